@@ -1,0 +1,164 @@
+//! Exact length of a classical CAN frame on the wire, stuff bits included (ISO 11898-1, 8.4 and 8.5).
+
+use crate::Frame;
+
+/// Intermission between frames, in bits.
+pub const INTERFRAME_SPACE_BITS: u32 = 3;
+
+/// An active error flag, the delimiter and intermission: what a destroyed frame costs at least, in bits.
+pub const ERROR_FRAME_BITS: u32 = 6 + 8 + INTERFRAME_SPACE_BITS;
+
+/// CRC delimiter, ACK slot, ACK delimiter, end of frame: never stuffed.
+const TAIL_BITS: u32 = 1 + 1 + 1 + 7;
+const STUFF_RUN: u8 = 5;
+const CRC_BITS: u32 = 15;
+const CRC_POLYNOMIAL: u16 = 0x4599;
+
+/// Bits from start of frame to the last bit of end of frame, with every stuff bit of the real contents.
+///
+/// The interframe space ([`INTERFRAME_SPACE_BITS`]) comes on top.
+pub fn frame_bits(frame: &Frame) -> u32 {
+    let mut wire = Wire::default();
+    wire.field(0, 1); // start of frame
+    let raw = frame.id().raw();
+    let remote = u32::from(frame.is_remote());
+    if frame.id().is_extended() {
+        wire.field(raw >> 18, 11);
+        wire.field(0b11, 2); // SRR, IDE
+        wire.field(raw & 0x3_FFFF, 18);
+        wire.field(remote, 1);
+        wire.field(0, 2); // r1, r0
+    } else {
+        wire.field(raw, 11);
+        wire.field(remote, 1);
+        wire.field(0, 2); // IDE, r0
+    }
+    wire.field(u32::from(frame.dlc()), 4);
+    for byte in frame.data() {
+        wire.field(u32::from(*byte), 8);
+    }
+    let crc = u32::from(wire.crc);
+    wire.field(crc, CRC_BITS);
+    wire.bits + TAIL_BITS
+}
+
+/// Counts bits as a transmitter puts them out.
+#[derive(Default)]
+struct Wire {
+    bits: u32,
+    crc: u16,
+    run: u8,
+    last: Option<bool>,
+}
+
+impl Wire {
+    fn field(&mut self, value: u32, width: u32) {
+        for shift in (0..width).rev() {
+            self.bit(value >> shift & 1 != 0);
+        }
+    }
+
+    fn bit(&mut self, bit: bool) {
+        let feedback = bit != (self.crc >> (CRC_BITS - 1) & 1 != 0);
+        self.crc = (self.crc << 1) & 0x7FFF;
+        if feedback {
+            self.crc ^= CRC_POLYNOMIAL;
+        }
+        self.put(bit);
+        if self.run == STUFF_RUN {
+            self.put(!bit);
+        }
+    }
+
+    fn put(&mut self, bit: bool) {
+        self.bits += 1;
+        self.run = if self.last == Some(bit) { self.run + 1 } else { 1 };
+        self.last = Some(bit);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::CanId;
+    use std::vec::Vec;
+
+    /// An independent count: build the bit string, divide by the CRC polynomial, stuff with a string scan.
+    fn by_strings(frame: &Frame) -> u32 {
+        let id = frame.id().raw();
+        let mut bits: Vec<u8> = Vec::from([0]);
+        let push = |bits: &mut Vec<u8>, value: u32, width: usize| {
+            let text = std::format!("{value:0width$b}");
+            bits.extend(text.bytes().map(|b| b - b'0'));
+        };
+        if frame.id().is_extended() {
+            push(&mut bits, id >> 18, 11);
+            push(&mut bits, 3, 2);
+            push(&mut bits, id & 0x3_FFFF, 18);
+            push(&mut bits, frame.is_remote() as u32, 1);
+            push(&mut bits, 0, 2);
+        } else {
+            push(&mut bits, id, 11);
+            push(&mut bits, frame.is_remote() as u32, 1);
+            push(&mut bits, 0, 2);
+        }
+        push(&mut bits, frame.dlc() as u32, 4);
+        frame.data().iter().for_each(|b| push(&mut bits, *b as u32, 8));
+        // Long division by x15+x14+x10+x8+x7+x4+x3+1.
+        let divisor: Vec<u8> = "1100010110011001".bytes().map(|b| b - b'0').collect();
+        let mut rest = bits.clone();
+        rest.extend([0; 15]);
+        for i in 0..bits.len() {
+            if rest[i] == 1 {
+                for (j, d) in divisor.iter().enumerate() {
+                    rest[i + j] ^= d;
+                }
+            }
+        }
+        let crc = rest[bits.len()..].to_vec();
+        bits.extend(crc);
+        let mut stuffed: Vec<u8> = Vec::new();
+        for bit in bits {
+            stuffed.push(bit);
+            let n = stuffed.len();
+            if n >= 5 && stuffed[n - 5..].iter().all(|b| *b == bit) {
+                // A run that a stuff bit already broke cannot reach five again unnoticed.
+                stuffed.push(1 - bit);
+            }
+        }
+        stuffed.len() as u32 + 10
+    }
+
+    #[test]
+    fn agrees_with_long_division_and_a_string_scan() {
+        let mut seed = 0x1234_5678_u32;
+        let mut next = || {
+            seed ^= seed << 13;
+            seed ^= seed >> 17;
+            seed ^= seed << 5;
+            seed
+        };
+        for round in 0..2_000 {
+            let length = (next() % 9) as u8;
+            let id = if round % 3 == 0 { CanId::extended(next()) } else { CanId::standard(next() as u16) };
+            let mask = [0xFF, 0x00, 0x81][round % 3];
+            let bytes: Vec<u8> = (0..length).map(|_| next() as u8 & mask).collect();
+            let frame = if round % 7 == 0 { Frame::remote(id, length) } else { Frame::new(id, &bytes) };
+            assert_eq!(frame_bits(&frame), by_strings(&frame), "{frame}");
+        }
+    }
+
+    #[test]
+    fn stays_within_the_standard_bounds() {
+        // Unstuffed: 44 + 8n bits without interframe space. Stuff bits: at most (34 + 8n - 1) / 4.
+        for n in 0..=8u32 {
+            for fill in [0x00, 0xFF, 0x55, 0x3C] {
+                let bits = frame_bits(&Frame::new(CanId::standard(0x2AA), &[fill; 8][..n as usize]));
+                assert!(bits >= 44 + 8 * n && bits <= 44 + 8 * n + (34 + 8 * n - 1) / 4);
+            }
+        }
+        // Runs of equal bits must be broken.
+        assert!(frame_bits(&Frame::full(CanId::standard(0), [0; 8])) > 108);
+    }
+}

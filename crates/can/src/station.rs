@@ -1,0 +1,34 @@
+use crate::{Frame, Instant};
+
+/// A thing on a bus: a drive, a master, a logger. A passive state machine.
+///
+/// # Contract
+/// - `now` never goes back between calls.
+/// - The runner calls [`handle_frame`](Self::handle_frame) for each frame that others sent, never for
+///   the station's own.
+/// - After every `handle_*` the runner drains [`poll_transmit`](Self::poll_transmit) as far as its
+///   mailboxes allow and asks [`poll_timeout`](Self::poll_timeout) again.
+/// - A frame from `poll_transmit` is offered, not sent: arbitration may delay it. The runner calls
+///   [`handle_transmitted`](Self::handle_transmitted) when the wire has taken it; inhibit times count
+///   from there.
+/// - Spurious calls do nothing.
+///
+/// A station holds no clock, thread, random source or `static`; a test may hold 127 of them.
+pub trait Station {
+    /// A frame arrived at `now`.
+    fn handle_frame(&mut self, frame: &Frame, now: Instant);
+
+    /// Time has reached `now`. Deadlines at or before `now` are served; extra calls do nothing.
+    fn handle_timeout(&mut self, now: Instant);
+
+    /// The next frame to send, most urgent first; `None` when there is nothing.
+    fn poll_transmit(&mut self) -> Option<Frame>;
+
+    /// When [`handle_timeout`](Self::handle_timeout) should next be called; `None` for never.
+    fn poll_timeout(&self) -> Option<Instant>;
+
+    /// The wire took `frame`, which came from [`poll_transmit`](Self::poll_transmit), at `now`.
+    fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
+        let _ = (frame, now);
+    }
+}
