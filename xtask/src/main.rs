@@ -1,1 +1,43 @@
-fn main() {}
+//! The project's own chores, in Rust, so that they run wherever the project builds.
+//!
+//! `cargo xtask test` runs everything that can fail; `cargo xtask tidy` checks what a program can check of the house
+//! style. Nothing here is part of what users get.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a chore talks to a terminal")]
+
+mod cargo_tests;
+mod examples;
+mod peers;
+mod process;
+mod steps;
+mod tally;
+mod test;
+mod tidy;
+mod workspace;
+
+use std::process::ExitCode;
+
+const USAGE: &str = "\
+The project's own chores.
+
+  cargo xtask test               every test, with a table and a count at the end
+  cargo xtask test --only STEP   one step (may be repeated)
+  cargo xtask test --list        the steps
+  cargo xtask tidy               the style that a program can check
+";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    match words.as_slice() {
+        ["test", rest @ ..] => test::command(rest),
+        ["tidy"] => tidy::command(),
+        [] | ["help" | "--help" | "-h"] => {
+            print!("{USAGE}");
+            ExitCode::SUCCESS
+        }
+        _ => {
+            eprint!("unknown chore: {}\n\n{USAGE}", words.join(" "));
+            ExitCode::from(2)
+        }
+    }
+}

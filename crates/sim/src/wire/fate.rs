@@ -17,7 +17,8 @@ impl Bus {
     /// Arbitration among all that may start at `now` on the main wire.
     pub(super) fn start_frame(&mut self, now: Instant) {
         self.waiting_count_idle(now);
-        let (mut winner, mut foreign): (Option<(u32, usize, Frame)>, Option<(usize, Frame)>) = (None, None);
+        let mut winner: Option<(u32, usize, Frame)> = None;
+        let mut foreign: Option<(usize, Frame)> = None;
         for i in 0..self.controllers.len() {
             if self.starts[i] > now {
                 continue;

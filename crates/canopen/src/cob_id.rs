@@ -1,0 +1,47 @@
+use can::CanId;
+
+/// The 32-bit value of a COB-ID object: identifier plus flags. Not what stands on the wire: see [`CanId`].
+///
+/// Source: CiA 301, 7.5.2.5 (SYNC), 7.5.2.17 (EMCY), 7.5.2.35 and 7.5.2.37 (PDO).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct CobId(pub u32);
+
+impl CobId {
+    /// Bit 31 of PDO and EMCY COB-IDs: the object does not exist / is not valid.
+    pub const INVALID: u32 = 1 << 31;
+    /// Bit 30 of TPDO COB-IDs: no RTR allowed; of the SYNC COB-ID: the device generates SYNC.
+    pub const NO_RTR: u32 = 1 << 30;
+    /// Bit 29: 29-bit identifier.
+    pub const EXTENDED: u32 = 1 << 29;
+
+    /// A valid COB-ID with a standard identifier and no flags.
+    pub const fn standard(id: u16) -> Self {
+        Self(id as u32 & 0x7FF)
+    }
+
+    /// False when bit 31 is set.
+    pub const fn is_valid(self) -> bool {
+        self.0 & Self::INVALID == 0
+    }
+
+    /// True when bit 29 is set.
+    pub const fn is_extended(self) -> bool {
+        self.0 & Self::EXTENDED != 0
+    }
+
+    /// The identifier on the wire.
+    pub const fn can_id(self) -> CanId {
+        if self.is_extended() { CanId::extended(self.0) } else { CanId::standard(self.0 as u16) }
+    }
+
+    /// True for identifiers that no PDO, SYNC or EMCY may use. Source: CiA 301, table 41 (restricted CAN-IDs).
+    pub const fn is_restricted(self) -> bool {
+        if self.is_extended() {
+            return false;
+        }
+        matches!(
+            self.0 as u16 & 0x7FF,
+            0x000..=0x07F | 0x101..=0x180 | 0x581..=0x5FF | 0x601..=0x67F | 0x6E0..=0x6FF | 0x701..=0x77F | 0x780..=0x7FF
+        )
+    }
+}

@@ -1,0 +1,179 @@
+use super::{Default, Object, Scalar, Slot, Table};
+use crate::{AbortCode, Mux, NodeId};
+
+/// The values of a device's objects: one 32-bit cell a row of its [`Table`], little endian in the low bytes.
+///
+/// `N` is the capacity in rows. Reading and writing by [`Object`] or [`Slot`] is an array access.
+#[derive(Clone)]
+pub struct Dictionary<const N: usize> {
+    table: &'static Table,
+    cells: [u32; N],
+}
+
+/// All values, to look at only; what a [`super::Check`] sees.
+#[derive(Clone, Copy)]
+pub struct View<'a> {
+    table: &'static Table,
+    cells: &'a [u32],
+}
+
+impl<const N: usize> Dictionary<N> {
+    /// Factory values for a device with this node-ID.
+    ///
+    /// # Panics
+    /// If the table has more than `N` rows.
+    pub fn new(table: &'static Table, node_id: NodeId) -> Self {
+        assert!(table.rows().len() <= N, "the table has more rows than the dictionary has cells");
+        let mut dictionary = Self { table, cells: [0; N] };
+        for (slot, _) in table.iter() {
+            dictionary.cells[slot.position()] = default_raw(table, slot, node_id);
+        }
+        dictionary
+    }
+
+    /// The rows.
+    pub const fn table(&self) -> &'static Table {
+        self.table
+    }
+
+    /// The value of a typed object.
+    #[inline]
+    pub fn get<T: Scalar>(&self, object: Object<T>) -> T {
+        T::from_raw(self.cells[object.slot().position()])
+    }
+
+    /// Stores the value of a typed object: the device's own right, no access or range is checked.
+    #[inline]
+    pub fn set<T: Scalar>(&mut self, object: Object<T>, value: T) {
+        self.cells[object.slot().position()] = value.to_raw();
+    }
+
+    /// The cell of a row.
+    #[inline]
+    pub fn raw(&self, slot: Slot) -> u32 {
+        self.cells[slot.position()]
+    }
+
+    /// Stores a cell; bits beyond the object's width are dropped. No access or range is checked.
+    #[inline]
+    pub fn set_raw(&mut self, slot: Slot, raw: u32) {
+        self.cells[slot.position()] = raw & self.table.row(slot).data_type.mask();
+    }
+
+    /// The value of a row as a number.
+    pub fn value(&self, slot: Slot) -> i64 {
+        self.table.row(slot).data_type.value(self.raw(slot))
+    }
+
+    /// Puts one row back to its factory value.
+    pub fn restore_default(&mut self, slot: Slot, node_id: NodeId) {
+        self.cells[slot.position()] = default_raw(self.table, slot, node_id);
+    }
+
+    /// All values, to look at.
+    pub fn view(&self) -> View<'_> {
+        View { table: self.table, cells: &self.cells }
+    }
+
+    /// Whether a peer (SDO or RPDO) may write `raw` to this row: access, listed values, limits, the row's check.
+    ///
+    /// # Errors
+    /// The abort code that an SDO server answers. Nothing is stored.
+    pub fn check_write(&self, slot: Slot, raw: u32) -> Result<(), AbortCode> {
+        let row = self.table.row(slot);
+        if !row.access.is_writable() {
+            return Err(AbortCode::READ_ONLY);
+        }
+        row.check_value(row.data_type.value(raw))?;
+        row.check.map_or(Ok(()), |check| check(&self.view(), raw))
+    }
+}
+
+impl View<'_> {
+    /// The rows.
+    pub const fn table(&self) -> &'static Table {
+        self.table
+    }
+
+    /// The value of a typed object.
+    pub fn get<T: Scalar>(&self, object: Object<T>) -> T {
+        T::from_raw(self.cells[object.slot().position()])
+    }
+
+    /// The cell of a row.
+    pub fn raw(&self, slot: Slot) -> u32 {
+        self.cells[slot.position()]
+    }
+
+    /// The value at a multiplexor as a number.
+    ///
+    /// # Errors
+    /// [`AbortCode::NO_SUCH_OBJECT`] or [`AbortCode::NO_SUCH_SUB_INDEX`].
+    pub fn value(&self, mux: Mux) -> Result<i64, AbortCode> {
+        let slot = self.table.find(mux)?;
+        Ok(self.table.row(slot).data_type.value(self.raw(slot)))
+    }
+}
+
+fn default_raw(table: &Table, slot: Slot, node_id: NodeId) -> u32 {
+    let row = table.row(slot);
+    match row.default {
+        Default::Value(value) => row.data_type.raw(value),
+        Default::NodeIdPlus(base) => base + u32::from(node_id.raw()),
+        Default::Text(_) => 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Access, DataType, Entry, keys};
+    use super::*;
+
+    static ROWS: [Entry; 4] = [
+        Entry::new(0x1000, 0, DataType::Unsigned32, Access::Const, "device_type", "").default(0x0004_0192),
+        Entry::new(0x1014, 0, DataType::Unsigned32, Access::ReadWrite, "cob_id_emcy", "").node_id_plus(0x80),
+        Entry::new(0x6060, 0, DataType::Integer8, Access::ReadWrite, "modes_of_operation", "")
+            .values(&[(0, "none"), (3, "velocity")]),
+        Entry::new(0x6071, 0, DataType::Integer16, Access::ReadWrite, "target_torque", "").range(-300, 300),
+    ];
+    static KEYS: [u32; 4] = keys(&ROWS);
+    static TABLE: Table = Table::new(&ROWS, &KEYS);
+    const TORQUE: Object<i16> = TABLE.object(0x6071, 0);
+
+    fn dictionary() -> Dictionary<8> {
+        Dictionary::new(&TABLE, NodeId::new(4).unwrap())
+    }
+
+    #[test]
+    fn defaults_include_the_node_id() {
+        assert_eq!(dictionary().raw(TABLE.slot(0x1014, 0)), 0x84);
+    }
+
+    #[test]
+    fn signed_values_keep_their_sign_in_a_cell() {
+        let mut dictionary = dictionary();
+        dictionary.set(TORQUE, -5);
+        assert_eq!(dictionary.get(TORQUE), -5);
+        assert_eq!(dictionary.raw(TORQUE.slot()), 0xFFFB);
+        assert_eq!(dictionary.value(TORQUE.slot()), -5);
+    }
+
+    #[test]
+    fn missing_object_and_missing_sub_index_are_told_apart() {
+        assert_eq!(TABLE.find(Mux::new(0x1000, 5)), Err(AbortCode::NO_SUCH_SUB_INDEX));
+        assert_eq!(TABLE.find(Mux::new(0x1003, 0)), Err(AbortCode::NO_SUCH_OBJECT));
+        assert_eq!(TABLE.find(Mux::new(0xFFFF, 0xFF)), Err(AbortCode::NO_SUCH_OBJECT));
+        assert_eq!(TABLE.find(Mux::new(0, 0)), Err(AbortCode::NO_SUCH_OBJECT));
+    }
+
+    #[test]
+    fn writes_are_checked_for_access_values_and_limits() {
+        let dictionary = dictionary();
+        let check = |mux, raw| dictionary.check_write(TABLE.find(mux).unwrap(), raw);
+        assert_eq!(check(Mux::new(0x1000, 0), 1), Err(AbortCode::READ_ONLY));
+        assert_eq!(check(Mux::new(0x6060, 0), 6), Err(AbortCode::INVALID_VALUE));
+        assert_eq!(check(Mux::new(0x6060, 0), 3), Ok(()));
+        assert_eq!(check(Mux::new(0x6071, 0), 301), Err(AbortCode::VALUE_TOO_HIGH));
+        assert_eq!(check(Mux::new(0x6071, 0), 0xFED3), Err(AbortCode::VALUE_TOO_LOW));
+    }
+}

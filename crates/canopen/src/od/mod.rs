@@ -1,0 +1,16 @@
+//! The object dictionary (CiA 301, clause 7.4): rows as const data, values beside them.
+//!
+//! A device writes one `static` array of [`Entry`] rows that reads like its manual's table. [`Table`] finds
+//! rows by multiplexor; [`Object`] is a row known at compile time, with its Rust type; [`Dictionary`] holds
+//! one 32-bit cell a row. Objects longer than four bytes are constant texts of the table: none of the drives
+//! has a writable one.
+
+mod data_type;
+mod dictionary;
+mod entry;
+mod table;
+
+pub use data_type::{DataType, Scalar};
+pub use dictionary::{Dictionary, View};
+pub use entry::{Access, Check, Default, Entry, PdoMapping};
+pub use table::{Object, Slot, Table, keys};

@@ -1,0 +1,125 @@
+//! `cargo xtask tidy`: the house rules that a program can check.
+//!
+//! Each rule is a function from a source file (or the workspace) to findings, lives beside its neighbours in one file
+//! per subject, and has a test that shows it a violation: a rule that cannot fail is worth nothing. What a rule may
+//! overlook is named in `exceptions`, each with its reason.
+
+mod banned;
+mod conventions;
+mod dependencies;
+mod exceptions;
+mod sizes;
+mod source;
+mod text;
+
+use std::fmt;
+use std::process::{Command, ExitCode};
+
+pub(crate) use dependencies::NO_STD;
+use source::Source;
+
+use crate::tally::Tally;
+use crate::{process, workspace};
+
+/// Something that a rule found. Printed as `path:line: what: why: what to do`.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Finding {
+    path: String,
+    line: usize,
+    /// The rule's name, which an exception refers to.
+    rule: &'static str,
+    what: String,
+    why: &'static str,
+    remedy: &'static str,
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}: {}: {}: {}", self.path, self.line, self.what, self.why, self.remedy)
+    }
+}
+
+/// A rule about one Rust file.
+type SourceRule = fn(&Source) -> Vec<Finding>;
+/// A rule about one text file of any kind: its path and its contents.
+type TextRule = fn(&str, &str) -> Vec<Finding>;
+
+const SOURCE_RULES: &[SourceRule] = &[
+    banned::in_code,
+    banned::left_undone,
+    banned::std_in_core,
+    conventions::module_docs,
+    conventions::test_names,
+    conventions::reasons,
+    conventions::field_words,
+    conventions::banners,
+    sizes::files,
+    sizes::functions,
+];
+
+const TEXT_RULES: &[TextRule] = &[text::typography, text::machine_paths, text::line_ends];
+
+/// Runs `cargo xtask tidy`.
+pub(crate) fn command() -> ExitCode {
+    let tally = step();
+    println!("{}", tally.summary());
+    if tally.failed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// The tidy step of `cargo xtask test`: prints the findings; each counts as one failure.
+pub(crate) fn step() -> Tally {
+    let findings = match findings() {
+        Ok(findings) => findings,
+        Err(error) => return Tally::failed(error),
+    };
+    findings.iter().for_each(|finding| println!("{finding}"));
+    let failed = u32::try_from(findings.len()).unwrap_or(u32::MAX);
+    if failed == 0 { Tally::passed() } else { Tally { failed, note: "findings above".into(), ..Tally::default() } }
+}
+
+fn findings() -> Result<Vec<Finding>, String> {
+    let mut found = dependencies::directions(&workspace::packages()?, |folder| {
+        std::fs::read_to_string(workspace::root().join(folder).join("Cargo.toml")).unwrap_or_default()
+    });
+    for path in tracked_files()? {
+        // A file that is listed but deleted, or that is not text, has no style.
+        let Ok(text) = std::fs::read_to_string(workspace::root().join(&path)) else { continue };
+        TEXT_RULES.iter().for_each(|rule| found.extend(rule(&path, &text)));
+        if path.ends_with(".rs") {
+            let source = Source::new(&path, &text);
+            SOURCE_RULES.iter().for_each(|rule| found.extend(rule(&source)));
+        }
+    }
+    let mut found = exceptions::apply(found, exceptions::EXCEPTIONS);
+    found.sort();
+    Ok(found)
+}
+
+/// Every file that is, or would be, under version control.
+fn tracked_files() -> Result<Vec<String>, String> {
+    let mut git = Command::new("git");
+    git.current_dir(workspace::root()).args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"]);
+    let list = process::output(&mut git)?;
+    let mut paths: Vec<String> = list.split('\0').filter(|path| !path.is_empty()).map(str::to_owned).collect();
+    paths.sort();
+    paths.dedup();
+    Ok(paths)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_finding_says_where_what_why_and_what_to_do() {
+        let finding = Finding {
+            path: "a.rs".into(),
+            line: 3,
+            rule: "sample",
+            what: "a thing".into(),
+            why: "it is bad",
+            remedy: "do another",
+        };
+        assert_eq!(finding.to_string(), "a.rs:3: a thing: it is bad: do another");
+    }
+}
