@@ -20,7 +20,7 @@ fn run(mut hub: Hub) {
 
 async fn next_frame(hub: &mut Hub, clock: &WallClock) -> (ClientId, Frame) {
     loop {
-        if let HubEvent::Frame { client, frame } = soon(clock, Hub::recv(hub)).await {
+        if let HubEvent::Frame { client, frame } = soon(clock, hub.next_event()).await {
             return (client, frame);
         }
     }
@@ -28,7 +28,7 @@ async fn next_frame(hub: &mut Hub, clock: &WallClock) -> (ClientId, Frame) {
 
 async fn left(hub: &mut Hub, clock: &WallClock) -> LeaveReason {
     loop {
-        if let HubEvent::Left { reason, .. } = soon(clock, Hub::recv(hub)).await {
+        if let HubEvent::Left { reason, .. } = soon(clock, hub.next_event()).await {
             return reason;
         }
     }
@@ -177,7 +177,7 @@ async fn a_client_faster_than_the_bus_is_slowed_down() {
     }
     // All 64 are under way, so nothing more comes, however long one waits.
     clock.sleep(Duration::from_millis(50)).await;
-    assert_eq!(hub.try_recv(), None);
+    assert_eq!(hub.try_next_event(), None);
     for _ in 64..500 {
         hub.broadcast(&frame("123#"), clock.now(), Some(id));
         next_frame(&mut hub, &clock).await;
@@ -203,7 +203,7 @@ async fn a_client_that_never_reads_is_dropped_and_holds_up_nobody() {
         for _ in 0..100 {
             heard(&mut reader, &clock).await;
         }
-        if let Some(HubEvent::Left { reason, .. }) = hub.try_recv() {
+        if let Some(HubEvent::Left { reason, .. }) = hub.try_next_event() {
             break reason;
         }
         assert!(clock.now() - start < PATIENCE, "the sleeper is still there");
