@@ -1,0 +1,63 @@
+//! S-shaped profiles from acceleration and deceleration *times*, as the ZL drives plan them.
+//!
+//! The times are those of the velocity change from the present to the target speed (ZLAC8030L quick start guide
+//! V1.00, objects 6083h and 6084h, "S-shaped acceleration time"). Velocity runs as two joined parabolas, so the
+//! acceleration is continuous and peaks in the middle at `2 * dv / T`, twice its mean.
+//!
+//! A move too short for its full speed keeps the pace of the full change, with a lower peak and shorter times: no
+//! manual says so, but the alternative, the full times for any short move, would take a second for one count.
+
+use crate::profile::{self, MoveLimits, Profile, Shape, pace, sane, sane_time};
+
+/// Change of velocity from `from` to `to` (units/s) in `time_s`. Zero time is a step.
+pub fn velocity_change(from: f64, to: f64, time_s: f64) -> Profile {
+    profile::velocity_change(Shape::Parabolic, sane(from), sane(to), sane_time(time_s))
+}
+
+/// A move from one position to another.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct PositionMove {
+    /// Signed way to go, in units.
+    pub distance: f64,
+    /// Present velocity, units/s, signed.
+    pub velocity: f64,
+    /// Speed that a motion from rest begins with, units/s.
+    pub start_speed: f64,
+    /// Speed of the plateau, units/s. With zero the motion only comes to rest, short of its distance.
+    pub max_speed: f64,
+    /// Speed that the motion ends from, units/s.
+    pub end_speed: f64,
+    /// Time from the present (or start) speed to the plateau.
+    pub acceleration_time_s: f64,
+    /// Time from the plateau to the end speed.
+    pub deceleration_time_s: f64,
+}
+
+impl PositionMove {
+    /// Plans the move. Any input gives a finite plan: what is not a number counts as zero, signs of speeds are
+    /// dropped, a start or end speed above the plateau counts as the plateau.
+    pub fn plan(&self) -> Profile {
+        let distance = sane(self.distance);
+        let velocity = sane(self.velocity);
+        let max_speed = sane(self.max_speed).abs();
+        let start_speed = sane(self.start_speed).abs().min(max_speed);
+        let end_speed = sane(self.end_speed).abs().min(max_speed);
+
+        // The speed the change really starts from: the present one when the motion already goes the right way.
+        let approach = if distance < 0.0 { -velocity } else { velocity };
+        let from = approach.max(start_speed).min(max_speed);
+        let up = pace(sane_time(self.acceleration_time_s), from, max_speed);
+        let deceleration_time_s = sane_time(self.deceleration_time_s);
+        let down = pace(deceleration_time_s, max_speed, end_speed)
+            // Plateau and end speed equal: slowing down from elsewhere takes the time of the plateau's whole speed.
+            .or(pace(deceleration_time_s, max_speed, 0.0));
+        let limits = MoveLimits {
+            start_speed,
+            max_speed,
+            end_speed,
+            acceleration_pace: up.unwrap_or(0.0),
+            deceleration_pace: down.unwrap_or(0.0),
+        };
+        profile::position_move(Shape::Parabolic, distance, velocity, limits)
+    }
+}

@@ -1,0 +1,116 @@
+//! A turning inertia with friction that truly holds.
+//!
+//! ```text
+//! J dw/dt = motor torque - load torque - viscous * w - dry friction * sign(w)
+//! ```
+//!
+//! Dry friction is solved implicitly: it takes away exactly what is needed to stop and no more, so that a rotor at
+//! rest under less torque than the friction stays at the same angle to the last bit. The load torque is active: a
+//! positive one opposes positive motion, and it drives the motor when the motor does not hold it.
+
+use crate::angle::Angle;
+
+const INV_TAU: f64 = 1.0 / core::f64::consts::TAU;
+
+/// What never changes about a rotor and its bearings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RotorModel {
+    /// Inertia of the rotor alone.
+    pub inertia_kg_m2: f64,
+    /// Torque per velocity.
+    pub viscous_nm_s: f64,
+    /// Dry friction: torque against any motion, and the torque that holds at rest.
+    pub coulomb_nm: f64,
+}
+
+/// What is joined to the shaft. All of it may be changed while running.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Load {
+    /// Inertia that turns with the rotor.
+    pub inertia_kg_m2: f64,
+    /// Active torque, signed: positive opposes positive motion. A weight on a rope, a slope, another motor.
+    pub torque_nm: f64,
+    /// Passive dry friction of the load.
+    pub coulomb_nm: f64,
+    /// Passive viscous friction of the load.
+    pub viscous_nm_s: f64,
+    /// The shaft is held fast: nothing moves it.
+    pub locked: bool,
+}
+
+/// State of the rotor.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct RotorData {
+    /// Mechanical angle.
+    pub angle: Angle,
+    /// Mechanical velocity.
+    pub velocity_rad_s: f64,
+    /// Acceleration over the last step; predicts the middle of the next one.
+    pub acceleration_rad_s2: f64,
+}
+
+/// What happened during one step.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct RotorOutput {
+    /// Mean velocity over the step.
+    pub velocity_rad_s: f64,
+    /// Heat of all friction, brake included.
+    pub friction_w: f64,
+    /// Power given to the active load torque; negative while the load drives.
+    pub load_w: f64,
+}
+
+impl RotorModel {
+    /// Energy of the turning masses.
+    pub fn kinetic_energy_j(&self, data: &RotorData, load: &Load) -> f64 {
+        0.5 * (self.inertia_kg_m2 + load.inertia_kg_m2) * data.velocity_rad_s * data.velocity_rad_s
+    }
+
+    /// Moves the rotor by one step under a motor torque, its load and a brake's friction torque.
+    ///
+    /// Implicit midpoint: `w_mean = w + dt/2J * (torques at w_mean)`.
+    #[inline]
+    pub fn step(&self, data: &mut RotorData, dt_s: f64, motor_nm: f64, load: &Load, brake_nm: f64) -> RotorOutput {
+        if load.locked {
+            *data = RotorData { angle: data.angle, ..RotorData::default() };
+            return RotorOutput::default();
+        }
+        let half_s = 0.5 * dt_s;
+        let inertia = self.inertia_kg_m2 + load.inertia_kg_m2;
+        let viscous = self.viscous_nm_s + load.viscous_nm_s;
+        let dry = self.coulomb_nm + load.coulomb_nm + brake_nm;
+        let before = data.velocity_rad_s;
+        let torque = motor_nm - load.torque_nm;
+
+        let drive = inertia * before + half_s * torque;
+        let excess = (drive.abs() - half_s * dry).max(0.0);
+        let mean = excess.copysign(drive) / (inertia + half_s * viscous);
+        let after = 2.0 * mean - before;
+        let crosses_zero = mean == 0.0 || (after < 0.0) != (mean < 0.0);
+        let (mean, after) = if crosses_zero && torque.abs() <= dry {
+            (stopping_velocity(inertia, before, torque, dry, dt_s), 0.0)
+        } else {
+            (mean, after)
+        };
+
+        data.angle = data.angle.advanced_by(mean * dt_s * INV_TAU);
+        data.velocity_rad_s = after;
+        data.acceleration_rad_s2 = (after - before) / dt_s;
+        // What the torques brought in and is not kinetic energy now went into friction.
+        let friction_w = torque * mean - 0.5 * inertia * (after + before) * data.acceleration_rad_s2;
+        RotorOutput { velocity_rad_s: mean, friction_w, load_w: load.torque_nm * mean }
+    }
+
+    /// Velocity in the middle of the next step, if the acceleration stays what it was.
+    #[inline]
+    pub fn predicted_velocity_rad_s(&self, data: &RotorData, dt_s: f64) -> f64 {
+        data.velocity_rad_s + 0.5 * dt_s * data.acceleration_rad_s2
+    }
+}
+
+/// Mean velocity of a step in which dry friction stops the rotor: half the velocity it had, for as long as it moved.
+fn stopping_velocity(inertia: f64, before: f64, torque: f64, dry: f64, dt_s: f64) -> f64 {
+    let deceleration_nm = dry - torque * 1_f64.copysign(before);
+    let moving = (inertia * before.abs() / (deceleration_nm * dt_s)).min(1.0);
+    0.5 * before * moving
+}

@@ -1,0 +1,216 @@
+//! The direct-voltage side: a source that gives but cannot take, the bus capacitor, the drive's own consumption and
+//! a bleeder (brake chopper) resistor.
+//!
+//! ```text
+//! C dV/dt = (V_source - V) / R_source [only while V < V_source] - P_load / V - V / R_bleeder [while switched on]
+//! ```
+//!
+//! Regeneration is a negative load; with no way back into the source it raises the capacitor's voltage. The implicit
+//! midpoint rule makes this one quadratic equation per step, and the energies close to the last bits.
+
+use crate::thermal::{BodyData, BodyModel};
+
+/// What never changes about a supply.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SupplyModel {
+    /// Resistance of source and wires.
+    pub source_resistance_ohm: f64,
+    /// Bus capacitor.
+    pub capacitance_f: f64,
+    /// What the drive's own electronics take while the bus holds at least `consumption_from_v`.
+    pub consumption_w: f64,
+    /// Bus voltage under which the drive's electronics are off.
+    pub consumption_from_v: f64,
+    /// The bleeder.
+    pub bleeder: BleederModel,
+}
+
+/// What never changes about a bleeder resistor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BleederModel {
+    /// Resistance.
+    pub resistance_ohm: f64,
+    /// Power that it stands for ever.
+    pub rated_power_w: f64,
+    /// Time constant of its warming.
+    pub time_constant_s: f64,
+    /// Warming, relative to that at rated power, at which it burns out (stays open).
+    pub burn_out_load: f64,
+}
+
+impl BleederModel {
+    /// The resistor as a body whose temperature is its load relative to the rating: 1 in the end at rated power.
+    fn body(&self) -> BodyModel {
+        let resistance_k_w = 1.0 / self.rated_power_w;
+        BodyModel { resistance_k_w, capacity_j_k: self.time_constant_s / resistance_k_w }
+    }
+}
+
+/// State of a supply. `source_v` and `connected` may be changed while running.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SupplyData {
+    /// Open-circuit voltage of the source.
+    pub source_v: f64,
+    /// The source is switched on and wired.
+    pub connected: bool,
+    /// Voltage of the bus capacitor.
+    pub bus_v: f64,
+    /// Warming of the bleeder relative to that at rated power for ever.
+    pub bleeder_load: f64,
+    /// The bleeder has burnt out and does not conduct any more.
+    pub bleeder_burnt: bool,
+}
+
+impl SupplyData {
+    /// A supply whose capacitor has been charged.
+    pub fn charged(source_v: f64) -> Self {
+        SupplyData { source_v, connected: true, bus_v: source_v, bleeder_load: 0.0, bleeder_burnt: false }
+    }
+}
+
+/// Mean powers of one step.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct SupplyOutput {
+    /// What the source gave behind its inner resistance: into the capacitor.
+    pub source_w: f64,
+    /// What the drive's electronics took.
+    pub consumption_w: f64,
+    /// Heat of the bleeder.
+    pub bleeder_w: f64,
+}
+
+impl SupplyModel {
+    /// Energy in the bus capacitor.
+    pub fn stored_energy_j(&self, data: &SupplyData) -> f64 {
+        0.5 * self.capacitance_f * data.bus_v * data.bus_v
+    }
+
+    /// Moves the bus by one step while the inverter takes `load_w` (negative: gives back).
+    ///
+    /// A load that the source cannot carry pulls the bus to zero.
+    #[inline]
+    pub fn step(&self, data: &mut SupplyData, dt_s: f64, load_w: f64, bleeder_on: bool) -> SupplyOutput {
+        let before = data.bus_v;
+        let consumption_w = if before > self.consumption_from_v { self.consumption_w } else { 0.0 };
+        let bleeder_s = if bleeder_on && !data.bleeder_burnt { 1.0 / self.bleeder.resistance_ohm } else { 0.0 };
+        let step = BusStep {
+            store_s: 2.0 * self.capacitance_f / dt_s,
+            source_s: 1.0 / self.source_resistance_ohm,
+            source_v: if data.connected { data.source_v } else { 0.0 },
+            bleeder_s,
+            power_w: load_w + consumption_w,
+        };
+        // The diode conducts when that leads to a bus below the source.
+        let guess = before < step.source_v;
+        let mean = step.mean_voltage(before, guess);
+        let conducts = mean < step.source_v;
+        let mean = if conducts == guess { mean } else { step.mean_voltage(before, conducts) };
+        data.bus_v = (2.0 * mean - before).max(0.0);
+
+        let bleeder_w = bleeder_s * mean * mean;
+        self.warm_bleeder(data, dt_s, bleeder_w);
+        let source_a = if conducts { (step.source_v - mean) * step.source_s } else { 0.0 };
+        SupplyOutput { source_w: source_a * mean, consumption_w, bleeder_w }
+    }
+
+    #[inline]
+    fn warm_bleeder(&self, data: &mut SupplyData, dt_s: f64, bleeder_w: f64) {
+        if bleeder_w == 0.0 && data.bleeder_load == 0.0 {
+            return;
+        }
+        let mut body = BodyData { temperature_c: data.bleeder_load, hold_c: None };
+        self.bleeder.body().step(&mut body, dt_s, bleeder_w, 0.0);
+        data.bleeder_load = body.temperature_c;
+        data.bleeder_burnt |= data.bleeder_load > self.bleeder.burn_out_load;
+    }
+}
+
+/// One step of the bus: conductances and the constant power.
+struct BusStep {
+    store_s: f64,
+    source_s: f64,
+    source_v: f64,
+    bleeder_s: f64,
+    power_w: f64,
+}
+
+impl BusStep {
+    /// `a V^2 - b V + P = 0` for the mean voltage, with `a` the sum of the conductances and `b` their currents.
+    #[inline]
+    fn mean_voltage(&self, before: f64, source_conducts: bool) -> f64 {
+        let source_s = if source_conducts { self.source_s } else { 0.0 };
+        let a = self.store_s + source_s + self.bleeder_s;
+        let b = self.store_s * before + source_s * self.source_v;
+        let discriminant = (b * b - 4.0 * a * self.power_w).max(0.0);
+        (b + libm::sqrt(discriminant)) / (2.0 * a)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SUPPLY: SupplyModel = SupplyModel {
+        source_resistance_ohm: 0.1,
+        capacitance_f: 2e-3,
+        consumption_w: 0.0,
+        consumption_from_v: 10.0,
+        bleeder: BleederModel { resistance_ohm: 5.0, rated_power_w: 100.0, time_constant_s: 30.0, burn_out_load: 2.0 },
+    };
+
+    #[test]
+    fn the_bus_sags_by_the_inner_resistance() {
+        let mut data = SupplyData::charged(48.0);
+        for _ in 0..20_000 {
+            SUPPLY.step(&mut data, 50e-6, 470.0, false);
+        }
+        // V (48 - V) / 0.1 = 470 has the root V = 47.
+        assert!((data.bus_v - 47.0).abs() < 1e-9, "{}", data.bus_v);
+    }
+
+    #[test]
+    fn regeneration_raises_the_bus_by_its_energy_and_nothing_flows_back() {
+        let mut data = SupplyData::charged(48.0);
+        let before = SUPPLY.stored_energy_j(&data);
+        for _ in 0..1000 {
+            let out = SUPPLY.step(&mut data, 50e-6, -100.0, false);
+            assert_eq!(out.source_w, 0.0);
+        }
+        // 100 W for 50 ms into the capacitor.
+        assert!((SUPPLY.stored_energy_j(&data) - before - 5.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_bleeder_discharges_the_bus_with_its_time_constant() {
+        let mut data = SupplyData { connected: false, ..SupplyData::charged(70.0) };
+        for _ in 0..200 {
+            SUPPLY.step(&mut data, 50e-6, 0.0, true);
+        }
+        // R C = 10 ms, after 10 ms.
+        assert!((data.bus_v - 70.0 * libm::exp(-1.0)).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_bleeder_stands_its_rated_power_and_burns_out_far_above() {
+        let mut rated = SupplyData::charged(libm::sqrt(100.0 * 5.0));
+        let stiff = SupplyModel { source_resistance_ohm: 1e-3, ..SUPPLY };
+        for _ in 0..300_000 {
+            stiff.step(&mut rated, 1e-3, 0.0, true);
+        }
+        assert!((rated.bleeder_load - 1.0).abs() < 2e-3 && !rated.bleeder_burnt);
+        let mut over = SupplyData::charged(70.0);
+        for _ in 0..30_000 {
+            stiff.step(&mut over, 1e-3, 0.0, true);
+        }
+        assert!(over.bleeder_burnt);
+    }
+
+    #[test]
+    fn an_impossible_load_pulls_the_bus_down_without_harm() {
+        let mut data = SupplyData::charged(48.0);
+        for _ in 0..10_000 {
+            SUPPLY.step(&mut data, 50e-6, 50_000.0, false);
+            assert!(data.bus_v >= 0.0 && data.bus_v.is_finite());
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! One lumped body that warms and cools against the ambient: a winding, a heat sink, a resistor.
+//!
+//! ```text
+//! C dT/dt = P - (T - T_ambient) / R_th          time constant R_th C
+//! ```
+//!
+//! Explicit steps: sound because bodies are thousands of steps slow.
+
+/// What never changes about a body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BodyModel {
+    /// Thermal resistance to the ambient.
+    pub resistance_k_w: f64,
+    /// Heat capacity.
+    pub capacity_j_k: f64,
+}
+
+/// State of a body.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct BodyData {
+    /// Its temperature.
+    pub temperature_c: f64,
+    /// A temperature that the body is held at, whatever the heat: lets a test bring about an over-temperature.
+    pub hold_c: Option<f64>,
+}
+
+impl BodyModel {
+    /// A body in balance with its surroundings.
+    pub fn at_ambient(&self, ambient_c: f64) -> BodyData {
+        BodyData { temperature_c: ambient_c, hold_c: None }
+    }
+
+    /// Time constant of warming and cooling.
+    pub fn time_constant_s(&self) -> f64 {
+        self.resistance_k_w * self.capacity_j_k
+    }
+
+    /// Warms the body by `heat_w` for one step.
+    #[inline]
+    pub fn step(&self, data: &mut BodyData, dt_s: f64, heat_w: f64, ambient_c: f64) {
+        if let Some(temperature_c) = data.hold_c {
+            data.temperature_c = temperature_c;
+            return;
+        }
+        let flow_w_by_resistance = heat_w * self.resistance_k_w - (data.temperature_c - ambient_c);
+        data.temperature_c += dt_s * flow_w_by_resistance / (self.resistance_k_w * self.capacity_j_k);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BODY: BodyModel = BodyModel { resistance_k_w: 2.0, capacity_j_k: 50.0 };
+
+    #[test]
+    fn a_heated_body_follows_its_time_constant_to_its_steady_state() {
+        let mut body = BODY.at_ambient(25.0);
+        for _ in 0..100_000 {
+            BODY.step(&mut body, 1e-3, 10.0, 25.0);
+        }
+        // One time constant: 1 - 1/e of 20 K.
+        let expected = 25.0 + 20.0 * (1.0 - libm::exp(-1.0));
+        assert!((body.temperature_c - expected).abs() < 1e-3);
+        for _ in 0..2_000_000 {
+            BODY.step(&mut body, 1e-3, 10.0, 25.0);
+        }
+        assert!((body.temperature_c - 45.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_held_temperature_stays_until_it_is_let_go() {
+        let mut body = BODY.at_ambient(25.0);
+        body.hold_c = Some(95.0);
+        BODY.step(&mut body, 1e-3, 0.0, 25.0);
+        assert_eq!(body.temperature_c, 95.0);
+        body.hold_c = None;
+        BODY.step(&mut body, 1e-3, 0.0, 25.0);
+        assert!(body.temperature_c < 95.0 && body.temperature_c > 94.9);
+    }
+}
