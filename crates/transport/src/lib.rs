@@ -1,1 +1,31 @@
-//! (to come)
+//! CAN over sockets, serial lines and log files, client and server side, and the loops that run stations on them.
+//!
+//! - [`AsyncBus`] is a bus that is somewhere else; [`BusSpec`] opens one from a text such as `socketcand://HOST:PORT/can0`.
+//! - [`Hub`] serves a bus to other programs over socketcand and slcan.
+//! - [`run_station`] drives a passive [`can::Station`] on a bus, [`run_world`] a virtual world behind a hub.
+//! - [`socketcand`], [`slcan`] and [`log`] are the wire formats, as pure codecs that any other program may use.
+//!
+//! This crate holds the only clock ([`WallClock`]) and the only sockets of the project. Everything else is sans-IO.
+//! Linux SocketCAN is deliberately absent so far: it needs a kernel module that few test machines have.
+
+mod bus;
+mod bus_spec;
+mod clock;
+mod hub;
+mod link;
+pub mod log;
+mod run;
+pub mod slcan;
+pub mod socketcand;
+#[cfg(test)]
+mod testing;
+mod text;
+
+pub use bus::{AnyBus, AsyncBus, BusError};
+pub use bus_spec::{BusSpec, ParseBusError, Protocol, ServeSpec};
+pub use clock::{Sleep, WallClock};
+pub use hub::{ClientId, Hub, HubError, HubEvent, HubOptions, LeaveReason, Listener};
+pub use log::LogBus;
+pub use run::{Heard, RealTimeWorld, run_station, run_world};
+pub use slcan::SlcanBus;
+pub use socketcand::SocketcandBus;

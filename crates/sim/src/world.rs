@@ -1,0 +1,185 @@
+//! Drives, stations and the bus between them, moved from event to event in virtual time.
+
+mod access;
+mod digest;
+mod due;
+mod log;
+mod member;
+mod step;
+mod tap;
+
+use std::time::Duration;
+
+use can::{Bitrate, Frame, Instant, Station};
+
+pub use digest::Digest;
+pub use log::FrameLog;
+pub use member::AnyStation;
+
+use crate::fault::{Corruption, NodeFaults};
+use crate::wire::{Bus, ControllerOptions};
+use crate::{Prng, VirtualDrive};
+use due::DueTimes;
+use member::{Member, Nobody};
+use tap::Tap;
+
+/// A bus with everything on it.
+///
+/// A clone is a snapshot: it goes on with identical results. (A station that shares state with others,
+/// such as a handle to a master, shares it with its clone too.)
+#[derive(Clone)]
+pub struct World {
+    now: Instant,
+    bus: Bus,
+    members: Vec<Member>,
+    due: DueTimes,
+    log: FrameLog,
+    digest: Digest,
+}
+
+/// Names one station of one world: what `add_*` returned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct StationId(usize);
+
+impl StationId {
+    /// The number of its controller in [`WireEvent`](crate::wire::WireEvent).
+    pub fn index(self) -> usize {
+        self.0
+    }
+}
+
+/// Why a world did not do what it was told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum WorldError {
+    /// A second drive under one number.
+    #[error("there is already a drive {0}")]
+    DuplicateDrive(u8),
+    /// No drive was added under this number.
+    #[error("there is no drive {0}")]
+    NoSuchDrive(u8),
+    /// The station is no tap.
+    #[error("station {} is no tap", .0.0)]
+    NotATap(StationId),
+    /// More frames wait at this tap than it can hold.
+    #[error("too many frames wait to be sent")]
+    TapFull,
+}
+
+impl World {
+    /// An empty bus at time zero. `seed` decides everything random.
+    pub fn new(bitrate: Bitrate, seed: u64) -> Self {
+        let mut seeds = Prng::new(seed);
+        Self {
+            now: Instant::ZERO,
+            bus: Bus::new(bitrate, seeds.next_u64()),
+            members: Vec::new(),
+            due: DueTimes::default(),
+            log: FrameLog::default(),
+            digest: Digest::default(),
+        }
+    }
+
+    /// Adds a drive under a number (the one users know it by, whatever its node-ID becomes) and powers it.
+    pub fn add_drive(&mut self, number: u8, drive: Box<dyn VirtualDrive>) -> Result<StationId, WorldError> {
+        if self.drive_id(number).is_some() {
+            return Err(WorldError::DuplicateDrive(number));
+        }
+        let id = self.add(Member::Drive { number, drive }, ControllerOptions::MICROCONTROLLER);
+        self.with_drive(number, |drive, now| drive.set_power(true, now))?;
+        Ok(id)
+    }
+
+    /// Adds a station at the bus's bit rate, with a microcontroller's CAN controller.
+    pub fn add_station<S: Station + Clone + Send + 'static>(&mut self, station: S) -> StationId {
+        self.add_station_with(station, ControllerOptions::MICROCONTROLLER, self.bus.bitrate())
+    }
+
+    /// Adds a station with a controller of its own kind and bit rate.
+    pub fn add_station_with<S: Station + Clone + Send + 'static>(
+        &mut self,
+        station: S,
+        options: ControllerOptions,
+        bitrate: Bitrate,
+    ) -> StationId {
+        let id = self.add(Member::Station(Box::new(station)), options);
+        self.bus.restart(id.0, Some(bitrate), self.now);
+        self.serve(id.0);
+        id
+    }
+
+    /// Adds a CAN adapter that is written and read from outside: [`send`](Self::send), [`poll_received`](Self::poll_received).
+    pub fn add_tap(&mut self) -> StationId {
+        let id = self.add(Member::Tap(Tap::default()), ControllerOptions::ADAPTER);
+        self.bus.restart(id.0, Some(self.bus.bitrate()), self.now);
+        id
+    }
+
+    /// Takes a station off the bus for good. Its identifier is not given to another.
+    pub fn remove(&mut self, id: StationId) {
+        self.members[id.0] = Member::Gone(Nobody);
+        self.bus.restart(id.0, None, self.now);
+        self.due.set(id.0, Instant::FAR_FUTURE);
+    }
+
+    /// The present.
+    pub fn now(&self) -> Instant {
+        self.now
+    }
+
+    /// Moves on until nothing is left to do at or before `end`; then it is `end`.
+    pub fn run_until(&mut self, end: Instant) {
+        while self.next_event().is_some_and(|at| at <= end) {
+            self.step();
+        }
+        self.now = self.now.max(end);
+    }
+
+    /// Moves on by `duration`.
+    pub fn run_for(&mut self, duration: Duration) {
+        self.run_until(self.now + duration);
+    }
+
+    /// Queues a frame at a tap.
+    pub fn send(&mut self, tap: StationId, frame: Frame) -> Result<(), WorldError> {
+        let Member::Tap(it) = &mut self.members[tap.0] else { return Err(WorldError::NotATap(tap)) };
+        it.send(frame).map_err(|_| WorldError::TapFull)?;
+        self.collect(tap.0);
+        Ok(())
+    }
+
+    /// The next frame a tap heard, with the time of its last bit. Frames it sent itself are not among them.
+    pub fn poll_received(&mut self, tap: StationId) -> Option<(Instant, Frame)> {
+        match &mut self.members[tap.0] {
+            Member::Tap(tap) => tap.poll_received(),
+            _ => None,
+        }
+    }
+
+    /// Cuts a station's cable. It goes on alone.
+    pub fn cut(&mut self, id: StationId) {
+        self.bus.cut(id.0, self.now);
+        self.keep_events();
+    }
+
+    /// Joins a cut cable.
+    pub fn join(&mut self, id: StationId) {
+        self.bus.join(id.0, self.now);
+        self.keep_events();
+    }
+
+    /// Sets what is wrong with a station's access to the bus.
+    pub fn set_node_faults(&mut self, id: StationId, faults: NodeFaults) {
+        self.bus.set_faults(id.0, faults, self.now);
+        self.collect(id.0);
+    }
+
+    /// Sets how the wire is disturbed from the next frame on.
+    pub fn set_corruption(&mut self, corruption: Corruption) {
+        self.bus.set_corruption(corruption);
+    }
+
+    /// A copy to come back to.
+    pub fn snapshot(&self) -> Self {
+        self.clone()
+    }
+}

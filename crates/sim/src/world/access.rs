@@ -1,0 +1,118 @@
+//! Looking at what is in a world, and operating its drives.
+
+use can::{Bitrate, Instant};
+
+use super::member::Member;
+use super::{Digest, FrameLog, StationId, World, WorldError};
+use crate::wire::{ControllerOptions, ErrorCounters, Statistics};
+use crate::{Report, VirtualDrive};
+
+impl World {
+    /// Operates the drive added under `number`: inputs, loads, faults, power.
+    pub fn with_drive<T>(
+        &mut self,
+        number: u8,
+        operate: impl FnOnce(&mut dyn VirtualDrive, Instant) -> T,
+    ) -> Result<T, WorldError> {
+        let id = self.drive_id(number).ok_or(WorldError::NoSuchDrive(number))?;
+        let Member::Drive { drive, .. } = &mut self.members[id.0] else {
+            return Err(WorldError::NoSuchDrive(number));
+        };
+        let result = operate(&mut **drive, self.now);
+        self.serve(id.0);
+        self.keep_events();
+        Ok(result)
+    }
+
+    /// What can be measured at the drive added under `number`, now.
+    pub fn report(&mut self, number: u8) -> Result<Report, WorldError> {
+        self.with_drive(number, |drive, now| {
+            drive.advance(now);
+            drive.report()
+        })
+    }
+
+    /// Switches the supply of the drive added under `number`.
+    pub fn set_power(&mut self, number: u8, on: bool) -> Result<(), WorldError> {
+        self.with_drive(number, |drive, now| drive.set_power(on, now))
+    }
+
+    /// The station of the drive added under `number`.
+    pub fn drive_id(&self, number: u8) -> Option<StationId> {
+        let is_it = |member: &Member| matches!(member, Member::Drive { number: it, .. } if *it == number);
+        self.members.iter().position(is_it).map(StationId)
+    }
+
+    /// The numbers under which drives were added, in that order.
+    pub fn drive_numbers(&self) -> impl Iterator<Item = u8> + '_ {
+        self.members.iter().filter_map(|member| match member {
+            Member::Drive { number, .. } => Some(*number),
+            _ => None,
+        })
+    }
+
+    /// A station as what it is; `None` if it is something else.
+    pub fn station<S: 'static>(&self, id: StationId) -> Option<&S> {
+        match &self.members[id.0] {
+            Member::Station(station) => (**station).as_any().downcast_ref(),
+            _ => None,
+        }
+    }
+
+    /// A station as what it is, to change it; call [`refresh`](Self::refresh) afterwards.
+    pub fn station_mut<S: 'static>(&mut self, id: StationId) -> Option<&mut S> {
+        match &mut self.members[id.0] {
+            Member::Station(station) => (**station).as_any_mut().downcast_mut(),
+            _ => None,
+        }
+    }
+
+    /// The bit rate of the bus.
+    pub fn bitrate(&self) -> Bitrate {
+        self.bus.bitrate()
+    }
+
+    /// Error counters of a station's controller.
+    pub fn counters(&self, id: StationId) -> ErrorCounters {
+        self.bus.counters(id.0)
+    }
+
+    /// Frames a station lost to overrun.
+    pub fn overruns(&self, id: StationId) -> u64 {
+        self.bus.overruns(id.0)
+    }
+
+    /// Frames, errors and bus load so far.
+    pub fn statistics(&self) -> Statistics {
+        self.bus.statistics(self.now)
+    }
+
+    /// What happened on the wire.
+    pub fn log(&self) -> &FrameLog {
+        &self.log
+    }
+
+    /// What happened on the wire, to pull it or to set how much is kept.
+    pub fn log_mut(&mut self) -> &mut FrameLog {
+        &mut self.log
+    }
+
+    /// Hash over all frames with their times and over the present shaft angles.
+    pub fn digest(&mut self) -> Digest {
+        let mut digest = self.digest;
+        digest.bytes(&self.now.as_nanos().to_le_bytes());
+        for member in &mut self.members {
+            if let Member::Drive { drive, .. } = member {
+                drive.advance(self.now);
+                digest.bytes(&drive.report().shaft_angle_rad.to_bits().to_le_bytes());
+            }
+        }
+        digest
+    }
+
+    pub(super) fn add(&mut self, member: Member, options: ControllerOptions) -> StationId {
+        self.members.push(member);
+        self.due.push();
+        StationId(self.bus.add(options))
+    }
+}

@@ -1,0 +1,94 @@
+//! One event after the other.
+
+use can::Instant;
+
+use super::World;
+use super::member::Member;
+use crate::wire::{Part, Passed};
+
+/// A station that leaves its deadline in the past is asked again after this time: it cannot stop the world.
+const OVERDUE_RETRY_NS: u64 = 1_000;
+
+impl World {
+    /// Moves to the next event and does all that is due there: frames that end, deadlines, then arbitration.
+    ///
+    /// False if nothing will ever happen any more unless somebody from outside acts.
+    pub fn step(&mut self) -> bool {
+        let Some(at) = self.next_event() else { return false };
+        self.now = self.now.max(at);
+        if let Some(passed) = self.bus.advance(self.now) {
+            self.deliver(&passed);
+        }
+        self.time_out();
+        self.bus.arbitrate(self.now);
+        self.keep_events();
+        true
+    }
+
+    /// When the next event is; `None` for never.
+    pub fn next_event(&self) -> Option<Instant> {
+        let due = self.due.first().map(|(at, _)| at);
+        self.bus.next_event().into_iter().chain(due).min()
+    }
+
+    /// Looks again at stations that were changed from outside: what they have to send, when they are due.
+    ///
+    /// They are told the time first, so that they can count from it.
+    pub fn refresh(&mut self) {
+        for i in 0..self.members.len() {
+            if let Member::Station(station) = &mut self.members[i] {
+                station.handle_timeout(self.now);
+                self.serve(i);
+            }
+        }
+    }
+
+    fn deliver(&mut self, passed: &Passed) {
+        self.digest.frame(&passed.frame, passed.end);
+        for i in 0..self.members.len() {
+            match self.bus.conclude(i, passed) {
+                Part::Transmitted(frame) => self.members[i].station().handle_transmitted(&frame, self.now),
+                Part::Received => self.members[i].station().handle_frame(&passed.frame, self.now),
+                Part::Nothing => continue,
+            }
+            self.serve(i);
+        }
+    }
+
+    fn time_out(&mut self) {
+        while let Some((_, i)) = self.due.first().filter(|(at, _)| *at <= self.now) {
+            self.members[i].station().handle_timeout(self.now);
+            self.serve(i);
+            if self.due.first().is_some_and(|(at, first)| first == i && at <= self.now) {
+                self.due.set(i, self.now.plus_nanos(OVERDUE_RETRY_NS));
+            }
+        }
+    }
+
+    /// After any call into station `i`: collects its frames and its deadline.
+    pub(super) fn serve(&mut self, i: usize) {
+        if let Member::Drive { drive, .. } = &self.members[i] {
+            let bitrate = drive.bitrate();
+            if bitrate != self.bus.bitrate_of(i) {
+                self.bus.restart(i, bitrate, self.now);
+            }
+        }
+        self.collect(i);
+        let due = self.members[i].station().poll_timeout().unwrap_or(Instant::FAR_FUTURE);
+        self.due.set(i, due);
+    }
+
+    /// Moves frames from station `i` into its mailboxes, as far as there is room.
+    pub(super) fn collect(&mut self, i: usize) {
+        while self.bus.has_room(i) {
+            let Some(frame) = self.members[i].station().poll_transmit() else { return };
+            self.bus.offer(i, frame, self.now);
+        }
+    }
+
+    pub(super) fn keep_events(&mut self) {
+        while let Some(event) = self.bus.poll_event() {
+            self.log.push(event);
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! A bus that is somewhere else: the trait that run loops work on, and what can go wrong.
+
+use std::future::Future;
+use std::io;
+use std::path::PathBuf;
+
+use can::{Bitrate, Frame, Instant};
+
+use crate::log::{LogBus, LogError};
+use crate::slcan::SlcanBus;
+use crate::socketcand::{self, SocketcandBus};
+
+/// A CAN bus behind a socket, a serial line or a file. Own frames do not come back.
+pub trait AsyncBus {
+    /// Hands `frame` to the bus; completes when the connection has taken it, which is before the wire carries it.
+    ///
+    /// Cancel-safe: a frame goes out whole or not at all.
+    fn send(&mut self, frame: &Frame) -> impl Future<Output = Result<(), BusError>> + Send;
+
+    /// The next frame of the others, and when it came: on a live bus by the clock given at opening, from a log its time
+    /// stamp.
+    ///
+    /// Cancel-safe: no frame is lost.
+    fn recv(&mut self) -> impl Future<Output = Result<(Instant, Frame), BusError>> + Send;
+}
+
+/// Why a bus cannot be opened or used any longer.
+#[derive(Debug, thiserror::Error)]
+pub enum BusError {
+    /// No connection.
+    #[error("cannot connect to {address}; is the server running, and is the port right?")]
+    Connect {
+        /// `HOST:PORT`.
+        address: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The serial device does not open.
+    #[error("cannot open the serial device {path}; is the adapter plugged in, and may this user access it?")]
+    OpenSerial {
+        /// The device.
+        path: String,
+        /// What the system said.
+        source: tokio_serial::Error,
+    },
+    /// The peer is silent.
+    #[error("{address} does not answer: waited for {expected}; is it a {protocol} peer?")]
+    Silent {
+        /// `HOST:PORT` or the device.
+        address: String,
+        /// What should have come.
+        expected: &'static str,
+        /// The protocol spoken.
+        protocol: &'static str,
+    },
+    /// The peer refused a request.
+    #[error("{address} refused '{request}': {said}")]
+    Refused {
+        /// `HOST:PORT` or the device.
+        address: String,
+        /// What was asked.
+        request: String,
+        /// What it said, or what to do.
+        said: String,
+    },
+    /// The peer said something else than the protocol lets it say here.
+    #[error("{address} said {received} where {expected} was expected; is it a socketcand server?")]
+    Unexpected {
+        /// `HOST:PORT`.
+        address: String,
+        /// What came.
+        received: String,
+        /// What should have come.
+        expected: &'static str,
+    },
+    /// The peer sent what is no message.
+    #[error("{address} sent what is no socketcand message")]
+    Malformed {
+        /// `HOST:PORT`.
+        address: String,
+        /// What is wrong with it.
+        source: socketcand::Malformed,
+    },
+    /// The peer ended the connection.
+    #[error("{address} closed the connection")]
+    Closed {
+        /// `HOST:PORT` or the device.
+        address: String,
+    },
+    /// The connection broke.
+    #[error("lost the connection to {address}")]
+    Lost {
+        /// `HOST:PORT` or the device.
+        address: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// slcan names nine bit rates only.
+    #[error("slcan cannot select {bitrate}; it knows 10k, 20k, 50k, 100k, 125k, 250k, 500k, 800k and 1M")]
+    NoSlcanBitrate {
+        /// What was asked for.
+        bitrate: Bitrate,
+    },
+    /// The log file does not open.
+    #[error("cannot open the log {}", path.display())]
+    OpenLog {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The log file has something else than frames in it.
+    #[error("cannot read the log {}", path.display())]
+    Log {
+        /// The file.
+        path: PathBuf,
+        /// Which line and why.
+        source: LogError,
+    },
+    /// The log is over.
+    #[error("the log {} ends here", path.display())]
+    EndOfLog {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A log takes no frames.
+    #[error("{} is a log and read only; nothing can be sent to it", path.display())]
+    ReadOnly {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A Linux network interface was asked for.
+    #[error("SocketCAN is not built into this version yet, so '{interface}' cannot be opened; use socketcand or slcan")]
+    SocketCanNotBuilt {
+        /// The interface.
+        interface: String,
+    },
+    /// A virtual bus is part of the program that asks for it, not of this crate.
+    #[error("a simulated bus is not reached through a connection; the program that wants it has to embed it")]
+    Simulated,
+}
+
+/// Any bus that [`crate::BusSpec::open`] opens.
+#[derive(Debug)]
+pub enum AnyBus {
+    /// A socketcand server.
+    Socketcand(SocketcandBus),
+    /// An slcan adapter or server.
+    Slcan(SlcanBus),
+    /// A log.
+    Log(LogBus),
+}
+
+impl AsyncBus for AnyBus {
+    async fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        match self {
+            Self::Socketcand(bus) => bus.send(frame).await,
+            Self::Slcan(bus) => bus.send(frame).await,
+            Self::Log(bus) => bus.send(frame).await,
+        }
+    }
+
+    async fn recv(&mut self) -> Result<(Instant, Frame), BusError> {
+        match self {
+            Self::Socketcand(bus) => bus.recv().await,
+            Self::Slcan(bus) => bus.recv().await,
+            Self::Log(bus) => bus.recv().await,
+        }
+    }
+}

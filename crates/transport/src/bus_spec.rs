@@ -1,0 +1,320 @@
+//! The texts behind `--bus` and `--serve`: what was typed, and what it means.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use can::Bitrate;
+
+use crate::{AnyBus, BusError, LogBus, SlcanBus, SocketcandBus, WallClock, socketcand};
+
+/// Line speed of a serial adapter unless `?baud=` says otherwise. USB adapters ignore it.
+const DEFAULT_BAUD: u32 = 115_200;
+
+/// Longest interface name on Linux (IFNAMSIZ without its terminating zero).
+const MAX_INTERFACE_LENGTH: usize = 15;
+
+/// A bus as named on the command line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum BusSpec {
+    /// `sim`, `sim:FILE.toml`: an embedded virtual bus.
+    Sim {
+        /// The machine file; `None` for the standard three drives.
+        file: Option<PathBuf>,
+    },
+    /// `can0`: a Linux SocketCAN interface.
+    SocketCan {
+        /// Its name.
+        interface: String,
+    },
+    /// `socketcand://HOST:PORT/can0`; port 29536 and bus can0 may be left out.
+    Socketcand {
+        /// `HOST:PORT`.
+        address: String,
+        /// The server's name for the bus.
+        bus: String,
+    },
+    /// `slcan:///dev/ttyACM0?bitrate=500k&baud=115200`: a serial adapter.
+    SlcanSerial {
+        /// The device.
+        path: String,
+        /// Bit rate to select; `None` leaves the adapter as it is.
+        bitrate: Option<Bitrate>,
+        /// Line speed.
+        baud: u32,
+    },
+    /// `slcan://HOST:PORT?bitrate=500k`: slcan over TCP.
+    SlcanTcp {
+        /// `HOST:PORT`.
+        address: String,
+        /// Bit rate to select; `None` leaves the peer as it is.
+        bitrate: Option<Bitrate>,
+    },
+    /// `log:FILE`: a candump log, read only.
+    Log {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+impl BusSpec {
+    /// Opens the bus. [`BusSpec::Sim`] is not opened here but embedded by whoever wants it.
+    pub async fn open(&self, clock: &WallClock) -> Result<AnyBus, BusError> {
+        match self {
+            Self::Sim { .. } => Err(BusError::Simulated),
+            Self::SocketCan { interface } => Err(BusError::SocketCanNotBuilt { interface: interface.clone() }),
+            Self::Socketcand { address, bus } => {
+                SocketcandBus::connect(address, bus, clock).await.map(AnyBus::Socketcand)
+            }
+            Self::SlcanSerial { path, bitrate, baud } => {
+                SlcanBus::open_serial(path, *baud, *bitrate, clock).await.map(AnyBus::Slcan)
+            }
+            Self::SlcanTcp { address, bitrate } => SlcanBus::connect(address, *bitrate, clock).await.map(AnyBus::Slcan),
+            Self::Log { path } => LogBus::open(path).map(AnyBus::Log),
+        }
+    }
+}
+
+/// Why a text names no bus.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{text}' is no {what}: {reason}")]
+pub struct ParseBusError {
+    text: String,
+    what: &'static str,
+    reason: String,
+}
+
+impl FromStr for BusSpec {
+    type Err = ParseBusError;
+
+    fn from_str(text: &str) -> Result<Self, ParseBusError> {
+        let parsed = match text.split_once(':') {
+            None if text == "sim" => Ok(Self::Sim { file: None }),
+            None => parse_interface(text),
+            Some(("sim", file)) => path(file).map(|file| Self::Sim { file: Some(file) }),
+            Some(("log", file)) => path(file).map(|path| Self::Log { path }),
+            Some(("socketcand", rest)) => parse_socketcand(rest),
+            Some(("slcan", rest)) => parse_slcan(rest),
+            Some(_) => Err(BUS_FORMS.to_owned()),
+        };
+        parsed.map_err(|reason| ParseBusError { text: text.to_owned(), what: "bus", reason })
+    }
+}
+
+const BUS_FORMS: &str = "expected sim, sim:FILE.toml, can0, socketcand://HOST:PORT/can0, slcan:///dev/ttyACM0?bitrate=500k, \
+                         slcan://HOST:PORT or log:FILE";
+
+fn path(text: &str) -> Result<PathBuf, String> {
+    if text.is_empty() { Err("the file name is missing".to_owned()) } else { Ok(PathBuf::from(text)) }
+}
+
+fn parse_interface(name: &str) -> Result<BusSpec, String> {
+    let allowed = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'.' | b'_' | b'-');
+    match name.as_bytes() {
+        [b'a'..=b'z' | b'A'..=b'Z', rest @ ..]
+            if rest.len() < MAX_INTERFACE_LENGTH && rest.iter().copied().all(allowed) =>
+        {
+            Ok(BusSpec::SocketCan { interface: name.to_owned() })
+        }
+        _ => Err(BUS_FORMS.to_owned()),
+    }
+}
+
+fn parse_socketcand(rest: &str) -> Result<BusSpec, String> {
+    let form = "expected socketcand://HOST:PORT/can0";
+    let rest = rest.strip_prefix("//").ok_or(form)?;
+    let (address, bus) = rest.split_once('/').unwrap_or((rest, "can0"));
+    let wrong = |byte: u8| !byte.is_ascii_graphic() || matches!(byte, b'<' | b'>' | b'/');
+    if bus.is_empty() || bus.bytes().any(wrong) {
+        return Err(format!("'{bus}' cannot be the name of a bus; {form}"));
+    }
+    Ok(BusSpec::Socketcand { address: parse_address(address, Some(socketcand::DEFAULT_PORT))?, bus: bus.to_owned() })
+}
+
+fn parse_slcan(rest: &str) -> Result<BusSpec, String> {
+    let rest = rest.strip_prefix("//").ok_or("expected slcan:///dev/ttyACM0?bitrate=500k or slcan://HOST:PORT")?;
+    let (place, options) = rest.split_once('?').unwrap_or((rest, ""));
+    let mut bitrate = None;
+    let mut baud = None;
+    for option in options.split('&').filter(|option| !option.is_empty()) {
+        match option.split_once('=') {
+            Some(("bitrate", value)) => bitrate = Some(value.parse().map_err(|error| format!("{error}"))?),
+            Some(("baud", value)) => {
+                let value: u32 = value.parse().map_err(|_| format!("'{value}' is no line speed"))?;
+                baud = Some(value);
+            }
+            _ => return Err(format!("unknown option '{option}'; known are bitrate=500k and baud=115200")),
+        }
+    }
+    if place.starts_with('/') {
+        return Ok(BusSpec::SlcanSerial { path: place.to_owned(), bitrate, baud: baud.unwrap_or(DEFAULT_BAUD) });
+    }
+    if baud.is_some() {
+        return Err("baud is for serial devices, not for TCP".to_owned());
+    }
+    Ok(BusSpec::SlcanTcp { address: parse_address(place, None)?, bitrate })
+}
+
+/// `HOST:PORT`, where HOST may be `[::1]`.
+fn parse_address(text: &str, default_port: Option<u16>) -> Result<String, String> {
+    let bracketed_alone = text.starts_with('[') && text.ends_with(']');
+    let (host, port) = match text.rsplit_once(':').filter(|_| !bracketed_alone) {
+        Some((host, port)) => {
+            let digits = port.bytes().all(|byte| byte.is_ascii_digit());
+            let number = port.parse::<u16>().ok().filter(|_| digits);
+            (host, number.ok_or_else(|| format!("'{port}' is no port; a port is 0 to 65535"))?)
+        }
+        None => (text, default_port.ok_or("the port is missing; expected HOST:PORT")?),
+    };
+    let bare = host.strip_prefix('[').and_then(|host| host.strip_suffix(']'));
+    let well_formed = match bare {
+        Some(bare) => bare.contains(':') && bare.bytes().all(|byte| byte.is_ascii_hexdigit() || b":.%".contains(&byte)),
+        None => !host.is_empty() && host.bytes().all(|byte| byte.is_ascii_alphanumeric() || b".-_".contains(&byte)),
+    };
+    if well_formed { Ok(format!("{host}:{port}")) } else { Err(format!("'{host}' is no host name or address")) }
+}
+
+impl fmt::Display for BusSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let option = |bitrate: &Option<Bitrate>| bitrate.map(|rate| format!("?bitrate={rate}")).unwrap_or_default();
+        match self {
+            Self::Sim { file: None } => f.write_str("sim"),
+            Self::Sim { file: Some(file) } => write!(f, "sim:{}", file.display()),
+            Self::SocketCan { interface } => f.write_str(interface),
+            Self::Socketcand { address, bus } => write!(f, "socketcand://{address}/{bus}"),
+            Self::SlcanTcp { address, bitrate } => write!(f, "slcan://{address}{}", option(bitrate)),
+            Self::SlcanSerial { path, bitrate, baud: DEFAULT_BAUD } => write!(f, "slcan://{path}{}", option(bitrate)),
+            Self::SlcanSerial { path, bitrate: None, baud } => write!(f, "slcan://{path}?baud={baud}"),
+            Self::SlcanSerial { path, bitrate, baud } => write!(f, "slcan://{path}{}&baud={baud}", option(bitrate)),
+            Self::Log { path } => write!(f, "log:{}", path.display()),
+        }
+    }
+}
+
+/// The protocol of a listener.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Protocol {
+    /// socketcand.
+    Socketcand,
+    /// slcan over TCP.
+    Slcan,
+}
+
+impl fmt::Display for Protocol {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Socketcand => "socketcand",
+            Self::Slcan => "slcan",
+        })
+    }
+}
+
+/// Where to serve a bus: `socketcand://127.0.0.1:29536` or `slcan://127.0.0.1:3000`; port 0 lets the system choose.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ServeSpec {
+    /// The protocol.
+    pub protocol: Protocol,
+    /// `HOST:PORT`.
+    pub address: String,
+}
+
+impl FromStr for ServeSpec {
+    type Err = ParseBusError;
+
+    fn from_str(text: &str) -> Result<Self, ParseBusError> {
+        let parsed = match text.split_once("://") {
+            Some(("socketcand", address)) => {
+                parse_address(address, None).map(|address| (Protocol::Socketcand, address))
+            }
+            Some(("slcan", address)) => parse_address(address, None).map(|address| (Protocol::Slcan, address)),
+            _ => Err("expected socketcand://HOST:PORT or slcan://HOST:PORT".to_owned()),
+        };
+        match parsed {
+            Ok((protocol, address)) => Ok(Self { protocol, address }),
+            Err(reason) => Err(ParseBusError { text: text.to_owned(), what: "place to serve a bus at", reason }),
+        }
+    }
+}
+
+impl fmt::Display for ServeSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}://{}", self.protocol, self.address)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_documented_form_is_read_and_printed_back() {
+        let socketcand = |address: &str, bus: &str| BusSpec::Socketcand { address: address.into(), bus: bus.into() };
+        for (text, spec) in [
+            ("sim", BusSpec::Sim { file: None }),
+            ("sim:two:axes.toml", BusSpec::Sim { file: Some("two:axes.toml".into()) }),
+            ("vcan0", BusSpec::SocketCan { interface: "vcan0".into() }),
+            ("socketcand://localhost:29536/can0", socketcand("localhost:29536", "can0")),
+            ("socketcand://[::1]:7/vcan1", socketcand("[::1]:7", "vcan1")),
+            ("slcan://10.0.0.1:3000", BusSpec::SlcanTcp { address: "10.0.0.1:3000".into(), bitrate: None }),
+            ("log:a/b.log", BusSpec::Log { path: "a/b.log".into() }),
+            (
+                "slcan:///dev/ttyACM0?bitrate=500k",
+                BusSpec::SlcanSerial { path: "/dev/ttyACM0".into(), bitrate: Some(Bitrate::K500), baud: 115_200 },
+            ),
+            (
+                "slcan:///dev/ttyS1?bitrate=1M&baud=57600",
+                BusSpec::SlcanSerial { path: "/dev/ttyS1".into(), bitrate: Some(Bitrate::M1), baud: 57_600 },
+            ),
+        ] {
+            assert_eq!(text.parse(), Ok(spec.clone()), "{text}");
+            assert_eq!(spec.to_string(), text);
+        }
+        assert_eq!("socketcand://drive.local".parse(), Ok(socketcand("drive.local:29536", "can0")));
+        assert_eq!("socketcand://[::1]".parse(), Ok(socketcand("[::1]:29536", "can0")));
+    }
+
+    #[test]
+    fn what_is_no_bus_is_refused_with_the_reason() {
+        for (text, reason) in [
+            ("", "expected sim,"),
+            ("can 0", "expected sim,"),
+            ("0can", "expected sim,"),
+            ("a-name-that-is-too-long", "expected sim,"),
+            ("tcp://localhost:1", "expected sim,"),
+            ("sim:", "file name is missing"),
+            ("log:", "file name is missing"),
+            ("socketcand:localhost", "expected socketcand://HOST:PORT/can0"),
+            ("socketcand://:29536/can0", "'' is no host name"),
+            ("socketcand://a:99999/can0", "'99999' is no port"),
+            ("socketcand://a:+1/can0", "'+1' is no port"),
+            ("socketcand://a:1/", "cannot be the name of a bus"),
+            ("socketcand://a:1/x > y", "cannot be the name of a bus"),
+            ("socketcand://::1:5/can0", "'::1' is no host name"),
+            ("slcan://host", "port is missing"),
+            ("slcan://host:1?bitrate=2M", "bit rate must be"),
+            ("slcan://host:1?baud=9600", "baud is for serial devices"),
+            ("slcan:///dev/ttyS0?parity=none", "unknown option 'parity=none'"),
+        ] {
+            let error = text.parse::<BusSpec>().unwrap_err().to_string();
+            assert!(error.contains(reason) && error.contains(&format!("'{text}'")), "{error}");
+        }
+    }
+
+    #[test]
+    fn serve_specs_are_read_and_printed_back() {
+        for text in ["socketcand://127.0.0.1:29536", "slcan://[::]:0"] {
+            assert_eq!(text.parse::<ServeSpec>().unwrap().to_string(), text);
+        }
+        for text in ["", "can0", "socketcand://127.0.0.1", "tcp://127.0.0.1:1", "socketcand://127.0.0.1:1/can0"] {
+            assert!(text.parse::<ServeSpec>().is_err(), "{text}");
+        }
+    }
+
+    #[tokio::test]
+    async fn what_cannot_be_opened_here_says_so() {
+        let clock = WallClock::start();
+        let error = "can0".parse::<BusSpec>().unwrap().open(&clock).await.unwrap_err();
+        assert!(error.to_string().contains("SocketCAN is not built into this version yet"), "{error}");
+        assert!(matches!(BusSpec::Sim { file: None }.open(&clock).await, Err(BusError::Simulated)));
+    }
+}

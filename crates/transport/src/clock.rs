@@ -1,0 +1,235 @@
+//! The wall clock: the one file of the project that reads time.
+//!
+//! A [`WallClock`] counts nanoseconds since it was made, as the [`Instant`]s that stations take, and sleeps until one.
+//! tokio's own timer counts whole milliseconds, which is ten CAN frames at 1 Mbit/s; so sleeping is done by a thread of
+//! its own that waits on a condition variable (some 60 µs late on Linux) and ends with the last copy of the clock.
+
+use std::collections::BTreeMap;
+use std::future::Future;
+use std::pin::Pin;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, Waker};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use can::Instant;
+
+/// Time since this clock was made. Copies share its zero and its timer thread.
+#[derive(Clone, Debug)]
+pub struct WallClock {
+    face: Face,
+    timer: Arc<Timer>,
+}
+
+impl WallClock {
+    /// A clock that reads [`Instant::ZERO`] now.
+    ///
+    /// # Panics
+    /// If the system has no thread left for the timer.
+    pub fn start() -> Self {
+        let face = Face { zero: std::time::Instant::now() };
+        let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        Self { face, timer: Timer::start(face, since_epoch) }
+    }
+
+    /// Now. Never goes back.
+    pub fn now(&self) -> Instant {
+        self.face.now()
+    }
+
+    /// Unix time of this clock's zero: what to add to an [`Instant`] for a time stamp that other programs understand.
+    pub fn unix_zero(&self) -> Duration {
+        self.timer.unix_zero
+    }
+
+    /// Completes when [`now`](Self::now) has reached `deadline`. Dropping the future forgets it.
+    pub fn sleep_until(&self, deadline: Instant) -> Sleep {
+        Sleep { clock: self.clone(), deadline, ticket: None }
+    }
+
+    /// [`sleep_until`](Self::sleep_until), or forever for `None`: what [`can::Station::poll_timeout`] returns.
+    pub async fn sleep_until_due(&self, deadline: Option<Instant>) {
+        match deadline {
+            Some(deadline) => self.sleep_until(deadline).await,
+            None => std::future::pending().await,
+        }
+    }
+
+    /// Completes `duration` from now.
+    pub fn sleep(&self, duration: Duration) -> Sleep {
+        self.sleep_until(self.now() + duration)
+    }
+}
+
+/// Future of [`WallClock::sleep_until`].
+#[derive(Debug)]
+#[must_use = "a sleep does nothing unless awaited"]
+pub struct Sleep {
+    clock: WallClock,
+    deadline: Instant,
+    ticket: Option<u64>,
+}
+
+impl Future for Sleep {
+    type Output = ();
+
+    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
+        if self.clock.now() >= self.deadline {
+            return Poll::Ready(());
+        }
+        let ticket = self.clock.timer.register(self.deadline, self.ticket, context.waker());
+        self.ticket = Some(ticket);
+        Poll::Pending
+    }
+}
+
+impl Drop for Sleep {
+    fn drop(&mut self) {
+        if let Some(ticket) = self.ticket {
+            self.clock.timer.forget(self.deadline, ticket);
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Face {
+    zero: std::time::Instant,
+}
+
+impl Face {
+    fn now(self) -> Instant {
+        Instant::ZERO + self.zero.elapsed()
+    }
+}
+
+/// Handle of the timer thread; dropping it ends the thread.
+#[derive(Debug)]
+struct Timer {
+    unix_zero: Duration,
+    queue: Arc<Queue>,
+}
+
+/// Wakers are woken and dropped with the lock released: either may end a task, and with it other sleeps.
+#[derive(Debug, Default)]
+struct Queue {
+    sleepers: Mutex<Sleepers>,
+    changed: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct Sleepers {
+    wakers: BTreeMap<(Instant, u64), Waker>,
+    next_ticket: u64,
+    closed: bool,
+}
+
+impl Timer {
+    fn start(face: Face, unix_zero: Duration) -> Arc<Self> {
+        let queue = Arc::new(Queue::default());
+        let served = Arc::clone(&queue);
+        std::thread::spawn(move || served.serve(face));
+        Arc::new(Self { unix_zero, queue })
+    }
+
+    fn register(&self, deadline: Instant, ticket: Option<u64>, waker: &Waker) -> u64 {
+        let mut sleepers = self.queue.lock();
+        let ticket = ticket.unwrap_or_else(|| {
+            sleepers.next_ticket += 1;
+            sleepers.next_ticket
+        });
+        let replaced = sleepers.wakers.insert((deadline, ticket), waker.clone());
+        if sleepers.wakers.first_key_value().is_some_and(|(key, _)| *key == (deadline, ticket)) {
+            self.queue.changed.notify_one();
+        }
+        drop(sleepers);
+        drop(replaced);
+        ticket
+    }
+
+    fn forget(&self, deadline: Instant, ticket: u64) {
+        let mut sleepers = self.queue.lock();
+        let forgotten = sleepers.wakers.remove(&(deadline, ticket));
+        drop(sleepers);
+        drop(forgotten);
+    }
+}
+
+impl Drop for Timer {
+    fn drop(&mut self) {
+        self.queue.lock().closed = true;
+        self.queue.changed.notify_one();
+    }
+}
+
+impl Queue {
+    fn lock(&self) -> MutexGuard<'_, Sleepers> {
+        self.sleepers.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The timer thread: wakes who is due, then waits for the next deadline or a change.
+    fn serve(&self, face: Face) {
+        let mut sleepers = self.lock();
+        while !sleepers.closed {
+            let now = face.now();
+            let next = sleepers.wakers.first_key_value().map(|((deadline, _), _)| *deadline);
+            sleepers = match next {
+                Some(deadline) if deadline <= now => {
+                    let due = sleepers.wakers.pop_first();
+                    drop(sleepers);
+                    if let Some((_, waker)) = due {
+                        waker.wake();
+                    }
+                    self.lock()
+                }
+                Some(deadline) => {
+                    let waited = self.changed.wait_timeout(sleepers, deadline - now);
+                    waited.unwrap_or_else(PoisonError::into_inner).0
+                }
+                None => self.changed.wait(sleepers).unwrap_or_else(PoisonError::into_inner),
+            };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn sleeps_at_least_until_the_deadline_and_in_order() {
+        let clock = WallClock::start();
+        let start = clock.now();
+        let order = Mutex::new(Vec::new());
+        let nap = async |millis: u64| {
+            let deadline = start + Duration::from_millis(millis);
+            clock.sleep_until(deadline).await;
+            assert!(clock.now() >= deadline);
+            order.lock().unwrap().push(millis);
+        };
+        tokio::join!(nap(30), nap(10), nap(20), nap(0));
+        assert_eq!(*order.lock().unwrap(), [0, 10, 20, 30]);
+    }
+
+    #[tokio::test]
+    async fn a_dropped_sleep_leaves_nothing_behind() {
+        let clock = WallClock::start();
+        let far = clock.sleep(Duration::from_secs(3600));
+        tokio::select! {
+            () = far => unreachable!("an hour has not passed"),
+            () = clock.sleep(Duration::from_millis(1)) => {}
+        }
+        assert!(clock.timer.queue.lock().wakers.is_empty());
+    }
+
+    #[tokio::test]
+    async fn the_thread_ends_with_the_last_copy() {
+        let clock = WallClock::start();
+        let queue = Arc::downgrade(&clock.timer.queue);
+        clock.clone().sleep(Duration::from_millis(1)).await;
+        drop(clock);
+        let patience = std::time::Instant::now();
+        while queue.strong_count() > 0 {
+            assert!(patience.elapsed() < Duration::from_secs(10), "timer thread still runs");
+            std::thread::yield_now();
+        }
+    }
+}

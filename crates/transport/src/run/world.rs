@@ -1,0 +1,130 @@
+//! Drives a virtual world at the pace of the wall clock, behind a [`Hub`].
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use can::{Frame, Instant};
+use tokio::sync::mpsc;
+
+use crate::{ClientId, Hub, HubEvent, WallClock};
+
+/// How far a world is moved past its next deadline in one go. A world that is late (the machine was busy, the process was
+/// stopped) catches up in steps of this length, between which clients and commands are served; one with nothing due is
+/// moved to now at once.
+const LONGEST_STEP: Duration = Duration::from_millis(20);
+
+/// A world of stations on a simulated wire whose time somebody else moves. Its time is that of the [`WallClock`].
+pub trait RealTimeWorld {
+    /// How far the world has come.
+    fn now(&self) -> Instant;
+
+    /// When something is next due in it; `None` for never, at or before [`now`](Self::now) for at once.
+    fn next_deadline(&self) -> Option<Instant>;
+
+    /// Moves the world to `instant`, which is never earlier than `now`, serving everything due on the way at its own time.
+    fn advance_to(&mut self, instant: Instant);
+
+    /// A client offers `frame` at the world's now: it takes part in arbitration from here on. At most 64 frames of one
+    /// client are under way at a time; a client's frames keep their order.
+    fn inject(&mut self, client: ClientId, frame: &Frame);
+
+    /// The next thing that became of a frame, in the order of time. Everything injected comes out here once.
+    fn take_heard(&mut self) -> Option<Heard>;
+}
+
+/// What became of a frame in a world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Heard {
+    /// The wire carried it: its last bit was sent at `at`.
+    Carried {
+        /// The frame.
+        frame: Frame,
+        /// When.
+        at: Instant,
+        /// Whose; `None` for the world's own stations.
+        from: Option<ClientId>,
+    },
+    /// The world gave up an injected frame.
+    Lost {
+        /// Whose.
+        from: ClientId,
+    },
+}
+
+/// Runs `world` in real time until `command` breaks the loop, and returns what it broke with.
+///
+/// `command` is called for everything that comes out of `commands`, with the world brought up to now; a closed channel
+/// leaves the world running. The loop sleeps until the next deadline, frame or command.
+pub async fn run_world<W, C, T>(
+    world: &mut W,
+    hub: &mut Hub,
+    clock: &WallClock,
+    commands: &mut mpsc::Receiver<C>,
+    mut command: impl FnMut(&mut W, C) -> ControlFlow<T>,
+) -> T
+where
+    W: RealTimeWorld,
+{
+    let mut commands_open = true;
+    loop {
+        let is_late = catch_up(world, hub, clock);
+        while let Some(event) = hub.try_next_event() {
+            take_in(world, event);
+        }
+        let deadline = if is_late { Some(Instant::ZERO) } else { world.next_deadline() };
+        tokio::select! {
+            biased;
+            received = commands.recv(), if commands_open => {
+                catch_up(world, hub, clock);
+                match received.map(|received| command(world, received)) {
+                    Some(ControlFlow::Break(result)) => {
+                        tell(world, hub);
+                        return result;
+                    }
+                    Some(ControlFlow::Continue(())) => {}
+                    None => commands_open = false,
+                }
+            }
+            event = hub.next_event() => {
+                catch_up(world, hub, clock);
+                take_in(world, event);
+            }
+            () = until_due(deadline, clock) => {}
+        }
+    }
+}
+
+/// Waits for the deadline, and lets the tasks of the clients run in any case.
+async fn until_due(deadline: Option<Instant>, clock: &WallClock) {
+    match deadline {
+        Some(deadline) if deadline <= clock.now() => tokio::task::yield_now().await,
+        _ => clock.sleep_until_due(deadline).await,
+    }
+}
+
+/// Moves the world towards now and tells what was heard; true if now is not reached.
+fn catch_up(world: &mut impl RealTimeWorld, hub: &Hub, clock: &WallClock) -> bool {
+    let now = clock.now().max(world.now());
+    let target = match world.next_deadline() {
+        Some(due) => now.min(due.max(world.now()) + LONGEST_STEP),
+        None => now,
+    };
+    world.advance_to(target);
+    tell(world, hub);
+    target < now
+}
+
+fn tell(world: &mut impl RealTimeWorld, hub: &Hub) {
+    while let Some(heard) = world.take_heard() {
+        match heard {
+            Heard::Carried { frame, at, from } => hub.broadcast(&frame, at, from),
+            Heard::Lost { from } => hub.discard(from),
+        }
+    }
+}
+
+fn take_in(world: &mut impl RealTimeWorld, event: HubEvent) {
+    if let HubEvent::Frame { client, frame } = event {
+        world.inject(client, &frame);
+    }
+}

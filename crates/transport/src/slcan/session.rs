@@ -1,0 +1,185 @@
+//! The adapter's side of one slcan connection, as LAWICEL's CANUSB behaves with auto-send on.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use can::{Bitrate, Frame, Instant};
+
+use super::codec::{Answer, Command, Decoder, Line, bitrate_of_code};
+use crate::hub::{MAX_WAITING_REPLIES, Session};
+
+/// Hardware version 1.0 (there is none), software version of this crate's first release.
+const VERSION: &str = "1001";
+const SERIAL_NUMBER: &str = "FD01";
+
+/// Time stamps wrap after a minute.
+const STAMP_PERIOD_MS: u64 = 60_000;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Channel {
+    Closed,
+    Open,
+    ListenOnly,
+}
+
+#[derive(Debug)]
+pub(crate) struct SlcanSession {
+    /// The rate of the bus served, if the client's choice is to be held against it.
+    bus_bitrate: Option<Bitrate>,
+    /// What the client selected; `None` for nothing, or for raw timing registers.
+    bitrate: Option<Bitrate>,
+    channel: Channel,
+    time_stamps: bool,
+    decoder: Decoder<Command>,
+    replies: VecDeque<Answer>,
+}
+
+impl SlcanSession {
+    /// A session with its channel closed. With `bus_bitrate`, a client that selected another rate cannot open it.
+    pub(crate) fn new(bus_bitrate: Option<Bitrate>) -> Self {
+        Self {
+            bus_bitrate,
+            bitrate: None,
+            channel: Channel::Closed,
+            time_stamps: false,
+            decoder: Decoder::default(),
+            replies: VecDeque::new(),
+        }
+    }
+
+    fn handle(&mut self, command: Command) -> (Answer, Option<Frame>) {
+        if let Command::Transmit(frame) = command {
+            return match self.channel {
+                Channel::Open => (Answer::Queued { extended: frame.id().is_extended() }, Some(frame)),
+                Channel::Closed | Channel::ListenOnly => (Answer::Refused, None),
+            };
+        }
+        let is_closed = self.channel == Channel::Closed;
+        let answer = match command {
+            Command::Version => Answer::Version(VERSION.to_owned()),
+            Command::SerialNumber => Answer::SerialNumber(SERIAL_NUMBER.to_owned()),
+            Command::Empty | Command::AutoSend(true) => Answer::Done,
+            // No flag can be set: the bus is never off, and a client that falls behind is disconnected.
+            Command::Status if !is_closed => Answer::Status(0),
+            Command::Close if !is_closed => self.set(Channel::Closed),
+            Command::Open if is_closed && self.rate_fits() => self.set(Channel::Open),
+            Command::OpenListenOnly if is_closed && self.rate_fits() => self.set(Channel::ListenOnly),
+            Command::SetBitrate(code) if is_closed => {
+                self.bitrate = bitrate_of_code(code);
+                Answer::Done
+            }
+            Command::SetTimingRegisters(_) if is_closed => {
+                self.bitrate = None;
+                Answer::Done
+            }
+            Command::TimeStamps(on) if is_closed => {
+                self.time_stamps = on;
+                Answer::Done
+            }
+            // The values that let everything pass; filtering is not offered.
+            Command::AcceptanceCode(0) | Command::AcceptanceMask(u32::MAX) if is_closed => Answer::Done,
+            _ => Answer::Refused,
+        };
+        (answer, None)
+    }
+
+    fn rate_fits(&self) -> bool {
+        self.bitrate.is_none() || self.bus_bitrate.is_none() || self.bitrate == self.bus_bitrate
+    }
+
+    fn set(&mut self, channel: Channel) -> Answer {
+        self.channel = channel;
+        Answer::Done
+    }
+}
+
+impl Session for SlcanSession {
+    fn receive(&mut self, input: &mut &[u8]) -> Option<Frame> {
+        while self.replies.len() < MAX_WAITING_REPLIES {
+            let (answer, frame) = match self.decoder.next(input)? {
+                Ok(command) => self.handle(command),
+                Err(_) => (Answer::Refused, None),
+            };
+            self.replies.push_back(answer);
+            if frame.is_some() {
+                return frame;
+            }
+        }
+        None
+    }
+
+    fn is_listening(&self) -> bool {
+        self.channel != Channel::Closed
+    }
+
+    fn next_reply(&mut self, out: &mut Vec<u8>) -> Option<Duration> {
+        self.replies.pop_front()?.emit(out);
+        Some(Duration::ZERO)
+    }
+
+    fn deliver(&mut self, at: Instant, frame: &Frame, out: &mut Vec<u8>) {
+        if self.is_listening() {
+            let stamp = (at.as_nanos() / 1_000_000 % STAMP_PERIOD_MS) as u16;
+            Answer::Frame { frame: *frame, stamp_ms: self.time_stamps.then_some(stamp) }.emit(out);
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn exchange(session: &mut SlcanSession, input: &str) -> (String, usize) {
+        let mut input = input.as_bytes();
+        let frames = std::iter::from_fn(|| session.receive(&mut input)).count();
+        let mut out = Vec::new();
+        while session.next_reply(&mut out).is_some() {}
+        (String::from_utf8(out).unwrap(), frames)
+    }
+
+    fn heard(session: &mut SlcanSession, at: Instant) -> String {
+        let mut out = Vec::new();
+        session.deliver(at, &"184#0102".parse().unwrap(), &mut out);
+        String::from_utf8(out).unwrap()
+    }
+
+    #[test]
+    fn a_closed_channel_neither_sends_nor_hears() {
+        let mut session = SlcanSession::new(None);
+        assert_eq!(exchange(&mut session, "t1000\rF\rC\r"), ("\x07\x07\x07".into(), 0));
+        assert_eq!(heard(&mut session, Instant::ZERO), "");
+        assert_eq!(exchange(&mut session, "S6\rO\r"), ("\r\r".into(), 0));
+        assert_eq!(exchange(&mut session, "t1000\rT000001001FF\rr1002\r"), ("z\rZ\rz\r".into(), 3));
+        assert_eq!(heard(&mut session, Instant::ZERO), "t18420102\r");
+        assert_eq!(exchange(&mut session, "C\rt1000\r"), ("\r\x07".into(), 0));
+        assert_eq!(heard(&mut session, Instant::ZERO), "");
+    }
+
+    #[test]
+    fn listen_only_hears_and_refuses_to_send() {
+        let mut session = SlcanSession::new(None);
+        assert_eq!(exchange(&mut session, "L\rt1000\r"), ("\r\x07".into(), 0));
+        assert_eq!(heard(&mut session, Instant::ZERO), "t18420102\r");
+    }
+
+    #[test]
+    fn settings_are_made_while_the_channel_is_closed() {
+        let mut session = SlcanSession::new(None);
+        assert_eq!(exchange(&mut session, "Z1\rs031C\rM00000000\rmFFFFFFFF\rX1\rO\r").0, "\r\r\r\r\r\r");
+        assert_eq!(exchange(&mut session, "Z0\rS6\rs031C\rO\rL\rM00000000\r").0, "\x07".repeat(6));
+        assert_eq!(heard(&mut session, Instant::from_millis(61_234)), "t1842010204D2\r");
+        assert_eq!(exchange(&mut session, "V\rN\rF\r\r").0, "V1001\rNFD01\rF00\r\r");
+        assert_eq!(exchange(&mut session, "M12345678\rP\rhello\rS9\r").0, "\x07".repeat(4));
+    }
+
+    #[test]
+    fn a_rate_that_is_not_the_buses_opens_nothing_where_that_is_asked_for() {
+        let mut session = SlcanSession::new(Some(Bitrate::K500));
+        assert_eq!(exchange(&mut session, "S8\rO\rL\rS6\rO\r").0, "\r\x07\x07\r\r");
+        assert_eq!(exchange(&mut SlcanSession::new(None), "S8\rO\r").0, "\r\r");
+    }
+}
