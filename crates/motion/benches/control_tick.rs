@@ -1,5 +1,9 @@
 //! Cost of a drive's control periods: the current loop with its sensors, the outer loops, a profile.
 
+#[allow(dead_code)]
+#[path = "../tests/rig/mod.rs"]
+mod rig;
+
 use criterion::{Criterion, criterion_group, criterion_main};
 use motion::cascade::{Cascade, CascadeGains, PositionDemand};
 use motion::commutation::{Commutation, CommutationModel};
@@ -74,5 +78,15 @@ fn outer_loops(c: &mut Criterion) {
     c.bench_function("profile_at", |b| b.iter(|| profile.at(black_box(2.9))));
 }
 
-criterion_group!(benches, current_loop, outer_loops);
+/// The current loop around the plant: what one 50 us control period of a virtual drive costs at the least.
+fn with_plant(c: &mut Criterion) {
+    let mut rig = rig::Rig::new();
+    let demand = motion::cascade::VelocityDemand { velocity_rad_s: 20.0, acceleration_rad_s2: 0.0 };
+    for _ in 0..20_000 {
+        rig.tick_velocity(&demand);
+    }
+    c.bench_function("velocity_loop_and_plant", |b| b.iter(|| rig.tick_velocity(black_box(&demand))));
+}
+
+criterion_group!(benches, current_loop, outer_loops, with_plant);
 criterion_main!(benches);
