@@ -192,7 +192,7 @@ fn no_load_speed_at_24_v_is_the_published_one() {
     for _ in 0..60_000 {
         let q_v = motor.supply.bus_v / libm::sqrt(3.0);
         let lead = motor.rotor.velocity_rad_s * 15.0 * DT_S / 2.0;
-        let axis = Axis::at_turns(MODEL.pmsm.electrical_turns(motor.rotor.angle)).turned_by(lead);
+        let axis = Axis::at_turns(MODEL.pmsm.electrical_turns(motor.rotor.angle)).turned_by(Axis::at_small_rad(lead));
         let (alpha, beta) = (-q_v * axis.sin, q_v * axis.cos);
         let side = 0.5 * libm::sqrt(3.0) * beta;
         let phases = [alpha, side - 0.5 * alpha, -side - 0.5 * alpha];
