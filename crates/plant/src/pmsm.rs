@@ -83,10 +83,10 @@ pub enum Terminals {
 }
 
 impl Terminals {
-    /// Three half bridges at these duty cycles (each held to 0..=1) on a bus.
+    /// Three half bridges at these duty cycles on a bus; each is held to 0..=1, and what is not a number is zero.
     #[inline]
     pub fn from_duties(duty: [f64; 3], bus_v: f64) -> Self {
-        let [u, v, w] = duty.map(|d| d.clamp(0.0, 1.0));
+        let [u, v, w] = duty.map(|d| if d > 0.0 { d.min(1.0) } else { 0.0 });
         Terminals::Driven { alpha_v: (2.0 * u - v - w) * (bus_v / 3.0), beta_v: (v - w) * (bus_v * INV_SQRT_3) }
     }
 }
