@@ -8,3 +8,8 @@ pub mod csv;
 pub mod laws;
 pub mod seeded;
 pub mod zlac8030l;
+
+/// The README's Rust, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+pub struct Readme;

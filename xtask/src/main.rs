@@ -8,6 +8,7 @@ mod cargo_tests;
 mod examples;
 mod peers;
 mod process;
+mod program;
 mod steps;
 mod tally;
 mod test;

@@ -7,22 +7,22 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::tally::Tally;
-use crate::{process, workspace};
+use crate::{process, program, workspace};
 
 /// The pinned packages: one file that people can also give to `pip install -r`.
 const REQUIREMENTS: &str = "tests/peers/requirements.txt";
 const SCRIPT: &str = "tests/peers/run.py";
 
 pub(crate) fn run() -> Tally {
+    let program = match program::build("sim") {
+        Ok(program) => program,
+        Err(tally) => return tally,
+    };
     let python = match environment() {
         Ok(python) => python,
         Err(reason) => return Tally::skipped(reason),
     };
-    if let Err(error) = build() {
-        return Tally::failed(error);
-    }
     let root = workspace::root();
-    let program = workspace::target().join("debug").join(format!("ferrodrive{}", std::env::consts::EXE_SUFFIX));
     let mut command = Command::new(&python);
     command.current_dir(&root).arg("-u").arg(root.join(SCRIPT)).arg("--program").arg(program);
     let mut tally = Tally::default();
@@ -69,13 +69,6 @@ fn install(python: &Path) -> Result<(), String> {
         let reason = error.lines().last().unwrap_or_default().to_owned();
         format!("pip could not install the peers (no network?): {reason}")
     })
-}
-
-/// Builds the program as the test step built it: same profile, same features.
-fn build() -> Result<(), String> {
-    let mut cargo = workspace::cargo();
-    cargo.args(["build", "--workspace", "--bins", "--quiet"]);
-    if process::run(&mut cargo, |_| ())? { Ok(()) } else { Err("ferrodrive does not build".to_owned()) }
 }
 
 /// Counts one line of the script: `ok NAME`, `FAILED NAME: why`, `skipped NAME: why`.

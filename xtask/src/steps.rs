@@ -4,7 +4,7 @@
 //! is compiled twice: clippy only checks, and the later steps use what the test step has built.
 
 use crate::tally::Tally;
-use crate::{cargo_tests, examples, peers, process, tidy, workspace};
+use crate::{cargo_tests, examples, peers, process, program, tidy, workspace};
 
 /// One step: its name for `--only`, what it does for the progress line, and the function that does it.
 pub(crate) struct Step {
@@ -22,6 +22,11 @@ pub(crate) const STEPS: &[Step] = &[
     Step { name: "docs", does: "the documentation builds and its links lead somewhere", run: docs },
     Step { name: "no_std", does: "the core crates build for a Cortex-M4", run: no_std },
     Step { name: "examples", does: "every example runs to its end", run: examples::run },
+    Step {
+        name: "demo",
+        does: "ferrodrive demo: the manuals' procedures against the virtual drives",
+        run: program::demo,
+    },
     Step { name: "peers", does: "canopen-python and python-can against ferrodrive sim", run: peers::run },
 ];
 

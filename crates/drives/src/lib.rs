@@ -1,1 +1,17 @@
-//! (to come)
+//! Firmware of real CANopen motor drives, from their manuals.
+//!
+//! A drive here is what runs on the drive's microcontroller: sensors and frames go in, power-stage commands and frames
+//! come out. It knows nothing of physics, of a simulator or of a clock; [`Firmware`] is the whole contract.
+//! [`engine`] holds the parts that all drives are made of; a drive's own folder holds what is particular to it, mostly
+//! as tables. [`profile`] describes each model as const data for masters and tools.
+#![no_std]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod engine;
+mod firmware;
+pub mod profile;
+pub mod zlac8030l;
+
+pub use firmware::{Firmware, Report};

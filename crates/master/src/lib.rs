@@ -1,1 +1,14 @@
-//! (to come)
+//! A CANopen master: a sans-IO core, an async face, and intents for drives in physical units.
+//!
+//! [`core::Core`] is a passive state machine (CiA 301): SDO clients, NMT, heartbeat and EMCY watch, SYNC and PDOs
+//! for 127 nodes. [`Network`] shares one between a runner and any number of tasks. Nothing here reads a clock,
+//! opens a socket or starts a thread: a runner (a simulated world, a transport loop) brings frames and time.
+
+pub mod core;
+pub mod decode;
+mod error;
+mod network;
+pub mod units;
+
+pub use error::{Access, Error, Hints};
+pub use network::{DEFAULT_TIMEOUT, Network, Node, Sleep, Wait, join_all};

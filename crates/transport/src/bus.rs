@@ -138,9 +138,6 @@ pub enum BusError {
     /// A virtual bus is part of the program that asks for it, not of this crate.
     #[error("a simulated bus is not reached through a connection; the program that wants it has to embed it")]
     Simulated,
-    /// The hub's listeners are gone.
-    #[error("the hub has been shut down")]
-    HubClosed,
 }
 
 /// Any bus that [`crate::BusSpec::open`] opens.

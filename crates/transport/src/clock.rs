@@ -22,6 +22,9 @@ pub struct WallClock {
 
 impl WallClock {
     /// A clock that reads [`Instant::ZERO`] now.
+    ///
+    /// # Panics
+    /// If the system has no thread left for the timer.
     pub fn start() -> Self {
         let face = Face { zero: std::time::Instant::now() };
         let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
@@ -105,6 +108,7 @@ struct Timer {
     queue: Arc<Queue>,
 }
 
+/// Wakers are woken and dropped with the lock released: either may end a task, and with it other sleeps.
 #[derive(Debug, Default)]
 struct Queue {
     sleepers: Mutex<Sleepers>,
@@ -121,8 +125,8 @@ struct Sleepers {
 impl Timer {
     fn start(face: Face, unix_zero: Duration) -> Arc<Self> {
         let queue = Arc::new(Queue::default());
-        let threads = Arc::clone(&queue);
-        std::thread::spawn(move || threads.serve(face));
+        let served = Arc::clone(&queue);
+        std::thread::spawn(move || served.serve(face));
         Arc::new(Self { unix_zero, queue })
     }
 
@@ -132,15 +136,20 @@ impl Timer {
             sleepers.next_ticket += 1;
             sleepers.next_ticket
         });
-        sleepers.wakers.insert((deadline, ticket), waker.clone());
+        let replaced = sleepers.wakers.insert((deadline, ticket), waker.clone());
         if sleepers.wakers.first_key_value().is_some_and(|(key, _)| *key == (deadline, ticket)) {
             self.queue.changed.notify_one();
         }
+        drop(sleepers);
+        drop(replaced);
         ticket
     }
 
     fn forget(&self, deadline: Instant, ticket: u64) {
-        self.queue.lock().wakers.remove(&(deadline, ticket));
+        let mut sleepers = self.queue.lock();
+        let forgotten = sleepers.wakers.remove(&(deadline, ticket));
+        drop(sleepers);
+        drop(forgotten);
     }
 }
 
@@ -161,11 +170,16 @@ impl Queue {
         let mut sleepers = self.lock();
         while !sleepers.closed {
             let now = face.now();
-            while let Some(entry) = sleepers.wakers.first_entry().filter(|entry| entry.key().0 <= now) {
-                entry.remove().wake();
-            }
             let next = sleepers.wakers.first_key_value().map(|((deadline, _), _)| *deadline);
             sleepers = match next {
+                Some(deadline) if deadline <= now => {
+                    let due = sleepers.wakers.pop_first();
+                    drop(sleepers);
+                    if let Some((_, waker)) = due {
+                        waker.wake();
+                    }
+                    self.lock()
+                }
                 Some(deadline) => {
                     let waited = self.changed.wait_timeout(sleepers, deadline - now);
                     waited.unwrap_or_else(PoisonError::into_inner).0

@@ -49,7 +49,11 @@ impl Link {
     pub(crate) fn open_serial(path: &str, baud: u32) -> Result<Self, BusError> {
         let opened = tokio_serial::new(path, baud).open_native_async();
         let stream = opened.map_err(|source| BusError::OpenSerial { path: path.to_owned(), source })?;
-        Ok(Self::new(path, Box::new(stream)))
+        Ok(Self::over_serial(path, stream))
+    }
+
+    pub(crate) fn over_serial(path: &str, stream: SerialStream) -> Self {
+        Self::new(path, Box::new(stream))
     }
 
     fn new(address: &str, stream: Box<dyn Stream>) -> Self {

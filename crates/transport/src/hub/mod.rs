@@ -1,10 +1,10 @@
 //! A CAN bus served to other programs: any number of clients over socketcand and slcan.
 //!
-//! The hub moves frames and knows no bus. Whoever owns the bus takes the clients' frames from [`Hub::recv`], puts them on
-//! the wire, and when the wire has carried a frame tells everybody with [`Hub::broadcast`]; the sender does not hear its
-//! own. A client may have [`MAX_FRAMES_IN_FLIGHT`] frames that were neither broadcast nor discarded; then its connection is
-//! not read, so that a client that sends faster than the bus is slowed down and no queue grows. A client that does not
-//! read is disconnected when [`MAX_FRAMES_WAITING`] frames wait for it; it never holds up the bus or the others.
+//! The hub moves frames and knows no bus. Whoever owns the bus takes the clients' frames from [`Hub::next_event`], puts them
+//! on the wire, and when the wire has carried a frame tells everybody with [`Hub::broadcast`]; the sender does not hear its
+//! own. A client may have 64 frames that were neither broadcast nor discarded; then its connection is not read, so that a
+//! client that sends faster than the bus is slowed down and no queue grows. A client that does not read is disconnected
+//! when 16,384 frames wait for it; it never holds up the bus or the others.
 
 mod client;
 mod session;
@@ -176,7 +176,7 @@ impl Hub {
     }
 
     /// The next thing that a client did; pending while nothing happens. Cancel-safe.
-    pub async fn recv(&mut self) -> HubEvent {
+    pub async fn next_event(&mut self) -> HubEvent {
         match self.inbox.recv().await {
             Some(event) => event,
             // Cannot be while `shared` holds a sender.
@@ -185,7 +185,7 @@ impl Hub {
     }
 
     /// The next thing that a client has done already.
-    pub fn try_recv(&mut self) -> Option<HubEvent> {
+    pub fn try_next_event(&mut self) -> Option<HubEvent> {
         self.inbox.try_recv().ok()
     }
 
@@ -236,7 +236,7 @@ impl AsyncBus for Hub {
 
     async fn recv(&mut self) -> Result<(Instant, Frame), BusError> {
         loop {
-            if let HubEvent::Frame { client, frame } = Hub::recv(self).await {
+            if let HubEvent::Frame { client, frame } = self.next_event().await {
                 let now = self.clock.now();
                 self.broadcast(&frame, now, Some(client));
                 return Ok((now, frame));

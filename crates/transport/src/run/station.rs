@@ -1,14 +1,21 @@
 //! Drives one [`Station`] on one bus.
 
 use std::future::{Future, poll_fn};
+use std::pin::pin;
 use std::task::Poll;
+use std::time::Duration;
 
 use can::{Frame, Instant, Station};
 use tokio::sync::Notify;
 
+use crate::link::within;
 use crate::{AsyncBus, BusError, WallClock};
 
-/// Runs `station` on `bus` until `until` completes (with its output) or the bus is lost.
+/// How long a connection may take for what the station still had to send when the run ended.
+const PARTING_PATIENCE: Duration = Duration::from_secs(1);
+
+/// Runs `station` on `bus` until `until` completes (with its output) or the bus is lost. What the station has to send by
+/// then still goes out.
 ///
 /// The calls keep to the contract of [`Station`]. What `until` does to the station through a handle - a master's command
 /// that queues an SDO request - is noticed at once, because `until` runs inside this loop; whoever does so from another
@@ -28,36 +35,31 @@ where
     S: Station,
     U: Future,
 {
-    let mut until = std::pin::pin!(until);
+    let mut until = pin!(until);
+    let mut offered = None;
     station.handle_timeout(clock.now());
     loop {
-        while let Some(frame) = station.poll_transmit() {
+        {
+            let mut sending = pin!(send_all(bus, station, clock, offered.take()));
             tokio::select! {
                 biased;
-                output = &mut until => return Ok(output),
-                sent = bus.send(&frame) => sent?,
+                output = &mut until => return part(clock, sending, output).await,
+                sent = &mut sending => sent?,
             }
-            station.handle_transmitted(&frame, clock.now());
         }
         let deadline = station.poll_timeout();
         let event = tokio::select! {
             biased;
-            output = &mut until => return Ok(output),
+            output = &mut until => return part(clock, send_all(bus, station, clock, None), output).await,
             event = changed_behind_our_back(station, deadline) => event,
+            // A deadline goes before a frame: a babbling bus must not keep a station from its timeouts.
+            () = clock.sleep_until_due(deadline) => Event::Woken,
             received = bus.recv() => Event::Received(received?.1),
             () = wakeup.notified() => Event::Woken,
-            () = clock.sleep_until_due(deadline) => Event::Woken,
         };
         match event {
             Event::Received(frame) => station.handle_frame(&frame, clock.now()),
-            Event::Offered(frame) => {
-                tokio::select! {
-                    biased;
-                    output = &mut until => return Ok(output),
-                    sent = bus.send(&frame) => sent?,
-                }
-                station.handle_transmitted(&frame, clock.now());
-            }
+            Event::Offered(frame) => offered = Some(frame),
             Event::Woken => station.handle_timeout(clock.now()),
         }
     }
@@ -68,6 +70,29 @@ enum Event {
     /// The station has something to send that it had not when it was last drained.
     Offered(Frame),
     Woken,
+}
+
+/// Sends `first` and everything that `station` offers.
+async fn send_all(
+    bus: &mut impl AsyncBus,
+    station: &mut impl Station,
+    clock: &WallClock,
+    mut first: Option<Frame>,
+) -> Result<(), BusError> {
+    while let Some(frame) = first.take().or_else(|| station.poll_transmit()) {
+        bus.send(&frame).await?;
+        station.handle_transmitted(&frame, clock.now());
+    }
+    Ok(())
+}
+
+/// Lets the last frames out before the run ends with `output`.
+async fn part<T>(
+    clock: &WallClock,
+    sending: impl Future<Output = Result<(), BusError>>,
+    output: T,
+) -> Result<T, BusError> {
+    within(clock, PARTING_PATIENCE, sending).await.unwrap_or(Ok(())).map(|()| output)
 }
 
 /// Completes if `until`, polled just before, made the station offer a frame or change its deadline.

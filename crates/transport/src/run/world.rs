@@ -8,8 +8,9 @@ use tokio::sync::mpsc;
 
 use crate::{ClientId, Hub, HubEvent, WallClock};
 
-/// Most that a world is moved in one go. A world that is late (the machine was busy, the process was stopped) catches up
-/// in steps of this length, between which clients and commands are served.
+/// How far a world is moved past its next deadline in one go. A world that is late (the machine was busy, the process was
+/// stopped) catches up in steps of this length, between which clients and commands are served; one with nothing due is
+/// moved to now at once.
 const LONGEST_STEP: Duration = Duration::from_millis(20);
 
 /// A world of stations on a simulated wire whose time somebody else moves. Its time is that of the [`WallClock`].
@@ -67,7 +68,7 @@ where
     let mut commands_open = true;
     loop {
         let is_late = catch_up(world, hub, clock);
-        while let Some(event) = hub.try_recv() {
+        while let Some(event) = hub.try_next_event() {
             take_in(world, event);
         }
         let deadline = if is_late { Some(Instant::ZERO) } else { world.next_deadline() };
@@ -84,7 +85,7 @@ where
                     None => commands_open = false,
                 }
             }
-            event = hub.recv() => {
+            event = hub.next_event() => {
                 catch_up(world, hub, clock);
                 take_in(world, event);
             }
@@ -101,10 +102,13 @@ async fn until_due(deadline: Option<Instant>, clock: &WallClock) {
     }
 }
 
-/// Moves the world towards now and tells what was heard; true if more than one step is missing.
+/// Moves the world towards now and tells what was heard; true if now is not reached.
 fn catch_up(world: &mut impl RealTimeWorld, hub: &Hub, clock: &WallClock) -> bool {
-    let now = clock.now();
-    let target = now.min(world.now() + LONGEST_STEP).max(world.now());
+    let now = clock.now().max(world.now());
+    let target = match world.next_deadline() {
+        Some(due) => now.min(due.max(world.now()) + LONGEST_STEP),
+        None => now,
+    };
     world.advance_to(target);
     tell(world, hub);
     target < now

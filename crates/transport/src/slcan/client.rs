@@ -130,3 +130,54 @@ impl AsyncBus for SlcanBus {
         }
     }
 }
+
+#[cfg(all(test, unix))]
+mod tests {
+    use tokio::io::{AsyncReadExt, AsyncWriteExt};
+    use tokio_serial::SerialStream;
+
+    use super::*;
+
+    /// Answers one line after the other on the adapter's end of a serial line; what it was told.
+    async fn adapter(mut line: SerialStream, answers: &[&str]) -> String {
+        let mut told = Vec::new();
+        for answer in answers {
+            while line.read_u8().await.map(|byte| told.push(byte)).is_ok() && told.last() != Some(&b'\r') {}
+            line.write_all(answer.as_bytes()).await.unwrap();
+        }
+        String::from_utf8(told).unwrap()
+    }
+
+    #[tokio::test]
+    async fn opens_a_serial_adapter_whatever_state_it_was_left_in() {
+        let clock = WallClock::start();
+        let (host, line) = SerialStream::pair().unwrap();
+        // The channel was open and half a command stood in the buffer: BEL, CR, CR, then the version.
+        let answers = ["\x07", "t1002", "1133\r\r", "V1013\r", "\r", "\r", "z\rnoise\r\x07t10021133\r"];
+        let (told, bus) = tokio::join!(adapter(line, &answers), async {
+            let mut bus = SlcanBus::open(Link::over_serial("tty", host), Some(Bitrate::K500), &clock).await.unwrap();
+            bus.send(&"601#40".parse().unwrap()).await.unwrap();
+            assert_eq!(bus.recv().await.unwrap().1, "100#1133".parse().unwrap());
+            bus
+        });
+        assert_eq!(told, "\r\rC\rV\rS6\rO\rt601140\r");
+        assert_eq!((bus.frames_refused(), bus.lines_malformed()), (1, 1));
+    }
+
+    #[tokio::test]
+    async fn a_refused_open_and_a_silent_line_are_told_apart() {
+        let clock = WallClock::start();
+        let (host, line) = SerialStream::pair().unwrap();
+        let answers = ["\r", "\r", "\r", "V1013\r", "\x07"];
+        let link = Link::over_serial("tty", host);
+        let (_, refused) = tokio::join!(adapter(line, &answers), SlcanBus::open(link, None, &clock));
+        assert!(refused.unwrap_err().to_string().contains("select a bit rate with ?bitrate=500k"));
+        let (host, _line) = SerialStream::pair().unwrap();
+        let silent = SlcanBus::open(Link::over_serial("tty", host), None, &clock).await.unwrap_err();
+        assert!(matches!(silent, BusError::Silent { .. }), "{silent}");
+        let odd = Bitrate::new(40_000).unwrap();
+        let (host, _line) = SerialStream::pair().unwrap();
+        let odd = SlcanBus::open(Link::over_serial("tty", host), Some(odd), &clock).await.unwrap_err();
+        assert!(odd.to_string().contains("cannot select 40k"), "{odd}");
+    }
+}

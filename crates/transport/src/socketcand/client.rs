@@ -6,7 +6,7 @@ use can::{Frame, Instant};
 
 use super::codec::{Decoder, Message, Reply, Request};
 use crate::link::{Link, within};
-use crate::{AsyncBus, BusError, WallClock};
+use crate::{AsyncBus, BusError, WallClock, text};
 
 /// How long the server may take for one step of the greeting.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -82,6 +82,18 @@ impl AsyncBus for SocketcandBus {
 
 /// `< error 004 23.424242 >` tells of an error frame on the bus: class and time. It is no answer to a request.
 fn is_error_frame(said: &str) -> bool {
-    let class = said.split_ascii_whitespace().next().unwrap_or_default();
-    !class.is_empty() && class.bytes().all(|byte| byte.is_ascii_hexdigit())
+    let mut words = said.split_ascii_whitespace();
+    let class = words.next().and_then(|class| text::parse_hex(class, 8));
+    class.is_some() && words.next().is_none_or(|time| text::parse_seconds(time).is_some())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn error_frames_are_told_from_refusals() {
+        assert!(is_error_frame("004 23.424242") && is_error_frame("20000080"));
+        assert!(!is_error_frame("bad request") && !is_error_frame("unknown command") && !is_error_frame(""));
+    }
 }

@@ -14,7 +14,7 @@ use crate::hub::{MAX_WAITING_REPLIES, Session};
 
 /// How long frames wait behind `< ok >` for a client that says nothing: long enough for a busy machine to schedule the
 /// reader, too short to notice. The frames are delayed, not lost, and keep their time stamps.
-const QUIET_AFTER_OK: Duration = Duration::from_millis(50);
+const QUIET_AFTER_OK: Duration = Duration::from_millis(100);
 
 /// What the protocol document calls modes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,0 +1,422 @@
+//! A CANopen device's communication: NMT slave, heartbeat producer, SYNC consumer, EMCY producer, SDO server, four
+//! RPDOs and four TPDOs over one object dictionary (CiA 301).
+//!
+//! [`Node`] is what a firmware owns. Frames and time go in as [`can::Station`] says. Out come frames, a deadline, and
+//! [`NodeEvent`]s: which entries a peer wrote, NMT changes, reset requests. The node never acts on the application;
+//! its owner polls events, reads and writes the dictionary, and carries out resets by calling [`Node::boot`] again.
+//! What differs between devices is data: [`NodeProfile`].
+
+mod event;
+mod objects;
+mod pending;
+mod profile;
+mod receive;
+
+use can::{CanId, Frame, Instant, Station};
+use heapless::Deque;
+
+pub use event::{EVENT_QUEUE_LENGTH, NodeEvent, Via};
+pub use profile::NodeProfile;
+
+use crate::cob::PdoNumber;
+use crate::emcy::{self, Emcy, EmcyErrorCode};
+use crate::heartbeat::{self, Heartbeat};
+use crate::nmt::Transition;
+use crate::od::{Dictionary, Table};
+use crate::pdo::{Rpdo, Tpdo};
+use crate::sdo::Server;
+use crate::{CobId, Mux, NmtCommand, NmtState, NodeId, cob};
+use pending::{Pending, Source};
+use receive::Receivers;
+
+/// One device on the bus, with a dictionary of up to `N` entries.
+///
+/// After [`new`](Self::new) it is silent and deaf until [`boot`](Self::boot). Call order: `handle_*`, then drain
+/// [`poll_event`](Self::poll_event), let the application act, then drain `poll_transmit`.
+#[derive(Clone)]
+pub struct Node<const N: usize> {
+    profile: &'static NodeProfile,
+    node_id: NodeId,
+    dictionary: Dictionary<N>,
+    state: NmtState,
+    /// Latest time seen.
+    now: Instant,
+    /// Nothing is due before this.
+    deadline: Instant,
+    receivers: Receivers,
+    pending: Pending,
+    events: Deque<NodeEvent, EVENT_QUEUE_LENGTH>,
+    last_addressed: Option<Instant>,
+    heartbeat: heartbeat::Producer,
+    heartbeat_state: Option<u8>,
+    emcy: emcy::Producer,
+    emcy_id: Option<CanId>,
+    sdo: Server,
+    rpdos: [Rpdo; PdoNumber::COUNT],
+    tpdos: [Tpdo; PdoNumber::COUNT],
+}
+
+impl<const N: usize> Node<N> {
+    /// A device with factory values, not booted yet.
+    ///
+    /// # Panics
+    /// If the profile's table has more than `N` rows.
+    pub fn new(profile: &'static NodeProfile, node_id: NodeId) -> Self {
+        Self {
+            profile,
+            node_id,
+            dictionary: Dictionary::new(profile.table, node_id),
+            state: NmtState::Initialising,
+            now: Instant::ZERO,
+            deadline: Instant::FAR_FUTURE,
+            receivers: Receivers::NONE,
+            pending: Pending::NONE,
+            events: Deque::new(),
+            last_addressed: None,
+            heartbeat: heartbeat::Producer::OFF,
+            heartbeat_state: None,
+            emcy: emcy::Producer::new(),
+            emcy_id: None,
+            sdo: Server::new(profile.sdo_frame_length, profile.sdo_timeout_ns),
+            rpdos: [Rpdo::INVALID; PdoNumber::COUNT],
+            tpdos: [Tpdo::INVALID; PdoNumber::COUNT],
+        }
+    }
+
+    /// Starts communication over with the values that are in the dictionary: takes up the communication objects,
+    /// sends boot-up and enters the profile's start state. For power-on, and after a reset request once the owner
+    /// has put the dictionary to its power-on values.
+    pub fn boot(&mut self, now: Instant) {
+        self.now = now;
+        self.sdo.reset();
+        self.emcy = emcy::Producer::new();
+        self.pending = Pending::NONE;
+        self.events.clear();
+        self.last_addressed = None;
+        self.take_up_objects();
+        self.pending.insert(Source::BootUp);
+        self.heartbeat = heartbeat::Producer::from_boot_up(self.heartbeat_period_ms(), now);
+        self.enter(self.profile.start_state);
+        self.reschedule();
+    }
+
+    /// Factory values for the communication objects (1000h to 1FFFh), then [`boot`](Self::boot): reset communication
+    /// for a device that stores none of them.
+    ///
+    /// A device with a parameter store calls [`restore_communication_defaults`](Self::restore_communication_defaults),
+    /// puts its stored values on top and boots.
+    pub fn reset_communication(&mut self, now: Instant) {
+        self.restore_communication_defaults();
+        self.boot(now);
+    }
+
+    /// Puts the objects 1000h to 1FFFh to factory values. They take effect with [`boot`](Self::boot).
+    pub fn restore_communication_defaults(&mut self) {
+        let rows = self.profile.table.iter();
+        for (slot, _) in rows.filter(|(_, row)| objects::is_communication(row.index)) {
+            self.dictionary.restore_default(slot, self.node_id);
+        }
+    }
+
+    /// Falls silent and deaf until the next [`boot`](Self::boot): the supply is gone.
+    pub fn power_off(&mut self) {
+        self.state = NmtState::Initialising;
+        self.receivers = Receivers::NONE;
+        self.pending = Pending::NONE;
+        self.deadline = Instant::FAR_FUTURE;
+        self.sdo.reset();
+        self.stop_pdos();
+        self.events.clear();
+    }
+
+    /// What happened since, in the order of arrival. Poll after every `handle_*`.
+    #[inline]
+    pub fn poll_event(&mut self) -> Option<NodeEvent> {
+        self.events.pop_front()
+    }
+
+    /// When the last frame for this node arrived (SDO request, RPDO, NMT command to it or to all): for a watch over
+    /// the host. `None` since boot.
+    pub const fn last_addressed(&self) -> Option<Instant> {
+        self.last_addressed
+    }
+
+    /// Queues an EMCY message and sets the error register (1001h).
+    pub fn raise_emcy(&mut self, code: EmcyErrorCode, error_register: u8, manufacturer: [u8; 5], now: Instant) {
+        self.now = now;
+        if let Ok(slot) = self.dictionary.table().find(Mux::new(0x1001, 0)) {
+            self.dictionary.set_raw(slot, u32::from(error_register));
+        }
+        if self.emcy_id.is_some() && self.state != NmtState::Initialising {
+            self.emcy.raise(Emcy { code, error_register, manufacturer });
+            self.offer_emcy();
+        }
+    }
+
+    /// The application has written to the dictionary: event-driven TPDOs whose mapped values changed become due.
+    #[inline]
+    pub fn notice_changes(&mut self, now: Instant) {
+        self.now = now;
+        if !self.state.allows_pdo() {
+            return;
+        }
+        for position in 0..PdoNumber::COUNT {
+            if self.tpdos[position].notice_change(&self.dictionary.view()) {
+                self.offer_tpdo(position);
+            }
+        }
+    }
+
+    /// Sends `state` in heartbeats instead of the NMT state; `None` for the NMT state again.
+    pub const fn set_heartbeat_state(&mut self, state: Option<u8>) {
+        self.heartbeat_state = state;
+    }
+
+    /// The values.
+    #[inline]
+    pub const fn dictionary(&self) -> &Dictionary<N> {
+        &self.dictionary
+    }
+
+    /// The values, to write as the device itself. Communication objects take effect with [`boot`](Self::boot); for
+    /// mapped values see [`notice_changes`](Self::notice_changes).
+    #[inline]
+    pub const fn dictionary_mut(&mut self) -> &mut Dictionary<N> {
+        &mut self.dictionary
+    }
+
+    /// The rows.
+    pub const fn table(&self) -> &'static Table {
+        self.profile.table
+    }
+
+    /// The node-ID.
+    pub const fn node_id(&self) -> NodeId {
+        self.node_id
+    }
+
+    /// The NMT state; `Initialising` before boot and after a reset request.
+    pub const fn state(&self) -> NmtState {
+        self.state
+    }
+
+    /// The identifier of TPDO `number`, if it is valid and maps something.
+    pub fn tpdo_id(&self, number: PdoNumber) -> Option<CanId> {
+        let tpdo = &self.tpdos[number.position()];
+        tpdo.is_active().then(|| tpdo.can_id())
+    }
+
+    /// The identifier of RPDO `number`, if it is valid.
+    pub fn rpdo_id(&self, number: PdoNumber) -> Option<CanId> {
+        self.rpdos[number.position()].standard_id().map(CanId::standard)
+    }
+
+    pub(crate) fn handle_nmt(&mut self, command: NmtCommand) {
+        match self.state.handle(command) {
+            Transition::None => {}
+            Transition::Enter(state) => self.enter(state),
+            Transition::ResetNode => self.go_down(NodeEvent::ResetNode),
+            Transition::ResetCommunication => self.go_down(NodeEvent::ResetCommunication),
+        }
+    }
+
+    fn enter(&mut self, state: NmtState) {
+        self.state = state;
+        self.push(NodeEvent::Nmt(state));
+        if state.allows_pdo() {
+            for position in 0..PdoNumber::COUNT {
+                self.tpdos[position].start(self.now);
+                self.offer_tpdo(position);
+            }
+        } else {
+            self.stop_pdos();
+        }
+        if state.allows_sdo() {
+            self.offer_emcy();
+        } else {
+            self.sdo.reset();
+            self.pending.remove(Source::SdoReply);
+            self.pending.remove(Source::Emcy);
+        }
+    }
+
+    /// Waits for the owner to boot again; what it was about to tell is void.
+    fn go_down(&mut self, request: NodeEvent) {
+        self.power_off();
+        self.push(request);
+    }
+
+    fn stop_pdos(&mut self) {
+        for position in 0..PdoNumber::COUNT {
+            let _ = self.rpdos[position].take_latched();
+            self.tpdos[position].stop();
+            self.pending.remove(Source::Tpdo(position));
+        }
+    }
+
+    /// Offers a TPDO if it is due and not inhibited, and sees that it is looked at when it will be.
+    #[inline]
+    fn offer_tpdo(&mut self, position: usize) {
+        let tpdo = &self.tpdos[position];
+        self.pending.set(Source::Tpdo(position), tpdo.is_ready(self.now));
+        self.deadline = self.deadline.min(tpdo.deadline(self.now));
+    }
+
+    fn offer_emcy(&mut self) {
+        let may_send = self.state.allows_sdo() && self.emcy_id.is_some();
+        self.pending.set(Source::Emcy, may_send && self.emcy.is_ready(self.now));
+        if may_send {
+            self.deadline = self.deadline.min(self.emcy.deadline(self.now));
+        }
+    }
+
+    /// When full, the oldest event is lost: the dictionary has the newest values.
+    #[inline]
+    fn push(&mut self, event: NodeEvent) {
+        if self.events.is_full() {
+            self.events.pop_front();
+        }
+        let _ = self.events.push_back(event);
+    }
+
+    /// Finds the earliest deadline of all services, and offers what has become ready.
+    fn reschedule(&mut self) {
+        self.deadline = self.heartbeat.deadline().min(self.sdo.deadline());
+        self.offer_emcy();
+        for position in 0..PdoNumber::COUNT {
+            self.offer_tpdo(position);
+        }
+    }
+
+    fn pending_id(&self, source: Source) -> u32 {
+        match source {
+            Source::BootUp => 0,
+            Source::Emcy => self.emcy_id.map_or(u32::MAX, CanId::raw),
+            Source::Tpdo(position) => self.tpdos[position].can_id().raw(),
+            Source::SdoReply => cob::sdo_reply(self.node_id).raw(),
+            Source::Heartbeat => cob::heartbeat(self.node_id).raw(),
+        }
+    }
+
+    fn take(&mut self, source: Source) -> Option<Frame> {
+        match source {
+            Source::BootUp => Some(Heartbeat::boot_up(self.node_id).emit()),
+            Source::Heartbeat => {
+                let state = self.heartbeat_state.unwrap_or(self.state.heartbeat_byte());
+                Some(Heartbeat { node: self.node_id, state }.emit())
+            }
+            Source::SdoReply => self.sdo.take_reply().map(|bytes| Frame::full(cob::sdo_reply(self.node_id), bytes)),
+            Source::Tpdo(position) => {
+                let frame = self.tpdos[position].take(&self.dictionary.view(), self.now);
+                self.deadline = self.deadline.min(self.tpdos[position].deadline(self.now));
+                frame
+            }
+            Source::Emcy => {
+                let emcy = self.emcy.take(self.now)?;
+                self.offer_emcy();
+                self.emcy_id.map(|id| emcy.emit(id))
+            }
+        }
+    }
+}
+
+impl<const N: usize> Station for Node<N> {
+    #[inline]
+    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
+        self.now = now;
+        let Some(id) = frame.standard_data_id() else { return };
+        let receivers = self.receivers.of(id);
+        if !receivers.is_empty() {
+            self.receive(frame, receivers);
+        }
+    }
+
+    #[inline]
+    fn handle_timeout(&mut self, now: Instant) {
+        self.now = now;
+        if now >= self.deadline {
+            self.serve_deadlines();
+        }
+    }
+
+    /// The most urgent frame: boot-up before all, then by identifier.
+    #[inline]
+    fn poll_transmit(&mut self) -> Option<Frame> {
+        if self.pending.is_empty() {
+            return None;
+        }
+        let source = self.pending.iter().min_by_key(|source| self.pending_id(*source))?;
+        self.pending.remove(source);
+        self.take(source)
+    }
+
+    #[inline]
+    fn poll_timeout(&self) -> Option<Instant> {
+        (self.deadline != Instant::FAR_FUTURE).then_some(self.deadline)
+    }
+
+    fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
+        self.now = now;
+        if Some(frame.id()) == self.emcy_id {
+            self.emcy.handle_transmitted(now);
+            self.offer_emcy();
+            return;
+        }
+        for position in 0..PdoNumber::COUNT {
+            if self.tpdos[position].can_id() == frame.id() {
+                self.tpdos[position].handle_transmitted(now);
+                self.offer_tpdo(position);
+            }
+        }
+    }
+}
+
+impl<const N: usize> Node<N> {
+    fn serve_deadlines(&mut self) {
+        if self.heartbeat.handle_timeout(self.now) {
+            self.pending.insert(Source::Heartbeat);
+        }
+        self.sdo.handle_timeout(self.now);
+        if self.sdo.has_reply() {
+            self.pending.insert(Source::SdoReply);
+        }
+        for tpdo in &mut self.tpdos {
+            tpdo.handle_timeout(self.now);
+        }
+        self.reschedule();
+    }
+
+    fn take_up_objects(&mut self) {
+        self.receivers = Receivers::new(self.node_id);
+        self.take_up_sync();
+        self.take_up_emcy();
+        for position in 0..PdoNumber::COUNT {
+            self.take_up_rpdo(position);
+            self.take_up_tpdo(position);
+        }
+    }
+
+    fn heartbeat_period_ms(&self) -> u16 {
+        self.object(0x1017).unwrap_or(0) as u16
+    }
+
+    fn object(&self, index: u16) -> Option<u32> {
+        self.dictionary.table().find(Mux::new(index, 0)).ok().map(|slot| self.dictionary.raw(slot))
+    }
+
+    fn take_up_sync(&mut self) {
+        let cob_id = self.object(0x1005).map(CobId);
+        self.receivers.set_sync(cob_id.and_then(|cob_id| cob_id.can_id().as_standard()));
+    }
+
+    /// 1014h, or what it would be by default on a device without it.
+    fn emcy_cob_id(&self) -> CobId {
+        self.object(0x1014).map_or(CobId(cob::emcy(self.node_id).raw()), CobId)
+    }
+
+    fn take_up_emcy(&mut self) {
+        let cob_id = self.emcy_cob_id();
+        self.emcy_id = (self.profile.emcy && cob_id.is_valid()).then(|| cob_id.can_id());
+        self.emcy.set_inhibit_time(self.object(0x1015).unwrap_or(0) as u16);
+    }
+}

@@ -1,0 +1,146 @@
+//! What a write to the communication objects (1000h to 1FFFh) must satisfy, and what it changes at once.
+
+use super::pending::Source;
+use super::{Node, NodeEvent, Via};
+use crate::heartbeat;
+use crate::od::{Slot, View};
+use crate::pdo::parameter::{COB_ID, INHIBIT_TIME, TRANSMISSION_TYPE};
+use crate::pdo::{
+    Direction, Mapping, MappingRecord, Parameter, RPDO_MAPPING, RPDO_PARAMETER, Rpdo, TPDO_MAPPING, TPDO_PARAMETER,
+    Tpdo, TransmissionType,
+};
+use crate::{AbortCode, CobId, Mux};
+
+/// True for the communication profile area.
+pub(super) const fn is_communication(index: u16) -> bool {
+    matches!(index, 0x1000..=0x1FFF)
+}
+
+/// A PDO record of a multiplexor.
+#[derive(Clone, Copy)]
+enum Record {
+    Parameter(Direction, usize),
+    Mapping(Direction, usize),
+    Other,
+}
+
+impl Record {
+    const fn of(index: u16) -> Self {
+        let position = (index & 3) as usize;
+        match index & !3 {
+            RPDO_PARAMETER => Self::Parameter(Direction::Receive, position),
+            RPDO_MAPPING => Self::Mapping(Direction::Receive, position),
+            TPDO_PARAMETER => Self::Parameter(Direction::Transmit, position),
+            TPDO_MAPPING => Self::Mapping(Direction::Transmit, position),
+            _ => Self::Other,
+        }
+    }
+}
+
+impl<const N: usize> Node<N> {
+    /// A peer's write: checks, stores, takes effect, is told to the owner.
+    #[inline]
+    pub(super) fn write(&mut self, slot: Slot, raw: u32, via: Via) -> Result<(), AbortCode> {
+        self.dictionary.check_write(slot, raw)?;
+        let mux = self.profile.table.row(slot).mux();
+        if is_communication(mux.index) {
+            self.check_communication(mux, raw)?;
+            self.dictionary.set_raw(slot, raw);
+            self.take_up(mux);
+        } else {
+            self.dictionary.set_raw(slot, raw);
+        }
+        self.push(NodeEvent::Written { slot, raw, via });
+        Ok(())
+    }
+
+    fn check_communication(&self, mux: Mux, raw: u32) -> Result<(), AbortCode> {
+        let values = self.dictionary.view();
+        match (mux.index, Record::of(mux.index)) {
+            // A consumer of SYNC only: bit 30 would make it a producer.
+            (0x1005, _) if raw & CobId::NO_RTR != 0 => Err(AbortCode::INVALID_VALUE),
+            (0x1005, _) => CobId(raw & !CobId::INVALID).check_identifier(),
+            (0x1014, _) => self.emcy_cob_id().check_change(CobId(raw), self.profile.pdo_changes_while_valid),
+            (_, Record::Parameter(..)) => self.check_parameter(&values, mux, raw),
+            (_, Record::Mapping(direction, _)) => self.check_mapping(&values, mux, raw, direction),
+            _ => Ok(()),
+        }
+    }
+
+    fn check_parameter(&self, values: &View<'_>, mux: Mux, raw: u32) -> Result<(), AbortCode> {
+        let while_valid = self.profile.pdo_changes_while_valid;
+        let parameter = Parameter::read(values, mux.index);
+        match mux.sub_index {
+            COB_ID => parameter.cob_id.check_change(CobId(raw), while_valid),
+            TRANSMISSION_TYPE => TransmissionType::from_raw(raw as u8).map(|_| ()),
+            INHIBIT_TIME if parameter.cob_id.is_valid() && !while_valid => Err(AbortCode::UNSUPPORTED_ACCESS),
+            _ => Ok(()),
+        }
+    }
+
+    /// Entries may be written while sub-index 00h is 0; sub-index 00h when all entries then in use fit.
+    fn check_mapping(&self, values: &View<'_>, mux: Mux, raw: u32, direction: Direction) -> Result<(), AbortCode> {
+        let parameter_index = mux.index - (RPDO_MAPPING - RPDO_PARAMETER);
+        let is_valid = Parameter::read(values, parameter_index).cob_id.is_valid();
+        if is_valid && !self.profile.pdo_changes_while_valid {
+            return Err(AbortCode::UNSUPPORTED_ACCESS);
+        }
+        if mux.sub_index == 0 {
+            return Mapping::with_count(values, mux.index, direction, raw as u8).map(|_| ());
+        }
+        if values.value(Mux::new(mux.index, 0)) != Ok(0) {
+            return Err(AbortCode::UNSUPPORTED_ACCESS);
+        }
+        // 0 empties an entry; it cannot be counted in until something is there.
+        if raw == 0 { Ok(()) } else { MappingRecord::from_raw(raw).resolve(values, direction).map(|_| ()) }
+    }
+
+    /// A communication object was stored: it takes effect at once.
+    fn take_up(&mut self, mux: Mux) {
+        match (mux.index, Record::of(mux.index)) {
+            (0x1005, _) => self.take_up_sync(),
+            (0x1014 | 0x1015, _) => self.take_up_emcy(),
+            (0x1017, _) => self.heartbeat = heartbeat::Producer::from_write(self.heartbeat_period_ms(), self.now),
+            (_, Record::Parameter(Direction::Receive, position) | Record::Mapping(Direction::Receive, position)) => {
+                self.take_up_rpdo(position);
+            }
+            (_, Record::Parameter(Direction::Transmit, position) | Record::Mapping(Direction::Transmit, position)) => {
+                let old = self.tpdos[position];
+                self.take_up_tpdo(position);
+                match (self.state.allows_pdo(), old.is_active()) {
+                    (true, true) => self.tpdos[position].take_over_from(&old, self.now),
+                    (true, false) => self.tpdos[position].start(self.now),
+                    (false, _) => {}
+                }
+            }
+            _ => {}
+        }
+        if self.heartbeat.handle_timeout(self.now) {
+            self.pending.insert(Source::Heartbeat);
+        }
+        self.reschedule();
+    }
+
+    pub(super) fn take_up_rpdo(&mut self, position: usize) {
+        let values = self.dictionary.view();
+        let parameter = Parameter::read(&values, RPDO_PARAMETER + position as u16);
+        let mapping = Mapping::read(&values, RPDO_MAPPING + position as u16, Direction::Receive);
+        // A mapping that does not resolve (a store of another firmware) maps nothing.
+        let rpdo = Rpdo::configure(&parameter, mapping.unwrap_or(None));
+        self.receivers.set_rpdo(position, rpdo.standard_id());
+        self.rpdos[position] = rpdo;
+    }
+
+    pub(super) fn take_up_tpdo(&mut self, position: usize) {
+        let values = self.dictionary.view();
+        let parameter = Parameter::read(&values, TPDO_PARAMETER + position as u16);
+        let mapping = Mapping::read(&values, TPDO_MAPPING + position as u16, Direction::Transmit);
+        self.tpdos[position] = Tpdo::configure(
+            &parameter,
+            mapping.unwrap_or(None),
+            self.profile.event_trigger,
+            self.profile.inhibit_unit_ns,
+            self.profile.event_timer_unit_ns,
+        );
+    }
+}

@@ -1,0 +1,60 @@
+use crate::NmtState;
+use crate::od::Table;
+use crate::pdo::EventTrigger;
+use crate::sdo::server::FrameLength;
+
+/// What differs between devices in their communication. Constant data.
+///
+/// Start from [`cia_301`](Self::cia_301) and change what a manual says otherwise.
+#[derive(Clone, Copy)]
+pub struct NodeProfile {
+    /// The object rows.
+    pub table: &'static Table,
+    /// NMT state entered after boot-up.
+    pub start_state: NmtState,
+    /// The device sends EMCY messages.
+    pub emcy: bool,
+    /// One count of a PDO's inhibit time (sub-index 03h).
+    pub inhibit_unit_ns: u64,
+    /// One count of a PDO's event timer (sub-index 05h).
+    pub event_timer_unit_ns: u64,
+    /// What makes the device send TPDOs of type 254 and 255.
+    pub event_trigger: EventTrigger,
+    /// COB-ID, inhibit time and mapping of a PDO may be changed while it is valid, and the COB-ID of EMCY.
+    pub pdo_changes_while_valid: bool,
+    /// Which SDO frames are heard, by length.
+    pub sdo_frame_length: FrameLength,
+    /// A segmented SDO transfer is aborted when the client is silent this long; 0 for never.
+    pub sdo_timeout_ns: u64,
+}
+
+impl NodeProfile {
+    /// Longest silence of a client within a segmented transfer. CiA 301 leaves it to the device; long enough for a
+    /// host that pauses, short enough that a client that went away does not hold the channel.
+    pub const SDO_TIMEOUT_NS: u64 = 1_000_000_000;
+
+    /// What CiA 301 says: pre-operational after boot-up, inhibit time in 100 us, event timer in 1 ms, PDOs to be made
+    /// invalid before they are changed, SDO frames of eight bytes.
+    pub const fn cia_301(table: &'static Table) -> Self {
+        Self {
+            table,
+            start_state: NmtState::PreOperational,
+            emcy: true,
+            inhibit_unit_ns: 100_000,
+            event_timer_unit_ns: 1_000_000,
+            event_trigger: EventTrigger::Change,
+            pdo_changes_while_valid: false,
+            sdo_frame_length: FrameLength::Eight,
+            sdo_timeout_ns: Self::SDO_TIMEOUT_NS,
+        }
+    }
+}
+
+impl core::fmt::Debug for NodeProfile {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("NodeProfile")
+            .field("rows", &self.table.rows().len())
+            .field("start_state", &self.start_state)
+            .finish_non_exhaustive()
+    }
+}

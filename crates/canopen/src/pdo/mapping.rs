@@ -1,0 +1,148 @@
+//! What a PDO carries (CiA 301, 7.5.2.36 and 7.5.2.38): records 1600h and 1A00h, resolved to cells.
+
+use crate::od::{PdoMapping, Slot, View};
+use crate::{AbortCode, Mux};
+
+/// Most objects in one PDO: eight of one byte.
+pub const MAX_OBJECTS: usize = 8;
+/// Bits of a PDO.
+pub const MAX_BITS: u32 = 64;
+
+/// Device's point of view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// To the device: objects must be writable.
+    Receive,
+    /// From the device: objects must be readable.
+    Transmit,
+}
+
+/// One entry of a mapping record: which object, how many bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MappingRecord {
+    /// The object.
+    pub mux: Mux,
+    /// Its length in bits.
+    pub bits: u8,
+}
+
+impl MappingRecord {
+    /// From the value of a sub-entry: index, sub-index, length.
+    pub const fn from_raw(raw: u32) -> Self {
+        Self { mux: Mux::from_key(raw >> 8), bits: raw as u8 }
+    }
+
+    /// The value of the sub-entry.
+    pub const fn raw(self) -> u32 {
+        self.mux.key() << 8 | self.bits as u32
+    }
+
+    /// The row that this entry maps.
+    ///
+    /// # Errors
+    /// 0602 0000h if there is no such object, 0604 0041h if it cannot be mapped in this direction or its length is
+    /// another.
+    pub fn resolve(self, values: &View<'_>, direction: Direction) -> Result<Slot, AbortCode> {
+        let slot = values.table().find(self.mux).map_err(|_| AbortCode::NO_SUCH_OBJECT)?;
+        let row = values.table().row(slot);
+        let allowed = match direction {
+            Direction::Receive => row.access.is_writable(),
+            Direction::Transmit => row.access.is_readable(),
+        };
+        let fits = row.data_type.bits() == self.bits && self.bits > 0;
+        if row.pdo == PdoMapping::Yes && allowed && fits { Ok(slot) } else { Err(AbortCode::NOT_MAPPABLE) }
+    }
+}
+
+/// The objects of a PDO in order, as cells and shifts into its 64 bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mapping {
+    objects: [Mapped; MAX_OBJECTS],
+    count: u8,
+    length: u8,
+}
+
+/// One mapped object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mapped {
+    /// The row.
+    pub slot: Slot,
+    shift: u8,
+    bits: u8,
+}
+
+impl Mapping {
+    /// Reads the mapping record at `index` (1600h or 1A00h + n) from the dictionary.
+    ///
+    /// # Errors
+    /// As [`with_count`](Self::with_count).
+    pub fn read(values: &View<'_>, index: u16, direction: Direction) -> Result<Option<Self>, AbortCode> {
+        match values.value(Mux::new(index, 0)) {
+            Ok(count) => Self::with_count(values, index, direction, count as u8),
+            Err(_) => Ok(None),
+        }
+    }
+
+    /// The mapping that the record's entries make if sub-index 00h is `count`; `None` for no objects.
+    ///
+    /// # Errors
+    /// 0604 0042h for more entries than the record has or more than 64 bits, else as [`MappingRecord::resolve`].
+    pub fn with_count(
+        values: &View<'_>,
+        index: u16,
+        direction: Direction,
+        count: u8,
+    ) -> Result<Option<Self>, AbortCode> {
+        if usize::from(count) > MAX_OBJECTS {
+            return Err(AbortCode::PDO_TOO_LONG);
+        }
+        let mut mapping: Option<Self> = None;
+        for sub_index in 1..=count {
+            let raw = values.value(Mux::new(index, sub_index)).map_err(|_| AbortCode::PDO_TOO_LONG)?;
+            let record = MappingRecord::from_raw(raw as u32);
+            let slot = record.resolve(values, direction)?;
+            mapping = Some(Self::extended(mapping, slot, record.bits)?);
+        }
+        Ok(mapping)
+    }
+
+    fn extended(mapping: Option<Self>, slot: Slot, bits: u8) -> Result<Self, AbortCode> {
+        let first = Mapped { slot, shift: 0, bits };
+        let Some(mut mapping) = mapping else {
+            return Ok(Self { objects: [first; MAX_OBJECTS], count: 1, length: bits / 8 });
+        };
+        let used_bits = mapping.length * 8;
+        if u32::from(used_bits) + u32::from(bits) > MAX_BITS {
+            return Err(AbortCode::PDO_TOO_LONG);
+        }
+        mapping.objects[usize::from(mapping.count)] = Mapped { slot, shift: used_bits, bits };
+        mapping.count += 1;
+        mapping.length += bits / 8;
+        Ok(mapping)
+    }
+
+    /// The mapped objects in order.
+    #[inline]
+    pub fn objects(&self) -> &[Mapped] {
+        &self.objects[..usize::from(self.count)]
+    }
+
+    /// Length of the PDO in bytes, 1 to 8.
+    pub const fn length(&self) -> u8 {
+        self.length
+    }
+
+    /// The PDO's data, the first object in the lowest bits.
+    #[inline]
+    pub fn gather(&self, values: &View<'_>) -> u64 {
+        self.objects().iter().fold(0, |data, object| data | u64::from(values.raw(object.slot)) << object.shift)
+    }
+}
+
+impl Mapped {
+    /// The object's cell within `data` of a received PDO.
+    #[inline]
+    pub const fn extract(&self, data: u64) -> u32 {
+        (data >> self.shift) as u32 & (u32::MAX >> (32 - self.bits as u32))
+    }
+}

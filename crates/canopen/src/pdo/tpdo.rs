@@ -1,0 +1,240 @@
+use can::{CanId, Frame, Instant};
+
+use super::{Mapping, Parameter, TransmissionType};
+use crate::od::View;
+
+/// What makes a device send a TPDO of type 254 or 255, apart from its event timer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EventTrigger {
+    /// A mapped value differs from the one last sent.
+    Change,
+    /// As `Change`, but type 255 with an event timer is sent by that timer alone.
+    ChangeOr255ByTimer,
+    /// TPDO n answers RPDO n; nothing is sent by itself.
+    AnswersRpdo,
+}
+
+/// A transmit PDO: from the device. Source: CiA 301, 7.2.2.5.2 and 7.5.2.37.
+///
+/// Wanting to send and being allowed to are apart: an event makes it *due*, the inhibit time holds it back. However
+/// many events come meanwhile, one frame is sent. Event-driven data is read when the frame is taken, synchronous
+/// data at its SYNC.
+#[derive(Clone, Copy, Debug)]
+pub struct Tpdo {
+    id: CanId,
+    mapping: Option<Mapping>,
+    schedule: Schedule,
+    due: Option<Cause>,
+    answers_rpdo: bool,
+    data: u64,
+    inhibit_ns: u64,
+    inhibited_until: Instant,
+    timer_ns: u64,
+    timer_at: Instant,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Schedule {
+    /// At the first SYNC after an event.
+    Acyclic { event: bool },
+    /// At every `period`-th SYNC; `left` more until then.
+    Cyclic { period: u8, left: u8 },
+    /// By events; `on_change` if a changed value is one.
+    Event { on_change: bool },
+}
+
+/// Why a TPDO is to be sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Cause {
+    /// Its event timer, which then keeps its grid.
+    Timer,
+    /// Anything else: the event timer starts anew.
+    Event,
+}
+
+impl Tpdo {
+    /// Not valid.
+    pub const INVALID: Self = Self {
+        id: CanId::standard(0),
+        mapping: None,
+        schedule: Schedule::Event { on_change: false },
+        due: None,
+        answers_rpdo: false,
+        data: 0,
+        inhibit_ns: 0,
+        inhibited_until: Instant::ZERO,
+        timer_ns: 0,
+        timer_at: Instant::FAR_FUTURE,
+    };
+
+    /// A TPDO at rest, with the times in units of `inhibit_unit_ns` and `timer_unit_ns`.
+    pub fn configure(
+        parameter: &Parameter,
+        mapping: Option<Mapping>,
+        trigger: EventTrigger,
+        inhibit_unit_ns: u64,
+        timer_unit_ns: u64,
+    ) -> Self {
+        let Some(id) = parameter.standard_id() else { return Self::INVALID };
+        let answers_rpdo = trigger == EventTrigger::AnswersRpdo;
+        let by_timer = trigger == EventTrigger::ChangeOr255ByTimer && parameter.event_timer != 0;
+        let schedule = match parameter.transmission_type {
+            _ if answers_rpdo => Schedule::Event { on_change: false },
+            TransmissionType::SynchronousAcyclic => Schedule::Acyclic { event: false },
+            TransmissionType::SynchronousCyclic(period) => Schedule::Cyclic { period, left: period },
+            TransmissionType::EventDrivenManufacturer => Schedule::Event { on_change: true },
+            TransmissionType::EventDrivenProfile => Schedule::Event { on_change: !by_timer },
+        };
+        // The inhibit time is for types 254 and 255 (CiA 301, 7.5.2.37).
+        let is_event_driven = matches!(schedule, Schedule::Event { .. });
+        Self {
+            id: CanId::standard(id),
+            mapping,
+            schedule,
+            answers_rpdo,
+            inhibit_ns: if is_event_driven { u64::from(parameter.inhibit_time) * inhibit_unit_ns } else { 0 },
+            timer_ns: u64::from(parameter.event_timer) * timer_unit_ns,
+            ..Self::INVALID
+        }
+    }
+
+    /// The identifier.
+    pub const fn can_id(&self) -> CanId {
+        self.id
+    }
+
+    /// True if it is valid and maps something.
+    pub const fn is_active(&self) -> bool {
+        self.mapping.is_some()
+    }
+
+    /// Operational is entered, or the PDO became active while operational: counts as an event, so that event-driven
+    /// data is sent once. SYNCs and the event timer count from here.
+    pub fn start(&mut self, now: Instant) {
+        if !self.is_active() {
+            return;
+        }
+        self.restart_counting(now);
+        match &mut self.schedule {
+            Schedule::Acyclic { event } => *event = true,
+            Schedule::Cyclic { .. } => {}
+            Schedule::Event { .. } => self.due = (!self.answers_rpdo).then_some(Cause::Event),
+        }
+    }
+
+    /// Stays active under a changed record: what was due or inhibited remains so.
+    pub fn take_over_from(&mut self, old: &Self, now: Instant) {
+        self.due = old.due;
+        self.data = old.data;
+        self.inhibited_until = old.inhibited_until;
+        self.restart_counting(now);
+    }
+
+    fn restart_counting(&mut self, now: Instant) {
+        match &mut self.schedule {
+            Schedule::Acyclic { .. } => {}
+            Schedule::Cyclic { period, left } => *left = *period,
+            Schedule::Event { .. } if self.timer_ns > 0 => self.timer_at = now.plus_nanos(self.timer_ns),
+            Schedule::Event { .. } => {}
+        }
+    }
+
+    /// Operational is left: nothing is due any more.
+    pub const fn stop(&mut self) {
+        self.due = None;
+        self.timer_at = Instant::FAR_FUTURE;
+    }
+
+    /// A SYNC arrived while operational. True if a frame is to be sent; its data is sampled here.
+    #[inline]
+    pub fn handle_sync(&mut self, values: &View<'_>) -> bool {
+        let Some(mapping) = &self.mapping else { return false };
+        let send = match &mut self.schedule {
+            Schedule::Acyclic { event } => core::mem::take(event),
+            Schedule::Cyclic { period, left } => {
+                *left -= 1;
+                let reached = *left == 0;
+                if reached {
+                    *left = *period;
+                }
+                reached
+            }
+            Schedule::Event { .. } => false,
+        };
+        if send {
+            self.data = mapping.gather(values);
+            self.due = Some(Cause::Event);
+        }
+        send
+    }
+
+    /// Looks whether a mapped value differs from the one last sent. True if that made the TPDO due.
+    #[inline]
+    pub fn notice_change(&mut self, values: &View<'_>) -> bool {
+        let Some(mapping) = &self.mapping else { return false };
+        match &mut self.schedule {
+            Schedule::Event { on_change: true } if self.due.is_none() && mapping.gather(values) != self.data => {
+                self.due = Some(Cause::Event);
+                true
+            }
+            Schedule::Acyclic { event: event @ false } => {
+                *event = mapping.gather(values) != self.data;
+                false
+            }
+            _ => false,
+        }
+    }
+
+    /// RPDO n of the same number was received. True if that made the TPDO due.
+    #[inline]
+    pub fn handle_rpdo(&mut self) -> bool {
+        let answers = self.answers_rpdo && self.is_active();
+        if answers {
+            self.due = Some(Cause::Event);
+        }
+        answers
+    }
+
+    /// Time has reached `now`: serves the event timer.
+    pub fn handle_timeout(&mut self, now: Instant) {
+        if now < self.timer_at || self.timer_ns == 0 {
+            return;
+        }
+        let missed = now.nanos_since(self.timer_at) / self.timer_ns;
+        self.timer_at = self.timer_at.plus_nanos((missed + 1).saturating_mul(self.timer_ns));
+        self.due = self.due.or(Some(Cause::Timer));
+    }
+
+    /// True if a frame may be sent at `now`.
+    #[inline]
+    pub fn is_ready(&self, now: Instant) -> bool {
+        self.due.is_some() && now >= self.inhibited_until
+    }
+
+    /// When after `now` it next needs attention; [`Instant::FAR_FUTURE`] for never.
+    #[inline]
+    pub fn deadline(&self, now: Instant) -> Instant {
+        let is_held_back = self.due.is_some() && now < self.inhibited_until;
+        if is_held_back { self.timer_at.min(self.inhibited_until) } else { self.timer_at }
+    }
+
+    /// The frame to offer at `now`.
+    #[inline]
+    pub fn take(&mut self, values: &View<'_>, now: Instant) -> Option<Frame> {
+        let mapping = self.mapping.as_ref()?;
+        let cause = self.due.take();
+        if let Schedule::Event { .. } = self.schedule {
+            self.data = mapping.gather(values);
+            if self.timer_ns > 0 && cause == Some(Cause::Event) {
+                self.timer_at = now.plus_nanos(self.timer_ns);
+            }
+        }
+        self.inhibited_until = now.plus_nanos(self.inhibit_ns);
+        Some(Frame::new(self.id, &self.data.to_le_bytes()[..usize::from(mapping.length())]))
+    }
+
+    /// The wire took the frame at `now`: the inhibit time counts from here.
+    pub const fn handle_transmitted(&mut self, now: Instant) {
+        self.inhibited_until = now.plus_nanos(self.inhibit_ns);
+    }
+}

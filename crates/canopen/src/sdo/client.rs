@@ -1,0 +1,365 @@
+//! The other side of an SDO channel: asks a server to read or write one entry (CiA 301, 7.2.4).
+//!
+//! One transfer at a time. The bytes live with the caller: a download hands the same bytes to every call, an upload
+//! the buffer to fill. Expedited or segmented is chosen by length, and by the server's answer. Retries and queues
+//! are the caller's.
+
+use core::fmt;
+use core::time::Duration;
+
+use can::{CanId, Frame, Instant};
+
+use super::wire::{LENGTH, MAX_SEGMENT, Payload, Reply, Request, Segment};
+use crate::{AbortCode, Mux, NodeId, cob};
+
+/// What a finished transfer did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// `length` bytes of the buffer were filled.
+    Uploaded {
+        /// The entry that was read.
+        mux: Mux,
+        /// Bytes in the buffer.
+        length: usize,
+    },
+    /// The server has stored the value.
+    Downloaded {
+        /// The entry that was written.
+        mux: Mux,
+    },
+}
+
+/// Why a transfer failed. It is over; the server was sent an abort where it may still be waiting.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Failure {
+    /// The server refused.
+    Aborted {
+        /// The entry.
+        mux: Mux,
+        /// Its reason.
+        code: AbortCode,
+    },
+    /// No reply in time.
+    TimedOut {
+        /// The entry.
+        mux: Mux,
+    },
+    /// A reply for another entry.
+    WrongMux {
+        /// The entry asked for.
+        expected: Mux,
+        /// The entry in the reply.
+        received: Mux,
+    },
+    /// A reply that does not belong to the request.
+    UnexpectedReply {
+        /// The entry.
+        mux: Mux,
+        /// Its first byte.
+        command: u8,
+    },
+    /// A segment came twice, or one was lost.
+    ToggleBit {
+        /// The entry.
+        mux: Mux,
+    },
+    /// The value is longer than the buffer.
+    BufferTooSmall {
+        /// The entry.
+        mux: Mux,
+        /// Bytes needed, as far as known.
+        needed: usize,
+    },
+    /// The server sent another number of bytes than it had declared.
+    LengthMismatch {
+        /// The entry.
+        mux: Mux,
+        /// Bytes declared.
+        declared: usize,
+        /// Bytes received.
+        received: usize,
+    },
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Aborted { mux, code } => write!(f, "{mux}: the device aborted with {code}"),
+            Self::TimedOut { mux } => write!(f, "{mux}: no reply from the device in time"),
+            Self::WrongMux { expected, received } => write!(f, "{expected}: the reply was for {received}"),
+            Self::UnexpectedReply { mux, command } => {
+                write!(f, "{mux}: the reply {command:02X}h does not fit the request")
+            }
+            Self::ToggleBit { mux } => write!(f, "{mux}: a segment was repeated or lost (toggle bit)"),
+            Self::BufferTooSmall { mux, needed } => write!(f, "{mux}: the value has at least {needed} bytes, too many"),
+            Self::LengthMismatch { mux, declared, received } => {
+                write!(f, "{mux}: {declared} bytes declared but {received} received")
+            }
+        }
+    }
+}
+
+impl core::error::Error for Failure {}
+
+/// A client of one server channel.
+///
+/// Start with [`upload`](Self::upload) or [`download`](Self::download); then hand in frames and time until an
+/// [`Outcome`] or [`Failure`] comes, and send what [`poll_transmit`](Self::poll_transmit) offers.
+#[derive(Clone, Debug)]
+pub struct Client {
+    request_id: CanId,
+    reply_id: CanId,
+    timeout: Duration,
+    state: State,
+    deadline: Instant,
+    request: Option<[u8; LENGTH]>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum State {
+    Idle,
+    /// Waits for the answer to an initiate upload.
+    Upload {
+        mux: Mux,
+    },
+    /// Waits for a segment.
+    UploadSegments {
+        mux: Mux,
+        declared: Option<usize>,
+        received: usize,
+        toggle: bool,
+    },
+    /// Waits for the answer to an initiate download.
+    Download {
+        mux: Mux,
+        expedited: bool,
+    },
+    /// Waits for a segment to be taken; `sent` includes it.
+    DownloadSegments {
+        mux: Mux,
+        sent: usize,
+        toggle: bool,
+    },
+}
+
+impl Client {
+    /// The default channel of `server`. `timeout` is for each reply.
+    pub const fn new(server: NodeId, timeout: Duration) -> Self {
+        Self {
+            request_id: cob::sdo_request(server),
+            reply_id: cob::sdo_reply(server),
+            timeout,
+            state: State::Idle,
+            deadline: Instant::FAR_FUTURE,
+            request: None,
+        }
+    }
+
+    /// Time allowed for each reply, from the next request on.
+    pub const fn set_timeout(&mut self, timeout: Duration) {
+        self.timeout = timeout;
+    }
+
+    /// True while a transfer is under way.
+    pub const fn is_busy(&self) -> bool {
+        !matches!(self.state, State::Idle)
+    }
+
+    /// Begins to read an entry. A transfer under way is forgotten: the server drops it when it sees the new one.
+    pub fn upload(&mut self, mux: Mux, now: Instant) {
+        self.ask(Request::InitiateUpload(mux), State::Upload { mux }, now);
+    }
+
+    /// Begins to write `data` to an entry: expedited up to four bytes, else in segments.
+    pub fn download(&mut self, mux: Mux, data: &[u8], now: Instant) {
+        match Payload::expedited(data) {
+            Some(payload) => {
+                self.ask(Request::InitiateDownload(mux, payload), State::Download { mux, expedited: true }, now);
+            }
+            None => self.download_segmented(mux, data, now),
+        }
+    }
+
+    /// As [`download`](Self::download), in segments whatever the length.
+    pub fn download_segmented(&mut self, mux: Mux, data: &[u8], now: Instant) {
+        let payload = Payload::Segmented { size: Some(data.len() as u32) };
+        self.ask(Request::InitiateDownload(mux, payload), State::Download { mux, expedited: false }, now);
+    }
+
+    /// Gives up a transfer under way and tells the server why.
+    pub fn abort(&mut self, code: AbortCode) {
+        if let Some(mux) = self.mux() {
+            self.give_up(mux, code);
+        }
+    }
+
+    /// A frame arrived. `buffer` is the data of a download, or the room for an upload. Frames that are not this
+    /// server's replies do nothing, nor does a reply without a transfer.
+    pub fn handle_frame(&mut self, frame: &Frame, buffer: &mut [u8], now: Instant) -> Option<Result<Outcome, Failure>> {
+        if frame.id() != self.reply_id || frame.is_remote() {
+            return None;
+        }
+        let mux = self.mux()?;
+        let reply = Reply::parse(frame.padded());
+        match self.advance(mux, reply, buffer, now) {
+            Ok(None) => None,
+            Ok(Some(outcome)) => {
+                self.end();
+                Some(Ok(outcome))
+            }
+            Err(failure) => {
+                match abort_code_for(&failure) {
+                    Some(code) => self.give_up(mux, code),
+                    None => self.end(),
+                }
+                Some(Err(failure))
+            }
+        }
+    }
+
+    /// Time has reached `now`.
+    pub fn handle_timeout(&mut self, now: Instant) -> Option<Failure> {
+        let mux = self.mux().filter(|_| now >= self.deadline)?;
+        self.give_up(mux, AbortCode::TIMED_OUT);
+        Some(Failure::TimedOut { mux })
+    }
+
+    /// The next frame to send.
+    pub fn poll_transmit(&mut self) -> Option<Frame> {
+        self.request.take().map(|bytes| Frame::full(self.request_id, bytes))
+    }
+
+    /// When [`handle_timeout`](Self::handle_timeout) should next be called.
+    pub fn poll_timeout(&self) -> Option<Instant> {
+        self.is_busy().then_some(self.deadline)
+    }
+
+    fn advance(&mut self, mux: Mux, reply: Reply, buffer: &mut [u8], now: Instant) -> Result<Option<Outcome>, Failure> {
+        if let Reply::Abort(received, code) = reply {
+            // Some servers abort segments without the multiplexor: 0 stands for the transfer under way.
+            expect_mux(mux, if received.key() == 0 { mux } else { received })?;
+            return Err(Failure::Aborted { mux, code });
+        }
+        match (self.state, reply) {
+            (State::Upload { .. }, Reply::InitiateUpload(received, payload)) => {
+                expect_mux(mux, received)?;
+                self.begin_upload(mux, payload, buffer, now)
+            }
+            (State::UploadSegments { declared, received, toggle, .. }, Reply::UploadSegment(segment)) => {
+                if segment.toggle != toggle {
+                    return Err(Failure::ToggleBit { mux });
+                }
+                let end = received + segment.data().len();
+                let room = buffer.get_mut(received..end).ok_or(Failure::BufferTooSmall { mux, needed: end })?;
+                room.copy_from_slice(segment.data());
+                if !segment.last {
+                    self.ask_segment(mux, declared, end, !toggle, now);
+                    return Ok(None);
+                }
+                match declared {
+                    Some(declared) if declared != end => Err(Failure::LengthMismatch { mux, declared, received: end }),
+                    _ => Ok(Some(Outcome::Uploaded { mux, length: end })),
+                }
+            }
+            (State::Download { expedited, .. }, Reply::InitiateDownload(received)) => {
+                expect_mux(mux, received)?;
+                if expedited {
+                    return Ok(Some(Outcome::Downloaded { mux }));
+                }
+                self.send_segment(mux, buffer, 0, false, now);
+                Ok(None)
+            }
+            (State::DownloadSegments { sent, toggle, .. }, Reply::DownloadSegment { toggle: received }) => {
+                if received != toggle {
+                    return Err(Failure::ToggleBit { mux });
+                }
+                if sent >= buffer.len() {
+                    return Ok(Some(Outcome::Downloaded { mux }));
+                }
+                self.send_segment(mux, buffer, sent, !toggle, now);
+                Ok(None)
+            }
+            (_, reply) => Err(Failure::UnexpectedReply { mux, command: reply.emit()[0] }),
+        }
+    }
+
+    fn begin_upload(
+        &mut self,
+        mux: Mux,
+        payload: Payload,
+        buffer: &mut [u8],
+        now: Instant,
+    ) -> Result<Option<Outcome>, Failure> {
+        match payload {
+            Payload::Expedited { length, bytes } => {
+                let length = usize::from(length.unwrap_or(bytes.len() as u8));
+                let room = buffer.get_mut(..length).ok_or(Failure::BufferTooSmall { mux, needed: length })?;
+                room.copy_from_slice(&bytes[..length]);
+                Ok(Some(Outcome::Uploaded { mux, length }))
+            }
+            Payload::Segmented { size } => {
+                let declared = size.map(|size| size as usize);
+                if let Some(needed) = declared.filter(|declared| *declared > buffer.len()) {
+                    return Err(Failure::BufferTooSmall { mux, needed });
+                }
+                self.ask_segment(mux, declared, 0, false, now);
+                Ok(None)
+            }
+        }
+    }
+
+    fn ask_segment(&mut self, mux: Mux, declared: Option<usize>, received: usize, toggle: bool, now: Instant) {
+        let state = State::UploadSegments { mux, declared, received, toggle };
+        self.ask(Request::UploadSegment { toggle }, state, now);
+    }
+
+    fn send_segment(&mut self, mux: Mux, data: &[u8], from: usize, toggle: bool, now: Instant) {
+        let rest = data.get(from..).unwrap_or(&[]);
+        let segment = Segment::new(toggle, rest.len() <= MAX_SEGMENT, rest);
+        let sent = from + segment.data().len();
+        self.ask(Request::DownloadSegment(segment), State::DownloadSegments { mux, sent, toggle }, now);
+    }
+
+    fn ask(&mut self, request: Request, state: State, now: Instant) {
+        self.request = Some(request.emit());
+        self.state = state;
+        self.deadline = now + self.timeout;
+    }
+
+    fn give_up(&mut self, mux: Mux, code: AbortCode) {
+        self.end();
+        self.request = Some(Request::Abort(mux, code).emit());
+    }
+
+    const fn end(&mut self) {
+        self.state = State::Idle;
+        self.deadline = Instant::FAR_FUTURE;
+    }
+
+    const fn mux(&self) -> Option<Mux> {
+        match self.state {
+            State::Idle => None,
+            State::Upload { mux }
+            | State::UploadSegments { mux, .. }
+            | State::Download { mux, .. }
+            | State::DownloadSegments { mux, .. } => Some(mux),
+        }
+    }
+}
+
+fn expect_mux(expected: Mux, received: Mux) -> Result<(), Failure> {
+    if received == expected { Ok(()) } else { Err(Failure::WrongMux { expected, received }) }
+}
+
+/// What to tell the server; `None` where it has ended the transfer itself.
+const fn abort_code_for(failure: &Failure) -> Option<AbortCode> {
+    match failure {
+        Failure::Aborted { .. } => None,
+        Failure::TimedOut { .. } => Some(AbortCode::TIMED_OUT),
+        Failure::WrongMux { .. } => Some(AbortCode::GENERAL),
+        Failure::UnexpectedReply { .. } => Some(AbortCode::UNKNOWN_COMMAND),
+        Failure::ToggleBit { .. } => Some(AbortCode::TOGGLE_BIT),
+        Failure::BufferTooSmall { .. } => Some(AbortCode::OUT_OF_MEMORY),
+        Failure::LengthMismatch { .. } => Some(AbortCode::LENGTH_MISMATCH),
+    }
+}

@@ -1,0 +1,128 @@
+//! Faults of a drive: a const table, and what is present, confirmed and latched of it.
+//!
+//! A fault is a row of the drive's table. Its cause has to be present for the row's debounce time to be confirmed;
+//! once confirmed the fault stays latched until a reset finds the cause gone.
+
+/// One fault of a drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FaultRow {
+    /// Its value in the drive's fault code object.
+    pub code: u16,
+    /// What it is.
+    pub name: &'static str,
+    /// What may cause it and what to do about it.
+    pub remedy: &'static str,
+    /// Bits of the error register 1001h. Source: CiA 301, 7.5.2.2.
+    pub error_register: u8,
+    /// Error code of the EMCY message.
+    pub emcy: u16,
+    /// How many supervision periods the cause must last.
+    pub debounce: u16,
+}
+
+/// A set of faults: bit *n* is row *n* of the drive's table.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FaultSet(pub u32);
+
+impl FaultSet {
+    /// No fault.
+    pub const NONE: Self = Self(0);
+
+    /// The fault of one row.
+    pub const fn row(row: usize) -> Self {
+        Self(1 << row)
+    }
+
+    /// This set and, if `present`, one more row.
+    #[must_use]
+    pub const fn with(self, row: usize, present: bool) -> Self {
+        Self(self.0 | (present as u32) << row)
+    }
+
+    /// True if there is none.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// True if row `row` is in it.
+    pub const fn has(self, row: usize) -> bool {
+        self.0 >> row & 1 == 1
+    }
+
+    /// The rows in it, ascending.
+    pub fn rows(self) -> impl Iterator<Item = usize> {
+        (0..32).filter(move |row| self.has(*row))
+    }
+}
+
+/// Debounce counters and the latch, for a table of `N` rows.
+#[derive(Clone, Debug)]
+pub struct FaultMonitor<const N: usize> {
+    table: &'static [FaultRow; N],
+    present_for: [u16; N],
+    present: FaultSet,
+    latched: FaultSet,
+}
+
+impl<const N: usize> FaultMonitor<N> {
+    /// Nothing present, nothing latched.
+    pub const fn new(table: &'static [FaultRow; N]) -> Self {
+        Self { table, present_for: [0; N], present: FaultSet::NONE, latched: FaultSet::NONE }
+    }
+
+    /// Takes in which causes are present now, once each supervision period; returns what is newly latched.
+    #[inline]
+    pub fn observe(&mut self, present: FaultSet) -> FaultSet {
+        if present.is_empty() && self.present.is_empty() {
+            return FaultSet::NONE;
+        }
+        self.count(present)
+    }
+
+    /// Latches a fault at once; true if it is new.
+    pub fn raise(&mut self, row: usize) -> bool {
+        let new = !self.latched.has(row);
+        self.latched = self.latched.with(row, true);
+        new
+    }
+
+    /// Forgets the faults whose cause is gone; true if none is left.
+    pub fn reset(&mut self) -> bool {
+        self.latched = FaultSet(self.latched.0 & self.present.0);
+        self.latched.is_empty()
+    }
+
+    /// The latched faults.
+    pub const fn latched(&self) -> FaultSet {
+        self.latched
+    }
+
+    /// The causes present at the last observation.
+    pub const fn present(&self) -> FaultSet {
+        self.present
+    }
+
+    /// The codes of all latched faults, or-ed: for drives whose fault code is a bit field.
+    pub fn code_bits(&self) -> u16 {
+        self.latched.rows().fold(0, |bits, row| bits | self.table[row].code)
+    }
+
+    /// The error register 1001h: the bits of all latched faults, and bit 0 when there is any.
+    pub fn error_register(&self) -> u8 {
+        let generic = u8::from(!self.latched.is_empty());
+        self.latched.rows().fold(generic, |bits, row| bits | self.table[row].error_register)
+    }
+
+    fn count(&mut self, present: FaultSet) -> FaultSet {
+        let mut new = FaultSet::NONE;
+        for (row, fault) in self.table.iter().enumerate() {
+            let lasts = &mut self.present_for[row];
+            *lasts = if present.has(row) { lasts.saturating_add(1) } else { 0 };
+            let confirmed = *lasts > 0 && *lasts >= fault.debounce;
+            new = new.with(row, confirmed && !self.latched.has(row));
+        }
+        self.present = present;
+        self.latched = FaultSet(self.latched.0 | new.0);
+        new
+    }
+}

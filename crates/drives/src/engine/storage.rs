@@ -1,0 +1,376 @@
+//! The parameter store of a drive: the stored rows of its object table in an EEPROM image of two banks.
+//!
+//! A write goes to the bank that is not in use and counts only once its checksum stands, so that a write cut short at
+//! any byte leaves the old contents. A bank is a header (magic, version, number of records, sequence number), one
+//! record a stored row (multiplexor key and value) and a CRC-32 (ISO 3309) over all of it, little endian.
+//! Values are checked against the table on the way in: an image can never put a value out of range into a dictionary.
+
+use canopen::Mux;
+use canopen::od::{Dictionary, Slot, Table};
+
+/// Bytes of one bank.
+pub const BANK_SIZE: usize = 1024;
+/// Bytes of the whole image.
+pub const IMAGE_SIZE: usize = 2 * BANK_SIZE;
+
+const MAGIC: u32 = u32::from_le_bytes(*b"FDRV");
+/// Layout version: an image of another one is unreadable until factory settings are restored.
+const VERSION: u16 = 1;
+const HEADER_SIZE: usize = 12;
+const RECORD_SIZE: usize = 8;
+const CRC_SIZE: usize = 4;
+
+/// Most rows that a bank holds.
+pub const CAPACITY: usize = (BANK_SIZE - HEADER_SIZE - CRC_SIZE) / RECORD_SIZE;
+
+/// The bytes of an EEPROM.
+pub type ImageBytes = [u8; IMAGE_SIZE];
+
+/// No bank of the image holds a checked set of values: it is blank, damaged or of another firmware.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unreadable;
+
+/// Which rows are waiting to be stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Pending([u32; 8]);
+
+/// An EEPROM with the rows that wait to be written into it.
+#[derive(Clone, Debug)]
+pub struct Store {
+    image: ImageBytes,
+    active: Option<Bank>,
+    pending: Pending,
+    generation: u32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Bank {
+    number: usize,
+    sequence: u32,
+}
+
+impl Store {
+    /// A store over the bytes found at power-on.
+    pub fn new(image: ImageBytes) -> Self {
+        Self { image, active: newest_bank(&image), pending: Pending::default(), generation: 0 }
+    }
+
+    /// The same EEPROM at the next power-on: what waited to be written is lost, the generation goes on.
+    pub fn reopen(&mut self, image: ImageBytes) {
+        *self = Self { generation: self.generation, ..Self::new(image) };
+    }
+
+    /// The bytes and their generation, which changes with them.
+    pub fn image(&self) -> (&ImageBytes, u32) {
+        (&self.image, self.generation)
+    }
+
+    /// True if the image can be read.
+    pub fn is_readable(&self) -> bool {
+        self.active.is_some()
+    }
+
+    /// Puts the stored values into a dictionary. Rows that are not stored, unknown keys and values that the table
+    /// refuses are passed over.
+    ///
+    /// # Errors
+    /// [`Unreadable`]; the dictionary is as before.
+    pub fn load<const N: usize>(&self, dictionary: &mut Dictionary<N>) -> Result<(), Unreadable> {
+        let bank = self.active.ok_or(Unreadable)?;
+        let bytes = &self.image[bank.number * BANK_SIZE..][..BANK_SIZE];
+        for record in bytes[HEADER_SIZE..].chunks_exact(RECORD_SIZE).take(record_count(bytes)) {
+            let (key, raw) = (word(record, 0), word(record, 4));
+            let table = dictionary.table();
+            let Ok(slot) = table.find(Mux::from_key(key)) else { continue };
+            let row = table.row(slot);
+            if row.stored && row.check_value(row.data_type.value(raw)).is_ok() {
+                dictionary.set_raw(slot, raw);
+            }
+        }
+        Ok(())
+    }
+
+    /// Has a row's value stored by the next [`commit`](Self::commit), if it is a row to be stored at all.
+    pub fn mark(&mut self, table: &Table, slot: Slot) {
+        if table.row(slot).stored {
+            self.pending.insert(slot);
+        }
+    }
+
+    /// Has all stored rows stored by the next [`commit`](Self::commit).
+    pub fn mark_all(&mut self, table: &Table) {
+        table.iter().for_each(|(slot, _)| self.mark(table, slot));
+    }
+
+    /// Writes the marked rows with their values in `dictionary`, all in one step. An unreadable image is left alone:
+    /// only [`format`](Self::format) makes it readable again.
+    pub fn commit<const N: usize>(&mut self, dictionary: &Dictionary<N>) {
+        let Some(bank) = self.active else {
+            self.pending = Pending::default();
+            return;
+        };
+        if self.pending.is_empty() {
+            return;
+        }
+        let pending = core::mem::take(&mut self.pending);
+        let old = bank.number * BANK_SIZE;
+        let mut bytes = [0; BANK_SIZE];
+        bytes.copy_from_slice(&self.image[old..][..BANK_SIZE]);
+        let stored = dictionary.table().iter().filter(|(_, row)| row.stored);
+        for (position, (slot, row)) in stored.enumerate() {
+            let record = HEADER_SIZE + position * RECORD_SIZE;
+            // A record of another row: the image came from a table with other rows. Write this table's whole set.
+            let foreign = word(&bytes, record) != row.mux().key();
+            if pending.contains(slot) || foreign {
+                put_word(&mut bytes, record, row.mux().key());
+                put_word(&mut bytes, record + 4, dictionary.raw(slot));
+            }
+        }
+        self.write(
+            Bank { number: 1 - bank.number, sequence: bank.sequence.wrapping_add(1) },
+            bytes,
+            dictionary.table(),
+        );
+    }
+
+    /// Writes all stored rows with their values in `dictionary`, whatever the image held.
+    pub fn format<const N: usize>(&mut self, dictionary: &Dictionary<N>) {
+        let bank = match self.active {
+            Some(bank) => Bank { number: 1 - bank.number, sequence: bank.sequence.wrapping_add(1) },
+            None => Bank { number: 0, sequence: 0 },
+        };
+        let mut bytes = [0xFF; BANK_SIZE];
+        for (position, (slot, row)) in dictionary.table().iter().filter(|(_, row)| row.stored).enumerate() {
+            let record = HEADER_SIZE + position * RECORD_SIZE;
+            put_word(&mut bytes, record, row.mux().key());
+            put_word(&mut bytes, record + 4, dictionary.raw(slot));
+        }
+        self.pending = Pending::default();
+        self.write(bank, bytes, dictionary.table());
+    }
+
+    fn write(&mut self, bank: Bank, mut bytes: [u8; BANK_SIZE], table: &Table) {
+        let count = stored_rows(table);
+        put_word(&mut bytes, 0, MAGIC);
+        put_word(&mut bytes, 4, u32::from(VERSION) | (count as u32) << 16);
+        put_word(&mut bytes, 8, bank.sequence);
+        let end = HEADER_SIZE + count * RECORD_SIZE;
+        let crc = crc32(&bytes[..end]);
+        put_word(&mut bytes, end, crc);
+        self.image[bank.number * BANK_SIZE..][..BANK_SIZE].copy_from_slice(&bytes);
+        self.active = Some(bank);
+        self.generation = self.generation.wrapping_add(1);
+    }
+}
+
+/// Number of stored rows of a table.
+///
+/// # Panics
+/// If a bank cannot hold them; used in a `const` of the drive, at compile time.
+pub const fn stored_rows(table: &Table) -> usize {
+    let rows = table.rows();
+    let (mut i, mut count) = (0, 0);
+    while i < rows.len() {
+        count += rows[i].stored as usize;
+        i += 1;
+    }
+    assert!(count <= CAPACITY, "a bank cannot hold all stored rows");
+    count
+}
+
+impl Pending {
+    fn insert(&mut self, slot: Slot) {
+        if let Some(word) = self.0.get_mut(slot.position() / 32) {
+            *word |= 1 << (slot.position() % 32);
+        }
+    }
+
+    fn contains(&self, slot: Slot) -> bool {
+        self.0.get(slot.position() / 32).is_some_and(|word| word >> (slot.position() % 32) & 1 == 1)
+    }
+
+    fn is_empty(&self) -> bool {
+        self.0 == [0; 8]
+    }
+}
+
+fn newest_bank(image: &ImageBytes) -> Option<Bank> {
+    let bank = |number: usize| {
+        let bytes = &image[number * BANK_SIZE..][..BANK_SIZE];
+        is_sound(bytes).then(|| Bank { number, sequence: word(bytes, 8) })
+    };
+    match (bank(0), bank(1)) {
+        (Some(a), Some(b)) if (b.sequence.wrapping_sub(a.sequence) as i32) > 0 => Some(b),
+        (Some(a), _) => Some(a),
+        (None, b) => b,
+    }
+}
+
+fn is_sound(bank: &[u8]) -> bool {
+    let count = record_count(bank);
+    let end = HEADER_SIZE + count * RECORD_SIZE;
+    word(bank, 0) == MAGIC
+        && word(bank, 4) as u16 == VERSION
+        && count <= CAPACITY
+        && word(bank, end) == crc32(&bank[..end])
+}
+
+fn record_count(bank: &[u8]) -> usize {
+    (word(bank, 4) >> 16) as usize
+}
+
+/// The four bytes at `at`; zeros past the end.
+fn word(bytes: &[u8], at: usize) -> u32 {
+    match bytes.get(at..at + 4) {
+        Some(&[a, b, c, d]) => u32::from_le_bytes([a, b, c, d]),
+        _ => 0,
+    }
+}
+
+fn put_word(bytes: &mut [u8], at: usize, value: u32) {
+    if let Some(place) = bytes.get_mut(at..at + 4) {
+        place.copy_from_slice(&value.to_le_bytes());
+    }
+}
+
+/// CRC-32 of ISO 3309 (reflected polynomial EDB88320h), half a byte at a time.
+fn crc32(bytes: &[u8]) -> u32 {
+    const TABLE: [u32; 16] = {
+        let mut table = [0; 16];
+        let mut i = 0;
+        while i < 16 {
+            let mut value = i as u32;
+            let mut bit = 0;
+            while bit < 4 {
+                value = if value & 1 == 1 { value >> 1 ^ 0xEDB8_8320 } else { value >> 1 };
+                bit += 1;
+            }
+            table[i] = value;
+            i += 1;
+        }
+        table
+    };
+    !bytes.iter().fold(!0, |crc: u32, byte| {
+        let crc = crc ^ u32::from(*byte);
+        let crc = crc >> 4 ^ TABLE[(crc & 15) as usize];
+        crc >> 4 ^ TABLE[(crc & 15) as usize]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use canopen::NodeId;
+    use canopen::od::{Access, DataType, Entry, Object, keys};
+
+    static ROWS: [Entry; 3] = [
+        Entry::new(0x2000, 0, DataType::Unsigned16, Access::ReadWrite, "a", "").default(7).range(0, 100).stored(),
+        Entry::new(0x2001, 0, DataType::Unsigned16, Access::ReadWrite, "b", "").default(8),
+        Entry::new(0x2002, 0, DataType::Integer16, Access::ReadWrite, "c", "").default(-9).stored(),
+    ];
+    static KEYS: [u32; 3] = keys(&ROWS);
+    static TABLE: Table = Table::new(&ROWS, &KEYS);
+    const A: Object<u16> = TABLE.object(0x2000, 0);
+    const B: Object<u16> = TABLE.object(0x2001, 0);
+    const C: Object<i16> = TABLE.object(0x2002, 0);
+
+    fn defaults() -> Dictionary<3> {
+        Dictionary::new(&TABLE, NodeId::MIN)
+    }
+
+    fn formatted() -> Store {
+        let mut store = Store::new([0xFF; IMAGE_SIZE]);
+        store.format(&defaults());
+        store
+    }
+
+    fn values(image: ImageBytes) -> (u16, u16, i16) {
+        let mut dictionary = defaults();
+        Store::new(image).load(&mut dictionary).unwrap();
+        (dictionary.get(A), dictionary.get(B), dictionary.get(C))
+    }
+
+    #[test]
+    fn the_checksum_is_the_standard_one() {
+        assert_eq!(crc32(b"123456789"), 0xCBF4_3926);
+    }
+
+    #[test]
+    fn a_blank_image_is_unreadable_until_it_is_formatted() {
+        let mut store = Store::new([0xFF; IMAGE_SIZE]);
+        assert_eq!(store.load(&mut defaults()), Err(Unreadable));
+        store.mark_all(&TABLE);
+        store.commit(&defaults());
+        assert!(!store.is_readable());
+        store.format(&defaults());
+        assert_eq!(values(*store.image().0), (7, 8, -9));
+    }
+
+    #[test]
+    fn only_marked_rows_of_stored_objects_are_written() {
+        let mut store = formatted();
+        let mut dictionary = defaults();
+        dictionary.set(A, 11);
+        dictionary.set(B, 22);
+        dictionary.set(C, -33);
+        store.mark(&TABLE, C.slot());
+        store.mark(&TABLE, B.slot());
+        store.commit(&dictionary);
+        assert_eq!(values(*store.image().0), (7, 8, -33));
+    }
+
+    #[test]
+    fn the_generation_changes_only_with_the_bytes() {
+        let mut store = formatted();
+        let before = store.image().1;
+        store.commit(&defaults());
+        assert_eq!(store.image().1, before);
+        store.mark_all(&TABLE);
+        store.commit(&defaults());
+        assert_ne!(store.image().1, before);
+    }
+
+    #[test]
+    fn a_write_cut_short_at_any_byte_leaves_the_old_or_the_new_values() {
+        let mut store = formatted();
+        let mut dictionary = defaults();
+        for round in 1..5_u16 {
+            let old = *store.image().0;
+            dictionary.set(A, round);
+            store.mark_all(&TABLE);
+            store.commit(&dictionary);
+            let new = *store.image().0;
+            for cut in 0..=IMAGE_SIZE {
+                let mut torn = old;
+                torn[..cut].copy_from_slice(&new[..cut]);
+                let a = values(torn).0;
+                assert!(a == values(old).0 || a == round, "cut at {cut}");
+            }
+        }
+    }
+
+    #[test]
+    fn any_flipped_bit_is_noticed_or_harmless() {
+        let mut store = formatted();
+        let mut dictionary = defaults();
+        dictionary.set(A, 50);
+        store.mark_all(&TABLE);
+        store.commit(&dictionary);
+        for byte in 0..IMAGE_SIZE {
+            let mut image = *store.image().0;
+            image[byte] ^= 0x10;
+            let (a, _, c) = values(image);
+            assert!(matches!((a, c), (50, -9) | (7, -9)), "byte {byte}");
+        }
+    }
+
+    #[test]
+    fn values_out_of_range_are_not_loaded() {
+        let mut store = formatted();
+        let mut dictionary = defaults();
+        dictionary.set(A, 101);
+        store.mark_all(&TABLE);
+        store.commit(&dictionary);
+        assert_eq!(values(*store.image().0).0, 7);
+    }
+}

@@ -1,0 +1,265 @@
+//! What masters and tools have to know about a model before they talk to it, as const data.
+//!
+//! Two of the drives answer the same identity, and the drives differ in units, in how they store parameters and in
+//! what an object number means. A [`DriveProfile`] says it all; [`model`] finds one by name.
+
+use can::Bitrate;
+use canopen::Mux;
+use canopen::od::Table;
+use cia402::ModeOfOperation;
+
+use crate::engine::faults::FaultRow;
+use crate::zlac8030l;
+
+/// All models.
+pub static MODELS: [&DriveProfile; 1] = [&zlac8030l::PROFILE];
+
+/// The model of this name (`zlac8030l`), in any case of letters.
+pub fn model(name: &str) -> Option<&'static DriveProfile> {
+    MODELS.iter().find(|profile| profile.model.eq_ignore_ascii_case(name)).copied()
+}
+
+/// The models that answer this identity: more than one may.
+pub fn models_by_identity(identity: Identity) -> impl Iterator<Item = &'static DriveProfile> {
+    MODELS.iter().copied().filter(move |profile| profile.identity == identity)
+}
+
+/// One model of drive.
+#[derive(Clone, Copy)]
+pub struct DriveProfile {
+    /// Name to type: `zlac8030l`.
+    pub model: &'static str,
+    /// Name to print.
+    pub title: &'static str,
+    /// The manual that all of this is read from.
+    pub manual: &'static str,
+    /// What 1000h and 1018h answer.
+    pub identity: Identity,
+    /// The object table.
+    pub table: &'static Table,
+    /// Node-ID as delivered.
+    pub node_id: u8,
+    /// Bit rate as delivered.
+    pub bitrate: Bitrate,
+    /// Modes that 6060h accepts.
+    pub modes: &'static [ModeOfOperation],
+    /// What raw values are worth.
+    pub units: Units,
+    /// How parameters are stored.
+    pub storage: ParameterStorage,
+    /// Fault codes.
+    pub faults: Faults,
+    /// PDO rules.
+    pub pdo: PdoRules,
+    /// Where the model departs from the standard or from its own manual.
+    pub quirks: &'static [Quirk],
+}
+
+/// What a drive says that it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Identity {
+    /// 1000h.
+    pub device_type: u32,
+    /// 1018h:01.
+    pub vendor_id: u32,
+    /// 1018h:02.
+    pub product_code: u32,
+    /// 1018h:03.
+    pub revision_number: u32,
+}
+
+/// What raw values are worth. A field is `None` where the model has no such object.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Units {
+    /// Counts of position in one turn of the motor's shaft.
+    pub counts_per_turn: CountsPerTurn,
+    /// Target velocity, in r/min.
+    pub target_velocity: Quantity,
+    /// Actual velocity, in r/min.
+    pub actual_velocity: Quantity,
+    /// Profile velocity of position moves, in r/min.
+    pub profile_velocity: Quantity,
+    /// Acceleration and deceleration of profiles.
+    pub ramps: Ramps,
+    /// Target motor current (torque), in A.
+    pub target_current: Option<Quantity>,
+    /// Actual motor current, in A.
+    pub actual_current: Option<Quantity>,
+    /// Bus voltage, in V.
+    pub bus_voltage: Option<Quantity>,
+    /// Motor temperature, in degC.
+    pub motor_temperature: Option<Quantity>,
+    /// Driver temperature, in degC.
+    pub driver_temperature: Option<Quantity>,
+}
+
+/// An object that holds a physical value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quantity {
+    /// Where it is.
+    pub object: Mux,
+    /// Physical units in one count.
+    pub per_count: f64,
+    /// An object whose value divides further: the resolution that is set on the drive.
+    pub divisor: Option<Mux>,
+}
+
+impl Quantity {
+    /// An object with a fixed scale.
+    pub const fn new(index: u16, sub_index: u8, per_count: f64) -> Self {
+        Self { object: Mux::new(index, sub_index), per_count, divisor: None }
+    }
+
+    /// The same with an object that divides further.
+    #[must_use]
+    pub const fn divided_by(mut self, index: u16, sub_index: u8) -> Self {
+        self.divisor = Some(Mux::new(index, sub_index));
+        self
+    }
+}
+
+/// Counts of position in one turn of the motor's shaft.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CountsPerTurn {
+    /// Always this many.
+    Fixed(u32),
+    /// The value of an object times a factor.
+    Object {
+        /// Where it is.
+        object: Mux,
+        /// Counts in one unit of it.
+        factor: u32,
+        /// Its factory value.
+        default: u32,
+    },
+}
+
+/// How acceleration and deceleration are given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ramps {
+    /// As the time of the velocity change, in ms.
+    Milliseconds {
+        /// Where the acceleration time is.
+        acceleration: Mux,
+        /// Where the deceleration time is.
+        deceleration: Mux,
+        /// Where the quick stop's time is.
+        quick_stop: Mux,
+    },
+}
+
+/// How parameters are stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ParameterStorage {
+    /// The write that stores all parameters.
+    pub save: Write,
+    /// The write that restores factory settings.
+    pub restore: Write,
+    /// The object and value that make each write be stored by itself, and whether it is so as delivered.
+    pub save_on_write: Option<(Write, bool)>,
+    /// Objects that take effect after a restart only.
+    pub effective_after_restart: &'static [Mux],
+}
+
+/// A value to write to an object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Write {
+    /// Where to.
+    pub object: Mux,
+    /// What.
+    pub value: u32,
+}
+
+/// How faults are told.
+#[derive(Clone, Copy)]
+pub struct Faults {
+    /// The object with the present code.
+    pub code: Mux,
+    /// The code is a bit field: several faults at once.
+    pub bit_field: bool,
+    /// All faults.
+    pub table: &'static [FaultRow],
+}
+
+/// What may be done with PDOs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PdoRules {
+    /// Nanoseconds in one count of the inhibit time.
+    pub inhibit_unit_ns: u64,
+    /// Nanoseconds in one count of the event timer.
+    pub event_timer_unit_ns: u64,
+    /// Objects in one PDO.
+    pub max_objects: u8,
+    /// The mapping may be changed while the PDO is valid.
+    pub remap_while_valid: bool,
+    /// The mapping cannot be changed at all.
+    pub fixed_mapping: bool,
+}
+
+/// A way in which a model differs from what a program written to the standard expects.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quirk {
+    /// No 6502h (supported drive modes): it answers 0602 0000h.
+    NoSupportedDriveModes,
+    /// No 1010h and 1011h: parameters are stored through an object of the maker's.
+    NoStandardStore,
+    /// No 1003h (error history).
+    NoErrorHistory,
+    /// No 1016h: heartbeats are produced, not consumed.
+    NoHeartbeatConsumer,
+    /// The device type says stepper though the motor is a servo.
+    DeviceTypeSaysStepper,
+    /// Another model answers the same identity: it has to be told.
+    IdentityShared,
+    /// The torque target 6071h is a current in mA, not a share of the rated torque.
+    TorqueTargetIsCurrent,
+    /// The actual torque 6077h is a current in another unit than the target.
+    TorqueActualIsCurrent,
+    /// The unit of the actual velocity is not that of the target.
+    VelocityUnitsDiffer,
+    /// Accelerations are times.
+    RampsAreTimes,
+    /// Inhibit time and event timer are in 0.5 ms.
+    PdoTimersInHalfMilliseconds,
+    /// Sub-index 00h of the maker's records is UNSIGNED16.
+    SubIndexZeroIsUnsigned16,
+    /// 1009h and 100Ah are numbers, not texts.
+    VersionsAreNumbers,
+    /// Bit 13 of the statusword in profile position is 1 when in position, the reverse of a following error.
+    InPositionInBit13,
+    /// Statusword bit 7 is set in fault.
+    WarningBitInFault,
+    /// A watch over the host stops the motor when no frame comes for a time, as delivered.
+    HostWatchdogOnByDefault,
+    /// The brake output is never moved by the drive itself.
+    BrakeIsManual,
+}
+
+impl Quirk {
+    /// In words, for people.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::NoSupportedDriveModes => "no object 6502h (supported drive modes)",
+            Self::NoStandardStore => {
+                "no objects 1010h and 1011h: parameters are stored through an object of the maker's"
+            }
+            Self::NoErrorHistory => "no object 1003h (error history)",
+            Self::NoHeartbeatConsumer => "no object 1016h: heartbeats are produced, not consumed",
+            Self::DeviceTypeSaysStepper => "1000h says stepper though the motor is a servo",
+            Self::IdentityShared => "another model answers the same identity: the model has to be told",
+            Self::TorqueTargetIsCurrent => "6071h is a current in mA, not a share of the rated torque",
+            Self::TorqueActualIsCurrent => "6077h is a current in 0.1 A, while the target 6071h is in mA",
+            Self::VelocityUnitsDiffer => "606Ch is in 0.1 r/min, while 60FFh is in r/min (or finer)",
+            Self::RampsAreTimes => "6083h, 6084h and 6085h are times in ms, not accelerations",
+            Self::PdoTimersInHalfMilliseconds => "inhibit time and event timer of PDOs are in 0.5 ms",
+            Self::SubIndexZeroIsUnsigned16 => "sub-index 00h of the maker's records is UNSIGNED16",
+            Self::VersionsAreNumbers => "1009h and 100Ah are numbers, not texts",
+            Self::InPositionInBit13 => "statusword bit 13 in profile position is 1 when in position",
+            Self::WarningBitInFault => "statusword bit 7 is set in fault",
+            Self::HostWatchdogOnByDefault => {
+                "the motor stops when no frame for the drive comes for a time (2000h, 1 s)"
+            }
+            Self::BrakeIsManual => "the drive never moves the brake output by itself",
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! Conditions on writes that need more than the row: they see the other values and refuse with an abort code.
+
+use canopen::AbortCode;
+use canopen::od::View;
+
+use super::{CONTROLWORD, MODES_OF_OPERATION_DISPLAY, TARGET_POSITION, VELOCITY_RESOLUTION};
+
+/// Largest absolute target position (607Ah: ±3FFFFFFFh absolute, ±7FFFFFFFh relative).
+pub const ABSOLUTE_TARGET_LIMIT: i32 = 0x3FFF_FFFF;
+
+/// Largest target velocity at a resolution of 1 r/min (60FFh).
+const TARGET_VELOCITY_LIMIT: i32 = 1000;
+
+/// 6040h: refuses the controlword that would take an absolute set-point out of range.
+///
+/// The range of 607Ah depends on bit 6 of the controlword, so it can only be judged when bit 4 rises.
+pub(super) fn set_point_in_range(values: &View<'_>, raw: u32) -> Result<(), AbortCode> {
+    const ENABLED_NEW_SET_POINT: u32 = 0x1F;
+    const NEW_SET_POINT: u32 = 0x10;
+    const RELATIVE: u32 = 0x40;
+    const PROFILE_POSITION: i8 = 1;
+    let rises =
+        raw & ENABLED_NEW_SET_POINT == ENABLED_NEW_SET_POINT && u32::from(values.get(CONTROLWORD)) & NEW_SET_POINT == 0;
+    let takes_absolute = rises && raw & RELATIVE == 0 && values.get(MODES_OF_OPERATION_DISPLAY) == PROFILE_POSITION;
+    if takes_absolute && values.get(TARGET_POSITION).unsigned_abs() > ABSOLUTE_TARGET_LIMIT.unsigned_abs() {
+        return Err(AbortCode::INVALID_VALUE);
+    }
+    Ok(())
+}
+
+/// 60FFh: ±1000 r/min in the resolution that 202F:05 sets.
+pub(super) fn target_velocity_in_range(values: &View<'_>, raw: u32) -> Result<(), AbortCode> {
+    let limit = TARGET_VELOCITY_LIMIT * i32::from(values.get(VELOCITY_RESOLUTION));
+    match raw as i32 {
+        value if value > limit => Err(AbortCode::VALUE_TOO_HIGH),
+        value if value < -limit => Err(AbortCode::VALUE_TOO_LOW),
+        _ => Ok(()),
+    }
+}

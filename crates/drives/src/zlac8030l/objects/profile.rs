@@ -1,0 +1,45 @@
+//! Drive profile parameters, 603Fh to 60FFh ("ZLAC8030L quick start guide V1.00", chapter 9, CiA 402 group).
+//!
+//! 6060h lists 6 for profile torque; the manual's own example, CiA 402 and all public programs have 4. The ranges
+//! of 6074h and 6077h are exchanged in the manual. 605Dh prints 0 where its default and the sibling have 1.
+
+use canopen::od::Entry;
+
+use super::checks;
+use super::row::{I8, I16, I32, U16, U32, ro, rw};
+use super::values::{DISABLE_OPTIONS, HALT_OPTIONS, MODES, QUICK_STOP_OPTIONS, SHUTDOWN_OPTIONS};
+
+#[rustfmt::skip]
+pub(super) const ROWS: [Entry; 22] = [
+    ro(0x603F, 0, U16, "error_code", "Driver last fault code").mappable(),
+    rw(0x6040, 0, U16, "controlword", "Control word").mappable().check(checks::set_point_in_range),
+    ro(0x6041, 0, U16, "statusword", "Status word").mappable(),
+    rw(0x605A, 0, I16, "quick_stop_option_code", "Quick stop code").values(QUICK_STOP_OPTIONS).default(5),
+    rw(0x605B, 0, I16, "shutdown_option_code", "Close operation code").values(SHUTDOWN_OPTIONS).default(1),
+    rw(0x605C, 0, I16, "disable_operation_option_code", "Disable operation code")
+        .values(DISABLE_OPTIONS).default(1),
+    rw(0x605D, 0, I16, "halt_option_code", "Halt control register").values(HALT_OPTIONS).default(1),
+    rw(0x6060, 0, I8, "modes_of_operation", "Operating mode").values(MODES).mappable(),
+    ro(0x6061, 0, I8, "modes_of_operation_display", "Operating mode status").values(MODES).mappable(),
+    ro(0x6064, 0, I32, "position_actual_value", "Actual position feedback").unit("counts").mappable(),
+    ro(0x606C, 0, I32, "velocity_actual_value", "Actual speed feedback").unit("0.1 r/min").mappable(),
+    rw(0x6071, 0, I16, "target_torque", "Target torque").range(-30000, 30000).unit("mA").mappable(),
+    ro(0x6074, 0, I16, "torque_demand", "Real-time target torque").range(-30000, 30000).unit("mA").mappable(),
+    ro(0x6077, 0, I16, "torque_actual_value", "Real-time torque feedback").range(-300, 300).unit("0.1 A").mappable(),
+    rw(0x607A, 0, I32, "target_position", "Target position")
+        .range(-0x7FFF_FFFF, 0x7FFF_FFFF).unit("counts").mappable(),
+    rw(0x6081, 0, U32, "profile_velocity", "Max speed").range(1, 1000).default(120).unit("r/min").mappable(),
+    rw(0x6082, 0, U32, "end_velocity", "Start / stop speed in profile position mode")
+        .range(1, 1000).default(1).unit("r/min").mappable(),
+    rw(0x6083, 0, U32, "profile_acceleration", "S-shaped acceleration time")
+        .range(0, 32767).default(500).unit("ms").mappable(),
+    rw(0x6084, 0, U32, "profile_deceleration", "S-shaped deceleration time")
+        .range(0, 32767).default(500).unit("ms").mappable(),
+    rw(0x6085, 0, U32, "quick_stop_deceleration", "Emergency stop deceleration time")
+        .range(0, 32767).default(10).unit("ms").mappable(),
+    rw(0x6087, 0, U32, "torque_slope", "Torque slope").default(300).unit("mA/s").mappable(),
+    // Printed -1000 to 1000 for a resolution of 1 r/min; 202F:05 makes one count finer and the range wider.
+    rw(0x60FF, 0, I32, "target_velocity", "Target speed")
+        .range(-10_000, 10_000).unit("r/min").mappable()
+        .check(checks::target_velocity_in_range),
+];

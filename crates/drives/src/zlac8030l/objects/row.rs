@@ -1,0 +1,45 @@
+//! The vocabulary of the table: the manual's type letters and attributes as short `const fn`s.
+
+use canopen::od::{Access, DataType, Entry};
+
+pub(super) const U8: DataType = DataType::Unsigned8;
+pub(super) const U16: DataType = DataType::Unsigned16;
+pub(super) const U32: DataType = DataType::Unsigned32;
+pub(super) const I8: DataType = DataType::Integer8;
+pub(super) const I16: DataType = DataType::Integer16;
+pub(super) const I32: DataType = DataType::Integer32;
+
+/// Attribute RO.
+pub(super) const fn ro(index: u16, sub: u8, data_type: DataType, name: &'static str, title: &'static str) -> Entry {
+    Entry::new(index, sub, data_type, Access::ReadOnly, name, title)
+}
+
+/// Attribute RW.
+pub(super) const fn rw(index: u16, sub: u8, data_type: DataType, name: &'static str, title: &'static str) -> Entry {
+    Entry::new(index, sub, data_type, Access::ReadWrite, name, title)
+}
+
+/// Attribute RW/S: kept in the EEPROM.
+pub(super) const fn rws(index: u16, sub: u8, data_type: DataType, name: &'static str, title: &'static str) -> Entry {
+    rw(index, sub, data_type, name, title).stored()
+}
+
+/// The rows of all `parts`, in order.
+///
+/// # Panics
+/// If they are not `N` rows, at compile time in a `const`.
+pub(super) const fn join<const N: usize>(parts: &[&[Entry]]) -> [Entry; N] {
+    let mut rows = [ro(0, 0, U8, "", ""); N];
+    let (mut part, mut at) = (0, 0);
+    while part < parts.len() {
+        let mut i = 0;
+        while i < parts[part].len() {
+            rows[at] = parts[part][i];
+            i += 1;
+            at += 1;
+        }
+        part += 1;
+    }
+    assert!(at == N, "the parts do not have N rows");
+    rows
+}

@@ -1,0 +1,72 @@
+//! The model as masters and tools see it.
+
+use can::Bitrate;
+use canopen::Mux;
+use cia402::ModeOfOperation;
+
+use super::faults::FAULTS;
+use super::objects::TABLE;
+use crate::profile::{
+    CountsPerTurn, DriveProfile, Faults, Identity, ParameterStorage, PdoRules, Quantity, Quirk, Ramps, Units, Write,
+};
+
+/// The ZLAC8030L V2.0.
+pub static PROFILE: DriveProfile = DriveProfile {
+    model: "zlac8030l",
+    title: "ZLTECH ZLAC8030L V2.0",
+    manual: "ZLAC8030L quick start guide V1.00",
+    identity: Identity { device_type: 0x0004_0192, vendor_id: 0x100, product_code: 1, revision_number: 0 },
+    table: &TABLE,
+    node_id: 4,
+    bitrate: Bitrate::K500,
+    modes: &[ModeOfOperation::PROFILE_POSITION, ModeOfOperation::PROFILE_VELOCITY, ModeOfOperation::PROFILE_TORQUE],
+    units: Units {
+        counts_per_turn: CountsPerTurn::Object { object: Mux::new(0x200B, 0), factor: 4, default: 1024 },
+        target_velocity: Quantity::new(0x60FF, 0, 1.0).divided_by(0x202F, 5),
+        actual_velocity: Quantity::new(0x606C, 0, 0.1),
+        profile_velocity: Quantity::new(0x6081, 0, 1.0),
+        ramps: Ramps::Milliseconds {
+            acceleration: Mux::new(0x6083, 0),
+            deceleration: Mux::new(0x6084, 0),
+            quick_stop: Mux::new(0x6085, 0),
+        },
+        target_current: Some(Quantity::new(0x6071, 0, 1e-3)),
+        actual_current: Some(Quantity::new(0x6077, 0, 0.1)),
+        bus_voltage: Some(Quantity::new(0x2029, 0, 0.01)),
+        motor_temperature: Some(Quantity::new(0x2026, 1, 0.1)),
+        driver_temperature: Some(Quantity::new(0x2026, 2, 0.1)),
+    },
+    storage: ParameterStorage {
+        save: Write { object: Mux::new(0x2009, 0), value: 2 },
+        restore: Write { object: Mux::new(0x2009, 0), value: 1 },
+        save_on_write: Some((Write { object: Mux::new(0x2010, 0), value: 0 }, true)),
+        effective_after_restart: &[Mux::new(0x200D, 0), Mux::new(0x200E, 0), Mux::new(0x202F, 5)],
+    },
+    faults: Faults { code: Mux::new(0x603F, 0), bit_field: true, table: &FAULTS },
+    pdo: PdoRules {
+        inhibit_unit_ns: 500_000,
+        event_timer_unit_ns: 500_000,
+        max_objects: 4,
+        remap_while_valid: true,
+        fixed_mapping: false,
+    },
+    quirks: &[
+        Quirk::NoSupportedDriveModes,
+        Quirk::NoStandardStore,
+        Quirk::NoErrorHistory,
+        Quirk::NoHeartbeatConsumer,
+        Quirk::DeviceTypeSaysStepper,
+        Quirk::IdentityShared,
+        Quirk::TorqueTargetIsCurrent,
+        Quirk::TorqueActualIsCurrent,
+        Quirk::VelocityUnitsDiffer,
+        Quirk::RampsAreTimes,
+        Quirk::PdoTimersInHalfMilliseconds,
+        Quirk::SubIndexZeroIsUnsigned16,
+        Quirk::VersionsAreNumbers,
+        Quirk::InPositionInBit13,
+        Quirk::WarningBitInFault,
+        Quirk::HostWatchdogOnByDefault,
+        Quirk::BrakeIsManual,
+    ],
+};

@@ -1,0 +1,89 @@
+//! Figures that the manual ("ZLAC8030L quick start guide V1.00") does not give, each with the reason for its value.
+
+/// 1009h. The manual prints no value; the maker's EDS has 2608h.
+pub const HARDWARE_VERSION: i64 = 0x2608;
+
+/// 100Ah and 2025h. The manual prints no value: version 1.00, as the manual itself.
+pub const SOFTWARE_VERSION: i64 = 0x0100;
+
+/// Control period: 20 kHz, usual for the switching of such a power stage.
+pub const CONTROL_PERIOD_NS: u64 = 50_000;
+
+/// Control periods in one supervision period: 0.5 ms, the unit of the drive's PDO timers.
+pub const SUPERVISION_DIVIDER: u8 = 10;
+
+/// Supervision period in seconds.
+pub const SUPERVISION_PERIOD_S: f32 = 0.5e-3;
+
+/// Communication task: 0.5 ms, the unit of the drive's PDO timers (6.1).
+pub const COMMUNICATION_PERIOD_NS: u64 = 500_000;
+
+/// Bus voltage below which the drive reports under-voltage. No manual gives it: between the 16 V of the sibling
+/// ZLAC8015D and the lowest supply of its motors, 24 V less 20 %.
+pub const UNDER_VOLTAGE_V: f32 = 18.0;
+
+/// Bus voltage above which the drive reports over-voltage: just over the range of the bleeder's switching points
+/// (202Eh:03, up to 75 V), which must be able to act first.
+pub const OVER_VOLTAGE_V: f32 = 76.0;
+
+/// How far the bus voltage has to come back before the fault's cause counts as gone.
+pub const VOLTAGE_HYSTERESIS_V: f32 = 1.0;
+
+/// 1 ms: longer than a switching transient, shorter than what the capacitors of the bus survive.
+pub const VOLTAGE_DEBOUNCE_PERIODS: u16 = 2;
+
+/// Phase current that counts as over-current, A. Above the largest current that 2015h allows (60 A) by the
+/// overshoot of a well damped current loop and measurement error, a third.
+pub const OVER_CURRENT_A: f32 = 80.0;
+
+/// Over-current is watched every control period and acts at once; the cause must be there at one look.
+pub const OVER_CURRENT_DEBOUNCE_PERIODS: u16 = 1;
+
+/// A motor wire counts as loose when the voltage is at its limit and the current stays under this share of what is
+/// asked for: chapter 8 names a loose power cable as a cause of over-current (0004h).
+pub const LOOSE_WIRE_CURRENT_SHARE: f32 = 0.5;
+
+/// Least current set-point at which a loose wire can be told, A.
+pub const LOOSE_WIRE_LEAST_A: f32 = 1.0;
+
+/// Above this speed the motor's own voltage can hold the current down, and a loose wire cannot be told, r/min.
+pub const LOOSE_WIRE_MOST_RPM: f32 = 20.0;
+
+/// How long it must be so: ten electrical time constants of a hub motor (3 ms) and more.
+pub const LOOSE_WIRE_PERIODS: u16 = 200;
+
+/// 5 ms: a Hall edge that is caught half way reads 0 or 7 for one control period at most.
+pub const SENSOR_DEBOUNCE_PERIODS: u16 = 10;
+
+/// 50 ms: temperatures are slow, a noisy reading is not a fault.
+pub const TEMPERATURE_DEBOUNCE_PERIODS: u16 = 100;
+
+/// How far a temperature has to fall below its threshold before the fault's cause counts as gone, degC.
+pub const TEMPERATURE_HYSTERESIS_C: f32 = 5.0;
+
+/// Reference of the current measurement, V: the supply of the controller.
+pub const REFERENCE_V: f32 = 3.3;
+
+/// Tolerance of the reference: a current reading off by more would let the drive exceed its limits.
+pub const REFERENCE_TOLERANCE_V: f32 = 0.33;
+
+/// Largest disagreement of encoder and Hall sensors at a Hall edge, in electrical turns. A dead encoder is off by a
+/// sixth of a turn; sampling at 1000 r/min and 64 pole pairs is off by a nineteenth.
+pub const HALL_DISAGREEMENT_TURNS: f32 = 0.125;
+
+/// Current in parking mode (5.2).
+pub const PARKING_CURRENT_A: f32 = 3.0;
+
+/// Tolerance of "speed in place" (bit 10 in profile velocity), r/min: there is no 606Dh.
+pub const VELOCITY_REACHED_RPM: f32 = 5.0;
+
+/// Tolerance of "target torque reached" (bit 10 in profile torque), A: two counts of 6077h.
+pub const TORQUE_REACHED_A: f32 = 0.2;
+
+/// Speed below which the motor counts as standing (bits 12 and 14, 2027h), r/min: twice the speed of one encoder count
+/// (4096 to the turn) in 30 ms.
+pub const STANDSTILL_RPM: f32 = 1.0;
+
+/// How long a digital input must hold a level: two supervision periods keep switching noise out and are far below what
+/// a person or a relay notices.
+pub const INPUT_DEBOUNCE_PERIODS: u8 = 2;

@@ -1,0 +1,171 @@
+use std::collections::VecDeque;
+
+use can::{Frame, Instant};
+use canopen::sdo::client::{self, Client};
+use canopen::sdo::wire::{Payload as Initiation, Reply};
+use canopen::{AbortCode, Mux, NodeId};
+
+use super::{Failure, Outcome, Payload, Request, Transfer};
+use crate::core::Ticket;
+
+/// Requests that may wait for one node.
+const QUEUE: usize = 64;
+
+/// Longest object that is read: larger than any drive's, and a bound on what a broken peer can make us allocate.
+const MAX_OBJECT: usize = 1 << 20;
+
+/// Room for an expedited answer and the first segment.
+const FIRST_ROOM: usize = 16;
+
+/// SDO client channel to one node with its queue: one transfer on the wire, the others wait.
+#[derive(Clone, Debug)]
+pub(super) struct Channel {
+    client: Client,
+    active: Option<Active>,
+    queue: VecDeque<(Ticket, Request)>,
+    ended: Option<Ended>,
+    /// What is read goes here, what is written comes from here.
+    buffer: Vec<u8>,
+}
+
+/// The transfer on the wire.
+#[derive(Clone, Debug)]
+struct Active {
+    ticket: Ticket,
+    mux: Mux,
+    timeout: core::time::Duration,
+    uploads: bool,
+    /// Its first frame was taken by the runner.
+    sent: bool,
+}
+
+/// A transfer that has ended.
+#[derive(Clone, Debug)]
+pub(super) struct Ended {
+    pub(super) ticket: Ticket,
+    pub(super) mux: Mux,
+    pub(super) outcome: Outcome,
+}
+
+impl Channel {
+    pub(super) fn new(node: NodeId) -> Self {
+        let client = Client::new(node, core::time::Duration::ZERO);
+        Self { client, active: None, queue: VecDeque::new(), ended: None, buffer: Vec::new() }
+    }
+
+    /// Starts the request, or queues it.
+    pub(super) fn push(&mut self, ticket: Ticket, request: Request, now: Instant) -> Result<(), Failure> {
+        if self.queue.len() == QUEUE {
+            return Err(Failure::QueueFull);
+        }
+        self.queue.push_back((ticket, request));
+        self.start_next(now);
+        Ok(())
+    }
+
+    /// Forgets a request; one on the wire is aborted. False if it is not here.
+    pub(super) fn cancel(&mut self, ticket: Ticket, now: Instant) -> bool {
+        if self.active.as_ref().is_some_and(|active| active.ticket == ticket) {
+            self.active = None;
+            self.client.abort(AbortCode::GENERAL);
+            self.start_next(now);
+            return true;
+        }
+        let before = self.queue.len();
+        self.queue.retain(|(queued, _)| *queued != ticket);
+        self.queue.len() < before
+    }
+
+    pub(super) fn start_next(&mut self, now: Instant) {
+        if self.active.is_some() || self.ended.is_some() {
+            return;
+        }
+        let Some((ticket, request)) = self.queue.pop_front() else { return };
+        let Request { mux, transfer, timeout, .. } = request;
+        self.client.set_timeout(timeout);
+        self.buffer.clear();
+        let uploads = match transfer {
+            Transfer::Upload => {
+                self.buffer.resize(FIRST_ROOM, 0);
+                self.client.upload(mux, now);
+                true
+            }
+            Transfer::Download(data) => {
+                self.buffer.extend_from_slice(data.as_bytes());
+                self.client.download(mux, &self.buffer, now);
+                false
+            }
+        };
+        self.active = Some(Active { ticket, mux, timeout, uploads, sent: false });
+    }
+
+    pub(super) fn handle_frame(&mut self, frame: &Frame, now: Instant) {
+        if self.active.as_ref().is_some_and(|active| active.uploads) {
+            self.make_room(frame);
+        }
+        match self.client.handle_frame(frame, &mut self.buffer, now) {
+            None => {}
+            Some(Ok(client::Outcome::Uploaded { length, .. })) => {
+                let bytes = self.buffer.get(..length).unwrap_or_default();
+                self.end(Ok(Payload::new(bytes)));
+            }
+            Some(Ok(client::Outcome::Downloaded { .. })) => self.end(Ok(Payload::EMPTY)),
+            Some(Err(failure)) => self.end(Err(self.failure(failure))),
+        }
+    }
+
+    pub(super) fn handle_timeout(&mut self, now: Instant) {
+        if let Some(failure) = self.client.handle_timeout(now) {
+            self.end(Err(self.failure(failure)));
+        }
+    }
+
+    pub(super) fn poll_transmit(&mut self) -> Option<Frame> {
+        let frame = self.client.poll_transmit()?;
+        if let Some(active) = &mut self.active {
+            active.sent = true;
+        }
+        Some(frame)
+    }
+
+    pub(super) fn poll_timeout(&self) -> Option<Instant> {
+        self.client.poll_timeout()
+    }
+
+    /// The transfer that has ended; call [`start_next`](Self::start_next) after it.
+    pub(super) fn poll_finished(&mut self) -> Option<Ended> {
+        self.ended.take()
+    }
+
+    /// Lets the buffer grow to what the answer declares, or by a segment.
+    fn make_room(&mut self, frame: &Frame) {
+        let wanted = match Reply::parse(frame.padded()) {
+            Reply::InitiateUpload(_, Initiation::Segmented { size: Some(size) }) => size as usize,
+            // Undeclared length: one segment more than ever came.
+            Reply::UploadSegment(segment) => self.buffer.len() + usize::from(segment.length),
+            _ => return,
+        };
+        let declared_fits = wanted > self.buffer.len() && wanted <= MAX_OBJECT;
+        if declared_fits {
+            self.buffer.resize(wanted, 0);
+        }
+    }
+
+    fn end(&mut self, outcome: Outcome) {
+        if let Some(active) = self.active.take() {
+            self.ended = Some(Ended { ticket: active.ticket, mux: active.mux, outcome });
+        }
+    }
+
+    fn failure(&self, failure: client::Failure) -> Failure {
+        let active = self.active.as_ref();
+        match failure {
+            client::Failure::Aborted { code, .. } => Failure::Aborted(code),
+            client::Failure::TimedOut { .. } => Failure::NoAnswer {
+                waited: active.map_or(core::time::Duration::ZERO, |active| active.timeout),
+                unsent: active.is_some_and(|active| !active.sent),
+            },
+            other => Failure::BadAnswer(other),
+        }
+    }
+}

@@ -1,0 +1,47 @@
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use can::Instant;
+use canopen::emcy::Emcy;
+use canopen::{AbortCode, Mux, NmtState, NodeId};
+
+/// Something that happened on the bus and that a person may want to know. Pulled with [`super::Core::poll_event`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A node sent its boot-up message.
+    BootUp(NodeId),
+    /// A node's heartbeat shows another state than before.
+    NmtState(NodeId, NmtState),
+    /// A watched heartbeat has not come for this long.
+    HeartbeatLost(NodeId, Duration),
+    /// A lost heartbeat has come back.
+    HeartbeatBack(NodeId),
+    /// A node sent an emergency message.
+    Emcy(NodeId, Emcy),
+    /// A node did not answer an SDO request in this time.
+    NoAnswer(NodeId, Mux, Duration),
+    /// A node aborted an SDO request.
+    Aborted(NodeId, Mux, AbortCode),
+}
+
+/// How many events are kept until they are pulled; older ones are dropped first.
+const EVENTS_KEPT: usize = 256;
+
+/// Events not yet pulled, with the time of each.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Events {
+    queue: VecDeque<(Instant, Event)>,
+}
+
+impl Events {
+    pub(super) fn push(&mut self, event: Event, now: Instant) {
+        if self.queue.len() == EVENTS_KEPT {
+            self.queue.pop_front();
+        }
+        self.queue.push_back((now, event));
+    }
+
+    pub(super) fn pop(&mut self) -> Option<(Instant, Event)> {
+        self.queue.pop_front()
+    }
+}

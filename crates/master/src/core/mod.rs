@@ -1,0 +1,388 @@
+//! The master as a passive state machine (CiA 301): one SDO channel, NMT and heartbeat watch per node, SYNC, PDOs.
+//!
+//! In: frames, time, and [`Command`]s that carry the time. Out: frames, deadlines, [`Finished`] requests and
+//! [`Event`]s, all pulled. Up to 127 nodes are asked at once, one request per node on the wire, the others queued.
+//! Nothing here waits: the async face is [`crate::Network`]. Drives are unknown here: see [`crate::drive`].
+
+mod channel;
+mod event;
+mod facts;
+mod image;
+mod node_set;
+mod payload;
+mod request;
+mod sync;
+mod timers;
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use can::{Frame, Instant, Station};
+use canopen::cob::Service;
+use canopen::emcy::Emcy;
+use canopen::heartbeat::Heartbeat;
+use canopen::nmt::NmtRequest;
+use canopen::{Mux, NmtState, NodeId};
+
+pub use event::Event;
+pub use facts::{HeartbeatWatch, NodeFacts};
+pub(crate) use image::bits_of;
+pub use image::{Image, MappedObject, PdoMap, Received, RpdoTrigger};
+pub use node_set::NodeSet;
+pub use payload::Payload;
+pub use request::{Command, Failure, Finished, Outcome, Request, Ticket, Transfer};
+
+use channel::Channel;
+use event::Events;
+use sync::SyncProducer;
+use timers::Timers;
+
+/// Frames that wait for [`Core::poll_transmit`] besides SDO, SYNC and PDO; a further one replaces the oldest.
+const OUTBOX: usize = 128;
+
+/// The sans-IO master. See the [module](self).
+///
+/// A core that is given no time cannot time out: call it as [`Station`] says.
+#[derive(Clone, Debug)]
+pub struct Core {
+    now: Instant,
+    members: Vec<Member>,
+    /// Nodes with a transfer on the wire.
+    busy: NodeSet,
+    /// Nodes whose SDO channel may have a frame to send.
+    sending: NodeSet,
+    /// Nodes whose facts changed since the last [`Core::take_changed`].
+    changed: NodeSet,
+    watched: NodeSet,
+    /// No watched heartbeat is lost before this; it may be too early, never too late.
+    heartbeat_check: Instant,
+    image: Image,
+    sync: SyncProducer,
+    timers: Timers,
+    outbox: VecDeque<Frame>,
+    finished: VecDeque<Finished>,
+    events: Events,
+    next_ticket: u64,
+}
+
+/// One node as the master sees it.
+#[derive(Clone, Debug)]
+struct Member {
+    facts: NodeFacts,
+    channel: Channel,
+}
+
+impl Default for Core {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Core {
+    /// A master that knows nothing of any node.
+    pub fn new() -> Self {
+        let member = |node| Member { facts: NodeFacts::default(), channel: Channel::new(node) };
+        Self {
+            now: Instant::ZERO,
+            members: NodeId::all().map(member).collect(),
+            busy: NodeSet::EMPTY,
+            sending: NodeSet::EMPTY,
+            changed: NodeSet::EMPTY,
+            watched: NodeSet::EMPTY,
+            heartbeat_check: Instant::FAR_FUTURE,
+            image: Image::default(),
+            sync: SyncProducer::default(),
+            timers: Timers::default(),
+            outbox: VecDeque::with_capacity(OUTBOX),
+            finished: VecDeque::new(),
+            events: Events::default(),
+            next_ticket: 0,
+        }
+    }
+
+    /// Reads an object of a node by SDO. The ticket comes back from [`poll_finished`](Self::poll_finished).
+    pub fn upload(&mut self, node: NodeId, mux: Mux, timeout: Duration, now: Instant) -> Ticket {
+        self.request(Request { node, mux, transfer: Transfer::Upload, timeout }, now)
+    }
+
+    /// Writes an object of a node by SDO. The ticket comes back from [`poll_finished`](Self::poll_finished).
+    pub fn download(&mut self, node: NodeId, mux: Mux, data: &[u8], timeout: Duration, now: Instant) -> Ticket {
+        self.request(Request { node, mux, transfer: Transfer::Download(Payload::new(data)), timeout }, now)
+    }
+
+    /// Queues an SDO request.
+    pub fn request(&mut self, request: Request, now: Instant) -> Ticket {
+        let ticket = self.ticket();
+        self.execute(Command::Request(ticket, request), now);
+        ticket
+    }
+
+    /// A ticket that no other request or timer of this core has.
+    pub const fn ticket(&mut self) -> Ticket {
+        self.next_ticket += 1;
+        Ticket(self.next_ticket)
+    }
+
+    /// Carries out one command at `now`.
+    pub fn execute(&mut self, command: Command, now: Instant) {
+        self.advance(now);
+        match command {
+            Command::Request(ticket, request) => self.start_request(ticket, request),
+            Command::Timer(ticket, after) => self.timers.arm(self.now + after, ticket),
+            Command::Cancel(ticket) => self.cancel(ticket),
+            Command::Nmt(target, command) => self.push_frame(NmtRequest::new(command, target).emit()),
+            Command::Sync(period) => self.sync.set_period(period, self.now),
+            Command::WatchHeartbeat(node, time) => self.watch_heartbeat(node, time),
+            Command::Transmit(frame) => self.push_frame(frame),
+        }
+    }
+
+    /// The next request or timer that has ended.
+    pub fn poll_finished(&mut self) -> Option<Finished> {
+        self.finished.pop_front()
+    }
+
+    /// The next event for people, with its time.
+    pub fn poll_event(&mut self) -> Option<(Instant, Event)> {
+        self.events.pop()
+    }
+
+    /// What has been seen of a node.
+    pub fn facts(&self, node: NodeId) -> &NodeFacts {
+        &self.member(node).facts
+    }
+
+    /// The nodes whose facts or PDOs have changed since the last call.
+    pub const fn take_changed(&mut self) -> NodeSet {
+        core::mem::replace(&mut self.changed, NodeSet::EMPTY)
+    }
+
+    /// Last values of mapped objects.
+    pub const fn image(&self) -> &Image {
+        &self.image
+    }
+
+    /// Last values of mapped objects, to change mappings and values to send.
+    pub const fn image_mut(&mut self) -> &mut Image {
+        &mut self.image
+    }
+
+    /// True if there may be a frame to send.
+    pub fn wants_transmit(&self) -> bool {
+        !self.outbox.is_empty() || !self.sending.is_empty() || self.image.has_pending()
+    }
+
+    /// The latest time this core was told.
+    pub const fn now(&self) -> Instant {
+        self.now
+    }
+
+    fn start_request(&mut self, ticket: Ticket, request: Request) {
+        let node = request.node;
+        let now = self.now;
+        match self.member_mut(node).channel.push(ticket, request, now) {
+            Ok(()) => self.settle(node),
+            Err(failure) => self.finished.push_back(Finished { ticket, outcome: Err(failure) }),
+        }
+    }
+
+    fn cancel(&mut self, ticket: Ticket) {
+        self.timers.cancel(ticket);
+        let now = self.now;
+        let owner = self.members.iter_mut().position(|member| member.channel.cancel(ticket, now));
+        if let Some(node) = owner.and_then(|position| NodeId::new(position as u8 + 1)) {
+            self.settle(node);
+        }
+    }
+
+    fn watch_heartbeat(&mut self, node: NodeId, time: Option<Duration>) {
+        let facts = &mut self.member_mut(node).facts;
+        facts.heartbeat_watch = time.map(|time| HeartbeatWatch { time, deadline: None, lost: false });
+        match time {
+            Some(_) => self.watched.insert(node),
+            None => self.watched.remove(node),
+        }
+    }
+
+    /// Collects what a node's channel has to say after it was called.
+    fn settle(&mut self, node: NodeId) {
+        let now = self.now;
+        while let Some(ended) = self.member_mut(node).channel.poll_finished() {
+            self.note_outcome(node, ended.mux, &ended.outcome);
+            self.finished.push_back(Finished { ticket: ended.ticket, outcome: ended.outcome });
+            self.member_mut(node).channel.start_next(now);
+        }
+        let busy = self.member(node).channel.poll_timeout().is_some();
+        if busy {
+            self.busy.insert(node)
+        } else {
+            self.busy.remove(node)
+        }
+        self.sending.insert(node);
+    }
+
+    fn note_outcome(&mut self, node: NodeId, mux: Mux, outcome: &Outcome) {
+        let now = self.now;
+        let facts = &mut self.member_mut(node).facts;
+        match *outcome {
+            Ok(_) | Err(Failure::BadAnswer(_) | Failure::QueueFull) => facts.unanswered = 0,
+            Err(Failure::Aborted(code)) => {
+                facts.unanswered = 0;
+                self.events.push(Event::Aborted(node, mux, code), now);
+            }
+            Err(Failure::NoAnswer { waited, .. }) => {
+                facts.unanswered = facts.unanswered.saturating_add(1);
+                self.events.push(Event::NoAnswer(node, mux, waited), now);
+            }
+        }
+    }
+
+    fn handle_sdo_reply(&mut self, node: NodeId, frame: &Frame) {
+        if self.busy.contains(node) {
+            let now = self.now;
+            self.member_mut(node).channel.handle_frame(frame, now);
+            self.settle(node);
+        }
+    }
+
+    fn handle_heartbeat(&mut self, node: NodeId, frame: &Frame) {
+        let now = self.now;
+        let Some(state) = Heartbeat::parse(frame).and_then(Heartbeat::nmt_state) else { return };
+        let facts = &mut self.member_mut(node).facts;
+        let before = facts.nmt_state.replace(state);
+        let back = facts.note_heartbeat(now);
+        let deadline = facts.heartbeat_watch.and_then(|watch| watch.deadline);
+        if state == NmtState::Initialising {
+            facts.boot_up = Some((now, facts.boot_up.map_or(1, |(_, count)| count.saturating_add(1))));
+            self.events.push(Event::BootUp(node), now);
+        } else if before != Some(state) {
+            self.events.push(Event::NmtState(node, state), now);
+        }
+        if back {
+            self.events.push(Event::HeartbeatBack(node), now);
+        }
+        if let Some(deadline) = deadline {
+            self.heartbeat_check = self.heartbeat_check.min(deadline);
+        }
+    }
+
+    fn handle_emcy(&mut self, node: NodeId, frame: &Frame) {
+        let Some(emcy) = Emcy::parse(frame) else { return };
+        let now = self.now;
+        self.member_mut(node).facts.push_emcy(emcy, now);
+        self.events.push(Event::Emcy(node, emcy), now);
+    }
+
+    fn check_heartbeats(&mut self) {
+        let now = self.now;
+        if self.heartbeat_check > now {
+            return;
+        }
+        self.heartbeat_check = Instant::FAR_FUTURE;
+        for node in self.watched.iter() {
+            let facts = &mut self.member_mut(node).facts;
+            let lost = facts.check_heartbeat(now);
+            let Some(watch) = facts.heartbeat_watch else { continue };
+            if lost {
+                self.changed.insert(node);
+                self.events.push(Event::HeartbeatLost(node, watch.time), now);
+            }
+            if let Some(deadline) = watch.deadline {
+                self.heartbeat_check = self.heartbeat_check.min(deadline);
+            }
+        }
+    }
+
+    fn push_frame(&mut self, frame: Frame) {
+        if self.outbox.len() == OUTBOX {
+            self.outbox.pop_front();
+        }
+        self.outbox.push_back(frame);
+    }
+
+    fn poll_sdo(&mut self) -> Option<Frame> {
+        while let Some(node) = self.sending.first() {
+            match self.member_mut(node).channel.poll_transmit() {
+                Some(frame) => return Some(frame),
+                None => self.sending.remove(node),
+            }
+        }
+        None
+    }
+
+    fn advance(&mut self, now: Instant) {
+        self.now = self.now.max(now);
+    }
+
+    fn member(&self, node: NodeId) -> &Member {
+        &self.members[usize::from(node.raw()) - 1]
+    }
+
+    fn member_mut(&mut self, node: NodeId) -> &mut Member {
+        &mut self.members[usize::from(node.raw()) - 1]
+    }
+}
+
+impl Station for Core {
+    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
+        self.advance(now);
+        let Some(id) = frame.standard_data_id() else { return };
+        if let Some(node) = self.image.handle_frame(id, frame, now) {
+            self.member_mut(node).facts.seen_at = Some(now);
+            self.changed.insert(node);
+            return;
+        }
+        let node = match Service::of(frame.id()) {
+            Some(Service::SdoReply(node)) => {
+                self.handle_sdo_reply(node, frame);
+                node
+            }
+            Some(Service::Heartbeat(node)) => {
+                self.handle_heartbeat(node, frame);
+                node
+            }
+            Some(Service::Emcy(node)) => {
+                self.handle_emcy(node, frame);
+                node
+            }
+            _ => return,
+        };
+        self.member_mut(node).facts.seen_at = Some(now);
+        self.changed.insert(node);
+    }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        self.advance(now);
+        let now = self.now;
+        for node in self.busy.iter() {
+            let channel = &mut self.member_mut(node).channel;
+            if channel.poll_timeout().is_some_and(|due| due <= now) {
+                channel.handle_timeout(now);
+                self.settle(node);
+                self.changed.insert(node);
+            }
+        }
+        while let Some(ticket) = self.timers.pop_due(now) {
+            self.finished.push_back(Finished { ticket, outcome: Ok(Payload::EMPTY) });
+        }
+        if self.sync.handle_timeout(now) {
+            self.image.handle_sync();
+        }
+        self.check_heartbeats();
+    }
+
+    /// NMT and other single frames, then SYNC, RPDOs, SDO.
+    fn poll_transmit(&mut self) -> Option<Frame> {
+        self.outbox
+            .pop_front()
+            .or_else(|| self.sync.poll_transmit())
+            .or_else(|| self.image.poll_transmit())
+            .or_else(|| self.poll_sdo())
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        let sdo = self.busy.iter().filter_map(|node| self.member(node).channel.poll_timeout()).min();
+        let heartbeat = (self.heartbeat_check < Instant::FAR_FUTURE).then_some(self.heartbeat_check);
+        [sdo, heartbeat, self.timers.next(), self.sync.next()].into_iter().flatten().min()
+    }
+}

@@ -1,0 +1,81 @@
+use core::fmt;
+
+/// Largest value kept without an allocation: what an expedited transfer carries.
+const SHORT: usize = 4;
+
+/// The bytes of an object, little endian as on the wire. Values of up to four bytes are held in place.
+#[derive(Clone)]
+pub struct Payload(Form);
+
+#[derive(Clone)]
+enum Form {
+    Short([u8; SHORT], u8),
+    Long(Vec<u8>),
+}
+
+impl Payload {
+    /// No bytes.
+    pub const EMPTY: Self = Self(Form::Short([0; SHORT], 0));
+
+    /// A copy of `bytes`.
+    pub fn new(bytes: &[u8]) -> Self {
+        if bytes.len() > SHORT {
+            return Self(Form::Long(bytes.to_vec()));
+        }
+        let mut short = [0; SHORT];
+        short[..bytes.len()].copy_from_slice(bytes);
+        Self(Form::Short(short, bytes.len() as u8))
+    }
+
+    /// The bytes.
+    pub fn as_bytes(&self) -> &[u8] {
+        match &self.0 {
+            Form::Short(bytes, length) => &bytes[..usize::from(*length)],
+            Form::Long(bytes) => bytes,
+        }
+    }
+
+    /// The low four bytes as a little-endian cell, missing ones zero.
+    pub fn raw(&self) -> u32 {
+        let mut cell = [0; 4];
+        let bytes = self.as_bytes();
+        let length = bytes.len().min(4);
+        cell[..length].copy_from_slice(&bytes[..length]);
+        u32::from_le_bytes(cell)
+    }
+}
+
+impl From<Vec<u8>> for Payload {
+    fn from(bytes: Vec<u8>) -> Self {
+        if bytes.len() > SHORT { Self(Form::Long(bytes)) } else { Self::new(&bytes) }
+    }
+}
+
+impl From<Payload> for Vec<u8> {
+    fn from(payload: Payload) -> Self {
+        match payload.0 {
+            Form::Short(bytes, length) => bytes[..usize::from(length)].to_vec(),
+            Form::Long(bytes) => bytes,
+        }
+    }
+}
+
+impl PartialEq for Payload {
+    fn eq(&self, other: &Self) -> bool {
+        self.as_bytes() == other.as_bytes()
+    }
+}
+
+impl Eq for Payload {}
+
+/// Bytes in wire order: `40 60 00 00`.
+impl fmt::Debug for Payload {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut separator = "";
+        self.as_bytes().iter().try_for_each(|byte| {
+            write!(f, "{separator}{byte:02X}")?;
+            separator = " ";
+            Ok(())
+        })
+    }
+}

@@ -1,0 +1,83 @@
+use std::time::Duration;
+
+use can::Frame;
+use canopen::nmt::NmtTarget;
+use canopen::sdo::client;
+use canopen::{AbortCode, Mux, NmtCommand, NodeId};
+
+use super::Payload;
+
+/// Names a request or a timer until it has finished.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Ticket(pub u64);
+
+/// What an SDO request does.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Transfer {
+    /// Read an object.
+    Upload,
+    /// Write an object with these bytes.
+    Download(Payload),
+}
+
+/// One SDO request to one node.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Request {
+    /// The node asked.
+    pub node: NodeId,
+    /// The object asked for.
+    pub mux: Mux,
+    /// What to do with it.
+    pub transfer: Transfer,
+    /// Longest wait for each frame of the answer.
+    pub timeout: Duration,
+}
+
+/// What the core can be told to do. A command is plain data; the time comes with [`super::Core::execute`].
+#[derive(Clone, Debug)]
+pub enum Command {
+    /// Queue an SDO request; it finishes under the ticket.
+    Request(Ticket, Request),
+    /// Fire the ticket after this long.
+    Timer(Ticket, Duration),
+    /// Forget a request (an SDO abort goes out if it was on the wire) or a timer.
+    Cancel(Ticket),
+    /// Send an NMT command.
+    Nmt(NmtTarget, NmtCommand),
+    /// Produce SYNC with this period, or stop.
+    Sync(Option<Duration>),
+    /// Expect a heartbeat of the node at least this often, or stop watching.
+    WatchHeartbeat(NodeId, Option<Duration>),
+    /// Send a frame as it is.
+    Transmit(Frame),
+}
+
+/// How a request or timer ended. A timer ends with no bytes.
+pub type Outcome = Result<Payload, Failure>;
+
+/// Why a request failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Failure {
+    /// The node did not answer in time.
+    NoAnswer {
+        /// How long the last wait was.
+        waited: Duration,
+        /// True if the request never left the master.
+        unsent: bool,
+    },
+    /// The node aborted the transfer.
+    Aborted(AbortCode),
+    /// The node's answer broke the protocol, and the master aborted.
+    BadAnswer(client::Failure),
+    /// The node's request queue was full.
+    QueueFull,
+}
+
+/// A request or timer that has ended.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// Which one.
+    pub ticket: Ticket,
+    /// How.
+    pub outcome: Outcome,
+}

@@ -1,0 +1,212 @@
+//! Frames in words: what a bus monitor shows (CiA 301, one type per service).
+//!
+//! In: every frame of the bus in order. Out: a [`Decoded`] value per frame, which prints as one line. SDO transfers
+//! are reassembled; PDOs are split by the mapping that was given, comes from a model's object table, or was seen
+//! being written or read by SDO. The decoder never sends and keeps no time.
+
+mod pdo;
+mod sdo;
+mod value;
+
+use core::fmt;
+
+use can::Frame;
+use canopen::cob::Service;
+use canopen::emcy::Emcy;
+use canopen::heartbeat::Heartbeat;
+use canopen::nmt::{NmtRequest, NmtTarget};
+use canopen::od::Table;
+use canopen::sync::Sync;
+use canopen::{NmtState, NodeId};
+
+use crate::core::PdoMap;
+use pdo::PdoBook;
+use sdo::Conversations;
+
+pub use pdo::{Direction, Pdo};
+pub use sdo::{Sdo, SdoStep, Side};
+pub use value::Value;
+
+/// What one frame says.
+#[derive(Clone, Debug)]
+pub enum Decoded {
+    /// NMT command of a master.
+    Nmt(NmtRequest),
+    /// SYNC.
+    Sync(Sync),
+    /// TIME stamp.
+    Time,
+    /// Emergency message.
+    Emcy(NodeId, Emcy),
+    /// Boot-up message.
+    BootUp(NodeId),
+    /// Heartbeat, or answer to node guarding.
+    Heartbeat(NodeId, NmtState),
+    /// Part of an SDO transfer.
+    Sdo(Sdo),
+    /// Process data.
+    Pdo(Pdo),
+    /// Layer setting services.
+    Lss,
+    /// A remote frame, which asks for the frame with its identifier.
+    Remote(Option<Service>),
+    /// A frame whose contents break the rules of its service.
+    Malformed(Service),
+    /// Not a frame of the predefined connection set, nor of a PDO that was seen being configured.
+    Unknown,
+}
+
+/// Turns frames into words. See the [module](self).
+#[derive(Clone, Debug, Default)]
+pub struct Decoder {
+    models: Models,
+    conversations: Conversations,
+    pdos: PdoBook,
+}
+
+/// The object table of each node whose model is known.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Models(std::collections::BTreeMap<u8, KnownTable>);
+
+#[derive(Clone, Copy)]
+struct KnownTable(&'static Table);
+
+impl fmt::Debug for KnownTable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Table of {} rows", self.0.rows().len())
+    }
+}
+
+impl Models {
+    fn table(&self, node: NodeId) -> Option<&'static Table> {
+        self.0.get(&node.raw()).map(|known| known.0)
+    }
+}
+
+impl Decoder {
+    /// A decoder that knows the standard only.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Names objects of a node by its model's table, and takes the table's factory PDO mappings for granted
+    /// until others are seen.
+    pub fn set_model(&mut self, node: NodeId, table: &'static Table) {
+        self.models.0.insert(node.raw(), KnownTable(table));
+        self.pdos.load_defaults(node, table);
+    }
+
+    /// Takes a PDO's identifier and mapping for granted. `number` counts from 0 (1400h, 1800h).
+    pub fn set_pdo(&mut self, node: NodeId, direction: Direction, number: u16, id: u16, map: &PdoMap) {
+        self.pdos.set(node, direction, number, id, map);
+    }
+
+    /// What a frame says. Frames must come in the order they were on the bus.
+    pub fn decode(&mut self, frame: &Frame) -> Decoded {
+        let service = Service::of(frame.id());
+        if frame.is_remote() {
+            return Decoded::Remote(service);
+        }
+        if let Some(pdo) = self.pdos.decode(frame, &self.models) {
+            return Decoded::Pdo(pdo);
+        }
+        match service {
+            Some(service) => self.decode_service(service, frame).unwrap_or(Decoded::Malformed(service)),
+            None => Decoded::Unknown,
+        }
+    }
+
+    fn decode_service(&mut self, service: Service, frame: &Frame) -> Option<Decoded> {
+        Some(match service {
+            Service::Nmt => Decoded::Nmt(NmtRequest::parse(frame).ok()?),
+            Service::Sync => Decoded::Sync(Sync::parse(frame)),
+            Service::Time => Decoded::Time,
+            Service::Emcy(node) => Decoded::Emcy(node, Emcy::parse(frame)?),
+            Service::Heartbeat(node) => match Heartbeat::parse(frame)?.nmt_state()? {
+                NmtState::Initialising => Decoded::BootUp(node),
+                state => Decoded::Heartbeat(node, state),
+            },
+            Service::SdoRequest(node) => Decoded::Sdo(self.decode_sdo(node, Side::Client, frame)?),
+            Service::SdoReply(node) => Decoded::Sdo(self.decode_sdo(node, Side::Server, frame)?),
+            Service::Tpdo(number, node) => {
+                Decoded::Pdo(Pdo::unmapped(node, Direction::Tpdo, number.position() as u16, frame))
+            }
+            Service::Rpdo(number, node) => {
+                Decoded::Pdo(Pdo::unmapped(node, Direction::Rpdo, number.position() as u16, frame))
+            }
+            Service::LssSlave | Service::LssMaster => Decoded::Lss,
+        })
+    }
+
+    fn decode_sdo(&mut self, node: NodeId, from: Side, frame: &Frame) -> Option<Sdo> {
+        if frame.data().is_empty() {
+            return None;
+        }
+        let step = self.conversations.step(node, from, frame.padded());
+        if let Some((mux, bytes)) = step.learned() {
+            self.pdos.learn(node, mux, bytes);
+        }
+        Some(Sdo { node, from, step, table: self.models.table(node).map(KnownTable) })
+    }
+}
+
+/// One line, without the frame itself.
+impl fmt::Display for Decoded {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Nmt(request) => {
+                let name = command_name(request.command);
+                match request.target {
+                    NmtTarget::All => write!(f, "NMT {name}, all nodes"),
+                    NmtTarget::Node(node) => write!(f, "NMT {name}, node {node}"),
+                }
+            }
+            Self::Sync(Sync { counter: Some(counter) }) => write!(f, "SYNC {counter}"),
+            Self::Sync(_) => f.write_str("SYNC"),
+            Self::Time => f.write_str("TIME"),
+            Self::Emcy(node, emcy) => {
+                write!(f, "EMCY node {node}: {}, error register {:02X}h", emcy.code, emcy.error_register)?;
+                if emcy.manufacturer != [0; 5] {
+                    f.write_str(", manufacturer")?;
+                    emcy.manufacturer.iter().try_for_each(|byte| write!(f, " {byte:02X}"))?;
+                }
+                Ok(())
+            }
+            Self::BootUp(node) => write!(f, "boot-up node {node}"),
+            Self::Heartbeat(node, state) => write!(f, "heartbeat node {node}: {state}"),
+            Self::Sdo(sdo) => sdo.fmt(f),
+            Self::Pdo(pdo) => pdo.fmt(f),
+            Self::Lss => f.write_str("LSS"),
+            Self::Remote(Some(service)) => write!(f, "remote request for {}", service_name(*service)),
+            Self::Remote(None) => f.write_str("remote request"),
+            Self::Malformed(service) => write!(f, "malformed {}", service_name(*service)),
+            Self::Unknown => f.write_str("unknown"),
+        }
+    }
+}
+
+fn command_name(command: canopen::NmtCommand) -> &'static str {
+    use canopen::NmtCommand;
+    match command {
+        NmtCommand::Start => "start",
+        NmtCommand::Stop => "stop",
+        NmtCommand::EnterPreOperational => "enter pre-operational",
+        NmtCommand::ResetNode => "reset node",
+        NmtCommand::ResetCommunication => "reset communication",
+    }
+}
+
+fn service_name(service: Service) -> String {
+    match service {
+        Service::Nmt => "NMT command".to_owned(),
+        Service::Sync => "SYNC".to_owned(),
+        Service::Time => "TIME".to_owned(),
+        Service::Emcy(node) => format!("EMCY of node {node}"),
+        Service::Tpdo(number, node) => format!("TPDO{} of node {node}", number.position()),
+        Service::Rpdo(number, node) => format!("RPDO{} of node {node}", number.position()),
+        Service::SdoReply(node) => format!("SDO reply of node {node}"),
+        Service::SdoRequest(node) => format!("SDO request to node {node}"),
+        Service::Heartbeat(node) => format!("heartbeat of node {node}"),
+        Service::LssSlave | Service::LssMaster => "LSS".to_owned(),
+    }
+}

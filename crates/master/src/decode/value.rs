@@ -1,0 +1,120 @@
+use core::fmt;
+
+use canopen::Mux;
+use canopen::od::{DataType, Entry, Table};
+use cia402::{Controlword, ModeOfOperation, Statusword};
+
+/// The bytes of one object, with what is known about it. Prints as `6041h:00 statusword = 0237h (Operation enabled)`.
+#[derive(Clone)]
+pub struct Value<'a> {
+    /// Which object.
+    pub mux: Mux,
+    /// Its bytes, little endian.
+    pub bytes: &'a [u8],
+    /// Its row in the model's table.
+    pub entry: Option<&'static Entry>,
+}
+
+impl<'a> Value<'a> {
+    /// The bytes of an object, looked up in a model's table if there is one.
+    pub fn new(mux: Mux, bytes: &'a [u8], table: Option<&Table>) -> Self {
+        Self { mux, bytes, entry: find(table, mux) }
+    }
+
+    /// The low four bytes as a cell; `None` for longer objects.
+    pub fn raw(&self) -> Option<u32> {
+        let mut cell = [0; 4];
+        cell.get_mut(..self.bytes.len())?.copy_from_slice(self.bytes);
+        Some(u32::from_le_bytes(cell))
+    }
+
+    /// The number that the bytes stand for, by the table's data type.
+    pub fn number(&self) -> Option<i64> {
+        let raw = self.raw()?;
+        match self.entry?.data_type {
+            DataType::VisibleString => None,
+            data_type => Some(data_type.value(raw)),
+        }
+    }
+}
+
+impl fmt::Debug for Value<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Value({self})")
+    }
+}
+
+impl fmt::Display for Value<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write_name(f, self.mux, self.entry)?;
+        f.write_str(" = ")?;
+        let Some(raw) = self.raw().filter(|_| !self.bytes.is_empty()) else { return write_long(f, self.bytes) };
+        if let Some(words) = standard_words(self.mux, raw) {
+            return f.write_str(&words);
+        }
+        match (self.number(), self.entry) {
+            (Some(number), Some(entry)) => write_number(f, number, raw, entry),
+            _ => write!(f, "{raw:0width$X}h ({raw})", width = self.bytes.len() * 2),
+        }
+    }
+}
+
+/// An object's multiplexor and its name, if known.
+pub(super) fn write_name(f: &mut fmt::Formatter<'_>, mux: Mux, entry: Option<&Entry>) -> fmt::Result {
+    match entry {
+        Some(entry) => write!(f, "{mux} {}", entry.name),
+        None => write!(f, "{mux}"),
+    }
+}
+
+pub(super) fn find(table: Option<&Table>, mux: Mux) -> Option<&'static Entry> {
+    let table = table?;
+    Some(table.row(table.find(mux).ok()?))
+}
+
+/// Objects whose bits mean the same on every CiA 402 drive.
+fn standard_words(mux: Mux, raw: u32) -> Option<String> {
+    match (mux.index, mux.sub_index) {
+        (0x6040, 0) => Some(Controlword(raw as u16).to_string()),
+        (0x6041, 0) => Some(Statusword(raw as u16).to_string()),
+        (0x6060 | 0x6061, 0) => Some(ModeOfOperation(raw as u8 as i8).to_string()),
+        (0x1600..=0x17FF | 0x1A00..=0x1BFF, 1..) => {
+            Some(format!("{raw:08X}h ({}, {} bits)", Mux::from_key(raw >> 8), raw & 0xFF))
+        }
+        _ => None,
+    }
+}
+
+fn write_number(f: &mut fmt::Formatter<'_>, number: i64, raw: u32, entry: &Entry) -> fmt::Result {
+    let is_identifier = entry.data_type == DataType::Unsigned32 && entry.unit.is_empty() && entry.index < 0x2000;
+    if is_identifier {
+        write!(f, "{raw:X}h")?
+    } else {
+        write!(f, "{number}")?
+    }
+    if !entry.unit.is_empty() {
+        write!(f, " [{}]", entry.unit)?;
+    }
+    match entry.meaning(number) {
+        Some(meaning) => write!(f, " ({meaning})"),
+        None => Ok(()),
+    }
+}
+
+/// As text when it is printable, else in hexadecimal.
+fn write_long(f: &mut fmt::Formatter<'_>, bytes: &[u8]) -> fmt::Result {
+    if bytes.is_empty() {
+        return f.write_str("(no bytes)");
+    }
+    match core::str::from_utf8(bytes) {
+        Ok(text) if !text.chars().any(char::is_control) => write!(f, "\"{text}\""),
+        _ => {
+            let mut separator = "";
+            bytes.iter().try_for_each(|byte| {
+                write!(f, "{separator}{byte:02X}")?;
+                separator = " ";
+                Ok(())
+            })
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! Errors that say which node, which object, what was expected, what came, and what to do next.
+
+use core::fmt;
+use std::time::Duration;
+
+use canopen::sdo::client;
+use canopen::{AbortCode, Mux, NmtState, NodeId};
+
+/// Why the master could not do what it was asked.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum Error {
+    /// An SDO request was not answered in time.
+    #[error("node {node} did not answer within {} ms when asked to {access} {mux}. {hints}", waited.as_millis())]
+    NoAnswer {
+        /// The node asked.
+        node: NodeId,
+        /// The object asked for.
+        mux: Mux,
+        /// Read or write.
+        access: Access,
+        /// How long the last frame of the answer was waited for.
+        waited: Duration,
+        /// What may explain it.
+        hints: Hints,
+    },
+    /// The node refused with an SDO abort.
+    #[error("node {node} refused to {access} {mux}: {code}. {}", advice(*code, *access))]
+    Aborted {
+        /// The node asked.
+        node: NodeId,
+        /// The object asked for.
+        mux: Mux,
+        /// Read or write.
+        access: Access,
+        /// The node's reason.
+        code: AbortCode,
+    },
+    /// The node's answer broke the SDO protocol; the master aborted the transfer.
+    #[error(
+        "node {node} answered the request to {access} {mux} in a way that breaks the SDO protocol. {why}. \
+             Try again; if it persists, two devices may share the node-ID, or another master talks to it"
+    )]
+    BadAnswer {
+        /// The node asked.
+        node: NodeId,
+        /// The object asked for.
+        mux: Mux,
+        /// Read or write.
+        access: Access,
+        /// What was wrong with it.
+        why: client::Failure,
+    },
+    /// An object is not as long as it should be.
+    #[error(
+        "{mux} of node {node} has {received} bytes where {expected} were expected: \
+             the device may be another model than assumed"
+    )]
+    WrongLength {
+        /// The node asked.
+        node: NodeId,
+        /// The object.
+        mux: Mux,
+        /// Bytes expected.
+        expected: usize,
+        /// Bytes received.
+        received: usize,
+    },
+    /// Too many requests wait for one node.
+    #[error("too many requests already wait for node {node}: wait for some of them first")]
+    QueueFull {
+        /// The node asked.
+        node: NodeId,
+    },
+    /// A node did not send its boot-up message.
+    #[error("node {node} did not boot within {} ms. {hints}", waited.as_millis())]
+    NoBootUp {
+        /// The node waited for.
+        node: NodeId,
+        /// How long.
+        waited: Duration,
+        /// What may explain it.
+        hints: Hints,
+    },
+}
+
+/// Direction of an SDO request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// Upload.
+    Read,
+    /// Download.
+    Write,
+}
+
+impl fmt::Display for Access {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Read => "read",
+            Self::Write => "write",
+        })
+    }
+}
+
+/// What the master knows when a node is silent. Prints as the likeliest cause and what to do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Hints {
+    /// The request never left the master.
+    pub unsent: bool,
+    /// The node's state when last heard.
+    pub nmt_state: Option<NmtState>,
+    /// Time since any frame of the node.
+    pub silent_for: Option<Duration>,
+    /// Other nodes have been heard.
+    pub others: bool,
+}
+
+impl fmt::Display for Hints {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.unsent, self.nmt_state, self.silent_for) {
+            (true, ..) => f.write_str(
+                "The request never left this computer: check that the CAN interface is up and that another node \
+                 acknowledges frames (cable, bit rate, termination)",
+            ),
+            (_, Some(NmtState::Stopped), _) => f.write_str(
+                "Its last heartbeat says stopped, where SDO does not exist: send NMT pre-operational or start",
+            ),
+            (_, _, Some(age)) => write!(
+                f,
+                "It was last heard {} ms ago: check whether it has lost its supply or its cable, or is too busy to \
+                 answer in time",
+                age.as_millis()
+            ),
+            (_, _, None) if self.others => f.write_str(
+                "Other nodes are on the bus but this one has never been heard: check its node-ID and its supply \
+                 (a scan shows who is there)",
+            ),
+            (_, _, None) => {
+                f.write_str("Nothing at all has been heard on the bus: check supply, cable, termination and bit rate")
+            }
+        }
+    }
+}
+
+/// What to do about an abort code.
+fn advice(code: AbortCode, access: Access) -> &'static str {
+    match code {
+        AbortCode::NO_SUCH_OBJECT | AbortCode::NO_SUCH_SUB_INDEX => {
+            "This model has no such object: check index and \
+             sub-index against its object dictionary"
+        }
+        AbortCode::READ_ONLY => "The object can only be read",
+        AbortCode::WRITE_ONLY => "The object can only be written",
+        AbortCode::INVALID_VALUE | AbortCode::VALUE_TOO_HIGH | AbortCode::VALUE_TOO_LOW => {
+            "Give a value within the limits of its object dictionary"
+        }
+        AbortCode::LENGTH_MISMATCH | AbortCode::TOO_LONG | AbortCode::TOO_SHORT => {
+            "The value was sent with another length than the object has: check its data type"
+        }
+        AbortCode::NOT_MAPPABLE | AbortCode::PDO_TOO_LONG => "Map other objects, or fewer of them, into this PDO",
+        AbortCode::DEVICE_STATE | AbortCode::LOCAL_CONTROL | AbortCode::CANNOT_TRANSFER => {
+            "The drive does not accept this in its present state: look at its statusword, and try it disabled"
+        }
+        AbortCode::UNSUPPORTED_ACCESS => match access {
+            Access::Read => "The object cannot be read now",
+            Access::Write => "The object cannot be changed now: a PDO mapping may have to be disabled first",
+        },
+        AbortCode::HARDWARE_ERROR => "The drive's parameter memory may be faulty",
+        _ => "Look the code up in the drive's manual",
+    }
+}

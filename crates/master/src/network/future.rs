@@ -1,0 +1,170 @@
+use core::fmt;
+use core::future::Future;
+use core::pin::Pin;
+use core::task::{Context, Poll};
+use std::time::Duration;
+
+use canopen::NodeId;
+
+use super::{Network, Slot, Watcher};
+use crate::core::{Command, NodeFacts, Outcome, Request, Ticket};
+
+/// A request or timer that is started by the first poll. Dropping it cancels it: an SDO transfer that is on the
+/// wire is aborted.
+#[must_use = "futures do nothing unless awaited"]
+pub(super) struct Pending {
+    network: Network,
+    state: State,
+}
+
+enum State {
+    Unstarted(Box<Start>),
+    Started(Ticket),
+    Finished,
+}
+
+enum Start {
+    Request(Request),
+    Timer(Duration),
+}
+
+impl Pending {
+    pub(super) fn request(network: Network, request: Request) -> Self {
+        Self { network, state: State::Unstarted(Box::new(Start::Request(request))) }
+    }
+
+    pub(super) fn timer(network: Network, duration: Duration) -> Self {
+        Self { network, state: State::Unstarted(Box::new(Start::Timer(duration))) }
+    }
+}
+
+impl Future for Pending {
+    type Output = Outcome;
+
+    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Outcome> {
+        match core::mem::replace(&mut self.state, State::Finished) {
+            State::Unstarted(start) => {
+                let ticket = self.network.lock().start(context);
+                self.state = State::Started(ticket);
+                self.network.submit(match *start {
+                    Start::Request(request) => Command::Request(ticket, request),
+                    Start::Timer(duration) => Command::Timer(ticket, duration),
+                });
+                Poll::Pending
+            }
+            State::Started(ticket) => {
+                let outcome = self.network.lock().poll_slot(ticket, context);
+                if outcome.is_pending() {
+                    self.state = State::Started(ticket);
+                }
+                outcome
+            }
+            // Polled after it had finished: nothing more will come.
+            State::Finished => Poll::Pending,
+        }
+    }
+}
+
+impl Drop for Pending {
+    fn drop(&mut self) {
+        if let State::Started(ticket) = self.state {
+            self.network.lock().slots.remove(&ticket);
+            self.network.submit(Command::Cancel(ticket));
+        }
+    }
+}
+
+impl super::Shared {
+    fn start(&mut self, context: &mut Context<'_>) -> Ticket {
+        let ticket = self.core.ticket();
+        self.slots.insert(ticket, Slot::Waiting(context.waker().clone()));
+        ticket
+    }
+
+    fn poll_slot(&mut self, ticket: Ticket, context: &mut Context<'_>) -> Poll<Outcome> {
+        match self.slots.remove(&ticket) {
+            Some(Slot::Done(outcome)) => Poll::Ready(outcome),
+            _ => {
+                self.slots.insert(ticket, Slot::Waiting(context.waker().clone()));
+                Poll::Pending
+            }
+        }
+    }
+}
+
+/// Ends when its time has passed on the bus. See [`Network::sleep`].
+#[must_use = "futures do nothing unless awaited"]
+pub struct Sleep(Pending);
+
+impl Sleep {
+    pub(super) fn new(network: Network, duration: Duration) -> Self {
+        Self(Pending::timer(network, duration))
+    }
+}
+
+impl Future for Sleep {
+    type Output = ();
+
+    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
+        Pin::new(&mut self.0).poll(context).map(|_| ())
+    }
+}
+
+impl fmt::Debug for Sleep {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Sleep").finish_non_exhaustive()
+    }
+}
+
+/// Waits until a condition on a node's facts holds: `Ok` with its value, `Err` when the time is over.
+/// See [`super::Node::wait`].
+#[must_use = "futures do nothing unless awaited"]
+pub struct Wait<F> {
+    network: Network,
+    node: NodeId,
+    condition: F,
+    ticket: Ticket,
+    timer: Pending,
+}
+
+impl<F> Wait<F> {
+    pub(super) fn new(network: Network, node: NodeId, condition: F, timeout: Duration) -> Self {
+        let ticket = network.lock().core.ticket();
+        let timer = Pending::timer(network.clone(), timeout);
+        Self { network, node, condition, ticket, timer }
+    }
+}
+
+/// The time given to a [`Wait`] is over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Elapsed;
+
+impl<T, F: FnMut(&NodeFacts) -> Option<T> + Unpin> Future for Wait<F> {
+    type Output = Result<T, Elapsed>;
+
+    fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
+        let this = self.get_mut();
+        {
+            let mut shared = this.network.lock();
+            if let Some(value) = (this.condition)(shared.core.facts(this.node)) {
+                return Poll::Ready(Ok(value));
+            }
+            let waker = context.waker().clone();
+            shared.watchers.retain(|watcher| watcher.ticket != this.ticket);
+            shared.watchers.push(Watcher { node: this.node, ticket: this.ticket, waker });
+        }
+        Pin::new(&mut this.timer).poll(context).map(|_| Err(Elapsed))
+    }
+}
+
+impl<F> Drop for Wait<F> {
+    fn drop(&mut self) {
+        self.network.lock().watchers.retain(|watcher| watcher.ticket != self.ticket);
+    }
+}
+
+impl<F> fmt::Debug for Wait<F> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Wait").field("node", &self.node).finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,243 @@
+//! The async face of the master: a shared handle that hands out futures.
+//!
+//! [`Network`] is a cheap clone over one [`Core`] and is itself a [`Station`]: the clone that a runner holds brings
+//! frames and time, the others ask and wait. Futures wait for facts in the core, never for a runtime's timer;
+//! sleeping is a deadline in the core. Nothing here knows the time: what is asked for is queued and carried out at
+//! the runner's next call, for which [`poll_timeout`](Station::poll_timeout) asks at once.
+
+mod future;
+mod join;
+mod node;
+
+use std::collections::{HashMap, VecDeque};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, Waker};
+use std::time::Duration;
+
+use can::{Frame, Instant, Station};
+use canopen::nmt::NmtTarget;
+use canopen::{Mux, NmtCommand, NodeId};
+
+use crate::core::{Command, Core, Event, NodeFacts, NodeSet, Outcome, Received, Ticket};
+
+pub use future::{Sleep, Wait};
+pub use join::join_all;
+pub use node::{DEFAULT_TIMEOUT, Node};
+
+/// A CANopen network as its master sees it. See the [module](self).
+#[derive(Clone, Debug, Default)]
+pub struct Network {
+    shared: Arc<Mutex<Shared>>,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    core: Core,
+    /// Commands that wait to be told the time.
+    inbox: VecDeque<Command>,
+    slots: HashMap<Ticket, Slot>,
+    watchers: Vec<Watcher>,
+    /// Woken whenever a command comes into the inbox.
+    on_activity: Option<Waker>,
+    /// Woken once by the next command that comes into the inbox.
+    activity: Option<Waker>,
+    /// What this program has set in motion.
+    moved: NodeSet,
+}
+
+/// What a future waits for.
+#[derive(Debug)]
+enum Slot {
+    Waiting(Waker),
+    Done(Outcome),
+}
+
+/// A future that wants to look again when a node's facts change.
+#[derive(Debug)]
+struct Watcher {
+    node: NodeId,
+    ticket: Ticket,
+    waker: Waker,
+}
+
+impl Network {
+    /// A network of which nothing is known yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// A handle on one node.
+    pub fn node(&self, id: NodeId) -> Node {
+        Node::new(self.clone(), id)
+    }
+
+    /// Waits this long, in the time of the bus.
+    pub fn sleep(&self, duration: Duration) -> Sleep {
+        Sleep::new(self.clone(), duration)
+    }
+
+    /// Produces SYNC with this period, or stops.
+    pub fn sync(&self, period: Option<Duration>) {
+        self.submit(Command::Sync(period));
+    }
+
+    /// Sends an NMT command to every node.
+    pub fn nmt_all(&self, command: NmtCommand) {
+        self.submit(Command::Nmt(NmtTarget::All, command));
+    }
+
+    /// Sends a frame as it is.
+    pub fn transmit(&self, frame: Frame) {
+        self.submit(Command::Transmit(frame));
+    }
+
+    /// The next event for people, with its time.
+    pub fn poll_event(&self) -> Option<(Instant, Event)> {
+        self.lock().core.poll_event()
+    }
+
+    /// What has been seen of a node.
+    pub fn facts(&self, node: NodeId) -> NodeFacts {
+        self.lock().core.facts(node).clone()
+    }
+
+    /// The nodes of which any frame has been seen.
+    pub fn seen(&self) -> NodeSet {
+        let shared = self.lock();
+        NodeId::all().filter(|node| shared.core.facts(*node).seen_at.is_some()).collect()
+    }
+
+    /// The newest value of an object that a node sends by PDO.
+    pub fn received(&self, node: NodeId, mux: Mux) -> Option<Received> {
+        self.lock().core.image().value(node, mux)
+    }
+
+    /// The latest time that the runner has told.
+    pub fn now(&self) -> Instant {
+        self.lock().core.now()
+    }
+
+    /// Looks into the core, or changes mappings and values to send. The runner is told to come and fetch frames.
+    pub fn with_core<T>(&self, look: impl FnOnce(&mut Core) -> T) -> T {
+        let mut shared = self.lock();
+        let result = look(&mut shared.core);
+        let wakers = shared.activity_wakers();
+        drop(shared);
+        wakers.wake();
+        result
+    }
+
+    /// Wakes `waker` each time that a command is queued, until another one is given. For a runner that sleeps.
+    pub fn on_activity(&self, waker: Waker) {
+        self.lock().on_activity = Some(waker);
+    }
+
+    /// Ready when a command waits for the runner to call [`handle_timeout`](Station::handle_timeout).
+    pub fn poll_activity(&self, context: &mut Context<'_>) -> Poll<()> {
+        let mut shared = self.lock();
+        if shared.inbox.is_empty() && !shared.core.wants_transmit() {
+            shared.activity = Some(context.waker().clone());
+            return Poll::Pending;
+        }
+        Poll::Ready(())
+    }
+
+    /// Notes that this program has set a node in motion.
+    pub fn note_moved(&self, node: NodeId) {
+        self.lock().moved.insert(node);
+    }
+
+    /// Notes that a node stands still again.
+    pub fn note_stopped(&self, node: NodeId) {
+        self.lock().moved.remove(node);
+    }
+
+    /// The nodes that this program has set in motion and not stopped again.
+    pub fn moved(&self) -> NodeSet {
+        self.lock().moved
+    }
+
+    pub(crate) fn submit(&self, command: Command) {
+        let mut shared = self.lock();
+        shared.inbox.push_back(command);
+        let wakers = shared.activity_wakers();
+        drop(shared);
+        wakers.wake();
+    }
+
+    /// Calls the core at `now`, waiting commands first, and wakes whoever waited for what came of it.
+    fn run(&self, now: Instant, call: impl FnOnce(&mut Core)) {
+        let mut shared = self.lock();
+        while let Some(command) = shared.inbox.pop_front() {
+            shared.core.execute(command, now);
+        }
+        call(&mut shared.core);
+        let wakers = shared.collect();
+        drop(shared);
+        wakers.into_iter().for_each(Waker::wake);
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Shared> {
+        // A panic elsewhere leaves the core whole: every call finishes its own step.
+        self.shared.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Shared {
+    /// Hands outcomes to their slots. The wakers are for after the lock.
+    fn collect(&mut self) -> Vec<Waker> {
+        let mut wakers = Vec::new();
+        while let Some(finished) = self.core.poll_finished() {
+            // No slot: the future has been dropped.
+            let Some(slot) = self.slots.get_mut(&finished.ticket) else { continue };
+            if let Slot::Waiting(waker) = core::mem::replace(slot, Slot::Done(finished.outcome)) {
+                wakers.push(waker);
+            }
+        }
+        let changed = self.core.take_changed();
+        if !changed.is_empty() {
+            let due = self.watchers.extract_if(.., |watcher| changed.contains(watcher.node));
+            wakers.extend(due.map(|watcher| watcher.waker));
+        }
+        wakers
+    }
+
+    fn activity_wakers(&mut self) -> ActivityWakers {
+        ActivityWakers { lasting: self.on_activity.clone(), once: self.activity.take() }
+    }
+}
+
+/// Whom a new command wakes; kept apart so that it happens after the lock.
+struct ActivityWakers {
+    lasting: Option<Waker>,
+    once: Option<Waker>,
+}
+
+impl ActivityWakers {
+    fn wake(self) {
+        [self.lasting, self.once].into_iter().flatten().for_each(Waker::wake);
+    }
+}
+
+impl Station for Network {
+    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
+        self.run(now, |core| core.handle_frame(frame, now));
+    }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        self.run(now, |core| core.handle_timeout(now));
+    }
+
+    fn poll_transmit(&mut self) -> Option<Frame> {
+        self.lock().core.poll_transmit()
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        let shared = self.lock();
+        if shared.inbox.is_empty() { shared.core.poll_timeout() } else { Some(shared.core.now()) }
+    }
+
+    fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
+        self.run(now, |core| core.handle_transmitted(frame, now));
+    }
+}

@@ -1,0 +1,161 @@
+use std::time::Duration;
+
+use canopen::nmt::NmtTarget;
+use canopen::od::Scalar;
+use canopen::{Mux, NmtCommand, NodeId};
+
+use super::future::{Elapsed, Pending};
+use super::{Network, Wait};
+use crate::core::{Command, Failure, NodeFacts, Payload, Request, Transfer};
+use crate::error::{Access, Error, Hints};
+
+/// How long an SDO answer is waited for. Drives answer within milliseconds; a loaded bus at 100 kbit/s may add
+/// some tens more.
+pub const DEFAULT_TIMEOUT: Duration = Duration::from_millis(500);
+
+/// A handle on one node of a [`Network`]: SDO client, NMT, and waiting for what it does.
+#[derive(Clone, Debug)]
+pub struct Node {
+    network: Network,
+    id: NodeId,
+    timeout: Duration,
+}
+
+impl Node {
+    pub(super) const fn new(network: Network, id: NodeId) -> Self {
+        Self { network, id, timeout: DEFAULT_TIMEOUT }
+    }
+
+    /// The same node with another longest wait for each SDO answer.
+    #[must_use]
+    pub const fn with_timeout(mut self, timeout: Duration) -> Self {
+        self.timeout = timeout;
+        self
+    }
+
+    /// Its node-ID.
+    pub const fn id(&self) -> NodeId {
+        self.id
+    }
+
+    /// The network it is in.
+    pub const fn network(&self) -> &Network {
+        &self.network
+    }
+
+    /// What has been seen of it.
+    pub fn facts(&self) -> NodeFacts {
+        self.network.facts(self.id)
+    }
+
+    /// SDO upload: the bytes of an object, as they came.
+    ///
+    /// # Errors
+    /// [`Error::NoAnswer`], [`Error::Aborted`], [`Error::BadAnswer`] or [`Error::QueueFull`].
+    pub async fn upload(&self, mux: Mux) -> Result<Payload, Error> {
+        self.transfer(mux, Transfer::Upload).await
+    }
+
+    /// SDO download: writes these bytes to an object.
+    ///
+    /// # Errors
+    /// As [`upload`](Self::upload).
+    pub async fn download(&self, mux: Mux, data: &[u8]) -> Result<(), Error> {
+        self.transfer(mux, Transfer::Download(Payload::new(data))).await.map(|_| ())
+    }
+
+    /// Reads a number.
+    ///
+    /// # Errors
+    /// As [`upload`](Self::upload); [`Error::WrongLength`] when the object is not as long as a `T`.
+    pub async fn read<T: Scalar>(&self, mux: Mux) -> Result<T, Error> {
+        let payload = self.upload(mux).await?;
+        let (expected, received) = (T::DATA_TYPE.size(), payload.as_bytes().len());
+        if expected == received {
+            Ok(T::from_raw(payload.raw()))
+        } else {
+            Err(Error::WrongLength { node: self.id, mux, expected, received })
+        }
+    }
+
+    /// Writes a number with the length of its type.
+    ///
+    /// # Errors
+    /// As [`upload`](Self::upload).
+    pub async fn write<T: Scalar>(&self, mux: Mux, value: T) -> Result<(), Error> {
+        self.download(mux, &value.to_raw().to_le_bytes()[..T::DATA_TYPE.size()]).await
+    }
+
+    /// Sends it an NMT command.
+    pub fn nmt(&self, command: NmtCommand) {
+        self.network.submit(Command::Nmt(NmtTarget::Node(self.id), command));
+    }
+
+    /// Expects a heartbeat of it at least this often, from the first one on; `None` ends the watch.
+    pub fn watch_heartbeat(&self, time: Option<Duration>) {
+        self.network.submit(Command::WatchHeartbeat(self.id, time));
+    }
+
+    /// Waits for its next boot-up message, counted from this call.
+    ///
+    /// # Errors
+    /// [`Error::NoBootUp`] with what has been seen of the node instead.
+    pub fn wait_boot_up(&self, timeout: Duration) -> impl Future<Output = Result<(), Error>> + use<> {
+        let before = self.facts().boot_up.map_or(0, |(_, count)| count);
+        let booted = move |facts: &NodeFacts| facts.boot_up.filter(|(_, count)| *count > before).map(|_| ());
+        let wait = self.wait(booted, timeout);
+        let node = self.clone();
+        async move {
+            wait.await.map_err(|Elapsed| Error::NoBootUp { node: node.id, waited: timeout, hints: node.hints(false) })
+        }
+    }
+
+    /// Resets it (NMT reset node) and waits for its boot-up message.
+    ///
+    /// # Errors
+    /// [`Error::NoBootUp`].
+    pub async fn reset(&self, timeout: Duration) -> Result<(), Error> {
+        let booted = self.wait_boot_up(timeout);
+        self.nmt(NmtCommand::ResetNode);
+        booted.await
+    }
+
+    /// Waits until `condition` gives a value, looking whenever something is heard of the node.
+    pub fn wait<T, F>(&self, condition: F, timeout: Duration) -> Wait<F>
+    where
+        F: FnMut(&NodeFacts) -> Option<T> + Unpin,
+    {
+        Wait::new(self.network.clone(), self.id, condition, timeout)
+    }
+
+    async fn transfer(&self, mux: Mux, transfer: Transfer) -> Result<Payload, Error> {
+        let access = if transfer == Transfer::Upload { Access::Read } else { Access::Write };
+        let request = Request { node: self.id, mux, transfer, timeout: self.timeout };
+        let outcome = Pending::request(self.network.clone(), request).await;
+        outcome.map_err(|failure| self.error(mux, access, failure))
+    }
+
+    fn error(&self, mux: Mux, access: Access, failure: Failure) -> Error {
+        let node = self.id;
+        match failure {
+            Failure::NoAnswer { waited, unsent } => {
+                Error::NoAnswer { node, mux, access, waited, hints: self.hints(unsent) }
+            }
+            Failure::Aborted(code) => Error::Aborted { node, mux, access, code },
+            Failure::BadAnswer(why) => Error::BadAnswer { node, mux, access, why },
+            Failure::QueueFull => Error::QueueFull { node },
+        }
+    }
+
+    /// What may explain its silence.
+    pub(crate) fn hints(&self, unsent: bool) -> Hints {
+        let shared = self.network.lock();
+        let facts = shared.core.facts(self.id);
+        Hints {
+            unsent,
+            nmt_state: facts.nmt_state,
+            silent_for: facts.seen_at.map(|at| shared.core.now() - at),
+            others: NodeId::all().any(|other| other != self.id && shared.core.facts(other).seen_at.is_some()),
+        }
+    }
+}

@@ -1,0 +1,350 @@
+//! Physical units as people type them, and the one place where they are converted.
+//!
+//! In: texts like `60rpm`, `90deg`, `0.5turn`, `32000`, `1.5A`, `500ms`. Out: newtypes whose name is their unit.
+//! A drive's own raw units are not known here: see [`crate::drive::Scale`]. Source of the SI symbols: BIPM
+//! brochure; `r/min` and `rpm` are one unit.
+
+use core::f64::consts::TAU;
+use core::fmt;
+use core::str::FromStr;
+use std::time::Duration;
+
+/// Speed of rotation in revolutions per minute.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+pub struct Rpm(pub f64);
+
+/// Speed of rotation in radians per second.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+pub struct RadiansPerSecond(pub f64);
+
+/// Angle in degrees.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+pub struct Degrees(pub f64);
+
+/// Angle in revolutions.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+pub struct Turns(pub f64);
+
+/// Angle in the drive's own position counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Counts(pub i64);
+
+/// Electric current in amperes.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+pub struct Amperes(pub f64);
+
+/// Voltage in volts.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+pub struct Volts(pub f64);
+
+/// Temperature in degrees Celsius.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+pub struct Celsius(pub f64);
+
+/// An angle as somebody gave it: in counts, which are exact, or in turns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Angle {
+    /// The drive's own counts.
+    Counts(i64),
+    /// Revolutions of the output shaft.
+    Turns(f64),
+}
+
+/// How fast a speed may change: a rate, or the time that one change may take.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Ramp {
+    /// (r/min)/s.
+    RpmPerSecond(f64),
+    /// Time from the present speed to the wanted one.
+    Time(Duration),
+}
+
+impl From<RadiansPerSecond> for Rpm {
+    fn from(speed: RadiansPerSecond) -> Self {
+        Self(speed.0 / TAU * 60.0)
+    }
+}
+
+impl From<Rpm> for RadiansPerSecond {
+    fn from(speed: Rpm) -> Self {
+        Self(speed.0 / 60.0 * TAU)
+    }
+}
+
+impl From<Degrees> for Angle {
+    fn from(angle: Degrees) -> Self {
+        Self::Turns(angle.0 / 360.0)
+    }
+}
+
+impl From<Turns> for Angle {
+    fn from(angle: Turns) -> Self {
+        Self::Turns(angle.0)
+    }
+}
+
+impl From<Counts> for Angle {
+    fn from(angle: Counts) -> Self {
+        Self::Counts(angle.0)
+    }
+}
+
+/// A text that is not the quantity it should be.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ParseUnitError {
+    /// No number at the start.
+    #[error("\"{text}\" does not begin with a number; expected {expected}")]
+    NoNumber {
+        /// What was given.
+        text: String,
+        /// What would have been right.
+        expected: &'static str,
+    },
+    /// A number without a unit where the unit cannot be guessed.
+    #[error("\"{text}\" has no unit; expected {expected}")]
+    NoUnit {
+        /// What was given.
+        text: String,
+        /// What would have been right.
+        expected: &'static str,
+    },
+    /// The unit is unknown or of another quantity.
+    #[error("\"{unit}\" in \"{text}\" is not a unit of this quantity; expected {expected}")]
+    WrongUnit {
+        /// What was given.
+        text: String,
+        /// The part after the number.
+        unit: String,
+        /// What would have been right.
+        expected: &'static str,
+    },
+    /// Counts with a fraction, a negative time, or a number that is not finite.
+    #[error("\"{text}\" is out of range: {why}")]
+    OutOfRange {
+        /// What was given.
+        text: String,
+        /// Which rule it breaks.
+        why: &'static str,
+    },
+}
+
+const SPEED: &str = "a speed such as 60rpm, 6.28rad/s, 360deg/s or 1turn/s (a bare number is r/min)";
+const ANGLE: &str = "an angle such as 90deg, 0.5turn, 1.57rad or 32000 (a bare number is counts)";
+const CURRENT: &str = "a current such as 1.5A or 1500mA";
+const RAMP: &str = "a ramp such as 500ms, 0.5s, 120rpm/s or 12.6rad/s2";
+const TIME: &str = "a time such as 500ms or 2s";
+
+impl FromStr for Rpm {
+    type Err = ParseUnitError;
+
+    fn from_str(text: &str) -> Result<Self, ParseUnitError> {
+        let (number, unit) = split(text, SPEED)?;
+        Ok(match unit {
+            "" | "rpm" | "r/min" | "1/min" => Self(number),
+            "rad/s" => RadiansPerSecond(number).into(),
+            "deg/s" | "°/s" => Self(number / 6.0),
+            "turn/s" | "turns/s" | "rps" | "r/s" => Self(number * 60.0),
+            _ => return Err(wrong_unit(text, unit, SPEED)),
+        })
+    }
+}
+
+impl FromStr for Angle {
+    type Err = ParseUnitError;
+
+    fn from_str(text: &str) -> Result<Self, ParseUnitError> {
+        let (number, unit) = split(text, ANGLE)?;
+        Ok(match unit {
+            "" | "counts" | "count" | "inc" => {
+                if number.fract() != 0.0 || number.abs() > i64::from(u32::MAX) as f64 {
+                    return Err(out_of_range(text, "counts are whole numbers of at most 32 bits"));
+                }
+                Self::Counts(number as i64)
+            }
+            "deg" | "°" => Degrees(number).into(),
+            "turn" | "turns" | "rev" | "r" => Self::Turns(number),
+            "rad" => Self::Turns(number / TAU),
+            _ => return Err(wrong_unit(text, unit, ANGLE)),
+        })
+    }
+}
+
+impl FromStr for Amperes {
+    type Err = ParseUnitError;
+
+    fn from_str(text: &str) -> Result<Self, ParseUnitError> {
+        let (number, unit) = split(text, CURRENT)?;
+        match unit {
+            "A" | "a" => Ok(Self(number)),
+            "mA" | "ma" => Ok(Self(number / 1000.0)),
+            "" => Err(ParseUnitError::NoUnit { text: text.to_owned(), expected: CURRENT }),
+            _ => Err(wrong_unit(text, unit, CURRENT)),
+        }
+    }
+}
+
+impl FromStr for Ramp {
+    type Err = ParseUnitError;
+
+    fn from_str(text: &str) -> Result<Self, ParseUnitError> {
+        let (number, unit) = split(text, RAMP)?;
+        if number < 0.0 {
+            return Err(out_of_range(text, "a ramp has no sign"));
+        }
+        match unit {
+            "ms" | "s" => parse_duration(text).map(Self::Time),
+            "rpm/s" | "r/min/s" => Ok(Self::RpmPerSecond(number)),
+            "rad/s2" | "rad/s²" | "rad/s^2" => Ok(Self::RpmPerSecond(Rpm::from(RadiansPerSecond(number)).0)),
+            "" => Err(ParseUnitError::NoUnit { text: text.to_owned(), expected: RAMP }),
+            _ => Err(wrong_unit(text, unit, RAMP)),
+        }
+    }
+}
+
+/// A duration such as `500ms` or `2s`.
+///
+/// # Errors
+/// [`ParseUnitError`] when it is none, negative, or longer than a year.
+pub fn parse_duration(text: &str) -> Result<Duration, ParseUnitError> {
+    let (number, unit) = split(text, TIME)?;
+    let seconds = match unit {
+        "us" | "µs" => number * 1e-6,
+        "ms" => number * 1e-3,
+        "s" => number,
+        "min" => number * 60.0,
+        "" => return Err(ParseUnitError::NoUnit { text: text.to_owned(), expected: TIME }),
+        _ => return Err(wrong_unit(text, unit, TIME)),
+    };
+    if !(0.0..=31_536_000.0).contains(&seconds) {
+        return Err(out_of_range(text, "a time is between 0 and a year"));
+    }
+    Ok(Duration::from_secs_f64(seconds))
+}
+
+/// Number and unit of `text`; blanks between them are allowed.
+fn split<'a>(text: &'a str, expected: &'static str) -> Result<(f64, &'a str), ParseUnitError> {
+    let trimmed = text.trim();
+    let end = number_end(trimmed.as_bytes());
+    let (number, unit) = trimmed.split_at(end);
+    let number: f64 = number.parse().map_err(|_| ParseUnitError::NoNumber { text: text.to_owned(), expected })?;
+    if !number.is_finite() {
+        return Err(out_of_range(text, "the number is too large"));
+    }
+    Ok((number, unit.trim_start()))
+}
+
+/// Where a decimal number with optional sign, fraction and exponent ends.
+fn number_end(text: &[u8]) -> usize {
+    let digits = |from: usize| text[from..].iter().take_while(|byte| byte.is_ascii_digit()).count();
+    let mut end = usize::from(matches!(text.first(), Some(b'+' | b'-')));
+    end += digits(end);
+    if text.get(end) == Some(&b'.') {
+        end += 1 + digits(end + 1);
+    }
+    if let Some(b'e' | b'E') = text.get(end) {
+        let sign = usize::from(matches!(text.get(end + 1), Some(b'+' | b'-')));
+        let exponent = digits((end + 1 + sign).min(text.len()));
+        if exponent > 0 {
+            end += 1 + sign + exponent;
+        }
+    }
+    end
+}
+
+fn wrong_unit(text: &str, unit: &str, expected: &'static str) -> ParseUnitError {
+    ParseUnitError::WrongUnit { text: text.to_owned(), unit: unit.to_owned(), expected }
+}
+
+fn out_of_range(text: &str, why: &'static str) -> ParseUnitError {
+    ParseUnitError::OutOfRange { text: text.to_owned(), why }
+}
+
+macro_rules! display {
+    ($($unit:ty => $form:literal;)*) => {$(
+        impl fmt::Display for $unit {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write!(f, $form, self.0)
+            }
+        }
+    )*};
+}
+
+display! {
+    Rpm => "{:.1} r/min";
+    RadiansPerSecond => "{:.3} rad/s";
+    Degrees => "{:.2}°";
+    Turns => "{:.4} turns";
+    Counts => "{} counts";
+    Amperes => "{:.2} A";
+    Volts => "{:.2} V";
+    Celsius => "{:.1} °C";
+}
+
+impl fmt::Display for Angle {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Counts(counts) => Counts(counts).fmt(f),
+            Self::Turns(turns) => Degrees(turns * 360.0).fmt(f),
+        }
+    }
+}
+
+impl fmt::Display for Ramp {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::RpmPerSecond(rate) => write!(f, "{rate:.1} r/min/s"),
+            Self::Time(time) => write!(f, "{} ms", time.as_millis()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn speeds_in_every_unit_mean_the_same() {
+        for text in ["60rpm", "60 r/min", "60", "360deg/s", "1turn/s", "6.283185307179586rad/s", "6e1rpm", "+60.0rpm"] {
+            let Rpm(speed) = text.parse().unwrap();
+            assert!((speed - 60.0).abs() < 1e-9, "{text}: {speed}");
+        }
+        assert_eq!("-50rpm".parse(), Ok(Rpm(-50.0)));
+    }
+
+    #[test]
+    fn angles_keep_counts_exact_and_turn_the_rest_into_turns() {
+        assert_eq!("32000".parse(), Ok(Angle::Counts(32_000)));
+        assert_eq!("-32000 counts".parse(), Ok(Angle::Counts(-32_000)));
+        assert_eq!("90deg".parse(), Ok(Angle::Turns(0.25)));
+        assert_eq!("0.5turn".parse(), Ok(Angle::Turns(0.5)));
+        assert_eq!("0.5rev".parse(), Ok(Angle::Turns(0.5)));
+    }
+
+    #[test]
+    fn currents_want_their_unit() {
+        assert_eq!("1.5A".parse(), Ok(Amperes(1.5)));
+        assert_eq!("1500mA".parse(), Ok(Amperes(1.5)));
+        let error = "1500".parse::<Amperes>().unwrap_err();
+        assert_eq!(error.to_string(), "\"1500\" has no unit; expected a current such as 1.5A or 1500mA");
+    }
+
+    #[test]
+    fn ramps_are_times_or_rates() {
+        assert_eq!("500ms".parse(), Ok(Ramp::Time(Duration::from_millis(500))));
+        assert_eq!("0.5s".parse(), Ok(Ramp::Time(Duration::from_millis(500))));
+        assert_eq!("120rpm/s".parse(), Ok(Ramp::RpmPerSecond(120.0)));
+        assert!("-120rpm/s".parse::<Ramp>().is_err());
+    }
+
+    #[test]
+    fn what_is_wrong_is_said() {
+        let says = |text: &str| text.parse::<Angle>().unwrap_err().to_string();
+        assert!(says("deg").starts_with("\"deg\" does not begin with a number"));
+        assert!(says("90rpm").starts_with("\"rpm\" in \"90rpm\" is not a unit of this quantity"));
+        assert!(says("0.5").contains("whole numbers"));
+        assert!(says("1e999turn").contains("too large"));
+        for text in ["", " ", ".", "-", "e5", "--5deg", "nandeg", "infdeg", "5.e", "µ"] {
+            assert!(text.parse::<Angle>().is_err(), "{text:?}");
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! The decoder against datagrams of the ZLAC8030L quick start guide V1.00 and of CiA 301.
+
+use can::Frame;
+use canopen::NodeId;
+use master::core::{MappedObject, PdoMap};
+use master::decode::{Decoder, Direction};
+
+fn lines(decoder: &mut Decoder, frames: &[&str]) -> Vec<String> {
+    frames.iter().map(|text| decoder.decode(&text.parse::<Frame>().unwrap()).to_string()).collect()
+}
+
+#[test]
+fn single_frame_services_are_told_in_words() {
+    let shown = lines(
+        &mut Decoder::new(),
+        &["000#0104", "000#8000", "080#", "704#00", "704#05", "084#1021020000000000", "184#R4", "000#01", "6FF#01"],
+    );
+    assert_eq!(
+        shown,
+        [
+            "NMT start, node 4",
+            "NMT enter pre-operational, all nodes",
+            "SYNC",
+            "boot-up node 4",
+            "heartbeat node 4: operational",
+            "EMCY node 4: 2110h (current, CANopen device input side), error register 02h",
+            "remote request for TPDO0 of node 4",
+            "malformed NMT command",
+            "unknown",
+        ]
+    );
+}
+
+#[test]
+fn sdo_requests_and_answers_show_object_and_value() {
+    let shown = lines(
+        &mut Decoder::new(),
+        &["604#4041600000000000", "584#4B41600037020000", "604#2B4060000F000000", "584#6040600000000000"],
+    );
+    assert_eq!(
+        shown,
+        [
+            "SDO node 4: read 6041h:00",
+            "SDO node 4: 6041h:00 = 0237h (Operation enabled)",
+            "SDO node 4: write 6040h:00 = 000Fh (enable operation)",
+            "SDO node 4: done: write 6040h:00",
+        ]
+    );
+    let shown = lines(&mut Decoder::new(), &["604#4002650000000000", "584#8002650000000206"]);
+    assert_eq!(
+        shown[1],
+        "SDO node 4: the drive aborts 6502h:00: 0602 0000h (object does not exist in the object dictionary)"
+    );
+}
+
+#[test]
+fn segmented_transfers_are_put_together() {
+    let shown = lines(
+        &mut Decoder::new(),
+        &[
+            "602#4008100000000000",
+            "582#4108100009000000",
+            "602#6000000000000000",
+            "582#0046657272616E61",
+            "602#7000000000000000",
+            "582#1B74610000000000",
+        ],
+    );
+    assert_eq!(shown[1], "SDO node 2: segmented transfer of 1008h:00, 9 bytes");
+    assert_eq!(shown[5], "SDO node 2: 1008h:00 = \"Ferranata\"");
+}
+
+#[test]
+fn pdos_are_split_by_the_mapping_that_went_over_the_bus() {
+    let mut decoder = Decoder::new();
+    // Quick start guide 6.1: 606Ch into TPDO0.
+    let shown = lines(&mut decoder, &["184#01020304"]);
+    assert_eq!(shown, ["TPDO0 node 4: 01 02 03 04 (mapping not known)"]);
+    lines(
+        &mut decoder,
+        &[
+            "604#2F001A0000000000",
+            "584#60001A0000000000",
+            "604#23001A0120006C60",
+            "584#60001A0100000000",
+            "604#2F001A0001000000",
+            "584#60001A0000000000",
+        ],
+    );
+    assert_eq!(lines(&mut decoder, &["184#64000000"]), ["TPDO0 node 4: 606Ch:00 = 00000064h (100)"]);
+    assert_eq!(
+        lines(&mut decoder, &["184#6400"]),
+        ["TPDO0 node 4: (too short: 2 of 4 bytes, the receiver ignores it)"]
+    );
+}
+
+#[test]
+fn a_refused_mapping_changes_nothing() {
+    let mut decoder = Decoder::new();
+    let map = PdoMap(vec![MappedObject::from_record(0x6041_0010)]);
+    decoder.set_pdo(NodeId::new(4).unwrap(), Direction::Tpdo, 0, 0x184, &map);
+    lines(&mut decoder, &["604#2F001A0000000000", "584#80001A0022000008"]);
+    assert_eq!(lines(&mut decoder, &["184#3702"]), ["TPDO0 node 4: 6041h:00 = 0237h (Operation enabled)"]);
+}
+
+#[test]
+fn random_frames_never_panic() {
+    let mut decoder = Decoder::new();
+    let mut seed = 0x2545_F491_u32;
+    let mut next = move || {
+        seed ^= seed << 13;
+        seed ^= seed >> 17;
+        seed ^= seed << 5;
+        seed
+    };
+    for _ in 0..50_000 {
+        let data: Vec<u8> = (0..next() % 9).map(|_| next() as u8).collect();
+        // Mostly the SDO of one node, so that transfers come about.
+        let id = if next() % 4 == 0 { next() as u16 } else { [0x584, 0x604][next() as usize % 2] };
+        let _ = decoder.decode(&Frame::new(can::CanId::standard(id), &data)).to_string();
+    }
+}

@@ -1,0 +1,58 @@
+"""The list of checks, and how a check says what it expected."""
+
+import time
+from typing import Callable, NamedTuple
+
+CHECKS = []
+
+
+class Check(NamedTuple):
+    name: str
+    function: Callable
+
+
+class Skip(Exception):
+    """The check cannot run here; the text says why."""
+
+
+def check(name):
+    """Adds a function of a bench to the list, under a sentence."""
+
+    def add(function):
+        CHECKS.append(Check(name, function))
+        return function
+
+    return add
+
+
+def equal(actual, expected, what):
+    if actual != expected:
+        raise AssertionError(f"{what}: expected {shown(expected)}, got {shown(actual)}")
+
+
+def near(actual, expected, tolerance, what):
+    if abs(actual - expected) > tolerance:
+        raise AssertionError(f"{what}: expected {expected} within {tolerance}, got {actual}")
+
+
+def true(condition, what):
+    if not condition:
+        raise AssertionError(what)
+
+
+def eventually(function, accept, what, timeout_s=3.0):
+    """Calls `function` until `accept(value)` holds, and returns that value."""
+    end = time.monotonic() + timeout_s
+    while True:
+        value = function()
+        if accept(value):
+            return value
+        if time.monotonic() > end:
+            raise AssertionError(f"{what}: not within {timeout_s} s, last {shown(value)}")
+        time.sleep(0.01)
+
+
+def shown(value):
+    if isinstance(value, bool) or not isinstance(value, int):
+        return repr(value)
+    return f"{value} ({value:#x})"
