@@ -1,0 +1,58 @@
+//! The command line as a whole: what every command takes, and the list of commands.
+
+use std::time::Duration;
+
+use canopen::NodeId;
+use clap::{Parser, Subcommand};
+use transport::BusSpec;
+
+use crate::command::{completions, dump, nmt, objects, scan, sdo};
+use crate::models::DriveProfile;
+use crate::parse::drive_spec::node_model;
+
+/// CANopen motor drives, virtual and real: simulate them, look into them, move them.
+#[derive(Parser)]
+#[command(name = "ferrodrive", version, propagate_version = true, max_term_width = 100, arg_required_else_help = true)]
+#[command(after_help = "Without --bus everything happens on a virtual bus of its own, in virtual time:\n  \
+    ferrodrive demo\n  ferrodrive move 4 90deg\n  ferrodrive --bus can0 state 4")]
+pub(crate) struct Cli {
+    #[command(flatten)]
+    pub(crate) global: Global,
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+/// What every command takes.
+#[derive(Clone, clap::Args)]
+pub(crate) struct Global {
+    /// The bus: sim, sim:FILE.toml, can0, socketcand://HOST:PORT/can0, slcan:///dev/ttyACM0?bitrate=500k,
+    /// slcan://HOST:PORT, log:FILE
+    ///
+    /// `sim` is a virtual bus of this command alone, with factory-fresh drives, as fast as the machine goes.
+    #[arg(long, value_name = "BUS", env = "FERRODRIVE_BUS", default_value = "sim", global = true)]
+    pub(crate) bus: BusSpec,
+
+    /// Print JSON instead of text
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+
+    /// Which model a node is, where its identity cannot tell (e.g. 4=zlac8030l); may be repeated
+    #[arg(long = "model", value_name = "NODE=MODEL", value_parser = node_model, global = true)]
+    pub(crate) models: Vec<(NodeId, &'static DriveProfile)>,
+
+    /// Longest wait for each answer of a node
+    #[arg(long, value_name = "TIME", value_parser = master::units::parse_duration, default_value = "500ms", global = true)]
+    pub(crate) timeout: Duration,
+}
+
+/// All commands.
+#[derive(Subcommand)]
+pub(crate) enum Command {
+    Scan(scan::Scan),
+    Read(sdo::Read),
+    Write(sdo::Write),
+    Objects(objects::Objects),
+    Nmt(nmt::Nmt),
+    Dump(dump::Dump),
+    Completions(completions::Completions),
+}

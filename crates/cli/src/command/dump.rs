@@ -1,0 +1,153 @@
+//! `ferrodrive dump`: the bus in words, line by line, and into a candump log.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use can::{Frame, Instant};
+use master::decode::Decoder;
+use serde::Serialize;
+use sim::wire::WireEvent;
+use transport::log::LogWriter;
+use transport::{AnyBus, AsyncBus, BusError, BusSpec, WallClock};
+
+use crate::args::Global;
+use crate::embedded;
+use crate::failure::Failure;
+use crate::output::{Format, Report};
+use crate::paint::Paint;
+use crate::session::{bus_failure, interrupted, runtime};
+
+/// Show the bus decoded: SDO with object names and values, PDOs by their mapping, statuswords in words
+///
+/// Only listens. On a real bus it runs until Ctrl-C; on a log until its end; on an embedded virtual bus it shows how the
+/// drives boot. Object names need the model: --model NODE=MODEL.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  ferrodrive --bus can0 --model 4=zlac8030l dump\n  ferrodrive --bus can0 dump --log trace.log\n  \
+    ferrodrive --bus log:trace.log --model 4=zlac8030l dump"
+)]
+pub(crate) struct Dump {
+    /// Also write the frames to this file, in candump format
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
+    /// End after this time (default on an embedded virtual bus: 2s)
+    #[arg(long = "for", value_name = "TIME", value_parser = master::units::parse_duration)]
+    duration: Option<Duration>,
+}
+
+/// Shown of an embedded bus, on which nothing happens after the drives have booted.
+const EMBEDDED_DURATION: Duration = Duration::from_secs(2);
+
+/// A frame in words.
+#[derive(Debug, Serialize)]
+struct Line {
+    t: f64,
+    frame: String,
+    text: String,
+}
+
+impl Report for Line {
+    fn text(&self, paint: Paint) -> String {
+        format!("{} {:<20}  {}", paint.dim(&format!("({:.6})", self.t)), self.frame, self.text)
+    }
+}
+
+/// Where decoded lines and logged frames go.
+struct Sink {
+    decoder: Decoder,
+    format: Format,
+    log: Option<LogWriter<BufWriter<File>>>,
+    path: Option<PathBuf>,
+}
+
+impl Dump {
+    /// Shows frames until there are no more, the time is over, or Ctrl-C.
+    pub(crate) fn run(&self, global: &Global, format: Format) -> Result<(), Failure> {
+        let mut sink = Sink::new(global, format, self.log.as_deref())?;
+        match &global.bus {
+            BusSpec::Sim { file } => self.embedded(file.as_deref(), &mut sink)?,
+            _ => runtime()?.block_on(self.listen(global, &mut sink))?,
+        }
+        sink.finish()
+    }
+
+    fn embedded(&self, file: Option<&Path>, sink: &mut Sink) -> Result<(), Failure> {
+        let (mut world, drives) = embedded::world(file)?;
+        for (node, model) in drives {
+            sink.decoder.set_model(node, model.table);
+        }
+        world.log_mut().set_limit(usize::MAX);
+        // Somebody has to acknowledge what a single drive sends.
+        world.add_tap();
+        world.run_for(self.duration.unwrap_or(EMBEDDED_DURATION));
+        while let Some(event) = world.log_mut().pull() {
+            if let WireEvent::Frame { end, frame, .. } = event {
+                sink.take(end, &frame)?;
+            }
+        }
+        Ok(())
+    }
+
+    async fn listen(&self, global: &Global, sink: &mut Sink) -> Result<(), Failure> {
+        let clock = WallClock::start();
+        let mut bus = global.bus.open(&clock).await.map_err(|error| bus_failure(global, &error))?;
+        let end = self.duration.map(|duration| clock.now() + duration);
+        let over = async {
+            tokio::select! {
+                () = clock.sleep_until_due(end) => Ok(()),
+                () = interrupted() => Err(Failure::interrupted()),
+            }
+        };
+        tokio::select! {
+            result = follow(&mut bus, sink) => result?.map_or(Ok(()), |error| Err(bus_failure(global, &error))),
+            result = over => sink.flush().and(result),
+        }
+    }
+}
+
+/// Shows what comes; ends with the bus, with the reason unless it was a log that is over.
+async fn follow(bus: &mut AnyBus, sink: &mut Sink) -> Result<Option<BusError>, Failure> {
+    loop {
+        match bus.recv().await {
+            Ok((at, frame)) => sink.take(at, &frame)?,
+            Err(BusError::EndOfLog { .. }) => return Ok(None),
+            Err(error) => return Ok(Some(error)),
+        }
+    }
+}
+
+impl Sink {
+    fn new(global: &Global, format: Format, path: Option<&Path>) -> Result<Self, Failure> {
+        let mut decoder = Decoder::new();
+        for (node, model) in &global.models {
+            decoder.set_model(*node, model.table);
+        }
+        let log = path.map(File::create).transpose().map_err(|error| log_failure(path, &error))?;
+        let log = log.map(|file| LogWriter::new(BufWriter::new(file), "can0"));
+        Ok(Self { decoder, format, log, path: path.map(Into::into) })
+    }
+
+    fn take(&mut self, at: Instant, frame: &Frame) -> Result<(), Failure> {
+        if let Some(log) = &mut self.log {
+            log.write(at, frame).map_err(|error| log_failure(self.path.as_deref(), &error))?;
+        }
+        let text = self.decoder.decode(frame).to_string();
+        let line = Line { t: at.as_secs_f64(), frame: frame.to_string(), text };
+        self.format.print(&line).map_err(|error| Failure::new("cannot write to standard output").because(error))
+    }
+
+    fn flush(&mut self) -> Result<(), Failure> {
+        let Some(log) = &mut self.log else { return Ok(()) };
+        log.flush().map_err(|error| log_failure(self.path.as_deref(), &error))
+    }
+
+    fn finish(mut self) -> Result<(), Failure> {
+        self.flush()
+    }
+}
+
+fn log_failure(path: Option<&Path>, error: &std::io::Error) -> Failure {
+    Failure::new(format!("cannot write the log {}", path.unwrap_or(Path::new("")).display())).because(error)
+}

@@ -1,0 +1,187 @@
+//! `ferrodrive objects`: the object dictionary of a model, searchable.
+
+use canopen::NodeId;
+use canopen::od::{Default, Entry, PdoMapping};
+use serde::Serialize;
+
+use crate::failure::Failure;
+use crate::models::DriveProfile;
+use crate::output::Report;
+use crate::paint::Paint;
+use crate::parse::drive_spec::model;
+use crate::parse::node::node;
+use crate::parse::object::{ObjectArg, object};
+use crate::table::Table;
+
+/// List the object dictionary of a model or of a node
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  ferrodrive objects zlac8030l\n  ferrodrive objects 4 velocity\n  ferrodrive objects zlac8030l 2026"
+)]
+pub(crate) struct Objects {
+    /// Model (e.g. zlac8030l) or node-ID
+    #[arg(value_name = "MODEL|NODE", value_parser = whose)]
+    pub(crate) whose: Whose,
+    /// Only objects with this index, or with this word in name, title or meaning
+    search: Vec<String>,
+}
+
+/// Whose dictionary.
+#[derive(Clone, Copy)]
+pub(crate) enum Whose {
+    /// A model's.
+    Model(&'static DriveProfile),
+    /// That of a node, whose model is to be found out.
+    Node(NodeId),
+}
+
+fn whose(text: &str) -> Result<Whose, String> {
+    if text.starts_with(|first: char| first.is_ascii_digit() || first == '-') {
+        return node(text).map(Whose::Node);
+    }
+    model(text).map(Whose::Model)
+}
+
+/// The rows found.
+#[derive(Debug, Serialize)]
+pub(crate) struct ObjectList {
+    model: &'static str,
+    title: String,
+    objects: Vec<Row>,
+}
+
+#[derive(Debug, Serialize)]
+struct Row {
+    object: String,
+    name: &'static str,
+    title: &'static str,
+    data_type: &'static str,
+    access: &'static str,
+    stored: bool,
+    mappable: bool,
+    default: String,
+    limits: Option<(i64, i64)>,
+    unit: &'static str,
+    values: Vec<Meaning>,
+}
+
+#[derive(Debug, Serialize)]
+struct Meaning {
+    value: i64,
+    meaning: &'static str,
+}
+
+impl Objects {
+    /// Searches the table of `model`.
+    pub(crate) fn list(&self, model: &'static DriveProfile) -> Result<ObjectList, Failure> {
+        let rows = model.table.rows();
+        let wanted = |row: &&Entry| self.search.iter().all(|word| matches(row, word));
+        let objects: Vec<Row> = rows.iter().filter(wanted).map(Row::new).collect();
+        if objects.is_empty() {
+            let words = self.search.join(" ");
+            return Err(Failure::new(format!("no object of the {} matches '{words}'", model.model)).next(format!(
+                "ferrodrive objects {} lists all {}",
+                model.model,
+                rows.len()
+            )));
+        }
+        Ok(ObjectList {
+            model: model.model,
+            title: format!("{}, object dictionary of \"{}\"", model.title, model.manual),
+            objects,
+        })
+    }
+}
+
+fn matches(row: &Entry, word: &str) -> bool {
+    if let Ok(ObjectArg::Mux(mux)) = object(word)
+        && mux.index == row.index
+        && (!word.contains(':') || mux.sub_index == row.sub_index)
+    {
+        return true;
+    }
+    let word = word.to_lowercase();
+    let texts = [row.name, row.title].into_iter().chain(row.values.iter().map(|(_, meaning)| *meaning));
+    texts.into_iter().any(|text| text.to_lowercase().contains(&word))
+}
+
+impl Row {
+    fn new(row: &Entry) -> Self {
+        Self {
+            object: row.mux().to_string(),
+            name: row.name,
+            title: row.title,
+            data_type: row.data_type.name(),
+            access: row.access.name(),
+            stored: row.stored,
+            mappable: row.pdo == PdoMapping::Yes,
+            default: default(row),
+            limits: row.limits,
+            unit: row.unit,
+            values: row.values.iter().map(|(value, meaning)| Meaning { value: *value, meaning }).collect(),
+        }
+    }
+
+    fn accepts(&self) -> String {
+        if self.values.is_empty() {
+            return self.limits.map(|(low, high)| format!("{low} to {high}")).unwrap_or_default();
+        }
+        let listed = self.values.iter().map(|row| format!("{} {}", row.value, row.meaning));
+        listed.collect::<Vec<_>>().join("; ")
+    }
+
+    fn rights(&self) -> String {
+        let stored = if self.stored { "/s" } else { "" };
+        let mappable = if self.mappable { " pdo" } else { "" };
+        format!("{}{stored}{mappable}", self.access)
+    }
+}
+
+fn default(row: &Entry) -> String {
+    match row.default {
+        Default::Value(value) if row.index < 0x2000 && value > 255 => format!("0x{value:X}"),
+        Default::Value(value) => value.to_string(),
+        Default::NodeIdPlus(base) => format!("0x{base:X} + node-ID"),
+        Default::Text(text) => format!("{text:?}"),
+    }
+}
+
+impl Report for ObjectList {
+    fn text(&self, paint: Paint) -> String {
+        let mut table = Table::new(&["object", "name", "type", "access", "default", "unit", "accepts"]);
+        for row in &self.objects {
+            table.row([
+                row.object.clone(),
+                row.name.into(),
+                row.data_type.into(),
+                row.rights(),
+                row.default.clone(),
+                row.unit.into(),
+                row.accepts(),
+            ]);
+        }
+        format!("{}\n\n{}", self.title, table.plain(paint))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::models::MODELS;
+
+    fn found(words: &[&str]) -> Vec<&'static str> {
+        let search = words.iter().map(|word| (*word).into()).collect();
+        let list = Objects { whose: Whose::Model(MODELS[0]), search }.list(MODELS[0]);
+        list.map(|list| list.objects.iter().map(|row| row.name).collect()).unwrap_or_default()
+    }
+
+    #[test]
+    fn objects_are_found_by_index_word_and_meaning() {
+        assert_eq!(found(&["6064"]), ["position_actual_value"]);
+        assert_eq!(found(&["2026:01"]), ["motor_temperature"]);
+        assert!(found(&["2026"]).len() == 3);
+        assert!(found(&["temperature", "threshold"]).contains(&"motor_temperature_threshold"));
+        assert!(found(&["profile torque"]).contains(&"modes_of_operation"));
+        assert!(found(&["zebra"]).is_empty());
+    }
+}

@@ -1,0 +1,151 @@
+//! Bytes of an object as people read them: number, unit, meaning.
+
+use canopen::od::{DataType, Entry};
+use cia402::{Controlword, Statusword};
+use serde::Serialize;
+
+use crate::paint::Paint;
+use crate::parse::unit::split_number;
+
+/// A decoded value.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Decoded {
+    /// The bytes as they came, hexadecimal, in the order of the wire.
+    pub(crate) bytes: String,
+    /// The object's number; `None` for a text or an unknown length.
+    pub(crate) value: Option<i64>,
+    /// A text object's text.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) string: Option<String>,
+    /// The number in its unit, where it has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) quantity: Option<f64>,
+    /// That unit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) unit: Option<&'static str>,
+    /// What the number means, where the object says so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) meaning: Option<String>,
+    #[serde(skip)]
+    decimals: usize,
+    #[serde(skip)]
+    hexadecimal: bool,
+}
+
+/// Decodes `bytes`, which came from the object of `row`, if that is known.
+pub(crate) fn decode(row: Option<&'static Entry>, bytes: &[u8]) -> Decoded {
+    let mut decoded = Decoded {
+        bytes: bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" "),
+        value: None,
+        string: None,
+        quantity: None,
+        unit: None,
+        meaning: None,
+        decimals: 0,
+        hexadecimal: true,
+    };
+    let raw = || bytes.iter().rev().fold(0u32, |raw, byte| raw << 8 | u32::from(*byte));
+    let Some(row) = row else {
+        decoded.value = (1..=4).contains(&bytes.len()).then(|| raw().into());
+        return decoded;
+    };
+    if row.data_type == DataType::VisibleString {
+        decoded.string = Some(String::from_utf8_lossy(bytes).trim_end_matches('\0').to_owned());
+    } else if bytes.len() == row.data_type.size() {
+        let value = row.data_type.value(raw());
+        decoded.value = Some(value);
+        decoded.meaning = meaning(row, value);
+        decoded.hexadecimal = is_bit_field(row);
+        decoded.measure(row.unit, value);
+    }
+    decoded
+}
+
+impl Decoded {
+    fn measure(&mut self, unit: &'static str, value: i64) {
+        if unit.is_empty() {
+            return;
+        }
+        let (factor, name) = split_number(unit).unwrap_or((1.0, unit));
+        self.quantity = Some(value as f64 * factor);
+        self.unit = Some(name);
+        self.decimals = (-factor.log10()).ceil().max(0.0) as usize;
+    }
+
+    /// One line.
+    pub(crate) fn text(&self, paint: Paint) -> String {
+        let number = match (self.value, self.quantity, self.unit, &self.string) {
+            (_, Some(quantity), Some(unit), _) => format!("{quantity:.*} {unit}", self.decimals),
+            (Some(value), ..) if self.hexadecimal => format!("0x{value:X}"),
+            (Some(value), ..) => value.to_string(),
+            (None, _, _, Some(string)) => format!("{string:?}"),
+            (None, ..) => format!("bytes {}", self.bytes),
+        };
+        let plain = match self.value {
+            Some(value) if self.hexadecimal => format!(" ({value})"),
+            Some(value) if self.quantity.is_some_and(|quantity| quantity != value as f64) => format!(" ({value})"),
+            _ => String::new(),
+        };
+        let meaning = self.meaning.as_ref().map(|meaning| format!("  {}", paint.strong(meaning))).unwrap_or_default();
+        format!("{number}{}{meaning}", paint.dim(&plain))
+    }
+}
+
+/// Values that are sets of bits or addresses read better in hexadecimal.
+fn is_bit_field(row: &Entry) -> bool {
+    matches!(row.index, 0x1000..=0x1016 | 0x1018..=0x1FFF | 0x603F..=0x6041)
+        && row.unit.is_empty()
+        && row.sub_index != 0
+        || matches!(row.index, 0x1000 | 0x1001 | 0x1005 | 0x1009 | 0x100A | 0x1014 | 0x603F..=0x6041)
+}
+
+fn meaning(row: &Entry, value: i64) -> Option<String> {
+    match (row.index, row.sub_index) {
+        (0x6041, 0) => Some(statusword(Statusword(value as u16))),
+        (0x6040, 0) => Some(Controlword(value as u16).command().name().into()),
+        _ => row.meaning(value).map(Into::into),
+    }
+}
+
+/// A statusword in words: the state, then the bits that say more.
+fn statusword(word: Statusword) -> String {
+    const BITS: [(u16, &str); 2] = [(Statusword::WARNING, "warning"), (Statusword::TARGET_REACHED, "target reached")];
+    let state = word.state().map_or("no state of CiA 402", |state| state.name());
+    let bits = BITS.iter().filter(|(mask, _)| word.has(*mask)).map(|(_, name)| format!(", {name}"));
+    format!("{state}{}", bits.collect::<String>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use canopen::od::Access;
+
+    static SPEED: Entry =
+        Entry::new(0x606C, 0, DataType::Integer32, Access::ReadOnly, "velocity_actual_value", "").unit("0.1 r/min");
+    static STATUS: Entry = Entry::new(0x6041, 0, DataType::Unsigned16, Access::ReadOnly, "statusword", "");
+    static MODE: Entry = Entry::new(0x6060, 0, DataType::Integer8, Access::ReadWrite, "modes_of_operation", "")
+        .values(&[(3, "profile velocity")]);
+    static POSITION: Entry =
+        Entry::new(0x6064, 0, DataType::Integer32, Access::ReadOnly, "position_actual_value", "").unit("counts");
+
+    #[test]
+    fn numbers_are_shown_in_their_unit() {
+        let text = |row, bytes: &[u8]| decode(Some(row), bytes).text(Paint::OFF);
+        assert_eq!(text(&SPEED, &[0x18, 0xFC, 0xFF, 0xFF]), "-100.0 r/min (-1000)");
+        assert_eq!(text(&POSITION, &[0, 0x7D, 0, 0]), "32000 counts");
+        assert_eq!(text(&MODE, &[3]), "3  profile velocity");
+    }
+
+    #[test]
+    fn a_statusword_is_put_into_words() {
+        let decoded = decode(Some(&STATUS), &[0x37, 0x06]);
+        assert_eq!(decoded.text(Paint::OFF), "0x637 (1591)  Operation enabled, target reached");
+    }
+
+    #[test]
+    fn an_unexpected_length_is_shown_as_bytes() {
+        assert_eq!(decode(Some(&SPEED), &[1, 2]).text(Paint::OFF), "bytes 01 02");
+        assert_eq!(decode(None, &[1, 2]).text(Paint::OFF), "0x201 (513)");
+        assert_eq!(decode(None, &[1; 6]).text(Paint::OFF), "bytes 01 01 01 01 01 01");
+    }
+}

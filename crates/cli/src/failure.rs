@@ -1,0 +1,85 @@
+//! Why a command did not do what was asked: what failed, what the drive said, what to do next.
+
+use std::fmt;
+
+/// How a command ended; the process ends with the same number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Status {
+    /// The operation failed.
+    Failed = 1,
+    /// The command line makes no sense.
+    Usage = 2,
+    /// Stopped by Ctrl-C, as shells number it: 128 + SIGINT.
+    Interrupted = 130,
+}
+
+/// A reason for people, in up to three parts.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Failure {
+    /// Decides the exit status.
+    pub(crate) status: Status,
+    /// What could not be done, with node and object.
+    pub(crate) what: String,
+    /// Why: what the drive or the system said, one line each.
+    pub(crate) because: Vec<String>,
+    /// What to do next, one line each.
+    pub(crate) next: Vec<String>,
+}
+
+impl Failure {
+    /// The operation failed.
+    pub(crate) fn new(what: impl Into<String>) -> Self {
+        Self { status: Status::Failed, what: what.into(), because: Vec::new(), next: Vec::new() }
+    }
+
+    /// The command line makes no sense, as found out only now.
+    pub(crate) fn usage(what: impl Into<String>) -> Self {
+        Self { status: Status::Usage, ..Self::new(what) }
+    }
+
+    /// Ctrl-C.
+    pub(crate) fn interrupted() -> Self {
+        Self { status: Status::Interrupted, ..Self::new("interrupted") }
+    }
+
+    /// Adds a reason.
+    pub(crate) fn because(mut self, reason: impl fmt::Display) -> Self {
+        self.because.push(reason.to_string());
+        self
+    }
+
+    /// Adds advice.
+    pub(crate) fn next(mut self, advice: impl fmt::Display) -> Self {
+        self.next.push(advice.to_string());
+        self
+    }
+}
+
+/// Several lines, each complete: `what`, then the reasons, then the advice.
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.what)?;
+        self.because.iter().try_for_each(|reason| write!(f, "\n  because: {reason}"))?;
+        self.next.iter().try_for_each(|advice| write!(f, "\n  next:    {advice}"))
+    }
+}
+
+impl From<master::Error> for Failure {
+    /// The master's errors say what, why and what to do in whole sentences.
+    fn from(error: master::Error) -> Self {
+        Self::new(error.to_string())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failure_names_what_why_and_next() {
+        let failure = Failure::new("cannot read 6064h:00 of node 9").because("no answer").next("ferrodrive scan");
+        let text = "cannot read 6064h:00 of node 9\n  because: no answer\n  next:    ferrodrive scan";
+        assert_eq!(failure.to_string(), text);
+        assert_eq!(Failure::usage("x").status as u8, 2);
+    }
+}

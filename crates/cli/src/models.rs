@@ -1,0 +1,8 @@
+//! The drives that Ferrodrive knows, as the command line names them.
+
+pub(crate) use drives::profile::{DriveProfile, MODELS, model as find};
+
+/// The names of all models, for messages.
+pub(crate) fn names() -> String {
+    MODELS.iter().map(|model| model.model).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,43 @@
+//! What a command has to say: one value, printed as text for people or as JSON for programs.
+
+use std::io::{self, Write};
+
+use serde::Serialize;
+
+use crate::paint::Paint;
+
+/// A value that a command prints.
+pub(crate) trait Report: Serialize {
+    /// Lines for people, without a line end after the last.
+    fn text(&self, paint: Paint) -> String;
+}
+
+/// How to print.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Format {
+    /// JSON instead of text.
+    pub(crate) json: bool,
+    /// Colours of standard output.
+    pub(crate) paint: Paint,
+}
+
+impl Format {
+    /// Prints a report on standard output, one line of JSON or its text.
+    pub(crate) fn print(self, report: &impl Report) -> io::Result<()> {
+        let text = if self.json { serde_json::to_string(report)? } else { report.text(self.paint) };
+        print_line(&text)
+    }
+}
+
+/// One text and a line end on standard output, at once. A reader that has gone away is no error: it has
+/// seen what it wanted (`ferrodrive dump | head`).
+pub(crate) fn print_line(text: &str) -> io::Result<()> {
+    if text.is_empty() {
+        return Ok(());
+    }
+    let mut out = io::stdout().lock();
+    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => std::process::exit(0),
+        other => other,
+    }
+}

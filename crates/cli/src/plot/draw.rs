@@ -1,0 +1,273 @@
+//! Layout and drawing: where panels, ticks, labels and marks go.
+
+use super::svg::{Anchor, Font, Svg};
+use super::thin::thin;
+use super::ticks::Ticks;
+use super::{Colour, Event, EventKind, Figure, Panel, Style, Trace, lanes};
+
+const WIDTH: f64 = 1120.0;
+const LEFT: f64 = 92.0;
+const RIGHT: f64 = 128.0;
+const TOP: f64 = 74.0;
+const SECTION_STRIP: f64 = 26.0;
+const EVENT_LANE: f64 = 17.0;
+const EVENT_LANES: usize = 4;
+const PANEL_HEIGHT: f64 = 150.0;
+const PANEL_GAP: f64 = 16.0;
+const BOTTOM: f64 = 50.0;
+const LABEL_GAP: f64 = 15.0;
+
+const GROUND: &str = "#ffffff";
+const FRAME: &str = "#d0d7de";
+const BAND: &str = "#f3f6f9";
+const GRID: &str = "#e3e8ee";
+const ZERO: &str = "#b6c0cb";
+
+const TITLE: Font = Font { size: 19.0, colour: "#1f2933", bold: true };
+const SUBTITLE: Font = Font { size: 13.0, colour: "#5b6773", bold: false };
+const AXIS: Font = Font { size: 12.0, colour: "#5b6773", bold: false };
+const NAME: Font = Font { size: 12.5, colour: "#1f2933", bold: true };
+const SECTION: Font = Font { size: 11.5, colour: "#3b4652", bold: false };
+
+/// Where things lie, px.
+struct Layout {
+    time_s: (f64, f64),
+    event_top: f64,
+    panels_top: f64,
+    panels_bottom: f64,
+}
+
+impl Layout {
+    fn x(&self, t_s: f64) -> f64 {
+        let (begin, end) = self.time_s;
+        LEFT + (t_s - begin) / (end - begin) * (WIDTH - LEFT - RIGHT)
+    }
+
+    fn panel_top(&self, number: usize) -> f64 {
+        self.panels_top + number as f64 * (PANEL_HEIGHT + PANEL_GAP)
+    }
+}
+
+/// The whole picture.
+pub(super) fn figure(figure: &Figure) -> String {
+    let mut events: Vec<&Event> = figure.events.iter().collect();
+    events.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+    let section_strip = if figure.sections.is_empty() { 0.0 } else { SECTION_STRIP };
+    let mut layout =
+        Layout { time_s: figure.time_span_s(), event_top: TOP + section_strip, panels_top: 0.0, panels_bottom: 0.0 };
+    let event_lanes = event_lanes(&layout, &events);
+    let lane_count = event_lanes.iter().max().map_or(0, |lane| lane + 1);
+    layout.panels_top = layout.event_top + lane_count as f64 * EVENT_LANE + 10.0;
+    layout.panels_bottom = layout.panel_top(figure.panels.len()) - PANEL_GAP;
+    let height = layout.panels_bottom + BOTTOM;
+
+    let mut svg = Svg::default();
+    svg.rect((0.5, 0.5), (WIDTH - 1.0, height - 1.0), 8.0, &format!(r#"fill="{GROUND}" stroke="{FRAME}""#));
+    svg.text((24.0, 34.0), Anchor::Start, TITLE, &figure.title);
+    svg.text((24.0, 55.0), Anchor::Start, SUBTITLE, &figure.subtitle);
+    sections(&mut svg, &layout, figure);
+    for (number, panel) in figure.panels.iter().enumerate() {
+        draw_panel(&mut svg, &layout, layout.panel_top(number), panel);
+    }
+    draw_events(&mut svg, &layout, &events, &event_lanes);
+    time_axis(&mut svg, &layout);
+    svg.document((WIDTH, height), &figure.title)
+}
+
+fn sections(svg: &mut Svg, layout: &Layout, figure: &Figure) {
+    for (number, section) in figure.sections.iter().enumerate() {
+        let (left, right) = (layout.x(section.from_s), layout.x(section.to_s));
+        if number % 2 == 0 {
+            let size = (right - left, layout.panels_bottom - TOP);
+            svg.rect((left, TOP), size, 0.0, &format!(r#"fill="{BAND}""#));
+        }
+        let fits = |name: &&String| SECTION.width(name) < right - left - 4.0;
+        if let Some(name) = section.names.iter().find(fits) {
+            svg.text(((left + right) / 2.0, TOP + 17.0), Anchor::Middle, SECTION, name);
+        }
+    }
+}
+
+fn draw_panel(svg: &mut Svg, layout: &Layout, top: f64, panel: &Panel) {
+    let values = panel.traces.iter().flat_map(|trace| &trace.points).map(|point| point.1);
+    let (low, high) = values.fold((0f64, 0f64), |(low, high), value| (low.min(value), high.max(value)));
+    let ticks = Ticks::around(low, high, 5);
+    let (low, high) = (ticks.values[0], ticks.values[ticks.values.len() - 1]);
+    let y = |value: f64| top + (high - value) / (high - low) * PANEL_HEIGHT;
+    for &tick in &ticks.values {
+        let colour = if tick == 0.0 { ZERO } else { GRID };
+        svg.line((LEFT, y(tick)), (WIDTH - RIGHT, y(tick)), &format!(r#"stroke="{colour}""#));
+        svg.text((LEFT - 8.0, y(tick) + 4.0), Anchor::End, AXIS, &ticks.text(tick));
+    }
+    svg.text((LEFT + 6.0, top + 15.0), Anchor::Start, NAME, panel.title);
+    let after_title = LEFT + 12.0 + NAME.width(panel.title);
+    svg.text((after_title, top + 15.0), Anchor::Start, AXIS, panel.unit);
+    for trace in &panel.traces {
+        let pixels = trace.points.iter().map(|&(t_s, value)| (layout.x(t_s), y(value)));
+        let line = if trace.style == Style::SetPoint { steps(pixels) } else { thin(pixels) };
+        svg.path(&line, &paint(trace.style));
+    }
+    trace_labels(svg, top, &panel.traces, y);
+}
+
+fn trace_labels(svg: &mut Svg, top: f64, traces: &[Trace], y: impl Fn(f64) -> f64) {
+    let ends: Vec<f64> = traces.iter().map(|trace| y(trace.points.last().map_or(0.0, |point| point.1))).collect();
+    let heights = lanes::spread(&ends, LABEL_GAP, top + 6.0, top + PANEL_HEIGHT - 2.0);
+    for (trace, height) in traces.iter().zip(heights) {
+        let x = WIDTH - RIGHT + 8.0;
+        svg.line((x, height), (x + 14.0, height), &paint(trace.style));
+        let font = Font { size: 12.0, colour: text_colour(trace.style), bold: matches!(trace.style, Style::Actual(_)) };
+        svg.text((x + 19.0, height + 4.0), Anchor::Start, font, trace.label);
+    }
+}
+
+/// A lane for each event's label, so that labels do not overlap.
+fn event_lanes(layout: &Layout, events: &[&Event]) -> Vec<usize> {
+    let spans: Vec<(f64, f64)> = events
+        .iter()
+        .map(|event| {
+            let left = label_left(layout, event);
+            (left - 8.0, left + event_font(event.kind).width(&event.label) + 10.0)
+        })
+        .collect();
+    lanes::assign(&spans, EVENT_LANES)
+}
+
+/// Labels begin at their mark, or end at the right border when they would leave the picture.
+fn label_left(layout: &Layout, event: &Event) -> f64 {
+    let width = event_font(event.kind).width(&event.label);
+    (layout.x(event.at_s) + 6.0).min(WIDTH - 14.0 - width)
+}
+
+fn draw_events(svg: &mut Svg, layout: &Layout, events: &[&Event], lanes: &[usize]) {
+    for (event, lane) in events.iter().zip(lanes) {
+        let font = event_font(event.kind);
+        let x = layout.x(event.at_s);
+        let y = layout.event_top + *lane as f64 * EVENT_LANE + 12.0;
+        let paint = format!(r#"stroke="{}" stroke-width="1" stroke-dasharray="2 3" opacity="0.75""#, font.colour);
+        svg.line((x, y - 4.0), (x, layout.panels_bottom), &paint);
+        svg.dot((x, y - 4.0), 3.2, font.colour);
+        svg.text((label_left(layout, event), y), Anchor::Start, font, &event.label);
+    }
+}
+
+fn event_font(kind: EventKind) -> Font {
+    let colour = match kind {
+        EventKind::Fault => "#b42318",
+        EventKind::Stop => "#a15c07",
+        EventKind::Note => "#475467",
+    };
+    Font { size: 11.5, colour, bold: false }
+}
+
+fn time_axis(svg: &mut Svg, layout: &Layout) {
+    let ticks = Ticks::within(layout.time_s.0, layout.time_s.1, 14);
+    let y = layout.panels_bottom;
+    svg.line((LEFT, y), (WIDTH - RIGHT, y), &format!(r#"stroke="{ZERO}""#));
+    for &tick in &ticks.values {
+        let x = layout.x(tick);
+        svg.line((x, y), (x, y + 5.0), &format!(r#"stroke="{ZERO}""#));
+        svg.text((x, y + 20.0), Anchor::Middle, AXIS, &ticks.text(tick));
+    }
+    svg.text((WIDTH - RIGHT + 8.0, y + 20.0), Anchor::Start, AXIS, "time, s");
+}
+
+/// A line that holds each value until the next.
+fn steps(pixels: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
+    let mut line: Vec<(f64, f64)> = Vec::new();
+    for (x, y) in pixels {
+        match line.last() {
+            Some(&(_, held)) if held != y => line.extend([(x, held), (x, y)]),
+            Some(_) if line.len() > 1 && line[line.len() - 2].1 == y => {
+                let end = line.len() - 1;
+                line[end].0 = x;
+            }
+            _ => line.push((x, y)),
+        }
+    }
+    line
+}
+
+fn paint(style: Style) -> String {
+    match style {
+        Style::Actual(colour) => format!(r#"stroke="{}" stroke-width="1.7""#, line_colour(colour)),
+        Style::Demand => r##"stroke="#b9c3cf" stroke-width="4.2" stroke-linecap="round""##.into(),
+        Style::SetPoint => r##"stroke="#667382" stroke-width="1.2" stroke-dasharray="5 4""##.into(),
+    }
+}
+
+fn line_colour(colour: Colour) -> &'static str {
+    match colour {
+        Colour::Blue => "#1d5fbf",
+        Colour::Teal => "#00796b",
+        Colour::Orange => "#c4500b",
+    }
+}
+
+fn text_colour(style: Style) -> &'static str {
+    match style {
+        Style::Actual(colour) => line_colour(colour),
+        Style::Demand => "#7a8694",
+        Style::SetPoint => "#667382",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Section;
+    use super::*;
+
+    fn example() -> Figure {
+        let wave =
+            |amplitude: f64| (0..2000).map(move |i| (f64::from(i) * 0.01, amplitude * (f64::from(i) * 0.01).sin()));
+        Figure {
+            title: "Title".into(),
+            subtitle: "subtitle".into(),
+            panels: vec![
+                Panel {
+                    title: "velocity",
+                    unit: "r/min",
+                    traces: vec![
+                        Trace { label: "set-point", style: Style::SetPoint, points: vec![(0.0, 0.0), (5.0, 80.0)] },
+                        Trace { label: "demand", style: Style::Demand, points: wave(98.0).collect() },
+                        Trace { label: "actual", style: Style::Actual(Colour::Teal), points: wave(100.0).collect() },
+                    ],
+                },
+                Panel { title: "empty", unit: "A", traces: Vec::new() },
+            ],
+            sections: vec![Section { from_s: 0.0, to_s: 10.0, names: vec!["x".repeat(500), "short".into()] }],
+            events: vec![Event { at_s: 3.0, label: "quick stop".into(), kind: EventKind::Stop }],
+        }
+    }
+
+    #[test]
+    fn a_figure_is_one_svg_with_its_own_background_and_no_script() {
+        let svg = example().to_svg();
+        assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>\n"));
+        assert!(svg.contains(r##"fill="#ffffff""##) && !svg.contains("<script"));
+        assert_eq!(svg.matches("<text").count(), svg.matches("</text>").count());
+        assert!(svg.len() < 60_000, "{} bytes", svg.len());
+    }
+
+    #[test]
+    fn a_section_takes_the_first_name_that_fits() {
+        let svg = example().to_svg();
+        assert!(svg.contains(">short<") && !svg.contains("xxxx"));
+    }
+
+    #[test]
+    fn no_number_in_the_picture_is_broken() {
+        let mut figure = example();
+        figure.panels[0].traces.clear();
+        let svg = figure.to_svg();
+        assert!(!svg.contains("NaN") && !svg.contains("inf"));
+    }
+
+    #[test]
+    fn set_points_are_drawn_as_steps() {
+        assert_eq!(
+            steps([(0.0, 1.0), (5.0, 1.0), (9.0, 1.0), (10.0, 3.0)].into_iter()),
+            [(0.0, 1.0), (9.0, 1.0), (10.0, 1.0), (10.0, 3.0)]
+        );
+    }
+}

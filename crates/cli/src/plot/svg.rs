@@ -1,0 +1,117 @@
+//! The few SVG elements a plot needs, as text.
+
+use std::fmt::Write;
+
+/// SVG text under construction.
+#[derive(Default)]
+pub(super) struct Svg {
+    body: String,
+}
+
+/// Where a text is held.
+#[derive(Clone, Copy)]
+pub(super) enum Anchor {
+    /// At its left end.
+    Start,
+    /// At its middle.
+    Middle,
+    /// At its right end.
+    End,
+}
+
+/// Look of a text.
+#[derive(Clone, Copy)]
+pub(super) struct Font {
+    /// Height, px.
+    pub(super) size: f64,
+    /// Colour.
+    pub(super) colour: &'static str,
+    /// Bold or not.
+    pub(super) bold: bool,
+}
+
+impl Font {
+    /// Width of a text, px; an estimate from the mean advance of common sans-serif faces.
+    pub(super) fn width(self, text: &str) -> f64 {
+        const MEAN_ADVANCE_EM: f64 = 0.56;
+        text.chars().count() as f64 * self.size * MEAN_ADVANCE_EM * if self.bold { 1.07 } else { 1.0 }
+    }
+}
+
+impl Svg {
+    /// A rectangle with rounded corners.
+    pub(super) fn rect(&mut self, (x, y): (f64, f64), (width, height): (f64, f64), radius: f64, paint: &str) {
+        let _ = writeln!(
+            self.body,
+            r#"<rect x="{x:.1}" y="{y:.1}" width="{width:.1}" height="{height:.1}" rx="{radius}" {paint}/>"#
+        );
+    }
+
+    /// A straight line.
+    pub(super) fn line(&mut self, (x1, y1): (f64, f64), (x2, y2): (f64, f64), paint: &str) {
+        let _ = writeln!(self.body, r#"<line x1="{x1:.1}" y1="{y1:.1}" x2="{x2:.1}" y2="{y2:.1}" {paint}/>"#);
+    }
+
+    /// A dot.
+    pub(super) fn dot(&mut self, (x, y): (f64, f64), radius: f64, colour: &str) {
+        let _ = writeln!(self.body, r#"<circle cx="{x:.1}" cy="{y:.1}" r="{radius}" fill="{colour}"/>"#);
+    }
+
+    /// A broken line through points.
+    pub(super) fn path(&mut self, points: &[(f64, f64)], paint: &str) {
+        let mut data = String::with_capacity(points.len() * 12);
+        for (i, (x, y)) in points.iter().enumerate() {
+            let _ = write!(data, "{}{x:.1} {y:.1}", if i == 0 { 'M' } else { 'L' });
+        }
+        let _ = writeln!(self.body, r#"<path d="{data}" fill="none" stroke-linejoin="round" {paint}/>"#);
+    }
+
+    /// A line of text; `y` is its base line.
+    pub(super) fn text(&mut self, (x, y): (f64, f64), anchor: Anchor, font: Font, text: &str) {
+        let anchor = match anchor {
+            Anchor::Start => "start",
+            Anchor::Middle => "middle",
+            Anchor::End => "end",
+        };
+        let weight = if font.bold { r#" font-weight="600""# } else { "" };
+        let _ = writeln!(
+            self.body,
+            r#"<text x="{x:.1}" y="{y:.1}" text-anchor="{anchor}" font-size="{}" fill="{}"{weight}>{}</text>"#,
+            font.size,
+            font.colour,
+            escape(text)
+        );
+    }
+
+    /// The whole document.
+    pub(super) fn document(self, (width, height): (f64, f64), title: &str) -> String {
+        format!(
+            concat!(
+                r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0} {height:.0}" "#,
+                r#"width="{width:.0}" height="{height:.0}" role="img" "#,
+                r#"font-family="ui-sans-serif, system-ui, 'Segoe UI', Helvetica, Arial, sans-serif">"#,
+                "\n<title>{title}</title>\n{body}</svg>\n"
+            ),
+            width = width,
+            height = height,
+            title = escape(title),
+            body = self.body
+        )
+    }
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_are_escaped() {
+        let mut svg = Svg::default();
+        svg.text((0.0, 0.0), Anchor::Start, Font { size: 10.0, colour: "#000", bold: false }, "a < b & c");
+        assert!(svg.document((10.0, 10.0), "<t>").contains("a &lt; b &amp; c"));
+    }
+}

@@ -1,0 +1,4 @@
+//! Virtual drives for other programs: a served world, EEPROM images on disk.
+
+pub(crate) mod eeprom;
+pub(crate) mod world;

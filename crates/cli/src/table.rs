@@ -1,0 +1,75 @@
+//! Text tables with aligned columns.
+
+use crate::paint::Paint;
+
+/// A table: a heading for each column and rows of as many cells.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Table {
+    headings: Vec<&'static str>,
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// An empty table.
+    pub(crate) fn new(headings: &[&'static str]) -> Self {
+        Self { headings: headings.to_vec(), rows: Vec::new() }
+    }
+
+    /// Adds a row; missing cells are empty.
+    pub(crate) fn row(&mut self, cells: impl IntoIterator<Item = impl Into<String>>) {
+        self.rows.push(cells.into_iter().map(Into::into).collect());
+    }
+
+    /// The text: heading line, then the rows, two blanks between columns, none at line ends.
+    /// `finish` may colour a finished cell (row, column, text).
+    pub(crate) fn text(&self, paint: Paint, finish: impl Fn(usize, usize, &str) -> Option<String>) -> String {
+        let widths = self.widths();
+        let mut text = line(&widths, self.headings.iter().map(|heading| (*heading, paint.strong(heading))));
+        for (number, row) in self.rows.iter().enumerate() {
+            let cells = row
+                .iter()
+                .enumerate()
+                .map(|(column, cell)| (cell.as_str(), finish(number, column, cell).unwrap_or_else(|| cell.clone())));
+            text.push('\n');
+            text.push_str(&line(&widths, cells));
+        }
+        text
+    }
+
+    /// The text without colours of its own.
+    pub(crate) fn plain(&self, paint: Paint) -> String {
+        self.text(paint, |_, _, _| None)
+    }
+
+    fn widths(&self) -> Vec<usize> {
+        let widest = |column: usize| {
+            let cells = self.rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count());
+            cells.chain([self.headings[column].chars().count()]).max().unwrap_or(0)
+        };
+        (0..self.headings.len()).map(widest).collect()
+    }
+}
+
+/// One line from cells given twice: as counted for the width, and as written.
+fn line<'a>(widths: &[usize], cells: impl Iterator<Item = (&'a str, String)>) -> String {
+    let mut text = String::new();
+    for (width, (counted, written)) in widths.iter().zip(cells) {
+        text.push_str(&written);
+        text.extend(std::iter::repeat_n(' ', width - counted.chars().count() + 2));
+    }
+    text.truncate(text.trim_end().len());
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_are_as_wide_as_their_widest_cell() {
+        let mut table = Table::new(&["node", "is"]);
+        table.row(["4", "a drive"]);
+        table.row(["127", "°C"]);
+        assert_eq!(table.plain(Paint::OFF), "node  is\n4     a drive\n127   °C");
+    }
+}
