@@ -336,7 +336,7 @@ impl Bus {
         }
     }
 
-    /// What an attempt that failed does to controller `i` (ISO 11898-1, 12.1.4.2).
+    /// What an attempt that failed does to controller `i` (fault confinement).
     fn count_failure(&mut self, i: usize, start: Instant, at: Instant, cause: ErrorCause) {
         let foreign = self.is_foreign(i);
         let controller = &mut self.controllers[i];
