@@ -1,3 +1,7 @@
+//! The wire and everybody's controller on it: how time passes there, and how frames end.
+//!
+//! How a frame starts and what will become of it is in `fate`, nodes with a cut cable are in `alone`.
+
 use std::collections::VecDeque;
 
 use can::{Bitrate, ERROR_FRAME_BITS, Frame, INTERFRAME_SPACE_BITS, Instant};

@@ -1,3 +1,8 @@
+//! Fault confinement (ISO 11898-1:2015, 12.1.4): error counters and what follows from them.
+//!
+//! The letters of the rules are those of 12.1.4.2. Counted at the grain of a frame: rules d, e and f (dominant bits
+//! during or long after an error flag) need a wire that is stuck, which is not modelled.
+
 /// How far a controller trusts itself (ISO 11898-1, 12.1.4).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorState {
