@@ -24,11 +24,12 @@ pub struct CommutationModel {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Commutation {
     register: u16,
-    sixth: Option<u8>,
-    /// Position within one electrical cycle in units of `1 / counts_per_turn` electrical turns:
-    /// each count adds `pole_pairs`.
-    phase: u32,
+    hall: u8,
     aligned: bool,
+    /// Position within one electrical turn in units of `1 / counts_per_turn` of it: each count adds `pole_pairs`.
+    phase: i32,
+    /// Electrical turns to one of these units.
+    unit_turns: f32,
     disagreement_turns: f32,
 }
 
@@ -43,26 +44,31 @@ impl CommutationModel {
 impl Commutation {
     /// The angle as the Hall state tells it; zero while the state is a fault.
     pub fn new(model: &CommutationModel, hall: u8, count: u16) -> Self {
-        let sixth = model.sixth(hall);
-        let turns = sixth.map_or(0.0, |sixth| model.offset_turns + (f32::from(sixth) + 0.5) / 6.0);
-        Commutation { register: count, sixth, phase: model.phase(turns), aligned: false, disagreement_turns: 0.0 }
+        let turns = model.sixth(hall).map_or(0.0, |sixth| model.offset_turns + (f32::from(sixth) + 0.5) / 6.0);
+        Commutation {
+            register: count,
+            hall,
+            aligned: false,
+            phase: model.phase(turns),
+            unit_turns: 1.0 / model.cycle() as f32,
+            disagreement_turns: 0.0,
+        }
     }
 
     /// Takes in both sensors, once each period, and returns the electrical angle in turns, `[0, 1)`.
     #[inline]
     pub fn update(&mut self, model: &CommutationModel, hall: u8, count: u16) -> f32 {
         let moved = count.wrapping_sub(self.register) as i16;
-        if moved != 0 {
-            self.register = count;
-            let cycle = model.counts_per_turn.max(1) as i32;
-            let step = (i32::from(moved)).wrapping_mul(model.pole_pairs as i32).rem_euclid(cycle);
-            self.phase = (self.phase + step as u32) % cycle as u32;
+        self.register = count;
+        let cycle = model.cycle();
+        self.phase = self.phase.wrapping_add(i32::from(moved).wrapping_mul(model.pole_pairs as i32));
+        if !(0..cycle).contains(&self.phase) {
+            self.phase = self.phase.rem_euclid(cycle);
         }
-        let known = self.sixth.map(|sixth| model.sequence[usize::from(sixth)]);
-        if known != Some(hall) {
+        if hall != self.hall {
             self.cross(model, hall);
         }
-        self.phase as f32 / model.counts_per_turn.max(1) as f32
+        self.phase as f32 * self.unit_turns
     }
 
     /// The angle has been fixed by a change of the Hall state; before that it may be off by 30 degrees.
@@ -78,21 +84,16 @@ impl Commutation {
 
     #[cold]
     fn cross(&mut self, model: &CommutationModel, hall: u8) {
-        let Some(now) = model.sixth(hall) else {
-            self.sixth = None;
-            return;
-        };
-        let before = self.sixth.replace(now);
+        let before = model.sixth(core::mem::replace(&mut self.hall, hall));
         // Only a step to a neighbour says which border was crossed.
-        let border = match before {
-            Some(before) if now == (before + 1) % 6 => now,
-            Some(before) if before == (now + 1) % 6 => before,
+        let border = match (before, model.sixth(hall)) {
+            (Some(before), Some(now)) if now == (before + 1) % 6 => now,
+            (Some(before), Some(now)) if before == (now + 1) % 6 => before,
             _ => return,
         };
         let border_turns = model.offset_turns + f32::from(border) / 6.0;
         if self.aligned {
-            let off = wrap_turns(self.phase as f32 / model.counts_per_turn.max(1) as f32 - border_turns + 0.5);
-            self.disagreement_turns = off - 0.5;
+            self.disagreement_turns = wrap_turns(self.phase as f32 * self.unit_turns - border_turns + 0.5) - 0.5;
         } else {
             self.phase = model.phase(border_turns);
             self.aligned = true;
@@ -101,8 +102,13 @@ impl Commutation {
 }
 
 impl CommutationModel {
-    fn phase(&self, turns: f32) -> u32 {
-        let counts = self.counts_per_turn.max(1);
-        ((wrap_turns(turns) * counts as f32) as u32).min(counts - 1)
+    /// Counts of a mechanical turn, at least one.
+    #[inline]
+    fn cycle(&self) -> i32 {
+        i32::try_from(self.counts_per_turn).unwrap_or(i32::MAX).max(1)
+    }
+
+    fn phase(&self, turns: f32) -> i32 {
+        ((wrap_turns(turns) * self.cycle() as f32) as i32).min(self.cycle() - 1)
     }
 }

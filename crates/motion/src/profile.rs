@@ -124,6 +124,15 @@ const LONGEST_S: f64 = 1e9;
 /// Speeds closer than this share of the larger one count as equal.
 const SAME_SPEED: f64 = 1e-9;
 
+/// A speed under this counts as none: a count in thirty years.
+const SLOWEST: f64 = 1e-9;
+
+/// A speed limit a planner can work with: finite, not negative.
+pub(crate) fn sane_speed(speed: f64) -> f64 {
+    let speed = sane(speed).abs();
+    if speed < SLOWEST { 0.0 } else { speed }
+}
+
 /// A value a planner can work with: not a number becomes zero, the huge becomes [`LARGEST`].
 pub(crate) fn sane(value: f64) -> f64 {
     if value.is_nan() { 0.0 } else { value.clamp(-LARGEST, LARGEST) }
@@ -142,6 +151,25 @@ pub(crate) fn velocity_change(shape: Shape, from: f64, to: f64, duration_s: f64)
     profile
 }
 
+/// How long a change of speed takes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Ramp {
+    /// Seconds per unit of speed; zero is a step.
+    Pace(f64),
+    /// Seconds for the change to the plateau from wherever it starts.
+    Time(f64),
+}
+
+impl Ramp {
+    /// Seconds per unit of speed on the way to the plateau.
+    fn pace(self, start: f64, max_speed: f64) -> f64 {
+        match self {
+            Ramp::Pace(pace) => pace,
+            Ramp::Time(time_s) => pace(time_s, start, max_speed).unwrap_or(0.0),
+        }
+    }
+}
+
 /// What a move has to keep to, in units and seconds.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct MoveLimits {
@@ -151,10 +179,12 @@ pub(crate) struct MoveLimits {
     pub(crate) max_speed: f64,
     /// The motion ends with a step from this speed to rest.
     pub(crate) end_speed: f64,
-    /// Seconds per unit of speed while speeding up; zero is a step.
-    pub(crate) acceleration_pace: f64,
-    /// Seconds per unit of speed while slowing down; zero is a step.
+    /// How it speeds up.
+    pub(crate) acceleration: Ramp,
+    /// Seconds per unit of speed while slowing down to the end; zero is a step.
     pub(crate) deceleration_pace: f64,
+    /// Seconds per unit of speed while stopping a motion that cannot end at the target.
+    pub(crate) stopping_pace: f64,
 }
 
 /// A move over `distance` from velocity `velocity`.
@@ -165,11 +195,11 @@ pub(crate) fn position_move(shape: Shape, distance: f64, velocity: f64, limits: 
     let mut profile = Profile::new(shape);
     let direction = if distance == 0.0 { 1_f64.copysign(velocity) } else { 1_f64.copysign(distance) };
     let approach = velocity * direction;
-    let stopping = 0.5 * approach * approach * limits.deceleration_pace;
+    let stopping = 0.5 * approach * approach * limits.stopping_pace;
     let too_fast =
         approach > limits.end_speed && stopping_distance(approach, &limits) > distance.abs() + tolerance(distance);
     if velocity != 0.0 && (approach < 0.0 || too_fast) {
-        profile.push(0, approach.abs() * limits.deceleration_pace, velocity, 0.0);
+        profile.push(0, approach.abs() * limits.stopping_pace, velocity, 0.0);
         let left = distance - stopping.copysign(velocity);
         plan_towards(&mut profile, left, 0.0, &limits);
     } else {
@@ -199,7 +229,7 @@ impl Profile {
 
 /// Speed up, run, slow down: the last three stretches. `speed` is the present one, towards the target.
 fn plan_towards(profile: &mut Profile, distance: f64, speed: f64, limits: &MoveLimits) {
-    let MoveLimits { max_speed, acceleration_pace: up, deceleration_pace: down, .. } = *limits;
+    let MoveLimits { max_speed, deceleration_pace: down, .. } = *limits;
     let length = distance.abs();
     if length == 0.0 || max_speed <= 0.0 {
         return;
@@ -215,11 +245,12 @@ fn plan_towards(profile: &mut Profile, distance: f64, speed: f64, limits: &MoveL
         slow_to_plateau(profile, sign, length, start, end, limits);
         return;
     }
+    let up = limits.acceleration.pace(start, max_speed);
     // length = (peak^2 - start^2) up / 2 + (peak^2 - end^2) down / 2, solved for the peak.
     let room = 2.0 * length + start * start * up + end * end * down;
     let peak = if room >= max_speed * max_speed * (up + down) { max_speed } else { libm::sqrt(room / (up + down)) };
-    let peak = peak.max(start);
-    // Too short to reach the end speed: end slower.
+    // Too short to reach the end speed: only speed up, and end slower.
+    let peak = if peak < end { libm::sqrt(start * start + 2.0 * length / up) } else { peak.max(start) };
     let end = end.min(peak);
     let ramps = 0.5 * ((peak * peak - start * start) * up + (peak * peak - end * end) * down);
     let plateau_s = if peak > 0.0 { ((length - ramps) / peak).max(0.0) } else { 0.0 };

@@ -7,7 +7,7 @@
 //! A move too short for its full speed keeps the pace of the full change, with a lower peak and shorter times: no
 //! manual says so, but the alternative, the full times for any short move, would take a second for one count.
 
-use crate::profile::{self, MoveLimits, Profile, Shape, pace, sane, sane_time};
+use crate::profile::{self, MoveLimits, Profile, Ramp, Shape, pace, sane, sane_speed, sane_time};
 
 /// Change of velocity from `from` to `to` (units/s) in `time_s`. Zero time is a step.
 pub fn velocity_change(from: f64, to: f64, time_s: f64) -> Profile {
@@ -39,24 +39,20 @@ impl PositionMove {
     pub fn plan(&self) -> Profile {
         let distance = sane(self.distance);
         let velocity = sane(self.velocity);
-        let max_speed = sane(self.max_speed).abs();
-        let start_speed = sane(self.start_speed).abs().min(max_speed);
-        let end_speed = sane(self.end_speed).abs().min(max_speed);
+        let max_speed = sane_speed(self.max_speed);
+        let start_speed = sane_speed(self.start_speed).min(max_speed);
+        let end_speed = sane_speed(self.end_speed).min(max_speed);
 
-        // The speed the change really starts from: the present one when the motion already goes the right way.
-        let approach = if distance < 0.0 { -velocity } else { velocity };
-        let from = approach.max(start_speed).min(max_speed);
-        let up = pace(sane_time(self.acceleration_time_s), from, max_speed);
         let deceleration_time_s = sane_time(self.deceleration_time_s);
-        let down = pace(deceleration_time_s, max_speed, end_speed)
-            // Plateau and end speed equal: slowing down from elsewhere takes the time of the plateau's whole speed.
-            .or(pace(deceleration_time_s, max_speed, 0.0));
+        // A stop takes its share of the time from the plateau to rest.
+        let stopping_pace = pace(deceleration_time_s, max_speed, 0.0).unwrap_or(0.0);
         let limits = MoveLimits {
             start_speed,
             max_speed,
             end_speed,
-            acceleration_pace: up.unwrap_or(0.0),
-            deceleration_pace: down.unwrap_or(0.0),
+            acceleration: Ramp::Time(sane_time(self.acceleration_time_s)),
+            deceleration_pace: pace(deceleration_time_s, max_speed, end_speed).unwrap_or(stopping_pace),
+            stopping_pace,
         };
         profile::position_move(Shape::Parabolic, distance, velocity, limits)
     }

@@ -1,7 +1,7 @@
 //! Profiles of constant acceleration and deceleration, for drives that are given them in units/s² (the M joint
 //! motors' objects 6083h and 6084h in r/min/s).
 
-use crate::profile::{self, MoveLimits, Profile, Shape, sane};
+use crate::profile::{self, MoveLimits, Profile, Ramp, Shape, sane, sane_speed};
 
 /// Change of velocity from `from` to `to` (units/s) at `acceleration` (units/s²); zero acceleration is a step.
 pub fn velocity_change(from: f64, to: f64, acceleration: f64) -> Profile {
@@ -31,13 +31,14 @@ pub struct PositionMove {
 impl PositionMove {
     /// Plans the move; see [`scurve::PositionMove::plan`](crate::scurve::PositionMove::plan) for odd inputs.
     pub fn plan(&self) -> Profile {
-        let max_speed = sane(self.max_speed).abs();
+        let max_speed = sane_speed(self.max_speed);
         let limits = MoveLimits {
-            start_speed: sane(self.start_speed).abs().min(max_speed),
+            start_speed: sane_speed(self.start_speed).min(max_speed),
             max_speed,
-            end_speed: sane(self.end_speed).abs().min(max_speed),
-            acceleration_pace: pace(self.acceleration),
+            end_speed: sane_speed(self.end_speed).min(max_speed),
+            acceleration: Ramp::Pace(pace(self.acceleration)),
             deceleration_pace: pace(self.deceleration),
+            stopping_pace: pace(self.deceleration),
         };
         profile::position_move(Shape::Linear, sane(self.distance), sane(self.velocity), limits)
     }

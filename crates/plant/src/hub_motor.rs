@@ -16,6 +16,10 @@ use crate::thermal::{BodyData, BodyModel};
 /// Temperature at which a winding's resistance is stated.
 const RESISTANCE_STATED_AT_C: f64 = 20.0;
 
+/// Steps between two looks at the slow things: heat, resistance, and the exact direction of the magnets. Bodies are
+/// a million steps slow, and turning the direction on by its series is off by 1e-11 in so many steps.
+const SLOW_EVERY: u32 = 16;
+
 /// What never changes about a hub motor and the power stage it is wired to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HubMotorModel {
@@ -140,6 +144,17 @@ pub struct HubMotor {
     /// Torque of the motor on its rotor, mean over the last step.
     pub torque_nm: f64,
     axis: Axis,
+    winding_ohm: f64,
+    slow: Slow,
+}
+
+/// When the slow things were last looked at.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Slow {
+    steps: u32,
+    time_s: f64,
+    winding_j: f64,
+    heat_sink_j: f64,
 }
 
 impl HubMotor {
@@ -160,44 +175,62 @@ impl HubMotor {
             energy: Energy::default(),
             torque_nm: 0.0,
             axis: Axis::at_turns(model.pmsm.electrical_turns(angle)),
+            winding_ohm: winding_resistance_ohm(&model, ambient_c),
+            slow: Slow::default(),
         }
     }
 
-    /// One step: winding, rotor, bus, temperatures, sensors. Meant for 50 µs and less.
+    /// One step: winding, rotor, bus, encoder, energies, and now and then heat. Meant for 50 µs and less.
     #[inline]
     pub fn step(&mut self, dt_s: f64, actuation: &Actuation) {
         let model = &self.model;
-        let velocity_rad_s = model.rotor.predicted_velocity_rad_s(&self.rotor, dt_s);
-        let electrical_rad = f64::from(model.pmsm.pole_pairs) * velocity_rad_s * 0.5 * dt_s;
-        let winding_ohm = self.winding_resistance_ohm();
-        let resistance_ohm = winding_ohm + model.switch_resistance_ohm;
-
+        let velocity_rad_s = self.rotor.predicted_velocity_rad_s();
+        let electrical_s = f64::from(model.pmsm.pole_pairs) * dt_s;
         let input = PmsmInput {
             terminals: actuation.inverter.terminals(self.supply.bus_v),
             lost_phase: self.lost_phase,
-            resistance_ohm,
-            axis: self.axis.turned_by(electrical_rad),
+            resistance_ohm: self.winding_ohm + model.switch_resistance_ohm,
+            axis: self.axis.turned_by(0.5 * electrical_s * velocity_rad_s),
             velocity_rad_s,
         };
         let motor = model.pmsm.step(&mut self.pmsm, dt_s, &input);
         let brake_nm = model.brake.torque_nm(actuation.brake_released);
         let moved = model.rotor.step(&mut self.rotor, dt_s, motor.torque_nm, &self.load, brake_nm);
-        let bus = model.supply.step(&mut self.supply, dt_s, motor.bus_power_w, actuation.bleeder_on);
-        let switches_w = motor.heat_w * (model.switch_resistance_ohm / resistance_ohm);
-        let winding_w = motor.heat_w - switches_w;
-        model.winding.step(&mut self.winding, dt_s, winding_w, self.ambient_c);
-        model.heat_sink.step(&mut self.heat_sink, dt_s, switches_w + bus.consumption_w, self.ambient_c);
+        let bus = model.supply.step(&mut self.supply, dt_s, motor.bus_w, actuation.bleeder_on);
         model.encoder.step(&mut self.encoder, self.rotor.angle);
-
-        self.axis = Axis::at_turns(model.pmsm.electrical_turns(self.rotor.angle));
+        self.axis = self.axis.turned_by(electrical_s * moved.velocity_rad_s);
         self.torque_nm = motor.torque_nm;
-        self.energy.source_j += bus.source_w * dt_s;
-        self.energy.winding_j += winding_w * dt_s;
-        self.energy.switches_j += switches_w * dt_s;
-        self.energy.friction_j += moved.friction_w * dt_s;
-        self.energy.load_j += moved.load_w * dt_s;
-        self.energy.bleeder_j += bus.bleeder_w * dt_s;
-        self.energy.consumption_j += bus.consumption_w * dt_s;
+
+        self.energy.source_j += bus.source_j;
+        self.energy.winding_j += motor.heat_w_per_ohm * self.winding_ohm * dt_s;
+        self.energy.switches_j += motor.heat_w_per_ohm * model.switch_resistance_ohm * dt_s;
+        self.energy.friction_j += moved.friction_j;
+        self.energy.load_j += moved.load_j;
+        self.energy.bleeder_j += bus.bleeder_j;
+        self.energy.consumption_j += bus.consumption_j;
+
+        self.slow.steps += 1;
+        self.slow.time_s += dt_s;
+        if self.slow.steps >= SLOW_EVERY {
+            self.step_slow();
+        }
+    }
+
+    /// Heat of the last steps into the bodies, the winding's resistance, and the magnets' direction afresh.
+    fn step_slow(&mut self) {
+        let Slow { time_s, winding_j, heat_sink_j, .. } = self.slow;
+        let model = &self.model;
+        let into_winding_j = self.energy.winding_j;
+        let into_heat_sink_j = self.energy.switches_j + self.energy.consumption_j;
+        if time_s > 0.0 {
+            let winding_w = (into_winding_j - winding_j) / time_s;
+            let heat_sink_w = (into_heat_sink_j - heat_sink_j) / time_s;
+            model.winding.step(&mut self.winding, time_s, winding_w, self.ambient_c);
+            model.heat_sink.step(&mut self.heat_sink, time_s, heat_sink_w, self.ambient_c);
+        }
+        self.winding_ohm = winding_resistance_ohm(model, self.winding.temperature_c);
+        self.axis = Axis::at_turns(model.pmsm.electrical_turns(self.rotor.angle));
+        self.slow = Slow { steps: 0, time_s: 0.0, winding_j: into_winding_j, heat_sink_j: into_heat_sink_j };
     }
 
     /// What the sensors read now.
@@ -214,19 +247,17 @@ impl HubMotor {
         }
     }
 
-    /// Resistance of one phase of the winding at its present temperature.
-    #[inline]
-    pub fn winding_resistance_ohm(&self) -> f64 {
-        let warming_k = self.winding.temperature_c - RESISTANCE_STATED_AT_C;
-        self.model.pmsm.resistance_ohm * (1.0 + self.model.resistance_per_k * warming_k)
-    }
-
     /// Energy stored now: in motion, in the winding's field and in the bus capacitor.
     pub fn stored_j(&self) -> f64 {
         self.model.rotor.kinetic_energy_j(&self.rotor, &self.load)
             + self.model.pmsm.magnetic_energy_j(&self.pmsm)
             + self.model.supply.stored_energy_j(&self.supply)
     }
+}
+
+/// Resistance of one phase of the winding at a temperature.
+fn winding_resistance_ohm(model: &HubMotorModel, winding_c: f64) -> f64 {
+    model.pmsm.resistance_ohm * (1.0 + model.resistance_per_k * (winding_c - RESISTANCE_STATED_AT_C))
 }
 
 impl Inverter {

@@ -45,8 +45,8 @@ pub struct RotorData {
     pub angle: Angle,
     /// Mechanical velocity.
     pub velocity_rad_s: f64,
-    /// Acceleration over the last step; predicts the middle of the next one.
-    pub acceleration_rad_s2: f64,
+    /// Change of the velocity over the last step; predicts the middle of the next one.
+    pub velocity_change_rad_s: f64,
 }
 
 /// What happened during one step.
@@ -54,10 +54,10 @@ pub struct RotorData {
 pub struct RotorOutput {
     /// Mean velocity over the step.
     pub velocity_rad_s: f64,
-    /// Heat of all friction, brake included.
-    pub friction_w: f64,
-    /// Power given to the active load torque; negative while the load drives.
-    pub load_w: f64,
+    /// Heat of all friction during the step, brake included.
+    pub friction_j: f64,
+    /// Work done on the active load torque; negative while the load drives.
+    pub load_j: f64,
 }
 
 impl RotorModel {
@@ -82,9 +82,11 @@ impl RotorModel {
         let before = data.velocity_rad_s;
         let torque = motor_nm - load.torque_nm;
 
+        // Ready before the torque is: a division is slow.
+        let mobility = 1.0 / (inertia + half_s * viscous);
         let drive = inertia * before + half_s * torque;
         let excess = (drive.abs() - half_s * dry).max(0.0);
-        let mean = excess.copysign(drive) / (inertia + half_s * viscous);
+        let mean = excess.copysign(drive) * mobility;
         let after = 2.0 * mean - before;
         let crosses_zero = mean == 0.0 || (after < 0.0) != (mean < 0.0);
         let (mean, after) = if crosses_zero && torque.abs() <= dry {
@@ -93,18 +95,21 @@ impl RotorModel {
             (mean, after)
         };
 
-        data.angle = data.angle.advanced_by(mean * dt_s * INV_TAU);
+        let way_rad = mean * dt_s;
+        data.angle = data.angle.advanced_by(way_rad * INV_TAU);
         data.velocity_rad_s = after;
-        data.acceleration_rad_s2 = (after - before) / dt_s;
+        data.velocity_change_rad_s = after - before;
         // What the torques brought in and is not kinetic energy now went into friction.
-        let friction_w = torque * mean - 0.5 * inertia * (after + before) * data.acceleration_rad_s2;
-        RotorOutput { velocity_rad_s: mean, friction_w, load_w: load.torque_nm * mean }
+        let friction_j = torque * way_rad - 0.5 * inertia * (after + before) * data.velocity_change_rad_s;
+        RotorOutput { velocity_rad_s: mean, friction_j, load_j: load.torque_nm * way_rad }
     }
+}
 
-    /// Velocity in the middle of the next step, if the acceleration stays what it was.
+impl RotorData {
+    /// Velocity in the middle of the next step, if the acceleration stays what it was and steps are equal.
     #[inline]
-    pub fn predicted_velocity_rad_s(&self, data: &RotorData, dt_s: f64) -> f64 {
-        data.velocity_rad_s + 0.5 * dt_s * data.acceleration_rad_s2
+    pub fn predicted_velocity_rad_s(&self) -> f64 {
+        self.velocity_rad_s + 0.5 * self.velocity_change_rad_s
     }
 }
 

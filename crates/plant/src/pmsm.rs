@@ -134,9 +134,9 @@ pub struct PmsmOutput {
     /// Torque on the rotor.
     pub torque_nm: f64,
     /// Power taken from the bus; negative while regenerating.
-    pub bus_power_w: f64,
-    /// Heat in the resistance of the input.
-    pub heat_w: f64,
+    pub bus_w: f64,
+    /// Heat in the phases' resistance per ohm of it: the sum of the squares of the three currents.
+    pub heat_w_per_ohm: f64,
 }
 
 impl PmsmModel {
@@ -198,12 +198,12 @@ impl PmsmModel {
                 let voltage_v = Dq { d: alpha_v * cos + beta_v * sin, q: beta_v * cos - alpha_v * sin };
                 let mean = winding.mean_current(voltage_v);
                 data.current_a = Dq { d: 2.0 * mean.d - data.current_a.d, q: 2.0 * mean.q - data.current_a.q };
-                self.output(mean, 1.5 * (voltage_v.d * mean.d + voltage_v.q * mean.q), input.resistance_ohm)
+                self.output(mean, 1.5 * (voltage_v.d * mean.d + voltage_v.q * mean.q))
             }
             Terminals::Shorted => {
                 let mean = winding.mean_current(Dq::default());
                 data.current_a = Dq { d: 2.0 * mean.d - data.current_a.d, q: 2.0 * mean.q - data.current_a.q };
-                self.output(mean, 0.0, input.resistance_ohm)
+                self.output(mean, 0.0)
             }
             Terminals::Open { bus_v } => self.step_diodes(data, dt_s, input, winding, bus_v),
         }
@@ -238,7 +238,7 @@ impl PmsmModel {
             mean = Dq { d: 0.5 * before.d, q: 0.5 * before.q };
         }
         data.current_a = after;
-        self.output(mean, -1.5 * counter_v * mean.magnitude(), input.resistance_ohm)
+        self.output(mean, -1.5 * counter_v * mean.magnitude())
     }
 
     /// One wire off: the current can only flow along the axis `n` across the lost phase, and one equation is left,
@@ -260,7 +260,7 @@ impl PmsmModel {
         let before = self.current_across(data, n, half_s * omega);
         let free = (inductance_h * before - half_s * omega * self.flux_linkage_wb * n.q) / lag_h;
 
-        let (mean, after, bus_power_w) = match input.terminals {
+        let (mean, after, bus_w) = match input.terminals {
             Terminals::Driven { alpha_v, beta_v } => {
                 let voltage_v = alpha_v * wires.cos + beta_v * wires.sin;
                 let mean = free + half_s * voltage_v / lag_h;
@@ -280,7 +280,7 @@ impl PmsmModel {
         // The state lives in the rotor's frame, which has turned on by half a step when the step ends.
         let turn = half_s * omega;
         data.current_a = Dq { d: after * (n.d + turn * n.q), q: after * (n.q - turn * n.d) };
-        self.output(Dq { d: mean * n.d, q: mean * n.q }, bus_power_w, input.resistance_ohm)
+        self.output(Dq { d: mean * n.d, q: mean * n.q }, bus_w)
     }
 
     /// The current along the fixed axis at the start of a step, when the axis stood `turn` radians further on.
@@ -290,12 +290,8 @@ impl PmsmModel {
     }
 
     #[inline]
-    fn output(&self, mean: Dq, bus_power_w: f64, resistance_ohm: f64) -> PmsmOutput {
-        PmsmOutput {
-            torque_nm: self.torque_nm(mean),
-            bus_power_w,
-            heat_w: 1.5 * resistance_ohm * (mean.d * mean.d + mean.q * mean.q),
-        }
+    fn output(&self, mean: Dq, bus_w: f64) -> PmsmOutput {
+        PmsmOutput { torque_nm: self.torque_nm(mean), bus_w, heat_w_per_ohm: 1.5 * (mean.d * mean.d + mean.q * mean.q) }
     }
 }
 

@@ -68,15 +68,15 @@ impl SupplyData {
     }
 }
 
-/// Mean powers of one step.
+/// Energies of one step.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct SupplyOutput {
     /// What the source gave behind its inner resistance: into the capacitor.
-    pub source_w: f64,
+    pub source_j: f64,
     /// What the drive's electronics took.
-    pub consumption_w: f64,
+    pub consumption_j: f64,
     /// Heat of the bleeder.
-    pub bleeder_w: f64,
+    pub bleeder_j: f64,
 }
 
 impl SupplyModel {
@@ -91,14 +91,14 @@ impl SupplyModel {
     #[inline]
     pub fn step(&self, data: &mut SupplyData, dt_s: f64, load_w: f64, bleeder_on: bool) -> SupplyOutput {
         let before = data.bus_v;
-        let consumption_w = if before > self.consumption_from_v { self.consumption_w } else { 0.0 };
-        let bleeder_s = if bleeder_on && !data.bleeder_burnt { 1.0 / self.bleeder.resistance_ohm } else { 0.0 };
+        let consumption_j = if before > self.consumption_from_v { self.consumption_w * dt_s } else { 0.0 };
+        let bleeder_on = bleeder_on && !data.bleeder_burnt;
         let step = BusStep {
-            store_s: 2.0 * self.capacitance_f / dt_s,
-            source_s: 1.0 / self.source_resistance_ohm,
+            store: 2.0 * self.capacitance_f,
+            source: dt_s / self.source_resistance_ohm,
             source_v: if data.connected { data.source_v } else { 0.0 },
-            bleeder_s,
-            power_w: load_w + consumption_w,
+            bleeder: if bleeder_on { dt_s / self.bleeder.resistance_ohm } else { 0.0 },
+            load_j: load_w * dt_s + consumption_j,
         };
         // The diode conducts when that leads to a bus below the source.
         let guess = before < step.source_v;
@@ -107,17 +107,15 @@ impl SupplyModel {
         let mean = if conducts == guess { mean } else { step.mean_voltage(before, conducts) };
         data.bus_v = (2.0 * mean - before).max(0.0);
 
-        let bleeder_w = bleeder_s * mean * mean;
-        self.warm_bleeder(data, dt_s, bleeder_w);
-        let source_a = if conducts { (step.source_v - mean) * step.source_s } else { 0.0 };
-        SupplyOutput { source_w: source_a * mean, consumption_w, bleeder_w }
+        let bleeder_j = step.bleeder * mean * mean;
+        if bleeder_j != 0.0 || data.bleeder_load != 0.0 {
+            self.warm_bleeder(data, dt_s, bleeder_j / dt_s);
+        }
+        let source_j = if conducts { (step.source_v - mean) * step.source * mean } else { 0.0 };
+        SupplyOutput { source_j, consumption_j, bleeder_j }
     }
 
-    #[inline]
     fn warm_bleeder(&self, data: &mut SupplyData, dt_s: f64, bleeder_w: f64) {
-        if bleeder_w == 0.0 && data.bleeder_load == 0.0 {
-            return;
-        }
         let mut body = BodyData { temperature_c: data.bleeder_load, hold_c: None };
         self.bleeder.body().step(&mut body, dt_s, bleeder_w, 0.0);
         data.bleeder_load = body.temperature_c;
@@ -125,24 +123,24 @@ impl SupplyModel {
     }
 }
 
-/// One step of the bus: conductances and the constant power.
+/// One step of the bus, all conductances times its length.
 struct BusStep {
-    store_s: f64,
-    source_s: f64,
+    store: f64,
+    source: f64,
     source_v: f64,
-    bleeder_s: f64,
-    power_w: f64,
+    bleeder: f64,
+    load_j: f64,
 }
 
 impl BusStep {
-    /// `a V^2 - b V + P = 0` for the mean voltage, with `a` the sum of the conductances and `b` their currents.
+    /// `a V^2 - b V + E = 0` for the mean voltage, with `a` the sum of the conductances and `b` their currents.
     #[inline]
     fn mean_voltage(&self, before: f64, source_conducts: bool) -> f64 {
-        let source_s = if source_conducts { self.source_s } else { 0.0 };
-        let a = self.store_s + source_s + self.bleeder_s;
-        let b = self.store_s * before + source_s * self.source_v;
-        let discriminant = (b * b - 4.0 * a * self.power_w).max(0.0);
-        (b + libm::sqrt(discriminant)) / (2.0 * a)
+        let source = if source_conducts { self.source } else { 0.0 };
+        let a = self.store + source + self.bleeder;
+        let b = self.store * before + source * self.source_v;
+        let discriminant = (b * b - 4.0 * a * self.load_j).max(0.0);
+        (b + libm::sqrt(discriminant)) * (0.5 / a)
     }
 }
 
@@ -174,7 +172,7 @@ mod tests {
         let before = SUPPLY.stored_energy_j(&data);
         for _ in 0..1000 {
             let out = SUPPLY.step(&mut data, 50e-6, -100.0, false);
-            assert_eq!(out.source_w, 0.0);
+            assert_eq!(out.source_j, 0.0);
         }
         // 100 W for 50 ms into the capacitor.
         assert!((SUPPLY.stored_energy_j(&data) - before - 5.0).abs() < 1e-9);

@@ -91,6 +91,7 @@ impl<const N: usize> Node<N> {
         self.sdo.reset();
         self.emcy = emcy::Producer::new();
         self.pending = Pending::NONE;
+        self.events.clear();
         self.last_addressed = None;
         self.take_up_objects();
         self.pending.insert(Source::BootUp);
@@ -131,7 +132,7 @@ impl<const N: usize> Node<N> {
     /// What happened since, in the order of arrival. Poll after every `handle_*`.
     #[inline]
     pub fn poll_event(&mut self) -> Option<NodeEvent> {
-        if self.events.is_empty() { None } else { self.events.pop_front() }
+        self.events.pop_front()
     }
 
     /// When the last frame for this node arrived (SDO request, RPDO, NMT command to it or to all): for a watch over
@@ -224,7 +225,8 @@ impl<const N: usize> Node<N> {
         self.push(NodeEvent::Nmt(state));
         if state.allows_pdo() {
             for position in 0..PdoNumber::COUNT {
-                self.start_tpdo(position);
+                self.tpdos[position].start(self.now);
+                self.offer_tpdo(position);
             }
         } else {
             self.stop_pdos();
@@ -252,30 +254,19 @@ impl<const N: usize> Node<N> {
         }
     }
 
-    fn start_tpdo(&mut self, position: usize) {
-        self.tpdos[position].start(self.now);
-        self.offer_tpdo(position);
-    }
-
-    /// Marks a due TPDO as ready, or sees that it is looked at when it will be.
+    /// Offers a TPDO if it is due and not inhibited, and sees that it is looked at when it will be.
     #[inline]
     fn offer_tpdo(&mut self, position: usize) {
         let tpdo = &self.tpdos[position];
-        if tpdo.is_ready(self.now) {
-            self.pending.insert(Source::Tpdo(position));
-        } else {
-            self.deadline = self.deadline.min(tpdo.deadline());
-        }
+        self.pending.set(Source::Tpdo(position), tpdo.is_ready(self.now));
+        self.deadline = self.deadline.min(tpdo.deadline(self.now));
     }
 
     fn offer_emcy(&mut self) {
-        if !self.state.allows_sdo() {
-            return;
-        }
-        if self.emcy.is_ready(self.now) {
-            self.pending.insert(Source::Emcy);
-        } else {
-            self.deadline = self.deadline.min(self.emcy.deadline());
+        let may_send = self.state.allows_sdo() && self.emcy_id.is_some();
+        self.pending.set(Source::Emcy, may_send && self.emcy.is_ready(self.now));
+        if may_send {
+            self.deadline = self.deadline.min(self.emcy.deadline(self.now));
         }
     }
 
@@ -288,16 +279,13 @@ impl<const N: usize> Node<N> {
         let _ = self.events.push_back(event);
     }
 
-    /// Finds the earliest deadline of all services.
+    /// Finds the earliest deadline of all services, and offers what has become ready.
     fn reschedule(&mut self) {
-        let services = self.heartbeat.deadline().min(self.sdo.deadline());
-        let emcy = if self.pending.contains(Source::Emcy) || !self.state.allows_sdo() {
-            Instant::FAR_FUTURE
-        } else {
-            self.emcy.deadline()
-        };
-        let tpdos = self.tpdos.iter().map(|tpdo| tpdo.deadline()).min().unwrap_or(Instant::FAR_FUTURE);
-        self.deadline = services.min(emcy).min(tpdos);
+        self.deadline = self.heartbeat.deadline().min(self.sdo.deadline());
+        self.offer_emcy();
+        for position in 0..PdoNumber::COUNT {
+            self.offer_tpdo(position);
+        }
     }
 
     fn pending_id(&self, source: Source) -> u32 {
@@ -320,7 +308,7 @@ impl<const N: usize> Node<N> {
             Source::SdoReply => self.sdo.take_reply().map(|bytes| Frame::full(cob::sdo_reply(self.node_id), bytes)),
             Source::Tpdo(position) => {
                 let frame = self.tpdos[position].take(&self.dictionary.view(), self.now);
-                self.deadline = self.deadline.min(self.tpdos[position].deadline());
+                self.deadline = self.deadline.min(self.tpdos[position].deadline(self.now));
                 frame
             }
             Source::Emcy => {
@@ -371,10 +359,14 @@ impl<const N: usize> Station for Node<N> {
         self.now = now;
         if Some(frame.id()) == self.emcy_id {
             self.emcy.handle_transmitted(now);
+            self.offer_emcy();
             return;
         }
-        if let Some(tpdo) = self.tpdos.iter_mut().find(|tpdo| tpdo.is_active() && tpdo.can_id() == frame.id()) {
-            tpdo.handle_transmitted(now);
+        for position in 0..PdoNumber::COUNT {
+            if self.tpdos[position].can_id() == frame.id() {
+                self.tpdos[position].handle_transmitted(now);
+                self.offer_tpdo(position);
+            }
         }
     }
 }
@@ -388,10 +380,8 @@ impl<const N: usize> Node<N> {
         if self.sdo.has_reply() {
             self.pending.insert(Source::SdoReply);
         }
-        self.offer_emcy();
-        for position in 0..PdoNumber::COUNT {
-            self.tpdos[position].handle_timeout(self.now);
-            self.offer_tpdo(position);
+        for tpdo in &mut self.tpdos {
+            tpdo.handle_timeout(self.now);
         }
         self.reschedule();
     }
@@ -419,9 +409,13 @@ impl<const N: usize> Node<N> {
         self.receivers.set_sync(cob_id.and_then(|cob_id| cob_id.can_id().as_standard()));
     }
 
+    /// 1014h, or what it would be by default on a device without it.
+    fn emcy_cob_id(&self) -> CobId {
+        self.object(0x1014).map_or(CobId(cob::emcy(self.node_id).raw()), CobId)
+    }
+
     fn take_up_emcy(&mut self) {
-        let default = CobId(cob::emcy(self.node_id).raw());
-        let cob_id = self.object(0x1014).map_or(default, CobId);
+        let cob_id = self.emcy_cob_id();
         self.emcy_id = (self.profile.emcy && cob_id.is_valid()).then(|| cob_id.can_id());
         self.emcy.set_inhibit_time(self.object(0x1015).unwrap_or(0) as u16);
     }

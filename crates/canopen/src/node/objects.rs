@@ -4,7 +4,7 @@ use super::pending::Source;
 use super::{Node, NodeEvent, Via};
 use crate::heartbeat;
 use crate::od::{Slot, View};
-use crate::pdo::parameter::{COB_ID, INHIBIT_TIME, TRANSMISSION_TYPE, check_identifier};
+use crate::pdo::parameter::{COB_ID, INHIBIT_TIME, TRANSMISSION_TYPE};
 use crate::pdo::{
     Direction, Mapping, MappingRecord, Parameter, RPDO_MAPPING, RPDO_PARAMETER, Rpdo, TPDO_MAPPING, TPDO_PARAMETER,
     Tpdo, TransmissionType,
@@ -59,8 +59,8 @@ impl<const N: usize> Node<N> {
         match (mux.index, Record::of(mux.index)) {
             // A consumer of SYNC only: bit 30 would make it a producer.
             (0x1005, _) if raw & CobId::NO_RTR != 0 => Err(AbortCode::INVALID_VALUE),
-            (0x1005, _) => check_identifier(CobId(raw & !CobId::INVALID)),
-            (0x1014, _) => check_identifier(CobId(raw)),
+            (0x1005, _) => CobId(raw & !CobId::INVALID).check_identifier(),
+            (0x1014, _) => self.emcy_cob_id().check_change(CobId(raw), self.profile.pdo_changes_while_valid),
             (_, Record::Parameter(..)) => self.check_parameter(&values, mux, raw),
             (_, Record::Mapping(direction, _)) => self.check_mapping(&values, mux, raw, direction),
             _ => Ok(()),
@@ -71,7 +71,7 @@ impl<const N: usize> Node<N> {
         let while_valid = self.profile.pdo_changes_while_valid;
         let parameter = Parameter::read(values, mux.index);
         match mux.sub_index {
-            COB_ID => parameter.check_cob_id(CobId(raw), while_valid),
+            COB_ID => parameter.cob_id.check_change(CobId(raw), while_valid),
             TRANSMISSION_TYPE => TransmissionType::from_raw(raw as u8).map(|_| ()),
             INHIBIT_TIME if parameter.cob_id.is_valid() && !while_valid => Err(AbortCode::UNSUPPORTED_ACCESS),
             _ => Ok(()),
@@ -99,20 +99,18 @@ impl<const N: usize> Node<N> {
     fn take_up(&mut self, mux: Mux) {
         match (mux.index, Record::of(mux.index)) {
             (0x1005, _) => self.take_up_sync(),
-            (0x1014 | 0x1015, _) => {
-                self.take_up_emcy();
-                if self.emcy_id.is_none() {
-                    self.pending.remove(Source::Emcy);
-                }
-            }
+            (0x1014 | 0x1015, _) => self.take_up_emcy(),
             (0x1017, _) => self.heartbeat = heartbeat::Producer::from_write(self.heartbeat_period_ms(), self.now),
             (_, Record::Parameter(Direction::Receive, position) | Record::Mapping(Direction::Receive, position)) => {
                 self.take_up_rpdo(position);
             }
             (_, Record::Parameter(Direction::Transmit, position) | Record::Mapping(Direction::Transmit, position)) => {
+                let old = self.tpdos[position];
                 self.take_up_tpdo(position);
-                if self.state.allows_pdo() {
-                    self.start_tpdo(position);
+                match (self.state.allows_pdo(), old.is_active()) {
+                    (true, true) => self.tpdos[position].take_over_from(&old, self.now),
+                    (true, false) => self.tpdos[position].start(self.now),
+                    (false, _) => {}
                 }
             }
             _ => {}
@@ -144,6 +142,5 @@ impl<const N: usize> Node<N> {
             self.profile.inhibit_unit_ns,
             self.profile.event_timer_unit_ns,
         );
-        self.pending.remove(Source::Tpdo(position));
     }
 }

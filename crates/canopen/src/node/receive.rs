@@ -92,10 +92,10 @@ impl<const N: usize> Node<N> {
 
     #[inline]
     fn receive_sdo(&mut self, frame: &Frame) {
+        self.last_addressed = Some(self.now);
         if !self.state.allows_sdo() {
             return;
         }
-        self.last_addressed = Some(self.now);
         if let Some(write) = self.sdo.handle_frame(frame, &self.dictionary.view(), self.now) {
             let result = self.write(write.slot, write.raw, Via::Sdo);
             self.sdo.finish(write, result);
