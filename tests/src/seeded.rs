@@ -3,7 +3,7 @@
 //! `FERRODRIVE_SEED=123 cargo test -p ferrodrive-tests` tries other input; a failure prints the seed that it needs.
 
 /// How many inputs a property test tries.
-const RUNS: u64 = 3_000;
+const RUNS: u64 = 20_000;
 
 /// A small generator (SplitMix64). Not for secrets.
 #[derive(Debug, Clone)]

@@ -68,12 +68,23 @@ pub fn modulate(voltage_v: AlphaBeta, bus_v: f32) -> [f32; 3] {
     if bus_v <= 0.0 {
         return [0.5; 3];
     }
-    let phases = inverse_clarke(voltage_v);
-    let highest = phases[0].max(phases[1]).max(phases[2]);
-    let lowest = phases[0].min(phases[1]).min(phases[2]);
-    let centre = 0.5 * (highest + lowest);
     let per_volt = 1.0 / bus_v;
-    phases.map(|v| ((v - centre) * per_volt + 0.5).clamp(0.0, 1.0))
+    let phases = inverse_clarke(voltage_v);
+    let centre = 0.5 - 0.5 * (highest(phases) + lowest(phases)) * per_volt;
+    phases.map(|v| (v * per_volt + centre).clamp(0.0, 1.0))
+}
+
+/// Plain comparisons: `f32::max` pays for a rule about values that are no number.
+#[inline]
+fn highest([u, v, w]: [f32; 3]) -> f32 {
+    let of_two = if u > v { u } else { v };
+    if of_two > w { of_two } else { w }
+}
+
+#[inline]
+fn lowest([u, v, w]: [f32; 3]) -> f32 {
+    let of_two = if u < v { u } else { v };
+    if of_two < w { of_two } else { w }
 }
 
 /// What the controller knows of the motor and how it is set.

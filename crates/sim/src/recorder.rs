@@ -4,8 +4,8 @@
 //! and is taken out again with its samples. It looks at machines without touching them: a run with a
 //! recorder is the same run.
 
+use core::time::Duration;
 use std::fmt::Write;
-use std::time::Duration;
 
 use can::Instant;
 

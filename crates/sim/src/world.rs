@@ -8,7 +8,7 @@ mod member;
 mod step;
 mod tap;
 
-use std::time::Duration;
+use core::time::Duration;
 
 use can::{Bitrate, Frame, Instant, Station};
 

@@ -39,3 +39,9 @@ fn a_station_that_never_serves_its_deadline_does_not_stop_the_world() {
     world.run_until(Instant::from_millis(3));
     assert_eq!(world.now(), Instant::from_millis(3));
 }
+
+#[test]
+fn a_world_can_move_to_another_thread() {
+    fn send<T: Send>(_: &T) {}
+    send(&World::new(Bitrate::K500, 1));
+}

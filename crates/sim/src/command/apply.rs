@@ -1,3 +1,5 @@
+//! Does what a command says, and words the answer.
+
 use std::collections::BTreeMap;
 
 use can::Instant;

@@ -1,3 +1,5 @@
+//! From a line to a [`Command`]. What a line may say stands in the usage texts below.
+
 use std::str::FromStr;
 
 use super::{Action, Command, CommandError};

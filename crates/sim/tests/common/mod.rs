@@ -1,5 +1,5 @@
 //! Stations and short words that the tests of this crate share.
-#![allow(dead_code, unreachable_pub)]
+#![allow(dead_code, unreachable_pub, reason = "each test binary uses a part of it")]
 
 use std::collections::VecDeque;
 use std::time::Duration;
