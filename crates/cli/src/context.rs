@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use canopen::{AbortCode, Mux, NodeId};
 use cia402::PowerCommand;
+use master::drive::Drive;
 use master::{Error, Network, Node};
 
 use crate::args::Global;
@@ -73,6 +74,17 @@ impl Context {
                 .because("its identity (1018h) fits no model, or more than one")
                 .next(format!("say which it is with --model {id}=MODEL, where MODEL is one of: {}", models::names()))
         })
+    }
+
+    /// A drive of a known model.
+    pub(crate) async fn known_drive(&self, id: NodeId) -> Result<Drive, Failure> {
+        Ok(Drive::new(self.node(id), self.known_model_of(id).await?))
+    }
+
+    /// A drive, of a known model or not.
+    pub(crate) async fn drive(&self, id: NodeId) -> Result<Drive, Failure> {
+        let model = self.model_of(id).await?;
+        Ok(model.map_or_else(|| Drive::of_unknown_model(self.node(id)), |model| Drive::new(self.node(id), model)))
     }
 
     /// Quick stop, whatever the node is doing.

@@ -6,7 +6,7 @@ use std::time::Duration;
 use can::Bitrate;
 use canopen::NodeId;
 use master::Network;
-use sim::World;
+use sim::{VirtualDrive, World};
 
 use crate::failure::Failure;
 use crate::models::DriveProfile;
@@ -26,6 +26,16 @@ pub(crate) fn world(file: Option<&Path>) -> Result<Embedded, Failure> {
         return Err(Failure::usage(format!("machine files such as {} are not read yet", path.display())));
     }
     Ok((World::new(Bitrate::K500, SEED), Vec::new()))
+}
+
+/// A factory-fresh virtual drive of a model.
+pub(crate) fn virtual_drive(
+    model: &DriveProfile,
+    node: NodeId,
+    bitrate: Bitrate,
+) -> Result<Box<dyn VirtualDrive>, Failure> {
+    let _ = (node, bitrate);
+    Err(Failure::new(format!("there is no virtual {} yet", model.model)))
 }
 
 /// Waits for the boot-up message of every drive.

@@ -85,13 +85,15 @@ impl Sim {
             self.add_drive(&mut world, spec, eeproms.as_ref())?;
         }
         let log = self.log.as_ref().map(File::create).transpose().map_err(|error| {
-            Failure::new(format!("cannot write the log {}", self.log.clone().unwrap_or_default().display())).because(error)
+            Failure::new(format!("cannot write the log {}", self.log.clone().unwrap_or_default().display()))
+                .because(error)
         })?;
         let keeper = eeproms.map(|eeproms| Keeper::start(eeproms, &mut world));
         let log = log.map(|file| LogWriter::new(BufWriter::new(file), "can0"));
         let world = ServedWorld::new(world, log.is_some());
         let runtime = runtime()?;
-        let ended = runtime.block_on(self.serve(world, Records { keeper, log, unix_zero: Duration::ZERO }, global, bridge));
+        let ended =
+            runtime.block_on(self.serve(world, Records { keeper, log, unix_zero: Duration::ZERO }, global, bridge));
         // Threads that wait for standard input must not hold up the end.
         runtime.shutdown_background();
         ended
@@ -108,7 +110,7 @@ impl Sim {
     }
 
     fn add_drive(&self, world: &mut World, spec: &DriveSpec, eeproms: Option<&Eeproms>) -> Result<(), Failure> {
-        let mut drive = embedded::virtual_drive(spec.model, spec.node, self.bitrate);
+        let mut drive = embedded::virtual_drive(spec.model, spec.node, self.bitrate)?;
         let name = file_name(spec.model.model, spec.node.raw());
         if let Some(image) = eeproms.map(|eeproms| eeproms.load(&name, spec.model.model)).transpose()?.flatten() {
             drive.load_nvm(&image).map_err(|error| {
@@ -141,7 +143,11 @@ impl Sim {
             tokio::spawn(join_buses(bus, inner, clock.clone(), requests.clone(), global.clone()));
         }
         let listeners = hub.listeners()[..self.places.len()].iter().map(|listener| format!(" {listener}"));
-        say(&format!("ready{}{}", listeners.collect::<String>(), bridge.map(|bus| format!(" {bus}")).unwrap_or_default()));
+        say(&format!(
+            "ready{}{}",
+            listeners.collect::<String>(),
+            bridge.map(|bus| format!(" {bus}")).unwrap_or_default()
+        ));
         tokio::spawn(tick(requests.clone(), clock.clone()));
         std::thread::spawn(move || read_lines(&requests));
         let ended = run_world(&mut world, &mut hub, &clock, &mut incoming, |world, request| {
@@ -257,7 +263,6 @@ async fn join_buses(
         }
     };
     let lost: Result<std::convert::Infallible, transport::BusError> = carried.await;
-    if let Err(error) = lost {
-        let _ = requests.send(Request::BridgeLost(bus_failure(&global, &error))).await;
-    }
+    let Err(error) = lost;
+    let _ = requests.send(Request::BridgeLost(bus_failure(&global, &error))).await;
 }

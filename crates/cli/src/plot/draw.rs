@@ -103,15 +103,18 @@ fn draw_panel(svg: &mut Svg, layout: &Layout, top: f64, panel: &Panel) {
     let after_title = LEFT + 12.0 + NAME.width(panel.title);
     svg.text((after_title, top + 15.0), Anchor::Start, AXIS, panel.unit);
     for trace in &panel.traces {
-        let pixels = trace.points.iter().map(|&(t_s, value)| (layout.x(t_s), y(value)));
-        let line = if trace.style == Style::SetPoint { steps(pixels) } else { thin(pixels) };
-        svg.path(&line, &paint(trace.style));
+        // Where a trace has no value, its line has a gap.
+        for piece in trace.points.split(|point| !point.1.is_finite()).filter(|piece| !piece.is_empty()) {
+            let pixels = piece.iter().map(|&(t_s, value)| (layout.x(t_s), y(value)));
+            let line = if trace.style == Style::SetPoint { steps(pixels) } else { thin(pixels) };
+            svg.path(&line, &paint(trace.style));
+        }
     }
     trace_labels(svg, top, &panel.traces, y);
 }
 
 fn trace_labels(svg: &mut Svg, top: f64, traces: &[Trace], y: impl Fn(f64) -> f64) {
-    let ends: Vec<f64> = traces.iter().map(|trace| y(trace.points.last().map_or(0.0, |point| point.1))).collect();
+    let ends: Vec<f64> = traces.iter().map(|trace| y(last_value(trace))).collect();
     let heights = lanes::spread(&ends, LABEL_GAP, top + 6.0, top + PANEL_HEIGHT - 2.0);
     for (trace, height) in traces.iter().zip(heights) {
         let x = WIDTH - RIGHT + 8.0;
@@ -119,6 +122,11 @@ fn trace_labels(svg: &mut Svg, top: f64, traces: &[Trace], y: impl Fn(f64) -> f6
         let font = Font { size: 12.0, colour: text_colour(trace.style), bold: matches!(trace.style, Style::Actual(_)) };
         svg.text((x + 19.0, height + 4.0), Anchor::Start, font, trace.label);
     }
+}
+
+/// Where the label belongs: at the last value that there is.
+fn last_value(trace: &Trace) -> f64 {
+    trace.points.iter().rev().map(|point| point.1).find(|value| value.is_finite()).unwrap_or(0.0)
 }
 
 /// A lane for each event's label, so that labels do not overlap.

@@ -85,7 +85,9 @@ fn write_all(eeproms: &Eeproms, incoming: &Receiver<(String, Image)>) -> Result<
         waiting.extend(received.into_iter().chain(incoming.try_iter()));
         match write_waiting(eeproms, &mut waiting) {
             Some(error) if over => return Err(error),
-            Some(error) => drop(writeln!(io::stderr(), "warning: {error}; the file keeps its old contents, trying again")),
+            Some(error) => {
+                drop(writeln!(io::stderr(), "warning: {error}; the file keeps its old contents, trying again"))
+            }
             None if over => return Ok(()),
             None => {}
         }
