@@ -21,8 +21,8 @@ use can::{Frame, Instant, Station};
 use canopen::cob::Service;
 use canopen::emcy::Emcy;
 use canopen::heartbeat::Heartbeat;
-use canopen::nmt::NmtRequest;
-use canopen::{Mux, NmtState, NodeId};
+use canopen::nmt::{NmtRequest, NmtTarget};
+use canopen::{Mux, NmtCommand, NmtState, NodeId};
 
 pub use event::Event;
 pub use facts::{HeartbeatWatch, NodeFacts};
@@ -130,7 +130,7 @@ impl Core {
             Command::Request(ticket, request) => self.start_request(ticket, request),
             Command::Timer(ticket, after) => self.timers.arm(self.now + after, ticket),
             Command::Cancel(ticket) => self.cancel(ticket),
-            Command::Nmt(target, command) => self.push_frame(NmtRequest::new(command, target).emit()),
+            Command::Nmt(target, command) => self.send_nmt(target, command),
             Command::Sync(period) => self.sync.set_period(period, self.now),
             Command::WatchHeartbeat(node, time) => self.watch_heartbeat(node, time),
             Command::Transmit(frame) => self.push_frame(frame),
@@ -195,6 +195,14 @@ impl Core {
         }
     }
 
+    fn send_nmt(&mut self, target: NmtTarget, command: NmtCommand) {
+        let now = self.now;
+        for node in NodeId::all().filter(|node| target.includes(*node)) {
+            self.member_mut(node).facts.nmt_sent = Some((now, command));
+        }
+        self.push_frame(NmtRequest::new(command, target).emit());
+    }
+
     fn watch_heartbeat(&mut self, node: NodeId, time: Option<Duration>) {
         let facts = &mut self.member_mut(node).facts;
         facts.heartbeat_watch = time.map(|time| HeartbeatWatch { time, deadline: None, lost: false });
@@ -250,10 +258,9 @@ impl Core {
         let Some(state) = Heartbeat::parse(frame).and_then(Heartbeat::nmt_state) else { return };
         let facts = &mut self.member_mut(node).facts;
         let before = facts.nmt_state.replace(state);
-        let back = facts.note_heartbeat(now);
+        let back = facts.note_heartbeat(state, now);
         let deadline = facts.heartbeat_watch.and_then(|watch| watch.deadline);
         if state == NmtState::Initialising {
-            facts.boot_up = Some((now, facts.boot_up.map_or(1, |(_, count)| count.saturating_add(1))));
             self.events.push(Event::BootUp(node), now);
         } else if before != Some(state) {
             self.events.push(Event::NmtState(node, state), now);

@@ -20,7 +20,7 @@ use canopen::{Mux, NmtCommand, NodeId};
 
 use crate::core::{Command, Core, Event, NodeFacts, NodeSet, Outcome, Received, Ticket};
 
-pub use future::{Sleep, Wait};
+pub use future::{Elapsed, NodeView, Sleep, Wait};
 pub use join::join_all;
 pub use node::{DEFAULT_TIMEOUT, Node};
 
