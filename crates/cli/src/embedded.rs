@@ -44,7 +44,7 @@ pub(crate) async fn wait_until_booted(
     drives: &[(NodeId, &'static DriveProfile)],
 ) -> Result<(), Failure> {
     for (node, _) in drives {
-        let booted = network.node(*node).wait(|facts| facts.boot_up, BOOT_PATIENCE).await;
+        let booted = network.node(*node).wait(|node| node.facts.boot_up, BOOT_PATIENCE).await;
         booted.map_err(|_| Failure::new(format!("the virtual drive at node {node} did not boot")))?;
     }
     Ok(())

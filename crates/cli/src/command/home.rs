@@ -34,7 +34,10 @@ impl Home {
         }
         failure
             .because(format!("the {} has no homing: 6060h takes {modes} only, and there is no 6098h", model.title))
-            .next(format!("move it to its reference, then set the position to zero there: ferrodrive write {} 2006 1", self.node))
+            .next(format!(
+                "move it to its reference, then set the position to zero there: ferrodrive write {} 2006 1",
+                self.node
+            ))
     }
 }
 

@@ -19,7 +19,9 @@ use crate::parse::node::node;
 ///
 /// Enables the drive and returns when the speed is reached; the motor goes on turning. With --for it is stopped again.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  ferrodrive velocity 4 60rpm --for 2s\n  ferrodrive velocity 4 -360deg/s --acceleration 120rpm/s")]
+#[command(
+    after_help = "Examples:\n  ferrodrive velocity 4 60rpm --for 2s\n  ferrodrive velocity 4 -360deg/s --acceleration 120rpm/s"
+)]
 pub(crate) struct Velocity {
     /// Node-ID
     #[arg(value_parser = node)]

@@ -38,7 +38,8 @@ fn sections(finished: &Finished) -> Vec<Section> {
     let section = |(begin, number, name): &(can::Instant, &str, &str), end: can::Instant| Section {
         from_s: begin.as_secs_f64(),
         to_s: end.as_secs_f64(),
-        names: vec![format!("{number} {name}"), (*number).into()],
+        number: (*number).into(),
+        names: [*name].into_iter().chain(name.split(' ').next_back()).map(Into::into).collect(),
     };
     begins.zip(ends).map(|(begin, end)| section(begin, end)).collect()
 }
