@@ -301,3 +301,40 @@ fn a_scan_finds_who_answers_and_who_only_beats() {
     // Four windows of 100 ms, not 127 times 100 ms.
     assert!(bus.now - Instant::from_secs(5) < Duration::from_millis(900), "{}", bus.now);
 }
+
+/// Web handlers and multi-threaded runtimes need it.
+#[test]
+fn futures_can_be_sent_between_threads() {
+    fn assert_send<T: Send>(_: T) {}
+    let (bus, drive) = bus_with(|_| {});
+    let node = bus.network.node(node(4));
+    assert_send(drive.enable());
+    assert_send(drive.disable());
+    assert_send(drive.quick_stop());
+    assert_send(drive.stop());
+    assert_send(drive.reset_fault());
+    assert_send(drive.velocity(Rpm(1.0), MotionOptions::default()));
+    assert_send(drive.move_absolute(Turns(1.0), MotionOptions::default()));
+    assert_send(drive.state());
+    assert_send(node.reset(Duration::ZERO));
+    assert_send(bus.network.scan(Duration::ZERO, |_| {}));
+    assert_send(bus.network.stop_all_moved());
+}
+
+#[test]
+fn a_move_after_a_stop_replaces_the_halted_one() {
+    let (mut bus, drive) = bus_with(|_| {});
+    let network = bus.network.clone();
+    bus.block_on(async {
+        let options = MotionOptions { wait: false, ..MotionOptions::default() };
+        drive.move_absolute(Turns(10.0), options).await.unwrap();
+        network.sleep(Duration::from_secs(1)).await;
+        drive.stop().await.unwrap();
+    });
+    let halted_at = object(&bus, 0x6064);
+    assert!((8_000..8_600).contains(&halted_at), "{halted_at}");
+    bus.block_on(drive.move_absolute(Turns(1.0), MotionOptions::default())).unwrap();
+    assert_eq!(object(&bus, 0x6064), 4096);
+    // Halt stays until the edge that takes the new set-point at once (bit 5).
+    assert_eq!(toy(&bus).controlwords[6..], [0x010F, 0x010F, 0x3F, 0x0F]);
+}

@@ -1,6 +1,6 @@
 //! Cost of a drive's control periods: the current loop with its sensors, the outer loops, a profile.
 
-#[allow(dead_code)]
+#[expect(dead_code, reason = "the bench needs a part of the rig")]
 #[path = "../tests/rig/mod.rs"]
 mod rig;
 

@@ -38,7 +38,7 @@ pub struct AlphaBeta {
 /// Three phase values to a vector; a common part is dropped.
 #[inline]
 pub fn clarke([u, v, w]: [f32; 3]) -> AlphaBeta {
-    AlphaBeta { alpha: (2.0 * u - v - w) * (1.0 / 3.0), beta: (v - w) * INV_SQRT_3 }
+    AlphaBeta { alpha: u * (2.0 / 3.0) - (v + w) * (1.0 / 3.0), beta: (v - w) * INV_SQRT_3 }
 }
 
 /// A vector to three phase values of sum zero.
@@ -69,8 +69,9 @@ pub fn modulate(voltage_v: AlphaBeta, bus_v: f32) -> [f32; 3] {
         return [0.5; 3];
     }
     let per_volt = 1.0 / bus_v;
+    let half_per_volt = 0.5 * per_volt;
     let phases = inverse_clarke(voltage_v);
-    let centre = 0.5 - 0.5 * (highest(phases) + lowest(phases)) * per_volt;
+    let centre = 0.5 - (highest(phases) + lowest(phases)) * half_per_volt;
     phases.map(|v| (v * per_volt + centre).clamp(0.0, 1.0))
 }
 

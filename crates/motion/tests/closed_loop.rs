@@ -5,6 +5,7 @@ mod rig;
 
 use motion::cascade::{PositionDemand, VelocityDemand};
 use motion::scurve::PositionMove;
+use plant::HubMotorModel;
 use rig::{AT_1_KHZ, AT_4_KHZ, COUNTS_PER_TURN, Rig, rad_s};
 
 #[test]
@@ -56,6 +57,26 @@ fn a_velocity_step_without_a_ramp_overshoots_less_than_ten_percent() {
     }
     assert!(peak < target * 1.10, "{peak} of {target}");
     assert!((rig.motor.rotor.velocity_rad_s as f32 - target).abs() < 0.01 * target);
+}
+
+#[test]
+fn the_fast_winding_runs_at_a_thousand_turns_per_minute() {
+    let mut rig = Rig::with_motor(HubMotorModel::ZLLG65ASM250, AT_4_KHZ);
+    let target = rad_s(1000.0);
+    let profile = motion::scurve::velocity_change(0.0, f64::from(target), 0.5);
+    let mut peak = 0.0_f64;
+    for tick in 0..30_000 {
+        let point = profile.at(f64::from(tick) * 50e-6);
+        let demand =
+            VelocityDemand { velocity_rad_s: point.velocity as f32, acceleration_rad_s2: point.acceleration as f32 };
+        rig.tick_velocity(&demand);
+        peak = peak.max(rig.motor.rotor.velocity_rad_s);
+    }
+    let target = f64::from(target);
+    assert!(peak < 1.1 * target, "{peak} of {target}");
+    assert!((rig.motor.rotor.velocity_rad_s - target).abs() < 0.01 * target);
+    // The field is kept where it belongs: no d current to speak of.
+    assert!(rig.motor.pmsm.current_a.d.abs() < 0.5, "{:?}", rig.motor.pmsm.current_a);
 }
 
 #[test]

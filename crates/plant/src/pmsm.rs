@@ -87,7 +87,8 @@ impl Terminals {
     #[inline]
     pub fn from_duties(duty: [f64; 3], bus_v: f64) -> Self {
         let [u, v, w] = duty.map(|d| if d > 0.0 { d.min(1.0) } else { 0.0 });
-        Terminals::Driven { alpha_v: (2.0 * u - v - w) * (bus_v / 3.0), beta_v: (v - w) * (bus_v * INV_SQRT_3) }
+        let third_v = bus_v * (1.0 / 3.0);
+        Terminals::Driven { alpha_v: u * (2.0 * third_v) - (v + w) * third_v, beta_v: (v - w) * (bus_v * INV_SQRT_3) }
     }
 }
 

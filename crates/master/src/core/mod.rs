@@ -131,7 +131,10 @@ impl Core {
             Command::Timer(ticket, after) => self.timers.arm(self.now + after, ticket),
             Command::Cancel(ticket) => self.cancel(ticket),
             Command::Nmt(target, command) => self.send_nmt(target, command),
-            Command::Sync(period) => self.sync.set_period(period, self.now),
+            Command::Sync(period) => {
+                self.sync.set_period(period, self.now);
+                self.produce_sync();
+            }
             Command::WatchHeartbeat(node, time) => self.watch_heartbeat(node, time),
             Command::Transmit(frame) => self.push_frame(frame),
         }
@@ -165,11 +168,6 @@ impl Core {
     /// Last values of mapped objects, to change mappings and values to send.
     pub const fn image_mut(&mut self) -> &mut Image {
         &mut self.image
-    }
-
-    /// True if there may be a frame to send.
-    pub fn wants_transmit(&self) -> bool {
-        !self.outbox.is_empty() || !self.sending.is_empty() || self.image.has_pending()
     }
 
     /// The latest time this core was told.
@@ -300,6 +298,12 @@ impl Core {
         }
     }
 
+    fn produce_sync(&mut self) {
+        if self.sync.handle_timeout(self.now) {
+            self.image.handle_sync();
+        }
+    }
+
     fn push_frame(&mut self, frame: Frame) {
         if self.outbox.len() == OUTBOX {
             self.outbox.pop_front();
@@ -372,9 +376,7 @@ impl Station for Core {
         while let Some(ticket) = self.timers.pop_due(now) {
             self.finished.push_back(Finished { ticket, outcome: Ok(Payload::EMPTY) });
         }
-        if self.sync.handle_timeout(now) {
-            self.image.handle_sync();
-        }
+        self.produce_sync();
         self.check_heartbeats();
     }
 

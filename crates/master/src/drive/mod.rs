@@ -6,6 +6,7 @@
 //! While a motion is supervised, the polling keeps the drive's watch over its host content.
 
 mod explain;
+mod goal;
 mod motion;
 mod position;
 mod power;

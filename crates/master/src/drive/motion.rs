@@ -1,12 +1,14 @@
+//! Turning at a speed, pushing with a current, stopping (CiA 402-2, clauses 13 and 15), in physical units.
+
 use core::fmt;
 use std::time::Duration;
 
 use canopen::Mux;
-use cia402::{Controlword, ModeOfOperation, PowerState, Statusword};
+use cia402::{Controlword, ModeOfOperation, PowerState};
 use drives::profile::Quirk;
 
-use super::explain::Trigger;
-use super::{CONTROLWORD, Drive, POLL};
+use super::goal::Goal;
+use super::{CONTROLWORD, Drive};
 use crate::error::Error;
 use crate::units::{Amperes, Ramp, Rpm};
 
@@ -55,8 +57,8 @@ impl fmt::Display for Note {
         match self {
             Self::HostWatchdog { object, time } => write!(
                 f,
-                "the drive stops by itself when no frame comes for {} ms ({object}): keep asking it something, or \
-                 set {object} to 0",
+                "the drive stops by itself when no frame for it comes for {} ms ({object}): watching the motion keeps \
+                 it content; when nobody does, ask it something from time to time or set {object} to 0",
                 time.as_millis()
             ),
         }
@@ -91,8 +93,8 @@ impl Drive {
         self.set_mode(ModeOfOperation::PROFILE_VELOCITY).await?;
         self.enable().await?;
         self.node.network().note_moved(self.node.id());
-        self.release_halt().await?;
         self.write_number(units.target_velocity.object, raw).await?;
+        self.release_halt().await?;
         let notes = self.notes().await;
         if !options.wait {
             return Ok(MotionReport { reached_after: None, notes });
@@ -100,13 +102,8 @@ impl Drive {
         let (up, down) = self.ramp_times_s().await?;
         let limit = Duration::from_secs_f64((up.max(down) * LATE_FACTOR + LATE_MARGIN_S).clamp(0.0, 3600.0));
         let band = (target.abs() * REACHED_SHARE).max(REACHED_LEAST_RPM);
-        let late = move |at, waited| Trigger::Late { at, target, unit: "r/min", waited };
-        let reached = self
-            .watch(INTENT, limit, late, async |_: Statusword| {
-                let speed = self.read_quantity(units.actual_velocity).await?;
-                Ok(((speed - target).abs() <= band, speed))
-            })
-            .await?;
+        let goal = Goal::Speed { quantity: units.actual_velocity, target_rpm: target, band_rpm: band };
+        let reached = self.watch(INTENT, goal, limit).await?;
         if target == 0.0 {
             self.node.network().note_stopped(self.node.id());
         }
@@ -130,8 +127,8 @@ impl Drive {
         self.set_mode(ModeOfOperation::PROFILE_TORQUE).await?;
         self.enable().await?;
         self.node.network().note_moved(self.node.id());
-        self.release_halt().await?;
         self.write_number(target.object, raw).await?;
+        self.release_halt().await?;
         Ok(MotionReport { reached_after: None, notes: self.notes().await })
     }
 
@@ -172,46 +169,10 @@ impl Drive {
         Ok(())
     }
 
-    /// Polls the drive until `look` says reached; it gives what to report when it gets late.
-    pub(super) async fn watch(
-        &self,
-        intent: &'static str,
-        limit: Duration,
-        late: impl Fn(f64, Duration) -> Trigger,
-        look: impl AsyncFn(Statusword) -> Result<(bool, f64), Error>,
-    ) -> Result<Duration, Error> {
-        let network = self.node.network();
-        let began = network.now();
-        loop {
-            let statusword = self.still_enabled(intent).await?;
-            let (reached, at) = self.answered(intent, look(statusword).await).await?;
-            let waited = network.now() - began;
-            if reached {
-                return Ok(waited);
-            }
-            if waited >= limit {
-                return Err(self.not_reached(intent, late(at, waited)).await);
-            }
-            network.sleep(POLL).await;
-        }
-    }
-
-    /// The statusword, if the drive still follows set-points.
-    pub(super) async fn still_enabled(&self, intent: &'static str) -> Result<Statusword, Error> {
-        let statusword = self.answered(intent, self.statusword().await).await?;
-        match statusword.state() {
-            Some(PowerState::OperationEnabled) => Ok(statusword),
-            Some(PowerState::Fault | PowerState::FaultReactionActive) => {
-                Err(self.not_reached(intent, Trigger::Fault).await)
-            }
-            _ => Err(self.not_reached(intent, Trigger::LostOperation).await),
-        }
-    }
-
-    /// Takes the halt bit back where it has no set-point waiting behind it.
+    /// Takes a halt bit back that an earlier stop has left, now that the target is the new one.
     async fn release_halt(&self) -> Result<(), Error> {
-        // Write-only controlwords exist: then the plain word is written in any case.
-        let halted = self.node.read::<u16>(CONTROLWORD).await.is_ok_and(|raw| raw & !Controlword::HALT == 0x0F);
+        // A controlword that cannot be read has no halt that this master could know of.
+        let halted = self.node.read::<u16>(CONTROLWORD).await.is_ok_and(|raw| Controlword(raw).has(Controlword::HALT));
         if halted { self.write_controlword(Controlword(0x0F)).await } else { Ok(()) }
     }
 

@@ -1,8 +1,12 @@
+//! Profile position moves (CiA 402-2, clause 10): the set-point handshake of bits 4 and 12, and the wait for the
+//! target with a deadline from way, speed and ramps. Interpolated and cyclic positions are not made here.
+
 use std::time::Duration;
 
 use cia402::{Controlword, ModeOfOperation, Statusword};
 
 use super::explain::Trigger;
+use super::goal::Goal;
 use super::motion::{LATE_FACTOR, LATE_MARGIN_S, MotionOptions, MotionReport};
 use super::{CONTROLWORD, Drive, POLL, POSITION_ACTUAL, STEP_TIMEOUT, TARGET_POSITION};
 use crate::error::Error;
@@ -10,8 +14,7 @@ use crate::units::{Angle, Rpm};
 
 const ENABLED: u16 = 0x0F;
 
-/// Part of a turn within which bit 10 (target reached) is believed: a bit left over from the move before says
-/// reached while the shaft is elsewhere.
+/// How near to the target bit 10 (target reached) is believed although it was never seen clear, in turns.
 const REACHED_TURNS: f64 = 0.01;
 
 /// Profile position moves with the set-point handshake. Source: CiA 402-2, clause 10.
@@ -55,7 +58,8 @@ impl Drive {
         if !options.wait {
             return Ok(MotionReport { reached_after: None, notes });
         }
-        let reached = self.wait_reached(INTENT, target, limit).await?;
+        let band = (self.counts_per_turn().await? * REACHED_TURNS).max(1.0);
+        let reached = self.watch(INTENT, Goal::Position { target, band, seen_clear: false }, limit).await?;
         self.node.network().note_stopped(self.node.id());
         Ok(MotionReport { reached_after: Some(reached), notes })
     }
@@ -86,17 +90,6 @@ impl Drive {
             self.wait_poll(&mut waited).await;
         }
         Ok(())
-    }
-
-    async fn wait_reached(&self, intent: &'static str, target: i64, limit: Duration) -> Result<Duration, Error> {
-        let band = (self.counts_per_turn().await? * REACHED_TURNS).max(1.0);
-        let late = move |at, waited| Trigger::Late { at, target: target as f64, unit: "counts", waited };
-        self.watch(intent, limit, late, async |statusword: Statusword| {
-            let at = self.read_number(POSITION_ACTUAL).await?;
-            let near = at.abs_diff(target) as f64 <= band;
-            Ok((near && statusword.has(Statusword::TARGET_REACHED), at as f64))
-        })
-        .await
     }
 
     /// Upper bound of a move's duration: the way at full speed plus both ramps, stretched by the margin.

@@ -1,9 +1,10 @@
+use std::time::Duration;
+
 use cia402::{Controlword, ModeOfOperation, PowerCommand, PowerState, Statusword, next_command};
 
 use super::explain::Trigger;
-use super::{Drive, MODE, POLL, STEP_TIMEOUT};
+use super::{Drive, MODE_DISPLAY, POLL, STEP_TIMEOUT};
 use crate::error::Error;
-use std::time::Duration;
 
 /// Speed below which a shaft counts as standing still: the rounding of the coarsest velocity object.
 pub(super) const STANDSTILL_RPM: f64 = 1.0;
@@ -166,7 +167,7 @@ impl Drive {
         if self.statusword().await?.state() == Some(PowerState::OperationEnabled) {
             return Ok(());
         }
-        match ModeOfOperation(self.node.read::<i8>(MODE).await?) {
+        match ModeOfOperation(self.node.read::<i8>(MODE_DISPLAY).await?) {
             ModeOfOperation::PROFILE_VELOCITY => self.write_number(profile.units.target_velocity.object, 0).await,
             ModeOfOperation::PROFILE_TORQUE => match profile.units.target_current {
                 Some(current) => self.write_number(current.object, 0).await,

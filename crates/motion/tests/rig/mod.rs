@@ -44,7 +44,11 @@ pub(crate) struct Rig {
 impl Rig {
     /// A ZLLG65ASM250-L on 48 V, somewhere within a turn; outer loops once in so many periods.
     pub(crate) fn new(outer_every: u32) -> Self {
-        let model = HubMotorModel::ZLLG65ASM250_L;
+        Rig::with_motor(HubMotorModel::ZLLG65ASM250_L, outer_every)
+    }
+
+    /// Any motor on 48 V, its gains derived from its own constants.
+    pub(crate) fn with_motor(model: HubMotorModel, outer_every: u32) -> Self {
         let motor = HubMotor::new(model, Angle::new(0, 0.123), 48.0, 25.0);
         let resistance_ohm = (model.pmsm.resistance_ohm + model.switch_resistance_ohm) as f32;
         let inductance_h = model.pmsm.inductance_q_h as f32;
@@ -76,7 +80,7 @@ impl Rig {
                 velocity: PiGains::for_inertia(70.0, inertia, torque_constant, 8.0),
                 acceleration_feed_forward: inertia / torque_constant,
                 friction_feed_forward: 0.0,
-                velocity_limit_rad_s: rad_s(500.0),
+                velocity_limit_rad_s: rad_s(1100.0),
             },
             observer_gains: ObserverGains::new(2e-3, 0.2, DT_S),
             smooth: LowPassGains::from_time_constant(0.5e-3, DT_S),
