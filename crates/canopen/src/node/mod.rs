@@ -254,6 +254,12 @@ impl<const N: usize> Node<N> {
         }
     }
 
+    fn offer_heartbeat(&mut self) {
+        if self.heartbeat.handle_timeout(self.now) {
+            self.pending.insert(Source::Heartbeat);
+        }
+    }
+
     /// Offers a TPDO if it is due and not inhibited, and sees that it is looked at when it will be.
     #[inline]
     fn offer_tpdo(&mut self, position: usize) {
@@ -286,6 +292,13 @@ impl<const N: usize> Node<N> {
         for position in 0..PdoNumber::COUNT {
             self.offer_tpdo(position);
         }
+    }
+
+    #[inline(never)]
+    fn take_most_urgent(&mut self) -> Option<Frame> {
+        let source = self.pending.iter().min_by_key(|source| self.pending_id(*source))?;
+        self.pending.remove(source);
+        self.take(source)
     }
 
     fn pending_id(&self, source: Source) -> u32 {
@@ -342,12 +355,7 @@ impl<const N: usize> Station for Node<N> {
     /// The most urgent frame: boot-up before all, then by identifier.
     #[inline]
     fn poll_transmit(&mut self) -> Option<Frame> {
-        if self.pending.is_empty() {
-            return None;
-        }
-        let source = self.pending.iter().min_by_key(|source| self.pending_id(*source))?;
-        self.pending.remove(source);
-        self.take(source)
+        if self.pending.is_empty() { None } else { self.take_most_urgent() }
     }
 
     #[inline]
@@ -372,10 +380,9 @@ impl<const N: usize> Station for Node<N> {
 }
 
 impl<const N: usize> Node<N> {
+    #[inline(never)]
     fn serve_deadlines(&mut self) {
-        if self.heartbeat.handle_timeout(self.now) {
-            self.pending.insert(Source::Heartbeat);
-        }
+        self.offer_heartbeat();
         self.sdo.handle_timeout(self.now);
         if self.sdo.has_reply() {
             self.pending.insert(Source::SdoReply);

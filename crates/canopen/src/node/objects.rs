@@ -1,6 +1,5 @@
 //! What a write to the communication objects (1000h to 1FFFh) must satisfy, and what it changes at once.
 
-use super::pending::Source;
 use super::{Node, NodeEvent, Via};
 use crate::heartbeat;
 use crate::od::{Slot, View};
@@ -41,15 +40,22 @@ impl<const N: usize> Node<N> {
     /// A peer's write: checks, stores, takes effect, is told to the owner.
     #[inline]
     pub(super) fn write(&mut self, slot: Slot, raw: u32, via: Via) -> Result<(), AbortCode> {
-        self.dictionary.check_write(slot, raw)?;
-        let mux = self.profile.table.row(slot).mux();
-        if is_communication(mux.index) {
-            self.check_communication(mux, raw)?;
-            self.dictionary.set_raw(slot, raw);
-            self.take_up(mux);
+        let row = self.dictionary.table().row(slot);
+        if is_communication(row.index) {
+            self.write_communication(slot, row.mux(), raw & row.data_type.mask(), via)
         } else {
-            self.dictionary.set_raw(slot, raw);
+            let raw = self.dictionary.write(slot, raw)?;
+            self.push(NodeEvent::Written { slot, raw, via });
+            Ok(())
         }
+    }
+
+    #[inline(never)]
+    fn write_communication(&mut self, slot: Slot, mux: Mux, raw: u32, via: Via) -> Result<(), AbortCode> {
+        self.dictionary.check_write(slot, raw)?;
+        self.check_communication(mux, raw)?;
+        self.dictionary.set_raw(slot, raw);
+        self.take_up(mux);
         self.push(NodeEvent::Written { slot, raw, via });
         Ok(())
     }
@@ -100,23 +106,22 @@ impl<const N: usize> Node<N> {
         match (mux.index, Record::of(mux.index)) {
             (0x1005, _) => self.take_up_sync(),
             (0x1014 | 0x1015, _) => self.take_up_emcy(),
-            (0x1017, _) => self.heartbeat = heartbeat::Producer::from_write(self.heartbeat_period_ms(), self.now),
+            (0x1017, _) => {
+                self.heartbeat = heartbeat::Producer::from_write(self.heartbeat_period_ms(), self.now);
+                self.offer_heartbeat();
+            }
             (_, Record::Parameter(Direction::Receive, position) | Record::Mapping(Direction::Receive, position)) => {
                 self.take_up_rpdo(position);
             }
             (_, Record::Parameter(Direction::Transmit, position) | Record::Mapping(Direction::Transmit, position)) => {
                 let old = self.tpdos[position];
                 self.take_up_tpdo(position);
-                match (self.state.allows_pdo(), old.is_active()) {
-                    (true, true) => self.tpdos[position].take_over_from(&old, self.now),
-                    (true, false) => self.tpdos[position].start(self.now),
-                    (false, _) => {}
+                let tpdo = &mut self.tpdos[position];
+                if self.state.allows_pdo() && tpdo.is_active() {
+                    if old.is_active() { tpdo.take_over_from(&old, self.now) } else { tpdo.start(self.now) }
                 }
             }
             _ => {}
-        }
-        if self.heartbeat.handle_timeout(self.now) {
-            self.pending.insert(Source::Heartbeat);
         }
         self.reschedule();
     }

@@ -24,7 +24,7 @@ pub enum FrameLength {
 pub struct Write {
     /// The entry.
     pub slot: Slot,
-    /// The value to store, of the entry's own length.
+    /// The value to store, in as many low bytes as the entry has; what stands above them means nothing.
     pub raw: u32,
     mux: Mux,
     confirm: Confirm,
@@ -199,8 +199,7 @@ impl Server {
         }
         match payload {
             Payload::Expedited { bytes, .. } => {
-                let raw = u32::from_le_bytes(bytes) & table.row(slot).data_type.mask();
-                Some(Write { slot, raw, mux, confirm: Confirm::Expedited })
+                Some(Write { slot, raw: u32::from_le_bytes(bytes), mux, confirm: Confirm::Expedited })
             }
             Payload::Segmented { size: declared } => {
                 let bytes = [0; MAX_EXPEDITED];
@@ -252,11 +251,13 @@ impl Server {
         self.refuse(mux, AbortCode::UNKNOWN_COMMAND);
     }
 
+    #[inline(never)]
     fn refuse(&mut self, mux: Mux, code: AbortCode) {
         self.end();
         self.answer(Reply::Abort(mux, code));
     }
 
+    #[inline(always)]
     fn answer(&mut self, reply: Reply) {
         self.reply = Some(reply.emit());
     }

@@ -266,6 +266,28 @@ fn an_invalid_tpdo_is_silent_and_is_sent_once_when_it_becomes_valid() {
 }
 
 #[test]
+fn what_an_invalidated_tpdo_still_had_to_send_is_dropped() {
+    let mut bench = configured(&LOOSE, 254, 20, 0);
+    bench.talk("> 000#0104\n < 184#0000");
+    bench.set(0x6041, 1);
+    bench.talk(
+        "> 604#2300180184010080
+         < 584#6000180100000000
+         silence 100ms
+         > 604#4000100000000000
+         < 584#4300100092010400",
+    );
+}
+
+#[test]
+fn what_a_changed_tpdo_still_has_to_send_is_sent() {
+    let mut bench = configured(&LOOSE, 254, 20, 0);
+    bench.talk("> 000#0104\n < 184#0000\n wait 1ms");
+    bench.set(0x6041, 1);
+    bench.talk("> 604#2F001802FF000000\n < 584#6000180200000000\n 10ms < 184#0100\n silence 100ms");
+}
+
+#[test]
 fn changing_a_timer_of_an_active_tpdo_sends_nothing() {
     let mut bench = Bench::operational();
     bench.talk(
