@@ -212,7 +212,7 @@ impl<const N: usize> Node<N> {
         self.rpdos[number.position()].standard_id().map(CanId::standard)
     }
 
-    pub(crate) fn handle_nmt(&mut self, command: NmtCommand) {
+    fn handle_nmt(&mut self, command: NmtCommand) {
         match self.state.handle(command) {
             Transition::None => {}
             Transition::Enter(state) => self.enter(state),
