@@ -2,23 +2,55 @@
 
 use ferrodrive_tests::{laws, seeded};
 
-const FRAME_TEXTS: &[&[u8]] = &[
-    b"604#2B40600006000000",
-    b"704#00",
-    b"000#0104",
-    b"1FFFFFFF#",
-    b"080#",
-    b"584#R",
-    b"123#R8",
-    b"7FF#0102030405060708",
-];
+fn check(name: &str) {
+    let law = laws::ALL.iter().find(|law| law.name == name).expect("a law of that name");
+    seeded::check(law.samples, law.holds);
+}
 
 #[test]
 fn candump_text_is_read_or_refused_and_reads_back_as_printed() {
-    seeded::check(FRAME_TEXTS, laws::frame_text);
+    check("frame_text");
 }
 
 #[test]
 fn a_frame_is_never_shorter_than_its_bits_nor_longer_than_with_all_stuff_bits() {
-    seeded::check(&[b"\x04\x06\0\0\x2B\x40\x60\0\0\0\0\0", b"\0\0\0\0\0\0\0\0"], laws::frame_length);
+    check("frame_length");
+}
+
+#[test]
+fn a_candump_line_is_read_or_refused_and_reads_back_as_written() {
+    check("candump_line");
+}
+
+#[test]
+fn a_socketcand_stream_decodes_alike_however_it_is_cut() {
+    check("socketcand");
+}
+
+#[test]
+fn an_slcan_stream_decodes_alike_however_it_is_cut() {
+    check("slcan");
+}
+
+#[test]
+fn sdo_bytes_read_back_as_written() {
+    check("sdo_wire");
+}
+
+#[test]
+fn a_node_under_any_frames_keeps_its_dictionary_lawful() {
+    check("node");
+}
+
+#[test]
+fn every_law_has_a_fuzz_target_and_every_fuzz_target_a_law() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../fuzz/fuzz_targets");
+    let files = std::fs::read_dir(folder).expect("the folder of fuzz targets");
+    let mut targets: Vec<String> = files
+        .map(|file| file.expect("a readable folder").path().file_stem().expect("a name").to_string_lossy().into_owned())
+        .collect();
+    let mut laws: Vec<&str> = laws::ALL.iter().map(|law| law.name).collect();
+    targets.sort();
+    laws.sort_unstable();
+    assert_eq!(targets, laws);
 }

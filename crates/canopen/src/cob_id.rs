@@ -1,5 +1,7 @@
 use can::CanId;
 
+use crate::AbortCode;
+
 /// The 32-bit value of a COB-ID object: identifier plus flags. Not what stands on the wire: see [`CanId`].
 ///
 /// Source: CiA 301, 7.5.2.5 (SYNC), 7.5.2.17 (EMCY), 7.5.2.35 and 7.5.2.37 (PDO).
@@ -32,6 +34,31 @@ impl CobId {
     /// The identifier on the wire.
     pub const fn can_id(self) -> CanId {
         if self.is_extended() { CanId::extended(self.0) } else { CanId::standard(self.0 as u16) }
+    }
+
+    /// Whether an object may have this COB-ID: only the base frame format is offered, so bit 29 is refused; so are
+    /// restricted identifiers unless bit 31 is set.
+    ///
+    /// # Errors
+    /// 0609 0030h.
+    pub const fn check_identifier(self) -> Result<(), AbortCode> {
+        if self.is_extended() || (self.is_valid() && self.is_restricted()) {
+            Err(AbortCode::INVALID_VALUE)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Whether an object with this COB-ID may take `new`: the identifier of a valid one may move only if
+    /// `while_valid`. Bit 30 is stored and has no effect: RTR is not offered.
+    ///
+    /// # Errors
+    /// 0609 0030h.
+    pub fn check_change(self, new: Self, while_valid: bool) -> Result<(), AbortCode> {
+        new.check_identifier()?;
+        let moves = new.can_id() != self.can_id();
+        let stays_valid = self.is_valid() && new.is_valid();
+        if moves && stays_valid && !while_valid { Err(AbortCode::INVALID_VALUE) } else { Ok(()) }
     }
 
     /// True for identifiers that no PDO, SYNC or EMCY may use. Source: CiA 301, table 41 (restricted CAN-IDs).

@@ -159,9 +159,10 @@ impl Producer {
         !self.queue.is_empty() && now >= self.inhibited_until
     }
 
-    /// When a waiting message may be sent; [`Instant::FAR_FUTURE`] if none waits.
-    pub fn deadline(&self) -> Instant {
-        if self.queue.is_empty() { Instant::FAR_FUTURE } else { self.inhibited_until }
+    /// When after `now` a message that is held back may be sent; [`Instant::FAR_FUTURE`] if there is none.
+    pub fn deadline(&self, now: Instant) -> Instant {
+        let is_held_back = !self.queue.is_empty() && now < self.inhibited_until;
+        if is_held_back { self.inhibited_until } else { Instant::FAR_FUTURE }
     }
 
     /// Takes the oldest message to offer it at `now`.

@@ -18,6 +18,7 @@ pub mod od;
 pub mod pdo;
 pub mod sdo;
 pub mod sync;
+pub mod time_stamp;
 
 pub use abort::AbortCode;
 pub use cob_id::CobId;

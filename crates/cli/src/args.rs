@@ -6,7 +6,7 @@ use canopen::NodeId;
 use clap::{Parser, Subcommand};
 use transport::BusSpec;
 
-use crate::command::{completions, dump, nmt, objects, scan, sdo};
+use crate::command::{completions, demo, drive, dump, home, motion, nmt, objects, scan, sdo, sim, store};
 use crate::models::DriveProfile;
 use crate::parse::drive_spec::node_model;
 
@@ -48,11 +48,25 @@ pub(crate) struct Global {
 /// All commands.
 #[derive(Subcommand)]
 pub(crate) enum Command {
+    Demo(demo::Demo),
+    Sim(sim::Sim),
     Scan(scan::Scan),
     Read(sdo::Read),
     Write(sdo::Write),
     Objects(objects::Objects),
     Nmt(nmt::Nmt),
+    State(drive::State),
+    Enable(drive::Enable),
+    Disable(drive::Disable),
+    Stop(drive::Stop),
+    QuickStop(drive::QuickStop),
+    Reset(drive::Reset),
+    Velocity(motion::Velocity),
+    Move(motion::Move),
+    Torque(motion::Torque),
+    Home(home::Home),
     Dump(dump::Dump),
+    Save(store::Save),
+    Restore(store::Restore),
     Completions(completions::Completions),
 }

@@ -3,8 +3,10 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use canopen::{AbortCode, Mux, NodeId};
+use canopen::{Mux, NodeId};
 use cia402::PowerCommand;
+use master::drive::Drive;
+use master::identify::identity;
 use master::{Error, Network, Node};
 
 use crate::args::Global;
@@ -16,8 +18,6 @@ use crate::progress::Progress;
 const SETTLING_TIME: Duration = Duration::from_millis(50);
 
 const CONTROLWORD: Mux = Mux::new(0x6040, 0);
-const VENDOR_ID: Mux = Mux::new(0x1018, 1);
-const PRODUCT_CODE: Mux = Mux::new(0x1018, 2);
 
 /// See the [module](self).
 pub(crate) struct Context {
@@ -57,13 +57,10 @@ impl Context {
         if let Some(model) = self.told_model(id) {
             return Ok(Some(model));
         }
-        let node = self.node(id);
-        let vendor = absent_is_none(node.read::<u32>(VENDOR_ID).await)?;
-        let product = absent_is_none(node.read::<u32>(PRODUCT_CODE).await)?;
-        Ok(match vendor.zip(product).map(candidates).as_deref() {
-            Some([only]) => Some(only),
-            _ => None,
-        })
+        let said = identity(&self.node(id)).await?;
+        let mut fits =
+            MODELS.iter().copied().filter(|model| said.device_type.is_some() && said.matches(&model.identity));
+        Ok(fits.next().filter(|_| fits.next().is_none()))
     }
 
     /// As [`model_of`](Self::model_of), for commands that cannot do without.
@@ -75,6 +72,22 @@ impl Context {
         })
     }
 
+    /// Longest wait for each answer.
+    pub(crate) fn timeout(&self) -> Duration {
+        self.timeout
+    }
+
+    /// A drive of a known model.
+    pub(crate) async fn known_drive(&self, id: NodeId) -> Result<Drive, Failure> {
+        Ok(Drive::new(self.node(id), self.known_model_of(id).await?))
+    }
+
+    /// A drive, of a known model or not.
+    pub(crate) async fn drive(&self, id: NodeId) -> Result<Drive, Failure> {
+        let model = self.model_of(id).await?;
+        Ok(model.map_or_else(|| Drive::of_unknown_model(self.node(id)), |model| Drive::new(self.node(id), model)))
+    }
+
     /// Quick stop, whatever the node is doing.
     pub(crate) async fn quick_stop(&self, id: NodeId) -> Result<(), Error> {
         self.node(id).write(CONTROLWORD, PowerCommand::QuickStop.controlword().0).await
@@ -83,20 +96,5 @@ impl Context {
     /// Lets frames out that nobody answers.
     pub(crate) async fn settle(&self) {
         self.network.sleep(SETTLING_TIME).await;
-    }
-}
-
-/// The models with this vendor-ID and product code.
-pub(crate) fn candidates(identity: (u32, u32)) -> Vec<&'static DriveProfile> {
-    let same = |model: &&DriveProfile| (model.identity.vendor_id, model.identity.product_code) == identity;
-    MODELS.iter().copied().filter(same).collect()
-}
-
-fn absent_is_none(answer: Result<u32, Error>) -> Result<Option<u32>, Failure> {
-    match answer {
-        Ok(number) => Ok(Some(number)),
-        Err(Error::Aborted { code: AbortCode::NO_SUCH_OBJECT | AbortCode::NO_SUCH_SUB_INDEX, .. }) => Ok(None),
-        Err(Error::WrongLength { .. }) => Ok(None),
-        Err(error) => Err(error.into()),
     }
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 use can::Bitrate;
 use canopen::NodeId;
 use master::Network;
-use sim::World;
+use sim::{VirtualDrive, World};
 
 use crate::failure::Failure;
 use crate::models::DriveProfile;
@@ -28,13 +28,23 @@ pub(crate) fn world(file: Option<&Path>) -> Result<Embedded, Failure> {
     Ok((World::new(Bitrate::K500, SEED), Vec::new()))
 }
 
+/// A factory-fresh virtual drive of a model.
+pub(crate) fn virtual_drive(
+    model: &DriveProfile,
+    node: NodeId,
+    bitrate: Bitrate,
+) -> Result<Box<dyn VirtualDrive>, Failure> {
+    let _ = (node, bitrate);
+    Err(Failure::new(format!("there is no virtual {} yet", model.model)))
+}
+
 /// Waits for the boot-up message of every drive.
 pub(crate) async fn wait_until_booted(
     network: &Network,
     drives: &[(NodeId, &'static DriveProfile)],
 ) -> Result<(), Failure> {
     for (node, _) in drives {
-        let booted = network.node(*node).wait(|facts| facts.boot_up, BOOT_PATIENCE).await;
+        let booted = network.node(*node).wait(|node| node.facts.boot_up, BOOT_PATIENCE).await;
         booted.map_err(|_| Failure::new(format!("the virtual drive at node {node} did not boot")))?;
     }
     Ok(())

@@ -65,9 +65,12 @@ impl fmt::Display for Failure {
 }
 
 impl From<master::Error> for Failure {
-    /// The master's errors say what, why and what to do in whole sentences.
+    /// The master's errors say what, why and what to do in whole sentences. What is beyond a limit was mistyped.
     fn from(error: master::Error) -> Self {
-        Self::new(error.to_string())
+        match error {
+            master::Error::OutOfLimits { .. } => Self::usage(error.to_string()),
+            _ => Self::new(error.to_string()),
+        }
     }
 }
 

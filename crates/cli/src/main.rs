@@ -7,17 +7,15 @@ mod args;
 mod command;
 mod context;
 mod decode;
+mod demo;
 mod embedded;
 mod failure;
 mod models;
 mod output;
-#[allow(dead_code, reason = "the commands that use all of it are under way")]
 mod paint;
 mod parse;
-#[allow(dead_code, reason = "the commands that use all of it are under way")]
 mod plot;
 mod progress;
-#[allow(dead_code, reason = "the commands that use all of it are under way")]
 mod serve;
 mod session;
 mod table;
@@ -25,7 +23,8 @@ mod table;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::parser::ValueSource;
+use clap::{ArgMatches, CommandFactory, FromArgMatches};
 
 use crate::args::{Cli, Command, Global};
 use crate::command::objects::Whose;
@@ -35,9 +34,13 @@ use crate::output::{Format, Report};
 use crate::paint::Paint;
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let matches = Cli::command().get_matches();
+    let cli = match Cli::from_arg_matches(&matches) {
+        Ok(cli) => cli,
+        Err(error) => error.exit(),
+    };
     let format = Format { json: cli.global.json, paint: Paint::for_stream(&io::stdout()) };
-    match run(&cli.global, format, &cli.command) {
+    match run(&cli.global, format, &cli.command, typed_bus(&matches)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             let error = Paint::for_stream(&io::stderr()).bad("error:");
@@ -48,12 +51,35 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(global: &Global, format: Format, command: &Command) -> Result<(), Failure> {
+/// True if the bus was given on the command line, not by the environment.
+fn typed_bus(matches: &ArgMatches) -> bool {
+    matches.value_source("bus") == Some(ValueSource::CommandLine)
+}
+
+fn run(global: &Global, format: Format, command: &Command, typed_bus: bool) -> Result<(), Failure> {
     match command {
-        Command::Scan(scan) => on_bus(global, format, async |context| scan.run(context).await),
-        Command::Read(read) => on_bus(global, format, async |context| read.run(context).await),
-        Command::Write(write) => on_bus(global, format, async |context| write.run(context).await),
-        Command::Nmt(nmt) => on_bus(global, format, async |context| nmt.run(context).await),
+        Command::Demo(demo) => {
+            let report = demo.run(global)?;
+            print(format, &report)?;
+            if report.ok { Ok(()) } else { Err(Failure::new("the drive did not do everything as its manual says")) }
+        }
+        Command::Sim(sim) => sim.run(global, typed_bus.then_some(&global.bus)),
+        Command::Scan(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Read(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Write(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Nmt(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::State(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Enable(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Disable(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Stop(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::QuickStop(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Reset(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Velocity(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Move(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Torque(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Save(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Restore(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Home(home) => session::run(global, async |context| home.run(context).await),
         Command::Objects(objects) => match objects.whose {
             Whose::Model(model) => print(format, &objects.list(model)?),
             Whose::Node(node) => {

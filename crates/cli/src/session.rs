@@ -108,10 +108,8 @@ async fn terminated() {
 
 /// Quick stop to every node that this command has set in motion.
 async fn stop_what_moves(context: &Context) {
-    let stops = context.network.moved().iter().map(|node| context.quick_stop(node));
-    let stopping = master::join_all(stops.collect::<Vec<_>>());
     // Whether it worked or not, the process ends now.
-    let _ = tokio::time::timeout(STOP_PATIENCE, stopping).await;
+    let _ = tokio::time::timeout(STOP_PATIENCE, context.network.stop_all_moved()).await;
 }
 
 /// A failure of the bus itself, with every cause that is known.

@@ -5,6 +5,10 @@ use std::time::Duration;
 
 use canopen::sdo::client;
 use canopen::{AbortCode, Mux, NmtState, NodeId};
+use cia402::ModeOfOperation;
+
+use crate::drive::Explanation;
+use crate::identify::Identity;
 
 /// Why the master could not do what it was asked.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -81,6 +85,59 @@ pub enum Error {
         /// What may explain it.
         hints: Hints,
     },
+    /// The drive did not get where it was meant to be.
+    #[error("{0}")]
+    NotReached(Box<Explanation>),
+    /// Something was asked of a drive whose model is not known.
+    #[error(
+        "node {node}: its model is not known, and that is needed to {intent}. Name the model; a wrong one could \
+             write to objects that mean something else"
+    )]
+    UnknownModel {
+        /// The node.
+        node: NodeId,
+        /// What was to be done.
+        intent: &'static str,
+    },
+    /// The node says that it is something else than the model it was taken for.
+    #[error("node {node} is not a {model}: it says {found}. Name the right model")]
+    WrongModel {
+        /// The node.
+        node: NodeId,
+        /// The model it was taken for.
+        model: &'static str,
+        /// What it says.
+        found: Identity,
+    },
+    /// The model does not have this mode.
+    #[error("node {node}: the {model} has no mode {mode}")]
+    NoSuchMode {
+        /// The node.
+        node: NodeId,
+        /// Its model.
+        model: &'static str,
+        /// The mode.
+        mode: ModeOfOperation,
+    },
+    /// A value is outside what the model takes: nothing was sent.
+    #[error("node {node}: {asked} is out of range for {mux} ({title}), which takes {low} to {high}{}{unit}. \
+             Nothing was sent", if unit.is_empty() { "" } else { " in units of " })]
+    OutOfLimits {
+        /// The node.
+        node: NodeId,
+        /// The object.
+        mux: Mux,
+        /// Its name in the manual.
+        title: &'static str,
+        /// Unit of one count; empty for none.
+        unit: &'static str,
+        /// What was asked for, in counts.
+        asked: i64,
+        /// Smallest value.
+        low: i64,
+        /// Largest value.
+        high: i64,
+    },
 }
 
 /// Direction of an SDO request.
@@ -106,7 +163,7 @@ impl fmt::Display for Access {
 pub struct Hints {
     /// The request never left the master.
     pub unsent: bool,
-    /// The node's state when last heard.
+    /// The state that the node must be in by its last heartbeat or the NMT command sent since.
     pub nmt_state: Option<NmtState>,
     /// Time since any frame of the node.
     pub silent_for: Option<Duration>,
@@ -122,7 +179,7 @@ impl fmt::Display for Hints {
                  acknowledges frames (cable, bit rate, termination)",
             ),
             (_, Some(NmtState::Stopped), _) => f.write_str(
-                "Its last heartbeat says stopped, where SDO does not exist: send NMT pre-operational or start",
+                "It is in the NMT state stopped, where SDO does not exist: send NMT pre-operational or start",
             ),
             (_, _, Some(age)) => write!(
                 f,

@@ -6,9 +6,13 @@
 
 pub mod core;
 pub mod decode;
+pub mod drive;
 mod error;
+pub mod identify;
 mod network;
+pub mod pdo;
 pub mod units;
 
+pub use drive::Drive;
 pub use error::{Access, Error, Hints};
-pub use network::{DEFAULT_TIMEOUT, Network, Node, Sleep, Wait, join_all};
+pub use network::{DEFAULT_TIMEOUT, Elapsed, Network, Node, NodeView, Sleep, Wait, join_all};

@@ -2,6 +2,7 @@
 
 mod support;
 
+use std::future::Future;
 use std::time::Duration;
 
 use can::Instant;
@@ -217,7 +218,7 @@ fn a_stopped_node_is_told_as_such() {
     let mut bus = Bus::new(vec![toy]);
     let network = bus.network.clone();
     let error = bus.block_on(network.node(node(4)).read::<u32>(DEVICE_TYPE)).unwrap_err();
-    assert!(error.to_string().contains("says stopped, where SDO does not exist"), "{error}");
+    assert!(error.to_string().contains("in the NMT state stopped, where SDO does not exist"), "{error}");
 }
 
 #[test]
@@ -228,8 +229,36 @@ fn a_lost_heartbeat_is_seen_by_who_waits_for_it() {
     let network = bus.network.clone();
     let node = network.node(node(4));
     node.watch_heartbeat(Some(Duration::from_millis(300)));
-    let lost = node.wait(|facts| facts.heartbeat_watch.filter(|watch| watch.lost).map(|_| ()), Duration::from_secs(2));
+    let lost =
+        node.wait(|node| node.facts.heartbeat_watch.filter(|watch| watch.lost).map(|_| ()), Duration::from_secs(2));
     assert_eq!(bus.block_on(lost), Ok(()));
     // 300 ms after the heartbeat, which took one frame time from 5 s.
     assert_eq!(bus.now, Instant::from_secs(5) + Duration::from_micros(300_256));
+}
+
+#[test]
+fn a_node_that_this_master_stopped_is_told_as_such_without_a_heartbeat() {
+    let mut toy = Toy::new(4);
+    toy.answers_left = Some(0);
+    let mut bus = Bus::new(vec![toy]);
+    let network = bus.network.clone();
+    let node = network.node(node(4));
+    node.nmt(canopen::NmtCommand::Stop);
+    let error = bus.block_on(node.read::<u32>(DEVICE_TYPE)).unwrap_err();
+    assert!(error.to_string().contains("in the NMT state stopped"), "{error}");
+}
+
+#[test]
+fn a_request_that_nobody_takes_from_the_master_is_told_as_such() {
+    // No runner takes frames: an interface that is down.
+    let mut network = master::Network::new();
+    let node = network.node(node(4)).with_timeout(Duration::from_millis(100));
+    let mut read = std::pin::pin!(node.read::<u32>(DEVICE_TYPE));
+    let mut context = std::task::Context::from_waker(std::task::Waker::noop());
+    assert!(read.as_mut().poll(&mut context).is_pending());
+    for ms in [0, 100] {
+        can::Station::handle_timeout(&mut network, Instant::from_millis(ms));
+    }
+    let std::task::Poll::Ready(Err(error)) = read.as_mut().poll(&mut context) else { panic!("not ready") };
+    assert!(error.to_string().contains("never left this computer"), "{error}");
 }

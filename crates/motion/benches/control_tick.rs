@@ -1,6 +1,6 @@
 //! Cost of a drive's control periods: the current loop with its sensors, the outer loops, a profile.
 
-#[allow(dead_code)]
+#[expect(dead_code, reason = "the bench needs a part of the rig")]
 #[path = "../tests/rig/mod.rs"]
 mod rig;
 
@@ -54,9 +54,9 @@ fn current_loop(c: &mut Criterion) {
 
 fn outer_loops(c: &mut Criterion) {
     let gains = CascadeGains {
-        position_per_s: 25.0,
+        position_per_s: 20.0,
         velocity_feed_forward: 1.0,
-        velocity: PiGains::for_inertia(100.0, 0.014, 0.761, 8.0),
+        velocity: PiGains::for_inertia(70.0, 0.014, 0.761, 8.0),
         acceleration_feed_forward: 0.018,
         friction_feed_forward: 0.0,
         velocity_limit_rad_s: 50.0,
@@ -80,7 +80,7 @@ fn outer_loops(c: &mut Criterion) {
 
 /// The current loop around the plant: what one 50 us control period of a virtual drive costs at the least.
 fn with_plant(c: &mut Criterion) {
-    let mut rig = rig::Rig::new();
+    let mut rig = rig::Rig::new(rig::AT_4_KHZ);
     let demand = motion::cascade::VelocityDemand { velocity_rad_s: 20.0, acceleration_rad_s2: 0.0 };
     for _ in 0..20_000 {
         rig.tick_velocity(&demand);

@@ -24,8 +24,10 @@ pub fn sin_cos_turns(turns: f32) -> (f32, f32) {
     let quarters = if (truncated as f32) > scaled { truncated - 1 } else { truncated };
     let r = (turns - quarters as f32 * 0.25) * TAU;
     let x = r * r;
-    let sin = r * (1.0 + x * (-1.0 / 6.0 + x * (1.0 / 120.0 + x * (-1.0 / 5_040.0))));
-    let cos = 1.0 + x * (-0.5 + x * (1.0 / 24.0 + x * (-1.0 / 720.0 + x * (1.0 / 40_320.0))));
+    // Summed in pairs: shorter to wait for than term by term.
+    let y = x * x;
+    let sin = r * ((1.0 - x * (1.0 / 6.0)) + y * (1.0 / 120.0 - x * (1.0 / 5_040.0)));
+    let cos = (1.0 - x * 0.5) + y * ((1.0 / 24.0 - x * (1.0 / 720.0)) + y * (1.0 / 40_320.0));
     match quarters & 3 {
         0 => (sin, cos),
         1 => (cos, -sin),

@@ -38,7 +38,7 @@ pub struct AlphaBeta {
 /// Three phase values to a vector; a common part is dropped.
 #[inline]
 pub fn clarke([u, v, w]: [f32; 3]) -> AlphaBeta {
-    AlphaBeta { alpha: (2.0 * u - v - w) * (1.0 / 3.0), beta: (v - w) * INV_SQRT_3 }
+    AlphaBeta { alpha: u * (2.0 / 3.0) - (v + w) * (1.0 / 3.0), beta: (v - w) * INV_SQRT_3 }
 }
 
 /// A vector to three phase values of sum zero.
@@ -68,12 +68,24 @@ pub fn modulate(voltage_v: AlphaBeta, bus_v: f32) -> [f32; 3] {
     if bus_v <= 0.0 {
         return [0.5; 3];
     }
-    let phases = inverse_clarke(voltage_v);
-    let highest = phases[0].max(phases[1]).max(phases[2]);
-    let lowest = phases[0].min(phases[1]).min(phases[2]);
-    let centre = 0.5 * (highest + lowest);
     let per_volt = 1.0 / bus_v;
-    phases.map(|v| ((v - centre) * per_volt + 0.5).clamp(0.0, 1.0))
+    let half_per_volt = 0.5 * per_volt;
+    let phases = inverse_clarke(voltage_v);
+    let centre = 0.5 - (highest(phases) + lowest(phases)) * half_per_volt;
+    phases.map(|v| (v * per_volt + centre).clamp(0.0, 1.0))
+}
+
+/// Plain comparisons: `f32::max` pays for a rule about values that are no number.
+#[inline]
+fn highest([u, v, w]: [f32; 3]) -> f32 {
+    let of_two = if u > v { u } else { v };
+    if of_two > w { of_two } else { w }
+}
+
+#[inline]
+fn lowest([u, v, w]: [f32; 3]) -> f32 {
+    let of_two = if u < v { u } else { v };
+    if of_two < w { of_two } else { w }
 }
 
 /// What the controller knows of the motor and how it is set.

@@ -66,7 +66,7 @@ impl Pi {
     /// The output before any limit. For loops whose limit is shared: propose all, limit, then [`settle`](Pi::settle).
     #[inline]
     pub fn propose(&self, gains: &PiGains, error: f32, feed_forward: f32) -> f32 {
-        gains.proportional * error + self.integral + feed_forward
+        gains.proportional * error + (self.integral + feed_forward)
     }
 
     /// Integrates, knowing what became of the proposed output.

@@ -250,7 +250,7 @@ fn plan_towards(profile: &mut Profile, distance: f64, speed: f64, limits: &MoveL
     let room = 2.0 * length + start * start * up + end * end * down;
     let peak = if room >= max_speed * max_speed * (up + down) { max_speed } else { libm::sqrt(room / (up + down)) };
     // Too short to reach the end speed: only speed up, and end slower.
-    let peak = if peak < end { libm::sqrt(start * start + 2.0 * length / up) } else { peak.max(start) };
+    let peak = if peak < end && up > 0.0 { libm::sqrt(start * start + 2.0 * length / up) } else { peak.max(start) };
     let end = end.min(peak);
     let ramps = 0.5 * ((peak * peak - start * start) * up + (peak * peak - end * end) * down);
     let plateau_s = if peak > 0.0 { ((length - ramps) / peak).max(0.0) } else { 0.0 };

@@ -5,11 +5,12 @@ mod rig;
 
 use motion::cascade::{PositionDemand, VelocityDemand};
 use motion::scurve::PositionMove;
-use rig::{COUNTS_PER_TURN, Rig, rad_s};
+use plant::HubMotorModel;
+use rig::{AT_1_KHZ, AT_4_KHZ, COUNTS_PER_TURN, Rig, rad_s};
 
 #[test]
 fn a_current_step_rises_with_the_chosen_bandwidth_and_does_not_overshoot() {
-    let mut rig = Rig::new();
+    let mut rig = Rig::new(AT_4_KHZ);
     rig.motor.load.locked = true;
     let mut peak = 0.0_f64;
     let mut at_time_constant = 0.0;
@@ -29,7 +30,7 @@ fn a_current_step_rises_with_the_chosen_bandwidth_and_does_not_overshoot() {
 
 #[test]
 fn a_velocity_ramp_is_followed_with_less_than_ten_percent_overshoot() {
-    let mut rig = Rig::new();
+    let mut rig = Rig::new(AT_4_KHZ);
     let target = rad_s(200.0);
     let profile = motion::scurve::velocity_change(0.0, f64::from(target), 0.2);
     let mut peak = 0.0_f32;
@@ -46,7 +47,7 @@ fn a_velocity_ramp_is_followed_with_less_than_ten_percent_overshoot() {
 
 #[test]
 fn a_velocity_step_without_a_ramp_overshoots_less_than_ten_percent() {
-    let mut rig = Rig::new();
+    let mut rig = Rig::new(AT_4_KHZ);
     let target = rad_s(100.0);
     let demand = VelocityDemand { velocity_rad_s: target, acceleration_rad_s2: 0.0 };
     let mut peak = 0.0_f32;
@@ -59,13 +60,34 @@ fn a_velocity_step_without_a_ramp_overshoots_less_than_ten_percent() {
 }
 
 #[test]
+fn the_fast_winding_runs_at_a_thousand_turns_per_minute() {
+    let mut rig = Rig::with_motor(HubMotorModel::ZLLG65ASM250, AT_4_KHZ);
+    let target = rad_s(1000.0);
+    let profile = motion::scurve::velocity_change(0.0, f64::from(target), 0.5);
+    let mut peak = 0.0_f64;
+    for tick in 0..30_000 {
+        let point = profile.at(f64::from(tick) * 50e-6);
+        let demand =
+            VelocityDemand { velocity_rad_s: point.velocity as f32, acceleration_rad_s2: point.acceleration as f32 };
+        rig.tick_velocity(&demand);
+        peak = peak.max(rig.motor.rotor.velocity_rad_s);
+    }
+    let target = f64::from(target);
+    assert!(peak < 1.1 * target, "{peak} of {target}");
+    assert!((rig.motor.rotor.velocity_rad_s - target).abs() < 0.01 * target);
+    // The field is kept where it belongs: no d current to speak of.
+    assert!(rig.motor.pmsm.current_a.d.abs() < 0.5, "{:?}", rig.motor.pmsm.current_a);
+}
+
+#[test]
 fn one_turn_per_minute_is_held_smoothly() {
-    let mut rig = Rig::new();
+    let mut rig = Rig::new(AT_4_KHZ);
     let target = rad_s(1.0);
     let demand = VelocityDemand { velocity_rad_s: target, acceleration_rad_s2: 0.0 };
     for _ in 0..40_000 {
         rig.tick_velocity(&demand);
     }
+    // Edges come 15 ms apart; the speed between them stays within two percent.
     let (mut least, mut most) = (f64::MAX, f64::MIN);
     let start = rig.motor.rotor.angle.as_rad();
     for _ in 0..40_000 {
@@ -74,13 +96,16 @@ fn one_turn_per_minute_is_held_smoothly() {
         (least, most) = (least.min(velocity), most.max(velocity));
     }
     let mean = (rig.motor.rotor.angle.as_rad() - start) / 2.0;
-    assert!((mean - f64::from(target)).abs() < 0.05 * f64::from(target), "mean {mean}");
-    assert!(least > 0.0 && most < 2.0 * f64::from(target), "{least} to {most} about {target}");
+    let target = f64::from(target);
+    assert!((mean - target).abs() < 0.005 * target, "mean {mean}");
+    assert!(least > 0.98 * target && most < 1.02 * target, "{least} to {most} about {target}");
 }
 
-#[test]
-fn a_position_move_ends_within_two_counts_and_hardly_overshoots() {
-    let mut rig = Rig::new();
+/// Two seconds for the integral to overcome the last of the dry friction.
+const SETTLE_TICKS: u32 = 40_000;
+
+/// Ten turns at 200 r/min with ramps of 0.3 s; returns where it ends, its overshoot and its worst lag, in counts.
+fn move_ten_turns(rig: &mut Rig) -> (f64, f64, f64) {
     let distance = 10.0 * COUNTS_PER_TURN;
     let profile = PositionMove {
         distance,
@@ -91,26 +116,41 @@ fn a_position_move_ends_within_two_counts_and_hardly_overshoots() {
     }
     .plan();
     let start = rig.position();
-    let mut highest = 0.0_f64;
-    let mut worst_lag = 0.0_f64;
-    let ticks = (profile.duration() / 50e-6) as u32 + 10_000;
+    let (mut overshoot, mut lag) = (0.0_f64, 0.0_f64);
+    let ticks = (profile.duration() / 50e-6) as u32 + SETTLE_TICKS;
     for tick in 0..ticks {
         let point = profile.at(f64::from(tick) * 50e-6);
         let travelled = f64::from(rig.position() - start);
         rig.tick_position(&rig.demand(point, travelled));
-        highest = highest.max(travelled - distance);
-        worst_lag = worst_lag.max((point.position - travelled).abs());
+        overshoot = overshoot.max(travelled - distance);
+        lag = lag.max((point.position - travelled).abs());
     }
-    let rest = f64::from(rig.position() - start) - distance;
+    (f64::from(rig.position() - start) - distance, overshoot, lag)
+}
+
+#[test]
+fn a_position_move_ends_within_two_counts_and_hardly_overshoots() {
+    for outer_every in [AT_4_KHZ, AT_1_KHZ] {
+        let (rest, overshoot, lag) = move_ten_turns(&mut Rig::new(outer_every));
+        assert!(rest.abs() <= 2.0, "ended {rest} counts off");
+        assert!(overshoot < 20.0, "overshot by {overshoot} counts");
+        // A tenth of the drive's own alarm threshold: object 2017h, 409 x 10 counts.
+        assert!(lag < 409.0, "lagged by {lag} counts");
+    }
+}
+
+#[test]
+fn five_times_the_inertia_is_still_well_damped() {
+    let mut rig = Rig::new(AT_4_KHZ);
+    rig.motor.load.inertia_kg_m2 = 4.0 * rig.motor.model.rotor.inertia_kg_m2;
+    let (rest, overshoot, _) = move_ten_turns(&mut rig);
     assert!(rest.abs() <= 2.0, "ended {rest} counts off");
-    assert!(highest < 20.0, "overshot by {highest} counts");
-    // The drive's own alarm threshold: object 2017h, 409 x 10 counts.
-    assert!(worst_lag < 400.0, "lagged by {worst_lag} counts");
+    assert!(overshoot < 0.01 * 10.0 * COUNTS_PER_TURN, "overshot by {overshoot} counts");
 }
 
 #[test]
 fn a_load_step_is_fought_and_the_position_returns() {
-    let mut rig = Rig::new();
+    let mut rig = Rig::new(AT_4_KHZ);
     let start = rig.position();
     let mut worst = 0;
     for tick in 0..40_000 {
@@ -122,7 +162,7 @@ fn a_load_step_is_fought_and_the_position_returns() {
         worst = worst.max(off.abs());
     }
     assert!((rig.position() - start).abs() <= 1, "{} counts off", rig.position() - start);
-    assert!((2..60).contains(&worst), "gave way by {worst} counts");
+    assert!((2..100).contains(&worst), "gave way by {worst} counts");
     // Kt i_q carries the load; dry friction may help with its share.
     let q = rig.motor.pmsm.current_a.q;
     assert!((q - 4.0 / 0.7613).abs() < 0.2, "{q} A");
@@ -130,7 +170,7 @@ fn a_load_step_is_fought_and_the_position_returns() {
 
 #[test]
 fn nothing_moves_while_nothing_is_asked() {
-    let mut rig = Rig::new();
+    let mut rig = Rig::new(AT_4_KHZ);
     let before = rig.motor.rotor.angle;
     for _ in 0..2_000 {
         rig.tick_position(&PositionDemand::default());

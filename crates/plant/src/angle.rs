@@ -62,8 +62,8 @@ impl Angle {
     /// The position on a scale of `divisions` per turn, rounded towards minus infinity: what a counter would read.
     #[inline]
     pub fn count(self, divisions: u32) -> i64 {
-        let within = (self.fraction * f64::from(divisions)) as i64;
-        self.turns.wrapping_mul(i64::from(divisions)).wrapping_add(within)
+        let within = (self.fraction * f64::from(divisions)) as u32;
+        self.turns.wrapping_mul(i64::from(divisions)).wrapping_add(i64::from(within))
     }
 }
 
@@ -84,19 +84,23 @@ impl Axis {
         Axis { sin, cos }
     }
 
-    /// The direction turned on by an angle.
+    /// The direction at a small angle: what to turn another one by.
     ///
-    /// Up to a tenth of a radian the rotation is summed from its series up to the fifth power, error
-    /// `0.1^6 / 720 = 1.4e-9`; beyond that the full functions are used.
+    /// Up to a tenth of a radian it is summed from the series up to the fifth power, error `0.1^6 / 720 = 1.4e-9`;
+    /// beyond that the full functions are used.
     #[inline]
-    pub fn turned_by(self, rad: f64) -> Self {
-        let (sin, cos) = if rad.abs() <= 0.1 {
-            let x = rad * rad;
-            (rad * (1.0 - x * (1.0 / 6.0 - x * (1.0 / 120.0))), 1.0 - x * (0.5 - x * (1.0 / 24.0)))
-        } else {
-            sin_cos_turns(rad / core::f64::consts::TAU)
-        };
-        Axis { sin: self.sin * cos + self.cos * sin, cos: self.cos * cos - self.sin * sin }
+    pub fn at_small_rad(rad: f64) -> Self {
+        if rad.abs() > 0.1 {
+            return Axis::at_turns(rad / core::f64::consts::TAU);
+        }
+        let x = rad * rad;
+        Axis { sin: rad * (1.0 - x * (1.0 / 6.0 - x * (1.0 / 120.0))), cos: 1.0 - x * (0.5 - x * (1.0 / 24.0)) }
+    }
+
+    /// The direction turned on by the angle of another.
+    #[inline]
+    pub fn turned_by(self, other: Axis) -> Self {
+        Axis { sin: self.sin * other.cos + self.cos * other.sin, cos: self.cos * other.cos - self.sin * other.sin }
     }
 }
 

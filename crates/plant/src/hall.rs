@@ -4,8 +4,6 @@
 //! later, W (bit 2) two thirds. Turning forward the state therefore runs 5, 1, 3, 2, 6, 4, each for 60 degrees;
 //! 0 and 7 never occur in a sound motor.
 
-use crate::angle::floor;
-
 /// State in each sixth of an electrical turn, forward from the offset.
 pub const FORWARD_SEQUENCE: [u8; 6] = [5, 1, 3, 2, 6, 4];
 
@@ -34,9 +32,10 @@ impl HallModel {
     /// The state read at an electrical angle in turns.
     #[inline]
     pub fn state(&self, electrical_turns: f64, fault: HallFault) -> u8 {
-        let turns = electrical_turns - self.offset_turns;
-        let sixth = ((turns - floor(turns)) * 6.0) as usize;
-        let state = FORWARD_SEQUENCE[sixth.min(5)];
+        let sixths = (electrical_turns - self.offset_turns) * 6.0;
+        let truncated = sixths as i32;
+        let sixth = if f64::from(truncated) > sixths { truncated - 1 } else { truncated };
+        let state = FORWARD_SEQUENCE[sixth.rem_euclid(6) as usize];
         match fault {
             HallFault::None => state,
             HallFault::Disconnected => 7,
@@ -49,6 +48,7 @@ impl HallModel {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::angle::floor;
 
     #[test]
     fn the_states_run_in_sequence_and_one_sensor_changes_at_a_time() {

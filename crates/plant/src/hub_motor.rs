@@ -184,21 +184,21 @@ impl HubMotor {
     #[inline]
     pub fn step(&mut self, dt_s: f64, actuation: &Actuation) {
         let model = &self.model;
-        let velocity_rad_s = self.rotor.predicted_velocity_rad_s();
-        let electrical_s = f64::from(model.pmsm.pole_pairs) * dt_s;
+        let velocity_rad_s = self.rotor.turn(dt_s, &self.load);
+        let half_turn = Axis::at_small_rad(0.5 * dt_s * f64::from(model.pmsm.pole_pairs) * velocity_rad_s);
         let input = PmsmInput {
             terminals: actuation.inverter.terminals(self.supply.bus_v),
             lost_phase: self.lost_phase,
             resistance_ohm: self.winding_ohm + model.switch_resistance_ohm,
-            axis: self.axis.turned_by(0.5 * electrical_s * velocity_rad_s),
+            axis: self.axis.turned_by(half_turn),
             velocity_rad_s,
         };
+        self.axis = input.axis.turned_by(half_turn);
         let motor = model.pmsm.step(&mut self.pmsm, dt_s, &input);
         let brake_nm = model.brake.torque_nm(actuation.brake_released);
         let moved = model.rotor.step(&mut self.rotor, dt_s, motor.torque_nm, &self.load, brake_nm);
         let bus = model.supply.step(&mut self.supply, dt_s, motor.bus_w, actuation.bleeder_on);
         model.encoder.step(&mut self.encoder, self.rotor.angle);
-        self.axis = self.axis.turned_by(electrical_s * moved.velocity_rad_s);
         self.torque_nm = motor.torque_nm;
 
         self.energy.source_j += bus.source_j;

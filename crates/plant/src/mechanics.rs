@@ -45,7 +45,7 @@ pub struct RotorData {
     pub angle: Angle,
     /// Mechanical velocity.
     pub velocity_rad_s: f64,
-    /// Change of the velocity over the last step; predicts the middle of the next one.
+    /// Change of the velocity over the last step, zero if the rotor came to rest in it.
     pub velocity_change_rad_s: f64,
 }
 
@@ -66,7 +66,8 @@ impl RotorModel {
         0.5 * (self.inertia_kg_m2 + load.inertia_kg_m2) * data.velocity_rad_s * data.velocity_rad_s
     }
 
-    /// Moves the rotor by one step under a motor torque, its load and a brake's friction torque.
+    /// Changes the velocity by one step of motor torque, load and a brake's friction; [`RotorData::turn`] moves the
+    /// angle.
     ///
     /// Implicit midpoint: `w_mean = w + dt/2J * (torques at w_mean)`.
     #[inline]
@@ -89,27 +90,37 @@ impl RotorModel {
         let mean = excess.copysign(drive) * mobility;
         let after = 2.0 * mean - before;
         let crosses_zero = mean == 0.0 || (after < 0.0) != (mean < 0.0);
-        let (mean, after) = if crosses_zero && torque.abs() <= dry {
-            (stopping_velocity(inertia, before, torque, dry, dt_s), 0.0)
+        let mean = if crosses_zero && torque.abs() <= dry {
+            data.velocity_rad_s = 0.0;
+            data.velocity_change_rad_s = 0.0;
+            stopping_velocity(inertia, before, torque, dry, dt_s)
         } else {
-            (mean, after)
+            data.velocity_rad_s = after;
+            data.velocity_change_rad_s = after - before;
+            mean
         };
-
-        let way_rad = mean * dt_s;
-        data.angle = data.angle.advanced_by(way_rad * INV_TAU);
-        data.velocity_rad_s = after;
-        data.velocity_change_rad_s = after - before;
         // What the torques brought in and is not kinetic energy now went into friction.
-        let friction_j = torque * way_rad - 0.5 * inertia * (after + before) * data.velocity_change_rad_s;
+        let after = data.velocity_rad_s;
+        let way_rad = mean * dt_s;
+        let friction_j = torque * way_rad - 0.5 * inertia * (after + before) * (after - before);
         RotorOutput { velocity_rad_s: mean, friction_j, load_j: load.torque_nm * way_rad }
     }
 }
 
 impl RotorData {
-    /// Velocity in the middle of the next step, if the acceleration stays what it was and steps are equal.
+    /// Turns the rotor on by one step, and returns the velocity it turned at.
+    ///
+    /// That is the velocity in the middle of the step if the acceleration stays what it was (the second-order
+    /// Adams-Bashforth rule). Its error is the change of acceleration, which adds up to nothing in the long run; in
+    /// exchange the angle does not wait for the torque of the same step. At rest and locked it is exactly zero.
     #[inline]
-    pub fn predicted_velocity_rad_s(&self) -> f64 {
-        self.velocity_rad_s + 0.5 * self.velocity_change_rad_s
+    pub fn turn(&mut self, dt_s: f64, load: &Load) -> f64 {
+        if load.locked {
+            return 0.0;
+        }
+        let velocity_rad_s = self.velocity_rad_s + 0.5 * self.velocity_change_rad_s;
+        self.angle = self.angle.advanced_by(velocity_rad_s * dt_s * INV_TAU);
+        velocity_rad_s
     }
 }
 

@@ -83,11 +83,12 @@ pub enum Terminals {
 }
 
 impl Terminals {
-    /// Three half bridges at these duty cycles (each held to 0..=1) on a bus.
+    /// Three half bridges at these duty cycles on a bus; each is held to 0..=1, and what is not a number is zero.
     #[inline]
     pub fn from_duties(duty: [f64; 3], bus_v: f64) -> Self {
-        let [u, v, w] = duty.map(|d| d.clamp(0.0, 1.0));
-        Terminals::Driven { alpha_v: (2.0 * u - v - w) * (bus_v / 3.0), beta_v: (v - w) * (bus_v * INV_SQRT_3) }
+        let [u, v, w] = duty.map(|d| if d > 0.0 { d.min(1.0) } else { 0.0 });
+        let third_v = bus_v * (1.0 / 3.0);
+        Terminals::Driven { alpha_v: u * (2.0 * third_v) - (v + w) * third_v, beta_v: (v - w) * (bus_v * INV_SQRT_3) }
     }
 }
 
@@ -325,9 +326,11 @@ impl<'a> Winding<'a> {
         let b = l_q + h * self.resistance_ohm;
         let cross_d = h * w * l_q;
         let cross_q = h * w * l_d;
+        // The matrix is inverted while the voltages are still being worked out.
+        let scale = 1.0 / (a * b + cross_d * cross_q);
+        let (dd, dq, qd, qq) = (b * scale, cross_d * scale, cross_q * scale, a * scale);
         let rhs_d = l_d * self.before.d + h * voltage_v.d;
         let rhs_q = l_q * self.before.q + h * (voltage_v.q - w * psi);
-        let scale = 1.0 / (a * b + cross_d * cross_q);
-        Dq { d: (rhs_d * b + cross_d * rhs_q) * scale, q: (a * rhs_q - cross_q * rhs_d) * scale }
+        Dq { d: dd * rhs_d + dq * rhs_q, q: qq * rhs_q - qd * rhs_d }
     }
 }

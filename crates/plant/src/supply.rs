@@ -62,6 +62,11 @@ pub struct SupplyData {
 }
 
 impl SupplyData {
+    /// A supply that is switched off, its capacitor empty. Setting `connected` switches it on.
+    pub fn switched_off(source_v: f64) -> Self {
+        SupplyData { connected: false, bus_v: 0.0, ..SupplyData::charged(source_v) }
+    }
+
     /// A supply whose capacitor has been charged.
     pub fn charged(source_v: f64) -> Self {
         SupplyData { source_v, connected: true, bus_v: source_v, bleeder_load: 0.0, bleeder_burnt: false }
@@ -164,6 +169,17 @@ mod tests {
         }
         // V (48 - V) / 0.1 = 470 has the root V = 47.
         assert!((data.bus_v - 47.0).abs() < 1e-9, "{}", data.bus_v);
+    }
+
+    #[test]
+    fn switching_on_charges_the_capacitor_through_the_inner_resistance() {
+        let mut data = SupplyData::switched_off(48.0);
+        data.connected = true;
+        for _ in 0..40 {
+            SUPPLY.step(&mut data, 5e-6, 0.0, false);
+        }
+        // R C = 200 us, after 200 us.
+        assert!((data.bus_v - 48.0 * (1.0 - libm::exp(-1.0))).abs() < 1e-2);
     }
 
     #[test]

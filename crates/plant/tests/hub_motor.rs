@@ -3,8 +3,10 @@
 use plant::angle::{Angle, Axis};
 use plant::encoder::EncoderFault;
 use plant::hall::FORWARD_SEQUENCE;
+use plant::pmsm::Phase;
 use plant::thermal::BodyModel;
 use plant::{Actuation, HubMotor, HubMotorModel, Inverter};
+use proptest::prelude::*;
 
 const DT_S: f64 = 50e-6;
 const MODEL: HubMotorModel = HubMotorModel::ZLLG65ASM250_L;
@@ -192,7 +194,7 @@ fn no_load_speed_at_24_v_is_the_published_one() {
     for _ in 0..60_000 {
         let q_v = motor.supply.bus_v / libm::sqrt(3.0);
         let lead = motor.rotor.velocity_rad_s * 15.0 * DT_S / 2.0;
-        let axis = Axis::at_turns(MODEL.pmsm.electrical_turns(motor.rotor.angle)).turned_by(lead);
+        let axis = Axis::at_turns(MODEL.pmsm.electrical_turns(motor.rotor.angle)).turned_by(Axis::at_small_rad(lead));
         let (alpha, beta) = (-q_v * axis.sin, q_v * axis.cos);
         let side = 0.5 * libm::sqrt(3.0) * beta;
         let phases = [alpha, side - 0.5 * alpha, -side - 0.5 * alpha];
@@ -246,4 +248,61 @@ fn halved_steps_lead_to_the_same_motion() {
     let [coarse, middle, fine] = [100e-6, 50e-6, 25e-6].map(play);
     assert!((middle - fine).abs() < 0.6 * (coarse - middle).abs(), "{coarse} {middle} {fine}");
     assert!((middle - fine).abs() < 1e-3);
+}
+
+fn any_inverter() -> impl Strategy<Value = Inverter> {
+    prop_oneof![
+        Just(Inverter::Open),
+        Just(Inverter::Shorted),
+        [0.0..=1.0_f64, 0.0..=1.0_f64, 0.0..=1.0_f64].prop_map(Inverter::Driven),
+    ]
+}
+
+/// Stretches of some steps each under one actuation and one load torque.
+fn any_play() -> impl Strategy<Value = Vec<(Inverter, bool, bool, f64, u32)>> {
+    prop::collection::vec((any_inverter(), any::<bool>(), any::<bool>(), -20.0..20.0_f64, 1_u32..300), 1..12)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn whatever_the_drive_does_the_energy_book_closes(play in any_play()) {
+        let mut motor = motor();
+        let stored = motor.stored_j();
+        for (inverter, bleeder_on, brake_released, load_nm, steps) in play {
+            motor.load.torque_nm = load_nm;
+            for _ in 0..steps {
+                motor.step(DT_S, &Actuation { inverter, bleeder_on, brake_released });
+            }
+        }
+        let through = motor.energy.source_j + motor.stored_j() + motor.energy.load_j.abs() + motor.energy.winding_j;
+        let rest = motor.energy.balance_j() - (motor.stored_j() - stored);
+        prop_assert!(rest.abs() < 0.002 * through, "{rest} J missing of {through} J");
+    }
+
+    #[test]
+    fn no_fault_and_no_duty_makes_the_plant_lose_its_numbers(
+        play in any_play(), lost in prop::option::of(prop_oneof![Just(Phase::U), Just(Phase::V), Just(Phase::W)]),
+        bad in prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(-1e300)],
+    ) {
+        let mut motor = motor();
+        for (index, (inverter, bleeder_on, brake_released, load_nm, steps)) in play.into_iter().enumerate() {
+            motor.lost_phase = if index % 2 == 1 { lost } else { None };
+            motor.supply.connected = index % 3 != 2;
+            motor.load.torque_nm = load_nm;
+            let inverter = match inverter {
+                Inverter::Driven([u, v, _]) if index % 4 == 3 => Inverter::Driven([u, v, bad]),
+                other => other,
+            };
+            for _ in 0..steps {
+                motor.step(DT_S, &Actuation { inverter, bleeder_on, brake_released });
+            }
+            let sensors = motor.sense();
+            prop_assert!(sensors.bus_v.is_finite() && sensors.bus_v >= 0.0);
+            prop_assert!(sensors.phase_current_a.iter().all(|a| a.is_finite()));
+            prop_assert!(sensors.winding_c.is_finite() && (1..=6).contains(&sensors.hall));
+            prop_assert!(motor.rotor.velocity_rad_s.is_finite() && motor.rotor.velocity_rad_s.abs() < 1e4);
+        }
+    }
 }

@@ -75,7 +75,8 @@ fn no_load_speed_is_voltage_over_back_emf_less_the_share_of_friction() {
     let mut rotor = RotorData::default();
     let volts = 13.0;
     for _ in 0..100_000 {
-        let torque = bench.step(rotor.predicted_velocity_rad_s(), in_rotor_frame(0.0, volts)).torque_nm;
+        let velocity = rotor.turn(bench.dt_s, &Load::default());
+        let torque = bench.step(velocity, in_rotor_frame(0.0, volts)).torque_nm;
         ROTOR.step(&mut rotor, DT_S, torque, &Load::default(), 0.0);
     }
     let speed = rotor.velocity_rad_s;
@@ -100,7 +101,8 @@ fn without_inductance_and_friction_the_speed_rises_with_the_mechanical_time_cons
         rotor_model.inertia_kg_m2 * RESISTANCE_OHM / (motor.torque_constant_nm_a() * motor.back_emf_constant_v_s());
     let steps = (time_constant_s / bench.dt_s) as u32;
     for _ in 0..steps {
-        let torque = bench.step(rotor.predicted_velocity_rad_s(), in_rotor_frame(0.0, 5.0)).torque_nm;
+        let velocity = rotor.turn(bench.dt_s, &Load::default());
+        let torque = bench.step(velocity, in_rotor_frame(0.0, 5.0)).torque_nm;
         rotor_model.step(&mut rotor, bench.dt_s, torque, &Load::default(), 0.0);
     }
     let elapsed = f64::from(steps) * bench.dt_s / time_constant_s;

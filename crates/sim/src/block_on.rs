@@ -1,8 +1,12 @@
+//! Futures in virtual time: a future is polled, and while it waits the world moves on.
+//!
+//! The future's own handle is a station in the world. Nothing here knows who that is, and no runtime is involved.
+
+use core::time::Duration;
 use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::{Context, Poll, Wake, Waker};
-use std::time::Duration;
 
 use can::Instant;
 

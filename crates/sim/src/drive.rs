@@ -1,3 +1,7 @@
+//! The contract of a virtual drive: what a world, a test or a person at the machine can do to one, whatever its model.
+//!
+//! Units are SI, positions are the drive's own counts, speeds are those of the motor shaft in r/min.
+
 use can::{Bitrate, Instant, Station};
 
 /// A drive joined to its physics: firmware, motor, load, supply and sensors as one station.

@@ -1,7 +1,7 @@
 //! Faults of a CAN bus, seeded and honest: what a real bus can do to frames and nodes, nothing else.
 //!
 //! A corrupted frame is never delivered corrupted (the CRC's residual error is not modelled): it costs
-//! an error frame, error counters, a resend and at worst bus-off (ISO 11898-1, clauses 10 and 12).
+//! an error frame, error counters, a resend and at worst bus-off (ISO 11898-1).
 //! Cable cut and join are [`World::cut`](crate::World::cut) and [`World::join`](crate::World::join).
 
 use std::collections::BTreeMap;

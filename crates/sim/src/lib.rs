@@ -9,10 +9,12 @@
 //! Deliberately absent: clocks, threads, sockets and files.
 
 mod block_on;
+pub mod command;
 mod drive;
 pub mod fault;
 pub mod pace;
 mod prng;
+pub mod recorder;
 pub mod wire;
 mod world;
 

@@ -2,7 +2,7 @@
 //!
 //! Pure arithmetic. Whoever reads the clock hands the elapsed time in; nothing here reads one.
 
-use std::time::Duration;
+use core::time::Duration;
 
 use can::Instant;
 

@@ -1,3 +1,5 @@
+//! The only source of chance in a world.
+
 /// Seeded pseudo-random numbers: SplitMix64.
 ///
 /// State `s += 9E3779B97F4A7C15h`, then two xor-shift-multiply rounds over `s` (Steele, Lea, Flood:

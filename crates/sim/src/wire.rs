@@ -1,4 +1,4 @@
-//! The CAN bus as physics, at the grain of a frame (ISO 11898-1:2015, clauses 10 and 12).
+//! The CAN bus as physics, at the grain of a frame (ISO 11898-1; Bosch CAN Specification 2.0, part A).
 //!
 //! [`Bus`] holds one controller for each station and the wire between them. Frames go in with
 //! [`Bus::offer`]; time comes in with [`Bus::arbitrate`] and [`Bus::advance`]; frames that passed,
@@ -25,10 +25,10 @@ use can::{Frame, Instant};
 /// Recessive bits in a row that tell a controller that the wire is idle.
 pub(crate) const IDLE_BITS: u64 = 11;
 
-/// Sequences of [`IDLE_BITS`] that a bus-off controller waits for (ISO 11898-1, 12.1.4.2 k).
+/// Sequences of eleven recessive bits that a bus-off controller waits for (fault confinement, rule 12).
 pub const BUS_OFF_SEQUENCES: u32 = 128;
 
-/// Bits an error-passive transmitter waits after the intermission (ISO 11898-1, 10.4.6.4).
+/// Bits an error-passive transmitter waits after the intermission (suspend transmission).
 pub const SUSPEND_BITS: u64 = 8;
 
 /// Why a frame did not get through.

@@ -8,7 +8,7 @@ mod member;
 mod step;
 mod tap;
 
-use std::time::Duration;
+use core::time::Duration;
 
 use can::{Bitrate, Frame, Instant, Station};
 
@@ -17,6 +17,7 @@ pub use log::FrameLog;
 pub use member::AnyStation;
 
 use crate::fault::{Corruption, NodeFaults};
+use crate::recorder::Recorder;
 use crate::wire::{Bus, ControllerOptions};
 use crate::{Prng, VirtualDrive};
 use due::DueTimes;
@@ -35,6 +36,7 @@ pub struct World {
     due: DueTimes,
     log: FrameLog,
     digest: Digest,
+    recorder: Option<Recorder>,
 }
 
 /// Names one station of one world: what `add_*` returned.
@@ -76,6 +78,7 @@ impl World {
             due: DueTimes::default(),
             log: FrameLog::default(),
             digest: Digest::default(),
+            recorder: None,
         }
     }
 
@@ -131,7 +134,7 @@ impl World {
         while self.next_event().is_some_and(|at| at <= end) {
             self.step();
         }
-        self.now = self.now.max(end);
+        self.move_to(end);
     }
 
     /// Moves on by `duration`.

@@ -151,6 +151,17 @@ pub enum AnyBus {
     Log(LogBus),
 }
 
+impl AnyBus {
+    /// Takes leave: an slcan adapter's channel is closed, so that it stops acknowledging frames on the bus. Dropping does
+    /// for the others.
+    pub async fn close(self) -> Result<(), BusError> {
+        match self {
+            Self::Slcan(bus) => bus.close().await,
+            Self::Socketcand(_) | Self::Log(_) => Ok(()),
+        }
+    }
+}
+
 impl AsyncBus for AnyBus {
     async fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         match self {

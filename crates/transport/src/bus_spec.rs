@@ -149,6 +149,9 @@ fn parse_slcan(rest: &str) -> Result<BusSpec, String> {
     if place.starts_with('/') {
         return Ok(BusSpec::SlcanSerial { path: place.to_owned(), bitrate, baud: baud.unwrap_or(DEFAULT_BAUD) });
     }
+    if !place.contains(':') {
+        return Err("expected HOST:PORT, or a device with three slashes such as slcan:///dev/ttyACM0".to_owned());
+    }
     if baud.is_some() {
         return Err("baud is for serial devices, not for TCP".to_owned());
     }
@@ -290,7 +293,7 @@ mod tests {
             ("socketcand://a:1/", "cannot be the name of a bus"),
             ("socketcand://a:1/x > y", "cannot be the name of a bus"),
             ("socketcand://::1:5/can0", "'::1' is no host name"),
-            ("slcan://host", "port is missing"),
+            ("slcan://ttyACM0", "a device with three slashes"),
             ("slcan://host:1?bitrate=2M", "bit rate must be"),
             ("slcan://host:1?baud=9600", "baud is for serial devices"),
             ("slcan:///dev/ttyS0?parity=none", "unknown option 'parity=none'"),

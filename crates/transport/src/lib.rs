@@ -6,6 +6,20 @@
 //! - [`socketcand`], [`slcan`] and [`log`] are the wire formats, as pure codecs that any other program may use.
 //!
 //! This crate holds the only clock ([`WallClock`]) and the only sockets of the project. Everything else is sans-IO.
+//!
+//! ```no_run
+//! use transport::{AsyncBus, BusSpec, WallClock};
+//!
+//! # async fn listen() -> Result<(), Box<dyn std::error::Error>> {
+//! let bus: BusSpec = "socketcand://127.0.0.1:29536/can0".parse()?;
+//! let mut bus = bus.open(&WallClock::start()).await?;
+//! bus.send(&"000#0100".parse()?).await?; // NMT: start all nodes
+//! let (at, frame) = bus.recv().await?;
+//! # let _ = (at, frame);
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! Linux SocketCAN is deliberately absent so far: it needs a kernel module that few test machines have.
 
 mod bus;

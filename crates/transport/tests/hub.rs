@@ -6,11 +6,11 @@ use std::time::Duration;
 
 use can::{Frame, Instant};
 use common::{PATIENCE, Raw, frame, heard, hub, slcan, slcan_port, socketcand, socketcand_port, soon};
-use tokio::io::AsyncWriteExt;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpSocket, TcpStream};
 use transport::{
-    AsyncBus, BusError, ClientId, Hub, HubError, HubEvent, HubOptions, LeaveReason, ServeSpec, SlcanBus, SocketcandBus,
-    WallClock,
+    AsyncBus, BusError, BusSpec, ClientId, Hub, HubError, HubEvent, HubOptions, LeaveReason, ServeSpec, SlcanBus,
+    SocketcandBus, WallClock,
 };
 
 /// Runs the hub as a bus without arbitration, in the background of the test's runtime.
@@ -270,4 +270,23 @@ async fn errors_name_the_place_and_the_reason() {
     greeter.await.unwrap();
     let error = SlcanBus::connect(&address, None, &clock).await.unwrap_err();
     assert!(error.to_string().contains(&address) && matches!(error, BusError::Connect { .. }), "{error}");
+}
+
+#[tokio::test]
+async fn closing_an_slcan_bus_closes_its_channel() {
+    let clock = WallClock::start();
+    let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let spec: BusSpec = format!("slcan://{}?bitrate=250k", listener.local_addr().unwrap()).parse().unwrap();
+    let adapter = async {
+        let (mut stream, _) = listener.accept().await.unwrap();
+        stream.write_all(b"\x07\r\rV1013\r").await.unwrap();
+        let mut told = vec![0; 10];
+        stream.read_exact(&mut told).await.unwrap();
+        stream.write_all(b"\r\r").await.unwrap();
+        stream.read_to_end(&mut told).await.unwrap();
+        String::from_utf8(told).unwrap()
+    };
+    let host = async { spec.open(&clock).await.unwrap().close().await.unwrap() };
+    let (told, ()) = soon(&clock, async { tokio::join!(adapter, host) }).await;
+    assert_eq!(told, "\r\rC\rV\rS5\rO\rC\r");
 }

@@ -3,20 +3,33 @@
 use super::Finding;
 use super::source::{Source, occurrences};
 
-/// Every file says at its top what it is.
+/// Every file says at its top what it is, or is one thing whose own documentation says so.
 pub(super) fn module_docs(source: &Source) -> Vec<Finding> {
-    let first = source.text.lines().find(|line| !line.trim().is_empty() && !line.starts_with("#!"));
-    if first.is_some_and(|line| line.starts_with("//!")) {
+    if source.text.lines().any(|line| line.starts_with("//!")) || first_item(&source.text).starts_with("///") {
         return Vec::new();
     }
     vec![finding(
         source,
         1,
         "module_docs",
-        "no module documentation".to_owned(),
+        "neither the file nor its first item is documented".to_owned(),
         "a reader wants to know what a file is before how it works",
         "begin with `//!` lines: what it is in the standard, what goes in and out, what it does not do",
     )]
+}
+
+/// The line where the first item begins, past attributes, modules and imports.
+fn first_item(text: &str) -> &str {
+    let mut importing = false;
+    for line in text.lines() {
+        let imports = importing
+            || ["use ", "pub use ", "pub(crate) use ", "mod ", "pub mod "].iter().any(|word| line.starts_with(word));
+        importing = imports && !line.trim_end().ends_with(';');
+        if !(imports || line.trim().is_empty() || line.starts_with("#")) {
+            return line;
+        }
+    }
+    ""
 }
 
 /// A test's name is a sentence: at least three words.
@@ -133,7 +146,9 @@ mod tests {
     #[test]
     fn a_file_without_module_documentation_is_found() {
         assert_eq!(count(module_docs, "use core::fmt;\n"), 1);
+        assert_eq!(count(module_docs, "use core::fmt;\n\nconst A: u8 = 1;\n/// B.\npub struct B;\n"), 1);
         assert_eq!(count(module_docs, "#![no_std]\n\n//! What it is.\n"), 0);
+        assert_eq!(count(module_docs, "use a::{\n    b,\n    c,\n};\n\n/// What it is.\npub struct A;\n"), 0);
     }
 
     #[test]

@@ -170,18 +170,25 @@ fn view(text: &str, kinds: &[Kind], wanted: Kind) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// Blanks each item that follows `#[cfg(test)]`, up to its closing brace or its semicolon.
+/// Blanks each item under `#[cfg(test)]` or a condition that includes `test`, up to its closing brace or semicolon.
 fn without_tests(code: &str) -> String {
-    const MARK: &str = "#[cfg(test)]";
+    const MARK: &str = "#[cfg(";
     let mut bytes = code.as_bytes().to_vec();
     let mut from = 0;
     while let Some(found) = code[from..].find(MARK) {
         let start = from + found;
-        let end = item_end(code, start + MARK.len());
-        bytes[start..end].iter_mut().filter(|byte| **byte != b'\n').for_each(|byte| *byte = b' ');
-        from = end;
+        let attribute_end = code[start..].find(']').map_or(code.len(), |length| start + length + 1);
+        from = attribute_end;
+        if is_test_condition(&code[start..attribute_end]) {
+            from = item_end(code, attribute_end);
+            bytes[start..from].iter_mut().filter(|byte| **byte != b'\n').for_each(|byte| *byte = b' ');
+        }
     }
     String::from_utf8_lossy(&bytes).into_owned()
+}
+
+fn is_test_condition(attribute: &str) -> bool {
+    !occurrences(attribute, "test").is_empty() && !attribute.contains("not(test)")
 }
 
 fn item_end(code: &str, from: usize) -> usize {
@@ -228,6 +235,8 @@ mod tests {
         assert!(source.shipped.contains("fn a") && source.shipped.contains("fn c"));
         assert!(!source.shipped.contains("fn b"));
         assert!(source.code.contains("fn b"));
+        let source = Source::new("a.rs", "#[cfg(all(test, unix))]\nfn a() {}\n#[cfg(not(test))]\nfn b() {}\n");
+        assert!(!source.shipped.contains("fn a") && source.shipped.contains("fn b"));
     }
 
     #[test]

@@ -11,6 +11,7 @@ mod objects;
 mod pending;
 mod profile;
 mod receive;
+mod transmit;
 
 use can::{CanId, Frame, Instant, Station};
 use heapless::Deque;
@@ -20,12 +21,12 @@ pub use profile::NodeProfile;
 
 use crate::cob::PdoNumber;
 use crate::emcy::{self, Emcy, EmcyErrorCode};
-use crate::heartbeat::{self, Heartbeat};
+use crate::heartbeat;
 use crate::nmt::Transition;
 use crate::od::{Dictionary, Table};
 use crate::pdo::{Rpdo, Tpdo};
 use crate::sdo::Server;
-use crate::{CobId, Mux, NmtCommand, NmtState, NodeId, cob};
+use crate::{Mux, NmtCommand, NmtState, NodeId};
 use pending::{Pending, Source};
 use receive::Receivers;
 
@@ -91,6 +92,7 @@ impl<const N: usize> Node<N> {
         self.sdo.reset();
         self.emcy = emcy::Producer::new();
         self.pending = Pending::NONE;
+        self.events.clear();
         self.last_addressed = None;
         self.take_up_objects();
         self.pending.insert(Source::BootUp);
@@ -131,7 +133,7 @@ impl<const N: usize> Node<N> {
     /// What happened since, in the order of arrival. Poll after every `handle_*`.
     #[inline]
     pub fn poll_event(&mut self) -> Option<NodeEvent> {
-        if self.events.is_empty() { None } else { self.events.pop_front() }
+        self.events.pop_front()
     }
 
     /// When the last frame for this node arrived (SDO request, RPDO, NMT command to it or to all): for a watch over
@@ -210,7 +212,7 @@ impl<const N: usize> Node<N> {
         self.rpdos[number.position()].standard_id().map(CanId::standard)
     }
 
-    pub(crate) fn handle_nmt(&mut self, command: NmtCommand) {
+    fn handle_nmt(&mut self, command: NmtCommand) {
         match self.state.handle(command) {
             Transition::None => {}
             Transition::Enter(state) => self.enter(state),
@@ -224,7 +226,8 @@ impl<const N: usize> Node<N> {
         self.push(NodeEvent::Nmt(state));
         if state.allows_pdo() {
             for position in 0..PdoNumber::COUNT {
-                self.start_tpdo(position);
+                self.tpdos[position].start(self.now);
+                self.offer_tpdo(position);
             }
         } else {
             self.stop_pdos();
@@ -252,33 +255,6 @@ impl<const N: usize> Node<N> {
         }
     }
 
-    fn start_tpdo(&mut self, position: usize) {
-        self.tpdos[position].start(self.now);
-        self.offer_tpdo(position);
-    }
-
-    /// Marks a due TPDO as ready, or sees that it is looked at when it will be.
-    #[inline]
-    fn offer_tpdo(&mut self, position: usize) {
-        let tpdo = &self.tpdos[position];
-        if tpdo.is_ready(self.now) {
-            self.pending.insert(Source::Tpdo(position));
-        } else {
-            self.deadline = self.deadline.min(tpdo.deadline());
-        }
-    }
-
-    fn offer_emcy(&mut self) {
-        if !self.state.allows_sdo() {
-            return;
-        }
-        if self.emcy.is_ready(self.now) {
-            self.pending.insert(Source::Emcy);
-        } else {
-            self.deadline = self.deadline.min(self.emcy.deadline());
-        }
-    }
-
     /// When full, the oldest event is lost: the dictionary has the newest values.
     #[inline]
     fn push(&mut self, event: NodeEvent) {
@@ -286,49 +262,6 @@ impl<const N: usize> Node<N> {
             self.events.pop_front();
         }
         let _ = self.events.push_back(event);
-    }
-
-    /// Finds the earliest deadline of all services.
-    fn reschedule(&mut self) {
-        let services = self.heartbeat.deadline().min(self.sdo.deadline());
-        let emcy = if self.pending.contains(Source::Emcy) || !self.state.allows_sdo() {
-            Instant::FAR_FUTURE
-        } else {
-            self.emcy.deadline()
-        };
-        let tpdos = self.tpdos.iter().map(|tpdo| tpdo.deadline()).min().unwrap_or(Instant::FAR_FUTURE);
-        self.deadline = services.min(emcy).min(tpdos);
-    }
-
-    fn pending_id(&self, source: Source) -> u32 {
-        match source {
-            Source::BootUp => 0,
-            Source::Emcy => self.emcy_id.map_or(u32::MAX, CanId::raw),
-            Source::Tpdo(position) => self.tpdos[position].can_id().raw(),
-            Source::SdoReply => cob::sdo_reply(self.node_id).raw(),
-            Source::Heartbeat => cob::heartbeat(self.node_id).raw(),
-        }
-    }
-
-    fn take(&mut self, source: Source) -> Option<Frame> {
-        match source {
-            Source::BootUp => Some(Heartbeat::boot_up(self.node_id).emit()),
-            Source::Heartbeat => {
-                let state = self.heartbeat_state.unwrap_or(self.state.heartbeat_byte());
-                Some(Heartbeat { node: self.node_id, state }.emit())
-            }
-            Source::SdoReply => self.sdo.take_reply().map(|bytes| Frame::full(cob::sdo_reply(self.node_id), bytes)),
-            Source::Tpdo(position) => {
-                let frame = self.tpdos[position].take(&self.dictionary.view(), self.now);
-                self.deadline = self.deadline.min(self.tpdos[position].deadline());
-                frame
-            }
-            Source::Emcy => {
-                let emcy = self.emcy.take(self.now)?;
-                self.offer_emcy();
-                self.emcy_id.map(|id| emcy.emit(id))
-            }
-        }
     }
 }
 
@@ -354,12 +287,7 @@ impl<const N: usize> Station for Node<N> {
     /// The most urgent frame: boot-up before all, then by identifier.
     #[inline]
     fn poll_transmit(&mut self) -> Option<Frame> {
-        if self.pending.is_empty() {
-            return None;
-        }
-        let source = self.pending.iter().min_by_key(|source| self.pending_id(*source))?;
-        self.pending.remove(source);
-        self.take(source)
+        if self.pending.is_empty() { None } else { self.take_most_urgent() }
     }
 
     #[inline]
@@ -371,58 +299,14 @@ impl<const N: usize> Station for Node<N> {
         self.now = now;
         if Some(frame.id()) == self.emcy_id {
             self.emcy.handle_transmitted(now);
+            self.offer_emcy();
             return;
         }
-        if let Some(tpdo) = self.tpdos.iter_mut().find(|tpdo| tpdo.is_active() && tpdo.can_id() == frame.id()) {
-            tpdo.handle_transmitted(now);
-        }
-    }
-}
-
-impl<const N: usize> Node<N> {
-    fn serve_deadlines(&mut self) {
-        if self.heartbeat.handle_timeout(self.now) {
-            self.pending.insert(Source::Heartbeat);
-        }
-        self.sdo.handle_timeout(self.now);
-        if self.sdo.has_reply() {
-            self.pending.insert(Source::SdoReply);
-        }
-        self.offer_emcy();
         for position in 0..PdoNumber::COUNT {
-            self.tpdos[position].handle_timeout(self.now);
-            self.offer_tpdo(position);
+            if self.tpdos[position].can_id() == frame.id() {
+                self.tpdos[position].handle_transmitted(now);
+                self.offer_tpdo(position);
+            }
         }
-        self.reschedule();
-    }
-
-    fn take_up_objects(&mut self) {
-        self.receivers = Receivers::new(self.node_id);
-        self.take_up_sync();
-        self.take_up_emcy();
-        for position in 0..PdoNumber::COUNT {
-            self.take_up_rpdo(position);
-            self.take_up_tpdo(position);
-        }
-    }
-
-    fn heartbeat_period_ms(&self) -> u16 {
-        self.object(0x1017).unwrap_or(0) as u16
-    }
-
-    fn object(&self, index: u16) -> Option<u32> {
-        self.dictionary.table().find(Mux::new(index, 0)).ok().map(|slot| self.dictionary.raw(slot))
-    }
-
-    fn take_up_sync(&mut self) {
-        let cob_id = self.object(0x1005).map(CobId);
-        self.receivers.set_sync(cob_id.and_then(|cob_id| cob_id.can_id().as_standard()));
-    }
-
-    fn take_up_emcy(&mut self) {
-        let default = CobId(cob::emcy(self.node_id).raw());
-        let cob_id = self.object(0x1014).map_or(default, CobId);
-        self.emcy_id = (self.profile.emcy && cob_id.is_valid()).then(|| cob_id.can_id());
-        self.emcy.set_inhibit_time(self.object(0x1015).unwrap_or(0) as u16);
     }
 }

@@ -1,15 +1,16 @@
 //! What a write to the communication objects (1000h to 1FFFh) must satisfy, and what it changes at once.
 
-use super::pending::Source;
+use super::receive::Receivers;
 use super::{Node, NodeEvent, Via};
+use crate::cob::PdoNumber;
 use crate::heartbeat;
 use crate::od::{Slot, View};
-use crate::pdo::parameter::{COB_ID, INHIBIT_TIME, TRANSMISSION_TYPE, check_identifier};
+use crate::pdo::parameter::{COB_ID, INHIBIT_TIME, TRANSMISSION_TYPE};
 use crate::pdo::{
     Direction, Mapping, MappingRecord, Parameter, RPDO_MAPPING, RPDO_PARAMETER, Rpdo, TPDO_MAPPING, TPDO_PARAMETER,
     Tpdo, TransmissionType,
 };
-use crate::{AbortCode, CobId, Mux};
+use crate::{AbortCode, CobId, Mux, cob};
 
 /// True for the communication profile area.
 pub(super) const fn is_communication(index: u16) -> bool {
@@ -41,15 +42,22 @@ impl<const N: usize> Node<N> {
     /// A peer's write: checks, stores, takes effect, is told to the owner.
     #[inline]
     pub(super) fn write(&mut self, slot: Slot, raw: u32, via: Via) -> Result<(), AbortCode> {
-        self.dictionary.check_write(slot, raw)?;
-        let mux = self.profile.table.row(slot).mux();
-        if is_communication(mux.index) {
-            self.check_communication(mux, raw)?;
-            self.dictionary.set_raw(slot, raw);
-            self.take_up(mux);
+        let row = self.dictionary.table().row(slot);
+        if is_communication(row.index) {
+            self.write_communication(slot, row.mux(), raw & row.data_type.mask(), via)
         } else {
-            self.dictionary.set_raw(slot, raw);
+            let raw = self.dictionary.write(slot, raw)?;
+            self.push(NodeEvent::Written { slot, raw, via });
+            Ok(())
         }
+    }
+
+    #[inline(never)]
+    fn write_communication(&mut self, slot: Slot, mux: Mux, raw: u32, via: Via) -> Result<(), AbortCode> {
+        self.dictionary.check_write(slot, raw)?;
+        self.check_communication(mux, raw)?;
+        self.dictionary.set_raw(slot, raw);
+        self.take_up(mux);
         self.push(NodeEvent::Written { slot, raw, via });
         Ok(())
     }
@@ -59,8 +67,8 @@ impl<const N: usize> Node<N> {
         match (mux.index, Record::of(mux.index)) {
             // A consumer of SYNC only: bit 30 would make it a producer.
             (0x1005, _) if raw & CobId::NO_RTR != 0 => Err(AbortCode::INVALID_VALUE),
-            (0x1005, _) => check_identifier(CobId(raw & !CobId::INVALID)),
-            (0x1014, _) => check_identifier(CobId(raw)),
+            (0x1005, _) => CobId(raw & !CobId::INVALID).check_identifier(),
+            (0x1014, _) => self.emcy_cob_id().check_change(CobId(raw), self.profile.pdo_changes_while_valid),
             (_, Record::Parameter(..)) => self.check_parameter(&values, mux, raw),
             (_, Record::Mapping(direction, _)) => self.check_mapping(&values, mux, raw, direction),
             _ => Ok(()),
@@ -71,7 +79,7 @@ impl<const N: usize> Node<N> {
         let while_valid = self.profile.pdo_changes_while_valid;
         let parameter = Parameter::read(values, mux.index);
         match mux.sub_index {
-            COB_ID => parameter.check_cob_id(CobId(raw), while_valid),
+            COB_ID => parameter.cob_id.check_change(CobId(raw), while_valid),
             TRANSMISSION_TYPE => TransmissionType::from_raw(raw as u8).map(|_| ()),
             INHIBIT_TIME if parameter.cob_id.is_valid() && !while_valid => Err(AbortCode::UNSUPPORTED_ACCESS),
             _ => Ok(()),
@@ -99,31 +107,63 @@ impl<const N: usize> Node<N> {
     fn take_up(&mut self, mux: Mux) {
         match (mux.index, Record::of(mux.index)) {
             (0x1005, _) => self.take_up_sync(),
-            (0x1014 | 0x1015, _) => {
-                self.take_up_emcy();
-                if self.emcy_id.is_none() {
-                    self.pending.remove(Source::Emcy);
-                }
+            (0x1014 | 0x1015, _) => self.take_up_emcy(),
+            (0x1017, _) => {
+                self.heartbeat = heartbeat::Producer::from_write(self.heartbeat_period_ms(), self.now);
+                self.offer_heartbeat();
             }
-            (0x1017, _) => self.heartbeat = heartbeat::Producer::from_write(self.heartbeat_period_ms(), self.now),
             (_, Record::Parameter(Direction::Receive, position) | Record::Mapping(Direction::Receive, position)) => {
                 self.take_up_rpdo(position);
             }
             (_, Record::Parameter(Direction::Transmit, position) | Record::Mapping(Direction::Transmit, position)) => {
+                let old = self.tpdos[position];
                 self.take_up_tpdo(position);
-                if self.state.allows_pdo() {
-                    self.start_tpdo(position);
+                let tpdo = &mut self.tpdos[position];
+                if self.state.allows_pdo() && tpdo.is_active() {
+                    if old.is_active() { tpdo.take_over_from(&old, self.now) } else { tpdo.start(self.now) }
                 }
             }
             _ => {}
         }
-        if self.heartbeat.handle_timeout(self.now) {
-            self.pending.insert(Source::Heartbeat);
-        }
         self.reschedule();
     }
 
-    pub(super) fn take_up_rpdo(&mut self, position: usize) {
+    /// All communication objects take effect.
+    pub(super) fn take_up_objects(&mut self) {
+        self.receivers = Receivers::new(self.node_id);
+        self.take_up_sync();
+        self.take_up_emcy();
+        for position in 0..PdoNumber::COUNT {
+            self.take_up_rpdo(position);
+            self.take_up_tpdo(position);
+        }
+    }
+
+    pub(super) fn heartbeat_period_ms(&self) -> u16 {
+        self.object(0x1017).unwrap_or(0) as u16
+    }
+
+    fn object(&self, index: u16) -> Option<u32> {
+        self.dictionary.table().find(Mux::new(index, 0)).ok().map(|slot| self.dictionary.raw(slot))
+    }
+
+    fn take_up_sync(&mut self) {
+        let cob_id = self.object(0x1005).map(CobId);
+        self.receivers.set_sync(cob_id.and_then(|cob_id| cob_id.can_id().as_standard()));
+    }
+
+    /// 1014h, or what it would be by default on a device without it.
+    fn emcy_cob_id(&self) -> CobId {
+        self.object(0x1014).map_or(CobId(cob::emcy(self.node_id).raw()), CobId)
+    }
+
+    fn take_up_emcy(&mut self) {
+        let cob_id = self.emcy_cob_id();
+        self.emcy_id = (self.profile.emcy && cob_id.is_valid()).then(|| cob_id.can_id());
+        self.emcy.set_inhibit_time(self.object(0x1015).unwrap_or(0) as u16);
+    }
+
+    fn take_up_rpdo(&mut self, position: usize) {
         let values = self.dictionary.view();
         let parameter = Parameter::read(&values, RPDO_PARAMETER + position as u16);
         let mapping = Mapping::read(&values, RPDO_MAPPING + position as u16, Direction::Receive);
@@ -133,7 +173,7 @@ impl<const N: usize> Node<N> {
         self.rpdos[position] = rpdo;
     }
 
-    pub(super) fn take_up_tpdo(&mut self, position: usize) {
+    fn take_up_tpdo(&mut self, position: usize) {
         let values = self.dictionary.view();
         let parameter = Parameter::read(&values, TPDO_PARAMETER + position as u16);
         let mapping = Mapping::read(&values, TPDO_MAPPING + position as u16, Direction::Transmit);
@@ -144,6 +184,5 @@ impl<const N: usize> Node<N> {
             self.profile.inhibit_unit_ns,
             self.profile.event_timer_unit_ns,
         );
-        self.pending.remove(Source::Tpdo(position));
     }
 }

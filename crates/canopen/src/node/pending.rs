@@ -48,12 +48,12 @@ impl Pending {
         self.0 == 0
     }
 
-    pub(super) const fn contains(self, source: Source) -> bool {
-        self.0 & source.bit() != 0
-    }
-
     pub(super) const fn insert(&mut self, source: Source) {
         self.0 |= source.bit();
+    }
+
+    pub(super) const fn set(&mut self, source: Source, ready: bool) {
+        if ready { self.insert(source) } else { self.remove(source) }
     }
 
     pub(super) const fn remove(&mut self, source: Source) {

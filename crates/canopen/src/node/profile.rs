@@ -20,7 +20,7 @@ pub struct NodeProfile {
     pub event_timer_unit_ns: u64,
     /// What makes the device send TPDOs of type 254 and 255.
     pub event_trigger: EventTrigger,
-    /// COB-ID, inhibit time and mapping of a PDO may be changed while it is valid.
+    /// COB-ID, inhibit time and mapping of a PDO may be changed while it is valid, and the COB-ID of EMCY.
     pub pdo_changes_while_valid: bool,
     /// Which SDO frames are heard, by length.
     pub sdo_frame_length: FrameLength,

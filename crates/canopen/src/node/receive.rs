@@ -6,65 +6,77 @@ use super::pending::Source;
 use super::{Node, NodeEvent, Via};
 use crate::cob::{self, PdoNumber};
 use crate::pdo::Reception;
-use crate::{NmtState, NodeId, nmt};
+use crate::{NodeId, nmt};
 
-/// The identifiers that a node listens to. A frame is compared with all of them at once.
+/// The identifiers that a node listens to, one in each 16-bit lane, so that a frame is compared with all of them at
+/// once. Most frames on a bus are for others.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Receivers([u16; 8]);
+pub(super) struct Receivers(u128);
 
-/// No frame has this identifier.
-const UNUSED: u16 = u16::MAX;
-const NMT: usize = 0;
-const SYNC: usize = 1;
-const SDO: usize = 2;
-const FIRST_RPDO: usize = 3;
+const LANE_BITS: u32 = 16;
+/// The highest bit of every lane; no identifier reaches it.
+const LANE_TOPS: u128 = 0x8000 * EACH_LANE;
+const EACH_LANE: u128 = 0x0001_0001_0001_0001_0001_0001_0001_0001;
 
-/// Which receivers a frame is for, one bit each.
+const NMT: u32 = 0;
+const SYNC: u32 = 1;
+const SDO: u32 = 2;
+const FIRST_RPDO: u32 = 3;
+
+/// Which receivers a frame is for: the top bit of their lanes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Matches(u8);
+pub(super) struct Matches(u128);
 
 impl Matches {
+    #[inline]
     pub(super) const fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    const fn contains(self, receiver: usize) -> bool {
-        self.0 >> receiver & 1 != 0
+    #[inline]
+    const fn contains(self, lane: u32) -> bool {
+        self.0 >> (lane * LANE_BITS + LANE_BITS - 1) & 1 != 0
     }
 }
 
 impl Receivers {
-    /// Deaf.
-    pub(super) const NONE: Self = Self([UNUSED; 8]);
+    /// Deaf: no identifier is FFFFh.
+    pub(super) const NONE: Self = Self(u128::MAX);
 
     /// NMT and SDO requests to `node_id`.
     pub(super) fn new(node_id: NodeId) -> Self {
         let mut receivers = Self::NONE;
-        receivers.0[NMT] = cob::NMT.raw() as u16;
-        receivers.0[SDO] = cob::sdo_request(node_id).raw() as u16;
+        receivers.set(NMT, cob::NMT.as_standard());
+        receivers.set(SDO, cob::sdo_request(node_id).as_standard());
         receivers
     }
 
     pub(super) fn set_sync(&mut self, id: Option<u16>) {
-        self.0[SYNC] = id.unwrap_or(UNUSED);
+        self.set(SYNC, id);
     }
 
     pub(super) fn set_rpdo(&mut self, position: usize, id: Option<u16>) {
-        self.0[FIRST_RPDO + position] = id.unwrap_or(UNUSED);
+        self.set(FIRST_RPDO + position as u32, id);
     }
 
+    fn set(&mut self, lane: u32, id: Option<u16>) {
+        let shift = lane * LANE_BITS;
+        self.0 = self.0 & !(0xFFFF << shift) | u128::from(id.unwrap_or(u16::MAX)) << shift;
+    }
+
+    /// A lane differs from `id` in its top bit, or in lower bits, which then carry into the top bit.
     #[inline]
-    pub(super) fn of(&self, id: u16) -> Matches {
-        let mut matches = 0;
-        for (bit, receiver) in self.0.iter().enumerate() {
-            matches |= u8::from(*receiver == id) << bit;
-        }
-        Matches(matches)
+    pub(super) const fn of(self, id: u16) -> Matches {
+        let half = (id as u64 * EACH_LANE as u64) as u128;
+        let difference = self.0 ^ (half << 64 | half);
+        let carried = (difference & !LANE_TOPS) + (LANE_TOPS - EACH_LANE);
+        Matches(!(carried | difference) & LANE_TOPS)
     }
 }
 
 impl<const N: usize> Node<N> {
     /// A data frame with an identifier that somebody here listens to.
+    #[inline(never)]
     pub(super) fn receive(&mut self, frame: &Frame, receivers: Matches) {
         if receivers.contains(SDO) {
             return self.receive_sdo(frame);
@@ -72,11 +84,11 @@ impl<const N: usize> Node<N> {
         if receivers.contains(NMT) {
             return self.receive_nmt(frame);
         }
-        if receivers.contains(SYNC) && self.state.allows_sdo() {
+        if receivers.contains(SYNC) {
             self.receive_sync();
         }
         for number in PdoNumber::ALL {
-            if receivers.contains(FIRST_RPDO + number.position()) {
+            if receivers.contains(FIRST_RPDO + number.position() as u32) {
                 self.receive_rpdo(frame, number);
             }
         }
@@ -92,10 +104,10 @@ impl<const N: usize> Node<N> {
 
     #[inline]
     fn receive_sdo(&mut self, frame: &Frame) {
+        self.last_addressed = Some(self.now);
         if !self.state.allows_sdo() {
             return;
         }
-        self.last_addressed = Some(self.now);
         if let Some(write) = self.sdo.handle_frame(frame, &self.dictionary.view(), self.now) {
             let result = self.write(write.slot, write.raw, Via::Sdo);
             self.sdo.finish(write, result);
@@ -108,8 +120,10 @@ impl<const N: usize> Node<N> {
 
     /// TPDOs first: their data is of the moment of SYNC, before what it lets take effect.
     fn receive_sync(&mut self) {
-        self.push(NodeEvent::Sync);
-        if self.state != NmtState::Operational {
+        if self.state.allows_sdo() {
+            self.push(NodeEvent::Sync);
+        }
+        if !self.state.allows_pdo() {
             return;
         }
         for position in 0..PdoNumber::COUNT {
@@ -146,6 +160,30 @@ impl<const N: usize> Node<N> {
         for object in mapping.objects() {
             // A refused value has nobody to tell: RPDOs are not confirmed.
             let _ = self.write(object.slot, object.extract(data), Via::Rpdo(number));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_identifier_is_found_in_every_lane_that_has_it_and_in_no_other() {
+        let mut receivers = Receivers::new(NodeId::MAX);
+        receivers.set_sync(Some(0x080));
+        for position in 0..4 {
+            receivers.set_rpdo(position, [Some(0x001), Some(0x7FE), None, Some(0x001)][position]);
+        }
+        let listened: [Option<u16>; 8] =
+            [Some(0), Some(0x080), Some(0x67F), Some(0x001), Some(0x7FE), None, Some(0x001), None];
+        for id in 0..=0x7FF {
+            let matches = receivers.of(id);
+            for (lane, expected) in listened.iter().enumerate() {
+                assert_eq!(matches.contains(lane as u32), *expected == Some(id), "{id:#X} in lane {lane}");
+            }
+            assert_eq!(matches.is_empty(), !listened.contains(&Some(id)));
+            assert!(Receivers::NONE.of(id).is_empty());
         }
     }
 }

@@ -66,14 +66,8 @@ impl DataType {
 
     /// The number that the low [`size`](Self::size) bytes of `raw` stand for.
     pub const fn value(self, raw: u32) -> i64 {
-        match self {
-            Self::Integer8 => raw as u8 as i8 as i64,
-            Self::Integer16 => raw as u16 as i16 as i64,
-            Self::Integer32 => raw as i32 as i64,
-            Self::Unsigned8 => raw as u8 as i64,
-            Self::Unsigned16 => raw as u16 as i64,
-            Self::Unsigned32 | Self::VisibleString => raw as i64,
-        }
+        let unused = self.unused_bits();
+        if self.is_signed() { ((raw << unused) as i32 >> unused) as i64 } else { (raw << unused >> unused) as i64 }
     }
 
     /// The cell for `value`: its low bytes, higher ones zero. Bits that do not fit are dropped.
@@ -83,10 +77,15 @@ impl DataType {
 
     /// Which bits of a cell the type uses.
     pub const fn mask(self) -> u32 {
+        u32::MAX >> self.unused_bits()
+    }
+
+    /// High bits of a cell that the type leaves zero.
+    const fn unused_bits(self) -> u32 {
         match self.size() {
-            1 => 0xFF,
-            2 => 0xFFFF,
-            _ => u32::MAX,
+            1 => 24,
+            2 => 16,
+            _ => 0,
         }
     }
 

@@ -1,4 +1,4 @@
-use super::{Default, Object, Scalar, Slot, Table};
+use super::{Default, Entry, Object, Scalar, Slot, Table};
 use crate::{AbortCode, Mux, NodeId};
 
 /// The values of a device's objects: one 32-bit cell a row of its [`Table`], little endian in the low bytes.
@@ -80,12 +80,29 @@ impl<const N: usize> Dictionary<N> {
     /// # Errors
     /// The abort code that an SDO server answers. Nothing is stored.
     pub fn check_write(&self, slot: Slot, raw: u32) -> Result<(), AbortCode> {
-        let row = self.table.row(slot);
+        self.check_row(self.table.row(slot), raw)
+    }
+
+    #[inline]
+    fn check_row(&self, row: &Entry, raw: u32) -> Result<(), AbortCode> {
         if !row.access.is_writable() {
             return Err(AbortCode::READ_ONLY);
         }
         row.check_value(row.data_type.value(raw))?;
         row.check.map_or(Ok(()), |check| check(&self.view(), raw))
+    }
+
+    /// [`check_write`](Self::check_write), then stores. Returns the cell.
+    ///
+    /// # Errors
+    /// The abort code that an SDO server answers. Nothing is stored.
+    #[inline]
+    pub fn write(&mut self, slot: Slot, raw: u32) -> Result<u32, AbortCode> {
+        let row = self.table.row(slot);
+        let cell = raw & row.data_type.mask();
+        self.check_row(row, cell)?;
+        self.cells[slot.position()] = cell;
+        Ok(cell)
     }
 }
 

@@ -68,7 +68,6 @@ pub struct Mapped {
     /// The row.
     pub slot: Slot,
     shift: u8,
-    bits: u8,
 }
 
 impl Mapping {
@@ -107,7 +106,7 @@ impl Mapping {
     }
 
     fn extended(mapping: Option<Self>, slot: Slot, bits: u8) -> Result<Self, AbortCode> {
-        let first = Mapped { slot, shift: 0, bits };
+        let first = Mapped { slot, shift: 0 };
         let Some(mut mapping) = mapping else {
             return Ok(Self { objects: [first; MAX_OBJECTS], count: 1, length: bits / 8 });
         };
@@ -115,7 +114,7 @@ impl Mapping {
         if u32::from(used_bits) + u32::from(bits) > MAX_BITS {
             return Err(AbortCode::PDO_TOO_LONG);
         }
-        mapping.objects[usize::from(mapping.count)] = Mapped { slot, shift: used_bits, bits };
+        mapping.objects[usize::from(mapping.count)] = Mapped { slot, shift: used_bits };
         mapping.count += 1;
         mapping.length += bits / 8;
         Ok(mapping)
@@ -140,9 +139,9 @@ impl Mapping {
 }
 
 impl Mapped {
-    /// The object's cell within `data` of a received PDO.
+    /// The object's value within `data` of a received PDO, in its low bytes; what stands above them means nothing.
     #[inline]
     pub const fn extract(&self, data: u64) -> u32 {
-        (data >> self.shift) as u32 & (u32::MAX >> (32 - self.bits as u32))
+        (data >> self.shift) as u32
     }
 }

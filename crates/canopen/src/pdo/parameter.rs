@@ -77,30 +77,4 @@ impl Parameter {
     pub fn standard_id(&self) -> Option<u16> {
         self.cob_id.can_id().as_standard().filter(|_| self.cob_id.is_valid())
     }
-
-    /// Whether `new` may be written to sub-index 01h.
-    ///
-    /// Only the base frame format is offered, so bit 29 is refused; so are restricted identifiers on a valid PDO.
-    /// The identifier of a valid PDO may change only if `while_valid`. Bit 30 is stored and has no effect.
-    ///
-    /// # Errors
-    /// 0609 0030h.
-    pub fn check_cob_id(&self, new: CobId, while_valid: bool) -> Result<(), AbortCode> {
-        check_identifier(new)?;
-        let moves = new.can_id() != self.cob_id.can_id();
-        let stays_valid = self.cob_id.is_valid() && new.is_valid();
-        if moves && stays_valid && !while_valid { Err(AbortCode::INVALID_VALUE) } else { Ok(()) }
-    }
-}
-
-/// Whether a COB-ID's identifier may be used: bit 29 clear, and not restricted unless bit 31 is set.
-///
-/// # Errors
-/// 0609 0030h.
-pub const fn check_identifier(cob_id: CobId) -> Result<(), AbortCode> {
-    if cob_id.is_extended() || (cob_id.is_valid() && cob_id.is_restricted()) {
-        Err(AbortCode::INVALID_VALUE)
-    } else {
-        Ok(())
-    }
 }

@@ -43,7 +43,7 @@ impl Rpdo {
         self.id
     }
 
-    /// The mapped objects.
+    /// What is mapped.
     pub const fn mapping(&self) -> Option<&Mapping> {
         self.mapping.as_ref()
     }

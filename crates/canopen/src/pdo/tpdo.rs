@@ -85,12 +85,14 @@ impl Tpdo {
             TransmissionType::EventDrivenManufacturer => Schedule::Event { on_change: true },
             TransmissionType::EventDrivenProfile => Schedule::Event { on_change: !by_timer },
         };
+        // The inhibit time is for types 254 and 255 (CiA 301, 7.5.2.37).
+        let is_event_driven = matches!(schedule, Schedule::Event { .. });
         Self {
             id: CanId::standard(id),
             mapping,
             schedule,
             answers_rpdo,
-            inhibit_ns: u64::from(parameter.inhibit_time) * inhibit_unit_ns,
+            inhibit_ns: if is_event_driven { u64::from(parameter.inhibit_time) * inhibit_unit_ns } else { 0 },
             timer_ns: u64::from(parameter.event_timer) * timer_unit_ns,
             ..Self::INVALID
         }
@@ -106,21 +108,34 @@ impl Tpdo {
         self.mapping.is_some()
     }
 
-    /// Operational is entered, or the record was changed while operational: event-driven data is sent once, and
-    /// SYNCs are counted from here.
+    /// Operational is entered, or the PDO became active while operational: counts as an event, so that event-driven
+    /// data is sent once. SYNCs and the event timer count from here.
     pub fn start(&mut self, now: Instant) {
         if !self.is_active() {
             return;
         }
+        self.restart_counting(now);
         match &mut self.schedule {
             Schedule::Acyclic { event } => *event = true,
+            Schedule::Cyclic { .. } => {}
+            Schedule::Event { .. } => self.due = (!self.answers_rpdo).then_some(Cause::Event),
+        }
+    }
+
+    /// Stays active under a changed record: what was due or inhibited remains so.
+    pub fn take_over_from(&mut self, old: &Self, now: Instant) {
+        self.due = old.due;
+        self.data = old.data;
+        self.inhibited_until = old.inhibited_until;
+        self.restart_counting(now);
+    }
+
+    fn restart_counting(&mut self, now: Instant) {
+        match &mut self.schedule {
+            Schedule::Acyclic { .. } => {}
             Schedule::Cyclic { period, left } => *left = *period,
-            Schedule::Event { .. } => {
-                self.due = (!self.answers_rpdo).then_some(Cause::Event);
-                if self.timer_ns > 0 {
-                    self.timer_at = now.plus_nanos(self.timer_ns);
-                }
-            }
+            Schedule::Event { .. } if self.timer_ns > 0 => self.timer_at = now.plus_nanos(self.timer_ns),
+            Schedule::Event { .. } => {}
         }
     }
 
@@ -196,12 +211,14 @@ impl Tpdo {
         self.due.is_some() && now >= self.inhibited_until
     }
 
-    /// When it next needs attention; [`Instant::FAR_FUTURE`] for never.
-    pub fn deadline(&self) -> Instant {
-        if self.due.is_some() { self.timer_at.min(self.inhibited_until) } else { self.timer_at }
+    /// When after `now` it next needs attention; [`Instant::FAR_FUTURE`] for never.
+    #[inline]
+    pub fn deadline(&self, now: Instant) -> Instant {
+        let is_held_back = self.due.is_some() && now < self.inhibited_until;
+        if is_held_back { self.timer_at.min(self.inhibited_until) } else { self.timer_at }
     }
 
-    /// The frame to offer at `now`.
+    /// The frame to offer at `now`. The inhibit time counts from here until the runner reports the transmission.
     #[inline]
     pub fn take(&mut self, values: &View<'_>, now: Instant) -> Option<Frame> {
         let mapping = self.mapping.as_ref()?;

@@ -7,7 +7,7 @@
 use can::{Frame, Instant};
 
 use super::wire::{LENGTH, MAX_EXPEDITED, MAX_SEGMENT, Payload, Reply, Request, Segment};
-use crate::od::{Default, Slot, Table, View};
+use crate::od::{Slot, Table, View};
 use crate::{AbortCode, Mux};
 
 /// Which requests a server listens to, by their data length code.
@@ -24,7 +24,7 @@ pub enum FrameLength {
 pub struct Write {
     /// The entry.
     pub slot: Slot,
-    /// The value to store, of the entry's own length.
+    /// The value to store, in as many low bytes as the entry has; what stands above them means nothing.
     pub raw: u32,
     mux: Mux,
     confirm: Confirm,
@@ -146,7 +146,7 @@ impl Server {
         if !row.access.is_readable() {
             return self.refuse(mux, AbortCode::WRITE_ONLY);
         }
-        if let Default::Text(text) = row.default {
+        if let Some(text) = row.constant_text() {
             return self.initiate_text(mux, text.as_bytes(), now);
         }
         let length = row.data_type.size() as u8;
@@ -199,8 +199,7 @@ impl Server {
         }
         match payload {
             Payload::Expedited { bytes, .. } => {
-                let raw = u32::from_le_bytes(bytes) & table.row(slot).data_type.mask();
-                Some(Write { slot, raw, mux, confirm: Confirm::Expedited })
+                Some(Write { slot, raw: u32::from_le_bytes(bytes), mux, confirm: Confirm::Expedited })
             }
             Payload::Segmented { size: declared } => {
                 let bytes = [0; MAX_EXPEDITED];
@@ -252,11 +251,13 @@ impl Server {
         self.refuse(mux, AbortCode::UNKNOWN_COMMAND);
     }
 
+    #[inline(never)]
     fn refuse(&mut self, mux: Mux, code: AbortCode) {
         self.end();
         self.answer(Reply::Abort(mux, code));
     }
 
+    #[inline(always)]
     fn answer(&mut self, reply: Reply) {
         self.reply = Some(reply.emit());
     }

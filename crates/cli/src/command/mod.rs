@@ -1,8 +1,14 @@
 //! The commands, one file each (commands that share everything but a word share a file).
 
 pub(crate) mod completions;
+pub(crate) mod demo;
+pub(crate) mod drive;
 pub(crate) mod dump;
+pub(crate) mod home;
+pub(crate) mod motion;
 pub(crate) mod nmt;
 pub(crate) mod objects;
 pub(crate) mod scan;
 pub(crate) mod sdo;
+pub(crate) mod sim;
+pub(crate) mod store;

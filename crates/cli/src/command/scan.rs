@@ -1,10 +1,10 @@
 //! `ferrodrive scan`: who is on the bus, what is known of each node, and what cannot be known.
 
-use canopen::{Mux, NodeId};
-use master::{Error, join_all};
+use canopen::NmtState;
+use master::identify::Found;
 use serde::Serialize;
 
-use crate::context::{Context, candidates};
+use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
 use crate::paint::Paint;
@@ -12,101 +12,64 @@ use crate::table::Table;
 
 /// Show who is on the bus
 ///
-/// Asks all 127 node-IDs at once for their device type and identity. A node in the state stopped answers no SDO; it is
-/// listed if it sends a heartbeat.
+/// Asks all 127 node-IDs for their device type and identity. A node in the state stopped answers no SDO; it is listed if it
+/// sends a heartbeat.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Scan {}
-
-const DEVICE_TYPE: Mux = Mux::new(0x1000, 0);
 
 /// Everybody found.
 #[derive(Debug, Serialize)]
 pub(crate) struct ScanReport {
-    nodes: Vec<Found>,
+    nodes: Vec<Node>,
 }
 
 #[derive(Debug, Serialize)]
-struct Found {
+struct Node {
     node: u8,
+    /// The model, if it can be told.
+    model: Option<&'static str>,
+    /// Every model that answers so.
+    models: Vec<&'static str>,
     /// As its last heartbeat said.
     nmt_state: Option<String>,
     device_type: Option<u32>,
     vendor_id: Option<u32>,
     product_code: Option<u32>,
     revision_number: Option<u32>,
-    serial_number: Option<u32>,
-    /// Every model that fits.
-    models: Vec<&'static str>,
-    remark: String,
+    /// What cannot be told, and why.
+    remark: Option<String>,
 }
 
 impl Scan {
     /// Asks everybody.
     pub(crate) async fn run(&self, context: &Context) -> Result<ScanReport, Failure> {
-        context.progress.show("asking nodes 1 to 127");
-        let found = join_all(NodeId::all().map(|node| ask(context, node))).await;
-        let nodes: Vec<Found> = found.into_iter().flatten().collect();
-        if nodes.is_empty() {
-            return Err(Failure::new("no node answered")
-                .because("nobody answered SDO and no heartbeat was heard")
+        let asked = |count| context.progress.show(format!("asked {count} of 127"));
+        let found = context.network.scan(context.timeout(), asked).await;
+        if found.is_empty() {
+            return Err(Failure::new("nobody is on the bus")
+                .because("no node answered SDO and no boot-up or heartbeat message was heard")
                 .next("check supply, cable, termination (60 ohm between CAN_H and CAN_L) and the bit rate"));
         }
-        Ok(ScanReport { nodes })
+        Ok(ScanReport { nodes: found.iter().map(|found| Node::new(context, found)).collect() })
     }
 }
 
-async fn ask(context: &Context, id: NodeId) -> Option<Found> {
-    let node = context.node(id);
-    let device_type = node.read::<u32>(DEVICE_TYPE).await;
-    if matches!(device_type, Err(Error::NoAnswer { .. } | Error::QueueFull { .. })) {
-        let state = node.facts().heartbeat_at.and(node.facts().nmt_state)?;
-        let remark = "sends heartbeats but answers no SDO".into();
-        return Some(Found { remark, ..Found::silent(id, Some(state.to_string())) });
-    }
-    let identity = async |sub_index| node.read::<u32>(Mux::new(0x1018, sub_index)).await.ok();
-    let (vendor_id, product_code) = (identity(1).await, identity(2).await);
-    let (revision_number, serial_number) = (identity(3).await, identity(4).await);
-    let fits = vendor_id.zip(product_code).map(candidates).unwrap_or_default();
-    let told = context.told_model(id);
-    let remark = remark(told.is_some(), vendor_id, fits.len());
-    let models = told.map_or_else(|| fits.iter().map(|model| model.model).collect(), |model| vec![model.model]);
-    let heartbeat = node.facts().heartbeat_at.is_some();
-    let nmt_state = node.facts().nmt_state.filter(|_| heartbeat).map(|state| state.to_string());
-    Some(Found {
-        device_type: device_type.ok(),
-        vendor_id,
-        product_code,
-        revision_number,
-        serial_number,
-        models,
-        remark,
-        ..Found::silent(id, nmt_state)
-    })
-}
-
-fn remark(told: bool, vendor_id: Option<u32>, fits: usize) -> String {
-    match (told, vendor_id, fits) {
-        (true, ..) => "",
-        (_, None, _) => "no identity object (1018h)",
-        (_, _, 0) => "no model known here has this identity",
-        (_, _, 1) => "",
-        _ => "these models have the same identity; say which with --model",
-    }
-    .into()
-}
-
-impl Found {
-    fn silent(node: NodeId, nmt_state: Option<String>) -> Self {
+impl Node {
+    fn new(context: &Context, found: &Found) -> Self {
+        let told = context.told_model(found.node);
+        let identity = found.identity.unwrap_or_default();
+        let model = told.or_else(|| found.model());
         Self {
-            node: node.raw(),
-            nmt_state,
-            device_type: None,
-            vendor_id: None,
-            product_code: None,
-            revision_number: None,
-            serial_number: None,
-            models: Vec::new(),
-            remark: String::new(),
+            node: found.node.raw(),
+            model: model.map(|model| model.model),
+            models: found.models.iter().map(|model| model.model).collect(),
+            // A boot-up message says only that the node has just left the state it names.
+            nmt_state: found.nmt_state.filter(|state| *state != NmtState::Initialising).map(|state| state.to_string()),
+            device_type: identity.device_type,
+            vendor_id: identity.vendor_id,
+            product_code: identity.product_code,
+            revision_number: identity.revision_number,
+            remark: found.doubt().filter(|_| told.is_none()),
         }
     }
 }
@@ -115,16 +78,16 @@ impl Report for ScanReport {
     fn text(&self, paint: Paint) -> String {
         let mut table = Table::new(&["node", "model", "nmt state", "device type", "vendor:product:revision", "remark"]);
         let hex = |number: Option<u32>| number.map_or_else(|| "-".into(), |number| format!("{number:X}h"));
-        for found in &self.nodes {
-            let model = if found.models.is_empty() { "unknown".into() } else { found.models.join(" or ") };
-            let identity = [found.vendor_id, found.product_code, found.revision_number].map(hex).join(":");
+        for node in &self.nodes {
+            let model = node.model.map_or_else(|| node.models.join(" or "), Into::into);
+            let identity = [node.vendor_id, node.product_code, node.revision_number].map(hex).join(":");
             table.row([
-                found.node.to_string(),
-                model,
-                found.nmt_state.clone().unwrap_or_else(|| "no heartbeat to tell".into()),
-                hex(found.device_type),
+                node.node.to_string(),
+                if model.is_empty() { "unknown".into() } else { model },
+                node.nmt_state.clone().unwrap_or_else(|| "no heartbeat".into()),
+                hex(node.device_type),
                 identity,
-                found.remark.clone(),
+                node.remark.clone().unwrap_or_default(),
             ]);
         }
         table.plain(paint)

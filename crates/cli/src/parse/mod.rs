@@ -2,7 +2,6 @@
 //!
 //! Every error says what was wrong, what is expected, and shows an example; clap prints it with exit status 2.
 
-#[allow(dead_code, reason = "the commands that use all of it are under way")]
 pub(crate) mod drive_spec;
 pub(crate) mod node;
 pub(crate) mod object;

@@ -9,11 +9,14 @@ const WIDTH: f64 = 1120.0;
 const LEFT: f64 = 92.0;
 const RIGHT: f64 = 128.0;
 const TOP: f64 = 74.0;
-const SECTION_STRIP: f64 = 26.0;
+const SECTION_STRIP: f64 = 40.0;
 const EVENT_LANE: f64 = 17.0;
-const EVENT_LANES: usize = 4;
+const EVENT_LANES: usize = 6;
 const PANEL_HEIGHT: f64 = 150.0;
-const PANEL_GAP: f64 = 16.0;
+/// Holds the title of the panel below.
+const PANEL_GAP: f64 = 34.0;
+/// Room above and below the values of a panel, as a part of their range.
+const HEADROOM: f64 = 0.07;
 const BOTTOM: f64 = 50.0;
 const LABEL_GAP: f64 = 15.0;
 
@@ -27,7 +30,8 @@ const TITLE: Font = Font { size: 19.0, colour: "#1f2933", bold: true };
 const SUBTITLE: Font = Font { size: 13.0, colour: "#5b6773", bold: false };
 const AXIS: Font = Font { size: 12.0, colour: "#5b6773", bold: false };
 const NAME: Font = Font { size: 12.5, colour: "#1f2933", bold: true };
-const SECTION: Font = Font { size: 11.5, colour: "#3b4652", bold: false };
+const NUMBER: Font = Font { size: 12.0, colour: "#3b4652", bold: true };
+const SECTION: Font = Font { size: 11.5, colour: "#5b6773", bold: false };
 
 /// Where things lie, px.
 struct Layout {
@@ -57,7 +61,7 @@ pub(super) fn figure(figure: &Figure) -> String {
         Layout { time_s: figure.time_span_s(), event_top: TOP + section_strip, panels_top: 0.0, panels_bottom: 0.0 };
     let event_lanes = event_lanes(&layout, &events);
     let lane_count = event_lanes.iter().max().map_or(0, |lane| lane + 1);
-    layout.panels_top = layout.event_top + lane_count as f64 * EVENT_LANE + 10.0;
+    layout.panels_top = layout.event_top + lane_count as f64 * EVENT_LANE + 28.0;
     layout.panels_bottom = layout.panel_top(figure.panels.len()) - PANEL_GAP;
     let height = layout.panels_bottom + BOTTOM;
 
@@ -82,8 +86,12 @@ fn sections(svg: &mut Svg, layout: &Layout, figure: &Figure) {
             svg.rect((left, TOP), size, 0.0, &format!(r#"fill="{BAND}""#));
         }
         let fits = |name: &&String| SECTION.width(name) < right - left - 4.0;
+        let middle = (left + right) / 2.0;
+        if NUMBER.width(&section.number) < right - left {
+            svg.text((middle, TOP + 17.0), Anchor::Middle, NUMBER, &section.number);
+        }
         if let Some(name) = section.names.iter().find(fits) {
-            svg.text(((left + right) / 2.0, TOP + 17.0), Anchor::Middle, SECTION, name);
+            svg.text((middle, TOP + 32.0), Anchor::Middle, SECTION, name);
         }
     }
 }
@@ -91,27 +99,31 @@ fn sections(svg: &mut Svg, layout: &Layout, figure: &Figure) {
 fn draw_panel(svg: &mut Svg, layout: &Layout, top: f64, panel: &Panel) {
     let values = panel.traces.iter().flat_map(|trace| &trace.points).map(|point| point.1);
     let (low, high) = values.fold((0f64, 0f64), |(low, high), value| (low.min(value), high.max(value)));
-    let ticks = Ticks::around(low, high, 5);
-    let (low, high) = (ticks.values[0], ticks.values[ticks.values.len() - 1]);
+    let (low, high) = if low < high { (low, high) } else { (-1.0, 1.0) };
+    let (low, high) = (low - (high - low) * HEADROOM, high + (high - low) * HEADROOM);
+    let ticks = Ticks::within(low, high, 5);
     let y = |value: f64| top + (high - value) / (high - low) * PANEL_HEIGHT;
     for &tick in &ticks.values {
         let colour = if tick == 0.0 { ZERO } else { GRID };
         svg.line((LEFT, y(tick)), (WIDTH - RIGHT, y(tick)), &format!(r#"stroke="{colour}""#));
         svg.text((LEFT - 8.0, y(tick) + 4.0), Anchor::End, AXIS, &ticks.text(tick));
     }
-    svg.text((LEFT + 6.0, top + 15.0), Anchor::Start, NAME, panel.title);
-    let after_title = LEFT + 12.0 + NAME.width(panel.title);
-    svg.text((after_title, top + 15.0), Anchor::Start, AXIS, panel.unit);
+    svg.text((LEFT, top - 7.0), Anchor::Start, NAME, panel.title);
+    let after_title = LEFT + 7.0 + NAME.width(panel.title);
+    svg.text((after_title, top - 7.0), Anchor::Start, AXIS, panel.unit);
     for trace in &panel.traces {
-        let pixels = trace.points.iter().map(|&(t_s, value)| (layout.x(t_s), y(value)));
-        let line = if trace.style == Style::SetPoint { steps(pixels) } else { thin(pixels) };
-        svg.path(&line, &paint(trace.style));
+        // Where a trace has no value, its line has a gap.
+        for piece in trace.points.split(|point| !point.1.is_finite()).filter(|piece| !piece.is_empty()) {
+            let pixels = piece.iter().map(|&(t_s, value)| (layout.x(t_s), y(value)));
+            let line = if trace.style == Style::SetPoint { steps(pixels) } else { thin(pixels) };
+            svg.path(&line, &paint(trace.style));
+        }
     }
     trace_labels(svg, top, &panel.traces, y);
 }
 
 fn trace_labels(svg: &mut Svg, top: f64, traces: &[Trace], y: impl Fn(f64) -> f64) {
-    let ends: Vec<f64> = traces.iter().map(|trace| y(trace.points.last().map_or(0.0, |point| point.1))).collect();
+    let ends: Vec<f64> = traces.iter().map(|trace| y(last_value(trace))).collect();
     let heights = lanes::spread(&ends, LABEL_GAP, top + 6.0, top + PANEL_HEIGHT - 2.0);
     for (trace, height) in traces.iter().zip(heights) {
         let x = WIDTH - RIGHT + 8.0;
@@ -119,6 +131,11 @@ fn trace_labels(svg: &mut Svg, top: f64, traces: &[Trace], y: impl Fn(f64) -> f6
         let font = Font { size: 12.0, colour: text_colour(trace.style), bold: matches!(trace.style, Style::Actual(_)) };
         svg.text((x + 19.0, height + 4.0), Anchor::Start, font, trace.label);
     }
+}
+
+/// Where the label belongs: at the last value that there is.
+fn last_value(trace: &Trace) -> f64 {
+    trace.points.iter().rev().map(|point| point.1).find(|value| value.is_finite()).unwrap_or(0.0)
 }
 
 /// A lane for each event's label, so that labels do not overlap.
@@ -235,7 +252,12 @@ mod tests {
                 },
                 Panel { title: "empty", unit: "A", traces: Vec::new() },
             ],
-            sections: vec![Section { from_s: 0.0, to_s: 10.0, names: vec!["x".repeat(500), "short".into()] }],
+            sections: vec![Section {
+                from_s: 0.0,
+                to_s: 10.0,
+                number: "4.1".into(),
+                names: vec!["x".repeat(500), "short".into()],
+            }],
             events: vec![Event { at_s: 3.0, label: "quick stop".into(), kind: EventKind::Stop }],
         }
     }

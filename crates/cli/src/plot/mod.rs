@@ -76,7 +76,9 @@ pub(crate) struct Section {
     pub(crate) from_s: f64,
     /// End, s.
     pub(crate) to_s: f64,
-    /// Names from the longest to the shortest; the first that fits is written.
+    /// Its number, written where there is room for it.
+    pub(crate) number: String,
+    /// Names from the longest to the shortest; the first that fits is written under the number.
     pub(crate) names: Vec<String>,
 }
 

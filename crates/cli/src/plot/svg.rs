@@ -33,7 +33,7 @@ pub(super) struct Font {
 impl Font {
     /// Width of a text, px; an estimate from the mean advance of common sans-serif faces.
     pub(super) fn width(self, text: &str) -> f64 {
-        const MEAN_ADVANCE_EM: f64 = 0.56;
+        const MEAN_ADVANCE_EM: f64 = 0.6;
         text.chars().count() as f64 * self.size * MEAN_ADVANCE_EM * if self.bold { 1.07 } else { 1.0 }
     }
 }

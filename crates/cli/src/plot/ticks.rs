@@ -18,20 +18,6 @@ impl Ticks {
         Self { values: (first..=last).map(|n| n as f64 * step).collect(), step }
     }
 
-    /// Whole steps that enclose `low..=high`.
-    pub(super) fn around(low: f64, high: f64, most: usize) -> Self {
-        let (low, high) = if low < high { (low, high) } else { (low - 1.0, high + 1.0) };
-        let mut step = round_step((high - low) / most.max(1) as f64);
-        loop {
-            let first = (low / step + 1e-9).floor() as i64;
-            let last = (high / step - 1e-9).ceil() as i64;
-            if (last - first) as usize <= most.max(1) {
-                return Self { values: (first..=last).map(|n| n as f64 * step).collect(), step };
-            }
-            step = round_step(step * 1.5);
-        }
-    }
-
     /// A tick as text, with as many decimals as the step needs and thousands set apart by a thin space.
     pub(super) fn text(&self, value: f64) -> String {
         let decimals = (-self.step.log10()).ceil().clamp(0.0, 9.0) as usize;
@@ -76,13 +62,6 @@ mod tests {
         {
             assert!((round_step(least) / step - 1.0).abs() < 1e-9, "{least} gives {}", round_step(least));
         }
-    }
-
-    #[test]
-    fn enclosing_ticks_cover_the_range_with_few_steps() {
-        let ticks = Ticks::around(-103.0, 101.0, 5);
-        assert_eq!(ticks.values, [-200.0, -100.0, 0.0, 100.0, 200.0]);
-        assert_eq!(Ticks::around(0.0, 0.0, 4).values.len(), 5);
     }
 
     #[test]

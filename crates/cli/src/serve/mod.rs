@@ -1,4 +1,5 @@
 //! Virtual drives for other programs: a served world, EEPROM images on disk.
 
 pub(crate) mod eeprom;
+pub(crate) mod keeper;
 pub(crate) mod world;

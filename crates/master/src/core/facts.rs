@@ -2,8 +2,8 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use can::Instant;
-use canopen::NmtState;
 use canopen::emcy::Emcy;
+use canopen::{NmtCommand, NmtState};
 
 /// How many emergency messages are kept for each node.
 const EMCY_KEPT: usize = 8;
@@ -17,6 +17,8 @@ pub struct NodeFacts {
     pub boot_up: Option<(Instant, u32)>,
     /// When its last heartbeat or boot-up message came.
     pub heartbeat_at: Option<Instant>,
+    /// The last NMT command that this master sent it, and when; forgotten at its boot-up.
+    pub nmt_sent: Option<(Instant, NmtCommand)>,
     /// When any frame of its predefined connection set came (CiA 301, 7.3.3).
     pub seen_at: Option<Instant>,
     /// The heartbeat that is expected of it, if it is being watched.
@@ -60,12 +62,30 @@ impl NodeFacts {
         self.emcys.push_back((now, emcy));
     }
 
-    /// Notes a heartbeat; true if a lost one has come back.
-    pub(super) fn note_heartbeat(&mut self, now: Instant) -> bool {
+    /// Notes a heartbeat or boot-up message; true if a lost heartbeat has come back.
+    pub(super) fn note_heartbeat(&mut self, state: NmtState, now: Instant) -> bool {
         self.heartbeat_at = Some(now);
+        let booted = state == NmtState::Initialising;
+        if booted {
+            self.boot_up = Some((now, self.boot_up.map_or(1, |(_, count)| count.saturating_add(1))));
+            self.nmt_sent = None;
+        }
         let Some(watch) = &mut self.heartbeat_watch else { return false };
-        watch.deadline = Some(now + watch.time);
-        core::mem::take(&mut watch.lost)
+        // Boot-up does not arm the watch: the node may have lost its heartbeat time (CiA 301, 7.2.8.3.2.2).
+        watch.deadline = (!booted).then(|| now + watch.time);
+        !booted && core::mem::take(&mut watch.lost)
+    }
+
+    /// The state that it must be in: what it last said, or what this master last told it since.
+    pub fn probable_state(&self) -> Option<NmtState> {
+        let told = self.nmt_sent.filter(|(at, _)| self.heartbeat_at.is_none_or(|heard| heard < *at));
+        let told = told.and_then(|(_, command)| match command {
+            NmtCommand::Start => Some(NmtState::Operational),
+            NmtCommand::Stop => Some(NmtState::Stopped),
+            NmtCommand::EnterPreOperational => Some(NmtState::PreOperational),
+            NmtCommand::ResetNode | NmtCommand::ResetCommunication => None,
+        });
+        told.or(self.nmt_state)
     }
 
     /// True once when the watched heartbeat has not come in time.

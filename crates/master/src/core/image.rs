@@ -223,10 +223,6 @@ impl Image {
         Some(Frame::new(pdo.id, &data[..pdo.map.bytes().min(MAX_DATA_LENGTH)]))
     }
 
-    pub(super) fn has_pending(&self) -> bool {
-        !self.pending.is_empty()
-    }
-
     fn index(&mut self) {
         self.by_id.fill(NONE);
         for (position, pdo) in self.tpdos.iter().enumerate() {

@@ -21,8 +21,8 @@ use can::{Frame, Instant, Station};
 use canopen::cob::Service;
 use canopen::emcy::Emcy;
 use canopen::heartbeat::Heartbeat;
-use canopen::nmt::NmtRequest;
-use canopen::{Mux, NmtState, NodeId};
+use canopen::nmt::{NmtRequest, NmtTarget};
+use canopen::{Mux, NmtCommand, NmtState, NodeId};
 
 pub use event::Event;
 pub use facts::{HeartbeatWatch, NodeFacts};
@@ -130,8 +130,11 @@ impl Core {
             Command::Request(ticket, request) => self.start_request(ticket, request),
             Command::Timer(ticket, after) => self.timers.arm(self.now + after, ticket),
             Command::Cancel(ticket) => self.cancel(ticket),
-            Command::Nmt(target, command) => self.push_frame(NmtRequest::new(command, target).emit()),
-            Command::Sync(period) => self.sync.set_period(period, self.now),
+            Command::Nmt(target, command) => self.send_nmt(target, command),
+            Command::Sync(period) => {
+                self.sync.set_period(period, self.now);
+                self.produce_sync();
+            }
             Command::WatchHeartbeat(node, time) => self.watch_heartbeat(node, time),
             Command::Transmit(frame) => self.push_frame(frame),
         }
@@ -167,11 +170,6 @@ impl Core {
         &mut self.image
     }
 
-    /// True if there may be a frame to send.
-    pub fn wants_transmit(&self) -> bool {
-        !self.outbox.is_empty() || !self.sending.is_empty() || self.image.has_pending()
-    }
-
     /// The latest time this core was told.
     pub const fn now(&self) -> Instant {
         self.now
@@ -193,6 +191,14 @@ impl Core {
         if let Some(node) = owner.and_then(|position| NodeId::new(position as u8 + 1)) {
             self.settle(node);
         }
+    }
+
+    fn send_nmt(&mut self, target: NmtTarget, command: NmtCommand) {
+        let now = self.now;
+        for node in NodeId::all().filter(|node| target.includes(*node)) {
+            self.member_mut(node).facts.nmt_sent = Some((now, command));
+        }
+        self.push_frame(NmtRequest::new(command, target).emit());
     }
 
     fn watch_heartbeat(&mut self, node: NodeId, time: Option<Duration>) {
@@ -250,10 +256,9 @@ impl Core {
         let Some(state) = Heartbeat::parse(frame).and_then(Heartbeat::nmt_state) else { return };
         let facts = &mut self.member_mut(node).facts;
         let before = facts.nmt_state.replace(state);
-        let back = facts.note_heartbeat(now);
+        let back = facts.note_heartbeat(state, now);
         let deadline = facts.heartbeat_watch.and_then(|watch| watch.deadline);
         if state == NmtState::Initialising {
-            facts.boot_up = Some((now, facts.boot_up.map_or(1, |(_, count)| count.saturating_add(1))));
             self.events.push(Event::BootUp(node), now);
         } else if before != Some(state) {
             self.events.push(Event::NmtState(node, state), now);
@@ -290,6 +295,12 @@ impl Core {
             if let Some(deadline) = watch.deadline {
                 self.heartbeat_check = self.heartbeat_check.min(deadline);
             }
+        }
+    }
+
+    fn produce_sync(&mut self) {
+        if self.sync.handle_timeout(self.now) {
+            self.image.handle_sync();
         }
     }
 
@@ -365,9 +376,7 @@ impl Station for Core {
         while let Some(ticket) = self.timers.pop_due(now) {
             self.finished.push_back(Finished { ticket, outcome: Ok(Payload::EMPTY) });
         }
-        if self.sync.handle_timeout(now) {
-            self.image.handle_sync();
-        }
+        self.produce_sync();
         self.check_heartbeats();
     }
 

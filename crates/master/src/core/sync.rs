@@ -16,12 +16,11 @@ pub(super) struct SyncProducer {
 }
 
 impl SyncProducer {
-    /// Starts with a first SYNC at once, or stops (`None` or a zero period).
+    /// Starts with a first SYNC due at once, or stops (`None` or a zero period).
     pub(super) fn set_period(&mut self, period: Option<Duration>, now: Instant) {
         self.period_ns = period.map_or(0, |period| u64::try_from(period.as_nanos()).unwrap_or(u64::MAX));
         self.due = (self.period_ns > 0).then_some(now);
         self.pending = false;
-        self.handle_timeout(now);
     }
 
     /// True when a tick has come.
@@ -50,6 +49,7 @@ mod tests {
     fn a_late_call_does_not_shift_the_grid() {
         let mut sync = SyncProducer::default();
         sync.set_period(Some(Duration::from_millis(20)), Instant::from_millis(100));
+        assert!(sync.handle_timeout(Instant::from_millis(100)));
         assert!(sync.poll_transmit().is_some() && sync.poll_transmit().is_none());
         assert!(sync.handle_timeout(Instant::from_millis(125)));
         assert_eq!(sync.next(), Some(Instant::from_millis(140)));

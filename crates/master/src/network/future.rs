@@ -4,10 +4,11 @@ use core::pin::Pin;
 use core::task::{Context, Poll};
 use std::time::Duration;
 
-use canopen::NodeId;
+use can::Instant;
+use canopen::{Mux, NodeId};
 
 use super::{Network, Slot, Watcher};
-use crate::core::{Command, NodeFacts, Outcome, Request, Ticket};
+use crate::core::{Command, Core, NodeFacts, Outcome, Received, Request, Ticket};
 
 /// A request or timer that is started by the first poll. Dropping it cancels it: an SDO transfer that is on the
 /// wire is aborted.
@@ -68,8 +69,10 @@ impl Future for Pending {
 impl Drop for Pending {
     fn drop(&mut self) {
         if let State::Started(ticket) = self.state {
-            self.network.lock().slots.remove(&ticket);
-            self.network.submit(Command::Cancel(ticket));
+            let slot = self.network.lock().slots.remove(&ticket);
+            if matches!(slot, Some(Slot::Waiting(_))) {
+                self.network.submit(Command::Cancel(ticket));
+            }
         }
     }
 }
@@ -139,14 +142,36 @@ impl<F> Wait<F> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Elapsed;
 
-impl<T, F: FnMut(&NodeFacts) -> Option<T> + Unpin> Future for Wait<F> {
+/// What a condition sees of the node that it waits for.
+#[derive(Clone, Copy, Debug)]
+pub struct NodeView<'a> {
+    /// What has been seen of it.
+    pub facts: &'a NodeFacts,
+    node: NodeId,
+    core: &'a Core,
+}
+
+impl NodeView<'_> {
+    /// The newest value of an object that it sends by PDO.
+    pub fn received(&self, mux: Mux) -> Option<Received> {
+        self.core.image().value(self.node, mux)
+    }
+
+    /// The latest time that the runner has told.
+    pub const fn now(&self) -> Instant {
+        self.core.now()
+    }
+}
+
+impl<T, F: FnMut(&NodeView<'_>) -> Option<T> + Unpin> Future for Wait<F> {
     type Output = Result<T, Elapsed>;
 
     fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
         let this = self.get_mut();
         {
             let mut shared = this.network.lock();
-            if let Some(value) = (this.condition)(shared.core.facts(this.node)) {
+            let view = NodeView { facts: shared.core.facts(this.node), node: this.node, core: &shared.core };
+            if let Some(value) = (this.condition)(&view) {
                 return Poll::Ready(Ok(value));
             }
             let waker = context.waker().clone();

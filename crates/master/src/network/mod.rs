@@ -20,7 +20,7 @@ use canopen::{Mux, NmtCommand, NodeId};
 
 use crate::core::{Command, Core, Event, NodeFacts, NodeSet, Outcome, Received, Ticket};
 
-pub use future::{Sleep, Wait};
+pub use future::{Elapsed, NodeView, Sleep, Wait};
 pub use join::join_all;
 pub use node::{DEFAULT_TIMEOUT, Node};
 
@@ -37,6 +37,8 @@ struct Shared {
     inbox: VecDeque<Command>,
     slots: HashMap<Ticket, Slot>,
     watchers: Vec<Watcher>,
+    /// Something was asked for since the runner last came.
+    fresh: bool,
     /// Woken whenever a command comes into the inbox.
     on_activity: Option<Waker>,
     /// Woken once by the next command that comes into the inbox.
@@ -132,13 +134,15 @@ impl Network {
         self.lock().on_activity = Some(waker);
     }
 
-    /// Ready when a command waits for the runner to call [`handle_timeout`](Station::handle_timeout).
+    /// Ready, once, when something was asked for since the runner last called
+    /// [`handle_timeout`](Station::handle_timeout). For a runner that waits in async code.
     pub fn poll_activity(&self, context: &mut Context<'_>) -> Poll<()> {
         let mut shared = self.lock();
-        if shared.inbox.is_empty() && !shared.core.wants_transmit() {
+        if !shared.fresh {
             shared.activity = Some(context.waker().clone());
             return Poll::Pending;
         }
+        shared.fresh = false;
         Poll::Ready(())
     }
 
@@ -168,6 +172,7 @@ impl Network {
     /// Calls the core at `now`, waiting commands first, and wakes whoever waited for what came of it.
     fn run(&self, now: Instant, call: impl FnOnce(&mut Core)) {
         let mut shared = self.lock();
+        shared.fresh = false;
         while let Some(command) = shared.inbox.pop_front() {
             shared.core.execute(command, now);
         }
@@ -203,6 +208,7 @@ impl Shared {
     }
 
     fn activity_wakers(&mut self) -> ActivityWakers {
+        self.fresh = true;
         ActivityWakers { lasting: self.on_activity.clone(), once: self.activity.take() }
     }
 }

@@ -5,7 +5,7 @@ use canopen::od::Scalar;
 use canopen::{Mux, NmtCommand, NodeId};
 
 use super::future::{Elapsed, Pending};
-use super::{Network, Wait};
+use super::{Network, NodeView, Wait};
 use crate::core::{Command, Failure, NodeFacts, Payload, Request, Transfer};
 use crate::error::{Access, Error, Hints};
 
@@ -31,6 +31,11 @@ impl Node {
     pub const fn with_timeout(mut self, timeout: Duration) -> Self {
         self.timeout = timeout;
         self
+    }
+
+    /// The longest wait for each SDO answer.
+    pub const fn timeout(&self) -> Duration {
+        self.timeout
     }
 
     /// Its node-ID.
@@ -102,7 +107,7 @@ impl Node {
     /// [`Error::NoBootUp`] with what has been seen of the node instead.
     pub fn wait_boot_up(&self, timeout: Duration) -> impl Future<Output = Result<(), Error>> + use<> {
         let before = self.facts().boot_up.map_or(0, |(_, count)| count);
-        let booted = move |facts: &NodeFacts| facts.boot_up.filter(|(_, count)| *count > before).map(|_| ());
+        let booted = move |node: &NodeView<'_>| node.facts.boot_up.filter(|(_, count)| *count > before).map(|_| ());
         let wait = self.wait(booted, timeout);
         let node = self.clone();
         async move {
@@ -123,7 +128,7 @@ impl Node {
     /// Waits until `condition` gives a value, looking whenever something is heard of the node.
     pub fn wait<T, F>(&self, condition: F, timeout: Duration) -> Wait<F>
     where
-        F: FnMut(&NodeFacts) -> Option<T> + Unpin,
+        F: FnMut(&NodeView<'_>) -> Option<T> + Unpin,
     {
         Wait::new(self.network.clone(), self.id, condition, timeout)
     }
@@ -153,7 +158,7 @@ impl Node {
         let facts = shared.core.facts(self.id);
         Hints {
             unsent,
-            nmt_state: facts.nmt_state,
+            nmt_state: facts.probable_state(),
             silent_for: facts.seen_at.map(|at| shared.core.now() - at),
             others: NodeId::all().any(|other| other != self.id && shared.core.facts(other).seen_at.is_some()),
         }

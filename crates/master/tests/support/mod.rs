@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "each test file uses its part")]
 
 pub(crate) mod toy;
+pub(crate) mod toy_drive;
 
 use std::future::Future;
 use std::pin::pin;

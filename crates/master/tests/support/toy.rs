@@ -4,6 +4,8 @@ use std::collections::{BTreeMap, VecDeque};
 
 use can::{CanId, Frame, Instant, Station};
 
+use super::toy_drive::ToyDrive;
+
 /// An SDO server with a heartbeat byte, and ways to misbehave.
 #[derive(Clone, Default)]
 pub(crate) struct Toy {
@@ -21,8 +23,11 @@ pub(crate) struct Toy {
     pub(crate) requests: Vec<[u8; 8]>,
     pub(crate) aborted_by_client: Vec<u32>,
     pub(crate) state: u8,
+    /// What makes it a drive.
+    pub(crate) drive: Option<ToyDrive>,
     upload: Option<(Vec<u8>, usize)>,
     download: Option<((u16, u8), Vec<u8>)>,
+    now: Instant,
     out: VecDeque<Frame>,
 }
 
@@ -145,13 +150,22 @@ impl Toy {
         if !self.ignores.contains(&key) {
             self.objects.insert(key, bytes);
         }
+        if let Some(drive) = &mut self.drive {
+            drive.written(key, &mut self.objects, self.now);
+        }
     }
 }
 
 impl Station for Toy {
-    fn handle_frame(&mut self, frame: &Frame, _: Instant) {
+    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
         let Some(id) = frame.standard_data_id() else { return };
         if id == 0x600 + u16::from(self.id) {
+            if let Some(drive) = &mut self.drive
+                && !drive.update(&mut self.objects, now)
+            {
+                return;
+            }
+            self.now = now;
             self.sdo(*frame.padded());
         }
         if let (0, [command, target]) = (id, frame.data())

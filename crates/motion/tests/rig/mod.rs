@@ -12,8 +12,9 @@ use plant::{Actuation, HubMotor, HubMotorModel, Inverter, Sensors};
 
 /// Period of the current loop.
 pub(crate) const DT_S: f32 = 50e-6;
-/// Current periods to one of the velocity and position loops: 4 kHz.
-pub(crate) const OUTER_EVERY: u32 = 5;
+/// Current periods to one of the velocity and position loops.
+pub(crate) const AT_4_KHZ: u32 = 5;
+pub(crate) const AT_1_KHZ: u32 = 20;
 pub(crate) const COUNTS_PER_TURN: f64 = 4096.0;
 const COUNT_RAD: f32 = core::f32::consts::TAU / 4096.0;
 const CURRENT_LIMIT_A: f32 = 15.0;
@@ -36,13 +37,18 @@ pub(crate) struct Rig {
     filter: LowPass,
     commutation: Commutation,
     setpoint_a: f32,
+    outer_every: u32,
     ticks: u32,
 }
 
 impl Rig {
-    /// A ZLLG65ASM250-L on 48 V, somewhere within a turn.
-    pub(crate) fn new() -> Self {
-        let model = HubMotorModel::ZLLG65ASM250_L;
+    /// A ZLLG65ASM250-L on 48 V, somewhere within a turn; outer loops once in so many periods.
+    pub(crate) fn new(outer_every: u32) -> Self {
+        Rig::with_motor(HubMotorModel::ZLLG65ASM250_L, outer_every)
+    }
+
+    /// Any motor on 48 V, its gains derived from its own constants.
+    pub(crate) fn with_motor(model: HubMotorModel, outer_every: u32) -> Self {
         let motor = HubMotor::new(model, Angle::new(0, 0.123), 48.0, 25.0);
         let resistance_ohm = (model.pmsm.resistance_ohm + model.switch_resistance_ohm) as f32;
         let inductance_h = model.pmsm.inductance_q_h as f32;
@@ -69,12 +75,12 @@ impl Rig {
                 voltage_delay_s: 0.5 * DT_S,
             },
             cascade_gains: CascadeGains {
-                position_per_s: 25.0,
+                position_per_s: 20.0,
                 velocity_feed_forward: 1.0,
-                velocity: PiGains::for_inertia(100.0, inertia, torque_constant, 8.0),
+                velocity: PiGains::for_inertia(70.0, inertia, torque_constant, 8.0),
                 acceleration_feed_forward: inertia / torque_constant,
                 friction_feed_forward: 0.0,
-                velocity_limit_rad_s: rad_s(500.0),
+                velocity_limit_rad_s: rad_s(1100.0),
             },
             observer_gains: ObserverGains::new(2e-3, 0.2, DT_S),
             smooth: LowPassGains::from_time_constant(0.5e-3, DT_S),
@@ -87,6 +93,7 @@ impl Rig {
             motor,
             velocity_rad_s: 0.0,
             setpoint_a: 0.0,
+            outer_every,
             ticks: 0,
         }
     }
@@ -120,8 +127,8 @@ impl Rig {
     }
 
     pub(crate) fn tick_position(&mut self, demand: &PositionDemand) {
-        if self.ticks.is_multiple_of(OUTER_EVERY) {
-            let dt_s = OUTER_EVERY as f32 * DT_S;
+        if self.ticks.is_multiple_of(self.outer_every) {
+            let dt_s = self.outer_every as f32 * DT_S;
             let (gains, velocity) = (&self.cascade_gains, self.velocity_rad_s);
             self.setpoint_a = self.cascade.position(gains, demand, velocity, CURRENT_LIMIT_A, dt_s);
         }
@@ -129,8 +136,8 @@ impl Rig {
     }
 
     pub(crate) fn tick_velocity(&mut self, demand: &VelocityDemand) {
-        if self.ticks.is_multiple_of(OUTER_EVERY) {
-            let dt_s = OUTER_EVERY as f32 * DT_S;
+        if self.ticks.is_multiple_of(self.outer_every) {
+            let dt_s = self.outer_every as f32 * DT_S;
             let (gains, velocity) = (&self.cascade_gains, self.velocity_rad_s);
             self.setpoint_a = self.cascade.velocity(gains, demand, velocity, CURRENT_LIMIT_A, dt_s);
         }

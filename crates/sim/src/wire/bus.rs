@@ -1,3 +1,7 @@
+//! The wire and everybody's controller on it: how time passes there, and how frames end.
+//!
+//! How a frame starts and what will become of it is in `fate`, nodes with a cut cable are in `alone`.
+
 use std::collections::VecDeque;
 
 use can::{Bitrate, ERROR_FRAME_BITS, Frame, INTERFRAME_SPACE_BITS, Instant};
@@ -332,7 +336,7 @@ impl Bus {
         }
     }
 
-    /// What an attempt that failed does to controller `i` (ISO 11898-1, 12.1.4.2).
+    /// What an attempt that failed does to controller `i` (fault confinement).
     fn count_failure(&mut self, i: usize, start: Instant, at: Instant, cause: ErrorCause) {
         let foreign = self.is_foreign(i);
         let controller = &mut self.controllers[i];

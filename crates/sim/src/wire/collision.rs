@@ -1,4 +1,4 @@
-//! Two nodes that send one identifier with different contents (ISO 11898-1, 10.9: nothing resolves that).
+//! Two nodes that send one identifier with different contents: arbitration cannot tell them apart, a bit error does.
 
 use can::Frame;
 

@@ -1,4 +1,10 @@
-/// How far a controller trusts itself (ISO 11898-1, 12.1.4).
+//! Fault confinement (ISO 11898-1, clause 12): error counters and what follows from them.
+//!
+//! The rules are numbered as in the Bosch CAN Specification 2.0, part A, chapter 7, which anybody can read; the
+//! standard has the same. Counted at the grain of a frame: rules 4 to 6 (dominant bits
+//! during or long after an error flag) need a wire that is stuck, which is not modelled.
+
+/// How far a controller trusts itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorState {
     /// Takes part and sends dominant error flags.
@@ -9,18 +15,18 @@ pub enum ErrorState {
     BusOff,
 }
 
-/// Transmit and receive error counters with the rules of fault confinement (ISO 11898-1, 12.1.4.2).
+/// Transmit and receive error counters with their rules.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ErrorCounters {
     tec: u16,
     rec: u16,
 }
 
-/// A counter above this makes a node error-passive (rule i).
+/// A counter above this makes a node error-passive (rule 9).
 const PASSIVE_ABOVE: u16 = 127;
-/// A transmit counter above this makes a node bus-off (rule j).
+/// A transmit counter above this makes a node bus-off (rule 11).
 const BUS_OFF_ABOVE: u16 = 255;
-/// Where a passive receiver's counter lands after a good frame: the standard allows 119 to 127 (rule h).
+/// Where a passive receiver's counter lands after a good frame: the standard allows 119 to 127 (rule 8).
 const RECEIVER_RETURN: u16 = 127;
 /// Controllers hold the receive counter in eight bits.
 const REC_MAX: u16 = 255;
@@ -47,36 +53,36 @@ impl ErrorCounters {
         }
     }
 
-    /// A transmitter sent an error flag: TEC + 8 (rule c).
+    /// A transmitter sent an error flag: TEC + 8 (rule 3).
     pub(crate) fn transmit_error(&mut self) {
         self.tec = (self.tec + 8).min(BUS_OFF_ABOVE + 1);
     }
 
     /// Nobody acknowledged. An error-passive transmitter that reads no dominant bit during its passive
-    /// error flag keeps its counter: alone, a node never goes bus-off (rule c, exception 1).
+    /// error flag keeps its counter: alone, a node never goes bus-off (rule 3, exception 1).
     pub(crate) fn acknowledge_error(&mut self) {
         if self.state() == ErrorState::ErrorActive {
             self.transmit_error();
         }
     }
 
-    /// A frame was sent: TEC - 1 (rule g).
+    /// A frame was sent: TEC - 1 (rule 7).
     pub(crate) fn transmit_success(&mut self) {
         self.tec = self.tec.saturating_sub(1);
     }
 
-    /// A receiver saw an error: REC + 1 (rule a).
+    /// A receiver saw an error: REC + 1 (rule 1).
     pub(crate) fn receive_error(&mut self) {
         self.rec = (self.rec + 1).min(REC_MAX);
     }
 
     /// A receiver was the first to see an error, and the others' flags answered its own: REC + 1, and
-    /// + 8 for the dominant bit after its flag (rules a and b).
+    /// + 8 for the dominant bit after its flag (rules 1 and 2).
     pub(crate) fn first_receive_error(&mut self) {
         self.rec = (self.rec + 9).min(REC_MAX);
     }
 
-    /// A frame was received: REC - 1, or back into 119..=127 (rule h).
+    /// A frame was received: REC - 1, or back into 119..=127 (rule 8).
     pub(crate) fn receive_success(&mut self) {
         self.rec = if self.rec > PASSIVE_ABOVE { RECEIVER_RETURN } else { self.rec.saturating_sub(1) };
     }

@@ -1,3 +1,5 @@
+//! One station's CAN controller: mailboxes, whether it takes part, and what is wrong with it.
+
 use can::{Bitrate, Frame, Instant};
 
 use super::{BUS_OFF_SEQUENCES, ErrorCounters, ErrorState, IDLE_BITS, Segment};

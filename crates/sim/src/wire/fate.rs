@@ -17,44 +17,79 @@ impl Bus {
     /// Arbitration among all that may start at `now` on the main wire.
     pub(super) fn start_frame(&mut self, now: Instant) {
         self.waiting_count_idle(now);
-        let mut winner: Option<(u32, usize, Frame)> = None;
-        let mut foreign: Option<(usize, Frame)> = None;
+        let foreign = self.start_foreign(now);
+        let winner = self.most_urgent(now);
+        let senders = winner.map_or(0, |(_, frame)| self.mark_senders(frame.arbitration_key(), now));
+        let disputed = foreign.is_some() || self.foreign_listener_objects(now);
+        match foreign.or(winner) {
+            Some((source, frame)) if disputed => self.clash_of_bit_rates(source, frame, now),
+            Some((source, frame)) if senders > 1 => {
+                let (source, frame, collision) = self.resolve_contents(source, frame, now);
+                self.transmit(source, frame, collision, now);
+            }
+            Some((source, frame)) => self.transmit(source, frame, None, now),
+            None => {}
+        }
+    }
+
+    /// Nodes at another bit rate start all the same: they cannot read what the others send.
+    fn start_foreign(&mut self, now: Instant) -> Option<(usize, Frame)> {
+        if !self.any_foreign {
+            return None;
+        }
+        let mut first = None;
         for i in 0..self.controllers.len() {
-            if self.starts[i] > now {
+            if self.starts[i] <= now && self.is_foreign(i) {
+                let started = self.take_candidate(i, now);
+                first = first.or(started.map(|(_, frame)| (i, frame)));
+            }
+        }
+        first
+    }
+
+    /// The frame with the lowest arbitration key, and the first node that sends it.
+    fn most_urgent(&self, now: Instant) -> Option<(usize, Frame)> {
+        let mut winner: Option<(u32, usize, Frame)> = None;
+        for i in 0..self.controllers.len() {
+            if self.starts[i] > now || self.is_foreign(i) {
                 continue;
             }
-            let Some((sending, frame)) = self.controllers[i].candidate(now) else { continue };
-            if self.is_foreign(i) {
-                // It starts all the same: it cannot read what the others send.
-                self.controllers[i].sending = Some(sending);
-                foreign = foreign.or(Some((i, frame)));
-            } else if winner.is_none_or(|(key, ..)| frame.arbitration_key() < key) {
-                winner = Some((frame.arbitration_key(), i, frame));
+            let Some((_, frame)) = self.controllers[i].candidate(now) else { continue };
+            let key = frame.arbitration_key();
+            if winner.is_none_or(|(least, ..)| key < least) {
+                winner = Some((key, i, frame));
             }
         }
-        let bit_ns = self.bitrate.bit_nanos();
-        if let (Some((source, frame)), _) | (None, Some((_, source, frame))) = (foreign, winner)
-            && (foreign.is_some() || self.foreign_listener_objects(now))
-        {
-            let senders = winner.map(|(key, ..)| key);
-            self.mark_senders(senders, now);
-            return self.clash_of_bit_rates(source, frame, now);
+        winner.map(|(_, i, frame)| (i, frame))
+    }
+
+    /// Marks all that send the identifier with this arbitration key at `now`; returns how many.
+    fn mark_senders(&mut self, key: u32, now: Instant) -> usize {
+        let mut senders = 0;
+        for i in 0..self.controllers.len() {
+            if self.starts[i] > now || self.is_foreign(i) {
+                continue;
+            }
+            let controller = &mut self.controllers[i];
+            let candidate = controller.candidate(now).filter(|(_, frame)| frame.arbitration_key() == key);
+            controller.sending = candidate.map(|(sending, _)| sending);
+            senders += usize::from(candidate.is_some());
         }
-        let Some((key, source, frame)) = winner else { return };
-        self.mark_senders(Some(key), now);
-        let (source, frame, collision) = self.resolve_contents(source, frame, now);
+        senders
+    }
+
+    /// Puts the winner on the wire. `collision` is the bit in which another sender's contents differ.
+    fn transmit(&mut self, source: usize, frame: Frame, collision: Option<u32>, now: Instant) {
         let bits = frame_bits(&frame);
-        let disturbed = self.corruption.strike(bits, &mut self.prng);
-        let failure = match (collision, disturbed) {
-            (Some(at), Some(bit)) if bit < at => Some((bit, ErrorCause::Disturbed)),
-            (Some(at), _) => Some((at, ErrorCause::Collision)),
-            (None, Some(bit)) => Some((bit, ErrorCause::Disturbed)),
-            (None, None) if !self.is_acknowledged(now) => {
-                Some((bits - BITS_AFTER_ACK_SLOT as u32, ErrorCause::NotAcknowledged))
-            }
-            (None, None) => None,
-        };
+        let collision = collision.map(|bit| (bit, ErrorCause::Collision));
+        let disturbed = self.corruption.strike(bits, &mut self.prng).map(|bit| (bit, ErrorCause::Disturbed));
+        let unacknowledged =
+            (!self.is_acknowledged(now)).then_some((bits - BITS_AFTER_ACK_SLOT as u32, ErrorCause::NotAcknowledged));
+        // The first error ends the frame.
+        let failures = [collision, disturbed, unacknowledged].into_iter().flatten();
+        let failure = failures.min_by_key(|(bit, _)| *bit);
         let (length, failure) = failure.map_or((bits, None), |(bit, cause)| (bit, Some(cause)));
+        let bit_ns = self.bitrate.bit_nanos();
         let end = now.plus_nanos(u64::from(length) * bit_ns);
         self.main.transmission = Some(Transmission { frame, source, start: now, end, bit_ns, failure });
     }
@@ -71,18 +106,6 @@ impl Bus {
         })
     }
 
-    /// Marks all that send the identifier with this arbitration key at `now`.
-    fn mark_senders(&mut self, key: Option<u32>, now: Instant) {
-        for i in 0..self.controllers.len() {
-            if self.starts[i] > now || self.is_foreign(i) {
-                continue;
-            }
-            let candidate = self.controllers[i].candidate(now);
-            let sends = candidate.filter(|(_, frame)| Some(frame.arbitration_key()) == key);
-            self.controllers[i].sending = sends.map(|(sending, _)| sending);
-        }
-    }
-
     /// Sorts out senders of one identifier: who remains, and the bit at which an error flag ends it all.
     ///
     /// A sender that reads dominant for recessive has a bit error. Its error flag destroys the frame if
@@ -92,9 +115,6 @@ impl Bus {
             .filter(|&i| self.controllers[i].sending.is_some())
             .filter_map(|i| self.controllers[i].candidate(now).map(|(_, frame)| (i, frame)))
             .collect();
-        if senders.len() < 2 {
-            return (source, frame, None);
-        }
         for (i, other) in &senders {
             if contents(other) < contents(&frame) {
                 (source, frame) = (*i, *other);

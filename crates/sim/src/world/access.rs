@@ -4,6 +4,7 @@ use can::{Bitrate, Instant};
 
 use super::member::Member;
 use super::{Digest, FrameLog, StationId, World, WorldError};
+use crate::recorder::Recorder;
 use crate::wire::{ControllerOptions, ErrorCounters, Statistics};
 use crate::{Report, VirtualDrive};
 
@@ -95,6 +96,34 @@ impl World {
     /// What happened on the wire, to pull it or to set how much is kept.
     pub fn log_mut(&mut self) -> &mut FrameLog {
         &mut self.log
+    }
+
+    /// True while a station's cable is cut.
+    pub fn is_cut(&self, id: StationId) -> bool {
+        self.bus.is_cut(id.0)
+    }
+
+    /// Records with `recorder` from now on; a recorder that was here before is lost.
+    pub fn start_recording(&mut self, mut recorder: Recorder) {
+        recorder.start(self.now);
+        self.recorder = Some(recorder);
+    }
+
+    /// The recorder at work.
+    pub fn recorder(&self) -> Option<&Recorder> {
+        self.recorder.as_ref()
+    }
+
+    /// Notes in the recording that something happened now.
+    pub fn mark(&mut self, text: &str) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.mark(self.now, text);
+        }
+    }
+
+    /// Ends recording and hands the samples out.
+    pub fn stop_recording(&mut self) -> Option<Recorder> {
+        self.recorder.take()
     }
 
     /// Hash over all frames with their times and over the present shaft angles.

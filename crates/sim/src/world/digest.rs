@@ -1,3 +1,5 @@
+//! A short number for a whole run, for golden tests.
+
 use can::{Frame, Instant};
 
 /// A running FNV-1a hash (64 bits) over what a world did: equal digests, equal runs.

@@ -1,3 +1,5 @@
+//! Who is due next, without asking everybody.
+
 use can::Instant;
 
 /// The deadline of each station, with the earliest at hand: a binary heap that knows everyone's place.

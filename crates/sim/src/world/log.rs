@@ -1,3 +1,5 @@
+//! The observer: listens without taking part.
+
 use std::collections::VecDeque;
 
 use crate::wire::WireEvent;

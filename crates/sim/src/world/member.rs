@@ -1,3 +1,5 @@
+//! Who can be on the bus: drives, stations, taps.
+
 use std::any::Any;
 
 use can::{Frame, Instant, Station};

@@ -4,6 +4,7 @@ use can::Instant;
 
 use super::World;
 use super::member::Member;
+use crate::recorder::Channel;
 use crate::wire::{Part, Passed};
 
 /// A station that leaves its deadline in the past is asked again after this time: it cannot stop the world.
@@ -15,7 +16,7 @@ impl World {
     /// False if nothing will ever happen any more unless somebody from outside acts.
     pub fn step(&mut self) -> bool {
         let Some(at) = self.next_event() else { return false };
-        self.now = self.now.max(at);
+        self.move_to(at);
         if let Some(passed) = self.bus.advance(self.now) {
             self.deliver(&passed);
         }
@@ -41,6 +42,30 @@ impl World {
                 self.serve(i);
             }
         }
+    }
+
+    /// Lets time pass up to `at`, and takes the samples due on the way as things stand just before `at`.
+    pub(super) fn move_to(&mut self, at: Instant) {
+        if let Some(mut recorder) = self.recorder.take() {
+            while let Some(due) = recorder.due_by(at) {
+                self.now = self.now.max(due);
+                recorder.sample(due, |channel| self.measure(channel));
+            }
+            self.recorder = Some(recorder);
+        }
+        self.now = self.now.max(at);
+    }
+
+    fn measure(&mut self, channel: Channel) -> f64 {
+        let number = channel.drive;
+        let drive = self.members.iter_mut().find_map(|member| match member {
+            Member::Drive { number: it, drive } if *it == number => Some(drive),
+            _ => None,
+        });
+        drive.map_or(f64::NAN, |drive| {
+            drive.advance(self.now);
+            channel.signal.of(&drive.report())
+        })
     }
 
     fn deliver(&mut self, passed: &Passed) {

@@ -1,3 +1,5 @@
+//! The built-in station for tests and for programs outside.
+
 use std::collections::VecDeque;
 
 use can::{Frame, Instant, Station};

@@ -22,7 +22,7 @@ enum Channel {
     ListenOnly,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct SlcanSession {
     /// The rate of the bus served, if the client's choice is to be held against it.
     bus_bitrate: Option<Bitrate>,

@@ -26,7 +26,7 @@ enum Mode {
     Over,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct SocketcandSession {
     bus: String,
     /// Time stamp of [`Instant::ZERO`].

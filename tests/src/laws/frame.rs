@@ -1,14 +1,22 @@
-//! Laws of everything that reads what others wrote: any bytes give a value or an error, never a panic, and what was
-//! read can be written and read again.
+//! Frames as text and as bits on the wire.
 
 use can::Frame;
 
+pub(super) const TEXT_SAMPLES: &[&[u8]] = &[
+    b"604#2B40600006000000",
+    b"704#00",
+    b"000#0104",
+    b"1FFFFFFF#",
+    b"080#",
+    b"584#R",
+    b"123#R8",
+    b"7FF#0102030405060708",
+];
+
+pub(super) const LENGTH_SAMPLES: &[&[u8]] = &[b"\x04\x06\0\0\x2B\x40\x60\0\0\0\0\0", b"\0\0\0\0\0\0\0\0"];
+
 /// Candump text: a frame that parses prints as text that parses to the same frame.
-///
-/// # Panics
-///
-/// When the law is broken.
-pub fn frame_text(data: &[u8]) {
+pub(super) fn text(data: &[u8]) {
     let Ok(text) = str::from_utf8(data) else { return };
     if let Ok(frame) = text.parse::<Frame>() {
         let printed = frame.to_string();
@@ -18,11 +26,7 @@ pub fn frame_text(data: &[u8]) {
 }
 
 /// The length of a frame on the wire: at least the bare bits, at most one stuff bit for every four of them.
-///
-/// # Panics
-///
-/// When the law is broken.
-pub fn frame_length(data: &[u8]) {
+pub(super) fn length(data: &[u8]) {
     let Some((&[a, b, c, d], data)) = data.split_first_chunk::<4>() else { return };
     let raw = u32::from_le_bytes([a, b, c, d]);
     let id = if raw >> 31 == 0 {

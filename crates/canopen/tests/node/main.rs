@@ -1,0 +1,13 @@
+//! Conversations with a node, in candump notation and virtual time.
+
+mod bench;
+mod client;
+mod configuration;
+mod device;
+mod emcy;
+mod nmt;
+mod robustness;
+mod rpdo;
+mod sdo;
+mod tpdo;
+mod traps;

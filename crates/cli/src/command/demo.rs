@@ -1,0 +1,36 @@
+//! `ferrodrive demo`: every procedure of the manuals against the virtual drives.
+
+use std::path::PathBuf;
+
+use transport::WallClock;
+
+use crate::args::Global;
+use crate::demo::{self, DemoReport};
+use crate::failure::Failure;
+use crate::progress::Progress;
+
+/// Show the whole thing on an embedded virtual bus: every procedure of the manual against the drive
+///
+/// Prints what was asked, what answered and what moved, beside what the manual lets expect, and draws the motion.
+/// Exit status 1 if anything differs.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Demo {
+    /// Where to draw the motion
+    #[arg(long, value_name = "FILE", default_value = "demo.svg")]
+    svg: PathBuf,
+}
+
+impl Demo {
+    /// Runs it and writes the picture.
+    pub(crate) fn run(&self, global: &Global) -> Result<DemoReport, Failure> {
+        let clock = WallClock::start();
+        let progress = Progress::new(global.json);
+        let (mut report, figure) = demo::run(progress.clone())?;
+        progress.clear();
+        std::fs::write(&self.svg, figure.to_svg())
+            .map_err(|error| Failure::new(format!("cannot write the picture {}", self.svg.display())).because(error))?;
+        report.svg = self.svg.display().to_string();
+        report.took_s = clock.now().as_secs_f64();
+        Ok(report)
+    }
+}

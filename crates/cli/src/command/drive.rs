@@ -1,0 +1,213 @@
+//! `ferrodrive state`, `enable`, `disable`, `stop`, `quick-stop` and `reset`: the power state machine of CiA 402 by its
+//! intents, and what a drive says of itself.
+
+use canopen::NodeId;
+use master::drive::{Drive, DriveState};
+use serde::Serialize;
+
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::output::Report;
+use crate::paint::Paint;
+use crate::parse::node::node;
+
+/// Show what a drive says of itself: power state, fault with remedy, position, speed, current, temperatures, supply
+#[derive(Debug, clap::Args)]
+pub(crate) struct State {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+}
+
+/// Enable a drive: power on the motor, holding still
+#[derive(Debug, clap::Args)]
+pub(crate) struct Enable {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+}
+
+/// Disable a drive: stop, then take the power off the motor
+#[derive(Debug, clap::Args)]
+pub(crate) struct Disable {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+}
+
+/// Stop a drive by its deceleration ramp; it stays enabled
+#[derive(Debug, clap::Args)]
+pub(crate) struct Stop {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+}
+
+/// Stop a drive as fast as it is set to (605Ah)
+#[derive(Debug, clap::Args)]
+pub(crate) struct QuickStop {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+}
+
+/// Reset a drive's fault, once its cause is gone
+#[derive(Debug, clap::Args)]
+pub(crate) struct Reset {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+}
+
+/// What a drive says of itself.
+#[derive(Debug, Serialize)]
+pub(crate) struct StateReport {
+    pub(crate) node: u8,
+    model: Option<&'static str>,
+    state: &'static str,
+    mode: Option<String>,
+    statusword: u16,
+    bits: Vec<&'static str>,
+    fault_code: u16,
+    faults: Vec<FaultReport>,
+    pub(crate) position: Option<i64>,
+    pub(crate) angle_deg: Option<f64>,
+    pub(crate) velocity_rpm: Option<f64>,
+    pub(crate) current_a: Option<f64>,
+    supply_v: Option<f64>,
+    motor_c: Option<f64>,
+    driver_c: Option<f64>,
+    nmt_state: Option<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct FaultReport {
+    code: u16,
+    name: &'static str,
+    remedy: &'static str,
+}
+
+impl State {
+    /// Reads everything.
+    pub(crate) async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
+        StateReport::read(&context.drive(self.node).await?).await
+    }
+}
+
+impl Enable {
+    /// Enables and shows the state.
+    pub(crate) async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
+        let drive = context.drive(self.node).await?;
+        drive.enable().await?;
+        StateReport::read(&drive).await
+    }
+}
+
+impl Disable {
+    /// Disables and shows the state.
+    pub(crate) async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
+        let drive = context.drive(self.node).await?;
+        drive.disable().await?;
+        StateReport::read(&drive).await
+    }
+}
+
+impl Stop {
+    /// Stops and shows the state.
+    pub(crate) async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
+        let drive = context.drive(self.node).await?;
+        drive.stop().await?;
+        StateReport::read(&drive).await
+    }
+}
+
+impl QuickStop {
+    /// Stops at once and shows the state. The stop goes out before anything is asked.
+    pub(crate) async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
+        context.quick_stop(self.node).await?;
+        let drive = context.drive(self.node).await?;
+        drive.quick_stop().await?;
+        StateReport::read(&drive).await
+    }
+}
+
+impl Reset {
+    /// Resets and shows the state.
+    pub(crate) async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
+        let drive = context.drive(self.node).await?;
+        drive.reset_fault().await?;
+        StateReport::read(&drive).await
+    }
+}
+
+impl StateReport {
+    /// Reads everything that the drive says of itself.
+    pub(crate) async fn read(drive: &Drive) -> Result<Self, Failure> {
+        let state: DriveState = drive.state().await?;
+        let bits = state.statusword_words();
+        let faults = state.faults.iter().map(|row| FaultReport { code: row.code, name: row.name, remedy: row.remedy });
+        Ok(Self {
+            node: drive.node().id().raw(),
+            model: drive.profile().map(|profile| profile.model),
+            state: state.power.map_or("no state of CiA 402", |power| power.name()),
+            mode: state.mode.map(|mode| mode.to_string()),
+            statusword: state.statusword.0,
+            bits,
+            fault_code: state.fault_code,
+            faults: faults.collect(),
+            position: state.position.map(|counts| counts.0),
+            angle_deg: state.angle.map(|angle| angle.0),
+            velocity_rpm: state.velocity.map(|speed| speed.0),
+            current_a: state.current.map(|current| current.0),
+            supply_v: state.supply.map(|supply| supply.0),
+            motor_c: state.motor_temperature.map(|temperature| temperature.0),
+            driver_c: state.driver_temperature.map(|temperature| temperature.0),
+            nmt_state: state.nmt.map(|nmt| nmt.to_string()),
+        })
+    }
+
+    /// Position, speed and current in one line; what is not known is left out.
+    pub(crate) fn motion(&self) -> String {
+        let parts = [
+            self.position.map(|counts| format!("{counts} counts")),
+            self.angle_deg.map(|angle| format!("{angle:.2}°")),
+            self.velocity_rpm.map(|speed| format!("{speed:.1} r/min")),
+            self.current_a.map(|current| format!("{current:.1} A")),
+        ];
+        parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
+
+    fn power(&self) -> String {
+        let parts = [
+            self.supply_v.map(|supply| format!("{supply:.1} V")),
+            self.motor_c.map(|celsius| format!("motor {celsius:.1} °C")),
+            self.driver_c.map(|celsius| format!("driver {celsius:.1} °C")),
+        ];
+        parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
+}
+
+impl Report for StateReport {
+    fn text(&self, paint: Paint) -> String {
+        let mode = self.mode.as_deref().unwrap_or("unknown mode");
+        let model = self.model.map(|model| format!(" ({model})")).unwrap_or_default();
+        let mut lines = vec![format!("node {}{model}: {}, {mode}", self.node, paint.strong(self.state))];
+        lines.push(format!("  statusword  {:04X}h  {}", self.statusword, self.bits.join(", ")));
+        if self.fault_code == 0 {
+            lines.push("  fault       none".into());
+        }
+        if self.fault_code != 0 && self.faults.is_empty() {
+            lines.push(format!("  fault       {}", paint.bad(&format!("{:04X}h", self.fault_code))));
+        }
+        for fault in &self.faults {
+            let name = paint.bad(&format!("{:04X}h {}", fault.code, fault.name));
+            lines.push(format!("  fault       {name}\n  remedy      {}", fault.remedy));
+        }
+        lines.push(format!("  motion      {}", self.motion()));
+        lines.push(format!("  power       {}", self.power()));
+        if let Some(nmt) = &self.nmt_state {
+            lines.push(format!("  nmt         {nmt}"));
+        }
+        lines.join("\n")
+    }
+}

@@ -1,0 +1,240 @@
+//! `ferrodrive velocity`, `move` and `torque`: motion in physical units.
+
+use std::time::Duration;
+
+use canopen::{Mux, NodeId};
+use drives::profile::{Quantity, Ramps};
+use master::drive::{Drive, MotionOptions, MotionReport};
+use master::units::{Amperes, Angle, Ramp, Rpm, parse_duration};
+use serde::Serialize;
+
+use super::drive::StateReport;
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::output::Report;
+use crate::paint::Paint;
+use crate::parse::node::node;
+
+/// Turn at a speed
+///
+/// Enables the drive and returns when the speed is reached; the motor goes on turning. With --for it is stopped again.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  ferrodrive velocity 4 60rpm --for 2s\n  ferrodrive velocity 4 -360deg/s --acceleration 120rpm/s"
+)]
+pub(crate) struct Velocity {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+    /// Speed: 60 (r/min), 60rpm, 6.28rad/s, 360deg/s, 1r/s
+    #[arg(allow_hyphen_values = true)]
+    speed: Rpm,
+    #[command(flatten)]
+    ramps: RampArgs,
+    /// Go on turning for this long, then stop
+    #[arg(long = "for", value_name = "TIME", value_parser = parse_duration, conflicts_with = "no_wait")]
+    duration: Option<Duration>,
+}
+
+/// Turn to a position, or by an angle
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive move 4 90deg\n  ferrodrive move 4 32000 --profile-velocity 60rpm\n  \
+    ferrodrive move 4 --relative -0.5turn --acceleration 300ms")]
+pub(crate) struct Move {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+    /// Position: 32000 (counts), 90deg, 0.5turn, 1.57rad
+    #[arg(allow_hyphen_values = true)]
+    position: Angle,
+    /// Turn by this much from the last target, instead of to it
+    #[arg(long)]
+    relative: bool,
+    /// Largest speed on the way
+    #[arg(long, value_name = "SPEED", value_parser = speed)]
+    profile_velocity: Option<Rpm>,
+    #[command(flatten)]
+    ramps: RampArgs,
+}
+
+/// Let the motor push with a current
+///
+/// Returns at once: what comes of it is up to the load. With --for the torque is taken away again.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  ferrodrive torque 4 1.5A --for 2s")]
+pub(crate) struct Torque {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+    /// Motor current: 1.5A, -800mA
+    #[arg(allow_hyphen_values = true)]
+    current: Amperes,
+    /// Push for this long, then stop
+    #[arg(long = "for", value_name = "TIME", value_parser = parse_duration, conflicts_with = "no_wait")]
+    duration: Option<Duration>,
+    /// Accepted for symmetry with the other moving commands: this one never waits
+    #[arg(long)]
+    no_wait: bool,
+}
+
+/// How a motion is to be made, where the drive's own settings are not wanted.
+#[derive(Debug, clap::Args)]
+struct RampArgs {
+    /// How fast the speed may rise: 500ms, 120rpm/s, 12.6rad/s2
+    #[arg(long, value_name = "RAMP")]
+    acceleration: Option<Ramp>,
+    /// How fast the speed may fall
+    #[arg(long, value_name = "RAMP")]
+    deceleration: Option<Ramp>,
+    /// Do not wait until the target is reached
+    #[arg(long)]
+    no_wait: bool,
+}
+
+fn speed(text: &str) -> Result<Rpm, String> {
+    match text.parse::<Rpm>() {
+        Ok(Rpm(rpm)) if rpm > 0.0 => Ok(Rpm(rpm)),
+        Ok(_) => Err("a profile velocity is more than zero, e.g. 60rpm; the target gives the direction".into()),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// What was asked, within which limits, and what came of it.
+#[derive(Debug, Serialize)]
+pub(crate) struct MotionOutcome {
+    asked: String,
+    reached: bool,
+    reached_after_s: Option<f64>,
+    stopped: bool,
+    limits: Limits,
+    #[serde(flatten)]
+    state: StateReport,
+    notes: Vec<String>,
+}
+
+/// The limits that the drive keeps to.
+#[derive(Debug, Default, Serialize)]
+struct Limits {
+    profile_velocity_rpm: Option<f64>,
+    acceleration_ms: Option<f64>,
+    deceleration_ms: Option<f64>,
+    quick_stop_ms: Option<f64>,
+}
+
+impl Velocity {
+    /// Turns.
+    pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
+        let drive = context.known_drive(self.node).await?;
+        context.progress.show(format!("node {}: to {}", self.node, self.speed));
+        let motion = drive.velocity(self.speed, self.ramps.options(None)).await?;
+        outcome(context, &drive, format!("turn at {}", self.speed), motion, self.duration).await
+    }
+}
+
+impl Move {
+    /// Moves.
+    pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
+        let drive = context.known_drive(self.node).await?;
+        let options = self.ramps.options(self.profile_velocity);
+        let how = if self.relative { "by" } else { "to" };
+        context.progress.show(format!("node {}: {how} {}", self.node, self.position));
+        let motion = if self.relative {
+            drive.move_relative(self.position, options).await?
+        } else {
+            drive.move_absolute(self.position, options).await?
+        };
+        outcome(context, &drive, format!("move {how} {}", self.position), motion, None).await
+    }
+}
+
+impl Torque {
+    /// Pushes.
+    pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
+        let drive = context.known_drive(self.node).await?;
+        let motion = drive.torque(self.current).await?;
+        outcome(context, &drive, format!("push with {}", self.current), motion, self.duration).await
+    }
+}
+
+impl RampArgs {
+    fn options(&self, speed: Option<Rpm>) -> MotionOptions {
+        MotionOptions { speed, acceleration: self.acceleration, deceleration: self.deceleration, wait: !self.no_wait }
+    }
+}
+
+/// Reads what came of a motion, and ends it after `duration`, if there is one.
+async fn outcome(
+    context: &Context,
+    drive: &Drive,
+    asked: String,
+    motion: MotionReport,
+    duration: Option<Duration>,
+) -> Result<MotionOutcome, Failure> {
+    let limits = limits(drive).await;
+    if let Some(duration) = duration {
+        context.progress.show(format!("node {}: {asked} for {} s", drive.node().id(), duration.as_secs_f64()));
+        drive.supervise(duration).await?;
+    }
+    let state = StateReport::read(drive).await?;
+    if duration.is_some() {
+        drive.stop().await?;
+    }
+    Ok(MotionOutcome {
+        asked,
+        reached: motion.reached_after.is_some(),
+        reached_after_s: motion.reached_after.map(|time| time.as_secs_f64()),
+        stopped: duration.is_some(),
+        limits,
+        state,
+        // A drive that has been stopped again needs no watching.
+        notes: if duration.is_some() { Vec::new() } else { motion.notes.iter().map(ToString::to_string).collect() },
+    })
+}
+
+/// What limits a motion, as far as the drive tells.
+async fn limits(drive: &Drive) -> Limits {
+    let Some(profile) = drive.profile() else { return Limits::default() };
+    let Ramps::Milliseconds { acceleration, deceleration, quick_stop } = profile.units.ramps;
+    Limits {
+        profile_velocity_rpm: number(drive, profile.units.profile_velocity).await,
+        acceleration_ms: number(drive, milliseconds(acceleration)).await,
+        deceleration_ms: number(drive, milliseconds(deceleration)).await,
+        quick_stop_ms: number(drive, milliseconds(quick_stop)).await,
+    }
+}
+
+const fn milliseconds(object: Mux) -> Quantity {
+    Quantity { object, per_count: 1.0, divisor: None }
+}
+
+async fn number(drive: &Drive, quantity: Quantity) -> Option<f64> {
+    let payload = drive.node().upload(quantity.object).await.ok()?;
+    Some(f64::from(payload.raw()) * quantity.per_count)
+}
+
+impl Limits {
+    fn text(&self) -> String {
+        let parts = [
+            self.profile_velocity_rpm.map(|rpm| format!("profile velocity {rpm:.0} r/min")),
+            self.acceleration_ms.map(|ms| format!("acceleration {ms:.0} ms")),
+            self.deceleration_ms.map(|ms| format!("deceleration {ms:.0} ms")),
+            self.quick_stop_ms.map(|ms| format!("quick stop {ms:.0} ms")),
+        ];
+        parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
+}
+
+impl Report for MotionOutcome {
+    fn text(&self, paint: Paint) -> String {
+        let reached = match self.reached_after_s {
+            Some(seconds) => paint.good(&format!("reached after {seconds:.2} s")),
+            None => "commanded, not waited for".into(),
+        };
+        let then = if self.stopped { "; stopped again" } else { "" };
+        let mut lines = vec![format!("node {}: {}: {reached}{then}", self.state.node, self.asked)];
+        lines.push(format!("  at      {}", self.state.motion()));
+        lines.push(format!("  limits  {}", self.limits.text()));
+        lines.extend(self.notes.iter().map(|note| format!("  note    {note}")));
+        lines.join("\n")
+    }
+}

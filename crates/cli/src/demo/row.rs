@@ -1,0 +1,52 @@
+//! One line of the demo's table: what was asked, what answered, what moved, what should have been seen and what was.
+
+use serde::Serialize;
+
+use super::expect::Expect;
+
+/// See the [module](self).
+#[derive(Clone, Debug, Default, Serialize)]
+pub(super) struct Row {
+    /// The manual's section.
+    pub(super) section: &'static str,
+    /// What is done.
+    pub(super) step: String,
+    /// The frames sent, in candump form.
+    pub(super) asked: String,
+    /// The frames that answered.
+    pub(super) answered: String,
+    /// What the shaft did.
+    pub(super) moved: String,
+    /// What the manual or a closed form lets expect.
+    pub(super) expected: String,
+    /// What was seen.
+    pub(super) seen: String,
+    /// Whether they agree.
+    pub(super) ok: bool,
+}
+
+impl Row {
+    /// A row that nothing is known against yet.
+    pub(super) fn new(section: &'static str, step: impl Into<String>) -> Self {
+        Self { section, step: step.into(), ok: true, ..Self::default() }
+    }
+
+    /// Adds an expectation and what was seen.
+    pub(super) fn expect(&mut self, what: &str, expect: Expect, unit: &str, seen: f64) {
+        self.compare(format!("{what} {}", expect.text(unit)), expect.seen(seen, unit), expect.is_met(seen));
+    }
+
+    /// Adds an expectation in words.
+    pub(super) fn compare(&mut self, expected: impl AsRef<str>, seen: impl AsRef<str>, ok: bool) {
+        append(&mut self.expected, expected.as_ref());
+        append(&mut self.seen, seen.as_ref());
+        self.ok &= ok;
+    }
+}
+
+fn append(text: &mut String, more: &str) {
+    if !text.is_empty() && !more.is_empty() {
+        text.push_str("; ");
+    }
+    text.push_str(more.trim());
+}

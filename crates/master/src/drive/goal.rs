@@ -1,0 +1,80 @@
+//! What a supervised motion waits for, and how the drive is looked at meanwhile.
+
+use std::time::Duration;
+
+use cia402::{PowerState, Statusword};
+use drives::profile::Quantity;
+
+use super::explain::Trigger;
+use super::{Drive, POLL, POSITION_ACTUAL};
+use crate::error::Error;
+
+/// What counts as reached.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Goal {
+    /// A speed, by the actual velocity.
+    Speed { quantity: Quantity, target_rpm: f64, band_rpm: f64 },
+    /// A position, by statusword bit 10. The bit is believed where the shaft is near the target, and everywhere once
+    /// it was seen clear: one left over from the move before says reached while the shaft is elsewhere.
+    Position { target: i64, band: f64, seen_clear: bool },
+}
+
+impl Goal {
+    /// Whether it is reached, and where the drive is.
+    async fn look(&mut self, drive: &Drive, statusword: Statusword) -> Result<(bool, f64), Error> {
+        match self {
+            Self::Speed { quantity, target_rpm, band_rpm } => {
+                let speed = drive.read_quantity(*quantity).await?;
+                Ok(((speed - *target_rpm).abs() <= *band_rpm, speed))
+            }
+            Self::Position { target, band, seen_clear } => {
+                let at = drive.read_number(POSITION_ACTUAL).await?;
+                let reached = statusword.has(Statusword::TARGET_REACHED);
+                let near = at.abs_diff(*target) as f64 <= *band;
+                let believed = near || *seen_clear;
+                *seen_clear |= !reached;
+                Ok((reached && believed, at as f64))
+            }
+        }
+    }
+
+    fn late(&self, at: f64, waited: Duration) -> Trigger {
+        let (target, unit) = match self {
+            Self::Speed { target_rpm, .. } => (*target_rpm, "r/min"),
+            Self::Position { target, .. } => (*target as f64, "counts"),
+        };
+        Trigger::Late { at, target, unit, waited }
+    }
+}
+
+impl Drive {
+    /// Polls the drive until the goal is reached; gives how long it took.
+    pub(super) async fn watch(&self, intent: &'static str, mut goal: Goal, limit: Duration) -> Result<Duration, Error> {
+        let network = self.node.network();
+        let began = network.now();
+        loop {
+            let statusword = self.still_enabled(intent).await?;
+            let (reached, at) = self.answered(intent, goal.look(self, statusword).await).await?;
+            let waited = network.now() - began;
+            if reached {
+                return Ok(waited);
+            }
+            if waited >= limit {
+                return Err(self.not_reached(intent, goal.late(at, waited)).await);
+            }
+            network.sleep(POLL).await;
+        }
+    }
+
+    /// The statusword, if the drive still follows set-points.
+    pub(super) async fn still_enabled(&self, intent: &'static str) -> Result<Statusword, Error> {
+        let statusword = self.answered(intent, self.statusword().await).await?;
+        match statusword.state() {
+            Some(PowerState::OperationEnabled) => Ok(statusword),
+            Some(PowerState::Fault | PowerState::FaultReactionActive) => {
+                Err(self.not_reached(intent, Trigger::Fault).await)
+            }
+            _ => Err(self.not_reached(intent, Trigger::LostOperation).await),
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! Turning at a speed, pushing with a current, stopping (CiA 402-2, clauses 13 and 15), in physical units.
+
+use core::fmt;
+use std::time::Duration;
+
+use canopen::Mux;
+use cia402::{Controlword, ModeOfOperation, PowerState};
+use drives::profile::Quirk;
+
+use super::goal::Goal;
+use super::{CONTROLWORD, Drive};
+use crate::error::Error;
+use crate::units::{Amperes, Ramp, Rpm};
+
+/// How a motion is to be made. What is `None` is left as the drive has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionOptions {
+    /// Speed of a position move.
+    pub speed: Option<Rpm>,
+    /// How fast the speed may rise.
+    pub acceleration: Option<Ramp>,
+    /// How fast the speed may fall.
+    pub deceleration: Option<Ramp>,
+    /// Wait until the target is reached, and watch the drive meanwhile.
+    pub wait: bool,
+}
+
+impl Default for MotionOptions {
+    fn default() -> Self {
+        Self { speed: None, acceleration: None, deceleration: None, wait: true }
+    }
+}
+
+/// How a motion went.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MotionReport {
+    /// From the command to the target; `None` if it was not waited for.
+    pub reached_after: Option<Duration>,
+    /// What to know about it.
+    pub notes: Vec<Note>,
+}
+
+/// Something to know about a motion that was commanded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Note {
+    /// The drive stops by itself when it hears nothing for this long.
+    HostWatchdog {
+        /// The object that sets it.
+        object: Mux,
+        /// The time.
+        time: Duration,
+    },
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::HostWatchdog { object, time } => write!(
+                f,
+                "the drive stops by itself when no frame for it comes for {} ms ({object}): watching the motion keeps \
+                 it content; when nobody does, ask it something from time to time or set {object} to 0",
+                time.as_millis()
+            ),
+        }
+    }
+}
+
+/// Part of the target within which a speed or current counts as reached, and the least such band: the resolution
+/// that drives of this kind show when they run smoothly.
+const REACHED_SHARE: f64 = 0.05;
+const REACHED_LEAST_RPM: f64 = 2.0;
+
+/// What a computed duration is stretched by, and what is added to it, before a motion counts as late: for jerk
+/// limits, load, and settling.
+pub(super) const LATE_FACTOR: f64 = 1.5;
+pub(super) const LATE_MARGIN_S: f64 = 2.0;
+
+/// The host watchdog of the ZL drives ("ZLAC8030L quick start guide V1.00", chapter 9, 2000h).
+const HOST_WATCHDOG: Mux = Mux::new(0x2000, 0);
+
+impl Drive {
+    /// Turns at this speed (profile velocity) until told otherwise. Enables the drive first.
+    ///
+    /// # Errors
+    /// [`Error::OutOfLimits`] before anything moves; [`Error::NotReached`] with an explanation; those of the requests.
+    pub async fn velocity(&self, speed: impl Into<Rpm>, options: MotionOptions) -> Result<MotionReport, Error> {
+        const INTENT: &str = "turn it at the wanted speed";
+        let Rpm(target) = speed.into();
+        let units = self.known(INTENT)?.units;
+        let raw = self.raw_quantity(units.target_velocity, target).await?;
+        let present = self.read_quantity(units.actual_velocity).await?;
+        self.write_ramps(options.acceleration, options.deceleration, target - present).await?;
+        self.set_mode(ModeOfOperation::PROFILE_VELOCITY).await?;
+        self.enable().await?;
+        self.node.network().note_moved(self.node.id());
+        self.write_number(units.target_velocity.object, raw).await?;
+        self.release_halt().await?;
+        let notes = self.notes().await;
+        if !options.wait {
+            return Ok(MotionReport { reached_after: None, notes });
+        }
+        let (up, down) = self.ramp_times_s().await?;
+        let limit = Duration::from_secs_f64((up.max(down) * LATE_FACTOR + LATE_MARGIN_S).clamp(0.0, 3600.0));
+        let band = (target.abs() * REACHED_SHARE).max(REACHED_LEAST_RPM);
+        let goal = Goal::Speed { quantity: units.actual_velocity, target_rpm: target, band_rpm: band };
+        let reached = self.watch(INTENT, goal, limit).await?;
+        if target == 0.0 {
+            self.node.network().note_stopped(self.node.id());
+        }
+        Ok(MotionReport { reached_after: Some(reached), notes })
+    }
+
+    /// Lets the motor push with this current (profile torque) until told otherwise. Enables the drive first.
+    ///
+    /// The speed that comes of it is up to the load: have somebody watch. Does not wait.
+    ///
+    /// # Errors
+    /// As [`velocity`](Self::velocity).
+    pub async fn torque(&self, current: Amperes) -> Result<MotionReport, Error> {
+        const INTENT: &str = "set its torque";
+        let profile = self.known(INTENT)?;
+        let Some(target) = profile.units.target_current else {
+            let (node, model, mode) = (self.node.id(), profile.title, ModeOfOperation::PROFILE_TORQUE);
+            return Err(Error::NoSuchMode { node, model, mode });
+        };
+        let raw = self.raw_quantity(target, current.0).await?;
+        self.set_mode(ModeOfOperation::PROFILE_TORQUE).await?;
+        self.enable().await?;
+        self.node.network().note_moved(self.node.id());
+        self.write_number(target.object, raw).await?;
+        self.release_halt().await?;
+        Ok(MotionReport { reached_after: None, notes: self.notes().await })
+    }
+
+    /// Stops by the drive's deceleration ramp and stays enabled: target zero, or halt (bit 8) in a position move.
+    ///
+    /// # Errors
+    /// As [`velocity`](Self::velocity).
+    pub async fn stop(&self) -> Result<(), Error> {
+        const INTENT: &str = "stop it";
+        let units = self.known(INTENT)?.units;
+        if self.statusword().await?.state() == Some(PowerState::OperationEnabled) {
+            match ModeOfOperation(self.node.read::<i8>(super::MODE_DISPLAY).await?) {
+                ModeOfOperation::PROFILE_VELOCITY => self.write_number(units.target_velocity.object, 0).await?,
+                ModeOfOperation::PROFILE_TORQUE => {
+                    if let Some(current) = units.target_current {
+                        self.write_number(current.object, 0).await?;
+                    }
+                }
+                _ => self.write_controlword(Controlword(0x0F | Controlword::HALT)).await?,
+            }
+        }
+        self.wait_standstill(INTENT).await?;
+        self.node.network().note_stopped(self.node.id());
+        Ok(())
+    }
+
+    /// Keeps a moving drive company for `duration`: its polling keeps the drive's watch over its host content.
+    ///
+    /// # Errors
+    /// [`Error::NotReached`] as soon as the drive is no longer enabled or falls silent.
+    pub async fn supervise(&self, duration: Duration) -> Result<(), Error> {
+        const INTENT: &str = "keep it moving";
+        let mut waited = Duration::ZERO;
+        while waited < duration {
+            self.still_enabled(INTENT).await?;
+            self.wait_poll(&mut waited).await;
+        }
+        Ok(())
+    }
+
+    /// Takes a halt bit back that an earlier stop has left, now that the target is the new one.
+    async fn release_halt(&self) -> Result<(), Error> {
+        // A controlword that cannot be read has no halt that this master could know of.
+        let halted = self.node.read::<u16>(CONTROLWORD).await.is_ok_and(|raw| Controlword(raw).has(Controlword::HALT));
+        if halted { self.write_controlword(Controlword(0x0F)).await } else { Ok(()) }
+    }
+
+    pub(super) async fn notes(&self) -> Vec<Note> {
+        let watches = self.profile.is_some_and(|profile| profile.quirks.contains(&Quirk::HostWatchdogOnByDefault));
+        if !watches {
+            return Vec::new();
+        }
+        match self.read_number(HOST_WATCHDOG).await {
+            Ok(ms) if ms > 0 => {
+                vec![Note::HostWatchdog { object: HOST_WATCHDOG, time: Duration::from_millis(ms as u64) }]
+            }
+            _ => Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! Profile position moves (CiA 402-2, clause 10): the set-point handshake of bits 4 and 12, and the wait for the
+//! target with a deadline from way, speed and ramps. Interpolated and cyclic positions are not made here.
+
+use std::time::Duration;
+
+use cia402::{Controlword, ModeOfOperation, Statusword};
+
+use super::explain::Trigger;
+use super::goal::Goal;
+use super::motion::{LATE_FACTOR, LATE_MARGIN_S, MotionOptions, MotionReport};
+use super::{CONTROLWORD, Drive, POLL, POSITION_ACTUAL, STEP_TIMEOUT, TARGET_POSITION};
+use crate::error::Error;
+use crate::units::{Angle, Rpm};
+
+const ENABLED: u16 = 0x0F;
+
+/// How near to the target bit 10 (target reached) is believed although it was never seen clear, in turns.
+const REACHED_TURNS: f64 = 0.01;
+
+/// Profile position moves with the set-point handshake. Source: CiA 402-2, clause 10.
+impl Drive {
+    /// Turns to an absolute position. Enables the drive first.
+    ///
+    /// # Errors
+    /// [`Error::OutOfLimits`] before anything moves; [`Error::NotReached`] with an explanation when the drive faults,
+    /// is stopped, falls silent or does not get there; those of the requests.
+    pub async fn move_absolute(&self, to: impl Into<Angle>, options: MotionOptions) -> Result<MotionReport, Error> {
+        let target = self.counts(to.into()).await?;
+        self.move_counts(target, false, options).await
+    }
+
+    /// Turns by an angle from the last target position. Enables the drive first.
+    ///
+    /// # Errors
+    /// As [`move_absolute`](Self::move_absolute).
+    pub async fn move_relative(&self, by: impl Into<Angle>, options: MotionOptions) -> Result<MotionReport, Error> {
+        let distance = self.counts(by.into()).await?;
+        self.move_counts(distance, true, options).await
+    }
+
+    async fn move_counts(&self, counts: i64, relative: bool, options: MotionOptions) -> Result<MotionReport, Error> {
+        const INTENT: &str = "move it to the wanted position";
+        let units = self.known(INTENT)?.units;
+        self.check_number(TARGET_POSITION, counts)?;
+        if let Some(Rpm(speed)) = options.speed {
+            let raw = self.raw_quantity(units.profile_velocity, speed.abs()).await?;
+            self.write_number(units.profile_velocity.object, raw).await?;
+        }
+        let speed = self.read_quantity(units.profile_velocity).await?;
+        self.write_ramps(options.acceleration, options.deceleration, speed).await?;
+        self.set_mode(ModeOfOperation::PROFILE_POSITION).await?;
+        self.enable().await?;
+        let began_at = self.read_number(POSITION_ACTUAL).await?;
+        let target = if relative { began_at.saturating_add(counts) } else { counts };
+        let limit = self.time_for(target.abs_diff(began_at) as f64, speed).await?;
+        self.give_set_point(INTENT, counts, relative).await?;
+        let notes = self.notes().await;
+        if !options.wait {
+            return Ok(MotionReport { reached_after: None, notes });
+        }
+        let band = (self.counts_per_turn().await? * REACHED_TURNS).max(1.0);
+        let reached = self.watch(INTENT, Goal::Position { target, band, seen_clear: false }, limit).await?;
+        self.node.network().note_stopped(self.node.id());
+        Ok(MotionReport { reached_after: Some(reached), notes })
+    }
+
+    /// Target into 607Ah, then a rising edge of bit 4, acknowledged by statusword bit 12, and bit 4 back.
+    ///
+    /// A drive left halted gets the new set-point in place of the one it was halted in, not after it.
+    async fn give_set_point(&self, intent: &'static str, counts: i64, relative: bool) -> Result<(), Error> {
+        let before = self.node.read::<u16>(CONTROLWORD).await.map_or(Controlword(ENABLED), Controlword);
+        let halted = before.has(Controlword::HALT);
+        let (held, replace) = if halted { (Controlword::HALT, Controlword::CHANGE_SET_IMMEDIATELY) } else { (0, 0) };
+        let kind = ENABLED | if relative { Controlword::RELATIVE } else { 0 };
+        self.write_controlword(Controlword(kind | held)).await?;
+        self.wait_acknowledge(intent, false).await?;
+        self.write_number(TARGET_POSITION, counts).await?;
+        self.node.network().note_moved(self.node.id());
+        self.write_controlword(Controlword(kind | replace | Controlword::NEW_SET_POINT)).await?;
+        self.wait_acknowledge(intent, true).await?;
+        self.write_controlword(Controlword(kind)).await
+    }
+
+    async fn wait_acknowledge(&self, intent: &'static str, acknowledged: bool) -> Result<(), Error> {
+        let mut waited = Duration::ZERO;
+        while self.still_enabled(intent).await?.has(Statusword::SET_POINT_ACKNOWLEDGE) != acknowledged {
+            if waited >= STEP_TIMEOUT {
+                return Err(self.not_reached(intent, Trigger::NoAcknowledge).await);
+            }
+            self.wait_poll(&mut waited).await;
+        }
+        Ok(())
+    }
+
+    /// Upper bound of a move's duration: the way at full speed plus both ramps, stretched by the margin.
+    async fn time_for(&self, counts: f64, speed_rpm: f64) -> Result<Duration, Error> {
+        let (up, down) = self.ramp_times_s().await?;
+        let turns = counts / self.counts_per_turn().await?.max(1.0);
+        let cruise = if speed_rpm > 0.0 { turns / speed_rpm * 60.0 } else { f64::INFINITY };
+        let seconds = (cruise + up + down) * LATE_FACTOR + LATE_MARGIN_S + POLL.as_secs_f64();
+        // A day: the longest move that makes sense to wait for.
+        Ok(Duration::from_secs_f64(seconds.min(86_400.0)))
+    }
+}

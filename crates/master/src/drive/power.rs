@@ -1,0 +1,179 @@
+use std::time::Duration;
+
+use cia402::{Controlword, ModeOfOperation, PowerCommand, PowerState, Statusword, next_command};
+
+use super::explain::Trigger;
+use super::{Drive, MODE_DISPLAY, POLL, STEP_TIMEOUT};
+use crate::error::Error;
+
+/// Speed below which a shaft counts as standing still: the rounding of the coarsest velocity object.
+pub(super) const STANDSTILL_RPM: f64 = 1.0;
+
+/// The power drive state machine. Source: CiA 402-2, 8.2.
+impl Drive {
+    /// Brings the drive to Operation enabled, one step of the state machine at a time.
+    ///
+    /// A speed or torque left over from before is set to zero first: some drives follow it at once. A fault is
+    /// not reset by itself: its cause comes first.
+    ///
+    /// # Errors
+    /// [`Error::NotReached`] with an explanation when the drive does not follow; those of the SDO requests.
+    pub async fn enable(&self) -> Result<(), Error> {
+        const INTENT: &str = "enable it";
+        self.clear_targets().await?;
+        let mut waited = Duration::ZERO;
+        loop {
+            let statusword = self.answered(INTENT, self.statusword().await).await?;
+            match statusword.state() {
+                Some(PowerState::OperationEnabled) => return Ok(()),
+                Some(PowerState::Fault) => return Err(self.not_reached(INTENT, Trigger::Fault).await),
+                Some(state) => match next_command(state) {
+                    Some(command) => {
+                        self.step(INTENT, state, command).await?;
+                        waited = Duration::ZERO;
+                        continue;
+                    }
+                    None => self.wait_poll(&mut waited).await,
+                },
+                None => self.wait_poll(&mut waited).await,
+            }
+            if waited >= STEP_TIMEOUT {
+                return Err(self.not_reached(INTENT, Trigger::Waiting).await);
+            }
+        }
+    }
+
+    /// Stops by the drive's shutdown ramp and takes the power off the motor: Switch on disabled.
+    ///
+    /// # Errors
+    /// [`Error::NotReached`]; those of the SDO requests.
+    pub async fn disable(&self) -> Result<(), Error> {
+        const INTENT: &str = "disable it";
+        if self.statusword().await?.state() == Some(PowerState::OperationEnabled) {
+            self.write_controlword(PowerCommand::Shutdown.controlword()).await?;
+            self.wait_for(INTENT, PowerCommand::Shutdown, self.stop_time().await, |state| {
+                state != PowerState::OperationEnabled
+            })
+            .await?;
+        }
+        if self.statusword().await?.state() != Some(PowerState::Fault) {
+            self.write_controlword(PowerCommand::DisableVoltage.controlword()).await?;
+            let command = PowerCommand::DisableVoltage;
+            self.wait_for(INTENT, command, STEP_TIMEOUT, |state| state == PowerState::SwitchOnDisabled).await?;
+        }
+        self.node.network().note_stopped(self.node.id());
+        Ok(())
+    }
+
+    /// Quick stop: the steepest ramp that the drive is set to (605Ah). Ends at standstill.
+    ///
+    /// # Errors
+    /// [`Error::NotReached`]; those of the SDO requests.
+    pub async fn quick_stop(&self) -> Result<(), Error> {
+        const INTENT: &str = "quick-stop it";
+        self.write_controlword(PowerCommand::QuickStop.controlword()).await?;
+        let stopping = |state| state != PowerState::OperationEnabled;
+        self.wait_for(INTENT, PowerCommand::QuickStop, STEP_TIMEOUT, stopping).await?;
+        if self.profile.is_some() {
+            self.wait_standstill(INTENT).await?;
+        }
+        self.node.network().note_stopped(self.node.id());
+        Ok(())
+    }
+
+    /// Resets a fault: a rising edge of controlword bit 7 (transition 15).
+    ///
+    /// # Errors
+    /// [`Error::NotReached`] with the fault's cause and remedy when it comes back.
+    pub async fn reset_fault(&self) -> Result<(), Error> {
+        const INTENT: &str = "reset its fault";
+        if self.statusword().await?.state() != Some(PowerState::Fault) {
+            return Ok(());
+        }
+        self.write_controlword(Controlword(0)).await?;
+        self.write_controlword(PowerCommand::FaultReset.controlword()).await?;
+        let mut waited = Duration::ZERO;
+        while self.answered(INTENT, self.statusword().await).await?.state() == Some(PowerState::Fault) {
+            if waited >= STEP_TIMEOUT {
+                return Err(self.not_reached(INTENT, Trigger::Fault).await);
+            }
+            self.wait_poll(&mut waited).await;
+        }
+        self.write_controlword(Controlword(0)).await
+    }
+
+    /// Waits until the shaft stands still, as long as the drive's ramps may take.
+    pub(super) async fn wait_standstill(&self, intent: &'static str) -> Result<(), Error> {
+        let velocity = self.known(intent)?.units.actual_velocity;
+        let limit = self.stop_time().await;
+        let mut waited = Duration::ZERO;
+        loop {
+            let speed = self.answered(intent, self.read_quantity(velocity).await).await?;
+            if speed.abs() < STANDSTILL_RPM {
+                return Ok(());
+            }
+            if waited >= limit {
+                return Err(self.not_reached(intent, Trigger::StillTurning(speed)).await);
+            }
+            self.wait_poll(&mut waited).await;
+        }
+    }
+
+    /// Sends a command and waits for the state machine to leave `state`.
+    async fn step(&self, intent: &'static str, state: PowerState, command: PowerCommand) -> Result<(), Error> {
+        let sent = self.write_controlword(command.controlword()).await;
+        self.answered(intent, sent).await?;
+        self.wait_for(intent, command, STEP_TIMEOUT, |now| now != state).await
+    }
+
+    async fn wait_for(
+        &self,
+        intent: &'static str,
+        command: PowerCommand,
+        limit: Duration,
+        arrived: impl Fn(PowerState) -> bool,
+    ) -> Result<(), Error> {
+        let mut waited = Duration::ZERO;
+        loop {
+            let statusword: Statusword = self.answered(intent, self.statusword().await).await?;
+            if statusword.state().is_some_and(&arrived) {
+                return Ok(());
+            }
+            if waited >= limit {
+                return Err(self.not_reached(intent, Trigger::Ignored(command)).await);
+            }
+            self.wait_poll(&mut waited).await;
+        }
+    }
+
+    /// How long a stop from full speed may take: twice the drive's slowest ramp, and a step.
+    pub(super) async fn stop_time(&self) -> Duration {
+        let ramp = match (self.ramp_times_s().await, self.quick_stop_time_s().await) {
+            (Ok((_, down)), Ok(quick)) => down.max(quick),
+            // The largest ramp of the drives known: 32767 ms.
+            _ => 32.767,
+        };
+        STEP_TIMEOUT + Duration::from_secs_f64((2.0 * ramp).clamp(0.0, 3600.0))
+    }
+
+    pub(super) async fn wait_poll(&self, waited: &mut Duration) {
+        self.node.network().sleep(POLL).await;
+        *waited += POLL;
+    }
+
+    /// Zeroes a target speed or torque left over, unless the drive already runs.
+    async fn clear_targets(&self) -> Result<(), Error> {
+        let Some(profile) = self.profile else { return Ok(()) };
+        if self.statusword().await?.state() == Some(PowerState::OperationEnabled) {
+            return Ok(());
+        }
+        match ModeOfOperation(self.node.read::<i8>(MODE_DISPLAY).await?) {
+            ModeOfOperation::PROFILE_VELOCITY => self.write_number(profile.units.target_velocity.object, 0).await,
+            ModeOfOperation::PROFILE_TORQUE => match profile.units.target_current {
+                Some(current) => self.write_number(current.object, 0).await,
+                None => Ok(()),
+            },
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,54 @@
+use canopen::NodeId;
+use cia402::PowerCommand;
+
+use super::CONTROLWORD;
+use crate::core::{Command, NodeSet, Payload, Request, Transfer};
+use crate::error::Error;
+use crate::network::{DEFAULT_TIMEOUT, Network, join_all};
+
+/// Stopping what this program has set in motion, and only that.
+impl Network {
+    /// Quick-stops every node that this program has set in motion, all at the same time, and says what each answered.
+    pub async fn stop_all_moved(&self) -> Vec<(NodeId, Result<(), Error>)> {
+        let stop = PowerCommand::QuickStop.controlword().0;
+        let stops = self.moved().iter().map(|id| {
+            let node = self.node(id);
+            async move { (id, node.write(CONTROLWORD, stop).await) }
+        });
+        let stopped = join_all(stops.collect::<Vec<_>>()).await;
+        stopped.iter().filter(|(_, outcome)| outcome.is_ok()).for_each(|(id, _)| self.note_stopped(*id));
+        stopped
+    }
+
+    /// Queues the same without waiting; the runner has to be kept going until the frames are out.
+    pub fn quick_stop_moved(&self) -> NodeSet {
+        let stop = Payload::new(&PowerCommand::QuickStop.controlword().0.to_le_bytes());
+        let moved = self.moved();
+        for node in moved.iter() {
+            let transfer = Transfer::Download(stop.clone());
+            let request = Request { node, mux: CONTROLWORD, transfer, timeout: DEFAULT_TIMEOUT };
+            let ticket = self.with_core(crate::core::Core::ticket);
+            self.submit(Command::Request(ticket, request));
+            self.note_stopped(node);
+        }
+        moved
+    }
+
+    /// A guard that quick-stops what was set in motion when it goes out of scope.
+    pub fn stop_guard(&self) -> StopGuard {
+        StopGuard { network: self.clone() }
+    }
+}
+
+/// Quick-stops, when dropped, every node that this program has set in motion. See [`Network::stop_guard`].
+#[derive(Debug)]
+#[must_use = "a guard that is dropped at once stops at once"]
+pub struct StopGuard {
+    network: Network,
+}
+
+impl Drop for StopGuard {
+    fn drop(&mut self) {
+        self.network.quick_stop_moved();
+    }
+}

@@ -1,0 +1,138 @@
+use std::time::Duration;
+
+use canopen::NmtState;
+use cia402::{ModeOfOperation, PowerState, Statusword};
+use drives::engine::faults::FaultRow;
+use drives::profile::Quantity;
+
+use super::explain::faults_in;
+use super::{Drive, ERROR_CODE, MODE_DISPLAY, POSITION_ACTUAL};
+use crate::error::Error;
+use crate::units::{Amperes, Celsius, Counts, Degrees, Rpm, Volts};
+
+/// Everything that a drive says of itself at one time. What the model does not have is `None`.
+#[derive(Clone, Debug)]
+pub struct DriveState {
+    /// 6041h.
+    pub statusword: Statusword,
+    /// The state it shows.
+    pub power: Option<PowerState>,
+    /// 6061h.
+    pub mode: Option<ModeOfOperation>,
+    /// The model's fault code; 0 for none.
+    pub fault_code: u16,
+    /// What the code means and what to do.
+    pub faults: Vec<&'static FaultRow>,
+    /// Position in counts.
+    pub position: Option<Counts>,
+    /// Position as an angle of the shaft.
+    pub angle: Option<Degrees>,
+    /// Speed.
+    pub velocity: Option<Rpm>,
+    /// Motor current.
+    pub current: Option<Amperes>,
+    /// Supply voltage.
+    pub supply: Option<Volts>,
+    /// Motor temperature.
+    pub motor_temperature: Option<Celsius>,
+    /// Temperature of the power stage.
+    pub driver_temperature: Option<Celsius>,
+    /// NMT state by its last heartbeat.
+    pub nmt: Option<NmtState>,
+    /// Age of its last heartbeat.
+    pub heartbeat_age: Option<Duration>,
+}
+
+impl Drive {
+    /// Reads everything that the model can say of its state.
+    ///
+    /// # Errors
+    /// Those of the SDO reads. An object that this drive refuses is left out; silence is an error.
+    pub async fn state(&self) -> Result<DriveState, Error> {
+        let statusword = self.statusword().await?;
+        let mode = optional(self.node.read::<i8>(MODE_DISPLAY).await)?.map(ModeOfOperation);
+        let code = self.profile.map_or(ERROR_CODE, |profile| profile.faults.code);
+        let fault_code = optional(self.node.upload(code).await)?.map_or(0, |payload| payload.raw() as u16);
+        let faults = self.profile.map(|profile| faults_in(profile, fault_code)).unwrap_or_default();
+        let position = optional(self.node.read::<i32>(POSITION_ACTUAL).await)?.map(|raw| Counts(raw.into()));
+        let angle = match (position, self.profile) {
+            (Some(Counts(counts)), Some(_)) => {
+                let turn = self.counts_per_turn().await?;
+                (turn > 0.0).then(|| Degrees(counts as f64 / turn * 360.0))
+            }
+            _ => None,
+        };
+        let units = self.profile.map(|profile| &profile.units);
+        let facts = self.node.facts();
+        Ok(DriveState {
+            statusword,
+            power: statusword.state(),
+            mode,
+            fault_code,
+            faults,
+            position,
+            angle,
+            velocity: self.measure(units.map(|units| units.actual_velocity)).await?.map(Rpm),
+            current: self.measure(units.and_then(|units| units.actual_current)).await?.map(Amperes),
+            supply: self.measure(units.and_then(|units| units.bus_voltage)).await?.map(Volts),
+            motor_temperature: self.measure(units.and_then(|units| units.motor_temperature)).await?.map(Celsius),
+            driver_temperature: self.measure(units.and_then(|units| units.driver_temperature)).await?.map(Celsius),
+            nmt: facts.nmt_state,
+            heartbeat_age: facts.heartbeat_age(self.node.network().now()),
+        })
+    }
+
+    async fn measure(&self, quantity: Option<Quantity>) -> Result<Option<f64>, Error> {
+        match quantity {
+            Some(quantity) => optional(self.read_quantity(quantity).await),
+            None => Ok(None),
+        }
+    }
+}
+
+impl DriveState {
+    /// The bits of the statusword that are set, in words. Bits 8 and 11 to 15 are told by their number where mode
+    /// or maker decide what they mean.
+    pub fn statusword_words(&self) -> Vec<&'static str> {
+        let fixed: [(u16, &str); 9] = [
+            (0x0001, "ready to switch on"),
+            (0x0002, "switched on"),
+            (0x0004, "operation enabled"),
+            (0x0008, "fault"),
+            (0x0010, "voltage enabled"),
+            (0x0040, "switch on disabled"),
+            (0x0080, "warning"),
+            (0x0200, "remote"),
+            (0x0400, "target reached"),
+        ];
+        let bit12 = match self.mode {
+            Some(ModeOfOperation::PROFILE_POSITION) => "set-point acknowledged",
+            Some(ModeOfOperation::PROFILE_VELOCITY) => "speed is zero",
+            Some(ModeOfOperation::HOMING) => "homing attained",
+            _ => "bit 12",
+        };
+        let open = [
+            (0x0100, "bit 8"),
+            (0x0800, "internal limit active"),
+            (0x1000, bit12),
+            (0x2000, "bit 13"),
+            (0x4000, "bit 14"),
+            (0x8000, "bit 15"),
+        ];
+        let set = |(mask, _): &(u16, &str)| self.statusword.has(*mask);
+        let mut words: Vec<_> = fixed.into_iter().chain(open).filter(set).map(|(_, name)| name).collect();
+        if self.power == Some(PowerState::QuickStopActive) {
+            words.push("quick stop active");
+        }
+        words
+    }
+}
+
+/// What the drive refuses is left out.
+fn optional<T>(result: Result<T, Error>) -> Result<Option<T>, Error> {
+    match result {
+        Ok(value) => Ok(Some(value)),
+        Err(Error::Aborted { .. }) => Ok(None),
+        Err(error) => Err(error),
+    }
+}

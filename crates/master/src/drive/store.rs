@@ -1,0 +1,35 @@
+use std::time::Duration;
+
+use drives::profile::Write;
+
+use super::Drive;
+use crate::error::Error;
+
+/// How long a drive may take to write its whole parameter memory before it answers: EEPROMs take 5 to 10 ms a page.
+const STORE_TIMEOUT: Duration = Duration::from_secs(3);
+
+/// The drive's own parameter memory, by the model's own commands.
+impl Drive {
+    /// Stores all parameters.
+    ///
+    /// # Errors
+    /// [`Error::UnknownModel`]: what means "save" to one model may be anything to another. Those of the SDO write.
+    pub async fn save(&self) -> Result<(), Error> {
+        let storage = self.known("save its parameters")?.storage;
+        self.command(storage.save).await
+    }
+
+    /// Puts all parameters back to their factory values. Some take effect after a restart only.
+    ///
+    /// # Errors
+    /// As [`save`](Self::save).
+    pub async fn restore(&self) -> Result<(), Error> {
+        let storage = self.known("restore its factory settings")?.storage;
+        self.command(storage.restore).await
+    }
+
+    async fn command(&self, write: Write) -> Result<(), Error> {
+        let patient = Self { node: self.node.clone().with_timeout(STORE_TIMEOUT), profile: self.profile };
+        patient.write_number(write.object, i64::from(write.value)).await
+    }
+}

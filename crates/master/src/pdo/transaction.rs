@@ -1,0 +1,183 @@
+//! The steps of a PDO configuration and the way back.
+
+use std::time::Duration;
+
+use canopen::{AbortCode, CobId, Mux};
+
+use super::{PdoConfig, PdoError, PdoName, TimerUnits, TransmissionType};
+use crate::core::{MappedObject, PdoMap};
+use crate::decode::Direction;
+use crate::error::Error;
+use crate::network::Node;
+
+/// Most objects in one PDO. Source: CiA 301, 7.5.2.36.
+const MAX_OBJECTS: usize = 64;
+
+/// One write with its name for people.
+#[derive(Clone, Copy, Debug)]
+struct Write {
+    step: &'static str,
+    mux: Mux,
+    raw: u32,
+    bytes: usize,
+}
+
+/// What a PDO was before, to go back to.
+struct Before {
+    cob_id: CobId,
+    writes: Vec<Write>,
+}
+
+enum Trouble {
+    Failed(&'static str, Error),
+    Differs(Write, u32),
+}
+
+/// Sets the PDO up and gives its COB-ID.
+pub(super) async fn apply(node: &Node, config: &PdoConfig, units: TimerUnits) -> Result<CobId, PdoError> {
+    let writes = plan(node, config, units)?;
+    let pdo = PdoName(config.direction, config.number);
+    let failed = |step, cause| PdoError::Step { node: node.id(), pdo, step, cause, restored: true };
+    let before = snapshot(node, config, &writes).await.map_err(|cause| failed("read what is there", cause))?;
+    let cob_id = config.id.map_or(CobId(before.cob_id.0 & !CobId::INVALID), CobId::standard);
+    match run(node, config, cob_id, before.cob_id, &writes).await {
+        Ok(()) => Ok(cob_id),
+        Err(trouble) => {
+            let restored = restore(node, config, &before).await.is_ok();
+            Err(match trouble {
+                Trouble::Failed(step, cause) => PdoError::Step { node: node.id(), pdo, step, cause, restored },
+                Trouble::Differs(Write { step, mux, raw, .. }, found) => {
+                    PdoError::ReadBack { node: node.id(), pdo, mux, step, asked: raw, found, restored }
+                }
+            })
+        }
+    }
+}
+
+/// Reads how a PDO is set up.
+pub(super) async fn read(
+    node: &Node,
+    direction: Direction,
+    number: u8,
+    units: TimerUnits,
+) -> Result<(PdoConfig, CobId), Error> {
+    let mut config = PdoConfig::new(direction, number, PdoMap::default());
+    let cob_id = CobId(cell(node, config.parameter(1)).await?);
+    config.transmission = TransmissionType(cell(node, config.parameter(2)).await? as u8);
+    let count = cell(node, config.mapping(0)).await?.min(MAX_OBJECTS as u32) as u8;
+    for sub_index in 1..=count {
+        let record = cell(node, config.mapping(sub_index)).await?;
+        config.map.0.push(MappedObject::from_record(record));
+    }
+    // Both timers are optional (CiA 301, 7.5.2.37).
+    config.inhibit_time = cell(node, config.parameter(3)).await.ok().map(|raw| units.inhibit * raw);
+    config.event_time = cell(node, config.parameter(5)).await.ok().map(|raw| units.event * raw);
+    Ok((config, cob_id))
+}
+
+/// Everything between invalidation and validation, in the standard's order.
+fn plan(node: &Node, config: &PdoConfig, units: TimerUnits) -> Result<Vec<Write>, PdoError> {
+    let pdo = PdoName(config.direction, config.number);
+    let (bits, objects) = (config.map.bits(), config.map.0.len());
+    if bits > u64::BITS || objects > MAX_OBJECTS {
+        return Err(PdoError::TooLong { node: node.id(), pdo, bits, objects });
+    }
+    let mut writes = vec![Write { step: "clear the mapping", mux: config.mapping(0), raw: 0, bytes: 1 }];
+    for (sub_index, object) in (1..).zip(&config.map.0) {
+        let mux = config.mapping(sub_index);
+        writes.push(Write { step: "map an object", mux, raw: object.to_record(), bytes: 4 });
+    }
+    writes.push(Write { step: "set the number of objects", mux: config.mapping(0), raw: objects as u32, bytes: 1 });
+    let transmission = u32::from(config.transmission.0);
+    writes.push(Write { step: "set the transmission type", mux: config.parameter(2), raw: transmission, bytes: 1 });
+    let timers = [
+        ("set the inhibit time", 3, config.inhibit_time, units.inhibit),
+        ("set the event timer", 5, config.event_time, units.event),
+    ];
+    for (step, sub_index, time, unit) in timers {
+        let Some(asked) = time else { continue };
+        let raw = counts(asked, unit).ok_or(PdoError::Time { node: node.id(), pdo, asked, unit })?;
+        writes.push(Write { step, mux: config.parameter(sub_index), raw: raw.into(), bytes: 2 });
+    }
+    Ok(writes)
+}
+
+/// A time in counts of the device's timer, rounded to the nearest; a time that is not zero never becomes zero.
+fn counts(time: Duration, unit: Duration) -> Option<u16> {
+    let unit_ns = unit.as_nanos().max(1);
+    let counts = (time.as_nanos() + unit_ns / 2) / unit_ns;
+    u16::try_from(if time.is_zero() { 0 } else { counts.max(1) }).ok()
+}
+
+/// Reads what the writes are going to change.
+async fn snapshot(node: &Node, config: &PdoConfig, writes: &[Write]) -> Result<Before, Error> {
+    let cob_id = CobId(cell(node, config.parameter(1)).await?);
+    let count = cell(node, config.mapping(0)).await?;
+    let mut old = vec![Write { step: "clear the mapping", mux: config.mapping(0), raw: 0, bytes: 1 }];
+    for sub_index in 1..=count.min(MAX_OBJECTS as u32) as u8 {
+        let mux = config.mapping(sub_index);
+        old.push(Write { step: "map an object", mux, raw: cell(node, mux).await?, bytes: 4 });
+    }
+    old.push(Write { step: "set the number of objects", mux: config.mapping(0), raw: count, bytes: 1 });
+    for write in writes.iter().filter(|write| write.mux.index == config.parameter(0).index) {
+        old.push(Write { raw: cell(node, write.mux).await?, ..*write });
+    }
+    Ok(Before { cob_id, writes: old })
+}
+
+async fn run(node: &Node, config: &PdoConfig, cob_id: CobId, before: CobId, writes: &[Write]) -> Result<(), Trouble> {
+    invalidate(node, config, before).await?;
+    for write in writes {
+        put(node, *write).await?;
+    }
+    // The first write cleared what a later one set.
+    for write in &writes[1..] {
+        check(node, *write).await?;
+    }
+    validate(node, config, cob_id).await
+}
+
+/// Sets bit 31. A device that does not let its COB-ID be written is left valid: some remap regardless.
+async fn invalidate(node: &Node, config: &PdoConfig, cob_id: CobId) -> Result<(), Trouble> {
+    let (step, mux) = ("invalidate it (bit 31 of its COB-ID)", config.parameter(1));
+    match put(node, Write { step, mux, raw: cob_id.0 | CobId::INVALID, bytes: 4 }).await {
+        Err(Trouble::Failed(_, Error::Aborted { code: AbortCode::READ_ONLY, .. })) => Ok(()),
+        other => other,
+    }
+}
+
+async fn validate(node: &Node, config: &PdoConfig, cob_id: CobId) -> Result<(), Trouble> {
+    let (step, mux) = ("validate it (its COB-ID without bit 31)", config.parameter(1));
+    let write = Write { step, mux, raw: cob_id.0, bytes: 4 };
+    match put(node, write).await {
+        // It may already be what it has to be.
+        Err(Trouble::Failed(_, Error::Aborted { code: AbortCode::READ_ONLY, .. })) => {}
+        other => other?,
+    }
+    check(node, write).await
+}
+
+async fn restore(node: &Node, config: &PdoConfig, before: &Before) -> Result<(), Trouble> {
+    invalidate(node, config, before.cob_id).await?;
+    for write in &before.writes {
+        put(node, *write).await?;
+    }
+    validate(node, config, before.cob_id).await
+}
+
+async fn put(node: &Node, write: Write) -> Result<(), Trouble> {
+    let bytes = write.raw.to_le_bytes();
+    node.download(write.mux, &bytes[..write.bytes]).await.map_err(|cause| Trouble::Failed(write.step, cause))
+}
+
+async fn check(node: &Node, write: Write) -> Result<(), Trouble> {
+    let found = cell(node, write.mux).await.map_err(|cause| Trouble::Failed(write.step, cause))?;
+    // Bit 30 (no RTR) is the device's own: some keep it set whatever is written.
+    let ignored = if write.mux.sub_index == 1 && write.mux.index & 0x200 == 0 { CobId::NO_RTR } else { 0 };
+    if (found ^ write.raw) & !ignored == 0 { Ok(()) } else { Err(Trouble::Differs(write, found)) }
+}
+
+/// An object of up to four bytes, whatever its length: devices differ in the types of PDO parameters.
+async fn cell(node: &Node, mux: Mux) -> Result<u32, Error> {
+    Ok(node.upload(mux).await?.raw())
+}

@@ -1,0 +1,160 @@
+//! World commands against a world with drives.
+
+mod common;
+
+use can::{Bitrate, Instant};
+use common::{TestDrive, frame, heard, texts};
+use serde_json::Value;
+use sim::command::answer;
+use sim::recorder::{Channel, Recorder, Signal};
+use sim::{StationId, World, WorldError};
+
+fn world() -> (World, StationId) {
+    let mut world = World::new(Bitrate::K500, 1);
+    let tap = world.add_tap();
+    world.add_drive(4, Box::new(TestDrive::new(4))).unwrap();
+    world.add_drive(2, Box::new(TestDrive::new(2))).unwrap();
+    world.run_until(Instant::from_millis(500));
+    (world, tap)
+}
+
+fn ask(world: &mut World, line: &str) -> Value {
+    let answer = answer(world, line).unwrap();
+    assert!(!answer.json.contains('\n'));
+    assert_eq!(answer.quit, line.trim() == "quit");
+    serde_json::from_str(&answer.json).unwrap()
+}
+
+fn refusal(world: &mut World, line: &str) -> String {
+    let before = world.digest();
+    let answer = ask(world, line);
+    assert_eq!(answer["ok"], false, "{line}");
+    assert_eq!(world.digest(), before);
+    answer["error"].as_str().unwrap().to_string()
+}
+
+#[test]
+fn drives_boot_when_they_are_added_and_answer_on_the_bus() {
+    let (mut world, tap) = world();
+    assert_eq!(texts(&world), ["702#00", "704#00"]);
+    heard(&mut world, tap);
+    world.send(tap, frame("604#4041600000000000")).unwrap();
+    world.run_for(std::time::Duration::from_millis(2));
+    assert_eq!(heard(&mut world, tap), ["584#0000000000000000"]);
+    let twice = world.add_drive(4, Box::new(TestDrive::new(9)));
+    assert_eq!(twice, Err(WorldError::DuplicateDrive(4)));
+}
+
+#[test]
+fn get_tells_what_can_be_measured() {
+    let (mut world, _) = world();
+    // Half a turn at 60 r/min.
+    let got = answer(&mut world, "4 get").unwrap().json;
+    assert!(
+        got.starts_with(r#"{"ok":true,"t":0.5,"node":4,"model":"testdrive","powered":true,"position":2048,"#),
+        "{got}"
+    );
+    let got: Value = serde_json::from_str(&got).unwrap();
+    assert_eq!(got["velocity_rpm"], 60.0);
+    assert_eq!(got["current_a"], 1.25);
+    assert_eq!(got["supply_v"], 48.0);
+    assert_eq!(got["outputs"], serde_json::json!({"Y0": 0, "Y1": 1}));
+    assert_eq!(got["brake"], "released");
+    assert_eq!(got["bus"], "error-active");
+    assert_eq!(got["bitrate"], 500_000);
+}
+
+#[test]
+fn now_and_quit_tell_the_time_and_blank_lines_nothing() {
+    let (mut world, _) = world();
+    assert_eq!(answer(&mut world, "now").unwrap().json, r#"{"ok":true,"t":0.5}"#);
+    assert_eq!(ask(&mut world, "quit")["ok"], true);
+    for blank in ["", "  ", "\t\r\n"] {
+        assert_eq!(answer(&mut world, blank), None);
+    }
+}
+
+#[test]
+fn errors_say_what_is_there_and_change_nothing() {
+    let (mut world, _) = world();
+    assert_eq!(refusal(&mut world, "7 get"), "no drive was started as node 7; there is 4, 2");
+    assert_eq!(refusal(&mut world, "4 input X9 1"), "a testdrive has no input \"X9\"; it has X0, X1");
+    assert_eq!(refusal(&mut world, "4 battery off"), "a testdrive has no battery");
+    assert_eq!(refusal(&mut world, "4 fault hall on"), "a testdrive has no Hall sensor");
+    assert_eq!(refusal(&mut world, "4 temperature driver 5"), "a testdrive has no driver temperature sensor");
+    assert_eq!(refusal(&mut world, "4 supply 1000"), "supply voltage must be 0 to 100 V, not 1000");
+    assert_eq!(refusal(&mut world, "4 supply"), "expected: NODE supply VOLTS");
+    assert!(refusal(&mut world, "\u{7}\"quoted\\").starts_with("unknown command"));
+    assert_eq!(refusal(&mut World::new(Bitrate::M1, 1), "4 get"), "no drive was started as node 4; there is none");
+}
+
+#[test]
+fn commands_reach_the_machine_under_the_number_given_at_the_start() {
+    let (mut world, _) = world();
+    world.with_drive(4, |_, _| ()).unwrap();
+    for line in ["4 supply 24", "4 temperature motor 95.5", "4 load torque -2.5", "4 load inertia 0.02", "4 input x1 1"]
+    {
+        assert_eq!(ask(&mut world, line), serde_json::json!({"ok": true, "t": 0.5}), "{line}");
+    }
+    let got = ask(&mut world, "4 get");
+    assert_eq!((&got["supply_v"], &got["motor_c"]), (&Value::from(24.0), &Value::from(95.5)));
+    ask(&mut world, "4 temperature motor auto");
+    ask(&mut world, "4 rotor lock");
+    let got = ask(&mut world, "4 get");
+    assert_eq!((&got["motor_c"], &got["velocity_rpm"]), (&Value::Null, &Value::from(0.0)));
+    ask(&mut world, "4 rotor free");
+    ask(&mut world, "4 switch X0 2000 max");
+    ask(&mut world, "4 fault phase on");
+}
+
+#[test]
+fn power_and_cable_take_a_drive_off_the_bus() {
+    let (mut world, tap) = world();
+    heard(&mut world, tap);
+    ask(&mut world, "4 power off");
+    assert_eq!(ask(&mut world, "4 get")["bus"], "off");
+    world.send(tap, frame("604#4041600000000000")).unwrap();
+    world.run_for(std::time::Duration::from_millis(2));
+    assert_eq!(heard(&mut world, tap), [""; 0]);
+    ask(&mut world, "4 power on");
+    world.run_for(std::time::Duration::from_millis(2));
+    assert_eq!(heard(&mut world, tap), ["704#00"]);
+    ask(&mut world, "4 power cycle");
+    ask(&mut world, "4 cable cut");
+    world.run_for(std::time::Duration::from_millis(50));
+    assert_eq!(heard(&mut world, tap), [""; 0]);
+    let got = ask(&mut world, "4 get");
+    assert_eq!((&got["bus"], &got["tec"]), (&Value::from("cut"), &Value::from(128)));
+    ask(&mut world, "4 cable join");
+    world.run_for(std::time::Duration::from_millis(2));
+    assert_eq!(heard(&mut world, tap), ["704#00"]);
+}
+
+#[test]
+fn a_recorder_samples_at_its_period_and_changes_nothing() {
+    let (mut plain, _) = world();
+    let (mut world, _) = world();
+    let channels = [Signal::Position, Signal::Velocity, Signal::MotorTemperature];
+    let channels = channels.map(|signal| Channel { drive: 4, signal });
+    world.start_recording(Recorder::new(std::time::Duration::from_millis(100), channels));
+    world.run_until(Instant::from_millis(650));
+    ask(&mut world, "4 rotor lock");
+    world.mark("rotor locked, \"hard\"");
+    world.run_until(Instant::from_millis(900));
+    let recorder = world.stop_recording().unwrap();
+    assert_eq!(recorder.samples(0).collect::<Vec<_>>(), [2048.0, 2457.0, 2662.0, 2662.0, 2662.0]);
+    assert_eq!(recorder.samples(3).count(), 0);
+    assert_eq!(
+        recorder.to_csv(),
+        "t_s,4.position_counts,4.velocity_rpm,4.motor_c,mark\n\
+         0.500000000,2048,60,,\n\
+         0.600000000,2457,60,,\n\
+         0.700000000,2662,0,,\"rotor locked, \"\"hard\"\"\"\n\
+         0.800000000,2662,0,,\n\
+         0.900000000,2662,0,,\n"
+    );
+    plain.run_until(Instant::from_millis(650));
+    ask(&mut plain, "4 rotor lock");
+    plain.run_until(Instant::from_millis(900));
+    assert_eq!(common::frames(&plain), common::frames(&world));
+}

@@ -1,0 +1,171 @@
+//! Faults of single nodes, and seeds.
+
+mod common;
+
+use std::time::Duration;
+
+use can::{Bitrate, Instant};
+use common::{Chatter, frame, heard, texts};
+use sim::World;
+use sim::fault::{Babble, Corruption, Delay, NodeFaults, Overrun};
+use sim::wire::ErrorState;
+
+fn at_ms(millis: u64) -> Instant {
+    Instant::from_millis(millis)
+}
+
+#[test]
+fn a_silent_node_sends_nothing_acknowledges_nothing_and_hears() {
+    let mut world = World::new(Bitrate::K500, 1);
+    let (a, b) = (world.add_tap(), world.add_tap());
+    world.run_until(at_ms(1));
+    world.set_node_faults(b, NodeFaults { silent: true, ..NodeFaults::default() });
+    world.send(b, frame("704#05")).unwrap();
+    world.run_until(at_ms(2));
+    assert!(texts(&world).is_empty());
+    world.send(a, frame("123#")).unwrap();
+    world.run_until(at_ms(50));
+    assert_eq!(world.counters(a).state(), ErrorState::ErrorPassive, "nobody acknowledges");
+    let c = world.add_tap();
+    world.run_until(at_ms(51));
+    assert_eq!(heard(&mut world, b), ["123#"]);
+    world.set_node_faults(b, NodeFaults::default());
+    world.run_until(at_ms(52));
+    assert_eq!(heard(&mut world, c), ["123#", "704#05"]);
+}
+
+#[test]
+fn a_late_node_answers_late_and_in_order() {
+    let mut world = World::new(Bitrate::K500, 1);
+    let (a, b) = (world.add_tap(), world.add_tap());
+    world.run_until(at_ms(1));
+    let late = Some(Delay::fixed(5_000_000));
+    world.set_node_faults(a, NodeFaults { late, ..NodeFaults::default() });
+    world.send(a, frame("704#05")).unwrap();
+    world.send(a, frame("123#")).unwrap();
+    world.run_until(at_ms(10));
+    assert_eq!(common::frames(&world)[0].0, 6_000_000);
+    // Both were ready at once: an order by priority, as in any controller.
+    assert_eq!(heard(&mut world, b), ["123#", "704#05"]);
+
+    let late = Some(Delay { min_ns: 1_000_000, max_ns: 9_000_000 });
+    world.set_node_faults(a, NodeFaults { late, ..NodeFaults::default() });
+    let sent: Vec<String> = (0..20u8).map(|n| format!("123#{n:02X}")).collect();
+    for text in &sent {
+        world.send(a, frame(text)).unwrap();
+        world.run_for(Duration::from_micros(500));
+    }
+    world.run_for(Duration::from_millis(20));
+    assert_eq!(heard(&mut world, b), sent);
+}
+
+#[test]
+fn a_babbling_node_starves_the_less_urgent_and_not_the_more_urgent() {
+    let mut world = World::new(Bitrate::K500, 1);
+    let (a, b, c) = (world.add_tap(), world.add_tap(), world.add_tap());
+    world.run_until(at_ms(1));
+    let babble = Some(Babble { frame: frame("100#"), gap_ns: 0 });
+    world.set_node_faults(a, NodeFaults { babble, ..NodeFaults::default() });
+    world.send(b, frame("704#05")).unwrap();
+    world.send(c, frame("000#0104")).unwrap();
+    world.run_until(at_ms(101));
+    let seen = texts(&world);
+    assert!(!seen.contains(&"704#05".to_string()));
+    assert!(seen[..2].contains(&"000#0104".to_string()));
+    let load = world.statistics().load_since(&Default::default());
+    assert!(load > 0.98, "{load}");
+    world.set_node_faults(a, NodeFaults::default());
+    world.run_until(at_ms(102));
+    assert_eq!(texts(&world).last().unwrap(), "704#05");
+}
+
+#[test]
+fn a_slow_receiver_loses_what_its_buffer_cannot_hold() {
+    let mut world = World::new(Bitrate::M1, 1);
+    let (a, b) = (world.add_tap(), world.add_tap());
+    world.run_until(at_ms(1));
+    let overrun = Some(Overrun { depth: 3, service_ns: 10_000_000 });
+    world.set_node_faults(b, NodeFaults { overrun, ..NodeFaults::default() });
+    for n in 0..6 {
+        world.send(a, frame(&format!("12{n}#"))).unwrap();
+    }
+    world.run_until(at_ms(5));
+    assert_eq!(heard(&mut world, b), ["120#", "121#", "122#"]);
+    assert_eq!(world.overruns(b), 3);
+    // It acknowledged them all.
+    assert_eq!(world.counters(a).tec(), 0);
+    world.run_until(at_ms(100));
+    world.send(a, frame("126#")).unwrap();
+    world.run_until(at_ms(101));
+    assert_eq!(heard(&mut world, b), ["126#"]);
+}
+
+/// Ten nodes that talk, one late and one babbling, on a bus that loses one frame in twenty.
+fn noisy_world(seed: u64) -> World {
+    let mut world = World::new(Bitrate::K500, seed);
+    for n in 0..10u16 {
+        let period = Duration::from_micros(3_000 + 170 * u64::from(n));
+        let text = format!("{:03X}#{:02X}00000000", 0x180 + n, n);
+        let id = world.add_station(Chatter::new(frame(&text), at_ms(1), period));
+        if n == 3 {
+            let late = Some(Delay { min_ns: 0, max_ns: 2_000_000 });
+            world.set_node_faults(id, NodeFaults { late, ..NodeFaults::default() });
+        }
+        if n == 4 {
+            let babble = Some(Babble { frame: frame("7FF#"), gap_ns: 1_300_000 });
+            world.set_node_faults(id, NodeFaults { babble, ..NodeFaults::default() });
+        }
+    }
+    world.set_corruption(Corruption::with_probability(0.05));
+    world
+}
+
+#[test]
+fn the_same_seed_gives_the_same_run_and_another_seed_another() {
+    let run = |seed| {
+        let mut world = noisy_world(seed);
+        world.run_until(at_ms(2_000));
+        (world.digest(), common::frames(&world))
+    };
+    assert_eq!(run(1), run(1));
+    assert_ne!(run(1).0, run(2).0);
+}
+
+#[test]
+fn the_size_of_the_strides_does_not_matter() {
+    let mut whole = noisy_world(5);
+    whole.run_until(at_ms(500));
+    let mut steps = noisy_world(5);
+    (0..5_000).for_each(|_| steps.run_for(Duration::from_micros(100)));
+    assert_eq!(whole.digest(), steps.digest());
+    assert_eq!(common::frames(&whole), common::frames(&steps));
+}
+
+#[test]
+fn a_snapshot_resumes_with_identical_results_as_often_as_wanted() {
+    let mut world = noisy_world(7);
+    world.run_until(at_ms(321));
+    let snapshot = world.snapshot();
+    world.run_until(at_ms(900));
+    for _ in 0..2 {
+        let mut again = snapshot.clone();
+        assert_eq!(again.now(), at_ms(321));
+        again.run_until(at_ms(900));
+        assert_eq!(again.digest(), world.digest());
+    }
+}
+
+#[test]
+fn about_the_asked_share_of_frames_is_disturbed_and_none_is_lost() {
+    let mut world = World::new(Bitrate::M1, 11);
+    let a = world.add_station(Chatter::new(frame("181#00"), at_ms(1), Duration::from_millis(1)));
+    let b = world.add_station(Chatter::new(frame("182#00"), Instant::FAR_FUTURE, Duration::ZERO));
+    world.set_corruption(Corruption::with_probability(0.1));
+    world.run_until(Instant::from_secs(20));
+    let statistics = world.statistics();
+    // 20 000 frames; failures are geometric: 1/9 of that, and far from five standard deviations (about 250).
+    assert!((statistics.errors as f64 - 20_000.0 / 9.0).abs() < 250.0, "{}", statistics.errors);
+    let sent = world.station::<Chatter>(a).unwrap().transmitted;
+    assert_eq!(world.station::<Chatter>(b).unwrap().heard, sent);
+    assert!(sent >= 19_999);
+}

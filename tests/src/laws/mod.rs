@@ -1,0 +1,40 @@
+//! Laws of everything that reads what others wrote: any bytes give a value or an error, never a panic, and what was
+//! read can be written and read again.
+//!
+//! Each law is a function of bytes that panics when it is broken. [`ALL`] names them with samples to damage.
+
+mod frame;
+mod node;
+mod stream;
+
+/// A law, the name that a fuzz target has for it, and valid inputs to start from.
+#[derive(Debug, Clone, Copy)]
+pub struct Law {
+    /// The name.
+    pub name: &'static str,
+    /// Panics when the law is broken for these bytes.
+    pub holds: fn(&[u8]),
+    /// Valid input.
+    pub samples: &'static [&'static [u8]],
+}
+
+/// Every law.
+pub const ALL: &[Law] = &[
+    Law { name: "frame_text", holds: frame::text, samples: frame::TEXT_SAMPLES },
+    Law { name: "frame_length", holds: frame::length, samples: frame::LENGTH_SAMPLES },
+    Law { name: "candump_line", holds: stream::candump_line, samples: stream::CANDUMP_SAMPLES },
+    Law { name: "socketcand", holds: stream::socketcand, samples: stream::SOCKETCAND_SAMPLES },
+    Law { name: "slcan", holds: stream::slcan, samples: stream::SLCAN_SAMPLES },
+    Law { name: "sdo_wire", holds: node::sdo_wire, samples: node::SDO_WIRE_SAMPLES },
+    Law { name: "node", holds: node::node, samples: node::NODE_SAMPLES },
+];
+
+/// The law of that name, for the fuzz targets.
+///
+/// # Panics
+///
+/// When there is none, or when the law is broken.
+pub fn check(name: &str, data: &[u8]) {
+    let law = ALL.iter().find(|law| law.name == name).unwrap_or_else(|| panic!("no law is called {name}"));
+    (law.holds)(data);
+}
