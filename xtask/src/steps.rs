@@ -58,7 +58,7 @@ fn doctests() -> Tally {
 }
 
 fn docs() -> Tally {
-    let words = ["doc", "--workspace", "--no-deps", "--document-private-items", "--quiet"];
+    let words = ["doc", "--workspace", "--no-deps", "--quiet"];
     cargo(&words, &[("RUSTDOCFLAGS", "-D warnings")], "a documentation link or example is broken")
 }
 
