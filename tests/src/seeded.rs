@@ -54,7 +54,7 @@ impl Seeded {
     }
 }
 
-/// Calls `law` with input from [`RUNS`] seeds, half of it random and half damaged samples.
+/// Calls `law` with input from as many seeds as there are runs, half of it random and half damaged samples.
 pub fn check(samples: &[&[u8]], law: impl Fn(&[u8]) + std::panic::RefUnwindSafe) {
     let first = std::env::var("FERRODRIVE_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(1);
     for seed in first..first + RUNS {

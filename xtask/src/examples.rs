@@ -1,8 +1,28 @@
-//! Runs every example of the workspace to its end: an example that nobody runs is wrong before long.
+//! Runs every example of the workspace: an example that nobody runs is wrong before long.
+//!
+//! An example either runs to its end, or serves until it is stopped and says so with a line that begins with `ready`.
 
-use crate::process;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
 use crate::tally::Tally;
-use crate::workspace;
+use crate::{process, workspace};
+
+/// An example is for a person to watch. One that takes longer does not end.
+const TIME_LIMIT: Duration = Duration::from_secs(120);
+
+/// How an example ended.
+#[derive(Debug, PartialEq, Eq)]
+enum Ending {
+    Success,
+    /// It serves, so it was stopped.
+    Ready,
+    Failure,
+    TooLate,
+}
 
 /// Runs each example without arguments. They all run on an embedded virtual bus when given none.
 pub(crate) fn run() -> Tally {
@@ -10,23 +30,92 @@ pub(crate) fn run() -> Tally {
         Ok(packages) => packages,
         Err(error) => return Tally::failed(error),
     };
-    let mut tally = Tally::default();
-    for package in &packages {
-        for example in &package.examples {
-            tally.add(&run_one(&package.name, example));
-        }
+    let names: Vec<String> = packages.into_iter().flat_map(|package| package.examples).collect();
+    if names.is_empty() {
+        return Tally::skipped("the workspace has no examples");
     }
-    if tally == Tally::default() { Tally::skipped("the workspace has no examples") } else { tally }
+    match process::run(workspace::cargo().args(["build", "--workspace", "--examples", "--quiet"]), |_| ()) {
+        Ok(true) => {}
+        Ok(false) => return Tally::failed("the examples do not build"),
+        Err(error) => return Tally::failed(error),
+    }
+    let folder = workspace::target().join("debug").join("examples");
+    let mut tally = Tally::default();
+    for name in names {
+        println!("   {name}");
+        tally.add(&run_one(&name, &folder.join(format!("{name}{}", std::env::consts::EXE_SUFFIX))));
+    }
+    tally
 }
 
-fn run_one(package: &str, example: &str) -> Tally {
-    println!("   example {example} of {package}");
-    let mut output = Vec::new();
-    let mut cargo = workspace::cargo();
-    cargo.args(["run", "--quiet", "--package", package, "--example", example]);
-    let ended_well = process::run(&mut cargo, |line| output.push(line.to_owned())).unwrap_or(false);
-    if !ended_well {
-        output.iter().for_each(|line| println!("{line}"));
+fn run_one(name: &str, program: &Path) -> Tally {
+    let mut command = Command::new(program);
+    command.current_dir(workspace::root());
+    let (ending, output) = match watch(command, TIME_LIMIT) {
+        Ok(ended) => ended,
+        Err(error) => return Tally::failed(format!("example {name}: {error}")),
+    };
+    if matches!(ending, Ending::Success | Ending::Ready) {
+        return Tally::passed();
     }
-    Tally::of_check(ended_well, &format!("example {example} ended badly"))
+    output.iter().for_each(|line| println!("   {line}"));
+    let what = if ending == Ending::TooLate { "did not end and did not say ready" } else { "ended badly" };
+    Tally::failed(format!("example {name} {what}"))
+}
+
+/// Runs `command` until it ends, says `ready`, or `limit` has passed; returns what it printed.
+fn watch(mut command: Command, limit: Duration) -> Result<(Ending, Vec<String>), String> {
+    let spawned = command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn();
+    let mut child = spawned.map_err(|error| error.to_string())?;
+    let lines = lines_of(&mut child);
+    let deadline = Instant::now() + limit;
+    let mut output = Vec::new();
+    loop {
+        match lines.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+            Ok(line) if line.starts_with("ready") => return stop(child).map(|()| (Ending::Ready, output)),
+            Ok(line) => output.push(line),
+            Err(RecvTimeoutError::Timeout) => return stop(child).map(|()| (Ending::TooLate, output)),
+            Err(RecvTimeoutError::Disconnected) => break,
+        }
+    }
+    let status = child.wait().map_err(|error| error.to_string())?;
+    Ok((if status.success() { Ending::Success } else { Ending::Failure }, output))
+}
+
+fn lines_of(child: &mut Child) -> Receiver<String> {
+    let (sender, receiver) = channel();
+    if let Some(output) = child.stdout.take() {
+        std::thread::spawn(move || {
+            BufReader::new(output).lines().map_while(Result::ok).try_for_each(|line| sender.send(line))
+        });
+    }
+    receiver
+}
+
+/// Ends the process that we started, and waits for it to be gone.
+fn stop(mut child: Child) -> Result<(), String> {
+    child.kill().and_then(|()| child.wait()).map(|_| ()).map_err(|error| error.to_string())
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    fn shell(script: &str) -> (Ending, Vec<String>) {
+        let mut command = Command::new("sh");
+        command.args(["-c", script]);
+        watch(command, Duration::from_millis(300)).unwrap()
+    }
+
+    #[test]
+    fn an_example_that_ends_is_judged_by_its_status() {
+        assert_eq!(shell("echo hello"), (Ending::Success, vec!["hello".to_owned()]));
+        assert_eq!(shell("exit 3").0, Ending::Failure);
+    }
+
+    #[test]
+    fn a_server_is_stopped_once_it_is_ready_and_anything_else_that_stays_is_too_late() {
+        assert_eq!(shell("echo ready here; exec sleep 30").0, Ending::Ready);
+        assert_eq!(shell("exec sleep 30").0, Ending::TooLate);
+    }
 }

@@ -5,12 +5,39 @@
 //! [`NodeEvent`]s: which entries a peer wrote, NMT changes, reset requests. The node never acts on the application;
 //! its owner polls events, reads and writes the dictionary, and carries out resets by calling [`Node::boot`] again.
 //! What differs between devices is data: [`NodeProfile`].
+//!
+//! ```
+//! use can::{Instant, Station};
+//! use canopen::od::{Access, DataType, Entry, Object, Table, keys};
+//! use canopen::{Node, NodeEvent, NodeId, NodeProfile};
+//!
+//! static ROWS: [Entry; 2] = [
+//!     Entry::new(0x1000, 0, DataType::Unsigned32, Access::Const, "device_type", "Device type").default(0x0002_0192),
+//!     Entry::new(0x6040, 0, DataType::Unsigned16, Access::ReadWrite, "controlword", "Controlword"),
+//! ];
+//! static KEYS: [u32; 2] = keys(&ROWS);
+//! static TABLE: Table = Table::new(&ROWS, &KEYS);
+//! static PROFILE: NodeProfile = NodeProfile::cia_301(&TABLE);
+//! const CONTROLWORD: Object<u16> = TABLE.object(0x6040, 0);
+//!
+//! let now = Instant::ZERO;
+//! let mut node: Node<2> = Node::new(&PROFILE, NodeId::new(4).unwrap());
+//! node.boot(now);
+//! assert_eq!(node.poll_transmit().unwrap().to_string(), "704#00");
+//!
+//! node.handle_frame(&"604#2B40600006000000".parse().unwrap(), now);
+//! assert_eq!(node.poll_transmit().unwrap().to_string(), "584#6040600000000000");
+//! assert_eq!(node.dictionary().get(CONTROLWORD), 6);
+//! assert!(matches!(node.poll_event(), Some(NodeEvent::Nmt(_))));
+//! assert!(matches!(node.poll_event(), Some(NodeEvent::Written { raw: 6, .. })));
+//! ```
 
 mod event;
 mod objects;
 mod pending;
 mod profile;
 mod receive;
+mod transmit;
 
 use can::{CanId, Frame, Instant, Station};
 use heapless::Deque;
@@ -20,12 +47,12 @@ pub use profile::NodeProfile;
 
 use crate::cob::PdoNumber;
 use crate::emcy::{self, Emcy, EmcyErrorCode};
-use crate::heartbeat::{self, Heartbeat};
+use crate::heartbeat;
 use crate::nmt::Transition;
 use crate::od::{Dictionary, Table};
 use crate::pdo::{Rpdo, Tpdo};
 use crate::sdo::Server;
-use crate::{CobId, Mux, NmtCommand, NmtState, NodeId, cob};
+use crate::{Mux, NmtCommand, NmtState, NodeId};
 use pending::{Pending, Source};
 use receive::Receivers;
 
@@ -211,7 +238,7 @@ impl<const N: usize> Node<N> {
         self.rpdos[number.position()].standard_id().map(CanId::standard)
     }
 
-    pub(crate) fn handle_nmt(&mut self, command: NmtCommand) {
+    fn handle_nmt(&mut self, command: NmtCommand) {
         match self.state.handle(command) {
             Transition::None => {}
             Transition::Enter(state) => self.enter(state),
@@ -254,28 +281,6 @@ impl<const N: usize> Node<N> {
         }
     }
 
-    fn offer_heartbeat(&mut self) {
-        if self.heartbeat.handle_timeout(self.now) {
-            self.pending.insert(Source::Heartbeat);
-        }
-    }
-
-    /// Offers a TPDO if it is due and not inhibited, and sees that it is looked at when it will be.
-    #[inline]
-    fn offer_tpdo(&mut self, position: usize) {
-        let tpdo = &self.tpdos[position];
-        self.pending.set(Source::Tpdo(position), tpdo.is_ready(self.now));
-        self.deadline = self.deadline.min(tpdo.deadline(self.now));
-    }
-
-    fn offer_emcy(&mut self) {
-        let may_send = self.state.allows_sdo() && self.emcy_id.is_some();
-        self.pending.set(Source::Emcy, may_send && self.emcy.is_ready(self.now));
-        if may_send {
-            self.deadline = self.deadline.min(self.emcy.deadline(self.now));
-        }
-    }
-
     /// When full, the oldest event is lost: the dictionary has the newest values.
     #[inline]
     fn push(&mut self, event: NodeEvent) {
@@ -283,53 +288,6 @@ impl<const N: usize> Node<N> {
             self.events.pop_front();
         }
         let _ = self.events.push_back(event);
-    }
-
-    /// Finds the earliest deadline of all services, and offers what has become ready.
-    fn reschedule(&mut self) {
-        self.deadline = self.heartbeat.deadline().min(self.sdo.deadline());
-        self.offer_emcy();
-        for position in 0..PdoNumber::COUNT {
-            self.offer_tpdo(position);
-        }
-    }
-
-    #[inline(never)]
-    fn take_most_urgent(&mut self) -> Option<Frame> {
-        let source = self.pending.iter().min_by_key(|source| self.pending_id(*source))?;
-        self.pending.remove(source);
-        self.take(source)
-    }
-
-    fn pending_id(&self, source: Source) -> u32 {
-        match source {
-            Source::BootUp => 0,
-            Source::Emcy => self.emcy_id.map_or(u32::MAX, CanId::raw),
-            Source::Tpdo(position) => self.tpdos[position].can_id().raw(),
-            Source::SdoReply => cob::sdo_reply(self.node_id).raw(),
-            Source::Heartbeat => cob::heartbeat(self.node_id).raw(),
-        }
-    }
-
-    fn take(&mut self, source: Source) -> Option<Frame> {
-        match source {
-            Source::BootUp => Some(Heartbeat::boot_up(self.node_id).emit()),
-            Source::Heartbeat => {
-                let state = self.heartbeat_state.unwrap_or(self.state.heartbeat_byte());
-                Some(Heartbeat { node: self.node_id, state }.emit())
-            }
-            Source::SdoReply => self.sdo.take_reply().map(|bytes| Frame::full(cob::sdo_reply(self.node_id), bytes)),
-            Source::Tpdo(position) => {
-                let frame = self.tpdos[position].take(&self.dictionary.view(), self.now);
-                self.deadline = self.deadline.min(self.tpdos[position].deadline(self.now));
-                frame
-            }
-            Source::Emcy => {
-                let emcy = self.emcy.take(self.now)?;
-                self.offer_emcy();
-                self.emcy_id.map(|id| emcy.emit(id))
-            }
-        }
     }
 }
 
@@ -376,54 +334,5 @@ impl<const N: usize> Station for Node<N> {
                 self.offer_tpdo(position);
             }
         }
-    }
-}
-
-impl<const N: usize> Node<N> {
-    #[inline(never)]
-    fn serve_deadlines(&mut self) {
-        self.offer_heartbeat();
-        self.sdo.handle_timeout(self.now);
-        if self.sdo.has_reply() {
-            self.pending.insert(Source::SdoReply);
-        }
-        for tpdo in &mut self.tpdos {
-            tpdo.handle_timeout(self.now);
-        }
-        self.reschedule();
-    }
-
-    fn take_up_objects(&mut self) {
-        self.receivers = Receivers::new(self.node_id);
-        self.take_up_sync();
-        self.take_up_emcy();
-        for position in 0..PdoNumber::COUNT {
-            self.take_up_rpdo(position);
-            self.take_up_tpdo(position);
-        }
-    }
-
-    fn heartbeat_period_ms(&self) -> u16 {
-        self.object(0x1017).unwrap_or(0) as u16
-    }
-
-    fn object(&self, index: u16) -> Option<u32> {
-        self.dictionary.table().find(Mux::new(index, 0)).ok().map(|slot| self.dictionary.raw(slot))
-    }
-
-    fn take_up_sync(&mut self) {
-        let cob_id = self.object(0x1005).map(CobId);
-        self.receivers.set_sync(cob_id.and_then(|cob_id| cob_id.can_id().as_standard()));
-    }
-
-    /// 1014h, or what it would be by default on a device without it.
-    fn emcy_cob_id(&self) -> CobId {
-        self.object(0x1014).map_or(CobId(cob::emcy(self.node_id).raw()), CobId)
-    }
-
-    fn take_up_emcy(&mut self) {
-        let cob_id = self.emcy_cob_id();
-        self.emcy_id = (self.profile.emcy && cob_id.is_valid()).then(|| cob_id.can_id());
-        self.emcy.set_inhibit_time(self.object(0x1015).unwrap_or(0) as u16);
     }
 }

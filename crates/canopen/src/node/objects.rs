@@ -1,6 +1,8 @@
 //! What a write to the communication objects (1000h to 1FFFh) must satisfy, and what it changes at once.
 
+use super::receive::Receivers;
 use super::{Node, NodeEvent, Via};
+use crate::cob::PdoNumber;
 use crate::heartbeat;
 use crate::od::{Slot, View};
 use crate::pdo::parameter::{COB_ID, INHIBIT_TIME, TRANSMISSION_TYPE};
@@ -8,7 +10,7 @@ use crate::pdo::{
     Direction, Mapping, MappingRecord, Parameter, RPDO_MAPPING, RPDO_PARAMETER, Rpdo, TPDO_MAPPING, TPDO_PARAMETER,
     Tpdo, TransmissionType,
 };
-use crate::{AbortCode, CobId, Mux};
+use crate::{AbortCode, CobId, Mux, cob};
 
 /// True for the communication profile area.
 pub(super) const fn is_communication(index: u16) -> bool {
@@ -126,7 +128,42 @@ impl<const N: usize> Node<N> {
         self.reschedule();
     }
 
-    pub(super) fn take_up_rpdo(&mut self, position: usize) {
+    /// All communication objects take effect.
+    pub(super) fn take_up_objects(&mut self) {
+        self.receivers = Receivers::new(self.node_id);
+        self.take_up_sync();
+        self.take_up_emcy();
+        for position in 0..PdoNumber::COUNT {
+            self.take_up_rpdo(position);
+            self.take_up_tpdo(position);
+        }
+    }
+
+    pub(super) fn heartbeat_period_ms(&self) -> u16 {
+        self.object(0x1017).unwrap_or(0) as u16
+    }
+
+    fn object(&self, index: u16) -> Option<u32> {
+        self.dictionary.table().find(Mux::new(index, 0)).ok().map(|slot| self.dictionary.raw(slot))
+    }
+
+    fn take_up_sync(&mut self) {
+        let cob_id = self.object(0x1005).map(CobId);
+        self.receivers.set_sync(cob_id.and_then(|cob_id| cob_id.can_id().as_standard()));
+    }
+
+    /// 1014h, or what it would be by default on a device without it.
+    fn emcy_cob_id(&self) -> CobId {
+        self.object(0x1014).map_or(CobId(cob::emcy(self.node_id).raw()), CobId)
+    }
+
+    fn take_up_emcy(&mut self) {
+        let cob_id = self.emcy_cob_id();
+        self.emcy_id = (self.profile.emcy && cob_id.is_valid()).then(|| cob_id.can_id());
+        self.emcy.set_inhibit_time(self.object(0x1015).unwrap_or(0) as u16);
+    }
+
+    fn take_up_rpdo(&mut self, position: usize) {
         let values = self.dictionary.view();
         let parameter = Parameter::read(&values, RPDO_PARAMETER + position as u16);
         let mapping = Mapping::read(&values, RPDO_MAPPING + position as u16, Direction::Receive);
@@ -136,7 +173,7 @@ impl<const N: usize> Node<N> {
         self.rpdos[position] = rpdo;
     }
 
-    pub(super) fn take_up_tpdo(&mut self, position: usize) {
+    fn take_up_tpdo(&mut self, position: usize) {
         let values = self.dictionary.view();
         let parameter = Parameter::read(&values, TPDO_PARAMETER + position as u16);
         let mapping = Mapping::read(&values, TPDO_MAPPING + position as u16, Direction::Transmit);

@@ -180,6 +180,15 @@ impl Entry {
         Mux::new(self.index, self.sub_index)
     }
 
+    /// The text of a VISIBLE_STRING; `None` for a number.
+    pub const fn constant_text(&self) -> Option<&'static str> {
+        match (self.data_type, self.default) {
+            (DataType::VisibleString, Default::Text(text)) => Some(text),
+            (DataType::VisibleString, _) => Some(""),
+            _ => None,
+        }
+    }
+
     /// What a value means, where the row lists meanings.
     pub fn meaning(&self, value: i64) -> Option<&'static str> {
         self.values.iter().find(|(listed, _)| *listed == value).map(|(_, text)| *text)

@@ -218,7 +218,7 @@ impl Tpdo {
         if is_held_back { self.timer_at.min(self.inhibited_until) } else { self.timer_at }
     }
 
-    /// The frame to offer at `now`.
+    /// The frame to offer at `now`. The inhibit time counts from here until the runner reports the transmission.
     #[inline]
     pub fn take(&mut self, values: &View<'_>, now: Instant) -> Option<Frame> {
         let mapping = self.mapping.as_ref()?;

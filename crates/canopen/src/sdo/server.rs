@@ -7,7 +7,7 @@
 use can::{Frame, Instant};
 
 use super::wire::{LENGTH, MAX_EXPEDITED, MAX_SEGMENT, Payload, Reply, Request, Segment};
-use crate::od::{Default, Slot, Table, View};
+use crate::od::{Slot, Table, View};
 use crate::{AbortCode, Mux};
 
 /// Which requests a server listens to, by their data length code.
@@ -146,7 +146,7 @@ impl Server {
         if !row.access.is_readable() {
             return self.refuse(mux, AbortCode::WRITE_ONLY);
         }
-        if let Default::Text(text) = row.default {
+        if let Some(text) = row.constant_text() {
             return self.initiate_text(mux, text.as_bytes(), now);
         }
         let length = row.data_type.size() as u8;

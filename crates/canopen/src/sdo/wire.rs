@@ -43,7 +43,7 @@ impl Segment {
 
     /// The data bytes.
     pub fn data(&self) -> &[u8] {
-        &self.bytes[..usize::from(self.length)]
+        &self.bytes[..usize::from(self.length).min(MAX_SEGMENT)]
     }
 
     fn parse(raw: &[u8; LENGTH]) -> Self {
@@ -53,7 +53,7 @@ impl Segment {
     }
 
     fn emit(self, specifier: u8) -> [u8; LENGTH] {
-        let unused = MAX_SEGMENT as u8 - self.length;
+        let unused = MAX_SEGMENT as u8 - self.data().len() as u8;
         let command = specifier << SPECIFIER_SHIFT | toggle_bit(self.toggle) | unused << 1 | u8::from(self.last);
         let [a, b, c, d, e, f, g] = self.bytes;
         [command, a, b, c, d, e, f, g]
@@ -102,7 +102,8 @@ impl Payload {
     fn emit(self, specifier: u8, mux: Mux) -> [u8; LENGTH] {
         let (flags, bytes) = match self {
             Self::Expedited { length: Some(length), bytes } => {
-                (EXPEDITED | SIZE_INDICATED | (MAX_EXPEDITED as u8 - length) << 2, bytes)
+                let unused = MAX_EXPEDITED as u8 - length.clamp(1, MAX_EXPEDITED as u8);
+                (EXPEDITED | SIZE_INDICATED | unused << 2, bytes)
             }
             Self::Expedited { length: None, bytes } => (EXPEDITED, bytes),
             Self::Segmented { size: Some(size) } => (SIZE_INDICATED, size.to_le_bytes()),
@@ -166,9 +167,9 @@ impl Request {
     /// How many bytes of the frame mean something: what the shortest tolerable frame has.
     pub fn used_length(&self) -> u8 {
         match self {
-            Self::InitiateDownload(_, Payload::Expedited { length, .. }) => 4 + length.unwrap_or(1),
+            Self::InitiateDownload(_, Payload::Expedited { length, .. }) => 4 + length.unwrap_or(1).min(4),
             Self::InitiateDownload(_, Payload::Segmented { size }) => 4 + if size.is_some() { 4 } else { 0 },
-            Self::DownloadSegment(segment) => 1 + segment.length,
+            Self::DownloadSegment(segment) => 1 + segment.data().len() as u8,
             Self::InitiateUpload(_) => 4,
             Self::UploadSegment { .. } | Self::Unknown { .. } => 1,
             Self::Abort(..) => 8,

@@ -1,5 +1,6 @@
 //! EMCY messages of a node.
 
+use can::Station;
 use canopen::{EmcyErrorCode, NodeProfile};
 
 use crate::bench::Bench;
@@ -51,6 +52,22 @@ fn no_message_while_stopped_but_afterwards() {
     bench.talk("> 000#0204");
     bench.raise(0x3210, 5);
     bench.talk("silence 100ms\n > 000#8004\n < 084#1032050102030405");
+}
+
+#[test]
+fn a_message_that_was_ready_is_held_back_by_stop_and_by_the_one_before_it() {
+    let mut bench = Bench::new(&STANDARD);
+    bench.talk("> 604#2B15100064000000\n < 584#6015100000000000");
+    let (node, now) = (&mut bench.node, bench.now);
+    node.raise_emcy(EmcyErrorCode(0x3210), 5, [0; 5], now);
+    node.raise_emcy(EmcyErrorCode(0x2310), 7, [0; 5], now);
+    node.handle_frame(&"000#0204".parse().unwrap(), now);
+    assert_eq!(node.poll_transmit(), None);
+    node.handle_frame(&"000#8004".parse().unwrap(), now);
+    assert_eq!(node.poll_transmit(), Some("084#1032050000000000".parse().unwrap()));
+    // The wire has not taken it yet.
+    assert_eq!(node.poll_transmit(), None);
+    assert_eq!(node.poll_timeout(), Some(can::Instant::from_millis(10)));
 }
 
 static WITHOUT_EMCY: NodeProfile = NodeProfile { emcy: false, ..NodeProfile::cia_301(&TABLE) };

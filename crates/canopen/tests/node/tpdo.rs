@@ -161,6 +161,24 @@ fn the_event_timer_does_not_beat_the_inhibit_time() {
 }
 
 #[test]
+fn a_late_runner_does_not_shift_the_event_timer() {
+    let mut bench = configured(&STANDARD, 254, 0, 20);
+    bench.talk("> 000#0104\n < 184#0000");
+    let node = &mut bench.node;
+    node.handle_timeout(Instant::from_millis(47));
+    assert_eq!(node.poll_transmit(), Some("184#0000".parse().unwrap()));
+    assert_eq!(node.poll_transmit(), None);
+    bench.now = Instant::from_millis(47);
+    bench.talk("60ms < 184#0000\n 80ms < 184#0000");
+}
+
+#[test]
+fn the_inhibit_time_is_not_for_synchronous_tpdos() {
+    let mut bench = configured(&STANDARD, 1, 1000, 0);
+    bench.talk("> 000#0104\n > 080#\n < 184#0000\n wait 1ms\n > 080#\n < 184#0000");
+}
+
+#[test]
 fn type_255_with_an_event_timer_is_sent_by_it_alone_where_the_manual_says_so() {
     // 100 counts of 0.5 ms.
     let mut bench = configured(&LOOSE, 255, 0, 100);

@@ -3,6 +3,8 @@
 //! A fault is a row of the drive's table. Its cause has to be present for the row's debounce time to be confirmed;
 //! once confirmed the fault stays latched until a reset finds the cause gone.
 
+use canopen::EmcyErrorCode;
+
 /// One fault of a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FaultRow {
@@ -15,7 +17,7 @@ pub struct FaultRow {
     /// Bits of the error register 1001h. Source: CiA 301, 7.5.2.2.
     pub error_register: u8,
     /// Error code of the EMCY message.
-    pub emcy: u16,
+    pub emcy: EmcyErrorCode,
     /// How many supervision periods the cause must last.
     pub debounce: u16,
 }
@@ -90,6 +92,12 @@ impl<const N: usize> FaultMonitor<N> {
     pub fn reset(&mut self) -> bool {
         self.latched = FaultSet(self.latched.0 & self.present.0);
         self.latched.is_empty()
+    }
+
+    /// The cause of one fault has been taken away; true if the fault was latched.
+    pub fn forget(&mut self, row: usize) -> bool {
+        self.present = FaultSet(self.present.0 & !FaultSet::row(row).0);
+        self.latched.has(row)
     }
 
     /// The latched faults.

@@ -6,7 +6,7 @@
 //! Values are checked against the table on the way in: an image can never put a value out of range into a dictionary.
 
 use canopen::Mux;
-use canopen::od::{Dictionary, Slot, Table};
+use canopen::od::{Dictionary, Entry, Slot, Table};
 
 /// Bytes of one bank.
 pub const BANK_SIZE: usize = 1024;
@@ -70,12 +70,16 @@ impl Store {
         self.active.is_some()
     }
 
-    /// Puts the stored values into a dictionary. Rows that are not stored, unknown keys and values that the table
-    /// refuses are passed over.
+    /// Puts the stored values of the rows that `wanted` names into a dictionary. Rows that are not stored, unknown keys
+    /// and values that the table refuses are passed over.
     ///
     /// # Errors
     /// [`Unreadable`]; the dictionary is as before.
-    pub fn load<const N: usize>(&self, dictionary: &mut Dictionary<N>) -> Result<(), Unreadable> {
+    pub fn load<const N: usize>(
+        &self,
+        dictionary: &mut Dictionary<N>,
+        wanted: fn(&Entry) -> bool,
+    ) -> Result<(), Unreadable> {
         let bank = self.active.ok_or(Unreadable)?;
         let bytes = &self.image[bank.number * BANK_SIZE..][..BANK_SIZE];
         for record in bytes[HEADER_SIZE..].chunks_exact(RECORD_SIZE).take(record_count(bytes)) {
@@ -83,7 +87,7 @@ impl Store {
             let table = dictionary.table();
             let Ok(slot) = table.find(Mux::from_key(key)) else { continue };
             let row = table.row(slot);
-            if row.stored && row.check_value(row.data_type.value(raw)).is_ok() {
+            if row.stored && wanted(row) && row.check_value(row.data_type.value(raw)).is_ok() {
                 dictionary.set_raw(slot, raw);
             }
         }
@@ -261,7 +265,7 @@ fn crc32(bytes: &[u8]) -> u32 {
 mod tests {
     use super::*;
     use canopen::NodeId;
-    use canopen::od::{Access, DataType, Entry, Object, keys};
+    use canopen::od::{Access, DataType, Object, keys};
 
     static ROWS: [Entry; 3] = [
         Entry::new(0x2000, 0, DataType::Unsigned16, Access::ReadWrite, "a", "").default(7).range(0, 100).stored(),
@@ -286,7 +290,7 @@ mod tests {
 
     fn values(image: ImageBytes) -> (u16, u16, i16) {
         let mut dictionary = defaults();
-        Store::new(image).load(&mut dictionary).unwrap();
+        Store::new(image).load(&mut dictionary, |_| true).unwrap();
         (dictionary.get(A), dictionary.get(B), dictionary.get(C))
     }
 
@@ -298,7 +302,7 @@ mod tests {
     #[test]
     fn a_blank_image_is_unreadable_until_it_is_formatted() {
         let mut store = Store::new([0xFF; IMAGE_SIZE]);
-        assert_eq!(store.load(&mut defaults()), Err(Unreadable));
+        assert_eq!(store.load(&mut defaults(), |_| true), Err(Unreadable));
         store.mark_all(&TABLE);
         store.commit(&defaults());
         assert!(!store.is_readable());

@@ -7,6 +7,8 @@
 //!
 //! EMCY messages carry the value of 603Fh as error code, as the manual of the sibling ZLIM42-C says (V1.03, 5.2).
 
+use canopen::EmcyErrorCode;
+
 use super::readings::{
     OVER_CURRENT_DEBOUNCE_PERIODS, SENSOR_DEBOUNCE_PERIODS, TEMPERATURE_DEBOUNCE_PERIODS, VOLTAGE_DEBOUNCE_PERIODS,
 };
@@ -78,7 +80,7 @@ pub static FAULTS: [FaultRow; FAULT_COUNT] = [
 ];
 
 const fn fault(code: u16, name: &'static str, error_register: u8, debounce: u16, remedy: &'static str) -> FaultRow {
-    FaultRow { code, name, remedy, error_register, emcy: code, debounce }
+    FaultRow { code, name, remedy, error_register, emcy: EmcyErrorCode(code), debounce }
 }
 
 /// What a code that a fault object of this model may show means; more than one bit may be set.

@@ -1,15 +1,26 @@
 //! The ZLAC8030L V2.0: a 30 A servo drive for hub motors with Hall sensors and incremental encoder.
 //!
 //! Source: "ZLAC8030L quick start guide V1.00" (2023-09-11). Where it contradicts itself or is silent, the choice is
-//! a named constant in [`readings`], or stands beside the row of [`objects`], with its reason.
+//! a named constant in [`readings`] or [`gains`], or stands beside the row of [`objects`], with its reason.
 
+mod drive;
 pub mod faults;
+pub mod gains;
 pub mod hardware;
 pub mod objects;
+mod parameters;
 mod profile;
+mod protection;
 pub mod readings;
+mod restart;
+pub mod statusword;
 mod storage;
+mod terminals;
 
+pub use drive::{NODE_PROFILE, Zlac8030l};
 pub use hardware::{Actuation, Hardware, PowerStage, Sensors};
 pub use profile::PROFILE;
 pub use storage::Image;
+
+/// The values of the drive's objects.
+pub type Values = canopen::od::Dictionary<{ objects::ROW_COUNT }>;

@@ -87,3 +87,30 @@ pub const STANDSTILL_RPM: f32 = 1.0;
 /// How long a digital input must hold a level: two supervision periods keep switching noise out and are far below what
 /// a person or a relay notices.
 pub const INPUT_DEBOUNCE_PERIODS: u8 = 2;
+
+/// Control period in seconds.
+pub const CONTROL_PERIOD_S: f32 = 50e-6;
+
+/// Longest span over which velocity is taken from counts: 2 to 4 ms, of which one control period is at most 2.5 %.
+pub const VELOCITY_WINDOW_S: f32 = 4e-3;
+
+/// Without a count for so long the velocity reads zero: 0.15 r/min with 4096 counts a turn.
+pub const VELOCITY_STANDSTILL_S: f32 = 0.1;
+
+/// Time constant of what 606Ch and 6077h show: a host's PDO sees the mean of its cycle, not one sample.
+pub const DISPLAY_FILTER_S: f32 = 5e-3;
+
+/// Supply voltage from which the firmware trusts its supply after power-on, and how long it waits: the
+/// capacitors charge through the source's resistance.
+pub const SUPPLY_SETTLING_PERIODS: u16 = 100;
+
+/// Times of the note below the object table, for once, twice and three times the rated current, with 2016h at its factory
+/// value; 2016h scales them.
+pub const OVERLOAD_TIMES_S: [(f32, f32); 3] = [(1.0, 20.0), (2.0, 6.0), (3.0, 4.0)];
+
+/// Factory value of 2016h, which [`OVERLOAD_TIMES_S`] belong to.
+pub const OVERLOAD_TIME_FACTORY: f32 = 300.0;
+
+/// Energy that the bleeder resistor bears beyond its rated power (202Eh:02), as a time of that power: ten seconds, of the
+/// order that makers of wire-wound resistors allow (ten times the power for a second or two).
+pub const BLEEDER_OVERLOAD_S: f32 = 10.0;

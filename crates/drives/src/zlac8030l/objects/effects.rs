@@ -5,6 +5,7 @@ use canopen::od::Slot;
 
 use super::{
     CLEAR_CURRENT_POSITION, CLEAR_FEEDBACK_POSITION, CONTROLWORD, MODES_OF_OPERATION, REGISTER_PARAMETER_SETTING,
+    TARGET_POSITION, TARGET_TORQUE, TARGET_VELOCITY,
 };
 
 /// The consequence of a write.
@@ -18,19 +19,23 @@ pub enum Effect {
     Registers,
     /// 2005h, 2006h: the position becomes zero.
     ClearPosition,
+    /// 607Ah, 60FFh, 6071h: read each period, or when a set-point is taken.
+    Target,
     /// Parameters: taken over by the next parameter refresh.
     Parameter,
 }
 
 /// What a write to `slot` does.
 pub fn effect(slot: Slot) -> Effect {
-    match slot {
-        slot if slot == CONTROLWORD.slot() => Effect::Command,
-        slot if slot == MODES_OF_OPERATION.slot() => Effect::SelectMode,
-        slot if slot == REGISTER_PARAMETER_SETTING.slot() => Effect::Registers,
-        slot if slot == CLEAR_FEEDBACK_POSITION.slot() || slot == CLEAR_CURRENT_POSITION.slot() => {
-            Effect::ClearPosition
-        }
-        _ => Effect::Parameter,
-    }
+    const EFFECTS: [(Slot, Effect); 8] = [
+        (CONTROLWORD.slot(), Effect::Command),
+        (TARGET_VELOCITY.slot(), Effect::Target),
+        (TARGET_POSITION.slot(), Effect::Target),
+        (TARGET_TORQUE.slot(), Effect::Target),
+        (MODES_OF_OPERATION.slot(), Effect::SelectMode),
+        (REGISTER_PARAMETER_SETTING.slot(), Effect::Registers),
+        (CLEAR_FEEDBACK_POSITION.slot(), Effect::ClearPosition),
+        (CLEAR_CURRENT_POSITION.slot(), Effect::ClearPosition),
+    ];
+    EFFECTS.iter().find(|(named, _)| *named == slot).map_or(Effect::Parameter, |(_, effect)| *effect)
 }

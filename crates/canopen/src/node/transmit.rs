@@ -1,0 +1,92 @@
+//! Frames from a node: which service has something to send, which of them is the most urgent, and when to look again.
+
+use can::{CanId, Frame};
+
+use super::Node;
+use super::pending::Source;
+use crate::cob::{self, PdoNumber};
+use crate::heartbeat::Heartbeat;
+
+impl<const N: usize> Node<N> {
+    #[inline(never)]
+    pub(super) fn serve_deadlines(&mut self) {
+        self.offer_heartbeat();
+        self.sdo.handle_timeout(self.now);
+        if self.sdo.has_reply() {
+            self.pending.insert(Source::SdoReply);
+        }
+        for tpdo in &mut self.tpdos {
+            tpdo.handle_timeout(self.now);
+        }
+        self.reschedule();
+    }
+
+    /// Finds the earliest deadline of all services, and offers what has become ready.
+    pub(super) fn reschedule(&mut self) {
+        self.deadline = self.heartbeat.deadline().min(self.sdo.deadline());
+        self.offer_emcy();
+        for position in 0..PdoNumber::COUNT {
+            self.offer_tpdo(position);
+        }
+    }
+
+    #[inline(never)]
+    pub(super) fn take_most_urgent(&mut self) -> Option<Frame> {
+        let source = self.pending.iter().min_by_key(|source| self.pending_id(*source))?;
+        self.pending.remove(source);
+        self.take(source)
+    }
+
+    fn pending_id(&self, source: Source) -> u32 {
+        match source {
+            Source::BootUp => 0,
+            Source::Emcy => self.emcy_id.map_or(u32::MAX, CanId::raw),
+            Source::Tpdo(position) => self.tpdos[position].can_id().raw(),
+            Source::SdoReply => cob::sdo_reply(self.node_id).raw(),
+            Source::Heartbeat => cob::heartbeat(self.node_id).raw(),
+        }
+    }
+
+    fn take(&mut self, source: Source) -> Option<Frame> {
+        match source {
+            Source::BootUp => Some(Heartbeat::boot_up(self.node_id).emit()),
+            Source::Heartbeat => {
+                let state = self.heartbeat_state.unwrap_or(self.state.heartbeat_byte());
+                Some(Heartbeat { node: self.node_id, state }.emit())
+            }
+            Source::SdoReply => self.sdo.take_reply().map(|bytes| Frame::full(cob::sdo_reply(self.node_id), bytes)),
+            Source::Tpdo(position) => {
+                let frame = self.tpdos[position].take(&self.dictionary.view(), self.now);
+                self.deadline = self.deadline.min(self.tpdos[position].deadline(self.now));
+                frame
+            }
+            Source::Emcy => {
+                let emcy = self.emcy.take(self.now)?;
+                self.offer_emcy();
+                self.emcy_id.map(|id| emcy.emit(id))
+            }
+        }
+    }
+
+    pub(super) fn offer_heartbeat(&mut self) {
+        if self.heartbeat.handle_timeout(self.now) {
+            self.pending.insert(Source::Heartbeat);
+        }
+    }
+
+    /// Offers a TPDO if it is due and not inhibited, and sees that it is looked at when it will be.
+    #[inline]
+    pub(super) fn offer_tpdo(&mut self, position: usize) {
+        let tpdo = &self.tpdos[position];
+        self.pending.set(Source::Tpdo(position), tpdo.is_ready(self.now));
+        self.deadline = self.deadline.min(tpdo.deadline(self.now));
+    }
+
+    pub(super) fn offer_emcy(&mut self) {
+        let may_send = self.state.allows_sdo() && self.emcy_id.is_some();
+        self.pending.set(Source::Emcy, may_send && self.emcy.is_ready(self.now));
+        if may_send {
+            self.deadline = self.deadline.min(self.emcy.deadline(self.now));
+        }
+    }
+}

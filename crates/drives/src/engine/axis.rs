@@ -1,0 +1,540 @@
+//! One axis: who may move, and where to. Joins the power state machine, the modes and everything that stops a motor.
+//!
+//! In go controlwords, targets and what the shaft does; out comes a [`Demand`] for the control loops each period.
+//! While something asks for a stop ([`StopCause`]), the shaft is ramped down and then held; the mode goes on when
+//! nothing does any more. Nothing here knows objects, units or statusword bits.
+
+use cia402::{Controlword, HaltOption, ModeOfOperation, PowerState, QuickStopOption, Transition};
+
+use super::modes::{ProfilePosition, ProfileTorque, ProfileVelocity, SetPoint, VelocityRamps};
+use super::power::{PowerMachine, StepDownOptions};
+use super::trajectory::{MoveLimits, Trajectory, TrajectoryPoint};
+
+/// What the control loops are to do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Demand {
+    /// Nothing: the power stage is off.
+    Off,
+    /// Be at a position.
+    Position(TrajectoryPoint),
+    /// Turn at a velocity.
+    Velocity(TrajectoryPoint),
+    /// Pull with a current, A.
+    Torque(f32),
+}
+
+/// What the shaft does, in counts and counts/s.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Feedback {
+    /// Actual position.
+    pub position: i32,
+    /// Actual velocity.
+    pub velocity: f64,
+    /// Torque-producing current, A.
+    pub current_a: f32,
+    /// Slower than the drive's threshold of standstill.
+    pub standing: bool,
+}
+
+/// What the host wants of the modes that follow a target at all times.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Targets {
+    /// Counts/s.
+    pub velocity: f64,
+    /// A.
+    pub current_a: f32,
+}
+
+/// How the axis is set.
+#[derive(Clone, Copy, Debug)]
+pub struct AxisParameters {
+    /// Speeds and times of position moves.
+    pub moves: MoveLimits,
+    /// Speeds and times of velocity changes.
+    pub velocity: VelocityRamps,
+    /// Time of a quick stop, s.
+    pub quick_stop_time_s: f64,
+    /// Slope of the torque, A/s; 0 for none.
+    pub torque_slope_a_s: f32,
+    /// 605Ah; also of the external stop and of the watch over the host.
+    pub quick_stop: QuickStopOption,
+    /// 605Bh and 605Ch.
+    pub step_down: StepDownOptions,
+    /// 605Dh.
+    pub halt: HaltOption,
+    /// The shaft is held while the axis is not enabled.
+    pub lock_when_disabled: bool,
+    /// An external stop ends with the power stage off.
+    pub release_after_external_stop: bool,
+    /// Tolerances of the status.
+    pub tolerances: Tolerances,
+}
+
+/// When a target counts as reached.
+#[derive(Clone, Copy, Debug)]
+pub struct Tolerances {
+    /// Counts.
+    pub position: u32,
+    /// Counts/s.
+    pub velocity: f64,
+    /// A.
+    pub current_a: f32,
+}
+
+/// What may stop the motor while the axis is enabled; the first that applies decides on the ramp.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StopCause {
+    /// Quick stop active.
+    QuickStop,
+    /// A digital input.
+    External,
+    /// Shutdown or disable operation with a ramp.
+    StepDown,
+    /// The host is silent.
+    HostLost,
+    /// Bit 8 of the controlword.
+    Halt,
+}
+
+/// How fast to stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StopRamp {
+    /// With the deceleration of the profiles.
+    SlowDown,
+    /// With the quick stop's deceleration.
+    QuickStop,
+    /// As fast as the current limit allows.
+    CurrentLimit,
+}
+
+/// What the statusword has to tell.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AxisStatus {
+    /// The mode's target is reached; while stopping: the motor stands.
+    pub target_reached: bool,
+    /// Set-point acknowledge.
+    pub acknowledged: bool,
+    /// The deviation of position is within its tolerance.
+    pub in_position: bool,
+    /// The motor stands.
+    pub standing: bool,
+    /// The motor turns, or is to.
+    pub running: bool,
+    /// The external stop acts.
+    pub external_stop: bool,
+}
+
+/// The axis.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    power: PowerMachine,
+    mode: ModeOfOperation,
+    requested_mode: ModeOfOperation,
+    trajectory: Trajectory,
+    position: ProfilePosition,
+    velocity: ProfileVelocity,
+    torque: ProfileTorque,
+    stop: Option<Stop>,
+    engaged: Engaged,
+    external_stop: bool,
+    host_lost: bool,
+    feedback: Feedback,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Stop {
+    cause: StopCause,
+    ramp: StopRamp,
+    /// How long the ramp has been over, s.
+    over_for_s: f64,
+    /// The shaft is held where it came to rest.
+    held: bool,
+}
+
+/// What the trajectory stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Engaged {
+    No,
+    /// Held without being enabled.
+    Locked,
+    Yes,
+}
+
+/// A stop is over when the motor stands, or this long after its ramp: a load that drives the motor may never let it.
+const STANDSTILL_PATIENCE_S: f64 = 1.0;
+
+impl Axis {
+    /// Not ready to switch on, without a mode.
+    pub fn new(extra: &'static [Transition]) -> Self {
+        Self {
+            power: PowerMachine::new(extra),
+            mode: ModeOfOperation::NONE,
+            requested_mode: ModeOfOperation::NONE,
+            trajectory: Trajectory::resting(0),
+            position: ProfilePosition::resting(0),
+            velocity: ProfileVelocity::default(),
+            torque: ProfileTorque::default(),
+            stop: None,
+            engaged: Engaged::No,
+            external_stop: false,
+            host_lost: false,
+            feedback: Feedback { standing: true, ..Feedback::default() },
+        }
+    }
+
+    /// State of the power drive state machine.
+    pub const fn state(&self) -> PowerState {
+        self.power.state()
+    }
+
+    /// The mode in effect.
+    pub const fn mode(&self) -> ModeOfOperation {
+        self.mode
+    }
+
+    /// What the motor is being stopped for.
+    pub fn stop_cause(&self) -> Option<StopCause> {
+        self.stop.map(|stop| stop.cause)
+    }
+
+    /// Demanded current of profile torque, A.
+    pub const fn torque_demand_a(&self) -> f32 {
+        self.torque.demand_a()
+    }
+
+    /// Operation enabled or quick stop active: the motor is under control.
+    pub const fn is_live(&self) -> bool {
+        matches!(self.power.state(), PowerState::OperationEnabled | PowerState::QuickStopActive)
+    }
+
+    /// Self-test has ended well.
+    pub fn self_test_done(&mut self) {
+        self.power.self_test_done();
+    }
+
+    /// Takes a controlword; `target` is the target position that a rising bit 4 takes. True if a fault reset is asked
+    /// for.
+    pub fn command(&mut self, controlword: Controlword, target: i32, parameters: &AxisParameters) -> bool {
+        let before = self.power.controlword();
+        let wants_reset = self.power.command(controlword, parameters.step_down);
+        if self.is_live() && self.engaged != Engaged::Yes {
+            self.engage();
+        }
+        if self.power.is_stepping_down() && self.is_at_rest() {
+            self.power.ramp_done();
+        }
+        if controlword.rises(before, Controlword::NEW_SET_POINT) && self.takes_set_points() {
+            let set_point = SetPoint {
+                target,
+                relative: controlword.has(Controlword::RELATIVE),
+                immediately: controlword.has(Controlword::CHANGE_SET_IMMEDIATELY),
+            };
+            self.position.take(set_point, &mut self.trajectory, &parameters.moves);
+        }
+        self.position.release(controlword.has(Controlword::NEW_SET_POINT));
+        wants_reset
+    }
+
+    /// Asks for a mode: it takes effect at standstill.
+    pub fn request_mode(&mut self, mode: ModeOfOperation) {
+        self.requested_mode = mode;
+        self.adopt_mode();
+    }
+
+    /// Whether the external stop input is active.
+    pub fn set_external_stop(&mut self, active: bool) {
+        self.external_stop = active;
+    }
+
+    /// The host is silent: stops the motor once.
+    pub fn lose_host(&mut self) {
+        self.host_lost = self.power.state() == PowerState::OperationEnabled;
+    }
+
+    /// A fault: off at once.
+    pub fn fault(&mut self) {
+        self.power.fault();
+        self.disengage();
+    }
+
+    /// The cause of the fault is gone.
+    pub fn reset_fault(&mut self) {
+        self.power.reset_fault();
+    }
+
+    /// The zero of position moves: what was `by` is 0 from now on.
+    pub fn shift_position(&mut self, by: i32) {
+        self.trajectory.shift(by);
+        self.position.shift(by);
+        self.feedback.position = self.feedback.position.wrapping_sub(by);
+    }
+
+    /// One period.
+    pub fn update(&mut self, feedback: Feedback, targets: &Targets, parameters: &AxisParameters, dt_s: f64) -> Demand {
+        self.feedback = feedback;
+        self.adopt_mode();
+        if !self.is_live() {
+            return self.idle(parameters.lock_when_disabled);
+        }
+        if self.engaged != Engaged::Yes {
+            self.engage();
+        }
+        self.choose_stop(parameters);
+        match self.stop {
+            Some(stop) => self.stopping(stop, parameters, dt_s),
+            None => self.following(targets, parameters, dt_s),
+        }
+    }
+
+    /// What the statusword has to tell.
+    pub fn status(&self, targets: &Targets, parameters: &AxisParameters) -> AxisStatus {
+        let standing = self.feedback.standing;
+        AxisStatus {
+            target_reached: self.target_reached(targets, parameters),
+            acknowledged: self.position.is_acknowledged(),
+            in_position: self.is_in_position(&parameters.tolerances),
+            standing,
+            running: !standing || (self.engaged == Engaged::Yes && self.trajectory.point().velocity != 0.0),
+            external_stop: self.external_stop,
+        }
+    }
+
+    fn takes_set_points(&self) -> bool {
+        let stopped = self.stop.is_some_and(|stop| stop.cause != StopCause::Halt);
+        self.power.state() == PowerState::OperationEnabled
+            && self.mode == ModeOfOperation::PROFILE_POSITION
+            && !stopped
+            && !self.external_stop
+            && !self.power.is_stepping_down()
+    }
+
+    fn is_at_rest(&self) -> bool {
+        let no_way_to_go = self.trajectory.is_resting() || self.mode == ModeOfOperation::PROFILE_TORQUE;
+        self.feedback.standing && no_way_to_go
+    }
+
+    fn adopt_mode(&mut self) {
+        if self.requested_mode == self.mode || (self.engaged == Engaged::Yes && !self.is_at_rest()) {
+            return;
+        }
+        self.mode = self.requested_mode;
+        if self.engaged == Engaged::Yes && self.stop.is_none() {
+            self.engage();
+        } else {
+            self.position.abort(self.feedback.position);
+        }
+    }
+
+    /// Takes the shaft over as it turns.
+    fn engage(&mut self) {
+        let Feedback { position, velocity, standing, .. } = self.feedback;
+        self.trajectory = if standing {
+            Trajectory::resting(position)
+        } else {
+            Trajectory::change_velocity(TrajectoryPoint::moving(position, velocity), velocity, 0.0)
+        };
+        self.position.abort(position);
+        self.velocity.restart();
+        self.torque.restart();
+        self.stop = None;
+        self.engaged = Engaged::Yes;
+    }
+
+    fn disengage(&mut self) {
+        self.engage();
+        self.host_lost = false;
+        self.engaged = Engaged::No;
+    }
+
+    fn idle(&mut self, lock: bool) -> Demand {
+        let lockable = !matches!(
+            self.power.state(),
+            PowerState::NotReadyToSwitchOn | PowerState::FaultReactionActive | PowerState::Fault
+        );
+        if !(lock && lockable) {
+            self.disengage();
+            return Demand::Off;
+        }
+        if self.engaged != Engaged::Locked {
+            self.disengage();
+            self.trajectory = Trajectory::resting(self.feedback.position);
+            self.engaged = Engaged::Locked;
+        }
+        Demand::Position(self.trajectory.point())
+    }
+
+    fn choose_stop(&mut self, parameters: &AxisParameters) {
+        let wanted = self.wanted_stop(parameters);
+        let present = self.stop.map(|stop| (stop.cause, stop.ramp));
+        if wanted == present {
+            return;
+        }
+        match (wanted, self.stop) {
+            (Some((cause, ramp)), Some(stop)) if stop.ramp == ramp || stop.held => {
+                self.stop = Some(Stop { cause, ramp, ..stop });
+            }
+            (Some((cause, ramp)), _) => self.begin_stop(cause, ramp, parameters),
+            (None, _) => self.resume(parameters),
+        }
+        if wanted.is_some_and(|(cause, _)| cause != StopCause::Halt) {
+            self.position.abort(self.trajectory.point().position);
+        }
+    }
+
+    fn wanted_stop(&self, parameters: &AxisParameters) -> Option<(StopCause, StopRamp)> {
+        let quick = StopRamp::of_quick_stop(parameters.quick_stop);
+        if self.power.state() == PowerState::QuickStopActive {
+            Some((StopCause::QuickStop, quick))
+        } else if self.external_stop {
+            Some((StopCause::External, quick))
+        } else if self.power.is_stepping_down() {
+            Some((StopCause::StepDown, StopRamp::SlowDown))
+        } else if self.host_lost {
+            Some((StopCause::HostLost, quick))
+        } else if self.power.controlword().has(Controlword::HALT) {
+            Some((StopCause::Halt, StopRamp::of_halt(parameters.halt)))
+        } else {
+            None
+        }
+    }
+
+    fn begin_stop(&mut self, cause: StopCause, ramp: StopRamp, parameters: &AxisParameters) {
+        let from = match self.mode {
+            ModeOfOperation::PROFILE_TORQUE if self.stop.is_none() => {
+                TrajectoryPoint::moving(self.feedback.position, self.feedback.velocity)
+            }
+            _ => self.trajectory.point(),
+        };
+        let time_s = match ramp {
+            StopRamp::SlowDown => parameters.moves.deceleration_time_s,
+            StopRamp::QuickStop => parameters.quick_stop_time_s,
+            StopRamp::CurrentLimit => 0.0,
+        };
+        // Already at rest: there is no way to take any time.
+        let time_s = if from.velocity == 0.0 { 0.0 } else { time_s };
+        self.trajectory = Trajectory::change_velocity(from, 0.0, time_s);
+        self.stop = Some(Stop { cause, ramp, over_for_s: 0.0, held: false });
+    }
+
+    /// Nothing asks for a stop any more.
+    fn resume(&mut self, parameters: &AxisParameters) {
+        let released = self.stop.is_some_and(|stop| stop.is_released(parameters));
+        if released {
+            self.engage();
+        }
+        self.stop = None;
+        self.velocity.restart();
+        self.torque.restart();
+        self.position.resume(&mut self.trajectory, &parameters.moves);
+    }
+
+    fn stopping(&mut self, mut stop: Stop, parameters: &AxisParameters, dt_s: f64) -> Demand {
+        let point = self.trajectory.advance(dt_s);
+        let follows_position = self.mode == ModeOfOperation::PROFILE_POSITION && stop.ramp == StopRamp::SlowDown;
+        if self.trajectory.is_resting() && !stop.held {
+            stop.over_for_s += dt_s;
+            if self.feedback.standing || stop.over_for_s > STANDSTILL_PATIENCE_S {
+                stop.held = true;
+                if !follows_position {
+                    self.trajectory = Trajectory::resting(self.feedback.position);
+                }
+                self.position.rebase(self.trajectory.point().position);
+                self.host_lost = false;
+                self.power.ramp_done();
+            }
+        }
+        self.stop = Some(stop);
+        match stop {
+            _ if !self.is_live() => self.idle(parameters.lock_when_disabled),
+            _ if stop.is_released(parameters) => Demand::Off,
+            _ if stop.held => Demand::Position(self.trajectory.point()),
+            _ if follows_position => Demand::Position(point),
+            _ => Demand::Velocity(point),
+        }
+    }
+
+    fn following(&mut self, targets: &Targets, parameters: &AxisParameters, dt_s: f64) -> Demand {
+        match self.mode {
+            ModeOfOperation::PROFILE_POSITION => {
+                self.slow_down_if_adrift(parameters);
+                self.trajectory.advance(dt_s);
+                let new_set_point = self.power.controlword().has(Controlword::NEW_SET_POINT);
+                self.position.update(new_set_point, &mut self.trajectory, &parameters.moves);
+                Demand::Position(self.trajectory.point())
+            }
+            ModeOfOperation::PROFILE_VELOCITY => {
+                self.velocity.update(targets.velocity, &mut self.trajectory, &parameters.velocity);
+                Demand::Velocity(self.trajectory.advance(dt_s))
+            }
+            ModeOfOperation::PROFILE_TORQUE => {
+                self.trajectory = Trajectory::resting(self.feedback.position);
+                Demand::Torque(self.torque.update(targets.current_a, parameters.torque_slope_a_s, dt_s as f32))
+            }
+            _ => {
+                self.slow_down_if_adrift(parameters);
+                Demand::Velocity(self.trajectory.advance(dt_s))
+            }
+        }
+    }
+
+    /// Enabled on a turning shaft, with nothing that asks for it: bring it to rest.
+    fn slow_down_if_adrift(&mut self, parameters: &AxisParameters) {
+        if self.trajectory.is_done() && !self.trajectory.is_resting() {
+            let time_s = parameters.moves.deceleration_time_s;
+            self.trajectory = Trajectory::change_velocity(self.trajectory.point(), 0.0, time_s);
+        }
+    }
+
+    fn target_reached(&self, targets: &Targets, parameters: &AxisParameters) -> bool {
+        let Tolerances { velocity, current_a, .. } = parameters.tolerances;
+        if self.engaged != Engaged::Yes || self.stop.is_some() {
+            return self.feedback.standing;
+        }
+        match self.mode {
+            ModeOfOperation::PROFILE_POSITION => {
+                !self.position.is_under_way() && self.is_in_position(&parameters.tolerances)
+            }
+            ModeOfOperation::PROFILE_VELOCITY => {
+                let limit = parameters.velocity.max_speed;
+                (self.feedback.velocity - targets.velocity.clamp(-limit, limit)).abs() <= velocity
+            }
+            ModeOfOperation::PROFILE_TORQUE => {
+                self.torque.demand_a() == targets.current_a
+                    && (self.feedback.current_a - targets.current_a).abs() <= current_a
+            }
+            _ => self.feedback.standing,
+        }
+    }
+
+    fn is_in_position(&self, tolerances: &Tolerances) -> bool {
+        let follows = self.mode == ModeOfOperation::PROFILE_POSITION && self.engaged != Engaged::No;
+        let deviation = self.trajectory.point().position.wrapping_sub(self.feedback.position);
+        !follows || deviation.unsigned_abs() <= tolerances.position
+    }
+}
+
+impl Stop {
+    fn is_released(&self, parameters: &AxisParameters) -> bool {
+        self.held && self.cause == StopCause::External && parameters.release_after_external_stop
+    }
+}
+
+impl StopRamp {
+    /// The ramp of 605Ah.
+    pub const fn of_quick_stop(option: QuickStopOption) -> Self {
+        match option {
+            QuickStopOption::SLOW_DOWN | QuickStopOption::SLOW_DOWN_AND_STAY => Self::SlowDown,
+            QuickStopOption::QUICK_STOP | QuickStopOption::QUICK_STOP_AND_STAY => Self::QuickStop,
+            _ => Self::CurrentLimit,
+        }
+    }
+
+    /// The ramp of 605Dh.
+    pub const fn of_halt(option: HaltOption) -> Self {
+        match option {
+            HaltOption::SLOW_DOWN => Self::SlowDown,
+            HaltOption::QUICK_STOP => Self::QuickStop,
+            _ => Self::CurrentLimit,
+        }
+    }
+}

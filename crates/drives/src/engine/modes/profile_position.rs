@@ -1,0 +1,202 @@
+//! Profile position (CiA 402-2, clause 10): set-points with a queue of one, and the handshake of bits 4, 5, 6 and 12.
+
+use crate::engine::trajectory::{MoveLimits, Trajectory};
+
+/// A set-point as the controlword hands it over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SetPoint {
+    /// Target position, or the way to go.
+    pub target: i32,
+    /// `target` is relative to the preceding target (CiA 402-2, 60F2h = 0: its default).
+    pub relative: bool,
+    /// Replaces what is under way; otherwise it waits for its end.
+    pub immediately: bool,
+}
+
+/// The set-point under way, the one that waits, and the acknowledge bit.
+#[derive(Clone, Copy, Debug)]
+pub struct ProfilePosition {
+    /// The present or last target: relative moves count from here.
+    target: i32,
+    under_way: bool,
+    waiting: Option<SetPoint>,
+    acknowledged: bool,
+}
+
+impl ProfilePosition {
+    /// Nothing under way; `position` stands for the preceding target.
+    pub const fn resting(position: i32) -> Self {
+        Self { target: position, under_way: false, waiting: None, acknowledged: false }
+    }
+
+    /// Bit 4 rose. Starts the set-point, or puts it into the queue; a set-point that finds the queue full is lost, and
+    /// the acknowledge bit shows it by not falling before.
+    pub fn take(&mut self, set_point: SetPoint, trajectory: &mut Trajectory, limits: &MoveLimits) {
+        if !self.under_way || set_point.immediately {
+            self.waiting = None;
+            self.start(set_point, trajectory, limits);
+        } else if self.waiting.is_none() {
+            self.waiting = Some(set_point);
+        } else {
+            return;
+        }
+        self.acknowledged = true;
+    }
+
+    /// One period, after the trajectory has moved on: a set-point that waits follows one that has ended, and the
+    /// acknowledge bit falls once bit 4 (`new_set_point`) is down and the queue has room.
+    pub fn update(&mut self, new_set_point: bool, trajectory: &mut Trajectory, limits: &MoveLimits) {
+        if self.under_way && trajectory.is_resting() {
+            self.under_way = false;
+            if let Some(next) = self.waiting.take() {
+                self.start(next, trajectory, limits);
+            }
+        }
+        self.release(new_set_point);
+    }
+
+    /// The acknowledge bit falls when bit 4 is down and the queue has room.
+    pub fn release(&mut self, new_set_point: bool) {
+        if !new_set_point && self.waiting.is_none() {
+            self.acknowledged = false;
+        }
+    }
+
+    /// After a halt: goes on to the target from where the shaft is.
+    pub fn resume(&mut self, trajectory: &mut Trajectory, limits: &MoveLimits) {
+        if self.under_way {
+            *trajectory = Trajectory::move_to(trajectory.point(), self.target, limits);
+        }
+    }
+
+    /// The shaft stands elsewhere than the target: relative moves count from here, unless a move is to go on.
+    pub fn rebase(&mut self, position: i32) {
+        if !self.under_way {
+            self.target = position;
+        }
+    }
+
+    /// Drops all set-points.
+    pub fn abort(&mut self, position: i32) {
+        *self = Self::resting(position);
+    }
+
+    /// The zero of position moves: what was `by` is 0 from now on.
+    pub fn shift(&mut self, by: i32) {
+        self.target = self.target.wrapping_sub(by);
+        if let Some(waiting) = self.waiting.as_mut().filter(|waiting| !waiting.relative) {
+            waiting.target = waiting.target.wrapping_sub(by);
+        }
+    }
+
+    /// Bit 12.
+    pub const fn is_acknowledged(&self) -> bool {
+        self.acknowledged
+    }
+
+    /// A move is under way or waits.
+    pub const fn is_under_way(&self) -> bool {
+        self.under_way
+    }
+
+    fn start(&mut self, set_point: SetPoint, trajectory: &mut Trajectory, limits: &MoveLimits) {
+        self.target = if set_point.relative { self.target.wrapping_add(set_point.target) } else { set_point.target };
+        self.under_way = true;
+        *trajectory = Trajectory::move_to(trajectory.point(), self.target, limits);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: MoveLimits = MoveLimits {
+        start_speed: 0.0,
+        max_speed: 1000.0,
+        end_speed: 0.0,
+        acceleration_time_s: 0.1,
+        deceleration_time_s: 0.1,
+    };
+
+    struct Bench {
+        mode: ProfilePosition,
+        trajectory: Trajectory,
+    }
+
+    impl Bench {
+        fn new() -> Self {
+            Self { mode: ProfilePosition::resting(0), trajectory: Trajectory::resting(0) }
+        }
+
+        fn take(&mut self, target: i32, relative: bool, immediately: bool) {
+            self.mode.take(SetPoint { target, relative, immediately }, &mut self.trajectory, &LIMITS);
+        }
+
+        fn run(&mut self, periods: u32, bit_4: bool) -> i32 {
+            for _ in 0..periods {
+                self.trajectory.advance(1e-3);
+                self.mode.update(bit_4, &mut self.trajectory, &LIMITS);
+            }
+            self.trajectory.point().position
+        }
+    }
+
+    #[test]
+    fn a_set_point_is_acknowledged_until_bit_4_falls() {
+        let mut bench = Bench::new();
+        bench.take(1000, false, false);
+        bench.run(10, true);
+        assert!(bench.mode.is_acknowledged());
+        bench.run(1, false);
+        assert!(!bench.mode.is_acknowledged());
+        assert_eq!(bench.run(5000, false), 1000);
+    }
+
+    #[test]
+    fn a_second_set_point_waits_and_a_third_is_lost() {
+        let mut bench = Bench::new();
+        bench.take(1000, false, false);
+        bench.take(2000, false, false);
+        bench.run(1, false);
+        assert!(bench.mode.is_acknowledged(), "the queue is full");
+        bench.take(3000, false, false);
+        let mut stopped_at_first = false;
+        for _ in 0..10_000 {
+            stopped_at_first |= bench.run(1, false) == 1000 && bench.trajectory.point().velocity == 0.0;
+        }
+        assert!(stopped_at_first && !bench.mode.is_acknowledged());
+        assert_eq!(bench.trajectory.point().position, 2000);
+    }
+
+    #[test]
+    fn an_immediate_set_point_replaces_the_move_and_the_queue() {
+        let mut bench = Bench::new();
+        bench.take(5000, false, false);
+        bench.take(6000, false, false);
+        bench.run(500, true);
+        bench.take(-200, false, true);
+        assert_eq!(bench.run(10_000, false), -200);
+    }
+
+    #[test]
+    fn relative_set_points_count_from_the_preceding_target() {
+        let mut bench = Bench::new();
+        bench.take(1000, true, false);
+        bench.run(300, true);
+        bench.take(1000, true, true);
+        assert_eq!(bench.run(10_000, false), 2000);
+        bench.take(-500, true, false);
+        assert_eq!(bench.run(10_000, false), 1500);
+    }
+
+    #[test]
+    fn clearing_the_position_moves_the_numbers_and_not_the_shaft() {
+        let mut bench = Bench::new();
+        bench.take(1000, false, false);
+        bench.run(500, true);
+        let here = bench.trajectory.point().position;
+        bench.trajectory.shift(here);
+        bench.mode.shift(here);
+        assert_eq!(bench.run(10_000, false), 1000 - here);
+    }
+}

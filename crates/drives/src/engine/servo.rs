@@ -1,0 +1,247 @@
+//! Control of a synchronous motor with encoder and Hall sensors: position, velocity and current loop.
+//!
+//! [`sense`](Servo::sense) and [`modulate`](Servo::modulate) run every control period, [`measure`](Servo::measure) and
+//! [`control`](Servo::control) every supervision period. Counts and counts/s come in, duty cycles go out; inside it
+//! is radians of the shaft and amperes. All signs are the user's: [`ServoModel::direction`] turns them into the motor's.
+
+use motion::angle::sin_cos_turns;
+use motion::cascade::{Cascade, CascadeGains, PositionDemand, VelocityDemand};
+use motion::commutation::{Commutation, CommutationModel};
+use motion::filter::{LowPass, LowPassGains};
+use motion::foc::{Dq, Foc, FocGains, FocInput, clarke, park};
+use motion::limits::symmetric;
+use motion::observer::{Observer, ObserverGains};
+
+use super::axis::Demand;
+use super::tracking::{Tracking, TrackingGains};
+
+const TAU: f32 = core::f32::consts::TAU;
+
+/// What the drive has been told about motor and sensors, and the two periods.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ServoModel {
+    /// Encoder, pole pairs, Hall sensors.
+    pub commutation: CommutationModel,
+    /// 1 when the user's positive sense of rotation is the motor's, -1 when it is the other.
+    pub direction: i8,
+    /// How velocity is taken from counts.
+    pub observer: ObserverGains,
+    /// Control period, s.
+    pub control_period_s: f32,
+    /// Supervision period, s.
+    pub supervision_period_s: f32,
+}
+
+/// How the loops are set.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ServoGains {
+    /// Current loop.
+    pub foc: FocGains,
+    /// Position and velocity loop.
+    pub cascade: CascadeGains,
+    /// Of the measured velocity.
+    pub velocity_filter: LowPassGains,
+    /// Of the planned acceleration that is fed forward.
+    pub feed_forward_filter: LowPassGains,
+    /// Of the current set-point.
+    pub torque_filter: LowPassGains,
+    /// A tracking observer and its share in the velocity, 0 to 1.
+    pub tracking: TrackingGains,
+    /// See `tracking`.
+    pub tracking_share: f32,
+}
+
+/// What the loops keep to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ServoLimits {
+    /// Largest current set-point, A.
+    pub current_a: f32,
+    /// Largest velocity in torque control, rad/s.
+    pub velocity_rad_s: f32,
+}
+
+/// State of the loops.
+#[derive(Clone, Debug)]
+pub struct Servo {
+    commutation: Commutation,
+    observer: Observer,
+    tracking: Tracking,
+    foc: Foc,
+    cascade: Cascade,
+    velocity_filter: LowPass,
+    feed_forward_filter: LowPass,
+    torque_filter: LowPass,
+    electrical_turns: f32,
+    velocity_rad_s: f32,
+    setpoint_a: f32,
+    current_a: f32,
+    saturated: bool,
+}
+
+impl ServoModel {
+    /// Radians of the shaft in one count.
+    pub fn rad_per_count(&self) -> f32 {
+        TAU / self.commutation.counts_per_turn.max(1) as f32
+    }
+}
+
+impl Servo {
+    /// At rest, with the angle that the Hall sensors tell.
+    pub fn new(model: &ServoModel, hall: u8, count: u16) -> Self {
+        Self {
+            commutation: Commutation::new(&model.commutation, hall, count),
+            observer: Observer::new(count),
+            tracking: Tracking::default(),
+            foc: Foc::default(),
+            cascade: Cascade::default(),
+            velocity_filter: LowPass::default(),
+            feed_forward_filter: LowPass::default(),
+            torque_filter: LowPass::default(),
+            electrical_turns: 0.0,
+            velocity_rad_s: 0.0,
+            setpoint_a: 0.0,
+            current_a: 0.0,
+            saturated: false,
+        }
+    }
+
+    /// Takes in the shaft's sensors: every control period.
+    #[inline]
+    pub fn sense(&mut self, model: &ServoModel, hall: u8, count: u16) {
+        self.electrical_turns = self.commutation.update(&model.commutation, hall, count);
+        self.observer.update(&model.observer, count);
+    }
+
+    /// Takes the angle anew from the Hall sensors, as at power-on.
+    pub fn realign(&mut self, model: &ServoModel, hall: u8, count: u16) {
+        self.commutation = Commutation::new(&model.commutation, hall, count);
+    }
+
+    /// Velocity of the shaft, rad/s: every supervision period.
+    pub fn measure(&mut self, model: &ServoModel, gains: &ServoGains, phase_current_a: [f32; 3]) {
+        let dt_s = model.supervision_period_s;
+        let sign = f32::from(model.direction);
+        let mut counts_s = self.observer.velocity() / model.control_period_s;
+        if gains.tracking_share > 0.0 {
+            let tracked = self.tracking.update(&gains.tracking, self.observer.position(), dt_s);
+            counts_s += gains.tracking_share * (tracked - counts_s);
+        }
+        let velocity_rad_s = sign * counts_s * model.rad_per_count();
+        self.velocity_rad_s = self.velocity_filter.update(&gains.velocity_filter, velocity_rad_s);
+        let (sin, cos) = sin_cos_turns(self.electrical_turns);
+        self.current_a = sign * park(clarke(phase_current_a), sin, cos).q;
+    }
+
+    /// The outer loops: every supervision period. `position` is the actual position that the demand counts in.
+    pub fn control(
+        &mut self,
+        model: &ServoModel,
+        gains: &ServoGains,
+        demand: &Demand,
+        position: i32,
+        limits: &ServoLimits,
+    ) {
+        let dt_s = model.supervision_period_s;
+        let rad = model.rad_per_count();
+        let velocity = self.velocity_rad_s;
+        let current_a = match demand {
+            Demand::Off => {
+                self.release();
+                return;
+            }
+            Demand::Position(point) => {
+                let error_counts = point.position.wrapping_sub(position) as f32 + point.fraction as f32;
+                let demand = PositionDemand {
+                    error_rad: error_counts * rad,
+                    velocity_rad_s: point.velocity as f32 * rad,
+                    acceleration_rad_s2: self.smooth_acceleration(gains, point.acceleration as f32 * rad),
+                };
+                self.cascade.position(&gains.cascade, &demand, velocity, limits.current_a, dt_s)
+            }
+            Demand::Velocity(point) => {
+                let demand = VelocityDemand {
+                    velocity_rad_s: point.velocity as f32 * rad,
+                    acceleration_rad_s2: self.smooth_acceleration(gains, point.acceleration as f32 * rad),
+                };
+                self.cascade.velocity(&gains.cascade, &demand, velocity, limits.current_a, dt_s)
+            }
+            Demand::Torque(current_a) => {
+                // The velocity loop's own stiffness holds the speed: it may take torque away, and brake.
+                let stiffness = gains.cascade.velocity.proportional;
+                let most = stiffness * (limits.velocity_rad_s - velocity);
+                let least = stiffness * (-limits.velocity_rad_s - velocity);
+                let current_a = symmetric(current_a.clamp(least.min(most), most), limits.current_a);
+                // The velocity loop takes over here without a step.
+                self.cascade.reset(current_a);
+                current_a
+            }
+        };
+        self.setpoint_a = if current_a.is_finite() { current_a } else { 0.0 };
+    }
+
+    /// The current loop: every control period. Duty cycles of U, V, W.
+    #[inline]
+    pub fn modulate(
+        &mut self,
+        model: &ServoModel,
+        gains: &ServoGains,
+        phase_current_a: [f32; 3],
+        bus_v: f32,
+    ) -> [f32; 3] {
+        let sign = f32::from(model.direction);
+        let setpoint_a = Dq { d: 0.0, q: sign * self.torque_filter.update(&gains.torque_filter, self.setpoint_a) };
+        let input = FocInput {
+            phase_current_a,
+            electrical_turns: self.electrical_turns,
+            electrical_rad_s: sign * self.velocity_rad_s * model.commutation.pole_pairs as f32,
+            bus_v,
+        };
+        let output = self.foc.tick(&gains.foc, setpoint_a, &input, model.control_period_s);
+        self.saturated = output.saturated;
+        output.duty
+    }
+
+    /// Counts since power-on, wrapping.
+    pub fn position(&self, model: &ServoModel) -> i32 {
+        self.observer.position().wrapping_mul(i32::from(model.direction))
+    }
+
+    /// Filtered velocity of the shaft, rad/s.
+    pub const fn velocity_rad_s(&self) -> f32 {
+        self.velocity_rad_s
+    }
+
+    /// Measured torque-producing current, A.
+    pub const fn current_a(&self) -> f32 {
+        self.current_a
+    }
+
+    /// Current set-point, A.
+    pub const fn setpoint_a(&self) -> f32 {
+        self.setpoint_a
+    }
+
+    /// The bus voltage is used up.
+    pub const fn is_saturated(&self) -> bool {
+        self.saturated
+    }
+
+    /// How far encoder and Hall sensors were apart at the last Hall edge, in electrical turns.
+    pub fn disagreement_turns(&self) -> f32 {
+        self.commutation.disagreement_turns()
+    }
+
+    fn smooth_acceleration(&mut self, gains: &ServoGains, acceleration: f32) -> f32 {
+        self.feed_forward_filter.update(&gains.feed_forward_filter, acceleration)
+    }
+
+    /// The power stage is off: the loops begin anew when it comes back.
+    fn release(&mut self) {
+        self.foc.reset();
+        self.cascade.reset(0.0);
+        self.feed_forward_filter.value = 0.0;
+        self.torque_filter.value = 0.0;
+        self.setpoint_a = 0.0;
+        self.saturated = false;
+    }
+}

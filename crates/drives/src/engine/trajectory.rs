@@ -1,0 +1,236 @@
+//! Where the shaft is to be: a planned profile anchored to a position, moved on period by period.
+//!
+//! Units are encoder counts and counts/s. The anchor is a wrapping 32-bit position, so a shaft may turn for ever; the
+//! way since the anchor is in double precision, so a move over 2^31 counts ends exactly.
+
+use motion::{Profile, scurve};
+
+/// A planned motion and how far it has come.
+#[derive(Clone, Copy, Debug)]
+pub struct Trajectory {
+    origin: i32,
+    fraction: f64,
+    profile: Profile,
+    elapsed_s: f64,
+}
+
+/// Where the shaft is to be at one time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TrajectoryPoint {
+    /// Whole counts.
+    pub position: i32,
+    /// Share of a count beyond `position`, 0 to 1.
+    pub fraction: f64,
+    /// Counts/s.
+    pub velocity: f64,
+    /// Counts/s².
+    pub acceleration: f64,
+}
+
+impl TrajectoryPoint {
+    /// At rest.
+    pub const fn rest(position: i32) -> Self {
+        Self { position, fraction: 0.0, velocity: 0.0, acceleration: 0.0 }
+    }
+
+    /// Moving.
+    pub const fn moving(position: i32, velocity: f64) -> Self {
+        Self { position, fraction: 0.0, velocity, acceleration: 0.0 }
+    }
+}
+
+/// Speeds and times that a move keeps to, in counts and seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MoveLimits {
+    /// Speed that a motion from rest begins with.
+    pub start_speed: f64,
+    /// Speed of the plateau.
+    pub max_speed: f64,
+    /// Speed that the motion ends from.
+    pub end_speed: f64,
+    /// Time from the present speed to the plateau.
+    pub acceleration_time_s: f64,
+    /// Time from the plateau to the end speed.
+    pub deceleration_time_s: f64,
+}
+
+impl Trajectory {
+    /// At rest at a position.
+    pub fn resting(position: i32) -> Self {
+        Self { origin: position, fraction: 0.0, profile: scurve::velocity_change(0.0, 0.0, 0.0), elapsed_s: 0.0 }
+    }
+
+    /// From `from` to the position `target`, the short way round if the counter wraps in between.
+    pub fn move_to(from: TrajectoryPoint, target: i32, limits: &MoveLimits) -> Self {
+        let distance = f64::from(target.wrapping_sub(from.position)) - from.fraction;
+        let plan = scurve::PositionMove {
+            distance,
+            velocity: from.velocity,
+            start_speed: limits.start_speed,
+            max_speed: limits.max_speed,
+            end_speed: limits.end_speed,
+            acceleration_time_s: limits.acceleration_time_s,
+            deceleration_time_s: limits.deceleration_time_s,
+        };
+        Self { origin: from.position, fraction: from.fraction, profile: plan.plan(), elapsed_s: 0.0 }
+    }
+
+    /// From the velocity of `from` to `velocity` in `time_s`.
+    ///
+    /// An acceleration that already leads there goes on: the change is planned as the rest of a longer one that
+    /// passes `from` with its acceleration. A host that sends a new target every 20 ms is followed smoothly so,
+    /// where ever new beginnings of the S would hardly move. From rest it is the plain S of the time.
+    pub fn change_velocity(from: TrajectoryPoint, velocity: f64, time_s: f64) -> Self {
+        let (change, elapsed_s) = passing(velocity - from.velocity, from.acceleration, time_s);
+        let profile = scurve::velocity_change(velocity - change, velocity, time_s);
+        let passed = profile.at(elapsed_s).position;
+        Self { origin: from.position, fraction: from.fraction - passed, profile, elapsed_s }
+    }
+
+    /// One period on; returns the new point.
+    pub fn advance(&mut self, dt_s: f64) -> TrajectoryPoint {
+        if self.is_done() && self.profile.end().velocity != 0.0 {
+            self.re_anchor();
+        }
+        self.elapsed_s += dt_s;
+        self.point()
+    }
+
+    /// The present point.
+    pub fn point(&self) -> TrajectoryPoint {
+        let at = self.profile.at(self.elapsed_s);
+        let way = at.position + self.fraction;
+        let whole = libm::floor(way);
+        TrajectoryPoint {
+            position: self.origin.wrapping_add(whole as i64 as i32),
+            fraction: way - whole,
+            velocity: at.velocity,
+            acceleration: at.acceleration,
+        }
+    }
+
+    /// The plan has run out: the shaft rests, or goes on at the velocity that was planned.
+    pub fn is_done(&self) -> bool {
+        self.elapsed_s >= self.profile.duration()
+    }
+
+    /// The plan has run out and asks for standstill.
+    pub fn is_resting(&self) -> bool {
+        self.is_done() && self.profile.end().velocity == 0.0
+    }
+
+    /// The zero of position moves: what was `by` is 0 from now on.
+    pub fn shift(&mut self, by: i32) {
+        self.origin = self.origin.wrapping_sub(by);
+    }
+
+    /// A steady motion has no end: begin it anew where it is, so that its way stays small and exact.
+    fn re_anchor(&mut self) {
+        let now = self.point();
+        let profile = scurve::velocity_change(now.velocity, now.velocity, 0.0);
+        *self = Self { origin: now.position, fraction: now.fraction, profile, elapsed_s: 0.0 };
+    }
+}
+
+/// The S-shaped change of duration `time_s` whose rest is `rest` at the moment its acceleration is `acceleration`:
+/// its whole change, and the time of that moment.
+///
+/// With x the share of the time passed, the S reaches `2x²` of the change at a slope of `4x` in its first half, and lacks
+/// `2y²` at a slope of `4y`, `y = 1 - x`, in its second.
+fn passing(rest: f64, acceleration: f64, time_s: f64) -> (f64, f64) {
+    let slope = acceleration * time_s;
+    if rest == 0.0 || slope * rest <= 0.0 {
+        return (rest, 0.0);
+    }
+    if slope.abs() >= 4.0 * rest.abs() {
+        // Second half: rest = 2 c y², slope = 4 c y.
+        let y = 2.0 * rest / slope;
+        return (slope / (4.0 * y), time_s * (1.0 - y));
+    }
+    // First half: rest = c (1 - 2x²), slope = 4 c x.
+    let change = 0.5 * (rest + libm::sqrt(rest * rest + 0.5 * slope * slope).copysign(rest));
+    (change, time_s * slope / (4.0 * change))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DT_S: f64 = 0.5e-3;
+
+    #[test]
+    fn a_velocity_change_takes_its_time_and_half_of_it_is_half_way() {
+        let mut trajectory = Trajectory::change_velocity(TrajectoryPoint::rest(0), 1000.0, 0.5);
+        let mut points = std::vec::Vec::new();
+        while !trajectory.is_done() {
+            points.push(trajectory.advance(DT_S));
+        }
+        assert!((999..=1001).contains(&points.len()), "{}", points.len());
+        assert!((points[499].velocity - 500.0).abs() < 1.0);
+        assert!(trajectory.advance(DT_S).velocity == 1000.0 && !trajectory.is_resting());
+    }
+
+    #[test]
+    fn a_changed_target_neither_jumps_in_velocity_nor_in_acceleration_nor_in_position() {
+        for elapsed in [0, 100, 400, 600, 950] {
+            let mut trajectory = Trajectory::change_velocity(TrajectoryPoint::rest(7), 1000.0, 0.5);
+            for _ in 0..elapsed {
+                trajectory.advance(DT_S);
+            }
+            let before = trajectory.point();
+            let after = Trajectory::change_velocity(before, 1500.0, 0.5).point();
+            assert!((after.velocity - before.velocity).abs() < 1e-6, "{elapsed}");
+            assert!((after.acceleration - before.acceleration).abs() < 1e-3, "{elapsed}");
+            let way = f64::from(after.position - before.position) + after.fraction - before.fraction;
+            assert!(way.abs() < 1e-6, "{elapsed}");
+        }
+    }
+
+    #[test]
+    fn a_target_that_rises_with_every_message_is_followed() {
+        // 50 counts/s more each 20 ms, for 2 s: the velocity follows with a lag of less than the ramp's time.
+        let mut trajectory = Trajectory::resting(0);
+        let mut target = 0.0;
+        for period in 0..4000 {
+            if period % 40 == 0 {
+                target += 50.0;
+                trajectory = Trajectory::change_velocity(trajectory.point(), target, 0.5);
+            }
+            trajectory.advance(DT_S);
+        }
+        let lag_s = (target - trajectory.point().velocity) / 2500.0;
+        assert!((0.0..0.5).contains(&lag_s), "{lag_s}");
+    }
+
+    #[test]
+    fn no_velocity_overshoots_a_target_that_comes_nearer() {
+        let mut trajectory = Trajectory::change_velocity(TrajectoryPoint::rest(0), 1000.0, 0.5);
+        for _ in 0..500 {
+            trajectory.advance(DT_S);
+        }
+        let mut trajectory = Trajectory::change_velocity(trajectory.point(), 510.0, 0.5);
+        while !trajectory.is_done() {
+            assert!(trajectory.advance(DT_S).velocity <= 510.0 + 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_move_across_the_wrap_of_the_counter_ends_on_its_target() {
+        let limits =
+            MoveLimits { max_speed: 1e5, acceleration_time_s: 0.1, deceleration_time_s: 0.1, ..Default::default() };
+        let mut trajectory = Trajectory::move_to(TrajectoryPoint::rest(i32::MAX - 10), i32::MIN + 10, &limits);
+        while !trajectory.is_resting() {
+            trajectory.advance(DT_S);
+        }
+        assert_eq!(trajectory.point().position, i32::MIN + 10);
+    }
+
+    #[test]
+    fn a_steady_motion_stays_exact_for_hours() {
+        let mut trajectory = Trajectory::change_velocity(TrajectoryPoint::rest(0), 2000.0, 0.0);
+        for _ in 0..2_000_000 {
+            trajectory.advance(DT_S);
+        }
+        assert!((trajectory.point().position - 2_000_000).abs() <= 1);
+    }
+}

@@ -1,0 +1,563 @@
+//! The drive: the engine's parts joined over the dictionary.
+//!
+//! Three rhythms: frames as they come (`handle_frame`), the communication task every 0.5 ms (`handle_timeout`), and the
+//! control period of 50 us ([`Firmware::tick`]), of which every tenth is a supervision period.
+
+use can::{Bitrate, Frame, Instant, Station};
+use canopen::node::{Node, NodeEvent, NodeProfile};
+use canopen::od::{Entry, Slot};
+use canopen::pdo::EventTrigger;
+use canopen::{EmcyErrorCode, NodeId};
+use cia402::{Controlword, ModeOfOperation, PowerState};
+use motion::filter::{LowPass, LowPassGains};
+
+use super::faults::{FAULT_COUNT, FAULTS, row};
+use super::hardware::{Actuation, Hardware, PowerStage, Sensors};
+use super::objects::effects::{Effect, effect};
+use super::objects::*;
+use super::parameters::Parameters;
+use super::protection::{Protection, Situation, is_over_current};
+use super::readings::*;
+use super::statusword::statusword;
+use super::storage::Image;
+use super::terminals::{self, Signals};
+use super::{Values, restart};
+use crate::engine::axis::{Axis, Demand, Feedback, Targets};
+use crate::engine::bleeder::Bleeder;
+use crate::engine::faults::{FaultMonitor, FaultSet};
+use crate::engine::host_watchdog::HostWatchdog;
+use crate::engine::inputs::Inputs;
+use crate::engine::servo::Servo;
+use crate::engine::storage::Store;
+use crate::{Firmware, Report};
+
+/// How this drive communicates: PDO timers in 0.5 ms, PDOs that may be changed while they are valid (6.1).
+pub static NODE_PROFILE: NodeProfile = NodeProfile {
+    inhibit_unit_ns: 500_000,
+    event_timer_unit_ns: 500_000,
+    event_trigger: EventTrigger::ChangeOr255ByTimer,
+    pdo_changes_while_valid: true,
+    ..NodeProfile::cia_301(&TABLE)
+};
+
+/// The firmware of a ZLAC8030L V2.0.
+#[derive(Clone)]
+pub struct Zlac8030l {
+    node: Node<ROW_COUNT>,
+    store: Store,
+    dip_address: u8,
+    running: bool,
+    /// 200Eh and 202F:05 as they were at the last restart.
+    bitrate: Bitrate,
+    velocity_resolution: u16,
+    parameters: Parameters,
+    parameters_changed: bool,
+    axis: Axis,
+    servo: Servo,
+    /// The sensors have been looked at since the restart.
+    awake: bool,
+    demand: Demand,
+    targets: Targets,
+    /// What is added to the counts since power-on to give 6064h.
+    position_offset: i32,
+    faults: FaultMonitor<FAULT_COUNT>,
+    protection: Protection,
+    eeprom_ok: bool,
+    inputs: Inputs<2>,
+    external_stop: bool,
+    outputs: [bool; 2],
+    bleeder: Bleeder,
+    watchdog: HostWatchdog,
+    shown_velocity_rpm: LowPass,
+    shown_current_a: LowPass,
+    periods: u8,
+    next_task: Instant,
+}
+
+impl Zlac8030l {
+    /// A drive without supply. [`Firmware::power_on`] starts it.
+    pub fn new() -> Self {
+        let node = Node::new(&NODE_PROFILE, NodeId::MIN);
+        let parameters = Parameters::from(node.dictionary());
+        Self {
+            servo: Servo::new(&parameters.model, 0, 0),
+            node,
+            store: Store::new(Image::factory().0),
+            dip_address: 0,
+            running: false,
+            bitrate: Bitrate::K500,
+            velocity_resolution: 1,
+            parameters,
+            parameters_changed: false,
+            axis: Axis::new(&[]),
+            awake: false,
+            demand: Demand::Off,
+            targets: Targets::default(),
+            position_offset: 0,
+            faults: FaultMonitor::new(&FAULTS),
+            protection: Protection::default(),
+            eeprom_ok: true,
+            inputs: Inputs::default(),
+            external_stop: false,
+            outputs: [false; 2],
+            bleeder: Bleeder::default(),
+            watchdog: HostWatchdog::default(),
+            shown_velocity_rpm: LowPass::default(),
+            shown_current_a: LowPass::default(),
+            periods: 0,
+            next_task: Instant::ZERO,
+        }
+    }
+
+    /// The values of the objects, to look at.
+    pub fn values(&self) -> &Values {
+        self.node.dictionary()
+    }
+
+    /// The communication side, to look at.
+    pub const fn node(&self) -> &Node<ROW_COUNT> {
+        &self.node
+    }
+
+    /// Starts the firmware over: stored values, node-ID and bit rate anew, motor free, position 0.
+    fn restart(&mut self, now: Instant) {
+        let mut values = Values::new(&TABLE, NodeId::MIN);
+        // An unreadable store leaves factory values; the fault follows with the first look at the sensors.
+        let _ = self.store.load(&mut values, |_| true);
+        let node_id = restart::node_id(self.dip_address, &values);
+        let mut started = Self::new();
+        started.node = Node::new(&NODE_PROFILE, node_id);
+        let _ = self.store.load(started.node.dictionary_mut(), |_| true);
+        started.store = self.store.clone();
+        started.dip_address = self.dip_address;
+        started.running = true;
+        started.bitrate = restart::bitrate(started.values());
+        started.velocity_resolution = started.values().get(VELOCITY_RESOLUTION);
+        started.parameters = Parameters::from(started.values());
+        started.next_task = now.plus_nanos(COMMUNICATION_PERIOD_NS);
+        started.axis.self_test_done();
+        *self = started;
+        self.publish_status();
+        self.node.boot(now);
+    }
+
+    /// NMT reset communication: 1000h to 1FFFh as at power-on; motor and node-ID go on.
+    fn restart_communication(&mut self, now: Instant) {
+        self.node.restore_communication_defaults();
+        let _ = self.store.load(self.node.dictionary_mut(), is_communication);
+        self.node.boot(now);
+        self.publish_error_register();
+    }
+
+    fn handle_events(&mut self, now: Instant) {
+        while let Some(event) = self.node.poll_event() {
+            match event {
+                NodeEvent::Written { slot, raw, .. } => self.written(slot, raw, now),
+                NodeEvent::ResetNode => self.restart(now),
+                NodeEvent::ResetCommunication => self.restart_communication(now),
+                NodeEvent::Nmt(_) | NodeEvent::Sync | NodeEvent::RpdoTooShort(_) => {}
+            }
+        }
+    }
+
+    /// A peer wrote `raw` to `slot`.
+    fn written(&mut self, slot: Slot, raw: u32, now: Instant) {
+        if self.values().get(SAVE_ON_WRITE) == 0 {
+            self.store.mark(&TABLE, slot);
+        }
+        match effect(slot) {
+            Effect::Command => self.command(Controlword(raw as u16), now),
+            Effect::SelectMode => {
+                self.axis.request_mode(ModeOfOperation(raw as u8 as i8));
+                self.publish_status();
+            }
+            Effect::Registers => self.registers(raw, now),
+            Effect::ClearPosition => self.clear_position(slot, raw),
+            Effect::Target => {}
+            Effect::Parameter => self.parameters_changed = true,
+        }
+    }
+
+    fn command(&mut self, controlword: Controlword, now: Instant) {
+        self.refresh_parameters();
+        let target = self.values().get(TARGET_POSITION);
+        let relative = controlword.has(Controlword::RELATIVE);
+        // An SDO write was refused for this already; an RPDO can only be ignored.
+        let in_range = relative || target.unsigned_abs() <= ABSOLUTE_TARGET_LIMIT.unsigned_abs();
+        let taken = if in_range { controlword } else { Controlword(controlword.0 & !Controlword::NEW_SET_POINT) };
+        if self.axis.command(taken, target, &self.parameters.axis) {
+            self.reset_faults(now);
+        }
+        self.publish_status();
+    }
+
+    /// 2009h: reads 0 again when it is done.
+    fn registers(&mut self, command: u32, now: Instant) {
+        match command {
+            1 => self.restore_factory_settings(now),
+            2 => self.store.mark_all(&TABLE),
+            _ => {}
+        }
+        self.node.dictionary_mut().set(REGISTER_PARAMETER_SETTING, 0);
+    }
+
+    /// Everything in the EEPROM becomes as delivered. Parameters take effect at once, communication objects with the next
+    /// restart: until then they show what the drive does. An EEPROM fault ends with it.
+    fn restore_factory_settings(&mut self, now: Instant) {
+        if !self.eeprom_ok {
+            return;
+        }
+        let node_id = self.node.node_id();
+        self.store.format(&Values::new(&TABLE, node_id));
+        for (slot, _) in TABLE.iter().filter(|(_, row)| row.stored && !is_communication(row)) {
+            self.node.dictionary_mut().restore_default(slot, node_id);
+        }
+        self.parameters_changed = true;
+        if self.faults.forget(row::EEPROM) {
+            self.reset_faults(now);
+        }
+    }
+
+    /// 2005h and 2006h: 6064h becomes 0, whatever moves goes on moving. They read 0 again when it is done.
+    fn clear_position(&mut self, slot: Slot, raw: u32) {
+        if raw == 1 {
+            let position = self.position();
+            self.position_offset = self.position_offset.wrapping_sub(position);
+            self.axis.shift_position(position);
+            self.node.dictionary_mut().set(POSITION_ACTUAL_VALUE, 0);
+        }
+        self.node.dictionary_mut().set_raw(slot, 0);
+    }
+
+    fn position(&self) -> i32 {
+        self.position_offset.wrapping_add(self.servo.position(&self.parameters.model))
+    }
+
+    fn velocity_rpm(&self) -> f32 {
+        self.servo.velocity_rad_s() * (60.0 / core::f32::consts::TAU)
+    }
+
+    // ---- faults ----
+
+    fn watch_faults(&mut self, sensors: &Sensors, now: Instant) {
+        self.eeprom_ok = sensors.eeprom_ok;
+        let situation = Situation {
+            servo: &self.servo,
+            demand: &self.demand,
+            position: self.position(),
+            velocity_rpm: self.velocity_rpm(),
+            eeprom_readable: self.store.is_readable(),
+            latched: self.faults.latched(),
+        };
+        let causes = self.protection.causes(&self.parameters, sensors, &situation);
+        let new = self.faults.observe(causes);
+        if causes.has(row::ENCODER) {
+            // Told once: whether encoder and Hall sensors still disagree shows at the next edges.
+            self.servo.realign(&self.parameters.model, sensors.hall, sensors.encoder_count);
+        }
+        self.fall(new, now);
+    }
+
+    /// New faults: off, and tell.
+    fn fall(&mut self, new: FaultSet, now: Instant) {
+        if new.is_empty() {
+            return;
+        }
+        self.axis.fault();
+        self.demand = Demand::Off;
+        self.node.dictionary_mut().set(ERROR_CODE, self.faults.code_bits());
+        for row in new.rows() {
+            let register = self.faults.error_register();
+            self.node.raise_emcy(FAULTS[row].emcy, register, [0; 5], now);
+        }
+        self.publish_status();
+    }
+
+    /// Forgets the faults whose cause is gone; with the last one the drive leaves Fault.
+    fn reset_faults(&mut self, now: Instant) {
+        self.protection.reset();
+        let all_gone = self.faults.reset();
+        self.node.dictionary_mut().set(ERROR_CODE, self.faults.code_bits());
+        self.publish_error_register();
+        if all_gone {
+            self.axis.reset_fault();
+            self.node.raise_emcy(EmcyErrorCode::NO_ERROR, 0, [0; 5], now);
+        }
+        self.publish_status();
+    }
+
+    // ---- the control task ----
+
+    /// The first look at the sensors after a restart.
+    fn wake(&mut self, sensors: &Sensors) {
+        self.awake = true;
+        self.servo = Servo::new(&self.parameters.model, sensors.hall, sensors.encoder_count);
+    }
+
+    /// Every tenth control period.
+    fn supervise(&mut self, sensors: &Sensors, now: Instant) {
+        self.refresh_parameters();
+        let feedback = self.measure(sensors);
+        self.watch_faults(sensors, now);
+        self.read_inputs(sensors);
+        self.read_targets();
+        self.demand = self.axis.update(feedback, &self.targets, &self.parameters.axis, f64::from(SUPERVISION_PERIOD_S));
+        let Parameters { model, gains, limits, .. } = &self.parameters;
+        self.servo.control(model, gains, &self.demand, feedback.position, limits);
+        self.publish(sensors);
+    }
+
+    /// Takes over changed parameters. Sensor and direction changes wait until the motor is free: they would turn
+    /// position and angle over under the loops.
+    fn refresh_parameters(&mut self) {
+        if !self.parameters_changed {
+            return;
+        }
+        let mut parameters = Parameters::from(self.node.dictionary());
+        if self.demand == Demand::Off {
+            self.parameters_changed = false;
+            let position = self.position();
+            self.awake &= parameters.model.commutation == self.parameters.model.commutation;
+            self.parameters = parameters;
+            self.position_offset = position.wrapping_sub(self.servo.position(&parameters.model));
+        } else {
+            self.parameters_changed = parameters.model != self.parameters.model;
+            parameters.model = self.parameters.model;
+            self.parameters = parameters;
+        }
+    }
+
+    fn measure(&mut self, sensors: &Sensors) -> Feedback {
+        self.servo.measure(&self.parameters.model, &self.parameters.gains, three_phases(sensors));
+        let velocity_rpm = self.velocity_rpm();
+        let shown = LowPassGains::from_time_constant(DISPLAY_FILTER_S, SUPERVISION_PERIOD_S);
+        self.shown_velocity_rpm.update(&shown, velocity_rpm);
+        self.shown_current_a.update(&shown, self.servo.current_a());
+        Feedback {
+            position: self.position(),
+            velocity: f64::from(velocity_rpm) * self.parameters.counts_s_per_rpm,
+            current_a: self.shown_current_a.value,
+            standing: velocity_rpm.abs() < STANDSTILL_RPM,
+        }
+    }
+
+    /// Debounced inputs; both ends of an external stop take the targets away, so that nothing starts by itself.
+    fn read_inputs(&mut self, sensors: &Sensors) {
+        let levels = self.inputs.update(sensors.inputs, INPUT_DEBOUNCE_PERIODS);
+        let stop = terminals::emergency_stop(self.values(), levels);
+        if stop != self.external_stop {
+            self.external_stop = stop;
+            self.axis.set_external_stop(stop);
+            self.drop_targets();
+        }
+    }
+
+    fn read_targets(&mut self) {
+        let values = self.node.dictionary();
+        let rpm = f64::from(values.get(TARGET_VELOCITY)) / f64::from(self.velocity_resolution.max(1));
+        let max_rpm = self.parameters.max_rpm;
+        self.targets = Targets {
+            velocity: rpm.clamp(-max_rpm, max_rpm) * self.parameters.counts_s_per_rpm,
+            current_a: f32::from(values.get(TARGET_TORQUE)) * 1e-3,
+        };
+    }
+
+    fn drop_targets(&mut self) {
+        let values = self.node.dictionary_mut();
+        values.set(TARGET_VELOCITY, 0);
+        values.set(TARGET_TORQUE, 0);
+    }
+
+    fn power_stage(&mut self, sensors: &Sensors) -> PowerStage {
+        if self.demand != Demand::Off {
+            let Parameters { model, gains, .. } = &self.parameters;
+            let duty = self.servo.modulate(model, gains, three_phases(sensors), sensors.bus_v);
+            return PowerStage::Modulate { duty };
+        }
+        let alarm = self.axis.state() == PowerState::Fault;
+        if alarm && self.parameters.alarm_pwm { PowerStage::Shorted } else { PowerStage::Off }
+    }
+
+    // ---- actual values -> dictionary ----
+
+    fn publish(&mut self, sensors: &Sensors) {
+        let position = self.position();
+        let (velocity, current) = (self.shown_velocity_rpm.value, self.shown_current_a.value);
+        let demand_ma = self.servo.setpoint_a() * 1e3;
+        let levels = self.inputs.levels();
+        let brake = terminals::brake_engaged(self.values());
+        let values = self.node.dictionary_mut();
+        values.set(POSITION_ACTUAL_VALUE, position);
+        values.set(VELOCITY_ACTUAL_VALUE, round(velocity * 10.0) as i32);
+        values.set(TORQUE_ACTUAL_VALUE, round(current * 10.0).clamp(-300.0, 300.0) as i16);
+        values.set(TORQUE_DEMAND, round(demand_ma).clamp(-30_000.0, 30_000.0) as i16);
+        values.set(MOTOR_TEMPERATURE, temperature(sensors.motor_c));
+        values.set(DRIVER_TEMPERATURE, temperature(sensors.driver_c));
+        values.set(BUS_VOLTAGE, round(sensors.bus_v * 100.0) as u16);
+        values.set(HALL_STATUS, u16::from(sensors.hall & 7));
+        values.set(INPUT_STATUS, levels);
+        values.set(OUTPUT_STATUS, terminals::output_status(self.outputs, brake));
+        self.publish_status();
+    }
+
+    /// Statusword, mode display and what follows from them; also right after a command, for a host that reads back.
+    fn publish_status(&mut self) {
+        let status = self.axis.status(&self.targets, &self.parameters.axis);
+        let (state, mode) = (self.axis.state(), self.axis.mode());
+        let signals = Signals {
+            alarm: state == PowerState::Fault,
+            enabled: self.axis.is_live(),
+            in_position: status.target_reached,
+        };
+        self.outputs = terminals::outputs(self.values(), signals);
+        let values = self.node.dictionary_mut();
+        values.set(STATUSWORD, statusword(state, mode, &status).0);
+        values.set(MODES_OF_OPERATION_DISPLAY, mode.0);
+        values.set(MOTOR_STATUS, u16::from(status.running));
+    }
+
+    fn publish_error_register(&mut self) {
+        let register = self.faults.error_register();
+        self.node.dictionary_mut().set(ERROR_REGISTER, register);
+    }
+
+    // ---- the communication task ----
+
+    fn communication_task(&mut self, now: Instant) {
+        let timeout_ns = u64::from(self.values().get(COMMUNICATION_OFFLINE_TIME)) * 1_000_000;
+        let armed = self.axis.state() == PowerState::OperationEnabled;
+        if self.watchdog.poll(armed, self.node.last_addressed(), timeout_ns, now) {
+            self.axis.lose_host();
+            self.drop_targets();
+        }
+        if self.eeprom_ok {
+            self.store.commit(self.node.dictionary());
+        }
+        self.node.notice_changes(now);
+    }
+}
+
+impl Default for Zlac8030l {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Station for Zlac8030l {
+    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
+        if self.running {
+            self.node.handle_frame(frame, now);
+            self.handle_events(now);
+        }
+    }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        if !self.running {
+            return;
+        }
+        self.node.handle_timeout(now);
+        self.handle_events(now);
+        if now >= self.next_task {
+            // The task keeps its grid unless it was not called for long.
+            let next = self.next_task.plus_nanos(COMMUNICATION_PERIOD_NS);
+            self.next_task = if next > now { next } else { now.plus_nanos(COMMUNICATION_PERIOD_NS) };
+            self.communication_task(now);
+        }
+    }
+
+    fn poll_transmit(&mut self) -> Option<Frame> {
+        self.node.poll_transmit()
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        let task = self.running.then_some(self.next_task)?;
+        Some(self.node.poll_timeout().map_or(task, |deadline| deadline.min(task)))
+    }
+
+    fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
+        self.node.handle_transmitted(frame, now);
+    }
+}
+
+impl Firmware for Zlac8030l {
+    type Sensors = Sensors;
+    type Actuation = Actuation;
+    type Hardware = Hardware;
+
+    const CONTROL_PERIOD_NS: u64 = CONTROL_PERIOD_NS;
+
+    fn power_on(&mut self, hardware: &Hardware, now: Instant) {
+        self.dip_address = hardware.dip_address;
+        self.store.reopen(hardware.eeprom.0);
+        self.restart(now);
+    }
+
+    fn power_off(&mut self, _now: Instant) {
+        self.running = false;
+        self.node.power_off();
+        self.axis = Axis::new(&[]);
+        self.demand = Demand::Off;
+    }
+
+    fn tick(&mut self, sensors: &Sensors, now: Instant) -> Actuation {
+        if !self.running {
+            return Actuation::default();
+        }
+        if !self.awake {
+            self.wake(sensors);
+        }
+        self.servo.sense(&self.parameters.model, sensors.hall, sensors.encoder_count);
+        if is_over_current(sensors) && self.faults.raise(row::OVER_CURRENT) {
+            self.fall(FaultSet::row(row::OVER_CURRENT), now);
+        }
+        self.periods += 1;
+        if self.periods >= SUPERVISION_DIVIDER {
+            self.periods = 0;
+            self.supervise(sensors, now);
+        }
+        Actuation {
+            power_stage: self.power_stage(sensors),
+            bleeder_on: self.bleeder.update(&self.parameters.bleeder, sensors.bus_v, CONTROL_PERIOD_S),
+            outputs: self.outputs,
+            brake_engaged: terminals::brake_engaged(self.values()),
+        }
+    }
+
+    fn eeprom(&self) -> (&[u8], u32) {
+        let (image, generation) = self.store.image();
+        (image, generation)
+    }
+
+    fn report(&self) -> Report {
+        Report {
+            powered: self.running,
+            node_id: self.node.node_id(),
+            bitrate: self.bitrate,
+            state: self.axis.state(),
+            mode: self.axis.mode(),
+            fault_code: self.faults.code_bits(),
+            position_counts: self.position(),
+            velocity_rpm: self.velocity_rpm(),
+            current_a: self.shown_current_a.value,
+            brake_engaged: self.running && terminals::brake_engaged(self.values()),
+        }
+    }
+}
+
+fn is_communication(row: &Entry) -> bool {
+    matches!(row.index, 0x1000..=0x1FFF)
+}
+
+fn three_phases(sensors: &Sensors) -> [f32; 3] {
+    let [u, v] = sensors.phase_current_a;
+    [u, v, -u - v]
+}
+
+/// 0.1 degC, held to the range of 2026h.
+fn temperature(celsius: f32) -> i16 {
+    round(celsius * 10.0).clamp(-550.0, 1200.0) as i16
+}
+
+fn round(value: f32) -> f32 {
+    libm::roundf(value)
+}

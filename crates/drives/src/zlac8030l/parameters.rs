@@ -1,0 +1,167 @@
+//! The dictionary's parameters in physical units, as the engine wants them. Written anew when one changes.
+
+use canopen::od::Object;
+use cia402::{DisableOperationOption, HaltOption, QuickStopOption, ShutdownOption};
+use motion::commutation::CommutationModel;
+use motion::observer::ObserverGains;
+
+use super::Values;
+use super::gains::gains;
+use super::objects::*;
+use super::readings::*;
+use crate::engine::axis::{AxisParameters, Tolerances};
+use crate::engine::bleeder::BleederLimits;
+use crate::engine::modes::VelocityRamps;
+use crate::engine::overload::OverloadLimits;
+use crate::engine::power::StepDownOptions;
+use crate::engine::servo::{ServoGains, ServoLimits, ServoModel};
+use crate::engine::trajectory::MoveLimits;
+
+/// Hall states forward, from the electrical angle 2011h.
+const HALL_SEQUENCE: [u8; 6] = [5, 1, 3, 2, 6, 4];
+
+/// Counts in one encoder line: both edges of both channels.
+const COUNTS_PER_LINE: u32 = 4;
+
+/// rad/s in one r/min.
+const RAD_S_PER_RPM: f32 = core::f32::consts::TAU / 60.0;
+
+/// Everything that the control task reads of the dictionary besides its targets.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Parameters {
+    /// Counts/s in one r/min.
+    pub(super) counts_s_per_rpm: f64,
+    /// Speed limit 200Ah, r/min.
+    pub(super) max_rpm: f64,
+    pub(super) axis: AxisParameters,
+    pub(super) model: ServoModel,
+    pub(super) gains: ServoGains,
+    pub(super) limits: ServoLimits,
+    pub(super) overload: OverloadLimits,
+    pub(super) bleeder: BleederLimits,
+    /// 2017h, counts.
+    pub(super) out_of_tolerance: u32,
+    /// 2013h, degC.
+    pub(super) motor_limit_c: f32,
+    pub(super) driver_limit_c: f32,
+    /// 202F:01.
+    pub(super) alarm_pwm: bool,
+}
+
+impl Parameters {
+    pub(super) fn from(values: &Values) -> Self {
+        let counts_per_turn = u32::from(values.get(ENCODER_LINES)) * COUNTS_PER_LINE;
+        let counts_s_per_rpm = f64::from(counts_per_turn) / 60.0;
+        let max_rpm = f64::from(values.get(MAX_MOTOR_SPEED));
+        let limits = servo_limits(values);
+        Self {
+            counts_s_per_rpm,
+            max_rpm,
+            axis: axis(values, counts_s_per_rpm),
+            model: servo_model(values, counts_per_turn),
+            gains: gains(values, limits.velocity_rad_s),
+            limits,
+            overload: overload(values),
+            bleeder: bleeder(values),
+            out_of_tolerance: u32::from(values.get(OUT_OF_TOLERANCE_THRESHOLD)) * 10,
+            motor_limit_c: tenths(values, MOTOR_TEMPERATURE_THRESHOLD),
+            driver_limit_c: tenths(values, DRIVER_TEMPERATURE_THRESHOLD),
+            alarm_pwm: values.get(ALARM_PWM) == 1,
+        }
+    }
+
+    /// The motor's sense of rotation that 2001h asks for.
+    pub(super) fn wanted_direction(values: &Values) -> i8 {
+        if values.get(MOTOR_DIRECTION) == 0 { 1 } else { -1 }
+    }
+}
+
+fn axis(values: &Values, counts_s_per_rpm: f64) -> AxisParameters {
+    let max_rpm = f64::from(values.get(MAX_MOTOR_SPEED));
+    let speed = |rpm: f64| rpm.min(max_rpm) * counts_s_per_rpm;
+    let time_s = |object| f64::from(values.get(object)) * 1e-3;
+    let start_speed = speed(f64::from(values.get(INITIAL_SPEED)));
+    let (acceleration_time_s, deceleration_time_s) = (time_s(PROFILE_ACCELERATION), time_s(PROFILE_DECELERATION));
+    AxisParameters {
+        moves: MoveLimits {
+            start_speed,
+            max_speed: speed(f64::from(values.get(PROFILE_VELOCITY))),
+            end_speed: speed(f64::from(values.get(END_VELOCITY))),
+            acceleration_time_s,
+            deceleration_time_s,
+        },
+        velocity: VelocityRamps { start_speed, max_speed: speed(max_rpm), acceleration_time_s, deceleration_time_s },
+        quick_stop_time_s: time_s(QUICK_STOP_DECELERATION),
+        torque_slope_a_s: values.get(TORQUE_SLOPE) as f32 * 1e-3,
+        quick_stop: QuickStopOption(values.get(QUICK_STOP_OPTION_CODE)),
+        step_down: StepDownOptions {
+            shutdown: ShutdownOption(values.get(SHUTDOWN_OPTION_CODE)),
+            disable_operation: DisableOperationOption(values.get(DISABLE_OPERATION_OPTION_CODE)),
+        },
+        halt: HaltOption(values.get(HALT_OPTION_CODE)),
+        lock_when_disabled: values.get(SHAFT_LOCK_WHEN_DISABLED) == 1,
+        release_after_external_stop: values.get(IO_STOP_PROCESSING) == 1,
+        tolerances: Tolerances {
+            position: u32::from(values.get(IN_POSITION_THRESHOLD)),
+            velocity: f64::from(VELOCITY_REACHED_RPM) * counts_s_per_rpm,
+            current_a: TORQUE_REACHED_A,
+        },
+    }
+}
+
+fn servo_model(values: &Values, counts_per_turn: u32) -> ServoModel {
+    ServoModel {
+        commutation: CommutationModel {
+            counts_per_turn,
+            pole_pairs: u32::from(values.get(MOTOR_POLE_PAIRS)),
+            offset_turns: f32::from(values.get(HALL_OFFSET_ANGLE)) / 360.0,
+            sequence: HALL_SEQUENCE,
+        },
+        direction: Parameters::wanted_direction(values),
+        observer: ObserverGains::new(VELOCITY_WINDOW_S, VELOCITY_STANDSTILL_S, CONTROL_PERIOD_S),
+        control_period_s: CONTROL_PERIOD_S,
+        supervision_period_s: SUPERVISION_PERIOD_S,
+    }
+}
+
+/// 2015h, held to 3 A in parking mode, and 200Ah.
+fn servo_limits(values: &Values) -> ServoLimits {
+    let max_a = tenths(values, MAX_CURRENT);
+    ServoLimits {
+        current_a: if values.get(PARKING_MODE) == 1 { max_a.min(PARKING_CURRENT_A) } else { max_a },
+        velocity_rad_s: f32::from(values.get(MAX_MOTOR_SPEED)) * RAD_S_PER_RPM,
+    }
+}
+
+/// Overload begins at 2012h times the rated current 2014h. With overload processing off (202F:02) it may last for 2016h,
+/// however high it is; with it on, the note below the object table gives the time, scaled by 2016h.
+fn overload(values: &Values) -> OverloadLimits {
+    let time = f32::from(values.get(OVERLOAD_TIME));
+    let curve = if values.get(OVERLOAD_PROCESSING) == 1 {
+        OVERLOAD_TIMES_S.map(|(multiple, time_s)| (multiple, time_s * time / OVERLOAD_TIME_FACTORY))
+    } else {
+        OVERLOAD_TIMES_S.map(|(multiple, _)| (multiple, time * 10e-3))
+    };
+    OverloadLimits {
+        rated_a: tenths(values, RATED_CURRENT),
+        begins_at: f32::from(values.get(OVERLOAD_FACTOR)) / 100.0,
+        curve,
+    }
+}
+
+fn bleeder(values: &Values) -> BleederLimits {
+    let resistance_ohm = tenths(values, BLEEDER_RESISTANCE);
+    let rated_w = f32::from(values.get(BLEEDER_POWER));
+    BleederLimits {
+        enabled: values.get(BLEEDER_ENABLE) == 1,
+        on_v: tenths(values, BLEEDER_ON_VOLTAGE),
+        off_v: tenths(values, BLEEDER_OFF_VOLTAGE),
+        conductance_s: if resistance_ohm > 0.0 { 1.0 / resistance_ohm } else { 0.0 },
+        rated_w,
+        overload_j: rated_w * BLEEDER_OVERLOAD_S,
+    }
+}
+
+fn tenths(values: &Values, object: Object<u16>) -> f32 {
+    f32::from(values.get(object)) * 0.1
+}
