@@ -3,6 +3,22 @@
 //! [`core::Core`] is a passive state machine (CiA 301): SDO clients, NMT, heartbeat and EMCY watch, SYNC and PDOs
 //! for 127 nodes. [`Network`] shares one between a runner and any number of tasks. Nothing here reads a clock,
 //! opens a socket or starts a thread: a runner (a simulated world, a transport loop) brings frames and time.
+//!
+//! ```no_run
+//! # async fn example() -> Result<(), Box<dyn std::error::Error>> {
+//! use canopen::NodeId;
+//! use master::units::{Degrees, Rpm};
+//! use master::{Drive, MotionOptions, Network};
+//!
+//! let network = Network::new(); // a clone of it goes to the runner
+//! let model = drives::profile::model("zlac8030l").ok_or("no such model")?;
+//! let node = network.node(NodeId::new(4).ok_or("no such node")?);
+//! let drive = Drive::new(node, model);
+//! let slowly = MotionOptions { speed: Some(Rpm(30.0)), ..MotionOptions::default() };
+//! drive.move_relative(Degrees(90.0), slowly).await?;
+//! # Ok(())
+//! # }
+//! ```
 
 pub mod core;
 pub mod decode;
@@ -13,6 +29,6 @@ mod network;
 pub mod pdo;
 pub mod units;
 
-pub use drive::Drive;
+pub use drive::{Drive, MotionOptions};
 pub use error::{Access, Error, Hints};
 pub use network::{DEFAULT_TIMEOUT, Elapsed, Network, Node, NodeView, Sleep, Wait, join_all};

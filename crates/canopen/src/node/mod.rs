@@ -5,6 +5,32 @@
 //! [`NodeEvent`]s: which entries a peer wrote, NMT changes, reset requests. The node never acts on the application;
 //! its owner polls events, reads and writes the dictionary, and carries out resets by calling [`Node::boot`] again.
 //! What differs between devices is data: [`NodeProfile`].
+//!
+//! ```
+//! use can::{Instant, Station};
+//! use canopen::od::{Access, DataType, Entry, Object, Table, keys};
+//! use canopen::{Node, NodeEvent, NodeId, NodeProfile};
+//!
+//! static ROWS: [Entry; 2] = [
+//!     Entry::new(0x1000, 0, DataType::Unsigned32, Access::Const, "device_type", "Device type").default(0x0002_0192),
+//!     Entry::new(0x6040, 0, DataType::Unsigned16, Access::ReadWrite, "controlword", "Controlword"),
+//! ];
+//! static KEYS: [u32; 2] = keys(&ROWS);
+//! static TABLE: Table = Table::new(&ROWS, &KEYS);
+//! static PROFILE: NodeProfile = NodeProfile::cia_301(&TABLE);
+//! const CONTROLWORD: Object<u16> = TABLE.object(0x6040, 0);
+//!
+//! let now = Instant::ZERO;
+//! let mut node: Node<2> = Node::new(&PROFILE, NodeId::new(4).unwrap());
+//! node.boot(now);
+//! assert_eq!(node.poll_transmit().unwrap().to_string(), "704#00");
+//!
+//! node.handle_frame(&"604#2B40600006000000".parse().unwrap(), now);
+//! assert_eq!(node.poll_transmit().unwrap().to_string(), "584#6040600000000000");
+//! assert_eq!(node.dictionary().get(CONTROLWORD), 6);
+//! assert!(matches!(node.poll_event(), Some(NodeEvent::Nmt(_))));
+//! assert!(matches!(node.poll_event(), Some(NodeEvent::Written { raw: 6, .. })));
+//! ```
 
 mod event;
 mod objects;

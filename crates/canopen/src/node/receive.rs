@@ -75,7 +75,8 @@ impl Receivers {
 }
 
 impl<const N: usize> Node<N> {
-    /// A data frame with an identifier that somebody here listens to.
+    /// A data frame with an identifier that somebody here listens to. SDO, NMT and SYNC share theirs with nobody; two
+    /// RPDOs may have the same.
     #[inline(never)]
     pub(super) fn receive(&mut self, frame: &Frame, receivers: Matches) {
         if receivers.contains(SDO) {
@@ -85,11 +86,11 @@ impl<const N: usize> Node<N> {
             return self.receive_nmt(frame);
         }
         if receivers.contains(SYNC) {
-            self.receive_sync();
+            return self.receive_sync();
         }
-        for number in PdoNumber::ALL {
-            if receivers.contains(FIRST_RPDO + number.position() as u32) {
-                self.receive_rpdo(frame, number);
+        for (lane, number) in (FIRST_RPDO..).zip(&PdoNumber::ALL) {
+            if receivers.contains(lane) {
+                self.receive_rpdo(frame, *number);
             }
         }
     }
@@ -131,9 +132,9 @@ impl<const N: usize> Node<N> {
                 self.offer_tpdo(position);
             }
         }
-        for number in PdoNumber::ALL {
+        for number in &PdoNumber::ALL {
             if let Some(data) = self.rpdos[number.position()].take_latched() {
-                self.apply_rpdo(number, data);
+                self.apply_rpdo(*number, data);
             }
         }
     }

@@ -5,8 +5,7 @@ use canopen::sdo::client::{self, Client};
 use canopen::sdo::wire::{Payload as Initiation, Reply};
 use canopen::{AbortCode, Mux, NodeId};
 
-use super::{Failure, Outcome, Payload, Request, Transfer};
-use crate::core::Ticket;
+use super::{Failure, Outcome, Payload, Request, Ticket, Transfer};
 
 /// Requests that may wait for one node.
 const QUEUE: usize = 64;
@@ -24,6 +23,8 @@ pub(super) struct Channel {
     active: Option<Active>,
     queue: VecDeque<(Ticket, Request)>,
     ended: Option<Ended>,
+    /// The object of a transfer that was given up: its answer may still come and is not about the next one.
+    given_up: Option<Mux>,
     /// What is read goes here, what is written comes from here.
     buffer: Vec<u8>,
 }
@@ -50,7 +51,7 @@ pub(super) struct Ended {
 impl Channel {
     pub(super) fn new(node: NodeId) -> Self {
         let client = Client::new(node, core::time::Duration::ZERO);
-        Self { client, active: None, queue: VecDeque::new(), ended: None, buffer: Vec::new() }
+        Self { client, active: None, queue: VecDeque::new(), ended: None, given_up: None, buffer: Vec::new() }
     }
 
     /// Starts the request, or queues it.
@@ -66,7 +67,7 @@ impl Channel {
     /// Forgets a request; one on the wire is aborted. False if it is not here.
     pub(super) fn cancel(&mut self, ticket: Ticket, now: Instant) -> bool {
         if self.active.as_ref().is_some_and(|active| active.ticket == ticket) {
-            self.active = None;
+            self.given_up = self.active.take().map(|active| active.mux);
             self.client.abort(AbortCode::GENERAL);
             self.start_next(now);
             return true;
@@ -100,7 +101,12 @@ impl Channel {
     }
 
     pub(super) fn handle_frame(&mut self, frame: &Frame, now: Instant) {
-        if self.active.as_ref().is_some_and(|active| active.uploads) {
+        let Some(active) = &self.active else { return };
+        let about = mux_of(&Reply::parse(frame.padded()));
+        if about.is_some() && about != Some(active.mux) && about == self.given_up {
+            return;
+        }
+        if active.uploads {
             self.make_room(frame);
         }
         match self.client.handle_frame(frame, &mut self.buffer, now) {
@@ -116,6 +122,7 @@ impl Channel {
 
     pub(super) fn handle_timeout(&mut self, now: Instant) {
         if let Some(failure) = self.client.handle_timeout(now) {
+            self.given_up = self.active.as_ref().map(|active| active.mux);
             self.end(Err(self.failure(failure)));
         }
     }
@@ -167,5 +174,13 @@ impl Channel {
             },
             other => Failure::BadAnswer(other),
         }
+    }
+}
+
+/// The object that an answer is about; segments do not say.
+const fn mux_of(reply: &Reply) -> Option<Mux> {
+    match reply {
+        Reply::InitiateUpload(mux, _) | Reply::InitiateDownload(mux) | Reply::Abort(mux, _) => Some(*mux),
+        _ => None,
     }
 }

@@ -1,3 +1,4 @@
+use core::fmt;
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -22,6 +23,22 @@ pub enum Event {
     NoAnswer(NodeId, Mux, Duration),
     /// A node aborted an SDO request.
     Aborted(NodeId, Mux, AbortCode),
+}
+
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::BootUp(node) => write!(f, "node {node} booted"),
+            Self::NmtState(node, state) => write!(f, "node {node} is {state}"),
+            Self::HeartbeatLost(node, time) => write!(f, "node {node}: no heartbeat for {} ms", time.as_millis()),
+            Self::HeartbeatBack(node) => write!(f, "node {node}: its heartbeat is back"),
+            Self::Emcy(node, emcy) => write!(f, "node {node}: emergency {}", emcy.code),
+            Self::NoAnswer(node, mux, time) => {
+                write!(f, "node {node} did not answer about {mux} within {} ms", time.as_millis())
+            }
+            Self::Aborted(node, mux, code) => write!(f, "node {node} refused {mux}: {code}"),
+        }
+    }
 }
 
 /// How many events are kept until they are pulled; older ones are dropped first.

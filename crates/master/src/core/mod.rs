@@ -56,6 +56,8 @@ pub struct Core {
     watched: NodeSet,
     /// No watched heartbeat is lost before this; it may be too early, never too late.
     heartbeat_check: Instant,
+    /// The earliest of all deadlines; heartbeats may make it too early, never too late.
+    due: Instant,
     image: Image,
     sync: SyncProducer,
     timers: Timers,
@@ -90,6 +92,7 @@ impl Core {
             changed: NodeSet::EMPTY,
             watched: NodeSet::EMPTY,
             heartbeat_check: Instant::FAR_FUTURE,
+            due: Instant::FAR_FUTURE,
             image: Image::default(),
             sync: SyncProducer::default(),
             timers: Timers::default(),
@@ -138,6 +141,7 @@ impl Core {
             Command::WatchHeartbeat(node, time) => self.watch_heartbeat(node, time),
             Command::Transmit(frame) => self.push_frame(frame),
         }
+        self.find_due();
     }
 
     /// The next request or timer that has ended.
@@ -248,6 +252,7 @@ impl Core {
             let now = self.now;
             self.member_mut(node).channel.handle_frame(frame, now);
             self.settle(node);
+            self.find_due();
         }
     }
 
@@ -268,6 +273,7 @@ impl Core {
         }
         if let Some(deadline) = deadline {
             self.heartbeat_check = self.heartbeat_check.min(deadline);
+            self.due = self.due.min(deadline);
         }
     }
 
@@ -302,6 +308,16 @@ impl Core {
         if self.sync.handle_timeout(self.now) {
             self.image.handle_sync();
         }
+    }
+
+    /// Finds the earliest deadline, after anything that may have moved one.
+    fn find_due(&mut self) {
+        let mut due = self.heartbeat_check;
+        for node in self.busy.iter() {
+            due = due.min(self.member(node).channel.poll_timeout().unwrap_or(Instant::FAR_FUTURE));
+        }
+        let others = [self.timers.next(), self.sync.next()];
+        self.due = others.into_iter().flatten().fold(due, Instant::min);
     }
 
     fn push_frame(&mut self, frame: Frame) {
@@ -365,6 +381,9 @@ impl Station for Core {
     fn handle_timeout(&mut self, now: Instant) {
         self.advance(now);
         let now = self.now;
+        if now < self.due {
+            return;
+        }
         for node in self.busy.iter() {
             let channel = &mut self.member_mut(node).channel;
             if channel.poll_timeout().is_some_and(|due| due <= now) {
@@ -378,6 +397,7 @@ impl Station for Core {
         }
         self.produce_sync();
         self.check_heartbeats();
+        self.find_due();
     }
 
     /// NMT and other single frames, then SYNC, RPDOs, SDO.
@@ -390,8 +410,6 @@ impl Station for Core {
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        let sdo = self.busy.iter().filter_map(|node| self.member(node).channel.poll_timeout()).min();
-        let heartbeat = (self.heartbeat_check < Instant::FAR_FUTURE).then_some(self.heartbeat_check);
-        [sdo, heartbeat, self.timers.next(), self.sync.next()].into_iter().flatten().min()
+        (self.due < Instant::FAR_FUTURE).then_some(self.due)
     }
 }
