@@ -128,7 +128,7 @@ impl Drive {
         facts.push(Fact::Heartbeat(seen.heartbeat_age(now)));
         facts.extend(seen.last_emcy().map(|(at, emcy)| {
             let rows = self.profile.map_or(&[][..], |profile| profile.faults.table);
-            Fact::Emcy(now - *at, *emcy, rows.iter().find(|row| row.emcy == emcy.code.0))
+            Fact::Emcy(now - *at, *emcy, rows.iter().find(|row| row.emcy == emcy.code))
         }));
     }
 }

@@ -24,7 +24,9 @@ pub use future::{Elapsed, NodeView, Sleep, Wait};
 pub use join::join_all;
 pub use node::{DEFAULT_TIMEOUT, Node};
 
-/// A CANopen network as its master sees it. See the [module](self).
+/// A CANopen network as its master sees it: a cheap handle that all tasks and the runner share.
+///
+/// Futures that it hands out wait for facts in the core; dropping one cancels what it asked for.
 #[derive(Clone, Debug, Default)]
 pub struct Network {
     shared: Arc<Mutex<Shared>>,
