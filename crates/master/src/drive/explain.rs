@@ -8,6 +8,7 @@ use drives::engine::faults::FaultRow;
 use drives::profile::DriveProfile;
 
 use super::{Drive, ERROR_CODE, MODE, MODE_DISPLAY};
+use crate::decode::emcy_words;
 use crate::error::Error;
 use crate::units::Volts;
 
@@ -37,7 +38,7 @@ pub enum Fact {
     Mode(ModeOfOperation, ModeOfOperation),
     /// Supply voltage at the drive.
     Supply(Volts),
-    /// State by its last heartbeat.
+    /// State by its last heartbeat or the NMT command sent since.
     Nmt(NmtState),
     /// Age of its last heartbeat; `None` if none ever came.
     Heartbeat(Option<Duration>),
@@ -124,7 +125,7 @@ impl Drive {
     fn recall(&self, facts: &mut Vec<Fact>) {
         let now = self.node.network().now();
         let seen = self.node.facts();
-        facts.extend(seen.nmt_state.map(Fact::Nmt));
+        facts.extend(seen.probable_state().map(Fact::Nmt));
         facts.push(Fact::Heartbeat(seen.heartbeat_age(now)));
         facts.extend(seen.last_emcy().map(|(at, emcy)| {
             let rows = self.profile.map_or(&[][..], |profile| profile.faults.table);
@@ -261,7 +262,7 @@ impl fmt::Display for Fact {
             Self::Emcy(age, emcy, Some(row)) => {
                 write!(f, "EMCY {:04X}h ({}) {:.1} s ago", emcy.code.0, row.name, age.as_secs_f64())
             }
-            Self::Emcy(age, emcy, None) => write!(f, "EMCY {} {:.1} s ago", emcy.code, age.as_secs_f64()),
+            Self::Emcy(age, emcy, None) => write!(f, "EMCY {} {:.1} s ago", emcy_words(emcy.code), age.as_secs_f64()),
             Self::Failed(error) => write!(f, "{error}"),
         }
     }
