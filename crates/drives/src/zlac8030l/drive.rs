@@ -114,6 +114,11 @@ impl Zlac8030l {
         self.node.dictionary()
     }
 
+    /// What the control loops are asked for, to look at.
+    pub const fn demand(&self) -> &Demand {
+        &self.demand
+    }
+
     /// The communication side, to look at.
     pub const fn node(&self) -> &Node<ROW_COUNT> {
         &self.node
