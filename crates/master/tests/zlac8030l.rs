@@ -229,3 +229,48 @@ fn a_boot_up_is_seen_after_a_reset() {
     let (mut world, _, drives) = world(&[4]);
     block_on(&mut world, drives[0].node().reset(Duration::from_secs(5))).unwrap().unwrap();
 }
+
+#[test]
+fn a_move_that_was_stopped_is_replaced_by_the_next_one() {
+    let (mut world, network, drives) = world(&[4]);
+    let options = MotionOptions { wait: false, ..slowly() };
+    block_on(&mut world, drives[0].move_absolute(Turns(50.0), options)).unwrap().unwrap();
+    block_on(&mut world, network.sleep(Duration::from_secs(3))).unwrap();
+    block_on(&mut world, drives[0].stop()).unwrap().unwrap();
+    let halted = world.report(4).unwrap();
+    assert!(halted.velocity_rpm.abs() < 2.0 && halted.position > 4096, "{halted:?}");
+    block_on(&mut world, drives[0].move_absolute(Turns(1.0), slowly())).unwrap().unwrap();
+    let position = world.report(4).unwrap().position;
+    assert!((position - 4096).abs() <= 30, "{position}");
+    // Nothing of the first move is left to run.
+    block_on(&mut world, drives[0].supervise(Duration::from_secs(3))).unwrap().unwrap();
+    let position = world.report(4).unwrap().position;
+    assert!((position - 4096).abs() <= 30, "{position}");
+}
+
+#[test]
+fn a_mode_is_changed_from_velocity_to_position_after_a_stop() {
+    let (mut world, _, drives) = world(&[4]);
+    block_on(&mut world, drives[0].velocity(Rpm(-60.0), MotionOptions::default())).unwrap().unwrap();
+    block_on(&mut world, drives[0].stop()).unwrap().unwrap();
+    block_on(&mut world, drives[0].move_absolute(Turns(0.5), slowly())).unwrap().unwrap();
+    let position = world.report(4).unwrap().position;
+    assert!((position - 2048).abs() <= 30, "{position}");
+    block_on(&mut world, drives[0].velocity(Rpm(60.0), MotionOptions::default())).unwrap().unwrap();
+    assert!((world.report(4).unwrap().velocity_rpm - 60.0).abs() < 4.0);
+}
+
+#[test]
+fn a_finer_speed_resolution_takes_effect_after_save_and_restart() {
+    let (mut world, network, drives) = world(&[4]);
+    let node = drives[0].node().clone();
+    block_on(&mut world, node.write(mux(0x202F, 5), 10_u16)).unwrap().unwrap();
+    block_on(&mut world, drives[0].save()).unwrap().unwrap();
+    block_on(&mut world, network.sleep(Duration::from_secs(1))).unwrap();
+    block_on(&mut world, node.reset(Duration::from_secs(5))).unwrap().unwrap();
+    block_on(&mut world, network.sleep(Duration::from_secs(1))).unwrap();
+    block_on(&mut world, drives[0].velocity(Rpm(30.5), MotionOptions::default())).unwrap().unwrap();
+    assert_eq!(block_on(&mut world, node.read::<i32>(mux(0x60FF, 0))).unwrap().unwrap(), 305);
+    let speed = world.report(4).unwrap().velocity_rpm;
+    assert!((speed - 30.5).abs() < 2.5, "{speed}");
+}
