@@ -291,3 +291,17 @@ fn a_runner_that_sleeps_is_woken_when_something_is_asked_for() {
     network.sync(None);
     assert_eq!(count.0.load(Ordering::Relaxed), 4, "once for the poll, twice for the lasting waker");
 }
+
+#[test]
+fn what_is_dropped_before_the_runner_comes_leaves_no_trace() {
+    let mut network = master::Network::new();
+    let node = network.node(node(4));
+    for _ in 0..10_000 {
+        let mut read = Box::pin(node.read::<u32>(DEVICE_TYPE));
+        let mut context = std::task::Context::from_waker(std::task::Waker::noop());
+        assert!(read.as_mut().poll(&mut context).is_pending());
+    }
+    can::Station::handle_timeout(&mut network, Instant::from_secs(1));
+    assert_eq!(can::Station::poll_transmit(&mut network), None);
+    assert_eq!(can::Station::poll_timeout(&network), None);
+}
