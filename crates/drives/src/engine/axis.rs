@@ -352,7 +352,9 @@ impl Axis {
             PowerState::NotReadyToSwitchOn | PowerState::FaultReactionActive | PowerState::Fault
         );
         if !(lock && lockable) {
-            self.disengage();
+            if self.engaged != Engaged::No {
+                self.disengage();
+            }
             return Demand::Off;
         }
         if self.engaged != Engaged::Locked {
