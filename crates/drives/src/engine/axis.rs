@@ -383,7 +383,9 @@ impl Axis {
 
     fn idle(&mut self, parameters: &AxisParameters) -> Demand {
         if !self.is_locked(parameters) {
-            self.disengage();
+            if self.engaged != Engaged::No {
+                self.disengage();
+            }
             return Demand::Off;
         }
         if self.engaged != Engaged::Locked {

@@ -67,15 +67,27 @@ impl<A: Assembly> Machine<A> {
     fn tick(&mut self, at: Instant) {
         self.watch_supply(at);
         if self.running {
-            let angle = self.assembly.shaft_counts();
-            let mut levels = 0;
-            for (n, input) in self.inputs.iter().enumerate() {
-                levels |= u32::from(input.level(angle)) << n;
-            }
-            let sensors = self.assembly.sense(levels);
-            self.actuation = self.firmware.tick(&sensors, at);
+            let sensors = self.assembly.sense(self.input_levels());
+            let next = self.firmware.tick(&sensors, at);
+            self.assembly.step(&self.actuation);
+            self.actuation = next;
+        } else {
+            self.assembly.step(&self.actuation);
         }
-        self.assembly.step(&self.actuation);
+    }
+
+    /// Bit `n` is the level of input `n`.
+    #[inline]
+    fn input_levels(&self) -> u32 {
+        let mut levels = 0;
+        for (n, input) in self.inputs.iter().enumerate() {
+            let level = match input {
+                Input::Level(level) => *level,
+                Input::Switch(range) => range.contains(self.assembly.shaft_counts()),
+            };
+            levels |= u32::from(level) << n;
+        }
+        levels
     }
 
     /// Starts the firmware when its voltage comes and stops it when it goes.

@@ -25,13 +25,6 @@ impl Input {
         let (low, high) = (range.low.map(place), range.high.map(place));
         Self::Switch(if reversed { SwitchRange { low: high, high: low } } else { SwitchRange { low, high } })
     }
-
-    pub(super) fn level(self, shaft: i64) -> bool {
-        match self {
-            Self::Level(level) => level,
-            Self::Switch(range) => range.contains(shaft),
-        }
-    }
 }
 
 #[cfg(test)]
@@ -40,12 +33,16 @@ mod tests {
 
     const RANGE: SwitchRange = SwitchRange { low: Some(-50), high: Some(-40) };
 
+    fn is_high(input: Input, shaft: i64) -> bool {
+        matches!(input, Input::Switch(range) if range.contains(shaft))
+    }
+
     #[test]
     fn a_switch_stays_where_it_is_when_the_drive_zeroes_its_position() {
         // The drive shows 100 with the shaft at 1000: -50..-40 is 850..860 of the shaft for ever.
         let switch = Input::switch(RANGE, 100, 1000, false);
         for (shaft, level) in [(849, false), (850, true), (860, true), (861, false)] {
-            assert_eq!(switch.level(shaft), level, "{shaft}");
+            assert_eq!(is_high(switch, shaft), level, "{shaft}");
         }
     }
 
@@ -53,15 +50,15 @@ mod tests {
     fn a_drive_that_counts_backwards_has_its_switch_on_the_other_side() {
         let switch = Input::switch(RANGE, 100, 1000, true);
         for (shaft, level) in [(1139, false), (1140, true), (1150, true), (1151, false)] {
-            assert_eq!(switch.level(shaft), level, "{shaft}");
+            assert_eq!(is_high(switch, shaft), level, "{shaft}");
         }
     }
 
     #[test]
     fn an_open_end_reaches_for_ever_in_the_drives_direction() {
         let range = SwitchRange { low: Some(0), high: None };
-        assert!(Input::switch(range, 0, 0, false).level(i64::MAX));
-        assert!(Input::switch(range, 0, 0, true).level(i64::MIN));
-        assert!(!Input::switch(range, 0, 0, true).level(1));
+        assert!(is_high(Input::switch(range, 0, 0, false), i64::MAX));
+        assert!(is_high(Input::switch(range, 0, 0, true), i64::MIN));
+        assert!(!is_high(Input::switch(range, 0, 0, true), 1));
     }
 }

@@ -1,3 +1,8 @@
+//! A ZLAC8030L on its hardware: hub motor, load, brake, supply and EEPROM as the assembly of a machine.
+//!
+//! In go the power stage, bleeder, outputs and brake of the firmware, out come its sensors and the report for people.
+//! Figures of the motor are those of `plant`; what is assumed of the surroundings is a constant below.
+
 use drives::engine::axis::Demand;
 use drives::zlac8030l::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use drives::zlac8030l::readings::REFERENCE_V;
