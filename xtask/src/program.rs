@@ -16,7 +16,7 @@ pub(crate) fn build(command: &str) -> Result<PathBuf, Tally> {
     }
     let program = workspace::target().join("debug").join(format!("ferrodrive{}", std::env::consts::EXE_SUFFIX));
     if !process::works(&program.to_string_lossy(), &[command, "--help"]) {
-        return Err(Tally::skipped(format!("this ferrodrive has no command `{command}`")));
+        return Err(Tally::failed(format!("this ferrodrive has no command `{command}`")));
     }
     Ok(program)
 }

@@ -6,12 +6,14 @@
 #![no_std]
 
 mod controlword;
+mod homing_method;
 mod mode;
 mod option_code;
 mod power;
 mod statusword;
 
 pub use controlword::{Controlword, PowerCommand};
+pub use homing_method::{Direction, HOMING_METHODS, HomingMethod, HomingRow, HomingSwitch, SwitchEdge};
 pub use mode::ModeOfOperation;
 pub use option_code::{DisableOperationOption, HaltOption, QuickStopOption, ShutdownOption};
 pub use power::{PowerEvent, PowerState, TRANSITIONS, Transition, next_command, transition};

@@ -8,8 +8,8 @@ use cia402::{ModeOfOperation, PowerState};
 /// - [`power_on`](Self::power_on) starts it from cold; until then, and after [`power_off`](Self::power_off), it is
 ///   silent and its power stage is off.
 /// - The owner calls [`tick`](Self::tick) once every [`CONTROL_PERIOD_NS`](Self::CONTROL_PERIOD_NS), as a
-///   microcontroller's timer interrupt does, with what the sensors read at that moment. What it returns holds until
-///   the next tick.
+///   microcontroller's timer interrupt does, with what the sensors read at that moment. What it returns holds from
+///   the next tick to the one after it: duty cycles go through the timer's shadow registers.
 /// - [`Station::poll_timeout`] covers communication only and never asks for a tick.
 /// - The owner keeps [`eeprom`](Self::eeprom) over power cycles: whenever the generation has changed, the bytes have.
 ///   A write that was cut short in the middle leaves the old contents or the new ones.

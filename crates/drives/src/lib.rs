@@ -12,6 +12,7 @@ extern crate std;
 pub mod engine;
 mod firmware;
 pub mod profile;
+mod row;
 pub mod zlac8030l;
 
 pub use firmware::{Firmware, Report};

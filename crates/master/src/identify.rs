@@ -70,7 +70,7 @@ pub struct Found {
     pub node: NodeId,
     /// What it says that it is; `None` if it answers no SDO.
     pub identity: Option<Identity>,
-    /// Its NMT state, if a boot-up or heartbeat message was seen.
+    /// Its NMT state by its last boot-up or heartbeat message, or the NMT command sent since.
     pub nmt_state: Option<NmtState>,
     /// The models that answer so. More than one: it cannot be told which.
     pub models: Vec<&'static DriveProfile>,
@@ -162,7 +162,7 @@ impl Network {
             return None;
         }
         let models = identity.map(models_answering).unwrap_or_default();
-        Some(Found { node: id, identity, nmt_state: facts.nmt_state, models })
+        Some(Found { node: id, identity, nmt_state: facts.probable_state(), models })
     }
 }
 

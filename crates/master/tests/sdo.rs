@@ -262,3 +262,46 @@ fn a_request_that_nobody_takes_from_the_master_is_told_as_such() {
     let std::task::Poll::Ready(Err(error)) = read.as_mut().poll(&mut context) else { panic!("not ready") };
     assert!(error.to_string().contains("never left this computer"), "{error}");
 }
+
+#[test]
+fn a_runner_that_sleeps_is_woken_when_something_is_asked_for() {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicU32, Ordering};
+    struct Count(AtomicU32);
+    impl std::task::Wake for Count {
+        fn wake(self: Arc<Self>) {
+            self.0.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+    let count = Arc::new(Count(AtomicU32::new(0)));
+    let waker = std::task::Waker::from(count.clone());
+    let mut context = std::task::Context::from_waker(&waker);
+    let mut network = master::Network::new();
+    assert!(network.poll_activity(&mut context).is_pending());
+    network.nmt_all(canopen::NmtCommand::Start);
+    assert_eq!(count.0.load(Ordering::Relaxed), 1);
+    assert!(network.poll_activity(&mut context).is_ready());
+    // Ready once; the command goes out at the runner's next call, for which the deadline asks at once.
+    assert!(network.poll_activity(&mut context).is_pending());
+    assert_eq!(can::Station::poll_timeout(&network), Some(Instant::ZERO));
+    can::Station::handle_timeout(&mut network, Instant::from_secs(1));
+    assert_eq!(can::Station::poll_transmit(&mut network).unwrap().to_string(), "000#0100");
+    network.on_activity(waker.clone());
+    network.sync(None);
+    network.sync(None);
+    assert_eq!(count.0.load(Ordering::Relaxed), 4, "once for the poll, twice for the lasting waker");
+}
+
+#[test]
+fn what_is_dropped_before_the_runner_comes_leaves_no_trace() {
+    let mut network = master::Network::new();
+    let node = network.node(node(4));
+    for _ in 0..10_000 {
+        let mut read = Box::pin(node.read::<u32>(DEVICE_TYPE));
+        let mut context = std::task::Context::from_waker(std::task::Waker::noop());
+        assert!(read.as_mut().poll(&mut context).is_pending());
+    }
+    can::Station::handle_timeout(&mut network, Instant::from_secs(1));
+    assert_eq!(can::Station::poll_transmit(&mut network), None);
+    assert_eq!(can::Station::poll_timeout(&network), None);
+}

@@ -1,6 +1,6 @@
 //! A virtual CAN bus and virtual machines in deterministic time.
 //!
-//! [`World`] holds drives joined to their physics ([`VirtualDrive`]), other stations and the bus
+//! [`World`] holds drives joined to their physics ([`VirtualDrive`], built in [`machine`]), other stations and the bus
 //! ([`wire`]), and moves time from event to event. The same seed and the same calls give the same
 //! frames at the same nanoseconds on every run; a clone of a world resumes with identical results.
 //! [`block_on`] runs a future against a world, [`command`] is the text protocol of `ferrodrive sim`,
@@ -12,6 +12,7 @@ mod block_on;
 pub mod command;
 mod drive;
 pub mod fault;
+pub mod machine;
 pub mod pace;
 mod prng;
 pub mod recorder;

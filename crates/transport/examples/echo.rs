@@ -1,5 +1,5 @@
 //! Serves a bus with one station on it: it answers every data frame with the same data under the next identifier, and
-//! sends a heartbeat. For trying other programs against the servers:
+//! sends a heartbeat. For trying other programs against the servers; without arguments it takes a free socketcand port:
 //!
 //! ```text
 //! cargo run -p ferrodrive-transport --example echo -- socketcand://127.0.0.1:29536 slcan://127.0.0.1:3000
@@ -47,7 +47,10 @@ impl Station for Echo {
 
 #[tokio::main(flavor = "current_thread")]
 async fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let places: Vec<ServeSpec> = std::env::args().skip(1).map(|place| place.parse()).collect::<Result<_, _>>()?;
+    let mut places: Vec<ServeSpec> = std::env::args().skip(1).map(|place| place.parse()).collect::<Result<_, _>>()?;
+    if places.is_empty() {
+        places.push("socketcand://127.0.0.1:0".parse()?);
+    }
     let clock = WallClock::start();
     let options = HubOptions { zero: clock.unix_zero(), ..HubOptions::default() };
     let mut hub = Hub::bind(&places, options, &clock).await?;

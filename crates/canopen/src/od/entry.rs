@@ -45,6 +45,17 @@ pub enum PdoMapping {
     Yes,
 }
 
+/// How an object looks in TPDOs, where SDO shows it otherwise.
+#[derive(Clone, Copy, Debug)]
+pub struct TpdoForm {
+    /// Its type there.
+    pub data_type: DataType,
+    /// Unit of one count of the value there.
+    pub unit: &'static str,
+    /// The value there from the object's cell.
+    pub convert: fn(u32) -> u32,
+}
+
 /// The value after a factory reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Default {
@@ -90,6 +101,8 @@ pub struct Entry {
     pub stored: bool,
     /// May be mapped into PDOs.
     pub pdo: PdoMapping,
+    /// Another type and scale in TPDOs.
+    pub tpdo_form: Option<TpdoForm>,
     /// Further condition on downloads.
     pub check: Option<Check>,
 }
@@ -117,6 +130,7 @@ impl Entry {
             unit: "",
             stored: false,
             pdo: PdoMapping::No,
+            tpdo_form: None,
             check: None,
         }
     }
@@ -166,6 +180,13 @@ impl Entry {
     /// May be mapped into PDOs.
     pub const fn mappable(mut self) -> Self {
         self.pdo = PdoMapping::Yes;
+        self
+    }
+
+    /// May be mapped into TPDOs, with another type and scale than SDO shows.
+    pub const fn mappable_as(mut self, form: TpdoForm) -> Self {
+        self.pdo = PdoMapping::Yes;
+        self.tpdo_form = Some(form);
         self
     }
 

@@ -12,5 +12,5 @@ mod table;
 
 pub use data_type::{DataType, Scalar};
 pub use dictionary::{Dictionary, View};
-pub use entry::{Access, Check, Default, Entry, PdoMapping};
+pub use entry::{Access, Check, Default, Entry, PdoMapping, TpdoForm};
 pub use table::{Object, Slot, Table, keys};

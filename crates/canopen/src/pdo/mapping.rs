@@ -49,7 +49,11 @@ impl MappingRecord {
             Direction::Receive => row.access.is_writable(),
             Direction::Transmit => row.access.is_readable(),
         };
-        let fits = row.data_type.bits() == self.bits && self.bits > 0;
+        let data_type = match (direction, row.tpdo_form) {
+            (Direction::Transmit, Some(form)) => form.data_type,
+            _ => row.data_type,
+        };
+        let fits = data_type.bits() == self.bits && self.bits > 0;
         if row.pdo == PdoMapping::Yes && allowed && fits { Ok(slot) } else { Err(AbortCode::NOT_MAPPABLE) }
     }
 }
@@ -68,6 +72,8 @@ pub struct Mapped {
     /// The row.
     pub slot: Slot,
     shift: u8,
+    /// The row has another form in TPDOs.
+    converted: bool,
 }
 
 impl Mapping {
@@ -100,13 +106,14 @@ impl Mapping {
             let raw = values.value(Mux::new(index, sub_index)).map_err(|_| AbortCode::PDO_TOO_LONG)?;
             let record = MappingRecord::from_raw(raw as u32);
             let slot = record.resolve(values, direction)?;
-            mapping = Some(Self::extended(mapping, slot, record.bits)?);
+            let converted = direction == Direction::Transmit && values.table().row(slot).tpdo_form.is_some();
+            mapping = Some(Self::extended(mapping, slot, record.bits, converted)?);
         }
         Ok(mapping)
     }
 
-    fn extended(mapping: Option<Self>, slot: Slot, bits: u8) -> Result<Self, AbortCode> {
-        let first = Mapped { slot, shift: 0 };
+    fn extended(mapping: Option<Self>, slot: Slot, bits: u8, converted: bool) -> Result<Self, AbortCode> {
+        let first = Mapped { slot, shift: 0, converted };
         let Some(mut mapping) = mapping else {
             return Ok(Self { objects: [first; MAX_OBJECTS], count: 1, length: bits / 8 });
         };
@@ -114,7 +121,7 @@ impl Mapping {
         if u32::from(used_bits) + u32::from(bits) > MAX_BITS {
             return Err(AbortCode::PDO_TOO_LONG);
         }
-        mapping.objects[usize::from(mapping.count)] = Mapped { slot, shift: used_bits };
+        mapping.objects[usize::from(mapping.count)] = Mapped { slot, shift: used_bits, converted };
         mapping.count += 1;
         mapping.length += bits / 8;
         Ok(mapping)
@@ -134,14 +141,64 @@ impl Mapping {
     /// The PDO's data, the first object in the lowest bits.
     #[inline]
     pub fn gather(&self, values: &View<'_>) -> u64 {
-        self.objects().iter().fold(0, |data, object| data | u64::from(values.raw(object.slot)) << object.shift)
+        self.objects().iter().fold(0, |data, object| data | u64::from(object.sample(values)) << object.shift)
     }
 }
 
 impl Mapped {
+    /// The object's value as the PDO shows it.
+    #[inline]
+    fn sample(&self, values: &View<'_>) -> u32 {
+        let raw = values.raw(self.slot);
+        if self.converted { self.convert(values, raw) } else { raw }
+    }
+
+    #[cold]
+    fn convert(&self, values: &View<'_>, raw: u32) -> u32 {
+        values.table().row(self.slot).tpdo_form.map_or(raw, |form| (form.convert)(raw))
+    }
+
     /// The object's value within `data` of a received PDO, in its low bytes; what stands above them means nothing.
     #[inline]
     pub const fn extract(&self, data: u64) -> u32 {
         (data >> self.shift) as u32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::NodeId;
+    use crate::od::{Access, DataType, Dictionary, Entry, Object, Table, TpdoForm, keys};
+
+    /// A speed that SDO shows in 16 bits of 0.1 r/min and TPDOs in 32 bits of r/min.
+    const IN_TPDO: TpdoForm =
+        TpdoForm { data_type: DataType::Integer32, unit: "r/min", convert: |raw| (i32::from(raw as i16) / 10) as u32 };
+
+    static ROWS: [Entry; 3] = [
+        Entry::new(0x1A00, 0, DataType::Unsigned8, Access::ReadOnly, "mapping", "Mapping").default(1),
+        Entry::new(0x1A00, 1, DataType::Unsigned32, Access::ReadOnly, "mapping_1", "Mapping 1").default(0x606C_0020),
+        Entry::new(0x606C, 0, DataType::Integer16, Access::ReadWrite, "speed", "Speed").mappable_as(IN_TPDO),
+    ];
+    static KEYS: [u32; 3] = keys(&ROWS);
+    static TABLE: Table = Table::new(&ROWS, &KEYS);
+    const SPEED: Object<i16> = TABLE.object(0x606C, 0);
+
+    #[test]
+    fn an_object_with_another_form_in_tpdos_is_mapped_and_sent_in_it() {
+        let mut values = Dictionary::<3>::new(&TABLE, NodeId::MIN);
+        values.set(SPEED, -6004);
+        let mapping = Mapping::read(&values.view(), 0x1A00, Direction::Transmit).unwrap().unwrap();
+        assert_eq!(mapping.length(), 4);
+        assert_eq!(mapping.gather(&values.view()) as u32 as i32, -600);
+    }
+
+    #[test]
+    fn in_rpdos_and_by_its_sdo_length_in_tpdos_the_forms_are_kept_apart() {
+        let values = Dictionary::<3>::new(&TABLE, NodeId::MIN);
+        let resolve = |raw, direction| MappingRecord::from_raw(raw).resolve(&values.view(), direction);
+        assert_eq!(resolve(0x606C_0010, Direction::Transmit), Err(AbortCode::NOT_MAPPABLE));
+        assert_eq!(resolve(0x606C_0020, Direction::Receive), Err(AbortCode::NOT_MAPPABLE));
+        assert!(resolve(0x606C_0010, Direction::Receive).is_ok());
     }
 }

@@ -60,6 +60,8 @@ struct Sink {
     format: Format,
     log: Option<LogWriter<BufWriter<File>>>,
     path: Option<PathBuf>,
+    /// Unix time of the time axis's zero, for the log; a recorded bus has Unix times already.
+    unix_zero: Duration,
 }
 
 impl Dump {
@@ -93,6 +95,9 @@ impl Dump {
     async fn listen(&self, global: &Global, sink: &mut Sink) -> Result<(), Failure> {
         let clock = WallClock::start();
         let mut bus = global.bus.open(&clock).await.map_err(|error| bus_failure(global, &error))?;
+        if !matches!(global.bus, BusSpec::Log { .. }) {
+            sink.unix_zero = clock.unix_zero();
+        }
         let end = self.duration.map(|duration| clock.now() + duration);
         let over = async {
             tokio::select! {
@@ -126,12 +131,12 @@ impl Sink {
         }
         let log = path.map(File::create).transpose().map_err(|error| log_failure(path, &error))?;
         let log = log.map(|file| LogWriter::new(BufWriter::new(file), "can0"));
-        Ok(Self { decoder, format, log, path: path.map(Into::into) })
+        Ok(Self { decoder, format, log, path: path.map(Into::into), unix_zero: Duration::ZERO })
     }
 
     fn take(&mut self, at: Instant, frame: &Frame) -> Result<(), Failure> {
         if let Some(log) = &mut self.log {
-            log.write(at, frame).map_err(|error| log_failure(self.path.as_deref(), &error))?;
+            log.write(at + self.unix_zero, frame).map_err(|error| log_failure(self.path.as_deref(), &error))?;
         }
         let text = self.decoder.decode(frame).to_string();
         let line = Line { t: at.as_secs_f64(), frame: frame.to_string(), text };

@@ -11,8 +11,10 @@ const RIGHT: f64 = 128.0;
 const TOP: f64 = 74.0;
 const SECTION_STRIP: f64 = 40.0;
 const EVENT_LANE: f64 = 17.0;
-const EVENT_LANES: usize = 6;
+const EVENT_LANES: usize = 7;
 const PANEL_HEIGHT: f64 = 150.0;
+/// Names may come this close to their neighbours: their width is estimated on the safe side.
+const CROWDING: f64 = 1.1;
 /// Holds the title of the panel below.
 const PANEL_GAP: f64 = 34.0;
 /// Room above and below the values of a panel, as a part of their range.
@@ -70,10 +72,10 @@ pub(super) fn figure(figure: &Figure) -> String {
     svg.text((24.0, 34.0), Anchor::Start, TITLE, &figure.title);
     svg.text((24.0, 55.0), Anchor::Start, SUBTITLE, &figure.subtitle);
     sections(&mut svg, &layout, figure);
+    draw_events(&mut svg, &layout, &events, &event_lanes);
     for (number, panel) in figure.panels.iter().enumerate() {
         draw_panel(&mut svg, &layout, layout.panel_top(number), panel);
     }
-    draw_events(&mut svg, &layout, &events, &event_lanes);
     time_axis(&mut svg, &layout);
     svg.document((WIDTH, height), &figure.title)
 }
@@ -85,7 +87,7 @@ fn sections(svg: &mut Svg, layout: &Layout, figure: &Figure) {
             let size = (right - left, layout.panels_bottom - TOP);
             svg.rect((left, TOP), size, 0.0, &format!(r#"fill="{BAND}""#));
         }
-        let fits = |name: &&String| SECTION.width(name) < right - left - 4.0;
+        let fits = |name: &&String| SECTION.width(name) < (right - left) * CROWDING;
         let middle = (left + right) / 2.0;
         if NUMBER.width(&section.number) < right - left {
             svg.text((middle, TOP + 17.0), Anchor::Middle, NUMBER, &section.number);

@@ -112,6 +112,14 @@ impl Servo {
         self.observer.update(&model.observer, count);
     }
 
+    /// The same for a shaft whose encoder is absolute: its electrical angle in turns, and its counts, of which the
+    /// lowest 16 bits are enough.
+    #[inline]
+    pub fn sense_absolute(&mut self, model: &ServoModel, electrical_turns: f32, count: u16) {
+        self.electrical_turns = electrical_turns;
+        self.observer.update(&model.observer, count);
+    }
+
     /// Takes the angle anew from the Hall sensors, as at power-on.
     pub fn realign(&mut self, model: &ServoModel, hall: u8, count: u16) {
         self.commutation = Commutation::new(&model.commutation, hall, count);

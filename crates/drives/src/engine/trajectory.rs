@@ -3,7 +3,7 @@
 //! Units are encoder counts and counts/s. The anchor is a wrapping 32-bit position, so a shaft may turn for ever; the
 //! way since the anchor is in double precision, so a move over 2^31 counts ends exactly.
 
-use motion::{Profile, scurve};
+use motion::{Profile, scurve, trapezoid};
 
 /// A planned motion and how far it has come.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +37,15 @@ impl TrajectoryPoint {
     pub const fn moving(position: i32, velocity: f64) -> Self {
         Self { position, fraction: 0.0, velocity, acceleration: 0.0 }
     }
+}
+
+/// Speed and acceleration that a move of straight ramps keeps to, in counts and seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StraightRamps {
+    /// Speed of the plateau.
+    pub max_speed: f64,
+    /// Of speeding up and slowing down; 0 for no ramp.
+    pub acceleration: f64,
 }
 
 /// Speeds and times that a move keeps to, in counts and seconds.
@@ -85,6 +94,25 @@ impl Trajectory {
         let profile = scurve::velocity_change(velocity - change, velocity, time_s);
         let passed = profile.at(elapsed_s).position;
         Self { origin: from.position, fraction: from.fraction - passed, profile, elapsed_s }
+    }
+
+    /// From `from` to the position `target` with straight ramps, the short way round if the counter wraps in between.
+    pub fn move_straight(from: TrajectoryPoint, target: i32, ramps: &StraightRamps) -> Self {
+        let plan = trapezoid::PositionMove {
+            distance: f64::from(target.wrapping_sub(from.position)) - from.fraction,
+            velocity: from.velocity,
+            max_speed: ramps.max_speed,
+            acceleration: ramps.acceleration,
+            deceleration: ramps.acceleration,
+            ..Default::default()
+        };
+        Self { origin: from.position, fraction: from.fraction, profile: plan.plan(), elapsed_s: 0.0 }
+    }
+
+    /// From the velocity of `from` to `velocity` along a straight ramp; an acceleration of 0 is a step.
+    pub fn ramp_velocity(from: TrajectoryPoint, velocity: f64, acceleration: f64) -> Self {
+        let profile = trapezoid::velocity_change(from.velocity, velocity, acceleration);
+        Self { origin: from.position, fraction: from.fraction, profile, elapsed_s: 0.0 }
     }
 
     /// One period on; returns the new point.
@@ -223,6 +251,25 @@ mod tests {
             trajectory.advance(DT_S);
         }
         assert_eq!(trajectory.point().position, i32::MIN + 10);
+    }
+
+    #[test]
+    fn straight_ramps_take_the_time_of_their_trapezoid() {
+        // 1000 counts at most 1000 counts/s and 2000 counts/s²: 0.5 s up, 0.5 s level, 0.5 s down.
+        let ramps = StraightRamps { max_speed: 1000.0, acceleration: 2000.0 };
+        let mut trajectory = Trajectory::move_straight(TrajectoryPoint::rest(-200), 800, &ramps);
+        let mut periods = 0;
+        while !trajectory.is_resting() {
+            trajectory.advance(DT_S);
+            periods += 1;
+        }
+        assert!((f64::from(periods) * DT_S - 1.5).abs() < 2.0 * DT_S, "{periods}");
+        assert_eq!(trajectory.point().position, 800);
+        let mut trajectory = Trajectory::ramp_velocity(TrajectoryPoint::rest(0), -500.0, 2000.0);
+        (0..500).for_each(|_| drop(trajectory.advance(DT_S)));
+        assert!(trajectory.is_done() && trajectory.point().velocity == -500.0);
+        let stepped = Trajectory::ramp_velocity(TrajectoryPoint::rest(0), 500.0, 0.0);
+        assert_eq!(stepped.point().velocity, 500.0);
     }
 
     #[test]

@@ -70,7 +70,8 @@ pub(super) fn gains(values: &Values, velocity_limit_rad_s: f32) -> ServoGains {
             // The drive has no objects for the motor's inductance and flux.
             feed_forward: None,
             modulation_limit: MODULATION_LIMIT,
-            voltage_delay_s: 0.5 * CONTROL_PERIOD_S,
+            // To the middle of the period that follows the next tick: see the contract of `Firmware::tick`.
+            voltage_delay_s: 1.5 * CONTROL_PERIOD_S,
         },
         cascade: CascadeGains {
             position_per_s: count(POSITION_KP) * POSITION_KP_PER_S,

@@ -76,7 +76,8 @@ impl NodeFacts {
         !booted && core::mem::take(&mut watch.lost)
     }
 
-    /// The state that it must be in: what it last said, or what this master last told it since.
+    /// The state that it must be in: what it last said, or what this master last told it since. A boot-up message is
+    /// followed by pre-operational without a word (CiA 301, 7.3.2.2.1).
     pub fn probable_state(&self) -> Option<NmtState> {
         let told = self.nmt_sent.filter(|(at, _)| self.heartbeat_at.is_none_or(|heard| heard < *at));
         let told = told.and_then(|(_, command)| match command {
@@ -85,7 +86,11 @@ impl NodeFacts {
             NmtCommand::EnterPreOperational => Some(NmtState::PreOperational),
             NmtCommand::ResetNode | NmtCommand::ResetCommunication => None,
         });
-        told.or(self.nmt_state)
+        let said = self.nmt_state.map(|state| match state {
+            NmtState::Initialising => NmtState::PreOperational,
+            state => state,
+        });
+        told.or(said)
     }
 
     /// True once when the watched heartbeat has not come in time.

@@ -52,6 +52,16 @@ pub enum Command {
     Transmit(Frame),
 }
 
+impl Command {
+    /// The ticket of a request or timer to be started.
+    pub const fn ticket(&self) -> Option<Ticket> {
+        match self {
+            Self::Request(ticket, _) | Self::Timer(ticket, _) => Some(*ticket),
+            _ => None,
+        }
+    }
+}
+
 /// How a request or timer ended. A timer ends with no bytes.
 pub type Outcome = Result<Payload, Failure>;
 

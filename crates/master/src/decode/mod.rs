@@ -26,6 +26,7 @@ use sdo::Conversations;
 pub use pdo::{Direction, Pdo};
 pub use sdo::{Sdo, SdoStep, Side};
 pub use value::Value;
+pub(crate) use value::emcy_words;
 
 /// What one frame says.
 #[derive(Clone, Debug)]
@@ -165,7 +166,7 @@ impl fmt::Display for Decoded {
             Self::Sync(_) => f.write_str("SYNC"),
             Self::Time => f.write_str("TIME"),
             Self::Emcy(node, emcy) => {
-                write!(f, "EMCY node {node}: {}, error register {:02X}h", emcy.code, emcy.error_register)?;
+                write!(f, "EMCY node {node}: {}, error register {:02X}h", emcy_words(emcy.code), emcy.error_register)?;
                 if emcy.manufacturer != [0; 5] {
                     f.write_str(", manufacturer")?;
                     emcy.manufacturer.iter().try_for_each(|byte| write!(f, " {byte:02X}"))?;

@@ -1,7 +1,7 @@
 use core::fmt;
 
-use canopen::Mux;
 use canopen::od::{DataType, Entry, Table};
+use canopen::{EmcyErrorCode, Mux};
 use cia402::{Controlword, ModeOfOperation, Statusword};
 
 /// The bytes of one object, with what is known about it. Prints as `6041h:00 statusword = 0237h (Operation enabled)`.
@@ -72,11 +72,25 @@ pub(super) fn find(table: Option<&Table>, mux: Mux) -> Option<&'static Entry> {
     Some(table.row(table.find(mux).ok()?))
 }
 
+/// An emergency error code in words. Codes 0001h to 00FFh are no errors to the standard and the maker's own to some
+/// drives, which send their fault codes in them.
+pub(crate) fn emcy_words(code: EmcyErrorCode) -> String {
+    match code.0 {
+        0x0000 => "0000h (error reset)".to_owned(),
+        0x0001..=0x00FF => format!("{:04X}h (a code of the maker's)", code.0),
+        _ => code.to_string(),
+    }
+}
+
 /// Objects whose bits mean the same on every CiA 402 drive.
 fn standard_words(mux: Mux, raw: u32) -> Option<String> {
     match (mux.index, mux.sub_index) {
         (0x6040, 0) => Some(Controlword(raw as u16).to_string()),
-        (0x6041, 0) => Some(Statusword(raw as u16).to_string()),
+        (0x6041, 0) => {
+            let word = Statusword(raw as u16);
+            let reached = if word.has(Statusword::TARGET_REACHED) { ", target reached" } else { "" };
+            Some(format!("{word}{reached}"))
+        }
         (0x6060 | 0x6061, 0) => Some(ModeOfOperation(raw as u8 as i8).to_string()),
         (0x1600..=0x17FF | 0x1A00..=0x1BFF, 1..) => {
             Some(format!("{raw:08X}h ({}, {} bits)", Mux::from_key(raw >> 8), raw & 0xFF))

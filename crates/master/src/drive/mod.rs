@@ -5,6 +5,7 @@
 //! from its [`DriveProfile`]; 6502h is never asked for. Without a profile only what the standard fixes is offered.
 //! While a motion is supervised, the polling keeps the drive's watch over its host content.
 
+mod conclude;
 mod explain;
 mod goal;
 mod motion;

@@ -52,13 +52,14 @@ impl Drive {
         self.enable().await?;
         let began_at = self.read_number(POSITION_ACTUAL).await?;
         let target = if relative { began_at.saturating_add(counts) } else { counts };
-        let limit = self.time_for(target.abs_diff(began_at) as f64, speed).await?;
+        let turn = self.counts_per_turn().await?.max(1.0);
+        let limit = self.time_for(target.abs_diff(began_at) as f64 / turn, speed).await?;
         self.give_set_point(INTENT, counts, relative).await?;
         let notes = self.notes().await;
         if !options.wait {
             return Ok(MotionReport { reached_after: None, notes });
         }
-        let band = (self.counts_per_turn().await? * REACHED_TURNS).max(1.0);
+        let band = (turn * REACHED_TURNS).max(1.0);
         let reached = self.watch(INTENT, Goal::Position { target, band, seen_clear: false }, limit).await?;
         self.node.network().note_stopped(self.node.id());
         Ok(MotionReport { reached_after: Some(reached), notes })
@@ -93,9 +94,8 @@ impl Drive {
     }
 
     /// Upper bound of a move's duration: the way at full speed plus both ramps, stretched by the margin.
-    async fn time_for(&self, counts: f64, speed_rpm: f64) -> Result<Duration, Error> {
+    async fn time_for(&self, turns: f64, speed_rpm: f64) -> Result<Duration, Error> {
         let (up, down) = self.ramp_times_s().await?;
-        let turns = counts / self.counts_per_turn().await?.max(1.0);
         let cruise = if speed_rpm > 0.0 { turns / speed_rpm * 60.0 } else { f64::INFINITY };
         let seconds = (cruise + up + down) * LATE_FACTOR + LATE_MARGIN_S + POLL.as_secs_f64();
         // A day: the longest move that makes sense to wait for.

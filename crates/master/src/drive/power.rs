@@ -20,25 +20,24 @@ impl Drive {
     /// [`Error::NotReached`] with an explanation when the drive does not follow; those of the SDO requests.
     pub async fn enable(&self) -> Result<(), Error> {
         const INTENT: &str = "enable it";
-        self.clear_targets().await?;
+        let mut statusword = self.answered(INTENT, self.statusword().await).await?;
+        if statusword.state() != Some(PowerState::OperationEnabled) {
+            self.clear_targets().await?;
+        }
         let mut waited = Duration::ZERO;
         loop {
-            let statusword = self.answered(INTENT, self.statusword().await).await?;
             match statusword.state() {
                 Some(PowerState::OperationEnabled) => return Ok(()),
                 Some(PowerState::Fault) => return Err(self.not_reached(INTENT, Trigger::Fault).await),
-                Some(state) => match next_command(state) {
-                    Some(command) => {
-                        self.step(INTENT, state, command).await?;
-                        waited = Duration::ZERO;
-                        continue;
-                    }
-                    None => self.wait_poll(&mut waited).await,
-                },
-                None => self.wait_poll(&mut waited).await,
-            }
-            if waited >= STEP_TIMEOUT {
-                return Err(self.not_reached(INTENT, Trigger::Waiting).await);
+                Some(state) if next_command(state).is_some() => {
+                    statusword = self.step(INTENT, state).await?;
+                    waited = Duration::ZERO;
+                }
+                _ if waited >= STEP_TIMEOUT => return Err(self.not_reached(INTENT, Trigger::Waiting).await),
+                _ => {
+                    self.wait_poll(&mut waited).await;
+                    statusword = self.answered(INTENT, self.statusword().await).await?;
+                }
             }
         }
     }
@@ -119,8 +118,9 @@ impl Drive {
         }
     }
 
-    /// Sends a command and waits for the state machine to leave `state`.
-    async fn step(&self, intent: &'static str, state: PowerState, command: PowerCommand) -> Result<(), Error> {
+    /// Sends the command that leads on from `state` and waits for the state machine to leave it.
+    async fn step(&self, intent: &'static str, state: PowerState) -> Result<Statusword, Error> {
+        let Some(command) = next_command(state) else { return self.statusword().await };
         let sent = self.write_controlword(command.controlword()).await;
         self.answered(intent, sent).await?;
         self.wait_for(intent, command, STEP_TIMEOUT, |now| now != state).await
@@ -132,12 +132,12 @@ impl Drive {
         command: PowerCommand,
         limit: Duration,
         arrived: impl Fn(PowerState) -> bool,
-    ) -> Result<(), Error> {
+    ) -> Result<Statusword, Error> {
         let mut waited = Duration::ZERO;
         loop {
-            let statusword: Statusword = self.answered(intent, self.statusword().await).await?;
+            let statusword = self.answered(intent, self.statusword().await).await?;
             if statusword.state().is_some_and(&arrived) {
-                return Ok(());
+                return Ok(statusword);
             }
             if waited >= limit {
                 return Err(self.not_reached(intent, Trigger::Ignored(command)).await);
@@ -161,12 +161,9 @@ impl Drive {
         *waited += POLL;
     }
 
-    /// Zeroes a target speed or torque left over, unless the drive already runs.
+    /// Zeroes a target speed or torque left over.
     async fn clear_targets(&self) -> Result<(), Error> {
         let Some(profile) = self.profile else { return Ok(()) };
-        if self.statusword().await?.state() == Some(PowerState::OperationEnabled) {
-            return Ok(());
-        }
         match ModeOfOperation(self.node.read::<i8>(MODE_DISPLAY).await?) {
             ModeOfOperation::PROFILE_VELOCITY => self.write_number(profile.units.target_velocity.object, 0).await,
             ModeOfOperation::PROFILE_TORQUE => match profile.units.target_current {

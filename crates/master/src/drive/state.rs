@@ -37,7 +37,7 @@ pub struct DriveState {
     pub motor_temperature: Option<Celsius>,
     /// Temperature of the power stage.
     pub driver_temperature: Option<Celsius>,
-    /// NMT state by its last heartbeat.
+    /// NMT state by its last heartbeat or the NMT command sent since.
     pub nmt: Option<NmtState>,
     /// Age of its last heartbeat.
     pub heartbeat_age: Option<Duration>,
@@ -77,7 +77,7 @@ impl Drive {
             supply: self.measure(units.and_then(|units| units.bus_voltage)).await?.map(Volts),
             motor_temperature: self.measure(units.and_then(|units| units.motor_temperature)).await?.map(Celsius),
             driver_temperature: self.measure(units.and_then(|units| units.driver_temperature)).await?.map(Celsius),
-            nmt: facts.nmt_state,
+            nmt: facts.probable_state(),
             heartbeat_age: facts.heartbeat_age(self.node.network().now()),
         })
     }

@@ -69,10 +69,7 @@ impl Future for Pending {
 impl Drop for Pending {
     fn drop(&mut self) {
         if let State::Started(ticket) = self.state {
-            let slot = self.network.lock().slots.remove(&ticket);
-            if matches!(slot, Some(Slot::Waiting(_))) {
-                self.network.submit(Command::Cancel(ticket));
-            }
+            self.network.withdraw(ticket);
         }
     }
 }

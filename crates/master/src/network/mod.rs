@@ -49,6 +49,10 @@ struct Shared {
     moved: NodeSet,
 }
 
+/// Commands that wait for a runner. Requests and timers are bounded by the futures that wait for them; the rest by
+/// this.
+const INBOX: usize = 4096;
+
 /// What a future waits for.
 #[derive(Debug)]
 enum Slot {
@@ -165,10 +169,31 @@ impl Network {
 
     pub(crate) fn submit(&self, command: Command) {
         let mut shared = self.lock();
+        let plain = |command: &Command| matches!(command, Command::Nmt(..) | Command::Transmit(_) | Command::Sync(_));
+        // Nobody has run the bus for thousands of commands: the newest replaces the oldest.
+        if shared.inbox.len() >= INBOX
+            && plain(&command)
+            && let Some(oldest) = shared.inbox.iter().position(plain)
+        {
+            shared.inbox.remove(oldest);
+        }
         shared.inbox.push_back(command);
         let wakers = shared.activity_wakers();
         drop(shared);
         wakers.wake();
+    }
+
+    /// Takes back a request or timer: before it reached the core without a trace, else by a cancel.
+    fn withdraw(&self, ticket: Ticket) {
+        let mut shared = self.lock();
+        let Some(Slot::Waiting(_)) = shared.slots.remove(&ticket) else { return };
+        let before = shared.inbox.len();
+        shared.inbox.retain(|command| command.ticket() != Some(ticket));
+        let known_to_core = shared.inbox.len() == before;
+        drop(shared);
+        if known_to_core {
+            self.submit(Command::Cancel(ticket));
+        }
     }
 
     /// Calls the core at `now`, waiting commands first, and wakes whoever waited for what came of it.

@@ -169,8 +169,18 @@ impl Message for Reply {
             Self::Frame { at, frame } => emit_frame(*at, frame, out),
             Self::Error(words) => {
                 out.extend_from_slice(b"< error ");
-                let harmless = words.bytes().take(MAX_MESSAGE_LENGTH - 16).filter(|byte| !byte.is_ascii_control());
-                out.extend(harmless.map(|byte| if matches!(byte, b'<' | b'>') { b'\'' } else { byte }));
+                let room = out.len() + MAX_MESSAGE_LENGTH - 16;
+                for mut letter in words.chars().filter(|letter| !letter.is_control()) {
+                    if matches!(letter, '<' | '>') {
+                        letter = '\'';
+                    }
+                    let mut bytes = [0; 4];
+                    let bytes = letter.encode_utf8(&mut bytes).as_bytes();
+                    if out.len() + bytes.len() > room {
+                        break;
+                    }
+                    out.extend_from_slice(bytes);
+                }
                 out.extend_from_slice(b" >");
             }
         }

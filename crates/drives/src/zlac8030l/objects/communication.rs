@@ -5,7 +5,7 @@
 
 use canopen::od::Entry;
 
-use super::row::{U8, U16, U32, join, ro, rw, rws};
+use crate::row::{U8, U16, U32, join, ro, rw, rws};
 use crate::zlac8030l::readings::{HARDWARE_VERSION, SOFTWARE_VERSION};
 
 pub(super) const ROWS: [Entry; 102] =

@@ -10,7 +10,6 @@ mod communication;
 pub mod effects;
 mod manufacturer;
 mod profile;
-mod row;
 mod values;
 
 use canopen::od::{Entry, Object, Table, keys};
@@ -20,7 +19,7 @@ pub use checks::ABSOLUTE_TARGET_LIMIT;
 /// Number of rows.
 pub const ROW_COUNT: usize = 195;
 
-static ROWS: [Entry; ROW_COUNT] = row::join(&[&communication::ROWS, &manufacturer::ROWS, &profile::ROWS]);
+static ROWS: [Entry; ROW_COUNT] = crate::row::join(&[&communication::ROWS, &manufacturer::ROWS, &profile::ROWS]);
 static KEYS: [u32; ROW_COUNT] = keys(&ROWS);
 
 /// All objects of the drive.

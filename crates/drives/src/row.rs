@@ -2,25 +2,25 @@
 
 use canopen::od::{Access, DataType, Entry};
 
-pub(super) const U8: DataType = DataType::Unsigned8;
-pub(super) const U16: DataType = DataType::Unsigned16;
-pub(super) const U32: DataType = DataType::Unsigned32;
-pub(super) const I8: DataType = DataType::Integer8;
-pub(super) const I16: DataType = DataType::Integer16;
-pub(super) const I32: DataType = DataType::Integer32;
+pub(crate) const U8: DataType = DataType::Unsigned8;
+pub(crate) const U16: DataType = DataType::Unsigned16;
+pub(crate) const U32: DataType = DataType::Unsigned32;
+pub(crate) const I8: DataType = DataType::Integer8;
+pub(crate) const I16: DataType = DataType::Integer16;
+pub(crate) const I32: DataType = DataType::Integer32;
 
 /// Attribute RO.
-pub(super) const fn ro(index: u16, sub: u8, data_type: DataType, name: &'static str, title: &'static str) -> Entry {
+pub(crate) const fn ro(index: u16, sub: u8, data_type: DataType, name: &'static str, title: &'static str) -> Entry {
     Entry::new(index, sub, data_type, Access::ReadOnly, name, title)
 }
 
 /// Attribute RW.
-pub(super) const fn rw(index: u16, sub: u8, data_type: DataType, name: &'static str, title: &'static str) -> Entry {
+pub(crate) const fn rw(index: u16, sub: u8, data_type: DataType, name: &'static str, title: &'static str) -> Entry {
     Entry::new(index, sub, data_type, Access::ReadWrite, name, title)
 }
 
 /// Attribute RW/S: kept in the EEPROM.
-pub(super) const fn rws(index: u16, sub: u8, data_type: DataType, name: &'static str, title: &'static str) -> Entry {
+pub(crate) const fn rws(index: u16, sub: u8, data_type: DataType, name: &'static str, title: &'static str) -> Entry {
     rw(index, sub, data_type, name, title).stored()
 }
 
@@ -28,7 +28,7 @@ pub(super) const fn rws(index: u16, sub: u8, data_type: DataType, name: &'static
 ///
 /// # Panics
 /// If they are not `N` rows, at compile time in a `const`.
-pub(super) const fn join<const N: usize>(parts: &[&[Entry]]) -> [Entry; N] {
+pub(crate) const fn join<const N: usize>(parts: &[&[Entry]]) -> [Entry; N] {
     let mut rows = [ro(0, 0, U8, "", ""); N];
     let (mut part, mut at) = (0, 0);
     while part < parts.len() {

@@ -1,0 +1,119 @@
+//! From facts to a conclusion: the one place that decides what an explanation says.
+
+use cia402::{PowerState, Statusword};
+use drives::engine::faults::FaultRow;
+
+use super::explain::{Fact, Trigger};
+use crate::error::Error;
+
+/// What follows from the facts, and what to do.
+pub(super) fn conclude(trigger: &Trigger, facts: &[Fact]) -> (String, String) {
+    let statusword = facts.iter().find_map(|fact| if let Fact::Statusword(word) = fact { Some(*word) } else { None });
+    let state = statusword.and_then(Statusword::state);
+    let faults = facts.iter().find_map(|fact| match fact {
+        Fact::FaultCode(code, rows) if *code != 0 => Some((*code, rows.as_slice())),
+        _ => None,
+    });
+    if let Trigger::Silent(error) = trigger {
+        return silent(error);
+    }
+    if let (Some(PowerState::Fault | PowerState::FaultReactionActive), Some((code, rows))) = (state, faults) {
+        return faulted(code, rows);
+    }
+    match (trigger, state) {
+        (_, Some(PowerState::Fault | PowerState::FaultReactionActive)) => text(
+            "The drive is at fault and gives no fault code",
+            "Look at its display or error history, remove the cause, then reset the fault",
+        ),
+        (Trigger::LostOperation, Some(PowerState::QuickStopActive)) => text(
+            "A quick stop came in the middle of the motion, from another master or an emergency stop input",
+            "Find out what asked for it; when it is safe, enable the drive again to release the quick stop",
+        ),
+        (Trigger::LostOperation, Some(state)) => (
+            format!("The drive left Operation enabled in the middle of the motion and is in {}", state.name()),
+            "Find out who else commands it (another master, an RPDO, the enable input), or whether its supply dipped"
+                .to_owned(),
+        ),
+        (_, None) if statusword.is_some() => text(
+            "Its statusword shows none of the states of CiA 402",
+            "Check that the node is the drive model that it is taken for",
+        ),
+        _ => by_trigger(trigger),
+    }
+}
+
+/// For a drive that answers, is in a known state and not at fault.
+fn by_trigger(trigger: &Trigger) -> (String, String) {
+    match trigger {
+        Trigger::Waiting => text(
+            "The drive is busy with itself and does not get ready",
+            "Wait for its self-test or fault reaction to end; check its supply; switch it off and on if it persists",
+        ),
+        Trigger::Ignored(command) => (
+            format!("The drive took the controlword {} and did not act on it", command.controlword()),
+            "Check that statusword bit 9 (remote) is set, that no other master writes 6040h, and its enable input and \
+             motor supply"
+                .to_owned(),
+        ),
+        Trigger::Mode(mode) => (
+            format!("The drive accepted mode {mode} in 6060h and does not show it in 6061h"),
+            "Stop the motor and try again: some drives change their mode at standstill only".to_owned(),
+        ),
+        Trigger::StillTurning(speed) => (
+            format!("The shaft still turns at {speed:.1} r/min after the time that the drive's ramps should take"),
+            "Something may be driving the shaft: check the load, the ramp times and the quick stop option 605Ah".to_owned(),
+        ),
+        Trigger::NoAcknowledge => text(
+            "The drive did not acknowledge the set-point (statusword bit 12)",
+            "An earlier set-point may still be waiting to be run: stop the drive, then move again",
+        ),
+        Trigger::Late { at, target, unit, waited } => (
+            format!(
+                "After {:.1} s it is at {at:.1} {unit} where {target:.1} {unit} was asked for, and reports no fault",
+                waited.as_secs_f64()
+            ),
+            "The load may be too heavy or the motor blocked: look at its current; check its speed limit, current limit \
+             and ramp times"
+                .to_owned(),
+        ),
+        Trigger::Fault | Trigger::LostOperation | Trigger::Silent(_) => text(
+            "The drive is no longer where it was a moment ago",
+            "Read its state again: it changes while being looked at",
+        ),
+    }
+}
+
+fn faulted(code: u16, rows: &[&'static FaultRow]) -> (String, String) {
+    if rows.is_empty() {
+        return (
+            format!("The drive is at fault with code {code:04X}h, which no fault table here explains"),
+            "Look the code up in the drive's manual, remove the cause, then reset the fault".to_owned(),
+        );
+    }
+    let join = |part: fn(&FaultRow) -> &'static str, separator| {
+        rows.iter().map(|row| part(row)).collect::<Vec<_>>().join(separator)
+    };
+    (
+        format!("The drive is at fault: {}", join(|row| row.name, " and ")),
+        format!("{} Then reset the fault and enable again", join(|row| row.remedy, " ")),
+    )
+}
+
+fn silent(error: &Error) -> (String, String) {
+    let Error::NoAnswer { hints, .. } = error else {
+        return text("The drive stopped answering", "Check its supply and its cable");
+    };
+    if hints.silent_for.is_none() {
+        return ("The drive does not answer".to_owned(), hints.to_string());
+    }
+    (
+        "The drive stopped answering. Whether it still moves cannot be told from here: a drive with a watch over its \
+         host stops by itself"
+            .to_owned(),
+        format!("If it moves and must not, use the emergency stop. {hints}"),
+    )
+}
+
+fn text(conclusion: &str, advice: &str) -> (String, String) {
+    (conclusion.to_owned(), advice.to_owned())
+}

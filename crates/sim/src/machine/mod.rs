@@ -1,0 +1,253 @@
+//! Virtual machines: a drive's firmware joined to the physics around it.
+//!
+//! [`Machine`] is the part that all drives share: the supply switch, the fixed grid of control periods, the wires of
+//! the digital inputs, the memory over power cycles. An [`Assembly`] is one model's motor, load, supply and sensors.
+//! Control periods are computed lazily, before anything from outside is let in: the world sees the firmware's
+//! communication deadlines only, and the result does not depend on when it looked.
+
+mod assembly;
+mod switch;
+mod zlac8030l;
+
+use can::{Bitrate, Frame, Instant, Station};
+use drives::Firmware;
+
+pub use assembly::Assembly;
+pub use zlac8030l::{HubWheel, Zlac8030lMachine, zlac8030l};
+
+use crate::{Component, Refused, Report, SwitchRange, TemperatureSensor, VirtualDrive};
+use switch::Input;
+
+/// How often a drive without enough voltage to run looks whether it has come.
+const WAKE_PERIOD_NS: u64 = 1_000_000;
+
+/// A drive's firmware on its hardware, as a station of a world.
+#[derive(Clone)]
+pub struct Machine<A: Assembly> {
+    firmware: A::Firmware,
+    assembly: A,
+    actuation: <A::Firmware as Firmware>::Actuation,
+    inputs: Vec<Input>,
+    switched_on: bool,
+    running: bool,
+    next_tick: Instant,
+}
+
+impl<A: Assembly> Machine<A> {
+    /// A machine without power: [`set_power`](VirtualDrive::set_power) starts it.
+    pub fn new(firmware: A::Firmware, assembly: A) -> Self {
+        Self {
+            firmware,
+            assembly,
+            actuation: Default::default(),
+            inputs: vec![Input::default(); A::INPUTS.len()],
+            switched_on: false,
+            running: false,
+            next_tick: Instant::ZERO,
+        }
+    }
+
+    /// The firmware, to look at.
+    pub fn firmware(&self) -> &A::Firmware {
+        &self.firmware
+    }
+
+    /// Motor, load, supply and sensors.
+    pub fn assembly(&self) -> &A {
+        &self.assembly
+    }
+
+    /// Motor, load, supply and sensors, to change what no command reaches. Call
+    /// [`advance`](VirtualDrive::advance) first.
+    pub fn assembly_mut(&mut self) -> &mut A {
+        &mut self.assembly
+    }
+
+    /// One control period that begins at `at`.
+    fn tick(&mut self, at: Instant) {
+        self.watch_supply(at);
+        if self.running {
+            let sensors = self.assembly.sense(self.input_levels());
+            let next = self.firmware.tick(&sensors, at);
+            self.assembly.step(&self.actuation);
+            self.actuation = next;
+        } else {
+            self.assembly.step(&self.actuation);
+        }
+    }
+
+    /// Bit `n` is the level of input `n`.
+    #[inline]
+    fn input_levels(&self) -> u32 {
+        let mut levels = 0;
+        for (n, input) in self.inputs.iter().enumerate() {
+            let level = match input {
+                Input::Level(level) => *level,
+                Input::Switch(range) => range.contains(self.assembly.shaft_counts()),
+            };
+            levels |= u32::from(level) << n;
+        }
+        levels
+    }
+
+    /// Starts the firmware when its voltage comes and stops it when it goes.
+    fn watch_supply(&mut self, at: Instant) {
+        let supplied = self.switched_on && self.assembly.supplies_firmware(self.running);
+        if supplied != self.running {
+            self.set_running(supplied, at);
+        }
+    }
+
+    fn set_running(&mut self, running: bool, now: Instant) {
+        self.running = running;
+        if running {
+            let hardware = self.assembly.hardware();
+            self.firmware.power_on(&hardware, now);
+        } else {
+            self.assembly.keep_image(self.firmware.eeprom().0);
+            self.firmware.power_off(now);
+            self.actuation = Default::default();
+        }
+    }
+
+    fn input(&mut self, input: usize) -> Result<&mut Input, Refused> {
+        self.inputs.get_mut(input).ok_or(Refused::Absent { model: A::MODEL, what: "such input" })
+    }
+}
+
+impl<A: Assembly> Station for Machine<A> {
+    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
+        self.advance(now);
+        if self.running {
+            self.firmware.handle_frame(frame, now);
+        }
+    }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        self.advance(now);
+        if self.running {
+            self.firmware.handle_timeout(now);
+        }
+    }
+
+    fn poll_transmit(&mut self) -> Option<Frame> {
+        if self.running { self.firmware.poll_transmit() } else { None }
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        match (self.running, self.switched_on) {
+            (true, _) => self.firmware.poll_timeout(),
+            (false, true) => Some(self.next_tick.plus_nanos(WAKE_PERIOD_NS)),
+            (false, false) => None,
+        }
+    }
+
+    fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
+        self.advance(now);
+        self.firmware.handle_transmitted(frame, now);
+    }
+}
+
+impl<A: Assembly> VirtualDrive for Machine<A> {
+    fn model(&self) -> &'static str {
+        A::MODEL
+    }
+
+    fn set_power(&mut self, on: bool, now: Instant) {
+        self.advance(now);
+        self.switched_on = on;
+        self.assembly.connect_supply(on);
+        self.watch_supply(now);
+    }
+
+    fn bitrate(&self) -> Option<Bitrate> {
+        self.running.then(|| self.firmware.report().bitrate)
+    }
+
+    fn advance(&mut self, now: Instant) {
+        while self.next_tick <= now {
+            self.tick(self.next_tick);
+            self.next_tick = self.next_tick.plus_nanos(A::Firmware::CONTROL_PERIOD_NS);
+        }
+    }
+
+    fn report(&self) -> Report {
+        Report { powered: self.running, ..self.assembly.report(&self.firmware, self.running) }
+    }
+
+    fn inputs(&self) -> &'static [&'static str] {
+        A::INPUTS
+    }
+
+    fn set_input(&mut self, input: usize, level: bool, now: Instant) -> Result<(), Refused> {
+        self.advance(now);
+        *self.input(input)? = Input::Level(level);
+        Ok(())
+    }
+
+    fn set_switch(&mut self, input: usize, range: SwitchRange, now: Instant) -> Result<(), Refused> {
+        self.advance(now);
+        let shaft = self.assembly.shaft_counts();
+        let position = i64::from(self.firmware.report().position_counts);
+        let reversed = self.assembly.counts_reversed(&self.firmware);
+        *self.input(input)? = Input::switch(range, position, shaft, reversed);
+        Ok(())
+    }
+
+    fn set_load_torque(&mut self, torque_nm: f64, now: Instant) -> Result<(), Refused> {
+        self.advance(now);
+        self.assembly.set_load_torque(torque_nm)
+    }
+
+    fn set_load_inertia(&mut self, inertia_kg_m2: f64, now: Instant) -> Result<(), Refused> {
+        self.advance(now);
+        self.assembly.set_load_inertia(inertia_kg_m2)
+    }
+
+    fn set_rotor_locked(&mut self, locked: bool, now: Instant) -> Result<(), Refused> {
+        self.advance(now);
+        self.assembly.set_rotor_locked(locked);
+        Ok(())
+    }
+
+    fn set_supply(&mut self, supply_v: f64, now: Instant) -> Result<(), Refused> {
+        self.advance(now);
+        self.assembly.set_supply(supply_v)
+    }
+
+    fn hold_temperature(
+        &mut self,
+        sensor: TemperatureSensor,
+        celsius: Option<f64>,
+        now: Instant,
+    ) -> Result<(), Refused> {
+        self.advance(now);
+        self.assembly.hold_temperature(sensor, celsius)
+    }
+
+    fn set_fault(&mut self, component: Component, broken: bool, now: Instant) -> Result<(), Refused> {
+        self.advance(now);
+        self.assembly.set_fault(component, broken)
+    }
+
+    fn set_battery(&mut self, connected: bool, now: Instant) -> Result<(), Refused> {
+        self.advance(now);
+        self.assembly.set_battery(connected)
+    }
+
+    fn nvm_generation(&self) -> u64 {
+        u64::from(self.firmware.eeprom().1)
+    }
+
+    fn nvm_image(&self) -> Vec<u8> {
+        if self.running { self.firmware.eeprom().0.to_vec() } else { self.assembly.image().to_vec() }
+    }
+
+    fn load_nvm(&mut self, image: &[u8]) -> Result<(), Refused> {
+        if image.len() != self.assembly.image().len() {
+            return Err(Refused::BadImage { model: A::MODEL, reason: "it has another length" });
+        }
+        self.assembly.keep_image(image);
+        Ok(())
+    }
+}
