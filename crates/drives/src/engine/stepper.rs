@@ -71,6 +71,7 @@ pub struct Stepper {
     /// Last whole pulse, and where in its electrical turn the vector points.
     issued: i32,
     field: u16,
+    electrical_turns: i32,
     amplitude_a: f32,
     resting_for: u16,
     d: Pi,
@@ -99,6 +100,17 @@ impl Stepper {
     /// Length of the current vector asked for, A.
     pub const fn reference_a(&self) -> f32 {
         self.amplitude_a
+    }
+
+    /// How far the vector has turned since the beginning, in electrical turns.
+    pub fn vector_turns(&self, model: &StepperModel) -> f64 {
+        f64::from(self.electrical_turns) + f64::from(self.field) / f64::from(model.pulses_per_electrical_turn.max(1))
+    }
+
+    /// The motor is free, the position 0; the vector keeps its direction.
+    #[must_use]
+    pub fn restarted(&self) -> Self {
+        Self { field: self.field, electrical_turns: self.electrical_turns, ..Self::default() }
     }
 
     /// The zero of the position: what was `by` is 0 from now on. The vector stays where it points.
@@ -190,7 +202,9 @@ impl Stepper {
         let due = self.from.position.wrapping_add(libm::floor(way + ROUNDING) as i32);
         let pulses = i64::from(due.wrapping_sub(self.issued));
         let turn = i64::from(model.pulses_per_electrical_turn.max(1));
-        self.field = (i64::from(self.field) + pulses).rem_euclid(turn) as u16;
+        let field = i64::from(self.field) + pulses;
+        self.field = field.rem_euclid(turn) as u16;
+        self.electrical_turns = self.electrical_turns.wrapping_add(field.div_euclid(turn) as i32);
         self.issued = due;
     }
 

@@ -112,6 +112,11 @@ impl Zlim42c {
         self.parameters.pulses_per_turn
     }
 
+    /// How far the current vector has turned since power-on, in electrical turns.
+    pub fn vector_turns(&self) -> f64 {
+        self.stepper.vector_turns(&self.parameters.model)
+    }
+
     /// The communication side, to look at.
     pub const fn node(&self) -> &Node<ROW_COUNT> {
         &self.node
@@ -132,6 +137,9 @@ impl Zlim42c {
         started.running = true;
         started.bitrate = restart::bitrate(started.values());
         started.parameters = Parameters::from(started.values());
+        started.stepper = self.stepper.restarted();
+        let pulses = |parameters: &Parameters| parameters.model.pulses_per_electrical_turn;
+        started.stepper.rescale(pulses(&self.parameters), pulses(&started.parameters));
         started.next_task = now.plus_nanos(COMMUNICATION_PERIOD_NS);
         started.axis.self_test_done();
         *self = started;
@@ -467,6 +475,7 @@ impl Firmware for Zlim42c {
     fn power_on(&mut self, hardware: &Hardware, now: Instant) {
         self.dip_address = hardware.dip_address;
         self.store.reopen(hardware.eeprom.0);
+        self.stepper = Stepper::default();
         self.restart(now);
     }
 
