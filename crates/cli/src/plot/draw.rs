@@ -81,12 +81,12 @@ pub(super) fn figure(figure: &Figure) -> String {
 }
 
 fn sections(svg: &mut Svg, layout: &Layout, figure: &Figure) {
-    for (number, section) in figure.sections.iter().enumerate() {
-        let (left, right) = (layout.x(section.from_s), layout.x(section.to_s));
-        if number % 2 == 0 {
-            let size = (right - left, layout.panels_bottom - TOP);
-            svg.rect((left, TOP), size, 0.0, &format!(r#"fill="{BAND}""#));
-        }
+    let places = figure.sections.iter().map(|section| (section, layout.x(section.from_s), layout.x(section.to_s)));
+    // Every other section has a tinted ground; all grounds come before all names, which may reach over a border.
+    for (_, left, right) in places.clone().step_by(2) {
+        svg.rect((left, TOP), (right - left, layout.panels_bottom - TOP), 0.0, &format!(r#"fill="{BAND}""#));
+    }
+    for (section, left, right) in places {
         let fits = |name: &&String| SECTION.width(name) < (right - left) * CROWDING;
         let middle = (left + right) / 2.0;
         if NUMBER.width(&section.number) < right - left {
