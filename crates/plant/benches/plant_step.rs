@@ -55,10 +55,13 @@ fn joint_motor(c: &mut Criterion) {
     for (name, inverter) in [("driven", Inverter::Driven([0.55, 0.5, 0.45])), ("shorted", Inverter::Shorted)] {
         let mut joint = start.clone();
         joint.load.inertia_kg_m2 = 0.1;
-        joint.load.torque_nm = -20.0;
+        joint.load.torque_nm = 5.0;
         let actuation = plant::joint_motor::Actuation { inverter, brake_released: true, set_origin: false };
         group.bench_function(name, |b| {
             b.iter(|| {
+                // 1000 r/min of the motor, whatever the field says.
+                joint.rotor.velocity_rad_s = 100.0;
+                joint.gear.output_velocity_rad_s = 2.0;
                 joint.step(DT_S, black_box(&actuation));
                 joint.sense()
             })

@@ -129,20 +129,19 @@ impl GearModel {
         if load.locked {
             data.output_velocity_rad_s = 0.0;
         }
-        let stored_j = self.spring_energy_j(data) + self.kinetic_energy_j(data, rotor, motor, load);
+        let windup_rad = self.windup_rad(data.twist_rad);
         let masses = Masses::new(self, data, rotor, motor.velocity_rad_s, dt_s, input);
-        let guess = self.side(data.twist_rad + 0.5 * dt_s * masses.twist_rate(masses.before));
-        let mut moved = if guess == 0.0 {
+        let side = self.side(data.twist_rad);
+        let mut moved = if side == 0.0 {
             masses.solve(0.0, 0.0)
         } else {
-            let windup_nm = self.stiffness_nm_rad * (data.twist_rad - 0.5 * guess * self.backlash_rad);
-            masses.solve(windup_nm, 0.5 * dt_s * self.stiffness_nm_rad + self.damping_nm_s_rad)
+            let coupling = 0.5 * dt_s * self.stiffness_nm_rad + self.damping_nm_s_rad;
+            masses.solve(self.stiffness_nm_rad * windup_rad, coupling)
         };
         if self.backlash_rad != 0.0 {
             // Teeth push, they do not pull.
-            let pulls = moved.torque_nm * guess < 0.0;
-            let end_rad = data.twist_rad + dt_s * moved.twist_rate;
-            if pulls || self.side(data.twist_rad) != guess || self.side(end_rad) != guess {
+            let pulls = moved.torque_nm * side < 0.0;
+            if pulls || self.side(data.twist_rad + dt_s * moved.twist_rate) != side {
                 moved = self.solve_crossing(&masses, data.twist_rad, dt_s, moved);
             }
         }
@@ -156,7 +155,12 @@ impl GearModel {
         motor.velocity_rad_s = moved.after[0];
 
         // What the torques brought in and is not stored now went into friction.
-        let gained_j = self.spring_energy_j(data) + self.kinetic_energy_j(data, rotor, motor, load) - stored_j;
+        let more_windup_rad = self.windup_rad(data.twist_rad) - windup_rad;
+        let spring_j = self.stiffness_nm_rad * (windup_rad + 0.5 * more_windup_rad) * more_windup_rad;
+        let motor_j = rotor.inertia_kg_m2 * mean[0] * (moved.after[0] - masses.before[0]);
+        let output_inertia = self.output_inertia_kg_m2 + load.inertia_kg_m2;
+        let output_j = output_inertia * mean[1] * (moved.after[1] - masses.before[1]);
+        let gained_j = spring_j + motor_j + output_j;
         let load_j = load.torque_nm * mean[1] * dt_s;
         GearOutput {
             motor_velocity_rad_s: mean[0],

@@ -4,6 +4,10 @@
 //! position sensor: a rotor that is overloaded slips by whole electrical turns (four full steps) and nothing in the
 //! readings says so; only [`StepperMotor::rotor`], the truth, does. The load, the supply, the faults and the
 //! surroundings are plain fields that a test or a person at a bench changes at any time.
+//!
+//! The rotor hangs on the field as on a spring and rings at some 300 Hz with hardly any damping, as the real one does
+//! when a drive dwells at its resonance. [`RotorData::turn`] moves the angle before the torque of the step is known,
+//! which gives such a ringing `(w dt)^3 / 8` of critical damping back: 1e-4 at 50 µs, a thirtieth of its friction's.
 
 use crate::angle::{Angle, Axis};
 use crate::hub_motor::Energy;

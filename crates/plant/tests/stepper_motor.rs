@@ -199,6 +199,10 @@ fn speed_reached_turns_s(volts: f64, target_turns_s: f64, load_nm: f64) -> f64 {
 
 #[test]
 fn torque_falls_with_speed_because_the_bus_no_longer_drives_the_current() {
+    // Without load it goes on to 1800 r/min, beyond the speed at which its back-emf alone exceeds the bus.
+    let idle = speed_reached_turns_s(24.0, 30.0, 0.0);
+    assert!(near(idle, 30.0, 0.01), "{idle}");
+    assert!(30.0 * TAU * MODEL.stepper.torque_constant_nm_a() > 24.0);
     // Against 0.2 N m: followed at 300 r/min, lost at 2400 r/min on 24 V.
     let slow = speed_reached_turns_s(24.0, 5.0, 0.2);
     assert!(near(slow, 5.0, 0.01), "{slow}");

@@ -191,7 +191,12 @@ impl Assembly for HubWheel {
     }
 
     fn set_supply(&mut self, supply_v: f64) -> Result<(), Refused> {
-        self.motor.supply.source_v = within("supply", "0 to 100 V", 0.0..=100.0, supply_v)?;
+        let supply = &mut self.motor.supply;
+        supply.source_v = within("supply", "0 to 100 V", 0.0..=100.0, supply_v)?;
+        // A supply that is turned down discharges its own output; only the motor's energy it cannot take.
+        if supply.connected {
+            supply.bus_v = supply.bus_v.min(supply_v);
+        }
         Ok(())
     }
 
