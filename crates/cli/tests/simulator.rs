@@ -78,6 +78,29 @@ fn commands_reach_it_over_socketcand_and_slcan() {
 }
 
 #[test]
+fn two_simulators_joined_by_a_bus_hear_each_other() {
+    let first = simulator(&[]);
+    let bus = first.bus("socketcand");
+    let second = Simulator::start(&["--drive", "zlac8030l@5", "--bus", &bus]);
+    assert_eq!(second.ready, format!("ready {bus}"));
+    let found = done(&["--bus", &bus, "--json", "scan"]).json();
+    let nodes: Vec<_> = found["nodes"].as_array().unwrap().iter().map(|node| node["node"].as_u64().unwrap()).collect();
+    assert_eq!(nodes, [4, 5]);
+    assert_eq!(done(&["--bus", &bus, "--json", "velocity", "5", "60rpm", "--for", "300ms"]).json()["reached"], true);
+}
+
+#[test]
+fn only_a_live_bus_given_on_the_command_line_is_joined() {
+    let drive = ["sim", "--drive", "zlac8030l@4", "--bus"];
+    let ended = ferrodrive(&[&drive[..], &["sim"]].concat());
+    assert_eq!(ended.status, Some(2));
+    assert!(ended.err.contains("a live one only"), "{}", ended.err);
+    let ended = ferrodrive(&[&drive[..], &["socketcand://127.0.0.1:1/can0"]].concat());
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.err.contains("cannot connect") && !ended.out.contains("ready"), "{}", ended.err);
+}
+
+#[test]
 fn a_lost_connection_ends_a_command_with_the_reason() {
     let mut simulator = simulator(&[]);
     let bus = simulator.bus("socketcand");
