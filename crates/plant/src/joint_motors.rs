@@ -39,8 +39,8 @@ const RATED_V: f64 = 36.0;
 /// makes 333 Hz, which a 20 kHz drive follows easily.
 const POLE_PAIRS: u32 = 10;
 
-/// Assumed: motor and unloaded gear take 8 % of the motor's rated torque at rated speed. It lets the motor reach 98 % of
-/// its printed maximum speed without load and leaves most of the loss to the teeth, as in harmonic gears.
+/// Assumed: motor and unloaded gear take 8 % of the motor's rated torque at rated speed. It lets the motor reach 98 %
+/// of its printed maximum speed without load and leaves most of the loss to the teeth, as in harmonic gears.
 const NO_LOAD_SHARE: f64 = 0.08;
 /// Assumed: half of it is dry, as for the hub motors.
 const DRY_SHARE: f64 = 0.5;

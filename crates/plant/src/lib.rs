@@ -1,8 +1,9 @@
 //! Physics of motors, loads, supplies and sensors, in SI units and double precision.
 //!
 //! What goes in is what a drive's power stage does ([`hub_motor::Actuation`], [`stepper::Bridges`],
-//! [`joint_motor::Actuation`]), what comes out is what its sensors read (`Sensors` of the same modules). A part is a *model* (constants that never change while it runs) and *data* (its
-//! small, cloneable state); `model.step(&mut data, ..)` moves it by one time step.
+//! [`joint_motor::Actuation`]), what comes out is what its sensors read (`Sensors` of the same modules). A part is
+//! a *model* (constants that never change while it runs) and *data* (its small, cloneable state); `model.step(&mut
+//! data, ..)` moves it by one time step.
 //!
 //! The same input gives the same bits on every machine: only IEEE 754 basic operations and `libm` are used, and
 //! nothing here reads a clock or a random source. The crate knows nothing of drives, controllers or CAN.

@@ -12,15 +12,57 @@ const DT_S: f64 = 50e-6;
 const TAU: f64 = core::f64::consts::TAU;
 const MODEL: JointMotorModel = JointMotorModel::M4230E17B50;
 
-/// A row of the manual's table: model, ratio, output torque, current, motor torque, power, maximum r/min, output
-/// r/min, ohm, mH, kg m².
-type Row = (JointMotorModel, f64, f64, f64, f64, f64, f64, f64, f64, f64, f64);
+/// A column of the manual's table, as printed.
+struct Printed {
+    model: JointMotorModel,
+    ratio: f64,
+    output_nm: f64,
+    current_a: f64,
+    motor_nm: f64,
+    power_w: f64,
+    rated_r_min: f64,
+    maximum_r_min: f64,
+    output_r_min: f64,
+    resistance_ohm: f64,
+    inductance_mh: f64,
+    inertia_kg_m2: f64,
+}
 
-const TABLE: [Row; 4] = [
-    (JointMotorModel::M4230E17B50, 50.0, 34.0, 3.5, 1.0, 100.0, 2000.0, 30.0, 0.86, 0.8, 0.69e-4),
-    (JointMotorModel::M4230E17B80, 80.0, 51.0, 3.5, 1.0, 100.0, 2000.0, 15.0, 0.86, 0.8, 0.69e-4),
-    (JointMotorModel::M8025E25B50, 50.0, 51.0, 7.0, 2.0, 200.0, 1500.0, 30.0, 0.53, 0.5, 1.74e-4),
-    (JointMotorModel::M8025E25B80, 80.0, 85.0, 7.0, 2.0, 200.0, 1500.0, 18.0, 0.53, 0.5, 1.74e-4),
+const M4230E17B50: Printed = Printed {
+    model: JointMotorModel::M4230E17B50,
+    ratio: 50.0,
+    output_nm: 34.0,
+    current_a: 3.5,
+    motor_nm: 1.0,
+    power_w: 100.0,
+    rated_r_min: 1500.0,
+    maximum_r_min: 2000.0,
+    output_r_min: 30.0,
+    resistance_ohm: 0.86,
+    inductance_mh: 0.8,
+    inertia_kg_m2: 0.69e-4,
+};
+
+const M8025E25B50: Printed = Printed {
+    model: JointMotorModel::M8025E25B50,
+    ratio: 50.0,
+    output_nm: 51.0,
+    current_a: 7.0,
+    motor_nm: 2.0,
+    power_w: 200.0,
+    rated_r_min: 1000.0,
+    maximum_r_min: 1500.0,
+    output_r_min: 30.0,
+    resistance_ohm: 0.53,
+    inductance_mh: 0.5,
+    inertia_kg_m2: 1.74e-4,
+};
+
+const TABLE: [Printed; 4] = [
+    M4230E17B50,
+    Printed { model: JointMotorModel::M4230E17B80, ratio: 80.0, output_nm: 51.0, output_r_min: 15.0, ..M4230E17B50 },
+    M8025E25B50,
+    Printed { model: JointMotorModel::M8025E25B80, ratio: 80.0, output_nm: 85.0, output_r_min: 18.0, ..M8025E25B50 },
 ];
 
 fn joint() -> JointMotor {
@@ -64,17 +106,17 @@ fn assert_energy_closes(joint: &JointMotor, stored_at_first_j: f64, relative: f6
 
 #[test]
 fn the_windings_and_masses_are_the_manuals() {
-    for (model, ratio, .., ohm, milli_h, inertia) in TABLE {
-        assert_eq!((model.gear.ratio, model.rotor.inertia_kg_m2), (ratio, inertia));
+    for Printed { model, ratio, resistance_ohm, inductance_mh, inertia_kg_m2, .. } in TABLE {
+        assert_eq!((model.gear.ratio, model.rotor.inertia_kg_m2), (ratio, inertia_kg_m2));
         // Printed between two wires: two phases in series.
-        assert!(near(2.0 * model.pmsm.resistance_ohm, ohm, 1e-12), "{}", model.name);
-        assert!(near(2.0 * model.pmsm.inductance_q_h, 1e-3 * milli_h, 1e-12));
+        assert!(near(2.0 * model.pmsm.resistance_ohm, resistance_ohm, 1e-12), "{}", model.name);
+        assert!(near(2.0 * model.pmsm.inductance_q_h, 1e-3 * inductance_mh, 1e-12));
     }
 }
 
 #[test]
 fn at_printed_torque_and_power_the_supply_gives_the_printed_current_within_its_tolerance() {
-    for (model, _, _, current_a, motor_nm, power_w, ..) in TABLE {
+    for Printed { model, current_a, motor_nm, power_w, .. } in TABLE {
         let q_a = motor_nm / model.pmsm.torque_constant_nm_a();
         let copper_w = 1.5 * q_a * q_a * model.pmsm.resistance_ohm;
         let supply_w = power_w + copper_w;
@@ -84,8 +126,7 @@ fn at_printed_torque_and_power_the_supply_gives_the_printed_current_within_its_t
 
 #[test]
 fn the_m4230s_motor_gives_the_printed_output_torque_and_the_m8025s_more_than_its_reducer_may_carry() {
-    for (model, _, output_nm, _, motor_nm, ..) in TABLE {
-        let rated_r_min = if motor_nm == 1.0 { 1500.0 } else { 1000.0 };
+    for Printed { model, output_nm, motor_nm, rated_r_min, .. } in TABLE {
         let driven_nm = model.gear.driven_torque_nm(&model.rotor, motor_nm, rated_r_min * TAU / 60.0);
         if motor_nm == 1.0 {
             assert!((driven_nm - output_nm).abs() < 0.5, "{}: {driven_nm} N m", model.name);
@@ -97,7 +138,7 @@ fn the_m4230s_motor_gives_the_printed_output_torque_and_the_m8025s_more_than_its
 
 #[test]
 fn without_load_a_joint_reaches_the_printed_maximum_speed_at_36_v_and_its_range_behind_the_gear() {
-    for (model, ratio, .., maximum_r_min, output_r_min, _, _, _) in TABLE {
+    for Printed { model, ratio, maximum_r_min, output_r_min, .. } in TABLE {
         let mut joint = JointMotor::new(model, Angle::default(), 36.0, 25.0);
         for _ in 0..40_000 {
             let all = joint.supply.bus_v / libm::sqrt(3.0);
@@ -114,9 +155,9 @@ fn without_load_a_joint_reaches_the_printed_maximum_speed_at_36_v_and_its_range_
 
 #[test]
 fn a_joint_lifts_its_printed_torque_at_its_printed_speed() {
-    for (model, ratio, output_nm, _, motor_nm, _, _, output_r_min, _, _, _) in TABLE {
+    for Printed { model, ratio, output_nm, rated_r_min, output_r_min, .. } in TABLE {
         // The printed range, or the motor's rated speed if that comes first (the M8025: 1000 r/min).
-        let output_r_min = f64::min(output_r_min, if motor_nm == 1.0 { 1500.0 } else { 1000.0 } / ratio);
+        let output_r_min = f64::min(output_r_min, rated_r_min / ratio);
         let mut joint = JointMotor::new(model, Angle::default(), 36.0, 25.0);
         joint.load.inertia_kg_m2 = 0.2;
         let target = output_r_min * TAU / 60.0;
@@ -136,7 +177,7 @@ fn a_joint_lifts_its_printed_torque_at_its_printed_speed() {
 
 #[test]
 fn at_rated_torque_the_winding_stays_at_the_printed_85_degrees() {
-    for (model, _, _, _, motor_nm, ..) in TABLE {
+    for Printed { model, motor_nm, .. } in TABLE {
         let q_a = motor_nm / model.pmsm.torque_constant_nm_a();
         let copper_w = 1.5 * q_a * q_a * model.pmsm.resistance_ohm;
         assert!(near(40.0 + model.winding.resistance_k_w * copper_w, 85.0, 1e-9));

@@ -157,7 +157,7 @@ fn pull_out_torque_follows_the_analytic_torque_speed_curve() {
 
 #[test]
 fn at_3000_r_min_the_step_of_50_us_is_within_half_a_per_cent_and_halving_it_gains_sixteen_fold() {
-    // 2.5 kHz electrical: 8 steps a period at 50 µs. The torque on a sinusoidal voltage is known exactly; the harmonics
+    // 2.5 kHz electrical: 8 steps a period at 50 µs. The torque on a sinusoidal voltage is known exactly; harmonics
     // of a held one do not turn with the magnets and make none.
     let velocity = 100.0 * core::f64::consts::PI;
     let omega = velocity * f64::from(MOTOR.teeth);
