@@ -483,6 +483,7 @@ impl Axis {
         self.stop = None;
         self.velocity.restart();
         self.torque.restart();
+        self.position.rebase(self.trajectory.point().position);
         self.position.resume(&mut self.trajectory, &parameters.moves);
     }
 
