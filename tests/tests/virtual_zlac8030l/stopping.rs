@@ -283,3 +283,18 @@ fn a_silent_host_stops_the_motor_with_the_ramp_of_605ah_in_each_mode() {
     assert_within("speed", bench.report().velocity_rpm, -1.0, 1.0);
     assert_eq!((bench.get(0x6071, 0), bench.statusword() & 0xFF), (0, 0x37));
 }
+
+#[test]
+fn a_shutdown_ends_even_when_a_load_never_lets_the_motor_stand() {
+    let mut bench = turning();
+    bench.set(0x202E, 5, 1);
+    bench.set(0x2015, 0, 20);
+    bench.operate(|drive, now| drive.set_load_inertia(0.3, now)).expect("a load");
+    bench.operate(|drive, now| drive.set_load_torque(-2.0, now)).expect("a load");
+    bench.set(0x6040, 0, 0x06);
+    bench.run_ms(300);
+    assert_eq!(bench.statusword() & 0xFF, 0x37, "on the ramp");
+    bench.run_ms(1700);
+    assert_eq!(bench.statusword() & 0xFF, 0x31);
+    assert!(bench.report().velocity_rpm > 60.0, "1.5 N m of the motor against 2 N m");
+}
