@@ -14,5 +14,6 @@ mod firmware;
 pub mod profile;
 mod row;
 pub mod zlac8030l;
+pub mod zlim42c;
 
 pub use firmware::{Firmware, Report};
