@@ -4,41 +4,71 @@ use std::path::Path;
 use std::time::Duration;
 
 use can::Bitrate;
-use canopen::NodeId;
+use canopen::{Mux, NodeId};
 use master::Network;
 use sim::{VirtualDrive, World};
 
 use crate::failure::Failure;
-use crate::models::DriveProfile;
+use crate::machine_file;
+use crate::models::{DriveProfile, MODELS};
 
 /// Decides everything random on the embedded bus: runs are repeatable.
-const SEED: u64 = 1;
+pub(crate) const SEED: u64 = 1;
 
 /// Every drive boots well within a second.
 const BOOT_PATIENCE: Duration = Duration::from_secs(5);
 
+/// After booting a drive looks at its supply, sensors and inputs for some tens of milliseconds before it judges them.
+const SETTLING_TIME: Duration = Duration::from_millis(200);
+
 /// A world with drives, and which they are.
 pub(crate) type Embedded = (World, Vec<(NodeId, &'static DriveProfile)>);
 
-/// The world that `--bus sim` or `--bus sim:FILE.toml` means.
+/// The world that `--bus sim` or `--bus sim:FILE.toml` means: one drive of each model, each at the node-ID as delivered,
+/// or what the file says.
 pub(crate) fn world(file: Option<&Path>) -> Result<Embedded, Failure> {
     if let Some(path) = file {
-        return Err(Failure::usage(format!("machine files such as {} are not read yet", path.display())));
+        return machine_file::load(path);
     }
-    Ok((World::new(Bitrate::K500, SEED), Vec::new()))
+    let mut world = World::new(Bitrate::K500, SEED);
+    let mut drives = Vec::new();
+    for model in MODELS {
+        let node = NodeId::new(model.node_id).unwrap_or(NodeId::MIN);
+        let drive = virtual_drive(model, node, world.bitrate())?;
+        world.add_drive(node.raw(), drive).map_err(|error| Failure::new(error.to_string()))?;
+        drives.push((node, model));
+    }
+    Ok((world, drives))
 }
 
-/// A factory-fresh virtual drive of a model.
+/// A factory-fresh virtual drive of a model, but for its node-ID and bit rate, without power.
 pub(crate) fn virtual_drive(
     model: &DriveProfile,
     node: NodeId,
     bitrate: Bitrate,
 ) -> Result<Box<dyn VirtualDrive>, Failure> {
-    let _ = (node, bitrate);
-    Err(Failure::new(format!("there is no virtual {} yet", model.model)))
+    match model.model {
+        "zlac8030l" => Ok(Box::new(sim::machine::zlac8030l(node.raw(), baud_rate(model, CAN_BAUD_RATE, bitrate)?))),
+        _ => Err(Failure::new(format!("there is no virtual {}", model.model))),
+    }
 }
 
-/// Waits for the boot-up message of every drive.
+/// Bit rate of the ZL drives, by number.
+const CAN_BAUD_RATE: Mux = Mux::new(0x200E, 0);
+
+/// The number that stands for a bit rate in a drive's object, by the words of the object's row.
+fn baud_rate(model: &DriveProfile, object: Mux, bitrate: Bitrate) -> Result<u16, Failure> {
+    let values = model.table.find(object).map_or(&[][..], |slot| model.table.row(slot).values);
+    let words = format!("{} kbit/s", bitrate.bits_per_second() / 1000);
+    let number =
+        values.iter().find(|(_, meaning)| *meaning == words).and_then(|(number, _)| u16::try_from(*number).ok());
+    number.ok_or_else(|| {
+        let known = values.iter().map(|(_, meaning)| *meaning).collect::<Vec<_>>().join(", ");
+        Failure::usage(format!("a {} cannot run at {bitrate}", model.model)).because(format!("{object} knows {known}"))
+    })
+}
+
+/// Waits until every drive has booted and looked about.
 pub(crate) async fn wait_until_booted(
     network: &Network,
     drives: &[(NodeId, &'static DriveProfile)],
@@ -47,5 +77,18 @@ pub(crate) async fn wait_until_booted(
         let booted = network.node(*node).wait(|node| node.facts.boot_up, BOOT_PATIENCE).await;
         booted.map_err(|_| Failure::new(format!("the virtual drive at node {node} did not boot")))?;
     }
+    network.sleep(SETTLING_TIME).await;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bit_rate_that_the_drive_does_not_know_is_refused_with_those_it_knows() {
+        assert_eq!(baud_rate(MODELS[0], CAN_BAUD_RATE, Bitrate::K125).ok(), Some(3));
+        let refusal = baud_rate(MODELS[0], CAN_BAUD_RATE, Bitrate::K50).err().map(|failure| failure.to_string());
+        assert!(refusal.is_some_and(|text| text.contains("cannot run at 50k") && text.contains("100 kbit/s")));
+    }
 }

@@ -13,7 +13,7 @@ use crate::args::Global;
 use crate::context::Context;
 use crate::embedded;
 
-use crate::failure::Failure;
+use crate::failure::{Failure, Status};
 use crate::progress::Progress;
 
 /// Longest virtual time that a command may take; none comes near, and a hang would otherwise never end.
@@ -43,6 +43,7 @@ fn virtual_bus<R>(
     file: Option<&std::path::Path>,
     command: impl AsyncFnOnce(&Context) -> Result<R, Failure>,
 ) -> Result<R, Failure> {
+    exit_on_interrupt();
     let (mut world, drives) = embedded::world(file)?;
     let network = Network::new();
     world.add_station(network.clone());
@@ -66,17 +67,31 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     let context = Context::new(global, network.clone(), None, progress.clone());
     let until = async {
         tokio::select! {
-            result = command(&context) => result,
-            () = interrupted() => {
-                stop_what_moves(&context).await;
-                Err(Failure::interrupted())
-            }
+            result = command(&context) => match result {
+                Ok(done) => Ok(done),
+                Err(failure) => Err(stop_what_moves(&context, failure).await),
+            },
+            () = interrupted() => Err(stop_what_moves(&context, Failure::interrupted()).await),
         }
     };
     let mut station = network.clone();
     let ended = run_station(&mut bus, &mut station, &clock, &Notify::new(), until).await;
     progress.clear();
-    ended.map_err(|error| bus_failure(global, &error))?
+    ended.map_err(|error| {
+        let moving =
+            network.moved().iter().map(|node| format!("node {node} was moving, and cannot be reached any more"));
+        moving.fold(bus_failure(global, &error), Failure::because)
+    })?
+}
+
+/// Ends the process on Ctrl-C from here on: on an embedded bus there is no motor to stop.
+pub(crate) fn exit_on_interrupt() {
+    std::thread::spawn(|| {
+        if let Ok(runtime) = runtime() {
+            runtime.block_on(interrupted());
+            std::process::exit(Status::Interrupted as i32);
+        }
+    });
 }
 
 /// Completes on Ctrl-C, or when the process is asked to end.
@@ -106,15 +121,27 @@ async fn terminated() {
     pending().await
 }
 
-/// Quick stop to every node that this command has set in motion.
-async fn stop_what_moves(context: &Context) {
-    // Whether it worked or not, the process ends now.
-    let _ = tokio::time::timeout(STOP_PATIENCE, context.network.stop_all_moved()).await;
+/// Quick stop to every node that this command has set in motion; the failure then says so.
+async fn stop_what_moves(context: &Context, mut failure: Failure) -> Failure {
+    let stopping = tokio::time::timeout(STOP_PATIENCE, context.network.stop_all_moved());
+    for (node, stopped) in stopping.await.unwrap_or_default() {
+        failure = match stopped {
+            Ok(()) => failure.because(format!("node {node} was moving and has been quick-stopped")),
+            Err(error) => failure.because(format!("node {node} may still be moving: {error}")),
+        };
+    }
+    failure
 }
 
 /// A failure of the bus itself, with every cause that is known.
 pub(crate) fn bus_failure(global: &Global, error: &dyn Error) -> Failure {
-    let mut failure = Failure::new(format!("bus {}: {error}", global.bus));
+    let failure = failure_of(error);
+    Failure { what: format!("bus {}: {}", global.bus, failure.what), ..failure }
+}
+
+/// An error with every cause that is known.
+pub(crate) fn failure_of(error: &dyn Error) -> Failure {
+    let mut failure = Failure::new(error.to_string());
     let mut source = error.source();
     while let Some(cause) = source {
         failure = failure.because(cause);

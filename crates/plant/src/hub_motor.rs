@@ -11,10 +11,7 @@ use crate::hall::{HallFault, HallModel};
 use crate::mechanics::{Load, RotorData, RotorModel};
 use crate::pmsm::{Phase, PmsmData, PmsmInput, PmsmModel, Terminals};
 use crate::supply::{SupplyData, SupplyModel};
-use crate::thermal::{BodyData, BodyModel};
-
-/// Temperature at which a winding's resistance is stated.
-const RESISTANCE_STATED_AT_C: f64 = 20.0;
+use crate::thermal::{BodyData, BodyModel, resistance_at_ohm};
 
 /// Steps between two looks at the slow things: heat, resistance, and the exact direction of the magnets. Bodies are
 /// a million steps slow, and turning the direction on by its series is off by 1e-11 in so many steps.
@@ -257,12 +254,12 @@ impl HubMotor {
 
 /// Resistance of one phase of the winding at a temperature.
 fn winding_resistance_ohm(model: &HubMotorModel, winding_c: f64) -> f64 {
-    model.pmsm.resistance_ohm * (1.0 + model.resistance_per_k * (winding_c - RESISTANCE_STATED_AT_C))
+    resistance_at_ohm(model.pmsm.resistance_ohm, model.resistance_per_k, winding_c)
 }
 
 impl Inverter {
     #[inline]
-    fn terminals(&self, bus_v: f64) -> Terminals {
+    pub(crate) fn terminals(&self, bus_v: f64) -> Terminals {
         match *self {
             Inverter::Open => Terminals::Open { bus_v },
             Inverter::Shorted => Terminals::Shorted,

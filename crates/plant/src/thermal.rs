@@ -6,6 +6,14 @@
 //!
 //! Explicit steps: sound because bodies are thousands of steps slow.
 
+/// Temperature at which a winding's resistance is stated.
+const RESISTANCE_STATED_AT_C: f64 = 20.0;
+
+/// Resistance at a temperature of a winding that has `stated_ohm` at 20 °C and changes by `per_k` of it per kelvin.
+pub fn resistance_at_ohm(stated_ohm: f64, per_k: f64, temperature_c: f64) -> f64 {
+    stated_ohm * (1.0 + per_k * (temperature_c - RESISTANCE_STATED_AT_C))
+}
+
 /// What never changes about a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BodyModel {

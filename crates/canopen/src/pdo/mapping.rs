@@ -101,6 +101,10 @@ impl Mapping {
         if usize::from(count) > MAX_OBJECTS {
             return Err(AbortCode::PDO_TOO_LONG);
         }
+        // That the record is too short says more than what stands in its entries.
+        if count > 0 {
+            values.value(Mux::new(index, count)).map_err(|_| AbortCode::PDO_TOO_LONG)?;
+        }
         let mut mapping: Option<Self> = None;
         for sub_index in 1..=count {
             let raw = values.value(Mux::new(index, sub_index)).map_err(|_| AbortCode::PDO_TOO_LONG)?;

@@ -8,6 +8,7 @@ use crate::args::Global;
 use crate::demo::{self, DemoReport};
 use crate::failure::Failure;
 use crate::progress::Progress;
+use crate::session::exit_on_interrupt;
 
 /// Show the whole thing on an embedded virtual bus: every procedure of the manual against the drive
 ///
@@ -23,6 +24,7 @@ pub(crate) struct Demo {
 impl Demo {
     /// Runs it and writes the picture.
     pub(crate) fn run(&self, global: &Global) -> Result<DemoReport, Failure> {
+        exit_on_interrupt();
         let clock = WallClock::start();
         let progress = Progress::new(global.json);
         let (mut report, figure) = demo::run(progress.clone())?;

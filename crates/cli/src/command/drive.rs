@@ -1,7 +1,7 @@
 //! `ferrodrive state`, `enable`, `disable`, `stop`, `quick-stop` and `reset`: the power state machine of CiA 402 by its
 //! intents, and what a drive says of itself.
 
-use canopen::NodeId;
+use canopen::{NmtState, NodeId};
 use master::drive::{Drive, DriveState};
 use serde::Serialize;
 
@@ -162,7 +162,8 @@ impl StateReport {
             supply_v: state.supply.map(|supply| supply.0),
             motor_c: state.motor_temperature.map(|temperature| temperature.0),
             driver_c: state.driver_temperature.map(|temperature| temperature.0),
-            nmt_state: state.nmt.map(|nmt| nmt.to_string()),
+            // A boot-up message says only that the node has just left the state it names.
+            nmt_state: state.nmt.filter(|nmt| *nmt != NmtState::Initialising).map(|nmt| nmt.to_string()),
         })
     }
 

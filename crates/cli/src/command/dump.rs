@@ -17,7 +17,7 @@ use crate::embedded;
 use crate::failure::Failure;
 use crate::output::{Format, Report};
 use crate::paint::Paint;
-use crate::session::{bus_failure, interrupted, runtime};
+use crate::session::{bus_failure, exit_on_interrupt, interrupted, runtime};
 
 /// Show the bus decoded: SDO with object names and values, PDOs by their mapping, statuswords in words
 ///
@@ -60,6 +60,8 @@ struct Sink {
     format: Format,
     log: Option<LogWriter<BufWriter<File>>>,
     path: Option<PathBuf>,
+    /// Unix time of the time axis's zero, for the log; a recorded bus has Unix times already.
+    unix_zero: Duration,
 }
 
 impl Dump {
@@ -74,6 +76,7 @@ impl Dump {
     }
 
     fn embedded(&self, file: Option<&Path>, sink: &mut Sink) -> Result<(), Failure> {
+        exit_on_interrupt();
         let (mut world, drives) = embedded::world(file)?;
         for (node, model) in drives {
             sink.decoder.set_model(node, model.table);
@@ -93,6 +96,9 @@ impl Dump {
     async fn listen(&self, global: &Global, sink: &mut Sink) -> Result<(), Failure> {
         let clock = WallClock::start();
         let mut bus = global.bus.open(&clock).await.map_err(|error| bus_failure(global, &error))?;
+        if !matches!(global.bus, BusSpec::Log { .. }) {
+            sink.unix_zero = clock.unix_zero();
+        }
         let end = self.duration.map(|duration| clock.now() + duration);
         let over = async {
             tokio::select! {
@@ -126,12 +132,12 @@ impl Sink {
         }
         let log = path.map(File::create).transpose().map_err(|error| log_failure(path, &error))?;
         let log = log.map(|file| LogWriter::new(BufWriter::new(file), "can0"));
-        Ok(Self { decoder, format, log, path: path.map(Into::into) })
+        Ok(Self { decoder, format, log, path: path.map(Into::into), unix_zero: Duration::ZERO })
     }
 
     fn take(&mut self, at: Instant, frame: &Frame) -> Result<(), Failure> {
         if let Some(log) = &mut self.log {
-            log.write(at, frame).map_err(|error| log_failure(self.path.as_deref(), &error))?;
+            log.write(at + self.unix_zero, frame).map_err(|error| log_failure(self.path.as_deref(), &error))?;
         }
         let text = self.decoder.decode(frame).to_string();
         let line = Line { t: at.as_secs_f64(), frame: frame.to_string(), text };

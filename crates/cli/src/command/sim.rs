@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use can::{Bitrate, Instant};
+use can::Bitrate;
 use sim::World;
 use tokio::sync::mpsc;
 use transport::log::LogWriter;
@@ -20,7 +20,7 @@ use crate::parse::drive_spec::{DriveSpec, drive_spec};
 use crate::serve::eeprom::{EepromError, Eeproms};
 use crate::serve::keeper::{Keeper, file_name};
 use crate::serve::world::ServedWorld;
-use crate::session::{bus_failure, interrupted, runtime};
+use crate::session::{bus_failure, failure_of, interrupted, runtime};
 
 /// Run virtual drives in real time, for other programs
 ///
@@ -79,6 +79,11 @@ impl Sim {
     /// Runs until `quit`, Ctrl-C or a lost `bridge` (the bus given with `--bus` beside `sim`).
     pub(crate) fn run(&self, global: &Global, bridge: Option<&BusSpec>) -> Result<(), Failure> {
         self.refuse_duplicates()?;
+        if let Some(BusSpec::Sim { .. } | BusSpec::Log { .. }) = bridge {
+            return Err(Failure::usage(format!("sim cannot join its drives to {}", global.bus))
+                .because("it makes a virtual bus itself, and joins it to a live one only")
+                .next("leave --bus away, or give e.g. --bus vcan0"));
+        }
         let eeproms = self.state.as_deref().map(Eeproms::open).transpose()?;
         let mut world = World::new(self.bitrate, self.seed);
         for spec in &self.drives {
@@ -130,17 +135,20 @@ impl Sim {
     ) -> Result<(), Failure> {
         let clock = WallClock::start();
         records.unix_zero = clock.unix_zero();
+        let outer = match bridge {
+            Some(spec) => Some(spec.open(&clock).await.map_err(|error| bus_failure(global, &error))?),
+            None => None,
+        };
         let mut places = self.places.clone();
-        if bridge.is_some() {
+        if outer.is_some() {
             places.push(ServeSpec { protocol: Protocol::Socketcand, address: "127.0.0.1:0".into() });
         }
         let options = HubOptions { bitrate: Some(self.bitrate), zero: clock.unix_zero(), ..HubOptions::default() };
-        let mut hub = Hub::bind(&places, options, &clock).await.map_err(|error| bus_failure(global, &error))?;
+        let mut hub = Hub::bind(&places, options, &clock).await.map_err(|error| failure_of(&error))?;
         let (requests, mut incoming) = mpsc::channel(LINES_WAITING);
-        let inner = hub.listeners().last().map(|listener| listener.address.to_string()).unwrap_or_default();
-        if let Some(spec) = bridge {
-            let bus = spec.open(&clock).await.map_err(|error| bus_failure(global, &error))?;
-            tokio::spawn(join_buses(bus, inner, clock.clone(), requests.clone(), global.clone()));
+        if let (Some(outer), Some(inner)) = (outer, hub.listeners().last()) {
+            let inner = inner.address.to_string();
+            tokio::spawn(join_buses(outer, inner, clock.clone(), requests.clone(), global.clone()));
         }
         let listeners = hub.listeners()[..self.places.len()].iter().map(|listener| format!(" {listener}"));
         say(&format!(
@@ -154,7 +162,8 @@ impl Sim {
             answer(world, request, &mut records)
         })
         .await;
-        records.keep(&mut world).and(records.finish()).and(ended)
+        records.keep(&mut world);
+        records.finish().and(ended)
     }
 }
 
@@ -165,7 +174,8 @@ fn answer(world: &mut ServedWorld, request: Request, records: &mut Records) -> C
             if let Some(answer) = sim::command::answer(world.world_mut(), &line) {
                 if answer.quit {
                     // What was stored is on the disk when the answer is read.
-                    let kept = records.keep(world).and(records.finish());
+                    records.keep(world);
+                    let kept = records.finish();
                     say(&answer.json);
                     return ControlFlow::Break(kept);
                 }
@@ -173,10 +183,10 @@ fn answer(world: &mut ServedWorld, request: Request, records: &mut Records) -> C
             }
             ControlFlow::Continue(())
         }
-        Request::Keep => match records.keep(world) {
-            Ok(()) => ControlFlow::Continue(()),
-            Err(failure) => ControlFlow::Break(Err(failure)),
-        },
+        Request::Keep => {
+            records.keep(world);
+            ControlFlow::Continue(())
+        }
         Request::Interrupted => ControlFlow::Break(Err(Failure::interrupted())),
         Request::BridgeLost(failure) => ControlFlow::Break(Err(failure)),
     }
@@ -184,15 +194,18 @@ fn answer(world: &mut ServedWorld, request: Request, records: &mut Records) -> C
 
 impl Records {
     /// Brings to the disk what has happened since the last time.
-    fn keep(&mut self, world: &mut ServedWorld) -> Result<(), Failure> {
+    fn keep(&mut self, world: &mut ServedWorld) {
         if let Some(keeper) = &mut self.keeper {
             keeper.look(world.world_mut());
         }
-        let Some(log) = &mut self.log else { return Ok(()) };
-        let zero = Instant::ZERO + self.unix_zero;
+        let Some(log) = &mut self.log else { return };
         let lines = world.take_carried();
-        let written = lines.iter().try_for_each(|(at, frame)| log.write(zero.plus_nanos(at.as_nanos()), frame));
-        written.and_then(|()| log.flush()).map_err(|error| Failure::new("cannot write the log").because(error))
+        let written = lines.iter().try_for_each(|(at, frame)| log.write(*at + self.unix_zero, frame));
+        if let Err(error) = written.and_then(|()| log.flush()) {
+            // The drives are worth more than their log.
+            let _ = writeln!(io::stderr(), "warning: cannot write the log: {error}; it ends here");
+            self.log = None;
+        }
     }
 
     /// Waits until EEPROM contents are on the disk.

@@ -10,7 +10,8 @@ use sim::{Report, StationId, World};
 
 use super::expect::Expect;
 use super::row::Row;
-use crate::embedded;
+use super::set_points::{Axis, SetPoints};
+use crate::embedded::{self, SEED};
 use crate::failure::Failure;
 use crate::models::DriveProfile;
 use crate::plot::{Event, EventKind};
@@ -30,8 +31,6 @@ const ANSWER_TIME: Duration = Duration::from_millis(50);
 
 const SAMPLING_PERIOD: Duration = Duration::from_millis(5);
 
-const SEED: u64 = 1;
-
 /// See the [module](self).
 pub(super) struct Bench {
     world: World,
@@ -42,6 +41,7 @@ pub(super) struct Bench {
     rows: Vec<Row>,
     sections: Vec<(Instant, &'static str, &'static str)>,
     events: Vec<Event>,
+    set_points: SetPoints,
 }
 
 /// What is left of a bench: the table, the recording, and the named spans and moments in it.
@@ -51,6 +51,7 @@ pub(super) struct Finished {
     /// Begin, number and name of each section.
     pub(super) sections: Vec<(Instant, &'static str, &'static str)>,
     pub(super) events: Vec<Event>,
+    pub(super) set_points: SetPoints,
     pub(super) end: Instant,
 }
 
@@ -83,6 +84,7 @@ impl Bench {
             rows: Vec::new(),
             sections: Vec::new(),
             events: Vec::new(),
+            set_points: SetPoints::default(),
         })
     }
 
@@ -91,6 +93,17 @@ impl Bench {
         self.section = number;
         self.sections.push((self.world.now(), number, name));
         self.progress.show(format!("{number} {name}"));
+    }
+
+    /// Draws a set-point of the position, in counts.
+    pub(super) fn aim_at(&mut self, counts: f64) {
+        let now = self.world.now();
+        self.set_points.set(Axis::Position, counts, now);
+    }
+
+    /// Counts of 60FFh in 1 r/min from here on (5.3).
+    pub(super) fn resolve(&mut self, counts_per_rpm: f64) {
+        self.set_points.counts_per_rpm = counts_per_rpm;
     }
 
     /// Marks the present moment in the picture.
@@ -104,33 +117,38 @@ impl Bench {
         self.rows.push(Row::new(self.section, step));
     }
 
+    /// Begins a row without a datagram that belongs to another section.
+    pub(super) fn step_in(&mut self, section: &'static str, step: impl Into<String>) {
+        self.rows.push(Row::new(section, step));
+    }
+
     /// Begins a row: sends a datagram to the drive's SDO server, and compares the answer with the manual's.
     pub(super) fn ask(&mut self, step: impl Into<String>, request: &str, reply: &str) {
         self.step(step);
-        self.ask_more(request, reply);
-    }
-
-    /// Sends a further datagram within the row.
-    pub(super) fn ask_more(&mut self, request: &str, reply: &str) {
         let answered = self.exchange(bytes(request));
         let text = answered.map_or_else(|| "nothing".into(), |data| hex(&data));
         let expected = hex(&bytes(reply));
-        let ok = text == expected;
         let row = self.row();
-        add(&mut row.asked, &hex(&bytes(request)));
-        add(&mut row.answered, &text);
-        if ok {
-            if row.expected.is_empty() {
-                row.compare("answer as printed", "same", true);
-            }
+        row.asked = hex(&bytes(request));
+        row.answered = text.clone();
+        if text == expected {
+            row.compare("as printed", "same", true);
         } else {
-            row.compare(format!("answer {expected}"), text, false);
+            row.compare(&expected, text, false);
+        }
+    }
+
+    /// Sends a datagram to the drive's SDO server within a row that speaks of something else.
+    pub(super) fn tell(&mut self, request: &str) {
+        let answered = self.exchange(bytes(request));
+        if answered.is_none_or(|reply| reply[0] == 0x80) {
+            self.row().compare("an answer", "refused, or none", false);
         }
     }
 
     /// Sends a frame that nobody answers, within the row.
     pub(super) fn send(&mut self, frame: Frame) {
-        add(&mut self.row().asked, &frame.to_string());
+        self.row().asked = frame.to_string();
         self.transmit(frame);
         self.world.run_for(Duration::from_millis(2));
         self.listen();
@@ -147,7 +165,7 @@ impl Bench {
     }
 
     /// Adds an expectation in words to the row.
-    pub(super) fn compare(&mut self, expected: impl AsRef<str>, seen: impl AsRef<str>, ok: bool) {
+    pub(super) fn compare(&mut self, expected: impl AsRef<str>, seen: impl Into<String>, ok: bool) {
         self.row().compare(expected, seen, ok);
     }
 
@@ -233,7 +251,9 @@ impl Bench {
     pub(super) fn finish(mut self) -> Finished {
         let recorder = self.world.stop_recording().unwrap_or_else(|| Recorder::new(SAMPLING_PERIOD, []));
         let end = self.world.now();
-        Finished { rows: self.rows, recorder, sections: self.sections, events: self.events, end }
+        self.set_points.end(end);
+        let Self { rows, sections, events, set_points, .. } = self;
+        Finished { rows, recorder, sections, events, set_points, end }
     }
 
     fn row(&mut self) -> &mut Row {
@@ -245,6 +265,7 @@ impl Bench {
     }
 
     fn exchange(&mut self, request: [u8; 8]) -> Option<[u8; 8]> {
+        self.set_points.note(&request, self.world.now());
         self.listen();
         let before = self.heard.len();
         self.transmit(Frame::full(CanId::standard(0x600 + u16::from(NODE)), request));
@@ -283,11 +304,4 @@ fn bytes(text: &str) -> [u8; 8] {
 
 fn hex(bytes: &[u8; 8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02X}")).collect()
-}
-
-fn add(text: &mut String, more: &str) {
-    if !text.is_empty() {
-        text.push(' ');
-    }
-    text.push_str(more);
 }

@@ -1,6 +1,7 @@
 //! The demo's picture: position, velocity and current over time, with the manual's sections and what happened.
 
 use super::bench::{Finished, SIGNALS};
+use super::set_points::Axis;
 use crate::plot::{Colour, Figure, Panel, Section, Style, Trace};
 
 use sim::recorder::Signal;
@@ -12,10 +13,14 @@ pub(super) fn figure(finished: &Finished) -> Figure {
         let times = finished.recorder.times().iter().map(|at| at.as_secs_f64());
         Trace { label, style, points: times.zip(finished.recorder.samples(channel)).collect() }
     };
-    let panel = |title, unit, colour, demand, actual| Panel {
+    let panel = |title, unit, colour, axis, demand, actual| Panel {
         title,
         unit,
-        traces: vec![trace("demand", Style::Demand, demand), trace("actual", Style::Actual(colour), actual)],
+        traces: vec![
+            trace("demand", Style::Demand, demand),
+            Trace { label: "set-point", style: Style::SetPoint, points: finished.set_points.line(axis) },
+            trace("actual", Style::Actual(colour), actual),
+        ],
     };
     Figure {
         title: "Every procedure of the ZLAC8030L's manual, on the virtual drive".into(),
@@ -23,9 +28,9 @@ pub(super) fn figure(finished: &Finished) -> Figure {
                    motor physics, virtual time"
             .into(),
         panels: vec![
-            panel("Position", "counts", Colour::Blue, Signal::PositionDemand, Signal::Position),
-            panel("Velocity", "r/min", Colour::Teal, Signal::VelocityDemand, Signal::Velocity),
-            panel("Motor current", "A", Colour::Orange, Signal::CurrentDemand, Signal::Current),
+            panel("Position", "counts", Colour::Blue, Axis::Position, Signal::PositionDemand, Signal::Position),
+            panel("Velocity", "r/min", Colour::Teal, Axis::Velocity, Signal::VelocityDemand, Signal::Velocity),
+            panel("Motor current", "A", Colour::Orange, Axis::Current, Signal::CurrentDemand, Signal::Current),
         ],
         sections: sections(finished),
         events: finished.events.clone(),

@@ -6,7 +6,7 @@ use sim::Brake;
 
 use super::bench::Bench;
 use super::expect::Expect;
-use super::velocity::enable;
+use super::velocity::enable_again;
 use crate::plot::EventKind;
 
 const SAVE: (&str, &str) = ("2B 09 20 00 02 00 00 00", "60 09 20 00 00 00 00 00");
@@ -64,14 +64,15 @@ pub(super) fn parking(bench: &mut Bench) {
 /// 5.3: a finer unit of the target speed, in force after saving and restarting.
 pub(super) fn speed_resolution(bench: &mut Bench) {
     bench.section("5.3", "speed resolution");
-    for (setting, request, speed_rpm) in [
-        ("A", "2B 2F 20 05 0A 00 00 00", 10.0),
-        ("5", "2B 2F 20 05 05 00 00 00", 20.0),
-        ("1", "2B 2F 20 05 01 00 00 00", 100.0),
+    for (setting, request, speed_rpm, counts_per_rpm) in [
+        ("A", "2B 2F 20 05 0A 00 00 00", 10.0, 10.0),
+        ("5", "2B 2F 20 05 05 00 00 00", 20.0, 5.0),
+        ("1", "2B 2F 20 05 01 00 00 00", 100.0, 1.0),
     ] {
         bench.ask(format!("resolution {setting}"), request, &format!("{WRITE_OK_202F} 05 00 00 00 00"));
         bench.ask("save", SAVE.0, SAVE.1);
         power_cycle(bench);
+        bench.resolve(counts_per_rpm);
         velocity_mode(bench);
         bench.ask("target 100", "23 FF 60 00 64 00 00 00", "60 FF 60 00 00 00 00 00");
         bench.run(Duration::from_millis(1_200));
@@ -140,7 +141,6 @@ pub(super) fn brake(bench: &mut Bench) {
 /// Supply off and on, and the boot-up message after it.
 pub(super) fn power_cycle(bench: &mut Bench) {
     bench.step("restart");
-    bench.mark("restart", EventKind::Note);
     let begin = bench.now();
     bench.machine("power off");
     bench.run_silently(Duration::from_millis(200));
@@ -162,7 +162,7 @@ pub(super) fn clear_fault(bench: &mut Bench) {
 /// Velocity mode, enabled.
 pub(super) fn velocity_mode(bench: &mut Bench) {
     bench.ask("velocity mode", "2F 60 60 00 03 00 00 00", "60 60 60 00 00 00 00 00");
-    enable(bench);
+    enable_again(bench);
 }
 
 /// Enabled and turning at 100 r/min.

@@ -13,6 +13,7 @@ mod pdo;
 mod position;
 mod report;
 mod row;
+mod set_points;
 mod torque;
 mod velocity;
 

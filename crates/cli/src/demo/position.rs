@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::bench::{Bench, COUNTS_PER_TURN};
 use super::expect::Expect;
-use super::velocity::enable;
+use super::velocity::enable_again;
 
 /// 2002h as delivered: the drive is in place within this many counts.
 const IN_PLACE_COUNTS: f64 = 30.0;
@@ -25,13 +25,18 @@ const ACKNOWLEDGE: u16 = 1 << 12;
 /// 4.2.
 pub(super) fn relative(bench: &mut Bench) {
     bench.section("4.2", "relative position");
-    bench.ask("position mode", "2F 60 60 00 01 00 00 00", "60 60 60 00 00 00 00 00");
-    bench.ask("max speed 60 r/min", "23 81 60 00 3C 00 00 00", "60 81 60 00 00 00 00 00");
-    enable(bench);
+    position_mode(bench);
     for (counts, request) in TARGETS {
         let from = bench.report().position as f64;
         go(bench, "relative", from + counts, request, RELATIVE);
     }
+}
+
+/// Position mode at 60 r/min, enabled.
+pub(super) fn position_mode(bench: &mut Bench) {
+    bench.ask("position mode", "2F 60 60 00 01 00 00 00", "60 60 60 00 00 00 00 00");
+    bench.ask("max speed 60 r/min", "23 81 60 00 3C 00 00 00", "60 81 60 00 00 00 00 00");
+    enable_again(bench);
 }
 
 /// 4.3.
@@ -49,7 +54,8 @@ fn go(bench: &mut Bench, kind: &str, goal: f64, target: &str, [prepare, start]: 
     bench.ask(format!("start {kind} motion"), prepare, "60 40 60 00 00 00 00 00");
     let from = bench.report().position as f64;
     let begin = bench.now();
-    bench.ask_more(start, "60 40 60 00 00 00 00 00");
+    bench.aim_at(goal);
+    bench.ask(format!("start {kind} motion"), start, "60 40 60 00 00 00 00 00");
     let acknowledged = bench.run_until(Duration::from_millis(100), |word| word & ACKNOWLEDGE != 0);
     bench.compare("bit 12 acknowledges", if acknowledged.is_some() { "yes" } else { "no" }, acknowledged.is_some());
     // The way at 60 r/min takes as long as the way alone and half of each ramp.
@@ -61,7 +67,8 @@ fn go(bench: &mut Bench, kind: &str, goal: f64, target: &str, [prepare, start]: 
     bench.moved(format!("{:+.0} counts in {took_s:.2} s", position - from));
     bench.expect("at", Expect::Near(goal.round(), IN_PLACE_COUNTS), "counts", position);
     bench.expect("after", Expect::Near(time_s, 0.03 * time_s), "s", took_s);
+    bench.step_in("7.2", "statusword at the target");
     let word = bench.statusword().unwrap_or_default();
-    // 7.2: bit 5 no emergency stop, 10 reached, 12 valid, 13 in place, 14 not running, 15 no external stop.
+    // Bit 5 no emergency stop, 10 reached, 12 valid, 13 in place, 14 not running, 15 no external stop.
     bench.expect("bits 5, 10, 13, 14, 15", Expect::Bits(0x2420), "", f64::from(word & 0xE420));
 }

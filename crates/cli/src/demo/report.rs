@@ -42,8 +42,13 @@ impl Report for DemoReport {
         for row in &self.rows {
             let number = if row.section == section { "" } else { row.section };
             section = row.section;
-            let ok = if row.ok { "ok" } else { "DIFFERS" };
-            table.row([number, &row.step, &row.asked, &row.answered, &row.moved, &row.expected, &row.seen, ok]);
+            for (place, check) in row.checks.iter().enumerate() {
+                let first = |text: &str| if place == 0 { text.to_owned() } else { String::new() };
+                let ok = if check.ok { "ok" } else { "DIFFERS" };
+                let what =
+                    [first(number), first(&row.step), first(&row.asked), first(&row.answered), first(&row.moved)];
+                table.row(what.into_iter().chain([check.expected.clone(), check.seen.clone(), ok.into()]));
+            }
         }
         let text = table.text(paint, |_, column, cell| {
             (column == OK_COLUMN).then(|| if cell == "ok" { paint.good(cell) } else { paint.bad(cell) })

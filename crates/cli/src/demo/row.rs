@@ -1,4 +1,4 @@
-//! One line of the demo's table: what was asked, what answered, what moved, what should have been seen and what was.
+//! One step of the demo: what was asked, what answered, what moved, what should have been seen and what was.
 
 use serde::Serialize;
 
@@ -11,12 +11,21 @@ pub(super) struct Row {
     pub(super) section: &'static str,
     /// What is done.
     pub(super) step: String,
-    /// The frames sent, in candump form.
+    /// The frame sent, in candump form or as the eight bytes to the drive's SDO server.
     pub(super) asked: String,
-    /// The frames that answered.
+    /// The frame that answered.
     pub(super) answered: String,
     /// What the shaft did.
     pub(super) moved: String,
+    /// Everything that was compared.
+    pub(super) checks: Vec<Check>,
+    /// Whether all of it agrees.
+    pub(super) ok: bool,
+}
+
+/// One comparison.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Check {
     /// What the manual or a closed form lets expect.
     pub(super) expected: String,
     /// What was seen.
@@ -37,16 +46,8 @@ impl Row {
     }
 
     /// Adds an expectation in words.
-    pub(super) fn compare(&mut self, expected: impl AsRef<str>, seen: impl AsRef<str>, ok: bool) {
-        append(&mut self.expected, expected.as_ref());
-        append(&mut self.seen, seen.as_ref());
+    pub(super) fn compare(&mut self, expected: impl AsRef<str>, seen: impl Into<String>, ok: bool) {
+        self.checks.push(Check { expected: expected.as_ref().trim().into(), seen: seen.into(), ok });
         self.ok &= ok;
     }
-}
-
-fn append(text: &mut String, more: &str) {
-    if !text.is_empty() && !more.is_empty() {
-        text.push_str("; ");
-    }
-    text.push_str(more.trim());
 }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::bench::Bench;
 use super::expect::Expect;
-use super::velocity::enable;
+use super::velocity::enable_again;
 use crate::plot::EventKind;
 
 /// Torque slope as delivered (6087h), A/s.
@@ -19,7 +19,7 @@ pub(super) fn profile_torque(bench: &mut Bench) {
     bench.ask("torque mode", "2F 60 60 00 04 00 00 00", "60 60 60 00 00 00 00 00");
     bench.machine("rotor lock");
     bench.mark("shaft locked", EventKind::Note);
-    enable(bench);
+    enable_again(bench);
     let targets = [(1.0, "2B 71 60 00 E8 03 00 00"), (-1.0, "2B 71 60 00 18 FC FF FF")];
     let mut before_a = 0f64;
     for (target_a, request) in targets {
@@ -31,11 +31,12 @@ pub(super) fn profile_torque(bench: &mut Bench) {
         bench.run(Duration::from_secs_f64(time_s / 2.0 + 0.5));
         let current = bench.read_f64(0x6077, 0) * RESOLUTION_A;
         bench.expect("6077h", Expect::Near(target_a, RESOLUTION_A), "A", current);
-        let word = bench.statusword().unwrap_or_default();
-        // 7.3: bit 5 no emergency stop, 10 reached, 15 no external stop.
-        bench.expect("bits 5, 10, 15", Expect::Bits(0x0420), "", f64::from(word & 0x8420));
         let measured = bench.report().current_a;
         bench.moved(format!("{measured:+.2} A, shaft locked"));
+        bench.step_in("7.3", "statusword at the target");
+        let word = bench.statusword().unwrap_or_default();
+        // Bit 5 no emergency stop, 10 reached, 15 no external stop.
+        bench.expect("bits 5, 10, 15", Expect::Bits(0x0420), "", f64::from(word & 0x8420));
         before_a = target_a;
     }
     bench.ask("target 0 mA", "2B 71 60 00 00 00 00 00", "60 71 60 00 00 00 00 00");

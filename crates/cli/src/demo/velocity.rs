@@ -6,7 +6,7 @@ use super::bench::{Bench, COUNTS_PER_TURN};
 use super::expect::Expect;
 use crate::plot::EventKind;
 
-/// Acceleration time as delivered (6083h), s: from the present speed to the target.
+/// Acceleration and deceleration time as delivered (6083h, 6084h), s: from the present speed to the target.
 const RAMP_S: f64 = 0.5;
 
 /// How long each target is held after it was given.
@@ -44,15 +44,28 @@ pub(super) fn enable(bench: &mut Bench) {
     }
 }
 
+/// The same three steps as one row, where they have been shown before.
+pub(super) fn enable_again(bench: &mut Bench) {
+    bench.step("enable (06h, 07h, 0Fh)");
+    let mut nibbles = Vec::new();
+    for (request, _) in ENABLE {
+        bench.tell(request);
+        bench.run(Duration::from_millis(20));
+        nibbles.push(format!("{:X}", bench.statusword().unwrap_or_default() & 0xF));
+    }
+    let seen = nibbles.join(", ");
+    let ok = seen == "1, 3, 7";
+    bench.compare("6041h bits 0-3 1, 3, 7", seen, ok);
+}
+
 /// Gives a target velocity; checks the speed reached and the way made by then.
 fn drive_at(bench: &mut Bench, before_rpm: f64, target_rpm: f64, request: &str) {
     let from = bench.report().position as f64;
     bench.ask(format!("target {target_rpm} r/min"), request, "60 FF 60 00 00 00 00 00");
     bench.run(HOLD);
     let way = bench.report().position as f64 - from;
-    // An S-shaped ramp is symmetric: its mean speed is that of its ends.
     let hold_s = HOLD.as_secs_f64();
-    let way_turns = ((before_rpm + target_rpm) / 2.0 * RAMP_S + target_rpm * (hold_s - RAMP_S)) / 60.0;
+    let way_turns = way_turns(before_rpm, target_rpm, hold_s);
     let reference_turns = target_rpm.abs() / 60.0 * hold_s;
     bench.moved(format!("{way:.0} counts in {hold_s} s"));
     bench.expect(
@@ -64,9 +77,20 @@ fn drive_at(bench: &mut Bench, before_rpm: f64, target_rpm: f64, request: &str) 
     // 606Ch is in 0.1 r/min; the manual's finest step of a target is 1 r/min.
     let speed = bench.read_f64(0x606C, 0) / 10.0;
     bench.expect("606Ch", Expect::Near(target_rpm, 1.0), "r/min", speed);
+    bench.step_in("7.1", format!("statusword at {target_rpm} r/min"));
     let word = bench.statusword().unwrap_or_default();
-    // 7.1: bit 5 no emergency stop, 10 in place, 12 speed is 0, 14 running, 15 external stop.
+    // Bit 5 no emergency stop, 10 in place, 12 speed is 0, 14 running, 15 external stop.
     bench.expect("bits 5, 10, 12, 14, 15", Expect::Bits(0x4420), "", f64::from(word & 0xD420));
+}
+
+/// Turns made in a time from one speed to another. An S-shaped ramp is symmetric: its mean speed is that of its ends.
+fn way_turns(before_rpm: f64, target_rpm: f64, time_s: f64) -> f64 {
+    if before_rpm * target_rpm < 0.0 {
+        // A reversal is two changes: to a stop in 6084h, and up again in 6083h.
+        let ramps = (before_rpm + target_rpm) / 2.0 * RAMP_S;
+        return (ramps + target_rpm * (time_s - 2.0 * RAMP_S)) / 60.0;
+    }
+    ((before_rpm + target_rpm) / 2.0 * RAMP_S + target_rpm * (time_s - RAMP_S)) / 60.0
 }
 
 /// 4.6: emergency stop by controlword 2, and its release.

@@ -75,6 +75,7 @@ pub(crate) fn file_name(model: &str, number: u8) -> String {
 
 fn write_all(eeproms: &Eeproms, incoming: &Receiver<(String, Image)>) -> Result<(), EepromError> {
     let mut waiting = Images::new();
+    let mut reported = String::new();
     loop {
         let received = if waiting.is_empty() {
             incoming.recv().map_err(|_| RecvTimeoutError::Disconnected)
@@ -85,11 +86,16 @@ fn write_all(eeproms: &Eeproms, incoming: &Receiver<(String, Image)>) -> Result<
         waiting.extend(received.into_iter().chain(incoming.try_iter()));
         match write_waiting(eeproms, &mut waiting) {
             Some(error) if over => return Err(error),
-            Some(error) => {
-                drop(writeln!(io::stderr(), "warning: {error}; the file keeps its old contents, trying again"))
+            // Said once for each reason, not twice a second.
+            Some(error) if error.to_string() != reported => {
+                reported = error.to_string();
+                let text = format!("warning: {reported}; the file keeps its old contents, trying again");
+                // Without standard error there is nobody to tell.
+                let _ = writeln!(io::stderr(), "{text}");
             }
+            Some(_) => {}
             None if over => return Ok(()),
-            None => {}
+            None => reported.clear(),
         }
     }
 }

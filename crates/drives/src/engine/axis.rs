@@ -4,10 +4,15 @@
 //! While something asks for a stop ([`StopCause`]), the shaft is ramped down and then held; the mode goes on when
 //! nothing does any more. Nothing here knows objects, units or statusword bits.
 
-use cia402::{Controlword, HaltOption, ModeOfOperation, PowerState, QuickStopOption, Transition};
+use cia402::{Controlword, Direction, HaltOption, ModeOfOperation, PowerState, QuickStopOption, Transition};
 
-use super::modes::{ProfilePosition, ProfileTorque, ProfileVelocity, SetPoint, VelocityRamps};
+use super::modes::{
+    Homing, HomingParameters, HomingStep, ProfilePosition, ProfileTorque, ProfileVelocity, SetPoint, Switches,
+    VelocityRamps,
+};
 use super::power::{PowerMachine, StepDownOptions};
+use super::stop::Stop;
+pub use super::stop::{StopCause, StopRamp};
 use super::trajectory::{MoveLimits, Trajectory, TrajectoryPoint};
 
 /// What the control loops are to do.
@@ -64,6 +69,12 @@ pub struct AxisParameters {
     pub halt: HaltOption,
     /// The shaft is held while the axis is not enabled.
     pub lock_when_disabled: bool,
+    /// The shaft is held from Switched on.
+    pub hold_when_switched_on: bool,
+    /// How a limit switch stops a motion towards it; `None` lets it pass. Homing has rules of its own.
+    pub limit_stop: Option<StopRamp>,
+    /// Homing.
+    pub homing: HomingParameters,
     /// An external stop ends with the power stage off.
     pub release_after_external_stop: bool,
     /// Tolerances of the status.
@@ -81,32 +92,6 @@ pub struct Tolerances {
     pub current_a: f32,
 }
 
-/// What may stop the motor while the axis is enabled; the first that applies decides on the ramp.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StopCause {
-    /// Quick stop active.
-    QuickStop,
-    /// A digital input.
-    External,
-    /// Shutdown or disable operation with a ramp.
-    StepDown,
-    /// The host is silent.
-    HostLost,
-    /// Bit 8 of the controlword.
-    Halt,
-}
-
-/// How fast to stop.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StopRamp {
-    /// With the deceleration of the profiles.
-    SlowDown,
-    /// With the quick stop's deceleration.
-    QuickStop,
-    /// As fast as the current limit allows.
-    CurrentLimit,
-}
-
 /// What the statusword has to tell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AxisStatus {
@@ -122,6 +107,8 @@ pub struct AxisStatus {
     pub running: bool,
     /// The external stop acts.
     pub external_stop: bool,
+    /// The last homing found its home position.
+    pub homing_attained: bool,
 }
 
 /// The axis.
@@ -134,21 +121,17 @@ pub struct Axis {
     position: ProfilePosition,
     velocity: ProfileVelocity,
     torque: ProfileTorque,
+    homing: Homing,
+    /// Where the home position was found, until somebody asks.
+    home: Option<i32>,
+    switches: Switches,
+    /// A limit switch ended the last move before its target.
+    short_of_target: bool,
     stop: Option<Stop>,
     engaged: Engaged,
     external_stop: bool,
     host_lost: bool,
     feedback: Feedback,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Stop {
-    cause: StopCause,
-    ramp: StopRamp,
-    /// How long the ramp has been over, s.
-    over_for_s: f64,
-    /// The shaft is held where it came to rest.
-    held: bool,
 }
 
 /// What the trajectory stands for.
@@ -174,6 +157,10 @@ impl Axis {
             position: ProfilePosition::resting(0),
             velocity: ProfileVelocity::default(),
             torque: ProfileTorque::default(),
+            homing: Homing::default(),
+            home: None,
+            switches: Switches::default(),
+            short_of_target: false,
             stop: None,
             engaged: Engaged::No,
             external_stop: false,
@@ -223,15 +210,18 @@ impl Axis {
         if self.power.is_stepping_down() && self.is_at_rest() {
             self.power.ramp_done();
         }
-        if controlword.rises(before, Controlword::NEW_SET_POINT) && self.takes_set_points() {
+        let new = controlword.has(Controlword::NEW_SET_POINT);
+        if controlword.rises(before, Controlword::NEW_SET_POINT) && self.takes_starts() {
             let set_point = SetPoint {
                 target,
                 relative: controlword.has(Controlword::RELATIVE),
                 immediately: controlword.has(Controlword::CHANGE_SET_IMMEDIATELY),
             };
-            self.position.take(set_point, &mut self.trajectory, &parameters.moves);
+            self.start(set_point, parameters);
+        } else if !new {
+            self.homing.interrupt();
         }
-        self.position.release(controlword.has(Controlword::NEW_SET_POINT));
+        self.position.release(new);
         wants_reset
     }
 
@@ -244,6 +234,21 @@ impl Axis {
     /// Whether the external stop input is active.
     pub fn set_external_stop(&mut self, active: bool) {
         self.external_stop = active;
+    }
+
+    /// What the limit and home switches say.
+    pub fn set_switches(&mut self, switches: Switches) {
+        self.switches = switches;
+    }
+
+    /// Where homing has just found the home position, told once: the caller then shifts the position.
+    pub fn take_home(&mut self) -> Option<i32> {
+        self.home.take()
+    }
+
+    /// The power stage is to be on: enabled, or held for another reason.
+    pub fn is_energised(&self, parameters: &AxisParameters) -> bool {
+        self.is_live() || self.is_locked(parameters)
     }
 
     /// The host is silent: stops the motor once.
@@ -274,12 +279,12 @@ impl Axis {
         self.feedback = feedback;
         self.adopt_mode();
         if !self.is_live() {
-            return self.idle(parameters.lock_when_disabled);
+            return self.idle(parameters);
         }
         if self.engaged != Engaged::Yes {
             self.engage();
         }
-        self.choose_stop(parameters);
+        self.choose_stop(targets, parameters);
         match self.stop {
             Some(stop) => self.stopping(stop, parameters, dt_s),
             None => self.following(targets, parameters, dt_s),
@@ -294,15 +299,34 @@ impl Axis {
             acknowledged: self.position.is_acknowledged(),
             in_position: self.is_in_position(&parameters.tolerances),
             standing,
-            running: !standing || (self.engaged == Engaged::Yes && self.trajectory.point().velocity != 0.0),
+            running: !standing
+                || (self.engaged == Engaged::Yes && self.trajectory.point().velocity != 0.0)
+                || (self.homing.is_running() && self.stop.is_none()),
             external_stop: self.external_stop,
+            homing_attained: self.homing.is_attained(),
         }
     }
 
-    fn takes_set_points(&self) -> bool {
+    /// Bit 4 rose: a set-point or homing begins.
+    fn start(&mut self, set_point: SetPoint, parameters: &AxisParameters) {
+        let SetPoint { target, relative, .. } = set_point;
+        let way = if relative { target } else { target.wrapping_sub(self.trajectory.point().position) };
+        match self.mode {
+            ModeOfOperation::PROFILE_POSITION if !self.meets_limit(f64::from(way), parameters) => {
+                self.short_of_target = false;
+                self.position.take(set_point, &mut self.trajectory, &parameters.moves);
+            }
+            ModeOfOperation::HOMING => {
+                self.velocity.restart();
+                self.homing.start(parameters.homing.row, self.switches);
+            }
+            _ => {}
+        }
+    }
+
+    fn takes_starts(&self) -> bool {
         let stopped = self.stop.is_some_and(|stop| stop.cause != StopCause::Halt);
         self.power.state() == PowerState::OperationEnabled
-            && self.mode == ModeOfOperation::PROFILE_POSITION
             && !stopped
             && !self.external_stop
             && !self.power.is_stepping_down()
@@ -310,7 +334,7 @@ impl Axis {
 
     fn is_at_rest(&self) -> bool {
         let no_way_to_go = self.trajectory.is_resting() || self.mode == ModeOfOperation::PROFILE_TORQUE;
-        self.feedback.standing && no_way_to_go
+        self.feedback.standing && no_way_to_go && !self.homing.is_running()
     }
 
     fn adopt_mode(&mut self) {
@@ -336,6 +360,8 @@ impl Axis {
         self.position.abort(position);
         self.velocity.restart();
         self.torque.restart();
+        self.homing.abort();
+        self.short_of_target = false;
         self.stop = None;
         self.engaged = Engaged::Yes;
     }
@@ -346,12 +372,17 @@ impl Axis {
         self.engaged = Engaged::No;
     }
 
-    fn idle(&mut self, lock: bool) -> Demand {
-        let lockable = !matches!(
-            self.power.state(),
-            PowerState::NotReadyToSwitchOn | PowerState::FaultReactionActive | PowerState::Fault
-        );
-        if !(lock && lockable) {
+    /// Held without being enabled.
+    fn is_locked(&self, parameters: &AxisParameters) -> bool {
+        match self.power.state() {
+            PowerState::NotReadyToSwitchOn | PowerState::FaultReactionActive | PowerState::Fault => false,
+            PowerState::SwitchedOn => parameters.lock_when_disabled || parameters.hold_when_switched_on,
+            _ => parameters.lock_when_disabled,
+        }
+    }
+
+    fn idle(&mut self, parameters: &AxisParameters) -> Demand {
+        if !self.is_locked(parameters) {
             if self.engaged != Engaged::No {
                 self.disengage();
             }
@@ -365,8 +396,8 @@ impl Axis {
         Demand::Position(self.trajectory.point())
     }
 
-    fn choose_stop(&mut self, parameters: &AxisParameters) {
-        let wanted = self.wanted_stop(parameters);
+    fn choose_stop(&mut self, targets: &Targets, parameters: &AxisParameters) {
+        let wanted = self.wanted_stop(targets, parameters);
         let present = self.stop.map(|stop| (stop.cause, stop.ramp));
         if wanted == present {
             return;
@@ -378,12 +409,16 @@ impl Axis {
             (Some((cause, ramp)), _) => self.begin_stop(cause, ramp, parameters),
             (None, _) => self.resume(parameters),
         }
-        if wanted.is_some_and(|(cause, _)| cause != StopCause::Halt) {
+        if let Some((cause, _)) = wanted
+            && cause != StopCause::Halt
+        {
+            self.short_of_target = cause == StopCause::Limit && self.position.is_under_way();
             self.position.abort(self.trajectory.point().position);
+            self.homing.abort();
         }
     }
 
-    fn wanted_stop(&self, parameters: &AxisParameters) -> Option<(StopCause, StopRamp)> {
+    fn wanted_stop(&self, targets: &Targets, parameters: &AxisParameters) -> Option<(StopCause, StopRamp)> {
         let quick = StopRamp::of_quick_stop(parameters.quick_stop);
         if self.power.state() == PowerState::QuickStopActive {
             Some((StopCause::QuickStop, quick))
@@ -393,11 +428,29 @@ impl Axis {
             Some((StopCause::StepDown, StopRamp::SlowDown))
         } else if self.host_lost {
             Some((StopCause::HostLost, quick))
+        } else if let Some(ramp) = parameters.limit_stop.filter(|_| self.meets_limit(self.heading(targets), parameters))
+        {
+            Some((StopCause::Limit, ramp))
         } else if self.power.controlword().has(Controlword::HALT) {
             Some((StopCause::Halt, StopRamp::of_halt(parameters.halt)))
         } else {
             None
         }
+    }
+
+    /// Where the shaft moves to, or is to: a sign.
+    fn heading(&self, targets: &Targets) -> f64 {
+        let velocity = self.trajectory.point().velocity;
+        match self.mode {
+            ModeOfOperation::HOMING => 0.0,
+            ModeOfOperation::PROFILE_VELOCITY if velocity == 0.0 => targets.velocity,
+            _ => velocity,
+        }
+    }
+
+    fn meets_limit(&self, heading: f64, parameters: &AxisParameters) -> bool {
+        let direction = if heading < 0.0 { Direction::Negative } else { Direction::Positive };
+        heading != 0.0 && parameters.limit_stop.is_some() && self.switches.limit(direction)
     }
 
     fn begin_stop(&mut self, cause: StopCause, ramp: StopRamp, parameters: &AxisParameters) {
@@ -408,6 +461,7 @@ impl Axis {
             _ => self.trajectory.point(),
         };
         let time_s = match ramp {
+            StopRamp::SlowDown if self.mode == ModeOfOperation::HOMING => parameters.homing.ramps.deceleration_time_s,
             StopRamp::SlowDown => parameters.moves.deceleration_time_s,
             StopRamp::QuickStop => parameters.quick_stop_time_s,
             StopRamp::CurrentLimit => 0.0,
@@ -420,7 +474,7 @@ impl Axis {
 
     /// Nothing asks for a stop any more.
     fn resume(&mut self, parameters: &AxisParameters) {
-        let released = self.stop.is_some_and(|stop| stop.is_released(parameters));
+        let released = self.stop.is_some_and(|stop| stop.is_released(parameters.release_after_external_stop));
         if released {
             self.engage();
         }
@@ -447,8 +501,8 @@ impl Axis {
         }
         self.stop = Some(stop);
         match stop {
-            _ if !self.is_live() => self.idle(parameters.lock_when_disabled),
-            _ if stop.is_released(parameters) => Demand::Off,
+            _ if !self.is_live() => self.idle(parameters),
+            _ if stop.is_released(parameters.release_after_external_stop) => Demand::Off,
             _ if stop.held => Demand::Position(self.trajectory.point()),
             _ if follows_position => Demand::Position(point),
             _ => Demand::Velocity(point),
@@ -472,11 +526,33 @@ impl Axis {
                 self.trajectory = Trajectory::resting(self.feedback.position);
                 Demand::Torque(self.torque.update(targets.current_a, parameters.torque_slope_a_s, dt_s as f32))
             }
+            ModeOfOperation::HOMING => self.homing(&parameters.homing, dt_s),
             _ => {
                 self.slow_down_if_adrift(parameters);
                 Demand::Velocity(self.trajectory.advance(dt_s))
             }
         }
+    }
+
+    fn homing(&mut self, parameters: &HomingParameters, dt_s: f64) -> Demand {
+        let at = self.trajectory.point();
+        let target = match self.homing.update(parameters, self.switches, at) {
+            HomingStep::Go(velocity) => velocity,
+            HomingStep::Latched => {
+                self.home = Some(at.position);
+                0.0
+            }
+            HomingStep::Failed => {
+                self.trajectory = Trajectory::resting(at.position);
+                0.0
+            }
+        };
+        self.velocity.update(target, &mut self.trajectory, &parameters.ramps);
+        let point = self.trajectory.advance(dt_s);
+        if self.trajectory.is_resting() {
+            self.homing.come_to_rest();
+        }
+        Demand::Position(point)
     }
 
     /// Enabled on a turning shaft, with nothing that asks for it: bring it to rest.
@@ -494,7 +570,7 @@ impl Axis {
         }
         match self.mode {
             ModeOfOperation::PROFILE_POSITION => {
-                !self.position.is_under_way() && self.is_in_position(&parameters.tolerances)
+                !self.position.is_under_way() && !self.short_of_target && self.is_in_position(&parameters.tolerances)
             }
             ModeOfOperation::PROFILE_VELOCITY => {
                 let limit = parameters.velocity.max_speed;
@@ -504,6 +580,7 @@ impl Axis {
                 self.torque.demand_a() == targets.current_a
                     && (self.feedback.current_a - targets.current_a).abs() <= current_a
             }
+            ModeOfOperation::HOMING => !self.homing.is_running() && self.feedback.standing,
             _ => self.feedback.standing,
         }
     }
@@ -512,31 +589,5 @@ impl Axis {
         let follows = self.mode == ModeOfOperation::PROFILE_POSITION && self.engaged != Engaged::No;
         let deviation = self.trajectory.point().position.wrapping_sub(self.feedback.position);
         !follows || deviation.unsigned_abs() <= tolerances.position
-    }
-}
-
-impl Stop {
-    fn is_released(&self, parameters: &AxisParameters) -> bool {
-        self.held && self.cause == StopCause::External && parameters.release_after_external_stop
-    }
-}
-
-impl StopRamp {
-    /// The ramp of 605Ah.
-    pub const fn of_quick_stop(option: QuickStopOption) -> Self {
-        match option {
-            QuickStopOption::SLOW_DOWN | QuickStopOption::SLOW_DOWN_AND_STAY => Self::SlowDown,
-            QuickStopOption::QUICK_STOP | QuickStopOption::QUICK_STOP_AND_STAY => Self::QuickStop,
-            _ => Self::CurrentLimit,
-        }
-    }
-
-    /// The ramp of 605Dh.
-    pub const fn of_halt(option: HaltOption) -> Self {
-        match option {
-            HaltOption::SLOW_DOWN => Self::SlowDown,
-            HaltOption::QUICK_STOP => Self::QuickStop,
-            _ => Self::CurrentLimit,
-        }
     }
 }

@@ -1,22 +1,35 @@
 //! Digital inputs: debounce of `N` lines. What a line does is the drive's table of functions.
 
 /// Debounced levels; bit *n* is input *n*.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Inputs<const N: usize> {
     levels: u16,
-    differs_for: u8,
+    differs_for: [u16; N],
+}
+
+impl<const N: usize> Default for Inputs<N> {
+    fn default() -> Self {
+        Self { levels: 0, differs_for: [0; N] }
+    }
 }
 
 impl<const N: usize> Inputs<N> {
-    /// Takes in the raw levels, once each period; a change counts once it has lasted `periods`.
+    /// Takes in the raw levels, once each period; a change of a line counts once it has lasted `periods`.
     pub fn update(&mut self, raw: [bool; N], periods: u8) -> u16 {
-        let raw = raw.iter().enumerate().fold(0, |bits, (n, level)| bits | u16::from(*level) << n);
-        if raw == self.levels {
-            self.differs_for = 0;
-        } else {
-            self.differs_for = self.differs_for.saturating_add(1);
-            if self.differs_for >= periods {
-                (self.levels, self.differs_for) = (raw, 0);
+        self.update_each(raw, [u16::from(periods); N])
+    }
+
+    /// The same with a debounce time of its own for each line.
+    pub fn update_each(&mut self, raw: [bool; N], periods: [u16; N]) -> u16 {
+        for (n, (differs_for, periods)) in self.differs_for.iter_mut().zip(periods).enumerate() {
+            if raw[n] == (self.levels >> n & 1 == 1) {
+                *differs_for = 0;
+                continue;
+            }
+            *differs_for = differs_for.saturating_add(1);
+            if *differs_for >= periods {
+                self.levels ^= 1 << n;
+                *differs_for = 0;
             }
         }
         self.levels
@@ -39,5 +52,12 @@ mod tests {
         assert_eq!(inputs.update([false, false], 2), 0);
         assert_eq!(inputs.update([true, true], 2), 0);
         assert_eq!(inputs.update([true, true], 2), 0b11);
+    }
+
+    #[test]
+    fn a_bouncing_line_does_not_hold_up_its_neighbour() {
+        let mut inputs = Inputs::<2>::default();
+        let levels = [true, false, true, false].map(|bounce| inputs.update_each([bounce, true], [2, 3]));
+        assert_eq!(levels, [0, 0, 0b10, 0b10]);
     }
 }

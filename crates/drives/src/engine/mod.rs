@@ -18,6 +18,8 @@ pub mod modes;
 pub mod overload;
 pub mod power;
 pub mod servo;
+pub mod stepper;
+pub mod stop;
 pub mod storage;
 pub mod tracking;
 pub mod trajectory;

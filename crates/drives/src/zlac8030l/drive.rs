@@ -229,6 +229,10 @@ impl Zlac8030l {
             let position = self.position();
             self.position_offset = self.position_offset.wrapping_sub(position);
             self.axis.shift_position(position);
+            // What is demanded at this moment stands at the same place of the shaft: no lag comes of it.
+            if let Demand::Position(point) = &mut self.demand {
+                point.position = point.position.wrapping_sub(position);
+            }
             self.node.dictionary_mut().set(POSITION_ACTUAL_VALUE, 0);
         }
         self.node.dictionary_mut().set_raw(slot, 0);

@@ -11,7 +11,7 @@ use super::objects::*;
 use super::readings::*;
 use crate::engine::axis::{AxisParameters, Tolerances};
 use crate::engine::bleeder::BleederLimits;
-use crate::engine::modes::VelocityRamps;
+use crate::engine::modes::{HomingParameters, VelocityRamps};
 use crate::engine::overload::OverloadLimits;
 use crate::engine::power::StepDownOptions;
 use crate::engine::servo::{ServoGains, ServoLimits, ServoModel};
@@ -100,6 +100,9 @@ fn axis(values: &Values, counts_s_per_rpm: f64) -> AxisParameters {
         },
         halt: HaltOption(values.get(HALT_OPTION_CODE)),
         lock_when_disabled: values.get(SHAFT_LOCK_WHEN_DISABLED) == 1,
+        hold_when_switched_on: false,
+        limit_stop: None,
+        homing: HomingParameters::default(),
         release_after_external_stop: values.get(IO_STOP_PROCESSING) == 1,
         tolerances: Tolerances {
             position: u32::from(values.get(IN_POSITION_THRESHOLD)),

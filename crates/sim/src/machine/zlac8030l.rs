@@ -1,3 +1,8 @@
+//! A ZLAC8030L on its hardware: hub motor, load, brake, supply and EEPROM as the assembly of a machine.
+//!
+//! In go the power stage, bleeder, outputs and brake of the firmware, out come its sensors and the report for people.
+//! Figures of the motor are those of `plant`; what is assumed of the surroundings is a constant below.
+
 use drives::engine::axis::Demand;
 use drives::zlac8030l::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use drives::zlac8030l::readings::REFERENCE_V;
@@ -186,7 +191,12 @@ impl Assembly for HubWheel {
     }
 
     fn set_supply(&mut self, supply_v: f64) -> Result<(), Refused> {
-        self.motor.supply.source_v = within("supply", "0 to 100 V", 0.0..=100.0, supply_v)?;
+        let supply = &mut self.motor.supply;
+        supply.source_v = within("supply", "0 to 100 V", 0.0..=100.0, supply_v)?;
+        // A supply that is turned down discharges its own output; only the motor's energy it cannot take.
+        if supply.connected {
+            supply.bus_v = supply.bus_v.min(supply_v);
+        }
         Ok(())
     }
 

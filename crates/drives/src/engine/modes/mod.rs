@@ -2,10 +2,12 @@
 //!
 //! What all drives share is here; which bits of the statusword tell of it is the drive's.
 
+mod homing;
 mod profile_position;
 mod profile_torque;
 mod profile_velocity;
 
+pub use homing::{Homing, HomingParameters, HomingStep, Switches};
 pub use profile_position::{ProfilePosition, SetPoint};
 pub use profile_torque::ProfileTorque;
 pub use profile_velocity::{ProfileVelocity, VelocityRamps};

@@ -1,0 +1,158 @@
+//! Machine files: an embedded virtual bus described in TOML, for `--bus sim:FILE.toml`.
+//!
+//! A file names the drives and what is around them. Everything about a machine is put into the words of `ferrodrive sim`
+//! and done by the same code, so that a file can do what a world command can, and no more.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use can::{Bitrate, Instant};
+use serde::Deserialize;
+use sim::World;
+
+use crate::embedded::{self, Embedded, SEED};
+use crate::failure::Failure;
+use crate::parse::drive_spec::{DriveSpec, drive_spec};
+
+const EXAMPLE: &str =
+    "[[drive]]\n           model = \"zlac8030l\"\n           node = 4\n           load = { torque_nm = 0.5 }";
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MachineFile {
+    bitrate: Option<String>,
+    seed: Option<u64>,
+    #[serde(default)]
+    drive: Vec<DriveTable>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DriveTable {
+    model: String,
+    node: u8,
+    supply_v: Option<f64>,
+    #[serde(default)]
+    load: Load,
+    /// Input levels by name.
+    #[serde(default)]
+    inputs: BTreeMap<String, bool>,
+    /// Where an input is active, in counts: `[low, high]`.
+    #[serde(default)]
+    switches: BTreeMap<String, [Bound; 2]>,
+    #[serde(default)]
+    rotor_locked: bool,
+    /// Held temperatures by sensor (`motor`, `driver`).
+    #[serde(default)]
+    temperatures_c: BTreeMap<String, f64>,
+    /// Broken components.
+    #[serde(default)]
+    faults: Vec<String>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Load {
+    torque_nm: Option<f64>,
+    inertia_kg_m2: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Bound {
+    Counts(i64),
+    Word(String),
+}
+
+/// The world that a file describes.
+pub(crate) fn load(path: &Path) -> Result<Embedded, Failure> {
+    let text = fs::read_to_string(path).map_err(|error| error.to_string());
+    text.and_then(|text| build(&text)).map_err(|reason| {
+        Failure::usage(format!("cannot use the machine file {}", path.display()))
+            .because(reason)
+            .next(format!("a machine file looks like this:\n           {EXAMPLE}"))
+    })
+}
+
+fn build(text: &str) -> Result<Embedded, String> {
+    let file: MachineFile = toml::from_str(text).map_err(|error| error.to_string().trim_end().to_owned())?;
+    let bitrate = file.bitrate.as_deref().map_or(Ok(Bitrate::K500), str::parse).map_err(|error| error.to_string())?;
+    if file.drive.is_empty() {
+        return Err("it has no [[drive]]".into());
+    }
+    let mut world = World::new(bitrate, file.seed.unwrap_or(SEED));
+    let mut drives = Vec::new();
+    for table in &file.drive {
+        let spec: DriveSpec = drive_spec(&format!("{}@{}", table.model, table.node))?;
+        let mut drive = embedded::virtual_drive(spec.model, spec.node, bitrate).map_err(|failure| failure.what)?;
+        if let Some(supply_v) = table.supply_v {
+            // Before the power comes on: capacitors once charged would hold another voltage for a while.
+            drive.set_supply(supply_v, Instant::ZERO).map_err(|refused| refused.to_string())?;
+        }
+        world.add_drive(spec.node.raw(), drive).map_err(|error| error.to_string())?;
+        for command in table.commands() {
+            obey(&mut world, &command)?;
+        }
+        drives.push((spec.node, spec.model));
+    }
+    Ok((world, drives))
+}
+
+/// Does what a world command says.
+fn obey(world: &mut World, command: &str) -> Result<(), String> {
+    let parsed: sim::command::Command = command.parse().map_err(|error| format!("{error}"))?;
+    let answer = sim::command::answer(world, command).map(|answer| answer.json).unwrap_or_default();
+    let done = answer.starts_with("{\"ok\":true");
+    if done { Ok(()) } else { Err(format!("{parsed:?} was answered with {answer}")) }
+}
+
+impl DriveTable {
+    /// What the table says, as world commands.
+    fn commands(&self) -> Vec<String> {
+        let mut commands: Vec<String> = Vec::new();
+        commands.extend(self.load.torque_nm.map(|torque| format!("load torque {torque}")));
+        commands.extend(self.load.inertia_kg_m2.map(|inertia| format!("load inertia {inertia}")));
+        commands.extend(self.inputs.iter().map(|(name, level)| format!("input {name} {}", u8::from(*level))));
+        commands.extend(self.switches.iter().map(|(name, [low, high])| format!("switch {name} {low} {high}")));
+        commands.extend(self.rotor_locked.then(|| "rotor lock".into()));
+        commands.extend(self.temperatures_c.iter().map(|(sensor, celsius)| format!("temperature {sensor} {celsius}")));
+        commands.extend(self.faults.iter().map(|component| format!("fault {component} on")));
+        commands.iter().map(|command| format!("{} {command}", self.node)).collect()
+    }
+}
+
+impl std::fmt::Display for Bound {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Counts(counts) => write!(f, "{counts}"),
+            Self::Word(word) => f.write_str(word),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(text: &str) -> String {
+        build(text).err().unwrap_or_default()
+    }
+
+    #[test]
+    fn a_table_becomes_world_commands() {
+        let text = "model = 'zlac8030l'\nnode = 7\nload = { torque_nm = 0.5 }\n\
+                    inputs = { X0 = true }\nswitches = { X1 = ['min', -100] }\nfaults = ['hall']";
+        let table: DriveTable = toml::from_str(text).unwrap();
+        assert_eq!(table.commands(), ["7 load torque 0.5", "7 input X0 1", "7 switch X1 min -100", "7 fault hall on"]);
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_place() {
+        assert!(refusal("").contains("no [[drive]]"));
+        assert!(refusal("[[drive]]\nmodel = 'zlac8030l'\nnode = 4\ncolour = 1").contains("line 4"));
+        assert!(refusal("[[drive]]\nmodel = 'zlac803'\nnode = 4").contains("did you mean zlac8030l?"));
+        assert!(refusal("[[drive]]\nmodel = 'zlac8030l'\nnode = 200").contains("no node 200"));
+        assert!(refusal("bitrate = '7k'\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4").contains("bit rate must be"));
+    }
+}

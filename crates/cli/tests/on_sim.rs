@@ -1,0 +1,184 @@
+//! Commands on the embedded virtual bus: what they print for programs, and what they do.
+
+mod common;
+
+use common::{done, ferrodrive, scratch};
+use serde_json::json;
+
+#[test]
+fn scan_finds_the_drive_and_names_its_model() {
+    let found = done(&["--json", "scan"]).json();
+    let node = &found["nodes"][0];
+    assert_eq!(node["node"], 4);
+    assert_eq!(node["model"], "zlac8030l");
+    // "ZLAC8030L quick start guide V1.00", chapter 9.
+    assert_eq!((node["device_type"].as_u64(), node["vendor_id"].as_u64()), (Some(0x40192), Some(0x100)));
+}
+
+#[test]
+fn an_object_is_read_by_number_and_by_name() {
+    for object in ["200B", "0x200B", "200Bh:00", "encoder_lines"] {
+        let read = done(&["--json", "read", "4", object]).json();
+        assert_eq!((&read["node"], &read["value"]), (&json!(4), &json!(1024)), "{object}");
+        assert_eq!(read["name"], "encoder_lines");
+        assert_eq!(read["bytes"], "00 04");
+    }
+    let speed = done(&["read", "4", "profile_velocity"]);
+    assert_eq!(speed.out, "node 4 6081h:00 profile_velocity = 120 r/min\n");
+}
+
+#[test]
+fn a_value_is_written_with_unit_or_word() {
+    let written = done(&["--json", "write", "4", "target_velocity", "-60rpm"]).json();
+    assert_eq!((&written["value"], &written["unit"]), (&json!(-60), &json!("r/min")));
+    let written = done(&["--json", "write", "4", "6060", "profile velocity"]).json();
+    assert_eq!((&written["value"], &written["meaning"]), (&json!(3), &json!("profile velocity")));
+}
+
+#[test]
+fn what_the_drive_refuses_is_told_with_its_reason() {
+    let ended = ferrodrive(&["write", "4", "6064", "5"]);
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.err.contains("6064h") && ended.err.contains("0601 0002h"), "{}", ended.err);
+    let ended = ferrodrive(&["read", "4", "6502"]);
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.err.contains("0602 0000h"), "{}", ended.err);
+}
+
+#[test]
+fn an_absent_node_is_a_failure_with_a_reason() {
+    let ended = ferrodrive(&["read", "9", "6064"]);
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.err.contains("node 9") && ended.err.contains("6064h"), "{}", ended.err);
+    assert!(ended.out.is_empty());
+}
+
+#[test]
+fn a_speed_is_reached_held_and_stopped() {
+    let moved = done(&["--json", "velocity", "4", "60rpm", "--for", "1s"]).json();
+    assert_eq!((&moved["reached"], &moved["stopped"]), (&json!(true), &json!(true)));
+    let speed = moved["velocity_rpm"].as_f64().unwrap();
+    assert!((speed - 60.0).abs() < 1.0, "{speed}");
+    // 6083h: 500 ms from 0 to the target; reached is within 5 %.
+    let reached = moved["reached_after_s"].as_f64().unwrap();
+    assert!((0.35..0.7).contains(&reached), "{reached}");
+    assert_eq!(moved["limits"]["acceleration_ms"], 500.0);
+}
+
+#[test]
+fn a_move_ends_where_it_should_and_when_it_should() {
+    let moved = done(&["--json", "move", "4", "90deg", "--profile-velocity", "30rpm"]).json();
+    let position = moved["position"].as_i64().unwrap();
+    assert!((position - 1024).abs() <= 30, "{position}");
+    // A quarter turn at half a turn a second, and half of each 500 ms ramp.
+    let reached = moved["reached_after_s"].as_f64().unwrap();
+    assert!((0.85..1.3).contains(&reached), "{reached}");
+    let back = done(&["--json", "move", "4", "--relative", "-0.5turn"]).json();
+    let position = back["position"].as_i64().unwrap();
+    assert!((position + 2048).abs() <= 30, "{position}");
+}
+
+#[test]
+fn a_torque_is_a_motor_current() {
+    let pushed = done(&["--json", "torque", "4", "500mA"]).json();
+    assert_eq!(pushed["reached"], false);
+    assert_eq!(pushed["asked"], "push with 0.50 A");
+}
+
+#[test]
+fn homing_is_refused_with_the_reason() {
+    let ended = ferrodrive(&["home", "4", "--method", "17"]);
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.err.contains("has no homing") && ended.err.contains("6098h"), "{}", ended.err);
+}
+
+#[test]
+fn states_follow_the_commands() {
+    let state = |arguments: &[&str]| done(&[&["--json"], arguments].concat()).json()["state"].clone();
+    assert_eq!(state(&["state", "4"]), "Switch on disabled");
+    assert_eq!(state(&["enable", "4"]), "Operation enabled");
+    assert_eq!(state(&["disable", "4"]), "Switch on disabled");
+    assert_eq!(state(&["reset", "4"]), "Switch on disabled");
+    let text = done(&["state", "4"]).out;
+    assert!(text.contains("fault       none") && text.contains("48.0 V"), "{text}");
+}
+
+#[test]
+fn parameters_are_stored_and_restored() {
+    let saved = done(&["--json", "save", "4"]).json();
+    assert_eq!((&saved["done"], &saved["object"]), (&json!("stored"), &json!("2009h:00")));
+    let restored = done(&["--json", "restore", "4"]).json();
+    assert_eq!(restored["done"], "restored to factory values");
+}
+
+#[test]
+fn a_reset_node_boots_again() {
+    assert_eq!(done(&["--json", "nmt", "4", "reset"]).json()["booted"], true);
+    assert_eq!(done(&["--json", "nmt", "all", "start"]).json()["node"], serde_json::Value::Null);
+    assert_eq!(ferrodrive(&["nmt", "9", "reset"]).status, Some(1));
+}
+
+#[test]
+fn the_dump_is_a_log_that_dump_reads() {
+    let directory = scratch("dump");
+    let log = directory.join("trace.log");
+    let shown = done(&["dump", "--log", log.to_str().unwrap()]);
+    assert!(shown.out.contains("704#00") && shown.out.contains("boot-up node 4"), "{}", shown.out);
+    let bus = format!("log:{}", log.display());
+    let again = done(&["--json", "--bus", &bus, "dump"]);
+    let line: serde_json::Value = serde_json::from_str(again.out.lines().next().unwrap()).unwrap();
+    assert_eq!(line["frame"], "704#00");
+    assert_eq!(line["text"], "boot-up node 4");
+    std::fs::remove_dir_all(directory).unwrap();
+}
+
+#[test]
+fn a_machine_file_describes_the_bus() {
+    let directory = scratch("machine");
+    let file = directory.join("two.toml");
+    let text = "bitrate = '250k'\n[[drive]]\nmodel = 'zlac8030l'\nnode = 2\nsupply_v = 56\n\
+                [[drive]]\nmodel = 'zlac8030l'\nnode = 3\nfaults = ['hall']\n";
+    std::fs::write(&file, text).unwrap();
+    let bus = format!("sim:{}", file.display());
+    let state = done(&["--bus", &bus, "--json", "state", "2"]).json();
+    assert!((state["supply_v"].as_f64().unwrap() - 56.0).abs() < 0.5, "{state}");
+    let state = done(&["--bus", &bus, "--json", "state", "3"]).json();
+    assert_eq!(state["fault_code"], 0x200);
+    assert!(state["faults"][0]["remedy"].as_str().unwrap().contains("Hall"));
+    std::fs::remove_dir_all(directory).unwrap();
+}
+
+#[test]
+fn objects_are_listed_and_searched() {
+    let all = done(&["--json", "objects", "zlac8030l"]).json();
+    assert!(all["objects"].as_array().unwrap().len() > 190);
+    let found = done(&["--json", "objects", "4", "6064"]).json();
+    assert_eq!(found["objects"][0]["name"], "position_actual_value");
+    assert_eq!(ferrodrive(&["objects", "zlac8030l", "zebra"]).status, Some(1));
+}
+
+#[test]
+fn completions_are_scripts() {
+    for shell in ["bash", "zsh", "fish"] {
+        assert!(done(&["completions", shell]).out.contains("ferrodrive"), "{shell}");
+    }
+}
+
+#[test]
+fn the_demo_passes_and_draws() {
+    let directory = scratch("demo");
+    let svg = directory.join("demo.svg");
+    let demo = done(&["--json", "demo", "--svg", svg.to_str().unwrap()]).json();
+    assert_eq!(demo["ok"], true);
+    assert_eq!(demo["steps"], demo["passed"]);
+    let picture = std::fs::read_to_string(&svg).unwrap();
+    assert!(picture.starts_with("<svg ") && picture.contains("absolute position"));
+    let sections: std::collections::BTreeSet<_> =
+        demo["rows"].as_array().unwrap().iter().map(|row| row["section"].as_str().unwrap().to_owned()).collect();
+    for section in
+        ["3.4", "4.1", "4.2", "4.3", "4.4", "4.5", "4.6", "5.1", "5.2", "5.3", "5.4", "5.5", "6.1", "6.2", "8"]
+    {
+        assert!(sections.contains(section), "{section} in {sections:?}");
+    }
+    std::fs::remove_dir_all(directory).unwrap();
+}

@@ -1,0 +1,229 @@
+//! `ferrodrive sim`: drives for other programs, over socketcand and slcan, with EEPROM contents that outlive it.
+
+mod common;
+
+use std::time::{Duration, Instant};
+
+use common::{Simulator, done, ferrodrive, scratch};
+use serde_json::json;
+
+const DRIVE: [&str; 2] = ["--drive", "zlac8030l@4"];
+const SERVE: [&str; 4] = ["--serve", "socketcand://127.0.0.1:0", "--serve", "slcan://127.0.0.1:0"];
+
+fn simulator(more: &[&str]) -> Simulator {
+    Simulator::start(&[&DRIVE[..], &SERVE[..], more].concat())
+}
+
+#[test]
+fn the_ready_line_names_every_listener_with_its_port() {
+    let simulator = simulator(&[]);
+    assert!(simulator.ready.starts_with("ready "), "{:?}", simulator.ready);
+    for protocol in ["socketcand", "slcan"] {
+        let address = simulator.address(protocol);
+        let port: u16 = address.rsplit_once(':').unwrap().1.parse().unwrap();
+        assert_ne!(port, 0);
+    }
+}
+
+#[test]
+fn world_commands_are_answered_line_by_line() {
+    let mut simulator = simulator(&[]);
+    let get = simulator.ask("4 get");
+    assert_eq!((&get["ok"], &get["node"]), (&json!(true), &json!(4)));
+    for field in ["t", "position", "velocity_rpm", "current_a", "supply_v"] {
+        assert!(get[field].is_number(), "{field} in {get}");
+    }
+    assert!(get["outputs"]["Y0"].is_number() && get["outputs"]["Y1"].is_number(), "{get}");
+    assert_eq!(get["brake"], "released");
+    assert_eq!(simulator.ask("4 supply 36")["ok"], true);
+    for wrong in ["fly", "5 get", "4 supply", "4 input X9 1", "4 fault wing on", "128 get"] {
+        let answer = simulator.ask(wrong);
+        assert_eq!(answer["ok"], false, "{wrong}");
+        assert!(answer["error"].as_str().is_some_and(|error| !error.is_empty()), "{answer}");
+    }
+    // Blank lines have no answer: the next one belongs to the next command.
+    simulator.send("");
+    simulator.send("   ");
+    assert_eq!(simulator.ask("now")["ok"], true);
+    assert_eq!(simulator.ask("quit")["ok"], true);
+    assert_eq!(simulator.wait(), Some(0));
+}
+
+#[test]
+fn the_end_of_input_leaves_it_running() {
+    let mut simulator = simulator(&[]);
+    simulator.close_input();
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(simulator.is_running());
+    let bus = simulator.bus("socketcand");
+    assert_eq!(done(&["--bus", &bus, "--json", "read", "4", "200B"]).json()["value"], 1024);
+}
+
+#[test]
+fn commands_reach_it_over_socketcand_and_slcan() {
+    let mut simulator = simulator(&[]);
+    for protocol in ["socketcand", "slcan"] {
+        let bus = simulator.bus(protocol);
+        let on = |arguments: &[&str]| done(&[&["--bus", &bus, "--json"], arguments].concat()).json();
+        assert_eq!(on(&["scan"])["nodes"][0]["node"], 4);
+        assert_eq!(on(&["write", "4", "2002", "50"])["value"], 50);
+        assert_eq!(on(&["read", "4", "in_position_threshold"])["value"], 50);
+        assert_eq!(on(&["velocity", "4", "30rpm", "--for", "500ms"])["reached"], true);
+        let moved = on(&["move", "4", "--relative", "45deg", "--profile-velocity", "60rpm"]);
+        assert_eq!(moved["reached"], true);
+        // What the drive says of its position is where the machine is.
+        let position = simulator.ask("4 get")["position"].as_i64().unwrap();
+        assert!((position - moved["position"].as_i64().unwrap()).abs() <= 5, "{position} and {moved}");
+    }
+}
+
+#[test]
+fn two_simulators_joined_by_a_bus_hear_each_other() {
+    let first = simulator(&[]);
+    let bus = first.bus("socketcand");
+    let second = Simulator::start(&["--drive", "zlac8030l@5", "--bus", &bus]);
+    assert_eq!(second.ready, format!("ready {bus}"));
+    let found = done(&["--bus", &bus, "--json", "scan"]).json();
+    let nodes: Vec<_> = found["nodes"].as_array().unwrap().iter().map(|node| node["node"].as_u64().unwrap()).collect();
+    assert_eq!(nodes, [4, 5]);
+    assert_eq!(done(&["--bus", &bus, "--json", "velocity", "5", "60rpm", "--for", "300ms"]).json()["reached"], true);
+}
+
+#[test]
+fn only_a_live_bus_given_on_the_command_line_is_joined() {
+    let drive = ["sim", "--drive", "zlac8030l@4", "--bus"];
+    let ended = ferrodrive(&[&drive[..], &["sim"]].concat());
+    assert_eq!(ended.status, Some(2));
+    assert!(ended.err.contains("a live one only"), "{}", ended.err);
+    let ended = ferrodrive(&[&drive[..], &["socketcand://127.0.0.1:1/can0"]].concat());
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.err.contains("cannot connect") && !ended.out.contains("ready"), "{}", ended.err);
+}
+
+#[test]
+fn a_lost_connection_ends_a_command_with_the_reason() {
+    let mut simulator = simulator(&[]);
+    let bus = simulator.bus("socketcand");
+    let waiting = std::thread::spawn(move || ferrodrive(&["--bus", &bus, "dump"]));
+    std::thread::sleep(Duration::from_millis(500));
+    simulator.kill();
+    let ended = waiting.join().unwrap();
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.err.contains("closed the connection") || ended.err.contains("lost the connection"), "{}", ended.err);
+}
+
+#[test]
+fn a_bus_that_is_not_there_is_a_failure_with_the_reason() {
+    let ended = ferrodrive(&["--bus", "socketcand://127.0.0.1:1/can0", "scan"]);
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.err.contains("cannot connect"), "{}", ended.err);
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_stops_the_motor_first_and_ends_with_130() {
+    let mut simulator = simulator(&[]);
+    let bus = simulator.bus("socketcand");
+    let mut turning = std::process::Command::new(env!("CARGO_BIN_EXE_ferrodrive"))
+        .args(["--bus", &bus, "velocity", "4", "100rpm", "--for", "60s"])
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    wait_until(|| simulator.ask("4 get")["velocity_rpm"].as_f64().unwrap() > 90.0);
+    let interrupted = std::process::Command::new("kill").args(["-INT", &turning.id().to_string()]).status().unwrap();
+    assert!(interrupted.success());
+    assert_eq!(turning.wait().unwrap().code(), Some(130));
+    // Quick stop active: the low byte of the statusword is 17h.
+    let get = simulator.ask("4 get");
+    assert_eq!(get["statusword"].as_u64().unwrap() & 0x6F, 0x07, "{get}");
+    wait_until(|| simulator.ask("4 get")["velocity_rpm"].as_f64().unwrap().abs() < 1.0);
+}
+
+fn wait_until(mut condition: impl FnMut() -> bool) {
+    let begin = Instant::now();
+    while !condition() {
+        assert!(begin.elapsed() < Duration::from_secs(20), "it does not come about");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[test]
+fn what_was_saved_is_there_after_quit_and_only_then() {
+    let directory = scratch("state");
+    let state = ["--state", directory.to_str().unwrap()];
+    let mut first = simulator(&state);
+    let bus = first.bus("socketcand");
+    done(&["--bus", &bus, "write", "4", "200A", "500"]);
+    assert_eq!(first.ask("quit")["ok"], true);
+    assert_eq!(first.wait(), Some(0));
+    let second = simulator(&state);
+    let bus = second.bus("socketcand");
+    assert_eq!(done(&["--bus", &bus, "--json", "read", "4", "200A"]).json()["value"], 500);
+    drop(second);
+    let fresh = simulator(&[]);
+    let bus = fresh.bus("socketcand");
+    assert_eq!(done(&["--bus", &bus, "--json", "read", "4", "200A"]).json()["value"], 1000);
+    std::fs::remove_dir_all(directory).unwrap();
+}
+
+#[test]
+fn a_kill_at_any_moment_leaves_an_old_or_a_new_image() {
+    let directory = scratch("kill");
+    let state = ["--state", directory.to_str().unwrap()];
+    let mut before = 1000;
+    for round in 0..6 {
+        let mut simulator = simulator(&state);
+        let bus = simulator.bus("socketcand");
+        let found = done(&["--bus", &bus, "--json", "read", "4", "200A"]).json()["value"].as_i64().unwrap();
+        assert!(found == before || found == 900 + round - 1, "round {round}: {found} is neither {before} nor newer");
+        before = found;
+        done(&["--bus", &bus, "write", "4", "200A", &(900 + round).to_string()]);
+        // The image reaches the disk within 1.5 s; the process dies somewhere on the way.
+        std::thread::sleep(Duration::from_millis(23 * round as u64));
+        simulator.kill();
+    }
+    std::fs::remove_dir_all(directory).unwrap();
+}
+
+#[test]
+fn an_image_is_on_the_disk_within_a_second_and_a_half() {
+    let directory = scratch("soon");
+    let state = ["--state", directory.to_str().unwrap()];
+    let mut first = simulator(&state);
+    let bus = first.bus("socketcand");
+    done(&["--bus", &bus, "write", "4", "200A", "700"]);
+    std::thread::sleep(Duration::from_millis(1500));
+    first.kill();
+    let second = simulator(&state);
+    let bus = second.bus("socketcand");
+    assert_eq!(done(&["--bus", &bus, "--json", "read", "4", "200A"]).json()["value"], 700);
+    drop(second);
+    std::fs::remove_dir_all(directory).unwrap();
+}
+
+#[test]
+fn a_corrupt_image_is_reported_and_not_used() {
+    let directory = scratch("corrupt");
+    std::fs::write(directory.join("zlac8030l@4.eeprom"), "ferrodrive eeprom 1 zlac8030l 5\nwrong").unwrap();
+    let ended = ferrodrive(&[&["sim"], &DRIVE[..], &["--state", directory.to_str().unwrap()]].concat());
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.err.contains("corrupt") && ended.err.contains("zlac8030l@4.eeprom"), "{}", ended.err);
+    assert!(!ended.out.contains("ready"));
+    std::fs::remove_dir_all(directory).unwrap();
+}
+
+#[test]
+fn every_frame_is_in_the_log() {
+    let directory = scratch("log");
+    let log = directory.join("bus.log");
+    let mut simulator = simulator(&["--log", log.to_str().unwrap()]);
+    let bus = simulator.bus("slcan");
+    done(&["--bus", &bus, "read", "4", "200B"]);
+    simulator.ask("quit");
+    assert_eq!(simulator.wait(), Some(0));
+    let text = std::fs::read_to_string(&log).unwrap();
+    for frame in ["can0 704#00", "can0 604#400B200000000000", "can0 584#4B0B200000040000"] {
+        assert!(text.contains(frame), "{frame} in {text}");
+    }
+    std::fs::remove_dir_all(directory).unwrap();
+}

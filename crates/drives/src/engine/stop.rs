@@ -1,0 +1,69 @@
+//! What stops a motor, and how fast.
+
+use cia402::{HaltOption, QuickStopOption};
+
+/// What may stop the motor while the axis is enabled; the first that applies decides on the ramp.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StopCause {
+    /// Quick stop active.
+    QuickStop,
+    /// A digital input.
+    External,
+    /// Shutdown or disable operation with a ramp.
+    StepDown,
+    /// The host is silent.
+    HostLost,
+    /// A limit switch at the end that the shaft moves to.
+    Limit,
+    /// Bit 8 of the controlword.
+    Halt,
+}
+
+/// How fast to stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StopRamp {
+    /// With the deceleration of the profiles.
+    SlowDown,
+    /// With the quick stop's deceleration.
+    QuickStop,
+    /// As fast as the current limit allows.
+    CurrentLimit,
+}
+
+/// A stop under way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Stop {
+    pub(super) cause: StopCause,
+    pub(super) ramp: StopRamp,
+    /// How long the ramp has been over, s.
+    pub(super) over_for_s: f64,
+    /// The shaft is held where it came to rest.
+    pub(super) held: bool,
+}
+
+impl Stop {
+    /// It ended with the motor free.
+    pub(super) fn is_released(&self, after_external_stop: bool) -> bool {
+        self.held && self.cause == StopCause::External && after_external_stop
+    }
+}
+
+impl StopRamp {
+    /// The ramp of 605Ah.
+    pub const fn of_quick_stop(option: QuickStopOption) -> Self {
+        match option {
+            QuickStopOption::SLOW_DOWN | QuickStopOption::SLOW_DOWN_AND_STAY => Self::SlowDown,
+            QuickStopOption::QUICK_STOP | QuickStopOption::QUICK_STOP_AND_STAY => Self::QuickStop,
+            _ => Self::CurrentLimit,
+        }
+    }
+
+    /// The ramp of 605Dh.
+    pub const fn of_halt(option: HaltOption) -> Self {
+        match option {
+            HaltOption::SLOW_DOWN => Self::SlowDown,
+            HaltOption::QUICK_STOP => Self::QuickStop,
+            _ => Self::CurrentLimit,
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! Constants of the four M-series joints: M4230E17B50, M4230E17B80, M8025E25B50, M8025E25B80.
+//!
+//! Figures are those of the M robot joint motor CANopen manual, "Parameters", unless named otherwise. How its table
+//! is read, since it does not say:
+//!
+//! **Rated current** (3.5 A, 7 A) is the supply's: 36 V * 3.5 A = 126 W is the M4230's 100 W plus the copper loss at
+//! its 1 N m (29 W); 36 V * 7 A = 252 W is the M8025's 200 W plus that at 2 N m (40 W).
+//!
+//! **Resistance and inductance** are between two wires; a phase has half. The copper losses above follow from it.
+//!
+//! **Maximum speed** (2000, 1500 r/min) is the motor's own limit at 36 V without load: the amplitude of the
+//! line-to-line back-emf then equals the bus, `psi = 36 V / (sqrt(3) * pole pairs * speed)`. Torque per ampere of q
+//! current: 0.149 and 0.198 N m/A.
+//!
+//! **Losses.** The M4230 gives 34 of 50 N m and 51 of 80 N m at 1 N m of its motor; what the unloaded friction does
+//! not explain is the loss in the teeth. The M8025's 51 and 85 N m are far under what 2 N m of its motor would give
+//! by the same losses: they are the reducer's rating, and the same loss is taken.
+//!
+//! **Gear.** "E17" and "E25" are sizes of harmonic gears: the M8025E25B50's 51 and 127 N m are the rated and repeated
+//! peak torque of a Harmonic Drive CSG-25-50. The stiffness is that of robot joints with such gears.
+//!
+//! What is assumed is a named constant with its reason.
+
+use crate::absolute_encoder::AbsoluteEncoderModel;
+use crate::brake::BrakeModel;
+use crate::gear::GearModel;
+use crate::joint_motor::JointMotorModel;
+use crate::mechanics::RotorModel;
+use crate::pmsm::PmsmModel;
+use crate::supply::{BleederModel, SupplyModel};
+use crate::thermal::BodyModel;
+
+const SQRT_3: f64 = 1.732_050_807_568_877_2;
+const RAD_S_PER_R_MIN: f64 = core::f64::consts::TAU / 60.0;
+
+/// "Motor rated voltage 36 VDC ± 10 %".
+const RATED_V: f64 = 36.0;
+/// Assumed: frameless motors of such joints ("multistage DD motor structure") have 14 to 28 poles. At 2000 r/min it
+/// makes 333 Hz, which a 20 kHz drive follows easily.
+const POLE_PAIRS: u32 = 10;
+
+/// Assumed: motor and unloaded gear take 8 % of the motor's rated torque at rated speed. It lets the motor reach 98 %
+/// of its printed maximum speed without load and leaves most of the loss to the teeth, as in harmonic gears.
+const NO_LOAD_SHARE: f64 = 0.08;
+/// Assumed: half of it is dry, as for the hub motors.
+const DRY_SHARE: f64 = 0.5;
+/// Assumed: half of it is the motor's bearings, seals and iron, half the gear's.
+const MOTOR_SHARE: f64 = 0.5;
+
+/// "Backspace: less than 20 arc seconds"; the bound is taken. At the output.
+const BACKLASH_RAD: f64 = 20.0 / 3600.0 * core::f64::consts::PI / 180.0;
+/// Assumed: damping over stiffness of the torsion. The flexspline is steel and rings: with a load of 0.1 kg m² the two
+/// masses of a size-17 joint swing at 66 Hz, and this damps them by 1 % of critical.
+const TORSION_DAMPING_S: f64 = 50e-6;
+
+/// Stiffness of joints with a size-17 gear: 14000 N m/rad (Rainbow Robotics RB-Y1 joint specification, type 17). That
+/// is for a ratio of 101, taken for 80 too. Assumed: at 50, whose teeth carry less, a fifth less.
+const SIZE_17_STIFFNESS_NM_RAD: [f64; 2] = [1.1e4, 1.4e4];
+/// The same for size 25: 50000 N m/rad (type 25). Assumed: at 50 a third less.
+const SIZE_25_STIFFNESS_NM_RAD: [f64; 2] = [3.4e4, 5.0e4];
+/// Assumed: the flange and cross-roller ring as a steel disc of 0.15 kg and 30 mm radius: `m r^2 / 2`.
+const SIZE_17_FLANGE_KG_M2: f64 = 7e-5;
+/// Assumed: 0.4 kg and 43 mm.
+const SIZE_25_FLANGE_KG_M2: f64 = 3.7e-4;
+
+/// "Maximum permissible temperature of motor 85°" at the highest ambient of 40 °C, at rated torque.
+const TEMPERATURE_RISE_K: f64 = 45.0;
+/// Assumed: half of the weight is copper and iron, at about 420 J/(kg K).
+const WINDING_HEAT_J_KG_K: f64 = 210.0;
+/// Copper.
+const COPPER_PER_K: f64 = 0.003_93;
+
+/// Assumed: one switch of 5 mohm in each phase's path, 5 mohm of board.
+const SWITCH_RESISTANCE_OHM: f64 = 0.01;
+/// Assumed: the board on the aluminium back cover; 5 W warm it by 20 K.
+const HEAT_SINK: BodyModel = BodyModel { resistance_k_w: 4.0, capacity_j_k: 100.0 };
+
+const ENCODER: AbsoluteEncoderModel = AbsoluteEncoderModel {
+    // "Single-loop 15 bit".
+    counts_per_turn: 32_768,
+    // "Multi-turn memory range -60000 ~ 60000 laps" (the table's 9 bits would be 512 turns).
+    turn_limit: 60_000,
+    // Assumed: a small rechargeable cell; full, it lasts 24 days.
+    battery_capacity_mah: 40.0,
+    // Assumed: a tenth of the capacity an hour, what such cells stand for ever.
+    charge_current_ma: 4.0,
+    // "The battery current consumption is only 0.07 mA".
+    standby_current_ma: 0.07,
+};
+
+const SUPPLY: SupplyModel = SupplyModel {
+    // Assumed: power supply with cable.
+    source_resistance_ohm: 0.1,
+    // Assumed: what fits into the joint.
+    capacitance_f: 470e-6,
+    // Assumed: controller, drivers, encoder.
+    consumption_w: 2.0,
+    // Assumed: where the drive's own converter stops.
+    consumption_from_v: 9.0,
+    // The "discharge module" that the manual asks for when generation raises the voltage. Assumed: 10 ohm, 50 W.
+    bleeder: BleederModel { resistance_ohm: 10.0, rated_power_w: 50.0, time_constant_s: 30.0, burn_out_load: 2.0 },
+};
+
+impl JointMotorModel {
+    /// 34 N m, 0 to 30 r/min.
+    pub const M4230E17B50: JointMotorModel = joint("M4230E17B50", M4230, 50.0, SIZE_17_STIFFNESS_NM_RAD[0], 34.0);
+    /// 51 N m, 0 to 15 r/min.
+    pub const M4230E17B80: JointMotorModel = joint("M4230E17B80", M4230, 80.0, SIZE_17_STIFFNESS_NM_RAD[1], 51.0);
+    /// 51 N m, 0 to 30 r/min.
+    pub const M8025E25B50: JointMotorModel = joint("M8025E25B50", M8025, 50.0, SIZE_25_STIFFNESS_NM_RAD[0], 34.0);
+    /// 85 N m, 0 to 18 r/min.
+    pub const M8025E25B80: JointMotorModel = joint("M8025E25B80", M8025, 80.0, SIZE_25_STIFFNESS_NM_RAD[1], 51.0);
+
+    /// The variant with a holding brake (the manual's special functions 7 and 8 are for it). Assumed: it holds the
+    /// motor's rated torque, as power-off brakes are chosen.
+    pub const fn with_brake(self) -> JointMotorModel {
+        JointMotorModel { brake: BrakeModel { holding_nm: self.rated_torque_nm }, ..self }
+    }
+}
+
+/// A row of the table: the motor.
+#[derive(Clone, Copy)]
+struct Motor {
+    torque_nm: f64,
+    rated_r_min: f64,
+    maximum_r_min: f64,
+    /// Of one phase: half of what is printed.
+    resistance_ohm: f64,
+    inductance_h: f64,
+    inertia_kg_m2: f64,
+    weight_kg: f64,
+    flange_kg_m2: f64,
+}
+
+const M4230: Motor = Motor {
+    torque_nm: 1.0,
+    rated_r_min: 1500.0,
+    maximum_r_min: 2000.0,
+    resistance_ohm: 0.5 * 0.86,
+    inductance_h: 0.5 * 0.8e-3,
+    inertia_kg_m2: 0.69e-4,
+    weight_kg: 1.0,
+    flange_kg_m2: SIZE_17_FLANGE_KG_M2,
+};
+
+const M8025: Motor = Motor {
+    torque_nm: 2.0,
+    rated_r_min: 1000.0,
+    maximum_r_min: 1500.0,
+    resistance_ohm: 0.5 * 0.53,
+    inductance_h: 0.5 * 0.5e-3,
+    inertia_kg_m2: 1.74e-4,
+    weight_kg: 2.5,
+    flange_kg_m2: SIZE_25_FLANGE_KG_M2,
+};
+
+/// A motor with a gear. `m4230_output_nm` is what the M4230's 1 N m gives through this ratio: it tells the losses.
+const fn joint(
+    name: &'static str,
+    motor: Motor,
+    ratio: f64,
+    stiffness_nm_rad: f64,
+    m4230_output_nm: f64,
+) -> JointMotorModel {
+    let flux_linkage_wb = RATED_V / (SQRT_3 * POLE_PAIRS as f64 * motor.maximum_r_min * RAD_S_PER_R_MIN);
+    let rated_current_a = motor.torque_nm / (1.5 * POLE_PAIRS as f64 * flux_linkage_wb);
+    let copper_w = 1.5 * rated_current_a * rated_current_a * motor.resistance_ohm;
+    let no_load_nm = NO_LOAD_SHARE * motor.torque_nm;
+    let dry_nm = DRY_SHARE * no_load_nm;
+    let viscous_nm_s = (1.0 - DRY_SHARE) * no_load_nm / (motor.rated_r_min * RAD_S_PER_R_MIN);
+    JointMotorModel {
+        name,
+        rated_torque_nm: motor.torque_nm,
+        pmsm: PmsmModel {
+            pole_pairs: POLE_PAIRS,
+            resistance_ohm: motor.resistance_ohm,
+            // One figure is printed for both axes: surface magnets.
+            inductance_d_h: motor.inductance_h,
+            inductance_q_h: motor.inductance_h,
+            flux_linkage_wb,
+        },
+        rotor: RotorModel {
+            inertia_kg_m2: motor.inertia_kg_m2,
+            viscous_nm_s: MOTOR_SHARE * viscous_nm_s,
+            coulomb_nm: MOTOR_SHARE * dry_nm,
+        },
+        gear: GearModel {
+            ratio,
+            stiffness_nm_rad,
+            damping_nm_s_rad: TORSION_DAMPING_S * stiffness_nm_rad,
+            backlash_rad: BACKLASH_RAD,
+            output_inertia_kg_m2: motor.flange_kg_m2,
+            coulomb_nm: (1.0 - MOTOR_SHARE) * dry_nm,
+            viscous_nm_s: (1.0 - MOTOR_SHARE) * viscous_nm_s,
+            mesh_loss: (1.0 - NO_LOAD_SHARE) * ratio * M4230.torque_nm / m4230_output_nm - 1.0,
+        },
+        encoder: ENCODER,
+        brake: BrakeModel { holding_nm: 0.0 },
+        winding: BodyModel {
+            resistance_k_w: TEMPERATURE_RISE_K / copper_w,
+            capacity_j_k: WINDING_HEAT_J_KG_K * motor.weight_kg,
+        },
+        resistance_per_k: COPPER_PER_K,
+        heat_sink: HEAT_SINK,
+        switch_resistance_ohm: SWITCH_RESISTANCE_OHM,
+        supply: SUPPLY,
+    }
+}

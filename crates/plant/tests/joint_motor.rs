@@ -1,0 +1,342 @@
+//! The joints against their maker's table, and the whole plant from the source to the output.
+
+use plant::absolute_encoder::BatteryState;
+use plant::angle::{Angle, Axis};
+use plant::brake::BrakeModel;
+use plant::joint_motor::Actuation;
+use plant::mechanics::RotorModel;
+use plant::{Inverter, JointMotor, JointMotorModel};
+use proptest::prelude::*;
+
+const DT_S: f64 = 50e-6;
+const TAU: f64 = core::f64::consts::TAU;
+const MODEL: JointMotorModel = JointMotorModel::M4230E17B50;
+
+/// A column of the manual's table, as printed.
+struct Printed {
+    model: JointMotorModel,
+    ratio: f64,
+    output_nm: f64,
+    current_a: f64,
+    motor_nm: f64,
+    power_w: f64,
+    rated_r_min: f64,
+    maximum_r_min: f64,
+    output_r_min: f64,
+    resistance_ohm: f64,
+    inductance_mh: f64,
+    inertia_kg_m2: f64,
+}
+
+const M4230E17B50: Printed = Printed {
+    model: JointMotorModel::M4230E17B50,
+    ratio: 50.0,
+    output_nm: 34.0,
+    current_a: 3.5,
+    motor_nm: 1.0,
+    power_w: 100.0,
+    rated_r_min: 1500.0,
+    maximum_r_min: 2000.0,
+    output_r_min: 30.0,
+    resistance_ohm: 0.86,
+    inductance_mh: 0.8,
+    inertia_kg_m2: 0.69e-4,
+};
+
+const M8025E25B50: Printed = Printed {
+    model: JointMotorModel::M8025E25B50,
+    ratio: 50.0,
+    output_nm: 51.0,
+    current_a: 7.0,
+    motor_nm: 2.0,
+    power_w: 200.0,
+    rated_r_min: 1000.0,
+    maximum_r_min: 1500.0,
+    output_r_min: 30.0,
+    resistance_ohm: 0.53,
+    inductance_mh: 0.5,
+    inertia_kg_m2: 1.74e-4,
+};
+
+const TABLE: [Printed; 4] = [
+    M4230E17B50,
+    Printed { model: JointMotorModel::M4230E17B80, ratio: 80.0, output_nm: 51.0, output_r_min: 15.0, ..M4230E17B50 },
+    M8025E25B50,
+    Printed { model: JointMotorModel::M8025E25B80, ratio: 80.0, output_nm: 85.0, output_r_min: 18.0, ..M8025E25B50 },
+];
+
+fn joint() -> JointMotor {
+    JointMotor::new(MODEL, Angle::new(0, 0.2), 36.0, 25.0)
+}
+
+/// Duties that put a voltage on the winding so that no current flows along the magnets, as a field-oriented drive does:
+/// `v_d = -w L i_q`, the rest across. From the true angle, half a step on.
+fn across_magnets(joint: &JointMotor, voltage_v: f64) -> Inverter {
+    let pmsm = &joint.model.pmsm;
+    let omega = f64::from(pmsm.pole_pairs) * joint.rotor.velocity_rad_s;
+    let Axis { sin, cos } =
+        Axis::at_turns(pmsm.electrical_turns(joint.rotor.angle)).turned_by(Axis::at_small_rad(0.5 * DT_S * omega));
+    let most = 0.7 * voltage_v.abs();
+    let d_v = (-omega * pmsm.inductance_q_h * joint.pmsm.current_a.q).clamp(-most, most);
+    let q_v = libm::sqrt(voltage_v * voltage_v - d_v * d_v).copysign(voltage_v);
+    let (alpha, beta) = (d_v * cos - q_v * sin, d_v * sin + q_v * cos);
+    let side = 0.5 * libm::sqrt(3.0) * beta;
+    let phases = [alpha, side - 0.5 * alpha, -side - 0.5 * alpha];
+    let (low, high) = phases.iter().fold((f64::MAX, f64::MIN), |(l, h), &v| (l.min(v), h.max(v)));
+    Inverter::Driven(phases.map(|v| (v - 0.5 * (low + high)) / joint.supply.bus_v + 0.5))
+}
+
+fn run(joint: &mut JointMotor, steps: u32, q_v: f64) {
+    for _ in 0..steps {
+        let inverter = across_magnets(joint, q_v);
+        joint.step(DT_S, &Actuation { inverter, brake_released: true, ..Actuation::default() });
+    }
+}
+
+fn near(actual: f64, expected: f64, relative: f64) -> bool {
+    (actual - expected).abs() <= relative * expected.abs()
+}
+
+fn assert_energy_closes(joint: &JointMotor, stored_at_first_j: f64, relative: f64) {
+    let gained = joint.stored_j() - stored_at_first_j;
+    let through = joint.energy.source_j.abs() + joint.stored_j() + joint.energy.load_j.abs();
+    let rest = joint.energy.balance_j() - gained;
+    assert!(rest.abs() < relative * through, "{rest} J missing of {through} J: {:?}", joint.energy);
+}
+
+#[test]
+fn the_windings_and_masses_are_the_manuals() {
+    for Printed { model, ratio, resistance_ohm, inductance_mh, inertia_kg_m2, .. } in TABLE {
+        assert_eq!((model.gear.ratio, model.rotor.inertia_kg_m2), (ratio, inertia_kg_m2));
+        // Printed between two wires: two phases in series.
+        assert!(near(2.0 * model.pmsm.resistance_ohm, resistance_ohm, 1e-12), "{}", model.name);
+        assert!(near(2.0 * model.pmsm.inductance_q_h, 1e-3 * inductance_mh, 1e-12));
+    }
+}
+
+#[test]
+fn at_printed_torque_and_power_the_supply_gives_the_printed_current_within_its_tolerance() {
+    for Printed { model, current_a, motor_nm, power_w, .. } in TABLE {
+        let q_a = motor_nm / model.pmsm.torque_constant_nm_a();
+        let copper_w = 1.5 * q_a * q_a * model.pmsm.resistance_ohm;
+        let supply_w = power_w + copper_w;
+        assert!(near(supply_w, 36.0 * current_a, 0.1), "{}: {supply_w} W", model.name);
+    }
+}
+
+#[test]
+fn the_m4230s_motor_gives_the_printed_output_torque_and_the_m8025s_more_than_its_reducer_may_carry() {
+    for Printed { model, output_nm, motor_nm, rated_r_min, .. } in TABLE {
+        let driven_nm = model.gear.driven_torque_nm(&model.rotor, motor_nm, rated_r_min * TAU / 60.0);
+        if motor_nm == 1.0 {
+            assert!((driven_nm - output_nm).abs() < 0.5, "{}: {driven_nm} N m", model.name);
+        } else {
+            assert!(driven_nm > output_nm, "{}: {driven_nm} N m", model.name);
+        }
+    }
+}
+
+#[test]
+fn without_load_a_joint_reaches_the_printed_maximum_speed_at_36_v_and_its_range_behind_the_gear() {
+    for Printed { model, ratio, maximum_r_min, output_r_min, .. } in TABLE {
+        let mut joint = JointMotor::new(model, Angle::default(), 36.0, 25.0);
+        for _ in 0..40_000 {
+            let all = joint.supply.bus_v / libm::sqrt(3.0);
+            run(&mut joint, 1, all);
+        }
+        let r_min = joint.rotor.velocity_rad_s * 60.0 / TAU;
+        assert!((0.96 * maximum_r_min..maximum_r_min).contains(&r_min), "{}: {r_min} r/min", model.name);
+        let output = joint.gear.output_velocity_rad_s * 60.0 / TAU;
+        // The M8025E25B50's 30 r/min are its motor's 1500 without any friction.
+        assert!(near(output, r_min / ratio, 1e-3), "{}: {output} r/min", model.name);
+        assert!(output > 0.97 * output_r_min, "{}: {output} r/min", model.name);
+    }
+}
+
+#[test]
+fn a_joint_lifts_its_printed_torque_at_its_printed_speed() {
+    for Printed { model, ratio, output_nm, rated_r_min, output_r_min, .. } in TABLE {
+        // The printed range, or the motor's rated speed if that comes first (the M8025: 1000 r/min).
+        let output_r_min = f64::min(output_r_min, rated_r_min / ratio);
+        let mut joint = JointMotor::new(model, Angle::default(), 36.0, 25.0);
+        joint.load.inertia_kg_m2 = 0.2;
+        let target = output_r_min * TAU / 60.0;
+        let full = 0.98 * 36.0 / libm::sqrt(3.0);
+        let mut q_v = 0.0;
+        for step in 0..60_000_u32 {
+            joint.load.torque_nm = output_nm * (f64::from(step) / 20_000.0).min(1.0);
+            // As little as a speed loop: more voltage while too slow.
+            q_v = (q_v + 2e-3 * (target - joint.gear.output_velocity_rad_s)).clamp(0.0, full);
+            run(&mut joint, 1, q_v);
+        }
+        let velocity = joint.gear.output_velocity_rad_s;
+        assert!(near(velocity, target, 0.03), "{}: {velocity} of {target} rad/s at {q_v} V", model.name);
+        assert!(near(joint.gear.torque_nm, output_nm, 0.05), "{}: {} N m", model.name, joint.gear.torque_nm);
+    }
+}
+
+#[test]
+fn at_rated_torque_the_winding_stays_at_the_printed_85_degrees() {
+    for Printed { model, motor_nm, .. } in TABLE {
+        let q_a = motor_nm / model.pmsm.torque_constant_nm_a();
+        let copper_w = 1.5 * q_a * q_a * model.pmsm.resistance_ohm;
+        assert!(near(40.0 + model.winding.resistance_k_w * copper_w, 85.0, 1e-9));
+    }
+}
+
+#[test]
+fn the_encoder_counts_the_motors_shaft_and_the_output_turns_by_the_ratio_less() {
+    let mut joint = joint();
+    let before = joint.sense().position_counts;
+    let output = joint.output_angle().as_turns();
+    run(&mut joint, 20_000, 10.0);
+    run(&mut joint, 20_000, 0.0);
+    let counted = joint.sense().position_counts - before;
+    assert!(counted > 5 * 32_768);
+    let turned = joint.output_angle().as_turns() - output;
+    // Backlash of 20 arc seconds at most, and the windup of friction.
+    assert!((turned * 50.0 - f64::from(counted) / 32_768.0).abs() < 50.0 * 20.0 / 3600.0 / 360.0 + 1.0 / 32_768.0);
+}
+
+#[test]
+fn the_brake_variant_holds_a_load_that_the_other_lets_fall() {
+    let braked = JointMotorModel { rotor: RotorModel { coulomb_nm: 0.0, ..MODEL.rotor }, ..MODEL }.with_brake();
+    assert_eq!(braked.brake, BrakeModel { holding_nm: 1.0 });
+    let mut held = JointMotor::new(braked, Angle::default(), 36.0, 25.0);
+    held.load.torque_nm = 34.0;
+    for _ in 0..20_000 {
+        held.step(DT_S, &Actuation::default());
+    }
+    assert!(held.rotor.angle.as_rad().abs() < 1e-9, "{:?}", held.rotor);
+    let mut falling = held.clone();
+    for _ in 0..20_000 {
+        falling.step(DT_S, &Actuation { brake_released: true, ..Actuation::default() });
+    }
+    assert!(falling.rotor.velocity_rad_s < -10.0, "{:?}", falling.rotor);
+}
+
+#[test]
+fn power_off_with_a_battery_keeps_the_turns_and_without_loses_them() {
+    for (connected, kept) in [(true, true), (false, false)] {
+        let mut joint = JointMotor::new(MODEL, Angle::new(7, 0.25), 36.0, 25.0);
+        assert_eq!(joint.sense().position_counts, 7 * 32_768 + 8_192);
+        joint.encoder.battery.connected = connected;
+        joint.supply.connected = false;
+        // The bus falls under what the electronics need.
+        for _ in 0..20_000 {
+            joint.step(DT_S, &Actuation::default());
+        }
+        assert!(joint.sense().bus_v < 9.0, "{}", joint.sense().bus_v);
+        joint.supply.connected = true;
+        for _ in 0..2_000 {
+            joint.step(DT_S, &Actuation::default());
+        }
+        let sensors = joint.sense();
+        assert_eq!(sensors.turns_lost, !kept);
+        assert_eq!(sensors.position_counts, if kept { 7 * 32_768 + 8_192 } else { 8_192 });
+        assert_eq!(sensors.battery == BatteryState::Disconnected, !connected);
+    }
+}
+
+#[test]
+fn an_origin_set_by_command_is_zero_and_clears_the_loss() {
+    let mut joint = JointMotor::new(MODEL, Angle::new(7, 0.25), 36.0, 25.0);
+    joint.encoder.turns_lost = true;
+    joint.step(DT_S, &Actuation { set_origin: true, ..Actuation::default() });
+    assert_eq!((joint.sense().position_counts, joint.sense().turns_lost), (0, false));
+}
+
+#[test]
+fn a_locked_output_winds_up_by_torque_over_stiffness_and_the_encoder_sees_only_that() {
+    let frictionless = plant::gear::GearModel { coulomb_nm: 0.0, mesh_loss: 0.0, ..MODEL.gear };
+    let model = JointMotorModel {
+        gear: frictionless,
+        rotor: RotorModel { coulomb_nm: 0.0, viscous_nm_s: 0.01, ..MODEL.rotor },
+        resistance_per_k: 0.0,
+        ..MODEL
+    };
+    let mut joint = JointMotor::new(model, Angle::default(), 36.0, 25.0);
+    joint.load.locked = true;
+    run(&mut joint, 20_000, 1.5);
+    let q_a = 1.5 / (model.pmsm.resistance_ohm + model.switch_resistance_ohm);
+    let output_nm = 50.0 * q_a * model.pmsm.torque_constant_nm_a();
+    let windup = output_nm / model.gear.stiffness_nm_rad + 0.5 * model.gear.backlash_rad;
+    assert!(near(joint.rotor.angle.as_rad(), 50.0 * windup, 1e-3), "{}", joint.rotor.angle.as_rad());
+    assert!(joint.output_angle().as_rad().abs() < 1e-12);
+    assert_eq!(joint.sense().position_counts, (50.0 * windup / TAU * 32_768.0) as i32);
+}
+
+#[test]
+fn energy_closes_while_lifting_and_while_falling_into_a_discharge_module() {
+    let mut joint = joint();
+    joint.load.inertia_kg_m2 = 0.5;
+    joint.load.torque_nm = 10.0;
+    joint.discharge_from_v = Some(45.0);
+    let stored = joint.stored_j();
+    run(&mut joint, 20_000, 10.0);
+    assert!(joint.rotor.velocity_rad_s > 50.0, "{}", joint.rotor.velocity_rad_s);
+    assert_energy_closes(&joint, stored, 1e-4);
+    joint.load.torque_nm = 30.0;
+    run(&mut joint, 40_000, -15.0);
+    assert!(joint.energy.bleeder_j > 0.1 && joint.supply.bus_v < 46.0, "{:?} {}", joint.energy, joint.supply.bus_v);
+    assert_energy_closes(&joint, stored, 1e-3);
+}
+
+#[test]
+fn a_held_temperature_shows_in_the_sensors_within_a_millisecond() {
+    let mut joint = joint();
+    joint.winding.hold_c = Some(95.0);
+    for _ in 0..20 {
+        joint.step(DT_S, &Actuation::default());
+    }
+    assert_eq!(joint.sense().winding_c, 95.0);
+}
+
+#[test]
+fn the_same_input_gives_the_same_bits() {
+    let play = || {
+        let mut joint = joint();
+        joint.load.torque_nm = 5.0;
+        run(&mut joint, 5_000, 9.0);
+        run(&mut joint, 5_000, -9.0);
+        joint
+    };
+    assert_eq!(play(), play());
+}
+
+fn any_inverter() -> impl Strategy<Value = Inverter> {
+    prop_oneof![
+        Just(Inverter::Open),
+        Just(Inverter::Shorted),
+        [0.3..=0.7_f64, 0.3..=0.7_f64, 0.3..=0.7_f64].prop_map(Inverter::Driven),
+        Just(Inverter::Driven([f64::NAN, 0.5, 2.0])),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn whatever_the_drive_does_the_book_closes_and_the_numbers_stay_sound(
+        play in prop::collection::vec((any_inverter(), any::<bool>(), -100.0..100.0_f64, 1_u32..300), 1..12),
+        load_kg_m2 in 0.0..1.0_f64,
+        locked in any::<bool>(),
+    ) {
+        let mut joint = joint();
+        joint.load.inertia_kg_m2 = load_kg_m2;
+        joint.load.locked = locked;
+        let stored = joint.stored_j();
+        for (inverter, brake_released, load_nm, steps) in play {
+            joint.load.torque_nm = load_nm;
+            for _ in 0..steps {
+                joint.step(DT_S, &Actuation { inverter, brake_released, set_origin: false });
+            }
+            let sensors = joint.sense();
+            prop_assert!(sensors.bus_v.is_finite() && sensors.phase_current_a.iter().all(|a| a.is_finite()));
+            prop_assert!(joint.rotor.velocity_rad_s.abs() < 1e4);
+        }
+        let through = joint.energy.source_j + joint.stored_j() + joint.energy.load_j.abs() + joint.energy.winding_j;
+        let rest = joint.energy.balance_j() - (joint.stored_j() - stored);
+        prop_assert!(rest.abs() < 0.005 * through, "{rest} J missing of {through} J");
+    }
+}

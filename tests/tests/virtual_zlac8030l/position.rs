@@ -1,0 +1,217 @@
+//! Profile position (manual 4.2, 4.3): the worked examples, times, the set-point handshake, and the lag fault.
+
+use std::time::Duration;
+
+use crate::bench::{Bench, assert_within};
+use crate::wheel::COUNTS_PER_TURN;
+
+const LOOK: Duration = Duration::from_millis(1);
+const RELATIVE: i64 = 0x40;
+const IMMEDIATELY: i64 = 0x20;
+const ACKNOWLEDGED: u16 = 1 << 12;
+const REACHED: u16 = 1 << 10;
+const IN_PLACE: u16 = 1 << 13;
+
+/// 2002h as delivered: how far a drive that is in place may be off.
+const IN_PLACE_COUNTS: i64 = 30;
+
+fn ready() -> Bench {
+    let mut bench = Bench::new();
+    bench.enable_in(1);
+    bench.set(0x6081, 0, 60);
+    bench
+}
+
+/// Target, then the edge of bit 4 as 4.2 and 4.3 write it: with the bit down and with the bit up.
+fn start(bench: &mut Bench, target: i64, bits: i64) {
+    bench.set(0x607A, 0, target);
+    bench.set(0x6040, 0, 0x0F | bits);
+    bench.set(0x6040, 0, 0x1F | bits);
+}
+
+#[track_caller]
+fn assert_at(bench: &mut Bench, expected: i64) {
+    let position = bench.get(0x6064, 0);
+    assert!((position - expected).abs() <= IN_PLACE_COUNTS, "at {position}, expected {expected}");
+    let statusword = bench.statusword();
+    assert_eq!(statusword & (REACHED | IN_PLACE), REACHED | IN_PLACE, "{statusword:04X}h");
+    let turned = bench.report().shaft_angle_rad / core::f64::consts::TAU * COUNTS_PER_TURN;
+    assert_within("counts that the shaft truly turned", turned, expected as f64 - 31.0, expected as f64 + 31.0);
+}
+
+/// At 60 r/min, 4096 counts/s, from and to 1 r/min in 500 ms each.
+fn duration_s(distance: f64) -> f64 {
+    let (speed, edge) = (COUNTS_PER_TURN, COUNTS_PER_TURN / 60.0);
+    let ramps = 2.0 * 0.5 * (speed + edge) / 2.0;
+    1.0 + (distance - ramps) / speed
+}
+
+#[test]
+fn the_relative_moves_of_4_2_go_32000_counts_and_come_back() {
+    let mut bench = ready();
+    start(&mut bench, 32_000, RELATIVE);
+    let end = bench.seconds_until(12.0, LOOK, |report| report.position >= 32_000 - 2);
+    assert_within("seconds of the move", end, duration_s(32_000.0) - 0.05, duration_s(32_000.0) + 0.05);
+    bench.run_ms(500);
+    assert_at(&mut bench, 32_000);
+    start(&mut bench, -32_000, RELATIVE);
+    bench.run_ms(10_000);
+    assert_at(&mut bench, 0);
+}
+
+#[test]
+fn the_absolute_moves_of_4_3_go_to_32000_and_to_minus_32000() {
+    let mut bench = ready();
+    start(&mut bench, 32_000, 0);
+    bench.run_ms(10_000);
+    assert_at(&mut bench, 32_000);
+    start(&mut bench, -32_000, 0);
+    bench.run_ms(18_000);
+    assert_at(&mut bench, -32_000);
+}
+
+#[test]
+fn a_move_keeps_to_the_speed_of_6081h_and_ends_without_overshoot() {
+    let mut bench = ready();
+    start(&mut bench, 12_000, 0);
+    let (mut fastest, mut farthest) = (0.0_f64, 0);
+    for _ in 0..5000 {
+        bench.run(LOOK);
+        let report = bench.report();
+        fastest = fastest.max(report.velocity_rpm);
+        farthest = farthest.max(report.position);
+    }
+    assert_within("greatest speed", fastest, 59.0, 61.5);
+    assert_within("farthest position", farthest as f64, 11_990.0, 12_010.0);
+}
+
+#[test]
+fn a_move_begins_with_2008h_and_ends_from_6082h() {
+    let mut bench = ready();
+    bench.set(0x2008, 0, 20);
+    bench.set(0x6082, 0, 10);
+    start(&mut bench, 20_000, 0);
+    let mut demands = Vec::new();
+    for _ in 0..12_000 {
+        bench.run(Duration::from_micros(500));
+        demands.push(bench.report().velocity_demand_rpm.unwrap_or_default());
+    }
+    let moving: Vec<_> = demands.into_iter().filter(|demand| *demand > 0.0).collect();
+    assert_within("first speed", moving[0], 19.9, 21.0);
+    assert_within("last speed", moving[moving.len() - 1], 9.9, 10.5);
+}
+
+#[test]
+fn nothing_moves_without_a_rising_bit_4() {
+    let mut bench = ready();
+    bench.set(0x607A, 0, 4096);
+    bench.set(0x6040, 0, 0x0F);
+    bench.run_ms(500);
+    assert_eq!(bench.get(0x6064, 0), 0);
+    start(&mut bench, 4096, 0);
+    bench.run_ms(2500);
+    assert_at(&mut bench, 4096);
+    // Bit 4 is still up: a new target waits for its next edge.
+    bench.set(0x607A, 0, 0);
+    bench.set(0x6040, 0, 0x1F);
+    bench.run_ms(500);
+    assert_at(&mut bench, 4096);
+}
+
+#[test]
+fn the_acknowledge_bit_rises_with_the_set_point_and_falls_with_bit_4() {
+    let mut bench = ready();
+    assert_eq!(bench.statusword() & ACKNOWLEDGED, 0);
+    start(&mut bench, 4096, 0);
+    assert_eq!(bench.statusword() & ACKNOWLEDGED, ACKNOWLEDGED);
+    bench.run_ms(200);
+    assert_eq!(bench.statusword() & ACKNOWLEDGED, ACKNOWLEDGED, "bit 4 is still up");
+    bench.set(0x6040, 0, 0x0F);
+    assert_eq!(bench.statusword() & ACKNOWLEDGED, 0);
+}
+
+#[test]
+fn one_set_point_waits_for_the_end_of_the_other() {
+    let mut bench = ready();
+    start(&mut bench, 8192, 0);
+    start(&mut bench, 4096, 0);
+    bench.set(0x6040, 0, 0x0F);
+    assert_eq!(bench.statusword() & ACKNOWLEDGED, ACKNOWLEDGED, "no room for a third");
+    let way = bench.seconds_until(5.0, LOOK, |report| report.position >= 8192 - 2);
+    assert_within("seconds to the first", way, duration_s(8192.0) - 0.05, duration_s(8192.0) + 0.05);
+    bench.run_ms(300);
+    assert_eq!(bench.statusword() & ACKNOWLEDGED, 0, "the second is under way");
+    bench.run_ms(2500);
+    assert_at(&mut bench, 4096);
+}
+
+#[test]
+fn with_bit_5_a_set_point_replaces_the_one_under_way() {
+    let mut bench = ready();
+    start(&mut bench, 40_000, 0);
+    bench.run_ms(1000);
+    start(&mut bench, 8192, IMMEDIATELY);
+    let mut farthest = 0;
+    for _ in 0..4000 {
+        bench.run(LOOK);
+        farthest = farthest.max(bench.report().position);
+    }
+    assert_within("farthest position", farthest as f64, 8162.0, 8222.0);
+    assert_at(&mut bench, 8192);
+}
+
+#[test]
+fn relative_moves_add_up_even_when_they_are_told_in_one_breath() {
+    let mut bench = ready();
+    start(&mut bench, 4096, RELATIVE);
+    start(&mut bench, 4096, RELATIVE);
+    bench.run_ms(5000);
+    assert_at(&mut bench, 8192);
+    start(&mut bench, -2048, RELATIVE);
+    bench.run_ms(3000);
+    assert_at(&mut bench, 6144);
+}
+
+#[test]
+fn an_absolute_target_beyond_3fffffffh_is_refused_when_it_is_to_start_and_a_relative_one_is_not() {
+    let mut bench = ready();
+    for target in [0x4000_0000, -0x4000_0000] {
+        bench.set(0x607A, 0, target);
+        bench.set(0x6040, 0, 0x0F);
+        assert_eq!(bench.write(0x6040, 0, 0x1F), Err(0x0609_0030), "{target:X}h");
+    }
+    bench.set(0x6040, 0, 0x4F);
+    bench.set(0x6040, 0, 0x5F);
+    bench.run_ms(300);
+    assert!(bench.report().velocity_rpm < -20.0, "the relative move has begun");
+}
+
+/// The lag passes 4090 counts (2017h = 409) at the time that the profile takes to go so far.
+#[test]
+fn a_blocked_shaft_faults_with_0020h_when_the_lag_passes_2017h() {
+    for (threshold, lag) in [(409, 4090.0), (200, 2000.0)] {
+        let mut bench = ready();
+        bench.set(0x2017, 0, threshold);
+        bench.operate(|drive, now| drive.set_rotor_locked(true, now)).expect("a rotor");
+        start(&mut bench, 40_000, 0);
+        let (speed, edge) = (COUNTS_PER_TURN, COUNTS_PER_TURN / 60.0);
+        let expected = 0.5 + (lag - 0.5 * (speed + edge) / 2.0) / speed;
+        let seconds = bench.seconds_until(3.0, LOOK, |report| report.error_code != 0);
+        assert_within("seconds to the fault", seconds, expected - 0.01, expected + 0.01);
+        assert_eq!((bench.get(0x603F, 0), bench.get(0x1001, 0)), (0x0020, 0x21), "drive profile and generic");
+    }
+}
+
+#[test]
+fn clearing_with_2006h_moves_the_origin_of_absolute_moves() {
+    let mut bench = ready();
+    start(&mut bench, 4096, 0);
+    bench.run_ms(2500);
+    bench.set(0x2006, 0, 1);
+    assert_within("6064h", bench.get(0x6064, 0) as f64, -2.0, 2.0);
+    start(&mut bench, 2048, 0);
+    bench.run_ms(2500);
+    let turned = bench.report().shaft_angle_rad / core::f64::consts::TAU * COUNTS_PER_TURN;
+    assert_within("counts from where it began", turned, 6144.0 - 60.0, 6144.0 + 60.0);
+    assert_within("6064h", bench.get(0x6064, 0) as f64, 2018.0, 2078.0);
+}

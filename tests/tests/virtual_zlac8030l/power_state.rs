@@ -1,0 +1,211 @@
+//! The power state machine on the running drive: every state with every event of the table, and the statuswords.
+//!
+//! Two states cannot be seen from the bus. Not ready to switch on ends before the boot-up message goes out. Fault
+//! reaction active takes no time: the manual names no fault reaction ramp, so the power stage goes off at once and
+//! transition 14 follows 13 in the same control period.
+
+use ferrodrive_tests::zlac8030l::{PowerCell, power_states};
+use sim::Component;
+
+use crate::bench::Bench;
+
+const REACHED: u16 = 1 << 10;
+/// Speed is zero in profile velocity, set-point acknowledge in profile position.
+const BIT_12: u16 = 1 << 12;
+const IN_PLACE: u16 = 1 << 13;
+const RUNNING: u16 = 1 << 14;
+const MODE_BITS: u16 = REACHED | BIT_12 | IN_PLACE | RUNNING;
+
+const UNSEEN: [&str; 2] = ["not_ready_to_switch_on", "fault_reaction_active"];
+
+#[test]
+fn every_event_in_every_state_leads_where_the_table_says() {
+    let cells: Vec<_> = power_states().into_iter().filter(|cell| !UNSEEN.contains(&&*cell.state)).collect();
+    assert_eq!(cells.len(), 66);
+    let differences: Vec<_> = cells.iter().filter_map(difference).collect();
+    assert!(differences.is_empty(), "{}", differences.join("\n"));
+}
+
+fn difference(cell: &PowerCell) -> Option<String> {
+    let mut bench = in_state(&cell.state);
+    cause(&mut bench, cell);
+    let low_byte = bench.statusword() & 0xFF;
+    let expected = match &*cell.state_after {
+        // Seen one transition later: Fault.
+        "fault_reaction_active" => 0x98,
+        _ => u16::from(cell.low_byte_after),
+    };
+    (low_byte != expected)
+        .then(|| format!("{} on {}: low byte {low_byte:02X}h, expected {expected:02X}h", cell.state, cell.event))
+}
+
+/// A drive without a mode, standing, in a state.
+fn in_state(state: &str) -> Bench {
+    let mut bench = Bench::new();
+    reach(&mut bench, state);
+    bench
+}
+
+/// From switch on disabled to a state.
+fn reach(bench: &mut Bench, state: &str) {
+    let controlwords: &[i64] = match state {
+        "switch_on_disabled" | "fault" => &[],
+        "ready_to_switch_on" => &[0x06],
+        "switched_on" => &[0x06, 0x07],
+        "operation_enabled" => &[0x06, 0x07, 0x0F],
+        "quick_stop_active" => &[0x06, 0x07, 0x0F, 0x02],
+        other => panic!("no way to {other}"),
+    };
+    bench.set(0x2000, 0, 0);
+    for controlword in controlwords {
+        bench.set(0x6040, 0, *controlword);
+    }
+    if state == "fault" {
+        hall_fault(bench, true);
+        hall_fault(bench, false);
+    }
+}
+
+fn cause(bench: &mut Bench, cell: &PowerCell) {
+    match (cell.controlword, &*cell.event) {
+        (Some(controlword), _) => {
+            bench.set(0x6040, 0, 0x00FF & i64::from(controlword));
+            bench.run_ms(10);
+        }
+        (None, "fault_occurs") => hall_fault(bench, true),
+        // Ends of what the drive does by itself: there is nothing of the kind under way, time passes.
+        (None, _) => bench.run_ms(1000),
+    }
+}
+
+fn hall_fault(bench: &mut Bench, broken: bool) {
+    bench.operate(|drive, now| drive.set_fault(Component::Hall, broken, now)).expect("there are Hall sensors");
+    bench.run_ms(50);
+}
+
+#[test]
+fn the_drive_says_that_it_has_booted_and_is_in_switch_on_disabled() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.heard(), ["704#00"]);
+    assert_eq!(bench.statusword() & 0x6F, 0x60);
+}
+
+#[test]
+fn the_statusword_of_each_state_has_bits_4_and_9_and_the_pattern_of_cia_402() {
+    // docs/drives/zlac8030l.md, chapter 7. Bits 10 and above belong to the mode.
+    let patterns = [
+        ("switch_on_disabled", 0x0270),
+        ("ready_to_switch_on", 0x0231),
+        ("switched_on", 0x0233),
+        ("operation_enabled", 0x0237),
+        ("quick_stop_active", 0x0217),
+        ("fault", 0x0298),
+    ];
+    for mode in [0, 1, 3, 4] {
+        for (state, pattern) in patterns {
+            let mut bench = Bench::new();
+            bench.set(0x6060, 0, mode);
+            reach(&mut bench, state);
+            bench.run_ms(50);
+            let statusword = bench.statusword();
+            assert_eq!(statusword & 0x03FF, pattern, "mode {mode}, {state}: {statusword:04X}h");
+            assert_eq!(statusword & 0xC000, 0, "{statusword:04X}h: neither running nor stopped from outside");
+        }
+    }
+}
+
+#[test]
+fn a_drive_that_has_just_booted_shows_0670h_as_the_recorded_one_does() {
+    assert_eq!(Bench::new().statusword(), 0x0670);
+}
+
+#[test]
+fn in_profile_velocity_bits_10_12_and_14_tell_reached_standing_and_running() {
+    let mut bench = Bench::new();
+    bench.enable_in(3);
+    bench.run_ms(100);
+    assert_eq!(bench.statusword() & MODE_BITS, REACHED | BIT_12, "at the target 0");
+    bench.set(0x60FF, 0, 100);
+    bench.run_ms(250);
+    assert_eq!(bench.statusword() & MODE_BITS, RUNNING, "half way up the ramp");
+    bench.run_ms(750);
+    assert_eq!(bench.statusword() & MODE_BITS, REACHED | RUNNING, "at 100 r/min");
+    bench.set(0x60FF, 0, 0);
+    bench.run_ms(1000);
+    assert_eq!(bench.statusword() & MODE_BITS, REACHED | BIT_12, "stopped");
+}
+
+#[test]
+fn in_profile_position_bits_10_12_13_and_14_tell_reached_acknowledged_in_place_and_running() {
+    let mut bench = Bench::new();
+    bench.enable_in(1);
+    bench.run_ms(100);
+    assert_eq!(bench.statusword() & MODE_BITS, REACHED | IN_PLACE, "nothing to do");
+    bench.set(0x607A, 0, 4096);
+    bench.set(0x6040, 0, 0x1F);
+    let taken = bench.statusword();
+    assert_eq!(taken & (REACHED | BIT_12), BIT_12, "{taken:04X}h");
+    bench.set(0x6040, 0, 0x0F);
+    bench.run_ms(300);
+    assert_eq!(bench.statusword() & (REACHED | BIT_12 | RUNNING), RUNNING, "under way, bit 4 is down");
+    bench.run_ms(2000);
+    assert_eq!(bench.statusword() & MODE_BITS, REACHED | IN_PLACE, "arrived");
+}
+
+#[test]
+fn in_profile_torque_bits_10_and_14_tell_reached_and_running() {
+    let mut bench = Bench::new();
+    bench.operate(|drive, now| drive.set_rotor_locked(true, now)).expect("a rotor");
+    bench.enable_in(4);
+    bench.set(0x6087, 0, 1000);
+    bench.set(0x6071, 0, 2000);
+    bench.run_ms(1000);
+    assert_eq!(bench.statusword() & MODE_BITS, 0, "1 A of 2 A, a shaft that cannot turn");
+    bench.run_ms(1500);
+    assert_eq!(bench.statusword() & MODE_BITS, REACHED);
+    bench.operate(|drive, now| drive.set_rotor_locked(false, now)).expect("a rotor");
+    bench.run_ms(200);
+    assert_eq!(bench.statusword() & MODE_BITS, REACHED | RUNNING);
+}
+
+#[test]
+fn bit_15_tells_of_the_external_stop_whatever_the_mode() {
+    for mode in [1, 3, 4] {
+        let mut bench = Bench::new();
+        bench.enable_in(mode);
+        bench.operate(|drive, now| drive.set_input(0, true, now)).expect("there is X0");
+        bench.run_ms(20);
+        assert_eq!(bench.statusword() & 0x8000, 0x8000, "mode {mode}");
+        assert_eq!(bench.get(0x2003, 0), 1);
+        bench.operate(|drive, now| drive.set_input(0, false, now)).expect("there is X0");
+        bench.run_ms(20);
+        assert_eq!(bench.statusword() & 0x8000, 0, "mode {mode}");
+    }
+}
+
+#[test]
+fn a_fault_is_cleared_only_by_a_rising_bit_7_and_only_when_its_cause_is_gone() {
+    let mut bench = in_state("switched_on");
+    hall_fault(&mut bench, true);
+    assert_eq!((bench.get(0x603F, 0), bench.get(0x1001, 0)), (0x0200, 0x81), "Hall error; generic and manufacturer");
+    bench.set(0x6040, 0, 0x80);
+    assert_eq!(bench.statusword() & 0xFF, 0x98, "the cause is still there");
+    hall_fault(&mut bench, false);
+    bench.set(0x6040, 0, 0x80);
+    assert_eq!(bench.statusword() & 0xFF, 0x98, "bit 7 did not rise");
+    bench.set(0x6040, 0, 0x00);
+    bench.set(0x6040, 0, 0x80);
+    assert_eq!(bench.statusword() & 0xFF, 0x70);
+    assert_eq!((bench.get(0x603F, 0), bench.get(0x1001, 0)), (0, 0));
+}
+
+#[test]
+fn a_fault_and_its_end_are_told_by_emcy() {
+    let mut bench = in_state("switch_on_disabled");
+    bench.heard();
+    hall_fault(&mut bench, true);
+    hall_fault(&mut bench, false);
+    bench.set(0x6040, 0, 0x80);
+    let told: Vec<_> = bench.heard().into_iter().filter(|frame| frame.starts_with("084#")).collect();
+    assert_eq!(told, ["084#0002810000000000", "084#0000000000000000"]);
+}

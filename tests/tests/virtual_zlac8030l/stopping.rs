@@ -1,0 +1,222 @@
+//! What stops a moving motor, how fast and how far: halt, quick stop (4.6), stop (4.5), external stop (5.4), a silent host.
+
+use std::time::Duration;
+
+use crate::bench::{Bench, assert_within};
+use crate::wheel::{self, COUNTS_PER_TURN, RAD_S_PER_RPM};
+
+const LOOK: Duration = Duration::from_millis(1);
+const RPM: f64 = 120.0;
+
+/// Turning at 120 r/min in profile velocity; 6084h 400 ms, 6085h 100 ms.
+fn turning() -> Bench {
+    let mut bench = Bench::new();
+    bench.set(0x6084, 0, 400);
+    bench.set(0x6085, 0, 100);
+    bench.enable_in(3);
+    bench.set(0x60FF, 0, RPM as i64);
+    bench.run_ms(1500);
+    bench
+}
+
+/// Seconds to standstill and counts gone, from now.
+fn stop_of(bench: &mut Bench) -> (f64, f64) {
+    let start = bench.report().position;
+    let seconds = bench.seconds_until(3.0, LOOK, |report| report.velocity_rpm.abs() < 1.0);
+    bench.run_ms(300);
+    assert_within("speed after the stop", bench.report().velocity_rpm, -0.5, 0.5);
+    (seconds, (bench.report().position - start) as f64)
+}
+
+/// A ramp of `time_s` is an S, so its way is half of what full speed would go; at the current limit it is v^2 / 2a.
+#[track_caller]
+fn assert_stops(bench: &mut Bench, ramp: Ramp) {
+    let (seconds, counts) = stop_of(bench);
+    let (expected_s, slack_s) = match ramp {
+        Ramp::Time(time_s) => (time_s, 0.03),
+        Ramp::CurrentLimit => {
+            let torque_nm = 30.0 * wheel::torque_per_a() + wheel::friction_nm(0.0);
+            (RPM * RAD_S_PER_RPM * wheel::inertia_kg_m2() / torque_nm, 0.02)
+        }
+    };
+    let expected_counts = RPM / 60.0 * COUNTS_PER_TURN * expected_s / 2.0;
+    let slack_counts = RPM / 60.0 * COUNTS_PER_TURN * 0.012;
+    assert_within("seconds to stand", seconds, expected_s * 0.8 - 0.002, expected_s + slack_s);
+    assert_within("counts to stand", counts, expected_counts * 0.9 - 2.0, expected_counts + slack_counts);
+}
+
+#[derive(Clone, Copy)]
+enum Ramp {
+    Time(f64),
+    CurrentLimit,
+}
+
+#[test]
+fn quick_stop_ramps_as_605ah_says_and_holds_the_shaft() {
+    for (option, ramp) in [(5, Ramp::Time(0.4)), (6, Ramp::Time(0.1)), (7, Ramp::CurrentLimit)] {
+        let mut bench = turning();
+        bench.set(0x605A, 0, option);
+        bench.set(0x6040, 0, 0x02);
+        assert_stops(&mut bench, ramp);
+        assert_eq!(bench.statusword() & 0xFF, 0x17, "the drive stays in quick stop active");
+        let held = bench.report().position;
+        bench.operate(|drive, now| drive.set_load_torque(3.0, now)).expect("a load");
+        bench.run_ms(2000);
+        assert_within("the motor holds", (bench.report().position - held) as f64, -30.0, 30.0);
+    }
+}
+
+#[test]
+fn enabling_again_after_a_quick_stop_goes_on_with_the_target() {
+    let mut bench = turning();
+    bench.set(0x6040, 0, 0x02);
+    bench.run_ms(600);
+    bench.set(0x6040, 0, 0x0F);
+    bench.run_ms(800);
+    assert_eq!(bench.statusword() & 0xFF, 0x37);
+    assert_within("speed", bench.report().velocity_rpm, RPM - 1.0, RPM + 1.0);
+}
+
+#[test]
+fn halt_ramps_as_605dh_says_stays_enabled_and_goes_on_when_it_ends() {
+    for (option, ramp) in [(1, Ramp::Time(0.4)), (2, Ramp::Time(0.1)), (3, Ramp::CurrentLimit)] {
+        let mut bench = turning();
+        bench.set(0x605D, 0, option);
+        bench.set(0x6040, 0, 0x10F);
+        assert_stops(&mut bench, ramp);
+        let statusword = bench.statusword();
+        assert_eq!((statusword & 0xFF, statusword & 0x0400), (0x37, 0x0400), "standing under halt is reached");
+        bench.set(0x6040, 0, 0x0F);
+        bench.run_ms(800);
+        assert_within("speed", bench.report().velocity_rpm, RPM - 1.0, RPM + 1.0);
+    }
+}
+
+#[test]
+fn a_halted_position_move_goes_on_to_its_target() {
+    let mut bench = Bench::new();
+    bench.enable_in(1);
+    bench.set(0x607A, 0, 16_384);
+    bench.set(0x6040, 0, 0x1F);
+    bench.run_ms(1000);
+    bench.set(0x6040, 0, 0x11F);
+    bench.run_ms(1000);
+    let halted = bench.report();
+    assert!(halted.velocity_rpm.abs() < 0.5 && (2000..15_000).contains(&halted.position), "{halted:?}");
+    bench.run_ms(1000);
+    assert_within("the shaft stays", (bench.report().position - halted.position) as f64, -5.0, 5.0);
+    bench.set(0x6040, 0, 0x1F);
+    bench.run_ms(4000);
+    assert_within("position", bench.report().position as f64, 16_354.0, 16_414.0);
+}
+
+#[test]
+fn shutdown_and_disable_operation_ramp_first_or_switch_off_at_once_as_605bh_and_605ch_say() {
+    for (object, controlword, low_byte) in [(0x605B, 0x06, 0x31), (0x605C, 0x07, 0x33)] {
+        let mut bench = turning();
+        bench.set(0x6040, 0, controlword);
+        bench.run_ms(100);
+        assert_eq!(bench.statusword() & 0xFF, 0x37, "still ramping down");
+        let (seconds, _) = stop_of(&mut bench);
+        assert_within("seconds left of the ramp of 400 ms", seconds, 0.2, 0.35);
+        assert_eq!(bench.statusword() & 0xFF, low_byte);
+
+        let mut bench = turning();
+        bench.set(object, 0, 0);
+        bench.set(0x6040, 0, controlword);
+        assert_eq!(bench.statusword() & 0xFF, low_byte, "at once");
+        assert_coasts(&mut bench);
+    }
+}
+
+#[test]
+fn controlword_0_lets_the_motor_coast() {
+    let mut bench = turning();
+    bench.set(0x6040, 0, 0);
+    assert_eq!(bench.statusword() & 0xFF, 0x70);
+    assert_coasts(&mut bench);
+}
+
+#[track_caller]
+fn assert_coasts(bench: &mut Bench) {
+    let rad_s = bench.report().velocity_rpm * RAD_S_PER_RPM;
+    let seconds = bench.seconds_until(5.0, LOOK, |report| report.velocity_rpm.abs() < 0.01);
+    let expected_s = wheel::coasting_time_s(rad_s);
+    assert_within("seconds to stand by friction alone", seconds, expected_s * 0.98, expected_s * 1.02);
+}
+
+#[test]
+fn an_external_stop_holds_the_shaft_at_speed_zero_or_releases_it_as_202f_03_says() {
+    for (release, enabled_current) in [(0, true), (1, false)] {
+        let mut bench = turning();
+        bench.set(0x202F, 3, release);
+        bench.operate(|drive, now| drive.set_input(0, true, now)).expect("there is X0");
+        bench.run_ms(2);
+        assert_stops(&mut bench, Ramp::Time(0.4));
+        let statusword = bench.statusword();
+        assert_eq!(statusword & 0x80FF, 0x8037, "enabled, stopped from outside: {statusword:04X}h");
+        bench.operate(|drive, now| drive.set_load_torque(2.0, now)).expect("a load");
+        let held = bench.report().position;
+        bench.run_ms(1000);
+        let moved = (bench.report().position - held).abs();
+        assert_eq!(moved < 30, enabled_current, "moved {moved} counts with 202F:03 = {release}");
+    }
+}
+
+#[test]
+fn only_an_input_with_function_9_stops_and_2030_01_turns_its_level_over() {
+    let mut bench = turning();
+    bench.operate(|drive, now| drive.set_input(1, true, now)).expect("there is X1");
+    bench.run_ms(500);
+    assert_within("X1 has function 0", bench.report().velocity_rpm, RPM - 1.0, RPM + 1.0);
+    bench.set(0x2030, 3, 9);
+    bench.run_ms(800);
+    assert_within("X1 has function 9", bench.report().velocity_rpm, -0.5, 0.5);
+
+    let mut bench = turning();
+    bench.set(0x2030, 1, 1);
+    bench.run_ms(800);
+    assert_within("X0 is active low and not connected", bench.report().velocity_rpm, -0.5, 0.5);
+}
+
+#[test]
+fn a_silent_host_stops_the_motor_after_2000h_and_leaves_it_enabled_without_a_fault() {
+    let mut bench = turning();
+    bench.set(0x2000, 0, 500);
+    bench.run_ms(490);
+    assert_within("just before", bench.report().velocity_rpm, RPM - 1.0, RPM + 1.0);
+    bench.run_ms(20);
+    assert_stops(&mut bench, Ramp::Time(0.4));
+    assert_eq!((bench.statusword() & 0xFF, bench.get(0x603F, 0), bench.get(0x60FF, 0)), (0x37, 0, 0));
+    bench.set(0x60FF, 0, 60);
+    bench.run_ms(400);
+    let again = bench.get(0x606C, 0);
+    assert!(again > 100, "a new target is followed: {again}");
+}
+
+#[test]
+fn any_frame_to_the_node_keeps_the_watch_quiet_and_frames_to_others_do_not() {
+    for (frame, address, kept) in
+        [("604#4041600000000000", "SDO", true), ("605#4041600000000000", "another node", false)]
+    {
+        let mut bench = turning();
+        bench.set(0x2000, 0, 300);
+        for _ in 0..10 {
+            bench.run_ms(150);
+            bench.send(frame);
+        }
+        assert_eq!(bench.report().velocity_rpm > RPM - 1.0, kept, "{address}");
+    }
+}
+
+#[test]
+fn the_watch_is_on_as_delivered_with_1000_ms() {
+    let mut bench = Bench::new();
+    bench.set(0x6060, 0, 3);
+    bench.enable();
+    bench.set(0x60FF, 0, 60);
+    bench.run_ms(990);
+    assert!(bench.report().velocity_rpm > 59.0);
+    let stopped = bench.seconds_until(2.0, LOOK, |report| report.velocity_rpm < 1.0);
+    assert_within("seconds to stand, 10 ms and a ramp of 500 ms", stopped, 0.40, 0.55);
+}

@@ -1,0 +1,184 @@
+//! Profile torque (manual 4.4) and currents: slope, limits, overload, parking (5.2).
+
+use std::time::Duration;
+
+use crate::bench::{Bench, assert_within};
+use crate::wheel;
+
+const LOOK: Duration = Duration::from_millis(1);
+
+/// Enabled in profile torque with a blocked rotor and a slope in mA/s.
+///
+/// The shaft has turned before, so that the drive knows its angle by a Hall edge.
+fn stalled(slope_ma_s: i64) -> Bench {
+    let mut bench = Bench::open();
+    bench.enable_in(3);
+    bench.set(0x60FF, 0, 30);
+    bench.run_ms(1000);
+    bench.set(0x60FF, 0, 0);
+    bench.run_ms(1000);
+    bench.set(0x6060, 0, 4);
+    bench.motor().load.locked = true;
+    bench.set(0x6087, 0, slope_ma_s);
+    assert_eq!((bench.get(0x6061, 0), bench.statusword() & 0xFF), (4, 0x37));
+    bench
+}
+
+fn current_a(bench: &mut Bench) -> f64 {
+    bench.report().current_a
+}
+
+#[test]
+fn the_example_of_4_4_pulls_with_plus_and_minus_1000_ma() {
+    let mut bench = stalled(10_000);
+    for target in [1000, -1000] {
+        bench.set(0x6071, 0, target);
+        bench.run_ms(500);
+        assert_eq!(bench.get(0x6077, 0), target / 100, "6077h in 0.1 A");
+        assert_eq!(bench.get(0x6074, 0), target, "6074h in mA");
+        // The shaft's torque is 3/2 p psi a peak ampere.
+        let expected_nm = target as f64 * 1e-3 * wheel::torque_per_a();
+        assert_within("torque in N m", bench.motor().torque_nm, expected_nm - 0.02, expected_nm + 0.02);
+    }
+}
+
+#[test]
+fn the_current_rises_with_the_slope_of_6087h() {
+    for (slope_ma_s, from) in [(300, "the manual"), (2000, "a host")] {
+        let mut bench = stalled(slope_ma_s);
+        bench.set(0x6071, 0, 6000);
+        bench.run_ms(1999);
+        let expected_ma = 2.0 * slope_ma_s as f64;
+        let demand_ma = bench.get(0x6074, 0) as f64;
+        assert_within(&format!("6074h with the slope of {from}"), demand_ma, expected_ma - 5.0, expected_ma + 5.0);
+        assert_within("current in A", current_a(&mut bench) * 1e3, expected_ma - 25.0, expected_ma + 25.0);
+    }
+}
+
+#[test]
+fn the_slope_as_delivered_is_300_ma_a_second() {
+    let mut bench = Bench::open();
+    bench.motor().load.locked = true;
+    bench.enable_in(4);
+    bench.set(0x6071, 0, 3000);
+    bench.run_ms(1000);
+    assert_within("6074h after 1 s", bench.get(0x6074, 0) as f64, 295.0, 305.0);
+}
+
+#[test]
+fn a_stalled_motor_carries_the_current_that_is_asked_for_but_no_more_than_2015h() {
+    for (limit, expected_a) in [(300, 20.0), (150, 15.0), (50, 5.0)] {
+        let mut bench = stalled(0);
+        bench.set(0x2015, 0, limit);
+        bench.set(0x6071, 0, 20_000);
+        bench.run_ms(300);
+        assert_within("stall current", current_a(&mut bench), expected_a * 0.99, expected_a * 1.01);
+        let torque_nm = bench.motor().torque_nm;
+        let expected_nm = expected_a * wheel::torque_per_a();
+        assert_within("stall torque", torque_nm, expected_nm * 0.99, expected_nm * 1.01);
+    }
+}
+
+/// Until the first Hall edge the drive takes the middle of the Hall sensors' sector for the angle, up to 30 degrees off.
+#[test]
+fn before_the_shaft_has_turned_a_sixth_of_its_torque_may_be_missing() {
+    let mut bench = Bench::open();
+    bench.motor().load.locked = true;
+    bench.set(0x6087, 0, 0);
+    bench.enable_in(4);
+    bench.set(0x6071, 0, 10_000);
+    bench.run_ms(300);
+    let full_nm = 10.0 * wheel::torque_per_a();
+    assert_within("torque", bench.motor().torque_nm, full_nm * 30_f64.to_radians().cos() * 0.99, full_nm * 1.01);
+}
+
+/// A stall takes all its power as heat: 3/2 R i^2 for the peak current i.
+#[test]
+fn a_stalled_motor_draws_only_what_its_resistance_turns_into_heat() {
+    let mut bench = stalled(0);
+    bench.set(0x6071, 0, 10_000);
+    bench.run_ms(200);
+    let before = bench.motor().energy;
+    bench.run_ms(1000);
+    let after = bench.motor().energy;
+    let heat_w = after.winding_j + after.switches_j - before.winding_j - before.switches_j;
+    let expected_w = 1.5 * wheel::phase_ohm() * 100.0;
+    assert_within("heat in W", heat_w, expected_w * 0.99, expected_w * 1.01);
+    let source_w = after.source_j - before.source_j;
+    assert_within("power from the source in W", source_w, heat_w + 2.9, heat_w + 3.1);
+}
+
+/// The note below the object table: once the rated current for 20 s, twice for 6 s, three times for 4 s.
+#[test]
+fn with_overload_handling_on_the_motor_bears_its_multiples_as_long_as_the_note_says() {
+    for (multiple, expected_s) in [(1.0, 20.0), (2.0, 6.0), (3.0, 4.0)] {
+        let mut bench = stalled(0);
+        bench.set(0x202F, 2, 1);
+        bench.set(0x2014, 0, 50);
+        bench.set(0x2012, 0, 100);
+        bench.set(0x6071, 0, (multiple * 5000.0) as i64);
+        let seconds = bench.seconds_until(30.0, LOOK, |report| report.error_code != 0);
+        assert_within(&format!("{multiple} times"), seconds, expected_s * 0.97, expected_s * 1.03);
+        assert_eq!((bench.get(0x603F, 0), bench.get(0x1001, 0)), (0x0008, 0x03), "overload: generic and current");
+    }
+}
+
+#[test]
+fn as_delivered_twice_the_rated_current_lasts_for_2016h() {
+    for (time, expected_s) in [(300, 3.0), (100, 1.0)] {
+        let mut bench = stalled(0);
+        bench.set(0x2014, 0, 80);
+        bench.set(0x2016, 0, time);
+        bench.set(0x6071, 0, 16_000);
+        let seconds = bench.seconds_until(5.0, LOOK, |report| report.error_code != 0);
+        assert_within("seconds", seconds, expected_s * 0.98, expected_s + 0.05);
+    }
+}
+
+#[test]
+fn less_than_the_overload_factor_is_borne_for_ever() {
+    let mut bench = stalled(0);
+    bench.set(0x2014, 0, 50);
+    bench.set(0x6071, 0, 9500);
+    bench.run_ms(20_000);
+    assert_eq!(bench.get(0x603F, 0), 0, "1.9 times of a factor of 200 %");
+}
+
+#[test]
+fn parking_holds_the_current_to_3_a_and_its_end_gives_it_back() {
+    let mut bench = stalled(0);
+    bench.set(0x6071, 0, 8000);
+    bench.set(0x202F, 4, 1);
+    bench.run_ms(200);
+    assert_within("parked", current_a(&mut bench), 2.9, 3.05);
+    bench.set(0x202F, 4, 0);
+    bench.run_ms(200);
+    assert_within("not parked", current_a(&mut bench), 7.9, 8.1);
+}
+
+#[test]
+fn a_free_wheel_in_torque_mode_accelerates_with_torque_over_inertia() {
+    let mut bench = Bench::open();
+    bench.motor().load.inertia_kg_m2 = 0.05;
+    bench.set(0x6087, 0, 0);
+    bench.enable_in(4);
+    bench.set(0x6071, 0, 2000);
+    bench.run_ms(100);
+    let first = bench.motor().rotor.velocity_rad_s;
+    bench.run_ms(200);
+    let gained = bench.motor().rotor.velocity_rad_s - first;
+    let mean = first + gained / 2.0;
+    let expected = 0.2 * (2.0 * wheel::torque_per_a() - wheel::friction_nm(mean)) / (wheel::inertia_kg_m2() + 0.05);
+    assert_within("rad/s gained in 0.2 s", gained, expected * 0.98, expected * 1.02);
+}
+
+#[test]
+fn in_torque_mode_the_speed_stays_below_200ah() {
+    let mut bench = Bench::new();
+    bench.set(0x200A, 0, 60);
+    bench.set(0x6087, 0, 0);
+    bench.enable_in(4);
+    bench.set(0x6071, 0, 5000);
+    bench.run_ms(3000);
+    assert_within("speed", bench.report().velocity_rpm, 50.0, 61.0);
+}
