@@ -6,9 +6,9 @@
 //!
 //! | object | delivered | one count | gives | because |
 //! |---|---|---|---|---|
-//! | 60F9h:01 | 3000 | 1/30 mA/(rad/s) | 0.1 A/(rad/s) | velocity bandwidth kp Kt/J of 216 and 114 rad/s: a tenth of the current loop's |
-//! | 60F9h:02 | 100 | 1 ms | 0.1 s | printed as a time; 2000 is none at all ("cancel integration") |
-//! | 60FBh:01 | 3000 | 0.01 1/s | 30 1/s | a quarter of the slower velocity loop |
+//! | 60F9h:01 | 3000 | 1/15 mA/(rad/s) | 0.2 A/(rad/s) | velocity bandwidth kp Kt/J of 430 and 230 rad/s: a fifth of the current loop's or less |
+//! | 60F9h:02 | 30 | 1 ms | 30 ms | printed as a time; seven and more of the loop's own. 2000 is none at all ("cancel integration") |
+//! | 60FBh:01 | 3000 | 0.015 1/s | 45 1/s | a fifth of the slower velocity loop |
 //! | 60FBh:02 | 0 | 1/327 V at 1000 r/min | 0 V | printed; added to the motor's voltage. Its 12 V reach over the 10.4 V of the M4230's own |
 
 use motion::cascade::CascadeGains;
@@ -23,8 +23,8 @@ use super::readings::{CONTROL_PERIOD_S, SUPERVISION_PERIOD_S, VELOCITY_FILTER_S}
 use crate::engine::servo::ServoGains;
 use crate::engine::tracking::TrackingGains;
 
-const VELOCITY_KP_A_PER_RAD_S: f32 = 0.1 / 3000.0;
-const POSITION_KP_PER_S: f32 = 0.01;
+const VELOCITY_KP_A_PER_RAD_S: f32 = 0.2 / 3000.0;
+const POSITION_KP_PER_S: f32 = 0.015;
 
 /// Value of 60F9h:02 that switches integration off ("Disk load").
 const NO_INTEGRATION_MS: u16 = 2000;
@@ -57,7 +57,8 @@ pub(super) fn gains(values: &Values, model: &Model) -> ServoGains {
             // "Following zero hysteresis": no lag behind a planned motion.
             velocity_feed_forward: 1.0,
             velocity: velocity_loop(values),
-            acceleration_feed_forward: 0.0,
+            // No object holds it: the joint knows its own motor.
+            acceleration_feed_forward: model.acceleration_a_s2,
             friction_feed_forward: 0.0,
             velocity_limit_rad_s: model.max_rpm as f32 * core::f32::consts::TAU / 60.0,
         },

@@ -37,7 +37,7 @@ pub const NO_RAMP_FROM: u32 = 60_000;
 pub const VELOCITY_KP: i64 = 3000;
 
 /// 60F9h:02 as delivered: see [`gains`](super::gains).
-pub const VELOCITY_INTEGRAL_TIME_MS: i64 = 100;
+pub const VELOCITY_INTEGRAL_TIME_MS: i64 = 30;
 
 /// 60FBh:01 as delivered: what the manual gives for a stiff load ("Wire rod load"). Its ones digit is even.
 pub const POSITION_KP: i64 = 3000;
@@ -80,7 +80,7 @@ pub const VELOCITY_WINDOW_S: f32 = 0.5e-3;
 pub const VELOCITY_STANDSTILL_S: f32 = 20e-3;
 
 /// Time constant of the measured velocity: a tenth of the velocity loop's own, and four noisy samples.
-pub const VELOCITY_FILTER_S: f32 = 0.5e-3;
+pub const VELOCITY_FILTER_S: f32 = 0.2e-3;
 
 /// Time constant of what 606Ch and 6078h show: a host sees the mean of its cycle, not one sample.
 pub const DISPLAY_FILTER_S: f32 = 5e-3;
