@@ -10,7 +10,7 @@ use sim::{VirtualDrive, World};
 
 use crate::failure::Failure;
 use crate::machine_file;
-use crate::models::{DriveProfile, MODELS};
+use crate::models::{DriveProfile, EMBEDDED};
 
 /// Decides everything random on the embedded bus: runs are repeatable.
 pub(crate) const SEED: u64 = 1;
@@ -24,7 +24,8 @@ const SETTLING_TIME: Duration = Duration::from_millis(200);
 /// A world with drives, and which they are.
 pub(crate) type Embedded = (World, Vec<(NodeId, &'static DriveProfile)>);
 
-/// The world that `--bus sim` or `--bus sim:FILE.toml` means: one drive of each model, each at the node-ID as delivered,
+/// The world that `--bus sim` or `--bus sim:FILE.toml` means: the drives of [`EMBEDDED`], each at its node-ID as
+/// delivered,
 /// or what the file says.
 pub(crate) fn world(file: Option<&Path>) -> Result<Embedded, Failure> {
     if let Some(path) = file {
@@ -32,7 +33,7 @@ pub(crate) fn world(file: Option<&Path>) -> Result<Embedded, Failure> {
     }
     let mut world = World::new(Bitrate::K500, SEED);
     let mut drives = Vec::new();
-    for model in MODELS {
+    for model in EMBEDDED.iter().copied() {
         let node = NodeId::new(model.node_id).unwrap_or(NodeId::MIN);
         let drive = virtual_drive(model, node, world.bitrate())?;
         world.add_drive(node.raw(), drive).map_err(|error| Failure::new(error.to_string()))?;
@@ -87,8 +88,8 @@ mod tests {
 
     #[test]
     fn a_bit_rate_that_the_drive_does_not_know_is_refused_with_those_it_knows() {
-        assert_eq!(baud_rate(MODELS[0], CAN_BAUD_RATE, Bitrate::K125).ok(), Some(3));
-        let refusal = baud_rate(MODELS[0], CAN_BAUD_RATE, Bitrate::K50).err().map(|failure| failure.to_string());
+        assert_eq!(baud_rate(EMBEDDED[0], CAN_BAUD_RATE, Bitrate::K125).ok(), Some(3));
+        let refusal = baud_rate(EMBEDDED[0], CAN_BAUD_RATE, Bitrate::K50).err().map(|failure| failure.to_string());
         assert!(refusal.is_some_and(|text| text.contains("cannot run at 50k") && text.contains("100 kbit/s")));
     }
 }

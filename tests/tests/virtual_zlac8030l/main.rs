@@ -6,12 +6,15 @@
 
 mod bench;
 mod datagrams;
+mod determinism;
 mod energy;
 mod holding;
+mod network;
 mod objects;
 mod position;
 mod power_state;
 mod stopping;
 mod torque;
+mod traps;
 mod velocity;
 mod wheel;
