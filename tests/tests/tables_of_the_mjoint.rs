@@ -73,9 +73,7 @@ fn the_modbus_addresses_are_the_manuals() {
     manual.sort_unstable();
     let ours: Vec<_> = REGISTERS
         .iter()
-        .map(|register| {
-            (register.address, register.object.index, register.object.sub_index, u16::from(register.words))
-        })
+        .map(|register| (register.address, register.object.index, register.object.sub_index, u16::from(register.words)))
         .collect();
     assert_eq!(ours, manual);
 }

@@ -50,7 +50,10 @@ pub(crate) fn virtual_drive(
 ) -> Result<Box<dyn VirtualDrive>, Failure> {
     match model.model {
         "zlac8030l" => Ok(Box::new(sim::machine::zlac8030l(node.raw(), baud_rate(model, CAN_BAUD_RATE, bitrate)?))),
-        _ => Err(Failure::new(format!("there is no virtual {}", model.model))),
+        name => match drives::mjoint::Model::named(name) {
+            Some(joint) => Ok(Box::new(sim::machine::mjoint(joint, node.raw(), bitrate))),
+            None => Err(Failure::new(format!("there is no virtual {}", model.model))),
+        },
     }
 }
 

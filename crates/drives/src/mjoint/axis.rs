@@ -220,9 +220,7 @@ impl Axis {
     /// Where a new plan begins: on the old one, unless the old one gave no position.
     fn departure(&self) -> TrajectoryPoint {
         match self.task {
-            Task::Speed { .. } => {
-                TrajectoryPoint::moving(self.feedback.position, self.trajectory.point().velocity)
-            }
+            Task::Speed { .. } => TrajectoryPoint::moving(self.feedback.position, self.trajectory.point().velocity),
             Task::Interpolate(interpolation) => interpolation.point(),
             Task::Hold | Task::Move { .. } | Task::Follow { .. } => self.trajectory.point(),
         }

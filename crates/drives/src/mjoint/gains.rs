@@ -42,8 +42,7 @@ pub const MODULATION_LIMIT: f32 = 0.98;
 pub(super) fn gains(values: &Values, model: &Model) -> ServoGains {
     let current = PiGains::for_winding(CURRENT_BANDWIDTH_RAD_S, model.resistance_ohm, model.inductance_h);
     let none = LowPassGains::from_time_constant(0.0, SUPERVISION_PERIOD_S);
-    let flux_linkage_wb =
-        f32::from(values.get(VELOCITY_FEED_FORWARD)) * FEED_FORWARD_V_S / f32::from(model.pole_pairs);
+    let flux_linkage_wb = f32::from(values.get(VELOCITY_FEED_FORWARD)) * FEED_FORWARD_V_S / f32::from(model.pole_pairs);
     ServoGains {
         foc: FocGains {
             d: current,

@@ -28,6 +28,12 @@ impl Model {
     pub const M8025E25B50: Self = Self { name: "m8025e25b50", ratio: 50.0, ..M8025 };
     /// 85 N·m, 0 to 18 r/min.
     pub const M8025E25B80: Self = Self { name: "m8025e25b80", ratio: 80.0, ..M8025 };
+
+    /// The model of this name, in any case of letters.
+    pub fn named(name: &str) -> Option<&'static Self> {
+        static ALL: [Model; 4] = [Model::M4230E17B50, Model::M4230E17B80, Model::M8025E25B50, Model::M8025E25B80];
+        ALL.iter().find(|model| model.name.eq_ignore_ascii_case(name))
+    }
 }
 
 const M4230: Model = Model {

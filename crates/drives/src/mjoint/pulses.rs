@@ -28,7 +28,7 @@ pub struct PulseParameters {
     pub denominator: u16,
     /// Ones digit of 60F9h:01 is odd: a pulse counts when PU begins to conduct, else when it ends.
     pub at_conduction: bool,
-    /// 2609h: a conducting DIR turns the shaft clockwise, which is negative; else counter-clockwise.
+    /// 2609h: the shaft turns clockwise, which is positive, while DIR conducts (1) or while it does not (0).
     pub dir_is_clockwise: bool,
 }
 
@@ -67,17 +67,17 @@ impl Pulses {
 }
 
 impl PulseParameters {
-    /// Positive is counter-clockwise, seen on the shaft. The timers count down while DIR conducts. An encoder's sense is
-    /// its own: PU ahead of DIR is positive.
+    /// Which way is positive is not printed: clockwise is taken, so that a joint as delivered turns forward while DIR is
+    /// not wired. The timers count down while DIR conducts. An encoder's sense is its own: PU ahead of DIR is positive.
     fn sense(&self) -> i64 {
-        if self.function == Function::EncoderFollowing || self.dir_is_clockwise { 1 } else { -1 }
+        if self.function == Function::EncoderFollowing || !self.dir_is_clockwise { 1 } else { -1 }
     }
 
     /// Speed in r/min that a duty cycle asks for: 10 % to 90 % are 0 to 1000 r/min.
     pub fn duty_speed_rpm(&self, input: &PulseInput, dir: bool) -> f64 {
         let duty = input.duty.unwrap_or(0.0).clamp(DUTY_ZERO, DUTY_FULL);
         let rpm = f64::from((duty - DUTY_ZERO) / (DUTY_FULL - DUTY_ZERO)) * DUTY_FULL_RPM;
-        if dir == self.dir_is_clockwise { -rpm } else { rpm }
+        if dir == self.dir_is_clockwise { rpm } else { -rpm }
     }
 }
 
@@ -90,7 +90,7 @@ mod tests {
         numerator: 32768,
         denominator: 8192,
         at_conduction: false,
-        dir_is_clockwise: true,
+        dir_is_clockwise: false,
     };
 
     fn total(parameters: &PulseParameters, steps: impl Iterator<Item = PulseInput>) -> i64 {
@@ -117,7 +117,7 @@ mod tests {
 
     #[test]
     fn dir_polarity_turns_pulses_around_and_an_encoder_has_its_own_sense() {
-        let reversed = PulseParameters { dir_is_clockwise: false, ..PARAMETERS };
+        let reversed = PulseParameters { dir_is_clockwise: true, ..PARAMETERS };
         assert_eq!(total(&reversed, falls(8192, 4)), -32768);
         for dir_is_clockwise in [false, true] {
             let function = Function::EncoderFollowing;

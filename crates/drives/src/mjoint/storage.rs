@@ -35,7 +35,8 @@ impl Image {
         let mut contents = values.clone();
         let address = u8::try_from(values.get(DEVICE_ADDRESS)).ok().and_then(NodeId::new).unwrap_or(node_id);
         for (slot, row) in TABLE.iter() {
-            let own = matches!(row.default, Default::NodeIdPlus(base) if values.raw(slot) == base + u32::from(node_id.raw()));
+            let own =
+                matches!(row.default, Default::NodeIdPlus(base) if values.raw(slot) == base + u32::from(node_id.raw()));
             if own {
                 contents.restore_default(slot, address);
             }
