@@ -15,5 +15,6 @@ pub mod mjoint;
 pub mod profile;
 mod row;
 pub mod zlac8030l;
+pub mod zlim42c;
 
 pub use firmware::{Firmware, Report};

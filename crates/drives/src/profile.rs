@@ -9,11 +9,18 @@ use canopen::od::Table;
 use cia402::ModeOfOperation;
 
 use crate::engine::faults::FaultRow;
-use crate::{mjoint, zlac8030l};
+use crate::{mjoint, zlac8030l, zlim42c};
 
 /// All models.
-pub static MODELS: [&DriveProfile; 5] =
-    [&zlac8030l::PROFILE, &mjoint::M4230E17B50, &mjoint::M4230E17B80, &mjoint::M8025E25B50, &mjoint::M8025E25B80];
+pub static MODELS: [&DriveProfile; 7] = [
+    &zlac8030l::PROFILE,
+    &mjoint::M4230E17B50,
+    &mjoint::M4230E17B80,
+    &mjoint::M8025E25B50,
+    &mjoint::M8025E25B80,
+    &zlim42c::PROFILE,
+    &zlim42c::PROFILE_82,
+];
 
 /// The model of this name (`zlac8030l`), in any case of letters.
 pub fn model(name: &str) -> Option<&'static DriveProfile> {
@@ -133,6 +140,15 @@ pub enum CountsPerTurn {
         /// Its factory value.
         default: u32,
     },
+    /// The value of an object is the place in a table.
+    Table {
+        /// Where it is.
+        object: Mux,
+        /// Counts per turn by value.
+        counts: &'static [u16],
+        /// Its factory value.
+        default: u32,
+    },
 }
 
 /// How acceleration and deceleration are given.
@@ -235,8 +251,18 @@ pub enum Quirk {
     VersionsAreNumbers,
     /// Bit 13 of the statusword in profile position is 1 when in position, the reverse of a following error.
     InPositionInBit13,
+    /// Statusword bit 15 in profile position is 1 when in position.
+    InPositionInBit15,
     /// Statusword bit 7 is set in fault.
     WarningBitInFault,
+    /// Nothing measures the rotor: actual position and velocity are the commanded ones, and a stall goes unnoticed.
+    NoPositionSensor,
+    /// The motor is energised from Switched on, not only in Operation enabled.
+    EnergisedWhenSwitchedOn,
+    /// Homing attained is statusword bit 8; bits 12 and 13 tell nothing of homing. Failed: 8 off, 10 on, 14 off.
+    HomingAttainedInBit8,
+    /// 2009h is the bit rate, where the model of the same identity stores its parameters.
+    BitRateWhereSiblingSaves,
     /// A watch over the host stops the motor when no frame comes for a time, as delivered.
     HostWatchdogOnByDefault,
     /// The brake output is never moved by the drive itself.
@@ -281,6 +307,15 @@ impl Quirk {
             Self::SubIndexZeroIsUnsigned16 => "sub-index 00h of the maker's records is UNSIGNED16",
             Self::VersionsAreNumbers => "1009h and 100Ah are numbers, not texts",
             Self::InPositionInBit13 => "statusword bit 13 in profile position is 1 when in position",
+            Self::InPositionInBit15 => "statusword bit 15 in profile position is 1 when in position",
+            Self::NoPositionSensor => {
+                "6064h and 606Ch are commanded values: nothing measures the rotor, a stall is not seen"
+            }
+            Self::EnergisedWhenSwitchedOn => "the motor is energised from switched on",
+            Self::HomingAttainedInBit8 => "homing attained is statusword bit 8; failed is bit 8 off, 10 on, 14 off",
+            Self::BitRateWhereSiblingSaves => {
+                "2009h is the bit rate; the ZLAC8030L, of the same identity, saves with it"
+            }
             Self::WarningBitInFault => "statusword bit 7 is set in fault",
             Self::HostWatchdogOnByDefault => {
                 "the motor stops when no frame for the drive comes for a time (2000h, 1 s)"

@@ -233,6 +233,8 @@ pub struct Report {
     pub error_code: u32,
     /// Actual position in the drive's counts.
     pub position: i64,
+    /// Where the rotor truly is in the drive's counts, of a drive that does not measure it.
+    pub rotor_position: Option<i64>,
     /// Position demand in the drive's counts, where a mode has one.
     pub position_demand: Option<i64>,
     /// True speed of the motor shaft in r/min.

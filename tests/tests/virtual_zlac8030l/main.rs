@@ -5,6 +5,7 @@
 //! form. One file for each subject; [`bench`] is the table they all work at.
 
 mod bench;
+mod communication;
 mod datagrams;
 mod determinism;
 mod energy;
@@ -13,7 +14,9 @@ mod network;
 mod objects;
 mod position;
 mod power_state;
+mod robustness;
 mod stopping;
+mod terminals;
 mod torque;
 mod traps;
 mod velocity;

@@ -17,6 +17,12 @@ impl Drive {
             CountsPerTurn::Object { object, factor, .. } => {
                 Ok(self.read_number(object).await? as f64 * f64::from(factor))
             }
+            CountsPerTurn::Table { object, counts, default } => {
+                let place = usize::try_from(self.read_number(object).await?).ok();
+                // A value beyond the table: the drive's own table refuses it, so it is as delivered.
+                let known = place.and_then(|place| counts.get(place)).or(counts.get(default as usize));
+                Ok(known.copied().map_or(1.0, f64::from))
+            }
         }
     }
 

@@ -98,6 +98,8 @@ struct Got<'a> {
     model: &'a str,
     powered: bool,
     position: i64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rotor_position: Option<i64>,
     velocity_rpm: f64,
     current_a: f64,
     supply_v: f64,
@@ -129,6 +131,7 @@ fn get(world: &mut World, number: u8, id: StationId) -> Result<String, CommandEr
         model,
         powered,
         position,
+        rotor_position: report.rotor_position,
         velocity_rpm,
         current_a,
         supply_v,

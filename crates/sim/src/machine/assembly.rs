@@ -37,8 +37,14 @@ pub trait Assembly: Clone + Send + 'static {
     /// Whether the voltage is enough for the firmware to run on (`running`), or to start.
     fn supplies_firmware(&self, running: bool) -> bool;
 
-    /// Where the motor shaft truly is, in counts of the drive's size, from an arbitrary zero.
+    /// Where the motor shaft truly is, in counts of a fixed size, from an arbitrary zero.
     fn shaft_counts(&self) -> i64;
+
+    /// How many of those are one count of the drive as it is set now.
+    fn shaft_counts_per_count(&self, firmware: &Self::Firmware) -> i64 {
+        let _ = firmware;
+        1
+    }
 
     /// The drive counts against the shaft's own direction.
     fn counts_reversed(&self, firmware: &Self::Firmware) -> bool;

@@ -10,6 +10,7 @@ mod mjoint;
 mod pulse_source;
 mod switch;
 mod zlac8030l;
+mod zlim42c;
 
 use can::{Bitrate, Frame, Instant, Station};
 use drives::Firmware;
@@ -17,6 +18,7 @@ use drives::Firmware;
 pub use assembly::Assembly;
 pub use mjoint::{Joint, MJointMachine, mjoint};
 pub use zlac8030l::{HubWheel, Zlac8030lMachine, zlac8030l};
+pub use zlim42c::{Stepper, Zlim42c82Machine, Zlim42cMachine, zlim42c, zlim42c_82};
 
 use crate::{Component, PulseTrain, Refused, Report, SwitchRange, TemperatureSensor, VirtualDrive};
 use switch::Input;
@@ -192,9 +194,10 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
     fn set_switch(&mut self, input: usize, range: SwitchRange, now: Instant) -> Result<(), Refused> {
         self.advance(now);
         let shaft = self.assembly.shaft_counts();
+        let scale = self.assembly.shaft_counts_per_count(&self.firmware);
         let position = i64::from(self.firmware.report().position_counts);
         let reversed = self.assembly.counts_reversed(&self.firmware);
-        *self.input(input)? = Input::switch(range, position, shaft, reversed);
+        *self.input(input)? = Input::switch(range, position, shaft, scale, reversed);
         Ok(())
     }
 

@@ -129,6 +129,7 @@ impl Assembly for HubWheel {
             statusword: running.then(|| firmware.values().get(objects::STATUSWORD)),
             error_code: u32::from(own.fault_code),
             position: i64::from(own.position_counts),
+            rotor_position: None,
             position_demand: demand.position,
             velocity_rpm: direction(self, firmware) * rotor.velocity_rad_s * RPM_PER_RAD_S,
             velocity_demand_rpm: demand.velocity_rpm,
