@@ -58,7 +58,10 @@ pub(crate) fn virtual_drive(
             let (node, rate) = (zlim_node(model, node)?, baud_rate(model, ZLIM_BAUD_RATE, bitrate)?);
             Ok(Box::new(sim::machine::zlim42c_82(node, rate)))
         }
-        _ => Err(Failure::new(format!("there is no virtual {}", model.model))),
+        name => match drives::mjoint::Model::named(name) {
+            Some(joint) => Ok(Box::new(sim::machine::mjoint(joint, node.raw(), bitrate))),
+            None => Err(Failure::new(format!("there is no virtual {}", model.model))),
+        },
     }
 }
 

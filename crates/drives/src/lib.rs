@@ -11,6 +11,7 @@ extern crate std;
 
 pub mod engine;
 mod firmware;
+pub mod mjoint;
 pub mod profile;
 mod row;
 pub mod zlac8030l;

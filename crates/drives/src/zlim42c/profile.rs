@@ -31,7 +31,7 @@ const fn profile(model: &'static str, title: &'static str) -> DriveProfile {
         units: UNITS,
         storage: ParameterStorage {
             save: Write { object: Mux::new(0x2010, 0), value: 2 },
-            restore: Write { object: Mux::new(0x2010, 0), value: 1 },
+            restore: Some(Write { object: Mux::new(0x2010, 0), value: 1 }),
             save_on_write: Some((Write { object: Mux::new(0x200C, 0), value: 0 }, true)),
             effective_after_restart: RESTART,
         },

@@ -46,6 +46,7 @@ fn act(drive: &mut dyn VirtualDrive, action: &Action, now: Instant) -> Result<()
         Action::Temperature(sensor, celsius) => drive.hold_temperature(*sensor, *celsius, now)?,
         Action::Fault(component, broken) => drive.set_fault(*component, *broken, now)?,
         Action::Battery(connected) => drive.set_battery(*connected, now)?,
+        Action::Pulses(train) => drive.set_pulses(*train, now)?,
         // The cable, the power cycle and the report are the world's.
         Action::CableCut(_) | Action::PowerCycle | Action::Get => {}
     }

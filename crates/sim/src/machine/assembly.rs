@@ -1,6 +1,6 @@
 use drives::Firmware;
 
-use crate::{Component, Refused, Report, TemperatureSensor};
+use crate::{Component, PulseTrain, Refused, Report, TemperatureSensor};
 
 /// One model's hardware: motor, load, supply, sensors, and the memory chip that outlives power.
 ///
@@ -13,6 +13,11 @@ pub trait Assembly: Clone + Send + 'static {
     const MODEL: &'static str;
     /// Names of the digital inputs.
     const INPUTS: &'static [&'static str];
+
+    /// The model's name as users type it, where one assembly serves several.
+    fn model(&self) -> &'static str {
+        Self::MODEL
+    }
 
     /// What the firmware finds when it wakes.
     fn hardware(&self) -> <Self::Firmware as Firmware>::Hardware;
@@ -71,7 +76,13 @@ pub trait Assembly: Clone + Send + 'static {
     /// Connects or disconnects the multi-turn battery, where there is one.
     fn set_battery(&mut self, connected: bool) -> Result<(), Refused> {
         let _ = connected;
-        Err(Refused::Absent { model: Self::MODEL, what: "battery" })
+        Err(Refused::Absent { model: self.model(), what: "battery" })
+    }
+
+    /// Sends pulses to the inputs, where the drive counts them.
+    fn set_pulses(&mut self, train: PulseTrain) -> Result<(), Refused> {
+        let _ = train;
+        Err(Refused::Absent { model: self.model(), what: "pulse input" })
     }
 }
 

@@ -92,6 +92,7 @@ impl Assembly for HubWheel {
         let sensed = self.motor.sense();
         Sensors {
             encoder_count: sensed.encoder_count,
+            encoder_wired: self.motor.encoder.fault != EncoderFault::Disconnected,
             hall: sensed.hall,
             phase_current_a: [sensed.phase_current_a[0] as f32, sensed.phase_current_a[1] as f32],
             bus_v: sensed.bus_v as f32,
