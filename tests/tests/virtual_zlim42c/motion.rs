@@ -84,14 +84,14 @@ fn half_way_in_time_an_s_shaped_ramp_is_half_way_in_speed() {
 #[test]
 fn no_speed_is_above_200_000_steps_a_second() {
     // 2.1: 468 r/min at 25600 pulses a turn, and 1875 r/min at 6400.
-    for (setting, pulses_per_turn) in [(7, 25_600.0), (5, 6_400.0)] {
+    for (setting, pulses_per_turn) in [(7, 25_600.0_f64), (5, 6_400.0)] {
         let mut bench = Bench::new();
         bench.set(0x2006, 0, setting);
         bench.set(0x6083, 0, 1000);
         bench.enable_in(3);
         bench.set(0x60FF, 0, 3000);
         bench.run_ms(1100);
-        assert_eq!(bench.get(0x606C, 0), (200_000.0 * 60.0 / pulses_per_turn as f64).round() as i64);
+        assert_eq!(bench.get(0x606C, 0), (200_000.0 * 60.0 / pulses_per_turn).round() as i64);
         let before = bench.report().position;
         bench.run_ms(1000);
         assert_eq!(bench.report().position - before, 200_000);
