@@ -183,6 +183,8 @@ impl Server {
         }
     }
 
+    // Inlined, the payload stays in registers.
+    #[inline(always)]
     fn initiate_download(&mut self, mux: Mux, payload: Payload, table: &Table, now: Instant) -> Option<Write> {
         self.end();
         let (slot, size) = match writable(mux, table) {
@@ -205,15 +207,21 @@ impl Server {
                 Some(Write { slot, raw: u32::from_le_bytes(bytes), mux, confirm: Confirm::Expedited })
             }
             Payload::Segmented { size: declared } => {
-                let bytes = [0; MAX_EXPEDITED];
-                self.transfer = Transfer::Download { mux, slot, declared, bytes, length: 0, toggle: false };
-                self.restart_timeout(now);
-                self.answer(Reply::InitiateDownload(mux));
+                self.begin_download(mux, slot, declared, now);
                 None
             }
         }
     }
 
+    #[inline(never)]
+    fn begin_download(&mut self, mux: Mux, slot: Slot, declared: Option<u32>, now: Instant) {
+        let bytes = [0; MAX_EXPEDITED];
+        self.transfer = Transfer::Download { mux, slot, declared, bytes, length: 0, toggle: false };
+        self.restart_timeout(now);
+        self.answer(Reply::InitiateDownload(mux));
+    }
+
+    #[inline(never)]
     fn download_segment(&mut self, segment: Segment, table: &Table, now: Instant) -> Option<Write> {
         let Transfer::Download { mux, slot, declared, bytes, length, toggle } = &mut self.transfer else {
             self.unexpected();
