@@ -5,9 +5,13 @@
 //! package and by the fuzz targets, with the same meaning.
 
 pub mod csv;
+pub mod homing;
 pub mod laws;
+pub mod manual;
+pub mod mjoint;
 pub mod seeded;
 pub mod zlac8030l;
+pub mod zlim42c;
 
 /// The README's Rust, compiled and run.
 #[cfg(doctest)]

@@ -24,6 +24,7 @@ pub(crate) struct Cli {
 
 /// What every command takes.
 #[derive(Clone, clap::Args)]
+#[command(next_help_heading = "On every command")]
 pub(crate) struct Global {
     /// The bus: sim, sim:FILE.toml, can0, socketcand://HOST:PORT/can0, slcan:///dev/ttyACM0?bitrate=500k,
     /// slcan://HOST:PORT, log:FILE

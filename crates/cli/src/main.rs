@@ -30,7 +30,7 @@ use clap::{ArgMatches, CommandFactory, FromArgMatches};
 use crate::args::{Cli, Command, Global};
 use crate::command::objects::Whose;
 use crate::context::Context;
-use crate::failure::Failure;
+use crate::failure::{Failure, Status};
 use crate::output::{Format, Report};
 use crate::paint::Paint;
 
@@ -44,12 +44,20 @@ fn main() -> ExitCode {
     match run(&cli.global, format, &cli.command, typed_bus(&matches)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            let error = Paint::for_stream(&io::stderr()).bad("error:");
-            // Nobody may be listening any more; the exit status still tells.
-            let _ = writeln!(io::stderr(), "{error} {failure}");
+            complain(&failure);
             ExitCode::from(failure.status as u8)
         }
     }
+}
+
+/// Says on standard error why. Who pressed Ctrl-C knows, unless there is more to tell.
+fn complain(failure: &Failure) {
+    if failure.status == Status::Interrupted && failure.because.is_empty() {
+        return;
+    }
+    let error = Paint::for_stream(&io::stderr()).bad("error:");
+    // Nobody may be listening any more; the exit status still tells.
+    let _ = writeln!(io::stderr(), "{error} {failure}");
 }
 
 /// True if the bus was given on the command line, not by the environment.

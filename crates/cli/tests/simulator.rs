@@ -64,7 +64,9 @@ fn commands_reach_it_over_socketcand_and_slcan() {
     let mut simulator = simulator(&[]);
     for protocol in ["socketcand", "slcan"] {
         let bus = simulator.bus(protocol);
-        let on = |arguments: &[&str]| done(&[&["--bus", &bus, "--json"], arguments].concat()).json();
+        let on = |arguments: &[&str]| {
+            done(&[&["--bus", &bus, "--model", "4=zlac8030l", "--json"], arguments].concat()).json()
+        };
         assert_eq!(on(&["scan"])["nodes"][0]["node"], 4);
         assert_eq!(on(&["write", "4", "2002", "50"])["value"], 50);
         assert_eq!(on(&["read", "4", "in_position_threshold"])["value"], 50);
@@ -75,6 +77,32 @@ fn commands_reach_it_over_socketcand_and_slcan() {
         let position = simulator.ask("4 get")["position"].as_i64().unwrap();
         assert!((position - moved["position"].as_i64().unwrap()).abs() <= 5, "{position} and {moved}");
     }
+}
+
+#[test]
+fn two_simulators_joined_by_a_bus_hear_each_other() {
+    let first = simulator(&[]);
+    let bus = first.bus("socketcand");
+    let second = Simulator::start(&["--drive", "zlac8030l@5", "--bus", &bus]);
+    assert_eq!(second.ready, format!("ready {bus}"));
+    let found = done(&["--bus", &bus, "--json", "scan"]).json();
+    let nodes: Vec<_> = found["nodes"].as_array().unwrap().iter().map(|node| node["node"].as_u64().unwrap()).collect();
+    assert_eq!(nodes, [4, 5]);
+    assert_eq!(
+        done(&["--bus", &bus, "--model", "5=zlac8030l", "--json", "velocity", "5", "60rpm", "--for", "300ms"]).json()["reached"],
+        true
+    );
+}
+
+#[test]
+fn only_a_live_bus_given_on_the_command_line_is_joined() {
+    let drive = ["sim", "--drive", "zlac8030l@4", "--bus"];
+    let ended = ferrodrive(&[&drive[..], &["sim"]].concat());
+    assert_eq!(ended.status, Some(2));
+    assert!(ended.err.contains("a live one only"), "{}", ended.err);
+    let ended = ferrodrive(&[&drive[..], &["socketcand://127.0.0.1:1/can0"]].concat());
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.err.contains("cannot connect") && !ended.out.contains("ready"), "{}", ended.err);
 }
 
 #[test]
@@ -102,7 +130,7 @@ fn ctrl_c_stops_the_motor_first_and_ends_with_130() {
     let mut simulator = simulator(&[]);
     let bus = simulator.bus("socketcand");
     let mut turning = std::process::Command::new(env!("CARGO_BIN_EXE_ferrodrive"))
-        .args(["--bus", &bus, "velocity", "4", "100rpm", "--for", "60s"])
+        .args(["--bus", &bus, "--model", "4=zlac8030l", "velocity", "4", "100rpm", "--for", "60s"])
         .stderr(std::process::Stdio::null())
         .spawn()
         .unwrap();
@@ -130,7 +158,7 @@ fn what_was_saved_is_there_after_quit_and_only_then() {
     let state = ["--state", directory.to_str().unwrap()];
     let mut first = simulator(&state);
     let bus = first.bus("socketcand");
-    done(&["--bus", &bus, "write", "4", "200A", "500"]);
+    done(&["--bus", &bus, "--model", "4=zlac8030l", "write", "4", "200A", "500"]);
     assert_eq!(first.ask("quit")["ok"], true);
     assert_eq!(first.wait(), Some(0));
     let second = simulator(&state);
@@ -154,7 +182,7 @@ fn a_kill_at_any_moment_leaves_an_old_or_a_new_image() {
         let found = done(&["--bus", &bus, "--json", "read", "4", "200A"]).json()["value"].as_i64().unwrap();
         assert!(found == before || found == 900 + round - 1, "round {round}: {found} is neither {before} nor newer");
         before = found;
-        done(&["--bus", &bus, "write", "4", "200A", &(900 + round).to_string()]);
+        done(&["--bus", &bus, "--model", "4=zlac8030l", "write", "4", "200A", &(900 + round).to_string()]);
         // The image reaches the disk within 1.5 s; the process dies somewhere on the way.
         std::thread::sleep(Duration::from_millis(23 * round as u64));
         simulator.kill();
@@ -168,7 +196,7 @@ fn an_image_is_on_the_disk_within_a_second_and_a_half() {
     let state = ["--state", directory.to_str().unwrap()];
     let mut first = simulator(&state);
     let bus = first.bus("socketcand");
-    done(&["--bus", &bus, "write", "4", "200A", "700"]);
+    done(&["--bus", &bus, "--model", "4=zlac8030l", "write", "4", "200A", "700"]);
     std::thread::sleep(Duration::from_millis(1500));
     first.kill();
     let second = simulator(&state);

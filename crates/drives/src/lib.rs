@@ -11,8 +11,10 @@ extern crate std;
 
 pub mod engine;
 mod firmware;
+pub mod mjoint;
 pub mod profile;
 mod row;
 pub mod zlac8030l;
+pub mod zlim42c;
 
 pub use firmware::{Firmware, Report};

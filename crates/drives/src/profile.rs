@@ -9,10 +9,18 @@ use canopen::od::Table;
 use cia402::ModeOfOperation;
 
 use crate::engine::faults::FaultRow;
-use crate::zlac8030l;
+use crate::{mjoint, zlac8030l, zlim42c};
 
 /// All models.
-pub static MODELS: [&DriveProfile; 1] = [&zlac8030l::PROFILE];
+pub static MODELS: [&DriveProfile; 7] = [
+    &zlac8030l::PROFILE,
+    &mjoint::M4230E17B50,
+    &mjoint::M4230E17B80,
+    &mjoint::M8025E25B50,
+    &mjoint::M8025E25B80,
+    &zlim42c::PROFILE,
+    &zlim42c::PROFILE_82,
+];
 
 /// The model of this name (`zlac8030l`), in any case of letters.
 pub fn model(name: &str) -> Option<&'static DriveProfile> {
@@ -132,6 +140,15 @@ pub enum CountsPerTurn {
         /// Its factory value.
         default: u32,
     },
+    /// The value of an object is the place in a table.
+    Table {
+        /// Where it is.
+        object: Mux,
+        /// Counts per turn by value.
+        counts: &'static [u16],
+        /// Its factory value.
+        default: u32,
+    },
 }
 
 /// How acceleration and deceleration are given.
@@ -146,6 +163,13 @@ pub enum Ramps {
         /// Where the quick stop's time is.
         quick_stop: Mux,
     },
+    /// As one acceleration in (r/min)/s.
+    Acceleration {
+        /// Where it is, for speeding up and slowing down.
+        both: Mux,
+        /// From this value on there is no ramp.
+        none_from: u32,
+    },
 }
 
 /// How parameters are stored.
@@ -153,8 +177,8 @@ pub enum Ramps {
 pub struct ParameterStorage {
     /// The write that stores all parameters.
     pub save: Write,
-    /// The write that restores factory settings.
-    pub restore: Write,
+    /// The write that restores factory settings, where there is one.
+    pub restore: Option<Write>,
     /// The object and value that make each write be stored by itself, and whether it is so as delivered.
     pub save_on_write: Option<(Write, bool)>,
     /// Objects that take effect after a restart only.
@@ -227,12 +251,40 @@ pub enum Quirk {
     VersionsAreNumbers,
     /// Bit 13 of the statusword in profile position is 1 when in position, the reverse of a following error.
     InPositionInBit13,
+    /// Statusword bit 15 in profile position is 1 when in position.
+    InPositionInBit15,
     /// Statusword bit 7 is set in fault.
     WarningBitInFault,
+    /// Nothing measures the rotor: actual position and velocity are the commanded ones, and a stall goes unnoticed.
+    NoPositionSensor,
+    /// The motor is energised from Switched on, not only in Operation enabled.
+    EnergisedWhenSwitchedOn,
+    /// Homing attained is statusword bit 8; bits 12 and 13 tell nothing of homing. Failed: 8 off, 10 on, 14 off.
+    HomingAttainedInBit8,
+    /// 2009h is the bit rate, where the model of the same identity stores its parameters.
+    BitRateWhereSiblingSaves,
     /// A watch over the host stops the motor when no frame comes for a time, as delivered.
     HostWatchdogOnByDefault,
     /// The brake output is never moved by the drive itself.
     BrakeIsManual,
+    /// The statusword mirrors the controlword: there are no states of CiA 402.
+    NoPowerStateMachine,
+    /// NMT operational from boot-up on.
+    StartsOperational,
+    /// Heartbeats say 04h while there is an alarm; it does not mean stopped.
+    HeartbeatTellsAlarm,
+    /// TPDO n is sent once for each RPDO n, and never by itself.
+    TpdoAnswersRpdo,
+    /// No EMCY messages.
+    NoEmcy,
+    /// No 6061h (mode display).
+    NoModeDisplay,
+    /// Homing starts with the write of its mode.
+    HomingStartsWithMode,
+    /// Bit 4 of the controlword acts on each write of a 1 and clears itself.
+    NewSetPointClearsItself,
+    /// The actual velocity has another length and unit in TPDOs than by SDO.
+    SpeedInTpdoDiffers,
 }
 
 impl Quirk {
@@ -255,11 +307,29 @@ impl Quirk {
             Self::SubIndexZeroIsUnsigned16 => "sub-index 00h of the maker's records is UNSIGNED16",
             Self::VersionsAreNumbers => "1009h and 100Ah are numbers, not texts",
             Self::InPositionInBit13 => "statusword bit 13 in profile position is 1 when in position",
+            Self::InPositionInBit15 => "statusword bit 15 in profile position is 1 when in position",
+            Self::NoPositionSensor => {
+                "6064h and 606Ch are commanded values: nothing measures the rotor, a stall is not seen"
+            }
+            Self::EnergisedWhenSwitchedOn => "the motor is energised from switched on",
+            Self::HomingAttainedInBit8 => "homing attained is statusword bit 8; failed is bit 8 off, 10 on, 14 off",
+            Self::BitRateWhereSiblingSaves => {
+                "2009h is the bit rate; the ZLAC8030L, of the same identity, saves with it"
+            }
             Self::WarningBitInFault => "statusword bit 7 is set in fault",
             Self::HostWatchdogOnByDefault => {
                 "the motor stops when no frame for the drive comes for a time (2000h, 1 s)"
             }
             Self::BrakeIsManual => "the drive never moves the brake output by itself",
+            Self::NoPowerStateMachine => "the statusword mirrors the controlword: no CiA 402 states; 0Fh enables",
+            Self::StartsOperational => "NMT operational from boot-up on",
+            Self::HeartbeatTellsAlarm => "heartbeats say 04h while there is an alarm; it does not mean stopped",
+            Self::TpdoAnswersRpdo => "TPDO n answers RPDO n; nothing is sent unasked",
+            Self::NoEmcy => "no EMCY messages",
+            Self::NoModeDisplay => "no object 6061h (mode display)",
+            Self::HomingStartsWithMode => "homing starts when 6 is written to 6060h",
+            Self::NewSetPointClearsItself => "controlword bit 4 acts on each write of a 1 and clears itself",
+            Self::SpeedInTpdoDiffers => "606Ch has 16 bits of 0.1 r/min by SDO and 32 bits of r/min in TPDO3",
         }
     }
 }

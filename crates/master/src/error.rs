@@ -109,6 +109,14 @@ pub enum Error {
         /// What it says.
         found: Identity,
     },
+    /// The model has no command that restores factory settings.
+    #[error("node {node}: the {model} cannot be told to restore its factory settings: write each object instead")]
+    NoFactorySettings {
+        /// The node.
+        node: NodeId,
+        /// The model's name.
+        model: &'static str,
+    },
     /// The model does not have this mode.
     #[error("node {node}: the {model} has no mode {mode}")]
     NoSuchMode {

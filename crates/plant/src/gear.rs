@@ -12,7 +12,8 @@
 //!
 //! The implicit midpoint rule makes this two linear equations for each case of the two dry frictions, so that a step
 //! is stable however stiff the spring is; with an endlessly stiff one and no backlash it is the one mass of
-//! [`mechanics`](crate::mechanics). Dry friction goes by the velocity at the end of a step, so that it truly holds.
+//! [`mechanics`](crate::mechanics). Dry friction goes by the velocity at the end of a step, so that it truly holds; in a
+//! step in which a side turns round its work may therefore have either sign.
 //! The loss in the teeth is a dry friction of the motor's side that grows with the torque transmitted: driving
 //! forward costs `mesh_loss`, and driving backward too. The output's angle is the motor's less the twist: the two
 //! never drift apart. In a step in which teeth meet or part the spring's torque is what its energy changes by over the
@@ -253,7 +254,9 @@ impl Masses {
         let motor = rotor.inertia_kg_m2 * twice_rate;
         let output = (gear.output_inertia_kg_m2 + load.inertia_kg_m2) * twice_rate;
         let viscous = [rotor.viscous_nm_s + gear.viscous_nm_s, load.viscous_nm_s];
-        let mesh_nm = gear.mesh_loss * data.torque_nm.abs() * inverse_ratio;
+        // Of the torque a step ago; none of that of an impact whose teeth have parted since.
+        let touching = gear.side(data.twist_rad) != 0.0;
+        let mesh_nm = if touching { gear.mesh_loss * data.torque_nm.abs() * inverse_ratio } else { 0.0 };
         Masses {
             before: [velocity_rad_s, data.output_velocity_rad_s],
             sum: [motor + viscous[0], output + viscous[1]],

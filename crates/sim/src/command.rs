@@ -7,7 +7,7 @@
 mod apply;
 mod parse;
 
-use crate::{Component, Refused, SwitchRange, TemperatureSensor, World};
+use crate::{Component, PulseTrain, Refused, SwitchRange, TemperatureSensor, World};
 
 /// One line, understood.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,6 +60,8 @@ pub enum Action {
     Fault(Component, bool),
     /// `battery off`.
     Battery(bool),
+    /// `pulses 8192 10000`, `quadrature -400 1000`, `duty 40`: what is sent to the pulse inputs.
+    Pulses(PulseTrain),
     /// `cable cut` is true, `cable join` is false.
     CableCut(bool),
     /// `get`: what can be measured.
@@ -78,7 +80,7 @@ pub enum CommandError {
     /// A node number and nothing or something unknown after it.
     #[error(
         "unknown command {0:?} for a node; expected power, input, switch, load, rotor, supply, temperature, fault, \
-         battery, cable or get"
+         battery, pulses, quadrature, duty, cable or get"
     )]
     UnknownAction(String),
     /// Missing, surplus or unknown words.

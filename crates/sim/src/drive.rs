@@ -68,6 +68,12 @@ pub trait VirtualDrive: Station + VirtualDriveClone + Send {
         Err(Refused::Absent { model: self.model(), what: "battery" })
     }
 
+    /// Sends pulses to the pulse inputs; what was being sent ends.
+    fn set_pulses(&mut self, train: PulseTrain, now: Instant) -> Result<(), Refused> {
+        let _ = (train, now);
+        Err(Refused::Absent { model: self.model(), what: "pulse input" })
+    }
+
     /// Counts stores into the non-volatile memory: a new value means a new image.
     fn nvm_generation(&self) -> u64;
 
@@ -167,6 +173,27 @@ pub enum Component {
     Phase,
 }
 
+/// What a controller sends to a drive's pulse inputs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PulseTrain {
+    /// Pulses with a direction.
+    Pulses {
+        /// How many; negative with the direction input conducting.
+        count: i64,
+        /// Pulses a second.
+        hz: f64,
+    },
+    /// Two channels of an encoder.
+    Quadrature {
+        /// Counts, four a line; negative with the second channel ahead.
+        count: i64,
+        /// Counts a second.
+        hz: f64,
+    },
+    /// A square wave of this duty cycle in per cent, for ever.
+    Duty(f64),
+}
+
 /// State of the holding brake.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Brake {
@@ -206,6 +233,8 @@ pub struct Report {
     pub error_code: u32,
     /// Actual position in the drive's counts.
     pub position: i64,
+    /// Where the rotor truly is in the drive's counts, of a drive that does not measure it.
+    pub rotor_position: Option<i64>,
     /// Position demand in the drive's counts, where a mode has one.
     pub position_demand: Option<i64>,
     /// True speed of the motor shaft in r/min.

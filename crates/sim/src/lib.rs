@@ -21,7 +21,8 @@ mod world;
 
 pub use block_on::{BlockOnError, block_on, block_on_for};
 pub use drive::{
-    Brake, Component, Levels, Refused, Report, SwitchRange, TemperatureSensor, VirtualDrive, VirtualDriveClone,
+    Brake, Component, Levels, PulseTrain, Refused, Report, SwitchRange, TemperatureSensor, VirtualDrive,
+    VirtualDriveClone,
 };
 pub use prng::Prng;
 pub use world::{AnyStation, Digest, FrameLog, StationId, World, WorldError};

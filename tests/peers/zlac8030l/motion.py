@@ -112,7 +112,7 @@ def relative(bench):
 
 @check("profile position goes to 32000 and to -32000 from wherever it stands")
 def absolute(bench):
-    bench.write(0x6081, 600)
+    bench.write(0x6081, 300)
     bench.enable(POSITION)
     for target in (32000, 32000, -32000):
         go(bench, target, relative=False)
@@ -132,7 +132,7 @@ def profile_speed(bench):
 
 @check("a second set-point waits for the first when bit 5 is 0")
 def queued_set_point(bench):
-    bench.write(0x6081, 600)
+    bench.write(0x6081, 300)
     bench.enable(POSITION)
     for target in (8000, 16000):
         bench.write(0x607A, target)

@@ -59,8 +59,6 @@ impl Bench {
         self
     }
 
-    // ---- time and frames ----
-
     pub(crate) fn run_ms(&mut self, ms: u64) {
         self.run(Duration::from_millis(ms));
     }
@@ -115,8 +113,6 @@ impl Bench {
         None
     }
 
-    // ---- objects ----
-
     /// Writes `value` with the object's width.
     pub(crate) fn write(&mut self, index: u16, sub: u8, value: i64) -> Result<(), Abort> {
         let size = row(index, sub).size;
@@ -156,8 +152,6 @@ impl Bench {
     pub(crate) fn statusword(&mut self) -> u16 {
         self.get(0x6041, 0) as u16
     }
-
-    // ---- the drive ----
 
     /// The controlwords of section 4.1: shutdown, switch on, enable operation.
     pub(crate) fn enable(&mut self) {

@@ -5,13 +5,20 @@
 //! form. One file for each subject; [`bench`] is the table they all work at.
 
 mod bench;
+mod communication;
 mod datagrams;
+mod determinism;
 mod energy;
 mod holding;
+mod motor_parameters;
+mod network;
 mod objects;
 mod position;
 mod power_state;
+mod robustness;
 mod stopping;
+mod terminals;
 mod torque;
+mod traps;
 mod velocity;
 mod wheel;

@@ -167,8 +167,6 @@ fn what_is_live_reads_what_a_resting_drive_has() {
     assert!(unchecked.is_empty(), "{unchecked:?}");
 }
 
-// ---- store ----
-
 /// Another legal value than the default; `None` where the drive then could not be asked any more.
 fn other_value(row: &ObjectRow) -> Option<i64> {
     let default = row.default?;

@@ -22,9 +22,10 @@ fn turning() -> Bench {
 /// Seconds to standstill and counts gone, from now.
 fn stop_of(bench: &mut Bench) -> (f64, f64) {
     let start = bench.report().position;
-    let seconds = bench.seconds_until(3.0, LOOK, |report| report.velocity_rpm.abs() < 1.0);
-    bench.run_ms(300);
-    assert_within("speed after the stop", bench.report().velocity_rpm, -0.5, 0.5);
+    let seconds = bench.seconds_until(3.0, LOOK, |report| report.velocity_rpm < 1.0);
+    // A step of the demand may overshoot before it rests.
+    bench.run_ms(600);
+    assert_within("speed after the stop", bench.report().velocity_rpm, -1.0, 1.0);
     (seconds, (bench.report().position - start) as f64)
 }
 
@@ -219,4 +220,81 @@ fn the_watch_is_on_as_delivered_with_1000_ms() {
     assert!(bench.report().velocity_rpm > 59.0);
     let stopped = bench.seconds_until(2.0, LOOK, |report| report.velocity_rpm < 1.0);
     assert_within("seconds to stand, 10 ms and a ramp of 500 ms", stopped, 0.40, 0.55);
+}
+
+#[test]
+fn a_wheel_released_by_an_external_stop_is_caught_where_it_is_and_not_pulled_back() {
+    // Held again by 202F:03, or by a quick stop, after it has rolled away.
+    for (object, sub, value) in [(0x202F, 3, 0), (0x6040, 0, 0x02)] {
+        let mut bench = turning();
+        bench.set(0x202F, 3, 1);
+        bench.operate(|drive, now| drive.set_input(0, true, now)).expect("there is X0");
+        bench.run_ms(600);
+        bench.operate(|drive, now| drive.set_load_torque(0.5, now)).expect("a load");
+        bench.run_ms(500);
+        bench.operate(|drive, now| drive.set_load_torque(0.0, now)).expect("a load");
+        let released = bench.report();
+        assert!(released.velocity_rpm < -50.0, "it rolls: {released:?}");
+        bench.set(object, sub, value);
+        let mut speeds = Vec::new();
+        for _ in 0..800 {
+            bench.run(LOOK);
+            speeds.push(bench.report().velocity_rpm);
+        }
+        let fastest_back = speeds.iter().copied().fold(0.0, f64::max);
+        assert_within("greatest speed back", fastest_back, 0.0, 5.0);
+        assert_within("speed in the end", speeds[speeds.len() - 1], -0.5, 0.5);
+        assert_eq!(bench.get(0x603F, 0), 0, "{object:04X}h");
+    }
+}
+
+#[test]
+fn a_silent_host_stops_the_motor_with_the_ramp_of_605ah_in_each_mode() {
+    let mut bench = turning();
+    bench.set(0x605A, 0, 6);
+    bench.set(0x2000, 0, 300);
+    bench.run_ms(299);
+    assert_stops(&mut bench, Ramp::Time(0.1));
+
+    let mut bench = Bench::new();
+    bench.set(0x605A, 0, 6);
+    bench.set(0x6085, 0, 100);
+    bench.enable_in(1);
+    bench.set(0x2000, 0, 1000);
+    bench.set(0x607A, 0, 100_000);
+    bench.set(0x6040, 0, 0x1F);
+    bench.run_ms(980);
+    assert_within("speed of the move", bench.report().velocity_rpm, 118.0, 122.0);
+    bench.run_ms(300);
+    assert_within("speed", bench.report().velocity_rpm, -1.0, 1.0);
+    let stands = bench.report().position;
+    bench.set(0x2000, 0, 0);
+    bench.run_ms(1000);
+    assert_within("the move is over", (bench.report().position - stands) as f64, -30.0, 30.0);
+
+    let mut bench = Bench::new();
+    bench.set(0x6087, 0, 0);
+    bench.enable_in(4);
+    bench.set(0x2000, 0, 500);
+    bench.set(0x6071, 0, 1000);
+    bench.run_ms(400);
+    assert!(bench.report().velocity_rpm > 100.0);
+    bench.run_ms(1500);
+    assert_within("speed", bench.report().velocity_rpm, -1.0, 1.0);
+    assert_eq!((bench.get(0x6071, 0), bench.statusword() & 0xFF), (0, 0x37));
+}
+
+#[test]
+fn a_shutdown_ends_even_when_a_load_never_lets_the_motor_stand() {
+    let mut bench = turning();
+    bench.set(0x202E, 5, 1);
+    bench.set(0x2015, 0, 20);
+    bench.operate(|drive, now| drive.set_load_inertia(0.3, now)).expect("a load");
+    bench.operate(|drive, now| drive.set_load_torque(-2.0, now)).expect("a load");
+    bench.set(0x6040, 0, 0x06);
+    bench.run_ms(300);
+    assert_eq!(bench.statusword() & 0xFF, 0x37, "on the ramp");
+    bench.run_ms(1700);
+    assert_eq!(bench.statusword() & 0xFF, 0x31);
+    assert!(bench.report().velocity_rpm > 60.0, "1.5 N m of the motor against 2 N m");
 }

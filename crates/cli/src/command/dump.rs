@@ -17,7 +17,7 @@ use crate::embedded;
 use crate::failure::Failure;
 use crate::output::{Format, Report};
 use crate::paint::Paint;
-use crate::session::{bus_failure, interrupted, runtime};
+use crate::session::{bus_failure, exit_on_interrupt, interrupted, runtime};
 
 /// Show the bus decoded: SDO with object names and values, PDOs by their mapping, statuswords in words
 ///
@@ -76,6 +76,7 @@ impl Dump {
     }
 
     fn embedded(&self, file: Option<&Path>, sink: &mut Sink) -> Result<(), Failure> {
+        exit_on_interrupt();
         let (mut world, drives) = embedded::world(file)?;
         for (node, model) in drives {
             sink.decoder.set_model(node, model.table);

@@ -119,6 +119,8 @@ struct Limits {
     acceleration_ms: Option<f64>,
     deceleration_ms: Option<f64>,
     quick_stop_ms: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    acceleration_rpm_s: Option<f64>,
 }
 
 impl Velocity {
@@ -194,16 +196,22 @@ async fn outcome(
 /// What limits a motion, as far as the drive tells.
 async fn limits(drive: &Drive) -> Limits {
     let Some(profile) = drive.profile() else { return Limits::default() };
-    let Ramps::Milliseconds { acceleration, deceleration, quick_stop } = profile.units.ramps;
-    Limits {
-        profile_velocity_rpm: number(drive, profile.units.profile_velocity).await,
-        acceleration_ms: number(drive, milliseconds(acceleration)).await,
-        deceleration_ms: number(drive, milliseconds(deceleration)).await,
-        quick_stop_ms: number(drive, milliseconds(quick_stop)).await,
+    let profile_velocity_rpm = number(drive, profile.units.profile_velocity).await;
+    match profile.units.ramps {
+        Ramps::Milliseconds { acceleration, deceleration, quick_stop } => Limits {
+            profile_velocity_rpm,
+            acceleration_ms: number(drive, raw(acceleration)).await,
+            deceleration_ms: number(drive, raw(deceleration)).await,
+            quick_stop_ms: number(drive, raw(quick_stop)).await,
+            ..Limits::default()
+        },
+        Ramps::Acceleration { both, .. } => {
+            Limits { profile_velocity_rpm, acceleration_rpm_s: number(drive, raw(both)).await, ..Limits::default() }
+        }
     }
 }
 
-const fn milliseconds(object: Mux) -> Quantity {
+const fn raw(object: Mux) -> Quantity {
     Quantity { object, per_count: 1.0, divisor: None }
 }
 
@@ -219,6 +227,7 @@ impl Limits {
             self.acceleration_ms.map(|ms| format!("acceleration {ms:.0} ms")),
             self.deceleration_ms.map(|ms| format!("deceleration {ms:.0} ms")),
             self.quick_stop_ms.map(|ms| format!("quick stop {ms:.0} ms")),
+            self.acceleration_rpm_s.map(|rate| format!("acceleration {rate:.0} (r/min)/s")),
         ];
         parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
     }

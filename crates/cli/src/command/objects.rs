@@ -167,11 +167,11 @@ impl Report for ObjectList {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::models::MODELS;
+    use crate::models::EMBEDDED;
 
     fn found(words: &[&str]) -> Vec<&'static str> {
         let search = words.iter().map(|word| (*word).into()).collect();
-        let list = Objects { whose: Whose::Model(MODELS[0]), search }.list(MODELS[0]);
+        let list = Objects { whose: Whose::Model(EMBEDDED[0]), search }.list(EMBEDDED[0]);
         list.map(|list| list.objects.iter().map(|row| row.name).collect()).unwrap_or_default()
     }
 

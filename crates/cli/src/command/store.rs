@@ -51,7 +51,9 @@ impl Restore {
         let drive = context.known_drive(self.node).await?;
         drive.restore().await?;
         let model = context.known_model_of(self.node).await?;
-        Ok(StoreReport::new(self.node, "restored to factory values", model.storage.restore.object, model))
+        // It has been restored: the model has the command.
+        let object = model.storage.restore.map_or(model.storage.save.object, |restore| restore.object);
+        Ok(StoreReport::new(self.node, "restored to factory values", object, model))
     }
 }
 

@@ -33,6 +33,7 @@ const SAMPLING_PERIOD: Duration = Duration::from_millis(5);
 
 /// See the [module](self).
 pub(super) struct Bench {
+    model: &'static DriveProfile,
     world: World,
     adapter: StationId,
     heard: Vec<(Instant, Frame)>,
@@ -76,6 +77,7 @@ impl Bench {
         let channels = SIGNALS.map(|signal| Channel { drive: NODE, signal });
         world.start_recording(Recorder::new(SAMPLING_PERIOD, channels));
         Ok(Self {
+            model,
             world,
             adapter,
             heard: Vec::new(),
@@ -204,7 +206,7 @@ impl Bench {
     pub(super) fn read(&mut self, index: u16, sub_index: u8) -> Option<i64> {
         let [low, high] = index.to_le_bytes();
         let reply = self.exchange([0x40, low, high, sub_index, 0, 0, 0, 0])?;
-        let table = drives::profile::MODELS[0].table;
+        let table = self.model.table;
         let row = table.row(table.find(Mux::new(index, sub_index)).ok()?);
         let is_upload = reply[0] >> 5 == 2 && reply[1..4] == [low, high, sub_index];
         let raw = u32::from_le_bytes([reply[4], reply[5], reply[6], reply[7]]);

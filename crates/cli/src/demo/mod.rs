@@ -21,13 +21,12 @@ use bench::Bench;
 pub(crate) use report::DemoReport;
 
 use crate::failure::Failure;
-use crate::models::MODELS;
 use crate::plot::Figure;
 use crate::progress::Progress;
 
 /// Runs the demo: the table, and the picture of the motion.
 pub(crate) fn run(progress: Progress) -> Result<(DemoReport, Figure), Failure> {
-    let mut bench = Bench::new(MODELS[0], progress)?;
+    let mut bench = Bench::new(&drives::zlac8030l::PROFILE, progress)?;
     communication::boot_up(&mut bench);
     communication::sdo_format(&mut bench);
     velocity::profile_velocity(&mut bench);

@@ -81,12 +81,12 @@ pub(super) fn figure(figure: &Figure) -> String {
 }
 
 fn sections(svg: &mut Svg, layout: &Layout, figure: &Figure) {
-    for (number, section) in figure.sections.iter().enumerate() {
-        let (left, right) = (layout.x(section.from_s), layout.x(section.to_s));
-        if number % 2 == 0 {
-            let size = (right - left, layout.panels_bottom - TOP);
-            svg.rect((left, TOP), size, 0.0, &format!(r#"fill="{BAND}""#));
-        }
+    let places = figure.sections.iter().map(|section| (section, layout.x(section.from_s), layout.x(section.to_s)));
+    // Every other section has a tinted ground; all grounds come before all names, which may reach over a border.
+    for (_, left, right) in places.clone().step_by(2) {
+        svg.rect((left, TOP), (right - left, layout.panels_bottom - TOP), 0.0, &format!(r#"fill="{BAND}""#));
+    }
+    for (section, left, right) in places {
         let fits = |name: &&String| SECTION.width(name) < (right - left) * CROWDING;
         let middle = (left + right) / 2.0;
         if NUMBER.width(&section.number) < right - left {
@@ -110,9 +110,9 @@ fn draw_panel(svg: &mut Svg, layout: &Layout, top: f64, panel: &Panel) {
         svg.line((LEFT, y(tick)), (WIDTH - RIGHT, y(tick)), &format!(r#"stroke="{colour}""#));
         svg.text((LEFT - 8.0, y(tick) + 4.0), Anchor::End, AXIS, &ticks.text(tick));
     }
-    svg.text((LEFT, top - 7.0), Anchor::Start, NAME, panel.title);
+    svg.rimmed_text((LEFT, top - 7.0), Anchor::Start, NAME, panel.title);
     let after_title = LEFT + 7.0 + NAME.width(panel.title);
-    svg.text((after_title, top - 7.0), Anchor::Start, AXIS, panel.unit);
+    svg.rimmed_text((after_title, top - 7.0), Anchor::Start, AXIS, panel.unit);
     for trace in &panel.traces {
         // Where a trace has no value, its line has a gap.
         for piece in trace.points.split(|point| !point.1.is_finite()).filter(|piece| !piece.is_empty()) {
@@ -158,15 +158,21 @@ fn label_left(layout: &Layout, event: &Event) -> f64 {
     (layout.x(event.at_s) + 6.0).min(WIDTH - 14.0 - width)
 }
 
+/// All lines first, so that none runs over a label.
 fn draw_events(svg: &mut Svg, layout: &Layout, events: &[&Event], lanes: &[usize]) {
-    for (event, lane) in events.iter().zip(lanes) {
-        let font = event_font(event.kind);
-        let x = layout.x(event.at_s);
-        let y = layout.event_top + *lane as f64 * EVENT_LANE + 12.0;
-        let paint = format!(r#"stroke="{}" stroke-width="1" stroke-dasharray="2 3" opacity="0.75""#, font.colour);
+    let places = || {
+        let heights = lanes.iter().map(|lane| layout.event_top + *lane as f64 * EVENT_LANE + 12.0);
+        events.iter().zip(heights).map(|(event, y)| (*event, layout.x(event.at_s), y))
+    };
+    for (event, x, y) in places() {
+        let colour = event_font(event.kind).colour;
+        let paint = format!(r#"stroke="{colour}" stroke-width="1" stroke-dasharray="2 3" opacity="0.75""#);
         svg.line((x, y - 4.0), (x, layout.panels_bottom), &paint);
+    }
+    for (event, x, y) in places() {
+        let font = event_font(event.kind);
         svg.dot((x, y - 4.0), 3.2, font.colour);
-        svg.text((label_left(layout, event), y), Anchor::Start, font, &event.label);
+        svg.rimmed_text((label_left(layout, event), y), Anchor::Start, font, &event.label);
     }
 }
 

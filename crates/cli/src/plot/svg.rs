@@ -67,7 +67,17 @@ impl Svg {
     }
 
     /// A line of text; `y` is its base line.
-    pub(super) fn text(&mut self, (x, y): (f64, f64), anchor: Anchor, font: Font, text: &str) {
+    pub(super) fn text(&mut self, at: (f64, f64), anchor: Anchor, font: Font, text: &str) {
+        self.painted_text(at, anchor, font, "", text);
+    }
+
+    /// A line of text with a light rim, which reads well where lines run under it.
+    pub(super) fn rimmed_text(&mut self, at: (f64, f64), anchor: Anchor, font: Font, text: &str) {
+        let rim = r##" paint-order="stroke" stroke="#ffffff" stroke-width="3.5" stroke-opacity="0.9""##;
+        self.painted_text(at, anchor, font, rim, text);
+    }
+
+    fn painted_text(&mut self, (x, y): (f64, f64), anchor: Anchor, font: Font, paint: &str, text: &str) {
         let anchor = match anchor {
             Anchor::Start => "start",
             Anchor::Middle => "middle",
@@ -76,7 +86,7 @@ impl Svg {
         let weight = if font.bold { r#" font-weight="600""# } else { "" };
         let _ = writeln!(
             self.body,
-            r#"<text x="{x:.1}" y="{y:.1}" text-anchor="{anchor}" font-size="{}" fill="{}"{weight}>{}</text>"#,
+            r#"<text x="{x:.1}" y="{y:.1}" text-anchor="{anchor}" font-size="{}" fill="{}"{weight}{paint}>{}</text>"#,
             font.size,
             font.colour,
             escape(text)

@@ -351,19 +351,19 @@ impl Axis {
 
     /// Takes the shaft over as it turns.
     fn engage(&mut self) {
-        let Feedback { position, velocity, standing, .. } = self.feedback;
-        self.trajectory = if standing {
-            Trajectory::resting(position)
-        } else {
-            Trajectory::change_velocity(TrajectoryPoint::moving(position, velocity), velocity, 0.0)
-        };
-        self.position.abort(position);
+        self.trajectory = self.as_it_turns();
+        self.position.abort(self.feedback.position);
         self.velocity.restart();
         self.torque.restart();
         self.homing.abort();
         self.short_of_target = false;
         self.stop = None;
         self.engaged = Engaged::Yes;
+    }
+
+    fn as_it_turns(&self) -> Trajectory {
+        let velocity = if self.feedback.standing { 0.0 } else { self.feedback.velocity };
+        Trajectory::change_velocity(TrajectoryPoint::moving(self.feedback.position, velocity), velocity, 0.0)
     }
 
     fn disengage(&mut self) {
@@ -399,11 +399,13 @@ impl Axis {
     fn choose_stop(&mut self, targets: &Targets, parameters: &AxisParameters) {
         let wanted = self.wanted_stop(targets, parameters);
         let present = self.stop.map(|stop| (stop.cause, stop.ramp));
-        if wanted == present {
+        let free = self.stop.is_some_and(|stop| stop.free);
+        let release = parameters.release_after_external_stop;
+        if wanted == present && self.stop.is_none_or(|stop| stop.free == stop.is_released(release)) {
             return;
         }
         match (wanted, self.stop) {
-            (Some((cause, ramp)), Some(stop)) if stop.ramp == ramp || stop.held => {
+            (Some((cause, ramp)), Some(stop)) if !free && (stop.ramp == ramp || stop.held) => {
                 self.stop = Some(Stop { cause, ramp, ..stop });
             }
             (Some((cause, ramp)), _) => self.begin_stop(cause, ramp, parameters),
@@ -469,7 +471,7 @@ impl Axis {
         // Already at rest: there is no way to take any time.
         let time_s = if from.velocity == 0.0 { 0.0 } else { time_s };
         self.trajectory = Trajectory::change_velocity(from, 0.0, time_s);
-        self.stop = Some(Stop { cause, ramp, over_for_s: 0.0, held: false });
+        self.stop = Some(Stop { cause, ramp, over_for_s: 0.0, held: false, free: false });
     }
 
     /// Nothing asks for a stop any more.
@@ -499,10 +501,15 @@ impl Axis {
                 self.power.ramp_done();
             }
         }
+        stop.free = stop.is_released(parameters.release_after_external_stop);
+        if stop.free {
+            // Whoever holds it again begins from wherever it has got to.
+            self.trajectory = self.as_it_turns();
+        }
         self.stop = Some(stop);
         match stop {
             _ if !self.is_live() => self.idle(parameters),
-            _ if stop.is_released(parameters.release_after_external_stop) => Demand::Off,
+            _ if stop.free => Demand::Off,
             _ if stop.held => Demand::Position(self.trajectory.point()),
             _ if follows_position => Demand::Position(point),
             _ => Demand::Velocity(point),

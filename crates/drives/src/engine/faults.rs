@@ -94,6 +94,12 @@ impl<const N: usize> FaultMonitor<N> {
         self.latched.is_empty()
     }
 
+    /// The cause of one fault has been taken away, and the fault clears itself; the others stay.
+    pub fn release(&mut self, row: usize) {
+        self.present = FaultSet(self.present.0 & !FaultSet::row(row).0);
+        self.latched = FaultSet(self.latched.0 & !FaultSet::row(row).0);
+    }
+
     /// The cause of one fault has been taken away; true if the fault was latched.
     pub fn forget(&mut self, row: usize) -> bool {
         self.present = FaultSet(self.present.0 & !FaultSet::row(row).0);

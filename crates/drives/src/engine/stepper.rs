@@ -71,6 +71,7 @@ pub struct Stepper {
     /// Last whole pulse, and where in its electrical turn the vector points.
     issued: i32,
     field: u16,
+    electrical_turns: i32,
     amplitude_a: f32,
     resting_for: u16,
     d: Pi,
@@ -99,6 +100,17 @@ impl Stepper {
     /// Length of the current vector asked for, A.
     pub const fn reference_a(&self) -> f32 {
         self.amplitude_a
+    }
+
+    /// How far the vector has turned since the beginning, in electrical turns.
+    pub fn vector_turns(&self, model: &StepperModel) -> f64 {
+        f64::from(self.electrical_turns) + f64::from(self.field) / f64::from(model.pulses_per_electrical_turn.max(1))
+    }
+
+    /// The motor is free, the position 0; the vector keeps its direction.
+    #[must_use]
+    pub fn restarted(&self) -> Self {
+        Self { field: self.field, electrical_turns: self.electrical_turns, ..Self::default() }
     }
 
     /// The zero of the position: what was `by` is 0 from now on. The vector stays where it points.
@@ -152,8 +164,8 @@ impl Stepper {
         let (wanted_d, wanted_q) =
             (self.d.propose(&gains.current, error_d, 0.0), self.q.propose(&gains.current, error_q, 0.0));
 
-        // The voltage acts over the coming period: in its middle the frame has turned on by half a period's way.
-        let (sin_v, cos_v) = sin_cos_turns(angle + 0.5 * self.pulses_per_period as f32 * per_pulse);
+        // The voltage acts over the period after the coming one: in its middle the frame has turned on so far.
+        let (sin_v, cos_v) = sin_cos_turns(angle + VOLTAGE_DELAY_PERIODS * self.pulses_per_period as f32 * per_pulse);
         let limit = gains.modulation_limit * bus_v.max(0.0);
         let v_a = (wanted_d * cos_v - wanted_q * sin_v).clamp(-limit, limit);
         let v_b = (wanted_d * sin_v + wanted_q * cos_v).clamp(-limit, limit);
@@ -190,7 +202,9 @@ impl Stepper {
         let due = self.from.position.wrapping_add(libm::floor(way + ROUNDING) as i32);
         let pulses = i64::from(due.wrapping_sub(self.issued));
         let turn = i64::from(model.pulses_per_electrical_turn.max(1));
-        self.field = (i64::from(self.field) + pulses).rem_euclid(turn) as u16;
+        let field = i64::from(self.field) + pulses;
+        self.field = field.rem_euclid(turn) as u16;
+        self.electrical_turns = self.electrical_turns.wrapping_add(field.div_euclid(turn) as i32);
         self.issued = due;
     }
 
@@ -205,6 +219,10 @@ impl Stepper {
     }
 }
 
+/// From sampling the currents to the middle of the period in which the voltage acts: duty cycles go through the
+/// timer's shadow registers.
+const VOLTAGE_DELAY_PERIODS: f32 = 1.5;
+
 /// A way that ends on a whole pulse does so in spite of the rounding of its tenths.
 const ROUNDING: f64 = 1e-6;
 
@@ -215,7 +233,7 @@ mod tests {
     const MODEL: StepperModel =
         StepperModel { pulses_per_electrical_turn: 80, periods_per_command: 10, control_period_s: 50e-6 };
     const GAINS: StepperGains =
-        StepperGains { current: PiGains { proportional: 30.0, integral_per_s: 30e3 }, modulation_limit: 0.95 };
+        StepperGains { current: PiGains { proportional: 15.0, integral_per_s: 15e3 }, modulation_limit: 0.98 };
     const CURRENTS: StepperCurrents = StepperCurrents { run_a: 1.2, hold_a: 0.6, hold_after: 20 };
     const RESISTANCE_OHM: f32 = 1.85;
     const INDUCTANCE_H: f32 = 2.8e-3;
@@ -223,18 +241,20 @@ mod tests {
     struct Bench {
         stepper: Stepper,
         current_a: [f32; 2],
+        duty: [f32; 2],
     }
 
     impl Bench {
         fn new() -> Self {
-            Self { stepper: Stepper::default(), current_a: [0.0; 2] }
+            Self { stepper: Stepper::default(), current_a: [0.0; 2], duty: [0.0; 2] }
         }
 
         /// One supervision period on windings without a rotor.
         fn run(&mut self, point: TrajectoryPoint) {
             self.stepper.command(&MODEL, &Demand::Position(point), &CURRENTS);
             for _ in 0..10 {
-                let duty = self.stepper.modulate(&MODEL, &GAINS, self.current_a, 24.0);
+                let next = self.stepper.modulate(&MODEL, &GAINS, self.current_a, 24.0);
+                let duty = core::mem::replace(&mut self.duty, next);
                 for (current_a, duty) in self.current_a.iter_mut().zip(duty) {
                     *current_a += (24.0 * duty - RESISTANCE_OHM * *current_a) * (50e-6 / INDUCTANCE_H);
                 }

@@ -39,6 +39,8 @@ pub(super) struct Stop {
     pub(super) over_for_s: f64,
     /// The shaft is held where it came to rest.
     pub(super) held: bool,
+    /// It was held, and the motor is free now.
+    pub(super) free: bool,
 }
 
 impl Stop {

@@ -7,6 +7,8 @@ use super::storage::Image;
 pub struct Sensors {
     /// Counter of the encoder's quadrature, four counts a line; wraps.
     pub encoder_count: u16,
+    /// The receiver sees signals on the encoder's lines: false with the cable unplugged.
+    pub encoder_wired: bool,
     /// Hall state: U bit 0, V bit 1, W bit 2; 0 and 7 are faults. Forward: 5, 1, 3, 2, 6, 4.
     pub hall: u8,
     /// Currents of phases U and V, A, positive into the motor.
@@ -30,6 +32,7 @@ impl Default for Sensors {
     fn default() -> Self {
         Self {
             encoder_count: 0,
+            encoder_wired: true,
             hall: 5,
             phase_current_a: [0.0; 2],
             bus_v: 48.0,

@@ -38,7 +38,7 @@ pub static PROFILE: DriveProfile = DriveProfile {
     },
     storage: ParameterStorage {
         save: Write { object: Mux::new(0x2009, 0), value: 2 },
-        restore: Write { object: Mux::new(0x2009, 0), value: 1 },
+        restore: Some(Write { object: Mux::new(0x2009, 0), value: 1 }),
         save_on_write: Some((Write { object: Mux::new(0x2010, 0), value: 0 }, true)),
         effective_after_restart: &[Mux::new(0x200D, 0), Mux::new(0x200E, 0), Mux::new(0x202F, 5)],
     },

@@ -48,7 +48,10 @@ impl Protection {
                 row::DRIVER_TEMPERATURE,
                 too_hot(sensors.driver_c, parameters.driver_limit_c, now, row::DRIVER_TEMPERATURE),
             )
-            .with(row::ENCODER, exceeds(now.servo.disagreement_turns().abs(), HALL_DISAGREEMENT_TURNS))
+            .with(
+                row::ENCODER,
+                !sensors.encoder_wired || exceeds(now.servo.disagreement_turns().abs(), HALL_DISAGREEMENT_TURNS),
+            )
     }
 
     /// A fault reset gives the overload its whole time back.

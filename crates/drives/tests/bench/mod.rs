@@ -103,6 +103,7 @@ impl Bench {
         let read = self.motor.sense();
         let mut sensors = Sensors {
             encoder_count: read.encoder_count,
+            encoder_wired: true,
             hall: read.hall,
             phase_current_a: [read.phase_current_a[0] as f32, read.phase_current_a[1] as f32],
             bus_v: read.bus_v as f32,

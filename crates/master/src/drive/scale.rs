@@ -17,6 +17,12 @@ impl Drive {
             CountsPerTurn::Object { object, factor, .. } => {
                 Ok(self.read_number(object).await? as f64 * f64::from(factor))
             }
+            CountsPerTurn::Table { object, counts, default } => {
+                let place = usize::try_from(self.read_number(object).await?).ok();
+                // A value beyond the table: the drive's own table refuses it, so it is as delivered.
+                let known = place.and_then(|place| counts.get(place)).or(counts.get(default as usize));
+                Ok(known.copied().map_or(1.0, f64::from))
+            }
         }
     }
 
@@ -54,10 +60,20 @@ impl Drive {
         deceleration: Option<Ramp>,
         change_rpm: f64,
     ) -> Result<(), Error> {
-        let Ramps::Milliseconds { acceleration: up, deceleration: down, .. } = self.known("set its ramps")?.units.ramps;
-        for (object, ramp) in [(up, acceleration), (down, deceleration)] {
-            if let Some(ramp) = ramp {
-                self.write_number(object, ramp_ms(ramp, change_rpm)).await?;
+        match self.known("set its ramps")?.units.ramps {
+            Ramps::Milliseconds { acceleration: up, deceleration: down, .. } => {
+                for (object, ramp) in [(up, acceleration), (down, deceleration)] {
+                    if let Some(ramp) = ramp {
+                        self.write_number(object, ramp_ms(ramp, change_rpm)).await?;
+                    }
+                }
+            }
+            Ramps::Acceleration { both, none_from } => {
+                // One object for both: the gentler of two wishes.
+                let wishes = [acceleration, deceleration].into_iter().flatten();
+                if let Some(rate) = wishes.map(|ramp| ramp_rpm_s(ramp, change_rpm, none_from)).min() {
+                    self.write_number(both, rate).await?;
+                }
             }
         }
         Ok(())
@@ -65,18 +81,44 @@ impl Drive {
 
     /// The drive's ramp times for a whole change of speed, in seconds: up, down.
     pub(super) async fn ramp_times_s(&self) -> Result<(f64, f64), Error> {
-        let Ramps::Milliseconds { acceleration, deceleration, .. } = self.known("read its ramps")?.units.ramps;
-        Ok((self.seconds(acceleration).await?, self.seconds(deceleration).await?))
+        match self.known("read its ramps")?.units.ramps {
+            Ramps::Milliseconds { acceleration, deceleration, .. } => {
+                Ok((self.seconds(acceleration).await?, self.seconds(deceleration).await?))
+            }
+            Ramps::Acceleration { both, none_from } => {
+                let rate = self.read_number(both).await?;
+                let none = rate >= i64::from(none_from);
+                let seconds = if none { 0.0 } else { LARGEST_CHANGE_RPM / rate.max(1) as f64 };
+                Ok((seconds, seconds))
+            }
+        }
     }
 
     /// Time of the drive's quick stop in seconds.
     pub(super) async fn quick_stop_time_s(&self) -> Result<f64, Error> {
-        let Ramps::Milliseconds { quick_stop, .. } = self.known("read its ramps")?.units.ramps;
-        self.seconds(quick_stop).await
+        match self.known("read its ramps")?.units.ramps {
+            Ramps::Milliseconds { quick_stop, .. } => self.seconds(quick_stop).await,
+            // Such a drive stops without a ramp.
+            Ramps::Acceleration { .. } => Ok(0.0),
+        }
     }
 
     async fn seconds(&self, object: Mux) -> Result<f64, Error> {
         Ok(self.read_number(object).await? as f64 * 1e-3)
+    }
+}
+
+/// The largest change of speed of a drive whose ramps are accelerations, r/min: from one limit of 60FFh to the other.
+const LARGEST_CHANGE_RPM: f64 = 6000.0;
+
+/// A ramp as an acceleration in (r/min)/s; a change without a ramp is `none_from`.
+fn ramp_rpm_s(ramp: Ramp, change_rpm: f64, none_from: u32) -> i64 {
+    match ramp {
+        Ramp::RpmPerSecond(rate) => (rate.max(1.0).round() as i64).min(i64::from(none_from)),
+        Ramp::Time(time) => {
+            let rate = change_rpm.abs() / time.as_secs_f64().max(1e-6);
+            (rate.round() as i64).clamp(1, i64::from(none_from))
+        }
     }
 }
 
@@ -94,6 +136,14 @@ fn ramp_ms(ramp: Ramp, change_rpm: f64) -> i64 {
 mod tests {
     use super::*;
     use std::time::Duration;
+
+    #[test]
+    fn a_time_becomes_the_acceleration_of_the_change() {
+        assert_eq!(ramp_rpm_s(Ramp::Time(Duration::from_millis(500)), -60.0, 60_000), 120);
+        assert_eq!(ramp_rpm_s(Ramp::RpmPerSecond(20_000.0), 60.0, 60_000), 20_000);
+        assert_eq!(ramp_rpm_s(Ramp::Time(Duration::ZERO), 60.0, 60_000), 60_000);
+        assert_eq!(ramp_rpm_s(Ramp::RpmPerSecond(0.0), 60.0, 60_000), 1);
+    }
 
     #[test]
     fn a_rate_becomes_the_time_of_the_change() {

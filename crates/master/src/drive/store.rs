@@ -22,10 +22,12 @@ impl Drive {
     /// Puts all parameters back to their factory values. Some take effect after a restart only.
     ///
     /// # Errors
-    /// As [`save`](Self::save).
+    /// As [`save`](Self::save); [`Error::NoFactorySettings`] for a model that cannot be told to.
     pub async fn restore(&self) -> Result<(), Error> {
-        let storage = self.known("restore its factory settings")?.storage;
-        self.command(storage.restore).await
+        let profile = self.known("restore its factory settings")?;
+        let model = profile.title;
+        let restore = profile.storage.restore.ok_or(Error::NoFactorySettings { node: self.node.id(), model })?;
+        self.command(restore).await
     }
 
     async fn command(&self, write: Write) -> Result<(), Error> {

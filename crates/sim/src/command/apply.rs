@@ -46,6 +46,7 @@ fn act(drive: &mut dyn VirtualDrive, action: &Action, now: Instant) -> Result<()
         Action::Temperature(sensor, celsius) => drive.hold_temperature(*sensor, *celsius, now)?,
         Action::Fault(component, broken) => drive.set_fault(*component, *broken, now)?,
         Action::Battery(connected) => drive.set_battery(*connected, now)?,
+        Action::Pulses(train) => drive.set_pulses(*train, now)?,
         // The cable, the power cycle and the report are the world's.
         Action::CableCut(_) | Action::PowerCycle | Action::Get => {}
     }
@@ -97,6 +98,8 @@ struct Got<'a> {
     model: &'a str,
     powered: bool,
     position: i64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rotor_position: Option<i64>,
     velocity_rpm: f64,
     current_a: f64,
     supply_v: f64,
@@ -128,6 +131,7 @@ fn get(world: &mut World, number: u8, id: StationId) -> Result<String, CommandEr
         model,
         powered,
         position,
+        rotor_position: report.rotor_position,
         velocity_rpm,
         current_a,
         supply_v,

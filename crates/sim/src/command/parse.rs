@@ -3,7 +3,7 @@
 use std::str::FromStr;
 
 use super::{Action, Command, CommandError};
-use crate::{Component, SwitchRange, TemperatureSensor};
+use crate::{Component, PulseTrain, SwitchRange, TemperatureSensor};
 
 impl FromStr for Command {
     type Err = CommandError;
@@ -33,6 +33,9 @@ const SUPPLY: &str = "NODE supply VOLTS";
 const TEMPERATURE: &str = "NODE temperature motor|driver CELSIUS|auto";
 const FAULT: &str = "NODE fault hall|encoder|eeprom|reference|phase on|off";
 const BATTERY: &str = "NODE battery on|off";
+const PULSES: &str = "NODE pulses COUNT HZ";
+const QUADRATURE: &str = "NODE quadrature COUNT HZ";
+const DUTY: &str = "NODE duty PERCENT";
 const CABLE: &str = "NODE cable cut|join";
 const GET: &str = "NODE get";
 
@@ -63,6 +66,18 @@ fn parse_action(words: &[&str]) -> Result<Action, CommandError> {
         "temperature" => parse_temperature(arguments),
         "fault" => parse_fault(arguments),
         "battery" => Ok(Action::Battery(choice(arguments, "on", "off", BATTERY)?)),
+        "pulses" => {
+            let (count, hz) = count_and_rate(arguments, PULSES)?;
+            Ok(Action::Pulses(PulseTrain::Pulses { count, hz }))
+        }
+        "quadrature" => {
+            let (count, hz) = count_and_rate(arguments, QUADRATURE)?;
+            Ok(Action::Pulses(PulseTrain::Quadrature { count, hz }))
+        }
+        "duty" => match arguments {
+            [percent] => Ok(Action::Pulses(PulseTrain::Duty(number(percent, "duty cycle", 0.0, DUTY)?))),
+            _ => Err(CommandError::Usage(DUTY)),
+        },
         "cable" => Ok(Action::CableCut(choice(arguments, "cut", "join", CABLE)?)),
         "get" if arguments.is_empty() => Ok(Action::Get),
         "get" => Err(CommandError::Usage(GET)),
@@ -128,6 +143,13 @@ fn parse_fault(arguments: &[&str]) -> Result<Action, CommandError> {
     Ok(Action::Fault(component, choice(&[state], "on", "off", FAULT)?))
 }
 
+/// Signed pulses or counts, and how many a second.
+fn count_and_rate(arguments: &[&str], usage: &'static str) -> Result<(i64, f64), CommandError> {
+    let [count, hz] = arguments else { return Err(CommandError::Usage(usage)) };
+    let bad = |_| CommandError::BadValue { text: count.to_string(), what: "count", usage };
+    Ok((count.parse().map_err(bad)?, number(hz, "frequency", 0.0, usage)?))
+}
+
 /// One word that must be `yes` (true) or `no` (false).
 fn choice(arguments: &[&str], yes: &str, no: &str, usage: &'static str) -> Result<bool, CommandError> {
     match arguments {
@@ -188,6 +210,9 @@ mod tests {
         assert_eq!(action("4 fault reference on"), Action::Fault(Component::Reference, true));
         assert_eq!(action("4 fault phase on"), Action::Fault(Component::Phase, true));
         assert_eq!(action("4 battery off"), Action::Battery(false));
+        assert_eq!(action("4 pulses 8192 10000"), Action::Pulses(PulseTrain::Pulses { count: 8192, hz: 1e4 }));
+        assert_eq!(action("4 quadrature -400 1e3"), Action::Pulses(PulseTrain::Quadrature { count: -400, hz: 1e3 }));
+        assert_eq!(action("4 duty 40"), Action::Pulses(PulseTrain::Duty(40.0)));
         assert_eq!(action("4 cable cut"), Action::CableCut(true));
         assert_eq!(action("4 cable join"), Action::CableCut(false));
         assert_eq!(action("\t4   get "), Action::Get);
@@ -208,12 +233,12 @@ mod tests {
             (
                 "4",
                 "unknown command \"\" for a node; expected power, input, switch, load, rotor, supply, temperature, \
-                 fault, battery, cable or get",
+                 fault, battery, pulses, quadrature, duty, cable or get",
             ),
             (
                 "4 Power on",
                 "unknown command \"Power\" for a node; expected power, input, switch, load, rotor, supply, \
-                 temperature, fault, battery, cable or get",
+                 temperature, fault, battery, pulses, quadrature, duty, cable or get",
             ),
             ("4 power", "expected: NODE power on|off|cycle"),
             ("4 power up", "expected: NODE power on|off|cycle"),
@@ -246,6 +271,10 @@ mod tests {
             ("4 fault hall", "expected: NODE fault hall|encoder|eeprom|reference|phase on|off"),
             ("4 fault fuse on", "expected: NODE fault hall|encoder|eeprom|reference|phase on|off"),
             ("4 battery low", "expected: NODE battery on|off"),
+            ("4 pulses 5", "expected: NODE pulses COUNT HZ"),
+            ("4 pulses 1.5 100", "\"1.5\" is no count; expected: NODE pulses COUNT HZ"),
+            ("4 quadrature 5 fast", "\"fast\" is no frequency; expected: NODE quadrature COUNT HZ"),
+            ("4 duty", "expected: NODE duty PERCENT"),
             ("4 cable off", "expected: NODE cable cut|join"),
             ("4 get position", "expected: NODE get"),
         ] {

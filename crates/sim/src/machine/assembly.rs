@@ -1,6 +1,6 @@
 use drives::Firmware;
 
-use crate::{Component, Refused, Report, TemperatureSensor};
+use crate::{Component, PulseTrain, Refused, Report, TemperatureSensor};
 
 /// One model's hardware: motor, load, supply, sensors, and the memory chip that outlives power.
 ///
@@ -13,6 +13,11 @@ pub trait Assembly: Clone + Send + 'static {
     const MODEL: &'static str;
     /// Names of the digital inputs.
     const INPUTS: &'static [&'static str];
+
+    /// The model's name as users type it, where one assembly serves several.
+    fn model(&self) -> &'static str {
+        Self::MODEL
+    }
 
     /// What the firmware finds when it wakes.
     fn hardware(&self) -> <Self::Firmware as Firmware>::Hardware;
@@ -32,8 +37,14 @@ pub trait Assembly: Clone + Send + 'static {
     /// Whether the voltage is enough for the firmware to run on (`running`), or to start.
     fn supplies_firmware(&self, running: bool) -> bool;
 
-    /// Where the motor shaft truly is, in counts of the drive's size, from an arbitrary zero.
+    /// Where the motor shaft truly is, in counts of a fixed size, from an arbitrary zero.
     fn shaft_counts(&self) -> i64;
+
+    /// How many of those are one count of the drive as it is set now.
+    fn shaft_counts_per_count(&self, firmware: &Self::Firmware) -> i64 {
+        let _ = firmware;
+        1
+    }
 
     /// The drive counts against the shaft's own direction.
     fn counts_reversed(&self, firmware: &Self::Firmware) -> bool;
@@ -65,7 +76,13 @@ pub trait Assembly: Clone + Send + 'static {
     /// Connects or disconnects the multi-turn battery, where there is one.
     fn set_battery(&mut self, connected: bool) -> Result<(), Refused> {
         let _ = connected;
-        Err(Refused::Absent { model: Self::MODEL, what: "battery" })
+        Err(Refused::Absent { model: self.model(), what: "battery" })
+    }
+
+    /// Sends pulses to the inputs, where the drive counts them.
+    fn set_pulses(&mut self, train: PulseTrain) -> Result<(), Refused> {
+        let _ = train;
+        Err(Refused::Absent { model: self.model(), what: "pulse input" })
     }
 }
 

@@ -6,16 +6,21 @@
 //! communication deadlines only, and the result does not depend on when it looked.
 
 mod assembly;
+mod mjoint;
+mod pulse_source;
 mod switch;
 mod zlac8030l;
+mod zlim42c;
 
 use can::{Bitrate, Frame, Instant, Station};
 use drives::Firmware;
 
 pub use assembly::Assembly;
+pub use mjoint::{Joint, MJointMachine, mjoint};
 pub use zlac8030l::{HubWheel, Zlac8030lMachine, zlac8030l};
+pub use zlim42c::{Stepper, Zlim42c82Machine, Zlim42cMachine, zlim42c, zlim42c_82};
 
-use crate::{Component, Refused, Report, SwitchRange, TemperatureSensor, VirtualDrive};
+use crate::{Component, PulseTrain, Refused, Report, SwitchRange, TemperatureSensor, VirtualDrive};
 use switch::Input;
 
 /// How often a drive without enough voltage to run looks whether it has come.
@@ -111,7 +116,8 @@ impl<A: Assembly> Machine<A> {
     }
 
     fn input(&mut self, input: usize) -> Result<&mut Input, Refused> {
-        self.inputs.get_mut(input).ok_or(Refused::Absent { model: A::MODEL, what: "such input" })
+        let model = self.assembly.model();
+        self.inputs.get_mut(input).ok_or(Refused::Absent { model, what: "such input" })
     }
 }
 
@@ -150,7 +156,7 @@ impl<A: Assembly> Station for Machine<A> {
 
 impl<A: Assembly> VirtualDrive for Machine<A> {
     fn model(&self) -> &'static str {
-        A::MODEL
+        self.assembly.model()
     }
 
     fn set_power(&mut self, on: bool, now: Instant) {
@@ -188,9 +194,10 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
     fn set_switch(&mut self, input: usize, range: SwitchRange, now: Instant) -> Result<(), Refused> {
         self.advance(now);
         let shaft = self.assembly.shaft_counts();
+        let scale = self.assembly.shaft_counts_per_count(&self.firmware);
         let position = i64::from(self.firmware.report().position_counts);
         let reversed = self.assembly.counts_reversed(&self.firmware);
-        *self.input(input)? = Input::switch(range, position, shaft, reversed);
+        *self.input(input)? = Input::switch(range, position, shaft, scale, reversed);
         Ok(())
     }
 
@@ -235,6 +242,11 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
         self.assembly.set_battery(connected)
     }
 
+    fn set_pulses(&mut self, train: PulseTrain, now: Instant) -> Result<(), Refused> {
+        self.advance(now);
+        self.assembly.set_pulses(train)
+    }
+
     fn nvm_generation(&self) -> u64 {
         u64::from(self.firmware.eeprom().1)
     }
@@ -245,7 +257,7 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
 
     fn load_nvm(&mut self, image: &[u8]) -> Result<(), Refused> {
         if image.len() != self.assembly.image().len() {
-            return Err(Refused::BadImage { model: A::MODEL, reason: "it has another length" });
+            return Err(Refused::BadImage { model: self.assembly.model(), reason: "it has another length" });
         }
         self.assembly.keep_image(image);
         Ok(())

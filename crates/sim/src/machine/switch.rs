@@ -16,13 +16,15 @@ impl Default for Input {
 }
 
 impl Input {
-    /// A switch at `range` of a drive that now shows `position` while its shaft is at `shaft`.
-    pub(super) fn switch(range: SwitchRange, position: i64, shaft: i64, reversed: bool) -> Self {
-        let place = |at: i64| {
-            let way = at.saturating_sub(position);
+    /// A switch at `range` of a drive that now shows `position` while its shaft is at `shaft`, `scale` of whose counts
+    /// are one of the drive's. A bound takes in the half of a drive's count beyond it.
+    pub(super) fn switch(range: SwitchRange, position: i64, shaft: i64, scale: i64, reversed: bool) -> Self {
+        let place = |at: i64, margin: i64| {
+            let way = at.saturating_sub(position).saturating_mul(scale).saturating_add(margin);
             shaft.saturating_add(if reversed { way.saturating_neg() } else { way })
         };
-        let (low, high) = (range.low.map(place), range.high.map(place));
+        let margin = scale / 2;
+        let (low, high) = (range.low.map(|at| place(at, -margin)), range.high.map(|at| place(at, margin)));
         Self::Switch(if reversed { SwitchRange { low: high, high: low } } else { SwitchRange { low, high } })
     }
 }
@@ -40,7 +42,7 @@ mod tests {
     #[test]
     fn a_switch_stays_where_it_is_when_the_drive_zeroes_its_position() {
         // The drive shows 100 with the shaft at 1000: -50..-40 is 850..860 of the shaft for ever.
-        let switch = Input::switch(RANGE, 100, 1000, false);
+        let switch = Input::switch(RANGE, 100, 1000, 1, false);
         for (shaft, level) in [(849, false), (850, true), (860, true), (861, false)] {
             assert_eq!(is_high(switch, shaft), level, "{shaft}");
         }
@@ -48,8 +50,16 @@ mod tests {
 
     #[test]
     fn a_drive_that_counts_backwards_has_its_switch_on_the_other_side() {
-        let switch = Input::switch(RANGE, 100, 1000, true);
+        let switch = Input::switch(RANGE, 100, 1000, 1, true);
         for (shaft, level) in [(1139, false), (1140, true), (1150, true), (1151, false)] {
+            assert_eq!(is_high(switch, shaft), level, "{shaft}");
+        }
+    }
+
+    #[test]
+    fn finer_shaft_counts_round_to_those_of_the_drive() {
+        let switch = Input::switch(SwitchRange { low: Some(2), high: Some(3) }, 0, 0, 10, false);
+        for (shaft, level) in [(14, false), (15, true), (35, true), (36, false)] {
             assert_eq!(is_high(switch, shaft), level, "{shaft}");
         }
     }
@@ -57,8 +67,8 @@ mod tests {
     #[test]
     fn an_open_end_reaches_for_ever_in_the_drives_direction() {
         let range = SwitchRange { low: Some(0), high: None };
-        assert!(is_high(Input::switch(range, 0, 0, false), i64::MAX));
-        assert!(is_high(Input::switch(range, 0, 0, true), i64::MIN));
-        assert!(!is_high(Input::switch(range, 0, 0, true), 1));
+        assert!(is_high(Input::switch(range, 0, 0, 1, false), i64::MAX));
+        assert!(is_high(Input::switch(range, 0, 0, 1, true), i64::MIN));
+        assert!(!is_high(Input::switch(range, 0, 0, 1, true), 1));
     }
 }

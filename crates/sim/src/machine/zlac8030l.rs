@@ -92,6 +92,7 @@ impl Assembly for HubWheel {
         let sensed = self.motor.sense();
         Sensors {
             encoder_count: sensed.encoder_count,
+            encoder_wired: self.motor.encoder.fault != EncoderFault::Disconnected,
             hall: sensed.hall,
             phase_current_a: [sensed.phase_current_a[0] as f32, sensed.phase_current_a[1] as f32],
             bus_v: sensed.bus_v as f32,
@@ -129,6 +130,7 @@ impl Assembly for HubWheel {
             statusword: running.then(|| firmware.values().get(objects::STATUSWORD)),
             error_code: u32::from(own.fault_code),
             position: i64::from(own.position_counts),
+            rotor_position: None,
             position_demand: demand.position,
             velocity_rpm: direction(self, firmware) * rotor.velocity_rad_s * RPM_PER_RAD_S,
             velocity_demand_rpm: demand.velocity_rpm,

@@ -1,0 +1,230 @@
+//! What a host's writes set in motion.
+
+use can::Instant;
+use canopen::heartbeat::Consumer;
+use canopen::node::{NodeEvent, Via};
+use canopen::od::Slot;
+use cia402::{Controlword, ModeOfOperation};
+
+use super::{Homing, MJoint, OwnMotion};
+use crate::mjoint::homing::Run;
+use crate::mjoint::objects::effects::{Effect, effect};
+use crate::mjoint::objects::*;
+use crate::mjoint::readings::{SET_ORIGIN, SUPERVISION_DIVIDER};
+
+/// Bits 1 to 3 of the controlword, without which nothing moves.
+const MAY_MOVE: u16 = Controlword::ENABLE_VOLTAGE | Controlword::QUICK_STOP | Controlword::ENABLE_OPERATION;
+
+/// The RPDO whose position waits for SYNC.
+const SYNCHRONOUS_RPDO: u8 = 4;
+
+impl MJoint {
+    pub(super) fn handle_events(&mut self, now: Instant) {
+        while let Some(event) = self.node.poll_event() {
+            match event {
+                NodeEvent::Written { slot, raw, via } => self.written(slot, raw, via),
+                NodeEvent::ResetNode => self.restart(self.node.node_id(), now),
+                NodeEvent::ResetCommunication => self.restart_communication(now),
+                NodeEvent::Nmt(_) | NodeEvent::Sync | NodeEvent::RpdoTooShort(_) => {}
+            }
+        }
+    }
+
+    /// A peer wrote `raw` to `slot`. The status is shown anew at once: the answer to the same frame may carry it.
+    fn written(&mut self, slot: Slot, raw: u32, via: Via) {
+        match effect(slot) {
+            Effect::Command => self.command(Controlword(raw as u16)),
+            Effect::SelectMode => self.select_mode(ModeOfOperation(raw as u8 as i8)),
+            Effect::Target => self.target_written(raw as i32, via),
+            Effect::Increment => self.increment(raw as i32),
+            Effect::Follow => {}
+            Effect::OutputEnabled => self.output_enabled(raw == 1),
+            Effect::AlarmCode => self.clear_alarm(raw == 0),
+            Effect::GearNumerator => self.gear_numerator(raw as u16),
+            Effect::Save => self.save_asked = raw == 1,
+            Effect::ConsumerHeartbeat => self.watch_another_host(raw),
+            Effect::Parameter => self.parameters_changed = true,
+        }
+        self.publish_status();
+    }
+
+    /// 6040h. The host takes the motor over with bit 0; bit 7 resets alarms; bit 4 clears itself.
+    fn command(&mut self, asked: Controlword) {
+        self.refresh_parameters();
+        if asked.has(Controlword::FAULT_RESET) {
+            self.reset_alarms();
+        }
+        if asked.has(Controlword::SWITCH_ON) {
+            self.own_motion = OwnMotion::None;
+        }
+        self.controlword = Controlword(asked.0 & !Controlword::NEW_SET_POINT);
+        self.node.dictionary_mut().set(CONTROLWORD, self.controlword.0);
+        self.take_or_let_go();
+        if !self.may_move() {
+            self.next_point = None;
+        }
+        if asked.has(Controlword::NEW_SET_POINT) && self.mode == ModeOfOperation::PROFILE_POSITION {
+            let target = self.values().get(TARGET_POSITION);
+            self.start_move(target);
+        }
+    }
+
+    /// 6060h. Homing starts with the write, each time, unless it is under way.
+    fn select_mode(&mut self, mode: ModeOfOperation) {
+        self.refresh_parameters();
+        if mode == ModeOfOperation::HOMING {
+            if !matches!(self.homing, Homing::Running(_)) {
+                self.begin_homing(mode);
+            }
+        } else if mode != self.mode {
+            self.homing = Homing::None;
+            self.next_point = None;
+            self.axis.hold(&self.parameters.ramps);
+        }
+        self.mode = mode;
+        self.take_or_let_go();
+    }
+
+    fn begin_homing(&mut self, mode: ModeOfOperation) {
+        self.mode = mode;
+        self.next_point = None;
+        self.own_motion = OwnMotion::None;
+        let (pu, dir) = (self.inputs.levels() & 1 != 0, self.inputs.levels() & 2 != 0);
+        let run = self.parameters.homing_method.filter(|_| self.can_be_live()).map(|method| Run::new(method, pu, dir));
+        self.homing = run.map_or(Homing::None, Homing::Running);
+    }
+
+    /// 607Ah: with bit 5 each write starts a move, and so does SYNC with the position of RPDO4. Else it waits.
+    fn target_written(&mut self, target: i32, via: Via) {
+        let with_sync = matches!(via, Via::Rpdo(number) if number.number() == SYNCHRONOUS_RPDO);
+        let immediately = with_sync || self.controlword.has(Controlword::CHANGE_SET_IMMEDIATELY);
+        match self.mode {
+            ModeOfOperation::PROFILE_POSITION if immediately => self.start_move(target),
+            ModeOfOperation::INTERPOLATED_POSITION if self.may_move() => self.interpolate_to(target),
+            _ => {}
+        }
+    }
+
+    /// 261Ch: above 0 the time base begins with SYNC, and the next point is taken up at once; else it runs by itself and
+    /// takes the point up when it is over.
+    fn interpolate_to(&mut self, target: i32) {
+        if self.parameters.synchronised {
+            self.axis.interpolate(target, self.parameters.max_speed);
+            self.base_periods = 0;
+            // A SYNC that comes a control period early or late does not move the loops.
+            if (1..SUPERVISION_DIVIDER - 1).contains(&self.periods) {
+                self.periods = SUPERVISION_DIVIDER - 1;
+            }
+        } else {
+            self.next_point = Some(target);
+        }
+    }
+
+    fn start_move(&mut self, target: i32) {
+        if !self.may_move() {
+            return;
+        }
+        self.refresh_parameters();
+        let relative = self.controlword.has(Controlword::RELATIVE);
+        let target = if relative { self.axis.base().wrapping_add(target) } else { target };
+        self.axis.move_to(target, &self.parameters.moves);
+    }
+
+    /// 260Ch: so many counts more, at once.
+    fn increment(&mut self, by: i32) {
+        if self.may_move() && self.mode == ModeOfOperation::PROFILE_POSITION {
+            self.refresh_parameters();
+            let target = self.axis.base().wrapping_add(by);
+            self.axis.move_to(target, &self.parameters.moves);
+        }
+    }
+
+    /// 2601h: 0 takes the power stage away, a 1 after it resets alarms.
+    fn output_enabled(&mut self, enabled: bool) {
+        let was_enabled = core::mem::replace(&mut self.output_was_enabled, enabled);
+        if enabled && !was_enabled {
+            self.reset_alarms();
+        }
+        if !enabled {
+            self.own_motion = OwnMotion::None;
+            self.fail_homing();
+        }
+        self.take_or_let_go();
+    }
+
+    fn clear_alarm(&mut self, clear: bool) {
+        if clear {
+            self.reset_alarms();
+        }
+        self.publish_alarms();
+    }
+
+    /// 260Ah: 60006 and then 60016 make the present position the origin, and neither stays.
+    fn gear_numerator(&mut self, value: u16) {
+        let [first, second] = SET_ORIGIN;
+        let armed = core::mem::replace(&mut self.origin_asked, value == first);
+        if armed && value == second {
+            self.make_origin();
+        }
+        if value == first || (armed && value == second) {
+            let kept = self.gear_numerator;
+            self.node.dictionary_mut().set(GEAR_NUMERATOR, kept);
+        } else {
+            self.gear_numerator = value;
+            self.parameters_changed = true;
+        }
+    }
+
+    /// The present position becomes 0 with the next control period; the turns are known again.
+    pub(super) fn make_origin(&mut self) {
+        self.set_origin = true;
+        self.protection.origin_set();
+        self.alarms.release(crate::mjoint::alarms::row::BATTERY);
+        self.publish_alarms();
+    }
+
+    /// 1016h:01. The watch begins anew with the next heartbeat.
+    fn watch_another_host(&mut self, raw: u32) {
+        self.host = Consumer::from_raw(raw);
+        self.host_lost = false;
+        self.alarms.release(crate::mjoint::alarms::row::COMMUNICATION);
+        self.publish_alarms();
+    }
+
+    // ---- who may move ----
+
+    /// Pulses are ignored and the host's targets count: bit 0 of the controlword, or 2600h.
+    pub(super) fn is_host_in_control(&self) -> bool {
+        self.controlword.has(Controlword::SWITCH_ON) || self.values().get(MODBUS_ENABLE) == 1
+    }
+
+    /// The host's targets may move the motor.
+    pub(super) fn may_move(&self) -> bool {
+        self.axis.is_engaged() && self.is_host_in_control() && self.controlword.has(MAY_MOVE)
+    }
+
+    /// Nothing forbids the power stage.
+    pub(super) fn can_be_live(&self) -> bool {
+        let releasing = self.alarms.latched().0 & crate::mjoint::alarms::RELEASING.0;
+        self.awake && self.values().get(OUTPUT_ENABLED) == 1 && releasing == 0
+    }
+
+    /// The power stage drives the motor: bit 1 of the controlword, homing in mode 6, or the joint's own motion.
+    fn wants_to_be_live(&self) -> bool {
+        let homing = matches!(self.homing, Homing::Running(_) | Homing::Attained);
+        let own = matches!(self.own_motion, OwnMotion::Returning | OwnMotion::Following);
+        self.can_be_live() && (self.controlword.has(Controlword::ENABLE_VOLTAGE) || homing || own)
+    }
+
+    /// Takes the shaft over or lets go of it, as it has become right.
+    pub(super) fn take_or_let_go(&mut self) {
+        let live = self.wants_to_be_live();
+        if live && !self.axis.is_engaged() {
+            self.axis.engage(&self.parameters.ramps);
+        } else if !live && self.axis.is_engaged() {
+            self.axis.release();
+            self.next_point = None;
+            self.demand = crate::engine::axis::Demand::Off;
+        }
+    }
+}

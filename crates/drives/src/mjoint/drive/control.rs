@@ -1,0 +1,256 @@
+//! The control task.
+
+use cia402::{Controlword, ModeOfOperation};
+use motion::filter::LowPassGains;
+
+use super::{Homing, MJoint, OwnMotion};
+use crate::engine::axis::Demand;
+use crate::engine::faults::FaultSet;
+use crate::mjoint::alarms::{self, row};
+use crate::mjoint::axis::Feedback;
+use crate::mjoint::gains::MODULATION_LIMIT;
+use crate::mjoint::hardware::Sensors;
+use crate::mjoint::objects::TARGET_VELOCITY;
+use crate::mjoint::parameters::Parameters;
+use crate::mjoint::power_on::Function;
+use crate::mjoint::protection::Situation;
+use crate::mjoint::readings::*;
+
+const DT_S: f64 = SUPERVISION_PERIOD_S as f64;
+
+impl MJoint {
+    /// The encoder, every control period.
+    pub(super) fn sense(&mut self, sensors: &Sensors) {
+        let angle = sensors.angle_count % COUNTS_PER_TURN as u16;
+        if !self.awake {
+            self.awake = true;
+            (self.angle_count, self.position) = (angle, sensors.position_counts);
+        }
+        let moved = within_half_a_turn(angle.wrapping_sub(self.angle_count));
+        self.angle_count = angle;
+        self.shaft_count = self.shaft_count.wrapping_add(moved as u16);
+        // What the counts of turns moved by and the shaft did not is a new origin.
+        let shift = self.position.wrapping_add(i32::from(moved)).wrapping_sub(sensors.position_counts);
+        self.position = sensors.position_counts;
+        if shift != 0 {
+            self.axis.shift(shift);
+            self.publish_position();
+        }
+        let cycle = u32::from(angle) * u32::from(self.model.pole_pairs) % COUNTS_PER_TURN;
+        let electrical_turns = cycle as f32 / COUNTS_PER_TURN as f32;
+        self.servo.sense_absolute(&self.parameters.servo, electrical_turns, self.shaft_count);
+    }
+
+    /// Homing looks at its switch every control period, undelayed.
+    pub(super) fn watch_for_origin(&mut self, sensors: &Sensors) {
+        let Homing::Running(run) = &mut self.homing else { return };
+        if run.update(sensors.pu, sensors.dir, self.axis.direction()) {
+            self.homing = Homing::Attained;
+            self.make_origin();
+        }
+    }
+
+    /// Every tenth control period.
+    pub(super) fn supervise(&mut self, sensors: &Sensors) {
+        self.refresh_parameters();
+        let feedback = self.measure(sensors);
+        self.battery = sensors.battery;
+        self.inputs.update([sensors.pu, sensors.dir], INPUT_DEBOUNCE_PERIODS);
+        self.watch_alarms(sensors);
+        self.move_by_itself(sensors);
+        self.take_or_let_go();
+        if self.axis.is_engaged() {
+            self.direct();
+        }
+        self.demand = self.axis.update(feedback, DT_S);
+        let Parameters { servo, gains, limits, .. } = &self.parameters;
+        self.servo.control(servo, gains, &self.demand, feedback.position, limits);
+        self.publish(sensors);
+    }
+
+    pub(super) fn modulate(&mut self, sensors: &Sensors) {
+        if self.demand != Demand::Off {
+            let Parameters { servo, gains, .. } = &self.parameters;
+            self.duty = self.servo.modulate(servo, gains, three_phases(sensors), sensors.bus_v);
+        }
+    }
+
+    pub(super) fn refresh_parameters(&mut self) {
+        if self.parameters_changed {
+            self.parameters_changed = false;
+            let output = self.parameters.gains.foc.modulation_limit;
+            self.parameters = Parameters::from(self.node.dictionary(), self.model, self.function);
+            self.parameters.gains.foc.modulation_limit = output;
+        }
+    }
+
+    pub(super) fn velocity_rpm(&self) -> f32 {
+        self.servo.velocity_rad_s() * (60.0 / core::f32::consts::TAU)
+    }
+
+    fn measure(&mut self, sensors: &Sensors) -> Feedback {
+        self.servo.measure(&self.parameters.servo, &self.parameters.gains, three_phases(sensors));
+        let rpm = self.velocity_rpm();
+        let shown = LowPassGains::from_time_constant(DISPLAY_FILTER_S, SUPERVISION_PERIOD_S);
+        self.shown_velocity_rpm.update(&shown, rpm);
+        self.shown_current_a.update(&shown, self.servo.current_a());
+        let stationary = rpm.abs() < STATIONARY_RPM;
+        self.parameters.gains.foc.modulation_limit =
+            if stationary { self.parameters.stationary_output } else { MODULATION_LIMIT };
+        Feedback {
+            position: self.position,
+            velocity: f64::from(rpm) * COUNTS_S_PER_RPM,
+            standing: rpm.abs() < STANDSTILL_RPM,
+        }
+    }
+
+    // ---- alarms ----
+
+    fn watch_alarms(&mut self, sensors: &Sensors) {
+        let situation = Situation {
+            servo: &self.servo,
+            live: self.axis.is_engaged(),
+            velocity_rpm: self.velocity_rpm(),
+            latched: self.alarms.latched(),
+            host_lost: self.host_lost,
+        };
+        let causes = self.protection.causes(&self.parameters, sensors, &situation);
+        let new = self.alarms.observe(causes);
+        if !new.is_empty() {
+            self.fall(new);
+        }
+    }
+
+    /// New alarms. Those that stop the motor leave it free, and end what was under way.
+    fn fall(&mut self, new: FaultSet) {
+        if new.0 & alarms::RELEASING.0 != 0 {
+            self.own_motion = OwnMotion::None;
+            self.fail_homing();
+            self.take_or_let_go();
+        }
+        self.publish_alarms();
+    }
+
+    pub(super) fn fail_homing(&mut self) {
+        if matches!(self.homing, Homing::Running(_)) {
+            self.homing = Homing::Failed;
+        }
+    }
+
+    /// Forgets the alarms whose cause is gone.
+    pub(super) fn reset_alarms(&mut self) {
+        self.protection.reset();
+        self.alarms.reset();
+        self.publish_alarms();
+    }
+
+    // ---- what to do ----
+
+    /// Pulses, and what 2619h starts after power-on.
+    fn move_by_itself(&mut self, sensors: &Sensors) {
+        let by = self.pulses.update(&self.parameters.pulses, &sensors.pulses);
+        match self.own_motion {
+            OwnMotion::Starting => self.start_by_itself(sensors),
+            OwnMotion::Returning if self.axis.is_done() => self.own_motion = OwnMotion::Following,
+            OwnMotion::Returning => {}
+            _ if self.is_host_in_control() || !self.can_be_live() => {}
+            _ if matches!(self.homing, Homing::Running(_)) => {}
+            _ if self.function == Function::DutyCycleSpeed => self.follow_duty(sensors),
+            _ => self.follow_pulses(by),
+        }
+    }
+
+    /// Turns that are lost are no place to go to.
+    fn start_by_itself(&mut self, sensors: &Sensors) {
+        self.own_motion = OwnMotion::None;
+        let known = !sensors.turns_lost || matches!(self.function, Function::TurnToAngle(_));
+        let Some(target) = self.function.target(self.position).filter(|_| known && self.can_be_live()) else { return };
+        self.own_motion = OwnMotion::Returning;
+        self.take_or_let_go();
+        let ramps = crate::engine::trajectory::StraightRamps {
+            max_speed: self.parameters.homing_speed,
+            ..self.parameters.ramps
+        };
+        self.axis.move_to(target, &ramps);
+    }
+
+    fn follow_pulses(&mut self, by: i32) {
+        if by == 0 && self.own_motion != OwnMotion::Following {
+            return;
+        }
+        self.own_motion = OwnMotion::Following;
+        self.take_or_let_go();
+        self.axis.follow(by, &self.parameters.ramps, DT_S);
+    }
+
+    fn follow_duty(&mut self, sensors: &Sensors) {
+        let rpm = self.parameters.pulses.duty_speed_rpm(&sensors.pulses, sensors.dir);
+        if rpm == 0.0 && self.own_motion != OwnMotion::Following {
+            return;
+        }
+        self.own_motion = OwnMotion::Following;
+        self.take_or_let_go();
+        self.axis.turn(rpm * COUNTS_S_PER_RPM, &self.parameters.ramps);
+    }
+
+    /// Stops, and modes that give a new demand each period.
+    fn direct(&mut self) {
+        let ramps = self.parameters.ramps;
+        let by_host = self.own_motion == OwnMotion::None;
+        let homing = matches!(self.homing, Homing::Running(_) | Homing::Attained);
+        let forbidden = by_host && !homing && !self.may_move();
+        if forbidden {
+            // Quick stop and disabled operation end a move; halt and a lost host let it go on afterwards.
+            self.next_point = None;
+            self.axis.abandon();
+        }
+        let halted = self.controlword.has(Controlword::HALT) && by_host;
+        let host_lost = self.alarms.latched().has(row::COMMUNICATION);
+        self.axis.set_stop(forbidden || halted || host_lost, &ramps, self.parameters.max_speed);
+        if by_host && !forbidden {
+            self.direct_by_mode();
+        }
+    }
+
+    fn direct_by_mode(&mut self) {
+        let ramps = self.parameters.ramps;
+        match (self.mode, &self.homing) {
+            (ModeOfOperation::HOMING, Homing::Running(run)) => {
+                let speed = f64::from(run.direction()) * self.parameters.homing_speed;
+                self.axis.turn(speed, &ramps);
+            }
+            (ModeOfOperation::PROFILE_VELOCITY, _) => self.axis.turn(self.target_velocity(), &ramps),
+            (ModeOfOperation::INTERPOLATED_POSITION, _) => {
+                self.base_periods = (self.base_periods + 1) % INTERPOLATION_PERIODS;
+                if self.base_periods == 0
+                    && let Some(target) = self.next_point.take()
+                {
+                    self.axis.interpolate(target, self.parameters.max_speed);
+                }
+            }
+            (ModeOfOperation::HOMING, _) => self.axis.hold(&ramps),
+            _ => {}
+        }
+    }
+
+    /// 60FFh, no faster than the motor, counts/s.
+    pub(super) fn target_velocity(&self) -> f64 {
+        let speed = f64::from(self.values().get(TARGET_VELOCITY)) * COUNTS_S_PER_RPM;
+        speed.clamp(-self.parameters.max_speed, self.parameters.max_speed)
+    }
+}
+
+/// Counts between two angles, the short way.
+fn within_half_a_turn(difference: u16) -> i16 {
+    let difference = difference % COUNTS_PER_TURN as u16;
+    if difference >= COUNTS_PER_TURN as u16 / 2 {
+        difference.wrapping_sub(COUNTS_PER_TURN as u16) as i16
+    } else {
+        difference as i16
+    }
+}
+
+fn three_phases(sensors: &Sensors) -> [f32; 3] {
+    let [u, v] = sensors.phase_current_a;
+    [u, v, -u - v]
+}

@@ -1,0 +1,113 @@
+//! Actual values -> dictionary.
+
+use cia402::{Controlword, ModeOfOperation};
+
+use super::{HEARTBEAT_ALARM, Homing, MJoint, OwnMotion};
+use crate::engine::axis::Demand;
+use crate::mjoint::alarms;
+use crate::mjoint::hardware::Sensors;
+use crate::mjoint::objects::*;
+use crate::mjoint::readings::{COUNTS_S_PER_RPM, POSITION_REACHED_COUNTS, SPEED_REACHED_RPM, STANDSTILL_RPM};
+use crate::mjoint::statusword::{Condition, statusword};
+
+/// 6078h: 1/2000 A.
+const CURRENT_COUNTS_PER_A: f32 = 2000.0;
+/// 6079h: 1/327 V.
+const VOLTAGE_COUNTS_PER_V: f32 = 327.0;
+/// 606Ch: 0.1 r/min.
+const SPEED_COUNTS_PER_RPM: f32 = 10.0;
+/// Largest value of the 16-bit objects.
+const LARGEST: f32 = 32767.0;
+
+impl MJoint {
+    pub(super) fn publish(&mut self, sensors: &Sensors) {
+        let speed = round(self.shown_velocity_rpm.value * SPEED_COUNTS_PER_RPM).clamp(-30_000.0, 30_000.0) as i16;
+        let current = round(self.shown_current_a.value.abs() * CURRENT_COUNTS_PER_A).min(LARGEST) as u16;
+        let (inputs, pwm) = (self.inputs.levels(), self.output_pwm());
+        let values = self.node.dictionary_mut();
+        values.set(VELOCITY_ACTUAL_VALUE, speed);
+        values.set(CURRENT_ACTUAL_VALUE, current);
+        values.set(DC_LINK_VOLTAGE, round(sensors.bus_v * VOLTAGE_COUNTS_PER_V).clamp(0.0, LARGEST) as u16);
+        values.set(DRIVER_TEMPERATURE, round(sensors.driver_c).clamp(0.0, 100.0) as u16);
+        values.set(OUTPUT_PWM, pwm);
+        values.set(DIGITAL_INPUTS, inputs);
+        self.publish_position();
+        self.publish_status();
+    }
+
+    pub(super) fn publish_position(&mut self) {
+        let position = self.position;
+        let values = self.node.dictionary_mut();
+        values.set(POSITION_ACTUAL_VALUE, position);
+        values.set(POSITION_ACTUAL_INTERNAL_VALUE, position);
+    }
+
+    /// 260Eh, 1001h and the heartbeat.
+    pub(super) fn publish_alarms(&mut self) {
+        let code = alarms::code(self.alarms.latched());
+        let register = self.alarms.error_register();
+        let values = self.node.dictionary_mut();
+        values.set(ALARM_CODE, code);
+        values.set(ERROR_REGISTER, register);
+        self.node.set_heartbeat_state((code != 0).then_some(HEARTBEAT_ALARM));
+    }
+
+    /// The statusword; also right after a command, for a host that reads back.
+    pub(super) fn publish_status(&mut self) {
+        let in_homing = self.mode == ModeOfOperation::HOMING;
+        let condition = Condition {
+            controlword: self.controlword,
+            output_enabled: self.values().get(OUTPUT_ENABLED) == 1,
+            alarm: !self.alarms.latched().is_empty(),
+            live: self.axis.is_engaged(),
+            reached: self.is_target_reached(),
+            homing_attained: in_homing && matches!(self.homing, Homing::Attained),
+            homing_error: in_homing && matches!(self.homing, Homing::Failed),
+        };
+        self.node.dictionary_mut().set(STATUSWORD, statusword(&condition).0);
+    }
+
+    /// Bit 10: nothing is left to be done. An alarm that stops the motor leaves it undone.
+    fn is_target_reached(&self) -> bool {
+        let stopping = alarms::RELEASING.0 | 1 << alarms::row::COMMUNICATION;
+        if self.alarms.latched().0 & stopping != 0 {
+            return false;
+        }
+        if !self.axis.is_engaged() {
+            return true;
+        }
+        let halted = self.controlword.has(Controlword::HALT) && self.own_motion == OwnMotion::None;
+        if halted {
+            return self.velocity_rpm().abs() < STANDSTILL_RPM;
+        }
+        match self.mode {
+            _ if self.own_motion != OwnMotion::None => self.is_there(),
+            ModeOfOperation::HOMING => matches!(self.homing, Homing::Attained),
+            ModeOfOperation::PROFILE_VELOCITY if self.may_move() => self.is_at_speed(),
+            _ => self.is_there() && self.next_point.is_none(),
+        }
+    }
+
+    fn is_there(&self) -> bool {
+        self.axis.is_done() && self.axis.way_to_go().unsigned_abs() <= POSITION_REACHED_COUNTS
+    }
+
+    fn is_at_speed(&self) -> bool {
+        let target_rpm = self.target_velocity() / COUNTS_S_PER_RPM;
+        (f64::from(self.velocity_rpm()) - target_rpm).abs() <= SPEED_REACHED_RPM
+    }
+
+    /// 2613h: share of the bus voltage between two wires, signed as the current that is asked for.
+    fn output_pwm(&self) -> i16 {
+        if self.demand == Demand::Off {
+            return 0;
+        }
+        let most = self.duty.iter().fold(0.0_f32, |most, duty| most.max(*duty));
+        let least = self.duty.iter().fold(1.0_f32, |least, duty| least.min(*duty));
+        (round((most - least) * LARGEST) as i16).wrapping_mul(if self.servo.setpoint_a() < 0.0 { -1 } else { 1 })
+    }
+}
+
+fn round(value: f32) -> f32 {
+    libm::roundf(value)
+}

@@ -1,0 +1,35 @@
+//! The M-series robot joint motors M4230E17B50, M4230E17B80, M8025E25B50 and M8025E25B80: a servo motor with its drive,
+//! a multi-turn absolute encoder on a battery, and a reducer.
+//!
+//! Source: "M Robot Joint Motor CanOpen Manual" (Zhengzhou Defy Mechanical & Electrical Equipment). The four models are
+//! one firmware; [`Model`] holds what differs. It is no CiA 402 state machine: the [statusword](statusword) mirrors the
+//! controlword. Where the manual contradicts itself or is silent, the choice is a named constant in [`readings`] or
+//! [`gains`], or stands beside the row of [`objects`], with its reason.
+
+pub mod alarms;
+mod axis;
+mod drive;
+pub mod gains;
+pub mod hardware;
+pub mod homing;
+mod interpolation;
+pub mod leds;
+mod model;
+pub mod objects;
+mod parameters;
+pub mod power_on;
+mod profile;
+mod protection;
+pub mod pulses;
+pub mod readings;
+pub mod statusword;
+mod storage;
+
+pub use drive::{MJoint, NODE_PROFILE};
+pub use hardware::{Actuation, Battery, Brake, Hardware, PowerStage, Sensors};
+pub use model::Model;
+pub use profile::{M4230E17B50, M4230E17B80, M8025E25B50, M8025E25B80};
+pub use storage::Image;
+
+/// The values of the drive's objects.
+pub type Values = canopen::od::Dictionary<{ objects::ROW_COUNT }>;

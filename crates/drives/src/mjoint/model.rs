@@ -1,0 +1,59 @@
+//! What differs between the four models, as const data ("M Robot Joint Motor CanOpen Manual", "Parameters").
+
+/// One model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Model {
+    /// Name to type: `m4230e17b50`.
+    pub name: &'static str,
+    /// Reduction ratio: motor turns in one turn of the output.
+    pub ratio: f64,
+    /// Highest speed of the motor, r/min: no set-point is faster.
+    pub max_rpm: f64,
+    /// Electrical turns in one turn of the motor. Not printed: assumed, as for the motors of crate `plant`.
+    pub pole_pairs: u16,
+    /// Resistance of one phase, ohm: half of what is printed, which is between two wires.
+    pub resistance_ohm: f32,
+    /// Inductance of one phase, H: half of what is printed.
+    pub inductance_h: f32,
+    /// Current for each rad/s² of the bare motor: its inertia over its torque constant, A/(rad/s²).
+    pub acceleration_a_s2: f32,
+}
+
+impl Model {
+    /// 34 N·m, 0 to 30 r/min.
+    pub const M4230E17B50: Self = Self { name: "m4230e17b50", ratio: 50.0, ..M4230 };
+    /// 51 N·m, 0 to 15 r/min.
+    pub const M4230E17B80: Self = Self { name: "m4230e17b80", ratio: 80.0, ..M4230 };
+    /// 51 N·m, 0 to 30 r/min.
+    pub const M8025E25B50: Self = Self { name: "m8025e25b50", ratio: 50.0, ..M8025 };
+    /// 85 N·m, 0 to 18 r/min.
+    pub const M8025E25B80: Self = Self { name: "m8025e25b80", ratio: 80.0, ..M8025 };
+
+    /// The model of this name, in any case of letters.
+    pub fn named(name: &str) -> Option<&'static Self> {
+        static ALL: [Model; 4] = [Model::M4230E17B50, Model::M4230E17B80, Model::M8025E25B50, Model::M8025E25B80];
+        ALL.iter().find(|model| model.name.eq_ignore_ascii_case(name))
+    }
+}
+
+const M4230: Model = Model {
+    name: "m4230",
+    ratio: 1.0,
+    max_rpm: 2000.0,
+    pole_pairs: 10,
+    resistance_ohm: 0.5 * 0.86,
+    inductance_h: 0.5 * 0.8e-3,
+    // 36 V at 2000 r/min without load: 0.149 N·m/A.
+    acceleration_a_s2: 0.69e-4 / 0.149,
+};
+
+const M8025: Model = Model {
+    name: "m8025",
+    ratio: 1.0,
+    max_rpm: 1500.0,
+    pole_pairs: 10,
+    resistance_ohm: 0.5 * 0.53,
+    inductance_h: 0.5 * 0.5e-3,
+    // 36 V at 1500 r/min without load: 0.198 N·m/A.
+    acceleration_a_s2: 1.74e-4 / 0.198,
+};

@@ -1,0 +1,119 @@
+//! The dictionary's parameters in physical units, as the parts of the drive want them. Written anew when one changes.
+
+use motion::commutation::CommutationModel;
+use motion::observer::ObserverGains;
+
+use super::gains::gains;
+use super::model::Model;
+use super::objects::*;
+use super::power_on::Function;
+use super::pulses::PulseParameters;
+use super::readings::*;
+use super::{Values, homing};
+use crate::engine::servo::{ServoGains, ServoLimits, ServoModel};
+use crate::engine::trajectory::StraightRamps;
+
+/// rad/s in one r/min.
+const RAD_S_PER_RPM: f32 = core::f32::consts::TAU / 60.0;
+
+/// Everything that the control task reads of the dictionary besides its targets.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Parameters {
+    /// Highest speed of the motor, counts/s.
+    pub(super) max_speed: f64,
+    /// Of position moves.
+    pub(super) moves: StraightRamps,
+    /// Of everything else.
+    pub(super) ramps: StraightRamps,
+    /// The speed in the ones digit of 6083h, counts/s.
+    pub(super) homing_speed: f64,
+    pub(super) homing_method: Option<&'static homing::Method>,
+    pub(super) pulses: PulseParameters,
+    pub(super) servo: ServoModel,
+    pub(super) gains: ServoGains,
+    pub(super) limits: ServoLimits,
+    /// 261Dh: seconds at the current limit until the alarm, 0 for never.
+    pub(super) current_time_s: f32,
+    /// 2618h: share of the output that a stationary motor may have.
+    pub(super) stationary_output: f32,
+    /// 2618h: seconds at that limit until the alarm, 0 for never.
+    pub(super) stationary_time_s: f32,
+    /// 261Ch is not 0.
+    pub(super) synchronised: bool,
+    /// Ones digit of 60FBh:01 is odd: the alarm output conducts while there is an alarm.
+    pub(super) alarm_conducts: bool,
+}
+
+impl Parameters {
+    /// `function` is that of the last power-on: 2619h acts from the next one on.
+    pub(super) fn from(values: &Values, model: &Model, function: Function) -> Self {
+        let max_speed = model.max_rpm * COUNTS_S_PER_RPM;
+        let acceleration = acceleration(values);
+        let (current_a, current_time_s) = with_seconds(values.get(ALLOWABLE_CURRENT));
+        let (stationary_output, stationary_time_s) = with_seconds(values.get(STATIONARY_OUTPUT));
+        let profile_speed = f64::from(values.get(PROFILE_VELOCITY)) * COUNTS_S_PER_RPM;
+        Self {
+            max_speed,
+            moves: StraightRamps { max_speed: profile_speed.min(max_speed), acceleration },
+            ramps: StraightRamps { max_speed, acceleration },
+            homing_speed: homing_speed(values).min(max_speed),
+            homing_method: homing::method(values.get(HOMING_METHOD)),
+            pulses: pulses(values, function),
+            servo: servo_model(model),
+            gains: gains(values, model),
+            limits: ServoLimits { current_a, velocity_rad_s: model.max_rpm as f32 * RAD_S_PER_RPM },
+            current_time_s,
+            stationary_output,
+            stationary_time_s,
+            synchronised: values.get(SYNCHRONOUS_CONTROL_WORD) != 0,
+            alarm_conducts: is_odd(values.get(POSITION_PROPORTIONAL)),
+        }
+    }
+}
+
+/// Counts/s², 0 for no ramp. An acceleration of 0 would never move: the smallest is taken.
+fn acceleration(values: &Values) -> f64 {
+    let raw = values.get(PROFILE_ACCELERATION);
+    if raw >= NO_RAMP_FROM { 0.0 } else { f64::from(raw.max(1)) * COUNTS_S_PER_RPM }
+}
+
+/// "The ones digit 0~9 means the speed of finding the origin is 100~1000RPM."
+fn homing_speed(values: &Values) -> f64 {
+    f64::from(values.get(PROFILE_ACCELERATION) % 10 + 1) * 100.0 * COUNTS_S_PER_RPM
+}
+
+/// A value whose ones digit is a time in seconds and whose other digits are thousandths.
+fn with_seconds(raw: u16) -> (f32, f32) {
+    let seconds = raw % 10;
+    (f32::from(raw - seconds) * 1e-3, f32::from(seconds))
+}
+
+fn is_odd(raw: u16) -> bool {
+    raw % 2 == 1
+}
+
+fn pulses(values: &Values, function: Function) -> PulseParameters {
+    PulseParameters {
+        function,
+        numerator: values.get(GEAR_NUMERATOR),
+        denominator: values.get(GEAR_DENOMINATOR),
+        at_conduction: is_odd(values.get(VELOCITY_PROPORTIONAL)),
+        dir_is_clockwise: values.get(DIR_POLARITY) == 1,
+    }
+}
+
+fn servo_model(model: &Model) -> ServoModel {
+    ServoModel {
+        commutation: CommutationModel {
+            counts_per_turn: COUNTS_PER_TURN,
+            pole_pairs: u32::from(model.pole_pairs),
+            offset_turns: 0.0,
+            // No Hall sensors: the encoder is absolute.
+            sequence: [0; 6],
+        },
+        direction: 1,
+        observer: ObserverGains::new(VELOCITY_WINDOW_S, VELOCITY_STANDSTILL_S, CONTROL_PERIOD_S),
+        control_period_s: CONTROL_PERIOD_S,
+        supervision_period_s: SUPERVISION_PERIOD_S,
+    }
+}

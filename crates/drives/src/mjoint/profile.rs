@@ -1,0 +1,87 @@
+//! The four models as masters and tools see them.
+
+use can::Bitrate;
+use canopen::Mux;
+use cia402::ModeOfOperation;
+
+use super::alarms::ALARMS;
+use super::objects::TABLE;
+use super::readings::COUNTS_PER_TURN;
+use crate::profile::{
+    CountsPerTurn, DriveProfile, Faults, Identity, ParameterStorage, PdoRules, Quantity, Quirk, Ramps, Units, Write,
+};
+
+/// The M4230E17B50.
+pub static M4230E17B50: DriveProfile = joint("m4230e17b50", "M4230E17B50 joint motor");
+/// The M4230E17B80.
+pub static M4230E17B80: DriveProfile = joint("m4230e17b80", "M4230E17B80 joint motor");
+/// The M8025E25B50.
+pub static M8025E25B50: DriveProfile = joint("m8025e25b50", "M8025E25B50 joint motor");
+/// The M8025E25B80.
+pub static M8025E25B80: DriveProfile = joint("m8025e25b80", "M8025E25B80 joint motor");
+
+const fn joint(model: &'static str, title: &'static str) -> DriveProfile {
+    DriveProfile {
+        model,
+        title,
+        manual: "M Robot Joint Motor CanOpen Manual",
+        identity: Identity { device_type: 0x0002_0192, vendor_id: 0x331, product_code: 1, revision_number: 0x100 },
+        table: &TABLE,
+        node_id: 1,
+        bitrate: Bitrate::M1,
+        modes: &[
+            ModeOfOperation::PROFILE_POSITION,
+            ModeOfOperation::PROFILE_VELOCITY,
+            ModeOfOperation::HOMING,
+            ModeOfOperation::INTERPOLATED_POSITION,
+        ],
+        units: UNITS,
+        storage: ParameterStorage {
+            save: Write { object: Mux::new(0x2614, 0), value: 1 },
+            restore: None,
+            save_on_write: None,
+            effective_after_restart: AFTER_RESTART,
+        },
+        faults: Faults { code: Mux::new(0x260E, 0), bit_field: false, table: &ALARMS },
+        pdo: PdoRules {
+            inhibit_unit_ns: 100_000,
+            event_timer_unit_ns: 1_000_000,
+            max_objects: 3,
+            remap_while_valid: false,
+            fixed_mapping: true,
+        },
+        quirks: QUIRKS,
+    }
+}
+
+const AFTER_RESTART: &[Mux] = &[Mux::new(0x2615, 0), Mux::new(0x2619, 0)];
+
+const UNITS: Units = Units {
+    counts_per_turn: CountsPerTurn::Fixed(COUNTS_PER_TURN),
+    target_velocity: Quantity::new(0x60FF, 0, 1.0),
+    actual_velocity: Quantity::new(0x606C, 0, 0.1),
+    profile_velocity: Quantity::new(0x6081, 0, 1.0),
+    ramps: Ramps::Acceleration { both: Mux::new(0x6083, 0), none_from: 60_000 },
+    target_current: None,
+    actual_current: Some(Quantity::new(0x6078, 0, 1.0 / 2000.0)),
+    bus_voltage: Some(Quantity::new(0x6079, 0, 1.0 / 327.0)),
+    motor_temperature: None,
+    driver_temperature: Some(Quantity::new(0x2612, 0, 1.0)),
+};
+
+const QUIRKS: &[Quirk] = &[
+    Quirk::NoPowerStateMachine,
+    Quirk::StartsOperational,
+    Quirk::HeartbeatTellsAlarm,
+    Quirk::TpdoAnswersRpdo,
+    Quirk::NoEmcy,
+    Quirk::NoModeDisplay,
+    Quirk::HomingStartsWithMode,
+    Quirk::NewSetPointClearsItself,
+    Quirk::SpeedInTpdoDiffers,
+    Quirk::VelocityUnitsDiffer,
+    Quirk::NoSupportedDriveModes,
+    Quirk::NoStandardStore,
+    Quirk::NoErrorHistory,
+    Quirk::IdentityShared,
+];

@@ -1,0 +1,85 @@
+//! Which causes of alarms are present, judged once each supervision period.
+
+use super::alarms::row;
+use super::hardware::{Battery, Sensors};
+use super::parameters::Parameters;
+use super::readings::*;
+use crate::engine::faults::FaultSet;
+use crate::engine::servo::Servo;
+
+/// What has to be remembered from one period to the next.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Protection {
+    at_current_limit_s: f32,
+    at_output_limit_s: f32,
+    battery_was_missing: bool,
+    turns_were_lost: bool,
+    /// The turns are unknown until an origin is set.
+    battery_lost: bool,
+}
+
+/// What the causes are judged by, besides the sensors.
+pub(super) struct Situation<'a> {
+    pub(super) servo: &'a Servo,
+    pub(super) live: bool,
+    pub(super) velocity_rpm: f32,
+    pub(super) latched: FaultSet,
+    /// The heartbeat of the host is missing.
+    pub(super) host_lost: bool,
+}
+
+impl Protection {
+    pub(super) fn causes(&mut self, parameters: &Parameters, sensors: &Sensors, now: &Situation<'_>) -> FaultSet {
+        self.watch_battery(sensors);
+        FaultSet::NONE
+            .with(row::OVER_VOLTAGE, over_voltage(sensors.bus_v, now))
+            .with(row::LOCKED_ROTOR, self.locked_rotor(parameters, now))
+            .with(row::STALL, self.stall(parameters, now))
+            .with(row::COMMUNICATION, now.host_lost)
+            .with(row::BATTERY, self.battery_lost)
+    }
+
+    /// A reset gives both times back.
+    pub(super) fn reset(&mut self) {
+        self.at_current_limit_s = 0.0;
+        self.at_output_limit_s = 0.0;
+    }
+
+    /// A new origin has been set: the turns are known.
+    pub(super) fn origin_set(&mut self) {
+        self.battery_lost = false;
+    }
+
+    /// Told once each time: a battery that stays away does not bring the alarm back after an origin was set.
+    fn watch_battery(&mut self, sensors: &Sensors) {
+        let missing = sensors.battery == Battery::Missing;
+        self.battery_lost |= missing && !self.battery_was_missing;
+        self.battery_lost |= sensors.turns_lost && !self.turns_were_lost;
+        self.battery_was_missing = missing;
+        self.turns_were_lost = sensors.turns_lost;
+    }
+
+    /// The current stays at the limit of 261Dh.
+    fn locked_rotor(&mut self, parameters: &Parameters, now: &Situation<'_>) -> bool {
+        let limit_a = parameters.limits.current_a;
+        let at_limit = now.live && limit_a > 0.0 && now.servo.current_a().abs() >= AT_CURRENT_LIMIT_SHARE * limit_a;
+        lasts(&mut self.at_current_limit_s, at_limit, parameters.current_time_s)
+    }
+
+    /// The output stays at the limit of 2618h and the motor does not turn.
+    fn stall(&mut self, parameters: &Parameters, now: &Situation<'_>) -> bool {
+        let at_limit = now.live && now.servo.is_saturated() && now.velocity_rpm.abs() < STATIONARY_RPM;
+        lasts(&mut self.at_output_limit_s, at_limit, parameters.stationary_time_s)
+    }
+}
+
+/// True once something has lasted for `limit_s`; a limit of 0 never is.
+fn lasts(lasted_s: &mut f32, present: bool, limit_s: f32) -> bool {
+    *lasted_s = if present { *lasted_s + SUPERVISION_PERIOD_S } else { 0.0 };
+    limit_s > 0.0 && *lasted_s >= limit_s
+}
+
+fn over_voltage(bus_v: f32, now: &Situation<'_>) -> bool {
+    let recovered = if now.latched.has(row::OVER_VOLTAGE) { VOLTAGE_HYSTERESIS_V } else { 0.0 };
+    bus_v > OVER_VOLTAGE_V - recovered || bus_v.is_nan()
+}

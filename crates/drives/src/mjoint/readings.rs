@@ -1,0 +1,99 @@
+//! Figures that the manual ("M Robot Joint Motor CanOpen Manual") does not give, each with the reason for its value.
+
+/// Counts of the encoder in one turn of the motor's shaft: "15 bit absolute encoder, one lap pulse up to 32768".
+pub const COUNTS_PER_TURN: u32 = 32768;
+
+/// Counts/s in one r/min.
+pub const COUNTS_S_PER_RPM: f64 = COUNTS_PER_TURN as f64 / 60.0;
+
+/// Control period: 20 kHz, usual for the switching of such a power stage.
+pub const CONTROL_PERIOD_NS: u64 = 50_000;
+
+/// Control period in seconds.
+pub const CONTROL_PERIOD_S: f32 = 50e-6;
+
+/// Control periods in one supervision period.
+pub const SUPERVISION_DIVIDER: u8 = 10;
+
+/// Supervision period: "location sampling frequency 2 kHz".
+pub const SUPERVISION_PERIOD_S: f32 = 0.5e-3;
+
+/// Communication task: with the supervision.
+pub const COMMUNICATION_PERIOD_NS: u64 = 500_000;
+
+/// Supervision periods in the time base of the interpolation, 2 ms (261Ch).
+pub const INTERPOLATION_PERIODS: u8 = 4;
+
+/// 6081h as delivered, r/min: rated speed of the M4230, highest speed of the M8025.
+pub const PROFILE_VELOCITY_RPM: i64 = 1500;
+
+/// 6083h as delivered, (r/min)/s: the value of the examples in 5.06.
+pub const ACCELERATION_RPM_S: i64 = 20_000;
+
+/// From this value of 6083h on there is no ramp ("Parameter debugging", 1).
+pub const NO_RAMP_FROM: u32 = 60_000;
+
+/// 60F9h:01 as delivered: see [`gains`](super::gains). Its ones digit is even.
+pub const VELOCITY_KP: i64 = 3000;
+
+/// 60F9h:02 as delivered: see [`gains`](super::gains).
+pub const VELOCITY_INTEGRAL_TIME_MS: i64 = 30;
+
+/// 60FBh:01 as delivered: what the manual gives for a stiff load ("Wire rod load"). Its ones digit is even.
+pub const POSITION_KP: i64 = 3000;
+
+/// 2618h as delivered: 60 % for 5 s.
+pub const STATIONARY_MAX_OUTPUT: i64 = 605;
+
+/// 261Dh as delivered: 7 A for 5 s. The M4230's rated torque takes 6.7 A of torque-producing current.
+pub const MAX_ALLOWABLE_CURRENT: i64 = 7005;
+
+/// Over-voltage alarm ("Alarm over 52V").
+pub const OVER_VOLTAGE_V: f32 = 52.0;
+
+/// How far the voltage has to come back before the alarm can be reset.
+pub const VOLTAGE_HYSTERESIS_V: f32 = 1.0;
+
+/// 1 ms: longer than a switching transient, shorter than what the capacitors survive.
+pub const VOLTAGE_DEBOUNCE_PERIODS: u16 = 2;
+
+/// The current counts as at its limit from this share of it: a regulated current swings about its set-point.
+pub const AT_CURRENT_LIMIT_SHARE: f32 = 0.95;
+
+/// Under this speed the motor is stationary: 2618h limits its output then, and it can stall, r/min. An eighth of
+/// the slowest homing speed.
+pub const STATIONARY_RPM: f32 = 12.0;
+
+/// Under this speed the motor counts as standing for bit 10, r/min: two counts in a supervision period.
+pub const STANDSTILL_RPM: f32 = 8.0;
+
+/// Tolerance of "target position reached", counts: a third of a degree of the motor's shaft.
+pub const POSITION_REACHED_COUNTS: u32 = 30;
+
+/// Tolerance of "given speed reached", r/min: 1 % of the rated speeds.
+pub const SPEED_REACHED_RPM: f64 = 10.0;
+
+/// Longest span over which the velocity is taken from counts: a supervision period, of which one count is 4 r/min.
+pub const VELOCITY_WINDOW_S: f32 = 0.5e-3;
+
+/// Without a count for so long the velocity reads zero: 0.1 r/min.
+pub const VELOCITY_STANDSTILL_S: f32 = 20e-3;
+
+/// Time constant of the measured velocity: a tenth of the velocity loop's own, and four noisy samples.
+pub const VELOCITY_FILTER_S: f32 = 0.2e-3;
+
+/// Time constant of what 606Ch and 6078h show: a host sees the mean of its cycle, not one sample.
+pub const DISPLAY_FILTER_S: f32 = 5e-3;
+
+/// How long an input must hold a level to be shown in 60FDh: two supervision periods.
+pub const INPUT_DEBOUNCE_PERIODS: u8 = 2;
+
+/// Duty cycle of speed 0 and of [`DUTY_FULL_RPM`], and that speed ("10%~90% for 0~1000RPM").
+pub const DUTY_ZERO: f32 = 0.1;
+/// See [`DUTY_ZERO`].
+pub const DUTY_FULL: f32 = 0.9;
+/// See [`DUTY_ZERO`].
+pub const DUTY_FULL_RPM: f64 = 1000.0;
+
+/// 260Ah: the first and second value of setting the multi-turn origin.
+pub const SET_ORIGIN: [u16; 2] = [60006, 60016];

@@ -1,0 +1,528 @@
+//! The drive: the engine's parts joined over the dictionary.
+//!
+//! Three rhythms: frames as they come (`handle_frame`), the communication task every 0.5 ms (`handle_timeout`), and the
+//! control period of 50 us ([`Firmware::tick`]), of which every tenth is a supervision period.
+
+use can::{Bitrate, Frame, Instant, Station};
+use canopen::node::{Node, NodeEvent, NodeProfile};
+use canopen::od::{Entry, Slot};
+use canopen::pdo::EventTrigger;
+use canopen::{EmcyErrorCode, NodeId};
+use cia402::{Controlword, ModeOfOperation, PowerState};
+
+use super::faults::{FAULT_COUNT, FAULTS, FLASHES, row};
+use super::hardware::{Actuation, Hardware, PowerStage, Sensors};
+use super::objects::effects::{Effect, effect};
+use super::objects::*;
+use super::parameters::Parameters;
+use super::protection::{Situation, causes, is_over_current};
+use super::readings::*;
+use super::statusword::{self, statusword};
+use super::storage::Image;
+use super::terminals::{self, Conditions};
+use super::{Values, led, restart};
+use crate::engine::axis::{Axis, Demand, Feedback, Targets};
+use crate::engine::faults::{FaultMonitor, FaultSet};
+use crate::engine::inputs::Inputs;
+use crate::engine::stepper::Stepper;
+use crate::engine::storage::Store;
+use crate::{Firmware, Report};
+
+/// How this drive communicates: as its sibling ZLAC8030L, since its manual gives no more than the object table.
+pub static NODE_PROFILE: NodeProfile = NodeProfile {
+    inhibit_unit_ns: 500_000,
+    event_timer_unit_ns: 500_000,
+    event_trigger: EventTrigger::ChangeOr255ByTimer,
+    pdo_changes_while_valid: true,
+    ..NodeProfile::cia_301(&TABLE)
+};
+
+/// The firmware of a ZLIM42-C.
+#[derive(Clone)]
+pub struct Zlim42c {
+    node: Node<ROW_COUNT>,
+    store: Store,
+    dip_address: u8,
+    running: bool,
+    /// 2009h as it was at the last restart.
+    bitrate: Bitrate,
+    parameters: Parameters,
+    parameters_changed: bool,
+    axis: Axis,
+    stepper: Stepper,
+    demand: Demand,
+    targets: Targets,
+    controlword: Controlword,
+    faults: FaultMonitor<FAULT_COUNT>,
+    /// The fault that 603Fh and the red light tell of: the last that came.
+    shown_fault: Option<usize>,
+    eeprom_ok: bool,
+    inputs: Inputs<4>,
+    external_stop: bool,
+    outputs: [bool; 2],
+    periods: u8,
+    next_task: Instant,
+}
+
+impl Zlim42c {
+    /// A drive without supply. [`Firmware::power_on`] starts it.
+    pub fn new() -> Self {
+        let node = Node::new(&NODE_PROFILE, NodeId::MIN);
+        Self {
+            parameters: Parameters::from(node.dictionary()),
+            node,
+            store: Store::new(Image::factory().0),
+            dip_address: 0,
+            running: false,
+            bitrate: Bitrate::K500,
+            parameters_changed: false,
+            axis: Axis::new(&[]),
+            stepper: Stepper::default(),
+            demand: Demand::Off,
+            targets: Targets::default(),
+            controlword: Controlword(0),
+            faults: FaultMonitor::new(&FAULTS),
+            shown_fault: None,
+            eeprom_ok: true,
+            inputs: Inputs::default(),
+            external_stop: false,
+            outputs: [false; 2],
+            periods: 0,
+            next_task: Instant::ZERO,
+        }
+    }
+
+    /// The values of the objects, to look at.
+    pub fn values(&self) -> &Values {
+        self.node.dictionary()
+    }
+
+    /// What the current vector is asked for, to look at.
+    pub const fn demand(&self) -> &Demand {
+        &self.demand
+    }
+
+    /// Amplitude of the current vector asked for, A.
+    pub const fn current_demand_a(&self) -> f32 {
+        self.stepper.reference_a()
+    }
+
+    /// Pulses in one turn: 2006h as it is in effect.
+    pub const fn pulses_per_turn(&self) -> u16 {
+        self.parameters.pulses_per_turn
+    }
+
+    /// How far the current vector has turned since power-on, in electrical turns.
+    pub fn vector_turns(&self) -> f64 {
+        self.stepper.vector_turns(&self.parameters.model)
+    }
+
+    /// The communication side, to look at.
+    pub const fn node(&self) -> &Node<ROW_COUNT> {
+        &self.node
+    }
+
+    /// Starts the firmware over: stored values, node-ID and bit rate anew, motor free, position 0.
+    fn restart(&mut self, now: Instant) {
+        let mut values = Values::new(&TABLE, NodeId::MIN);
+        // An unreadable store leaves factory values; the fault follows with the first look at the sensors.
+        let _ = self.store.load(&mut values, |_| true);
+        let node_id = restart::node_id(self.dip_address, &values);
+        let mut started = Self::new();
+        started.node = Node::new(&NODE_PROFILE, node_id);
+        let _ = self.store.load(started.node.dictionary_mut(), |_| true);
+        started.node.dictionary_mut().set(NODE_ID, u16::from(node_id.raw()));
+        started.store = self.store.clone();
+        started.dip_address = self.dip_address;
+        started.running = true;
+        started.bitrate = restart::bitrate(started.values());
+        started.parameters = Parameters::from(started.values());
+        started.stepper = self.stepper.restarted();
+        let pulses = |parameters: &Parameters| parameters.model.pulses_per_electrical_turn;
+        started.stepper.rescale(pulses(&self.parameters), pulses(&started.parameters));
+        started.next_task = now.plus_nanos(COMMUNICATION_PERIOD_NS);
+        started.axis.self_test_done();
+        *self = started;
+        self.publish_status();
+        self.node.boot(now);
+    }
+
+    /// NMT reset communication: 1000h to 1FFFh as at power-on; motor and node-ID go on.
+    fn restart_communication(&mut self, now: Instant) {
+        self.node.restore_communication_defaults();
+        let _ = self.store.load(self.node.dictionary_mut(), is_communication);
+        self.node.boot(now);
+        self.publish_error_register();
+    }
+
+    fn handle_events(&mut self, now: Instant) {
+        while let Some(event) = self.node.poll_event() {
+            match event {
+                NodeEvent::Written { slot, raw, .. } => self.written(slot, raw, now),
+                NodeEvent::ResetNode => self.restart(now),
+                NodeEvent::ResetCommunication => self.restart_communication(now),
+                NodeEvent::Nmt(_) | NodeEvent::Sync | NodeEvent::RpdoTooShort(_) => {}
+            }
+        }
+    }
+
+    /// A peer wrote `raw` to `slot`.
+    fn written(&mut self, slot: Slot, raw: u32, now: Instant) {
+        if self.values().get(SAVE_ON_WRITE) == 0 {
+            self.store.mark(&TABLE, slot);
+        }
+        match effect(slot) {
+            Effect::Command => self.command(Controlword(raw as u16), now),
+            Effect::SelectMode => {
+                self.axis.request_mode(ModeOfOperation(raw as u8 as i8));
+                self.publish_status();
+            }
+            Effect::Registers => self.registers(raw, now),
+            Effect::FaultReset => {
+                if raw == 1 && self.axis.state() == PowerState::Fault {
+                    self.reset_faults(now);
+                }
+                self.node.dictionary_mut().set(FAULT_RESET, 0);
+            }
+            Effect::ClearPosition => {
+                if raw == 1 {
+                    self.shift_position(self.stepper.position());
+                }
+                self.node.dictionary_mut().set(CLEAR_CURRENT_POSITION, 0);
+            }
+            Effect::Target => {}
+            Effect::Parameter => self.parameters_changed = true,
+        }
+    }
+
+    fn command(&mut self, controlword: Controlword, now: Instant) {
+        self.refresh_parameters();
+        self.controlword = controlword;
+        let target = self.values().get(TARGET_POSITION);
+        if self.axis.command(controlword, target, &self.parameters.axis) {
+            self.reset_faults(now);
+        }
+        self.publish_status();
+    }
+
+    /// 2010h: reads 0 again when it is done.
+    fn registers(&mut self, command: u32, now: Instant) {
+        match command {
+            1 => self.restore_factory_settings(now),
+            2 => self.store.mark_all(&TABLE),
+            _ => {}
+        }
+        self.node.dictionary_mut().set(REGISTER_PARAMETER_SETTING, 0);
+    }
+
+    /// Everything in the EEPROM becomes as delivered. Parameters take effect at once, communication objects with the next
+    /// restart: until then they show what the drive does. An EEPROM fault ends with it.
+    fn restore_factory_settings(&mut self, now: Instant) {
+        if !self.eeprom_ok {
+            return;
+        }
+        let node_id = self.node.node_id();
+        self.store.format(&Values::new(&TABLE, node_id));
+        for (slot, _) in TABLE.iter().filter(|(_, row)| row.stored && !is_communication(row)) {
+            self.node.dictionary_mut().restore_default(slot, node_id);
+        }
+        self.parameters_changed = true;
+        if self.faults.forget(row::EEPROM) {
+            self.reset_faults(now);
+        }
+    }
+
+    /// The zero of the position: what was `by` is 0 from now on, and whatever moves goes on moving.
+    fn shift_position(&mut self, by: i32) {
+        self.axis.shift_position(by);
+        self.stepper.shift(by);
+        if let Demand::Position(point) | Demand::Velocity(point) = &mut self.demand {
+            point.position = point.position.wrapping_sub(by);
+        }
+        let position = self.stepper.position();
+        self.node.dictionary_mut().set(POSITION_ACTUAL_VALUE, position);
+    }
+
+    /// Commanded velocity in r/min.
+    fn velocity_rpm(&self) -> f64 {
+        self.stepper.velocity() / self.parameters.pulses_s_per_rpm
+    }
+
+    // ---- faults ----
+
+    fn watch_faults(&mut self, sensors: &Sensors, now: Instant) {
+        self.eeprom_ok = sensors.eeprom_ok;
+        let situation = Situation {
+            peaks: self.stepper.take_peaks(),
+            amplitude_a: self.stepper.reference_a(),
+            eeprom_readable: self.store.is_readable(),
+            latched: self.faults.latched(),
+        };
+        let new = self.faults.observe(causes(sensors, &situation));
+        self.fall(new, now);
+    }
+
+    /// New faults: off, and tell.
+    fn fall(&mut self, new: FaultSet, now: Instant) {
+        if new.is_empty() {
+            return;
+        }
+        self.axis.fault();
+        self.energise(Demand::Off);
+        for row in new.rows() {
+            self.shown_fault = Some(row);
+            let register = self.faults.error_register();
+            self.node.raise_emcy(FAULTS[row].emcy, register, [0; 5], now);
+        }
+        self.publish_error_code();
+        self.publish_status();
+    }
+
+    /// Forgets the faults whose cause is gone; with the last one the drive leaves Fault.
+    fn reset_faults(&mut self, now: Instant) {
+        let all_gone = self.faults.reset();
+        self.shown_fault = self.shown_fault.filter(|row| self.faults.latched().has(*row));
+        self.shown_fault = self.shown_fault.or_else(|| self.faults.latched().rows().last());
+        self.publish_error_code();
+        self.publish_error_register();
+        if all_gone {
+            self.axis.reset_fault();
+            self.node.raise_emcy(EmcyErrorCode::NO_ERROR, 0, [0; 5], now);
+        }
+        self.publish_status();
+    }
+
+    // ---- the control task ----
+
+    /// Every tenth control period.
+    fn supervise(&mut self, sensors: &Sensors, now: Instant) {
+        self.refresh_parameters();
+        self.watch_faults(sensors, now);
+        self.read_inputs(sensors);
+        let max_speed = self.parameters.axis.velocity.max_speed;
+        let target_rpm = f64::from(self.values().get(TARGET_VELOCITY));
+        let velocity = (target_rpm * self.parameters.pulses_s_per_rpm).clamp(-max_speed, max_speed);
+        self.targets = Targets { velocity, current_a: 0.0 };
+        let feedback = self.feedback();
+        let demand = self.axis.update(feedback, &self.targets, &self.parameters.axis, SUPERVISION_PERIOD_S);
+        self.energise(demand);
+        if let Some(home) = self.axis.take_home() {
+            let offset = self.values().get(HOME_OFFSET);
+            self.shift_position(home.wrapping_add(offset));
+        }
+        self.publish(sensors);
+    }
+
+    /// The motor follows what it is told, as far as the drive knows.
+    fn feedback(&self) -> Feedback {
+        let velocity = self.stepper.velocity();
+        Feedback {
+            position: self.stepper.position(),
+            velocity,
+            current_a: self.stepper.current_a(),
+            standing: velocity == 0.0,
+        }
+    }
+
+    fn energise(&mut self, demand: Demand) {
+        self.demand = demand;
+        self.stepper.command(&self.parameters.model, &demand, &self.parameters.currents);
+    }
+
+    /// Takes over changed parameters. Another number of pulses waits until the motor is free: it would turn the meaning of
+    /// every position over under the trajectory.
+    fn refresh_parameters(&mut self) {
+        if !self.parameters_changed {
+            return;
+        }
+        let (values, before) = (self.node.dictionary(), self.parameters);
+        let mut after = Parameters::from(values);
+        let waits = after.pulses_per_turn != before.pulses_per_turn && self.demand != Demand::Off;
+        if waits {
+            after = Parameters::with_pulses(values, before.pulses_per_turn);
+        } else {
+            self.stepper.rescale(before.model.pulses_per_electrical_turn, after.model.pulses_per_electrical_turn);
+        }
+        self.parameters_changed = waits;
+        self.parameters = after;
+    }
+
+    /// Debounced inputs; both ends of an external stop take the target away, so that nothing starts by itself.
+    fn read_inputs(&mut self, sensors: &Sensors) {
+        let periods = terminals::filter_periods(self.values());
+        let levels = self.inputs.update_each(sensors.inputs, periods);
+        let signals = terminals::signals(self.values(), levels);
+        self.axis.set_switches(signals.switches);
+        if signals.emergency_stop != self.external_stop {
+            self.external_stop = signals.emergency_stop;
+            self.axis.set_external_stop(self.external_stop);
+            self.node.dictionary_mut().set(TARGET_VELOCITY, 0);
+        }
+    }
+
+    fn power_stage(&mut self, sensors: &Sensors) -> PowerStage {
+        if self.demand == Demand::Off {
+            return PowerStage::Off;
+        }
+        let Parameters { model, gains, .. } = &self.parameters;
+        PowerStage::Modulate { duty: self.stepper.modulate(model, gains, sensors.phase_current_a, sensors.bus_v) }
+    }
+
+    // ---- actual values -> dictionary ----
+
+    fn publish(&mut self, sensors: &Sensors) {
+        let position = self.stepper.position();
+        let rpm = libm::round(self.velocity_rpm()) as i32;
+        let levels = self.inputs.levels();
+        let values = self.node.dictionary_mut();
+        values.set(POSITION_ACTUAL_VALUE, position);
+        values.set(VELOCITY_ACTUAL_VALUE, rpm);
+        values.set(MOTOR_SPEED, rpm as i16);
+        values.set(BUS_VOLTAGE, libm::roundf(sensors.bus_v) as u16);
+        values.set(INPUT_STATUS, levels);
+        self.publish_status();
+    }
+
+    /// Statusword, mode display and what follows from them; also right after a command, for a host that reads back.
+    fn publish_status(&mut self) {
+        let status = self.axis.status(&self.targets, &self.parameters.axis);
+        let (state, mode) = (self.axis.state(), self.axis.mode());
+        let energised = self.axis.is_energised(&self.parameters.axis);
+        let word =
+            statusword(statusword::Situation { state, mode, controlword: self.controlword, energised, axis: status });
+        let conditions = Conditions {
+            alarm: state == PowerState::Fault,
+            enabled: self.axis.is_live(),
+            homing_attained: status.homing_attained,
+            in_position: word.has(statusword::IN_POSITION),
+        };
+        self.outputs = terminals::outputs(self.values(), conditions);
+        let [y0, y1] = self.outputs;
+        let values = self.node.dictionary_mut();
+        values.set(STATUSWORD, word.0);
+        values.set(MODES_OF_OPERATION_DISPLAY, mode.0);
+        values.set(MOTOR_STATUS, u16::from(status.running));
+        values.set(OUTPUT_STATUS, u16::from(y0) | u16::from(y1) << 1);
+    }
+
+    fn publish_error_register(&mut self) {
+        let register = self.faults.error_register();
+        self.node.dictionary_mut().set(ERROR_REGISTER, register);
+    }
+
+    fn publish_error_code(&mut self) {
+        let code = self.error_code();
+        self.node.dictionary_mut().set(ERROR_CODE, code);
+    }
+
+    fn error_code(&self) -> u16 {
+        self.shown_fault.map_or(0, |row| FAULTS[row].code)
+    }
+}
+
+impl Default for Zlim42c {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Station for Zlim42c {
+    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
+        if self.running {
+            self.node.handle_frame(frame, now);
+            self.handle_events(now);
+        }
+    }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        if !self.running {
+            return;
+        }
+        self.node.handle_timeout(now);
+        self.handle_events(now);
+        if now >= self.next_task {
+            // The task keeps its grid unless it was not called for long.
+            let next = self.next_task.plus_nanos(COMMUNICATION_PERIOD_NS);
+            self.next_task = if next > now { next } else { now.plus_nanos(COMMUNICATION_PERIOD_NS) };
+            if self.eeprom_ok {
+                self.store.commit(self.node.dictionary());
+            }
+            self.node.notice_changes(now);
+        }
+    }
+
+    fn poll_transmit(&mut self) -> Option<Frame> {
+        self.node.poll_transmit()
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        let task = self.running.then_some(self.next_task)?;
+        Some(self.node.poll_timeout().map_or(task, |deadline| deadline.min(task)))
+    }
+
+    fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
+        self.node.handle_transmitted(frame, now);
+    }
+}
+
+impl Firmware for Zlim42c {
+    type Sensors = Sensors;
+    type Actuation = Actuation;
+    type Hardware = Hardware;
+
+    const CONTROL_PERIOD_NS: u64 = CONTROL_PERIOD_NS;
+
+    fn power_on(&mut self, hardware: &Hardware, now: Instant) {
+        self.dip_address = hardware.dip_address;
+        self.store.reopen(hardware.eeprom.0);
+        self.stepper = Stepper::default();
+        self.restart(now);
+    }
+
+    fn power_off(&mut self, _now: Instant) {
+        self.running = false;
+        self.node.power_off();
+        self.axis = Axis::new(&[]);
+        self.energise(Demand::Off);
+    }
+
+    fn tick(&mut self, sensors: &Sensors, now: Instant) -> Actuation {
+        if !self.running {
+            return Actuation::default();
+        }
+        if is_over_current(sensors) && self.faults.raise(row::OVER_CURRENT) {
+            self.fall(FaultSet::row(row::OVER_CURRENT), now);
+        }
+        self.periods += 1;
+        if self.periods >= SUPERVISION_DIVIDER {
+            self.periods = 0;
+            self.supervise(sensors, now);
+        }
+        let flashes = self.shown_fault.map_or(0, |row| FLASHES[row]);
+        Actuation { power_stage: self.power_stage(sensors), outputs: self.outputs, led: led::shown(flashes, now) }
+    }
+
+    fn eeprom(&self) -> (&[u8], u32) {
+        let (image, generation) = self.store.image();
+        (image, generation)
+    }
+
+    fn report(&self) -> Report {
+        Report {
+            powered: self.running,
+            node_id: self.node.node_id(),
+            bitrate: self.bitrate,
+            state: self.axis.state(),
+            mode: self.axis.mode(),
+            fault_code: self.error_code(),
+            position_counts: self.stepper.position(),
+            velocity_rpm: self.velocity_rpm() as f32,
+            current_a: self.stepper.current_a(),
+            brake_engaged: false,
+        }
+    }
+}
+
+fn is_communication(row: &Entry) -> bool {
+    matches!(row.index, 0x1000..=0x1FFF)
+}

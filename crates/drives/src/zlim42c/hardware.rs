@@ -1,0 +1,72 @@
+//! What the drive's pins read and do: the border between firmware and the physical world.
+
+use super::led::Led;
+use super::storage::Image;
+
+/// What the drive measures, each control period. There is no position sensor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sensors {
+    /// Currents of phases A and B, A.
+    pub phase_current_a: [f32; 2],
+    /// Voltage of the direct-voltage bus.
+    pub bus_v: f32,
+    /// The reference of the current measurement; [`REFERENCE_V`](super::readings::REFERENCE_V) when sound.
+    pub reference_v: f32,
+    /// Levels of inputs X0 to X3; an unconnected input is low.
+    pub inputs: [bool; 4],
+    /// The EEPROM answers.
+    pub eeprom_ok: bool,
+}
+
+impl Default for Sensors {
+    /// No current at 24 V, nothing wrong.
+    fn default() -> Self {
+        Self {
+            phase_current_a: [0.0; 2],
+            bus_v: 24.0,
+            reference_v: super::readings::REFERENCE_V,
+            inputs: [false; 4],
+            eeprom_ok: true,
+        }
+    }
+}
+
+/// What the two bridges do.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum PowerStage {
+    /// All switches off: the motor is free but for its detent.
+    #[default]
+    Off,
+    /// Switching: phases A and B see the bus voltage times these, -1 to 1.
+    Modulate {
+        /// Duty cycles of A and B.
+        duty: [f32; 2],
+    },
+}
+
+/// What the drive does until the next control period.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Actuation {
+    /// The bridges.
+    pub power_stage: PowerStage,
+    /// Levels of outputs Y0 and Y1.
+    pub outputs: [bool; 2],
+    /// The two lights.
+    pub led: Led,
+}
+
+/// What the firmware finds at power-on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hardware {
+    /// Switches SW2 to SW5, SW2 lowest, OFF counting 1 (4.1): 1 to 15 are node-IDs, 0 lets 2008h decide.
+    pub dip_address: u8,
+    /// Contents of the EEPROM.
+    pub eeprom: Image,
+}
+
+impl Default for Hardware {
+    /// As delivered: all switches ON, factory settings.
+    fn default() -> Self {
+        Self { dip_address: 0, eeprom: Image::factory() }
+    }
+}

@@ -1,0 +1,28 @@
+//! The ZLIM42-C: an integrated open-loop stepper, motor and drive in one, in two lengths (70 and 82 mm).
+//!
+//! Source: "ZLIM42-C user manual V1.03" (2022-03-03, Chinese; names are translated). Where it contradicts itself or is
+//! silent, the choice is a named constant in [`readings`], or stands beside the row of [`objects`], with its reason.
+//! Nothing measures the rotor: positions and velocities are the commanded ones.
+
+mod drive;
+pub mod faults;
+pub mod hardware;
+pub mod led;
+pub mod objects;
+mod parameters;
+mod profile;
+mod protection;
+pub mod readings;
+mod restart;
+pub mod statusword;
+mod storage;
+pub mod tables;
+mod terminals;
+
+pub use drive::{NODE_PROFILE, Zlim42c};
+pub use hardware::{Actuation, Hardware, PowerStage, Sensors};
+pub use profile::{PROFILE, PROFILE_82};
+pub use storage::Image;
+
+/// The values of the drive's objects.
+pub type Values = canopen::od::Dictionary<{ objects::ROW_COUNT }>;

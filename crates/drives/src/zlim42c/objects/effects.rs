@@ -1,0 +1,42 @@
+//! What a write sets in motion, object by object. Objects that are not named here are parameters: the drive reads
+//! them when it needs them.
+
+use canopen::od::Slot;
+
+use super::{
+    CLEAR_CURRENT_POSITION, CONTROLWORD, FAULT_RESET, MODES_OF_OPERATION, REGISTER_PARAMETER_SETTING, TARGET_POSITION,
+    TARGET_VELOCITY,
+};
+
+/// The consequence of a write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effect {
+    /// 6040h: a command to the power state machine and the mode.
+    Command,
+    /// 6060h: another mode is asked for.
+    SelectMode,
+    /// 2010h: save or restore.
+    Registers,
+    /// 2011h: fault reset.
+    FaultReset,
+    /// 2012h: the position becomes zero.
+    ClearPosition,
+    /// 607Ah, 60FFh: read each period, or when a set-point is taken.
+    Target,
+    /// Parameters: taken over by the next parameter refresh.
+    Parameter,
+}
+
+/// What a write to `slot` does.
+pub fn effect(slot: Slot) -> Effect {
+    const EFFECTS: [(Slot, Effect); 7] = [
+        (CONTROLWORD.slot(), Effect::Command),
+        (TARGET_VELOCITY.slot(), Effect::Target),
+        (TARGET_POSITION.slot(), Effect::Target),
+        (MODES_OF_OPERATION.slot(), Effect::SelectMode),
+        (REGISTER_PARAMETER_SETTING.slot(), Effect::Registers),
+        (FAULT_RESET.slot(), Effect::FaultReset),
+        (CLEAR_CURRENT_POSITION.slot(), Effect::ClearPosition),
+    ];
+    EFFECTS.iter().find(|(named, _)| *named == slot).map_or(Effect::Parameter, |(_, effect)| *effect)
+}

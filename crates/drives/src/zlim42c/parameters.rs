@@ -1,0 +1,119 @@
+//! The dictionary's parameters in physical units, as the engine wants them. Written anew when one changes.
+
+use cia402::{DisableOperationOption, HaltOption, HomingMethod, QuickStopOption, ShutdownOption};
+use motion::pid::PiGains;
+
+use super::Values;
+use super::objects::*;
+use super::readings::*;
+use super::tables::{PEAK_CURRENTS_A, PULSES_PER_TURN, entry};
+use crate::engine::axis::{AxisParameters, StopRamp, Tolerances};
+use crate::engine::modes::{HomingParameters, VelocityRamps};
+use crate::engine::power::StepDownOptions;
+use crate::engine::stepper::{StepperCurrents, StepperGains, StepperModel};
+use crate::engine::trajectory::MoveLimits;
+
+/// Everything that the control task reads of the dictionary besides its targets.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Parameters {
+    /// Pulses in one turn.
+    pub(super) pulses_per_turn: u16,
+    /// Pulses/s in one r/min.
+    pub(super) pulses_s_per_rpm: f64,
+    pub(super) axis: AxisParameters,
+    pub(super) model: StepperModel,
+    pub(super) gains: StepperGains,
+    pub(super) currents: StepperCurrents,
+}
+
+impl Parameters {
+    pub(super) fn from(values: &Values) -> Self {
+        Self::with_pulses(values, pulses_per_turn(values))
+    }
+
+    /// The same with another number of pulses in a turn than 2006h has.
+    pub(super) fn with_pulses(values: &Values, pulses_per_turn: u16) -> Self {
+        Self {
+            pulses_per_turn,
+            pulses_s_per_rpm: f64::from(pulses_per_turn) / 60.0,
+            axis: axis(values, pulses_per_turn),
+            model: StepperModel {
+                pulses_per_electrical_turn: pulses_per_turn / TEETH as u16,
+                periods_per_command: SUPERVISION_DIVIDER,
+                control_period_s: CONTROL_PERIOD_S,
+            },
+            gains: StepperGains {
+                current: PiGains {
+                    proportional: f32::from(values.get(CURRENT_LOOP_KP)) * CURRENT_KP_V_PER_A,
+                    integral_per_s: f32::from(values.get(CURRENT_LOOP_KI)) * CURRENT_KI_V_PER_A_S,
+                },
+                modulation_limit: MODULATION_LIMIT,
+            },
+            currents: currents(values),
+        }
+    }
+}
+
+/// 2006h.
+fn pulses_per_turn(values: &Values) -> u16 {
+    entry(&PULSES_PER_TURN, values.get(MICROSTEP_SETTING))
+}
+
+fn axis(values: &Values, pulses_per_turn: u16) -> AxisParameters {
+    let speed = |rpm: f64| (rpm * f64::from(pulses_per_turn) / 60.0).min(STEP_FREQUENCY_HZ);
+    let time_s = |object| f64::from(values.get(object)) * 1e-3;
+    let start_speed = speed(f64::from(values.get(START_SPEED)));
+    let max_speed = speed(MAX_SPEED_RPM);
+    let (acceleration_time_s, deceleration_time_s) = (time_s(PROFILE_ACCELERATION), time_s(PROFILE_DECELERATION));
+    let homing_time_s = time_s(HOMING_ACCELERATION);
+    AxisParameters {
+        moves: MoveLimits {
+            start_speed,
+            max_speed: speed(f64::from(values.get(PROFILE_VELOCITY))),
+            end_speed: speed(f64::from(values.get(END_VELOCITY))),
+            acceleration_time_s,
+            deceleration_time_s,
+        },
+        velocity: VelocityRamps { start_speed, max_speed, acceleration_time_s, deceleration_time_s },
+        quick_stop_time_s: time_s(QUICK_STOP_DECELERATION),
+        torque_slope_a_s: 0.0,
+        quick_stop: QuickStopOption(values.get(QUICK_STOP_OPTION_CODE)),
+        step_down: StepDownOptions {
+            shutdown: ShutdownOption(values.get(SHUTDOWN_OPTION_CODE)),
+            disable_operation: DisableOperationOption(values.get(DISABLE_OPERATION_OPTION_CODE)),
+        },
+        halt: HaltOption(values.get(HALT_OPTION_CODE)),
+        lock_when_disabled: values.get(SHAFT_LOCK_WHEN_DISABLED) == 1,
+        hold_when_switched_on: true,
+        limit_stop: match values.get(LIMIT_STOP_MODE) {
+            0 => Some(StopRamp::SlowDown),
+            1 => Some(StopRamp::QuickStop),
+            _ => None,
+        },
+        homing: HomingParameters {
+            row: HomingMethod(values.get(HOMING_METHOD) as i8).row(),
+            search_speed: speed(f64::from(values.get(HOMING_SPEED))),
+            latch_speed: speed(f64::from(values.get(HOMING_SEARCH_SPEED))),
+            ramps: VelocityRamps {
+                start_speed,
+                max_speed,
+                acceleration_time_s: homing_time_s,
+                deceleration_time_s: homing_time_s,
+            },
+            back_off: (HOMING_BACK_OFF_TURNS * f64::from(pulses_per_turn)) as u32,
+        },
+        release_after_external_stop: false,
+        // What is commanded is what there is: every target is reached exactly.
+        tolerances: Tolerances { position: 0, velocity: VELOCITY_ROUNDING, current_a: 0.0 },
+    }
+}
+
+/// 2005h while turning; 2007h at standstill: half of it, or all.
+fn currents(values: &Values) -> StepperCurrents {
+    let run_a = entry(&PEAK_CURRENTS_A, values.get(CURRENT_SETTING));
+    let hold_a = if values.get(LOCK_CURRENT) == 0 { 0.5 * run_a } else { run_a };
+    StepperCurrents { run_a, hold_a, hold_after: HOLD_AFTER_PERIODS }
+}
+
+/// Pulses/s by which a planned velocity may miss its target in the last bits.
+const VELOCITY_ROUNDING: f64 = 1e-6;

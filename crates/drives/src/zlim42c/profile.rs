@@ -1,0 +1,85 @@
+//! The two models as masters and tools see them: they differ in their motors only.
+
+use can::Bitrate;
+use canopen::Mux;
+use cia402::ModeOfOperation;
+
+use super::faults::FAULTS;
+use super::objects::TABLE;
+use super::tables::PULSES_PER_TURN;
+use crate::profile::{
+    CountsPerTurn, DriveProfile, Faults, Identity, ParameterStorage, PdoRules, Quantity, Quirk, Ramps, Units, Write,
+};
+
+/// The ZLIM42-C of 70 mm.
+pub static PROFILE: DriveProfile = profile("zlim42c", "ZLTECH ZLIM42-C (70 mm)");
+
+/// The ZLIM42-C of 82 mm.
+pub static PROFILE_82: DriveProfile = profile("zlim42c-82", "ZLTECH ZLIM42-C (82 mm)");
+
+const fn profile(model: &'static str, title: &'static str) -> DriveProfile {
+    DriveProfile {
+        model,
+        title,
+        manual: "ZLIM42-C user manual V1.03",
+        // The same as the ZLAC8030L, whose objects have other meanings.
+        identity: Identity { device_type: 0x0004_0192, vendor_id: 0x100, product_code: 1, revision_number: 0 },
+        table: &TABLE,
+        node_id: 1,
+        bitrate: Bitrate::K500,
+        modes: &[ModeOfOperation::PROFILE_POSITION, ModeOfOperation::PROFILE_VELOCITY, ModeOfOperation::HOMING],
+        units: UNITS,
+        storage: ParameterStorage {
+            save: Write { object: Mux::new(0x2010, 0), value: 2 },
+            restore: Some(Write { object: Mux::new(0x2010, 0), value: 1 }),
+            save_on_write: Some((Write { object: Mux::new(0x200C, 0), value: 0 }, true)),
+            effective_after_restart: RESTART,
+        },
+        faults: Faults { code: Mux::new(0x603F, 0), bit_field: false, table: &FAULTS },
+        pdo: PdoRules {
+            inhibit_unit_ns: 500_000,
+            event_timer_unit_ns: 500_000,
+            max_objects: 4,
+            remap_while_valid: true,
+            fixed_mapping: false,
+        },
+        quirks: QUIRKS,
+    }
+}
+
+const UNITS: Units = Units {
+    counts_per_turn: CountsPerTurn::Table { object: Mux::new(0x2006, 0), counts: &PULSES_PER_TURN, default: 10 },
+    target_velocity: Quantity::new(0x60FF, 0, 1.0),
+    actual_velocity: Quantity::new(0x606C, 0, 1.0),
+    profile_velocity: Quantity::new(0x6081, 0, 1.0),
+    ramps: Ramps::Milliseconds {
+        acceleration: Mux::new(0x6083, 0),
+        deceleration: Mux::new(0x6084, 0),
+        quick_stop: Mux::new(0x6085, 0),
+    },
+    target_current: None,
+    actual_current: None,
+    bus_voltage: Some(Quantity::new(0x2069, 0, 1.0)),
+    motor_temperature: None,
+    driver_temperature: None,
+};
+
+const RESTART: &[Mux] = &[Mux::new(0x2008, 0), Mux::new(0x2009, 0)];
+
+const QUIRKS: &[Quirk] = &[
+    Quirk::NoSupportedDriveModes,
+    Quirk::NoStandardStore,
+    Quirk::NoErrorHistory,
+    Quirk::NoHeartbeatConsumer,
+    Quirk::IdentityShared,
+    Quirk::RampsAreTimes,
+    Quirk::PdoTimersInHalfMilliseconds,
+    Quirk::SubIndexZeroIsUnsigned16,
+    Quirk::VersionsAreNumbers,
+    Quirk::InPositionInBit15,
+    Quirk::WarningBitInFault,
+    Quirk::NoPositionSensor,
+    Quirk::EnergisedWhenSwitchedOn,
+    Quirk::HomingAttainedInBit8,
+    Quirk::BitRateWhereSiblingSaves,
+];

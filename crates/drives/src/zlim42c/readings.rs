@@ -1,0 +1,96 @@
+//! Figures that the manual ("ZLIM42-C user manual V1.03") does not give, each with the reason for its value.
+
+/// 1009h. The manual prints no value: version 1.00.
+pub const HARDWARE_VERSION: i64 = 0x0100;
+
+/// 100Ah and 2088h. The manual prints no value: version 1.03, as the manual itself.
+pub const SOFTWARE_VERSION: i64 = 0x0103;
+
+/// Rotor teeth of a motor with 200 full steps: electrical turns in a turn of the shaft.
+pub const TEETH: u32 = 50;
+
+/// Control period: 20 kHz, usual for the switching of such a power stage, and inaudible.
+pub const CONTROL_PERIOD_NS: u64 = 50_000;
+
+/// Control period in seconds.
+pub const CONTROL_PERIOD_S: f32 = 50e-6;
+
+/// Control periods in one supervision period: 0.5 ms, the unit of the sibling's PDO timers.
+pub const SUPERVISION_DIVIDER: u8 = 10;
+
+/// Supervision period in seconds.
+pub const SUPERVISION_PERIOD_S: f64 = 0.5e-3;
+
+/// Communication task: 0.5 ms, the unit of the sibling's PDO timers.
+pub const COMMUNICATION_PERIOD_NS: u64 = 500_000;
+
+/// Highest step frequency (2.1), pulses/s: it bounds every speed.
+pub const STEP_FREQUENCY_HZ: f64 = 200e3;
+
+/// Highest speed of 6081h and 60FFh, r/min.
+pub const MAX_SPEED_RPM: f64 = 3000.0;
+
+/// Bus voltage above which the drive reports over-voltage (2.1).
+pub const OVER_VOLTAGE_V: f32 = 40.0;
+
+/// How far the bus voltage has to come back before the fault's cause counts as gone.
+pub const VOLTAGE_HYSTERESIS_V: f32 = 1.0;
+
+/// 1 ms: longer than a switching transient, shorter than what the capacitors of the bus survive.
+pub const VOLTAGE_DEBOUNCE_PERIODS: u16 = 2;
+
+/// Phase current that counts as over-current, A: half as much again as the highest setting (2.2 A), beyond any overshoot
+/// of the current loop.
+pub const OVER_CURRENT_A: f32 = 3.3;
+
+/// Current drawn from the supply that counts as over-current, A: both phases at their highest setting with the full bus
+/// voltage is the most that the bridges can pass on (4.4 A).
+pub const BUS_OVER_CURRENT_A: f32 = 4.5;
+
+/// Both are watched every control period and act at once.
+pub const OVER_CURRENT_DEBOUNCE_PERIODS: u16 = 1;
+
+/// A phase counts as lost when it is asked for at least this share of the amplitude ...
+pub const PHASE_ASKED_SHARE: f32 = 0.3;
+
+/// ... and carries less than this share of it: a sound phase carries more, even where the motor's own voltage holds the
+/// current down at 3000 r/min.
+pub const PHASE_CARRIED_SHARE: f32 = 0.05;
+
+/// 10 ms: ten times the rise time of the current.
+pub const PHASE_LOSS_DEBOUNCE_PERIODS: u16 = 20;
+
+/// Reference of the current measurement, V: the supply of the controller.
+pub const REFERENCE_V: f32 = 3.3;
+
+/// Tolerance of the reference: a current reading off by more would let the drive exceed its limits.
+pub const REFERENCE_TOLERANCE_V: f32 = 0.33;
+
+/// 5 ms.
+pub const REFERENCE_DEBOUNCE_PERIODS: u16 = 10;
+
+/// Supervision periods from the last pulse until the current falls to the lock current (2007h): 100 ms, long enough for
+/// the rotor to settle after its last step.
+pub const HOLD_AFTER_PERIODS: u16 = 200;
+
+/// How far beyond the home switch methods 24 and 29 go before they come back slowly (5.3.6, "goes back some way"), in
+/// turns: 18 degrees, ten full steps, more than a switch's hysteresis and the way of its filter time at 60 r/min.
+pub const HOMING_BACK_OFF_TURNS: f64 = 0.05;
+
+/// Factory value of 204Bh and 204Ch, ms: 3.2 asks for pulses longer than 10 ms. No unit is printed.
+pub const INPUT_FILTER_MS: i64 = 10;
+
+/// Factory values of 2040h and 2041h: those of the sibling ZLAC8030L, since none are printed.
+pub const CURRENT_KP: i64 = 600;
+/// See [`CURRENT_KP`].
+pub const CURRENT_KI: i64 = 300;
+
+/// One count of 2040h, V/A: 600 counts give 15 V/A, a loop gain `kp T / L` of 0.27 and 0.14 with the windings of the two
+/// lengths (2.8 and 5.4 mH). A voltage acts one control period late, so 0.25 is critically damped and 1 unstable.
+pub const CURRENT_KP_V_PER_A: f32 = 25e-3;
+
+/// One count of 2041h, V/(A s): 300 counts give an integral time of 1 ms, of the order of the windings' L/R.
+pub const CURRENT_KI_V_PER_A_S: f32 = 50.0;
+
+/// Share of the bus voltage that the bridges can give; the rest is dead time.
+pub const MODULATION_LIMIT: f32 = 0.98;

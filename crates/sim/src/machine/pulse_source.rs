@@ -1,0 +1,110 @@
+//! What a controller sends to a drive's pulse inputs, and the timers behind them.
+
+use drives::mjoint::pulses::PulseInput;
+
+use super::assembly::within;
+use crate::{PulseTrain, Refused};
+
+/// Highest input frequency ("Maximum input pulse frequency 500 KHz").
+const MOST_HZ: f64 = 500e3;
+
+/// A pulse generator wired to PU and DIR.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PulseSource {
+    train: Option<Running>,
+    input: PulseInput,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Running {
+    train: PulseTrain,
+    /// Pulses or counts sent, with the share of the one under way.
+    sent: f64,
+}
+
+impl PulseSource {
+    /// Begins to send; what was being sent ends.
+    pub(super) fn start(&mut self, train: PulseTrain) -> Result<(), Refused> {
+        match train {
+            PulseTrain::Pulses { hz, .. } | PulseTrain::Quadrature { hz, .. } => {
+                within("frequency", "above 0 to 500000 Hz", f64::MIN_POSITIVE..=MOST_HZ, hz)?;
+            }
+            PulseTrain::Duty(percent) => {
+                let percent = within("duty cycle", "0 to 100 %", 0.0..=100.0, percent)?;
+                self.train = None;
+                self.input.duty = Some(percent as f32 / 100.0);
+                return Ok(());
+            }
+        }
+        self.input.duty = None;
+        self.train = Some(Running { train, sent: 0.0 });
+        Ok(())
+    }
+
+    pub(super) fn read(&self) -> PulseInput {
+        self.input
+    }
+
+    /// Time goes on.
+    #[inline]
+    pub(super) fn advance(&mut self, dt_s: f64) {
+        let Some(running) = self.train.as_mut() else { return };
+        let (count, hz) = match running.train {
+            PulseTrain::Pulses { count, hz } | PulseTrain::Quadrature { count, hz } => (count, hz),
+            PulseTrain::Duty(_) => return,
+        };
+        let before = running.sent;
+        running.sent = (before + hz * dt_s).min(count.unsigned_abs() as f64);
+        let sent = running.sent;
+        // The timers count down while DIR conducts, or while PU comes after it.
+        let step = |from: f64, to: f64| (to.floor() - from.floor()) as i64 * count.signum();
+        let add = |counter: u16, by: i64| counter.wrapping_add(by as u16);
+        if let PulseTrain::Quadrature { .. } = running.train {
+            self.input.quadrature = add(self.input.quadrature, step(before, sent));
+        } else {
+            // A pulse is up in the second half of its period.
+            self.input.rises = add(self.input.rises, step(before + 0.5, sent + 0.5));
+            self.input.falls = add(self.input.falls, step(before, sent));
+        }
+        if sent >= count.unsigned_abs() as f64 {
+            self.train = None;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(train: PulseTrain, s: f64) -> PulseInput {
+        let mut source = PulseSource::default();
+        source.start(train).expect("a train that can be sent");
+        (0..(s / 50e-6) as u32).for_each(|_| source.advance(50e-6));
+        source.read()
+    }
+
+    #[test]
+    fn exactly_as_many_pulses_are_sent_at_the_frequency_asked_for() {
+        for (count, hz) in [(8192, 10_000.0), (-777, 123.4), (60_000, 500e3)] {
+            let all = run(PulseTrain::Pulses { count, hz }, count.abs() as f64 / hz + 0.01);
+            assert_eq!((all.rises, all.falls), (count as u16, count as u16), "{count}");
+        }
+        let half = run(PulseTrain::Pulses { count: 8192, hz: 10_000.0 }, 0.4096);
+        assert!((4095..=4097).contains(&half.falls), "{}", half.falls);
+        assert_eq!(run(PulseTrain::Quadrature { count: -400, hz: 1e3 }, 1.0).quadrature, -400_i16 as u16);
+        assert_eq!(run(PulseTrain::Duty(40.0), 0.1).duty, Some(0.4));
+    }
+
+    #[test]
+    fn what_no_generator_can_send_is_refused() {
+        let mut source = PulseSource::default();
+        for train in [
+            PulseTrain::Pulses { count: 1, hz: 500_001.0 },
+            PulseTrain::Pulses { count: 1, hz: 0.0 },
+            PulseTrain::Quadrature { count: 1, hz: -1.0 },
+            PulseTrain::Duty(101.0),
+        ] {
+            assert!(source.start(train).is_err(), "{train:?}");
+        }
+    }
+}

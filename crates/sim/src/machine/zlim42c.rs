@@ -1,0 +1,258 @@
+//! A ZLIM42-C on its hardware: stepper, load, supply and EEPROM as the assembly of a machine.
+//!
+//! In go the bridges and outputs of the firmware, out come its sensors and the report for people. The drive does not
+//! know where its rotor is; the report tells both, the commanded position and the rotor's in the same pulses. Figures of
+//! the motors are those of `plant`; what is assumed of the surroundings is a constant below.
+
+use drives::engine::axis::Demand;
+use drives::zlim42c::hardware::{Actuation, Hardware, PowerStage, Sensors};
+use drives::zlim42c::readings::{REFERENCE_V, TEETH};
+use drives::zlim42c::{Image, Zlim42c, objects};
+use plant::angle::Angle;
+use plant::stepper::{Bridges, Phase};
+use plant::stepper_motor::{StepperMotor, StepperMotorModel};
+
+use super::Machine;
+use super::assembly::{Assembly, within};
+use crate::{Component, Levels, Refused, Report, TemperatureSensor};
+
+const OUTPUTS: &[&str] = &["Y0", "Y1"];
+const PERIOD_S: f64 = <Zlim42c as drives::Firmware>::CONTROL_PERIOD_NS as f64 * 1e-9;
+const SUPPLY_V: f64 = 24.0;
+const AMBIENT_C: f64 = 25.0;
+
+/// The drive's own converter starts above and stops below these bus voltages. Assumed: well below the 20 V of the
+/// manual (2.1), which gives no fault for a low supply.
+const START_V: f64 = 12.0;
+const STOP_V: f64 = 9.0;
+
+/// Length of the longer motor's body, mm.
+const LONG: u16 = 82;
+
+/// Counts of a turn in which switches are placed: each setting of 2006h divides it.
+const SHAFT_COUNTS: u32 = 3_200_000;
+
+const RPM_PER_RAD_S: f64 = 30.0 / core::f64::consts::PI;
+
+/// A ZLIM42-C of 70 mm as a station of a world.
+pub type Zlim42cMachine = Machine<Stepper<70>>;
+
+/// A ZLIM42-C of 82 mm as a station of a world.
+pub type Zlim42c82Machine = Machine<Stepper<LONG>>;
+
+/// A ZLIM42-C of 70 mm as delivered but for its address, on 24 V, without power.
+///
+/// `node` 1 to 15 is set at the DIP switches, 32 to 127 is stored in the EEPROM (2008h); the drive cannot be given any
+/// other, and answers as node 1. `baud_rate` is the value of 2009h in the EEPROM.
+pub fn zlim42c(node: u8, baud_rate: u16) -> Zlim42cMachine {
+    Machine::new(Zlim42c::new(), Stepper::addressed(node, baud_rate))
+}
+
+/// The same with the longer motor, 82 mm.
+pub fn zlim42c_82(node: u8, baud_rate: u16) -> Zlim42c82Machine {
+    Machine::new(Zlim42c::new(), Stepper::addressed(node, baud_rate))
+}
+
+/// Motor, load, supply and memory of a ZLIM42-C whose body is this many mm long.
+#[derive(Clone, Debug)]
+pub struct Stepper<const LENGTH_MM: u16> {
+    motor: StepperMotor,
+    dip_address: u8,
+    image: Image,
+    eeprom_broken: bool,
+    reference_broken: bool,
+    last: Actuation,
+    /// The electrical turn that the rotor stood in when it was first energised after power-on: there the drive's vector
+    /// points to its zero.
+    zero: Option<f64>,
+}
+
+impl<const LENGTH_MM: u16> Stepper<LENGTH_MM> {
+    /// At rest at ambient temperature, the supply not yet connected.
+    pub fn new(dip_address: u8, image: Image) -> Self {
+        let model = if LENGTH_MM == LONG { StepperMotorModel::ZLIM42_C_82 } else { StepperMotorModel::ZLIM42_C_70 };
+        let mut motor = StepperMotor::new(model, Angle::default(), SUPPLY_V, AMBIENT_C);
+        motor.supply.connected = false;
+        Self {
+            motor,
+            dip_address,
+            image,
+            eeprom_broken: false,
+            reference_broken: false,
+            last: Actuation::default(),
+            zero: None,
+        }
+    }
+
+    /// The motor and all that is joined to it.
+    pub fn motor(&self) -> &StepperMotor {
+        &self.motor
+    }
+
+    /// The motor and all that is joined to it, to change.
+    pub fn motor_mut(&mut self) -> &mut StepperMotor {
+        &mut self.motor
+    }
+
+    /// What the drive does now.
+    pub fn actuation(&self) -> &Actuation {
+        &self.last
+    }
+
+    fn addressed(node: u8, baud_rate: u16) -> Self {
+        let dip_address = if node <= 15 { node } else { 0 };
+        Self::new(dip_address, Image::with_address(node, baud_rate))
+    }
+
+    /// Electrical turns of the rotor.
+    fn rotor_turns(&self) -> f64 {
+        self.motor.rotor.angle.as_rad() / core::f64::consts::TAU * f64::from(TEETH)
+    }
+
+    /// The rotor's true position in the drive's pulses: the commanded one and how far the rotor is from the vector.
+    fn rotor_position(&self, firmware: &Zlim42c, position: i64) -> i64 {
+        let rotor = self.rotor_turns();
+        let ahead = rotor - self.zero.unwrap_or(rotor.round()) - firmware.vector_turns();
+        position + (ahead * f64::from(firmware.pulses_per_turn()) / f64::from(TEETH)).round() as i64
+    }
+}
+
+impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
+    type Firmware = Zlim42c;
+
+    const MODEL: &'static str = if LENGTH_MM == LONG { "zlim42c-82" } else { "zlim42c" };
+    const INPUTS: &'static [&'static str] = &["X0", "X1", "X2", "X3"];
+
+    fn hardware(&self) -> Hardware {
+        Hardware { dip_address: self.dip_address, eeprom: self.image }
+    }
+
+    #[inline]
+    fn sense(&self, inputs: u32) -> Sensors {
+        let sensed = self.motor.sense();
+        Sensors {
+            phase_current_a: sensed.phase_current_a.map(|current_a| current_a as f32),
+            bus_v: sensed.bus_v as f32,
+            reference_v: if self.reference_broken { 0.0 } else { REFERENCE_V },
+            inputs: [0, 1, 2, 3].map(|n| inputs >> n & 1 != 0),
+            eeprom_ok: !self.eeprom_broken,
+        }
+    }
+
+    #[inline]
+    fn step(&mut self, actuation: &Actuation) {
+        self.last = *actuation;
+        let bridges = match actuation.power_stage {
+            PowerStage::Off => Bridges::Open,
+            PowerStage::Modulate { duty } => {
+                if self.zero.is_none() {
+                    self.zero = Some(self.rotor_turns().round());
+                }
+                Bridges::Driven(duty.map(f64::from))
+            }
+        };
+        self.motor.step(PERIOD_S, &bridges);
+    }
+
+    fn report(&self, firmware: &Zlim42c, running: bool) -> Report {
+        let own = drives::Firmware::report(firmware);
+        let position = i64::from(own.position_counts);
+        let rpm = |pulses_s: f64| pulses_s * 60.0 / f64::from(firmware.pulses_per_turn());
+        let demand = match *firmware.demand() {
+            Demand::Position(point) | Demand::Velocity(point) => Some(point),
+            Demand::Off | Demand::Torque(_) => None,
+        };
+        let rotor = &self.motor.rotor;
+        Report {
+            node: own.node_id.raw(),
+            powered: running,
+            statusword: running.then(|| firmware.values().get(objects::STATUSWORD)),
+            error_code: u32::from(own.fault_code),
+            position,
+            rotor_position: Some(self.rotor_position(firmware, position)),
+            position_demand: demand.map(|point| i64::from(point.position)),
+            velocity_rpm: rotor.velocity_rad_s * RPM_PER_RAD_S,
+            velocity_demand_rpm: demand.map(|point| rpm(point.velocity)),
+            current_a: f64::from(own.current_a),
+            current_demand_a: demand.map(|_| f64::from(firmware.current_demand_a())),
+            supply_v: self.motor.supply.bus_v,
+            motor_c: None,
+            driver_c: None,
+            outputs: Levels {
+                names: OUTPUTS,
+                bits: u32::from(self.last.outputs[0]) | u32::from(self.last.outputs[1]) << 1,
+            },
+            brake: None,
+            shaft_angle_rad: rotor.angle.as_rad(),
+        }
+    }
+
+    fn connect_supply(&mut self, on: bool) {
+        let supply = &mut self.motor.supply;
+        if on && !supply.connected {
+            // The inrush limiter has charged the capacitor by the time the drive's converter starts.
+            supply.bus_v = supply.bus_v.max(supply.source_v);
+        }
+        supply.connected = on;
+    }
+
+    fn supplies_firmware(&self, running: bool) -> bool {
+        self.motor.supply.bus_v >= if running { STOP_V } else { START_V }
+    }
+
+    #[inline]
+    fn shaft_counts(&self) -> i64 {
+        self.motor.rotor.angle.count(SHAFT_COUNTS)
+    }
+
+    fn shaft_counts_per_count(&self, firmware: &Zlim42c) -> i64 {
+        i64::from(SHAFT_COUNTS) / i64::from(firmware.pulses_per_turn())
+    }
+
+    fn counts_reversed(&self, _firmware: &Zlim42c) -> bool {
+        false
+    }
+
+    fn image(&self) -> &[u8] {
+        &self.image.0
+    }
+
+    fn keep_image(&mut self, image: &[u8]) {
+        self.image = Image::from_bytes(image);
+        self.zero = None;
+    }
+
+    fn set_load_torque(&mut self, torque_nm: f64) -> Result<(), Refused> {
+        self.motor.load.torque_nm = within("load torque", "-100 to 100 N·m", -100.0..=100.0, torque_nm)?;
+        Ok(())
+    }
+
+    fn set_load_inertia(&mut self, inertia_kg_m2: f64) -> Result<(), Refused> {
+        self.motor.load.inertia_kg_m2 = within("load inertia", "0 to 100 kg·m²", 0.0..=100.0, inertia_kg_m2)?;
+        Ok(())
+    }
+
+    fn set_rotor_locked(&mut self, locked: bool) {
+        self.motor.load.locked = locked;
+    }
+
+    fn set_supply(&mut self, supply_v: f64) -> Result<(), Refused> {
+        self.motor.supply.source_v = within("supply", "0 to 100 V", 0.0..=100.0, supply_v)?;
+        Ok(())
+    }
+
+    fn hold_temperature(&mut self, _sensor: TemperatureSensor, _celsius: Option<f64>) -> Result<(), Refused> {
+        Err(Refused::Absent { model: Self::MODEL, what: "temperature sensor" })
+    }
+
+    fn set_fault(&mut self, component: Component, broken: bool) -> Result<(), Refused> {
+        match component {
+            Component::Hall => return Err(Refused::Absent { model: Self::MODEL, what: "Hall sensor" }),
+            Component::Encoder => return Err(Refused::Absent { model: Self::MODEL, what: "encoder" }),
+            Component::Eeprom => self.eeprom_broken = broken,
+            Component::Reference => self.reference_broken = broken,
+            Component::Phase => self.motor.lost_phase = broken.then_some(Phase::A),
+        }
+        Ok(())
+    }
+}

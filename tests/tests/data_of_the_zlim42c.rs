@@ -1,0 +1,187 @@
+//! The data files of the ZLIM42-C agree with themselves, with CiA 301 and with CiA 402, before they judge a drive.
+
+use std::collections::HashSet;
+
+use ferrodrive_tests::homing::{HomingRow, Track, run};
+use ferrodrive_tests::zlim42c::{
+    HomingResult, datagrams, fault_code, figure, figures, homing_runs, objects, power_states,
+};
+
+/// The step frequency in Hz that the drive can make (2.1).
+const STEP_FREQUENCY_HZ: f64 = 200_000.0;
+
+#[test]
+fn the_object_table_has_the_manuals_rows_and_those_it_lost_in_order() {
+    let objects = objects();
+    assert_eq!(objects.len(), 151 + 7, "151 printed rows, six lost at page breaks, 1018h:03");
+    assert!(objects.is_sorted_by_key(|row| (row.index, row.sub)));
+    let keys: HashSet<_> = objects.iter().map(|row| (row.index, row.sub)).collect();
+    assert_eq!(keys.len(), objects.len());
+}
+
+#[test]
+fn defaults_lie_within_their_limits_and_limits_within_their_types() {
+    for row in objects() {
+        row.check();
+    }
+}
+
+#[test]
+fn what_is_stored_can_be_written() {
+    let wrong: Vec<_> = objects().into_iter().filter(|row| row.stored && !row.writable).collect();
+    assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+#[test]
+fn the_first_rows_of_each_record_count_its_sub_indexes_or_more() {
+    let objects = objects();
+    for count in objects.iter().filter(|row| row.name == "Number of sub-indexes" && !row.writable) {
+        let greatest = objects.iter().filter(|row| row.index == count.index).map(|row| i64::from(row.sub)).max();
+        assert!(count.default >= greatest, "{count:?} has {greatest:?}");
+    }
+}
+
+#[test]
+fn every_datagram_is_answered_as_the_standard_demands_and_names_an_object() {
+    let (objects, datagrams) = (objects(), datagrams());
+    assert_eq!(datagrams.len(), 37);
+    for datagram in &datagrams {
+        let (cob, data) = datagram.request.as_ref().expect("the master speaks first in every printed line");
+        if *cob == 0 {
+            assert_eq!((data.as_slice(), &datagram.response), (&[1, 0][..], &None), "{datagram:?}");
+            continue;
+        }
+        datagram.check_sdo(&objects, 1);
+    }
+}
+
+#[test]
+fn the_power_state_table_is_full_and_the_motor_is_energised_from_switched_on() {
+    let cells = power_states();
+    let states: HashSet<_> = cells.iter().map(|it| it.cell.state.as_str()).collect();
+    let events: HashSet<_> = cells.iter().map(|it| it.cell.event.as_str()).collect();
+    assert_eq!((states.len(), events.len(), cells.len()), (8, 11, 88));
+    for it in &cells {
+        let energised = ["switched_on", "operation_enabled", "quick_stop_active"];
+        assert_eq!(it.bit_13_after, energised.contains(&it.cell.state_after.as_str()), "{it:?}");
+    }
+}
+
+#[test]
+fn the_low_nibble_after_each_controlword_is_the_printed_one() {
+    // 5.3.2: 6040h = 0, 6, 7, Fh give 0000, 0001, 0011, 0111.
+    let cells = power_states();
+    let mut state = "switch_on_disabled";
+    for (controlword, nibble) in [(0x0, 0b0000), (0x6, 0b0001), (0x7, 0b0011), (0xF, 0b0111)] {
+        let found = cells.iter().find(|it| it.cell.state == state && it.cell.controlword == Some(controlword));
+        let cell = &found.expect("the table is full").cell;
+        assert_eq!(cell.low_byte_after & 0xF, nibble, "{cell:?}");
+        state = &cell.state_after;
+    }
+}
+
+#[test]
+fn each_homing_run_is_possible_and_latches_the_edge_of_its_method() {
+    for HomingResult { row, bit_8, bit_10, bit_14 } in homing_runs() {
+        let expected = match row.result.as_str() {
+            "attained" => (true, true, false),
+            "running" => (false, false, true),
+            _ => (false, true, false),
+        };
+        assert_eq!((bit_8, bit_10, bit_14), expected, "{row:?}");
+        let Some((track, start)) = place(&row) else { continue };
+        let end = run(&row, &track, start, |direction| fatal_limit(row.method, direction));
+        match row.result.as_str() {
+            "attained" => assert_eq!(end, Some(latched_at(row.method)), "{row:?}"),
+            "running" => assert_eq!(end, None, "{row:?}"),
+            "failed" => {
+                let last = row.moves.last().expect("a run that fails on the way has a way");
+                assert!(fatal_limit(row.method, last.direction).is_some_and(|it| last.until == format!("{it}_on")));
+                assert!(end.is_some(), "{row:?}");
+            }
+            other => panic!("{other} ends from outside"),
+        }
+    }
+}
+
+#[test]
+fn the_last_move_of_an_attained_run_is_the_latch_and_is_slow() {
+    let runs = homing_runs();
+    for method in [17, 18, 24, 29] {
+        assert!(runs.iter().filter(|it| it.row.method == method && it.row.result == "attained").count() >= 4);
+    }
+    for HomingResult { row, .. } in runs.iter().filter(|it| it.bit_8) {
+        let (last, latch) = (row.moves.last().expect("a move"), row.latch.as_ref().expect("a latch"));
+        assert_eq!(last.until, format!("{}_{}", latch.switch, if latch.rising { "on" } else { "off" }));
+        assert_eq!((last.direction, last.speed.as_str()), (latch.direction, "6099:02"));
+    }
+}
+
+#[test]
+fn the_tables_of_settings_follow_from_each_other() {
+    for step in 0..8 {
+        let step = step.to_string();
+        let (rms_a, peak_a) = (figure("current", &step, "rms"), figure("current", &step, "peak"));
+        assert!((rms_a - peak_a / 2.0_f64.sqrt()).abs() < 0.011, "step {step}: {rms_a} A for {peak_a} A");
+    }
+    for step in 0..16 {
+        let step = step.to_string();
+        let pulses = figure("microstep", &step, "pulses_per_turn");
+        let limit_rpm = (STEP_FREQUENCY_HZ * 60.0 / pulses).floor().min(3000.0);
+        assert!((figure("microstep", &step, "speed_limit") - limit_rpm).abs() < 0.5, "step {step}");
+    }
+}
+
+#[test]
+fn the_address_switches_are_inverted_binary_and_the_fault_codes_one_hot() {
+    let figures = figures();
+    let addresses: Vec<_> = figures.iter().filter(|it| it.table == "address").collect();
+    assert_eq!(addresses.len(), 16);
+    for it in addresses {
+        let weighed = it.value.split(' ').zip(0..).map(|(switch, bit)| u8::from(switch == "OFF") << bit);
+        assert_eq!(weighed.sum::<u8>().to_string(), it.row);
+    }
+    let codes: HashSet<_> = figures.iter().filter(|it| it.table == "fault").map(fault_code).collect();
+    assert_eq!(codes, HashSet::from([0xFF01, 0xFF02, 0xFF04, 0xFF08, 0xFF10]));
+}
+
+/// A track and a start; `None` for runs that are ended from outside or never begin.
+fn place(row: &HomingRow) -> Option<(Track, i32)> {
+    let usual = || vec![("negative_limit", -2000..=-1000), ("home", -100..=100), ("positive_limit", 1000..=2000)];
+    let without_home = || vec![("negative_limit", -2000..=-1000), ("positive_limit", 1000..=2000)];
+    let everywhere = -5000..=5000;
+    Some(match row.start.as_str() {
+        "below_home" => (usual(), -500),
+        "between" | "above_home" if row.method != 0 => (usual(), 500),
+        "on_home" => (usual(), 0),
+        "on_negative_limit" => (usual(), -1500),
+        "on_positive_limit" => (usual(), 1500),
+        "beyond_negative_limit" => (usual(), -2500),
+        "beyond_positive_limit" => (usual(), 2500),
+        "both_limits_on" => (vec![("negative_limit", everywhere.clone()), ("positive_limit", everywhere)], 0),
+        "above_home_without_home_switch" => (without_home(), 500),
+        "below_home_without_home_switch" => (without_home(), -500),
+        "home_on_at_negative_limit" => (vec![("negative_limit", -2000..=-1000), ("home", -1500..=-900)], -950),
+        "no_input_configured" => (Vec::new(), 0),
+        _ => return None,
+    })
+}
+
+/// The limit that ends homing at once when it is met in `direction` (5.3.6).
+fn fatal_limit(method: u8, direction: i32) -> Option<&'static str> {
+    match (method, direction) {
+        (17 | 29, 1) => Some("positive_limit"),
+        (18 | 24, -1) => Some("negative_limit"),
+        _ => None,
+    }
+}
+
+/// Where the origin lies on the usual track: the first position beyond the edge.
+fn latched_at(method: u8) -> i32 {
+    match method {
+        17 => -999,
+        18 => 999,
+        24 | 29 => -100,
+        _ => panic!("no method {method}"),
+    }
+}

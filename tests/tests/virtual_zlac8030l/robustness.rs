@@ -1,0 +1,314 @@
+//! Extremes: whatever a host writes and whatever happens around the machine, the drive answers, stays finite and obeys.
+
+use std::time::Duration;
+
+use ferrodrive_tests::seeded::Seeded;
+use ferrodrive_tests::zlac8030l::{ObjectRow, objects};
+use sim::{Component, TemperatureSensor};
+
+use crate::bench::{Bench, assert_within};
+use crate::wheel;
+
+/// Writes that a random host may not do: they take the drive off this bus at its next restart.
+const ADDRESS: [u16; 2] = [0x200D, 0x200E];
+/// And these would end the conversation by themselves.
+const IDENTIFIERS: [u16; 1] = [0x1005];
+
+#[test]
+fn a_host_that_writes_anything_anywhere_is_answered_and_breaks_nothing() {
+    let rows: Vec<_> = objects()
+        .into_iter()
+        .filter(|row| row.writable && !ADDRESS.contains(&row.index) && !IDENTIFIERS.contains(&row.index))
+        .collect();
+    for seed in 0..60 {
+        let mut seeded = Seeded::new(seed);
+        let mut bench = Bench::new();
+        for step in 0..120 {
+            let row = &rows[seeded.below(rows.len())];
+            let value = any_value(&mut seeded, row);
+            // Taken or refused, but answered: `write` panics without an answer.
+            let _ = bench.write(row.index, row.sub, value);
+            disturb(&mut bench, &mut seeded);
+            bench.run_ms(seeded.below(20) as u64);
+            let report = bench.report();
+            let at =
+                format!("seed {seed}, step {step}, after {:04X}h:{:02X} = {value}: {report:?}", row.index, row.sub);
+            let finite = [report.velocity_rpm, report.current_a, report.supply_v, report.shaft_angle_rad];
+            assert!(finite.iter().all(|value| value.is_finite()), "{at}");
+            assert!(is_a_state(report.statusword.unwrap_or_default()), "{at}");
+        }
+        recovers(&mut bench, seed);
+    }
+}
+
+/// A legal value mostly, sometimes any.
+fn any_value(seeded: &mut Seeded, row: &ObjectRow) -> i64 {
+    match (row.limits, seeded.below(4)) {
+        (_, 0) => seeded.bits() as i64 >> (64 - row.size * 8),
+        (Some((low, high)), _) => low + (seeded.bits() % (high - low + 1) as u64) as i64,
+        (None, _) if row.index == 0x6040 => [0x06, 0x07, 0x0F, 0x1F, 0x5F, 0x02, 0x80, 0x10F, 0x00][seeded.below(9)],
+        (None, _) => row.default.unwrap_or_default(),
+    }
+}
+
+fn disturb(bench: &mut Bench, seeded: &mut Seeded) {
+    let on = seeded.below(2) == 0;
+    let torque_nm = seeded.below(5) as f64 - 2.0;
+    let choice = seeded.below(40);
+    bench.operate(|drive, now| {
+        let _ = match choice {
+            0 => drive.set_load_torque(torque_nm, now),
+            1 => drive.set_rotor_locked(on, now),
+            2 => drive.set_fault(Component::Hall, on, now),
+            3 => drive.set_fault(Component::Encoder, on, now),
+            4 => drive.set_fault(Component::Phase, on, now),
+            5 => drive.set_input(0, on, now),
+            6 => drive.set_load_inertia(if on { 0.2 } else { 0.0 }, now),
+            _ => Ok(()),
+        };
+    });
+}
+
+fn is_a_state(statusword: u16) -> bool {
+    let patterns = [0x0270, 0x0231, 0x0233, 0x0237, 0x0217, 0x0298];
+    patterns.contains(&(statusword & 0x03FF))
+}
+
+/// Mended, given its factory settings and restarted, the drive is as delivered.
+fn recovers(bench: &mut Bench, seed: u64) {
+    bench.operate(|drive, now| {
+        for component in [Component::Hall, Component::Encoder, Component::Phase] {
+            drive.set_fault(component, false, now).unwrap_or_default();
+        }
+        drive.set_rotor_locked(false, now).unwrap_or_default();
+        drive.set_load_torque(0.0, now).unwrap_or_default();
+        drive.set_load_inertia(0.0, now).unwrap_or_default();
+        drive.set_input(0, false, now).unwrap_or_default();
+    });
+    bench.set(0x6040, 0, 0);
+    bench.set(0x200F, 0, 0);
+    // A wheel that the load drove fast has charged the bus, and only the electronics discharge it.
+    let calm = |report: &sim::Report| report.velocity_rpm.abs() < 1.0 && report.supply_v < 60.0;
+    bench.seconds_until(60.0, Duration::from_millis(100), calm);
+    bench.set(0x2009, 0, 1);
+    bench.let_store();
+    bench.power_cycle();
+    bench.run_ms(500);
+    for row in objects().iter().filter(|row| row.stored && !row.live) {
+        assert_eq!(Some(bench.get(row.index, row.sub)), row.default, "seed {seed}: {}", row.name);
+    }
+    bench.enable_in(3);
+    bench.set(0x60FF, 0, 60);
+    bench.run_ms(1500);
+    assert_within(&format!("speed after seed {seed}"), bench.report().velocity_rpm, 59.0, 61.0);
+}
+
+#[test]
+fn requests_sent_without_waiting_for_answers_are_all_answered_in_order() {
+    let mut bench = Bench::new();
+    for (n, request) in ["604#4000100000000000", "604#4041600000000000", "604#4000200000000000"].into_iter().enumerate()
+    {
+        let frame = request.parse().expect("a frame");
+        bench.world.send(bench.host, frame).unwrap_or_else(|_| panic!("room for frame {n}"));
+    }
+    bench.run_ms(20);
+    let heard: Vec<_> = bench.heard().into_iter().filter(|frame| frame.starts_with("584#")).collect();
+    assert_eq!(heard, ["584#4300100092010400", "584#4B41600070060000", "584#4B002000E8030000"]);
+}
+
+#[test]
+fn a_speed_that_the_supply_cannot_give_is_no_fault_and_the_way_back_is_quick() {
+    let mut bench = Bench::new();
+    bench.operate(|drive, now| drive.set_supply(24.0, now)).expect("a supply");
+    bench.enable_in(3);
+    bench.set(0x60FF, 0, 1000);
+    bench.run_ms(5000);
+    assert_within("speed", bench.report().velocity_rpm, 240.0, wheel::no_load_rpm(24.0, 1.0));
+    bench.set(0x60FF, 0, 100);
+    // The demand comes down from 1000 in 500 ms; the wheel joins it on the way.
+    bench.run_ms(900);
+    assert_within("speed", bench.report().velocity_rpm, 95.0, 105.0);
+    assert_eq!(bench.get(0x603F, 0), 0);
+}
+
+#[test]
+fn times_of_zero_are_steps_at_the_current_limit_without_a_fault() {
+    let mut bench = Bench::new();
+    for index in [0x6083, 0x6084, 0x6085] {
+        bench.set(index, 0, 0);
+    }
+    bench.enable_in(3);
+    for target in [100, -100, 0] {
+        bench.set(0x60FF, 0, target);
+        bench.run_ms(400);
+        assert_within("speed", bench.report().velocity_rpm, target as f64 - 2.0, target as f64 + 2.0);
+    }
+    assert_eq!(bench.get(0x603F, 0), 0);
+}
+
+#[test]
+fn a_heavy_load_is_accelerated_at_the_current_limit_and_no_more() {
+    let mut bench = Bench::new();
+    bench.operate(|drive, now| drive.set_load_inertia(1.0, now)).expect("a load");
+    bench.set(0x2015, 0, 100);
+    bench.set(0x6083, 0, 0);
+    bench.enable_in(3);
+    bench.set(0x60FF, 0, 60);
+    bench.run_ms(200);
+    let first = bench.report();
+    assert_within("current", first.current_a, 9.8, 10.2);
+    bench.run_ms(400);
+    let gained = (bench.report().velocity_rpm - first.velocity_rpm) * wheel::RAD_S_PER_RPM;
+    let expected = 0.4 * (10.0 * wheel::torque_per_a() - wheel::friction_nm(2.0)) / (1.0 + wheel::inertia_kg_m2());
+    assert_within("rad/s gained in 0.4 s", gained, expected * 0.97, expected * 1.03);
+}
+
+#[test]
+fn a_load_that_drives_the_motor_is_held_at_its_speed_and_feeds_the_bus_until_it_is_too_much() {
+    let mut bench = Bench::new();
+    bench.enable_in(3);
+    bench.set(0x60FF, 0, 200);
+    bench.run_ms(1000);
+    bench.operate(|drive, now| drive.set_load_torque(-3.0, now)).expect("a load");
+    bench.run_ms(300);
+    assert_within("speed", bench.report().velocity_rpm, 195.0, 206.0);
+    assert!(bench.report().supply_v > 49.0, "{} V", bench.report().supply_v);
+    bench.run_ms(5000);
+    assert_eq!(bench.get(0x603F, 0), 0x0001);
+
+    let mut bench = Bench::new();
+    bench.set(0x202E, 5, 1);
+    bench.enable_in(3);
+    bench.set(0x60FF, 0, 200);
+    bench.run_ms(1000);
+    bench.operate(|drive, now| drive.set_load_torque(-3.0, now)).expect("a load");
+    bench.run_ms(5000);
+    assert_eq!(bench.get(0x603F, 0), 0, "the bleeder takes it");
+    assert_within("speed", bench.report().velocity_rpm, 199.0, 201.0);
+}
+
+#[test]
+fn without_a_mode_an_enabled_drive_stands_whatever_its_targets_are() {
+    let mut bench = Bench::new();
+    bench.enable_in(0);
+    bench.set(0x60FF, 0, 100);
+    bench.set(0x6071, 0, 1000);
+    bench.set(0x607A, 0, 4096);
+    bench.set(0x6040, 0, 0x1F);
+    bench.run_ms(1000);
+    assert_within("counts", bench.report().position as f64, -2.0, 2.0);
+}
+
+#[test]
+fn an_external_stop_that_is_active_lets_nothing_start_in_any_mode() {
+    for mode in [1, 3, 4] {
+        let mut bench = Bench::new();
+        bench.operate(|drive, now| drive.set_input(0, true, now)).expect("there is X0");
+        bench.run_ms(10);
+        bench.enable_in(mode);
+        bench.set(0x60FF, 0, 100);
+        bench.set(0x6071, 0, 2000);
+        bench.set(0x607A, 0, 8192);
+        bench.set(0x6040, 0, 0x1F);
+        bench.run_ms(2000);
+        assert_within(&format!("counts in mode {mode}"), bench.report().position as f64, -5.0, 5.0);
+        // Nothing starts by itself when it ends.
+        bench.operate(|drive, now| drive.set_input(0, false, now)).expect("there is X0");
+        bench.run_ms(2000);
+        assert_within(&format!("counts in mode {mode}"), bench.report().position as f64, -10.0, 10.0);
+    }
+}
+
+#[test]
+fn a_lower_limit_is_followed_in_motion() {
+    let mut bench = Bench::new();
+    bench.enable_in(3);
+    bench.set(0x60FF, 0, 200);
+    bench.run_ms(1000);
+    bench.set(0x200A, 0, 80);
+    bench.run_ms(1000);
+    assert_within("speed", bench.report().velocity_rpm, 79.0, 81.0);
+    let mut bench = Bench::new();
+    bench.set(0x200A, 0, 30);
+    bench.enable_in(1);
+    bench.set(0x607A, 0, 8192);
+    bench.set(0x6040, 0, 0x1F);
+    bench.run_ms(1500);
+    assert_within("speed of a move with 6081h = 120", bench.report().velocity_rpm, 29.0, 31.0);
+}
+
+#[test]
+fn a_current_limit_of_zero_moves_nothing_and_an_overload_watch_of_zero_is_off() {
+    let mut bench = Bench::new();
+    bench.set(0x2015, 0, 0);
+    bench.enable_in(3);
+    bench.set(0x60FF, 0, 100);
+    bench.run_ms(1000);
+    assert_within("speed", bench.report().velocity_rpm, -0.1, 0.1);
+    assert_eq!(bench.get(0x603F, 0), 0);
+
+    for (object, value) in [(0x2014, 0), (0x2012, 0), (0x2016, 0)] {
+        let mut bench = Bench::new();
+        bench.operate(|drive, now| drive.set_rotor_locked(true, now)).expect("a rotor");
+        bench
+            .operate(|drive, now| drive.hold_temperature(TemperatureSensor::Motor, Some(40.0), now))
+            .expect("a sensor");
+        bench.set(object, 0, value);
+        bench.set(0x6087, 0, 0);
+        bench.enable_in(4);
+        bench.set(0x6071, 0, 30_000);
+        bench.run_ms(10_000);
+        assert_eq!(bench.get(0x603F, 0), 0, "{object:04X}h = {value}");
+    }
+}
+
+#[test]
+fn a_brown_out_in_motion_restarts_the_drive_with_its_stored_values() {
+    let mut bench = Bench::new();
+    bench.set(0x6060, 0, 3);
+    bench.set(0x2000, 0, 0);
+    bench.enable();
+    bench.set(0x60FF, 0, 200);
+    bench.run_ms(1000);
+    bench.heard();
+    bench.operate(|drive, now| drive.set_power(false, now));
+    bench.run_ms(3000);
+    assert_within("speed: it coasted", bench.report().velocity_rpm, -0.1, 120.0);
+    bench.operate(|drive, now| drive.set_power(true, now));
+    bench.run_ms(100);
+    assert_eq!(bench.heard().iter().filter(|frame| *frame == "704#00").count(), 1);
+    assert_eq!((bench.get(0x2000, 0), bench.get(0x6060, 0), bench.get(0x60FF, 0)), (0, 0, 0));
+    assert_eq!(bench.statusword() & 0x6F, 0x60);
+}
+
+#[test]
+fn power_that_goes_at_any_moment_of_a_save_leaves_the_old_values_or_the_new_ones() {
+    for delay_us in (0..3000).step_by(100) {
+        let mut bench = Bench::new();
+        bench.set(0x2010, 0, 1);
+        bench.set(0x2014, 0, 77);
+        bench.set(0x2015, 0, 88);
+        let save = "604#2B09200002000000".parse().expect("a frame");
+        bench.world.send(bench.host, save).expect("room");
+        bench.run(Duration::from_micros(delay_us));
+        bench.power_cycle();
+        let kept = (bench.get(0x2014, 0), bench.get(0x2015, 0));
+        assert!(kept == (150, 300) || kept == (77, 88), "off after {delay_us} us: {kept:?}");
+        assert_eq!(bench.get(0x603F, 0), 0);
+    }
+}
+
+#[test]
+fn turning_by_hand_counts_in_every_state_and_raises_nothing() {
+    let mut bench = Bench::new();
+    bench.operate(|drive, now| drive.set_load_torque(-0.3, now)).expect("a load");
+    bench.run_ms(500);
+    bench.operate(|drive, now| drive.set_load_torque(0.0, now)).expect("a load");
+    bench.run_ms(200);
+    let turned = bench.report().shaft_angle_rad / core::f64::consts::TAU * wheel::COUNTS_PER_TURN;
+    bench.operate(|drive, now| drive.set_rotor_locked(true, now)).expect("a rotor");
+    let position = bench.get(0x6064, 0) as f64;
+    assert_within("6064h", position, turned - 2.0, turned + 2.0);
+    assert!(turned > 500.0);
+    assert_eq!(bench.get(0x603F, 0), 0);
+}
