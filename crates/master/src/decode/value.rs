@@ -107,13 +107,7 @@ fn standard_words(mux: Mux, raw: u32) -> Option<String> {
     }
 }
 
-fn write_number(
-    f: &mut fmt::Formatter<'_>,
-    number: i64,
-    raw: u32,
-    entry: &Entry,
-    unit: &'static str,
-) -> fmt::Result {
+fn write_number(f: &mut fmt::Formatter<'_>, number: i64, raw: u32, entry: &Entry, unit: &'static str) -> fmt::Result {
     let is_identifier = entry.data_type == DataType::Unsigned32 && entry.unit.is_empty() && entry.index < 0x2000;
     if is_identifier {
         write!(f, "{raw:X}h")?
