@@ -10,6 +10,7 @@ mod datagrams;
 mod determinism;
 mod energy;
 mod holding;
+mod motor_parameters;
 mod network;
 mod objects;
 mod position;

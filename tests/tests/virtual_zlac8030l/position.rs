@@ -215,3 +215,14 @@ fn clearing_with_2006h_moves_the_origin_of_absolute_moves() {
     assert_within("counts from where it began", turned, 6144.0 - 60.0, 6144.0 + 60.0);
     assert_within("6064h", bench.get(0x6064, 0) as f64, 2018.0, 2078.0);
 }
+
+/// 60F2h is absent, so its default holds: relative to the preceding target (CiA 402-2).
+#[test]
+fn a_relative_set_point_that_replaces_a_move_counts_from_that_moves_target() {
+    let mut bench = ready();
+    start(&mut bench, 8192, RELATIVE);
+    bench.run_ms(1000);
+    start(&mut bench, 4096, RELATIVE | IMMEDIATELY);
+    bench.run_ms(4000);
+    assert_at(&mut bench, 12_288);
+}

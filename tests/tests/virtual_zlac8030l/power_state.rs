@@ -209,3 +209,13 @@ fn a_fault_and_its_end_are_told_by_emcy() {
     let told: Vec<_> = bench.heard().into_iter().filter(|frame| frame.starts_with("084#")).collect();
     assert_eq!(told, ["084#0002810000000000", "084#0000000000000000"]);
 }
+
+#[test]
+fn a_slow_wheel_is_a_running_one() {
+    let mut bench = Bench::new();
+    bench.enable_in(3);
+    bench.set(0x60FF, 0, 3);
+    bench.run_ms(2000);
+    assert_eq!(bench.statusword() & (BIT_12 | RUNNING), RUNNING, "3 r/min is not 0 r/min");
+    assert_eq!(bench.get(0x2027, 0), 1);
+}

@@ -247,3 +247,54 @@ fn a_wheel_released_by_an_external_stop_is_caught_where_it_is_and_not_pulled_bac
         assert_eq!(bench.get(0x603F, 0), 0, "{object:04X}h");
     }
 }
+
+#[test]
+fn a_silent_host_stops_the_motor_with_the_ramp_of_605ah_in_each_mode() {
+    let mut bench = turning();
+    bench.set(0x605A, 0, 6);
+    bench.set(0x2000, 0, 300);
+    bench.run_ms(299);
+    assert_stops(&mut bench, Ramp::Time(0.1));
+
+    let mut bench = Bench::new();
+    bench.set(0x605A, 0, 6);
+    bench.set(0x6085, 0, 100);
+    bench.enable_in(1);
+    bench.set(0x2000, 0, 1000);
+    bench.set(0x607A, 0, 100_000);
+    bench.set(0x6040, 0, 0x1F);
+    bench.run_ms(980);
+    assert_within("speed of the move", bench.report().velocity_rpm, 118.0, 122.0);
+    bench.run_ms(300);
+    assert_within("speed", bench.report().velocity_rpm, -1.0, 1.0);
+    let stands = bench.report().position;
+    bench.set(0x2000, 0, 0);
+    bench.run_ms(1000);
+    assert_within("the move is over", (bench.report().position - stands) as f64, -30.0, 30.0);
+
+    let mut bench = Bench::new();
+    bench.set(0x6087, 0, 0);
+    bench.enable_in(4);
+    bench.set(0x2000, 0, 500);
+    bench.set(0x6071, 0, 1000);
+    bench.run_ms(400);
+    assert!(bench.report().velocity_rpm > 100.0);
+    bench.run_ms(1500);
+    assert_within("speed", bench.report().velocity_rpm, -1.0, 1.0);
+    assert_eq!((bench.get(0x6071, 0), bench.statusword() & 0xFF), (0, 0x37));
+}
+
+#[test]
+fn a_shutdown_ends_even_when_a_load_never_lets_the_motor_stand() {
+    let mut bench = turning();
+    bench.set(0x202E, 5, 1);
+    bench.set(0x2015, 0, 20);
+    bench.operate(|drive, now| drive.set_load_inertia(0.3, now)).expect("a load");
+    bench.operate(|drive, now| drive.set_load_torque(-2.0, now)).expect("a load");
+    bench.set(0x6040, 0, 0x06);
+    bench.run_ms(300);
+    assert_eq!(bench.statusword() & 0xFF, 0x37, "on the ramp");
+    bench.run_ms(1700);
+    assert_eq!(bench.statusword() & 0xFF, 0x31);
+    assert!(bench.report().velocity_rpm > 60.0, "1.5 N m of the motor against 2 N m");
+}

@@ -182,3 +182,33 @@ fn in_torque_mode_the_speed_stays_below_200ah() {
     bench.run_ms(3000);
     assert_within("speed", bench.report().velocity_rpm, 50.0, 61.0);
 }
+
+#[test]
+fn a_rest_between_overloads_gives_their_time_back() {
+    let mut bench = stalled(0);
+    bench.set(0x202F, 2, 1);
+    bench.set(0x2014, 0, 50);
+    bench.set(0x2012, 0, 100);
+    for _ in 0..4 {
+        bench.set(0x6071, 0, 10_000);
+        bench.run_ms(5000);
+        bench.set(0x6071, 0, 0);
+        bench.run_ms(20_000);
+        assert_eq!(bench.get(0x603F, 0), 0, "5 s of the 6 s, then a rest");
+    }
+    bench.set(0x6071, 0, 10_000);
+    bench.run_ms(6500);
+    assert_eq!(bench.get(0x603F, 0), 0x0008);
+}
+
+#[test]
+fn the_times_of_the_note_scale_with_2016h() {
+    let mut bench = stalled(0);
+    bench.set(0x202F, 2, 1);
+    bench.set(0x2014, 0, 50);
+    bench.set(0x2012, 0, 100);
+    bench.set(0x2016, 0, 150);
+    bench.set(0x6071, 0, 10_000);
+    let seconds = bench.seconds_until(10.0, LOOK, |report| report.error_code != 0);
+    assert_within("seconds of half of 6 s", seconds, 2.9, 3.1);
+}
