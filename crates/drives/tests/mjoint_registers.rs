@@ -67,7 +67,8 @@ fn every_written_value_is_taken_or_refused_as_over_sdo() {
         let Mux { index, sub_index } = register.object;
         let type_range = row(register).data_type.range();
         let limits = row(register).limits.unwrap_or(type_range);
-        let edges = [limits.0, limits.1, type_range.0, type_range.1].into_iter().flat_map(|edge| [edge - 1, edge, edge + 1]);
+        let edges =
+            [limits.0, limits.1, type_range.0, type_range.1].into_iter().flat_map(|edge| [edge - 1, edge, edge + 1]);
         for value in edges.chain([0, 1, 2, 3, 17, -1]).filter(|value| (type_range.0..=type_range.1).contains(value)) {
             let (mut by_sdo, mut by_register) = (Bench::new(), Bench::new());
             let expected = by_sdo.try_write(index, sub_index, value);

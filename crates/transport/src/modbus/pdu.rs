@@ -60,10 +60,9 @@ pub(super) fn parse(pdu: &[u8]) -> Result<RegisterAccess, ModbusException> {
             let valid = (1..=MAX_READ).contains(&count);
             valid.then_some(RegisterAccess::Read { address, count }).ok_or(ModbusException::IllegalDataValue)
         }
-        [WRITE_SINGLE_REGISTER, a, b, c, d] => Ok(RegisterAccess::Write {
-            address: u16::from_be_bytes([a, b]),
-            words: vec![u16::from_be_bytes([c, d])],
-        }),
+        [WRITE_SINGLE_REGISTER, a, b, c, d] => {
+            Ok(RegisterAccess::Write { address: u16::from_be_bytes([a, b]), words: vec![u16::from_be_bytes([c, d])] })
+        }
         [WRITE_MULTIPLE_REGISTERS, a, b, c, d, length, ref data @ ..] => {
             let (address, count) = (u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]));
             let (pairs, rest) = data.as_chunks::<2>();
@@ -73,10 +72,9 @@ pub(super) fn parse(pdu: &[u8]) -> Result<RegisterAccess, ModbusException> {
             }
             Ok(RegisterAccess::Write { address, words: pairs.iter().map(|pair| u16::from_be_bytes(*pair)).collect() })
         }
-        [
-            READ_HOLDING_REGISTERS | READ_INPUT_REGISTERS | WRITE_SINGLE_REGISTER | WRITE_MULTIPLE_REGISTERS,
-            ..,
-        ] => Err(ModbusException::IllegalDataValue),
+        [READ_HOLDING_REGISTERS | READ_INPUT_REGISTERS | WRITE_SINGLE_REGISTER | WRITE_MULTIPLE_REGISTERS, ..] => {
+            Err(ModbusException::IllegalDataValue)
+        }
         _ => Err(ModbusException::IllegalFunction),
     }
 }
