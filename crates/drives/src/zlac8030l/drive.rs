@@ -155,13 +155,21 @@ impl Zlac8030l {
     }
 
     fn handle_events(&mut self, now: Instant) {
+        let mut commanded = false;
         while let Some(event) = self.node.poll_event() {
             match event {
-                NodeEvent::Written { slot, raw, .. } => self.written(slot, raw, now),
+                NodeEvent::Written { slot, raw, .. } => {
+                    self.written(slot, raw, now);
+                    commanded |= matches!(effect(slot), Effect::Command | Effect::SelectMode);
+                }
                 NodeEvent::ResetNode => self.restart(now),
                 NodeEvent::ResetCommunication => self.restart_communication(now),
                 NodeEvent::Nmt(_) | NodeEvent::Sync | NodeEvent::RpdoTooShort(_) => {}
             }
+        }
+        // Once for all that one frame commands.
+        if commanded {
+            self.publish_status();
         }
     }
 
@@ -172,10 +180,7 @@ impl Zlac8030l {
         }
         match effect(slot) {
             Effect::Command => self.command(Controlword(raw as u16), now),
-            Effect::SelectMode => {
-                self.axis.request_mode(ModeOfOperation(raw as u8 as i8));
-                self.publish_status();
-            }
+            Effect::SelectMode => self.axis.request_mode(ModeOfOperation(raw as u8 as i8)),
             Effect::Registers => self.registers(raw, now),
             Effect::ClearPosition => self.clear_position(slot, raw),
             Effect::Target => {}
@@ -193,7 +198,6 @@ impl Zlac8030l {
         if self.axis.command(taken, target, &self.parameters.axis) {
             self.reset_faults(now);
         }
-        self.publish_status();
     }
 
     /// 2009h: reads 0 again when it is done.
