@@ -100,6 +100,27 @@ fn no_speed_is_above_200_000_steps_a_second() {
 }
 
 #[test]
+fn a_motor_without_load_follows_to_3000_rpm_and_back_without_losing_a_step() {
+    // 6081h and 60FFh allow 3000 r/min; there the pull-out torque with 24 V is still twice the friction.
+    for supply_v in [24.0, 30.0] {
+        let mut bench = Bench::new();
+        bench.operate(|drive, now| drive.set_supply(supply_v, now)).expect("a supply");
+        bench.set(0x6083, 0, 1000);
+        bench.set(0x6084, 0, 2000);
+        bench.enable_in(3);
+        bench.set(0x60FF, 0, 3000);
+        bench.run_ms(2000);
+        assert_within("r/min", bench.report().velocity_rpm, 2800.0, 3200.0);
+        bench.set(0x60FF, 0, 0);
+        bench.run_ms(2500);
+        let report = bench.report();
+        let away = report.position - report.rotor_position.expect("known here");
+        // Dry friction may hold it some pulses off; four full steps are 80.
+        assert!(away.abs() <= 4 && report.error_code == 0, "{supply_v} V: {away} pulses, {report:?}");
+    }
+}
+
+#[test]
 fn every_microstep_setting_makes_one_turn_of_its_pulses() {
     use ferrodrive_tests::zlim42c::figure;
     for setting in 0..16 {

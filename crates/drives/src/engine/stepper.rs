@@ -233,8 +233,8 @@ mod tests {
     const MODEL: StepperModel =
         StepperModel { pulses_per_electrical_turn: 80, periods_per_command: 10, control_period_s: 50e-6 };
     const GAINS: StepperGains =
-        StepperGains { current: PiGains { proportional: 15.0, integral_per_s: 15e3 }, modulation_limit: 0.98 };
-    const CURRENTS: StepperCurrents = StepperCurrents { run_a: 1.2, hold_a: 0.6, hold_after: 20 };
+        StepperGains { current: PiGains { proportional: 15.0, integral_per_s: 1.5e3 }, modulation_limit: 0.98 };
+    const CURRENTS: StepperCurrents = StepperCurrents { run_a: 1.2, hold_a: 0.6, hold_after: 200 };
     const RESISTANCE_OHM: f32 = 1.85;
     const INDUCTANCE_H: f32 = 2.8e-3;
 
@@ -269,9 +269,9 @@ mod tests {
     #[test]
     fn the_vector_stands_up_at_its_amplitude_and_halves_at_rest() {
         let mut bench = Bench::new();
-        (0..15).for_each(|_| bench.run(TrajectoryPoint::rest(0)));
+        (0..150).for_each(|_| bench.run(TrajectoryPoint::rest(0)));
         assert!((bench.current_a[0] - 1.2).abs() < 0.01 && bench.current_a[1].abs() < 0.01);
-        (0..30).for_each(|_| bench.run(TrajectoryPoint::rest(0)));
+        (0..250).for_each(|_| bench.run(TrajectoryPoint::rest(0)));
         assert!((bench.stepper.current_a() - 0.6).abs() < 0.01);
     }
 
@@ -279,9 +279,9 @@ mod tests {
     fn a_quarter_of_an_electrical_turn_is_a_full_step_from_phase_a_to_phase_b() {
         let mut bench = Bench::new();
         bench.run(TrajectoryPoint::rest(0));
-        (0..15).for_each(|_| bench.run(TrajectoryPoint::rest(20)));
+        (0..150).for_each(|_| bench.run(TrajectoryPoint::rest(20)));
         assert!(bench.current_a[0].abs() < 0.01 && (bench.current_a[1] - 1.2).abs() < 0.01, "{:?}", bench.current_a);
-        (0..15).for_each(|_| bench.run(TrajectoryPoint::rest(-20)));
+        (0..150).for_each(|_| bench.run(TrajectoryPoint::rest(-20)));
         assert!((bench.current_a[1] + 1.2).abs() < 0.01, "{:?}", bench.current_a);
     }
 

@@ -92,8 +92,10 @@ pub const CURRENT_KI: i64 = 300;
 /// lengths (2.8 and 5.4 mH). A voltage acts one control period late, so 0.25 is critically damped and 1 unstable.
 pub const CURRENT_KP_V_PER_A: f32 = 25e-3;
 
-/// One count of 2041h, V/(A s): 300 counts give an integral time of 1 ms, of the order of the windings' L/R.
-pub const CURRENT_KI_V_PER_A_S: f32 = 50.0;
+/// One count of 2041h, V/(A s): 300 counts give an integral time of 10 ms. It is long against the swing of a rotor at high
+/// speed, where the voltage is at its limit: a tenth of it feeds the swing until the rotor falls out of step before 3000
+/// r/min.
+pub const CURRENT_KI_V_PER_A_S: f32 = 5.0;
 
 /// Share of the bus voltage that the bridges can give; the rest is dead time.
 pub const MODULATION_LIMIT: f32 = 0.98;
