@@ -14,3 +14,4 @@ mod motion;
 mod objects;
 mod power_on;
 mod pulses;
+mod robustness;

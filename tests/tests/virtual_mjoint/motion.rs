@@ -39,6 +39,35 @@ fn bit_4_acts_on_each_write_and_clears_itself_and_bit_6_counts_from_the_target()
 }
 
 #[test]
+fn rpdo_1_may_change_the_mode_and_start_a_move_in_one_frame() {
+    let mut bench = Bench::new();
+    bench.send("401#0F000300000000");
+    bench.send("201#1F000110270000");
+    bench.until_reached(1000);
+    assert!((bench.position() - 10_000).abs() <= 30, "{}", bench.position());
+    assert_eq!(bench.get(0x6040, 0), 0x0F);
+}
+
+#[test]
+fn a_target_that_is_sent_again_and_again_is_reached_in_the_same_time() {
+    let time = |again: bool| {
+        let mut bench = Bench::new();
+        bench.set(0x6040, 0, 0x2F);
+        bench.set(0x607A, 0, 10 * TURN);
+        let from = bench.world.now();
+        while bench.report().statusword.is_some_and(|word| word & 0x0400 == 0) {
+            if again {
+                bench.send("201#2F000100000500");
+            }
+            bench.run_ms(1);
+        }
+        assert!((bench.position() - 10 * TURN).abs() <= 30);
+        bench.world.now().as_secs_f64() - from.as_secs_f64()
+    };
+    assert!((time(true) - time(false)).abs() < 0.02);
+}
+
+#[test]
 fn the_incremental_position_moves_at_once() {
     let mut bench = Bench::new();
     bench.set(0x6040, 0, 0x0F);

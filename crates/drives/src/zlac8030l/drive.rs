@@ -250,8 +250,6 @@ impl Zlac8030l {
         self.servo.velocity_rad_s() * (60.0 / core::f32::consts::TAU)
     }
 
-    // ---- faults ----
-
     fn watch_faults(&mut self, sensors: &Sensors, now: Instant) {
         self.eeprom_ok = sensors.eeprom_ok;
         let situation = Situation {
@@ -298,8 +296,6 @@ impl Zlac8030l {
         }
         self.publish_status();
     }
-
-    // ---- the control task ----
 
     /// The first look at the sensors after a restart.
     fn wake(&mut self, sensors: &Sensors) {
@@ -391,8 +387,6 @@ impl Zlac8030l {
         if alarm && self.parameters.alarm_pwm { PowerStage::Shorted } else { PowerStage::Off }
     }
 
-    // ---- actual values -> dictionary ----
-
     fn publish(&mut self, sensors: &Sensors) {
         let position = self.position();
         let (velocity, current) = (self.shown_velocity_rpm.value, self.shown_current_a.value);
@@ -433,8 +427,6 @@ impl Zlac8030l {
         let register = self.faults.error_register();
         self.node.dictionary_mut().set(ERROR_REGISTER, register);
     }
-
-    // ---- the communication task ----
 
     fn communication_task(&mut self, now: Instant) {
         let timeout_ns = u64::from(self.values().get(COMMUNICATION_OFFLINE_TIME)) * 1_000_000;

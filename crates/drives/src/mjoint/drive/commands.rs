@@ -31,7 +31,7 @@ impl MJoint {
     }
 
     /// A peer wrote `raw` to `slot`. The status is shown anew at once: the answer to the same frame may carry it.
-    fn written(&mut self, slot: Slot, raw: u32, via: Via) {
+    pub(super) fn written(&mut self, slot: Slot, raw: u32, via: Via) {
         match effect(slot) {
             Effect::Command => self.command(Controlword(raw as u16)),
             Effect::SelectMode => self.select_mode(ModeOfOperation(raw as u8 as i8)),
@@ -51,6 +51,11 @@ impl MJoint {
     /// 6040h. The host takes the motor over with bit 0; bit 7 resets alarms; bit 4 clears itself.
     fn command(&mut self, asked: Controlword) {
         self.refresh_parameters();
+        // RPDO1 and 3 carry a mode behind the controlword, which is meant in that mode.
+        let mode = ModeOfOperation(self.values().get(MODES_OF_OPERATION));
+        if mode != ModeOfOperation::HOMING {
+            self.select_mode(mode);
+        }
         if asked.has(Controlword::FAULT_RESET) {
             self.reset_alarms();
         }

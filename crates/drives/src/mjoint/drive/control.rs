@@ -106,8 +106,6 @@ impl MJoint {
         }
     }
 
-    // ---- alarms ----
-
     fn watch_alarms(&mut self, sensors: &Sensors) {
         let situation = Situation {
             servo: &self.servo,
@@ -145,8 +143,6 @@ impl MJoint {
         self.alarms.reset();
         self.publish_alarms();
     }
-
-    // ---- what to do ----
 
     /// Pulses, and what 2619h starts after power-on.
     fn move_by_itself(&mut self, sensors: &Sensors) {
