@@ -40,10 +40,10 @@ fn sdo_requests_and_answers_show_object_and_value() {
     assert_eq!(
         shown,
         [
-            "SDO node 4: read 6041h:00",
-            "SDO node 4: 6041h:00 = 0237h (Operation enabled)",
-            "SDO node 4: write 6040h:00 = 000Fh (enable operation)",
-            "SDO node 4: done: write 6040h:00",
+            "SDO node 4: read 6041h:00 statusword",
+            "SDO node 4: 6041h:00 statusword = 0237h (Operation enabled)",
+            "SDO node 4: write 6040h:00 controlword = 000Fh (enable operation)",
+            "SDO node 4: done: write 6040h:00 controlword",
         ]
     );
     let shown = lines(&mut Decoder::new(), &["604#4002650000000000", "584#8002650000000206"]);
@@ -100,7 +100,7 @@ fn a_refused_mapping_changes_nothing() {
     let map = PdoMap(vec![MappedObject::from_record(0x6041_0010)]);
     decoder.set_pdo(NodeId::new(4).unwrap(), Direction::Tpdo, 0, 0x184, &map);
     lines(&mut decoder, &["604#2F001A0000000000", "584#80001A0022000008"]);
-    assert_eq!(lines(&mut decoder, &["184#3702"]), ["TPDO0 node 4: 6041h:00 = 0237h (Operation enabled)"]);
+    assert_eq!(lines(&mut decoder, &["184#3702"]), ["TPDO0 node 4: 6041h:00 statusword = 0237h (Operation enabled)"]);
 }
 
 #[test]

@@ -85,7 +85,7 @@ impl Models {
 }
 
 impl Decoder {
-    /// A decoder that knows the standard only.
+    /// A decoder that knows no node's model: it names the objects that all models agree on.
     pub fn new() -> Self {
         Self::default()
     }

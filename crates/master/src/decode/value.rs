@@ -76,8 +76,18 @@ pub(super) fn write_name(f: &mut fmt::Formatter<'_>, mux: Mux, entry: Option<&En
 }
 
 pub(super) fn find(table: Option<&Table>, mux: Mux) -> Option<&'static Entry> {
-    let table = table?;
-    Some(table.row(table.find(mux).ok()?))
+    let row_of = |table: &Table| table.find(mux).ok().map(|slot| table.row(slot));
+    let Some(table) = table else {
+        // Of a node whose model is not known, what all models that have the object agree on.
+        let mut rows = drives::profile::MODELS.iter().filter_map(|profile| row_of(profile.table));
+        let first = rows.next()?;
+        return rows.all(|row| reads_alike(row, first)).then_some(first);
+    };
+    row_of(table)
+}
+
+fn reads_alike(a: &Entry, b: &Entry) -> bool {
+    (a.name, a.data_type, a.unit, a.values) == (b.name, b.data_type, b.unit, b.values)
 }
 
 /// An emergency error code in words. Codes 0001h to 00FFh are no errors to the standard and the maker's own to some
