@@ -44,6 +44,13 @@ impl Frame {
         Self { data, id, length: MAX_DATA_LENGTH as u8, kind: FrameKind::Data }
     }
 
+    /// A data frame with the low `length` bytes (at most 8) of `bits`, the lowest byte first.
+    pub const fn of_bits(id: CanId, bits: u64, length: u8) -> Self {
+        let length = if length < MAX_DATA_LENGTH as u8 { length } else { MAX_DATA_LENGTH as u8 };
+        let used = if length == 0 { 0 } else { u64::MAX >> (u64::BITS - length as u32 * 8) };
+        Self { data: (bits & used).to_le_bytes(), id, length, kind: FrameKind::Data }
+    }
+
     /// A remote frame asking for `length` bytes (at most 8).
     pub const fn remote(id: CanId, length: u8) -> Self {
         let length = if length < MAX_DATA_LENGTH as u8 { length } else { MAX_DATA_LENGTH as u8 };
@@ -219,6 +226,16 @@ mod tests {
             assert_eq!(text.parse::<Frame>().unwrap().to_string(), text);
         }
         assert_eq!("123#11.22.33".parse::<Frame>().unwrap(), Frame::new(CanId::standard(0x123), &[0x11, 0x22, 0x33]));
+    }
+
+    #[test]
+    fn bits_are_carried_from_the_lowest_byte_on() {
+        let bits = 0x8877_6655_4433_2211;
+        for length in 0..=MAX_DATA_LENGTH {
+            let frame = Frame::of_bits(CanId::standard(0x184), bits, length as u8);
+            assert_eq!(frame, Frame::new(CanId::standard(0x184), &bits.to_le_bytes()[..length]));
+        }
+        assert_eq!(Frame::of_bits(CanId::standard(0x184), bits, 9).dlc(), 8);
     }
 
     #[test]

@@ -60,6 +60,35 @@ impl PdoNumber {
     }
 }
 
+/// Some of the four PDOs of one direction, by position: a bit each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct PdoSet(u8);
+
+impl PdoSet {
+    pub(crate) const NONE: Self = Self(0);
+
+    pub(crate) const fn set(&mut self, position: usize, contained: bool) {
+        let bit = 1 << position;
+        self.0 = if contained { self.0 | bit } else { self.0 & !bit };
+    }
+
+    /// What is contained; nothing is left.
+    pub(crate) const fn take(&mut self) -> Self {
+        core::mem::replace(self, Self::NONE)
+    }
+
+    /// The positions contained, ascending.
+    #[inline]
+    pub(crate) fn iter(self) -> impl Iterator<Item = usize> {
+        let mut rest = self.0;
+        core::iter::from_fn(move || {
+            let position = rest.trailing_zeros() as usize;
+            rest &= rest.wrapping_sub(1);
+            (position < PdoNumber::COUNT).then_some(position)
+        })
+    }
+}
+
 /// What an identifier of the predefined connection set carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Service {

@@ -6,12 +6,11 @@ use std::time::Duration;
 use canopen::{Mux, NodeId};
 use cia402::PowerCommand;
 use master::drive::Drive;
-use master::identify::identity;
 use master::{Error, Network, Node};
 
 use crate::args::Global;
 use crate::failure::Failure;
-use crate::models::{self, DriveProfile, MODELS};
+use crate::models::{self, DriveProfile};
 use crate::progress::Progress;
 
 /// Time for a frame without an answer (NMT) to get onto the bus before a command ends.
@@ -52,22 +51,20 @@ impl Context {
         self.models.get(&id).copied()
     }
 
-    /// Which model a node is: as the command line says, else as its identity says, if that fits one model only.
+    /// Which model a node is: as the command line says, else as its identity and objects say, if they fit one model only.
     pub(crate) async fn model_of(&self, id: NodeId) -> Result<Option<&'static DriveProfile>, Failure> {
         if let Some(model) = self.told_model(id) {
             return Ok(Some(model));
         }
-        let said = identity(&self.node(id)).await?;
-        let mut fits =
-            MODELS.iter().copied().filter(|model| said.device_type.is_some() && said.matches(&model.identity));
-        Ok(fits.next().filter(|_| fits.next().is_none()))
+        let models = master::identify::models(&self.node(id)).await?;
+        Ok(if let [model] = models[..] { Some(model) } else { None })
     }
 
     /// As [`model_of`](Self::model_of), for commands that cannot do without.
     pub(crate) async fn known_model_of(&self, id: NodeId) -> Result<&'static DriveProfile, Failure> {
         self.model_of(id).await?.ok_or_else(|| {
             Failure::new(format!("the model of node {id} is not known"))
-                .because("its identity (1018h) fits no model, or more than one")
+                .because("its identity (1018h) and objects fit no model, or more than one")
                 .next(format!("say which it is with --model {id}=MODEL, where MODEL is one of: {}", models::names()))
         })
     }

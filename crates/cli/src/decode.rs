@@ -57,6 +57,11 @@ pub(crate) fn decode(row: Option<&'static Entry>, bytes: &[u8]) -> Decoded {
         decoded.meaning = meaning(row, value);
         decoded.hexadecimal = is_bit_field(row);
         decoded.measure(row.unit, value);
+    } else if let Some(form) = row.tpdo_form.filter(|form| form.data_type.size() == bytes.len()) {
+        // An object may have another length and unit in TPDOs.
+        let value = form.data_type.value(raw());
+        decoded.value = Some(value);
+        decoded.measure(form.unit, value);
     }
     decoded
 }

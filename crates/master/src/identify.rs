@@ -1,12 +1,14 @@
 //! Who is on the bus: what nodes say of themselves, and which model that can be.
 //!
 //! In: boot-up and heartbeat messages seen, and answers to 1000h and 1018h. Out: one [`Found`] per node. Nodes are
-//! asked in windows, all of a window at the same time. What cannot be told is said: two models may share an identity.
+//! asked in windows, all of a window at the same time. Models may share an identity: those with other objects are told
+//! apart by an object that only some of them have. What cannot be told is said.
 
 use core::fmt;
 use std::time::Duration;
 
-use canopen::{Mux, NmtState, NodeId};
+use canopen::od::Entry;
+use canopen::{AbortCode, Mux, NmtState, NodeId};
 use drives::profile::{self, DriveProfile, models_by_identity};
 
 use crate::error::Error;
@@ -72,7 +74,7 @@ pub struct Found {
     pub identity: Option<Identity>,
     /// Its NMT state by its last boot-up or heartbeat message, or the NMT command sent since.
     pub nmt_state: Option<NmtState>,
-    /// The models that answer so. More than one: it cannot be told which.
+    /// The models that answer so and have its objects. More than one: it cannot be told which.
     pub models: Vec<&'static DriveProfile>,
 }
 
@@ -100,12 +102,12 @@ impl Found {
             (None, _) => Some("it is heard but answers no SDO: stopped, or busy, or its SDO is elsewhere".to_owned()),
             (Some(_), []) => Some("no model known here answers so".to_owned()),
             (Some(_), [model]) if shared(model) => {
-                Some(format!("other models of the maker answer so too: tell the model ({}) if it is that", model.model))
+                Some(format!("other models answer the same identity: its objects are those of the {}", model.model))
             }
             (Some(_), [_]) => None,
             (Some(_), models) => {
                 let names: Vec<_> = models.iter().map(|model| model.model).collect();
-                Some(format!("{} answer the same identity: the model has to be told", names.join(" and ")))
+                Some(format!("{} answer the same identity and have the same objects: say which", names.join(" and ")))
             }
         }
     }
@@ -137,6 +139,37 @@ fn node_silent(node: &Node, mux: Mux) -> Error {
     Error::NoAnswer { node: node.id(), mux, access, waited: node.timeout(), hints: node.hints(false) }
 }
 
+/// The models that a node can be: those of its identity, as far as their objects do not speak against it.
+///
+/// # Errors
+/// [`Error::NoAnswer`] when it is silent.
+pub async fn models(node: &Node) -> Result<Vec<&'static DriveProfile>, Error> {
+    let said = identity(node).await?;
+    told_apart(node, models_answering(said)).await
+}
+
+/// Those of `models` whose objects the node has.
+async fn told_apart(node: &Node, mut models: Vec<&'static DriveProfile>) -> Result<Vec<&'static DriveProfile>, Error> {
+    // Each answer leaves fewer models, and at least one.
+    while let Some(mux) = distinguishing_object(&models) {
+        let present = match node.upload(mux).await {
+            Ok(_) => true,
+            Err(Error::Aborted { code: AbortCode::NO_SUCH_OBJECT | AbortCode::NO_SUCH_SUB_INDEX, .. }) => false,
+            Err(Error::NoAnswer { .. }) => return Err(node_silent(node, mux)),
+            Err(_) => break,
+        };
+        models.retain(|model| model.table.find(mux).is_ok() == present);
+    }
+    Ok(models)
+}
+
+/// An object that the first model lets read and another one does not have.
+fn distinguishing_object(models: &[&'static DriveProfile]) -> Option<Mux> {
+    let (first, others) = models.split_first()?;
+    let readable = first.table.rows().iter().filter(|entry| entry.access.is_readable());
+    readable.map(Entry::mux).find(|mux| others.iter().any(|other| other.table.find(*mux).is_err()))
+}
+
 impl Network {
     /// Asks all 127 node-IDs who they are. `progress` hears how many have been asked.
     ///
@@ -161,7 +194,8 @@ impl Network {
         if identity.is_none() && facts.seen_at.is_none() {
             return None;
         }
-        let models = identity.map(models_answering).unwrap_or_default();
+        let answering = identity.map(models_answering).unwrap_or_default();
+        let models = told_apart(&node, answering).await.unwrap_or_default();
         Some(Found { node: id, identity, nmt_state: facts.probable_state(), models })
     }
 }

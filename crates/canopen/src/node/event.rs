@@ -33,6 +33,41 @@ pub enum NodeEvent {
     RpdoTooShort(PdoNumber),
 }
 
+/// What waits for the owner, in the order of arrival. When full, the oldest is lost: the dictionary has the newest
+/// values.
+#[derive(Clone, Debug)]
+pub(super) struct EventQueue {
+    events: [NodeEvent; EVENT_QUEUE_LENGTH],
+    /// How many were ever taken and put, modulo 256: two counters, so that neither waits for the other.
+    taken: u8,
+    put: u8,
+}
+
+const _: () = assert!(EVENT_QUEUE_LENGTH.is_power_of_two() && EVENT_QUEUE_LENGTH < 256);
+
+impl EventQueue {
+    pub(super) const EMPTY: Self = Self { events: [NodeEvent::Sync; EVENT_QUEUE_LENGTH], taken: 0, put: 0 };
+
+    #[inline]
+    pub(super) fn push(&mut self, event: NodeEvent) {
+        self.events[usize::from(self.put) % EVENT_QUEUE_LENGTH] = event;
+        self.put = self.put.wrapping_add(1);
+        if usize::from(self.put.wrapping_sub(self.taken)) > EVENT_QUEUE_LENGTH {
+            self.taken = self.taken.wrapping_add(1);
+        }
+    }
+
+    #[inline]
+    pub(super) fn pop(&mut self) -> Option<NodeEvent> {
+        if self.taken == self.put {
+            return None;
+        }
+        let event = self.events[usize::from(self.taken) % EVENT_QUEUE_LENGTH];
+        self.taken = self.taken.wrapping_add(1);
+        Some(event)
+    }
+}
+
 /// How a value came.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Via {

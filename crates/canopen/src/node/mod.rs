@@ -33,6 +33,7 @@
 //! ```
 
 mod event;
+mod identifiers;
 mod objects;
 mod pending;
 mod profile;
@@ -40,12 +41,12 @@ mod receive;
 mod transmit;
 
 use can::{CanId, Frame, Instant, Station};
-use heapless::Deque;
 
+use event::EventQueue;
 pub use event::{EVENT_QUEUE_LENGTH, NodeEvent, Via};
 pub use profile::NodeProfile;
 
-use crate::cob::PdoNumber;
+use crate::cob::{PdoNumber, PdoSet};
 use crate::emcy::{self, Emcy, EmcyErrorCode};
 use crate::heartbeat;
 use crate::nmt::Transition;
@@ -53,8 +54,8 @@ use crate::od::{Dictionary, Table};
 use crate::pdo::{Rpdo, Tpdo};
 use crate::sdo::Server;
 use crate::{Mux, NmtCommand, NmtState, NodeId};
+use identifiers::Identifiers;
 use pending::{Pending, Source};
-use receive::Receivers;
 
 /// One device on the bus, with a dictionary of up to `N` entries.
 ///
@@ -70,9 +71,10 @@ pub struct Node<const N: usize> {
     now: Instant,
     /// Nothing is due before this.
     deadline: Instant,
-    receivers: Receivers,
+    /// What it listens to.
+    received: Identifiers,
     pending: Pending,
-    events: Deque<NodeEvent, EVENT_QUEUE_LENGTH>,
+    events: EventQueue,
     last_addressed: Option<Instant>,
     heartbeat: heartbeat::Producer,
     heartbeat_state: Option<u8>,
@@ -81,6 +83,10 @@ pub struct Node<const N: usize> {
     sdo: Server,
     rpdos: [Rpdo; PdoNumber::COUNT],
     tpdos: [Tpdo; PdoNumber::COUNT],
+    /// Active TPDOs that look at SYNC.
+    synchronous_tpdos: PdoSet,
+    /// RPDOs whose data waits for SYNC.
+    latched_rpdos: PdoSet,
 }
 
 impl<const N: usize> Node<N> {
@@ -96,9 +102,9 @@ impl<const N: usize> Node<N> {
             state: NmtState::Initialising,
             now: Instant::ZERO,
             deadline: Instant::FAR_FUTURE,
-            receivers: Receivers::NONE,
+            received: Identifiers::NONE,
             pending: Pending::NONE,
-            events: Deque::new(),
+            events: EventQueue::EMPTY,
             last_addressed: None,
             heartbeat: heartbeat::Producer::OFF,
             heartbeat_state: None,
@@ -107,6 +113,8 @@ impl<const N: usize> Node<N> {
             sdo: Server::new(profile.sdo_frame_length, profile.sdo_timeout_ns),
             rpdos: [Rpdo::INVALID; PdoNumber::COUNT],
             tpdos: [Tpdo::INVALID; PdoNumber::COUNT],
+            synchronous_tpdos: PdoSet::NONE,
+            latched_rpdos: PdoSet::NONE,
         }
     }
 
@@ -118,7 +126,7 @@ impl<const N: usize> Node<N> {
         self.sdo.reset();
         self.emcy = emcy::Producer::new();
         self.pending = Pending::NONE;
-        self.events.clear();
+        self.events = EventQueue::EMPTY;
         self.last_addressed = None;
         self.take_up_objects();
         self.pending.insert(Source::BootUp);
@@ -148,18 +156,18 @@ impl<const N: usize> Node<N> {
     /// Falls silent and deaf until the next [`boot`](Self::boot): the supply is gone.
     pub fn power_off(&mut self) {
         self.state = NmtState::Initialising;
-        self.receivers = Receivers::NONE;
+        self.received = Identifiers::NONE;
         self.pending = Pending::NONE;
         self.deadline = Instant::FAR_FUTURE;
         self.sdo.reset();
         self.stop_pdos();
-        self.events.clear();
+        self.events = EventQueue::EMPTY;
     }
 
     /// What happened since, in the order of arrival. Poll after every `handle_*`.
     #[inline]
     pub fn poll_event(&mut self) -> Option<NodeEvent> {
-        self.events.pop_front()
+        self.events.pop()
     }
 
     /// When the last frame for this node arrived (SDO request, RPDO, NMT command to it or to all): for a watch over
@@ -274,6 +282,7 @@ impl<const N: usize> Node<N> {
     }
 
     fn stop_pdos(&mut self) {
+        self.latched_rpdos = PdoSet::NONE;
         for position in 0..PdoNumber::COUNT {
             let _ = self.rpdos[position].take_latched();
             self.tpdos[position].stop();
@@ -281,13 +290,9 @@ impl<const N: usize> Node<N> {
         }
     }
 
-    /// When full, the oldest event is lost: the dictionary has the newest values.
     #[inline]
     fn push(&mut self, event: NodeEvent) {
-        if self.events.is_full() {
-            self.events.pop_front();
-        }
-        let _ = self.events.push_back(event);
+        self.events.push(event);
     }
 }
 
@@ -296,7 +301,7 @@ impl<const N: usize> Station for Node<N> {
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
         self.now = now;
         let Some(id) = frame.standard_data_id() else { return };
-        let receivers = self.receivers.of(id);
+        let receivers = self.received.of(id);
         if !receivers.is_empty() {
             self.receive(frame, receivers);
         }

@@ -1,6 +1,6 @@
 //! What a write to the communication objects (1000h to 1FFFh) must satisfy, and what it changes at once.
 
-use super::receive::Receivers;
+use super::identifiers::{FIRST_RPDO, Identifiers, SYNC};
 use super::{Node, NodeEvent, Via};
 use crate::cob::PdoNumber;
 use crate::heartbeat;
@@ -40,20 +40,20 @@ impl Record {
 
 impl<const N: usize> Node<N> {
     /// A peer's write: checks, stores, takes effect, is told to the owner.
-    #[inline]
+    #[inline(always)]
     pub(super) fn write(&mut self, slot: Slot, raw: u32, via: Via) -> Result<(), AbortCode> {
-        let row = self.dictionary.table().row(slot);
-        if is_communication(row.index) {
-            self.write_communication(slot, row.mux(), raw & row.data_type.mask(), via)
-        } else {
-            let raw = self.dictionary.write(slot, raw)?;
-            self.push(NodeEvent::Written { slot, raw, via });
-            Ok(())
+        if self.dictionary.table().summary(slot).is_communication() {
+            return self.write_communication(slot, raw, via);
         }
+        let raw = self.dictionary.write(slot, raw)?;
+        self.push(NodeEvent::Written { slot, raw, via });
+        Ok(())
     }
 
     #[inline(never)]
-    fn write_communication(&mut self, slot: Slot, mux: Mux, raw: u32, via: Via) -> Result<(), AbortCode> {
+    fn write_communication(&mut self, slot: Slot, raw: u32, via: Via) -> Result<(), AbortCode> {
+        let row = self.dictionary.table().row(slot);
+        let (mux, raw) = (row.mux(), raw & row.data_type.mask());
         self.dictionary.check_write(slot, raw)?;
         self.check_communication(mux, raw)?;
         self.dictionary.set_raw(slot, raw);
@@ -130,7 +130,7 @@ impl<const N: usize> Node<N> {
 
     /// All communication objects take effect.
     pub(super) fn take_up_objects(&mut self) {
-        self.receivers = Receivers::new(self.node_id);
+        self.received = Identifiers::of_requests(self.node_id);
         self.take_up_sync();
         self.take_up_emcy();
         for position in 0..PdoNumber::COUNT {
@@ -149,7 +149,7 @@ impl<const N: usize> Node<N> {
 
     fn take_up_sync(&mut self) {
         let cob_id = self.object(0x1005).map(CobId);
-        self.receivers.set_sync(cob_id.and_then(|cob_id| cob_id.can_id().as_standard()));
+        self.received.set(SYNC, cob_id.and_then(|cob_id| cob_id.can_id().as_standard()));
     }
 
     /// 1014h, or what it would be by default on a device without it.
@@ -169,7 +169,8 @@ impl<const N: usize> Node<N> {
         let mapping = Mapping::read(&values, RPDO_MAPPING + position as u16, Direction::Receive);
         // A mapping that does not resolve (a store of another firmware) maps nothing.
         let rpdo = Rpdo::configure(&parameter, mapping.unwrap_or(None));
-        self.receivers.set_rpdo(position, rpdo.standard_id());
+        self.received.set(FIRST_RPDO + position as u32, rpdo.standard_id());
+        self.latched_rpdos.set(position, false);
         self.rpdos[position] = rpdo;
     }
 
@@ -177,12 +178,14 @@ impl<const N: usize> Node<N> {
         let values = self.dictionary.view();
         let parameter = Parameter::read(&values, TPDO_PARAMETER + position as u16);
         let mapping = Mapping::read(&values, TPDO_MAPPING + position as u16, Direction::Transmit);
-        self.tpdos[position] = Tpdo::configure(
+        let tpdo = Tpdo::configure(
             &parameter,
             mapping.unwrap_or(None),
             self.profile.event_trigger,
             self.profile.inhibit_unit_ns,
             self.profile.event_timer_unit_ns,
         );
+        self.synchronous_tpdos.set(position, tpdo.is_active() && tpdo.is_synchronous());
+        self.tpdos[position] = tpdo;
     }
 }

@@ -60,6 +60,11 @@ impl Pending {
         self.0 &= !source.bit();
     }
 
+    /// The one source that has a frame, if no other has.
+    pub(super) const fn only(self) -> Option<Source> {
+        if self.0.is_power_of_two() { Some(Source::of_bit(self.0.trailing_zeros())) } else { None }
+    }
+
     pub(super) fn iter(self) -> impl Iterator<Item = Source> {
         let mut rest = self.0;
         core::iter::from_fn(move || {

@@ -32,7 +32,10 @@ impl<const N: usize> Node<N> {
 
     #[inline(never)]
     pub(super) fn take_most_urgent(&mut self) -> Option<Frame> {
-        let source = self.pending.iter().min_by_key(|source| self.pending_id(*source))?;
+        let source = match self.pending.only() {
+            Some(source) => source,
+            None => self.pending.iter().min_by_key(|source| self.pending_id(*source))?,
+        };
         self.pending.remove(source);
         self.take(source)
     }

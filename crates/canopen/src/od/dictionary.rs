@@ -1,4 +1,4 @@
-use super::{Default, Entry, Object, Scalar, Slot, Table};
+use super::{Default, Object, Scalar, Slot, Table};
 use crate::{AbortCode, Mux, NodeId};
 
 /// The values of a device's objects: one 32-bit cell a row of its [`Table`], little endian in the low bytes.
@@ -57,7 +57,7 @@ impl<const N: usize> Dictionary<N> {
     /// Stores a cell; bits beyond the object's width are dropped. No access or range is checked.
     #[inline]
     pub fn set_raw(&mut self, slot: Slot, raw: u32) {
-        self.cells[slot.position()] = raw & self.table.row(slot).data_type.mask();
+        self.cells[slot.position()] = raw & self.table.summary(slot).mask();
     }
 
     /// The value of a row as a number.
@@ -79,28 +79,30 @@ impl<const N: usize> Dictionary<N> {
     ///
     /// # Errors
     /// The abort code that an SDO server answers. Nothing is stored.
+    #[inline(always)]
     pub fn check_write(&self, slot: Slot, raw: u32) -> Result<(), AbortCode> {
-        self.check_row(self.table.row(slot), raw)
-    }
-
-    #[inline]
-    fn check_row(&self, row: &Entry, raw: u32) -> Result<(), AbortCode> {
-        if !row.access.is_writable() {
+        let summary = self.table.summary(slot);
+        if !summary.is_writable() {
             return Err(AbortCode::READ_ONLY);
         }
-        row.check_value(row.data_type.value(raw))?;
-        row.check.map_or(Ok(()), |check| check(&self.view(), raw))
+        if summary.is_bounded() {
+            let row = self.table.row(slot);
+            row.check_value(row.data_type.value(raw))?;
+        }
+        if summary.is_checked() {
+            self.table.row(slot).check.map_or(Ok(()), |check| check(&self.view(), raw))?;
+        }
+        Ok(())
     }
 
     /// [`check_write`](Self::check_write), then stores. Returns the cell.
     ///
     /// # Errors
     /// The abort code that an SDO server answers. Nothing is stored.
-    #[inline]
+    #[inline(always)]
     pub fn write(&mut self, slot: Slot, raw: u32) -> Result<u32, AbortCode> {
-        let row = self.table.row(slot);
-        let cell = raw & row.data_type.mask();
-        self.check_row(row, cell)?;
+        let cell = raw & self.table.summary(slot).mask();
+        self.check_write(slot, cell)?;
         self.cells[slot.position()] = cell;
         Ok(cell)
     }

@@ -8,9 +8,11 @@
 mod data_type;
 mod dictionary;
 mod entry;
+mod summary;
 mod table;
 
 pub use data_type::{DataType, Scalar};
 pub use dictionary::{Dictionary, View};
 pub use entry::{Access, Check, Default, Entry, PdoMapping, TpdoForm};
+use summary::Summary;
 pub use table::{Object, Slot, Table, keys};

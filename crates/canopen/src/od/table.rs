@@ -1,6 +1,6 @@
 use core::marker::PhantomData;
 
-use super::{Entry, Scalar};
+use super::{Entry, Scalar, Summary};
 use crate::{AbortCode, Mux};
 
 /// All rows of a device, ascending by index and sub-index, with their keys packed for the search.
@@ -12,6 +12,7 @@ pub struct Table {
     rows: &'static [Entry],
     keys: &'static [u32],
     directory: [u16; DIRECTORY_LENGTH],
+    summaries: [Summary; MAX_ROWS],
 }
 
 /// Places of the directory: a power of two, so that the hash needs no division.
@@ -74,6 +75,7 @@ impl Table {
     pub const fn new(rows: &'static [Entry], keys: &'static [u32]) -> Self {
         assert!(rows.len() == keys.len() && rows.len() <= MAX_ROWS);
         let mut directory = [FREE; DIRECTORY_LENGTH];
+        let mut summaries = [Summary::NONE; MAX_ROWS];
         let mut position = 0;
         while position < keys.len() {
             let mut place = first_place(keys[position]);
@@ -81,9 +83,10 @@ impl Table {
                 place = next_place(place);
             }
             directory[place] = position as u16;
+            summaries[position] = Summary::of(&rows[position]);
             position += 1;
         }
-        Self { rows, keys, directory }
+        Self { rows, keys, directory, summaries }
     }
 
     /// All rows, ascending.
@@ -94,6 +97,12 @@ impl Table {
     /// The row of a slot of this table.
     pub fn row(&self, slot: Slot) -> &'static Entry {
         &self.rows[slot.position()]
+    }
+
+    /// The row of a slot of this table in short.
+    #[inline]
+    pub(crate) const fn summary(&self, slot: Slot) -> Summary {
+        self.summaries[slot.position()]
     }
 
     /// All slots with their rows.

@@ -108,6 +108,11 @@ impl Tpdo {
         self.mapping.is_some()
     }
 
+    /// True if SYNC is what sends it; else events do.
+    pub const fn is_synchronous(&self) -> bool {
+        !matches!(self.schedule, Schedule::Event { .. })
+    }
+
     /// Operational is entered, or the PDO became active while operational: counts as an event, so that event-driven
     /// data is sent once. SYNCs and the event timer count from here.
     pub fn start(&mut self, now: Instant) {
@@ -230,7 +235,7 @@ impl Tpdo {
             }
         }
         self.inhibited_until = now.plus_nanos(self.inhibit_ns);
-        Some(Frame::new(self.id, &self.data.to_le_bytes()[..usize::from(mapping.length())]))
+        Some(Frame::of_bits(self.id, self.data, mapping.length()))
     }
 
     /// The wire took the frame at `now`: the inhibit time counts from here.

@@ -64,11 +64,10 @@ impl Server {
     /// A request arrived. Returns the write that the owner has to carry out, if it completes a download.
     #[inline]
     pub fn handle_frame(&mut self, frame: &Frame, values: &View<'_>, now: Instant) -> Option<Write> {
-        let request = Request::parse(frame.padded());
-        if !self.listens_to(frame, &request) {
+        if !self.listens_to(frame) {
             return None;
         }
-        match request {
+        match Request::parse(frame.padded()) {
             Request::InitiateUpload(mux) => self.initiate_upload(mux, values, now),
             Request::InitiateDownload(mux, payload) => {
                 return self.initiate_download(mux, payload, values.table(), now);
@@ -127,11 +126,13 @@ impl Server {
         self.reply = None;
     }
 
-    fn listens_to(&self, frame: &Frame, request: &Request) -> bool {
-        match self.frame_length {
-            FrameLength::Eight => frame.dlc() == LENGTH as u8,
+    #[inline]
+    fn listens_to(&self, frame: &Frame) -> bool {
+        match (frame.dlc(), self.frame_length) {
+            (8, _) => true,
+            (_, FrameLength::Eight) => false,
             // The first byte must be there to say what the request is.
-            FrameLength::Used => frame.dlc() > 0 && frame.dlc() >= request.used_length(),
+            (dlc, FrameLength::Used) => dlc > 0 && dlc >= Request::parse(frame.padded()).used_length(),
         }
     }
 
@@ -142,18 +143,20 @@ impl Server {
             Ok(slot) => slot,
             Err(code) => return self.refuse(mux, code),
         };
-        let row = table.row(slot);
-        if !row.access.is_readable() {
+        let row = table.summary(slot);
+        if !row.is_readable() {
             return self.refuse(mux, AbortCode::WRITE_ONLY);
         }
-        if let Some(text) = row.constant_text() {
+        if row.is_text() {
+            let text = table.row(slot).constant_text().unwrap_or_default();
             return self.initiate_text(mux, text.as_bytes(), now);
         }
-        let length = row.data_type.size() as u8;
+        let length = row.size();
         let bytes = values.raw(slot).to_le_bytes();
         self.answer(Reply::InitiateUpload(mux, Payload::Expedited { length: Some(length), bytes }));
     }
 
+    #[inline(never)]
     fn initiate_text(&mut self, mux: Mux, text: &'static [u8], now: Instant) {
         if let Some(payload) = Payload::expedited(text) {
             return self.answer(Reply::InitiateUpload(mux, payload));
@@ -180,6 +183,8 @@ impl Server {
         }
     }
 
+    // Inlined, the payload stays in registers.
+    #[inline(always)]
     fn initiate_download(&mut self, mux: Mux, payload: Payload, table: &Table, now: Instant) -> Option<Write> {
         self.end();
         let (slot, size) = match writable(mux, table) {
@@ -202,15 +207,21 @@ impl Server {
                 Some(Write { slot, raw: u32::from_le_bytes(bytes), mux, confirm: Confirm::Expedited })
             }
             Payload::Segmented { size: declared } => {
-                let bytes = [0; MAX_EXPEDITED];
-                self.transfer = Transfer::Download { mux, slot, declared, bytes, length: 0, toggle: false };
-                self.restart_timeout(now);
-                self.answer(Reply::InitiateDownload(mux));
+                self.begin_download(mux, slot, declared, now);
                 None
             }
         }
     }
 
+    #[inline(never)]
+    fn begin_download(&mut self, mux: Mux, slot: Slot, declared: Option<u32>, now: Instant) {
+        let bytes = [0; MAX_EXPEDITED];
+        self.transfer = Transfer::Download { mux, slot, declared, bytes, length: 0, toggle: false };
+        self.restart_timeout(now);
+        self.answer(Reply::InitiateDownload(mux));
+    }
+
+    #[inline(never)]
     fn download_segment(&mut self, segment: Segment, table: &Table, now: Instant) -> Option<Write> {
         let Transfer::Download { mux, slot, declared, bytes, length, toggle } = &mut self.transfer else {
             self.unexpected();
@@ -284,13 +295,8 @@ impl Server {
 /// The entry to write and its length in bytes.
 fn writable(mux: Mux, table: &Table) -> Result<(Slot, usize), AbortCode> {
     let slot = table.find(mux)?;
-    let row = table.row(slot);
-    match row.data_type.size() {
-        // A text is constant here.
-        0 => Err(AbortCode::READ_ONLY),
-        _ if !row.access.is_writable() => Err(AbortCode::READ_ONLY),
-        size => Ok((slot, size)),
-    }
+    let row = table.summary(slot);
+    if row.is_writable() { Ok((slot, usize::from(row.size()))) } else { Err(AbortCode::READ_ONLY) }
 }
 
 const fn check_length(length: usize, size: usize) -> Result<(), AbortCode> {

@@ -6,6 +6,7 @@
 
 use cia402::{Controlword, Direction, HaltOption, ModeOfOperation, PowerState, QuickStopOption, Transition};
 
+pub use super::demand::{Demand, Feedback, Targets};
 use super::modes::{
     Homing, HomingParameters, HomingStep, ProfilePosition, ProfileTorque, ProfileVelocity, SetPoint, Switches,
     VelocityRamps,
@@ -14,41 +15,6 @@ use super::power::{PowerMachine, StepDownOptions};
 use super::stop::Stop;
 pub use super::stop::{StopCause, StopRamp};
 use super::trajectory::{MoveLimits, Trajectory, TrajectoryPoint};
-
-/// What the control loops are to do.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Demand {
-    /// Nothing: the power stage is off.
-    Off,
-    /// Be at a position.
-    Position(TrajectoryPoint),
-    /// Turn at a velocity.
-    Velocity(TrajectoryPoint),
-    /// Pull with a current, A.
-    Torque(f32),
-}
-
-/// What the shaft does, in counts and counts/s.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Feedback {
-    /// Actual position.
-    pub position: i32,
-    /// Actual velocity.
-    pub velocity: f64,
-    /// Torque-producing current, A.
-    pub current_a: f32,
-    /// Slower than the drive's threshold of standstill.
-    pub standing: bool,
-}
-
-/// What the host wants of the modes that follow a target at all times.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Targets {
-    /// Counts/s.
-    pub velocity: f64,
-    /// A.
-    pub current_a: f32,
-}
 
 /// How the axis is set.
 #[derive(Clone, Copy, Debug)]
@@ -483,6 +449,7 @@ impl Axis {
         self.stop = None;
         self.velocity.restart();
         self.torque.restart();
+        self.position.rebase(self.trajectory.point().position);
         self.position.resume(&mut self.trajectory, &parameters.moves);
     }
 

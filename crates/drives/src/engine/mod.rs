@@ -11,6 +11,7 @@
 
 pub mod axis;
 pub mod bleeder;
+pub mod demand;
 pub mod faults;
 pub mod host_watchdog;
 pub mod inputs;

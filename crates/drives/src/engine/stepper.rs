@@ -48,14 +48,14 @@ pub struct StepperGains {
     pub modulation_limit: f32,
 }
 
-/// Largest values of one supervision period, for the faults: phase A first.
+/// What the currents did in one supervision period, for the faults: the largest values, phase A first.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Peaks {
     /// Measured, A, without sign.
     pub current_a: [f32; 2],
     /// Asked for, A, without sign.
     pub reference_a: [f32; 2],
-    /// Drawn from the bus, A.
+    /// Drawn from the bus, A: the mean.
     pub bus_a: f32,
 }
 
@@ -174,7 +174,7 @@ impl Stepper {
         self.q.settle(&gains.current, error_q, wanted_q, given_q, model.control_period_s);
 
         let duty = if bus_v > 0.0 { [v_a / bus_v, v_b / bus_v] } else { [0.0; 2] };
-        self.note_peaks(current_a, [self.amplitude_a * cos, self.amplitude_a * sin], duty);
+        self.note_peaks(model, current_a, [self.amplitude_a * cos, self.amplitude_a * sin], duty);
         duty
     }
 
@@ -208,14 +208,14 @@ impl Stepper {
         self.issued = due;
     }
 
-    fn note_peaks(&mut self, current_a: [f32; 2], reference_a: [f32; 2], duty: [f32; 2]) {
+    fn note_peaks(&mut self, model: &StepperModel, current_a: [f32; 2], reference_a: [f32; 2], duty: [f32; 2]) {
         let larger = |most: f32, now: f32| if now.abs() > most { now.abs() } else { most };
         for phase in 0..2 {
             self.peaks.current_a[phase] = larger(self.peaks.current_a[phase], current_a[phase]);
             self.peaks.reference_a[phase] = larger(self.peaks.reference_a[phase], reference_a[phase]);
         }
         let bus_a = duty[0] * current_a[0] + duty[1] * current_a[1];
-        self.peaks.bus_a = if bus_a > self.peaks.bus_a { bus_a } else { self.peaks.bus_a };
+        self.peaks.bus_a += bus_a / f32::from(model.periods_per_command.max(1));
     }
 }
 
@@ -233,8 +233,8 @@ mod tests {
     const MODEL: StepperModel =
         StepperModel { pulses_per_electrical_turn: 80, periods_per_command: 10, control_period_s: 50e-6 };
     const GAINS: StepperGains =
-        StepperGains { current: PiGains { proportional: 15.0, integral_per_s: 15e3 }, modulation_limit: 0.98 };
-    const CURRENTS: StepperCurrents = StepperCurrents { run_a: 1.2, hold_a: 0.6, hold_after: 20 };
+        StepperGains { current: PiGains { proportional: 15.0, integral_per_s: 1.5e3 }, modulation_limit: 0.98 };
+    const CURRENTS: StepperCurrents = StepperCurrents { run_a: 1.2, hold_a: 0.6, hold_after: 200 };
     const RESISTANCE_OHM: f32 = 1.85;
     const INDUCTANCE_H: f32 = 2.8e-3;
 
@@ -269,9 +269,9 @@ mod tests {
     #[test]
     fn the_vector_stands_up_at_its_amplitude_and_halves_at_rest() {
         let mut bench = Bench::new();
-        (0..15).for_each(|_| bench.run(TrajectoryPoint::rest(0)));
+        (0..150).for_each(|_| bench.run(TrajectoryPoint::rest(0)));
         assert!((bench.current_a[0] - 1.2).abs() < 0.01 && bench.current_a[1].abs() < 0.01);
-        (0..30).for_each(|_| bench.run(TrajectoryPoint::rest(0)));
+        (0..250).for_each(|_| bench.run(TrajectoryPoint::rest(0)));
         assert!((bench.stepper.current_a() - 0.6).abs() < 0.01);
     }
 
@@ -279,9 +279,9 @@ mod tests {
     fn a_quarter_of_an_electrical_turn_is_a_full_step_from_phase_a_to_phase_b() {
         let mut bench = Bench::new();
         bench.run(TrajectoryPoint::rest(0));
-        (0..15).for_each(|_| bench.run(TrajectoryPoint::rest(20)));
+        (0..150).for_each(|_| bench.run(TrajectoryPoint::rest(20)));
         assert!(bench.current_a[0].abs() < 0.01 && (bench.current_a[1] - 1.2).abs() < 0.01, "{:?}", bench.current_a);
-        (0..15).for_each(|_| bench.run(TrajectoryPoint::rest(-20)));
+        (0..150).for_each(|_| bench.run(TrajectoryPoint::rest(-20)));
         assert!((bench.current_a[1] + 1.2).abs() < 0.01, "{:?}", bench.current_a);
     }
 

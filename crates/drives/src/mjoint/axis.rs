@@ -158,9 +158,13 @@ impl Axis {
         }
     }
 
-    /// One period.
-    pub(super) fn update(&mut self, feedback: Feedback, dt_s: f64) -> Demand {
+    /// What the shaft does now, before anything is decided on it.
+    pub(super) fn observe(&mut self, feedback: Feedback) {
         self.feedback = feedback;
+    }
+
+    /// One period.
+    pub(super) fn update(&mut self, dt_s: f64) -> Demand {
         if !self.engaged {
             return Demand::Off;
         }

@@ -155,13 +155,21 @@ impl Zlac8030l {
     }
 
     fn handle_events(&mut self, now: Instant) {
+        let mut commanded = false;
         while let Some(event) = self.node.poll_event() {
             match event {
-                NodeEvent::Written { slot, raw, .. } => self.written(slot, raw, now),
+                NodeEvent::Written { slot, raw, .. } => {
+                    self.written(slot, raw, now);
+                    commanded |= matches!(effect(slot), Effect::Command | Effect::SelectMode);
+                }
                 NodeEvent::ResetNode => self.restart(now),
                 NodeEvent::ResetCommunication => self.restart_communication(now),
                 NodeEvent::Nmt(_) | NodeEvent::Sync | NodeEvent::RpdoTooShort(_) => {}
             }
+        }
+        // Once for all that one frame commands.
+        if commanded {
+            self.publish_status();
         }
     }
 
@@ -172,10 +180,7 @@ impl Zlac8030l {
         }
         match effect(slot) {
             Effect::Command => self.command(Controlword(raw as u16), now),
-            Effect::SelectMode => {
-                self.axis.request_mode(ModeOfOperation(raw as u8 as i8));
-                self.publish_status();
-            }
+            Effect::SelectMode => self.axis.request_mode(ModeOfOperation(raw as u8 as i8)),
             Effect::Registers => self.registers(raw, now),
             Effect::ClearPosition => self.clear_position(slot, raw),
             Effect::Target => {}
@@ -193,7 +198,6 @@ impl Zlac8030l {
         if self.axis.command(taken, target, &self.parameters.axis) {
             self.reset_faults(now);
         }
-        self.publish_status();
     }
 
     /// 2009h: reads 0 again when it is done.
@@ -246,8 +250,6 @@ impl Zlac8030l {
         self.servo.velocity_rad_s() * (60.0 / core::f32::consts::TAU)
     }
 
-    // ---- faults ----
-
     fn watch_faults(&mut self, sensors: &Sensors, now: Instant) {
         self.eeprom_ok = sensors.eeprom_ok;
         let situation = Situation {
@@ -294,8 +296,6 @@ impl Zlac8030l {
         }
         self.publish_status();
     }
-
-    // ---- the control task ----
 
     /// The first look at the sensors after a restart.
     fn wake(&mut self, sensors: &Sensors) {
@@ -387,8 +387,6 @@ impl Zlac8030l {
         if alarm && self.parameters.alarm_pwm { PowerStage::Shorted } else { PowerStage::Off }
     }
 
-    // ---- actual values -> dictionary ----
-
     fn publish(&mut self, sensors: &Sensors) {
         let position = self.position();
         let (velocity, current) = (self.shown_velocity_rpm.value, self.shown_current_a.value);
@@ -429,8 +427,6 @@ impl Zlac8030l {
         let register = self.faults.error_register();
         self.node.dictionary_mut().set(ERROR_REGISTER, register);
     }
-
-    // ---- the communication task ----
 
     fn communication_task(&mut self, now: Instant) {
         let timeout_ns = u64::from(self.values().get(COMMUNICATION_OFFLINE_TIME)) * 1_000_000;

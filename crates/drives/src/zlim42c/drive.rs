@@ -248,8 +248,6 @@ impl Zlim42c {
         self.stepper.velocity() / self.parameters.pulses_s_per_rpm
     }
 
-    // ---- faults ----
-
     fn watch_faults(&mut self, sensors: &Sensors, now: Instant) {
         self.eeprom_ok = sensors.eeprom_ok;
         let situation = Situation {
@@ -291,8 +289,6 @@ impl Zlim42c {
         }
         self.publish_status();
     }
-
-    // ---- the control task ----
 
     /// Every tenth control period.
     fn supervise(&mut self, sensors: &Sensors, now: Instant) {
@@ -367,8 +363,6 @@ impl Zlim42c {
         let Parameters { model, gains, .. } = &self.parameters;
         PowerStage::Modulate { duty: self.stepper.modulate(model, gains, sensors.phase_current_a, sensors.bus_v) }
     }
-
-    // ---- actual values -> dictionary ----
 
     fn publish(&mut self, sensors: &Sensors) {
         let position = self.stepper.position();

@@ -6,7 +6,8 @@
 use canopen::EmcyErrorCode;
 
 use super::readings::{
-    OVER_CURRENT_DEBOUNCE_PERIODS, PHASE_LOSS_DEBOUNCE_PERIODS, REFERENCE_DEBOUNCE_PERIODS, VOLTAGE_DEBOUNCE_PERIODS,
+    BUS_OVER_CURRENT_DEBOUNCE_PERIODS, OVER_CURRENT_DEBOUNCE_PERIODS, PHASE_LOSS_DEBOUNCE_PERIODS,
+    REFERENCE_DEBOUNCE_PERIODS, VOLTAGE_DEBOUNCE_PERIODS,
 };
 use crate::engine::faults::FaultRow;
 
@@ -49,7 +50,7 @@ pub static FAULTS: [FaultRow; FAULT_COUNT] = [
         "The drive's reference voltage circuit is out of order: replace the drive."),
     fault(0xFF10, "EEPROM read and write", MANUFACTURER, AT_ONCE,
         "Write 1 to 2010h (factory settings). If it comes back, the EEPROM is damaged."),
-    fault(0xFF02, "bus over-current", CURRENT, OVER_CURRENT_DEBOUNCE_PERIODS,
+    fault(0xFF02, "bus over-current", CURRENT, BUS_OVER_CURRENT_DEBOUNCE_PERIODS,
         "The drive draws too much from its supply: lower 2005h; look for a short circuit in the motor."),
 ];
 

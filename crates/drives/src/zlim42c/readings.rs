@@ -39,16 +39,19 @@ pub const VOLTAGE_HYSTERESIS_V: f32 = 1.0;
 /// 1 ms: longer than a switching transient, shorter than what the capacitors of the bus survive.
 pub const VOLTAGE_DEBOUNCE_PERIODS: u16 = 2;
 
-/// Phase current that counts as over-current, A: half as much again as the highest setting (2.2 A), beyond any overshoot
-/// of the current loop.
-pub const OVER_CURRENT_A: f32 = 3.3;
+/// Phase current that counts as over-current, A: twice the highest setting (2.2 A). What a rotor that slips drives through
+/// the windings stays below, what a short circuit draws is far above.
+pub const OVER_CURRENT_A: f32 = 4.4;
 
-/// Current drawn from the supply that counts as over-current, A: both phases at their highest setting with the full bus
-/// voltage is the most that the bridges can pass on (4.4 A).
-pub const BUS_OVER_CURRENT_A: f32 = 4.5;
-
-/// Both are watched every control period and act at once.
+/// Phase over-current is watched every control period and acts at once.
 pub const OVER_CURRENT_DEBOUNCE_PERIODS: u16 = 1;
+
+/// Current drawn from the supply that counts as over-current, A, mean over a supervision period: both phases of a vector
+/// of the highest setting with the full bus voltage are the most that a sound motor draws (2.2 A times the root of 2).
+pub const BUS_OVER_CURRENT_A: f32 = 3.2;
+
+/// 10 ms: the capacitors of the bus carry shorter pulses.
+pub const BUS_OVER_CURRENT_DEBOUNCE_PERIODS: u16 = 20;
 
 /// A phase counts as lost when it is asked for at least this share of the amplitude ...
 pub const PHASE_ASKED_SHARE: f32 = 0.3;
@@ -89,8 +92,10 @@ pub const CURRENT_KI: i64 = 300;
 /// lengths (2.8 and 5.4 mH). A voltage acts one control period late, so 0.25 is critically damped and 1 unstable.
 pub const CURRENT_KP_V_PER_A: f32 = 25e-3;
 
-/// One count of 2041h, V/(A s): 300 counts give an integral time of 1 ms, of the order of the windings' L/R.
-pub const CURRENT_KI_V_PER_A_S: f32 = 50.0;
+/// One count of 2041h, V/(A s): 300 counts give an integral time of 10 ms. It is long against the swing of a rotor at high
+/// speed, where the voltage is at its limit: a tenth of it feeds the swing until the rotor falls out of step before 3000
+/// r/min.
+pub const CURRENT_KI_V_PER_A_S: f32 = 5.0;
 
 /// Share of the bus voltage that the bridges can give; the rest is dead time.
 pub const MODULATION_LIMIT: f32 = 0.98;

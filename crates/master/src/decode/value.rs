@@ -31,9 +31,17 @@ impl<'a> Value<'a> {
     /// The number that the bytes stand for, by the table's data type.
     pub fn number(&self) -> Option<i64> {
         let raw = self.raw()?;
-        match self.entry?.data_type {
+        match self.form(self.entry?).0 {
             DataType::VisibleString => None,
             data_type => Some(data_type.value(raw)),
+        }
+    }
+
+    /// Type and unit of the bytes: an object may have another form in TPDOs, which its length tells.
+    fn form(&self, entry: &Entry) -> (DataType, &'static str) {
+        match entry.tpdo_form {
+            Some(form) if form.data_type.size() == self.bytes.len() => (form.data_type, form.unit),
+            _ => (entry.data_type, entry.unit),
         }
     }
 }
@@ -53,7 +61,7 @@ impl fmt::Display for Value<'_> {
             return f.write_str(&words);
         }
         match (self.number(), self.entry) {
-            (Some(number), Some(entry)) => write_number(f, number, raw, entry),
+            (Some(number), Some(entry)) => write_number(f, number, raw, entry, self.form(entry).1),
             _ => write!(f, "{raw:0width$X}h ({raw})", width = self.bytes.len() * 2),
         }
     }
@@ -99,15 +107,15 @@ fn standard_words(mux: Mux, raw: u32) -> Option<String> {
     }
 }
 
-fn write_number(f: &mut fmt::Formatter<'_>, number: i64, raw: u32, entry: &Entry) -> fmt::Result {
+fn write_number(f: &mut fmt::Formatter<'_>, number: i64, raw: u32, entry: &Entry, unit: &'static str) -> fmt::Result {
     let is_identifier = entry.data_type == DataType::Unsigned32 && entry.unit.is_empty() && entry.index < 0x2000;
     if is_identifier {
         write!(f, "{raw:X}h")?
     } else {
         write!(f, "{number}")?
     }
-    if !entry.unit.is_empty() {
-        write!(f, " [{}]", entry.unit)?;
+    if !unit.is_empty() {
+        write!(f, " [{unit}]")?;
     }
     match entry.meaning(number) {
         Some(meaning) => write!(f, " ({meaning})"),
@@ -130,5 +138,18 @@ fn write_long(f: &mut fmt::Formatter<'_>, bytes: &[u8]) -> fmt::Result {
                 Ok(())
             })
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_object_with_another_form_in_tpdos_is_read_by_its_length() {
+        let table = Some(&drives::mjoint::objects::TABLE);
+        let speed = |bytes| Value::new(Mux::new(0x606C, 0), bytes, table).to_string();
+        assert_eq!(speed(&[0x90, 0xE8]), "606Ch:00 velocity_actual_value = -6000 [0.1 r/min]");
+        assert_eq!(speed(&[0xA8, 0xFD, 0xFF, 0xFF]), "606Ch:00 velocity_actual_value = -600 [r/min]");
     }
 }

@@ -22,6 +22,10 @@ const PERIOD_S: f64 = <MJoint as drives::Firmware>::CONTROL_PERIOD_NS as f64 * 1
 const SUPPLY_V: f64 = 36.0;
 const AMBIENT_C: f64 = 25.0;
 
+/// Assumed: at the output of a 36 V supply of some 200 W. A bare joint that stops from its full speed stays under 52 V
+/// with it; a loaded one does not.
+const SUPPLY_CAPACITANCE_F: f64 = 3_000e-6;
+
 /// The drive's own converter starts above and stops below these bus voltages. Assumed: well below the 24 V that the
 /// manual wants at least.
 const START_V: f64 = 12.0;
@@ -56,6 +60,7 @@ impl Joint {
     /// At rest at ambient temperature, the supply not yet connected.
     pub fn new(model: &'static Model, image: Image, bitrate: Bitrate) -> Self {
         let mut motor = JointMotor::new(motor_of(model), Angle::default(), SUPPLY_V, AMBIENT_C);
+        motor.model.supply.capacitance_f += SUPPLY_CAPACITANCE_F;
         motor.supply.connected = false;
         motor.supply.bus_v = 0.0;
         Self {
@@ -184,6 +189,7 @@ impl Assembly for Joint {
         if on && !supply.connected {
             // The inrush limiter has charged the capacitor by the time the drive's converter starts.
             supply.bus_v = supply.bus_v.max(supply.source_v);
+            model.encoder.step(encoder, 0.0, rotor.angle, true);
         }
         if !on {
             // However short the off time of a person's hand: the capacitor is empty after it, and the encoder lives on

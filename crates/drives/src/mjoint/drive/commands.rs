@@ -51,6 +51,11 @@ impl MJoint {
     /// 6040h. The host takes the motor over with bit 0; bit 7 resets alarms; bit 4 clears itself.
     fn command(&mut self, asked: Controlword) {
         self.refresh_parameters();
+        // RPDO1 and 3 carry a mode behind the controlword, which is meant in that mode.
+        let mode = ModeOfOperation(self.values().get(MODES_OF_OPERATION));
+        if mode != ModeOfOperation::HOMING {
+            self.select_mode(mode);
+        }
         if asked.has(Controlword::FAULT_RESET) {
             self.reset_alarms();
         }

@@ -25,6 +25,7 @@ impl MJoint {
         if !self.awake {
             self.awake = true;
             (self.angle_count, self.position) = (angle, sensors.position_counts);
+            self.axis.observe(Feedback { position: self.position, velocity: 0.0, standing: true });
         }
         let moved = within_half_a_turn(angle.wrapping_sub(self.angle_count));
         self.angle_count = angle;
@@ -54,6 +55,7 @@ impl MJoint {
     pub(super) fn supervise(&mut self, sensors: &Sensors) {
         self.refresh_parameters();
         let feedback = self.measure(sensors);
+        self.axis.observe(feedback);
         self.battery = sensors.battery;
         self.inputs.update([sensors.pu, sensors.dir], INPUT_DEBOUNCE_PERIODS);
         self.watch_alarms(sensors);
@@ -62,7 +64,7 @@ impl MJoint {
         if self.axis.is_engaged() {
             self.direct();
         }
-        self.demand = self.axis.update(feedback, DT_S);
+        self.demand = self.axis.update(DT_S);
         let Parameters { servo, gains, limits, .. } = &self.parameters;
         self.servo.control(servo, gains, &self.demand, feedback.position, limits);
         self.publish(sensors);
@@ -104,8 +106,6 @@ impl MJoint {
         }
     }
 
-    // ---- alarms ----
-
     fn watch_alarms(&mut self, sensors: &Sensors) {
         let situation = Situation {
             servo: &self.servo,
@@ -143,8 +143,6 @@ impl MJoint {
         self.alarms.reset();
         self.publish_alarms();
     }
-
-    // ---- what to do ----
 
     /// Pulses, and what 2619h starts after power-on.
     fn move_by_itself(&mut self, sensors: &Sensors) {

@@ -5,7 +5,7 @@ use canopen::od::Slot;
 
 use super::{
     CLEAR_CURRENT_POSITION, CLEAR_FEEDBACK_POSITION, CONTROLWORD, MODES_OF_OPERATION, REGISTER_PARAMETER_SETTING,
-    TARGET_POSITION, TARGET_TORQUE, TARGET_VELOCITY,
+    ROW_COUNT, TARGET_POSITION, TARGET_TORQUE, TARGET_VELOCITY,
 };
 
 /// The consequence of a write.
@@ -26,8 +26,13 @@ pub enum Effect {
 }
 
 /// What a write to `slot` does.
+#[inline]
 pub fn effect(slot: Slot) -> Effect {
-    const EFFECTS: [(Slot, Effect); 8] = [
+    EFFECTS[slot.position()]
+}
+
+static EFFECTS: [Effect; ROW_COUNT] = {
+    let named = [
         (CONTROLWORD.slot(), Effect::Command),
         (TARGET_VELOCITY.slot(), Effect::Target),
         (TARGET_POSITION.slot(), Effect::Target),
@@ -37,5 +42,11 @@ pub fn effect(slot: Slot) -> Effect {
         (CLEAR_FEEDBACK_POSITION.slot(), Effect::ClearPosition),
         (CLEAR_CURRENT_POSITION.slot(), Effect::ClearPosition),
     ];
-    EFFECTS.iter().find(|(named, _)| *named == slot).map_or(Effect::Parameter, |(_, effect)| *effect)
-}
+    let mut effects = [Effect::Parameter; ROW_COUNT];
+    let mut i = 0;
+    while i < named.len() {
+        effects[named[i].0.position()] = named[i].1;
+        i += 1;
+    }
+    effects
+};

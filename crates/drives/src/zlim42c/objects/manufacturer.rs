@@ -42,7 +42,7 @@ const GENERAL: [Entry; 17] = [
 #[rustfmt::skip]
 const TERMINALS: [Entry; 9] = [
     // 16 as printed: sub-indexes 06 to 0B, 0F and 10 do not exist.
-    ro(0x2030, 0, U16, "terminals", "Number of sub-indexes").default(16).mappable(),
+    ro(0x2030, 0, U16, "terminals", "Number of sub-indexes").default(16),
     rws(0x2030, 1, U16, "input_polarity", "Input terminal effective level").mappable(),
     // 0 undefined, 1 home, 2 positive limit, 3 negative limit, 9 emergency stop, others not connected.
     rws(0x2030, 2, U16, "input_x0_function", "Input terminal X0 function selection").range(0, 15).mappable(),

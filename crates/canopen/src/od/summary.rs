@@ -1,0 +1,122 @@
+use super::{DataType, Entry};
+
+/// What every request must know of a row, in one byte: an upload needs no more of it, a download only where the value is
+/// restricted. Rows are wide; the summaries of a whole table take a few cache lines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Summary(u8);
+
+/// Bytes of a cell that the type leaves zero.
+const UNUSED_BYTES: u8 = 0b11;
+const TEXT: u8 = 1 << 2;
+const READABLE: u8 = 1 << 3;
+const WRITABLE: u8 = 1 << 4;
+const COMMUNICATION: u8 = 1 << 5;
+const BOUNDED: u8 = 1 << 6;
+const CHECKED: u8 = 1 << 7;
+
+impl Summary {
+    /// Of no row: nothing is allowed.
+    pub(super) const NONE: Self = Self(0);
+
+    pub(super) const fn of(row: &Entry) -> Self {
+        let is_text = matches!(row.data_type, DataType::VisibleString);
+        let unused = if is_text { 0 } else { MAX_SIZE - row.data_type.size() as u8 };
+        let is_communication = matches!(row.index, 0x1000..=0x1FFF);
+        Self(
+            unused
+                | flag(TEXT, is_text)
+                | flag(READABLE, row.access.is_readable())
+                | flag(WRITABLE, row.access.is_writable() && !is_text)
+                | flag(COMMUNICATION, is_communication)
+                | flag(BOUNDED, row.limits.is_some() || !row.values.is_empty())
+                | flag(CHECKED, row.check.is_some()),
+        )
+    }
+
+    /// Bytes on the wire of a number.
+    #[inline]
+    pub(crate) const fn size(self) -> u8 {
+        MAX_SIZE - (self.0 & UNUSED_BYTES)
+    }
+
+    /// Which bits of a cell the type uses.
+    #[inline]
+    pub(crate) const fn mask(self) -> u32 {
+        u32::MAX >> ((self.0 & UNUSED_BYTES) * 8)
+    }
+
+    /// A constant text.
+    #[inline]
+    pub(crate) const fn is_text(self) -> bool {
+        self.0 & TEXT != 0
+    }
+
+    /// SDO upload is allowed.
+    #[inline]
+    pub(crate) const fn is_readable(self) -> bool {
+        self.0 & READABLE != 0
+    }
+
+    /// SDO download is allowed: never of a text.
+    #[inline]
+    pub(crate) const fn is_writable(self) -> bool {
+        self.0 & WRITABLE != 0
+    }
+
+    /// Of the communication profile area, 1000h to 1FFFh.
+    #[inline]
+    pub(crate) const fn is_communication(self) -> bool {
+        self.0 & COMMUNICATION != 0
+    }
+
+    /// Has limits or lists its values.
+    #[inline]
+    pub(super) const fn is_bounded(self) -> bool {
+        self.0 & BOUNDED != 0
+    }
+
+    /// Has a check.
+    #[inline]
+    pub(super) const fn is_checked(self) -> bool {
+        self.0 & CHECKED != 0
+    }
+}
+
+/// Bytes of a cell.
+const MAX_SIZE: u8 = 4;
+
+const fn flag(bit: u8, set: bool) -> u8 {
+    if set { bit } else { 0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Access;
+    use super::*;
+
+    #[test]
+    fn a_summary_says_what_the_row_says() {
+        for data_type in [DataType::Integer8, DataType::Unsigned16, DataType::Integer32] {
+            for access in [Access::ReadOnly, Access::WriteOnly, Access::ReadWrite, Access::Const] {
+                let row = Entry::new(0x2000, 0, data_type, access, "", "");
+                let summary = Summary::of(&row);
+                assert_eq!(usize::from(summary.size()), data_type.size());
+                assert_eq!(summary.mask(), data_type.mask());
+                assert_eq!(summary.is_readable(), access.is_readable());
+                assert_eq!(summary.is_writable(), access.is_writable());
+                assert!(!summary.is_text() && !summary.is_communication());
+                assert!(!summary.is_bounded() && !summary.is_checked());
+                assert!(Summary::of(&row.range(0, 1)).is_bounded());
+                assert!(Summary::of(&row.values(&[(0, "")])).is_bounded());
+                assert!(Summary::of(&row.check(|_, _| Ok(()))).is_checked());
+            }
+        }
+    }
+
+    #[test]
+    fn a_text_is_readable_only() {
+        let summary = Summary::of(&Entry::new(0x1008, 0, DataType::VisibleString, Access::ReadWrite, "", ""));
+        assert!(summary.is_text() && summary.is_communication() && summary.is_readable());
+        assert!(!summary.is_writable());
+    }
+}

@@ -1,0 +1,38 @@
+//! What passes between an axis and its control loops, in counts, seconds and amperes.
+
+use super::trajectory::TrajectoryPoint;
+
+/// What the control loops are to do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Demand {
+    /// Nothing: the power stage is off.
+    Off,
+    /// Be at a position.
+    Position(TrajectoryPoint),
+    /// Turn at a velocity.
+    Velocity(TrajectoryPoint),
+    /// Pull with a current, A.
+    Torque(f32),
+}
+
+/// What the shaft does, in counts and counts/s.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Feedback {
+    /// Actual position.
+    pub position: i32,
+    /// Actual velocity.
+    pub velocity: f64,
+    /// Torque-producing current, A.
+    pub current_a: f32,
+    /// Slower than the drive's threshold of standstill.
+    pub standing: bool,
+}
+
+/// What the host wants of the modes that follow a target at all times.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Targets {
+    /// Counts/s.
+    pub velocity: f64,
+    /// A.
+    pub current_a: f32,
+}

@@ -1,0 +1,94 @@
+//! Faults of the ZLIM42-C that a sound motor cannot cause, fed to the firmware's pins.
+
+use can::{CanId, Frame, Instant, Station};
+use drives::Firmware;
+use drives::zlim42c::{Actuation, Hardware, Image, PowerStage, Sensors, Zlim42c, objects};
+
+struct Pins {
+    drive: Zlim42c,
+    sensors: Sensors,
+    now: Instant,
+    actuation: Actuation,
+    sent: Vec<String>,
+}
+
+impl Pins {
+    fn new(eeprom: Image) -> Self {
+        let mut drive = Zlim42c::new();
+        drive.power_on(&Hardware { eeprom, ..Hardware::default() }, Instant::ZERO);
+        let (sensors, now) = (Sensors::default(), Instant::ZERO);
+        let mut pins = Self { drive, sensors, now, actuation: Actuation::default(), sent: Vec::new() };
+        pins.run_ms(5);
+        pins
+    }
+
+    fn run_ms(&mut self, ms: u32) {
+        (0..20 * ms).for_each(|_| self.tick());
+    }
+
+    fn tick(&mut self) {
+        self.now = self.now.plus_nanos(Zlim42c::CONTROL_PERIOD_NS);
+        self.actuation = self.drive.tick(&self.sensors, self.now);
+        self.drive.handle_timeout(self.now);
+        while let Some(frame) = self.drive.poll_transmit() {
+            self.drive.handle_transmitted(&frame, self.now);
+            self.sent.push(frame.to_string());
+        }
+    }
+
+    fn write(&mut self, index: u16, value: u16) {
+        let [low, high] = index.to_le_bytes();
+        let [a, b] = value.to_le_bytes();
+        let request = Frame::full(CanId::standard(0x601), [0x2B, low, high, 0, a, b, 0, 0]);
+        self.drive.handle_frame(&request, self.now);
+        self.run_ms(1);
+    }
+
+    fn code(&self) -> u16 {
+        self.drive.values().get(objects::ERROR_CODE)
+    }
+}
+
+#[test]
+fn over_current_switches_off_in_the_control_period_in_which_it_is_measured() {
+    for phase_current_a in [[5.0, 0.0], [0.0, -5.0], [f32::NAN, 0.0]] {
+        let mut pins = Pins::new(Image::factory());
+        for word in [0x06, 0x07] {
+            pins.write(0x6040, word);
+        }
+        assert_ne!(pins.actuation.power_stage, PowerStage::Off, "energised from switched on");
+        pins.sensors.phase_current_a = phase_current_a;
+        pins.tick();
+        assert_eq!(pins.actuation.power_stage, PowerStage::Off);
+        assert_eq!(pins.code(), 0xFF02);
+        pins.run_ms(5);
+        assert!(pins.sent.contains(&"081#02FF030000000000".to_owned()), "{:?}", pins.sent);
+    }
+}
+
+#[test]
+fn a_blank_eeprom_is_a_fault_that_factory_settings_end() {
+    let mut pins = Pins::new(Image::BLANK);
+    assert_eq!(pins.code(), 0xFF10);
+    pins.write(0x2010, 1);
+    pins.run_ms(5);
+    assert_eq!(pins.code(), 0);
+    let image = Image::from_bytes(pins.drive.eeprom().0);
+    assert_eq!(Pins::new(image).code(), 0, "the next start finds them");
+}
+
+#[test]
+fn a_reading_that_is_no_number_is_a_fault_and_never_a_duty_cycle() {
+    let mut pins = Pins::new(Image::factory());
+    for word in [0x06, 0x07, 0x0F] {
+        pins.write(0x6040, word);
+    }
+    pins.sensors.bus_v = f32::NAN;
+    for _ in 0..100 {
+        pins.tick();
+        if let PowerStage::Modulate { duty } = pins.actuation.power_stage {
+            assert!(duty.iter().all(|duty| duty.abs() <= 1.0), "{duty:?}");
+        }
+    }
+    assert_eq!(pins.code(), 0xFF01);
+}

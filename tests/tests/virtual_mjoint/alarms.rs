@@ -1,0 +1,149 @@
+//! Alarms from physics, their resets, and the outputs that tell of them.
+
+use drives::mjoint::Model;
+
+use crate::bench::Bench;
+
+fn running(bench: &mut Bench) {
+    bench.set(0x6060, 0, 3);
+    bench.set(0x60FF, 0, 300);
+    bench.set(0x6040, 0, 0x0F);
+    bench.run_ms(300);
+}
+
+fn output(bench: &mut Bench, name: &str) -> bool {
+    bench.report().outputs.iter().find(|(found, _)| *found == name).expect("an output").1
+}
+
+#[test]
+fn a_rotor_that_stays_locked_at_the_current_limit_raises_12h_after_its_seconds() {
+    let mut bench = Bench::new();
+    bench.set(0x261D, 0, 3002);
+    running(&mut bench);
+    bench.tell("1 rotor lock");
+    bench.run_ms(300);
+    let current = bench.report().current_a;
+    assert!((current - 3.0).abs() < 0.1, "3000 mA without the ones digit: {current}");
+    bench.run_ms(1400);
+    assert_eq!(bench.get(0x260E, 0), 0);
+    bench.run_ms(500);
+    assert_eq!((bench.get(0x260E, 0), bench.statusword()), (0x12, 0x002F));
+    bench.tell("1 rotor free");
+    bench.run_ms(200);
+    assert!(bench.report().current_a.abs() < 0.05 && bench.report().velocity_rpm.abs() < 1.0, "free, and off");
+    bench.set(0x6040, 0, 0x0080);
+    assert_eq!((bench.get(0x260E, 0), bench.statusword()), (0, 0x0404));
+}
+
+#[test]
+fn a_time_of_0_never_raises_12h() {
+    let mut bench = Bench::new();
+    bench.set(0x261D, 0, 2000);
+    bench.set(0x2618, 0, 600);
+    running(&mut bench);
+    bench.tell("1 rotor lock");
+    bench.run_ms(12_000);
+    assert_eq!(bench.get(0x260E, 0), 0);
+}
+
+#[test]
+fn an_output_that_stays_at_its_limit_raises_14h_and_2601h_resets_it() {
+    let mut bench = Bench::new();
+    // 10 % of 36 V / sqrt 3 in 0.44 ohm are under 5 A: the current's limit of 7 A is not reached.
+    bench.set(0x2618, 0, 101);
+    running(&mut bench);
+    bench.tell("1 rotor lock");
+    bench.run_ms(700);
+    assert_eq!(bench.get(0x260E, 0), 0);
+    bench.until(1500, |bench| bench.get(0x260E, 0) == 0x14);
+    assert_eq!(bench.statusword(), 0x002F);
+    bench.tell("1 rotor free");
+    bench.set(0x2601, 0, 0);
+    assert_eq!(bench.get(0x260E, 0), 0x14, "0 alone resets nothing");
+    bench.set(0x2601, 0, 1);
+    assert_eq!(bench.get(0x260E, 0), 0);
+    bench.run_ms(300);
+    assert!((bench.report().velocity_rpm - 300.0).abs() < 10.0, "0Fh still stands: it runs again");
+}
+
+#[test]
+fn over_52_v_raise_15h_which_goes_with_a_reset_below() {
+    let mut bench = Bench::new();
+    bench.tell("1 supply 51.5");
+    bench.run_ms(500);
+    running(&mut bench);
+    assert_eq!(bench.get(0x260E, 0), 0);
+    bench.tell("1 supply 53");
+    bench.run_ms(500);
+    assert_eq!((bench.get(0x260E, 0), bench.statusword()), (0x15, 0x002F));
+    bench.set(0x6040, 0, 0x008F);
+    assert_eq!(bench.get(0x260E, 0), 0x15, "its cause is still there");
+    bench.tell("1 supply 36");
+    bench.run_ms(100);
+    bench.set(0x260E, 0, 5);
+    assert_eq!(bench.get(0x260E, 0), 0x15, "only 0 clears");
+    bench.set(0x260E, 0, 0);
+    assert_eq!(bench.get(0x260E, 0), 0);
+}
+
+#[test]
+fn a_heavy_load_that_is_braked_hard_raises_the_voltage_over_its_limit() {
+    let mut bench = Bench::of(1, &Model::M8025E25B50);
+    bench.tell("1 load inertia 2");
+    bench.set(0x6083, 0, 3000);
+    bench.set(0x6060, 0, 3);
+    bench.set(0x60FF, 0, 1200);
+    bench.set(0x6040, 0, 0x0F);
+    bench.run_ms(1500);
+    bench.set(0x6083, 0, 60_000);
+    bench.set(0x60FF, 0, 0);
+    bench.run_ms(500);
+    assert_eq!(bench.get(0x260E, 0), 0x15, "no discharge module is fitted");
+}
+
+#[test]
+fn a_lost_battery_raises_10h_the_motor_goes_on_and_a_new_origin_clears_it() {
+    let mut bench = Bench::new();
+    running(&mut bench);
+    bench.tell("1 battery off");
+    bench.run_ms(100);
+    assert_eq!((bench.get(0x260E, 0), bench.statusword()), (0x10, 0x043F));
+    bench.set(0x6040, 0, 0x008F);
+    bench.set(0x6040, 0, 0x000F);
+    assert_eq!(bench.get(0x260E, 0), 0x10, "no reset");
+    assert!((bench.report().velocity_rpm - 300.0).abs() < 10.0);
+    bench.tell("1 battery on");
+    bench.set(0x60FF, 0, 0);
+    bench.run_ms(300);
+    bench.set(0x260A, 0, 60_006);
+    bench.set(0x260A, 0, 60_016);
+    bench.run_ms(1);
+    assert_eq!((bench.get(0x260E, 0), bench.get(0x260A, 0)), (0, 32_768));
+    assert!(bench.position().abs() < 5, "{}", bench.position());
+}
+
+#[test]
+fn the_alarm_output_and_the_leds_tell_of_alarms() {
+    let mut bench = Bench::new();
+    bench.run_ms(1000);
+    assert!(output(&mut bench, "WR") && output(&mut bench, "GREEN") && !output(&mut bench, "RED"));
+    bench.set(0x60FB, 1, 3001);
+    bench.run_ms(5);
+    assert!(!output(&mut bench, "WR"), "an odd ones digit turns it around");
+    bench.tell("1 battery off");
+    bench.run_ms(5);
+    assert!(output(&mut bench, "WR"));
+    let mut red = 0;
+    let mut green_changes = 0;
+    let mut green = output(&mut bench, "GREEN");
+    for _ in 0..2700 {
+        bench.run_ms(1);
+        red += u32::from(output(&mut bench, "RED"));
+        let now = output(&mut bench, "GREEN");
+        green_changes += u32::from(now != green);
+        green = now;
+    }
+    // One long flash in a round of 2.7 s; green flickers at 10 Hz.
+    assert!((880..=920).contains(&red), "{red}");
+    assert!((50..=56).contains(&green_changes), "{green_changes}");
+}

@@ -1,0 +1,123 @@
+//! NMT, heartbeats, the watch over the host, and PDOs that answer PDOs.
+
+use crate::bench::{Bench, TURN};
+
+#[test]
+fn a_joint_boots_into_operational_and_sends_nothing_but_heartbeats_unasked() {
+    let mut bench = Bench::new();
+    let boot: Vec<String> = bench.heard();
+    assert_eq!(boot, ["701#00"]);
+    bench.set(0x6060, 0, 3);
+    bench.set(0x60FF, 0, 500);
+    bench.set(0x6040, 0, 0x0F);
+    bench.heard();
+    bench.run_ms(3500);
+    let heard = bench.heard();
+    assert!(heard.iter().all(|frame| frame == "701#05"), "{heard:?}");
+    assert!((3..=4).contains(&heard.len()), "{heard:?}");
+}
+
+#[test]
+fn each_rpdo_is_answered_once_by_the_tpdo_of_its_number() {
+    let mut bench = Bench::new();
+    for (request, answer, length) in [
+        ("201#000001A0860100", "181#", 6),
+        ("301#A0860100E8030000", "281#", 6),
+        ("401#00000100000000", "381#", 6),
+        ("501#A0860100", "481#", 6),
+    ] {
+        bench.heard();
+        bench.send(request);
+        bench.run_ms(10);
+        let heard = bench.heard();
+        assert_eq!(heard.len(), 1, "{request}: {heard:?}");
+        assert!(heard[0].starts_with(answer) && heard[0].len() == 4 + 2 + length * 2 - 2, "{request}: {heard:?}");
+    }
+    bench.heard();
+    bench.send("080#");
+    assert_eq!(bench.heard(), [""; 0], "SYNC itself is answered by nothing");
+}
+
+#[test]
+fn requests_may_be_as_short_as_they_need_and_answers_have_eight_bytes() {
+    let mut bench = Bench::new();
+    for (request, answer) in [
+        ("601#40416000", "581#4B41600004040000"),
+        ("601#2B4060000F00", "581#6040600000000000"),
+        ("601#2F60600001", "581#6060600000000000"),
+        ("601#4064600000000000", "581#4364600000000000"),
+    ] {
+        bench.heard();
+        bench.send(request);
+        assert_eq!(bench.heard(), [answer], "{request}");
+    }
+    bench.heard();
+    bench.send("601#2B4060000F");
+    assert_eq!(bench.heard(), [""; 0], "a byte is missing");
+}
+
+#[test]
+fn the_first_heartbeat_of_the_host_arms_a_watch_that_stops_the_motor_and_clears_itself() {
+    let mut bench = Bench::new();
+    bench.set(0x6060, 0, 3);
+    bench.set(0x60FF, 0, 600);
+    bench.set(0x6040, 0, 0x0F);
+    bench.run_ms(5000);
+    assert_eq!(bench.statusword(), 0x0437, "not watched before the first heartbeat");
+    bench.send("77F#05");
+    bench.run_ms(1900);
+    assert_eq!(bench.get(0x260E, 0), 0);
+    bench.run_ms(200);
+    assert_eq!((bench.get(0x260E, 0), bench.statusword()), (0x20, 0x003F));
+    assert_eq!(bench.get(0x1001, 0), 1);
+    bench.run_ms(200);
+    assert!(bench.report().velocity_rpm.abs() < 1.0, "stopped, and held");
+    bench.heard();
+    bench.run_ms(1010);
+    assert!(bench.heard().contains(&"701#04".to_string()));
+    bench.send("77E#05");
+    assert_eq!(bench.get(0x260E, 0), 0x20, "another node's heartbeat");
+    bench.send("77F#05");
+    assert_eq!((bench.get(0x260E, 0), bench.get(0x1001, 0)), (0, 0));
+    bench.run_ms(500);
+    assert!((bench.report().velocity_rpm - 600.0).abs() < 10.0, "it goes on");
+}
+
+#[test]
+fn a_move_goes_on_to_its_target_after_a_silence_of_the_host() {
+    let mut bench = Bench::new();
+    bench.set(0x6081, 0, 300);
+    bench.set(0x1016, 1, 0x007F_0064);
+    bench.set(0x6040, 0, 0x2F);
+    bench.set(0x607A, 0, 10 * TURN);
+    bench.send("77F#05");
+    bench.run_ms(400);
+    let stopped = bench.position();
+    assert!(stopped < 2 * TURN && bench.get(0x260E, 0) == 0x20, "{stopped}");
+    bench.send("77F#05");
+    bench.set(0x1016, 1, 0);
+    bench.until_reached(3000);
+    assert!((bench.position() - 10 * TURN).abs() <= 30);
+}
+
+#[test]
+fn nmt_stop_silences_pdos_and_sdo_and_start_brings_them_back() {
+    let mut bench = Bench::new();
+    bench.send("000#0201");
+    bench.heard();
+    bench.send("301#0000000000000000");
+    bench.send("601#40416000");
+    assert_eq!(bench.heard(), [""; 0]);
+    bench.send("000#0101");
+    bench.send("301#0000000000000000");
+    assert!(bench.heard().iter().any(|frame| frame.starts_with("281#")));
+}
+
+#[test]
+fn bit_31_of_a_cob_id_switches_a_pdo_off() {
+    let mut bench = Bench::new();
+    bench.set(0x1401, 1, 0x8000_0301);
+    bench.heard();
+    bench.send("301#0000000000000000");
+    assert_eq!(bench.heard(), [""; 0]);
+}

@@ -1,0 +1,151 @@
+//! Homing from every start of `homing.csv` (5.09).
+
+use ferrodrive_tests::mjoint::{HomingStatus, homing_runs};
+
+use crate::bench::{Bench, TURN};
+
+/// Where the switch's edge is, in counts from where the motor begins off the switch.
+const EDGE: i64 = 20_000;
+
+/// 100 r/min: half a turn in 0.3 s.
+const PATIENCE_MS: u64 = 4000;
+
+#[test]
+fn every_run_ends_as_the_table_says() {
+    let runs = homing_runs();
+    assert_eq!(runs.len(), 20);
+    for run in &runs {
+        let row = &run.row;
+        match row.start.as_str() {
+            "off_switch" | "on_switch" => finds_its_origin(run),
+            "beyond_switch" => goes_on(run),
+            "stalls_on_the_way" => fails_at_the_stop(run),
+            "mode_1_on_the_way" => is_left(run),
+            other => panic!("nobody knows what to do with {other}"),
+        }
+    }
+}
+
+/// The switch's pin, the side of the positions it lies on, and the edge that is the origin.
+fn switch_of(method: i64) -> (&'static str, bool) {
+    match method {
+        18 => ("PU", true),
+        19 | 20 => ("DIR", true),
+        _ => ("DIR", false),
+    }
+}
+
+fn started(run: &HomingStatus, line: &str) -> Bench {
+    let mut bench = Bench::new();
+    bench.tell(line);
+    bench.run_ms(5);
+    bench.set(0x6098, 0, i64::from(run.row.method));
+    bench.set(0x6060, 0, 6);
+    assert_eq!(bench.statusword(), run.running, "{run:?}");
+    bench
+}
+
+fn finds_its_origin(run: &HomingStatus) {
+    let method = i64::from(run.row.method);
+    let (pin, positive) = switch_of(method);
+    let on = run.row.start == "on_switch";
+    // The switch reaches from its edge to the end of the way. On the switch the edge lies behind the motor.
+    let edge = if positive == on { -EDGE } else { EDGE };
+    let line = if positive { format!("1 switch {pin} {edge} max") } else { format!("1 switch {pin} min {edge}") };
+    let mut bench = started(run, &line);
+    bench.until(PATIENCE_MS, |bench| bench.statusword() == run.after);
+    bench.run_ms(200);
+    assert_eq!(bench.statusword(), run.after, "{run:?}");
+    // 0 or a few counts: it stays where it came to rest, slowing down from 100 r/min with 20000 (r/min)/s.
+    let position = bench.position();
+    assert!(position.abs() < 200, "{run:?}: {position}");
+    // The world's own counts began at 0: what 6064h lost is where the origin is.
+    let origin = (bench.report().shaft_angle_rad / core::f64::consts::TAU * TURN as f64).round() as i64 - position;
+    let expected = if positive { edge } else { edge + 1 };
+    // "Or a single digit": at 100 r/min a control period is 2.7 counts.
+    assert!((origin - expected).abs() <= 9, "{run:?}: origin at {origin}, edge at {expected}");
+}
+
+fn goes_on(run: &HomingStatus) {
+    let (pin, positive) = switch_of(i64::from(run.row.method));
+    // A short switch, on the side that the run does not go to.
+    let (low, high) = if positive { (-EDGE - 500, -EDGE) } else { (EDGE, EDGE + 500) };
+    let mut bench = started(run, &format!("1 switch {pin} {low} {high}"));
+    bench.run_ms(3000);
+    assert_eq!(bench.statusword(), run.after, "{run:?}");
+    let turns = bench.position() as f64 / TURN as f64;
+    let sign = if positive { 1.0 } else { -1.0 };
+    assert!((turns * sign - 5.0).abs() < 0.1, "{run:?}: {turns} turns in 3 s at 100 r/min");
+}
+
+fn fails_at_the_stop(run: &HomingStatus) {
+    let mut bench = Bench::new();
+    // 30 % of the output at rest for 1 s, and a current limit that is not reached.
+    bench.set(0x2618, 0, 101);
+    bench.set(0x261D, 0, 10_000);
+    bench.set(0x6098, 0, i64::from(run.row.method));
+    bench.set(0x6060, 0, 6);
+    bench.run_ms(500);
+    assert_eq!(bench.statusword(), run.running);
+    bench.tell("1 rotor lock");
+    bench.until(6000, |bench| bench.get(0x260E, 0) == 0x14);
+    assert_eq!(bench.statusword(), run.after);
+    bench.heard();
+    bench.run_ms(1010);
+    assert!(bench.heard().contains(&"701#04".to_string()));
+}
+
+fn is_left(run: &HomingStatus) {
+    let mut bench = started(run, "1 input DIR 0");
+    bench.run_ms(500);
+    let before = bench.position();
+    bench.set(0x6060, 0, 1);
+    bench.run_ms(500);
+    assert_eq!(bench.statusword(), run.after);
+    assert!((bench.position() - before).abs() < TURN, "stopped, and no new origin: {before}, {}", bench.position());
+    assert!(bench.report().velocity_rpm.abs() < 1.0);
+}
+
+#[test]
+fn the_ones_digit_of_the_acceleration_is_the_speed() {
+    let mut bench = Bench::new();
+    bench.set(0x6083, 0, 10_005);
+    bench.set(0x6060, 0, 6);
+    bench.run_ms(500);
+    assert!((bench.report().velocity_rpm + 600.0).abs() < 10.0, "{}", bench.report().velocity_rpm);
+}
+
+#[test]
+fn a_halt_holds_homing_and_its_end_lets_it_go_on() {
+    let mut bench = Bench::new();
+    bench.set(0x6060, 0, 6);
+    bench.run_ms(300);
+    bench.set(0x6040, 0, 0x0100);
+    bench.run_ms(300);
+    assert_eq!(bench.statusword(), 0x0414);
+    let held = bench.position();
+    bench.run_ms(300);
+    assert!((bench.position() - held).abs() <= 2);
+    bench.set(0x6040, 0, 0);
+    bench.run_ms(300);
+    assert_eq!(bench.statusword(), 0x0014);
+    assert!(bench.position() < held - 1000);
+}
+
+#[test]
+fn homing_under_power_shows_the_mirrored_bits_and_position_mode_goes_on_from_the_origin() {
+    let mut bench = Bench::new();
+    bench.tell("1 switch DIR min -5000");
+    bench.set(0x6040, 0, 0x0F);
+    bench.set(0x6060, 0, 6);
+    assert_eq!(bench.statusword(), 0x0037);
+    bench.until(3000, |bench| bench.statusword() == 0x1437);
+    bench.run_ms(50);
+    bench.set(0x6060, 0, 1);
+    assert_eq!(bench.statusword(), 0x0437);
+    bench.set(0x6040, 0, 0x2F);
+    bench.set(0x607A, 0, 0);
+    bench.until_reached(1000);
+    let turns = bench.report().shaft_angle_rad / core::f64::consts::TAU;
+    assert!((turns * TURN as f64 + 4999.0).abs() < 45.0, "{turns}");
+}

@@ -1,0 +1,122 @@
+//! Mode 7: three joints led point by point with RPDO4 and SYNC each 2 ms (5.10.3).
+
+use std::time::Duration;
+
+use can::{CanId, Frame};
+use drives::mjoint::Model;
+
+use crate::bench::{Bench, TURN};
+
+const CYCLE: Duration = Duration::from_millis(2);
+
+fn three(synchronised: i64) -> Bench {
+    let mut bench = Bench::of(3, &Model::M4230E17B50);
+    for node in 1..=3 {
+        for (index, value) in [(0x261C, synchronised), (0x6060, 7), (0x6040, 0x0F)] {
+            bench.write_to(node, index, 0, value).expect("a setting");
+        }
+    }
+    // The joints' own rhythms are apart from each other, as those of real ones are.
+    for node in 2..=3_u64 {
+        bench.tell(&format!("{node} power off"));
+        bench.run(Duration::from_micros(1_730 * node));
+        bench.tell(&format!("{node} power on"));
+        bench.run_ms(20);
+        for (index, value) in [(0x261C, synchronised), (0x6060, 7), (0x6040, 0x0F)] {
+            bench.write_to(node as u16, index, 0, value).expect("a setting");
+        }
+    }
+    bench.run_ms(20);
+    bench
+}
+
+/// Sends a point to each joint and lets SYNC follow.
+fn point(bench: &mut Bench, target: i64) {
+    let start = bench.world.now();
+    for node in 1..=3 {
+        let frame = Frame::new(CanId::standard(0x500 + node), &(target as i32).to_le_bytes());
+        bench.world.send(bench.host, frame).expect("room at the host");
+    }
+    // "The above process needs to be completed within 2 ms": three points and their answers take 0.6 ms at 1 Mbit/s.
+    bench.run(Duration::from_micros(1500));
+    bench.world.send(bench.host, Frame::new(CanId::standard(0x080), &[])).expect("room at the host");
+    let rest = CYCLE.saturating_sub(Duration::from_secs_f64(bench.world.now().as_secs_f64() - start.as_secs_f64()));
+    bench.run(rest);
+}
+
+/// When each shaft has moved by more than a count since `from`, in seconds of virtual time.
+fn starts(bench: &mut Bench) -> [f64; 3] {
+    let turns = |bench: &mut Bench, node: u8| bench.world.report(node).expect("a joint").shaft_angle_rad;
+    let rest = [1, 2, 3].map(|node| turns(bench, node));
+    let mut starts = [f64::NAN; 3];
+    for _ in 0..2000 {
+        bench.run(Duration::from_micros(5));
+        for (n, start) in starts.iter_mut().enumerate() {
+            let moved = (turns(bench, n as u8 + 1) - rest[n]).abs() > 2.0 * core::f64::consts::TAU / TURN as f64;
+            if start.is_nan() && moved {
+                *start = bench.world.now().as_secs_f64();
+            }
+        }
+    }
+    starts
+}
+
+fn spread_us(synchronised: i64) -> f64 {
+    let mut bench = three(synchronised);
+    for node in 1..=3 {
+        let frame = Frame::new(CanId::standard(0x500 + node), &20_000_i32.to_le_bytes());
+        bench.world.send(bench.host, frame).expect("room at the host");
+    }
+    bench.run_ms(2);
+    bench.world.send(bench.host, Frame::new(CanId::standard(0x080), &[])).expect("room at the host");
+    let starts = starts(&mut bench);
+    let (first, last) =
+        (starts.iter().copied().fold(f64::NAN, f64::min), starts.iter().copied().fold(f64::NAN, f64::max));
+    assert!(starts.iter().all(|start| !start.is_nan()), "{starts:?}");
+    (last - first) * 1e6
+}
+
+#[test]
+fn with_261ch_the_axes_start_within_a_control_period_of_each_other_and_without_it_within_2_ms() {
+    let together = spread_us(1);
+    assert!(together <= 50.0, "{together} us");
+    let apart = spread_us(0);
+    assert!(apart > together && apart <= 2_500.0, "{apart} us");
+}
+
+#[test]
+fn a_point_waits_for_sync() {
+    let mut bench = three(1);
+    let before = bench.position();
+    bench.send("501#50C30000");
+    bench.run_ms(50);
+    assert_eq!(bench.position(), before);
+    bench.send("080#");
+    bench.run_ms(1);
+    assert_eq!(bench.statusword(), 0x0037);
+}
+
+#[test]
+fn a_line_of_points_is_followed_with_a_steady_speed_and_little_lag() {
+    let mut bench = three(1);
+    let mut speeds = Vec::new();
+    // 600 r/min are 655.36 counts in 2 ms; half a second up to speed, half a second there.
+    let mut position = 0.0;
+    for cycle in 0..500 {
+        position += 655.36 * f64::from(cycle.min(250)) / 250.0;
+        point(&mut bench, position as i64);
+        if cycle > 350 {
+            speeds.push(bench.report().velocity_rpm);
+        }
+    }
+    let lag = position as i64 - bench.report().position;
+    let (least, most) = speeds.iter().fold((f64::MAX, f64::MIN), |(l, m), s| (l.min(*s), m.max(*s)));
+    assert!(least > 585.0 && most < 615.0, "{least} to {most} r/min");
+    // Within its cycle and a little.
+    assert!(lag.abs() < 1000, "{lag} counts");
+    bench.run_ms(300);
+    for node in 1..=3 {
+        let end = bench.get_from(node, 0x6064, 0);
+        assert!((end - position as i64).abs() <= 30, "node {node}: {end}");
+    }
+}

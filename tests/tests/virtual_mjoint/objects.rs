@@ -1,0 +1,83 @@
+//! The object dictionary over the bus.
+
+use ferrodrive_tests::mjoint::objects;
+
+use crate::bench::Bench;
+
+const READ_ONLY: u32 = 0x0601_0002;
+const NO_OBJECT: u32 = 0x0602_0000;
+const NO_SUB_INDEX: u32 = 0x0609_0011;
+const INVALID_VALUE: u32 = 0x0609_0030;
+const TOO_HIGH: u32 = 0x0609_0031;
+
+#[test]
+fn every_object_reads_its_default_after_power_on() {
+    let mut bench = Bench::new();
+    for joint in objects() {
+        let row = joint.row;
+        let read = bench.get(row.index, row.sub);
+        if let (false, Some(default)) = (row.live, row.default) {
+            assert_eq!(read, default, "{:04X}h:{:02X} {}", row.index, row.sub, row.name);
+        }
+    }
+}
+
+#[test]
+fn mappings_and_read_only_objects_refuse_writes() {
+    let mut bench = Bench::new();
+    for joint in objects().iter().filter(|joint| !joint.row.writable) {
+        let row = &joint.row;
+        assert_eq!(bench.write(row.index, row.sub, 0), Err(READ_ONLY), "{:04X}h:{:02X}", row.index, row.sub);
+    }
+}
+
+#[test]
+fn refusals_are_those_of_cia_301() {
+    let mut bench = Bench::new();
+    for index in [0x603F, 0x6061, 0x607C, 0x6084, 0x6099, 0x609A, 0x6502, 0x1003, 0x1008, 0x1010, 0x1014, 0x1200] {
+        assert_eq!(bench.write(index, 0, 0), Err(NO_OBJECT), "{index:04X}h");
+    }
+    assert_eq!(bench.write(0x60F9, 3, 0), Err(NO_SUB_INDEX));
+    assert_eq!(bench.write(0x6083, 0, 65_536), Err(TOO_HIGH));
+    for (index, sub, value) in [(0x6060, 0, 2), (0x6060, 0, 8), (0x2619, 0, 5), (0x2619, 0, 29), (0x1403, 2, 255)] {
+        assert_eq!(bench.write(index, sub, value), Err(INVALID_VALUE), "{index:04X}h = {value}");
+    }
+    assert!(bench.write(0x2614, 0, 2).is_err(), "2 is only ever read");
+}
+
+#[test]
+fn what_is_stored_survives_a_power_cycle_and_what_commands_does_not() {
+    let mut bench = Bench::new();
+    for (index, sub, value) in [(0x6081, 0, 900), (0x6083, 0, 10_005), (0x60FB, 1, 2501), (0x1017, 0, 500)] {
+        bench.set(index, sub, value);
+    }
+    bench.set(0x60FF, 0, 300);
+    bench.power_cycle();
+    assert_eq!(bench.get(0x6081, 0), 1500, "nothing was saved yet");
+    for (index, sub, value) in [(0x6081, 0, 900), (0x6083, 0, 10_005), (0x60FB, 1, 2501), (0x1017, 0, 500)] {
+        bench.set(index, sub, value);
+    }
+    bench.set(0x60FF, 0, 300);
+    bench.save();
+    bench.power_cycle();
+    for (index, sub, value) in
+        [(0x6081, 0, 900), (0x6083, 0, 10_005), (0x60FB, 1, 2501), (0x1017, 0, 500), (0x60FF, 0, 0)]
+    {
+        assert_eq!(bench.get(index, sub), value, "{index:04X}h");
+    }
+}
+
+#[test]
+fn a_new_address_counts_after_saving_and_a_power_cycle_and_takes_the_pdos_with_it() {
+    let mut bench = Bench::new();
+    bench.set(0x2615, 0, 9);
+    bench.save();
+    bench.send("000#8101");
+    bench.run_ms(5);
+    assert_eq!(bench.get(0x2615, 0), 9, "NMT reset keeps the node-ID in use");
+    bench.power_cycle();
+    assert!(bench.heard().contains(&"709#00".to_string()));
+    assert_eq!(bench.get_from(9, 0x1400, 1), 0x209);
+    bench.send("309#0000000000000000");
+    assert!(bench.heard().iter().any(|frame| frame.starts_with("289#")));
+}

@@ -1,0 +1,132 @@
+//! What the joint does by itself after power-on (2619h), and the position that the battery keeps.
+
+use crate::bench::{Bench, TURN};
+
+fn saved(function: i64) -> Bench {
+    let mut bench = Bench::new();
+    bench.set(0x2619, 0, function);
+    bench.save();
+    bench
+}
+
+fn turn_to(bench: &mut Bench, counts: i64) {
+    bench.set(0x6060, 0, 1);
+    bench.set(0x6040, 0, 0x2F);
+    bench.set(0x607A, 0, counts);
+    bench.until_reached(5000);
+    bench.set(0x6040, 0, 0);
+}
+
+#[test]
+fn turns_are_kept_by_the_battery_also_when_the_shaft_is_turned_without_power() {
+    let mut bench = Bench::new();
+    turn_to(&mut bench, 7 * TURN + 5000);
+    bench.tell("1 power off");
+    bench.tell("1 load torque -20");
+    bench.run_ms(3000);
+    bench.tell("1 load torque 0");
+    bench.run_ms(500);
+    let turned = bench.report().shaft_angle_rad / core::f64::consts::TAU * TURN as f64;
+    assert!(turned > (8 * TURN) as f64, "the load turned it on: {turned}");
+    bench.tell("1 power on");
+    bench.run_ms(10);
+    assert!((bench.position() as f64 - turned).abs() < 2.0, "{} {turned}", bench.position());
+    assert_eq!(bench.get(0x260E, 0), 0);
+}
+
+#[test]
+fn without_battery_and_power_the_turns_are_lost_and_the_place_in_the_turn_is_known() {
+    let mut bench = Bench::new();
+    turn_to(&mut bench, 7 * TURN + 5000);
+    bench.tell("1 battery off");
+    bench.power_cycle();
+    let position = bench.position();
+    assert!((position - 5000).abs() <= 30, "{position}");
+    assert_eq!(bench.get(0x260E, 0), 0x10);
+}
+
+#[test]
+fn an_origin_set_with_60006_and_60016_outlives_a_power_cycle() {
+    let mut bench = Bench::new();
+    turn_to(&mut bench, 3 * TURN + 777);
+    bench.set(0x260A, 0, 60_016);
+    assert_eq!(bench.get(0x260A, 0), 60_016, "alone it is a gear");
+    bench.set(0x260A, 0, 1234);
+    bench.set(0x260A, 0, 60_006);
+    assert!(bench.position() > 3 * TURN);
+    bench.set(0x260A, 0, 60_016);
+    bench.run_ms(1);
+    assert!(bench.position().abs() < 5);
+    assert_eq!(bench.get(0x260A, 0), 1234);
+    bench.power_cycle();
+    assert!(bench.position().abs() < 5);
+}
+
+#[test]
+fn function_6_goes_back_to_the_origin_at_the_speed_of_the_ones_digit() {
+    let mut bench = saved(6);
+    bench.set(0x6083, 0, 20_002);
+    bench.save();
+    turn_to(&mut bench, 8 * TURN);
+    bench.power_cycle();
+    bench.run_ms(500);
+    let speed = bench.report().velocity_rpm;
+    assert!((speed + 300.0).abs() < 10.0, "{speed}");
+    assert_eq!(bench.statusword(), 0x0014, "it drives the motor by itself");
+    bench.until_reached(4000);
+    assert!(bench.position().abs() <= 30, "{}", bench.position());
+}
+
+#[test]
+fn turns_that_are_lost_are_no_place_to_go_back_to() {
+    let mut bench = saved(6);
+    turn_to(&mut bench, 8 * TURN + 9000);
+    bench.tell("1 battery off");
+    bench.power_cycle();
+    bench.run_ms(1000);
+    assert!((bench.position() - 9000).abs() <= 30 && bench.statusword() & 0x10 == 0);
+}
+
+#[test]
+fn an_angle_is_turned_to_within_the_present_turn() {
+    let mut bench = saved(16_384);
+    turn_to(&mut bench, 2 * TURN + 1000);
+    bench.power_cycle();
+    bench.until_reached(3000);
+    assert!((bench.position() - (2 * TURN + 16_384)).abs() <= 30, "{}", bench.position());
+}
+
+#[test]
+fn functions_7_and_8_move_a_brake() {
+    let mut bench = saved(7);
+    assert_eq!(bench.report().brake, Some(sim::Brake::Released));
+    bench.power_cycle();
+    assert_eq!(bench.report().brake, Some(sim::Brake::Engaged));
+    let before = bench.position();
+    bench.tell("1 load torque 20");
+    bench.run_ms(500);
+    assert!((bench.position() - before).abs() < 200, "the brake holds");
+    bench.set(0x6040, 0, 0x0F);
+    bench.run_ms(5);
+    assert_eq!(bench.report().brake, Some(sim::Brake::Released));
+    bench.set(0x6040, 0, 0);
+    bench.run_ms(5);
+    bench.tell("1 power off");
+    bench.run_ms(300);
+    assert_eq!(bench.report().brake, Some(sim::Brake::Engaged), "without power it holds");
+}
+
+#[test]
+fn function_9_and_a_gear_of_0_put_the_host_in_control() {
+    for (index, value) in [(0x2619, 9), (0x260A, 0)] {
+        let mut bench = Bench::new();
+        bench.set(index, 0, value);
+        bench.save();
+        assert_eq!(bench.get(0x2600, 0), 0);
+        bench.power_cycle();
+        assert_eq!(bench.get(0x2600, 0), 1, "{index:04X}h");
+        bench.tell("1 pulses 1000 10000");
+        bench.run_ms(300);
+        assert!(bench.position().abs() < 2, "pulses are ignored");
+    }
+}

@@ -1,0 +1,78 @@
+//! Node-ID and bit rate: switches, 2008h, 2009h, and when they take effect.
+
+use can::Bitrate;
+use ferrodrive_tests::zlim42c::{figure, figures};
+use sim::machine::{Zlim42cMachine, zlim42c};
+use sim::{VirtualDrive, World};
+
+use crate::bench::{Bench, RATE_500K};
+
+/// The boot-up message of a machine on a bus of 500 kbit/s, if it can be heard.
+fn boots_as(machine: Zlim42cMachine) -> Option<String> {
+    let mut world = World::new(Bitrate::K500, 1);
+    let host = world.add_tap();
+    world.add_drive(99, Box::new(machine)).expect("room");
+    world.run_for(std::time::Duration::from_millis(10));
+    world.poll_received(host).map(|(_, frame)| frame.to_string())
+}
+
+#[test]
+fn the_switches_give_1_to_15_as_the_table_has_it() {
+    for row in figures().iter().filter(|row| row.table == "address" && row.row != "0") {
+        // 4.1: SW2 is the lowest; OFF counts.
+        let address = row.value.split(' ').enumerate().map(|(n, switch)| u8::from(switch == "OFF") << n).sum::<u8>();
+        assert_eq!(address.to_string(), row.row);
+        assert_eq!(boots_as(zlim42c(address, RATE_500K)), Some(format!("{:03X}#00", 0x700 + u16::from(address))));
+    }
+}
+
+#[test]
+fn stored_numbers_from_32_on_are_used_and_others_give_node_1() {
+    for (stored, used) in [(32, 32), (100, 100), (127, 127), (16, 1), (31, 1)] {
+        assert_eq!(boots_as(zlim42c(stored, RATE_500K)), Some(format!("{:03X}#00", 0x700 + used)), "2008h = {stored}");
+    }
+}
+
+#[test]
+fn another_node_number_takes_effect_with_the_next_start_unless_the_switches_decide() {
+    let mut machine = Bench::new();
+    machine.set(0x2008, 0, 42);
+    assert_eq!(machine.get(0x2000, 0), 1);
+    machine.let_store();
+    machine.power_cycle();
+    // The bench's drive has its switches at 1: they decide.
+    assert_eq!((machine.get(0x2000, 0), machine.get(0x2008, 0)), (1, 42));
+
+    let mut world = World::new(Bitrate::K500, 1);
+    let host = world.add_tap();
+    world.add_drive(32, Box::new(zlim42c(32, RATE_500K))).expect("room");
+    world.run_for(std::time::Duration::from_millis(10));
+    world.send(host, "620#2B08200021000000".parse().expect("a frame")).expect("room");
+    world.run_for(std::time::Duration::from_millis(10));
+    world.send(host, "000#8120".parse().expect("a frame")).expect("room");
+    world.run_for(std::time::Duration::from_millis(10));
+    let heard: Vec<_> = std::iter::from_fn(|| world.poll_received(host)).map(|(_, frame)| frame.to_string()).collect();
+    assert_eq!(heard, ["720#00", "5A0#6008200000000000", "721#00"], "2008h = 33, NMT reset node");
+}
+
+#[test]
+fn every_bit_rate_of_the_table_takes_effect_with_the_next_start() {
+    for number in 0..7_i64 {
+        let mut bench = Bench::new();
+        bench.set(0x2009, 0, number);
+        bench.let_store();
+        assert_eq!(bench.operate(|drive, _| drive.bitrate()), Some(Bitrate::K500));
+        bench.power_cycle();
+        let rate = bench.operate(|drive, _| drive.bitrate()).expect("it has power");
+        let expected = figure("bit_rate", &number.to_string(), "rate") * 1e3;
+        assert_eq!(f64::from(rate.bits_per_second()), expected, "2009h = {number}");
+    }
+}
+
+#[test]
+fn both_lengths_are_models_of_their_own() {
+    let names: Vec<_> = drives::profile::MODELS.iter().map(|model| model.model).collect();
+    assert!(names.contains(&"zlim42c") && names.contains(&"zlim42c-82"));
+    assert_eq!(zlim42c(1, RATE_500K).model(), "zlim42c");
+    assert_eq!(sim::machine::zlim42c_82(1, RATE_500K).model(), "zlim42c-82");
+}

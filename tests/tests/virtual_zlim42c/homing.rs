@@ -1,0 +1,213 @@
+//! Homing from every start of `tests/data/zlim42c/homing.csv`: the moves, the edge, and how it ends.
+//!
+//! The track, in pulses from where the rotor stands at power-on: limits from ±8000 outwards, home from -400 to 400.
+//! X0 is the home switch, X1 the positive and X2 the negative limit.
+
+use ferrodrive_tests::zlim42c::{HomingResult, homing_runs};
+use sim::SwitchRange;
+
+use crate::bench::{Bench, assert_within};
+
+const HOME_OFFSET: i64 = 250;
+const BITS: u16 = 1 << 8 | 1 << 10 | 1 << 14;
+
+/// Pulses in 10 ms of filter time at 60 r/min, some periods more, and what the rotor swings about its place.
+const FILTER_WAY: std::ops::RangeInclusive<f64> = 36.0..=46.0;
+
+#[derive(Clone, Copy)]
+struct Track {
+    home: Option<(i64, i64)>,
+    positive: Option<(Option<i64>, Option<i64>)>,
+    negative: Option<(Option<i64>, Option<i64>)>,
+}
+
+const TRACK: Track =
+    Track { home: Some((-400, 400)), positive: Some((Some(8000), None)), negative: Some((None, Some(-8000))) };
+
+/// The track and the start that a row means.
+fn scene(start: &str) -> (Track, i64) {
+    let everywhere = Some((None, None));
+    match start {
+        "between" | "above_home" | "bit_4_falls_on_the_way" | "halt_on_the_way" => (TRACK, 3000),
+        "below_home" => (TRACK, -3000),
+        "on_home" => (TRACK, 0),
+        "on_negative_limit" => (TRACK, -9000),
+        "on_positive_limit" => (TRACK, 9000),
+        "beyond_negative_limit" => (Track { negative: Some((Some(-4000), Some(-3000))), ..TRACK }, -5000),
+        "beyond_positive_limit" => (Track { positive: Some((Some(3000), Some(4000))), ..TRACK }, 5000),
+        "both_limits_on" => (Track { positive: everywhere, negative: everywhere, ..TRACK }, 0),
+        "above_home_without_home_switch" => (Track { home: None, ..TRACK }, 3000),
+        "below_home_without_home_switch" => (Track { home: None, ..TRACK }, -3000),
+        "home_on_at_negative_limit" => (Track { negative: Some((None, Some(200))), ..TRACK }, 0),
+        "no_input_configured" => (Track { home: None, positive: None, negative: None }, 0),
+        other => panic!("no scene for {other}"),
+    }
+}
+
+fn on_track(start: &str, method: i64) -> Bench {
+    let (track, position) = scene(start);
+    let mut bench = Bench::new();
+    let range = |(low, high)| SwitchRange { low, high };
+    let home = track.home.map(|(low, high)| range((Some(low), Some(high))));
+    let switches = [home, track.positive.map(range), track.negative.map(range)];
+    for (n, switch) in switches.into_iter().enumerate() {
+        if let Some(range) = switch {
+            bench.operate(|drive, now| drive.set_switch(n, range, now)).expect("an input");
+            bench.set(0x2030, 2 + n as u8, n as i64 + 1);
+        }
+    }
+    bench.set(0x200A, 0, 2);
+    bench.enable_in(1);
+    bench.move_by(position);
+    bench.run_ms(2500);
+    assert_eq!(bench.report().rotor_position, Some(position));
+    bench.set(0x6040, 0, 0x0F);
+    bench.set(0x6098, 0, method);
+    bench.set(0x607C, 0, HOME_OFFSET);
+    bench.set(0x6060, 0, 6);
+    bench.run_ms(5);
+    assert_eq!(bench.get(0x6061, 0), 6);
+    bench
+}
+
+/// Runs for `ms`; the plateaus of the commanded velocity, r/min. One look may catch a ramp in its middle, two do not.
+fn plateaus(bench: &mut Bench, ms: u64) -> Vec<i64> {
+    let (mut seen, mut last): (Vec<i64>, f64) = (Vec::new(), 0.0);
+    for _ in 0..ms {
+        bench.run_ms(1);
+        let rpm = bench.report().velocity_demand_rpm.unwrap_or_default();
+        let plateau = [120.0, -120.0, 60.0, -60.0].into_iter().find(|speed| (rpm - speed).abs() < 1e-6 && rpm == last);
+        last = rpm;
+        if let Some(plateau) = plateau.map(|speed| speed as i64)
+            && seen.last() != Some(&plateau)
+        {
+            seen.push(plateau);
+        }
+    }
+    seen
+}
+
+/// The plateaus that the moves of a row mean: moves that go on the same way at the same speed are one.
+fn expected_plateaus(run: &HomingResult) -> Vec<i64> {
+    // "No step is made" where the switch that ends the only move is on already.
+    if matches!(&*run.row.start, "both_limits_on" | "home_on_at_negative_limit") {
+        return Vec::new();
+    }
+    let speed = |name: &str| if name == "6099:01" { 120 } else { 60 };
+    let mut all: Vec<i64> = run.row.moves.iter().map(|step| i64::from(step.direction) * speed(&step.speed)).collect();
+    all.dedup();
+    all
+}
+
+fn shaft_pulses(bench: &mut Bench) -> f64 {
+    bench.report().shaft_angle_rad / std::f64::consts::TAU * 4000.0
+}
+
+/// Where the edge of a row is, and the direction in which it is crossed.
+fn edge(method: u8) -> (f64, f64) {
+    match method {
+        17 => (-8000.0, 1.0),
+        18 => (8000.0, -1.0),
+        _ => (-400.0, 1.0),
+    }
+}
+
+#[test]
+fn every_start_of_every_method_goes_and_ends_as_the_table_says() {
+    let runs = homing_runs();
+    assert_eq!(runs.len(), 32);
+    for run in &runs {
+        let (method, start) = (run.row.method, &*run.row.start);
+        let at = format!("method {method}, {start}");
+        let mut bench = on_track(start, i64::from(method));
+        bench.set(0x6040, 0, 0x1F);
+        let seen = match start {
+            "bit_4_falls_on_the_way" | "halt_on_the_way" => {
+                let seen = plateaus(&mut bench, 300);
+                bench.set(0x6040, 0, if start == "halt_on_the_way" { 0x11F } else { 0x0F });
+                bench.run_ms(300);
+                seen
+            }
+            _ => plateaus(&mut bench, 6000),
+        };
+        assert_eq!(seen, expected_plateaus(run), "{at}");
+        let expected = u16::from(run.bit_8) << 8 | u16::from(run.bit_10) << 10 | u16::from(run.bit_14) << 14;
+        assert_eq!(bench.statusword() & BITS, expected, "{at}: {:04X}h", bench.statusword());
+        let zero = shaft_pulses(&mut bench) - bench.report().position as f64;
+        if run.row.result == "attained" {
+            // 6064h reads -607Ch where the drive saw the edge: its filter time beyond it.
+            let (edge, direction) = edge(method);
+            let beyond = (zero - HOME_OFFSET as f64 - edge) * direction;
+            assert_within(&at, beyond, *FILTER_WAY.start(), *FILTER_WAY.end());
+        } else {
+            // A rotor that turns swings by a few pulses about its vector.
+            assert_within(&format!("{at}: the zero is not moved"), zero, -6.0, 6.0);
+        }
+    }
+}
+
+#[test]
+fn a_halted_homing_goes_on_and_attains() {
+    let mut bench = on_track("halt_on_the_way", 17);
+    bench.set(0x6040, 0, 0x1F);
+    bench.run_ms(300);
+    bench.set(0x6040, 0, 0x11F);
+    bench.run_ms(500);
+    assert_eq!(bench.get(0x606C, 0), 0);
+    bench.set(0x6040, 0, 0x1F);
+    bench.run_ms(5000);
+    assert_eq!(bench.statusword() & BITS, 1 << 8 | 1 << 10);
+}
+
+#[test]
+fn an_interrupted_homing_starts_again_with_the_next_edge_and_a_quick_stop_ends_it() {
+    let mut bench = on_track("between", 18);
+    for controlword in [0x1F, 0x0F, 0x1F] {
+        bench.set(0x6040, 0, controlword);
+        bench.run_ms(200);
+    }
+    assert_eq!(bench.statusword() & BITS, 1 << 14);
+    bench.set(0x6040, 0, 0x02);
+    bench.run_ms(300);
+    bench.set(0x6040, 0, 0x0F);
+    bench.run_ms(300);
+    assert_eq!((bench.get(0x606C, 0), bench.statusword() & BITS), (0, 1 << 10), "it does not go on");
+}
+
+#[test]
+fn an_output_tells_that_homing_is_done() {
+    let mut bench = on_track("between", 18);
+    bench.set(0x2030, 0x0E, 3);
+    bench.set(0x6040, 0, 0x1F);
+    bench.run_ms(500);
+    assert_eq!(bench.get(0x2004, 0), 0);
+    bench.run_ms(4500);
+    assert_eq!(bench.get(0x2004, 0), 2, "Y1");
+    bench.set(0x2030, 0x0C, 2);
+    bench.run_ms(2);
+    assert_eq!(bench.get(0x2004, 0), 0, "reversed");
+}
+
+#[test]
+fn a_switch_on_any_input_reversed_too_is_found() {
+    for (input, reversed) in [(0, false), (1, true), (2, false), (3, true)] {
+        let mut bench = Bench::new();
+        // An opener is high everywhere but on its switch.
+        let range = if reversed {
+            SwitchRange { low: None, high: Some(1999) }
+        } else {
+            SwitchRange { low: Some(2000), high: None }
+        };
+        bench.operate(|drive, now| drive.set_switch(input, range, now)).expect("an input");
+        bench.set(0x2030, 1, if reversed { 1 << input } else { 0 });
+        bench.run_ms(20);
+        bench.set(0x2030, 2 + input as u8, 2);
+        bench.set(0x6098, 0, 18);
+        bench.enable_in(6);
+        bench.set(0x6040, 0, 0x1F);
+        bench.run_ms(4000);
+        assert_eq!(bench.statusword() & BITS, 1 << 8 | 1 << 10, "X{input}");
+        let zero = shaft_pulses(&mut bench) - bench.report().position as f64;
+        assert_within("pulses before the edge", 2000.0 - zero, *FILTER_WAY.start(), *FILTER_WAY.end());
+    }
+}

@@ -1,0 +1,236 @@
+//! Profile position and profile velocity: the S-shaped ramps by their closed forms, the speed limit of 200 kHz, halt and
+//! quick stop.
+//!
+//! With 4000 pulses a turn 60 r/min are 4000 pulses/s. A ramp covers the mean of its two speeds times its time.
+
+use std::time::Duration;
+
+use crate::bench::{Bench, assert_within};
+
+const LOOK: Duration = Duration::from_micros(500);
+const REACHED: u16 = 1 << 10;
+const ACKNOWLEDGED: u16 = 1 << 12;
+const RUNNING: u16 = 1 << 14;
+const IN_POSITION: u16 = 1 << 15;
+
+/// Pulses/s in one r/min.
+const PULSES_S: f64 = 4000.0 / 60.0;
+
+/// Seconds from the set-point until the commanded velocity is 0 again.
+fn duration_of(bench: &mut Bench, pulses: i64) -> f64 {
+    bench.move_by(pulses);
+    bench.seconds_until(10.0, LOOK, |report| report.velocity_demand_rpm != Some(0.0));
+    bench.seconds_until(10.0, LOOK, |report| report.velocity_demand_rpm == Some(0.0))
+}
+
+#[test]
+fn a_move_takes_its_two_ramps_and_the_plateau() {
+    let mut bench = Bench::new();
+    bench.enable_in(1);
+    bench.set(0x6081, 0, 60);
+    let (start, top, end) = (5.0 * PULSES_S, 60.0 * PULSES_S, 10.0 * PULSES_S);
+    for (speeding_ms, slowing_ms) in [(100, 100), (200, 50), (0, 400)] {
+        bench.set(0x6083, 0, speeding_ms);
+        bench.set(0x6084, 0, slowing_ms);
+        let (speeding, slowing) = (speeding_ms as f64 * 1e-3, slowing_ms as f64 * 1e-3);
+        let ramps = 0.5 * (start + top) * speeding + 0.5 * (top + end) * slowing;
+        let expected = speeding + slowing + (3200.0 - ramps) / top;
+        let taken = duration_of(&mut bench, 3200);
+        assert_within("seconds", taken, expected - 0.003, expected + 0.003);
+    }
+    assert_eq!(bench.get(0x6064, 0), 9600);
+}
+
+#[test]
+fn a_move_too_short_for_its_speed_turns_back_at_a_lower_peak() {
+    // Each ramp keeps its pace p = T / change of speed: d = (v² - v0²) pa / 2 + (v² - ve²) pd / 2 gives the peak.
+    let mut bench = Bench::new();
+    bench.enable_in(1);
+    bench.set(0x6081, 0, 60);
+    let (start, top, end, ramp) = (5.0 * PULSES_S, 60.0 * PULSES_S, 10.0 * PULSES_S, 0.1);
+    let (up, down) = (ramp / (top - start), ramp / (top - end));
+    for pulses in [40, 100, 200, 400] {
+        let squares = 2.0 * f64::from(pulses) + start * start * up + end * end * down;
+        let peak = (squares / (up + down)).sqrt();
+        let expected = (peak - start) * up + (peak - end) * down;
+        let taken = duration_of(&mut bench, i64::from(pulses));
+        assert_within("seconds", taken, expected - 0.003, expected + 0.003);
+    }
+    assert_eq!(bench.get(0x6064, 0), 740);
+}
+
+#[test]
+fn half_way_in_time_an_s_shaped_ramp_is_half_way_in_speed() {
+    let mut bench = Bench::new();
+    bench.set(0x6083, 0, 400);
+    bench.enable_in(3);
+    bench.set(0x60FF, 0, 300);
+    bench.run_ms(200);
+    let half = bench.get(0x606C, 0);
+    assert!((150..=158).contains(&half), "{half} r/min, expected (5 + 300) / 2 and 1.5 r/min a ms");
+    bench.run_ms(210);
+    assert_eq!((bench.get(0x606C, 0), bench.get(0x2002, 0)), (300, 300));
+    assert_eq!(bench.statusword() & (REACHED | ACKNOWLEDGED | RUNNING), REACHED | RUNNING);
+    // The way of the ramp: the mean of both speeds. 10 ms and the talk at 300 r/min come on top.
+    let way = bench.get(0x6064, 0) as f64;
+    let ramp = 0.5 * 305.0 * PULSES_S * 0.4;
+    assert_within("pulses", way, ramp, ramp + 300.0 * PULSES_S * 0.02);
+    bench.set(0x60FF, 0, 0);
+    bench.run_ms(120);
+    assert_eq!(bench.get(0x606C, 0), 0, "6084h: 100 ms");
+    assert_eq!(bench.statusword() & (REACHED | ACKNOWLEDGED | RUNNING), REACHED | ACKNOWLEDGED, "bit 12: speed is 0");
+}
+
+#[test]
+fn no_speed_is_above_200_000_steps_a_second() {
+    // 2.1: 468 r/min at 25600 pulses a turn, and 1875 r/min at 6400.
+    for (setting, pulses_per_turn) in [(7, 25_600.0_f64), (5, 6_400.0)] {
+        let mut bench = Bench::new();
+        bench.set(0x2006, 0, setting);
+        bench.set(0x6083, 0, 1000);
+        bench.enable_in(3);
+        bench.set(0x60FF, 0, 3000);
+        bench.run_ms(1100);
+        assert_eq!(bench.get(0x606C, 0), (200_000.0 * 60.0 / pulses_per_turn).round() as i64);
+        let before = bench.report().position;
+        bench.run_ms(1000);
+        assert_eq!(bench.report().position - before, 200_000);
+        assert_ne!(bench.statusword() & REACHED, 0, "the speed that can be is reached");
+    }
+}
+
+#[test]
+fn a_motor_without_load_follows_to_3000_rpm_and_back_without_losing_a_step() {
+    // 6081h and 60FFh allow 3000 r/min; there the pull-out torque with 24 V is still twice the friction.
+    for supply_v in [24.0, 30.0] {
+        let mut bench = Bench::new();
+        bench.operate(|drive, now| drive.set_supply(supply_v, now)).expect("a supply");
+        bench.set(0x6083, 0, 1000);
+        bench.set(0x6084, 0, 2000);
+        bench.enable_in(3);
+        bench.set(0x60FF, 0, 3000);
+        bench.run_ms(2000);
+        assert_within("r/min", bench.report().velocity_rpm, 2800.0, 3200.0);
+        bench.set(0x60FF, 0, 0);
+        bench.run_ms(2500);
+        let report = bench.report();
+        let away = report.position - report.rotor_position.expect("known here");
+        // Dry friction may hold it some pulses off; four full steps are 80.
+        assert!(away.abs() <= 4 && report.error_code == 0, "{supply_v} V: {away} pulses, {report:?}");
+    }
+}
+
+#[test]
+fn every_microstep_setting_makes_one_turn_of_its_pulses() {
+    use ferrodrive_tests::zlim42c::figure;
+    for setting in 0..16 {
+        let mut bench = Bench::new();
+        bench.set(0x2006, 0, setting);
+        bench.enable_in(1);
+        let pulses = figure("microstep", &setting.to_string(), "pulses_per_turn") as i64;
+        bench.move_by(pulses);
+        bench.run_ms(1200);
+        let report = bench.report();
+        assert_eq!(report.position, pulses, "setting {setting}");
+        assert_within("turns", report.shaft_angle_rad / std::f64::consts::TAU, 0.999, 1.001);
+    }
+}
+
+#[test]
+fn a_microstep_setting_written_while_energised_waits_and_other_settings_do_not() {
+    let mut bench = Bench::new();
+    bench.enable_in(1);
+    bench.set(0x2006, 0, 0);
+    bench.set(0x6081, 0, 30);
+    bench.move_by(4000);
+    bench.run_ms(500);
+    assert_eq!(bench.get(0x606C, 0), 30);
+    bench.run_ms(2500);
+    assert_within("turns", bench.report().shaft_angle_rad / std::f64::consts::TAU, 0.999, 1.001);
+    bench.set(0x6040, 0, 0);
+    bench.run_ms(5);
+    bench.enable();
+    bench.move_by(200);
+    bench.run_ms(3000);
+    assert_within("turns", bench.report().shaft_angle_rad / std::f64::consts::TAU, 1.999, 2.001);
+}
+
+#[test]
+fn bits_10_12_and_15_follow_a_set_point() {
+    let mut bench = Bench::new();
+    bench.enable_in(1);
+    bench.run_ms(10);
+    assert_eq!(bench.statusword() & (REACHED | ACKNOWLEDGED | IN_POSITION), REACHED | IN_POSITION, "nothing to do");
+    bench.move_by(4000);
+    assert_eq!(bench.statusword() & (REACHED | ACKNOWLEDGED | IN_POSITION), ACKNOWLEDGED);
+    bench.set(0x6040, 0, 0x0F);
+    bench.run_ms(100);
+    assert_eq!(bench.statusword() & (REACHED | ACKNOWLEDGED | IN_POSITION | RUNNING), RUNNING);
+    bench.run_ms(1000);
+    assert_eq!(bench.statusword() & (REACHED | ACKNOWLEDGED | IN_POSITION | RUNNING), REACHED | IN_POSITION);
+}
+
+#[test]
+fn a_halted_move_goes_on_to_its_target() {
+    for option in [1, 2, 3] {
+        let mut bench = Bench::new();
+        bench.set(0x605D, 0, option);
+        bench.enable_in(1);
+        bench.move_by(8000);
+        bench.run_ms(300);
+        bench.set(0x6040, 0, 0x15F);
+        bench.run_ms(150);
+        let halted = bench.get(0x6064, 0);
+        assert_eq!(bench.statusword() & (REACHED | RUNNING), REACHED, "605Dh = {option}: the motor stands");
+        bench.run_ms(300);
+        assert_eq!(bench.get(0x6064, 0), halted);
+        bench.set(0x6040, 0, 0x5F);
+        bench.run_ms(2000);
+        assert_eq!(bench.get(0x6064, 0), 8000);
+    }
+}
+
+#[test]
+fn each_stop_takes_the_time_that_its_option_names() {
+    // 605Ah: 5 slows down (6084h), 6 as quick stop (6085h), 7 at once; each stays in quick stop active.
+    for (option, seconds) in [(5, 0.3), (6, 0.05), (7, 0.0)] {
+        let mut bench = Bench::new();
+        bench.set(0x605A, 0, option);
+        bench.set(0x6084, 0, 300);
+        bench.set(0x6085, 0, 50);
+        bench.enable_in(3);
+        bench.set(0x60FF, 0, 120);
+        bench.run_ms(500);
+        bench.set(0x6040, 0, 0x02);
+        let taken = bench.seconds_until(1.0, LOOK, |report| report.velocity_demand_rpm == Some(0.0));
+        assert_within("seconds", taken, seconds - 0.003, seconds + 0.002);
+        bench.run_ms(500);
+        assert_eq!(bench.statusword() & 0x6F, 0x07, "605Ah = {option}");
+    }
+}
+
+#[test]
+fn a_shutdown_ramps_first_or_switches_off_at_once() {
+    for (index, controlword, state) in [(0x605B, 0x06, 0x21), (0x605C, 0x07, 0x23)] {
+        for option in [1, 0] {
+            let mut bench = Bench::new();
+            bench.set(index, 0, option);
+            bench.set(0x6084, 0, 300);
+            bench.enable_in(3);
+            bench.set(0x60FF, 0, 120);
+            bench.run_ms(500);
+            bench.set(0x6040, 0, controlword);
+            let at_once = bench.statusword() & 0x6F;
+            assert_eq!(at_once == state, option == 0, "{index:04X}h = {option}: {at_once:02X}h");
+            bench.run_ms(500);
+            assert_eq!(bench.statusword() & 0x6F, state);
+        }
+    }
+}
+
+#[test]
+fn a_target_beyond_its_range_is_refused() {
+    let mut bench = Bench::new();
+    assert!(bench.write(0x607A, 0, 1_000_001).is_err());
+    assert_eq!(bench.get(0x607A, 0), 5000);
+}

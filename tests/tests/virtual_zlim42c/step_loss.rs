@@ -1,0 +1,123 @@
+//! Overload: the rotor slips by whole electrical turns, and the drive does not know.
+
+use ferrodrive_tests::zlim42c::figure;
+use plant::stepper_motor::StepperMotorModel;
+
+use crate::bench::{Bench, assert_within};
+
+/// Pulses of four full steps with 4000 pulses a turn.
+const FOUR_STEPS: i64 = 80;
+
+fn load(bench: &mut Bench, torque_nm: f64) {
+    bench.operate(|drive, now| drive.set_load_torque(torque_nm, now)).expect("a torque");
+}
+
+/// Enabled with the highest current, also at standstill.
+fn strong() -> Bench {
+    let mut bench = Bench::new();
+    bench.set(0x2005, 0, 7);
+    bench.set(0x2007, 0, 1);
+    bench.enable_in(1);
+    bench.run_ms(50);
+    bench
+}
+
+/// Moves two turns while `disturb` does something to the shaft; pulses that the rotor lost.
+fn lost_in_a_move(disturb: impl FnOnce(&mut Bench)) -> i64 {
+    let mut bench = strong();
+    bench.move_by(8000);
+    bench.run_ms(400);
+    disturb(&mut bench);
+    bench.run_ms(3000);
+    let report = bench.report();
+    assert_eq!((report.position, report.error_code), (8000, 0), "{report:?}");
+    assert_eq!((bench.get(0x6064, 0), bench.get(0x603F, 0)), (8000, 0), "the drive knows nothing");
+    assert_ne!(bench.statusword() & 1 << 10, 0, "target reached, as far as the drive knows");
+    report.position - report.rotor_position.expect("the rotor's place is known here")
+}
+
+#[test]
+fn a_blocked_rotor_loses_a_multiple_of_four_full_steps_and_the_drive_does_not_notice() {
+    for blocked_ms in [30, 100, 333] {
+        let lost = lost_in_a_move(|bench| {
+            bench.operate(|drive, now| drive.set_rotor_locked(true, now)).expect("a rotor");
+            bench.run_ms(blocked_ms);
+            bench.operate(|drive, now| drive.set_rotor_locked(false, now)).expect("a rotor");
+        });
+        // 120 r/min are 8 pulses a ms; the rotor falls in at one of the turns around where it is.
+        let missed = 8 * blocked_ms as i64;
+        assert_eq!(lost % FOUR_STEPS, 0, "{blocked_ms} ms: {lost} pulses");
+        assert!((missed - lost).abs() <= 4 * FOUR_STEPS && lost > 0, "{blocked_ms} ms: {lost} of {missed} pulses");
+    }
+}
+
+#[test]
+fn an_overloaded_rotor_loses_a_multiple_of_four_full_steps_and_a_pushed_one_gains_it() {
+    // A push of some ms: a longer one would speed the rotor up until its voltage trips the drive.
+    for torque_nm in [0.6, -0.6] {
+        let losses = [8, 10, 12].map(|ms| {
+            lost_in_a_move(|bench| {
+                bench.operate(|drive, now| drive.set_load_inertia(5e-5, now)).expect("an inertia");
+                load(bench, torque_nm);
+                bench.run_ms(ms);
+                load(bench, 0.0);
+            })
+        });
+        assert!(losses.iter().all(|lost| lost % FOUR_STEPS == 0), "{torque_nm} N m: {losses:?}");
+        assert!(
+            losses.iter().any(|lost| *lost != 0 && (*lost > 0) == (torque_nm > 0.0)),
+            "{torque_nm} N m: {losses:?}"
+        );
+    }
+}
+
+#[test]
+fn the_holding_torque_is_that_of_the_manual() {
+    // 2.1, at the highest current, with a load that grows slowly: below it the rotor stays within its step, above it slips.
+    let holding_nm = figure("model", "zlim42c", "holding_torque");
+    for (share, holds) in [(0.95, true), (1.1, false)] {
+        let mut bench = strong();
+        for part in 1..=40 {
+            load(&mut bench, share * holding_nm * f64::from(part) / 40.0);
+            bench.run_ms(50);
+        }
+        let away = bench.report().rotor_position.expect("known here").abs();
+        assert_eq!(away < FOUR_STEPS / 2, holds, "{share}: {away} pulses");
+    }
+}
+
+#[test]
+fn a_load_below_it_turns_the_rotor_by_the_angle_of_its_sine() {
+    // T = K I sin(x) + detent sin(4x), x the electrical angle that the rotor lags by; dry friction may hold the rest.
+    let model = StepperMotorModel::ZLIM42_C_70;
+    for torque_nm in [0.1, 0.25, -0.35] {
+        let mut bench = strong();
+        load(&mut bench, torque_nm);
+        bench.run_ms(3000);
+        let report = bench.report();
+        let lag = -report.shaft_angle_rad * f64::from(model.stepper.teeth);
+        let held_nm = model.stepper.torque_constant_nm_a() * report.current_a * lag.sin()
+            + model.stepper.detent_nm * (4.0 * lag).sin();
+        assert_within("N m", held_nm - torque_nm, -model.rotor.coulomb_nm, model.rotor.coulomb_nm);
+    }
+}
+
+#[test]
+fn half_the_current_at_rest_holds_half_the_load() {
+    let mut bench = strong();
+    bench.set(0x2007, 0, 0);
+    bench.run_ms(50);
+    load(&mut bench, 0.35);
+    bench.run_ms(500);
+    let report = bench.report();
+    assert!(report.rotor_position.expect("known here").abs() >= FOUR_STEPS, "{report:?}");
+}
+
+#[test]
+fn a_free_rotor_turns_under_its_load_and_the_position_stays() {
+    let mut bench = Bench::new();
+    load(&mut bench, -0.1);
+    bench.run_ms(200);
+    assert_eq!(bench.get(0x6064, 0), 0);
+    assert!(bench.report().shaft_angle_rad > 1.0, "6040h = 0: free but for the detent");
+}
