@@ -13,8 +13,10 @@ pub mod engine;
 mod firmware;
 pub mod mjoint;
 pub mod profile;
+mod register_error;
 mod row;
 pub mod zlac8030l;
 pub mod zlim42c;
 
 pub use firmware::{Firmware, Report};
+pub use register_error::RegisterError;

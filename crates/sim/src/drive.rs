@@ -3,6 +3,7 @@
 //! Units are SI, positions are the drive's own counts, speeds are those of the motor shaft in r/min.
 
 use can::{Bitrate, Instant, Station};
+use drives::RegisterError;
 
 /// A drive joined to its physics: firmware, motor, load, supply and sensors as one station.
 ///
@@ -72,6 +73,23 @@ pub trait VirtualDrive: Station + VirtualDriveClone + Send {
     fn set_pulses(&mut self, train: PulseTrain, now: Instant) -> Result<(), Refused> {
         let _ = (train, now);
         Err(Refused::Absent { model: self.model(), what: "pulse input" })
+    }
+
+    /// The unit identifier that it answers to over Modbus; `None` without such an interface, or without power.
+    fn modbus_unit(&self) -> Option<u8> {
+        None
+    }
+
+    /// Reads Modbus registers from `address` on.
+    fn read_registers(&mut self, address: u16, words: &mut [u16], now: Instant) -> Result<(), RegisterError> {
+        let _ = (address, words, now);
+        Err(RegisterError::NoSuchAddress)
+    }
+
+    /// Writes Modbus registers from `address` on, all of them or none.
+    fn write_registers(&mut self, address: u16, words: &[u16], now: Instant) -> Result<(), RegisterError> {
+        let _ = (address, words, now);
+        Err(RegisterError::NoSuchAddress)
     }
 
     /// Counts stores into the non-volatile memory: a new value means a new image.

@@ -24,5 +24,6 @@ pub use drive::{
     Brake, Component, Levels, PulseTrain, Refused, Report, SwitchRange, TemperatureSensor, VirtualDrive,
     VirtualDriveClone,
 };
+pub use drives::RegisterError;
 pub use prng::Prng;
 pub use world::{AnyStation, Digest, FrameLog, StationId, World, WorldError};

@@ -84,6 +84,12 @@ pub struct ParseBusError {
     reason: String,
 }
 
+impl ParseBusError {
+    pub(crate) fn new(text: &str, what: &'static str, reason: String) -> Self {
+        Self { text: text.to_owned(), what, reason }
+    }
+}
+
 impl FromStr for BusSpec {
     type Err = ParseBusError;
 
@@ -159,7 +165,7 @@ fn parse_slcan(rest: &str) -> Result<BusSpec, String> {
 }
 
 /// `HOST:PORT`, where HOST may be `[::1]`.
-fn parse_address(text: &str, default_port: Option<u16>) -> Result<String, String> {
+pub(crate) fn parse_address(text: &str, default_port: Option<u16>) -> Result<String, String> {
     let bracketed_alone = text.starts_with('[') && text.ends_with(']');
     let (host, port) = match text.rsplit_once(':').filter(|_| !bracketed_alone) {
         Some((host, port)) => {

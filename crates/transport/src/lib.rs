@@ -2,6 +2,7 @@
 //!
 //! - [`AsyncBus`] is a bus that is somewhere else; [`BusSpec`] opens one from a text such as `socketcand://HOST:PORT/can0`.
 //! - [`Hub`] serves a bus to other programs over socketcand and slcan.
+//! - [`ModbusServer`] serves registers over Modbus TCP or RTU.
 //! - [`run_station`] drives a passive [`can::Station`] on a bus, [`run_world`] a virtual world behind a hub.
 //! - [`socketcand`], [`slcan`] and [`log`] are the wire formats, as pure codecs that any other program may use.
 //!
@@ -28,6 +29,7 @@ mod clock;
 mod hub;
 mod link;
 pub mod log;
+mod modbus;
 mod run;
 pub mod slcan;
 pub mod socketcand;
@@ -40,6 +42,9 @@ pub use bus_spec::{BusSpec, ParseBusError, Protocol, ServeSpec};
 pub use clock::{Sleep, WallClock};
 pub use hub::{ClientId, Hub, HubError, HubEvent, HubOptions, LeaveReason, Listener};
 pub use log::LogBus;
+pub use modbus::{
+    ModbusError, ModbusException, ModbusRequest, ModbusServer, ModbusSpec, RegisterAccess, RegisterAnswer,
+};
 pub use run::{Heard, RealTimeWorld, run_station, run_world};
 pub use slcan::SlcanBus;
 pub use socketcand::SocketcandBus;

@@ -11,7 +11,10 @@ use can::Bitrate;
 use sim::World;
 use tokio::sync::mpsc;
 use transport::log::LogWriter;
-use transport::{AsyncBus, BusSpec, Hub, HubOptions, Protocol, ServeSpec, SocketcandBus, WallClock, run_world};
+use transport::{
+    AsyncBus, BusSpec, Hub, HubOptions, ModbusRequest, ModbusServer, ModbusSpec, Protocol, ServeSpec, SocketcandBus,
+    WallClock, run_world,
+};
 
 use crate::args::Global;
 use crate::embedded;
@@ -19,6 +22,7 @@ use crate::failure::Failure;
 use crate::parse::drive_spec::{DriveSpec, drive_spec};
 use crate::serve::eeprom::{EepromError, Eeproms};
 use crate::serve::keeper::{Keeper, file_name};
+use crate::serve::registers;
 use crate::serve::world::ServedWorld;
 use crate::session::{bus_failure, failure_of, interrupted, runtime};
 
@@ -44,6 +48,10 @@ pub(crate) struct Sim {
     /// Where to serve the bus: socketcand://HOST:PORT or slcan://HOST:PORT; port 0 takes a free one; may be repeated
     #[arg(long = "serve", value_name = "URL")]
     places: Vec<ServeSpec>,
+    /// Where to serve the joints' registers: HOST:PORT for Modbus TCP, or rtu:///dev/ttyUSB0?baud=115200; the unit
+    /// identifier is the joint's address (2615h)
+    #[arg(long, value_name = "PLACE")]
+    modbus: Option<ModbusSpec>,
     /// Keep EEPROM contents in this directory; without it every start is factory-fresh
     #[arg(long, value_name = "DIR")]
     state: Option<PathBuf>,
@@ -64,8 +72,15 @@ const LINES_WAITING: usize = 64;
 enum Request {
     Line(String),
     Keep,
+    Registers(ModbusRequest),
     Interrupted,
     BridgeLost(Failure),
+}
+
+impl From<ModbusRequest> for Request {
+    fn from(request: ModbusRequest) -> Self {
+        Self::Registers(request)
+    }
 }
 
 /// What a running simulation writes to the disk.
@@ -146,14 +161,16 @@ impl Sim {
         let options = HubOptions { bitrate: Some(self.bitrate), zero: clock.unix_zero(), ..HubOptions::default() };
         let mut hub = Hub::bind(&places, options, &clock).await.map_err(|error| failure_of(&error))?;
         let (requests, mut incoming) = mpsc::channel(LINES_WAITING);
+        let modbus = self.serve_registers(&requests, &clock).await?;
         if let (Some(outer), Some(inner)) = (outer, hub.listeners().last()) {
             let inner = inner.address.to_string();
             tokio::spawn(join_buses(outer, inner, clock.clone(), requests.clone(), global.clone()));
         }
         let listeners = hub.listeners()[..self.places.len()].iter().map(|listener| format!(" {listener}"));
         say(&format!(
-            "ready{}{}",
+            "ready{}{}{}",
             listeners.collect::<String>(),
+            modbus.as_ref().map(|server| format!(" {}", server.place())).unwrap_or_default(),
             bridge.map(|bus| format!(" {bus}")).unwrap_or_default()
         ));
         tokio::spawn(tick(requests.clone(), clock.clone()));
@@ -164,6 +181,19 @@ impl Sim {
         .await;
         records.keep(&mut world);
         records.finish().and(ended)
+    }
+}
+
+impl Sim {
+    /// The server of `--modbus`, listening.
+    async fn serve_registers(
+        &self,
+        requests: &mpsc::Sender<Request>,
+        clock: &WallClock,
+    ) -> Result<Option<ModbusServer>, Failure> {
+        let Some(place) = &self.modbus else { return Ok(None) };
+        let server = ModbusServer::bind(place, requests.clone(), clock).await;
+        server.map(Some).map_err(|error| failure_of(&error))
     }
 }
 
@@ -181,6 +211,10 @@ fn answer(world: &mut ServedWorld, request: Request, records: &mut Records) -> C
                 }
                 say(&answer.json);
             }
+            ControlFlow::Continue(())
+        }
+        Request::Registers(request) => {
+            registers::answer(world.world_mut(), request);
             ControlFlow::Continue(())
         }
         Request::Keep => {

@@ -2,4 +2,5 @@
 
 pub(crate) mod eeprom;
 pub(crate) mod keeper;
+pub(crate) mod registers;
 pub(crate) mod world;

@@ -1,4 +1,4 @@
-use drives::Firmware;
+use drives::{Firmware, RegisterError};
 
 use crate::{Component, PulseTrain, Refused, Report, TemperatureSensor};
 
@@ -83,6 +83,24 @@ pub trait Assembly: Clone + Send + 'static {
     fn set_pulses(&mut self, train: PulseTrain) -> Result<(), Refused> {
         let _ = train;
         Err(Refused::Absent { model: self.model(), what: "pulse input" })
+    }
+
+    /// The unit identifier of the firmware's Modbus registers, where it has any.
+    fn modbus_unit(firmware: &Self::Firmware) -> Option<u8> {
+        let _ = firmware;
+        None
+    }
+
+    /// Reads the firmware's Modbus registers from `address` on.
+    fn read_registers(firmware: &Self::Firmware, address: u16, words: &mut [u16]) -> Result<(), RegisterError> {
+        let _ = (firmware, address, words);
+        Err(RegisterError::NoSuchAddress)
+    }
+
+    /// Writes the firmware's Modbus registers from `address` on, all of them or none.
+    fn write_registers(firmware: &mut Self::Firmware, address: u16, words: &[u16]) -> Result<(), RegisterError> {
+        let _ = (firmware, address, words);
+        Err(RegisterError::NoSuchAddress)
     }
 }
 

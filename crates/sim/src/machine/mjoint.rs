@@ -5,6 +5,7 @@
 //! motors are those of `plant`; what is assumed of the surroundings is a constant below.
 
 use can::Bitrate;
+use drives::RegisterError;
 use drives::engine::axis::Demand;
 use drives::mjoint::readings::{COUNTS_PER_TURN, COUNTS_S_PER_RPM};
 use drives::mjoint::{Actuation, Battery, Brake, Hardware, Image, MJoint, Model, PowerStage, Sensors, objects};
@@ -278,6 +279,18 @@ impl Assembly for Joint {
 
     fn set_pulses(&mut self, train: PulseTrain) -> Result<(), Refused> {
         self.pulses.start(train)
+    }
+
+    fn modbus_unit(firmware: &MJoint) -> Option<u8> {
+        firmware.modbus_address()
+    }
+
+    fn read_registers(firmware: &MJoint, address: u16, words: &mut [u16]) -> Result<(), RegisterError> {
+        firmware.read_registers(address, words)
+    }
+
+    fn write_registers(firmware: &mut MJoint, address: u16, words: &[u16]) -> Result<(), RegisterError> {
+        firmware.write_registers(address, words)
     }
 }
 

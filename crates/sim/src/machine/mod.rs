@@ -13,7 +13,7 @@ mod zlac8030l;
 mod zlim42c;
 
 use can::{Bitrate, Frame, Instant, Station};
-use drives::Firmware;
+use drives::{Firmware, RegisterError};
 
 pub use assembly::Assembly;
 pub use mjoint::{Joint, MJointMachine, mjoint};
@@ -245,6 +245,20 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
     fn set_pulses(&mut self, train: PulseTrain, now: Instant) -> Result<(), Refused> {
         self.advance(now);
         self.assembly.set_pulses(train)
+    }
+
+    fn modbus_unit(&self) -> Option<u8> {
+        if self.running { A::modbus_unit(&self.firmware) } else { None }
+    }
+
+    fn read_registers(&mut self, address: u16, words: &mut [u16], now: Instant) -> Result<(), RegisterError> {
+        self.advance(now);
+        A::read_registers(&self.firmware, address, words)
+    }
+
+    fn write_registers(&mut self, address: u16, words: &[u16], now: Instant) -> Result<(), RegisterError> {
+        self.advance(now);
+        A::write_registers(&mut self.firmware, address, words)
     }
 
     fn nvm_generation(&self) -> u64 {

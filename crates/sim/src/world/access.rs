@@ -52,6 +52,19 @@ impl World {
         })
     }
 
+    /// The number of the drive that answers to a Modbus unit identifier; `None` if none does, or if two would at once
+    /// and garble each other's answers.
+    pub fn modbus_drive(&mut self, unit: u8) -> Option<u8> {
+        let mut answering = self.members.iter_mut().filter_map(|member| match member {
+            Member::Drive { number, drive } => {
+                drive.advance(self.now);
+                (drive.modbus_unit() == Some(unit)).then_some(*number)
+            }
+            _ => None,
+        });
+        answering.next().filter(|_| answering.next().is_none())
+    }
+
     /// A station as what it is; `None` if it is something else.
     pub fn station<S: 'static>(&self, id: StationId) -> Option<&S> {
         match &self.members[id.0] {

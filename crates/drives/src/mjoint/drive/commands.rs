@@ -31,7 +31,7 @@ impl MJoint {
     }
 
     /// A peer wrote `raw` to `slot`. The status is shown anew at once: the answer to the same frame may carry it.
-    fn written(&mut self, slot: Slot, raw: u32, via: Via) {
+    pub(super) fn written(&mut self, slot: Slot, raw: u32, via: Via) {
         match effect(slot) {
             Effect::Command => self.command(Controlword(raw as u16)),
             Effect::SelectMode => self.select_mode(ModeOfOperation(raw as u8 as i8)),

@@ -7,6 +7,7 @@
 mod commands;
 mod control;
 mod publish;
+mod registers;
 
 use can::{Bitrate, Frame, Instant, Station};
 use canopen::NmtState;

@@ -32,6 +32,14 @@ pub static REGISTERS: [Register; 33] = [
     one(0x25, 0x6060, 0), one(0x26, 0x6098, 0),
 ];
 
+/// The register at `address`, and which of its words that is.
+pub fn find(address: u16) -> Option<(&'static Register, usize)> {
+    let after = REGISTERS.partition_point(|register| register.address <= address);
+    let register = REGISTERS[..after].last()?;
+    let word = address - register.address;
+    (word < u16::from(register.words)).then_some((register, usize::from(word)))
+}
+
 const fn one(address: u16, index: u16, sub_index: u8) -> Register {
     Register { address, object: Mux::new(index, sub_index), words: 1 }
 }

@@ -1,0 +1,43 @@
+//! Modbus requests on a world: which drive a unit is, and what it answers.
+//!
+//! A unit is a drive by the address it uses at present (2615h of an M joint). Requests are served between two steps of
+//! the world, at its present time, as world commands are.
+
+use sim::{RegisterError, World};
+use transport::{ModbusException, ModbusRequest, RegisterAccess, RegisterAnswer};
+
+/// Has `request` answered by the drive that it is for; a broadcast is a write for all of them.
+pub(crate) fn answer(world: &mut World, request: ModbusRequest) {
+    let answer = if request.broadcast { broadcast(world, &request) } else { of_unit(world, &request) };
+    request.answer(answer);
+}
+
+fn of_unit(world: &mut World, request: &ModbusRequest) -> RegisterAnswer {
+    let number = world.modbus_drive(request.unit)?;
+    Some(request.access.as_ref().map_err(|refused| *refused).and_then(|access| carry_out(world, number, access)))
+}
+
+/// Each unit takes it or refuses it by itself; a read for all is for nobody.
+fn broadcast(world: &mut World, request: &ModbusRequest) -> RegisterAnswer {
+    if let Ok(access @ RegisterAccess::Write { .. }) = &request.access {
+        let numbers: Vec<u8> = world.drive_numbers().collect();
+        for number in numbers {
+            let _ = carry_out(world, number, access);
+        }
+    }
+    None
+}
+
+fn carry_out(world: &mut World, number: u8, access: &RegisterAccess) -> Result<Vec<u16>, ModbusException> {
+    let done = world.with_drive(number, |drive, now| match access {
+        RegisterAccess::Read { address, count } => {
+            let mut words = vec![0; usize::from(*count)];
+            drive.read_registers(*address, &mut words, now).map(|()| words)
+        }
+        RegisterAccess::Write { address, words } => drive.write_registers(*address, words, now).map(|()| Vec::new()),
+    });
+    done.map_err(|_| ModbusException::ServerDeviceFailure)?.map_err(|error| match error {
+        RegisterError::NoSuchAddress | RegisterError::ReadOnly => ModbusException::IllegalDataAddress,
+        RegisterError::BadValue(_) => ModbusException::IllegalDataValue,
+    })
+}
