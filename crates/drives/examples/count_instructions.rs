@@ -1,8 +1,9 @@
 //! Makes the same exchange many times, for an instruction counter to look at: a count does not depend on what else the
 //! machine does, as a time does.
 //!
-//! Arguments: `node`, `firmware` or `idle`, the number of a frame of the workload (from 0), and how many exchanges. The
-//! difference between two runs, divided by the difference of their lengths, is what one exchange takes:
+//! Arguments: `node`, `firmware` or `idle`, the number of a frame of the workload (from 0), and how many exchanges
+//! (without arguments: `node 0 10000`). The difference between two runs, divided by the difference of their lengths, is
+//! what one exchange takes:
 //!
 //! ```text
 //! cargo build --release -p ferrodrive-drives --example count_instructions
@@ -21,7 +22,10 @@ use std::hint::black_box;
 use workload::{FRAMES, exchange_with_firmware, exchange_with_node, firmware, frame, idle, node};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let mut arguments: Vec<String> = std::env::args().skip(1).collect();
+    if arguments.is_empty() {
+        arguments = ["node", "0", "10000"].map(String::from).to_vec();
+    }
     let [subject, number, exchanges] = arguments.as_slice() else {
         return Err("arguments: node, firmware or idle; number of the frame; exchanges".into());
     };
