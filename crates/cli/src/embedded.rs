@@ -24,17 +24,16 @@ const SETTLING_TIME: Duration = Duration::from_millis(200);
 /// A world with drives, and which they are.
 pub(crate) type Embedded = (World, Vec<(NodeId, &'static DriveProfile)>);
 
-/// The world that `--bus sim` or `--bus sim:FILE.toml` means: the drives of [`EMBEDDED`], each at its node-ID as
-/// delivered,
-/// or what the file says.
+/// The world that `--bus sim` or `--bus sim:FILE.toml` means: the drives of [`EMBEDDED`], or what the file
+/// says.
 pub(crate) fn world(file: Option<&Path>) -> Result<Embedded, Failure> {
     if let Some(path) = file {
         return machine_file::load(path);
     }
     let mut world = World::new(Bitrate::K500, SEED);
     let mut drives = Vec::new();
-    for model in EMBEDDED.iter().copied() {
-        let node = NodeId::new(model.node_id).unwrap_or(NodeId::MIN);
+    for (model, node) in EMBEDDED.iter().copied() {
+        let node = NodeId::new(node).unwrap_or(NodeId::MIN);
         let drive = virtual_drive(model, node, world.bitrate())?;
         world.add_drive(node.raw(), drive).map_err(|error| Failure::new(error.to_string()))?;
         drives.push((node, model));
@@ -109,8 +108,8 @@ mod tests {
 
     #[test]
     fn a_bit_rate_that_the_drive_does_not_know_is_refused_with_those_it_knows() {
-        assert_eq!(baud_rate(EMBEDDED[0], ZLAC_BAUD_RATE, Bitrate::K125).ok(), Some(3));
-        let refusal = baud_rate(EMBEDDED[0], ZLAC_BAUD_RATE, Bitrate::K50).err().map(|failure| failure.to_string());
+        assert_eq!(baud_rate(EMBEDDED[0].0, ZLAC_BAUD_RATE, Bitrate::K125).ok(), Some(3));
+        let refusal = baud_rate(EMBEDDED[0].0, ZLAC_BAUD_RATE, Bitrate::K50).err().map(|failure| failure.to_string());
         assert!(refusal.is_some_and(|text| text.contains("cannot run at 50k") && text.contains("100 kbit/s")));
     }
 }

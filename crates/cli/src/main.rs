@@ -88,7 +88,7 @@ fn run(global: &Global, format: Format, command: &Command, typed_bus: bool) -> R
         Command::Torque(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Save(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Restore(command) => on_bus(global, format, async |context| command.run(context).await),
-        Command::Home(home) => session::run(global, async |context| home.run(context).await),
+        Command::Home(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Objects(objects) => match objects.whose {
             Whose::Model(model) => print(format, &objects.list(model)?),
             Whose::Node(node) => {

@@ -2,8 +2,9 @@
 
 pub(crate) use drives::profile::{DriveProfile, MODELS, model as find};
 
-/// The models on the embedded virtual bus, each at its node-ID as delivered.
-pub(crate) const EMBEDDED: &[&DriveProfile] = &[&drives::zlac8030l::PROFILE];
+/// The drives on the embedded virtual bus and their node-IDs: as delivered, but for the ZLIM42-C, whose 1 is the joint's.
+pub(crate) const EMBEDDED: &[(&DriveProfile, u8)] =
+    &[(&drives::zlac8030l::PROFILE, 4), (&drives::mjoint::M4230E17B50, 1), (&drives::zlim42c::PROFILE, 2)];
 
 /// The names of all models, for messages.
 pub(crate) fn names() -> String {

@@ -6,13 +6,18 @@ use common::{done, ferrodrive, scratch};
 use serde_json::json;
 
 #[test]
-fn scan_finds_the_drive_and_names_its_model() {
+fn scan_finds_the_drives_and_names_their_models() {
     let found = done(&["--json", "scan"]).json();
-    let node = &found["nodes"][0];
-    assert_eq!(node["node"], 4);
-    assert_eq!(node["model"], "zlac8030l");
-    // "ZLAC8030L quick start guide V1.00", chapter 9.
-    assert_eq!((node["device_type"].as_u64(), node["vendor_id"].as_u64()), (Some(0x40192), Some(0x100)));
+    let nodes = found["nodes"].as_array().unwrap();
+    let known: Vec<_> = nodes.iter().map(|node| (node["node"].as_u64(), node["model"].as_str())).collect();
+    assert_eq!(known, [(Some(1), Some("m4230e17b50")), (Some(2), Some("zlim42c")), (Some(4), Some("zlac8030l"))]);
+    // "ZLAC8030L quick start guide V1.00", chapter 9, and "ZLIM42-C user manual V1.03", 5.4: the same.
+    for node in &nodes[1..] {
+        assert_eq!((node["device_type"].as_u64(), node["vendor_id"].as_u64()), (Some(0x40192), Some(0x100)));
+    }
+    // "M Robot Joint Motor CanOpen Manual", 5.04.
+    assert_eq!((nodes[0]["device_type"].as_u64(), nodes[0]["vendor_id"].as_u64()), (Some(0x20192), Some(0x331)));
+    assert!(nodes.iter().all(|node| node["remark"].is_null()), "on this bus the models are known: {found}");
 }
 
 #[test]
@@ -86,10 +91,59 @@ fn a_torque_is_a_motor_current() {
 }
 
 #[test]
+fn the_same_commands_move_all_three_drives() {
+    for node in ["1", "2", "4"] {
+        let moved = done(&["--json", "velocity", node, "60rpm", "--for", "1s"]).json();
+        let speed = moved["velocity_rpm"].as_f64().unwrap();
+        assert!((speed - 60.0).abs() < 3.0, "node {node}: {speed}");
+        let moved = done(&["--json", "move", node, "90deg", "--profile-velocity", "60rpm"]).json();
+        let angle = moved["angle_deg"].as_f64().unwrap();
+        assert!((angle - 90.0).abs() < 4.0, "node {node}: {angle}");
+        let state = |arguments: &[&str]| done(&[&["--json"], arguments].concat()).json()["state"].clone();
+        assert_eq!(state(&["state", node]), "Switch on disabled");
+        assert_eq!(state(&["enable", node]), "Operation enabled");
+        assert!(done(&["objects", node]).out.contains("6064h:00"));
+    }
+    // 0404h: "M Robot Joint Motor CanOpen Manual", 5.10.1.
+    let joint = done(&["--json", "state", "1"]).json();
+    assert_eq!((&joint["statusword"], &joint["bits"]), (&json!(0x0404), &json!(["output enabled", "target reached"])));
+}
+
+#[test]
+fn a_torque_is_refused_where_the_model_has_no_such_mode() {
+    for node in ["1", "2"] {
+        let ended = ferrodrive(&["torque", node, "500mA"]);
+        assert_eq!(ended.status, Some(1));
+        assert!(ended.err.contains("has no mode"), "{}", ended.err);
+    }
+}
+
+#[test]
+fn a_joint_homes_on_the_switch_of_its_machine_file() {
+    let directory = scratch("homing");
+    let file = directory.join("joint.toml");
+    let text = "[[drive]]\nmodel = 'm4230e17b50'\nnode = 1\nswitches = { DIR = ['min', -16384] }\n";
+    std::fs::write(&file, text).unwrap();
+    let bus = format!("sim:{}", file.display());
+    let homed = done(&["--bus", &bus, "--json", "home", "1", "--method", "17"]).json();
+    assert_eq!(homed["reached"], true);
+    assert!(homed["bits"].as_array().unwrap().contains(&json!("homing attained")), "{homed}");
+    std::fs::remove_dir_all(directory).unwrap();
+}
+
+#[test]
+fn homing_that_finds_nothing_in_time_is_told_with_what_to_check() {
+    let ended = ferrodrive(&["home", "2", "--method", "17", "--within", "2s"]);
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.err.contains("still looks for its reference") && ended.err.contains("switch"), "{}", ended.err);
+    assert_eq!(ferrodrive(&["home", "2", "--method", "99"]).status, Some(2));
+}
+
+#[test]
 fn homing_is_refused_with_the_reason() {
     let ended = ferrodrive(&["home", "4", "--method", "17"]);
     assert_eq!(ended.status, Some(1));
-    assert!(ended.err.contains("has no homing") && ended.err.contains("6098h"), "{}", ended.err);
+    assert!(ended.err.contains("has no homing") && ended.err.contains("6060h takes 1"), "{}", ended.err);
 }
 
 #[test]
@@ -107,6 +161,8 @@ fn states_follow_the_commands() {
 fn parameters_are_stored_and_restored() {
     let saved = done(&["--json", "save", "4"]).json();
     assert_eq!((&saved["done"], &saved["object"]), (&json!("stored"), &json!("2009h:00")));
+    assert_eq!(done(&["--json", "save", "1"]).json()["object"], "2614h:00");
+    assert_eq!(done(&["--json", "save", "2"]).json()["object"], "2010h:00");
     let restored = done(&["--json", "restore", "4"]).json();
     assert_eq!(restored["done"], "restored to factory values");
 }
@@ -126,8 +182,8 @@ fn the_dump_is_a_log_that_dump_reads() {
     assert!(shown.out.contains("704#00") && shown.out.contains("boot-up node 4"), "{}", shown.out);
     let bus = format!("log:{}", log.display());
     let again = done(&["--json", "--bus", &bus, "dump"]);
-    let line: serde_json::Value = serde_json::from_str(again.out.lines().next().unwrap()).unwrap();
-    assert_eq!(line["frame"], "704#00");
+    let lines = again.out.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    let line = lines.into_iter().find(|line| line["frame"] == "704#00").unwrap();
     assert_eq!(line["text"], "boot-up node 4");
     std::fs::remove_dir_all(directory).unwrap();
 }

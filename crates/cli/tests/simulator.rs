@@ -232,3 +232,30 @@ fn every_frame_is_in_the_log() {
     }
     std::fs::remove_dir_all(directory).unwrap();
 }
+
+#[test]
+fn every_model_can_be_simulated_and_a_scan_from_outside_says_what_it_cannot_tell() {
+    let drives = ["zlac8030l@4", "zlim42c@2", "zlim42c-82@3", "m4230e17b50@10", "m4230e17b80@11", "m8025e25b50@12"];
+    let mut arguments: Vec<&str> = drives.iter().flat_map(|drive| ["--drive", drive]).collect();
+    arguments.extend(["--drive", "m8025e25b80@13", "--serve", "socketcand://127.0.0.1:0"]);
+    let mut simulator = Simulator::start(&arguments);
+    for node in [4, 2, 3, 10, 11, 12, 13] {
+        assert_eq!(simulator.ask(&format!("{node} get"))["node"], node);
+    }
+    let bus = simulator.bus("socketcand");
+    let found = done(&["--bus", &bus, "--json", "--model", "4=zlac8030l", "scan"]).json();
+    let node = |id: u64| found["nodes"].as_array().unwrap().iter().find(|node| node["node"] == id).unwrap();
+    assert_eq!((&node(4)["model"], &node(4)["remark"]), (&"zlac8030l".into(), &serde_json::Value::Null));
+    assert!(node(2)["model"].is_null() && node(12)["model"].is_null());
+    assert!(node(2)["remark"].as_str().unwrap().contains("--model 2=zlim42c"), "{found}");
+    // A store command to a node that cannot be told is refused; so is one to a node that is told wrongly.
+    let ended = ferrodrive(&["--bus", &bus, "save", "2"]);
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.err.contains("--model 2=MODEL"), "{}", ended.err);
+    let ended = ferrodrive(&["--bus", &bus, "--model", "2=zlac8030l", "save", "2"]);
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.err.contains("it has no 2029h:00"), "{}", ended.err);
+    done(&["--bus", &bus, "--model", "2=zlim42c", "save", "2"]);
+    simulator.ask("quit");
+    assert_eq!(simulator.wait(), Some(0));
+}

@@ -6,7 +6,7 @@
 use can::Bitrate;
 use canopen::Mux;
 use canopen::od::Table;
-use cia402::ModeOfOperation;
+use cia402::{ModeOfOperation, PowerState, Statusword};
 
 use crate::engine::faults::FaultRow;
 use crate::{mjoint, zlac8030l, zlim42c};
@@ -43,6 +43,8 @@ pub struct DriveProfile {
     pub manual: &'static str,
     /// What 1000h and 1018h answer.
     pub identity: Identity,
+    /// An object that no other maker's model of the same identity has, where there is one: reading it confirms the model.
+    pub hallmark: Option<Mux>,
     /// The object table.
     pub table: &'static Table,
     /// Node-ID as delivered.
@@ -51,6 +53,16 @@ pub struct DriveProfile {
     pub bitrate: Bitrate,
     /// Modes that 6060h accepts.
     pub modes: &'static [ModeOfOperation],
+    /// Where the present mode is shown: 6061h, or 6060h where there is no such object.
+    pub mode_display: Mux,
+    /// How it is enabled, and how it shows that.
+    pub power: PowerStyle,
+    /// Bits of the statusword that mean something of this model's own, in words.
+    pub statusword_bits: &'static [(u16, &'static str)],
+    /// How it finds its reference position, where it does.
+    pub homing: Option<HomingRules>,
+    /// The object with the time, in ms, after which it stops by itself when no frame comes for it; 0 for never.
+    pub host_watchdog: Option<Mux>,
     /// What raw values are worth.
     pub units: Units,
     /// How parameters are stored.
@@ -61,6 +73,87 @@ pub struct DriveProfile {
     pub pdo: PdoRules,
     /// Where the model departs from the standard or from its own manual.
     pub quirks: &'static [Quirk],
+}
+
+impl DriveProfile {
+    /// The power state that a statusword shows, or for a drive without the state machine the one that comes closest.
+    pub const fn power_state(&self, statusword: Statusword) -> Option<PowerState> {
+        self.power.state(statusword)
+    }
+}
+
+/// How a drive is enabled, and how its statusword shows that.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PowerStyle {
+    /// The power state machine of CiA 402-2, 8.2.
+    Cia402,
+    /// No states: the statusword mirrors the controlword. One write of 0Fh enables, 0 disables.
+    Mirror {
+        /// Bits of the statusword that are set while the drive follows its host.
+        following: u16,
+        /// Bit that is set while the power stage drives the motor.
+        live: u16,
+        /// Bit that is set while there is an alarm.
+        alarm: u16,
+    },
+}
+
+impl PowerStyle {
+    /// The power state that a statusword shows, or the one of CiA 402 that comes closest: an alarm is a fault only when
+    /// it has taken the power off the motor, and a live motor that follows nobody is switched on.
+    pub const fn state(self, statusword: Statusword) -> Option<PowerState> {
+        match self {
+            Self::Cia402 => statusword.state(),
+            Self::Mirror { following, live, alarm } => {
+                Some(match (statusword.has(following | live), statusword.has(live), statusword.has(alarm)) {
+                    (true, ..) => PowerState::OperationEnabled,
+                    (false, true, _) => PowerState::SwitchedOn,
+                    (false, false, true) => PowerState::Fault,
+                    (false, false, false) => PowerState::SwitchOnDisabled,
+                })
+            }
+        }
+    }
+}
+
+/// How a drive finds its reference position (mode 6).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HomingRules {
+    /// Where the method is.
+    pub method: Mux,
+    /// Speed of the search in r/min, where it has an object of its own.
+    pub search_speed: Option<Quantity>,
+    /// What starts it.
+    pub start: HomingStart,
+    /// How the statusword tells that it was found.
+    pub attained: BitPattern,
+    /// How the statusword tells that it was not.
+    pub failed: BitPattern,
+}
+
+/// What starts homing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HomingStart {
+    /// A rising edge of controlword bit 4 in mode 6.
+    ControlwordBit4,
+    /// The write of mode 6, each time.
+    ModeWrite,
+}
+
+/// Some bits of a word, and how they have to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BitPattern {
+    /// Bits that matter.
+    pub mask: u16,
+    /// Their values.
+    pub value: u16,
+}
+
+impl BitPattern {
+    /// True if the bits that matter are so.
+    pub const fn matches(self, statusword: Statusword) -> bool {
+        statusword.0 & self.mask == self.value
+    }
 }
 
 /// What a drive says that it is.

@@ -109,6 +109,19 @@ pub enum Error {
         /// What it says.
         found: Identity,
     },
+    /// The node lacks an object that the model has, though both say the same identity.
+    #[error(
+        "node {node} is not a {model}, though it says the same of itself: it has no {hallmark}. Name the right model; \
+         what stores parameters on one may set something else on the other"
+    )]
+    OtherModel {
+        /// The node.
+        node: NodeId,
+        /// The model it was taken for.
+        model: &'static str,
+        /// The object that the model has.
+        hallmark: Mux,
+    },
     /// The model has no command that restores factory settings.
     #[error("node {node}: the {model} cannot be told to restore its factory settings: write each object instead")]
     NoFactorySettings {

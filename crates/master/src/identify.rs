@@ -163,11 +163,11 @@ async fn told_apart(node: &Node, mut models: Vec<&'static DriveProfile>) -> Resu
     Ok(models)
 }
 
-/// An object that the first model lets read and another one does not have.
+/// An object that the first model lets read and another one does not have: its hallmark, if that is one.
 fn distinguishing_object(models: &[&'static DriveProfile]) -> Option<Mux> {
     let (first, others) = models.split_first()?;
-    let readable = first.table.rows().iter().filter(|entry| entry.access.is_readable());
-    readable.map(Entry::mux).find(|mux| others.iter().any(|other| other.table.find(*mux).is_err()))
+    let readable = first.table.rows().iter().filter(|entry| entry.access.is_readable()).map(Entry::mux);
+    first.hallmark.into_iter().chain(readable).find(|mux| others.iter().any(|other| other.table.find(*mux).is_err()))
 }
 
 impl Network {

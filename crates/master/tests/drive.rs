@@ -247,7 +247,8 @@ fn the_stop_guard_quick_stops_what_was_moved_and_only_that() {
         drop(guard);
     });
     let words = |bus: &Bus, position: usize| bus.toys[position].drive.as_ref().unwrap().controlwords.clone();
-    assert_eq!(words(&bus, 0).last(), Some(&0x02));
+    // Quick stop and halt.
+    assert_eq!(words(&bus, 0).last(), Some(&0x0102));
     assert_eq!(words(&bus, 1), [0x06, 0x07, 0x0F]);
 }
 

@@ -1,15 +1,24 @@
 //! `ferrodrive home`: homing (CiA 402-2, mode 6), where a drive has it.
 
+use std::time::Duration;
+
 use canopen::NodeId;
 use cia402::ModeOfOperation;
+use master::drive::HomingOptions;
+use master::units::{Rpm, parse_duration};
 
+use super::motion::{MotionOutcome, outcome, speed};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::models::DriveProfile;
 use crate::parse::node::node;
 
 /// Find a drive's reference position
+///
+/// Enables the drive and waits until it has found the edge of its switch, which is position zero from then on. The inputs
+/// have to be set up as switches before; a drive that finds nothing in time is stopped.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive home 2 --method 17\n  ferrodrive home 1 --method 18 --within 5s")]
 pub(crate) struct Home {
     /// Node-ID
     #[arg(value_parser = node)]
@@ -17,26 +26,38 @@ pub(crate) struct Home {
     /// Homing method of CiA 402, e.g. 17 (negative limit switch)
     #[arg(long, value_parser = clap::value_parser!(i8), allow_hyphen_values = true)]
     method: i8,
+    /// Speed of the search, where the drive has an object for it
+    #[arg(long, value_name = "SPEED", value_parser = speed)]
+    profile_velocity: Option<Rpm>,
+    /// Longest time that it may take
+    #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "60s")]
+    within: Duration,
+    /// Do not wait until it is found
+    #[arg(long)]
+    no_wait: bool,
 }
 
 impl Home {
-    /// Refuses for drives without homing, with the reason.
-    pub(crate) async fn run(&self, context: &Context) -> Result<(), Failure> {
-        let model = context.known_model_of(self.node).await?;
-        Err(self.refusal(model))
+    /// Homes; refuses for drives without homing, with the reason.
+    pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
+        let drive = context.known_drive(self.node).await?;
+        if let Some(model) = drive.profile().filter(|model| model.homing.is_none()) {
+            return Err(self.refusal(model));
+        }
+        context.progress.show(format!("node {}: looking for its reference", self.node));
+        let options = HomingOptions { speed: self.profile_velocity, limit: self.within, wait: !self.no_wait };
+        let motion = drive.home(self.method, options).await?;
+        outcome(context, &drive, format!("home with method {}", self.method), motion, None).await
     }
 
     fn refusal(&self, model: &DriveProfile) -> Failure {
         let modes = model.modes.iter().map(|mode| format!("{} ({})", mode.0, mode)).collect::<Vec<_>>().join(", ");
-        let failure = Failure::new(format!("node {}: no homing with method {}", self.node, self.method));
-        if model.modes.contains(&ModeOfOperation::HOMING) {
-            return failure.because(format!("homing the {} from here is not supported", model.title));
-        }
-        failure
-            .because(format!("the {} has no homing: 6060h takes {modes} only, and there is no 6098h", model.title))
+        let mode = ModeOfOperation::HOMING;
+        Failure::new(format!("node {}: no homing with method {}", self.node, self.method))
+            .because(format!("the {} has no homing: 6060h takes {modes} only, not {}", model.title, mode.0))
             .next(format!(
-                "move it to its reference, then set the position to zero there: ferrodrive write {} 2006 1",
-                self.node
+                "move it to its reference, then set the position to zero there: ferrodrive objects {} position",
+                model.model
             ))
     }
 }
@@ -47,8 +68,14 @@ mod tests {
 
     #[test]
     fn the_refusal_names_the_modes_there_are() {
-        let home = Home { node: NodeId::MAX, method: 17 };
+        let home = Home {
+            node: NodeId::MAX,
+            method: 17,
+            profile_velocity: None,
+            within: Duration::from_secs(60),
+            no_wait: false,
+        };
         let text = home.refusal(crate::models::find("zlac8030l").unwrap()).to_string();
-        assert!(text.contains("6060h takes 1") && text.contains("write 127 2006 1"), "{text}");
+        assert!(text.contains("6060h takes 1") && text.contains("objects zlac8030l position"), "{text}");
     }
 }

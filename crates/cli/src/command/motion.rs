@@ -91,7 +91,7 @@ struct RampArgs {
     no_wait: bool,
 }
 
-fn speed(text: &str) -> Result<Rpm, String> {
+pub(super) fn speed(text: &str) -> Result<Rpm, String> {
     match text.parse::<Rpm>() {
         Ok(Rpm(rpm)) if rpm > 0.0 => Ok(Rpm(rpm)),
         Ok(_) => Err("a profile velocity is more than zero, e.g. 60rpm; the target gives the direction".into()),
@@ -165,7 +165,7 @@ impl RampArgs {
 }
 
 /// Reads what came of a motion, and ends it after `duration`, if there is one.
-async fn outcome(
+pub(super) async fn outcome(
     context: &Context,
     drive: &Drive,
     asked: String,

@@ -16,7 +16,7 @@ use crate::table::Table;
 /// List the object dictionary of a model or of a node
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  ferrodrive objects zlac8030l\n  ferrodrive objects 4 velocity\n  ferrodrive objects zlac8030l 2026"
+    after_help = "Examples:\n  ferrodrive objects zlac8030l\n  ferrodrive objects 4 velocity\n  ferrodrive objects zlim42c homing"
 )]
 pub(crate) struct Objects {
     /// Model (e.g. zlac8030l) or node-ID
@@ -171,7 +171,7 @@ mod tests {
 
     fn found(words: &[&str]) -> Vec<&'static str> {
         let search = words.iter().map(|word| (*word).into()).collect();
-        let list = Objects { whose: Whose::Model(EMBEDDED[0]), search }.list(EMBEDDED[0]);
+        let list = Objects { whose: Whose::Model(EMBEDDED[0].0), search }.list(EMBEDDED[0].0);
         list.map(|list| list.objects.iter().map(|row| row.name).collect()).unwrap_or_default()
     }
 

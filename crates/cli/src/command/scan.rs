@@ -12,7 +12,8 @@ use crate::table::Table;
 
 /// Show who is on the bus
 ///
-/// Asks all 127 node-IDs for their device type and identity. A node in the state stopped answers no SDO; it is listed if it
+/// Asks all 127 node-IDs for their device type and identity. Models of one maker may say the same of themselves and have
+/// the same objects: say which a node is with --model NODE=MODEL, or in a machine file. A node in the state stopped answers no SDO; it is listed if it
 /// sends a heartbeat.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Scan {}
@@ -69,8 +70,16 @@ impl Node {
             vendor_id: identity.vendor_id,
             product_code: identity.product_code,
             revision_number: identity.revision_number,
-            remark: found.doubt().filter(|_| told.is_none()),
+            remark: found.doubt().filter(|_| told.is_none()).map(|doubt| remark(found, doubt)),
         }
+    }
+}
+
+/// What cannot be told, and what the user can do about it.
+fn remark(found: &Found, doubt: String) -> String {
+    match found.models[..] {
+        [first, _, ..] => format!("{doubt}, e.g. --model {}={}", found.node, first.model),
+        _ => doubt,
     }
 }
 

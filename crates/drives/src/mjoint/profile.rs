@@ -2,13 +2,15 @@
 
 use can::Bitrate;
 use canopen::Mux;
-use cia402::ModeOfOperation;
+use cia402::{ModeOfOperation, Statusword};
 
 use super::alarms::ALARMS;
 use super::objects::TABLE;
 use super::readings::COUNTS_PER_TURN;
+use super::statusword::{HOMING_ATTAINED, HOMING_ERROR, LIVE};
 use crate::profile::{
-    CountsPerTurn, DriveProfile, Faults, Identity, ParameterStorage, PdoRules, Quantity, Quirk, Ramps, Units, Write,
+    BitPattern, CountsPerTurn, DriveProfile, Faults, HomingRules, HomingStart, Identity, ParameterStorage, PdoRules,
+    PowerStyle, Quantity, Quirk, Ramps, Units, Write,
 };
 
 /// The M4230E17B50.
@@ -26,6 +28,8 @@ const fn joint(model: &'static str, title: &'static str) -> DriveProfile {
         title,
         manual: "M Robot Joint Motor CanOpen Manual",
         identity: Identity { device_type: 0x0002_0192, vendor_id: 0x331, product_code: 1, revision_number: 0x100 },
+        // The four models of the identity have the same objects.
+        hallmark: None,
         table: &TABLE,
         node_id: 1,
         bitrate: Bitrate::M1,
@@ -35,6 +39,11 @@ const fn joint(model: &'static str, title: &'static str) -> DriveProfile {
             ModeOfOperation::HOMING,
             ModeOfOperation::INTERPOLATED_POSITION,
         ],
+        mode_display: Mux::new(0x6060, 0),
+        power: PowerStyle::Mirror { following: 0b10_0111, live: LIVE, alarm: Statusword::FAULT },
+        statusword_bits: STATUSWORD_BITS,
+        homing: Some(HOMING),
+        host_watchdog: None,
         units: UNITS,
         storage: ParameterStorage {
             save: Write { object: Mux::new(0x2614, 0), value: 1 },
@@ -55,6 +64,26 @@ const fn joint(model: &'static str, title: &'static str) -> DriveProfile {
 }
 
 const AFTER_RESTART: &[Mux] = &[Mux::new(0x2615, 0), Mux::new(0x2619, 0)];
+
+/// Bits of 5.04 as the examples show them.
+const STATUSWORD_BITS: &[(u16, &str)] = &[
+    (0b11, "follows its host"),
+    (1 << 2, "output enabled"),
+    (Statusword::FAULT, "alarm"),
+    (LIVE, "power stage live"),
+    (1 << 5, "no quick stop"),
+    (Statusword::TARGET_REACHED, "target reached"),
+    (HOMING_ATTAINED, "homing attained"),
+    (HOMING_ERROR, "homing error"),
+];
+
+const HOMING: HomingRules = HomingRules {
+    method: Mux::new(0x6098, 0),
+    search_speed: None,
+    start: HomingStart::ModeWrite,
+    attained: BitPattern { mask: HOMING_ATTAINED | HOMING_ERROR, value: HOMING_ATTAINED },
+    failed: BitPattern { mask: HOMING_ATTAINED | HOMING_ERROR, value: HOMING_ERROR },
+};
 
 const UNITS: Units = Units {
     counts_per_turn: CountsPerTurn::Fixed(COUNTS_PER_TURN),

@@ -7,7 +7,8 @@ use cia402::ModeOfOperation;
 use super::faults::FAULTS;
 use super::objects::TABLE;
 use crate::profile::{
-    CountsPerTurn, DriveProfile, Faults, Identity, ParameterStorage, PdoRules, Quantity, Quirk, Ramps, Units, Write,
+    CountsPerTurn, DriveProfile, Faults, Identity, ParameterStorage, PdoRules, PowerStyle, Quantity, Quirk, Ramps,
+    Units, Write,
 };
 
 /// The ZLAC8030L V2.0.
@@ -16,10 +17,17 @@ pub static PROFILE: DriveProfile = DriveProfile {
     title: "ZLTECH ZLAC8030L V2.0",
     manual: "ZLAC8030L quick start guide V1.00",
     identity: Identity { device_type: 0x0004_0192, vendor_id: 0x100, product_code: 1, revision_number: 0 },
+    // The ZLIM42-C, of the same identity, has its bus voltage in 2069h.
+    hallmark: Some(Mux::new(0x2029, 0)),
     table: &TABLE,
     node_id: 4,
     bitrate: Bitrate::K500,
     modes: &[ModeOfOperation::PROFILE_POSITION, ModeOfOperation::PROFILE_VELOCITY, ModeOfOperation::PROFILE_TORQUE],
+    mode_display: Mux::new(0x6061, 0),
+    power: PowerStyle::Cia402,
+    statusword_bits: &[],
+    homing: None,
+    host_watchdog: Some(Mux::new(0x2000, 0)),
     units: Units {
         counts_per_turn: CountsPerTurn::Object { object: Mux::new(0x200B, 0), factor: 4, default: 1024 },
         target_velocity: Quantity::new(0x60FF, 0, 1.0).divided_by(0x202F, 5),

@@ -2,13 +2,15 @@
 
 use can::Bitrate;
 use canopen::Mux;
-use cia402::ModeOfOperation;
+use cia402::{ModeOfOperation, Statusword};
 
 use super::faults::FAULTS;
 use super::objects::TABLE;
+use super::statusword::{ENERGISED, HOMING_ATTAINED, RUNNING};
 use super::tables::PULSES_PER_TURN;
 use crate::profile::{
-    CountsPerTurn, DriveProfile, Faults, Identity, ParameterStorage, PdoRules, Quantity, Quirk, Ramps, Units, Write,
+    BitPattern, CountsPerTurn, DriveProfile, Faults, HomingRules, HomingStart, Identity, ParameterStorage, PdoRules,
+    PowerStyle, Quantity, Quirk, Ramps, Units, Write,
 };
 
 /// The ZLIM42-C of 70 mm.
@@ -24,10 +26,17 @@ const fn profile(model: &'static str, title: &'static str) -> DriveProfile {
         manual: "ZLIM42-C user manual V1.03",
         // The same as the ZLAC8030L, whose objects have other meanings.
         identity: Identity { device_type: 0x0004_0192, vendor_id: 0x100, product_code: 1, revision_number: 0 },
+        // The ZLAC8030L has its bus voltage in 2029h.
+        hallmark: Some(Mux::new(0x2069, 0)),
         table: &TABLE,
         node_id: 1,
         bitrate: Bitrate::K500,
         modes: &[ModeOfOperation::PROFILE_POSITION, ModeOfOperation::PROFILE_VELOCITY, ModeOfOperation::HOMING],
+        mode_display: Mux::new(0x6061, 0),
+        power: PowerStyle::Cia402,
+        statusword_bits: &[(HOMING_ATTAINED, "homing attained"), (ENERGISED, "energised"), (RUNNING, "running")],
+        homing: Some(HOMING),
+        host_watchdog: None,
         units: UNITS,
         storage: ParameterStorage {
             save: Write { object: Mux::new(0x2010, 0), value: 2 },
@@ -46,6 +55,17 @@ const fn profile(model: &'static str, title: &'static str) -> DriveProfile {
         quirks: QUIRKS,
     }
 }
+
+/// Bits of 5.3.6: at the end 10 is on and 14 off, and 8 tells whether the home position was found.
+const AT_THE_END: u16 = HOMING_ATTAINED | Statusword::TARGET_REACHED | RUNNING;
+
+const HOMING: HomingRules = HomingRules {
+    method: Mux::new(0x6098, 0),
+    search_speed: Some(Quantity::new(0x6099, 1, 1.0)),
+    start: HomingStart::ControlwordBit4,
+    attained: BitPattern { mask: AT_THE_END, value: HOMING_ATTAINED | Statusword::TARGET_REACHED },
+    failed: BitPattern { mask: AT_THE_END, value: Statusword::TARGET_REACHED },
+};
 
 const UNITS: Units = Units {
     counts_per_turn: CountsPerTurn::Table { object: Mux::new(0x2006, 0), counts: &PULSES_PER_TURN, default: 10 },

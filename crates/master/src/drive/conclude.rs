@@ -1,15 +1,16 @@
 //! From facts to a conclusion: the one place that decides what an explanation says.
 
-use cia402::{PowerState, Statusword};
+use cia402::PowerState;
 use drives::engine::faults::FaultRow;
+use drives::profile::PowerStyle;
 
 use super::explain::{Fact, Trigger};
 use crate::error::Error;
 
 /// What follows from the facts, and what to do.
-pub(super) fn conclude(trigger: &Trigger, facts: &[Fact]) -> (String, String) {
-    let statusword = facts.iter().find_map(|fact| if let Fact::Statusword(word) = fact { Some(*word) } else { None });
-    let state = statusword.and_then(Statusword::state);
+pub(super) fn conclude(trigger: &Trigger, facts: &[Fact], style: PowerStyle) -> (String, String) {
+    let seen = facts.iter().find_map(|fact| if let Fact::Statusword(_, state) = fact { Some(*state) } else { None });
+    let state = seen.flatten();
     let faults = facts.iter().find_map(|fact| match fact {
         Fact::FaultCode(code, rows) if *code != 0 => Some((*code, rows.as_slice())),
         _ => None,
@@ -17,7 +18,9 @@ pub(super) fn conclude(trigger: &Trigger, facts: &[Fact]) -> (String, String) {
     if let Trigger::Silent(error) = trigger {
         return silent(error);
     }
-    if let (Some(PowerState::Fault | PowerState::FaultReactionActive), Some((code, rows))) = (state, faults) {
+    // A drive without the state machine has alarms that stop it and leave it enabled.
+    let at_fault = matches!(state, Some(PowerState::Fault | PowerState::FaultReactionActive));
+    if let Some((code, rows)) = faults.filter(|_| at_fault || style != PowerStyle::Cia402) {
         return faulted(code, rows);
     }
     match (trigger, state) {
@@ -34,7 +37,7 @@ pub(super) fn conclude(trigger: &Trigger, facts: &[Fact]) -> (String, String) {
             "Find out who else commands it (another master, an RPDO, the enable input), or whether its supply dipped"
                 .to_owned(),
         ),
-        (_, None) if statusword.is_some() => text(
+        (_, None) if seen.is_some() => text(
             "Its statusword shows none of the states of CiA 402",
             "Check that the node is the drive model that it is taken for",
         ),
@@ -66,6 +69,18 @@ fn by_trigger(trigger: &Trigger) -> (String, String) {
         Trigger::NoAcknowledge => text(
             "The drive did not acknowledge the set-point (statusword bit 12)",
             "An earlier set-point may still be waiting to be run: stop the drive, then move again",
+        ),
+        Trigger::NotHome { at, waited } => (
+            format!("After {:.1} s it is at {at:.0} counts and still looks for its reference", waited.as_secs_f64()),
+            "Check that the method's switch is wired, that its input is set to that function, and which way the method \
+             looks for it; a long way takes a longer time limit"
+                .to_owned(),
+        ),
+        Trigger::HomingFailed(method) => (
+            format!("The drive ended homing with method {method} and has not found its reference"),
+            "Check that the method's switch is wired, that its input is set to that function, and that it lies in the \
+             direction in which the method looks for it"
+                .to_owned(),
         ),
         Trigger::Late { at, target, unit, waited } => (
             format!(

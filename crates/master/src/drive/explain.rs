@@ -3,12 +3,12 @@ use std::time::Duration;
 
 use canopen::emcy::Emcy;
 use canopen::{NmtState, NodeId};
-use cia402::{ModeOfOperation, PowerCommand, Statusword};
+use cia402::{ModeOfOperation, PowerCommand, PowerState, Statusword};
 use drives::engine::faults::FaultRow;
 use drives::profile::DriveProfile;
 
 use super::conclude::conclude;
-use super::{Drive, ERROR_CODE, MODE, MODE_DISPLAY};
+use super::{Drive, ERROR_CODE, MODE};
 use crate::decode::emcy_words;
 use crate::error::Error;
 use crate::units::Volts;
@@ -31,8 +31,8 @@ pub struct Explanation {
 /// One thing seen.
 #[derive(Clone, Debug)]
 pub enum Fact {
-    /// 6041h.
-    Statusword(Statusword),
+    /// 6041h, and the state that it shows.
+    Statusword(Statusword, Option<PowerState>),
     /// The model's fault code, with what its bits mean.
     FaultCode(u16, Vec<&'static FaultRow>),
     /// 6060h and 6061h.
@@ -68,6 +68,10 @@ pub(super) enum Trigger {
     NoAcknowledge,
     /// The target was not reached in the time it should take: where it is, where it should be, in `unit`.
     Late { at: f64, target: f64, unit: &'static str, waited: Duration },
+    /// Homing has not ended in the time given to it; position in counts.
+    NotHome { at: f64, waited: Duration },
+    /// Homing ended without a home position.
+    HomingFailed(i8),
     /// It stopped answering.
     Silent(Error),
 }
@@ -88,7 +92,7 @@ impl Drive {
             self.ask(&mut facts).await;
         }
         self.recall(&mut facts);
-        let (conclusion, advice) = conclude(&trigger, &facts);
+        let (conclusion, advice) = conclude(&trigger, &facts, self.power_style());
         Error::NotReached(Box::new(Explanation { node: self.node.id(), intent, facts, conclusion, advice }))
     }
 
@@ -103,7 +107,7 @@ impl Drive {
     /// Facts that the drive is asked for. The first silence ends the asking.
     async fn ask(&self, facts: &mut Vec<Fact>) {
         match self.statusword().await {
-            Ok(statusword) => facts.push(Fact::Statusword(statusword)),
+            Ok(statusword) => facts.push(Fact::Statusword(statusword, self.power_state(statusword))),
             Err(error) => return facts.push(Fact::Failed(Box::new(error))),
         }
         let code = self.profile.map_or(ERROR_CODE, |profile| profile.faults.code);
@@ -111,9 +115,8 @@ impl Drive {
             let code = payload.raw() as u16;
             facts.push(Fact::FaultCode(code, self.profile.map(|profile| faults_in(profile, code)).unwrap_or_default()));
         }
-        let (wanted, shown) = (self.node.read::<i8>(MODE).await, self.node.read::<i8>(MODE_DISPLAY).await);
-        if let (Ok(wanted), Ok(shown)) = (wanted, shown) {
-            facts.push(Fact::Mode(ModeOfOperation(wanted), ModeOfOperation(shown)));
+        if let (Ok(wanted), Ok(shown)) = (self.node.read::<i8>(MODE).await, self.mode().await) {
+            facts.push(Fact::Mode(ModeOfOperation(wanted), shown));
         }
         if let Some(voltage) = self.profile.and_then(|profile| profile.units.bus_voltage)
             && let Ok(volts) = self.read_quantity(voltage).await
@@ -149,7 +152,8 @@ impl fmt::Display for Explanation {
 impl fmt::Display for Fact {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Statusword(word) => write!(f, "statusword {word}"),
+            Self::Statusword(word, Some(state)) => write!(f, "statusword {:04X}h ({})", word.0, state.name()),
+            Self::Statusword(word, None) => write!(f, "statusword {word}"),
             Self::FaultCode(0, _) => f.write_str("no fault code"),
             Self::FaultCode(code, rows) => {
                 write!(f, "fault code {code:04X}h")?;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use cia402::{PowerState, Statusword};
-use drives::profile::Quantity;
+use drives::profile::{HomingRules, Quantity};
 
 use super::explain::Trigger;
 use super::{Drive, POLL, POSITION_ACTUAL};
@@ -17,12 +17,32 @@ pub(super) enum Goal {
     /// A position, by statusword bit 10. The bit is believed where the shaft is near the target, and everywhere once
     /// it was seen clear: one left over from the move before says reached while the shaft is elsewhere.
     Position { target: i64, band: f64, seen_clear: bool },
+    /// The home position, by the model's bits of the statusword. They are believed some time after the start: until
+    /// then they may be those of the run before.
+    Home { rules: HomingRules, method: i8, looks: u8 },
 }
+
+/// How often the drive is looked at before its verdict on homing is believed: 50 ms, many cycles of any drive.
+const LOOKS_BEFORE_VERDICT: u8 = 5;
 
 impl Goal {
     /// Whether it is reached, and where the drive is.
-    async fn look(&mut self, drive: &Drive, statusword: Statusword) -> Result<(bool, f64), Error> {
+    async fn look(
+        &mut self,
+        drive: &Drive,
+        intent: &'static str,
+        statusword: Statusword,
+    ) -> Result<(bool, f64), Error> {
         match self {
+            Self::Home { rules, method, looks } => {
+                *looks = looks.saturating_add(1);
+                let settled = *looks > LOOKS_BEFORE_VERDICT;
+                if settled && rules.failed.matches(statusword) {
+                    return Err(drive.not_reached(intent, Trigger::HomingFailed(*method)).await);
+                }
+                let at = drive.read_number(POSITION_ACTUAL).await?;
+                Ok((settled && rules.attained.matches(statusword), at as f64))
+            }
             Self::Speed { quantity, target_rpm, band_rpm } => {
                 let speed = drive.read_quantity(*quantity).await?;
                 Ok(((speed - *target_rpm).abs() <= *band_rpm, speed))
@@ -40,6 +60,7 @@ impl Goal {
 
     fn late(&self, at: f64, waited: Duration) -> Trigger {
         let (target, unit) = match self {
+            Self::Home { .. } => return Trigger::NotHome { at, waited },
             Self::Speed { target_rpm, .. } => (*target_rpm, "r/min"),
             Self::Position { target, .. } => (*target as f64, "counts"),
         };
@@ -54,7 +75,7 @@ impl Drive {
         let began = network.now();
         loop {
             let statusword = self.still_enabled(intent).await?;
-            let (reached, at) = self.answered(intent, goal.look(self, statusword).await).await?;
+            let (reached, at) = self.answered(intent, goal.look(self, intent, statusword).await).await?;
             let waited = network.now() - began;
             if reached {
                 return Ok(waited);
@@ -69,7 +90,7 @@ impl Drive {
     /// The statusword, if the drive still follows set-points.
     pub(super) async fn still_enabled(&self, intent: &'static str) -> Result<Statusword, Error> {
         let statusword = self.answered(intent, self.statusword().await).await?;
-        match statusword.state() {
+        match self.power_state(statusword) {
             Some(PowerState::OperationEnabled) => Ok(statusword),
             Some(PowerState::Fault | PowerState::FaultReactionActive) => {
                 Err(self.not_reached(intent, Trigger::Fault).await)

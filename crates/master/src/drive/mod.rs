@@ -1,13 +1,15 @@
 //! A CiA 402 drive by its intents, in physical units.
 //!
 //! In: what a person wants ("turn 90 degrees at 30 r/min"). Out: SDO requests to the node in the order that CiA 402-2
-//! and the model's manual ask for, and either success or an [`Explanation`]. What a model's raw values are worth comes
-//! from its [`DriveProfile`]; 6502h is never asked for. Without a profile only what the standard fixes is offered.
+//! and the model's manual ask for, and either success or an [`Explanation`]. What a model's raw values are worth, and
+//! where it departs from the standard, comes from its [`DriveProfile`]; no model is known here by its name, and 6502h is
+//! never asked for. Without a profile only what the standard fixes is offered.
 //! While a motion is supervised, the polling keeps the drive's watch over its host content.
 
 mod conclude;
 mod explain;
 mod goal;
+mod homing;
 mod motion;
 mod position;
 mod power;
@@ -20,13 +22,14 @@ use std::time::Duration;
 
 use canopen::Mux;
 use canopen::od::Entry;
-use cia402::{Controlword, ModeOfOperation, Statusword};
-use drives::profile::DriveProfile;
+use cia402::{Controlword, ModeOfOperation, PowerState, Statusword};
+use drives::profile::{DriveProfile, PowerStyle};
 
 use crate::error::{Access, Error};
 use crate::network::Node;
 
 pub use explain::{Explanation, Fact, faults_in};
+pub use homing::HomingOptions;
 pub use motion::{MotionOptions, MotionReport, Note};
 pub use safety::StopGuard;
 pub use state::DriveState;
@@ -81,17 +84,24 @@ impl Drive {
         self.profile
     }
 
-    /// Checks that the node says it is this model.
+    /// Checks that the node says it is this model, and has the object that tells it from others that say so too.
     ///
     /// # Errors
-    /// [`Error::WrongModel`] when its device type or vendor differ; those of the SDO reads.
+    /// [`Error::WrongModel`] when its device type or vendor differ, [`Error::OtherModel`] when it lacks that object;
+    /// those of the SDO reads.
     pub async fn check_identity(&self) -> Result<(), Error> {
         let profile = self.known("compare its identity")?;
+        let (node, model) = (self.node.id(), profile.title);
         let found = crate::identify::identity(&self.node).await?;
-        if found.matches(&profile.identity) {
-            return Ok(());
+        if !found.matches(&profile.identity) {
+            return Err(Error::WrongModel { node, model, found });
         }
-        Err(Error::WrongModel { node: self.node.id(), model: profile.title, found })
+        let Some(hallmark) = profile.hallmark else { return Ok(()) };
+        match self.node.upload(hallmark).await {
+            Ok(_) => Ok(()),
+            Err(Error::Aborted { .. }) => Err(Error::OtherModel { node, model, hallmark }),
+            Err(error) => Err(error),
+        }
     }
 
     /// The statusword.
@@ -102,22 +112,37 @@ impl Drive {
         self.node.read::<u16>(STATUSWORD).await.map(Statusword)
     }
 
+    /// The power state that a statusword of this model shows.
+    fn power_state(&self, statusword: Statusword) -> Option<PowerState> {
+        self.power_style().state(statusword)
+    }
+
+    fn power_style(&self) -> PowerStyle {
+        self.profile.map_or(PowerStyle::Cia402, |profile| profile.power)
+    }
+
+    /// The mode that the drive is in.
+    async fn mode(&self) -> Result<ModeOfOperation, Error> {
+        let display = self.profile.map_or(MODE_DISPLAY, |profile| profile.mode_display);
+        self.node.read::<i8>(display).await.map(ModeOfOperation)
+    }
+
     async fn write_controlword(&self, controlword: Controlword) -> Result<(), Error> {
         self.node.write(CONTROLWORD, controlword.0).await
     }
 
-    /// Sets 6060h and waits until 6061h shows it.
+    /// Sets 6060h and waits until the drive shows it.
     async fn set_mode(&self, mode: ModeOfOperation) -> Result<(), Error> {
         let profile = self.known("set its mode")?;
         if !profile.modes.contains(&mode) {
             return Err(Error::NoSuchMode { node: self.node.id(), model: profile.title, mode });
         }
-        if self.node.read::<i8>(MODE_DISPLAY).await? == mode.0 {
+        if self.mode().await? == mode {
             return Ok(());
         }
         self.node.write(MODE, mode.0).await?;
         let mut waited = Duration::ZERO;
-        while self.node.read::<i8>(MODE_DISPLAY).await? != mode.0 {
+        while self.mode().await? != mode {
             if waited >= STEP_TIMEOUT {
                 return Err(self.not_reached("change its mode", explain::Trigger::Mode(mode)).await);
             }

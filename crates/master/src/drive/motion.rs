@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use canopen::Mux;
 use cia402::{Controlword, ModeOfOperation, PowerState};
-use drives::profile::Quirk;
 
 use super::goal::Goal;
 use super::{CONTROLWORD, Drive};
@@ -75,9 +74,6 @@ const REACHED_LEAST_RPM: f64 = 2.0;
 pub(super) const LATE_FACTOR: f64 = 1.5;
 pub(super) const LATE_MARGIN_S: f64 = 2.0;
 
-/// The host watchdog of the ZL drives ("ZLAC8030L quick start guide V1.00", chapter 9, 2000h).
-const HOST_WATCHDOG: Mux = Mux::new(0x2000, 0);
-
 impl Drive {
     /// Turns at this speed (profile velocity) until told otherwise. Enables the drive first.
     ///
@@ -139,8 +135,8 @@ impl Drive {
     pub async fn stop(&self) -> Result<(), Error> {
         const INTENT: &str = "stop it";
         let units = self.known(INTENT)?.units;
-        if self.statusword().await?.state() == Some(PowerState::OperationEnabled) {
-            match ModeOfOperation(self.node.read::<i8>(super::MODE_DISPLAY).await?) {
+        if self.power_state(self.statusword().await?) == Some(PowerState::OperationEnabled) {
+            match self.mode().await? {
                 ModeOfOperation::PROFILE_VELOCITY => self.write_number(units.target_velocity.object, 0).await?,
                 ModeOfOperation::PROFILE_TORQUE => {
                     if let Some(current) = units.target_current {
@@ -170,21 +166,16 @@ impl Drive {
     }
 
     /// Takes a halt bit back that an earlier stop has left, now that the target is the new one.
-    async fn release_halt(&self) -> Result<(), Error> {
+    pub(super) async fn release_halt(&self) -> Result<(), Error> {
         // A controlword that cannot be read has no halt that this master could know of.
         let halted = self.node.read::<u16>(CONTROLWORD).await.is_ok_and(|raw| Controlword(raw).has(Controlword::HALT));
         if halted { self.write_controlword(Controlword(0x0F)).await } else { Ok(()) }
     }
 
     pub(super) async fn notes(&self) -> Vec<Note> {
-        let watches = self.profile.is_some_and(|profile| profile.quirks.contains(&Quirk::HostWatchdogOnByDefault));
-        if !watches {
-            return Vec::new();
-        }
-        match self.read_number(HOST_WATCHDOG).await {
-            Ok(ms) if ms > 0 => {
-                vec![Note::HostWatchdog { object: HOST_WATCHDOG, time: Duration::from_millis(ms as u64) }]
-            }
+        let Some(object) = self.profile.and_then(|profile| profile.host_watchdog) else { return Vec::new() };
+        match self.read_number(object).await {
+            Ok(ms) if ms > 0 => vec![Note::HostWatchdog { object, time: Duration::from_millis(ms as u64) }],
             _ => Vec::new(),
         }
     }

@@ -4,6 +4,7 @@
 use std::time::Duration;
 
 use cia402::{Controlword, ModeOfOperation, Statusword};
+use drives::profile::Quirk;
 
 use super::explain::Trigger;
 use super::goal::Goal;
@@ -67,17 +68,25 @@ impl Drive {
 
     /// Target into 607Ah, then a rising edge of bit 4, acknowledged by statusword bit 12, and bit 4 back.
     ///
-    /// A drive left halted gets the new set-point in place of the one it was halted in, not after it.
+    /// A drive left halted gets the new set-point in place of the one it was halted in, not after it. A drive that acts
+    /// on each write of bit 4 acknowledges nothing, and takes every set-point in place of the one before.
     async fn give_set_point(&self, intent: &'static str, counts: i64, relative: bool) -> Result<(), Error> {
         let before = self.node.read::<u16>(CONTROLWORD).await.map_or(Controlword(ENABLED), Controlword);
         let halted = before.has(Controlword::HALT);
-        let (held, replace) = if halted { (Controlword::HALT, Controlword::CHANGE_SET_IMMEDIATELY) } else { (0, 0) };
+        let self_clearing = self.known(intent)?.quirks.contains(&Quirk::NewSetPointClearsItself);
+        let held = if halted { Controlword::HALT } else { 0 };
+        let replace = if halted && !self_clearing { Controlword::CHANGE_SET_IMMEDIATELY } else { 0 };
         let kind = ENABLED | if relative { Controlword::RELATIVE } else { 0 };
         self.write_controlword(Controlword(kind | held)).await?;
-        self.wait_acknowledge(intent, false).await?;
+        if !self_clearing {
+            self.wait_acknowledge(intent, false).await?;
+        }
         self.write_number(TARGET_POSITION, counts).await?;
         self.node.network().note_moved(self.node.id());
         self.write_controlword(Controlword(kind | replace | Controlword::NEW_SET_POINT)).await?;
+        if self_clearing {
+            return Ok(());
+        }
         self.wait_acknowledge(intent, true).await?;
         self.write_controlword(Controlword(kind)).await
     }

@@ -1,17 +1,19 @@
 use std::time::Duration;
 
 use cia402::{Controlword, ModeOfOperation, PowerCommand, PowerState, Statusword, next_command};
+use drives::profile::{HomingStart, PowerStyle};
 
 use super::explain::Trigger;
-use super::{Drive, MODE_DISPLAY, POLL, STEP_TIMEOUT};
+use super::{Drive, MODE, POLL, STEP_TIMEOUT};
 use crate::error::Error;
 
 /// Speed below which a shaft counts as standing still: the rounding of the coarsest velocity object.
 pub(super) const STANDSTILL_RPM: f64 = 1.0;
 
-/// The power drive state machine. Source: CiA 402-2, 8.2.
+/// The power drive state machine (CiA 402-2, 8.2), and what stands in its place on drives without one.
 impl Drive {
-    /// Brings the drive to Operation enabled, one step of the state machine at a time.
+    /// Brings the drive to Operation enabled, one step of the state machine at a time, or in one step where there is no
+    /// state machine.
     ///
     /// A speed or torque left over from before is set to zero first: some drives follow it at once. A fault is
     /// not reset by itself: its cause comes first.
@@ -21,6 +23,9 @@ impl Drive {
     pub async fn enable(&self) -> Result<(), Error> {
         const INTENT: &str = "enable it";
         let mut statusword = self.answered(INTENT, self.statusword().await).await?;
+        if self.power_style() != PowerStyle::Cia402 {
+            return self.enable_mirrored(INTENT, statusword).await;
+        }
         if statusword.state() != Some(PowerState::OperationEnabled) {
             self.clear_targets().await?;
         }
@@ -42,21 +47,42 @@ impl Drive {
         }
     }
 
+    /// A drive that mirrors its controlword: the statusword does not show bit 3, so the controlword is looked at too.
+    async fn enable_mirrored(&self, intent: &'static str, statusword: Statusword) -> Result<(), Error> {
+        let command = PowerCommand::EnableOperation;
+        let follows = self.power_state(statusword) == Some(PowerState::OperationEnabled);
+        let present = self.node.read::<u16>(super::CONTROLWORD).await.map(Controlword)?;
+        if follows && present.command() == command {
+            return Ok(());
+        }
+        self.leave_homing().await?;
+        self.clear_targets().await?;
+        self.write_controlword(command.controlword()).await?;
+        let enabled = |state| state == PowerState::OperationEnabled;
+        let result = self.wait_for(intent, command, STEP_TIMEOUT, enabled).await.map(drop);
+        if result.is_err() {
+            // Or it would take the motor over as soon as its alarm is reset.
+            self.write_controlword(PowerCommand::DisableVoltage.controlword()).await?;
+        }
+        result
+    }
+
     /// Stops by the drive's shutdown ramp and takes the power off the motor: Switch on disabled.
     ///
     /// # Errors
     /// [`Error::NotReached`]; those of the SDO requests.
     pub async fn disable(&self) -> Result<(), Error> {
         const INTENT: &str = "disable it";
-        if self.statusword().await?.state() == Some(PowerState::OperationEnabled) {
+        if self.power_state(self.statusword().await?) == Some(PowerState::OperationEnabled) {
             self.write_controlword(PowerCommand::Shutdown.controlword()).await?;
             self.wait_for(INTENT, PowerCommand::Shutdown, self.stop_time().await, |state| {
                 state != PowerState::OperationEnabled
             })
             .await?;
         }
-        if self.statusword().await?.state() != Some(PowerState::Fault) {
-            self.write_controlword(PowerCommand::DisableVoltage.controlword()).await?;
+        // A fault has taken the power off already; a drive that mirrors its controlword would act on an old one after it.
+        self.write_controlword(PowerCommand::DisableVoltage.controlword()).await?;
+        if self.power_state(self.statusword().await?) != Some(PowerState::Fault) {
             let command = PowerCommand::DisableVoltage;
             self.wait_for(INTENT, command, STEP_TIMEOUT, |state| state == PowerState::SwitchOnDisabled).await?;
         }
@@ -71,6 +97,7 @@ impl Drive {
     pub async fn quick_stop(&self) -> Result<(), Error> {
         const INTENT: &str = "quick-stop it";
         self.write_controlword(PowerCommand::QuickStop.controlword()).await?;
+        self.leave_homing().await?;
         let stopping = |state| state != PowerState::OperationEnabled;
         self.wait_for(INTENT, PowerCommand::QuickStop, STEP_TIMEOUT, stopping).await?;
         if self.profile.is_some() {
@@ -86,13 +113,13 @@ impl Drive {
     /// [`Error::NotReached`] with the fault's cause and remedy when it comes back.
     pub async fn reset_fault(&self) -> Result<(), Error> {
         const INTENT: &str = "reset its fault";
-        if self.statusword().await?.state() != Some(PowerState::Fault) {
+        if self.power_state(self.statusword().await?) != Some(PowerState::Fault) {
             return Ok(());
         }
         self.write_controlword(Controlword(0)).await?;
         self.write_controlword(PowerCommand::FaultReset.controlword()).await?;
         let mut waited = Duration::ZERO;
-        while self.answered(INTENT, self.statusword().await).await?.state() == Some(PowerState::Fault) {
+        while self.power_state(self.answered(INTENT, self.statusword().await).await?) == Some(PowerState::Fault) {
             if waited >= STEP_TIMEOUT {
                 return Err(self.not_reached(INTENT, Trigger::Fault).await);
             }
@@ -136,7 +163,7 @@ impl Drive {
         let mut waited = Duration::ZERO;
         loop {
             let statusword = self.answered(intent, self.statusword().await).await?;
-            if statusword.state().is_some_and(&arrived) {
+            if self.power_state(statusword).is_some_and(&arrived) {
                 return Ok(statusword);
             }
             if waited >= limit {
@@ -161,10 +188,20 @@ impl Drive {
         *waited += POLL;
     }
 
+    /// Ends homing where its mode alone keeps it going, whatever the controlword says.
+    async fn leave_homing(&self) -> Result<(), Error> {
+        let rules = self.profile.and_then(|profile| profile.homing);
+        let by_mode = rules.is_some_and(|rules| rules.start == HomingStart::ModeWrite);
+        if by_mode && self.mode().await? == ModeOfOperation::HOMING {
+            self.node.write(MODE, ModeOfOperation::PROFILE_POSITION.0).await?;
+        }
+        Ok(())
+    }
+
     /// Zeroes a target speed or torque left over.
     async fn clear_targets(&self) -> Result<(), Error> {
         let Some(profile) = self.profile else { return Ok(()) };
-        match ModeOfOperation(self.node.read::<i8>(MODE_DISPLAY).await?) {
+        match self.mode().await? {
             ModeOfOperation::PROFILE_VELOCITY => self.write_number(profile.units.target_velocity.object, 0).await,
             ModeOfOperation::PROFILE_TORQUE => match profile.units.target_current {
                 Some(current) => self.write_number(current.object, 0).await,

@@ -88,7 +88,7 @@ impl Drive {
             Ramps::Acceleration { both, none_from } => {
                 let rate = self.read_number(both).await?;
                 let none = rate >= i64::from(none_from);
-                let seconds = if none { 0.0 } else { LARGEST_CHANGE_RPM / rate.max(1) as f64 };
+                let seconds = if none { 0.0 } else { self.largest_change_rpm()? / rate.max(1) as f64 };
                 Ok((seconds, seconds))
             }
         }
@@ -103,13 +103,18 @@ impl Drive {
         }
     }
 
+    /// The largest change of speed that can be asked for, r/min: from one limit of the target velocity to the other.
+    fn largest_change_rpm(&self) -> Result<f64, Error> {
+        let target = self.known("read its limits")?.units.target_velocity;
+        let row = self.row(target.object, "read its limits")?;
+        let (low, high) = row.limits.unwrap_or(row.data_type.range());
+        Ok((high - low) as f64 * target.per_count)
+    }
+
     async fn seconds(&self, object: Mux) -> Result<f64, Error> {
         Ok(self.read_number(object).await? as f64 * 1e-3)
     }
 }
-
-/// The largest change of speed of a drive whose ramps are accelerations, r/min: from one limit of 60FFh to the other.
-const LARGEST_CHANGE_RPM: f64 = 6000.0;
 
 /// A ramp as an acceleration in (r/min)/s; a change without a ramp is `none_from`.
 fn ramp_rpm_s(ramp: Ramp, change_rpm: f64, none_from: u32) -> i64 {

@@ -3,10 +3,10 @@ use std::time::Duration;
 use canopen::NmtState;
 use cia402::{ModeOfOperation, PowerState, Statusword};
 use drives::engine::faults::FaultRow;
-use drives::profile::Quantity;
+use drives::profile::{PowerStyle, Quantity};
 
 use super::explain::faults_in;
-use super::{Drive, ERROR_CODE, MODE_DISPLAY, POSITION_ACTUAL};
+use super::{Drive, ERROR_CODE, POSITION_ACTUAL};
 use crate::error::Error;
 use crate::units::{Amperes, Celsius, Counts, Degrees, Rpm, Volts};
 
@@ -15,9 +15,13 @@ use crate::units::{Amperes, Celsius, Counts, Degrees, Rpm, Volts};
 pub struct DriveState {
     /// 6041h.
     pub statusword: Statusword,
-    /// The state it shows.
+    /// The state it shows; of a drive without the state machine, the one that comes closest.
     pub power: Option<PowerState>,
-    /// 6061h.
+    /// How its statusword is to be read.
+    pub style: PowerStyle,
+    /// Bits of the statusword of this model's own, in words.
+    pub own_bits: &'static [(u16, &'static str)],
+    /// 6061h, or 6060h of a drive without it.
     pub mode: Option<ModeOfOperation>,
     /// The model's fault code; 0 for none.
     pub fault_code: u16,
@@ -50,7 +54,7 @@ impl Drive {
     /// Those of the SDO reads. An object that this drive refuses is left out; silence is an error.
     pub async fn state(&self) -> Result<DriveState, Error> {
         let statusword = self.statusword().await?;
-        let mode = optional(self.node.read::<i8>(MODE_DISPLAY).await)?.map(ModeOfOperation);
+        let mode = optional(self.mode().await)?;
         let code = self.profile.map_or(ERROR_CODE, |profile| profile.faults.code);
         let fault_code = optional(self.node.upload(code).await)?.map_or(0, |payload| payload.raw() as u16);
         let faults = self.profile.map(|profile| faults_in(profile, fault_code)).unwrap_or_default();
@@ -66,7 +70,9 @@ impl Drive {
         let facts = self.node.facts();
         Ok(DriveState {
             statusword,
-            power: statusword.state(),
+            power: self.power_state(statusword),
+            style: self.power_style(),
+            own_bits: self.profile.map_or(&[], |profile| profile.statusword_bits),
             mode,
             fault_code,
             faults,
@@ -92,8 +98,12 @@ impl Drive {
 
 impl DriveState {
     /// The bits of the statusword that are set, in words. Bits 8 and 11 to 15 are told by their number where mode
-    /// or maker decide what they mean.
+    /// or maker decide what they mean, unless the model's profile says it.
     pub fn statusword_words(&self) -> Vec<&'static str> {
+        let own = self.own_bits.iter().filter(|(mask, _)| self.statusword.has(*mask)).map(|(_, name)| *name);
+        if self.style != PowerStyle::Cia402 {
+            return own.collect();
+        }
         let fixed: [(u16, &str); 9] = [
             (0x0001, "ready to switch on"),
             (0x0002, "switched on"),
@@ -119,8 +129,9 @@ impl DriveState {
             (0x4000, "bit 14"),
             (0x8000, "bit 15"),
         ];
-        let set = |(mask, _): &(u16, &str)| self.statusword.has(*mask);
-        let mut words: Vec<_> = fixed.into_iter().chain(open).filter(set).map(|(_, name)| name).collect();
+        let is_own = |mask| self.own_bits.iter().any(|(own, _)| *own == mask);
+        let set = |(mask, _): &(u16, &str)| self.statusword.has(*mask) && !is_own(*mask);
+        let mut words: Vec<_> = fixed.into_iter().chain(open).filter(set).map(|(_, name)| name).chain(own).collect();
         if self.power == Some(PowerState::QuickStopActive) {
             words.push("quick stop active");
         }

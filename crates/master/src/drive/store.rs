@@ -13,9 +13,11 @@ impl Drive {
     /// Stores all parameters.
     ///
     /// # Errors
-    /// [`Error::UnknownModel`]: what means "save" to one model may be anything to another. Those of the SDO write.
+    /// [`Error::UnknownModel`], [`Error::WrongModel`], [`Error::OtherModel`], and nothing is written: what means "save" to
+    /// one model may be anything to another of the same identity. Those of the SDO write.
     pub async fn save(&self) -> Result<(), Error> {
         let storage = self.known("save its parameters")?.storage;
+        self.check_identity().await?;
         self.command(storage.save).await
     }
 
@@ -27,6 +29,7 @@ impl Drive {
         let profile = self.known("restore its factory settings")?;
         let model = profile.title;
         let restore = profile.storage.restore.ok_or(Error::NoFactorySettings { node: self.node.id(), model })?;
+        self.check_identity().await?;
         self.command(restore).await
     }
 

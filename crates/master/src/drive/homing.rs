@@ -1,0 +1,92 @@
+//! Homing (CiA 402-2, clause 11), as each model starts it and tells its end.
+//!
+//! The way to the switch is not known, so the time that it may take is the caller's to say. Setting a model's inputs up
+//! as switches is not done here.
+
+use std::time::Duration;
+
+use cia402::{Controlword, ModeOfOperation};
+use drives::profile::{HomingRules, HomingStart};
+
+use super::goal::Goal;
+use super::motion::MotionReport;
+use super::{Drive, MODE};
+use crate::error::Error;
+use crate::units::Rpm;
+
+const ENABLED: u16 = 0x0F;
+
+/// How the reference position is to be found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HomingOptions {
+    /// Speed of the search, where the model has an object for it; else, and with `None`, as the drive has it.
+    pub speed: Option<Rpm>,
+    /// Longest time that it may take.
+    pub limit: Duration,
+    /// Wait until it is found, and watch the drive meanwhile.
+    pub wait: bool,
+}
+
+impl Default for HomingOptions {
+    fn default() -> Self {
+        Self { speed: None, limit: Duration::from_secs(60), wait: true }
+    }
+}
+
+impl Drive {
+    /// Finds the reference position with a homing method of CiA 402. Enables the drive first; leaves it in mode 6.
+    ///
+    /// A drive that does not find it in time is quick-stopped.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMode`] for a model without homing; [`Error::OutOfLimits`] for a method that it does not have, before
+    /// anything moves; [`Error::NotReached`] with an explanation; those of the requests.
+    pub async fn home(&self, method: i8, options: HomingOptions) -> Result<MotionReport, Error> {
+        const INTENT: &str = "find its reference position";
+        let profile = self.known(INTENT)?;
+        let (node, model, mode) = (self.node.id(), profile.title, ModeOfOperation::HOMING);
+        let rules = profile.homing.ok_or(Error::NoSuchMode { node, model, mode })?;
+        self.write_number(rules.method, method.into()).await?;
+        if let (Some(search), Some(Rpm(speed))) = (rules.search_speed, options.speed) {
+            let raw = self.raw_quantity(search, speed.abs()).await?;
+            self.write_number(search.object, raw).await?;
+        }
+        self.start_homing(&rules).await?;
+        let notes = self.notes().await;
+        if !options.wait {
+            return Ok(MotionReport { reached_after: None, notes });
+        }
+        let reached = match self.watch(INTENT, Goal::Home { rules, method, looks: 0 }, options.limit).await {
+            Err(error @ Error::NotReached(_)) => {
+                // What went wrong first is what matters, whatever becomes of the stop.
+                let _ = self.quick_stop().await;
+                return Err(error);
+            }
+            other => other?,
+        };
+        if rules.start == HomingStart::ControlwordBit4 {
+            self.write_controlword(Controlword(ENABLED)).await?;
+        }
+        self.node.network().note_stopped(node);
+        Ok(MotionReport { reached_after: Some(reached), notes })
+    }
+
+    async fn start_homing(&self, rules: &HomingRules) -> Result<(), Error> {
+        match rules.start {
+            HomingStart::ControlwordBit4 => {
+                self.set_mode(ModeOfOperation::HOMING).await?;
+                self.enable().await?;
+                // Bit 4, which has to rise, may be left over.
+                self.write_controlword(Controlword(ENABLED)).await?;
+                self.node.network().note_moved(self.node.id());
+                self.write_controlword(Controlword(ENABLED | Controlword::NEW_SET_POINT)).await
+            }
+            HomingStart::ModeWrite => {
+                self.enable().await?;
+                self.release_halt().await?;
+                self.node.network().note_moved(self.node.id());
+                self.node.write(MODE, ModeOfOperation::HOMING.0).await
+            }
+        }
+    }
+}

@@ -1,0 +1,329 @@
+//! The same intents on a servo, a joint and a stepper of three manuals, on one virtual bus.
+
+mod support;
+
+use std::time::Duration;
+
+use can::{Bitrate, Instant};
+use cia402::{ModeOfOperation, PowerState};
+use drives::mjoint::Model;
+use drives::profile::{DriveProfile, MODELS, PowerStyle, Quirk, model};
+use master::drive::{Fact, HomingOptions, MotionOptions, Note};
+use master::units::{Amperes, Degrees, Ramp, Rpm, Turns};
+use master::{Drive, Error, Network};
+use sim::machine::{mjoint, zlac8030l, zlim42c};
+use sim::{SwitchRange, World, block_on};
+use support::{mux, node};
+
+const JOINT: u8 = 1;
+const STEPPER: u8 = 2;
+const SERVO: u8 = 4;
+
+/// The value of the ZL drives' bit rate objects for 500 kbit/s.
+const K500: u16 = 1;
+
+fn bench() -> (World, Network, [Drive; 3]) {
+    let mut world = World::new(Bitrate::K500, 5);
+    let network = Network::new();
+    world.add_station(network.clone());
+    let joint = Model::named("m4230e17b50").unwrap();
+    world.add_drive(JOINT, Box::new(mjoint(joint, JOINT, Bitrate::K500))).unwrap();
+    world.add_drive(STEPPER, Box::new(zlim42c(STEPPER, K500))).unwrap();
+    world.add_drive(SERVO, Box::new(zlac8030l(SERVO, K500))).unwrap();
+    let drives = [(JOINT, "m4230e17b50"), (STEPPER, "zlim42c"), (SERVO, "zlac8030l")]
+        .map(|(id, name)| Drive::new(network.node(node(id)), model(name).unwrap()));
+    world.run_until(Instant::from_secs(2));
+    (world, network, drives)
+}
+
+fn id(drive: &Drive) -> u8 {
+    drive.node().id().raw()
+}
+
+fn slowly() -> MotionOptions {
+    let ramp = Some(Ramp::Time(Duration::from_millis(300)));
+    MotionOptions { speed: Some(Rpm(60.0)), acceleration: ramp, deceleration: ramp, ..MotionOptions::default() }
+}
+
+fn range(low: Option<i64>, high: Option<i64>) -> SwitchRange {
+    SwitchRange { low, high }
+}
+
+#[test]
+fn sixty_revolutions_a_minute_are_the_same_at_every_shaft() {
+    let (mut world, network, drives) = bench();
+    for drive in &drives {
+        for wanted in [60.0, -60.0] {
+            block_on(&mut world, drive.velocity(Rpm(wanted), slowly())).unwrap().unwrap();
+            block_on(&mut world, drive.supervise(Duration::from_secs(1))).unwrap().unwrap();
+            // The rotor of a stepper swings about its speed: the mean of a tenth of a second.
+            let mut sum = 0.0;
+            for _ in 0..100 {
+                world.run_for(Duration::from_millis(1));
+                sum += world.report(id(drive)).unwrap().velocity_rpm;
+            }
+            assert!((sum / 100.0 - wanted).abs() < 1.5, "{drive:?}: {}", sum / 100.0);
+            let state = block_on(&mut world, drive.state()).unwrap().unwrap();
+            let Rpm(shown) = state.velocity.unwrap();
+            assert!((shown - wanted).abs() < 3.0, "{drive:?} shows {shown}");
+        }
+        block_on(&mut world, drive.stop()).unwrap().unwrap();
+        assert!(world.report(id(drive)).unwrap().velocity_rpm.abs() < 3.0, "{drive:?}");
+    }
+    assert!(network.moved().is_empty());
+}
+
+#[test]
+fn ninety_degrees_are_a_quarter_turn_of_every_shaft() {
+    let (mut world, _, drives) = bench();
+    // Counts in a turn: 32768 of the encoder, 4000 pulses (2006h = 10), four edges of 1024 lines.
+    for (drive, turn) in drives.iter().zip([32_768, 4_000, 4_096]) {
+        let near = |world: &mut World, wanted: i64| {
+            let report = world.report(id(drive)).unwrap();
+            let at = report.rotor_position.unwrap_or(report.position);
+            assert!((at - wanted).abs() <= turn / 100, "{drive:?}: {at} instead of {wanted}");
+        };
+        let began = world.now();
+        block_on(&mut world, drive.move_absolute(Degrees(90.0), slowly())).unwrap().unwrap();
+        near(&mut world, turn / 4);
+        // A quarter turn at a turn a second with ramps of 0.3 s: 0.55 s.
+        let seconds = (world.now() - began).as_secs_f64();
+        assert!((0.5..1.2).contains(&seconds), "{drive:?}: {seconds}");
+        block_on(&mut world, drive.move_relative(Turns(-0.5), slowly())).unwrap().unwrap();
+        near(&mut world, -turn / 4);
+        let Degrees(angle) = block_on(&mut world, drive.state()).unwrap().unwrap().angle.unwrap();
+        assert!((angle + 90.0).abs() < 4.0, "{drive:?}: {angle}");
+    }
+}
+
+#[test]
+fn every_drive_enables_stops_quickly_comes_back_and_lets_go() {
+    let (mut world, _, drives) = bench();
+    let power = |world: &mut World, drive: &Drive| block_on(world, drive.state()).unwrap().unwrap().power;
+    for drive in &drives {
+        assert_eq!(power(&mut world, drive), Some(PowerState::SwitchOnDisabled), "{drive:?}");
+        block_on(&mut world, drive.enable()).unwrap().unwrap();
+        assert_eq!(power(&mut world, drive), Some(PowerState::OperationEnabled), "{drive:?}");
+        block_on(&mut world, drive.velocity(Rpm(60.0), slowly())).unwrap().unwrap();
+        block_on(&mut world, drive.quick_stop()).unwrap().unwrap();
+        assert_ne!(power(&mut world, drive), Some(PowerState::OperationEnabled), "{drive:?}");
+        world.run_for(Duration::from_millis(100));
+        assert!(world.report(id(drive)).unwrap().velocity_rpm.abs() < 2.0, "{drive:?}");
+        // The speed from before is not taken up again.
+        block_on(&mut world, drive.enable()).unwrap().unwrap();
+        world.run_for(Duration::from_millis(500));
+        assert!(world.report(id(drive)).unwrap().velocity_rpm.abs() < 2.0, "{drive:?}");
+        block_on(&mut world, drive.disable()).unwrap().unwrap();
+        assert_eq!(power(&mut world, drive), Some(PowerState::SwitchOnDisabled), "{drive:?}");
+    }
+}
+
+#[test]
+fn a_move_that_was_halted_gives_way_to_the_next_one_on_every_drive() {
+    let (mut world, _, drives) = bench();
+    for drive in &drives {
+        let not_waiting = MotionOptions { wait: false, ..slowly() };
+        block_on(&mut world, drive.move_absolute(Turns(20.0), not_waiting)).unwrap().unwrap();
+        world.run_for(Duration::from_millis(500));
+        block_on(&mut world, drive.stop()).unwrap().unwrap();
+        block_on(&mut world, drive.move_absolute(Turns(0.0), slowly())).unwrap().unwrap();
+        let Degrees(angle) = block_on(&mut world, drive.state()).unwrap().unwrap().angle.unwrap();
+        assert!(angle.abs() < 4.0, "{drive:?}: {angle}");
+    }
+}
+
+#[test]
+fn a_current_is_pushed_where_the_model_has_a_torque_mode_and_refused_where_not() {
+    let (mut world, _, [joint, stepper, servo]) = bench();
+    block_on(&mut world, servo.torque(Amperes(0.5))).unwrap().unwrap();
+    for drive in [joint, stepper] {
+        let error = block_on(&mut world, drive.torque(Amperes(0.5))).unwrap().unwrap_err();
+        assert!(matches!(error, Error::NoSuchMode { mode: ModeOfOperation::PROFILE_TORQUE, .. }), "{error}");
+        assert!(error.to_string().contains(drive.profile().unwrap().title), "{error}");
+    }
+}
+
+#[test]
+fn only_a_drive_with_a_watch_over_its_host_gives_a_note_of_it() {
+    let (mut world, _, drives) = bench();
+    for drive in &drives {
+        let report = block_on(&mut world, drive.velocity(Rpm(30.0), slowly())).unwrap().unwrap();
+        let noted = matches!(report.notes[..], [Note::HostWatchdog { .. }]);
+        assert_eq!(noted, id(drive) == SERVO, "{drive:?}");
+        block_on(&mut world, drive.stop()).unwrap().unwrap();
+    }
+}
+
+#[test]
+fn the_stepper_homes_on_a_limit_switch() {
+    let (mut world, network, [_, stepper, _]) = bench();
+    // 2030h:02 = 3: X0 is the negative limit ("ZLIM42-C user manual V1.03", 5.4).
+    block_on(&mut world, stepper.node().write(mux(0x2030, 2), 3_u16)).unwrap().unwrap();
+    let set = |drive: &mut dyn sim::VirtualDrive, now| drive.set_switch(0, range(None, Some(-2000)), now);
+    world.with_drive(STEPPER, |drive, now| set(drive, now)).unwrap().unwrap();
+    let report = block_on(&mut world, stepper.home(17, HomingOptions::default())).unwrap().unwrap();
+    // Half a turn at 120 r/min and its ramps.
+    let seconds = report.reached_after.unwrap().as_secs_f64();
+    assert!((0.25..2.0).contains(&seconds), "{seconds}");
+    // The edge is 0 now: the shaft has gone on from there by its ramp only.
+    let Degrees(angle) = block_on(&mut world, stepper.state()).unwrap().unwrap().angle.unwrap();
+    assert!(angle.abs() < 90.0, "{angle}");
+    assert!(network.moved().is_empty());
+    // It homes again, though the bits of the run before still say that it has.
+    block_on(&mut world, stepper.move_absolute(Turns(0.5), slowly())).unwrap().unwrap();
+    let again = block_on(&mut world, stepper.home(17, HomingOptions::default())).unwrap().unwrap();
+    assert!(again.reached_after.unwrap() > Duration::from_millis(250), "{again:?}");
+}
+
+#[test]
+fn the_joint_homes_as_soon_as_its_mode_is_written() {
+    let (mut world, network, [joint, ..]) = bench();
+    let dir =
+        world.with_drive(JOINT, |drive, _| drive.inputs().iter().position(|name| *name == "DIR")).unwrap().unwrap();
+    let switch = range(None, Some(-16_384));
+    world.with_drive(JOINT, |drive, now| drive.set_switch(dir, switch, now)).unwrap().unwrap();
+    for _ in 0..2 {
+        let report = block_on(&mut world, joint.home(17, HomingOptions::default())).unwrap().unwrap();
+        assert!(report.reached_after.is_some());
+        let state = block_on(&mut world, joint.state()).unwrap().unwrap();
+        assert!(state.statusword_words().contains(&"homing attained"), "{state:?}");
+        assert!(state.angle.unwrap().0.abs() < 45.0, "{state:?}");
+        // Half a turn back, and once more.
+        block_on(&mut world, joint.move_absolute(Turns(0.5), slowly())).unwrap().unwrap();
+    }
+    assert!(network.moved().is_empty());
+}
+
+#[test]
+fn homing_that_fails_or_finds_nothing_is_explained_and_stopped() {
+    let (mut world, _, [joint, stepper, servo]) = bench();
+    let error = block_on(&mut world, servo.home(17, HomingOptions::default())).unwrap().unwrap_err();
+    assert!(matches!(error, Error::NoSuchMode { mode: ModeOfOperation::HOMING, .. }), "{error}");
+    let error = block_on(&mut world, joint.home(24, HomingOptions::default())).unwrap().unwrap_err();
+    assert!(matches!(error, Error::OutOfLimits { low: 17, high: 22, .. }), "{error}");
+    // Method 0 is accepted and fails at once ("ZLIM42-C user manual V1.03", 5.3.6: bit 8 off, 10 on, 14 off).
+    let error = block_on(&mut world, stepper.home(0, HomingOptions::default())).unwrap().unwrap_err();
+    assert!(error.to_string().contains("ended homing with method 0"), "{error}");
+    let options = HomingOptions { limit: Duration::from_secs(2), ..HomingOptions::default() };
+    for drive in [joint, stepper] {
+        let error = block_on(&mut world, drive.home(17, options)).unwrap().unwrap_err();
+        assert!(error.to_string().contains("still looks for its reference"), "{error}");
+        world.run_for(Duration::from_millis(200));
+        assert!(world.report(id(&drive)).unwrap().velocity_rpm.abs() < 2.0, "{drive:?} goes on");
+    }
+}
+
+#[test]
+fn homing_cut_short_by_the_guard_stops_and_is_not_taken_up_again() {
+    let (mut world, network, [joint, stepper, _]) = bench();
+    for drive in [joint, stepper] {
+        let not_waiting = HomingOptions { wait: false, ..HomingOptions::default() };
+        block_on(&mut world, drive.home(17, not_waiting)).unwrap().unwrap();
+        world.run_for(Duration::from_millis(500));
+        assert!(world.report(id(&drive)).unwrap().velocity_rpm < -50.0, "{drive:?}");
+        block_on(&mut world, async {
+            drop(network.stop_guard());
+            network.sleep(Duration::from_millis(500)).await;
+        })
+        .unwrap();
+        assert!(world.report(id(&drive)).unwrap().velocity_rpm.abs() < 2.0, "{drive:?} goes on");
+        block_on(&mut world, drive.enable()).unwrap().unwrap();
+        world.run_for(Duration::from_millis(500));
+        assert!(world.report(id(&drive)).unwrap().velocity_rpm.abs() < 2.0, "{drive:?} goes on");
+    }
+}
+
+#[test]
+fn a_blocked_joint_is_explained_by_its_alarm_and_enabled_after_a_reset() {
+    let (mut world, _, [joint, ..]) = bench();
+    world.with_drive(JOINT, |drive, now| drive.set_rotor_locked(true, now)).unwrap().unwrap();
+    let moving = MotionOptions { speed: Some(Rpm(500.0)), ..MotionOptions::default() };
+    let error = block_on(&mut world, joint.move_relative(Turns(200.0), moving)).unwrap().unwrap_err();
+    let Error::NotReached(explanation) = &error else { panic!("{error}") };
+    let coded = |fact: &Fact| matches!(fact, Fact::FaultCode(code, rows) if *code != 0 && rows.len() == 1);
+    assert!(explanation.facts.iter().any(coded), "{error}");
+    assert!(explanation.conclusion.starts_with("The drive is at fault: "), "{error}");
+    let state = block_on(&mut world, joint.state()).unwrap().unwrap();
+    assert_eq!(state.power, Some(PowerState::Fault), "{state:?}");
+    let error = block_on(&mut world, joint.enable()).unwrap().unwrap_err();
+    assert!(error.to_string().contains("The drive is at fault: "), "{error}");
+    world.with_drive(JOINT, |drive, now| drive.set_rotor_locked(false, now)).unwrap().unwrap();
+    block_on(&mut world, joint.reset_fault()).unwrap().unwrap();
+    let state = block_on(&mut world, joint.state()).unwrap().unwrap();
+    assert_eq!((state.power, state.fault_code), (Some(PowerState::SwitchOnDisabled), 0), "the reset moves nothing");
+    block_on(&mut world, joint.enable()).unwrap().unwrap();
+}
+
+#[test]
+fn saving_a_zlac_writes_2009h_2_and_the_same_bytes_set_250_kbit_s_on_a_zlim42_c() {
+    let (mut world, _, [_, stepper, servo]) = bench();
+    let tap = world.add_tap();
+    block_on(&mut world, servo.save()).unwrap().unwrap();
+    let mut heard = Vec::new();
+    while let Some((_, frame)) = world.poll_received(tap) {
+        heard.push(frame.to_string());
+    }
+    assert!(heard.contains(&"604#2B09200002000000".to_owned()), "{heard:?}");
+
+    let rate = || stepper.node().read::<u16>(mux(0x2009, 0));
+    assert_eq!(block_on(&mut world, rate()).unwrap().unwrap(), K500);
+    // A program that takes the stepper for a ZLAC, whose identity it has, is stopped before it writes.
+    let mistaken = Drive::new(stepper.node().clone(), model("zlac8030l").unwrap());
+    for outcome in [block_on(&mut world, mistaken.save()).unwrap(), block_on(&mut world, mistaken.restore()).unwrap()] {
+        let error = outcome.unwrap_err();
+        assert!(matches!(error, Error::OtherModel { hallmark, .. } if hallmark == mux(0x2029, 0)), "{error}");
+    }
+    assert_eq!(block_on(&mut world, rate()).unwrap().unwrap(), K500);
+    // One that is not told the model, too.
+    let unknown = Drive::of_unknown_model(stepper.node().clone());
+    assert!(matches!(block_on(&mut world, unknown.save()).unwrap(), Err(Error::UnknownModel { .. })));
+    // This is what would have happened.
+    block_on(&mut world, stepper.node().write(mux(0x2009, 0), 2_u16)).unwrap().unwrap();
+    assert_eq!(block_on(&mut world, rate()).unwrap().unwrap(), 2);
+    let table = model("zlim42c").unwrap().table;
+    assert_eq!(table.row(table.find(mux(0x2009, 0)).unwrap()).meaning(2), Some("250 kbit/s"));
+}
+
+#[test]
+fn every_drive_saves_by_its_own_command_and_restores_where_it_can() {
+    let (mut world, _, [joint, stepper, servo]) = bench();
+    for drive in [&joint, &stepper, &servo] {
+        block_on(&mut world, drive.save()).unwrap().unwrap();
+    }
+    for drive in [&stepper, &servo] {
+        block_on(&mut world, drive.restore()).unwrap().unwrap();
+    }
+    let error = block_on(&mut world, joint.restore()).unwrap().unwrap_err();
+    assert!(matches!(error, Error::NoFactorySettings { .. }), "{error}");
+    // A joint taken for a servo says another identity.
+    let mistaken = Drive::new(joint.node().clone(), model("zlac8030l").unwrap());
+    assert!(matches!(block_on(&mut world, mistaken.save()).unwrap(), Err(Error::WrongModel { .. })));
+}
+
+#[test]
+fn models_of_one_identity_and_different_tables_have_hallmarks_that_tell_them_apart() {
+    let has = |profile: &DriveProfile, object| profile.table.find(object).is_ok();
+    for one in MODELS {
+        for other in MODELS {
+            let same_table = core::ptr::eq(one.table, other.table);
+            if one.identity != other.identity || same_table {
+                continue;
+            }
+            let hallmark = one.hallmark.unwrap_or_else(|| panic!("{} and {}", one.model, other.model));
+            assert!(has(one, hallmark) && !has(other, hallmark), "{} and {}", one.model, other.model);
+            assert!(one.quirks.contains(&Quirk::IdentityShared));
+        }
+    }
+}
+
+#[test]
+fn a_profile_says_of_power_and_homing_what_its_quirks_say() {
+    for profile in MODELS {
+        let quirk = |quirk| profile.quirks.contains(&quirk);
+        assert_eq!(profile.power != PowerStyle::Cia402, quirk(Quirk::NoPowerStateMachine), "{}", profile.model);
+        assert_eq!(profile.mode_display == mux(0x6060, 0), quirk(Quirk::NoModeDisplay), "{}", profile.model);
+        assert_eq!(profile.host_watchdog.is_some(), quirk(Quirk::HostWatchdogOnByDefault), "{}", profile.model);
+        assert_eq!(profile.homing.is_some(), profile.modes.contains(&ModeOfOperation::HOMING), "{}", profile.model);
+        assert!(profile.table.find(profile.mode_display).is_ok(), "{}", profile.model);
+    }
+}
