@@ -11,7 +11,7 @@ use rig::{AT_1_KHZ, AT_4_KHZ, COUNTS_PER_TURN, Rig, rad_s};
 #[test]
 fn a_current_step_rises_with_the_chosen_bandwidth_and_does_not_overshoot() {
     let mut rig = Rig::new(AT_4_KHZ);
-    rig.motor.load.locked = true;
+    rig.motor.rig.load.locked = true;
     let mut peak = 0.0_f64;
     let mut at_time_constant = 0.0;
     // From the exact angle, so that d and q are what they are called.
@@ -142,7 +142,7 @@ fn a_position_move_ends_within_two_counts_and_hardly_overshoots() {
 #[test]
 fn five_times_the_inertia_is_still_well_damped() {
     let mut rig = Rig::new(AT_4_KHZ);
-    rig.motor.load.inertia_kg_m2 = 4.0 * rig.motor.model.rotor.inertia_kg_m2;
+    rig.motor.rig.load.inertia_kg_m2 = 4.0 * rig.motor.model.rotor.inertia_kg_m2;
     let (rest, overshoot, _) = move_ten_turns(&mut rig);
     assert!(rest.abs() <= 2.0, "ended {rest} counts off");
     assert!(overshoot < 0.01 * 10.0 * COUNTS_PER_TURN, "overshot by {overshoot} counts");
@@ -155,7 +155,7 @@ fn a_load_step_is_fought_and_the_position_returns() {
     let mut worst = 0;
     for tick in 0..40_000 {
         if tick == 10_000 {
-            rig.motor.load.torque_nm = 4.0;
+            rig.motor.rig.load.torque_nm = 4.0;
         }
         let off = rig.position() - start;
         rig.tick_position(&rig.demand(motion::Point::default(), f64::from(off)));

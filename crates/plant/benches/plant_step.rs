@@ -16,7 +16,7 @@ fn hub_motor(c: &mut Criterion) {
     {
         let mut motor = start.clone();
         motor.rotor.velocity_rad_s = 20.0;
-        motor.load.torque_nm = -0.2;
+        motor.rig.load.torque_nm = -0.2;
         let actuation = Actuation { inverter, bleeder_on: false, brake_released: true };
         group.bench_function(name, |b| {
             b.iter(|| {
@@ -54,8 +54,8 @@ fn joint_motor(c: &mut Criterion) {
     let start = JointMotor::new(JointMotorModel::M4230E17B50, Angle::default(), 36.0, 25.0);
     for (name, inverter) in [("driven", Inverter::Driven([0.55, 0.5, 0.45])), ("shorted", Inverter::Shorted)] {
         let mut joint = start.clone();
-        joint.load.inertia_kg_m2 = 0.1;
-        joint.load.torque_nm = 5.0;
+        joint.rig.load.inertia_kg_m2 = 0.1;
+        joint.rig.load.torque_nm = 5.0;
         let actuation = plant::joint_motor::Actuation { inverter, brake_released: true, set_origin: false };
         group.bench_function(name, |b| {
             b.iter(|| {

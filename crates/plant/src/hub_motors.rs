@@ -23,11 +23,11 @@ use crate::encoder::EncoderModel;
 use crate::hall::HallModel;
 use crate::hub_motor::HubMotorModel;
 use crate::mechanics::RotorModel;
-use crate::pmsm::PmsmModel;
+use crate::pmsm::{PmsmModel, SQRT_3};
+use crate::rig::RigModel;
 use crate::supply::{BleederModel, SupplyModel};
-use crate::thermal::BodyModel;
+use crate::thermal::{BodyModel, COPPER_PER_K};
 
-const SQRT_3: f64 = 1.732_050_807_568_877_2;
 const POLE_PAIRS: u32 = 15;
 
 /// Disc of the published mass and wheel diameter: `m r^2 / 2 = 3.75 * 0.0865^2 / 2`.
@@ -47,8 +47,6 @@ const DRY_SHARE: f64 = 0.5;
 const WINDING_RESISTANCE_K_W: f64 = 2.0;
 /// Assumed: 1.5 kg of the published 3.75 kg are stator, copper and iron, at about 420 J/(kg K).
 const WINDING_CAPACITY_J_K: f64 = 630.0;
-/// Copper.
-const COPPER_PER_K: f64 = 0.003_93;
 
 /// Assumed: one switch of 4 mohm in each phase's path, 4 mohm of board and cable.
 const SWITCH_RESISTANCE_OHM: f64 = 0.008;
@@ -114,10 +112,12 @@ const fn wheel_motor(name: &'static str, resistance_ohm: f64, inductance_h: f64,
         encoder: EncoderModel { lines: 1024 },
         hall: HallModel { offset_turns: 0.0 },
         brake: BrakeModel { holding_nm: 0.0 },
-        winding: BodyModel { resistance_k_w: WINDING_RESISTANCE_K_W, capacity_j_k: WINDING_CAPACITY_J_K },
-        resistance_per_k: COPPER_PER_K,
-        heat_sink: BodyModel { resistance_k_w: HEAT_SINK_RESISTANCE_K_W, capacity_j_k: HEAT_SINK_CAPACITY_J_K },
-        switch_resistance_ohm: SWITCH_RESISTANCE_OHM,
-        supply: SUPPLY,
+        rig: RigModel {
+            winding: BodyModel { resistance_k_w: WINDING_RESISTANCE_K_W, capacity_j_k: WINDING_CAPACITY_J_K },
+            resistance_per_k: COPPER_PER_K,
+            heat_sink: BodyModel { resistance_k_w: HEAT_SINK_RESISTANCE_K_W, capacity_j_k: HEAT_SINK_CAPACITY_J_K },
+            switch_resistance_ohm: SWITCH_RESISTANCE_OHM,
+            supply: SUPPLY,
+        },
     }
 }

@@ -9,14 +9,10 @@ use crate::absolute_encoder::{AbsoluteEncoderData, AbsoluteEncoderModel, Battery
 use crate::angle::{Angle, Axis};
 use crate::brake::BrakeModel;
 use crate::gear::{GearData, GearInput, GearModel};
-use crate::hub_motor::{Energy, Inverter};
-use crate::mechanics::{Load, RotorData, RotorModel};
+use crate::hub_motor::Inverter;
+use crate::mechanics::{RotorData, RotorModel};
 use crate::pmsm::{Phase, PmsmData, PmsmInput, PmsmModel};
-use crate::supply::{SupplyData, SupplyModel};
-use crate::thermal::{BodyData, BodyModel, resistance_at_ohm};
-
-/// Steps between two looks at the slow things: heat, resistance, battery, and the exact direction of the magnets.
-const SLOW_EVERY: u32 = 16;
+use crate::rig::{Flows, Rig, RigModel};
 
 /// What never changes about a joint and the power stage it is built with.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,16 +31,8 @@ pub struct JointMotorModel {
     pub encoder: AbsoluteEncoderModel,
     /// Holding brake on the motor's shaft.
     pub brake: BrakeModel,
-    /// The winding as a warm body.
-    pub winding: BodyModel,
-    /// Change of the winding's resistance per kelvin, relative to that at 20 °C.
-    pub resistance_per_k: f64,
-    /// The power stage's heat sink as a warm body.
-    pub heat_sink: BodyModel,
-    /// Resistance of the power stage's switches and wires in each phase.
-    pub switch_resistance_ohm: f64,
-    /// The direct-voltage side; its bleeder is the external discharge module.
-    pub supply: SupplyModel,
+    /// Warm bodies, power stage and supply; the supply's bleeder is the external discharge module.
+    pub rig: RigModel,
 }
 
 /// What the drive does during one step.
@@ -92,34 +80,14 @@ pub struct JointMotor {
     pub encoder: AbsoluteEncoderData,
     /// A motor wire that has come off.
     pub lost_phase: Option<Phase>,
-    /// Winding temperature.
-    pub winding: BodyData,
-    /// Heat-sink temperature.
-    pub heat_sink: BodyData,
-    /// Source and bus.
-    pub supply: SupplyData,
     /// An external discharge module is wired to the bus, and conducts above this voltage.
     pub discharge_from_v: Option<f64>,
-    /// What the output is joined to; a locked load holds the output.
-    pub load: Load,
-    /// Temperature of the surroundings.
-    pub ambient_c: f64,
-    /// Energy book. Friction includes all of the gear's; the battery has none of it.
-    pub energy: Energy,
+    /// Load, supply, temperatures and energies. A locked load holds the output. Friction includes all of the gear's; the
+    /// encoder's battery is not in the book.
+    pub rig: Rig,
     /// Torque of the motor on its rotor, mean over the last step.
     pub torque_nm: f64,
     axis: Axis,
-    winding_ohm: f64,
-    slow: Slow,
-}
-
-/// When the slow things were last looked at.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Slow {
-    steps: u32,
-    time_s: f64,
-    winding_j: f64,
-    heat_sink_j: f64,
 }
 
 impl JointMotor {
@@ -133,17 +101,10 @@ impl JointMotor {
             gear: GearData::default(),
             encoder: model.encoder.with_full_battery(),
             lost_phase: None,
-            winding: model.winding.at_ambient(ambient_c),
-            heat_sink: model.heat_sink.at_ambient(ambient_c),
-            supply: SupplyData::charged(source_v),
             discharge_from_v: None,
-            load: Load::default(),
-            ambient_c,
-            energy: Energy::default(),
+            rig: Rig::new(&model.rig, model.pmsm.resistance_ohm, source_v, ambient_c),
             torque_nm: 0.0,
             axis: Axis::at_turns(model.pmsm.electrical_turns(motor_angle)),
-            winding_ohm: winding_resistance_ohm(&model, ambient_c),
-            slow: Slow::default(),
         }
     }
 
@@ -156,35 +117,31 @@ impl JointMotor {
         // The winding goes by the velocity that is expected in the middle of the step, the angle by the real one.
         let velocity_rad_s = self.rotor.velocity_rad_s + 0.5 * self.rotor.velocity_change_rad_s;
         let input = PmsmInput {
-            terminals: actuation.inverter.terminals(self.supply.bus_v),
+            terminals: actuation.inverter.terminals(self.rig.supply.bus_v),
             lost_phase: self.lost_phase,
-            resistance_ohm: self.winding_ohm + model.switch_resistance_ohm,
+            resistance_ohm: self.rig.path_ohm(&model.rig),
             axis: self.axis.turned_by(Axis::at_small_rad(0.5 * electrical_s * velocity_rad_s)),
             velocity_rad_s,
         };
         let motor = model.pmsm.step(&mut self.pmsm, dt_s, &input);
         let brake_nm = model.brake.torque_nm(actuation.brake_released);
-        let shafts = GearInput { motor_nm: motor.torque_nm, brake_nm, load: &self.load };
+        let shafts = GearInput { motor_nm: motor.torque_nm, brake_nm, load: &self.rig.load };
         let moved = model.gear.step(&mut self.gear, &model.rotor, &mut self.rotor, dt_s, &shafts);
         self.axis = self.axis.turned_by(Axis::at_small_rad(electrical_s * moved.motor_velocity_rad_s));
-        let discharging = self.discharge_from_v.is_some_and(|from_v| self.supply.bus_v > from_v);
-        let bus = model.supply.step(&mut self.supply, dt_s, motor.bus_w, discharging);
+        let discharging = self.discharge_from_v.is_some_and(|from_v| self.rig.supply.bus_v > from_v);
         if actuation.set_origin {
             model.encoder.set_origin(&mut self.encoder, self.rotor.angle);
         }
         self.torque_nm = motor.torque_nm;
 
-        self.energy.source_j += bus.source_j;
-        self.energy.winding_j += motor.heat_w_per_ohm * self.winding_ohm * dt_s;
-        self.energy.switches_j += motor.heat_w_per_ohm * model.switch_resistance_ohm * dt_s;
-        self.energy.friction_j += moved.friction_j;
-        self.energy.load_j += moved.load_j;
-        self.energy.bleeder_j += bus.bleeder_j;
-        self.energy.consumption_j += bus.consumption_j;
-
-        self.slow.steps += 1;
-        self.slow.time_s += dt_s;
-        if self.slow.steps >= SLOW_EVERY {
+        let flows = Flows {
+            bus_w: motor.bus_w,
+            heat_w_per_ohm: motor.heat_w_per_ohm,
+            arc_j: 0.0,
+            friction_j: moved.friction_j,
+            load_j: moved.load_j,
+        };
+        if self.rig.step(&model.rig, dt_s, &flows, discharging) {
             self.step_slow();
         }
     }
@@ -192,21 +149,11 @@ impl JointMotor {
     /// Heat of the last steps into the bodies, the winding's resistance, the encoder's battery, and the magnets'
     /// direction afresh.
     fn step_slow(&mut self) {
-        let Slow { time_s, winding_j, heat_sink_j, .. } = self.slow;
         let model = &self.model;
-        let into_winding_j = self.energy.winding_j;
-        let into_heat_sink_j = self.energy.switches_j + self.energy.consumption_j;
-        if time_s > 0.0 {
-            let winding_w = (into_winding_j - winding_j) / time_s;
-            let heat_sink_w = (into_heat_sink_j - heat_sink_j) / time_s;
-            model.winding.step(&mut self.winding, time_s, winding_w, self.ambient_c);
-            model.heat_sink.step(&mut self.heat_sink, time_s, heat_sink_w, self.ambient_c);
-        }
-        let powered = self.supply.bus_v > model.supply.consumption_from_v;
+        let time_s = self.rig.step_slow(&model.rig, model.pmsm.resistance_ohm);
+        let powered = self.rig.supply.bus_v > model.rig.supply.consumption_from_v;
         model.encoder.step(&mut self.encoder, time_s, self.rotor.angle, powered);
-        self.winding_ohm = winding_resistance_ohm(model, self.winding.temperature_c);
         self.axis = Axis::at_turns(model.pmsm.electrical_turns(self.rotor.angle));
-        self.slow = Slow { steps: 0, time_s: 0.0, winding_j: into_winding_j, heat_sink_j: into_heat_sink_j };
     }
 
     /// What the sensors read now.
@@ -217,9 +164,9 @@ impl JointMotor {
             turns_lost: self.encoder.turns_lost,
             battery: self.model.encoder.battery_state(&self.encoder),
             phase_current_a: self.model.pmsm.phase_current_a(&self.pmsm, self.axis),
-            bus_v: self.supply.bus_v,
-            winding_c: self.winding.temperature_c,
-            heat_sink_c: self.heat_sink.temperature_c,
+            bus_v: self.rig.supply.bus_v,
+            winding_c: self.rig.winding.temperature_c,
+            heat_sink_c: self.rig.heat_sink.temperature_c,
         }
     }
 
@@ -230,15 +177,10 @@ impl JointMotor {
 
     /// Energy stored now: in motion, in the gear's spring, in the winding's field and in the bus capacitor.
     pub fn stored_j(&self) -> f64 {
-        let JointMotorModel { gear, rotor, pmsm, supply, .. } = &self.model;
-        gear.kinetic_energy_j(&self.gear, rotor, &self.rotor, &self.load)
+        let JointMotorModel { gear, rotor, pmsm, rig, .. } = &self.model;
+        gear.kinetic_energy_j(&self.gear, rotor, &self.rotor, &self.rig.load)
             + gear.spring_energy_j(&self.gear)
             + pmsm.magnetic_energy_j(&self.pmsm)
-            + supply.stored_energy_j(&self.supply)
+            + rig.supply.stored_energy_j(&self.rig.supply)
     }
-}
-
-/// Resistance of one phase of the winding at a temperature.
-fn winding_resistance_ohm(model: &JointMotorModel, winding_c: f64) -> f64 {
-    resistance_at_ohm(model.pmsm.resistance_ohm, model.resistance_per_k, winding_c)
 }

@@ -26,11 +26,11 @@ use crate::brake::BrakeModel;
 use crate::gear::GearModel;
 use crate::joint_motor::JointMotorModel;
 use crate::mechanics::RotorModel;
-use crate::pmsm::PmsmModel;
+use crate::pmsm::{PmsmModel, SQRT_3};
+use crate::rig::RigModel;
 use crate::supply::{BleederModel, SupplyModel};
-use crate::thermal::BodyModel;
+use crate::thermal::{BodyModel, COPPER_PER_K};
 
-const SQRT_3: f64 = 1.732_050_807_568_877_2;
 const RAD_S_PER_R_MIN: f64 = core::f64::consts::TAU / 60.0;
 
 /// "Motor rated voltage 36 VDC ± 10 %".
@@ -67,8 +67,6 @@ const SIZE_25_FLANGE_KG_M2: f64 = 3.7e-4;
 const TEMPERATURE_RISE_K: f64 = 45.0;
 /// Assumed: half of the weight is copper and iron, at about 420 J/(kg K).
 const WINDING_HEAT_J_KG_K: f64 = 210.0;
-/// Copper.
-const COPPER_PER_K: f64 = 0.003_93;
 
 /// Assumed: one switch of 5 mohm in each phase's path, 5 mohm of board.
 const SWITCH_RESISTANCE_OHM: f64 = 0.01;
@@ -196,13 +194,15 @@ const fn joint(
         },
         encoder: ENCODER,
         brake: BrakeModel { holding_nm: 0.0 },
-        winding: BodyModel {
-            resistance_k_w: TEMPERATURE_RISE_K / copper_w,
-            capacity_j_k: WINDING_HEAT_J_KG_K * motor.weight_kg,
+        rig: RigModel {
+            winding: BodyModel {
+                resistance_k_w: TEMPERATURE_RISE_K / copper_w,
+                capacity_j_k: WINDING_HEAT_J_KG_K * motor.weight_kg,
+            },
+            resistance_per_k: COPPER_PER_K,
+            heat_sink: HEAT_SINK,
+            switch_resistance_ohm: SWITCH_RESISTANCE_OHM,
+            supply: SUPPLY,
         },
-        resistance_per_k: COPPER_PER_K,
-        heat_sink: HEAT_SINK,
-        switch_resistance_ohm: SWITCH_RESISTANCE_OHM,
-        supply: SUPPLY,
     }
 }

@@ -10,7 +10,7 @@
 //!
 //! Three compositions, one for each kind of drive: [`hub_motor`] is a [`pmsm`] with incremental encoder and Hall
 //! sensors, [`stepper_motor`] a two-phase [`stepper`] without any, [`joint_motor`] a [`pmsm`] with a battery-backed
-//! [`absolute_encoder`] behind a [`gear`].
+//! [`absolute_encoder`] behind a [`gear`]. Each is on a [`rig`]: load, power stage, supply, heat and the book of energies.
 #![no_std]
 
 pub mod absolute_encoder;
@@ -23,6 +23,7 @@ pub mod hub_motor;
 pub mod joint_motor;
 pub mod mechanics;
 pub mod pmsm;
+pub mod rig;
 pub mod stepper;
 pub mod stepper_motor;
 pub mod supply;
@@ -35,5 +36,6 @@ mod stepper_motors;
 pub use angle::Angle;
 pub use hub_motor::{Actuation, HubMotor, HubMotorModel, Inverter, Sensors};
 pub use joint_motor::{JointMotor, JointMotorModel};
+pub use rig::Rig;
 pub use stepper::Bridges;
 pub use stepper_motor::{StepperMotor, StepperMotorModel};

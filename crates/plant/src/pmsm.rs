@@ -18,6 +18,8 @@ use crate::angle::{Angle, Axis};
 
 /// Below this current an idle bridge is taken as not conducting.
 const NO_CURRENT_A: f64 = 1e-9;
+/// Line to line over phase.
+pub(crate) const SQRT_3: f64 = 1.732_050_807_568_877_2;
 const INV_SQRT_3: f64 = 0.577_350_269_189_625_8;
 const HALF_SQRT_3: f64 = 0.866_025_403_784_438_6;
 

@@ -10,14 +10,9 @@
 //! which gives such a ringing `(w dt)^3 / 8` of critical damping back: 1e-4 at 50 µs, a thirtieth of its friction's.
 
 use crate::angle::{Angle, Axis};
-use crate::hub_motor::Energy;
-use crate::mechanics::{Load, RotorData, RotorModel};
+use crate::mechanics::{RotorData, RotorModel};
+use crate::rig::{Flows, Rig, RigModel};
 use crate::stepper::{Bridges, Phase, StepperData, StepperInput, StepperModel, Turn};
-use crate::supply::{SupplyData, SupplyModel};
-use crate::thermal::{BodyData, BodyModel, resistance_at_ohm};
-
-/// Steps between two looks at the slow things: heat, resistance, and the exact direction of the magnets.
-const SLOW_EVERY: u32 = 16;
 
 /// What never changes about a stepper and the power stage it is wired to.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,16 +23,8 @@ pub struct StepperMotorModel {
     pub stepper: StepperModel,
     /// Inertia and friction of the motor alone.
     pub rotor: RotorModel,
-    /// The windings as a warm body.
-    pub winding: BodyModel,
-    /// Change of the windings' resistance per kelvin, relative to that at 20 °C.
-    pub resistance_per_k: f64,
-    /// The power stage's heat sink as a warm body.
-    pub heat_sink: BodyModel,
-    /// Resistance of the power stage's switches and wires in each phase.
-    pub switch_resistance_ohm: f64,
-    /// The direct-voltage side. The drive has no bleeder: it is never switched on.
-    pub supply: SupplyModel,
+    /// Warm bodies, power stage and supply. The drive has no bleeder: it is never switched on.
+    pub rig: RigModel,
 }
 
 /// What the drive's sensors read at the end of a step.
@@ -64,32 +51,11 @@ pub struct StepperMotor {
     pub rotor: RotorData,
     /// A phase whose wire has come off.
     pub lost_phase: Option<Phase>,
-    /// Winding temperature.
-    pub winding: BodyData,
-    /// Heat-sink temperature.
-    pub heat_sink: BodyData,
-    /// Source and bus.
-    pub supply: SupplyData,
-    /// What the shaft is joined to.
-    pub load: Load,
-    /// Temperature of the surroundings.
-    pub ambient_c: f64,
-    /// Energy book. The arc of a wire that comes off under current counts as heat of the switches.
-    pub energy: Energy,
+    /// Load, supply, temperatures and energies.
+    pub rig: Rig,
     /// Torque of the motor on its rotor, detent included, mean over the last step.
     pub torque_nm: f64,
     axis: Axis,
-    winding_ohm: f64,
-    slow: Slow,
-}
-
-/// When the slow things were last looked at.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Slow {
-    steps: u32,
-    time_s: f64,
-    winding_j: f64,
-    heat_sink_j: f64,
 }
 
 impl StepperMotor {
@@ -100,16 +66,9 @@ impl StepperMotor {
             stepper: StepperData::default(),
             rotor: RotorData { angle, ..RotorData::default() },
             lost_phase: None,
-            winding: model.winding.at_ambient(ambient_c),
-            heat_sink: model.heat_sink.at_ambient(ambient_c),
-            supply: SupplyData::charged(source_v),
-            load: Load::default(),
-            ambient_c,
-            energy: Energy::default(),
+            rig: Rig::new(&model.rig, model.stepper.resistance_ohm, source_v, ambient_c),
             torque_nm: 0.0,
             axis: magnet_axis(&model, angle),
-            winding_ohm: winding_resistance_ohm(&model, ambient_c),
-            slow: Slow::default(),
         }
     }
 
@@ -117,51 +76,37 @@ impl StepperMotor {
     #[inline]
     pub fn step(&mut self, dt_s: f64, bridges: &Bridges) {
         let model = &self.model;
-        let velocity_rad_s = self.rotor.turn(dt_s, &self.load);
+        let velocity_rad_s = self.rotor.turn(dt_s, &self.rig.load);
         let turn = Turn::new(self.axis, 0.5 * dt_s * f64::from(model.stepper.teeth) * velocity_rad_s);
         self.axis = turn.end();
         let input = StepperInput {
             bridges: *bridges,
-            bus_v: self.supply.bus_v,
+            bus_v: self.rig.supply.bus_v,
             lost_phase: self.lost_phase,
-            resistance_ohm: self.winding_ohm + model.switch_resistance_ohm,
+            resistance_ohm: self.rig.path_ohm(&model.rig),
             turn,
         };
         let motor = model.stepper.step(&mut self.stepper, dt_s, &input);
         let torque_nm = motor.torque_nm + model.stepper.detent_torque_nm(&turn);
-        let moved = model.rotor.step(&mut self.rotor, dt_s, torque_nm, &self.load, 0.0);
-        let bus = model.supply.step(&mut self.supply, dt_s, motor.bus_w, false);
+        let moved = model.rotor.step(&mut self.rotor, dt_s, torque_nm, &self.rig.load, 0.0);
         self.torque_nm = torque_nm;
 
-        self.energy.source_j += bus.source_j;
-        self.energy.winding_j += motor.heat_w_per_ohm * self.winding_ohm * dt_s;
-        self.energy.switches_j += motor.heat_w_per_ohm * model.switch_resistance_ohm * dt_s + motor.arc_j;
-        self.energy.friction_j += moved.friction_j;
-        self.energy.load_j += moved.load_j;
-        self.energy.consumption_j += bus.consumption_j;
-
-        self.slow.steps += 1;
-        self.slow.time_s += dt_s;
-        if self.slow.steps >= SLOW_EVERY {
+        let flows = Flows {
+            bus_w: motor.bus_w,
+            heat_w_per_ohm: motor.heat_w_per_ohm,
+            arc_j: motor.arc_j,
+            friction_j: moved.friction_j,
+            load_j: moved.load_j,
+        };
+        if self.rig.step(&model.rig, dt_s, &flows, false) {
             self.step_slow();
         }
     }
 
     /// Heat of the last steps into the bodies, the windings' resistance, and the magnets' direction afresh.
     fn step_slow(&mut self) {
-        let Slow { time_s, winding_j, heat_sink_j, .. } = self.slow;
-        let model = &self.model;
-        let into_winding_j = self.energy.winding_j;
-        let into_heat_sink_j = self.energy.switches_j + self.energy.consumption_j;
-        if time_s > 0.0 {
-            let winding_w = (into_winding_j - winding_j) / time_s;
-            let heat_sink_w = (into_heat_sink_j - heat_sink_j) / time_s;
-            model.winding.step(&mut self.winding, time_s, winding_w, self.ambient_c);
-            model.heat_sink.step(&mut self.heat_sink, time_s, heat_sink_w, self.ambient_c);
-        }
-        self.winding_ohm = winding_resistance_ohm(model, self.winding.temperature_c);
-        self.axis = magnet_axis(model, self.rotor.angle);
-        self.slow = Slow { steps: 0, time_s: 0.0, winding_j: into_winding_j, heat_sink_j: into_heat_sink_j };
+        self.rig.step_slow(&self.model.rig, self.model.stepper.resistance_ohm);
+        self.axis = magnet_axis(&self.model, self.rotor.angle);
     }
 
     /// What the sensors read now.
@@ -169,26 +114,21 @@ impl StepperMotor {
     pub fn sense(&self) -> Sensors {
         Sensors {
             phase_current_a: self.stepper.current_a,
-            bus_v: self.supply.bus_v,
-            winding_c: self.winding.temperature_c,
-            heat_sink_c: self.heat_sink.temperature_c,
+            bus_v: self.rig.supply.bus_v,
+            winding_c: self.rig.winding.temperature_c,
+            heat_sink_c: self.rig.heat_sink.temperature_c,
         }
     }
 
     /// Energy stored now: in motion, in the windings' field, in the detent and in the bus capacitor.
     pub fn stored_j(&self) -> f64 {
-        self.model.rotor.kinetic_energy_j(&self.rotor, &self.load)
+        self.model.rotor.kinetic_energy_j(&self.rotor, &self.rig.load)
             + self.model.stepper.magnetic_energy_j(&self.stepper)
             + self.model.stepper.detent_energy_j(magnet_axis(&self.model, self.rotor.angle))
-            + self.model.supply.stored_energy_j(&self.supply)
+            + self.model.rig.supply.stored_energy_j(&self.rig.supply)
     }
 }
 
 fn magnet_axis(model: &StepperMotorModel, angle: Angle) -> Axis {
     Axis::at_turns(angle.fraction() * f64::from(model.stepper.teeth))
-}
-
-/// Resistance of one phase at a temperature.
-fn winding_resistance_ohm(model: &StepperMotorModel, winding_c: f64) -> f64 {
-    resistance_at_ohm(model.stepper.resistance_ohm, model.resistance_per_k, winding_c)
 }

@@ -18,10 +18,11 @@
 //! What is assumed is a named constant with its reason.
 
 use crate::mechanics::RotorModel;
+use crate::rig::RigModel;
 use crate::stepper::StepperModel;
 use crate::stepper_motor::StepperMotorModel;
 use crate::supply::{BleederModel, SupplyModel};
-use crate::thermal::BodyModel;
+use crate::thermal::{BodyModel, COPPER_PER_K};
 
 /// 200 full steps a turn, four to a tooth.
 const TEETH: u32 = 50;
@@ -40,8 +41,6 @@ const VISCOUS_NM_S: f64 = 1e-4;
 const TEMPERATURE_RISE_K: f64 = 80.0;
 /// Assumed: copper, iron and magnets at about 450 J/(kg K).
 const HEAT_J_KG_K: f64 = 450.0;
-/// Copper.
-const COPPER_PER_K: f64 = 0.003_93;
 
 /// Assumed: two switches in each phase's path, 0.1 ohm each, as in integrated dual bridges of this size.
 const SWITCH_RESISTANCE_OHM: f64 = 0.2;
@@ -111,14 +110,16 @@ impl Published {
                 detent_nm: DETENT_SHARE * self.holding_nm,
             },
             rotor: RotorModel { inertia_kg_m2: self.inertia_kg_m2, viscous_nm_s: VISCOUS_NM_S, coulomb_nm: COULOMB_NM },
-            winding: BodyModel {
-                resistance_k_w: TEMPERATURE_RISE_K / rated_w,
-                capacity_j_k: self.mass_kg * HEAT_J_KG_K,
+            rig: RigModel {
+                winding: BodyModel {
+                    resistance_k_w: TEMPERATURE_RISE_K / rated_w,
+                    capacity_j_k: self.mass_kg * HEAT_J_KG_K,
+                },
+                resistance_per_k: COPPER_PER_K,
+                heat_sink: HEAT_SINK,
+                switch_resistance_ohm: SWITCH_RESISTANCE_OHM,
+                supply: SUPPLY,
             },
-            resistance_per_k: COPPER_PER_K,
-            heat_sink: HEAT_SINK,
-            switch_resistance_ohm: SWITCH_RESISTANCE_OHM,
-            supply: SUPPLY,
         }
     }
 }

@@ -9,6 +9,9 @@
 /// Temperature at which a winding's resistance is stated.
 const RESISTANCE_STATED_AT_C: f64 = 20.0;
 
+/// Change of copper's resistance per kelvin, relative to that at 20 °C.
+pub(crate) const COPPER_PER_K: f64 = 0.003_93;
+
 /// Resistance at a temperature of a winding that has `stated_ohm` at 20 °C and changes by `per_k` of it per kelvin.
 pub fn resistance_at_ohm(stated_ohm: f64, per_k: f64, temperature_c: f64) -> f64 {
     stated_ohm * (1.0 + per_k * (temperature_c - RESISTANCE_STATED_AT_C))

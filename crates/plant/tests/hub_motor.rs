@@ -4,6 +4,7 @@ use plant::angle::{Angle, Axis};
 use plant::encoder::EncoderFault;
 use plant::hall::FORWARD_SEQUENCE;
 use plant::pmsm::Phase;
+use plant::rig::RigModel;
 use plant::thermal::BodyModel;
 use plant::{Actuation, HubMotor, HubMotorModel, Inverter};
 use proptest::prelude::*;
@@ -22,7 +23,7 @@ fn across_magnets(motor: &HubMotor, q_v: f64) -> Inverter {
     let (alpha, beta) = (-q_v * sin, q_v * cos);
     let side = 0.5 * libm::sqrt(3.0) * beta;
     let phases = [alpha, side - 0.5 * alpha, -side - 0.5 * alpha];
-    Inverter::Driven(phases.map(|v| v / motor.supply.bus_v + 0.5))
+    Inverter::Driven(phases.map(|v| v / motor.rig.supply.bus_v + 0.5))
 }
 
 /// Runs at a voltage across the magnets and checks the energy book after every step.
@@ -35,15 +36,15 @@ fn run(motor: &mut HubMotor, steps: u32, q_v: f64, bleeder_on: bool) {
 
 fn assert_energy_closes(motor: &HubMotor, stored_at_first_j: f64) {
     let gained = motor.stored_j() - stored_at_first_j;
-    let through = motor.energy.source_j.abs() + motor.stored_j() + motor.energy.load_j.abs();
-    let rest = motor.energy.balance_j() - gained;
-    assert!(rest.abs() < 1e-5 * through, "{rest} J missing of {through} J: {:?}", motor.energy);
+    let through = motor.rig.energy.source_j.abs() + motor.stored_j() + motor.rig.energy.load_j.abs();
+    let rest = motor.rig.energy.balance_j() - gained;
+    assert!(rest.abs() < 1e-5 * through, "{rest} J missing of {through} J: {:?}", motor.rig.energy);
 }
 
 #[test]
 fn energy_closes_while_accelerating() {
     let mut motor = motor();
-    motor.load.inertia_kg_m2 = 0.2;
+    motor.rig.load.inertia_kg_m2 = 0.2;
     let stored = motor.stored_j();
     run(&mut motor, 20_000, 10.0, false);
     assert!(motor.rotor.velocity_rad_s > 15.0, "{}", motor.rotor.velocity_rad_s);
@@ -53,46 +54,46 @@ fn energy_closes_while_accelerating() {
 #[test]
 fn regeneration_without_a_bleeder_raises_the_bus_and_energy_closes() {
     let mut motor = motor();
-    motor.load.inertia_kg_m2 = 0.2;
+    motor.rig.load.inertia_kg_m2 = 0.2;
     let stored = motor.stored_j();
     run(&mut motor, 40_000, 12.0, false);
-    let source_j = motor.energy.source_j;
+    let source_j = motor.rig.energy.source_j;
     run(&mut motor, 1_000, 10.0, false);
-    assert!(motor.supply.bus_v > 50.0, "{} V", motor.supply.bus_v);
-    assert!(motor.energy.source_j - source_j < 0.5, "the source takes nothing back and gives little");
+    assert!(motor.rig.supply.bus_v > 50.0, "{} V", motor.rig.supply.bus_v);
+    assert!(motor.rig.energy.source_j - source_j < 0.5, "the source takes nothing back and gives little");
     assert_energy_closes(&motor, stored);
 }
 
 #[test]
 fn the_bleeder_holds_the_bus_down_and_energy_closes() {
     let mut motor = motor();
-    motor.load.inertia_kg_m2 = 0.2;
+    motor.rig.load.inertia_kg_m2 = 0.2;
     let stored = motor.stored_j();
     run(&mut motor, 40_000, 12.0, false);
     let mut highest = 0.0_f64;
     let mut bleeder_on = false;
     for _ in 0..2_000 {
         // As the drive's firmware does, with the manual's thresholds scaled to this bus.
-        bleeder_on = motor.supply.bus_v > if bleeder_on { 50.0 } else { 52.0 };
+        bleeder_on = motor.rig.supply.bus_v > if bleeder_on { 50.0 } else { 52.0 };
         run(&mut motor, 1, 10.0, bleeder_on);
-        highest = highest.max(motor.supply.bus_v);
+        highest = highest.max(motor.rig.supply.bus_v);
     }
     assert!(highest < 53.0, "{highest} V");
-    assert!(motor.energy.bleeder_j > 1.0, "{} J", motor.energy.bleeder_j);
+    assert!(motor.rig.energy.bleeder_j > 1.0, "{} J", motor.rig.energy.bleeder_j);
     assert_energy_closes(&motor, stored);
 }
 
 #[test]
 fn energy_closes_when_a_load_drives_the_shorted_motor() {
     let mut motor = motor();
-    motor.load.torque_nm = -3.0;
+    motor.rig.load.torque_nm = -3.0;
     let stored = motor.stored_j();
     for _ in 0..40_000 {
         motor.step(DT_S, &Actuation { inverter: Inverter::Shorted, bleeder_on: false, brake_released: true });
     }
     // All that the load brings becomes heat; the bus only feeds the electronics.
-    let heat = motor.energy.winding_j + motor.energy.switches_j + motor.energy.friction_j;
-    let brought = -motor.energy.load_j;
+    let heat = motor.rig.energy.winding_j + motor.rig.energy.switches_j + motor.rig.energy.friction_j;
+    let brought = -motor.rig.energy.load_j;
     assert!((heat - brought).abs() < 0.01 * brought, "{heat} of {brought}");
     assert_energy_closes(&motor, stored);
 }
@@ -100,29 +101,30 @@ fn energy_closes_when_a_load_drives_the_shorted_motor() {
 #[test]
 fn a_driven_open_motor_charges_the_bus_through_its_diodes() {
     let mut motor = motor();
-    motor.load.torque_nm = -3.0;
+    motor.rig.load.torque_nm = -3.0;
     let stored = motor.stored_j();
     for _ in 0..40_000 {
         motor.step(DT_S, &Actuation { brake_released: true, ..Actuation::default() });
     }
-    assert!(motor.supply.bus_v > 60.0, "{} V", motor.supply.bus_v);
+    assert!(motor.rig.supply.bus_v > 60.0, "{} V", motor.rig.supply.bus_v);
     assert_energy_closes(&motor, stored);
 }
 
 #[test]
 fn the_winding_warms_its_resistance_rises_and_the_stall_current_falls() {
     let fast = BodyModel { resistance_k_w: 2.0, capacity_j_k: 0.05 };
-    let mut motor = HubMotor::new(HubMotorModel { winding: fast, ..MODEL }, Angle::default(), 48.0, 20.0);
-    motor.load.locked = true;
+    let model = HubMotorModel { rig: RigModel { winding: fast, ..MODEL.rig }, ..MODEL };
+    let mut motor = HubMotor::new(model, Angle::default(), 48.0, 20.0);
+    motor.rig.load.locked = true;
     for _ in 0..200_000 {
         let inverter = across_magnets(&motor, 1.5);
         motor.step(DT_S, &Actuation { inverter, bleeder_on: false, brake_released: true });
     }
     // P = 3/2 R i^2, T = 20 + R_th P, R = R20 (1 + a (T - 20)), i = V / (R + R_switch).
     let i = motor.pmsm.current_a.q;
-    let r = 1.5 / i - MODEL.switch_resistance_ohm;
+    let r = 1.5 / i - MODEL.rig.switch_resistance_ohm;
     let rise = 2.0 * 1.5 * r * i * i;
-    assert!((motor.winding.temperature_c - 20.0 - rise).abs() < 0.01 * rise, "{rise}");
+    assert!((motor.rig.winding.temperature_c - 20.0 - rise).abs() < 0.01 * rise, "{rise}");
     assert!((r - 0.255 * (1.0 + 0.003_93 * rise)).abs() < 1e-3 * r);
     assert!(rise > 20.0);
 }
@@ -130,8 +132,8 @@ fn the_winding_warms_its_resistance_rises_and_the_stall_current_falls() {
 #[test]
 fn a_held_temperature_shows_in_the_sensors_within_a_millisecond() {
     let mut motor = motor();
-    motor.winding.hold_c = Some(95.0);
-    motor.heat_sink.hold_c = Some(85.0);
+    motor.rig.winding.hold_c = Some(95.0);
+    motor.rig.heat_sink.hold_c = Some(85.0);
     for _ in 0..20 {
         motor.step(DT_S, &Actuation::default());
     }
@@ -192,14 +194,14 @@ fn no_load_speed_at_24_v_is_the_published_one() {
     let mut motor = HubMotor::new(MODEL, Angle::default(), 24.0, 25.0);
     // As much voltage as the bus has, turned on by half a step to stand across the magnets.
     for _ in 0..60_000 {
-        let q_v = motor.supply.bus_v / libm::sqrt(3.0);
+        let q_v = motor.rig.supply.bus_v / libm::sqrt(3.0);
         let lead = motor.rotor.velocity_rad_s * 15.0 * DT_S / 2.0;
         let axis = Axis::at_turns(MODEL.pmsm.electrical_turns(motor.rotor.angle)).turned_by(Axis::at_small_rad(lead));
         let (alpha, beta) = (-q_v * axis.sin, q_v * axis.cos);
         let side = 0.5 * libm::sqrt(3.0) * beta;
         let phases = [alpha, side - 0.5 * alpha, -side - 0.5 * alpha];
         let (low, high) = phases.iter().fold((f64::MAX, f64::MIN), |(l, h), &v| (l.min(v), h.max(v)));
-        let duty = phases.map(|v| (v - 0.5 * (low + high)) / motor.supply.bus_v + 0.5);
+        let duty = phases.map(|v| (v - 0.5 * (low + high)) / motor.rig.supply.bus_v + 0.5);
         motor.step(DT_S, &Actuation { inverter: Inverter::Driven(duty), bleeder_on: false, brake_released: true });
     }
     let r_min = motor.rotor.velocity_rad_s * 60.0 / core::f64::consts::TAU;
@@ -211,7 +213,7 @@ fn no_load_speed_at_24_v_is_the_published_one() {
 fn the_same_input_gives_the_same_bits() {
     let play = || {
         let mut motor = motor();
-        motor.load.torque_nm = 0.7;
+        motor.rig.load.torque_nm = 0.7;
         run(&mut motor, 5_000, 9.0, false);
         run(&mut motor, 5_000, -9.0, true);
         motor
@@ -233,7 +235,7 @@ fn a_clone_goes_on_as_the_original() {
 fn halved_steps_lead_to_the_same_motion() {
     let play = |dt_s: f64| {
         let mut motor = motor();
-        motor.load.torque_nm = 0.5;
+        motor.rig.load.torque_nm = 0.5;
         let steps = (0.5 / dt_s) as u32;
         for step in 0..steps {
             // A rotating field at 10 Hz electrical that the motor is pulled along by.
@@ -271,13 +273,13 @@ proptest! {
         let mut motor = motor();
         let stored = motor.stored_j();
         for (inverter, bleeder_on, brake_released, load_nm, steps) in play {
-            motor.load.torque_nm = load_nm;
+            motor.rig.load.torque_nm = load_nm;
             for _ in 0..steps {
                 motor.step(DT_S, &Actuation { inverter, bleeder_on, brake_released });
             }
         }
-        let through = motor.energy.source_j + motor.stored_j() + motor.energy.load_j.abs() + motor.energy.winding_j;
-        let rest = motor.energy.balance_j() - (motor.stored_j() - stored);
+        let through = motor.rig.energy.source_j + motor.stored_j() + motor.rig.energy.load_j.abs() + motor.rig.energy.winding_j;
+        let rest = motor.rig.energy.balance_j() - (motor.stored_j() - stored);
         prop_assert!(rest.abs() < 0.002 * through, "{rest} J missing of {through} J");
     }
 
@@ -289,8 +291,8 @@ proptest! {
         let mut motor = motor();
         for (index, (inverter, bleeder_on, brake_released, load_nm, steps)) in play.into_iter().enumerate() {
             motor.lost_phase = if index % 2 == 1 { lost } else { None };
-            motor.supply.connected = index % 3 != 2;
-            motor.load.torque_nm = load_nm;
+            motor.rig.supply.connected = index % 3 != 2;
+            motor.rig.load.torque_nm = load_nm;
             let inverter = match inverter {
                 Inverter::Driven([u, v, _]) if index % 4 == 3 => Inverter::Driven([u, v, bad]),
                 other => other,

@@ -5,6 +5,7 @@ use plant::angle::{Angle, Axis};
 use plant::brake::BrakeModel;
 use plant::joint_motor::Actuation;
 use plant::mechanics::RotorModel;
+use plant::rig::RigModel;
 use plant::{Inverter, JointMotor, JointMotorModel};
 use proptest::prelude::*;
 
@@ -83,7 +84,7 @@ fn across_magnets(joint: &JointMotor, voltage_v: f64) -> Inverter {
     let side = 0.5 * libm::sqrt(3.0) * beta;
     let phases = [alpha, side - 0.5 * alpha, -side - 0.5 * alpha];
     let (low, high) = phases.iter().fold((f64::MAX, f64::MIN), |(l, h), &v| (l.min(v), h.max(v)));
-    Inverter::Driven(phases.map(|v| (v - 0.5 * (low + high)) / joint.supply.bus_v + 0.5))
+    Inverter::Driven(phases.map(|v| (v - 0.5 * (low + high)) / joint.rig.supply.bus_v + 0.5))
 }
 
 fn run(joint: &mut JointMotor, steps: u32, q_v: f64) {
@@ -99,9 +100,9 @@ fn near(actual: f64, expected: f64, relative: f64) -> bool {
 
 fn assert_energy_closes(joint: &JointMotor, stored_at_first_j: f64, relative: f64) {
     let gained = joint.stored_j() - stored_at_first_j;
-    let through = joint.energy.source_j.abs() + joint.stored_j() + joint.energy.load_j.abs();
-    let rest = joint.energy.balance_j() - gained;
-    assert!(rest.abs() < relative * through, "{rest} J missing of {through} J: {:?}", joint.energy);
+    let through = joint.rig.energy.source_j.abs() + joint.stored_j() + joint.rig.energy.load_j.abs();
+    let rest = joint.rig.energy.balance_j() - gained;
+    assert!(rest.abs() < relative * through, "{rest} J missing of {through} J: {:?}", joint.rig.energy);
 }
 
 #[test]
@@ -141,7 +142,7 @@ fn without_load_a_joint_reaches_the_printed_maximum_speed_at_36_v_and_its_range_
     for Printed { model, ratio, maximum_r_min, output_r_min, .. } in TABLE {
         let mut joint = JointMotor::new(model, Angle::default(), 36.0, 25.0);
         for _ in 0..40_000 {
-            let all = joint.supply.bus_v / libm::sqrt(3.0);
+            let all = joint.rig.supply.bus_v / libm::sqrt(3.0);
             run(&mut joint, 1, all);
         }
         let r_min = joint.rotor.velocity_rad_s * 60.0 / TAU;
@@ -159,12 +160,12 @@ fn a_joint_lifts_its_printed_torque_at_its_printed_speed() {
         // The printed range, or the motor's rated speed if that comes first (the M8025: 1000 r/min).
         let output_r_min = f64::min(output_r_min, rated_r_min / ratio);
         let mut joint = JointMotor::new(model, Angle::default(), 36.0, 25.0);
-        joint.load.inertia_kg_m2 = 0.2;
+        joint.rig.load.inertia_kg_m2 = 0.2;
         let target = output_r_min * TAU / 60.0;
         let full = 0.98 * 36.0 / libm::sqrt(3.0);
         let mut q_v = 0.0;
         for step in 0..60_000_u32 {
-            joint.load.torque_nm = output_nm * (f64::from(step) / 20_000.0).min(1.0);
+            joint.rig.load.torque_nm = output_nm * (f64::from(step) / 20_000.0).min(1.0);
             // As little as a speed loop: more voltage while too slow.
             q_v = (q_v + 2e-3 * (target - joint.gear.output_velocity_rad_s)).clamp(0.0, full);
             run(&mut joint, 1, q_v);
@@ -180,7 +181,7 @@ fn at_rated_torque_the_winding_stays_at_the_printed_85_degrees() {
     for Printed { model, motor_nm, .. } in TABLE {
         let q_a = motor_nm / model.pmsm.torque_constant_nm_a();
         let copper_w = 1.5 * q_a * q_a * model.pmsm.resistance_ohm;
-        assert!(near(40.0 + model.winding.resistance_k_w * copper_w, 85.0, 1e-9));
+        assert!(near(40.0 + model.rig.winding.resistance_k_w * copper_w, 85.0, 1e-9));
     }
 }
 
@@ -203,7 +204,7 @@ fn the_brake_variant_holds_a_load_that_the_other_lets_fall() {
     let braked = JointMotorModel { rotor: RotorModel { coulomb_nm: 0.0, ..MODEL.rotor }, ..MODEL }.with_brake();
     assert_eq!(braked.brake, BrakeModel { holding_nm: 1.0 });
     let mut held = JointMotor::new(braked, Angle::default(), 36.0, 25.0);
-    held.load.torque_nm = 34.0;
+    held.rig.load.torque_nm = 34.0;
     for _ in 0..20_000 {
         held.step(DT_S, &Actuation::default());
     }
@@ -221,13 +222,13 @@ fn power_off_with_a_battery_keeps_the_turns_and_without_loses_them() {
         let mut joint = JointMotor::new(MODEL, Angle::new(7, 0.25), 36.0, 25.0);
         assert_eq!(joint.sense().position_counts, 7 * 32_768 + 8_192);
         joint.encoder.battery.connected = connected;
-        joint.supply.connected = false;
+        joint.rig.supply.connected = false;
         // The bus falls under what the electronics need.
         for _ in 0..20_000 {
             joint.step(DT_S, &Actuation::default());
         }
         assert!(joint.sense().bus_v < 9.0, "{}", joint.sense().bus_v);
-        joint.supply.connected = true;
+        joint.rig.supply.connected = true;
         for _ in 0..2_000 {
             joint.step(DT_S, &Actuation::default());
         }
@@ -252,13 +253,13 @@ fn a_locked_output_winds_up_by_torque_over_stiffness_and_the_encoder_sees_only_t
     let model = JointMotorModel {
         gear: frictionless,
         rotor: RotorModel { coulomb_nm: 0.0, viscous_nm_s: 0.01, ..MODEL.rotor },
-        resistance_per_k: 0.0,
+        rig: RigModel { resistance_per_k: 0.0, ..MODEL.rig },
         ..MODEL
     };
     let mut joint = JointMotor::new(model, Angle::default(), 36.0, 25.0);
-    joint.load.locked = true;
+    joint.rig.load.locked = true;
     run(&mut joint, 20_000, 1.5);
-    let q_a = 1.5 / (model.pmsm.resistance_ohm + model.switch_resistance_ohm);
+    let q_a = 1.5 / (model.pmsm.resistance_ohm + model.rig.switch_resistance_ohm);
     let output_nm = 50.0 * q_a * model.pmsm.torque_constant_nm_a();
     let windup = output_nm / model.gear.stiffness_nm_rad + 0.5 * model.gear.backlash_rad;
     assert!(near(joint.rotor.angle.as_rad(), 50.0 * windup, 1e-3), "{}", joint.rotor.angle.as_rad());
@@ -269,23 +270,28 @@ fn a_locked_output_winds_up_by_torque_over_stiffness_and_the_encoder_sees_only_t
 #[test]
 fn energy_closes_while_lifting_and_while_falling_into_a_discharge_module() {
     let mut joint = joint();
-    joint.load.inertia_kg_m2 = 0.5;
-    joint.load.torque_nm = 10.0;
+    joint.rig.load.inertia_kg_m2 = 0.5;
+    joint.rig.load.torque_nm = 10.0;
     joint.discharge_from_v = Some(45.0);
     let stored = joint.stored_j();
     run(&mut joint, 20_000, 10.0);
     assert!(joint.rotor.velocity_rad_s > 50.0, "{}", joint.rotor.velocity_rad_s);
     assert_energy_closes(&joint, stored, 1e-4);
-    joint.load.torque_nm = 30.0;
+    joint.rig.load.torque_nm = 30.0;
     run(&mut joint, 40_000, -15.0);
-    assert!(joint.energy.bleeder_j > 0.1 && joint.supply.bus_v < 46.0, "{:?} {}", joint.energy, joint.supply.bus_v);
+    assert!(
+        joint.rig.energy.bleeder_j > 0.1 && joint.rig.supply.bus_v < 46.0,
+        "{:?} {}",
+        joint.rig.energy,
+        joint.rig.supply.bus_v
+    );
     assert_energy_closes(&joint, stored, 1e-3);
 }
 
 #[test]
 fn a_held_temperature_shows_in_the_sensors_within_a_millisecond() {
     let mut joint = joint();
-    joint.winding.hold_c = Some(95.0);
+    joint.rig.winding.hold_c = Some(95.0);
     for _ in 0..20 {
         joint.step(DT_S, &Actuation::default());
     }
@@ -296,7 +302,7 @@ fn a_held_temperature_shows_in_the_sensors_within_a_millisecond() {
 fn the_same_input_gives_the_same_bits() {
     let play = || {
         let mut joint = joint();
-        joint.load.torque_nm = 5.0;
+        joint.rig.load.torque_nm = 5.0;
         run(&mut joint, 5_000, 9.0);
         run(&mut joint, 5_000, -9.0);
         joint
@@ -323,11 +329,11 @@ proptest! {
         locked in any::<bool>(),
     ) {
         let mut joint = joint();
-        joint.load.inertia_kg_m2 = load_kg_m2;
-        joint.load.locked = locked;
+        joint.rig.load.inertia_kg_m2 = load_kg_m2;
+        joint.rig.load.locked = locked;
         let stored = joint.stored_j();
         for (inverter, brake_released, load_nm, steps) in play {
-            joint.load.torque_nm = load_nm;
+            joint.rig.load.torque_nm = load_nm;
             for _ in 0..steps {
                 joint.step(DT_S, &Actuation { inverter, brake_released, set_origin: false });
             }
@@ -335,8 +341,8 @@ proptest! {
             prop_assert!(sensors.bus_v.is_finite() && sensors.phase_current_a.iter().all(|a| a.is_finite()));
             prop_assert!(joint.rotor.velocity_rad_s.abs() < 1e4);
         }
-        let through = joint.energy.source_j + joint.stored_j() + joint.energy.load_j.abs() + joint.energy.winding_j;
-        let rest = joint.energy.balance_j() - (joint.stored_j() - stored);
+        let through = joint.rig.energy.source_j + joint.stored_j() + joint.rig.energy.load_j.abs() + joint.rig.energy.winding_j;
+        let rest = joint.rig.energy.balance_j() - (joint.stored_j() - stored);
         prop_assert!(rest.abs() < 0.005 * through, "{rest} J missing of {through} J");
     }
 }

@@ -2,6 +2,7 @@
 
 use plant::angle::Angle;
 use plant::mechanics::RotorModel;
+use plant::rig::RigModel;
 use plant::stepper::{Phase, StepperModel};
 use plant::thermal::BodyModel;
 use plant::{Bridges, StepperMotor, StepperMotorModel};
@@ -52,7 +53,7 @@ fn under_load_the_rotor_lags_the_field_by_the_arc_sine() {
         for share in [-0.9, -0.3, 0.1, 0.5, 0.95] {
             let stepper = StepperModel { detent_nm: 0.0, ..model.stepper };
             let mut motor = motor(StepperMotorModel { stepper, rotor: FREE.rotor, ..model });
-            motor.load.torque_nm = share * holding_nm;
+            motor.rig.load.torque_nm = share * holding_nm;
             // A microstep of 1/16 of a full step.
             settle(&mut motor, 1.0 / 64.0);
             let lag_rad = (1.0 / 64.0 - electrical_turns(&motor)) * TAU;
@@ -143,7 +144,7 @@ fn a_rotor_pulls_out_at_the_holding_torque_and_not_before() {
         let friction_nm = motor.model.rotor.coulomb_nm + 0.01 * velocity_turns_s * TAU;
         for step in 0..40_000 {
             let time_s = f64::from(step) * DT_S;
-            motor.load.torque_nm = share * (0.48 - friction_nm) * time_s.min(1.0);
+            motor.rig.load.torque_nm = share * (0.48 - friction_nm) * time_s.min(1.0);
             motor.step(DT_S, &field(50.0 * velocity_turns_s * time_s, CURRENT_A));
         }
         let lag = 50.0 * velocity_turns_s * 2.0 - electrical_turns(&motor);
@@ -157,11 +158,11 @@ fn a_lost_rotor_comes_to_rest_whole_times_four_full_steps_away_and_no_sensor_tel
         let mut motor = motor(FREE);
         settle(&mut motor, 0.0);
         // Overloaded for a time, then free again.
-        motor.load.torque_nm = overload_nm;
+        motor.rig.load.torque_nm = overload_nm;
         for _ in 0..400 {
             motor.step(DT_S, &field(0.0, CURRENT_A));
         }
-        motor.load.torque_nm = 0.0;
+        motor.rig.load.torque_nm = 0.0;
         settle(&mut motor, 0.0);
         settle(&mut motor, 0.0);
         motor
@@ -182,7 +183,7 @@ fn a_lost_rotor_comes_to_rest_whole_times_four_full_steps_away_and_no_sensor_tel
 /// Turns that the rotor makes in the last tenth of a second of a ramp to a speed and a time at it.
 fn speed_reached_turns_s(volts: f64, target_turns_s: f64, load_nm: f64) -> f64 {
     let mut motor = StepperMotor::new(MODEL, Angle::default(), volts, 25.0);
-    motor.load.torque_nm = load_nm;
+    motor.rig.load.torque_nm = load_nm;
     let (mut field_turns, mut start) = (0.0, 0.0);
     let (ramp, end) = (20_000, 26_000);
     for step in 0..end {
@@ -213,31 +214,32 @@ fn torque_falls_with_speed_because_the_bus_no_longer_drives_the_current() {
 #[test]
 fn energy_closes_through_a_ramp_a_loss_and_an_open_bridge() {
     let mut motor = motor(MODEL);
-    motor.load.inertia_kg_m2 = 1e-5;
+    motor.rig.load.inertia_kg_m2 = 1e-5;
     let stored = motor.stored_j();
     let mut field_turns = 0.0;
     for step in 0..60_000_u32 {
-        motor.load.torque_nm = if step > 30_000 { 0.8 } else { 0.1 };
+        motor.rig.load.torque_nm = if step > 30_000 { 0.8 } else { 0.1 };
         field_turns += 50.0 * 5.0 * (f64::from(step) / 20_000.0).min(1.0) * DT_S;
         let bridges = if step > 50_000 { Bridges::Open } else { field(field_turns, CURRENT_A) };
         motor.step(DT_S, &bridges);
     }
     let gained = motor.stored_j() - stored;
-    let through = motor.energy.source_j + motor.energy.load_j.abs();
-    let rest = motor.energy.balance_j() - gained;
-    assert!(rest.abs() < 1e-3 * through, "{rest} J missing of {through} J: {:?}", motor.energy);
+    let through = motor.rig.energy.source_j + motor.rig.energy.load_j.abs();
+    let rest = motor.rig.energy.balance_j() - gained;
+    assert!(rest.abs() < 1e-3 * through, "{rest} J missing of {through} J: {:?}", motor.rig.energy);
 }
 
 #[test]
 fn the_winding_warms_and_its_resistance_rises() {
     let fast = BodyModel { resistance_k_w: 5.0, capacity_j_k: 0.02 };
-    let mut motor = StepperMotor::new(StepperMotorModel { winding: fast, ..MODEL }, Angle::default(), 24.0, 20.0);
-    motor.load.locked = true;
+    let model = StepperMotorModel { rig: RigModel { winding: fast, ..MODEL.rig }, ..MODEL };
+    let mut motor = StepperMotor::new(model, Angle::default(), 24.0, 20.0);
+    motor.rig.load.locked = true;
     for _ in 0..100_000 {
         motor.step(DT_S, &Bridges::Driven([0.1, 0.0]));
     }
     let current = motor.sense().phase_current_a[0];
-    let winding_ohm = motor.supply.bus_v * 0.1 / current - MODEL.switch_resistance_ohm;
+    let winding_ohm = motor.rig.supply.bus_v * 0.1 / current - MODEL.rig.switch_resistance_ohm;
     let rise = 5.0 * current * current * winding_ohm;
     assert!((motor.sense().winding_c - 20.0 - rise).abs() < 0.01 * rise, "{rise}");
     assert!(near(winding_ohm, 1.65 * (1.0 + 0.003_93 * rise), 1e-3));
@@ -258,7 +260,7 @@ fn a_lost_phase_shows_in_the_currents() {
 fn halved_steps_lead_to_the_same_motion() {
     let play = |dt_s: f64| {
         let mut motor = motor(FREE);
-        motor.load.torque_nm = 0.1;
+        motor.rig.load.torque_nm = 0.1;
         for step in 0..(0.1 / dt_s).round() as u32 {
             // The field at the end of the step, from rest.
             let time_s = f64::from(step + 1) * dt_s;
@@ -303,10 +305,10 @@ proptest! {
         lost in prop::option::of(prop_oneof![Just(Phase::A), Just(Phase::B)]),
     ) {
         let mut motor = motor(MODEL);
-        motor.load.inertia_kg_m2 = 1e-5;
+        motor.rig.load.inertia_kg_m2 = 1e-5;
         let stored = motor.stored_j();
         for (index, (bridges, load_nm, steps)) in play.into_iter().enumerate() {
-            motor.load.torque_nm = load_nm;
+            motor.rig.load.torque_nm = load_nm;
             motor.lost_phase = if index % 3 == 2 { lost } else { None };
             for _ in 0..steps {
                 motor.step(DT_S, &bridges);
@@ -316,8 +318,8 @@ proptest! {
             prop_assert!(sensors.phase_current_a.iter().all(|a| a.is_finite()));
             prop_assert!(motor.rotor.velocity_rad_s.abs() < 1e5);
         }
-        let through = motor.energy.source_j + motor.stored_j() + motor.energy.load_j.abs() + motor.energy.winding_j;
-        let rest = motor.energy.balance_j() - (motor.stored_j() - stored);
+        let through = motor.rig.energy.source_j + motor.stored_j() + motor.rig.energy.load_j.abs() + motor.rig.energy.winding_j;
+        let rest = motor.rig.energy.balance_j() - (motor.stored_j() - stored);
         // At thousands of r/min out of step the torque turns round every few steps, and the angle's explicit step
         // shows: a per mille, in place of the parts in a million of a motor that is in step.
         prop_assert!(rest.abs() < 0.01 * through, "{rest} J missing of {through} J");

@@ -11,7 +11,7 @@ const OVER_VOLTAGE: i64 = 0x0001;
 /// Turning at `rpm` with an inertia on the shaft, to be stopped in `stop_ms` by a quick stop.
 fn turning(rpm: f64, inertia_kg_m2: f64, stop_ms: i64) -> Bench {
     let mut bench = Bench::open();
-    bench.motor().load.inertia_kg_m2 = inertia_kg_m2;
+    bench.motor().rig.load.inertia_kg_m2 = inertia_kg_m2;
     bench.set(0x605A, 0, 6);
     bench.set(0x6085, 0, stop_ms);
     bench.set(0x6083, 0, 2000);
@@ -25,7 +25,7 @@ fn turning(rpm: f64, inertia_kg_m2: f64, stop_ms: i64) -> Bench {
 fn highest_bus_v(bench: &mut Bench, ms: u64) -> f64 {
     (0..ms).fold(0.0, |highest, _| {
         bench.run(Duration::from_millis(1));
-        bench.motor().supply.bus_v.max(highest)
+        bench.motor().rig.supply.bus_v.max(highest)
     })
 }
 
@@ -34,13 +34,13 @@ fn the_energy_book_closes_over_a_day_of_work() {
     let mut bench = turning(200.0, 0.05, 300);
     bench.set(0x202E, 5, 1);
     let mut stored_before = bench.motor().stored_j();
-    let mut booked_before = bench.motor().energy.balance_j();
+    let mut booked_before = bench.motor().rig.energy.balance_j();
     for (step, target) in [150, -200, 30, 0].into_iter().enumerate() {
         bench.set(0x60FF, 0, target);
         bench.operate(|drive, now| drive.set_load_torque(step as f64 - 1.0, now)).expect("a load");
         bench.run_ms(1500);
-        let (stored, booked) = (bench.motor().stored_j(), bench.motor().energy.balance_j());
-        let turnover = bench.motor().energy.source_j;
+        let (stored, booked) = (bench.motor().stored_j(), bench.motor().rig.energy.balance_j());
+        let turnover = bench.motor().rig.energy.source_j;
         let gap = (stored - stored_before) - (booked - booked_before);
         assert_within("J missing, by J turned over", gap / turnover, -1e-6, 1e-6);
         (stored_before, booked_before) = (stored, booked);
@@ -52,10 +52,10 @@ fn the_energy_book_closes_over_a_day_of_work() {
 #[test]
 fn braking_raises_the_bus_by_what_the_wheel_gives_back() {
     let mut bench = turning(300.0, 0.0, 100);
-    let before = bench.motor().energy;
+    let before = bench.motor().rig.energy;
     let rad_s = 300.0 * RAD_S_PER_RPM;
     let kinetic_j = 0.5 * wheel::inertia_kg_m2() * rad_s.powi(2);
-    let start_v = bench.motor().supply.bus_v;
+    let start_v = bench.motor().rig.supply.bus_v;
     bench.set(0x6040, 0, 0x02);
     let highest_v = highest_bus_v(&mut bench, 150);
     // The S brakes with a peak of twice the mean: its copper loss is 4/3 of the mean torque's.
@@ -69,7 +69,7 @@ fn braking_raises_the_bus_by_what_the_wheel_gives_back() {
     assert_within("highest bus voltage", highest_v, expected_v - 1.0, expected_v + 1.0);
     let without_losses_v = (start_v * start_v + 2.0 * kinetic_j / wheel::bus_capacitance_f()).sqrt();
     assert!(SUPPLY_V + 5.0 < highest_v && highest_v < without_losses_v, "{highest_v} V");
-    let after = bench.motor().energy;
+    let after = bench.motor().rig.energy;
     assert_eq!(after.bleeder_j, before.bleeder_j, "no bleeder");
 }
 
@@ -91,7 +91,7 @@ fn hard_braking_with_a_bleeder_stays_between_its_two_voltages() {
     let highest_v = highest_bus_v(&mut bench, 700);
     assert_eq!((bench.get(0x603F, 0), bench.statusword() & 0xFF), (0, 0x17));
     assert_within("highest bus voltage", highest_v, 69.9, 70.5);
-    let burnt_j = bench.motor().energy.bleeder_j;
+    let burnt_j = bench.motor().rig.energy.bleeder_j;
     let kinetic_j = 0.5 * (wheel::inertia_kg_m2() + 0.1) * (300.0 * RAD_S_PER_RPM).powi(2);
     assert_within("J burnt", burnt_j, 0.3 * kinetic_j, kinetic_j);
 }
@@ -110,7 +110,7 @@ fn the_bleeder_switches_at_202e_03_and_202e_04() {
 #[test]
 fn a_steady_current_warms_the_winding_as_its_time_constant_says() {
     let mut bench = Bench::open();
-    bench.motor().load.locked = true;
+    bench.motor().rig.load.locked = true;
     bench.set(0x6087, 0, 0);
     bench.enable_in(4);
     bench.set(0x6071, 0, 10_000);

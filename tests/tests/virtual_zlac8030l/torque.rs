@@ -18,7 +18,7 @@ fn stalled(slope_ma_s: i64) -> Bench {
     bench.set(0x60FF, 0, 0);
     bench.run_ms(1000);
     bench.set(0x6060, 0, 4);
-    bench.motor().load.locked = true;
+    bench.motor().rig.load.locked = true;
     bench.set(0x6087, 0, slope_ma_s);
     assert_eq!((bench.get(0x6061, 0), bench.statusword() & 0xFF), (4, 0x37));
     bench
@@ -58,7 +58,7 @@ fn the_current_rises_with_the_slope_of_6087h() {
 #[test]
 fn the_slope_as_delivered_is_300_ma_a_second() {
     let mut bench = Bench::open();
-    bench.motor().load.locked = true;
+    bench.motor().rig.load.locked = true;
     bench.enable_in(4);
     bench.set(0x6071, 0, 3000);
     bench.run_ms(1000);
@@ -83,7 +83,7 @@ fn a_stalled_motor_carries_the_current_that_is_asked_for_but_no_more_than_2015h(
 #[test]
 fn before_the_shaft_has_turned_a_sixth_of_its_torque_may_be_missing() {
     let mut bench = Bench::open();
-    bench.motor().load.locked = true;
+    bench.motor().rig.load.locked = true;
     bench.set(0x6087, 0, 0);
     bench.enable_in(4);
     bench.set(0x6071, 0, 10_000);
@@ -98,9 +98,9 @@ fn a_stalled_motor_draws_only_what_its_resistance_turns_into_heat() {
     let mut bench = stalled(0);
     bench.set(0x6071, 0, 10_000);
     bench.run_ms(200);
-    let before = bench.motor().energy;
+    let before = bench.motor().rig.energy;
     bench.run_ms(1000);
-    let after = bench.motor().energy;
+    let after = bench.motor().rig.energy;
     let heat_w = after.winding_j + after.switches_j - before.winding_j - before.switches_j;
     let expected_w = 1.5 * wheel::phase_ohm() * 100.0;
     assert_within("heat in W", heat_w, expected_w * 0.99, expected_w * 1.01);
@@ -159,7 +159,7 @@ fn parking_holds_the_current_to_3_a_and_its_end_gives_it_back() {
 #[test]
 fn a_free_wheel_in_torque_mode_accelerates_with_torque_over_inertia() {
     let mut bench = Bench::open();
-    bench.motor().load.inertia_kg_m2 = 0.05;
+    bench.motor().rig.load.inertia_kg_m2 = 0.05;
     bench.set(0x6087, 0, 0);
     bench.enable_in(4);
     bench.set(0x6071, 0, 2000);

@@ -11,12 +11,12 @@ pub(crate) const COUNTS_PER_TURN: f64 = 4096.0;
 
 /// Resistance of a phase with its switch, at the ambient temperature of 25 °C.
 pub(crate) fn phase_ohm() -> f64 {
-    winding_ohm(25.0) + MODEL.switch_resistance_ohm
+    winding_ohm(25.0) + MODEL.rig.switch_resistance_ohm
 }
 
 /// Resistance of a phase of the winding at a temperature: copper.
 pub(crate) fn winding_ohm(celsius: f64) -> f64 {
-    MODEL.pmsm.resistance_ohm * (1.0 + MODEL.resistance_per_k * (celsius - 20.0))
+    MODEL.pmsm.resistance_ohm * (1.0 + MODEL.rig.resistance_per_k * (celsius - 20.0))
 }
 
 /// Torque of 1 A: 3/2 p psi.
@@ -39,7 +39,7 @@ pub(crate) fn inertia_kg_m2() -> f64 {
 }
 
 pub(crate) fn bus_capacitance_f() -> f64 {
-    MODEL.supply.capacitance_f
+    MODEL.rig.supply.capacitance_f
 }
 
 /// Time that the free wheel takes from a speed to rest: J dw/dt = -(dry + viscous w).
@@ -59,6 +59,6 @@ pub(crate) fn no_load_rpm(bus_v: f64, share: f64) -> f64 {
 
 /// Winding's warming after `time_s` of steady heat: one body of resistance Rth and capacity C.
 pub(crate) fn warming_k(heat_w: f64, time_s: f64) -> f64 {
-    let body = MODEL.winding;
+    let body = MODEL.rig.winding;
     heat_w * body.resistance_k_w * (1.0 - (-time_s / body.time_constant_s()).exp())
 }

@@ -62,7 +62,7 @@ impl Bench {
     }
 
     pub(crate) fn power_on(&mut self) {
-        self.motor.supply.connected = true;
+        self.motor.rig.supply.connected = true;
         self.drive.power_on(&self.hardware, self.now);
         self.run_ms(5);
     }
@@ -70,15 +70,15 @@ impl Bench {
     pub(crate) fn power_off(&mut self) {
         self.drive.power_off(self.now);
         self.hardware.eeprom = Image::from_bytes(self.drive.eeprom().0);
-        self.motor.supply.connected = false;
-        self.motor.supply.bus_v = 0.0;
+        self.motor.rig.supply.connected = false;
+        self.motor.rig.supply.bus_v = 0.0;
     }
 
     /// Off for a while and on again; the EEPROM keeps what it holds.
     pub(crate) fn power_cycle(&mut self) {
         self.power_off();
         self.run_ms(20);
-        self.motor.supply.bus_v = self.motor.supply.source_v;
+        self.motor.rig.supply.bus_v = self.motor.rig.supply.source_v;
         self.power_on();
     }
 

@@ -50,7 +50,7 @@ impl Rig {
     /// Any motor on 48 V, its gains derived from its own constants.
     pub(crate) fn with_motor(model: HubMotorModel, outer_every: u32) -> Self {
         let motor = HubMotor::new(model, Angle::new(0, 0.123), 48.0, 25.0);
-        let resistance_ohm = (model.pmsm.resistance_ohm + model.switch_resistance_ohm) as f32;
+        let resistance_ohm = (model.pmsm.resistance_ohm + model.rig.switch_resistance_ohm) as f32;
         let inductance_h = model.pmsm.inductance_q_h as f32;
         let torque_constant = model.pmsm.torque_constant_nm_a() as f32;
         let current = PiGains::for_winding(3000.0, resistance_ohm, inductance_h);
@@ -100,7 +100,7 @@ impl Rig {
 
     /// Turns the shaft by hand over a Hall border, so that the commutation angle is exact.
     pub(crate) fn align(&mut self) {
-        let locked = core::mem::take(&mut self.motor.load.locked);
+        let locked = core::mem::take(&mut self.motor.rig.load.locked);
         self.motor.rotor.velocity_rad_s = 4.0;
         for _ in 0..2000 {
             self.motor.step(f64::from(DT_S), &Actuation { brake_released: true, ..Actuation::default() });
@@ -109,7 +109,7 @@ impl Rig {
             self.observer.update(&self.observer_gains, encoder_count);
         }
         assert!(self.commutation.is_aligned());
-        self.motor.load.locked = locked;
+        self.motor.rig.load.locked = locked;
     }
 
     /// Counts since power-on.

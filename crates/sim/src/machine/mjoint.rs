@@ -11,7 +11,7 @@ use drives::mjoint::readings::{COUNTS_PER_TURN, COUNTS_S_PER_RPM};
 use drives::mjoint::{Actuation, Battery, Brake, Hardware, Image, MJoint, Model, PowerStage, Sensors, objects};
 use plant::absolute_encoder::BatteryState;
 use plant::pmsm::Phase;
-use plant::{Angle, Inverter, JointMotor, JointMotorModel, joint_motor};
+use plant::{Angle, Inverter, JointMotor, JointMotorModel, Rig, joint_motor};
 
 use super::Machine;
 use super::assembly::{Assembly, within};
@@ -61,9 +61,9 @@ impl Joint {
     /// At rest at ambient temperature, the supply not yet connected.
     pub fn new(model: &'static Model, image: Image, bitrate: Bitrate) -> Self {
         let mut motor = JointMotor::new(motor_of(model), Angle::default(), SUPPLY_V, AMBIENT_C);
-        motor.model.supply.capacitance_f += SUPPLY_CAPACITANCE_F;
-        motor.supply.connected = false;
-        motor.supply.bus_v = 0.0;
+        motor.model.rig.supply.capacitance_f += SUPPLY_CAPACITANCE_F;
+        motor.rig.supply.connected = false;
+        motor.rig.supply.bus_v = 0.0;
         Self {
             model,
             motor,
@@ -172,9 +172,9 @@ impl Assembly for Joint {
             position: i64::from(own.position_counts),
             velocity_rpm: rotor.velocity_rad_s * RPM_PER_RAD_S,
             current_a: f64::from(own.current_a),
-            supply_v: self.motor.supply.bus_v,
-            motor_c: Some(self.motor.winding.temperature_c),
-            driver_c: Some(self.motor.heat_sink.temperature_c),
+            supply_v: self.motor.rig.supply.bus_v,
+            motor_c: Some(self.motor.rig.winding.temperature_c),
+            driver_c: Some(self.motor.rig.heat_sink.temperature_c),
             outputs: Levels {
                 names: OUTPUTS,
                 bits: bits.iter().enumerate().fold(0, |all, (n, bit)| all | u32::from(running && *bit) << n),
@@ -186,7 +186,7 @@ impl Assembly for Joint {
     }
 
     fn connect_supply(&mut self, on: bool) {
-        let JointMotor { supply, encoder, model, rotor, .. } = &mut self.motor;
+        let JointMotor { rig: Rig { supply, .. }, encoder, model, rotor, .. } = &mut self.motor;
         if on && !supply.connected {
             // The inrush limiter has charged the capacitor by the time the drive's converter starts.
             supply.bus_v = supply.bus_v.max(supply.source_v);
@@ -202,7 +202,7 @@ impl Assembly for Joint {
     }
 
     fn supplies_firmware(&self, running: bool) -> bool {
-        self.motor.supply.bus_v >= if running { STOP_V } else { START_V }
+        self.motor.rig.supply.bus_v >= if running { STOP_V } else { START_V }
     }
 
     #[inline]
@@ -223,21 +223,21 @@ impl Assembly for Joint {
     }
 
     fn set_load_torque(&mut self, torque_nm: f64) -> Result<(), Refused> {
-        self.motor.load.torque_nm = within("load torque", "-1000 to 1000 N·m", -1000.0..=1000.0, torque_nm)?;
+        self.motor.rig.load.torque_nm = within("load torque", "-1000 to 1000 N·m", -1000.0..=1000.0, torque_nm)?;
         Ok(())
     }
 
     fn set_load_inertia(&mut self, inertia_kg_m2: f64) -> Result<(), Refused> {
-        self.motor.load.inertia_kg_m2 = within("load inertia", "0 to 1000 kg·m²", 0.0..=1000.0, inertia_kg_m2)?;
+        self.motor.rig.load.inertia_kg_m2 = within("load inertia", "0 to 1000 kg·m²", 0.0..=1000.0, inertia_kg_m2)?;
         Ok(())
     }
 
     fn set_rotor_locked(&mut self, locked: bool) {
-        self.motor.load.locked = locked;
+        self.motor.rig.load.locked = locked;
     }
 
     fn set_supply(&mut self, supply_v: f64) -> Result<(), Refused> {
-        let supply = &mut self.motor.supply;
+        let supply = &mut self.motor.rig.supply;
         supply.source_v = within("supply", "0 to 100 V", 0.0..=100.0, supply_v)?;
         // A supply that is turned down discharges its own output; only the motor's energy it cannot take.
         if supply.connected {
@@ -251,8 +251,8 @@ impl Assembly for Joint {
             within("temperature", "-55 to 200 °C", -55.0..=200.0, celsius)?;
         }
         let body = match sensor {
-            TemperatureSensor::Motor => &mut self.motor.winding,
-            TemperatureSensor::Driver => &mut self.motor.heat_sink,
+            TemperatureSensor::Motor => &mut self.motor.rig.winding,
+            TemperatureSensor::Driver => &mut self.motor.rig.heat_sink,
         };
         body.hold_c = celsius;
         Ok(())

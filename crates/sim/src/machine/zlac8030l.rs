@@ -62,7 +62,7 @@ impl HubWheel {
         let mut model = HubMotorModel::ZLLG65ASM250_L;
         model.brake.holding_nm = BRAKE_NM;
         let mut motor = HubMotor::new(model, Angle::default(), SUPPLY_V, AMBIENT_C);
-        motor.supply.connected = false;
+        motor.rig.supply.connected = false;
         Self { motor, dip_address, image, eeprom_broken: false, reference_broken: false, last: Actuation::default() }
     }
 
@@ -136,9 +136,9 @@ impl Assembly for HubWheel {
             velocity_demand_rpm: demand.velocity_rpm,
             current_a: f64::from(own.current_a),
             current_demand_a: demand.current_a,
-            supply_v: self.motor.supply.bus_v,
-            motor_c: Some(self.motor.winding.temperature_c),
-            driver_c: Some(self.motor.heat_sink.temperature_c),
+            supply_v: self.motor.rig.supply.bus_v,
+            motor_c: Some(self.motor.rig.winding.temperature_c),
+            driver_c: Some(self.motor.rig.heat_sink.temperature_c),
             outputs: Levels {
                 names: OUTPUTS,
                 bits: u32::from(self.last.outputs[0]) | u32::from(self.last.outputs[1]) << 1,
@@ -149,7 +149,7 @@ impl Assembly for HubWheel {
     }
 
     fn connect_supply(&mut self, on: bool) {
-        let supply = &mut self.motor.supply;
+        let supply = &mut self.motor.rig.supply;
         if on && !supply.connected {
             // The inrush limiter has charged the capacitor by the time the drive's converter starts.
             supply.bus_v = supply.bus_v.max(supply.source_v);
@@ -158,7 +158,7 @@ impl Assembly for HubWheel {
     }
 
     fn supplies_firmware(&self, running: bool) -> bool {
-        self.motor.supply.bus_v >= if running { STOP_V } else { START_V }
+        self.motor.rig.supply.bus_v >= if running { STOP_V } else { START_V }
     }
 
     #[inline]
@@ -179,21 +179,21 @@ impl Assembly for HubWheel {
     }
 
     fn set_load_torque(&mut self, torque_nm: f64) -> Result<(), Refused> {
-        self.motor.load.torque_nm = within("load torque", "-1000 to 1000 N·m", -1000.0..=1000.0, torque_nm)?;
+        self.motor.rig.load.torque_nm = within("load torque", "-1000 to 1000 N·m", -1000.0..=1000.0, torque_nm)?;
         Ok(())
     }
 
     fn set_load_inertia(&mut self, inertia_kg_m2: f64) -> Result<(), Refused> {
-        self.motor.load.inertia_kg_m2 = within("load inertia", "0 to 1000 kg·m²", 0.0..=1000.0, inertia_kg_m2)?;
+        self.motor.rig.load.inertia_kg_m2 = within("load inertia", "0 to 1000 kg·m²", 0.0..=1000.0, inertia_kg_m2)?;
         Ok(())
     }
 
     fn set_rotor_locked(&mut self, locked: bool) {
-        self.motor.load.locked = locked;
+        self.motor.rig.load.locked = locked;
     }
 
     fn set_supply(&mut self, supply_v: f64) -> Result<(), Refused> {
-        let supply = &mut self.motor.supply;
+        let supply = &mut self.motor.rig.supply;
         supply.source_v = within("supply", "0 to 100 V", 0.0..=100.0, supply_v)?;
         // A supply that is turned down discharges its own output; only the motor's energy it cannot take.
         if supply.connected {
@@ -207,8 +207,8 @@ impl Assembly for HubWheel {
             within("temperature", "-55 to 200 °C", -55.0..=200.0, celsius)?;
         }
         let body = match sensor {
-            TemperatureSensor::Motor => &mut self.motor.winding,
-            TemperatureSensor::Driver => &mut self.motor.heat_sink,
+            TemperatureSensor::Motor => &mut self.motor.rig.winding,
+            TemperatureSensor::Driver => &mut self.motor.rig.heat_sink,
         };
         body.hold_c = celsius;
         Ok(())

@@ -72,7 +72,7 @@ impl<const LENGTH_MM: u16> Stepper<LENGTH_MM> {
     pub fn new(dip_address: u8, image: Image) -> Self {
         let model = if LENGTH_MM == LONG { StepperMotorModel::ZLIM42_C_82 } else { StepperMotorModel::ZLIM42_C_70 };
         let mut motor = StepperMotor::new(model, Angle::default(), SUPPLY_V, AMBIENT_C);
-        motor.supply.connected = false;
+        motor.rig.supply.connected = false;
         Self {
             motor,
             dip_address,
@@ -175,7 +175,7 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
             velocity_demand_rpm: demand.map(|point| rpm(point.velocity)),
             current_a: f64::from(own.current_a),
             current_demand_a: demand.map(|_| f64::from(firmware.current_demand_a())),
-            supply_v: self.motor.supply.bus_v,
+            supply_v: self.motor.rig.supply.bus_v,
             motor_c: None,
             driver_c: None,
             outputs: Levels {
@@ -188,7 +188,7 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
     }
 
     fn connect_supply(&mut self, on: bool) {
-        let supply = &mut self.motor.supply;
+        let supply = &mut self.motor.rig.supply;
         if on && !supply.connected {
             // The inrush limiter has charged the capacitor by the time the drive's converter starts.
             supply.bus_v = supply.bus_v.max(supply.source_v);
@@ -197,7 +197,7 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
     }
 
     fn supplies_firmware(&self, running: bool) -> bool {
-        self.motor.supply.bus_v >= if running { STOP_V } else { START_V }
+        self.motor.rig.supply.bus_v >= if running { STOP_V } else { START_V }
     }
 
     #[inline]
@@ -223,21 +223,21 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
     }
 
     fn set_load_torque(&mut self, torque_nm: f64) -> Result<(), Refused> {
-        self.motor.load.torque_nm = within("load torque", "-100 to 100 N·m", -100.0..=100.0, torque_nm)?;
+        self.motor.rig.load.torque_nm = within("load torque", "-100 to 100 N·m", -100.0..=100.0, torque_nm)?;
         Ok(())
     }
 
     fn set_load_inertia(&mut self, inertia_kg_m2: f64) -> Result<(), Refused> {
-        self.motor.load.inertia_kg_m2 = within("load inertia", "0 to 100 kg·m²", 0.0..=100.0, inertia_kg_m2)?;
+        self.motor.rig.load.inertia_kg_m2 = within("load inertia", "0 to 100 kg·m²", 0.0..=100.0, inertia_kg_m2)?;
         Ok(())
     }
 
     fn set_rotor_locked(&mut self, locked: bool) {
-        self.motor.load.locked = locked;
+        self.motor.rig.load.locked = locked;
     }
 
     fn set_supply(&mut self, supply_v: f64) -> Result<(), Refused> {
-        self.motor.supply.source_v = within("supply", "0 to 100 V", 0.0..=100.0, supply_v)?;
+        self.motor.rig.supply.source_v = within("supply", "0 to 100 V", 0.0..=100.0, supply_v)?;
         Ok(())
     }
 

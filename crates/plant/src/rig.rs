@@ -1,0 +1,155 @@
+//! What a motor of any kind is rigged up with: load, supply and power stage, warm bodies, and the book of energies.
+//!
+//! A composition ([`hub_motor`](crate::hub_motor), [`joint_motor`](crate::joint_motor),
+//! [`stepper_motor`](crate::stepper_motor)) says what its windings and its shaft did during a step; out come the bus,
+//! the temperatures, the winding's resistance and the energies. The load, the source and the surroundings are plain
+//! fields that a test or a person at a bench changes at any time. What the load does to the shaft is the composition's.
+
+use crate::mechanics::Load;
+use crate::supply::{SupplyData, SupplyModel};
+use crate::thermal::{BodyData, BodyModel, resistance_at_ohm};
+
+/// Steps between two looks at the slow things: heat, resistance, and the exact direction of the magnets. Bodies are
+/// a million steps slow, and turning the direction on by its series is off by 1e-11 in so many steps.
+const SLOW_EVERY: u32 = 16;
+
+/// What never changes about it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RigModel {
+    /// The winding as a warm body.
+    pub winding: BodyModel,
+    /// Change of the winding's resistance per kelvin, relative to that at 20 °C; 0 for none.
+    pub resistance_per_k: f64,
+    /// The power stage's heat sink as a warm body.
+    pub heat_sink: BodyModel,
+    /// Resistance of the power stage's switches and wires in each phase.
+    pub switch_resistance_ohm: f64,
+    /// The direct-voltage side.
+    pub supply: SupplyModel,
+}
+
+/// Energies since power-on. The sum of what came in equals the sum of where it went, but for what is stored.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Energy {
+    /// In: from the source.
+    pub source_j: f64,
+    /// Out: heat of the winding.
+    pub winding_j: f64,
+    /// Out: heat of the switches, and of the arc of a wire that comes off under current.
+    pub switches_j: f64,
+    /// Out: heat of all friction, brake and gear included.
+    pub friction_j: f64,
+    /// Out: work done on the active load torque; negative while the load drove.
+    pub load_j: f64,
+    /// Out: heat of the bleeder.
+    pub bleeder_j: f64,
+    /// Out: the drive's own electronics.
+    pub consumption_j: f64,
+}
+
+impl Energy {
+    /// All that came in less all that went out: equals the change of the stored energy.
+    pub fn balance_j(&self) -> f64 {
+        self.source_j
+            - (self.winding_j + self.switches_j + self.friction_j + self.load_j + self.bleeder_j + self.consumption_j)
+    }
+}
+
+/// Its state.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rig {
+    /// What the shaft, or the gear's output, is joined to.
+    pub load: Load,
+    /// Source and bus.
+    pub supply: SupplyData,
+    /// Winding temperature.
+    pub winding: BodyData,
+    /// Heat-sink temperature.
+    pub heat_sink: BodyData,
+    /// Temperature of the surroundings.
+    pub ambient_c: f64,
+    /// Energy book.
+    pub energy: Energy,
+    winding_ohm: f64,
+    slow: Slow,
+}
+
+/// When the slow things were last looked at.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Slow {
+    steps: u32,
+    time_s: f64,
+    winding_j: f64,
+    heat_sink_j: f64,
+}
+
+/// What windings and shaft did during a step.
+pub(crate) struct Flows {
+    /// Power that the windings took from the bus; negative while regenerating.
+    pub(crate) bus_w: f64,
+    /// Heat in the phases' resistance per ohm of it.
+    pub(crate) heat_w_per_ohm: f64,
+    /// Heat of an arc.
+    pub(crate) arc_j: f64,
+    /// Heat of all friction.
+    pub(crate) friction_j: f64,
+    /// Work done on the active load torque.
+    pub(crate) load_j: f64,
+}
+
+impl Rig {
+    /// No load, the bus charged from a source of `source_v`, all at `ambient_c`. A phase of the winding has `cold_ohm`
+    /// at 20 °C.
+    pub(crate) fn new(model: &RigModel, cold_ohm: f64, source_v: f64, ambient_c: f64) -> Self {
+        Rig {
+            load: Load::default(),
+            supply: SupplyData::charged(source_v),
+            winding: model.winding.at_ambient(ambient_c),
+            heat_sink: model.heat_sink.at_ambient(ambient_c),
+            ambient_c,
+            energy: Energy::default(),
+            winding_ohm: resistance_at_ohm(cold_ohm, model.resistance_per_k, ambient_c),
+            slow: Slow::default(),
+        }
+    }
+
+    /// Resistance of one phase's path: winding, switches and wires.
+    #[inline]
+    pub(crate) fn path_ohm(&self, model: &RigModel) -> f64 {
+        self.winding_ohm + model.switch_resistance_ohm
+    }
+
+    /// One step of bus and energies. True when [`step_slow`](Self::step_slow) is due.
+    #[inline]
+    pub(crate) fn step(&mut self, model: &RigModel, dt_s: f64, flows: &Flows, bleeder_on: bool) -> bool {
+        let bus = model.supply.step(&mut self.supply, dt_s, flows.bus_w, bleeder_on);
+
+        self.energy.source_j += bus.source_j;
+        self.energy.winding_j += flows.heat_w_per_ohm * self.winding_ohm * dt_s;
+        self.energy.switches_j += flows.heat_w_per_ohm * model.switch_resistance_ohm * dt_s + flows.arc_j;
+        self.energy.friction_j += flows.friction_j;
+        self.energy.load_j += flows.load_j;
+        self.energy.bleeder_j += bus.bleeder_j;
+        self.energy.consumption_j += bus.consumption_j;
+
+        self.slow.steps += 1;
+        self.slow.time_s += dt_s;
+        self.slow.steps >= SLOW_EVERY
+    }
+
+    /// Heat of the steps since the last call into the bodies, and the winding's resistance. The time of those steps, s.
+    pub(crate) fn step_slow(&mut self, model: &RigModel, cold_ohm: f64) -> f64 {
+        let Slow { time_s, winding_j, heat_sink_j, .. } = self.slow;
+        let into_winding_j = self.energy.winding_j;
+        let into_heat_sink_j = self.energy.switches_j + self.energy.consumption_j;
+        if time_s > 0.0 {
+            let winding_w = (into_winding_j - winding_j) / time_s;
+            let heat_sink_w = (into_heat_sink_j - heat_sink_j) / time_s;
+            model.winding.step(&mut self.winding, time_s, winding_w, self.ambient_c);
+            model.heat_sink.step(&mut self.heat_sink, time_s, heat_sink_w, self.ambient_c);
+        }
+        self.winding_ohm = resistance_at_ohm(cold_ohm, model.resistance_per_k, self.winding.temperature_c);
+        self.slow = Slow { steps: 0, time_s: 0.0, winding_j: into_winding_j, heat_sink_j: into_heat_sink_j };
+        time_s
+    }
+}
