@@ -1,6 +1,6 @@
 //! The vocabulary of the table: the manual's type letters and attributes as short `const fn`s.
 
-use canopen::od::{Access, DataType, Entry};
+use canopen::od::{Access, DataType, Entry, Slot};
 
 pub(crate) const U8: DataType = DataType::Unsigned8;
 pub(crate) const U16: DataType = DataType::Unsigned16;
@@ -8,6 +8,9 @@ pub(crate) const U32: DataType = DataType::Unsigned32;
 pub(crate) const I8: DataType = DataType::Integer8;
 pub(crate) const I16: DataType = DataType::Integer16;
 pub(crate) const I32: DataType = DataType::Integer32;
+
+/// The values that an object accepts, with what each means.
+pub(crate) type Values = &'static [(i64, &'static str)];
 
 /// Attribute RO.
 pub(crate) const fn ro(index: u16, sub: u8, data_type: DataType, name: &'static str, title: &'static str) -> Entry {
@@ -43,3 +46,23 @@ pub(crate) const fn join<const N: usize>(parts: &[&[Entry]]) -> [Entry; N] {
     assert!(at == N, "the parts do not have N rows");
     rows
 }
+
+/// What a write to each row of a table does: as `named`, or else `other`. Looked up by [`Slot::position`].
+pub(crate) const fn effects<E: Copy, const N: usize>(named: &[(Slot, E)], other: E) -> [E; N] {
+    let mut effects = [other; N];
+    let mut i = 0;
+    while i < named.len() {
+        effects[named[i].0.position()] = named[i].1;
+        i += 1;
+    }
+    effects
+}
+
+/// Constants for objects of a table, checked at compile time: `NAME: type = index sub-index;`.
+macro_rules! objects {
+    ($table:ident: $($name:ident: $type:ty = $index:literal $sub:literal;)*) => {
+        $(#[doc = concat!("Object ", stringify!($index), ":", stringify!($sub), ".")]
+        pub const $name: canopen::od::Object<$type> = $table.object($index, $sub);)*
+    };
+}
+pub(crate) use objects;

@@ -2,7 +2,8 @@
 
 use can::{CanId, Frame, Instant, Station};
 use drives::Firmware;
-use drives::zlim42c::{Actuation, Hardware, Image, PowerStage, Sensors, Zlim42c, objects};
+use drives::engine::storage::Image;
+use drives::zlim42c::{Actuation, Hardware, PowerStage, Sensors, Zlim42c, objects, storage};
 
 struct Pins {
     drive: Zlim42c,
@@ -52,7 +53,7 @@ impl Pins {
 #[test]
 fn over_current_switches_off_in_the_control_period_in_which_it_is_measured() {
     for phase_current_a in [[5.0, 0.0], [0.0, -5.0], [f32::NAN, 0.0]] {
-        let mut pins = Pins::new(Image::factory());
+        let mut pins = Pins::new(storage::factory());
         for word in [0x06, 0x07] {
             pins.write(0x6040, word);
         }
@@ -79,7 +80,7 @@ fn a_blank_eeprom_is_a_fault_that_factory_settings_end() {
 
 #[test]
 fn a_reading_that_is_no_number_is_a_fault_and_never_a_duty_cycle() {
-    let mut pins = Pins::new(Image::factory());
+    let mut pins = Pins::new(storage::factory());
     for word in [0x06, 0x07, 0x0F] {
         pins.write(0x6040, word);
     }

@@ -87,7 +87,7 @@ pub struct Entry {
     pub access: Access,
     /// The standard's name in snake case, to search and type: `position_actual_value`.
     pub name: &'static str,
-    /// The manual's words.
+    /// The manual's words, or the standard's.
     pub title: &'static str,
     /// Factory value.
     pub default: Default,

@@ -23,8 +23,28 @@ const CRC_SIZE: usize = 4;
 /// Most rows that a bank holds.
 pub const CAPACITY: usize = (BANK_SIZE - HEADER_SIZE - CRC_SIZE) / RECORD_SIZE;
 
-/// The bytes of an EEPROM.
-pub type ImageBytes = [u8; IMAGE_SIZE];
+/// Contents of an EEPROM, to be kept over power cycles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Image(pub [u8; IMAGE_SIZE]);
+
+impl Image {
+    /// A chip that has never been written: no drive can read it until factory settings are restored.
+    pub const BLANK: Self = Self([0xFF; IMAGE_SIZE]);
+
+    /// The stored rows of a dictionary with their values.
+    pub fn of<const N: usize>(dictionary: &Dictionary<N>) -> Self {
+        let mut store = Store::new(Self::BLANK);
+        store.format(dictionary);
+        store.image
+    }
+
+    /// The image in a file's bytes: short files are padded as blank, long ones cut; a checksum tells if it is sound.
+    pub fn from_bytes(bytes: &[u8]) -> Self {
+        let mut image = Self::BLANK;
+        image.0.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
+        image
+    }
+}
 
 /// No bank of the image holds a checked set of values: it is blank, damaged or of another firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,7 +57,7 @@ struct Pending([u32; 8]);
 /// An EEPROM with the rows that wait to be written into it.
 #[derive(Clone, Debug)]
 pub struct Store {
-    image: ImageBytes,
+    image: Image,
     active: Option<Bank>,
     pending: Pending,
     generation: u32,
@@ -50,18 +70,18 @@ struct Bank {
 }
 
 impl Store {
-    /// A store over the bytes found at power-on.
-    pub fn new(image: ImageBytes) -> Self {
+    /// A store over what is found at power-on.
+    pub fn new(image: Image) -> Self {
         Self { image, active: newest_bank(&image), pending: Pending::default(), generation: 0 }
     }
 
     /// The same EEPROM at the next power-on: what waited to be written is lost, the generation goes on.
-    pub fn reopen(&mut self, image: ImageBytes) {
+    pub fn reopen(&mut self, image: Image) {
         *self = Self { generation: self.generation, ..Self::new(image) };
     }
 
-    /// The bytes and their generation, which changes with them.
-    pub fn image(&self) -> (&ImageBytes, u32) {
+    /// The image and its generation, which changes with it.
+    pub fn image(&self) -> (&Image, u32) {
         (&self.image, self.generation)
     }
 
@@ -81,7 +101,7 @@ impl Store {
         wanted: fn(&Entry) -> bool,
     ) -> Result<(), Unreadable> {
         let bank = self.active.ok_or(Unreadable)?;
-        let bytes = &self.image[bank.number * BANK_SIZE..][..BANK_SIZE];
+        let bytes = &self.image.0[bank.number * BANK_SIZE..][..BANK_SIZE];
         for record in bytes[HEADER_SIZE..].chunks_exact(RECORD_SIZE).take(record_count(bytes)) {
             let (key, raw) = (word(record, 0), word(record, 4));
             let table = dictionary.table();
@@ -119,7 +139,7 @@ impl Store {
         let pending = core::mem::take(&mut self.pending);
         let old = bank.number * BANK_SIZE;
         let mut bytes = [0; BANK_SIZE];
-        bytes.copy_from_slice(&self.image[old..][..BANK_SIZE]);
+        bytes.copy_from_slice(&self.image.0[old..][..BANK_SIZE]);
         let stored = dictionary.table().iter().filter(|(_, row)| row.stored);
         for (position, (slot, row)) in stored.enumerate() {
             let record = HEADER_SIZE + position * RECORD_SIZE;
@@ -161,7 +181,7 @@ impl Store {
         let end = HEADER_SIZE + count * RECORD_SIZE;
         let crc = crc32(&bytes[..end]);
         put_word(&mut bytes, end, crc);
-        self.image[bank.number * BANK_SIZE..][..BANK_SIZE].copy_from_slice(&bytes);
+        self.image.0[bank.number * BANK_SIZE..][..BANK_SIZE].copy_from_slice(&bytes);
         self.active = Some(bank);
         self.generation = self.generation.wrapping_add(1);
     }
@@ -198,9 +218,9 @@ impl Pending {
     }
 }
 
-fn newest_bank(image: &ImageBytes) -> Option<Bank> {
+fn newest_bank(image: &Image) -> Option<Bank> {
     let bank = |number: usize| {
-        let bytes = &image[number * BANK_SIZE..][..BANK_SIZE];
+        let bytes = &image.0[number * BANK_SIZE..][..BANK_SIZE];
         is_sound(bytes).then(|| Bank { number, sequence: word(bytes, 8) })
     };
     match (bank(0), bank(1)) {
@@ -283,12 +303,12 @@ mod tests {
     }
 
     fn formatted() -> Store {
-        let mut store = Store::new([0xFF; IMAGE_SIZE]);
+        let mut store = Store::new(Image::BLANK);
         store.format(&defaults());
         store
     }
 
-    fn values(image: ImageBytes) -> (u16, u16, i16) {
+    fn values(image: Image) -> (u16, u16, i16) {
         let mut dictionary = defaults();
         Store::new(image).load(&mut dictionary, |_| true).unwrap();
         (dictionary.get(A), dictionary.get(B), dictionary.get(C))
@@ -301,7 +321,7 @@ mod tests {
 
     #[test]
     fn a_blank_image_is_unreadable_until_it_is_formatted() {
-        let mut store = Store::new([0xFF; IMAGE_SIZE]);
+        let mut store = Store::new(Image::BLANK);
         assert_eq!(store.load(&mut defaults(), |_| true), Err(Unreadable));
         store.mark_all(&TABLE);
         store.commit(&defaults());
@@ -346,7 +366,7 @@ mod tests {
             let new = *store.image().0;
             for cut in 0..=IMAGE_SIZE {
                 let mut torn = old;
-                torn[..cut].copy_from_slice(&new[..cut]);
+                torn.0[..cut].copy_from_slice(&new.0[..cut]);
                 let a = values(torn).0;
                 assert!(a == values(old).0 || a == round, "cut at {cut}");
             }
@@ -362,7 +382,7 @@ mod tests {
         store.commit(&dictionary);
         for byte in 0..IMAGE_SIZE {
             let mut image = *store.image().0;
-            image[byte] ^= 0x10;
+            image.0[byte] ^= 0x10;
             let (a, _, c) = values(image);
             assert!(matches!((a, c), (50, -9) | (7, -9)), "byte {byte}");
         }

@@ -3,7 +3,8 @@
 use can::Bitrate;
 
 use super::pulses::PulseInput;
-use super::storage::Image;
+use super::storage;
+use crate::engine::storage::Image;
 
 /// The encoder's battery.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -100,6 +101,6 @@ pub struct Hardware {
 impl Default for Hardware {
     /// As delivered.
     fn default() -> Self {
-        Self { eeprom: Image::factory(), bitrate: Bitrate::M1 }
+        Self { eeprom: storage::factory(), bitrate: Bitrate::M1 }
     }
 }

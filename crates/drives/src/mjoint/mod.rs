@@ -23,13 +23,12 @@ mod protection;
 pub mod pulses;
 pub mod readings;
 pub mod statusword;
-mod storage;
+pub mod storage;
 
 pub use drive::{MJoint, NODE_PROFILE};
 pub use hardware::{Actuation, Battery, Brake, Hardware, PowerStage, Sensors};
 pub use model::Model;
 pub use profile::{M4230E17B50, M4230E17B80, M8025E25B50, M8025E25B80};
-pub use storage::Image;
 
 /// The values of the drive's objects.
 pub type Values = canopen::od::Dictionary<{ objects::ROW_COUNT }>;

@@ -6,7 +6,6 @@
 use can::{Bitrate, Frame, Instant, Station};
 use canopen::node::{Node, NodeEvent, NodeProfile};
 use canopen::od::{Entry, Slot};
-use canopen::pdo::EventTrigger;
 use canopen::{EmcyErrorCode, NodeId};
 use cia402::{Controlword, ModeOfOperation, PowerState};
 use motion::filter::{LowPass, LowPassGains};
@@ -19,9 +18,8 @@ use super::parameters::Parameters;
 use super::protection::{Protection, Situation, is_over_current};
 use super::readings::*;
 use super::statusword::statusword;
-use super::storage::Image;
 use super::terminals::{self, Signals};
-use super::{Values, restart};
+use super::{Values, restart, storage};
 use crate::engine::axis::{Axis, Demand, Feedback, Targets};
 use crate::engine::bleeder::Bleeder;
 use crate::engine::faults::{FaultMonitor, FaultSet};
@@ -29,16 +27,10 @@ use crate::engine::host_watchdog::HostWatchdog;
 use crate::engine::inputs::Inputs;
 use crate::engine::servo::Servo;
 use crate::engine::storage::Store;
-use crate::{Firmware, Report};
+use crate::{Firmware, Report, zl};
 
-/// How this drive communicates: PDO timers in 0.5 ms, PDOs that may be changed while they are valid (6.1).
-pub static NODE_PROFILE: NodeProfile = NodeProfile {
-    inhibit_unit_ns: 500_000,
-    event_timer_unit_ns: 500_000,
-    event_trigger: EventTrigger::ChangeOr255ByTimer,
-    pdo_changes_while_valid: true,
-    ..NodeProfile::cia_301(&TABLE)
-};
+/// How this drive communicates.
+pub static NODE_PROFILE: NodeProfile = zl::node_profile(&TABLE);
 
 /// The firmware of a ZLAC8030L V2.0.
 #[derive(Clone)]
@@ -82,7 +74,7 @@ impl Zlac8030l {
         Self {
             servo: Servo::new(&parameters.model, 0, 0),
             node,
-            store: Store::new(Image::factory().0),
+            store: Store::new(storage::factory()),
             dip_address: 0,
             running: false,
             bitrate: Bitrate::K500,
@@ -493,7 +485,7 @@ impl Firmware for Zlac8030l {
 
     fn power_on(&mut self, hardware: &Hardware, now: Instant) {
         self.dip_address = hardware.dip_address;
-        self.store.reopen(hardware.eeprom.0);
+        self.store.reopen(hardware.eeprom);
         self.restart(now);
     }
 
@@ -530,7 +522,7 @@ impl Firmware for Zlac8030l {
 
     fn eeprom(&self) -> (&[u8], u32) {
         let (image, generation) = self.store.image();
-        (image, generation)
+        (&image.0, generation)
     }
 
     fn report(&self) -> Report {

@@ -14,13 +14,12 @@ mod protection;
 pub mod readings;
 mod restart;
 pub mod statusword;
-mod storage;
+pub mod storage;
 mod terminals;
 
 pub use drive::{NODE_PROFILE, Zlac8030l};
 pub use hardware::{Actuation, Hardware, PowerStage, Sensors};
 pub use profile::PROFILE;
-pub use storage::Image;
 
 /// The values of the drive's objects.
 pub type Values = canopen::od::Dictionary<{ objects::ROW_COUNT }>;

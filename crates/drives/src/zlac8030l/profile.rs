@@ -6,17 +6,15 @@ use cia402::ModeOfOperation;
 
 use super::faults::FAULTS;
 use super::objects::TABLE;
-use crate::profile::{
-    CountsPerTurn, DriveProfile, Faults, Identity, ParameterStorage, PdoRules, PowerStyle, Quantity, Quirk, Ramps,
-    Units, Write,
-};
+use crate::profile::{CountsPerTurn, DriveProfile, Faults, PowerStyle, Quantity, Quirk, Units};
+use crate::zl;
 
 /// The ZLAC8030L V2.0.
 pub static PROFILE: DriveProfile = DriveProfile {
     model: "zlac8030l",
     title: "ZLTECH ZLAC8030L V2.0",
     manual: "ZLAC8030L quick start guide V1.00",
-    identity: Identity { device_type: 0x0004_0192, vendor_id: 0x100, product_code: 1, revision_number: 0 },
+    identity: zl::IDENTITY,
     // The ZLIM42-C, of the same identity, has its bus voltage in 2069h.
     hallmark: Some(Mux::new(0x2029, 0)),
     table: &TABLE,
@@ -33,31 +31,16 @@ pub static PROFILE: DriveProfile = DriveProfile {
         target_velocity: Quantity::new(0x60FF, 0, 1.0).divided_by(0x202F, 5),
         actual_velocity: Quantity::new(0x606C, 0, 0.1),
         profile_velocity: Quantity::new(0x6081, 0, 1.0),
-        ramps: Ramps::Milliseconds {
-            acceleration: Mux::new(0x6083, 0),
-            deceleration: Mux::new(0x6084, 0),
-            quick_stop: Mux::new(0x6085, 0),
-        },
+        ramps: zl::RAMPS,
         target_current: Some(Quantity::new(0x6071, 0, 1e-3)),
         actual_current: Some(Quantity::new(0x6077, 0, 0.1)),
         bus_voltage: Some(Quantity::new(0x2029, 0, 0.01)),
         motor_temperature: Some(Quantity::new(0x2026, 1, 0.1)),
         driver_temperature: Some(Quantity::new(0x2026, 2, 0.1)),
     },
-    storage: ParameterStorage {
-        save: Write { object: Mux::new(0x2009, 0), value: 2 },
-        restore: Some(Write { object: Mux::new(0x2009, 0), value: 1 }),
-        save_on_write: Some((Write { object: Mux::new(0x2010, 0), value: 0 }, true)),
-        effective_after_restart: &[Mux::new(0x200D, 0), Mux::new(0x200E, 0), Mux::new(0x202F, 5)],
-    },
+    storage: zl::parameter_storage(0x2009, 0x2010, RESTART),
     faults: Faults { code: Mux::new(0x603F, 0), bit_field: true, table: &FAULTS },
-    pdo: PdoRules {
-        inhibit_unit_ns: 500_000,
-        event_timer_unit_ns: 500_000,
-        max_objects: 4,
-        remap_while_valid: true,
-        fixed_mapping: false,
-    },
+    pdo: zl::PDO_RULES,
     quirks: &[
         Quirk::NoSupportedDriveModes,
         Quirk::NoStandardStore,
@@ -78,3 +61,5 @@ pub static PROFILE: DriveProfile = DriveProfile {
         Quirk::BrakeIsManual,
     ],
 };
+
+const RESTART: &[Mux] = &[Mux::new(0x200D, 0), Mux::new(0x200E, 0), Mux::new(0x202F, 5)];

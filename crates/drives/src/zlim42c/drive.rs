@@ -6,7 +6,6 @@
 use can::{Bitrate, Frame, Instant, Station};
 use canopen::node::{Node, NodeEvent, NodeProfile};
 use canopen::od::{Entry, Slot};
-use canopen::pdo::EventTrigger;
 use canopen::{EmcyErrorCode, NodeId};
 use cia402::{Controlword, ModeOfOperation, PowerState};
 
@@ -18,24 +17,17 @@ use super::parameters::Parameters;
 use super::protection::{Situation, causes, is_over_current};
 use super::readings::*;
 use super::statusword::{self, statusword};
-use super::storage::Image;
 use super::terminals::{self, Conditions};
-use super::{Values, led, restart};
+use super::{Values, led, restart, storage};
 use crate::engine::axis::{Axis, Demand, Feedback, Targets};
 use crate::engine::faults::{FaultMonitor, FaultSet};
 use crate::engine::inputs::Inputs;
 use crate::engine::stepper::Stepper;
 use crate::engine::storage::Store;
-use crate::{Firmware, Report};
+use crate::{Firmware, Report, zl};
 
-/// How this drive communicates: as its sibling ZLAC8030L, since its manual gives no more than the object table.
-pub static NODE_PROFILE: NodeProfile = NodeProfile {
-    inhibit_unit_ns: 500_000,
-    event_timer_unit_ns: 500_000,
-    event_trigger: EventTrigger::ChangeOr255ByTimer,
-    pdo_changes_while_valid: true,
-    ..NodeProfile::cia_301(&TABLE)
-};
+/// How this drive communicates.
+pub static NODE_PROFILE: NodeProfile = zl::node_profile(&TABLE);
 
 /// The firmware of a ZLIM42-C.
 #[derive(Clone)]
@@ -71,7 +63,7 @@ impl Zlim42c {
         Self {
             parameters: Parameters::from(node.dictionary()),
             node,
-            store: Store::new(Image::factory().0),
+            store: Store::new(storage::factory()),
             dip_address: 0,
             running: false,
             bitrate: Bitrate::K500,
@@ -468,7 +460,7 @@ impl Firmware for Zlim42c {
 
     fn power_on(&mut self, hardware: &Hardware, now: Instant) {
         self.dip_address = hardware.dip_address;
-        self.store.reopen(hardware.eeprom.0);
+        self.store.reopen(hardware.eeprom);
         self.stepper = Stepper::default();
         self.restart(now);
     }
@@ -498,7 +490,7 @@ impl Firmware for Zlim42c {
 
     fn eeprom(&self) -> (&[u8], u32) {
         let (image, generation) = self.store.image();
-        (image, generation)
+        (&image.0, generation)
     }
 
     fn report(&self) -> Report {

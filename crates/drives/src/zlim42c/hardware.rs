@@ -1,7 +1,8 @@
 //! What the drive's pins read and do: the border between firmware and the physical world.
 
 use super::led::Led;
-use super::storage::Image;
+use super::storage;
+use crate::engine::storage::Image;
 
 /// What the drive measures, each control period. There is no position sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,6 +68,6 @@ pub struct Hardware {
 impl Default for Hardware {
     /// As delivered: all switches ON, factory settings.
     fn default() -> Self {
-        Self { dip_address: 0, eeprom: Image::factory() }
+        Self { dip_address: 0, eeprom: storage::factory() }
     }
 }

@@ -15,14 +15,13 @@ mod protection;
 pub mod readings;
 mod restart;
 pub mod statusword;
-mod storage;
+pub mod storage;
 pub mod tables;
 mod terminals;
 
 pub use drive::{NODE_PROFILE, Zlim42c};
 pub use hardware::{Actuation, Hardware, PowerStage, Sensors};
 pub use profile::{PROFILE, PROFILE_82};
-pub use storage::Image;
 
 /// The values of the drive's objects.
 pub type Values = canopen::od::Dictionary<{ objects::ROW_COUNT }>;

@@ -9,9 +9,9 @@ use super::objects::TABLE;
 use super::statusword::{ENERGISED, HOMING_ATTAINED, RUNNING};
 use super::tables::PULSES_PER_TURN;
 use crate::profile::{
-    BitPattern, CountsPerTurn, DriveProfile, Faults, HomingRules, HomingStart, Identity, ParameterStorage, PdoRules,
-    PowerStyle, Quantity, Quirk, Ramps, Units, Write,
+    BitPattern, CountsPerTurn, DriveProfile, Faults, HomingRules, HomingStart, PowerStyle, Quantity, Quirk, Units,
 };
+use crate::zl;
 
 /// The ZLIM42-C of 70 mm.
 pub static PROFILE: DriveProfile = profile("zlim42c", "ZLTECH ZLIM42-C (70 mm)");
@@ -24,8 +24,7 @@ const fn profile(model: &'static str, title: &'static str) -> DriveProfile {
         model,
         title,
         manual: "ZLIM42-C user manual V1.03",
-        // The same as the ZLAC8030L, whose objects have other meanings.
-        identity: Identity { device_type: 0x0004_0192, vendor_id: 0x100, product_code: 1, revision_number: 0 },
+        identity: zl::IDENTITY,
         // The ZLAC8030L has its bus voltage in 2029h.
         hallmark: Some(Mux::new(0x2069, 0)),
         table: &TABLE,
@@ -38,20 +37,9 @@ const fn profile(model: &'static str, title: &'static str) -> DriveProfile {
         homing: Some(HOMING),
         host_watchdog: None,
         units: UNITS,
-        storage: ParameterStorage {
-            save: Write { object: Mux::new(0x2010, 0), value: 2 },
-            restore: Some(Write { object: Mux::new(0x2010, 0), value: 1 }),
-            save_on_write: Some((Write { object: Mux::new(0x200C, 0), value: 0 }, true)),
-            effective_after_restart: RESTART,
-        },
+        storage: zl::parameter_storage(0x2010, 0x200C, RESTART),
         faults: Faults { code: Mux::new(0x603F, 0), bit_field: false, table: &FAULTS },
-        pdo: PdoRules {
-            inhibit_unit_ns: 500_000,
-            event_timer_unit_ns: 500_000,
-            max_objects: 4,
-            remap_while_valid: true,
-            fixed_mapping: false,
-        },
+        pdo: zl::PDO_RULES,
         quirks: QUIRKS,
     }
 }
@@ -72,11 +60,7 @@ const UNITS: Units = Units {
     target_velocity: Quantity::new(0x60FF, 0, 1.0),
     actual_velocity: Quantity::new(0x606C, 0, 1.0),
     profile_velocity: Quantity::new(0x6081, 0, 1.0),
-    ramps: Ramps::Milliseconds {
-        acceleration: Mux::new(0x6083, 0),
-        deceleration: Mux::new(0x6084, 0),
-        quick_stop: Mux::new(0x6085, 0),
-    },
+    ramps: zl::RAMPS,
     target_current: None,
     actual_current: None,
     bus_voltage: Some(Quantity::new(0x2069, 0, 1.0)),

@@ -63,7 +63,7 @@ impl Bench {
     /// Off and on again; the EEPROM keeps what it holds.
     pub(crate) fn power_cycle(&mut self) {
         self.drive.power_off(self.now);
-        self.hardware.eeprom = drives::zlac8030l::Image::from_bytes(self.drive.eeprom().0);
+        self.hardware.eeprom = drives::engine::storage::Image::from_bytes(self.drive.eeprom().0);
         self.run_ms(5);
         self.power_on();
     }

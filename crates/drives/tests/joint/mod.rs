@@ -3,8 +3,9 @@
 
 use can::{CanId, Frame, Instant, Station};
 use drives::Firmware;
+use drives::engine::storage::Image;
 use drives::mjoint::pulses::PulseInput;
-use drives::mjoint::{Actuation, Battery, Brake, Hardware, Image, MJoint, Model, PowerStage, Sensors};
+use drives::mjoint::{Actuation, Battery, Brake, Hardware, MJoint, Model, PowerStage, Sensors};
 use plant::absolute_encoder::BatteryState;
 use plant::{Angle, Inverter, JointMotor, JointMotorModel, joint_motor};
 

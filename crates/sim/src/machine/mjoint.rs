@@ -7,8 +7,9 @@
 use can::Bitrate;
 use drives::RegisterError;
 use drives::engine::axis::Demand;
+use drives::engine::storage::Image;
 use drives::mjoint::readings::{COUNTS_PER_TURN, COUNTS_S_PER_RPM};
-use drives::mjoint::{Actuation, Battery, Brake, Hardware, Image, MJoint, Model, PowerStage, Sensors, objects};
+use drives::mjoint::{Actuation, Battery, Brake, Hardware, MJoint, Model, PowerStage, Sensors, objects, storage};
 use plant::absolute_encoder::BatteryState;
 use plant::pmsm::Phase;
 use plant::{Angle, Inverter, JointMotor, JointMotorModel, Rig, joint_motor};
@@ -41,7 +42,7 @@ pub type MJointMachine = Machine<Joint>;
 ///
 /// `bitrate` is the rate that its CAN controller is built for: 1 Mbit/s on a real one.
 pub fn mjoint(model: &'static Model, node: u8, bitrate: Bitrate) -> MJointMachine {
-    Machine::new(MJoint::new(model), Joint::new(model, Image::with_address(node), bitrate))
+    Machine::new(MJoint::new(model), Joint::new(model, storage::with_address(node), bitrate))
 }
 
 /// Motor, gear, load, supply and memory of a joint.

@@ -4,9 +4,10 @@
 //! Figures of the motor are those of `plant`; what is assumed of the surroundings is a constant below.
 
 use drives::engine::axis::Demand;
+use drives::engine::storage::Image;
 use drives::zlac8030l::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use drives::zlac8030l::readings::REFERENCE_V;
-use drives::zlac8030l::{Image, Zlac8030l, objects};
+use drives::zlac8030l::{Zlac8030l, objects, storage};
 use plant::angle::Angle;
 use plant::encoder::EncoderFault;
 use plant::hall::HallFault;
@@ -42,7 +43,7 @@ pub type Zlac8030lMachine = Machine<HubWheel>;
 /// 200Eh in the EEPROM.
 pub fn zlac8030l(node: u8, baud_rate: u16) -> Zlac8030lMachine {
     let dip_address = if node <= 3 { node } else { 0 };
-    Machine::new(Zlac8030l::new(), HubWheel::new(dip_address, Image::with_address(node, baud_rate)))
+    Machine::new(Zlac8030l::new(), HubWheel::new(dip_address, storage::with_address(node, baud_rate)))
 }
 
 /// Motor, load, supply and memory of a ZLAC8030L.

@@ -5,9 +5,10 @@
 //! the motors are those of `plant`; what is assumed of the surroundings is a constant below.
 
 use drives::engine::axis::Demand;
+use drives::engine::storage::Image;
 use drives::zlim42c::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use drives::zlim42c::readings::{REFERENCE_V, TEETH};
-use drives::zlim42c::{Image, Zlim42c, objects};
+use drives::zlim42c::{Zlim42c, objects, storage};
 use plant::angle::Angle;
 use plant::stepper::{Bridges, Phase};
 use plant::stepper_motor::{StepperMotor, StepperMotorModel};
@@ -101,7 +102,7 @@ impl<const LENGTH_MM: u16> Stepper<LENGTH_MM> {
 
     fn addressed(node: u8, baud_rate: u16) -> Self {
         let dip_address = if node <= 15 { node } else { 0 };
-        Self::new(dip_address, Image::with_address(node, baud_rate))
+        Self::new(dip_address, storage::with_address(node, baud_rate))
     }
 
     /// Electrical turns of the rotor.

@@ -20,7 +20,6 @@ use canopen::sdo::server::FrameLength;
 use cia402::{Controlword, ModeOfOperation, PowerState};
 use motion::filter::LowPass;
 
-use super::Values;
 use super::alarms::{self, ALARM_COUNT, ALARMS, row};
 use super::axis::Axis;
 use super::hardware::{Actuation, Battery, Brake, Hardware, PowerStage, Sensors};
@@ -33,7 +32,7 @@ use super::power_on::Function;
 use super::protection::Protection;
 use super::pulses::Pulses;
 use super::readings::*;
-use super::storage::Image;
+use super::{Values, storage};
 use crate::engine::axis::Demand;
 use crate::engine::faults::FaultMonitor;
 use crate::engine::inputs::Inputs;
@@ -143,7 +142,7 @@ impl MJoint {
             gear_numerator: node.dictionary().get(GEAR_NUMERATOR),
             servo: Servo::new(&parameters.servo, 0, 0),
             node,
-            store: Store::new(Image::factory().0),
+            store: Store::new(storage::factory()),
             bitrate: Bitrate::M1,
             running: false,
             powered_at: Instant::ZERO,
@@ -254,7 +253,7 @@ impl MJoint {
         if self.save_asked {
             self.save_asked = false;
             self.store.mark_all(&TABLE);
-            self.store.commit(&Image::contents(self.node.dictionary(), self.node.node_id()));
+            self.store.commit(&storage::contents(self.node.dictionary(), self.node.node_id()));
             self.node.dictionary_mut().set(DATA_SAVE_FLAG, 2);
         }
     }
@@ -334,7 +333,7 @@ impl Firmware for MJoint {
     const CONTROL_PERIOD_NS: u64 = CONTROL_PERIOD_NS;
 
     fn power_on(&mut self, hardware: &Hardware, now: Instant) {
-        self.store.reopen(hardware.eeprom.0);
+        self.store.reopen(hardware.eeprom);
         self.bitrate = hardware.bitrate;
         self.powered_at = now;
         let mut values = Values::new(&TABLE, NodeId::MIN);
@@ -367,7 +366,7 @@ impl Firmware for MJoint {
 
     fn eeprom(&self) -> (&[u8], u32) {
         let (image, generation) = self.store.image();
-        (image, generation)
+        (&image.0, generation)
     }
 
     fn report(&self) -> Report {

@@ -4,6 +4,7 @@
 use canopen::od::Slot;
 
 use super::*;
+use crate::row::effects;
 
 /// The consequence of a write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,8 +34,13 @@ pub enum Effect {
 }
 
 /// What a write to `slot` does.
+#[inline]
 pub fn effect(slot: Slot) -> Effect {
-    const EFFECTS: [(Slot, Effect); 10] = [
+    EFFECTS[slot.position()]
+}
+
+static EFFECTS: [Effect; ROW_COUNT] = effects(
+    &[
         (CONTROLWORD.slot(), Effect::Command),
         (MODES_OF_OPERATION.slot(), Effect::SelectMode),
         (TARGET_POSITION.slot(), Effect::Target),
@@ -45,6 +51,6 @@ pub fn effect(slot: Slot) -> Effect {
         (GEAR_NUMERATOR.slot(), Effect::GearNumerator),
         (DATA_SAVE_FLAG.slot(), Effect::Save),
         (CONSUMER_HEARTBEAT_TIME.slot(), Effect::ConsumerHeartbeat),
-    ];
-    EFFECTS.iter().find(|(named, _)| *named == slot).map_or(Effect::Parameter, |(_, effect)| *effect)
-}
+    ],
+    Effect::Parameter,
+);

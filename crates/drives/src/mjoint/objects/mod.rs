@@ -11,25 +11,20 @@ pub mod effects;
 pub mod modbus;
 mod values;
 
-use canopen::od::{Entry, Object, Table, keys};
+use canopen::od::{Entry, Table, keys};
+
+use crate::row::join;
 
 /// Number of rows.
 pub const ROW_COUNT: usize = 104;
 
-static ROWS: [Entry; ROW_COUNT] = crate::row::join(&[&communication::ROWS, &control::ROWS]);
+static ROWS: [Entry; ROW_COUNT] = join(&[&communication::ROWS, &control::ROWS]);
 static KEYS: [u32; ROW_COUNT] = keys(&ROWS);
 
 /// All objects of the drive.
 pub static TABLE: Table = Table::new(&ROWS, &KEYS);
 
-macro_rules! objects {
-    ($($name:ident: $type:ty = $index:literal $sub:literal;)*) => {
-        $(#[doc = concat!("Object ", stringify!($index), ":", stringify!($sub), ".")]
-        pub const $name: Object<$type> = TABLE.object($index, $sub);)*
-    };
-}
-
-objects! {
+crate::row::objects! { TABLE:
     ERROR_REGISTER: u8 = 0x1001 0x00;
     CONSUMER_HEARTBEAT_TIME: u32 = 0x1016 0x01;
     MODBUS_ENABLE: u16 = 0x2600 0x00;

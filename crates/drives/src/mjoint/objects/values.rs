@@ -1,7 +1,6 @@
 //! Listed values of objects, with what they mean.
 
-/// A list of values.
-pub(super) type Values = &'static [(i64, &'static str)];
+use crate::row::Values;
 
 /// 2600h, 2601h, 2609h.
 pub(super) const OFF_ON: Values = &[(0, "forbidden"), (1, "enabled")];

@@ -7,6 +7,7 @@ use super::{
     CLEAR_CURRENT_POSITION, CLEAR_FEEDBACK_POSITION, CONTROLWORD, MODES_OF_OPERATION, REGISTER_PARAMETER_SETTING,
     ROW_COUNT, TARGET_POSITION, TARGET_TORQUE, TARGET_VELOCITY,
 };
+use crate::row::effects;
 
 /// The consequence of a write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,8 +32,8 @@ pub fn effect(slot: Slot) -> Effect {
     EFFECTS[slot.position()]
 }
 
-static EFFECTS: [Effect; ROW_COUNT] = {
-    let named = [
+static EFFECTS: [Effect; ROW_COUNT] = effects(
+    &[
         (CONTROLWORD.slot(), Effect::Command),
         (TARGET_VELOCITY.slot(), Effect::Target),
         (TARGET_POSITION.slot(), Effect::Target),
@@ -41,12 +42,6 @@ static EFFECTS: [Effect; ROW_COUNT] = {
         (REGISTER_PARAMETER_SETTING.slot(), Effect::Registers),
         (CLEAR_FEEDBACK_POSITION.slot(), Effect::ClearPosition),
         (CLEAR_CURRENT_POSITION.slot(), Effect::ClearPosition),
-    ];
-    let mut effects = [Effect::Parameter; ROW_COUNT];
-    let mut i = 0;
-    while i < named.len() {
-        effects[named[i].0.position()] = named[i].1;
-        i += 1;
-    }
-    effects
-};
+    ],
+    Effect::Parameter,
+);

@@ -6,11 +6,9 @@
 
 use canopen::od::Entry;
 
-use super::values::{
-    BAUD_RATES, BRAKE, CLEAR, DIRECTIONS, IO_STOP, LIMIT_STOP, OFF_ON, OUTPUT_FUNCTIONS, REGISTER_COMMANDS,
-    RS485_BAUD_RATES, SAVE_ON_WRITE, SHAFT_LOCK,
-};
+use super::values::{BAUD_RATES, BRAKE, DIRECTIONS, IO_STOP, OFF_ON, OUTPUT_FUNCTIONS, RS485_BAUD_RATES};
 use crate::row::{I16, U16, join, ro, rw, rws};
+use crate::zl::values::{CLEAR, LIMIT_STOP, REGISTER_COMMANDS, SAVE_ON_WRITE, SHAFT_LOCK};
 use crate::zlac8030l::readings::SOFTWARE_VERSION;
 
 pub(super) const ROWS: [Entry; 71] = join(&[&GENERAL, &LIMITS, &LOOPS, &DEVICE, &POWER, &TERMINALS]);

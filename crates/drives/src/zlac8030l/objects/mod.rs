@@ -3,36 +3,33 @@
 //!
 //! [`TABLE`] is the one description that the drive, the command line, the EDS writer and the documents read.
 //! The constants below it are the objects that the firmware itself reads and writes. What a write sets in motion
-//! stands in [`effects`].
+//! stands in [`effects`]; 1000h to 1FFFh are in the folder `zl`, for both drives of the maker.
 
 mod checks;
-mod communication;
 pub mod effects;
 mod manufacturer;
 mod profile;
 mod values;
 
-use canopen::od::{Entry, Object, Table, keys};
+use canopen::od::{Entry, Table, keys};
 
 pub use checks::ABSOLUTE_TARGET_LIMIT;
+
+use super::readings::{HARDWARE_VERSION, SOFTWARE_VERSION};
+use crate::row::join;
+use crate::zl::communication;
 
 /// Number of rows.
 pub const ROW_COUNT: usize = 195;
 
-static ROWS: [Entry; ROW_COUNT] = crate::row::join(&[&communication::ROWS, &manufacturer::ROWS, &profile::ROWS]);
+static ROWS: [Entry; ROW_COUNT] =
+    join(&[&communication::rows(HARDWARE_VERSION, SOFTWARE_VERSION), &manufacturer::ROWS, &profile::ROWS]);
 static KEYS: [u32; ROW_COUNT] = keys(&ROWS);
 
 /// All objects of the drive.
 pub static TABLE: Table = Table::new(&ROWS, &KEYS);
 
-macro_rules! objects {
-    ($($name:ident: $type:ty = $index:literal $sub:literal;)*) => {
-        $(#[doc = concat!("Object ", stringify!($index), ":", stringify!($sub), ".")]
-        pub const $name: Object<$type> = TABLE.object($index, $sub);)*
-    };
-}
-
-objects! {
+crate::row::objects! { TABLE:
     ERROR_REGISTER: u8 = 0x1001 0x00;
     COMMUNICATION_OFFLINE_TIME: u16 = 0x2000 0x00;
     MOTOR_DIRECTION: u16 = 0x2001 0x00;

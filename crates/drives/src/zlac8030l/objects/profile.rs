@@ -6,8 +6,9 @@
 use canopen::od::Entry;
 
 use super::checks;
-use super::values::{DISABLE_OPTIONS, HALT_OPTIONS, MODES, QUICK_STOP_OPTIONS, SHUTDOWN_OPTIONS};
+use super::values::{DISABLE_OPTIONS, HALT_OPTIONS, MODES, QUICK_STOP_OPTIONS};
 use crate::row::{I8, I16, I32, U16, U32, ro, rw};
+use crate::zl::values::SHUTDOWN_OPTIONS;
 
 #[rustfmt::skip]
 pub(super) const ROWS: [Entry; 22] = [

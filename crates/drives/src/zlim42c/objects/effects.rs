@@ -4,9 +4,10 @@
 use canopen::od::Slot;
 
 use super::{
-    CLEAR_CURRENT_POSITION, CONTROLWORD, FAULT_RESET, MODES_OF_OPERATION, REGISTER_PARAMETER_SETTING, TARGET_POSITION,
-    TARGET_VELOCITY,
+    CLEAR_CURRENT_POSITION, CONTROLWORD, FAULT_RESET, MODES_OF_OPERATION, REGISTER_PARAMETER_SETTING, ROW_COUNT,
+    TARGET_POSITION, TARGET_VELOCITY,
 };
+use crate::row::effects;
 
 /// The consequence of a write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,8 +29,13 @@ pub enum Effect {
 }
 
 /// What a write to `slot` does.
+#[inline]
 pub fn effect(slot: Slot) -> Effect {
-    const EFFECTS: [(Slot, Effect); 7] = [
+    EFFECTS[slot.position()]
+}
+
+static EFFECTS: [Effect; ROW_COUNT] = effects(
+    &[
         (CONTROLWORD.slot(), Effect::Command),
         (TARGET_VELOCITY.slot(), Effect::Target),
         (TARGET_POSITION.slot(), Effect::Target),
@@ -37,6 +43,6 @@ pub fn effect(slot: Slot) -> Effect {
         (REGISTER_PARAMETER_SETTING.slot(), Effect::Registers),
         (FAULT_RESET.slot(), Effect::FaultReset),
         (CLEAR_CURRENT_POSITION.slot(), Effect::ClearPosition),
-    ];
-    EFFECTS.iter().find(|(named, _)| *named == slot).map_or(Effect::Parameter, |(_, effect)| *effect)
-}
+    ],
+    Effect::Parameter,
+);

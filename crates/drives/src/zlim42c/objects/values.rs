@@ -1,7 +1,6 @@
 //! The listed values of objects, with their meaning ("ZLIM42-C user manual V1.03", 5.4).
 
-/// The values that an object accepts, with what each means.
-pub(super) type Values = &'static [(i64, &'static str)];
+use crate::row::Values;
 
 pub(super) const CURRENTS: Values = &[
     (0, "0.21 A rms, 0.3 A peak"),
@@ -42,13 +41,7 @@ pub(super) const BAUD_RATES: Values = &[
     (5, "50 kbit/s"),
     (6, "25 kbit/s"),
 ];
-pub(super) const LIMIT_STOP: Values = &[(0, "stop"), (1, "emergency stop"), (2, "invalid")];
-pub(super) const SHAFT_LOCK: Values = &[(0, "free while not enabled"), (1, "locked while not enabled")];
-pub(super) const SAVE_ON_WRITE: Values = &[(0, "each write is stored"), (1, "not stored")];
-pub(super) const REGISTER_COMMANDS: Values =
-    &[(0, "invalid"), (1, "restore factory settings"), (2, "save all RW/S parameters")];
 pub(super) const RESET: Values = &[(0, "invalid"), (1, "reset the fault")];
-pub(super) const CLEAR: Values = &[(0, "invalid"), (1, "clear the position")];
 pub(super) const OUTPUT_FUNCTIONS: Values =
     &[(0, "undefined"), (1, "alarm"), (2, "drive status"), (3, "homing done"), (4, "in position")];
 pub(super) const QUICK_STOP_OPTIONS: Values = &[
@@ -56,7 +49,6 @@ pub(super) const QUICK_STOP_OPTIONS: Values = &[
     (6, "quick stop ramp, stay in quick stop active"),
     (7, "stop at once, stay in quick stop active"),
 ];
-pub(super) const SHUTDOWN_OPTIONS: Values = &[(0, "power off at once"), (1, "normal stop, then ready to switch on")];
 pub(super) const DISABLE_OPTIONS: Values = &[(0, "stop at once"), (1, "normal stop, then switched on")];
 pub(super) const HALT_OPTIONS: Values = &[(1, "normal stop"), (2, "quick stop ramp"), (3, "stop at once")];
 pub(super) const MODES: Values = &[(0, "undefined"), (1, "profile position"), (3, "profile velocity"), (6, "homing")];

@@ -1,0 +1,64 @@
+//! What both models are on the bus, as const data: for the firmware and for [`DriveProfile`](crate::profile::DriveProfile).
+
+use canopen::Mux;
+use canopen::node::NodeProfile;
+use canopen::od::Table;
+use canopen::pdo::EventTrigger;
+
+use crate::profile::{Identity, ParameterStorage, PdoRules, Ramps, Write};
+
+/// One count of a PDO's inhibit time and event timer (ZLAC8030L, 6.1; the ZLIM42-C's manual gives none).
+const PDO_TIMER_UNIT_NS: u64 = 500_000;
+
+/// How the drives communicate: PDO timers in 0.5 ms, PDOs that may be changed while they are valid (ZLAC8030L, 6.1; the
+/// ZLIM42-C's manual gives no more than the object table).
+pub(crate) const fn node_profile(table: &'static Table) -> NodeProfile {
+    NodeProfile {
+        inhibit_unit_ns: PDO_TIMER_UNIT_NS,
+        event_timer_unit_ns: PDO_TIMER_UNIT_NS,
+        event_trigger: EventTrigger::ChangeOr255ByTimer,
+        pdo_changes_while_valid: true,
+        ..NodeProfile::cia_301(table)
+    }
+}
+
+/// The same for both, though their objects have other meanings.
+pub(crate) const IDENTITY: Identity =
+    Identity { device_type: 0x0004_0192, vendor_id: 0x100, product_code: 1, revision_number: 0 };
+
+/// [`node_profile`] and four objects in a mapping, for masters.
+pub(crate) const PDO_RULES: PdoRules = PdoRules {
+    inhibit_unit_ns: PDO_TIMER_UNIT_NS,
+    event_timer_unit_ns: PDO_TIMER_UNIT_NS,
+    max_objects: 4,
+    remap_while_valid: true,
+    fixed_mapping: false,
+};
+
+/// 6083h to 6085h are times.
+pub(crate) const RAMPS: Ramps = Ramps::Milliseconds {
+    acceleration: Mux::new(0x6083, 0),
+    deceleration: Mux::new(0x6084, 0),
+    quick_stop: Mux::new(0x6085, 0),
+};
+
+/// Value of the register parameter setting that restores factory settings.
+pub(crate) const RESTORE: u32 = 1;
+
+/// Value of the register parameter setting that saves all stored parameters.
+pub(crate) const SAVE: u32 = 2;
+
+/// How parameters are stored: by the object `register` as a whole, each with its write while the object `save_on_write` is
+/// 0, as delivered.
+pub(crate) const fn parameter_storage(
+    register: u16,
+    save_on_write: u16,
+    effective_after_restart: &'static [Mux],
+) -> ParameterStorage {
+    ParameterStorage {
+        save: Write { object: Mux::new(register, 0), value: SAVE },
+        restore: Some(Write { object: Mux::new(register, 0), value: RESTORE }),
+        save_on_write: Some((Write { object: Mux::new(save_on_write, 0), value: 0 }, true)),
+        effective_after_restart,
+    }
+}
