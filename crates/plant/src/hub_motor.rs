@@ -10,7 +10,7 @@ use crate::encoder::{EncoderData, EncoderModel};
 use crate::hall::{HallFault, HallModel};
 use crate::mechanics::{RotorData, RotorModel};
 use crate::pmsm::{Phase, PmsmData, PmsmInput, PmsmModel, Terminals};
-use crate::rig::{Flows, Rig, RigModel};
+use crate::rig::{Rig, RigModel};
 
 /// What never changes about a hub motor and the power stage it is wired to.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -129,13 +129,7 @@ impl HubMotor {
         model.encoder.step(&mut self.encoder, self.rotor.angle);
         self.torque_nm = motor.torque_nm;
 
-        let flows = Flows {
-            bus_w: motor.bus_w,
-            heat_w_per_ohm: motor.heat_w_per_ohm,
-            arc_j: 0.0,
-            friction_j: moved.friction_j,
-            load_j: moved.load_j,
-        };
+        let flows = motor.flows(moved.friction_j, moved.load_j);
         if self.rig.step(&model.rig, dt_s, &flows, actuation.bleeder_on) {
             self.step_slow();
         }

@@ -12,7 +12,7 @@ use crate::gear::{GearData, GearInput, GearModel};
 use crate::hub_motor::Inverter;
 use crate::mechanics::{RotorData, RotorModel};
 use crate::pmsm::{Phase, PmsmData, PmsmInput, PmsmModel};
-use crate::rig::{Flows, Rig, RigModel};
+use crate::rig::{Rig, RigModel};
 
 /// What never changes about a joint and the power stage it is built with.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -134,13 +134,7 @@ impl JointMotor {
         }
         self.torque_nm = motor.torque_nm;
 
-        let flows = Flows {
-            bus_w: motor.bus_w,
-            heat_w_per_ohm: motor.heat_w_per_ohm,
-            arc_j: 0.0,
-            friction_j: moved.friction_j,
-            load_j: moved.load_j,
-        };
+        let flows = motor.flows(moved.friction_j, moved.load_j);
         if self.rig.step(&model.rig, dt_s, &flows, discharging) {
             self.step_slow();
         }

@@ -15,6 +15,7 @@
 //! Iron loss is left to the friction of [`mechanics`](crate::mechanics); saturation of the iron is not modelled.
 
 use crate::angle::{Angle, Axis};
+use crate::rig::Flows;
 
 /// Below this current an idle bridge is taken as not conducting.
 const NO_CURRENT_A: f64 = 1e-9;
@@ -140,6 +141,14 @@ pub struct PmsmOutput {
     pub bus_w: f64,
     /// Heat in the phases' resistance per ohm of it: the sum of the squares of the three currents.
     pub heat_w_per_ohm: f64,
+}
+
+impl PmsmOutput {
+    /// The step for the energy book, with what its shaft did.
+    #[inline]
+    pub(crate) fn flows(&self, friction_j: f64, load_j: f64) -> Flows {
+        Flows { bus_w: self.bus_w, heat_w_per_ohm: self.heat_w_per_ohm, arc_j: 0.0, friction_j, load_j }
+    }
 }
 
 impl PmsmModel {

@@ -231,6 +231,12 @@ pub struct Levels {
 }
 
 impl Levels {
+    /// Levels and their names, in the same order.
+    pub fn new(names: &'static [&'static str], levels: &[bool]) -> Self {
+        let bits = levels.iter().enumerate().fold(0, |bits, (n, level)| bits | u32::from(*level) << n);
+        Levels { names, bits }
+    }
+
     /// Each name with its level.
     pub fn iter(&self) -> impl Iterator<Item = (&'static str, bool)> + use<> {
         let bits = self.bits;

@@ -1,6 +1,29 @@
-use drives::{Firmware, RegisterError};
+//! What a machine asks of one model's hardware, and what all models answer alike: supply, load and temperatures.
 
+use drives::engine::axis::Demand;
+use drives::{Firmware, RegisterError};
+use plant::Rig;
+use plant::mechanics::RotorData;
+use plant::supply::SupplyData;
+
+use super::quantity::Quantity;
 use crate::{Component, PulseTrain, Refused, Report, TemperatureSensor};
+
+/// Temperature of the surroundings.
+pub(super) const AMBIENT_C: f64 = 25.0;
+
+/// A drive's own converter starts above and stops below these bus voltages. Assumed for all three: far below the
+/// ZLAC8030L's under-voltage fault, which needs the firmware to run, the 20 V that the ZLIM42-C's manual wants (2.1;
+/// it gives no fault for a low supply) and the 24 V that the M joint's wants.
+const START_V: f64 = 12.0;
+const STOP_V: f64 = 9.0;
+
+/// What the supply can be set to.
+pub(super) const SUPPLY_VOLTAGE: Quantity =
+    Quantity { what: "supply", expected: "0 to 100 V", least: 0.0, greatest: 100.0 };
+
+const TEMPERATURE: Quantity =
+    Quantity { what: "temperature", expected: "-55 to 200 °C", least: -55.0, greatest: 200.0 };
 
 /// One model's hardware: motor, load, supply, sensors, and the memory chip that outlives power.
 ///
@@ -13,6 +36,14 @@ pub trait Assembly: Clone + Send + 'static {
     const MODEL: &'static str;
     /// Names of the digital inputs.
     const INPUTS: &'static [&'static str];
+    /// Length of a control period.
+    const PERIOD_S: f64 = <Self::Firmware as Firmware>::CONTROL_PERIOD_NS as f64 * 1e-9;
+    /// What can be asked of the load at the output shaft.
+    const LOAD_TORQUE: Quantity =
+        Quantity { what: "load torque", expected: "-1000 to 1000 N·m", least: -1000.0, greatest: 1000.0 };
+    /// What can be added at the output shaft.
+    const LOAD_INERTIA: Quantity =
+        Quantity { what: "load inertia", expected: "0 to 1000 kg·m²", least: 0.0, greatest: 1000.0 };
 
     /// The model's name as users type it, where one assembly serves several.
     fn model(&self) -> &'static str {
@@ -28,14 +59,25 @@ pub trait Assembly: Clone + Send + 'static {
     /// One control period of physics under `actuation`.
     fn step(&mut self, actuation: &<Self::Firmware as Firmware>::Actuation);
 
-    /// What can be measured from outside. `running` is false without power.
-    fn report(&self, firmware: &Self::Firmware, running: bool) -> Report;
+    /// The motor's shaft, and load, supply, temperatures and energies around it.
+    fn shaft_and_rig(&self) -> (&RotorData, &Rig);
+
+    /// Load, supply, temperatures and energies, to change.
+    fn rig_mut(&mut self) -> &mut Rig;
+
+    /// What can be measured from outside: `common`, what is measured alike at every model, with the model's own.
+    fn report(&self, firmware: &Self::Firmware, common: Report) -> Report;
 
     /// Connects or disconnects the supply.
-    fn connect_supply(&mut self, on: bool);
+    fn connect_supply(&mut self, on: bool) {
+        connect(&mut self.rig_mut().supply, on);
+    }
 
     /// Whether the voltage is enough for the firmware to run on (`running`), or to start.
-    fn supplies_firmware(&self, running: bool) -> bool;
+    #[inline]
+    fn supplies_firmware(&self, running: bool) -> bool {
+        self.shaft_and_rig().1.supply.bus_v >= if running { STOP_V } else { START_V }
+    }
 
     /// Where the motor shaft truly is, in counts of a fixed size, from an arbitrary zero.
     fn shaft_counts(&self) -> i64;
@@ -47,7 +89,10 @@ pub trait Assembly: Clone + Send + 'static {
     }
 
     /// The drive counts against the shaft's own direction.
-    fn counts_reversed(&self, firmware: &Self::Firmware) -> bool;
+    fn counts_reversed(&self, firmware: &Self::Firmware) -> bool {
+        let _ = firmware;
+        false
+    }
 
     /// Contents of the memory chip as of the last power-off.
     fn image(&self) -> &[u8];
@@ -56,19 +101,44 @@ pub trait Assembly: Clone + Send + 'static {
     fn keep_image(&mut self, image: &[u8]);
 
     /// Torque at the output shaft, positive against positive motion.
-    fn set_load_torque(&mut self, torque_nm: f64) -> Result<(), Refused>;
+    fn set_load_torque(&mut self, torque_nm: f64) -> Result<(), Refused> {
+        self.rig_mut().load.torque_nm = Self::LOAD_TORQUE.check(torque_nm)?;
+        Ok(())
+    }
 
     /// Inertia added at the output shaft.
-    fn set_load_inertia(&mut self, inertia_kg_m2: f64) -> Result<(), Refused>;
+    fn set_load_inertia(&mut self, inertia_kg_m2: f64) -> Result<(), Refused> {
+        self.rig_mut().load.inertia_kg_m2 = Self::LOAD_INERTIA.check(inertia_kg_m2)?;
+        Ok(())
+    }
 
     /// Blocks the rotor, or frees it.
-    fn set_rotor_locked(&mut self, locked: bool);
+    fn set_rotor_locked(&mut self, locked: bool) {
+        self.rig_mut().load.locked = locked;
+    }
 
     /// Voltage of the supply.
-    fn set_supply(&mut self, supply_v: f64) -> Result<(), Refused>;
+    fn set_supply(&mut self, supply_v: f64) -> Result<(), Refused> {
+        let supply = &mut self.rig_mut().supply;
+        supply.source_v = SUPPLY_VOLTAGE.check(supply_v)?;
+        // A supply that is turned down discharges its own output; only the motor's energy it cannot take.
+        if supply.connected {
+            supply.bus_v = supply.bus_v.min(supply_v);
+        }
+        Ok(())
+    }
 
     /// Holds a temperature, or gives it back to the model.
-    fn hold_temperature(&mut self, sensor: TemperatureSensor, celsius: Option<f64>) -> Result<(), Refused>;
+    fn hold_temperature(&mut self, sensor: TemperatureSensor, celsius: Option<f64>) -> Result<(), Refused> {
+        let hold_c = celsius.map(|celsius| TEMPERATURE.check(celsius)).transpose()?;
+        let rig = self.rig_mut();
+        let body = match sensor {
+            TemperatureSensor::Motor => &mut rig.winding,
+            TemperatureSensor::Driver => &mut rig.heat_sink,
+        };
+        body.hold_c = hold_c;
+        Ok(())
+    }
 
     /// Breaks or mends a component.
     fn set_fault(&mut self, component: Component, broken: bool) -> Result<(), Refused>;
@@ -104,12 +174,25 @@ pub trait Assembly: Clone + Send + 'static {
     }
 }
 
-/// `value` if it is a number in `range`.
-pub(super) fn within(
-    what: &'static str,
-    expected: &'static str,
-    range: core::ops::RangeInclusive<f64>,
-    value: f64,
-) -> Result<f64, Refused> {
-    if range.contains(&value) { Ok(value) } else { Err(Refused::OutOfRange { what, expected, value }) }
+/// Connects a supply or disconnects it. The inrush limiter has charged the capacitor by the time the drive's converter
+/// starts.
+pub(super) fn connect(supply: &mut SupplyData, on: bool) {
+    if on && !supply.connected {
+        supply.bus_v = supply.bus_v.max(supply.source_v);
+    }
+    supply.connected = on;
+}
+
+/// `report` with the set-points of the control loops; `rpm` turns the velocity of a set-point into r/min.
+pub(super) fn with_demand(demand: &Demand, rpm: impl Fn(f64) -> f64, report: Report) -> Report {
+    match *demand {
+        Demand::Off => report,
+        Demand::Position(point) => Report {
+            position_demand: Some(i64::from(point.position)),
+            velocity_demand_rpm: Some(rpm(point.velocity)),
+            ..report
+        },
+        Demand::Velocity(point) => Report { velocity_demand_rpm: Some(rpm(point.velocity)), ..report },
+        Demand::Torque(current_a) => Report { current_demand_a: Some(f64::from(current_a)), ..report },
+    }
 }

@@ -6,34 +6,25 @@
 
 use can::Bitrate;
 use drives::RegisterError;
-use drives::engine::axis::Demand;
 use drives::engine::storage::Image;
 use drives::mjoint::readings::{COUNTS_PER_TURN, COUNTS_S_PER_RPM};
 use drives::mjoint::{Actuation, Battery, Brake, Hardware, MJoint, Model, PowerStage, Sensors, objects, storage};
 use plant::absolute_encoder::BatteryState;
+use plant::mechanics::RotorData;
 use plant::pmsm::Phase;
 use plant::{Angle, Inverter, JointMotor, JointMotorModel, Rig, joint_motor};
 
 use super::Machine;
-use super::assembly::{Assembly, within};
+use super::assembly::{AMBIENT_C, Assembly, connect, with_demand};
 use super::pulse_source::PulseSource;
-use crate::{Component, Levels, PulseTrain, Refused, Report, TemperatureSensor};
+use crate::{Component, Levels, PulseTrain, Refused, Report};
 
 const OUTPUTS: &[&str] = &["ZO", "WR", "RED", "GREEN"];
-const PERIOD_S: f64 = <MJoint as drives::Firmware>::CONTROL_PERIOD_NS as f64 * 1e-9;
 const SUPPLY_V: f64 = 36.0;
-const AMBIENT_C: f64 = 25.0;
 
 /// Assumed: at the output of a 36 V supply of some 200 W. A bare joint that stops from its full speed stays under 52 V
 /// with it; a loaded one does not.
 const SUPPLY_CAPACITANCE_F: f64 = 3_000e-6;
-
-/// The drive's own converter starts above and stops below these bus voltages. Assumed: well below the 24 V that the
-/// manual wants at least.
-const START_V: f64 = 12.0;
-const STOP_V: f64 = 9.0;
-
-const RPM_PER_RAD_S: f64 = 30.0 / core::f64::consts::PI;
 
 /// An M joint motor, as a station of a world.
 pub type MJointMachine = Machine<Joint>;
@@ -156,63 +147,49 @@ impl Assembly for Joint {
             brake_released: !self.is_braked(actuation),
             set_origin: actuation.set_origin,
         };
-        self.motor.step(PERIOD_S, &pins);
-        self.pulses.advance(PERIOD_S);
+        self.motor.step(Self::PERIOD_S, &pins);
+        self.pulses.advance(Self::PERIOD_S);
     }
 
-    fn report(&self, firmware: &MJoint, running: bool) -> Report {
-        let own = drives::Firmware::report(firmware);
-        let rotor = &self.motor.rotor;
-        let engaged = if running { own.brake_engaged } else { self.braked_without_power };
-        let bits = [self.last.zero_output, self.last.alarm_output, self.last.red_led, self.last.green_led];
-        Report {
-            node: own.node_id.raw(),
-            powered: running,
+    fn shaft_and_rig(&self) -> (&RotorData, &Rig) {
+        (&self.motor.rotor, &self.motor.rig)
+    }
+
+    fn rig_mut(&mut self) -> &mut Rig {
+        &mut self.motor.rig
+    }
+
+    fn report(&self, firmware: &MJoint, common: Report) -> Report {
+        let running = common.powered;
+        let engaged =
+            if running { drives::Firmware::report(firmware).brake_engaged } else { self.braked_without_power };
+        let levels = [self.last.zero_output, self.last.alarm_output, self.last.red_led, self.last.green_led];
+        let report = Report {
             statusword: running.then(|| firmware.values().get(objects::STATUSWORD)),
-            error_code: u32::from(own.fault_code),
-            position: i64::from(own.position_counts),
-            velocity_rpm: rotor.velocity_rad_s * RPM_PER_RAD_S,
-            current_a: f64::from(own.current_a),
-            supply_v: self.motor.rig.supply.bus_v,
-            motor_c: Some(self.motor.rig.winding.temperature_c),
-            driver_c: Some(self.motor.rig.heat_sink.temperature_c),
-            outputs: Levels {
-                names: OUTPUTS,
-                bits: bits.iter().enumerate().fold(0, |all, (n, bit)| all | u32::from(running && *bit) << n),
-            },
+            outputs: Levels::new(OUTPUTS, &levels.map(|level| running && level)),
             brake: Some(if engaged { crate::Brake::Engaged } else { crate::Brake::Released }),
-            shaft_angle_rad: rotor.angle.as_rad(),
-            ..demands(firmware)
-        }
+            ..common
+        };
+        with_demand(firmware.demand(), |counts_s| counts_s / COUNTS_S_PER_RPM, report)
     }
 
     fn connect_supply(&mut self, on: bool) {
-        let JointMotor { rig: Rig { supply, .. }, encoder, model, rotor, .. } = &mut self.motor;
-        if on && !supply.connected {
-            // The inrush limiter has charged the capacitor by the time the drive's converter starts.
-            supply.bus_v = supply.bus_v.max(supply.source_v);
-            model.encoder.step(encoder, 0.0, rotor.angle, true);
-        }
+        let JointMotor { rig, encoder, model, rotor, .. } = &mut self.motor;
+        let was_on = rig.supply.connected;
+        connect(&mut rig.supply, on);
         if !on {
             // However short the off time of a person's hand: the capacitor is empty after it, and the encoder lives on
             // its battery or not at all.
-            supply.bus_v = 0.0;
-            model.encoder.step(encoder, 0.0, rotor.angle, false);
+            rig.supply.bus_v = 0.0;
         }
-        supply.connected = on;
-    }
-
-    fn supplies_firmware(&self, running: bool) -> bool {
-        self.motor.rig.supply.bus_v >= if running { STOP_V } else { START_V }
+        if !(on && was_on) {
+            model.encoder.step(encoder, 0.0, rotor.angle, on);
+        }
     }
 
     #[inline]
     fn shaft_counts(&self) -> i64 {
         self.motor.rotor.angle.count(COUNTS_PER_TURN)
-    }
-
-    fn counts_reversed(&self, _firmware: &MJoint) -> bool {
-        false
     }
 
     fn image(&self) -> &[u8] {
@@ -221,42 +198,6 @@ impl Assembly for Joint {
 
     fn keep_image(&mut self, image: &[u8]) {
         self.image = Image::from_bytes(image);
-    }
-
-    fn set_load_torque(&mut self, torque_nm: f64) -> Result<(), Refused> {
-        self.motor.rig.load.torque_nm = within("load torque", "-1000 to 1000 N·m", -1000.0..=1000.0, torque_nm)?;
-        Ok(())
-    }
-
-    fn set_load_inertia(&mut self, inertia_kg_m2: f64) -> Result<(), Refused> {
-        self.motor.rig.load.inertia_kg_m2 = within("load inertia", "0 to 1000 kg·m²", 0.0..=1000.0, inertia_kg_m2)?;
-        Ok(())
-    }
-
-    fn set_rotor_locked(&mut self, locked: bool) {
-        self.motor.rig.load.locked = locked;
-    }
-
-    fn set_supply(&mut self, supply_v: f64) -> Result<(), Refused> {
-        let supply = &mut self.motor.rig.supply;
-        supply.source_v = within("supply", "0 to 100 V", 0.0..=100.0, supply_v)?;
-        // A supply that is turned down discharges its own output; only the motor's energy it cannot take.
-        if supply.connected {
-            supply.bus_v = supply.bus_v.min(supply_v);
-        }
-        Ok(())
-    }
-
-    fn hold_temperature(&mut self, sensor: TemperatureSensor, celsius: Option<f64>) -> Result<(), Refused> {
-        if let Some(celsius) = celsius {
-            within("temperature", "-55 to 200 °C", -55.0..=200.0, celsius)?;
-        }
-        let body = match sensor {
-            TemperatureSensor::Motor => &mut self.motor.rig.winding,
-            TemperatureSensor::Driver => &mut self.motor.rig.heat_sink,
-        };
-        body.hold_c = celsius;
-        Ok(())
     }
 
     fn set_fault(&mut self, component: Component, broken: bool) -> Result<(), Refused> {
@@ -292,20 +233,5 @@ impl Assembly for Joint {
 
     fn write_registers(firmware: &mut MJoint, address: u16, words: &[u16]) -> Result<(), RegisterError> {
         firmware.write_registers(address, words)
-    }
-}
-
-/// Set-points of the control loops.
-fn demands(firmware: &MJoint) -> Report {
-    let rpm = |counts_s: f64| Some(counts_s / COUNTS_S_PER_RPM);
-    match *firmware.demand() {
-        Demand::Off => Report::default(),
-        Demand::Position(point) => Report {
-            position_demand: Some(i64::from(point.position)),
-            velocity_demand_rpm: rpm(point.velocity),
-            ..Report::default()
-        },
-        Demand::Velocity(point) => Report { velocity_demand_rpm: rpm(point.velocity), ..Report::default() },
-        Demand::Torque(current_a) => Report { current_demand_a: Some(f64::from(current_a)), ..Report::default() },
     }
 }

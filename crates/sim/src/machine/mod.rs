@@ -8,6 +8,7 @@
 mod assembly;
 mod mjoint;
 mod pulse_source;
+mod quantity;
 mod switch;
 mod zlac8030l;
 mod zlim42c;
@@ -17,6 +18,7 @@ use drives::{Firmware, RegisterError};
 
 pub use assembly::Assembly;
 pub use mjoint::{Joint, MJointMachine, mjoint};
+pub use quantity::Quantity;
 pub use zlac8030l::{HubWheel, Zlac8030lMachine, zlac8030l};
 pub use zlim42c::{Stepper, Zlim42c82Machine, Zlim42cMachine, zlim42c, zlim42c_82};
 
@@ -25,6 +27,8 @@ use switch::Input;
 
 /// How often a drive without enough voltage to run looks whether it has come.
 const WAKE_PERIOD_NS: u64 = 1_000_000;
+
+const RPM_PER_RAD_S: f64 = 30.0 / core::f64::consts::PI;
 
 /// A drive's firmware on its hardware, as a station of a world.
 #[derive(Clone)]
@@ -178,7 +182,23 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
     }
 
     fn report(&self) -> Report {
-        Report { powered: self.running, ..self.assembly.report(&self.firmware, self.running) }
+        let own = self.firmware.report();
+        let (shaft, rig) = self.assembly.shaft_and_rig();
+        let direction = if self.assembly.counts_reversed(&self.firmware) { -1.0 } else { 1.0 };
+        let common = Report {
+            node: own.node_id.raw(),
+            powered: self.running,
+            error_code: u32::from(own.fault_code),
+            position: i64::from(own.position_counts),
+            velocity_rpm: direction * shaft.velocity_rad_s * RPM_PER_RAD_S,
+            current_a: f64::from(own.current_a),
+            supply_v: rig.supply.bus_v,
+            motor_c: Some(rig.winding.temperature_c),
+            driver_c: Some(rig.heat_sink.temperature_c),
+            shaft_angle_rad: shaft.angle.as_rad(),
+            ..Report::default()
+        };
+        self.assembly.report(&self.firmware, common)
     }
 
     fn inputs(&self) -> &'static [&'static str] {

@@ -2,11 +2,13 @@
 
 use drives::mjoint::pulses::PulseInput;
 
-use super::assembly::within;
+use super::quantity::Quantity;
 use crate::{PulseTrain, Refused};
 
 /// Highest input frequency ("Maximum input pulse frequency 500 KHz").
-const MOST_HZ: f64 = 500e3;
+const FREQUENCY: Quantity =
+    Quantity { what: "frequency", expected: "above 0 to 500000 Hz", least: f64::MIN_POSITIVE, greatest: 500e3 };
+const DUTY_CYCLE: Quantity = Quantity { what: "duty cycle", expected: "0 to 100 %", least: 0.0, greatest: 100.0 };
 
 /// A pulse generator wired to PU and DIR.
 #[derive(Clone, Copy, Debug, Default)]
@@ -27,10 +29,10 @@ impl PulseSource {
     pub(super) fn start(&mut self, train: PulseTrain) -> Result<(), Refused> {
         match train {
             PulseTrain::Pulses { hz, .. } | PulseTrain::Quadrature { hz, .. } => {
-                within("frequency", "above 0 to 500000 Hz", f64::MIN_POSITIVE..=MOST_HZ, hz)?;
+                FREQUENCY.check(hz)?;
             }
             PulseTrain::Duty(percent) => {
-                let percent = within("duty cycle", "0 to 100 %", 0.0..=100.0, percent)?;
+                let percent = DUTY_CYCLE.check(percent)?;
                 self.train = None;
                 self.input.duty = Some(percent as f32 / 100.0);
                 return Ok(());

@@ -10,30 +10,24 @@ use drives::zlim42c::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use drives::zlim42c::readings::{REFERENCE_V, TEETH};
 use drives::zlim42c::{Zlim42c, objects, storage};
 use plant::angle::Angle;
+use plant::mechanics::RotorData;
+use plant::rig::Rig;
 use plant::stepper::{Bridges, Phase};
 use plant::stepper_motor::{StepperMotor, StepperMotorModel};
 
 use super::Machine;
-use super::assembly::{Assembly, within};
+use super::assembly::{AMBIENT_C, Assembly, SUPPLY_VOLTAGE};
+use super::quantity::Quantity;
 use crate::{Component, Levels, Refused, Report, TemperatureSensor};
 
 const OUTPUTS: &[&str] = &["Y0", "Y1"];
-const PERIOD_S: f64 = <Zlim42c as drives::Firmware>::CONTROL_PERIOD_NS as f64 * 1e-9;
 const SUPPLY_V: f64 = 24.0;
-const AMBIENT_C: f64 = 25.0;
-
-/// The drive's own converter starts above and stops below these bus voltages. Assumed: well below the 20 V of the
-/// manual (2.1), which gives no fault for a low supply.
-const START_V: f64 = 12.0;
-const STOP_V: f64 = 9.0;
 
 /// Length of the longer motor's body, mm.
 const LONG: u16 = 82;
 
 /// Counts of a turn in which switches are placed: each setting of 2006h divides it.
 const SHAFT_COUNTS: u32 = 3_200_000;
-
-const RPM_PER_RAD_S: f64 = 30.0 / core::f64::consts::PI;
 
 /// A ZLIM42-C of 70 mm as a station of a world.
 pub type Zlim42cMachine = Machine<Stepper<70>>;
@@ -123,6 +117,10 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
 
     const MODEL: &'static str = if LENGTH_MM == LONG { "zlim42c-82" } else { "zlim42c" };
     const INPUTS: &'static [&'static str] = &["X0", "X1", "X2", "X3"];
+    const LOAD_TORQUE: Quantity =
+        Quantity { what: "load torque", expected: "-100 to 100 N·m", least: -100.0, greatest: 100.0 };
+    const LOAD_INERTIA: Quantity =
+        Quantity { what: "load inertia", expected: "0 to 100 kg·m²", least: 0.0, greatest: 100.0 };
 
     fn hardware(&self) -> Hardware {
         Hardware { dip_address: self.dip_address, eeprom: self.image }
@@ -152,53 +150,34 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
                 Bridges::Driven(duty.map(f64::from))
             }
         };
-        self.motor.step(PERIOD_S, &bridges);
+        self.motor.step(Self::PERIOD_S, &bridges);
     }
 
-    fn report(&self, firmware: &Zlim42c, running: bool) -> Report {
-        let own = drives::Firmware::report(firmware);
-        let position = i64::from(own.position_counts);
+    fn shaft_and_rig(&self) -> (&RotorData, &Rig) {
+        (&self.motor.rotor, &self.motor.rig)
+    }
+
+    fn rig_mut(&mut self) -> &mut Rig {
+        &mut self.motor.rig
+    }
+
+    fn report(&self, firmware: &Zlim42c, common: Report) -> Report {
         let rpm = |pulses_s: f64| pulses_s * 60.0 / f64::from(firmware.pulses_per_turn());
         let demand = match *firmware.demand() {
             Demand::Position(point) | Demand::Velocity(point) => Some(point),
             Demand::Off | Demand::Torque(_) => None,
         };
-        let rotor = &self.motor.rotor;
         Report {
-            node: own.node_id.raw(),
-            powered: running,
-            statusword: running.then(|| firmware.values().get(objects::STATUSWORD)),
-            error_code: u32::from(own.fault_code),
-            position,
-            rotor_position: Some(self.rotor_position(firmware, position)),
+            rotor_position: Some(self.rotor_position(firmware, common.position)),
             position_demand: demand.map(|point| i64::from(point.position)),
-            velocity_rpm: rotor.velocity_rad_s * RPM_PER_RAD_S,
             velocity_demand_rpm: demand.map(|point| rpm(point.velocity)),
-            current_a: f64::from(own.current_a),
             current_demand_a: demand.map(|_| f64::from(firmware.current_demand_a())),
-            supply_v: self.motor.rig.supply.bus_v,
             motor_c: None,
             driver_c: None,
-            outputs: Levels {
-                names: OUTPUTS,
-                bits: u32::from(self.last.outputs[0]) | u32::from(self.last.outputs[1]) << 1,
-            },
-            brake: None,
-            shaft_angle_rad: rotor.angle.as_rad(),
+            statusword: common.powered.then(|| firmware.values().get(objects::STATUSWORD)),
+            outputs: Levels::new(OUTPUTS, &self.last.outputs),
+            ..common
         }
-    }
-
-    fn connect_supply(&mut self, on: bool) {
-        let supply = &mut self.motor.rig.supply;
-        if on && !supply.connected {
-            // The inrush limiter has charged the capacitor by the time the drive's converter starts.
-            supply.bus_v = supply.bus_v.max(supply.source_v);
-        }
-        supply.connected = on;
-    }
-
-    fn supplies_firmware(&self, running: bool) -> bool {
-        self.motor.rig.supply.bus_v >= if running { STOP_V } else { START_V }
     }
 
     #[inline]
@@ -210,10 +189,6 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
         i64::from(SHAFT_COUNTS) / i64::from(firmware.pulses_per_turn())
     }
 
-    fn counts_reversed(&self, _firmware: &Zlim42c) -> bool {
-        false
-    }
-
     fn image(&self) -> &[u8] {
         &self.image.0
     }
@@ -223,22 +198,9 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
         self.zero = None;
     }
 
-    fn set_load_torque(&mut self, torque_nm: f64) -> Result<(), Refused> {
-        self.motor.rig.load.torque_nm = within("load torque", "-100 to 100 N·m", -100.0..=100.0, torque_nm)?;
-        Ok(())
-    }
-
-    fn set_load_inertia(&mut self, inertia_kg_m2: f64) -> Result<(), Refused> {
-        self.motor.rig.load.inertia_kg_m2 = within("load inertia", "0 to 100 kg·m²", 0.0..=100.0, inertia_kg_m2)?;
-        Ok(())
-    }
-
-    fn set_rotor_locked(&mut self, locked: bool) {
-        self.motor.rig.load.locked = locked;
-    }
-
     fn set_supply(&mut self, supply_v: f64) -> Result<(), Refused> {
-        self.motor.rig.supply.source_v = within("supply", "0 to 100 V", 0.0..=100.0, supply_v)?;
+        // Its bus capacitor is the drive's alone: a supply that is turned down takes nothing out of that.
+        self.motor.rig.supply.source_v = SUPPLY_VOLTAGE.check(supply_v)?;
         Ok(())
     }
 

@@ -1,0 +1,25 @@
+//! A quantity that a person at the machine sets, with the bounds of what makes sense.
+
+use crate::Refused;
+
+/// A quantity that somebody sets, and what makes sense for it.
+pub struct Quantity {
+    /// Its name.
+    pub what: &'static str,
+    /// The range with its unit, for people.
+    pub expected: &'static str,
+    /// Lower end.
+    pub least: f64,
+    /// Upper end.
+    pub greatest: f64,
+}
+
+impl Quantity {
+    /// `value` if it is a number in the range.
+    pub fn check(&self, value: f64) -> Result<f64, Refused> {
+        if (self.least..=self.greatest).contains(&value) {
+            return Ok(value);
+        }
+        Err(Refused::OutOfRange { what: self.what, expected: self.expected, value })
+    }
+}
