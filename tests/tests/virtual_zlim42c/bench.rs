@@ -7,7 +7,7 @@ use std::time::Duration;
 use can::{Bitrate, CanId, Frame, Instant};
 use ferrodrive_tests::manual::ObjectRow;
 use ferrodrive_tests::zlim42c::objects;
-use sim::machine::{Zlim42cMachine, zlim42c};
+use sim::machine::{Zlim42cMachine, zlim42c, zlim42c_82};
 use sim::{Report, StationId, VirtualDrive, World};
 
 /// The node of a drive as delivered, and its number in the world.
@@ -38,9 +38,18 @@ pub(crate) type Abort = u32;
 impl Bench {
     /// A drive as delivered that has just booted.
     pub(crate) fn new() -> Self {
+        Self::with(Box::new(zlim42c(NODE, RATE_500K)))
+    }
+
+    /// The same with the longer motor.
+    pub(crate) fn long() -> Self {
+        Self::with(Box::new(zlim42c_82(NODE, RATE_500K)))
+    }
+
+    fn with(machine: Box<dyn VirtualDrive>) -> Self {
         let mut world = World::new(Bitrate::K500, 1);
         let host = world.add_tap();
-        let drive = world.add_drive(NODE, Box::new(zlim42c(NODE, RATE_500K))).expect("the first drive");
+        let drive = world.add_drive(NODE, machine).expect("the first drive");
         Self { world, host, node: NODE, drive, bare: false, heard: Vec::new() }.booted()
     }
 

@@ -3,7 +3,7 @@
 use ferrodrive_tests::zlim42c::figure;
 use sim::Component;
 
-use crate::bench::Bench;
+use crate::bench::{Bench, assert_within};
 
 /// A way to break something, and its code.
 #[derive(Clone, Copy, Debug)]
@@ -118,6 +118,94 @@ fn a_lost_phase_is_noticed_whichever_way_the_vector_points_once_it_moves() {
         bench.run_ms(200);
         assert_eq!(bench.get(0x603F, 0), 0xFF04, "{pulses}");
     }
+}
+
+#[test]
+fn a_lost_phase_is_noticed_at_every_speed() {
+    // At 60 to 200 r/min a phase is asked for current for some ms at a time, at 1000 r/min for less than one.
+    for rpm in [10, 60, 100, 150, 200, 300, 600, 1000, 2000] {
+        let mut bench = Bench::new();
+        bench.set(0x6083, 0, 1000);
+        bench.enable_in(3);
+        bench.set(0x60FF, 0, rpm);
+        bench.run_ms(1200);
+        assert_eq!(bench.get(0x603F, 0), 0, "{rpm} r/min");
+        bench.operate(|drive, now| drive.set_fault(Component::Phase, true, now)).expect("phases");
+        bench.run_ms(400);
+        assert_eq!(bench.get(0x603F, 0), 0xFF04, "{rpm} r/min");
+    }
+}
+
+#[test]
+fn a_sound_motor_whose_own_voltage_holds_its_current_down_has_lost_no_phase() {
+    // Around this speed the magnets' voltage is that of the bus (psi = 0.72 N m / 2.2 A / 50, 20 V): without load hardly
+    // any current flows, in either phase.
+    for rpm in (520..=700).step_by(20) {
+        let mut bench = Bench::long();
+        bench.operate(|drive, now| drive.set_supply(20.0, now)).expect("a supply");
+        bench.set(0x6083, 0, 1000);
+        bench.enable_in(3);
+        bench.set(0x60FF, 0, rpm);
+        bench.run_ms(3000);
+        assert_eq!((bench.get(0x603F, 0), bench.get(0x606C, 0)), (0, rpm));
+        assert_within("r/min", bench.report().velocity_rpm, 0.8 * rpm as f64, 1.2 * rpm as f64);
+    }
+}
+
+#[test]
+fn a_load_that_drives_the_motor_raises_the_bus_until_over_voltage() {
+    // 0.25 N m at 1000 r/min are 26 W, the windings turn 2.2² * 1.85 = 9 W into heat, and the source cannot take the rest.
+    for (torque_nm, code) in [(0.25, 0), (-0.05, 0), (-0.25, 0xFF01)] {
+        let mut bench = Bench::new();
+        bench.set(0x2005, 0, 7);
+        bench.set(0x6083, 0, 2000);
+        bench.enable_in(3);
+        bench.set(0x60FF, 0, 1000);
+        bench.run_ms(2500);
+        for part in 1..=10 {
+            let torque_nm = torque_nm * f64::from(part) / 10.0;
+            bench.operate(|drive, now| drive.set_load_torque(torque_nm, now)).expect("a torque");
+            bench.run_ms(50);
+        }
+        assert_eq!(bench.get(0x603F, 0), code, "{torque_nm} N m: {:?}", bench.report());
+    }
+}
+
+#[test]
+fn over_voltage_begins_above_40_v_and_there_is_no_fault_for_a_low_supply() {
+    for (supply_v, code) in [(15.0, 0), (20.0, 0), (30.0, 0), (39.5, 0), (40.5, 0xFF01)] {
+        let mut bench = Bench::new();
+        bench.operate(|drive, now| drive.set_supply(supply_v, now)).expect("a supply");
+        bench.run_ms(300);
+        assert_eq!(bench.get(0x603F, 0), code, "{supply_v} V");
+    }
+}
+
+#[test]
+fn two_faults_are_told_one_by_one_and_go_one_by_one() {
+    let mut bench = faulty(Cause::Broken(Component::Reference));
+    set(&mut bench, Cause::OverVoltage, true);
+    let told: Vec<_> = bench.heard().into_iter().filter(|frame| frame.starts_with("081#")).collect();
+    assert_eq!(told, ["081#08FF810000000000", "081#01FF850000000000"], "the register gathers both");
+    assert_eq!(bench.get(0x603F, 0), 0xFF01, "the last");
+    set(&mut bench, Cause::OverVoltage, false);
+    bench.set(0x2011, 0, 1);
+    assert_eq!((bench.get(0x603F, 0), bench.get(0x1001, 0), bench.statusword() & 0x4F), (0xFF08, 0x81, 0x08));
+    set(&mut bench, Cause::Broken(Component::Reference), false);
+    bench.set(0x2011, 0, 1);
+    assert_eq!((bench.get(0x603F, 0), bench.get(0x1001, 0), bench.statusword() & 0x4F), (0, 0, 0x40));
+}
+
+#[test]
+fn a_reset_without_a_fault_changes_nothing() {
+    let mut bench = Bench::new();
+    bench.enable_in(3);
+    bench.set(0x60FF, 0, 60);
+    bench.run_ms(300);
+    bench.heard();
+    bench.set(0x2011, 0, 1);
+    assert_eq!((bench.get(0x2011, 0), bench.get(0x606C, 0), bench.statusword() & 0x6F), (0, 60, 0x27));
+    assert!(!bench.heard().iter().any(|frame| frame.starts_with("081#")));
 }
 
 #[test]

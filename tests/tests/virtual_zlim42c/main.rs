@@ -6,6 +6,7 @@
 
 mod address;
 mod bench;
+mod communication;
 mod current;
 mod datagrams;
 mod faults;
@@ -14,4 +15,7 @@ mod limits;
 mod motion;
 mod objects;
 mod power_state;
+mod robustness;
 mod step_loss;
+mod stops;
+mod terminals;

@@ -103,6 +103,97 @@ fn a_load_below_it_turns_the_rotor_by_the_angle_of_its_sine() {
 }
 
 #[test]
+fn the_longer_motor_holds_what_the_manual_gives_it() {
+    let holding_nm = figure("model", "zlim42c-82", "holding_torque");
+    for (share, holds) in [(0.95, true), (1.1, false)] {
+        let mut bench = Bench::long();
+        bench.set(0x2005, 0, 7);
+        bench.set(0x2007, 0, 1);
+        bench.enable_in(1);
+        for part in 1..=40 {
+            load(&mut bench, share * holding_nm * f64::from(part) / 40.0);
+            bench.run_ms(50);
+        }
+        let away = bench.report().rotor_position.expect("known here").abs();
+        assert_eq!(away < FOUR_STEPS / 2, holds, "{share}: {away} pulses");
+    }
+}
+
+#[test]
+fn a_rotor_pulled_while_it_is_held_falls_in_again_whole_turns_of_the_field_away() {
+    for torque_nm in [0.8, -0.8] {
+        let mut bench = strong();
+        bench.operate(|drive, now| drive.set_load_inertia(5e-5, now)).expect("an inertia");
+        load(&mut bench, torque_nm);
+        bench.run_ms(7);
+        load(&mut bench, 0.0);
+        bench.run_ms(3000);
+        let report = bench.report();
+        let pulled = report.rotor_position.expect("known here");
+        assert_eq!((pulled % FOUR_STEPS, pulled.signum() as f64), (0, -torque_nm.signum()), "{pulled} pulses");
+        assert_eq!(
+            (bench.get(0x6064, 0), bench.get(0x606C, 0), bench.get(0x603F, 0)),
+            (0, 0, 0),
+            "the drive knows nothing"
+        );
+        // The next move starts from where the drive believes to be: the loss stays.
+        bench.move_by(4000);
+        bench.run_ms(1500);
+        let report = bench.report();
+        assert_eq!((report.position, report.rotor_position), (4000, Some(4000 + pulled)));
+    }
+}
+
+#[test]
+fn a_load_that_is_carried_slowly_is_lost_at_speed() {
+    // With 24 V the pull-out torque is 0.48 N m at 60 r/min, and by its closed form a fifth of it at 2400 r/min.
+    let model = StepperMotorModel::ZLIM42_C_70.stepper;
+    let fast_rad_s = 2400.0 * std::f64::consts::PI / 30.0;
+    assert_within("N m at 2400 r/min", model.pull_out_nm(24.0, model.resistance_ohm, fast_rad_s), 0.05, 0.15);
+    // The fast rotor is let go after some ms: a load that drives it would feed the bus until the drive trips.
+    for (rpm, load_ms, keeps) in [(60, 500, true), (2400, 5, false)] {
+        let mut bench = strong();
+        bench.set(0x6060, 0, 3);
+        bench.set(0x6083, 0, 2000);
+        bench.set(0x60FF, 0, rpm);
+        bench.run_ms(2500);
+        assert_within("r/min", bench.report().velocity_rpm, 0.5 * rpm as f64, 1.5 * rpm as f64);
+        load(&mut bench, 0.25);
+        bench.run_ms(load_ms);
+        load(&mut bench, 0.0);
+        bench.run_ms(500);
+        let report = bench.report();
+        let lost = report.position - report.rotor_position.expect("known here");
+        assert_eq!(lost.abs() < FOUR_STEPS, keeps, "{rpm} r/min: {lost} pulses, {report:?}");
+        assert_eq!((bench.get(0x606C, 0), bench.get(0x603F, 0)), (rpm, 0), "the drive knows nothing");
+    }
+}
+
+#[test]
+fn a_higher_setting_of_2005h_carries_a_load_that_a_lower_one_loses() {
+    // K = 0.48 N m / 2.2 A: 0.8 A give 0.17 N m, 2.2 A give 0.48 N m.
+    for (setting, keeps) in [(2, false), (7, true)] {
+        let mut bench = Bench::new();
+        bench.set(0x2005, 0, setting);
+        bench.set(0x2007, 0, 1);
+        bench.enable_in(1);
+        bench.run_ms(50);
+        bench.move_by(4000);
+        bench.run_ms(300);
+        for part in 1..=10 {
+            load(&mut bench, 0.03 * f64::from(part));
+            bench.run_ms(10);
+        }
+        bench.run_ms(1500);
+        load(&mut bench, 0.0);
+        bench.run_ms(1500);
+        let report = bench.report();
+        let lost = report.position - report.rotor_position.expect("known here");
+        assert_eq!(lost < FOUR_STEPS / 2, keeps, "2005h = {setting}: {lost} pulses");
+    }
+}
+
+#[test]
 fn half_the_current_at_rest_holds_half_the_load() {
     let mut bench = strong();
     bench.set(0x2007, 0, 0);

@@ -14,7 +14,7 @@ use super::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use super::objects::effects::{Effect, effect};
 use super::objects::*;
 use super::parameters::Parameters;
-use super::protection::{Situation, causes, is_over_current};
+use super::protection::{PhaseWatch, Situation, causes, is_over_current};
 use super::readings::*;
 use super::statusword::{self, statusword};
 use super::terminals::{self, Conditions};
@@ -46,6 +46,7 @@ pub struct Zlim42c {
     targets: Targets,
     controlword: Controlword,
     faults: FaultMonitor<FAULT_COUNT>,
+    phases: PhaseWatch,
     /// The fault that 603Fh and the red light tell of: the last that came.
     shown_fault: Option<usize>,
     eeprom_ok: bool,
@@ -74,6 +75,7 @@ impl Zlim42c {
             targets: Targets::default(),
             controlword: Controlword(0),
             faults: FaultMonitor::new(&FAULTS),
+            phases: PhaseWatch::default(),
             shown_fault: None,
             eeprom_ok: true,
             inputs: Inputs::default(),
@@ -242,9 +244,10 @@ impl Zlim42c {
 
     fn watch_faults(&mut self, sensors: &Sensors, now: Instant) {
         self.eeprom_ok = sensors.eeprom_ok;
+        let (peaks, speed_rpm) = (self.stepper.take_peaks(), self.velocity_rpm());
         let situation = Situation {
-            peaks: self.stepper.take_peaks(),
-            amplitude_a: self.stepper.reference_a(),
+            bus_a: peaks.bus_a,
+            phase_lost: self.phases.observe(&peaks, self.stepper.reference_a(), speed_rpm),
             eeprom_readable: self.store.is_readable(),
             latched: self.faults.latched(),
         };

@@ -6,8 +6,8 @@
 use canopen::EmcyErrorCode;
 
 use super::readings::{
-    BUS_OVER_CURRENT_DEBOUNCE_PERIODS, OVER_CURRENT_DEBOUNCE_PERIODS, PHASE_LOSS_DEBOUNCE_PERIODS,
-    REFERENCE_DEBOUNCE_PERIODS, VOLTAGE_DEBOUNCE_PERIODS,
+    BUS_OVER_CURRENT_DEBOUNCE_PERIODS, OVER_CURRENT_DEBOUNCE_PERIODS, REFERENCE_DEBOUNCE_PERIODS,
+    VOLTAGE_DEBOUNCE_PERIODS,
 };
 use crate::engine::faults::FaultRow;
 
@@ -35,6 +35,7 @@ const CURRENT: u8 = 1 << 1;
 const VOLTAGE: u8 = 1 << 2;
 const MANUFACTURER: u8 = 1 << 7;
 
+/// Also of what has a debounce of its own, as the phases have.
 const AT_ONCE: u16 = 1;
 
 /// All faults that occur.
@@ -44,7 +45,7 @@ pub static FAULTS: [FaultRow; FAULT_COUNT] = [
         "Lower the supply: 24 V, at most 30 V. If it rises while the motor brakes, slow down longer (6084h)."),
     fault(0xFF02, "over-current", CURRENT, OVER_CURRENT_DEBOUNCE_PERIODS,
         "Look for a short circuit between the motor's wires; lower 2005h; set 2040h and 2041h back."),
-    fault(0xFF04, "phase loss", MANUFACTURER, PHASE_LOSS_DEBOUNCE_PERIODS,
+    fault(0xFF04, "phase loss", MANUFACTURER, AT_ONCE,
         "A motor wire has bad contact to the drive's board: have it repaired."),
     fault(0xFF08, "internal reference voltage", MANUFACTURER, REFERENCE_DEBOUNCE_PERIODS,
         "The drive's reference voltage circuit is out of order: replace the drive."),

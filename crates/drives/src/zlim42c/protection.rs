@@ -8,34 +8,58 @@ use crate::engine::stepper::Peaks;
 
 /// What the causes are judged by, besides the sensors.
 pub(super) struct Situation {
-    pub(super) peaks: Peaks,
-    /// Amplitude of the current vector, A; 0 while the motor is free.
-    pub(super) amplitude_a: f32,
+    pub(super) bus_a: f32,
+    pub(super) phase_lost: bool,
     pub(super) eeprom_readable: bool,
     pub(super) latched: FaultSet,
+}
+
+/// Tells an open phase from one that is not asked for current at present, or cannot be given any.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PhaseWatch {
+    /// Supervision periods in which each phase was asked and carried nothing, since it last carried something. Those in
+    /// which it was not asked do not count: a slowly turning vector asks each phase for a part of its turn only.
+    empty_for: [u16; 2],
+}
+
+impl PhaseWatch {
+    /// Takes in one supervision period: amplitude of the vector asked for, A (0 while the motor is free), and its speed.
+    /// True if a phase is lost.
+    pub(super) fn observe(&mut self, peaks: &Peaks, amplitude_a: f32, speed_rpm: f64) -> bool {
+        if amplitude_a <= 0.0 {
+            *self = Self::default();
+            return false;
+        }
+        let carries = |phase: usize, share| peaks.current_a[phase] >= share * amplitude_a;
+        let mut lost = false;
+        for (phase, empty_for) in self.empty_for.iter_mut().enumerate() {
+            // Where the motor's own voltage is near the bus voltage, a sound motor takes hardly any current: in both.
+            let held_down = speed_rpm.abs() > PHASE_COMPARED_RPM && !carries(1 - phase, PHASE_SOUND_SHARE);
+            if carries(phase, PHASE_CARRIED_SHARE) {
+                *empty_for = 0;
+            } else if peaks.reference_a[phase] > PHASE_ASKED_SHARE * amplitude_a && !held_down {
+                *empty_for = empty_for.saturating_add(1);
+            }
+            lost |= *empty_for >= PHASE_LOSS_DEBOUNCE_PERIODS;
+        }
+        lost
+    }
 }
 
 pub(super) fn causes(sensors: &Sensors, now: &Situation) -> FaultSet {
     FaultSet::NONE
         .with(row::OVER_VOLTAGE, over_voltage(sensors.bus_v, now))
         .with(row::OVER_CURRENT, is_over_current(sensors))
-        .with(row::PHASE_LOSS, (0..2).any(|phase| is_lost(phase, now)))
+        .with(row::PHASE_LOSS, now.phase_lost)
         .with(row::REFERENCE_VOLTAGE, !within(sensors.reference_v, REFERENCE_V, REFERENCE_TOLERANCE_V))
         .with(row::EEPROM, !(sensors.eeprom_ok && now.eeprom_readable))
-        .with(row::BUS_OVER_CURRENT, exceeds(now.peaks.bus_a, BUS_OVER_CURRENT_A))
+        .with(row::BUS_OVER_CURRENT, exceeds(now.bus_a, BUS_OVER_CURRENT_A))
 }
 
 /// Any phase carries more than the power stage bears.
 #[inline]
 pub(super) fn is_over_current(sensors: &Sensors) -> bool {
     sensors.phase_current_a.iter().any(|current_a| exceeds(current_a.abs(), OVER_CURRENT_A))
-}
-
-/// The phase was asked for current throughout and carried none.
-fn is_lost(phase: usize, now: &Situation) -> bool {
-    now.amplitude_a > 0.0
-        && now.peaks.reference_a[phase] > PHASE_ASKED_SHARE * now.amplitude_a
-        && now.peaks.current_a[phase] < PHASE_CARRIED_SHARE * now.amplitude_a
 }
 
 fn over_voltage(bus_v: f32, now: &Situation) -> bool {

@@ -1,0 +1,234 @@
+//! Extremes: whatever a host writes and whatever happens to the supply, the drive answers, stays finite and obeys.
+
+use std::time::Duration;
+
+use ferrodrive_tests::manual::ObjectRow;
+use ferrodrive_tests::seeded::Seeded;
+use ferrodrive_tests::zlim42c::objects;
+use sim::Component;
+
+use crate::bench::Bench;
+
+/// Writes that a random host may not do: node-ID and bit rate take the drive off this bus at its next restart, and 1005h
+/// would make other frames SYNC.
+const SPARED: [u16; 3] = [0x2008, 0x2009, 0x1005];
+
+#[test]
+fn a_host_that_writes_anything_anywhere_is_answered_and_breaks_nothing() {
+    let rows: Vec<_> = objects().into_iter().filter(|row| row.writable && !SPARED.contains(&row.index)).collect();
+    for seed in 0..100 {
+        let mut seeded = Seeded::new(seed);
+        let mut bench = Bench::new();
+        for step in 0..120 {
+            let row = &rows[seeded.below(rows.len())];
+            let value = any_value(&mut seeded, row);
+            // Taken or refused, but answered: `write` panics without an answer.
+            let _ = bench.write(row.index, row.sub, value);
+            disturb(&mut bench, &mut seeded);
+            bench.run_ms(seeded.below(20) as u64);
+            let report = bench.report();
+            let at =
+                format!("seed {seed}, step {step}, after {:04X}h:{:02X} = {value}: {report:?}", row.index, row.sub);
+            let finite = [report.velocity_rpm, report.current_a, report.supply_v, report.shaft_angle_rad];
+            assert!(finite.iter().all(|value| value.is_finite()), "{at}");
+            assert!(is_a_state(report.statusword.unwrap_or_default()), "{at}");
+        }
+        recovers(&mut bench, seed);
+    }
+}
+
+/// A legal value mostly, sometimes any.
+fn any_value(seeded: &mut Seeded, row: &ObjectRow) -> i64 {
+    match (row.limits, seeded.below(4)) {
+        (_, 0) => seeded.bits() as i64 >> (64 - row.size * 8),
+        (Some((low, high)), _) => low + (seeded.bits() % (high - low + 1) as u64) as i64,
+        (None, _) if row.index == 0x6040 => [0x06, 0x07, 0x0F, 0x1F, 0x5F, 0x02, 0x80, 0x10F, 0x00][seeded.below(9)],
+        (None, _) if row.index == 0x6060 => [1, 3, 6, 0][seeded.below(4)],
+        (None, _) => row.default.unwrap_or_default(),
+    }
+}
+
+fn disturb(bench: &mut Bench, seeded: &mut Seeded) {
+    let on = seeded.below(2) == 0;
+    let torque_nm = seeded.below(5) as f64 * 0.2 - 0.4;
+    let choice = seeded.below(40);
+    bench.operate(|drive, now| {
+        let _ = match choice {
+            0 => drive.set_load_torque(torque_nm, now),
+            1 => drive.set_rotor_locked(on, now),
+            2 => drive.set_fault(Component::Reference, on, now),
+            3 => drive.set_fault(Component::Eeprom, on, now),
+            4 => drive.set_fault(Component::Phase, on, now),
+            5..9 => drive.set_input(choice - 5, on, now),
+            9 => drive.set_load_inertia(if on { 1e-4 } else { 0.0 }, now),
+            10 => drive.set_supply(if on { 42.0 } else { 24.0 }, now),
+            _ => Ok(()),
+        };
+    });
+}
+
+/// The low ten bits of each state (docs/drives/zlim42c.md, 5.3.1), without bit 8.
+fn is_a_state(statusword: u16) -> bool {
+    [0x0270, 0x0231, 0x0233, 0x0237, 0x0217, 0x0298].contains(&(statusword & 0x02FF))
+}
+
+/// Mended, given its factory settings and restarted, the drive is as delivered.
+fn recovers(bench: &mut Bench, seed: u64) {
+    bench.operate(|drive, now| {
+        for component in [Component::Reference, Component::Eeprom, Component::Phase] {
+            drive.set_fault(component, false, now).expect("it has that");
+        }
+        drive.set_supply(24.0, now).expect("a supply");
+        drive.set_load_torque(0.0, now).expect("a load");
+        drive.set_load_inertia(0.0, now).expect("a load");
+        // A rotor that coasts feeds the bus.
+        drive.set_rotor_locked(true, now).expect("a rotor");
+        (0..4).for_each(|input| drive.set_input(input, false, now).expect("X0 to X3"));
+    });
+    // What it has fed, up to a hundred volts, goes away with the drive's own 1 W.
+    bench.run_ms(2000);
+    bench.operate(|drive, now| drive.set_rotor_locked(false, now)).expect("a rotor");
+    bench.set(0x2010, 0, 1);
+    bench.let_store();
+    bench.power_cycle();
+    bench.run_ms(100);
+    assert_eq!((bench.statusword(), bench.get(0x603F, 0), bench.get(0x2006, 0)), (0x0270, 0, 10), "seed {seed}");
+    bench.enable_in(1);
+    bench.move_by(400);
+    bench.run_ms(1000);
+    assert_eq!(bench.get(0x6064, 0), 400, "seed {seed}");
+}
+
+#[test]
+fn a_brown_out_in_motion_restarts_the_drive_at_position_0_with_its_stored_values() {
+    let mut bench = Bench::new();
+    bench.set(0x2005, 0, 5);
+    bench.set(0x200E, 0, 50);
+    bench.enable_in(3);
+    bench.set(0x60FF, 0, 120);
+    bench.run_ms(1000);
+    let turned = bench.get(0x6064, 0);
+    assert!(turned > 4000, "{turned} pulses");
+    bench.heard();
+    // Down to 5 V, where no converter of the drive runs, and back.
+    for supply_v in [5.0, 24.0] {
+        bench.operate(|drive, now| drive.set_supply(supply_v, now)).expect("a supply");
+        bench.run_ms(1000);
+    }
+    assert_eq!(bench.heard().iter().filter(|frame| *frame == "701#00").count(), 1);
+    assert_eq!((bench.statusword(), bench.get(0x6064, 0), bench.get(0x603F, 0)), (0x0270, 0, 0));
+    assert_eq!((bench.get(0x6060, 0), bench.get(0x60FF, 0), bench.get(0x606C, 0)), (0, 0, 0));
+    assert_eq!((bench.get(0x2005, 0), bench.get(0x200E, 0)), (5, 5), "2005h is stored, 200Eh is not");
+    // The free rotor rests in its detent, at most half an electrical turn from where the vector will stand up.
+    let rotor = bench.report().rotor_position.expect("known here");
+    assert!(rotor.abs() <= 40, "both begin anew: {rotor}");
+}
+
+#[test]
+fn power_that_goes_at_any_moment_of_a_save_leaves_the_old_values_or_the_new_ones() {
+    let (mut old, mut new) = (0, 0);
+    for delay_us in (0..3000).step_by(50) {
+        let mut bench = Bench::new();
+        bench.set(0x200C, 0, 1);
+        bench.set(0x2005, 0, 7);
+        bench.set(0x2006, 0, 4);
+        let save = "601#2B10200002000000".parse().expect("a frame");
+        bench.world.send(bench.host, save).expect("room");
+        bench.run(Duration::from_micros(delay_us));
+        bench.power_cycle();
+        let kept = (bench.get(0x2005, 0), bench.get(0x2006, 0));
+        assert!(kept == (3, 10) || kept == (7, 4), "off after {delay_us} us: {kept:?}");
+        assert_eq!(bench.get(0x603F, 0), 0);
+        (old, new) = if kept == (3, 10) { (old + 1, new) } else { (old, new + 1) };
+    }
+    assert!(old > 0 && new > 0, "both happen: {old} and {new}");
+}
+
+#[test]
+fn power_that_goes_while_factory_settings_are_restored_leaves_the_old_values_or_the_factory_ones() {
+    for delay_us in (0..2000).step_by(50) {
+        let mut bench = Bench::new();
+        bench.set(0x2005, 0, 7);
+        bench.set(0x2006, 0, 4);
+        bench.let_store();
+        let restore = "601#2B10200001000000".parse().expect("a frame");
+        bench.world.send(bench.host, restore).expect("room");
+        bench.run(Duration::from_micros(delay_us));
+        bench.power_cycle();
+        let kept = (bench.get(0x2005, 0), bench.get(0x2006, 0));
+        assert!(kept == (3, 10) || kept == (7, 4), "off after {delay_us} us: {kept:?}");
+    }
+}
+
+#[test]
+fn speeds_and_times_at_the_ends_of_their_ranges_still_end_on_the_target() {
+    for (top, start, end) in [(5, 300, 3000), (5, 2, 5), (3000, 2, 5), (120, 300, 3000)] {
+        for (up_ms, down_ms) in [(0, 0), (2000, 0), (0, 2000), (2000, 2000)] {
+            let mut bench = Bench::new();
+            for (index, value) in [(0x6081, top), (0x200E, start), (0x6082, end), (0x6083, up_ms), (0x6084, down_ms)] {
+                bench.set(index, 0, value);
+            }
+            bench.enable_in(1);
+            let mut expected = 0;
+            for pulses in [1, -1, 80, 0, -800] {
+                bench.move_by(pulses);
+                expected += pulses;
+                bench.seconds_until(30.0, Duration::from_millis(5), |report| report.velocity_demand_rpm == Some(0.0));
+                bench.run_ms(2);
+                assert_eq!(bench.get(0x6064, 0), expected, "{pulses} at {top}, {start}, {end}, {up_ms}, {down_ms}");
+                assert_ne!(bench.statusword() & 1 << 10, 0);
+            }
+        }
+    }
+}
+
+#[test]
+fn set_points_that_replace_each_other_at_any_moment_end_on_the_last_one() {
+    for seed in 0..40 {
+        let mut seeded = Seeded::new(seed);
+        let mut bench = Bench::new();
+        bench.set(0x2006, 0, seeded.below(16) as i64);
+        bench.enable_in(1);
+        let mut expected = 0;
+        for _ in 0..12 {
+            let mut up_to = |most: usize| seeded.below(most) as i64;
+            let settings =
+                [(0x6081, 60 + up_to(900)), (0x6082, 5 + up_to(100)), (0x200E, 2 + up_to(100)), (0x6083, up_to(300))];
+            for (index, value) in settings.into_iter().chain([(0x6084, up_to(300))]) {
+                bench.set(index, 0, value);
+            }
+            let (target, relative) = (up_to(4000) - 2000, up_to(2) == 0);
+            let controlword = if relative { 0x6F } else { 0x2F };
+            for (index, value) in [(0x607A, target), (0x6040, controlword), (0x6040, controlword | 0x10)] {
+                bench.set(index, 0, value);
+            }
+            expected = if relative { expected + target } else { target };
+            let mut last = bench.report().position;
+            for _ in 0..up_to(400) {
+                bench.run_ms(1);
+                let position = bench.report().position;
+                assert!((position - last).abs() <= 201, "seed {seed}: {} steps in 1 ms", position - last);
+                last = position;
+            }
+        }
+        bench.seconds_until(100.0, Duration::from_millis(20), |report| report.velocity_demand_rpm == Some(0.0));
+        bench.run_ms(2);
+        assert_eq!(bench.get(0x6064, 0), expected, "seed {seed}");
+    }
+}
+
+#[test]
+fn requests_sent_without_waiting_for_answers_are_all_answered_in_order() {
+    let mut bench = Bench::new();
+    bench.heard();
+    for _ in 0..20 {
+        for frame in ["601#4041600000000000", "601#4005200000000000"] {
+            bench.world.send(bench.host, frame.parse().expect("a frame")).expect("room");
+        }
+        bench.run_ms(5);
+    }
+    let answers = ["581#4B41600070020000", "581#4B05200003000000"];
+    let heard = bench.heard();
+    assert_eq!(heard.len(), 40);
+    assert!(heard.chunks(2).all(|pair| pair == answers), "{heard:?}");
+}
