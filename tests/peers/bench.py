@@ -1,126 +1,47 @@
 """What a check works with: a simulator, a canopen-python network and node on it, and a record of every frame."""
 
-import collections
-import csv
 import pathlib
+import tempfile
 import threading
 import time
 
 import can
 import canopen
-from canopen.objectdictionary import ODRecord, ODVariable, ObjectDictionary, datatypes
-from canopen.profiles.p402 import BaseNode402
+from canopen.objectdictionary import ODVariable
 
 from checks import eventually
 from simulator import Simulator
 
-DATA = pathlib.Path(__file__).resolve().parent.parent / "data" / "zlac8030l"
-NODE_ID = 4
-TYPES = {
-    "U8": datatypes.UNSIGNED8,
-    "U16": datatypes.UNSIGNED16,
-    "U32": datatypes.UNSIGNED32,
-    "I8": datatypes.INTEGER8,
-    "I16": datatypes.INTEGER16,
-    "I32": datatypes.INTEGER32,
-}
 
+class Remote:
+    """One drive on the bench: its canopen-python node, its objects, its raw frames, its place in the world."""
 
-def rows(name):
-    """The rows of one of the data files, as dictionaries."""
-    with open(DATA / name, newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
-
-
-def dictionary():
-    """The object dictionary that canopen-python needs, from objects.csv."""
-    od = ObjectDictionary()
-    od.bitrate = 500_000
-    of_index = collections.defaultdict(list)
-    for row in rows("objects.csv"):
-        of_index[int(row["index"], 16)].append(row)
-    for index, group in of_index.items():
-        if len(group) == 1:
-            od.add_object(variable(index, group[0]))
-            continue
-        record = ODRecord(f"Object {index:04X}h", index)
-        for row in group:
-            record.add_member(variable(index, row))
-        od.add_object(record)
-    return od
-
-
-def variable(index, row):
-    sub = int(row["sub"], 16)
-    # Names must differ within a dictionary; the manual repeats some.
-    result = ODVariable(f"{row['name']} ({index:04X}h:{sub:02X})", index, sub)
-    result.data_type = TYPES[row["type"]]
-    result.access_type = row["access"]
-    result.pdo_mappable = row["pdo_mappable"] == "yes"
-    if row["default"]:
-        result.default = int(row["default"], 0)
-    return result
-
-
-class Bench:
-    """One drive, one network, one node. Use it with `with`."""
-
-    def __init__(self, program, extra=()):
-        self.simulator = Simulator(program, extra=extra)
-        self.trace = Trace()
-
-    def __enter__(self):
-        self.simulator.__enter__()
-        try:
-            self.network = canopen.Network()
-            # How long disconnecting may wait for the reader thread.
-            self.network.NOTIFIER_CYCLE = 0.05
-            self.network.listeners.append(self.trace)
-            self.network.connect(interface="socketcand", host="127.0.0.1", port=self.simulator.port, channel="can0")
-            self.node = BaseNode402(NODE_ID, dictionary())
-            # The drive has no 6502h (supported modes), which this library insists on. Modes 1, 3, 4 by the manual.
-            self.node._op_mode_support = 1 << 0 | 1 << 2 | 1 << 3
-            self.network.add_node(self.node)
-            self.sdo = self.node.sdo
-            self.sdo.RESPONSE_TIMEOUT = 1.0
-            self._wait_until_booted()
-        except BaseException:
-            self.simulator.__exit__(None, None, None)
-            raise
-        return self
-
-    def __exit__(self, *_):
-        try:
-            self.network.disconnect()
-        finally:
-            self.simulator.__exit__(None, None, None)
-
-    def _wait_until_booted(self):
-        """The boot-up may have gone before we were on the bus, so ask until the node answers."""
-        def answers():
-            try:
-                return self.read(0x1000) == 0x00040192
-            except canopen.SdoCommunicationError:
-                return False
-
-        eventually(answers, bool, "the drive answers 1000h", timeout_s=5)
+    def __init__(self, bench, drive, node_id):
+        self.bench = bench
+        self.drive = drive
+        self.node_id = node_id
+        self.node = drive.node(node_id)
+        self.sdo = self.node.sdo
+        self.sdo.RESPONSE_TIMEOUT = 3.0
 
     def world(self, command):
-        return self.simulator.world(f"{NODE_ID} {command}")
+        """A world command for the drive that was started as this node."""
+        return self.bench.simulator.world(f"{self.node_id} {command}")
 
     def read(self, index, sub=0):
         """Uploads an object and decodes it by its row in objects.csv."""
-        od = self.node.object_dictionary[index]
-        od = od if isinstance(od, ODVariable) else od[sub]
+        od = self._variable(index, sub)
         data = self.sdo.upload(index, sub)
         if len(data) * 8 != len(od):
             raise AssertionError(f"{index:04X}h:{sub:02X}: expected {len(od) // 8} bytes, got {len(data)}")
         return od.decode_raw(data)
 
     def write(self, index, value, sub=0):
+        self.sdo.download(index, sub, self._variable(index, sub).encode_raw(value))
+
+    def _variable(self, index, sub):
         od = self.node.object_dictionary[index]
-        od = od if isinstance(od, ODVariable) else od[sub]
-        self.sdo.download(index, sub, od.encode_raw(value))
+        return od if isinstance(od, ODVariable) else od[sub]
 
     def abort_code(self, function, *arguments):
         """The abort code that a transfer ends with, or None when it succeeds."""
@@ -133,24 +54,129 @@ class Bench:
     def statusword(self):
         return self.read(0x6041)
 
+    def status_becomes(self, mask, expected, what, timeout_s=5.0):
+        """Waits for bits of the statusword."""
+        return eventually(self.statusword, lambda word: word & mask == expected, what, timeout_s)
+
     def enable(self, mode):
-        """The manual's enabling steps (4.1): mode, 6, 7, Fh."""
+        """The ZL manuals' enabling steps: mode, 6, 7, Fh."""
         self.write(0x6060, mode)
         self.node.state = "OPERATION ENABLED"
         eventually(lambda: self.read(0x6061), lambda shown: shown == mode, "6061h shows the mode")
 
-    def send(self, cob_id, data):
+    def nmt(self, command, node=None):
+        self.bench.send(0x000, [command, self.node_id if node is None else node])
+
+    def ask(self, request, timeout_s=3.0):
+        """Sends a raw SDO request to the drive and returns the raw answer."""
+        mark = self.bench.trace.mark()
+        self.bench.send(0x600 + self.node_id, request)
+        what = f"an answer to {bytes(request).hex(' ')}"
+        return bytes(self.bench.trace.wait(0x580 + self.node_id, mark, timeout_s, what).data)
+
+    def answers(self):
+        """Whether the drive answers 1000h as its model does."""
+        before, self.sdo.RESPONSE_TIMEOUT = self.sdo.RESPONSE_TIMEOUT, 0.5
+        try:
+            return self.read(0x1000) == self.drive.device_type
+        except canopen.SdoCommunicationError:
+            return False
+        finally:
+            self.sdo.RESPONSE_TIMEOUT = before
+
+    def power_cycle(self):
+        """Takes the supply away and gives it back, and waits for the boot-up."""
+        mark = self.bench.trace.mark()
+        self.world("power cycle")
+        self.bench.trace.wait(0x700 + self.node_id, mark, 8.0, "boot-up after the power cycle", lambda frame: frame.data == b"\0")
+        time.sleep(0.05)
+
+
+class Bench(Remote):
+    """The folder's drive behind a simulator, and the network to it. Use it with `with`.
+
+    `drives` are other `--drive` arguments than the folder's own, `extra` more of the command line. With `state` the
+    parameter stores are kept in a folder, so that `restart` finds them again. With `absent` nobody waits for the drive.
+    """
+
+    def __init__(self, program, drive, drives=(), extra=(), state=False, absent=False):
+        self.drives = drives or (f"{drive.model}@{drive.node_id}",)
+        super().__init__(self, drive, int(self.drives[0].partition("@")[2]))
+        self.others = {}
+        self.program, self.extra, self.absent = program, list(extra), absent
+        self.folder = tempfile.TemporaryDirectory() if state else None
+        if state:
+            self.extra += ["--state", self.folder.name]
+        self.trace = Trace()
+
+    def __enter__(self):
+        try:
+            self._start()
+        except BaseException:
+            if self.folder:
+                self.folder.cleanup()
+            raise
+        return self
+
+    def __exit__(self, *_):
+        try:
+            self._stop(kill=False)
+        finally:
+            if self.folder:
+                self.folder.cleanup()
+
+    def restart(self, kill=False, drives=None):
+        """Ends the simulator, by `quit` or by force, and starts it again with the same command line."""
+        self._stop(kill)
+        self.drives = drives or self.drives
+        self._start()
+
+    def state_files(self):
+        return [path for path in pathlib.Path(self.folder.name).rglob("*") if path.is_file()]
+
+    def _start(self):
+        self.simulator = Simulator(self.program, self.drives, extra=self.extra)
+        self.simulator.__enter__()
+        try:
+            self.network = canopen.Network()
+            # How long disconnecting may wait for the reader thread.
+            self.network.NOTIFIER_CYCLE = 0.05
+            self.network.listeners.append(self.trace)
+            self.network.connect(interface="socketcand", host="127.0.0.1", port=self.simulator.port(), channel="can0")
+            self.network.add_node(self.node)
+            if not self.absent:
+                # The boot-up may have gone before we were on the bus, so ask until the node answers.
+                eventually(self.answers, bool, "the drive answers 1000h", timeout_s=10)
+        except BaseException:
+            self.simulator.__exit__(None, None, None)
+            raise
+
+    def _stop(self, kill):
+        try:
+            self.network.disconnect()
+        finally:
+            self.simulator.kill() if kill else self.simulator.quit()
+
+    def other(self, node_id, drive=None):
+        """A further drive of the command line, or the same one under another node-ID."""
+        remote = Remote(self, drive or self.drive, node_id)
+        self.network.add_node(remote.node)
+        self.others[node_id] = remote
+        return remote
+
+    def send(self, cob_id, data=b""):
         """Sends a raw frame with python-can."""
         self.network.bus.send(can.Message(arbitration_id=cob_id, data=bytes(data), is_extended_id=False))
 
-    def nmt(self, command, node=NODE_ID):
-        self.send(0x000, [command, node])
+    def now(self):
+        """The simulated time in seconds, which stands still while a busy machine does not get round to it."""
+        return self.simulator.world("now")["t"]
 
-    def ask(self, request, timeout_s=1.0):
-        """Sends a raw SDO request to the drive and returns the raw answer."""
-        mark = self.trace.mark()
-        self.send(0x600 + NODE_ID, request)
-        return bytes(self.trace.wait(0x580 + NODE_ID, mark, timeout_s, f"an answer to {bytes(request).hex(' ')}").data)
+    def sleep(self, duration_s):
+        """Waits for simulated time to pass."""
+        end = self.now() + duration_s
+        while (left := end - self.now()) > 0:
+            time.sleep(max(left, 0.001))
 
     def last_words(self):
         """What to show when a check failed: the last frames, and what the simulator said."""

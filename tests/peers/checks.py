@@ -1,7 +1,7 @@
 """The list of checks, and how a check says what it expected."""
 
 import time
-from typing import Callable, NamedTuple
+from typing import Any, Callable, NamedTuple
 
 CHECKS = []
 
@@ -9,17 +9,24 @@ CHECKS = []
 class Check(NamedTuple):
     name: str
     function: Callable
+    #: What the bench is made with, beside the folder's own drive: see `Bench`.
+    setup: dict[str, Any]
+
+    @property
+    def folder(self):
+        """The drive's folder, in which the check stands."""
+        return self.function.__module__.partition(".")[0]
 
 
 class Skip(Exception):
     """The check cannot run here; the text says why."""
 
 
-def check(name):
+def check(name, **setup):
     """Adds a function of a bench to the list, under a sentence."""
 
     def add(function):
-        CHECKS.append(Check(name, function))
+        CHECKS.append(Check(name, function, setup))
         return function
 
     return add
@@ -40,7 +47,7 @@ def true(condition, what):
         raise AssertionError(what)
 
 
-def eventually(function, accept, what, timeout_s=3.0):
+def eventually(function, accept, what, timeout_s=5.0):
     """Calls `function` until `accept(value)` holds, and returns that value."""
     end = time.monotonic() + timeout_s
     while True:

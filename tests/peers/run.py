@@ -1,64 +1,82 @@
-"""Drives `ferrodrive sim` with canopen-python and python-can and compares with the manual's figures.
+"""Drives `ferrodrive sim` with other people's software and compares with the manuals' figures.
 
-Each check gets a factory-fresh drive of its own. One line a check on standard output: `ok NAME`,
+Each check gets factory-fresh drives of its own. One line a check on standard output: `ok NAME`,
 `FAILED NAME: why` or `skipped NAME: why`. Exit status 1 when a check failed.
 
-    python run.py --program target/debug/ferrodrive [--only WORD] [--list]
+    python run.py --program target/debug/ferrodrive [--only WORD] [--jobs N] [--list]
 """
 
 import argparse
+import concurrent.futures
 import importlib
 import logging
+import pathlib
 import sys
 import time
 
 from bench import Bench
 from checks import CHECKS, Skip
 
-MODULES = ("nmt", "sdo", "power", "motion", "pdo", "faults", "storage", "manual")
+HERE = pathlib.Path(__file__).resolve().parent
+FOLDERS = ("zlac8030l", "zlim42c", "mjoint")
+#: Checks mostly wait for a drive to move, so more of them run at once than the machine has cores.
+JOBS = 6
 
 
 def main():
     arguments = parse(sys.argv[1:])
-    # The libraries log what the checks provoke on purpose.
-    logging.disable(logging.CRITICAL)
-    for module in MODULES:
-        importlib.import_module(f"zlac8030l.{module}")
-    chosen = [check for check in CHECKS if not arguments.only or arguments.only in check.name]
+    load()
+    chosen = [number for number, check in enumerate(CHECKS) if not arguments.only or arguments.only in title(check)]
     if arguments.list:
-        for check in chosen:
-            print(check.name)
+        for number in chosen:
+            print(title(CHECKS[number]))
         return 0
-    failed = sum(not run(check, arguments.program) for check in chosen)
+    failed = 0
+    with concurrent.futures.ProcessPoolExecutor(arguments.jobs, initializer=load) as pool:
+        for lines, ended_well in pool.map(run, chosen, [arguments.program] * len(chosen)):
+            print("\n".join(lines), flush=True)
+            failed += not ended_well
     print(f"{len(chosen)} checks, {failed} failed", flush=True)
     return 1 if failed else 0
+
+
+def load():
+    """Fills the list of checks, in every process alike."""
+    # The libraries log what the checks provoke on purpose.
+    logging.disable(logging.CRITICAL)
+    for folder in FOLDERS:
+        for path in sorted((HERE / folder).glob("[a-z]*.py")):
+            importlib.import_module(f"{folder}.{path.stem}")
+
+
+def title(check):
+    return f"{check.folder}: {check.name}"
 
 
 def parse(words):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", default="target/debug/ferrodrive", help="the ferrodrive binary")
-    parser.add_argument("--only", help="only the checks whose name holds this text")
+    parser.add_argument("--only", help="only the checks whose `folder: name` holds this text")
+    parser.add_argument("--jobs", type=int, default=JOBS, help="how many checks run at once")
     parser.add_argument("--list", action="store_true", help="name the checks")
     return parser.parse_args(words)
 
 
-def run(check, program):
-    """Runs one check on a drive of its own, prints its line and returns whether it did not fail."""
+def run(number, program):
+    """Runs one check on drives of its own. Returns its lines, and whether it did not fail."""
+    check = CHECKS[number]
+    drive = sys.modules[check.folder].DRIVE
     start = time.monotonic()
     bench = None
     try:
-        with Bench(program) as bench:
+        with Bench(program, drive, **check.setup) as bench:
             check.function(bench)
     except Skip as reason:
-        print(f"skipped {check.name}: {reason}", flush=True)
+        return [f"skipped {title(check)}: {reason}"], True
     except Exception as error:  # any error of a check, a library or the program is this check's failure
-        print(f"FAILED {check.name}: {type(error).__name__}: {error}", flush=True)
-        for line in bench.last_words() if bench else ():
-            print(f"    {line}", flush=True)
-        return False
-    else:
-        print(f"ok {check.name} ({time.monotonic() - start:.1f} s)", flush=True)
-    return True
+        words = bench.last_words() if bench else ()
+        return [f"FAILED {title(check)}: {type(error).__name__}: {error}", *(f"    {line}" for line in words)], False
+    return [f"ok {title(check)} ({time.monotonic() - start:.1f} s)"], True
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""`ferrodrive sim` as a child process: one virtual drive behind a socketcand port, world commands on its stdin."""
+"""`ferrodrive sim` as a child process: virtual drives behind a socketcand port, world commands on its stdin."""
 
 import json
 import queue
@@ -7,18 +7,19 @@ import subprocess
 import tempfile
 import threading
 
-READY_TIMEOUT_S = 20
-ANSWER_TIMEOUT_S = 5
+READY_TIMEOUT_S = 30
+ANSWER_TIMEOUT_S = 10
 
 
 class Simulator:
     """Starts the program, waits for its `ready` line and ends it again, whatever happens in between."""
 
-    def __init__(self, program, drive="zlac8030l@4", seed=1, extra=()):
-        self.command_line = [program, "sim", "--drive", drive, "--serve", "socketcand://127.0.0.1:0"]
-        self.command_line += ["--seed", str(seed), *extra]
+    def __init__(self, program, drives, seed=1, extra=()):
+        self.command_line = [program, "sim", "--serve", "socketcand://127.0.0.1:0", "--seed", str(seed), *extra]
+        for drive in drives:
+            self.command_line += ["--drive", drive]
         self.process = None
-        self.port = None
+        self.ready = ""
         self.lines = queue.Queue()
 
     def __enter__(self):
@@ -33,27 +34,51 @@ class Simulator:
         )
         threading.Thread(target=self._read, daemon=True).start()
         try:
-            self.port = self._wait_until_ready()
+            self._wait_until_ready()
         except BaseException:
-            self._end()
+            self.quit()
             raise
         return self
 
     def __exit__(self, *_):
-        self._end()
+        self.quit()
+
+    def port(self, protocol="socketcand"):
+        """The port of a listener, as the `ready` line names it."""
+        address = re.search(rf"{protocol}://127\.0\.0\.1:(\d+)", self.ready)
+        if not address:
+            raise AssertionError(f"no {protocol} address in {self.ready!r}")
+        return int(address.group(1))
 
     def world(self, command):
         """Sends one world command and returns its answer; an answer that is not ok is an error."""
-        self.process.stdin.write(command + "\n")
-        self.process.stdin.flush()
-        answer = json.loads(self._line(ANSWER_TIMEOUT_S, f"no answer to the world command {command!r}"))
+        answer = self.tell(command)
         if not answer.get("ok"):
             raise AssertionError(f"world command {command!r} refused: {answer}")
         return answer
 
+    def tell(self, line):
+        """Sends a line and returns its answer, whatever it is."""
+        self.process.stdin.write(line + "\n")
+        self.process.stdin.flush()
+        return json.loads(self._line(ANSWER_TIMEOUT_S, f"no answer to {line!r}"))
+
     def stderr(self):
         self.errors.seek(0)
         return self.errors.read().splitlines()[-10:]
+
+    def quit(self):
+        """Asks the program to quit, and ends the very process that was started if it does not."""
+        try:
+            self.process.communicate("quit\n", timeout=5)
+        except (subprocess.TimeoutExpired, OSError, ValueError):
+            self.kill()
+        return self.process.returncode
+
+    def kill(self):
+        """Ends the process without a word, as a crash of the machine would."""
+        self.process.kill()
+        self.process.wait()
 
     def _read(self):
         for line in self.process.stdout:
@@ -70,18 +95,5 @@ class Simulator:
         return line
 
     def _wait_until_ready(self):
-        while True:
-            line = self._line(READY_TIMEOUT_S, "no line that begins with `ready`")
-            if line.startswith("ready"):
-                address = re.search(r"socketcand://127\.0\.0\.1:(\d+)", line)
-                if not address:
-                    raise AssertionError(f"no socketcand address in {line!r}")
-                return int(address.group(1))
-
-    def _end(self):
-        """Asks the program to quit, and ends the very process that was started if it does not."""
-        try:
-            self.process.communicate("quit\n", timeout=3)
-        except (subprocess.TimeoutExpired, OSError, ValueError):
-            self.process.kill()
-            self.process.wait()
+        while not self.ready.startswith("ready"):
+            self.ready = self._line(READY_TIMEOUT_S, "no line that begins with `ready`")

@@ -3,7 +3,7 @@
 import itertools
 import time
 
-from bench import rows
+from zlac8030l import rows
 from checks import check, equal
 
 

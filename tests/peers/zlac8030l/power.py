@@ -2,7 +2,7 @@
 
 import time
 
-from bench import rows
+from zlac8030l import rows
 from checks import check, equal, eventually, true
 
 #: How to reach a state from switch on disabled, by controlwords.

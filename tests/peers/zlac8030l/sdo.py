@@ -2,7 +2,7 @@
 
 import canopen
 
-from bench import rows
+from zlac8030l import rows
 from checks import check, equal, true
 
 READ_ONLY, NO_OBJECT, NO_SUB_INDEX = 0x06010002, 0x06020000, 0x06090011
