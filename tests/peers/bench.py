@@ -111,7 +111,7 @@ class Bench(Remote):
 
     def __enter__(self):
         try:
-            self._start()
+            self.start()
         except BaseException:
             if self.folder:
                 self.folder.cleanup()
@@ -120,21 +120,21 @@ class Bench(Remote):
 
     def __exit__(self, *_):
         try:
-            self._stop(kill=False)
+            self.stop()
         finally:
             if self.folder:
                 self.folder.cleanup()
 
     def restart(self, kill=False, drives=None):
         """Ends the simulator, by `quit` or by force, and starts it again with the same command line."""
-        self._stop(kill)
+        self.stop(kill)
         self.drives = drives or self.drives
-        self._start()
+        self.start()
 
     def state_files(self):
         return [path for path in pathlib.Path(self.folder.name).rglob("*") if path.is_file()]
 
-    def _start(self):
+    def start(self):
         self.simulator = Simulator(self.program, self.drives, extra=self.extra)
         self.simulator.__enter__()
         try:
@@ -151,9 +151,11 @@ class Bench(Remote):
             self.simulator.__exit__(None, None, None)
             raise
 
-    def _stop(self, kill):
+    def stop(self, kill=False):
         try:
             self.network.disconnect()
+            for node_id in tuple(self.network):
+                del self.network[node_id]
         finally:
             self.simulator.kill() if kill else self.simulator.quit()
 

@@ -7,15 +7,12 @@ CHECKS = []
 
 
 class Check(NamedTuple):
+    #: The drive's folder.
+    folder: str
     name: str
     function: Callable
     #: What the bench is made with, beside the folder's own drive: see `Bench`.
     setup: dict[str, Any]
-
-    @property
-    def folder(self):
-        """The drive's folder, in which the check stands."""
-        return self.function.__module__.partition(".")[0]
 
 
 class Skip(Exception):
@@ -23,13 +20,30 @@ class Skip(Exception):
 
 
 def check(name, **setup):
-    """Adds a function of a bench to the list, under a sentence."""
+    """Adds a function of a bench to the list, under a sentence and for the drive in whose folder it stands."""
 
     def add(function):
-        CHECKS.append(Check(name, function, setup))
+        CHECKS.append(Check(function.__module__.partition(".")[0], name, function, setup))
         return function
 
     return add
+
+
+class Common:
+    """Checks that hold for several drives: written once, taken into the list for each."""
+
+    def __init__(self):
+        self.members = []
+
+    def check(self, name, **setup):
+        def add(function):
+            self.members.append((name, function, setup))
+            return function
+
+        return add
+
+    def into(self, folder):
+        CHECKS.extend(Check(folder, *member) for member in self.members)
 
 
 def equal(actual, expected, what):

@@ -20,12 +20,14 @@ TYPES = {
 class Drive:
     """What the checks of a folder run on: a model at a node-ID, and how it is told to be there."""
 
-    def __init__(self, folder, model, node_id, device_type, node_class):
+    def __init__(self, folder, model, node_id, device_type, node_class, per_rpm):
         self.folder = folder
         self.model = model
         self.node_id = node_id
         self.device_type = device_type
         self.node_class = node_class
+        #: What 606Ch reads by SDO at 1 r/min.
+        self.per_rpm = per_rpm
 
     def rows(self, name):
         """The rows of one of the data files, as dictionaries."""

@@ -4,5 +4,7 @@ from canopen import RemoteNode
 
 from drive import Drive
 
-DRIVE = Drive("mjoint", model="m4230e17b50", node_id=1, device_type=0x00020192, node_class=RemoteNode)
+DRIVE = Drive(
+    "mjoint", model="m4230e17b50", node_id=1, device_type=0x00020192, node_class=RemoteNode, per_rpm=10
+)
 rows = DRIVE.rows

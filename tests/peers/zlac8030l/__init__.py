@@ -13,5 +13,7 @@ class Node(BaseNode402):
         self._op_mode_support = 1 << 0 | 1 << 2 | 1 << 3
 
 
-DRIVE = Drive("zlac8030l", model="zlac8030l", node_id=4, device_type=0x00040192, node_class=Node)
+DRIVE = Drive(
+    "zlac8030l", model="zlac8030l", node_id=4, device_type=0x00040192, node_class=Node, per_rpm=10
+)
 rows = DRIVE.rows

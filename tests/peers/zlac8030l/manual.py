@@ -1,10 +1,10 @@
 """Every datagram that the manual prints, byte by byte, with python-can alone."""
 
-import itertools
 import time
 
-from zlac8030l import rows
+import datagrams
 from checks import check, equal
+from zlac8030l import DRIVE, rows
 
 
 def conversation(section):
@@ -12,27 +12,12 @@ def conversation(section):
 
     @check(f"manual {section}: the drive answers each datagram as printed, or as CiA 301 demands")
     def replay(bench):
-        for row in rows("datagrams.csv"):
-            if row["section"] != section or not row["request"]:
-                continue
-            request = bytes.fromhex(row["request"])
-            if row["request_cob"] != "0x604":
-                bench.send(int(row["request_cob"], 16), request)
-                time.sleep(0.05)
-                continue
-            got = bench.ask(request).hex(" ").upper()
-            equal(masked(got, row["answer"]), row["answer"], f"answer to {row['request']} ({row['meaning']})")
-        equal(bench.read(0x1000), 0x00040192, "1000h at the end")
+        datagrams.replay(bench, section)
 
     return replay
 
 
-def masked(got, pattern):
-    """The answer with `..` where the pattern leaves a byte open."""
-    return " ".join(".." if wanted == ".." else byte for byte, wanted in itertools.zip_longest(got.split(), pattern.split(), fillvalue=""))
-
-
-for _section in dict.fromkeys(row["section"] for row in rows("datagrams.csv") if row["request"]):
+for _section in datagrams.sections(DRIVE):
     conversation(_section)
 
 

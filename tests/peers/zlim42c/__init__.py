@@ -13,5 +13,7 @@ class Node(BaseNode402):
         self._op_mode_support = 1 << 0 | 1 << 2 | 1 << 5
 
 
-DRIVE = Drive("zlim42c", model="zlim42c", node_id=1, device_type=0x00040192, node_class=Node)
+DRIVE = Drive(
+    "zlim42c", model="zlim42c", node_id=1, device_type=0x00040192, node_class=Node, per_rpm=1
+)
 rows = DRIVE.rows

@@ -1,0 +1,34 @@
+"""The datagrams that a manual prints, byte by byte, with python-can alone."""
+
+import itertools
+import time
+
+from checks import equal
+
+
+def replay(bench, section):
+    """Sends a section's requests in order and compares the drive's answers; NMT and SYNC have none."""
+    for row in bench.drive.rows("datagrams.csv"):
+        if row["section"] != section or not row["request_cob"]:
+            continue
+        request = bytes.fromhex(row["request"])
+        cob = int(row["request_cob"], 16)
+        if not row["response_cob"]:
+            bench.send(cob, request)
+            time.sleep(0.05)
+            continue
+        mark = bench.trace.mark()
+        bench.send(cob, request)
+        frame = bench.trace.wait(int(row["response_cob"], 16), mark, 3.0, f"an answer to {row['request']}")
+        got = bytes(frame.data).hex(" ").upper()
+        equal(masked(got, row["answer"]), row["answer"], f"answer to {row['request']} ({row['meaning']})")
+    equal(bench.read(0x1000), bench.drive.device_type, "1000h at the end")
+
+
+def sections(drive):
+    return dict.fromkeys(row["section"] for row in drive.rows("datagrams.csv") if row["request"])
+
+
+def masked(got, pattern):
+    """The answer with `..` where the pattern leaves a byte open."""
+    return " ".join(".." if wanted == ".." else byte for byte, wanted in itertools.zip_longest(got.split(), pattern.split(), fillvalue=""))

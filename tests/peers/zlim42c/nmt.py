@@ -1,0 +1,5 @@
+"""NMT states, boot-up and heartbeat."""
+
+from zl import nmt
+
+nmt.COMMON.into("zlim42c")

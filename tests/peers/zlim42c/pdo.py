@@ -1,0 +1,5 @@
+"""PDOs, their mapping and their transmission types."""
+
+from zl import pdo
+
+pdo.COMMON.into("zlim42c")
