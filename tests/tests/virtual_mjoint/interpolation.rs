@@ -17,13 +17,13 @@ fn three(synchronised: i64) -> Bench {
         }
     }
     // The joints' own rhythms are apart from each other, as those of real ones are.
-    for node in 2..=3_u64 {
+    for node in 2..=3_u8 {
         bench.tell(&format!("{node} power off"));
-        bench.run(Duration::from_micros(1_730 * node));
+        bench.run(Duration::from_micros(1_730 * u64::from(node)));
         bench.tell(&format!("{node} power on"));
         bench.run_ms(20);
         for (index, value) in [(0x261C, synchronised), (0x6060, 7), (0x6040, 0x0F)] {
-            bench.write_to(node as u16, index, 0, value).expect("a setting");
+            bench.write_to(node, index, 0, value).expect("a setting");
         }
     }
     bench.run_ms(20);

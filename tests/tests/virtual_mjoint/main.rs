@@ -4,8 +4,9 @@
 //! `tests/data/mjoint` lists it), in CiA 301, or follows from the motor's published constants by a closed form. One file
 //! for each subject; [`bench`] is the table they all work at.
 
+use ferrodrive_tests::bench::mjoint as bench;
+
 mod alarms;
-mod bench;
 mod communication;
 mod datagrams;
 mod homing;

@@ -4,7 +4,8 @@
 //! `tests/data/zlac8030l` lists it), in CiA 301 and CiA 402-2, or follows from the motor's published constants by a closed
 //! form. One file for each subject; [`bench`] is the table they all work at.
 
-mod bench;
+use ferrodrive_tests::bench::zlac8030l as bench;
+
 mod communication;
 mod datagrams;
 mod determinism;

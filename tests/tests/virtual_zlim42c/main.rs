@@ -4,8 +4,9 @@
 //! `tests/data/zlim42c` lists it), in CiA 301 and CiA 402-2, or follows from the motor's published constants by a closed
 //! form. One file for each subject; [`bench`] is the table they all work at.
 
+use ferrodrive_tests::bench::zlim42c as bench;
+
 mod address;
-mod bench;
 mod communication;
 mod current;
 mod datagrams;

@@ -1,0 +1,86 @@
+//! The bench of M joints.
+
+use std::sync::LazyLock;
+
+use can::Bitrate;
+use drives::mjoint::Model;
+use sim::VirtualDrive;
+use sim::machine::{MJointMachine, mjoint};
+
+use super::{Rows, Subject};
+use crate::mjoint::objects;
+
+pub use super::{Abort, head};
+
+/// Counts in one turn of the motor.
+pub const TURN: i64 = 32_768;
+
+/// A joint of the smallest model.
+#[derive(Debug)]
+pub struct MJoint;
+
+/// Its bench.
+pub type Bench = super::Bench<MJoint>;
+
+impl Subject for MJoint {
+    type Machine = MJointMachine;
+
+    const NODE: u8 = 1;
+    const BITRATE: Bitrate = Bitrate::M1;
+
+    fn machine() -> MJointMachine {
+        mjoint(&Model::M4230E17B50, Self::NODE, Self::BITRATE)
+    }
+
+    fn rows() -> &'static Rows {
+        static ROWS: LazyLock<Rows> =
+            LazyLock::new(|| Rows::new(objects().into_iter().map(|joint| joint.row).collect()));
+        &ROWS
+    }
+}
+
+impl Bench {
+    /// Joints of a model at the nodes 1 to `count`.
+    #[must_use]
+    pub fn of(count: u8, model: &'static Model) -> Self {
+        let joint = |node| -> Box<dyn VirtualDrive> { Box::new(mjoint(model, node, MJoint::BITRATE)) };
+        Self::with((1..=count).map(joint).collect())
+    }
+
+    /// Writes to another joint than the first.
+    pub fn write_to(&mut self, node: u8, index: u16, sub: u8, value: i64) -> Result<(), Abort> {
+        self.at(node, |bench| bench.write(index, sub, value))
+    }
+
+    /// Reads from another joint than the first.
+    #[track_caller]
+    pub fn get_from(&mut self, node: u8, index: u16, sub: u8) -> i64 {
+        self.at(node, |bench| bench.get(index, sub))
+    }
+
+    #[track_caller]
+    fn at<T>(&mut self, node: u8, talk: impl FnOnce(&mut Self) -> T) -> T {
+        let usual = std::mem::replace(&mut self.node, node);
+        let result = talk(self);
+        self.node = usual;
+        result
+    }
+
+    /// 6064h.
+    pub fn position(&mut self) -> i64 {
+        self.get(0x6064, 0)
+    }
+
+    /// Milliseconds until the target is reached; panics after `limit_ms`.
+    #[track_caller]
+    pub fn until_reached(&mut self, limit_ms: u64) -> u64 {
+        self.until(limit_ms, |bench| bench.statusword() & 0x0400 != 0)
+    }
+
+    /// 2614h = 1, and its 2.
+    pub fn save(&mut self) {
+        self.set(0x2614, 0, 1);
+        self.run_ms(5);
+        assert_eq!(self.get(0x2614, 0), 2);
+    }
+}

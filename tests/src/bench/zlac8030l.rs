@@ -1,0 +1,55 @@
+//! The bench of a ZLAC8030L with its wheel motor.
+
+use std::sync::LazyLock;
+
+use can::Bitrate;
+use plant::hub_motor::HubMotor;
+use sim::machine::{Zlac8030lMachine, zlac8030l};
+
+use super::{Rows, Subject};
+use crate::zlac8030l::objects;
+
+pub use super::{Abort, assert_within};
+
+/// Value of 200Eh for 500 kbit/s.
+pub const RATE_500K: u16 = 1;
+
+/// The node of a drive as delivered, and its number in the world.
+pub const NODE: u8 = Zlac8030l::NODE;
+
+/// The drive.
+#[derive(Debug)]
+pub struct Zlac8030l;
+
+/// Its bench.
+pub type Bench = super::Bench<Zlac8030l>;
+
+impl Subject for Zlac8030l {
+    type Machine = Zlac8030lMachine;
+
+    const NODE: u8 = 4;
+    const BITRATE: Bitrate = Bitrate::K500;
+
+    fn machine() -> Zlac8030lMachine {
+        zlac8030l(NODE, RATE_500K)
+    }
+
+    fn rows() -> &'static Rows {
+        static ROWS: LazyLock<Rows> = LazyLock::new(|| Rows::new(objects()));
+        &ROWS
+    }
+}
+
+impl Bench {
+    /// Selects a mode and enables operation, without the watch over the host (2000h), so that a test may just look.
+    pub fn enable_in(&mut self, mode: i64) {
+        self.set(0x2000, 0, 0);
+        self.set(0x6060, 0, mode);
+        self.enable();
+    }
+
+    /// The motor of an [`open`](Self::open) bench, as it is now.
+    pub fn motor(&mut self) -> &mut HubMotor {
+        self.machine().assembly_mut().motor_mut()
+    }
+}

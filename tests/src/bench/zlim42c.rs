@@ -1,0 +1,67 @@
+//! The bench of a ZLIM42-C.
+
+use std::sync::LazyLock;
+
+use can::Bitrate;
+use sim::machine::{Zlim42cMachine, zlim42c, zlim42c_82};
+
+use super::{Rows, Subject};
+use crate::zlim42c::objects;
+
+pub use super::{Abort, assert_within};
+
+/// Value of 2009h for 500 kbit/s.
+pub const RATE_500K: u16 = 1;
+
+/// The node of a drive as delivered, and its number in the world.
+pub const NODE: u8 = Zlim42c::NODE;
+
+/// The drive, of 70 mm.
+#[derive(Debug)]
+pub struct Zlim42c;
+
+/// Its bench.
+pub type Bench = super::Bench<Zlim42c>;
+
+impl Subject for Zlim42c {
+    type Machine = Zlim42cMachine;
+
+    const NODE: u8 = 1;
+    const BITRATE: Bitrate = Bitrate::K500;
+
+    fn machine() -> Zlim42cMachine {
+        zlim42c(NODE, RATE_500K)
+    }
+
+    fn rows() -> &'static Rows {
+        static ROWS: LazyLock<Rows> = LazyLock::new(|| Rows::new(objects()));
+        &ROWS
+    }
+}
+
+impl Bench {
+    /// A drive with the longer motor, as delivered, that has just booted.
+    #[must_use]
+    pub fn long() -> Self {
+        Self::with(vec![Box::new(zlim42c_82(NODE, RATE_500K))])
+    }
+
+    /// Selects a mode and enables operation.
+    pub fn enable_in(&mut self, mode: i64) {
+        self.set(0x6060, 0, mode);
+        self.enable();
+    }
+
+    /// Level of a digital input, held long enough to pass its filter.
+    pub fn input(&mut self, input: usize, level: bool) {
+        self.operate(|drive, now| drive.set_input(input, level, now)).expect("X0 to X3");
+        self.run_ms(15);
+    }
+
+    /// Relative move of profile position.
+    pub fn move_by(&mut self, pulses: i64) {
+        self.set(0x607A, 0, pulses);
+        self.set(0x6040, 0, 0x4F);
+        self.set(0x6040, 0, 0x5F);
+    }
+}
