@@ -7,6 +7,7 @@ use clap::{Parser, Subcommand};
 use transport::BusSpec;
 
 use crate::command::{completions, demo, drive, dump, home, motion, nmt, objects, scan, sdo, sim, store};
+use crate::machine_file::{self, Machine};
 use crate::models::DriveProfile;
 use crate::parse::drive_spec::node_model;
 
@@ -40,6 +41,12 @@ pub(crate) struct Global {
     /// Which model a node is, where its identity cannot tell (e.g. 4=zlac8030l); may be repeated
     #[arg(long = "model", value_name = "NODE=MODEL", value_parser = node_model, global = true)]
     pub(crate) models: Vec<(NodeId, &'static DriveProfile)>,
+
+    /// Machine file that says which models are where on a real bus; the same file describes a virtual one to sim:FILE.toml
+    ///
+    /// Of each [[drive]] its `model` and `node` count. An embedded bus knows its drives and does not need it.
+    #[arg(long, value_name = "FILE.toml", value_parser = machine_file::models, env = "FERRODRIVE_MACHINE", global = true)]
+    pub(crate) machine: Option<Machine>,
 
     /// Longest wait for each answer of a node
     #[arg(long, value_name = "TIME", value_parser = master::units::parse_duration, default_value = "500ms", global = true)]

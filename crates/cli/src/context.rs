@@ -6,6 +6,7 @@ use std::time::Duration;
 use canopen::{Mux, NodeId};
 use cia402::PowerCommand;
 use master::drive::Drive;
+use master::identify::Knowledge;
 use master::{Error, Network, Node};
 
 use crate::args::Global;
@@ -25,20 +26,41 @@ pub(crate) struct Context {
     /// Where to show what is going on.
     pub(crate) progress: Progress,
     timeout: Duration,
-    models: BTreeMap<NodeId, &'static DriveProfile>,
+    models: BTreeMap<NodeId, Told>,
+    json: bool,
+}
+
+/// A model that need not be found out.
+#[derive(Clone, Copy)]
+enum Told {
+    /// By the embedded bus, whose drive it is.
+    ByBus(&'static DriveProfile),
+    /// By the user, who may be wrong.
+    ByUser(&'static DriveProfile),
+}
+
+impl Told {
+    const fn profile(self) -> &'static DriveProfile {
+        match self {
+            Self::ByBus(profile) | Self::ByUser(profile) => profile,
+        }
+    }
 }
 
 impl Context {
-    /// A context for `network`. `embedded` are the drives of an embedded bus; the command line may overrule them.
+    /// A context for `network`. `embedded` are the drives of an embedded bus, which need no machine file; --model overrules
+    /// both.
     pub(crate) fn new(
         global: &Global,
         network: Network,
         embedded: Option<&[(NodeId, &'static DriveProfile)]>,
         progress: Progress,
     ) -> Self {
-        let known = embedded.unwrap_or_default().iter().chain(&global.models);
-        let models = known.map(|(node, model)| (*node, *model)).collect();
-        Self { network, progress, timeout: global.timeout, models }
+        let of_machine = global.machine.iter().filter(|_| embedded.is_none()).flat_map(|machine| machine.0.iter());
+        let by_user = of_machine.chain(&global.models).map(|(node, model)| (*node, Told::ByUser(model)));
+        let by_bus = embedded.unwrap_or_default().iter().map(|(node, model)| (*node, Told::ByBus(model)));
+        let models = by_bus.chain(by_user).collect();
+        Self { network, progress, timeout: global.timeout, models, json: global.json }
     }
 
     /// A node, to be waited for as long as the command line says.
@@ -46,27 +68,23 @@ impl Context {
         self.network.node(id).with_timeout(self.timeout)
     }
 
-    /// Which model a node is as the command line or the embedded bus says.
+    /// Which model a node is as the user or the embedded bus says.
     pub(crate) fn told_model(&self, id: NodeId) -> Option<&'static DriveProfile> {
-        self.models.get(&id).copied()
+        self.models.get(&id).map(|told| told.profile())
     }
 
-    /// Which model a node is: as the command line says, else as its identity and objects say, if they fit one model only.
-    pub(crate) async fn model_of(&self, id: NodeId) -> Result<Option<&'static DriveProfile>, Failure> {
-        if let Some(model) = self.told_model(id) {
-            return Ok(Some(model));
+    /// What is known of a node's model: as it was told, if the node does not contradict, else as its identity and objects
+    /// say.
+    async fn knowledge_of(&self, id: NodeId) -> Result<Knowledge, Failure> {
+        match self.models.get(&id) {
+            Some(Told::ByBus(model)) => return Ok((*model).into()),
+            Some(Told::ByUser(model)) => {
+                Drive::new(self.node(id), model).check_identity().await?;
+                return Ok((*model).into());
+            }
+            None => {}
         }
-        let models = master::identify::models(&self.node(id)).await?;
-        Ok(if let [model] = models[..] { Some(model) } else { None })
-    }
-
-    /// As [`model_of`](Self::model_of), for commands that cannot do without.
-    pub(crate) async fn known_model_of(&self, id: NodeId) -> Result<&'static DriveProfile, Failure> {
-        self.model_of(id).await?.ok_or_else(|| {
-            Failure::new(format!("the model of node {id} is not known"))
-                .because("its identity (1018h) and objects fit no model, or more than one")
-                .next(format!("say which it is with --model {id}=MODEL, where MODEL is one of: {}", models::names()))
-        })
+        Ok(master::identify::knowledge(&self.node(id)).await?)
     }
 
     /// Longest wait for each answer.
@@ -74,15 +92,44 @@ impl Context {
         self.timeout
     }
 
-    /// A drive of a known model.
+    /// A drive of a known or guessed model, for commands that cannot do without. A guess is told to the user.
     pub(crate) async fn known_drive(&self, id: NodeId) -> Result<Drive, Failure> {
-        Ok(Drive::new(self.node(id), self.known_model_of(id).await?))
+        let drive = self.drive(id).await?;
+        if drive.profile().is_some() {
+            return Ok(drive);
+        }
+        Err(Failure::new(format!("the model of node {id} is not known"))
+            .because("its identity (1018h) and objects fit no model, or more than one")
+            .next(format!("say which it is with --model {id}=MODEL, where MODEL is one of: {}", models::names())))
     }
 
-    /// A drive, of a known model or not.
+    /// A drive, of a known model or not. A guess is told to the user.
     pub(crate) async fn drive(&self, id: NodeId) -> Result<Drive, Failure> {
-        let model = self.model_of(id).await?;
-        Ok(model.map_or_else(|| Drive::of_unknown_model(self.node(id)), |model| Drive::new(self.node(id), model)))
+        let drive = self.drive_untold(id).await?;
+        self.tell_guess(&drive);
+        Ok(drive)
+    }
+
+    /// A drive, for commands that may refuse to work with a guess, which is then told with the refusal.
+    pub(crate) async fn drive_untold(&self, id: NodeId) -> Result<Drive, Failure> {
+        Ok(Drive::known_as(self.node(id), self.knowledge_of(id).await?))
+    }
+
+    /// Tells the user if what follows rests on a guess. Where all models that answer so have the same objects, it does not.
+    pub(crate) fn tell_guess(&self, drive: &Drive) {
+        let Some(guess) = drive.guess().filter(|guess| guess.evidence().is_some() && !self.json) else { return };
+        let id = drive.node().id();
+        let fitting: Vec<_> = guess.fitting().map(|model| model.model).collect();
+        let how = how_to_say(id, &fitting);
+        self.progress.note(&format!("node {id}: cannot tell its model: {guess}. Taken for that; to be sure: {how}"));
+    }
+
+    /// A drive that is to be stopped: as what the user takes it for, be that right or wrong.
+    pub(crate) async fn drive_to_stop(&self, id: NodeId) -> Result<Drive, Failure> {
+        match self.told_model(id) {
+            Some(model) => Ok(Drive::new(self.node(id), model)),
+            None => self.drive(id).await,
+        }
     }
 
     /// Quick stop, whatever the node is doing.
@@ -94,4 +141,11 @@ impl Context {
     pub(crate) async fn settle(&self) {
         self.network.sleep(SETTLING_TIME).await;
     }
+}
+
+/// How the user says which of `models` a node is.
+pub(crate) fn how_to_say(node: NodeId, models: &[&str]) -> String {
+    let (first, others) = models.split_first().unwrap_or((&"MODEL", &[]));
+    let others = if others.is_empty() { String::new() } else { format!(" (or {})", others.join(", ")) };
+    format!("--model {node}={first}{others}, or a machine file (--machine FILE)")
 }

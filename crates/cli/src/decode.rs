@@ -2,8 +2,10 @@
 
 use canopen::od::{DataType, Entry};
 use cia402::{Controlword, Statusword};
+use master::decode::statusword_words;
 use serde::Serialize;
 
+use crate::models::DriveProfile;
 use crate::paint::Paint;
 use crate::parse::unit::split_number;
 
@@ -32,8 +34,8 @@ pub(crate) struct Decoded {
     hexadecimal: bool,
 }
 
-/// Decodes `bytes`, which came from the object of `row`, if that is known.
-pub(crate) fn decode(row: Option<&'static Entry>, bytes: &[u8]) -> Decoded {
+/// Decodes `bytes`, which came from the object of `row`, if that is known, on a node of `model`.
+pub(crate) fn decode(model: Option<&DriveProfile>, row: Option<&'static Entry>, bytes: &[u8]) -> Decoded {
     let mut decoded = Decoded {
         bytes: bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" "),
         value: None,
@@ -54,7 +56,7 @@ pub(crate) fn decode(row: Option<&'static Entry>, bytes: &[u8]) -> Decoded {
     } else if bytes.len() == row.data_type.size() {
         let value = row.data_type.value(raw());
         decoded.value = Some(value);
-        decoded.meaning = meaning(row, value);
+        decoded.meaning = meaning(model, row, value);
         decoded.hexadecimal = is_bit_field(row);
         decoded.measure(row.unit, value);
     } else if let Some(form) = row.tpdo_form.filter(|form| form.data_type.size() == bytes.len()) {
@@ -104,20 +106,12 @@ fn is_bit_field(row: &Entry) -> bool {
         || matches!(row.index, 0x1000 | 0x1001 | 0x1005 | 0x1009 | 0x100A | 0x1014 | 0x603F..=0x6041)
 }
 
-fn meaning(row: &Entry, value: i64) -> Option<String> {
+fn meaning(model: Option<&DriveProfile>, row: &Entry, value: i64) -> Option<String> {
     match (row.index, row.sub_index) {
-        (0x6041, 0) => Some(statusword(Statusword(value as u16))),
+        (0x6041, 0) => Some(statusword_words(Statusword(value as u16), model)),
         (0x6040, 0) => Some(Controlword(value as u16).command().name().into()),
         _ => row.meaning(value).map(Into::into),
     }
-}
-
-/// A statusword in words: the state, then the bits that say more.
-fn statusword(word: Statusword) -> String {
-    const BITS: [(u16, &str); 2] = [(Statusword::WARNING, "warning"), (Statusword::TARGET_REACHED, "target reached")];
-    let state = word.state().map_or("no state of CiA 402", |state| state.name());
-    let bits = BITS.iter().filter(|(mask, _)| word.has(*mask)).map(|(_, name)| format!(", {name}"));
-    format!("{state}{}", bits.collect::<String>())
 }
 
 #[cfg(test)]
@@ -135,7 +129,7 @@ mod tests {
 
     #[test]
     fn numbers_are_shown_in_their_unit() {
-        let text = |row, bytes: &[u8]| decode(Some(row), bytes).text(Paint::OFF);
+        let text = |row, bytes: &[u8]| decode(None, Some(row), bytes).text(Paint::OFF);
         assert_eq!(text(&SPEED, &[0x18, 0xFC, 0xFF, 0xFF]), "-100.0 r/min (-1000)");
         assert_eq!(text(&POSITION, &[0, 0x7D, 0, 0]), "32000 counts");
         assert_eq!(text(&MODE, &[3]), "3  profile velocity");
@@ -143,14 +137,17 @@ mod tests {
 
     #[test]
     fn a_statusword_is_put_into_words() {
-        let decoded = decode(Some(&STATUS), &[0x37, 0x06]);
+        let decoded = decode(None, Some(&STATUS), &[0x37, 0x06]);
         assert_eq!(decoded.text(Paint::OFF), "0x637 (1591)  Operation enabled, target reached");
+        // "M Robot Joint Motor CanOpen Manual", 5.10.1: an idle joint.
+        let joint = decode(Some(&drives::mjoint::M4230E17B50), Some(&STATUS), &[0x04, 0x04]);
+        assert_eq!(joint.text(Paint::OFF), "0x404 (1028)  output enabled, target reached");
     }
 
     #[test]
     fn an_unexpected_length_is_shown_as_bytes() {
-        assert_eq!(decode(Some(&SPEED), &[1, 2]).text(Paint::OFF), "bytes 01 02");
-        assert_eq!(decode(None, &[1, 2]).text(Paint::OFF), "0x201 (513)");
-        assert_eq!(decode(None, &[1; 6]).text(Paint::OFF), "bytes 01 01 01 01 01 01");
+        assert_eq!(decode(None, Some(&SPEED), &[1, 2]).text(Paint::OFF), "bytes 01 02");
+        assert_eq!(decode(None, None, &[1, 2]).text(Paint::OFF), "0x201 (513)");
+        assert_eq!(decode(None, None, &[1; 6]).text(Paint::OFF), "bytes 01 01 01 01 01 01");
     }
 }

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::context::how_to_say;
+
 /// How a command ended; the process ends with the same number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Status {
@@ -65,11 +67,24 @@ impl fmt::Display for Failure {
 }
 
 impl From<master::Error> for Failure {
-    /// The master's errors say what, why and what to do in whole sentences. What is beyond a limit was mistyped.
+    /// The master's errors say what, why and what to do in whole sentences, but for how a model is named on this command
+    /// line. What is beyond a limit was mistyped.
     fn from(error: master::Error) -> Self {
+        use master::Error;
+        let failure = Self::new(error.to_string());
         match error {
-            master::Error::OutOfLimits { .. } => Self::usage(error.to_string()),
-            _ => Self::new(error.to_string()),
+            Error::OutOfLimits { .. } => Self { status: Status::Usage, ..failure },
+            Error::GuessedModel { node, guess, .. } => {
+                let fitting: Vec<_> = guess.fitting().map(|model| model.model).collect();
+                failure.next(format!("say which it is: {}", how_to_say(node, &fitting)))
+            }
+            Error::WrongModel { node, .. } | Error::OtherModel { node, .. } => failure.next(format!(
+                "leave --model {node}=.. away and see what `ferrodrive scan` says of it, or correct the machine file"
+            )),
+            Error::UnknownModel { node, .. } => {
+                failure.next(format!("say which it is: {}", how_to_say(node, &["MODEL"])))
+            }
+            _ => failure,
         }
     }
 }

@@ -1,4 +1,5 @@
-//! Machine files: an embedded virtual bus described in TOML, for `--bus sim:FILE.toml`.
+//! Machine files: an embedded virtual bus described in TOML, for `--bus sim:FILE.toml`, or which models are where on a real
+//! bus, for `--machine FILE.toml`.
 //!
 //! A file names the drives and what is around them. Everything about a machine is put into the words of `ferrodrive sim`
 //! and done by the same code, so that a file can do what a world command can, and no more.
@@ -8,11 +9,13 @@ use std::fs;
 use std::path::Path;
 
 use can::{Bitrate, Instant};
+use canopen::NodeId;
 use serde::Deserialize;
 use sim::World;
 
 use crate::embedded::{self, Embedded, SEED};
 use crate::failure::Failure;
+use crate::models::DriveProfile;
 use crate::parse::drive_spec::{DriveSpec, drive_spec};
 
 const EXAMPLE: &str =
@@ -75,16 +78,42 @@ pub(crate) fn load(path: &Path) -> Result<Embedded, Failure> {
     })
 }
 
-fn build(text: &str) -> Result<Embedded, String> {
-    let file: MachineFile = toml::from_str(text).map_err(|error| error.to_string().trim_end().to_owned())?;
-    let bitrate = file.bitrate.as_deref().map_or(Ok(Bitrate::K500), str::parse).map_err(|error| error.to_string())?;
-    if file.drive.is_empty() {
-        return Err("it has no [[drive]]".into());
+/// Which models are at which nodes of a real bus.
+#[derive(Clone)]
+pub(crate) struct Machine(pub(crate) Vec<(NodeId, &'static DriveProfile)>);
+
+/// What a file says of the models at its nodes.
+pub(crate) fn models(path: &str) -> Result<Machine, String> {
+    let text = fs::read_to_string(path).map_err(|error| error.to_string());
+    text.and_then(|text| nodes(&text))
+        .map(Machine)
+        .map_err(|reason| format!("cannot use it: {reason}\na machine file looks like this:\n           {EXAMPLE}"))
+}
+
+fn nodes(text: &str) -> Result<Vec<(NodeId, &'static DriveProfile)>, String> {
+    let mut nodes: Vec<(NodeId, &'static DriveProfile)> = Vec::new();
+    for table in parse(text)?.drive {
+        let spec = table.spec()?;
+        if nodes.iter().any(|(node, _)| *node == spec.node) {
+            return Err(format!("two drives at node {}", spec.node));
+        }
+        nodes.push((spec.node, spec.model));
     }
+    Ok(nodes)
+}
+
+fn parse(text: &str) -> Result<MachineFile, String> {
+    let file: MachineFile = toml::from_str(text).map_err(|error| error.to_string().trim_end().to_owned())?;
+    if file.drive.is_empty() { Err("it has no [[drive]]".into()) } else { Ok(file) }
+}
+
+fn build(text: &str) -> Result<Embedded, String> {
+    let file = parse(text)?;
+    let bitrate = file.bitrate.as_deref().map_or(Ok(Bitrate::K500), str::parse).map_err(|error| error.to_string())?;
     let mut world = World::new(bitrate, file.seed.unwrap_or(SEED));
     let mut drives = Vec::new();
     for table in &file.drive {
-        let spec: DriveSpec = drive_spec(&format!("{}@{}", table.model, table.node))?;
+        let spec = table.spec()?;
         let mut drive = embedded::virtual_drive(spec.model, spec.node, bitrate).map_err(|failure| failure.what)?;
         if let Some(supply_v) = table.supply_v {
             // Before the power comes on: capacitors once charged would hold another voltage for a while.
@@ -108,6 +137,10 @@ fn obey(world: &mut World, command: &str) -> Result<(), String> {
 }
 
 impl DriveTable {
+    fn spec(&self) -> Result<DriveSpec, String> {
+        drive_spec(&format!("{}@{}", self.model, self.node))
+    }
+
     /// What the table says, as world commands.
     fn commands(&self) -> Vec<String> {
         let mut commands: Vec<String> = Vec::new();
@@ -145,6 +178,17 @@ mod tests {
                     inputs = { X0 = true }\nswitches = { X1 = ['min', -100] }\nfaults = ['hall']";
         let table: DriveTable = toml::from_str(text).unwrap();
         assert_eq!(table.commands(), ["7 load torque 0.5", "7 input X0 1", "7 switch X1 min -100", "7 fault hall on"]);
+    }
+
+    #[test]
+    fn a_file_says_which_models_are_where_and_no_node_twice() {
+        let text = "[[drive]]\nmodel = 'zlim42c'\nnode = 2\nload = { torque_nm = 0.5 }\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4";
+        let said: Vec<_> =
+            nodes(text).unwrap_or_default().into_iter().map(|(node, model)| (node.raw(), model.model)).collect();
+        assert_eq!(said, [(2, "zlim42c"), (4, "zlac8030l")]);
+        let twice = "[[drive]]\nmodel = 'zlim42c'\nnode = 2\n[[drive]]\nmodel = 'zlac8030l'\nnode = 2";
+        assert_eq!(nodes(twice).err().as_deref(), Some("two drives at node 2"));
+        assert!(models("/nowhere/machine.toml").is_err_and(|reason| reason.contains("[[drive]]")));
     }
 
     #[test]

@@ -91,9 +91,7 @@ fn run(global: &Global, format: Format, command: &Command, typed_bus: bool) -> R
         Command::Home(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Objects(objects) => match objects.whose {
             Whose::Model(model) => print(format, &objects.list(model)?),
-            Whose::Node(node) => {
-                on_bus(global, format, async |context| objects.list(context.known_model_of(node).await?))
-            }
+            Whose::Node(node) => on_bus(global, format, async |context| objects.of_node(context, node).await),
         },
         Command::Dump(dump) => dump.run(global, format),
         Command::Completions(completions) => {

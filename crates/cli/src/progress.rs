@@ -1,6 +1,6 @@
 //! What is going on, on a terminal only.
 
-use std::io::{self, IsTerminal};
+use std::io::{self, IsTerminal, Write};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -28,6 +28,12 @@ impl Progress {
     pub(crate) fn show(&self, text: impl Into<String>) {
         self.bar.set_message(text.into());
         self.bar.tick();
+    }
+
+    /// A line on standard error that stays, terminal or not.
+    pub(crate) fn note(&self, text: &str) {
+        // Nobody may be listening any more.
+        self.bar.suspend(|| drop(writeln!(io::stderr(), "note: {text}")));
     }
 
     /// Keeps the line moving while nothing changes.

@@ -78,9 +78,14 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     let ended = run_station(&mut bus, &mut station, &clock, &Notify::new(), until).await;
     progress.clear();
     ended.map_err(|error| {
-        let moving =
-            network.moved().iter().map(|node| format!("node {node} was moving, and cannot be reached any more"));
-        moving.fold(bus_failure(global, &error), Failure::because)
+        let failure = bus_failure(global, &error);
+        let moved = network.moved();
+        let failure = moved.iter().fold(failure, |failure, node| {
+            failure
+                .because(format!("node {node} was moving, and cannot be reached any more"))
+                .next(format!("make sure that it stands still (emergency stop); then: ferrodrive state {node}"))
+        });
+        failure.next(format!("find out why {} went away, and start it again", global.bus))
     })?
 }
 

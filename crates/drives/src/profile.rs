@@ -4,8 +4,8 @@
 //! what an object number means. A [`DriveProfile`] says it all; [`model`] finds one by name.
 
 use can::Bitrate;
-use canopen::Mux;
-use canopen::od::Table;
+use canopen::od::{Entry, Table};
+use canopen::{Mux, NmtState};
 use cia402::{ModeOfOperation, PowerState, Statusword};
 
 use crate::engine::faults::FaultRow;
@@ -28,8 +28,13 @@ pub fn model(name: &str) -> Option<&'static DriveProfile> {
 }
 
 /// The models that answer this identity: more than one may.
-pub fn models_by_identity(identity: Identity) -> impl Iterator<Item = &'static DriveProfile> {
+pub fn models_by_identity(identity: Identity) -> impl Iterator<Item = &'static DriveProfile> + use<> {
     MODELS.iter().copied().filter(move |profile| profile.identity == identity)
+}
+
+/// True if two rows give an object the same name, type, unit and meanings.
+pub fn reads_alike(a: &Entry, b: &Entry) -> bool {
+    (a.name, a.data_type, a.unit, a.values) == (b.name, b.data_type, b.unit, b.values)
 }
 
 /// One model of drive.
@@ -43,7 +48,8 @@ pub struct DriveProfile {
     pub manual: &'static str,
     /// What 1000h and 1018h answer.
     pub identity: Identity,
-    /// An object that no other maker's model of the same identity has, where there is one: reading it confirms the model.
+    /// An object that, by their manuals, no model of the same identity and other objects has. That it is there speaks for
+    /// the model and proves nothing: the next firmware of the other may have it too.
     pub hallmark: Option<Mux>,
     /// The object table.
     pub table: &'static Table,
@@ -79,6 +85,55 @@ impl DriveProfile {
     /// The power state that a statusword shows, or for a drive without the state machine the one that comes closest.
     pub const fn power_state(&self, statusword: Statusword) -> Option<PowerState> {
         self.power.state(statusword)
+    }
+
+    /// The row of an object, if the model has it.
+    pub fn row(&self, mux: Mux) -> Option<&'static Entry> {
+        self.table.find(mux).ok().map(|slot| self.table.row(slot))
+    }
+
+    /// The models that answer the same identity, this one among them.
+    pub fn answering_alike(&self) -> impl Iterator<Item = &'static Self> + use<> {
+        models_by_identity(self.identity)
+    }
+
+    /// The models that answer the same identity and have the same objects, this one among them.
+    pub fn with_same_objects(&self) -> impl Iterator<Item = &'static Self> + use<> {
+        let table = self.table;
+        self.answering_alike().filter(move |other| core::ptr::eq(other.table, table))
+    }
+
+    /// True if every model that answers the same identity has this object and means the same by this value of it.
+    pub fn shares(&self, mux: Mux, value: i64) -> bool {
+        let own = self.row(mux);
+        self.answering_alike().all(|other| match (own, other.row(mux)) {
+            (Some(own), Some(row)) => {
+                let form = |row: &Entry| (row.name, row.data_type, row.unit, row.meaning(value));
+                form(own) == form(row)
+            }
+            _ => false,
+        })
+    }
+
+    /// The NMT state that a boot-up message or a heartbeat of this model stands for. A boot-up message is followed by
+    /// pre-operational without a word (CiA 301, 7.3.2.2.1), but for models that start by themselves.
+    pub fn nmt_state(&self, said: NmtState) -> NmtState {
+        match said {
+            NmtState::Initialising if self.has(Quirk::StartsOperational) => NmtState::Operational,
+            NmtState::Initialising => NmtState::PreOperational,
+            _ if self.tells_alarm(said) => NmtState::Operational,
+            said => said,
+        }
+    }
+
+    /// True if a heartbeat with this state says that there is an alarm.
+    pub fn tells_alarm(&self, said: NmtState) -> bool {
+        said == NmtState::Stopped && self.has(Quirk::HeartbeatTellsAlarm)
+    }
+
+    /// True if the model departs in this way.
+    pub fn has(&self, quirk: Quirk) -> bool {
+        self.quirks.contains(&quirk)
     }
 }
 

@@ -8,7 +8,7 @@ use canopen::{AbortCode, Mux, NmtState, NodeId};
 use cia402::ModeOfOperation;
 
 use crate::drive::Explanation;
-use crate::identify::Identity;
+use crate::identify::{Guess, Identity};
 
 /// Why the master could not do what it was asked.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -98,6 +98,19 @@ pub enum Error {
         node: NodeId,
         /// What was to be done.
         intent: &'static str,
+    },
+    /// Something that not every model of the node's identity takes alike was asked of a drive whose model is a guess.
+    #[error(
+        "node {node}: its model is not known for sure, and that is needed to {intent}: {guess}. Nothing was sent{}",
+        if guess.evidence().is_some() { ": what stores parameters on one may set something else on the other" } else { "" }
+    )]
+    GuessedModel {
+        /// The node.
+        node: NodeId,
+        /// What was to be done.
+        intent: String,
+        /// What is known.
+        guess: Guess,
     },
     /// The node says that it is something else than the model it was taken for.
     #[error("node {node} is not a {model}: it says {found}. Name the right model")]

@@ -1,14 +1,13 @@
 //! Who is on the bus: what nodes say of themselves, and which model that can be.
 //!
 //! In: boot-up and heartbeat messages seen, and answers to 1000h and 1018h. Out: one [`Found`] per node. Nodes are
-//! asked in windows, all of a window at the same time. Models may share an identity: those with other objects are told
-//! apart by an object that only some of them have. What cannot be told is said.
+//! asked in windows, all of a window at the same time. Models may share an identity: an object that only some of them
+//! have then makes a [`Guess`], never a certainty. What cannot be told is said.
 
 use core::fmt;
 use std::time::Duration;
 
-use canopen::od::Entry;
-use canopen::{AbortCode, Mux, NmtState, NodeId};
+use canopen::{Mux, NmtState, NodeId};
 use drives::profile::{self, DriveProfile, models_by_identity};
 
 use crate::error::Error;
@@ -65,8 +64,111 @@ impl fmt::Display for Identity {
     }
 }
 
+/// What is known of a node's model.
+#[derive(Clone, Copy, Debug)]
+pub enum Knowledge {
+    /// This model: somebody has said so who must know, or no other model answers so.
+    Named(Model),
+    /// One of several that answer so: good for reading and moving, not for what only one model means.
+    Guessed(Guess),
+    /// No model known here answers so, or models with other objects do and nothing speaks for one of them.
+    Unknown,
+}
+
+impl Knowledge {
+    /// The profile to work with: of a guess, the one that all models it may be agree with.
+    pub const fn profile(self) -> Option<&'static DriveProfile> {
+        match self {
+            Self::Named(Model(profile)) => Some(profile),
+            Self::Guessed(guess) => Some(guess.profile),
+            Self::Unknown => None,
+        }
+    }
+
+    /// The guess, if it is one.
+    pub const fn guess(self) -> Option<Guess> {
+        if let Self::Guessed(guess) = self { Some(guess) } else { None }
+    }
+}
+
+impl From<&'static DriveProfile> for Knowledge {
+    fn from(profile: &'static DriveProfile) -> Self {
+        Self::Named(Model(profile))
+    }
+}
+
+/// A model's profile, which prints as its name.
+#[derive(Clone, Copy)]
+pub struct Model(pub &'static DriveProfile);
+
+impl fmt::Debug for Model {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.0.model)
+    }
+}
+
+/// A model that several answer like, chosen by an object that it has, if the others have other objects.
+///
+/// Models with the same objects differ in their motors only: they are read and moved in the same way.
+#[derive(Clone, Copy)]
+pub struct Guess {
+    profile: &'static DriveProfile,
+    evidence: Option<Mux>,
+}
+
+impl Guess {
+    /// The profile to read and move with.
+    pub const fn profile(self) -> &'static DriveProfile {
+        self.profile
+    }
+
+    /// The object that speaks for it; `None` where all that answer so have the same objects.
+    pub const fn evidence(self) -> Option<Mux> {
+        self.evidence
+    }
+
+    /// The models that it may be by its objects.
+    pub fn fitting(self) -> impl Iterator<Item = &'static DriveProfile> {
+        self.profile.with_same_objects()
+    }
+
+    /// True if this value of this object means the same on every model that answers so.
+    pub fn may_write(self, mux: Mux, value: i64) -> bool {
+        self.profile.shares(mux, value)
+    }
+}
+
+impl fmt::Debug for Guess {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Guess {{ {}, {:?} }}", self.profile.model, self.evidence)
+    }
+}
+
+/// Why it is no more than a guess: "zlac8030l, zlim42c and zlim42c-82 answer the same identity; it has 2029h:00 as zlac8030l has".
+impl fmt::Display for Guess {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (answering, _) = names(self.profile.answering_alike());
+        let (fitting, several) = names(self.fitting());
+        write!(f, "{answering} answer the same identity")?;
+        match self.evidence {
+            Some(evidence) => write!(f, "; it has {evidence} as {fitting} {}", if several { "have" } else { "has" }),
+            None => f.write_str(" and have the same objects"),
+        }
+    }
+}
+
+/// Names in a sentence, and whether they are several.
+fn names(models: impl Iterator<Item = &'static DriveProfile>) -> (String, bool) {
+    let names: Vec<_> = models.map(|model| model.model).collect();
+    match names.split_last() {
+        Some((last, [])) => ((*last).to_owned(), false),
+        Some((last, others)) => (format!("{} and {last}", others.join(", ")), true),
+        None => ("no model".to_owned(), false),
+    }
+}
+
 /// A node that was found.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Found {
     /// Its node-ID.
     pub node: NodeId,
@@ -74,41 +176,28 @@ pub struct Found {
     pub identity: Option<Identity>,
     /// Its NMT state by its last boot-up or heartbeat message, or the NMT command sent since.
     pub nmt_state: Option<NmtState>,
-    /// The models that answer so and have its objects. More than one: it cannot be told which.
-    pub models: Vec<&'static DriveProfile>,
-}
-
-impl fmt::Debug for Found {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let models: Vec<_> = self.models.iter().map(|model| model.model).collect();
-        let Self { node, identity, nmt_state, .. } = self;
-        write!(f, "Found {{ {node}, {identity:?}, {nmt_state:?}, {models:?} }}")
-    }
+    /// What that tells of its model.
+    pub knowledge: Knowledge,
 }
 
 impl Found {
-    /// The model, if only one answers so.
-    pub fn model(&self) -> Option<&'static DriveProfile> {
-        match self.models[..] {
-            [model] => Some(model),
-            _ => None,
-        }
+    /// The models that answer so. More than one: it cannot be told which.
+    pub fn models(&self) -> Vec<&'static DriveProfile> {
+        self.identity.map(models_answering).unwrap_or_default()
     }
 
     /// What cannot be told about it, and why.
     pub fn doubt(&self) -> Option<String> {
-        let shared = |model: &&DriveProfile| model.quirks.contains(&profile::Quirk::IdentityShared);
-        match (self.identity, &self.models[..]) {
+        match (self.identity, self.knowledge) {
             (None, _) => Some("it is heard but answers no SDO: stopped, or busy, or its SDO is elsewhere".to_owned()),
-            (Some(_), []) => Some("no model known here answers so".to_owned()),
-            (Some(_), [model]) if shared(model) => {
-                Some(format!("other models answer the same identity: its objects are those of the {}", model.model))
-            }
-            (Some(_), [_]) => None,
-            (Some(_), models) => {
-                let names: Vec<_> = models.iter().map(|model| model.model).collect();
-                Some(format!("{} answer the same identity and have the same objects: say which", names.join(" and ")))
-            }
+            (Some(_), Knowledge::Named(_)) => None,
+            (Some(_), Knowledge::Guessed(guess)) => Some(format!("cannot tell: {guess}")),
+            (Some(identity), Knowledge::Unknown) => Some(match names(models_answering(identity).into_iter()) {
+                (answering, true) => {
+                    format!("cannot tell: {answering} answer the same identity, and its objects speak for none of them")
+                }
+                _ => "no model known here answers so".to_owned(),
+            }),
         }
     }
 }
@@ -139,35 +228,50 @@ fn node_silent(node: &Node, mux: Mux) -> Error {
     Error::NoAnswer { node: node.id(), mux, access, waited: node.timeout(), hints: node.hints(false) }
 }
 
-/// The models that a node can be: those of its identity, as far as their objects do not speak against it.
+/// What a node's identity and objects tell of its model.
 ///
 /// # Errors
 /// [`Error::NoAnswer`] when it is silent.
-pub async fn models(node: &Node) -> Result<Vec<&'static DriveProfile>, Error> {
+pub async fn knowledge(node: &Node) -> Result<Knowledge, Error> {
     let said = identity(node).await?;
-    told_apart(node, models_answering(said)).await
+    told_apart(node, &models_answering(said)).await
 }
 
-/// Those of `models` whose objects the node has.
-async fn told_apart(node: &Node, mut models: Vec<&'static DriveProfile>) -> Result<Vec<&'static DriveProfile>, Error> {
-    // Each answer leaves fewer models, and at least one.
-    while let Some(mux) = distinguishing_object(&models) {
-        let present = match node.upload(mux).await {
-            Ok(_) => true,
-            Err(Error::Aborted { code: AbortCode::NO_SUCH_OBJECT | AbortCode::NO_SUCH_SUB_INDEX, .. }) => false,
-            Err(Error::NoAnswer { .. }) => return Err(node_silent(node, mux)),
-            Err(_) => break,
-        };
-        models.retain(|model| model.table.find(mux).is_ok() == present);
+/// What the node's objects tell of which of `models` it is.
+async fn told_apart(node: &Node, models: &[&'static DriveProfile]) -> Result<Knowledge, Error> {
+    let Some((first, others)) = models.split_first() else { return Ok(Knowledge::Unknown) };
+    if others.is_empty() {
+        return Ok((*first).into());
     }
-    Ok(models)
+    if others.iter().all(|other| core::ptr::eq(other.table, first.table)) {
+        return Ok(Knowledge::Guessed(Guess { profile: first, evidence: None }));
+    }
+    let mut guess: Option<Guess> = None;
+    for model in models {
+        let Some(hallmark) = model.hallmark else { continue };
+        let same = |guess: &Guess| core::ptr::eq(guess.profile.table, model.table);
+        if guess.as_ref().is_some_and(same) || !has(node, hallmark).await? {
+            continue;
+        }
+        if guess.is_some() {
+            // It has what should be one model's own and what should be another's.
+            return Ok(Knowledge::Unknown);
+        }
+        guess = Some(Guess { profile: model, evidence: Some(hallmark) });
+    }
+    Ok(guess.map_or(Knowledge::Unknown, Knowledge::Guessed))
 }
 
-/// An object that the first model lets read and another one does not have: its hallmark, if that is one.
-fn distinguishing_object(models: &[&'static DriveProfile]) -> Option<Mux> {
-    let (first, others) = models.split_first()?;
-    let readable = first.table.rows().iter().filter(|entry| entry.access.is_readable()).map(Entry::mux);
-    first.hallmark.into_iter().chain(readable).find(|mux| others.iter().any(|other| other.table.find(*mux).is_err()))
+/// True if the node lets this object be read.
+///
+/// # Errors
+/// [`Error::NoAnswer`] when it is silent.
+pub(crate) async fn has(node: &Node, mux: Mux) -> Result<bool, Error> {
+    match node.upload(mux).await {
+        Ok(_) => Ok(true),
+        Err(Error::NoAnswer { .. }) => Err(node_silent(node, mux)),
+        Err(_) => Ok(false),
+    }
 }
 
 impl Network {
@@ -195,8 +299,8 @@ impl Network {
             return None;
         }
         let answering = identity.map(models_answering).unwrap_or_default();
-        let models = told_apart(&node, answering).await.unwrap_or_default();
-        Some(Found { node: id, identity, nmt_state: facts.probable_state(), models })
+        let knowledge = told_apart(&node, &answering).await.unwrap_or(Knowledge::Unknown);
+        Some(Found { node: id, identity, nmt_state: facts.probable_state(knowledge.profile()), knowledge })
     }
 }
 

@@ -95,6 +95,56 @@ fn pdos_are_split_by_the_mapping_that_went_over_the_bus() {
 }
 
 #[test]
+fn a_joint_is_put_into_its_own_words() {
+    let mut decoder = Decoder::new();
+    decoder.set_model(NodeId::new(1).unwrap(), &drives::mjoint::M4230E17B50);
+    // "M Robot Joint Motor CanOpen Manual", 5.10.1: 0404h idle; 5.11.1: heartbeat 05h, and 04h in alarm; 606Ch is
+    // INTEGER16 of 0.1 r/min by SDO (5.04) and INTEGER32 of r/min in TPDO3 (5.08).
+    let shown = lines(
+        &mut decoder,
+        &[
+            "581#4B41600004040000",
+            "581#4B41600037000000",
+            "701#05",
+            "701#04",
+            "581#4B6C600090E80000",
+            "381#A8FDFFFF3704",
+        ],
+    );
+    assert_eq!(
+        shown,
+        [
+            "SDO node 1: 6041h:00 statusword = 0404h (output enabled, target reached)",
+            "SDO node 1: 6041h:00 statusword = 0037h (follows its host, output enabled, power stage live, no quick stop)",
+            "heartbeat node 1: operational",
+            "heartbeat node 1: in alarm (04h; it does not mean stopped)",
+            "SDO node 1: 606Ch:00 velocity_actual_value = -6000 [0.1 r/min]",
+            "TPDO2 node 1: 606Ch:00 velocity_actual_value = -600 [r/min], 6041h:00 statusword = 0437h (follows its host, \
+             output enabled, power stage live, no quick stop, target reached)",
+        ]
+    );
+}
+
+#[test]
+fn a_joint_is_known_by_its_device_type_and_a_zl_drive_is_not() {
+    let mut decoder = Decoder::new();
+    let shown = lines(
+        &mut decoder,
+        &[
+            "601#4000100000000000",
+            "581#4300100092010200",
+            "581#4B41600004040000",
+            "701#04",
+            "584#4300100092010400",
+            "704#04",
+        ],
+    );
+    assert_eq!(shown[2], "SDO node 1: 6041h:00 statusword = 0404h (output enabled, target reached)");
+    assert_eq!(shown[3], "heartbeat node 1: in alarm (04h; it does not mean stopped)");
+    assert_eq!(shown[5], "heartbeat node 4: stopped");
+}
+
+#[test]
 fn a_refused_mapping_changes_nothing() {
     let mut decoder = Decoder::new();
     let map = PdoMap(vec![MappedObject::from_record(0x6041_0010)]);

@@ -133,6 +133,21 @@ fn a_move_that_was_halted_gives_way_to_the_next_one_on_every_drive() {
 }
 
 #[test]
+fn a_move_after_a_speed_stops_first_and_says_so_on_every_drive() {
+    let (mut world, _, drives) = bench();
+    for drive in &drives {
+        block_on(&mut world, drive.velocity(Rpm(120.0), slowly())).unwrap().unwrap();
+        let moved = block_on(&mut world, drive.move_absolute(Turns(1.0), slowly())).unwrap().unwrap();
+        let note = Note::StoppedFirst { before: ModeOfOperation::PROFILE_VELOCITY };
+        assert!(moved.notes.contains(&note), "{drive:?}: {moved:?}");
+        let Degrees(angle) = block_on(&mut world, drive.state()).unwrap().unwrap().angle.unwrap();
+        assert!((angle - 360.0).abs() < 4.0, "{drive:?}: {angle}");
+        let again = block_on(&mut world, drive.move_absolute(Turns(0.0), slowly())).unwrap().unwrap();
+        assert!(!again.notes.contains(&note), "{drive:?}: {again:?}");
+    }
+}
+
+#[test]
 fn a_current_is_pushed_where_the_model_has_a_torque_mode_and_refused_where_not() {
     let (mut world, _, [joint, stepper, servo]) = bench();
     block_on(&mut world, servo.torque(Amperes(0.5))).unwrap().unwrap();

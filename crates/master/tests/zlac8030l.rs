@@ -14,7 +14,7 @@ use master::drive::{MotionOptions, Note};
 use master::pdo::{PdoConfig, TimerUnits};
 use master::units::{Amperes, Counts, Degrees, Ramp, Rpm, Turns};
 use master::{Drive, Error, Network, join_all};
-use sim::machine::{zlac8030l, zlim42c};
+use sim::machine::zlac8030l;
 use sim::{World, block_on};
 use support::{mux, node};
 
@@ -40,25 +40,9 @@ fn slowly() -> MotionOptions {
 }
 
 #[test]
-fn the_identity_is_the_model_s_and_a_scan_tells_what_it_cannot_tell() {
-    let (mut world, network, drives) = world(&[4]);
+fn the_identity_is_the_models() {
+    let (mut world, _, drives) = world(&[4]);
     block_on(&mut world, drives[0].check_identity()).unwrap().unwrap();
-    let found = block_on(&mut world, network.scan(Duration::from_millis(100), |_| {})).unwrap();
-    assert_eq!(found.len(), 1, "{found:?}");
-    assert_eq!(found[0].node, node(4));
-    assert_eq!(found[0].model().map(|model| model.model), Some("zlac8030l"));
-    assert!(found[0].doubt().is_some(), "the ZLIM42-C answers the same identity");
-}
-
-#[test]
-fn drives_of_one_identity_are_told_apart_by_their_objects() {
-    let (mut world, network, _) = world(&[4]);
-    world.add_drive(2, Box::new(zlim42c(2, K500))).unwrap();
-    world.run_for(Duration::from_secs(2));
-    let found = block_on(&mut world, network.scan(Duration::from_millis(100), |_| {})).unwrap();
-    let names = found.iter().map(|found| found.models.iter().map(|model| model.model).collect::<Vec<_>>());
-    // The two ZLIM42-C differ in their motors only.
-    assert_eq!(names.collect::<Vec<_>>(), [vec!["zlim42c", "zlim42c-82"], vec!["zlac8030l"]]);
 }
 
 #[test]

@@ -7,6 +7,8 @@
 mod apply;
 mod parse;
 
+use serde::Serialize;
+
 use crate::{Component, PulseTrain, Refused, SwitchRange, TemperatureSensor, World};
 
 /// One line, understood.
@@ -77,7 +79,13 @@ pub enum CommandError {
     /// The number is no node number.
     #[error("{0:?} is no node number; expected 1 to 127")]
     BadNode(String),
-    /// A node number and nothing or something unknown after it.
+    /// A node number and nothing after it.
+    #[error(
+        "nothing to do is said after node {0}; expected power, input, switch, load, rotor, supply, temperature, fault, \
+         battery, pulses, quadrature, duty, cable or get, as in: {0} get"
+    )]
+    NoAction(u8),
+    /// A node number and something unknown after it.
     #[error(
         "unknown command {0:?} for a node; expected power, input, switch, load, rotor, supply, temperature, fault, \
          battery, pulses, quadrature, duty, cable or get"
@@ -144,7 +152,23 @@ pub fn answer(world: &mut World, line: &str) -> Option<Answer> {
     let done = line.parse().and_then(|command| Ok((command == Command::Quit, apply::apply(world, &command)?)));
     let (quit, json) = match done {
         Ok((quit, json)) => (quit, json),
-        Err(error) => (false, serde_json::json!({ "ok": false, "error": error.to_string() }).to_string()),
+        Err(error) => (false, refused(&error)),
     };
     Some(Answer { json, quit })
+}
+
+#[derive(Serialize)]
+struct Refusal {
+    ok: bool,
+    error: String,
+}
+
+/// The answer to a line that was not done.
+fn refused(error: &CommandError) -> String {
+    to_json(&Refusal { ok: false, error: error.to_string() })
+}
+
+fn to_json(answer: &impl Serialize) -> String {
+    // Answers are flags, numbers and texts: they always become JSON.
+    serde_json::to_string(answer).unwrap_or_else(|_| r#"{"ok":false,"error":"an answer cannot be written"}"#.to_owned())
 }

@@ -46,6 +46,15 @@ fn drives_boot_when_they_are_added_and_answer_on_the_bus() {
 }
 
 #[test]
+fn a_refusal_begins_as_every_answer_does_and_says_what_is_expected() {
+    let (mut world, _) = world();
+    let json = answer(&mut world, "fly").unwrap().json;
+    assert!(json.starts_with(r#"{"ok":false,"error":""#), "{json}");
+    let error = refusal(&mut world, "4");
+    assert!(error.contains("after node 4") && error.contains("power") && error.contains("4 get"), "{error}");
+}
+
+#[test]
 fn get_tells_what_can_be_measured() {
     let (mut world, _) = world();
     // Half a turn at 60 r/min.

@@ -5,6 +5,7 @@ use canopen::{NmtState, NodeId};
 use master::drive::{Drive, DriveState};
 use serde::Serialize;
 
+use super::sdo::guessed;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
@@ -63,7 +64,10 @@ pub(crate) struct Reset {
 #[derive(Debug, Serialize)]
 pub(crate) struct StateReport {
     pub(crate) node: u8,
+    /// The model, if it is known for sure.
     model: Option<&'static str>,
+    /// The model that its objects speak for.
+    guess: Option<&'static str>,
     state: &'static str,
     mode: Option<String>,
     statusword: u16,
@@ -106,7 +110,7 @@ impl Enable {
 impl Disable {
     /// Disables and shows the state.
     pub(crate) async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
-        let drive = context.drive(self.node).await?;
+        let drive = context.drive_to_stop(self.node).await?;
         drive.disable().await?;
         StateReport::read(&drive).await
     }
@@ -115,7 +119,7 @@ impl Disable {
 impl Stop {
     /// Stops and shows the state.
     pub(crate) async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
-        let drive = context.drive(self.node).await?;
+        let drive = context.drive_to_stop(self.node).await?;
         drive.stop().await?;
         StateReport::read(&drive).await
     }
@@ -125,7 +129,7 @@ impl QuickStop {
     /// Stops at once and shows the state. The stop goes out before anything is asked.
     pub(crate) async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
         context.quick_stop(self.node).await?;
-        let drive = context.drive(self.node).await?;
+        let drive = context.drive_to_stop(self.node).await?;
         drive.quick_stop().await?;
         StateReport::read(&drive).await
     }
@@ -148,7 +152,8 @@ impl StateReport {
         let faults = state.faults.iter().map(|row| FaultReport { code: row.code, name: row.name, remedy: row.remedy });
         Ok(Self {
             node: drive.node().id().raw(),
-            model: drive.profile().map(|profile| profile.model),
+            model: drive.profile().filter(|_| drive.guess().is_none()).map(|profile| profile.model),
+            guess: guessed(drive),
             state: state.power.map_or("no state of CiA 402", |power| power.name()),
             mode: state.mode.map(|mode| mode.to_string()),
             statusword: state.statusword.0,

@@ -22,7 +22,7 @@ use crate::session::{bus_failure, exit_on_interrupt, interrupted, runtime};
 /// Show the bus decoded: SDO with object names and values, PDOs by their mapping, statuswords in words
 ///
 /// Only listens. On a real bus it runs until Ctrl-C; on a log until its end; on an embedded virtual bus it shows how the
-/// drives boot. Object names need the model: --model NODE=MODEL.
+/// drives boot. Names of a model's own objects need the model: --model NODE=MODEL, or --machine FILE.toml.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  ferrodrive --bus can0 --model 4=zlac8030l dump\n  ferrodrive --bus can0 dump --log trace.log\n  \
@@ -79,7 +79,7 @@ impl Dump {
         exit_on_interrupt();
         let (mut world, drives) = embedded::world(file)?;
         for (node, model) in drives {
-            sink.decoder.set_model(node, model.table);
+            sink.decoder.set_model(node, model);
         }
         world.log_mut().set_limit(usize::MAX);
         // Somebody has to acknowledge what a single drive sends.
@@ -127,8 +127,9 @@ async fn follow(bus: &mut AnyBus, sink: &mut Sink) -> Result<Option<BusError>, F
 impl Sink {
     fn new(global: &Global, format: Format, path: Option<&Path>) -> Result<Self, Failure> {
         let mut decoder = Decoder::new();
-        for (node, model) in &global.models {
-            decoder.set_model(*node, model.table);
+        let of_machine = global.machine.iter().flat_map(|machine| machine.0.iter());
+        for (node, model) in of_machine.chain(&global.models) {
+            decoder.set_model(*node, model);
         }
         let log = path.map(File::create).transpose().map_err(|error| log_failure(path, &error))?;
         let log = log.map(|file| LogWriter::new(BufWriter::new(file), "can0"));

@@ -51,7 +51,7 @@ impl Home {
     }
 
     fn refusal(&self, model: &DriveProfile) -> Failure {
-        let modes = model.modes.iter().map(|mode| format!("{} ({})", mode.0, mode)).collect::<Vec<_>>().join(", ");
+        let modes = model.modes.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
         let mode = ModeOfOperation::HOMING;
         Failure::new(format!("node {}: no homing with method {}", self.node, self.method))
             .because(format!("the {} has no homing: 6060h takes {modes} only, not {}", model.title, mode.0))

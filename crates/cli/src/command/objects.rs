@@ -4,6 +4,8 @@ use canopen::NodeId;
 use canopen::od::{Default, Entry, PdoMapping};
 use serde::Serialize;
 
+use super::sdo::guessed;
+use crate::context::Context;
 use crate::failure::Failure;
 use crate::models::DriveProfile;
 use crate::output::Report;
@@ -46,6 +48,9 @@ fn whose(text: &str) -> Result<Whose, String> {
 #[derive(Debug, Serialize)]
 pub(crate) struct ObjectList {
     model: &'static str,
+    /// The model, if a node was asked and its model is a guess.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    guess: Option<&'static str>,
     title: String,
     objects: Vec<Row>,
 }
@@ -72,6 +77,13 @@ struct Meaning {
 }
 
 impl Objects {
+    /// Searches the table of a node's model.
+    pub(crate) async fn of_node(&self, context: &Context, node: NodeId) -> Result<ObjectList, Failure> {
+        let drive = context.known_drive(node).await?;
+        let model = drive.profile().ok_or_else(|| Failure::new(format!("the model of node {node} is not known")))?;
+        Ok(ObjectList { guess: guessed(&drive), ..self.list(model)? })
+    }
+
     /// Searches the table of `model`.
     pub(crate) fn list(&self, model: &'static DriveProfile) -> Result<ObjectList, Failure> {
         let rows = model.table.rows();
@@ -87,6 +99,7 @@ impl Objects {
         }
         Ok(ObjectList {
             model: model.model,
+            guess: None,
             title: format!("{}, object dictionary of \"{}\"", model.title, model.manual),
             objects,
         })

@@ -1,20 +1,21 @@
 //! `ferrodrive scan`: who is on the bus, what is known of each node, and what cannot be known.
 
 use canopen::NmtState;
-use master::identify::Found;
+use master::identify::{Found, Knowledge};
 use serde::Serialize;
 
-use crate::context::Context;
+use crate::context::{Context, how_to_say};
 use crate::failure::Failure;
+use crate::models::DriveProfile;
 use crate::output::Report;
 use crate::paint::Paint;
 use crate::table::Table;
 
 /// Show who is on the bus
 ///
-/// Asks all 127 node-IDs for their device type and identity. Models of one maker may say the same of themselves and have
-/// the same objects: say which a node is with --model NODE=MODEL, or in a machine file. A node in the state stopped answers no SDO; it is listed if it
-/// sends a heartbeat.
+/// Asks all 127 node-IDs for their device type and identity. Several models may answer the same: say which a node is with
+/// --model NODE=MODEL, or in a machine file (--machine FILE.toml). A node in the state stopped answers no SDO; it is listed
+/// if it sends a heartbeat.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Scan {}
 
@@ -27,10 +28,14 @@ pub(crate) struct ScanReport {
 #[derive(Debug, Serialize)]
 struct Node {
     node: u8,
-    /// The model, if it can be told.
+    /// The model, if it is known for sure.
     model: Option<&'static str>,
-    /// Every model that answers so.
+    /// Every model that answers this identity.
     models: Vec<&'static str>,
+    /// The model whose objects it has, where those that answer so have other objects; of several the first.
+    guess: Option<&'static str>,
+    /// The object that speaks for the guess.
+    evidence: Option<String>,
     /// As its last heartbeat said.
     nmt_state: Option<String>,
     device_type: Option<u32>,
@@ -59,46 +64,67 @@ impl Node {
     fn new(context: &Context, found: &Found) -> Self {
         let told = context.told_model(found.node);
         let identity = found.identity.unwrap_or_default();
-        let model = told.or_else(|| found.model());
+        let contradiction = told.and_then(|told| contradiction(told, found));
+        let named = if let Knowledge::Named(model) = found.knowledge { Some(model.0) } else { None };
+        let model = told.filter(|_| contradiction.is_none()).or(named);
+        let guess = found.knowledge.guess().filter(|_| model.is_none());
+        let evidence = guess.and_then(|guess| guess.evidence());
         Self {
             node: found.node.raw(),
             model: model.map(|model| model.model),
-            models: found.models.iter().map(|model| model.model).collect(),
+            models: found.models().iter().map(|model| model.model).collect(),
+            guess: guess.filter(|_| evidence.is_some()).map(|guess| guess.profile().model),
+            evidence: evidence.map(|mux| mux.to_string()),
             // A boot-up message says only that the node has just left the state it names.
             nmt_state: found.nmt_state.filter(|state| *state != NmtState::Initialising).map(|state| state.to_string()),
             device_type: identity.device_type,
             vendor_id: identity.vendor_id,
             product_code: identity.product_code,
             revision_number: identity.revision_number,
-            remark: found.doubt().filter(|_| told.is_none()).map(|doubt| remark(found, doubt)),
+            remark: contradiction
+                .or_else(|| found.doubt().filter(|_| told.is_none()).map(|doubt| remark(found, doubt))),
         }
     }
+}
+
+/// What speaks against the model that a node is said to be.
+fn contradiction(told: &'static DriveProfile, found: &Found) -> Option<String> {
+    let said = format!("it is said to be a {}", told.model);
+    if !found.identity?.matches(&told.identity) {
+        return Some(format!("{said}, but its identity is another one: say the right model"));
+    }
+    let guess = found.knowledge.guess()?;
+    let evidence = guess.evidence().filter(|_| guess.fitting().all(|model| model.model != told.model))?;
+    let fitting = guess.profile().model;
+    Some(format!("{said}, but has {evidence} as a {fitting} has: say the right model"))
 }
 
 /// What cannot be told, and what the user can do about it.
 fn remark(found: &Found, doubt: String) -> String {
-    match found.models[..] {
-        [first, _, ..] => format!("{doubt}, e.g. --model {}={}", found.node, first.model),
-        _ => doubt,
-    }
+    let candidates = match found.knowledge {
+        Knowledge::Named(_) => Vec::new(),
+        Knowledge::Guessed(guess) => guess.fitting().map(|model| model.model).collect(),
+        Knowledge::Unknown => found.models().iter().map(|model| model.model).collect(),
+    };
+    if candidates.is_empty() { doubt } else { format!("{doubt}. Say which: {}", how_to_say(found.node, &candidates)) }
 }
 
 impl Report for ScanReport {
     fn text(&self, paint: Paint) -> String {
-        let mut table = Table::new(&["node", "model", "nmt state", "device type", "vendor:product:revision", "remark"]);
+        let mut table = Table::new(&["node", "model", "nmt state", "device type", "vendor:product:revision"]);
         let hex = |number: Option<u32>| number.map_or_else(|| "-".into(), |number| format!("{number:X}h"));
         for node in &self.nodes {
-            let model = node.model.map_or_else(|| node.models.join(" or "), Into::into);
             let identity = [node.vendor_id, node.product_code, node.revision_number].map(hex).join(":");
             table.row([
                 node.node.to_string(),
-                if model.is_empty() { "unknown".into() } else { model },
+                node.model.unwrap_or(if node.models.is_empty() { "unknown" } else { "cannot tell" }).into(),
                 node.nmt_state.clone().unwrap_or_else(|| "no heartbeat".into()),
                 hex(node.device_type),
                 identity,
-                node.remark.clone().unwrap_or_default(),
             ]);
         }
-        table.plain(paint)
+        let remarks =
+            self.nodes.iter().filter_map(|node| Some(format!("\nnode {}: {}", node.node, node.remark.as_ref()?)));
+        format!("{}{}", table.plain(paint), remarks.collect::<String>())
     }
 }

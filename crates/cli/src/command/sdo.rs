@@ -4,6 +4,9 @@ use canopen::od::Entry;
 use canopen::{Mux, NodeId};
 use serde::Serialize;
 
+use master::Drive;
+use master::decode::common_row;
+
 use crate::context::Context;
 use crate::decode::{Decoded, decode};
 use crate::failure::Failure;
@@ -50,6 +53,9 @@ pub(crate) struct ObjectReport {
     node: u8,
     object: String,
     name: Option<&'static str>,
+    /// The model by whose table it is read, if that is a guess.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    guess: Option<&'static str>,
     #[serde(flatten)]
     value: Decoded,
     #[serde(skip)]
@@ -60,53 +66,66 @@ impl Read {
     /// Reads and decodes.
     pub(crate) async fn run(&self, context: &Context) -> Result<ObjectReport, Failure> {
         // A number is asked for before the model, so that an absent node is blamed for the object that was wanted.
-        let (mux, payload) = match self.object {
-            ObjectArg::Mux(mux) => (mux, context.node(self.node).upload(mux).await?),
-            ObjectArg::Name(_) => {
-                let (mux, _) = resolve(context, self.node, &self.object).await?;
-                (mux, context.node(self.node).upload(mux).await?)
-            }
+        let early = match self.object {
+            ObjectArg::Mux(mux) => Some(context.node(self.node).upload(mux).await?),
+            ObjectArg::Name(_) => None,
         };
-        let (_, row) = resolve(context, self.node, &self.object).await?;
-        Ok(ObjectReport::new(self.node, mux, row, decode(row, payload.as_bytes()), false))
+        let drive = context.drive(self.node).await?;
+        let (mux, row) = resolve(&drive, &self.object)?;
+        let payload = match early {
+            Some(payload) => payload,
+            None => drive.node().upload(mux).await?,
+        };
+        let row = if drive.profile().is_some() { row } else { common_row(mux) };
+        Ok(ObjectReport::new(&drive, mux, row, payload.as_bytes(), false))
     }
 }
 
 impl Write {
     /// Reads what was typed, and writes it.
     pub(crate) async fn run(&self, context: &Context) -> Result<ObjectReport, Failure> {
-        let (mux, row) = resolve(context, self.node, &self.object).await?;
+        let drive = context.drive_untold(self.node).await?;
+        let (mux, row) = resolve(&drive, &self.object)?;
         let (data_type, number) = match row {
             Some(row) => (row.data_type, value(row, &self.value).map_err(Failure::usage)?),
             None => typed_value(&self.value).map_err(Failure::usage)?,
         };
+        drive.check_write(mux, number)?;
+        context.tell_guess(&drive);
         let bytes = data_type.raw(number).to_le_bytes();
         let bytes = &bytes[..data_type.size()];
-        context.node(self.node).download(mux, bytes).await?;
-        Ok(ObjectReport::new(self.node, mux, row, decode(row, bytes), true))
+        drive.node().download(mux, bytes).await?;
+        Ok(ObjectReport::new(&drive, mux, row, bytes, true))
     }
 }
 
 /// The multiplexor, and the row if the node's model is known and has it.
-async fn resolve(
-    context: &Context,
-    node: NodeId,
-    object: &ObjectArg,
-) -> Result<(Mux, Option<&'static Entry>), Failure> {
-    let model = context.model_of(node).await?;
-    object.resolve(model.map(|model| model.table)).map_err(Failure::usage)
+fn resolve(drive: &Drive, object: &ObjectArg) -> Result<(Mux, Option<&'static Entry>), Failure> {
+    object.resolve(drive.profile().map(|model| model.table)).map_err(Failure::usage)
 }
 
 impl ObjectReport {
-    fn new(node: NodeId, mux: Mux, row: Option<&'static Entry>, value: Decoded, written: bool) -> Self {
-        Self { node: node.raw(), object: mux.to_string(), name: row.map(|row| row.name), value, written }
+    fn new(drive: &Drive, mux: Mux, row: Option<&'static Entry>, bytes: &[u8], written: bool) -> Self {
+        Self {
+            node: drive.node().id().raw(),
+            object: mux.to_string(),
+            name: row.map(|row| row.name),
+            guess: guessed(drive),
+            value: decode(drive.profile(), row, bytes),
+            written,
+        }
     }
+}
+
+/// The model that a drive is taken for on the evidence of its objects.
+pub(super) fn guessed(drive: &Drive) -> Option<&'static str> {
+    drive.guess().filter(|guess| guess.evidence().is_some()).map(|guess| guess.profile().model)
 }
 
 impl Report for ObjectReport {
     fn text(&self, paint: Paint) -> String {
         let name = self.name.map(|name| format!(" {name}")).unwrap_or_default();
-        let verb = if self.written { "written: " } else { "" };
-        format!("node {} {}{name} = {verb}{}", self.node, self.object, self.value.text(paint))
+        let verb = if self.written { " written:" } else { " =" };
+        format!("node {} {}{name}{verb} {}", self.node, self.object, self.value.text(paint))
     }
 }

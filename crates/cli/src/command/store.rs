@@ -1,11 +1,12 @@
 //! `ferrodrive save` and `restore`: a drive's own parameter memory, by its model's own commands.
 
-use canopen::{Mux, NodeId};
+use canopen::NodeId;
+use drives::profile::{ParameterStorage, Write};
+use master::{Drive, Error};
 use serde::Serialize;
 
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::models::DriveProfile;
 use crate::output::Report;
 use crate::paint::Paint;
 use crate::parse::node::node;
@@ -38,32 +39,40 @@ pub(crate) struct StoreReport {
 impl Save {
     /// Stores.
     pub(crate) async fn run(&self, context: &Context) -> Result<StoreReport, Failure> {
-        let drive = context.known_drive(self.node).await?;
+        let drive = context.drive_untold(self.node).await?;
         drive.save().await?;
-        let model = context.known_model_of(self.node).await?;
-        Ok(StoreReport::new(self.node, "stored", model.storage.save.object, model))
+        StoreReport::new(&drive, "stored", |storage| Some(storage.save))
     }
 }
 
 impl Restore {
     /// Restores.
     pub(crate) async fn run(&self, context: &Context) -> Result<StoreReport, Failure> {
-        let drive = context.known_drive(self.node).await?;
+        let drive = context.drive_untold(self.node).await?;
         drive.restore().await?;
-        let model = context.known_model_of(self.node).await?;
-        // It has been restored: the model has the command.
-        let object = model.storage.restore.map_or(model.storage.save.object, |restore| restore.object);
-        Ok(StoreReport::new(self.node, "restored to factory values", object, model))
+        StoreReport::new(&drive, "restored to factory values", |storage| storage.restore)
     }
 }
 
 impl StoreReport {
-    fn new(node: NodeId, done: &'static str, object: Mux, model: &DriveProfile) -> Self {
-        let after_restart = model.storage.effective_after_restart.iter().map(|mux| match model.table.find(*mux) {
-            Ok(slot) => format!("{mux} {}", model.table.row(slot).name),
-            Err(_) => mux.to_string(),
+    fn new(
+        drive: &Drive,
+        done: &'static str,
+        write: impl Fn(&ParameterStorage) -> Option<Write>,
+    ) -> Result<Self, Failure> {
+        let (node, intent) = (drive.node().id(), "say what was stored");
+        let model = drive.profile().ok_or(Error::UnknownModel { node, intent })?;
+        let after_restart = model.storage.effective_after_restart.iter().map(|mux| match model.row(*mux) {
+            Some(row) => format!("{mux} {}", row.name),
+            None => mux.to_string(),
         });
-        Self { node: node.raw(), done, object: object.to_string(), effective_after_restart: after_restart.collect() }
+        let object = write(&model.storage).unwrap_or(model.storage.save).object;
+        Ok(Self {
+            node: node.raw(),
+            done,
+            object: object.to_string(),
+            effective_after_restart: after_restart.collect(),
+        })
     }
 }
 

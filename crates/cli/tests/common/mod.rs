@@ -28,7 +28,7 @@ impl Ended {
 
 fn command(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_ferrodrive"));
-    command.args(arguments).env_remove("FERRODRIVE_BUS").env("NO_COLOR", "1");
+    command.args(arguments).env_remove("FERRODRIVE_BUS").env_remove("FERRODRIVE_MACHINE").env("NO_COLOR", "1");
     command
 }
 

@@ -4,6 +4,7 @@ use std::time::Duration;
 use can::Instant;
 use canopen::emcy::Emcy;
 use canopen::{NmtCommand, NmtState};
+use drives::profile::DriveProfile;
 
 /// How many emergency messages are kept for each node.
 const EMCY_KEPT: usize = 8;
@@ -76,21 +77,19 @@ impl NodeFacts {
         !booted && core::mem::take(&mut watch.lost)
     }
 
-    /// The state that it must be in: what it last said, or what this master last told it since. A boot-up message is
-    /// followed by pre-operational without a word (CiA 301, 7.3.2.2.1).
-    pub fn probable_state(&self) -> Option<NmtState> {
-        let told = self.nmt_sent.filter(|(at, _)| self.heartbeat_at.is_none_or(|heard| heard < *at));
-        let told = told.and_then(|(_, command)| match command {
-            NmtCommand::Start => Some(NmtState::Operational),
-            NmtCommand::Stop => Some(NmtState::Stopped),
-            NmtCommand::EnterPreOperational => Some(NmtState::PreOperational),
-            NmtCommand::ResetNode | NmtCommand::ResetCommunication => None,
+    /// The state that it must be in: what this master last told it, or what it has said since, as a node of this model
+    /// means it (as the standard says, if the model is not known).
+    pub fn probable_state(&self, profile: Option<&DriveProfile>) -> Option<NmtState> {
+        let told = self.nmt_sent.and_then(|(at, command)| Some((at, state_after(command)?)));
+        let said = self.nmt_state.map(|said| match profile {
+            // Such a model's heartbeat cannot say that it is stopped: what it was told decides.
+            Some(profile) if profile.tells_alarm(said) => told.map_or(NmtState::Operational, |(_, state)| state),
+            Some(profile) => profile.nmt_state(said),
+            None if said == NmtState::Initialising => NmtState::PreOperational,
+            None => said,
         });
-        let said = self.nmt_state.map(|state| match state {
-            NmtState::Initialising => NmtState::PreOperational,
-            state => state,
-        });
-        told.or(said)
+        let since = told.filter(|(at, _)| self.heartbeat_at.is_none_or(|heard| heard < *at));
+        since.map(|(_, state)| state).or(said)
     }
 
     /// True once when the watched heartbeat has not come in time.
@@ -102,5 +101,15 @@ impl NodeFacts {
         watch.deadline = None;
         watch.lost = true;
         true
+    }
+}
+
+/// The state that a command leads to; `None` for a reset, of which the boot-up message tells.
+const fn state_after(command: NmtCommand) -> Option<NmtState> {
+    match command {
+        NmtCommand::Start => Some(NmtState::Operational),
+        NmtCommand::Stop => Some(NmtState::Stopped),
+        NmtCommand::EnterPreOperational => Some(NmtState::PreOperational),
+        NmtCommand::ResetNode | NmtCommand::ResetCommunication => None,
     }
 }

@@ -15,18 +15,19 @@ use canopen::cob::Service;
 use canopen::emcy::Emcy;
 use canopen::heartbeat::Heartbeat;
 use canopen::nmt::{NmtRequest, NmtTarget};
-use canopen::od::Table;
 use canopen::sync::Sync;
-use canopen::{NmtState, NodeId};
+use canopen::{Mux, NmtState, NodeId};
+use drives::profile::{DriveProfile, MODELS};
 
 use crate::core::PdoMap;
+use crate::identify::Model;
 use pdo::PdoBook;
 use sdo::Conversations;
 
 pub use pdo::{Direction, Pdo};
 pub use sdo::{Sdo, SdoStep, Side};
-pub use value::Value;
 pub(crate) use value::emcy_words;
+pub use value::{Value, common_row, statusword_words};
 
 /// What one frame says.
 #[derive(Clone, Debug)]
@@ -43,6 +44,8 @@ pub enum Decoded {
     BootUp(NodeId),
     /// Heartbeat, or answer to node guarding.
     Heartbeat(NodeId, NmtState),
+    /// Heartbeat of a node whose model says so, and nothing of its NMT state, that there is an alarm.
+    AlarmHeartbeat(NodeId),
     /// Part of an SDO transfer.
     Sdo(Sdo),
     /// Process data.
@@ -65,36 +68,39 @@ pub struct Decoder {
     pdos: PdoBook,
 }
 
-/// The object table of each node whose model is known.
+/// The profile of each node whose model is known, or one that all models it may be read alike.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Models(std::collections::BTreeMap<u8, KnownTable>);
-
-#[derive(Clone, Copy)]
-struct KnownTable(&'static Table);
-
-impl fmt::Debug for KnownTable {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Table of {} rows", self.0.rows().len())
-    }
-}
+pub(crate) struct Models(std::collections::BTreeMap<u8, Model>);
 
 impl Models {
-    fn table(&self, node: NodeId) -> Option<&'static Table> {
-        self.0.get(&node.raw()).map(|known| known.0)
+    fn get(&self, node: NodeId) -> Option<Model> {
+        self.0.get(&node.raw()).copied()
     }
 }
 
 impl Decoder {
-    /// A decoder that knows no node's model: it names the objects that all models agree on.
+    /// A decoder that knows no node's model: it names the objects that all models agree on. A node whose 1000h is seen
+    /// being read is known as far as that tells it.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Names objects of a node by its model's table, and takes the table's factory PDO mappings for granted
-    /// until others are seen.
-    pub fn set_model(&mut self, node: NodeId, table: &'static Table) {
-        self.models.0.insert(node.raw(), KnownTable(table));
-        self.pdos.load_defaults(node, table);
+    /// Puts what a node says in its model's words, and takes the model's factory PDO mappings for granted until others
+    /// are seen.
+    pub fn set_model(&mut self, node: NodeId, model: &'static DriveProfile) {
+        self.models.0.insert(node.raw(), Model(model));
+        self.pdos.load_defaults(node, model.table);
+    }
+
+    /// A node has said its device type (1000h): enough where all models that say so have the same objects.
+    fn learn_model(&mut self, node: NodeId, device_type: &[u8]) {
+        let Ok(bytes) = <[u8; 4]>::try_from(device_type) else { return };
+        let said = u32::from_le_bytes(bytes);
+        let mut models = MODELS.iter().filter(|model| model.identity.device_type == said);
+        let Some(first) = models.next().filter(|_| self.models.get(node).is_none()) else { return };
+        if models.all(|model| core::ptr::eq(model.table, first.table)) {
+            self.models.0.insert(node.raw(), Model(first));
+        }
     }
 
     /// Takes a PDO's identifier and mapping for granted. `number` counts from 0 (1400h, 1800h).
@@ -125,6 +131,9 @@ impl Decoder {
             Service::Emcy(node) => Decoded::Emcy(node, Emcy::parse(frame)?),
             Service::Heartbeat(node) => match Heartbeat::parse(frame)?.nmt_state()? {
                 NmtState::Initialising => Decoded::BootUp(node),
+                state if self.models.get(node).is_some_and(|model| model.0.tells_alarm(state)) => {
+                    Decoded::AlarmHeartbeat(node)
+                }
                 state => Decoded::Heartbeat(node, state),
             },
             Service::SdoRequest(node) => Decoded::Sdo(self.decode_sdo(node, Side::Client, frame)?),
@@ -146,8 +155,11 @@ impl Decoder {
         let step = self.conversations.step(node, from, frame.padded());
         if let Some((mux, bytes)) = step.learned() {
             self.pdos.learn(node, mux, bytes);
+            if mux == Mux::new(0x1000, 0) {
+                self.learn_model(node, bytes);
+            }
         }
-        Some(Sdo { node, from, step, table: self.models.table(node).map(KnownTable) })
+        Some(Sdo { node, from, step, model: self.models.get(node) })
     }
 }
 
@@ -175,6 +187,7 @@ impl fmt::Display for Decoded {
             }
             Self::BootUp(node) => write!(f, "boot-up node {node}"),
             Self::Heartbeat(node, state) => write!(f, "heartbeat node {node}: {state}"),
+            Self::AlarmHeartbeat(node) => write!(f, "heartbeat node {node}: in alarm (04h; it does not mean stopped)"),
             Self::Sdo(sdo) => sdo.fmt(f),
             Self::Pdo(pdo) => pdo.fmt(f),
             Self::Lss => f.write_str("LSS"),

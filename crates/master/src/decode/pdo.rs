@@ -6,9 +6,10 @@ use canopen::cob::{self, PdoNumber};
 use canopen::od::{Default as Factory, Table};
 use canopen::{CobId, Mux, NodeId};
 
+use super::Models;
 use super::value::Value;
-use super::{KnownTable, Models};
 use crate::core::{MappedObject, PdoMap, bits_of};
+use crate::identify::Model;
 
 /// Which way a PDO goes, from the device's side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -58,25 +59,25 @@ pub struct Pdo {
     pub bytes: Vec<u8>,
     /// Bytes that the mapping asks for; `None` if the mapping is not known.
     pub mapped_bytes: Option<usize>,
-    table: Option<KnownTable>,
+    model: Option<Model>,
 }
 
 impl Pdo {
     pub(super) fn unmapped(node: NodeId, direction: Direction, number: u16, frame: &Frame) -> Self {
         let bytes = frame.data().to_vec();
-        Self { node, direction, number, fields: Vec::new(), bytes, mapped_bytes: None, table: None }
+        Self { node, direction, number, fields: Vec::new(), bytes, mapped_bytes: None, model: None }
     }
 }
 
 impl fmt::Display for Pdo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}{} node {}:", self.direction, self.number, self.node)?;
-        let table = self.table.map(|known| known.0);
+        let model = self.model.map(|model| model.0);
         for (position, (object, raw)) in self.fields.iter().enumerate() {
             f.write_str(if position == 0 { " " } else { ", " })?;
             let bytes = raw.to_le_bytes();
             let length = usize::from(object.bits).div_ceil(8).min(bytes.len());
-            write!(f, "{}", Value::new(object.mux, &bytes[..length], table))?;
+            write!(f, "{}", Value::new(object.mux, &bytes[..length], model))?;
         }
         match self.mapped_bytes {
             None => {
@@ -179,7 +180,7 @@ impl PdoBook {
             fields: fields.map(|(object, bits)| (object, bits_of(data, bits))).collect(),
             bytes: frame.data().to_vec(),
             mapped_bytes: Some(map.bytes()),
-            table: models.table(node).map(KnownTable),
+            model: models.get(node),
         })
     }
 

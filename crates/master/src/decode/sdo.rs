@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use canopen::sdo::wire::{LENGTH, Payload, Reply, Request, Segment};
 use canopen::{AbortCode, Mux, NodeId};
 
-use super::KnownTable;
 use super::value::{Value, find, write_name};
+use crate::identify::Model;
 
 /// Longest object that is put together; a longer one is shown without its value.
 const MAX_OBJECT: usize = 64 * 1024;
@@ -28,7 +28,7 @@ pub struct Sdo {
     pub from: Side,
     /// What it does in its transfer.
     pub step: SdoStep,
-    pub(super) table: Option<KnownTable>,
+    pub(super) model: Option<Model>,
 }
 
 /// What a frame does in an SDO transfer. Bytes are those of the whole object.
@@ -170,16 +170,16 @@ impl Conversations {
 
 impl fmt::Display for Sdo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let table = self.table.map(|known| known.0);
-        let named = |f: &mut fmt::Formatter<'_>, mux| write_name(f, mux, find(table, mux));
+        let model = self.model.map(|model| model.0);
+        let named = |f: &mut fmt::Formatter<'_>, mux| write_name(f, mux, find(model, mux));
         write!(f, "SDO node {}: ", self.node)?;
         match &self.step {
             SdoStep::Read(mux) => {
                 f.write_str("read ")?;
                 named(f, *mux)
             }
-            SdoStep::ReadDone(mux, bytes) => Value::new(*mux, bytes, table).fmt(f),
-            SdoStep::Write(mux, bytes) => write!(f, "write {}", Value::new(*mux, bytes, table)),
+            SdoStep::ReadDone(mux, bytes) => Value::new(*mux, bytes, model).fmt(f),
+            SdoStep::Write(mux, bytes) => write!(f, "write {}", Value::new(*mux, bytes, model)),
             SdoStep::WriteDone(mux, _) => {
                 f.write_str("done: write ")?;
                 named(f, *mux)

@@ -1,8 +1,9 @@
 use core::fmt;
 
-use canopen::od::{DataType, Entry, Table};
+use canopen::od::{DataType, Entry};
 use canopen::{EmcyErrorCode, Mux};
 use cia402::{Controlword, ModeOfOperation, Statusword};
+use drives::profile::{DriveProfile, MODELS, PowerStyle, reads_alike};
 
 /// The bytes of one object, with what is known about it. Prints as `6041h:00 statusword = 0237h (Operation enabled)`.
 #[derive(Clone)]
@@ -13,12 +14,13 @@ pub struct Value<'a> {
     pub bytes: &'a [u8],
     /// Its row in the model's table.
     pub entry: Option<&'static Entry>,
+    model: Option<&'static DriveProfile>,
 }
 
 impl<'a> Value<'a> {
-    /// The bytes of an object, looked up in a model's table if there is one.
-    pub fn new(mux: Mux, bytes: &'a [u8], table: Option<&Table>) -> Self {
-        Self { mux, bytes, entry: find(table, mux) }
+    /// The bytes of an object, looked up in the model's table, or in what all models agree on.
+    pub fn new(mux: Mux, bytes: &'a [u8], model: Option<&'static DriveProfile>) -> Self {
+        Self { mux, bytes, entry: find(model, mux), model }
     }
 
     /// The low four bytes as a cell; `None` for longer objects.
@@ -57,7 +59,7 @@ impl fmt::Display for Value<'_> {
         write_name(f, self.mux, self.entry)?;
         f.write_str(" = ")?;
         let Some(raw) = self.raw().filter(|_| !self.bytes.is_empty()) else { return write_long(f, self.bytes) };
-        if let Some(words) = standard_words(self.mux, raw) {
+        if let Some(words) = standard_words(self.mux, raw, self.model) {
             return f.write_str(&words);
         }
         match (self.number(), self.entry) {
@@ -75,19 +77,28 @@ pub(super) fn write_name(f: &mut fmt::Formatter<'_>, mux: Mux, entry: Option<&En
     }
 }
 
-pub(super) fn find(table: Option<&Table>, mux: Mux) -> Option<&'static Entry> {
-    let row_of = |table: &Table| table.find(mux).ok().map(|slot| table.row(slot));
-    let Some(table) = table else {
-        // Of a node whose model is not known, what all models that have the object agree on.
-        let mut rows = drives::profile::MODELS.iter().filter_map(|profile| row_of(profile.table));
-        let first = rows.next()?;
-        return rows.all(|row| reads_alike(row, first)).then_some(first);
-    };
-    row_of(table)
+pub(super) fn find(model: Option<&'static DriveProfile>, mux: Mux) -> Option<&'static Entry> {
+    model.map_or_else(|| common_row(mux), |model| model.row(mux))
 }
 
-fn reads_alike(a: &Entry, b: &Entry) -> bool {
-    (a.name, a.data_type, a.unit, a.values) == (b.name, b.data_type, b.unit, b.values)
+/// The row of an object on which all models agree that have it, for a node whose model is not known.
+pub fn common_row(mux: Mux) -> Option<&'static Entry> {
+    let mut rows = MODELS.iter().filter_map(|profile| profile.row(mux));
+    let first = rows.next()?;
+    rows.all(|row| reads_alike(row, first)).then_some(first)
+}
+
+/// A statusword in words: its state and the bits that say more, or for a model without states its bits.
+pub fn statusword_words(word: Statusword, model: Option<&DriveProfile>) -> String {
+    const BITS: [(u16, &str); 2] = [(Statusword::WARNING, "warning"), (Statusword::TARGET_REACHED, "target reached")];
+    let own = model.map_or(&[][..], |model| model.statusword_bits);
+    let (state, common) = match model {
+        Some(model) if model.power != PowerStyle::Cia402 => (None, &[][..]),
+        _ => (Some(word.state().map_or("no state of CiA 402", |state| state.name())), &BITS[..]),
+    };
+    let set = common.iter().chain(own).filter(|(mask, _)| word.has(*mask)).map(|(_, name)| *name);
+    let words: Vec<&str> = state.into_iter().chain(set).collect();
+    if words.is_empty() { "no bit set".to_owned() } else { words.join(", ") }
 }
 
 /// An emergency error code in words. Codes 0001h to 00FFh are no errors to the standard and the maker's own to some
@@ -100,15 +111,11 @@ pub(crate) fn emcy_words(code: EmcyErrorCode) -> String {
     }
 }
 
-/// Objects whose bits mean the same on every CiA 402 drive.
-fn standard_words(mux: Mux, raw: u32) -> Option<String> {
+/// Objects whose bits the standard or the model gives a meaning.
+fn standard_words(mux: Mux, raw: u32, model: Option<&DriveProfile>) -> Option<String> {
     match (mux.index, mux.sub_index) {
         (0x6040, 0) => Some(Controlword(raw as u16).to_string()),
-        (0x6041, 0) => {
-            let word = Statusword(raw as u16);
-            let reached = if word.has(Statusword::TARGET_REACHED) { ", target reached" } else { "" };
-            Some(format!("{word}{reached}"))
-        }
+        (0x6041, 0) => Some(format!("{raw:04X}h ({})", statusword_words(Statusword(raw as u16), model))),
         (0x6060 | 0x6061, 0) => Some(ModeOfOperation(raw as u8 as i8).to_string()),
         (0x1600..=0x17FF | 0x1A00..=0x1BFF, 1..) => {
             Some(format!("{raw:08X}h ({}, {} bits)", Mux::from_key(raw >> 8), raw & 0xFF))
@@ -157,8 +164,8 @@ mod tests {
 
     #[test]
     fn an_object_with_another_form_in_tpdos_is_read_by_its_length() {
-        let table = Some(&drives::mjoint::objects::TABLE);
-        let speed = |bytes| Value::new(Mux::new(0x606C, 0), bytes, table).to_string();
+        let joint = Some(&drives::mjoint::M4230E17B50);
+        let speed = |bytes| Value::new(Mux::new(0x606C, 0), bytes, joint).to_string();
         assert_eq!(speed(&[0x90, 0xE8]), "606Ch:00 velocity_actual_value = -6000 [0.1 r/min]");
         assert_eq!(speed(&[0xA8, 0xFD, 0xFF, 0xFF]), "606Ch:00 velocity_actual_value = -600 [r/min]");
     }

@@ -129,7 +129,7 @@ impl Drive {
     fn recall(&self, facts: &mut Vec<Fact>) {
         let now = self.node.network().now();
         let seen = self.node.facts();
-        facts.extend(seen.probable_state().map(Fact::Nmt));
+        facts.extend(seen.probable_state(self.profile).map(Fact::Nmt));
         facts.push(Fact::Heartbeat(seen.heartbeat_age(now)));
         facts.extend(seen.last_emcy().map(|(at, emcy)| {
             let rows = self.profile.map_or(&[][..], |profile| profile.faults.table);

@@ -9,7 +9,7 @@ use cia402::{Controlword, ModeOfOperation};
 use drives::profile::{HomingRules, HomingStart};
 
 use super::goal::Goal;
-use super::motion::MotionReport;
+use super::motion::{MotionReport, Note};
 use super::{Drive, MODE};
 use crate::error::Error;
 use crate::units::Rpm;
@@ -51,8 +51,8 @@ impl Drive {
             let raw = self.raw_quantity(search, speed.abs()).await?;
             self.write_number(search.object, raw).await?;
         }
-        self.start_homing(&rules).await?;
-        let notes = self.notes().await;
+        let stopped = self.start_homing(&rules).await?;
+        let notes = self.notes(stopped).await;
         if !options.wait {
             return Ok(MotionReport { reached_after: None, notes });
         }
@@ -71,21 +71,23 @@ impl Drive {
         Ok(MotionReport { reached_after: Some(reached), notes })
     }
 
-    async fn start_homing(&self, rules: &HomingRules) -> Result<(), Error> {
+    async fn start_homing(&self, rules: &HomingRules) -> Result<Option<Note>, Error> {
         match rules.start {
             HomingStart::ControlwordBit4 => {
-                self.set_mode(ModeOfOperation::HOMING).await?;
+                let stopped = self.set_mode(ModeOfOperation::HOMING).await?;
                 self.enable().await?;
                 // Bit 4, which has to rise, may be left over.
                 self.write_controlword(Controlword(ENABLED)).await?;
                 self.node.network().note_moved(self.node.id());
-                self.write_controlword(Controlword(ENABLED | Controlword::NEW_SET_POINT)).await
+                self.write_controlword(Controlword(ENABLED | Controlword::NEW_SET_POINT)).await?;
+                Ok(stopped)
             }
             HomingStart::ModeWrite => {
                 self.enable().await?;
                 self.release_halt().await?;
                 self.node.network().note_moved(self.node.id());
-                self.node.write(MODE, ModeOfOperation::HOMING.0).await
+                self.node.write(MODE, ModeOfOperation::HOMING.0).await?;
+                Ok(None)
             }
         }
     }

@@ -26,6 +26,7 @@ use cia402::{Controlword, ModeOfOperation, PowerState, Statusword};
 use drives::profile::{DriveProfile, PowerStyle};
 
 use crate::error::{Access, Error};
+use crate::identify::{Guess, Knowledge};
 use crate::network::Node;
 
 pub use explain::{Explanation, Fact, faults_in};
@@ -54,24 +55,36 @@ const STEP_TIMEOUT: Duration = Duration::from_secs(1);
 pub struct Drive {
     node: Node,
     profile: Option<&'static DriveProfile>,
+    /// Set where the profile is no more than that.
+    guess: Option<Guess>,
 }
 
 impl core::fmt::Debug for Drive {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let model = self.profile.map(|profile| profile.model);
-        f.debug_struct("Drive").field("node", &self.node.id()).field("model", &model).finish()
+        let guessed = self.guess.is_some();
+        f.debug_struct("Drive")
+            .field("node", &self.node.id())
+            .field("model", &model)
+            .field("guessed", &guessed)
+            .finish()
     }
 }
 
 impl Drive {
     /// A drive of a known model.
     pub const fn new(node: Node, profile: &'static DriveProfile) -> Self {
-        Self { node, profile: Some(profile) }
+        Self { node, profile: Some(profile), guess: None }
+    }
+
+    /// A drive of a model that is known this well. One that is guessed can be moved, and its parameters not be stored.
+    pub const fn known_as(node: Node, knowledge: Knowledge) -> Self {
+        Self { node, profile: knowledge.profile(), guess: knowledge.guess() }
     }
 
     /// A CiA 402 drive of unknown model: it can be enabled, disabled, quick-stopped and reset, not moved or stored.
     pub const fn of_unknown_model(node: Node) -> Self {
-        Self { node, profile: None }
+        Self { node, profile: None, guess: None }
     }
 
     /// Its node.
@@ -79,9 +92,14 @@ impl Drive {
         &self.node
     }
 
-    /// What is known of its model.
+    /// The model's profile, or of a guess the one to read and move with.
     pub const fn profile(&self) -> Option<&'static DriveProfile> {
         self.profile
+    }
+
+    /// Why its model is no more than a guess, if it is.
+    pub const fn guess(&self) -> Option<Guess> {
+        self.guess
     }
 
     /// Checks that the node says it is this model, and has the object that tells it from others that say so too.
@@ -96,11 +114,22 @@ impl Drive {
         if !found.matches(&profile.identity) {
             return Err(Error::WrongModel { node, model, found });
         }
-        let Some(hallmark) = profile.hallmark else { return Ok(()) };
-        match self.node.upload(hallmark).await {
-            Ok(_) => Ok(()),
-            Err(Error::Aborted { .. }) => Err(Error::OtherModel { node, model, hallmark }),
-            Err(error) => Err(error),
+        match profile.hallmark {
+            Some(hallmark) if !crate::identify::has(&self.node, hallmark).await? => {
+                Err(Error::OtherModel { node, model, hallmark })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks that this value of this object means the same on every model that the drive may be.
+    ///
+    /// # Errors
+    /// [`Error::GuessedModel`] where it does not and the model is no more than a guess.
+    pub fn check_write(&self, mux: Mux, value: i64) -> Result<(), Error> {
+        match self.guess.filter(|guess| !guess.may_write(mux, value)) {
+            Some(guess) => Err(Error::GuessedModel { node: self.node.id(), intent: format!("write {mux}"), guess }),
+            None => Ok(()),
         }
     }
 
@@ -131,15 +160,18 @@ impl Drive {
         self.node.write(CONTROLWORD, controlword.0).await
     }
 
-    /// Sets 6060h and waits until the drive shows it.
-    async fn set_mode(&self, mode: ModeOfOperation) -> Result<(), Error> {
+    /// Sets 6060h and waits until the drive shows it. A shaft that turns in another mode is stopped first: drives change
+    /// their mode at standstill, or jump.
+    async fn set_mode(&self, mode: ModeOfOperation) -> Result<Option<Note>, Error> {
         let profile = self.known("set its mode")?;
         if !profile.modes.contains(&mode) {
             return Err(Error::NoSuchMode { node: self.node.id(), model: profile.title, mode });
         }
-        if self.mode().await? == mode {
-            return Ok(());
+        let before = self.mode().await?;
+        if before == mode {
+            return Ok(None);
         }
+        let stopped = self.stop_if_turning(profile).await?;
         self.node.write(MODE, mode.0).await?;
         let mut waited = Duration::ZERO;
         while self.mode().await? != mode {
@@ -149,12 +181,29 @@ impl Drive {
             self.node.network().sleep(POLL).await;
             waited += POLL;
         }
-        Ok(())
+        Ok(stopped.then_some(Note::StoppedFirst { before }))
+    }
+
+    async fn stop_if_turning(&self, profile: &DriveProfile) -> Result<bool, Error> {
+        let turning = self.read_quantity(profile.units.actual_velocity).await?.abs() >= power::STANDSTILL_RPM;
+        let follows = self.power_state(self.statusword().await?) == Some(PowerState::OperationEnabled);
+        if turning && follows {
+            self.stop().await?;
+        }
+        Ok(turning && follows)
     }
 
     /// The model's profile, or an error that says what it was needed for.
     fn known(&self, intent: &'static str) -> Result<&'static DriveProfile, Error> {
         self.profile.ok_or(Error::UnknownModel { node: self.node.id(), intent })
+    }
+
+    /// The model's profile, if it is more than a guess.
+    fn named(&self, intent: &'static str) -> Result<&'static DriveProfile, Error> {
+        match self.guess {
+            Some(guess) => Err(Error::GuessedModel { node: self.node.id(), intent: intent.to_owned(), guess }),
+            None => self.known(intent),
+        }
     }
 
     /// The model's row of an object.

@@ -49,6 +49,11 @@ pub enum Note {
         /// The time.
         time: Duration,
     },
+    /// The shaft was turning in another mode and has been stopped before this motion began.
+    StoppedFirst {
+        /// That mode.
+        before: ModeOfOperation,
+    },
 }
 
 impl fmt::Display for Note {
@@ -60,6 +65,9 @@ impl fmt::Display for Note {
                  it content; when nobody does, ask it something from time to time or set {object} to 0",
                 time.as_millis()
             ),
+            Self::StoppedFirst { before } => {
+                write!(f, "it was turning in mode {before} and has been stopped first: the mode changes at standstill")
+            }
         }
     }
 }
@@ -86,12 +94,12 @@ impl Drive {
         let raw = self.raw_quantity(units.target_velocity, target).await?;
         let present = self.read_quantity(units.actual_velocity).await?;
         self.write_ramps(options.acceleration, options.deceleration, target - present).await?;
-        self.set_mode(ModeOfOperation::PROFILE_VELOCITY).await?;
+        let stopped = self.set_mode(ModeOfOperation::PROFILE_VELOCITY).await?;
         self.enable().await?;
         self.node.network().note_moved(self.node.id());
         self.write_number(units.target_velocity.object, raw).await?;
         self.release_halt().await?;
-        let notes = self.notes().await;
+        let notes = self.notes(stopped).await;
         if !options.wait {
             return Ok(MotionReport { reached_after: None, notes });
         }
@@ -120,12 +128,12 @@ impl Drive {
             return Err(Error::NoSuchMode { node, model, mode });
         };
         let raw = self.raw_quantity(target, current.0).await?;
-        self.set_mode(ModeOfOperation::PROFILE_TORQUE).await?;
+        let stopped = self.set_mode(ModeOfOperation::PROFILE_TORQUE).await?;
         self.enable().await?;
         self.node.network().note_moved(self.node.id());
         self.write_number(target.object, raw).await?;
         self.release_halt().await?;
-        Ok(MotionReport { reached_after: None, notes: self.notes().await })
+        Ok(MotionReport { reached_after: None, notes: self.notes(stopped).await })
     }
 
     /// Stops by the drive's deceleration ramp and stays enabled: target zero, or halt (bit 8) in a position move.
@@ -172,11 +180,15 @@ impl Drive {
         if halted { self.write_controlword(Controlword(0x0F)).await } else { Ok(()) }
     }
 
-    pub(super) async fn notes(&self) -> Vec<Note> {
-        let Some(object) = self.profile.and_then(|profile| profile.host_watchdog) else { return Vec::new() };
-        match self.read_number(object).await {
-            Ok(ms) if ms > 0 => vec![Note::HostWatchdog { object, time: Duration::from_millis(ms as u64) }],
-            _ => Vec::new(),
-        }
+    /// What to know about a motion, beside what was noted at its start.
+    pub(super) async fn notes(&self, noted: Option<Note>) -> Vec<Note> {
+        let watchdog = match self.profile.and_then(|profile| profile.host_watchdog) {
+            Some(object) => match self.read_number(object).await {
+                Ok(ms) if ms > 0 => Some(Note::HostWatchdog { object, time: Duration::from_millis(ms as u64) }),
+                _ => None,
+            },
+            None => None,
+        };
+        noted.into_iter().chain(watchdog).collect()
     }
 }

@@ -49,14 +49,14 @@ impl Drive {
         }
         let speed = self.read_quantity(units.profile_velocity).await?;
         self.write_ramps(options.acceleration, options.deceleration, speed).await?;
-        self.set_mode(ModeOfOperation::PROFILE_POSITION).await?;
+        let stopped = self.set_mode(ModeOfOperation::PROFILE_POSITION).await?;
         self.enable().await?;
         let began_at = self.read_number(POSITION_ACTUAL).await?;
         let target = if relative { began_at.saturating_add(counts) } else { counts };
         let turn = self.counts_per_turn().await?.max(1.0);
         let limit = self.time_for(target.abs_diff(began_at) as f64 / turn, speed).await?;
         self.give_set_point(INTENT, counts, relative).await?;
-        let notes = self.notes().await;
+        let notes = self.notes(stopped).await;
         if !options.wait {
             return Ok(MotionReport { reached_after: None, notes });
         }
@@ -73,7 +73,7 @@ impl Drive {
     async fn give_set_point(&self, intent: &'static str, counts: i64, relative: bool) -> Result<(), Error> {
         let before = self.node.read::<u16>(CONTROLWORD).await.map_or(Controlword(ENABLED), Controlword);
         let halted = before.has(Controlword::HALT);
-        let self_clearing = self.known(intent)?.quirks.contains(&Quirk::NewSetPointClearsItself);
+        let self_clearing = self.known(intent)?.has(Quirk::NewSetPointClearsItself);
         let held = if halted { Controlword::HALT } else { 0 };
         let replace = if halted && !self_clearing { Controlword::CHANGE_SET_IMMEDIATELY } else { 0 };
         let kind = ENABLED | if relative { Controlword::RELATIVE } else { 0 };

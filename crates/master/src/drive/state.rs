@@ -83,7 +83,7 @@ impl Drive {
             supply: self.measure(units.and_then(|units| units.bus_voltage)).await?.map(Volts),
             motor_temperature: self.measure(units.and_then(|units| units.motor_temperature)).await?.map(Celsius),
             driver_temperature: self.measure(units.and_then(|units| units.driver_temperature)).await?.map(Celsius),
-            nmt: facts.probable_state(),
+            nmt: facts.probable_state(self.profile),
             heartbeat_age: facts.heartbeat_age(self.node.network().now()),
         })
     }

@@ -13,10 +13,10 @@ impl Drive {
     /// Stores all parameters.
     ///
     /// # Errors
-    /// [`Error::UnknownModel`], [`Error::WrongModel`], [`Error::OtherModel`], and nothing is written: what means "save" to
-    /// one model may be anything to another of the same identity. Those of the SDO write.
+    /// [`Error::UnknownModel`], [`Error::GuessedModel`], [`Error::WrongModel`], [`Error::OtherModel`], and nothing is
+    /// written: what means "save" to one model may be anything to another of the same identity. Those of the SDO write.
     pub async fn save(&self) -> Result<(), Error> {
-        let storage = self.known("save its parameters")?.storage;
+        let storage = self.named("save its parameters")?.storage;
         self.check_identity().await?;
         self.command(storage.save).await
     }
@@ -26,7 +26,7 @@ impl Drive {
     /// # Errors
     /// As [`save`](Self::save); [`Error::NoFactorySettings`] for a model that cannot be told to.
     pub async fn restore(&self) -> Result<(), Error> {
-        let profile = self.known("restore its factory settings")?;
+        let profile = self.named("restore its factory settings")?;
         let model = profile.title;
         let restore = profile.storage.restore.ok_or(Error::NoFactorySettings { node: self.node.id(), model })?;
         self.check_identity().await?;
@@ -34,7 +34,7 @@ impl Drive {
     }
 
     async fn command(&self, write: Write) -> Result<(), Error> {
-        let patient = Self { node: self.node.clone().with_timeout(STORE_TIMEOUT), profile: self.profile };
+        let patient = Self { node: self.node.clone().with_timeout(STORE_TIMEOUT), ..self.clone() };
         patient.write_number(write.object, i64::from(write.value)).await
     }
 }

@@ -158,7 +158,7 @@ impl Node {
         let facts = shared.core.facts(self.id);
         Hints {
             unsent,
-            nmt_state: facts.probable_state(),
+            nmt_state: facts.probable_state(None),
             silent_for: facts.seen_at.map(|at| shared.core.now() - at),
             others: NodeId::all().any(|other| other != self.id && shared.core.facts(other).seen_at.is_some()),
         }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use can::Instant;
 use serde::Serialize;
 
-use super::{Action, Command, CommandError};
+use super::{Action, Command, CommandError, to_json};
 use crate::wire::ErrorState;
 use crate::{Brake, Report, StationId, VirtualDrive, World};
 
@@ -173,9 +173,4 @@ fn bus_text(world: &World, id: StationId, powered: bool) -> &'static str {
 fn seconds(world: &World) -> f64 {
     // A division rounds once, so that 12.5 s prints as 12.5.
     world.now().as_nanos() as f64 / 1e9
-}
-
-fn to_json(answer: &impl Serialize) -> String {
-    serde_json::to_string(answer)
-        .unwrap_or_else(|error| serde_json::json!({ "ok": false, "error": error.to_string() }).to_string())
 }

@@ -17,7 +17,7 @@ impl FromStr for Command {
             ["quit", ..] => Err(CommandError::Usage("quit")),
             [first, action @ ..] => {
                 let number = parse_node(first)?;
-                Ok(Self::Drive { number, action: parse_action(action)? })
+                Ok(Self::Drive { number, action: parse_action(number, action)? })
             }
             [] => Err(CommandError::Unknown(String::new())),
         }
@@ -51,8 +51,8 @@ fn parse_node(word: &str) -> Result<u8, CommandError> {
     })
 }
 
-fn parse_action(words: &[&str]) -> Result<Action, CommandError> {
-    let (&verb, arguments) = words.split_first().ok_or(CommandError::UnknownAction(String::new()))?;
+fn parse_action(node: u8, words: &[&str]) -> Result<Action, CommandError> {
+    let (&verb, arguments) = words.split_first().ok_or(CommandError::NoAction(node))?;
     match verb {
         "power" => parse_power(arguments),
         "input" => parse_input(arguments),
