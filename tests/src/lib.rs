@@ -11,6 +11,7 @@ pub mod homing;
 pub mod laws;
 pub mod manual;
 pub mod mjoint;
+pub mod object_rows;
 pub mod seeded;
 pub mod zlac8030l;
 pub mod zlim42c;

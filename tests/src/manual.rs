@@ -2,6 +2,8 @@
 //!
 //! The files lie in `tests/data`, one folder a drive; `tests/data/README.md` describes their columns.
 
+use std::ops::RangeInclusive;
+
 use crate::csv::{Row, Table};
 
 /// A row of an object dictionary.
@@ -63,15 +65,20 @@ pub struct PowerCell {
 }
 
 impl ObjectRow {
+    /// The values that its type can carry.
+    #[must_use]
+    pub fn type_range(&self) -> RangeInclusive<i64> {
+        let bits = self.size * 8;
+        if self.signed { -(1 << (bits - 1))..=(1 << (bits - 1)) - 1 } else { 0..=(1 << bits) - 1 }
+    }
+
     /// Checks that the default lies within the limits, and the limits within the type.
     ///
     /// # Panics
     ///
     /// When they do not.
     pub fn check(&self) {
-        let bits = self.size * 8;
-        let (least, most) =
-            if self.signed { (-(1_i64 << (bits - 1)), (1 << (bits - 1)) - 1) } else { (0, (1 << bits) - 1) };
+        let (least, most) = self.type_range().into_inner();
         let (low, high) = self.limits.unwrap_or((least, most));
         assert!(least <= low && low <= high && high <= most, "{self:?}");
         assert!(self.default.is_none_or(|default| (low..=high).contains(&default)), "{self:?}");

@@ -1,146 +1,57 @@
 //! Every row of the manual's object table on the running drive: width, default, access, range and store.
 
-use ferrodrive_tests::zlac8030l::{ObjectRow, objects};
+use ferrodrive_tests::bench::zlac8030l::Zlac8030l;
+use ferrodrive_tests::object_rows::{self, Memory};
 
-use crate::bench::{Abort, Bench};
+use crate::bench::Bench;
 
-const READ_ONLY: Abort = 0x0601_0002;
-const INVALID_VALUE: Abort = 0x0609_0030;
-const TOO_HIGH: Abort = 0x0609_0031;
-const TOO_LOW: Abort = 0x0609_0032;
-const NO_SUCH_OBJECT: Abort = 0x0602_0000;
-const NO_SUCH_SUB_INDEX: Abort = 0x0609_0011;
-
-/// Collects what `check` finds wrong with each row that `of` picks.
-fn wrong_rows(of: impl Fn(&ObjectRow) -> bool, check: impl Fn(&ObjectRow) -> Result<(), String>) -> Vec<String> {
-    let rows: Vec<_> = objects().into_iter().filter(of).collect();
-    assert!(!rows.is_empty());
-    let at = |row: &ObjectRow, text| format!("{:04X}h:{:02X} {}: {text}", row.index, row.sub, row.name);
-    rows.iter().filter_map(|row| check(row).err().map(|text| at(row, text))).collect()
-}
-
-fn assert_none(wrong: &[String]) {
-    assert!(wrong.is_empty(), "{} rows:\n{}", wrong.len(), wrong.join("\n"));
-}
-
-fn expect<T: PartialEq + std::fmt::Debug>(what: &str, actual: T, expected: T) -> Result<(), String> {
-    if actual == expected { Ok(()) } else { Err(format!("{what}: {actual:X?}, expected {expected:X?}")) }
-}
+const MEMORY: Memory = Memory {
+    switch: 0x2010,
+    command: 0x2009,
+    // The bit rate: see `network`. The others do something and read 0 again.
+    without: &[0x200E, 0x2005, 0x2006, 0x2009],
+    node_id: Some(0x200D),
+};
 
 #[test]
 fn each_object_is_read_with_its_width_and_its_default() {
-    let wrong = wrong_rows(
-        |_| true,
-        |row| {
-            let mut bench = Bench::new();
-            let width = bench.read(row.index, row.sub).map(|bytes| bytes.len());
-            expect("bytes on the wire", width, Ok(row.size))?;
-            match row.default {
-                Some(default) if !row.live => expect("default", bench.get(row.index, row.sub), default),
-                _ => Ok(()),
-            }
-        },
-    );
-    assert_none(&wrong);
+    object_rows::are_read_with_their_width_and_default::<Zlac8030l>();
 }
 
 #[test]
 fn a_read_only_object_refuses_every_write() {
-    let wrong = wrong_rows(
-        |row| !row.writable,
-        |row| {
-            let mut bench = Bench::new();
-            expect("a write", bench.write(row.index, row.sub, 1), Err(READ_ONLY))
-        },
-    );
-    assert_none(&wrong);
+    object_rows::refuse_writes_where_they_are_read_only::<Zlac8030l>();
 }
 
 #[test]
 fn what_a_range_holds_is_taken_and_what_lies_beyond_is_refused_with_the_right_code() {
-    let wrong = wrong_rows(
-        |row| row.writable && row.limits.is_some(),
-        |row| {
-            let (low, high) = row.limits.unwrap_or_default();
-            for value in [low, high] {
-                expect(&format!("write {value}"), Bench::new().write(row.index, row.sub, value), Ok(()))?;
-            }
-            refused(row, low - 1, TOO_LOW)?;
-            refused(row, high + 1, TOO_HIGH)
-        },
-    );
-    assert_none(&wrong);
-}
-
-/// Refused with `code`, or as a value that is not in a list, and not stored.
-fn refused(row: &ObjectRow, value: i64, code: Abort) -> Result<(), String> {
-    let bits = row.size * 8;
-    let (least, most) = if row.signed { (-(1_i64 << (bits - 1)), (1 << (bits - 1)) - 1) } else { (0, (1 << bits) - 1) };
-    if !(least..=most).contains(&value) {
-        return Ok(());
-    }
-    let mut bench = Bench::new();
-    let before = bench.get(row.index, row.sub);
-    let answer = bench.write(row.index, row.sub, value);
-    if answer != Err(code) && answer != Err(INVALID_VALUE) {
-        return Err(format!("write {value}: {answer:X?}, expected {code:08X}h"));
-    }
-    expect("value after it", bench.get(row.index, row.sub), before)
+    object_rows::take_their_range_and_refuse_what_lies_beyond::<Zlac8030l>();
 }
 
 #[test]
 fn a_value_between_the_listed_ones_is_refused() {
     // 6060h: no mode 2 (velocity mode), and 6 is homing in CiA 402 (docs/drives/zlac8030l.md, L020).
-    for mode in [2, 5, 6, 7, 8, 9, 10, -1] {
-        assert_eq!(Bench::new().write(0x6060, 0, mode), Err(INVALID_VALUE), "mode {mode}");
-    }
-    for (index, value) in [(0x605A, 4), (0x605A, 8), (0x605D, 0), (0x605D, 4), (0x605B, 2), (0x605C, -1)] {
-        assert_eq!(Bench::new().write(index, 0, value), Err(INVALID_VALUE), "{index:04X}h = {value}");
-    }
+    let modes = [2, 5, 6, 7, 8, 9, 10, -1].map(|mode| (0x6060, mode));
+    let options = [(0x605A, 4), (0x605A, 8), (0x605D, 0), (0x605D, 4), (0x605B, 2), (0x605C, -1)];
+    object_rows::refuse_values_between_the_listed::<Zlac8030l>(&[&modes[..], &options].concat());
 }
 
 #[test]
 fn a_write_of_another_width_is_refused_and_changes_nothing() {
-    let wrong = wrong_rows(
-        |row| row.writable,
-        |row| {
-            let mut bench = Bench::new();
-            let before = bench.get(row.index, row.sub);
-            let [low, high] = row.index.to_le_bytes();
-            for (size, command) in [(1, 0x2F), (2, 0x2B), (4, 0x23)] {
-                if size == row.size {
-                    continue;
-                }
-                let answer = bench.sdo(&[command, low, high, row.sub, 1, 0, 0, 0]).ok_or("no answer")?;
-                let code = u32::from_le_bytes([answer[4], answer[5], answer[6], answer[7]]);
-                let expected = if size > row.size { 0x0607_0012 } else { 0x0607_0013 };
-                if answer[0] != 0x80 || (code != expected && code != 0x0607_0010) {
-                    return Err(format!("{size} bytes: answered {answer:02X?}, expected abort {expected:08X}h"));
-                }
-            }
-            expect("value after it", bench.get(row.index, row.sub), before)
-        },
-    );
-    assert_none(&wrong);
+    object_rows::refuse_another_width::<Zlac8030l>();
 }
 
 #[test]
 fn a_missing_object_and_a_missing_sub_index_are_told_apart() {
-    let mut bench = Bench::new();
-    let missing = [0x1003, 0x1006, 0x1008, 0x100C, 0x1010, 0x1011, 0x1016, 0x2024, 0x2031, 0x6098, 0x60C2, 0x6502];
-    for index in missing {
-        assert_eq!(bench.read(index, 0), Err(NO_SUCH_OBJECT), "{index:04X}h");
-    }
-    let missing = [(0x1000, 1), (0x1018, 4), (0x1400, 6), (0x1A00, 5), (0x2026, 3), (0x202F, 6)];
+    let objects = [0x1003, 0x1006, 0x1008, 0x100C, 0x1010, 0x1011, 0x1016, 0x2024, 0x2031, 0x6098, 0x60C2, 0x6502];
+    let beyond = [(0x1000, 1), (0x1018, 4), (0x1400, 6), (0x1A00, 5), (0x2026, 3), (0x202F, 6)];
     let unused = (0x06..=0x0B).chain([0x10]).map(|sub| (0x2030, sub));
-    for (index, sub) in missing.into_iter().chain(unused) {
-        assert_eq!(bench.read(index, sub), Err(NO_SUCH_SUB_INDEX), "{index:04X}h:{sub:02X}");
-    }
+    let sub_indexes: Vec<_> = beyond.into_iter().chain(unused).collect();
+    object_rows::are_missed_by_object_or_by_sub_index::<Zlac8030l>(&objects, &sub_indexes);
 }
 
 #[test]
 fn what_is_live_reads_what_a_resting_drive_has() {
-    let mut bench = Bench::new();
     let expected = [
         (0x2003, 0, 0..=0),
         (0x2004, 0, 0..=0),
@@ -155,110 +66,19 @@ fn what_is_live_reads_what_a_resting_drive_has() {
         (0x6074, 0, 0..=0),
         (0x6077, 0, 0..=0),
     ];
-    for (index, sub, range) in &expected {
-        let value = bench.get(*index, *sub);
-        assert!(range.contains(&value), "{index:04X}h:{sub:02X} reads {value}, expected {range:?}");
-    }
+    object_rows::read_at_rest::<Zlac8030l>(&expected, &[0x1009, 0x100A, 0x2025]);
+    let mut bench = Bench::new();
     assert_eq!(bench.get(0x2025, 0), bench.get(0x100A, 0), "the software version in both places");
-    let checked = |row: &ObjectRow| expected.iter().any(|(index, sub, _)| (*index, *sub) == (row.index, row.sub));
-    let versions = [0x1009, 0x100A, 0x2025];
-    let unchecked: Vec<_> =
-        objects().into_iter().filter(|row| row.live && !checked(row) && !versions.contains(&row.index)).collect();
-    assert!(unchecked.is_empty(), "{unchecked:?}");
-}
-
-/// Another legal value than the default; `None` where the drive then could not be asked any more.
-fn other_value(row: &ObjectRow) -> Option<i64> {
-    let default = row.default?;
-    let mapped_velocity = if row.index < 0x1A00 { 0x60FF_0020 } else { 0x606C_0020 };
-    match (row.index, row.sub) {
-        // Another bit rate: see `network`.
-        (0x200E, _) => None,
-        // It does something and reads 0 again.
-        (0x2005 | 0x2006 | 0x2009, _) => None,
-        (0x1005, _) => Some(0x90),
-        (0x1014, _) => Some(0x8000_0084),
-        (0x1400..=0x1403 | 0x1800..=0x1803, 1) => Some(0x8000_0000 | default),
-        (0x1400..=0x1403 | 0x1800..=0x1803, 2) => Some(0xFE),
-        (0x1600..=0x1603 | 0x1A00..=0x1A03, 0) => Some(1 - default),
-        (0x1600..=0x1603 | 0x1A00..=0x1A03, _) => Some(mapped_velocity),
-        _ => match row.limits {
-            Some((low, high)) => Some(if default == high { low } else { high }),
-            None => Some(default + 1),
-        },
-    }
-}
-
-/// Writes the value the way the object wants it: mapping entries while sub-index 00 is 0.
-fn write_other(bench: &mut Bench, row: &ObjectRow, value: i64) -> Result<(), String> {
-    if matches!(row.index, 0x1600..=0x1603 | 0x1A00..=0x1A03) {
-        expect("clear the mapping", bench.write(row.index, 0, 0), Ok(()))?;
-        if row.sub == 0 && value == 1 {
-            let object = if row.index < 0x1A00 { 0x60FF_0020 } else { 0x606C_0020 };
-            expect("map", bench.write(row.index, 1, object), Ok(()))?;
-        }
-    }
-    expect(&format!("write {value}"), bench.write(row.index, row.sub, value), Ok(()))?;
-    expect("value read back", bench.get(row.index, row.sub), value)?;
-    bench.let_store();
-    Ok(())
-}
-
-/// Off and on; the host follows to another node.
-fn restart(bench: &mut Bench, node: i64) {
-    bench.power_cycle();
-    bench.node = u8::try_from(node).expect("a node");
-}
-
-/// The node that the drive has after the next restart if `row` keeps `value`.
-fn node_with(row: &ObjectRow, value: i64) -> i64 {
-    if row.index == 0x200D { value } else { 4 }
-}
-
-fn storable(row: &ObjectRow) -> bool {
-    row.writable && other_value(row).is_some()
 }
 
 #[test]
 fn with_2010h_0_a_write_outlives_a_power_cycle_if_and_only_if_the_object_is_stored() {
-    let wrong = wrong_rows(storable, |row| {
-        let (other, default) = (other_value(row).unwrap_or_default(), row.default.unwrap_or_default());
-        let kept = if row.stored { other } else { default };
-        let mut bench = Bench::new();
-        write_other(&mut bench, row, other)?;
-        restart(&mut bench, node_with(row, kept));
-        expect("after a power cycle", bench.get(row.index, row.sub), kept)
-    });
-    assert_none(&wrong);
+    object_rows::outlive_a_power_cycle_if_and_only_if_stored::<Zlac8030l>(&MEMORY);
 }
 
 #[test]
 fn with_2010h_1_nothing_is_kept_until_2009h_is_2_and_2009h_1_restores_it() {
-    let wrong = wrong_rows(
-        |row| storable(row) && row.stored,
-        |row| {
-            let (other, default) = (other_value(row).unwrap_or_default(), row.default.unwrap_or_default());
-            let mut bench = Bench::new();
-            bench.set(0x2010, 0, 1);
-            write_other(&mut bench, row, other)?;
-            restart(&mut bench, 4);
-            expect("2010h = 1, after a power cycle", bench.get(row.index, row.sub), default)?;
-
-            bench.set(0x2010, 0, 1);
-            write_other(&mut bench, row, other)?;
-            bench.set(0x2009, 0, 2);
-            expect("2009h", bench.get(0x2009, 0), 0)?;
-            bench.let_store();
-            restart(&mut bench, node_with(row, other));
-            expect("2009h = 2, after a power cycle", bench.get(row.index, row.sub), other)?;
-
-            bench.set(0x2009, 0, 1);
-            bench.let_store();
-            restart(&mut bench, 4);
-            expect("2009h = 1, after a power cycle", bench.get(row.index, row.sub), default)
-        },
-    );
-    assert_none(&wrong);
+    object_rows::are_kept_and_restored_only_on_command::<Zlac8030l>(&MEMORY);
 }
 
 #[test]

@@ -1,0 +1,260 @@
+//! What is asked of every row of a manual's object table on a running drive: width, default, access, range and store.
+//!
+//! Each function is the body of one test; it asks all rows that it is about, each at a fresh [`Bench`], and fails with the
+//! list of those that answer otherwise. What a drive's manual says of single objects stays in that drive's tests.
+
+use std::ops::RangeInclusive;
+
+use crate::bench::{Abort, Bench, Subject};
+use crate::manual::ObjectRow;
+
+/// Abort codes of CiA 301, 7.2.4.3.17.
+pub const READ_ONLY: Abort = 0x0601_0002;
+/// The object does not exist.
+pub const NO_SUCH_OBJECT: Abort = 0x0602_0000;
+/// The length does not match.
+pub const WRONG_LENGTH: Abort = 0x0607_0010;
+/// The length does not match: too long.
+pub const TOO_LONG: Abort = 0x0607_0012;
+/// The length does not match: too short.
+pub const TOO_SHORT: Abort = 0x0607_0013;
+/// The sub-index does not exist.
+pub const NO_SUCH_SUB_INDEX: Abort = 0x0609_0011;
+/// Not among the values of the object.
+pub const INVALID_VALUE: Abort = 0x0609_0030;
+/// Above the range.
+pub const TOO_HIGH: Abort = 0x0609_0031;
+/// Below the range.
+pub const TOO_LOW: Abort = 0x0609_0032;
+
+/// How a drive keeps its objects over a power cycle.
+#[derive(Debug)]
+pub struct Memory {
+    /// 0: a write is stored at once; 1: only on command.
+    pub switch: u16,
+    /// 2 stores all objects, 1 restores the defaults.
+    pub command: u16,
+    /// Writable objects that cannot be asked: commands that read 0 again, and those with which the bus loses the drive.
+    pub without: &'static [u16],
+    /// The object that gives the drive another node after its next start.
+    pub node_id: Option<u16>,
+}
+
+/// Every row is read with its width, and with its default unless it is a measurement.
+pub fn are_read_with_their_width_and_default<S: Subject>() {
+    assert_rows::<S>(
+        |_| true,
+        |row| {
+            let mut bench = Bench::<S>::new();
+            let width = bench.read(row.index, row.sub).map(|bytes| bytes.len());
+            expect("bytes on the wire", width, Ok(row.size))?;
+            match row.default {
+                Some(default) if !row.live => expect("default", bench.get(row.index, row.sub), default),
+                _ => Ok(()),
+            }
+        },
+    );
+}
+
+/// What is read-only refuses a write.
+pub fn refuse_writes_where_they_are_read_only<S: Subject>() {
+    assert_rows::<S>(
+        |row| !row.writable,
+        |row| expect("a write", Bench::<S>::new().write(row.index, row.sub, 1), Err(READ_ONLY)),
+    );
+}
+
+/// Both ends of a range are taken, and what lies beyond is refused with the code for it and not stored.
+pub fn take_their_range_and_refuse_what_lies_beyond<S: Subject>() {
+    assert_rows::<S>(
+        |row| row.writable && row.limits.is_some(),
+        |row| {
+            let (low, high) = row.limits.unwrap_or_default();
+            for value in [low, high] {
+                expect(&format!("write {value}"), Bench::<S>::new().write(row.index, row.sub, value), Ok(()))?;
+            }
+            refused::<S>(row, low - 1, TOO_LOW)?;
+            refused::<S>(row, high + 1, TOO_HIGH)
+        },
+    );
+}
+
+/// Refused with `code`, or as a value that is not in a list, and not stored.
+fn refused<S: Subject>(row: &ObjectRow, value: i64, code: Abort) -> Result<(), String> {
+    if !row.type_range().contains(&value) {
+        return Ok(());
+    }
+    let mut bench = Bench::<S>::new();
+    let before = bench.get(row.index, row.sub);
+    let answer = bench.write(row.index, row.sub, value);
+    if answer != Err(code) && answer != Err(INVALID_VALUE) {
+        return Err(format!("write {value}: {answer:X?}, expected {code:08X}h"));
+    }
+    expect("value after it", bench.get(row.index, row.sub), before)
+}
+
+/// These values of these objects lie between the listed ones, and are refused.
+pub fn refuse_values_between_the_listed<S: Subject>(values: &[(u16, i64)]) {
+    for (index, value) in values {
+        let answer = Bench::<S>::new().write(*index, 0, *value);
+        assert_eq!(answer, Err(INVALID_VALUE), "{index:04X}h = {value}");
+    }
+}
+
+/// A write of another width is refused with the code for it and changes nothing.
+pub fn refuse_another_width<S: Subject>() {
+    assert_rows::<S>(
+        |row| row.writable,
+        |row| {
+            let mut bench = Bench::<S>::new();
+            let before = bench.get(row.index, row.sub);
+            let [low, high] = row.index.to_le_bytes();
+            for (size, command) in [(1, 0x2F), (2, 0x2B), (4, 0x23)] {
+                if size == row.size {
+                    continue;
+                }
+                let answer = bench.sdo(&[command, low, high, row.sub, 1, 0, 0, 0]).ok_or("no answer")?;
+                let code = u32::from_le_bytes([answer[4], answer[5], answer[6], answer[7]]);
+                let expected = if size > row.size { TOO_LONG } else { TOO_SHORT };
+                if answer[0] != 0x80 || (code != expected && code != WRONG_LENGTH) {
+                    return Err(format!("{size} bytes: answered {answer:02X?}, expected abort {expected:08X}h"));
+                }
+            }
+            expect("value after it", bench.get(row.index, row.sub), before)
+        },
+    );
+}
+
+/// Neither these objects nor these sub-indexes exist, and the drive tells the two apart.
+pub fn are_missed_by_object_or_by_sub_index<S: Subject>(objects: &[u16], sub_indexes: &[(u16, u8)]) {
+    let mut bench = Bench::<S>::new();
+    for index in objects {
+        assert_eq!(bench.read(*index, 0), Err(NO_SUCH_OBJECT), "{index:04X}h");
+    }
+    for (index, sub) in sub_indexes {
+        assert_eq!(bench.read(*index, *sub), Err(NO_SUCH_SUB_INDEX), "{index:04X}h:{sub:02X}");
+    }
+}
+
+/// What is live reads this at a drive that has just booted and rests. `elsewhere` is live too and checked by others.
+pub fn read_at_rest<S: Subject>(expected: &[(u16, u8, RangeInclusive<i64>)], elsewhere: &[u16]) {
+    let mut bench = Bench::<S>::new();
+    for (index, sub, range) in expected {
+        let value = bench.get(*index, *sub);
+        assert!(range.contains(&value), "{index:04X}h:{sub:02X} reads {value}, expected {range:?}");
+    }
+    let checked = |row: &ObjectRow| expected.iter().any(|(index, sub, _)| (*index, *sub) == (row.index, row.sub));
+    let live = S::rows().all().iter().filter(|row| row.live);
+    let unchecked: Vec<_> = live.filter(|row| !checked(row) && !elsewhere.contains(&row.index)).collect();
+    assert!(unchecked.is_empty(), "{unchecked:?}");
+}
+
+/// With the memory's switch at 0, a write outlives a power cycle if and only if the object is stored.
+pub fn outlive_a_power_cycle_if_and_only_if_stored<S: Subject>(memory: &Memory) {
+    assert_rows::<S>(
+        |row| memory.other_value::<S>(row).is_some(),
+        |row| {
+            let (other, default) = memory.values::<S>(row);
+            let kept = if row.stored { other } else { default };
+            let mut bench = Bench::<S>::new();
+            write_other(&mut bench, row, other)?;
+            memory.restart(&mut bench, row, kept);
+            expect("after a power cycle", bench.get(row.index, row.sub), kept)
+        },
+    );
+}
+
+/// With the memory's switch at 1, nothing is kept until the command stores it, and the command for it restores it.
+pub fn are_kept_and_restored_only_on_command<S: Subject>(memory: &Memory) {
+    assert_rows::<S>(
+        |row| row.stored && memory.other_value::<S>(row).is_some(),
+        |row| {
+            let (other, default) = memory.values::<S>(row);
+            let mut bench = Bench::<S>::new();
+            bench.set(memory.switch, 0, 1);
+            write_other(&mut bench, row, other)?;
+            memory.restart(&mut bench, row, default);
+            expect("not stored, after a power cycle", bench.get(row.index, row.sub), default)?;
+
+            bench.set(memory.switch, 0, 1);
+            write_other(&mut bench, row, other)?;
+            bench.set(memory.command, 0, 2);
+            expect("the command", bench.get(memory.command, 0), 0)?;
+            bench.let_store();
+            memory.restart(&mut bench, row, other);
+            expect("stored, after a power cycle", bench.get(row.index, row.sub), other)?;
+
+            bench.set(memory.command, 0, 1);
+            bench.let_store();
+            memory.restart(&mut bench, row, default);
+            expect("restored, after a power cycle", bench.get(row.index, row.sub), default)
+        },
+    );
+}
+
+impl Memory {
+    /// Another legal value of a writable object than the default; `None` where the drive could not be asked any more.
+    fn other_value<S: Subject>(&self, row: &ObjectRow) -> Option<i64> {
+        let default = row.default?;
+        if !row.writable || self.without.contains(&row.index) {
+            return None;
+        }
+        Some(match (row.index, row.sub) {
+            (0x1005, _) => 0x90,
+            (0x1014, _) => 0x8000_0080 + i64::from(S::NODE),
+            (0x1400..=0x1403 | 0x1800..=0x1803, 1) => 0x8000_0000 | default,
+            (0x1400..=0x1403 | 0x1800..=0x1803, 2) => 0xFE,
+            (0x1600..=0x1603 | 0x1A00..=0x1A03, 0) => 1 - default,
+            (0x1600..=0x1603 | 0x1A00..=0x1A03, _) => velocity_mapping(row),
+            _ => match row.limits {
+                Some((low, high)) if default == high => low,
+                Some((_, high)) => high,
+                None => default + 1,
+            },
+        })
+    }
+
+    /// That value, and the default.
+    fn values<S: Subject>(&self, row: &ObjectRow) -> (i64, i64) {
+        (self.other_value::<S>(row).unwrap_or_default(), row.default.unwrap_or_default())
+    }
+
+    /// Off and on; the host follows to the node that the drive has with `kept` in the row.
+    fn restart<S: Subject>(&self, bench: &mut Bench<S>, row: &ObjectRow, kept: i64) {
+        bench.power_cycle();
+        let moves = self.node_id == Some(row.index);
+        bench.node = if moves { u8::try_from(kept).expect("a node") } else { S::NODE };
+    }
+}
+
+/// The velocity, whole: the target in a receive PDO, the actual value in a transmit PDO.
+fn velocity_mapping(row: &ObjectRow) -> i64 {
+    if row.index < 0x1A00 { 0x60FF_0020 } else { 0x606C_0020 }
+}
+
+/// Writes the value the way the object wants it: mapping entries while sub-index 00 is 0.
+fn write_other<S: Subject>(bench: &mut Bench<S>, row: &ObjectRow, value: i64) -> Result<(), String> {
+    if matches!(row.index, 0x1600..=0x1603 | 0x1A00..=0x1A03) {
+        expect("clear the mapping", bench.write(row.index, 0, 0), Ok(()))?;
+        if row.sub == 0 && value == 1 {
+            expect("map", bench.write(row.index, 1, velocity_mapping(row)), Ok(()))?;
+        }
+    }
+    expect(&format!("write {value}"), bench.write(row.index, row.sub, value), Ok(()))?;
+    expect("value read back", bench.get(row.index, row.sub), value)?;
+    bench.let_store();
+    Ok(())
+}
+
+/// Asserts that `check` finds nothing wrong with any row that `of` picks, and that it picks some.
+fn assert_rows<S: Subject>(of: impl Fn(&ObjectRow) -> bool, check: impl Fn(&ObjectRow) -> Result<(), String>) {
+    let rows: Vec<_> = S::rows().all().iter().filter(|row| of(row)).collect();
+    assert!(!rows.is_empty());
+    let at = |row: &ObjectRow, text| format!("{:04X}h:{:02X} {}: {text}", row.index, row.sub, row.name);
+    let wrong: Vec<_> = rows.iter().filter_map(|row| check(row).err().map(|text| at(row, text))).collect();
+    assert!(wrong.is_empty(), "{} rows:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+fn expect<T: PartialEq + std::fmt::Debug>(what: &str, actual: T, expected: T) -> Result<(), String> {
+    if actual == expected { Ok(()) } else { Err(format!("{what}: {actual:X?}, expected {expected:X?}")) }
+}
