@@ -29,7 +29,7 @@ mod clock;
 mod hub;
 mod link;
 pub mod log;
-mod modbus;
+pub mod modbus;
 mod run;
 pub mod slcan;
 pub mod socketcand;

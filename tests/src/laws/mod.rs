@@ -4,6 +4,8 @@
 //! Each law is a function of bytes that panics when it is broken. [`ALL`] names them with samples to damage.
 
 mod frame;
+mod mjoint;
+mod modbus;
 mod node;
 mod stream;
 
@@ -27,6 +29,10 @@ pub const ALL: &[Law] = &[
     Law { name: "slcan", holds: stream::slcan, samples: stream::SLCAN_SAMPLES },
     Law { name: "sdo_wire", holds: node::sdo_wire, samples: node::SDO_WIRE_SAMPLES },
     Law { name: "node", holds: node::node, samples: node::NODE_SAMPLES },
+    Law { name: "mjoint", holds: mjoint::joint, samples: mjoint::SAMPLES },
+    Law { name: "modbus_pdu", holds: modbus::pdu, samples: modbus::PDU_SAMPLES },
+    Law { name: "modbus_rtu", holds: modbus::rtu, samples: modbus::RTU_SAMPLES },
+    Law { name: "modbus_tcp", holds: modbus::tcp, samples: modbus::TCP_SAMPLES },
 ];
 
 /// The law of that name, for the fuzz targets.

@@ -8,6 +8,7 @@ use ferrodrive_tests::bench::mjoint as bench;
 
 mod alarms;
 mod communication;
+mod components;
 mod datagrams;
 mod homing;
 mod interpolation;

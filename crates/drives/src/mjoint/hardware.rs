@@ -41,6 +41,8 @@ pub struct Sensors {
     pub dir: bool,
     /// The timers behind PU and DIR.
     pub pulses: PulseInput,
+    /// The EEPROM does not answer.
+    pub eeprom_fails: bool,
 }
 
 /// What the three half bridges do.

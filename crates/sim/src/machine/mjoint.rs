@@ -47,6 +47,16 @@ pub struct Joint {
     last: Actuation,
     /// A brake that was fitted holds the shaft when the drive has no power.
     braked_without_power: bool,
+    eeprom_broken: bool,
+    /// The line to the encoder is broken: the drive goes on reading what came last.
+    last_reading: Option<EncoderReading>,
+}
+
+/// What the encoder tells.
+#[derive(Clone, Copy, Debug)]
+struct EncoderReading {
+    angle_count: u16,
+    position_counts: i32,
 }
 
 impl Joint {
@@ -64,6 +74,8 @@ impl Joint {
             pulses: PulseSource::default(),
             last: Actuation::default(),
             braked_without_power: false,
+            eeprom_broken: false,
+            last_reading: None,
         }
     }
 
@@ -75,6 +87,12 @@ impl Joint {
     /// The motor and all that is joined to it, to change.
     pub fn motor_mut(&mut self) -> &mut JointMotor {
         &mut self.motor
+    }
+
+    fn encoder_reading(&self, position_counts: i32) -> EncoderReading {
+        let turn = i64::from(COUNTS_PER_TURN);
+        let angle_count = self.motor.rotor.angle.count(COUNTS_PER_TURN).rem_euclid(turn) as u16;
+        self.last_reading.unwrap_or(EncoderReading { angle_count, position_counts })
     }
 
     /// Fits a brake as soon as the drive is set for one (2619h = 7 or 8), and moves it.
@@ -111,16 +129,19 @@ impl Assembly for Joint {
         self.model.name
     }
 
+    /// A broken EEPROM reads as a blank one; what is in it comes back when it is mended.
     fn hardware(&self) -> Hardware {
-        Hardware { eeprom: self.image, bitrate: self.bitrate }
+        let eeprom = if self.eeprom_broken { Image::from_bytes(&[]) } else { self.image };
+        Hardware { eeprom, bitrate: self.bitrate }
     }
 
     #[inline]
     fn sense(&self, inputs: u32) -> Sensors {
         let sensed = self.motor.sense();
+        let EncoderReading { angle_count, position_counts } = self.encoder_reading(sensed.position_counts);
         Sensors {
-            angle_count: self.motor.rotor.angle.count(COUNTS_PER_TURN).rem_euclid(i64::from(COUNTS_PER_TURN)) as u16,
-            position_counts: sensed.position_counts,
+            angle_count,
+            position_counts,
             turns_lost: sensed.turns_lost,
             battery: match sensed.battery {
                 BatteryState::Full => Battery::Full,
@@ -133,6 +154,7 @@ impl Assembly for Joint {
             pu: inputs & 1 != 0,
             dir: inputs & 2 != 0,
             pulses: self.pulses.read(),
+            eeprom_fails: self.eeprom_broken,
         }
     }
 
@@ -196,22 +218,26 @@ impl Assembly for Joint {
         &self.image.0
     }
 
+    /// A blank image is what a firmware has that found the EEPROM broken: nothing was written then.
     fn keep_image(&mut self, image: &[u8]) {
-        self.image = Image::from_bytes(image);
+        if image.iter().any(|byte| *byte != 0xFF) {
+            self.image = Image::from_bytes(image);
+        }
     }
 
     fn set_fault(&mut self, component: Component, broken: bool) -> Result<(), Refused> {
-        let what = match component {
-            Component::Phase => {
-                self.motor.lost_phase = broken.then_some(Phase::U);
-                return Ok(());
+        let absent = |what| Err(Refused::Absent { model: self.model(), what });
+        match component {
+            Component::Hall => return absent("Hall sensors: its encoder is absolute"),
+            Component::Reference => return absent("reference voltage that it watches: no alarm tells of one"),
+            Component::Encoder => {
+                let now = self.encoder_reading(self.motor.sense().position_counts);
+                self.last_reading = broken.then_some(now);
             }
-            Component::Hall => "Hall sensors",
-            Component::Encoder => "fault of the encoder; take its battery away",
-            Component::Eeprom => "fault of the EEPROM",
-            Component::Reference => "reference voltage to measure",
-        };
-        Err(Refused::Absent { model: self.model(), what })
+            Component::Eeprom => self.eeprom_broken = broken,
+            Component::Phase => self.motor.lost_phase = broken.then_some(Phase::U),
+        }
+        Ok(())
     }
 
     fn set_battery(&mut self, connected: bool) -> Result<(), Refused> {

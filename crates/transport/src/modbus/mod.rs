@@ -24,6 +24,13 @@ use crate::bus_spec::parse_address;
 use crate::{ParseBusError, WallClock};
 pub use pdu::{ModbusException, RegisterAccess};
 
+/// The bytes of requests and responses, without sockets.
+pub mod wire {
+    pub use super::pdu::{MAX_PDU_LENGTH, parse, response};
+    pub use super::rtu::{close, open};
+    pub use super::tcp::Header;
+}
+
 /// Line speed unless `?baud=` says otherwise.
 const DEFAULT_BAUD: u32 = 115_200;
 

@@ -44,7 +44,7 @@ const WRITE_MULTIPLE_REGISTERS: u8 = 0x10;
 const EXCEPTION: u8 = 0x80;
 
 /// Longest PDU (clause 4.1): what an RTU frame of 256 bytes has room for.
-pub(super) const MAX_PDU_LENGTH: usize = 253;
+pub const MAX_PDU_LENGTH: usize = 253;
 
 const MAX_READ: u16 = 125;
 const MAX_WRITTEN: u16 = 123;
@@ -53,7 +53,7 @@ const MAX_WRITTEN: u16 = 123;
 ///
 /// # Errors
 /// The exception to answer.
-pub(super) fn parse(pdu: &[u8]) -> Result<RegisterAccess, ModbusException> {
+pub fn parse(pdu: &[u8]) -> Result<RegisterAccess, ModbusException> {
     match *pdu {
         [READ_HOLDING_REGISTERS | READ_INPUT_REGISTERS, a, b, c, d] => {
             let (address, count) = (u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]));
@@ -79,8 +79,8 @@ pub(super) fn parse(pdu: &[u8]) -> Result<RegisterAccess, ModbusException> {
     }
 }
 
-/// The response to `request`.
-pub(super) fn response(request: &[u8], result: &Result<Vec<u16>, ModbusException>) -> Vec<u8> {
+/// The response to `request`: the words read, none after a write, or an exception.
+pub fn response(request: &[u8], result: &Result<Vec<u16>, ModbusException>) -> Vec<u8> {
     let function = request.first().copied().unwrap_or_default();
     match result {
         Err(exception) => vec![function | EXCEPTION, *exception as u8],

@@ -89,15 +89,16 @@ async fn read_frame(line: &mut (impl AsyncRead + Unpin), silence: Duration, cloc
     }
 }
 
-/// Address and PDU of a frame that is whole.
-fn open(frame: &[u8]) -> Option<(u8, &[u8])> {
+/// Address and PDU of a frame that is whole; `None` for one that is broken, too long, or without a PDU.
+pub fn open(frame: &[u8]) -> Option<(u8, &[u8])> {
     let (content, check) = frame.split_last_chunk::<2>()?;
     let (unit, pdu) = content.split_first()?;
     let whole = frame.len() <= MAX_FRAME_LENGTH && !pdu.is_empty() && crc(content) == u16::from_le_bytes(*check);
     whole.then_some((*unit, pdu))
 }
 
-fn close(unit: u8, pdu: &[u8]) -> Vec<u8> {
+/// The frame of an address and a PDU.
+pub fn close(unit: u8, pdu: &[u8]) -> Vec<u8> {
     let mut frame = [&[unit], pdu].concat();
     frame.extend(crc(&frame).to_le_bytes());
     frame

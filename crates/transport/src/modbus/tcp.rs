@@ -19,6 +19,37 @@ const MAX_CLIENTS: usize = 64;
 /// Pause after a failed accept (out of file descriptors): the clients that are there go on.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
+/// What stands before a PDU.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Header {
+    /// Number that the client gave the request; the response repeats it.
+    pub transaction: u16,
+    /// Bytes of the PDU, 1 to [`MAX_PDU_LENGTH`].
+    pub length: u16,
+    /// Unit identifier.
+    pub unit: u8,
+}
+
+impl Header {
+    /// Its bytes.
+    pub const SIZE: usize = 7;
+
+    /// From the wire; `None` for another protocol, or a length that no PDU has.
+    pub fn parse(bytes: [u8; Self::SIZE]) -> Option<Self> {
+        let [t0, t1, p0, p1, l0, l1, unit] = bytes;
+        // The length counts the unit identifier.
+        let length = u16::from_be_bytes([l0, l1]).wrapping_sub(1);
+        let sound = [p0, p1] == [0, 0] && (1..=MAX_PDU_LENGTH).contains(&usize::from(length));
+        sound.then_some(Self { transaction: u16::from_be_bytes([t0, t1]), length, unit })
+    }
+
+    /// To the wire.
+    pub fn emit(self) -> [u8; Self::SIZE] {
+        let ([t0, t1], [l0, l1]) = (self.transaction.to_be_bytes(), self.length.wrapping_add(1).to_be_bytes());
+        [t0, t1, 0, 0, l0, l1, self.unit]
+    }
+}
+
 /// Serves clients until it is dropped, which ends their connections too.
 pub(super) async fn serve<T>(listener: TcpListener, requests: mpsc::Sender<T>, clock: WallClock)
 where
@@ -41,20 +72,15 @@ async fn serve_client<T: From<ModbusRequest>>(mut stream: TcpStream, requests: m
     stream.set_nodelay(true)?;
     let mut buffer = [0; MAX_PDU_LENGTH];
     loop {
-        let mut header = [0; 7];
+        let mut header = [0; Header::SIZE];
         stream.read_exact(&mut header).await?;
-        let [t0, t1, p0, p1, l0, l1, unit] = header;
-        // The length counts the unit identifier.
-        let length = usize::from(u16::from_be_bytes([l0, l1])).wrapping_sub(1);
-        if [p0, p1] != [0, 0] || !(1..=MAX_PDU_LENGTH).contains(&length) {
-            return Err(io::ErrorKind::InvalidData.into());
-        }
-        let request = &mut buffer[..length];
+        let header = Header::parse(header).ok_or(io::ErrorKind::InvalidData)?;
+        let request = &mut buffer[..usize::from(header.length)];
         stream.read_exact(request).await?;
         let no_unit = || pdu::response(request, &Err(ModbusException::GatewayTargetFailedToRespond));
-        let response = ask(&requests, unit, false, request).await.unwrap_or_else(no_unit);
-        let [l0, l1] = (response.len() as u16 + 1).to_be_bytes();
-        let frame = [&[t0, t1, 0, 0, l0, l1, unit], &*response].concat();
+        let response = ask(&requests, header.unit, false, request).await.unwrap_or_else(no_unit);
+        let header = Header { length: response.len() as u16, ..header };
+        let frame = [&header.emit(), &*response].concat();
         stream.write_all(&frame).await?;
     }
 }

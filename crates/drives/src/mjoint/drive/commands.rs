@@ -196,8 +196,6 @@ impl MJoint {
         self.publish_alarms();
     }
 
-    // ---- who may move ----
-
     /// Pulses are ignored and the host's targets count: bit 0 of the controlword, or 2600h.
     pub(super) fn is_host_in_control(&self) -> bool {
         self.controlword.has(Controlword::SWITCH_ON) || self.values().get(MODBUS_ENABLE) == 1

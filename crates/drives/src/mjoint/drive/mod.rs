@@ -75,6 +75,7 @@ pub struct MJoint {
     origin_asked: bool,
     set_origin: bool,
     save_asked: bool,
+    eeprom_fails: bool,
     output_was_enabled: bool,
 
     controlword: Controlword,
@@ -154,6 +155,7 @@ impl MJoint {
             origin_asked: false,
             set_origin: false,
             save_asked: false,
+            eeprom_fails: false,
             output_was_enabled: true,
             controlword: Controlword(0),
             mode: ModeOfOperation::PROFILE_POSITION,
@@ -210,6 +212,7 @@ impl MJoint {
         started.bitrate = self.bitrate;
         started.running = true;
         started.powered_at = self.powered_at;
+        started.eeprom_fails = self.eeprom_fails;
         started.function = Function::from_raw(started.values().get(MODE_SELECTION)).unwrap_or_default();
         started.own_motion = OwnMotion::Starting;
         started.gear_numerator = started.values().get(GEAR_NUMERATOR);
@@ -248,14 +251,20 @@ impl MJoint {
         self.publish_status();
     }
 
-    /// Stores what 2614h asked for: reads 2 when it is done.
+    /// Stores what 2614h asked for: reads 2 when it is done, and 1 for as long as the EEPROM does not answer.
     fn save(&mut self) {
-        if self.save_asked {
-            self.save_asked = false;
-            self.store.mark_all(&TABLE);
-            self.store.commit(&storage::contents(self.node.dictionary(), self.node.node_id()));
-            self.node.dictionary_mut().set(DATA_SAVE_FLAG, 2);
+        if !self.save_asked || self.eeprom_fails {
+            return;
         }
+        self.save_asked = false;
+        let contents = storage::contents(self.node.dictionary(), self.node.node_id());
+        if self.store.is_readable() {
+            self.store.mark_all(&TABLE);
+            self.store.commit(&contents);
+        } else {
+            self.store.format(&contents);
+        }
+        self.node.dictionary_mut().set(DATA_SAVE_FLAG, 2);
     }
 
     fn actuation(&mut self, now: Instant) -> Actuation {
@@ -353,6 +362,7 @@ impl Firmware for MJoint {
         if !self.running {
             return Actuation::default();
         }
+        self.eeprom_fails = sensors.eeprom_fails;
         self.sense(sensors);
         self.watch_for_origin(sensors);
         self.periods += 1;

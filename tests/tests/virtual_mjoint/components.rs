@@ -1,0 +1,98 @@
+//! Components that break. The manual lists no alarm for any of them: what the joint shows follows from what it reads.
+
+use crate::bench::Bench;
+
+fn turning(bench: &mut Bench, rpm: i64) {
+    bench.set(0x6060, 0, 3);
+    bench.set(0x60FF, 0, rpm);
+    bench.set(0x6040, 0, 0x0F);
+    bench.run_ms(400);
+}
+
+#[test]
+fn the_save_flag_never_reads_2_while_the_eeprom_does_not_answer() {
+    let mut bench = Bench::new();
+    bench.tell("1 fault eeprom on");
+    bench.set(0x6081, 0, 900);
+    bench.set(0x2614, 0, 1);
+    bench.run_ms(200);
+    assert_eq!(bench.get(0x2614, 0), 1);
+    bench.tell("1 fault eeprom off");
+    bench.run_ms(5);
+    assert_eq!(bench.get(0x2614, 0), 2, "what waits is stored as soon as it can be");
+    bench.power_cycle();
+    assert_eq!(bench.get(0x6081, 0), 900);
+}
+
+#[test]
+fn a_save_that_failed_is_gone_after_a_power_cycle() {
+    let mut bench = Bench::new();
+    bench.set(0x6081, 0, 900);
+    bench.save();
+    bench.tell("1 fault eeprom on");
+    bench.set(0x6081, 0, 800);
+    bench.set(0x2614, 0, 1);
+    bench.run_ms(50);
+    bench.power_cycle();
+    assert_eq!((bench.get(0x2614, 0), bench.get(0x6081, 0)), (0, 1500), "what cannot be read is as delivered");
+    bench.tell("1 fault eeprom off");
+    bench.power_cycle();
+    assert_eq!(bench.get(0x6081, 0), 900, "what was stored before is still there");
+}
+
+#[test]
+fn an_eeprom_that_could_not_be_read_at_power_on_is_written_anew_by_a_save() {
+    let mut bench = Bench::new();
+    bench.tell("1 fault eeprom on");
+    bench.power_cycle();
+    bench.tell("1 fault eeprom off");
+    bench.set(0x6081, 0, 700);
+    bench.save();
+    bench.power_cycle();
+    assert_eq!(bench.get(0x6081, 0), 700);
+}
+
+#[test]
+fn an_encoder_that_stands_still_looks_like_a_locked_rotor() {
+    let mut bench = Bench::new();
+    turning(&mut bench, 300);
+    let before = bench.position();
+    bench.tell("1 fault encoder on");
+    bench.run_ms(1000);
+    let stuck = bench.position();
+    assert!((stuck - before).abs() < 2000, "{before} {stuck}");
+    let current = bench.report().current_a;
+    assert!((current - 7.0).abs() < 0.3, "the speed that it does not see is asked for with all current: {current}");
+    assert!(bench.report().velocity_rpm.abs() < 1.0, "the field stands, and the shaft with it");
+    bench.until(5000, |bench| bench.get(0x260E, 0) == 0x12);
+    assert_eq!(bench.position(), stuck);
+    bench.tell("1 fault encoder off");
+    bench.set(0x6040, 0, 0x8F);
+    bench.set(0x6040, 0, 0x0F);
+    bench.run_ms(500);
+    assert_eq!((bench.get(0x260E, 0), bench.statusword()), (0, 0x0437));
+    assert!((bench.report().velocity_rpm - 300.0).abs() < 10.0);
+}
+
+#[test]
+fn a_lost_phase_takes_torque_and_a_heavy_load_locks_the_rotor() {
+    let mut bench = Bench::new();
+    turning(&mut bench, 300);
+    bench.tell("1 load torque 25");
+    bench.run_ms(1000);
+    assert!((bench.report().velocity_rpm - 300.0).abs() < 10.0);
+    bench.tell("1 fault phase on");
+    bench.run_ms(1000);
+    assert!((bench.report().velocity_rpm - 300.0).abs() > 100.0, "{}", bench.report().velocity_rpm);
+}
+
+#[test]
+fn parts_that_a_joint_does_not_have_cannot_break() {
+    let mut bench = Bench::new();
+    for (part, because) in [("hall", "its encoder is absolute"), ("reference", "no alarm tells of one")] {
+        let line = format!("1 fault {part} on");
+        let answer = sim::command::answer(&mut bench.world, &line).expect("a line is answered").json;
+        assert!(answer.starts_with("{\"ok\":false") || answer.contains("\"ok\":false"), "{answer}");
+        assert!(answer.contains("a m4230e17b50 has no") && answer.contains(because), "{answer}");
+    }
+}
