@@ -62,7 +62,7 @@ pub enum Action {
     Fault(Component, bool),
     /// `battery off`.
     Battery(bool),
-    /// `pulses 8192 10000`, `quadrature -400 1000`, `duty 40`: what is sent to the pulse inputs.
+    /// `pulses 8192 10000`, `quadrature -400 1000`, `duty 40`, `clock 10000`: what is sent to the pulse inputs.
     Pulses(PulseTrain),
     /// `cable cut` is true, `cable join` is false.
     CableCut(bool),
@@ -88,7 +88,7 @@ pub enum CommandError {
     /// A node number and something unknown after it.
     #[error(
         "unknown command {0:?} for a node; expected power, input, switch, load, rotor, supply, temperature, fault, \
-         battery, pulses, quadrature, duty, cable or get"
+         battery, pulses, quadrature, duty, clock, cable or get"
     )]
     UnknownAction(String),
     /// Missing, surplus or unknown words.

@@ -210,6 +210,8 @@ pub enum PulseTrain {
     },
     /// A square wave of this duty cycle in per cent, for ever.
     Duty(f64),
+    /// A level on the second input that changes so many times a second, for ever.
+    Clock(f64),
 }
 
 /// State of the holding brake.

@@ -62,14 +62,17 @@ fn starts(bench: &mut Bench) -> [f64; 3] {
 }
 
 fn spread_us(synchronised: i64) -> f64 {
-    let mut bench = three(synchronised);
+    spread_us_of(&mut three(synchronised))
+}
+
+fn spread_us_of(bench: &mut Bench) -> f64 {
     for node in 1..=3 {
         let frame = Frame::new(CanId::standard(0x500 + node), &20_000_i32.to_le_bytes());
         bench.world.send(bench.host, frame).expect("room at the host");
     }
     bench.run_ms(2);
     bench.world.send(bench.host, Frame::new(CanId::standard(0x080), &[])).expect("room at the host");
-    let starts = starts(&mut bench);
+    let starts = starts(bench);
     let (first, last) =
         (starts.iter().copied().fold(f64::NAN, f64::min), starts.iter().copied().fold(f64::NAN, f64::max));
     assert!(starts.iter().all(|start| !start.is_nan()), "{starts:?}");
@@ -119,4 +122,69 @@ fn a_line_of_points_is_followed_with_a_steady_speed_and_little_lag() {
         let end = bench.get_from(node, 0x6064, 0);
         assert!((end - position as i64).abs() <= 30, "node {node}: {end}");
     }
+}
+
+#[test]
+fn with_255_dir_is_the_clock_of_the_stretch_and_axes_start_together() {
+    let mut bench = three(255);
+    for node in 1..=3 {
+        bench.tell(&format!("{node} clock 10000"));
+    }
+    assert!(spread_us_of(&mut bench) <= 50.0);
+}
+
+#[test]
+fn with_255_a_host_that_goes_by_a_slow_dir_clock_is_followed_without_a_pause_between_points() {
+    // 20 changes of level are 5 ms by this clock, and so is the host's cycle: 655.36 counts in it are 240 r/min.
+    let speeds = |time_base: i64| {
+        let mut bench = Bench::new();
+        for (index, value) in [(0x261C, time_base), (0x6060, 7), (0x6040, 0x0F)] {
+            bench.set(index, 0, value);
+        }
+        bench.tell("1 clock 4000");
+        let (mut least, mut most) = (f64::MAX, f64::MIN);
+        let mut position = 0.0;
+        for cycle in 0..300 {
+            position += 655.36 * f64::from(cycle.min(150)) / 150.0;
+            bench.send(&format!("501#{:08X}", (position as i32).swap_bytes()));
+            bench.send("080#");
+            for _ in 0..16 {
+                bench.run(Duration::from_micros(250));
+                let speed = bench.report().velocity_rpm;
+                if cycle > 200 {
+                    (least, most) = (least.min(speed), most.max(speed));
+                }
+            }
+        }
+        (least, most)
+    };
+    let (least, most) = speeds(255);
+    assert!(least > 210.0 && most < 270.0, "{least} to {most} r/min");
+    let (least, most) = speeds(1);
+    assert!(most - least > 120.0, "by its own 2 ms the joint waits for each point: {least} to {most} r/min");
+}
+
+#[test]
+fn with_255_a_point_waits_while_dir_stands_still() {
+    let mut bench = three(255);
+    bench.send("501#E8030000");
+    bench.run_ms(1);
+    bench.send("080#");
+    bench.run_ms(100);
+    assert!(bench.position().abs() < 3, "{}", bench.position());
+    assert_eq!(bench.statusword(), 0x0037);
+    // Half of the stretch: 10 changes of the level.
+    for n in 1..=10 {
+        bench.tell(&format!("1 input DIR {}", n % 2));
+        bench.run_ms(1);
+    }
+    bench.run_ms(300);
+    assert!((bench.position() - 500).abs() <= 12, "{}", bench.position());
+    for n in 1..=11 {
+        bench.tell(&format!("1 input DIR {}", n % 2));
+        bench.run_ms(1);
+    }
+    bench.run_ms(300);
+    assert!((bench.position() - 1000).abs() <= 12, "{}", bench.position());
+    assert_eq!(bench.statusword(), 0x0437);
 }

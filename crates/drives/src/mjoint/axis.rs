@@ -163,8 +163,8 @@ impl Axis {
         self.feedback = feedback;
     }
 
-    /// One period.
-    pub(super) fn update(&mut self, dt_s: f64) -> Demand {
+    /// One period of `dt_s`, in which the time base of the interpolation goes on by `base_s`.
+    pub(super) fn update(&mut self, dt_s: f64, base_s: f64) -> Demand {
         if !self.engaged {
             return Demand::Off;
         }
@@ -173,7 +173,10 @@ impl Axis {
         }
         match &mut self.task {
             Task::Speed { .. } => Demand::Velocity(self.trajectory.advance(dt_s)),
-            Task::Interpolate(interpolation) => Demand::Position(interpolation.advance(dt_s)),
+            Task::Interpolate(interpolation) => {
+                let point = interpolation.advance(base_s);
+                Demand::Position(TrajectoryPoint { velocity: point.velocity * base_s / dt_s, ..point })
+            }
             Task::Follow { velocity, .. } => {
                 let point = self.trajectory.advance(dt_s);
                 Demand::Position(TrajectoryPoint { velocity: point.velocity + *velocity, ..point })

@@ -38,10 +38,30 @@ pub(super) struct Parameters {
     pub(super) stationary_output: f32,
     /// 2618h: seconds at that limit until the alarm, 0 for never.
     pub(super) stationary_time_s: f32,
-    /// 261Ch is not 0.
-    pub(super) synchronised: bool,
+    pub(super) time_base: TimeBase,
     /// Ones digit of 60FBh:01 is odd: the alarm output conducts while there is an alarm.
     pub(super) alarm_conducts: bool,
+}
+
+/// What the 2 ms of mode 7 go by: 261Ch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum TimeBase {
+    /// 0: the joint's own clock, apart from everybody else's.
+    Own,
+    /// Above 0: the joint's own clock, which SYNC starts over.
+    Sync,
+    /// 255: the level of DIR, which changes each 0.1 ms; SYNC tells from which change on.
+    Dir,
+}
+
+impl TimeBase {
+    const fn from_raw(raw: u16) -> Self {
+        match raw {
+            0 => Self::Own,
+            DIR_IS_CLOCK => Self::Dir,
+            _ => Self::Sync,
+        }
+    }
 }
 
 impl Parameters {
@@ -65,7 +85,7 @@ impl Parameters {
             current_time_s,
             stationary_output,
             stationary_time_s,
-            synchronised: values.get(SYNCHRONOUS_CONTROL_WORD) != 0,
+            time_base: TimeBase::from_raw(values.get(SYNCHRONOUS_CONTROL_WORD)),
             alarm_conducts: is_odd(values.get(POSITION_PROPORTIONAL)),
         }
     }

@@ -24,6 +24,12 @@ pub const COMMUNICATION_PERIOD_NS: u64 = 500_000;
 /// Supervision periods in the time base of the interpolation, 2 ms (261Ch).
 pub const INTERPOLATION_PERIODS: u8 = 4;
 
+/// Value of 261Ch with which DIR is the clock of the interpolation.
+pub const DIR_IS_CLOCK: u16 = 255;
+
+/// What one change of DIR's level stands for then ("switch between high and low levels every 0.1ms").
+pub const DIR_CLOCK_S: f64 = 0.1e-3;
+
 /// 6081h as delivered, r/min: rated speed of the M4230, highest speed of the M8025.
 pub const PROFILE_VELOCITY_RPM: i64 = 1500;
 

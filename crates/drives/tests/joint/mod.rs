@@ -142,6 +142,7 @@ impl Bench {
             pu: self.pu.contains(&self.shaft()),
             dir: self.dir.contains(&self.shaft()),
             pulses: self.pulses,
+            eeprom_fails: false,
         }
     }
 

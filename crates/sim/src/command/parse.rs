@@ -36,6 +36,7 @@ const BATTERY: &str = "NODE battery on|off";
 const PULSES: &str = "NODE pulses COUNT HZ";
 const QUADRATURE: &str = "NODE quadrature COUNT HZ";
 const DUTY: &str = "NODE duty PERCENT";
+const CLOCK: &str = "NODE clock HZ";
 const CABLE: &str = "NODE cable cut|join";
 const GET: &str = "NODE get";
 
@@ -77,6 +78,10 @@ fn parse_action(node: u8, words: &[&str]) -> Result<Action, CommandError> {
         "duty" => match arguments {
             [percent] => Ok(Action::Pulses(PulseTrain::Duty(number(percent, "duty cycle", 0.0, DUTY)?))),
             _ => Err(CommandError::Usage(DUTY)),
+        },
+        "clock" => match arguments {
+            [hz] => Ok(Action::Pulses(PulseTrain::Clock(number(hz, "frequency", 0.0, CLOCK)?))),
+            _ => Err(CommandError::Usage(CLOCK)),
         },
         "cable" => Ok(Action::CableCut(choice(arguments, "cut", "join", CABLE)?)),
         "get" if arguments.is_empty() => Ok(Action::Get),
@@ -213,6 +218,7 @@ mod tests {
         assert_eq!(action("4 pulses 8192 10000"), Action::Pulses(PulseTrain::Pulses { count: 8192, hz: 1e4 }));
         assert_eq!(action("4 quadrature -400 1e3"), Action::Pulses(PulseTrain::Quadrature { count: -400, hz: 1e3 }));
         assert_eq!(action("4 duty 40"), Action::Pulses(PulseTrain::Duty(40.0)));
+        assert_eq!(action("4 clock 1e4"), Action::Pulses(PulseTrain::Clock(1e4)));
         assert_eq!(action("4 cable cut"), Action::CableCut(true));
         assert_eq!(action("4 cable join"), Action::CableCut(false));
         assert_eq!(action("\t4   get "), Action::Get);
@@ -233,12 +239,12 @@ mod tests {
             (
                 "4",
                 "unknown command \"\" for a node; expected power, input, switch, load, rotor, supply, temperature, \
-                 fault, battery, pulses, quadrature, duty, cable or get",
+                 fault, battery, pulses, quadrature, duty, clock, cable or get",
             ),
             (
                 "4 Power on",
                 "unknown command \"Power\" for a node; expected power, input, switch, load, rotor, supply, \
-                 temperature, fault, battery, pulses, quadrature, duty, cable or get",
+                 temperature, fault, battery, pulses, quadrature, duty, clock, cable or get",
             ),
             ("4 power", "expected: NODE power on|off|cycle"),
             ("4 power up", "expected: NODE power on|off|cycle"),
@@ -275,6 +281,7 @@ mod tests {
             ("4 pulses 1.5 100", "\"1.5\" is no count; expected: NODE pulses COUNT HZ"),
             ("4 quadrature 5 fast", "\"fast\" is no frequency; expected: NODE quadrature COUNT HZ"),
             ("4 duty", "expected: NODE duty PERCENT"),
+            ("4 clock", "expected: NODE clock HZ"),
             ("4 cable off", "expected: NODE cable cut|join"),
             ("4 get position", "expected: NODE get"),
         ] {

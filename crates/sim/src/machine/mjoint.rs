@@ -152,7 +152,7 @@ impl Assembly for Joint {
             bus_v: sensed.bus_v as f32,
             driver_c: sensed.heat_sink_c as f32,
             pu: inputs & 1 != 0,
-            dir: inputs & 2 != 0,
+            dir: self.pulses.dir().unwrap_or(inputs & 2 != 0),
             pulses: self.pulses.read(),
             eeprom_fails: self.eeprom_broken,
         }

@@ -9,12 +9,16 @@ use crate::{PulseTrain, Refused};
 const FREQUENCY: Quantity =
     Quantity { what: "frequency", expected: "above 0 to 500000 Hz", least: f64::MIN_POSITIVE, greatest: 500e3 };
 const DUTY_CYCLE: Quantity = Quantity { what: "duty cycle", expected: "0 to 100 %", least: 0.0, greatest: 100.0 };
+/// Of a clock's level: at most one in a control period, which is how often the drive looks at DIR.
+const CHANGES: Quantity = Quantity { what: "changes of level", expected: "0 to 20000 Hz", least: 0.0, greatest: 20e3 };
 
 /// A pulse generator wired to PU and DIR.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PulseSource {
     train: Option<Running>,
     input: PulseInput,
+    /// Level of DIR while it is a clock.
+    dir: Option<bool>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -31,14 +35,18 @@ impl PulseSource {
             PulseTrain::Pulses { hz, .. } | PulseTrain::Quadrature { hz, .. } => {
                 FREQUENCY.check(hz)?;
             }
+            PulseTrain::Clock(hz) => {
+                CHANGES.check(hz)?;
+            }
             PulseTrain::Duty(percent) => {
                 let percent = DUTY_CYCLE.check(percent)?;
-                self.train = None;
+                (self.train, self.dir) = (None, None);
                 self.input.duty = Some(percent as f32 / 100.0);
                 return Ok(());
             }
         }
         self.input.duty = None;
+        self.dir = matches!(train, PulseTrain::Clock(_)).then_some(false);
         self.train = Some(Running { train, sent: 0.0 });
         Ok(())
     }
@@ -47,12 +55,22 @@ impl PulseSource {
         self.input
     }
 
+    /// Level that it gives DIR, if it does.
+    pub(super) fn dir(&self) -> Option<bool> {
+        self.dir
+    }
+
     /// Time goes on.
     #[inline]
     pub(super) fn advance(&mut self, dt_s: f64) {
         let Some(running) = self.train.as_mut() else { return };
         let (count, hz) = match running.train {
             PulseTrain::Pulses { count, hz } | PulseTrain::Quadrature { count, hz } => (count, hz),
+            PulseTrain::Clock(hz) => {
+                running.sent = (running.sent + hz * dt_s) % 2.0;
+                self.dir = Some(running.sent >= 1.0);
+                return;
+            }
             PulseTrain::Duty(_) => return,
         };
         let before = running.sent;
@@ -98,6 +116,22 @@ mod tests {
     }
 
     #[test]
+    fn a_clock_changes_the_level_of_dir_as_often_as_asked_for_until_something_else_is_sent() {
+        let mut source = PulseSource::default();
+        source.start(PulseTrain::Clock(10_000.0)).expect("a clock");
+        let mut changes = 0;
+        for _ in 0..20_000 {
+            let before = source.dir();
+            source.advance(50e-6);
+            changes += u32::from(source.dir() != before);
+        }
+        assert!((9_999..=10_001).contains(&changes), "{changes} in a second");
+        assert_eq!(source.read(), PulseInput::default());
+        source.start(PulseTrain::Duty(10.0)).expect("a duty cycle");
+        assert_eq!(source.dir(), None);
+    }
+
+    #[test]
     fn what_no_generator_can_send_is_refused() {
         let mut source = PulseSource::default();
         for train in [
@@ -105,6 +139,7 @@ mod tests {
             PulseTrain::Pulses { count: 1, hz: 0.0 },
             PulseTrain::Quadrature { count: 1, hz: -1.0 },
             PulseTrain::Duty(101.0),
+            PulseTrain::Clock(20_001.0),
         ] {
             assert!(source.start(train).is_err(), "{train:?}");
         }

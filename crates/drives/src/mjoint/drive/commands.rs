@@ -10,6 +10,7 @@ use super::{Homing, MJoint, OwnMotion};
 use crate::mjoint::homing::Run;
 use crate::mjoint::objects::effects::{Effect, effect};
 use crate::mjoint::objects::*;
+use crate::mjoint::parameters::TimeBase;
 use crate::mjoint::readings::{SET_ORIGIN, SUPERVISION_DIVIDER};
 
 /// Bits 1 to 3 of the controlword, without which nothing moves.
@@ -111,9 +112,10 @@ impl MJoint {
     }
 
     /// 261Ch: above 0 the time base begins with SYNC, and the next point is taken up at once; else it runs by itself and
-    /// takes the point up when it is over.
+    /// takes the point up when it is over. With 255 it begins with SYNC too, and goes on with DIR.
     fn interpolate_to(&mut self, target: i32) {
-        if self.parameters.synchronised {
+        if self.parameters.time_base != TimeBase::Own {
+            self.dir_changes = 0;
             self.axis.interpolate(target, self.parameters.max_speed);
             self.base_periods = 0;
             // A SYNC that comes a control period early or late does not move the loops.

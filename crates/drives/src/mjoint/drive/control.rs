@@ -11,7 +11,7 @@ use crate::mjoint::axis::Feedback;
 use crate::mjoint::gains::MODULATION_LIMIT;
 use crate::mjoint::hardware::Sensors;
 use crate::mjoint::objects::TARGET_VELOCITY;
-use crate::mjoint::parameters::Parameters;
+use crate::mjoint::parameters::{Parameters, TimeBase};
 use crate::mjoint::power_on::Function;
 use crate::mjoint::protection::Situation;
 use crate::mjoint::readings::*;
@@ -24,6 +24,7 @@ impl MJoint {
         let angle = sensors.angle_count % COUNTS_PER_TURN as u16;
         if !self.awake {
             self.awake = true;
+            self.dir = sensors.dir;
             (self.angle_count, self.position) = (angle, sensors.position_counts);
             self.axis.observe(Feedback { position: self.position, velocity: 0.0, standing: true });
         }
@@ -37,6 +38,8 @@ impl MJoint {
             self.axis.shift(shift);
             self.publish_position();
         }
+        self.dir_changes = self.dir_changes.saturating_add(u8::from(self.dir != sensors.dir));
+        self.dir = sensors.dir;
         let cycle = u32::from(angle) * u32::from(self.model.pole_pairs) % COUNTS_PER_TURN;
         let electrical_turns = cycle as f32 / COUNTS_PER_TURN as f32;
         self.servo.sense_absolute(&self.parameters.servo, electrical_turns, self.shaft_count);
@@ -64,10 +67,17 @@ impl MJoint {
         if self.axis.is_engaged() {
             self.direct();
         }
-        self.demand = self.axis.update(DT_S);
+        let base_s = self.time_base_s();
+        self.demand = self.axis.update(DT_S, base_s);
         let Parameters { servo, gains, limits, .. } = &self.parameters;
         self.servo.control(servo, gains, &self.demand, feedback.position, limits);
         self.publish(sensors);
+    }
+
+    /// By how much the time base of the interpolation went on in this period.
+    fn time_base_s(&mut self) -> f64 {
+        let changes = core::mem::take(&mut self.dir_changes);
+        if self.parameters.time_base == TimeBase::Dir { f64::from(changes) * DIR_CLOCK_S } else { DT_S }
     }
 
     pub(super) fn modulate(&mut self, sensors: &Sensors) {

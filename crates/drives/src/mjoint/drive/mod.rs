@@ -94,6 +94,9 @@ pub struct MJoint {
     pulses: Pulses,
     inputs: Inputs<2>,
     battery: Battery,
+    /// Level of DIR, and how often it has changed since the time base of the interpolation went on.
+    dir: bool,
+    dir_changes: u8,
 
     /// The sensors have been looked at since the start.
     awake: bool,
@@ -170,6 +173,8 @@ impl MJoint {
             pulses: Pulses::default(),
             inputs: Inputs::default(),
             battery: Battery::Full,
+            dir: false,
+            dir_changes: 0,
             awake: false,
             angle_count: 0,
             shaft_count: 0,
