@@ -130,3 +130,54 @@ fn function_9_and_a_gear_of_0_put_the_host_in_control() {
         assert!(bench.position().abs() < 2, "pulses are ignored");
     }
 }
+
+#[test]
+fn with_a_brake_the_turns_outlive_a_power_off_without_a_battery() {
+    let mut bench = saved(7);
+    bench.tell("1 battery off");
+    bench.power_cycle();
+    assert_eq!(bench.get(0x260E, 0), 0, "a brake in place of a battery: nothing is missing");
+    turn_to(&mut bench, 7 * TURN + 5000);
+    bench.tell("1 load torque 20");
+    bench.run_ms(10);
+    bench.tell("1 power off");
+    bench.run_ms(500);
+    bench.tell("1 power on");
+    bench.run_ms(10);
+    assert_eq!(bench.get(0x260E, 0), 0);
+    let position = bench.position();
+    assert!((position - (7 * TURN + 5000)).abs() < 300, "{position}");
+    bench.send("000#8101");
+    bench.run_ms(10);
+    assert_eq!((bench.position(), bench.get(0x260E, 0)), (position, 0), "and an NMT reset");
+}
+
+#[test]
+fn function_8_goes_back_to_the_origin_without_a_battery() {
+    let mut bench = saved(8);
+    bench.tell("1 battery off");
+    bench.power_cycle();
+    bench.until_reached(2000);
+    bench.set(0x6040, 0, 0x0F);
+    bench.set(0x260A, 0, 60_006);
+    bench.set(0x260A, 0, 60_016);
+    bench.run_ms(1);
+    turn_to(&mut bench, -3 * TURN);
+    bench.power_cycle();
+    // Already on its way: 100 r/min for less than 10 ms.
+    assert!((bench.position() + 3 * TURN).abs() < 1000, "{}", bench.position());
+    bench.until_reached(4000);
+    assert!(bench.position().abs() <= 30, "{}", bench.position());
+    bench.power_cycle();
+    assert!(bench.position().abs() <= 30, "{}", bench.position());
+}
+
+#[test]
+fn a_brake_without_a_readable_record_does_not_guess_the_turns() {
+    let mut bench = saved(7);
+    turn_to(&mut bench, 2 * TURN);
+    bench.tell("1 battery off");
+    bench.tell("1 fault eeprom on");
+    bench.power_cycle();
+    assert_eq!(bench.get(0x260E, 0), 0x10);
+}

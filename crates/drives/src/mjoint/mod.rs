@@ -24,6 +24,7 @@ pub mod pulses;
 pub mod readings;
 pub mod statusword;
 pub mod storage;
+mod turns;
 
 pub use drive::{MJoint, NODE_PROFILE};
 pub use hardware::{Actuation, Battery, Brake, Hardware, PowerStage, Sensors};

@@ -16,9 +16,9 @@ pub enum Function {
     DutyCycleSpeed,
     /// 6: back to the origin of the turns.
     ReturnToOrigin,
-    /// 7: as 0, with a brake.
+    /// 7: as 0, with a brake that keeps the turns in place of a battery.
     Brake,
-    /// 8: back to the origin, with a brake.
+    /// 8: as 7, and back to the origin.
     BrakeAndReturn,
     /// 9: communication control, pulses are ignored.
     CommunicationControl,

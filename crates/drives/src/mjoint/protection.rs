@@ -26,11 +26,14 @@ pub(super) struct Situation<'a> {
     pub(super) latched: FaultSet,
     /// The heartbeat of the host is missing.
     pub(super) host_lost: bool,
+    /// The turns outlive a power-off without a battery.
+    pub(super) has_brake: bool,
+    pub(super) turns_known: bool,
 }
 
 impl Protection {
     pub(super) fn causes(&mut self, parameters: &Parameters, sensors: &Sensors, now: &Situation<'_>) -> FaultSet {
-        self.watch_battery(sensors);
+        self.watch_battery(sensors, now);
         FaultSet::NONE
             .with(row::OVER_VOLTAGE, over_voltage(sensors.bus_v, now))
             .with(row::LOCKED_ROTOR, self.locked_rotor(parameters, now))
@@ -51,12 +54,12 @@ impl Protection {
     }
 
     /// Told once each time: a battery that stays away does not bring the alarm back after an origin was set.
-    fn watch_battery(&mut self, sensors: &Sensors) {
-        let missing = sensors.battery == Battery::Missing;
+    fn watch_battery(&mut self, sensors: &Sensors, now: &Situation<'_>) {
+        let missing = sensors.battery == Battery::Missing && !now.has_brake;
         self.battery_lost |= missing && !self.battery_was_missing;
-        self.battery_lost |= sensors.turns_lost && !self.turns_were_lost;
+        self.battery_lost |= !now.turns_known && !self.turns_were_lost;
         self.battery_was_missing = missing;
-        self.turns_were_lost = sensors.turns_lost;
+        self.turns_were_lost = !now.turns_known;
     }
 
     /// The current stays at the limit of 261Dh.

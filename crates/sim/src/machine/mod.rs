@@ -113,8 +113,8 @@ impl<A: Assembly> Machine<A> {
             let hardware = self.assembly.hardware();
             self.firmware.power_on(&hardware, now);
         } else {
-            self.assembly.keep_image(self.firmware.eeprom().0);
             self.firmware.power_off(now);
+            self.assembly.keep_image(self.firmware.eeprom().0);
             self.actuation = Default::default();
         }
     }

@@ -22,18 +22,19 @@ impl MJoint {
     /// The encoder, every control period.
     pub(super) fn sense(&mut self, sensors: &Sensors) {
         let angle = sensors.angle_count % COUNTS_PER_TURN as u16;
+        let position = self.turns.position(sensors.position_counts, sensors.turns_lost);
         if !self.awake {
             self.awake = true;
             self.dir = sensors.dir;
-            (self.angle_count, self.position) = (angle, sensors.position_counts);
+            (self.angle_count, self.position) = (angle, position);
             self.axis.observe(Feedback { position: self.position, velocity: 0.0, standing: true });
         }
         let moved = within_half_a_turn(angle.wrapping_sub(self.angle_count));
         self.angle_count = angle;
         self.shaft_count = self.shaft_count.wrapping_add(moved as u16);
         // What the counts of turns moved by and the shaft did not is a new origin.
-        let shift = self.position.wrapping_add(i32::from(moved)).wrapping_sub(sensors.position_counts);
-        self.position = sensors.position_counts;
+        let shift = self.position.wrapping_add(i32::from(moved)).wrapping_sub(position);
+        self.position = position;
         if shift != 0 {
             self.axis.shift(shift);
             self.publish_position();
@@ -123,6 +124,8 @@ impl MJoint {
             velocity_rpm: self.velocity_rpm(),
             latched: self.alarms.latched(),
             host_lost: self.host_lost,
+            has_brake: self.function.has_brake(),
+            turns_known: self.turns.are_known(sensors.turns_lost),
         };
         let causes = self.protection.causes(&self.parameters, sensors, &situation);
         let new = self.alarms.observe(causes);
@@ -171,7 +174,7 @@ impl MJoint {
     /// Turns that are lost are no place to go to.
     fn start_by_itself(&mut self, sensors: &Sensors) {
         self.own_motion = OwnMotion::None;
-        let known = !sensors.turns_lost || matches!(self.function, Function::TurnToAngle(_));
+        let known = self.turns.are_known(sensors.turns_lost) || matches!(self.function, Function::TurnToAngle(_));
         let Some(target) = self.function.target(self.position).filter(|_| known && self.can_be_live()) else { return };
         self.own_motion = OwnMotion::Returning;
         self.take_or_let_go();

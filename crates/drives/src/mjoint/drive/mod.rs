@@ -32,6 +32,7 @@ use super::power_on::Function;
 use super::protection::Protection;
 use super::pulses::Pulses;
 use super::readings::*;
+use super::turns::Turns;
 use super::{Values, storage};
 use crate::engine::axis::Demand;
 use crate::engine::faults::FaultMonitor;
@@ -103,6 +104,7 @@ pub struct MJoint {
     angle_count: u16,
     /// Counts of the shaft, wrapping: the encoder's angle followed over its turns.
     shaft_count: u16,
+    turns: Turns,
     position: i32,
     shown_velocity_rpm: LowPass,
     shown_current_a: LowPass,
@@ -178,6 +180,7 @@ impl MJoint {
             awake: false,
             angle_count: 0,
             shaft_count: 0,
+            turns: Turns::default(),
             position: 0,
             shown_velocity_rpm: LowPass::default(),
             shown_current_a: LowPass::default(),
@@ -218,6 +221,7 @@ impl MJoint {
         started.running = true;
         started.powered_at = self.powered_at;
         started.eeprom_fails = self.eeprom_fails;
+        started.turns = self.turns;
         started.function = Function::from_raw(started.values().get(MODE_SELECTION)).unwrap_or_default();
         started.own_motion = OwnMotion::Starting;
         started.gear_numerator = started.values().get(GEAR_NUMERATOR);
@@ -270,6 +274,14 @@ impl MJoint {
             self.store.format(&contents);
         }
         self.node.dictionary_mut().set(DATA_SAVE_FLAG, 2);
+    }
+
+    /// The last thing that the falling supply voltage lets it do.
+    fn record_position(&mut self) {
+        if self.running && self.awake && !self.eeprom_fails {
+            self.store.mark(&TABLE, POSITION_ACTUAL_INTERNAL_VALUE.slot());
+            self.store.commit(self.node.dictionary());
+        }
     }
 
     fn actuation(&mut self, now: Instant) -> Actuation {
@@ -351,12 +363,15 @@ impl Firmware for MJoint {
         self.bitrate = hardware.bitrate;
         self.powered_at = now;
         let mut values = Values::new(&TABLE, NodeId::MIN);
-        let _ = self.store.load(&mut values, |_| true);
+        let readable = self.store.load(&mut values, |_| true).is_ok();
+        let has_brake = Function::from_raw(values.get(MODE_SELECTION)).is_some_and(Function::has_brake);
+        self.turns = Turns::new((readable && has_brake).then(|| values.get(POSITION_ACTUAL_INTERNAL_VALUE)));
         let address = u8::try_from(values.get(DEVICE_ADDRESS)).ok().and_then(NodeId::new);
         self.restart(address.unwrap_or(NodeId::MIN), now);
     }
 
     fn power_off(&mut self, _now: Instant) {
+        self.record_position();
         self.running = false;
         self.node.power_off();
         self.axis = Axis::new();

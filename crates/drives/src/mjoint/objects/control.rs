@@ -45,8 +45,8 @@ const MANUFACTURER: [Entry; 17] = [
 const PROFILE: [Entry; 19] = [
     ro(0x6041, 0, U16, "statusword", "Status word").default(0x0404).mappable(),
     rw(0x6060, 0, I8, "modes_of_operation", "Work mode").values(MODES).default(1).mappable(),
-    // Printed on one row with 6064h.
-    ro(0x6063, 0, I32, "position_actual_internal_value", "Position").unit("counts").mappable(),
+    // Printed on one row with 6064h. Recorded at power-off.
+    ro(0x6063, 0, I32, "position_actual_internal_value", "Position").unit("counts").mappable().stored(),
     ro(0x6064, 0, I32, "position_actual_value", "Actual position").unit("counts").mappable(),
     // Printed read and write, with a range in r/min.
     ro(0x606C, 0, I16, "velocity_actual_value", "Motor actual speed")
