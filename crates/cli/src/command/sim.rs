@@ -35,7 +35,10 @@ use crate::session::{bus_failure, failure_of, interrupted, runtime};
     4 power off|on|cycle      4 input X0 1              4 switch X0 -5000 max\n  \
     4 load torque 2.5         4 load inertia 0.02       4 rotor lock|free\n  \
     4 supply 48               4 temperature motor 95    4 fault hall on\n  \
-    4 cable cut|join          4 get                     now, quit\n\n\
+    4 cable cut|join          4 get                     now, quit\n\
+    Of the joints, here node 1:\n  \
+    1 battery off|on          1 pulses 8192 10000       1 quadrature -400 1000\n  \
+    1 duty 40                 1 clock 10000\n\n\
     Example:\n  ferrodrive sim --drive zlac8030l@4 --serve socketcand://127.0.0.1:29536\n  \
     ferrodrive --bus socketcand://127.0.0.1:29536/can0 move 4 90deg")]
 pub(crate) struct Sim {
