@@ -12,6 +12,7 @@ pub mod laws;
 pub mod manual;
 pub mod mjoint;
 pub mod object_rows;
+pub mod power_states;
 pub mod seeded;
 pub mod zlac8030l;
 pub mod zlim42c;

@@ -4,9 +4,11 @@ use std::sync::LazyLock;
 
 use can::Bitrate;
 use plant::hub_motor::HubMotor;
+use sim::Component;
 use sim::machine::{Zlac8030lMachine, zlac8030l};
 
 use super::{Rows, Subject};
+use crate::power_states::PowerSubject;
 use crate::zlac8030l::objects;
 
 pub use super::{Abort, assert_within};
@@ -37,6 +39,15 @@ impl Subject for Zlac8030l {
     fn rows() -> &'static Rows {
         static ROWS: LazyLock<Rows> = LazyLock::new(|| Rows::new(objects()));
         &ROWS
+    }
+}
+
+impl PowerSubject for Zlac8030l {
+    const BREAKABLE: Component = Component::Hall;
+
+    fn let_take_time(bench: &mut Bench) {
+        // The watch over the host.
+        bench.set(0x2000, 0, 0);
     }
 }
 

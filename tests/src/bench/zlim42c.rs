@@ -3,9 +3,11 @@
 use std::sync::LazyLock;
 
 use can::Bitrate;
+use sim::Component;
 use sim::machine::{Zlim42cMachine, zlim42c, zlim42c_82};
 
 use super::{Rows, Subject};
+use crate::power_states::PowerSubject;
 use crate::zlim42c::objects;
 
 pub use super::{Abort, assert_within};
@@ -37,6 +39,12 @@ impl Subject for Zlim42c {
         static ROWS: LazyLock<Rows> = LazyLock::new(|| Rows::new(objects()));
         &ROWS
     }
+}
+
+impl PowerSubject for Zlim42c {
+    const BREAKABLE: Component = Component::Reference;
+
+    fn let_take_time(_bench: &mut Bench) {}
 }
 
 impl Bench {

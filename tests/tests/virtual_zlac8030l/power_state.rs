@@ -1,11 +1,8 @@
 //! The power state machine on the running drive: every state with every event of the table, and the statuswords.
-//!
-//! Two states cannot be seen from the bus. Not ready to switch on ends before the boot-up message goes out. Fault
-//! reaction active takes no time: the manual names no fault reaction ramp, so the power stage goes off at once and
-//! transition 14 follows 13 in the same control period.
 
-use ferrodrive_tests::zlac8030l::{PowerCell, power_states};
-use sim::Component;
+use ferrodrive_tests::bench::zlac8030l::Zlac8030l;
+use ferrodrive_tests::power_states::lead_where_the_table_says;
+use ferrodrive_tests::zlac8030l::power_states;
 
 use crate::bench::Bench;
 
@@ -16,71 +13,10 @@ const IN_PLACE: u16 = 1 << 13;
 const RUNNING: u16 = 1 << 14;
 const MODE_BITS: u16 = REACHED | BIT_12 | IN_PLACE | RUNNING;
 
-const UNSEEN: [&str; 2] = ["not_ready_to_switch_on", "fault_reaction_active"];
-
 #[test]
 fn every_event_in_every_state_leads_where_the_table_says() {
-    let cells: Vec<_> = power_states().into_iter().filter(|cell| !UNSEEN.contains(&&*cell.state)).collect();
-    assert_eq!(cells.len(), 66);
-    let differences: Vec<_> = cells.iter().filter_map(difference).collect();
-    assert!(differences.is_empty(), "{}", differences.join("\n"));
-}
-
-fn difference(cell: &PowerCell) -> Option<String> {
-    let mut bench = in_state(&cell.state);
-    cause(&mut bench, cell);
-    let low_byte = bench.statusword() & 0xFF;
-    let expected = match &*cell.state_after {
-        // Seen one transition later: Fault.
-        "fault_reaction_active" => 0x98,
-        _ => u16::from(cell.low_byte_after),
-    };
-    (low_byte != expected)
-        .then(|| format!("{} on {}: low byte {low_byte:02X}h, expected {expected:02X}h", cell.state, cell.event))
-}
-
-/// A drive without a mode, standing, in a state.
-fn in_state(state: &str) -> Bench {
-    let mut bench = Bench::new();
-    reach(&mut bench, state);
-    bench
-}
-
-/// From switch on disabled to a state.
-fn reach(bench: &mut Bench, state: &str) {
-    let controlwords: &[i64] = match state {
-        "switch_on_disabled" | "fault" => &[],
-        "ready_to_switch_on" => &[0x06],
-        "switched_on" => &[0x06, 0x07],
-        "operation_enabled" => &[0x06, 0x07, 0x0F],
-        "quick_stop_active" => &[0x06, 0x07, 0x0F, 0x02],
-        other => panic!("no way to {other}"),
-    };
-    bench.set(0x2000, 0, 0);
-    for controlword in controlwords {
-        bench.set(0x6040, 0, *controlword);
-    }
-    if state == "fault" {
-        hall_fault(bench, true);
-        hall_fault(bench, false);
-    }
-}
-
-fn cause(bench: &mut Bench, cell: &PowerCell) {
-    match (cell.controlword, &*cell.event) {
-        (Some(controlword), _) => {
-            bench.set(0x6040, 0, 0x00FF & i64::from(controlword));
-            bench.run_ms(10);
-        }
-        (None, "fault_occurs") => hall_fault(bench, true),
-        // Ends of what the drive does by itself: there is nothing of the kind under way, time passes.
-        (None, _) => bench.run_ms(1000),
-    }
-}
-
-fn hall_fault(bench: &mut Bench, broken: bool) {
-    bench.operate(|drive, now| drive.set_fault(Component::Hall, broken, now)).expect("there are Hall sensors");
-    bench.run_ms(50);
+    let cells: Vec<_> = power_states().into_iter().map(|cell| (cell, 0)).collect();
+    lead_where_the_table_says::<Zlac8030l>(&cells, 0);
 }
 
 #[test]
@@ -105,7 +41,7 @@ fn the_statusword_of_each_state_has_bits_4_and_9_and_the_pattern_of_cia_402() {
         for (state, pattern) in patterns {
             let mut bench = Bench::new();
             bench.set(0x6060, 0, mode);
-            reach(&mut bench, state);
+            bench.reach(state);
             bench.run_ms(50);
             let statusword = bench.statusword();
             assert_eq!(statusword & 0x03FF, pattern, "mode {mode}, {state}: {statusword:04X}h");
@@ -185,12 +121,12 @@ fn bit_15_tells_of_the_external_stop_whatever_the_mode() {
 
 #[test]
 fn a_fault_is_cleared_only_by_a_rising_bit_7_and_only_when_its_cause_is_gone() {
-    let mut bench = in_state("switched_on");
-    hall_fault(&mut bench, true);
+    let mut bench = Bench::in_state("switched_on");
+    bench.set_fault(true);
     assert_eq!((bench.get(0x603F, 0), bench.get(0x1001, 0)), (0x0200, 0x81), "Hall error; generic and manufacturer");
     bench.set(0x6040, 0, 0x80);
     assert_eq!(bench.statusword() & 0xFF, 0x98, "the cause is still there");
-    hall_fault(&mut bench, false);
+    bench.set_fault(false);
     bench.set(0x6040, 0, 0x80);
     assert_eq!(bench.statusword() & 0xFF, 0x98, "bit 7 did not rise");
     bench.set(0x6040, 0, 0x00);
@@ -201,10 +137,10 @@ fn a_fault_is_cleared_only_by_a_rising_bit_7_and_only_when_its_cause_is_gone() {
 
 #[test]
 fn a_fault_and_its_end_are_told_by_emcy() {
-    let mut bench = in_state("switch_on_disabled");
+    let mut bench = Bench::in_state("switch_on_disabled");
     bench.heard();
-    hall_fault(&mut bench, true);
-    hall_fault(&mut bench, false);
+    bench.set_fault(true);
+    bench.set_fault(false);
     bench.set(0x6040, 0, 0x80);
     let told: Vec<_> = bench.heard().into_iter().filter(|frame| frame.starts_with("084#")).collect();
     assert_eq!(told, ["084#0002810000000000", "084#0000000000000000"]);

@@ -1,0 +1,97 @@
+//! The CiA 402 power states of a running drive: the ways into them, and the table of states and events asked over the bus.
+//!
+//! Two states cannot be seen from the bus. Not ready to switch on ends before the boot-up message goes out. Fault
+//! reaction active takes no time: no manual names a fault reaction ramp, so the power stage goes off at once and
+//! transition 14 follows 13 in the same control period.
+
+use sim::Component;
+
+use crate::bench::{Bench, Subject};
+use crate::manual::PowerCell;
+
+const UNSEEN: [&str; 2] = ["not_ready_to_switch_on", "fault_reaction_active"];
+
+/// The low byte of the statusword in the state Fault, with the bus voltage present.
+const FAULT: u16 = 0x98;
+
+/// A drive with the power state machine of CiA 402.
+pub trait PowerSubject: Subject {
+    /// A component whose break is a fault in every state, and which can be mended.
+    const BREAKABLE: Component;
+
+    /// What has to be set so that a test may take its time between two commands.
+    fn let_take_time(bench: &mut Bench<Self>)
+    where
+        Self: Sized;
+}
+
+impl<S: PowerSubject> Bench<S> {
+    /// A drive without a mode, standing, in a state.
+    #[must_use]
+    pub fn in_state(state: &str) -> Self {
+        let mut bench = Self::new();
+        bench.reach(state);
+        bench
+    }
+
+    /// From switch on disabled to a state.
+    pub fn reach(&mut self, state: &str) {
+        let controlwords: &[i64] = match state {
+            "switch_on_disabled" | "fault" => &[],
+            "ready_to_switch_on" => &[0x06],
+            "switched_on" => &[0x06, 0x07],
+            "operation_enabled" => &[0x06, 0x07, 0x0F],
+            "quick_stop_active" => &[0x06, 0x07, 0x0F, 0x02],
+            other => panic!("no way to {other}"),
+        };
+        S::let_take_time(self);
+        for controlword in controlwords {
+            self.set(0x6040, 0, *controlword);
+        }
+        if state == "fault" {
+            self.set_fault(true);
+            self.set_fault(false);
+        }
+    }
+
+    /// Breaks the component whose break is a fault, or mends it, and lets the drive notice.
+    pub fn set_fault(&mut self, broken: bool) {
+        self.operate(|drive, now| drive.set_fault(S::BREAKABLE, broken, now)).expect("the drive has it");
+        self.run_ms(50);
+    }
+
+    fn cause(&mut self, cell: &PowerCell) {
+        match (cell.controlword, &*cell.event) {
+            (Some(controlword), _) => {
+                self.set(0x6040, 0, 0x00FF & i64::from(controlword));
+                self.run_ms(10);
+            }
+            (None, "fault_occurs") => self.set_fault(true),
+            // Ends of what the drive does by itself: there is nothing of the kind under way, time passes.
+            (None, _) => self.run_ms(1000),
+        }
+    }
+}
+
+/// Asserts that every event in every state that can be seen leads where the table says. With each cell come the bits
+/// above the low byte that the statusword then has among those of `mask`.
+pub fn lead_where_the_table_says<S: PowerSubject>(cells: &[(PowerCell, u16)], mask: u16) {
+    let seen: Vec<_> = cells.iter().filter(|(cell, _)| !UNSEEN.contains(&&*cell.state)).collect();
+    assert_eq!(seen.len(), 66);
+    let differences: Vec<_> = seen.iter().filter_map(|(cell, above)| difference::<S>(cell, *above, mask)).collect();
+    assert!(differences.is_empty(), "{}", differences.join("\n"));
+}
+
+fn difference<S: PowerSubject>(cell: &PowerCell, above: u16, mask: u16) -> Option<String> {
+    let mut bench = Bench::<S>::in_state(&cell.state);
+    bench.cause(cell);
+    let statusword = bench.statusword() & (mask | 0xFF);
+    let low_byte = match &*cell.state_after {
+        // Seen one transition later: Fault.
+        "fault_reaction_active" => FAULT,
+        _ => u16::from(cell.low_byte_after),
+    };
+    let expected = low_byte | above;
+    (statusword != expected)
+        .then(|| format!("{} on {}: {statusword:04X}h, expected {expected:04X}h", cell.state, cell.event))
+}
