@@ -1,126 +1,26 @@
-//! The drive's tables and the data read from its manual, laid side by side. Two people made the two.
+//! The tables of the ZLAC8030L's firmware and the data read from its manual, laid side by side.
 
 use canopen::NodeId;
-use canopen::od::{Access, Default, Dictionary, Entry, PdoMapping};
-use cia402::{Controlword, PowerEvent, PowerState, Statusword, transition};
 use drives::zlac8030l::objects::{ROW_COUNT, TABLE};
-use ferrodrive_tests::zlac8030l::{ObjectRow, PowerCell, objects, power_states};
-
-const NODE_ID: u8 = 4;
+use ferrodrive_tests::side_by_side;
+use ferrodrive_tests::zlac8030l::{objects, power_states};
 
 #[test]
 fn the_drive_has_exactly_the_objects_of_the_manual() {
-    let ours: Vec<_> = TABLE.rows().iter().map(|row| (row.index, row.sub_index)).collect();
-    let manual: Vec<_> = objects().iter().map(|row| (row.index, row.sub)).collect();
-    assert_eq!(ours, manual);
+    side_by_side::objects_are_the_manuals(&TABLE, &objects());
 }
 
 #[test]
 fn every_object_agrees_with_the_manual_in_every_column() {
-    let rows = objects();
-    let differences: Vec<String> =
-        TABLE.rows().iter().zip(&rows).flat_map(|(ours, row)| differences(ours, row)).collect();
-    assert!(differences.is_empty(), "{} differences:\n{}", differences.len(), differences.join("\n"));
-}
-
-fn differences(ours: &Entry, row: &ObjectRow) -> Vec<String> {
-    let default = match ours.default {
-        Default::Value(value) => Some(value),
-        Default::NodeIdPlus(base) => Some(i64::from(base) + i64::from(NODE_ID)),
-        Default::Text(_) => None,
-    };
-    let pairs = [
-        ("size", ours.data_type.size().to_string(), row.size.to_string()),
-        ("signed", ours.data_type.is_signed().to_string(), row.signed.to_string()),
-        ("writable", ours.access.is_writable().to_string(), row.writable.to_string()),
-        ("readable", (ours.access != Access::WriteOnly).to_string(), true.to_string()),
-        ("stored", ours.stored.to_string(), row.stored.to_string()),
-        ("mappable", (ours.pdo == PdoMapping::Yes).to_string(), row.pdo_mappable.to_string()),
-        // A measurement's default is what the drive puts there, not a figure of the manual.
-        ("default", shown(default, row), shown(row.default, row)),
-    ];
-    let at = format!("{:04X}h:{:02X} {}", row.index, row.sub, row.name);
-    let differs = pairs.iter().filter(|(_, ours, manual)| ours != manual);
-    let mut found: Vec<String> = differs.map(|(what, a, b)| format!("{at}: {what}: drive {a}, manual {b}")).collect();
-    found.extend(limit_differences(ours, row).iter().map(|text| format!("{at}: {text}")));
-    found
-}
-
-fn shown(default: Option<i64>, row: &ObjectRow) -> String {
-    if row.live || row.default.is_none() { String::new() } else { format!("{default:?}") }
-}
-
-/// With all other objects at their defaults, the bounds are taken and what lies beyond is refused. Whether by limits, by
-/// a list of values or by a check is the drive's business.
-fn limit_differences(ours: &Entry, row: &ObjectRow) -> Vec<String> {
-    if !row.writable {
-        return Vec::new();
-    }
-    let dictionary: Dictionary<ROW_COUNT> = Dictionary::new(&TABLE, NodeId::new(NODE_ID).expect("4 is a node-ID"));
-    let slot = TABLE.find(ours.mux()).expect("a row of the table");
-    let (least, most) = ours.data_type.range();
-    let (low, high) = row.limits.unwrap_or((least, most));
-    let cases = [(low, true), (high, true), (low - 1, false), (high + 1, false)];
-    let possible = cases.into_iter().filter(|(value, _)| (least..=most).contains(value));
-    let differs =
-        |&(value, taken): &(i64, bool)| dictionary.check_write(slot, ours.data_type.raw(value)).is_ok() != taken;
-    possible
-        .filter(differs)
-        .map(|(value, taken)| format!("{value} should be {}", if taken { "taken" } else { "refused" }))
-        .collect()
+    side_by_side::columns_are_the_manuals::<ROW_COUNT>(&TABLE, &objects(), NodeId::new(4).expect("4 is a node-ID"));
 }
 
 #[test]
 fn the_power_state_machine_agrees_with_the_table_of_states_and_events() {
-    let mut differences = Vec::new();
-    for cell in power_states() {
-        let Some(event) = event(&cell) else { continue };
-        let after = settle(state(&cell.state), event);
-        if after != state(&cell.state_after) {
-            differences.push(format!("{} on {}: {after:?}, table {}", cell.state, cell.event, cell.state_after));
-        }
-    }
-    assert!(differences.is_empty(), "{}", differences.join("\n"));
+    side_by_side::transitions_are_the_manuals(&power_states());
 }
 
 #[test]
 fn the_statusword_bits_of_each_state_are_those_of_the_table() {
-    const STATE_BITS: u16 = 0x6F;
-    for cell in power_states() {
-        let state = state(&cell.state_after);
-        let expected = u16::from(cell.low_byte_after);
-        assert_eq!(Statusword(expected).state(), Some(state), "{cell:?}");
-        assert_eq!(state.statusword_bits() & STATE_BITS & !0x20, expected & STATE_BITS & !0x20, "{cell:?}");
-    }
-}
-
-/// Takes transitions until the event has none: "enable operation" passes through Switched on.
-fn settle(mut state: PowerState, event: PowerEvent) -> PowerState {
-    let automatic = |state| state == PowerState::SwitchedOn;
-    if let Some(step) = transition(state, event) {
-        state = step.to;
-        if automatic(state) && step.from == PowerState::ReadyToSwitchOn {
-            state = transition(state, event).map_or(state, |step| step.to);
-        }
-    }
-    state
-}
-
-/// The event of a cell; `None` for the ends of ramps, which the drive turns into the command that waits for them.
-fn event(cell: &PowerCell) -> Option<PowerEvent> {
-    if let Some(controlword) = cell.controlword {
-        return Some(PowerEvent::Command(Controlword(controlword).command()));
-    }
-    match cell.event.as_str() {
-        "self_test_done" => Some(PowerEvent::SelfTestDone),
-        "fault_occurs" => Some(PowerEvent::FaultOccurred),
-        "fault_reaction_done" => Some(PowerEvent::FaultReactionDone),
-        "ramp_done" | "quick_stop_ramp_done" => None,
-        other => panic!("unknown event {other}"),
-    }
-}
-
-fn state(name: &str) -> PowerState {
-    let snake = |state: &PowerState| state.name().to_lowercase().replace(' ', "_") == name;
-    PowerState::ALL.into_iter().find(snake).unwrap_or_else(|| panic!("unknown state {name}"))
+    side_by_side::state_bits_are_the_manuals(&power_states());
 }
