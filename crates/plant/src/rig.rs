@@ -35,7 +35,7 @@ pub struct Energy {
     pub source_j: f64,
     /// Out: heat of the winding.
     pub winding_j: f64,
-    /// Out: heat of the switches, and of the arc of a wire that comes off under current.
+    /// Out: heat of the switches, of the arc of a wire that comes off under current, and of short circuits.
     pub switches_j: f64,
     /// Out: heat of all friction, brake and gear included.
     pub friction_j: f64,
@@ -89,7 +89,7 @@ pub(crate) struct Flows {
     pub(crate) bus_w: f64,
     /// Heat in the phases' resistance per ohm of it.
     pub(crate) heat_w_per_ohm: f64,
-    /// Heat of an arc.
+    /// Heat of an arc, and of short circuits.
     pub(crate) arc_j: f64,
     /// Heat of all friction.
     pub(crate) friction_j: f64,

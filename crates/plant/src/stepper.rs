@@ -120,6 +120,8 @@ pub struct StepperInput {
     pub bus_v: f64,
     /// A phase whose wire has come off, if any.
     pub lost_phase: Option<Phase>,
+    /// A phase whose two wires touch, if any: its winding sees no voltage, whatever the bridge does.
+    pub shorted_phase: Option<Phase>,
     /// Resistance in each phase's path: copper at its present temperature, switches and wires.
     pub resistance_ohm: f64,
     /// How the rotor turns.
@@ -200,10 +202,8 @@ impl StepperModel {
     pub fn step(&self, data: &mut StepperData, dt_s: f64, input: &StepperInput) -> StepperOutput {
         let Axis { sin, cos } = input.turn.middle;
         let solver = Solver::new(self, dt_s, input);
-        let lost_a = input.lost_phase == Some(Phase::A);
-        let lost_b = input.lost_phase == Some(Phase::B);
-        let a = solver.phase(&mut data.current_a[0], cos, -sin, 0, lost_a);
-        let b = solver.phase(&mut data.current_a[1], sin, cos, 1, lost_b);
+        let a = solver.phase(&mut data.current_a[0], cos, -sin, Phase::A);
+        let b = solver.phase(&mut data.current_a[1], sin, cos, Phase::B);
         StepperOutput {
             torque_nm: self.torque_constant_nm_a() * (a.torque_a + b.torque_a),
             bus_w: a.bus_w + b.bus_w,
@@ -267,9 +267,10 @@ impl<'a> Solver<'a> {
     }
 
     #[inline]
-    fn phase(&self, current_a: &mut f64, d: f64, q: f64, index: usize, lost: bool) -> PhaseOutput {
+    fn phase(&self, current_a: &mut f64, d: f64, q: f64, phase: Phase) -> PhaseOutput {
         let before = *current_a;
-        if lost {
+        let index = phase as usize;
+        if self.input.lost_phase == Some(phase) {
             *current_a = 0.0;
             return PhaseOutput { arc_j: 0.5 * self.inductance_h * before * before, ..PhaseOutput::default() };
         }
@@ -278,7 +279,9 @@ impl<'a> Solver<'a> {
         let swing_wb = self.swing_wb * q;
         // What flux the phase takes without any voltage, and what the whole bus adds to it.
         let free_wb = -self.dt_s * resistance_ohm * (before + bend_a) - swing_wb;
+        let shorted = self.input.shorted_phase == Some(phase);
         let (change, voltage_v) = match self.input.bridges {
+            _ if shorted => (free_wb * self.inverse_lag, 0.0),
             Bridges::Open => return self.phase_through_diodes(current_a, q),
             Bridges::Shorted => (free_wb * self.inverse_lag, 0.0),
             Bridges::Driven(duty) => {

@@ -14,6 +14,12 @@ use crate::mechanics::{RotorData, RotorModel};
 use crate::rig::{Flows, Rig, RigModel};
 use crate::stepper::{Bridges, Phase, StepperData, StepperInput, StepperModel, Turn};
 
+/// Assumed: two wires that touch have 1 ohm with their contact. It is enough to be noticed before the bus collapses.
+const SHORT_OHM: f64 = 1.0;
+
+/// Assumed: a transistor that has broken down, with the one that works beside it.
+const BREAKDOWN_OHM: f64 = 5.0;
+
 /// What never changes about a stepper and the power stage it is wired to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepperMotorModel {
@@ -30,10 +36,12 @@ pub struct StepperMotorModel {
 /// What the drive's sensors read at the end of a step.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Sensors {
-    /// Currents of phases A and B.
+    /// Currents of phases A and B, at the bridges.
     pub phase_current_a: [f64; 2],
     /// Voltage of the bus capacitor.
     pub bus_v: f64,
+    /// Current that the bridges take from the bus, mean over the last step.
+    pub bus_current_a: f64,
     /// Temperature of the windings.
     pub winding_c: f64,
     /// Temperature of the power stage's heat sink.
@@ -51,11 +59,18 @@ pub struct StepperMotor {
     pub rotor: RotorData,
     /// A phase whose wire has come off.
     pub lost_phase: Option<Phase>,
+    /// A phase whose two wires touch: the bridge feeds the contact, the winding brakes the rotor.
+    pub shorted_phase: Option<Phase>,
+    /// A transistor of the bridges has broken down: it takes current from the bus whether they switch or not.
+    pub broken_down: bool,
     /// Load, supply, temperatures and energies.
     pub rig: Rig,
     /// Torque of the motor on its rotor, detent included, mean over the last step.
     pub torque_nm: f64,
     axis: Axis,
+    bus_current_a: f64,
+    /// Current through the contact of two wires.
+    short_a: f64,
 }
 
 impl StepperMotor {
@@ -66,23 +81,30 @@ impl StepperMotor {
             stepper: StepperData::default(),
             rotor: RotorData { angle, ..RotorData::default() },
             lost_phase: None,
+            shorted_phase: None,
+            broken_down: false,
             rig: Rig::new(&model.rig, model.stepper.resistance_ohm, source_v, ambient_c),
             torque_nm: 0.0,
             axis: magnet_axis(&model, angle),
+            bus_current_a: 0.0,
+            short_a: 0.0,
         }
     }
 
     /// One step: windings, rotor, bus, energies, and now and then heat. Meant for 50 µs and less.
     #[inline]
     pub fn step(&mut self, dt_s: f64, bridges: &Bridges) {
+        let bus_v = self.rig.supply.bus_v;
+        let broken_w = self.broken_w(bridges, bus_v);
         let model = &self.model;
         let velocity_rad_s = self.rotor.turn(dt_s, &self.rig.load);
         let turn = Turn::new(self.axis, 0.5 * dt_s * f64::from(model.stepper.teeth) * velocity_rad_s);
         self.axis = turn.end();
         let input = StepperInput {
             bridges: *bridges,
-            bus_v: self.rig.supply.bus_v,
+            bus_v,
             lost_phase: self.lost_phase,
+            shorted_phase: self.shorted_phase,
             resistance_ohm: self.rig.path_ohm(&model.rig),
             turn,
         };
@@ -91,16 +113,34 @@ impl StepperMotor {
         let moved = model.rotor.step(&mut self.rotor, dt_s, torque_nm, &self.rig.load, 0.0);
         self.torque_nm = torque_nm;
 
+        let bus_w = motor.bus_w + broken_w;
+        self.bus_current_a = if bus_v > 0.0 { bus_w / bus_v } else { 0.0 };
         let flows = Flows {
-            bus_w: motor.bus_w,
+            bus_w,
             heat_w_per_ohm: motor.heat_w_per_ohm,
-            arc_j: motor.arc_j,
+            arc_j: motor.arc_j + broken_w * dt_s,
             friction_j: moved.friction_j,
             load_j: moved.load_j,
         };
         if self.rig.step(&model.rig, dt_s, &flows, false) {
             self.step_slow();
         }
+    }
+
+    /// Power that goes into what is broken, and the current of a short circuit.
+    #[inline]
+    fn broken_w(&mut self, bridges: &Bridges, bus_v: f64) -> f64 {
+        self.short_a = 0.0;
+        if self.shorted_phase.is_none() && !self.broken_down {
+            return 0.0;
+        }
+        let short_v = match (self.shorted_phase, bridges) {
+            (Some(phase), Bridges::Driven(duty)) => duty[phase as usize].clamp(-1.0, 1.0) * bus_v,
+            _ => 0.0,
+        };
+        self.short_a = short_v / (SHORT_OHM + self.model.rig.switch_resistance_ohm);
+        let breakdown_w = if self.broken_down { bus_v * bus_v / BREAKDOWN_OHM } else { 0.0 };
+        short_v * self.short_a + breakdown_w
     }
 
     /// Heat of the last steps into the bodies, the windings' resistance, and the magnets' direction afresh.
@@ -112,9 +152,14 @@ impl StepperMotor {
     /// What the sensors read now.
     #[inline]
     pub fn sense(&self) -> Sensors {
+        let mut phase_current_a = self.stepper.current_a;
+        if let Some(phase) = self.shorted_phase {
+            phase_current_a[phase as usize] = self.short_a;
+        }
         Sensors {
-            phase_current_a: self.stepper.current_a,
+            phase_current_a,
             bus_v: self.rig.supply.bus_v,
+            bus_current_a: self.bus_current_a,
             winding_c: self.rig.winding.temperature_c,
             heat_sink_c: self.rig.heat_sink.temperature_c,
         }

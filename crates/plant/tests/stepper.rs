@@ -32,6 +32,7 @@ impl Bench {
             bridges,
             bus_v: self.bus_v,
             lost_phase: self.lost_phase,
+            shorted_phase: None,
             resistance_ohm: RESISTANCE_OHM,
             turn,
         };
@@ -73,6 +74,7 @@ fn holding_torque_at_the_rated_current_is_the_manuals() {
                 bridges: Bridges::Regulated([2.2, 0.0]),
                 bus_v: 24.0,
                 lost_phase: None,
+                shorted_phase: None,
                 resistance_ohm: RESISTANCE_OHM,
                 turn,
             };

@@ -257,6 +257,38 @@ fn a_lost_phase_shows_in_the_currents() {
 }
 
 #[test]
+fn touching_wires_draw_voltage_over_their_contact_and_brake_a_turned_rotor() {
+    let mut motor = motor(StepperMotorModel::ZLIM42_C_70);
+    motor.shorted_phase = Some(Phase::B);
+    motor.step(DT_S, &Bridges::Driven([0.0, 0.5]));
+    // 12 V over 1 ohm of contact and 0.2 ohm of switches; the other phase has nothing.
+    let sensed = motor.sense();
+    assert!(near(sensed.phase_current_a[1], 10.0, 0.01) && sensed.phase_current_a[0].abs() < 1e-9, "{sensed:?}");
+    assert!(near(sensed.bus_current_a, 5.0, 0.01), "{sensed:?}");
+    // Open bridges feed no contact, and a rotor that is turned feels its shorted winding.
+    let coasting = |shorted: Option<Phase>| {
+        let mut motor = self::motor(StepperMotorModel::ZLIM42_C_70);
+        motor.shorted_phase = shorted;
+        motor.rotor.velocity_rad_s = 100.0;
+        (0..200).for_each(|_| motor.step(DT_S, &Bridges::Open));
+        assert_eq!(motor.sense().phase_current_a, [0.0; 2]);
+        motor.rotor.velocity_rad_s
+    };
+    assert!(coasting(Some(Phase::A)) < 0.8 * coasting(None));
+}
+
+#[test]
+fn a_transistor_that_has_broken_down_takes_current_from_the_bus_and_the_energies_close() {
+    let mut motor = motor(StepperMotorModel::ZLIM42_C_70);
+    let before = motor.stored_j() - motor.rig.energy.balance_j();
+    motor.broken_down = true;
+    (0..2000).for_each(|_| motor.step(DT_S, &Bridges::Open));
+    // 5 ohm behind 0.1 ohm of the source.
+    assert!(near(motor.sense().bus_current_a, 24.0 / 5.1, 0.01), "{:?}", motor.sense());
+    assert!((motor.stored_j() - motor.rig.energy.balance_j() - before).abs() < 1e-9);
+}
+
+#[test]
 fn halved_steps_lead_to_the_same_motion() {
     let play = |dt_s: f64| {
         let mut motor = motor(FREE);

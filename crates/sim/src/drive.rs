@@ -189,6 +189,10 @@ pub enum Component {
     Reference,
     /// A motor phase, open.
     Phase,
+    /// A motor phase, its wires touching.
+    Short,
+    /// The power stage: a transistor that has broken down takes current from the bus.
+    Bridge,
 }
 
 /// What a controller sends to a drive's pulse inputs.

@@ -13,8 +13,10 @@ enum Cause {
 }
 
 /// Cause, code, what the table of lights calls it, error register.
-const CAUSES: [(Cause, u16, &str, u8); 4] = [
+const CAUSES: [(Cause, u16, &str, u8); 6] = [
     (Cause::OverVoltage, 0xFF01, "over_voltage", 0x05),
+    (Cause::Broken(Component::Short), 0xFF02, "over_current", 0x03),
+    (Cause::Broken(Component::Bridge), 0xFF02, "bus_over_current", 0x03),
     (Cause::Broken(Component::Phase), 0xFF04, "phase_loss", 0x81),
     (Cause::Broken(Component::Reference), 0xFF08, "internal_reference", 0x81),
     (Cause::Broken(Component::Eeprom), 0xFF10, "eeprom", 0x81),
@@ -67,8 +69,8 @@ fn a_rising_bit_7_or_2011h_resets_a_fault_whose_cause_is_gone() {
                 }
                 bench.statusword() & 0xFF
             };
-            // A free motor cannot tell whether its wire is back: that fault alone comes again only with the current.
-            let unseen = matches!(cause, Cause::Broken(Component::Phase));
+            // A free motor cannot tell how its wires are: such a fault comes again with the current only.
+            let unseen = matches!(cause, Cause::Broken(Component::Phase | Component::Short));
             assert_eq!(reset(&mut bench), if unseen { 0x70 } else { 0x98 }, "{cause:?} is still there");
             set(&mut bench, cause, false);
             assert_eq!(reset(&mut bench), 0x70, "{cause:?}");
@@ -87,7 +89,7 @@ fn the_red_light_flashes_as_often_as_the_manual_counts() {
         let mut bench = faulty(cause);
         // Two pauses and what lies between: count the flashes between two long dark times.
         let (mut flashes, mut counts, mut dark_ms, mut was_on) = (0, Vec::new(), 0, false);
-        for _ in 0..8000 {
+        for _ in 0..12_000 {
             bench.run_ms(1);
             let led = bench.machine().assembly().actuation().led;
             assert!(led.green);
@@ -100,6 +102,48 @@ fn the_red_light_flashes_as_often_as_the_manual_counts() {
         }
         let expected = figure("fault", &format!("{code:04X}"), name) as u32;
         assert!(counts.len() >= 3 && counts[1..].iter().all(|count| *count == expected), "{cause:?}: {counts:?}");
+    }
+}
+
+#[test]
+fn touching_wires_and_a_broken_transistor_trip_the_drive_in_every_state_that_feeds_them() {
+    // Enabled, only locked (200Bh), and free: a short circuit needs a voltage at the wires, a breakdown of the bridge does not.
+    for (component, codes) in [(Component::Short, [0xFF02, 0xFF02, 0]), (Component::Bridge, [0xFF02; 3])] {
+        for (state, code) in ["enabled", "locked", "free"].into_iter().zip(codes) {
+            let mut bench = Bench::new();
+            match state {
+                "enabled" => bench.enable_in(1),
+                "locked" => bench.set(0x200B, 0, 1),
+                _ => {}
+            }
+            bench.run_ms(50);
+            set(&mut bench, Cause::Broken(component), true);
+            assert_eq!(bench.get(0x603F, 0), code, "{component:?}, {state}");
+            assert_eq!(bench.report().current_a == 0.0, state == "free" || code != 0, "{component:?}, {state}");
+        }
+    }
+}
+
+#[test]
+fn the_current_of_hard_work_is_no_bus_over_current() {
+    // Nearly what the longer motor can carry, at the highest setting.
+    let mut bench = Bench::long();
+    bench.set(0x2005, 0, 7);
+    bench.set(0x6083, 0, 2000);
+    bench.enable_in(3);
+    for (rpm, most_nm) in [(120, 0.4), (300, 0.35), (600, 0.2)] {
+        bench.set(0x60FF, 0, rpm);
+        bench.run_ms(2100);
+        for part in 1..=10 {
+            let torque_nm = most_nm * f64::from(part) / 10.0;
+            bench.operate(|drive, now| drive.set_load_torque(torque_nm, now)).expect("a torque");
+            bench.run_ms(100);
+        }
+        let report = bench.report();
+        let lag = report.position - report.rotor_position.expect("known here");
+        assert!((0..80).contains(&lag), "it carries the load at {rpm} r/min: {lag} pulses");
+        bench.operate(|drive, now| drive.set_load_torque(0.0, now)).expect("a torque");
+        assert_eq!(bench.get(0x603F, 0), 0, "{rpm} r/min");
     }
 }
 

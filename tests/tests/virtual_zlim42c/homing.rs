@@ -3,6 +3,7 @@
 //! The track, in pulses from where the rotor stands at power-on: limits from ±8000 outwards, home from -400 to 400.
 //! X0 is the home switch, X1 the positive and X2 the negative limit.
 
+use ferrodrive_tests::seeded::Seeded;
 use ferrodrive_tests::zlim42c::{HomingResult, homing_runs};
 use sim::SwitchRange;
 
@@ -209,5 +210,54 @@ fn a_switch_on_any_input_reversed_too_is_found() {
         assert_eq!(bench.statusword() & BITS, 1 << 8 | 1 << 10, "X{input}");
         let zero = shaft_pulses(&mut bench) - bench.report().position as f64;
         assert_within("pulses before the edge", 2000.0 - zero, *FILTER_WAY.start(), *FILTER_WAY.end());
+    }
+}
+
+/// Home and limits anywhere around the rotor, any microsteps, any of the two speeds: the edge that the method names is
+/// found, as far beyond it as the filter's 10 ms are at 6099h:02.
+#[test]
+fn any_start_and_any_speed_leads_to_the_edge_of_the_method() {
+    for seed in 0..60 {
+        let mut seeded = Seeded::new(seed);
+        let mut up_to = |most: usize| seeded.below(most) as i64;
+        let (setting, pulses_per_turn) = [(10, 4000), (4, 3200), (13, 10_000), (9, 2000)][up_to(4) as usize];
+        let (search_rpm, latch_rpm, offset) = (60 + up_to(400), 5 + up_to(90), up_to(20_000) - 10_000);
+        // The home switch is wide enough for the filter to see it at the speed of the search.
+        let (half, end) = (search_rpm * pulses_per_turn / 60 / 50 + up_to(200), 4 * pulses_per_turn);
+        let start = up_to(3 * end as usize) - end - end / 2;
+        for method in [17, 18, 24, 29] {
+            let at = format!("seed {seed}, method {method} from {start}");
+            let mut bench = Bench::new();
+            let track = [(Some(-half), Some(half)), (Some(end), None), (None, Some(-end))];
+            bench.set(0x2006, 0, setting);
+            for (n, (low, high)) in track.into_iter().enumerate() {
+                let shifted = |edge: Option<i64>| edge.map(|edge| edge - start);
+                let range = SwitchRange { low: shifted(low), high: shifted(high) };
+                bench.operate(|drive, now| drive.set_switch(n, range, now)).expect("an input");
+                bench.set(0x2030, 2 + n as u8, n as i64 + 1);
+            }
+            for (index, sub, value) in [(0x6099, 1, search_rpm), (0x6099, 2, latch_rpm), (0x607C, 0, offset)] {
+                bench.set(index, sub, value);
+            }
+            bench.set(0x6098, 0, method);
+            bench.enable_in(6);
+            bench.run_ms(50);
+            bench.set(0x6040, 0, 0x1F);
+            let attained = |report: &sim::Report| report.statusword.is_some_and(|word| word & BITS == 1 << 8 | 1 << 10);
+            bench.seconds_until(200.0, std::time::Duration::from_millis(10), attained);
+            bench.run_ms(100);
+            let (edge, direction) = match method {
+                17 => (-end, 1.0),
+                18 => (end, -1.0),
+                _ => (-half, 1.0),
+            };
+            let report = bench.report();
+            let turned = report.shaft_angle_rad / std::f64::consts::TAU * pulses_per_turn as f64;
+            let zero = start as f64 + turned - report.position as f64 - offset as f64;
+            let pulses_ms = (latch_rpm * pulses_per_turn) as f64 / 60_000.0;
+            // What the rotor swings about its place: a few hundredths of a full step.
+            let swing = 0.002 * pulses_per_turn as f64;
+            assert_within(&at, (zero - edge as f64) * direction, 9.0 * pulses_ms - swing, 11.5 * pulses_ms + swing);
+        }
     }
 }

@@ -55,8 +55,6 @@ pub struct Peaks {
     pub current_a: [f32; 2],
     /// Asked for, A, without sign.
     pub reference_a: [f32; 2],
-    /// Drawn from the bus, A: the mean.
-    pub bus_a: f32,
 }
 
 /// State of the vector and its loops.
@@ -174,7 +172,7 @@ impl Stepper {
         self.q.settle(&gains.current, error_q, wanted_q, given_q, model.control_period_s);
 
         let duty = if bus_v > 0.0 { [v_a / bus_v, v_b / bus_v] } else { [0.0; 2] };
-        self.note_peaks(model, current_a, [self.amplitude_a * cos, self.amplitude_a * sin], duty);
+        self.note_peaks(current_a, [self.amplitude_a * cos, self.amplitude_a * sin]);
         duty
     }
 
@@ -208,14 +206,12 @@ impl Stepper {
         self.issued = due;
     }
 
-    fn note_peaks(&mut self, model: &StepperModel, current_a: [f32; 2], reference_a: [f32; 2], duty: [f32; 2]) {
+    fn note_peaks(&mut self, current_a: [f32; 2], reference_a: [f32; 2]) {
         let larger = |most: f32, now: f32| if now.abs() > most { now.abs() } else { most };
         for phase in 0..2 {
             self.peaks.current_a[phase] = larger(self.peaks.current_a[phase], current_a[phase]);
             self.peaks.reference_a[phase] = larger(self.peaks.reference_a[phase], reference_a[phase]);
         }
-        let bus_a = duty[0] * current_a[0] + duty[1] * current_a[1];
-        self.peaks.bus_a += bus_a / f32::from(model.periods_per_command.max(1));
     }
 }
 

@@ -47,6 +47,8 @@ pub struct Zlim42c {
     controlword: Controlword,
     faults: FaultMonitor<FAULT_COUNT>,
     phases: PhaseWatch,
+    /// Current from the bus, A: its mean, growing through the supervision period.
+    bus_a: f32,
     /// The fault that 603Fh and the red light tell of: the last that came.
     shown_fault: Option<usize>,
     eeprom_ok: bool,
@@ -76,6 +78,7 @@ impl Zlim42c {
             controlword: Controlword(0),
             faults: FaultMonitor::new(&FAULTS),
             phases: PhaseWatch::default(),
+            bus_a: 0.0,
             shown_fault: None,
             eeprom_ok: true,
             inputs: Inputs::default(),
@@ -246,7 +249,7 @@ impl Zlim42c {
         self.eeprom_ok = sensors.eeprom_ok;
         let (peaks, speed_rpm) = (self.stepper.take_peaks(), self.velocity_rpm());
         let situation = Situation {
-            bus_a: peaks.bus_a,
+            bus_a: core::mem::take(&mut self.bus_a),
             phase_lost: self.phases.observe(&peaks, self.stepper.reference_a(), speed_rpm),
             eeprom_readable: self.store.is_readable(),
             latched: self.faults.latched(),
@@ -482,6 +485,7 @@ impl Firmware for Zlim42c {
         if is_over_current(sensors) && self.faults.raise(row::OVER_CURRENT) {
             self.fall(FaultSet::row(row::OVER_CURRENT), now);
         }
+        self.bus_a += sensors.bus_current_a / f32::from(SUPERVISION_DIVIDER);
         self.periods += 1;
         if self.periods >= SUPERVISION_DIVIDER {
             self.periods = 0;

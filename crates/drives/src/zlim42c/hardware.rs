@@ -11,6 +11,8 @@ pub struct Sensors {
     pub phase_current_a: [f32; 2],
     /// Voltage of the direct-voltage bus.
     pub bus_v: f32,
+    /// Current that the bridges take from the bus, A.
+    pub bus_current_a: f32,
     /// The reference of the current measurement; [`REFERENCE_V`](super::readings::REFERENCE_V) when sound.
     pub reference_v: f32,
     /// Levels of inputs X0 to X3; an unconnected input is low.
@@ -25,6 +27,7 @@ impl Default for Sensors {
         Self {
             phase_current_a: [0.0; 2],
             bus_v: 24.0,
+            bus_current_a: 0.0,
             reference_v: super::readings::REFERENCE_V,
             inputs: [false; 4],
             eeprom_ok: true,

@@ -8,6 +8,7 @@ use crate::engine::stepper::Peaks;
 
 /// What the causes are judged by, besides the sensors.
 pub(super) struct Situation {
+    /// Current from the bus, A, mean over the supervision period.
     pub(super) bus_a: f32,
     pub(super) phase_lost: bool,
     pub(super) eeprom_readable: bool,

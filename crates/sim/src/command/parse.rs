@@ -31,7 +31,7 @@ const LOAD: &str = "NODE load torque N·m, or NODE load inertia kg·m²";
 const ROTOR: &str = "NODE rotor lock|free";
 const SUPPLY: &str = "NODE supply VOLTS";
 const TEMPERATURE: &str = "NODE temperature motor|driver CELSIUS|auto";
-const FAULT: &str = "NODE fault hall|encoder|eeprom|reference|phase on|off";
+const FAULT: &str = "NODE fault hall|encoder|eeprom|reference|phase|short|bridge on|off";
 const BATTERY: &str = "NODE battery on|off";
 const PULSES: &str = "NODE pulses COUNT HZ";
 const QUADRATURE: &str = "NODE quadrature COUNT HZ";
@@ -143,6 +143,8 @@ fn parse_fault(arguments: &[&str]) -> Result<Action, CommandError> {
         "eeprom" => Component::Eeprom,
         "reference" => Component::Reference,
         "phase" => Component::Phase,
+        "short" => Component::Short,
+        "bridge" => Component::Bridge,
         _ => return Err(CommandError::Usage(FAULT)),
     };
     Ok(Action::Fault(component, choice(&[state], "on", "off", FAULT)?))
@@ -214,6 +216,8 @@ mod tests {
         assert_eq!(action("4 fault eeprom on"), Action::Fault(Component::Eeprom, true));
         assert_eq!(action("4 fault reference on"), Action::Fault(Component::Reference, true));
         assert_eq!(action("4 fault phase on"), Action::Fault(Component::Phase, true));
+        assert_eq!(action("4 fault short on"), Action::Fault(Component::Short, true));
+        assert_eq!(action("4 fault bridge off"), Action::Fault(Component::Bridge, false));
         assert_eq!(action("4 battery off"), Action::Battery(false));
         assert_eq!(action("4 pulses 8192 10000"), Action::Pulses(PulseTrain::Pulses { count: 8192, hz: 1e4 }));
         assert_eq!(action("4 quadrature -400 1e3"), Action::Pulses(PulseTrain::Quadrature { count: -400, hz: 1e3 }));
@@ -274,8 +278,8 @@ mod tests {
                 "4 temperature motor -300",
                 "\"-300\" is no temperature; expected: NODE temperature motor|driver CELSIUS|auto",
             ),
-            ("4 fault hall", "expected: NODE fault hall|encoder|eeprom|reference|phase on|off"),
-            ("4 fault fuse on", "expected: NODE fault hall|encoder|eeprom|reference|phase on|off"),
+            ("4 fault hall", "expected: NODE fault hall|encoder|eeprom|reference|phase|short|bridge on|off"),
+            ("4 fault fuse on", "expected: NODE fault hall|encoder|eeprom|reference|phase|short|bridge on|off"),
             ("4 battery low", "expected: NODE battery on|off"),
             ("4 pulses 5", "expected: NODE pulses COUNT HZ"),
             ("4 pulses 1.5 100", "\"1.5\" is no count; expected: NODE pulses COUNT HZ"),

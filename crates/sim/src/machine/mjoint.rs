@@ -230,6 +230,7 @@ impl Assembly for Joint {
         match component {
             Component::Hall => return absent("Hall sensors: its encoder is absolute"),
             Component::Reference => return absent("reference voltage that it watches: no alarm tells of one"),
+            Component::Short | Component::Bridge => return absent("short circuit to simulate"),
             Component::Encoder => {
                 let now = self.encoder_reading(self.motor.sense().position_counts);
                 self.last_reading = broken.then_some(now);

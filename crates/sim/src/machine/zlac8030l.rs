@@ -160,6 +160,9 @@ impl Assembly for HubWheel {
             Component::Eeprom => self.eeprom_broken = broken,
             Component::Reference => self.reference_broken = broken,
             Component::Phase => self.motor.lost_phase = broken.then_some(Phase::U),
+            Component::Short | Component::Bridge => {
+                return Err(Refused::Absent { model: Self::MODEL, what: "short circuit to simulate" });
+            }
         }
         Ok(())
     }

@@ -132,6 +132,7 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
         Sensors {
             phase_current_a: sensed.phase_current_a.map(|current_a| current_a as f32),
             bus_v: sensed.bus_v as f32,
+            bus_current_a: sensed.bus_current_a as f32,
             reference_v: if self.reference_broken { 0.0 } else { REFERENCE_V },
             inputs: [0, 1, 2, 3].map(|n| inputs >> n & 1 != 0),
             eeprom_ok: !self.eeprom_broken,
@@ -215,6 +216,8 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
             Component::Eeprom => self.eeprom_broken = broken,
             Component::Reference => self.reference_broken = broken,
             Component::Phase => self.motor.lost_phase = broken.then_some(Phase::A),
+            Component::Short => self.motor.shorted_phase = broken.then_some(Phase::A),
+            Component::Bridge => self.motor.broken_down = broken,
         }
         Ok(())
     }
