@@ -242,8 +242,8 @@ mod tests {
             ("99999999999999999999 get", "\"99999999999999999999\" is no node number; expected 1 to 127"),
             (
                 "4",
-                "unknown command \"\" for a node; expected power, input, switch, load, rotor, supply, temperature, \
-                 fault, battery, pulses, quadrature, duty, clock, cable or get",
+                "nothing to do is said after node 4; expected power, input, switch, load, rotor, supply, temperature, \
+                 fault, battery, pulses, quadrature, duty, clock, cable or get, as in: 4 get",
             ),
             (
                 "4 Power on",
