@@ -82,7 +82,7 @@ pub enum CommandError {
     /// A node number and nothing after it.
     #[error(
         "nothing to do is said after node {0}; expected power, input, switch, load, rotor, supply, temperature, fault, \
-         battery, pulses, quadrature, duty, cable or get, as in: {0} get"
+         battery, pulses, quadrature, duty, clock, cable or get, as in: {0} get"
     )]
     NoAction(u8),
     /// A node number and something unknown after it.
