@@ -148,7 +148,7 @@ impl<const N: usize> Node<N> {
     /// Puts the objects 1000h to 1FFFh to factory values. They take effect with [`boot`](Self::boot).
     pub fn restore_communication_defaults(&mut self) {
         let rows = self.profile.table.iter();
-        for (slot, _) in rows.filter(|(_, row)| objects::is_communication(row.index)) {
+        for (slot, _) in rows.filter(|(_, row)| row.is_communication()) {
             self.dictionary.restore_default(slot, self.node_id);
         }
     }

@@ -12,11 +12,6 @@ use crate::pdo::{
 };
 use crate::{AbortCode, CobId, Mux, cob};
 
-/// True for the communication profile area.
-pub(super) const fn is_communication(index: u16) -> bool {
-    matches!(index, 0x1000..=0x1FFF)
-}
-
 /// A PDO record of a multiplexor.
 #[derive(Clone, Copy)]
 enum Record {

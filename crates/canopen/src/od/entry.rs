@@ -201,6 +201,11 @@ impl Entry {
         Mux::new(self.index, self.sub_index)
     }
 
+    /// Of the communication profile area, 1000h to 1FFFh.
+    pub const fn is_communication(&self) -> bool {
+        matches!(self.index, 0x1000..=0x1FFF)
+    }
+
     /// The text of a VISIBLE_STRING; `None` for a number.
     pub const fn constant_text(&self) -> Option<&'static str> {
         match (self.data_type, self.default) {

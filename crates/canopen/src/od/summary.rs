@@ -21,13 +21,12 @@ impl Summary {
     pub(super) const fn of(row: &Entry) -> Self {
         let is_text = matches!(row.data_type, DataType::VisibleString);
         let unused = if is_text { 0 } else { MAX_SIZE - row.data_type.size() as u8 };
-        let is_communication = matches!(row.index, 0x1000..=0x1FFF);
         Self(
             unused
                 | flag(TEXT, is_text)
                 | flag(READABLE, row.access.is_readable())
                 | flag(WRITABLE, row.access.is_writable() && !is_text)
-                | flag(COMMUNICATION, is_communication)
+                | flag(COMMUNICATION, row.is_communication())
                 | flag(BOUNDED, row.limits.is_some() || !row.values.is_empty())
                 | flag(CHECKED, row.check.is_some()),
         )

@@ -22,6 +22,27 @@ pub struct FaultRow {
     pub debounce: u16,
 }
 
+impl FaultRow {
+    /// A fault whose EMCY error code is the value of the drive's fault code object.
+    pub const fn new(code: u16, name: &'static str, error_register: u8, debounce: u16, remedy: &'static str) -> Self {
+        Self { code, name, remedy, error_register, emcy: EmcyErrorCode(code), debounce }
+    }
+}
+
+/// Bits of the error register 1001h (CiA 301, 7.5.2.2). Bit 0, generic, is set with each.
+pub mod error_register {
+    /// Current.
+    pub const CURRENT: u8 = 1 << 1;
+    /// Voltage.
+    pub const VOLTAGE: u8 = 1 << 2;
+    /// Temperature.
+    pub const TEMPERATURE: u8 = 1 << 3;
+    /// Device profile specific.
+    pub const PROFILE: u8 = 1 << 5;
+    /// Manufacturer specific.
+    pub const MANUFACTURER: u8 = 1 << 7;
+}
+
 /// A set of faults: bit *n* is row *n* of the drive's table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FaultSet(pub u32);
@@ -55,6 +76,25 @@ impl FaultSet {
     pub fn rows(self) -> impl Iterator<Item = usize> {
         (0..32).filter(move |row| self.has(*row))
     }
+}
+
+/// True if a reading is above a limit. A reading that is no number is no sound reading.
+#[allow(clippy::neg_cmp_op_on_partial_ord, reason = "NaN is not at most anything")]
+#[inline]
+pub fn exceeds(value: f32, limit: f32) -> bool {
+    !(value <= limit)
+}
+
+/// The same for a fault that, once latched, ends only `hysteresis` below the limit.
+#[inline]
+pub fn exceeds_with_hysteresis(value: f32, limit: f32, hysteresis: f32, latched: bool) -> bool {
+    exceeds(value, if latched { limit - hysteresis } else { limit })
+}
+
+/// True if a reading is near its nominal value.
+#[inline]
+pub fn within(value: f32, nominal: f32, tolerance: f32) -> bool {
+    (value - nominal).abs() <= tolerance
 }
 
 /// Debounce counters and the latch, for a table of `N` rows.
@@ -104,6 +144,11 @@ impl<const N: usize> FaultMonitor<N> {
     pub fn forget(&mut self, row: usize) -> bool {
         self.present = FaultSet(self.present.0 & !FaultSet::row(row).0);
         self.latched.has(row)
+    }
+
+    /// A row of the table.
+    pub const fn row(&self, row: usize) -> &'static FaultRow {
+        &self.table[row]
     }
 
     /// The latched faults.

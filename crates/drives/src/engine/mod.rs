@@ -12,6 +12,7 @@
 pub mod axis;
 pub mod bleeder;
 pub mod demand;
+pub mod device;
 pub mod faults;
 pub mod host_watchdog;
 pub mod inputs;

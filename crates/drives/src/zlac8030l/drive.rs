@@ -3,10 +3,9 @@
 //! Three rhythms: frames as they come (`handle_frame`), the communication task every 0.5 ms (`handle_timeout`), and the
 //! control period of 50 us ([`Firmware::tick`]), of which every tenth is a supervision period.
 
-use can::{Bitrate, Frame, Instant, Station};
-use canopen::node::{Node, NodeEvent, NodeProfile};
-use canopen::od::{Entry, Slot};
-use canopen::{EmcyErrorCode, NodeId};
+use can::{Bitrate, Instant};
+use canopen::node::{Node, NodeProfile, Via};
+use canopen::od::Slot;
 use cia402::{Controlword, ModeOfOperation, PowerState};
 use motion::filter::{LowPass, LowPassGains};
 
@@ -18,15 +17,16 @@ use super::parameters::Parameters;
 use super::protection::{Protection, Situation, is_over_current};
 use super::readings::*;
 use super::statusword::statusword;
-use super::terminals::{self, Signals};
+use super::terminals::{self, TERMINALS};
 use super::{Values, restart, storage};
 use crate::engine::axis::{Axis, Demand, Feedback, Targets};
 use crate::engine::bleeder::Bleeder;
+use crate::engine::device::{self, Application, Device};
 use crate::engine::faults::{FaultMonitor, FaultSet};
 use crate::engine::host_watchdog::HostWatchdog;
 use crate::engine::inputs::Inputs;
 use crate::engine::servo::Servo;
-use crate::engine::storage::Store;
+use crate::zl::terminals::Conditions;
 use crate::{Firmware, Report, zl};
 
 /// How this drive communicates.
@@ -35,12 +35,9 @@ pub static NODE_PROFILE: NodeProfile = zl::node_profile(&TABLE);
 /// The firmware of a ZLAC8030L V2.0.
 #[derive(Clone)]
 pub struct Zlac8030l {
-    node: Node<ROW_COUNT>,
-    store: Store,
+    device: Device<ROW_COUNT>,
     dip_address: u8,
-    running: bool,
-    /// 200Eh and 202F:05 as they were at the last restart.
-    bitrate: Bitrate,
+    /// 202F:05 as it was at the last restart.
     velocity_resolution: u16,
     parameters: Parameters,
     parameters_changed: bool,
@@ -54,7 +51,6 @@ pub struct Zlac8030l {
     position_offset: i32,
     faults: FaultMonitor<FAULT_COUNT>,
     protection: Protection,
-    eeprom_ok: bool,
     inputs: Inputs<2>,
     external_stop: bool,
     outputs: [bool; 2],
@@ -63,22 +59,22 @@ pub struct Zlac8030l {
     shown_velocity_rpm: LowPass,
     shown_current_a: LowPass,
     periods: u8,
-    next_task: Instant,
 }
 
 impl Zlac8030l {
     /// A drive without supply. [`Firmware::power_on`] starts it.
     pub fn new() -> Self {
-        let node = Node::new(&NODE_PROFILE, NodeId::MIN);
-        let parameters = Parameters::from(node.dictionary());
+        Self::over(Device::new(&NODE_PROFILE, Bitrate::K500, storage::factory(), COMMUNICATION_PERIOD_NS))
+    }
+
+    /// Motor free, position 0, and the values of `device` in effect.
+    fn over(device: Device<ROW_COUNT>) -> Self {
+        let parameters = Parameters::from(device.values());
         Self {
             servo: Servo::new(&parameters.model, 0, 0),
-            node,
-            store: Store::new(storage::factory()),
+            velocity_resolution: device.values().get(VELOCITY_RESOLUTION),
+            device,
             dip_address: 0,
-            running: false,
-            bitrate: Bitrate::K500,
-            velocity_resolution: 1,
             parameters,
             parameters_changed: false,
             axis: Axis::new(&[]),
@@ -88,7 +84,6 @@ impl Zlac8030l {
             position_offset: 0,
             faults: FaultMonitor::new(&FAULTS),
             protection: Protection::default(),
-            eeprom_ok: true,
             inputs: Inputs::default(),
             external_stop: false,
             outputs: [false; 2],
@@ -97,13 +92,12 @@ impl Zlac8030l {
             shown_velocity_rpm: LowPass::default(),
             shown_current_a: LowPass::default(),
             periods: 0,
-            next_task: Instant::ZERO,
         }
     }
 
     /// The values of the objects, to look at.
     pub fn values(&self) -> &Values {
-        self.node.dictionary()
+        self.device.values()
     }
 
     /// What the control loops are asked for, to look at.
@@ -113,71 +107,7 @@ impl Zlac8030l {
 
     /// The communication side, to look at.
     pub const fn node(&self) -> &Node<ROW_COUNT> {
-        &self.node
-    }
-
-    /// Starts the firmware over: stored values, node-ID and bit rate anew, motor free, position 0.
-    fn restart(&mut self, now: Instant) {
-        let mut values = Values::new(&TABLE, NodeId::MIN);
-        // An unreadable store leaves factory values; the fault follows with the first look at the sensors.
-        let _ = self.store.load(&mut values, |_| true);
-        let node_id = restart::node_id(self.dip_address, &values);
-        let mut started = Self::new();
-        started.node = Node::new(&NODE_PROFILE, node_id);
-        let _ = self.store.load(started.node.dictionary_mut(), |_| true);
-        started.store = self.store.clone();
-        started.dip_address = self.dip_address;
-        started.running = true;
-        started.bitrate = restart::bitrate(started.values());
-        started.velocity_resolution = started.values().get(VELOCITY_RESOLUTION);
-        started.parameters = Parameters::from(started.values());
-        started.next_task = now.plus_nanos(COMMUNICATION_PERIOD_NS);
-        started.axis.self_test_done();
-        *self = started;
-        self.publish_status();
-        self.node.boot(now);
-    }
-
-    /// NMT reset communication: 1000h to 1FFFh as at power-on; motor and node-ID go on.
-    fn restart_communication(&mut self, now: Instant) {
-        self.node.restore_communication_defaults();
-        let _ = self.store.load(self.node.dictionary_mut(), is_communication);
-        self.node.boot(now);
-        self.publish_error_register();
-    }
-
-    fn handle_events(&mut self, now: Instant) {
-        let mut commanded = false;
-        while let Some(event) = self.node.poll_event() {
-            match event {
-                NodeEvent::Written { slot, raw, .. } => {
-                    self.written(slot, raw, now);
-                    commanded |= matches!(effect(slot), Effect::Command | Effect::SelectMode);
-                }
-                NodeEvent::ResetNode => self.restart(now),
-                NodeEvent::ResetCommunication => self.restart_communication(now),
-                NodeEvent::Nmt(_) | NodeEvent::Sync | NodeEvent::RpdoTooShort(_) => {}
-            }
-        }
-        // Once for all that one frame commands.
-        if commanded {
-            self.publish_status();
-        }
-    }
-
-    /// A peer wrote `raw` to `slot`.
-    fn written(&mut self, slot: Slot, raw: u32, now: Instant) {
-        if self.values().get(SAVE_ON_WRITE) == 0 {
-            self.store.mark(&TABLE, slot);
-        }
-        match effect(slot) {
-            Effect::Command => self.command(Controlword(raw as u16), now),
-            Effect::SelectMode => self.axis.request_mode(ModeOfOperation(raw as u8 as i8)),
-            Effect::Registers => self.registers(raw, now),
-            Effect::ClearPosition => self.clear_position(slot, raw),
-            Effect::Target => {}
-            Effect::Parameter => self.parameters_changed = true,
-        }
+        self.device.node()
     }
 
     fn command(&mut self, controlword: Controlword, now: Instant) {
@@ -192,30 +122,13 @@ impl Zlac8030l {
         }
     }
 
-    /// 2009h: reads 0 again when it is done.
+    /// Save or restore. An EEPROM fault ends with the factory settings.
     fn registers(&mut self, command: u32, now: Instant) {
-        match command {
-            1 => self.restore_factory_settings(now),
-            2 => self.store.mark_all(&TABLE),
-            _ => {}
-        }
-        self.node.dictionary_mut().set(REGISTER_PARAMETER_SETTING, 0);
-    }
-
-    /// Everything in the EEPROM becomes as delivered. Parameters take effect at once, communication objects with the next
-    /// restart: until then they show what the drive does. An EEPROM fault ends with it.
-    fn restore_factory_settings(&mut self, now: Instant) {
-        if !self.eeprom_ok {
-            return;
-        }
-        let node_id = self.node.node_id();
-        self.store.format(&Values::new(&TABLE, node_id));
-        for (slot, _) in TABLE.iter().filter(|(_, row)| row.stored && !is_communication(row)) {
-            self.node.dictionary_mut().restore_default(slot, node_id);
-        }
-        self.parameters_changed = true;
-        if self.faults.forget(row::EEPROM) {
-            self.reset_faults(now);
+        if zl::register_command(&mut self.device, REGISTER_PARAMETER_SETTING, command) {
+            self.parameters_changed = true;
+            if self.faults.forget(row::EEPROM) {
+                self.reset_faults(now);
+            }
         }
     }
 
@@ -229,9 +142,9 @@ impl Zlac8030l {
             if let Demand::Position(point) = &mut self.demand {
                 point.position = point.position.wrapping_sub(position);
             }
-            self.node.dictionary_mut().set(POSITION_ACTUAL_VALUE, 0);
+            self.device.values_mut().set(POSITION_ACTUAL_VALUE, 0);
         }
-        self.node.dictionary_mut().set_raw(slot, 0);
+        self.device.values_mut().set_raw(slot, 0);
     }
 
     fn position(&self) -> i32 {
@@ -243,13 +156,13 @@ impl Zlac8030l {
     }
 
     fn watch_faults(&mut self, sensors: &Sensors, now: Instant) {
-        self.eeprom_ok = sensors.eeprom_ok;
+        self.device.set_eeprom_ok(sensors.eeprom_ok);
         let situation = Situation {
             servo: &self.servo,
             demand: &self.demand,
             position: self.position(),
             velocity_rpm: self.velocity_rpm(),
-            eeprom_readable: self.store.is_readable(),
+            eeprom_sound: self.device.is_eeprom_sound(),
             latched: self.faults.latched(),
         };
         let causes = self.protection.causes(&self.parameters, sensors, &situation);
@@ -268,11 +181,8 @@ impl Zlac8030l {
         }
         self.axis.fault();
         self.demand = Demand::Off;
-        self.node.dictionary_mut().set(ERROR_CODE, self.faults.code_bits());
-        for row in new.rows() {
-            let register = self.faults.error_register();
-            self.node.raise_emcy(FAULTS[row].emcy, register, [0; 5], now);
-        }
+        self.device.values_mut().set(ERROR_CODE, self.faults.code_bits());
+        self.device.tell_faults(new, &self.faults, now);
         self.publish_status();
     }
 
@@ -280,11 +190,10 @@ impl Zlac8030l {
     fn reset_faults(&mut self, now: Instant) {
         self.protection.reset();
         let all_gone = self.faults.reset();
-        self.node.dictionary_mut().set(ERROR_CODE, self.faults.code_bits());
-        self.publish_error_register();
+        self.device.values_mut().set(ERROR_CODE, self.faults.code_bits());
+        self.device.tell_reset(&self.faults, now);
         if all_gone {
             self.axis.reset_fault();
-            self.node.raise_emcy(EmcyErrorCode::NO_ERROR, 0, [0; 5], now);
         }
         self.publish_status();
     }
@@ -314,7 +223,7 @@ impl Zlac8030l {
         if !self.parameters_changed {
             return;
         }
-        let mut parameters = Parameters::from(self.node.dictionary());
+        let mut parameters = Parameters::from(self.device.values());
         if self.demand == Demand::Off {
             self.parameters_changed = false;
             let position = self.position();
@@ -345,7 +254,7 @@ impl Zlac8030l {
     /// Debounced inputs; both ends of an external stop take the targets away, so that nothing starts by itself.
     fn read_inputs(&mut self, sensors: &Sensors) {
         let levels = self.inputs.update(sensors.inputs, INPUT_DEBOUNCE_PERIODS);
-        let stop = terminals::emergency_stop(self.values(), levels);
+        let stop = TERMINALS.signals(self.values(), levels).emergency_stop;
         if stop != self.external_stop {
             self.external_stop = stop;
             self.axis.set_external_stop(stop);
@@ -354,7 +263,7 @@ impl Zlac8030l {
     }
 
     fn read_targets(&mut self) {
-        let values = self.node.dictionary();
+        let values = self.device.values();
         let rpm = f64::from(values.get(TARGET_VELOCITY)) / f64::from(self.velocity_resolution.max(1));
         let max_rpm = self.parameters.max_rpm;
         self.targets = Targets {
@@ -364,7 +273,7 @@ impl Zlac8030l {
     }
 
     fn drop_targets(&mut self) {
-        let values = self.node.dictionary_mut();
+        let values = self.device.values_mut();
         values.set(TARGET_VELOCITY, 0);
         values.set(TARGET_TORQUE, 0);
     }
@@ -385,7 +294,7 @@ impl Zlac8030l {
         let demand_ma = self.servo.setpoint_a() * 1e3;
         let levels = self.inputs.levels();
         let brake = terminals::brake_engaged(self.values());
-        let values = self.node.dictionary_mut();
+        let values = self.device.values_mut();
         values.set(POSITION_ACTUAL_VALUE, position);
         values.set(VELOCITY_ACTUAL_VALUE, round(velocity * 10.0) as i32);
         values.set(TORQUE_ACTUAL_VALUE, round(current * 10.0).clamp(-300.0, 300.0) as i16);
@@ -398,40 +307,6 @@ impl Zlac8030l {
         values.set(OUTPUT_STATUS, terminals::output_status(self.outputs, brake));
         self.publish_status();
     }
-
-    /// Statusword, mode display and what follows from them; also right after a command, for a host that reads back.
-    fn publish_status(&mut self) {
-        let status = self.axis.status(&self.targets, &self.parameters.axis);
-        let (state, mode) = (self.axis.state(), self.axis.mode());
-        let signals = Signals {
-            alarm: state == PowerState::Fault,
-            enabled: self.axis.is_live(),
-            in_position: status.target_reached,
-        };
-        self.outputs = terminals::outputs(self.values(), signals);
-        let values = self.node.dictionary_mut();
-        values.set(STATUSWORD, statusword(state, mode, &status).0);
-        values.set(MODES_OF_OPERATION_DISPLAY, mode.0);
-        values.set(MOTOR_STATUS, u16::from(status.running));
-    }
-
-    fn publish_error_register(&mut self) {
-        let register = self.faults.error_register();
-        self.node.dictionary_mut().set(ERROR_REGISTER, register);
-    }
-
-    fn communication_task(&mut self, now: Instant) {
-        let timeout_ns = u64::from(self.values().get(COMMUNICATION_OFFLINE_TIME)) * 1_000_000;
-        let armed = self.axis.state() == PowerState::OperationEnabled;
-        if self.watchdog.poll(armed, self.node.last_addressed(), timeout_ns, now) {
-            self.axis.lose_host();
-            self.drop_targets();
-        }
-        if self.eeprom_ok {
-            self.store.commit(self.node.dictionary());
-        }
-        self.node.notice_changes(now);
-    }
 }
 
 impl Default for Zlac8030l {
@@ -440,41 +315,65 @@ impl Default for Zlac8030l {
     }
 }
 
-impl Station for Zlac8030l {
-    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
-        if self.running {
-            self.node.handle_frame(frame, now);
-            self.handle_events(now);
+impl Application<ROW_COUNT> for Zlac8030l {
+    fn device(&mut self) -> &mut Device<ROW_COUNT> {
+        &mut self.device
+    }
+
+    fn restart(&mut self, now: Instant) {
+        let stored = self.device.stored_values();
+        self.device.restart(restart::node_id(self.dip_address, &stored), restart::bitrate(&stored), now);
+        *self = Self { dip_address: self.dip_address, ..Self::over(self.device.clone()) };
+        self.axis.self_test_done();
+        self.publish_status();
+        self.device.boot(now);
+    }
+
+    #[inline]
+    fn written(&mut self, slot: Slot, raw: u32, _via: Via, now: Instant) -> bool {
+        zl::note_write(&mut self.device, SAVE_ON_WRITE, slot);
+        let effect = effect(slot);
+        match effect {
+            Effect::Command => self.command(Controlword(raw as u16), now),
+            Effect::SelectMode => self.axis.request_mode(ModeOfOperation(raw as u8 as i8)),
+            Effect::Registers => self.registers(raw, now),
+            Effect::ClearPosition => self.clear_position(slot, raw),
+            Effect::Target => {}
+            Effect::Parameter => self.parameters_changed = true,
         }
+        matches!(effect, Effect::Command | Effect::SelectMode)
     }
 
-    fn handle_timeout(&mut self, now: Instant) {
-        if !self.running {
-            return;
+    fn communication_task(&mut self, now: Instant) {
+        let timeout_ns = u64::from(self.values().get(COMMUNICATION_OFFLINE_TIME)) * 1_000_000;
+        let armed = self.axis.state() == PowerState::OperationEnabled;
+        if self.watchdog.poll(armed, self.device.last_addressed(), timeout_ns, now) {
+            self.axis.lose_host();
+            self.drop_targets();
         }
-        self.node.handle_timeout(now);
-        self.handle_events(now);
-        if now >= self.next_task {
-            // The task keeps its grid unless it was not called for long.
-            let next = self.next_task.plus_nanos(COMMUNICATION_PERIOD_NS);
-            self.next_task = if next > now { next } else { now.plus_nanos(COMMUNICATION_PERIOD_NS) };
-            self.communication_task(now);
-        }
+        self.device.commit();
+        self.device.notice_changes(now);
     }
 
-    fn poll_transmit(&mut self) -> Option<Frame> {
-        self.node.poll_transmit()
-    }
-
-    fn poll_timeout(&self) -> Option<Instant> {
-        let task = self.running.then_some(self.next_task)?;
-        Some(self.node.poll_timeout().map_or(task, |deadline| deadline.min(task)))
-    }
-
-    fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
-        self.node.handle_transmitted(frame, now);
+    /// Statusword, mode display and what follows from them; also right after a command, for a host that reads back.
+    fn publish_status(&mut self) {
+        let status = self.axis.status(&self.targets, &self.parameters.axis);
+        let (state, mode) = (self.axis.state(), self.axis.mode());
+        let conditions = Conditions {
+            alarm: state == PowerState::Fault,
+            enabled: self.axis.is_live(),
+            homing_attained: false,
+            in_position: status.target_reached,
+        };
+        self.outputs = TERMINALS.outputs(self.values(), conditions);
+        let values = self.device.values_mut();
+        values.set(STATUSWORD, statusword(state, mode, &status).0);
+        values.set(MODES_OF_OPERATION_DISPLAY, mode.0);
+        values.set(MOTOR_STATUS, u16::from(status.running));
     }
 }
+
+device::station!(Zlac8030l);
 
 impl Firmware for Zlac8030l {
     type Sensors = Sensors;
@@ -485,19 +384,18 @@ impl Firmware for Zlac8030l {
 
     fn power_on(&mut self, hardware: &Hardware, now: Instant) {
         self.dip_address = hardware.dip_address;
-        self.store.reopen(hardware.eeprom);
+        self.device.power_on(hardware.eeprom);
         self.restart(now);
     }
 
     fn power_off(&mut self, _now: Instant) {
-        self.running = false;
-        self.node.power_off();
+        self.device.power_off();
         self.axis = Axis::new(&[]);
         self.demand = Demand::Off;
     }
 
     fn tick(&mut self, sensors: &Sensors, now: Instant) -> Actuation {
-        if !self.running {
+        if !self.device.is_running() {
             return Actuation::default();
         }
         if !self.awake {
@@ -521,28 +419,23 @@ impl Firmware for Zlac8030l {
     }
 
     fn eeprom(&self) -> (&[u8], u32) {
-        let (image, generation) = self.store.image();
-        (&image.0, generation)
+        self.device.eeprom()
     }
 
     fn report(&self) -> Report {
         Report {
-            powered: self.running,
-            node_id: self.node.node_id(),
-            bitrate: self.bitrate,
+            powered: self.device.is_running(),
+            node_id: self.device.node().node_id(),
+            bitrate: self.device.bitrate(),
             state: self.axis.state(),
             mode: self.axis.mode(),
             fault_code: self.faults.code_bits(),
             position_counts: self.position(),
             velocity_rpm: self.velocity_rpm(),
             current_a: self.shown_current_a.value,
-            brake_engaged: self.running && terminals::brake_engaged(self.values()),
+            brake_engaged: self.device.is_running() && terminals::brake_engaged(self.values()),
         }
     }
-}
-
-fn is_communication(row: &Entry) -> bool {
-    matches!(row.index, 0x1000..=0x1FFF)
 }
 
 fn three_phases(sensors: &Sensors) -> [f32; 3] {

@@ -7,12 +7,11 @@
 //!
 //! EMCY messages carry the value of 603Fh as error code, as the manual of the sibling ZLIM42-C says (V1.03, 5.2).
 
-use canopen::EmcyErrorCode;
-
 use super::readings::{
     OVER_CURRENT_DEBOUNCE_PERIODS, SENSOR_DEBOUNCE_PERIODS, TEMPERATURE_DEBOUNCE_PERIODS, VOLTAGE_DEBOUNCE_PERIODS,
 };
 use crate::engine::faults::FaultRow;
+use crate::engine::faults::error_register::{CURRENT, MANUFACTURER, PROFILE, TEMPERATURE, VOLTAGE};
 
 /// Rows of [`FAULTS`].
 pub mod row {
@@ -43,45 +42,34 @@ pub mod row {
 /// Number of faults.
 pub const FAULT_COUNT: usize = 11;
 
-// Bits of 1001h (CiA 301, 7.5.2.2). Bit 0, generic, is set with each.
-const CURRENT: u8 = 1 << 1;
-const VOLTAGE: u8 = 1 << 2;
-const TEMPERATURE: u8 = 1 << 3;
-const PROFILE: u8 = 1 << 5;
-const MANUFACTURER: u8 = 1 << 7;
-
 const AT_ONCE: u16 = 1;
 
 /// All faults that occur.
 #[rustfmt::skip]
 pub static FAULTS: [FaultRow; FAULT_COUNT] = [
-    fault(0x0001, "over-voltage", VOLTAGE, VOLTAGE_DEBOUNCE_PERIODS,
+    FaultRow::new(0x0001, "over-voltage", VOLTAGE, VOLTAGE_DEBOUNCE_PERIODS,
         "Lower the supply. If it rises while the motor brakes, fit a bleeder resistor and set 202Eh:05 = 1."),
-    fault(0x0002, "under-voltage", VOLTAGE, VOLTAGE_DEBOUNCE_PERIODS,
+    FaultRow::new(0x0002, "under-voltage", VOLTAGE, VOLTAGE_DEBOUNCE_PERIODS,
         "Raise the supply and check its connector; check the motor parameters 200Bh, 200Ch and 2014h."),
-    fault(0x0004, "over-current", CURRENT, OVER_CURRENT_DEBOUNCE_PERIODS,
+    FaultRow::new(0x0004, "over-current", CURRENT, OVER_CURRENT_DEBOUNCE_PERIODS,
         "Check the motor's power cable for a loose or shorted wire; lower 2015h or the current loop gain 2019h."),
-    fault(0x0008, "overload", CURRENT, AT_ONCE,
+    FaultRow::new(0x0008, "overload", CURRENT, AT_ONCE,
         "Free a blocked motor; check motor cable, wiring, and motor parameters; lower the load or raise 2016h."),
-    fault(0x0020, "encoder value out of tolerance", PROFILE, AT_ONCE,
+    FaultRow::new(0x0020, "encoder value out of tolerance", PROFILE, AT_ONCE,
         "Free a blocked motor; check the encoder; ask for slower moves or raise 2017h."),
-    fault(0x0080, "reference voltage", MANUFACTURER, SENSOR_DEBOUNCE_PERIODS,
+    FaultRow::new(0x0080, "reference voltage", MANUFACTURER, SENSOR_DEBOUNCE_PERIODS,
         "The drive's reference voltage circuit is out of order: replace the drive."),
-    fault(0x0100, "EEPROM read and write", MANUFACTURER, AT_ONCE,
+    FaultRow::new(0x0100, "EEPROM read and write", MANUFACTURER, AT_ONCE,
         "After a firmware upgrade write 1 to 2009h (factory settings). If it comes back, the EEPROM is damaged."),
-    fault(0x0200, "Hall sensor", MANUFACTURER, SENSOR_DEBOUNCE_PERIODS,
+    FaultRow::new(0x0200, "Hall sensor", MANUFACTURER, SENSOR_DEBOUNCE_PERIODS,
         "Check the motor's Hall cable (2028h reads 0 or 7 while it is at fault), then motor and drive."),
-    fault(0x0400, "motor over-temperature", TEMPERATURE, TEMPERATURE_DEBOUNCE_PERIODS,
+    FaultRow::new(0x0400, "motor over-temperature", TEMPERATURE, TEMPERATURE_DEBOUNCE_PERIODS,
         "Lower the motor current and let it cool; check the motor's thermistor; the limit is 2013h:01."),
-    fault(0x0800, "driver over-temperature", TEMPERATURE, TEMPERATURE_DEBOUNCE_PERIODS,
+    FaultRow::new(0x0800, "driver over-temperature", TEMPERATURE, TEMPERATURE_DEBOUNCE_PERIODS,
         "Lower the current and let the drive cool; the limit is 2013h:02."),
-    fault(0x1000, "encoder", MANUFACTURER, AT_ONCE,
+    FaultRow::new(0x1000, "encoder", MANUFACTURER, AT_ONCE,
         "Check the encoder's cable; check 200Bh (lines) and 200Ch (pole pairs) against the motor."),
 ];
-
-const fn fault(code: u16, name: &'static str, error_register: u8, debounce: u16, remedy: &'static str) -> FaultRow {
-    FaultRow { code, name, remedy, error_register, emcy: EmcyErrorCode(code), debounce }
-}
 
 /// What a code that a fault object of this model may show means; more than one bit may be set.
 pub fn faults_of(code: u16) -> impl Iterator<Item = &'static FaultRow> {

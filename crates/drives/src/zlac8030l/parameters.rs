@@ -1,7 +1,6 @@
 //! The dictionary's parameters in physical units, as the engine wants them. Written anew when one changes.
 
 use canopen::od::Object;
-use cia402::{DisableOperationOption, HaltOption, QuickStopOption, ShutdownOption};
 use motion::commutation::CommutationModel;
 use motion::observer::ObserverGains;
 
@@ -11,11 +10,11 @@ use super::objects::*;
 use super::readings::*;
 use crate::engine::axis::{AxisParameters, Tolerances};
 use crate::engine::bleeder::BleederLimits;
-use crate::engine::modes::{HomingParameters, VelocityRamps};
 use crate::engine::overload::OverloadLimits;
-use crate::engine::power::StepDownOptions;
 use crate::engine::servo::{ServoGains, ServoLimits, ServoModel};
-use crate::engine::trajectory::MoveLimits;
+use crate::zl::ProfileObjects;
+
+const PROFILE_OBJECTS: ProfileObjects = ProfileObjects::of(&TABLE);
 
 /// Hall states forward, from the electrical angle 2011h.
 const HALL_SEQUENCE: [u8; 6] = [5, 1, 3, 2, 6, 4];
@@ -79,36 +78,16 @@ impl Parameters {
 fn axis(values: &Values, counts_s_per_rpm: f64) -> AxisParameters {
     let max_rpm = f64::from(values.get(MAX_MOTOR_SPEED));
     let speed = |rpm: f64| rpm.min(max_rpm) * counts_s_per_rpm;
-    let time_s = |object| f64::from(values.get(object)) * 1e-3;
-    let start_speed = speed(f64::from(values.get(INITIAL_SPEED)));
-    let (acceleration_time_s, deceleration_time_s) = (time_s(PROFILE_ACCELERATION), time_s(PROFILE_DECELERATION));
     AxisParameters {
-        moves: MoveLimits {
-            start_speed,
-            max_speed: speed(f64::from(values.get(PROFILE_VELOCITY))),
-            end_speed: speed(f64::from(values.get(END_VELOCITY))),
-            acceleration_time_s,
-            deceleration_time_s,
-        },
-        velocity: VelocityRamps { start_speed, max_speed: speed(max_rpm), acceleration_time_s, deceleration_time_s },
-        quick_stop_time_s: time_s(QUICK_STOP_DECELERATION),
         torque_slope_a_s: values.get(TORQUE_SLOPE) as f32 * 1e-3,
-        quick_stop: QuickStopOption(values.get(QUICK_STOP_OPTION_CODE)),
-        step_down: StepDownOptions {
-            shutdown: ShutdownOption(values.get(SHUTDOWN_OPTION_CODE)),
-            disable_operation: DisableOperationOption(values.get(DISABLE_OPERATION_OPTION_CODE)),
-        },
-        halt: HaltOption(values.get(HALT_OPTION_CODE)),
         lock_when_disabled: values.get(SHAFT_LOCK_WHEN_DISABLED) == 1,
-        hold_when_switched_on: false,
-        limit_stop: None,
-        homing: HomingParameters::default(),
         release_after_external_stop: values.get(IO_STOP_PROCESSING) == 1,
         tolerances: Tolerances {
             position: u32::from(values.get(IN_POSITION_THRESHOLD)),
             velocity: f64::from(VELOCITY_REACHED_RPM) * counts_s_per_rpm,
             current_a: TORQUE_REACHED_A,
         },
+        ..PROFILE_OBJECTS.axis(values, values.get(INITIAL_SPEED), max_rpm, speed)
     }
 }
 

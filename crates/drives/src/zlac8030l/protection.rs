@@ -7,7 +7,7 @@ use super::hardware::Sensors;
 use super::parameters::Parameters;
 use super::readings::*;
 use crate::engine::axis::Demand;
-use crate::engine::faults::FaultSet;
+use crate::engine::faults::{FaultSet, exceeds, exceeds_with_hysteresis, within};
 use crate::engine::overload::Overload;
 use crate::engine::servo::Servo;
 
@@ -25,20 +25,20 @@ pub(super) struct Situation<'a> {
     pub(super) demand: &'a Demand,
     pub(super) position: i32,
     pub(super) velocity_rpm: f32,
-    pub(super) eeprom_readable: bool,
+    pub(super) eeprom_sound: bool,
     pub(super) latched: FaultSet,
 }
 
 impl Protection {
     pub(super) fn causes(&mut self, parameters: &Parameters, sensors: &Sensors, now: &Situation<'_>) -> FaultSet {
         FaultSet::NONE
-            .with(row::OVER_VOLTAGE, above(sensors.bus_v, OVER_VOLTAGE_V, VOLTAGE_HYSTERESIS_V, now, row::OVER_VOLTAGE))
+            .with(row::OVER_VOLTAGE, over_voltage(sensors.bus_v, now))
             .with(row::UNDER_VOLTAGE, self.under_voltage(sensors.bus_v, now))
             .with(row::OVER_CURRENT, is_over_current(sensors) || self.loose_wire(now))
             .with(row::OVERLOAD, self.overload.update(&parameters.overload, now.current_a(), SUPERVISION_PERIOD_S))
             .with(row::OUT_OF_TOLERANCE, out_of_tolerance(parameters, now))
             .with(row::REFERENCE_VOLTAGE, !within(sensors.reference_v, REFERENCE_V, REFERENCE_TOLERANCE_V))
-            .with(row::EEPROM, !(sensors.eeprom_ok && now.eeprom_readable))
+            .with(row::EEPROM, !now.eeprom_sound)
             .with(row::HALL, matches!(sensors.hall & 7, 0 | 7))
             .with(
                 row::MOTOR_TEMPERATURE,
@@ -103,20 +103,10 @@ fn out_of_tolerance(parameters: &Parameters, now: &Situation<'_>) -> bool {
     }
 }
 
+fn over_voltage(bus_v: f32, now: &Situation<'_>) -> bool {
+    exceeds_with_hysteresis(bus_v, OVER_VOLTAGE_V, VOLTAGE_HYSTERESIS_V, now.latched.has(row::OVER_VOLTAGE))
+}
+
 fn too_hot(celsius: f32, limit_c: f32, now: &Situation<'_>, row: usize) -> bool {
-    above(celsius, limit_c, TEMPERATURE_HYSTERESIS_C, now, row)
-}
-
-fn above(value: f32, limit: f32, hysteresis: f32, now: &Situation<'_>, row: usize) -> bool {
-    let limit = if now.latched.has(row) { limit - hysteresis } else { limit };
-    exceeds(value, limit)
-}
-
-/// A reading that is no number is no sound reading.
-fn exceeds(value: f32, limit: f32) -> bool {
-    value > limit || value.is_nan() || limit.is_nan()
-}
-
-fn within(value: f32, nominal: f32, tolerance: f32) -> bool {
-    (value - nominal).abs() <= tolerance
+    exceeds_with_hysteresis(celsius, limit_c, TEMPERATURE_HYSTERESIS_C, now.latched.has(row))
 }

@@ -3,10 +3,9 @@
 //! Three rhythms: frames as they come (`handle_frame`), the communication task every 0.5 ms (`handle_timeout`), and the
 //! control period of 50 us ([`Firmware::tick`]), of which every tenth is a supervision period.
 
-use can::{Bitrate, Frame, Instant, Station};
-use canopen::node::{Node, NodeEvent, NodeProfile};
-use canopen::od::{Entry, Slot};
-use canopen::{EmcyErrorCode, NodeId};
+use can::{Bitrate, Instant};
+use canopen::node::{Node, NodeProfile, Via};
+use canopen::od::Slot;
 use cia402::{Controlword, ModeOfOperation, PowerState};
 
 use super::faults::{FAULT_COUNT, FAULTS, FLASHES, row};
@@ -17,13 +16,14 @@ use super::parameters::Parameters;
 use super::protection::{PhaseWatch, Situation, causes, is_over_current};
 use super::readings::*;
 use super::statusword::{self, statusword};
-use super::terminals::{self, Conditions};
+use super::terminals::{self, TERMINALS};
 use super::{Values, led, restart, storage};
 use crate::engine::axis::{Axis, Demand, Feedback, Targets};
+use crate::engine::device::{self, Application, Device};
 use crate::engine::faults::{FaultMonitor, FaultSet};
 use crate::engine::inputs::Inputs;
 use crate::engine::stepper::Stepper;
-use crate::engine::storage::Store;
+use crate::zl::terminals::Conditions;
 use crate::{Firmware, Report, zl};
 
 /// How this drive communicates.
@@ -32,12 +32,8 @@ pub static NODE_PROFILE: NodeProfile = zl::node_profile(&TABLE);
 /// The firmware of a ZLIM42-C.
 #[derive(Clone)]
 pub struct Zlim42c {
-    node: Node<ROW_COUNT>,
-    store: Store,
+    device: Device<ROW_COUNT>,
     dip_address: u8,
-    running: bool,
-    /// 2009h as it was at the last restart.
-    bitrate: Bitrate,
     parameters: Parameters,
     parameters_changed: bool,
     axis: Axis,
@@ -51,25 +47,24 @@ pub struct Zlim42c {
     bus_a: f32,
     /// The fault that 603Fh and the red light tell of: the last that came.
     shown_fault: Option<usize>,
-    eeprom_ok: bool,
     inputs: Inputs<4>,
     external_stop: bool,
     outputs: [bool; 2],
     periods: u8,
-    next_task: Instant,
 }
 
 impl Zlim42c {
     /// A drive without supply. [`Firmware::power_on`] starts it.
     pub fn new() -> Self {
-        let node = Node::new(&NODE_PROFILE, NodeId::MIN);
+        Self::over(Device::new(&NODE_PROFILE, Bitrate::K500, storage::factory(), COMMUNICATION_PERIOD_NS))
+    }
+
+    /// Motor free, position 0, and the values of `device` in effect.
+    fn over(device: Device<ROW_COUNT>) -> Self {
         Self {
-            parameters: Parameters::from(node.dictionary()),
-            node,
-            store: Store::new(storage::factory()),
+            parameters: Parameters::from(device.values()),
+            device,
             dip_address: 0,
-            running: false,
-            bitrate: Bitrate::K500,
             parameters_changed: false,
             axis: Axis::new(&[]),
             stepper: Stepper::default(),
@@ -80,18 +75,16 @@ impl Zlim42c {
             phases: PhaseWatch::default(),
             bus_a: 0.0,
             shown_fault: None,
-            eeprom_ok: true,
             inputs: Inputs::default(),
             external_stop: false,
             outputs: [false; 2],
             periods: 0,
-            next_task: Instant::ZERO,
         }
     }
 
     /// The values of the objects, to look at.
     pub fn values(&self) -> &Values {
-        self.node.dictionary()
+        self.device.values()
     }
 
     /// What the current vector is asked for, to look at.
@@ -116,80 +109,7 @@ impl Zlim42c {
 
     /// The communication side, to look at.
     pub const fn node(&self) -> &Node<ROW_COUNT> {
-        &self.node
-    }
-
-    /// Starts the firmware over: stored values, node-ID and bit rate anew, motor free, position 0.
-    fn restart(&mut self, now: Instant) {
-        let mut values = Values::new(&TABLE, NodeId::MIN);
-        // An unreadable store leaves factory values; the fault follows with the first look at the sensors.
-        let _ = self.store.load(&mut values, |_| true);
-        let node_id = restart::node_id(self.dip_address, &values);
-        let mut started = Self::new();
-        started.node = Node::new(&NODE_PROFILE, node_id);
-        let _ = self.store.load(started.node.dictionary_mut(), |_| true);
-        started.node.dictionary_mut().set(NODE_ID, u16::from(node_id.raw()));
-        started.store = self.store.clone();
-        started.dip_address = self.dip_address;
-        started.running = true;
-        started.bitrate = restart::bitrate(started.values());
-        started.parameters = Parameters::from(started.values());
-        started.stepper = self.stepper.restarted();
-        let pulses = |parameters: &Parameters| parameters.model.pulses_per_electrical_turn;
-        started.stepper.rescale(pulses(&self.parameters), pulses(&started.parameters));
-        started.next_task = now.plus_nanos(COMMUNICATION_PERIOD_NS);
-        started.axis.self_test_done();
-        *self = started;
-        self.publish_status();
-        self.node.boot(now);
-    }
-
-    /// NMT reset communication: 1000h to 1FFFh as at power-on; motor and node-ID go on.
-    fn restart_communication(&mut self, now: Instant) {
-        self.node.restore_communication_defaults();
-        let _ = self.store.load(self.node.dictionary_mut(), is_communication);
-        self.node.boot(now);
-        self.publish_error_register();
-    }
-
-    fn handle_events(&mut self, now: Instant) {
-        while let Some(event) = self.node.poll_event() {
-            match event {
-                NodeEvent::Written { slot, raw, .. } => self.written(slot, raw, now),
-                NodeEvent::ResetNode => self.restart(now),
-                NodeEvent::ResetCommunication => self.restart_communication(now),
-                NodeEvent::Nmt(_) | NodeEvent::Sync | NodeEvent::RpdoTooShort(_) => {}
-            }
-        }
-    }
-
-    /// A peer wrote `raw` to `slot`.
-    fn written(&mut self, slot: Slot, raw: u32, now: Instant) {
-        if self.values().get(SAVE_ON_WRITE) == 0 {
-            self.store.mark(&TABLE, slot);
-        }
-        match effect(slot) {
-            Effect::Command => self.command(Controlword(raw as u16), now),
-            Effect::SelectMode => {
-                self.axis.request_mode(ModeOfOperation(raw as u8 as i8));
-                self.publish_status();
-            }
-            Effect::Registers => self.registers(raw, now),
-            Effect::FaultReset => {
-                if raw == 1 && self.axis.state() == PowerState::Fault {
-                    self.reset_faults(now);
-                }
-                self.node.dictionary_mut().set(FAULT_RESET, 0);
-            }
-            Effect::ClearPosition => {
-                if raw == 1 {
-                    self.shift_position(self.stepper.position());
-                }
-                self.node.dictionary_mut().set(CLEAR_CURRENT_POSITION, 0);
-            }
-            Effect::Target => {}
-            Effect::Parameter => self.parameters_changed = true,
-        }
+        self.device.node()
     }
 
     fn command(&mut self, controlword: Controlword, now: Instant) {
@@ -199,33 +119,31 @@ impl Zlim42c {
         if self.axis.command(controlword, target, &self.parameters.axis) {
             self.reset_faults(now);
         }
-        self.publish_status();
     }
 
-    /// 2010h: reads 0 again when it is done.
-    fn registers(&mut self, command: u32, now: Instant) {
-        match command {
-            1 => self.restore_factory_settings(now),
-            2 => self.store.mark_all(&TABLE),
-            _ => {}
-        }
-        self.node.dictionary_mut().set(REGISTER_PARAMETER_SETTING, 0);
-    }
-
-    /// Everything in the EEPROM becomes as delivered. Parameters take effect at once, communication objects with the next
-    /// restart: until then they show what the drive does. An EEPROM fault ends with it.
-    fn restore_factory_settings(&mut self, now: Instant) {
-        if !self.eeprom_ok {
-            return;
-        }
-        let node_id = self.node.node_id();
-        self.store.format(&Values::new(&TABLE, node_id));
-        for (slot, _) in TABLE.iter().filter(|(_, row)| row.stored && !is_communication(row)) {
-            self.node.dictionary_mut().restore_default(slot, node_id);
-        }
-        self.parameters_changed = true;
-        if self.faults.forget(row::EEPROM) {
+    /// 2011h: reads 0 again when it is done.
+    fn fault_reset(&mut self, raw: u32, now: Instant) {
+        if raw == 1 && self.axis.state() == PowerState::Fault {
             self.reset_faults(now);
+        }
+        self.device.values_mut().set(FAULT_RESET, 0);
+    }
+
+    /// 2012h: reads 0 again when it is done.
+    fn clear_position(&mut self, raw: u32) {
+        if raw == 1 {
+            self.shift_position(self.stepper.position());
+        }
+        self.device.values_mut().set(CLEAR_CURRENT_POSITION, 0);
+    }
+
+    /// Save or restore. An EEPROM fault ends with the factory settings.
+    fn registers(&mut self, command: u32, now: Instant) {
+        if zl::register_command(&mut self.device, REGISTER_PARAMETER_SETTING, command) {
+            self.parameters_changed = true;
+            if self.faults.forget(row::EEPROM) {
+                self.reset_faults(now);
+            }
         }
     }
 
@@ -237,7 +155,7 @@ impl Zlim42c {
             point.position = point.position.wrapping_sub(by);
         }
         let position = self.stepper.position();
-        self.node.dictionary_mut().set(POSITION_ACTUAL_VALUE, position);
+        self.device.values_mut().set(POSITION_ACTUAL_VALUE, position);
     }
 
     /// Commanded velocity in r/min.
@@ -246,12 +164,12 @@ impl Zlim42c {
     }
 
     fn watch_faults(&mut self, sensors: &Sensors, now: Instant) {
-        self.eeprom_ok = sensors.eeprom_ok;
+        self.device.set_eeprom_ok(sensors.eeprom_ok);
         let (peaks, speed_rpm) = (self.stepper.take_peaks(), self.velocity_rpm());
         let situation = Situation {
             bus_a: core::mem::take(&mut self.bus_a),
             phase_lost: self.phases.observe(&peaks, self.stepper.reference_a(), speed_rpm),
-            eeprom_readable: self.store.is_readable(),
+            eeprom_sound: self.device.is_eeprom_sound(),
             latched: self.faults.latched(),
         };
         let new = self.faults.observe(causes(sensors, &situation));
@@ -267,9 +185,8 @@ impl Zlim42c {
         self.energise(Demand::Off);
         for row in new.rows() {
             self.shown_fault = Some(row);
-            let register = self.faults.error_register();
-            self.node.raise_emcy(FAULTS[row].emcy, register, [0; 5], now);
         }
+        self.device.tell_faults(new, &self.faults, now);
         self.publish_error_code();
         self.publish_status();
     }
@@ -280,10 +197,9 @@ impl Zlim42c {
         self.shown_fault = self.shown_fault.filter(|row| self.faults.latched().has(*row));
         self.shown_fault = self.shown_fault.or_else(|| self.faults.latched().rows().last());
         self.publish_error_code();
-        self.publish_error_register();
+        self.device.tell_reset(&self.faults, now);
         if all_gone {
             self.axis.reset_fault();
-            self.node.raise_emcy(EmcyErrorCode::NO_ERROR, 0, [0; 5], now);
         }
         self.publish_status();
     }
@@ -329,7 +245,7 @@ impl Zlim42c {
         if !self.parameters_changed {
             return;
         }
-        let (values, before) = (self.node.dictionary(), self.parameters);
+        let (values, before) = (self.device.values(), self.parameters);
         let mut after = Parameters::from(values);
         let waits = after.pulses_per_turn != before.pulses_per_turn && self.demand != Demand::Off;
         if waits {
@@ -345,12 +261,12 @@ impl Zlim42c {
     fn read_inputs(&mut self, sensors: &Sensors) {
         let periods = terminals::filter_periods(self.values());
         let levels = self.inputs.update_each(sensors.inputs, periods);
-        let signals = terminals::signals(self.values(), levels);
+        let signals = TERMINALS.signals(self.values(), levels);
         self.axis.set_switches(signals.switches);
         if signals.emergency_stop != self.external_stop {
             self.external_stop = signals.emergency_stop;
             self.axis.set_external_stop(self.external_stop);
-            self.node.dictionary_mut().set(TARGET_VELOCITY, 0);
+            self.device.values_mut().set(TARGET_VELOCITY, 0);
         }
     }
 
@@ -366,13 +282,69 @@ impl Zlim42c {
         let position = self.stepper.position();
         let rpm = libm::round(self.velocity_rpm()) as i32;
         let levels = self.inputs.levels();
-        let values = self.node.dictionary_mut();
+        let values = self.device.values_mut();
         values.set(POSITION_ACTUAL_VALUE, position);
         values.set(VELOCITY_ACTUAL_VALUE, rpm);
         values.set(MOTOR_SPEED, rpm as i16);
         values.set(BUS_VOLTAGE, libm::roundf(sensors.bus_v) as u16);
         values.set(INPUT_STATUS, levels);
         self.publish_status();
+    }
+
+    fn publish_error_code(&mut self) {
+        let code = self.error_code();
+        self.device.values_mut().set(ERROR_CODE, code);
+    }
+
+    fn error_code(&self) -> u16 {
+        self.shown_fault.map_or(0, |row| FAULTS[row].code)
+    }
+}
+
+impl Default for Zlim42c {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Application<ROW_COUNT> for Zlim42c {
+    fn device(&mut self) -> &mut Device<ROW_COUNT> {
+        &mut self.device
+    }
+
+    fn restart(&mut self, now: Instant) {
+        let stored = self.device.stored_values();
+        let node_id = restart::node_id(self.dip_address, &stored);
+        self.device.restart(node_id, restart::bitrate(&stored), now);
+        self.device.values_mut().set(NODE_ID, u16::from(node_id.raw()));
+        let (before, mut stepper) = (self.parameters.model, self.stepper.restarted());
+        *self = Self { dip_address: self.dip_address, ..Self::over(self.device.clone()) };
+        stepper.rescale(before.pulses_per_electrical_turn, self.parameters.model.pulses_per_electrical_turn);
+        self.stepper = stepper;
+        self.axis.self_test_done();
+        self.publish_status();
+        self.device.boot(now);
+    }
+
+    #[inline]
+    fn written(&mut self, slot: Slot, raw: u32, _via: Via, now: Instant) -> bool {
+        zl::note_write(&mut self.device, SAVE_ON_WRITE, slot);
+        let effect = effect(slot);
+        match effect {
+            Effect::Command => self.command(Controlword(raw as u16), now),
+            Effect::SelectMode => self.axis.request_mode(ModeOfOperation(raw as u8 as i8)),
+            Effect::Registers => self.registers(raw, now),
+            Effect::FaultReset => self.fault_reset(raw, now),
+            Effect::ClearPosition => self.clear_position(raw),
+            Effect::Target => {}
+            Effect::Parameter => self.parameters_changed = true,
+        }
+        matches!(effect, Effect::Command | Effect::SelectMode)
+    }
+
+    fn communication_task(&mut self, now: Instant) {
+        self.device.commit();
+        self.device.notice_changes(now);
     }
 
     /// Statusword, mode display and what follows from them; also right after a command, for a host that reads back.
@@ -388,74 +360,17 @@ impl Zlim42c {
             homing_attained: status.homing_attained,
             in_position: word.has(statusword::IN_POSITION),
         };
-        self.outputs = terminals::outputs(self.values(), conditions);
+        self.outputs = TERMINALS.outputs(self.values(), conditions);
         let [y0, y1] = self.outputs;
-        let values = self.node.dictionary_mut();
+        let values = self.device.values_mut();
         values.set(STATUSWORD, word.0);
         values.set(MODES_OF_OPERATION_DISPLAY, mode.0);
         values.set(MOTOR_STATUS, u16::from(status.running));
         values.set(OUTPUT_STATUS, u16::from(y0) | u16::from(y1) << 1);
     }
-
-    fn publish_error_register(&mut self) {
-        let register = self.faults.error_register();
-        self.node.dictionary_mut().set(ERROR_REGISTER, register);
-    }
-
-    fn publish_error_code(&mut self) {
-        let code = self.error_code();
-        self.node.dictionary_mut().set(ERROR_CODE, code);
-    }
-
-    fn error_code(&self) -> u16 {
-        self.shown_fault.map_or(0, |row| FAULTS[row].code)
-    }
 }
 
-impl Default for Zlim42c {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl Station for Zlim42c {
-    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
-        if self.running {
-            self.node.handle_frame(frame, now);
-            self.handle_events(now);
-        }
-    }
-
-    fn handle_timeout(&mut self, now: Instant) {
-        if !self.running {
-            return;
-        }
-        self.node.handle_timeout(now);
-        self.handle_events(now);
-        if now >= self.next_task {
-            // The task keeps its grid unless it was not called for long.
-            let next = self.next_task.plus_nanos(COMMUNICATION_PERIOD_NS);
-            self.next_task = if next > now { next } else { now.plus_nanos(COMMUNICATION_PERIOD_NS) };
-            if self.eeprom_ok {
-                self.store.commit(self.node.dictionary());
-            }
-            self.node.notice_changes(now);
-        }
-    }
-
-    fn poll_transmit(&mut self) -> Option<Frame> {
-        self.node.poll_transmit()
-    }
-
-    fn poll_timeout(&self) -> Option<Instant> {
-        let task = self.running.then_some(self.next_task)?;
-        Some(self.node.poll_timeout().map_or(task, |deadline| deadline.min(task)))
-    }
-
-    fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
-        self.node.handle_transmitted(frame, now);
-    }
-}
+device::station!(Zlim42c);
 
 impl Firmware for Zlim42c {
     type Sensors = Sensors;
@@ -466,20 +381,19 @@ impl Firmware for Zlim42c {
 
     fn power_on(&mut self, hardware: &Hardware, now: Instant) {
         self.dip_address = hardware.dip_address;
-        self.store.reopen(hardware.eeprom);
+        self.device.power_on(hardware.eeprom);
         self.stepper = Stepper::default();
         self.restart(now);
     }
 
     fn power_off(&mut self, _now: Instant) {
-        self.running = false;
-        self.node.power_off();
+        self.device.power_off();
         self.axis = Axis::new(&[]);
         self.energise(Demand::Off);
     }
 
     fn tick(&mut self, sensors: &Sensors, now: Instant) -> Actuation {
-        if !self.running {
+        if !self.device.is_running() {
             return Actuation::default();
         }
         if is_over_current(sensors) && self.faults.raise(row::OVER_CURRENT) {
@@ -496,15 +410,14 @@ impl Firmware for Zlim42c {
     }
 
     fn eeprom(&self) -> (&[u8], u32) {
-        let (image, generation) = self.store.image();
-        (&image.0, generation)
+        self.device.eeprom()
     }
 
     fn report(&self) -> Report {
         Report {
-            powered: self.running,
-            node_id: self.node.node_id(),
-            bitrate: self.bitrate,
+            powered: self.device.is_running(),
+            node_id: self.device.node().node_id(),
+            bitrate: self.device.bitrate(),
             state: self.axis.state(),
             mode: self.axis.mode(),
             fault_code: self.error_code(),
@@ -514,8 +427,4 @@ impl Firmware for Zlim42c {
             brake_engaged: false,
         }
     }
-}
-
-fn is_communication(row: &Entry) -> bool {
-    matches!(row.index, 0x1000..=0x1FFF)
 }

@@ -3,13 +3,12 @@
 //! The two lists do not match one to one. Over-current of the bus has a light (five flashes) and no code: FF02h. The
 //! EEPROM has a code and no light. EMCY messages carry the value of 603Fh as error code (5.2).
 
-use canopen::EmcyErrorCode;
-
 use super::readings::{
     BUS_OVER_CURRENT_DEBOUNCE_PERIODS, OVER_CURRENT_DEBOUNCE_PERIODS, REFERENCE_DEBOUNCE_PERIODS,
     VOLTAGE_DEBOUNCE_PERIODS,
 };
 use crate::engine::faults::FaultRow;
+use crate::engine::faults::error_register::{CURRENT, MANUFACTURER, VOLTAGE};
 
 /// Rows of [`FAULTS`].
 pub mod row {
@@ -30,34 +29,25 @@ pub mod row {
 /// Number of faults.
 pub const FAULT_COUNT: usize = 6;
 
-// Bits of 1001h (CiA 301, 7.5.2.2). Bit 0, generic, is set with each.
-const CURRENT: u8 = 1 << 1;
-const VOLTAGE: u8 = 1 << 2;
-const MANUFACTURER: u8 = 1 << 7;
-
 /// Also of what has a debounce of its own, as the phases have.
 const AT_ONCE: u16 = 1;
 
 /// All faults that occur.
 #[rustfmt::skip]
 pub static FAULTS: [FaultRow; FAULT_COUNT] = [
-    fault(0xFF01, "over-voltage", VOLTAGE, VOLTAGE_DEBOUNCE_PERIODS,
+    FaultRow::new(0xFF01, "over-voltage", VOLTAGE, VOLTAGE_DEBOUNCE_PERIODS,
         "Lower the supply: 24 V, at most 30 V. If it rises while the motor brakes, slow down longer (6084h)."),
-    fault(0xFF02, "over-current", CURRENT, OVER_CURRENT_DEBOUNCE_PERIODS,
+    FaultRow::new(0xFF02, "over-current", CURRENT, OVER_CURRENT_DEBOUNCE_PERIODS,
         "Look for a short circuit between the motor's wires; lower 2005h; set 2040h and 2041h back."),
-    fault(0xFF04, "phase loss", MANUFACTURER, AT_ONCE,
+    FaultRow::new(0xFF04, "phase loss", MANUFACTURER, AT_ONCE,
         "A motor wire has bad contact to the drive's board: have it repaired."),
-    fault(0xFF08, "internal reference voltage", MANUFACTURER, REFERENCE_DEBOUNCE_PERIODS,
+    FaultRow::new(0xFF08, "internal reference voltage", MANUFACTURER, REFERENCE_DEBOUNCE_PERIODS,
         "The drive's reference voltage circuit is out of order: replace the drive."),
-    fault(0xFF10, "EEPROM read and write", MANUFACTURER, AT_ONCE,
+    FaultRow::new(0xFF10, "EEPROM read and write", MANUFACTURER, AT_ONCE,
         "Write 1 to 2010h (factory settings). If it comes back, the EEPROM is damaged."),
-    fault(0xFF02, "bus over-current", CURRENT, BUS_OVER_CURRENT_DEBOUNCE_PERIODS,
+    FaultRow::new(0xFF02, "bus over-current", CURRENT, BUS_OVER_CURRENT_DEBOUNCE_PERIODS,
         "The drive draws too much from its supply: lower 2005h; look for a short circuit in the motor."),
 ];
 
 /// Red flashes of each row of [`FAULTS`] (3.4). None is printed for the EEPROM: the next free count.
 pub const FLASHES: [u8; FAULT_COUNT] = [1, 2, 3, 4, 6, 5];
-
-const fn fault(code: u16, name: &'static str, error_register: u8, debounce: u16, remedy: &'static str) -> FaultRow {
-    FaultRow { code, name, remedy, error_register, emcy: EmcyErrorCode(code), debounce }
-}

@@ -1,6 +1,6 @@
 //! The dictionary's parameters in physical units, as the engine wants them. Written anew when one changes.
 
-use cia402::{DisableOperationOption, HaltOption, HomingMethod, QuickStopOption, ShutdownOption};
+use cia402::HomingMethod;
 use motion::pid::PiGains;
 
 use super::Values;
@@ -9,9 +9,10 @@ use super::readings::*;
 use super::tables::{PEAK_CURRENTS_A, PULSES_PER_TURN, entry};
 use crate::engine::axis::{AxisParameters, StopRamp, Tolerances};
 use crate::engine::modes::{HomingParameters, VelocityRamps};
-use crate::engine::power::StepDownOptions;
 use crate::engine::stepper::{StepperCurrents, StepperGains, StepperModel};
-use crate::engine::trajectory::MoveLimits;
+use crate::zl::ProfileObjects;
+
+const PROFILE_OBJECTS: ProfileObjects = ProfileObjects::of(&TABLE);
 
 /// Everything that the control task reads of the dictionary besides its targets.
 #[derive(Clone, Copy, Debug)]
@@ -61,28 +62,9 @@ fn pulses_per_turn(values: &Values) -> u16 {
 
 fn axis(values: &Values, pulses_per_turn: u16) -> AxisParameters {
     let speed = |rpm: f64| (rpm * f64::from(pulses_per_turn) / 60.0).min(STEP_FREQUENCY_HZ);
-    let time_s = |object| f64::from(values.get(object)) * 1e-3;
-    let start_speed = speed(f64::from(values.get(START_SPEED)));
-    let max_speed = speed(MAX_SPEED_RPM);
-    let (acceleration_time_s, deceleration_time_s) = (time_s(PROFILE_ACCELERATION), time_s(PROFILE_DECELERATION));
-    let homing_time_s = time_s(HOMING_ACCELERATION);
+    let shared = PROFILE_OBJECTS.axis(values, values.get(START_SPEED), MAX_SPEED_RPM, speed);
+    let homing_time_s = f64::from(values.get(HOMING_ACCELERATION)) * 1e-3;
     AxisParameters {
-        moves: MoveLimits {
-            start_speed,
-            max_speed: speed(f64::from(values.get(PROFILE_VELOCITY))),
-            end_speed: speed(f64::from(values.get(END_VELOCITY))),
-            acceleration_time_s,
-            deceleration_time_s,
-        },
-        velocity: VelocityRamps { start_speed, max_speed, acceleration_time_s, deceleration_time_s },
-        quick_stop_time_s: time_s(QUICK_STOP_DECELERATION),
-        torque_slope_a_s: 0.0,
-        quick_stop: QuickStopOption(values.get(QUICK_STOP_OPTION_CODE)),
-        step_down: StepDownOptions {
-            shutdown: ShutdownOption(values.get(SHUTDOWN_OPTION_CODE)),
-            disable_operation: DisableOperationOption(values.get(DISABLE_OPERATION_OPTION_CODE)),
-        },
-        halt: HaltOption(values.get(HALT_OPTION_CODE)),
         lock_when_disabled: values.get(SHAFT_LOCK_WHEN_DISABLED) == 1,
         hold_when_switched_on: true,
         limit_stop: match values.get(LIMIT_STOP_MODE) {
@@ -95,16 +77,15 @@ fn axis(values: &Values, pulses_per_turn: u16) -> AxisParameters {
             search_speed: speed(f64::from(values.get(HOMING_SPEED))),
             latch_speed: speed(f64::from(values.get(HOMING_SEARCH_SPEED))),
             ramps: VelocityRamps {
-                start_speed,
-                max_speed,
                 acceleration_time_s: homing_time_s,
                 deceleration_time_s: homing_time_s,
+                ..shared.velocity
             },
             back_off: (HOMING_BACK_OFF_TURNS * f64::from(pulses_per_turn)) as u32,
         },
-        release_after_external_stop: false,
         // What is commanded is what there is: every target is reached exactly.
         tolerances: Tolerances { position: 0, velocity: VELOCITY_ROUNDING, current_a: 0.0 },
+        ..shared
     }
 }
 

@@ -3,7 +3,7 @@
 use super::faults::row;
 use super::hardware::Sensors;
 use super::readings::*;
-use crate::engine::faults::FaultSet;
+use crate::engine::faults::{FaultSet, exceeds, exceeds_with_hysteresis, within};
 use crate::engine::stepper::Peaks;
 
 /// What the causes are judged by, besides the sensors.
@@ -11,7 +11,7 @@ pub(super) struct Situation {
     /// Current from the bus, A, mean over the supervision period.
     pub(super) bus_a: f32,
     pub(super) phase_lost: bool,
-    pub(super) eeprom_readable: bool,
+    pub(super) eeprom_sound: bool,
     pub(super) latched: FaultSet,
 }
 
@@ -53,7 +53,7 @@ pub(super) fn causes(sensors: &Sensors, now: &Situation) -> FaultSet {
         .with(row::OVER_CURRENT, is_over_current(sensors))
         .with(row::PHASE_LOSS, now.phase_lost)
         .with(row::REFERENCE_VOLTAGE, !within(sensors.reference_v, REFERENCE_V, REFERENCE_TOLERANCE_V))
-        .with(row::EEPROM, !(sensors.eeprom_ok && now.eeprom_readable))
+        .with(row::EEPROM, !now.eeprom_sound)
         .with(row::BUS_OVER_CURRENT, exceeds(now.bus_a, BUS_OVER_CURRENT_A))
 }
 
@@ -64,15 +64,5 @@ pub(super) fn is_over_current(sensors: &Sensors) -> bool {
 }
 
 fn over_voltage(bus_v: f32, now: &Situation) -> bool {
-    let hysteresis_v = if now.latched.has(row::OVER_VOLTAGE) { VOLTAGE_HYSTERESIS_V } else { 0.0 };
-    exceeds(bus_v, OVER_VOLTAGE_V - hysteresis_v)
-}
-
-/// A reading that is no number is no sound reading.
-fn exceeds(value: f32, limit: f32) -> bool {
-    value > limit || value.is_nan()
-}
-
-fn within(value: f32, nominal: f32, tolerance: f32) -> bool {
-    (value - nominal).abs() <= tolerance
+    exceeds_with_hysteresis(bus_v, OVER_VOLTAGE_V, VOLTAGE_HYSTERESIS_V, now.latched.has(row::OVER_VOLTAGE))
 }

@@ -1,0 +1,319 @@
+//! What every drive is on the bus: its CANopen node, its parameter store, and the task that looks after both.
+//!
+//! A drive owns a [`Device`] and hands frames and time to it. What a peer wrote comes back as [`NodeEvent`]s, which
+//! [`Application`] turns into the drive's own reactions. Nothing here knows what an object means but for the error register
+//! (1001h).
+
+use can::{Bitrate, Frame, Instant, Station};
+use canopen::node::{Node, NodeEvent, NodeProfile, Via};
+use canopen::od::{Dictionary, Entry, Slot};
+use canopen::{EmcyErrorCode, Mux, NodeId};
+
+use super::faults::{FaultMonitor, FaultSet};
+use super::storage::{Image, Store};
+
+/// Node, store and communication task of a drive whose table has `N` rows.
+#[derive(Clone)]
+pub struct Device<const N: usize> {
+    profile: &'static NodeProfile,
+    node: Node<N>,
+    store: Store,
+    eeprom_ok: bool,
+    running: bool,
+    bitrate: Bitrate,
+    task_period_ns: u64,
+    next_task: Instant,
+}
+
+impl<const N: usize> Device<N> {
+    /// A device without supply, with its bit rate and EEPROM as delivered and the time between two runs of its communication
+    /// task.
+    pub fn new(profile: &'static NodeProfile, bitrate: Bitrate, image: Image, task_period_ns: u64) -> Self {
+        Self {
+            profile,
+            node: Node::new(profile, NodeId::MIN),
+            store: Store::new(image),
+            eeprom_ok: true,
+            running: false,
+            bitrate,
+            task_period_ns,
+            next_task: Instant::ZERO,
+        }
+    }
+
+    /// The node, to look at.
+    pub const fn node(&self) -> &Node<N> {
+        &self.node
+    }
+
+    /// The values of the objects.
+    #[inline]
+    pub const fn values(&self) -> &Dictionary<N> {
+        self.node.dictionary()
+    }
+
+    /// The values, to write as the drive itself.
+    #[inline]
+    pub const fn values_mut(&mut self) -> &mut Dictionary<N> {
+        self.node.dictionary_mut()
+    }
+
+    /// Supplied and started.
+    #[inline]
+    pub const fn is_running(&self) -> bool {
+        self.running
+    }
+
+    /// Bit rate in use.
+    pub const fn bitrate(&self) -> Bitrate {
+        self.bitrate
+    }
+
+    /// Supply voltage arrives, and this is found in the EEPROM. [`restart`](Self::restart) and [`boot`](Self::boot) follow.
+    pub fn power_on(&mut self, image: Image) {
+        self.store.reopen(image);
+    }
+
+    /// Supply voltage is gone.
+    pub fn power_off(&mut self) {
+        self.running = false;
+        self.node.power_off();
+    }
+
+    /// The values that a restart finds. An unreadable store leaves factory values.
+    pub fn stored_values(&self) -> Dictionary<N> {
+        let mut values = Dictionary::new(self.profile.table, NodeId::MIN);
+        let _ = self.store.load(&mut values, |_| true);
+        values
+    }
+
+    /// Starts over with the stored values. [`boot`](Self::boot) follows, when the drive has put its own on top.
+    pub fn restart(&mut self, node_id: NodeId, bitrate: Bitrate, now: Instant) {
+        self.node = Node::new(self.profile, node_id);
+        let _ = self.store.load(self.node.dictionary_mut(), |_| true);
+        self.eeprom_ok = true;
+        self.running = true;
+        self.bitrate = bitrate;
+        self.next_task = now.plus_nanos(self.task_period_ns);
+    }
+
+    /// Communication begins with the values that are there.
+    pub fn boot(&mut self, now: Instant) {
+        self.node.boot(now);
+    }
+
+    /// NMT reset communication: 1000h to 1FFFh as at power-on, but for the error register; all else and the node-ID go on.
+    pub fn restart_communication(&mut self, now: Instant) {
+        let error_register = self.error_register().map(|slot| (slot, self.values().raw(slot)));
+        self.node.restore_communication_defaults();
+        let _ = self.store.load(self.node.dictionary_mut(), Entry::is_communication);
+        if let Some((slot, register)) = error_register {
+            self.node.dictionary_mut().set_raw(slot, register);
+        }
+        self.node.boot(now);
+    }
+
+    /// What happened since, in the order of arrival.
+    #[inline]
+    pub fn poll_event(&mut self) -> Option<NodeEvent> {
+        self.node.poll_event()
+    }
+
+    /// See [`Node::last_addressed`].
+    pub const fn last_addressed(&self) -> Option<Instant> {
+        self.node.last_addressed()
+    }
+
+    /// True once each task period. The task keeps its grid unless it was not called for long.
+    #[inline]
+    pub fn is_task_due(&mut self, now: Instant) -> bool {
+        if !self.running || now < self.next_task {
+            return false;
+        }
+        let next = self.next_task.plus_nanos(self.task_period_ns);
+        self.next_task = if next > now { next } else { now.plus_nanos(self.task_period_ns) };
+        true
+    }
+
+    /// The values have changed: event-driven TPDOs become due.
+    #[inline]
+    pub fn notice_changes(&mut self, now: Instant) {
+        self.node.notice_changes(now);
+    }
+
+    /// Contents of the EEPROM, and a number that changes with them.
+    pub fn eeprom(&self) -> (&[u8], u32) {
+        let (image, generation) = self.store.image();
+        (&image.0, generation)
+    }
+
+    /// Whether the EEPROM answers, as measured. Nothing is written while it does not.
+    #[inline]
+    pub const fn set_eeprom_ok(&mut self, ok: bool) {
+        self.eeprom_ok = ok;
+    }
+
+    /// The EEPROM answers, and what it holds can be read.
+    #[inline]
+    pub fn is_eeprom_sound(&self) -> bool {
+        self.eeprom_ok && self.store.is_readable()
+    }
+
+    /// Has a row's value stored with the next [`commit`](Self::commit), if it is a row to be stored at all.
+    #[inline]
+    pub fn mark(&mut self, slot: Slot) {
+        self.store.mark(self.profile.table, slot);
+    }
+
+    /// Has all stored rows stored with the next [`commit`](Self::commit).
+    pub fn mark_all(&mut self) {
+        self.store.mark_all(self.profile.table);
+    }
+
+    /// Stores what is marked. While the EEPROM does not answer it waits.
+    #[inline]
+    pub fn commit(&mut self) {
+        if self.eeprom_ok {
+            self.store.commit(self.node.dictionary());
+        }
+    }
+
+    /// Everything in the EEPROM becomes as delivered. Parameters do at once, communication objects with the next restart:
+    /// until then they show what the device does. False if the EEPROM does not answer; nothing is changed then.
+    pub fn restore_factory_settings(&mut self) -> bool {
+        if !self.eeprom_ok {
+            return false;
+        }
+        let (table, node_id) = (self.profile.table, self.node.node_id());
+        self.store.format(&Dictionary::<N>::new(table, node_id));
+        for (slot, _) in table.iter().filter(|(_, row)| row.stored && !row.is_communication()) {
+            self.node.dictionary_mut().restore_default(slot, node_id);
+        }
+        true
+    }
+
+    /// Sends an EMCY message for each new fault; the error register shows all that are latched.
+    pub fn tell_faults<const F: usize>(&mut self, new: FaultSet, faults: &FaultMonitor<F>, now: Instant) {
+        for row in new.rows() {
+            self.node.raise_emcy(faults.row(row).emcy, faults.error_register(), [0; 5], now);
+        }
+    }
+
+    /// After a reset of faults: the error register shows what is left, and EMCY tells when nothing is.
+    pub fn tell_reset<const F: usize>(&mut self, faults: &FaultMonitor<F>, now: Instant) {
+        if let Some(slot) = self.error_register() {
+            self.node.dictionary_mut().set_raw(slot, u32::from(faults.error_register()));
+        }
+        if faults.latched().is_empty() {
+            self.node.raise_emcy(EmcyErrorCode::NO_ERROR, 0, [0; 5], now);
+        }
+    }
+
+    fn error_register(&self) -> Option<Slot> {
+        self.profile.table.find(Mux::new(0x1001, 0)).ok()
+    }
+}
+
+impl<const N: usize> Station for Device<N> {
+    #[inline]
+    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
+        if self.running {
+            self.node.handle_frame(frame, now);
+        }
+    }
+
+    #[inline]
+    fn handle_timeout(&mut self, now: Instant) {
+        if self.running {
+            self.node.handle_timeout(now);
+        }
+    }
+
+    #[inline]
+    fn poll_transmit(&mut self) -> Option<Frame> {
+        self.node.poll_transmit()
+    }
+
+    #[inline]
+    fn poll_timeout(&self) -> Option<Instant> {
+        let task = self.running.then_some(self.next_task)?;
+        Some(self.node.poll_timeout().map_or(task, |deadline| deadline.min(task)))
+    }
+
+    fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
+        self.node.handle_transmitted(frame, now);
+    }
+}
+
+/// What a drive does with what its device hears.
+pub(crate) trait Application<const N: usize> {
+    /// The device.
+    fn device(&mut self) -> &mut Device<N>;
+
+    /// A peer wrote `raw` to `slot`. True if it was a command: the status is shown anew once the whole frame has been taken.
+    fn written(&mut self, slot: Slot, raw: u32, via: Via, now: Instant) -> bool;
+
+    /// Puts the status into the dictionary.
+    fn publish_status(&mut self);
+
+    /// NMT reset node: starts the firmware over with the stored values.
+    fn restart(&mut self, now: Instant);
+
+    /// NMT reset communication: the motor goes on.
+    fn restart_communication(&mut self, now: Instant) {
+        self.device().restart_communication(now);
+    }
+
+    /// Every task period.
+    fn communication_task(&mut self, now: Instant);
+
+    /// Acts on all that the device has heard.
+    #[inline]
+    fn handle_events(&mut self, now: Instant) {
+        let mut commanded = false;
+        while let Some(event) = self.device().poll_event() {
+            match event {
+                NodeEvent::Written { slot, raw, via } => commanded |= self.written(slot, raw, via, now),
+                NodeEvent::ResetNode => self.restart(now),
+                NodeEvent::ResetCommunication => self.restart_communication(now),
+                NodeEvent::Nmt(_) | NodeEvent::Sync | NodeEvent::RpdoTooShort(_) => {}
+            }
+        }
+        if commanded {
+            self.publish_status();
+        }
+    }
+}
+
+/// [`Station`] for a drive that is an [`Application`] over its field `device`.
+macro_rules! station {
+    ($drive:ty) => {
+        impl can::Station for $drive {
+            fn handle_frame(&mut self, frame: &can::Frame, now: can::Instant) {
+                self.device.handle_frame(frame, now);
+                self.handle_events(now);
+            }
+
+            fn handle_timeout(&mut self, now: can::Instant) {
+                self.device.handle_timeout(now);
+                self.handle_events(now);
+                if self.device.is_task_due(now) {
+                    self.communication_task(now);
+                }
+            }
+
+            fn poll_transmit(&mut self) -> Option<can::Frame> {
+                self.device.poll_transmit()
+            }
+
+            fn poll_timeout(&self) -> Option<can::Instant> {
+                self.device.poll_timeout()
+            }
+
+            fn handle_transmitted(&mut self, frame: &can::Frame, now: can::Instant) {
+                self.device.handle_transmitted(frame, now);
+            }
+        }
+    };
+}
+pub(crate) use station;

@@ -1,0 +1,78 @@
+//! The CiA 402 objects that mean the same in both drives, in physical units: speeds in r/min, ramps as times in ms.
+
+use canopen::od::{Dictionary, Object, Table};
+use cia402::{DisableOperationOption, HaltOption, QuickStopOption, ShutdownOption};
+
+use crate::engine::axis::{AxisParameters, Tolerances};
+use crate::engine::modes::{HomingParameters, VelocityRamps};
+use crate::engine::power::StepDownOptions;
+use crate::engine::trajectory::MoveLimits;
+
+/// Where a drive's table has them.
+pub(crate) struct ProfileObjects {
+    quick_stop_option_code: Object<i16>,
+    shutdown_option_code: Object<i16>,
+    disable_operation_option_code: Object<i16>,
+    halt_option_code: Object<i16>,
+    profile_velocity: Object<u32>,
+    end_velocity: Object<u32>,
+    profile_acceleration: Object<u32>,
+    profile_deceleration: Object<u32>,
+    quick_stop_deceleration: Object<u32>,
+}
+
+impl ProfileObjects {
+    /// Those of `table`.
+    pub(crate) const fn of(table: &Table) -> Self {
+        Self {
+            quick_stop_option_code: table.object(0x605A, 0),
+            shutdown_option_code: table.object(0x605B, 0),
+            disable_operation_option_code: table.object(0x605C, 0),
+            halt_option_code: table.object(0x605D, 0),
+            profile_velocity: table.object(0x6081, 0),
+            end_velocity: table.object(0x6082, 0),
+            profile_acceleration: table.object(0x6083, 0),
+            profile_deceleration: table.object(0x6084, 0),
+            quick_stop_deceleration: table.object(0x6085, 0),
+        }
+    }
+
+    /// Ramps, speeds and option codes, with nothing that only one of the drives has. `speed` turns r/min into counts/s, no
+    /// faster than the drive allows.
+    pub(crate) fn axis<const N: usize>(
+        &self,
+        values: &Dictionary<N>,
+        start_rpm: u16,
+        max_rpm: f64,
+        speed: impl Fn(f64) -> f64,
+    ) -> AxisParameters {
+        let time_s = |object| f64::from(values.get(object)) * 1e-3;
+        let (start_speed, max_speed) = (speed(f64::from(start_rpm)), speed(max_rpm));
+        let (acceleration_time_s, deceleration_time_s) =
+            (time_s(self.profile_acceleration), time_s(self.profile_deceleration));
+        AxisParameters {
+            moves: MoveLimits {
+                start_speed,
+                max_speed: speed(f64::from(values.get(self.profile_velocity))),
+                end_speed: speed(f64::from(values.get(self.end_velocity))),
+                acceleration_time_s,
+                deceleration_time_s,
+            },
+            velocity: VelocityRamps { start_speed, max_speed, acceleration_time_s, deceleration_time_s },
+            quick_stop_time_s: time_s(self.quick_stop_deceleration),
+            torque_slope_a_s: 0.0,
+            quick_stop: QuickStopOption(values.get(self.quick_stop_option_code)),
+            step_down: StepDownOptions {
+                shutdown: ShutdownOption(values.get(self.shutdown_option_code)),
+                disable_operation: DisableOperationOption(values.get(self.disable_operation_option_code)),
+            },
+            halt: HaltOption(values.get(self.halt_option_code)),
+            lock_when_disabled: false,
+            hold_when_switched_on: false,
+            limit_stop: None,
+            homing: HomingParameters::default(),
+            release_after_external_stop: false,
+            tolerances: Tolerances { position: 0, velocity: 0.0, current_a: 0.0 },
+        }
+    }
+}

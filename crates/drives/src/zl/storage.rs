@@ -1,0 +1,29 @@
+//! How parameters are stored: the register parameter setting (2009h of the ZLAC8030L, 2010h of the ZLIM42-C) and the object
+//! that has each write stored (2010h and 200Ch).
+
+use canopen::od::{Object, Slot};
+
+use super::model::{RESTORE, SAVE};
+use crate::engine::device::Device;
+
+/// A write to the register parameter setting, which reads 0 again when it is done. True if all is as delivered now.
+#[cold]
+pub(crate) fn register_command<const N: usize>(device: &mut Device<N>, register: Object<u16>, command: u32) -> bool {
+    device.values_mut().set(register, 0);
+    match command {
+        RESTORE => device.restore_factory_settings(),
+        SAVE => {
+            device.mark_all();
+            false
+        }
+        _ => false,
+    }
+}
+
+/// A peer's write to a row: stored by the next task if each write is.
+#[inline]
+pub(crate) fn note_write<const N: usize>(device: &mut Device<N>, save_on_write: Object<u16>, slot: Slot) {
+    if device.values().get(save_on_write) == 0 {
+        device.mark(slot);
+    }
+}
