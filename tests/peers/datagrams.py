@@ -6,8 +6,11 @@ import time
 from checks import equal
 
 
-def replay(bench, section):
-    """Sends a section's requests in order and compares the drive's answers; NMT and SYNC have none."""
+def replay(bench, section, patience_s=0):
+    """Sends a section's requests in order and compares the drive's answers; NMT and SYNC have none.
+
+    A printed answer may tell that a move is over. With patience, its request is sent again until that is so.
+    """
     for row in bench.drive.rows("datagrams.csv"):
         if row["section"] != section or not row["request_cob"]:
             continue
@@ -17,12 +20,20 @@ def replay(bench, section):
             bench.send(cob, request)
             time.sleep(0.05)
             continue
-        mark = bench.trace.mark()
-        bench.send(cob, request)
-        frame = bench.trace.wait(int(row["response_cob"], 16), mark, 3.0, f"an answer to {row['request']}")
-        got = bytes(frame.data).hex(" ").upper()
-        equal(masked(got, row["answer"]), row["answer"], f"answer to {row['request']} ({row['meaning']})")
+        ask = lambda: masked(answer_to(bench, row, request), row["answer"])
+        got = ask()
+        end = bench.now() + patience_s
+        while got != row["answer"] and bench.now() < end:
+            got = ask()
+        equal(got, row["answer"], f"answer to {row['request']} ({row['meaning']})")
     equal(bench.read(0x1000), bench.drive.device_type, "1000h at the end")
+
+
+def answer_to(bench, row, request):
+    mark = bench.trace.mark()
+    bench.send(int(row["request_cob"], 16), request)
+    frame = bench.trace.wait(int(row["response_cob"], 16), mark, 3.0, f"an answer to {row['request']}")
+    return bytes(frame.data).hex(" ").upper()
 
 
 def sections(drive):

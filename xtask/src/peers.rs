@@ -1,4 +1,4 @@
-//! Other people's CANopen software against ours: canopen-python and python-can talk to `ferrodrive sim` over TCP.
+//! Other people's software against ours: canopen-python, python-can and pymodbus talk to `ferrodrive sim`.
 //!
 //! The Python packages go into a private environment under `target/`, in pinned versions, and stay there for the next
 //! run. A machine without Python or without a network skips this step and says so; it never fails for that.

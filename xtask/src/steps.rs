@@ -27,7 +27,7 @@ pub(crate) const STEPS: &[Step] = &[
         does: "ferrodrive demo: the manuals' procedures against the virtual drives",
         run: program::demo,
     },
-    Step { name: "peers", does: "canopen-python and python-can against ferrodrive sim", run: peers::run },
+    Step { name: "peers", does: "canopen-python, python-can and pymodbus against ferrodrive sim", run: peers::run },
 ];
 
 /// The target of the `no_std` step: a Cortex-M4F microcontroller, which has no operating system to lean on.
