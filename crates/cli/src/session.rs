@@ -5,6 +5,7 @@ use std::error::Error;
 use std::future::pending;
 use std::time::Duration;
 
+use canopen::{Mux, NodeId};
 use master::Network;
 use tokio::sync::Notify;
 use transport::{BusSpec, WallClock, run_station};
@@ -21,6 +22,13 @@ const VIRTUAL_LIMIT: Duration = Duration::from_secs(24 * 3600);
 
 /// How long stopping may take after Ctrl-C.
 const STOP_PATIENCE: Duration = Duration::from_secs(2);
+
+/// How often the position is looked at until the shaft stands, and what it may vary by, in counts: an encoder of 32768
+/// counts a turn has 11 of them in this time at 1 r/min.
+const STANDSTILL_POLL: Duration = Duration::from_millis(20);
+const STANDSTILL_COUNTS: u32 = 11;
+
+const POSITION_ACTUAL: Mux = Mux::new(0x6064, 0);
 
 /// Runs `command` on the bus of the command line.
 pub(crate) fn run<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Result<R, Failure>) -> Result<R, Failure> {
@@ -131,11 +139,27 @@ async fn stop_what_moves(context: &Context, mut failure: Failure) -> Failure {
     let stopping = tokio::time::timeout(STOP_PATIENCE, context.network.stop_all_moved());
     for (node, stopped) in stopping.await.unwrap_or_default() {
         failure = match stopped {
-            Ok(()) => failure.because(format!("node {node} was moving and has been quick-stopped")),
+            Ok(()) => {
+                let _ = tokio::time::timeout(STOP_PATIENCE, standstill(context, node)).await;
+                failure.because(format!("node {node} was moving and has been quick-stopped"))
+            }
             Err(error) => failure.because(format!("node {node} may still be moving: {error}")),
         };
     }
     failure
+}
+
+/// Waits until the position of a node rests, or it does not tell it.
+async fn standstill(context: &Context, node: NodeId) {
+    let handle = context.node(node);
+    let mut before = None;
+    while let Ok(position) = handle.read::<i32>(POSITION_ACTUAL).await {
+        if before.is_some_and(|before: i32| position.abs_diff(before) <= STANDSTILL_COUNTS) {
+            return;
+        }
+        before = Some(position);
+        context.network.sleep(STANDSTILL_POLL).await;
+    }
 }
 
 /// A failure of the bus itself, with every cause that is known.

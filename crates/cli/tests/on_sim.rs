@@ -114,8 +114,48 @@ fn a_torque_is_refused_where_the_model_has_no_such_mode() {
     for node in ["1", "2"] {
         let ended = ferrodrive(&["torque", node, "500mA"]);
         assert_eq!(ended.status, Some(1));
-        assert!(ended.err.contains("has no mode"), "{}", ended.err);
+        assert!(
+            ended.err.contains("has no mode 4 (profile torque): its 6060h takes 1 (profile position)"),
+            "{}",
+            ended.err
+        );
     }
+}
+
+#[test]
+fn a_value_that_is_refused_is_told_with_what_the_object_takes() {
+    let said = |arguments: &[&str], status| {
+        let ended = ferrodrive(arguments);
+        assert_eq!(ended.status, Some(status), "{arguments:?}: {}", ended.err);
+        ended.err
+    };
+    // "M Robot Joint Motor CanOpen Manual", 5.04: 60FFh is -3000 to 3000 r/min.
+    let error = said(&["write", "1", "60FF", "99999"], 1);
+    assert!(error.contains("60FFh:00 target_velocity takes -3000 to 3000 in units of r/min"), "{error}");
+    // "ZLIM42-C user manual V1.03", 5.3.6: methods 17, 18, 24 and 29.
+    for error in [said(&["write", "2", "6098", "99"], 1), said(&["home", "2", "--method", "99"], 2)] {
+        assert!(["17 (", "18 (", "24 (", "29 ("].iter().all(|method| error.contains(method)), "{error}");
+    }
+}
+
+#[test]
+fn texts_say_a_thing_once() {
+    assert_eq!(done(&["write", "4", "60FF", "60rpm"]).out, "node 4 60FFh:00 target_velocity written: 60 r/min\n");
+    let refused = ferrodrive(&["home", "4", "--method", "17"]).err;
+    assert!(
+        refused.contains("6060h takes 1 (profile position), 3 (profile velocity), 4 (profile torque) only"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn a_joint_is_operational_by_itself_and_its_statusword_in_its_own_words() {
+    let nodes = done(&["--json", "scan"]).json()["nodes"].clone();
+    let states: Vec<_> = nodes.as_array().unwrap().iter().map(|node| node["nmt_state"].as_str().unwrap()).collect();
+    assert_eq!(states, ["operational", "pre-operational", "pre-operational"]);
+    assert_eq!(done(&["--json", "state", "1"]).json()["nmt_state"], "operational");
+    let read = done(&["read", "1", "statusword"]).out;
+    assert_eq!(read, "node 1 6041h:00 statusword = 0x404 (1028)  output enabled, target reached\n");
 }
 
 #[test]

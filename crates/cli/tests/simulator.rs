@@ -2,7 +2,7 @@
 
 mod common;
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use common::{Simulator, done, ferrodrive, scratch};
 use serde_json::json;
@@ -122,34 +122,6 @@ fn a_bus_that_is_not_there_is_a_failure_with_the_reason() {
     let ended = ferrodrive(&["--bus", "socketcand://127.0.0.1:1/can0", "scan"]);
     assert_eq!(ended.status, Some(1));
     assert!(ended.err.contains("cannot connect"), "{}", ended.err);
-}
-
-#[cfg(unix)]
-#[test]
-fn ctrl_c_stops_the_motor_first_and_ends_with_130() {
-    let mut simulator = simulator(&[]);
-    let bus = simulator.bus("socketcand");
-    let mut turning = std::process::Command::new(env!("CARGO_BIN_EXE_ferrodrive"))
-        .args(["--bus", &bus, "--model", "4=zlac8030l", "velocity", "4", "100rpm", "--for", "60s"])
-        .stderr(std::process::Stdio::null())
-        .spawn()
-        .unwrap();
-    wait_until(|| simulator.ask("4 get")["velocity_rpm"].as_f64().unwrap() > 90.0);
-    let interrupted = std::process::Command::new("kill").args(["-INT", &turning.id().to_string()]).status().unwrap();
-    assert!(interrupted.success());
-    assert_eq!(turning.wait().unwrap().code(), Some(130));
-    // Quick stop active: the low byte of the statusword is 17h.
-    let get = simulator.ask("4 get");
-    assert_eq!(get["statusword"].as_u64().unwrap() & 0x6F, 0x07, "{get}");
-    wait_until(|| simulator.ask("4 get")["velocity_rpm"].as_f64().unwrap().abs() < 1.0);
-}
-
-fn wait_until(mut condition: impl FnMut() -> bool) {
-    let begin = Instant::now();
-    while !condition() {
-        assert!(begin.elapsed() < Duration::from_secs(20), "it does not come about");
-        std::thread::sleep(Duration::from_millis(20));
-    }
 }
 
 #[test]

@@ -154,6 +154,14 @@ pub enum PowerStyle {
 }
 
 impl PowerStyle {
+    /// True if the statusword tells of a fault, or of an alarm, which need not have stopped the drive.
+    pub const fn is_faulted(self, statusword: Statusword) -> bool {
+        match self {
+            Self::Cia402 => matches!(statusword.state(), Some(PowerState::Fault)),
+            Self::Mirror { alarm, .. } => statusword.has(alarm),
+        }
+    }
+
     /// The power state that a statusword shows, or the one of CiA 402 that comes closest: an alarm is a fault only when
     /// it has taken the power off the motor, and a live motor that follows nobody is switched on.
     pub const fn state(self, statusword: Statusword) -> Option<PowerState> {

@@ -144,7 +144,7 @@ pub enum Error {
         model: &'static str,
     },
     /// The model does not have this mode.
-    #[error("node {node}: the {model} has no mode {mode}")]
+    #[error("node {node}: the {model} has no mode {mode}: its 6060h takes {}", list(modes))]
     NoSuchMode {
         /// The node.
         node: NodeId,
@@ -152,10 +152,12 @@ pub enum Error {
         model: &'static str,
         /// The mode.
         mode: ModeOfOperation,
+        /// Those that it has.
+        modes: &'static [ModeOfOperation],
     },
     /// A value is outside what the model takes: nothing was sent.
-    #[error("node {node}: {asked} is out of range for {mux} ({title}), which takes {low} to {high}{}{unit}. \
-             Nothing was sent", if unit.is_empty() { "" } else { " in units of " })]
+    #[error("node {node}: {asked} is out of range for {mux} ({title}), which takes {}{}{unit}. Nothing was sent",
+        range(*low, *high, listed), if unit.is_empty() { "" } else { " in units of " })]
     OutOfLimits {
         /// The node.
         node: NodeId,
@@ -171,6 +173,8 @@ pub enum Error {
         low: i64,
         /// Largest value.
         high: i64,
+        /// The only values, with what they mean, where not all between are taken.
+        listed: &'static [(i64, &'static str)],
     },
 }
 
@@ -230,6 +234,18 @@ impl fmt::Display for Hints {
             }
         }
     }
+}
+
+fn list(items: &[impl fmt::Display]) -> String {
+    items.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+}
+
+/// The values that an object takes.
+fn range(low: i64, high: i64, listed: &[(i64, &str)]) -> String {
+    if listed.is_empty() {
+        return format!("{low} to {high}");
+    }
+    list(&listed.iter().map(|(value, meaning)| format!("{value} ({meaning})")).collect::<Vec<_>>())
 }
 
 /// What to do about an abort code.

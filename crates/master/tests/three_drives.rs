@@ -270,6 +270,24 @@ fn a_blocked_joint_is_explained_by_its_alarm_and_enabled_after_a_reset() {
 }
 
 #[test]
+fn an_alarm_that_stops_nothing_is_reset_or_explained_and_does_not_stop_the_joint() {
+    let (mut world, network, [joint, ..]) = bench();
+    block_on(&mut world, joint.velocity(Rpm(60.0), slowly())).unwrap().unwrap();
+    world.with_drive(JOINT, |drive, now| drive.set_battery(false, now)).unwrap().unwrap();
+    block_on(&mut world, network.sleep(Duration::from_millis(100))).unwrap();
+    // 10h: the turns are unknown until an origin is set ("M Robot Joint Motor CanOpen Manual", 5.12).
+    let error = block_on(&mut world, joint.reset_fault()).unwrap().unwrap_err();
+    assert!(error.to_string().contains("battery lost") && error.to_string().contains("60006"), "{error}");
+    block_on(&mut world, joint.supervise(Duration::from_millis(500))).unwrap().unwrap();
+    assert!(world.report(JOINT).unwrap().velocity_rpm > 50.0);
+    for step in [60_006_u16, 60_016] {
+        block_on(&mut world, joint.node().write(mux(0x260A, 0), step)).unwrap().unwrap();
+    }
+    block_on(&mut world, joint.reset_fault()).unwrap().unwrap();
+    assert_eq!(block_on(&mut world, joint.state()).unwrap().unwrap().fault_code, 0);
+}
+
+#[test]
 fn saving_a_zlac_writes_2009h_2_and_the_same_bytes_set_250_kbit_s_on_a_zlim42_c() {
     let (mut world, _, [_, stepper, servo]) = bench();
     let tap = world.add_tap();

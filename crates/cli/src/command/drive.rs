@@ -183,6 +183,18 @@ impl StateReport {
         parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
 
+    /// Faults and what to do about them; nothing without one. `gap` lines the texts up with others.
+    pub(crate) fn fault_lines(&self, paint: Paint, gap: &str) -> Vec<String> {
+        if self.fault_code != 0 && self.faults.is_empty() {
+            return vec![format!("  fault {gap}{}", paint.bad(&format!("{:04X}h", self.fault_code)))];
+        }
+        let lines = self.faults.iter().flat_map(|fault| {
+            let name = paint.bad(&format!("{:04X}h {}", fault.code, fault.name));
+            [format!("  fault {gap}{name}"), format!("  remedy{gap}{}", fault.remedy)]
+        });
+        lines.collect()
+    }
+
     fn power(&self) -> String {
         let parts = [
             self.supply_v.map(|supply| format!("{supply:.1} V")),
@@ -199,15 +211,9 @@ impl Report for StateReport {
         let model = self.model.map(|model| format!(" ({model})")).unwrap_or_default();
         let mut lines = vec![format!("node {}{model}: {}, {mode}", self.node, paint.strong(self.state))];
         lines.push(format!("  statusword  {:04X}h  {}", self.statusword, self.bits.join(", ")));
+        lines.extend(self.fault_lines(paint, "      "));
         if self.fault_code == 0 {
             lines.push("  fault       none".into());
-        }
-        if self.fault_code != 0 && self.faults.is_empty() {
-            lines.push(format!("  fault       {}", paint.bad(&format!("{:04X}h", self.fault_code))));
-        }
-        for fault in &self.faults {
-            let name = paint.bad(&format!("{:04X}h {}", fault.code, fault.name));
-            lines.push(format!("  fault       {name}\n  remedy      {}", fault.remedy));
         }
         lines.push(format!("  motion      {}", self.motion()));
         lines.push(format!("  power       {}", self.power()));

@@ -243,6 +243,7 @@ impl Report for MotionOutcome {
         let mut lines = vec![format!("node {}: {}: {reached}{then}", self.state.node, self.asked)];
         lines.push(format!("  at      {}", self.state.motion()));
         lines.push(format!("  limits  {}", self.limits.text()));
+        lines.extend(self.state.fault_lines(paint, "  "));
         lines.extend(self.notes.iter().map(|note| format!("  note    {note}")));
         lines.join("\n")
     }

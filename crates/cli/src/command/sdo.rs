@@ -1,11 +1,10 @@
 //! `ferrodrive read` and `ferrodrive write`: one object of a node by SDO (CiA 301, clause 7.2.4).
 
 use canopen::od::Entry;
-use canopen::{Mux, NodeId};
-use serde::Serialize;
-
-use master::Drive;
+use canopen::{AbortCode, Mux, NodeId};
 use master::decode::common_row;
+use master::{Drive, Error};
+use serde::Serialize;
 
 use crate::context::Context;
 use crate::decode::{Decoded, decode};
@@ -94,9 +93,29 @@ impl Write {
         context.tell_guess(&drive);
         let bytes = data_type.raw(number).to_le_bytes();
         let bytes = &bytes[..data_type.size()];
-        drive.node().download(mux, bytes).await?;
+        drive.node().download(mux, bytes).await.map_err(|error| with_limits(error, row))?;
         Ok(ObjectReport::new(&drive, mux, row, bytes, true))
     }
+}
+
+/// A refusal of a value, with what the object takes.
+fn with_limits(error: Error, row: Option<&Entry>) -> Failure {
+    let by_value = [AbortCode::INVALID_VALUE, AbortCode::VALUE_TOO_HIGH, AbortCode::VALUE_TOO_LOW];
+    let refused = matches!(error, Error::Aborted { code, .. } if by_value.contains(&code));
+    let failure = Failure::from(error);
+    match row.filter(|_| refused) {
+        Some(row) => failure.next(format!("{} {} takes {}", row.mux(), row.name, accepted(row))),
+        None => failure,
+    }
+}
+
+fn accepted(row: &Entry) -> String {
+    if row.values.is_empty() {
+        let (low, high) = row.limits.unwrap_or(row.data_type.range());
+        let unit = if row.unit.is_empty() { String::new() } else { format!(" in units of {}", row.unit) };
+        return format!("{low} to {high}{unit}");
+    }
+    row.values.iter().map(|(value, meaning)| format!("{value} ({meaning})")).collect::<Vec<_>>().join(", ")
 }
 
 /// The multiplexor, and the row if the node's model is known and has it.

@@ -6,6 +6,7 @@ use cia402::ModeOfOperation;
 
 use super::faults::FAULTS;
 use super::objects::TABLE;
+use super::statusword::{EXTERNAL_STOP, IN_POSITION, RUNNING};
 use crate::profile::{CountsPerTurn, DriveProfile, Faults, PowerStyle, Quantity, Quirk, Units};
 use crate::zl;
 
@@ -23,7 +24,7 @@ pub static PROFILE: DriveProfile = DriveProfile {
     modes: &[ModeOfOperation::PROFILE_POSITION, ModeOfOperation::PROFILE_VELOCITY, ModeOfOperation::PROFILE_TORQUE],
     mode_display: Mux::new(0x6061, 0),
     power: PowerStyle::Cia402,
-    statusword_bits: &[],
+    statusword_bits: &[(IN_POSITION, "in position"), (RUNNING, "running"), (EXTERNAL_STOP, "external stop")],
     homing: None,
     host_watchdog: Some(Mux::new(0x2000, 0)),
     units: Units {

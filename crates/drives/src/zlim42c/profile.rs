@@ -6,7 +6,7 @@ use cia402::{ModeOfOperation, Statusword};
 
 use super::faults::FAULTS;
 use super::objects::TABLE;
-use super::statusword::{ENERGISED, HOMING_ATTAINED, RUNNING};
+use super::statusword::{BIT_4_OF_CONTROLWORD, ENERGISED, HOMING_ATTAINED, IN_POSITION, RUNNING};
 use super::tables::PULSES_PER_TURN;
 use crate::profile::{
     BitPattern, CountsPerTurn, DriveProfile, Faults, HomingRules, HomingStart, PowerStyle, Quantity, Quirk, Units,
@@ -33,7 +33,7 @@ const fn profile(model: &'static str, title: &'static str) -> DriveProfile {
         modes: &[ModeOfOperation::PROFILE_POSITION, ModeOfOperation::PROFILE_VELOCITY, ModeOfOperation::HOMING],
         mode_display: Mux::new(0x6061, 0),
         power: PowerStyle::Cia402,
-        statusword_bits: &[(HOMING_ATTAINED, "homing attained"), (ENERGISED, "energised"), (RUNNING, "running")],
+        statusword_bits: STATUSWORD_BITS,
         homing: Some(HOMING),
         host_watchdog: None,
         units: UNITS,
@@ -43,6 +43,14 @@ const fn profile(model: &'static str, title: &'static str) -> DriveProfile {
         quirks: QUIRKS,
     }
 }
+
+const STATUSWORD_BITS: &[(u16, &str)] = &[
+    (HOMING_ATTAINED, "homing attained"),
+    (BIT_4_OF_CONTROLWORD, "controlword bit 4 set"),
+    (ENERGISED, "energised"),
+    (RUNNING, "running"),
+    (IN_POSITION, "in position"),
+];
 
 /// Bits of 5.3.6: at the end 10 is on and 14 off, and 8 tells whether the home position was found.
 const AT_THE_END: u16 = HOMING_ATTAINED | Statusword::TARGET_REACHED | RUNNING;

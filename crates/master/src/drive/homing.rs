@@ -44,8 +44,7 @@ impl Drive {
     pub async fn home(&self, method: i8, options: HomingOptions) -> Result<MotionReport, Error> {
         const INTENT: &str = "find its reference position";
         let profile = self.known(INTENT)?;
-        let (node, model, mode) = (self.node.id(), profile.title, ModeOfOperation::HOMING);
-        let rules = profile.homing.ok_or(Error::NoSuchMode { node, model, mode })?;
+        let rules = profile.homing.ok_or_else(|| self.no_such_mode(profile, ModeOfOperation::HOMING))?;
         self.write_number(rules.method, method.into()).await?;
         if let (Some(search), Some(Rpm(speed))) = (rules.search_speed, options.speed) {
             let raw = self.raw_quantity(search, speed.abs()).await?;
@@ -67,7 +66,7 @@ impl Drive {
         if rules.start == HomingStart::ControlwordBit4 {
             self.write_controlword(Controlword(ENABLED)).await?;
         }
-        self.node.network().note_stopped(node);
+        self.node.network().note_stopped(self.node.id());
         Ok(MotionReport { reached_after: Some(reached), notes })
     }
 

@@ -165,7 +165,7 @@ impl Drive {
     async fn set_mode(&self, mode: ModeOfOperation) -> Result<Option<Note>, Error> {
         let profile = self.known("set its mode")?;
         if !profile.modes.contains(&mode) {
-            return Err(Error::NoSuchMode { node: self.node.id(), model: profile.title, mode });
+            return Err(self.no_such_mode(profile, mode));
         }
         let before = self.mode().await?;
         if before == mode {
@@ -182,6 +182,10 @@ impl Drive {
             waited += POLL;
         }
         Ok(stopped.then_some(Note::StoppedFirst { before }))
+    }
+
+    const fn no_such_mode(&self, profile: &DriveProfile, mode: ModeOfOperation) -> Error {
+        Error::NoSuchMode { node: self.node.id(), model: profile.title, mode, modes: profile.modes }
     }
 
     async fn stop_if_turning(&self, profile: &DriveProfile) -> Result<bool, Error> {
@@ -238,8 +242,8 @@ impl Drive {
         let (low, high) = row.limits.unwrap_or(row.data_type.range());
         let listed = row.values.is_empty() || row.meaning(value).is_some();
         if value < low || value > high || !listed {
-            let (node, title, unit) = (self.node.id(), row.title, row.unit);
-            return Err(Error::OutOfLimits { node, mux, title, unit, asked: value, low, high });
+            let (node, title, unit, listed) = (self.node.id(), row.title, row.unit, row.values);
+            return Err(Error::OutOfLimits { node, mux, title, unit, asked: value, low, high, listed });
         }
         Ok(row)
     }

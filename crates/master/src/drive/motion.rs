@@ -124,8 +124,7 @@ impl Drive {
         const INTENT: &str = "set its torque";
         let profile = self.known(INTENT)?;
         let Some(target) = profile.units.target_current else {
-            let (node, model, mode) = (self.node.id(), profile.title, ModeOfOperation::PROFILE_TORQUE);
-            return Err(Error::NoSuchMode { node, model, mode });
+            return Err(self.no_such_mode(profile, ModeOfOperation::PROFILE_TORQUE));
         };
         let raw = self.raw_quantity(target, current.0).await?;
         let stopped = self.set_mode(ModeOfOperation::PROFILE_TORQUE).await?;

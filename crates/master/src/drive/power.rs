@@ -82,6 +82,7 @@ impl Drive {
         }
         // A fault has taken the power off already; a drive that mirrors its controlword would act on an old one after it.
         self.write_controlword(PowerCommand::DisableVoltage.controlword()).await?;
+        self.leave_homing().await?;
         if self.power_state(self.statusword().await?) != Some(PowerState::Fault) {
             let command = PowerCommand::DisableVoltage;
             self.wait_for(INTENT, command, STEP_TIMEOUT, |state| state == PowerState::SwitchOnDisabled).await?;
@@ -107,25 +108,33 @@ impl Drive {
         Ok(())
     }
 
-    /// Resets a fault: a rising edge of controlword bit 7 (transition 15).
+    /// Resets a fault or an alarm: a rising edge of controlword bit 7 (transition 15).
     ///
     /// # Errors
-    /// [`Error::NotReached`] with the fault's cause and remedy when it comes back.
+    /// [`Error::NotReached`] with the fault's cause and remedy when it stays or comes back.
     pub async fn reset_fault(&self) -> Result<(), Error> {
         const INTENT: &str = "reset its fault";
-        if self.power_state(self.statusword().await?) != Some(PowerState::Fault) {
+        let (style, statusword) = (self.power_style(), self.statusword().await?);
+        if !style.is_faulted(statusword) {
             return Ok(());
         }
-        self.write_controlword(Controlword(0)).await?;
-        self.write_controlword(PowerCommand::FaultReset.controlword()).await?;
+        let rest = match self.power_state(statusword) {
+            // A fault has taken the power off: what was commanded before must not come back by itself.
+            Some(PowerState::Fault) | None => Controlword(0),
+            // An alarm that has stopped nothing: who follows or holds goes on so.
+            Some(_) => Controlword(self.node.read::<u16>(super::CONTROLWORD).await? & !Controlword::FAULT_RESET),
+        };
+        self.write_controlword(rest).await?;
+        self.write_controlword(Controlword(rest.0 | Controlword::FAULT_RESET)).await?;
         let mut waited = Duration::ZERO;
-        while self.power_state(self.answered(INTENT, self.statusword().await).await?) == Some(PowerState::Fault) {
+        while style.is_faulted(self.answered(INTENT, self.statusword().await).await?) {
             if waited >= STEP_TIMEOUT {
+                self.write_controlword(rest).await?;
                 return Err(self.not_reached(INTENT, Trigger::Fault).await);
             }
             self.wait_poll(&mut waited).await;
         }
-        self.write_controlword(Controlword(0)).await
+        self.write_controlword(rest).await
     }
 
     /// Waits until the shaft stands still, as long as the drive's ramps may take.
