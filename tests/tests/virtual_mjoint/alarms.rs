@@ -49,7 +49,7 @@ fn a_time_of_0_never_raises_12h() {
 #[test]
 fn an_output_that_stays_at_its_limit_raises_14h_and_2601h_resets_it() {
     let mut bench = Bench::new();
-    // 10 % of 36 V / sqrt 3 in 0.44 ohm are under 5 A: the current's limit of 7 A is not reached.
+    // 10 % of 36 V / sqrt 3 in 0.44 ohm are under 5 A: the current's limit of 10 A is not reached.
     bench.set(0x2618, 0, 101);
     running(&mut bench);
     bench.tell("1 rotor lock");
@@ -146,4 +146,27 @@ fn the_alarm_output_and_the_leds_tell_of_alarms() {
     // One long flash in a round of 2.7 s; green flickers at 10 Hz.
     assert!((880..=920).contains(&red), "{red}");
     assert!((50..=56).contains(&green_changes), "{green_changes}");
+}
+
+#[test]
+fn green_flashes_while_the_battery_is_charged_and_the_drivers_temperature_is_shown() {
+    let mut bench = Bench::open();
+    // 4 mA charge a hundredth of a mA·h in 9 s.
+    bench.machine().assembly_mut().motor_mut().encoder.battery.charge_mah -= 0.01;
+    let changes = |bench: &mut Bench| {
+        let mut green = Vec::new();
+        for _ in 0..4000 {
+            bench.run_ms(1);
+            green.push(bench.report().outputs.iter().any(|(name, level)| name == "GREEN" && level));
+        }
+        green.windows(2).filter(|pair| pair[0] != pair[1]).count()
+    };
+    bench.run_ms(1000);
+    let charging = changes(&mut bench);
+    assert!((3..=12).contains(&charging), "slowly, that a person sees: {charging} in 4 s");
+    bench.run_ms(5000);
+    assert_eq!(changes(&mut bench), 0, "full");
+    bench.machine().assembly_mut().motor_mut().rig.heat_sink.hold_c = Some(61.6);
+    bench.run_ms(20);
+    assert_eq!(bench.get(0x2612, 0), 62);
 }

@@ -121,3 +121,72 @@ fn bit_31_of_a_cob_id_switches_a_pdo_off() {
     bench.send("301#0000000000000000");
     assert_eq!(bench.heard(), [""; 0]);
 }
+
+#[test]
+fn an_rpdo_that_is_too_short_has_no_effect_and_one_that_is_longer_is_taken() {
+    let mut bench = Bench::new();
+    bench.heard();
+    for short in ["201#2F000150C300", "301#50C30000E80300", "401#0F00035802", "501#50C300", "201#"] {
+        bench.send(short);
+        assert_eq!(bench.heard(), [""; 0], "{short}");
+    }
+    assert_eq!((bench.get(0x6040, 0), bench.get(0x607A, 0), bench.get(0x60FF, 0)), (0, 0, 0));
+    bench.heard();
+    bench.send("201#0F000150C30000FF");
+    assert!(bench.heard().iter().any(|frame| frame.starts_with("181#")));
+    assert_eq!((bench.get(0x6040, 0), bench.get(0x607A, 0)), (0x0F, 50_000));
+}
+
+#[test]
+fn remote_frames_are_answered_by_nothing() {
+    let mut bench = Bench::new();
+    bench.heard();
+    for remote in ["181#R", "281#R6", "701#R", "601#R8", "080#R", "201#R7"] {
+        bench.send(remote);
+        bench.run_ms(3);
+        assert_eq!(bench.heard(), [""; 0], "{remote}");
+    }
+}
+
+#[test]
+fn pre_operational_leaves_sdo_and_stops_pdos() {
+    let mut bench = Bench::new();
+    bench.send("000#8001");
+    bench.heard();
+    bench.send("301#0000000000000000");
+    assert_eq!(bench.heard(), [""; 0]);
+    assert_eq!(bench.statusword(), 0x0404);
+    bench.run_ms(1010);
+    assert!(bench.heard().contains(&"701#7F".to_string()));
+    for reset in ["000#8101", "000#8201"] {
+        bench.send(reset);
+        bench.run_ms(5);
+        assert_eq!(bench.heard(), ["701#00"], "{reset}");
+        bench.send("301#0000000000000000");
+        assert!(bench.heard().iter().any(|frame| frame.starts_with("281#")), "operational again by itself");
+    }
+}
+
+#[test]
+fn no_reset_clears_the_loss_of_the_host_and_a_time_of_0_watches_nothing() {
+    let mut bench = Bench::new();
+    bench.set(0x1016, 1, 0x007F_0064);
+    bench.send("77F#05");
+    bench.run_ms(150);
+    assert_eq!(bench.get(0x260E, 0), 0x20);
+    bench.set(0x6040, 0, 0x80);
+    bench.set(0x2601, 0, 0);
+    bench.set(0x2601, 0, 1);
+    bench.set(0x260E, 0, 0);
+    assert_eq!(bench.get(0x260E, 0), 0x20);
+    bench.set(0x1016, 1, 0x007F_0000);
+    assert_eq!(bench.get(0x260E, 0), 0, "nobody is watched any more");
+    bench.send("77F#05");
+    bench.run_ms(5000);
+    assert_eq!(bench.get(0x260E, 0), 0);
+    // Bits 24 to 31 are "invalid": node 7Fh is watched all the same.
+    bench.set(0x1016, 1, 0xAB7F_0064);
+    bench.send("77F#05");
+    bench.run_ms(150);
+    assert_eq!(bench.get(0x260E, 0), 0x20);
+}

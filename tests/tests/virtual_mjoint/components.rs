@@ -62,7 +62,7 @@ fn an_encoder_that_stands_still_looks_like_a_locked_rotor() {
     let stuck = bench.position();
     assert!((stuck - before).abs() < 2000, "{before} {stuck}");
     let current = bench.report().current_a;
-    assert!((current - 7.0).abs() < 0.3, "the speed that it does not see is asked for with all current: {current}");
+    assert!((current - 10.0).abs() < 0.5, "the speed that it does not see is asked for with all current: {current}");
     assert!(bench.report().velocity_rpm.abs() < 1.0, "the field stands, and the shaft with it");
     bench.until(5000, |bench| bench.get(0x260E, 0) == 0x12);
     assert_eq!(bench.position(), stuck);

@@ -149,3 +149,22 @@ fn homing_under_power_shows_the_mirrored_bits_and_position_mode_goes_on_from_the
     let turns = bench.report().shaft_angle_rad / core::f64::consts::TAU;
     assert!((turns * TURN as f64 + 4999.0).abs() < 45.0, "{turns}");
 }
+
+#[test]
+fn homing_that_cannot_begin_fails_at_once() {
+    let mut bench = Bench::new();
+    bench.set(0x2601, 0, 0);
+    bench.set(0x6060, 0, 6);
+    assert_eq!(bench.statusword(), 0x2400);
+    bench.run_ms(500);
+    assert_eq!((bench.statusword(), bench.report().velocity_rpm.abs() < 1.0), (0x2400, true));
+    bench.set(0x2601, 0, 1);
+    assert_eq!(bench.statusword(), 0x2404, "allowing the output begins nothing");
+    bench.set(0x6060, 0, 6);
+    assert_eq!(bench.statusword(), 0x0014, "the next write does");
+    let mut bench = Bench::new();
+    bench.tell("1 supply 60");
+    bench.run_ms(300);
+    bench.set(0x6060, 0, 6);
+    assert_eq!((bench.get(0x260E, 0), bench.statusword()), (0x15, 0x200C));
+}

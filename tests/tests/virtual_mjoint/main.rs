@@ -16,4 +16,5 @@ mod motion;
 mod objects;
 mod power_on;
 mod pulses;
+mod ratings;
 mod robustness;

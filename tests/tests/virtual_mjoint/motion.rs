@@ -102,7 +102,7 @@ fn halt_stops_within_milliseconds_and_holds_and_the_move_goes_on_afterwards() {
     bench.set(0x607A, 0, 30 * TURN);
     bench.run_ms(500);
     bench.set(0x6040, 0, 0x012F);
-    // 1000 r/min at the limit of 7 A: 0.69e-4 kg m² * 105 rad/s / (7 A * 0.149 N m/A) is 7 ms.
+    // 1000 r/min at the limit of 10 A: 0.69e-4 kg m² * 105 rad/s / (10 A * 0.149 N m/A) is 5 ms.
     bench.run_ms(40);
     assert!(bench.report().velocity_rpm.abs() < 10.0, "{}", bench.report().velocity_rpm);
     bench.run_ms(200);

@@ -113,3 +113,32 @@ fn zo_conducts_below_zero_and_60fdh_shows_the_pins() {
     bench.run_ms(3);
     assert_eq!(bench.get(0x60FD, 0), 3);
 }
+
+#[test]
+fn no_pulse_is_lost_at_the_highest_frequency() {
+    // "Maximum input pulse frequency 500 KHz": 1 : 1, that is 916 r/min.
+    let mut bench = Bench::new();
+    bench.set(0x6083, 0, 60_000);
+    bench.set(0x260A, 0, 1);
+    bench.set(0x260B, 0, 1);
+    bench.tell("1 pulses 400000 500000");
+    bench.run_ms(600);
+    assert!((bench.report().velocity_rpm - 915.5).abs() < 15.0, "{}", bench.report().velocity_rpm);
+    bench.run_ms(1000);
+    assert!((bench.position() - 400_000).abs() <= 12, "{}", bench.position());
+}
+
+#[test]
+fn an_internal_ramp_makes_a_sudden_pulse_frequency_gentle() {
+    // 1000 r/min at once; with 2000 (r/min)/s the motor takes half a second to it.
+    let speed_after_100_ms = |acceleration: i64| {
+        let mut bench = Bench::new();
+        bench.set(0x6083, 0, acceleration);
+        bench.tell("1 pulses 1000000 136533");
+        bench.run_ms(100);
+        bench.report().velocity_rpm
+    };
+    let (gentle, at_once) = (speed_after_100_ms(2000), speed_after_100_ms(60_000));
+    assert!((gentle - 200.0).abs() < 25.0, "{gentle}");
+    assert!((at_once - 1000.0).abs() < 30.0, "{at_once}");
+}

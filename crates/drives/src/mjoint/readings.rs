@@ -51,8 +51,9 @@ pub const POSITION_KP: i64 = 3000;
 /// 2618h as delivered: 60 % for 5 s.
 pub const STATIONARY_MAX_OUTPUT: i64 = 605;
 
-/// 261Dh as delivered: 7 A for 5 s. The M4230's rated torque takes 6.7 A of torque-producing current.
-pub const MAX_ALLOWABLE_CURRENT: i64 = 7005;
+/// 261Dh as delivered: 10 A, the most that it takes, for 5 s. The printed torques behind the reducers take 6.7 A of the
+/// M4230 and up to 8.5 A of the M8025.
+pub const MAX_ALLOWABLE_CURRENT: i64 = 10005;
 
 /// Over-voltage alarm ("Alarm over 52V").
 pub const OVER_VOLTAGE_V: f32 = 52.0;

@@ -97,7 +97,7 @@ impl MJoint {
         self.own_motion = OwnMotion::None;
         let (pu, dir) = (self.inputs.levels() & 1 != 0, self.inputs.levels() & 2 != 0);
         let run = self.parameters.homing_method.filter(|_| self.can_be_live()).map(|method| Run::new(method, pu, dir));
-        self.homing = run.map_or(Homing::None, Homing::Running);
+        self.homing = run.map_or(Homing::Failed, Homing::Running);
     }
 
     /// 607Ah: with bit 5 each write starts a move, and so does SYNC with the position of RPDO4. Else it waits.
