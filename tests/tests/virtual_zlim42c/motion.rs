@@ -234,3 +234,130 @@ fn a_target_beyond_its_range_is_refused() {
     assert!(bench.write(0x607A, 0, 1_000_001).is_err());
     assert_eq!(bench.get(0x607A, 0), 5000);
 }
+
+#[test]
+fn a_move_at_the_step_rate_limit_takes_its_closed_form() {
+    // 6081h = 3000 r/min at 25600 pulses a turn: 200 kHz, 468.75 r/min, is what there is.
+    let mut bench = Bench::new();
+    bench.set(0x2006, 0, 7);
+    bench.set(0x6081, 0, 3000);
+    bench.enable_in(1);
+    let pulses_s = 25_600.0 / 60.0;
+    let (start, top, end) = (5.0 * pulses_s, 200_000.0, 10.0 * pulses_s);
+    let ramps = 0.5 * (start + top) * 0.1 + 0.5 * (top + end) * 0.1;
+    let expected = 0.2 + (256_000.0 - ramps) / top;
+    let taken = duration_of(&mut bench, 256_000);
+    assert_within("seconds", taken, expected - 0.003, expected + 0.003);
+    bench.run_ms(2000);
+    let rotor = bench.report().rotor_position.expect("known here");
+    assert!((rotor - 256_000).abs() <= 16, "{rotor}: dry friction may hold it some pulses off");
+}
+
+#[test]
+fn a_motion_begins_at_200eh_and_a_move_ends_from_6082h() {
+    let mut bench = Bench::new();
+    for (index, value) in [(0x200E, 40), (0x6082, 30), (0x6081, 120), (0x6083, 500), (0x6084, 500)] {
+        bench.set(index, 0, value);
+    }
+    bench.enable_in(1);
+    bench.move_by(8000);
+    let mut speeds = Vec::new();
+    while bench.report().velocity_demand_rpm != Some(0.0) || speeds.is_empty() {
+        bench.run(LOOK);
+        speeds.extend(bench.report().velocity_demand_rpm.filter(|rpm| *rpm != 0.0));
+    }
+    // An S of 80 or 90 r/min in 0.5 s moves by 0.1 r/min in its first 10 ms.
+    assert_within("r/min at the beginning", speeds[0], 40.0, 40.2);
+    assert_within("r/min at the end", speeds[speeds.len() - 1], 30.0, 30.2);
+    assert_within("r/min in between", speeds.iter().copied().fold(0.0, f64::max), 119.9, 120.0);
+    bench.set(0x6060, 0, 3);
+    bench.set(0x60FF, 0, -120);
+    let first = bench.seconds_until(0.1, LOOK, |report| report.velocity_demand_rpm != Some(0.0));
+    assert!(first < 0.01, "{first} s");
+    assert_within("r/min", bench.report().velocity_demand_rpm.expect("enabled"), -40.2, -40.0);
+}
+
+#[test]
+fn a_reversal_ramps_down_by_6084h_and_up_by_6083h() {
+    let mut bench = Bench::new();
+    bench.set(0x6083, 0, 200);
+    bench.set(0x6084, 0, 400);
+    bench.enable_in(3);
+    bench.set(0x60FF, 0, 300);
+    bench.run_ms(500);
+    bench.set(0x60FF, 0, -300);
+    let down = bench.seconds_until(1.0, LOOK, |report| report.velocity_demand_rpm.is_some_and(|rpm| rpm <= 0.0));
+    let up = bench.seconds_until(1.0, LOOK, |report| report.velocity_demand_rpm == Some(-300.0));
+    // The answer to the write takes 0.5 ms of the first ramp.
+    assert_within("seconds down", down, 0.397, 0.402);
+    assert_within("seconds up", up, 0.197, 0.202);
+    bench.run_ms(10);
+    let told = [0x2001, 0x2002, 0x606C].map(|index| bench.get(index, 0));
+    assert_eq!(told, [1, -300, -300], "it runs, and both speeds have their sign");
+}
+
+#[test]
+fn a_second_set_point_waits_for_the_first_and_a_third_is_not_taken() {
+    let mut bench = Bench::new();
+    bench.enable_in(1);
+    let start = |bench: &mut Bench, target| {
+        bench.set(0x607A, 0, target);
+        bench.set(0x6040, 0, 0x0F);
+        bench.set(0x6040, 0, 0x1F);
+    };
+    start(&mut bench, 2000);
+    start(&mut bench, 500);
+    bench.set(0x6040, 0, 0x0F);
+    assert_ne!(bench.statusword() & ACKNOWLEDGED, 0, "the queue is full");
+    start(&mut bench, 9000);
+    let mut highest = 0;
+    while bench.statusword() & REACHED == 0 {
+        highest = highest.max(bench.report().position);
+    }
+    assert_eq!((highest, bench.get(0x6064, 0)), (2000, 500));
+}
+
+#[test]
+fn clearing_the_position_in_motion_changes_the_numbers_and_not_the_way() {
+    let mut bench = Bench::new();
+    bench.enable_in(1);
+    bench.move_by(8000);
+    bench.run_ms(400);
+    bench.set(0x2012, 0, 1);
+    bench.run_ms(2000);
+    let turns = bench.report().shaft_angle_rad / std::f64::consts::TAU;
+    assert_within("turns", turns, 1.999, 2.001);
+    assert_within("6064h", bench.get(0x6064, 0) as f64, 4000.0, 7900.0);
+    // A relative move goes on from there, an absolute one counts from the new zero.
+    let here = bench.get(0x6064, 0);
+    bench.set(0x6040, 0, 0x0F);
+    bench.move_by(400);
+    bench.run_ms(500);
+    assert_eq!(bench.get(0x6064, 0), here + 400);
+}
+
+#[test]
+fn full_steps_shake_the_rotor_at_its_resonance_far_more_than_fine_ones() {
+    use plant::stepper_motor::StepperMotorModel;
+    // The rotor rings at the root of stiffness over inertia: where full steps come as often, at (f / 200) turns a second.
+    let model = StepperMotorModel::ZLIM42_C_70;
+    let ringing_hz = (model.stepper.stiffness_nm_rad(1.2) / model.rotor.inertia_kg_m2).sqrt() / std::f64::consts::TAU;
+    let rpm = (ringing_hz / 200.0 * 60.0).round() as i64;
+    let shaking = |setting| {
+        let mut bench = Bench::new();
+        bench.set(0x2006, 0, setting);
+        bench.enable_in(3);
+        bench.set(0x60FF, 0, rpm);
+        bench.run_ms(1000);
+        let speeds: Vec<f64> = (0..2000)
+            .map(|_| {
+                bench.run(LOOK);
+                bench.report().velocity_rpm - rpm as f64
+            })
+            .collect();
+        (speeds.iter().map(|speed| speed * speed).sum::<f64>() / speeds.len() as f64).sqrt()
+    };
+    let (full, fine) = (shaking(0), shaking(7));
+    // Fine ones leave the detent, which comes as often.
+    assert!(full > 3.0 * fine && full > rpm as f64, "{full} and {fine} r/min about {rpm}");
+}

@@ -42,6 +42,49 @@ fn the_statusword_of_each_state_is_that_of_the_readings() {
 }
 
 #[test]
+fn the_statusword_of_each_state_in_each_mode_at_rest() {
+    // 5.3.4 to 5.3.6: bits 10 and 15 in position, bits 10 and 12 (speed is 0) in velocity, bit 10 in homing; there is
+    // nothing to be reached before the drive is enabled.
+    const REACHED: u16 = 1 << 10;
+    const SPEED_IS_ZERO: u16 = 1 << 12;
+    const IN_POSITION: u16 = 1 << 15;
+    let states = [
+        ("switch_on_disabled", 0x0270, false),
+        ("ready_to_switch_on", 0x0231, false),
+        ("switched_on", 0x2233, false),
+        ("operation_enabled", 0x2237, true),
+        ("quick_stop_active", 0x2217, true),
+        ("fault", 0x0298, false),
+    ];
+    let modes = [(1, 0, REACHED | IN_POSITION), (3, SPEED_IS_ZERO, REACHED), (6, 0, REACHED)];
+    for (mode, always, when_live) in modes {
+        for (state, pattern, live) in states {
+            let mut bench = Bench::new();
+            bench.set(0x6060, 0, mode);
+            bench.reach(state);
+            bench.run_ms(50);
+            let expected = pattern | always | if live { when_live } else { 0 };
+            assert_eq!(format!("{:04X}", bench.statusword()), format!("{expected:04X}"), "{state}, mode {mode}");
+            assert_eq!(bench.get(0x6061, 0), mode, "{state}");
+        }
+    }
+}
+
+#[test]
+fn a_locked_shaft_stands_against_a_load_that_turns_a_free_one() {
+    // 200Bh, not enabled. A tenth of the holding torque turns a motor that has its detent (0.026 N m) only.
+    for (lock, stands) in [(0, false), (1, true)] {
+        let mut bench = Bench::new();
+        bench.set(0x200B, 0, lock);
+        bench.run_ms(50);
+        bench.operate(|drive, now| drive.set_load_torque(0.05, now)).expect("a torque");
+        bench.run_ms(200);
+        let away = bench.report().rotor_position.expect("known here").abs();
+        assert_eq!(away < 40, stands, "200Bh = {lock}: {away} pulses");
+    }
+}
+
+#[test]
 fn the_motor_carries_current_from_switched_on_and_when_locked() {
     for (state, locked, live) in [
         ("switch_on_disabled", 0, false),

@@ -57,8 +57,7 @@ pub struct Stepper<const LENGTH_MM: u16> {
     eeprom_broken: bool,
     reference_broken: bool,
     last: Actuation,
-    /// The electrical turn that the rotor stood in when it was first energised after power-on: there the drive's vector
-    /// points to its zero.
+    /// The electrical turn that the rotor stood in at power-on: there the drive's vector points to its zero.
     zero: Option<f64>,
 }
 
@@ -142,14 +141,13 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
     #[inline]
     fn step(&mut self, actuation: &Actuation) {
         self.last = *actuation;
+        // The green light: the firmware runs.
+        if self.zero.is_none() && actuation.led.green {
+            self.zero = Some(self.rotor_turns().round());
+        }
         let bridges = match actuation.power_stage {
             PowerStage::Off => Bridges::Open,
-            PowerStage::Modulate { duty } => {
-                if self.zero.is_none() {
-                    self.zero = Some(self.rotor_turns().round());
-                }
-                Bridges::Driven(duty.map(f64::from))
-            }
+            PowerStage::Modulate { duty } => Bridges::Driven(duty.map(f64::from)),
         };
         self.motor.step(Self::PERIOD_S, &bridges);
     }
