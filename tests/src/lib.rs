@@ -13,6 +13,7 @@ pub mod manual;
 pub mod mjoint;
 pub mod object_rows;
 pub mod power_states;
+pub mod random_host;
 pub mod seeded;
 pub mod side_by_side;
 pub mod zlac8030l;

@@ -154,6 +154,11 @@ impl<S: Subject> Bench<S> {
         self.heard_at().into_iter().map(|(_, frame)| frame.to_string()).collect()
     }
 
+    /// Those of them that begin like this: `704#`.
+    pub fn heard_of(&mut self, beginning: &str) -> Vec<String> {
+        self.heard().into_iter().filter(|frame| frame.starts_with(beginning)).collect()
+    }
+
     /// Everything that the host heard since the last call.
     pub fn heard_at(&mut self) -> Vec<(Instant, Frame)> {
         self.listen();
@@ -223,6 +228,16 @@ impl<S: Subject> Bench<S> {
     pub fn get(&mut self, index: u16, sub: u8) -> i64 {
         let bytes = self.read(index, sub).unwrap_or_else(|abort| panic!("{index:04X}h:{sub:02X}: {abort:08X}h"));
         value_of(&bytes, S::rows().find(index, sub).is_some_and(|row| row.signed))
+    }
+
+    /// Maps objects into a PDO, as CiA 301 wants it: none, then each, then how many. `record` is 1600h or 1A00h and on.
+    #[track_caller]
+    pub fn map(&mut self, record: u16, objects: &[i64]) {
+        self.set(record, 0, 0);
+        for (sub, object) in (1..).zip(objects) {
+            self.set(record, sub, *object);
+        }
+        self.set(record, 0, objects.len() as i64);
     }
 
     /// 6041h.

@@ -7,22 +7,10 @@ use crate::bench::{Bench, assert_within};
 /// Maps 60FFh into RPDO1 and starts the node, as 6.2 does.
 fn with_velocity_rpdo() -> Bench {
     let mut bench = Bench::new();
-    map(&mut bench, 0x1601, &[0x60FF_0020]);
+    bench.map(0x1601, &[0x60FF_0020]);
     bench.send("000#0104");
     bench.heard();
     bench
-}
-
-fn map(bench: &mut Bench, record: u16, objects: &[i64]) {
-    bench.set(record, 0, 0);
-    for (sub, object) in (1..).zip(objects) {
-        bench.set(record, sub, *object);
-    }
-    bench.set(record, 0, objects.len() as i64);
-}
-
-fn heard_of(bench: &mut Bench, identifier: &str) -> Vec<String> {
-    bench.heard().into_iter().filter(|frame| frame.starts_with(identifier)).collect()
 }
 
 #[test]
@@ -45,7 +33,7 @@ fn a_reset_leaves_the_node_able_to_speak() {
         bench.send(command);
         bench.run_ms(450);
         // 1017h is stored: the heartbeat goes on with the boot-up message as its first.
-        let heard = heard_of(&mut bench, "704#");
+        let heard = bench.heard_of("704#");
         assert_eq!(heard, ["704#00", "704#7F", "704#7F", "704#7F", "704#7F"], "reset {name}");
         assert_eq!(bench.get(0x1000, 0), 0x0004_0192);
         bench.send("000#0104");
@@ -114,7 +102,7 @@ fn the_heartbeat_comes_back_by_itself_after_a_power_cycle_when_it_was_stored() {
     bench.heard();
     bench.power_cycle();
     bench.run_ms(700);
-    assert_eq!(heard_of(&mut bench, "704#"), ["704#00", "704#7F", "704#7F", "704#7F"]);
+    assert_eq!(bench.heard_of("704#"), ["704#00", "704#7F", "704#7F", "704#7F"]);
 }
 
 #[test]
@@ -152,11 +140,11 @@ fn an_answer_comes_within_about_a_millisecond() {
 #[test]
 fn a_short_rpdo_is_not_half_applied_and_a_long_one_counts_as_far_as_mapped() {
     let mut bench = Bench::new();
-    map(&mut bench, 0x1601, &[0x6083_0020, 0x6084_0020]);
+    bench.map(0x1601, &[0x6083_0020, 0x6084_0020]);
     bench.send("000#0104");
     bench.send("304#64000000C80000");
     assert_eq!((bench.get(0x6083, 0), bench.get(0x6084, 0)), (500, 500));
-    map(&mut bench, 0x1601, &[0x60FF_0020]);
+    bench.map(0x1601, &[0x60FF_0020]);
     bench.send("304#6400000012345678");
     assert_eq!(bench.get(0x60FF, 0), 100);
 }
@@ -164,7 +152,7 @@ fn a_short_rpdo_is_not_half_applied_and_a_long_one_counts_as_far_as_mapped() {
 #[test]
 fn a_tpdo_of_type_3_comes_with_each_third_sync() {
     let mut bench = Bench::new();
-    map(&mut bench, 0x1A00, &[0x6064_0020]);
+    bench.map(0x1A00, &[0x6064_0020]);
     bench.set(0x1800, 2, 3);
     bench.send("000#0104");
     bench.run_ms(10);
@@ -173,7 +161,7 @@ fn a_tpdo_of_type_3_comes_with_each_third_sync() {
         .map(|_| {
             bench.send("080#");
             bench.run_ms(5);
-            heard_of(&mut bench, "184#").len()
+            bench.heard_of("184#").len()
         })
         .collect();
     assert_eq!(sent, [0, 0, 1, 0, 0, 1, 0, 0, 1]);
@@ -182,8 +170,8 @@ fn a_tpdo_of_type_3_comes_with_each_third_sync() {
 #[test]
 fn each_asynchronous_tpdo_is_sent_once_on_entering_operational() {
     let mut bench = Bench::new();
-    map(&mut bench, 0x1A01, &[0x6041_0010]);
-    map(&mut bench, 0x1A02, &[0x6064_0020]);
+    bench.map(0x1A01, &[0x6041_0010]);
+    bench.map(0x1A02, &[0x6064_0020]);
     bench.set(0x1802, 2, 254);
     bench.heard();
     bench.send("000#0104");
@@ -194,7 +182,7 @@ fn each_asynchronous_tpdo_is_sent_once_on_entering_operational() {
 #[test]
 fn an_event_driven_tpdo_keeps_to_its_inhibit_time_in_half_milliseconds() {
     let mut bench = Bench::new();
-    map(&mut bench, 0x1A00, &[0x6064_0020]);
+    bench.map(0x1A00, &[0x6064_0020]);
     bench.set(0x1800, 2, 254);
     bench.set(0x1800, 3, 200);
     bench.enable_in(3);
@@ -217,21 +205,21 @@ fn a_pdo_is_mapped_with_bit_31_as_masters_do_and_without_as_the_manual_does() {
         if with_bit_31 {
             bench.set(0x1800, 1, 0x8000_0184);
         }
-        map(&mut bench, 0x1A00, &[0x6064_0020, 0x6041_0010]);
+        bench.map(0x1A00, &[0x6064_0020, 0x6041_0010]);
         bench.set(0x1800, 2, 254);
         if with_bit_31 {
             bench.set(0x1800, 1, 0x184);
         }
         bench.send("000#0104");
         bench.run_ms(20);
-        assert_eq!(heard_of(&mut bench, "184#"), ["184#000000007006"]);
+        assert_eq!(bench.heard_of("184#"), ["184#000000007006"]);
     }
 }
 
 #[test]
 fn a_switched_off_pdo_is_silent_and_deaf() {
     let mut bench = with_velocity_rpdo();
-    map(&mut bench, 0x1A00, &[0x6041_0010]);
+    bench.map(0x1A00, &[0x6041_0010]);
     bench.set(0x1800, 1, 0x8000_0184);
     bench.set(0x1401, 1, 0x8000_0304);
     bench.heard();
@@ -240,7 +228,7 @@ fn a_switched_off_pdo_is_silent_and_deaf() {
     bench.send("304#64000000");
     bench.set(0x6040, 0, 6);
     bench.run_ms(100);
-    assert_eq!(heard_of(&mut bench, "184#"), [""; 0]);
+    assert_eq!(bench.heard_of("184#"), [""; 0]);
     assert_eq!(bench.get(0x60FF, 0), 0);
 }
 
@@ -289,7 +277,7 @@ fn emcy_is_sent_on_the_identifier_of_1014h_and_not_at_all_with_bit_31() {
         bench.heard();
         bench.operate(|drive, now| drive.set_fault(Component::Hall, true, now)).expect("Hall sensors");
         bench.run_ms(50);
-        assert_eq!(heard_of(&mut bench, "084#").len(), expected);
+        assert_eq!(bench.heard_of("084#").len(), expected);
     }
 }
 
@@ -338,7 +326,7 @@ fn a_heartbeat_of_100_ms_comes_a_hundred_times_in_ten_seconds_without_drift() {
 #[test]
 fn no_emcy_and_no_pdo_leave_a_stopped_node() {
     let mut bench = with_velocity_rpdo();
-    map(&mut bench, 0x1A00, &[0x603F_0010]);
+    bench.map(0x1A00, &[0x603F_0010]);
     bench.send("000#0204");
     bench.heard();
     bench.operate(|drive, now| drive.set_fault(Component::Hall, true, now)).expect("Hall sensors");
@@ -350,7 +338,7 @@ fn no_emcy_and_no_pdo_leave_a_stopped_node() {
 #[test]
 fn remote_frames_get_no_answer() {
     let mut bench = with_velocity_rpdo();
-    map(&mut bench, 0x1A00, &[0x6041_0010]);
+    bench.map(0x1A00, &[0x6041_0010]);
     bench.run_ms(20);
     bench.heard();
     for frame in ["704#R1", "184#R2", "584#R8"] {

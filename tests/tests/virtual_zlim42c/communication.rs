@@ -8,18 +8,6 @@ use crate::bench::{Bench, assert_within};
 const CANNOT_BE_MAPPED: u32 = 0x0604_0041;
 const TOO_LONG: u32 = 0x0604_0042;
 
-fn map(bench: &mut Bench, record: u16, objects: &[i64]) {
-    bench.set(record, 0, 0);
-    for (sub, object) in (1..).zip(objects) {
-        bench.set(record, sub, *object);
-    }
-    bench.set(record, 0, objects.len() as i64);
-}
-
-fn heard_of(bench: &mut Bench, identifier: &str) -> Vec<String> {
-    bench.heard().into_iter().filter(|frame| frame.starts_with(identifier)).collect()
-}
-
 /// Sends SYNC and waits until what it causes has gone over the bus.
 fn sync(bench: &mut Bench) {
     bench.send("080#");
@@ -37,7 +25,7 @@ fn each_of_the_four_rpdos_sets_the_objects_it_maps() {
         [0x607A_0020, 0x6060_0008],
     ];
     for (record, pair) in (0x1600..).zip(&pairs) {
-        map(&mut bench, record, pair);
+        bench.map(record, pair);
     }
     bench.send("000#0101");
     for frame in ["201#2C010000C8000000", "301#58020000E8030000", "401#9CFFFFFF0500", "501#80C1FFFF03"] {
@@ -59,7 +47,7 @@ fn each_of_the_four_tpdos_tells_the_objects_it_maps() {
         &[0x2003_0010, 0x2004_0010, 0x2005_0010, 0x2000_0010],
     ];
     for (record, objects) in (0x1A00..).zip(maps) {
-        map(&mut bench, record, objects);
+        bench.map(record, objects);
     }
     for record in 0x1800..0x1804 {
         bench.set(record, 2, 1);
@@ -79,7 +67,7 @@ fn each_of_the_four_tpdos_tells_the_objects_it_maps() {
 fn an_rpdo_of_types_0_to_240_waits_for_the_sync_and_one_of_254_or_255_does_not() {
     for (kind, waits) in [(0, true), (1, true), (240, true), (254, false), (255, false)] {
         let mut bench = Bench::new();
-        map(&mut bench, 0x1601, &[0x60FF_0020]);
+        bench.map(0x1601, &[0x60FF_0020]);
         bench.set(0x1401, 2, kind);
         bench.send("000#0101");
         bench.send("301#64000000");
@@ -93,7 +81,7 @@ fn an_rpdo_of_types_0_to_240_waits_for_the_sync_and_one_of_254_or_255_does_not()
 fn a_synchronous_tpdo_comes_with_each_nth_sync_and_one_of_type_0_after_a_change() {
     for (kind, syncs, expected) in [(1, 12, 12), (4, 12, 3), (240, 480, 2), (0, 12, 1)] {
         let mut bench = Bench::new();
-        map(&mut bench, 0x1A02, &[0x6041_0010]);
+        bench.map(0x1A02, &[0x6041_0010]);
         bench.set(0x1802, 2, kind);
         bench.send("000#0101");
         bench.run_ms(5);
@@ -104,14 +92,14 @@ fn a_synchronous_tpdo_comes_with_each_nth_sync_and_one_of_type_0_after_a_change(
             bench.set(0x6040, 0, 6);
         }
         (0..syncs).for_each(|_| sync(&mut bench));
-        assert_eq!(heard_of(&mut bench, "381#").len(), expected, "type {kind}");
+        assert_eq!(bench.heard_of("381#").len(), expected, "type {kind}");
     }
 }
 
 #[test]
 fn sync_is_heard_on_the_identifier_of_1005h() {
     let mut bench = Bench::new();
-    map(&mut bench, 0x1A00, &[0x6041_0010]);
+    bench.map(0x1A00, &[0x6041_0010]);
     bench.set(0x1800, 2, 1);
     bench.set(0x1005, 0, 0x90);
     bench.send("000#0101");
@@ -120,14 +108,14 @@ fn sync_is_heard_on_the_identifier_of_1005h() {
     for (frame, answers) in [("080#", 0), ("090#", 1)] {
         bench.send(frame);
         bench.run_ms(2);
-        assert_eq!(heard_of(&mut bench, "181#").len(), answers, "{frame}");
+        assert_eq!(bench.heard_of("181#").len(), answers, "{frame}");
     }
 }
 
 #[test]
 fn inhibit_time_and_event_timer_count_half_milliseconds() {
     let mut bench = Bench::new();
-    map(&mut bench, 0x1A00, &[0x6064_0020]);
+    bench.map(0x1A00, &[0x6064_0020]);
     bench.set(0x1800, 2, 254);
     bench.set(0x1800, 3, 100);
     bench.enable_in(3);
@@ -149,14 +137,14 @@ fn inhibit_time_and_event_timer_count_half_milliseconds() {
     bench.run_ms(500);
     bench.heard();
     bench.run_ms(1000);
-    let count = heard_of(&mut bench, "181#").len();
+    let count = bench.heard_of("181#").len();
     assert!((49..=51).contains(&count), "{count} in 1 s, expected one each 20 ms");
 }
 
 #[test]
 fn an_rpdo_acts_in_operational_only() {
     let mut bench = Bench::new();
-    map(&mut bench, 0x1601, &[0x60FF_0020]);
+    bench.map(0x1601, &[0x60FF_0020]);
     for (state, acts) in [("000#8001", false), ("000#0201", false), ("000#0101", true)] {
         bench.send(state);
         bench.send("301#64000000");
@@ -168,7 +156,7 @@ fn an_rpdo_acts_in_operational_only() {
 #[test]
 fn what_the_table_refuses_an_rpdo_does_not_do_either() {
     let mut bench = Bench::new();
-    map(&mut bench, 0x1601, &[0x6060_0008, 0x60FF_0020]);
+    bench.map(0x1601, &[0x6060_0008, 0x60FF_0020]);
     bench.send("000#0101");
     bench.send("301#03B80B0000");
     assert_eq!((bench.get(0x6060, 0), bench.get(0x60FF, 0)), (3, 3000));
@@ -184,7 +172,7 @@ fn what_the_table_refuses_an_rpdo_does_not_do_either() {
 fn controlword_and_target_in_one_rpdo_start_the_move_whichever_comes_first() {
     for objects in [[0x6040_0010, 0x607A_0020], [0x607A_0020, 0x6040_0010]] {
         let mut bench = Bench::new();
-        map(&mut bench, 0x1602, &objects);
+        bench.map(0x1602, &objects);
         bench.enable_in(1);
         bench.send("000#0101");
         let (start, target) = ("5F00", "90010000");
@@ -215,7 +203,7 @@ fn what_the_manual_does_not_map_cannot_be_mapped() {
 #[test]
 fn a_stored_mapping_works_after_a_power_cycle() {
     let mut bench = Bench::new();
-    map(&mut bench, 0x1A03, &[0x6064_0020, 0x6041_0010]);
+    bench.map(0x1A03, &[0x6064_0020, 0x6041_0010]);
     bench.set(0x1803, 2, 1);
     bench.let_store();
     bench.power_cycle();
@@ -278,11 +266,11 @@ fn a_stopped_node_answers_nothing_and_a_reset_boots_it_again() {
     assert_eq!(bench.sdo(&[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]), None);
     bench.heard();
     bench.run_ms(120);
-    assert!(heard_of(&mut bench, "701#").iter().all(|beat| beat == "701#04"));
+    assert!(bench.heard_of("701#").iter().all(|beat| beat == "701#04"));
     for command in ["000#8201", "000#8101"] {
         bench.send(command);
         bench.run_ms(20);
-        assert_eq!(heard_of(&mut bench, "701#")[0], "701#00", "{command}");
+        assert_eq!(bench.heard_of("701#")[0], "701#00", "{command}");
         assert_eq!(bench.get(0x1000, 0), 0x0004_0192);
     }
 }
@@ -309,6 +297,6 @@ fn emcy_goes_out_on_the_identifier_of_1014h_and_not_at_all_with_bit_31() {
         bench.heard();
         bench.operate(|drive, now| drive.set_fault(Component::Reference, true, now)).expect("a reference");
         bench.run_ms(50);
-        assert_eq!(heard_of(&mut bench, identifier).len(), expected, "{cob_id:X}h");
+        assert_eq!(bench.heard_of(identifier).len(), expected, "{cob_id:X}h");
     }
 }

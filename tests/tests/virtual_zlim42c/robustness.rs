@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use ferrodrive_tests::manual::ObjectRow;
+use ferrodrive_tests::bench::zlim42c::Zlim42c;
+use ferrodrive_tests::random_host::{self, Play};
 use ferrodrive_tests::seeded::Seeded;
-use ferrodrive_tests::zlim42c::objects;
 use sim::Component;
 
 use crate::bench::Bench;
@@ -15,37 +15,13 @@ const SPARED: [u16; 3] = [0x2008, 0x2009, 0x1005];
 
 #[test]
 fn a_host_that_writes_anything_anywhere_is_answered_and_breaks_nothing() {
-    let rows: Vec<_> = objects().into_iter().filter(|row| row.writable && !SPARED.contains(&row.index)).collect();
-    for seed in 0..100 {
-        let mut seeded = Seeded::new(seed);
-        let mut bench = Bench::new();
-        for step in 0..120 {
-            let row = &rows[seeded.below(rows.len())];
-            let value = any_value(&mut seeded, row);
-            // Taken or refused, but answered: `write` panics without an answer.
-            let _ = bench.write(row.index, row.sub, value);
-            disturb(&mut bench, &mut seeded);
-            bench.run_ms(seeded.below(20) as u64);
-            let report = bench.report();
-            let at =
-                format!("seed {seed}, step {step}, after {:04X}h:{:02X} = {value}: {report:?}", row.index, row.sub);
-            let finite = [report.velocity_rpm, report.current_a, report.supply_v, report.shaft_angle_rad];
-            assert!(finite.iter().all(|value| value.is_finite()), "{at}");
-            assert!(is_a_state(report.statusword.unwrap_or_default()), "{at}");
-        }
-        recovers(&mut bench, seed);
-    }
-}
-
-/// A legal value mostly, sometimes any.
-fn any_value(seeded: &mut Seeded, row: &ObjectRow) -> i64 {
-    match (row.limits, seeded.below(4)) {
-        (_, 0) => seeded.bits() as i64 >> (64 - row.size * 8),
-        (Some((low, high)), _) => low + (seeded.bits() % (high - low + 1) as u64) as i64,
-        (None, _) if row.index == 0x6040 => [0x06, 0x07, 0x0F, 0x1F, 0x5F, 0x02, 0x80, 0x10F, 0x00][seeded.below(9)],
-        (None, _) if row.index == 0x6060 => [1, 3, 6, 0][seeded.below(4)],
-        (None, _) => row.default.unwrap_or_default(),
-    }
+    random_host::is_answered_and_breaks_nothing(&Play::<Zlim42c> {
+        seeds: 100,
+        spared: &SPARED,
+        disturb,
+        is_a_state,
+        recovers,
+    });
 }
 
 fn disturb(bench: &mut Bench, seeded: &mut Seeded) {

@@ -1,0 +1,59 @@
+//! A host that writes anything anywhere, while somebody plays with the machine.
+
+use crate::bench::{Bench, Subject};
+use crate::manual::ObjectRow;
+use crate::seeded::Seeded;
+
+/// Writes of a conversation.
+const WRITES: usize = 120;
+
+/// What is different from drive to drive.
+#[derive(Debug)]
+pub struct Play<S> {
+    /// How many conversations.
+    pub seeds: u64,
+    /// Objects that are not written: they would end the conversation by themselves.
+    pub spared: &'static [u16],
+    /// Does something to the machine now and then.
+    pub disturb: fn(&mut Bench<S>, &mut Seeded),
+    /// Whether a statusword is one of the drive's states.
+    pub is_a_state: fn(u16) -> bool,
+    /// Asserts that the drive, mended and restarted, is as delivered; with the seed, for the message.
+    pub recovers: fn(&mut Bench<S>, u64),
+}
+
+/// Every write is answered, every number that can be measured stays finite, every statusword is one of a state, and in
+/// the end the drive recovers.
+pub fn is_answered_and_breaks_nothing<S: Subject>(play: &Play<S>) {
+    let writable = |row: &&ObjectRow| row.writable && !play.spared.contains(&row.index);
+    let rows: Vec<_> = S::rows().all().iter().filter(writable).collect();
+    for seed in 0..play.seeds {
+        let mut seeded = Seeded::new(seed);
+        let mut bench = Bench::new();
+        for step in 0..WRITES {
+            let row = rows[seeded.below(rows.len())];
+            let value = any_value(&mut seeded, row);
+            // Taken or refused, but answered: `write` panics without an answer.
+            let _ = bench.write(row.index, row.sub, value);
+            (play.disturb)(&mut bench, &mut seeded);
+            bench.run_ms(seeded.below(20) as u64);
+            let report = bench.report();
+            let at =
+                format!("seed {seed}, step {step}, after {:04X}h:{:02X} = {value}: {report:?}", row.index, row.sub);
+            let finite = [report.velocity_rpm, report.current_a, report.supply_v, report.shaft_angle_rad];
+            assert!(finite.iter().all(|value| value.is_finite()), "{at}");
+            assert!((play.is_a_state)(report.statusword.unwrap_or_default()), "{at}");
+        }
+        (play.recovers)(&mut bench, seed);
+    }
+}
+
+/// A legal value mostly, sometimes any.
+fn any_value(seeded: &mut Seeded, row: &ObjectRow) -> i64 {
+    match (row.limits, seeded.below(4)) {
+        (_, 0) => seeded.bits() as i64 >> (64 - row.size * 8),
+        (Some((low, high)), _) => low + (seeded.bits() % (high - low + 1) as u64) as i64,
+        (None, _) if row.index == 0x6040 => [0x06, 0x07, 0x0F, 0x1F, 0x5F, 0x02, 0x80, 0x10F, 0x00][seeded.below(9)],
+        (None, _) => row.default.unwrap_or_default(),
+    }
+}
