@@ -16,15 +16,8 @@ fn the_object_table_has_the_manuals_rows_and_the_revision_in_order() {
 #[test]
 fn defaults_lie_within_their_limits_and_limits_within_their_types() {
     for row in objects() {
-        let at = format!("{:04X}h:{:02X} {}", row.index, row.sub, row.name);
-        let bits = row.size * 8;
-        let (least, most) =
-            if row.signed { (-(1_i64 << (bits - 1)), (1 << (bits - 1)) - 1) } else { (0, (1 << bits) - 1) };
-        let (low, high) = row.limits.unwrap_or((least, most));
-        assert!(least <= low && low < high && high <= most, "{at}: {low}..{high}");
-        if let Some(default) = row.default {
-            assert!((low..=high).contains(&default), "{at}: default {default} outside {low}..{high}");
-        }
+        row.check();
+        assert!(row.limits.is_none_or(|(low, high)| low < high), "{row:?}");
     }
 }
 
@@ -49,17 +42,11 @@ fn every_printed_answer_is_the_answer_that_the_standard_demands() {
 
 #[test]
 fn every_sdo_datagram_names_an_object_of_the_table_and_carries_its_size() {
-    let objects = objects();
-    let requests = datagrams().into_iter().filter_map(|datagram| datagram.request);
-    for (_, data) in requests.filter(|(cob, _)| *cob == 0x604) {
-        let [command, low, high, sub, ..] = data[..] else { panic!("short request {data:02X?}") };
-        let index = u16::from_le_bytes([low, high]);
-        let object = objects.iter().find(|row| (row.index, row.sub) == (index, sub)).expect("a row of the table");
-        let size_by_command = match command {
-            0x40 => object.size,
-            _ => 4 - usize::from(command >> 2 & 3),
-        };
-        assert_eq!(size_by_command, object.size, "{data:02X?}");
+    let (objects, datagrams) = (objects(), datagrams());
+    let requests: Vec<_> = datagrams.iter().filter(|it| matches!(it.request, Some((0x604, _)))).collect();
+    assert!(!requests.is_empty());
+    for datagram in requests {
+        datagram.check_sdo_request(&objects, 4);
     }
 }
 
