@@ -1,43 +1,37 @@
 //! The object dictionary over the bus.
 
-use ferrodrive_tests::mjoint::objects;
+use ferrodrive_tests::bench::mjoint::MJoint;
+use ferrodrive_tests::object_rows::{self, INVALID_VALUE, NO_SUCH_OBJECT, NO_SUCH_SUB_INDEX, TOO_HIGH};
 
 use crate::bench::Bench;
 
-const READ_ONLY: u32 = 0x0601_0002;
-const NO_OBJECT: u32 = 0x0602_0000;
-const NO_SUB_INDEX: u32 = 0x0609_0011;
-const INVALID_VALUE: u32 = 0x0609_0030;
-const TOO_HIGH: u32 = 0x0609_0031;
-
 #[test]
-fn every_object_reads_its_default_after_power_on() {
-    let mut bench = Bench::new();
-    for joint in objects() {
-        let row = joint.row;
-        let read = bench.get(row.index, row.sub);
-        if let (false, Some(default)) = (row.live, row.default) {
-            assert_eq!(read, default, "{:04X}h:{:02X} {}", row.index, row.sub, row.name);
-        }
-    }
+fn every_object_is_read_with_its_width_and_its_default_after_power_on() {
+    object_rows::are_read_with_their_width_and_default::<MJoint>();
 }
 
 #[test]
 fn mappings_and_read_only_objects_refuse_writes() {
-    let mut bench = Bench::new();
-    for joint in objects().iter().filter(|joint| !joint.row.writable) {
-        let row = &joint.row;
-        assert_eq!(bench.write(row.index, row.sub, 0), Err(READ_ONLY), "{:04X}h:{:02X}", row.index, row.sub);
-    }
+    object_rows::refuse_writes_where_they_are_read_only::<MJoint>();
+}
+
+#[test]
+fn what_a_range_holds_is_taken_and_what_lies_beyond_is_refused_with_the_right_code() {
+    object_rows::take_their_range_and_refuse_what_lies_beyond::<MJoint>();
+}
+
+#[test]
+fn a_write_of_another_width_is_refused_and_changes_nothing() {
+    object_rows::refuse_another_width::<MJoint>();
 }
 
 #[test]
 fn refusals_are_those_of_cia_301() {
     let mut bench = Bench::new();
     for index in [0x603F, 0x6061, 0x607C, 0x6084, 0x6099, 0x609A, 0x6502, 0x1003, 0x1008, 0x1010, 0x1014, 0x1200] {
-        assert_eq!(bench.write(index, 0, 0), Err(NO_OBJECT), "{index:04X}h");
+        assert_eq!(bench.write(index, 0, 0), Err(NO_SUCH_OBJECT), "{index:04X}h");
     }
-    assert_eq!(bench.write(0x60F9, 3, 0), Err(NO_SUB_INDEX));
+    assert_eq!(bench.write(0x60F9, 3, 0), Err(NO_SUCH_SUB_INDEX));
     assert_eq!(bench.write(0x6083, 0, 65_536), Err(TOO_HIGH));
     for (index, sub, value) in [(0x6060, 0, 2), (0x6060, 0, 8), (0x2619, 0, 5), (0x2619, 0, 29), (0x1403, 2, 255)] {
         assert_eq!(bench.write(index, sub, value), Err(INVALID_VALUE), "{index:04X}h = {value}");
