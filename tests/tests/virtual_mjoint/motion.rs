@@ -248,3 +248,21 @@ fn actual_values_are_in_the_manuals_units() {
     let speed = u32::from_str_radix(&tpdo[4..12], 16).expect("a number").swap_bytes() as i32;
     assert!((speed + 600).abs() <= 5, "{speed}");
 }
+
+#[test]
+fn the_feed_forward_of_60fbh_gives_the_current_that_a_rising_back_emf_would_take() {
+    // At 10 A the speed rises by 10 A * 0.149 N·m/A / 0.69e-4 kg m², and the back-emf by 0.099 V·s times that, 2100 V/s. A
+    // current loop of 2000 rad/s on 0.44 ohm is behind such a ramp by 2100 / (0.44 * 2000), 2.4 A of the 10.
+    let time_to_1000_rpm = |feed_forward: i64| {
+        let mut bench = Bench::new();
+        bench.set(0x60FB, 2, feed_forward);
+        bench.set(0x6083, 0, 60_000);
+        bench.set(0x6060, 0, 3);
+        bench.set(0x6040, 0, 0x0F);
+        bench.set(0x60FF, 0, 1500);
+        bench.seconds_until(0.1, std::time::Duration::from_micros(50), |report| report.velocity_rpm > 1000.0)
+    };
+    // The motor's own 10.4 V at 1000 r/min.
+    let gained = time_to_1000_rpm(0) / time_to_1000_rpm(3400);
+    assert!((1.08..1.35).contains(&gained), "{gained}");
+}

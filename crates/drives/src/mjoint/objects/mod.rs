@@ -1,6 +1,6 @@
 //! The object table of the M joint motors ("M Robot Joint Motor CanOpen Manual", 5.04 and 5.08).
 //!
-//! [`TABLE`] is the one description that the drive, the command line, the EDS writer and the documents read; the four
+//! [`TABLE`] is the one description that the drive, the command line and the documents read; the four
 //! models share it. The constants below it are the objects that the firmware itself reads and writes. What a write
 //! sets in motion stands in [`effects`], where the RS485 side finds an object in [`modbus`].
 

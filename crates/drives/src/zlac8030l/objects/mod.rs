@@ -1,7 +1,7 @@
 //! The object table of the ZLAC8030L: 194 rows as its manual prints them ("ZLAC8030L quick start guide V1.00",
 //! chapter 9) and 1018h:03 of the maker's EDS.
 //!
-//! [`TABLE`] is the one description that the drive, the command line, the EDS writer and the documents read.
+//! [`TABLE`] is the one description that the drive, the command line and the documents read.
 //! The constants below it are the objects that the firmware itself reads and writes. What a write sets in motion
 //! stands in [`effects`]; 1000h to 1FFFh are in the folder `zl`, for both drives of the maker.
 

@@ -1,7 +1,7 @@
 //! The object table of the ZLIM42-C: the rows that its manual prints ("ZLIM42-C user manual V1.03", 5.4), those that it
 //! lost at page breaks, and 1018h:03 of the maker's EDS.
 //!
-//! [`TABLE`] is the one description that the drive, the command line, the EDS writer and the documents read.
+//! [`TABLE`] is the one description that the drive, the command line and the documents read.
 //! The constants below it are the objects that the firmware itself reads and writes. What a write sets in motion
 //! stands in [`effects`]; 1000h to 1FFFh are in the folder `zl`, for both drives of the maker.
 
