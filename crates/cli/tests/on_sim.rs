@@ -261,6 +261,16 @@ fn completions_are_scripts() {
 }
 
 #[test]
+fn the_demo_of_one_drive_is_only_of_that_drive() {
+    let directory = scratch("demo of one");
+    let svg = directory.join("demo.svg");
+    let demo = done(&["--json", "demo", "--drive", "zlim42c", "--svg", svg.to_str().unwrap()]).json();
+    assert_eq!((&demo["ok"], demo["drives"].as_array().unwrap().len()), (&true.into(), 1));
+    assert!(demo["rows"].as_array().unwrap().iter().all(|row| row["drive"] == "ZLIM42-C"));
+    std::fs::remove_dir_all(directory).unwrap();
+}
+
+#[test]
 fn the_demo_passes_and_draws() {
     let directory = scratch("demo");
     let svg = directory.join("demo.svg");
@@ -269,12 +279,19 @@ fn the_demo_passes_and_draws() {
     assert_eq!(demo["steps"], demo["passed"]);
     let picture = std::fs::read_to_string(&svg).unwrap();
     assert!(picture.starts_with("<svg ") && picture.contains("absolute position"));
+    let text = |row: &serde_json::Value, key: &str| row[key].as_str().unwrap().to_owned();
     let sections: std::collections::BTreeSet<_> =
-        demo["rows"].as_array().unwrap().iter().map(|row| row["section"].as_str().unwrap().to_owned()).collect();
-    for section in
-        ["3.4", "4.1", "4.2", "4.3", "4.4", "4.5", "4.6", "5.1", "5.2", "5.3", "5.4", "5.5", "6.1", "6.2", "8"]
-    {
-        assert!(sections.contains(section), "{section} in {sections:?}");
+        demo["rows"].as_array().unwrap().iter().map(|row| (text(row, "drive"), text(row, "section"))).collect();
+    let manuals = [
+        ("ZLAC8030L", "3.4 4.1 4.2 4.3 4.4 4.5 4.6 5.1 5.2 5.3 5.4 5.5 6.1 6.2 8"),
+        ("M4230E17B50", "5.04 5.05 5.06.1 5.06.2 5.07.1 5.08 5.08.4 5.09 5.10.1 5.10.2 5.11.1 5.11.2"),
+        ("ZLIM42-C", "4.1 5.2 5.3.1 5.3.2 5.3.3 5.3.4 5.3.5 5.3.6 5.4 603Fh"),
+    ];
+    for (drive, wanted) in manuals {
+        for section in wanted.split(' ') {
+            let step = (drive.to_owned(), section.to_owned());
+            assert!(sections.contains(&step), "{step:?} in {sections:?}");
+        }
     }
     std::fs::remove_dir_all(directory).unwrap();
 }

@@ -10,15 +10,18 @@ use crate::failure::Failure;
 use crate::progress::Progress;
 use crate::session::exit_on_interrupt;
 
-/// Show the whole thing on an embedded virtual bus: every procedure of the manual against the drive
+/// Show the whole thing on an embedded virtual bus: every procedure of the three manuals against the three drives
 ///
-/// Prints what was asked, what answered and what moved, beside what the manual lets expect, and draws the motion.
+/// Prints what was asked, what answered and what moved, beside what the manuals let expect, and draws the motion.
 /// Exit status 1 if anything differs.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Demo {
     /// Where to draw the motion
     #[arg(long, value_name = "FILE", default_value = "demo.svg")]
     svg: PathBuf,
+    /// Only the part of one drive
+    #[arg(long, value_name = "MODEL", value_parser = clap::builder::PossibleValuesParser::new(demo::models()))]
+    drive: Option<String>,
 }
 
 impl Demo {
@@ -27,9 +30,9 @@ impl Demo {
         exit_on_interrupt();
         let clock = WallClock::start();
         let progress = Progress::new(global.json);
-        let (mut report, figure) = demo::run(progress.clone())?;
+        let (mut report, poster) = demo::run(self.drive.as_deref(), &progress)?;
         progress.clear();
-        std::fs::write(&self.svg, figure.to_svg())
+        std::fs::write(&self.svg, poster.to_svg())
             .map_err(|error| Failure::new(format!("cannot write the picture {}", self.svg.display())).because(error))?;
         report.svg = self.svg.display().to_string();
         report.took_s = clock.now().as_secs_f64();

@@ -1,13 +1,17 @@
-//! The demo's test bench: a virtual ZLAC8030L on a virtual bus, a CAN adapter that sends the manual's datagrams as they
-//! are printed, a recorder, and the table that grows from it.
+//! The demo's test bench: virtual drives on a virtual bus, a CAN adapter that sends the manuals' datagrams as they are
+//! printed, a recorder, and the table that grows from it.
+//!
+//! One drive at a time is talked to. What is asked of it, and what it answers, is a row of the table.
 
 use std::time::Duration;
 
 use can::{Bitrate, CanId, Frame, Instant};
-use canopen::Mux;
+use canopen::od::Entry;
+use canopen::{Mux, NodeId};
 use sim::recorder::{Channel, Recorder, Signal};
 use sim::{Report, StationId, World};
 
+use super::datagram::{Pattern, bytes, frame, hex};
 use super::expect::Expect;
 use super::row::Row;
 use super::set_points::{Axis, SetPoints};
@@ -17,23 +21,20 @@ use crate::models::DriveProfile;
 use crate::plot::{Event, EventKind};
 use crate::progress::Progress;
 
-/// Node-ID as delivered (3.1).
-pub(super) const NODE: u8 = 4;
-
-/// Counts in a turn of the shaft: 4 edges of 1024 encoder lines (200Bh).
-pub(super) const COUNTS_PER_TURN: f64 = 4096.0;
-
-/// How often something is asked while the motor runs: the drive stops it when it hears nothing for 2000h = 1000 ms.
+/// How often something is asked while a motor runs whose drive watches its host: the ZLAC8030L stops it when it hears
+/// nothing for 2000h = 1000 ms.
 const TALKING_INTERVAL: Duration = Duration::from_millis(100);
 
-/// Longest wait for an answer; the drive answers within a millisecond or two.
+/// Longest wait for an answer; the drives answer within a millisecond or two.
 const ANSWER_TIME: Duration = Duration::from_millis(50);
 
 const SAMPLING_PERIOD: Duration = Duration::from_millis(5);
 
 /// See the [module](self).
 pub(super) struct Bench {
-    model: &'static DriveProfile,
+    drives: Vec<(&'static DriveProfile, u8)>,
+    /// Which of them is talked to.
+    subject: usize,
     world: World,
     adapter: StationId,
     heard: Vec<(Instant, Frame)>,
@@ -56,28 +57,36 @@ pub(super) struct Finished {
     pub(super) end: Instant,
 }
 
-/// What the bench records.
-pub(super) const SIGNALS: [Signal; 6] = [
+/// What the bench records of each drive.
+pub(super) const SIGNALS: [Signal; 7] = [
     Signal::Position,
     Signal::PositionDemand,
     Signal::Velocity,
     Signal::VelocityDemand,
     Signal::Current,
     Signal::CurrentDemand,
+    Signal::ShaftAngle,
 ];
 
 impl Bench {
-    /// A bench with a factory-fresh drive that is being powered.
-    pub(super) fn new(model: &'static DriveProfile, progress: Progress) -> Result<Self, Failure> {
-        let node = canopen::NodeId::new(NODE).unwrap_or(canopen::NodeId::MIN);
-        let mut world = World::new(Bitrate::K500, SEED);
+    /// A bench with factory-fresh drives that are being powered. The first one is talked to.
+    pub(super) fn new(
+        drives: &[(&'static DriveProfile, u8)],
+        bitrate: Bitrate,
+        progress: Progress,
+    ) -> Result<Self, Failure> {
+        let mut world = World::new(bitrate, SEED);
         let adapter = world.add_tap();
-        let drive = embedded::virtual_drive(model, node, world.bitrate())?;
-        world.add_drive(NODE, drive).map_err(|error| Failure::new(error.to_string()))?;
-        let channels = SIGNALS.map(|signal| Channel { drive: NODE, signal });
+        for (model, number) in drives.iter().copied() {
+            let node = NodeId::new(number).unwrap_or(NodeId::MIN);
+            let drive = embedded::virtual_drive(model, node, bitrate)?;
+            world.add_drive(number, drive).map_err(|error| Failure::new(error.to_string()))?;
+        }
+        let channels = drives.iter().flat_map(|(_, number)| SIGNALS.map(|signal| Channel { drive: *number, signal }));
         world.start_recording(Recorder::new(SAMPLING_PERIOD, channels));
         Ok(Self {
-            model,
+            drives: drives.to_vec(),
+            subject: 0,
             world,
             adapter,
             heard: Vec::new(),
@@ -90,11 +99,21 @@ impl Bench {
         })
     }
 
+    /// The node-ID that is talked to.
+    pub(super) fn node(&self) -> u8 {
+        self.drives[self.subject].1
+    }
+
+    /// What is known of the drive that is talked to.
+    pub(super) fn model(&self) -> &'static DriveProfile {
+        self.drives[self.subject].0
+    }
+
     /// Begins a section of the manual.
     pub(super) fn section(&mut self, number: &'static str, name: &'static str) {
         self.section = number;
         self.sections.push((self.world.now(), number, name));
-        self.progress.show(format!("{number} {name}"));
+        self.progress.show(format!("{}: {number} {name}", self.model().title));
     }
 
     /// Draws a set-point of the position, in counts.
@@ -103,7 +122,13 @@ impl Bench {
         self.set_points.set(Axis::Position, counts, now);
     }
 
-    /// Counts of 60FFh in 1 r/min from here on (5.3).
+    /// No set-point is drawn from here on.
+    pub(super) fn aim_at_nothing(&mut self) {
+        let now = self.world.now();
+        self.set_points.end(now);
+    }
+
+    /// Counts of 60FFh in 1 r/min from here on.
     pub(super) fn resolve(&mut self, counts_per_rpm: f64) {
         self.set_points.counts_per_rpm = counts_per_rpm;
     }
@@ -126,23 +151,58 @@ impl Bench {
 
     /// Begins a row: sends a datagram to the drive's SDO server, and compares the answer with the manual's.
     pub(super) fn ask(&mut self, step: impl Into<String>, request: &str, reply: &str) {
+        let reply = Pattern::sdo(reply);
+        self.ask_for(step, request, &reply, &reply.expectation());
+    }
+
+    /// Begins a row: writes an object, with the length that it has, and expects that the drive takes the value.
+    pub(super) fn write(&mut self, step: impl Into<String>, index: u16, sub_index: u8, value: i64) {
+        let size = self.object(index, sub_index).map_or(4, |row| row.data_type.size());
+        let [low, high] = index.to_le_bytes();
+        let mut request = [0x23 | (4 - size.clamp(1, 4) as u8) << 2, low, high, sub_index, 0, 0, 0, 0];
+        let raw = value.to_le_bytes();
+        request[4..4 + size.clamp(1, 4)].copy_from_slice(&raw[..size.clamp(1, 4)]);
+        let reply = Pattern::sdo(&hex(&[0x60, low, high, sub_index]));
+        self.ask_for(step, &hex(&request), &reply, "written");
+    }
+
+    fn ask_for(&mut self, step: impl Into<String>, request: &str, reply: &Pattern, expected: &str) {
         self.step(step);
-        let answered = self.exchange(bytes(request));
+        let request = bytes(request);
+        let answered = self.exchange(&request);
         let text = answered.map_or_else(|| "nothing".into(), |data| hex(&data));
-        let expected = hex(&bytes(reply));
+        let ok = answered.is_some_and(|data| reply.fits(&data));
         let row = self.row();
-        row.asked = hex(&bytes(request));
-        row.answered = text.clone();
-        if text == expected {
-            row.compare("as printed", "same", true);
+        row.asked = hex(&request);
+        row.answered.clone_from(&text);
+        if ok {
+            row.compare(expected, "same", true);
         } else {
-            row.compare(&expected, text, false);
+            row.compare(reply.text(), text, false);
         }
+    }
+
+    /// Begins a row: sends a datagram that is no SDO request, and compares the one that answers it. Both are given as the
+    /// identifier and the bytes, `..` being any byte.
+    pub(super) fn exchange_pdo(&mut self, step: impl Into<String>, request: &str, reply: &str) -> Option<Frame> {
+        self.step(step);
+        let (id, data) = reply.split_once(' ').unwrap_or((reply, ""));
+        let id = u16::from_str_radix(id, 16).unwrap_or_default();
+        let pattern = Pattern::new(data);
+        let request = frame(request);
+        let answered = self.await_frame(request, id);
+        let text = answered.map_or_else(|| "nothing".into(), |frame| frame.to_string());
+        let ok = answered.is_some_and(|frame| pattern.fits(frame.data()));
+        let row = self.row();
+        row.asked = request.to_string();
+        row.answered.clone_from(&text);
+        row.compare(format!("{id:03X}#{}", pattern.text()), if ok { "same".into() } else { text }, ok);
+        answered
     }
 
     /// Sends a datagram to the drive's SDO server within a row that speaks of something else.
     pub(super) fn tell(&mut self, request: &str) {
-        let answered = self.exchange(bytes(request));
+        let answered = self.exchange(&bytes(request));
         if answered.is_none_or(|reply| reply[0] == 0x80) {
             self.row().compare("an answer", "refused, or none", false);
         }
@@ -171,8 +231,24 @@ impl Bench {
         self.row().compare(expected, seen, ok);
     }
 
-    /// Lets time pass, talking to the drive all the while, so that it does not stop because its host is silent.
+    /// Reads an object and adds an expectation of it to the row.
+    pub(super) fn expect_object(&mut self, index: u16, sub_index: u8, expect: Expect, unit: &str) {
+        let seen = self.read_f64(index, sub_index);
+        let what = if sub_index == 0 { format!("{index:04X}h") } else { format!("{index:04X}h:{sub_index:02X}") };
+        self.expect(&what, expect, unit, seen);
+    }
+
+    /// Reads the statusword and adds an expectation of some of its bits to the row.
+    pub(super) fn expect_status(&mut self, what: &str, mask: u16, bits: u16) {
+        let word = self.statusword().map_or(f64::NAN, |word| f64::from(word & mask));
+        self.expect(what, Expect::Bits(bits.into()), "", word);
+    }
+
+    /// Lets time pass, talking all the while to a drive that stops because its host is silent.
     pub(super) fn run(&mut self, duration: Duration) {
+        if self.model().host_watchdog.is_none() {
+            return self.run_silently(duration);
+        }
         let end = self.world.now() + duration;
         while self.world.now() < end {
             self.world.run_until(end.min(self.world.now() + TALKING_INTERVAL));
@@ -181,6 +257,11 @@ impl Bench {
             }
         }
         self.listen();
+    }
+
+    /// Lets milliseconds pass.
+    pub(super) fn run_ms(&mut self, ms: u64) {
+        self.run(Duration::from_millis(ms));
     }
 
     /// Lets time pass in silence.
@@ -205,9 +286,8 @@ impl Bench {
     /// Reads an object; `None` if the drive refuses or is silent.
     pub(super) fn read(&mut self, index: u16, sub_index: u8) -> Option<i64> {
         let [low, high] = index.to_le_bytes();
-        let reply = self.exchange([0x40, low, high, sub_index, 0, 0, 0, 0])?;
-        let table = self.model.table;
-        let row = table.row(table.find(Mux::new(index, sub_index)).ok()?);
+        let reply = self.exchange(&[0x40, low, high, sub_index, 0, 0, 0, 0])?;
+        let row = self.object(index, sub_index)?;
         let is_upload = reply[0] >> 5 == 2 && reply[1..4] == [low, high, sub_index];
         let raw = u32::from_le_bytes([reply[4], reply[5], reply[6], reply[7]]);
         is_upload.then(|| row.data_type.value(raw))
@@ -225,12 +305,23 @@ impl Bench {
 
     /// What can be measured at the drive.
     pub(super) fn report(&mut self) -> Report {
-        self.world.report(NODE).unwrap_or_default()
+        let node = self.node();
+        self.report_of(node)
+    }
+
+    /// What can be measured at one of the drives.
+    pub(super) fn report_of(&mut self, node: u8) -> Report {
+        self.world.report(node).unwrap_or_default()
+    }
+
+    /// The level of one of the drive's outputs.
+    pub(super) fn output(&mut self, name: &str) -> bool {
+        self.report().outputs.iter().any(|(output, on)| output == name && on)
     }
 
     /// Does something to the machine around the drive, in the words of `ferrodrive sim`.
     pub(super) fn machine(&mut self, command: &str) {
-        let line = format!("{NODE} {command}");
+        let line = format!("{} {command}", self.node());
         let refused =
             sim::command::answer(&mut self.world, &line).filter(|answer| !answer.json.contains("\"ok\":true"));
         if let Some(answer) = refused {
@@ -241,6 +332,12 @@ impl Bench {
     /// The present.
     pub(super) fn now(&self) -> Instant {
         self.world.now()
+    }
+
+    /// Queues a frame without letting time pass.
+    pub(super) fn transmit(&mut self, frame: Frame) {
+        // The adapter's queue holds thousands; the bench sends a few frames at a time.
+        let _ = self.world.send(self.adapter, frame);
     }
 
     /// Frames heard from `begin` on with this identifier.
@@ -258,6 +355,11 @@ impl Bench {
         Finished { rows, recorder, sections, events, set_points, end }
     }
 
+    fn object(&self, index: u16, sub_index: u8) -> Option<&'static Entry> {
+        let table = self.model().table;
+        Some(table.row(table.find(Mux::new(index, sub_index)).ok()?))
+    }
+
     fn row(&mut self) -> &mut Row {
         if self.rows.is_empty() {
             self.rows.push(Row::new(self.section, ""));
@@ -266,26 +368,28 @@ impl Bench {
         &mut self.rows[last]
     }
 
-    fn exchange(&mut self, request: [u8; 8]) -> Option<[u8; 8]> {
-        self.set_points.note(&request, self.world.now());
+    fn exchange(&mut self, request: &[u8]) -> Option<[u8; 8]> {
+        self.set_points.note(request, self.world.now());
+        let node = u16::from(self.node());
+        let request = Frame::new(CanId::standard(0x600 + node), request);
+        self.await_frame(request, 0x580 + node).map(|frame| *frame.padded())
+    }
+
+    /// Sends a frame and waits for the first one with an identifier.
+    fn await_frame(&mut self, request: Frame, id: u16) -> Option<Frame> {
         self.listen();
         let before = self.heard.len();
-        self.transmit(Frame::full(CanId::standard(0x600 + u16::from(NODE)), request));
+        self.transmit(request);
         let limit = self.world.now() + ANSWER_TIME;
         while self.world.now() < limit && self.world.next_event().is_some_and(|at| at <= limit) {
             self.world.step();
             self.listen();
-            let reply = |(_, frame): &&(Instant, Frame)| frame.standard_data_id() == Some(0x580 + u16::from(NODE));
-            if let Some((_, frame)) = self.heard[before..].iter().find(reply) {
-                return Some(*frame.padded());
+            let is_it = |(_, frame): &&(Instant, Frame)| frame.standard_data_id() == Some(id);
+            if let Some((_, frame)) = self.heard[before..].iter().find(is_it) {
+                return Some(*frame);
             }
         }
         None
-    }
-
-    fn transmit(&mut self, frame: Frame) {
-        // The adapter's queue holds thousands; the bench sends one frame at a time.
-        let _ = self.world.send(self.adapter, frame);
     }
 
     fn listen(&mut self) {
@@ -293,17 +397,4 @@ impl Bench {
             self.heard.push(heard);
         }
     }
-}
-
-/// A datagram as printed: `2F 60 60 00 03 00 00 00`.
-fn bytes(text: &str) -> [u8; 8] {
-    let mut bytes = [0; 8];
-    for (byte, word) in bytes.iter_mut().zip(text.split_whitespace()) {
-        *byte = u8::from_str_radix(word, 16).unwrap_or_default();
-    }
-    bytes
-}
-
-fn hex(bytes: &[u8; 8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02X}")).collect()
 }

@@ -1,13 +1,45 @@
-//! The demo's picture: position, velocity and current over time, with the manual's sections and what happened.
-
-use super::bench::{Finished, SIGNALS};
-use super::set_points::Axis;
-use crate::plot::{Colour, Figure, Panel, Section, Style, Trace};
+//! The demo's picture: position, velocity and current of each drive over time, with the manuals' sections and what
+//! happened.
 
 use sim::recorder::Signal;
 
-/// Draws what the bench recorded.
-pub(super) fn figure(finished: &Finished) -> Figure {
+use super::bench::{Finished, SIGNALS};
+use super::set_points::Axis;
+use crate::plot::{Colour, Figure, Panel, Poster, Section, Style, Trace};
+
+/// The picture without its charts.
+pub(super) fn poster() -> Poster {
+    Poster {
+        title: "Every procedure of three drives' manuals, on the virtual drives".into(),
+        subtitle: "ferrodrive demo: datagrams as printed, the drives' own control loops, motor physics, virtual time"
+            .into(),
+        rows: Vec::new(),
+    }
+}
+
+/// The ZLAC8030L's chart.
+pub(super) fn zlac8030l(finished: &Finished) -> Vec<Vec<Figure>> {
+    vec![vec![drive(finished, "ZLAC8030L", "hub servo, quick start guide V1.00", "counts", Signal::Position)]]
+}
+
+/// The joint's chart.
+pub(super) fn mjoint(finished: &Finished) -> Vec<Vec<Figure>> {
+    vec![vec![drive(finished, "M4230E17B50", "robot joint, CanOpen manual", "counts", Signal::Position)]]
+}
+
+/// The stepper's chart.
+pub(super) fn zlim42c(finished: &Finished) -> Vec<Vec<Figure>> {
+    vec![vec![drive(finished, "ZLIM42-C", "open-loop stepper, user manual V1.03", "pulses", Signal::Position)]]
+}
+
+/// Position, velocity and current of the first drive.
+fn drive(
+    finished: &Finished,
+    title: &'static str,
+    subtitle: &'static str,
+    position_unit: &'static str,
+    position: Signal,
+) -> Figure {
     let trace = |label, style, signal: Signal| {
         let channel = SIGNALS.iter().position(|recorded| *recorded == signal).unwrap_or(0);
         let times = finished.recorder.times().iter().map(|at| at.as_secs_f64());
@@ -23,12 +55,11 @@ pub(super) fn figure(finished: &Finished) -> Figure {
         ],
     };
     Figure {
-        title: "Every procedure of the ZLAC8030L's manual, on the virtual drive".into(),
-        subtitle: "ferrodrive demo: datagrams as printed in the quick start guide V1.00, control loops at 20 kHz, \
-                   motor physics, virtual time"
-            .into(),
+        title: title.into(),
+        subtitle: subtitle.into(),
+        time: "time, s",
         panels: vec![
-            panel("Position", "counts", Colour::Blue, Axis::Position, Signal::PositionDemand, Signal::Position),
+            panel("Position", position_unit, Colour::Blue, Axis::Position, Signal::PositionDemand, position),
             panel("Velocity", "r/min", Colour::Teal, Axis::Velocity, Signal::VelocityDemand, Signal::Velocity),
             panel("Motor current", "A", Colour::Orange, Axis::Current, Signal::CurrentDemand, Signal::Current),
         ],

@@ -1,51 +1,90 @@
-//! The demo: every procedure of the ZLAC8030L's manual against the virtual drive, datagram by datagram as printed.
+//! The demo: every procedure of the three manuals against the virtual drives, datagram by datagram as printed, and the
+//! three drives together on one bus.
 //!
-//! What is expected comes from the manual ("ZLAC8030L quick start guide V1.00") or from a closed form of its figures,
-//! never from an earlier run. Each row of the table says what was asked, what answered, what moved and what was seen.
+//! What is expected comes from the manuals ("ZLAC8030L quick start guide V1.00", "M Robot Joint Motor CanOpen Manual",
+//! "ZLIM42-C user manual V1.03"; misprints as `docs/drives` reads them) or from a closed form of their figures, never
+//! from an earlier run. Each row of the table says what was asked, what answered, what moved and what was seen.
 
 mod bench;
-mod communication;
+mod datagram;
 mod expect;
-mod faults;
 mod figure;
-mod functions;
-mod pdo;
-mod position;
+mod mjoint;
 mod report;
 mod row;
 mod set_points;
-mod torque;
-mod velocity;
+mod timing;
+mod zlac8030l;
+mod zlim42c;
 
 use bench::Bench;
+use can::Bitrate;
+use drives::profile::DriveProfile;
 pub(crate) use report::DemoReport;
+use report::PartReport;
 
 use crate::failure::Failure;
-use crate::plot::Figure;
+use crate::plot::Poster;
 use crate::progress::Progress;
 
-/// Runs the demo: the table, and the picture of the motion.
-pub(crate) fn run(progress: Progress) -> Result<(DemoReport, Figure), Failure> {
-    let mut bench = Bench::new(&drives::zlac8030l::PROFILE, progress)?;
-    communication::boot_up(&mut bench);
-    communication::sdo_format(&mut bench);
-    velocity::profile_velocity(&mut bench);
-    velocity::emergency_stop(&mut bench);
-    velocity::stop(&mut bench);
-    velocity::readings(&mut bench);
-    position::relative(&mut bench);
-    position::absolute(&mut bench);
-    torque::profile_torque(&mut bench);
-    functions::alarm_pwm(&mut bench);
-    functions::parking(&mut bench);
-    functions::speed_resolution(&mut bench);
-    functions::io_stop(&mut bench);
-    functions::brake(&mut bench);
-    pdo::tpdo(&mut bench);
-    pdo::rpdo(&mut bench);
-    faults::all(&mut bench);
-    communication::heartbeat(&mut bench);
-    let finished = bench.finish();
-    let figure = figure::figure(&finished);
-    Ok((DemoReport::new(finished), figure))
+/// A part of the demo: some drives on a bus, and what is done with them.
+struct Part {
+    /// As in the table's heading.
+    name: &'static str,
+    /// The drives with their node-IDs; the first one is talked to.
+    drives: &'static [(&'static DriveProfile, u8)],
+    bitrate: Bitrate,
+    procedures: fn(&mut Bench),
+    draw: fn(&bench::Finished) -> Vec<Vec<crate::plot::Figure>>,
+}
+
+/// Node-IDs and bit rates are those of the manuals' examples.
+const PARTS: [Part; 3] = [
+    Part {
+        name: "ZLAC8030L",
+        drives: &[(&drives::zlac8030l::PROFILE, 4)],
+        bitrate: Bitrate::K500,
+        procedures: zlac8030l::procedures,
+        draw: figure::zlac8030l,
+    },
+    Part {
+        name: "M4230E17B50",
+        drives: &[(&drives::mjoint::M4230E17B50, 1)],
+        bitrate: Bitrate::M1,
+        procedures: mjoint::procedures,
+        draw: figure::mjoint,
+    },
+    Part {
+        name: "ZLIM42-C",
+        drives: &[(&drives::zlim42c::PROFILE, 1)],
+        bitrate: Bitrate::K500,
+        procedures: zlim42c::procedures,
+        draw: figure::zlim42c,
+    },
+];
+
+/// The models that have a part of their own.
+pub(crate) fn models() -> Vec<&'static str> {
+    PARTS.iter().filter_map(|part| part.model()).collect()
+}
+
+/// Runs the demo, or the part of one model: the table, and the picture of the motion.
+pub(crate) fn run(only: Option<&str>, progress: &Progress) -> Result<(DemoReport, Poster), Failure> {
+    let mut parts = Vec::new();
+    let mut poster = figure::poster();
+    for part in PARTS.iter().filter(|part| only.is_none_or(|model| part.model() == Some(model))) {
+        let mut bench = Bench::new(part.drives, part.bitrate, progress.clone())?;
+        (part.procedures)(&mut bench);
+        let finished = bench.finish();
+        poster.rows.extend((part.draw)(&finished));
+        parts.push(PartReport::new(part.name, finished));
+    }
+    Ok((DemoReport::new(parts), poster))
+}
+
+impl Part {
+    /// The model whose manual it is about, if it is about one.
+    fn model(&self) -> Option<&'static str> {
+        if let [(profile, _)] = self.drives { Some(profile.model) } else { None }
+    }
 }

@@ -13,7 +13,7 @@ use crate::table::Table;
 pub(crate) struct DemoReport {
     /// True if nothing differed.
     pub(crate) ok: bool,
-    /// Steps made, and how many were as expected.
+    /// Steps with something to compare, and how many were as expected.
     steps: usize,
     passed: usize,
     /// Virtual time passed, s.
@@ -22,41 +22,98 @@ pub(crate) struct DemoReport {
     pub(crate) took_s: f64,
     /// Where the picture is.
     pub(crate) svg: String,
+    /// The same figures for each part.
+    drives: Vec<PartReport>,
+    /// All steps, each with the part that it belongs to.
     rows: Vec<Row>,
 }
 
-impl DemoReport {
-    pub(super) fn new(finished: Finished) -> Self {
-        let passed = finished.rows.iter().filter(|row| row.ok).count();
-        let steps = finished.rows.len();
-        let virtual_s = finished.end.as_secs_f64();
-        Self { ok: passed == steps, steps, passed, virtual_s, took_s: 0.0, svg: String::new(), rows: finished.rows }
+/// What a part of it found.
+#[derive(Debug, Serialize)]
+pub(super) struct PartReport {
+    /// The drive, or what the drives do together.
+    drive: &'static str,
+    steps: usize,
+    passed: usize,
+    virtual_s: f64,
+    #[serde(skip)]
+    rows: Vec<Row>,
+}
+
+impl PartReport {
+    pub(super) fn new(drive: &'static str, finished: Finished) -> Self {
+        let Finished { mut rows, end, .. } = finished;
+        rows.iter_mut().for_each(|row| row.drive = drive);
+        let compared = || rows.iter().filter(|row| !row.checks.is_empty());
+        let (steps, passed) = (compared().count(), compared().filter(|row| row.ok).count());
+        Self { drive, steps, passed, virtual_s: end.as_secs_f64(), rows }
     }
+
+    fn ok(&self) -> bool {
+        self.passed == self.steps
+    }
+}
+
+impl DemoReport {
+    pub(super) fn new(mut drives: Vec<PartReport>) -> Self {
+        let rows = drives.iter_mut().flat_map(|part| std::mem::take(&mut part.rows)).collect();
+        let sum = |count: fn(&PartReport) -> usize| drives.iter().map(count).sum();
+        Self {
+            ok: drives.iter().all(PartReport::ok),
+            steps: sum(|part| part.steps),
+            passed: sum(|part| part.passed),
+            virtual_s: drives.iter().map(|part| part.virtual_s).sum(),
+            took_s: 0.0,
+            svg: String::new(),
+            drives,
+            rows,
+        }
+    }
+}
+
+const OK_COLUMN: usize = 7;
+
+/// The steps of one part.
+fn table<'a>(rows: impl Iterator<Item = &'a Row>, paint: Paint) -> String {
+    let mut table = Table::new(&["", "step", "asked", "answered", "moved", "expected", "seen", "ok"]);
+    let mut section = "";
+    for row in rows {
+        let number = if row.section == section { "" } else { row.section };
+        section = row.section;
+        if row.checks.is_empty() {
+            // Nobody answers a frame of this kind.
+            table.row([number, &row.step, &row.asked]);
+        }
+        for (place, check) in row.checks.iter().enumerate() {
+            let first = |text: &str| if place == 0 { text.to_owned() } else { String::new() };
+            let ok = if check.ok { "ok" } else { "DIFFERS" };
+            let what = [first(number), first(&row.step), first(&row.asked), first(&row.answered), first(&row.moved)];
+            table.row(what.into_iter().chain([check.expected.clone(), check.seen.clone(), ok.into()]));
+        }
+    }
+    table.text(paint, |_, column, cell| {
+        (column == OK_COLUMN).then(|| if cell == "ok" { paint.good(cell) } else { paint.bad(cell) })
+    })
 }
 
 impl Report for DemoReport {
     fn text(&self, paint: Paint) -> String {
-        const OK_COLUMN: usize = 7;
-        let mut table = Table::new(&["", "step", "asked", "answered", "moved", "expected", "seen", "ok"]);
-        let mut section = "";
-        for row in &self.rows {
-            let number = if row.section == section { "" } else { row.section };
-            section = row.section;
-            for (place, check) in row.checks.iter().enumerate() {
-                let first = |text: &str| if place == 0 { text.to_owned() } else { String::new() };
-                let ok = if check.ok { "ok" } else { "DIFFERS" };
-                let what =
-                    [first(number), first(&row.step), first(&row.asked), first(&row.answered), first(&row.moved)];
-                table.row(what.into_iter().chain([check.expected.clone(), check.seen.clone(), ok.into()]));
-            }
+        let colour = |ok: bool, text: String| if ok { paint.good(&text) } else { paint.bad(&text) };
+        let mut text = String::new();
+        for part in &self.drives {
+            let rows = self.rows.iter().filter(|row| row.drive == part.drive);
+            text.push_str(&format!("{}\n\n{}\n\n", paint.strong(part.drive), table(rows, paint)));
         }
-        let text = table.text(paint, |_, column, cell| {
-            (column == OK_COLUMN).then(|| if cell == "ok" { paint.good(cell) } else { paint.bad(cell) })
-        });
-        let verdict = format!("{} of {} steps as the manual says", self.passed, self.steps);
-        let verdict = if self.ok { paint.good(&verdict) } else { paint.bad(&verdict) };
-        format!(
-            "{text}\n\n{verdict}; {:.1} s of drive time in {:.2} s; the motion is drawn in {}",
+        let width = self.drives.iter().map(|part| part.drive.chars().count()).max().unwrap_or(0);
+        for part in &self.drives {
+            let count = format!("{:3} of {:3} steps as expected", part.passed, part.steps);
+            let name = part.drive;
+            text.push_str(&format!("{name:width$}  {}; {:.1} s\n", colour(part.ok(), count), part.virtual_s));
+        }
+        let verdict = format!("{} of {} steps as the manuals say", self.passed, self.steps);
+        let verdict = colour(self.ok, verdict);
+        text + &format!(
+            "\n{verdict}; {:.1} s of drive time in {:.2} s; the motion is drawn in {}",
             self.virtual_s, self.took_s, self.svg
         )
     }

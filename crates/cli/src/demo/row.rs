@@ -7,6 +7,8 @@ use super::expect::Expect;
 /// See the [module](self).
 #[derive(Clone, Debug, Default, Serialize)]
 pub(super) struct Row {
+    /// The part of the demo: a drive, or what the drives do together.
+    pub(super) drive: &'static str,
     /// The manual's section.
     pub(super) section: &'static str,
     /// What is done.

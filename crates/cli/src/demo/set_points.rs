@@ -45,8 +45,10 @@ impl SetPoints {
     }
 
     /// Reads an SDO request.
-    pub(super) fn note(&mut self, request: &[u8; 8], now: Instant) {
-        let [command, low, high, _, data @ ..] = *request;
+    pub(super) fn note(&mut self, request: &[u8], now: Instant) {
+        let mut padded = [0; 8];
+        padded.iter_mut().zip(request).for_each(|(to, from)| *to = *from);
+        let [command, low, high, _, data @ ..] = padded;
         if command >> 5 != 1 {
             return;
         }

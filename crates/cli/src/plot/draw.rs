@@ -3,24 +3,31 @@
 use super::svg::{Anchor, Font, Svg};
 use super::thin::thin;
 use super::ticks::Ticks;
-use super::{Colour, Event, EventKind, Figure, Panel, Style, Trace, lanes};
+use super::{Colour, Event, EventKind, Figure, Panel, Poster, Style, Trace, lanes};
 
-const WIDTH: f64 = 1120.0;
-const LEFT: f64 = 92.0;
-const RIGHT: f64 = 128.0;
-const TOP: f64 = 74.0;
-const SECTION_STRIP: f64 = 40.0;
-const EVENT_LANE: f64 = 17.0;
+/// Chosen for pages that show pictures about 900 px wide: letters stay readable there.
+const WIDTH: f64 = 1000.0;
+/// From a figure's border to its axes: room for the ticks, and for the names of the lines.
+const LEFT: f64 = 84.0;
+const RIGHT: f64 = 92.0;
+/// Holds the poster's title and subtitle.
+const HEADING: f64 = 66.0;
+/// Holds a figure's title.
+const TOP: f64 = 34.0;
+const SECTION_STRIP: f64 = 38.0;
+const EVENT_LANE: f64 = 16.0;
 const EVENT_LANES: usize = 7;
-const PANEL_HEIGHT: f64 = 150.0;
+const PANEL_HEIGHT: f64 = 104.0;
 /// Names may come this close to their neighbours: their width is estimated on the safe side.
 const CROWDING: f64 = 1.1;
 /// Holds the title of the panel below.
-const PANEL_GAP: f64 = 34.0;
+const PANEL_GAP: f64 = 30.0;
 /// Room above and below the values of a panel, as a part of their range.
 const HEADROOM: f64 = 0.07;
-const BOTTOM: f64 = 50.0;
+const BOTTOM: f64 = 44.0;
 const LABEL_GAP: f64 = 15.0;
+/// A tick of the time axis for each so many pixels at most.
+const TICK_DISTANCE: f64 = 62.0;
 
 const GROUND: &str = "#ffffff";
 const FRAME: &str = "#d0d7de";
@@ -30,23 +37,27 @@ const ZERO: &str = "#b6c0cb";
 
 const TITLE: Font = Font { size: 19.0, colour: "#1f2933", bold: true };
 const SUBTITLE: Font = Font { size: 13.0, colour: "#5b6773", bold: false };
+const FIGURE_TITLE: Font = Font { size: 15.5, colour: "#1f2933", bold: true };
 const AXIS: Font = Font { size: 12.0, colour: "#5b6773", bold: false };
 const NAME: Font = Font { size: 12.5, colour: "#1f2933", bold: true };
 const NUMBER: Font = Font { size: 12.0, colour: "#3b4652", bold: true };
 const SECTION: Font = Font { size: 11.5, colour: "#5b6773", bold: false };
 
-/// Where things lie, px.
+/// Where things of a figure lie, px.
 struct Layout {
-    time_s: (f64, f64),
+    time: (f64, f64),
+    left: f64,
+    right: f64,
+    top: f64,
     event_top: f64,
     panels_top: f64,
     panels_bottom: f64,
 }
 
 impl Layout {
-    fn x(&self, t_s: f64) -> f64 {
-        let (begin, end) = self.time_s;
-        LEFT + (t_s - begin) / (end - begin) * (WIDTH - LEFT - RIGHT)
+    fn x(&self, time: f64) -> f64 {
+        let (begin, end) = self.time;
+        self.left + (time - begin) / (end - begin) * (self.right - self.left)
     }
 
     fn panel_top(&self, number: usize) -> f64 {
@@ -55,45 +66,71 @@ impl Layout {
 }
 
 /// The whole picture.
-pub(super) fn figure(figure: &Figure) -> String {
+pub(super) fn poster(poster: &Poster) -> String {
+    let mut body = Svg::default();
+    body.text((24.0, 34.0), Anchor::Start, TITLE, &poster.title);
+    body.text((24.0, 55.0), Anchor::Start, SUBTITLE, &poster.subtitle);
+    let mut top = HEADING;
+    for row in &poster.rows {
+        let width = WIDTH / row.len().max(1) as f64;
+        let bottoms = row.iter().enumerate().map(|(place, it)| {
+            let left = place as f64 * width;
+            figure(&mut body, it, (left + LEFT, left + width - RIGHT), top)
+        });
+        top = bottoms.fold(top, f64::max);
+    }
+    let mut svg = Svg::default();
+    svg.rect((0.5, 0.5), (WIDTH - 1.0, top - 1.0), 8.0, &format!(r#"fill="{GROUND}" stroke="{FRAME}""#));
+    svg.append(body);
+    svg.document((WIDTH, top), &poster.title)
+}
+
+/// One figure; gives where the next one may begin.
+fn figure(svg: &mut Svg, figure: &Figure, (left, right): (f64, f64), top: f64) -> f64 {
     let mut events: Vec<&Event> = figure.events.iter().collect();
     events.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
     let section_strip = if figure.sections.is_empty() { 0.0 } else { SECTION_STRIP };
+    let top = top + TOP;
+    let event_top = top + section_strip;
     let mut layout =
-        Layout { time_s: figure.time_span_s(), event_top: TOP + section_strip, panels_top: 0.0, panels_bottom: 0.0 };
+        Layout { time: figure.time_span(), left, right, top, event_top, panels_top: 0.0, panels_bottom: 0.0 };
     let event_lanes = event_lanes(&layout, &events);
     let lane_count = event_lanes.iter().max().map_or(0, |lane| lane + 1);
-    layout.panels_top = layout.event_top + lane_count as f64 * EVENT_LANE + 28.0;
+    layout.panels_top = layout.event_top + lane_count as f64 * EVENT_LANE + 26.0;
     layout.panels_bottom = layout.panel_top(figure.panels.len()) - PANEL_GAP;
-    let height = layout.panels_bottom + BOTTOM;
 
-    let mut svg = Svg::default();
-    svg.rect((0.5, 0.5), (WIDTH - 1.0, height - 1.0), 8.0, &format!(r#"fill="{GROUND}" stroke="{FRAME}""#));
-    svg.text((24.0, 34.0), Anchor::Start, TITLE, &figure.title);
-    svg.text((24.0, 55.0), Anchor::Start, SUBTITLE, &figure.subtitle);
-    sections(&mut svg, &layout, figure);
-    draw_events(&mut svg, &layout, &events, &event_lanes);
+    let title_left = left - LEFT + 24.0;
+    svg.text((title_left, top - 9.0), Anchor::Start, FIGURE_TITLE, &figure.title);
+    let after_title = title_left + 8.0 + FIGURE_TITLE.width(&figure.title);
+    svg.text((after_title, top - 9.0), Anchor::Start, SUBTITLE, &figure.subtitle);
+    sections(svg, &layout, figure);
+    draw_events(svg, &layout, &events, &event_lanes);
     for (number, panel) in figure.panels.iter().enumerate() {
-        draw_panel(&mut svg, &layout, layout.panel_top(number), panel);
+        draw_panel(svg, &layout, layout.panel_top(number), panel);
     }
-    time_axis(&mut svg, &layout);
-    svg.document((WIDTH, height), &figure.title)
+    time_axis(svg, &layout, figure.time);
+    layout.panels_bottom + BOTTOM
 }
 
 fn sections(svg: &mut Svg, layout: &Layout, figure: &Figure) {
     let places = figure.sections.iter().map(|section| (section, layout.x(section.from_s), layout.x(section.to_s)));
     // Every other section has a tinted ground; all grounds come before all names, which may reach over a border.
     for (_, left, right) in places.clone().step_by(2) {
-        svg.rect((left, TOP), (right - left, layout.panels_bottom - TOP), 0.0, &format!(r#"fill="{BAND}""#));
+        svg.rect(
+            (left, layout.top),
+            (right - left, layout.panels_bottom - layout.top),
+            0.0,
+            &format!(r#"fill="{BAND}""#),
+        );
     }
     for (section, left, right) in places {
         let fits = |name: &&String| SECTION.width(name) < (right - left) * CROWDING;
         let middle = (left + right) / 2.0;
         if NUMBER.width(&section.number) < right - left {
-            svg.text((middle, TOP + 17.0), Anchor::Middle, NUMBER, &section.number);
+            svg.text((middle, layout.top + 16.0), Anchor::Middle, NUMBER, &section.number);
         }
         if let Some(name) = section.names.iter().find(fits) {
-            svg.text((middle, TOP + 32.0), Anchor::Middle, SECTION, name);
+            svg.text((middle, layout.top + 31.0), Anchor::Middle, SECTION, name);
         }
     }
 }
@@ -107,11 +144,11 @@ fn draw_panel(svg: &mut Svg, layout: &Layout, top: f64, panel: &Panel) {
     let y = |value: f64| top + (high - value) / (high - low) * PANEL_HEIGHT;
     for &tick in &ticks.values {
         let colour = if tick == 0.0 { ZERO } else { GRID };
-        svg.line((LEFT, y(tick)), (WIDTH - RIGHT, y(tick)), &format!(r#"stroke="{colour}""#));
-        svg.text((LEFT - 8.0, y(tick) + 4.0), Anchor::End, AXIS, &ticks.text(tick));
+        svg.line((layout.left, y(tick)), (layout.right, y(tick)), &format!(r#"stroke="{colour}""#));
+        svg.text((layout.left - 8.0, y(tick) + 4.0), Anchor::End, AXIS, &ticks.text(tick));
     }
-    svg.rimmed_text((LEFT, top - 7.0), Anchor::Start, NAME, panel.title);
-    let after_title = LEFT + 7.0 + NAME.width(panel.title);
+    svg.rimmed_text((layout.left, top - 7.0), Anchor::Start, NAME, panel.title);
+    let after_title = layout.left + 7.0 + NAME.width(panel.title);
     svg.rimmed_text((after_title, top - 7.0), Anchor::Start, AXIS, panel.unit);
     for trace in &panel.traces {
         // Where a trace has no value, its line has a gap.
@@ -121,14 +158,13 @@ fn draw_panel(svg: &mut Svg, layout: &Layout, top: f64, panel: &Panel) {
             svg.path(&line, &paint(trace.style));
         }
     }
-    trace_labels(svg, top, &panel.traces, y);
+    trace_labels(svg, (layout.right + 8.0, top), &panel.traces, y);
 }
 
-fn trace_labels(svg: &mut Svg, top: f64, traces: &[Trace], y: impl Fn(f64) -> f64) {
+fn trace_labels(svg: &mut Svg, (x, top): (f64, f64), traces: &[Trace], y: impl Fn(f64) -> f64) {
     let ends: Vec<f64> = traces.iter().map(|trace| y(last_value(trace))).collect();
     let heights = lanes::spread(&ends, LABEL_GAP, top + 6.0, top + PANEL_HEIGHT - 2.0);
     for (trace, height) in traces.iter().zip(heights) {
-        let x = WIDTH - RIGHT + 8.0;
         svg.line((x, height), (x + 14.0, height), &paint(trace.style));
         let font = Font { size: 12.0, colour: text_colour(trace.style), bold: matches!(trace.style, Style::Actual(_)) };
         svg.text((x + 19.0, height + 4.0), Anchor::Start, font, trace.label);
@@ -155,7 +191,7 @@ fn event_lanes(layout: &Layout, events: &[&Event]) -> Vec<usize> {
 /// Labels begin at their mark, or end at the right border when they would leave the picture.
 fn label_left(layout: &Layout, event: &Event) -> f64 {
     let width = event_font(event.kind).width(&event.label);
-    (layout.x(event.at_s) + 6.0).min(WIDTH - 14.0 - width)
+    (layout.x(event.at_s) + 6.0).min(layout.right + RIGHT - 14.0 - width)
 }
 
 /// All lines first, so that none runs over a label.
@@ -185,16 +221,17 @@ fn event_font(kind: EventKind) -> Font {
     Font { size: 11.5, colour, bold: false }
 }
 
-fn time_axis(svg: &mut Svg, layout: &Layout) {
-    let ticks = Ticks::within(layout.time_s.0, layout.time_s.1, 14);
+fn time_axis(svg: &mut Svg, layout: &Layout, name: &str) {
+    let most = ((layout.right - layout.left) / TICK_DISTANCE) as usize;
+    let ticks = Ticks::within(layout.time.0, layout.time.1, most.max(2));
     let y = layout.panels_bottom;
-    svg.line((LEFT, y), (WIDTH - RIGHT, y), &format!(r#"stroke="{ZERO}""#));
+    svg.line((layout.left, y), (layout.right, y), &format!(r#"stroke="{ZERO}""#));
     for &tick in &ticks.values {
         let x = layout.x(tick);
         svg.line((x, y), (x, y + 5.0), &format!(r#"stroke="{ZERO}""#));
         svg.text((x, y + 20.0), Anchor::Middle, AXIS, &ticks.text(tick));
     }
-    svg.text((WIDTH - RIGHT + 8.0, y + 20.0), Anchor::Start, AXIS, "time, s");
+    svg.text((layout.right + 8.0, y + 20.0), Anchor::Start, AXIS, name);
 }
 
 /// A line that holds each value until the next.
@@ -242,12 +279,17 @@ mod tests {
     use super::super::Section;
     use super::*;
 
-    fn example() -> Figure {
+    fn example() -> Poster {
+        Poster { title: "Title".into(), subtitle: "subtitle".into(), rows: vec![vec![figure()]] }
+    }
+
+    fn figure() -> Figure {
         let wave =
             |amplitude: f64| (0..2000).map(move |i| (f64::from(i) * 0.01, amplitude * (f64::from(i) * 0.01).sin()));
         Figure {
-            title: "Title".into(),
-            subtitle: "subtitle".into(),
+            title: "Drive".into(),
+            subtitle: "in words".into(),
+            time: "time, s",
             panels: vec![
                 Panel {
                     title: "velocity",
@@ -287,10 +329,22 @@ mod tests {
 
     #[test]
     fn no_number_in_the_picture_is_broken() {
-        let mut figure = example();
-        figure.panels[0].traces.clear();
-        let svg = figure.to_svg();
+        let mut poster = example();
+        poster.rows[0][0].panels[0].traces.clear();
+        let svg = poster.to_svg();
         assert!(!svg.contains("NaN") && !svg.contains("inf"));
+    }
+
+    #[test]
+    fn figures_of_a_row_stand_side_by_side() {
+        let height = |rows: Vec<Vec<Figure>>| {
+            let svg = Poster { rows, ..Poster::default() }.to_svg();
+            let (_, size) = svg.split_once("viewBox=\"0 0 ").expect("a view box");
+            size.split(['"', ' ']).nth(1).and_then(|height| height.parse::<f64>().ok()).expect("a height")
+        };
+        let one = height(vec![vec![figure()]]);
+        assert_eq!(height(vec![vec![figure(), figure()]]), one);
+        assert!(height(vec![vec![figure()], vec![figure()]]) > one + 200.0);
     }
 
     #[test]

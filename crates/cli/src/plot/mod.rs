@@ -1,6 +1,6 @@
-//! Time plots as SVG: stacked panels over one time axis, with named sections and marked events.
+//! Time plots as SVG: a poster of figures, each with stacked panels over one time axis, named sections and marked events.
 //!
-//! A [`Figure`] is plain data in; [`Figure::to_svg`] is text out. It has its own light background, so that it
+//! A [`Poster`] is plain data in; [`Poster::to_svg`] is text out. It has its own light background, so that it
 //! reads the same on a white page and in a dark one, and holds no script and no fonts. Long traces are thinned to
 //! the smallest and largest value of each pixel column, so nothing that could be seen is lost.
 
@@ -10,13 +10,26 @@ mod svg;
 mod thin;
 mod ticks;
 
-/// A figure: what to draw, not how.
+/// A page of figures.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Figure {
+pub(crate) struct Poster {
     /// Large line at the top.
     pub(crate) title: String,
     /// Small line under it.
     pub(crate) subtitle: String,
+    /// From top to bottom; those of a row stand side by side.
+    pub(crate) rows: Vec<Vec<Figure>>,
+}
+
+/// A figure: what to draw, not how.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Figure {
+    /// Line above it.
+    pub(crate) title: String,
+    /// Small words after the title.
+    pub(crate) subtitle: String,
+    /// What the time axis shows: "time, s".
+    pub(crate) time: &'static str,
     /// From top to bottom.
     pub(crate) panels: Vec<Panel>,
     /// Spans of time with a name, not overlapping.
@@ -43,7 +56,7 @@ pub(crate) struct Trace {
     pub(crate) label: &'static str,
     /// How it looks.
     pub(crate) style: Style,
-    /// Time in seconds and value in the panel's unit, time ascending.
+    /// Time in the figure's unit and value in the panel's unit, time ascending.
     pub(crate) points: Vec<(f64, f64)>,
 }
 
@@ -104,14 +117,16 @@ pub(crate) enum EventKind {
     Note,
 }
 
-impl Figure {
+impl Poster {
     /// The picture.
     pub(crate) fn to_svg(&self) -> String {
-        draw::figure(self)
+        draw::poster(self)
     }
+}
 
-    /// First and last moment of all traces, s.
-    fn time_span_s(&self) -> (f64, f64) {
+impl Figure {
+    /// First and last moment of all traces.
+    fn time_span(&self) -> (f64, f64) {
         let times = self
             .panels
             .iter()

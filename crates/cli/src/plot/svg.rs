@@ -39,6 +39,11 @@ impl Font {
 }
 
 impl Svg {
+    /// Puts what another one holds on top.
+    pub(super) fn append(&mut self, other: Self) {
+        self.body.push_str(&other.body);
+    }
+
     /// A rectangle with rounded corners.
     pub(super) fn rect(&mut self, (x, y): (f64, f64), (width, height): (f64, f64), radius: f64, paint: &str) {
         let _ = writeln!(

@@ -2,12 +2,13 @@
 
 use std::time::Duration;
 
-use can::{CanId, Frame, Instant};
+use can::{CanId, Frame};
 
-use super::bench::{Bench, NODE};
-use super::communication::largest_gap_ms;
-use super::expect::Expect;
+use super::NODE;
 use super::functions::{stop, velocity_mode};
+use crate::demo::bench::Bench;
+use crate::demo::expect::Expect;
+use crate::demo::timing::{largest_gap_ms, smallest_gap_ms};
 
 const TPDO0: u16 = 0x180 + NODE as u16;
 
@@ -96,8 +97,4 @@ fn silent(bench: &mut Bench) {
     bench.run(Duration::from_millis(1_500));
     let sent = bench.heard_since(begin, TPDO0).len();
     bench.expect("184h after closing", Expect::Near(0.0, 0.0), "frames", sent as f64);
-}
-
-fn smallest_gap_ms(frames: &[(Instant, Frame)]) -> f64 {
-    frames.windows(2).map(|pair| (pair[1].0 - pair[0].0).as_secs_f64() * 1e3).fold(f64::NAN, f64::min)
 }

@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use super::bench::Bench;
-use super::expect::Expect;
 use super::velocity::enable_again;
+use crate::demo::bench::Bench;
+use crate::demo::expect::Expect;
 use crate::plot::EventKind;
 
 /// Torque slope as delivered (6087h), A/s.

@@ -4,8 +4,10 @@ use std::time::Duration;
 
 use can::{CanId, Frame, Instant};
 
-use super::bench::{Bench, NODE};
-use super::expect::Expect;
+use super::NODE;
+use crate::demo::bench::Bench;
+use crate::demo::expect::Expect;
+use crate::demo::timing::largest_gap_ms;
 
 /// 3.2: "will send a 700+ID NMT message when it is powered on".
 pub(super) fn boot_up(bench: &mut Bench) {
@@ -49,9 +51,4 @@ pub(super) fn heartbeat(bench: &mut Bench) {
         bench.expect("heartbeat", Expect::Bits(state), "", seen);
     }
     bench.ask("heartbeat off", "2B 17 10 00 00 00 00 00", "60 17 10 00 00 00 00 00");
-}
-
-/// The time between neighbours that is farthest from none.
-pub(super) fn largest_gap_ms(frames: &[(Instant, Frame)]) -> f64 {
-    frames.windows(2).map(|pair| (pair[1].0 - pair[0].0).as_secs_f64() * 1e3).fold(f64::NAN, f64::max)
 }

@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use sim::Brake;
 
-use super::bench::Bench;
-use super::expect::Expect;
 use super::velocity::enable_again;
+use crate::demo::bench::Bench;
+use crate::demo::expect::Expect;
 use crate::plot::EventKind;
 
 const SAVE: (&str, &str) = ("2B 09 20 00 02 00 00 00", "60 09 20 00 00 00 00 00");

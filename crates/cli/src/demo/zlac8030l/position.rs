@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
-use super::bench::{Bench, COUNTS_PER_TURN};
-use super::expect::Expect;
+use super::COUNTS_PER_TURN;
 use super::velocity::enable_again;
+use crate::demo::bench::Bench;
+use crate::demo::expect::Expect;
 
 /// 2002h as delivered: the drive is in place within this many counts.
 const IN_PLACE_COUNTS: f64 = 30.0;

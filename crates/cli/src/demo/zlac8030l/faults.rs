@@ -2,10 +2,11 @@
 
 use std::time::Duration;
 
-use super::bench::{Bench, NODE};
-use super::expect::Expect;
+use super::NODE;
 use super::functions::{clear_fault, velocity_mode};
 use super::position::position_mode;
+use crate::demo::bench::Bench;
+use crate::demo::expect::Expect;
 use crate::plot::EventKind;
 
 /// 1014h: 80h + node-ID.

@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
-use super::bench::{Bench, COUNTS_PER_TURN};
-use super::expect::Expect;
+use super::COUNTS_PER_TURN;
+use crate::demo::bench::Bench;
+use crate::demo::expect::Expect;
 use crate::plot::EventKind;
 
 /// Acceleration and deceleration time as delivered (6083h, 6084h), s: from the present speed to the target.
