@@ -44,6 +44,37 @@ pub(super) struct Bench {
     sections: Vec<(Instant, &'static str, &'static str)>,
     events: Vec<Event>,
     set_points: SetPoints,
+    starts: Vec<Start>,
+}
+
+/// How axes start after SYNC.
+#[derive(Clone, Debug)]
+pub(super) struct Start {
+    /// What was set.
+    pub(super) setting: &'static str,
+    /// How far an axis has turned once it counts as started, counts.
+    pub(super) started_counts: f64,
+    /// Microseconds since SYNC was sent, and counts turned since, of each axis.
+    pub(super) axes: Vec<Vec<(f64, f64)>>,
+}
+
+impl Start {
+    /// When each axis started, µs; not a number for one that did not.
+    pub(super) fn times_us(&self) -> Vec<f64> {
+        let is_started = |point: &&(f64, f64)| point.1.abs() > self.started_counts;
+        self.axes.iter().map(|axis| axis.iter().find(is_started).map_or(f64::NAN, |point| point.0)).collect()
+    }
+
+    /// From the first to the last start, µs; not a number unless all started.
+    pub(super) fn spread_us(&self) -> f64 {
+        let times = self.times_us();
+        if times.iter().any(|time| time.is_nan()) {
+            return f64::NAN;
+        }
+        let (first, last) =
+            (times.iter().copied().fold(f64::NAN, f64::min), times.iter().copied().fold(f64::NAN, f64::max));
+        last - first
+    }
 }
 
 /// What is left of a bench: the table, the recording, and the named spans and moments in it.
@@ -54,6 +85,7 @@ pub(super) struct Finished {
     pub(super) sections: Vec<(Instant, &'static str, &'static str)>,
     pub(super) events: Vec<Event>,
     pub(super) set_points: SetPoints,
+    pub(super) starts: Vec<Start>,
     pub(super) end: Instant,
 }
 
@@ -96,7 +128,18 @@ impl Bench {
             sections: Vec::new(),
             events: Vec::new(),
             set_points: SetPoints::default(),
+            starts: Vec::new(),
         })
+    }
+
+    /// Talks to the drive at this node from here on.
+    pub(super) fn talk_to(&mut self, node: u8) {
+        self.subject = self.drives.iter().position(|(_, number)| *number == node).unwrap_or(0);
+    }
+
+    /// The drives and their node-IDs.
+    pub(super) fn drives(&self) -> &[(&'static DriveProfile, u8)] {
+        &self.drives
     }
 
     /// The node-ID that is talked to.
@@ -214,6 +257,21 @@ impl Bench {
         self.transmit(frame);
         self.world.run_for(Duration::from_millis(2));
         self.listen();
+    }
+
+    /// Says in the row what was asked.
+    pub(super) fn asked(&mut self, text: impl Into<String>) {
+        self.row().asked = text.into();
+    }
+
+    /// Says in the row what answered.
+    pub(super) fn answered_with(&mut self, text: impl Into<String>) {
+        self.row().answered = text.into();
+    }
+
+    /// Keeps how three axes started, for the picture.
+    pub(super) fn starts(&mut self, start: Start) {
+        self.starts.push(start);
     }
 
     /// Says in the row what the shaft did.
@@ -334,6 +392,11 @@ impl Bench {
         self.world.now()
     }
 
+    /// The world, for a station of its own.
+    pub(super) fn world(&mut self) -> &mut World {
+        &mut self.world
+    }
+
     /// Queues a frame without letting time pass.
     pub(super) fn transmit(&mut self, frame: Frame) {
         // The adapter's queue holds thousands; the bench sends a few frames at a time.
@@ -346,13 +409,19 @@ impl Bench {
         self.heard.iter().filter(wanted).copied().collect()
     }
 
+    /// When the first frame with this identifier was heard from `begin` on; `None` if none was.
+    pub(super) fn heard_after(&self, begin: Instant, id: u16) -> Option<Instant> {
+        let latest = self.heard.iter().rev().take_while(|(at, _)| *at >= begin);
+        latest.filter(|(_, frame)| frame.standard_data_id() == Some(id)).last().map(|(at, _)| *at)
+    }
+
     /// Ends the demo.
     pub(super) fn finish(mut self) -> Finished {
         let recorder = self.world.stop_recording().unwrap_or_else(|| Recorder::new(SAMPLING_PERIOD, []));
         let end = self.world.now();
         self.set_points.end(end);
-        let Self { rows, sections, events, set_points, .. } = self;
-        Finished { rows, recorder, sections, events, set_points, end }
+        let Self { rows, sections, events, set_points, starts, .. } = self;
+        Finished { rows, recorder, sections, events, set_points, starts, end }
     }
 
     fn object(&self, index: u16, sub_index: u8) -> Option<&'static Entry> {

@@ -1,6 +1,8 @@
 //! The demo's picture: position, velocity and current of each drive over time, with the manuals' sections and what
 //! happened.
 
+use std::f64::consts::TAU;
+
 use sim::recorder::Signal;
 
 use super::bench::{Finished, SIGNALS};
@@ -30,6 +32,73 @@ pub(super) fn mjoint(finished: &Finished) -> Vec<Vec<Figure>> {
 /// The stepper's chart.
 pub(super) fn zlim42c(finished: &Finished) -> Vec<Vec<Figure>> {
     vec![vec![drive(finished, "ZLIM42-C", "open-loop stepper, user manual V1.03", "pulses", Signal::Position)]]
+}
+
+/// Angle and speed of three models that are asked the same.
+pub(super) fn same_calls(finished: &Finished) -> Vec<Vec<Figure>> {
+    let names = ["ZLAC8030L", "M joint", "ZLIM42-C"];
+    vec![vec![Figure {
+        title: "Three drives on one bus".into(),
+        subtitle: "the same call of the master on each, in degrees and r/min at the motor's shaft".into(),
+        time: "time, s",
+        panels: vec![
+            axes(finished, names, "Shaft angle", "°", Signal::ShaftAngle, 360.0 / TAU),
+            axes(finished, names, "Velocity", "r/min", Signal::Velocity, 1.0),
+        ],
+        sections: sections(finished),
+        events: finished.events.clone(),
+    }]]
+}
+
+/// The start of three joints in microseconds, and the path that they are led along.
+pub(super) fn interpolation(finished: &Finished) -> Vec<Vec<Figure>> {
+    let names = ["node 1", "node 2", "node 3"];
+    let starts = finished.starts.iter().map(|start| Figure {
+        title: format!("{}: {:.0} µs apart", start.setting, start.spread_us()),
+        subtitle: "three joints after one SYNC".into(),
+        time: "µs",
+        panels: vec![Panel {
+            title: "Shaft",
+            unit: "counts",
+            traces: names
+                .into_iter()
+                .zip(COLOURS)
+                .zip(&start.axes)
+                .map(|((label, colour), points)| Trace { label, style: Style::Actual(colour), points: points.clone() })
+                .collect(),
+        }],
+        sections: Vec::new(),
+        events: Vec::new(),
+    });
+    let path = Figure {
+        title: "Three joints, interpolation".into(),
+        subtitle: "mode 7: RPDO4 to each and SYNC, every 2 ms".into(),
+        time: "time, s",
+        panels: vec![axes(finished, names, "Shaft angle", "turns of the motor", Signal::ShaftAngle, 1.0 / TAU)],
+        sections: sections(finished),
+        events: finished.events.clone(),
+    };
+    vec![vec![path], starts.collect()]
+}
+
+const COLOURS: [Colour; 3] = [Colour::Blue, Colour::Teal, Colour::Orange];
+
+/// One signal of three drives.
+fn axes(
+    finished: &Finished,
+    names: [&'static str; 3],
+    title: &'static str,
+    unit: &'static str,
+    signal: Signal,
+    scale: f64,
+) -> Panel {
+    let place = SIGNALS.iter().position(|recorded| *recorded == signal).unwrap_or(0);
+    let traces = names.into_iter().zip(COLOURS).enumerate().map(|(drive, (label, colour))| {
+        let times = finished.recorder.times().iter().map(|at| at.as_secs_f64());
+        let values = finished.recorder.samples(drive * SIGNALS.len() + place).map(|value| value * scale);
+        Trace { label, style: Style::Actual(colour), points: times.zip(values).collect() }
+    });
+    Panel { title, unit, traces: traces.collect() }
 }
 
 /// Position, velocity and current of the first drive.

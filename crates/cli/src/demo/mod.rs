@@ -14,6 +14,7 @@ mod report;
 mod row;
 mod set_points;
 mod timing;
+mod together;
 mod zlac8030l;
 mod zlim42c;
 
@@ -24,6 +25,7 @@ pub(crate) use report::DemoReport;
 use report::PartReport;
 
 use crate::failure::Failure;
+use crate::models::EMBEDDED;
 use crate::plot::Poster;
 use crate::progress::Progress;
 
@@ -38,8 +40,14 @@ struct Part {
     draw: fn(&bench::Finished) -> Vec<Vec<crate::plot::Figure>>,
 }
 
+/// "Set to different addresses in advance, such as addresses 1, 2, 3" (5.10.3).
+const JOINTS: [(&DriveProfile, u8); 3] = {
+    let joint = &drives::mjoint::M4230E17B50;
+    [(joint, 1), (joint, 2), (joint, 3)]
+};
+
 /// Node-IDs and bit rates are those of the manuals' examples.
-const PARTS: [Part; 3] = [
+const PARTS: [Part; 5] = [
     Part {
         name: "ZLAC8030L",
         drives: &[(&drives::zlac8030l::PROFILE, 4)],
@@ -60,6 +68,20 @@ const PARTS: [Part; 3] = [
         bitrate: Bitrate::K500,
         procedures: zlim42c::procedures,
         draw: figure::zlim42c,
+    },
+    Part {
+        name: "Three drives, one bus, the same calls",
+        drives: EMBEDDED,
+        bitrate: Bitrate::K500,
+        procedures: together::intents::same_calls,
+        draw: figure::same_calls,
+    },
+    Part {
+        name: "Three joints, interpolation at 2 ms",
+        drives: &JOINTS,
+        bitrate: Bitrate::M1,
+        procedures: together::interpolation::three_joints,
+        draw: figure::interpolation,
     },
 ];
 
