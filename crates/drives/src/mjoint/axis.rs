@@ -195,6 +195,14 @@ impl Axis {
         }
     }
 
+    /// The plan moves nothing, and has not moved anything in the last period either.
+    pub(super) fn is_resting(&self) -> bool {
+        match self.task {
+            Task::Interpolate(interpolation) => interpolation.is_resting(),
+            _ => self.is_done(),
+        }
+    }
+
     /// Counts from where the shaft is to where its task ends.
     pub(super) fn way_to_go(&self) -> i32 {
         match self.task {

@@ -47,8 +47,13 @@ impl Interpolation {
         self.elapsed_s >= self.duration_s - 1e-9
     }
 
+    /// Past the end of its stretch: nothing moves.
+    pub(super) fn is_resting(&self) -> bool {
+        self.elapsed_s > self.duration_s + 1e-9 || self.duration_s == 0.0
+    }
+
     pub(super) fn point(&self) -> TrajectoryPoint {
-        if self.elapsed_s > self.duration_s + 1e-9 || self.duration_s == 0.0 {
+        if self.is_resting() {
             return TrajectoryPoint::rest(self.target);
         }
         let at = linear(0.0, self.way(), self.duration_s, self.elapsed_s);

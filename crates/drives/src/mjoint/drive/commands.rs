@@ -116,10 +116,12 @@ impl MJoint {
     fn interpolate_to(&mut self, target: i32) {
         if self.parameters.time_base != TimeBase::Own {
             self.dir_changes = 0;
+            let at_rest = self.axis.is_resting();
             self.axis.interpolate(target, self.parameters.max_speed);
             self.base_periods = 0;
-            // A SYNC that comes a control period early or late does not move the loops.
-            if (1..SUPERVISION_DIVIDER - 1).contains(&self.periods) {
+            // On the way a SYNC that comes a control period early or late does not move the loops. From rest all axes
+            // begin in the next control period, wherever in their own rhythm they are.
+            if at_rest || (1..SUPERVISION_DIVIDER - 1).contains(&self.periods) {
                 self.periods = SUPERVISION_DIVIDER - 1;
             }
         } else {
