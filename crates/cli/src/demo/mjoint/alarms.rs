@@ -40,7 +40,7 @@ fn locked_rotor(bench: &mut Bench) {
     bench.machine("rotor free");
     bench.write("control word bit 7: clear", 0x6040, 0, 0x80);
     bench.expect_object(0x260E, 0, Expect::Bits(0), "");
-    bench.write("7 A for 5 s (261Dh)", 0x261D, 0, 7005);
+    bench.write("10 A for 5 s (261Dh)", 0x261D, 0, 10_005);
 }
 
 fn stall(bench: &mut Bench) {
