@@ -190,3 +190,78 @@ fn no_reset_clears_the_loss_of_the_host_and_a_time_of_0_watches_nothing() {
     bench.run_ms(150);
     assert_eq!(bench.get(0x260E, 0), 0x20);
 }
+
+#[test]
+fn services_that_the_manual_does_not_know_are_refused_or_not_answered() {
+    let mut bench = Bench::new();
+    bench.heard();
+    // Block download and block upload: "command specifier not valid" (CiA 301).
+    for block in ["601#C0816000E8030000", "601#A064600010000000"] {
+        bench.send(block);
+        let answers = bench.heard();
+        assert!(
+            answers.len() == 1 && answers[0].starts_with("581#80") && answers[0].ends_with("01000405"),
+            "{answers:?}"
+        );
+    }
+    // LSS, TIME, and an SDO of another node.
+    for other in ["7E5#0401000000000000", "100#000000000000", "602#4041600000000000"] {
+        bench.send(other);
+        assert_eq!(bench.heard(), [""; 0], "{other}");
+    }
+}
+
+#[test]
+fn a_receive_pdo_can_be_moved_and_a_transmit_pdo_keeps_its_inhibit_time() {
+    let mut bench = Bench::new();
+    bench.set(0x1401, 1, 0x2AA);
+    bench.heard();
+    bench.send("301#0000000000000000");
+    assert_eq!(bench.heard(), [""; 0]);
+    bench.send("2AA#0000000000000000");
+    assert!(bench.heard().iter().any(|frame| frame.starts_with("281#")));
+    // 100 * 0.1 ms.
+    bench.set(0x1801, 3, 100);
+    bench.run_ms(20);
+    bench.heard_at();
+    for _ in 0..4 {
+        bench.send("2AA#0000000000000000");
+    }
+    bench.run_ms(50);
+    let sent: Vec<f64> = bench
+        .heard_at()
+        .iter()
+        .filter(|(_, frame)| frame.standard_data_id() == Some(0x281))
+        .map(|(at, _)| at.as_secs_f64())
+        .collect();
+    assert_eq!(sent.len(), 2, "the first at once, one more for all that came in the time: {sent:?}");
+    assert!(sent[1] - sent[0] >= 0.01, "{sent:?}");
+}
+
+#[test]
+fn of_several_cached_positions_sync_takes_the_last() {
+    let mut bench = Bench::new();
+    bench.set(0x6040, 0, 0x0F);
+    for position in ["501#10270000", "501#E8030000"] {
+        bench.send(position);
+    }
+    bench.send("080#");
+    bench.until_reached(1000);
+    assert!((bench.position() - 1000).abs() <= 30, "{}", bench.position());
+    bench.send("080#");
+    assert_eq!(bench.statusword(), 0x0437, "it is used up");
+}
+
+#[test]
+fn the_heartbeat_follows_its_interval() {
+    let mut bench = Bench::new();
+    let mut count = |interval_ms: i64| {
+        bench.set(0x1017, 0, interval_ms);
+        bench.run_ms(5);
+        bench.heard();
+        bench.run_ms(1000);
+        bench.heard().iter().filter(|frame| frame.starts_with("701#")).count()
+    };
+    assert!((9..=11).contains(&count(100)));
+    assert_eq!(count(0), 0);
+}
