@@ -4,6 +4,9 @@
 //! list of those that answer otherwise. What a drive's manual says of single objects stays in that drive's tests.
 
 use std::ops::RangeInclusive;
+use std::time::Duration;
+
+use can::{CanId, Frame};
 
 use crate::bench::{Abort, Bench, Subject};
 use crate::manual::ObjectRow;
@@ -190,6 +193,30 @@ pub fn are_kept_and_restored_only_on_command<S: Subject>(memory: &Memory) {
             expect("restored, after a power cycle", bench.get(row.index, row.sub), default)
         },
     );
+}
+
+/// Power that goes at any moment of a save leaves the old values of these objects or the new ones, all of them, and no
+/// fault. Each comes with its default and another value.
+pub fn are_saved_together_or_not_at_all<S: Subject>(memory: &Memory, objects: &[(u16, i64, i64)]) {
+    let (old, new): (Vec<i64>, Vec<i64>) = objects.iter().map(|(_, old, new)| (*old, *new)).unzip();
+    let (mut olds, mut news) = (0, 0);
+    for delay_us in (0..3000).step_by(50) {
+        let mut bench = Bench::<S>::new();
+        bench.set(memory.switch, 0, 1);
+        for (index, _, value) in objects {
+            bench.set(*index, 0, *value);
+        }
+        let [low, high] = memory.command.to_le_bytes();
+        let save = Frame::full(CanId::standard(0x600 + u16::from(S::NODE)), [0x2B, low, high, 0, 2, 0, 0, 0]);
+        bench.world.send(bench.host, save).expect("room at the host");
+        bench.run(Duration::from_micros(delay_us));
+        bench.power_cycle();
+        let kept: Vec<_> = objects.iter().map(|(index, ..)| bench.get(*index, 0)).collect();
+        assert!(kept == old || kept == new, "off after {delay_us} us: {kept:?}");
+        assert_eq!(bench.get(0x603F, 0), 0, "off after {delay_us} us");
+        (olds, news) = if kept == old { (olds + 1, news) } else { (olds, news + 1) };
+    }
+    assert!(olds > 0 && news > 0, "both happen: {olds} and {news}");
 }
 
 impl Memory {

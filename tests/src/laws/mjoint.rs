@@ -5,7 +5,9 @@ use drives::Firmware;
 use drives::mjoint::objects::{DATA_SAVE_FLAG, STATUSWORD, TABLE};
 use drives::mjoint::{Hardware, MJoint, Model, PowerStage, Sensors};
 
-/// A chunk is a selector, a length and eight bytes, see [`frame`], and two for what the sensors read, see [`sensors`].
+use super::selected_frame;
+
+/// A chunk is a selector, a length and eight bytes, see [`selected_frame`], and two for what the sensors read, see [`sensors`].
 pub(super) const SAMPLES: &[&[u8]] = &[
     // 0Fh, mode 3 and 600 r/min by SDO.
     b"\0\x06\x2B\x40\x60\x00\x0F\x00\0\0\x10\x40\0\x05\x2F\x60\x60\x00\x03\0\0\0\x10\x40\0\x08\x23\xFF\x60\x00\x58\x02\0\0\x10\x40",
@@ -19,6 +21,9 @@ pub(super) const SAMPLES: &[&[u8]] = &[
 
 const CHUNK: usize = 12;
 
+/// What a selector picks: SDO, the four RPDOs, SYNC, the host's heartbeat, NMT.
+const IDS: [u16; 8] = [0x601, 0x201, 0x301, 0x401, 0x501, 0x080, 0x77F, 0x000];
+
 /// Bits 0 to 5, 10, 12 and 13 are all that the statusword has.
 const STATUSWORD_BITS: u16 = 0x343F;
 
@@ -30,7 +35,7 @@ pub(super) fn joint(data: &[u8]) {
     joint.power_on(&Hardware::default(), now);
     let first = fixed(&joint);
     for chunk in data.chunks(CHUNK) {
-        let frame = frame(chunk);
+        let frame = selected_frame(chunk, &IDS);
         joint.handle_frame(&frame, now);
         let answers = drain(&mut joint).iter().filter(|sent| sent.id() == CanId::standard(0x581)).count();
         let asked = frame.id() == CanId::standard(0x601) && !frame.is_remote();
@@ -48,18 +53,6 @@ pub(super) fn joint(data: &[u8]) {
         assert_eq!(fixed(&joint), first, "{frame} changed what is fixed");
         judge(&joint, &frame);
     }
-}
-
-/// The selector picks the identifier, the length may be too short, missing bytes are 0.
-fn frame(chunk: &[u8]) -> Frame {
-    const IDS: [u16; 8] = [0x601, 0x201, 0x301, 0x401, 0x501, 0x080, 0x77F, 0x000];
-    let byte = |at: usize| chunk.get(at).copied().unwrap_or(0);
-    let data: [u8; 8] = std::array::from_fn(|at| byte(at + 2));
-    let id = CanId::standard(IDS[usize::from(byte(0)) % IDS.len()]);
-    if byte(1) & 0x80 != 0 {
-        return Frame::remote(id, byte(1) % 9);
-    }
-    Frame::new(id, &data[..usize::from(byte(1) % 9)])
 }
 
 /// Each bit of the second byte spoils something; the first gives the angle.

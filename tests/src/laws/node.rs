@@ -8,6 +8,8 @@ use canopen::sdo::wire;
 use canopen::{Node, NodeId, NodeProfile};
 use drives::zlac8030l::objects::{ROW_COUNT, TABLE};
 
+use super::selected_frame;
+
 pub(super) const SDO_WIRE_SAMPLES: &[&[u8]] = &[
     b"\x2B\x40\x60\x00\x06\x00\x00\x00",
     b"\x40\x41\x60\x00\x00\x00\x00\x00",
@@ -16,7 +18,7 @@ pub(super) const SDO_WIRE_SAMPLES: &[&[u8]] = &[
     b"\x07\x01\x02\x03\x04\x00\x00\x00",
 ];
 
-/// A chunk is a selector, a length and eight bytes: see [`frame`].
+/// A chunk is a selector, a length and eight bytes: see [`selected_frame`].
 pub(super) const NODE_SAMPLES: &[&[u8]] = &[
     b"\0\x08\x2B\x40\x60\x00\x06\x00\x00\x00\0\x08\x40\x41\x60\x00\x00\x00\x00\x00",
     b"\0\x08\x21\xFF\x60\x00\x04\x00\x00\x00\0\x08\x07\x01\x02\x03\x04\x00\x00\x00",
@@ -27,6 +29,9 @@ pub(super) const NODE_SAMPLES: &[&[u8]] = &[
 
 static PROFILE: NodeProfile = NodeProfile::cia_301(&TABLE);
 const NODE_ID: u8 = 4;
+
+/// What a selector picks: SDO, NMT, SYNC, the four RPDOs, a heartbeat.
+const IDS: [u16; 8] = [0x604, 0x000, 0x080, 0x204, 0x304, 0x404, 0x504, 0x704];
 
 /// What a request or a reply was read as is what it reads as when it is written again.
 pub(super) fn sdo_wire(data: &[u8]) {
@@ -50,7 +55,7 @@ pub(super) fn node(data: &[u8]) {
         now = now.plus_nanos(u64::from(chunk[0]) * 100_000);
         node.handle_timeout(now);
         drain(&mut node);
-        let frame = frame(chunk);
+        let frame = selected_frame(chunk, &IDS);
         node.handle_frame(&frame, now);
         let sent = drain(&mut node);
         let answers: Vec<&Frame> = sent.iter().filter(|sent| sent.id() == CanId::standard(0x580 + 4)).collect();
@@ -58,18 +63,6 @@ pub(super) fn node(data: &[u8]) {
         assert!(answers.iter().all(|answer| answer.dlc() == 8), "{frame} was answered by {answers:?}");
         judge(&node, &first, &frame);
     }
-}
-
-/// The frame of a chunk: the selector picks the identifier, the length may be too short, missing bytes are 0.
-fn frame(chunk: &[u8]) -> Frame {
-    const IDS: [u16; 8] = [0x604, 0x000, 0x080, 0x204, 0x304, 0x404, 0x504, 0x704];
-    let byte = |at: usize| chunk.get(at).copied().unwrap_or(0);
-    let data: [u8; 8] = std::array::from_fn(|at| byte(at + 2));
-    let id = CanId::standard(IDS[usize::from(byte(0)) % IDS.len()]);
-    if byte(1) & 0x80 != 0 {
-        return Frame::remote(id, byte(1) % 9);
-    }
-    Frame::new(id, &data[..usize::from(byte(1) % 9)])
 }
 
 fn drain(node: &mut Node<ROW_COUNT>) -> Vec<Frame> {

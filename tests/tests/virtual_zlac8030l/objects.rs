@@ -5,7 +5,7 @@ use ferrodrive_tests::object_rows::{self, Memory};
 
 use crate::bench::Bench;
 
-const MEMORY: Memory = Memory {
+pub(crate) const MEMORY: Memory = Memory {
     switch: 0x2010,
     command: 0x2009,
     // The bit rate: see `network`. The others do something and read 0 again.

@@ -3,12 +3,14 @@
 use std::time::Duration;
 
 use ferrodrive_tests::bench::zlac8030l::Zlac8030l;
+use ferrodrive_tests::object_rows;
 use ferrodrive_tests::random_host::{self, Play};
 use ferrodrive_tests::seeded::Seeded;
 use ferrodrive_tests::zlac8030l::objects;
 use sim::{Component, TemperatureSensor};
 
 use crate::bench::{Bench, assert_within};
+use crate::objects::MEMORY;
 use crate::wheel;
 
 /// Writes that a random host may not do: node-ID and bit rate take the drive off this bus at its next restart, and 1005h
@@ -258,19 +260,7 @@ fn a_brown_out_in_motion_restarts_the_drive_with_its_stored_values() {
 
 #[test]
 fn power_that_goes_at_any_moment_of_a_save_leaves_the_old_values_or_the_new_ones() {
-    for delay_us in (0..3000).step_by(100) {
-        let mut bench = Bench::new();
-        bench.set(0x2010, 0, 1);
-        bench.set(0x2014, 0, 77);
-        bench.set(0x2015, 0, 88);
-        let save = "604#2B09200002000000".parse().expect("a frame");
-        bench.world.send(bench.host, save).expect("room");
-        bench.run(Duration::from_micros(delay_us));
-        bench.power_cycle();
-        let kept = (bench.get(0x2014, 0), bench.get(0x2015, 0));
-        assert!(kept == (150, 300) || kept == (77, 88), "off after {delay_us} us: {kept:?}");
-        assert_eq!(bench.get(0x603F, 0), 0);
-    }
+    object_rows::are_saved_together_or_not_at_all::<Zlac8030l>(&MEMORY, &[(0x2014, 150, 77), (0x2015, 300, 88)]);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use ferrodrive_tests::object_rows::{self, Memory};
 
 use crate::bench::Bench;
 
-const MEMORY: Memory = Memory {
+pub(crate) const MEMORY: Memory = Memory {
     switch: 0x200C,
     command: 0x2010,
     // The bit rate: see `address`. The others do something and read 0 again.

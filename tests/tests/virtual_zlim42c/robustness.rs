@@ -3,11 +3,13 @@
 use std::time::Duration;
 
 use ferrodrive_tests::bench::zlim42c::Zlim42c;
+use ferrodrive_tests::object_rows;
 use ferrodrive_tests::random_host::{self, Play};
 use ferrodrive_tests::seeded::Seeded;
 use sim::Component;
 
 use crate::bench::Bench;
+use crate::objects::MEMORY;
 
 /// Writes that a random host may not do: node-ID and bit rate take the drive off this bus at its next restart, and 1005h
 /// would make other frames SYNC.
@@ -102,22 +104,7 @@ fn a_brown_out_in_motion_restarts_the_drive_at_position_0_with_its_stored_values
 
 #[test]
 fn power_that_goes_at_any_moment_of_a_save_leaves_the_old_values_or_the_new_ones() {
-    let (mut old, mut new) = (0, 0);
-    for delay_us in (0..3000).step_by(50) {
-        let mut bench = Bench::new();
-        bench.set(0x200C, 0, 1);
-        bench.set(0x2005, 0, 7);
-        bench.set(0x2006, 0, 4);
-        let save = "601#2B10200002000000".parse().expect("a frame");
-        bench.world.send(bench.host, save).expect("room");
-        bench.run(Duration::from_micros(delay_us));
-        bench.power_cycle();
-        let kept = (bench.get(0x2005, 0), bench.get(0x2006, 0));
-        assert!(kept == (3, 10) || kept == (7, 4), "off after {delay_us} us: {kept:?}");
-        assert_eq!(bench.get(0x603F, 0), 0);
-        (old, new) = if kept == (3, 10) { (old + 1, new) } else { (old, new + 1) };
-    }
-    assert!(old > 0 && new > 0, "both happen: {old} and {new}");
+    object_rows::are_saved_together_or_not_at_all::<Zlim42c>(&MEMORY, &[(0x2005, 3, 7), (0x2006, 10, 4)]);
 }
 
 #[test]
