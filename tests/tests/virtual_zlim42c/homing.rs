@@ -261,3 +261,40 @@ fn any_start_and_any_speed_leads_to_the_edge_of_the_method() {
         }
     }
 }
+
+#[test]
+fn homing_that_fails_stops_at_once_and_not_along_a_ramp() {
+    // 5.3.6: at the other limit the motor stops at once. 609Ah = 2 s would be a long way.
+    let mut bench = on_track("above_home_without_home_switch", 24);
+    bench.set(0x609A, 0, 2000);
+    bench.set(0x6099, 1, 300);
+    bench.set(0x6040, 0, 0x1F);
+    let look = std::time::Duration::from_micros(500);
+    let backwards = |report: &sim::Report| report.velocity_demand_rpm.is_some_and(|rpm| rpm < -20.0);
+    bench.seconds_until(20.0, look, backwards);
+    let mut last = 0.0;
+    let stands = |report: &sim::Report| {
+        let now = report.velocity_demand_rpm.unwrap_or_default();
+        let before = std::mem::replace(&mut last, now);
+        now == 0.0 && before != 0.0
+    };
+    bench.seconds_until(20.0, look, stands);
+    bench.run_ms(1);
+    assert_eq!(bench.statusword() & BITS, 1 << 10, "failed");
+    // The limit is at -8000; 10 ms of filter at up to 300 r/min are 200 pulses.
+    let position = bench.report().position;
+    assert!((-8220..=-8000).contains(&position), "{position}");
+}
+
+#[test]
+fn the_search_keeps_to_the_step_rate_limit() {
+    // 6099h:01 = 3000 r/min at 25600 pulses a turn are 1.28 MHz; 200 kHz are 468.75 r/min (2.1).
+    let mut bench = Bench::new();
+    for (index, sub, value) in [(0x2006, 0, 7), (0x6098, 0, 18), (0x6099, 1, 3000), (0x609A, 0, 500)] {
+        bench.set(index, sub, value);
+    }
+    bench.enable_in(6);
+    bench.set(0x6040, 0, 0x1F);
+    bench.run_ms(700);
+    assert_eq!(bench.report().velocity_demand_rpm, Some(468.75));
+}

@@ -59,6 +59,45 @@ fn the_way_out_of_a_limit_is_free_and_the_way_in_is_not() {
 }
 
 #[test]
+fn a_velocity_goes_on_when_the_limit_goes_off_and_a_move_does_not() {
+    let mut bench = with_switches(0);
+    bench.enable_in(3);
+    bench.set(0x60FF, 0, 60);
+    bench.run_ms(300);
+    bench.input(0, true);
+    bench.run_ms(400);
+    assert_eq!(bench.get(0x606C, 0), 0);
+    assert_eq!(bench.statusword() & 1 << 14, 0, "it stands");
+    bench.input(0, false);
+    bench.run_ms(300);
+    assert_eq!(bench.get(0x606C, 0), 60);
+
+    let mut bench = with_switches(0);
+    bench.enable_in(1);
+    bench.move_by(40_000);
+    bench.run_ms(300);
+    bench.input(0, true);
+    bench.run_ms(400);
+    let stopped = bench.get(0x6064, 0);
+    bench.input(0, false);
+    bench.run_ms(300);
+    assert_eq!(bench.get(0x6064, 0), stopped);
+}
+
+#[test]
+fn a_move_is_stopped_by_a_limit_as_200ah_says() {
+    for (mode, seconds) in [(0, 0.3), (1, 0.05)] {
+        let mut bench = with_switches(mode);
+        bench.enable_in(1);
+        bench.move_by(-100_000);
+        bench.run_ms(500);
+        bench.operate(|drive, now| drive.set_input(1, true, now)).expect("X1");
+        let taken = bench.seconds_until(1.0, LOOK, |report| report.velocity_demand_rpm == Some(0.0));
+        assert_within("seconds", taken - 0.010, seconds - 0.002, seconds + 0.003);
+    }
+}
+
+#[test]
 fn a_move_that_meets_a_limit_ends_there_and_does_not_count_as_reached() {
     let mut bench = with_switches(0);
     bench.enable_in(1);

@@ -195,3 +195,49 @@ fn requests_sent_without_waiting_for_answers_are_all_answered_in_order() {
     assert_eq!(heard.len(), 40);
     assert!(heard.chunks(2).all(|pair| pair == answers), "{heard:?}");
 }
+
+#[test]
+fn any_bytes_on_the_sdo_channel_are_survived() {
+    let rows: Vec<_> = objects().into_iter().filter(|row| !SPARED.contains(&row.index)).collect();
+    for seed in 0..20 {
+        let mut seeded = Seeded::new(seed);
+        let mut bench = Bench::new();
+        for _ in 0..300 {
+            let row = &rows[seeded.below(rows.len())];
+            let [low, high] = row.index.to_le_bytes();
+            let bits = seeded.bits().to_le_bytes();
+            let mut request = vec![bits[0], low, high, row.sub];
+            request.extend(&bits[1..5]);
+            request.truncate(if seeded.below(4) == 0 { seeded.below(9) } else { 8 });
+            // A block transfer's end and an abort get no answer; nothing gets more than one.
+            let _ = bench.sdo(&request);
+        }
+        bench.set(0x2010, 0, 1);
+        bench.let_store();
+        bench.power_cycle();
+        assert_eq!((bench.statusword(), bench.get(0x1000, 0)), (0x0270, 0x0004_0192), "seed {seed}");
+    }
+}
+
+#[test]
+fn a_run_is_the_same_whatever_the_strides_of_time() {
+    let run = |strides_us: &[u64]| {
+        let mut bench = Bench::new();
+        bench.enable_in(1);
+        bench.move_by(12_345);
+        let end = bench.world.now() + Duration::from_millis(700);
+        for stride_us in strides_us.iter().cycle() {
+            let left = Duration::from_nanos(end.nanos_since(bench.world.now()));
+            if left.is_zero() {
+                break;
+            }
+            bench.run(Duration::from_micros(*stride_us).min(left));
+        }
+        (bench.report(), bench.heard())
+    };
+    let once = run(&[1_000_000]);
+    assert!(once.0.position > 1000, "{:?}", once.0);
+    for strides_us in [&[50][..], &[1000], &[7, 13, 1111]] {
+        assert_eq!(run(strides_us), once, "{strides_us:?}");
+    }
+}
