@@ -6,6 +6,7 @@ use ferrodrive_tests::bench::zlim42c::Zlim42c;
 use ferrodrive_tests::object_rows;
 use ferrodrive_tests::random_host::{self, Play};
 use ferrodrive_tests::seeded::Seeded;
+use ferrodrive_tests::zlim42c::objects;
 use sim::Component;
 
 use crate::bench::Bench;
