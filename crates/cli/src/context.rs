@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use canopen::{Mux, NodeId};
-use cia402::PowerCommand;
+use cia402::{PowerCommand, PowerState, Statusword};
 use master::drive::Drive;
 use master::identify::Knowledge;
 use master::{Error, Network, Node};
@@ -18,6 +18,10 @@ use crate::progress::Progress;
 const SETTLING_TIME: Duration = Duration::from_millis(50);
 
 const CONTROLWORD: Mux = Mux::new(0x6040, 0);
+const STATUSWORD: Mux = Mux::new(0x6041, 0);
+
+/// How long a quick stop may be held up by a look at the statusword: drives answer within a few milliseconds.
+const GLANCE: Duration = Duration::from_millis(50);
 
 /// See the [module](self).
 pub(crate) struct Context {
@@ -132,8 +136,14 @@ impl Context {
         }
     }
 
-    /// Quick stop, whatever the node is doing.
+    /// Quick stop, whatever the node is doing, unless it soon says that its motor has no power (statusword bit 4): a drive
+    /// without the state machine would energise the motor to hold it.
     pub(crate) async fn quick_stop(&self, id: NodeId) -> Result<(), Error> {
+        let statusword = self.network.node(id).with_timeout(GLANCE).read::<u16>(STATUSWORD).await.map(Statusword);
+        let enabled = |word: Statusword| word.state() == Some(PowerState::OperationEnabled);
+        if statusword.is_ok_and(|word| !word.has(Statusword::VOLTAGE_ENABLED) && !enabled(word)) {
+            return Ok(());
+        }
         self.node(id).write(CONTROLWORD, PowerCommand::QuickStop.controlword().0).await
     }
 

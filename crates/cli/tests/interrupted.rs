@@ -3,6 +3,7 @@
 
 mod common;
 
+use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
@@ -79,6 +80,23 @@ fn a_joint_that_looks_for_its_reference_can_be_disabled() {
     on(&["home", "1", "--method", "17", "--no-wait"]);
     wait_until_it_turns(&mut simulator, "1");
     assert_eq!(on(&["disable", "1"])["state"], "Switch on disabled");
+}
+
+#[test]
+fn an_interrupted_simulator_ends_with_130_and_without_a_word() {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_ferrodrive"))
+        .args(["sim", "--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut ready = String::new();
+    BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut ready).unwrap();
+    assert!(ready.starts_with("ready"), "{ready:?}");
+    let ended = interrupt(child);
+    assert_eq!(ended.status.code(), Some(130));
+    assert_eq!(String::from_utf8(ended.stderr).unwrap(), "");
 }
 
 #[test]

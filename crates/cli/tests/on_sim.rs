@@ -193,6 +193,9 @@ fn states_follow_the_commands() {
     assert_eq!(state(&["enable", "4"]), "Operation enabled");
     assert_eq!(state(&["disable", "4"]), "Switch on disabled");
     assert_eq!(state(&["reset", "4"]), "Switch on disabled");
+    for node in ["1", "2", "4"] {
+        assert_eq!(state(&["quick-stop", node]), "Switch on disabled", "a motor without power is left so");
+    }
     let text = done(&["state", "4"]).out;
     assert!(text.contains("fault       none") && text.contains("48.0 V"), "{text}");
 }

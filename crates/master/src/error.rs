@@ -217,7 +217,8 @@ impl fmt::Display for Hints {
                  acknowledges frames (cable, bit rate, termination)",
             ),
             (_, Some(NmtState::Stopped), _) => f.write_str(
-                "It is in the NMT state stopped, where SDO does not exist: send NMT pre-operational or start",
+                "By its last heartbeat, or the last NMT command to it, it is stopped, where SDO does not exist: send NMT \
+                 pre-operational or start. Some drives' heartbeats say so in an alarm: then check supply and cable",
             ),
             (_, _, Some(age)) => write!(
                 f,
@@ -227,10 +228,13 @@ impl fmt::Display for Hints {
             ),
             (_, _, None) if self.others => f.write_str(
                 "Other nodes are on the bus but this one has never been heard: check its node-ID and its supply \
-                 (a scan shows who is there)",
+                 (a scan shows who is there); if it is in the NMT state stopped, it answers after NMT start",
             ),
             (_, _, None) => {
-                f.write_str("Nothing at all has been heard on the bus: check supply, cable, termination and bit rate")
+                f.write_str(
+                "Nothing at all has been heard on the bus: check supply, cable, termination and bit rate; if the node is \
+                 in the NMT state stopped, it answers after NMT start",
+            )
             }
         }
     }

@@ -218,7 +218,7 @@ fn a_stopped_node_is_told_as_such() {
     let mut bus = Bus::new(vec![toy]);
     let network = bus.network.clone();
     let error = bus.block_on(network.node(node(4)).read::<u32>(DEVICE_TYPE)).unwrap_err();
-    assert!(error.to_string().contains("in the NMT state stopped, where SDO does not exist"), "{error}");
+    assert!(error.to_string().contains("it is stopped, where SDO does not exist"), "{error}");
 }
 
 #[test]
@@ -245,7 +245,7 @@ fn a_node_that_this_master_stopped_is_told_as_such_without_a_heartbeat() {
     let node = network.node(node(4));
     node.nmt(canopen::NmtCommand::Stop);
     let error = bus.block_on(node.read::<u32>(DEVICE_TYPE)).unwrap_err();
-    assert!(error.to_string().contains("in the NMT state stopped"), "{error}");
+    assert!(error.to_string().contains("it is stopped, where SDO does not exist"), "{error}");
 }
 
 #[test]

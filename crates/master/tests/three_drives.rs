@@ -270,6 +270,14 @@ fn a_blocked_joint_is_explained_by_its_alarm_and_enabled_after_a_reset() {
 }
 
 #[test]
+fn a_quick_stop_does_not_energise_a_motor_without_power() {
+    let (mut world, _, [joint, ..]) = bench();
+    block_on(&mut world, joint.quick_stop()).unwrap().unwrap();
+    let state = block_on(&mut world, joint.state()).unwrap().unwrap();
+    assert_eq!((state.power, state.statusword.0), (Some(PowerState::SwitchOnDisabled), 0x0404));
+}
+
+#[test]
 fn an_alarm_that_stops_nothing_is_reset_or_explained_and_does_not_stop_the_joint() {
     let (mut world, network, [joint, ..]) = bench();
     block_on(&mut world, joint.velocity(Rpm(60.0), slowly())).unwrap().unwrap();

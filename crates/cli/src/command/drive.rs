@@ -126,7 +126,7 @@ impl Stop {
 }
 
 impl QuickStop {
-    /// Stops at once and shows the state. The stop goes out before anything is asked.
+    /// Stops at once and shows the state. The stop goes out before the model is asked for.
     pub(crate) async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
         context.quick_stop(self.node).await?;
         let drive = context.drive_to_stop(self.node).await?;

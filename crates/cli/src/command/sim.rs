@@ -285,11 +285,12 @@ fn read_lines(requests: &mpsc::Sender<Request>) {
 async fn tick(requests: mpsc::Sender<Request>, clock: WallClock) {
     let mut interruption = std::pin::pin!(interrupted());
     loop {
-        let request = tokio::select! {
-            () = &mut interruption => Request::Interrupted,
-            () = clock.sleep(KEEPING_INTERVAL) => Request::Keep,
+        let over = tokio::select! {
+            () = &mut interruption => true,
+            () = clock.sleep(KEEPING_INTERVAL) => false,
         };
-        if requests.send(request).await.is_err() {
+        let request = if over { Request::Interrupted } else { Request::Keep };
+        if requests.send(request).await.is_err() || over {
             return;
         }
     }

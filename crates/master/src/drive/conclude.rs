@@ -41,12 +41,12 @@ pub(super) fn conclude(trigger: &Trigger, facts: &[Fact], style: PowerStyle) -> 
             "Its statusword shows none of the states of CiA 402",
             "Check that the node is the drive model that it is taken for",
         ),
-        _ => by_trigger(trigger),
+        _ => by_trigger(trigger, style),
     }
 }
 
 /// For a drive that answers, is in a known state and not at fault.
-fn by_trigger(trigger: &Trigger) -> (String, String) {
+fn by_trigger(trigger: &Trigger, style: PowerStyle) -> (String, String) {
     match trigger {
         Trigger::Waiting => text(
             "The drive is busy with itself and does not get ready",
@@ -54,9 +54,16 @@ fn by_trigger(trigger: &Trigger) -> (String, String) {
         ),
         Trigger::Ignored(command) => (
             format!("The drive took the controlword {} and did not act on it", command.controlword()),
-            "Check that statusword bit 9 (remote) is set, that no other master writes 6040h, and its enable input and \
-             motor supply"
-                .to_owned(),
+            match style {
+                PowerStyle::Cia402 => {
+                    "Check that statusword bit 9 (remote) is set, that no other master writes 6040h, and its enable \
+                     input and motor supply"
+                }
+                PowerStyle::Mirror { .. } => {
+                    "Check that no other master writes 6040h, that its output is enabled, and its motor supply"
+                }
+            }
+            .to_owned(),
         ),
         Trigger::Mode(mode) => (
             format!("The drive accepted mode {mode} in 6060h and does not show it in 6061h"),

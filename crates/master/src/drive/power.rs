@@ -91,12 +91,19 @@ impl Drive {
         Ok(())
     }
 
-    /// Quick stop: the steepest ramp that the drive is set to (605Ah). Ends at standstill.
+    /// Quick stop: the steepest ramp that the drive is set to (605Ah). Ends at standstill. A motor without power is left so:
+    /// a drive that mirrors its controlword would energise it to hold it.
     ///
     /// # Errors
     /// [`Error::NotReached`]; those of the SDO requests.
     pub async fn quick_stop(&self) -> Result<(), Error> {
         const INTENT: &str = "quick-stop it";
+        if let PowerStyle::Mirror { live, .. } = self.power_style()
+            && self.statusword().await.is_ok_and(|statusword| !statusword.has(live))
+        {
+            self.node.network().note_stopped(self.node.id());
+            return Ok(());
+        }
         self.write_controlword(PowerCommand::QuickStop.controlword()).await?;
         self.leave_homing().await?;
         let stopping = |state| state != PowerState::OperationEnabled;
