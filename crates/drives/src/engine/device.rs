@@ -72,6 +72,7 @@ impl<const N: usize> Device<N> {
     /// Supply voltage arrives, and this is found in the EEPROM. [`restart`](Self::restart) and [`boot`](Self::boot) follow.
     pub fn power_on(&mut self, image: Image) {
         self.store.reopen(image);
+        self.eeprom_ok = true;
     }
 
     /// Supply voltage is gone.
@@ -91,7 +92,6 @@ impl<const N: usize> Device<N> {
     pub fn restart(&mut self, node_id: NodeId, bitrate: Bitrate, now: Instant) {
         self.node = Node::new(self.profile, node_id);
         let _ = self.store.load(self.node.dictionary_mut(), |_| true);
-        self.eeprom_ok = true;
         self.running = true;
         self.bitrate = bitrate;
         self.next_task = now.plus_nanos(self.task_period_ns);
@@ -135,6 +135,11 @@ impl<const N: usize> Device<N> {
         true
     }
 
+    /// See [`Node::set_heartbeat_state`].
+    pub const fn set_heartbeat_state(&mut self, state: Option<u8>) {
+        self.node.set_heartbeat_state(state);
+    }
+
     /// The values have changed: event-driven TPDOs become due.
     #[inline]
     pub fn notice_changes(&mut self, now: Instant) {
@@ -151,6 +156,12 @@ impl<const N: usize> Device<N> {
     #[inline]
     pub const fn set_eeprom_ok(&mut self, ok: bool) {
         self.eeprom_ok = ok;
+    }
+
+    /// The EEPROM answers.
+    #[inline]
+    pub const fn is_eeprom_ok(&self) -> bool {
+        self.eeprom_ok
     }
 
     /// The EEPROM answers, and what it holds can be read.
@@ -178,14 +189,22 @@ impl<const N: usize> Device<N> {
         }
     }
 
+    /// Stores all rows that are to be stored, with their values in `contents`, whatever the EEPROM held. False if it does
+    /// not answer; nothing is stored then.
+    pub fn save(&mut self, contents: &Dictionary<N>) -> bool {
+        if self.eeprom_ok {
+            self.store.format(contents);
+        }
+        self.eeprom_ok
+    }
+
     /// Everything in the EEPROM becomes as delivered. Parameters do at once, communication objects with the next restart:
     /// until then they show what the device does. False if the EEPROM does not answer; nothing is changed then.
     pub fn restore_factory_settings(&mut self) -> bool {
-        if !self.eeprom_ok {
+        let (table, node_id) = (self.profile.table, self.node.node_id());
+        if !self.save(&Dictionary::new(table, node_id)) {
             return false;
         }
-        let (table, node_id) = (self.profile.table, self.node.node_id());
-        self.store.format(&Dictionary::<N>::new(table, node_id));
         for (slot, _) in table.iter().filter(|(_, row)| row.stored && !row.is_communication()) {
             self.node.dictionary_mut().restore_default(slot, node_id);
         }

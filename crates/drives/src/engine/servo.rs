@@ -126,7 +126,7 @@ impl Servo {
     }
 
     /// Velocity of the shaft, rad/s: every supervision period.
-    pub fn measure(&mut self, model: &ServoModel, gains: &ServoGains, phase_current_a: [f32; 3]) {
+    pub fn measure(&mut self, model: &ServoModel, gains: &ServoGains, phase_current_a: [f32; 2]) {
         let dt_s = model.supervision_period_s;
         let sign = f32::from(model.direction);
         let mut counts_s = self.observer.velocity() / model.control_period_s;
@@ -137,7 +137,7 @@ impl Servo {
         let velocity_rad_s = sign * counts_s * model.rad_per_count();
         self.velocity_rad_s = self.velocity_filter.update(&gains.velocity_filter, velocity_rad_s);
         let (sin, cos) = sin_cos_turns(self.electrical_turns);
-        self.current_a = sign * park(clarke(phase_current_a), sin, cos).q;
+        self.current_a = sign * park(clarke(three_phases(phase_current_a)), sin, cos).q;
     }
 
     /// The outer loops: every supervision period. `position` is the actual position that the demand counts in.
@@ -193,13 +193,13 @@ impl Servo {
         &mut self,
         model: &ServoModel,
         gains: &ServoGains,
-        phase_current_a: [f32; 3],
+        phase_current_a: [f32; 2],
         bus_v: f32,
     ) -> [f32; 3] {
         let sign = f32::from(model.direction);
         let setpoint_a = Dq { d: 0.0, q: sign * self.torque_filter.update(&gains.torque_filter, self.setpoint_a) };
         let input = FocInput {
-            phase_current_a,
+            phase_current_a: three_phases(phase_current_a),
             electrical_turns: self.electrical_turns,
             electrical_rad_s: sign * self.velocity_rad_s * model.commutation.pole_pairs as f32,
             bus_v,
@@ -217,6 +217,11 @@ impl Servo {
     /// Filtered velocity of the shaft, rad/s.
     pub const fn velocity_rad_s(&self) -> f32 {
         self.velocity_rad_s
+    }
+
+    /// The same in r/min.
+    pub const fn velocity_rpm(&self) -> f32 {
+        self.velocity_rad_s * (60.0 / TAU)
     }
 
     /// Measured torque-producing current, A.
@@ -252,4 +257,9 @@ impl Servo {
         self.setpoint_a = 0.0;
         self.saturated = false;
     }
+}
+
+/// Two phases are measured, and the three add up to nothing.
+fn three_phases([u, v]: [f32; 2]) -> [f32; 3] {
+    [u, v, -u - v]
 }

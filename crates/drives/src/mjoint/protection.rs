@@ -4,7 +4,7 @@ use super::alarms::row;
 use super::hardware::{Battery, Sensors};
 use super::parameters::Parameters;
 use super::readings::*;
-use crate::engine::faults::FaultSet;
+use crate::engine::faults::{FaultSet, exceeds_with_hysteresis};
 use crate::engine::servo::Servo;
 
 /// What has to be remembered from one period to the next.
@@ -83,6 +83,5 @@ fn lasts(lasted_s: &mut f32, present: bool, limit_s: f32) -> bool {
 }
 
 fn over_voltage(bus_v: f32, now: &Situation<'_>) -> bool {
-    let recovered = if now.latched.has(row::OVER_VOLTAGE) { VOLTAGE_HYSTERESIS_V } else { 0.0 };
-    bus_v > OVER_VOLTAGE_V - recovered || bus_v.is_nan()
+    exceeds_with_hysteresis(bus_v, OVER_VOLTAGE_V, VOLTAGE_HYSTERESIS_V, now.latched.has(row::OVER_VOLTAGE))
 }

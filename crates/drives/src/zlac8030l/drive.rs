@@ -151,17 +151,13 @@ impl Zlac8030l {
         self.position_offset.wrapping_add(self.servo.position(&self.parameters.model))
     }
 
-    fn velocity_rpm(&self) -> f32 {
-        self.servo.velocity_rad_s() * (60.0 / core::f32::consts::TAU)
-    }
-
     fn watch_faults(&mut self, sensors: &Sensors, now: Instant) {
         self.device.set_eeprom_ok(sensors.eeprom_ok);
         let situation = Situation {
             servo: &self.servo,
             demand: &self.demand,
             position: self.position(),
-            velocity_rpm: self.velocity_rpm(),
+            velocity_rpm: self.servo.velocity_rpm(),
             eeprom_sound: self.device.is_eeprom_sound(),
             latched: self.faults.latched(),
         };
@@ -238,8 +234,8 @@ impl Zlac8030l {
     }
 
     fn measure(&mut self, sensors: &Sensors) -> Feedback {
-        self.servo.measure(&self.parameters.model, &self.parameters.gains, three_phases(sensors));
-        let velocity_rpm = self.velocity_rpm();
+        self.servo.measure(&self.parameters.model, &self.parameters.gains, sensors.phase_current_a);
+        let velocity_rpm = self.servo.velocity_rpm();
         let shown = LowPassGains::from_time_constant(DISPLAY_FILTER_S, SUPERVISION_PERIOD_S);
         self.shown_velocity_rpm.update(&shown, velocity_rpm);
         self.shown_current_a.update(&shown, self.servo.current_a());
@@ -281,7 +277,7 @@ impl Zlac8030l {
     fn power_stage(&mut self, sensors: &Sensors) -> PowerStage {
         if self.demand != Demand::Off {
             let Parameters { model, gains, .. } = &self.parameters;
-            let duty = self.servo.modulate(model, gains, three_phases(sensors), sensors.bus_v);
+            let duty = self.servo.modulate(model, gains, sensors.phase_current_a, sensors.bus_v);
             return PowerStage::Modulate { duty };
         }
         let alarm = self.axis.state() == PowerState::Fault;
@@ -431,16 +427,11 @@ impl Firmware for Zlac8030l {
             mode: self.axis.mode(),
             fault_code: self.faults.code_bits(),
             position_counts: self.position(),
-            velocity_rpm: self.velocity_rpm(),
+            velocity_rpm: self.servo.velocity_rpm(),
             current_a: self.shown_current_a.value,
             brake_engaged: self.device.is_running() && terminals::brake_engaged(self.values()),
         }
     }
-}
-
-fn three_phases(sensors: &Sensors) -> [f32; 3] {
-    let [u, v] = sensors.phase_current_a;
-    [u, v, -u - v]
 }
 
 /// 0.1 degC, held to the range of 2026h.

@@ -2,11 +2,12 @@
 
 use can::Instant;
 use canopen::heartbeat::Consumer;
-use canopen::node::{NodeEvent, Via};
+use canopen::node::Via;
 use canopen::od::Slot;
 use cia402::{Controlword, ModeOfOperation};
 
 use super::{Homing, MJoint, OwnMotion};
+use crate::engine::device::{Application, Device};
 use crate::mjoint::homing::Run;
 use crate::mjoint::objects::effects::{Effect, effect};
 use crate::mjoint::objects::*;
@@ -19,20 +20,40 @@ const MAY_MOVE: u16 = Controlword::ENABLE_VOLTAGE | Controlword::QUICK_STOP | Co
 /// The RPDO whose position waits for SYNC.
 const SYNCHRONOUS_RPDO: u8 = 4;
 
-impl MJoint {
-    pub(super) fn handle_events(&mut self, now: Instant) {
-        while let Some(event) = self.node.poll_event() {
-            match event {
-                NodeEvent::Written { slot, raw, via } => self.written(slot, raw, via),
-                NodeEvent::ResetNode => self.restart(self.node.node_id(), now),
-                NodeEvent::ResetCommunication => self.restart_communication(now),
-                NodeEvent::Nmt(_) | NodeEvent::Sync | NodeEvent::RpdoTooShort(_) => {}
-            }
-        }
+impl Application<ROW_COUNT> for MJoint {
+    fn device(&mut self) -> &mut Device<ROW_COUNT> {
+        &mut self.device
     }
 
-    /// A peer wrote `raw` to `slot`. The status is shown anew at once: the answer to the same frame may carry it.
-    pub(super) fn written(&mut self, slot: Slot, raw: u32, via: Via) {
+    fn restart(&mut self, now: Instant) {
+        self.start(self.device.node().node_id(), self.device.bitrate(), now);
+    }
+
+    fn restart_communication(&mut self, now: Instant) {
+        self.device.restart_communication(now);
+        self.host = Consumer::from_raw(self.values().get(CONSUMER_HEARTBEAT_TIME));
+    }
+
+    /// Any write may change the status, and the answer to the same frame may carry it.
+    fn written(&mut self, slot: Slot, raw: u32, via: Via, _now: Instant) -> bool {
+        self.act_on(slot, raw, via);
+        true
+    }
+
+    /// The statusword; also right after a command, for a host that reads back.
+    fn publish_status(&mut self) {
+        let word = self.statusword();
+        self.device.values_mut().set(STATUSWORD, word.0);
+    }
+
+    fn communication_task(&mut self, _now: Instant) {
+        self.save();
+    }
+}
+
+impl MJoint {
+    /// A peer wrote `raw` to `slot`.
+    pub(super) fn act_on(&mut self, slot: Slot, raw: u32, via: Via) {
         match effect(slot) {
             Effect::Command => self.command(Controlword(raw as u16)),
             Effect::SelectMode => self.select_mode(ModeOfOperation(raw as u8 as i8)),
@@ -46,7 +67,6 @@ impl MJoint {
             Effect::ConsumerHeartbeat => self.watch_another_host(raw),
             Effect::Parameter => self.parameters_changed = true,
         }
-        self.publish_status();
     }
 
     /// 6040h. The host takes the motor over with bit 0; bit 7 resets alarms; bit 4 clears itself.
@@ -64,7 +84,7 @@ impl MJoint {
             self.own_motion = OwnMotion::None;
         }
         self.controlword = Controlword(asked.0 & !Controlword::NEW_SET_POINT);
-        self.node.dictionary_mut().set(CONTROLWORD, self.controlword.0);
+        self.device.values_mut().set(CONTROLWORD, self.controlword.0);
         self.take_or_let_go();
         if !self.may_move() {
             self.next_point = None;
@@ -177,7 +197,7 @@ impl MJoint {
         }
         if value == first || (armed && value == second) {
             let kept = self.gear_numerator;
-            self.node.dictionary_mut().set(GEAR_NUMERATOR, kept);
+            self.device.values_mut().set(GEAR_NUMERATOR, kept);
         } else {
             self.gear_numerator = value;
             self.parameters_changed = true;

@@ -84,7 +84,7 @@ impl MJoint {
     pub(super) fn modulate(&mut self, sensors: &Sensors) {
         if self.demand != Demand::Off {
             let Parameters { servo, gains, .. } = &self.parameters;
-            self.duty = self.servo.modulate(servo, gains, three_phases(sensors), sensors.bus_v);
+            self.duty = self.servo.modulate(servo, gains, sensors.phase_current_a, sensors.bus_v);
         }
     }
 
@@ -92,18 +92,14 @@ impl MJoint {
         if self.parameters_changed {
             self.parameters_changed = false;
             let output = self.parameters.gains.foc.modulation_limit;
-            self.parameters = Parameters::from(self.node.dictionary(), self.model, self.function);
+            self.parameters = Parameters::from(self.device.values(), self.model, self.function);
             self.parameters.gains.foc.modulation_limit = output;
         }
     }
 
-    pub(super) fn velocity_rpm(&self) -> f32 {
-        self.servo.velocity_rad_s() * (60.0 / core::f32::consts::TAU)
-    }
-
     fn measure(&mut self, sensors: &Sensors) -> Feedback {
-        self.servo.measure(&self.parameters.servo, &self.parameters.gains, three_phases(sensors));
-        let rpm = self.velocity_rpm();
+        self.servo.measure(&self.parameters.servo, &self.parameters.gains, sensors.phase_current_a);
+        let rpm = self.servo.velocity_rpm();
         let shown = LowPassGains::from_time_constant(DISPLAY_FILTER_S, SUPERVISION_PERIOD_S);
         self.shown_velocity_rpm.update(&shown, rpm);
         self.shown_current_a.update(&shown, self.servo.current_a());
@@ -121,7 +117,7 @@ impl MJoint {
         let situation = Situation {
             servo: &self.servo,
             live: self.axis.is_engaged(),
-            velocity_rpm: self.velocity_rpm(),
+            velocity_rpm: self.servo.velocity_rpm(),
             latched: self.alarms.latched(),
             host_lost: self.host_lost,
             has_brake: self.function.has_brake(),
@@ -259,9 +255,4 @@ fn within_half_a_turn(difference: u16) -> i16 {
     } else {
         difference as i16
     }
-}
-
-fn three_phases(sensors: &Sensors) -> [f32; 3] {
-    let [u, v] = sensors.phase_current_a;
-    [u, v, -u - v]
 }

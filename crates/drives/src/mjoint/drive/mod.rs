@@ -14,7 +14,6 @@ use canopen::NmtState;
 use canopen::NodeId;
 use canopen::heartbeat::{Consumer, ConsumerEvent};
 use canopen::node::{Node, NodeProfile};
-use canopen::od::Entry;
 use canopen::pdo::EventTrigger;
 use canopen::sdo::server::FrameLength;
 use cia402::{Controlword, ModeOfOperation, PowerState};
@@ -35,10 +34,10 @@ use super::readings::*;
 use super::turns::Turns;
 use super::{Values, storage};
 use crate::engine::axis::Demand;
+use crate::engine::device::{Application, Device};
 use crate::engine::faults::FaultMonitor;
 use crate::engine::inputs::Inputs;
 use crate::engine::servo::Servo;
-use crate::engine::storage::Store;
 use crate::{Firmware, Report};
 
 /// How this drive communicates: operational from the start, SDO requests as short as they may be, TPDO n answers
@@ -59,10 +58,7 @@ const HEARTBEAT_ALARM: u8 = 0x04;
 #[derive(Clone)]
 pub struct MJoint {
     model: &'static Model,
-    node: Node<ROW_COUNT>,
-    store: Store,
-    bitrate: Bitrate,
-    running: bool,
+    device: Device<ROW_COUNT>,
     powered_at: Instant,
     host: Option<Consumer>,
     host_lost: bool,
@@ -76,7 +72,6 @@ pub struct MJoint {
     origin_asked: bool,
     set_origin: bool,
     save_asked: bool,
-    eeprom_fails: bool,
     output_was_enabled: bool,
 
     controlword: Controlword,
@@ -111,7 +106,6 @@ pub struct MJoint {
     periods: u8,
     /// Supervision periods in the present 2 ms.
     base_periods: u8,
-    next_task: Instant,
 }
 
 /// Where homing is.
@@ -140,17 +134,18 @@ enum OwnMotion {
 impl MJoint {
     /// A drive without supply. [`Firmware::power_on`] starts it.
     pub fn new(model: &'static Model) -> Self {
-        let node = Node::new(&NODE_PROFILE, NodeId::MIN);
-        let function = Function::default();
-        let parameters = Parameters::from(node.dictionary(), model, function);
+        Self::over(model, Device::new(&NODE_PROFILE, Bitrate::M1, storage::factory(), COMMUNICATION_PERIOD_NS))
+    }
+
+    /// Motor free, and the values of `device` in effect.
+    fn over(model: &'static Model, device: Device<ROW_COUNT>) -> Self {
+        let function = Function::from_raw(device.values().get(MODE_SELECTION)).unwrap_or_default();
+        let parameters = Parameters::from(device.values(), model, function);
         Self {
             model,
-            gear_numerator: node.dictionary().get(GEAR_NUMERATOR),
+            gear_numerator: device.values().get(GEAR_NUMERATOR),
             servo: Servo::new(&parameters.servo, 0, 0),
-            node,
-            store: Store::new(storage::factory()),
-            bitrate: Bitrate::M1,
-            running: false,
+            device,
             powered_at: Instant::ZERO,
             host: None,
             host_lost: false,
@@ -160,7 +155,6 @@ impl MJoint {
             origin_asked: false,
             set_origin: false,
             save_asked: false,
-            eeprom_fails: false,
             output_was_enabled: true,
             controlword: Controlword(0),
             mode: ModeOfOperation::PROFILE_POSITION,
@@ -186,7 +180,6 @@ impl MJoint {
             shown_current_a: LowPass::default(),
             periods: 0,
             base_periods: 0,
-            next_task: Instant::ZERO,
         }
     }
 
@@ -197,7 +190,7 @@ impl MJoint {
 
     /// The values of the objects, to look at.
     pub const fn values(&self) -> &Values {
-        self.node.dictionary()
+        self.device.values()
     }
 
     /// What the control loops are asked for, to look at.
@@ -207,41 +200,20 @@ impl MJoint {
 
     /// The communication side, to look at.
     pub const fn node(&self) -> &Node<ROW_COUNT> {
-        &self.node
+        self.device.node()
     }
 
     /// Starts the firmware over with the stored values: motor free, then what 2619h says.
-    fn restart(&mut self, node_id: NodeId, now: Instant) {
-        let mut started = Self::new(self.model);
-        started.node = Node::new(&NODE_PROFILE, node_id);
-        // An unreadable store leaves factory values.
-        let _ = self.store.load(started.node.dictionary_mut(), |_| true);
-        started.store = self.store.clone();
-        started.bitrate = self.bitrate;
-        started.running = true;
-        started.powered_at = self.powered_at;
-        started.eeprom_fails = self.eeprom_fails;
-        started.turns = self.turns;
-        started.function = Function::from_raw(started.values().get(MODE_SELECTION)).unwrap_or_default();
-        started.own_motion = OwnMotion::Starting;
-        started.gear_numerator = started.values().get(GEAR_NUMERATOR);
-        let by_host = started.gear_numerator == 0 || started.function == Function::CommunicationControl;
-        started.node.dictionary_mut().set(MODBUS_ENABLE, u16::from(by_host));
-        started.host = Consumer::from_raw(started.values().get(CONSUMER_HEARTBEAT_TIME));
-        started.parameters = Parameters::from(started.values(), self.model, started.function);
-        started.next_task = now.plus_nanos(COMMUNICATION_PERIOD_NS);
-        *self = started;
-        self.publish_status();
-        self.node.boot(now);
-    }
-
-    /// NMT reset communication: 1000h to 1FFFh as at power-on; motor and node-ID go on.
-    fn restart_communication(&mut self, now: Instant) {
-        self.node.restore_communication_defaults();
-        let _ = self.store.load(self.node.dictionary_mut(), is_communication);
+    fn start(&mut self, node_id: NodeId, bitrate: Bitrate, now: Instant) {
+        self.device.restart(node_id, bitrate, now);
+        let started = Self::over(self.model, self.device.clone());
+        let (powered_at, turns) = (self.powered_at, self.turns);
+        *self = Self { powered_at, turns, own_motion: OwnMotion::Starting, ..started };
+        let by_host = self.gear_numerator == 0 || self.function == Function::CommunicationControl;
+        self.device.values_mut().set(MODBUS_ENABLE, u16::from(by_host));
         self.host = Consumer::from_raw(self.values().get(CONSUMER_HEARTBEAT_TIME));
-        self.node.boot(now);
-        self.publish_alarms();
+        self.publish_status();
+        self.device.boot(now);
     }
 
     fn heard(&mut self, event: Option<ConsumerEvent>) {
@@ -262,25 +234,18 @@ impl MJoint {
 
     /// Stores what 2614h asked for: reads 2 when it is done, and 1 for as long as the EEPROM does not answer.
     fn save(&mut self) {
-        if !self.save_asked || self.eeprom_fails {
-            return;
+        let node_id = self.device.node().node_id();
+        if self.save_asked && self.device.save(&storage::contents(self.values(), node_id)) {
+            self.save_asked = false;
+            self.device.values_mut().set(DATA_SAVE_FLAG, 2);
         }
-        self.save_asked = false;
-        let contents = storage::contents(self.node.dictionary(), self.node.node_id());
-        if self.store.is_readable() {
-            self.store.mark_all(&TABLE);
-            self.store.commit(&contents);
-        } else {
-            self.store.format(&contents);
-        }
-        self.node.dictionary_mut().set(DATA_SAVE_FLAG, 2);
     }
 
     /// The last thing that the falling supply voltage lets it do.
     fn record_position(&mut self) {
-        if self.running && self.awake && !self.eeprom_fails {
-            self.store.mark(&TABLE, POSITION_ACTUAL_INTERNAL_VALUE.slot());
-            self.store.commit(self.node.dictionary());
+        if self.device.is_running() && self.awake {
+            self.device.mark(POSITION_ACTUAL_INTERNAL_VALUE.slot());
+            self.device.commit();
         }
     }
 
@@ -309,45 +274,36 @@ impl MJoint {
     }
 }
 
+/// As the others' but for the heartbeat of the host, which the joint listens to by itself.
 impl Station for MJoint {
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
-        if self.running {
-            let event = self.host.as_mut().and_then(|host| host.handle_frame(frame, now));
-            self.heard(event);
-            self.node.handle_frame(frame, now);
-            self.handle_events(now);
-        }
+        let event = self.host.as_mut().and_then(|host| host.handle_frame(frame, now));
+        self.heard(event);
+        self.device.handle_frame(frame, now);
+        self.handle_events(now);
     }
 
     fn handle_timeout(&mut self, now: Instant) {
-        if !self.running {
-            return;
-        }
         let event = self.host.as_mut().and_then(|host| host.handle_timeout(now));
         self.heard(event);
-        self.node.handle_timeout(now);
+        self.device.handle_timeout(now);
         self.handle_events(now);
-        if now >= self.next_task {
-            // The task keeps its grid unless it was not called for long.
-            let next = self.next_task.plus_nanos(COMMUNICATION_PERIOD_NS);
-            self.next_task = if next > now { next } else { now.plus_nanos(COMMUNICATION_PERIOD_NS) };
-            self.save();
+        if self.device.is_task_due(now) {
+            self.communication_task(now);
         }
     }
 
     fn poll_transmit(&mut self) -> Option<Frame> {
-        self.node.poll_transmit()
+        self.device.poll_transmit()
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        let task = self.running.then_some(self.next_task)?;
-        let node = self.node.poll_timeout().unwrap_or(Instant::FAR_FUTURE);
         let host = self.host.and_then(|host| host.poll_timeout()).unwrap_or(Instant::FAR_FUTURE);
-        Some(task.min(node).min(host))
+        self.device.poll_timeout().map(|device| device.min(host))
     }
 
     fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
-        self.node.handle_transmitted(frame, now);
+        self.device.handle_transmitted(frame, now);
     }
 }
 
@@ -359,30 +315,29 @@ impl Firmware for MJoint {
     const CONTROL_PERIOD_NS: u64 = CONTROL_PERIOD_NS;
 
     fn power_on(&mut self, hardware: &Hardware, now: Instant) {
-        self.store.reopen(hardware.eeprom);
-        self.bitrate = hardware.bitrate;
+        self.device.power_on(hardware.eeprom);
         self.powered_at = now;
-        let mut values = Values::new(&TABLE, NodeId::MIN);
-        let readable = self.store.load(&mut values, |_| true).is_ok();
+        let values = self.device.stored_values();
+        let readable = self.device.is_eeprom_sound();
         let has_brake = Function::from_raw(values.get(MODE_SELECTION)).is_some_and(Function::has_brake);
         self.turns = Turns::new((readable && has_brake).then(|| values.get(POSITION_ACTUAL_INTERNAL_VALUE)));
         let address = u8::try_from(values.get(DEVICE_ADDRESS)).ok().and_then(NodeId::new);
-        self.restart(address.unwrap_or(NodeId::MIN), now);
+        self.start(address.unwrap_or(NodeId::MIN), hardware.bitrate, now);
     }
 
     fn power_off(&mut self, _now: Instant) {
         self.record_position();
-        self.running = false;
-        self.node.power_off();
+        self.device.power_off();
+        self.host = None;
         self.axis = Axis::new();
         self.demand = Demand::Off;
     }
 
     fn tick(&mut self, sensors: &Sensors, now: Instant) -> Actuation {
-        if !self.running {
+        if !self.device.is_running() {
             return Actuation::default();
         }
-        self.eeprom_fails = sensors.eeprom_fails;
+        self.device.set_eeprom_ok(!sensors.eeprom_fails);
         self.sense(sensors);
         self.watch_for_origin(sensors);
         self.periods += 1;
@@ -395,22 +350,21 @@ impl Firmware for MJoint {
     }
 
     fn eeprom(&self) -> (&[u8], u32) {
-        let (image, generation) = self.store.image();
-        (&image.0, generation)
+        self.device.eeprom()
     }
 
     fn report(&self) -> Report {
         Report {
-            powered: self.running,
-            node_id: self.node.node_id(),
-            bitrate: self.bitrate,
+            powered: self.device.is_running(),
+            node_id: self.device.node().node_id(),
+            bitrate: self.device.bitrate(),
             state: self.power_state(),
             mode: self.mode,
             fault_code: alarms::code(self.alarms.latched()),
             position_counts: self.position,
-            velocity_rpm: self.velocity_rpm(),
+            velocity_rpm: self.servo.velocity_rpm(),
             current_a: self.shown_current_a.value,
-            brake_engaged: self.running && self.brake() == Brake::Engaged,
+            brake_engaged: self.device.is_running() && self.brake() == Brake::Engaged,
         }
     }
 }
@@ -426,8 +380,4 @@ impl MJoint {
             PowerState::SwitchOnDisabled
         }
     }
-}
-
-fn is_communication(row: &Entry) -> bool {
-    matches!(row.index, 0x1000..=0x1FFF)
 }

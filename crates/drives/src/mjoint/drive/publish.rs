@@ -1,9 +1,10 @@
 //! Actual values -> dictionary.
 
-use cia402::{Controlword, ModeOfOperation};
+use cia402::{Controlword, ModeOfOperation, Statusword};
 
 use super::{HEARTBEAT_ALARM, Homing, MJoint, OwnMotion};
 use crate::engine::axis::Demand;
+use crate::engine::device::Application;
 use crate::mjoint::alarms;
 use crate::mjoint::hardware::Sensors;
 use crate::mjoint::objects::*;
@@ -24,7 +25,7 @@ impl MJoint {
         let speed = round(self.shown_velocity_rpm.value * SPEED_COUNTS_PER_RPM).clamp(-30_000.0, 30_000.0) as i16;
         let current = round(self.shown_current_a.value.abs() * CURRENT_COUNTS_PER_A).min(LARGEST) as u16;
         let (inputs, pwm) = (self.inputs.levels(), self.output_pwm());
-        let values = self.node.dictionary_mut();
+        let values = self.device.values_mut();
         values.set(VELOCITY_ACTUAL_VALUE, speed);
         values.set(CURRENT_ACTUAL_VALUE, current);
         values.set(DC_LINK_VOLTAGE, round(sensors.bus_v * VOLTAGE_COUNTS_PER_V).clamp(0.0, LARGEST) as u16);
@@ -37,7 +38,7 @@ impl MJoint {
 
     pub(super) fn publish_position(&mut self) {
         let position = self.position;
-        let values = self.node.dictionary_mut();
+        let values = self.device.values_mut();
         values.set(POSITION_ACTUAL_VALUE, position);
         values.set(POSITION_ACTUAL_INTERNAL_VALUE, position);
     }
@@ -46,14 +47,13 @@ impl MJoint {
     pub(super) fn publish_alarms(&mut self) {
         let code = alarms::code(self.alarms.latched());
         let register = self.alarms.error_register();
-        let values = self.node.dictionary_mut();
+        let values = self.device.values_mut();
         values.set(ALARM_CODE, code);
         values.set(ERROR_REGISTER, register);
-        self.node.set_heartbeat_state((code != 0).then_some(HEARTBEAT_ALARM));
+        self.device.set_heartbeat_state((code != 0).then_some(HEARTBEAT_ALARM));
     }
 
-    /// The statusword; also right after a command, for a host that reads back.
-    pub(super) fn publish_status(&mut self) {
+    pub(super) fn statusword(&self) -> Statusword {
         let in_homing = self.mode == ModeOfOperation::HOMING;
         let condition = Condition {
             controlword: self.controlword,
@@ -64,7 +64,7 @@ impl MJoint {
             homing_attained: in_homing && matches!(self.homing, Homing::Attained),
             homing_error: in_homing && matches!(self.homing, Homing::Failed),
         };
-        self.node.dictionary_mut().set(STATUSWORD, statusword(&condition).0);
+        statusword(&condition)
     }
 
     /// Bit 10: nothing is left to be done. An alarm that stops the motor leaves it undone.
@@ -78,7 +78,7 @@ impl MJoint {
         }
         let halted = self.controlword.has(Controlword::HALT) && self.own_motion == OwnMotion::None;
         if halted {
-            return self.velocity_rpm().abs() < STANDSTILL_RPM;
+            return self.servo.velocity_rpm().abs() < STANDSTILL_RPM;
         }
         match self.mode {
             _ if self.own_motion != OwnMotion::None => self.is_there(),
@@ -94,7 +94,7 @@ impl MJoint {
 
     fn is_at_speed(&self) -> bool {
         let target_rpm = self.target_velocity() / COUNTS_S_PER_RPM;
-        (f64::from(self.velocity_rpm()) - target_rpm).abs() <= SPEED_REACHED_RPM
+        (f64::from(self.servo.velocity_rpm()) - target_rpm).abs() <= SPEED_REACHED_RPM
     }
 
     /// 2613h: share of the bus voltage between two wires, signed as the current that is asked for.

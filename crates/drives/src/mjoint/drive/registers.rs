@@ -11,6 +11,7 @@ use canopen::od::{Entry, Slot};
 
 use super::MJoint;
 use crate::RegisterError;
+use crate::engine::device::Application;
 use crate::mjoint::objects::TABLE;
 use crate::mjoint::objects::modbus::{Register, find};
 
@@ -26,7 +27,7 @@ impl MJoint {
     /// The address that it answers to on the RS485 line: the node-ID in use (2615h as it was at power-on). `None` while
     /// it has no power.
     pub fn modbus_address(&self) -> Option<u8> {
-        self.running.then(|| self.node.node_id().raw())
+        self.device.is_running().then(|| self.device.node().node_id().raw())
     }
 
     /// Reads the registers from `address` on into `words`. Values of 8 bits are extended with their sign; half of a
@@ -60,10 +61,11 @@ impl MJoint {
         done = 0;
         while done < words.len() {
             let change = self.change(address, done, &words[done..])?;
-            let raw = self.node.dictionary_mut().write(change.slot, change.raw)?;
-            self.written(change.slot, raw, Via::Sdo);
+            let raw = self.device.values_mut().write(change.slot, change.raw)?;
+            self.act_on(change.slot, raw, Via::Sdo);
             done += change.words;
         }
+        self.publish_status();
         Ok(())
     }
 
