@@ -47,15 +47,31 @@ pub(crate) const fn join<const N: usize>(parts: &[&[Entry]]) -> [Entry; N] {
     rows
 }
 
-/// What a write to each row of a table does: as `named`, or else `other`. Looked up by [`Slot::position`].
-pub(crate) const fn effects<E: Copy, const N: usize>(named: &[(Slot, E)], other: E) -> [E; N] {
-    let mut effects = [other; N];
+/// What a write to each row of a table does: `OBJECT => Effect;` where it is named, or else the one in
+/// the head. The function `effect` looks it up.
+macro_rules! effects {
+    ($rows:ident else $other:ident: $($object:ident => $effect:ident;)*) => {
+        /// What a write to `slot` does.
+        #[inline]
+        pub fn effect(slot: canopen::od::Slot) -> Effect {
+            EFFECTS[slot.position()]
+        }
+
+        static EFFECTS: [Effect; $rows] =
+            crate::row::by_position(&[$(($object.slot(), Effect::$effect)),*], Effect::$other);
+    };
+}
+pub(crate) use effects;
+
+/// `named` by the position of their rows, and `other` at all other positions.
+pub(crate) const fn by_position<E: Copy, const N: usize>(named: &[(Slot, E)], other: E) -> [E; N] {
+    let mut all = [other; N];
     let mut i = 0;
     while i < named.len() {
-        effects[named[i].0.position()] = named[i].1;
+        all[named[i].0.position()] = named[i].1;
         i += 1;
     }
-    effects
+    all
 }
 
 /// Constants for objects of a table, checked at compile time: `NAME: type = index sub-index;`.

@@ -1,14 +1,15 @@
 //! Modes of the M joint on its motor.
 
-mod joint;
+mod bench;
 
+use bench::Bench;
+use bench::joint::{Joint, TURN};
 use drives::mjoint::Model;
-use joint::{Bench, TURN};
 use plant::JointMotorModel;
 
 #[test]
 fn an_absolute_move_takes_the_time_of_its_trapezoid_and_ends_within_the_tolerance() {
-    let mut bench = Bench::new();
+    let mut bench = Bench::<Joint>::new();
     bench.write(0x6081, 0, 1000);
     bench.write(0x6083, 0, 20_000);
     bench.enable_absolute();
@@ -31,8 +32,7 @@ fn every_model_reaches_its_speed_without_much_overshoot() {
         (&Model::M8025E25B50, JointMotorModel::M8025E25B50),
         (&Model::M8025E25B80, JointMotorModel::M8025E25B80),
     ] {
-        let mut bench = Bench::unpowered(model, motor);
-        bench.power_on();
+        let mut bench = Bench::<Joint>::of(model, motor);
         bench.enable_speed();
         bench.write(0x60FF, 0, 1000);
         let mut most: f64 = 0.0;

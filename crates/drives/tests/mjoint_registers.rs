@@ -1,12 +1,13 @@
 //! The M joint's registers over RS485 against its objects over SDO ("M Robot Joint Motor CanOpen Manual", 5.04).
 
-mod joint;
+mod bench;
 
+use bench::Bench;
+use bench::joint::Joint;
 use canopen::{AbortCode, Mux};
 use drives::RegisterError;
 use drives::mjoint::objects::TABLE;
 use drives::mjoint::objects::modbus::{REGISTERS, Register, find};
-use joint::Bench;
 
 /// Addresses of the manual's table that the tests write by name.
 const MODBUS_ENABLE: u16 = 0x00;
@@ -19,7 +20,7 @@ const TARGET_VELOCITY: u16 = 0x1E;
 const CONTROLWORD: u16 = 0x23;
 const MODE: u16 = 0x25;
 
-fn read(bench: &Bench, register: &Register) -> i64 {
+fn read(bench: &Bench<Joint>, register: &Register) -> i64 {
     let mut words = [0; 2];
     let words = &mut words[..usize::from(register.words)];
     bench.drive.read_registers(register.address, words).unwrap();
@@ -45,7 +46,7 @@ fn row(register: &Register) -> &'static canopen::od::Entry {
 
 #[test]
 fn every_address_of_the_table_reads_what_sdo_reads() {
-    let mut bench = Bench::new();
+    let mut bench = Bench::<Joint>::new();
     bench.run_ms(50);
     for register in &REGISTERS {
         let over_sdo = bench.read(register.object.index, register.object.sub_index);
@@ -70,7 +71,7 @@ fn every_written_value_is_taken_or_refused_as_over_sdo() {
         let edges =
             [limits.0, limits.1, type_range.0, type_range.1].into_iter().flat_map(|edge| [edge - 1, edge, edge + 1]);
         for value in edges.chain([0, 1, 2, 3, 17, -1]).filter(|value| (type_range.0..=type_range.1).contains(value)) {
-            let (mut by_sdo, mut by_register) = (Bench::new(), Bench::new());
+            let (mut by_sdo, mut by_register) = (Bench::<Joint>::new(), Bench::<Joint>::new());
             let expected = by_sdo.try_write(index, sub_index, value);
             let written = by_register.drive.write_registers(register.address, &words_of(register, value));
             let as_abort = written.map_err(|error| match error {
@@ -89,7 +90,7 @@ fn every_written_value_is_taken_or_refused_as_over_sdo() {
 
 #[test]
 fn a_move_by_registers_is_the_move_by_sdo() {
-    let (mut by_sdo, mut by_register) = (Bench::new(), Bench::new());
+    let (mut by_sdo, mut by_register) = (Bench::<Joint>::new(), Bench::<Joint>::new());
     for (index, value) in [(0x2600, 1), (0x6060, 1), (0x6081, 300), (0x6040, 0x0E), (0x607A, -40_000), (0x6040, 0x1E)] {
         by_sdo.write(index, 0, value);
     }
@@ -116,7 +117,7 @@ fn a_move_by_registers_is_the_move_by_sdo() {
 
 #[test]
 fn two_words_of_a_move_act_once_and_one_word_acts_with_the_present_other_half() {
-    let mut bench = Bench::new();
+    let mut bench = Bench::<Joint>::new();
     bench.write(0x2600, 0, 1);
     bench.write(0x6040, 0, 0x0E);
     bench.drive.write_registers(INCREMENTAL_POSITION, &[0x86A0, 0x0001]).unwrap();
@@ -130,7 +131,7 @@ fn two_words_of_a_move_act_once_and_one_word_acts_with_the_present_other_half() 
 
 #[test]
 fn half_of_a_value_is_checked_as_the_whole_value() {
-    let mut bench = Bench::new();
+    let mut bench = Bench::<Joint>::new();
     bench.write(0x60FF, 0, 100);
     // 100 with the high half FFFFh is -65436 r/min.
     let refused = bench.drive.write_registers(TARGET_VELOCITY + 1, &[0xFFFF]);
@@ -144,7 +145,7 @@ fn half_of_a_value_is_checked_as_the_whole_value() {
 
 #[test]
 fn a_refused_word_leaves_the_words_before_it_unwritten() {
-    let mut bench = Bench::new();
+    let mut bench = Bench::<Joint>::new();
     // 60F9h:01 takes 0 to 10000 at 07h, 60F9h:02 only 2 to 2000 at 08h.
     let before = bench.read(0x60F9, 1);
     let refused = bench.drive.write_registers(0x07, &[1234, 1]);
@@ -157,7 +158,7 @@ fn a_refused_word_leaves_the_words_before_it_unwritten() {
 
 #[test]
 fn addresses_outside_the_table_are_refused() {
-    let mut bench = Bench::new();
+    let mut bench = Bench::<Joint>::new();
     let mut words = [0; 3];
     for address in [0x27, 0x100, 0x2600, 0xFFFE, 0xFFFF] {
         assert_eq!(find(address), None);
@@ -169,7 +170,7 @@ fn addresses_outside_the_table_are_refused() {
 
 #[test]
 fn a_word_that_does_not_fit_into_eight_bits_is_refused() {
-    let mut bench = Bench::new();
+    let mut bench = Bench::<Joint>::new();
     for (word, expected) in [
         (0x0103, Err(RegisterError::BadValue(AbortCode::VALUE_TOO_HIGH))),
         (0xFF03, Err(RegisterError::BadValue(AbortCode::VALUE_TOO_LOW))),
@@ -182,7 +183,7 @@ fn a_word_that_does_not_fit_into_eight_bits_is_refused() {
 
 #[test]
 fn it_has_no_address_without_power() {
-    let mut bench = Bench::new();
+    let mut bench = Bench::<Joint>::new();
     assert_eq!(bench.drive.modbus_address(), Some(1));
     // 2615h counts from the next power-on, when it was saved.
     bench.drive.write_registers(0x17, &[9]).unwrap();

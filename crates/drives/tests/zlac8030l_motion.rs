@@ -3,12 +3,13 @@
 mod bench;
 
 use bench::Bench;
+use bench::hub_wheel::HubWheel;
 
 #[test]
 fn profile_velocity_reaches_its_target_in_the_acceleration_time_without_much_overshoot() {
-    let mut bench = Bench::new();
+    let mut bench = Bench::<HubWheel>::new();
     bench.enable(3);
-    bench.write(0x60FF, 0, 4, 100);
+    bench.write(0x60FF, 0, 100);
     let mut most: f64 = 0.0;
     for _ in 0..1500 {
         bench.run_ms(1);

@@ -74,7 +74,12 @@ impl FaultSet {
 
     /// The rows in it, ascending.
     pub fn rows(self) -> impl Iterator<Item = usize> {
-        (0..32).filter(move |row| self.has(*row))
+        let mut left = self.0;
+        core::iter::from_fn(move || {
+            let row = left.trailing_zeros();
+            left &= left.wrapping_sub(1);
+            (row < u32::BITS).then_some(row as usize)
+        })
     }
 }
 

@@ -51,14 +51,14 @@ impl<const INPUTS: usize> Terminals<INPUTS> {
     #[inline]
     pub(crate) fn outputs<const N: usize>(&self, values: &Dictionary<N>, now: Conditions) -> [bool; 2] {
         let polarity = values.get(self.output_polarity);
-        // Bit n is function n.
-        let active = u16::from(now.alarm) << 1
-            | u16::from(now.enabled) << 2
-            | u16::from(now.homing_attained) << 3
-            | u16::from(now.in_position) << 4;
+        // Bit n is function n; the tables list functions 0 to 4.
+        let active = u32::from(now.alarm) << 1
+            | u32::from(now.enabled) << 2
+            | u32::from(now.homing_attained) << 3
+            | u32::from(now.in_position) << 4;
         let level = |n: u16, function: Object<u16>| {
-            let active = active.checked_shr(u32::from(values.get(function))).unwrap_or(0);
-            (active ^ polarity >> n) & 1 == 1
+            let active = active.wrapping_shr(u32::from(values.get(function)));
+            (active ^ u32::from(polarity >> n)) & 1 == 1
         };
         let [y0, y1] = self.output_functions;
         [level(0, y0), level(1, y1)]

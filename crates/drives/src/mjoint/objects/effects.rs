@@ -1,10 +1,7 @@
 //! What a write sets in motion, object by object. Objects that are not named here are parameters: the drive takes
 //! them over at its next supervision period.
 
-use canopen::od::Slot;
-
 use super::*;
-use crate::row::effects;
 
 /// The consequence of a write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,24 +30,15 @@ pub enum Effect {
     Parameter,
 }
 
-/// What a write to `slot` does.
-#[inline]
-pub fn effect(slot: Slot) -> Effect {
-    EFFECTS[slot.position()]
+crate::row::effects! { ROW_COUNT else Parameter:
+    CONTROLWORD => Command;
+    MODES_OF_OPERATION => SelectMode;
+    TARGET_POSITION => Target;
+    TARGET_VELOCITY => Follow;
+    INCREMENTAL_POSITION => Increment;
+    OUTPUT_ENABLED => OutputEnabled;
+    ALARM_CODE => AlarmCode;
+    GEAR_NUMERATOR => GearNumerator;
+    DATA_SAVE_FLAG => Save;
+    CONSUMER_HEARTBEAT_TIME => ConsumerHeartbeat;
 }
-
-static EFFECTS: [Effect; ROW_COUNT] = effects(
-    &[
-        (CONTROLWORD.slot(), Effect::Command),
-        (MODES_OF_OPERATION.slot(), Effect::SelectMode),
-        (TARGET_POSITION.slot(), Effect::Target),
-        (TARGET_VELOCITY.slot(), Effect::Follow),
-        (INCREMENTAL_POSITION.slot(), Effect::Increment),
-        (OUTPUT_ENABLED.slot(), Effect::OutputEnabled),
-        (ALARM_CODE.slot(), Effect::AlarmCode),
-        (GEAR_NUMERATOR.slot(), Effect::GearNumerator),
-        (DATA_SAVE_FLAG.slot(), Effect::Save),
-        (CONSUMER_HEARTBEAT_TIME.slot(), Effect::ConsumerHeartbeat),
-    ],
-    Effect::Parameter,
-);

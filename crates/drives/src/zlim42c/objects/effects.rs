@@ -1,13 +1,10 @@
 //! What a write sets in motion, object by object. Objects that are not named here are parameters: the drive reads
 //! them when it needs them.
 
-use canopen::od::Slot;
-
 use super::{
     CLEAR_CURRENT_POSITION, CONTROLWORD, FAULT_RESET, MODES_OF_OPERATION, REGISTER_PARAMETER_SETTING, ROW_COUNT,
     TARGET_POSITION, TARGET_VELOCITY,
 };
-use crate::row::effects;
 
 /// The consequence of a write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,21 +25,12 @@ pub enum Effect {
     Parameter,
 }
 
-/// What a write to `slot` does.
-#[inline]
-pub fn effect(slot: Slot) -> Effect {
-    EFFECTS[slot.position()]
+crate::row::effects! { ROW_COUNT else Parameter:
+    CONTROLWORD => Command;
+    TARGET_VELOCITY => Target;
+    TARGET_POSITION => Target;
+    MODES_OF_OPERATION => SelectMode;
+    REGISTER_PARAMETER_SETTING => Registers;
+    FAULT_RESET => FaultReset;
+    CLEAR_CURRENT_POSITION => ClearPosition;
 }
-
-static EFFECTS: [Effect; ROW_COUNT] = effects(
-    &[
-        (CONTROLWORD.slot(), Effect::Command),
-        (TARGET_VELOCITY.slot(), Effect::Target),
-        (TARGET_POSITION.slot(), Effect::Target),
-        (MODES_OF_OPERATION.slot(), Effect::SelectMode),
-        (REGISTER_PARAMETER_SETTING.slot(), Effect::Registers),
-        (FAULT_RESET.slot(), Effect::FaultReset),
-        (CLEAR_CURRENT_POSITION.slot(), Effect::ClearPosition),
-    ],
-    Effect::Parameter,
-);
