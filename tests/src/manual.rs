@@ -65,11 +65,28 @@ pub struct PowerCell {
 }
 
 impl ObjectRow {
+    /// Index and sub-index.
+    #[must_use]
+    pub fn key(&self) -> (u16, u8) {
+        (self.index, self.sub)
+    }
+
     /// The values that its type can carry.
     #[must_use]
     pub fn type_range(&self) -> RangeInclusive<i64> {
         let bits = self.size * 8;
         if self.signed { -(1 << (bits - 1))..=(1 << (bits - 1)) - 1 } else { 0..=(1 << bits) - 1 }
+    }
+
+    /// Another value than the default, at an end of the limits where there are any.
+    #[must_use]
+    pub fn other_value(&self) -> Option<i64> {
+        let default = self.default?;
+        Some(match self.limits {
+            Some((low, high)) if default == high => low,
+            Some((_, high)) => high,
+            None => default + 1,
+        })
     }
 
     /// Checks that the default lies within the limits, and the limits within the type.

@@ -233,11 +233,7 @@ impl Memory {
             (0x1400..=0x1403 | 0x1800..=0x1803, 2) => 0xFE,
             (0x1600..=0x1603 | 0x1A00..=0x1A03, 0) => 1 - default,
             (0x1600..=0x1603 | 0x1A00..=0x1A03, _) => velocity_mapping(row),
-            _ => match row.limits {
-                Some((low, high)) if default == high => low,
-                Some((_, high)) => high,
-                None => default + 1,
-            },
+            _ => row.other_value()?,
         })
     }
 

@@ -51,11 +51,7 @@ fn other_value(row: &ObjectRow) -> Option<i64> {
         (0x1400..=0x1403 | 0x1800..=0x1803, 1) => 0x8000_0000 | default,
         (0x2615, _) => 5,
         (0x6060, _) => 3,
-        _ => match row.limits {
-            Some((low, high)) if default == high => low,
-            Some((_, high)) => high,
-            None => default + 1,
-        },
+        _ => row.other_value()?,
     })
 }
 
