@@ -112,6 +112,21 @@ fn a_halted_position_move_goes_on_to_its_target() {
 }
 
 #[test]
+fn a_set_point_given_under_halt_waits_for_its_end() {
+    let mut bench = Bench::new();
+    bench.enable_in(1);
+    bench.set(0x6040, 0, 0x10F);
+    bench.set(0x607A, 0, 8192);
+    bench.set(0x6040, 0, 0x11F);
+    bench.run_ms(1000);
+    assert_within("the shaft stays", bench.report().position as f64, -5.0, 5.0);
+    assert_ne!(bench.statusword() & 0x1000, 0, "the set-point is acknowledged");
+    bench.set(0x6040, 0, 0x0F);
+    bench.run_ms(4000);
+    assert_within("position", bench.report().position as f64, 8162.0, 8222.0);
+}
+
+#[test]
 fn shutdown_and_disable_operation_ramp_first_or_switch_off_at_once_as_605bh_and_605ch_say() {
     for (object, controlword, low_byte) in [(0x605B, 0x06, 0x31), (0x605C, 0x07, 0x33)] {
         let mut bench = turning();

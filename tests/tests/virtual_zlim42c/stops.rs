@@ -74,6 +74,29 @@ fn halt_takes_the_ramp_of_605dh_in_every_mode_and_stays_enabled() {
 }
 
 #[test]
+fn a_set_point_given_under_halt_waits_for_its_end_at_rest_and_on_the_way() {
+    for on_the_way in [false, true] {
+        let mut bench = Bench::new();
+        bench.enable_in(1);
+        if on_the_way {
+            bench.move_by(100_000);
+            bench.run_ms(500);
+        }
+        bench.set(0x6040, 0, 0x10F);
+        bench.set(0x607A, 0, 3000);
+        bench.set(0x6040, 0, 0x13F);
+        bench.run_ms(500);
+        let halted = bench.get(0x6064, 0);
+        bench.run_ms(500);
+        assert_eq!(bench.get(0x6064, 0), halted, "on the way: {on_the_way}");
+        assert!(on_the_way || halted == 0, "{halted}");
+        bench.set(0x6040, 0, 0x0F);
+        bench.run_ms(2000);
+        assert_eq!(bench.get(0x6064, 0), 3000, "on the way: {on_the_way}");
+    }
+}
+
+#[test]
 fn quick_stop_takes_the_ramp_of_605ah_in_every_mode_and_nothing_goes_on_by_itself_but_a_velocity() {
     for mode in [1, 3, 6] {
         for (option, kind) in [(5, 1), (6, 2), (7, 3)] {

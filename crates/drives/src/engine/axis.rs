@@ -280,7 +280,11 @@ impl Axis {
         match self.mode {
             ModeOfOperation::PROFILE_POSITION if !self.meets_limit(f64::from(way), parameters) => {
                 self.short_of_target = false;
-                self.position.take(set_point, &mut self.trajectory, &parameters.moves);
+                let sets_off = self.position.take(set_point);
+                // Under halt the move waits for `resume`.
+                if sets_off && self.stop.is_none() {
+                    self.position.resume(&mut self.trajectory, &parameters.moves);
+                }
             }
             ModeOfOperation::HOMING => {
                 self.velocity.restart();

@@ -29,18 +29,22 @@ impl ProfilePosition {
         Self { target: position, under_way: false, waiting: None, acknowledged: false }
     }
 
-    /// Bit 4 rose. Starts the set-point, or puts it into the queue; a set-point that finds the queue full is lost, and
-    /// the acknowledge bit shows it by not falling before.
-    pub fn take(&mut self, set_point: SetPoint, trajectory: &mut Trajectory, limits: &MoveLimits) {
-        if !self.under_way || set_point.immediately {
+    /// Bit 4 rose. Aims at the set-point, or puts it into the queue; a set-point that finds the queue full is lost, and
+    /// the acknowledge bit shows it by not falling before. Whether to set off now: without it the move begins with
+    /// [`resume`](Self::resume), as after a halt.
+    #[must_use]
+    pub fn take(&mut self, set_point: SetPoint) -> bool {
+        let at_once = !self.under_way || set_point.immediately;
+        if at_once {
             self.waiting = None;
-            self.start(set_point, trajectory, limits);
+            self.aim(set_point);
         } else if self.waiting.is_none() {
             self.waiting = Some(set_point);
         } else {
-            return;
+            return false;
         }
         self.acknowledged = true;
+        at_once
     }
 
     /// One period, after the trajectory has moved on: a set-point that waits follows one that has ended, and the
@@ -49,7 +53,8 @@ impl ProfilePosition {
         if self.under_way && trajectory.is_resting() {
             self.under_way = false;
             if let Some(next) = self.waiting.take() {
-                self.start(next, trajectory, limits);
+                self.aim(next);
+                self.resume(trajectory, limits);
             }
         }
         self.release(new_set_point);
@@ -62,7 +67,7 @@ impl ProfilePosition {
         }
     }
 
-    /// After a halt: goes on to the target from where the shaft is.
+    /// Sets off to the target from where the shaft is, or goes on after a halt.
     pub fn resume(&mut self, trajectory: &mut Trajectory, limits: &MoveLimits) {
         if self.under_way {
             *trajectory = Trajectory::move_to(trajectory.point(), self.target, limits);
@@ -99,10 +104,9 @@ impl ProfilePosition {
         self.under_way
     }
 
-    fn start(&mut self, set_point: SetPoint, trajectory: &mut Trajectory, limits: &MoveLimits) {
+    fn aim(&mut self, set_point: SetPoint) {
         self.target = if set_point.relative { self.target.wrapping_add(set_point.target) } else { set_point.target };
         self.under_way = true;
-        *trajectory = Trajectory::move_to(trajectory.point(), self.target, limits);
     }
 }
 
@@ -129,7 +133,9 @@ mod tests {
         }
 
         fn take(&mut self, target: i32, relative: bool, immediately: bool) {
-            self.mode.take(SetPoint { target, relative, immediately }, &mut self.trajectory, &LIMITS);
+            if self.mode.take(SetPoint { target, relative, immediately }) {
+                self.mode.resume(&mut self.trajectory, &LIMITS);
+            }
         }
 
         fn run(&mut self, periods: u32, bit_4: bool) -> i32 {
