@@ -273,7 +273,7 @@ pub(crate) trait Application<const N: usize> {
     fn written(&mut self, slot: Slot, raw: u32, via: Via, now: Instant) -> bool;
 
     /// Puts the status into the dictionary.
-    fn publish_status(&mut self);
+    fn show_status(&mut self);
 
     /// NMT reset node: starts the firmware over with the stored values.
     fn restart(&mut self, now: Instant);
@@ -299,7 +299,7 @@ pub(crate) trait Application<const N: usize> {
             }
         }
         if commanded {
-            self.publish_status();
+            self.show_status();
         }
     }
 }

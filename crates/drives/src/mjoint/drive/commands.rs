@@ -40,10 +40,8 @@ impl Application<ROW_COUNT> for MJoint {
         true
     }
 
-    /// The statusword; also right after a command, for a host that reads back.
-    fn publish_status(&mut self) {
-        let word = self.statusword();
-        self.device.values_mut().set(STATUSWORD, word.0);
+    fn show_status(&mut self) {
+        self.publish_status();
     }
 
     fn communication_task(&mut self, _now: Instant) {

@@ -1,10 +1,9 @@
 //! Actual values -> dictionary.
 
-use cia402::{Controlword, ModeOfOperation, Statusword};
+use cia402::{Controlword, ModeOfOperation};
 
 use super::{HEARTBEAT_ALARM, Homing, MJoint, OwnMotion};
 use crate::engine::axis::Demand;
-use crate::engine::device::Application;
 use crate::mjoint::alarms;
 use crate::mjoint::hardware::Sensors;
 use crate::mjoint::objects::*;
@@ -53,7 +52,8 @@ impl MJoint {
         self.device.set_heartbeat_state((code != 0).then_some(HEARTBEAT_ALARM));
     }
 
-    pub(super) fn statusword(&self) -> Statusword {
+    /// The statusword; also right after a command, for a host that reads back.
+    pub(super) fn publish_status(&mut self) {
         let in_homing = self.mode == ModeOfOperation::HOMING;
         let condition = Condition {
             controlword: self.controlword,
@@ -64,7 +64,7 @@ impl MJoint {
             homing_attained: in_homing && matches!(self.homing, Homing::Attained),
             homing_error: in_homing && matches!(self.homing, Homing::Failed),
         };
-        statusword(&condition)
+        self.device.values_mut().set(STATUSWORD, statusword(&condition).0);
     }
 
     /// Bit 10: nothing is left to be done. An alarm that stops the motor leaves it undone.

@@ -11,7 +11,6 @@ use canopen::od::{Entry, Slot};
 
 use super::MJoint;
 use crate::RegisterError;
-use crate::engine::device::Application;
 use crate::mjoint::objects::TABLE;
 use crate::mjoint::objects::modbus::{Register, find};
 

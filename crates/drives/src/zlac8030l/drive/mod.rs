@@ -1,27 +1,27 @@
 //! The drive: the engine's parts joined over the dictionary.
 //!
-//! Three rhythms: frames as they come (`handle_frame`), the communication task every 0.5 ms (`handle_timeout`), and the
-//! control period of 50 us ([`Firmware::tick`]), of which every tenth is a supervision period.
+//! Three rhythms: frames as they come (`handle_frame`, in [`commands`]), the communication task every 0.5 ms
+//! (`handle_timeout`), and the control period of 50 us ([`Firmware::tick`]), of which every tenth is a supervision period.
+
+mod commands;
 
 use can::{Bitrate, Instant};
-use canopen::node::{Node, NodeProfile, Via};
-use canopen::od::Slot;
-use cia402::{Controlword, ModeOfOperation, PowerState};
+use canopen::node::{Node, NodeProfile};
+use cia402::PowerState;
 use motion::filter::{LowPass, LowPassGains};
 
 use super::faults::{FAULT_COUNT, FAULTS, row};
 use super::hardware::{Actuation, Hardware, PowerStage, Sensors};
-use super::objects::effects::{Effect, effect};
 use super::objects::*;
 use super::parameters::Parameters;
 use super::protection::{Protection, Situation, is_over_current};
 use super::readings::*;
 use super::statusword::statusword;
 use super::terminals::{self, TERMINALS};
-use super::{Values, restart, storage};
+use super::{Values, storage};
 use crate::engine::axis::{Axis, Demand, Feedback, Targets};
 use crate::engine::bleeder::Bleeder;
-use crate::engine::device::{self, Application, Device};
+use crate::engine::device::{Application, Device};
 use crate::engine::faults::{FaultMonitor, FaultSet};
 use crate::engine::host_watchdog::HostWatchdog;
 use crate::engine::inputs::Inputs;
@@ -110,97 +110,13 @@ impl Zlac8030l {
         self.device.node()
     }
 
-    fn command(&mut self, controlword: Controlword, now: Instant) {
-        self.refresh_parameters();
-        let target = self.values().get(TARGET_POSITION);
-        let relative = controlword.has(Controlword::RELATIVE);
-        // An SDO write was refused for this already; an RPDO can only be ignored.
-        let in_range = relative || target.unsigned_abs() <= ABSOLUTE_TARGET_LIMIT.unsigned_abs();
-        let taken = if in_range { controlword } else { Controlword(controlword.0 & !Controlword::NEW_SET_POINT) };
-        if self.axis.command(taken, target, &self.parameters.axis) {
-            self.reset_faults(now);
-        }
-    }
-
-    /// Save or restore. An EEPROM fault ends with the factory settings.
-    fn registers(&mut self, command: u32, now: Instant) {
-        if zl::register_command(&mut self.device, REGISTER_PARAMETER_SETTING, command) {
-            self.parameters_changed = true;
-            if self.faults.forget(row::EEPROM) {
-                self.reset_faults(now);
-            }
-        }
-    }
-
-    /// 2005h and 2006h: 6064h becomes 0, whatever moves goes on moving. They read 0 again when it is done.
-    fn clear_position(&mut self, slot: Slot, raw: u32) {
-        if raw == 1 {
-            let position = self.position();
-            self.position_offset = self.position_offset.wrapping_sub(position);
-            self.axis.shift_position(position);
-            // What is demanded at this moment stands at the same place of the shaft: no lag comes of it.
-            if let Demand::Position(point) = &mut self.demand {
-                point.position = point.position.wrapping_sub(position);
-            }
-            self.device.values_mut().set(POSITION_ACTUAL_VALUE, 0);
-        }
-        self.device.values_mut().set_raw(slot, 0);
-    }
-
-    fn position(&self) -> i32 {
-        self.position_offset.wrapping_add(self.servo.position(&self.parameters.model))
-    }
-
-    fn watch_faults(&mut self, sensors: &Sensors, now: Instant) {
-        self.device.set_eeprom_ok(sensors.eeprom_ok);
-        let situation = Situation {
-            servo: &self.servo,
-            demand: &self.demand,
-            position: self.position(),
-            velocity_rpm: self.servo.velocity_rpm(),
-            eeprom_sound: self.device.is_eeprom_sound(),
-            latched: self.faults.latched(),
-        };
-        let causes = self.protection.causes(&self.parameters, sensors, &situation);
-        let new = self.faults.observe(causes);
-        if causes.has(row::ENCODER) {
-            // Told once: whether encoder and Hall sensors still disagree shows at the next edges.
-            self.servo.realign(&self.parameters.model, sensors.hall, sensors.encoder_count);
-        }
-        self.fall(new, now);
-    }
-
-    /// New faults: off, and tell.
-    fn fall(&mut self, new: FaultSet, now: Instant) {
-        if new.is_empty() {
-            return;
-        }
-        self.axis.fault();
-        self.demand = Demand::Off;
-        self.device.values_mut().set(ERROR_CODE, self.faults.code_bits());
-        self.device.tell_faults(new, &self.faults, now);
-        self.publish_status();
-    }
-
-    /// Forgets the faults whose cause is gone; with the last one the drive leaves Fault.
-    fn reset_faults(&mut self, now: Instant) {
-        self.protection.reset();
-        let all_gone = self.faults.reset();
-        self.device.values_mut().set(ERROR_CODE, self.faults.code_bits());
-        self.device.tell_reset(&self.faults, now);
-        if all_gone {
-            self.axis.reset_fault();
-        }
-        self.publish_status();
-    }
-
     /// The first look at the sensors after a restart.
     fn wake(&mut self, sensors: &Sensors) {
         self.awake = true;
         self.servo = Servo::new(&self.parameters.model, sensors.hall, sensors.encoder_count);
     }
 
-    /// Every tenth control period.
+    /// Every tenth control period: faults, power state, demand, and what is told of it. The voltages follow every period.
     fn supervise(&mut self, sensors: &Sensors, now: Instant) {
         self.refresh_parameters();
         let feedback = self.measure(sensors);
@@ -245,6 +161,49 @@ impl Zlac8030l {
             current_a: self.shown_current_a.value,
             standing: velocity_rpm.abs() < STANDSTILL_RPM,
         }
+    }
+
+    fn watch_faults(&mut self, sensors: &Sensors, now: Instant) {
+        self.device.set_eeprom_ok(sensors.eeprom_ok);
+        let situation = Situation {
+            servo: &self.servo,
+            demand: &self.demand,
+            position: self.position(),
+            velocity_rpm: self.servo.velocity_rpm(),
+            eeprom_sound: self.device.is_eeprom_sound(),
+            latched: self.faults.latched(),
+        };
+        let causes = self.protection.causes(&self.parameters, sensors, &situation);
+        let new = self.faults.observe(causes);
+        if causes.has(row::ENCODER) {
+            // Told once: whether encoder and Hall sensors still disagree shows at the next edges.
+            self.servo.realign(&self.parameters.model, sensors.hall, sensors.encoder_count);
+        }
+        self.fall(new, now);
+    }
+
+    /// New faults: off, and tell.
+    fn fall(&mut self, new: FaultSet, now: Instant) {
+        if new.is_empty() {
+            return;
+        }
+        self.axis.fault();
+        self.demand = Demand::Off;
+        self.device.values_mut().set(ERROR_CODE, self.faults.code_bits());
+        self.device.tell_faults(new, &self.faults, now);
+        self.publish_status();
+    }
+
+    /// Forgets the faults whose cause is gone; with the last one the drive leaves Fault.
+    fn reset_faults(&mut self, now: Instant) {
+        self.protection.reset();
+        let all_gone = self.faults.reset();
+        self.device.values_mut().set(ERROR_CODE, self.faults.code_bits());
+        self.device.tell_reset(&self.faults, now);
+        if all_gone {
+            self.axis.reset_fault();
+        }
+        self.publish_status();
     }
 
     /// Debounced inputs; both ends of an external stop take the targets away, so that nothing starts by itself.
@@ -303,53 +262,6 @@ impl Zlac8030l {
         values.set(OUTPUT_STATUS, terminals::output_status(self.outputs, brake));
         self.publish_status();
     }
-}
-
-impl Default for Zlac8030l {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl Application<ROW_COUNT> for Zlac8030l {
-    fn device(&mut self) -> &mut Device<ROW_COUNT> {
-        &mut self.device
-    }
-
-    fn restart(&mut self, now: Instant) {
-        let stored = self.device.stored_values();
-        self.device.restart(restart::node_id(self.dip_address, &stored), restart::bitrate(&stored), now);
-        *self = Self { dip_address: self.dip_address, ..Self::over(self.device.clone()) };
-        self.axis.self_test_done();
-        self.publish_status();
-        self.device.boot(now);
-    }
-
-    #[inline]
-    fn written(&mut self, slot: Slot, raw: u32, _via: Via, now: Instant) -> bool {
-        zl::note_write(&mut self.device, SAVE_ON_WRITE, slot);
-        let effect = effect(slot);
-        match effect {
-            Effect::Command => self.command(Controlword(raw as u16), now),
-            Effect::SelectMode => self.axis.request_mode(ModeOfOperation(raw as u8 as i8)),
-            Effect::Registers => self.registers(raw, now),
-            Effect::ClearPosition => self.clear_position(slot, raw),
-            Effect::Target => {}
-            Effect::Parameter => self.parameters_changed = true,
-        }
-        matches!(effect, Effect::Command | Effect::SelectMode)
-    }
-
-    fn communication_task(&mut self, now: Instant) {
-        let timeout_ns = u64::from(self.values().get(COMMUNICATION_OFFLINE_TIME)) * 1_000_000;
-        let armed = self.axis.state() == PowerState::OperationEnabled;
-        if self.watchdog.poll(armed, self.device.last_addressed(), timeout_ns, now) {
-            self.axis.lose_host();
-            self.drop_targets();
-        }
-        self.device.commit();
-        self.device.notice_changes(now);
-    }
 
     /// Statusword, mode display and what follows from them; also right after a command, for a host that reads back.
     fn publish_status(&mut self) {
@@ -367,9 +279,17 @@ impl Application<ROW_COUNT> for Zlac8030l {
         values.set(MODES_OF_OPERATION_DISPLAY, mode.0);
         values.set(MOTOR_STATUS, u16::from(status.running));
     }
+
+    fn position(&self) -> i32 {
+        self.position_offset.wrapping_add(self.servo.position(&self.parameters.model))
+    }
 }
 
-device::station!(Zlac8030l);
+impl Default for Zlac8030l {
+    fn default() -> Self {
+        Self::new()
+    }
+}
 
 impl Firmware for Zlac8030l {
     type Sensors = Sensors;

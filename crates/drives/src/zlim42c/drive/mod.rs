@@ -1,25 +1,25 @@
 //! The drive: the engine's parts joined over the dictionary.
 //!
-//! Three rhythms: frames as they come (`handle_frame`), the communication task every 0.5 ms (`handle_timeout`), and the
-//! control period of 50 us ([`Firmware::tick`]), of which every tenth is a supervision period.
+//! Three rhythms: frames as they come (`handle_frame`, in [`commands`]), the communication task every 0.5 ms
+//! (`handle_timeout`), and the control period of 50 us ([`Firmware::tick`]), of which every tenth is a supervision period.
+
+mod commands;
 
 use can::{Bitrate, Instant};
-use canopen::node::{Node, NodeProfile, Via};
-use canopen::od::Slot;
-use cia402::{Controlword, ModeOfOperation, PowerState};
+use canopen::node::{Node, NodeProfile};
+use cia402::{Controlword, PowerState};
 
 use super::faults::{FAULT_COUNT, FAULTS, FLASHES, row};
 use super::hardware::{Actuation, Hardware, PowerStage, Sensors};
-use super::objects::effects::{Effect, effect};
 use super::objects::*;
 use super::parameters::Parameters;
 use super::protection::{PhaseWatch, Situation, causes, is_over_current};
 use super::readings::*;
 use super::statusword::{self, statusword};
 use super::terminals::{self, TERMINALS};
-use super::{Values, led, restart, storage};
+use super::{Values, led, storage};
 use crate::engine::axis::{Axis, Demand, Feedback, Targets};
-use crate::engine::device::{self, Application, Device};
+use crate::engine::device::{Application, Device};
 use crate::engine::faults::{FaultMonitor, FaultSet};
 use crate::engine::inputs::Inputs;
 use crate::engine::stepper::Stepper;
@@ -112,55 +112,38 @@ impl Zlim42c {
         self.device.node()
     }
 
-    fn command(&mut self, controlword: Controlword, now: Instant) {
+    /// Every tenth control period: faults, power state, demand, and what is told of it. The voltages follow every period.
+    fn supervise(&mut self, sensors: &Sensors, now: Instant) {
         self.refresh_parameters();
-        self.controlword = controlword;
-        let target = self.values().get(TARGET_POSITION);
-        if self.axis.command(controlword, target, &self.parameters.axis) {
-            self.reset_faults(now);
+        self.watch_faults(sensors, now);
+        self.read_inputs(sensors);
+        self.read_targets();
+        let feedback = self.feedback();
+        let demand = self.axis.update(feedback, &self.targets, &self.parameters.axis, SUPERVISION_PERIOD_S);
+        self.energise(demand);
+        if let Some(home) = self.axis.take_home() {
+            let offset = self.values().get(HOME_OFFSET);
+            self.shift_position(home.wrapping_add(offset));
         }
+        self.publish(sensors);
     }
 
-    /// 2011h: reads 0 again when it is done.
-    fn fault_reset(&mut self, raw: u32, now: Instant) {
-        if raw == 1 && self.axis.state() == PowerState::Fault {
-            self.reset_faults(now);
+    /// Takes over changed parameters. Another number of pulses waits until the motor is free: it would turn the meaning of
+    /// every position over under the trajectory.
+    fn refresh_parameters(&mut self) {
+        if !self.parameters_changed {
+            return;
         }
-        self.device.values_mut().set(FAULT_RESET, 0);
-    }
-
-    /// 2012h: reads 0 again when it is done.
-    fn clear_position(&mut self, raw: u32) {
-        if raw == 1 {
-            self.shift_position(self.stepper.position());
+        let (values, before) = (self.device.values(), self.parameters);
+        let mut after = Parameters::from(values);
+        let waits = after.pulses_per_turn != before.pulses_per_turn && self.demand != Demand::Off;
+        if waits {
+            after = Parameters::with_pulses(values, before.pulses_per_turn);
+        } else {
+            self.stepper.rescale(before.model.pulses_per_electrical_turn, after.model.pulses_per_electrical_turn);
         }
-        self.device.values_mut().set(CLEAR_CURRENT_POSITION, 0);
-    }
-
-    /// Save or restore. An EEPROM fault ends with the factory settings.
-    fn registers(&mut self, command: u32, now: Instant) {
-        if zl::register_command(&mut self.device, REGISTER_PARAMETER_SETTING, command) {
-            self.parameters_changed = true;
-            if self.faults.forget(row::EEPROM) {
-                self.reset_faults(now);
-            }
-        }
-    }
-
-    /// The zero of the position: what was `by` is 0 from now on, and whatever moves goes on moving.
-    fn shift_position(&mut self, by: i32) {
-        self.axis.shift_position(by);
-        self.stepper.shift(by);
-        if let Demand::Position(point) | Demand::Velocity(point) = &mut self.demand {
-            point.position = point.position.wrapping_sub(by);
-        }
-        let position = self.stepper.position();
-        self.device.values_mut().set(POSITION_ACTUAL_VALUE, position);
-    }
-
-    /// Commanded velocity in r/min.
-    fn velocity_rpm(&self) -> f64 {
-        self.stepper.velocity() / self.parameters.pulses_s_per_rpm
+        self.parameters_changed = waits;
+        self.parameters = after;
     }
 
     fn watch_faults(&mut self, sensors: &Sensors, now: Instant) {
@@ -204,23 +187,24 @@ impl Zlim42c {
         self.publish_status();
     }
 
-    /// Every tenth control period.
-    fn supervise(&mut self, sensors: &Sensors, now: Instant) {
-        self.refresh_parameters();
-        self.watch_faults(sensors, now);
-        self.read_inputs(sensors);
+    /// Debounced inputs; both ends of an external stop take the target away, so that nothing starts by itself.
+    fn read_inputs(&mut self, sensors: &Sensors) {
+        let periods = terminals::filter_periods(self.values());
+        let levels = self.inputs.update_each(sensors.inputs, periods);
+        let signals = TERMINALS.signals(self.values(), levels);
+        self.axis.set_switches(signals.switches);
+        if signals.emergency_stop != self.external_stop {
+            self.external_stop = signals.emergency_stop;
+            self.axis.set_external_stop(self.external_stop);
+            self.device.values_mut().set(TARGET_VELOCITY, 0);
+        }
+    }
+
+    fn read_targets(&mut self) {
         let max_speed = self.parameters.axis.velocity.max_speed;
         let target_rpm = f64::from(self.values().get(TARGET_VELOCITY));
         let velocity = (target_rpm * self.parameters.pulses_s_per_rpm).clamp(-max_speed, max_speed);
         self.targets = Targets { velocity, current_a: 0.0 };
-        let feedback = self.feedback();
-        let demand = self.axis.update(feedback, &self.targets, &self.parameters.axis, SUPERVISION_PERIOD_S);
-        self.energise(demand);
-        if let Some(home) = self.axis.take_home() {
-            let offset = self.values().get(HOME_OFFSET);
-            self.shift_position(home.wrapping_add(offset));
-        }
-        self.publish(sensors);
     }
 
     /// The motor follows what it is told, as far as the drive knows.
@@ -237,37 +221,6 @@ impl Zlim42c {
     fn energise(&mut self, demand: Demand) {
         self.demand = demand;
         self.stepper.command(&self.parameters.model, &demand, &self.parameters.currents);
-    }
-
-    /// Takes over changed parameters. Another number of pulses waits until the motor is free: it would turn the meaning of
-    /// every position over under the trajectory.
-    fn refresh_parameters(&mut self) {
-        if !self.parameters_changed {
-            return;
-        }
-        let (values, before) = (self.device.values(), self.parameters);
-        let mut after = Parameters::from(values);
-        let waits = after.pulses_per_turn != before.pulses_per_turn && self.demand != Demand::Off;
-        if waits {
-            after = Parameters::with_pulses(values, before.pulses_per_turn);
-        } else {
-            self.stepper.rescale(before.model.pulses_per_electrical_turn, after.model.pulses_per_electrical_turn);
-        }
-        self.parameters_changed = waits;
-        self.parameters = after;
-    }
-
-    /// Debounced inputs; both ends of an external stop take the target away, so that nothing starts by itself.
-    fn read_inputs(&mut self, sensors: &Sensors) {
-        let periods = terminals::filter_periods(self.values());
-        let levels = self.inputs.update_each(sensors.inputs, periods);
-        let signals = TERMINALS.signals(self.values(), levels);
-        self.axis.set_switches(signals.switches);
-        if signals.emergency_stop != self.external_stop {
-            self.external_stop = signals.emergency_stop;
-            self.axis.set_external_stop(self.external_stop);
-            self.device.values_mut().set(TARGET_VELOCITY, 0);
-        }
     }
 
     fn power_stage(&mut self, sensors: &Sensors) -> PowerStage {
@@ -291,62 +244,6 @@ impl Zlim42c {
         self.publish_status();
     }
 
-    fn publish_error_code(&mut self) {
-        let code = self.error_code();
-        self.device.values_mut().set(ERROR_CODE, code);
-    }
-
-    fn error_code(&self) -> u16 {
-        self.shown_fault.map_or(0, |row| FAULTS[row].code)
-    }
-}
-
-impl Default for Zlim42c {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl Application<ROW_COUNT> for Zlim42c {
-    fn device(&mut self) -> &mut Device<ROW_COUNT> {
-        &mut self.device
-    }
-
-    fn restart(&mut self, now: Instant) {
-        let stored = self.device.stored_values();
-        let node_id = restart::node_id(self.dip_address, &stored);
-        self.device.restart(node_id, restart::bitrate(&stored), now);
-        self.device.values_mut().set(NODE_ID, u16::from(node_id.raw()));
-        let (before, mut stepper) = (self.parameters.model, self.stepper.restarted());
-        *self = Self { dip_address: self.dip_address, ..Self::over(self.device.clone()) };
-        stepper.rescale(before.pulses_per_electrical_turn, self.parameters.model.pulses_per_electrical_turn);
-        self.stepper = stepper;
-        self.axis.self_test_done();
-        self.publish_status();
-        self.device.boot(now);
-    }
-
-    #[inline]
-    fn written(&mut self, slot: Slot, raw: u32, _via: Via, now: Instant) -> bool {
-        zl::note_write(&mut self.device, SAVE_ON_WRITE, slot);
-        let effect = effect(slot);
-        match effect {
-            Effect::Command => self.command(Controlword(raw as u16), now),
-            Effect::SelectMode => self.axis.request_mode(ModeOfOperation(raw as u8 as i8)),
-            Effect::Registers => self.registers(raw, now),
-            Effect::FaultReset => self.fault_reset(raw, now),
-            Effect::ClearPosition => self.clear_position(raw),
-            Effect::Target => {}
-            Effect::Parameter => self.parameters_changed = true,
-        }
-        matches!(effect, Effect::Command | Effect::SelectMode)
-    }
-
-    fn communication_task(&mut self, now: Instant) {
-        self.device.commit();
-        self.device.notice_changes(now);
-    }
-
     /// Statusword, mode display and what follows from them; also right after a command, for a host that reads back.
     fn publish_status(&mut self) {
         let status = self.axis.status(&self.targets, &self.parameters.axis);
@@ -368,9 +265,38 @@ impl Application<ROW_COUNT> for Zlim42c {
         values.set(MOTOR_STATUS, u16::from(status.running));
         values.set(OUTPUT_STATUS, u16::from(y0) | u16::from(y1) << 1);
     }
+
+    fn publish_error_code(&mut self) {
+        let code = self.error_code();
+        self.device.values_mut().set(ERROR_CODE, code);
+    }
+
+    fn error_code(&self) -> u16 {
+        self.shown_fault.map_or(0, |row| FAULTS[row].code)
+    }
+
+    /// The zero of the position: what was `by` is 0 from now on, and whatever moves goes on moving.
+    fn shift_position(&mut self, by: i32) {
+        self.axis.shift_position(by);
+        self.stepper.shift(by);
+        if let Demand::Position(point) | Demand::Velocity(point) = &mut self.demand {
+            point.position = point.position.wrapping_sub(by);
+        }
+        let position = self.stepper.position();
+        self.device.values_mut().set(POSITION_ACTUAL_VALUE, position);
+    }
+
+    /// Commanded velocity in r/min.
+    fn velocity_rpm(&self) -> f64 {
+        self.stepper.velocity() / self.parameters.pulses_s_per_rpm
+    }
 }
 
-device::station!(Zlim42c);
+impl Default for Zlim42c {
+    fn default() -> Self {
+        Self::new()
+    }
+}
 
 impl Firmware for Zlim42c {
     type Sensors = Sensors;

@@ -1,0 +1,101 @@
+//! What a host sets in motion: its writes, and NMT resets.
+
+use can::Instant;
+use canopen::node::Via;
+use canopen::od::Slot;
+use cia402::{Controlword, ModeOfOperation, PowerState};
+
+use super::Zlac8030l;
+use crate::engine::axis::Demand;
+use crate::engine::device::{self, Application, Device};
+use crate::zl;
+use crate::zlac8030l::faults::row;
+use crate::zlac8030l::objects::effects::{Effect, effect};
+use crate::zlac8030l::objects::*;
+use crate::zlac8030l::restart;
+
+impl Application<ROW_COUNT> for Zlac8030l {
+    fn device(&mut self) -> &mut Device<ROW_COUNT> {
+        &mut self.device
+    }
+
+    fn restart(&mut self, now: Instant) {
+        let stored = self.device.stored_values();
+        self.device.restart(restart::node_id(self.dip_address, &stored), restart::bitrate(&stored), now);
+        *self = Self { dip_address: self.dip_address, ..Self::over(self.device.clone()) };
+        self.axis.self_test_done();
+        self.publish_status();
+        self.device.boot(now);
+    }
+
+    #[inline]
+    fn written(&mut self, slot: Slot, raw: u32, _via: Via, now: Instant) -> bool {
+        zl::note_write(&mut self.device, SAVE_ON_WRITE, slot);
+        let effect = effect(slot);
+        match effect {
+            Effect::Command => self.command(Controlword(raw as u16), now),
+            Effect::SelectMode => self.axis.request_mode(ModeOfOperation(raw as u8 as i8)),
+            Effect::Registers => self.registers(raw, now),
+            Effect::ClearPosition => self.clear_position(slot, raw),
+            Effect::Target => {}
+            Effect::Parameter => self.parameters_changed = true,
+        }
+        matches!(effect, Effect::Command | Effect::SelectMode)
+    }
+
+    fn communication_task(&mut self, now: Instant) {
+        let timeout_ns = u64::from(self.values().get(COMMUNICATION_OFFLINE_TIME)) * 1_000_000;
+        let armed = self.axis.state() == PowerState::OperationEnabled;
+        if self.watchdog.poll(armed, self.device.last_addressed(), timeout_ns, now) {
+            self.axis.lose_host();
+            self.drop_targets();
+        }
+        self.device.commit();
+        self.device.notice_changes(now);
+    }
+
+    fn show_status(&mut self) {
+        self.publish_status();
+    }
+}
+
+device::station!(Zlac8030l);
+
+impl Zlac8030l {
+    fn command(&mut self, controlword: Controlword, now: Instant) {
+        self.refresh_parameters();
+        let target = self.values().get(TARGET_POSITION);
+        let relative = controlword.has(Controlword::RELATIVE);
+        // An SDO write was refused for this already; an RPDO can only be ignored.
+        let in_range = relative || target.unsigned_abs() <= ABSOLUTE_TARGET_LIMIT.unsigned_abs();
+        let taken = if in_range { controlword } else { Controlword(controlword.0 & !Controlword::NEW_SET_POINT) };
+        if self.axis.command(taken, target, &self.parameters.axis) {
+            self.reset_faults(now);
+        }
+    }
+
+    /// Save or restore. An EEPROM fault ends with the factory settings.
+    fn registers(&mut self, command: u32, now: Instant) {
+        if zl::register_command(&mut self.device, REGISTER_PARAMETER_SETTING, command) {
+            self.parameters_changed = true;
+            if self.faults.forget(row::EEPROM) {
+                self.reset_faults(now);
+            }
+        }
+    }
+
+    /// 2005h and 2006h: 6064h becomes 0, whatever moves goes on moving. They read 0 again when it is done.
+    fn clear_position(&mut self, slot: Slot, raw: u32) {
+        if raw == 1 {
+            let position = self.position();
+            self.position_offset = self.position_offset.wrapping_sub(position);
+            self.axis.shift_position(position);
+            // What is demanded at this moment stands at the same place of the shaft: no lag comes of it.
+            if let Demand::Position(point) = &mut self.demand {
+                point.position = point.position.wrapping_sub(position);
+            }
+            self.device.values_mut().set(POSITION_ACTUAL_VALUE, 0);
+        }
+        self.device.values_mut().set_raw(slot, 0);
+    }
+}
