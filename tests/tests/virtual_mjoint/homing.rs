@@ -168,3 +168,29 @@ fn homing_that_cannot_begin_fails_at_once() {
     bench.set(0x6060, 0, 6);
     assert_eq!((bench.get(0x260E, 0), bench.statusword()), (0x15, 0x200C));
 }
+
+#[test]
+fn the_origin_lies_within_three_control_periods_of_the_edge_at_every_speed_and_from_any_distance() {
+    for method in 17..=22 {
+        let (pin, positive) = switch_of(method);
+        // (6083 mod 10 + 1) * 100 r/min, and the way to the edge: less than it takes to get up to speed, or to slow down.
+        for (digit, distance) in [(0, 40), (3, 700), (4, 20_000), (9, 300), (9, 60_000)] {
+            let mut bench = Bench::new();
+            bench.set(0x6083, 0, 20_000 + digit);
+            bench.set(0x6098, 0, method);
+            let edge = if positive { distance } else { -distance };
+            let range = if positive { format!("{edge} max") } else { format!("min {edge}") };
+            bench.tell(&format!("1 switch {pin} {range}"));
+            bench.run_ms(5);
+            bench.set(0x6060, 0, 6);
+            bench.until(6000, |bench| bench.statusword() == 0x1414);
+            bench.run_ms(300);
+            let shaft = (bench.report().shaft_angle_rad / core::f64::consts::TAU * TURN as f64).round() as i64;
+            let expected = if positive { edge } else { edge + 1 };
+            let counts_a_period = (digit + 1) as f64 * 100.0 / 60.0 * TURN as f64 * 50e-6;
+            let off = (shaft - bench.position() - expected).abs() as f64;
+            // The look at the switch, the command, and the encoder that takes it.
+            assert!(off <= 3.0 * counts_a_period + 1.0, "{method}, digit {digit}, {distance} away: {off} counts");
+        }
+    }
+}

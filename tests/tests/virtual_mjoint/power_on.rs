@@ -181,3 +181,21 @@ fn a_brake_without_a_readable_record_does_not_guess_the_turns() {
     bench.power_cycle();
     assert_eq!(bench.get(0x260E, 0), 0x10);
 }
+
+#[test]
+fn a_battery_that_runs_empty_without_power_loses_the_turns_and_is_charged_again() {
+    // 0.07 mA for 0.1 s are 1.9e-6 mA·h.
+    for (charge_mah, position, alarm) in [(1e-5, 7 * TURN + 5000, 0), (1e-6, 5000, 0x10)] {
+        let mut bench = Bench::open();
+        turn_to(&mut bench, 7 * TURN + 5000);
+        bench.machine().assembly_mut().motor_mut().encoder.battery.charge_mah = charge_mah;
+        bench.power_cycle();
+        assert!((bench.position() - position).abs() <= 30, "{charge_mah} mA·h: {}", bench.position());
+        assert_eq!(bench.get(0x260E, 0), alarm, "{charge_mah} mA·h");
+        let charged = |bench: &mut Bench| bench.machine().assembly().motor().encoder.battery.charge_mah;
+        let before = charged(&mut bench);
+        bench.run_ms(900);
+        // 4 mA.
+        assert!((charged(&mut bench) - before - 1e-3).abs() < 1e-5);
+    }
+}
