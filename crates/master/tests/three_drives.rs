@@ -74,6 +74,40 @@ fn sixty_revolutions_a_minute_are_the_same_at_every_shaft() {
 }
 
 #[test]
+fn the_same_606ch_is_a_tenth_of_a_revolution_a_minute_on_the_zlac_and_a_whole_one_on_the_zlim42_c() {
+    let (mut world, _, [_, stepper, servo]) = bench();
+    // "ZLAC8030L quick start guide V1.00", chapter 9; "ZLIM42-C user manual V1.03", 5.4.
+    for (drive, counts_a_rpm) in [(&servo, 10.0), (&stepper, 1.0)] {
+        block_on(&mut world, drive.velocity(Rpm(60.0), slowly())).unwrap().unwrap();
+        block_on(&mut world, drive.supervise(Duration::from_secs(1))).unwrap().unwrap();
+        let raw = block_on(&mut world, drive.node().read::<i32>(mux(0x606C, 0))).unwrap().unwrap();
+        assert!((f64::from(raw) / counts_a_rpm - 60.0).abs() < 3.0, "{drive:?}: {raw}");
+        let Rpm(told) = block_on(&mut world, drive.state()).unwrap().unwrap().velocity.unwrap();
+        assert!((told - 60.0).abs() < 3.0, "{drive:?}: {told}");
+        block_on(&mut world, drive.stop()).unwrap().unwrap();
+    }
+}
+
+#[test]
+fn torque_is_mode_4_and_not_6_velocity_is_mode_3_and_not_2_on_both_zl_drives() {
+    let (mut world, _, [_, stepper, servo]) = bench();
+    let write = |world: &mut World, drive: &Drive, mode: i8| {
+        block_on(world, drive.node().write(mux(0x6060, 0), mode)).unwrap().is_ok()
+    };
+    // 1 position, 3 velocity, 4 torque; 6 is homing, which only the stepper has. 2 is the velocity mode of CiA 402.
+    let taken = |world: &mut World, drive: &Drive| [1, 2, 3, 4, 6].map(|mode| write(world, drive, mode));
+    assert_eq!(taken(&mut world, &servo), [true, false, true, true, false]);
+    assert_eq!(taken(&mut world, &stepper), [true, false, true, false, true]);
+    block_on(&mut world, servo.torque(Amperes(0.2))).unwrap().unwrap();
+    assert_eq!(block_on(&mut world, servo.node().read::<i8>(mux(0x6061, 0))).unwrap().unwrap(), 4);
+    for drive in [&servo, &stepper] {
+        block_on(&mut world, drive.stop()).unwrap().unwrap();
+        block_on(&mut world, drive.velocity(Rpm(30.0), slowly())).unwrap().unwrap();
+        assert_eq!(block_on(&mut world, drive.node().read::<i8>(mux(0x6061, 0))).unwrap().unwrap(), 3);
+    }
+}
+
+#[test]
 fn ninety_degrees_are_a_quarter_turn_of_every_shaft() {
     let (mut world, _, drives) = bench();
     // Counts in a turn: 32768 of the encoder, 4000 pulses (2006h = 10), four edges of 1024 lines.
