@@ -1,7 +1,7 @@
 //! What every drive is on the bus: its CANopen node, its parameter store, and the task that looks after both.
 //!
 //! A drive owns a [`Device`] and hands frames and time to it. What a peer wrote comes back as [`NodeEvent`]s, which
-//! [`Application`] turns into the drive's own reactions. Nothing here knows what an object means but for the error register
+//! `Application` turns into the drive's own reactions. Nothing here knows what an object means but for the error register
 //! (1001h).
 
 use can::{Bitrate, Frame, Instant, Station};
