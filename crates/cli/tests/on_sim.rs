@@ -270,6 +270,7 @@ fn the_demo_of_one_drive_is_only_of_that_drive() {
     let demo = done(&["--json", "demo", "--drive", "zlim42c", "--svg", svg.to_str().unwrap()]).json();
     assert_eq!((&demo["ok"], demo["drives"].as_array().unwrap().len()), (&true.into(), 1));
     assert!(demo["rows"].as_array().unwrap().iter().all(|row| row["drive"] == "ZLIM42-C"));
+    assert_eq!(ferrodrive(&["demo", "--drive", "toaster"]).status, Some(2));
     std::fs::remove_dir_all(directory).unwrap();
 }
 
@@ -289,6 +290,7 @@ fn the_demo_passes_and_draws() {
         ("ZLAC8030L", "3.4 4.1 4.2 4.3 4.4 4.5 4.6 5.1 5.2 5.3 5.4 5.5 6.1 6.2 8"),
         ("M4230E17B50", "5.04 5.05 5.06.1 5.06.2 5.07.1 5.08 5.08.4 5.09 5.10.1 5.10.2 5.11.1 5.11.2"),
         ("ZLIM42-C", "4.1 5.2 5.3.1 5.3.2 5.3.3 5.3.4 5.3.5 5.3.6 5.4 603Fh"),
+        ("Three joints, interpolation at 2 ms", "5.10.3"),
     ];
     for (drive, wanted) in manuals {
         for section in wanted.split(' ') {

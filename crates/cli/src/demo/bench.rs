@@ -45,6 +45,7 @@ pub(super) struct Bench {
     events: Vec<Event>,
     set_points: SetPoints,
     starts: Vec<Start>,
+    cuts: Vec<(Instant, Instant)>,
 }
 
 /// How axes start after SYNC.
@@ -86,14 +87,15 @@ pub(super) struct Finished {
     pub(super) events: Vec<Event>,
     pub(super) set_points: SetPoints,
     pub(super) starts: Vec<Start>,
+    /// Spans in which there is nothing to see.
+    pub(super) cuts: Vec<(Instant, Instant)>,
     pub(super) end: Instant,
 }
 
 /// What the bench records of each drive.
-pub(super) const SIGNALS: [Signal; 7] = [
+pub(super) const SIGNALS: [Signal; 6] = [
     Signal::Position,
     Signal::PositionDemand,
-    Signal::Velocity,
     Signal::VelocityDemand,
     Signal::Current,
     Signal::CurrentDemand,
@@ -129,6 +131,7 @@ impl Bench {
             events: Vec::new(),
             set_points: SetPoints::default(),
             starts: Vec::new(),
+            cuts: Vec::new(),
         })
     }
 
@@ -302,6 +305,14 @@ impl Bench {
         self.expect(what, Expect::Bits(bits.into()), "", word);
     }
 
+    /// Does something that is not worth room in the picture.
+    pub(super) fn unseen<T>(&mut self, act: impl FnOnce(&mut Self) -> T) -> T {
+        let from = self.world.now();
+        let done = act(self);
+        self.cuts.push((from, self.world.now()));
+        done
+    }
+
     /// Lets time pass, talking all the while to a drive that stops because its host is silent.
     pub(super) fn run(&mut self, duration: Duration) {
         if self.model().host_watchdog.is_none() {
@@ -387,6 +398,27 @@ impl Bench {
         }
     }
 
+    /// Reads one Modbus register as a number, or two as one of 32 bits with the low word first; not a number if refused.
+    pub(super) fn read_registers(&mut self, address: u16, count: usize) -> f64 {
+        let (node, mut words) = (self.node(), [0; 2]);
+        let count = count.min(words.len());
+        let read = self.world.with_drive(node, |drive, now| drive.read_registers(address, &mut words[..count], now));
+        match read {
+            Ok(Ok(())) if count == 1 => f64::from(words[0] as i16),
+            Ok(Ok(())) => f64::from((u32::from(words[1]) << 16 | u32::from(words[0])) as i32),
+            _ => f64::NAN,
+        }
+    }
+
+    /// Writes Modbus registers within the row.
+    pub(super) fn write_registers(&mut self, address: u16, words: &[u16]) {
+        let node = self.node();
+        let written = self.world.with_drive(node, |drive, now| drive.write_registers(address, words, now));
+        if !matches!(written, Ok(Ok(()))) {
+            self.row().compare("written", "refused", false);
+        }
+    }
+
     /// The present.
     pub(super) fn now(&self) -> Instant {
         self.world.now()
@@ -420,8 +452,8 @@ impl Bench {
         let recorder = self.world.stop_recording().unwrap_or_else(|| Recorder::new(SAMPLING_PERIOD, []));
         let end = self.world.now();
         self.set_points.end(end);
-        let Self { rows, sections, events, set_points, starts, .. } = self;
-        Finished { rows, recorder, sections, events, set_points, starts, end }
+        let Self { rows, sections, events, set_points, starts, cuts, .. } = self;
+        Finished { rows, recorder, sections, events, set_points, starts, cuts, end }
     }
 
     fn object(&self, index: u16, sub_index: u8) -> Option<&'static Entry> {

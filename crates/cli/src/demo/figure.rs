@@ -1,5 +1,5 @@
 //! The demo's picture: position, velocity and current of each drive over time, with the manuals' sections and what
-//! happened.
+//! happened; then the drives together.
 
 use std::f64::consts::TAU;
 
@@ -21,17 +21,35 @@ pub(super) fn poster() -> Poster {
 
 /// The ZLAC8030L's chart.
 pub(super) fn zlac8030l(finished: &Finished) -> Vec<Vec<Figure>> {
-    vec![vec![drive(finished, "ZLAC8030L", "hub servo, quick start guide V1.00", "counts", Signal::Position)]]
+    vec![vec![drive(
+        finished,
+        "ZLAC8030L",
+        "hub servo, quick start guide V1.00",
+        "counts",
+        samples(finished, 0, Signal::Position),
+    )]]
 }
 
 /// The joint's chart.
 pub(super) fn mjoint(finished: &Finished) -> Vec<Vec<Figure>> {
-    vec![vec![drive(finished, "M4230E17B50", "robot joint, CanOpen manual", "counts", Signal::Position)]]
+    vec![vec![drive(
+        finished,
+        "M4230E17B50",
+        "robot joint, CanOpen manual; waiting is left out at //",
+        "counts",
+        samples(finished, 0, Signal::Position),
+    )]]
 }
 
 /// The stepper's chart.
 pub(super) fn zlim42c(finished: &Finished) -> Vec<Vec<Figure>> {
-    vec![vec![drive(finished, "ZLIM42-C", "open-loop stepper, user manual V1.03", "pulses", Signal::Position)]]
+    vec![vec![drive(
+        finished,
+        "ZLIM42-C",
+        "open-loop stepper, user manual V1.03",
+        "pulses",
+        samples(finished, 0, Signal::Position),
+    )]]
 }
 
 /// Angle and speed of three models that are asked the same.
@@ -42,11 +60,12 @@ pub(super) fn same_calls(finished: &Finished) -> Vec<Vec<Figure>> {
         subtitle: "the same call of the master on each, in degrees and r/min at the motor's shaft".into(),
         time: "time, s",
         panels: vec![
-            axes(finished, names, "Shaft angle", "°", Signal::ShaftAngle, 360.0 / TAU),
-            axes(finished, names, "Velocity", "r/min", Signal::Velocity, 1.0),
+            axes(names, "Shaft angle", "°", |drive| angle(finished, drive, 360.0)),
+            axes(names, "Velocity", "r/min", |drive| mean_rpm(finished, drive)),
         ],
         sections: sections(finished),
         events: finished.events.clone(),
+        cuts: Vec::new(),
     }]]
 }
 
@@ -60,45 +79,54 @@ pub(super) fn interpolation(finished: &Finished) -> Vec<Vec<Figure>> {
         panels: vec![Panel {
             title: "Shaft",
             unit: "counts",
+            height: 90.0,
             traces: names
                 .into_iter()
                 .zip(COLOURS)
                 .zip(&start.axes)
-                .map(|((label, colour), points)| Trace { label, style: Style::Actual(colour), points: points.clone() })
+                .zip(0..)
+                .map(|(((label, colour), points), place)| Trace {
+                    label,
+                    style: Style::OneOf(colour, place),
+                    points: points.clone(),
+                })
                 .collect(),
         }],
-        sections: Vec::new(),
-        events: Vec::new(),
+        ..Figure::default()
     });
     let path = Figure {
         title: "Three joints, interpolation".into(),
         subtitle: "mode 7: RPDO4 to each and SYNC, every 2 ms".into(),
         time: "time, s",
-        panels: vec![axes(finished, names, "Shaft angle", "turns of the motor", Signal::ShaftAngle, 1.0 / TAU)],
+        panels: vec![axes(names, "Shaft angle", "turns of the motor", |drive| angle(finished, drive, 1.0))],
         sections: sections(finished),
         events: finished.events.clone(),
+        cuts: Vec::new(),
     };
     vec![vec![path], starts.collect()]
 }
 
 const COLOURS: [Colour; 3] = [Colour::Blue, Colour::Teal, Colour::Orange];
 
-/// One signal of three drives.
+/// One quantity of three drives.
 fn axes(
-    finished: &Finished,
     names: [&'static str; 3],
     title: &'static str,
     unit: &'static str,
-    signal: Signal,
-    scale: f64,
+    points: impl Fn(usize) -> Vec<(f64, f64)>,
 ) -> Panel {
-    let place = SIGNALS.iter().position(|recorded| *recorded == signal).unwrap_or(0);
-    let traces = names.into_iter().zip(COLOURS).enumerate().map(|(drive, (label, colour))| {
-        let times = finished.recorder.times().iter().map(|at| at.as_secs_f64());
-        let values = finished.recorder.samples(drive * SIGNALS.len() + place).map(|value| value * scale);
-        Trace { label, style: Style::Actual(colour), points: times.zip(values).collect() }
+    let traces = names.into_iter().zip(COLOURS).zip(0..).map(|((label, colour), place)| Trace {
+        label,
+        style: Style::OneOf(colour, place),
+        points: points(place.into()),
     });
-    Panel { title, unit, traces: traces.collect() }
+    Panel { title, unit, height: 90.0, traces: traces.collect() }
+}
+
+/// Angle of a shaft, in parts of a turn.
+fn angle(finished: &Finished, drive: usize, parts: f64) -> Vec<(f64, f64)> {
+    let samples = samples(finished, drive, Signal::ShaftAngle);
+    samples.into_iter().map(|(time, angle)| (time, angle / TAU * parts)).collect()
 }
 
 /// Position, velocity and current of the first drive.
@@ -107,34 +135,47 @@ fn drive(
     title: &'static str,
     subtitle: &'static str,
     position_unit: &'static str,
-    position: Signal,
+    position: Vec<(f64, f64)>,
 ) -> Figure {
-    let trace = |label, style, signal: Signal| {
-        let channel = SIGNALS.iter().position(|recorded| *recorded == signal).unwrap_or(0);
-        let times = finished.recorder.times().iter().map(|at| at.as_secs_f64());
-        Trace { label, style, points: times.zip(finished.recorder.samples(channel)).collect() }
-    };
-    let panel = |title, unit, colour, axis, demand, actual| Panel {
+    let panel = |title, unit, height, colour, axis, demand, actual| Panel {
         title,
         unit,
+        height,
         traces: vec![
-            trace("demand", Style::Demand, demand),
+            Trace { label: "demand", style: Style::Demand, points: samples(finished, 0, demand) },
             Trace { label: "set-point", style: Style::SetPoint, points: finished.set_points.line(axis) },
-            trace("actual", Style::Actual(colour), actual),
+            Trace { label: "actual", style: Style::Actual(colour), points: actual },
         ],
     };
+    let (velocity, current) = (mean_rpm(finished, 0), samples(finished, 0, Signal::Current));
     Figure {
         title: title.into(),
         subtitle: subtitle.into(),
         time: "time, s",
         panels: vec![
-            panel("Position", position_unit, Colour::Blue, Axis::Position, Signal::PositionDemand, position),
-            panel("Velocity", "r/min", Colour::Teal, Axis::Velocity, Signal::VelocityDemand, Signal::Velocity),
-            panel("Motor current", "A", Colour::Orange, Axis::Current, Signal::CurrentDemand, Signal::Current),
+            panel("Position", position_unit, 80.0, Colour::Blue, Axis::Position, Signal::PositionDemand, position),
+            panel("Velocity", "r/min", 80.0, Colour::Teal, Axis::Velocity, Signal::VelocityDemand, velocity),
+            panel("Motor current", "A", 60.0, Colour::Orange, Axis::Current, Signal::CurrentDemand, current),
         ],
         sections: sections(finished),
         events: finished.events.clone(),
+        cuts: finished.cuts.iter().map(|(from, to)| (from.as_secs_f64(), to.as_secs_f64())).collect(),
     }
+}
+
+/// Speed of the shaft, the mean since the sample before: a stepper's rotor swings with each step, and to look at it at
+/// moments would show that swing as a wrong speed.
+fn mean_rpm(finished: &Finished, drive: usize) -> Vec<(f64, f64)> {
+    let angles = samples(finished, drive, Signal::ShaftAngle);
+    let rpm = |pair: &[(f64, f64)]| (pair[1].1 - pair[0].1) / (pair[1].0 - pair[0].0) / TAU * 60.0;
+    angles.windows(2).map(|pair| (pair[1].0, rpm(pair))).collect()
+}
+
+/// A signal of one of the drives over time, s.
+fn samples(finished: &Finished, drive: usize, signal: Signal) -> Vec<(f64, f64)> {
+    let place = SIGNALS.iter().position(|recorded| *recorded == signal).unwrap_or(0);
+    let times = finished.recorder.times().iter().map(|at| at.as_secs_f64());
+    times.zip(finished.recorder.samples(drive * SIGNALS.len() + place)).collect()
 }
 
 fn sections(finished: &Finished) -> Vec<Section> {

@@ -9,31 +9,32 @@ use super::{Colour, Event, EventKind, Figure, Panel, Poster, Style, Trace, lanes
 const WIDTH: f64 = 1000.0;
 /// From a figure's border to its axes: room for the ticks, and for the names of the lines.
 const LEFT: f64 = 84.0;
-const RIGHT: f64 = 92.0;
+const RIGHT: f64 = 112.0;
 /// Holds the poster's title and subtitle.
 const HEADING: f64 = 66.0;
 /// Holds a figure's title.
 const TOP: f64 = 34.0;
 const SECTION_STRIP: f64 = 38.0;
 const EVENT_LANE: f64 = 16.0;
-const EVENT_LANES: usize = 7;
-const PANEL_HEIGHT: f64 = 104.0;
+const EVENT_LANES: usize = 9;
 /// Names may come this close to their neighbours: their width is estimated on the safe side.
 const CROWDING: f64 = 1.1;
 /// Holds the title of the panel below.
-const PANEL_GAP: f64 = 30.0;
+const PANEL_GAP: f64 = 27.0;
 /// Room above and below the values of a panel, as a part of their range.
 const HEADROOM: f64 = 0.07;
 const BOTTOM: f64 = 44.0;
 const LABEL_GAP: f64 = 15.0;
 /// A tick of the time axis for each so many pixels at most.
 const TICK_DISTANCE: f64 = 62.0;
+const TICK_HEIGHT: f64 = 16.0;
 
 const GROUND: &str = "#ffffff";
 const FRAME: &str = "#d0d7de";
 const BAND: &str = "#f3f6f9";
 const GRID: &str = "#e3e8ee";
 const ZERO: &str = "#b6c0cb";
+const CUT: &str = "#7a8694";
 
 const TITLE: Font = Font { size: 19.0, colour: "#1f2933", bold: true };
 const SUBTITLE: Font = Font { size: 13.0, colour: "#5b6773", bold: false };
@@ -44,8 +45,9 @@ const NUMBER: Font = Font { size: 12.0, colour: "#3b4652", bold: true };
 const SECTION: Font = Font { size: 11.5, colour: "#5b6773", bold: false };
 
 /// Where things of a figure lie, px.
-struct Layout {
+struct Layout<'a> {
     time: (f64, f64),
+    cuts: &'a [(f64, f64)],
     left: f64,
     right: f64,
     top: f64,
@@ -54,14 +56,19 @@ struct Layout {
     panels_bottom: f64,
 }
 
-impl Layout {
+impl Layout<'_> {
     fn x(&self, time: f64) -> f64 {
-        let (begin, end) = self.time;
-        self.left + (time - begin) / (end - begin) * (self.right - self.left)
+        self.left + self.shown(time) / self.shown(self.time.1) * (self.right - self.left)
     }
 
-    fn panel_top(&self, number: usize) -> f64 {
-        self.panels_top + number as f64 * (PANEL_HEIGHT + PANEL_GAP)
+    /// Time from the begin to `time` without what is cut out.
+    fn shown(&self, time: f64) -> f64 {
+        let cut = self.cuts.iter().map(|(from, to)| (to.min(time) - from).max(0.0)).sum::<f64>();
+        time - self.time.0 - cut
+    }
+
+    fn is_cut(&self, time: f64) -> bool {
+        self.cuts.iter().any(|(from, to)| (*from..*to).contains(&time))
     }
 }
 
@@ -91,13 +98,14 @@ fn figure(svg: &mut Svg, figure: &Figure, (left, right): (f64, f64), top: f64) -
     events.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
     let section_strip = if figure.sections.is_empty() { 0.0 } else { SECTION_STRIP };
     let top = top + TOP;
-    let event_top = top + section_strip;
+    let (time, event_top) = (figure.time_span(), top + section_strip);
     let mut layout =
-        Layout { time: figure.time_span(), left, right, top, event_top, panels_top: 0.0, panels_bottom: 0.0 };
+        Layout { time, cuts: &figure.cuts, left, right, top, event_top, panels_top: 0.0, panels_bottom: 0.0 };
     let event_lanes = event_lanes(&layout, &events);
     let lane_count = event_lanes.iter().max().map_or(0, |lane| lane + 1);
     layout.panels_top = layout.event_top + lane_count as f64 * EVENT_LANE + 26.0;
-    layout.panels_bottom = layout.panel_top(figure.panels.len()) - PANEL_GAP;
+    let heights = figure.panels.iter().map(|panel| panel.height + PANEL_GAP).sum::<f64>();
+    layout.panels_bottom = layout.panels_top + heights - PANEL_GAP;
 
     let title_left = left - LEFT + 24.0;
     svg.text((title_left, top - 9.0), Anchor::Start, FIGURE_TITLE, &figure.title);
@@ -105,14 +113,16 @@ fn figure(svg: &mut Svg, figure: &Figure, (left, right): (f64, f64), top: f64) -
     svg.text((after_title, top - 9.0), Anchor::Start, SUBTITLE, &figure.subtitle);
     sections(svg, &layout, figure);
     draw_events(svg, &layout, &events, &event_lanes);
-    for (number, panel) in figure.panels.iter().enumerate() {
-        draw_panel(svg, &layout, layout.panel_top(number), panel);
+    let mut panel_top = layout.panels_top;
+    for panel in &figure.panels {
+        draw_panel(svg, &layout, panel_top, panel);
+        panel_top += panel.height + PANEL_GAP;
     }
     time_axis(svg, &layout, figure.time);
     layout.panels_bottom + BOTTOM
 }
 
-fn sections(svg: &mut Svg, layout: &Layout, figure: &Figure) {
+fn sections(svg: &mut Svg, layout: &Layout<'_>, figure: &Figure) {
     let places = figure.sections.iter().map(|section| (section, layout.x(section.from_s), layout.x(section.to_s)));
     // Every other section has a tinted ground; all grounds come before all names, which may reach over a border.
     for (_, left, right) in places.clone().step_by(2) {
@@ -135,13 +145,13 @@ fn sections(svg: &mut Svg, layout: &Layout, figure: &Figure) {
     }
 }
 
-fn draw_panel(svg: &mut Svg, layout: &Layout, top: f64, panel: &Panel) {
+fn draw_panel(svg: &mut Svg, layout: &Layout<'_>, top: f64, panel: &Panel) {
     let values = panel.traces.iter().flat_map(|trace| &trace.points).map(|point| point.1);
     let (low, high) = values.fold((0f64, 0f64), |(low, high), value| (low.min(value), high.max(value)));
     let (low, high) = if low < high { (low, high) } else { (-1.0, 1.0) };
     let (low, high) = (low - (high - low) * HEADROOM, high + (high - low) * HEADROOM);
-    let ticks = Ticks::within(low, high, 5);
-    let y = |value: f64| top + (high - value) / (high - low) * PANEL_HEIGHT;
+    let ticks = Ticks::within(low, high, (panel.height / TICK_HEIGHT) as usize);
+    let y = |value: f64| top + (high - value) / (high - low) * panel.height;
     for &tick in &ticks.values {
         let colour = if tick == 0.0 { ZERO } else { GRID };
         svg.line((layout.left, y(tick)), (layout.right, y(tick)), &format!(r#"stroke="{colour}""#));
@@ -153,20 +163,22 @@ fn draw_panel(svg: &mut Svg, layout: &Layout, top: f64, panel: &Panel) {
     for trace in &panel.traces {
         // Where a trace has no value, its line has a gap.
         for piece in trace.points.split(|point| !point.1.is_finite()).filter(|piece| !piece.is_empty()) {
-            let pixels = piece.iter().map(|&(t_s, value)| (layout.x(t_s), y(value)));
+            let shown = piece.iter().filter(|point| !layout.is_cut(point.0));
+            let pixels = shown.map(|&(time, value)| (layout.x(time), y(value)));
             let line = if trace.style == Style::SetPoint { steps(pixels) } else { thin(pixels) };
             svg.path(&line, &paint(trace.style));
         }
     }
-    trace_labels(svg, (layout.right + 8.0, top), &panel.traces, y);
+    trace_labels(svg, (layout.right + 8.0, top), panel, y);
 }
 
-fn trace_labels(svg: &mut Svg, (x, top): (f64, f64), traces: &[Trace], y: impl Fn(f64) -> f64) {
+fn trace_labels(svg: &mut Svg, (x, top): (f64, f64), panel: &Panel, y: impl Fn(f64) -> f64) {
+    let traces = &panel.traces;
     let ends: Vec<f64> = traces.iter().map(|trace| y(last_value(trace))).collect();
-    let heights = lanes::spread(&ends, LABEL_GAP, top + 6.0, top + PANEL_HEIGHT - 2.0);
+    let heights = lanes::spread(&ends, LABEL_GAP, top + 2.0, top + panel.height - 2.0);
     for (trace, height) in traces.iter().zip(heights) {
         svg.line((x, height), (x + 14.0, height), &paint(trace.style));
-        let font = Font { size: 12.0, colour: text_colour(trace.style), bold: matches!(trace.style, Style::Actual(_)) };
+        let font = Font { size: 12.0, colour: text_colour(trace.style), bold: is_actual(trace.style) };
         svg.text((x + 19.0, height + 4.0), Anchor::Start, font, trace.label);
     }
 }
@@ -177,7 +189,7 @@ fn last_value(trace: &Trace) -> f64 {
 }
 
 /// A lane for each event's label, so that labels do not overlap.
-fn event_lanes(layout: &Layout, events: &[&Event]) -> Vec<usize> {
+fn event_lanes(layout: &Layout<'_>, events: &[&Event]) -> Vec<usize> {
     let spans: Vec<(f64, f64)> = events
         .iter()
         .map(|event| {
@@ -189,13 +201,13 @@ fn event_lanes(layout: &Layout, events: &[&Event]) -> Vec<usize> {
 }
 
 /// Labels begin at their mark, or end at the right border when they would leave the picture.
-fn label_left(layout: &Layout, event: &Event) -> f64 {
+fn label_left(layout: &Layout<'_>, event: &Event) -> f64 {
     let width = event_font(event.kind).width(&event.label);
     (layout.x(event.at_s) + 6.0).min(layout.right + RIGHT - 14.0 - width)
 }
 
 /// All lines first, so that none runs over a label.
-fn draw_events(svg: &mut Svg, layout: &Layout, events: &[&Event], lanes: &[usize]) {
+fn draw_events(svg: &mut Svg, layout: &Layout<'_>, events: &[&Event], lanes: &[usize]) {
     let places = || {
         let heights = lanes.iter().map(|lane| layout.event_top + *lane as f64 * EVENT_LANE + 12.0);
         events.iter().zip(heights).map(|(event, y)| (*event, layout.x(event.at_s), y))
@@ -221,15 +233,28 @@ fn event_font(kind: EventKind) -> Font {
     Font { size: 11.5, colour, bold: false }
 }
 
-fn time_axis(svg: &mut Svg, layout: &Layout, name: &str) {
-    let most = ((layout.right - layout.left) / TICK_DISTANCE) as usize;
-    let ticks = Ticks::within(layout.time.0, layout.time.1, most.max(2));
+fn time_axis(svg: &mut Svg, layout: &Layout<'_>, name: &str) {
+    let (begin, end) = layout.time;
+    // As if what is cut out were there, with the same distances.
+    let whole = (layout.right - layout.left) * (end - begin) / layout.shown(end);
+    let ticks = Ticks::within(begin, end, ((whole / TICK_DISTANCE) as usize).max(2));
     let y = layout.panels_bottom;
     svg.line((layout.left, y), (layout.right, y), &format!(r#"stroke="{ZERO}""#));
-    for &tick in &ticks.values {
-        let x = layout.x(tick);
+    let mut free_from = f64::NEG_INFINITY;
+    for tick in ticks.values.iter().copied().filter(|tick| !layout.is_cut(*tick)) {
+        let (x, text) = (layout.x(tick), ticks.text(tick));
         svg.line((x, y), (x, y + 5.0), &format!(r#"stroke="{ZERO}""#));
-        svg.text((x, y + 20.0), Anchor::Middle, AXIS, &ticks.text(tick));
+        let half = AXIS.width(&text) / 2.0;
+        if x - half >= free_from {
+            svg.text((x, y + 20.0), Anchor::Middle, AXIS, &text);
+            free_from = x + half + 4.0;
+        }
+    }
+    for (from, _) in layout.cuts {
+        let x = layout.x(*from);
+        for shift in [-2.0, 2.0] {
+            svg.line((x + shift - 2.5, y + 6.0), (x + shift + 2.5, y - 6.0), &format!(r#"stroke="{CUT}""#));
+        }
     }
     svg.text((layout.right + 8.0, y + 20.0), Anchor::Start, AXIS, name);
 }
@@ -250,8 +275,16 @@ fn steps(pixels: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     line
 }
 
+fn is_actual(style: Style) -> bool {
+    matches!(style, Style::Actual(_) | Style::OneOf(..))
+}
+
 fn paint(style: Style) -> String {
     match style {
+        Style::OneOf(colour, place) => {
+            let width = (6.0 - 2.2 * f64::from(place)).max(1.4);
+            format!(r#"stroke="{}" stroke-width="{width:.1}""#, line_colour(colour))
+        }
         Style::Actual(colour) => format!(r#"stroke="{}" stroke-width="1.7""#, line_colour(colour)),
         Style::Demand => r##"stroke="#b9c3cf" stroke-width="4.2" stroke-linecap="round""##.into(),
         Style::SetPoint => r##"stroke="#667382" stroke-width="1.2" stroke-dasharray="5 4""##.into(),
@@ -268,7 +301,7 @@ fn line_colour(colour: Colour) -> &'static str {
 
 fn text_colour(style: Style) -> &'static str {
     match style {
-        Style::Actual(colour) => line_colour(colour),
+        Style::Actual(colour) | Style::OneOf(colour, _) => line_colour(colour),
         Style::Demand => "#7a8694",
         Style::SetPoint => "#667382",
     }
@@ -294,13 +327,14 @@ mod tests {
                 Panel {
                     title: "velocity",
                     unit: "r/min",
+                    height: 100.0,
                     traces: vec![
                         Trace { label: "set-point", style: Style::SetPoint, points: vec![(0.0, 0.0), (5.0, 80.0)] },
                         Trace { label: "demand", style: Style::Demand, points: wave(98.0).collect() },
                         Trace { label: "actual", style: Style::Actual(Colour::Teal), points: wave(100.0).collect() },
                     ],
                 },
-                Panel { title: "empty", unit: "A", traces: Vec::new() },
+                Panel { title: "empty", unit: "A", height: 60.0, traces: Vec::new() },
             ],
             sections: vec![Section {
                 from_s: 0.0,
@@ -309,6 +343,7 @@ mod tests {
                 names: vec!["x".repeat(500), "short".into()],
             }],
             events: vec![Event { at_s: 3.0, label: "quick stop".into(), kind: EventKind::Stop }],
+            cuts: vec![(12.0, 16.0)],
         }
     }
 
@@ -333,6 +368,24 @@ mod tests {
         poster.rows[0][0].panels[0].traces.clear();
         let svg = poster.to_svg();
         assert!(!svg.contains("NaN") && !svg.contains("inf"));
+    }
+
+    #[test]
+    fn time_that_is_cut_out_takes_no_room() {
+        let cuts = [(2.0, 4.0), (6.0, 7.0)];
+        let layout = Layout {
+            time: (0.0, 10.0),
+            cuts: &cuts,
+            left: 0.0,
+            right: 700.0,
+            top: 0.0,
+            event_top: 0.0,
+            panels_top: 0.0,
+            panels_bottom: 0.0,
+        };
+        let at = [0.0, 2.0, 3.0, 4.0, 6.5, 8.0, 10.0].map(|time| layout.x(time));
+        assert_eq!(at, [0.0, 200.0, 200.0, 200.0, 400.0, 500.0, 700.0]);
+        assert!(layout.is_cut(3.0) && !layout.is_cut(4.0) && !layout.is_cut(1.0));
     }
 
     #[test]

@@ -36,6 +36,8 @@ pub(crate) struct Figure {
     pub(crate) sections: Vec<Section>,
     /// Marked moments.
     pub(crate) events: Vec<Event>,
+    /// Spans of time that are left out, ascending; a mark on the time axis tells of each.
+    pub(crate) cuts: Vec<(f64, f64)>,
 }
 
 /// One set of axes.
@@ -45,6 +47,8 @@ pub(crate) struct Panel {
     pub(crate) title: &'static str,
     /// Its unit: "r/min".
     pub(crate) unit: &'static str,
+    /// Of its axes, px.
+    pub(crate) height: f64,
     /// Drawn in order, the last one on top.
     pub(crate) traces: Vec<Trace>,
 }
@@ -69,16 +73,18 @@ pub(crate) enum Style {
     Demand,
     /// What the user asked for: dashed steps.
     SetPoint,
+    /// What was measured at one of several machines, the first one the broadest: those that lie under another show.
+    OneOf(Colour, u8),
 }
 
 /// Colours that stay apart for colour-blind readers on a light ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Colour {
-    /// For positions.
+    /// For positions, and for the first of several.
     Blue,
-    /// For velocities.
+    /// For velocities, and for the second.
     Teal,
-    /// For currents.
+    /// For currents, and for the third.
     Orange,
 }
 

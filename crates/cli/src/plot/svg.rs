@@ -31,10 +31,17 @@ pub(super) struct Font {
 }
 
 impl Font {
-    /// Width of a text, px; an estimate from the mean advance of common sans-serif faces.
+    /// Width of a text, px; an estimate on the safe side from the advances of common sans-serif faces.
     pub(super) fn width(self, text: &str) -> f64 {
-        const MEAN_ADVANCE_EM: f64 = 0.6;
-        text.chars().count() as f64 * self.size * MEAN_ADVANCE_EM * if self.bold { 1.07 } else { 1.0 }
+        let advance_em = |letter: char| match letter {
+            'i' | 'j' | 'l' | 'I' | '.' | ',' | ':' | ';' | '\'' | '|' | '(' | ')' | ' ' => 0.36,
+            'f' | 'r' | 't' | '-' | '/' => 0.44,
+            'm' | 'w' | 'M' | 'W' => 0.95,
+            'A'..='Z' => 0.72,
+            _ => 0.62,
+        };
+        let bold = if self.bold { 1.09 } else { 1.0 };
+        text.chars().map(advance_em).sum::<f64>() * self.size * bold
     }
 }
 
@@ -62,11 +69,16 @@ impl Svg {
         let _ = writeln!(self.body, r#"<circle cx="{x:.1}" cy="{y:.1}" r="{radius}" fill="{colour}"/>"#);
     }
 
-    /// A broken line through points.
+    /// A broken line through points. Points between neighbours of the same height are left out.
     pub(super) fn path(&mut self, points: &[(f64, f64)], paint: &str) {
         let mut data = String::with_capacity(points.len() * 12);
-        for (i, (x, y)) in points.iter().enumerate() {
-            let _ = write!(data, "{}{x:.1} {y:.1}", if i == 0 { 'M' } else { 'L' });
+        let tenths = |point: &(f64, f64)| (point.1 * 10.0).round() as i64;
+        for (i, point) in points.iter().enumerate() {
+            let is_level = |other: Option<&(f64, f64)>| other.is_some_and(|other| tenths(other) == tenths(point));
+            if i > 0 && is_level(points.get(i - 1)) && is_level(points.get(i + 1)) {
+                continue;
+            }
+            let _ = write!(data, "{}{:.1} {:.1}", if i == 0 { 'M' } else { 'L' }, point.0, point.1);
         }
         let _ = writeln!(self.body, r#"<path d="{data}" fill="none" stroke-linejoin="round" {paint}/>"#);
     }
@@ -122,6 +134,13 @@ fn escape(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_level_line_needs_its_ends_only() {
+        let mut svg = Svg::default();
+        svg.path(&[(0.0, 5.0), (1.0, 5.02), (2.0, 5.0), (3.0, 9.0)], "");
+        assert!(svg.body.contains(r#"d="M0.0 5.0L2.0 5.0L3.0 9.0""#), "{}", svg.body);
+    }
 
     #[test]
     fn texts_are_escaped() {

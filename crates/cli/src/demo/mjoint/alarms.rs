@@ -14,7 +14,7 @@ const PAUSE: Duration = Duration::from_millis(1000);
 
 /// The table of alarms that stop the motor.
 pub(super) fn all(bench: &mut Bench) {
-    bench.section("alarms 3", "alarms");
+    bench.section("interface 3", "alarms");
     locked_rotor(bench);
     stall(bench);
     over_voltage(bench);
@@ -107,7 +107,7 @@ fn expect_alarm(bench: &mut Bench, code: u32, label: &str, after_s: f64) {
 /// "04 represents alarm" (5.11.1).
 pub(super) fn expect_heartbeat_04(bench: &mut Bench) {
     let begin = bench.now();
-    bench.run_ms(1_010);
+    bench.unseen(|bench| bench.run_ms(1_010));
     let beats = bench.heard_since(begin, 0x701);
     let seen = beats.last().map_or(f64::NAN, |(_, frame)| f64::from(frame.padded()[0]));
     bench.expect("heartbeat", Expect::Bits(4), "", seen);
@@ -115,7 +115,7 @@ pub(super) fn expect_heartbeat_04(bench: &mut Bench) {
 
 /// Watches one whole round of the red light.
 pub(super) fn expect_flashes(bench: &mut Bench, long: usize, short: usize) {
-    let seen = flashes(bench);
+    let seen = bench.unseen(flashes);
     let (seen_long, seen_short) =
         (seen.iter().filter(|on| **on >= LONG).count(), seen.iter().filter(|on| **on < LONG).count());
     let words = |long: usize, short: usize| format!("red {long} long {short} short");

@@ -15,7 +15,7 @@ use crate::plot::EventKind;
 pub(super) fn boot_up(bench: &mut Bench) {
     bench.section("5.11.1", "heartbeat");
     bench.step("power on");
-    bench.run_silently(Duration::from_millis(3_500));
+    bench.unseen(|bench| bench.run_silently(Duration::from_millis(3_500)));
     let heard = bench.heard_since(Instant::ZERO, 0x701);
     let first = heard.first().map_or_else(|| "nothing".into(), |(_, frame)| frame.to_string());
     bench.compare("701#00", &first, first == "701#00");
@@ -26,12 +26,12 @@ pub(super) fn boot_up(bench: &mut Bench) {
     bench.expect("apart", Expect::Near(1000.0, 2.0), "ms", largest_gap_ms(beats));
     bench.ask("interval 500 ms", "2B 17 10 00 F4 01", "60 17 10 00");
     let begin = bench.now();
-    bench.run_silently(Duration::from_millis(2_200));
+    bench.unseen(|bench| bench.run_silently(Duration::from_millis(2_200)));
     let beats = bench.heard_since(begin, 0x701);
     bench.expect("apart", Expect::Near(500.0, 2.0), "ms", largest_gap_ms(&beats));
     bench.ask("no heartbeat (0)", "2B 17 10 00 00 00", "60 17 10 00");
     let begin = bench.now();
-    bench.run_silently(Duration::from_millis(1_200));
+    bench.unseen(|bench| bench.run_silently(Duration::from_millis(1_200)));
     let beats = bench.heard_since(begin, 0x701).len();
     bench.expect("heartbeats in 1.2 s", Expect::Near(0.0, 0.0), "", beats as f64);
     bench.ask("interval 1000 ms", "2B 17 10 00 E8 03", "60 17 10 00");
@@ -97,6 +97,60 @@ pub(super) fn host_heartbeat(bench: &mut Bench) {
     bench.ask("no monitoring (1016h:01 time 0)", "23 16 10 01 00 00 7F 00", "60 16 10 01");
     bench.write("0 r/min", 0x60FF, 0, 0);
     bench.run_ms(200);
+    idle(bench);
+}
+
+/// 5.08.1 has no row for NMT; the commands of CiA 301 act, and the heartbeat tells the state.
+pub(super) fn nmt(bench: &mut Bench) {
+    bench.section("5.08.1", "NMT");
+    bench.ask("interval 100 ms", "2B 17 10 00 64 00", "60 17 10 00");
+    let commands = [
+        ("stop", "000 02 01", 0x04),
+        ("pre-operational", "000 80 01", 0x7F),
+        ("start", "000 01 01", 0x05),
+        ("start all nodes", "000 01 00", 0x05),
+    ];
+    for (name, command, state) in commands {
+        bench.step(format!("NMT {name}"));
+        bench.send(frame(command));
+        let begin = bench.now();
+        bench.run_ms(110);
+        let beats = bench.heard_since(begin, 0x701);
+        let seen = beats.last().map_or(f64::NAN, |(_, beat)| f64::from(beat.padded()[0]));
+        bench.expect("heartbeat", Expect::Bits(state), "", seen);
+    }
+    for (name, command) in [("reset node", "000 81 01"), ("reset communication", "000 82 01")] {
+        bench.step(format!("NMT {name}"));
+        let begin = bench.now();
+        bench.send(frame(command));
+        bench.run_ms(50);
+        let heard = bench.heard_since(begin, 0x701);
+        let first = heard.first().map_or_else(|| "nothing".into(), |(_, frame)| frame.to_string());
+        bench.compare("701#00", &first, first == "701#00");
+    }
+    bench.ask("interval 1000 ms", "2B 17 10 00 E8 03", "60 17 10 00");
+}
+
+/// 5.04, column "Modbus address": the same values as registers, those of 32 bits in two, the low word first.
+pub(super) fn registers(bench: &mut Bench) {
+    bench.section("5.04", "Modbus");
+    bench.write("enable", 0x6040, 0, 0x0F);
+    let values = [
+        ("system voltage (13h)", 0x13, 1, 0x6079),
+        ("alarm code (10h)", 0x10, 1, 0x260E),
+        ("actual position (18h)", 0x18, 2, 0x6064),
+        ("status word (24h)", 0x24, 1, 0x6041),
+    ];
+    for (name, address, words, index) in values {
+        bench.step(format!("read {name}, {index:04X}h"));
+        let object = bench.read_f64(index, 0);
+        let register = bench.read_registers(address, words);
+        bench.expect("register", Expect::Near(object, 40.0 * f64::from(u8::from(index == 0x6079))), "", register);
+    }
+    let from = bench.report().position as f64;
+    bench.step("write incremental position 10000 (0Eh)");
+    bench.write_registers(0x0E, &[10_000, 0]);
+    super::until_reached(bench, from + 10_000.0, from, super::move_time_s(10_000.0, 1000.0, 20_000.0));
     idle(bench);
 }
 

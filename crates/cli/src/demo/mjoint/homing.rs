@@ -30,6 +30,7 @@ const METHODS: [(u8, &str, bool); 6] = [
 pub(super) fn all(bench: &mut Bench) {
     bench.section("5.09", "homing");
     for (method, pin, positive) in METHODS {
+        bench.mark(format!("homing {method}"), EventKind::Note);
         for on_switch in [false, true] {
             home(bench, method, pin, positive, on_switch);
         }
@@ -50,13 +51,12 @@ fn home(bench: &mut Bench, method: u8, pin: &str, positive: bool, on_switch: boo
     bench.ask("work mode 6: homing starts", "2F 60 60 00 06", "60 60 60 00");
     bench.ask("status word: still looking", "40 41 60 00", "4B 41 60 00 14 00");
     bench.run_until(Duration::from_secs(5), |word| word & FOUND != 0);
-    bench.mark(format!("method {method}"), EventKind::Note);
     bench.run_ms(100);
     bench.ask("status word: found", "40 41 60 00", "4B 41 60 00 14 14");
     let position = bench.read_f64(0x6064, 0);
     bench.moved(format!("origin {:+.0} counts from the start", edge as f64 - start as f64));
-    // The switch's last count on the negative side is its edge; the origin is the count beyond.
-    let expected = if positive { edge_shaft } else { edge_shaft + 1.0 };
+    // The switch goes on or off between two counts.
+    let expected = if positive { edge_shaft - 0.5 } else { edge_shaft + 0.5 };
     let origin = shaft_counts(bench) - position;
     bench.expect("origin from the edge", Expect::Near(0.0, EDGE_COUNTS), "counts", (origin - expected).round());
     // 5.10.1: "the return value is a number around 0": what it takes to stop from 100 r/min.

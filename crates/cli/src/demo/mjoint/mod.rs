@@ -36,6 +36,8 @@ pub(super) fn procedures(bench: &mut Bench) {
     motion::incremental(bench);
     motion::speed(bench);
     motion::readings(bench);
+    communication::registers(bench);
+    communication::nmt(bench);
     pdo::parameters(bench);
     pdo::synchronised(bench);
     pdo::absolute(bench);

@@ -73,7 +73,7 @@ pub(super) fn incremental(bench: &mut Bench) {
 
 /// 5.07.1.
 pub(super) fn speed(bench: &mut Bench) {
-    bench.section("5.07.1", "speed mode");
+    bench.section("5.07.1", "speed");
     bench.ask("work mode 3: speed", "2F 60 60 00 03", "60 60 60 00");
     bench.ask("speed 500 r/min", "23 FF 60 00 F4 01 00 00", "60 FF 60 00");
     let (begin, from) = (bench.now(), bench.report().position as f64);

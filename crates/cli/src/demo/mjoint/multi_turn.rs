@@ -10,7 +10,7 @@ use crate::plot::EventKind;
 
 /// 2: the battery is disconnected, the turns are lost, and a new origin is set with 60006 and 60016.
 pub(super) fn zero_setting(bench: &mut Bench) {
-    bench.section("turns 2", "zero setting");
+    bench.section("turns 2", "origin");
     go_to(bench, 2 * COUNTS_PER_TURN as i64 + 5000);
     bench.step("battery disconnected");
     bench.machine("battery off");

@@ -18,7 +18,7 @@ fn set(bench: &mut Bench, function: i64) {
 
 /// "Speed mode, duty cycle speed regulation (10%~90% for 0~1000RPM)".
 pub(super) fn duty_cycle(bench: &mut Bench) {
-    bench.section("5.04", "duty cycle");
+    bench.section("5.04", "duty");
     // The mode's number is lost in the table; 1 and 3 are the free ones (docs/drives/mjoint.md, J054).
     set(bench, 1);
     for (percent, rpm) in [(10, 0.0), (30, 250.0), (50, 500.0), (90, 1000.0), (10, 0.0)] {

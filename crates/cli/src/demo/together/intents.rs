@@ -88,7 +88,7 @@ pub(in crate::demo) fn same_calls(bench: &mut Bench) {
         fleet.go_by(bench, angle);
     }
     bench.section("", "absolute");
-    for angle in [0.0, 180.0] {
+    for angle in [1080.0, 1260.0] {
         fleet.go_to(bench, angle);
     }
     bench.section("", "disable");
@@ -141,7 +141,7 @@ impl Fleet {
             bench.expect("after", Expect::Near(expected_s, 0.05), "s", after_s);
         });
         let from: Vec<f64> = (0..self.drives.len()).map(|place| angle_deg(bench, place)).collect();
-        let (time, begin) = (Duration::from_secs(2), bench.now());
+        let (time, begin) = (Duration::from_secs(1), bench.now());
         // The drives are left alone together, so that the way of each is that of one stretch of time.
         self.ask(bench, Intent::KeepTurning(time));
         let time_s = (bench.now() - begin).as_secs_f64();

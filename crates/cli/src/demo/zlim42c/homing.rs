@@ -89,7 +89,8 @@ fn finish(bench: &mut Bench, edge: f64, direction: f64, offset: f64) {
     bench.expect_status("on the way: bits 8, 10, 14", HOMING_BITS, RUNNING);
     let from = shaft(bench);
     bench.run_until(Duration::from_secs(8), |word| word & HOMING_BITS == HOMED);
-    bench.mark("homed", EventKind::Note);
+    let method = bench.read(0x6098, 0).unwrap_or_default();
+    bench.mark(format!("homed ({method})"), EventKind::Note);
     bench.run_ms(150);
     let way = shaft(bench) - from;
     bench.moved(format!("{way:+.0} pulses"));
