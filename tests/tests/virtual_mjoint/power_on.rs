@@ -199,3 +199,27 @@ fn a_battery_that_runs_empty_without_power_loses_the_turns_and_is_charged_again(
         assert!((charged(&mut bench) - before - 1e-3).abs() < 1e-5);
     }
 }
+
+#[test]
+fn beyond_60000_turns_the_position_goes_on_from_the_other_end_and_the_move_does_not_notice() {
+    let mut bench = Bench::open();
+    bench.operate(|drive, now| drive.set_power(false, now));
+    bench.machine().assembly_mut().motor_mut().rotor.angle = plant::Angle::new(59_999, 0.5);
+    bench.power_cycle();
+    assert_eq!(bench.position(), 59_999 * TURN + TURN / 2);
+    bench.set(0x607A, 0, TURN);
+    bench.set(0x6040, 0, 0x4F);
+    bench.set(0x6040, 0, 0x5F);
+    let mut most: f64 = 0.0;
+    for _ in 0..500 {
+        bench.run_ms(1);
+        most = most.max(bench.report().velocity_rpm.abs());
+    }
+    assert!((bench.position() - (-60_000 * TURN + TURN / 2)).abs() <= 30, "{}", bench.position());
+    assert!(most < 1700.0 && bench.statusword() == 0x0437, "one turn at 1500 r/min, and no more: {most}");
+    // Back by two turns, over the same edge.
+    bench.set(0x607A, 0, -2 * TURN);
+    bench.set(0x6040, 0, 0x5F);
+    bench.run_ms(500);
+    assert!((bench.position() - (59_998 * TURN + TURN / 2)).abs() <= 30, "{}", bench.position());
+}
