@@ -194,3 +194,18 @@ fn the_origin_lies_within_three_control_periods_of_the_edge_at_every_speed_and_f
         }
     }
 }
+
+#[test]
+fn a_host_that_sends_mode_6_each_cycle_homes_once() {
+    let mut bench = Bench::new();
+    bench.tell("1 switch DIR min -5000");
+    for _ in 0..600 {
+        bench.send("201#0F000600000000");
+        bench.run_ms(2);
+    }
+    assert_eq!(bench.statusword(), 0x1437);
+    assert!(bench.position().abs() < 200, "{}", bench.position());
+    bench.send("201#0F000100000000");
+    bench.send("201#0F000600000000");
+    assert_eq!(bench.statusword(), 0x0037, "and again after another mode");
+}

@@ -54,7 +54,7 @@ impl MJoint {
     pub(super) fn act_on(&mut self, slot: Slot, raw: u32, via: Via) {
         match effect(slot) {
             Effect::Command => self.command(Controlword(raw as u16)),
-            Effect::SelectMode => self.select_mode(ModeOfOperation(raw as u8 as i8)),
+            Effect::SelectMode => self.mode_written(ModeOfOperation(raw as u8 as i8), via),
             Effect::Target => self.target_written(raw as i32, via),
             Effect::Increment => self.increment(raw as i32),
             Effect::Follow => {}
@@ -93,7 +93,15 @@ impl MJoint {
         }
     }
 
-    /// 6060h. Homing starts with the write, each time, unless it is under way.
+    /// 6060h. An RPDO repeats the mode with whatever it brings, and means a new homing only when the mode is new.
+    fn mode_written(&mut self, mode: ModeOfOperation, via: Via) {
+        let repeated = mode == self.mode && matches!(via, Via::Rpdo(_));
+        if !repeated {
+            self.select_mode(mode);
+        }
+    }
+
+    /// Homing starts with the write, each time, unless it is under way.
     fn select_mode(&mut self, mode: ModeOfOperation) {
         self.refresh_parameters();
         if mode == ModeOfOperation::HOMING {
