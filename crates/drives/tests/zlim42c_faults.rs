@@ -52,7 +52,7 @@ impl Pins {
 
 #[test]
 fn over_current_switches_off_in_the_control_period_in_which_it_is_measured() {
-    for phase_current_a in [[5.0, 0.0], [0.0, -5.0], [f32::NAN, 0.0]] {
+    for phase_current_a in [[7.0, 0.0], [0.0, -7.0], [f32::NAN, 0.0]] {
         let mut pins = Pins::new(storage::factory());
         for word in [0x06, 0x07] {
             pins.write(0x6040, word);
@@ -65,6 +65,33 @@ fn over_current_switches_off_in_the_control_period_in_which_it_is_measured() {
         pins.run_ms(5);
         assert!(pins.sent.contains(&"081#02FF030000000000".to_owned()), "{:?}", pins.sent);
     }
+}
+
+#[test]
+fn bus_over_current_is_the_mean_of_10_ms_and_flashes_five_times() {
+    let mut pins = Pins::new(storage::factory());
+    // Half of the time twice the limit less a little, and short peaks, are borne.
+    for period in 0..2000 {
+        pins.sensors.bus_current_a = if period % 2 == 0 { 6.0 } else { 0.0 };
+        pins.tick();
+    }
+    pins.sensors.bus_current_a = 20.0;
+    pins.run_ms(5);
+    pins.sensors.bus_current_a = 0.0;
+    pins.run_ms(5);
+    assert_eq!(pins.code(), 0);
+    pins.sensors.bus_current_a = 3.3;
+    pins.run_ms(12);
+    assert_eq!(pins.code(), 0xFF02);
+    assert!(pins.sent.contains(&"081#02FF030000000000".to_owned()), "{:?}", pins.sent);
+    let (mut flashes, mut was_on) = (0, pins.actuation.led.red);
+    // Five flashes of 0.4 s and a pause of 1 s.
+    for _ in 0..3000 {
+        pins.run_ms(1);
+        flashes += u32::from(pins.actuation.led.red && !was_on);
+        was_on = pins.actuation.led.red;
+    }
+    assert_eq!(flashes, 5);
 }
 
 #[test]

@@ -124,6 +124,28 @@ fn touching_wires_and_a_broken_transistor_trip_the_drive_in_every_state_that_fee
 }
 
 #[test]
+fn a_vector_that_jumps_is_no_over_current() {
+    // Without ramps from full speed into the other direction: the voltage of the old speed meets the standing field.
+    for supply_v in [20.0, 24.0, 30.0] {
+        for (setting, rpm) in (0..8).flat_map(|setting| [300, 900, 1200, 1800, 3000].map(|rpm| (setting, rpm))) {
+            let mut bench = Bench::new();
+            bench.operate(|drive, now| drive.set_supply(supply_v, now)).expect("a supply");
+            bench.set(0x2005, 0, setting);
+            bench.set(0x6083, 0, 500);
+            bench.enable_in(3);
+            bench.set(0x60FF, 0, rpm);
+            bench.run_ms(700);
+            for (object, value) in [(0x6083, 0), (0x6084, 0), (0x60FF, -600)] {
+                bench.set(object, 0, value);
+            }
+            bench.run_ms(100);
+            let code = bench.get(0x603F, 0);
+            assert!(matches!(code, 0 | 0xFF01), "2005h = {setting}, {rpm} r/min, {supply_v} V: {code:X}h");
+        }
+    }
+}
+
+#[test]
 fn the_current_of_hard_work_is_no_bus_over_current() {
     // Nearly what the longer motor can carry, at the highest setting.
     let mut bench = Bench::long();

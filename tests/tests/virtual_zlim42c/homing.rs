@@ -298,3 +298,21 @@ fn the_search_keeps_to_the_step_rate_limit() {
     bench.run_ms(700);
     assert_eq!(bench.report().velocity_demand_rpm, Some(468.75));
 }
+
+#[test]
+fn off_the_home_switch_the_motor_goes_back_some_way_before_it_returns() {
+    // docs/drives/zlim42c.md: 0.05 turns, 200 pulses, beyond the edge at -400. At 5 r/min (333 pulses/s) the filter takes
+    // 3 pulses more and the ramp of 30 ms 5.
+    for method in [24, 29] {
+        let mut bench = on_track("on_home", method);
+        bench.set(0x6099, 2, 5);
+        bench.set(0x609A, 0, 30);
+        bench.set(0x6040, 0, 0x1F);
+        let mut lowest = 0;
+        while bench.report().velocity_demand_rpm.is_none_or(|rpm| rpm <= 0.0) {
+            bench.run_ms(1);
+            lowest = lowest.min(bench.report().position);
+        }
+        assert_within(&format!("pulses, method {method}"), lowest as f64, -615.0, -600.0);
+    }
+}

@@ -242,3 +242,40 @@ fn a_run_is_the_same_whatever_the_strides_of_time() {
         assert_eq!(run(strides_us), once, "{strides_us:?}");
     }
 }
+
+#[test]
+fn a_sound_motor_has_no_fault_but_over_voltage_whatever_it_is_asked_and_whatever_pulls_at_it() {
+    for seed in 0..60 {
+        let mut seeded = Seeded::new(seed);
+        let mut bench = if seed % 2 == 0 { Bench::new() } else { Bench::long() };
+        let supply_v = 20.0 + seeded.below(11) as f64;
+        bench.operate(|drive, now| drive.set_supply(supply_v, now)).expect("a supply");
+        for (index, most) in [(0x2005, 8), (0x2006, 16), (0x2007, 2)] {
+            bench.set(index, 0, seeded.below(most) as i64);
+        }
+        bench.enable_in(3);
+        for step in 0..30 {
+            // Now and then nearly no ramp: the vector jumps.
+            let ramp_ms = if seeded.below(3) == 0 { 5 } else { 1000 };
+            bench.set(0x6083, 0, seeded.below(ramp_ms) as i64);
+            bench.set(0x6084, 0, seeded.below(ramp_ms) as i64);
+            bench.set(0x60FF, 0, seeded.below(6001) as i64 - 3000);
+            let (torque_nm, choice) = (seeded.below(13) as f64 * 0.1 - 0.6, seeded.below(6));
+            bench.operate(|drive, now| {
+                match choice {
+                    0 => drive.set_load_torque(torque_nm, now),
+                    1 => drive.set_rotor_locked(torque_nm > 0.0, now),
+                    2 => drive.set_load_inertia(torque_nm.abs() * 1e-4, now),
+                    _ => drive.set_load_torque(0.0, now),
+                }
+                .expect("a load");
+            });
+            bench.run_ms(50 + seeded.below(400) as u64);
+            let report = bench.report();
+            assert!(matches!(report.error_code, 0 | 0xFF01), "seed {seed}, step {step}: {report:?}");
+            if report.error_code != 0 {
+                break;
+            }
+        }
+    }
+}

@@ -39,9 +39,9 @@ pub const VOLTAGE_HYSTERESIS_V: f32 = 1.0;
 /// 1 ms: longer than a switching transient, shorter than what the capacitors of the bus survive.
 pub const VOLTAGE_DEBOUNCE_PERIODS: u16 = 2;
 
-/// Phase current that counts as over-current, A: twice the highest setting (2.2 A). What a rotor that slips drives through
-/// the windings stays below, what a short circuit draws is far above.
-pub const OVER_CURRENT_A: f32 = 4.4;
+/// Phase current that counts as over-current, A: three times the highest setting (2.2 A). What a vector that jumps from 3000
+/// r/min or a rotor that slips drives through the windings stays below, what a short circuit draws is far above.
+pub const OVER_CURRENT_A: f32 = 6.6;
 
 /// Phase over-current is watched every control period and acts at once.
 pub const OVER_CURRENT_DEBOUNCE_PERIODS: u16 = 1;
