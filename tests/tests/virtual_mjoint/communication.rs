@@ -265,3 +265,41 @@ fn the_heartbeat_follows_its_interval() {
     assert!((9..=11).contains(&count(100)));
     assert_eq!(count(0), 0);
 }
+
+#[test]
+fn what_came_while_pdos_were_off_is_not_done_later() {
+    let mut bench = Bench::new();
+    bench.set(0x6040, 0, 0x2F);
+    for state in ["000#8001", "000#0201"] {
+        bench.send(state);
+        bench.send("201#2F000150C30000");
+        bench.send("501#50C30000");
+        bench.send("080#");
+        bench.send("000#0101");
+        bench.send("080#");
+        bench.run_ms(200);
+        assert_eq!((bench.get(0x607A, 0), bench.position().abs() < 5), (0, true), "{state}");
+    }
+    // To all nodes, and frames that are no NMT commands.
+    bench.send("000#8000");
+    bench.heard();
+    bench.send("301#0000000000000000");
+    assert_eq!(bench.heard(), [""; 0], "a command to all counts");
+    for nothing in ["000#01", "000#", "000#0102", "000#FF01"] {
+        bench.send(nothing);
+        bench.send("301#0000000000000000");
+        assert_eq!(bench.heard(), [""; 0], "{nothing}");
+    }
+}
+
+#[test]
+fn identifiers_that_cia_301_reserves_are_no_pdos() {
+    let mut bench = Bench::new();
+    for (index, id) in
+        [(0x1400, 0x000), (0x1401, 0x601), (0x1402, 0x77F), (0x1800, 0x7E5), (0x1801, 0x581), (0x1802, 0x07F)]
+    {
+        let before = bench.get(index, 1);
+        assert_eq!(bench.write(index, 1, id), Err(0x0609_0030), "{index:04X}h = {id:03X}h");
+        assert_eq!(bench.get(index, 1), before);
+    }
+}

@@ -47,6 +47,8 @@ fn the_pulse_frequency_is_the_speed_and_an_internal_ramp_lags_behind_it() {
     };
     let (with_ramp, without) = (lag(5000), lag(60_000));
     assert!(with_ramp > without + 10_000, "{with_ramp} {without}");
+    // "Zero hysteresis": no more than the two supervision periods, 546 counts, in which pulses are counted and followed.
+    assert!((0..=546).contains(&without), "{without}");
 }
 
 #[test]
