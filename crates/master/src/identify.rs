@@ -7,7 +7,7 @@
 use core::fmt;
 use std::time::Duration;
 
-use canopen::{Mux, NmtState, NodeId};
+use canopen::{AbortCode, Mux, NmtState, NodeId};
 use drives::profile::{self, DriveProfile, models_by_identity};
 
 use crate::error::Error;
@@ -262,15 +262,18 @@ async fn told_apart(node: &Node, models: &[&'static DriveProfile]) -> Result<Kno
     Ok(guess.map_or(Knowledge::Unknown, Knowledge::Guessed))
 }
 
-/// True if the node lets this object be read.
+/// True if the node has this object.
 ///
 /// # Errors
-/// [`Error::NoAnswer`] when it is silent.
+/// [`Error::NoAnswer`] when it is silent; what keeps the question from being asked.
 pub(crate) async fn has(node: &Node, mux: Mux) -> Result<bool, Error> {
     match node.upload(mux).await {
         Ok(_) => Ok(true),
+        Err(Error::Aborted { code: AbortCode::NO_SUCH_OBJECT | AbortCode::NO_SUCH_SUB_INDEX, .. }) => Ok(false),
+        // It is there, and cannot be read now.
+        Err(Error::Aborted { .. }) => Ok(true),
         Err(Error::NoAnswer { .. }) => Err(node_silent(node, mux)),
-        Err(_) => Ok(false),
+        Err(error) => Err(error),
     }
 }
 
