@@ -1,0 +1,5 @@
+"""The simulator's servers and its world commands."""
+
+import servers
+
+servers.COMMON.into("zlac8030l")
