@@ -1,9 +1,10 @@
 """Alarms 10h, 12h, 14h and 15h, their lights, and how they are cleared (manual, interface 3, 5.04)."""
 
 from checks import check, equal, eventually, near, true
+from lights import bursts, flashes, usual
 from mjoint.joint import ALARM, POSITION, REACHED, SPEED, command, is_at, speed_becomes
 
-BATTERY, LOCKED_ROTOR, STALL, OVER_VOLTAGE = 0x10, 0x12, 0x14, 0x15
+BATTERY, LOCKED_ROTOR, STALL, OVER_VOLTAGE, COMMUNICATION = 0x10, 0x12, 0x14, 0x15, 0x20
 
 
 def alarm_is(bench, code, timeout_s=8.0):
@@ -143,49 +144,58 @@ def error_register(bench):
     equal(bench.read(0x1001) & 1, 1, "bit 0 of 1001h")
 
 
-def flashes(bench, led, for_s):
-    """The lengths of what the light was on for, in simulated seconds, and of the darkness after each."""
-    end = bench.now() + for_s
-    changes = []
-    while (get := bench.world("get"))["t"] < end:
-        on = get["outputs"][led]
-        if not changes or changes[-1][1] != on:
-            changes.append((get["t"], on))
-    lengths = [(on, later - at) for (at, on), (later, _) in zip(changes, changes[1:])]
-    return lengths[1:]
+def red_flashes(bench, code, expected):
+    alarm_is(bench, code)
+    seen = bursts(flashes(bench, "RED", 12))
+    equal(usual(seen), expected, f"flashes of alarm {code:02X}h, L for long and s for short, in {seen}")
 
 
-def bursts(lengths):
-    """Flashes between long darknesses, as L for long and s for short."""
-    lit = [length for on, length in lengths if on]
-    dark = [length for on, length in lengths if not on]
-    if not lit or not dark:
-        return []
-    pause, long = max(dark) * 0.7, max(lit) * 0.6
-    words, word = [], ""
-    for on, length in lengths:
-        if on:
-            word += "L" if length > long else "s"
-        elif length > pause:
-            words.append(word)
-            word = ""
-    return words[1:]
-
-
-@check("the red light flashes the alarm: 15h is one long and five short")
-def red_light(bench):
+@check("the red light flashes over-voltage, 15h: one long and five short")
+def red_for_over_voltage(bench):
     bench.world("supply 55")
-    alarm_is(bench, OVER_VOLTAGE)
-    seen = bursts(flashes(bench, "RED", 14))
-    true(seen and set(seen) == {"Lsssss"}, f"one long and five short, again and again; got {seen}")
+    red_flashes(bench, OVER_VOLTAGE, "Lsssss")
 
 
-@check("in health the red light is dark and the green one shines or shows the battery charging")
+@check("the red light flashes a locked rotor, 12h: one long and two short")
+def red_for_locked_rotor(bench):
+    block(bench, LOCKED_ROTOR)
+    red_flashes(bench, LOCKED_ROTOR, "Lss")
+
+
+@check("the red light flashes a stall, 14h: one long and four short")
+def red_for_stall(bench):
+    block(bench, STALL)
+    red_flashes(bench, STALL, "Lssss")
+
+
+@check("the red light flashes a lost battery, 10h, one long, and lost communication, 20h, two long")
+def red_for_long_ones(bench):
+    bench.world("battery off")
+    bench.power_cycle()
+    alarm_is(bench, BATTERY)
+    battery = flashes(bench, "RED", 8)
+    bench.restart()
+    bench.write(0x1016, 0x007F0064, sub=1)
+    bench.send(0x77F, [5])
+    alarm_is(bench, COMMUNICATION)
+    communication = flashes(bench, "RED", 10)
+    lit = sorted(length for on, length in battery + communication if on)
+    true(lit[len(lit) // 2] > 0.4, f"long to the eye, got {lit} s")
+    dark = sorted(length for on, length in battery if not on)
+    near(dark[len(dark) // 4], dark[-1], 0.2, f"single flashes: the same darkness between all, {dark}")
+    equal(usual(bursts(communication)), "LL", "flashes of alarm 20h")
+
+
+@check("the green light shines or flashes in health, and flickers faster without the battery")
 def green_light(bench):
     bench.sleep(2.0)
-    seen = [bench.world("get")["outputs"] for _ in range(200)]
-    equal({outputs["RED"] for outputs in seen}, {0}, "the red light")
-    true(any(outputs["GREEN"] for outputs in seen), "the green light")
+    seen = flashes(bench, "GREEN", 3)
+    equal({bench.world("get")["outputs"]["RED"] for _ in range(100)}, {0}, "the red light in health")
+    true(bench.world("get")["outputs"]["GREEN"] or seen, "the green light in health")
+    bench.world("battery off")
+    bench.sleep(0.5)
+    dropped = flashes(bench, "GREEN", 3)
+    true(len(dropped) > 2 * len(seen) and len(dropped) > 10, f"changes in 3 s: {len(seen)} in health, {len(dropped)} without the battery")
 
 
 @check("the alarm output conducts in health with an even ones digit of 60FBh:01, and in alarm with an odd one")

@@ -3,6 +3,7 @@
 import time
 
 from checks import check, equal, eventually, near, true
+from lights import bursts, flashes, usual
 from zlim42c.axis import POSITION, POWER_STATE, go, runs, speed_becomes
 
 EMERGENCY = 0x081
@@ -169,6 +170,28 @@ def cable(bench):
     bench.sleep(0.3)  # what nobody took from the wire meanwhile is answered now
     # 2000h is the node number here: nothing watches the host.
     speed_becomes(bench, 100)
+
+
+@check("without a fault the red light is dark and the green one shines")
+def green_light(bench):
+    seen = [bench.world("get")["outputs"] for _ in range(100)]
+    equal({(outputs["RED"], outputs["GREEN"]) for outputs in seen}, {(0, 1)}, "the red and the green light")
+
+
+for _code, _count in ((OVER_VOLTAGE, 1), (PHASE_LOSS, 3), (REFERENCE, 4)):
+
+    @check(f"the red light flashes fault {_code:04X}h: {_count}")
+    def red_light(bench, code=_code, count=_count):
+        runs(bench, 100)
+        bench.world(CAUSES[code][0])
+        fault_appears(bench, code)
+        seen = flashes(bench, "RED", 9)
+        dark = sorted(length for on, length in seen if not on)
+        if count == 1:
+            near(dark[len(dark) // 4], dark[-1], 0.2, f"single flashes: the same darkness between all, {dark}")
+        else:
+            equal(len(usual(bursts(seen))), count, f"flashes, in {bursts(seen)}")
+        equal(bench.world("get")["outputs"]["GREEN"], 1, "the green light")
 
 
 @check("1014h is the identifier of the EMCY, and 80h plus the node-ID as delivered")

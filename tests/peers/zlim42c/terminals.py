@@ -2,7 +2,7 @@
 
 from checks import check, equal, eventually, near, true
 from zlim42c.axis import (
-    ALARM, ARRIVED, EMERGENCY_STOP, HOMING, HOMING_DONE, NEGATIVE_LIMIT, POSITION, POSITIVE_LIMIT,
+    ALARM, ARRIVED, DRIVE_STATUS, EMERGENCY_STOP, HOMING, HOMING_DONE, NEGATIVE_LIMIT, POSITION, POSITIVE_LIMIT,
     PULSES_PER_SECOND, VELOCITY, go, runs, set_point, speed_becomes, stands,
 )
 
@@ -184,6 +184,14 @@ def homing_output(bench):
     bench.write(0x6040, 0x1F)
     bench.status_becomes(1 << 8, 1 << 8, "bit 8", 10)
     outputs_become(bench, [1, None], "Y0 afterwards")
+
+
+@check("an output with the status function is on while operation is enabled")
+def status_output(bench):
+    bench.write(0x2030, DRIVE_STATUS, sub=0x0D)
+    for controlword, on in ((0x06, 0), (0x07, 0), (0x0F, 1), (0x07, 0), (0x0F, 1), (0x00, 0)):
+        bench.write(0x6040, controlword)
+        outputs_become(bench, [on, None], f"Y0 after {controlword:02X}h")
 
 
 @check("functions that are not connected have no effect, and others are refused")

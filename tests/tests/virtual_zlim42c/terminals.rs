@@ -14,7 +14,8 @@ const IN_POSITION: i64 = 4;
 fn outputs(bench: &mut Bench) -> i64 {
     bench.run_ms(2);
     let told = bench.get(0x2004, 0);
-    assert_eq!(i64::from(bench.report().outputs.bits), told);
+    // The lights stand behind Y0 and Y1.
+    assert_eq!(i64::from(bench.report().outputs.bits & 3), told);
     told
 }
 

@@ -20,7 +20,7 @@ use super::assembly::{AMBIENT_C, Assembly, SUPPLY_VOLTAGE};
 use super::quantity::Quantity;
 use crate::{Component, Levels, Refused, Report, TemperatureSensor};
 
-const OUTPUTS: &[&str] = &["Y0", "Y1"];
+const OUTPUTS: &[&str] = &["Y0", "Y1", "RED", "GREEN"];
 const SUPPLY_V: f64 = 24.0;
 
 /// Length of the longer motor's body, mm.
@@ -166,6 +166,8 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
             Demand::Position(point) | Demand::Velocity(point) => Some(point),
             Demand::Off | Demand::Torque(_) => None,
         };
+        let [y0, y1] = self.last.outputs;
+        let levels = [y0, y1, self.last.led.red, self.last.led.green];
         Report {
             rotor_position: Some(self.rotor_position(firmware, common.position)),
             position_demand: demand.map(|point| i64::from(point.position)),
@@ -174,7 +176,7 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
             motor_c: None,
             driver_c: None,
             statusword: common.powered.then(|| firmware.values().get(objects::STATUSWORD)),
-            outputs: Levels::new(OUTPUTS, &self.last.outputs),
+            outputs: Levels::new(OUTPUTS, &levels.map(|level| common.powered && level)),
             ..common
         }
     }
