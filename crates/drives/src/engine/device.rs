@@ -158,12 +158,6 @@ impl<const N: usize> Device<N> {
         self.eeprom_ok = ok;
     }
 
-    /// The EEPROM answers.
-    #[inline]
-    pub const fn is_eeprom_ok(&self) -> bool {
-        self.eeprom_ok
-    }
-
     /// The EEPROM answers, and what it holds can be read.
     #[inline]
     pub fn is_eeprom_sound(&self) -> bool {
@@ -336,3 +330,95 @@ macro_rules! station {
     };
 }
 pub(crate) use station;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::faults::{FaultRow, error_register};
+    use crate::row::{U8, U16, ro, rws};
+    use canopen::od::{Object, Table, keys};
+
+    const PERIOD_NS: u64 = 500_000;
+
+    static ROWS: [Entry; 3] = [
+        ro(0x1001, 0, U8, "error_register", ""),
+        rws(0x1017, 0, U16, "producer_heartbeat_time", "").default(100),
+        rws(0x2000, 0, U16, "parameter", "").default(7),
+    ];
+    static KEYS: [u32; 3] = keys(&ROWS);
+    static TABLE: Table = Table::new(&ROWS, &KEYS);
+    static PROFILE: NodeProfile = NodeProfile::cia_301(&TABLE);
+    static FAULTS: [FaultRow; 1] = [FaultRow::new(0x3210, "over-voltage", error_register::VOLTAGE, 1, "")];
+    const ERROR_REGISTER: Object<u8> = TABLE.object(0x1001, 0);
+    const HEARTBEAT: Object<u16> = TABLE.object(0x1017, 0);
+    const PARAMETER: Object<u16> = TABLE.object(0x2000, 0);
+
+    fn started() -> Device<3> {
+        let image = Image::of(&Dictionary::<3>::new(&TABLE, NodeId::MIN));
+        let mut device = Device::new(&PROFILE, Bitrate::K500, image, PERIOD_NS);
+        device.power_on(image);
+        device.restart(NodeId::MIN, Bitrate::K500, Instant::ZERO);
+        device.boot(Instant::ZERO);
+        device
+    }
+
+    fn at(periods: u64, ns: u64) -> Instant {
+        Instant::ZERO.plus_nanos(periods * PERIOD_NS + ns)
+    }
+
+    #[test]
+    fn the_task_keeps_its_grid_when_it_is_called_late_and_begins_a_new_one_after_a_long_pause() {
+        let mut device = started();
+        assert!(!device.is_task_due(at(0, PERIOD_NS - 1)));
+        assert!(device.is_task_due(at(1, 400_000)));
+        assert!(device.is_task_due(at(2, 0)));
+        assert!(!device.is_task_due(at(2, 0)));
+        assert!(device.is_task_due(at(9, 100_000)));
+        assert!(!device.is_task_due(at(10, 99_999)));
+        assert!(device.is_task_due(at(10, 100_000)));
+        device.power_off();
+        assert!(!device.is_task_due(at(20, 0)));
+        assert_eq!(device.poll_timeout(), None);
+    }
+
+    #[test]
+    fn what_is_marked_waits_while_the_eeprom_does_not_answer() {
+        let mut device = started();
+        device.values_mut().set(PARAMETER, 8);
+        device.mark(PARAMETER.slot());
+        device.set_eeprom_ok(false);
+        device.commit();
+        assert!(!device.save(&device.values().clone()) && !device.restore_factory_settings());
+        assert_eq!((device.values().get(PARAMETER), device.stored_values().get(PARAMETER)), (8, 7));
+        device.set_eeprom_ok(true);
+        device.commit();
+        assert_eq!(device.stored_values().get(PARAMETER), 8);
+    }
+
+    #[test]
+    fn factory_settings_show_parameters_at_once_and_communication_objects_after_a_restart() {
+        let mut device = started();
+        device.values_mut().set(PARAMETER, 8);
+        device.values_mut().set(HEARTBEAT, 200);
+        assert!(device.restore_factory_settings());
+        assert_eq!((device.values().get(PARAMETER), device.values().get(HEARTBEAT)), (7, 200));
+        device.restart(NodeId::MIN, Bitrate::K500, at(1, 0));
+        assert_eq!(device.values().get(HEARTBEAT), 100);
+    }
+
+    #[test]
+    fn a_restart_of_communication_leaves_parameters_and_the_error_register() {
+        let mut device = started();
+        let mut faults = FaultMonitor::new(&FAULTS);
+        faults.raise(0);
+        device.tell_faults(faults.latched(), &faults, Instant::ZERO);
+        device.values_mut().set(PARAMETER, 8);
+        device.values_mut().set(HEARTBEAT, 200);
+        device.restart_communication(at(1, 0));
+        let values = device.values();
+        assert_eq!((values.get(ERROR_REGISTER), values.get(HEARTBEAT), values.get(PARAMETER)), (0b101, 100, 8));
+        assert!(faults.reset());
+        device.tell_reset(&faults, at(1, 0));
+        assert_eq!(device.values().get(ERROR_REGISTER), 0);
+    }
+}
