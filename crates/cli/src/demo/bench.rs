@@ -195,7 +195,8 @@ impl Bench {
         self.rows.push(Row::new(section, step));
     }
 
-    /// Begins a row: sends a datagram to the drive's SDO server, and compares the answer with the manual's.
+    /// Begins a row: sends a datagram to the drive's SDO server, and compares the answer with the one that is wanted.
+    /// Fewer than eight bytes of it, as some manuals print them, stand for zeros after them.
     pub(super) fn ask(&mut self, step: impl Into<String>, request: &str, reply: &str) {
         let reply = Pattern::sdo(reply);
         self.ask_for(step, request, &reply, &reply.expectation());
@@ -309,7 +310,11 @@ impl Bench {
     pub(super) fn unseen<T>(&mut self, act: impl FnOnce(&mut Self) -> T) -> T {
         let from = self.world.now();
         let done = act(self);
-        self.cuts.push((from, self.world.now()));
+        let to = self.world.now();
+        match self.cuts.last_mut() {
+            Some(last) if last.1 == from => last.1 = to,
+            _ => self.cuts.push((from, to)),
+        }
         done
     }
 
@@ -497,5 +502,22 @@ impl Bench {
         while let Some(heard) = self.world.poll_received(self.adapter) {
             self.heard.push(heard);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_spread_of_a_start_needs_all_axes() {
+        let axis = |begin_us: f64| {
+            (0..10).map(|n| (f64::from(n) * 100.0, (f64::from(n) * 100.0 - begin_us).max(0.0))).collect()
+        };
+        let mut start = Start { setting: "", started_counts: 2.0, axes: vec![axis(100.0), axis(450.0), axis(0.0)] };
+        assert_eq!(start.times_us(), [200.0, 500.0, 100.0]);
+        assert_eq!(start.spread_us(), 400.0);
+        start.axes.push(vec![(0.0, 0.0), (900.0, 1.0)]);
+        assert!(start.spread_us().is_nan());
     }
 }

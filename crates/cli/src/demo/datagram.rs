@@ -38,8 +38,7 @@ impl Pattern {
             [Some(0x80), _, _, _, Some(a), Some(b), Some(c), Some(d)] => {
                 format!("abort {:04X} {:04X}h", u16::from_le_bytes([c, d]), u16::from_le_bytes([a, b]))
             }
-            _ if self.0.contains(&None) => self.text(),
-            _ => "as printed".into(),
+            _ => self.text(),
         }
     }
 }
@@ -87,7 +86,7 @@ mod tests {
     #[test]
     fn an_abort_is_told_by_its_code() {
         assert_eq!(Pattern::sdo("80 16 10 00 00 00 02 06").expectation(), "abort 0602 0000h");
-        assert_eq!(Pattern::sdo("60 40 60 00").expectation(), "as printed");
+        assert_eq!(Pattern::sdo("60 40 60 00").expectation(), "6040600000000000");
     }
 
     #[test]

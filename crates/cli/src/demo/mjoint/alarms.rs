@@ -15,6 +15,7 @@ const PAUSE: Duration = Duration::from_millis(1000);
 /// The table of alarms that stop the motor.
 pub(super) fn all(bench: &mut Bench) {
     bench.section("interface 3", "alarms");
+    expect_green(bench, "always bright", Expect::Near(0.0, 0.0));
     locked_rotor(bench);
     stall(bench);
     over_voltage(bench);
@@ -111,6 +112,25 @@ pub(super) fn expect_heartbeat_04(bench: &mut Bench) {
     let beats = bench.heard_since(begin, 0x701);
     let seen = beats.last().map_or(f64::NAN, |(_, frame)| f64::from(frame.padded()[0]));
     bench.expect("heartbeat", Expect::Bits(4), "", seen);
+}
+
+/// Counts how often the green light changes in a second: not at all while the battery is charged, often while there is none.
+pub(super) fn expect_green(bench: &mut Bench, how: &str, changes: Expect) {
+    const LOOKS: u32 = 200;
+    bench.step(format!("green light {how}"));
+    let mut lit = bench.output("GREEN");
+    let on = lit;
+    let mut seen = 0;
+    for _ in 0..LOOKS {
+        bench.unseen(|bench| bench.run_ms(5));
+        let now = bench.output("GREEN");
+        seen += u32::from(now != lit);
+        lit = now;
+    }
+    bench.expect("changes in 1 s", changes, "", seen.into());
+    if seen == 0 {
+        bench.compare("on", if on { "on" } else { "off" }, on);
+    }
 }
 
 /// Watches one whole round of the red light.

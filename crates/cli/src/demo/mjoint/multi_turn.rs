@@ -19,6 +19,8 @@ pub(super) fn zero_setting(bench: &mut Bench) {
     bench.expect_object(0x260E, 0, Expect::Bits(0x10), "");
     bench.expect_status("bit 3", ALARM, ALARM);
     super::alarms::expect_flashes(bench, 1, 0);
+    // "High frequency flicker": more often than a charging battery's flashes, which one could count.
+    super::alarms::expect_green(bench, "flickers", Expect::AtLeast(10.0));
     bench.write("the motor does not stop: speed mode", 0x6060, 0, 3);
     bench.write("200 r/min", 0x60FF, 0, 200);
     bench.run_ms(300);
