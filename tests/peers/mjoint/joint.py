@@ -30,7 +30,7 @@ def is_at(bench, position, what="6064h"):
 
 
 def speed_becomes(bench, r_min, timeout_s=8.0):
-    """606Ch by SDO is in 0.1 r/min."""
+    """606Ch by SDO is in 0.1 r/min: within 2 r/min, and within 2 %."""
     close = lambda now: abs(now - 10 * r_min) <= max(20, abs(r_min) // 5)
     eventually(lambda: bench.read(0x606C), close, f"606Ch becomes {10 * r_min}", timeout_s)
 

@@ -141,12 +141,13 @@ def reductions(bench):
 def greatest_speed(bench):
     for joint, greatest in ((bench, 2000), (bench.other(2), 1500)):
         eventually(joint.answers, bool, "the joint answers")
+        joint.world("supply 40")
         joint.write(0x6081, 3000)
         command(joint, POSITION, 0x2F)
         joint.write(0x607A, 10_000_000)
         eventually(lambda: joint.read(0x606C), lambda now: now > 9 * greatest, f"606Ch of node {joint.node_id}")
-        bench.sleep(0.5)
-        near(joint.read(0x606C) / 10, greatest, greatest * 0.04, f"r/min of node {joint.node_id}")
+        bench.sleep(1.0)
+        near(joint.read(0x606C) / 10, greatest, greatest * 0.01, f"r/min of node {joint.node_id}")
 
 
 def arrival_time(bench):

@@ -33,6 +33,15 @@ def gear(bench):
     settles(bench, start, 2 * COUNTS_PER_TURN, "a turn with 256 to 25")
 
 
+@check("2609h turns the direction of pulses around")
+def polarity(bench):
+    start = bench.read(0x6064)
+    bench.write(0x2609, 1)
+    bench.sleep(0.1)
+    bench.world("pulses 8192 20000")
+    settles(bench, start, -COUNTS_PER_TURN, "a turn backward")
+
+
 @check("the gear does not act on positions of CANopen")
 def gear_on_can(bench):
     bench.write(0x260B, 3200)

@@ -1,5 +1,7 @@
 """Speed mode, and the two scales of 606Ch (manual 5.04, 5.07, 5.10.2)."""
 
+import statistics
+
 from checks import check, equal, eventually, near, true
 from mjoint.joint import COUNTS_PER_SECOND, SPEED, command, rpdo3, speed_becomes
 
@@ -93,3 +95,29 @@ def under_load(bench):
     bench.sleep(1.0)
     near(bench.read(0x606C), 5000, 150, "606Ch under 20 N·m")
     equal(bench.read(0x260E), 0, "260Eh")
+
+
+@check("60FFh takes up to 3000 r/min, and the motor turns as fast as its model does: 2000")
+def greatest(bench):
+    # At 36 V the motor's own voltage and the reducer's friction leave a little less.
+    bench.world("supply 40")
+    command(bench, SPEED, 0x0F)
+    bench.write(0x60FF, 3000)
+    speed_becomes(bench, 2000)
+    bench.sleep(1.0)
+    near(bench.read(0x606C), 20_000, 200, "606Ch")
+
+
+@check("2613h shows the output with its sign: more at more speed")
+def output(bench):
+    near(bench.read(0x2613), 0, 600, "2613h at rest without power")
+    seen = []
+    for r_min in (500, 1000, -1000):
+        runs(bench, r_min)
+        bench.sleep(0.3)
+        # The mean: the loops answer each ripple of the gear.
+        seen.append(statistics.mean(bench.read(0x2613) for _ in range(100)))
+    slow, fast, backward = seen
+    true(0 < slow < fast, f"2613h at 500 and 1000 r/min: {slow} and {fast}")
+    near(backward, -fast, 0.2 * fast, "2613h at -1000 r/min")
+    true(1.6 < fast / slow < 2.2, f"the motor's own voltage grows with the speed: {slow}, {fast}")

@@ -7,7 +7,7 @@ drive always wakes up at 0, so a start elsewhere moves the switches instead.
 import itertools
 
 from checks import check, equal, near, true
-from zlim42c.axis import HOME, HOMED, HOMING, NEGATIVE_LIMIT, POSITION, POSITIVE_LIMIT, REACHED, RUNNING, go, rotor, watch
+from zlim42c.axis import HOME, HOMED, HOMING, NEGATIVE_LIMIT, POSITION, POSITIVE_LIMIT, REACHED, RUNNING, go, rotor, speed_becomes, watch
 from zlim42c import rows
 
 SWITCHES = {NEGATIVE_LIMIT: ("min", -3000), HOME: (-200, 200), POSITIVE_LIMIT: (3000, "max")}
@@ -138,6 +138,21 @@ def goes_on(bench):
     bench.status_becomes(OUTCOME, REACHED, "bits 8, 10 and 14 under halt")
     bench.write(0x6040, 0x1F)
     bench.status_becomes(OUTCOME, HOMED | REACHED, "bits 8, 10 and 14 in the end")
+
+
+@check("halt in homing takes the time of 609Ah, not that of 6084h")
+def halt_ramp(bench):
+    prepare(bench, 17, 0)
+    bench.write(0x609A, 600)
+    bench.write(0x6084, 50)
+    bench.write(0x6040, 0x1F)
+    speed_becomes(bench, -FAST)
+    mark = bench.trace.mark()
+    bench.write(0x6040, 0x011F)
+    given = bench.trace.wait(0x581, mark, 3.0, "the answer to the controlword").timestamp
+    bench.status_becomes(OUTCOME, REACHED, "bits 8, 10 and 14 under halt")
+    still = lambda frame: not any(frame.data[:4])
+    near(bench.trace.wait(0x181, mark, 3.0, "606Ch becomes 0", still).timestamp - given, 0.6, 0.04, "seconds to standstill")
 
 
 @check("homing can be repeated, and finds the same place again")

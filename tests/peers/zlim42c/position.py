@@ -61,9 +61,9 @@ def mirror(bench):
         bench.status_becomes(1 << 11, bit, f"bit 11 after {controlword:02X}h")
 
 
-def duration(pulses, r_min, up_ms, down_ms):
+def duration(pulses, r_min, up_ms, down_ms, start_r_min=START_SPEED, end_r_min=END_SPEED):
     """Closed form: an S that is symmetric covers its time at the mean of its two speeds."""
-    speed, start, end = (v * PULSES_PER_SECOND for v in (r_min, START_SPEED, END_SPEED))
+    speed, start, end = (v * PULSES_PER_SECOND for v in (r_min, start_r_min, end_r_min))
     up, down = up_ms / 1000, down_ms / 1000
     cruise = abs(pulses) - (start + speed) / 2 * up - (speed + end) / 2 * down
     return up + down + cruise / speed
@@ -86,6 +86,30 @@ def durations(bench):
         took = timed_move(bench, pulses, r_min, up_ms, down_ms)
         near(took, duration(pulses, r_min, up_ms, down_ms), 0.012, f"seconds for {pulses} at {r_min} r/min, ramps {up_ms} and {down_ms} ms")
         equal(bench.read(0x6064) - before, pulses, "pulses")
+
+
+@check("200Eh is where a move's speed begins, and 6082h where it ends")
+def start_and_end_speeds(bench):
+    watch(bench, 0x6041)
+    bench.enable(POSITION)
+    for start, end in ((100, 200), (300, 5), (2, 250)):
+        bench.write(0x200E, start)
+        bench.write(0x6082, end)
+        took = timed_move(bench, 16000, 300, 400, 400)
+        near(took, duration(16000, 300, 400, 400, start, end), 0.012, f"seconds from {start} r/min and to {end} r/min")
+
+
+@check("start and end speeds above 6081h do not make a move faster than 6081h")
+def slow_move(bench):
+    watch(bench, 0x6041, 0x606C)
+    bench.write(0x200E, 300)
+    bench.write(0x6082, 3000)
+    bench.enable(POSITION)
+    mark = bench.trace.mark()
+    took = timed_move(bench, 2000, 30, 100, 100)
+    near(took, 1.0, 0.012, "seconds for half a turn at 30 r/min")
+    fastest = max(abs(int.from_bytes(frame.data[2:6], "little", signed=True)) for frame in bench.trace.since(mark, 0x181))
+    equal(fastest, 30, "greatest 606Ch")
 
 
 @check("the ramp is an S: it gains little speed in its first and last tenth, and half of it in the middle")
