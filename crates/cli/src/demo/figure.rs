@@ -46,7 +46,7 @@ pub(super) fn zlim42c(finished: &Finished) -> Vec<Vec<Figure>> {
     vec![vec![drive(
         finished,
         "ZLIM42-C",
-        "open-loop stepper, user manual V1.03",
+        "open-loop stepper, user manual V1.03; waiting is left out at //",
         "pulses",
         samples(finished, 0, Signal::Position),
     )]]

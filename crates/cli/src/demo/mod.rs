@@ -9,6 +9,7 @@ mod bench;
 mod datagram;
 mod expect;
 mod figure;
+mod lights;
 mod mjoint;
 mod report;
 mod row;

@@ -118,3 +118,42 @@ impl Report for DemoReport {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use can::Instant;
+    use sim::recorder::Recorder;
+
+    use super::*;
+    use crate::demo::set_points::SetPoints;
+
+    fn part(rows: Vec<Row>) -> PartReport {
+        let recorder = Recorder::new(std::time::Duration::from_millis(1), []);
+        let (sections, events, starts, cuts) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (set_points, end) = (SetPoints::default(), Instant::from_secs(2));
+        PartReport::new("a drive", Finished { rows, recorder, sections, events, set_points, starts, cuts, end })
+    }
+
+    fn row(step: &str, ok: bool) -> Row {
+        let mut row = Row::new("4.1", step);
+        row.compare("1", if ok { "1" } else { "2" }, ok);
+        row
+    }
+
+    #[test]
+    fn one_difference_fails_the_whole_and_is_shown() {
+        let report =
+            DemoReport::new(vec![part(vec![row("one", true)]), part(vec![row("two", true), row("three", false)])]);
+        assert!(!report.ok);
+        assert_eq!((report.steps, report.passed), (3, 2));
+        let text = report.text(Paint::OFF);
+        assert!(text.contains("DIFFERS") && text.contains("2 of 3 steps as the manuals say"), "{text}");
+    }
+
+    #[test]
+    fn a_row_without_anything_to_compare_is_shown_and_not_counted() {
+        let report = DemoReport::new(vec![part(vec![row("one", true), Row::new("4.1", "NMT start")])]);
+        assert!(report.ok && report.steps == 1);
+        assert!(report.text(Paint::OFF).contains("NMT start"));
+    }
+}

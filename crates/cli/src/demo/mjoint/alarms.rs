@@ -6,11 +6,11 @@ use std::time::Duration;
 use super::{ALARM, idle};
 use crate::demo::bench::Bench;
 use crate::demo::expect::Expect;
+use crate::demo::lights::red_flashes;
 use crate::plot::EventKind;
 
-/// A flash that lasts this long is a long one, and darkness that does ends a round. The table does not print times.
+/// A flash that lasts this long is a long one. The table does not print times.
 const LONG: Duration = Duration::from_millis(500);
-const PAUSE: Duration = Duration::from_millis(1000);
 
 /// The table of alarms that stop the motor.
 pub(super) fn all(bench: &mut Bench) {
@@ -135,33 +135,9 @@ pub(super) fn expect_green(bench: &mut Bench, how: &str, changes: Expect) {
 
 /// Watches one whole round of the red light.
 pub(super) fn expect_flashes(bench: &mut Bench, long: usize, short: usize) {
-    let seen = bench.unseen(flashes);
+    let seen = red_flashes(bench);
     let (seen_long, seen_short) =
         (seen.iter().filter(|on| **on >= LONG).count(), seen.iter().filter(|on| **on < LONG).count());
     let words = |long: usize, short: usize| format!("red {long} long {short} short");
     bench.compare(words(long, short), words(seen_long, seen_short), (seen_long, seen_short) == (long, short));
-}
-
-/// How long each flash of a round lasts.
-fn flashes(bench: &mut Bench) -> Vec<Duration> {
-    const LOOK: Duration = Duration::from_millis(20);
-    const LIMIT: Duration = Duration::from_secs(15);
-    let begin = bench.now();
-    let (mut lit, mut dark, mut seen, mut in_round) = (Duration::ZERO, Duration::ZERO, Vec::new(), false);
-    while bench.now() - begin < LIMIT {
-        bench.run(LOOK);
-        if bench.output("RED") {
-            (lit, dark) = (lit + LOOK, Duration::ZERO);
-            continue;
-        }
-        if !lit.is_zero() && in_round {
-            seen.push(lit);
-        }
-        (lit, dark) = (Duration::ZERO, dark + LOOK);
-        if dark >= PAUSE && !seen.is_empty() {
-            break;
-        }
-        in_round |= dark >= PAUSE;
-    }
-    seen
 }

@@ -18,6 +18,17 @@ pub(super) fn boot_up(bench: &mut Bench) {
     let first = heard.first().map_or_else(|| "nothing".into(), |(_, frame)| frame.to_string());
     bench.compare("701#00", &first, first == "701#00");
     bench.expect("and nothing else", Expect::Near(1.0, 0.0), "frame", heard.len() as f64);
+    // 3.4: green while there is power, red for faults.
+    let lights = (bench.output("GREEN"), bench.output("RED"));
+    bench.compare(
+        "green on, red off",
+        format!("green {}, red {}", on(lights.0), on(lights.1)),
+        lights == (true, false),
+    );
+}
+
+fn on(level: bool) -> &'static str {
+    if level { "on" } else { "off" }
 }
 
 /// 5.4: what the drive says it is, and its predefined identifiers.
