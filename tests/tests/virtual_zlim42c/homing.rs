@@ -257,7 +257,10 @@ fn any_start_and_any_speed_leads_to_the_edge_of_the_method() {
             let pulses_ms = (latch_rpm * pulses_per_turn) as f64 / 60_000.0;
             // What the rotor swings about its place: a few hundredths of a full step.
             let swing = 0.002 * pulses_per_turn as f64;
-            assert_within(&at, (zero - edge as f64) * direction, 9.0 * pulses_ms - swing, 11.5 * pulses_ms + swing);
+            // A start close to the edge crosses it on the ramp of 100 ms, slower than 6099h:02.
+            let on_the_ramp = ((start - edge) as f64).abs() < 100.0 * pulses_ms;
+            let least = if on_the_ramp { 0.0 } else { 9.0 * pulses_ms };
+            assert_within(&at, (zero - edge as f64) * direction, least - swing, 11.5 * pulses_ms + swing);
         }
     }
 }
