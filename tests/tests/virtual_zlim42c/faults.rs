@@ -202,6 +202,21 @@ fn a_lost_phase_is_noticed_whichever_way_the_vector_points_once_it_moves() {
 }
 
 #[test]
+fn the_other_phase_is_watched_too() {
+    use plant::stepper::Phase;
+    let mut bench = Bench::open();
+    bench.enable_in(1);
+    bench.run_ms(50);
+    bench.machine().assembly_mut().motor_mut().lost_phase = Some(Phase::B);
+    bench.run_ms(200);
+    assert_eq!(bench.get(0x603F, 0), 0, "the vector stands along phase A");
+    // A full step on it stands along phase B.
+    bench.move_by(20);
+    bench.run_ms(200);
+    assert_eq!(bench.get(0x603F, 0), 0xFF04);
+}
+
+#[test]
 fn a_lost_phase_is_noticed_at_every_speed() {
     // At 60 to 200 r/min a phase is asked for current for some ms at a time, at 1000 r/min for less than one.
     for rpm in [10, 60, 100, 150, 200, 300, 600, 1000, 2000] {
