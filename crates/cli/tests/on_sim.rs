@@ -269,7 +269,7 @@ fn the_demo_of_one_drive_is_only_of_that_drive() {
     let svg = directory.join("demo.svg");
     let demo = done(&["--json", "demo", "--drive", "zlim42c", "--svg", svg.to_str().unwrap()]).json();
     assert_eq!((&demo["ok"], demo["drives"].as_array().unwrap().len()), (&true.into(), 1));
-    assert!(demo["rows"].as_array().unwrap().iter().all(|row| row["drive"] == "ZLIM42-C"));
+    assert!(demo["rows"].as_array().unwrap().iter().all(|row| row["drive"] == "ZLTECH ZLIM42-C (70 mm)"));
     assert_eq!(ferrodrive(&["demo", "--drive", "toaster"]).status, Some(2));
     std::fs::remove_dir_all(directory).unwrap();
 }

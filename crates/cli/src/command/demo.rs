@@ -2,11 +2,13 @@
 
 use std::path::PathBuf;
 
+use clap::builder::PossibleValuesParser;
 use transport::WallClock;
 
 use crate::args::Global;
 use crate::demo::{self, DemoReport};
 use crate::failure::Failure;
+use crate::models::{self, MODELS};
 use crate::progress::Progress;
 use crate::session::exit_on_interrupt;
 
@@ -19,8 +21,8 @@ pub(crate) struct Demo {
     /// Where to draw the motion
     #[arg(long, value_name = "FILE", default_value = "demo.svg")]
     svg: PathBuf,
-    /// Only the part of one drive
-    #[arg(long, value_name = "MODEL", value_parser = clap::builder::PossibleValuesParser::new(demo::models()))]
+    /// Only the part of one drive, which may be any model that its manual is about
+    #[arg(long, value_name = "MODEL", value_parser = PossibleValuesParser::new(MODELS.iter().map(|known| known.model)))]
     drive: Option<String>,
 }
 
@@ -30,7 +32,7 @@ impl Demo {
         exit_on_interrupt();
         let clock = WallClock::start();
         let progress = Progress::new(global.json);
-        let (mut report, poster) = demo::run(self.drive.as_deref(), &progress)?;
+        let (mut report, poster) = demo::run(self.drive.as_deref().and_then(models::find), &progress)?;
         progress.clear();
         std::fs::write(&self.svg, poster.to_svg())
             .map_err(|error| Failure::new(format!("cannot write the picture {}", self.svg.display())).because(error))?;

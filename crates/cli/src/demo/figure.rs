@@ -10,9 +10,14 @@ use super::set_points::Axis;
 use crate::plot::{Colour, Figure, Panel, Poster, Section, Style, Trace};
 
 /// The picture without its charts.
-pub(super) fn poster() -> Poster {
+pub(super) fn poster(of_one: bool) -> Poster {
+    let title = if of_one {
+        "Every procedure of a drive's manual, on the virtual drive"
+    } else {
+        "Every procedure of three drives' manuals, on the virtual drives"
+    };
     Poster {
-        title: "Every procedure of three drives' manuals, on the virtual drives".into(),
+        title: title.into(),
         subtitle: "ferrodrive demo: datagrams as printed, the drives' own control loops, motor physics, virtual time"
             .into(),
         rows: Vec::new(),
@@ -20,10 +25,10 @@ pub(super) fn poster() -> Poster {
 }
 
 /// The ZLAC8030L's chart.
-pub(super) fn zlac8030l(finished: &Finished) -> Vec<Vec<Figure>> {
+pub(super) fn zlac8030l(finished: &Finished, name: &'static str) -> Vec<Vec<Figure>> {
     vec![vec![drive(
         finished,
-        "ZLAC8030L",
+        name,
         "hub servo, quick start guide V1.00",
         "counts",
         samples(finished, 0, Signal::Position),
@@ -31,10 +36,10 @@ pub(super) fn zlac8030l(finished: &Finished) -> Vec<Vec<Figure>> {
 }
 
 /// The joint's chart.
-pub(super) fn mjoint(finished: &Finished) -> Vec<Vec<Figure>> {
+pub(super) fn mjoint(finished: &Finished, name: &'static str) -> Vec<Vec<Figure>> {
     vec![vec![drive(
         finished,
-        "M4230E17B50",
+        name,
         "robot joint, CanOpen manual; waiting is left out at //",
         "counts",
         samples(finished, 0, Signal::Position),
@@ -42,10 +47,10 @@ pub(super) fn mjoint(finished: &Finished) -> Vec<Vec<Figure>> {
 }
 
 /// The stepper's chart.
-pub(super) fn zlim42c(finished: &Finished) -> Vec<Vec<Figure>> {
+pub(super) fn zlim42c(finished: &Finished, name: &'static str) -> Vec<Vec<Figure>> {
     vec![vec![drive(
         finished,
-        "ZLIM42-C",
+        name,
         "open-loop stepper, user manual V1.03; waiting is left out at //",
         "pulses",
         samples(finished, 0, Signal::Position),
@@ -53,7 +58,7 @@ pub(super) fn zlim42c(finished: &Finished) -> Vec<Vec<Figure>> {
 }
 
 /// Angle and speed of three models that are asked the same.
-pub(super) fn same_calls(finished: &Finished) -> Vec<Vec<Figure>> {
+pub(super) fn same_calls(finished: &Finished, _name: &'static str) -> Vec<Vec<Figure>> {
     let names = ["ZLAC8030L", "M joint", "ZLIM42-C"];
     vec![vec![Figure {
         title: "Three drives on one bus".into(),
@@ -70,7 +75,7 @@ pub(super) fn same_calls(finished: &Finished) -> Vec<Vec<Figure>> {
 }
 
 /// The start of three joints in microseconds, and the path that they are led along.
-pub(super) fn interpolation(finished: &Finished) -> Vec<Vec<Figure>> {
+pub(super) fn interpolation(finished: &Finished, _name: &'static str) -> Vec<Vec<Figure>> {
     let names = ["node 1", "node 2", "node 3"];
     let starts = finished.starts.iter().map(|start| Figure {
         title: format!("{}: {:.0} µs apart", start.setting, start.spread_us()),

@@ -38,7 +38,7 @@ struct Part {
     drives: &'static [(&'static DriveProfile, u8)],
     bitrate: Bitrate,
     procedures: fn(&mut Bench),
-    draw: fn(&bench::Finished) -> Vec<Vec<crate::plot::Figure>>,
+    draw: fn(&bench::Finished, &'static str) -> Vec<Vec<crate::plot::Figure>>,
 }
 
 /// "Set to different addresses in advance, such as addresses 1, 2, 3" (5.10.3).
@@ -86,28 +86,33 @@ const PARTS: [Part; 5] = [
     },
 ];
 
-/// The models that have a part of their own.
-pub(crate) fn models() -> Vec<&'static str> {
-    PARTS.iter().filter_map(|part| part.model()).collect()
-}
-
 /// Runs the demo, or the part of one model: the table, and the picture of the motion.
-pub(crate) fn run(only: Option<&str>, progress: &Progress) -> Result<(DemoReport, Poster), Failure> {
+pub(crate) fn run(only: Option<&'static DriveProfile>, progress: &Progress) -> Result<(DemoReport, Poster), Failure> {
     let mut parts = Vec::new();
-    let mut poster = figure::poster();
-    for part in PARTS.iter().filter(|part| only.is_none_or(|model| part.model() == Some(model))) {
-        let mut bench = Bench::new(part.drives, part.bitrate, progress.clone())?;
+    let mut poster = figure::poster(only.is_some());
+    for part in &PARTS {
+        let (name, drives) = match only {
+            None => (part.name, part.drives.to_vec()),
+            Some(model) => match part.with(model) {
+                Some(drives) => (model.title, drives),
+                None => continue,
+            },
+        };
+        let mut bench = Bench::new(&drives, part.bitrate, progress.clone())?;
         (part.procedures)(&mut bench);
         let finished = bench.finish();
-        poster.rows.extend((part.draw)(&finished));
-        parts.push(PartReport::new(part.name, finished));
+        poster.rows.extend((part.draw)(&finished, name));
+        parts.push(PartReport::new(name, finished));
     }
     Ok((DemoReport::new(parts), poster))
 }
 
 impl Part {
-    /// The model whose manual it is about, if it is about one.
-    fn model(&self) -> Option<&'static str> {
-        if let [(profile, _)] = self.drives { Some(profile.model) } else { None }
+    /// The part with another model in place of its drive, if the manual is the same: then the objects are too.
+    fn with(&self, model: &'static DriveProfile) -> Option<Vec<(&'static DriveProfile, u8)>> {
+        match *self.drives {
+            [(profile, node)] if std::ptr::eq(profile.table, model.table) => Some(vec![(model, node)]),
+            _ => None,
+        }
     }
 }

@@ -79,8 +79,14 @@ fn until_reached(bench: &mut Bench, goal: f64, from: f64, time_s: f64) {
     let position = bench.report().position as f64;
     bench.moved(format!("{:+.0} counts in {took_s:.2} s", position - from));
     bench.expect("at", Expect::Near(goal, IN_PLACE_COUNTS), "counts", position);
-    // The motor settles within some milliseconds of the end of its ramp.
-    bench.expect("after", Expect::Near(time_s, 0.05 * time_s + 0.03), "s", took_s);
+    expect_time(bench, "after", time_s, took_s);
+}
+
+/// How long a move took, beside its plan. How long the loops take to settle at its end the manual does not print. The
+/// M8025's rotor is 2.5 times as heavy as the M4230's, with the same gains as delivered.
+fn expect_time(bench: &mut Bench, what: &str, planned_s: f64, took_s: f64) {
+    let settling_s = if bench.model().model.starts_with("m8025") { 0.3 } else { 0.03 };
+    bench.expect(what, Expect::Near(planned_s, 0.05 * planned_s + settling_s), "s", took_s);
 }
 
 /// Power off the motor, position mode.
