@@ -50,6 +50,20 @@ fn world_commands_are_answered_line_by_line() {
 }
 
 #[test]
+fn every_drive_tells_the_same_fields_of_itself() {
+    let mut simulator = simulator(&["--drive", "m4230e17b50@1", "--drive", "zlim42c@2"]);
+    for node in [1, 2, 4] {
+        let got = simulator.ask(&format!("{node} get"));
+        assert_eq!((&got["ok"], &got["node"]), (&json!(true), &json!(node)));
+        for field in ["t", "position", "velocity_rpm", "current_a", "supply_v"] {
+            assert!(got[field].is_number(), "{field} in {got}");
+        }
+        assert_eq!(got["brake"], "released", "also where there is none: nothing holds the shaft");
+        assert!(got["outputs"].is_object(), "{got}");
+    }
+}
+
+#[test]
 fn the_end_of_input_leaves_it_running() {
     let mut simulator = simulator(&[]);
     simulator.close_input();

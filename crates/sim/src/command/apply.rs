@@ -104,7 +104,7 @@ struct Got<'a> {
     current_a: f64,
     supply_v: f64,
     outputs: BTreeMap<&'a str, u8>,
-    brake: Option<&'a str>,
+    brake: &'a str,
     motor_c: Option<f64>,
     driver_c: Option<f64>,
     statusword: Option<u16>,
@@ -136,7 +136,7 @@ fn get(world: &mut World, number: u8, id: StationId) -> Result<String, CommandEr
         current_a,
         supply_v,
         outputs: report.outputs.iter().map(|(name, level)| (name, u8::from(level))).collect(),
-        brake: report.brake.map(brake_text),
+        brake: brake_text(report.brake),
         motor_c: report.motor_c,
         driver_c: report.driver_c,
         statusword: report.statusword,
@@ -149,10 +149,11 @@ fn get(world: &mut World, number: u8, id: StationId) -> Result<String, CommandEr
     }))
 }
 
-fn brake_text(brake: Brake) -> &'static str {
+/// A drive without a brake has nothing that holds its shaft: clients may rely on one of the two words.
+fn brake_text(brake: Option<Brake>) -> &'static str {
     match brake {
-        Brake::Released => "released",
-        Brake::Engaged => "engaged",
+        Some(Brake::Engaged) => "engaged",
+        Some(Brake::Released) | None => "released",
     }
 }
 
