@@ -30,8 +30,12 @@ def slcan(bench):
         bus.send(request(bench, 0x40, 0, 0x10, 0, 0, 0, 0, 0))
         answer = received(bus, 0x580 + bench.node_id)
         equal(bytes(answer.data), b"\x43\x00\x10\x00" + bench.drive.device_type.to_bytes(4, "little"), "1000h")
+        mark = bench.trace.mark()
         bus.send(request(bench, 0x23, 0x81, 0x60, 0, 77, 0, 0, 0))
         received(bus, 0x580 + bench.node_id)
+        # The same answer must have passed here, or canopen-python takes it for that of its own request.
+        written = lambda frame: frame.data[0] == 0x60
+        bench.trace.wait(0x580 + bench.node_id, mark, 3.0, "the answer at the socketcand client", written)
         equal(bench.read(0x6081), 77, "6081h by socketcand after a write by slcan")
 
 

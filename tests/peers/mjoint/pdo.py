@@ -124,6 +124,19 @@ def interpolation(bench):
     true(took < 30, f"the points took {took:.1f} s")
 
 
+@check("with 261Ch = 255 mode 7 goes on by the edges at DIR, and stands without them")
+def dir_clock(bench):
+    start = bench.read(0x6064)
+    bench.write(0x261C, 255)
+    command(bench, INTERPOLATION, 0x0F)
+    rpdo4(bench, start + 300)
+    bench.send(SYNC)
+    bench.sleep(0.3)
+    near(bench.read(0x6064), start, 30, "6064h after SYNC, without edges")
+    bench.world("clock 10000")
+    is_at(bench, start + 300)
+
+
 @check("targets of three joints wait for one SYNC and then begin in the same cycle", drives=THREE)
 def together(bench):
     joints = [bench, bench.other(2), bench.other(3)]

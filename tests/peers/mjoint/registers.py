@@ -34,9 +34,10 @@ class Registers:
         return value - (1 << 32) if value >> 31 else value
 
     def write(self, address, *words):
-        answer = self.client.write_registers(address, list(words), device_id=self.unit) if len(words) > 1 else self.client.write_register(
-            address, words[0], device_id=self.unit
-        )
+        if len(words) == 1:
+            answer = self.client.write_register(address, words[0], device_id=self.unit)
+        else:
+            answer = self.client.write_registers(address, list(words), device_id=self.unit)
         true(not answer.isError(), f"write {words} to {address:#x}: {answer}")
 
     def write_long(self, address, value):
