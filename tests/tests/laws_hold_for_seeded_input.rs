@@ -48,21 +48,6 @@ fn a_joint_under_any_frames_and_sensors_keeps_its_objects_lawful_and_its_duty_cy
 }
 
 #[test]
-fn a_modbus_request_is_understood_as_it_was_written_or_refused() {
-    check("modbus_pdu");
-}
-
-#[test]
-fn a_modbus_frame_of_a_serial_line_is_whole_or_passed_over() {
-    check("modbus_rtu");
-}
-
-#[test]
-fn a_modbus_header_of_tcp_reads_back_or_ends_its_connection() {
-    check("modbus_tcp");
-}
-
-#[test]
 fn every_law_has_a_fuzz_target_and_every_fuzz_target_a_law() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../fuzz/fuzz_targets");
     let files = std::fs::read_dir(folder).expect("the folder of fuzz targets");

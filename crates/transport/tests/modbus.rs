@@ -97,6 +97,45 @@ async fn a_client_of_another_make_reads_and_writes_over_a_serial_line() {
     drop(ours);
 }
 
+/// Address and PDU with the check of "MODBUS over Serial Line V1.02", 6.2.2: x^16 + x^15 + x^2 + 1, low bit first.
+#[cfg(unix)]
+fn line_frame(content: &[u8]) -> Vec<u8> {
+    let crc = content.iter().fold(0xFFFF_u16, |crc, byte| {
+        (0..8).fold(crc ^ u16::from(*byte), |crc, _| if crc & 1 != 0 { crc >> 1 ^ 0xA001 } else { crc >> 1 })
+    });
+    [content, &crc.to_le_bytes()].concat()
+}
+
+#[cfg(unix)]
+#[tokio::test]
+async fn a_line_is_answered_by_its_unit_alone_also_after_noise() {
+    use tokio_serial::{SerialPort, SerialStream};
+
+    let clock = WallClock::start();
+    let (mut theirs, ours) = SerialStream::pair().unwrap();
+    let _server = serve(&format!("rtu://{}", ours.name().unwrap()), &clock).await;
+    let read = |unit| line_frame(&[unit, 3, 0, 0, 0, 1]);
+    let mut broken = read(UNIT);
+    broken[3] ^= 1;
+    // For another unit, for all, broken, and cut short: silence. Then our own: as often as a master would ask.
+    for silent in [read(UNIT + 1), read(0), broken, read(UNIT)[..5].to_vec()] {
+        theirs.write_all(&silent).await.unwrap();
+        clock.sleep(std::time::Duration::from_millis(20)).await;
+    }
+    let expected = line_frame(&[UNIT, 3, 2, 0, 0]);
+    let mut heard = Vec::new();
+    for _ in 0..5 {
+        theirs.write_all(&read(UNIT)).await.unwrap();
+        let mut bytes = [0; 64];
+        tokio::select! {
+            read = theirs.read(&mut bytes) => heard.extend_from_slice(&bytes[..read.unwrap()]),
+            () = clock.sleep(std::time::Duration::from_millis(200)) => {}
+        }
+    }
+    assert!(!heard.is_empty() && heard.chunks(expected.len()).all(|answer| answer == expected), "{heard:02X?}");
+    drop(ours);
+}
+
 #[tokio::test]
 async fn a_unit_that_nobody_has_is_a_target_that_fails_to_respond() {
     let clock = WallClock::start();
@@ -133,22 +172,11 @@ async fn raw(server: &ModbusServer, bytes: &[u8]) -> TcpStream {
     stream
 }
 
-#[tokio::test]
-async fn a_request_whose_parts_disagree_is_answered_and_the_next_one_served() {
-    let clock = WallClock::start();
-    let server = serve("127.0.0.1:0", &clock).await;
-    // 10h: two registers, but two bytes; then 8000h registers and none; then a good read, all in one segment.
-    let requests = [
-        &[0, 1, 0, 0, 0, 9, UNIT, 0x10, 0, 0, 0, 2, 2, 0, 1][..],
-        &[0, 2, 0, 0, 0, 7, UNIT, 0x10, 0, 0, 0x80, 0, 0],
-        &[0, 3, 0, 0, 0, 6, UNIT, 0x03, 0, 0, 0, 1],
-    ];
-    let mut stream = raw(&server, &requests.concat()).await;
-    let mut answers = [0; 9 + 9 + 11];
-    soon(&clock, stream.read_exact(&mut answers)).await.unwrap();
-    assert_eq!(answers[..9], [0, 1, 0, 0, 0, 3, UNIT, 0x90, 3]);
-    assert_eq!(answers[9..18], [0, 2, 0, 0, 0, 3, UNIT, 0x90, 3]);
-    assert_eq!(answers[18..], [0, 3, 0, 0, 0, 5, UNIT, 0x03, 2, 0, 0]);
+/// What is left of a stream until the server ends it.
+async fn rest(clock: &WallClock, mut stream: TcpStream) -> Vec<u8> {
+    let mut rest = Vec::new();
+    let _ = soon(clock, stream.read_to_end(&mut rest)).await;
+    rest
 }
 
 #[tokio::test]
@@ -157,18 +185,70 @@ async fn bytes_that_are_no_modbus_end_their_connection_and_no_other() {
     let server = serve("127.0.0.1:0", &clock).await;
     let mut neighbour = client(&server, UNIT).await;
     for bytes in [
-        &b"GET / HTTP/1.1\r\n\r\n"[..],
-        &[0, 1, 0, 1, 0, 6, UNIT, 3, 0, 0, 0, 1],
+        // Another protocol; no unit; no function; a function of responses.
+        &[0, 1, 0, 1, 0, 6, UNIT, 3, 0, 0, 0, 1][..],
         &[0, 1, 0, 0, 0, 0, UNIT],
         &[0, 1, 0, 0, 0, 1, UNIT],
-        &[0, 1, 0, 0, 0xFF, 0xFF, UNIT, 3],
+        &[0, 1, 0, 0, 0, 2, UNIT, 0x83],
+        // 03h too short and too long; 10h of two registers in two bytes, of 8000h registers in none.
+        &[0, 1, 0, 0, 0, 5, UNIT, 0x03, 0, 0, 0],
+        &[0, 1, 0, 0, 0, 7, UNIT, 0x03, 0, 0, 0, 1, 0],
+        &[0, 1, 0, 0, 0, 9, UNIT, 0x10, 0, 0, 0, 2, 2, 0, 1],
+        &[0, 2, 0, 0, 0, 7, UNIT, 0x10, 0, 0, 0x80, 0, 0],
     ] {
-        let mut stream = raw(&server, bytes).await;
-        let mut rest = Vec::new();
-        let _ = soon(&clock, stream.read_to_end(&mut rest)).await;
-        assert_eq!(rest, [], "{bytes:02X?}");
+        let stream = raw(&server, bytes).await;
+        assert_eq!(rest(&clock, stream).await, [], "{bytes:02X?}");
     }
     assert_eq!(soon(&clock, neighbour.read_holding_registers(0, 1)).await.unwrap(), Ok(vec![0]));
+}
+
+#[tokio::test]
+async fn a_request_in_pieces_and_two_in_one_segment_are_answered() {
+    let clock = WallClock::start();
+    let server = serve("127.0.0.1:0", &clock).await;
+    let write = [0, 1, 0, 0, 0, 6, UNIT, 0x06, 0, 5, 0xBE, 0xEF];
+    let read = [0, 2, 0, 0, 0, 6, UNIT, 0x03, 0, 5, 0, 1];
+    let mut stream = raw(&server, &write[..9]).await;
+    clock.sleep(std::time::Duration::from_millis(20)).await;
+    stream.write_all(&[&write[9..], &read].concat()).await.unwrap();
+    let mut answers = [0; 12 + 11];
+    soon(&clock, stream.read_exact(&mut answers)).await.unwrap();
+    assert_eq!(answers[..12], write);
+    assert_eq!(answers[12..], [0, 2, 0, 0, 0, 5, UNIT, 0x03, 2, 0xBE, 0xEF]);
+}
+
+#[tokio::test]
+async fn a_client_that_sends_anything_disturbs_no_other() {
+    let clock = WallClock::start();
+    let server = serve("127.0.0.1:0", &clock).await;
+    let mut neighbour = client(&server, UNIT).await;
+    // A generator of Marsaglia's ("Xorshift RNGs", 2003), from a fixed seed.
+    let mut state = 2_463_534_242_u32;
+    let mut next = || {
+        state ^= state << 13;
+        state ^= state >> 17;
+        state ^= state << 5;
+        state
+    };
+    let mut held = std::collections::VecDeque::new();
+    for round in 0..300 {
+        let length = next() % 40;
+        let mut bytes: Vec<u8> = (0..length).map(|_| next() as u8).collect();
+        // Two of three have a sound header, for another unit.
+        if round % 3 != 0 {
+            bytes.splice(0..0, [0, 1, 0, 0, 0, length as u8 + 1, 9, [3, 6, 0x10, 0x17][round % 4]]);
+        }
+        let mut stream = TcpStream::connect(address(&server)).await.unwrap();
+        // It may have been ended meanwhile.
+        let _ = stream.write_all(&bytes).await;
+        held.push_back(stream);
+        if held.len() > 20 {
+            held.pop_front();
+        }
+        if round % 10 == 0 {
+            assert_eq!(soon(&clock, neighbour.read_holding_registers(0, 1)).await.unwrap(), Ok(vec![0]), "{round}");
+        }
+    }
 }
 
 #[tokio::test]

@@ -5,7 +5,6 @@
 
 mod frame;
 mod mjoint;
-mod modbus;
 mod node;
 mod stream;
 
@@ -32,9 +31,6 @@ pub const ALL: &[Law] = &[
     Law { name: "sdo_wire", holds: node::sdo_wire, samples: node::SDO_WIRE_SAMPLES },
     Law { name: "node", holds: node::node, samples: node::NODE_SAMPLES },
     Law { name: "mjoint", holds: mjoint::joint, samples: mjoint::SAMPLES },
-    Law { name: "modbus_pdu", holds: modbus::pdu, samples: modbus::PDU_SAMPLES },
-    Law { name: "modbus_rtu", holds: modbus::rtu, samples: modbus::RTU_SAMPLES },
-    Law { name: "modbus_tcp", holds: modbus::tcp, samples: modbus::TCP_SAMPLES },
 ];
 
 /// The law of that name, for the fuzz targets.

@@ -1,13 +1,13 @@
 //! Modbus registers served to other programs, over TCP or a serial line ("MODBUS Application Protocol Specification
 //! V1.1b3", "MODBUS Messaging on TCP/IP Implementation Guide V1.0b", "MODBUS over Serial Line V1.02").
 //!
-//! Function codes 03h and 04h read (the registers are the same to both), 06h and 10h write; any other is answered with
-//! exception 01. The server knows no registers: each request goes as a [`ModbusRequest`] to whoever has them, and the
+//! Frames and sockets are crate `tokio-modbus`. Function codes 03h and 04h read (the registers are the same to both), 06h
+//! and 10h write; any other is answered with exception 01. The server knows no registers: each request goes as a [`ModbusRequest`] to whoever has them, and the
 //! connection waits for the answer, so that a client's requests keep their order. A unit that nobody has gets exception
 //! 0Bh over TCP, where this end is the gateway to the units, and silence on a serial line.
 
-mod pdu;
 mod rtu;
+mod service;
 mod tcp;
 
 use std::fmt;
@@ -18,18 +18,11 @@ use std::str::FromStr;
 use tokio::net::TcpListener;
 use tokio::sync::{mpsc, oneshot};
 use tokio::task::AbortHandle;
+pub use tokio_modbus::ExceptionCode as ModbusException;
 use tokio_serial::SerialStream;
 
 use crate::bus_spec::parse_address;
 use crate::{ParseBusError, WallClock};
-pub use pdu::{ModbusException, RegisterAccess};
-
-/// The bytes of requests and responses, without sockets.
-pub mod wire {
-    pub use super::pdu::{MAX_PDU_LENGTH, parse, response};
-    pub use super::rtu::{close, open};
-    pub use super::tcp::Header;
-}
 
 /// Line speed unless `?baud=` says otherwise.
 const DEFAULT_BAUD: u32 = 115_200;
@@ -89,6 +82,25 @@ impl fmt::Display for ModbusSpec {
     }
 }
 
+/// What a request wants of the registers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum RegisterAccess {
+    /// 03h, 04h.
+    Read {
+        /// First address.
+        address: u16,
+        /// 1 to 125 registers.
+        count: u16,
+    },
+    /// 06h, 10h.
+    Write {
+        /// First address.
+        address: u16,
+        /// 1 to 123 words.
+        words: Vec<u16>,
+    },
+}
+
 /// One request to one unit. Answer it with [`answer`](Self::answer); dropping it answers with exception 04.
 #[derive(Debug)]
 pub struct ModbusRequest {
@@ -144,7 +156,7 @@ impl ModbusServer {
             ModbusSpec::Rtu { path, baud } => {
                 let line = tokio_serial::new(path.as_str(), *baud);
                 let opened = SerialStream::open(&line).map_err(|error| failed(error.into()))?;
-                let task = tokio::spawn(rtu::serve(line, *baud, opened, requests, clock)).abort_handle();
+                let task = tokio::spawn(rtu::serve(line, opened, requests, clock)).abort_handle();
                 Ok(Self { place: place.clone(), task })
             }
         }
@@ -160,21 +172,6 @@ impl Drop for ModbusServer {
     fn drop(&mut self) {
         self.task.abort();
     }
-}
-
-/// Has a request answered; the response's PDU, or `None` if there is no such unit.
-async fn ask<T: From<ModbusRequest>>(
-    requests: &mpsc::Sender<T>,
-    unit: u8,
-    broadcast: bool,
-    request: &[u8],
-) -> Option<Vec<u8>> {
-    let (answer, answered) = oneshot::channel();
-    let asked = ModbusRequest { unit, broadcast, access: pdu::parse(request), answer };
-    // Who had the registers may be gone.
-    let _ = requests.send(asked.into()).await;
-    let result = answered.await.unwrap_or(Some(Err(ModbusException::ServerDeviceFailure)))?;
-    Some(pdu::response(request, &result))
 }
 
 #[cfg(test)]

@@ -1,6 +1,0 @@
-//! The law `modbus_pdu` of `ferrodrive_tests::laws` under libFuzzer.
-#![no_main]
-
-use libfuzzer_sys::fuzz_target;
-
-fuzz_target!(|data: &[u8]| ferrodrive_tests::laws::check("modbus_pdu", data));
