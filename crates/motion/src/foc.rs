@@ -152,7 +152,8 @@ pub struct Foc {
 
 impl Foc {
     /// One control period of `dt_s`.
-    #[inline]
+    // Inlined by force: with every kind of motor in one program it has several callers, and none would get it.
+    #[inline(always)]
     pub fn tick(&mut self, gains: &FocGains, setpoint_a: Dq, input: &FocInput, dt_s: f32) -> FocOutput {
         let (sin, cos) = sin_cos_turns(input.electrical_turns);
         let current_a = park(clarke(input.phase_current_a), sin, cos);

@@ -198,7 +198,8 @@ impl PmsmModel {
     }
 
     /// Moves the current by one step.
-    #[inline]
+    // Inlined by force: with every kind of motor in one program it has several callers, and none would get it.
+    #[inline(always)]
     pub fn step(&self, data: &mut PmsmData, dt_s: f64, input: &PmsmInput) -> PmsmOutput {
         if let Some(phase) = input.lost_phase {
             return self.step_two_wires(data, dt_s, input, phase);

@@ -120,7 +120,8 @@ impl Rig {
     }
 
     /// One step of bus and energies. True when [`step_slow`](Self::step_slow) is due.
-    #[inline]
+    // Inlined by force: with every kind of motor in one program it has several callers, and none would get it.
+    #[inline(always)]
     pub(crate) fn step(&mut self, model: &RigModel, dt_s: f64, flows: &Flows, bleeder_on: bool) -> bool {
         let bus = model.supply.step(&mut self.supply, dt_s, flows.bus_w, bleeder_on);
 

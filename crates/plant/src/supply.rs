@@ -93,7 +93,8 @@ impl SupplyModel {
     /// Moves the bus by one step while the inverter takes `load_w` (negative: gives back).
     ///
     /// A load that the source cannot carry pulls the bus to zero.
-    #[inline]
+    // Inlined by force: with every kind of motor in one program it has several callers, and none would get it.
+    #[inline(always)]
     pub fn step(&self, data: &mut SupplyData, dt_s: f64, load_w: f64, bleeder_on: bool) -> SupplyOutput {
         let before = data.bus_v;
         let consumption_j = if before > self.consumption_from_v { self.consumption_w * dt_s } else { 0.0 };

@@ -188,7 +188,8 @@ impl Servo {
     }
 
     /// The current loop: every control period. Duty cycles of U, V, W.
-    #[inline]
+    // Inlined by force: with every kind of motor in one program it has several callers, and none would get it.
+    #[inline(always)]
     pub fn modulate(
         &mut self,
         model: &ServoModel,
