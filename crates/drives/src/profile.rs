@@ -4,7 +4,9 @@
 //! what an object number means. A [`DriveProfile`] says it all; [`model`] finds one by name.
 
 use can::Bitrate;
+use canopen::node::NodeProfile;
 use canopen::od::{Entry, Table};
+use canopen::pdo::EventTrigger;
 use canopen::{Mux, NmtState};
 use cia402::{ModeOfOperation, PowerState, Statusword};
 
@@ -133,7 +135,7 @@ impl DriveProfile {
 
     /// True if the model departs in this way.
     pub fn has(&self, quirk: Quirk) -> bool {
-        self.quirks.contains(&quirk)
+        quirk.is_in(self.quirks)
     }
 }
 
@@ -370,10 +372,28 @@ pub struct PdoRules {
     pub event_timer_unit_ns: u64,
     /// Objects in one PDO.
     pub max_objects: u8,
-    /// The mapping may be changed while the PDO is valid.
+    /// A PDO's records may be changed while the PDO is valid.
     pub remap_while_valid: bool,
     /// The mapping cannot be changed at all.
     pub fixed_mapping: bool,
+}
+
+/// How a firmware with these rules and quirks communicates: a master reads of a drive what the drive does.
+pub(crate) const fn communication(table: &'static Table, pdo: &PdoRules, quirks: &[Quirk]) -> NodeProfile {
+    let standard = NodeProfile::cia_301(table);
+    NodeProfile {
+        start_state: if Quirk::StartsOperational.is_in(quirks) { NmtState::Operational } else { standard.start_state },
+        emcy: !Quirk::NoEmcy.is_in(quirks),
+        inhibit_unit_ns: pdo.inhibit_unit_ns,
+        event_timer_unit_ns: pdo.event_timer_unit_ns,
+        event_trigger: if Quirk::TpdoAnswersRpdo.is_in(quirks) {
+            EventTrigger::AnswersRpdo
+        } else {
+            standard.event_trigger
+        },
+        pdo_changes_while_valid: pdo.remap_while_valid,
+        ..standard
+    }
 }
 
 /// A way in which a model differs from what a program written to the standard expects.
@@ -444,6 +464,18 @@ pub enum Quirk {
 }
 
 impl Quirk {
+    /// True if it is among `quirks`.
+    pub const fn is_in(self, quirks: &[Self]) -> bool {
+        let mut at = 0;
+        while at < quirks.len() {
+            if quirks[at] as u8 == self as u8 {
+                return true;
+            }
+            at += 1;
+        }
+        false
+    }
+
     /// In words, for people.
     pub const fn text(self) -> &'static str {
         match self {

@@ -52,16 +52,19 @@ const fn joint(model: &'static str, title: &'static str) -> DriveProfile {
             effective_after_restart: AFTER_RESTART,
         },
         faults: Faults { code: Mux::new(0x260E, 0), bit_field: false, table: &ALARMS },
-        pdo: PdoRules {
-            inhibit_unit_ns: 100_000,
-            event_timer_unit_ns: 1_000_000,
-            max_objects: 3,
-            remap_while_valid: false,
-            fixed_mapping: true,
-        },
+        pdo: PDO_RULES,
         quirks: QUIRKS,
     }
 }
+
+/// The mapping is fixed; an identifier may be changed at any time, since no bit of it makes a PDO invalid (5.08).
+pub(super) const PDO_RULES: PdoRules = PdoRules {
+    inhibit_unit_ns: 100_000,
+    event_timer_unit_ns: 1_000_000,
+    max_objects: 3,
+    remap_while_valid: true,
+    fixed_mapping: true,
+};
 
 const AFTER_RESTART: &[Mux] = &[Mux::new(0x2615, 0), Mux::new(0x2619, 0)];
 
@@ -98,7 +101,7 @@ const UNITS: Units = Units {
     driver_temperature: Some(Quantity::new(0x2612, 0, 1.0)),
 };
 
-const QUIRKS: &[Quirk] = &[
+pub(super) const QUIRKS: &[Quirk] = &[
     Quirk::NoPowerStateMachine,
     Quirk::StartsOperational,
     Quirk::HeartbeatTellsAlarm,

@@ -5,28 +5,22 @@ use canopen::node::NodeProfile;
 use canopen::od::Table;
 use canopen::pdo::EventTrigger;
 
-use crate::profile::{Identity, ParameterStorage, PdoRules, Ramps, Write};
+use crate::profile::{Identity, ParameterStorage, PdoRules, Quirk, Ramps, Write, communication};
 
 /// One count of a PDO's inhibit time and event timer (ZLAC8030L, 6.1; the ZLIM42-C's manual gives none).
 const PDO_TIMER_UNIT_NS: u64 = 500_000;
 
-/// How the drives communicate: PDO timers in 0.5 ms, PDOs that may be changed while they are valid (ZLAC8030L, 6.1; the
-/// ZLIM42-C's manual gives no more than the object table).
-pub(crate) const fn node_profile(table: &'static Table) -> NodeProfile {
-    NodeProfile {
-        inhibit_unit_ns: PDO_TIMER_UNIT_NS,
-        event_timer_unit_ns: PDO_TIMER_UNIT_NS,
-        event_trigger: EventTrigger::ChangeOr255ByTimer,
-        pdo_changes_while_valid: true,
-        ..NodeProfile::cia_301(table)
-    }
+/// How the drives communicate: by [`PDO_RULES`] and their quirks, event-driven PDOs as the ZLAC8030L's manual has them
+/// (6.1; the ZLIM42-C's gives no more than the object table).
+pub(crate) const fn node_profile(table: &'static Table, quirks: &[Quirk]) -> NodeProfile {
+    NodeProfile { event_trigger: EventTrigger::ChangeOr255ByTimer, ..communication(table, &PDO_RULES, quirks) }
 }
 
 /// The same for both, though their objects have other meanings.
 pub(crate) const IDENTITY: Identity =
     Identity { device_type: 0x0004_0192, vendor_id: 0x100, product_code: 1, revision_number: 0 };
 
-/// [`node_profile`] and four objects in a mapping, for masters.
+/// PDO timers in 0.5 ms, PDOs that may be changed while they are valid, four objects in a mapping.
 pub(crate) const PDO_RULES: PdoRules = PdoRules {
     inhibit_unit_ns: PDO_TIMER_UNIT_NS,
     event_timer_unit_ns: PDO_TIMER_UNIT_NS,

@@ -78,7 +78,7 @@ const UNITS: Units = Units {
 
 const RESTART: &[Mux] = &[Mux::new(0x2008, 0), Mux::new(0x2009, 0)];
 
-const QUIRKS: &[Quirk] = &[
+pub(super) const QUIRKS: &[Quirk] = &[
     Quirk::NoSupportedDriveModes,
     Quirk::NoStandardStore,
     Quirk::NoErrorHistory,

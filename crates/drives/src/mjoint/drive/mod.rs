@@ -10,11 +10,9 @@ mod publish;
 mod registers;
 
 use can::{Bitrate, Frame, Instant, Station};
-use canopen::NmtState;
 use canopen::NodeId;
 use canopen::heartbeat::{Consumer, ConsumerEvent};
 use canopen::node::{Node, NodeProfile};
-use canopen::pdo::EventTrigger;
 use canopen::sdo::server::FrameLength;
 use cia402::{Controlword, ModeOfOperation, PowerState};
 use motion::filter::LowPass;
@@ -28,6 +26,7 @@ use super::model::Model;
 use super::objects::*;
 use super::parameters::Parameters;
 use super::power_on::Function;
+use super::profile::{PDO_RULES, QUIRKS};
 use super::protection::Protection;
 use super::pulses::Pulses;
 use super::readings::*;
@@ -38,18 +37,13 @@ use crate::engine::device::{Application, Device};
 use crate::engine::faults::FaultMonitor;
 use crate::engine::inputs::Inputs;
 use crate::engine::servo::Servo;
+use crate::profile::communication;
 use crate::{Firmware, Report};
 
 /// How this drive communicates: operational from the start, SDO requests as short as they may be, TPDO n answers
 /// RPDO n, no EMCY (5.05, 5.08, 5.11).
-pub static NODE_PROFILE: NodeProfile = NodeProfile {
-    start_state: NmtState::Operational,
-    emcy: false,
-    event_trigger: EventTrigger::AnswersRpdo,
-    pdo_changes_while_valid: true,
-    sdo_frame_length: FrameLength::Used,
-    ..NodeProfile::cia_301(&TABLE)
-};
+pub static NODE_PROFILE: NodeProfile =
+    NodeProfile { sdo_frame_length: FrameLength::Used, ..communication(&TABLE, &PDO_RULES, QUIRKS) };
 
 /// State byte of heartbeats while there is an alarm (5.11.1).
 const HEARTBEAT_ALARM: u8 = 0x04;

@@ -14,6 +14,7 @@ use super::faults::{FAULT_COUNT, FAULTS, row};
 use super::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use super::objects::*;
 use super::parameters::Parameters;
+use super::profile::QUIRKS;
 use super::protection::{Protection, Situation, is_over_current};
 use super::readings::*;
 use super::statusword::statusword;
@@ -30,7 +31,7 @@ use crate::zl::terminals::Conditions;
 use crate::{Firmware, Report, zl};
 
 /// How this drive communicates.
-pub static NODE_PROFILE: NodeProfile = zl::node_profile(&TABLE);
+pub static NODE_PROFILE: NodeProfile = zl::node_profile(&TABLE, QUIRKS);
 
 /// The firmware of a ZLAC8030L V2.0.
 #[derive(Clone)]

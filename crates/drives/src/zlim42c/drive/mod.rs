@@ -13,6 +13,7 @@ use super::faults::{FAULT_COUNT, FAULTS, FLASHES, row};
 use super::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use super::objects::*;
 use super::parameters::Parameters;
+use super::profile::QUIRKS;
 use super::protection::{PhaseWatch, Situation, causes, is_over_current};
 use super::readings::*;
 use super::statusword::{self, statusword};
@@ -27,7 +28,7 @@ use crate::zl::terminals::Conditions;
 use crate::{Firmware, Report, zl};
 
 /// How this drive communicates.
-pub static NODE_PROFILE: NodeProfile = zl::node_profile(&TABLE);
+pub static NODE_PROFILE: NodeProfile = zl::node_profile(&TABLE, QUIRKS);
 
 /// The firmware of a ZLIM42-C.
 #[derive(Clone)]
