@@ -398,6 +398,8 @@ fn a_profile_says_of_power_and_homing_what_its_quirks_say() {
         assert_eq!(profile.power != PowerStyle::Cia402, quirk(Quirk::NoPowerStateMachine), "{}", profile.model);
         assert_eq!(profile.mode_display == mux(0x6060, 0), quirk(Quirk::NoModeDisplay), "{}", profile.model);
         assert_eq!(profile.host_watchdog.is_some(), quirk(Quirk::HostWatchdogOnByDefault), "{}", profile.model);
+        let half_milliseconds = [profile.pdo.inhibit_unit_ns, profile.pdo.event_timer_unit_ns] == [500_000; 2];
+        assert_eq!(half_milliseconds, quirk(Quirk::PdoTimersInHalfMilliseconds), "{}", profile.model);
         assert_eq!(profile.homing.is_some(), profile.modes.contains(&ModeOfOperation::HOMING), "{}", profile.model);
         assert!(profile.table.find(profile.mode_display).is_ok(), "{}", profile.model);
     }

@@ -1,10 +1,11 @@
 """SDO: sizes, lengths of frames, aborts (manual 5.04 and 5.05; CiA 301, 7.2.4)."""
 
-import canopen
-
 import sweeps
+import transfers
 from checks import check, equal, true
-from sweeps import BAD_VALUE, READ_ONLY, TOO_HIGH, UNKNOWN_COMMAND
+from sweeps import BAD_VALUE, READ_ONLY, TOO_HIGH
+
+transfers.COMMON.into("mjoint")
 
 
 @check("every object of the manual reads its default with its size")
@@ -79,24 +80,6 @@ def cut_off(bench):
         bench.send(0x601, bytes.fromhex(request))
     bench.sleep(0.1)
     equal([bench.read(0x6081), bench.read(0x6040), bench.read(0x6060)], [1500, 0, 1], "6081h, 6040h and 6060h")
-
-
-@check("a command that CiA 301 does not know, and block transfer, are refused with 0504 0001")
-def unknown_commands(bench):
-    equal(bench.ask(bytes.fromhex("E0 00 10 00 00 00 00 00")), bytes.fromhex("80 00 10 00 01 00 04 05"), "answer to E0h")
-    try:
-        bench.sdo.open(0x1000, 0, "rb", block_transfer=True).close()
-    except canopen.SdoAbortedError as error:
-        equal(error.code, UNKNOWN_COMMAND, "block upload by canopen-python")
-    else:
-        raise AssertionError("a block upload by canopen-python succeeded")
-
-
-@check("a segmented download of four bytes arrives")
-def segmented(bench):
-    with bench.sdo.open(0x60FF, 0, "wb", size=4, force_segment=True) as stream:
-        stream.write((-321).to_bytes(4, "little", signed=True))
-    equal(bench.read(0x60FF), -321, "60FFh")
 
 
 @check("6079h reads the supply in 1/327 V, and 2612h the temperature in degrees")

@@ -1,10 +1,11 @@
 """SDO reads, writes and aborts (manual 3.3 and chapter 9; CiA 301, 7.2.4)."""
 
-import canopen
-
 import sweeps
+import transfers
 from checks import check, equal
-from sweeps import BAD_VALUE, UNKNOWN_COMMAND
+from sweeps import BAD_VALUE
+
+transfers.COMMON.into("zlac8030l")
 
 
 @check("every object of the manual reads its default with its size")
@@ -44,27 +45,7 @@ def modes(bench):
         equal(bench.abort_code(bench.write, 0x6060, mode), BAD_VALUE, f"6060h = {mode}")
 
 
-@check("a command that CiA 301 does not know, and block transfer, are refused with 0504 0001")
-def unknown_commands(bench):
-    expected = bytes.fromhex("80 00 10 00 01 00 04 05")
-    equal(bench.ask(bytes.fromhex("E0 00 10 00 00 00 00 00")), expected, "answer to command E0h")
-    equal(bench.ask(bytes.fromhex("A4 00 10 00 7F 00 00 00")), expected, "answer to a block upload")
-    try:
-        bench.sdo.open(0x1000, 0, "rb", block_transfer=True).close()
-    except canopen.SdoAbortedError as error:
-        equal(error.code, UNKNOWN_COMMAND, "block upload by canopen-python")
-    else:
-        raise AssertionError("a block upload by canopen-python succeeded")
-
-
 @check("an expedited download without a size is taken by the object's own size")
 def size_not_indicated(bench):
     equal(bench.ask(bytes.fromhex("22 FF 60 00 64 00 00 00")), bytes.fromhex("60 FF 60 00 00 00 00 00"), "answer")
     equal(bench.read(0x60FF), 100, "60FFh")
-
-
-@check("a segmented download of four bytes arrives")
-def segmented(bench):
-    with bench.sdo.open(0x60FF, 0, "wb", size=4, force_segment=True) as stream:
-        stream.write((-321).to_bytes(4, "little", signed=True))
-    equal(bench.read(0x60FF), -321, "60FFh")

@@ -1,12 +1,13 @@
 """SDO reads, writes and aborts (manual 5.2 and 5.4; CiA 301, 7.2.4)."""
 
-import canopen
-
 import sweeps
+import transfers
 from checks import check, equal, true
-from sweeps import BAD_VALUE, UNKNOWN_COMMAND
+from sweeps import BAD_VALUE
 
 TOGGLE = 0x05030000
+
+transfers.COMMON.into("zlim42c")
 
 
 @check("the identity is the one that the manual prints, the ZLAC8030L's")
@@ -79,25 +80,6 @@ def commands(bench):
             got = got.replace("13 00 07 06", "10 00 07 06")
         equal(got, answer, f"answer to {request}")
     equal(bench.read(0x6084), 200, "6084h")
-
-
-@check("a command that CiA 301 does not know, and block transfer, are refused with 0504 0001")
-def unknown_commands(bench):
-    expected = bytes.fromhex("80 00 10 00 01 00 04 05")
-    equal(bench.ask(bytes.fromhex("E0 00 10 00 00 00 00 00")), expected, "answer to command E0h")
-    try:
-        bench.sdo.open(0x1000, 0, "rb", block_transfer=True).close()
-    except canopen.SdoAbortedError as error:
-        equal(error.code, UNKNOWN_COMMAND, "block upload by canopen-python")
-    else:
-        raise AssertionError("a block upload by canopen-python succeeded")
-
-
-@check("a segmented download of four bytes arrives, as the normal SDO of 5.2")
-def segmented(bench):
-    with bench.sdo.open(0x60FF, 0, "wb", size=4, force_segment=True) as stream:
-        stream.write((-321).to_bytes(4, "little", signed=True))
-    equal(bench.read(0x60FF), -321, "60FFh")
 
 
 @check("a segmented download with the wrong toggle bit is aborted and stores nothing")
