@@ -29,11 +29,29 @@ const NODES: [u8; 3] = [1, 2, 3];
 const SWINGS: [(f64, f64); 3] = [(4.0, 0.5), (2.0, 1.0), (4.0 / 3.0, 1.5)];
 const PATH_S: f64 = 2.0;
 
+/// Whose 2 ms lead from point to point.
+#[derive(Clone, Copy)]
+enum TimeBase {
+    /// The joint's own, as delivered.
+    Own,
+    /// Those of SYNC.
+    Sync,
+}
+
+impl TimeBase {
+    const fn setting(self) -> &'static str {
+        match self {
+            Self::Own => "261Ch = 0",
+            Self::Sync => "261Ch = 1",
+        }
+    }
+}
+
 /// 5.10.3.
 pub(in crate::demo) fn three_joints(bench: &mut Bench) {
     bench.section("5.10.3", "start of three axes");
     prepare(bench);
-    let without = start(bench, 50_000, "261Ch = 0");
+    let without = start(bench, 50_000, TimeBase::Own);
     for node in NODES {
         bench.talk_to(node);
         bench.write(format!("node {node}: synchronised (261Ch = 1)"), 0x261C, 0, 1);
@@ -42,7 +60,7 @@ pub(in crate::demo) fn three_joints(bench: &mut Bench) {
         bench.write(format!("node {node}: enable"), 0x6040, 0, 0x0F);
     }
     bench.run_ms(20);
-    let with = start(bench, 0, "261Ch = 1");
+    let with = start(bench, 0, TimeBase::Sync);
     bench.step("SYNC as the clock brings the axes together");
     bench.expect("spread", Expect::AtMost(without.max(1.0)), "µs", with);
     bench.section("5.10.3", "path, a point each 2 ms");
@@ -72,7 +90,8 @@ fn prepare(bench: &mut Bench) {
 }
 
 /// The printed procedure: a target for each, and SYNC. The spread of the start in µs.
-fn start(bench: &mut Bench, target: i32, setting: &'static str) -> f64 {
+fn start(bench: &mut Bench, target: i32, time_base: TimeBase) -> f64 {
+    let setting = time_base.setting();
     let data = target.to_le_bytes().map(|byte| format!("{byte:02X}")).join(" ");
     let before = NODES.map(|node| shaft_counts(bench, node));
     for node in NODES {
@@ -92,8 +111,11 @@ fn start(bench: &mut Bench, target: i32, setting: &'static str) -> f64 {
     let spread_us = recorded.spread_us();
     bench.asked("080#");
     let period_us = MJoint::CONTROL_PERIOD_NS as f64 / 1e3;
-    // Without 261Ch each joint goes on at its own next 2 ms.
-    let most_us = if setting.ends_with('0') { CYCLE.as_micros() as f64 + period_us } else { period_us };
+    let most_us = match time_base {
+        // Each joint goes on at its own next 2 ms.
+        TimeBase::Own => CYCLE.as_micros() as f64 + period_us,
+        TimeBase::Sync => period_us,
+    };
     bench.moved(format!("started {spread_us:.0} µs apart"));
     bench.expect("spread of the start", Expect::AtMost(most_us), "µs", spread_us);
     bench.starts(recorded);
