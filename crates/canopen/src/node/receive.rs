@@ -95,13 +95,15 @@ impl<const N: usize> Node<N> {
     }
 
     /// Stores each mapped object whose value may be written; the others keep their value.
-    #[inline(never)]
+    #[inline(always)]
     fn apply_rpdo(&mut self, position: usize, data: u64) {
         let via = Via::Rpdo(PdoNumber::ALL[position]);
-        let Some(mapping) = self.rpdos[position].mapping().copied() else { return };
+        let Some(mapping) = self.rpdos[position].mapping() else { return };
         for object in mapping.objects() {
-            // A refused value has nobody to tell: RPDOs are not confirmed.
-            let _ = self.write(object.slot, object.extract(data), via);
+            // A refused value has nobody to tell: RPDOs are not confirmed. Communication objects cannot be mapped.
+            if let Ok(raw) = self.dictionary.write(object.slot, object.extract(data)) {
+                self.events.push(NodeEvent::Written { slot: object.slot, raw, via });
+            }
         }
     }
 }

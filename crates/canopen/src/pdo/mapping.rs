@@ -46,7 +46,8 @@ impl MappingRecord {
         let slot = values.table().find(self.mux).map_err(|_| AbortCode::NO_SUCH_OBJECT)?;
         let row = values.table().row(slot);
         let allowed = match direction {
-            Direction::Receive => row.access.is_writable(),
+            // Communication objects take effect by more than their value: by SDO only.
+            Direction::Receive => row.access.is_writable() && !row.is_communication(),
             Direction::Transmit => row.access.is_readable(),
         };
         let data_type = match (direction, row.tpdo_form) {
