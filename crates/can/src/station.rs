@@ -15,6 +15,13 @@ use crate::{Frame, Instant};
 ///
 /// A station holds no clock, thread, random source or `static`; a test may hold 127 of them.
 pub trait Station {
+    /// True if [`handle_frame`](Self::handle_frame) would do nothing with this frame, as a controller's acceptance filter
+    /// would decide it: the call may be left out. `false` is always right.
+    fn ignores(&self, frame: &Frame) -> bool {
+        let _ = frame;
+        false
+    }
+
     /// A frame arrived at `now`.
     fn handle_frame(&mut self, frame: &Frame, now: Instant);
 

@@ -298,6 +298,11 @@ impl<const N: usize> Node<N> {
 
 impl<const N: usize> Station for Node<N> {
     #[inline]
+    fn ignores(&self, frame: &Frame) -> bool {
+        frame.standard_data_id().is_none_or(|id| self.received.of(id).is_empty())
+    }
+
+    #[inline]
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
         self.now = now;
         let Some(id) = frame.standard_data_id() else { return };

@@ -229,6 +229,11 @@ impl<const N: usize> Device<N> {
 
 impl<const N: usize> Station for Device<N> {
     #[inline]
+    fn ignores(&self, frame: &Frame) -> bool {
+        !self.running || self.node.ignores(frame)
+    }
+
+    #[inline]
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
         if self.running {
             self.node.handle_frame(frame, now);
@@ -302,6 +307,10 @@ pub(crate) trait Application<const N: usize> {
 macro_rules! station {
     ($drive:ty) => {
         impl can::Station for $drive {
+            fn ignores(&self, frame: &can::Frame) -> bool {
+                self.device.ignores(frame)
+            }
+
             fn handle_frame(&mut self, frame: &can::Frame, now: can::Instant) {
                 self.device.handle_frame(frame, now);
                 self.handle_events(now);

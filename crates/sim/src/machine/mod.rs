@@ -23,7 +23,7 @@ pub use zlac8030l::{HubWheel, Zlac8030lMachine, zlac8030l};
 pub use zlim42c::{Stepper, Zlim42c82Machine, Zlim42cMachine, zlim42c, zlim42c_82};
 
 use crate::{Component, PulseTrain, Refused, Report, SwitchRange, TemperatureSensor, VirtualDrive};
-use switch::Input;
+use switch::{Inputs, stretch};
 
 /// How often a drive without enough voltage to run looks whether it has come.
 const WAKE_PERIOD_NS: u64 = 1_000_000;
@@ -36,7 +36,7 @@ pub struct Machine<A: Assembly> {
     firmware: A::Firmware,
     assembly: A,
     actuation: <A::Firmware as Firmware>::Actuation,
-    inputs: Vec<Input>,
+    inputs: Inputs,
     switched_on: bool,
     running: bool,
     next_tick: Instant,
@@ -49,7 +49,7 @@ impl<A: Assembly> Machine<A> {
             firmware,
             assembly,
             actuation: Default::default(),
-            inputs: vec![Input::default(); A::INPUTS.len()],
+            inputs: Inputs::default(),
             switched_on: false,
             running: false,
             next_tick: Instant::ZERO,
@@ -76,27 +76,14 @@ impl<A: Assembly> Machine<A> {
     fn tick(&mut self, at: Instant) {
         self.watch_supply(at);
         if self.running {
-            let sensors = self.assembly.sense(self.input_levels());
+            let levels = self.inputs.levels(|| self.assembly.shaft_counts());
+            let sensors = self.assembly.sense(levels);
             let next = self.firmware.tick(&sensors, at);
             self.assembly.step(&self.actuation);
             self.actuation = next;
         } else {
             self.assembly.step(&self.actuation);
         }
-    }
-
-    /// Bit `n` is the level of input `n`.
-    #[inline]
-    fn input_levels(&self) -> u32 {
-        let mut levels = 0;
-        for (n, input) in self.inputs.iter().enumerate() {
-            let level = match input {
-                Input::Level(level) => *level,
-                Input::Switch(range) => range.contains(self.assembly.shaft_counts()),
-            };
-            levels |= u32::from(level) << n;
-        }
-        levels
     }
 
     /// Starts the firmware when its voltage comes and stops it when it goes.
@@ -119,13 +106,17 @@ impl<A: Assembly> Machine<A> {
         }
     }
 
-    fn input(&mut self, input: usize) -> Result<&mut Input, Refused> {
-        let model = self.assembly.model();
-        self.inputs.get_mut(input).ok_or(Refused::Absent { model, what: "such input" })
+    fn input(&self, input: usize) -> Result<usize, Refused> {
+        let absent = Refused::Absent { model: self.assembly.model(), what: "such input" };
+        if input < A::INPUTS.len() { Ok(input) } else { Err(absent) }
     }
 }
 
 impl<A: Assembly> Station for Machine<A> {
+    fn ignores(&self, frame: &Frame) -> bool {
+        !self.running || self.firmware.ignores(frame)
+    }
+
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
         self.advance(now);
         if self.running {
@@ -207,7 +198,7 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
 
     fn set_input(&mut self, input: usize, level: bool, now: Instant) -> Result<(), Refused> {
         self.advance(now);
-        *self.input(input)? = Input::Level(level);
+        self.inputs.set(self.input(input)?, level);
         Ok(())
     }
 
@@ -217,7 +208,7 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
         let scale = self.assembly.shaft_counts_per_count(&self.firmware);
         let position = i64::from(self.firmware.report().position_counts);
         let reversed = self.assembly.counts_reversed(&self.firmware);
-        *self.input(input)? = Input::switch(range, position, shaft, scale, reversed);
+        self.inputs.tie(self.input(input)?, stretch(range, position, shaft, scale, reversed));
         Ok(())
     }
 

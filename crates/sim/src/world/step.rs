@@ -73,6 +73,7 @@ impl World {
         for i in 0..self.members.len() {
             match self.bus.conclude(i, passed) {
                 Part::Transmitted(frame) => self.members[i].station().handle_transmitted(&frame, self.now),
+                Part::Received if self.members[i].station().ignores(&passed.frame) => continue,
                 Part::Received => self.members[i].station().handle_frame(&passed.frame, self.now),
                 Part::Nothing => continue,
             }
