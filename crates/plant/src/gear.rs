@@ -133,12 +133,12 @@ impl GearModel {
         let windup_rad = self.windup_rad(data.twist_rad);
         let masses = Masses::new(self, data, rotor, motor.velocity_rad_s, dt_s, input);
         let side = self.side(data.twist_rad);
-        let mut moved = if side == 0.0 {
-            masses.solve(0.0, 0.0)
+        let (spring_nm, coupling) = if side == 0.0 {
+            (0.0, 0.0)
         } else {
-            let coupling = 0.5 * dt_s * self.stiffness_nm_rad + self.damping_nm_s_rad;
-            masses.solve(self.stiffness_nm_rad * windup_rad, coupling)
+            (self.stiffness_nm_rad * windup_rad, 0.5 * dt_s * self.stiffness_nm_rad + self.damping_nm_s_rad)
         };
+        let mut moved = masses.solve(spring_nm, coupling);
         if self.backlash_rad != 0.0 {
             // Teeth push, they do not pull.
             let pulls = moved.torque_nm * side < 0.0;
@@ -274,7 +274,7 @@ impl Masses {
     }
 
     /// The step with a torque of `spring_nm + coupling * (mean rate of the twist)`.
-    #[inline]
+    #[inline(always)]
     fn solve(&self, spring_nm: f64, coupling: f64) -> Moved {
         let rate_before = self.twist_rate(self.before);
         let known_nm = spring_nm + 0.5 * coupling * rate_before;

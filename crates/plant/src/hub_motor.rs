@@ -9,8 +9,8 @@ use crate::brake::BrakeModel;
 use crate::encoder::{EncoderData, EncoderModel};
 use crate::hall::{HallFault, HallModel};
 use crate::mechanics::{RotorData, RotorModel};
-use crate::pmsm::{Phase, PmsmData, PmsmInput, PmsmModel, Terminals};
-use crate::rig::{Rig, RigModel};
+use crate::pmsm::{Dq, Phase, PmsmData, PmsmInput, PmsmModel, Terminals};
+use crate::rig::{Flows, Rig, RigModel};
 
 /// What never changes about a hub motor and the power stage it is wired to.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -112,6 +112,13 @@ impl HubMotor {
     /// One step: winding, rotor, bus, encoder, energies, and now and then heat. Meant for 50 µs and less.
     #[inline]
     pub fn step(&mut self, dt_s: f64, actuation: &Actuation) {
+        if self.rests(actuation) {
+            self.torque_nm = 0.0;
+            if self.rig.step(&self.model.rig, dt_s, &Flows::default(), actuation.bleeder_on) {
+                self.step_slow();
+            }
+            return;
+        }
         let model = &self.model;
         let velocity_rad_s = self.rotor.turn(dt_s, &self.rig.load);
         let half_turn = Axis::at_small_rad(0.5 * dt_s * f64::from(model.pmsm.pole_pairs) * velocity_rad_s);
@@ -133,6 +140,16 @@ impl HubMotor {
         if self.rig.step(&model.rig, dt_s, &flows, actuation.bleeder_on) {
             self.step_slow();
         }
+    }
+
+    /// True if nothing will move or flow in this step: friction holds the shaft, and the idle bridge carries no current
+    /// (without motion there is no voltage that its diodes could rectify).
+    #[inline]
+    fn rests(&self, actuation: &Actuation) -> bool {
+        actuation.inverter == Inverter::Open
+            && self.pmsm.current_a == Dq::default()
+            && self.rotor.stands()
+            && self.model.rotor.holds(&self.rig.load, self.model.brake.torque_nm(actuation.brake_released))
     }
 
     /// Heat of the last steps into the bodies, the winding's resistance, and the magnets' direction afresh.

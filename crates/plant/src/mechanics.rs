@@ -105,9 +105,21 @@ impl RotorModel {
         let friction_j = torque * way_rad - 0.5 * inertia * (after + before) * (after - before);
         RotorOutput { velocity_rad_s: mean, friction_j, load_j: load.torque_nm * way_rad }
     }
+
+    /// True if a rotor at rest stays so while the motor gives no torque.
+    #[inline]
+    pub(crate) fn holds(&self, load: &Load, brake_nm: f64) -> bool {
+        load.locked || load.torque_nm.abs() <= self.coulomb_nm + load.coulomb_nm + brake_nm
+    }
 }
 
 impl RotorData {
+    /// At rest, and was so in the step before.
+    #[inline]
+    pub(crate) fn stands(&self) -> bool {
+        self.velocity_rad_s == 0.0 && self.velocity_change_rad_s == 0.0
+    }
+
     /// Turns the rotor on by one step, and returns the velocity it turned at.
     ///
     /// That is the velocity in the middle of the step if the acceleration stays what it was (the second-order

@@ -84,6 +84,7 @@ struct Slow {
 }
 
 /// What windings and shaft did during a step.
+#[derive(Default)]
 pub(crate) struct Flows {
     /// Power that the windings took from the bus; negative while regenerating.
     pub(crate) bus_w: f64,

@@ -266,7 +266,7 @@ impl<'a> Solver<'a> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn phase(&self, current_a: &mut f64, d: f64, q: f64, phase: Phase) -> PhaseOutput {
         let before = *current_a;
         let index = phase as usize;

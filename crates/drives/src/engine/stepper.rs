@@ -197,15 +197,20 @@ impl Stepper {
     fn step(&mut self, model: &StepperModel) {
         self.period = self.period.saturating_add(1).min(model.periods_per_command);
         let way = self.from.fraction + self.pulses_per_period * f64::from(self.period);
-        let due = self.from.position.wrapping_add(libm::floor(way + ROUNDING) as i32);
+        let due = self.from.position.wrapping_add(floor(way + ROUNDING));
         let pulses = i64::from(due.wrapping_sub(self.issued));
         let turn = i64::from(model.pulses_per_electrical_turn.max(1));
         let field = i64::from(self.field) + pulses;
-        self.field = field.rem_euclid(turn) as u16;
-        self.electrical_turns = self.electrical_turns.wrapping_add(field.div_euclid(turn) as i32);
+        if (0..turn).contains(&field) {
+            self.field = field as u16;
+        } else {
+            self.field = field.rem_euclid(turn) as u16;
+            self.electrical_turns = self.electrical_turns.wrapping_add(field.div_euclid(turn) as i32);
+        }
         self.issued = due;
     }
 
+    #[inline]
     fn note_peaks(&mut self, current_a: [f32; 2], reference_a: [f32; 2]) {
         let larger = |most: f32, now: f32| if now.abs() > most { now.abs() } else { most };
         for phase in 0..2 {
@@ -218,6 +223,13 @@ impl Stepper {
 /// From sampling the currents to the middle of the period in which the voltage acts: duty cycles go through the
 /// timer's shadow registers.
 const VOLTAGE_DELAY_PERIODS: f32 = 1.5;
+
+/// The largest whole number not above `x`, a number of pulses.
+#[inline]
+fn floor(x: f64) -> i32 {
+    let whole = x as i64;
+    (if whole as f64 > x { whole - 1 } else { whole }) as i32
+}
 
 /// A way that ends on a whole pulse does so in spite of the rounding of its tenths.
 const ROUNDING: f64 = 1e-6;
