@@ -152,7 +152,7 @@ fn the_current_of_hard_work_is_no_bus_over_current() {
     bench.set(0x2005, 0, 7);
     bench.set(0x6083, 0, 2000);
     bench.enable_in(3);
-    for (rpm, most_nm) in [(120, 0.4), (300, 0.35), (600, 0.2)] {
+    for (rpm, most_nm) in [(120, 0.4), (300, 0.35), (600, 0.19)] {
         bench.set(0x60FF, 0, rpm);
         bench.run_ms(2100);
         for part in 1..=10 {
