@@ -4,8 +4,9 @@ use std::path::Path;
 use std::time::Duration;
 
 use can::Bitrate;
-use canopen::{Mux, NodeId};
+use canopen::NodeId;
 use master::Network;
+use sim::machine::Order;
 use sim::{VirtualDrive, World};
 
 use crate::failure::Failure;
@@ -47,46 +48,12 @@ pub(crate) fn virtual_drive(
     node: NodeId,
     bitrate: Bitrate,
 ) -> Result<Box<dyn VirtualDrive>, Failure> {
-    match model.model {
-        "zlac8030l" => Ok(Box::new(sim::machine::zlac8030l(node.raw(), baud_rate(model, ZLAC_BAUD_RATE, bitrate)?))),
-        "zlim42c" => {
-            let (node, rate) = (zlim_node(model, node)?, baud_rate(model, ZLIM_BAUD_RATE, bitrate)?);
-            Ok(Box::new(sim::machine::zlim42c(node, rate)))
-        }
-        "zlim42c-82" => {
-            let (node, rate) = (zlim_node(model, node)?, baud_rate(model, ZLIM_BAUD_RATE, bitrate)?);
-            Ok(Box::new(sim::machine::zlim42c_82(node, rate)))
-        }
-        name => match drives::mjoint::Model::named(name) {
-            Some(joint) => Ok(Box::new(sim::machine::mjoint(joint, node.raw(), bitrate))),
-            None => Err(Failure::new(format!("there is no virtual {}", model.model))),
-        },
-    }
+    ordered_drive(model, &Order::new(model, node, bitrate))
 }
 
-/// Bit rates of the ZL drives, by number.
-const ZLAC_BAUD_RATE: Mux = Mux::new(0x200E, 0);
-const ZLIM_BAUD_RATE: Mux = Mux::new(0x2009, 0);
-
-/// A node-ID that a ZLIM42-C can have: 1 to 15 at its switches, 32 to 127 in 2008h.
-fn zlim_node(model: &DriveProfile, node: NodeId) -> Result<u8, Failure> {
-    match node.raw() {
-        16..=31 => Err(Failure::usage(format!("a {} cannot be node {node}", model.model))
-            .because("its switches have 1 to 15, and 2008h takes 32 to 127".to_owned())),
-        node => Ok(node),
-    }
-}
-
-/// The number that stands for a bit rate in a drive's object, by the words of the object's row.
-fn baud_rate(model: &DriveProfile, object: Mux, bitrate: Bitrate) -> Result<u16, Failure> {
-    let values = model.table.find(object).map_or(&[][..], |slot| model.table.row(slot).values);
-    let words = format!("{} kbit/s", bitrate.bits_per_second() / 1000);
-    let number =
-        values.iter().find(|(_, meaning)| *meaning == words).and_then(|(number, _)| u16::try_from(*number).ok());
-    number.ok_or_else(|| {
-        let known = values.iter().map(|(_, meaning)| *meaning).collect::<Vec<_>>().join(", ");
-        Failure::usage(format!("a {} cannot run at {bitrate}", model.model)).because(format!("{object} knows {known}"))
-    })
+/// A virtual drive as it was ordered, without power.
+pub(crate) fn ordered_drive(model: &DriveProfile, order: &Order) -> Result<Box<dyn VirtualDrive>, Failure> {
+    sim::machine::order(model, order).map_err(|error| Failure::usage(error.to_string()))
 }
 
 /// Waits until every drive has booted and looked about.
@@ -100,16 +67,4 @@ pub(crate) async fn wait_until_booted(
     }
     network.sleep(SETTLING_TIME).await;
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_bit_rate_that_the_drive_does_not_know_is_refused_with_those_it_knows() {
-        assert_eq!(baud_rate(EMBEDDED[0].0, ZLAC_BAUD_RATE, Bitrate::K125).ok(), Some(3));
-        let refusal = baud_rate(EMBEDDED[0].0, ZLAC_BAUD_RATE, Bitrate::K50).err().map(|failure| failure.to_string());
-        assert!(refusal.is_some_and(|text| text.contains("cannot run at 50k") && text.contains("100 kbit/s")));
-    }
 }

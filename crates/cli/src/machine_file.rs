@@ -36,6 +36,9 @@ struct DriveTable {
     model: String,
     node: u8,
     supply_v: Option<f64>,
+    /// What is special about this one: the keys and values that follow a comma in `sim --drive`.
+    #[serde(default)]
+    options: BTreeMap<String, OptionValue>,
     #[serde(default)]
     load: Load,
     /// Input levels by name.
@@ -114,7 +117,8 @@ fn build(text: &str) -> Result<Embedded, String> {
     let mut drives = Vec::new();
     for table in &file.drive {
         let spec = table.spec()?;
-        let mut drive = embedded::virtual_drive(spec.model, spec.node, bitrate).map_err(|failure| failure.what)?;
+        let order = spec.order(bitrate);
+        let mut drive = embedded::ordered_drive(spec.model, &order).map_err(|failure| failure.what)?;
         if let Some(supply_v) = table.supply_v {
             // Before the power comes on: capacitors once charged would hold another voltage for a while.
             drive.set_supply(supply_v, Instant::ZERO).map_err(|refused| refused.to_string())?;
@@ -138,7 +142,11 @@ fn obey(world: &mut World, command: &str) -> Result<(), String> {
 
 impl DriveTable {
     fn spec(&self) -> Result<DriveSpec, String> {
-        drive_spec(&format!("{}@{}", self.model, self.node))
+        let mut spec = drive_spec(&format!("{}@{}", self.model, self.node))?;
+        for (key, value) in &self.options {
+            spec.set(key, &value.to_string()).map_err(|reason| format!("options of node {}: {reason}", self.node))?;
+        }
+        Ok(spec)
     }
 
     /// What the table says, as world commands.
@@ -152,6 +160,23 @@ impl DriveTable {
         commands.extend(self.temperatures_c.iter().map(|(sensor, celsius)| format!("temperature {sensor} {celsius}")));
         commands.extend(self.faults.iter().map(|component| format!("fault {component} on")));
         commands.iter().map(|command| format!("{} {command}", self.node)).collect()
+    }
+}
+
+/// `2.01` as a text, `3` as a number.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum OptionValue {
+    Number(i64),
+    Text(String),
+}
+
+impl std::fmt::Display for OptionValue {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Number(number) => write!(f, "{number}"),
+            Self::Text(text) => f.write_str(text),
+        }
     }
 }
 
@@ -197,6 +222,10 @@ mod tests {
         assert!(refusal("[[drive]]\nmodel = 'zlac8030l'\nnode = 4\ncolour = 1").contains("line 4"));
         assert!(refusal("[[drive]]\nmodel = 'zlac803'\nnode = 4").contains("did you mean zlac8030l?"));
         assert!(refusal("[[drive]]\nmodel = 'zlac8030l'\nnode = 200").contains("no node 200"));
+        assert!(
+            refusal("[[drive]]\nmodel = 'zlac8030l'\nnode = 4\noptions = { colour = 'red' }").contains("no 'colour'")
+        );
+        assert_eq!(refusal("[[drive]]\nmodel = 'zlac8030l'\nnode = 4\noptions = { 2014 = 100 }"), "");
         assert!(refusal("bitrate = '7k'\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4").contains("bit rate must be"));
     }
 }

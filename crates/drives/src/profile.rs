@@ -11,6 +11,7 @@ use canopen::{Mux, NmtState};
 use cia402::{ModeOfOperation, PowerState, Statusword};
 
 use crate::engine::faults::FaultRow;
+use crate::variant::Variation;
 use crate::{mjoint, zlac8030l, zlim42c};
 
 /// All models.
@@ -81,6 +82,8 @@ pub struct DriveProfile {
     pub pdo: PdoRules,
     /// Where the model departs from the standard or from its own manual.
     pub quirks: &'static [Quirk],
+    /// At which points drives of this model may differ.
+    pub variations: &'static [Variation],
 }
 
 impl DriveProfile {

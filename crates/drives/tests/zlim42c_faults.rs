@@ -3,7 +3,7 @@
 use can::{CanId, Frame, Instant, Station};
 use drives::Firmware;
 use drives::engine::storage::Image;
-use drives::zlim42c::{Actuation, Hardware, PowerStage, Sensors, Zlim42c, objects, storage};
+use drives::zlim42c::{Actuation, Hardware, PowerStage, Sensors, Zlim42c, objects};
 
 struct Pins {
     drive: Zlim42c,
@@ -53,7 +53,7 @@ impl Pins {
 #[test]
 fn over_current_switches_off_in_the_control_period_in_which_it_is_measured() {
     for phase_current_a in [[7.0, 0.0], [0.0, -7.0], [f32::NAN, 0.0]] {
-        let mut pins = Pins::new(storage::factory());
+        let mut pins = Pins::new(Hardware::default().eeprom);
         for word in [0x06, 0x07] {
             pins.write(0x6040, word);
         }
@@ -69,7 +69,7 @@ fn over_current_switches_off_in_the_control_period_in_which_it_is_measured() {
 
 #[test]
 fn bus_over_current_is_the_mean_of_10_ms_and_flashes_five_times() {
-    let mut pins = Pins::new(storage::factory());
+    let mut pins = Pins::new(Hardware::default().eeprom);
     // Half of the time twice the limit less a little, and short peaks, are borne.
     for period in 0..2000 {
         pins.sensors.bus_current_a = if period % 2 == 0 { 6.0 } else { 0.0 };
@@ -107,7 +107,7 @@ fn a_blank_eeprom_is_a_fault_that_factory_settings_end() {
 
 #[test]
 fn a_reading_that_is_no_number_is_a_fault_and_never_a_duty_cycle() {
-    let mut pins = Pins::new(storage::factory());
+    let mut pins = Pins::new(Hardware::default().eeprom);
     for word in [0x06, 0x07, 0x0F] {
         pins.write(0x6040, word);
     }

@@ -43,7 +43,10 @@ use crate::session::{bus_failure, failure_of, interrupted, runtime};
     ferrodrive --bus socketcand://127.0.0.1:29536/can0 move 4 90deg")]
 pub(crate) struct Sim {
     /// A drive and its node-ID, e.g. zlac8030l@4; may be repeated
-    #[arg(long = "drive", value_name = "MODEL@NODE", value_parser = drive_spec, required = true)]
+    ///
+    /// After a comma: what is special about this one (`ferrodrive readings MODEL` lists it), e.g. zlim42c@2,reading=Z050:prose;
+    /// or the value that an object has at power-on, as if stored, e.g. zlac8030l@4,2014=100.
+    #[arg(long = "drive", value_name = "MODEL@NODE[,KEY=VALUE..]", value_parser = drive_spec, required = true)]
     drives: Vec<DriveSpec>,
     /// Bit rate of the bus
     #[arg(long, value_name = "RATE", default_value = "500k")]
@@ -133,7 +136,7 @@ impl Sim {
     }
 
     fn add_drive(&self, world: &mut World, spec: &DriveSpec, eeproms: Option<&Eeproms>) -> Result<(), Failure> {
-        let mut drive = embedded::virtual_drive(spec.model, spec.node, self.bitrate)?;
+        let mut drive = embedded::ordered_drive(spec.model, &spec.order(self.bitrate))?;
         let name = file_name(spec.model.model, spec.node.raw());
         if let Some(image) = eeproms.map(|eeproms| eeproms.load(&name, spec.model.model)).transpose()?.flatten() {
             drive.load_nvm(&image).map_err(|error| {

@@ -1,25 +1,106 @@
-//! A drive to simulate, `MODEL@NODE`, and which model a node is, `NODE=MODEL`.
+//! A drive to simulate, `MODEL@NODE,key=value,...`, and which model a node is, `NODE=MODEL`.
 
-use canopen::NodeId;
+use can::Bitrate;
+use canopen::{Mux, NodeId};
+use drives::variant::{NoSuchChoice, Preset, Variant, VariationKind};
+use sim::machine::Order;
 
 use super::node::node;
+use super::object;
 use super::suggest::{did_you_mean, near};
 use crate::models::{self, DriveProfile, MODELS};
 
 /// A drive to put on a virtual bus.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(crate) struct DriveSpec {
     /// Which drive.
     pub(crate) model: &'static DriveProfile,
     /// Its node-ID at the first start.
     pub(crate) node: NodeId,
+    variant: Variant,
+    presets: Vec<Preset>,
 }
 
-/// `zlac8030l@4`.
+impl DriveSpec {
+    /// A drive as delivered.
+    pub(crate) fn new(model: &'static DriveProfile, node: NodeId) -> Self {
+        Self { model, node, variant: Variant::first_of(model.variations), presets: Vec::new() }
+    }
+
+    /// What to order for a bus of this rate.
+    pub(crate) fn order(&self, bitrate: Bitrate) -> Order {
+        Order { node: self.node, bitrate, variant: self.variant, presets: self.presets.clone() }
+    }
+
+    /// Takes one option: a choice of the model's (`firmware=2.01`, `reading=Z050:prose` or `Z050=prose`), or the value that an
+    /// object has at power-on (`6060=3`, `2030:02=9`).
+    pub(crate) fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
+        let (key, value) = match key {
+            "reading" => value.split_once(':').ok_or_else(|| {
+                format!("'reading={value}' is incomplete; expected reading=PLACE:CHOICE, e.g. {}", self.an_example())
+            })?,
+            _ => (key, value),
+        };
+        match self.variant.choose(key, value) {
+            Ok(()) => Ok(()),
+            Err(NoSuchChoice::Choice(variation)) => {
+                let known: Vec<_> = variation.choices.iter().map(|choice| choice.name).collect();
+                Err(format!("{key} of a {} is no '{value}'; expected one of: {}", self.model.model, known.join(", ")))
+            }
+            Err(NoSuchChoice::Variation) => {
+                let object = object_of(self.model, key).ok_or_else(|| self.unknown(key))?;
+                let number = number(value)
+                    .ok_or_else(|| format!("'{value}' is no value for {object}; expected a whole number or 0x.."))?;
+                self.presets.push(Preset { object, value: number });
+                Ok(())
+            }
+        }
+    }
+
+    fn an_example(&self) -> String {
+        let mut readings = self.model.variations.iter().filter(|variation| variation.kind == VariationKind::Reading);
+        let known = readings.find_map(|variation| Some((variation.key, variation.choices.last()?.name)));
+        known.map_or("none for this model".into(), |(key, choice)| format!("reading={key}:{choice}"))
+    }
+
+    fn unknown(&self, key: &str) -> String {
+        let keys = self.model.variations.iter().map(|variation| match variation.kind {
+            VariationKind::Reading => format!("reading={}:CHOICE", variation.key),
+            VariationKind::Build => format!("{}=CHOICE", variation.key),
+        });
+        let known = keys.chain(["OBJECT=VALUE, e.g. 6060=3".to_owned()]).collect::<Vec<_>>().join("; ");
+        let near = near(key, self.model.variations.iter().map(|variation| variation.key));
+        format!("a {} takes no '{key}'{}; it takes: {known}", self.model.model, did_you_mean(&near))
+    }
+}
+
+/// The object that somebody means by a name, an index or an index with a sub-index.
+fn object_of(model: &DriveProfile, text: &str) -> Option<Mux> {
+    let (mux, _) = object::object(text).ok()?.resolve(Some(model.table)).ok()?;
+    Some(mux)
+}
+
+fn number(text: &str) -> Option<i64> {
+    match text.strip_prefix("0x") {
+        Some(digits) => i64::from_str_radix(digits, 16).ok(),
+        None => text.parse().ok(),
+    }
+}
+
+/// `zlac8030l@4,motor=fast,6060=3`.
 pub(crate) fn drive_spec(text: &str) -> Result<DriveSpec, String> {
+    let mut words = text.split(',');
+    let place = words.next().unwrap_or_default();
     let (name, number) =
-        text.split_once('@').ok_or_else(|| format!("'{text}' is no drive; expected MODEL@NODE, e.g. zlac8030l@4"))?;
-    Ok(DriveSpec { model: model(name)?, node: node(number)? })
+        place.split_once('@').ok_or_else(|| format!("'{place}' is no drive; expected MODEL@NODE, e.g. zlac8030l@4"))?;
+    let mut spec = DriveSpec::new(model(name)?, node(number)?);
+    for word in words {
+        let (key, value) = word
+            .split_once('=')
+            .ok_or_else(|| format!("'{word}' is no option of a drive; expected KEY=VALUE after the comma"))?;
+        spec.set(key.trim(), value.trim())?;
+    }
+    Ok(spec)
 }
 
 /// `4=zlac8030l`.
@@ -41,6 +122,10 @@ pub(crate) fn model(name: &str) -> Result<&'static DriveProfile, String> {
 mod tests {
     use super::*;
 
+    fn refusal(text: &str) -> String {
+        drive_spec(text).err().unwrap_or_default()
+    }
+
     #[test]
     fn drives_are_model_at_node() {
         let spec = drive_spec("zlac8030l@4").ok().unwrap();
@@ -49,11 +134,28 @@ mod tests {
     }
 
     #[test]
+    fn an_objects_value_at_power_on_is_given_by_index_or_name() {
+        let spec = drive_spec("zlac8030l@4,2014=100,max_current=0x64").ok().unwrap();
+        let values: Vec<_> =
+            spec.order(Bitrate::K500).presets.iter().map(|preset| (preset.object, preset.value)).collect();
+        assert_eq!(values, [(Mux::new(0x2014, 0), 100), (Mux::new(0x2015, 0), 100)]);
+    }
+
+    #[test]
+    fn an_unknown_option_is_refused_with_those_that_the_model_takes() {
+        assert!(refusal("zlac8030l@4,colour=red").contains("a zlac8030l takes no 'colour'"));
+        assert!(refusal("zlac8030l@4,colour=red").contains("OBJECT=VALUE"));
+        assert!(refusal("zlac8030l@4,fast").contains("KEY=VALUE"));
+        assert!(refusal("zlac8030l@4,6060=profile").contains("whole number"));
+        assert!(refusal("zlac8030l@4,reading=X9").contains("PLACE:CHOICE"));
+    }
+
+    #[test]
     fn wrong_drives_say_what_is_known() {
-        assert!(drive_spec("zlac8030@4").err().unwrap().contains("did you mean zlac8030l?"));
-        assert!(drive_spec("zlac8030l").err().unwrap().contains("MODEL@NODE"));
-        assert!(drive_spec("zlac8030l@128").err().unwrap().contains("1 to 127"));
-        assert!(drive_spec("@4").err().unwrap().contains("zlac8030l"));
+        assert!(refusal("zlac8030@4").contains("did you mean zlac8030l?"));
+        assert!(refusal("zlac8030l").contains("MODEL@NODE"));
+        assert!(refusal("zlac8030l@128").contains("1 to 127"));
+        assert!(refusal("@4").contains("zlac8030l"));
         assert!(node_model("zlac8030l").err().unwrap().contains("4=zlac8030l"));
     }
 }

@@ -11,6 +11,7 @@ use canopen::{EmcyErrorCode, Mux, NodeId};
 
 use super::faults::{FaultMonitor, FaultSet};
 use super::storage::{Image, Store};
+use crate::variant::Variant;
 
 /// Node, store and communication task of a drive whose table has `N` rows.
 #[derive(Clone)]
@@ -23,12 +24,19 @@ pub struct Device<const N: usize> {
     bitrate: Bitrate,
     task_period_ns: u64,
     next_task: Instant,
+    variant: Variant,
 }
 
 impl<const N: usize> Device<N> {
-    /// A device without supply, with its bit rate and EEPROM as delivered and the time between two runs of its communication
-    /// task.
-    pub fn new(profile: &'static NodeProfile, bitrate: Bitrate, image: Image, task_period_ns: u64) -> Self {
+    /// A device without supply, with its bit rate and EEPROM as delivered, the time between two runs of its communication
+    /// task, and how it differs from others of its model.
+    pub fn new(
+        profile: &'static NodeProfile,
+        bitrate: Bitrate,
+        image: Image,
+        task_period_ns: u64,
+        variant: Variant,
+    ) -> Self {
         Self {
             profile,
             node: Node::new(profile, NodeId::MIN),
@@ -38,6 +46,7 @@ impl<const N: usize> Device<N> {
             bitrate,
             task_period_ns,
             next_task: Instant::ZERO,
+            variant,
         }
     }
 
@@ -69,6 +78,18 @@ impl<const N: usize> Device<N> {
         self.bitrate
     }
 
+    /// How this drive differs from others of its model.
+    pub const fn variant(&self) -> &Variant {
+        &self.variant
+    }
+
+    /// The values as delivered, of a device with this node-ID.
+    fn factory_values(&self, node_id: NodeId) -> Dictionary<N> {
+        let mut values = Dictionary::new(self.profile.table, node_id);
+        self.variant.apply_factory_values(&mut values, |_| true);
+        values
+    }
+
     /// Supply voltage arrives, and this is found in the EEPROM. [`restart`](Self::restart) and [`boot`](Self::boot) follow.
     pub fn power_on(&mut self, image: Image) {
         self.store.reopen(image);
@@ -83,7 +104,7 @@ impl<const N: usize> Device<N> {
 
     /// The values that a restart finds. An unreadable store leaves factory values.
     pub fn stored_values(&self) -> Dictionary<N> {
-        let mut values = Dictionary::new(self.profile.table, NodeId::MIN);
+        let mut values = self.factory_values(NodeId::MIN);
         let _ = self.store.load(&mut values, |_| true);
         values
     }
@@ -91,6 +112,7 @@ impl<const N: usize> Device<N> {
     /// Starts over with the stored values. [`boot`](Self::boot) follows, when the drive has put its own on top.
     pub fn restart(&mut self, node_id: NodeId, bitrate: Bitrate, now: Instant) {
         self.node = Node::new(self.profile, node_id);
+        *self.node.dictionary_mut() = self.factory_values(node_id);
         let _ = self.store.load(self.node.dictionary_mut(), |_| true);
         self.running = true;
         self.bitrate = bitrate;
@@ -106,6 +128,7 @@ impl<const N: usize> Device<N> {
     pub fn restart_communication(&mut self, now: Instant) {
         let error_register = self.error_register().map(|slot| (slot, self.values().raw(slot)));
         self.node.restore_communication_defaults();
+        self.variant.apply_factory_values(self.node.dictionary_mut(), Entry::is_communication);
         let _ = self.store.load(self.node.dictionary_mut(), Entry::is_communication);
         if let Some((slot, register)) = error_register {
             self.node.dictionary_mut().set_raw(slot, register);
@@ -195,12 +218,12 @@ impl<const N: usize> Device<N> {
     /// Everything in the EEPROM becomes as delivered. Parameters do at once, communication objects with the next restart:
     /// until then they show what the device does. False if the EEPROM does not answer; nothing is changed then.
     pub fn restore_factory_settings(&mut self) -> bool {
-        let (table, node_id) = (self.profile.table, self.node.node_id());
-        if !self.save(&Dictionary::new(table, node_id)) {
+        let factory = self.factory_values(self.node.node_id());
+        if !self.save(&factory) {
             return false;
         }
-        for (slot, _) in table.iter().filter(|(_, row)| row.stored && !row.is_communication()) {
-            self.node.dictionary_mut().restore_default(slot, node_id);
+        for (slot, _) in factory.table().iter().filter(|(_, row)| row.stored && !row.is_communication()) {
+            self.node.dictionary_mut().set_raw(slot, factory.raw(slot));
         }
         true
     }
@@ -364,7 +387,7 @@ mod tests {
 
     fn started() -> Device<3> {
         let image = Image::of(&Dictionary::<3>::new(&TABLE, NodeId::MIN));
-        let mut device = Device::new(&PROFILE, Bitrate::K500, image, PERIOD_NS);
+        let mut device = Device::new(&PROFILE, Bitrate::K500, image, PERIOD_NS, Variant::first_of(&[]));
         device.power_on(image);
         device.restart(NodeId::MIN, Bitrate::K500, Instant::ZERO);
         device.boot(Instant::ZERO);

@@ -4,6 +4,7 @@ use can::Bitrate;
 
 use super::pulses::PulseInput;
 use super::storage;
+use super::variations::VARIANT;
 use crate::engine::storage::Image;
 
 /// The encoder's battery.
@@ -103,6 +104,6 @@ pub struct Hardware {
 impl Default for Hardware {
     /// As delivered.
     fn default() -> Self {
-        Self { eeprom: storage::factory(), bitrate: Bitrate::M1 }
+        Self { eeprom: Image::of(&storage::delivered(&VARIANT)), bitrate: Bitrate::M1 }
     }
 }

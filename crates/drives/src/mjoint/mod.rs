@@ -25,6 +25,7 @@ pub mod readings;
 pub mod statusword;
 pub mod storage;
 mod turns;
+pub mod variations;
 
 pub use drive::{MJoint, NODE_PROFILE};
 pub use hardware::{Actuation, Battery, Brake, Hardware, PowerStage, Sensors};

@@ -8,6 +8,7 @@ use super::alarms::ALARMS;
 use super::objects::TABLE;
 use super::readings::COUNTS_PER_TURN;
 use super::statusword::{HOMING_ATTAINED, HOMING_ERROR, LIVE};
+use super::variations::VARIATIONS;
 use crate::profile::{
     BitPattern, CountsPerTurn, DriveProfile, Faults, HomingRules, HomingStart, Identity, ParameterStorage, PdoRules,
     PowerStyle, Quantity, Quirk, Ramps, Units, Write,
@@ -54,6 +55,7 @@ const fn joint(model: &'static str, title: &'static str) -> DriveProfile {
         faults: Faults { code: Mux::new(0x260E, 0), bit_field: false, table: &ALARMS },
         pdo: PDO_RULES,
         quirks: QUIRKS,
+        variations: VARIATIONS,
     }
 }
 

@@ -5,22 +5,24 @@ use canopen::od::Default;
 
 use super::Values;
 use super::objects::{DEVICE_ADDRESS, TABLE};
-use crate::engine::storage::{Image, stored_rows};
+use crate::engine::storage::stored_rows;
+use crate::variant::Variant;
 
 const _: usize = stored_rows(&TABLE);
 
-/// Factory settings, node-ID 1.
-pub fn factory() -> Image {
-    with_address(1)
+/// The values as delivered, node-ID 1.
+pub fn delivered(variant: &Variant) -> Values {
+    addressed(variant, 1)
 }
 
-/// Factory settings but for the node-ID (2615h).
-pub fn with_address(node_id: u8) -> Image {
+/// The values as delivered but for the node-ID (2615h).
+pub fn addressed(variant: &Variant, node_id: u8) -> Values {
     let mut values = Values::new(&TABLE, NodeId::new(node_id).unwrap_or(NodeId::MIN));
+    variant.apply_factory_values(&mut values, |_| true);
     if TABLE.row(DEVICE_ADDRESS.slot()).check_value(i64::from(node_id)).is_ok() {
         values.set(DEVICE_ADDRESS, u16::from(node_id));
     }
-    Image::of(&values)
+    values
 }
 
 /// What a save has to store: the identifiers of PDOs follow a new device address ("setting the device address via SDO

@@ -1,6 +1,7 @@
 //! What the drive's pins read and do: the border between firmware and the physical world.
 
 use super::storage;
+use super::variations::VARIANT;
 use crate::engine::storage::Image;
 
 /// What the drive measures, each control period.
@@ -86,6 +87,6 @@ pub struct Hardware {
 impl Default for Hardware {
     /// As delivered: switches at 0, factory settings.
     fn default() -> Self {
-        Self { dip_address: 0, eeprom: storage::factory() }
+        Self { dip_address: 0, eeprom: Image::of(&storage::delivered(&VARIANT)) }
     }
 }

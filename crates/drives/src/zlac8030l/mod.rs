@@ -16,6 +16,7 @@ mod restart;
 pub mod statusword;
 pub mod storage;
 mod terminals;
+pub mod variations;
 
 pub use drive::{NODE_PROFILE, Zlac8030l};
 pub use hardware::{Actuation, Hardware, PowerStage, Sensors};

@@ -7,6 +7,7 @@ use cia402::ModeOfOperation;
 use super::faults::FAULTS;
 use super::objects::TABLE;
 use super::statusword::{EXTERNAL_STOP, IN_POSITION, RUNNING};
+use super::variations::VARIATIONS;
 use crate::profile::{CountsPerTurn, DriveProfile, Faults, PowerStyle, Quantity, Quirk, Units};
 use crate::zl;
 
@@ -43,6 +44,7 @@ pub static PROFILE: DriveProfile = DriveProfile {
     faults: Faults { code: Mux::new(0x603F, 0), bit_field: true, table: &FAULTS },
     pdo: zl::PDO_RULES,
     quirks: QUIRKS,
+    variations: VARIATIONS,
 };
 
 const RESTART: &[Mux] = &[Mux::new(0x200D, 0), Mux::new(0x200E, 0), Mux::new(0x202F, 5)];

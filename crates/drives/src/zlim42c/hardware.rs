@@ -2,6 +2,7 @@
 
 use super::led::Led;
 use super::storage;
+use super::variations::VARIANT;
 use crate::engine::storage::Image;
 
 /// What the drive measures, each control period. There is no position sensor.
@@ -71,6 +72,6 @@ pub struct Hardware {
 impl Default for Hardware {
     /// As delivered: all switches ON, factory settings.
     fn default() -> Self {
-        Self { dip_address: 0, eeprom: storage::factory() }
+        Self { dip_address: 0, eeprom: Image::of(&storage::delivered(&VARIANT)) }
     }
 }

@@ -18,6 +18,7 @@ pub mod statusword;
 pub mod storage;
 pub mod tables;
 mod terminals;
+pub mod variations;
 
 pub use drive::{NODE_PROFILE, Zlim42c};
 pub use hardware::{Actuation, Hardware, PowerStage, Sensors};

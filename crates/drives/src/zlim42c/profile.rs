@@ -8,6 +8,7 @@ use super::faults::FAULTS;
 use super::objects::TABLE;
 use super::statusword::{BIT_4_OF_CONTROLWORD, ENERGISED, HOMING_ATTAINED, IN_POSITION, RUNNING};
 use super::tables::PULSES_PER_TURN;
+use super::variations::VARIATIONS;
 use crate::profile::{
     BitPattern, CountsPerTurn, DriveProfile, Faults, HomingRules, HomingStart, PowerStyle, Quantity, Quirk, Units,
 };
@@ -41,6 +42,7 @@ const fn profile(model: &'static str, title: &'static str) -> DriveProfile {
         faults: Faults { code: Mux::new(0x603F, 0), bit_field: false, table: &FAULTS },
         pdo: zl::PDO_RULES,
         quirks: QUIRKS,
+        variations: VARIATIONS,
     }
 }
 

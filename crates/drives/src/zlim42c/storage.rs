@@ -5,24 +5,26 @@ use canopen::NodeId;
 use super::Values;
 use super::objects::{CAN_BAUD_RATE, CUSTOM_NODE_ID, TABLE};
 use super::restart::CUSTOM_NODE_IDS;
-use crate::engine::storage::{Image, stored_rows};
+use crate::engine::storage::stored_rows;
+use crate::variant::Variant;
 
 const _: usize = stored_rows(&TABLE);
 
-/// Factory settings.
-pub fn factory() -> Image {
-    Image::of(&Values::new(&TABLE, NodeId::MIN))
+/// The values as delivered.
+pub fn delivered(variant: &Variant) -> Values {
+    let mut values = Values::new(&TABLE, NodeId::MIN);
+    variant.apply_factory_values(&mut values, |_| true);
+    values
 }
 
-/// Factory settings but for the custom node-ID (2008h, 32 to 127; others leave it alone) and the number of the bit rate
-/// (2009h).
-pub fn with_address(node_id: u8, baud_rate: u16) -> Image {
-    let mut values = Values::new(&TABLE, NodeId::MIN);
+/// The same of a drive for this custom node-ID (2008h, 32 to 127; others leave it alone) and number of a bit rate (2009h).
+pub fn addressed(variant: &Variant, node_id: u8, baud_rate: u16) -> Values {
+    let mut values = delivered(variant);
     if CUSTOM_NODE_IDS.contains(&u16::from(node_id)) {
         values.set(CUSTOM_NODE_ID, u16::from(node_id));
     }
     if TABLE.row(CAN_BAUD_RATE.slot()).check_value(i64::from(baud_rate)).is_ok() {
         values.set(CAN_BAUD_RATE, baud_rate);
     }
-    Image::of(&values)
+    values
 }

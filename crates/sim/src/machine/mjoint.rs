@@ -8,7 +8,9 @@ use can::Bitrate;
 use drives::RegisterError;
 use drives::engine::storage::Image;
 use drives::mjoint::readings::{COUNTS_PER_TURN, COUNTS_S_PER_RPM};
+use drives::mjoint::variations::VARIANT;
 use drives::mjoint::{Actuation, Battery, Brake, Hardware, MJoint, Model, PowerStage, Sensors, objects, storage};
+use drives::profile::DriveProfile;
 use plant::absolute_encoder::BatteryState;
 use plant::mechanics::RotorData;
 use plant::pmsm::Phase;
@@ -16,8 +18,9 @@ use plant::{Angle, Inverter, JointMotor, JointMotorModel, Rig, joint_motor};
 
 use super::Machine;
 use super::assembly::{AMBIENT_C, Assembly, connect, with_demand};
+use super::order::{Order, OrderError};
 use super::pulse_source::PulseSource;
-use crate::{Component, Levels, PulseTrain, Refused, Report};
+use crate::{Component, Levels, PulseTrain, Refused, Report, VirtualDrive};
 
 const OUTPUTS: &[&str] = &["ZO", "WR", "RED", "GREEN"];
 const SUPPLY_V: f64 = 36.0;
@@ -33,7 +36,15 @@ pub type MJointMachine = Machine<Joint>;
 ///
 /// `bitrate` is the rate that its CAN controller is built for: 1 Mbit/s on a real one.
 pub fn mjoint(model: &'static Model, node: u8, bitrate: Bitrate) -> MJointMachine {
-    Machine::new(MJoint::new(model), Joint::new(model, storage::with_address(node), bitrate))
+    let image = Image::of(&storage::addressed(&VARIANT, node));
+    Machine::new(MJoint::new(model), Joint::new(model, image, bitrate))
+}
+
+/// The same as it was ordered.
+pub(super) fn ordered(model: &DriveProfile, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
+    let joint = Model::named(model.model).ok_or(OrderError::NoSuchModel { model: model.model })?;
+    let image = order.image(storage::addressed(&order.variant, order.node.raw()))?;
+    Ok(Box::new(Machine::new(MJoint::of(joint, order.variant), Joint::new(joint, image, order.bitrate))))
 }
 
 /// Motor, gear, load, supply and memory of a joint.

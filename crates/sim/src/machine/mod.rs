@@ -7,6 +7,7 @@
 
 mod assembly;
 mod mjoint;
+mod order;
 mod pulse_source;
 mod quantity;
 mod switch;
@@ -18,6 +19,7 @@ use drives::{Firmware, RegisterError};
 
 pub use assembly::Assembly;
 pub use mjoint::{Joint, MJointMachine, mjoint};
+pub use order::{Order, OrderError, order};
 pub use quantity::Quantity;
 pub use zlac8030l::{HubWheel, Zlac8030lMachine, zlac8030l};
 pub use zlim42c::{Stepper, Zlim42c82Machine, Zlim42cMachine, zlim42c, zlim42c_82};

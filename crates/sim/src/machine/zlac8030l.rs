@@ -3,9 +3,12 @@
 //! In go the power stage, bleeder, outputs and brake of the firmware, out come its sensors and the report for people.
 //! Figures of the motor are those of `plant`; what is assumed of the surroundings is a constant below.
 
+use canopen::Mux;
 use drives::engine::storage::Image;
+use drives::profile::DriveProfile;
 use drives::zlac8030l::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use drives::zlac8030l::readings::REFERENCE_V;
+use drives::zlac8030l::variations::VARIANT;
 use drives::zlac8030l::{Zlac8030l, objects, storage};
 use plant::angle::Angle;
 use plant::encoder::EncoderFault;
@@ -17,7 +20,8 @@ use plant::rig::Rig;
 
 use super::Machine;
 use super::assembly::{AMBIENT_C, Assembly, with_demand};
-use crate::{Brake, Component, Levels, Refused, Report};
+use super::order::{Order, OrderError, baud_rate};
+use crate::{Brake, Component, Levels, Refused, Report, VirtualDrive};
 
 const OUTPUTS: &[&str] = &["Y0", "Y1"];
 const SUPPLY_V: f64 = 48.0;
@@ -34,8 +38,24 @@ pub type Zlac8030lMachine = Machine<HubWheel>;
 /// `node` 1 to 3 is set at the DIP switches; any other number is stored in the EEPROM. `baud_rate` is the value of
 /// 200Eh in the EEPROM.
 pub fn zlac8030l(node: u8, baud_rate: u16) -> Zlac8030lMachine {
-    let dip_address = if node <= 3 { node } else { 0 };
-    Machine::new(Zlac8030l::new(), HubWheel::new(dip_address, storage::with_address(node, baud_rate)))
+    let image = Image::of(&storage::addressed(&VARIANT, node, baud_rate));
+    Machine::new(Zlac8030l::new(), HubWheel::new(dip_address(node), image))
+}
+
+/// Bit rates by number.
+const BAUD_RATE: Mux = Mux::new(0x200E, 0);
+
+/// The same as it was ordered.
+pub(super) fn ordered(model: &DriveProfile, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
+    let (node, variant) = (order.node.raw(), order.variant);
+    let baud_rate = baud_rate(model, BAUD_RATE, order.bitrate)?;
+    let image = order.image(storage::addressed(&variant, node, baud_rate))?;
+    Ok(Box::new(Machine::new(Zlac8030l::of(variant), HubWheel::new(dip_address(node), image))))
+}
+
+/// What the DIP switches of a drive for this node-ID are set to.
+const fn dip_address(node: u8) -> u8 {
+    if node <= 3 { node } else { 0 }
 }
 
 /// Motor, load, supply and memory of a ZLAC8030L.

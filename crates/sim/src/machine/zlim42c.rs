@@ -4,10 +4,13 @@
 //! know where its rotor is; the report tells both, the commanded position and the rotor's in the same pulses. Figures of
 //! the motors are those of `plant`; what is assumed of the surroundings is a constant below.
 
+use canopen::Mux;
 use drives::engine::axis::Demand;
 use drives::engine::storage::Image;
+use drives::profile::DriveProfile;
 use drives::zlim42c::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use drives::zlim42c::readings::{REFERENCE_V, TEETH};
+use drives::zlim42c::variations::VARIANT;
 use drives::zlim42c::{Zlim42c, objects, storage};
 use plant::angle::Angle;
 use plant::mechanics::RotorData;
@@ -17,8 +20,9 @@ use plant::stepper_motor::{StepperMotor, StepperMotorModel};
 
 use super::Machine;
 use super::assembly::{AMBIENT_C, Assembly, SUPPLY_VOLTAGE};
+use super::order::{Order, OrderError, baud_rate};
 use super::quantity::Quantity;
-use crate::{Component, Levels, Refused, Report, TemperatureSensor};
+use crate::{Component, Levels, Refused, Report, TemperatureSensor, VirtualDrive};
 
 const OUTPUTS: &[&str] = &["Y0", "Y1", "RED", "GREEN"];
 const SUPPLY_V: f64 = 24.0;
@@ -46,6 +50,35 @@ pub fn zlim42c(node: u8, baud_rate: u16) -> Zlim42cMachine {
 /// The same with the longer motor, 82 mm.
 pub fn zlim42c_82(node: u8, baud_rate: u16) -> Zlim42c82Machine {
     Machine::new(Zlim42c::new(), Stepper::addressed(node, baud_rate))
+}
+
+/// Bit rates by number.
+const BAUD_RATE: Mux = Mux::new(0x2009, 0);
+
+/// The same as it was ordered, of 70 mm.
+pub(super) fn ordered(model: &DriveProfile, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
+    Ok(Box::new(of_length::<70>(model, order)?))
+}
+
+/// The same as it was ordered, of 82 mm.
+pub(super) fn ordered_82(model: &DriveProfile, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
+    Ok(Box::new(of_length::<LONG>(model, order)?))
+}
+
+fn of_length<const MM: u16>(model: &DriveProfile, order: &Order) -> Result<Machine<Stepper<MM>>, OrderError> {
+    let (node, variant) = (order.node.raw(), order.variant);
+    if (16..=31).contains(&node) {
+        let reason = "its switches have 1 to 15, and 2008h takes 32 to 127";
+        return Err(OrderError::Node { model: model.model, node: order.node, reason });
+    }
+    let baud_rate = baud_rate(model, BAUD_RATE, order.bitrate)?;
+    let image = order.image(storage::addressed(&variant, node, baud_rate))?;
+    Ok(Machine::new(Zlim42c::of(variant), Stepper::new(dip_address(node), image)))
+}
+
+/// What the DIP switches of a drive for this node-ID are set to.
+const fn dip_address(node: u8) -> u8 {
+    if node <= 15 { node } else { 0 }
 }
 
 /// Motor, load, supply and memory of a ZLIM42-C whose body is this many mm long.
@@ -94,8 +127,7 @@ impl<const LENGTH_MM: u16> Stepper<LENGTH_MM> {
     }
 
     fn addressed(node: u8, baud_rate: u16) -> Self {
-        let dip_address = if node <= 15 { node } else { 0 };
-        Self::new(dip_address, storage::with_address(node, baud_rate))
+        Self::new(dip_address(node), Image::of(&storage::addressed(&VARIANT, node, baud_rate)))
     }
 
     /// Electrical turns of the rotor.

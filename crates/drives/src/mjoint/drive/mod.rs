@@ -31,13 +31,16 @@ use super::protection::Protection;
 use super::pulses::Pulses;
 use super::readings::*;
 use super::turns::Turns;
+use super::variations::VARIANT;
 use super::{Values, storage};
 use crate::engine::axis::Demand;
 use crate::engine::device::{Application, Device};
 use crate::engine::faults::FaultMonitor;
 use crate::engine::inputs::Inputs;
 use crate::engine::servo::Servo;
+use crate::engine::storage::Image;
 use crate::profile::communication;
+use crate::variant::Variant;
 use crate::{Firmware, Report};
 
 /// How this drive communicates: operational from the start, SDO requests as short as they may be, TPDO n answers
@@ -128,7 +131,13 @@ enum OwnMotion {
 impl MJoint {
     /// A drive without supply. [`Firmware::power_on`] starts it.
     pub fn new(model: &'static Model) -> Self {
-        Self::over(model, Device::new(&NODE_PROFILE, Bitrate::M1, storage::factory(), COMMUNICATION_PERIOD_NS))
+        Self::of(model, VARIANT)
+    }
+
+    /// The same of another variant.
+    pub fn of(model: &'static Model, variant: Variant) -> Self {
+        let image = Image::of(&storage::delivered(&variant));
+        Self::over(model, Device::new(&NODE_PROFILE, Bitrate::M1, image, COMMUNICATION_PERIOD_NS, variant))
     }
 
     /// Motor free, and the values of `device` in effect.

@@ -19,6 +19,7 @@ use super::protection::{Protection, Situation, is_over_current};
 use super::readings::*;
 use super::statusword::statusword;
 use super::terminals::{self, TERMINALS};
+use super::variations::VARIANT;
 use super::{Values, storage};
 use crate::engine::axis::{Axis, Demand, Feedback, Targets};
 use crate::engine::bleeder::Bleeder;
@@ -27,6 +28,8 @@ use crate::engine::faults::{FaultMonitor, FaultSet};
 use crate::engine::host_watchdog::HostWatchdog;
 use crate::engine::inputs::Inputs;
 use crate::engine::servo::Servo;
+use crate::engine::storage::Image;
+use crate::variant::Variant;
 use crate::zl::terminals::Conditions;
 use crate::{Firmware, Report, zl};
 
@@ -65,7 +68,13 @@ pub struct Zlac8030l {
 impl Zlac8030l {
     /// A drive without supply. [`Firmware::power_on`] starts it.
     pub fn new() -> Self {
-        Self::over(Device::new(&NODE_PROFILE, Bitrate::K500, storage::factory(), COMMUNICATION_PERIOD_NS))
+        Self::of(VARIANT)
+    }
+
+    /// The same of another variant.
+    pub fn of(variant: Variant) -> Self {
+        let image = Image::of(&storage::delivered(&variant));
+        Self::over(Device::new(&NODE_PROFILE, Bitrate::K500, image, COMMUNICATION_PERIOD_NS, variant))
     }
 
     /// Motor free, position 0, and the values of `device` in effect.

@@ -18,12 +18,15 @@ use super::protection::{PhaseWatch, Situation, causes, is_over_current};
 use super::readings::*;
 use super::statusword::{self, statusword};
 use super::terminals::{self, TERMINALS};
+use super::variations::VARIANT;
 use super::{Values, led, storage};
 use crate::engine::axis::{Axis, Demand, Feedback, Targets};
 use crate::engine::device::{Application, Device};
 use crate::engine::faults::{FaultMonitor, FaultSet};
 use crate::engine::inputs::Inputs;
 use crate::engine::stepper::Stepper;
+use crate::engine::storage::Image;
+use crate::variant::Variant;
 use crate::zl::terminals::Conditions;
 use crate::{Firmware, Report, zl};
 
@@ -57,7 +60,13 @@ pub struct Zlim42c {
 impl Zlim42c {
     /// A drive without supply. [`Firmware::power_on`] starts it.
     pub fn new() -> Self {
-        Self::over(Device::new(&NODE_PROFILE, Bitrate::K500, storage::factory(), COMMUNICATION_PERIOD_NS))
+        Self::of(VARIANT)
+    }
+
+    /// The same of another variant.
+    pub fn of(variant: Variant) -> Self {
+        let image = Image::of(&storage::delivered(&variant));
+        Self::over(Device::new(&NODE_PROFILE, Bitrate::K500, image, COMMUNICATION_PERIOD_NS, variant))
     }
 
     /// Motor free, position 0, and the values of `device` in effect.
