@@ -6,7 +6,7 @@ use canopen::NodeId;
 use clap::{Parser, Subcommand};
 use transport::BusSpec;
 
-use crate::command::{completions, demo, drive, dump, home, motion, nmt, objects, scan, sdo, sim, store};
+use crate::command::{completions, demo, drive, dump, home, motion, nmt, objects, readings, scan, sdo, sim, store};
 use crate::machine_file::{self, Machine};
 use crate::models::DriveProfile;
 use crate::parse::drive_spec::node_model;
@@ -62,6 +62,7 @@ pub(crate) enum Command {
     Read(sdo::Read),
     Write(sdo::Write),
     Objects(objects::Objects),
+    Readings(readings::Readings),
     Nmt(nmt::Nmt),
     State(drive::State),
     Enable(drive::Enable),

@@ -17,6 +17,7 @@ mod paint;
 mod parse;
 mod plot;
 mod progress;
+mod readings;
 mod serve;
 mod session;
 mod table;
@@ -93,6 +94,7 @@ fn run(global: &Global, format: Format, command: &Command, typed_bus: bool) -> R
             Whose::Model(model) => print(format, &objects.list(model)?),
             Whose::Node(node) => on_bus(global, format, async |context| objects.of_node(context, node).await),
         },
+        Command::Readings(readings) => print(format, &readings.list()?),
         Command::Dump(dump) => dump.run(global, format),
         Command::Completions(completions) => {
             completions.run();
