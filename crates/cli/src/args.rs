@@ -15,7 +15,7 @@ use crate::parse::drive_spec::node_model;
 #[derive(Parser)]
 #[command(name = "ferrodrive", version, propagate_version = true, max_term_width = 100, arg_required_else_help = true)]
 #[command(after_help = "Without --bus everything happens on a virtual bus of its own, in virtual time:\n  \
-    ferrodrive demo\n  ferrodrive move 4 90deg\n  ferrodrive --bus can0 state 4")]
+    ferrodrive demo\n  ferrodrive move 4 90deg\n  ferrodrive --bus socketcand://HOST:29536/can0 state 4")]
 pub(crate) struct Cli {
     #[command(flatten)]
     pub(crate) global: Global,
@@ -27,7 +27,7 @@ pub(crate) struct Cli {
 #[derive(Clone, clap::Args)]
 #[command(next_help_heading = "On every command")]
 pub(crate) struct Global {
-    /// The bus: sim, sim:FILE.toml, can0, socketcand://HOST:PORT/can0, slcan:///dev/ttyACM0?bitrate=500k,
+    /// The bus: sim, sim:FILE.toml, socketcand://HOST:PORT/can0, slcan:///dev/ttyACM0?bitrate=500k,
     /// slcan://HOST:PORT, log:FILE
     ///
     /// `sim` is a virtual bus of this command alone, with factory-fresh drives, as fast as the machine goes.

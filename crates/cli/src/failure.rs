@@ -3,6 +3,7 @@
 use std::fmt;
 
 use crate::context::how_to_say;
+use crate::signals::Signal;
 
 /// How a command ended; the process ends with the same number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -11,8 +12,21 @@ pub(crate) enum Status {
     Failed = 1,
     /// The command line makes no sense.
     Usage = 2,
-    /// Stopped by Ctrl-C, as shells number it: 128 + SIGINT.
+    /// The terminal was closed. Signals as shells number them: 128 + SIGHUP.
+    HungUp = 129,
+    /// Ctrl-C: 128 + SIGINT.
     Interrupted = 130,
+    /// Ctrl-\: 128 + SIGQUIT.
+    Quit = 131,
+    /// Asked to end: 128 + SIGTERM.
+    Terminated = 143,
+}
+
+impl Status {
+    /// True if a signal ended the command.
+    pub(crate) const fn is_signal(self) -> bool {
+        self as u8 > 128
+    }
 }
 
 /// A reason for people, in up to three parts.
@@ -39,9 +53,9 @@ impl Failure {
         Self { status: Status::Usage, ..Self::new(what) }
     }
 
-    /// Ctrl-C.
-    pub(crate) fn interrupted() -> Self {
-        Self { status: Status::Interrupted, ..Self::new("interrupted") }
+    /// A signal asked the command to end.
+    pub(crate) fn ended_by(signal: Signal) -> Self {
+        Self { status: signal.status(), ..Self::new(signal.text()) }
     }
 
     /// Adds a reason.

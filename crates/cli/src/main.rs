@@ -20,6 +20,7 @@ mod progress;
 mod readings;
 mod serve;
 mod session;
+mod signals;
 mod table;
 
 use std::io::{self, Write};
@@ -31,7 +32,7 @@ use clap::{ArgMatches, CommandFactory, FromArgMatches};
 use crate::args::{Cli, Command, Global};
 use crate::command::objects::Whose;
 use crate::context::Context;
-use crate::failure::{Failure, Status};
+use crate::failure::Failure;
 use crate::output::{Format, Report};
 use crate::paint::Paint;
 
@@ -51,9 +52,9 @@ fn main() -> ExitCode {
     }
 }
 
-/// Says on standard error why. Who pressed Ctrl-C knows, unless there is more to tell.
+/// Says on standard error why. Who sent a signal knows, unless there is more to tell.
 fn complain(failure: &Failure) {
-    if failure.status == Status::Interrupted && failure.because.is_empty() {
+    if failure.status.is_signal() && failure.because.is_empty() {
         return;
     }
     let error = Paint::for_stream(&io::stderr()).bad("error:");
@@ -96,10 +97,7 @@ fn run(global: &Global, format: Format, command: &Command, typed_bus: bool) -> R
         },
         Command::Readings(readings) => print(format, &readings.list()?),
         Command::Dump(dump) => dump.run(global, format),
-        Command::Completions(completions) => {
-            completions.run();
-            Ok(())
-        }
+        Command::Completions(completions) => completions.run(),
     }
 }
 

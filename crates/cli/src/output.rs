@@ -29,14 +29,16 @@ impl Format {
     }
 }
 
-/// One text and a line end on standard output, at once. A reader that has gone away is no error: it has
-/// seen what it wanted (`ferrodrive dump | head`).
+/// One text and a line end on standard output, at once.
 pub(crate) fn print_line(text: &str) -> io::Result<()> {
-    if text.is_empty() {
-        return Ok(());
-    }
+    if text.is_empty() { Ok(()) } else { print(format!("{text}\n").as_bytes()) }
+}
+
+/// Bytes on standard output, at once. A reader that has gone away is no error: it has seen what it wanted
+/// (`ferrodrive dump | head`).
+pub(crate) fn print(bytes: &[u8]) -> io::Result<()> {
     let mut out = io::stdout().lock();
-    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+    match out.write_all(bytes).and_then(|()| out.flush()) {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => std::process::exit(0),
         other => other,
     }

@@ -2,7 +2,6 @@
 //! driven by `transport` under tokio. The command is the same async code on both.
 
 use std::error::Error;
-use std::future::pending;
 use std::time::Duration;
 
 use canopen::{Mux, NodeId};
@@ -13,14 +12,14 @@ use transport::{BusSpec, WallClock, run_station};
 use crate::args::Global;
 use crate::context::Context;
 use crate::embedded;
-
-use crate::failure::{Failure, Status};
+use crate::failure::Failure;
 use crate::progress::Progress;
+use crate::signals::asked_to_end;
 
 /// Longest virtual time that a command may take; none comes near, and a hang would otherwise never end.
 const VIRTUAL_LIMIT: Duration = Duration::from_secs(24 * 3600);
 
-/// How long stopping may take after Ctrl-C.
+/// How long stopping may take after a signal.
 const STOP_PATIENCE: Duration = Duration::from_secs(2);
 
 /// How often the position is looked at until the shaft stands, and what it may vary by, in counts: an encoder of 32768
@@ -51,7 +50,7 @@ fn virtual_bus<R>(
     file: Option<&std::path::Path>,
     command: impl AsyncFnOnce(&Context) -> Result<R, Failure>,
 ) -> Result<R, Failure> {
-    exit_on_interrupt();
+    exit_on_signal();
     let (mut world, drives) = embedded::world(file)?;
     let network = Network::new();
     world.add_station(network.clone());
@@ -79,7 +78,7 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
                 Ok(done) => Ok(done),
                 Err(failure) => Err(stop_what_moves(&context, failure).await),
             },
-            () = interrupted() => Err(stop_what_moves(&context, Failure::interrupted()).await),
+            signal = asked_to_end() => Err(stop_what_moves(&context, Failure::ended_by(signal)).await),
         }
     };
     let mut station = network.clone();
@@ -97,41 +96,14 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     })?
 }
 
-/// Ends the process on Ctrl-C from here on: on an embedded bus there is no motor to stop.
-pub(crate) fn exit_on_interrupt() {
+/// Ends the process on Ctrl-C and its like from here on: on an embedded bus there is no motor to stop.
+pub(crate) fn exit_on_signal() {
     std::thread::spawn(|| {
         if let Ok(runtime) = runtime() {
-            runtime.block_on(interrupted());
-            std::process::exit(Status::Interrupted as i32);
+            let signal = runtime.block_on(asked_to_end());
+            std::process::exit(signal.status() as i32);
         }
     });
-}
-
-/// Completes on Ctrl-C, or when the process is asked to end.
-pub(crate) async fn interrupted() {
-    let ctrl_c = async {
-        if tokio::signal::ctrl_c().await.is_err() {
-            pending::<()>().await;
-        }
-    };
-    tokio::select! {
-        () = ctrl_c => {}
-        () = terminated() => {}
-    }
-}
-
-#[cfg(unix)]
-async fn terminated() {
-    use tokio::signal::unix::{SignalKind, signal};
-    match signal(SignalKind::terminate()) {
-        Ok(mut terminate) => drop(terminate.recv().await),
-        Err(_) => pending().await,
-    }
-}
-
-#[cfg(not(unix))]
-async fn terminated() {
-    pending().await
 }
 
 /// Quick stop to every node that this command has set in motion; the failure then says so.

@@ -1,4 +1,4 @@
-//! Motions that are cut short: by Ctrl-C, and by a bus that goes away.
+//! Motions that are cut short: by Ctrl-C and the other signals that ask for an end, and by a bus that goes away.
 #![cfg(unix)]
 
 mod common;
@@ -30,9 +30,13 @@ fn start(bus: &str, model: &str, arguments: &[&str]) -> Child {
 }
 
 fn interrupt(child: Child) -> Output {
-    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-    assert!(sent.success());
+    send("INT", &child);
     child.wait_with_output().unwrap()
+}
+
+fn send(signal: &str, child: &Child) {
+    let sent = Command::new("kill").args([format!("-{signal}"), child.id().to_string()]).status().unwrap();
+    assert!(sent.success());
 }
 
 fn speed(simulator: &mut Simulator, node: &str) -> f64 {
@@ -71,6 +75,48 @@ fn ctrl_c_stops_every_drive_before_it_ends_with_130() {
     }
 }
 
+/// The statuses are those of a shell: 128 and the signal's number (POSIX, 2.8.2).
+#[test]
+fn every_signal_that_asks_for_an_end_stops_the_drive_first() {
+    let mut simulator = bench();
+    let bus = simulator.bus("socketcand");
+    for (signal, status, said) in
+        [("HUP", 129, "SIGHUP"), ("INT", 130, "interrupted"), ("QUIT", 131, "SIGQUIT"), ("TERM", 143, "SIGTERM")]
+    {
+        let moving = start(&bus, "4=zlac8030l", &["velocity", "4", "100rpm", "--for", "60s"]);
+        wait_until_it_turns(&mut simulator, "4");
+        send(signal, &moving);
+        let ended = moving.wait_with_output().unwrap();
+        let speed = speed(&mut simulator, "4");
+        assert!(speed.abs() < 20.0, "{signal}: still at {speed} r/min");
+        let error = String::from_utf8(ended.stderr).unwrap();
+        assert_eq!(ended.status.code(), Some(status), "{signal}: {error}");
+        for part in [said, "node 4 was moving and has been quick-stopped"] {
+            assert!(error.contains(part), "{signal}: {part:?} in {error}");
+        }
+        done(&["--bus", &bus, "--model", "4=zlac8030l", "disable", "4"]);
+    }
+}
+
+/// What `nohup` and `trap '' HUP` ask for.
+#[test]
+fn a_command_that_is_to_outlive_its_terminal_does() {
+    let mut simulator = bench();
+    let bus = simulator.bus("socketcand");
+    let line = r#"trap '' HUP; exec "$0" "$@""#;
+    let moving = Command::new("sh")
+        .args(["-c", line, env!("CARGO_BIN_EXE_ferrodrive"), "--bus", &bus, "--model", "4=zlac8030l"])
+        .args(["velocity", "4", "100rpm", "--for", "3s"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    wait_until_it_turns(&mut simulator, "4");
+    send("HUP", &moving);
+    let ended = moving.wait_with_output().unwrap();
+    assert_eq!(ended.status.code(), Some(0), "{}", String::from_utf8_lossy(&ended.stderr));
+}
+
 #[test]
 fn a_joint_that_looks_for_its_reference_can_be_disabled() {
     let mut simulator = bench();
@@ -83,7 +129,14 @@ fn a_joint_that_looks_for_its_reference_can_be_disabled() {
 }
 
 #[test]
-fn an_interrupted_simulator_ends_with_130_and_without_a_word() {
+fn a_simulator_that_is_asked_to_end_does_so_without_a_word() {
+    for (signal, status) in [("HUP", 129), ("INT", 130), ("QUIT", 131), ("TERM", 143)] {
+        simulator_ends(signal, status);
+    }
+}
+
+#[track_caller]
+fn simulator_ends(signal: &str, status: i32) {
     let mut child = Command::new(env!("CARGO_BIN_EXE_ferrodrive"))
         .args(["sim", "--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"])
         .stdin(Stdio::piped())
@@ -94,9 +147,10 @@ fn an_interrupted_simulator_ends_with_130_and_without_a_word() {
     let mut ready = String::new();
     BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut ready).unwrap();
     assert!(ready.starts_with("ready"), "{ready:?}");
-    let ended = interrupt(child);
-    assert_eq!(ended.status.code(), Some(130));
-    assert_eq!(String::from_utf8(ended.stderr).unwrap(), "");
+    send(signal, &child);
+    let ended = child.wait_with_output().unwrap();
+    assert_eq!(ended.status.code(), Some(status), "{signal}");
+    assert_eq!(String::from_utf8(ended.stderr).unwrap(), "", "{signal}");
 }
 
 #[test]

@@ -62,8 +62,11 @@ fn an_absent_node_is_a_failure_with_a_reason() {
 fn a_speed_is_reached_held_and_stopped() {
     let moved = done(&["--json", "velocity", "4", "60rpm", "--for", "1s"]).json();
     assert_eq!((&moved["reached"], &moved["stopped"]), (&json!(true), &json!(true)));
-    let speed = moved["velocity_rpm"].as_f64().unwrap();
+    let speed = moved["before_stop"]["velocity_rpm"].as_f64().unwrap();
     assert!((speed - 60.0).abs() < 1.0, "{speed}");
+    // What is told of a stopped drive is what it does now: standing is less than 1 r/min.
+    let speed = moved["velocity_rpm"].as_f64().unwrap();
+    assert!(speed.abs() < 1.0, "{speed}");
     // 6083h: 500 ms from 0 to the target; reached is within 5 %.
     let reached = moved["reached_after_s"].as_f64().unwrap();
     assert!((0.35..0.7).contains(&reached), "{reached}");
@@ -94,8 +97,9 @@ fn a_torque_is_a_motor_current() {
 fn the_same_commands_move_all_three_drives() {
     for node in ["1", "2", "4"] {
         let moved = done(&["--json", "velocity", node, "60rpm", "--for", "1s"]).json();
-        let speed = moved["velocity_rpm"].as_f64().unwrap();
+        let speed = moved["before_stop"]["velocity_rpm"].as_f64().unwrap();
         assert!((speed - 60.0).abs() < 3.0, "node {node}: {speed}");
+        assert!(moved["velocity_rpm"].as_f64().unwrap().abs() < 1.0, "node {node}: {moved}");
         let moved = done(&["--json", "move", node, "90deg", "--profile-velocity", "60rpm"]).json();
         let angle = moved["angle_deg"].as_f64().unwrap();
         assert!((angle - 90.0).abs() < 4.0, "node {node}: {angle}");

@@ -130,7 +130,10 @@ pub enum BusError {
         path: PathBuf,
     },
     /// A Linux network interface was asked for.
-    #[error("SocketCAN is not built into this version yet, so '{interface}' cannot be opened; use socketcand or slcan")]
+    #[error(
+        "SocketCAN is not built into this version yet, so '{interface}' cannot be opened; run `socketcand -i {interface}` \
+         on its machine and use socketcand://HOST:29536/{interface}, or use slcan"
+    )]
     SocketCanNotBuilt {
         /// The interface.
         interface: String,

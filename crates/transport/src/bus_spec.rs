@@ -107,7 +107,7 @@ impl FromStr for BusSpec {
     }
 }
 
-const BUS_FORMS: &str = "expected sim, sim:FILE.toml, can0, socketcand://HOST:PORT/can0, slcan:///dev/ttyACM0?bitrate=500k, \
+const BUS_FORMS: &str = "expected sim, sim:FILE.toml, socketcand://HOST:PORT/can0, slcan:///dev/ttyACM0?bitrate=500k, \
                          slcan://HOST:PORT or log:FILE";
 
 fn path(text: &str) -> Result<PathBuf, String> {

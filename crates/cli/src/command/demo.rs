@@ -10,7 +10,7 @@ use crate::demo::{self, DemoReport};
 use crate::failure::Failure;
 use crate::models::{self, MODELS};
 use crate::progress::Progress;
-use crate::session::exit_on_interrupt;
+use crate::session::exit_on_signal;
 
 /// Show the whole thing on an embedded virtual bus: every procedure of the three manuals against the three drives
 ///
@@ -29,7 +29,7 @@ pub(crate) struct Demo {
 impl Demo {
     /// Runs it and writes the picture.
     pub(crate) fn run(&self, global: &Global) -> Result<DemoReport, Failure> {
-        exit_on_interrupt();
+        exit_on_signal();
         let clock = WallClock::start();
         let progress = Progress::new(global.json);
         let (mut report, poster) = demo::run(self.drive.as_deref().and_then(models::find), &progress)?;

@@ -74,14 +74,21 @@ pub(crate) struct StateReport {
     bits: Vec<&'static str>,
     fault_code: u16,
     faults: Vec<FaultReport>,
-    pub(crate) position: Option<i64>,
-    pub(crate) angle_deg: Option<f64>,
-    pub(crate) velocity_rpm: Option<f64>,
-    pub(crate) current_a: Option<f64>,
+    #[serde(flatten)]
+    pub(crate) motion: Motion,
     supply_v: Option<f64>,
     motor_c: Option<f64>,
     driver_c: Option<f64>,
     nmt_state: Option<String>,
+}
+
+/// Where a shaft is and what it does; what is not known is left out of the text.
+#[derive(Debug, Serialize)]
+pub(crate) struct Motion {
+    position: Option<i64>,
+    angle_deg: Option<f64>,
+    velocity_rpm: Option<f64>,
+    current_a: Option<f64>,
 }
 
 #[derive(Debug, Serialize)]
@@ -160,27 +167,18 @@ impl StateReport {
             bits,
             fault_code: state.fault_code,
             faults: faults.collect(),
-            position: state.position.map(|counts| counts.0),
-            angle_deg: state.angle.map(|angle| angle.0),
-            velocity_rpm: state.velocity.map(|speed| speed.0),
-            current_a: state.current.map(|current| current.0),
+            motion: Motion {
+                position: state.position.map(|counts| counts.0),
+                angle_deg: state.angle.map(|angle| angle.0),
+                velocity_rpm: state.velocity.map(|speed| speed.0),
+                current_a: state.current.map(|current| current.0),
+            },
             supply_v: state.supply.map(|supply| supply.0),
             motor_c: state.motor_temperature.map(|temperature| temperature.0),
             driver_c: state.driver_temperature.map(|temperature| temperature.0),
             // A boot-up message says only that the node has just left the state it names.
             nmt_state: state.nmt.filter(|nmt| *nmt != NmtState::Initialising).map(|nmt| nmt.to_string()),
         })
-    }
-
-    /// Position, speed and current in one line; what is not known is left out.
-    pub(crate) fn motion(&self) -> String {
-        let parts = [
-            self.position.map(|counts| format!("{counts} counts")),
-            self.angle_deg.map(|angle| format!("{angle:.2}°")),
-            self.velocity_rpm.map(|speed| format!("{speed:.1} r/min")),
-            self.current_a.map(|current| format!("{current:.1} A")),
-        ];
-        parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
 
     /// Faults and what to do about them; nothing without one. `gap` lines the texts up with others.
@@ -205,6 +203,19 @@ impl StateReport {
     }
 }
 
+impl Motion {
+    /// In one line.
+    pub(crate) fn text(&self) -> String {
+        let parts = [
+            self.position.map(|counts| format!("{counts} counts")),
+            self.angle_deg.map(|angle| format!("{angle:.2}°")),
+            self.velocity_rpm.map(|speed| format!("{speed:.1} r/min")),
+            self.current_a.map(|current| format!("{current:.1} A")),
+        ];
+        parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
+}
+
 impl Report for StateReport {
     fn text(&self, paint: Paint) -> String {
         let mode = self.mode.as_deref().unwrap_or("unknown mode");
@@ -215,7 +226,7 @@ impl Report for StateReport {
         if self.fault_code == 0 {
             lines.push("  fault       none".into());
         }
-        lines.push(format!("  motion      {}", self.motion()));
+        lines.push(format!("  motion      {}", self.motion.text()));
         lines.push(format!("  power       {}", self.power()));
         if let Some(nmt) = &self.nmt_state {
             lines.push(format!("  nmt         {nmt}"));

@@ -17,17 +17,17 @@ use crate::embedded;
 use crate::failure::Failure;
 use crate::output::{Format, Report};
 use crate::paint::Paint;
-use crate::session::{bus_failure, exit_on_interrupt, interrupted, runtime};
+use crate::session::{bus_failure, exit_on_signal, runtime};
+use crate::signals::asked_to_end;
 
 /// Show the bus decoded: SDO with object names and values, PDOs by their mapping, statuswords in words
 ///
 /// Only listens. On a real bus it runs until Ctrl-C; on a log until its end; on an embedded virtual bus it shows how the
 /// drives boot. Names of a model's own objects need the model: --model NODE=MODEL, or --machine FILE.toml.
 #[derive(Debug, clap::Args)]
-#[command(
-    after_help = "Examples:\n  ferrodrive --bus can0 --model 4=zlac8030l dump\n  ferrodrive --bus can0 dump --log trace.log\n  \
-    ferrodrive --bus log:trace.log --model 4=zlac8030l dump"
-)]
+#[command(after_help = "Examples:\n  ferrodrive --bus socketcand://HOST:29536/can0 --model 4=zlac8030l dump\n  \
+    ferrodrive --bus slcan:///dev/ttyACM0?bitrate=500k dump --log trace.log\n  \
+    ferrodrive --bus log:trace.log --model 4=zlac8030l dump")]
 pub(crate) struct Dump {
     /// Also write the frames to this file, in candump format
     #[arg(long, value_name = "FILE")]
@@ -76,7 +76,7 @@ impl Dump {
     }
 
     fn embedded(&self, file: Option<&Path>, sink: &mut Sink) -> Result<(), Failure> {
-        exit_on_interrupt();
+        exit_on_signal();
         let (mut world, drives) = embedded::world(file)?;
         for (node, model) in drives {
             sink.decoder.set_model(node, model);
@@ -103,7 +103,7 @@ impl Dump {
         let over = async {
             tokio::select! {
                 () = clock.sleep_until_due(end) => Ok(()),
-                () = interrupted() => Err(Failure::interrupted()),
+                signal = asked_to_end() => Err(Failure::ended_by(signal)),
             }
         };
         tokio::select! {

@@ -8,7 +8,7 @@ use master::drive::{Drive, MotionOptions, MotionReport};
 use master::units::{Amperes, Angle, Ramp, Rpm, parse_duration};
 use serde::Serialize;
 
-use super::drive::StateReport;
+use super::drive::{Motion, StateReport};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
@@ -106,6 +106,9 @@ pub(crate) struct MotionOutcome {
     reached: bool,
     reached_after_s: Option<f64>,
     stopped: bool,
+    /// How it turned or pushed before it was stopped again.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    before_stop: Option<Motion>,
     limits: Limits,
     #[serde(flatten)]
     state: StateReport,
@@ -173,19 +176,20 @@ pub(super) async fn outcome(
     duration: Option<Duration>,
 ) -> Result<MotionOutcome, Failure> {
     let limits = limits(drive).await;
+    let mut before_stop = None;
     if let Some(duration) = duration {
         context.progress.show(format!("node {}: {asked} for {} s", drive.node().id(), duration.as_secs_f64()));
         drive.supervise(duration).await?;
-    }
-    let state = StateReport::read(drive).await?;
-    if duration.is_some() {
+        before_stop = Some(StateReport::read(drive).await?.motion);
         drive.stop().await?;
     }
+    let state = StateReport::read(drive).await?;
     Ok(MotionOutcome {
         asked,
         reached: motion.reached_after.is_some(),
         reached_after_s: motion.reached_after.map(|time| time.as_secs_f64()),
         stopped: duration.is_some(),
+        before_stop,
         limits,
         state,
         // A drive that has been stopped again needs no watching.
@@ -241,7 +245,8 @@ impl Report for MotionOutcome {
         };
         let then = if self.stopped { "; stopped again" } else { "" };
         let mut lines = vec![format!("node {}: {}: {reached}{then}", self.state.node, self.asked)];
-        lines.push(format!("  at      {}", self.state.motion()));
+        lines.extend(self.before_stop.as_ref().map(|motion| format!("  before  {}", motion.text())));
+        lines.push(format!("  at      {}", self.state.motion.text()));
         lines.push(format!("  limits  {}", self.limits.text()));
         lines.extend(self.state.fault_lines(paint, "  "));
         lines.extend(self.notes.iter().map(|note| format!("  note    {note}")));

@@ -14,9 +14,8 @@ use crate::parse::node::{Nodes, nodes};
 
 /// Send a network management command to one node or to all
 #[derive(Debug, clap::Args)]
-#[command(
-    after_help = "Examples:\n  ferrodrive --bus can0 nmt 4 start\n  ferrodrive --bus can0 nmt all pre-operational"
-)]
+#[command(after_help = "Examples:\n  ferrodrive --bus socketcand://HOST:29536/can0 nmt 4 start\n  \
+    ferrodrive --bus slcan:///dev/ttyACM0 nmt all pre-operational")]
 pub(crate) struct Nmt {
     /// Node-ID, or all
     #[arg(value_name = "NODE|all", value_parser = nodes)]

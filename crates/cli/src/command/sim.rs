@@ -24,7 +24,8 @@ use crate::serve::eeprom::{EepromError, Eeproms};
 use crate::serve::keeper::{Keeper, file_name};
 use crate::serve::registers;
 use crate::serve::world::ServedWorld;
-use crate::session::{bus_failure, failure_of, interrupted, runtime};
+use crate::session::{bus_failure, failure_of, runtime};
+use crate::signals::{Signal, Signals};
 
 /// Run virtual drives in real time, for other programs
 ///
@@ -79,7 +80,7 @@ enum Request {
     Line(String),
     Keep,
     Registers(ModbusRequest),
-    Interrupted,
+    Ended(Signal),
     BridgeLost(Failure),
 }
 
@@ -103,7 +104,7 @@ impl Sim {
         if let Some(BusSpec::Sim { .. } | BusSpec::Log { .. }) = bridge {
             return Err(Failure::usage(format!("sim cannot join its drives to {}", global.bus))
                 .because("it makes a virtual bus itself, and joins it to a live one only")
-                .next("leave --bus away, or give e.g. --bus vcan0"));
+                .next("leave --bus away, or give e.g. --bus socketcand://HOST:29536/can0"));
         }
         let eeproms = self.state.as_deref().map(Eeproms::open).transpose()?;
         let mut world = World::new(self.bitrate, self.seed);
@@ -155,6 +156,8 @@ impl Sim {
         bridge: Option<&BusSpec>,
     ) -> Result<(), Failure> {
         let clock = WallClock::start();
+        // Whoever has read `ready` may ask for the end.
+        let signals = Signals::listen();
         records.unix_zero = clock.unix_zero();
         let outer = match bridge {
             Some(spec) => Some(spec.open(&clock).await.map_err(|error| bus_failure(global, &error))?),
@@ -179,7 +182,7 @@ impl Sim {
             modbus.as_ref().map(|server| format!(" {}", server.place())).unwrap_or_default(),
             bridge.map(|bus| format!(" {bus}")).unwrap_or_default()
         ));
-        tokio::spawn(tick(requests.clone(), clock.clone()));
+        tokio::spawn(tick(requests.clone(), clock.clone(), signals));
         std::thread::spawn(move || read_lines(&requests));
         let ended = run_world(&mut world, &mut hub, &clock, &mut incoming, |world, request| {
             answer(world, request, &mut records)
@@ -227,7 +230,7 @@ fn answer(world: &mut ServedWorld, request: Request, records: &mut Records) -> C
             records.keep(world);
             ControlFlow::Continue(())
         }
-        Request::Interrupted => ControlFlow::Break(Err(Failure::interrupted())),
+        Request::Ended(signal) => ControlFlow::Break(Err(Failure::ended_by(signal))),
         Request::BridgeLost(failure) => ControlFlow::Break(Err(failure)),
     }
 }
@@ -284,15 +287,13 @@ fn read_lines(requests: &mpsc::Sender<Request>) {
     }
 }
 
-/// Asks for records to be kept, and tells of Ctrl-C.
-async fn tick(requests: mpsc::Sender<Request>, clock: WallClock) {
-    let mut interruption = std::pin::pin!(interrupted());
+/// Asks for records to be kept, and tells of a signal to end.
+async fn tick(requests: mpsc::Sender<Request>, clock: WallClock, mut signals: Signals) {
     loop {
-        let over = tokio::select! {
-            () = &mut interruption => true,
-            () = clock.sleep(KEEPING_INTERVAL) => false,
+        let (request, over) = tokio::select! {
+            signal = signals.next() => (Request::Ended(signal), true),
+            () = clock.sleep(KEEPING_INTERVAL) => (Request::Keep, false),
         };
-        let request = if over { Request::Interrupted } else { Request::Keep };
         if requests.send(request).await.is_err() || over {
             return;
         }
