@@ -48,6 +48,11 @@ fn a_joint_under_any_frames_and_sensors_keeps_its_objects_lawful_and_its_duty_cy
 }
 
 #[test]
+fn modbus_bytes_get_well_formed_responses_or_silence_and_the_next_request_its_answer() {
+    check("modbus");
+}
+
+#[test]
 fn every_law_has_a_fuzz_target_and_every_fuzz_target_a_law() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../fuzz/fuzz_targets");
     let files = std::fs::read_dir(folder).expect("the folder of fuzz targets");

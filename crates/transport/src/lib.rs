@@ -43,7 +43,8 @@ pub use clock::{Sleep, WallClock};
 pub use hub::{ClientId, Hub, HubError, HubEvent, HubOptions, LeaveReason, Listener};
 pub use log::LogBus;
 pub use modbus::{
-    ModbusError, ModbusException, ModbusRequest, ModbusServer, ModbusSpec, RegisterAccess, RegisterAnswer,
+    ModbusError, ModbusException, ModbusInquiry, ModbusMedium, ModbusRequest, ModbusServer, ModbusSession, ModbusSpec,
+    RegisterAccess, RegisterAnswer,
 };
 pub use run::{Heard, RealTimeWorld, run_station, run_world};
 pub use slcan::SlcanBus;

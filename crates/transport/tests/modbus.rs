@@ -185,21 +185,103 @@ async fn bytes_that_are_no_modbus_end_their_connection_and_no_other() {
     let server = serve("127.0.0.1:0", &clock).await;
     let mut neighbour = client(&server, UNIT).await;
     for bytes in [
-        // Another protocol; no unit; no function; a function of responses.
+        // Another protocol; no unit; no function; more than the 253 bytes of a request.
         &[0, 1, 0, 1, 0, 6, UNIT, 3, 0, 0, 0, 1][..],
         &[0, 1, 0, 0, 0, 0, UNIT],
         &[0, 1, 0, 0, 0, 1, UNIT],
-        &[0, 1, 0, 0, 0, 2, UNIT, 0x83],
-        // 03h too short and too long; 10h of two registers in two bytes, of 8000h registers in none.
-        &[0, 1, 0, 0, 0, 5, UNIT, 0x03, 0, 0, 0],
-        &[0, 1, 0, 0, 0, 7, UNIT, 0x03, 0, 0, 0, 1, 0],
-        &[0, 1, 0, 0, 0, 9, UNIT, 0x10, 0, 0, 0, 2, 2, 0, 1],
-        &[0, 2, 0, 0, 0, 7, UNIT, 0x10, 0, 0, 0x80, 0, 0],
+        &[0, 1, 0, 0, 0, 255, UNIT, 3],
     ] {
         let stream = raw(&server, bytes).await;
         assert_eq!(rest(&clock, stream).await, [], "{bytes:02X?}");
     }
     assert_eq!(soon(&clock, neighbour.read_holding_registers(0, 1)).await.unwrap(), Ok(vec![0]));
+}
+
+/// Requests that contradict themselves, each with the exception of "MODBUS Application Protocol Specification V1.1b3":
+/// 03 for lengths and quantities (chapter 7), 01 for a function that is not served, whatever follows it.
+const CONTRADICTIONS: [(&[u8], u8); 10] = [
+    // 03h too short and too long.
+    (&[0x03, 0, 0, 0], 3),
+    (&[0x03, 0, 0, 0, 1, 0], 3),
+    // 10h: two registers in two bytes, one in three, 8000h in none, 8001h in two, one in more bytes than are told.
+    (&[0x10, 0, 0, 0, 2, 2, 0, 1], 3),
+    (&[0x10, 0, 0, 0, 1, 3, 0, 1, 0], 3),
+    (&[0x10, 0, 0, 0x80, 0, 0], 3),
+    (&[0x10, 0, 0, 0x80, 1, 2, 0, 1], 3),
+    (&[0x10, 0, 0, 0, 1, 2, 0, 1, 0, 1], 3),
+    // 0Fh: 65,535 coils in one byte. 17h: 8001h registers in two bytes. 2Bh: cut short.
+    (&[0x0F, 0, 0, 0xFF, 0xFF, 1, 0], 1),
+    (&[0x17, 0, 0, 0, 1, 0, 0, 0x80, 1, 2, 0, 1], 1),
+    (&[0x2B], 1),
+];
+
+#[tokio::test]
+async fn requests_that_contradict_themselves_get_their_exception_and_the_connection_goes_on() {
+    let clock = WallClock::start();
+    let server = serve("127.0.0.1:0", &clock).await;
+    let mut stream = raw(&server, &[]).await;
+    for (pdu, exception) in CONTRADICTIONS {
+        let request = [&[0xAB, 0xCD, 0, 0, 0, 1 + pdu.len() as u8, UNIT], pdu].concat();
+        stream.write_all(&request).await.unwrap();
+        let mut answer = [0; 9];
+        soon(&clock, stream.read_exact(&mut answer)).await.unwrap();
+        assert_eq!(answer, [0xAB, 0xCD, 0, 0, 0, 3, UNIT, pdu[0] | 0x80, exception], "{pdu:02X?}");
+    }
+    // A response is nothing to answer.
+    let response_and_read = [0, 1, 0, 0, 0, 2, UNIT, 0x83, 0, 2, 0, 0, 0, 6, UNIT, 3, 0, 0, 0, 1];
+    stream.write_all(&response_and_read).await.unwrap();
+    let mut answer = [0; 11];
+    soon(&clock, stream.read_exact(&mut answer)).await.unwrap();
+    assert_eq!(answer, [0, 2, 0, 0, 0, 5, UNIT, 3, 2, 0, 0]);
+}
+
+#[cfg(unix)]
+#[tokio::test]
+async fn requests_that_contradict_themselves_get_their_exception_and_the_line_goes_on() {
+    use tokio_serial::{SerialPort, SerialStream};
+
+    let clock = WallClock::start();
+    let (mut theirs, ours) = SerialStream::pair().unwrap();
+    let _server = serve(&format!("rtu://{}", ours.name().unwrap()), &clock).await;
+    for (pdu, exception) in CONTRADICTIONS {
+        theirs.write_all(&line_frame(&[&[UNIT], pdu].concat())).await.unwrap();
+        let mut answer = [0; 5];
+        soon(&clock, theirs.read_exact(&mut answer)).await.unwrap();
+        assert_eq!(answer[..], line_frame(&[UNIT, pdu[0] | 0x80, exception]), "{pdu:02X?}");
+        // The very next request is answered.
+        theirs.write_all(&line_frame(&[UNIT, 3, 0, 0, 0, 1])).await.unwrap();
+        let mut answer = [0; 7];
+        soon(&clock, theirs.read_exact(&mut answer)).await.unwrap();
+        assert_eq!(answer[..], line_frame(&[UNIT, 3, 2, 0, 0]), "{pdu:02X?}");
+    }
+    drop(ours);
+}
+
+#[tokio::test]
+async fn of_many_clients_the_longest_idle_one_makes_room_for_the_next() {
+    let clock = WallClock::start();
+    let server = serve("127.0.0.1:0", &clock).await;
+    let mut first = client(&server, UNIT).await;
+    assert!(soon(&clock, first.read_holding_registers(0, 1)).await.unwrap().is_ok());
+    // As many as there are places, none of which says a word or more than half of one.
+    let mut idle = Vec::new();
+    for number in 0..64 {
+        idle.push(raw(&server, if number % 2 == 0 { &[] } else { &[0, 1, 0] }).await);
+        // Whoever asks is not idle, however long ago it came.
+        assert!(soon(&clock, first.read_holding_registers(0, 1)).await.unwrap().is_ok(), "{number}");
+    }
+    let mut last = client(&server, UNIT).await;
+    assert!(soon(&clock, last.read_holding_registers(0, 1)).await.unwrap().is_ok());
+    assert!(soon(&clock, first.read_holding_registers(0, 1)).await.unwrap().is_ok());
+    // 66 came and 64 are served: the two that came first and were silent had to go, the third is still there.
+    let mut idle = idle.into_iter();
+    for gone in idle.by_ref().take(2) {
+        assert_eq!(rest(&clock, gone).await, []);
+    }
+    let mut third = idle.next().unwrap();
+    third.write_all(&[0, 2, 0, 0, 0, 6, UNIT, 3, 0, 0, 0, 1]).await.unwrap();
+    let mut answer = [0; 11];
+    soon(&clock, third.read_exact(&mut answer)).await.unwrap();
 }
 
 #[tokio::test]

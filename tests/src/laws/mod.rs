@@ -5,6 +5,7 @@
 
 mod frame;
 mod mjoint;
+mod modbus;
 mod node;
 mod stream;
 
@@ -30,6 +31,7 @@ pub const ALL: &[Law] = &[
     Law { name: "slcan", holds: stream::slcan, samples: stream::SLCAN_SAMPLES },
     Law { name: "sdo_wire", holds: node::sdo_wire, samples: node::SDO_WIRE_SAMPLES },
     Law { name: "node", holds: node::node, samples: node::NODE_SAMPLES },
+    Law { name: "modbus", holds: modbus::modbus, samples: modbus::SAMPLES },
     Law { name: "mjoint", holds: mjoint::joint, samples: mjoint::SAMPLES },
 ];
 

@@ -1,13 +1,18 @@
 //! Modbus registers served to other programs, over TCP or a serial line ("MODBUS Application Protocol Specification
 //! V1.1b3", "MODBUS Messaging on TCP/IP Implementation Guide V1.0b", "MODBUS over Serial Line V1.02").
 //!
-//! Frames and sockets are crate `tokio-modbus`. Function codes 03h and 04h read (the registers are the same to both), 06h
-//! and 10h write; any other is answered with exception 01. The server knows no registers: each request goes as a [`ModbusRequest`] to whoever has them, and the
-//! connection waits for the answer, so that a client's requests keep their order. A unit that nobody has gets exception
-//! 0Bh over TCP, where this end is the gateway to the units, and silence on a serial line.
+//! Function codes 03h and 04h read (the registers are the same to both), 06h and 10h write; any other is answered with
+//! exception 01, and a request whose length or quantity contradicts itself with exception 03. The server knows no
+//! registers: each request goes as a [`ModbusRequest`] to whoever has them, and the connection waits for the answer, so
+//! that a client's requests keep their order. A unit that nobody has gets exception 0Bh over TCP, where this end is the
+//! gateway to the units, and silence on a serial line. [`ModbusSession`] is all of that without sockets.
 
+mod line;
+mod mbap;
+mod pdu;
 mod rtu;
 mod service;
+mod session;
 mod tcp;
 
 use std::fmt;
@@ -18,9 +23,9 @@ use std::str::FromStr;
 use tokio::net::TcpListener;
 use tokio::sync::{mpsc, oneshot};
 use tokio::task::AbortHandle;
-pub use tokio_modbus::ExceptionCode as ModbusException;
 use tokio_serial::SerialStream;
 
+pub use self::session::{ModbusInquiry, ModbusMedium, ModbusSession};
 use crate::bus_spec::parse_address;
 use crate::{ParseBusError, WallClock};
 
@@ -101,6 +106,22 @@ pub enum RegisterAccess {
     },
 }
 
+/// Why a request is not carried out (application protocol, chapter 7). The value is the exception code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum ModbusException {
+    /// The function is none of those that are served.
+    IllegalFunction = 0x01,
+    /// There is no such register, or it cannot be written.
+    IllegalDataAddress = 0x02,
+    /// A value out of its range, or a request whose length or quantity contradicts itself.
+    IllegalDataValue = 0x03,
+    /// Whoever has the registers failed to answer.
+    ServerDeviceFailure = 0x04,
+    /// No unit of this number answers behind the gateway.
+    GatewayTargetDevice = 0x0B,
+}
+
 /// One request to one unit. Answer it with [`answer`](Self::answer); dropping it answers with exception 04.
 #[derive(Debug)]
 pub struct ModbusRequest {
@@ -156,7 +177,7 @@ impl ModbusServer {
             ModbusSpec::Rtu { path, baud } => {
                 let line = tokio_serial::new(path.as_str(), *baud);
                 let opened = SerialStream::open(&line).map_err(|error| failed(error.into()))?;
-                let task = tokio::spawn(rtu::serve(line, opened, requests, clock)).abort_handle();
+                let task = tokio::spawn(rtu::serve(line, *baud, opened, requests, clock)).abort_handle();
                 Ok(Self { place: place.clone(), task })
             }
         }
