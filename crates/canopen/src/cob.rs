@@ -72,6 +72,14 @@ impl PdoSet {
         self.0 = if contained { self.0 | bit } else { self.0 & !bit };
     }
 
+    pub(crate) const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    pub(crate) const fn contains(self, position: usize) -> bool {
+        self.0 >> position & 1 == 1
+    }
+
     /// What is contained; nothing is left.
     pub(crate) const fn take(&mut self) -> Self {
         core::mem::replace(self, Self::NONE)

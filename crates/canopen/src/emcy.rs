@@ -77,10 +77,16 @@ impl EmcyErrorCode {
     }
 }
 
-/// `8130h (life guard error or heartbeat error)`.
+/// `8130h (life guard error or heartbeat error)`. Codes 0001h to 00FFh are of the class "no error", and yet some devices
+/// send their faults in them: they are not called that.
 impl fmt::Display for EmcyErrorCode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:04X}h ({})", self.0, self.class())
+        let words = match self.0 {
+            0x0000 => "error reset",
+            0x0001..=0x00FF => "a code of the maker's",
+            _ => self.class(),
+        };
+        write!(f, "{:04X}h ({words})", self.0)
     }
 }
 

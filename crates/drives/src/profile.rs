@@ -7,7 +7,7 @@ use can::Bitrate;
 use canopen::node::NodeProfile;
 use canopen::od::{Entry, Table};
 use canopen::pdo::EventTrigger;
-use canopen::{Mux, NmtState};
+use canopen::{EmcyErrorCode, Mux, NmtState};
 use cia402::{ModeOfOperation, PowerState, Statusword};
 
 use crate::engine::faults::FaultRow;
@@ -134,6 +134,11 @@ impl DriveProfile {
     /// True if a heartbeat with this state says that there is an alarm.
     pub fn tells_alarm(&self, said: NmtState) -> bool {
         said == NmtState::Stopped && self.has(Quirk::HeartbeatTellsAlarm)
+    }
+
+    /// The fault that an EMCY message with this error code tells of.
+    pub fn fault_told_by(&self, code: EmcyErrorCode) -> Option<&'static FaultRow> {
+        self.faults.table.iter().find(|row| row.emcy == code && code != EmcyErrorCode::NO_ERROR)
     }
 
     /// True if the model departs in this way.
@@ -379,6 +384,9 @@ pub struct PdoRules {
     pub remap_while_valid: bool,
     /// The mapping cannot be changed at all.
     pub fixed_mapping: bool,
+    /// Error code of the EMCY message when an RPDO has fewer bytes than are mapped; `None` for none. It is not used in
+    /// either case. Of a longer one the mapped bytes are used, and nothing is told.
+    pub short_rpdo: Option<EmcyErrorCode>,
 }
 
 /// How a firmware with these rules and quirks communicates: a master reads of a drive what the drive does.
@@ -395,6 +403,7 @@ pub(crate) const fn communication(table: &'static Table, pdo: &PdoRules, quirks:
             standard.event_trigger
         },
         pdo_changes_while_valid: pdo.remap_while_valid,
+        short_rpdo: pdo.short_rpdo,
         ..standard
     }
 }

@@ -2,6 +2,7 @@
 
 use can::Frame;
 use canopen::NodeId;
+use drives::profile::model;
 use master::core::{MappedObject, PdoMap};
 use master::decode::{Decoder, Direction};
 
@@ -29,6 +30,33 @@ fn single_frame_services_are_told_in_words() {
             "unknown",
         ]
     );
+}
+
+/// ZLAC8030L, 603Fh: 0001h to 0080h lie in the class "error reset or no error" of CiA 301, table 26.
+#[test]
+fn a_fault_of_a_zl_drive_is_never_called_no_error() {
+    let over_voltage = "084#0100050000000000";
+    assert_eq!(
+        lines(&mut Decoder::new(), &[over_voltage, "084#0000000000000000"]),
+        [
+            "EMCY node 4: 0001h (a code of the maker's), error register 05h",
+            "EMCY node 4: 0000h (error reset), error register 00h"
+        ]
+    );
+    let mut decoder = Decoder::new();
+    decoder.set_model(NodeId::new(4).unwrap(), model("zlac8030l").unwrap());
+    assert_eq!(lines(&mut decoder, &[over_voltage]), ["EMCY node 4: 0001h (over-voltage), error register 05h"]);
+    for name in ["zlac8030l", "zlim42c"] {
+        let profile = model(name).unwrap();
+        for fault in profile.faults.table {
+            let [low, high] = fault.emcy.0.to_le_bytes();
+            let frame = format!("084#{low:02X}{high:02X}{:02X}0000000000", fault.error_register | 1);
+            for mut decoder in [Decoder::new(), decoder.clone()] {
+                let shown = lines(&mut decoder, &[&frame]);
+                assert!(!shown[0].contains("no error") && !shown[0].contains("reset"), "{name}: {}", shown[0]);
+            }
+        }
+    }
 }
 
 #[test]

@@ -1,10 +1,17 @@
 use crate::NmtState;
 use crate::cob::PdoNumber;
 use crate::od::Slot;
+use crate::pdo::MAX_OBJECTS;
 
-/// How many events may wait for the owner. When full, the oldest is lost. One RPDO makes at most eight, and an owner
-/// polls after every frame.
-pub const EVENT_QUEUE_LENGTH: usize = 32;
+/// SYNC, and the objects of every RPDO that waited for it.
+const MOST_OF_SYNC: usize = 1 + PdoNumber::COUNT * MAX_OBJECTS;
+/// A frame that all RPDOs listen to, each of which was too short before: [`NodeEvent::RpdoFits`] and its objects.
+const MOST_OF_AN_RPDO: usize = PdoNumber::COUNT * (1 + MAX_OBJECTS);
+
+/// How many events may wait for the owner: at least what one frame makes. An owner that polls after every `handle_*`
+/// never loses one; another is told [`NodeEvent::EventsLost`].
+pub const EVENT_QUEUE_LENGTH: usize =
+    if MOST_OF_SYNC > MOST_OF_AN_RPDO { MOST_OF_SYNC } else { MOST_OF_AN_RPDO }.next_power_of_two();
 
 /// What a node tells its owner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,12 +36,15 @@ pub enum NodeEvent {
     /// NMT reset communication: the node is down. Put 1000h to 1FFFh to power-on values and call
     /// [`Node::boot`](super::Node::boot).
     ResetCommunication,
-    /// An RPDO was shorter than its mapping and discarded.
+    /// An RPDO was shorter than its mapping and discarded. Told once, until [`RpdoFits`](Self::RpdoFits).
     RpdoTooShort(PdoNumber),
+    /// An RPDO has the length of its mapping again.
+    RpdoFits(PdoNumber),
+    /// The owner did not poll in time: older events than the following ones are lost. The dictionary has the values.
+    EventsLost,
 }
 
-/// What waits for the owner, in the order of arrival. When full, the oldest is lost: the dictionary has the newest
-/// values.
+/// What waits for the owner, in the order of arrival. When full, the oldest are lost, and that is told in their place.
 #[derive(Clone, Debug)]
 pub(super) struct EventQueue {
     events: [NodeEvent; EVENT_QUEUE_LENGTH],
@@ -43,7 +53,7 @@ pub(super) struct EventQueue {
     put: u8,
 }
 
-const _: () = assert!(EVENT_QUEUE_LENGTH.is_power_of_two() && EVENT_QUEUE_LENGTH < 256);
+const _: () = assert!(EVENT_QUEUE_LENGTH < 256, "the counters are told apart by their difference");
 
 impl EventQueue {
     pub(super) const EMPTY: Self = Self { events: [NodeEvent::Sync; EVENT_QUEUE_LENGTH], taken: 0, put: 0 };
@@ -53,8 +63,14 @@ impl EventQueue {
         self.events[usize::from(self.put) % EVENT_QUEUE_LENGTH] = event;
         self.put = self.put.wrapping_add(1);
         if usize::from(self.put.wrapping_sub(self.taken)) > EVENT_QUEUE_LENGTH {
-            self.taken = self.taken.wrapping_add(1);
+            self.lose_oldest();
         }
+    }
+
+    #[cold]
+    fn lose_oldest(&mut self) {
+        self.taken = self.taken.wrapping_add(1);
+        self.events[usize::from(self.taken) % EVENT_QUEUE_LENGTH] = NodeEvent::EventsLost;
     }
 
     #[inline]

@@ -87,6 +87,8 @@ pub struct Node<const N: usize> {
     synchronous_tpdos: PdoSet,
     /// RPDOs whose data waits for SYNC.
     latched_rpdos: PdoSet,
+    /// RPDOs whose last frame was too short.
+    short_rpdos: PdoSet,
 }
 
 impl<const N: usize> Node<N> {
@@ -115,6 +117,7 @@ impl<const N: usize> Node<N> {
             tpdos: [Tpdo::INVALID; PdoNumber::COUNT],
             synchronous_tpdos: PdoSet::NONE,
             latched_rpdos: PdoSet::NONE,
+            short_rpdos: PdoSet::NONE,
         }
     }
 
@@ -128,6 +131,7 @@ impl<const N: usize> Node<N> {
         self.pending = Pending::NONE;
         self.events = EventQueue::EMPTY;
         self.last_addressed = None;
+        self.short_rpdos = PdoSet::NONE;
         self.take_up_objects();
         self.pending.insert(Source::BootUp);
         self.heartbeat = heartbeat::Producer::from_boot_up(self.heartbeat_period_ms(), now);

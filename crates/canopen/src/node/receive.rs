@@ -83,14 +83,35 @@ impl<const N: usize> Node<N> {
         if !self.state.allows_pdo() {
             return;
         }
-        match self.rpdos[position].receive(frame) {
+        let reception = self.rpdos[position].receive(frame);
+        if !self.short_rpdos.is_empty() {
+            self.accept_after_short(position, &reception);
+        }
+        match reception {
             Reception::Apply(data) => self.apply_rpdo(position, data),
             Reception::Latched => self.latched_rpdos.set(position, true),
-            Reception::TooShort => return self.push(NodeEvent::RpdoTooShort(PdoNumber::ALL[position])),
+            Reception::TooShort => return self.refuse_short_rpdo(position),
             Reception::NothingMapped => return,
         }
         if self.tpdos[position].handle_rpdo() {
             self.offer_tpdo(position);
+        }
+    }
+
+    /// An error is told when it begins and when it ends (CiA 301, 7.2.7.1), not with each frame between.
+    #[cold]
+    fn refuse_short_rpdo(&mut self, position: usize) {
+        if !self.short_rpdos.contains(position) {
+            self.short_rpdos.set(position, true);
+            self.push(NodeEvent::RpdoTooShort(PdoNumber::ALL[position]));
+        }
+    }
+
+    #[cold]
+    fn accept_after_short(&mut self, position: usize, reception: &Reception) {
+        if *reception != Reception::TooShort && self.short_rpdos.contains(position) {
+            self.short_rpdos.set(position, false);
+            self.push(NodeEvent::RpdoFits(PdoNumber::ALL[position]));
         }
     }
 

@@ -15,4 +15,4 @@ pub use data_type::{DataType, Scalar};
 pub use dictionary::{Dictionary, View};
 pub use entry::{Access, Check, Default, Entry, PdoMapping, TpdoForm};
 use summary::Summary;
-pub use table::{Object, Slot, Table, keys};
+pub use table::{MAX_ROWS, Object, Slot, Table, keys};

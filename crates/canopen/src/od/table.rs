@@ -18,7 +18,7 @@ pub struct Table {
 /// Places of the directory: a power of two, so that the hash needs no division.
 const DIRECTORY_LENGTH: usize = 1024;
 /// Most rows of a table: a quarter of the directory stays free, so that searches end soon.
-const MAX_ROWS: usize = DIRECTORY_LENGTH / 4 * 3;
+pub const MAX_ROWS: usize = DIRECTORY_LENGTH / 4 * 3;
 /// A free place.
 const FREE: u16 = u16::MAX;
 

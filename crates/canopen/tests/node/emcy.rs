@@ -79,3 +79,10 @@ fn a_device_without_emcy_sets_the_error_register_only() {
     bench.talk("silence 100ms");
     assert_eq!(bench.value(0x1001), 5);
 }
+
+#[test]
+fn only_code_0_is_shown_as_the_end_of_an_error() {
+    assert_eq!(EmcyErrorCode::NO_ERROR.to_string(), "0000h (error reset)");
+    assert_eq!(EmcyErrorCode(0x0001).to_string(), "0001h (a code of the maker's)");
+    assert_eq!(EmcyErrorCode(0x0080).class(), EmcyErrorCode::NO_ERROR.class());
+}

@@ -5,6 +5,7 @@ mod client;
 mod configuration;
 mod device;
 mod emcy;
+mod events;
 mod nmt;
 mod robustness;
 mod rpdo;

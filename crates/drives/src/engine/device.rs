@@ -5,10 +5,12 @@
 //! (1001h).
 
 use can::{Bitrate, Frame, Instant, Station};
+use canopen::cob::PdoNumber;
 use canopen::node::{Node, NodeEvent, NodeProfile, Via};
 use canopen::od::{Dictionary, Entry, Slot};
 use canopen::{EmcyErrorCode, Mux, NodeId};
 
+use super::communication_errors::CommunicationErrors;
 use super::faults::{FaultMonitor, FaultSet};
 use super::storage::{Image, Store};
 use crate::variant::Variant;
@@ -19,6 +21,9 @@ pub struct Device<const N: usize> {
     profile: &'static NodeProfile,
     node: Node<N>,
     store: Store,
+    /// Bits of the error register that the drive's faults set.
+    fault_bits: u8,
+    communication_errors: CommunicationErrors,
     eeprom_ok: bool,
     running: bool,
     bitrate: Bitrate,
@@ -41,6 +46,8 @@ impl<const N: usize> Device<N> {
             profile,
             node: Node::new(profile, NodeId::MIN),
             store: Store::new(image),
+            fault_bits: 0,
+            communication_errors: CommunicationErrors::NONE,
             eeprom_ok: true,
             running: false,
             bitrate,
@@ -113,6 +120,8 @@ impl<const N: usize> Device<N> {
     pub fn restart(&mut self, node_id: NodeId, bitrate: Bitrate, now: Instant) {
         self.node = Node::new(self.profile, node_id);
         *self.node.dictionary_mut() = self.factory_values(node_id);
+        self.fault_bits = 0;
+        self.communication_errors = CommunicationErrors::NONE;
         let _ = self.store.load(self.node.dictionary_mut(), |_| true);
         self.running = true;
         self.bitrate = bitrate;
@@ -124,9 +133,14 @@ impl<const N: usize> Device<N> {
         self.node.boot(now);
     }
 
-    /// NMT reset communication: 1000h to 1FFFh as at power-on, but for the error register; all else and the node-ID go on.
+    /// NMT reset communication: 1000h to 1FFFh as at power-on, but for what the drive's faults show in the error register;
+    /// all else and the node-ID go on.
     pub fn restart_communication(&mut self, now: Instant) {
-        let error_register = self.error_register().map(|slot| (slot, self.values().raw(slot)));
+        let error_register = self.error_register().map(|slot| {
+            let shown = self.values().raw(slot);
+            (slot, if self.communication_errors.is_empty() { shown } else { u32::from(self.fault_bits) })
+        });
+        self.communication_errors = CommunicationErrors::NONE;
         self.node.restore_communication_defaults();
         self.variant.apply_factory_values(self.node.dictionary_mut(), Entry::is_communication);
         let _ = self.store.load(self.node.dictionary_mut(), Entry::is_communication);
@@ -230,17 +244,50 @@ impl<const N: usize> Device<N> {
 
     /// Sends an EMCY message for each new fault; the error register shows all that are latched.
     pub fn tell_faults<const F: usize>(&mut self, new: FaultSet, faults: &FaultMonitor<F>, now: Instant) {
+        self.fault_bits = faults.error_register();
         for row in new.rows() {
-            self.node.raise_emcy(faults.row(row).emcy, faults.error_register(), [0; 5], now);
+            self.tell_error(faults.row(row).emcy, now);
         }
     }
 
     /// After a reset of faults: the error register shows what is left, and EMCY tells when nothing is.
     pub fn tell_reset<const F: usize>(&mut self, faults: &FaultMonitor<F>, now: Instant) {
-        if let Some(slot) = self.error_register() {
-            self.node.dictionary_mut().set_raw(slot, u32::from(faults.error_register()));
+        self.fault_bits = faults.error_register();
+        self.communication_errors.remove(CommunicationErrors::EVENTS_LOST);
+        self.tell_end(now);
+    }
+
+    /// An RPDO came too short, or has its length again: an error that the profile may have a code for.
+    fn tell_length(&mut self, number: PdoNumber, fits: bool, now: Instant) {
+        let Some(code) = self.profile.short_rpdo else { return };
+        let error = CommunicationErrors::short_rpdo(number);
+        if fits {
+            self.communication_errors.remove(error);
+            self.tell_end(now);
+        } else {
+            self.communication_errors.insert(error);
+            self.tell_error(code, now);
         }
-        if faults.latched().is_empty() {
+    }
+
+    /// Events of the node were lost: what CiA 301 calls objects lost. It stands until faults are reset, since what was
+    /// lost does not come back.
+    fn tell_lost_events(&mut self, now: Instant) {
+        self.communication_errors.insert(CommunicationErrors::EVENTS_LOST);
+        self.tell_error(EmcyErrorCode::CAN_OVERRUN, now);
+    }
+
+    fn tell_error(&mut self, code: EmcyErrorCode, now: Instant) {
+        self.node.raise_emcy(code, self.fault_bits | self.communication_errors.register_bits(), [0; 5], now);
+    }
+
+    /// An error ended: the error register shows what is left, and EMCY tells when nothing is.
+    fn tell_end(&mut self, now: Instant) {
+        let register = self.fault_bits | self.communication_errors.register_bits();
+        if let Some(slot) = self.error_register() {
+            self.node.dictionary_mut().set_raw(slot, u32::from(register));
+        }
+        if register == 0 {
             self.node.raise_emcy(EmcyErrorCode::NO_ERROR, 0, [0; 5], now);
         }
     }
@@ -317,7 +364,10 @@ pub(crate) trait Application<const N: usize> {
                 NodeEvent::Written { slot, raw, via } => commanded |= self.written(slot, raw, via, now),
                 NodeEvent::ResetNode => self.restart(now),
                 NodeEvent::ResetCommunication => self.restart_communication(now),
-                NodeEvent::Nmt(_) | NodeEvent::Sync | NodeEvent::RpdoTooShort(_) => {}
+                NodeEvent::RpdoTooShort(number) => self.device().tell_length(number, false, now),
+                NodeEvent::RpdoFits(number) => self.device().tell_length(number, true, now),
+                NodeEvent::EventsLost => self.device().tell_lost_events(now),
+                NodeEvent::Nmt(_) | NodeEvent::Sync => {}
             }
         }
         if commanded {
@@ -452,5 +502,45 @@ mod tests {
         assert!(faults.reset());
         device.tell_reset(&faults, at(1, 0));
         assert_eq!(device.values().get(ERROR_REGISTER), 0);
+    }
+
+    /// These frames and no others wait to be sent; then what 1001h shows.
+    #[track_caller]
+    fn assert_sent<const F: usize>(device: &mut Device<3>, frames: [&str; F], error_register: u8) {
+        for frame in frames {
+            assert_eq!(device.poll_transmit(), Some(frame.parse().unwrap()));
+        }
+        assert_eq!((device.poll_transmit(), device.values().get(ERROR_REGISTER)), (None, error_register));
+    }
+
+    #[test]
+    fn errors_of_communication_stand_beside_the_faults_and_no_error_is_told_when_the_last_has_ended() {
+        let mut device = started();
+        let mut faults = FaultMonitor::new(&FAULTS);
+        let [first, second, ..] = PdoNumber::ALL;
+        device.tell_length(first, false, at(1, 0));
+        device.tell_length(second, false, at(1, 0));
+        assert_sent(&mut device, ["701#00", "081#1082110000000000", "081#1082110000000000"], 0b1_0001);
+        faults.raise(0);
+        device.tell_faults(faults.latched(), &faults, at(1, 0));
+        assert_sent(&mut device, ["081#1032150000000000"], 0b1_0101);
+        device.tell_length(first, true, at(1, 0));
+        assert!(faults.reset());
+        device.tell_reset(&faults, at(1, 0));
+        assert_sent(&mut device, [], 0b1_0001);
+        device.tell_length(second, true, at(1, 0));
+        assert_sent(&mut device, ["081#0000000000000000"], 0);
+    }
+
+    #[test]
+    fn lost_events_are_told_as_objects_lost_until_faults_are_reset_or_communication_is() {
+        let mut device = started();
+        device.tell_lost_events(at(1, 0));
+        assert_sent(&mut device, ["701#00", "081#1081110000000000"], 0b1_0001);
+        let mut again = device.clone();
+        device.tell_reset(&FaultMonitor::new(&FAULTS), at(1, 0));
+        assert_sent(&mut device, ["081#0000000000000000"], 0);
+        again.restart_communication(at(1, 0));
+        assert_sent(&mut again, ["701#00"], 0);
     }
 }

@@ -29,14 +29,18 @@ impl FaultRow {
     }
 }
 
-/// Bits of the error register 1001h (CiA 301, 7.5.2.2). Bit 0, generic, is set with each.
+/// Bits of the error register 1001h (CiA 301, 7.5.2.2). Bit 0, generic, is set with each other.
 pub mod error_register {
+    /// Any error.
+    pub const GENERIC: u8 = 1 << 0;
     /// Current.
     pub const CURRENT: u8 = 1 << 1;
     /// Voltage.
     pub const VOLTAGE: u8 = 1 << 2;
     /// Temperature.
     pub const TEMPERATURE: u8 = 1 << 3;
+    /// Communication.
+    pub const COMMUNICATION: u8 = 1 << 4;
     /// Device profile specific.
     pub const PROFILE: u8 = 1 << 5;
     /// Manufacturer specific.
@@ -173,7 +177,7 @@ impl<const N: usize> FaultMonitor<N> {
 
     /// The error register 1001h: the bits of all latched faults, and bit 0 when there is any.
     pub fn error_register(&self) -> u8 {
-        let generic = u8::from(!self.latched.is_empty());
+        let generic = if self.latched.is_empty() { 0 } else { error_register::GENERIC };
         self.latched.rows().fold(generic, |bits, row| bits | self.table[row].error_register)
     }
 

@@ -11,6 +11,7 @@
 
 pub mod axis;
 pub mod bleeder;
+mod communication_errors;
 pub mod demand;
 pub mod device;
 pub mod faults;

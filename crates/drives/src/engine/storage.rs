@@ -6,7 +6,7 @@
 //! Values are checked against the table on the way in: an image can never put a value out of range into a dictionary.
 
 use canopen::Mux;
-use canopen::od::{Dictionary, Entry, Slot, Table};
+use canopen::od::{Dictionary, Entry, MAX_ROWS, Slot, Table};
 
 /// Bytes of one bank.
 pub const BANK_SIZE: usize = 1024;
@@ -50,9 +50,9 @@ impl Image {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unreadable;
 
-/// Which rows are waiting to be stored.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Pending([u32; 8]);
+/// Which rows are waiting to be stored: a bit for each that a table can have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Pending([u32; MAX_ROWS.div_ceil(32)]);
 
 /// An EEPROM with the rows that wait to be written into it.
 #[derive(Clone, Debug)]
@@ -72,7 +72,7 @@ struct Bank {
 impl Store {
     /// A store over what is found at power-on.
     pub fn new(image: Image) -> Self {
-        Self { image, active: newest_bank(&image), pending: Pending::default(), generation: 0 }
+        Self { image, active: newest_bank(&image), pending: Pending::NONE, generation: 0 }
     }
 
     /// The same EEPROM at the next power-on: what waited to be written is lost, the generation goes on.
@@ -130,13 +130,13 @@ impl Store {
     /// only [`format`](Self::format) makes it readable again.
     pub fn commit<const N: usize>(&mut self, dictionary: &Dictionary<N>) {
         let Some(bank) = self.active else {
-            self.pending = Pending::default();
+            self.pending = Pending::NONE;
             return;
         };
         if self.pending.is_empty() {
             return;
         }
-        let pending = core::mem::take(&mut self.pending);
+        let pending = core::mem::replace(&mut self.pending, Pending::NONE);
         let old = bank.number * BANK_SIZE;
         let mut bytes = [0; BANK_SIZE];
         bytes.copy_from_slice(&self.image.0[old..][..BANK_SIZE]);
@@ -169,7 +169,7 @@ impl Store {
             put_word(&mut bytes, record, row.mux().key());
             put_word(&mut bytes, record + 4, dictionary.raw(slot));
         }
-        self.pending = Pending::default();
+        self.pending = Pending::NONE;
         self.write(bank, bytes, dictionary.table());
     }
 
@@ -190,7 +190,26 @@ impl Store {
 /// Number of stored rows of a table.
 ///
 /// # Panics
-/// If a bank cannot hold them; used in a `const` of the drive, at compile time.
+/// If a bank cannot hold them; used in a `const` of the drive, at compile time:
+///
+/// ```compile_fail,E0080
+/// use canopen::od::{Access, DataType, Entry, Table, keys};
+/// use ferrodrive_drives::engine::storage::{CAPACITY, stored_rows};
+///
+/// static ROWS: [Entry; CAPACITY + 1] = {
+///     let row = Entry::new(0, 0, DataType::Unsigned16, Access::ReadWrite, "row", "").stored();
+///     let mut rows = [row; CAPACITY + 1];
+///     let mut i = 0;
+///     while i < rows.len() {
+///         rows[i].index = 0x2000 + i as u16;
+///         i += 1;
+///     }
+///     rows
+/// };
+/// static KEYS: [u32; CAPACITY + 1] = keys(&ROWS);
+/// static TABLE: Table = Table::new(&ROWS, &KEYS);
+/// const _: usize = stored_rows(&TABLE); // without "+ 1" it compiles
+/// ```
 pub const fn stored_rows(table: &Table) -> usize {
     let rows = table.rows();
     let (mut i, mut count) = (0, 0);
@@ -203,18 +222,18 @@ pub const fn stored_rows(table: &Table) -> usize {
 }
 
 impl Pending {
+    const NONE: Self = Self([0; MAX_ROWS.div_ceil(32)]);
+
     fn insert(&mut self, slot: Slot) {
-        if let Some(word) = self.0.get_mut(slot.position() / 32) {
-            *word |= 1 << (slot.position() % 32);
-        }
+        self.0[slot.position() / 32] |= 1 << (slot.position() % 32);
     }
 
     fn contains(&self, slot: Slot) -> bool {
-        self.0.get(slot.position() / 32).is_some_and(|word| word >> (slot.position() % 32) & 1 == 1)
+        self.0[slot.position() / 32] >> (slot.position() % 32) & 1 == 1
     }
 
     fn is_empty(&self) -> bool {
-        self.0 == [0; 8]
+        *self == Self::NONE
     }
 }
 
@@ -385,6 +404,40 @@ mod tests {
             image.0[byte] ^= 0x10;
             let (a, _, c) = values(image);
             assert!(matches!((a, c), (50, -9) | (7, -9)), "byte {byte}");
+        }
+    }
+
+    /// As many rows as a table can have, of which the last ones are stored: as many as a bank can hold.
+    static WIDE_ROWS: [Entry; MAX_ROWS] = {
+        let mut rows = [ROWS[1]; MAX_ROWS];
+        let mut i = 0;
+        while i < MAX_ROWS {
+            rows[i] = Entry::new(0x2000 + i as u16, 0, DataType::Unsigned16, Access::ReadWrite, "row", "");
+            if i >= MAX_ROWS - CAPACITY {
+                rows[i] = rows[i].stored();
+            }
+            i += 1;
+        }
+        rows
+    };
+    static WIDE_KEYS: [u32; MAX_ROWS] = keys(&WIDE_ROWS);
+    static WIDE_TABLE: Table = Table::new(&WIDE_ROWS, &WIDE_KEYS);
+    const _: usize = stored_rows(&WIDE_TABLE);
+
+    #[test]
+    fn every_row_that_a_table_can_have_is_stored_by_itself() {
+        let wide = || Dictionary::<MAX_ROWS>::new(&WIDE_TABLE, NodeId::MIN);
+        let mut store = Store::new(Image::BLANK);
+        store.format(&wide());
+        for (slot, _) in WIDE_TABLE.iter().filter(|(_, row)| row.stored) {
+            let mut store = store.clone();
+            let mut written = wide();
+            written.set_raw(slot, 77);
+            store.mark(&WIDE_TABLE, slot);
+            store.commit(&written);
+            let mut loaded = wide();
+            store.load(&mut loaded, |_| true).unwrap();
+            assert_eq!(loaded.raw(slot), 77, "row {}", slot.position());
         }
     }
 

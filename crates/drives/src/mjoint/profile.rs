@@ -66,6 +66,8 @@ pub(super) const PDO_RULES: PdoRules = PdoRules {
     max_objects: 3,
     remap_while_valid: true,
     fixed_mapping: true,
+    // It has no EMCY.
+    short_rpdo: None,
 };
 
 const AFTER_RESTART: &[Mux] = &[Mux::new(0x2615, 0), Mux::new(0x2619, 0)];

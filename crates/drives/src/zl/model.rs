@@ -1,9 +1,9 @@
 //! What both models are on the bus, as const data: for the firmware and for [`DriveProfile`](crate::profile::DriveProfile).
 
-use canopen::Mux;
 use canopen::node::NodeProfile;
 use canopen::od::Table;
 use canopen::pdo::EventTrigger;
+use canopen::{EmcyErrorCode, Mux};
 
 use crate::profile::{Identity, ParameterStorage, PdoRules, Quirk, Ramps, Write, communication};
 
@@ -27,6 +27,8 @@ pub(crate) const PDO_RULES: PdoRules = PdoRules {
     max_objects: 4,
     remap_while_valid: true,
     fixed_mapping: false,
+    // The manuals are silent; CiA 301 asks it of a device with EMCY.
+    short_rpdo: Some(EmcyErrorCode::PDO_NOT_PROCESSED),
 };
 
 /// 6083h to 6085h are times.

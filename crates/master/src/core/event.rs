@@ -6,8 +6,6 @@ use can::Instant;
 use canopen::emcy::Emcy;
 use canopen::{AbortCode, Mux, NmtState, NodeId};
 
-use crate::decode::emcy_words;
-
 /// Something that happened on the bus and that a person may want to know. Pulled with [`super::Core::poll_event`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
@@ -34,7 +32,7 @@ impl fmt::Display for Event {
             Self::NmtState(node, state) => write!(f, "node {node} is {state}"),
             Self::HeartbeatLost(node, time) => write!(f, "node {node}: no heartbeat for {} ms", time.as_millis()),
             Self::HeartbeatBack(node) => write!(f, "node {node}: its heartbeat is back"),
-            Self::Emcy(node, emcy) => write!(f, "node {node}: emergency {}", emcy_words(emcy.code)),
+            Self::Emcy(node, emcy) => write!(f, "node {node}: emergency {}", emcy.code),
             Self::NoAnswer(node, mux, time) => {
                 write!(f, "node {node} did not answer about {mux} within {} ms", time.as_millis())
             }

@@ -17,6 +17,7 @@ use canopen::heartbeat::Heartbeat;
 use canopen::nmt::{NmtRequest, NmtTarget};
 use canopen::sync::Sync;
 use canopen::{Mux, NmtState, NodeId};
+use drives::engine::faults::FaultRow;
 use drives::profile::{DriveProfile, MODELS};
 
 use crate::core::PdoMap;
@@ -26,7 +27,6 @@ use sdo::Conversations;
 
 pub use pdo::{Direction, Pdo};
 pub use sdo::{Sdo, SdoStep, Side};
-pub(crate) use value::emcy_words;
 pub use value::{Value, common_row, statusword_words};
 
 /// What one frame says.
@@ -38,8 +38,8 @@ pub enum Decoded {
     Sync(Sync),
     /// TIME stamp.
     Time,
-    /// Emergency message.
-    Emcy(NodeId, Emcy),
+    /// Emergency message, and the fault of the node's model that it tells of.
+    Emcy(NodeId, Emcy, Option<&'static FaultRow>),
     /// Boot-up message.
     BootUp(NodeId),
     /// Heartbeat, or answer to node guarding.
@@ -128,7 +128,11 @@ impl Decoder {
             Service::Nmt => Decoded::Nmt(NmtRequest::parse(frame).ok()?),
             Service::Sync => Decoded::Sync(Sync::parse(frame)),
             Service::Time => Decoded::Time,
-            Service::Emcy(node) => Decoded::Emcy(node, Emcy::parse(frame)?),
+            Service::Emcy(node) => {
+                let emcy = Emcy::parse(frame)?;
+                let model = self.models.get(node);
+                Decoded::Emcy(node, emcy, model.and_then(|model| model.0.fault_told_by(emcy.code)))
+            }
             Service::Heartbeat(node) => match Heartbeat::parse(frame)?.nmt_state()? {
                 NmtState::Initialising => Decoded::BootUp(node),
                 state if self.models.get(node).is_some_and(|model| model.0.tells_alarm(state)) => {
@@ -177,8 +181,12 @@ impl fmt::Display for Decoded {
             Self::Sync(Sync { counter: Some(counter) }) => write!(f, "SYNC {counter}"),
             Self::Sync(_) => f.write_str("SYNC"),
             Self::Time => f.write_str("TIME"),
-            Self::Emcy(node, emcy) => {
-                write!(f, "EMCY node {node}: {}, error register {:02X}h", emcy_words(emcy.code), emcy.error_register)?;
+            Self::Emcy(node, emcy, fault) => {
+                match fault {
+                    Some(fault) => write!(f, "EMCY node {node}: {:04X}h ({})", emcy.code.0, fault.name)?,
+                    None => write!(f, "EMCY node {node}: {}", emcy.code)?,
+                }
+                write!(f, ", error register {:02X}h", emcy.error_register)?;
                 if emcy.manufacturer != [0; 5] {
                     f.write_str(", manufacturer")?;
                     emcy.manufacturer.iter().try_for_each(|byte| write!(f, " {byte:02X}"))?;

@@ -1,7 +1,7 @@
 use core::fmt;
 
+use canopen::Mux;
 use canopen::od::{DataType, Entry};
-use canopen::{EmcyErrorCode, Mux};
 use cia402::{Controlword, ModeOfOperation, Statusword};
 use drives::profile::{DriveProfile, MODELS, PowerStyle, reads_alike};
 
@@ -99,16 +99,6 @@ pub fn statusword_words(word: Statusword, model: Option<&DriveProfile>) -> Strin
     let set = common.iter().chain(own).filter(|(mask, _)| word.has(*mask)).map(|(_, name)| *name);
     let words: Vec<&str> = state.into_iter().chain(set).collect();
     if words.is_empty() { "no bit set".to_owned() } else { words.join(", ") }
-}
-
-/// An emergency error code in words. Codes 0001h to 00FFh are no errors to the standard and the maker's own to some
-/// drives, which send their fault codes in them.
-pub(crate) fn emcy_words(code: EmcyErrorCode) -> String {
-    match code.0 {
-        0x0000 => "0000h (error reset)".to_owned(),
-        0x0001..=0x00FF => format!("{:04X}h (a code of the maker's)", code.0),
-        _ => code.to_string(),
-    }
 }
 
 /// Objects whose bits the standard or the model gives a meaning.

@@ -9,7 +9,6 @@ use drives::profile::DriveProfile;
 
 use super::conclude::conclude;
 use super::{Drive, ERROR_CODE, MODE};
-use crate::decode::emcy_words;
 use crate::error::Error;
 use crate::units::Volts;
 
@@ -132,8 +131,7 @@ impl Drive {
         facts.extend(seen.probable_state(self.profile).map(Fact::Nmt));
         facts.push(Fact::Heartbeat(seen.heartbeat_age(now)));
         facts.extend(seen.last_emcy().map(|(at, emcy)| {
-            let rows = self.profile.map_or(&[][..], |profile| profile.faults.table);
-            Fact::Emcy(now - *at, *emcy, rows.iter().find(|row| row.emcy == emcy.code))
+            Fact::Emcy(now - *at, *emcy, self.profile.and_then(|profile| profile.fault_told_by(emcy.code)))
         }));
     }
 }
@@ -168,7 +166,7 @@ impl fmt::Display for Fact {
             Self::Emcy(age, emcy, Some(row)) => {
                 write!(f, "EMCY {:04X}h ({}) {:.1} s ago", emcy.code.0, row.name, age.as_secs_f64())
             }
-            Self::Emcy(age, emcy, None) => write!(f, "EMCY {} {:.1} s ago", emcy_words(emcy.code), age.as_secs_f64()),
+            Self::Emcy(age, emcy, None) => write!(f, "EMCY {} {:.1} s ago", emcy.code, age.as_secs_f64()),
             Self::Failed(error) => write!(f, "{error}"),
         }
     }
