@@ -35,9 +35,12 @@ impl Seeded {
         (0..length).map(|_| self.bits().to_le_bytes()[0]).collect()
     }
 
-    /// One of `samples`, now and then damaged: a byte changed, dropped, doubled, or the tail cut off.
+    /// One of `samples`, or two in a row, now and then damaged: a byte changed, dropped, doubled, or the tail cut off.
     pub fn damaged(&mut self, samples: &[&[u8]]) -> Vec<u8> {
         let mut bytes = samples[self.below(samples.len())].to_vec();
+        if self.below(4) == 0 {
+            bytes.extend_from_slice(samples[self.below(samples.len())]);
+        }
         for _ in 0..self.below(4) {
             if bytes.is_empty() {
                 break;
@@ -56,8 +59,13 @@ impl Seeded {
 
 /// Calls `law` with input from as many seeds as there are runs, half of it random and half damaged samples.
 pub fn check(samples: &[&[u8]], law: impl Fn(&[u8]) + std::panic::RefUnwindSafe) {
+    check_some(RUNS, samples, law);
+}
+
+/// [`check`] with fewer runs, for a law that takes long.
+pub fn check_some(runs: u64, samples: &[&[u8]], law: impl Fn(&[u8]) + std::panic::RefUnwindSafe) {
     let first = std::env::var("FERRODRIVE_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(1);
-    for seed in first..first + RUNS {
+    for seed in first..first + runs {
         let mut seeded = Seeded::new(seed);
         let input = if seed % 2 == 0 { seeded.bytes(96) } else { seeded.damaged(samples) };
         if let Err(panic) = std::panic::catch_unwind(|| law(&input)) {

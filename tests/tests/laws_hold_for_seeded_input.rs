@@ -3,8 +3,12 @@
 use ferrodrive_tests::{laws, seeded};
 
 fn check(name: &str) {
-    let law = laws::ALL.iter().find(|law| law.name == name).expect("a law of that name");
+    let law = law(name);
     seeded::check(law.samples, law.holds);
+}
+
+fn law(name: &str) -> &'static laws::Law {
+    laws::ALL.iter().find(|law| law.name == name).expect("a law of that name")
 }
 
 #[test]
@@ -50,6 +54,33 @@ fn a_joint_under_any_frames_and_sensors_keeps_its_objects_lawful_and_its_duty_cy
 #[test]
 fn modbus_bytes_get_well_formed_responses_or_silence_and_the_next_request_its_answer() {
     check("modbus");
+}
+
+#[test]
+fn a_zlac8030l_under_any_frames_and_sensors_keeps_its_objects_lawful() {
+    check("zlac8030l");
+}
+
+#[test]
+fn a_zlim42c_under_any_frames_and_sensors_keeps_its_objects_lawful() {
+    check("zlim42c");
+}
+
+#[test]
+fn any_memory_image_boots_to_values_within_their_limits() {
+    check("eeprom");
+}
+
+#[test]
+fn any_world_command_is_answered_and_leaves_every_measurement_a_number() {
+    // Each run is a world of three drives that turn.
+    let law = law("world_command");
+    seeded::check_some(3_000, law.samples, law.holds);
+}
+
+#[test]
+fn the_masters_requests_all_end_once_whatever_the_bus_brings() {
+    check("master_core");
 }
 
 #[test]

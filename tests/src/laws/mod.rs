@@ -3,11 +3,15 @@
 //!
 //! Each law is a function of bytes that panics when it is broken. [`ALL`] names them with samples to damage.
 
+mod eeprom;
 mod frame;
+mod master_core;
 mod mjoint;
 mod modbus;
 mod node;
 mod stream;
+mod world_command;
+mod zl;
 
 use can::{CanId, Frame};
 
@@ -33,6 +37,11 @@ pub const ALL: &[Law] = &[
     Law { name: "node", holds: node::node, samples: node::NODE_SAMPLES },
     Law { name: "modbus", holds: modbus::modbus, samples: modbus::SAMPLES },
     Law { name: "mjoint", holds: mjoint::joint, samples: mjoint::SAMPLES },
+    Law { name: "zlac8030l", holds: zl::zlac8030l, samples: zl::ZLAC8030L_SAMPLES },
+    Law { name: "zlim42c", holds: zl::zlim42c, samples: zl::ZLIM42C_SAMPLES },
+    Law { name: "eeprom", holds: eeprom::eeprom, samples: eeprom::SAMPLES },
+    Law { name: "world_command", holds: world_command::world_command, samples: world_command::SAMPLES },
+    Law { name: "master_core", holds: master_core::master_core, samples: master_core::SAMPLES },
 ];
 
 /// The law of that name, for the fuzz targets.

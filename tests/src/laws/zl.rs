@@ -1,0 +1,192 @@
+//! The firmwares of the two ZLTECH drives under frames, sensors and gaps in time that nobody sane would give them.
+
+use can::{CanId, Frame, Instant};
+use canopen::od::{Slot, Table};
+use canopen::sdo::wire::Reply;
+use drives::{Firmware, zlac8030l, zlim42c};
+
+use super::selected_frame;
+
+/// A chunk is a selector, a length and eight bytes, see [`selected_frame`], one byte for how long it lasts, see [`wait`],
+/// and two for what the sensors read.
+pub(super) const ZLAC8030L_SAMPLES: &[&[u8]] = &[
+    // Enable by SDO, mode 3, 100 r/min.
+    b"\0\x08\x2F\x60\x60\0\x03\0\0\0\x20\0\0\0\x08\x2B\x40\x60\0\x06\0\0\0\x20\0\0\0\x08\x2B\x40\x60\0\x07\0\0\0\x20\0\0\0\x08\x2B\x40\x60\0\x0F\0\0\0\x20\0\0\0\x08\x23\xFF\x60\0\x64\0\0\0\x20\x40\0",
+    // Start by NMT, 6040h by RPDO0, SYNC, a reset.
+    b"\x01\x02\x01\x01\0\0\0\0\0\0\x10\0\0\x03\x02\x06\0\0\0\0\0\0\0\x10\0\0\x03\x02\x0F\0\0\0\0\0\0\0\x10\0\0\x02\0\0\0\0\0\0\0\0\0\x10\0\0\x01\x02\x81\x01\0\0\0\0\0\0\x10\0\0",
+    // An event-driven TPDO of 6064h every 10 ms; a save; ten seconds.
+    b"\0\x08\x23\0\x1A\x01\x20\0\x64\x60\x08\0\0\0\x08\x2F\0\x1A\0\x01\0\0\0\x08\0\0\0\x08\x2B\0\x18\x05\x14\0\0\0\x08\0\0\0\x08\x2B\x09\x20\0\x01\0\0\0\x07\x10\0",
+];
+
+/// The same for the ZLIM42-C.
+pub(super) const ZLIM42C_SAMPLES: &[&[u8]] = &[
+    // Enable by SDO, mode 1, a turn on.
+    b"\0\x08\x2F\x60\x60\0\x01\0\0\0\x20\0\0\0\x08\x2B\x40\x60\0\x06\0\0\0\x20\0\0\0\x08\x2B\x40\x60\0\x07\0\0\0\x20\0\0\0\x08\x2B\x40\x60\0\x0F\0\0\0\x20\0\0\0\x08\x23\x7A\x60\0\xA0\x0F\0\0\x20\0\0\0\x08\x2B\x40\x60\0\x1F\0\0\0\xF8\0\0",
+    // Homing to a switch; the stall of time; a fault by a short circuit and its reset.
+    b"\0\x08\x2F\x60\x60\0\x06\0\0\0\x20\0\0\0\x08\x2F\x98\x60\0\x11\0\0\0\x20\0\0\0\x08\x2B\x40\x60\0\x1F\0\0\0\xF8\x01\0\0\x08\x2B\x11\x20\0\x01\0\0\0\x10\0\x04",
+];
+
+const CHUNK: usize = 13;
+
+/// Both are node 1 by their switches, so that no write can take them out of hearing.
+const NODE: u8 = 1;
+
+/// What a selector picks: SDO, NMT, SYNC, the four RPDOs, a heartbeat.
+const IDS: [u16; 8] = [0x601, 0x000, 0x080, 0x201, 0x301, 0x401, 0x501, 0x701];
+
+/// Any frames, sensor values and gaps leave a ZLAC8030L lawful: see [`drive`].
+pub(super) fn zlac8030l(data: &[u8]) {
+    let mut firmware = zlac8030l::Zlac8030l::new();
+    let hardware = zlac8030l::hardware::Hardware { dip_address: NODE, ..Default::default() };
+    firmware.power_on(&hardware, Instant::ZERO);
+    drive(data, firmware);
+}
+
+/// Any frames, sensor values and gaps leave a ZLIM42-C lawful: see [`drive`].
+pub(super) fn zlim42c(data: &[u8]) {
+    let mut firmware = zlim42c::Zlim42c::new();
+    let hardware = zlim42c::hardware::Hardware { dip_address: NODE, ..Default::default() };
+    firmware.power_on(&hardware, Instant::ZERO);
+    drive(data, firmware);
+}
+
+/// What differs between the two.
+trait Subject: Firmware {
+    fn table() -> &'static Table;
+    fn value(&self, slot: Slot) -> i64;
+    /// What the sensors read: each bit spoils something.
+    fn sensors(place: u8, bits: u8) -> Self::Sensors;
+    /// The power stage does nothing that hardware cannot do.
+    fn is_possible(actuation: &Self::Actuation) -> bool;
+}
+
+/// Every SDO request gets at most one well-formed answer, every writable object lies within its limits, read-only
+/// communication objects do not change, what the drive tells of itself is finite, and the duty cycles are shares.
+fn drive<F: Subject>(data: &[u8], mut firmware: F) {
+    let mut now = Instant::ZERO;
+    let first = fixed(&firmware);
+    let (mut asked, mut answered) = (0, 0);
+    for chunk in data.chunks(CHUNK) {
+        let frame = selected_frame(chunk, &IDS);
+        asked += usize::from(frame.id() == CanId::standard(IDS[0]) && !frame.is_remote());
+        firmware.handle_frame(&frame, now);
+        answered += drain(&mut firmware, &frame);
+        let byte = |at: usize| chunk.get(at).copied().unwrap_or(0);
+        let sensors = F::sensors(byte(11), byte(12));
+        let (periods, gap_ns) = wait(byte(10), F::CONTROL_PERIOD_NS);
+        for _ in 0..periods {
+            let actuation = firmware.tick(&sensors, now);
+            assert!(F::is_possible(&actuation), "an impossible actuation after {frame}");
+            now = now.plus_nanos(gap_ns);
+            firmware.handle_timeout(now);
+            answered += drain(&mut firmware, &frame);
+        }
+        assert!(answered <= asked, "{answered} answers to {asked} requests, the last {frame}");
+        judge(&firmware, &first, &frame);
+    }
+}
+
+/// How many control periods a chunk lasts, and how far apart they are: as they should be, or once ten seconds late.
+fn wait(byte: u8, period_ns: u64) -> (u8, u64) {
+    match byte & 7 {
+        7 => (1, 10_000_000_000),
+        _ => (byte >> 3, period_ns),
+    }
+}
+
+/// Takes what is sent: SDO answers are counted, and all is of the form that CiA 301 gives it.
+fn drain<F: Subject>(firmware: &mut F, after: &Frame) -> usize {
+    let mut answers = 0;
+    for count in 0.. {
+        assert!(count < 64, "it never stops sending after {after}");
+        let Some(sent) = firmware.poll_transmit() else { break };
+        if sent.id() == CanId::standard(0x580 + u16::from(NODE)) {
+            let raw = sent.data().first_chunk::<8>().expect("an SDO answer has eight bytes");
+            assert!(!matches!(Reply::parse(raw), Reply::Unknown { .. }), "{sent} after {after}");
+            answers += 1;
+        }
+        if sent.id() == CanId::standard(0x700 + u16::from(NODE)) {
+            assert_eq!(sent.dlc(), 1, "{sent} after {after}");
+        }
+    }
+    answers
+}
+
+/// Communication objects that can only be read, but for the error register.
+fn fixed<F: Subject>(firmware: &F) -> Vec<i64> {
+    let rows = F::table().iter();
+    let rows = rows.filter(|(_, row)| row.index < 0x2000 && row.index != 0x1001 && !row.access.is_writable());
+    rows.map(|(slot, _)| firmware.value(slot)).collect()
+}
+
+fn judge<F: Subject>(firmware: &F, first: &[i64], frame: &Frame) {
+    for (slot, row) in F::table().iter().filter(|(_, row)| row.access.is_writable()) {
+        let value = firmware.value(slot);
+        assert_eq!(row.check_value(value), Ok(()), "{frame} put {value} into {}", row.mux());
+    }
+    assert_eq!(fixed(firmware), first, "{frame} changed what is fixed");
+    let report = firmware.report();
+    assert!(report.velocity_rpm.is_finite() && report.current_a.is_finite(), "{frame}: {report:?}");
+}
+
+impl Subject for zlac8030l::Zlac8030l {
+    fn table() -> &'static Table {
+        &zlac8030l::objects::TABLE
+    }
+
+    fn value(&self, slot: Slot) -> i64 {
+        self.values().value(slot)
+    }
+
+    fn sensors(place: u8, bits: u8) -> zlac8030l::hardware::Sensors {
+        let has = |bit: u8| bits & 1 << bit != 0;
+        zlac8030l::hardware::Sensors {
+            encoder_count: u16::from(place) * 257,
+            encoder_wired: !has(0),
+            hall: if has(1) { place } else { 5 },
+            phase_current_a: if has(2) { [f32::from(place) * 1e3, -1e6] } else { [0.5, 0.25] },
+            bus_v: if has(3) { f32::from(place) } else { 48.0 },
+            motor_c: if has(4) { 300.0 } else { 25.0 },
+            driver_c: if has(4) { -300.0 } else { 25.0 },
+            inputs: [has(5), has(6)],
+            eeprom_ok: !has(7),
+            ..Default::default()
+        }
+    }
+
+    fn is_possible(actuation: &zlac8030l::hardware::Actuation) -> bool {
+        match actuation.power_stage {
+            zlac8030l::hardware::PowerStage::Modulate { duty } => duty.iter().all(|share| (0.0..=1.0).contains(share)),
+            _ => true,
+        }
+    }
+}
+
+impl Subject for zlim42c::Zlim42c {
+    fn table() -> &'static Table {
+        &zlim42c::objects::TABLE
+    }
+
+    fn value(&self, slot: Slot) -> i64 {
+        self.values().value(slot)
+    }
+
+    fn sensors(place: u8, bits: u8) -> zlim42c::hardware::Sensors {
+        let has = |bit: u8| bits & 1 << bit != 0;
+        zlim42c::hardware::Sensors {
+            phase_current_a: if has(2) { [f32::from(place) * 1e3, -1e6] } else { [0.5, 0.25] },
+            bus_v: if has(3) { f32::from(place) } else { 24.0 },
+            bus_current_a: if has(2) { 30.0 } else { 0.5 },
+            reference_v: if has(4) { 0.0 } else { zlim42c::readings::REFERENCE_V },
+            inputs: [has(0), has(1), has(5), has(6)],
+            eeprom_ok: !has(7),
+        }
+    }
+
+    fn is_possible(actuation: &zlim42c::hardware::Actuation) -> bool {
+        match actuation.power_stage {
+            zlim42c::hardware::PowerStage::Modulate { duty } => duty.iter().all(|share| share.abs() <= 1.0),
+            zlim42c::hardware::PowerStage::Off => true,
+        }
+    }
+}
