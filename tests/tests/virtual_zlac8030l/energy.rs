@@ -80,7 +80,7 @@ fn hard_braking_without_a_bleeder_ends_in_over_voltage() {
     let highest_v = highest_bus_v(&mut bench, 700);
     assert_eq!((bench.get(0x603F, 0), bench.get(0x1001, 0)), (OVER_VOLTAGE, 0x05), "generic and voltage");
     assert_eq!(bench.statusword() & 0xFF, 0x98);
-    assert_within("highest bus voltage", highest_v, 76.0, 79.0);
+    assert_within("highest bus voltage", highest_v, 75.0, 78.0);
 }
 
 #[test]
@@ -163,9 +163,10 @@ fn after_a_fault_alarm_pwm_brakes_the_wheel_and_without_it_the_wheel_coasts() {
     assert!(rad_s > 15.0 && braking_s < coasting_s / 10.0, "{braking_s} s against {coasting_s} s");
 }
 
+/// 16 and 75 V of the maker's hardware manual V1.00 (docs/drives/zlac8030l.md, L108).
 #[test]
 fn under_voltage_and_over_voltage_of_the_supply_are_told() {
-    for (supply_v, code) in [(17.0, 0x0002), (78.0, 0x0001), (19.0, 0), (75.0, 0)] {
+    for (supply_v, code) in [(15.5, 0x0002), (75.5, 0x0001), (16.5, 0), (74.5, 0)] {
         let mut bench = Bench::new();
         bench.operate(|drive, now| drive.set_supply(supply_v, now)).expect("a supply");
         bench.run_ms(2000);

@@ -108,7 +108,7 @@ fn a_stalled_motor_draws_only_what_its_resistance_turns_into_heat() {
     assert_within("power from the source in W", source_w, heat_w + 2.9, heat_w + 3.1);
 }
 
-/// The note below the object table: once the rated current for 20 s, twice for 6 s, three times for 4 s.
+/// The note below the object table: an I2t time of 20 s, which is 2016h, means 6 s at double and 4 s at triple load.
 #[test]
 fn with_overload_handling_on_the_motor_bears_its_multiples_as_long_as_the_note_says() {
     for (multiple, expected_s) in [(1.0, 20.0), (2.0, 6.0), (3.0, 4.0)] {
@@ -116,6 +116,7 @@ fn with_overload_handling_on_the_motor_bears_its_multiples_as_long_as_the_note_s
         bench.set(0x202F, 2, 1);
         bench.set(0x2014, 0, 50);
         bench.set(0x2012, 0, 100);
+        bench.set(0x2016, 0, 2000);
         bench.set(0x6071, 0, (multiple * 5000.0) as i64);
         let seconds = bench.seconds_until(30.0, LOOK, |report| report.error_code != 0);
         assert_within(&format!("{multiple} times"), seconds, expected_s * 0.97, expected_s * 1.03);
@@ -135,13 +136,51 @@ fn as_delivered_twice_the_rated_current_lasts_for_2016h() {
     }
 }
 
+/// 2016h is the time at the overload factor 2012h; below it the note's 20 : 6 : 4 makes it longer (L101).
 #[test]
-fn less_than_the_overload_factor_is_borne_for_ever() {
+fn as_delivered_less_than_the_overload_factor_lasts_longer_and_the_rated_current_for_ever() {
+    // 2012h = 200 %: 3 s of 2016h at twice the rated current, where the note has 6 s, so half of the note's times.
+    for (current_ma, expected_s) in [(7500, 6.5), (9500, 3.7), (10_000, 3.0), (20_000, 3.0)] {
+        let mut bench = stalled(0);
+        bench.set(0x2014, 0, 50);
+        bench.set(0x6071, 0, current_ma);
+        let seconds = bench.seconds_until(15.0, LOOK, |report| report.error_code != 0);
+        assert_within(&format!("{current_ma} mA of 5 A"), seconds, expected_s * 0.98, expected_s * 1.02 + 0.02);
+        assert_eq!(bench.get(0x603F, 0), 0x0008);
+    }
     let mut bench = stalled(0);
     bench.set(0x2014, 0, 50);
-    bench.set(0x6071, 0, 9500);
-    bench.run_ms(20_000);
-    assert_eq!(bench.get(0x603F, 0), 0, "1.9 times of a factor of 200 %");
+    bench.set(0x6071, 0, 5000);
+    bench.run_ms(60_000);
+    assert_eq!(bench.get(0x603F, 0), 0, "the rated current");
+}
+
+/// Nothing of the watch's own settings is touched: 15 A rated, 30 A at most, 2012h 200 %, 2016h 3 s.
+#[test]
+fn as_delivered_the_overload_ends_a_stall_long_before_the_winding_is_at_its_limit() {
+    for current_a in [16_i32, 20, 25, 29] {
+        let mut bench = stalled(0);
+        bench.set(0x6071, 0, i64::from(current_a) * 1000);
+        bench.seconds_until(60.0, Duration::from_millis(10), |report| report.error_code != 0);
+        assert_eq!(bench.get(0x603F, 0), 0x0008, "{current_a} A");
+        assert_within("winding in degC, of 80", bench.get(0x2026, 1) as f64 * 0.1, 25.0, 40.0);
+    }
+}
+
+/// Chapter 9: 2015h in 0.1 A decides what flows, and 6077h shows it; 6074h in mA ends where its 16 bits do.
+#[test]
+fn what_6077h_shows_is_what_flows_up_to_the_60_a_of_2015h() {
+    let mut bench = stalled(0);
+    bench.set(0x2014, 0, 300);
+    bench.set(0x6060, 0, 3);
+    bench.set(0x60FF, 0, 1000);
+    for (limit, shown, demand_ma) in [(300, 300, 30_000), (200, 200, 20_000), (600, 600, 32_767)] {
+        bench.set(0x2015, 0, limit);
+        bench.run_ms(200);
+        assert_within("current in A", current_a(&mut bench), shown as f64 * 0.0995, shown as f64 * 0.1005);
+        assert_within("6077h in 0.1 A", bench.get(0x6077, 0) as f64, shown as f64 - 2.0, shown as f64 + 2.0);
+        assert_eq!(bench.get(0x6074, 0), demand_ma, "6074h in mA");
+    }
 }
 
 #[test]
@@ -189,6 +228,7 @@ fn a_rest_between_overloads_gives_their_time_back() {
     bench.set(0x202F, 2, 1);
     bench.set(0x2014, 0, 50);
     bench.set(0x2012, 0, 100);
+    bench.set(0x2016, 0, 2000);
     for _ in 0..4 {
         bench.set(0x6071, 0, 10_000);
         bench.run_ms(5000);
@@ -207,7 +247,7 @@ fn the_times_of_the_note_scale_with_2016h() {
     bench.set(0x202F, 2, 1);
     bench.set(0x2014, 0, 50);
     bench.set(0x2012, 0, 100);
-    bench.set(0x2016, 0, 150);
+    bench.set(0x2016, 0, 1000);
     bench.set(0x6071, 0, 10_000);
     let seconds = bench.seconds_until(10.0, LOOK, |report| report.error_code != 0);
     assert_within("seconds of half of 6 s", seconds, 2.9, 3.1);

@@ -121,6 +121,43 @@ fn the_range_of_60ffh_grows_with_the_resolution_so_that_1000_rpm_stay_in_reach()
     assert_eq!(bench.write(0x60FF, 0, -10_001), Err(0x0609_0032));
 }
 
+/// 5.3: a resolution is in effect after a restart, and so is the range that it gives.
+#[test]
+fn a_resolution_that_waits_for_its_restart_does_not_widen_the_range_of_60ffh() {
+    let mut bench = Bench::new();
+    bench.set(0x202F, 5, 10);
+    assert_eq!(bench.write(0x60FF, 0, 1001), Err(0x0609_0031));
+    bench.let_store();
+    bench.power_cycle();
+    bench.set(0x60FF, 0, 1001);
+    bench.set(0x202F, 5, 1);
+    bench.set(0x60FF, 0, 5000);
+    bench.send("000#8104");
+    bench.run_ms(10);
+    assert_eq!(bench.write(0x60FF, 0, 1001), Err(0x0609_0031), "after NMT reset node too");
+}
+
+/// 7.1: bit 12 says that the speed is 0, bit 14 that the motor runs.
+#[test]
+fn bits_12_and_14_are_never_both_set_however_slowly_the_motor_turns() {
+    let mut bench = Bench::new();
+    bench.set(0x202F, 5, 10);
+    bench.let_store();
+    bench.power_cycle();
+    bench.enable_in(3);
+    // 0.5 r/min, then faster, to rest, and back through rest.
+    for target in [5, 300, 0, -5, 5, 0] {
+        bench.set(0x60FF, 0, target);
+        for _ in 0..700 {
+            bench.run_ms(2);
+            let statusword = bench.statusword();
+            assert!(matches!(statusword & 0x5000, 0x1000 | 0x4000), "{statusword:04X}h at {target}");
+        }
+        assert_eq!(bench.statusword() & 0x5000, if target == 0 { 0x1000 } else { 0x4000 }, "target {target}");
+        assert_eq!(bench.get(0x2027, 0), i64::from(target != 0), "2027h");
+    }
+}
+
 #[test]
 fn direction_2001h_turns_the_shaft_the_other_way_round_for_the_same_target() {
     let turned = |direction| {

@@ -8,6 +8,7 @@ use crate::{AbortCode, Mux, NodeId};
 pub struct Dictionary<const N: usize> {
     table: &'static Table,
     cells: [u32; N],
+    in_effect: u32,
 }
 
 /// All values, to look at only; what a [`super::Check`] sees.
@@ -15,6 +16,7 @@ pub struct Dictionary<const N: usize> {
 pub struct View<'a> {
     table: &'static Table,
     cells: &'a [u32],
+    in_effect: u32,
 }
 
 impl<const N: usize> Dictionary<N> {
@@ -24,7 +26,7 @@ impl<const N: usize> Dictionary<N> {
     /// If the table has more than `N` rows.
     pub fn new(table: &'static Table, node_id: NodeId) -> Self {
         assert!(table.rows().len() <= N, "the table has more rows than the dictionary has cells");
-        let mut dictionary = Self { table, cells: [0; N] };
+        let mut dictionary = Self { table, cells: [0; N], in_effect: 0 };
         for (slot, _) in table.iter() {
             dictionary.cells[slot.position()] = default_raw(table, slot, node_id);
         }
@@ -72,7 +74,18 @@ impl<const N: usize> Dictionary<N> {
 
     /// All values, to look at.
     pub fn view(&self) -> View<'_> {
-        View { table: self.table, cells: &self.cells }
+        View { table: self.table, cells: &self.cells, in_effect: self.in_effect }
+    }
+
+    /// Lends a word of the device's own to the rows' checks: what it goes by though no object shows it, such as a setting
+    /// as it was at the last restart. 0 until then.
+    pub const fn set_in_effect(&mut self, word: u32) {
+        self.in_effect = word;
+    }
+
+    /// The word that the device lent.
+    pub const fn in_effect(&self) -> u32 {
+        self.in_effect
     }
 
     /// Whether a peer (SDO or RPDO) may write `raw` to this row: access, listed values, limits, the row's check.
@@ -122,6 +135,11 @@ impl View<'_> {
     /// The cell of a row.
     pub fn raw(&self, slot: Slot) -> u32 {
         self.cells[slot.position()]
+    }
+
+    /// The word that the device lent; see [`Dictionary::set_in_effect`].
+    pub const fn in_effect(&self) -> u32 {
+        self.in_effect
     }
 
     /// The value at a multiplexor as a number.

@@ -29,7 +29,7 @@ impl Overload {
     pub fn update(&mut self, limits: &OverloadLimits, current_a: f32, dt_s: f32) -> bool {
         let multiple = current_a.abs() / limits.rated_a;
         let overloaded = multiple >= REGULATION_SHARE * limits.begins_at;
-        let allowed_s = allowed_time(&limits.curve, multiple);
+        let allowed_s = between(&limits.curve, multiple);
         if limits.rated_a <= 0.0 || limits.begins_at <= 0.0 || allowed_s <= 0.0 {
             self.used = 0.0;
         } else if overloaded {
@@ -46,18 +46,17 @@ impl Overload {
     }
 }
 
-fn allowed_time(curve: &[(f32, f32); 3], multiple: f32) -> f32 {
-    let [(first, first_s), .., (_, last_s)] = *curve;
-    if multiple <= first {
-        return first_s;
+/// The value at `x` of a curve through points ascending by `x`: straight between two of them, flat outside.
+pub fn between(curve: &[(f32, f32); 3], x: f32) -> f32 {
+    let [(first, first_y), .., (_, last_y)] = *curve;
+    if x <= first {
+        return first_y;
     }
     let between = curve.windows(2).find_map(|pair| match pair {
-        [(low, low_s), (high, high_s)] if multiple <= *high => {
-            Some(low_s + (high_s - low_s) * (multiple - low) / (high - low))
-        }
+        [(low, low_y), (high, high_y)] if x <= *high => Some(low_y + (high_y - low_y) * (x - low) / (high - low)),
         _ => None,
     });
-    between.unwrap_or(last_s)
+    between.unwrap_or(last_y)
 }
 
 #[cfg(test)]

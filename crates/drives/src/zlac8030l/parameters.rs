@@ -10,7 +10,7 @@ use super::objects::*;
 use super::readings::*;
 use crate::engine::axis::{AxisParameters, Tolerances};
 use crate::engine::bleeder::BleederLimits;
-use crate::engine::overload::OverloadLimits;
+use crate::engine::overload::{OverloadLimits, between};
 use crate::engine::servo::{ServoGains, ServoLimits, ServoModel};
 use crate::zl::ProfileObjects;
 
@@ -115,20 +115,21 @@ fn servo_limits(values: &Values) -> ServoLimits {
     }
 }
 
-/// Overload begins at 2012h times the rated current 2014h. With overload processing off (202F:02) it may last for 2016h,
-/// however high it is; with it on, the note below the object table gives the time, scaled by 2016h.
+/// With overload processing on (202F:02) 2016h is the time at the rated current 2014h, and the note below the object table
+/// has the shares of it at higher ones. With it off, as delivered, 2016h is the time from 2012h times the rated current on,
+/// and below that the time is longer in the proportion of the note.
 fn overload(values: &Values) -> OverloadLimits {
-    let time = f32::from(values.get(OVERLOAD_TIME));
+    let time_s = f32::from(values.get(OVERLOAD_TIME)) * 10e-3;
+    let factor = f32::from(values.get(OVERLOAD_FACTOR)) / 100.0;
     let curve = if values.get(OVERLOAD_PROCESSING) == 1 {
-        OVERLOAD_TIMES_S.map(|(multiple, time_s)| (multiple, time_s * time / OVERLOAD_TIME_FACTORY))
+        OVERLOAD_TIME_SHARES.map(|(multiple, share)| (multiple, time_s * share))
     } else {
-        OVERLOAD_TIMES_S.map(|(multiple, _)| (multiple, time * 10e-3))
+        let at_factor = between(&OVERLOAD_TIME_SHARES, factor);
+        OVERLOAD_TIME_SHARES.map(|(multiple, share)| {
+            if multiple < factor { (multiple, time_s * share / at_factor) } else { (factor, time_s) }
+        })
     };
-    OverloadLimits {
-        rated_a: tenths(values, RATED_CURRENT),
-        begins_at: f32::from(values.get(OVERLOAD_FACTOR)) / 100.0,
-        curve,
-    }
+    OverloadLimits { rated_a: tenths(values, RATED_CURRENT), begins_at: factor.min(OVERLOAD_FROM), curve }
 }
 
 fn bleeder(values: &Values) -> BleederLimits {

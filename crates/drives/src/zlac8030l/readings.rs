@@ -18,13 +18,12 @@ pub const SUPERVISION_PERIOD_S: f32 = 0.5e-3;
 /// Communication task: 0.5 ms, the unit of the drive's PDO timers (6.1).
 pub const COMMUNICATION_PERIOD_NS: u64 = 500_000;
 
-/// Bus voltage below which the drive reports under-voltage. No manual gives it: between the 16 V of the sibling
-/// ZLAC8015D and the lowest supply of its motors, 24 V less 20 %.
-pub const UNDER_VOLTAGE_V: f32 = 18.0;
+/// Bus voltage below which the drive reports under-voltage. Source: the maker's "ZLAC8030L hardware manual" V1.00, as is
+/// that of over-voltage. The sibling ZLAC8015D has the same.
+pub const UNDER_VOLTAGE_V: f32 = 16.0;
 
-/// Bus voltage above which the drive reports over-voltage: just over the range of the bleeder's switching points
-/// (202Eh:03, up to 75 V), which must be able to act first.
-pub const OVER_VOLTAGE_V: f32 = 76.0;
+/// Bus voltage above which the drive reports over-voltage.
+pub const OVER_VOLTAGE_V: f32 = 75.0;
 
 /// How far the bus voltage has to come back before the fault's cause counts as gone.
 pub const VOLTAGE_HYSTERESIS_V: f32 = 1.0;
@@ -104,12 +103,13 @@ pub const DISPLAY_FILTER_S: f32 = 5e-3;
 /// capacitors charge through the source's resistance.
 pub const SUPPLY_SETTLING_PERIODS: u16 = 100;
 
-/// Times of the note below the object table, for once, twice and three times the rated current, with 2016h at its factory
-/// value; 2016h scales them.
-pub const OVERLOAD_TIMES_S: [(f32, f32); 3] = [(1.0, 20.0), (2.0, 6.0), (3.0, 4.0)];
+/// Times of the note below the object table as shares of the one at rated current, which is 2016h: 20 s, 6 s and 4 s at once,
+/// twice and three times the rated current.
+pub const OVERLOAD_TIME_SHARES: [(f32, f32); 3] = [(1.0, 1.0), (2.0, 0.3), (3.0, 0.2)];
 
-/// Factory value of 2016h, which [`OVERLOAD_TIMES_S`] belong to.
-pub const OVERLOAD_TIME_FACTORY: f32 = 300.0;
+/// Multiple of the rated current from which time is counted, where 2012h does not put it lower. Guess: the rated current
+/// itself can be carried for ever, and a regulated current swings about it by less than this.
+pub const OVERLOAD_FROM: f32 = 1.05;
 
 /// Energy that the bleeder resistor bears beyond its rated power (202Eh:02), as a time of that power: ten seconds, of the
 /// order that makers of wire-wound resistors allow (ten times the power for a second or two).

@@ -4,7 +4,8 @@ use cia402::{ModeOfOperation, PowerState, Statusword};
 
 use crate::engine::axis::AxisStatus;
 
-/// Bit 12 in profile velocity.
+/// Bit 12 in profile velocity; never with [`RUNNING`], which slower than the threshold of standstill means that the motor is
+/// to turn.
 pub const SPEED_IS_ZERO: u16 = 1 << 12;
 /// Bit 13 in profile position: the deviation is within 2002h.
 pub const IN_POSITION: u16 = 1 << 13;
@@ -21,7 +22,7 @@ pub(super) fn statusword(state: PowerState, mode: ModeOfOperation, status: &Axis
         ModeOfOperation::PROFILE_POSITION => {
             bit(Statusword::SET_POINT_ACKNOWLEDGE, status.acknowledged) | bit(IN_POSITION, status.in_position)
         }
-        ModeOfOperation::PROFILE_VELOCITY => bit(SPEED_IS_ZERO, status.standing),
+        ModeOfOperation::PROFILE_VELOCITY => bit(SPEED_IS_ZERO, !status.running),
         _ => 0,
     };
     Statusword(

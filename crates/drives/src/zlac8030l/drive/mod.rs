@@ -41,8 +41,6 @@ pub static NODE_PROFILE: NodeProfile = zl::node_profile(&TABLE, QUIRKS);
 pub struct Zlac8030l {
     device: Device<ROW_COUNT>,
     dip_address: u8,
-    /// 202F:05 as it was at the last restart.
-    velocity_resolution: u16,
     parameters: Parameters,
     parameters_changed: bool,
     axis: Axis,
@@ -78,11 +76,13 @@ impl Zlac8030l {
     }
 
     /// Motor free, position 0, and the values of `device` in effect.
-    fn over(device: Device<ROW_COUNT>) -> Self {
+    fn over(mut device: Device<ROW_COUNT>) -> Self {
         let parameters = Parameters::from(device.values());
+        // 202F:05 acts from a restart on (5.3).
+        let resolution = device.values().get(VELOCITY_RESOLUTION);
+        device.values_mut().set_in_effect(u32::from(resolution));
         Self {
             servo: Servo::new(&parameters.model, 0, 0),
-            velocity_resolution: device.values().get(VELOCITY_RESOLUTION),
             device,
             dip_address: 0,
             parameters,
@@ -229,7 +229,7 @@ impl Zlac8030l {
 
     fn read_targets(&mut self) {
         let values = self.device.values();
-        let rpm = f64::from(values.get(TARGET_VELOCITY)) / f64::from(self.velocity_resolution.max(1));
+        let rpm = f64::from(values.get(TARGET_VELOCITY)) / f64::from(values.in_effect().max(1));
         let max_rpm = self.parameters.max_rpm;
         self.targets = Targets {
             velocity: rpm.clamp(-max_rpm, max_rpm) * self.parameters.counts_s_per_rpm,
@@ -262,8 +262,9 @@ impl Zlac8030l {
         let values = self.device.values_mut();
         values.set(POSITION_ACTUAL_VALUE, position);
         values.set(VELOCITY_ACTUAL_VALUE, round(velocity * 10.0) as i32);
-        values.set(TORQUE_ACTUAL_VALUE, round(current * 10.0).clamp(-300.0, 300.0) as i16);
-        values.set(TORQUE_DEMAND, round(demand_ma).clamp(-30_000.0, 30_000.0) as i16);
+        values.set(TORQUE_ACTUAL_VALUE, round(current * 10.0) as i16);
+        // 16 bits end at 32.767 A, half of what 2015h goes to: saturated, as the cast is.
+        values.set(TORQUE_DEMAND, round(demand_ma) as i16);
         values.set(MOTOR_TEMPERATURE, temperature(sensors.motor_c));
         values.set(DRIVER_TEMPERATURE, temperature(sensors.driver_c));
         values.set(BUS_VOLTAGE, round(sensors.bus_v * 100.0) as u16);

@@ -3,7 +3,7 @@
 use canopen::AbortCode;
 use canopen::od::View;
 
-use super::{CONTROLWORD, MODES_OF_OPERATION_DISPLAY, TARGET_POSITION, VELOCITY_RESOLUTION};
+use super::{CONTROLWORD, MODES_OF_OPERATION_DISPLAY, TARGET_POSITION};
 
 /// Largest absolute target position (607Ah: ±3FFFFFFFh absolute, ±7FFFFFFFh relative).
 pub const ABSOLUTE_TARGET_LIMIT: i32 = 0x3FFF_FFFF;
@@ -28,9 +28,10 @@ pub(super) fn set_point_in_range(values: &View<'_>, raw: u32) -> Result<(), Abor
     Ok(())
 }
 
-/// 60FFh: ±1000 r/min in the resolution that 202F:05 sets.
+/// 60FFh: ±1000 r/min in the resolution of 202F:05. A new resolution acts from the next restart on (5.3), here too: the
+/// drive lends the one in effect.
 pub(super) fn target_velocity_in_range(values: &View<'_>, raw: u32) -> Result<(), AbortCode> {
-    let limit = TARGET_VELOCITY_LIMIT * i32::from(values.get(VELOCITY_RESOLUTION));
+    let limit = TARGET_VELOCITY_LIMIT * values.in_effect().max(1) as i32;
     match raw as i32 {
         value if value > limit => Err(AbortCode::VALUE_TOO_HIGH),
         value if value < -limit => Err(AbortCode::VALUE_TOO_LOW),

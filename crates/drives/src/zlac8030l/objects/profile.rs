@@ -25,8 +25,9 @@ pub(super) const ROWS: [Entry; 22] = [
     ro(0x6064, 0, I32, "position_actual_value", "Actual position feedback").unit("counts").mappable(),
     ro(0x606C, 0, I32, "velocity_actual_value", "Actual speed feedback").unit("0.1 r/min").mappable(),
     rw(0x6071, 0, I16, "target_torque", "Target torque").range(-30000, 30000).unit("mA").mappable(),
-    ro(0x6074, 0, I16, "torque_demand", "Real-time target torque").range(-30000, 30000).unit("mA").mappable(),
-    ro(0x6077, 0, I16, "torque_actual_value", "Real-time torque feedback").range(-300, 300).unit("0.1 A").mappable(),
+    // Both show what flows, up to the 60 A that 2015h goes to; 16 bits of 1 mA end before that.
+    ro(0x6074, 0, I16, "torque_demand", "Real-time target torque").unit("mA").mappable(),
+    ro(0x6077, 0, I16, "torque_actual_value", "Real-time torque feedback").range(-600, 600).unit("0.1 A").mappable(),
     rw(0x607A, 0, I32, "target_position", "Target position")
         .range(-0x7FFF_FFFF, 0x7FFF_FFFF).unit("counts").mappable(),
     rw(0x6081, 0, U32, "profile_velocity", "Max speed").range(1, 1000).default(120).unit("r/min").mappable(),
