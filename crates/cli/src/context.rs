@@ -103,6 +103,8 @@ impl Context {
             return Ok(drive);
         }
         Err(Failure::new(format!("the model of node {id} is not known"))
+            .of_kind("unknown_model")
+            .at_node(id)
             .because("its identity (1018h) and objects fit no model, or more than one")
             .next(format!("say which it is with --model {id}=MODEL, where MODEL is one of: {}", models::names())))
     }

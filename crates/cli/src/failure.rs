@@ -2,6 +2,10 @@
 
 use std::fmt;
 
+use canopen::{AbortCode, Mux, NodeId};
+use clap::error::{ContextKind, ErrorKind};
+use serde::Serialize;
+
 use crate::context::how_to_say;
 use crate::signals::Signal;
 
@@ -29,33 +33,92 @@ impl Status {
     }
 }
 
-/// A reason for people, in up to three parts.
+/// A reason for people, in up to three parts, and what programs look for in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Failure {
     /// Decides the exit status.
     pub(crate) status: Status,
+    /// What kind it is, in a word that programs may rely on.
+    pub(crate) kind: &'static str,
     /// What could not be done, with node and object.
     pub(crate) what: String,
     /// Why: what the drive or the system said, one line each.
     pub(crate) because: Vec<String>,
     /// What to do next, one line each.
     pub(crate) next: Vec<String>,
+    /// The node, object and abort code that it is about.
+    pub(crate) subject: Subject,
+    /// It has been told already, as part of what the command printed.
+    pub(crate) told: bool,
+}
+
+/// What a failure is about, as far as it is about one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Subject {
+    pub(crate) node: Option<NodeId>,
+    pub(crate) object: Option<Mux>,
+    pub(crate) abort: Option<AbortCode>,
 }
 
 impl Failure {
     /// The operation failed.
     pub(crate) fn new(what: impl Into<String>) -> Self {
-        Self { status: Status::Failed, what: what.into(), because: Vec::new(), next: Vec::new() }
+        Self {
+            status: Status::Failed,
+            kind: "failed",
+            what: what.into(),
+            because: Vec::new(),
+            next: Vec::new(),
+            subject: Subject::default(),
+            told: false,
+        }
     }
 
     /// The command line makes no sense, as found out only now.
     pub(crate) fn usage(what: impl Into<String>) -> Self {
-        Self { status: Status::Usage, ..Self::new(what) }
+        Self { status: Status::Usage, kind: "usage", ..Self::new(what) }
     }
 
     /// A signal asked the command to end.
     pub(crate) fn ended_by(signal: Signal) -> Self {
-        Self { status: signal.status(), ..Self::new(signal.text()) }
+        Self { status: signal.status(), kind: "interrupted", ..Self::new(signal.text()) }
+    }
+
+    /// What the parser of the command line found, for programs; people get its own text.
+    pub(crate) fn of_command_line(error: &clap::Error) -> Self {
+        let text = error.render().to_string();
+        let (what, rest) = text.split_once("\n\n").unwrap_or((&text, ""));
+        let what: Vec<&str> = what.lines().map(str::trim).collect();
+        let failure = Self::usage(what.join(" ").trim_start_matches("error: "));
+        let tips = rest.lines().map(str::trim).filter_map(|line| line.strip_prefix("tip: "));
+        let failure = tips.fold(failure, |failure, tip| failure.next(tip));
+        match error.kind() {
+            ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+                Self::usage("no command given").next("ferrodrive --help lists the commands")
+            }
+            _ => match error.get(ContextKind::Usage) {
+                Some(usage) => failure.next(usage.to_string().trim().replace("Usage:", "usage:")),
+                None if failure.next.is_empty() => failure.next("ferrodrive --help, or --help behind the command"),
+                None => failure,
+            },
+        }
+    }
+
+    /// Names its kind.
+    pub(crate) fn of_kind(self, kind: &'static str) -> Self {
+        Self { kind, ..self }
+    }
+
+    /// Says which node it is about.
+    pub(crate) fn at_node(mut self, node: NodeId) -> Self {
+        self.subject.node = Some(node);
+        self
+    }
+
+    /// Says which object it is about.
+    pub(crate) fn at_object(mut self, object: Mux) -> Self {
+        self.subject.object = Some(object);
+        self
     }
 
     /// Adds a reason.
@@ -80,12 +143,56 @@ impl fmt::Display for Failure {
     }
 }
 
+/// A failure as programs read it: `{"ok":false,"error":{..}}`.
+#[derive(Serialize)]
+pub(crate) struct FailureReport {
+    ok: bool,
+    error: FailureBody,
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct FailureBody {
+    /// A word: `usage`, `no_answer`, `aborted`, `out_of_limits`, ...
+    kind: &'static str,
+    /// What and why.
+    message: String,
+    node: Option<u8>,
+    object: Option<String>,
+    /// The SDO abort code.
+    abort: Option<u32>,
+    /// What to do.
+    next: Option<String>,
+}
+
+impl From<&Failure> for FailureReport {
+    fn from(failure: &Failure) -> Self {
+        Self { ok: false, error: failure.into() }
+    }
+}
+
+impl From<&Failure> for FailureBody {
+    fn from(failure: &Failure) -> Self {
+        let because = failure.because.join("; ");
+        let message = if because.is_empty() { failure.what.clone() } else { format!("{}: {because}", failure.what) };
+        let Subject { node, object, abort } = failure.subject;
+        Self {
+            kind: failure.kind,
+            message,
+            node: node.map(NodeId::raw),
+            object: object.map(|object| object.to_string()),
+            abort: abort.map(|code| code.0),
+            next: (!failure.next.is_empty()).then(|| failure.next.join("; ")),
+        }
+    }
+}
+
 impl From<master::Error> for Failure {
-    /// The master's errors say what, why and what to do in whole sentences, but for how a model is named on this command
-    /// line. What is beyond a limit was mistyped.
+    /// The master's errors say what, why and what to do, but for how a model is named on this command line. What is beyond
+    /// a limit was mistyped.
     fn from(error: master::Error) -> Self {
         use master::Error;
-        let failure = Self::new(error.to_string());
+        let subject = Subject { node: Some(error.node()), object: error.object(), abort: error.abort() };
+        let failure = Self { kind: error.kind(), subject, ..parts(&error) };
         match error {
             Error::OutOfLimits { .. } => Self { status: Status::Usage, ..failure },
             Error::GuessedModel { node, guess, .. } => {
@@ -103,6 +210,22 @@ impl From<master::Error> for Failure {
     }
 }
 
+/// What the error says, and apart from it what it advises.
+fn parts(error: &master::Error) -> Failure {
+    if let master::Error::NotReached(explanation) = error {
+        let facts: Vec<String> = explanation.facts.iter().map(ToString::to_string).collect();
+        return Failure::new(format!("node {}: could not {}", explanation.node, explanation.intent))
+            .because(&explanation.conclusion)
+            .because(format!("seen: {}", facts.join("; ")))
+            .next(&explanation.advice);
+    }
+    let text = error.to_string();
+    match error.advice().and_then(|advice| Some((text.strip_suffix(&advice)?, advice.clone()))) {
+        Some((what, advice)) => Failure::new(what.trim_end().trim_end_matches(['.', ':'])).next(advice),
+        None => Failure::new(text),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -113,5 +236,17 @@ mod tests {
         let text = "cannot read 6064h:00 of node 9\n  because: no answer\n  next:    ferrodrive scan";
         assert_eq!(failure.to_string(), text);
         assert_eq!(Failure::usage("x").status as u8, 2);
+    }
+
+    #[test]
+    fn a_failure_for_programs_has_its_parts_in_fields() {
+        let failure = Failure::new("node 4 refused").because("read-only").next("read it").next("once");
+        let mut failure = failure.at_node(NodeId::new(4).unwrap()).at_object(Mux::new(0x6064, 0));
+        failure.subject.abort = Some(AbortCode::READ_ONLY);
+        let json = serde_json::to_value(FailureReport::from(&failure)).unwrap();
+        let expected = serde_json::json!({ "ok": false, "error": {
+            "kind": "failed", "message": "node 4 refused: read-only", "node": 4, "object": "6064h:00",
+            "abort": 0x0601_0002, "next": "read it; once" } });
+        assert_eq!(json, expected);
     }
 }

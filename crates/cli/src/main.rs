@@ -32,28 +32,54 @@ use clap::{ArgMatches, CommandFactory, FromArgMatches};
 use crate::args::{Cli, Command, Global};
 use crate::command::objects::Whose;
 use crate::context::Context;
-use crate::failure::Failure;
+use crate::failure::{Failure, FailureReport};
 use crate::output::{Format, Report};
 use crate::paint::Paint;
 
 fn main() -> ExitCode {
-    let matches = Cli::command().get_matches();
-    let cli = match Cli::from_arg_matches(&matches) {
-        Ok(cli) => cli,
-        Err(error) => error.exit(),
+    let parsed = Cli::command().try_get_matches().and_then(|matches| {
+        let cli = Cli::from_arg_matches(&matches)?;
+        Ok((cli, matches))
+    });
+    let (cli, matches) = match parsed {
+        Ok(parsed) => parsed,
+        Err(error) => return refuse_command_line(&error),
     };
     let format = Format { json: cli.global.json, paint: Paint::for_stream(&io::stdout()) };
     match run(&cli.global, format, &cli.command, typed_bus(&matches)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            complain(&failure);
+            complain(format, &failure);
             ExitCode::from(failure.status as u8)
         }
     }
 }
 
-/// Says on standard error why. Who sent a signal knows, unless there is more to tell.
-fn complain(failure: &Failure) {
+/// A command line that makes no sense, or asks for help. It has not been parsed, but it may say in which form to complain.
+fn refuse_command_line(error: &clap::Error) -> ExitCode {
+    let before_dashes = std::env::args_os().take_while(|argument| argument != "--");
+    let json = before_dashes.into_iter().any(|argument| argument == "--json");
+    if !json || !error.use_stderr() {
+        error.exit();
+    }
+    let failure = Failure::of_command_line(error);
+    complain(Format { json, paint: Paint::for_stream(&io::stdout()) }, &failure);
+    ExitCode::from(failure.status as u8)
+}
+
+/// Says why: to people on standard error, to programs as a line of JSON on standard output. Who sent a signal knows,
+/// unless there is more to tell.
+fn complain(format: Format, failure: &Failure) {
+    if failure.told {
+        return;
+    }
+    if format.json {
+        // Nobody may be listening any more; the exit status still tells.
+        if let Ok(line) = sim::json::to_string(&FailureReport::from(failure)) {
+            let _ = writeln!(io::stdout(), "{line}");
+        }
+        return;
+    }
     if failure.status.is_signal() && failure.because.is_empty() {
         return;
     }
@@ -72,7 +98,12 @@ fn run(global: &Global, format: Format, command: &Command, typed_bus: bool) -> R
         Command::Demo(demo) => {
             let report = demo.run(global)?;
             print(format, &report)?;
-            if report.ok { Ok(()) } else { Err(Failure::new("the drive did not do everything as its manual says")) }
+            match report.failure() {
+                // For programs the report has it.
+                Some(failure) if format.json => Err(Failure { told: true, ..failure }),
+                Some(failure) => Err(failure),
+                None => Ok(()),
+            }
         }
         Command::Sim(sim) => sim.run(global, typed_bus.then_some(&global.bus)),
         Command::Scan(command) => on_bus(global, format, async |context| command.run(context).await),

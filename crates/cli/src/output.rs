@@ -24,7 +24,7 @@ pub(crate) struct Format {
 impl Format {
     /// Prints a report on standard output, one line of JSON or its text.
     pub(crate) fn print(self, report: &impl Report) -> io::Result<()> {
-        let text = if self.json { serde_json::to_string(report)? } else { report.text(self.paint) };
+        let text = if self.json { sim::json::to_string(report)? } else { report.text(self.paint) };
         print_line(&text)
     }
 }

@@ -137,7 +137,7 @@ async fn standstill(context: &Context, node: NodeId) {
 /// A failure of the bus itself, with every cause that is known.
 pub(crate) fn bus_failure(global: &Global, error: &dyn Error) -> Failure {
     let failure = failure_of(error);
-    Failure { what: format!("bus {}: {}", global.bus, failure.what), ..failure }
+    Failure { what: format!("bus {}: {}", global.bus, failure.what), kind: "bus", ..failure }
 }
 
 /// An error with every cause that is known.

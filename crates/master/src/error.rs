@@ -178,6 +178,76 @@ pub enum Error {
     },
 }
 
+impl Error {
+    /// What kind it is, in a word that programs may rely on.
+    pub const fn kind(&self) -> &'static str {
+        match self {
+            Self::NoAnswer { .. } => "no_answer",
+            Self::Aborted { .. } => "aborted",
+            Self::BadAnswer { .. } => "bad_answer",
+            Self::WrongLength { .. } => "wrong_length",
+            Self::QueueFull { .. } => "queue_full",
+            Self::NoBootUp { .. } => "no_boot_up",
+            Self::NotReached(_) => "not_reached",
+            Self::UnknownModel { .. } => "unknown_model",
+            Self::GuessedModel { .. } => "guessed_model",
+            Self::WrongModel { .. } => "wrong_model",
+            Self::OtherModel { .. } => "other_model",
+            Self::NoFactorySettings { .. } => "no_factory_settings",
+            Self::NoSuchMode { .. } => "no_such_mode",
+            Self::OutOfLimits { .. } => "out_of_limits",
+        }
+    }
+
+    /// The node that it is about.
+    pub const fn node(&self) -> NodeId {
+        match self {
+            Self::NoAnswer { node, .. }
+            | Self::Aborted { node, .. }
+            | Self::BadAnswer { node, .. }
+            | Self::WrongLength { node, .. }
+            | Self::QueueFull { node }
+            | Self::NoBootUp { node, .. }
+            | Self::UnknownModel { node, .. }
+            | Self::GuessedModel { node, .. }
+            | Self::WrongModel { node, .. }
+            | Self::OtherModel { node, .. }
+            | Self::NoFactorySettings { node, .. }
+            | Self::NoSuchMode { node, .. }
+            | Self::OutOfLimits { node, .. } => *node,
+            Self::NotReached(explanation) => explanation.node,
+        }
+    }
+
+    /// The object that it is about, if it is about one.
+    pub const fn object(&self) -> Option<Mux> {
+        match self {
+            Self::NoAnswer { mux, .. }
+            | Self::Aborted { mux, .. }
+            | Self::BadAnswer { mux, .. }
+            | Self::WrongLength { mux, .. }
+            | Self::OutOfLimits { mux, .. } => Some(*mux),
+            Self::OtherModel { hallmark, .. } => Some(*hallmark),
+            _ => None,
+        }
+    }
+
+    /// The abort code that the node gave.
+    pub const fn abort(&self) -> Option<AbortCode> {
+        if let Self::Aborted { code, .. } = self { Some(*code) } else { None }
+    }
+
+    /// What to do about it, where that is known; the text of the error has it too, as its end.
+    pub fn advice(&self) -> Option<String> {
+        match self {
+            Self::NoAnswer { hints, .. } | Self::NoBootUp { hints, .. } => Some(hints.to_string()),
+            Self::Aborted { code, access, .. } => Some(advice(*code, *access).to_owned()),
+            Self::NotReached(explanation) => Some(explanation.advice.clone()),
+            _ => None,
+        }
+    }
+}
+
 /// Direction of an SDO request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {

@@ -170,5 +170,6 @@ fn refused(error: &CommandError) -> String {
 
 fn to_json(answer: &impl Serialize) -> String {
     // Answers are flags, numbers and texts: they always become JSON.
-    serde_json::to_string(answer).unwrap_or_else(|_| r#"{"ok":false,"error":"an answer cannot be written"}"#.to_owned())
+    crate::json::to_string(answer)
+        .unwrap_or_else(|_| r#"{"ok":false,"error":"an answer cannot be written"}"#.to_owned())
 }

@@ -12,6 +12,7 @@ mod block_on;
 pub mod command;
 mod drive;
 pub mod fault;
+pub mod json;
 pub mod machine;
 pub mod pace;
 mod prng;

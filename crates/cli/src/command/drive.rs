@@ -2,6 +2,7 @@
 //! intents, and what a drive says of itself.
 
 use canopen::{NmtState, NodeId};
+use cia402::ModeOfOperation;
 use master::drive::{Drive, DriveState};
 use serde::Serialize;
 
@@ -69,7 +70,9 @@ pub(crate) struct StateReport {
     /// The model that its objects speak for.
     guess: Option<&'static str>,
     state: &'static str,
-    mode: Option<String>,
+    /// The mode of operation: its number, and its name where CiA 402 or the model has one.
+    mode: Option<i8>,
+    mode_name: Option<&'static str>,
     statusword: u16,
     bits: Vec<&'static str>,
     fault_code: u16,
@@ -162,7 +165,8 @@ impl StateReport {
             model: drive.profile().filter(|_| drive.guess().is_none()).map(|profile| profile.model),
             guess: guessed(drive),
             state: state.power.map_or("no state of CiA 402", |power| power.name()),
-            mode: state.mode.map(|mode| mode.to_string()),
+            mode: state.mode.map(|mode| mode.0),
+            mode_name: state.mode.and_then(ModeOfOperation::name),
             statusword: state.statusword.0,
             bits,
             fault_code: state.fault_code,
@@ -218,7 +222,7 @@ impl Motion {
 
 impl Report for StateReport {
     fn text(&self, paint: Paint) -> String {
-        let mode = self.mode.as_deref().unwrap_or("unknown mode");
+        let mode = self.mode.map_or_else(|| "unknown mode".into(), |mode| ModeOfOperation(mode).to_string());
         let model = self.model.map(|model| format!(" ({model})")).unwrap_or_default();
         let mut lines = vec![format!("node {}{model}: {}, {mode}", self.node, paint.strong(self.state))];
         lines.push(format!("  statusword  {:04X}h  {}", self.statusword, self.bits.join(", ")));

@@ -54,6 +54,8 @@ impl Home {
         let modes = model.modes.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
         let mode = ModeOfOperation::HOMING;
         Failure::new(format!("node {}: no homing with method {}", self.node, self.method))
+            .of_kind("no_such_mode")
+            .at_node(self.node)
             .because(format!("the {} has no homing: 6060h takes {modes} only, not {}", model.title, mode.0))
             .next(format!(
                 "move it to its reference, then set the position to zero there: ferrodrive objects {} position",

@@ -58,16 +58,27 @@ pub(crate) struct ObjectList {
 #[derive(Debug, Serialize)]
 struct Row {
     object: String,
+    #[serde(skip)]
+    communication: bool,
     name: &'static str,
     title: &'static str,
     data_type: &'static str,
     access: &'static str,
     stored: bool,
     mappable: bool,
-    default: String,
+    default: Factory,
     limits: Option<(i64, i64)>,
     unit: &'static str,
     values: Vec<Meaning>,
+}
+
+/// A factory value, as programs read it: a number, a text, or what the node-ID is added to.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+enum Factory {
+    Number(i64),
+    PlusNodeId { plus_node_id: u32 },
+    Text(&'static str),
 }
 
 #[derive(Debug, Serialize)]
@@ -122,13 +133,14 @@ impl Row {
     fn new(row: &Entry) -> Self {
         Self {
             object: row.mux().to_string(),
+            communication: row.is_communication(),
             name: row.name,
             title: row.title,
             data_type: row.data_type.name(),
             access: row.access.name(),
             stored: row.stored,
             mappable: row.pdo == PdoMapping::Yes,
-            default: default(row),
+            default: Factory::of(row),
             limits: row.limits,
             unit: row.unit,
             values: row.values.iter().map(|(value, meaning)| Meaning { value: *value, meaning }).collect(),
@@ -150,12 +162,23 @@ impl Row {
     }
 }
 
-fn default(row: &Entry) -> String {
-    match row.default {
-        Default::Value(value) if row.index < 0x2000 && value > 255 => format!("0x{value:X}"),
-        Default::Value(value) => value.to_string(),
-        Default::NodeIdPlus(base) => format!("0x{base:X} + node-ID"),
-        Default::Text(text) => format!("{text:?}"),
+impl Factory {
+    const fn of(row: &Entry) -> Self {
+        match row.default {
+            Default::Value(value) => Self::Number(value),
+            Default::NodeIdPlus(base) => Self::PlusNodeId { plus_node_id: base },
+            Default::Text(text) => Self::Text(text),
+        }
+    }
+
+    /// For people. What is in the communication area is mostly identifiers and mappings.
+    fn text(&self, in_communication_area: bool) -> String {
+        match self {
+            Self::Number(value) if in_communication_area && *value > 255 => format!("0x{value:X}"),
+            Self::Number(value) => value.to_string(),
+            Self::PlusNodeId { plus_node_id } => format!("0x{plus_node_id:X} + node-ID"),
+            Self::Text(text) => format!("{text:?}"),
+        }
     }
 }
 
@@ -168,7 +191,7 @@ impl Report for ObjectList {
                 row.name.into(),
                 row.data_type.into(),
                 row.rights(),
-                row.default.clone(),
+                row.default.text(row.communication),
                 row.unit.into(),
                 row.accepts(),
             ]);

@@ -53,6 +53,7 @@ impl Scan {
         let found = context.network.scan(context.timeout(), asked).await;
         if found.is_empty() {
             return Err(Failure::new("nobody is on the bus")
+                .of_kind("nobody")
                 .because("no node answered SDO and no boot-up or heartbeat message was heard")
                 .next("check supply, cable, termination (60 ohm between CAN_H and CAN_L) and the bit rate"));
         }

@@ -85,9 +85,10 @@ impl Write {
     pub(crate) async fn run(&self, context: &Context) -> Result<ObjectReport, Failure> {
         let drive = context.drive_untold(self.node).await?;
         let (mux, row) = resolve(&drive, &self.object)?;
+        let wrong = |reason| Failure::usage(reason).at_node(self.node).at_object(mux);
         let (data_type, number) = match row {
-            Some(row) => (row.data_type, value(row, &self.value).map_err(Failure::usage)?),
-            None => typed_value(&self.value).map_err(Failure::usage)?,
+            Some(row) => (row.data_type, value(row, &self.value).map_err(wrong)?),
+            None => typed_value(&self.value).map_err(wrong)?,
         };
         drive.check_write(mux, number)?;
         context.tell_guess(&drive);
@@ -120,7 +121,8 @@ fn accepted(row: &Entry) -> String {
 
 /// The multiplexor, and the row if the node's model is known and has it.
 fn resolve(drive: &Drive, object: &ObjectArg) -> Result<(Mux, Option<&'static Entry>), Failure> {
-    object.resolve(drive.profile().map(|model| model.table)).map_err(Failure::usage)
+    let found = object.resolve(drive.profile().map(|model| model.table));
+    found.map_err(|reason| Failure::usage(reason).at_node(drive.node().id()))
 }
 
 impl ObjectReport {

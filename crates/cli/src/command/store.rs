@@ -33,7 +33,14 @@ pub(crate) struct StoreReport {
     node: u8,
     done: &'static str,
     object: String,
-    effective_after_restart: Vec<String>,
+    effective_after_restart: Vec<Named>,
+}
+
+/// An object by number and name.
+#[derive(Debug, Serialize)]
+struct Named {
+    object: String,
+    name: Option<&'static str>,
 }
 
 impl Save {
@@ -62,10 +69,9 @@ impl StoreReport {
     ) -> Result<Self, Failure> {
         let (node, intent) = (drive.node().id(), "say what was stored");
         let model = drive.profile().ok_or(Error::UnknownModel { node, intent })?;
-        let after_restart = model.storage.effective_after_restart.iter().map(|mux| match model.row(*mux) {
-            Some(row) => format!("{mux} {}", row.name),
-            None => mux.to_string(),
-        });
+        let after_restart = model.storage.effective_after_restart.iter();
+        let after_restart =
+            after_restart.map(|mux| Named { object: mux.to_string(), name: model.row(*mux).map(|row| row.name) });
         let object = write(&model.storage).unwrap_or(model.storage.save).object;
         Ok(Self {
             node: node.raw(),
@@ -78,7 +84,9 @@ impl StoreReport {
 
 impl Report for StoreReport {
     fn text(&self, _: Paint) -> String {
-        let after = match self.effective_after_restart.as_slice() {
+        let named = |row: &Named| format!("{} {}", row.object, row.name.unwrap_or_default()).trim_end().to_owned();
+        let objects: Vec<String> = self.effective_after_restart.iter().map(named).collect();
+        let after = match objects.as_slice() {
             [] => String::new(),
             objects => format!("\n  after a restart only: {}", objects.join(", ")),
         };

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::bench::Finished;
 use super::row::Row;
+use crate::failure::{Failure, FailureBody};
 use crate::output::Report;
 use crate::paint::Paint;
 use crate::table::Table;
@@ -12,7 +13,10 @@ use crate::table::Table;
 #[derive(Debug, Serialize)]
 pub(crate) struct DemoReport {
     /// True if nothing differed.
-    pub(crate) ok: bool,
+    ok: bool,
+    /// Why not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<FailureBody>,
     /// Steps with something to compare, and how many were as expected.
     steps: usize,
     passed: usize,
@@ -58,8 +62,10 @@ impl DemoReport {
     pub(super) fn new(mut drives: Vec<PartReport>) -> Self {
         let rows = drives.iter_mut().flat_map(|part| std::mem::take(&mut part.rows)).collect();
         let sum = |count: fn(&PartReport) -> usize| drives.iter().map(count).sum();
+        let ok = drives.iter().all(PartReport::ok);
         Self {
-            ok: drives.iter().all(PartReport::ok),
+            ok,
+            error: (!ok).then(|| (&differs()).into()),
             steps: sum(|part| part.steps),
             passed: sum(|part| part.passed),
             virtual_s: drives.iter().map(|part| part.virtual_s).sum(),
@@ -69,6 +75,16 @@ impl DemoReport {
             rows,
         }
     }
+
+    /// Why the demo failed, if it did.
+    pub(crate) fn failure(&self) -> Option<Failure> {
+        (!self.ok).then(differs)
+    }
+}
+
+fn differs() -> Failure {
+    let failure = Failure::new("the drives did not do everything as their manuals say");
+    Failure { kind: "differs", ..failure.next("look for DIFFERS in the table, or for \"ok\":false in the rows") }
 }
 
 const OK_COLUMN: usize = 7;
