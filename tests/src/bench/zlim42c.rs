@@ -3,7 +3,10 @@
 use std::sync::LazyLock;
 
 use can::Bitrate;
+use canopen::NodeId;
+use drives::zlim42c::PROFILE;
 use sim::Component;
+use sim::machine::{Order, order};
 use sim::machine::{Zlim42cMachine, zlim42c, zlim42c_82};
 
 use super::{Rows, Subject};
@@ -52,6 +55,14 @@ impl Bench {
     #[must_use]
     pub fn long() -> Self {
         Self::with(vec![Box::new(zlim42c_82(NODE, RATE_500K))])
+    }
+
+    /// A drive that takes another choice at one point (`Z092`, `brake`), and has just booted.
+    #[must_use]
+    pub fn choosing(key: &str, choice: &str) -> Self {
+        let mut wanted = Order::new(&PROFILE, NodeId::MIN, Zlim42c::BITRATE);
+        wanted.variant.choose(key, choice).expect("a choice of this model");
+        Self::with(vec![order(&PROFILE, &wanted).expect("a drive that can be ordered")])
     }
 
     /// Selects a mode and enables operation.

@@ -1,6 +1,7 @@
 //! Halt, quick stop, emergency stop and step-down in every mode: how long the ramp takes, and what goes on after it.
 //!
-//! 605Ah, 605Bh, 605Ch and 605Dh name the ramps: normal is 6084h (609Ah in homing), quick is 6085h, at once is none.
+//! 605Ah, 605Bh, 605Ch and 605Dh name the ramps: normal is 6084h (609Ah in homing), quick is 6085h, and so is an emergency
+//! stop (5.4 has one word for 605Ah = 7, 605Dh = 3, 200Ah = 1 and 6085h); `brake` and `coast` are the other readings of it.
 
 use std::time::Duration;
 
@@ -44,8 +45,7 @@ fn ramp_s(mode: i64, option: i64) -> f64 {
     match option {
         1 if mode == 6 => HOMING_S,
         1 => NORMAL_S,
-        2 => QUICK_S,
-        _ => 0.0,
+        _ => QUICK_S,
     }
 }
 
@@ -168,23 +168,105 @@ fn disable_voltage_frees_the_motor_at_once_in_every_mode() {
     }
 }
 
-#[test]
-fn a_stop_at_once_from_high_speed_throws_the_rotor_out_of_step_and_a_ramp_does_not() {
-    // 6084h = 1 s against no ramp at all, from 1500 r/min: the energy of the rotor has to go somewhere.
-    for (option, keeps) in [(1, true), (3, false)] {
-        let mut bench = Bench::new();
-        bench.set(0x6083, 0, 1000);
-        bench.set(0x6084, 0, 1000);
-        bench.set(0x605D, 0, option);
-        bench.enable_in(3);
-        bench.set(0x60FF, 0, 1500);
-        bench.run_ms(1500);
-        bench.set(0x6040, 0, 0x10F);
-        bench.run_ms(2000);
-        let report = bench.report();
-        let lost = report.position - report.rotor_position.expect("known here");
-        assert_eq!((lost.abs() < 40, report.error_code), (keeps, 0), "605Dh = {option}: {lost} pulses, {report:?}");
+/// Turning at `rpm` in profile velocity, after a ramp of a second.
+fn at_speed(mut bench: Bench, rpm: i64) -> Bench {
+    for index in [0x6083, 0x6084] {
+        bench.set(index, 0, 1000);
     }
+    bench.enable_in(3);
+    bench.set(0x60FF, 0, rpm);
+    bench.run_ms(1500);
+    bench
+}
+
+/// Pulses that the rotor is away from the vector, two seconds later.
+fn lost_pulses(bench: &mut Bench) -> i64 {
+    bench.run_ms(2000);
+    let report = bench.report();
+    assert_eq!(report.error_code, 0, "{report:?}");
+    (report.position - report.rotor_position.expect("known here")).abs()
+}
+
+/// 5.4: 605Ah = 7, 605Dh = 3, 200Ah = 1 by the way in which they are set off.
+const EMERGENCY_STOPS: [&str; 3] = ["605Ah = 7", "605Dh = 3", "200Ah = 1"];
+
+fn emergency_stop(bench: &mut Bench, how: &str) {
+    match how {
+        "605Ah = 7" => {
+            bench.set(0x605A, 0, 7);
+            bench.set(0x6040, 0, 0x02);
+        }
+        "605Dh = 3" => {
+            bench.set(0x605D, 0, 3);
+            bench.set(0x6040, 0, 0x10F);
+        }
+        _ => {
+            for (index, sub, value) in [(0x200A, 0, 1), (0x2030, 2, 2), (0x204B, 0, 0)] {
+                bench.set(index, sub, value);
+            }
+            bench.operate(|drive, now| drive.set_input(0, true, now)).expect("X0");
+        }
+    }
+}
+
+#[test]
+fn every_emergency_stop_takes_the_time_of_6085h() {
+    for how in EMERGENCY_STOPS {
+        for ms in [50, 400] {
+            let mut bench = at_speed(Bench::new(), 120);
+            bench.set(0x6085, 0, ms);
+            emergency_stop(&mut bench, how);
+            stops_within(&mut bench, how, ms as f64 * 1e-3 - 0.0005);
+        }
+    }
+}
+
+#[test]
+fn an_emergency_stop_that_brakes_at_once_loses_steps_where_the_ramp_of_6085h_loses_none() {
+    // The rotor alone at 1000 r/min has J w² / 2 = 37 mJ; the field holds it with at most 2 K I / 50 = 10 mJ at 1.2 A.
+    for how in EMERGENCY_STOPS {
+        for (choice, keeps) in [("ramp", true), ("brake", false)] {
+            let mut bench = at_speed(Bench::choosing("Z092", choice), 1000);
+            emergency_stop(&mut bench, how);
+            let lost = lost_pulses(&mut bench);
+            assert_eq!(lost < 40, keeps, "{how}, {choice}: {lost} pulses");
+            assert!(keeps || lost % 80 < 8 || lost % 80 > 72, "{how}: {lost} pulses are whole electrical turns");
+        }
+    }
+}
+
+#[test]
+fn an_emergency_stop_that_coasts_switches_the_bridges_off_and_takes_the_motor_again_afterwards() {
+    for how in EMERGENCY_STOPS {
+        let mut bench = at_speed(Bench::choosing("Z092", "coast"), 300);
+        emergency_stop(&mut bench, how);
+        bench.run_ms(2);
+        assert_eq!(bench.report().velocity_demand_rpm, None, "{how}: no ramp");
+        bench.run_ms(300);
+        assert_eq!((bench.report().current_a, bench.statusword() & 1 << 13), (0.0, 0), "{how}: free");
+        let state = if how == "605Ah = 7" { 0x07 } else { 0x27 };
+        assert_eq!(bench.statusword() & 0x6F, state, "{how}");
+        // The cause goes, and the target velocity holds again.
+        bench.operate(|drive, now| drive.set_input(0, false, now)).expect("X0");
+        bench.set(0x6040, 0, 0x0F);
+        bench.run_ms(1200);
+        assert_eq!((bench.statusword() & 0x206F, bench.get(0x606C, 0)), (0x2027, 300), "{how}");
+    }
+}
+
+#[test]
+fn a_move_halted_by_coasting_goes_on_to_its_target() {
+    let mut bench = Bench::choosing("Z092", "coast");
+    bench.set(0x605D, 0, 3);
+    bench.enable_in(1);
+    bench.move_by(8000);
+    bench.run_ms(300);
+    bench.set(0x6040, 0, 0x15F);
+    bench.run_ms(300);
+    assert_eq!(bench.report().current_a, 0.0);
+    bench.set(0x6040, 0, 0x5F);
+    bench.run_ms(2000);
+    assert_eq!(bench.get(0x6064, 0), 8000);
 }
 
 #[test]

@@ -33,6 +33,8 @@ pub struct AxisParameters {
     pub step_down: StepDownOptions,
     /// 605Dh.
     pub halt: HaltOption,
+    /// What 605Ah and 605Dh call an emergency stop: how the drive reads their last value.
+    pub emergency_stop: StopRamp,
     /// The shaft is held while the axis is not enabled.
     pub lock_when_disabled: bool,
     /// The shaft is held from Switched on.
@@ -212,9 +214,10 @@ impl Axis {
         self.home.take()
     }
 
-    /// The power stage is to be on: enabled, or held for another reason.
+    /// The power stage is to be on: enabled and not let go, or held for another reason.
     pub fn is_energised(&self, parameters: &AxisParameters) -> bool {
-        self.is_live() || self.is_locked(parameters)
+        let coasts = self.stop.is_some_and(|stop| stop.free);
+        (self.is_live() && !coasts) || self.is_locked(parameters)
     }
 
     /// The host is silent: stops the motor once.
@@ -391,7 +394,7 @@ impl Axis {
     }
 
     fn wanted_stop(&self, targets: &Targets, parameters: &AxisParameters) -> Option<(StopCause, StopRamp)> {
-        let quick = StopRamp::of_quick_stop(parameters.quick_stop);
+        let quick = StopRamp::of_quick_stop(parameters.quick_stop, parameters.emergency_stop);
         if self.power.state() == PowerState::QuickStopActive {
             Some((StopCause::QuickStop, quick))
         } else if self.external_stop {
@@ -404,7 +407,7 @@ impl Axis {
         {
             Some((StopCause::Limit, ramp))
         } else if self.power.controlword().has(Controlword::HALT) {
-            Some((StopCause::Halt, StopRamp::of_halt(parameters.halt)))
+            Some((StopCause::Halt, StopRamp::of_halt(parameters.halt, parameters.emergency_stop)))
         } else {
             None
         }
@@ -436,7 +439,7 @@ impl Axis {
             StopRamp::SlowDown if self.mode == ModeOfOperation::HOMING => parameters.homing.ramps.deceleration_time_s,
             StopRamp::SlowDown => parameters.moves.deceleration_time_s,
             StopRamp::QuickStop => parameters.quick_stop_time_s,
-            StopRamp::CurrentLimit => 0.0,
+            StopRamp::CurrentLimit | StopRamp::Coast => 0.0,
         };
         // Already at rest: there is no way to take any time.
         let time_s = if from.velocity == 0.0 { 0.0 } else { time_s };
@@ -446,8 +449,8 @@ impl Axis {
 
     /// Nothing asks for a stop any more.
     fn resume(&mut self, parameters: &AxisParameters) {
-        let released = self.stop.is_some_and(|stop| stop.is_released(parameters.release_after_external_stop));
-        if released {
+        // A halted move or homing goes on, from wherever the motor coasted to.
+        if self.stop.is_some_and(|stop| stop.free && stop.cause != StopCause::Halt) {
             self.engage();
         }
         self.stop = None;
@@ -460,7 +463,7 @@ impl Axis {
     fn stopping(&mut self, mut stop: Stop, parameters: &AxisParameters, dt_s: f64) -> Demand {
         let point = self.trajectory.advance(dt_s);
         let follows_position = self.mode == ModeOfOperation::PROFILE_POSITION && stop.ramp == StopRamp::SlowDown;
-        if self.trajectory.is_resting() && !stop.held {
+        if (self.trajectory.is_resting() || stop.free) && !stop.held {
             stop.over_for_s += dt_s;
             if self.feedback.standing || stop.over_for_s > STANDSTILL_PATIENCE_S {
                 stop.held = true;

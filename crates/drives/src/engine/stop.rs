@@ -28,6 +28,8 @@ pub enum StopRamp {
     QuickStop,
     /// As fast as the current limit allows.
     CurrentLimit,
+    /// The power stage is off, and the motor coasts.
+    Coast,
 }
 
 /// A stop under way.
@@ -39,33 +41,33 @@ pub(super) struct Stop {
     pub(super) over_for_s: f64,
     /// The shaft is held where it came to rest.
     pub(super) held: bool,
-    /// It was held, and the motor is free now.
+    /// The power stage is off.
     pub(super) free: bool,
 }
 
 impl Stop {
-    /// It ended with the motor free.
+    /// The motor is to be free: it coasts, or it was held and is let go.
     pub(super) fn is_released(&self, after_external_stop: bool) -> bool {
-        self.held && self.cause == StopCause::External && after_external_stop
+        self.ramp == StopRamp::Coast || (self.held && self.cause == StopCause::External && after_external_stop)
     }
 }
 
 impl StopRamp {
-    /// The ramp of 605Ah.
-    pub const fn of_quick_stop(option: QuickStopOption) -> Self {
+    /// The ramp of 605Ah; `emergency` is what the drive does where CiA 402 has the current limit.
+    pub const fn of_quick_stop(option: QuickStopOption, emergency: Self) -> Self {
         match option {
             QuickStopOption::SLOW_DOWN | QuickStopOption::SLOW_DOWN_AND_STAY => Self::SlowDown,
             QuickStopOption::QUICK_STOP | QuickStopOption::QUICK_STOP_AND_STAY => Self::QuickStop,
-            _ => Self::CurrentLimit,
+            _ => emergency,
         }
     }
 
-    /// The ramp of 605Dh.
-    pub const fn of_halt(option: HaltOption) -> Self {
+    /// The ramp of 605Dh; `emergency` as for [`of_quick_stop`](Self::of_quick_stop).
+    pub const fn of_halt(option: HaltOption, emergency: Self) -> Self {
         match option {
             HaltOption::SLOW_DOWN => Self::SlowDown,
             HaltOption::QUICK_STOP => Self::QuickStop,
-            _ => Self::CurrentLimit,
+            _ => emergency,
         }
     }
 }

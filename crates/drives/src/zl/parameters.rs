@@ -3,7 +3,7 @@
 use canopen::od::{Dictionary, Object, Table};
 use cia402::{DisableOperationOption, HaltOption, QuickStopOption, ShutdownOption};
 
-use crate::engine::axis::{AxisParameters, Tolerances};
+use crate::engine::axis::{AxisParameters, StopRamp, Tolerances};
 use crate::engine::modes::{HomingParameters, VelocityRamps};
 use crate::engine::power::StepDownOptions;
 use crate::engine::trajectory::MoveLimits;
@@ -67,6 +67,7 @@ impl ProfileObjects {
                 disable_operation: DisableOperationOption(values.get(self.disable_operation_option_code)),
             },
             halt: HaltOption(values.get(self.halt_option_code)),
+            emergency_stop: StopRamp::CurrentLimit,
             lock_when_disabled: false,
             hold_when_switched_on: false,
             limit_stop: None,

@@ -7,9 +7,11 @@ use super::Values;
 use super::objects::*;
 use super::readings::*;
 use super::tables::{PEAK_CURRENTS_A, PULSES_PER_TURN, entry};
+use super::variations::{EMERGENCY_BRAKE, EMERGENCY_COAST};
 use crate::engine::axis::{AxisParameters, StopRamp, Tolerances};
 use crate::engine::modes::{HomingParameters, VelocityRamps};
 use crate::engine::stepper::{StepperCurrents, StepperGains, StepperModel};
+use crate::variant::Variant;
 use crate::zl::ProfileObjects;
 
 const PROFILE_OBJECTS: ProfileObjects = ProfileObjects::of(&TABLE);
@@ -28,16 +30,16 @@ pub(super) struct Parameters {
 }
 
 impl Parameters {
-    pub(super) fn from(values: &Values) -> Self {
-        Self::with_pulses(values, pulses_per_turn(values))
+    pub(super) fn of(values: &Values, variant: &Variant) -> Self {
+        Self::with_pulses(values, variant, pulses_per_turn(values))
     }
 
     /// The same with another number of pulses in a turn than 2006h has.
-    pub(super) fn with_pulses(values: &Values, pulses_per_turn: u16) -> Self {
+    pub(super) fn with_pulses(values: &Values, variant: &Variant, pulses_per_turn: u16) -> Self {
         Self {
             pulses_per_turn,
             pulses_s_per_rpm: f64::from(pulses_per_turn) / 60.0,
-            axis: axis(values, pulses_per_turn),
+            axis: axis(values, variant, pulses_per_turn),
             model: StepperModel {
                 pulses_per_electrical_turn: pulses_per_turn / TEETH as u16,
                 periods_per_command: SUPERVISION_DIVIDER,
@@ -60,16 +62,18 @@ fn pulses_per_turn(values: &Values) -> u16 {
     entry(&PULSES_PER_TURN, values.get(MICROSTEP_SETTING))
 }
 
-fn axis(values: &Values, pulses_per_turn: u16) -> AxisParameters {
+fn axis(values: &Values, variant: &Variant, pulses_per_turn: u16) -> AxisParameters {
     let speed = |rpm: f64| (rpm * f64::from(pulses_per_turn) / 60.0).min(STEP_FREQUENCY_HZ);
     let shared = PROFILE_OBJECTS.axis(values, values.get(START_SPEED), MAX_SPEED_RPM, speed);
     let homing_time_s = f64::from(values.get(HOMING_ACCELERATION)) * 1e-3;
+    let emergency_stop = emergency_stop(variant);
     AxisParameters {
+        emergency_stop,
         lock_when_disabled: values.get(SHAFT_LOCK_WHEN_DISABLED) == 1,
         hold_when_switched_on: true,
         limit_stop: match values.get(LIMIT_STOP_MODE) {
             0 => Some(StopRamp::SlowDown),
-            1 => Some(StopRamp::QuickStop),
+            1 => Some(emergency_stop),
             _ => None,
         },
         homing: HomingParameters {
@@ -86,6 +90,18 @@ fn axis(values: &Values, pulses_per_turn: u16) -> AxisParameters {
         // What is commanded is what there is: every target is reached exactly.
         tolerances: Tolerances { position: 0, velocity: VELOCITY_ROUNDING, current_a: 0.0 },
         ..shared
+    }
+}
+
+/// 605Ah = 7, 605Dh = 3 and 200Ah = 1 have one word, and so has 6085h, the time of its ramp. A stepper that is stopped
+/// without a ramp loses steps.
+fn emergency_stop(variant: &Variant) -> StopRamp {
+    if variant.is(EMERGENCY_BRAKE) {
+        StopRamp::CurrentLimit
+    } else if variant.is(EMERGENCY_COAST) {
+        StopRamp::Coast
+    } else {
+        StopRamp::QuickStop
     }
 }
 

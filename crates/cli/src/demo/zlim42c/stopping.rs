@@ -40,10 +40,10 @@ pub(super) fn option_codes(bench: &mut Bench) {
     let rows: [(&str, u16, i64, i64, f64, u16); 8] = [
         ("quick stop, normal", 0x605A, 5, 0x02, NORMAL_S, 0x07),
         ("quick stop, fast", 0x605A, 6, 0x02, FAST_S, 0x07),
-        ("quick stop, at once", 0x605A, 7, 0x02, 0.0, 0x07),
+        ("quick stop, emergency", 0x605A, 7, 0x02, FAST_S, 0x07),
         ("halt, normal", 0x605D, 1, 0x10F, NORMAL_S, 0x27),
         ("halt, fast", 0x605D, 2, 0x10F, FAST_S, 0x27),
-        ("halt, at once", 0x605D, 3, 0x10F, 0.0, 0x27),
+        ("halt, emergency", 0x605D, 3, 0x10F, FAST_S, 0x27),
         ("shutdown, normal", 0x605B, 1, 0x06, NORMAL_S, 0x21),
         ("disable operation, normal", 0x605C, 1, 0x07, NORMAL_S, 0x23),
     ];

@@ -72,7 +72,7 @@ impl Zlim42c {
     /// Motor free, position 0, and the values of `device` in effect.
     fn over(device: Device<ROW_COUNT>) -> Self {
         Self {
-            parameters: Parameters::from(device.values()),
+            parameters: Parameters::of(device.values(), device.variant()),
             device,
             dip_address: 0,
             parameters_changed: false,
@@ -144,11 +144,11 @@ impl Zlim42c {
         if !self.parameters_changed {
             return;
         }
-        let (values, before) = (self.device.values(), self.parameters);
-        let mut after = Parameters::from(values);
+        let (values, variant, before) = (self.device.values(), self.device.variant(), self.parameters);
+        let mut after = Parameters::of(values, variant);
         let waits = after.pulses_per_turn != before.pulses_per_turn && self.demand != Demand::Off;
         if waits {
-            after = Parameters::with_pulses(values, before.pulses_per_turn);
+            after = Parameters::with_pulses(values, variant, before.pulses_per_turn);
         } else {
             self.stepper.rescale(before.model.pulses_per_electrical_turn, after.model.pulses_per_electrical_turn);
         }

@@ -47,10 +47,10 @@ pub(super) const OUTPUT_FUNCTIONS: Values =
 pub(super) const QUICK_STOP_OPTIONS: Values = &[
     (5, "normal stop, stay in quick stop active"),
     (6, "quick stop ramp, stay in quick stop active"),
-    (7, "stop at once, stay in quick stop active"),
+    (7, "emergency stop, stay in quick stop active"),
 ];
 pub(super) const DISABLE_OPTIONS: Values = &[(0, "stop at once"), (1, "normal stop, then switched on")];
-pub(super) const HALT_OPTIONS: Values = &[(1, "normal stop"), (2, "quick stop ramp"), (3, "stop at once")];
+pub(super) const HALT_OPTIONS: Values = &[(1, "normal stop"), (2, "quick stop ramp"), (3, "emergency stop")];
 pub(super) const MODES: Values = &[(0, "undefined"), (1, "profile position"), (3, "profile velocity"), (6, "homing")];
 pub(super) const HOMING_METHODS: Values = &[
     (0, "none"),
