@@ -3,9 +3,12 @@
 use std::sync::LazyLock;
 
 use can::Bitrate;
+use canopen::NodeId;
+use drives::variant::Preset;
+use drives::zlac8030l::PROFILE;
 use plant::hub_motor::HubMotor;
 use sim::Component;
-use sim::machine::{Zlac8030lMachine, zlac8030l};
+use sim::machine::{Order, Zlac8030lMachine, order, zlac8030l};
 
 use super::{Rows, Subject};
 use crate::power_states::PowerSubject;
@@ -52,6 +55,21 @@ impl PowerSubject for Zlac8030l {
 }
 
 impl Bench {
+    /// A drive that takes another choice at one point (`L123`, `coast`), and has just booted.
+    #[must_use]
+    pub fn choosing(key: &str, choice: &str) -> Self {
+        Self::ordered(key, choice, &[])
+    }
+
+    /// The same with values of its own in its parameter store.
+    #[must_use]
+    pub fn ordered(key: &str, choice: &str, presets: &[Preset]) -> Self {
+        let mut wanted = Order::new(&PROFILE, NodeId::new(NODE).expect("a node-ID"), Zlac8030l::BITRATE);
+        wanted.variant.choose(key, choice).expect("a choice of this model");
+        wanted.presets = presets.to_vec();
+        Self::with(vec![order(&PROFILE, &wanted).expect("a drive that can be ordered")])
+    }
+
     /// Selects a mode and enables operation, without the watch over the host (2000h), so that a test may just look.
     pub fn enable_in(&mut self, mode: i64) {
         self.set(0x2000, 0, 0);

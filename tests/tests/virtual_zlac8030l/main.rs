@@ -9,6 +9,7 @@ use ferrodrive_tests::bench::zlac8030l as bench;
 mod communication;
 mod datagrams;
 mod determinism;
+mod emergency;
 mod energy;
 mod holding;
 mod motor_parameters;

@@ -5,12 +5,16 @@ use std::time::Duration;
 use crate::bench::{Bench, assert_within};
 use crate::wheel::{self, COUNTS_PER_TURN, RAD_S_PER_RPM};
 
-const LOOK: Duration = Duration::from_millis(1);
-const RPM: f64 = 120.0;
+pub(crate) const LOOK: Duration = Duration::from_millis(1);
+pub(crate) const RPM: f64 = 120.0;
 
 /// Turning at 120 r/min in profile velocity; 6084h 400 ms, 6085h 100 ms.
-fn turning() -> Bench {
-    let mut bench = Bench::new();
+pub(crate) fn turning() -> Bench {
+    brought_to_speed(Bench::new())
+}
+
+/// The same with this drive.
+pub(crate) fn brought_to_speed(mut bench: Bench) -> Bench {
     bench.set(0x6084, 0, 400);
     bench.set(0x6085, 0, 100);
     bench.enable_in(3);
@@ -31,7 +35,7 @@ fn stop_of(bench: &mut Bench) -> (f64, f64) {
 
 /// A ramp of `time_s` is an S, so its way is half of what full speed would go; at the current limit it is v^2 / 2a.
 #[track_caller]
-fn assert_stops(bench: &mut Bench, ramp: Ramp) {
+pub(crate) fn assert_stops(bench: &mut Bench, ramp: Ramp) {
     let (seconds, counts) = stop_of(bench);
     let (expected_s, slack_s) = match ramp {
         Ramp::Time(time_s) => (time_s, 0.03),
@@ -47,7 +51,7 @@ fn assert_stops(bench: &mut Bench, ramp: Ramp) {
 }
 
 #[derive(Clone, Copy)]
-enum Ramp {
+pub(crate) enum Ramp {
     Time(f64),
     CurrentLimit,
 }
@@ -154,29 +158,11 @@ fn controlword_0_lets_the_motor_coast() {
 }
 
 #[track_caller]
-fn assert_coasts(bench: &mut Bench) {
+pub(crate) fn assert_coasts(bench: &mut Bench) {
     let rad_s = bench.report().velocity_rpm * RAD_S_PER_RPM;
     let seconds = bench.seconds_until(5.0, LOOK, |report| report.velocity_rpm.abs() < 0.01);
     let expected_s = wheel::coasting_time_s(rad_s);
     assert_within("seconds to stand by friction alone", seconds, expected_s * 0.98, expected_s * 1.02);
-}
-
-#[test]
-fn an_external_stop_holds_the_shaft_at_speed_zero_or_releases_it_as_202f_03_says() {
-    for (release, enabled_current) in [(0, true), (1, false)] {
-        let mut bench = turning();
-        bench.set(0x202F, 3, release);
-        bench.operate(|drive, now| drive.set_input(0, true, now)).expect("there is X0");
-        bench.run_ms(2);
-        assert_stops(&mut bench, Ramp::Time(0.4));
-        let statusword = bench.statusword();
-        assert_eq!(statusword & 0x80FF, 0x8037, "enabled, stopped from outside: {statusword:04X}h");
-        bench.operate(|drive, now| drive.set_load_torque(2.0, now)).expect("a load");
-        let held = bench.report().position;
-        bench.run_ms(1000);
-        let moved = (bench.report().position - held).abs();
-        assert_eq!(moved < 30, enabled_current, "moved {moved} counts with 202F:03 = {release}");
-    }
 }
 
 #[test]
@@ -235,32 +221,6 @@ fn the_watch_is_on_as_delivered_with_1000_ms() {
     assert!(bench.report().velocity_rpm > 59.0);
     let stopped = bench.seconds_until(2.0, LOOK, |report| report.velocity_rpm < 1.0);
     assert_within("seconds to stand, 10 ms and a ramp of 500 ms", stopped, 0.40, 0.55);
-}
-
-#[test]
-fn a_wheel_released_by_an_external_stop_is_caught_where_it_is_and_not_pulled_back() {
-    // Held again by 202F:03, or by a quick stop, after it has rolled away.
-    for (object, sub, value) in [(0x202F, 3, 0), (0x6040, 0, 0x02)] {
-        let mut bench = turning();
-        bench.set(0x202F, 3, 1);
-        bench.operate(|drive, now| drive.set_input(0, true, now)).expect("there is X0");
-        bench.run_ms(600);
-        bench.operate(|drive, now| drive.set_load_torque(0.5, now)).expect("a load");
-        bench.run_ms(500);
-        bench.operate(|drive, now| drive.set_load_torque(0.0, now)).expect("a load");
-        let released = bench.report();
-        assert!(released.velocity_rpm < -50.0, "it rolls: {released:?}");
-        bench.set(object, sub, value);
-        let mut speeds = Vec::new();
-        for _ in 0..800 {
-            bench.run(LOOK);
-            speeds.push(bench.report().velocity_rpm);
-        }
-        let fastest_back = speeds.iter().copied().fold(0.0, f64::max);
-        assert_within("greatest speed back", fastest_back, 0.0, 5.0);
-        assert_within("speed in the end", speeds[speeds.len() - 1], -0.5, 0.5);
-        assert_eq!(bench.get(0x603F, 0), 0, "{object:04X}h");
-    }
 }
 
 #[test]

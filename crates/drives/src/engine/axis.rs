@@ -13,7 +13,7 @@ use super::modes::{
 };
 use super::power::{PowerMachine, StepDownOptions};
 use super::stop::Stop;
-pub use super::stop::{StopCause, StopRamp};
+pub use super::stop::{ExternalStop, StopCause, StopRamp};
 use super::trajectory::{MoveLimits, Trajectory, TrajectoryPoint};
 
 /// How the axis is set.
@@ -43,8 +43,8 @@ pub struct AxisParameters {
     pub limit_stop: Option<StopRamp>,
     /// Homing.
     pub homing: HomingParameters,
-    /// An external stop ends with the power stage off.
-    pub release_after_external_stop: bool,
+    /// How an external stop ends.
+    pub external_stop: ExternalStop,
     /// Tolerances of the status.
     pub tolerances: Tolerances,
 }
@@ -347,6 +347,9 @@ impl Axis {
 
     /// Held without being enabled.
     fn is_locked(&self, parameters: &AxisParameters) -> bool {
+        if self.external_stop && parameters.external_stop != ExternalStop::Hold {
+            return false;
+        }
         match self.power.state() {
             PowerState::NotReadyToSwitchOn | PowerState::FaultReactionActive | PowerState::Fault => false,
             PowerState::SwitchedOn => parameters.lock_when_disabled || parameters.hold_when_switched_on,
@@ -373,8 +376,8 @@ impl Axis {
         let wanted = self.wanted_stop(targets, parameters);
         let present = self.stop.map(|stop| (stop.cause, stop.ramp));
         let free = self.stop.is_some_and(|stop| stop.free);
-        let release = parameters.release_after_external_stop;
-        if wanted == present && self.stop.is_none_or(|stop| stop.free == stop.is_released(release)) {
+        let end = parameters.external_stop;
+        if wanted == present && self.stop.is_none_or(|stop| stop.free == stop.is_released(end)) {
             return;
         }
         match (wanted, self.stop) {
@@ -395,10 +398,14 @@ impl Axis {
 
     fn wanted_stop(&self, targets: &Targets, parameters: &AxisParameters) -> Option<(StopCause, StopRamp)> {
         let quick = StopRamp::of_quick_stop(parameters.quick_stop, parameters.emergency_stop);
-        if self.power.state() == PowerState::QuickStopActive {
+        let external = parameters.external_stop.ramp(parameters.quick_stop, parameters.emergency_stop);
+        // A stop that ends disabled goes before one that holds the motor.
+        if self.external_stop && parameters.external_stop == ExternalStop::Disable {
+            Some((StopCause::External, external))
+        } else if self.power.state() == PowerState::QuickStopActive {
             Some((StopCause::QuickStop, quick))
         } else if self.external_stop {
-            Some((StopCause::External, quick))
+            Some((StopCause::External, external))
         } else if self.power.is_stepping_down() {
             Some((StopCause::StepDown, StopRamp::SlowDown))
         } else if self.host_lost {
@@ -475,7 +482,11 @@ impl Axis {
                 self.power.ramp_done();
             }
         }
-        stop.free = stop.is_released(parameters.release_after_external_stop);
+        if stop.disables(parameters.external_stop) {
+            self.power.disable();
+            return self.idle(parameters);
+        }
+        stop.free = stop.is_released(parameters.external_stop);
         if stop.free {
             // Whoever holds it again begins from wherever it has got to.
             self.trajectory = self.as_it_turns();

@@ -86,6 +86,12 @@ impl PowerMachine {
         }
     }
 
+    /// The drive disables itself: power off.
+    pub fn disable(&mut self) {
+        self.pending = None;
+        self.take(PowerEvent::Command(PowerCommand::DisableVoltage));
+    }
+
     /// A fault occurred. These drives switch off or short the motor at once, so the fault reaction ends as it begins.
     pub fn fault(&mut self) {
         self.pending = None;

@@ -45,10 +45,40 @@ pub(super) struct Stop {
     pub(super) free: bool,
 }
 
+/// How an external stop ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ExternalStop {
+    /// Held where it came to rest.
+    Hold,
+    /// Still enabled, with the power stage off while the stop lasts.
+    LetGo,
+    /// In Switch on disabled: an emergency stop at once, a ramp at its end.
+    Disable,
+}
+
+impl ExternalStop {
+    /// How fast: as 605Ah says, but that an emergency stop of a motor that is to be free in the end leaves it to itself, and
+    /// one that is to be held has to stop first.
+    pub(super) fn ramp(self, option: QuickStopOption, emergency: StopRamp) -> StopRamp {
+        match (self, emergency) {
+            (Self::Hold, StopRamp::Coast) => StopRamp::of_quick_stop(option, StopRamp::CurrentLimit),
+            (Self::Hold, _) => StopRamp::of_quick_stop(option, emergency),
+            (Self::LetGo | Self::Disable, _) => StopRamp::of_quick_stop(option, StopRamp::Coast),
+        }
+    }
+}
+
 impl Stop {
     /// The motor is to be free: it coasts, or it was held and is let go.
-    pub(super) fn is_released(&self, after_external_stop: bool) -> bool {
-        self.ramp == StopRamp::Coast || (self.held && self.cause == StopCause::External && after_external_stop)
+    pub(super) fn is_released(&self, end: ExternalStop) -> bool {
+        let let_go = self.held && self.cause == StopCause::External && end == ExternalStop::LetGo;
+        self.ramp == StopRamp::Coast || let_go
+    }
+
+    /// The axis is to be disabled now.
+    pub(super) fn disables(&self, end: ExternalStop) -> bool {
+        let over = self.held || self.ramp == StopRamp::Coast;
+        self.cause == StopCause::External && end == ExternalStop::Disable && over
     }
 }
 

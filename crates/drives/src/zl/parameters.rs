@@ -3,7 +3,7 @@
 use canopen::od::{Dictionary, Object, Table};
 use cia402::{DisableOperationOption, HaltOption, QuickStopOption, ShutdownOption};
 
-use crate::engine::axis::{AxisParameters, StopRamp, Tolerances};
+use crate::engine::axis::{AxisParameters, ExternalStop, StopRamp, Tolerances};
 use crate::engine::modes::{HomingParameters, VelocityRamps};
 use crate::engine::power::StepDownOptions;
 use crate::engine::trajectory::MoveLimits;
@@ -72,7 +72,7 @@ impl ProfileObjects {
             hold_when_switched_on: false,
             limit_stop: None,
             homing: HomingParameters::default(),
-            release_after_external_stop: false,
+            external_stop: ExternalStop::Hold,
             tolerances: Tolerances { position: 0, velocity: 0.0, current_a: 0.0 },
         }
     }

@@ -8,10 +8,12 @@ use super::Values;
 use super::gains::gains;
 use super::objects::*;
 use super::readings::*;
-use crate::engine::axis::{AxisParameters, Tolerances};
+use super::variations::{EMERGENCY_COAST, EMERGENCY_RAMP, OVERLOAD_FROM_FACTOR, STOPPED_ENABLED};
+use crate::engine::axis::{AxisParameters, ExternalStop, StopRamp, Tolerances};
 use crate::engine::bleeder::BleederLimits;
 use crate::engine::overload::{OverloadLimits, between};
 use crate::engine::servo::{ServoGains, ServoLimits, ServoModel};
+use crate::variant::Variant;
 use crate::zl::ProfileObjects;
 
 const PROFILE_OBJECTS: ProfileObjects = ProfileObjects::of(&TABLE);
@@ -48,7 +50,7 @@ pub(super) struct Parameters {
 }
 
 impl Parameters {
-    pub(super) fn from(values: &Values) -> Self {
+    pub(super) fn of(values: &Values, variant: &Variant) -> Self {
         let counts_per_turn = u32::from(values.get(ENCODER_LINES)) * COUNTS_PER_LINE;
         let counts_s_per_rpm = f64::from(counts_per_turn) / 60.0;
         let max_rpm = f64::from(values.get(MAX_MOTOR_SPEED));
@@ -56,11 +58,11 @@ impl Parameters {
         Self {
             counts_s_per_rpm,
             max_rpm,
-            axis: axis(values, counts_s_per_rpm),
+            axis: axis(values, variant, counts_s_per_rpm),
             model: servo_model(values, counts_per_turn),
             gains: gains(values, limits.velocity_rad_s),
             limits,
-            overload: overload(values),
+            overload: overload(values, variant),
             bleeder: bleeder(values),
             out_of_tolerance: u32::from(values.get(OUT_OF_TOLERANCE_THRESHOLD)) * 10,
             motor_limit_c: tenths(values, MOTOR_TEMPERATURE_THRESHOLD),
@@ -75,19 +77,35 @@ impl Parameters {
     }
 }
 
-fn axis(values: &Values, counts_s_per_rpm: f64) -> AxisParameters {
+fn axis(values: &Values, variant: &Variant, counts_s_per_rpm: f64) -> AxisParameters {
     let max_rpm = f64::from(values.get(MAX_MOTOR_SPEED));
     let speed = |rpm: f64| rpm.min(max_rpm) * counts_s_per_rpm;
     AxisParameters {
         torque_slope_a_s: values.get(TORQUE_SLOPE) as f32 * 1e-3,
         lock_when_disabled: values.get(SHAFT_LOCK_WHEN_DISABLED) == 1,
-        release_after_external_stop: values.get(IO_STOP_PROCESSING) == 1,
+        emergency_stop: emergency_stop(variant),
+        external_stop: match values.get(IO_STOP_PROCESSING) {
+            0 => ExternalStop::Hold,
+            _ if variant.is(STOPPED_ENABLED) => ExternalStop::LetGo,
+            _ => ExternalStop::Disable,
+        },
         tolerances: Tolerances {
             position: u32::from(values.get(IN_POSITION_THRESHOLD)),
             velocity: f64::from(VELOCITY_REACHED_RPM) * counts_s_per_rpm,
             current_a: TORQUE_REACHED_A,
         },
         ..PROFILE_OBJECTS.axis(values, values.get(INITIAL_SPEED), max_rpm, speed)
+    }
+}
+
+/// What 605Ah = 7 and 605Dh = 3 mean.
+fn emergency_stop(variant: &Variant) -> StopRamp {
+    if variant.is(EMERGENCY_RAMP) {
+        StopRamp::QuickStop
+    } else if variant.is(EMERGENCY_COAST) {
+        StopRamp::Coast
+    } else {
+        StopRamp::CurrentLimit
     }
 }
 
@@ -117,10 +135,11 @@ fn servo_limits(values: &Values) -> ServoLimits {
 
 /// With overload processing on (202F:02) 2016h is the time at the rated current 2014h, and the note below the object table
 /// has the shares of it at higher ones. With it off, as delivered, 2016h is the time from 2012h times the rated current on,
-/// and below that the time is longer in the proportion of the note.
-fn overload(values: &Values) -> OverloadLimits {
+/// and below that the time is longer in the proportion of the note, or there is no overload.
+fn overload(values: &Values, variant: &Variant) -> OverloadLimits {
     let time_s = f32::from(values.get(OVERLOAD_TIME)) * 10e-3;
     let factor = f32::from(values.get(OVERLOAD_FACTOR)) / 100.0;
+    let begins_at = if variant.is(OVERLOAD_FROM_FACTOR) { factor } else { factor.min(OVERLOAD_FROM) };
     let curve = if values.get(OVERLOAD_PROCESSING) == 1 {
         OVERLOAD_TIME_SHARES.map(|(multiple, share)| (multiple, time_s * share))
     } else {
@@ -129,7 +148,7 @@ fn overload(values: &Values) -> OverloadLimits {
             if multiple < factor { (multiple, time_s * share / at_factor) } else { (factor, time_s) }
         })
     };
-    OverloadLimits { rated_a: tenths(values, RATED_CURRENT), begins_at: factor.min(OVERLOAD_FROM), curve }
+    OverloadLimits { rated_a: tenths(values, RATED_CURRENT), begins_at, curve }
 }
 
 fn bleeder(values: &Values) -> BleederLimits {

@@ -77,7 +77,7 @@ impl Zlac8030l {
 
     /// Motor free, position 0, and the values of `device` in effect.
     fn over(mut device: Device<ROW_COUNT>) -> Self {
-        let parameters = Parameters::from(device.values());
+        let parameters = Parameters::of(device.values(), device.variant());
         // 202F:05 acts from a restart on (5.3).
         let resolution = device.values().get(VELOCITY_RESOLUTION);
         device.values_mut().set_in_effect(u32::from(resolution));
@@ -145,7 +145,7 @@ impl Zlac8030l {
         if !self.parameters_changed {
             return;
         }
-        let mut parameters = Parameters::from(self.device.values());
+        let mut parameters = Parameters::of(self.device.values(), self.device.variant());
         if self.demand == Demand::Off {
             self.parameters_changed = false;
             let position = self.position();

@@ -15,9 +15,9 @@ pub(super) const BRAKE: Values = &[(0, "open"), (1, "closed")];
 pub(super) const QUICK_STOP_OPTIONS: Values = &[
     (5, "normal stop, stay in quick stop active"),
     (6, "quick stop ramp, stay in quick stop active"),
-    (7, "stop at the current limit, stay in quick stop active"),
+    (7, "emergency stop, stay in quick stop active"),
 ];
 pub(super) const DISABLE_OPTIONS: Values = &[(0, "power off at once"), (1, "normal stop, then switched on")];
-pub(super) const HALT_OPTIONS: Values = &[(1, "normal stop"), (2, "quick stop ramp"), (3, "stop at the current limit")];
+pub(super) const HALT_OPTIONS: Values = &[(1, "normal stop"), (2, "quick stop ramp"), (3, "emergency stop")];
 pub(super) const MODES: Values =
     &[(0, "undefined"), (1, "profile position"), (3, "profile velocity"), (4, "profile torque")];
