@@ -12,35 +12,21 @@ const LANES: usize = 8;
 /// Equal to no identifier.
 const UNUSED: u16 = u16::MAX;
 
-/// Lane of NMT commands.
-pub(super) const NMT: u32 = 0;
-/// Lane of SYNC.
-pub(super) const SYNC: u32 = 1;
-/// Lane of SDO requests.
-pub(super) const SDO: u32 = 2;
-/// Lane of RPDO 1.
-pub(super) const FIRST_RPDO: u32 = 3;
+/// A service that has an identifier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Lane(usize);
 
-/// The lanes that have an identifier, a bit each.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Matches(u8);
+impl Lane {
+    /// NMT commands.
+    pub(super) const NMT: Self = Self(0);
+    /// SYNC.
+    pub(super) const SYNC: Self = Self(1);
+    /// SDO requests.
+    pub(super) const SDO: Self = Self(2);
 
-impl Matches {
-    #[inline]
-    pub(super) const fn is_empty(self) -> bool {
-        self.0 == 0
-    }
-
-    /// The first of the lanes; 8 if there is none.
-    #[inline]
-    pub(super) const fn first(self) -> u32 {
-        self.0.trailing_zeros()
-    }
-
-    /// The lanes after the first.
-    #[inline]
-    pub(super) const fn rest(self) -> Self {
-        Self(self.0 & self.0.wrapping_sub(1))
+    /// The RPDO at `position`.
+    pub(super) const fn rpdo(position: usize) -> Self {
+        Self(Self::SDO.0 + 1 + position)
     }
 }
 
@@ -51,26 +37,29 @@ impl Identifiers {
     /// NMT and SDO requests to `node_id`.
     pub(super) fn of_requests(node_id: NodeId) -> Self {
         let mut identifiers = Self::NONE;
-        identifiers.set(NMT, cob::NMT.as_standard());
-        identifiers.set(SDO, cob::sdo_request(node_id).as_standard());
+        identifiers.set(Lane::NMT, cob::NMT.as_standard());
+        identifiers.set(Lane::SDO, cob::sdo_request(node_id).as_standard());
         identifiers
     }
 
-    pub(super) fn set(&mut self, lane: u32, id: Option<u16>) {
-        self.0[lane as usize] = id.unwrap_or(UNUSED);
+    pub(super) fn set(&mut self, lane: Lane, id: Option<u16>) {
+        self.0[lane.0] = id.unwrap_or(UNUSED);
     }
 
+    /// True if a service has this identifier. All are compared, without a branch between them.
     #[inline]
-    pub(super) fn of(self, id: u16) -> Matches {
-        let mut matches = 0;
-        for (lane, own) in self.0.iter().enumerate() {
-            matches |= u8::from(*own == id) << lane;
-        }
-        Matches(matches)
+    pub(super) fn contain(&self, id: u16) -> bool {
+        self.0.iter().fold(false, |found, own| found | (*own == id))
+    }
+
+    /// True if this service has it.
+    #[inline]
+    pub(super) const fn has(&self, lane: Lane, id: u16) -> bool {
+        self.0[lane.0] == id
     }
 }
 
-const _: () = assert!(FIRST_RPDO as usize + PdoNumber::COUNT <= LANES, "a lane for every service");
+const _: () = assert!(Lane::rpdo(PdoNumber::COUNT - 1).0 < LANES, "a lane for every service");
 
 #[cfg(test)]
 mod tests {
@@ -80,21 +69,18 @@ mod tests {
     fn an_identifier_is_found_in_every_lane_that_has_it_and_in_no_other() {
         let mut identifiers = Identifiers::of_requests(NodeId::MAX);
         let rpdos = [Some(0x001), Some(0x7FE), None, Some(0x001)];
-        identifiers.set(SYNC, Some(0x080));
-        for (lane, id) in (FIRST_RPDO..).zip(rpdos) {
-            identifiers.set(lane, id);
+        identifiers.set(Lane::SYNC, Some(0x080));
+        for (position, id) in rpdos.into_iter().enumerate() {
+            identifiers.set(Lane::rpdo(position), id);
         }
-        let listened: [Option<u16>; 8] =
+        let listened: [Option<u16>; LANES] =
             [Some(0), Some(0x080), Some(0x67F), Some(0x001), Some(0x7FE), None, Some(0x001), None];
         for id in 0..=0x7FF {
-            let mut matches = identifiers.of(id);
-            assert_eq!(matches.is_empty(), !listened.contains(&Some(id)));
-            for lane in (0..8).filter(|lane| listened[*lane as usize] == Some(id)) {
-                assert_eq!(matches.first(), lane, "{id:#X}");
-                matches = matches.rest();
+            assert_eq!(identifiers.contain(id), listened.contains(&Some(id)), "{id:#X}");
+            for (lane, own) in listened.into_iter().enumerate() {
+                assert_eq!(identifiers.has(Lane(lane), id), own == Some(id), "{id:#X} in lane {lane}");
             }
-            assert!(matches.is_empty(), "{id:#X}");
-            assert!(Identifiers::NONE.of(id).is_empty());
+            assert!(!Identifiers::NONE.contain(id));
         }
     }
 }

@@ -303,16 +303,14 @@ impl<const N: usize> Node<N> {
 impl<const N: usize> Station for Node<N> {
     #[inline]
     fn ignores(&self, frame: &Frame) -> bool {
-        frame.standard_data_id().is_none_or(|id| self.received.of(id).is_empty())
+        !frame.standard_data_id().is_some_and(|id| self.received.contain(id))
     }
 
     #[inline]
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
         self.now = now;
-        let Some(id) = frame.standard_data_id() else { return };
-        let receivers = self.received.of(id);
-        if !receivers.is_empty() {
-            self.receive(frame, receivers);
+        if let Some(id) = frame.standard_data_id().filter(|id| self.received.contain(*id)) {
+            self.receive(frame, id);
         }
     }
 

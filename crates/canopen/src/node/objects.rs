@@ -1,6 +1,6 @@
 //! What a write to the communication objects (1000h to 1FFFh) must satisfy, and what it changes at once.
 
-use super::identifiers::{FIRST_RPDO, Identifiers, SYNC};
+use super::identifiers::{Identifiers, Lane};
 use super::{Node, NodeEvent, Via};
 use crate::cob::PdoNumber;
 use crate::heartbeat;
@@ -144,7 +144,7 @@ impl<const N: usize> Node<N> {
 
     fn take_up_sync(&mut self) {
         let cob_id = self.object(0x1005).map(CobId);
-        self.received.set(SYNC, cob_id.and_then(|cob_id| cob_id.can_id().as_standard()));
+        self.received.set(Lane::SYNC, cob_id.and_then(|cob_id| cob_id.can_id().as_standard()));
     }
 
     /// 1014h, or what it would be by default on a device without it.
@@ -164,7 +164,7 @@ impl<const N: usize> Node<N> {
         let mapping = Mapping::read(&values, RPDO_MAPPING + position as u16, Direction::Receive);
         // A mapping that does not resolve (a store of another firmware) maps nothing.
         let rpdo = Rpdo::configure(&parameter, mapping.unwrap_or(None));
-        self.received.set(FIRST_RPDO + position as u32, rpdo.standard_id());
+        self.received.set(Lane::rpdo(position), rpdo.standard_id());
         self.latched_rpdos.set(position, false);
         self.rpdos[position] = rpdo;
     }

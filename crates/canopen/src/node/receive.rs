@@ -2,7 +2,7 @@
 
 use can::Frame;
 
-use super::identifiers::{FIRST_RPDO, Matches, NMT, SDO, SYNC};
+use super::identifiers::Lane;
 use super::pending::Source;
 use super::{Node, NodeEvent, Via};
 use crate::cob::PdoNumber;
@@ -13,12 +13,15 @@ impl<const N: usize> Node<N> {
     /// A data frame with an identifier that somebody here listens to. SDO, NMT and SYNC share theirs with nobody; two
     /// RPDOs may have the same.
     #[inline(never)]
-    pub(super) fn receive(&mut self, frame: &Frame, receivers: Matches) {
-        match receivers.first() {
-            SDO => self.receive_sdo(frame),
-            NMT => self.receive_nmt(frame),
-            SYNC => self.receive_sync(),
-            _ => self.receive_rpdos(frame, receivers),
+    pub(super) fn receive(&mut self, frame: &Frame, id: u16) {
+        if self.received.has(Lane::NMT, id) {
+            self.receive_nmt(frame);
+        } else if self.received.has(Lane::SYNC, id) {
+            self.receive_sync();
+        } else if self.received.has(Lane::SDO, id) {
+            self.receive_sdo(frame);
+        } else {
+            self.receive_rpdos(frame, id);
         }
     }
 
@@ -70,10 +73,11 @@ impl<const N: usize> Node<N> {
     }
 
     #[inline(never)]
-    fn receive_rpdos(&mut self, frame: &Frame, mut receivers: Matches) {
-        while !receivers.is_empty() {
-            self.receive_rpdo(frame, (receivers.first() - FIRST_RPDO) as usize);
-            receivers = receivers.rest();
+    fn receive_rpdos(&mut self, frame: &Frame, id: u16) {
+        for position in 0..PdoNumber::COUNT {
+            if self.received.has(Lane::rpdo(position), id) {
+                self.receive_rpdo(frame, position);
+            }
         }
     }
 
@@ -84,8 +88,8 @@ impl<const N: usize> Node<N> {
             return;
         }
         let reception = self.rpdos[position].receive(frame);
-        if !self.short_rpdos.is_empty() {
-            self.accept_after_short(position, &reception);
+        if !self.short_rpdos.is_empty() && reception != Reception::TooShort {
+            self.accept_after_short(position);
         }
         match reception {
             Reception::Apply(data) => self.apply_rpdo(position, data),
@@ -108,8 +112,8 @@ impl<const N: usize> Node<N> {
     }
 
     #[cold]
-    fn accept_after_short(&mut self, position: usize, reception: &Reception) {
-        if *reception != Reception::TooShort && self.short_rpdos.contains(position) {
+    fn accept_after_short(&mut self, position: usize) {
+        if self.short_rpdos.contains(position) {
             self.short_rpdos.set(position, false);
             self.push(NodeEvent::RpdoFits(PdoNumber::ALL[position]));
         }

@@ -1,4 +1,4 @@
-use super::{Default, Object, Scalar, Slot, Table};
+use super::{Default, Gate, Object, Scalar, Slot, Table};
 use crate::{AbortCode, Mux, NodeId};
 
 /// The values of a device's objects: one 32-bit cell a row of its [`Table`], little endian in the low bytes.
@@ -94,18 +94,7 @@ impl<const N: usize> Dictionary<N> {
     /// The abort code that an SDO server answers. Nothing is stored.
     #[inline(always)]
     pub fn check_write(&self, slot: Slot, raw: u32) -> Result<(), AbortCode> {
-        let summary = self.table.summary(slot);
-        if !summary.is_writable() {
-            return Err(AbortCode::READ_ONLY);
-        }
-        if summary.is_bounded() {
-            let row = self.table.row(slot);
-            row.check_value(row.data_type.value(raw))?;
-        }
-        if summary.is_checked() {
-            self.table.row(slot).check.map_or(Ok(()), |check| check(&self.view(), raw))?;
-        }
-        Ok(())
+        self.check(self.table.gate(slot), slot, raw)
     }
 
     /// [`check_write`](Self::check_write), then stores. Returns the cell.
@@ -114,10 +103,30 @@ impl<const N: usize> Dictionary<N> {
     /// The abort code that an SDO server answers. Nothing is stored.
     #[inline(always)]
     pub fn write(&mut self, slot: Slot, raw: u32) -> Result<u32, AbortCode> {
-        let cell = raw & self.table.summary(slot).mask();
-        self.check_write(slot, cell)?;
+        let gate = self.table.gate(slot);
+        let cell = raw & gate.mask();
+        self.check(gate, slot, cell)?;
         self.cells[slot.position()] = cell;
         Ok(cell)
+    }
+
+    #[inline(always)]
+    fn check(&self, gate: &Gate, slot: Slot, raw: u32) -> Result<(), AbortCode> {
+        if !gate.admits(raw) {
+            return self.ask_row(slot, raw);
+        }
+        gate.check().map_or(Ok(()), |check| check(&self.view(), raw))
+    }
+
+    /// Why a row does not take a value, if that is so.
+    #[cold]
+    fn ask_row(&self, slot: Slot, raw: u32) -> Result<(), AbortCode> {
+        let row = self.table.row(slot);
+        if !self.table.summary(slot).is_writable() {
+            return Err(AbortCode::READ_ONLY);
+        }
+        row.check_value(row.data_type.value(raw))?;
+        row.check.map_or(Ok(()), |check| check(&self.view(), raw))
     }
 }
 

@@ -8,11 +8,13 @@
 mod data_type;
 mod dictionary;
 mod entry;
+mod gate;
 mod summary;
 mod table;
 
 pub use data_type::{DataType, Scalar};
 pub use dictionary::{Dictionary, View};
 pub use entry::{Access, Check, Default, Entry, PdoMapping, TpdoForm};
+use gate::Gate;
 use summary::Summary;
 pub use table::{MAX_ROWS, Object, Slot, Table, keys};

@@ -1,7 +1,7 @@
 use super::{DataType, Entry};
 
-/// What every request must know of a row, in one byte: an upload needs no more of it, a download only where the value is
-/// restricted. Rows are wide; the summaries of a whole table take a few cache lines.
+/// What every request must know of a row, in one byte: an upload needs no more of it, a download its [`Gate`](super::Gate)
+/// too. Rows are wide; the summaries of a whole table take a few cache lines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Summary(u8);
 
@@ -11,8 +11,6 @@ const TEXT: u8 = 1 << 2;
 const READABLE: u8 = 1 << 3;
 const WRITABLE: u8 = 1 << 4;
 const COMMUNICATION: u8 = 1 << 5;
-const BOUNDED: u8 = 1 << 6;
-const CHECKED: u8 = 1 << 7;
 
 impl Summary {
     /// Of no row: nothing is allowed.
@@ -26,9 +24,7 @@ impl Summary {
                 | flag(TEXT, is_text)
                 | flag(READABLE, row.access.is_readable())
                 | flag(WRITABLE, row.access.is_writable() && !is_text)
-                | flag(COMMUNICATION, row.is_communication())
-                | flag(BOUNDED, row.limits.is_some() || !row.values.is_empty())
-                | flag(CHECKED, row.check.is_some()),
+                | flag(COMMUNICATION, row.is_communication()),
         )
     }
 
@@ -67,18 +63,6 @@ impl Summary {
     pub(crate) const fn is_communication(self) -> bool {
         self.0 & COMMUNICATION != 0
     }
-
-    /// Has limits or lists its values.
-    #[inline]
-    pub(super) const fn is_bounded(self) -> bool {
-        self.0 & BOUNDED != 0
-    }
-
-    /// Has a check.
-    #[inline]
-    pub(super) const fn is_checked(self) -> bool {
-        self.0 & CHECKED != 0
-    }
 }
 
 /// Bytes of a cell.
@@ -104,10 +88,6 @@ mod tests {
                 assert_eq!(summary.is_readable(), access.is_readable());
                 assert_eq!(summary.is_writable(), access.is_writable());
                 assert!(!summary.is_text() && !summary.is_communication());
-                assert!(!summary.is_bounded() && !summary.is_checked());
-                assert!(Summary::of(&row.range(0, 1)).is_bounded());
-                assert!(Summary::of(&row.values(&[(0, "")])).is_bounded());
-                assert!(Summary::of(&row.check(|_, _| Ok(()))).is_checked());
             }
         }
     }

@@ -1,6 +1,6 @@
 use core::marker::PhantomData;
 
-use super::{Entry, Scalar, Summary};
+use super::{Entry, Gate, Scalar, Summary};
 use crate::{AbortCode, Mux};
 
 /// All rows of a device, ascending by index and sub-index, with their keys packed for the search.
@@ -13,6 +13,7 @@ pub struct Table {
     keys: &'static [u32],
     directory: [u16; DIRECTORY_LENGTH],
     summaries: [Summary; MAX_ROWS],
+    gates: [Gate; MAX_ROWS],
 }
 
 /// Places of the directory: a power of two, so that the hash needs no division.
@@ -76,6 +77,7 @@ impl Table {
         assert!(rows.len() == keys.len() && rows.len() <= MAX_ROWS);
         let mut directory = [FREE; DIRECTORY_LENGTH];
         let mut summaries = [Summary::NONE; MAX_ROWS];
+        let mut gates = [Gate::CLOSED; MAX_ROWS];
         let mut position = 0;
         while position < keys.len() {
             let mut place = first_place(keys[position]);
@@ -84,9 +86,10 @@ impl Table {
             }
             directory[place] = position as u16;
             summaries[position] = Summary::of(&rows[position]);
+            gates[position] = Gate::of(&rows[position]);
             position += 1;
         }
-        Self { rows, keys, directory, summaries }
+        Self { rows, keys, directory, summaries, gates }
     }
 
     /// All rows, ascending.
@@ -103,6 +106,12 @@ impl Table {
     #[inline]
     pub(crate) const fn summary(&self, slot: Slot) -> Summary {
         self.summaries[slot.position()]
+    }
+
+    /// What a value has to pass that is written to the row of a slot of this table.
+    #[inline]
+    pub(super) const fn gate(&self, slot: Slot) -> &Gate {
+        &self.gates[slot.position()]
     }
 
     /// All slots with their rows.
