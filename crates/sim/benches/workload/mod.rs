@@ -1,0 +1,114 @@
+//! Worlds whose speed is measured: what the benchmark times and what `run_world` runs for so long.
+
+mod busy;
+
+use std::time::Duration;
+
+use can::{Bitrate, CanId, Frame};
+use drives::mjoint::Model;
+use sim::machine::{mjoint, zlac8030l, zlim42c};
+use sim::{StationId, VirtualDrive, World};
+
+/// Names of the worlds.
+pub(crate) const WORLDS: [&str; 9] = [
+    "1 hub servo turning, silent bus",
+    "1 hub servo turning, busy bus",
+    "1 hub servo not enabled",
+    "1 joint turning, silent bus",
+    "1 stepper turning, silent bus",
+    "one of each turning, silent bus",
+    "3 hub servos turning, silent bus",
+    "127 hub servos turning, silent bus",
+    "127 hub servos turning, busy bus",
+];
+
+/// Drives by their node-ID.
+type Drives = Vec<(u8, Box<dyn VirtualDrive>)>;
+
+/// A world of [`WORLDS`], past its beginning.
+pub(crate) fn world(name: &str) -> Option<World> {
+    Some(match name {
+        "1 hub servo turning, silent bus" => turning(hub_servos(1)).0,
+        "1 hub servo turning, busy bus" => busy::controlled_each_millisecond(),
+        "1 hub servo not enabled" => not_enabled(),
+        "1 joint turning, silent bus" => turning(vec![joint(1)]).0,
+        "1 stepper turning, silent bus" => turning(vec![stepper(2)]).0,
+        "one of each turning, silent bus" => {
+            let mut one_of_each = hub_servos(1);
+            one_of_each.extend([stepper(2), joint(3)]);
+            turning(one_of_each).0
+        }
+        "3 hub servos turning, silent bus" => turning(hub_servos(3)).0,
+        "127 hub servos turning, silent bus" => turning(hub_servos(127)).0,
+        "127 hub servos turning, busy bus" => busy::many_in_one_cycle(),
+        _ => return None,
+    })
+}
+
+fn hub_servos(count: u8) -> Drives {
+    (1..=count).map(|node| (node, Box::new(zlac8030l(node, 0)) as Box<dyn VirtualDrive>)).collect()
+}
+
+fn joint(node: u8) -> (u8, Box<dyn VirtualDrive>) {
+    (node, Box::new(mjoint(Model::named("m4230e17b50").expect("a model"), node, Bitrate::M1)))
+}
+
+fn stepper(node: u8) -> (u8, Box<dyn VirtualDrive>) {
+    (node, Box::new(zlim42c(node, 0)))
+}
+
+fn not_enabled() -> World {
+    let mut world = World::new(Bitrate::M1, 1);
+    // Somebody who acknowledges: alone it would repeat its boot-up message for ever.
+    world.add_tap();
+    world.add_drive(1, Box::new(zlac8030l(1, 0))).expect("numbers differ");
+    world.run_for(Duration::from_secs(1));
+    world
+}
+
+/// A bus of drives that all turn at 100 r/min, with next to no frame on it; and who may speak there.
+fn turning(drives: Drives) -> (World, StationId) {
+    let mut world = World::new(Bitrate::M1, 1);
+    let tap = world.add_tap();
+    let nodes: Vec<u8> = drives.iter().map(|(node, _)| *node).collect();
+    for (node, drive) in drives {
+        world.add_drive(node, drive).expect("numbers differ");
+    }
+    world.run_for(Duration::from_millis(20));
+    while world.poll_received(tap).is_some() {} // boot-up messages
+    for node in &nodes {
+        turn(&mut world, tap, *node);
+    }
+    world.run_for(Duration::from_secs(1));
+    assert_turning(&mut world, &nodes);
+    (world, tap)
+}
+
+fn assert_turning(world: &mut World, nodes: &[u8]) {
+    for node in nodes {
+        let speed = world.report(*node).map(|report| report.velocity_rpm);
+        // The stepper's rotor swings with its steps.
+        assert!(speed.as_ref().is_ok_and(|rpm| (rpm - 100.0).abs() < 40.0), "node {node}: {speed:?}");
+    }
+}
+
+/// Profile velocity at 100 r/min, enabled as each of the drives can be; no watch over the host where there is one.
+fn turn(world: &mut World, tap: StationId, node: u8) {
+    request(world, tap, node, [0x2B, 0x00, 0x20, 0, 0, 0, 0, 0], true);
+    request(world, tap, node, [0x2F, 0x60, 0x60, 0, 3, 0, 0, 0], false);
+    for command in [0x06, 0x07, 0x0F] {
+        request(world, tap, node, [0x2B, 0x40, 0x60, 0, command, 0, 0, 0], false);
+    }
+    request(world, tap, node, [0x23, 0xFF, 0x60, 0, 100, 0, 0, 0], false);
+}
+
+/// An SDO request and its answer.
+fn request(world: &mut World, tap: StationId, node: u8, data: [u8; 8], may_refuse: bool) {
+    let request = Frame::full(CanId::standard(0x600 + u16::from(node)), data);
+    world.send(tap, request).expect("the tap has room");
+    world.run_for(Duration::from_millis(1));
+    let answers = std::iter::from_fn(|| world.poll_received(tap)).map(|(_, frame)| frame);
+    let answer = answers.filter(|frame| frame.id() == CanId::standard(0x580 + u16::from(node))).last();
+    let first = answer.and_then(|frame| frame.data().first().copied());
+    assert!(first == Some(0x60) || (may_refuse && first == Some(0x80)), "{request} -> {answer:?}");
+}
