@@ -12,6 +12,8 @@
 //! done
 //! ```
 
+#![allow(clippy::print_stdout, reason = "a program that people run")]
+
 #[path = "../benches/workload/mod.rs"]
 mod workload;
 
