@@ -57,6 +57,25 @@ const OVERRUN: i32 = 10;
 /// How far a motor leaves a switch that it has to meet again.
 const BACK_OFF: i32 = 30;
 
+impl Latch {
+    /// Where on the track it is: the first position at which the switch has changed.
+    ///
+    /// # Panics
+    ///
+    /// When the track has no such switch.
+    #[must_use]
+    pub fn place(&self, track: &Track) -> i32 {
+        let found = track.iter().find(|(name, _)| *name == self.switch);
+        let (_, range) = found.unwrap_or_else(|| panic!("no {} on the track", self.switch));
+        match (self.rising, self.direction > 0) {
+            (true, true) => *range.start(),
+            (true, false) => *range.end(),
+            (false, true) => *range.end() + 1,
+            (false, false) => *range.start() - 1,
+        }
+    }
+}
+
 /// Reads a row.
 pub(crate) fn homing(row: Row<'_>) -> HomingRow {
     HomingRow {

@@ -65,10 +65,20 @@ pub fn power_states() -> Vec<EnergisedCell> {
     })
 }
 
-/// Homing from each start.
+/// Homing from each start, in the directions of the labels.
 #[must_use]
 pub fn homing_runs() -> Vec<HomingResult> {
-    rows(include_str!("../data/zlim42c/homing.csv"), |row| HomingResult {
+    homing_results(include_str!("../data/zlim42c/homing.csv"))
+}
+
+/// Homing from each start, in the directions of the paragraphs.
+#[must_use]
+pub fn homing_runs_by_prose() -> Vec<HomingResult> {
+    homing_results(include_str!("../data/zlim42c/homing_by_prose.csv"))
+}
+
+fn homing_results(file: &str) -> Vec<HomingResult> {
+    rows(file, |row| HomingResult {
         row: homing(row),
         bit_8: bit(row, "bit_8"),
         bit_10: bit(row, "bit_10"),

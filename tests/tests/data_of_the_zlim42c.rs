@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use ferrodrive_tests::homing::{HomingRow, Track, run};
 use ferrodrive_tests::zlim42c::{
-    HomingResult, datagrams, fault_code, figure, figures, homing_runs, objects, power_states,
+    HomingResult, datagrams, fault_code, figure, figures, homing_runs, homing_runs_by_prose, objects, power_states,
 };
 
 /// The step frequency in Hz that the drive can make (2.1).
@@ -80,7 +80,9 @@ fn the_low_nibble_after_each_controlword_is_the_printed_one() {
 
 #[test]
 fn each_homing_run_is_possible_and_latches_the_edge_of_its_method() {
-    for HomingResult { row, bit_8, bit_10, bit_14 } in homing_runs() {
+    let by_label = homing_runs().into_iter().map(|run| (run, fatal_limit as FatalLimit));
+    let by_prose = homing_runs_by_prose().into_iter().map(|run| (run, fatal_limit_by_prose as FatalLimit));
+    for (HomingResult { row, bit_8, bit_10, bit_14 }, fatal_limit) in by_label.chain(by_prose) {
         let expected = match row.result.as_str() {
             "attained" => (true, true, false),
             "running" => (false, false, true),
@@ -90,7 +92,10 @@ fn each_homing_run_is_possible_and_latches_the_edge_of_its_method() {
         let Some((track, start)) = place(&row) else { continue };
         let end = run(&row, &track, start, |direction| fatal_limit(row.method, direction));
         match row.result.as_str() {
-            "attained" => assert_eq!(end, Some(latched_at(row.method)), "{row:?}"),
+            "attained" => {
+                let latch = row.latch.as_ref().expect("an attained run has its edge");
+                assert_eq!(end, Some(latch.place(&track)), "{row:?}");
+            }
             "running" => assert_eq!(end, None, "{row:?}"),
             "failed" => {
                 let last = row.moves.last().expect("a run that fails on the way has a way");
@@ -103,16 +108,31 @@ fn each_homing_run_is_possible_and_latches_the_edge_of_its_method() {
 }
 
 #[test]
-fn the_last_move_of_an_attained_run_is_the_latch_and_is_slow() {
-    let runs = homing_runs();
-    for method in [17, 18, 24, 29] {
-        assert!(runs.iter().filter(|it| it.row.method == method && it.row.result == "attained").count() >= 4);
+fn the_last_move_of_an_attained_run_is_the_latch_and_is_slow_and_ends_on_the_switch() {
+    for runs in [homing_runs(), homing_runs_by_prose()] {
+        for method in [17, 18, 24, 29] {
+            assert!(runs.iter().filter(|it| it.row.method == method && it.row.result == "attained").count() >= 4);
+        }
+        for HomingResult { row, .. } in runs.iter().filter(|it| it.bit_8) {
+            let (last, latch) = (row.moves.last().expect("a move"), row.latch.as_ref().expect("a latch"));
+            assert_eq!(last.until, format!("{}_on", latch.switch));
+            assert_eq!((last.direction, last.speed.as_str()), (latch.direction, "6099:02"));
+            assert!(latch.rising, "5.3.6: it stops when the switch is found");
+        }
     }
-    for HomingResult { row, .. } in runs.iter().filter(|it| it.bit_8) {
-        let (last, latch) = (row.moves.last().expect("a move"), row.latch.as_ref().expect("a latch"));
-        assert_eq!(last.until, format!("{}_{}", latch.switch, if latch.rising { "on" } else { "off" }));
-        assert_eq!((last.direction, last.speed.as_str()), (latch.direction, "6099:02"));
-    }
+}
+
+#[test]
+fn the_paragraphs_search_in_the_other_direction_than_the_labels() {
+    let first = |runs: Vec<HomingResult>| -> Vec<(u8, i32)> {
+        let starts = ["between", "above_home", "below_home"];
+        let at_rest = runs.iter().filter(|it| starts.contains(&&*it.row.start) && it.row.result == "attained");
+        let mut first: Vec<_> = at_rest.map(|it| (it.row.method, it.row.moves[0].direction)).collect();
+        first.dedup();
+        first
+    };
+    assert_eq!(first(homing_runs()), [(17, -1), (18, 1), (24, 1), (29, -1)]);
+    assert_eq!(first(homing_runs_by_prose()), [(17, 1), (18, -1), (24, -1), (29, 1)]);
 }
 
 #[test]
@@ -166,6 +186,9 @@ fn place(row: &HomingRow) -> Option<(Track, i32)> {
 }
 
 /// The limit that ends homing at once when it is met in `direction` (5.3.6).
+type FatalLimit = fn(u8, i32) -> Option<&'static str>;
+
+/// With the directions of the labels.
 fn fatal_limit(method: u8, direction: i32) -> Option<&'static str> {
     match (method, direction) {
         (17 | 29, 1) => Some("positive_limit"),
@@ -174,12 +197,11 @@ fn fatal_limit(method: u8, direction: i32) -> Option<&'static str> {
     }
 }
 
-/// Where the origin lies on the usual track: the first position beyond the edge.
-fn latched_at(method: u8) -> i32 {
-    match method {
-        17 => -999,
-        18 => 999,
-        24 | 29 => -100,
-        _ => panic!("no method {method}"),
+/// With those of the paragraphs: the other limit for each.
+fn fatal_limit_by_prose(method: u8, direction: i32) -> Option<&'static str> {
+    match (method, direction) {
+        (17 | 29, -1) => Some("negative_limit"),
+        (18 | 24, 1) => Some("positive_limit"),
+        _ => None,
     }
 }

@@ -30,7 +30,7 @@ STARTS = {
     "halt_on_the_way": (1000, {}),
 }
 #: The edge that becomes the origin: where it is, and the direction in which it is crossed.
-LATCHES = {17: (-3000, 1), 18: (3000, -1), 24: (-200, 1), 29: (-200, 1)}
+LATCHES = {17: (-3000, -1), 18: (3000, 1), 24: (-200, 1), 29: (-200, 1)}
 FAST, SLOW, RAMP_MS = 300, 60, 30
 #: An input is seen 10 ms late (3.2), which is 40 pulses at 60 r/min.
 LATE = 40
@@ -100,6 +100,7 @@ def homes(number, row):
         wire(bench, start, number % 4)
         prepare(bench, method, offset)
         mark = bench.trace.mark()
+        equal(bench.statusword() & OUTCOME, 0, "bits 8, 10 and 14 before the first homing")
         bench.write(0x6040, 0x1F)
         if start == "bit_4_falls_on_the_way":
             bench.sleep(0.1)
@@ -116,6 +117,8 @@ def homes(number, row):
             edge, direction = LATCHES[method]
             origin = STARTS[start][0] + rotor(place) - bench.read(0x6064) - offset
             near(origin, edge + direction * LATE, 20, "the place where 6064h became -607Ch")
+            equal(bench.read(0x6064), -offset, "6064h: it stops when the switch is found")
+            true(bench.read(0x2003), "the motor stands on the switch")
         elif row["result"] != "running":
             bench.sleep(0.2)  # a rotor that was stopped at once rings for a while
             place = bench.world("get")
@@ -179,7 +182,7 @@ def exactness(bench):
     bench.write(0x6040, 0x1F)
     bench.status_becomes(OUTCOME, HOMED | REACHED, "bits 8, 10 and 14 in the end", timeout_s=15)
     origin = 1000 + rotor(bench.world("get")) - bench.read(0x6064)
-    near(origin, -3000 + LATE / 10, 8, "the place where 6064h became 0")
+    near(origin, -3000 - LATE / 10, 8, "the place where 6064h became 0")
 
 
 @check("after homing with an offset, an absolute move to 0 goes to the place beside the switch")
@@ -192,7 +195,7 @@ def to_the_origin(bench):
     bench.enable(POSITION)
     go(bench, 0, relative=False)
     bench.sleep(0.1)
-    near(1000 + rotor(bench.world("get")), -3000 + LATE + 1000, 20, "where the rotor is on the axis")
+    near(1000 + rotor(bench.world("get")), -3000 - LATE + 1000, 20, "where the rotor is on the axis")
 
 
 @check("the home switch works at either level: 2030h:01 inverts it")
@@ -204,4 +207,4 @@ def inverted(bench):
     prepare(bench, 17, 0)
     bench.write(0x6040, 0x1F)
     bench.status_becomes(OUTCOME, HOMED | REACHED, "bits 8, 10 and 14 in the end")
-    near(rotor(bench.world("get")) - bench.read(0x6064), -4000 + LATE, 20, "the place where 6064h became 0")
+    near(rotor(bench.world("get")) - bench.read(0x6064), -4000 - LATE, 20, "the place where 6064h became 0")

@@ -1,10 +1,12 @@
-//! Homing from every start of `tests/data/zlim42c/homing.csv`: the moves, the edge, and how it ends.
+//! 5.3.6, homing from every start of `homing.csv` and `homing_by_prose.csv` in `tests/data/zlim42c`: the moves, the edge, and
+//! how it ends.
 //!
 //! The track, in pulses from where the rotor stands at power-on: limits from ±8000 outwards, home from -400 to 400.
 //! X0 is the home switch, X1 the positive and X2 the negative limit.
 
+use ferrodrive_tests::homing::Latch;
 use ferrodrive_tests::seeded::Seeded;
-use ferrodrive_tests::zlim42c::{HomingResult, homing_runs};
+use ferrodrive_tests::zlim42c::{HomingResult, homing_runs, homing_runs_by_prose};
 use sim::SwitchRange;
 
 use crate::bench::{Bench, assert_within};
@@ -46,8 +48,11 @@ fn scene(start: &str) -> (Track, i64) {
 }
 
 fn on_track(start: &str, method: i64) -> Bench {
+    put_on_track(Bench::new(), start, method)
+}
+
+fn put_on_track(mut bench: Bench, start: &str, method: i64) -> Bench {
     let (track, position) = scene(start);
-    let mut bench = Bench::new();
     let range = |(low, high)| SwitchRange { low, high };
     let home = track.home.map(|(low, high)| range((Some(low), Some(high))));
     let switches = [home, track.positive.map(range), track.negative.map(range)];
@@ -104,46 +109,62 @@ fn shaft_pulses(bench: &mut Bench) -> f64 {
     bench.report().shaft_angle_rad / std::f64::consts::TAU * 4000.0
 }
 
-/// Where the edge of a row is, and the direction in which it is crossed.
-fn edge(method: u8) -> (f64, f64) {
-    match method {
-        17 => (-8000.0, 1.0),
-        18 => (8000.0, -1.0),
-        _ => (-400.0, 1.0),
-    }
+/// Where an edge is, the direction in which it is crossed, and its input.
+fn edge(latch: &Latch) -> (f64, f64, u16) {
+    assert!(latch.rising, "{latch:?}");
+    let input = match &*latch.switch {
+        "home" => 0,
+        "positive_limit" => 1,
+        _ => 2,
+    };
+    let place = if input == 0 { -400.0 } else { 8000.0 };
+    let direction = f64::from(latch.direction);
+    (if input == 0 { place * direction } else { place.copysign(direction) }, direction, input)
 }
 
 #[test]
 fn every_start_of_every_method_goes_and_ends_as_the_table_says() {
     let runs = homing_runs();
     assert_eq!(runs.len(), 32);
-    for run in &runs {
-        let (method, start) = (run.row.method, &*run.row.start);
-        let at = format!("method {method}, {start}");
-        let mut bench = on_track(start, i64::from(method));
-        bench.set(0x6040, 0, 0x1F);
-        let seen = match start {
-            "bit_4_falls_on_the_way" | "halt_on_the_way" => {
-                let seen = plateaus(&mut bench, 300);
-                bench.set(0x6040, 0, if start == "halt_on_the_way" { 0x11F } else { 0x0F });
-                bench.run_ms(300);
-                seen
-            }
-            _ => plateaus(&mut bench, 6000),
-        };
-        assert_eq!(seen, expected_plateaus(run), "{at}");
-        let expected = u16::from(run.bit_8) << 8 | u16::from(run.bit_10) << 10 | u16::from(run.bit_14) << 14;
-        assert_eq!(bench.statusword() & BITS, expected, "{at}: {:04X}h", bench.statusword());
-        let zero = shaft_pulses(&mut bench) - bench.report().position as f64;
-        if run.row.result == "attained" {
-            // 6064h reads -607Ch where the drive saw the edge: its filter time beyond it.
-            let (edge, direction) = edge(method);
-            let beyond = (zero - HOME_OFFSET as f64 - edge) * direction;
-            assert_within(&at, beyond, *FILTER_WAY.start(), *FILTER_WAY.end());
-        } else {
-            // A rotor that turns swings by a few pulses about its vector.
-            assert_within(&format!("{at}: the zero is not moved"), zero, -6.0, 6.0);
+    runs.iter().for_each(|run| goes_and_ends_as_the_table_says(Bench::new(), run));
+}
+
+#[test]
+fn by_the_prose_all_four_methods_go_the_other_way() {
+    let runs = homing_runs_by_prose();
+    assert_eq!(runs.len(), 24);
+    runs.iter().for_each(|run| goes_and_ends_as_the_table_says(Bench::choosing("Z050", "prose"), run));
+}
+
+fn goes_and_ends_as_the_table_says(bench: Bench, run: &HomingResult) {
+    let (method, start) = (run.row.method, &*run.row.start);
+    let at = format!("method {method}, {start}");
+    let mut bench = put_on_track(bench, start, i64::from(method));
+    assert_eq!(bench.statusword() & BITS, 0, "5.3.6, bit 10: no home position before the first run");
+    bench.set(0x6040, 0, 0x1F);
+    let seen = match start {
+        "bit_4_falls_on_the_way" | "halt_on_the_way" => {
+            let seen = plateaus(&mut bench, 300);
+            bench.set(0x6040, 0, if start == "halt_on_the_way" { 0x11F } else { 0x0F });
+            bench.run_ms(300);
+            seen
         }
+        _ => plateaus(&mut bench, 6000),
+    };
+    assert_eq!(seen, expected_plateaus(run), "{at}");
+    let expected = u16::from(run.bit_8) << 8 | u16::from(run.bit_10) << 10 | u16::from(run.bit_14) << 14;
+    assert_eq!(bench.statusword() & BITS, expected, "{at}: {:04X}h", bench.statusword());
+    let zero = shaft_pulses(&mut bench) - bench.report().position as f64;
+    if let Some(latch) = &run.row.latch {
+        // 6064h reads -607Ch where the drive saw the edge, its filter time beyond it, and there the motor stands.
+        let (edge, direction, input) = edge(latch);
+        let beyond = (zero - HOME_OFFSET as f64 - edge) * direction;
+        assert_within(&at, beyond, *FILTER_WAY.start(), *FILTER_WAY.end());
+        assert_eq!(bench.get(0x6064, 0), -HOME_OFFSET, "{at}: it stops when the switch is found");
+        assert_ne!(bench.get(0x2003, 0) as u16 & 1 << input, 0, "{at}: it ends on the switch");
+    } else {
+        // A rotor that turns swings by a few pulses about its vector.
+        assert_within(&format!("{at}: the zero is not moved"), zero, -6.0, 6.0);
     }
 }
 
@@ -209,7 +230,7 @@ fn a_switch_on_any_input_reversed_too_is_found() {
         bench.run_ms(4000);
         assert_eq!(bench.statusword() & BITS, 1 << 8 | 1 << 10, "X{input}");
         let zero = shaft_pulses(&mut bench) - bench.report().position as f64;
-        assert_within("pulses before the edge", 2000.0 - zero, *FILTER_WAY.start(), *FILTER_WAY.end());
+        assert_within("pulses beyond the edge", zero - 2000.0, *FILTER_WAY.start(), *FILTER_WAY.end());
     }
 }
 
@@ -247,8 +268,8 @@ fn any_start_and_any_speed_leads_to_the_edge_of_the_method() {
             bench.seconds_until(200.0, std::time::Duration::from_millis(10), attained);
             bench.run_ms(100);
             let (edge, direction) = match method {
-                17 => (-end, 1.0),
-                18 => (end, -1.0),
+                17 => (-end, -1.0),
+                18 => (end, 1.0),
                 _ => (-half, 1.0),
             };
             let report = bench.report();
@@ -257,10 +278,8 @@ fn any_start_and_any_speed_leads_to_the_edge_of_the_method() {
             let pulses_ms = (latch_rpm * pulses_per_turn) as f64 / 60_000.0;
             // What the rotor swings about its place: a few hundredths of a full step.
             let swing = 0.002 * pulses_per_turn as f64;
-            // A start close to the edge crosses it on the ramp of 100 ms, slower than 6099h:02.
-            let on_the_ramp = ((start - edge) as f64).abs() < 100.0 * pulses_ms;
-            let least = if on_the_ramp { 0.0 } else { 9.0 * pulses_ms };
-            assert_within(&at, (zero - edge as f64) * direction, least - swing, 11.5 * pulses_ms + swing);
+            let beyond = (zero - edge as f64) * direction;
+            assert_within(&at, beyond, 9.0 * pulses_ms - swing, 11.5 * pulses_ms + swing);
         }
     }
 }
@@ -303,19 +322,25 @@ fn the_search_keeps_to_the_step_rate_limit() {
 }
 
 #[test]
-fn off_the_home_switch_the_motor_goes_back_some_way_before_it_returns() {
-    // docs/drives/zlim42c.md: 0.05 turns, 200 pulses, beyond the edge at -400. At 5 r/min (333 pulses/s) the filter takes
-    // 3 pulses more and the ramp of 30 ms 5.
-    for method in [24, 29] {
-        let mut bench = on_track("on_home", method);
+fn off_its_switch_the_motor_goes_back_some_way_before_it_returns() {
+    // docs/drives/zlim42c.md: 0.05 turns, 200 pulses, beyond the edge. At 5 r/min (333 pulses/s) the filter takes 3 pulses
+    // more and the ramp of 30 ms 5.
+    for (method, start, back, edge) in [
+        (24, "on_home", -1, 400),
+        (29, "on_home", -1, 400),
+        (17, "on_negative_limit", 1, -8000),
+        (18, "on_positive_limit", -1, -8000),
+    ] {
+        let mut bench = on_track(start, method);
         bench.set(0x6099, 2, 5);
         bench.set(0x609A, 0, 30);
         bench.set(0x6040, 0, 0x1F);
-        let mut lowest = 0;
-        while bench.report().velocity_demand_rpm.is_none_or(|rpm| rpm <= 0.0) {
+        let (mut farthest, back) = (i64::MIN, f64::from(back));
+        while bench.report().velocity_demand_rpm.is_none_or(|rpm| rpm * back >= 0.0) {
             bench.run_ms(1);
-            lowest = lowest.min(bench.report().position);
+            farthest = farthest.max(bench.report().position * back as i64);
         }
-        assert_within(&format!("pulses, method {method}"), lowest as f64, -615.0, -600.0);
+        let beyond = farthest - edge;
+        assert_within(&format!("pulses, method {method}"), beyond as f64, 200.0, 215.0);
     }
 }

@@ -530,11 +530,8 @@ impl Axis {
         let at = self.trajectory.point();
         let target = match self.homing.update(parameters, self.switches, at) {
             HomingStep::Go(velocity) => velocity,
-            HomingStep::Latched => {
-                self.home = Some(at.position);
-                0.0
-            }
-            HomingStep::Failed => {
+            step @ (HomingStep::Latched | HomingStep::Failed) => {
+                self.home = Some(at.position).filter(|_| step == HomingStep::Latched);
                 self.trajectory = Trajectory::resting(at.position);
                 0.0
             }
@@ -557,6 +554,10 @@ impl Axis {
 
     fn target_reached(&self, targets: &Targets, parameters: &AxisParameters) -> bool {
         let Tolerances { velocity, current_a, .. } = parameters.tolerances;
+        let homing = self.mode == ModeOfOperation::HOMING;
+        if homing && !self.homing.has_ended() && self.stop_cause() != Some(StopCause::Halt) {
+            return false;
+        }
         if self.engaged != Engaged::Yes || self.stop.is_some() {
             return self.feedback.standing;
         }
@@ -572,7 +573,6 @@ impl Axis {
                 self.torque.demand_a() == targets.current_a
                     && (self.feedback.current_a - targets.current_a).abs() <= current_a
             }
-            ModeOfOperation::HOMING => !self.homing.is_running() && self.feedback.standing,
             _ => self.feedback.standing,
         }
     }

@@ -7,6 +7,7 @@
 mod drive;
 pub mod faults;
 pub mod hardware;
+pub mod homing;
 pub mod led;
 pub mod objects;
 mod parameters;

@@ -1,13 +1,12 @@
 //! The dictionary's parameters in physical units, as the engine wants them. Written anew when one changes.
 
-use cia402::HomingMethod;
 use motion::pid::PiGains;
 
-use super::Values;
 use super::objects::*;
 use super::readings::*;
 use super::tables::{PEAK_CURRENTS_A, PULSES_PER_TURN, entry};
 use super::variations::{EMERGENCY_BRAKE, EMERGENCY_COAST};
+use super::{Values, homing};
 use crate::engine::axis::{AxisParameters, StopRamp, Tolerances};
 use crate::engine::modes::{HomingParameters, VelocityRamps};
 use crate::engine::stepper::{StepperCurrents, StepperGains, StepperModel};
@@ -77,7 +76,7 @@ fn axis(values: &Values, variant: &Variant, pulses_per_turn: u16) -> AxisParamet
             _ => None,
         },
         homing: HomingParameters {
-            row: HomingMethod(values.get(HOMING_METHOD) as i8).row(),
+            row: homing::method(values.get(HOMING_METHOD), variant),
             search_speed: speed(f64::from(values.get(HOMING_SPEED))),
             latch_speed: speed(f64::from(values.get(HOMING_SEARCH_SPEED))),
             ramps: VelocityRamps {

@@ -29,10 +29,10 @@ pub(super) fn all(bench: &mut Bench) {
     bench.section("5.3.6", "homing");
     let zero = track(bench);
     example(bench);
-    finish(bench, zero + 8000.0, -1.0, 0.0);
-    run(bench, 17, zero - 8000.0, 0);
-    run(bench, 24, zero - 400.0, 250);
-    run(bench, 29, zero - 400.0, 0);
+    finish(bench, zero + 8000.0, 1.0, 0);
+    run(bench, 17, zero - 8000.0, -1.0, 0);
+    run(bench, 24, zero - 400.0, 1.0, 250);
+    run(bench, 29, zero - 400.0, 1.0, 0);
     interrupted(bench);
     halted(bench);
     failed(bench);
@@ -75,16 +75,16 @@ fn example(bench: &mut Bench) {
 }
 
 /// Another method from where the motor stands.
-fn run(bench: &mut Bench, method: i64, edge: f64, offset: i64) {
+fn run(bench: &mut Bench, method: i64, edge: f64, direction: f64, offset: i64) {
     bench.write("controlword 0Fh", 0x6040, 0, 0x0F);
     bench.write(format!("home offset {offset}"), 0x607C, 0, offset);
     bench.write(format!("method {method}"), 0x6098, 0, method);
     bench.write("controlword 1Fh: homing starts", 0x6040, 0, 0x1F);
-    finish(bench, edge, 1.0, offset as f64);
+    finish(bench, edge, direction, offset);
 }
 
-/// Waits until it is homed, and checks where zero is: minus the offset at the edge, crossed in `direction`.
-fn finish(bench: &mut Bench, edge: f64, direction: f64, offset: f64) {
+/// Waits until it is homed, and checks where it stands: at minus the offset, on the switch, whose edge was met in `direction`.
+fn finish(bench: &mut Bench, edge: f64, direction: f64, offset: i64) {
     bench.run_ms(20);
     bench.expect_status("on the way: bits 8, 10, 14", HOMING_BITS, RUNNING);
     let from = shaft(bench);
@@ -95,10 +95,10 @@ fn finish(bench: &mut Bench, edge: f64, direction: f64, offset: f64) {
     let way = shaft(bench) - from;
     bench.moved(format!("{way:+.0} pulses"));
     bench.expect_status("homed", HOMING_BITS, HOMED);
-    let position = bench.read_f64(0x6064, 0);
-    let zero = shaft(bench) - position - offset;
-    let beyond = (zero - edge) * direction;
-    bench.expect("zero beyond the edge", Expect::Near(FILTER_PULSES, 8.0), "pulses", beyond.round());
+    bench.expect_object(0x6064, 0, Expect::Near(-offset as f64, 0.0), "pulses");
+    bench.expect_object(0x2003, 0, Expect::AtLeast(1.0), "on the switch");
+    let beyond = (shaft(bench) - edge) * direction;
+    bench.expect("beyond the edge", Expect::Near(FILTER_PULSES, 8.0), "pulses", beyond.round());
 }
 
 /// Bit 4 falls on the way.

@@ -1,14 +1,14 @@
-//! Homing (CiA 402-2, clause 11) after the rows of [`cia402::HOMING_METHODS`].
+//! Homing (CiA 402-2, clause 11) after rows as those of [`cia402::HOMING_METHODS`].
 //!
 //! ```text
-//! search (fast) --switch on--> leave and back off --> cross the edge (slow) --> slow down
-//!        \--limit: turn round, once                        edge = home position
+//! search (fast) --switch on--> leave and back off --> cross the edge (slow) = home position, stop
+//!        \--limit: turn round, once
 //! ```
 //!
 //! In go the switches and where the shaft is, out comes the velocity to go at, and the moment of the edge. Stopping,
 //! reversing and its ramps are the trajectory's. A limit switch against the present direction ends the run unless the
-//! method turns round there. An edge counts only while the shaft moves the way it is to be crossed, so that running
-//! past a switch while slowing down does no harm.
+//! method turns round there, or looks for that switch. An edge counts only while the shaft moves the way it is to be
+//! crossed, so that running past a switch while slowing down does no harm.
 
 use cia402::{Direction, HomingRow, HomingSwitch, SwitchEdge};
 
@@ -46,9 +46,9 @@ pub struct HomingParameters {
 pub enum HomingStep {
     /// Go at this velocity; 0 also when nothing is under way.
     Go(f64),
-    /// The edge is here: slow down.
+    /// The edge is here, and the run is over: stop at once.
     Latched,
-    /// Stop at once: a limit switch stands in the way.
+    /// A limit switch stands in the way, and the run is over: stop at once.
     Failed,
 }
 
@@ -56,7 +56,8 @@ pub enum HomingStep {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Homing {
     run: Option<Run>,
-    attained: bool,
+    /// How the last run ended: true with the home position.
+    outcome: Option<bool>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -72,51 +73,51 @@ enum Phase {
     Search { direction: Direction, turned: bool },
     Leave { fast: bool, left_at: Option<i32> },
     Cross,
-    SlowDown { attained: bool },
+    SlowDown,
 }
 
 impl Homing {
     /// Bit 4 rose.
     pub fn start(&mut self, row: Option<&'static HomingRow>, switches: Switches) {
-        self.attained = false;
-        self.run = row.map(|row| {
-            let mut run =
-                Run { row, phase: Phase::Search { direction: row.search, turned: false }, was_on: switches.of(row) };
-            if run.was_on {
-                run.found(None);
-            }
-            run
-        });
+        let Some(row) = row else { return self.end(false) };
+        let mut run =
+            Run { row, phase: Phase::Search { direction: row.search, turned: false }, was_on: switches.of(row) };
+        if run.was_on {
+            run.found(None);
+        }
+        *self = Self { run: Some(run), outcome: None };
     }
 
     /// Bit 4 fell: slows down, and the run counts as nothing.
     pub fn interrupt(&mut self) {
-        if let Some(Run { phase, .. }) = &mut self.run
-            && !matches!(phase, Phase::SlowDown { .. })
-        {
-            *phase = Phase::SlowDown { attained: false };
+        if let Some(Run { phase, .. }) = &mut self.run {
+            *phase = Phase::SlowDown;
         }
     }
 
     /// Somebody else stops the motor.
     pub fn abort(&mut self) {
-        self.run = None;
+        if self.is_running() {
+            self.end(false);
+        }
     }
 
     /// One period, before the trajectory moves on from `at`.
     pub fn update(&mut self, parameters: &HomingParameters, switches: Switches, at: TrajectoryPoint) -> HomingStep {
         let Some(run) = &mut self.run else { return HomingStep::Go(0.0) };
         let step = run.update(parameters, switches, at);
-        if step == HomingStep::Failed {
-            self.run = None;
+        match step {
+            HomingStep::Go(_) => {}
+            HomingStep::Latched => self.end(true),
+            HomingStep::Failed => self.end(false),
         }
         step
     }
 
     /// The shaft rests after slowing down.
     pub fn come_to_rest(&mut self) {
-        if let Some(Run { phase: Phase::SlowDown { attained }, .. }) = self.run {
-            *self = Self { run: None, attained };
+        if self.run.is_some_and(|run| run.is_slowing_down()) {
+            self.end(false);
         }
     }
 
@@ -125,9 +126,18 @@ impl Homing {
         self.run.is_some()
     }
 
-    /// The last run found the home position, and the shaft has come to rest.
-    pub const fn is_attained(&self) -> bool {
-        self.attained
+    /// A run has ended, well or not, and none is under way.
+    pub const fn has_ended(&self) -> bool {
+        self.outcome.is_some()
+    }
+
+    /// The last run found the home position.
+    pub fn is_attained(&self) -> bool {
+        self.outcome == Some(true)
+    }
+
+    fn end(&mut self, attained: bool) {
+        *self = Self { run: None, outcome: Some(attained) };
     }
 }
 
@@ -140,12 +150,12 @@ impl Run {
         {
             self.found(Some(direction));
         }
-        if switches.limit(self.direction()) && !self.is_slowing_down() && !self.turn_round(switches) {
+        if self.meets_limit(switches) && !self.turn_round(switches) {
             return HomingStep::Failed;
         }
         let moves = at.velocity * f64::from(self.direction().sign()) > 0.0;
         match &mut self.phase {
-            Phase::Search { .. } | Phase::SlowDown { .. } => {}
+            Phase::Search { .. } | Phase::SlowDown => {}
             Phase::Leave { left_at, .. } => {
                 match *left_at {
                     _ if on => *left_at = None,
@@ -164,7 +174,6 @@ impl Run {
                     SwitchEdge::Falling => was_on && !on,
                 };
                 if edge && moves {
-                    self.phase = Phase::SlowDown { attained: true };
                     return HomingStep::Latched;
                 }
             }
@@ -179,6 +188,15 @@ impl Run {
             // Going on the same way needs no reversal, so it stays fast.
             SwitchEdge::Rising => Phase::Leave { fast: direction == Some(self.row.crossing.reversed()), left_at: None },
         };
+    }
+
+    /// A limit switch stands in the way; the one that the method looks for does not.
+    fn meets_limit(&self, switches: Switches) -> bool {
+        let looked_for = match self.direction() {
+            Direction::Negative => HomingSwitch::NegativeLimit,
+            Direction::Positive => HomingSwitch::PositiveLimit,
+        };
+        self.row.switch != looked_for && switches.limit(self.direction()) && !self.is_slowing_down()
     }
 
     /// A limit switch stands in the way of the search; true if the method turns round there.
@@ -198,7 +216,7 @@ impl Run {
         match self.phase {
             Phase::Search { direction, .. } => direction,
             Phase::Leave { .. } => self.row.crossing.reversed(),
-            Phase::Cross | Phase::SlowDown { .. } => self.row.crossing,
+            Phase::Cross | Phase::SlowDown => self.row.crossing,
         }
     }
 
@@ -206,12 +224,12 @@ impl Run {
         match self.phase {
             Phase::Search { .. } | Phase::Leave { fast: true, .. } => parameters.search_speed,
             Phase::Leave { fast: false, .. } | Phase::Cross => parameters.latch_speed,
-            Phase::SlowDown { .. } => 0.0,
+            Phase::SlowDown => 0.0,
         }
     }
 
     const fn is_slowing_down(&self) -> bool {
-        matches!(self.phase, Phase::SlowDown { .. })
+        matches!(self.phase, Phase::SlowDown)
     }
 }
 
@@ -247,10 +265,15 @@ mod tests {
         }
     }
 
-    /// Runs a method from `start`; the position latched, `None` if it fails.
     fn latch(method: i8, start: i32) -> Option<i32> {
+        latch_by(HomingMethod(method).row().unwrap(), start)
+    }
+
+    /// Runs a row from `start`; the position latched, `None` if it fails.
+    fn latch_by(row: &'static HomingRow, start: i32) -> Option<i32> {
+        let method = row.method;
         let parameters = HomingParameters {
-            row: HomingMethod(method).row(),
+            row: Some(row),
             search_speed: 5.0,
             latch_speed: 1.0,
             back_off: 20,
@@ -267,7 +290,7 @@ mod tests {
             }
             position += velocity as i32;
         }
-        panic!("method {method} from {start} has no end");
+        panic!("{method:?} from {start} has no end");
     }
 
     #[test]
@@ -277,6 +300,23 @@ mod tests {
         for (method, edge) in expected.into_iter().chain([(30, -1)]) {
             for start in [-1005, -990, -500, -1, 0, 50, 100, 101, 500, 990, 1005] {
                 assert_eq!(latch(method, start), Some(edge), "method {method} from {start}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_limit_switch_may_be_left_and_met_again_from_inside() {
+        const fn row(switch: HomingSwitch, search: Direction) -> HomingRow {
+            let method = HomingMethod(-1);
+            HomingRow { method, switch, search, reverses_at_limit: false, edge: SwitchEdge::Rising, crossing: search }
+        }
+        static ROWS: [HomingRow; 2] = [
+            row(HomingSwitch::NegativeLimit, Direction::Negative),
+            row(HomingSwitch::PositiveLimit, Direction::Positive),
+        ];
+        for start in [-1005, -990, -500, 0, 500, 990, 1005] {
+            for (row, edge) in ROWS.iter().zip([-1000, 1000]) {
+                assert_eq!(latch_by(row, start), Some(edge), "{row:?} from {start}");
             }
         }
     }
@@ -292,13 +332,14 @@ mod tests {
         assert_eq!(homing.update(&parameters, Switches::default(), at), HomingStep::Go(5.0));
         assert_eq!(homing.update(&parameters, positive, at), HomingStep::Go(-5.0));
         assert_eq!(homing.update(&parameters, negative, at), HomingStep::Failed);
-        assert!(!homing.is_running() && !homing.is_attained());
+        assert!(!homing.is_running() && homing.has_ended() && !homing.is_attained());
     }
 
     #[test]
     fn without_a_method_nothing_starts() {
         let mut homing = Homing::default();
+        assert!(!homing.has_ended(), "nobody has asked for it");
         homing.start(None, Switches::default());
-        assert!(!homing.is_running() && !homing.is_attained());
+        assert!(!homing.is_running() && homing.has_ended() && !homing.is_attained());
     }
 }
