@@ -6,7 +6,7 @@
 use can::Bitrate;
 use canopen::node::NodeProfile;
 use canopen::od::{Entry, Table};
-use canopen::pdo::EventTrigger;
+use canopen::pdo::{EventTrigger, MappingRules};
 use canopen::{EmcyErrorCode, Mux, NmtState};
 use cia402::{ModeOfOperation, PowerState, Statusword};
 
@@ -384,6 +384,8 @@ pub struct PdoRules {
     pub remap_while_valid: bool,
     /// The mapping cannot be changed at all.
     pub fixed_mapping: bool,
+    /// What entries of a mapping are taken.
+    pub mapping: MappingRules,
     /// Error code of the EMCY message when an RPDO has fewer bytes than are mapped; `None` for none. It is not used in
     /// either case. Of a longer one the mapped bytes are used, and nothing is told.
     pub short_rpdo: Option<EmcyErrorCode>,
@@ -403,6 +405,7 @@ pub(crate) const fn communication(table: &'static Table, pdo: &PdoRules, quirks:
             standard.event_trigger
         },
         pdo_changes_while_valid: pdo.remap_while_valid,
+        mapping: pdo.mapping,
         short_rpdo: pdo.short_rpdo,
         ..standard
     }

@@ -109,7 +109,7 @@ impl Preset {
         let table = values.table();
         let slot = table.find(self.object).map_err(|_| PresetError::NoSuchObject)?;
         let row = table.row(slot);
-        if !row.stored {
+        if !row.is_kept() {
             return Err(PresetError::NotStored);
         }
         let raw = row.data_type.raw(self.value);

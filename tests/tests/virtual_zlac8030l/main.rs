@@ -9,6 +9,8 @@ use ferrodrive_tests::bench::zlac8030l as bench;
 mod communication;
 mod datagrams;
 mod determinism;
+mod drivers;
+mod eds_defaults;
 mod emergency;
 mod energy;
 mod holding;

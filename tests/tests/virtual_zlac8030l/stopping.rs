@@ -196,12 +196,19 @@ fn a_silent_host_stops_the_motor_after_2000h_and_leaves_it_enabled_without_a_fau
     assert!(again > 100, "a new target is followed: {again}");
 }
 
+/// 2000h is the time without the host (chapter 9); which frames are a sign of it is a reading, L083.
 #[test]
-fn any_frame_to_the_node_keeps_the_watch_quiet_and_frames_to_others_do_not() {
-    for (frame, address, kept) in
-        [("604#4041600000000000", "SDO", true), ("605#4041600000000000", "another node", false)]
-    {
+fn data_to_the_node_keeps_the_watch_quiet_and_what_goes_on_without_a_host_does_not() {
+    for (frame, address, kept) in [
+        ("604#4041600000000000", "SDO", true),
+        ("204#0F00", "RPDO", true),
+        ("605#4041600000000000", "SDO of another node", false),
+        ("080#", "SYNC", false),
+        ("000#0104", "NMT start", false),
+        ("77F#05", "heartbeat of a master", false),
+    ] {
         let mut bench = turning();
+        bench.send("000#0104");
         bench.set(0x2000, 0, 300);
         for _ in 0..10 {
             bench.run_ms(150);
@@ -209,6 +216,19 @@ fn any_frame_to_the_node_keeps_the_watch_quiet_and_frames_to_others_do_not() {
         }
         assert_eq!(bench.report().velocity_rpm > RPM - 1.0, kept, "{address}");
     }
+}
+
+#[test]
+fn with_l083_sync_a_sync_keeps_the_watch_quiet_too_and_its_end_stops_the_motor() {
+    let mut bench = brought_to_speed(Bench::choosing("L083", "sync"));
+    bench.set(0x2000, 0, 300);
+    for _ in 0..10 {
+        bench.run_ms(150);
+        bench.send("080#");
+    }
+    assert_within("speed", bench.report().velocity_rpm, RPM - 1.0, RPM + 1.0);
+    bench.run_ms(300);
+    assert_stops(&mut bench, Ramp::Time(0.4));
 }
 
 #[test]

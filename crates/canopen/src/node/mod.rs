@@ -174,8 +174,8 @@ impl<const N: usize> Node<N> {
         self.events.pop()
     }
 
-    /// When the last frame for this node arrived (SDO request, RPDO, NMT command to it or to all): for a watch over
-    /// the host. `None` since boot.
+    /// When the last frame arrived that brings this node data (SDO request, RPDO): for a watch over the host. NMT commands,
+    /// SYNC and heartbeats go on when nobody means the motor any more. `None` since boot.
     pub const fn last_addressed(&self) -> Option<Instant> {
         self.last_addressed
     }

@@ -88,14 +88,15 @@ impl<const N: usize> Node<N> {
         if is_valid && !self.profile.pdo_changes_while_valid {
             return Err(AbortCode::UNSUPPORTED_ACCESS);
         }
+        let rules = self.profile.mapping;
         if mux.sub_index == 0 {
-            return Mapping::with_count(values, mux.index, direction, raw as u8).map(|_| ());
+            return Mapping::with_count(values, mux.index, direction, rules, raw as u8).map(|_| ());
         }
         if values.value(Mux::new(mux.index, 0)) != Ok(0) {
             return Err(AbortCode::UNSUPPORTED_ACCESS);
         }
-        // 0 empties an entry; it cannot be counted in until something is there.
-        if raw == 0 { Ok(()) } else { MappingRecord::from_raw(raw).resolve(values, direction).map(|_| ()) }
+        // 0 empties an entry; most devices do not count it in until something is there.
+        if raw == 0 { Ok(()) } else { MappingRecord::from_raw(raw).resolve(values, direction, rules).map(|_| ()) }
     }
 
     /// A communication object was stored: it takes effect at once.
@@ -161,7 +162,7 @@ impl<const N: usize> Node<N> {
     fn take_up_rpdo(&mut self, position: usize) {
         let values = self.dictionary.view();
         let parameter = Parameter::read(&values, RPDO_PARAMETER + position as u16);
-        let mapping = Mapping::read(&values, RPDO_MAPPING + position as u16, Direction::Receive);
+        let mapping = Mapping::read(&values, RPDO_MAPPING + position as u16, Direction::Receive, self.profile.mapping);
         // A mapping that does not resolve (a store of another firmware) maps nothing.
         let rpdo = Rpdo::configure(&parameter, mapping.unwrap_or(None));
         self.received.set(Lane::rpdo(position), rpdo.standard_id());
@@ -172,7 +173,7 @@ impl<const N: usize> Node<N> {
     fn take_up_tpdo(&mut self, position: usize) {
         let values = self.dictionary.view();
         let parameter = Parameter::read(&values, TPDO_PARAMETER + position as u16);
-        let mapping = Mapping::read(&values, TPDO_MAPPING + position as u16, Direction::Transmit);
+        let mapping = Mapping::read(&values, TPDO_MAPPING + position as u16, Direction::Transmit, self.profile.mapping);
         let tpdo = Tpdo::configure(
             &parameter,
             mapping.unwrap_or(None),

@@ -1,7 +1,7 @@
 use crate::NmtState;
 use crate::emcy::EmcyErrorCode;
 use crate::od::Table;
-use crate::pdo::EventTrigger;
+use crate::pdo::{EventTrigger, MappingRules};
 use crate::sdo::server::FrameLength;
 
 /// What differs between devices in their communication. Constant data.
@@ -23,6 +23,8 @@ pub struct NodeProfile {
     pub event_trigger: EventTrigger,
     /// COB-ID, inhibit time and mapping of a PDO may be changed while it is valid, and the COB-ID of EMCY.
     pub pdo_changes_while_valid: bool,
+    /// What entries of a mapping it takes.
+    pub mapping: MappingRules,
     /// The EMCY error code of an RPDO with fewer bytes than are mapped; `None` if nothing is told of it. Such a frame is
     /// never used. Of a longer one the mapped bytes are, and nothing is told: CiA 301 has 8220h for it and leaves it to
     /// the device, and many masters send eight bytes whatever they mean.
@@ -49,6 +51,7 @@ impl NodeProfile {
             event_timer_unit_ns: 1_000_000,
             event_trigger: EventTrigger::Change,
             pdo_changes_while_valid: false,
+            mapping: MappingRules::CIA_301,
             short_rpdo: Some(EmcyErrorCode::PDO_NOT_PROCESSED),
             sdo_frame_length: FrameLength::Eight,
             sdo_timeout_ns: Self::SDO_TIMEOUT_NS,

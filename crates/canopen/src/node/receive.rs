@@ -29,7 +29,6 @@ impl<const N: usize> Node<N> {
     fn receive_nmt(&mut self, frame: &Frame) {
         let Ok(request) = nmt::NmtRequest::parse(frame) else { return };
         if request.target.includes(self.node_id) {
-            self.last_addressed = Some(self.now);
             self.handle_nmt(request.command);
         }
     }

@@ -99,6 +99,8 @@ pub struct Entry {
     pub unit: &'static str,
     /// Kept in the device's parameter store.
     pub stored: bool,
+    /// Kept there as well, but only by a save of everything: not with each write.
+    pub saved: bool,
     /// May be mapped into PDOs.
     pub pdo: PdoMapping,
     /// Another type and scale in TPDOs.
@@ -129,6 +131,7 @@ impl Entry {
             values: &[],
             unit: "",
             stored: false,
+            saved: false,
             pdo: PdoMapping::No,
             tpdo_form: None,
             check: None,
@@ -175,6 +178,17 @@ impl Entry {
     pub const fn stored(mut self) -> Self {
         self.stored = true;
         self
+    }
+
+    /// Kept in the parameter store by a save of everything only.
+    pub const fn saved(mut self) -> Self {
+        self.saved = true;
+        self
+    }
+
+    /// Kept in the parameter store, in one way or the other.
+    pub const fn is_kept(&self) -> bool {
+        self.stored || self.saved
     }
 
     /// May be mapped into PDOs.

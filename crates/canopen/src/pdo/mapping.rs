@@ -17,6 +17,20 @@ pub enum Direction {
     Transmit,
 }
 
+/// What entries of a mapping record a device takes beyond those of CiA 301.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MappingRules {
+    /// An entry may give an object more bits than it has. A TPDO sends zeros in them, an RPDO ignores them.
+    pub longer_entries: bool,
+    /// Entries of 0 may be counted in. They carry nothing.
+    pub empty_entries: bool,
+}
+
+impl MappingRules {
+    /// None.
+    pub const CIA_301: Self = Self { longer_entries: false, empty_entries: false };
+}
+
 /// One entry of a mapping record: which object, how many bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MappingRecord {
@@ -40,9 +54,8 @@ impl MappingRecord {
     /// The row that this entry maps.
     ///
     /// # Errors
-    /// 0602 0000h if there is no such object, 0604 0041h if it cannot be mapped in this direction or its length is
-    /// another.
-    pub fn resolve(self, values: &View<'_>, direction: Direction) -> Result<Slot, AbortCode> {
+    /// 0602 0000h if there is no such object, 0604 0041h if it cannot be mapped in this direction or not with this length.
+    pub fn resolve(self, values: &View<'_>, direction: Direction, rules: MappingRules) -> Result<Slot, AbortCode> {
         let slot = values.table().find(self.mux).map_err(|_| AbortCode::NO_SUCH_OBJECT)?;
         let row = values.table().row(slot);
         let allowed = match direction {
@@ -54,7 +67,8 @@ impl MappingRecord {
             (Direction::Transmit, Some(form)) => form.data_type,
             _ => row.data_type,
         };
-        let fits = data_type.bits() == self.bits && self.bits > 0;
+        let longer = self.bits > data_type.bits() && self.bits.is_multiple_of(8) && u32::from(self.bits) <= MAX_BITS;
+        let fits = data_type.bits() > 0 && (self.bits == data_type.bits() || (rules.longer_entries && longer));
         if row.pdo == PdoMapping::Yes && allowed && fits { Ok(slot) } else { Err(AbortCode::NOT_MAPPABLE) }
     }
 }
@@ -82,9 +96,14 @@ impl Mapping {
     ///
     /// # Errors
     /// As [`with_count`](Self::with_count).
-    pub fn read(values: &View<'_>, index: u16, direction: Direction) -> Result<Option<Self>, AbortCode> {
+    pub fn read(
+        values: &View<'_>,
+        index: u16,
+        direction: Direction,
+        rules: MappingRules,
+    ) -> Result<Option<Self>, AbortCode> {
         match values.value(Mux::new(index, 0)) {
-            Ok(count) => Self::with_count(values, index, direction, count as u8),
+            Ok(count) => Self::with_count(values, index, direction, rules, count as u8),
             Err(_) => Ok(None),
         }
     }
@@ -97,6 +116,7 @@ impl Mapping {
         values: &View<'_>,
         index: u16,
         direction: Direction,
+        rules: MappingRules,
         count: u8,
     ) -> Result<Option<Self>, AbortCode> {
         if usize::from(count) > MAX_OBJECTS {
@@ -109,8 +129,11 @@ impl Mapping {
         let mut mapping: Option<Self> = None;
         for sub_index in 1..=count {
             let raw = values.value(Mux::new(index, sub_index)).map_err(|_| AbortCode::PDO_TOO_LONG)?;
+            if raw == 0 && rules.empty_entries {
+                continue;
+            }
             let record = MappingRecord::from_raw(raw as u32);
-            let slot = record.resolve(values, direction)?;
+            let slot = record.resolve(values, direction, rules)?;
             let converted = direction == Direction::Transmit && values.table().row(slot).tpdo_form.is_some();
             mapping = Some(Self::extended(mapping, slot, record.bits, converted)?);
         }
@@ -193,7 +216,8 @@ mod tests {
     fn an_object_with_another_form_in_tpdos_is_mapped_and_sent_in_it() {
         let mut values = Dictionary::<3>::new(&TABLE, NodeId::MIN);
         values.set(SPEED, -6004);
-        let mapping = Mapping::read(&values.view(), 0x1A00, Direction::Transmit).unwrap().unwrap();
+        let rules = MappingRules::CIA_301;
+        let mapping = Mapping::read(&values.view(), 0x1A00, Direction::Transmit, rules).unwrap().unwrap();
         assert_eq!(mapping.length(), 4);
         assert_eq!(mapping.gather(&values.view()) as u32 as i32, -600);
     }
@@ -201,9 +225,22 @@ mod tests {
     #[test]
     fn in_rpdos_and_by_its_sdo_length_in_tpdos_the_forms_are_kept_apart() {
         let values = Dictionary::<3>::new(&TABLE, NodeId::MIN);
-        let resolve = |raw, direction| MappingRecord::from_raw(raw).resolve(&values.view(), direction);
+        let resolve =
+            |raw, direction| MappingRecord::from_raw(raw).resolve(&values.view(), direction, MappingRules::CIA_301);
         assert_eq!(resolve(0x606C_0010, Direction::Transmit), Err(AbortCode::NOT_MAPPABLE));
         assert_eq!(resolve(0x606C_0020, Direction::Receive), Err(AbortCode::NOT_MAPPABLE));
         assert!(resolve(0x606C_0010, Direction::Receive).is_ok());
+    }
+
+    #[test]
+    fn a_device_may_take_longer_entries_in_whole_bytes_and_never_shorter_ones() {
+        let values = Dictionary::<3>::new(&TABLE, NodeId::MIN);
+        let rules = MappingRules { longer_entries: true, ..MappingRules::CIA_301 };
+        let resolve = |raw, rules| MappingRecord::from_raw(raw).resolve(&values.view(), Direction::Receive, rules);
+        for (bits, taken) in [(0, false), (8, false), (16, true), (17, false), (24, true), (64, true), (72, false)] {
+            let entry = 0x606C_0000 | bits;
+            assert_eq!(resolve(entry, rules).is_ok(), taken, "{bits} bits");
+            assert_eq!(resolve(entry, MappingRules::CIA_301).is_ok(), bits == 16, "{bits} bits");
+        }
     }
 }

@@ -9,7 +9,7 @@ pub mod parameter;
 mod rpdo;
 mod tpdo;
 
-pub use mapping::{Direction, MAX_OBJECTS, Mapping, MappingRecord};
+pub use mapping::{Direction, MAX_OBJECTS, Mapping, MappingRecord, MappingRules};
 pub use parameter::{Parameter, TransmissionType};
 pub use rpdo::{Reception, Rpdo};
 pub use tpdo::{EventTrigger, Tpdo};

@@ -207,9 +207,9 @@ impl<const N: usize> Device<N> {
         self.store.mark(self.profile.table, slot);
     }
 
-    /// Has all stored rows stored with the next [`commit`](Self::commit).
-    pub fn mark_all(&mut self) {
-        self.store.mark_all(self.profile.table);
+    /// Has all kept rows that `wanted` names stored with the next [`commit`](Self::commit).
+    pub fn mark_all(&mut self, wanted: fn(&Entry) -> bool) {
+        self.store.mark_all(self.profile.table, wanted);
     }
 
     /// Stores what is marked. While the EEPROM does not answer it waits.
@@ -230,13 +230,15 @@ impl<const N: usize> Device<N> {
     }
 
     /// Everything in the EEPROM becomes as delivered. Parameters do at once, communication objects with the next restart:
-    /// until then they show what the device does. False if the EEPROM does not answer; nothing is changed then.
-    pub fn restore_factory_settings(&mut self) -> bool {
+    /// until then they show what the device does. Of the parameters those that `wanted` names are. False if the EEPROM does
+    /// not answer; nothing is changed then.
+    pub fn restore_factory_settings(&mut self, wanted: fn(&Entry) -> bool) -> bool {
         let factory = self.factory_values(self.node.node_id());
         if !self.save(&factory) {
             return false;
         }
-        for (slot, _) in factory.table().iter().filter(|(_, row)| row.stored && !row.is_communication()) {
+        let parameters = |row: &Entry| row.is_kept() && wanted(row) && !row.is_communication();
+        for (slot, _) in factory.table().iter().filter(|(_, row)| parameters(row)) {
             self.node.dictionary_mut().set_raw(slot, factory.raw(slot));
         }
         true
@@ -341,6 +343,12 @@ pub(crate) trait Application<const N: usize> {
     /// A peer wrote `raw` to `slot`. True if it was a command: the status is shown anew once the whole frame has been taken.
     fn written(&mut self, slot: Slot, raw: u32, via: Via, now: Instant) -> bool;
 
+    /// SYNC came.
+    #[inline]
+    fn synchronised(&mut self, now: Instant) {
+        let _ = now;
+    }
+
     /// Puts the status into the dictionary.
     fn show_status(&mut self);
 
@@ -367,7 +375,8 @@ pub(crate) trait Application<const N: usize> {
                 NodeEvent::RpdoTooShort(number) => self.device().tell_length(number, false, now),
                 NodeEvent::RpdoFits(number) => self.device().tell_length(number, true, now),
                 NodeEvent::EventsLost => self.device().tell_lost_events(now),
-                NodeEvent::Nmt(_) | NodeEvent::Sync => {}
+                NodeEvent::Sync => self.synchronised(now),
+                NodeEvent::Nmt(_) => {}
             }
         }
         if commanded {
@@ -470,7 +479,7 @@ mod tests {
         device.mark(PARAMETER.slot());
         device.set_eeprom_ok(false);
         device.commit();
-        assert!(!device.save(&device.values().clone()) && !device.restore_factory_settings());
+        assert!(!device.save(&device.values().clone()) && !device.restore_factory_settings(|_| true));
         assert_eq!((device.values().get(PARAMETER), device.stored_values().get(PARAMETER)), (8, 7));
         device.set_eeprom_ok(true);
         device.commit();
@@ -482,7 +491,7 @@ mod tests {
         let mut device = started();
         device.values_mut().set(PARAMETER, 8);
         device.values_mut().set(HEARTBEAT, 200);
-        assert!(device.restore_factory_settings());
+        assert!(device.restore_factory_settings(|_| true));
         assert_eq!((device.values().get(PARAMETER), device.values().get(HEARTBEAT)), (7, 200));
         device.restart(NodeId::MIN, Bitrate::K500, at(1, 0));
         assert_eq!(device.values().get(HEARTBEAT), 100);

@@ -107,23 +107,24 @@ impl Store {
             let table = dictionary.table();
             let Ok(slot) = table.find(Mux::from_key(key)) else { continue };
             let row = table.row(slot);
-            if row.stored && wanted(row) && row.check_value(row.data_type.value(raw)).is_ok() {
+            if row.is_kept() && wanted(row) && row.check_value(row.data_type.value(raw)).is_ok() {
                 dictionary.set_raw(slot, raw);
             }
         }
         Ok(())
     }
 
-    /// Has a row's value stored by the next [`commit`](Self::commit), if it is a row to be stored at all.
+    /// Has a row's value stored by the next [`commit`](Self::commit), if it is a row to be stored with each write.
     pub fn mark(&mut self, table: &Table, slot: Slot) {
         if table.row(slot).stored {
             self.pending.insert(slot);
         }
     }
 
-    /// Has all stored rows stored by the next [`commit`](Self::commit).
-    pub fn mark_all(&mut self, table: &Table) {
-        table.iter().for_each(|(slot, _)| self.mark(table, slot));
+    /// Has all kept rows that `wanted` names stored by the next [`commit`](Self::commit).
+    pub fn mark_all(&mut self, table: &Table, wanted: fn(&Entry) -> bool) {
+        let kept = table.iter().filter(|(_, row)| row.is_kept() && wanted(row));
+        kept.for_each(|(slot, _)| self.pending.insert(slot));
     }
 
     /// Writes the marked rows with their values in `dictionary`, all in one step. An unreadable image is left alone:
@@ -140,7 +141,7 @@ impl Store {
         let old = bank.number * BANK_SIZE;
         let mut bytes = [0; BANK_SIZE];
         bytes.copy_from_slice(&self.image.0[old..][..BANK_SIZE]);
-        let stored = dictionary.table().iter().filter(|(_, row)| row.stored);
+        let stored = dictionary.table().iter().filter(|(_, row)| row.is_kept());
         for (position, (slot, row)) in stored.enumerate() {
             let record = HEADER_SIZE + position * RECORD_SIZE;
             // A record of another row: the image came from a table with other rows. Write this table's whole set.
@@ -164,7 +165,7 @@ impl Store {
             None => Bank { number: 0, sequence: 0 },
         };
         let mut bytes = [0xFF; BANK_SIZE];
-        for (position, (slot, row)) in dictionary.table().iter().filter(|(_, row)| row.stored).enumerate() {
+        for (position, (slot, row)) in dictionary.table().iter().filter(|(_, row)| row.is_kept()).enumerate() {
             let record = HEADER_SIZE + position * RECORD_SIZE;
             put_word(&mut bytes, record, row.mux().key());
             put_word(&mut bytes, record + 4, dictionary.raw(slot));
@@ -214,7 +215,7 @@ pub const fn stored_rows(table: &Table) -> usize {
     let rows = table.rows();
     let (mut i, mut count) = (0, 0);
     while i < rows.len() {
-        count += rows[i].stored as usize;
+        count += rows[i].is_kept() as usize;
         i += 1;
     }
     assert!(count <= CAPACITY, "a bank cannot hold all stored rows");
@@ -306,18 +307,19 @@ mod tests {
     use canopen::NodeId;
     use canopen::od::{Access, DataType, Object, keys};
 
-    static ROWS: [Entry; 3] = [
+    static ROWS: [Entry; 4] = [
         Entry::new(0x2000, 0, DataType::Unsigned16, Access::ReadWrite, "a", "").default(7).range(0, 100).stored(),
         Entry::new(0x2001, 0, DataType::Unsigned16, Access::ReadWrite, "b", "").default(8),
         Entry::new(0x2002, 0, DataType::Integer16, Access::ReadWrite, "c", "").default(-9).stored(),
+        Entry::new(0x2003, 0, DataType::Unsigned16, Access::ReadWrite, "d", "").default(4).saved(),
     ];
-    static KEYS: [u32; 3] = keys(&ROWS);
+    static KEYS: [u32; 4] = keys(&ROWS);
     static TABLE: Table = Table::new(&ROWS, &KEYS);
     const A: Object<u16> = TABLE.object(0x2000, 0);
     const B: Object<u16> = TABLE.object(0x2001, 0);
     const C: Object<i16> = TABLE.object(0x2002, 0);
 
-    fn defaults() -> Dictionary<3> {
+    fn defaults() -> Dictionary<4> {
         Dictionary::new(&TABLE, NodeId::MIN)
     }
 
@@ -342,7 +344,7 @@ mod tests {
     fn a_blank_image_is_unreadable_until_it_is_formatted() {
         let mut store = Store::new(Image::BLANK);
         assert_eq!(store.load(&mut defaults(), |_| true), Err(Unreadable));
-        store.mark_all(&TABLE);
+        store.mark_all(&TABLE, |_| true);
         store.commit(&defaults());
         assert!(!store.is_readable());
         store.format(&defaults());
@@ -363,12 +365,34 @@ mod tests {
     }
 
     #[test]
+    fn a_row_that_only_a_save_keeps_is_written_by_no_mark_of_its_own() {
+        const D: Object<u16> = TABLE.object(0x2003, 0);
+        let kept = |store: &Store| {
+            let mut dictionary = defaults();
+            store.load(&mut dictionary, |_| true).unwrap();
+            dictionary.get(D)
+        };
+        let mut store = formatted();
+        let mut dictionary = defaults();
+        dictionary.set(D, 5);
+        store.mark(&TABLE, D.slot());
+        store.commit(&dictionary);
+        assert_eq!(kept(&store), 4);
+        store.mark_all(&TABLE, |row| row.stored);
+        store.commit(&dictionary);
+        assert_eq!(kept(&store), 4);
+        store.mark_all(&TABLE, |_| true);
+        store.commit(&dictionary);
+        assert_eq!(kept(&store), 5);
+    }
+
+    #[test]
     fn the_generation_changes_only_with_the_bytes() {
         let mut store = formatted();
         let before = store.image().1;
         store.commit(&defaults());
         assert_eq!(store.image().1, before);
-        store.mark_all(&TABLE);
+        store.mark_all(&TABLE, |_| true);
         store.commit(&defaults());
         assert_ne!(store.image().1, before);
     }
@@ -380,7 +404,7 @@ mod tests {
         for round in 1..5_u16 {
             let old = *store.image().0;
             dictionary.set(A, round);
-            store.mark_all(&TABLE);
+            store.mark_all(&TABLE, |_| true);
             store.commit(&dictionary);
             let new = *store.image().0;
             for cut in 0..=IMAGE_SIZE {
@@ -397,7 +421,7 @@ mod tests {
         let mut store = formatted();
         let mut dictionary = defaults();
         dictionary.set(A, 50);
-        store.mark_all(&TABLE);
+        store.mark_all(&TABLE, |_| true);
         store.commit(&dictionary);
         for byte in 0..IMAGE_SIZE {
             let mut image = *store.image().0;
@@ -429,7 +453,7 @@ mod tests {
         let wide = || Dictionary::<MAX_ROWS>::new(&WIDE_TABLE, NodeId::MIN);
         let mut store = Store::new(Image::BLANK);
         store.format(&wide());
-        for (slot, _) in WIDE_TABLE.iter().filter(|(_, row)| row.stored) {
+        for (slot, _) in WIDE_TABLE.iter().filter(|(_, row)| row.is_kept()) {
             let mut store = store.clone();
             let mut written = wide();
             written.set_raw(slot, 77);
@@ -446,7 +470,7 @@ mod tests {
         let mut store = formatted();
         let mut dictionary = defaults();
         dictionary.set(A, 101);
-        store.mark_all(&TABLE);
+        store.mark_all(&TABLE, |_| true);
         store.commit(&dictionary);
         assert_eq!(values(*store.image().0).0, 7);
     }

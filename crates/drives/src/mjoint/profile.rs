@@ -2,6 +2,7 @@
 
 use can::Bitrate;
 use canopen::Mux;
+use canopen::pdo::MappingRules;
 use cia402::{ModeOfOperation, Statusword};
 
 use super::alarms::ALARMS;
@@ -66,6 +67,7 @@ pub(super) const PDO_RULES: PdoRules = PdoRules {
     max_objects: 3,
     remap_while_valid: true,
     fixed_mapping: true,
+    mapping: MappingRules::CIA_301,
     // It has no EMCY.
     short_rpdo: None,
 };

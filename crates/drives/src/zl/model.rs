@@ -2,7 +2,7 @@
 
 use canopen::node::NodeProfile;
 use canopen::od::Table;
-use canopen::pdo::EventTrigger;
+use canopen::pdo::{EventTrigger, MappingRules};
 use canopen::{EmcyErrorCode, Mux};
 
 use crate::profile::{Identity, ParameterStorage, PdoRules, Quirk, Ramps, Write, communication};
@@ -10,10 +10,10 @@ use crate::profile::{Identity, ParameterStorage, PdoRules, Quirk, Ramps, Write, 
 /// One count of a PDO's inhibit time and event timer (ZLAC8030L, 6.1; the ZLIM42-C's manual gives none).
 const PDO_TIMER_UNIT_NS: u64 = 500_000;
 
-/// How the drives communicate: by [`PDO_RULES`] and their quirks, event-driven PDOs as the ZLAC8030L's manual has them
+/// How the drives communicate: by their PDO rules and quirks, event-driven PDOs as the ZLAC8030L's manual has them
 /// (6.1; the ZLIM42-C's gives no more than the object table).
-pub(crate) const fn node_profile(table: &'static Table, quirks: &[Quirk]) -> NodeProfile {
-    NodeProfile { event_trigger: EventTrigger::ChangeOr255ByTimer, ..communication(table, &PDO_RULES, quirks) }
+pub(crate) const fn node_profile(table: &'static Table, pdo: &PdoRules, quirks: &[Quirk]) -> NodeProfile {
+    NodeProfile { event_trigger: EventTrigger::ChangeOr255ByTimer, ..communication(table, pdo, quirks) }
 }
 
 /// The same for both, though their objects have other meanings.
@@ -27,6 +27,7 @@ pub(crate) const PDO_RULES: PdoRules = PdoRules {
     max_objects: 4,
     remap_while_valid: true,
     fixed_mapping: false,
+    mapping: MappingRules::CIA_301,
     // The manuals are silent; CiA 301 asks it of a device with EMCY.
     short_rpdo: Some(EmcyErrorCode::PDO_NOT_PROCESSED),
 };

@@ -1,19 +1,25 @@
 //! How parameters are stored: the register parameter setting (2009h of the ZLAC8030L, 2010h of the ZLIM42-C) and the object
 //! that has each write stored (2010h and 200Ch).
 
-use canopen::od::{Object, Slot};
+use canopen::od::{Entry, Object, Slot};
 
 use super::model::{RESTORE, SAVE};
 use crate::engine::device::Device;
 
-/// A write to the register parameter setting, which reads 0 again when it is done. True if all is as delivered now.
+/// A write to the register parameter setting, which reads 0 again when it is done; it is about the rows that `wanted` names.
+/// True if all is as delivered now.
 #[cold]
-pub(crate) fn register_command<const N: usize>(device: &mut Device<N>, register: Object<u16>, command: u32) -> bool {
+pub(crate) fn register_command<const N: usize>(
+    device: &mut Device<N>,
+    register: Object<u16>,
+    command: u32,
+    wanted: fn(&Entry) -> bool,
+) -> bool {
     device.values_mut().set(register, 0);
     match command {
-        RESTORE => device.restore_factory_settings(),
+        RESTORE => device.restore_factory_settings(wanted),
         SAVE => {
-            device.mark_all();
+            device.mark_all(wanted);
             false
         }
         _ => false,

@@ -2,13 +2,14 @@
 
 use can::Bitrate;
 use canopen::Mux;
+use canopen::pdo::MappingRules;
 use cia402::ModeOfOperation;
 
 use super::faults::FAULTS;
 use super::objects::TABLE;
 use super::statusword::{EXTERNAL_STOP, IN_POSITION, RUNNING};
 use super::variations::VARIATIONS;
-use crate::profile::{CountsPerTurn, DriveProfile, Faults, PowerStyle, Quantity, Quirk, Units};
+use crate::profile::{CountsPerTurn, DriveProfile, Faults, PdoRules, PowerStyle, Quantity, Quirk, Units};
 use crate::zl;
 
 /// The ZLAC8030L V2.0.
@@ -42,10 +43,14 @@ pub static PROFILE: DriveProfile = DriveProfile {
     },
     storage: zl::parameter_storage(0x2009, 0x2010, RESTART),
     faults: Faults { code: Mux::new(0x603F, 0), bit_field: true, table: &FAULTS },
-    pdo: zl::PDO_RULES,
+    pdo: PDO_RULES,
     quirks: QUIRKS,
     variations: VARIATIONS,
 };
+
+/// Working robots map 6077h with 32 bits; the maker's EDS counts empty entries in.
+pub(super) const PDO_RULES: PdoRules =
+    PdoRules { mapping: MappingRules { longer_entries: true, empty_entries: true }, ..zl::PDO_RULES };
 
 const RESTART: &[Mux] = &[Mux::new(0x200D, 0), Mux::new(0x200E, 0), Mux::new(0x202F, 5)];
 

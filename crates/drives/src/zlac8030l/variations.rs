@@ -1,9 +1,25 @@
 //! At which points two drives of this model may differ.
 
-use crate::variant::{Choice, Pick, Trust, Variant, Variation, VariationKind};
+use crate::variant::{Choice, Pick, Preset, Trust, Variant, Variation, VariationKind};
 
 /// All of them.
 pub const VARIATIONS: &[Variation] = &[
+    Variation {
+        key: "defaults",
+        kind: VariationKind::Build,
+        section: "9",
+        about: "whose factory values it has",
+        choices: &[
+            Choice::new("manual", "those of the object table", Trust::Vendor),
+            Choice::new(
+                "eds",
+                "those of the maker's EDS: 6040h and 6060h in RPDO0, 6041h in TPDO0 of type 254, 30 A rated, 60 A at most, \
+                 60FFh 120 r/min, the speed observer on",
+                Trust::Vendor,
+            )
+            .factory(EDS),
+        ],
+    },
     Variation {
         key: "L039",
         kind: VariationKind::Reading,
@@ -12,6 +28,26 @@ pub const VARIATIONS: &[Variation] = &[
         choices: &[
             Choice::new("disabled", "in switch on disabled: the host enables it anew", Trust::Vendor),
             Choice::new("enabled", "in operation enabled, the power stage off until the input goes off", Trust::Guess),
+        ],
+    },
+    Variation {
+        key: "L083",
+        kind: VariationKind::Reading,
+        section: "9, 2000h",
+        about: "which frames keep the watch over the host (2000h) quiet",
+        choices: &[
+            Choice::new("node", "SDO requests and receive PDOs of this node", Trust::Guess),
+            Choice::new("sync", "those and SYNC", Trust::Guess),
+        ],
+    },
+    Variation {
+        key: "L090",
+        kind: VariationKind::Reading,
+        section: "9, 2009h",
+        about: "whether a save (2009h = 2) keeps the mode 6060h, which is marked RW and not RW/S",
+        choices: &[
+            Choice::new("mode", "it does: after a restart the drive is in the mode that was saved", Trust::Traffic),
+            Choice::new("marked", "it does not: after a restart the mode is 0", Trust::Vendor),
         ],
     },
     Variation {
@@ -37,11 +73,50 @@ pub const VARIATIONS: &[Variation] = &[
     },
 ];
 
+/// What the maker's EDS has where the manual has another default. Left out: 2005h, to which it gives 3 where 0 and 1 are
+/// listed.
+const EDS: &[Preset] = &[
+    Preset::new(0x1600, 0, 4),
+    Preset::new(0x1600, 2, 0x6060_0008),
+    Preset::new(0x1601, 0, 4),
+    Preset::new(0x1602, 0, 4),
+    Preset::new(0x1603, 0, 4),
+    Preset::new(0x1800, 2, 254),
+    Preset::new(0x1800, 3, 100),
+    Preset::new(0x1801, 2, 254),
+    Preset::new(0x1801, 3, 100),
+    Preset::new(0x1802, 2, 254),
+    Preset::new(0x1802, 3, 100),
+    Preset::new(0x1803, 2, 254),
+    Preset::new(0x1803, 3, 100),
+    Preset::new(0x1A00, 0, 4),
+    Preset::new(0x1A00, 1, 0x6041_0010),
+    Preset::new(0x1A01, 0, 4),
+    Preset::new(0x1A02, 0, 4),
+    Preset::new(0x1A03, 0, 4),
+    Preset::new(0x2014, 0, 300),
+    Preset::new(0x2015, 0, 600),
+    Preset::new(0x201F, 0, 100),
+    Preset::new(0x2023, 0, 4),
+    Preset::new(0x202A, 0, 1000),
+    Preset::new(0x202B, 0, 750),
+    Preset::new(0x202C, 0, 350),
+    Preset::new(0x202D, 0, 1000),
+    Preset::new(0x2030, 0, 14),
+    Preset::new(0x60FF, 0, 120),
+];
+
 /// The first choice of each.
 pub const VARIANT: Variant = Variant::first_of(VARIATIONS);
 
 /// An external stop that releases the shaft leaves operation enabled.
 pub(super) const STOPPED_ENABLED: Pick = Pick::of(VARIATIONS, "L039", "enabled");
+
+/// SYNC keeps the watch over the host quiet.
+pub(super) const SYNC_FEEDS_WATCHDOG: Pick = Pick::of(VARIATIONS, "L083", "sync");
+
+/// A save does not keep the mode.
+pub(super) const MODE_NOT_SAVED: Pick = Pick::of(VARIATIONS, "L090", "marked");
 
 /// Nothing below 2012h is overload.
 pub(super) const OVERLOAD_FROM_FACTOR: Pick = Pick::of(VARIATIONS, "L101", "factor");

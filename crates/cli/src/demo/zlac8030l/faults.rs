@@ -48,7 +48,7 @@ const DISCHARGE: Duration = Duration::from_secs(5);
 
 const SOON: Duration = Duration::from_millis(500);
 
-/// Twice the rated current is borne for 6 s (note below the object table).
+/// Twice the rated current is borne for 2016h = 3 s (chapter 9).
 const OVERLOAD: Duration = Duration::from_secs(9);
 
 #[rustfmt::skip]

@@ -117,6 +117,8 @@ pub(super) fn io_stop(bench: &mut Bench) {
     bench.run(Duration::from_millis(1_000));
     let current = bench.report().current_a;
     bench.expect("current", Expect::Near(0.0, 0.05), "A", current);
+    let word = bench.statusword().unwrap_or_default();
+    bench.expect("6041h bits 0-3, 15", Expect::Bits(0x8000), "", f64::from(word & 0x800F));
     bench.machine("input X0 0");
     stop(bench);
     bench.ask("lock the shaft", "2B 2F 20 03 00 00 00 00", &format!("{WRITE_OK_202F} 03 00 00 00 00"));

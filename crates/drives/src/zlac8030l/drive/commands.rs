@@ -2,7 +2,7 @@
 
 use can::Instant;
 use canopen::node::Via;
-use canopen::od::Slot;
+use canopen::od::{Entry, Slot};
 use cia402::{Controlword, ModeOfOperation, PowerState};
 
 use super::Zlac8030l;
@@ -13,6 +13,7 @@ use crate::zlac8030l::faults::row;
 use crate::zlac8030l::objects::effects::{Effect, effect};
 use crate::zlac8030l::objects::*;
 use crate::zlac8030l::restart;
+use crate::zlac8030l::variations::{MODE_NOT_SAVED, SYNC_FEEDS_WATCHDOG};
 
 impl Application<ROW_COUNT> for Zlac8030l {
     fn device(&mut self) -> &mut Device<ROW_COUNT> {
@@ -23,6 +24,7 @@ impl Application<ROW_COUNT> for Zlac8030l {
         let stored = self.device.stored_values();
         self.device.restart(restart::node_id(self.dip_address, &stored), restart::bitrate(&stored), now);
         *self = Self { dip_address: self.dip_address, ..Self::over(self.device.clone()) };
+        self.select_mode();
         self.axis.self_test_done();
         self.publish_status();
         self.device.boot(now);
@@ -34,7 +36,7 @@ impl Application<ROW_COUNT> for Zlac8030l {
         let effect = effect(slot);
         match effect {
             Effect::Command => self.command(Controlword(raw as u16), now),
-            Effect::SelectMode => self.axis.request_mode(ModeOfOperation(raw as u8 as i8)),
+            Effect::SelectMode => self.select_mode(),
             Effect::Registers => self.registers(raw, now),
             Effect::ClearPosition => self.clear_position(slot, raw),
             Effect::Target => {}
@@ -43,10 +45,17 @@ impl Application<ROW_COUNT> for Zlac8030l {
         matches!(effect, Effect::Command | Effect::SelectMode)
     }
 
+    fn synchronised(&mut self, now: Instant) {
+        if self.device.variant().is(SYNC_FEEDS_WATCHDOG) {
+            self.last_sync = Some(now);
+        }
+    }
+
     fn communication_task(&mut self, now: Instant) {
         let timeout_ns = u64::from(self.values().get(COMMUNICATION_OFFLINE_TIME)) * 1_000_000;
         let armed = self.axis.state() == PowerState::OperationEnabled;
-        if self.watchdog.poll(armed, self.device.last_addressed(), timeout_ns, now) {
+        let heard = self.device.last_addressed().max(self.last_sync);
+        if self.watchdog.poll(armed, heard, timeout_ns, now) {
             self.axis.lose_host();
             self.drop_targets();
         }
@@ -74,10 +83,17 @@ impl Zlac8030l {
         }
     }
 
+    /// 6060h.
+    fn select_mode(&mut self) {
+        self.axis.request_mode(ModeOfOperation(self.values().get(MODES_OF_OPERATION)));
+    }
+
     /// Save or restore. An EEPROM fault ends with the factory settings.
     fn registers(&mut self, command: u32, now: Instant) {
-        if zl::register_command(&mut self.device, REGISTER_PARAMETER_SETTING, command) {
+        let about = if self.device.variant().is(MODE_NOT_SAVED) { |row: &Entry| row.stored } else { Entry::is_kept };
+        if zl::register_command(&mut self.device, REGISTER_PARAMETER_SETTING, command, about) {
             self.parameters_changed = true;
+            self.select_mode();
             if self.faults.forget(row::EEPROM) {
                 self.reset_faults(now);
             }

@@ -14,7 +14,7 @@ use super::faults::{FAULT_COUNT, FAULTS, row};
 use super::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use super::objects::*;
 use super::parameters::Parameters;
-use super::profile::QUIRKS;
+use super::profile::{PDO_RULES, QUIRKS};
 use super::protection::{Protection, Situation, is_over_current};
 use super::readings::*;
 use super::statusword::statusword;
@@ -34,7 +34,7 @@ use crate::zl::terminals::Conditions;
 use crate::{Firmware, Report, zl};
 
 /// How this drive communicates.
-pub static NODE_PROFILE: NodeProfile = zl::node_profile(&TABLE, QUIRKS);
+pub static NODE_PROFILE: NodeProfile = zl::node_profile(&TABLE, &PDO_RULES, QUIRKS);
 
 /// The firmware of a ZLAC8030L V2.0.
 #[derive(Clone)]
@@ -58,6 +58,8 @@ pub struct Zlac8030l {
     outputs: [bool; 2],
     bleeder: Bleeder,
     watchdog: HostWatchdog,
+    /// The last SYNC, where that counts as a sign of the host.
+    last_sync: Option<Instant>,
     shown_velocity_rpm: LowPass,
     shown_current_a: LowPass,
     periods: u8,
@@ -99,6 +101,7 @@ impl Zlac8030l {
             outputs: [false; 2],
             bleeder: Bleeder::default(),
             watchdog: HostWatchdog::default(),
+            last_sync: None,
             shown_velocity_rpm: LowPass::default(),
             shown_current_a: LowPass::default(),
             periods: 0,

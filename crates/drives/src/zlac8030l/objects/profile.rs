@@ -20,7 +20,8 @@ pub(super) const ROWS: [Entry; 22] = [
     rw(0x605C, 0, I16, "disable_operation_option_code", "Disable operation code")
         .values(DISABLE_OPTIONS).default(1),
     rw(0x605D, 0, I16, "halt_option_code", "Halt control register").values(HALT_OPTIONS).default(1),
-    rw(0x6060, 0, I8, "modes_of_operation", "Operating mode").values(MODES).mappable(),
+    // Printed RW. A robot's driver has never written it and turns the wheels: a save keeps it.
+    rw(0x6060, 0, I8, "modes_of_operation", "Operating mode").values(MODES).mappable().saved(),
     ro(0x6061, 0, I8, "modes_of_operation_display", "Operating mode status").values(MODES).mappable(),
     ro(0x6064, 0, I32, "position_actual_value", "Actual position feedback").unit("counts").mappable(),
     ro(0x606C, 0, I32, "velocity_actual_value", "Actual speed feedback").unit("0.1 r/min").mappable(),

@@ -72,7 +72,7 @@ impl Zlim42c {
 
     /// Save or restore. An EEPROM fault ends with the factory settings.
     fn registers(&mut self, command: u32, now: Instant) {
-        if zl::register_command(&mut self.device, REGISTER_PARAMETER_SETTING, command) {
+        if zl::register_command(&mut self.device, REGISTER_PARAMETER_SETTING, command, |_| true) {
             self.parameters_changed = true;
             if self.faults.forget(row::EEPROM) {
                 self.reset_faults(now);

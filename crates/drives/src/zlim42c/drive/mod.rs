@@ -31,7 +31,7 @@ use crate::zl::terminals::Conditions;
 use crate::{Firmware, Report, zl};
 
 /// How this drive communicates.
-pub static NODE_PROFILE: NodeProfile = zl::node_profile(&TABLE, QUIRKS);
+pub static NODE_PROFILE: NodeProfile = zl::node_profile(&TABLE, &zl::PDO_RULES, QUIRKS);
 
 /// The firmware of a ZLIM42-C.
 #[derive(Clone)]
