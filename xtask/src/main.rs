@@ -7,6 +7,7 @@
 mod cargo_tests;
 mod examples;
 mod peers;
+mod pgo;
 mod process;
 mod program;
 mod steps;
@@ -24,6 +25,7 @@ The project's own chores.
   cargo xtask test --only STEP   one step (may be repeated)
   cargo xtask test --list        the steps
   cargo xtask tidy               the style that a program can check
+  cargo xtask pgo                the binary to release, optimised by what a training run does
 ";
 
 fn main() -> ExitCode {
@@ -32,6 +34,7 @@ fn main() -> ExitCode {
     match words.as_slice() {
         ["test", rest @ ..] => test::command(rest),
         ["tidy"] => tidy::command(),
+        ["pgo"] => pgo::command(),
         [] | ["help" | "--help" | "-h"] => {
             print!("{USAGE}");
             ExitCode::SUCCESS
