@@ -13,6 +13,8 @@ mod drivers;
 mod eds_defaults;
 mod emergency;
 mod energy;
+mod fast_motor;
+mod firmware;
 mod holding;
 mod motor_parameters;
 mod network;

@@ -5,6 +5,9 @@
 //! temperature, which only this model measures, and 1000h to the encoder. The table follows chapter 9. The two codes
 //! that chapter 9 calls reserved (0010h, 0040h) never occur.
 //!
+//! The maker's guide of firmware 2.01 has one more, 2000h: a speed is given above the rated one. Which speed that is, it does
+//! not say; 200Ah is the one that the drive knows.
+//!
 //! EMCY messages carry the value of 603Fh as error code, as the manual of the sibling ZLIM42-C says (V1.03, 5.2).
 
 use super::readings::{
@@ -37,10 +40,12 @@ pub mod row {
     pub const DRIVER_TEMPERATURE: usize = 9;
     /// 1000h.
     pub const ENCODER: usize = 10;
+    /// 2000h, of firmware 2.01.
+    pub const SPEED_SETTING: usize = 11;
 }
 
 /// Number of faults.
-pub const FAULT_COUNT: usize = 11;
+pub const FAULT_COUNT: usize = 12;
 
 const AT_ONCE: u16 = 1;
 
@@ -56,7 +61,7 @@ pub static FAULTS: [FaultRow; FAULT_COUNT] = [
     FaultRow::new(0x0008, "overload", CURRENT, AT_ONCE,
         "Free a blocked motor; check motor cable, wiring, and motor parameters; lower the load or raise 2016h."),
     FaultRow::new(0x0020, "encoder value out of tolerance", PROFILE, AT_ONCE,
-        "Free a blocked motor; check the encoder; ask for slower moves or raise 2017h."),
+        "Free a blocked motor; check the encoder; ask for moves no faster than the supply lets this motor turn; raise 2017h."),
     FaultRow::new(0x0080, "reference voltage", MANUFACTURER, SENSOR_DEBOUNCE_PERIODS,
         "The drive's reference voltage circuit is out of order: replace the drive."),
     FaultRow::new(0x0100, "EEPROM read and write", MANUFACTURER, AT_ONCE,
@@ -69,6 +74,8 @@ pub static FAULTS: [FaultRow; FAULT_COUNT] = [
         "Lower the current and let the drive cool; the limit is 2013h:02."),
     FaultRow::new(0x1000, "encoder", MANUFACTURER, AT_ONCE,
         "Check the encoder's cable; check 200Bh (lines) and 200Ch (pole pairs) against the motor."),
+    FaultRow::new(0x2000, "speed setting", PROFILE, AT_ONCE,
+        "Firmware 2.01 only. Ask for no more than 200Ah with 60FFh, then reset the fault."),
 ];
 
 /// What a code that a fault object of this model may show means; more than one bit may be set.

@@ -26,6 +26,8 @@ pub(super) struct Situation<'a> {
     pub(super) position: i32,
     pub(super) velocity_rpm: f32,
     pub(super) eeprom_sound: bool,
+    /// More is asked for than this firmware takes.
+    pub(super) speed_setting_wrong: bool,
     pub(super) latched: FaultSet,
 }
 
@@ -52,6 +54,7 @@ impl Protection {
                 row::ENCODER,
                 !sensors.encoder_wired || exceeds(now.servo.disagreement_turns().abs(), HALL_DISAGREEMENT_TURNS),
             )
+            .with(row::SPEED_SETTING, now.speed_setting_wrong)
     }
 
     /// A fault reset gives the overload its whole time back.

@@ -5,6 +5,27 @@ use crate::variant::{Choice, Pick, Preset, Trust, Variant, Variation, VariationK
 /// All of them.
 pub const VARIATIONS: &[Variation] = &[
     Variation {
+        key: "firmware",
+        kind: VariationKind::Build,
+        section: "8",
+        about: "its version",
+        choices: &[
+            Choice::new("1.00", "as the manual V1.00 of 2023 has it", Trust::Vendor),
+            Choice::new("2.01", "as the guide V2.01 of 2024: a target velocity above 200Ah is fault 2000h", Trust::Vendor)
+                .factory(&[Preset::new(0x100A, 0, 0x0201), Preset::new(0x2025, 0, 0x0201)]),
+        ],
+    },
+    Variation {
+        key: "motor",
+        kind: VariationKind::Build,
+        section: "9, 200Ah",
+        about: "which winding of the wheel motor is wired to it",
+        choices: &[
+            Choice::new("slow", "ZLLG65ASM250-L: 0.76 N m/A, up to some 510 r/min at 48 V", Trust::Vendor),
+            Choice::new("fast", "ZLLG65ASM250: 0.30 N m/A, up to the drive's 1000 r/min at 48 V", Trust::Vendor),
+        ],
+    },
+    Variation {
         key: "defaults",
         kind: VariationKind::Build,
         section: "9",
@@ -108,6 +129,12 @@ const EDS: &[Preset] = &[
 
 /// The first choice of each.
 pub const VARIANT: Variant = Variant::first_of(VARIATIONS);
+
+/// A target velocity above 200Ah is a fault.
+pub(super) const SPEED_SETTING_FAULTS: Pick = Pick::of(VARIATIONS, "firmware", "2.01");
+
+/// The fast winding is wired to it.
+pub const FAST_MOTOR: Pick = Pick::of(VARIATIONS, "motor", "fast");
 
 /// An external stop that releases the shaft leaves operation enabled.
 pub(super) const STOPPED_ENABLED: Pick = Pick::of(VARIATIONS, "L039", "enabled");

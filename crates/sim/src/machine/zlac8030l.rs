@@ -8,7 +8,8 @@ use drives::engine::storage::Image;
 use drives::profile::DriveProfile;
 use drives::zlac8030l::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use drives::zlac8030l::readings::REFERENCE_V;
-use drives::zlac8030l::variations::VARIANT;
+use drives::variant::Variant;
+use drives::zlac8030l::variations::{FAST_MOTOR, VARIANT};
 use drives::zlac8030l::{Zlac8030l, objects, storage};
 use plant::angle::Angle;
 use plant::encoder::EncoderFault;
@@ -39,7 +40,7 @@ pub type Zlac8030lMachine = Machine<HubWheel>;
 /// 200Eh in the EEPROM.
 pub fn zlac8030l(node: u8, baud_rate: u16) -> Zlac8030lMachine {
     let image = Image::of(&storage::addressed(&VARIANT, node, baud_rate));
-    Machine::new(Zlac8030l::new(), HubWheel::new(dip_address(node), image))
+    Machine::new(Zlac8030l::new(), HubWheel::new(dip_address(node), image, &VARIANT))
 }
 
 /// Bit rates by number.
@@ -50,7 +51,7 @@ pub(super) fn ordered(model: &DriveProfile, order: &Order) -> Result<Box<dyn Vir
     let (node, variant) = (order.node.raw(), order.variant);
     let baud_rate = baud_rate(model, BAUD_RATE, order.bitrate)?;
     let image = order.image(storage::addressed(&variant, node, baud_rate))?;
-    Ok(Box::new(Machine::new(Zlac8030l::of(variant), HubWheel::new(dip_address(node), image))))
+    Ok(Box::new(Machine::new(Zlac8030l::of(variant), HubWheel::new(dip_address(node), image, &variant))))
 }
 
 /// What the DIP switches of a drive for this node-ID are set to.
@@ -70,9 +71,10 @@ pub struct HubWheel {
 }
 
 impl HubWheel {
-    /// At rest at ambient temperature, the supply not yet connected.
-    pub fn new(dip_address: u8, image: Image) -> Self {
-        let mut model = HubMotorModel::ZLLG65ASM250_L;
+    /// At rest at ambient temperature, the supply not yet connected, with the motor of this variant.
+    pub fn new(dip_address: u8, image: Image, variant: &Variant) -> Self {
+        let fast = variant.is(FAST_MOTOR);
+        let mut model = if fast { HubMotorModel::ZLLG65ASM250 } else { HubMotorModel::ZLLG65ASM250_L };
         model.brake.holding_nm = BRAKE_NM;
         let mut motor = HubMotor::new(model, Angle::default(), SUPPLY_V, AMBIENT_C);
         motor.rig.supply.connected = false;

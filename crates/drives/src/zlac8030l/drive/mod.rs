@@ -7,7 +7,7 @@ mod commands;
 
 use can::{Bitrate, Instant};
 use canopen::node::{Node, NodeProfile};
-use cia402::PowerState;
+use cia402::{ModeOfOperation, PowerState};
 use motion::filter::{LowPass, LowPassGains};
 
 use super::faults::{FAULT_COUNT, FAULTS, row};
@@ -19,7 +19,7 @@ use super::protection::{Protection, Situation, is_over_current};
 use super::readings::*;
 use super::statusword::statusword;
 use super::terminals::{self, TERMINALS};
-use super::variations::VARIANT;
+use super::variations::{SPEED_SETTING_FAULTS, VARIANT};
 use super::{Values, storage};
 use crate::engine::axis::{Axis, Demand, Feedback, Targets};
 use crate::engine::bleeder::Bleeder;
@@ -49,6 +49,8 @@ pub struct Zlac8030l {
     awake: bool,
     demand: Demand,
     targets: Targets,
+    /// 60FFh is above 200Ah, and this firmware minds.
+    speed_setting_wrong: bool,
     /// What is added to the counts since power-on to give 6064h.
     position_offset: i32,
     faults: FaultMonitor<FAULT_COUNT>,
@@ -93,6 +95,7 @@ impl Zlac8030l {
             awake: false,
             demand: Demand::Off,
             targets: Targets::default(),
+            speed_setting_wrong: false,
             position_offset: 0,
             faults: FaultMonitor::new(&FAULTS),
             protection: Protection::default(),
@@ -184,6 +187,7 @@ impl Zlac8030l {
             position: self.position(),
             velocity_rpm: self.servo.velocity_rpm(),
             eeprom_sound: self.device.is_eeprom_sound(),
+            speed_setting_wrong: self.speed_setting_wrong,
             latched: self.faults.latched(),
         };
         let causes = self.protection.causes(&self.parameters, sensors, &situation);
@@ -234,6 +238,9 @@ impl Zlac8030l {
         let values = self.device.values();
         let rpm = f64::from(values.get(TARGET_VELOCITY)) / f64::from(values.in_effect().max(1));
         let max_rpm = self.parameters.max_rpm;
+        self.speed_setting_wrong = rpm.abs() > max_rpm
+            && self.axis.mode() == ModeOfOperation::PROFILE_VELOCITY
+            && self.device.variant().is(SPEED_SETTING_FAULTS);
         self.targets = Targets {
             velocity: rpm.clamp(-max_rpm, max_rpm) * self.parameters.counts_s_per_rpm,
             current_a: f32::from(values.get(TARGET_TORQUE)) * 1e-3,
