@@ -36,6 +36,10 @@ pub trait Firmware: Station + Clone {
     /// Contents of the EEPROM, and a number that changes with them.
     fn eeprom(&self) -> (&[u8], u32);
 
+    /// A value that was written, and perhaps acknowledged, is not in the EEPROM yet and will be with the next run of the
+    /// communication task, which changes the generation by one.
+    fn is_storing(&self) -> bool;
+
     /// How the drive is, for people.
     fn report(&self) -> Report;
 }

@@ -1,11 +1,14 @@
 //! World commands: the lines that `ferrodrive sim` takes on standard input, each answered by one line of JSON.
 //!
 //! A line is parsed into a [`Command`], applied to a [`World`], and answered with `{"ok":true,"t":12.5}`
-//! (`t` is virtual time in seconds) or `{"ok":false,"error":"..."}`. A line that is refused changes nothing.
+//! (`t` is virtual time in seconds) or `{"ok":false,"error":"..."}`. A line that is refused changes nothing. A blank line
+//! and a comment (`# ...`) have no answer.
 //! Node numbers are those under which drives were added, whatever their node-IDs are by now.
 
 mod apply;
 mod parse;
+
+use core::time::Duration;
 
 use serde::Serialize;
 
@@ -16,6 +19,8 @@ use crate::{Component, PulseTrain, Refused, SwitchRange, TemperatureSensor, Worl
 pub enum Command {
     /// `now`: the virtual time.
     Now,
+    /// `help`: what a line may say.
+    Help,
     /// `quit`: the end.
     Quit,
     /// `4 ...`: something about the drive added under a number.
@@ -73,8 +78,11 @@ pub enum Action {
 /// Why a line was not done.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CommandError {
+    /// The line is longer than [`MAX_LINE_LENGTH`].
+    #[error("the line is longer than {MAX_LINE_LENGTH} bytes; expected a command, as in: 4 get")]
+    TooLong,
     /// The first word is neither a node nor a command.
-    #[error("unknown command {0:?}; expected now, quit, or a node number and a command, as in: 4 get")]
+    #[error("unknown command {0:?}; expected now, help, quit, or a node number and a command, as in: 4 get")]
     Unknown(String),
     /// The number is no node number.
     #[error("{0:?} is no node number; expected 1 to 127")]
@@ -144,17 +152,43 @@ pub struct Answer {
     pub quit: bool,
 }
 
-/// Does what a line says and answers it; `None` for a blank line.
+/// Longest line that is read, in bytes: many times the longest command.
+pub const MAX_LINE_LENGTH: usize = 4096;
+
+/// What only the one who moves a world's time and serves its bus knows; `now` and `get` tell it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Service {
+    /// How far the world's time is behind the clock; nothing where no clock drives it.
+    pub behind: Duration,
+    /// Frames of clients that were given up.
+    pub frames_lost: u64,
+}
+
+/// Does what a line says and answers it, in a world that nobody serves; `None` for a blank line or a comment.
 pub fn answer(world: &mut World, line: &str) -> Option<Answer> {
-    if line.trim().is_empty() {
+    answer_served(world, line, Service::default())
+}
+
+/// Does what a line says and answers it; `None` for a blank line or a comment.
+pub fn answer_served(world: &mut World, line: &str, service: Service) -> Option<Answer> {
+    if line.len() > MAX_LINE_LENGTH {
+        return Some(Answer { json: refused(&CommandError::TooLong), quit: false });
+    }
+    if !asks_for_an_answer(line) {
         return None;
     }
-    let done = line.parse().and_then(|command| Ok((command == Command::Quit, apply::apply(world, &command)?)));
+    let done = line.parse().and_then(|command| Ok((command == Command::Quit, apply::apply(world, &command, service)?)));
     let (quit, json) = match done {
         Ok((quit, json)) => (quit, json),
         Err(error) => (false, refused(&error)),
     };
     Some(Answer { json, quit })
+}
+
+/// False for a blank line and for a comment.
+pub fn asks_for_an_answer(line: &str) -> bool {
+    let line = line.trim();
+    !line.is_empty() && !line.starts_with('#')
 }
 
 #[derive(Serialize)]

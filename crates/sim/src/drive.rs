@@ -95,6 +95,12 @@ pub trait VirtualDrive: Station + VirtualDriveClone + Send {
     /// Counts stores into the non-volatile memory: a new value means a new image.
     fn nvm_generation(&self) -> u64;
 
+    /// A value that was written is not in the non-volatile memory yet and soon will be, which is when
+    /// [`nvm_generation`](Self::nvm_generation) grows by one.
+    fn is_storing(&self) -> bool {
+        false
+    }
+
     /// The contents of the non-volatile memory, as [`load_nvm`](Self::load_nvm) takes them back.
     fn nvm_image(&self) -> Vec<u8>;
 

@@ -27,4 +27,4 @@ pub use drive::{
 };
 pub use drives::RegisterError;
 pub use prng::Prng;
-pub use world::{AnyStation, Digest, FrameLog, StationId, World, WorldError};
+pub use world::{AnyStation, Digest, FrameLog, StationId, StoredImage, World, WorldError};

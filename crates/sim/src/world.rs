@@ -6,6 +6,7 @@ mod due;
 mod log;
 mod member;
 mod step;
+mod stores;
 mod tap;
 
 use core::time::Duration;
@@ -15,6 +16,7 @@ use can::{Bitrate, Frame, Instant, Station};
 pub use digest::Digest;
 pub use log::FrameLog;
 pub use member::AnyStation;
+pub use stores::StoredImage;
 
 use crate::fault::{Corruption, NodeFaults};
 use crate::recorder::Recorder;
@@ -22,6 +24,7 @@ use crate::wire::{Bus, ControllerOptions};
 use crate::{Prng, VirtualDrive};
 use due::DueTimes;
 use member::{Member, Nobody};
+use stores::Ledger;
 use tap::Tap;
 
 /// A bus with everything on it.
@@ -37,6 +40,8 @@ pub struct World {
     log: FrameLog,
     digest: Digest,
     recorder: Option<Recorder>,
+    /// By station, while stores are guarded.
+    ledgers: Vec<Option<Ledger>>,
 }
 
 /// Names one station of one world: what `add_*` returned.
@@ -79,6 +84,7 @@ impl World {
             log: FrameLog::default(),
             digest: Digest::default(),
             recorder: None,
+            ledgers: Vec::new(),
         }
     }
 

@@ -2,10 +2,12 @@
 
 mod common;
 
+use std::time::Duration;
+
 use can::{Bitrate, Instant};
 use common::{TestDrive, frame, heard, texts};
 use serde_json::Value;
-use sim::command::answer;
+use sim::command::{MAX_LINE_LENGTH, Service, answer, answer_served};
 use sim::recorder::{Channel, Recorder, Signal};
 use sim::{StationId, World, WorldError};
 
@@ -74,12 +76,52 @@ fn get_tells_what_can_be_measured() {
 }
 
 #[test]
-fn now_and_quit_tell_the_time_and_blank_lines_nothing() {
+fn now_and_quit_tell_the_time_and_blank_lines_and_comments_nothing() {
     let (mut world, _) = world();
-    assert_eq!(answer(&mut world, "now").unwrap().json, r#"{"ok":true,"t":0.5}"#);
+    assert_eq!(answer(&mut world, "now").unwrap().json, r#"{"ok":true,"t":0.5,"behind_ms":0,"frames_lost":0}"#);
     assert_eq!(ask(&mut world, "quit")["ok"], true);
-    for blank in ["", "  ", "\t\r\n"] {
-        assert_eq!(answer(&mut world, blank), None);
+    for unanswered in ["", "  ", "\t\r\n", "# quit", "  #now\n"] {
+        assert_eq!(answer(&mut world, unanswered), None);
+    }
+}
+
+#[test]
+fn now_and_get_tell_what_the_one_who_serves_the_world_knows() {
+    let (mut world, _) = world();
+    let service = Service { behind: Duration::from_micros(12_900), frames_lost: 3 };
+    let json = |world: &mut World, line| -> Value {
+        serde_json::from_str(&answer_served(world, line, service).unwrap().json).unwrap()
+    };
+    assert_eq!(json(&mut world, "now")["behind_ms"], 12);
+    assert_eq!(json(&mut world, "now")["frames_lost"], 3);
+    assert_eq!(json(&mut world, "4 get")["behind_ms"], 12);
+    assert_eq!(ask(&mut world, "4 get")["behind_ms"], 0, "a world that nobody serves is never late");
+}
+
+#[test]
+fn help_has_a_line_for_every_command() {
+    let (mut world, _) = world();
+    let help = ask(&mut world, "help");
+    assert_eq!(help["ok"], true);
+    let forms: Vec<&str> = help["help"].as_array().unwrap().iter().map(|form| form.as_str().unwrap()).collect();
+    // The verbs that an unknown one is answered with, and what needs no node.
+    let verbs = refusal(&mut world, "4 fly");
+    let verbs = verbs.split_once("expected ").unwrap().1.replace(" or ", ", ");
+    for verb in verbs.split(", ") {
+        assert!(forms.iter().any(|form| form.starts_with(&format!("NODE {verb}"))), "{verb} in {forms:?}");
+    }
+    assert!(["now", "help", "quit"].iter().all(|word| forms.contains(word)));
+    assert_eq!(refusal(&mut world, "help me"), "expected: help");
+}
+
+#[test]
+fn a_line_too_long_and_one_with_escapes_are_refused_without_an_echo_of_either() {
+    let (mut world, _) = world();
+    let long = format!("4 input {} 1", "x".repeat(MAX_LINE_LENGTH));
+    assert!(refusal(&mut world, &long).contains("longer than 4096 bytes"));
+    for line in ["\u{1b}[31mred", "4 \u{9b}2J", "4 supply \u{7}", "4 input \u{1b}c 1", "\u{9d}0;title 4"] {
+        let json = answer(&mut world, line).unwrap().json;
+        assert!(!json.chars().any(char::is_control), "{json:?}");
     }
 }
 

@@ -212,6 +212,12 @@ impl<const N: usize> Device<N> {
         self.store.mark_all(self.profile.table, wanted);
     }
 
+    /// A value waits for the next [`commit`](Self::commit), which will write it: the EEPROM answers and can be read.
+    #[inline]
+    pub fn is_storing(&self) -> bool {
+        self.running && self.eeprom_ok && self.store.has_pending()
+    }
+
     /// Stores what is marked. While the EEPROM does not answer it waits.
     #[inline]
     pub fn commit(&mut self) {

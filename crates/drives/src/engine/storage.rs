@@ -114,6 +114,12 @@ impl Store {
         Ok(())
     }
 
+    /// True if the next [`commit`](Self::commit) has something to write and can.
+    #[inline]
+    pub fn has_pending(&self) -> bool {
+        self.active.is_some() && !self.pending.is_empty()
+    }
+
     /// Has a row's value stored by the next [`commit`](Self::commit), if it is a row to be stored with each write.
     pub fn mark(&mut self, table: &Table, slot: Slot) {
         if table.row(slot).stored {

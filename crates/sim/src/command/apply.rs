@@ -1,20 +1,26 @@
 //! Does what a command says, and words the answer.
 
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 use can::Instant;
 use serde::Serialize;
 
-use super::{Action, Command, CommandError, to_json};
+use super::{Action, Command, CommandError, Service, parse, to_json};
 use crate::wire::ErrorState;
 use crate::{Brake, Report, StationId, VirtualDrive, World};
 
 /// Does what `command` says; returns the line of JSON that answers it.
-pub(super) fn apply(world: &mut World, command: &Command) -> Result<String, CommandError> {
+pub(super) fn apply(world: &mut World, command: &Command, service: Service) -> Result<String, CommandError> {
     match command {
-        Command::Now | Command::Quit => Ok(done(world)),
+        Command::Now => Ok(now(world, service)),
+        Command::Help => Ok(to_json(&Help { ok: true, help: parse::FORMS })),
+        Command::Quit => Ok(done(world)),
         Command::Drive { number, action } => {
             let id = world.drive_id(*number).ok_or_else(|| no_such_drive(world, *number))?;
+            if *action == Action::Get {
+                return get(world, *number, id, service);
+            }
             apply_to_drive(world, *number, id, action)
         }
     }
@@ -22,7 +28,6 @@ pub(super) fn apply(world: &mut World, command: &Command) -> Result<String, Comm
 
 fn apply_to_drive(world: &mut World, number: u8, id: StationId, action: &Action) -> Result<String, CommandError> {
     match action {
-        Action::Get => return get(world, number, id),
         Action::CableCut(true) => world.cut(id),
         Action::CableCut(false) => world.join(id),
         Action::PowerCycle => {
@@ -89,6 +94,31 @@ fn done(world: &World) -> String {
     to_json(&Done { ok: true, t: seconds(world) })
 }
 
+/// The answer to `now`.
+#[derive(Serialize)]
+struct Now {
+    ok: bool,
+    t: f64,
+    behind_ms: u64,
+    frames_lost: u64,
+}
+
+fn now(world: &World, service: Service) -> String {
+    let Service { behind, frames_lost } = service;
+    to_json(&Now { ok: true, t: seconds(world), behind_ms: millis(behind), frames_lost })
+}
+
+/// Whole milliseconds.
+fn millis(duration: Duration) -> u64 {
+    duration.as_millis().try_into().unwrap_or(u64::MAX)
+}
+
+#[derive(Serialize)]
+struct Help {
+    ok: bool,
+    help: &'static [&'static str],
+}
+
 /// The answer to `get`, in the order in which people look at it.
 #[derive(Serialize)]
 struct Got<'a> {
@@ -114,9 +144,10 @@ struct Got<'a> {
     bus: &'a str,
     tec: u16,
     rec: u16,
+    behind_ms: u64,
 }
 
-fn get(world: &mut World, number: u8, id: StationId) -> Result<String, CommandError> {
+fn get(world: &mut World, number: u8, id: StationId, service: Service) -> Result<String, CommandError> {
     let measured = world.with_drive(number, |drive, now| {
         drive.advance(now);
         (drive.model(), drive.bitrate(), drive.report())
@@ -146,6 +177,7 @@ fn get(world: &mut World, number: u8, id: StationId) -> Result<String, CommandEr
         bus: bus_text(world, id, powered),
         tec: counters.tec(),
         rec: counters.rec(),
+        behind_ms: millis(service.behind),
     }))
 }
 

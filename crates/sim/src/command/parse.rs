@@ -12,8 +12,10 @@ impl FromStr for Command {
         let words: Vec<&str> = line.split_whitespace().collect();
         match words.as_slice() {
             ["now"] => Ok(Self::Now),
+            ["help"] => Ok(Self::Help),
             ["quit"] => Ok(Self::Quit),
             ["now", ..] => Err(CommandError::Usage("now")),
+            ["help", ..] => Err(CommandError::Usage("help")),
             ["quit", ..] => Err(CommandError::Usage("quit")),
             [first, action @ ..] => {
                 let number = parse_node(first)?;
@@ -39,6 +41,28 @@ const DUTY: &str = "NODE duty PERCENT";
 const CLOCK: &str = "NODE clock HZ";
 const CABLE: &str = "NODE cable cut|join";
 const GET: &str = "NODE get";
+
+/// Every form of a line, one line each.
+pub(super) const FORMS: &[&str] = &[
+    POWER,
+    INPUT,
+    SWITCH,
+    LOAD,
+    ROTOR,
+    SUPPLY,
+    TEMPERATURE,
+    FAULT,
+    BATTERY,
+    PULSES,
+    QUADRATURE,
+    DUTY,
+    CLOCK,
+    CABLE,
+    GET,
+    "now",
+    "help",
+    "quit",
+];
 
 /// Below this a temperature is below absolute zero.
 const ABSOLUTE_ZERO_C: f64 = -273.15;
@@ -231,8 +255,11 @@ mod tests {
     #[test]
     fn says_what_it_expected_of_a_malformed_line() {
         for (line, error) in [
-            ("", "unknown command \"\"; expected now, quit, or a node number and a command, as in: 4 get"),
-            ("hello", "unknown command \"hello\"; expected now, quit, or a node number and a command, as in: 4 get"),
+            ("", "unknown command \"\"; expected now, help, quit, or a node number and a command, as in: 4 get"),
+            (
+                "hello",
+                "unknown command \"hello\"; expected now, help, quit, or a node number and a command, as in: 4 get",
+            ),
             ("now 4", "expected: now"),
             ("quit now", "expected: quit"),
             ("0 get", "\"0\" is no node number; expected 1 to 127"),

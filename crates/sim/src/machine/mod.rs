@@ -278,6 +278,10 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
         u64::from(self.firmware.eeprom().1)
     }
 
+    fn is_storing(&self) -> bool {
+        self.firmware.is_storing()
+    }
+
     fn nvm_image(&self) -> Vec<u8> {
         if self.running { self.firmware.eeprom().0.to_vec() } else { self.assembly.image().to_vec() }
     }

@@ -97,6 +97,7 @@ impl World {
             let bitrate = drive.bitrate();
             if bitrate != self.bus.bitrate_of(i) {
                 self.bus.restart(i, bitrate, self.now);
+                self.forget_held(i);
             }
         }
         self.collect(i);
@@ -107,7 +108,7 @@ impl World {
     /// Moves frames from station `i` into its mailboxes, as far as there is room.
     pub(super) fn collect(&mut self, i: usize) {
         while self.bus.has_room(i) {
-            let Some(frame) = self.members[i].station().poll_transmit() else { return };
+            let Some(frame) = self.next_frame(i) else { return };
             self.bus.offer(i, frame, self.now);
         }
     }

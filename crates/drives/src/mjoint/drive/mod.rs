@@ -356,6 +356,10 @@ impl Firmware for MJoint {
         self.device.eeprom()
     }
 
+    fn is_storing(&self) -> bool {
+        self.device.is_storing()
+    }
+
     fn report(&self) -> Report {
         Report {
             powered: self.device.is_running(),

@@ -359,6 +359,10 @@ impl Firmware for Zlac8030l {
         self.device.eeprom()
     }
 
+    fn is_storing(&self) -> bool {
+        self.device.is_storing()
+    }
+
     fn report(&self) -> Report {
         Report {
             powered: self.device.is_running(),

@@ -1,0 +1,162 @@
+//! Stores that somebody outside keeps: what a drive answers after a store waits until the store is kept.
+//!
+//! A drive's non-volatile memory lives in the world. Whoever brings it to a disk asks for that with
+//! [`World::guard_stores`]: from then on each new content is handed out once by [`World::poll_store`], and an SDO answer
+//! that a drive gives after a store, or while one is due, stays off the wire until [`World::confirm_store`]. Nothing else
+//! waits: process data and heartbeats acknowledge nothing.
+
+use std::collections::VecDeque;
+
+use can::{Frame, Instant};
+use canopen::cob::SDO_REPLY_BASE;
+
+use super::member::Member;
+use super::{StationId, World};
+use crate::VirtualDrive;
+
+/// Answers of one drive that may wait here. With as many waiting, what else it sends waits in the drive, by its own rules.
+const MAX_HELD: usize = 8;
+
+/// A new content of a drive's non-volatile memory.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StoredImage {
+    /// The number under which the drive was added.
+    pub number: u8,
+    /// The drive's model.
+    pub model: &'static str,
+    /// Which store it is: grows by one with each.
+    pub generation: u64,
+    /// The content.
+    pub bytes: Vec<u8>,
+}
+
+/// What is known of the stores of one drive.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Ledger {
+    handed_out: u64,
+    confirmed: u64,
+    held: VecDeque<Held>,
+}
+
+/// An answer that waits for a store.
+#[derive(Clone, Debug)]
+struct Held {
+    frame: Frame,
+    needs: u64,
+    since: Instant,
+}
+
+impl Ledger {
+    /// The store that an answer given now stands for: the last one, or the one that is due.
+    fn needed(drive: &dyn VirtualDrive) -> u64 {
+        drive.nvm_generation() + u64::from(drive.is_storing())
+    }
+
+    /// The next frame that may go to the wire. `limit` is the last store that the drive has made or is about to make: an
+    /// answer cannot wait for one that will not come.
+    fn next_frame(&mut self, drive: &mut dyn VirtualDrive, now: Instant) -> Option<Frame> {
+        let limit = Self::needed(drive);
+        if self.held.front().is_some_and(|held| held.needs.min(limit) <= self.confirmed) {
+            return self.held.pop_front().map(|held| held.frame);
+        }
+        while self.held.len() < MAX_HELD {
+            let frame = drive.poll_transmit()?;
+            let needs = Self::needed(drive);
+            if !is_sdo_answer(&frame) || needs <= self.confirmed {
+                return Some(frame);
+            }
+            self.held.push_back(Held { frame, needs, since: now });
+        }
+        None
+    }
+}
+
+/// The SDO answers of the predefined connection set (CiA 301, 7.3.5); no drive here moves them.
+fn is_sdo_answer(frame: &Frame) -> bool {
+    let id = frame.id();
+    !id.is_extended() && id.raw() & !0x7F == u32::from(SDO_REPLY_BASE)
+}
+
+impl World {
+    /// From now on answers that follow a store wait for [`confirm_store`](Self::confirm_store). What the drives hold now
+    /// counts as kept. Drives added later are not guarded.
+    pub fn guard_stores(&mut self) {
+        self.ledgers = self.members.iter().map(Ledger::of_member).collect();
+    }
+
+    /// A content that has not been handed out yet.
+    pub fn poll_store(&mut self) -> Option<StoredImage> {
+        for (ledger, member) in self.ledgers.iter_mut().zip(&self.members) {
+            let (Some(ledger), Member::Drive { number, drive }) = (ledger, member) else { continue };
+            let generation = drive.nvm_generation();
+            if ledger.handed_out != generation {
+                ledger.handed_out = generation;
+                let (number, model) = (*number, drive.model());
+                return Some(StoredImage { number, model, generation, bytes: drive.nvm_image() });
+            }
+        }
+        None
+    }
+
+    /// The content `generation` of a drive is kept, and with it all before: answers that waited for it go to the wire.
+    pub fn confirm_store(&mut self, number: u8, generation: u64) {
+        let Some(StationId(i)) = self.drive_id(number) else { return };
+        if let Some(Some(ledger)) = self.ledgers.get_mut(i) {
+            ledger.confirmed = ledger.confirmed.max(generation);
+            self.collect(i);
+        }
+    }
+
+    /// The store that an answer of a drive given now stands for, if it is not confirmed yet.
+    pub fn unconfirmed_store(&self, number: u8) -> Option<u64> {
+        let StationId(i) = self.drive_id(number)?;
+        let (Some(ledger), Member::Drive { drive, .. }) = (self.ledgers.get(i)?, &self.members[i]) else { return None };
+        Some(Ledger::needed(&**drive)).filter(|needed| *needed > ledger.confirmed)
+    }
+
+    /// That a store of a drive is kept; one that will not come after all counts as kept.
+    pub fn is_store_confirmed(&self, number: u8, generation: u64) -> bool {
+        self.unconfirmed_store(number).is_none_or(|needed| {
+            let confirmed = self.drive_id(number).and_then(|StationId(i)| self.ledgers.get(i)?.as_ref());
+            confirmed.is_none_or(|ledger| generation.min(needed) <= ledger.confirmed)
+        })
+    }
+
+    /// The answer that has waited for the longest: the drive's number, the store it waits for, and since when.
+    pub fn longest_held(&self) -> Option<(u8, u64, Instant)> {
+        let held = self.ledgers.iter().zip(&self.members).filter_map(|(ledger, member)| match (ledger, member) {
+            (Some(ledger), Member::Drive { number, .. }) => {
+                ledger.held.front().map(|held| (*number, held.needs, held.since))
+            }
+            _ => None,
+        });
+        held.min_by_key(|(_, _, since)| *since)
+    }
+
+    /// The next frame that station `i` has for the wire.
+    pub(super) fn next_frame(&mut self, i: usize) -> Option<Frame> {
+        match (self.ledgers.get_mut(i), &mut self.members[i]) {
+            (Some(Some(ledger)), Member::Drive { drive, .. }) => ledger.next_frame(&mut **drive, self.now),
+            (_, member) => member.station().poll_transmit(),
+        }
+    }
+
+    /// Station `i` has lost its power: what it had to say is lost too.
+    pub(super) fn forget_held(&mut self, i: usize) {
+        if let Some(Some(ledger)) = self.ledgers.get_mut(i) {
+            ledger.held.clear();
+        }
+    }
+}
+
+impl Ledger {
+    fn of_member(member: &Member) -> Option<Self> {
+        match member {
+            Member::Drive { drive, .. } => {
+                let generation = drive.nvm_generation();
+                Some(Self { handed_out: generation, confirmed: generation, held: VecDeque::new() })
+            }
+            _ => None,
+        }
+    }
+}
