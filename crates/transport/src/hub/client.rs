@@ -2,7 +2,7 @@
 
 use std::io;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use can::{Frame, Instant};
@@ -21,6 +21,10 @@ const READ_SIZE: usize = 2048;
 /// Frames are gathered into one write up to this size: what fits one Ethernet segment.
 const WRITE_SIZE: usize = 1400;
 
+/// Segments read or written before the other tasks have their turn. A segment of garbage has up to 64 refusals made for it,
+/// some 100 µs of work; without a budget a few dozen such clients take more time than the world has for a step.
+const SEGMENTS_A_TURN: u32 = 16;
+
 /// How long a disconnected client may take to close its side.
 const LINGER: Duration = Duration::from_secs(1);
 
@@ -31,10 +35,35 @@ pub(super) struct Stamped {
     pub(super) frame: Frame,
 }
 
+/// What the hub sees of a client without asking it.
+#[derive(Debug)]
+pub(super) struct Vitals {
+    listening: AtomicBool,
+    /// When it last said something, in ns of the hub's clock.
+    spoke_at: AtomicU64,
+}
+
+impl Vitals {
+    /// Of a client that connected at `now`.
+    pub(super) fn new(now: Instant) -> Self {
+        Self { listening: AtomicBool::new(false), spoke_at: AtomicU64::new(now.as_nanos()) }
+    }
+
+    /// It wants to hear frames.
+    pub(super) fn is_listening(&self) -> bool {
+        self.listening.load(Ordering::Relaxed)
+    }
+
+    /// Lower for a client that matters less: first those that do not listen, then by how long they have been silent.
+    pub(super) fn rank(&self) -> (bool, u64) {
+        (self.is_listening(), self.spoke_at.load(Ordering::Relaxed))
+    }
+}
+
 /// The task's end of what it shares with the hub.
 pub(super) struct End {
     pub(super) client: ClientId,
-    pub(super) listening: Arc<AtomicBool>,
+    pub(super) vitals: Arc<Vitals>,
     pub(super) credits: Arc<Semaphore>,
     pub(super) frames: mpsc::Receiver<Stamped>,
     pub(super) inbox: mpsc::UnboundedSender<HubEvent>,
@@ -75,7 +104,13 @@ struct Connection {
 impl Connection {
     async fn run(&mut self, mut stream: TcpStream) -> io::Result<()> {
         let (mut reader, mut writer) = stream.split();
+        let mut segments = 0;
         loop {
+            segments += 1;
+            if segments > SEGMENTS_A_TURN {
+                segments = 0;
+                tokio::task::yield_now().await;
+            }
             self.read_requests();
             self.fill_segment();
             let has_input = self.consumed < self.input.len() || self.waiting.is_some();
@@ -94,6 +129,7 @@ impl Connection {
                 read = reader.read_buf(&mut self.input), if wants_input => {
                     self.at_end = read? == 0;
                     self.quiet_until = None;
+                    self.end.vitals.spoke_at.store(self.end.clock.now().as_nanos(), Ordering::Relaxed);
                 }
                 credit = self.end.credits.acquire(), if self.waiting.is_some() => {
                     if let (Ok(credit), Some(frame)) = (credit, self.waiting.take()) {
@@ -122,7 +158,7 @@ impl Connection {
                 self.input.clear();
                 self.consumed = 0;
             }
-            self.end.listening.store(self.session.is_listening(), Ordering::Relaxed);
+            self.end.vitals.listening.store(self.session.is_listening(), Ordering::Relaxed);
         }
     }
 

@@ -4,7 +4,9 @@
 //! on the wire, and when the wire has carried a frame tells everybody with [`Hub::broadcast`]; the sender does not hear its
 //! own. A client may have 64 frames that were neither broadcast nor discarded; then its connection is not read, so that a
 //! client that sends faster than the bus is slowed down and no queue grows. A client that does not read is disconnected
-//! when 16,384 frames wait for it; it never holds up the bus or the others.
+//! when 16,384 frames wait for it; it never holds up the bus or the others. Reading what clients send is done in small turns,
+//! so that neither the bus nor another client waits for one that sends a lot. When 256 clients are there, the next takes the
+//! place of the one that matters least: one that does not listen, or else the one that has been silent for the longest.
 
 mod client;
 mod session;
@@ -12,7 +14,6 @@ mod session;
 use std::fmt;
 use std::io;
 use std::net::SocketAddr;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -24,7 +25,7 @@ use tokio::task::AbortHandle;
 use crate::slcan::SlcanSession;
 use crate::socketcand::SocketcandSession;
 use crate::{AsyncBus, BusError, Protocol, ServeSpec, WallClock};
-use client::Stamped;
+use client::{Stamped, Vitals};
 pub(crate) use session::{MAX_WAITING_REPLIES, Session};
 
 /// Frames of one client that may wait for the wire: the send queue of its controller. Linux gives an interface 10; a
@@ -33,6 +34,9 @@ const MAX_FRAMES_IN_FLIGHT: usize = 64;
 
 /// Frames that may wait for one client besides what the sockets buffer: 2 s of a full bus at 1 Mbit/s.
 const MAX_FRAMES_WAITING: usize = 16_384;
+
+/// Clients served at a time, well below the 1024 files that a process may have open by default.
+const MAX_CLIENTS: usize = 256;
 
 /// Pause after a failed accept (out of file descriptors): the clients that are there go on.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
@@ -130,6 +134,8 @@ pub enum LeaveReason {
     Broken,
     /// It did not read for so long that too many frames waited for it.
     TooSlow,
+    /// It made room for another: it did not listen, or was silent for the longest, and there were too many.
+    Displaced,
 }
 
 /// Serves one bus on any number of listeners. Dropping it ends every connection.
@@ -197,7 +203,7 @@ impl Hub {
                 client.credits.add_permits(1);
                 return true;
             }
-            let kept = !client.listening.load(Ordering::Relaxed)
+            let kept = !client.vitals.is_listening()
                 || !matches!(
                     client.outgoing.try_send(Stamped { at, frame: *frame }),
                     Err(mpsc::error::TrySendError::Full(_))
@@ -264,7 +270,7 @@ struct Clients {
 #[derive(Debug)]
 struct Client {
     id: ClientId,
-    listening: Arc<AtomicBool>,
+    vitals: Arc<Vitals>,
     credits: Arc<Semaphore>,
     outgoing: mpsc::Sender<Stamped>,
     task: AbortHandle,
@@ -289,15 +295,18 @@ impl Shared {
         if clients.closed {
             return;
         }
+        if clients.list.len() >= MAX_CLIENTS {
+            self.displace_one(&mut clients);
+        }
         clients.last_id += 1;
         let id = ClientId(clients.last_id);
         let (outgoing, frames) = mpsc::channel(MAX_FRAMES_WAITING);
-        let listening = Arc::new(AtomicBool::new(false));
+        let vitals = Arc::new(Vitals::new(self.clock.now()));
         let credits = Arc::new(Semaphore::new(MAX_FRAMES_IN_FLIGHT));
         self.tell(HubEvent::Joined { client: id, protocol, peer });
         let end = client::End {
             client: id,
-            listening: Arc::clone(&listening),
+            vitals: Arc::clone(&vitals),
             credits: Arc::clone(&credits),
             frames,
             inbox: self.inbox.clone(),
@@ -313,7 +322,16 @@ impl Shared {
                 shared.forget(id, reason);
             }
         });
-        clients.list.push(Client { id, listening, credits, outgoing, task: task.abort_handle() });
+        clients.list.push(Client { id, vitals, credits, outgoing, task: task.abort_handle() });
+    }
+
+    fn displace_one(&self, clients: &mut Clients) {
+        let least = (0..clients.list.len()).min_by_key(|place| clients.list[*place].vitals.rank());
+        if let Some(place) = least {
+            let client = clients.list.remove(place);
+            client.task.abort();
+            self.tell(HubEvent::Left { client: client.id, reason: LeaveReason::Displaced });
+        }
     }
 
     fn forget(&self, id: ClientId, reason: LeaveReason) {

@@ -6,7 +6,7 @@ use std::time::Duration;
 use can::{Frame, Instant};
 use tokio::sync::mpsc;
 
-use crate::{ClientId, Hub, HubEvent, WallClock};
+use crate::{ClientId, Hub, HubEvent, LeaveReason, WallClock};
 
 /// How far a world is moved past its next deadline in one go. A world that is late (the machine was busy, the process was
 /// stopped) catches up in steps of this length, between which clients and commands are served; one with nothing due is
@@ -30,6 +30,17 @@ pub trait RealTimeWorld {
 
     /// The next thing that became of a frame, in the order of time. Everything injected comes out here once.
     fn take_heard(&mut self) -> Option<Heard>;
+
+    /// A client is gone. Nothing more is injected for it; what was before still counts.
+    fn left(&mut self, client: ClientId, reason: LeaveReason) {
+        let _ = (client, reason);
+    }
+
+    /// How far the world is behind the clock, told at every turn of the loop and before every command: next to nothing
+    /// while the machine keeps up.
+    fn set_lag(&mut self, lag: Duration) {
+        let _ = lag;
+    }
 }
 
 /// What became of a frame in a world.
@@ -110,6 +121,8 @@ fn catch_up(world: &mut impl RealTimeWorld, hub: &Hub, clock: &WallClock) -> boo
         None => now,
     };
     world.advance_to(target);
+    // The clock goes on while the world computes, so that a world which takes longer than it gains shows that here.
+    world.set_lag(clock.now() - target);
     tell(world, hub);
     target < now
 }
@@ -124,7 +137,9 @@ fn tell(world: &mut impl RealTimeWorld, hub: &Hub) {
 }
 
 fn take_in(world: &mut impl RealTimeWorld, event: HubEvent) {
-    if let HubEvent::Frame { client, frame } = event {
-        world.inject(client, &frame);
+    match event {
+        HubEvent::Frame { client, frame } => world.inject(client, &frame),
+        HubEvent::Left { client, reason } => world.left(client, reason),
+        HubEvent::Joined { .. } => {}
     }
 }
