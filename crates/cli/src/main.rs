@@ -15,6 +15,7 @@ mod models;
 mod output;
 mod paint;
 mod parse;
+mod plain;
 mod plot;
 mod progress;
 mod readings;
@@ -35,6 +36,7 @@ use crate::context::Context;
 use crate::failure::{Failure, FailureReport};
 use crate::output::{Format, Report};
 use crate::paint::Paint;
+use crate::plain::plain;
 
 fn main() -> ExitCode {
     let parsed = Cli::command().try_get_matches().and_then(|matches| {
@@ -85,7 +87,7 @@ fn complain(format: Format, failure: &Failure) {
     }
     let error = Paint::for_stream(&io::stderr()).bad("error:");
     // Nobody may be listening any more; the exit status still tells.
-    let _ = writeln!(io::stderr(), "{error} {failure}");
+    let _ = writeln!(io::stderr(), "{error} {}", plain(&failure.to_string()));
 }
 
 /// True if the bus was given on the command line, not by the environment.

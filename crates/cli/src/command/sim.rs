@@ -2,18 +2,14 @@
 
 use std::collections::BTreeSet;
 use std::fs::File;
-use std::io::{self, BufRead, BufWriter, Write};
-use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::time::Duration;
 
 use can::Bitrate;
 use sim::World;
 use tokio::sync::mpsc;
-use transport::log::LogWriter;
 use transport::{
-    AsyncBus, BusSpec, Hub, HubOptions, ModbusRequest, ModbusServer, ModbusSpec, Protocol, ServeSpec, SocketcandBus,
-    WallClock, run_world,
+    AsyncBus, BusSpec, Hub, HubOptions, ModbusServer, ModbusSpec, Protocol, ServeSpec, SocketcandBus, WallClock,
+    run_world,
 };
 
 use crate::args::Global;
@@ -21,11 +17,13 @@ use crate::embedded;
 use crate::failure::Failure;
 use crate::parse::drive_spec::{DriveSpec, drive_spec};
 use crate::serve::eeprom::{EepromError, Eeproms};
+use crate::serve::files::create_log;
+use crate::serve::frame_log::FrameLog;
 use crate::serve::keeper::{Keeper, file_name};
-use crate::serve::registers;
+use crate::serve::service::{Request, Service, listen_to_signals, read_lines, tick};
+use crate::serve::speaker::Speaker;
 use crate::serve::world::ServedWorld;
-use crate::session::{bus_failure, failure_of, runtime};
-use crate::signals::{Signal, Signals};
+use crate::session::{bus_failure, failure_of};
 
 /// Run virtual drives in real time, for other programs
 ///
@@ -36,7 +34,7 @@ use crate::signals::{Signal, Signals};
     4 power off|on|cycle      4 input X0 1              4 switch X0 -5000 max\n  \
     4 load torque 2.5         4 load inertia 0.02       4 rotor lock|free\n  \
     4 supply 48               4 temperature motor 95    4 fault hall on\n  \
-    4 cable cut|join          4 get                     now, quit\n\
+    4 cable cut|join          4 get                     now, help, quit\n\
     Of the joints, here node 1:\n  \
     1 battery off|on          1 pulses 8192 10000       1 quadrature -400 1000\n  \
     1 duty 40                 1 clock 10000\n\n\
@@ -70,32 +68,15 @@ pub(crate) struct Sim {
     log: Option<PathBuf>,
 }
 
-/// How often EEPROM contents and the log are brought to the disk.
-const KEEPING_INTERVAL: Duration = Duration::from_millis(100);
+/// What a simulator says that nobody can reach.
+const NOBODY: &str = "note: no program can reach these drives: give --serve socketcand://127.0.0.1:29536, or --modbus, or \
+                      --bus to join a bus. World commands on standard input are answered all the same";
 
-/// Lines of standard input that may wait.
-const LINES_WAITING: usize = 64;
+/// Requests that may wait.
+const REQUESTS_WAITING: usize = 64;
 
-enum Request {
-    Line(String),
-    Keep,
-    Registers(ModbusRequest),
-    Ended(Signal),
-    BridgeLost(Failure),
-}
-
-impl From<ModbusRequest> for Request {
-    fn from(request: ModbusRequest) -> Self {
-        Self::Registers(request)
-    }
-}
-
-/// What a running simulation writes to the disk.
-struct Records {
-    keeper: Option<Keeper>,
-    log: Option<LogWriter<BufWriter<File>>>,
-    unix_zero: Duration,
-}
+/// Tasks of clients that run before the world has its turn again; see [`Hub`] on how much each does.
+const TASKS_A_TURN: u32 = 16;
 
 impl Sim {
     /// Runs until `quit`, Ctrl-C or a lost `bridge` (the bus given with `--bus` beside `sim`).
@@ -106,21 +87,20 @@ impl Sim {
                 .because("it makes a virtual bus itself, and joins it to a live one only")
                 .next("leave --bus away, or give e.g. --bus socketcand://HOST:29536/can0"));
         }
+        let warnings = Speaker::of_warnings();
         let eeproms = self.state.as_deref().map(Eeproms::open).transpose()?;
         let mut world = World::new(self.bitrate, self.seed);
         for spec in &self.drives {
-            self.add_drive(&mut world, spec, eeproms.as_ref())?;
+            self.add_drive(&mut world, spec, eeproms.as_ref(), &warnings)?;
         }
-        let log = self.log.as_ref().map(File::create).transpose().map_err(|error| {
+        let log = self.log.as_deref().map(create_log).transpose().map_err(|error| {
             Failure::new(format!("cannot write the log {}", self.log.clone().unwrap_or_default().display()))
                 .because(error)
         })?;
-        let keeper = eeproms.map(|eeproms| Keeper::start(eeproms, &mut world));
-        let log = log.map(|file| LogWriter::new(BufWriter::new(file), "can0"));
-        let world = ServedWorld::new(world, log.is_some());
-        let runtime = runtime()?;
-        let ended =
-            runtime.block_on(self.serve(world, Records { keeper, log, unix_zero: Duration::ZERO }, global, bridge));
+        let world = ServedWorld::new(world, log.is_some(), warnings.clone());
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().event_interval(TASKS_A_TURN).build();
+        let runtime = runtime.map_err(|error| Failure::new("cannot start the runtime").because(error))?;
+        let ended = runtime.block_on(self.serve(world, eeproms, log, warnings, global, bridge));
         // Threads that wait for standard input must not hold up the end.
         runtime.shutdown_background();
         ended
@@ -136,29 +116,61 @@ impl Sim {
         }
     }
 
-    fn add_drive(&self, world: &mut World, spec: &DriveSpec, eeproms: Option<&Eeproms>) -> Result<(), Failure> {
+    fn add_drive(
+        &self,
+        world: &mut World,
+        spec: &DriveSpec,
+        eeproms: Option<&Eeproms>,
+        warnings: &Speaker,
+    ) -> Result<(), Failure> {
         let mut drive = embedded::ordered_drive(spec.model, &spec.order(self.bitrate))?;
-        let name = file_name(spec.model.model, spec.node.raw());
-        if let Some(image) = eeproms.map(|eeproms| eeproms.load(&name, spec.model.model)).transpose()?.flatten() {
-            drive.load_nvm(&image).map_err(|error| {
+        let number = spec.node.raw();
+        let name = file_name(spec.model.model, number);
+        let image = eeproms.map(|eeproms| eeproms.load(&name, spec.model.model)).transpose()?.flatten();
+        if let Some(image) = &image {
+            drive.load_nvm(image).map_err(|error| {
                 Failure::new(format!("the EEPROM contents kept for {name} cannot be used")).because(error)
             })?;
         }
-        world.add_drive(spec.node.raw(), drive).map_err(|error| Failure::usage(error.to_string()))?;
+        world.add_drive(number, drive).map_err(|error| Failure::usage(error.to_string()))?;
+        if image.is_some() {
+            self.note_what_the_image_changes(world, number, &name, warnings);
+        }
         Ok(())
+    }
+
+    /// Says it if a drive is not where the command line puts it, because its EEPROM contents say otherwise.
+    fn note_what_the_image_changes(&self, world: &mut World, number: u8, name: &str, warnings: &Speaker) {
+        let found = world.with_drive(number, |drive, _| (drive.bitrate(), drive.report().node));
+        let Ok((bitrate, node)) = found else { return };
+        if let Some(bitrate) = bitrate.filter(|bitrate| *bitrate != self.bitrate) {
+            warnings.say(&format!(
+                "warning: {name} is off the bus: its EEPROM contents say {bitrate}, and the bus has {}",
+                self.bitrate
+            ));
+        }
+        if node != number {
+            warnings.say(&format!(
+                "note: {name} is node {node} on the bus, as its EEPROM contents say; world commands call it {number}"
+            ));
+        }
     }
 
     async fn serve(
         &self,
         mut world: ServedWorld,
-        mut records: Records,
+        eeproms: Option<Eeproms>,
+        log: Option<File>,
+        warnings: Speaker,
         global: &Global,
         bridge: Option<&BusSpec>,
     ) -> Result<(), Failure> {
         let clock = WallClock::start();
-        // Whoever has read `ready` may ask for the end.
-        let signals = Signals::listen();
-        records.unix_zero = clock.unix_zero();
+        let (requests, mut incoming) = mpsc::channel(REQUESTS_WAITING);
+        listen_to_signals(requests.clone());
+        let answers = Speaker::of_answers(warnings.clone());
+        let log = log.map(|file| FrameLog::start(file, clock.unix_zero(), warnings.clone()));
+        let mut service = Service { answers: answers.clone(), warnings: warnings.clone(), log };
         let outer = match bridge {
             Some(spec) => Some(spec.open(&clock).await.map_err(|error| bus_failure(global, &error))?),
             None => None,
@@ -169,31 +181,36 @@ impl Sim {
         }
         let options = HubOptions { bitrate: Some(self.bitrate), zero: clock.unix_zero(), ..HubOptions::default() };
         let mut hub = Hub::bind(&places, options, &clock).await.map_err(|error| failure_of(&error))?;
-        let (requests, mut incoming) = mpsc::channel(LINES_WAITING);
         let modbus = self.serve_registers(&requests, &clock).await?;
         if let (Some(outer), Some(inner)) = (outer, hub.listeners().last()) {
             let inner = inner.address.to_string();
             tokio::spawn(join_buses(outer, inner, clock.clone(), requests.clone(), global.clone()));
         }
-        let listeners = hub.listeners()[..self.places.len()].iter().map(|listener| format!(" {listener}"));
-        say(&format!(
-            "ready{}{}{}",
-            listeners.collect::<String>(),
-            modbus.as_ref().map(|server| format!(" {}", server.place())).unwrap_or_default(),
-            bridge.map(|bus| format!(" {bus}")).unwrap_or_default()
-        ));
-        tokio::spawn(tick(requests.clone(), clock.clone(), signals));
-        std::thread::spawn(move || read_lines(&requests));
-        let ended = run_world(&mut world, &mut hub, &clock, &mut incoming, |world, request| {
-            answer(world, request, &mut records)
-        })
-        .await;
-        records.keep(&mut world);
-        records.finish().and(ended)
+        if let Some(eeproms) = eeproms {
+            let stored = requests.clone();
+            // A full queue wakes the loop as well.
+            world.keep_stores(Keeper::start(eeproms, warnings, move || drop(stored.try_send(Request::Stored))));
+        }
+        answers.say(&self.ready(&hub, modbus.as_ref(), bridge));
+        if self.places.is_empty() && modbus.is_none() && bridge.is_none() {
+            service.warnings.say(NOBODY);
+        }
+        tokio::spawn(tick(requests.clone(), clock.clone()));
+        std::thread::spawn(move || read_lines(&requests, &answers));
+        let serving =
+            run_world(&mut world, &mut hub, &clock, &mut incoming, |world, request| service.serve(world, request));
+        let ended = serving.await;
+        service.part(&mut world, ended)
     }
-}
 
-impl Sim {
+    /// The line that tells where the bus can be reached.
+    fn ready(&self, hub: &Hub, modbus: Option<&ModbusServer>, bridge: Option<&BusSpec>) -> String {
+        let listeners = hub.listeners()[..self.places.len()].iter().map(|listener| format!(" {listener}"));
+        let modbus = modbus.map(|server| format!(" {}", server.place()));
+        let bridge = bridge.map(|bus| format!(" {bus}"));
+        ["ready".to_owned()].into_iter().chain(listeners).chain(modbus).chain(bridge).collect()
+    }
+
     /// The server of `--modbus`, listening.
     async fn serve_registers(
         &self,
@@ -206,96 +223,16 @@ impl Sim {
     }
 }
 
-/// Serves one request; breaks when it was the last.
-fn answer(world: &mut ServedWorld, request: Request, records: &mut Records) -> ControlFlow<Result<(), Failure>> {
-    match request {
-        Request::Line(line) => {
-            if let Some(answer) = sim::command::answer(world.world_mut(), &line) {
-                if answer.quit {
-                    // What was stored is on the disk when the answer is read.
-                    records.keep(world);
-                    let kept = records.finish();
-                    say(&answer.json);
-                    return ControlFlow::Break(kept);
-                }
-                say(&answer.json);
-            }
-            ControlFlow::Continue(())
-        }
-        Request::Registers(request) => {
-            registers::answer(world.world_mut(), request);
-            ControlFlow::Continue(())
-        }
-        Request::Keep => {
-            records.keep(world);
-            ControlFlow::Continue(())
-        }
-        Request::Ended(signal) => ControlFlow::Break(Err(Failure::ended_by(signal))),
-        Request::BridgeLost(failure) => ControlFlow::Break(Err(failure)),
-    }
-}
-
-impl Records {
-    /// Brings to the disk what has happened since the last time.
-    fn keep(&mut self, world: &mut ServedWorld) {
-        if let Some(keeper) = &mut self.keeper {
-            keeper.look(world.world_mut());
-        }
-        let Some(log) = &mut self.log else { return };
-        let lines = world.take_carried();
-        let written = lines.iter().try_for_each(|(at, frame)| log.write(*at + self.unix_zero, frame));
-        if let Err(error) = written.and_then(|()| log.flush()) {
-            // The drives are worth more than their log.
-            let _ = writeln!(io::stderr(), "warning: cannot write the log: {error}; it ends here");
-            self.log = None;
-        }
-    }
-
-    /// Waits until EEPROM contents are on the disk.
-    fn finish(&mut self) -> Result<(), Failure> {
-        self.keeper.take().map_or(Ok(()), |keeper| keeper.finish().map_err(Failure::from))
-    }
-}
-
 impl From<EepromError> for Failure {
     fn from(error: EepromError) -> Self {
         let failure = Self::new(error.to_string());
         match error {
             EepromError::Corrupt(..) => failure.next("move the file away to start this drive factory-fresh"),
+            EepromError::File(..) => {
+                failure.next("put a regular file of ours there, or none, and see that it can be written")
+            }
             EepromError::InUse(_) => failure.next("end the other simulator, or give another --state directory"),
             _ => failure,
-        }
-    }
-}
-
-/// One line on standard output, at once. The drives run on if nobody reads.
-fn say(line: &str) {
-    let mut out = io::stdout().lock();
-    let _ = writeln!(out, "{line}").and_then(|()| out.flush());
-}
-
-/// Hands over the lines of standard input; ends with it.
-fn read_lines(requests: &mpsc::Sender<Request>) {
-    let mut input = io::stdin().lock();
-    let mut line = Vec::new();
-    while input.read_until(b'\n', &mut line).is_ok_and(|length| length > 0) {
-        let text = String::from_utf8_lossy(&line).into_owned();
-        line.clear();
-        if requests.blocking_send(Request::Line(text)).is_err() {
-            return;
-        }
-    }
-}
-
-/// Asks for records to be kept, and tells of a signal to end.
-async fn tick(requests: mpsc::Sender<Request>, clock: WallClock, mut signals: Signals) {
-    loop {
-        let (request, over) = tokio::select! {
-            signal = signals.next() => (Request::Ended(signal), true),
-            () = clock.sleep(KEEPING_INTERVAL) => (Request::Keep, false),
-        };
-        if requests.send(request).await.is_err() || over {
-            return;
         }
     }
 }

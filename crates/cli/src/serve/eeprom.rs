@@ -1,19 +1,26 @@
 //! EEPROM images on disk, one file a drive: at any moment the old contents or the new ones, never a mixture.
 //!
 //! A file is written beside its place, brought to the disk, and renamed over it. It begins with a line that names the
-//! model, and a checksum guards its bytes: a file that is not what was written is reported, never used.
+//! model, and a checksum guards its bytes: a file that is not what was written is reported, never used. The directory
+//! itself is locked, so that no file can be removed to get around the lock, and it is looked at before each use: in a
+//! directory that has taken its place nothing is written.
 
-use std::fs::{self, File};
+use std::fs::{self, File, Metadata};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use super::files::{create_new, identity, read_bounded};
+
 const MAGIC: &str = "ferrodrive eeprom 1";
+
+/// Longest file that is read: many times an image.
+const MAX_LENGTH: u64 = 64 * 1024;
 
 /// The directory of `--state`, locked against a second simulator.
 #[derive(Debug)]
 pub(crate) struct Eeproms {
     directory: PathBuf,
-    _lock: File,
+    lock: File,
 }
 
 /// Why images cannot be kept or used.
@@ -23,6 +30,8 @@ pub(crate) enum EepromError {
     Directory(PathBuf, io::Error),
     /// Another simulator has the directory.
     InUse(PathBuf),
+    /// The directory was removed, or another has its name.
+    Replaced(PathBuf),
     /// A file cannot be read or written.
     File(PathBuf, io::Error),
     /// A file is not what was written.
@@ -34,6 +43,7 @@ impl std::fmt::Display for EepromError {
         match self {
             Self::Directory(path, error) => write!(f, "cannot use the state directory {}: {error}", path.display()),
             Self::InUse(path) => write!(f, "the state directory {} is in use by another simulator", path.display()),
+            Self::Replaced(path) => write!(f, "the state directory {} was removed or exchanged", path.display()),
             Self::File(path, error) => write!(f, "{}: {error}", path.display()),
             Self::Corrupt(path, reason) => write!(f, "the EEPROM file {} is corrupt: {reason}", path.display()),
         }
@@ -41,51 +51,103 @@ impl std::fmt::Display for EepromError {
 }
 
 impl Eeproms {
-    /// Opens or makes the directory.
+    /// Opens or makes the directory. A last symbolic link is not followed.
     pub(crate) fn open(directory: &Path) -> Result<Self, EepromError> {
-        let failed = |error| EepromError::Directory(directory.into(), error);
-        fs::create_dir_all(directory).map_err(failed)?;
-        let lock = File::create(directory.join("lock")).map_err(failed)?;
-        match lock.try_lock() {
-            Ok(()) => Ok(Self { directory: directory.into(), _lock: lock }),
-            Err(fs::TryLockError::WouldBlock) => Err(EepromError::InUse(directory.into())),
-            Err(fs::TryLockError::Error(error)) => Err(failed(error)),
+        // Without the slashes at its end, behind which a link would be followed.
+        let directory: PathBuf = directory.components().collect();
+        let failed = |error| EepromError::Directory(directory.clone(), error);
+        match fs::symlink_metadata(&directory) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => fs::create_dir_all(&directory).map_err(failed)?,
+            Ok(metadata) if metadata.is_symlink() => {
+                let reason = "it is a symbolic link, and those are not followed here; name the directory itself";
+                return Err(failed(io::Error::new(io::ErrorKind::InvalidInput, reason)));
+            }
+            Ok(metadata) if !metadata.is_dir() => return Err(failed(io::ErrorKind::NotADirectory.into())),
+            Ok(_) => {}
+            Err(error) => return Err(failed(error)),
         }
+        let lock = open_to_lock(&directory).map_err(failed)?;
+        match lock.try_lock() {
+            Ok(()) => {}
+            Err(fs::TryLockError::WouldBlock) => return Err(EepromError::InUse(directory)),
+            Err(fs::TryLockError::Error(error)) => return Err(failed(error)),
+        }
+        let eeproms = Self { directory, lock };
+        eeproms.check_place()?;
+        Ok(eeproms)
     }
 
     /// The image kept for a drive; `None` if there is none yet.
     pub(crate) fn load(&self, drive: &str, model: &str) -> Result<Option<Vec<u8>>, EepromError> {
+        self.check_place()?;
         let path = self.path(drive);
-        match fs::read(&path) {
-            Ok(bytes) => unwrap(&bytes, model).map(Some).map_err(|reason| EepromError::Corrupt(path, reason)),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-            Err(error) => Err(EepromError::File(path, error)),
+        match read_bounded(&path, MAX_LENGTH) {
+            Ok(bytes) => bytes.map(|bytes| unwrap(&bytes, model)).transpose(),
+            Err(error) => return Err(EepromError::File(path, error)),
         }
+        .map_err(|reason| EepromError::Corrupt(path, reason))
     }
 
     /// Keeps an image for a drive; returns when it is on the disk.
     pub(crate) fn store(&self, drive: &str, model: &str, image: &[u8]) -> Result<(), EepromError> {
+        self.check_place()?;
         let path = self.path(drive);
         let temporary = self.directory.join(format!("{drive}.new"));
-        let written = write_synced(&temporary, &wrap(image, model))
+        let failed = |error| EepromError::File(path.clone(), error);
+        let mut file = fresh(&temporary).map_err(|error| EepromError::File(temporary.clone(), error))?;
+        let written = file
+            .write_all(&wrap(image, model))
+            .and_then(|()| file.sync_all())
             .and_then(|()| fs::rename(&temporary, &path))
             .and_then(|()| File::open(&self.directory)?.sync_all());
         written.map_err(|error| {
             // What is left of a failed attempt holds no one's contents and may take the disk's last blocks.
             let _ = fs::remove_file(&temporary);
-            EepromError::File(path, error)
+            failed(error)
         })
     }
 
     fn path(&self, drive: &str) -> PathBuf {
         self.directory.join(format!("{drive}.eeprom"))
     }
+
+    /// That the directory's name still names the directory that is locked.
+    fn check_place(&self) -> Result<(), EepromError> {
+        let named = fs::symlink_metadata(&self.directory).ok().filter(Metadata::is_dir);
+        let locked = self.lock.metadata().ok();
+        if named.is_some_and(|named| identity(&named) == locked.as_ref().and_then(identity)) {
+            Ok(())
+        } else {
+            Err(EepromError::Replaced(self.directory.clone()))
+        }
+    }
 }
 
-fn write_synced(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut file = File::create(path)?;
-    file.write_all(bytes)?;
-    file.sync_all()
+/// The directory itself, where that can be locked.
+#[cfg(unix)]
+fn open_to_lock(directory: &Path) -> io::Result<File> {
+    File::open(directory)
+}
+
+/// A file in the directory.
+#[cfg(not(unix))]
+fn open_to_lock(directory: &Path) -> io::Result<File> {
+    File::create(directory.join("lock"))
+}
+
+/// A new file at `path`, where nothing may be but what an attempt that was cut short has left there.
+fn fresh(path: &Path) -> io::Result<File> {
+    match create_new(path) {
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+        created => return created,
+    }
+    let left = read_bounded(path, MAX_LENGTH)?.unwrap_or_default();
+    let common = left.len().min(MAGIC.len());
+    if left[..common] != MAGIC.as_bytes()[..common] {
+        return Err(io::Error::new(io::ErrorKind::AlreadyExists, "it is in the way, and no EEPROM file; move it away"));
+    }
+    fs::remove_file(path)?;
+    create_new(path)
 }
 
 /// Heading line, CRC-32 of the image, image.
@@ -126,12 +188,7 @@ fn crc32(bytes: &[u8]) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn scratch(name: &str) -> PathBuf {
-        let path = std::env::temp_dir().join(format!("ferrodrive-eeprom-{}-{name}", std::process::id()));
-        let _ = fs::remove_dir_all(&path);
-        path
-    }
+    use crate::serve::scratch;
 
     #[test]
     fn crc_matches_the_published_check_value() {
@@ -162,11 +219,70 @@ mod tests {
         assert!(unwrap(&sound, "zlim42c").is_err());
     }
 
+    #[cfg(unix)]
     #[test]
-    fn two_simulators_cannot_share_a_directory() {
+    fn two_simulators_cannot_share_a_directory_whatever_is_removed_from_it() {
         let path = scratch("shared");
-        let _first = Eeproms::open(&path).unwrap();
+        let first = Eeproms::open(&path).unwrap();
+        first.store("a@1", "a", b"one").unwrap();
         assert!(matches!(Eeproms::open(&path), Err(EepromError::InUse(_))));
+        for entry in fs::read_dir(&path).unwrap() {
+            fs::remove_file(entry.unwrap().path()).unwrap();
+        }
+        assert!(matches!(Eeproms::open(&path), Err(EepromError::InUse(_))));
+        // With the directory itself gone a second one is free to begin, and the first writes there no more.
+        fs::remove_dir(&path).unwrap();
+        let second = Eeproms::open(&path).unwrap();
+        assert!(matches!(first.store("a@1", "a", b"two"), Err(EepromError::Replaced(_))));
+        assert_eq!(second.load("a@1", "a").unwrap(), None);
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_and_files_of_others_are_left_alone() {
+        use std::os::unix::fs::symlink;
+        let path = scratch("foreign");
+        let (state, link) = (path.join("state"), path.join("link"));
+        fs::create_dir(&state).unwrap();
+        symlink(&state, &link).unwrap();
+        for name in [link.clone(), link.join("")] {
+            assert!(matches!(Eeproms::open(&name), Err(EepromError::Directory(..))), "{}", name.display());
+        }
+        let eeproms = Eeproms::open(&state).unwrap();
+        let victim = path.join("victim");
+        fs::write(&victim, "precious").unwrap();
+        symlink(&victim, state.join("a@1.new")).unwrap();
+        assert!(matches!(eeproms.store("a@1", "a", b"new"), Err(EepromError::File(..))));
+        symlink(&victim, state.join("b@1.eeprom")).unwrap();
+        assert!(matches!(eeproms.load("b@1", "b"), Err(EepromError::File(..))));
+        fs::write(state.join("c@1.new"), "precious").unwrap();
+        assert!(matches!(eeproms.store("c@1", "c", b"new"), Err(EepromError::File(..))));
+        assert_eq!(fs::read(state.join("c@1.new")).unwrap(), b"precious");
+        assert_eq!(fs::read(&victim).unwrap(), b"precious");
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    #[test]
+    fn what_a_kill_has_left_of_a_new_file_is_in_nobodys_way() {
+        let path = scratch("torn");
+        let eeproms = Eeproms::open(&path).unwrap();
+        let whole = wrap(b"image", "a");
+        for length in [0, 5, MAGIC.len(), whole.len() - 1, whole.len()] {
+            fs::write(path.join("a@1.new"), &whole[..length]).unwrap();
+            eeproms.store("a@1", "a", b"new").unwrap();
+        }
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    #[test]
+    fn a_file_that_is_far_too_long_is_not_read() {
+        let path = scratch("long");
+        let eeproms = Eeproms::open(&path).unwrap();
+        // 3 GB that take no room.
+        File::create(path.join("a@1.eeprom")).and_then(|file| file.set_len(3 << 30)).unwrap();
+        let refused = eeproms.load("a@1", "a").unwrap_err().to_string();
+        assert!(refused.contains("a@1.eeprom") && refused.contains("longer than 65536 bytes"), "{refused}");
         fs::remove_dir_all(path).unwrap();
     }
 

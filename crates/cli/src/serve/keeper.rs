@@ -1,70 +1,71 @@
 //! Brings EEPROM contents to the disk while the simulation runs.
 //!
-//! The world is looked at every now and then; a drive whose memory has changed has its image handed to a thread of its
-//! own, so that a slow disk does not hold up the bus. What cannot be written (disk full) is reported and tried again.
+//! A thread of its own writes what it is handed, so that a slow disk does not hold up the bus; of several contents of one
+//! drive only the newest. What is on the disk is told back, so that the drive's answer may go out. What cannot be written
+//! (disk full) is said and tried again; the answer then goes out all the same.
 
 use std::collections::BTreeMap;
-use std::io::{self, Write};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::thread::JoinHandle;
+use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use sim::World;
+use sim::StoredImage;
 
 use super::eeprom::{EepromError, Eeproms};
+use super::speaker::Speaker;
 
 /// How long after a failed attempt the next one is made.
 const RETRY_INTERVAL: Duration = Duration::from_millis(500);
 
-/// Images by drive, newest only.
-type Images = BTreeMap<String, Image>;
-
-struct Image {
-    model: &'static str,
-    bytes: Vec<u8>,
-}
-
 /// See the [module](self).
 pub(crate) struct Keeper {
-    /// The generation last handed over, by drive number.
-    generations: BTreeMap<u8, u64>,
-    images: Sender<(String, Image)>,
-    writer: JoinHandle<Result<(), EepromError>>,
+    desk: Arc<Desk>,
+    /// How the last attempts went, when it is over.
+    outcome: Receiver<Result<(), EepromError>>,
+}
+
+#[derive(Default)]
+struct Desk {
+    papers: Mutex<Papers>,
+    changed: Condvar,
+}
+
+#[derive(Default)]
+struct Papers {
+    /// To be written, by drive number.
+    waiting: BTreeMap<u8, StoredImage>,
+    /// Written, or told to be unwritable: drive number and which store.
+    settled: Vec<(u8, u64)>,
+    over: bool,
 }
 
 impl Keeper {
-    /// Begins with the drives of `world` as kept: their images come from `eeproms` or are factory-fresh.
-    pub(crate) fn start(eeproms: Eeproms, world: &mut World) -> Self {
-        let (images, incoming) = channel();
-        let writer = std::thread::spawn(move || write_all(&eeproms, &incoming));
-        let numbers: Vec<u8> = world.drive_numbers().collect();
-        let generation = |number| world.with_drive(number, |drive, _| drive.nvm_generation()).unwrap_or(0);
-        let generations = numbers.iter().copied().zip(numbers.iter().copied().map(generation)).collect();
-        Self { generations, images, writer }
+    /// Writes to `eeproms` from now on. `settled` is called when there is something for [`take_settled`](Self::take_settled).
+    pub(crate) fn start(eeproms: Eeproms, speaker: Speaker, settled: impl Fn() + Send + 'static) -> Self {
+        let desk = Arc::new(Desk::default());
+        let (done, outcome) = channel();
+        let served = Arc::clone(&desk);
+        std::thread::spawn(move || done.send(served.write_all(&eeproms, &speaker, settled)));
+        Self { desk, outcome }
     }
 
-    /// Hands over what has changed since the last look.
-    pub(crate) fn look(&mut self, world: &mut World) {
-        for (number, known) in &mut self.generations {
-            let changed = world.with_drive(*number, |drive, now| {
-                drive.advance(now);
-                let generation = drive.nvm_generation();
-                let model = drive.model();
-                (generation != *known).then(|| (generation, Image { model, bytes: drive.nvm_image() }))
-            });
-            if let Ok(Some((generation, image))) = changed {
-                *known = generation;
-                // The writer ends only after this sender.
-                let _ = self.images.send((file_name(image.model, *number), image));
-            }
-        }
+    /// Has an image brought to the disk.
+    pub(crate) fn hand_over(&self, image: StoredImage) {
+        self.desk.lock().waiting.insert(image.number, image);
+        self.desk.changed.notify_one();
     }
 
-    /// Returns when everything is on the disk, or with the reason why it cannot be.
-    pub(crate) fn finish(self) -> Result<(), EepromError> {
-        drop(self.images);
-        // A panic of the writer has been reported by itself.
-        self.writer.join().unwrap_or(Ok(()))
+    /// The stores that need not be waited for any more, by drive number.
+    pub(crate) fn take_settled(&self) -> Vec<(u8, u64)> {
+        std::mem::take(&mut self.desk.lock().settled)
+    }
+
+    /// Returns when everything is on the disk, or with the reason why it is not, at most after `patience`; `None` if nothing
+    /// is known by then.
+    pub(crate) fn finish(self, patience: Duration) -> Option<Result<(), EepromError>> {
+        self.desk.lock().over = true;
+        self.desk.changed.notify_one();
+        self.outcome.recv_timeout(patience).ok()
     }
 }
 
@@ -73,41 +74,112 @@ pub(crate) fn file_name(model: &str, number: u8) -> String {
     format!("{model}@{number}")
 }
 
-fn write_all(eeproms: &Eeproms, incoming: &Receiver<(String, Image)>) -> Result<(), EepromError> {
-    let mut waiting = Images::new();
-    let mut reported = String::new();
-    loop {
-        let received = if waiting.is_empty() {
-            incoming.recv().map_err(|_| RecvTimeoutError::Disconnected)
-        } else {
-            incoming.recv_timeout(RETRY_INTERVAL)
-        };
-        let over = matches!(received, Err(RecvTimeoutError::Disconnected));
-        waiting.extend(received.into_iter().chain(incoming.try_iter()));
-        match write_waiting(eeproms, &mut waiting) {
-            Some(error) if over => return Err(error),
-            // Said once for each reason, not twice a second.
-            Some(error) if error.to_string() != reported => {
-                reported = error.to_string();
-                let text = format!("warning: {reported}; the file keeps its old contents, trying again");
-                // Without standard error there is nobody to tell.
-                let _ = writeln!(io::stderr(), "{text}");
+impl Desk {
+    fn lock(&self) -> MutexGuard<'_, Papers> {
+        self.papers.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn write_all(&self, eeproms: &Eeproms, speaker: &Speaker, settled: impl Fn()) -> Result<(), EepromError> {
+        let mut failed = None;
+        let mut reported = String::new();
+        loop {
+            let images = match self.next(failed.is_some()) {
+                Some(images) => images,
+                None => return failed.map_or(Ok(()), Err),
+            };
+            failed = None;
+            for (number, image) in images {
+                let generation = image.generation;
+                if let Err(error) = eeproms.store(&file_name(image.model, number), image.model, &image.bytes) {
+                    // Said once for each reason, not twice a second.
+                    if error.to_string() != reported {
+                        reported = error.to_string();
+                        speaker.say(&format!(
+                            "warning: {reported}; the file keeps its old contents, trying again. The drive acknowledges \
+                             the store all the same"
+                        ));
+                    }
+                    failed = Some(error);
+                    self.lock().waiting.entry(number).or_insert(image);
+                }
+                self.lock().settled.push((number, generation));
+                settled();
             }
-            Some(_) => {}
-            None if over => return Ok(()),
-            None => reported.clear(),
+            if failed.is_none() {
+                reported.clear();
+            }
         }
+    }
+
+    /// Waits for something to write, after a failure for some time in any case; `None` when it is over: after a failure
+    /// that is one last attempt later.
+    fn next(&self, after_failure: bool) -> Option<BTreeMap<u8, StoredImage>> {
+        let mut papers = self.lock();
+        let was_over = papers.over;
+        if after_failure {
+            if was_over {
+                return None;
+            }
+            let waited = self.changed.wait_timeout_while(papers, RETRY_INTERVAL, |papers| !papers.over);
+            papers = waited.unwrap_or_else(PoisonError::into_inner).0;
+        }
+        let idle = |papers: &mut Papers| papers.waiting.is_empty() && !papers.over;
+        papers = self.changed.wait_while(papers, idle).unwrap_or_else(PoisonError::into_inner);
+        let images = std::mem::take(&mut papers.waiting);
+        (!images.is_empty()).then_some(images)
     }
 }
 
-fn write_waiting(eeproms: &Eeproms, waiting: &mut Images) -> Option<EepromError> {
-    let mut failed = None;
-    waiting.retain(|drive, image| match eeproms.store(drive, image.model, &image.bytes) {
-        Ok(()) => false,
-        Err(error) => {
-            failed = Some(error);
-            true
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::serve::scratch;
+
+    const SOON: Duration = Duration::from_secs(20);
+
+    fn image(generation: u64) -> StoredImage {
+        StoredImage { number: 1, model: "a", generation, bytes: vec![generation as u8; 8] }
+    }
+
+    #[test]
+    fn what_is_settled_is_on_the_disk() {
+        let place = scratch("settled");
+        let eeproms = Eeproms::open(&place).unwrap();
+        let (wake, woken) = channel();
+        let keeper = Keeper::start(eeproms, Speaker::of_warnings(), move || wake.send(()).expect("the test waits"));
+        for generation in 1..20 {
+            keeper.hand_over(image(generation));
+            woken.recv_timeout(SOON).unwrap();
+            assert_eq!(keeper.take_settled(), [(1, generation)]);
+            let kept = std::fs::read(place.join("a@1.eeprom")).unwrap();
+            assert_eq!(kept[kept.len() - 8..], [generation as u8; 8]);
         }
-    });
-    failed
+        assert!(matches!(keeper.finish(SOON), Some(Ok(()))));
+        std::fs::remove_dir_all(place).unwrap();
+    }
+
+    #[test]
+    fn the_last_image_handed_over_is_on_the_disk_at_the_end() {
+        let place = scratch("newest");
+        let keeper = Keeper::start(Eeproms::open(&place).unwrap(), Speaker::of_warnings(), || {});
+        (1..=100).for_each(|generation| keeper.hand_over(image(generation)));
+        assert!(matches!(keeper.finish(SOON), Some(Ok(()))));
+        assert!(std::fs::read(place.join("a@1.eeprom")).unwrap().ends_with(&[100; 8]));
+        std::fs::remove_dir_all(place).unwrap();
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_settled_and_told_at_the_end() {
+        let place = scratch("unwritable");
+        let (wake, woken) = channel();
+        let keeper = Keeper::start(Eeproms::open(&place).unwrap(), Speaker::of_warnings(), move || {
+            wake.send(()).expect("the test waits")
+        });
+        std::fs::create_dir(place.join("a@1.new")).unwrap();
+        keeper.hand_over(image(3));
+        woken.recv_timeout(SOON).unwrap();
+        assert_eq!(keeper.take_settled(), [(1, 3)]);
+        assert!(matches!(keeper.finish(SOON), Some(Err(EepromError::File(..)))));
+        std::fs::remove_dir_all(place).unwrap();
+    }
 }

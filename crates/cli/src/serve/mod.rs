@@ -1,6 +1,23 @@
-//! Virtual drives for other programs: a served world, EEPROM images on disk.
+//! Virtual drives for other programs: a served world, what is said and written about it, EEPROM images on disk.
 
 pub(crate) mod eeprom;
+pub(crate) mod files;
+pub(crate) mod frame_log;
+mod input;
 pub(crate) mod keeper;
-pub(crate) mod registers;
+mod lag;
+mod registers;
+pub(crate) mod service;
+pub(crate) mod speaker;
+mod stores;
+mod turns;
 pub(crate) mod world;
+
+/// An empty directory of a test's own.
+#[cfg(test)]
+pub(crate) fn scratch(name: &str) -> std::path::PathBuf {
+    let path = std::env::temp_dir().join(format!("ferrodrive-serve-{}-{name}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&path);
+    std::fs::create_dir_all(&path).expect("the temporary directory can be written");
+    path
+}

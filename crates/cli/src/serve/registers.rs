@@ -1,20 +1,20 @@
 //! Modbus requests on a world: which drive a unit is, and what it answers.
 //!
 //! A unit is a drive by the address it uses at present (2615h of an M joint). Requests are served between two steps of
-//! the world, at its present time, as world commands are.
+//! the world, at its present time, as world commands are. Who answers decides when: an answer may stand for a store.
 
 use sim::{RegisterError, World};
 use transport::{ModbusException, ModbusRequest, RegisterAccess, RegisterAnswer};
 
-/// Has `request` answered by the drive that it is for; a broadcast is a write for all of them.
-pub(crate) fn answer(world: &mut World, request: ModbusRequest) {
-    let answer = if request.broadcast { broadcast(world, &request) } else { of_unit(world, &request) };
-    request.answer(answer);
-}
-
-fn of_unit(world: &mut World, request: &ModbusRequest) -> RegisterAnswer {
-    let number = world.modbus_drive(request.unit)?;
-    Some(request.access.as_ref().map_err(|refused| *refused).and_then(|access| carry_out(world, number, access)))
+/// What the drive that `request` is for answers, and that drive's number; a broadcast is a write for all of them, and none
+/// answers.
+pub(crate) fn answer(world: &mut World, request: &ModbusRequest) -> (RegisterAnswer, Option<u8>) {
+    if request.broadcast {
+        return (broadcast(world, request), None);
+    }
+    let Some(number) = world.modbus_drive(request.unit) else { return (None, None) };
+    let access = request.access.as_ref().map_err(|refused| *refused);
+    (Some(access.and_then(|access| carry_out(world, number, access))), Some(number))
 }
 
 /// Each unit takes it or refuses it by itself; a read for all is for nobody.

@@ -1,37 +1,82 @@
 //! A virtual world whose bus is served to other programs: its wire's frames go to clients, theirs go onto its wire.
 //!
-//! All clients share one CAN adapter of the virtual bus, as the clients of a real socketcand server do: their frames
-//! go out in the order they came.
+//! All clients share one CAN adapter of the virtual bus. It is given one frame at a time, each client's in turn, so that
+//! who sends much waits and who sends little does not.
 
 use std::collections::VecDeque;
+use std::time::Duration;
 
 use can::{Frame, Instant};
+use sim::command::{Answer, Service};
 use sim::wire::WireEvent;
 use sim::{StationId, World};
-use transport::{ClientId, Heard, RealTimeWorld};
+use transport::{ClientId, Heard, LeaveReason, ModbusRequest, RealTimeWorld};
+
+use super::eeprom::EepromError;
+use super::keeper::Keeper;
+use super::lag::Lag;
+use super::registers;
+use super::speaker::Speaker;
+use super::stores::Stores;
+use super::turns::Turns;
 
 /// See the [module](self).
 pub(crate) struct ServedWorld {
     world: World,
     adapter: StationId,
-    /// Whose frames wait in the adapter, in the order they go out.
-    waiting: VecDeque<(ClientId, Frame)>,
+    turns: Turns<ClientId>,
+    /// Whose frame the adapter has.
+    offered: Option<ClientId>,
     heard: VecDeque<Heard>,
     /// Frames carried since the last call of [`Self::take_carried`], for a log.
     carried: Option<Vec<(Instant, Frame)>>,
+    stores: Option<Stores>,
+    lag: Lag,
+    frames_lost: u64,
+    displaced: u64,
+    speaker: Speaker,
 }
 
 impl ServedWorld {
-    /// Adds the adapter to `world`. `logged` keeps carried frames for [`Self::take_carried`].
-    pub(crate) fn new(mut world: World, logged: bool) -> Self {
+    /// Adds the adapter to `world`. `logged` keeps carried frames for [`Self::take_carried`]; what is to be said of the
+    /// service goes to `speaker`.
+    pub(crate) fn new(mut world: World, logged: bool, speaker: Speaker) -> Self {
         let adapter = world.add_tap();
-        let carried = logged.then(Vec::new);
-        Self { world, adapter, waiting: VecDeque::new(), heard: VecDeque::new(), carried }
+        Self {
+            world,
+            adapter,
+            turns: Turns::new(),
+            offered: None,
+            heard: VecDeque::new(),
+            carried: logged.then(Vec::new),
+            stores: None,
+            lag: Lag::default(),
+            frames_lost: 0,
+            displaced: 0,
+            speaker,
+        }
     }
 
-    /// The world, to operate on its drives.
-    pub(crate) fn world_mut(&mut self) -> &mut World {
-        &mut self.world
+    /// From now on what drives store is kept, and acknowledged when it is.
+    pub(crate) fn keep_stores(&mut self, keeper: Keeper) {
+        self.stores = Some(Stores::guard(&mut self.world, keeper, self.speaker.clone()));
+    }
+
+    /// Does what a world command says.
+    pub(crate) fn command(&mut self, line: &str) -> Option<Answer> {
+        let service = Service { behind: self.lag.now(), frames_lost: self.frames_lost };
+        sim::command::answer_served(&mut self.world, line, service)
+    }
+
+    /// Has a Modbus request answered.
+    pub(crate) fn serve_registers(&mut self, request: ModbusRequest) {
+        match &mut self.stores {
+            Some(stores) => stores.answer(&mut self.world, request),
+            None => {
+                let (answer, _) = registers::answer(&mut self.world, &request);
+                request.answer(answer);
+            }
+        }
     }
 
     /// Frames carried since the last call.
@@ -39,11 +84,32 @@ impl ServedWorld {
         self.carried.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
-    /// Sorts out what the wire did.
+    /// Finds stores that no frame goes with: a joint notes its position when its supply falls.
+    pub(crate) fn look_for_stores(&mut self) {
+        let Some(stores) = &mut self.stores else { return };
+        let numbers: Vec<u8> = self.world.drive_numbers().collect();
+        for number in numbers {
+            // Only an unknown number is an error.
+            let _ = self.world.with_drive(number, |drive, now| drive.advance(now));
+        }
+        stores.settle(&mut self.world);
+    }
+
+    /// Returns when all stores are on the disk, at most after `patience`; `None` if nothing is known by then. Stores of
+    /// later are not kept.
+    pub(crate) fn finish_stores(&mut self, patience: Duration) -> Option<Result<(), EepromError>> {
+        self.look_for_stores();
+        match self.stores.take() {
+            Some(stores) => stores.finish(&mut self.world, patience),
+            None => Some(Ok(())),
+        }
+    }
+
+    /// Sorts out what the wire did, and gives the adapter its next frame.
     fn collect(&mut self) {
         while let Some(event) = self.world.log_mut().pull() {
             let WireEvent::Frame { end, source, frame, .. } = event else { continue };
-            let from = if source == self.adapter.index() { self.sender(&frame) } else { None };
+            let from = if source == self.adapter.index() { self.offered.take() } else { None };
             self.heard.push_back(Heard::Carried { frame, at: end, from });
             if let Some(carried) = &mut self.carried {
                 carried.push((end, frame));
@@ -51,11 +117,27 @@ impl ServedWorld {
         }
         // What the adapter heard is in the log too.
         while self.world.poll_received(self.adapter).is_some() {}
+        self.offer_next();
     }
 
-    fn sender(&mut self, frame: &Frame) -> Option<ClientId> {
-        let place = self.waiting.iter().position(|(_, waiting)| waiting == frame)?;
-        self.waiting.remove(place).map(|(client, _)| client)
+    fn offer_next(&mut self) {
+        while self.offered.is_none() {
+            let Some((client, frame)) = self.turns.pop() else { return };
+            match self.world.send(self.adapter, frame) {
+                Ok(()) => self.offered = Some(client),
+                Err(_) => self.heard.push_back(Heard::Lost { from: client }),
+            }
+        }
+    }
+
+    fn give_up(&mut self, frames: usize) {
+        if frames > 0 && self.frames_lost == 0 {
+            self.speaker.say(
+                "warning: clients that are gone have left more frames behind than the bus can carry; those are given up \
+                 and counted in the answer to `now`",
+            );
+        }
+        self.frames_lost += frames as u64;
     }
 }
 
@@ -65,22 +147,45 @@ impl RealTimeWorld for ServedWorld {
     }
 
     fn next_deadline(&self) -> Option<Instant> {
-        self.world.next_event()
+        let stores = self.stores.as_ref().and_then(|stores| stores.next_deadline(&self.world));
+        self.world.next_event().into_iter().chain(stores).min()
     }
 
     fn advance_to(&mut self, instant: Instant) {
+        // Step by step, so that the adapter has its next frame before the wire is free again.
+        while self.world.next_event().is_some_and(|at| at <= instant) {
+            self.world.step();
+            self.collect();
+        }
         self.world.run_until(instant);
-        self.collect();
+        if let Some(stores) = &mut self.stores {
+            stores.settle(&mut self.world);
+        }
     }
 
     fn inject(&mut self, client: ClientId, frame: &Frame) {
-        match self.world.send(self.adapter, *frame) {
-            Ok(()) => self.waiting.push_back((client, *frame)),
-            Err(_) => self.heard.push_back(Heard::Lost { from: client }),
-        }
+        self.turns.push(client, *frame);
+        self.offer_next();
     }
 
     fn take_heard(&mut self) -> Option<Heard> {
         self.heard.pop_front()
+    }
+
+    fn left(&mut self, client: ClientId, reason: LeaveReason) {
+        let given_up = self.turns.leave(client);
+        self.give_up(given_up);
+        if reason == LeaveReason::Displaced {
+            if self.displaced == 0 {
+                self.speaker.say("warning: too many clients; those that are idle make room for new ones");
+            }
+            self.displaced += 1;
+        }
+    }
+
+    fn set_lag(&mut self, lag: Duration) {
+        if let Some(text) = self.lag.update(lag) {
+            self.speaker.say(&text);
+        }
     }
 }

@@ -1,6 +1,8 @@
 //! Runs the built `ferrodrive`, for a moment or for a while.
 #![allow(dead_code, reason = "each test file uses its part")]
 
+pub(crate) mod raw_bus;
+
 use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;
 use std::process::{Child, ChildStdin, Command, Stdio};

@@ -1,0 +1,136 @@
+//! Files that outlive this program: read with a bound, and never through what somebody else has put in their place.
+//!
+//! A symbolic link, a device, a FIFO or a directory where a file of ours should be is refused, not followed, not opened.
+//! What was looked at and what was opened are compared, so that a swap in between is noticed.
+
+use std::fs::{self, File, Metadata, OpenOptions};
+use std::io::{self, Read};
+use std::path::Path;
+
+/// What a path names, without following a last symbolic link.
+///
+/// # Errors
+/// The system's, or that it is no regular file, in words that fit after the path.
+fn regular(path: &Path) -> io::Result<Metadata> {
+    let metadata = fs::symlink_metadata(path)?;
+    let kind = metadata.file_type();
+    if kind.is_file() {
+        return Ok(metadata);
+    }
+    let what = if kind.is_symlink() {
+        "a symbolic link, and those are not followed here; name the file itself"
+    } else if kind.is_dir() {
+        "a directory"
+    } else {
+        "no regular file but a device, a FIFO or a socket"
+    };
+    Err(io::Error::new(io::ErrorKind::InvalidInput, format!("it is {what}")))
+}
+
+/// `options` on a regular file that is there.
+fn open_regular(path: &Path, options: &OpenOptions) -> io::Result<File> {
+    let seen = regular(path)?;
+    let file = options.open(path)?;
+    if identity(&seen) != identity(&file.metadata()?) {
+        return Err(io::Error::other("it was exchanged while it was opened"));
+    }
+    Ok(file)
+}
+
+/// The contents of a regular file of at most `limit` bytes; `None` if there is none.
+pub(crate) fn read_bounded(path: &Path, limit: u64) -> io::Result<Option<Vec<u8>>> {
+    let file = match open_regular(path, OpenOptions::new().read(true)) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        opened => opened?,
+    };
+    let mut bytes = Vec::new();
+    file.take(limit + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > limit {
+        return Err(io::Error::new(io::ErrorKind::InvalidData, format!("it is longer than {limit} bytes")));
+    }
+    Ok(Some(bytes))
+}
+
+/// A file that did not exist, to be written.
+pub(crate) fn create_new(path: &Path) -> io::Result<File> {
+    OpenOptions::new().write(true).create_new(true).open(path)
+}
+
+/// An empty file to write a log to: a new one, or one that is empty or begins as a candump log does, with `(`. Any other
+/// file is somebody's, and stays as it is.
+pub(crate) fn create_log(path: &Path) -> io::Result<File> {
+    match create_new(path) {
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+        created => return created,
+    }
+    let mut file = open_regular(path, OpenOptions::new().read(true).write(true))?;
+    let mut first = [0];
+    if file.read(&mut first)? == 1 && first != *b"(" {
+        let reason = "it exists and is no candump log; remove it or choose another name";
+        return Err(io::Error::new(io::ErrorKind::AlreadyExists, reason));
+    }
+    file.set_len(0)?;
+    io::Seek::rewind(&mut file)?;
+    Ok(file)
+}
+
+/// What tells two files apart, where the system tells.
+#[cfg(unix)]
+pub(crate) fn identity(metadata: &Metadata) -> Option<(u64, u64)> {
+    use std::os::unix::fs::MetadataExt;
+    Some((metadata.dev(), metadata.ino()))
+}
+
+/// What tells two files apart, where the system tells.
+#[cfg(not(unix))]
+pub(crate) fn identity(_: &Metadata) -> Option<(u64, u64)> {
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::serve::scratch;
+
+    #[test]
+    fn a_log_replaces_a_log_and_nothing_else() {
+        let place = scratch("logs");
+        let (log, letter) = (place.join("log"), place.join("letter"));
+        drop(create_log(&log).unwrap());
+        fs::write(&log, "(1.0) can0 701#05\n").unwrap();
+        drop(create_log(&log).unwrap());
+        assert_eq!(fs::read(&log).unwrap(), b"");
+        fs::write(&letter, "Dear reader").unwrap();
+        assert!(create_log(&letter).unwrap_err().to_string().contains("no candump log"));
+        assert_eq!(fs::read(&letter).unwrap(), b"Dear reader");
+        assert!(create_log(&place).unwrap_err().to_string().contains("directory"));
+        fs::remove_dir_all(place).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_symbolic_link_is_neither_read_nor_written() {
+        let place = scratch("links");
+        let (target, link) = (place.join("target"), place.join("link"));
+        fs::write(&target, "(mine").unwrap();
+        std::os::unix::fs::symlink(&target, &link).unwrap();
+        assert!(create_log(&link).unwrap_err().to_string().contains("symbolic link"));
+        assert!(read_bounded(&link, 100).unwrap_err().to_string().contains("symbolic link"));
+        assert_eq!(fs::read(&target).unwrap(), b"(mine");
+        // One that leads nowhere is no free name either.
+        fs::remove_file(&target).unwrap();
+        assert!(create_log(&link).is_err() && create_new(&link).is_err() && !target.exists());
+        fs::remove_dir_all(place).unwrap();
+    }
+
+    #[test]
+    fn what_is_longer_than_its_bound_is_refused() {
+        let place = scratch("bound");
+        let path = place.join("file");
+        assert_eq!(read_bounded(&path, 4).unwrap(), None);
+        fs::write(&path, "four").unwrap();
+        assert_eq!(read_bounded(&path, 4).unwrap().unwrap(), b"four");
+        assert!(read_bounded(&path, 3).unwrap_err().to_string().contains("longer than 3 bytes"));
+        fs::remove_dir_all(place).unwrap();
+    }
+}

@@ -1,0 +1,65 @@
+//! Whether the world keeps up with the clock, and when that is worth a word.
+
+use std::time::Duration;
+
+/// From here on the bus is said to be behind: clients wait that long for an answer, and some give up soon after.
+const BEHIND: Duration = Duration::from_millis(100);
+
+/// Below this it has caught up: one step of the loop.
+const CAUGHT_UP: Duration = Duration::from_millis(20);
+
+/// See the [module](self).
+#[derive(Debug, Default)]
+pub(crate) struct Lag {
+    now: Duration,
+    /// The most since it fell behind, if it is behind.
+    worst: Option<Duration>,
+}
+
+impl Lag {
+    /// How far the world is behind.
+    pub(crate) fn now(&self) -> Duration {
+        self.now
+    }
+
+    /// Takes a new value; what is to be said about it.
+    pub(crate) fn update(&mut self, lag: Duration) -> Option<String> {
+        self.now = lag;
+        match &mut self.worst {
+            None if lag >= BEHIND => {
+                self.worst = Some(lag);
+                Some(format!(
+                    "warning: the bus is {} ms behind the clock: the drives and clients are more than this machine can do \
+                     at once, or the simulator was stopped",
+                    lag.as_millis()
+                ))
+            }
+            None => None,
+            Some(worst) => {
+                *worst = lag.max(*worst);
+                let worst = *worst;
+                (lag <= CAUGHT_UP).then(|| {
+                    self.worst = None;
+                    format!("the bus has caught up with the clock; it was up to {} ms behind", worst.as_millis())
+                })
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn falling_behind_and_catching_up_are_said_once_each() {
+        let mut lag = Lag::default();
+        let said: Vec<String> = [0, 99, 100, 250, 40, 99, 20, 50, 0]
+            .into_iter()
+            .filter_map(|millis| lag.update(Duration::from_millis(millis)))
+            .collect();
+        assert_eq!(said.len(), 2, "{said:?}");
+        assert!(said[0].contains("100 ms behind") && said[1].contains("up to 250 ms"), "{said:?}");
+        assert_eq!(lag.now(), Duration::ZERO);
+    }
+}

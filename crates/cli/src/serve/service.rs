@@ -1,0 +1,174 @@
+//! What is asked of a running simulation by those who started it: lines of standard input, signals, Modbus clients; and the
+//! records that it keeps. Nothing here waits for whoever reads or writes at the other end.
+
+use std::io;
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use tokio::sync::mpsc;
+use transport::{ModbusRequest, WallClock};
+
+use super::frame_log::FrameLog;
+use super::input::next_line;
+use super::speaker::Speaker;
+use super::world::ServedWorld;
+use crate::failure::Failure;
+use crate::session::runtime;
+use crate::signals::{Signal, Signals};
+
+/// How often the log is handed on, and drives are looked at that nothing has happened to.
+const KEEPING_INTERVAL: Duration = Duration::from_millis(100);
+
+/// How long standard input waits for the reader of the answers before answers may be dropped.
+const READER_PATIENCE: Duration = Duration::from_secs(1);
+
+/// How long the end waits for the disk, and then for whoever reads the last answers.
+const DISK_PATIENCE: Duration = Duration::from_secs(5);
+const PARTING_PATIENCE: Duration = Duration::from_millis(500);
+
+/// How long after a signal the process ends in any case.
+const END_PATIENCE: Duration = Duration::from_secs(8);
+
+/// Something to be served between two steps of the world.
+pub(crate) enum Request {
+    /// A line of standard input.
+    Line(String),
+    /// Time to look for records.
+    Keep,
+    /// A store is on the disk: answers may go out.
+    Stored,
+    /// A Modbus request.
+    Registers(ModbusRequest),
+    /// A signal asks for the end.
+    Ended(Signal),
+    /// The bus that was joined is gone.
+    BridgeLost(Failure),
+}
+
+impl From<ModbusRequest> for Request {
+    fn from(request: ModbusRequest) -> Self {
+        Self::Registers(request)
+    }
+}
+
+/// What a running simulation says and writes.
+pub(crate) struct Service {
+    /// Answers to world commands.
+    pub(crate) answers: Speaker,
+    /// Everything else that people should know.
+    pub(crate) warnings: Speaker,
+    /// The log, if one is asked for.
+    pub(crate) log: Option<FrameLog>,
+}
+
+impl Service {
+    /// Serves one request; breaks when it was the last.
+    pub(crate) fn serve(&mut self, world: &mut ServedWorld, request: Request) -> ControlFlow<Result<(), Failure>> {
+        match request {
+            Request::Line(line) => {
+                let Some(answer) = world.command(&line) else { return ControlFlow::Continue(()) };
+                if answer.quit {
+                    // What was stored is on the disk when the answer is read.
+                    let kept = self.finish(world);
+                    self.answers.say(&answer.json);
+                    return ControlFlow::Break(kept);
+                }
+                self.answers.say(&answer.json);
+            }
+            Request::Registers(request) => world.serve_registers(request),
+            Request::Keep => {
+                world.look_for_stores();
+                self.write_log(world);
+            }
+            // Whatever woke the loop, answers that may go out do so before it sleeps again.
+            Request::Stored => {}
+            Request::Ended(signal) => return ControlFlow::Break(Err(Failure::ended_by(signal))),
+            Request::BridgeLost(failure) => return ControlFlow::Break(Err(failure)),
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Ends with `ended`: stores and log are on the disk, and what was said is read, as far as the disk and the readers
+    /// allow in good time. What ended the simulation is what is told of it, then what kept a store from the disk.
+    pub(crate) fn part(mut self, world: &mut ServedWorld, ended: Result<(), Failure>) -> Result<(), Failure> {
+        let kept = self.finish(world);
+        let mut ended = match (ended, kept) {
+            (Err(failure), Err(lost)) => Err(failure.because(lost.what)),
+            (ended, kept) => ended.and(kept),
+        };
+        if let Some(log) = self.log.take() {
+            log.finish(DISK_PATIENCE);
+        }
+        let read = self.answers.finish(PARTING_PATIENCE) & self.warnings.finish(PARTING_PATIENCE);
+        if let Err(failure) = &mut ended {
+            // Where nobody reads, the reason cannot be told either, and telling it would wait for ever.
+            failure.told |= !read;
+        }
+        ended
+    }
+
+    /// Brings to the disk what has happened since the last time.
+    fn finish(&mut self, world: &mut ServedWorld) -> Result<(), Failure> {
+        self.write_log(world);
+        match world.finish_stores(DISK_PATIENCE) {
+            Some(kept) => kept.map_err(Failure::from),
+            None => Err(Failure::new("the last stores are not in --state")
+                .because(format!("the disk has not taken them within {} s", DISK_PATIENCE.as_secs()))),
+        }
+    }
+
+    fn write_log(&mut self, world: &mut ServedWorld) {
+        if let Some(log) = &mut self.log {
+            log.write(world.take_carried());
+        }
+    }
+}
+
+/// Hands over the lines of standard input; ends with it. A reader of `answers` that is slow is waited for here.
+pub(crate) fn read_lines(requests: &mpsc::Sender<Request>, answers: &Speaker) {
+    let mut input = io::stdin().lock();
+    while let Ok(Some(line)) = next_line(&mut input) {
+        if sim::command::asks_for_an_answer(&line) {
+            answers.wait_for_room(READER_PATIENCE);
+            if requests.blocking_send(Request::Line(line)).is_err() {
+                return;
+            }
+        }
+    }
+}
+
+/// Asks for records to be kept.
+pub(crate) async fn tick(requests: mpsc::Sender<Request>, clock: WallClock) {
+    loop {
+        clock.sleep(KEEPING_INTERVAL).await;
+        if requests.send(Request::Keep).await.is_err() {
+            return;
+        }
+    }
+}
+
+/// Listens to signals from now on, in a thread of its own. The first asks for the end; if that takes too long, or a second
+/// one comes, the process ends at once. Stores that were acknowledged are on the disk in any case.
+pub(crate) fn listen_to_signals(requests: mpsc::Sender<Request>) {
+    let (ready, listening) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        let Ok(runtime) = runtime() else { return };
+        runtime.block_on(async {
+            let mut signals = Signals::listen();
+            drop(ready);
+            let signal = signals.next().await;
+            let asked = async {
+                let _ = requests.send(Request::Ended(signal)).await;
+                std::future::pending::<()>().await;
+            };
+            tokio::select! {
+                () = asked => {}
+                _ = signals.next() => {}
+                () = tokio::time::sleep(END_PATIENCE) => {}
+            }
+            std::process::exit(signal.status() as i32);
+        });
+    });
+    // Whoever has read `ready` may ask for the end; the other end is dropped when that is so.
+    let _: Result<(), _> = listening.recv();
+}

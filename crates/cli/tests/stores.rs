@@ -1,0 +1,131 @@
+//! Stores that a client was told of are on the disk, however the simulator ends.
+//!
+//! `FERRODRIVE_KILLS=200 cargo test --test stores` kills more often than a test run does.
+#![cfg(unix)]
+
+mod common;
+
+use std::io::Write;
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+
+use common::raw_bus::RawBus;
+use common::{Simulator, done, scratch};
+
+/// Communication offline time of the ZLAC8030L, 0 to 32767, which is stored with each write while 2010h is 0, as delivered.
+const STORED: u16 = 0x2000;
+
+/// Weak magnetic angle of a joint, 0 to 306.
+const SAVED: u16 = 0x2604;
+
+/// An SDO answer to a download that was taken (CiA 301, 7.2.4.3.4).
+const TAKEN: &str = "60";
+
+fn simulator(state: &Path) -> Simulator {
+    Simulator::start(&[
+        "--drive",
+        "zlac8030l@4",
+        "--drive",
+        "m4230e17b50@1",
+        "--serve",
+        "socketcand://127.0.0.1:0",
+        "--state",
+        state.to_str().unwrap(),
+    ])
+}
+
+fn send_signal(simulator: &Simulator, signal: &str) {
+    let sent = Command::new("kill").args([signal, &simulator.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+}
+
+/// The value that a fresh start finds.
+fn found(state: &Path) -> u32 {
+    let simulator = simulator(state);
+    let bus = simulator.bus("socketcand");
+    done(&["--bus", &bus, "--json", "read", "4", "2000"]).json()["value"].as_u64().unwrap() as u32
+}
+
+#[test]
+fn a_store_is_there_after_every_end_that_came_with_its_acknowledgement() {
+    let state = scratch("ends");
+    for (round, end) in ["-HUP", "-INT", "-TERM", "-QUIT", "-KILL", "quit"].iter().cycle().take(12).enumerate() {
+        let value = 500 + round as u32;
+        let mut simulator = simulator(&state);
+        let mut bus = RawBus::connect(&simulator.address("socketcand"));
+        assert!(bus.download(4, STORED, 0, value, 2).is_some_and(|answer| answer.starts_with(TAKEN)));
+        if *end == "quit" {
+            assert_eq!(simulator.ask("quit")["ok"], true);
+        } else {
+            send_signal(&simulator, end);
+        }
+        let status = match *end {
+            "-HUP" => Some(129),
+            "-INT" => Some(130),
+            "-QUIT" => Some(131),
+            "-TERM" => Some(143),
+            "-KILL" => None,
+            _ => Some(0),
+        };
+        assert_eq!(simulator.wait(), status, "{end}");
+        assert_eq!(found(&state), value, "after {end}");
+    }
+    std::fs::remove_dir_all(state).unwrap();
+}
+
+#[test]
+fn a_kill_in_a_stream_of_stores_loses_none_that_was_acknowledged() {
+    let kills = std::env::var("FERRODRIVE_KILLS").map_or(10, |text| text.parse().expect("a number of kills"));
+    let state = scratch("stream");
+    let mut value = 1;
+    let mut stores = 0;
+    for round in 0..kills {
+        let mut simulator = simulator(&state);
+        let mut bus = RawBus::connect(&simulator.address("socketcand"));
+        let killer = simulator.id().to_string();
+        // 0 to 120 ms later, spread evenly over the rounds (golden ratio).
+        let delay = Duration::from_micros(round * 74_164 % 120_000);
+        let killing = std::thread::spawn(move || {
+            std::thread::sleep(delay);
+            assert!(Command::new("kill").args(["-KILL", &killer]).status().unwrap().success());
+        });
+        let mut acknowledged = None;
+        while bus.download(4, STORED, 0, value, 2).is_some_and(|answer| answer.starts_with(TAKEN)) {
+            acknowledged = Some(value);
+            stores += 1;
+            // 1 to 30000 are taken.
+            value = value % 30_000 + 1;
+        }
+        killing.join().unwrap();
+        simulator.wait();
+        if let Some(acknowledged) = acknowledged {
+            let found = found(&state);
+            // The one that was under way may be there or not.
+            assert!(found == acknowledged || found == value, "kill {round}: {found} after {acknowledged}");
+        }
+        value = value % 30_000 + 1;
+    }
+    let _ = writeln!(std::io::stderr(), "{kills} kills, {stores} acknowledged stores, none lost");
+    assert!(stores > 0);
+    std::fs::remove_dir_all(state).unwrap();
+}
+
+#[test]
+fn what_a_joint_says_to_have_saved_survives_a_kill() {
+    let state = scratch("joint");
+    for value in [40, 41, 42, 43] {
+        let mut simulator = simulator(&state);
+        let mut bus = RawBus::connect(&simulator.address("socketcand"));
+        assert!(bus.download(1, SAVED, 0, value, 2).is_some_and(|answer| answer.starts_with(TAKEN)));
+        assert!(bus.download(1, 0x2614, 0, 1, 2).is_some_and(|answer| answer.starts_with(TAKEN)));
+        // 2614h reads 1 while it saves and 2 afterwards.
+        while !bus.upload(1, 0x2614, 0).is_some_and(|answer| answer.starts_with("4B14260002")) {}
+        simulator.kill();
+        let again = self::simulator(&state);
+        let mut bus = RawBus::connect(&again.address("socketcand"));
+        let answer = bus.upload(1, SAVED, 0).unwrap();
+        assert!(answer.starts_with(&format!("4B042600{value:02X}")), "{answer} after {value}");
+    }
+    std::fs::remove_dir_all(state).unwrap();
+}
