@@ -32,6 +32,7 @@ pub(crate) struct Context {
     timeout: Duration,
     models: BTreeMap<NodeId, Told>,
     json: bool,
+    embedded: bool,
 }
 
 /// A model that need not be found out.
@@ -64,7 +65,7 @@ impl Context {
         let by_user = of_machine.chain(&global.models).map(|(node, model)| (*node, Told::ByUser(model)));
         let by_bus = embedded.unwrap_or_default().iter().map(|(node, model)| (*node, Told::ByBus(model)));
         let models = by_bus.chain(by_user).collect();
-        Self { network, progress, timeout: global.timeout, models, json: global.json }
+        Self { network, progress, timeout: global.timeout, models, json: global.json, embedded: embedded.is_some() }
     }
 
     /// A node, to be waited for as long as the command line says.
@@ -128,6 +129,13 @@ impl Context {
         let fitting: Vec<_> = guess.fitting().map(|model| model.model).collect();
         let how = how_to_say(id, &fitting);
         self.progress.note(&format!("node {id}: cannot tell its model: {guess}. Taken for that; to be sure: {how}"));
+    }
+
+    /// Warns people of what may happen to a motor. On an embedded bus there is none; programs read the report.
+    pub(crate) fn warn(&self, text: &str) {
+        if !self.json && !self.embedded {
+            self.progress.note(text);
+        }
     }
 
     /// A drive that is to be stopped: as what the user takes it for, be that right or wrong.

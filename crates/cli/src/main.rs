@@ -10,6 +10,7 @@ mod decode;
 mod demo;
 mod embedded;
 mod failure;
+mod guard;
 mod machine_file;
 mod models;
 mod output;

@@ -88,8 +88,8 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
         let failure = bus_failure(global, &error);
         let moved = network.moved();
         let failure = moved.iter().fold(failure, |failure, node| {
-            failure
-                .because(format!("node {node} was moving, and cannot be reached any more"))
+            let failure = failure.because(format!("node {node} was moving, and cannot be reached any more"));
+            without_this_command(&network, node, failure)
                 .next(format!("make sure that it stands still (emergency stop); then: ferrodrive state {node}"))
         });
         failure.next(format!("find out why {} went away, and start it again", global.bus))
@@ -115,10 +115,25 @@ async fn stop_what_moves(context: &Context, mut failure: Failure) -> Failure {
                 let _ = tokio::time::timeout(STOP_PATIENCE, standstill(context, node)).await;
                 failure.because(format!("node {node} was moving and has been quick-stopped"))
             }
-            Err(error) => failure.because(format!("node {node} may still be moving: {error}")),
+            Err(error) => {
+                let failure = failure.because(format!("node {node} may still be moving: {error}"));
+                without_this_command(&context.network, node, failure)
+            }
         };
     }
+    // What still moves had better miss this command, and stop by itself.
+    if context.network.moved().is_empty() {
+        let _ = tokio::time::timeout(STOP_PATIENCE, context.network.release_guards()).await;
+    }
     failure
+}
+
+/// Adds what a drive that cannot be reached any more does by itself.
+fn without_this_command(network: &Network, node: NodeId, failure: Failure) -> Failure {
+    match network.guarded(node) {
+        Some(loss) => failure.because(format!("without this command {loss}")),
+        None => failure,
+    }
 }
 
 /// Waits until the position of a node rests, or it does not tell it.

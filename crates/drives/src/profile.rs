@@ -70,8 +70,8 @@ pub struct DriveProfile {
     pub statusword_bits: &'static [(u16, &'static str)],
     /// How it finds its reference position, where it does.
     pub homing: Option<HomingRules>,
-    /// The object with the time, in ms, after which it stops by itself when no frame comes for it; 0 for never.
-    pub host_watchdog: Option<Mux>,
+    /// How it notices that its host has gone.
+    pub host_watch: HostWatch,
     /// What raw values are worth.
     pub units: Units,
     /// How parameters are stored.
@@ -145,6 +145,27 @@ impl DriveProfile {
     pub fn has(&self, quirk: Quirk) -> bool {
         quirk.is_in(self.quirks)
     }
+}
+
+/// How a drive notices that its host has gone, and stops by itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HostWatch {
+    /// It does not: it goes on with what it was told last.
+    None,
+    /// By silence: it stops when no frame for it has come for a time.
+    Silence {
+        /// Where the time is, in ms; 0 is off.
+        time: Mux,
+    },
+    /// By a heartbeat (CiA 301, 7.2.8.2.2): it stops when that stays away. The first one arms the watch, a write to the
+    /// consumer entry disarms it.
+    Heartbeat {
+        /// The consumer entry, as 1016h: bits 16 to 23 whose heartbeat, bits 0 to 15 the time in ms; 0 is off.
+        consumer: Mux,
+        /// The fault code of a drive that it has stopped. With the next heartbeat such a drive goes on with what it was
+        /// told before.
+        fault: u16,
+    },
 }
 
 /// How a drive is enabled, and how its statusword shows that.

@@ -95,7 +95,8 @@ fn an_absolute_move_follows_the_handshake_of_the_manual() {
     let seconds = report.reached_after.unwrap().as_secs_f64();
     assert!((7.8125..7.85).contains(&seconds), "{seconds}");
     assert_eq!(report.notes.len(), 1);
-    assert!(matches!(report.notes[0], Note::HostWatchdog { time, .. } if time == Duration::from_secs(1)));
+    let Note::HostLoss(loss) = report.notes[0] else { panic!("{:?}", report.notes) };
+    assert_eq!(loss.stops_after(), Some(Duration::from_secs(1)));
     // The polling kept the host watchdog (1 s) content by a wide margin.
     assert!(toy(&bus).longest_gap_ns < 50_000_000, "{}", toy(&bus).longest_gap_ns);
     assert!(bus.network.moved().is_empty());

@@ -166,7 +166,7 @@ fn models_with_the_same_objects_are_the_same_to_a_master() {
             let units = |profile: &drives::profile::DriveProfile| (profile.units, profile.storage, profile.pdo);
             assert_eq!(units(one), units(other), "{} and {}", one.model, other.model);
             assert_eq!((one.power, one.homing, one.modes), (other.power, other.homing, other.modes));
-            assert_eq!((one.mode_display, one.host_watchdog), (other.mode_display, other.host_watchdog));
+            assert_eq!((one.mode_display, one.host_watch), (other.mode_display, other.host_watch));
             assert_eq!(
                 (one.statusword_bits, one.quirks, one.hallmark),
                 (other.statusword_bits, other.quirks, other.hallmark)

@@ -7,8 +7,8 @@ use std::time::Duration;
 use can::{Bitrate, Instant};
 use cia402::{ModeOfOperation, PowerState};
 use drives::mjoint::Model;
-use drives::profile::{DriveProfile, MODELS, PowerStyle, Quirk, model};
-use master::drive::{Fact, HomingOptions, MotionOptions, Note};
+use drives::profile::{DriveProfile, HostWatch, MODELS, PowerStyle, Quirk, model};
+use master::drive::{Fact, HomingOptions, HostLoss, MotionOptions, Note};
 use master::units::{Amperes, Degrees, Ramp, Rpm, Turns};
 use master::{Drive, Error, Network};
 use sim::machine::{mjoint, zlac8030l, zlim42c};
@@ -193,12 +193,18 @@ fn a_current_is_pushed_where_the_model_has_a_torque_mode_and_refused_where_not()
 }
 
 #[test]
-fn only_a_drive_with_a_watch_over_its_host_gives_a_note_of_it() {
+fn a_note_tells_what_each_drive_does_without_its_host() {
     let (mut world, _, drives) = bench();
     for drive in &drives {
         let report = block_on(&mut world, drive.velocity(Rpm(30.0), slowly())).unwrap().unwrap();
-        let noted = matches!(report.notes[..], [Note::HostWatchdog { .. }]);
-        assert_eq!(noted, id(drive) == SERVO, "{drive:?}");
+        let [Note::HostLoss(loss)] = report.notes[..] else { panic!("{drive:?}: {:?}", report.notes) };
+        // 2000h is 1000 ms as delivered; nobody has armed the joint's watch; the stepper has none.
+        let expected = match id(drive) {
+            SERVO => HostLoss::StopsInSilence { object: mux(0x2000, 0), time: Duration::from_secs(1) },
+            JOINT => HostLoss::NotArmed { object: mux(0x1016, 1) },
+            _ => HostLoss::GoesOn,
+        };
+        assert_eq!(loss, expected, "{drive:?}");
         block_on(&mut world, drive.stop()).unwrap().unwrap();
     }
 }
@@ -397,7 +403,8 @@ fn a_profile_says_of_power_and_homing_what_its_quirks_say() {
         let quirk = |quirk| profile.quirks.contains(&quirk);
         assert_eq!(profile.power != PowerStyle::Cia402, quirk(Quirk::NoPowerStateMachine), "{}", profile.model);
         assert_eq!(profile.mode_display == mux(0x6060, 0), quirk(Quirk::NoModeDisplay), "{}", profile.model);
-        assert_eq!(profile.host_watchdog.is_some(), quirk(Quirk::HostWatchdogOnByDefault), "{}", profile.model);
+        let by_silence = matches!(profile.host_watch, HostWatch::Silence { .. });
+        assert_eq!(by_silence, quirk(Quirk::HostWatchdogOnByDefault), "{}", profile.model);
         let half_milliseconds = [profile.pdo.inhibit_unit_ns, profile.pdo.event_timer_unit_ns] == [500_000; 2];
         assert_eq!(half_milliseconds, quirk(Quirk::PdoTimersInHalfMilliseconds), "{}", profile.model);
         assert_eq!(profile.homing.is_some(), profile.modes.contains(&ModeOfOperation::HOMING), "{}", profile.model);

@@ -10,7 +10,7 @@ use cia402::PowerState;
 use drives::profile::model;
 use master::core::{MappedObject, PdoMap};
 use master::decode::Direction;
-use master::drive::{MotionOptions, Note};
+use master::drive::{HostLoss, MotionOptions, Note};
 use master::pdo::{PdoConfig, TimerUnits};
 use master::units::{Amperes, Counts, Degrees, Ramp, Rpm, Turns};
 use master::{Drive, Error, Network, join_all};
@@ -63,7 +63,7 @@ fn an_absolute_move_ends_at_its_target_in_the_time_that_speed_and_ramps_take() {
     // 32000 counts at 4096 counts/s is 7.81 s; ramps of 0.5 s each add their half.
     let seconds = report.reached_after.unwrap().as_secs_f64();
     assert!((7.8..9.5).contains(&seconds), "{seconds}");
-    assert!(matches!(report.notes[..], [Note::HostWatchdog { .. }]));
+    assert!(matches!(report.notes[..], [Note::HostLoss(HostLoss::StopsInSilence { .. })]));
     assert!(network.moved().is_empty());
 }
 
@@ -103,7 +103,9 @@ fn velocity_is_reached_watched_and_stopped() {
 fn without_supervision_the_host_watchdog_stops_it_as_the_note_says() {
     let (mut world, network, drives) = world(&[4]);
     let report = block_on(&mut world, drives[0].velocity(Rpm(100.0), MotionOptions::default())).unwrap().unwrap();
-    let [Note::HostWatchdog { time, .. }] = report.notes[..] else { panic!("{:?}", report.notes) };
+    let [Note::HostLoss(HostLoss::StopsInSilence { time, .. })] = report.notes[..] else {
+        panic!("{:?}", report.notes)
+    };
     block_on(&mut world, network.sleep(time + Duration::from_secs(2))).unwrap();
     assert!(world.report(4).unwrap().velocity_rpm.abs() < 2.0);
 }

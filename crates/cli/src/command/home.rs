@@ -7,9 +7,10 @@ use cia402::ModeOfOperation;
 use master::drive::HomingOptions;
 use master::units::{Rpm, parse_duration};
 
-use super::motion::{MotionOutcome, outcome, speed};
+use super::motion::{MotionOutcome, Then, outcome, speed};
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::guard::GuardArgs;
 use crate::models::DriveProfile;
 use crate::parse::node::node;
 
@@ -35,6 +36,8 @@ pub(crate) struct Home {
     /// Do not wait until it is found
     #[arg(long)]
     no_wait: bool,
+    #[command(flatten)]
+    guard: GuardArgs,
 }
 
 impl Home {
@@ -46,8 +49,10 @@ impl Home {
         }
         context.progress.show(format!("node {}: looking for its reference", self.node));
         let options = HomingOptions { speed: self.profile_velocity, limit: self.within, wait: !self.no_wait };
+        let guard = self.guard.begin(context, &drive).await?;
         let motion = drive.home(self.method, options).await?;
-        outcome(context, &drive, format!("home with method {}", self.method), motion, None).await
+        let then = Then::goes_on_if(motion.reached_after.is_none());
+        outcome(context, &drive, format!("home with method {}", self.method), motion, then, guard).await
     }
 
     fn refusal(&self, model: &DriveProfile) -> Failure {
@@ -76,6 +81,7 @@ mod tests {
             profile_velocity: None,
             within: Duration::from_secs(60),
             no_wait: false,
+            guard: GuardArgs::default(),
         };
         let text = home.refusal(crate::models::find("zlac8030l").unwrap()).to_string();
         assert!(text.contains("6060h takes 1") && text.contains("objects zlac8030l position"), "{text}");

@@ -4,13 +4,14 @@ use std::time::Duration;
 
 use canopen::{Mux, NodeId};
 use drives::profile::{Quantity, Ramps};
-use master::drive::{Drive, MotionOptions, MotionReport};
+use master::drive::{Drive, MotionOptions, MotionReport, Note};
 use master::units::{Amperes, Angle, Ramp, Rpm, parse_duration};
 use serde::Serialize;
 
 use super::drive::{Motion, StateReport};
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::guard::{Guard, GuardArgs, GuardReport};
 use crate::output::Report;
 use crate::paint::Paint;
 use crate::parse::node::node;
@@ -75,6 +76,8 @@ pub(crate) struct Torque {
     /// Accepted for symmetry with the other moving commands: this one never waits
     #[arg(long)]
     no_wait: bool,
+    #[command(flatten)]
+    guard: GuardArgs,
 }
 
 /// How a motion is to be made, where the drive's own settings are not wanted.
@@ -89,6 +92,8 @@ struct RampArgs {
     /// Do not wait until the target is reached
     #[arg(long)]
     no_wait: bool,
+    #[command(flatten)]
+    guard: GuardArgs,
 }
 
 pub(super) fn speed(text: &str) -> Result<Rpm, String> {
@@ -110,6 +115,7 @@ pub(crate) struct MotionOutcome {
     #[serde(skip_serializing_if = "Option::is_none")]
     before_stop: Option<Motion>,
     limits: Limits,
+    guard: GuardReport,
     #[serde(flatten)]
     state: StateReport,
     notes: Vec<String>,
@@ -131,8 +137,10 @@ impl Velocity {
     pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
         let drive = context.known_drive(self.node).await?;
         context.progress.show(format!("node {}: to {}", self.node, self.speed));
+        let guard = self.ramps.guard.begin(context, &drive).await?;
         let motion = drive.velocity(self.speed, self.ramps.options(None)).await?;
-        outcome(context, &drive, format!("turn at {}", self.speed), motion, self.duration).await
+        let then = self.duration.map_or(Then::goes_on_if(self.speed.0 != 0.0), Then::StopAfter);
+        outcome(context, &drive, format!("turn at {}", self.speed), motion, then, guard).await
     }
 }
 
@@ -143,12 +151,14 @@ impl Move {
         let options = self.ramps.options(self.profile_velocity);
         let how = if self.relative { "by" } else { "to" };
         context.progress.show(format!("node {}: {how} {}", self.node, self.position));
+        let guard = self.ramps.guard.begin(context, &drive).await?;
         let motion = if self.relative {
             drive.move_relative(self.position, options).await?
         } else {
             drive.move_absolute(self.position, options).await?
         };
-        outcome(context, &drive, format!("move {how} {}", self.position), motion, None).await
+        let then = Then::goes_on_if(motion.reached_after.is_none());
+        outcome(context, &drive, format!("move {how} {}", self.position), motion, then, guard).await
     }
 }
 
@@ -156,8 +166,10 @@ impl Torque {
     /// Pushes.
     pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
         let drive = context.known_drive(self.node).await?;
+        let guard = self.guard.begin(context, &drive).await?;
         let motion = drive.torque(self.current).await?;
-        outcome(context, &drive, format!("push with {}", self.current), motion, self.duration).await
+        let then = self.duration.map_or(Then::goes_on_if(self.current.0 != 0.0), Then::StopAfter);
+        outcome(context, &drive, format!("push with {}", self.current), motion, then, guard).await
     }
 }
 
@@ -167,33 +179,55 @@ impl RampArgs {
     }
 }
 
-/// Reads what came of a motion, and ends it after `duration`, if there is one.
+/// What becomes of a motion that has been commanded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Then {
+    /// It is watched for this long, then the drive is stopped.
+    StopAfter(Duration),
+    /// The command ends, the motion does not.
+    GoesOn,
+    /// It is at its end.
+    Stands,
+}
+
+impl Then {
+    /// The motion goes on if so, and else is at its end.
+    pub(super) const fn goes_on_if(moving: bool) -> Self {
+        if moving { Self::GoesOn } else { Self::Stands }
+    }
+}
+
+/// Reads what came of a motion, and ends it if it is to be ended.
 pub(super) async fn outcome(
     context: &Context,
     drive: &Drive,
     asked: String,
     motion: MotionReport,
-    duration: Option<Duration>,
+    then: Then,
+    guard: Guard,
 ) -> Result<MotionOutcome, Failure> {
     let limits = limits(drive).await;
     let mut before_stop = None;
-    if let Some(duration) = duration {
+    if let Then::StopAfter(duration) = then {
         context.progress.show(format!("node {}: {asked} for {} s", drive.node().id(), duration.as_secs_f64()));
         drive.supervise(duration).await?;
         before_stop = Some(StateReport::read(drive).await?.motion);
         drive.stop().await?;
     }
     let state = StateReport::read(drive).await?;
+    let (guard, farewell) = guard.end(drive, then == Then::GoesOn).await?;
+    // What the drive does without its host is the guard's to tell.
+    let notes = motion.notes.iter().filter(|note| !matches!(note, Note::HostLoss(_))).map(ToString::to_string);
     Ok(MotionOutcome {
         asked,
         reached: motion.reached_after.is_some(),
         reached_after_s: motion.reached_after.map(|time| time.as_secs_f64()),
-        stopped: duration.is_some(),
+        stopped: before_stop.is_some(),
         before_stop,
         limits,
+        guard,
         state,
-        // A drive that has been stopped again needs no watching.
-        notes: if duration.is_some() { Vec::new() } else { motion.notes.iter().map(ToString::to_string).collect() },
+        notes: notes.chain(farewell).collect(),
     })
 }
 
@@ -248,6 +282,7 @@ impl Report for MotionOutcome {
         lines.extend(self.before_stop.as_ref().map(|motion| format!("  before  {}", motion.text())));
         lines.push(format!("  at      {}", self.state.motion.text()));
         lines.push(format!("  limits  {}", self.limits.text()));
+        lines.push(format!("  guard   {}", self.guard.text));
         lines.extend(self.state.fault_lines(paint, "  "));
         lines.extend(self.notes.iter().map(|note| format!("  note    {note}")));
         lines.join("\n")

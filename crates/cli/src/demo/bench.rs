@@ -8,6 +8,7 @@ use std::time::Duration;
 use can::{Bitrate, CanId, Frame, Instant};
 use canopen::od::Entry;
 use canopen::{Mux, NodeId};
+use drives::profile::HostWatch;
 use sim::recorder::{Channel, Recorder, Signal};
 use sim::{Report, StationId, World};
 
@@ -320,7 +321,7 @@ impl Bench {
 
     /// Lets time pass, talking all the while to a drive that stops because its host is silent.
     pub(super) fn run(&mut self, duration: Duration) {
-        if self.model().host_watchdog.is_none() {
+        if !matches!(self.model().host_watch, HostWatch::Silence { .. }) {
             return self.run_silently(duration);
         }
         let end = self.world.now() + duration;

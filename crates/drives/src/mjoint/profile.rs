@@ -11,8 +11,8 @@ use super::readings::COUNTS_PER_TURN;
 use super::statusword::{HOMING_ATTAINED, HOMING_ERROR, LIVE};
 use super::variations::VARIATIONS;
 use crate::profile::{
-    BitPattern, CountsPerTurn, DriveProfile, Faults, HomingRules, HomingStart, Identity, ParameterStorage, PdoRules,
-    PowerStyle, Quantity, Quirk, Ramps, Units, Write,
+    BitPattern, CountsPerTurn, DriveProfile, Faults, HomingRules, HomingStart, HostWatch, Identity, ParameterStorage,
+    PdoRules, PowerStyle, Quantity, Quirk, Ramps, Units, Write,
 };
 
 /// The M4230E17B50.
@@ -45,7 +45,7 @@ const fn joint(model: &'static str, title: &'static str) -> DriveProfile {
         power: PowerStyle::Mirror { following: 0b10_0111, live: LIVE, alarm: Statusword::FAULT },
         statusword_bits: STATUSWORD_BITS,
         homing: Some(HOMING),
-        host_watchdog: None,
+        host_watch: HostWatch::Heartbeat { consumer: Mux::new(0x1016, 1), fault: 0x20 },
         units: UNITS,
         storage: ParameterStorage {
             save: Write { object: Mux::new(0x2614, 0), value: 1 },

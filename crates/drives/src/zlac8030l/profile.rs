@@ -9,7 +9,7 @@ use super::faults::FAULTS;
 use super::objects::TABLE;
 use super::statusword::{EXTERNAL_STOP, IN_POSITION, RUNNING};
 use super::variations::VARIATIONS;
-use crate::profile::{CountsPerTurn, DriveProfile, Faults, PdoRules, PowerStyle, Quantity, Quirk, Units};
+use crate::profile::{CountsPerTurn, DriveProfile, Faults, HostWatch, PdoRules, PowerStyle, Quantity, Quirk, Units};
 use crate::zl;
 
 /// The ZLAC8030L V2.0.
@@ -28,7 +28,7 @@ pub static PROFILE: DriveProfile = DriveProfile {
     power: PowerStyle::Cia402,
     statusword_bits: &[(IN_POSITION, "in position"), (RUNNING, "running"), (EXTERNAL_STOP, "external stop")],
     homing: None,
-    host_watchdog: Some(Mux::new(0x2000, 0)),
+    host_watch: HostWatch::Silence { time: Mux::new(0x2000, 0) },
     units: Units {
         counts_per_turn: CountsPerTurn::Object { object: Mux::new(0x200B, 0), factor: 4, default: 1024 },
         target_velocity: Quantity::new(0x60FF, 0, 1.0).divided_by(0x202F, 5),

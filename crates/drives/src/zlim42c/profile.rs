@@ -10,7 +10,8 @@ use super::statusword::{BIT_4_OF_CONTROLWORD, ENERGISED, HOMING_ATTAINED, IN_POS
 use super::tables::PULSES_PER_TURN;
 use super::variations::VARIATIONS;
 use crate::profile::{
-    BitPattern, CountsPerTurn, DriveProfile, Faults, HomingRules, HomingStart, PowerStyle, Quantity, Quirk, Units,
+    BitPattern, CountsPerTurn, DriveProfile, Faults, HomingRules, HomingStart, HostWatch, PowerStyle, Quantity, Quirk,
+    Units,
 };
 use crate::zl;
 
@@ -36,7 +37,7 @@ const fn profile(model: &'static str, title: &'static str) -> DriveProfile {
         power: PowerStyle::Cia402,
         statusword_bits: STATUSWORD_BITS,
         homing: Some(HOMING),
-        host_watchdog: None,
+        host_watch: HostWatch::None,
         units: UNITS,
         storage: zl::parameter_storage(0x2010, 0x200C, RESTART),
         faults: Faults { code: Mux::new(0x603F, 0), bit_field: false, table: &FAULTS },

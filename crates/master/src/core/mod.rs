@@ -1,4 +1,5 @@
-//! The master as a passive state machine (CiA 301): one SDO channel, NMT and heartbeat watch per node, SYNC, PDOs.
+//! The master as a passive state machine (CiA 301): one SDO channel, NMT and heartbeat watch per node, SYNC, PDOs, and the
+//! heartbeat by which drives notice that it lives.
 //!
 //! In: frames, time, and [`Command`]s that carry the time. Out: frames, deadlines, [`Finished`] requests and
 //! [`Event`]s, all pulled. Up to 127 nodes are asked at once, one request per node on the wire, the others queued.
@@ -10,6 +11,7 @@ mod facts;
 mod image;
 mod node_set;
 mod payload;
+mod presence;
 mod request;
 mod sync;
 mod timers;
@@ -34,11 +36,21 @@ pub use request::{Command, Failure, Finished, Outcome, Request, Ticket, Transfer
 
 use channel::Channel;
 use event::Events;
+use presence::Presence;
 use sync::SyncProducer;
 use timers::Timers;
 
 /// Frames that wait for [`Core::poll_transmit`] besides SDO, SYNC and PDO; a further one replaces the oldest.
 const OUTBOX: usize = 128;
+
+/// What a drive is asked to show it that this master lives: something that any drive has and that changes nothing.
+const STATUSWORD: Mux = Mux::new(0x6041, 0);
+
+/// Names those questions; nobody waits for their answers. Other tickets count from 1.
+const FEED: Ticket = Ticket(0);
+
+/// Shortest wait for their answers: drives take some milliseconds, a loaded bus some tens more.
+const SHORTEST_FEED_TIMEOUT: Duration = Duration::from_millis(50);
 
 /// The sans-IO master. See the [module](self).
 ///
@@ -60,6 +72,7 @@ pub struct Core {
     due: Instant,
     image: Image,
     sync: SyncProducer,
+    presence: Presence,
     timers: Timers,
     outbox: VecDeque<Frame>,
     finished: VecDeque<Finished>,
@@ -95,6 +108,7 @@ impl Core {
             due: Instant::FAR_FUTURE,
             image: Image::default(),
             sync: SyncProducer::default(),
+            presence: Presence::default(),
             timers: Timers::default(),
             outbox: VecDeque::with_capacity(OUTBOX),
             finished: VecDeque::new(),
@@ -139,6 +153,11 @@ impl Core {
                 self.produce_sync();
             }
             Command::WatchHeartbeat(node, time) => self.watch_heartbeat(node, time),
+            Command::Heartbeat(node, period) => {
+                self.presence.set_heartbeat(node, period, self.now);
+                self.show_presence();
+            }
+            Command::KeepFed(node, period) => self.presence.set_feed(node, period, self.now),
             Command::Transmit(frame) => self.push_frame(frame),
         }
         self.find_due();
@@ -219,7 +238,9 @@ impl Core {
         let now = self.now;
         while let Some(ended) = self.member_mut(node).channel.poll_finished() {
             self.note_outcome(node, ended.mux, &ended.outcome);
-            self.finished.push_back(Finished { ticket: ended.ticket, outcome: ended.outcome });
+            if ended.ticket != FEED {
+                self.finished.push_back(Finished { ticket: ended.ticket, outcome: ended.outcome });
+            }
             self.member_mut(node).channel.start_next(now);
         }
         let busy = self.member(node).channel.poll_timeout().is_some();
@@ -313,13 +334,24 @@ impl Core {
         }
     }
 
+    /// Sends heartbeats that are due, and asks for the statusword of drives that would lose patience. A node that is being
+    /// asked something already needs no question.
+    fn show_presence(&mut self) {
+        for (node, period) in self.presence.handle_timeout(self.now) {
+            if !self.busy.contains(node) {
+                let timeout = period.max(SHORTEST_FEED_TIMEOUT);
+                self.start_request(FEED, Request { node, mux: STATUSWORD, transfer: Transfer::Upload, timeout });
+            }
+        }
+    }
+
     /// Finds the earliest deadline, after anything that may have moved one.
     fn find_due(&mut self) {
         let mut due = self.heartbeat_check;
         for node in self.busy.iter() {
             due = due.min(self.member(node).channel.poll_timeout().unwrap_or(Instant::FAR_FUTURE));
         }
-        let others = [self.timers.next(), self.sync.next()];
+        let others = [self.timers.next(), self.sync.next(), self.presence.next()];
         self.due = others.into_iter().flatten().fold(due, Instant::min);
     }
 
@@ -333,7 +365,10 @@ impl Core {
     fn poll_sdo(&mut self) -> Option<Frame> {
         while let Some(node) = self.sending.first() {
             match self.member_mut(node).channel.poll_transmit() {
-                Some(frame) => return Some(frame),
+                Some(frame) => {
+                    self.presence.note_sent(node, self.now);
+                    return Some(frame);
+                }
                 None => self.sending.remove(node),
             }
         }
@@ -399,15 +434,17 @@ impl Station for Core {
             self.finished.push_back(Finished { ticket, outcome: Ok(Payload::EMPTY) });
         }
         self.produce_sync();
+        self.show_presence();
         self.check_heartbeats();
         self.find_due();
     }
 
-    /// NMT and other single frames, then SYNC, RPDOs, SDO.
+    /// NMT and other single frames, then SYNC, heartbeats, RPDOs, SDO.
     fn poll_transmit(&mut self) -> Option<Frame> {
         self.outbox
             .pop_front()
             .or_else(|| self.sync.poll_transmit())
+            .or_else(|| self.presence.poll_transmit())
             .or_else(|| self.image.poll_transmit())
             .or_else(|| self.poll_sdo())
     }

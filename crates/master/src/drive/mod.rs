@@ -9,6 +9,7 @@
 mod conclude;
 mod explain;
 mod goal;
+pub(crate) mod guard;
 mod homing;
 mod motion;
 mod position;
@@ -30,6 +31,7 @@ use crate::identify::{Guess, Knowledge};
 use crate::network::Node;
 
 pub use explain::{Explanation, Fact, faults_in};
+pub use guard::{HostLoss, SwitchedOff};
 pub use homing::HomingOptions;
 pub use motion::{MotionOptions, MotionReport, Note};
 pub use safety::StopGuard;

@@ -3,10 +3,10 @@
 use core::fmt;
 use std::time::Duration;
 
-use canopen::Mux;
 use cia402::{Controlword, ModeOfOperation, PowerState};
 
 use super::goal::Goal;
+use super::guard::HostLoss;
 use super::{CONTROLWORD, Drive};
 use crate::error::Error;
 use crate::units::{Amperes, Ramp, Rpm};
@@ -42,13 +42,8 @@ pub struct MotionReport {
 /// Something to know about a motion that was commanded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Note {
-    /// The drive stops by itself when it hears nothing for this long.
-    HostWatchdog {
-        /// The object that sets it.
-        object: Mux,
-        /// The time.
-        time: Duration,
-    },
+    /// What the drive does when the program that moves it dies or falls silent. See [`Drive::guard`].
+    HostLoss(HostLoss),
     /// The shaft was turning in another mode and has been stopped before this motion began.
     StoppedFirst {
         /// That mode.
@@ -59,12 +54,12 @@ pub enum Note {
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::HostWatchdog { object, time } => write!(
+            Self::HostLoss(loss @ HostLoss::StopsInSilence { object, .. }) => write!(
                 f,
-                "the drive stops by itself when no frame for it comes for {} ms ({object}): watching the motion keeps \
-                 it content; when nobody does, ask it something from time to time or set {object} to 0",
-                time.as_millis()
+                "when nobody talks to it {loss}: watching the motion keeps it content; when nobody does, ask it something \
+                 from time to time or set {object} to 0"
             ),
+            Self::HostLoss(loss) => write!(f, "when the program that moves it dies {loss}"),
             Self::StoppedFirst { before } => {
                 write!(f, "it was turning in mode {before} and has been stopped first: the mode changes at standstill")
             }
@@ -181,13 +176,8 @@ impl Drive {
 
     /// What to know about a motion, beside what was noted at its start.
     pub(super) async fn notes(&self, noted: Option<Note>) -> Vec<Note> {
-        let watchdog = match self.profile.and_then(|profile| profile.host_watchdog) {
-            Some(object) => match self.read_number(object).await {
-                Ok(ms) if ms > 0 => Some(Note::HostWatchdog { object, time: Duration::from_millis(ms as u64) }),
-                _ => None,
-            },
-            None => None,
-        };
-        noted.into_iter().chain(watchdog).collect()
+        // A note that cannot be made is no reason to fail: the drive moves already.
+        let loss = self.host_loss().await.ok().map(Note::HostLoss);
+        noted.into_iter().chain(loss).collect()
     }
 }

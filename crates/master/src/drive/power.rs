@@ -10,6 +10,9 @@ use crate::error::Error;
 /// Speed below which a shaft counts as standing still: the rounding of the coarsest velocity object.
 pub(super) const STANDSTILL_RPM: f64 = 1.0;
 
+/// How many looks in a row have to find it so: a shaft that swings about its rest passes zero.
+const STANDSTILL_LOOKS: u32 = 5;
+
 /// The power drive state machine (CiA 402-2, 8.2), and what stands in its place on drives without one.
 impl Drive {
     /// Brings the drive to Operation enabled, one step of the state machine at a time, or in one step where there is no
@@ -125,6 +128,7 @@ impl Drive {
         if !style.is_faulted(statusword) {
             return Ok(());
         }
+        self.forget_lost_host().await?;
         let rest = match self.power_state(statusword) {
             // A fault has taken the power off: what was commanded before must not come back by itself.
             Some(PowerState::Fault) | None => Controlword(0),
@@ -144,14 +148,15 @@ impl Drive {
         self.write_controlword(rest).await
     }
 
-    /// Waits until the shaft stands still, as long as the drive's ramps may take.
+    /// Waits until the shaft stands still and goes on doing so, as long as the drive's ramps may take.
     pub(super) async fn wait_standstill(&self, intent: &'static str) -> Result<(), Error> {
         let velocity = self.known(intent)?.units.actual_velocity;
         let limit = self.stop_time().await;
-        let mut waited = Duration::ZERO;
+        let (mut waited, mut looks) = (Duration::ZERO, 0);
         loop {
             let speed = self.answered(intent, self.read_quantity(velocity).await).await?;
-            if speed.abs() < STANDSTILL_RPM {
+            looks = if speed.abs() < STANDSTILL_RPM { looks + 1 } else { 0 };
+            if looks == STANDSTILL_LOOKS {
                 return Ok(());
             }
             if waited >= limit {

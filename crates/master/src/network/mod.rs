@@ -9,7 +9,7 @@ mod future;
 mod join;
 mod node;
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::Duration;
@@ -19,6 +19,7 @@ use canopen::nmt::NmtTarget;
 use canopen::{Mux, NmtCommand, NodeId};
 
 use crate::core::{Command, Core, Event, NodeFacts, NodeSet, Outcome, Received, Ticket};
+use crate::drive::guard::Guard;
 
 pub use future::{Elapsed, NodeView, Sleep, Wait};
 pub use join::join_all;
@@ -47,6 +48,8 @@ struct Shared {
     activity: Option<Waker>,
     /// What this program has set in motion.
     moved: NodeSet,
+    /// What watches this program, by node.
+    guards: BTreeMap<NodeId, Guard>,
 }
 
 /// Commands that wait for a runner. Requests and timers are bounded by the futures that wait for them; the rest by
@@ -87,6 +90,14 @@ impl Network {
     /// Produces SYNC with this period, or stops.
     pub fn sync(&self, period: Option<Duration>) {
         self.submit(Command::Sync(period));
+    }
+
+    /// Produces this master's heartbeat under a node-ID, the first one at once, or stops. Periods are whole milliseconds.
+    ///
+    /// Any drive that consumes that heartbeat (1016h) and hears it watches this program from then on, not only those that
+    /// it moves. [`crate::Drive::guard`] does what a drive needs; this is for masters that do the rest themselves.
+    pub fn heartbeat(&self, own: NodeId, period: Option<Duration>) {
+        self.submit(Command::Heartbeat(own, period));
     }
 
     /// Sends an NMT command to every node.
@@ -167,9 +178,17 @@ impl Network {
         self.lock().moved
     }
 
+    /// The guards of this program, to look at or to change.
+    pub(crate) fn with_guards<T>(&self, look: impl FnOnce(&mut BTreeMap<NodeId, Guard>) -> T) -> T {
+        look(&mut self.lock().guards)
+    }
+
     pub(crate) fn submit(&self, command: Command) {
         let mut shared = self.lock();
-        let plain = |command: &Command| matches!(command, Command::Nmt(..) | Command::Transmit(_) | Command::Sync(_));
+        let plain = |command: &Command| {
+            use Command::{Heartbeat, KeepFed, Nmt, Sync, Transmit};
+            matches!(command, Nmt(..) | Transmit(_) | Sync(_) | Heartbeat(..) | KeepFed(..))
+        };
         // Nobody has run the bus for thousands of commands: the newest replaces the oldest.
         if shared.inbox.len() >= INBOX
             && plain(&command)

@@ -101,6 +101,12 @@ impl Node {
         self.network.submit(Command::WatchHeartbeat(self.id, time));
     }
 
+    /// Asks it for its statusword (6041h) whenever nothing else was sent to it for this long, so that a drive that stops when
+    /// its host is silent goes on; `None` ends it. The runner has to go on running.
+    pub fn keep_fed(&self, period: Option<Duration>) {
+        self.network.submit(Command::KeepFed(self.id, period));
+    }
+
     /// Waits for its next boot-up message, counted from this call.
     ///
     /// # Errors

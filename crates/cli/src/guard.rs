@@ -1,0 +1,101 @@
+//! `--guard`: what a drive does when the command that moves it dies, armed where the drive has something against that, and
+//! told where it has not.
+//!
+//! A guard lasts as long as its command. A command that ends and leaves the motor turning releases it, and says what
+//! happens then.
+
+use clap::ValueEnum;
+use master::Drive;
+use master::drive::{HostLoss, SwitchedOff};
+use serde::Serialize;
+
+use crate::context::Context;
+use crate::failure::Failure;
+
+/// Whether a motion is guarded.
+#[derive(Debug, Default, clap::Args)]
+pub(crate) struct GuardArgs {
+    /// Have the drive stop by itself if this command dies, where it has a watch over its host (on, unless off is given)
+    ///
+    /// What a drive has is its model's: it stops when no frame for it comes for a time, or when the heartbeat of this command
+    /// (node 127, as a drive's 1016h has it) stays away, or it has nothing and goes on, which is said before it moves. A watch
+    /// that is set to 0 on the drive stays so, unless --guard is given: then it has its factory value until this command ends.
+    #[arg(long, value_name = "on|off", num_args = 0..=1, default_missing_value = "on")]
+    guard: Option<OnOff>,
+    /// The same as --guard off: a heartbeat is not sent, and a drive that needs one goes on
+    #[arg(long, conflicts_with = "guard")]
+    no_guard: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum OnOff {
+    On,
+    Off,
+}
+
+/// What a drive does without this command.
+#[derive(Debug)]
+pub(crate) struct Guard {
+    loss: HostLoss,
+    armed: bool,
+}
+
+/// The same for programs.
+#[derive(Debug, Serialize)]
+pub(crate) struct GuardReport {
+    /// This command has seen to it that the drive stops by itself.
+    armed: bool,
+    /// After how long without this command it stops; `null` if it does not.
+    stops_after_ms: Option<u64>,
+    /// The object that sets it.
+    object: Option<String>,
+    /// In words.
+    pub(crate) text: String,
+}
+
+impl GuardArgs {
+    /// Guards the drive before it moves. What nothing would stop is told on standard error.
+    pub(crate) async fn begin(&self, context: &Context, drive: &Drive) -> Result<Guard, Failure> {
+        let armed = !self.no_guard && self.guard != Some(OnOff::Off);
+        let switched_off = if self.guard.is_some() { SwitchedOff::SwitchOn } else { SwitchedOff::Leave };
+        let loss = if armed { drive.guard(switched_off).await? } else { drive.host_loss().await? };
+        if loss.stops_after().is_none() {
+            let more = match loss {
+                HostLoss::SwitchedOff { .. } if armed => "; --guard gives it its factory value for this command",
+                HostLoss::NotArmed { .. } => "; without --no-guard they are",
+                _ => "; have an emergency stop at hand",
+            };
+            context.warn(&format!("node {}: if this command dies, {loss}{more}", drive.node().id()));
+        }
+        Ok(Guard { loss, armed: armed && loss.stops_after().is_some() })
+    }
+}
+
+impl Guard {
+    /// Releases the drive; what there is to know of one that `goes_on` moving.
+    pub(crate) async fn end(self, drive: &Drive, goes_on: bool) -> Result<(GuardReport, Option<String>), Failure> {
+        drive.release_guard().await?;
+        let note = goes_on.then(|| self.farewell(drive));
+        let report = GuardReport {
+            armed: self.armed,
+            stops_after_ms: self.loss.stops_after().map(|time| time.as_millis() as u64),
+            object: self.loss.object().map(|object| object.to_string()),
+            text: format!("without this command {}", self.loss),
+        };
+        Ok((report, note))
+    }
+
+    fn farewell(&self, drive: &Drive) -> String {
+        let node = drive.node().id();
+        match self.loss {
+            HostLoss::StopsInSilence { object, .. } => format!(
+                "this command ends here, and {}: watch it (--for), or let it go on alone \
+                 (ferrodrive write {node} {object} 0)",
+                self.loss
+            ),
+            _ => format!(
+                "this command ends here, and nobody watches it: it goes on until it is told to stop (ferrodrive stop {node})"
+            ),
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! What each drive does when the command that moves it is killed (kill -9), and what was said of it before.
+//!
+//! Times are the manuals': 2000h of the ZLAC8030L is 1000 ms as delivered (quick start guide, chapter 9); 1016h:01 of the
+//! joint is node 7Fh within 2000 ms (M joint manual, 5.11.2); the ZLIM42-C has no such object (user manual, 5.4).
+#![cfg(unix)]
+
+mod common;
+
+use std::io::Read;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use common::{Simulator, done};
+use serde_json::{Value, json};
+
+const JOINT: (&str, &str) = ("1", "1=m4230e17b50");
+const STEPPER: (&str, &str) = ("2", "2=zlim42c");
+const SERVO: (&str, &str) = ("4", "4=zlac8030l");
+
+/// Stopping from 60 r/min with the ramps as delivered, and a busy machine.
+const SLACK: Duration = Duration::from_millis(1500);
+
+struct Bench {
+    simulator: Simulator,
+    bus: String,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let drives = ["--drive", "m4230e17b50@1", "--drive", "zlim42c@2", "--drive", "zlac8030l@4"];
+        let simulator = Simulator::start(&[&drives[..], &["--serve", "socketcand://127.0.0.1:0"]].concat());
+        let bus = simulator.bus("socketcand");
+        Self { simulator, bus }
+    }
+
+    fn position(&mut self, node: &str) -> i64 {
+        self.simulator.ask(&format!("{node} get"))["position"].as_i64().unwrap()
+    }
+
+    /// By its way, since the rotor of a stepper swings about its speed: 60 r/min is several hundred counts in this time on
+    /// each of the drives.
+    fn turns(&mut self, node: &str) -> bool {
+        let before = self.position(node);
+        std::thread::sleep(Duration::from_millis(100));
+        self.position(node).abs_diff(before) > 100
+    }
+
+    /// A command that moves a drive, once the drive turns.
+    fn moving(&mut self, (node, model): (&str, &str), options: &[&str]) -> Child {
+        let child = Command::new(env!("CARGO_BIN_EXE_ferrodrive"))
+            .args(["--bus", &self.bus, "--model", model, "velocity", node, "60rpm", "--for", "60s"])
+            .args(options)
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        self.wait(node, true, Duration::from_secs(20));
+        child
+    }
+
+    /// Waits until the drive turns, or stands; how long it took.
+    fn wait(&mut self, node: &str, turning: bool, patience: Duration) -> Duration {
+        let begin = Instant::now();
+        while self.turns(node) != turning {
+            assert!(begin.elapsed() < patience, "node {node} turns: {}", !turning);
+        }
+        begin.elapsed()
+    }
+
+    /// Kills the command; what it had said on standard error.
+    fn kill(&mut self, mut child: Child) -> String {
+        child.kill().unwrap();
+        let mut said = String::new();
+        child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+        child.wait().unwrap();
+        said
+    }
+
+    fn json(&self, (_, model): (&str, &str), arguments: &[&str]) -> Value {
+        done(&[&["--json", "--bus", &self.bus, "--model", model], arguments].concat()).json()
+    }
+}
+
+#[test]
+fn a_servo_stops_a_second_after_its_master_was_killed() {
+    let mut bench = Bench::new();
+    let child = bench.moving(SERVO, &[]);
+    assert_eq!(bench.kill(child), "");
+    let took = bench.wait("4", false, Duration::from_millis(1000) + SLACK);
+    assert!(took > Duration::from_millis(700), "{took:?}");
+}
+
+#[test]
+fn a_joint_stops_two_seconds_after_its_master_was_killed_and_the_next_command_begins_at_rest() {
+    let mut bench = Bench::new();
+    let child = bench.moving(JOINT, &[]);
+    assert_eq!(bench.kill(child), "");
+    // The last heartbeat is up to half a second old.
+    let took = bench.wait("1", false, Duration::from_millis(2000) + SLACK);
+    assert!(took > Duration::from_millis(1300), "{took:?}");
+    // Alarm 20h: heartbeat of the host lost (M joint manual, alarm table).
+    assert_eq!(bench.json(JOINT, &["state", "1"])["fault_code"], 0x20);
+    let moved = bench.json(JOINT, &["move", "1", "--relative", "10deg"]);
+    assert_eq!((&moved["reached"], &moved["fault_code"]), (&json!(true), &json!(0)));
+    assert!(!bench.turns("1"));
+}
+
+#[test]
+fn a_stepper_turns_on_after_its_master_was_killed_as_was_said_before() {
+    let mut bench = Bench::new();
+    let child = bench.moving(STEPPER, &[]);
+    let said = bench.kill(child);
+    for part in ["node 2: if this command dies, nothing stops it", "no watch over its host", "emergency stop"] {
+        assert!(said.contains(part), "{part:?} in {said}");
+    }
+    std::thread::sleep(Duration::from_secs(4));
+    assert!(bench.turns("2"));
+}
+
+#[test]
+fn an_unguarded_joint_turns_on_as_was_said_before() {
+    let mut bench = Bench::new();
+    for off in [&["--no-guard"][..], &["--guard", "off"]] {
+        let child = bench.moving(JOINT, off);
+        let said = bench.kill(child);
+        assert!(said.contains("node 1: if this command dies, nothing stops it"), "{said}");
+        std::thread::sleep(Duration::from_secs(4));
+        assert!(bench.turns("1"));
+        bench.json(JOINT, &["stop", "1"]);
+    }
+}
+
+#[test]
+fn a_command_that_leaves_a_motor_turning_says_what_happens_then() {
+    let mut bench = Bench::new();
+    for (drive, armed, after_ms, object, then) in [
+        (SERVO, true, json!(1000), json!("2000h:00"), "it stops by itself 1000 ms after"),
+        (JOINT, true, json!(2000), json!("1016h:01"), "it goes on until it is told to stop"),
+        (STEPPER, false, Value::Null, Value::Null, "it goes on until it is told to stop"),
+    ] {
+        let (node, _) = drive;
+        let said = bench.json(drive, &["velocity", node, "60rpm"]);
+        let guard = &said["guard"];
+        assert_eq!((&guard["armed"], &guard["stops_after_ms"], &guard["object"]), (&json!(armed), &after_ms, &object));
+        assert!(said["notes"][0].as_str().unwrap().contains(then), "{said}");
+        assert!(bench.turns(node));
+    }
+    // Beyond the time of either watch.
+    std::thread::sleep(Duration::from_secs(4));
+    assert!(!bench.turns("4"));
+    assert!(bench.turns("1") && bench.turns("2"));
+    assert_eq!(bench.json(JOINT, &["state", "1"])["fault_code"], 0);
+    // A motion that has come to its end leaves nothing to say.
+    let moved = bench.json(STEPPER, &["velocity", "2", "60rpm", "--for", "200ms"]);
+    assert_eq!((&moved["notes"], &moved["guard"]["armed"]), (&json!([]), &json!(false)));
+}
+
+#[test]
+fn a_motion_that_is_not_waited_for_goes_on_alone() {
+    let mut bench = Bench::new();
+    let said = bench.json(JOINT, &["velocity", "1", "60rpm", "--no-wait"]);
+    assert!(said["notes"][0].as_str().unwrap().contains("nobody watches it"), "{said}");
+    std::thread::sleep(Duration::from_secs(4));
+    assert!(bench.turns("1"));
+    assert_eq!(bench.json(JOINT, &["state", "1"])["fault_code"], 0);
+}
+
+#[test]
+fn a_watch_that_is_switched_off_is_told_and_switched_on_if_asked_for() {
+    let mut bench = Bench::new();
+    let time = |bench: &Bench| bench.json(SERVO, &["read", "4", "2000"])["value"].clone();
+    bench.json(SERVO, &["write", "4", "2000", "0"]);
+    let child = bench.moving(SERVO, &[]);
+    let said = bench.kill(child);
+    assert!(said.contains("2000h:00) is set to 0; --guard gives it"), "{said}");
+    assert_eq!(time(&bench), 0);
+    let moved = bench.json(SERVO, &["velocity", "4", "60rpm", "--for", "500ms", "--guard"]);
+    assert_eq!((&moved["guard"]["armed"], time(&bench)), (&json!(true), json!(0)));
+    let child = bench.moving(SERVO, &["--guard", "on"]);
+    bench.kill(child);
+    bench.wait("4", false, Duration::from_millis(1000) + SLACK);
+}

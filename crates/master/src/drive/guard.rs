@@ -1,0 +1,343 @@
+//! What a drive does when the program that moves it dies, and arming what it has against that.
+//!
+//! How a drive notices is data of its model ([`HostWatch`]): by silence, by a missing heartbeat (CiA 301, 7.2.8.2.2), or not
+//! at all. A guard lasts until it is released; meanwhile the core keeps the drive content, so long as somebody runs it.
+//! That the program lives and yet does nothing sensible is not noticed here.
+
+use core::fmt;
+use std::time::Duration;
+
+use canopen::heartbeat::Consumer;
+use canopen::od::Default;
+use canopen::{Mux, NodeId};
+use drives::profile::HostWatch;
+
+use super::Drive;
+use crate::core::NodeSet;
+use crate::error::Error;
+use crate::network::{Network, join_all};
+
+/// How often a drive that watches for silence or for a heartbeat is content within its time: two may get lost.
+const SIGNS_IN_TIME: u32 = 4;
+
+/// How long a node that this program does not move is waited for, when it is asked whether it watches too.
+const BYSTANDER_TIMEOUT: Duration = Duration::from_millis(100);
+
+/// What a drive does when the program that moves it dies in the middle of a motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HostLoss {
+    /// It stops when no frame for it has come for this long.
+    StopsInSilence {
+        /// The object that sets it.
+        object: Mux,
+        /// The time.
+        time: Duration,
+    },
+    /// It stops when this program's heartbeat has stayed away for this long.
+    StopsWithoutHeartbeat {
+        /// The object that sets it.
+        object: Mux,
+        /// The node-ID whose heartbeat it is.
+        host: NodeId,
+        /// The time.
+        time: Duration,
+    },
+    /// It goes on: its watch for a heartbeat is armed by the first one, and this program sends none.
+    NotArmed {
+        /// The object that sets the watch.
+        object: Mux,
+    },
+    /// It goes on: its watch is set to 0.
+    SwitchedOff {
+        /// The object that sets the watch.
+        object: Mux,
+    },
+    /// It goes on: it watches for the heartbeat of a node-ID that another device on the bus has.
+    WatchesAnother {
+        /// The object that sets the watch.
+        object: Mux,
+        /// That node-ID.
+        host: NodeId,
+    },
+    /// It goes on: its model has no watch over its host.
+    GoesOn,
+}
+
+impl HostLoss {
+    /// After how long the drive stops by itself, if it does.
+    pub const fn stops_after(self) -> Option<Duration> {
+        match self {
+            Self::StopsInSilence { time, .. } | Self::StopsWithoutHeartbeat { time, .. } => Some(time),
+            _ => None,
+        }
+    }
+
+    /// The object that sets the drive's watch over its host, if it has one.
+    pub const fn object(self) -> Option<Mux> {
+        match self {
+            Self::StopsInSilence { object, .. }
+            | Self::StopsWithoutHeartbeat { object, .. }
+            | Self::NotArmed { object }
+            | Self::SwitchedOff { object }
+            | Self::WatchesAnother { object, .. } => Some(object),
+            Self::GoesOn => None,
+        }
+    }
+}
+
+impl fmt::Display for HostLoss {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::StopsInSilence { object, time } => {
+                write!(f, "it stops by itself {} ms after the last frame for it ({object})", time.as_millis())
+            }
+            Self::StopsWithoutHeartbeat { object, host, time } => {
+                let ms = time.as_millis();
+                write!(
+                    f,
+                    "it stops by itself {ms} ms after the last heartbeat of node {host}, which is this program ({object})"
+                )
+            }
+            Self::NotArmed { object } => {
+                write!(
+                    f,
+                    "nothing stops it: its watch over a host ({object}) is armed by heartbeats, and none are sent"
+                )
+            }
+            Self::SwitchedOff { object } => write!(f, "nothing stops it: its watch over a host ({object}) is set to 0"),
+            Self::WatchesAnother { object, host } => write!(
+                f,
+                "nothing of this program stops it: {object} has it watch node {host}, which is another device on this bus"
+            ),
+            Self::GoesOn => {
+                f.write_str("nothing stops it: this model has no watch over its host and goes on as it was told")
+            }
+        }
+    }
+}
+
+/// What is to be done with a watch that is set to 0 on the drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SwitchedOff {
+    /// It is somebody's decision, and stays so.
+    Leave,
+    /// It is set to its factory value until the guard is released. A drive that stores each write stores these two.
+    SwitchOn,
+}
+
+/// A drive that watches this program.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Guard {
+    loss: HostLoss,
+    /// How often it needs a sign of life.
+    period: Duration,
+    /// What the watch's object had before.
+    before: i64,
+    /// What it has now.
+    armed: i64,
+}
+
+impl Drive {
+    /// What the drive does when this program dies, as it is set and guarded now. Changes nothing.
+    ///
+    /// # Errors
+    /// [`Error::UnknownModel`]; those of the SDO reads.
+    pub async fn host_loss(&self) -> Result<HostLoss, Error> {
+        if let Some(guard) = self.node.network().with_guards(|guards| guards.get(&self.node.id()).copied()) {
+            return Ok(guard.loss);
+        }
+        match self.known("tell what it does without its host")?.host_watch {
+            HostWatch::Heartbeat { consumer, .. } => Ok(match self.read_number(consumer).await? {
+                0 => HostLoss::SwitchedOff { object: consumer },
+                _ => HostLoss::NotArmed { object: consumer },
+            }),
+            HostWatch::Silence { time } => Ok(self.loss(self.read_number(time).await?)),
+            HostWatch::None => Ok(HostLoss::GoesOn),
+        }
+    }
+
+    /// Has the drive stop by itself when this program dies, with what its model has for that, and tells what it will do:
+    /// [`HostLoss::stops_after`] is `None` where nothing can be done.
+    ///
+    /// From here on the runner keeps the drive content: a drive that watches for silence is asked for its statusword when
+    /// nothing else is sent to it, and for one that consumes a heartbeat this master produces it, under the node-ID that the
+    /// drive watches. A drive that had lost its host, and would go on with an old motion at the first heartbeat, is stopped
+    /// before. Ends with [`release_guard`](Self::release_guard); to stop in another way is to let the drive stop by itself.
+    ///
+    /// One request whose answer is waited for longer than the drive's time leaves it without a frame: timeouts should be
+    /// shorter.
+    ///
+    /// # Errors
+    /// [`Error::UnknownModel`]; [`Error::NotReached`] when an old motion cannot be stopped; those of the SDO requests.
+    pub async fn guard(&self, switched_off: SwitchedOff) -> Result<HostLoss, Error> {
+        let object = match self.known("guard it")?.host_watch {
+            HostWatch::Silence { time } => time,
+            HostWatch::Heartbeat { consumer, .. } => consumer,
+            HostWatch::None => return Ok(HostLoss::GoesOn),
+        };
+        let (id, network) = (self.node.id(), self.node.network());
+        let held = network.with_guards(|guards| guards.get(&id).copied());
+        let before = match held {
+            Some(guard) => guard.before,
+            None => self.read_number(object).await?,
+        };
+        let mut armed = held.map_or(before, |guard| guard.armed);
+        if armed == 0
+            && switched_off == SwitchedOff::SwitchOn
+            && let Default::Value(factory) = self.row(object, "guard it")?.default
+        {
+            armed = factory;
+            self.write_number(object, armed).await?;
+        }
+        let loss = self.loss(armed);
+        let Some(time) = loss.stops_after() else { return Ok(loss) };
+        if self.has_lost_its_host().await? {
+            self.stop().await?;
+        }
+        let guard = Guard { loss, period: time / SIGNS_IN_TIME, before, armed };
+        network.with_guards(|guards| guards.insert(id, guard));
+        network.show_presence(id, guard.loss, Some(guard.period));
+        Ok(loss)
+    }
+
+    /// Ends the guard: the drive no longer watches this program. To be called when it stands still, or is to go on alone.
+    ///
+    /// # Errors
+    /// Those of the SDO requests. The guard has ended nevertheless, and the drive may stop by itself.
+    pub async fn release_guard(&self) -> Result<(), Error> {
+        self.node.network().release_guard(self.node.id()).await
+    }
+
+    /// What this value of the drive's watch stands for, when this program does its part.
+    fn loss(&self, raw: i64) -> HostLoss {
+        let time = |ms: i64| Duration::from_millis(ms.unsigned_abs());
+        match self.profile.map(|profile| profile.host_watch) {
+            None | Some(HostWatch::None) => HostLoss::GoesOn,
+            Some(HostWatch::Silence { time: object }) if raw <= 0 => HostLoss::SwitchedOff { object },
+            Some(HostWatch::Silence { time: object }) => HostLoss::StopsInSilence { object, time: time(raw) },
+            Some(HostWatch::Heartbeat { consumer: object, .. }) => match Consumer::from_raw(raw as u32) {
+                None => HostLoss::SwitchedOff { object },
+                // A device that has that node-ID sends a heartbeat of its own, and this program must not.
+                Some(consumer) if self.node.network().seen().contains(consumer.node()) => {
+                    HostLoss::WatchesAnother { object, host: consumer.node() }
+                }
+                Some(consumer) => HostLoss::StopsWithoutHeartbeat {
+                    object,
+                    host: consumer.node(),
+                    time: Duration::from_millis(u64::from(raw as u16)),
+                },
+            },
+        }
+    }
+
+    /// Ends the alarm of a drive that has stopped for want of a heartbeat, once its old motion is stopped for good.
+    pub(super) async fn forget_lost_host(&self) -> Result<(), Error> {
+        let Some(HostWatch::Heartbeat { consumer, .. }) = self.profile.map(|profile| profile.host_watch) else {
+            return Ok(());
+        };
+        if !self.has_lost_its_host().await? {
+            return Ok(());
+        }
+        self.stop().await?;
+        let raw = self.read_number(consumer).await?;
+        self.write_number(consumer, 0).await?;
+        self.write_number(consumer, raw).await
+    }
+
+    /// True if the drive has stopped for want of a heartbeat, and would go on with the next one.
+    async fn has_lost_its_host(&self) -> Result<bool, Error> {
+        let Some(profile) = self.profile else { return Ok(false) };
+        match profile.host_watch {
+            HostWatch::Heartbeat { fault, .. } => Ok(self.read_number(profile.faults.code).await? == i64::from(fault)),
+            HostWatch::None | HostWatch::Silence { .. } => Ok(false),
+        }
+    }
+}
+
+impl Network {
+    /// What the drive at this node does when this program dies, if it is guarded.
+    pub fn guarded(&self, node: NodeId) -> Option<HostLoss> {
+        self.with_guards(|guards| guards.get(&node).map(|guard| guard.loss))
+    }
+
+    /// Ends all guards, as [`Drive::release_guard`] does.
+    ///
+    /// # Errors
+    /// The first error of an SDO request; all guards have ended nevertheless.
+    pub async fn release_guards(&self) -> Result<(), Error> {
+        let nodes: NodeSet = self.with_guards(|guards| guards.keys().copied().collect());
+        let mut result = Ok(());
+        for node in nodes.iter() {
+            result = result.and(self.release_guard(node).await);
+        }
+        result
+    }
+
+    async fn release_guard(&self, id: NodeId) -> Result<(), Error> {
+        let Some(guard) = self.with_guards(|guards| guards.remove(&id)) else { return Ok(()) };
+        match guard.loss {
+            HostLoss::StopsInSilence { object, .. } => {
+                self.show_presence(id, guard.loss, None);
+                if guard.before == guard.armed {
+                    return Ok(());
+                }
+                // The object of the time is UNSIGNED16 wherever there is one.
+                self.node(id).write(object, guard.before as u16).await
+            }
+            HostLoss::StopsWithoutHeartbeat { object, host, .. } => {
+                let others = self.with_guards(|guards| heartbeat_period(guards.values(), host));
+                self.heartbeat(host, others);
+                if others.is_some() {
+                    // The heartbeat goes on for others, and would arm the watch anew.
+                    return Ok(());
+                }
+                self.disarm_bystanders(id, object, host).await;
+                disarm(&self.node(id), object, host, Some(guard.before as u32)).await
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Has every other drive that this program's heartbeat has armed forget it: they would stop for want of it, whoever
+    /// moves them. Who does not answer cannot be helped.
+    async fn disarm_bystanders(&self, guarded: NodeId, object: Mux, host: NodeId) {
+        let bystanders = self.seen().iter().filter(|node| *node != guarded).collect::<Vec<_>>();
+        let disarmed = bystanders.into_iter().map(|id| async move {
+            let node = self.node(id).with_timeout(BYSTANDER_TIMEOUT);
+            disarm(&node, object, host, None).await
+        });
+        join_all(disarmed).await;
+    }
+
+    /// Starts, changes or ends what keeps a drive content.
+    fn show_presence(&self, node: NodeId, loss: HostLoss, period: Option<Duration>) {
+        match loss {
+            HostLoss::StopsInSilence { .. } => self.node(node).keep_fed(period),
+            HostLoss::StopsWithoutHeartbeat { host, .. } => {
+                self.heartbeat(host, self.with_guards(|guards| heartbeat_period(guards.values(), host)));
+            }
+            _ => {}
+        }
+    }
+}
+
+/// The shortest period that any of these drives needs of the heartbeat of `host`.
+fn heartbeat_period<'a>(guards: impl Iterator<Item = &'a Guard>, host: NodeId) -> Option<Duration> {
+    let of_host =
+        guards.filter(|guard| matches!(guard.loss, HostLoss::StopsWithoutHeartbeat { host: own, .. } if own == host));
+    of_host.map(|guard| guard.period).min()
+}
+
+/// Has a consumer of the heartbeat of `host` wait for a first one again, with `value` in its entry, or what was there. A
+/// consumer entry of 0 watches nothing (CiA 301, 7.5.2.16), and each write begins anew.
+async fn disarm(node: &crate::Node, object: Mux, host: NodeId, value: Option<u32>) -> Result<(), Error> {
+    let present: u32 = node.read(object).await?;
+    if Consumer::from_raw(present).is_none_or(|consumer| consumer.node() != host) {
+        return Ok(());
+    }
+    node.write(object, 0u32).await?;
+    match value.unwrap_or(present) {
+        0 => Ok(()),
+        value => node.write(object, value).await,
+    }
+}
