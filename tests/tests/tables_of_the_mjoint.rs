@@ -69,3 +69,13 @@ fn the_four_models_have_the_ratio_and_highest_speed_of_the_manual() {
     assert_eq!(ours.map(|model| model.max_rpm), figure("Maximum rotational speed"));
     assert!(MODELS.iter().all(|name| model(name).is_some_and(|profile| profile.model == *name)));
 }
+
+#[test]
+fn the_words_of_2609h_say_at_which_level_of_dir_the_motor_turns_clockwise() {
+    // 5.04: 0, it does so while DIR does not conduct; 1, while it conducts.
+    let row = TABLE.row(TABLE.slot(0x2609, 0));
+    let words: Vec<_> = row.values.iter().map(|(value, word)| (*value, *word)).collect();
+    assert_eq!(words.len(), 2);
+    assert!(words[0].0 == 0 && words[0].1.contains("does not conduct"), "{words:?}");
+    assert!(words[1].0 == 1 && words[1].1.ends_with("while DIR conducts"), "{words:?}");
+}

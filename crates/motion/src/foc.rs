@@ -137,6 +137,8 @@ pub struct FocOutput {
     pub current_a: Dq,
     /// The voltage asked of the bus, after the limit.
     pub voltage_v: Dq,
+    /// What the controllers wanted before the limit.
+    pub wanted_v: Dq,
     /// The voltage limit was reached: the current cannot follow its set-point.
     pub saturated: bool,
 }
@@ -169,7 +171,7 @@ impl Foc {
 
         let (sin, cos) = look_ahead(sin, cos, input.electrical_rad_s * gains.voltage_delay_s);
         let duty = modulate(inverse_park(voltage_v, sin, cos), input.bus_v);
-        FocOutput { duty, current_a, voltage_v, saturated: voltage_v != wanted }
+        FocOutput { duty, current_a, voltage_v, wanted_v: wanted, saturated: voltage_v != wanted }
     }
 
     /// Forgets the past: for the moment the power stage is switched on.

@@ -12,6 +12,7 @@
 pub mod angle;
 pub mod cascade;
 pub mod commutation;
+pub mod field_weakening;
 pub mod filter;
 pub mod foc;
 pub mod interpolate;

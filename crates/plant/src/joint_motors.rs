@@ -3,18 +3,17 @@
 //! Figures are those of the M robot joint motor CANopen manual, "Parameters", unless named otherwise. How its table
 //! is read, since it does not say:
 //!
-//! **Rated current** (3.5 A, 7 A) is the supply's: 36 V * 3.5 A = 126 W is the M4230's 100 W plus the copper loss at
-//! its 1 N m (29 W); 36 V * 7 A = 252 W is the M8025's 200 W plus that at 2 N m (40 W).
+//! **Rated current** (3.5 A, 7 A) is the r.m.s. current of a phase at the motor's torque (1 N m, 2 N m), as is usual in
+//! tables of servo motors: `Kt = torque / (sqrt(2) * current)` is 0.202 N m for each ampere of q current in both. The
+//! copper loss at it is 16 and 39 W.
 //!
-//! **Resistance and inductance** are between two wires; a phase has half. The copper losses above follow from it.
+//! **Resistance and inductance** are between two wires; a phase has half.
 //!
-//! **Maximum speed** (2000, 1500 r/min) is the motor's own limit at 36 V without load: the amplitude of the
-//! line-to-line back-emf then equals the bus, `psi = 36 V / (sqrt(3) * pole pairs * speed)`. Torque per ampere of q
-//! current: 0.149 and 0.198 N m/A.
+//! **Maximum speed** (2000, 1500 r/min). The amplitude of the line-to-line back-emf equals 36 V at 1474 r/min in both
+//! motors; beyond, the drive weakens the field, which 2604h names. The M8025's 1000 r/min at rated torque need none.
 //!
-//! **Losses.** The M4230 gives 34 of 50 N m and 51 of 80 N m at 1 N m of its motor; what the unloaded friction does
-//! not explain is the loss in the teeth. The M8025's 51 and 85 N m are far under what 2 N m of its motor would give
-//! by the same losses: they are the reducer's rating, and the same loss is taken.
+//! **Losses.** 34 of 50 N m, 51 of 80, 51 of 100 and 85 of 160 N m come out; what the unloaded friction does not explain
+//! is the loss in the teeth.
 //!
 //! **Gear.** "E17" and "E25" are sizes of harmonic gears: the M8025E25B50's 51 and 127 N m are the rated and repeated
 //! peak torque of a Harmonic Drive CSG-25-50. The stiffness is that of robot joints with such gears.
@@ -26,21 +25,20 @@ use crate::brake::BrakeModel;
 use crate::gear::GearModel;
 use crate::joint_motor::JointMotorModel;
 use crate::mechanics::RotorModel;
-use crate::pmsm::{PmsmModel, SQRT_3};
+use crate::pmsm::PmsmModel;
 use crate::rig::RigModel;
 use crate::supply::{BleederModel, SupplyModel};
 use crate::thermal::{BodyModel, COPPER_PER_K};
 
 const RAD_S_PER_R_MIN: f64 = core::f64::consts::TAU / 60.0;
 
-/// "Motor rated voltage 36 VDC ± 10 %".
-const RATED_V: f64 = 36.0;
-/// Assumed: frameless motors of such joints ("multistage DD motor structure") have 14 to 28 poles. At 2000 r/min it
-/// makes 333 Hz, which a 20 kHz drive follows easily.
-const POLE_PAIRS: u32 = 10;
+/// Assumed: "multistage DD motor structure" is a multi-pole direct-drive motor, and 36 slots with 42 poles are its usual
+/// winding. With the printed inductance, a d current of 5 A then takes the unloaded M4230 to its 2000 r/min; fewer
+/// poles would need more than the drive's 10 A (r.m.s.) allow at an advance of 20 degrees, the end of 2604h.
+const POLE_PAIRS: u32 = 21;
 
-/// Assumed: motor and unloaded gear take 8 % of the motor's rated torque at rated speed. It lets the motor reach 98 %
-/// of its printed maximum speed without load and leaves most of the loss to the teeth, as in harmonic gears.
+/// Assumed: motor and unloaded gear take 8 % of the motor's rated torque at rated speed, which leaves most of the loss to
+/// the teeth, as in harmonic gears.
 const NO_LOAD_SHARE: f64 = 0.08;
 /// Assumed: half of it is dry, as for the hub motors.
 const DRY_SHARE: f64 = 0.5;
@@ -105,9 +103,9 @@ impl JointMotorModel {
     /// 51 N m, 0 to 15 r/min.
     pub const M4230E17B80: JointMotorModel = joint("M4230E17B80", M4230, 80.0, SIZE_17_STIFFNESS_NM_RAD[1], 51.0);
     /// 51 N m, 0 to 30 r/min.
-    pub const M8025E25B50: JointMotorModel = joint("M8025E25B50", M8025, 50.0, SIZE_25_STIFFNESS_NM_RAD[0], 34.0);
+    pub const M8025E25B50: JointMotorModel = joint("M8025E25B50", M8025, 50.0, SIZE_25_STIFFNESS_NM_RAD[0], 51.0);
     /// 85 N m, 0 to 18 r/min.
-    pub const M8025E25B80: JointMotorModel = joint("M8025E25B80", M8025, 80.0, SIZE_25_STIFFNESS_NM_RAD[1], 51.0);
+    pub const M8025E25B80: JointMotorModel = joint("M8025E25B80", M8025, 80.0, SIZE_25_STIFFNESS_NM_RAD[1], 85.0);
 
     /// The variant with a holding brake (the manual's special functions 7 and 8 are for it). Assumed: it holds the
     /// motor's rated torque, as power-off brakes are chosen.
@@ -120,8 +118,9 @@ impl JointMotorModel {
 #[derive(Clone, Copy)]
 struct Motor {
     torque_nm: f64,
+    /// Of a phase, r.m.s., at this torque.
+    current_a: f64,
     rated_r_min: f64,
-    maximum_r_min: f64,
     /// Of one phase: half of what is printed.
     resistance_ohm: f64,
     inductance_h: f64,
@@ -132,8 +131,8 @@ struct Motor {
 
 const M4230: Motor = Motor {
     torque_nm: 1.0,
+    current_a: 3.5,
     rated_r_min: 1500.0,
-    maximum_r_min: 2000.0,
     resistance_ohm: 0.5 * 0.86,
     inductance_h: 0.5 * 0.8e-3,
     inertia_kg_m2: 0.69e-4,
@@ -143,8 +142,8 @@ const M4230: Motor = Motor {
 
 const M8025: Motor = Motor {
     torque_nm: 2.0,
+    current_a: 7.0,
     rated_r_min: 1000.0,
-    maximum_r_min: 1500.0,
     resistance_ohm: 0.5 * 0.53,
     inductance_h: 0.5 * 0.5e-3,
     inertia_kg_m2: 1.74e-4,
@@ -152,17 +151,11 @@ const M8025: Motor = Motor {
     flange_kg_m2: SIZE_25_FLANGE_KG_M2,
 };
 
-/// A motor with a gear. `m4230_output_nm` is what the M4230's 1 N m gives through this ratio: it tells the losses.
-const fn joint(
-    name: &'static str,
-    motor: Motor,
-    ratio: f64,
-    stiffness_nm_rad: f64,
-    m4230_output_nm: f64,
-) -> JointMotorModel {
-    let flux_linkage_wb = RATED_V / (SQRT_3 * POLE_PAIRS as f64 * motor.maximum_r_min * RAD_S_PER_R_MIN);
-    let rated_current_a = motor.torque_nm / (1.5 * POLE_PAIRS as f64 * flux_linkage_wb);
-    let copper_w = 1.5 * rated_current_a * rated_current_a * motor.resistance_ohm;
+/// A motor with a gear, through which its torque is `output_nm` at its rated speed: that tells the loss in the teeth.
+const fn joint(name: &'static str, motor: Motor, ratio: f64, stiffness_nm_rad: f64, output_nm: f64) -> JointMotorModel {
+    let torque_constant_nm_a = motor.torque_nm / (core::f64::consts::SQRT_2 * motor.current_a);
+    let flux_linkage_wb = torque_constant_nm_a / (1.5 * POLE_PAIRS as f64);
+    let copper_w = 3.0 * motor.current_a * motor.current_a * motor.resistance_ohm;
     let no_load_nm = NO_LOAD_SHARE * motor.torque_nm;
     let dry_nm = DRY_SHARE * no_load_nm;
     let viscous_nm_s = (1.0 - DRY_SHARE) * no_load_nm / (motor.rated_r_min * RAD_S_PER_R_MIN);
@@ -190,7 +183,7 @@ const fn joint(
             output_inertia_kg_m2: motor.flange_kg_m2,
             coulomb_nm: (1.0 - MOTOR_SHARE) * dry_nm,
             viscous_nm_s: (1.0 - MOTOR_SHARE) * viscous_nm_s,
-            mesh_loss: (1.0 - NO_LOAD_SHARE) * ratio * M4230.torque_nm / m4230_output_nm - 1.0,
+            mesh_loss: (1.0 - NO_LOAD_SHARE) * ratio * motor.torque_nm / output_nm - 1.0,
         },
         encoder: ENCODER,
         brake: BrakeModel { holding_nm: 0.0 },

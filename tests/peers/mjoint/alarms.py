@@ -198,9 +198,9 @@ def green_light(bench):
     true(len(dropped) > 2 * len(seen) and len(dropped) > 10, f"changes in 3 s: {len(seen)} in health, {len(dropped)} without the battery")
 
 
-@check("the alarm output conducts in health with an even ones digit of 60FBh:01, and in alarm with an odd one")
+@check("the alarm output is normally open with an even ones digit of 60FBh:01, and normally closed with an odd one")
 def alarm_output(bench):
-    for value, in_health in ((3000, 1), (3001, 0)):
+    for value, in_health in ((3000, 0), (3001, 1)):
         bench.write(0x60FB, value, sub=1)
         eventually(lambda: bench.world("get")["outputs"]["WR"], lambda wr: wr == in_health, f"WR in health with {value}")
         bench.world("supply 55")

@@ -3,9 +3,10 @@
 use std::sync::LazyLock;
 
 use can::Bitrate;
-use drives::mjoint::Model;
+use canopen::NodeId;
+use drives::mjoint::{M4230E17B50, Model};
 use sim::VirtualDrive;
-use sim::machine::{MJointMachine, mjoint};
+use sim::machine::{self, MJointMachine, Order, mjoint};
 
 use super::{Rows, Subject};
 use crate::mjoint::objects;
@@ -45,6 +46,16 @@ impl Bench {
     pub fn of(count: u8, model: &'static Model) -> Self {
         let joint = |node| -> Box<dyn VirtualDrive> { Box::new(mjoint(model, node, MJoint::BITRATE)) };
         Self::with((1..=count).map(joint).collect())
+    }
+
+    /// One that is read in another way, as `ferrodrive readings` lists them.
+    #[must_use]
+    #[track_caller]
+    pub fn read_as(key: &str, choice: &str) -> Self {
+        let model = &M4230E17B50;
+        let mut order = Order::new(model, NodeId::MIN, MJoint::BITRATE);
+        order.variant.choose(key, choice).expect("a reading of the joint");
+        Self::with(vec![machine::order(model, &order).expect("a joint")])
     }
 
     /// Writes to another joint than the first.

@@ -113,9 +113,14 @@ impl<S: Subject> Bench<S> {
     /// A drive as delivered that has just booted, with its [`machine`](Self::machine) open to the eye.
     #[must_use]
     pub fn open() -> Self {
+        Self::open_with(S::machine())
+    }
+
+    /// The same with a machine of one's own.
+    #[must_use]
+    pub fn open_with(mut machine: S::Machine) -> Self {
         let mut world = World::new(S::BITRATE, 1);
         let host = world.add_tap();
-        let mut machine = S::machine();
         machine.set_power(true, world.now());
         let drive = world.add_station(machine);
         Self::booted(world, host, drive, true)

@@ -49,7 +49,7 @@ fn a_time_of_0_never_raises_12h() {
 #[test]
 fn an_output_that_stays_at_its_limit_raises_14h_and_2601h_resets_it() {
     let mut bench = Bench::new();
-    // 10 % of 36 V / sqrt 3 in 0.44 ohm are under 5 A: the current's limit of 10 A is not reached.
+    // 10 % of 36 V / sqrt 3 in 0.44 ohm are under 5 A of amplitude: the current's limit of 10 A is not reached.
     bench.set(0x2618, 0, 101);
     running(&mut bench);
     bench.tell("1 rotor lock");
@@ -64,6 +64,71 @@ fn an_output_that_stays_at_its_limit_raises_14h_and_2601h_resets_it() {
     assert_eq!(bench.get(0x260E, 0), 0);
     bench.run_ms(300);
     assert!((bench.report().velocity_rpm - 300.0).abs() < 10.0, "0Fh still stands: it runs again");
+}
+
+#[test]
+fn as_delivered_a_locked_output_gives_14h_and_a_creeping_one_12h() {
+    // Interface 3: 12h and 14h are both there to be seen. Locked, the current stays under the 10 A of 261Dh.
+    for model in [&Model::M4230E17B50, &Model::M4230E17B80, &Model::M8025E25B50, &Model::M8025E25B80] {
+        let mut bench = Bench::of(1, model);
+        running(&mut bench);
+        bench.tell("1 rotor lock");
+        bench.run_ms(1000);
+        assert!(bench.report().current_a < 0.95 * 10.0, "{}: {} A", model.name, bench.report().current_a);
+        bench.until(6000, |bench| bench.get(0x260E, 0) != 0);
+        assert_eq!(bench.get(0x260E, 0), 0x14, "{}", model.name);
+    }
+    // A load that the motor lifts with all of its 10 A, slower and slower.
+    let mut bench = Bench::new();
+    bench.set(0x6060, 0, 3);
+    bench.set(0x60FF, 0, 100);
+    bench.set(0x6040, 0, 0x0F);
+    for torque_nm in 1..=200 {
+        bench.tell(&format!("1 load torque {}", f64::from(torque_nm) * 0.5));
+        bench.run_ms(5);
+    }
+    bench.until(8000, |bench| bench.get(0x260E, 0) != 0);
+    assert_eq!(bench.get(0x260E, 0), 0x12);
+}
+
+#[test]
+fn without_an_alarm_in_2618h_the_output_of_a_stalled_motor_is_halved_after_3_s_and_back_when_it_turns() {
+    let mut bench = Bench::new();
+    bench.set(0x2618, 0, 160);
+    running(&mut bench);
+    bench.tell("1 rotor lock");
+    bench.run_ms(2500);
+    let whole = bench.report().current_a;
+    // The motor swings on the gear before it stands.
+    bench.run_ms(1500);
+    let halved = bench.report().current_a;
+    assert!((halved / whole - 0.5).abs() < 0.02, "{whole} A, then {halved} A");
+    bench.run_ms(5000);
+    assert_eq!(bench.get(0x260E, 0), 0);
+    bench.tell("1 rotor free");
+    bench.run_ms(500);
+    assert!((bench.report().velocity_rpm - 300.0).abs() < 10.0);
+    bench.tell("1 rotor lock");
+    bench.run_ms(1000);
+    assert!((bench.report().current_a / whole - 1.0).abs() < 0.03);
+}
+
+#[test]
+fn the_amperes_of_261dh_and_6078h_are_r_m_s_or_amplitudes_as_the_table_is_read() {
+    for (choice, amplitude) in [("rms", 2.0_f64.sqrt()), ("amplitude", 1.0)] {
+        let mut bench = Bench::read_as("J047", choice);
+        bench.set(0x261D, 0, 3500);
+        bench.set(0x2618, 0, 600);
+        running(&mut bench);
+        bench.tell("1 rotor lock");
+        bench.run_ms(1000);
+        assert!((bench.get(0x6078, 0) - 7000).abs() < 100, "{choice}: 6078h in 1/2000 A of 261Dh");
+        // On a phase of 0.44 ohm, 2613h in shares of the bus between two wires: sqrt(3) times the phase's amplitude, less
+        // where the vector lies between two wires' axes.
+        let volts = bench.get(0x2613, 0) as f64 / 32_767.0 * 36.0;
+        let most = 3.0_f64.sqrt() * 0.45 * 3.5 * amplitude;
+        assert!((0.85 * most..most * 1.02).contains(&volts), "{choice}: {volts} of {most} V");
+    }
 }
 
 #[test]
@@ -88,11 +153,13 @@ fn over_52_v_raise_15h_which_goes_with_a_reset_below() {
 
 #[test]
 fn a_heavy_load_that_is_braked_hard_raises_the_voltage_over_its_limit() {
-    let mut bench = Bench::of(1, &Model::M8025E25B50);
-    bench.tell("1 load inertia 2");
+    let mut bench = Bench::of(1, &Model::M4230E17B50);
+    // 17 J at the output, of which the gear leaves two thirds and the winding at 4 A most; the bus holds 2.4 J up to 52 V.
+    bench.tell("1 load inertia 4");
+    bench.set(0x261D, 0, 4005);
     bench.set(0x6083, 0, 3000);
     bench.set(0x6060, 0, 3);
-    bench.set(0x60FF, 0, 1200);
+    bench.set(0x60FF, 0, 1400);
     bench.set(0x6040, 0, 0x0F);
     bench.run_ms(1500);
     bench.set(0x6083, 0, 60_000);
@@ -123,16 +190,26 @@ fn a_lost_battery_raises_10h_the_motor_goes_on_and_a_new_origin_clears_it() {
 }
 
 #[test]
-fn the_alarm_output_and_the_leds_tell_of_alarms() {
+fn the_alarm_output_is_normally_open_and_an_odd_ones_digit_of_60fb_makes_it_normally_closed() {
+    // 5.04, 60FBh:01: even is normally open, odd normally closed.
+    for (kp, healthy) in [(3000, false), (3001, true)] {
+        let mut bench = Bench::new();
+        bench.set(0x60FB, 1, kp);
+        bench.run_ms(5);
+        assert_eq!(output(&mut bench, "WR"), healthy, "{kp}: conducts while healthy");
+        bench.tell("1 battery off");
+        bench.run_ms(5);
+        assert_eq!(output(&mut bench, "WR"), !healthy, "{kp}: conducts in an alarm");
+    }
+}
+
+#[test]
+fn the_leds_tell_of_alarms() {
     let mut bench = Bench::new();
     bench.run_ms(1000);
-    assert!(output(&mut bench, "WR") && output(&mut bench, "GREEN") && !output(&mut bench, "RED"));
-    bench.set(0x60FB, 1, 3001);
-    bench.run_ms(5);
-    assert!(!output(&mut bench, "WR"), "an odd ones digit turns it around");
+    assert!(output(&mut bench, "GREEN") && !output(&mut bench, "RED"));
     bench.tell("1 battery off");
     bench.run_ms(5);
-    assert!(output(&mut bench, "WR"));
     let mut red = 0;
     let mut green_changes = 0;
     let mut green = output(&mut bench, "GREEN");

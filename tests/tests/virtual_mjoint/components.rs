@@ -53,7 +53,7 @@ fn an_eeprom_that_could_not_be_read_at_power_on_is_written_anew_by_a_save() {
 }
 
 #[test]
-fn an_encoder_that_stands_still_looks_like_a_locked_rotor() {
+fn an_encoder_that_stands_still_looks_like_a_stall() {
     let mut bench = Bench::new();
     turning(&mut bench, 300);
     let before = bench.position();
@@ -62,9 +62,14 @@ fn an_encoder_that_stands_still_looks_like_a_locked_rotor() {
     let stuck = bench.position();
     assert!((stuck - before).abs() < 2000, "{before} {stuck}");
     let current = bench.report().current_a;
-    assert!((current - 10.0).abs() < 0.5, "the speed that it does not see is asked for with all current: {current}");
+    // 16 % of 36 V / sqrt 3 on a phase of 0.44 ohm, r.m.s.
+    let allowed = 0.16 * 36.0 / 3.0_f64.sqrt() / 0.44 / 2.0_f64.sqrt();
+    assert!(
+        (current / allowed - 1.0).abs() < 0.05,
+        "the speed that it does not see is asked for with all output: {current}"
+    );
     assert!(bench.report().velocity_rpm.abs() < 1.0, "the field stands, and the shaft with it");
-    bench.until(5000, |bench| bench.get(0x260E, 0) == 0x12);
+    bench.until(5000, |bench| bench.get(0x260E, 0) == 0x14);
     assert_eq!(bench.position(), stuck);
     bench.tell("1 fault encoder off");
     bench.set(0x6040, 0, 0x8F);
@@ -78,7 +83,9 @@ fn an_encoder_that_stands_still_looks_like_a_locked_rotor() {
 fn a_lost_phase_takes_torque_and_a_heavy_load_locks_the_rotor() {
     let mut bench = Bench::new();
     turning(&mut bench, 300);
-    bench.tell("1 load torque 25");
+    // 5 A lift half as much again as the printed 34 N·m, two wires on average half of that.
+    bench.set(0x261D, 0, 5005);
+    bench.tell("1 load torque 34");
     bench.run_ms(1000);
     assert!((bench.report().velocity_rpm - 300.0).abs() < 10.0);
     bench.tell("1 fault phase on");

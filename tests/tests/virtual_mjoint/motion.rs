@@ -102,7 +102,7 @@ fn halt_stops_within_milliseconds_and_holds_and_the_move_goes_on_afterwards() {
     bench.set(0x607A, 0, 30 * TURN);
     bench.run_ms(500);
     bench.set(0x6040, 0, 0x012F);
-    // 1000 r/min at the limit of 10 A: 0.69e-4 kg m² * 105 rad/s / (10 A * 0.149 N m/A) is 5 ms.
+    // 1000 r/min at the limit of 10 A: 0.69e-4 kg m² * 105 rad/s / (10 A / 3.5 A * 1 N m) is 3 ms.
     bench.run_ms(40);
     assert!(bench.report().velocity_rpm.abs() < 10.0, "{}", bench.report().velocity_rpm);
     bench.run_ms(200);
@@ -156,7 +156,8 @@ fn the_load_is_felt_through_the_gear() {
     bench.tell("1 load torque 20");
     bench.run_ms(500);
     let more = bench.report().current_a - free;
-    let least = 20.0 / 50.0 / 0.149;
+    // The motor gives 1 N m at 3.5 A.
+    let least = 20.0 / 50.0 * 3.5;
     assert!((least..1.6 * least).contains(&more), "{more} A more, at least {least} A");
     assert!((bench.report().velocity_rpm - 500.0).abs() < 5.0);
 }
@@ -251,18 +252,19 @@ fn actual_values_are_in_the_manuals_units() {
 
 #[test]
 fn the_feed_forward_of_60fbh_gives_the_current_that_a_rising_back_emf_would_take() {
-    // At 10 A the speed rises by 10 A * 0.149 N·m/A / 0.69e-4 kg m², and the back-emf by 0.099 V·s times that, 2100 V/s. A
-    // current loop of 2000 rad/s on 0.44 ohm is behind such a ramp by 2100 / (0.44 * 2000), 2.4 A of the 10.
+    // At 5 A r.m.s. the speed rises by 1.43 N m / 0.69e-4 kg m², and the back-emf by 0.135 V·s times that, 2800 V/s. A current
+    // loop of 3000 rad/s on 0.44 ohm is behind such a ramp by 2800 / (0.44 * 3000), 2.1 A of an amplitude of 7.1.
     let time_to_1000_rpm = |feed_forward: i64| {
         let mut bench = Bench::new();
         bench.set(0x60FB, 2, feed_forward);
+        bench.set(0x261D, 0, 5005);
         bench.set(0x6083, 0, 60_000);
         bench.set(0x6060, 0, 3);
         bench.set(0x6040, 0, 0x0F);
         bench.set(0x60FF, 0, 1500);
         bench.seconds_until(0.1, std::time::Duration::from_micros(50), |report| report.velocity_rpm > 1000.0)
     };
-    // The motor's own 10.4 V at 1000 r/min.
-    let gained = time_to_1000_rpm(0) / time_to_1000_rpm(3400);
-    assert!((1.08..1.35).contains(&gained), "{gained}");
+    // 12 V of the motor's own 14.1 V at 1000 r/min.
+    let gained = time_to_1000_rpm(0) / time_to_1000_rpm(3924);
+    assert!((1.1..1.42).contains(&gained), "{gained}");
 }

@@ -74,7 +74,10 @@ pub struct Servo {
     electrical_turns: f32,
     velocity_rad_s: f32,
     setpoint_a: f32,
-    current_a: f32,
+    /// Current along the magnets that is asked for.
+    direct_setpoint_a: f32,
+    current_a: Dq,
+    wanted_v: Dq,
     saturated: bool,
 }
 
@@ -100,7 +103,9 @@ impl Servo {
             electrical_turns: 0.0,
             velocity_rad_s: 0.0,
             setpoint_a: 0.0,
-            current_a: 0.0,
+            direct_setpoint_a: 0.0,
+            current_a: Dq::default(),
+            wanted_v: Dq::default(),
             saturated: false,
         }
     }
@@ -137,7 +142,8 @@ impl Servo {
         let velocity_rad_s = sign * counts_s * model.rad_per_count();
         self.velocity_rad_s = self.velocity_filter.update(&gains.velocity_filter, velocity_rad_s);
         let (sin, cos) = sin_cos_turns(self.electrical_turns);
-        self.current_a = sign * park(clarke(three_phases(phase_current_a)), sin, cos).q;
+        let Dq { d, q } = park(clarke(three_phases(phase_current_a)), sin, cos);
+        self.current_a = Dq { d, q: sign * q };
     }
 
     /// The outer loops: every supervision period. `position` is the actual position that the demand counts in.
@@ -198,7 +204,8 @@ impl Servo {
         bus_v: f32,
     ) -> [f32; 3] {
         let sign = f32::from(model.direction);
-        let setpoint_a = Dq { d: 0.0, q: sign * self.torque_filter.update(&gains.torque_filter, self.setpoint_a) };
+        let torque_a = self.torque_filter.update(&gains.torque_filter, self.setpoint_a);
+        let setpoint_a = Dq { d: self.direct_setpoint_a, q: sign * torque_a };
         let input = FocInput {
             phase_current_a: three_phases(phase_current_a),
             electrical_turns: self.electrical_turns,
@@ -207,6 +214,7 @@ impl Servo {
         };
         let output = self.foc.tick(&gains.foc, setpoint_a, &input, model.control_period_s);
         self.saturated = output.saturated;
+        self.wanted_v = output.wanted_v;
         output.duty
     }
 
@@ -227,7 +235,22 @@ impl Servo {
 
     /// Measured torque-producing current, A.
     pub const fn current_a(&self) -> f32 {
-        self.current_a
+        self.current_a.q
+    }
+
+    /// Amplitude of the whole measured current, A.
+    pub fn current_magnitude_a(&self) -> f32 {
+        magnitude(self.current_a)
+    }
+
+    /// Amplitude of the phase voltage that the current loops asked for last, V: more than the bus has while it is used up.
+    pub fn wanted_magnitude_v(&self) -> f32 {
+        magnitude(self.wanted_v)
+    }
+
+    /// Asks for a current along the magnets, A: negative weakens the field. It stays until it is asked for anew.
+    pub const fn set_direct_current(&mut self, direct_a: f32) {
+        self.direct_setpoint_a = direct_a;
     }
 
     /// Current set-point, A.
@@ -256,8 +279,14 @@ impl Servo {
         self.feed_forward_filter.value = 0.0;
         self.torque_filter.value = 0.0;
         self.setpoint_a = 0.0;
+        self.direct_setpoint_a = 0.0;
+        self.wanted_v = Dq::default();
         self.saturated = false;
     }
+}
+
+fn magnitude(vector: Dq) -> f32 {
+    libm::sqrtf(vector.d * vector.d + vector.q * vector.q)
 }
 
 /// Two phases are measured, and the three add up to nothing.

@@ -1,15 +1,14 @@
 //! What one count of a loop coefficient is worth. The manual gives 60F9h and 60FBh ranges and hardly a unit; these are
 //! chosen so that the values as delivered make a well damped drive on the motors of crate `plant`.
 //!
-//! Motors: R = 0.43 and 0.265 ohm, L = 0.4 and 0.25 mH a phase, Kt = 0.149 and 0.198 N m/A, J = 0.69e-4 and
-//! 1.74e-4 kg m².
+//! Motors: R = 0.43 and 0.265 ohm, L = 0.4 and 0.25 mH a phase, Kt = 0.202 N m/A of amplitude, J = 0.69e-4 and 1.74e-4 kg m².
 //!
 //! | object | delivered | one count | gives | because |
 //! |---|---|---|---|---|
-//! | 60F9h:01 | 3000 | 1/15 mA/(rad/s) | 0.2 A/(rad/s) | velocity bandwidth kp Kt/J of 430 and 230 rad/s: a fifth of the current loop's or less |
+//! | 60F9h:01 | 3000 | 1/15 mA/(rad/s) | 0.2 A/(rad/s) | velocity bandwidth kp Kt/J of 590 and 230 rad/s: a fifth of the current loop's or less |
 //! | 60F9h:02 | 30 | 1 ms | 30 ms | printed as a time; seven and more of the loop's own. 2000 is none at all ("cancel integration") |
-//! | 60FBh:01 | 3000 | 0.015 1/s | 45 1/s | a fifth of the slower velocity loop |
-//! | 60FBh:02 | 0 | 1/327 V at 1000 r/min | 0 V | printed; added to the motor's voltage. Its 12 V reach over the 10.4 V of the M4230's own |
+//! | 60FBh:01 | 3000 | 0.02 1/s | 60 1/s | a quarter of the slower velocity loop |
+//! | 60FBh:02 | 0 | 1/327 V at 1000 r/min | 0 V | printed; added to the motor's voltage. Its 12 V come near the 14.1 V of the motors' own |
 
 use motion::cascade::CascadeGains;
 use motion::filter::LowPassGains;
@@ -24,7 +23,7 @@ use crate::engine::servo::ServoGains;
 use crate::engine::tracking::TrackingGains;
 
 const VELOCITY_KP_A_PER_RAD_S: f32 = 0.2 / 3000.0;
-const POSITION_KP_PER_S: f32 = 0.015;
+const POSITION_KP_PER_S: f32 = 0.02;
 
 /// Value of 60F9h:02 that switches integration off ("Disk load").
 const NO_INTEGRATION_MS: u16 = 2000;
@@ -32,8 +31,8 @@ const NO_INTEGRATION_MS: u16 = 2000;
 /// V for each rad/s of the shaft in one count of 60FBh:02: 1/327 V at 1000 r/min.
 const FEED_FORWARD_V_S: f32 = 60.0 / (327.0 * 1000.0 * core::f32::consts::TAU);
 
-/// Bandwidth of the current loop: a tenth of the control period's 20 kHz, in rad/s a sixth of it again.
-const CURRENT_BANDWIDTH_RAD_S: f32 = 2000.0;
+/// Bandwidth of the current loop: 0.15 of it are one control period.
+const CURRENT_BANDWIDTH_RAD_S: f32 = 3000.0;
 
 /// Share of the bus voltage that the power stage can give to a turning motor; the rest is dead time.
 pub const MODULATION_LIMIT: f32 = 0.98;
@@ -47,7 +46,12 @@ pub(super) fn gains(values: &Values, model: &Model) -> ServoGains {
         foc: FocGains {
             d: current,
             q: current,
-            feed_forward: Some(FeedForward { flux_linkage_wb, ..FeedForward::default() }),
+            // The axes are decoupled: at 2000 r/min the electrical speed is beyond the loop's bandwidth.
+            feed_forward: Some(FeedForward {
+                inductance_d_h: model.inductance_h,
+                inductance_q_h: model.inductance_h,
+                flux_linkage_wb,
+            }),
             modulation_limit: MODULATION_LIMIT,
             voltage_delay_s: 0.5 * CONTROL_PERIOD_S,
         },

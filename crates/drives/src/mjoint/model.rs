@@ -15,7 +15,7 @@ pub struct Model {
     pub resistance_ohm: f32,
     /// Inductance of one phase, H: half of what is printed.
     pub inductance_h: f32,
-    /// Current for each rad/s² of the bare motor: its inertia over its torque constant, A/(rad/s²).
+    /// Amplitude of the q current for each rad/s² of the bare motor: its inertia over its torque constant, A/(rad/s²).
     pub acceleration_a_s2: f32,
 }
 
@@ -36,24 +36,25 @@ impl Model {
     }
 }
 
+/// Of both motors: 1 N·m at 3.5 A and 2 N·m at 7 A, r.m.s.; for each ampere of amplitude.
+const TORQUE_CONSTANT_NM_A: f32 = 1.0 / (core::f32::consts::SQRT_2 * 3.5);
+
 const M4230: Model = Model {
     name: "m4230",
     ratio: 1.0,
     max_rpm: 2000.0,
-    pole_pairs: 10,
+    pole_pairs: 21,
     resistance_ohm: 0.5 * 0.86,
     inductance_h: 0.5 * 0.8e-3,
-    // 36 V at 2000 r/min without load: 0.149 N·m/A.
-    acceleration_a_s2: 0.69e-4 / 0.149,
+    acceleration_a_s2: 0.69e-4 / TORQUE_CONSTANT_NM_A,
 };
 
 const M8025: Model = Model {
     name: "m8025",
     ratio: 1.0,
     max_rpm: 1500.0,
-    pole_pairs: 10,
+    pole_pairs: 21,
     resistance_ohm: 0.5 * 0.53,
     inductance_h: 0.5 * 0.5e-3,
-    // 36 V at 1500 r/min without load: 0.198 N·m/A.
-    acceleration_a_s2: 1.74e-4 / 0.198,
+    acceleration_a_s2: 1.74e-4 / TORQUE_CONSTANT_NM_A,
 };

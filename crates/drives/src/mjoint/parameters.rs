@@ -1,6 +1,7 @@
 //! The dictionary's parameters in physical units, as the parts of the drive want them. Written anew when one changes.
 
 use motion::commutation::CommutationModel;
+use motion::field_weakening::FieldWeakeningGains;
 use motion::observer::ObserverGains;
 
 use super::gains::gains;
@@ -32,6 +33,7 @@ pub(super) struct Parameters {
     pub(super) servo: ServoModel,
     pub(super) gains: ServoGains,
     pub(super) limits: ServoLimits,
+    pub(super) weakening: FieldWeakeningGains,
     /// 261Dh: seconds at the current limit until the alarm, 0 for never.
     pub(super) current_time_s: f32,
     /// 2618h: share of the output that a stationary motor may have.
@@ -39,7 +41,8 @@ pub(super) struct Parameters {
     /// 2618h: seconds at that limit until the alarm, 0 for never.
     pub(super) stationary_time_s: f32,
     pub(super) time_base: TimeBase,
-    /// Ones digit of 60FBh:01 is odd: the alarm output conducts while there is an alarm.
+    /// Ones digit of 60FBh:01 is even: the alarm output is normally open, and conducts while there is an alarm. Odd:
+    /// normally closed, and opens then.
     pub(super) alarm_conducts: bool,
 }
 
@@ -65,11 +68,13 @@ impl TimeBase {
 }
 
 impl Parameters {
-    /// `function` is that of the last power-on: 2619h acts from the next one on.
-    pub(super) fn from(values: &Values, model: &Model, function: Function) -> Self {
+    /// `function` is that of the last power-on: 2619h acts from the next one on. `amplitude` is that of a phase's current
+    /// for each ampere of 261Dh and 6078h.
+    pub(super) fn from(values: &Values, model: &Model, function: Function, amplitude: f32) -> Self {
         let max_speed = model.max_rpm * COUNTS_S_PER_RPM;
         let acceleration = acceleration(values);
-        let (current_a, current_time_s) = with_seconds(values.get(ALLOWABLE_CURRENT));
+        let (allowed_a, current_time_s) = with_seconds(values.get(ALLOWABLE_CURRENT));
+        let current_a = allowed_a * amplitude;
         let (stationary_output, stationary_time_s) = with_seconds(values.get(STATIONARY_OUTPUT));
         let profile_speed = f64::from(values.get(PROFILE_VELOCITY)) * COUNTS_S_PER_RPM;
         Self {
@@ -82,12 +87,23 @@ impl Parameters {
             servo: servo_model(model),
             gains: gains(values, model),
             limits: ServoLimits { current_a, velocity_rad_s: model.max_rpm as f32 * RAD_S_PER_RPM },
+            weakening: weakening(values, current_a),
             current_time_s,
             stationary_output,
             stationary_time_s,
             time_base: TimeBase::from_raw(values.get(SYNCHRONOUS_CONTROL_WORD)),
-            alarm_conducts: is_odd(values.get(POSITION_PROPORTIONAL)),
+            alarm_conducts: !is_odd(values.get(POSITION_PROPORTIONAL)),
         }
+    }
+}
+
+/// 2604h: how far the vector of the current limit may be turned from the torque's direction against the magnets.
+fn weakening(values: &Values, current_a: f32) -> FieldWeakeningGains {
+    let advance_rad = f32::from(values.get(WEAK_MAGNETIC)) * (0.1 * core::f32::consts::PI / 180.0);
+    FieldWeakeningGains {
+        most_a: current_a * libm::sinf(advance_rad),
+        voltage_share: WEAKENING_VOLTAGE_SHARE,
+        integral_per_s: WEAKENING_PER_S,
     }
 }
 

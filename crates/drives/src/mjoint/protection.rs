@@ -1,6 +1,7 @@
 //! Which causes of alarms are present, judged once each supervision period.
 
 use super::alarms::row;
+use super::gains::MODULATION_LIMIT;
 use super::hardware::{Battery, Sensors};
 use super::parameters::Parameters;
 use super::readings::*;
@@ -12,6 +13,8 @@ use crate::engine::servo::Servo;
 pub(super) struct Protection {
     at_current_limit_s: f32,
     at_output_limit_s: f32,
+    turning_s: f32,
+    halved: bool,
     battery_was_missing: bool,
     turns_were_lost: bool,
     /// The turns are unknown until an origin is set.
@@ -46,6 +49,7 @@ impl Protection {
     pub(super) fn reset(&mut self) {
         self.at_current_limit_s = 0.0;
         self.at_output_limit_s = 0.0;
+        self.halved = false;
     }
 
     /// A new origin has been set: the turns are known.
@@ -65,8 +69,23 @@ impl Protection {
     /// The current stays at the limit of 261Dh.
     fn locked_rotor(&mut self, parameters: &Parameters, now: &Situation<'_>) -> bool {
         let limit_a = parameters.limits.current_a;
-        let at_limit = now.live && limit_a > 0.0 && now.servo.current_a().abs() >= AT_CURRENT_LIMIT_SHARE * limit_a;
+        let at_limit = now.live && limit_a > 0.0 && now.servo.current_magnitude_a() >= AT_CURRENT_LIMIT_SHARE * limit_a;
         lasts(&mut self.at_current_limit_s, at_limit, parameters.current_time_s)
+    }
+
+    /// Share of the output that the motor may have: 2618h while it is stationary. Without an alarm that is halved after a
+    /// while of stall, until the motor has turned for more than the swing of a gear that unwinds.
+    pub(super) fn output_share(&mut self, parameters: &Parameters, stationary: bool) -> f32 {
+        self.turning_s = if stationary { 0.0 } else { self.turning_s + SUPERVISION_PERIOD_S };
+        let stalled = parameters.stationary_time_s == 0.0 && self.at_output_limit_s >= HALVED_AFTER_S;
+        self.halved = stalled || (self.halved && self.turning_s < TURNS_AGAIN_S);
+        if self.halved {
+            0.5 * parameters.stationary_output
+        } else if stationary {
+            parameters.stationary_output
+        } else {
+            MODULATION_LIMIT
+        }
     }
 
     /// The output stays at the limit of 2618h and the motor does not turn.

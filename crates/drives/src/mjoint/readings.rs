@@ -48,12 +48,31 @@ pub const VELOCITY_INTEGRAL_TIME_MS: i64 = 30;
 /// 60FBh:01 as delivered: what the manual gives for a stiff load ("Wire rod load"). Its ones digit is even.
 pub const POSITION_KP: i64 = 3000;
 
-/// 2618h as delivered: 60 % for 5 s.
-pub const STATIONARY_MAX_OUTPUT: i64 = 605;
+/// 2618h as delivered: 16 % for 5 s. Enough to start the printed torque with a winding of 85 degC (M8025: 2 N·m take 9.9 A
+/// of amplitude, 3.4 V of 20.8 V). A locked output then stays under [`AT_CURRENT_LIMIT_SHARE`] of the 10 A of 261Dh (M8025
+/// cold: 8.6 A), so that it is 14h that comes, the alarm that is called stall.
+pub const STATIONARY_MAX_OUTPUT: i64 = 165;
 
-/// 261Dh as delivered: 10 A, the most that it takes, for 5 s. The printed torques behind the reducers take 6.7 A of the
-/// M4230 and up to 8.5 A of the M8025.
+/// With 2618h without an alarm (ones digit 0), the output of a motor that has stalled for so long is halved. The manual of
+/// the same maker's AIM servos, special function 18h.
+pub const HALVED_AFTER_S: f32 = 3.0;
+
+/// Turning for so long, it has its whole output again: longer than a gear that unwinds swings.
+pub const TURNS_AGAIN_S: f32 = 0.2;
+
+/// 261Dh as delivered: 10 A, the most that it takes, for 5 s. The printed torques behind the reducers take 3.5 and 7 A.
 pub const MAX_ALLOWABLE_CURRENT: i64 = 10005;
+
+/// 2604h as delivered, 0.1 degrees: the whole range, with which the motors reach their printed maximum speed. The range
+/// and the unit are those of the AIM servos' manual.
+pub const WEAK_MAGNETIC_ANGLE: i64 = 200;
+
+/// Field weakening keeps the voltage at this share of what the power stage can give.
+pub const WEAKENING_VOLTAGE_SHARE: f32 = 0.99;
+
+/// Its regulator uses up the whole angle within 25 ms at a tenth of voltage too much, and is far slower than the
+/// current loop.
+pub const WEAKENING_PER_S: f32 = 400.0;
 
 /// Over-voltage alarm ("Alarm over 52V").
 pub const OVER_VOLTAGE_V: f32 = 52.0;

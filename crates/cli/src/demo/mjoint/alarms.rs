@@ -26,16 +26,16 @@ fn locked_rotor(bench: &mut Bench) {
     bench.write("3 A for 2 s at most (261Dh)", 0x261D, 0, 3002);
     run_at_300(bench);
     bench.step("locked rotor");
-    let healthy = bench.output("WR");
-    bench.compare("alarm output on", if healthy { "on" } else { "off" }, healthy);
+    let healthy = !bench.output("WR");
+    bench.compare("alarm output off", if healthy { "off" } else { "on" }, healthy);
     bench.machine("rotor lock");
     bench.run_ms(300);
     let current = bench.report().current_a;
     bench.expect("current", Expect::Near(3.0, 0.1), "A", current);
     // The deviation has to grow before the current is at its limit.
     expect_alarm(bench, 0x12, "locked rotor (12h)", 2.0 - 0.3);
-    let alarmed = !bench.output("WR");
-    bench.compare("alarm output off", if alarmed { "off" } else { "on" }, alarmed);
+    let alarmed = bench.output("WR");
+    bench.compare("alarm output on", if alarmed { "on" } else { "off" }, alarmed);
     expect_flashes(bench, 1, 2);
     expect_heartbeat_04(bench);
     bench.machine("rotor free");
@@ -49,7 +49,8 @@ fn stall(bench: &mut Bench) {
     run_at_300(bench);
     bench.step("stall");
     bench.machine("rotor lock");
-    expect_alarm(bench, 0x14, "stall (14h)", 1.0);
+    // The motor swings on the gear's spring before it stands.
+    expect_alarm(bench, 0x14, "stall (14h)", 1.0 + 0.2);
     expect_flashes(bench, 1, 4);
     bench.machine("rotor free");
     bench.write("2601h: output forbidden", 0x2601, 0, 0);

@@ -1,11 +1,13 @@
 //! The control task.
 
 use cia402::{Controlword, ModeOfOperation};
+use motion::field_weakening::torque_share;
 use motion::filter::LowPassGains;
 
 use super::{Homing, MJoint, OwnMotion};
 use crate::engine::axis::Demand;
 use crate::engine::faults::FaultSet;
+use crate::engine::servo::ServoLimits;
 use crate::mjoint::alarms::{self, row};
 use crate::mjoint::axis::Feedback;
 use crate::mjoint::gains::MODULATION_LIMIT;
@@ -17,6 +19,8 @@ use crate::mjoint::protection::Situation;
 use crate::mjoint::readings::*;
 
 const DT_S: f64 = SUPERVISION_PERIOD_S as f64;
+/// Amplitude of a phase over the voltage of the bus.
+const INV_SQRT_3: f32 = 0.577_350_26;
 
 impl MJoint {
     /// The encoder, every control period.
@@ -70,9 +74,27 @@ impl MJoint {
         }
         let base_s = self.time_base_s();
         self.demand = self.axis.update(DT_S, base_s);
+        let direct_a = self.weaken_field(sensors);
         let Parameters { servo, gains, limits, .. } = &self.parameters;
-        self.servo.control(servo, gains, &self.demand, feedback.position, limits);
+        let limits = ServoLimits { current_a: torque_share(limits.current_a, direct_a), ..*limits };
+        self.servo.control(servo, gains, &self.demand, feedback.position, &limits);
         self.publish(sensors);
+    }
+
+    /// The current against the magnets, for more speed than the bus gives by itself. A motor that stands needs its voltage
+    /// for torque.
+    fn weaken_field(&mut self, sensors: &Sensors) -> f32 {
+        let turns = self.demand != Demand::Off && self.servo.velocity_rpm().abs() >= STATIONARY_RPM;
+        let direct_a = if turns {
+            let available_v = sensors.bus_v * INV_SQRT_3 * MODULATION_LIMIT;
+            let wanted_v = self.servo.wanted_magnitude_v();
+            self.weakening.update(&self.parameters.weakening, wanted_v, available_v, SUPERVISION_PERIOD_S)
+        } else {
+            self.weakening.reset();
+            0.0
+        };
+        self.servo.set_direct_current(direct_a);
+        direct_a
     }
 
     /// By how much the time base of the interpolation went on in this period.
@@ -92,7 +114,7 @@ impl MJoint {
         if self.parameters_changed {
             self.parameters_changed = false;
             let output = self.parameters.gains.foc.modulation_limit;
-            self.parameters = Parameters::from(self.device.values(), self.model, self.function);
+            self.parameters = Parameters::from(self.device.values(), self.model, self.function, self.amplitude);
             self.parameters.gains.foc.modulation_limit = output;
         }
     }
@@ -102,10 +124,10 @@ impl MJoint {
         let rpm = self.servo.velocity_rpm();
         let shown = LowPassGains::from_time_constant(DISPLAY_FILTER_S, SUPERVISION_PERIOD_S);
         self.shown_velocity_rpm.update(&shown, rpm);
-        self.shown_current_a.update(&shown, self.servo.current_a());
+        let current_a = self.servo.current_magnitude_a().copysign(self.servo.current_a());
+        self.shown_current_a.update(&shown, current_a / self.amplitude);
         let stationary = rpm.abs() < STATIONARY_RPM;
-        self.parameters.gains.foc.modulation_limit =
-            if stationary { self.parameters.stationary_output } else { MODULATION_LIMIT };
+        self.parameters.gains.foc.modulation_limit = self.protection.output_share(&self.parameters, stationary);
         Feedback {
             position: self.position,
             velocity: f64::from(rpm) * COUNTS_S_PER_RPM,

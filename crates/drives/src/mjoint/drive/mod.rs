@@ -15,6 +15,7 @@ use canopen::heartbeat::{Consumer, ConsumerEvent};
 use canopen::node::{Node, NodeProfile};
 use canopen::sdo::server::FrameLength;
 use cia402::{Controlword, ModeOfOperation, PowerState};
+use motion::field_weakening::FieldWeakening;
 use motion::filter::LowPass;
 
 use super::alarms::{self, ALARM_COUNT, ALARMS, row};
@@ -31,7 +32,7 @@ use super::protection::Protection;
 use super::pulses::Pulses;
 use super::readings::*;
 use super::turns::Turns;
-use super::variations::VARIANT;
+use super::variations::{self, VARIANT};
 use super::{Values, storage};
 use crate::engine::axis::Demand;
 use crate::engine::device::{Application, Device};
@@ -61,6 +62,8 @@ pub struct MJoint {
     host_lost: bool,
     /// 2619h as it was at power-on.
     function: Function,
+    /// Amplitude of a phase's current for each ampere of 261Dh and 6078h.
+    amplitude: f32,
     parameters: Parameters,
     parameters_changed: bool,
     /// 260Ah without the two values that set the origin.
@@ -80,6 +83,7 @@ pub struct MJoint {
 
     axis: Axis,
     servo: Servo,
+    weakening: FieldWeakening,
     demand: Demand,
     duty: [f32; 3],
     alarms: FaultMonitor<ALARM_COUNT>,
@@ -143,11 +147,14 @@ impl MJoint {
     /// Motor free, and the values of `device` in effect.
     fn over(model: &'static Model, device: Device<ROW_COUNT>) -> Self {
         let function = Function::from_raw(device.values().get(MODE_SELECTION)).unwrap_or_default();
-        let parameters = Parameters::from(device.values(), model, function);
+        let amplitude = variations::amplitude_per_a(device.variant());
+        let parameters = Parameters::from(device.values(), model, function, amplitude);
         Self {
             model,
             gear_numerator: device.values().get(GEAR_NUMERATOR),
             servo: Servo::new(&parameters.servo, 0, 0),
+            weakening: FieldWeakening::default(),
+            amplitude,
             device,
             powered_at: Instant::ZERO,
             host: None,
@@ -262,7 +269,7 @@ impl MJoint {
             brake: self.brake(),
             set_origin: core::mem::take(&mut self.set_origin),
             zero_output: self.position < 0,
-            alarm_output: (alarm == 0) != self.parameters.alarm_conducts,
+            alarm_output: (alarm != 0) == self.parameters.alarm_conducts,
             red_led: lit.red,
             green_led: lit.green,
         }

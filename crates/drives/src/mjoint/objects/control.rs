@@ -7,7 +7,7 @@
 use canopen::od::Entry;
 
 use super::checks::{mode_selection, revolutions_in_tpdo};
-use super::values::{MODES, OFF_ON};
+use super::values::{self, MODES, OFF_ON};
 use crate::mjoint::readings::*;
 use crate::row::{I8, I16, I32, U8, U16, U32, join, ro, rw, rws};
 
@@ -18,8 +18,10 @@ const MANUFACTURER: [Entry; 17] = [
     rw(0x2600, 0, U16, "modbus_enable", "Modbus enable").values(OFF_ON),
     // 1 from power-on: bit 2 of the statusword 0404h that 5.10.1 prints before anything is enabled.
     rw(0x2601, 0, U16, "output_enabled", "Drive output enabled").values(OFF_ON).default(1),
-    rws(0x2604, 0, U16, "weak_magnetic_angle", "Weak magnetic Angle").range(0, 306),
-    rws(0x2609, 0, U16, "dir_polarity", "DIR polarity").values(OFF_ON),
+    // Printed 0 to 306 r/min; the AIM servos' manual has 0 to 200 and tenths of a degree.
+    rws(0x2604, 0, U16, "weak_magnetic_angle", "Weak magnetic Angle")
+        .range(0, 200).default(WEAK_MAGNETIC_ANGLE).unit("0.1 deg"),
+    rws(0x2609, 0, U16, "dir_polarity", "DIR polarity").values(values::DIR_POLARITY),
     rws(0x260A, 0, U16, "electronic_gear_numerator", "Electronic gear molecule").default(32768),
     rws(0x260B, 0, U16, "electronic_gear_denominator", "Electronic gear denominator")
         .range(1, 65535).default(8192),
