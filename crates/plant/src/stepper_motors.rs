@@ -28,8 +28,9 @@ use crate::thermal::{BodyModel, COPPER_PER_K};
 const TEETH: u32 = 50;
 /// Highest peak current: ZLIM42-C user manual V1.03, 2.1 and object 2005h.
 const HOLDING_CURRENT_A: f64 = 2.2;
-/// Detent torque over holding torque of the published MotionKing 17HS4401: 2.2 N cm of 40 N cm.
-const DETENT_SHARE: f64 = 0.055;
+/// Detent torque over holding torque. A guess: motors of this frame that are sold for low vibration have 2 to 3 %, and the
+/// manual calls this one's ultra-low (1.2). A plain one has more: the published MotionKing 17HS4401 2.2 N cm of 40 N cm.
+const DETENT_SHARE: f64 = 0.025;
 
 /// Assumed: two small ball bearings, 1 % of the smaller holding torque.
 const COULOMB_NM: f64 = 0.005;
@@ -47,6 +48,10 @@ const SWITCH_RESISTANCE_OHM: f64 = 0.2;
 /// Assumed: the board on the motor's back cover; 3 W warm it by 30 K.
 const HEAT_SINK: BodyModel = BodyModel { resistance_k_w: 10.0, capacity_j_k: 30.0 };
 
+/// Bus voltage below which the drive's own converter stops. A guess: its manual (2.1) wants 20 V of the supply, and cable and
+/// bus take some tenths when the motor draws its most.
+const CONVERTER_STOPS_V: f64 = 19.3;
+
 const SUPPLY: SupplyModel = SupplyModel {
     // Assumed: power supply with cable.
     source_resistance_ohm: 0.1,
@@ -54,8 +59,7 @@ const SUPPLY: SupplyModel = SupplyModel {
     capacitance_f: 220e-6,
     // Assumed: controller, bridges' drivers and optocouplers.
     consumption_w: 1.0,
-    // Assumed: where the drive's own converter stops.
-    consumption_from_v: 9.0,
+    consumption_from_v: CONVERTER_STOPS_V,
     // The drive has none; these values never matter.
     bleeder: BleederModel { resistance_ohm: 1e6, rated_power_w: 1.0, time_constant_s: 1.0, burn_out_load: 1e9 },
 };

@@ -102,7 +102,7 @@ fn detent_torque_has_four_periods_per_electrical_turn_and_rests_at_the_full_step
         last = torque;
     }
     assert_eq!(stable, [0.0, 1.0, 2.0, 3.0]);
-    assert!(near(highest, 0.055 * 0.48, 1e-6));
+    assert!(near(highest, 0.025 * 0.48, 1e-6));
 }
 
 #[test]

@@ -268,8 +268,8 @@ fn a_load_that_drives_the_motor_raises_the_bus_until_over_voltage() {
 }
 
 #[test]
-fn over_voltage_begins_above_40_v_and_there_is_no_fault_for_a_low_supply() {
-    for (supply_v, code) in [(15.0, 0), (20.0, 0), (30.0, 0), (39.5, 0), (40.5, 0xFF01)] {
+fn over_voltage_begins_above_40_v() {
+    for (supply_v, code) in [(20.0, 0), (30.0, 0), (39.5, 0), (40.5, 0xFF01)] {
         let mut bench = Bench::new();
         bench.operate(|drive, now| drive.set_supply(supply_v, now)).expect("a supply");
         bench.run_ms(300);

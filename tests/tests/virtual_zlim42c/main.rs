@@ -19,4 +19,5 @@ mod power_state;
 mod robustness;
 mod step_loss;
 mod stops;
+mod supply;
 mod terminals;

@@ -336,6 +336,31 @@ fn clearing_the_position_in_motion_changes_the_numbers_and_not_the_way() {
     assert_eq!(bench.get(0x6064, 0), here + 400);
 }
 
+/// Speeds of the rotor at a constant commanded one, r/min about it.
+fn swings(mut bench: Bench, setting: i64, rpm: i64) -> Vec<f64> {
+    bench.set(0x2006, 0, setting);
+    bench.enable_in(3);
+    bench.set(0x60FF, 0, rpm);
+    bench.run_ms(1000);
+    let mut look = |_| {
+        bench.run(Duration::from_micros(250));
+        bench.report().velocity_rpm - rpm as f64
+    };
+    (0..4000).map(&mut look).collect()
+}
+
+#[test]
+fn at_the_speeds_of_the_manuals_examples_the_motor_turns_smoothly_with_the_factory_settings() {
+    // 1.2: ultra-low vibration. 5.3.4, 5.3.5 and 5.3.6 have 60 and 120 r/min; the detent meets the rotor's resonance at 65
+    // (70 mm) and 90 (82 mm).
+    for new in [Bench::new, Bench::long] {
+        for rpm in [20, 40, 60, 65, 70, 80, 90, 120, 300] {
+            let ripple = swings(new(), 10, rpm).into_iter().fold(0.0, |most: f64, swing| most.max(swing.abs()));
+            assert!(ripple < 0.2 * rpm as f64, "{rpm} r/min: {ripple} r/min");
+        }
+    }
+}
+
 #[test]
 fn full_steps_shake_the_rotor_at_its_resonance_far_more_than_fine_ones() {
     use plant::stepper_motor::StepperMotorModel;
@@ -344,20 +369,9 @@ fn full_steps_shake_the_rotor_at_its_resonance_far_more_than_fine_ones() {
     let ringing_hz = (model.stepper.stiffness_nm_rad(1.2) / model.rotor.inertia_kg_m2).sqrt() / std::f64::consts::TAU;
     let rpm = (ringing_hz / 200.0 * 60.0).round() as i64;
     let shaking = |setting| {
-        let mut bench = Bench::new();
-        bench.set(0x2006, 0, setting);
-        bench.enable_in(3);
-        bench.set(0x60FF, 0, rpm);
-        bench.run_ms(1000);
-        let speeds: Vec<f64> = (0..2000)
-            .map(|_| {
-                bench.run(LOOK);
-                bench.report().velocity_rpm - rpm as f64
-            })
-            .collect();
+        let speeds = swings(Bench::new(), setting, rpm);
         (speeds.iter().map(|speed| speed * speed).sum::<f64>() / speeds.len() as f64).sqrt()
     };
     let (full, fine) = (shaking(0), shaking(7));
-    // Fine ones leave the detent, which comes as often.
-    assert!(full > 3.0 * fine && full > rpm as f64, "{full} and {fine} r/min about {rpm}");
+    assert!(full > 10.0 * fine && full > rpm as f64, "{full} and {fine} r/min about {rpm}");
 }

@@ -72,7 +72,7 @@ fn the_statusword_of_each_state_in_each_mode_at_rest() {
 
 #[test]
 fn a_locked_shaft_stands_against_a_load_that_turns_a_free_one() {
-    // 200Bh, not enabled. A tenth of the holding torque turns a motor that has its detent (0.026 N m) only.
+    // 200Bh, not enabled. A tenth of the holding torque turns a motor that has its detent (0.012 N m) and its friction only.
     for (lock, stands) in [(0, false), (1, true)] {
         let mut bench = Bench::new();
         bench.set(0x200B, 0, lock);

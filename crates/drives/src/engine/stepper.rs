@@ -8,8 +8,15 @@
 //! angle = pulses / pulses per electrical turn        i_a* = I cos(angle)        i_b* = I sin(angle)
 //! ```
 //!
-//! One PI controller for each axis of the turning frame regulates the two currents. Nothing here measures the rotor: it
-//! follows within a quarter of an electrical turn, or slips by whole ones, and the position knows nothing of it.
+//! One PI controller for each axis of the turning frame regulates the two currents. Across the vector flows what balances
+//! the detent of a rotor that follows without a load, four periods in an electrical turn:
+//!
+//! ```text
+//! i_q* = I_detent sin(4 angle)
+//! ```
+//!
+//! Nothing here measures the rotor: it follows within a quarter of an electrical turn, or slips by whole ones, and the
+//! position knows nothing of it.
 
 use motion::angle::sin_cos_turns;
 use motion::pid::{Pi, PiGains};
@@ -26,6 +33,11 @@ pub struct StepperModel {
     pub periods_per_command: u8,
     /// Control period, s.
     pub control_period_s: f32,
+    /// Current across the vector that balances the motor's detent, A: the detent torque over the torque constant. Zero for
+    /// none.
+    pub detent_a: f32,
+    /// How far ahead that current is asked for, control periods: what the voltage and the current take to follow.
+    pub detent_lead_periods: f32,
 }
 
 /// Amplitudes of the current vector.
@@ -157,8 +169,9 @@ impl Stepper {
         let angle = f32::from(self.field) * per_pulse;
         let (sin, cos) = sin_cos_turns(angle);
         let [a, b] = current_a;
-        let error_d = self.amplitude_a - (a * cos + b * sin);
-        let error_q = a * sin - b * cos;
+        let (wanted_d_a, wanted_q_a) = self.wanted_current_a(model, angle, per_pulse);
+        let error_d = wanted_d_a - (a * cos + b * sin);
+        let error_q = wanted_q_a + a * sin - b * cos;
         let (wanted_d, wanted_q) =
             (self.d.propose(&gains.current, error_d, 0.0), self.q.propose(&gains.current, error_q, 0.0));
 
@@ -174,6 +187,19 @@ impl Stepper {
         let duty = if bus_v > 0.0 { [v_a / bus_v, v_b / bus_v] } else { [0.0; 2] };
         self.note_peaks(current_a, [self.amplitude_a * cos, self.amplitude_a * sin]);
         duty
+    }
+
+    /// Current along the vector and across it, A: across it what balances the detent, along it the rest of the vector's length
+    /// (`I cos x` for `I sin x`, to the square of x). Above the speed at which the lead is a quarter of the detent's period
+    /// nothing is balanced: the rotor's inertia smooths what comes so often.
+    #[inline]
+    fn wanted_current_a(&self, model: &StepperModel, angle: f32, per_pulse: f32) -> (f32, f32) {
+        let lead = model.detent_lead_periods * self.pulses_per_period as f32 * per_pulse;
+        if model.detent_a == 0.0 || self.amplitude_a <= model.detent_a || lead.abs() > 1.0 / 16.0 {
+            return (self.amplitude_a, 0.0);
+        }
+        let across_a = model.detent_a * sin_cos_turns(4.0 * (angle + lead)).0;
+        (self.amplitude_a - 0.5 * across_a * across_a / self.amplitude_a, across_a)
     }
 
     /// The largest values since they were last taken.
@@ -238,8 +264,13 @@ const ROUNDING: f64 = 1e-6;
 mod tests {
     use super::*;
 
-    const MODEL: StepperModel =
-        StepperModel { pulses_per_electrical_turn: 80, periods_per_command: 10, control_period_s: 50e-6 };
+    const MODEL: StepperModel = StepperModel {
+        pulses_per_electrical_turn: 80,
+        periods_per_command: 10,
+        control_period_s: 50e-6,
+        detent_a: 0.0,
+        detent_lead_periods: 0.0,
+    };
     const GAINS: StepperGains =
         StepperGains { current: PiGains { proportional: 15.0, integral_per_s: 1.5e3 }, modulation_limit: 0.98 };
     const CURRENTS: StepperCurrents = StepperCurrents { run_a: 1.2, hold_a: 0.6, hold_after: 200 };
@@ -259,9 +290,13 @@ mod tests {
 
         /// One supervision period on windings without a rotor.
         fn run(&mut self, point: TrajectoryPoint) {
-            self.stepper.command(&MODEL, &Demand::Position(point), &CURRENTS);
+            self.run_with(&MODEL, point);
+        }
+
+        fn run_with(&mut self, model: &StepperModel, point: TrajectoryPoint) {
+            self.stepper.command(model, &Demand::Position(point), &CURRENTS);
             for _ in 0..10 {
-                let next = self.stepper.modulate(&MODEL, &GAINS, self.current_a, 24.0);
+                let next = self.stepper.modulate(model, &GAINS, self.current_a, 24.0);
                 let duty = core::mem::replace(&mut self.duty, next);
                 for (current_a, duty) in self.current_a.iter_mut().zip(duty) {
                     *current_a += (24.0 * duty - RESISTANCE_OHM * *current_a) * (50e-6 / INDUCTANCE_H);
@@ -304,6 +339,20 @@ mod tests {
         let lag = (asked - bench.angle_turns() + 0.5).rem_euclid(1.0) - 0.5;
         assert!(lag.abs() < 0.03, "{lag} turns");
         assert!((bench.stepper.current_a() - 1.2).abs() < 0.1, "{}", bench.stepper.current_a());
+    }
+
+    #[test]
+    fn what_balances_the_detent_turns_the_vector_between_the_full_steps_and_leaves_its_length() {
+        let model = StepperModel { detent_a: 0.05, ..MODEL };
+        // Full steps (20 pulses) lie where the detent is zero, quarter steps where it is at its greatest.
+        for (pulses, across_a) in [(0, 0.0), (5, 0.05), (10, 0.0), (15, -0.05), (20, 0.0), (25, 0.05)] {
+            let mut bench = Bench::new();
+            bench.run_with(&model, TrajectoryPoint::rest(0));
+            (0..150).for_each(|_| bench.run_with(&model, TrajectoryPoint::rest(pulses)));
+            let angle = f64::from(pulses) / 80.0 + f64::from(across_a / 1.2) / core::f64::consts::TAU;
+            assert!((bench.angle_turns() - angle).abs() < 2e-4, "{pulses}: {} turns", bench.angle_turns());
+            assert!((bench.stepper.current_a() - 1.2).abs() < 0.005, "{pulses}: {} A", bench.stepper.current_a());
+        }
     }
 
     #[test]

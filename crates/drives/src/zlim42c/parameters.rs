@@ -43,6 +43,8 @@ impl Parameters {
                 pulses_per_electrical_turn: pulses_per_turn / TEETH as u16,
                 periods_per_command: SUPERVISION_DIVIDER,
                 control_period_s: CONTROL_PERIOD_S,
+                detent_a: if pulses_per_turn < DETENT_FROM_PULSES { 0.0 } else { DETENT_CURRENT_A },
+                detent_lead_periods: DETENT_LEAD_PERIODS,
             },
             gains: StepperGains {
                 current: PiGains {

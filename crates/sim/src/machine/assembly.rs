@@ -12,12 +12,6 @@ use crate::{Component, PulseTrain, Refused, Report, TemperatureSensor};
 /// Temperature of the surroundings.
 pub(super) const AMBIENT_C: f64 = 25.0;
 
-/// A drive's own converter starts above and stops below these bus voltages. Assumed for all three: far below the
-/// ZLAC8030L's under-voltage fault, which needs the firmware to run, the 20 V that the ZLIM42-C's manual wants (2.1;
-/// it gives no fault for a low supply) and the 24 V that the M joint's wants.
-const START_V: f64 = 12.0;
-const STOP_V: f64 = 9.0;
-
 /// What the supply can be set to.
 pub(super) const SUPPLY_VOLTAGE: Quantity =
     Quantity { what: "supply", expected: "0 to 100 V", least: 0.0, greatest: 100.0 };
@@ -38,6 +32,11 @@ pub trait Assembly: Clone + Send + 'static {
     const INPUTS: &'static [&'static str];
     /// Length of a control period.
     const PERIOD_S: f64 = <Self::Firmware as Firmware>::CONTROL_PERIOD_NS as f64 * 1e-9;
+    /// Bus voltage at which the drive's own converter starts. Assumed: far below the ZLAC8030L's under-voltage fault, which
+    /// needs the firmware to run, and the 24 V that the M joint's manual wants.
+    const STARTS_AT_V: f64 = 12.0;
+    /// Bus voltage below which it stops; assumed likewise.
+    const STOPS_BELOW_V: f64 = 9.0;
     /// What can be asked of the load at the output shaft.
     const LOAD_TORQUE: Quantity =
         Quantity { what: "load torque", expected: "-1000 to 1000 N·m", least: -1000.0, greatest: 1000.0 };
@@ -76,7 +75,7 @@ pub trait Assembly: Clone + Send + 'static {
     /// Whether the voltage is enough for the firmware to run on (`running`), or to start.
     #[inline]
     fn supplies_firmware(&self, running: bool) -> bool {
-        self.shaft_and_rig().1.supply.bus_v >= if running { STOP_V } else { START_V }
+        self.shaft_and_rig().1.supply.bus_v >= if running { Self::STOPS_BELOW_V } else { Self::STARTS_AT_V }
     }
 
     /// Where the motor shaft truly is, in counts of a fixed size, from an arbitrary zero.

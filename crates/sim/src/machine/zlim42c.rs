@@ -148,6 +148,10 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
 
     const MODEL: &'static str = if LENGTH_MM == LONG { "zlim42c-82" } else { "zlim42c" };
     const INPUTS: &'static [&'static str] = &["X0", "X1", "X2", "X3"];
+    // It is off below the 20 V of 2.1, and has no fault for a low supply. A guess: half a volt of hysteresis, and that its
+    // 20 V are those of the supply, of which cable and bus take some tenths when the motor draws its most.
+    const STARTS_AT_V: f64 = 19.8;
+    const STOPS_BELOW_V: f64 = StepperMotorModel::ZLIM42_C_70.rig.supply.consumption_from_v;
     const LOAD_TORQUE: Quantity =
         Quantity { what: "load torque", expected: "-100 to 100 N·m", least: -100.0, greatest: 100.0 };
     const LOAD_INERTIA: Quantity =
@@ -182,6 +186,14 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
             PowerStage::Modulate { duty } => Bridges::Driven(duty.map(f64::from)),
         };
         self.motor.step(Self::PERIOD_S, &bridges);
+    }
+
+    #[inline]
+    fn supplies_firmware(&self, running: bool) -> bool {
+        let supply = &self.motor.rig.supply;
+        // What a motor feeds back as it is switched off lasts for milliseconds, in which no controller starts.
+        let may_start = supply.connected && supply.source_v >= Self::STARTS_AT_V;
+        supply.bus_v >= if running { Self::STOPS_BELOW_V } else { Self::STARTS_AT_V } && (running || may_start)
     }
 
     fn shaft_and_rig(&self) -> (&RotorData, &Rig) {
