@@ -119,7 +119,7 @@ impl Build {
         let flags = std::env::var("RUSTFLAGS").unwrap_or_default();
         let mut cargo = workspace::cargo();
         cargo.args(["build", "--release", "--quiet", "--target", &rustc.host, "--target-dir"]).arg(&target);
-        cargo.args(["-p", "ferrodrive-cli", "-p", "ferrodrive-sim", "--bin", "ferrodrive", "--example", "run_world"]);
+        cargo.args(["-p", "ferrodrive", "-p", "ferrodrive-sim", "--bin", "ferrodrive", "--example", "run_world"]);
         cargo.env("RUSTFLAGS", format!("{flags} {flag}"));
         if !process::run(&mut cargo, |line| println!("{line}"))? {
             return Err(format!("it does not build with {flag}"));
