@@ -6,9 +6,9 @@
 use canopen::Mux;
 use drives::engine::storage::Image;
 use drives::profile::DriveProfile;
+use drives::variant::Variant;
 use drives::zlac8030l::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use drives::zlac8030l::readings::REFERENCE_V;
-use drives::variant::Variant;
 use drives::zlac8030l::variations::{FAST_MOTOR, VARIANT};
 use drives::zlac8030l::{Zlac8030l, objects, storage};
 use plant::angle::Angle;
