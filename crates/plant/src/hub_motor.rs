@@ -29,6 +29,31 @@ pub struct HubMotorModel {
     pub brake: BrakeModel,
     /// Warm bodies, power stage and supply.
     pub rig: RigModel,
+    /// What limits the voltage of the bus.
+    pub clamp: ClampModel,
+    /// Temperature of the heat sink at which the power stage melts through.
+    pub power_stage_limit_c: f64,
+    /// Speed at which the bearings seize.
+    pub bearing_limit_rad_s: f64,
+}
+
+/// Suppressors across the bus: a motor that is driven faster than its bus charges it through the diodes of the idle bridge,
+/// and the source takes nothing back. Their heat goes into the heat sink.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClampModel {
+    /// Voltage from which they conduct.
+    pub from_v: f64,
+    /// Voltage above that per ampere.
+    pub resistance_ohm: f64,
+}
+
+impl ClampModel {
+    /// What they take from a bus of this voltage.
+    #[inline]
+    fn power_w(&self, bus_v: f64) -> f64 {
+        let above_v = bus_v - self.from_v;
+        if above_v > 0.0 { bus_v * above_v / self.resistance_ohm } else { 0.0 }
+    }
 }
 
 /// What the drive's power stage does during one step.
@@ -90,6 +115,8 @@ pub struct HubMotor {
     pub rig: Rig,
     /// Torque of the motor on its rotor, mean over the last step.
     pub torque_nm: f64,
+    power_stage_burnt: bool,
+    seized: bool,
     axis: Axis,
 }
 
@@ -105,6 +132,8 @@ impl HubMotor {
             lost_phase: None,
             rig: Rig::new(&model.rig, model.pmsm.resistance_ohm, source_v, ambient_c),
             torque_nm: 0.0,
+            power_stage_burnt: false,
+            seized: false,
             axis: Axis::at_turns(model.pmsm.electrical_turns(angle)),
         }
     }
@@ -114,7 +143,8 @@ impl HubMotor {
     pub fn step(&mut self, dt_s: f64, actuation: &Actuation) {
         if self.rests(actuation) {
             self.torque_nm = 0.0;
-            if self.rig.step(&self.model.rig, dt_s, &Flows::default(), actuation.bleeder_on) {
+            let flows = self.clamped(Flows::default(), dt_s);
+            if self.rig.step(&self.model.rig, dt_s, &flows, actuation.bleeder_on) {
                 self.step_slow();
             }
             return;
@@ -123,7 +153,7 @@ impl HubMotor {
         let velocity_rad_s = self.rotor.turn(dt_s, &self.rig.load);
         let half_turn = Axis::at_small_rad(0.5 * dt_s * f64::from(model.pmsm.pole_pairs) * velocity_rad_s);
         let input = PmsmInput {
-            terminals: actuation.inverter.terminals(self.rig.supply.bus_v),
+            terminals: self.inverter(actuation).terminals(self.rig.supply.bus_v),
             lost_phase: self.lost_phase,
             resistance_ohm: self.rig.path_ohm(&model.rig),
             axis: self.axis.turned_by(half_turn),
@@ -136,17 +166,68 @@ impl HubMotor {
         model.encoder.step(&mut self.encoder, self.rotor.angle);
         self.torque_nm = motor.torque_nm;
 
-        let flows = motor.flows(moved.friction_j, moved.load_j);
-        if self.rig.step(&model.rig, dt_s, &flows, actuation.bleeder_on) {
+        let flows = self.clamped(motor.flows(moved.friction_j, moved.load_j), dt_s);
+        if self.rig.step(&self.model.rig, dt_s, &flows, actuation.bleeder_on) {
             self.step_slow();
         }
+    }
+
+    /// With what the clamp takes, where the bus is so high.
+    #[inline]
+    fn clamped(&self, flows: Flows, dt_s: f64) -> Flows {
+        let clamp_w = self.model.clamp.power_w(self.rig.supply.bus_v);
+        Flows { bus_w: flows.bus_w + clamp_w, arc_j: flows.arc_j + clamp_w * dt_s, ..flows }
+    }
+
+    /// What the bridge does: molten switches join the wires, whatever the drive wants.
+    #[inline]
+    fn inverter(&self, actuation: &Actuation) -> Inverter {
+        if self.power_stage_burnt { Inverter::Shorted } else { actuation.inverter }
+    }
+
+    /// Blocks the rotor, or frees it; seized bearings are new ones then.
+    pub fn lock_rotor(&mut self, locked: bool) {
+        self.rig.load.locked = locked;
+        self.seized = false;
+    }
+
+    /// The bearings have seized.
+    pub fn is_seized(&self) -> bool {
+        self.seized
+    }
+
+    #[cold]
+    fn seize(&mut self) {
+        self.seized = true;
+        self.rig.energy.friction_j += self.model.rotor.kinetic_energy_j(&self.rotor, &self.rig.load);
+        self.rotor = RotorData { angle: self.rotor.angle, ..RotorData::default() };
+        self.rig.load.locked = true;
+    }
+
+    /// Molten switches join the motor's wires and short the bus, so that the source's fuse blows.
+    #[cold]
+    pub fn burn_power_stage(&mut self) {
+        self.power_stage_burnt = true;
+        self.rig.energy.switches_j += self.model.rig.supply.stored_energy_j(&self.rig.supply);
+        self.rig.supply.connected = false;
+        self.rig.supply.bus_v = 0.0;
+    }
+
+    /// A new power stage. The source is connected again by whoever put it in.
+    pub fn mend_power_stage(&mut self) {
+        self.power_stage_burnt = false;
+    }
+
+    /// The power stage has melted through.
+    pub fn is_power_stage_burnt(&self) -> bool {
+        self.power_stage_burnt
     }
 
     /// True if nothing will move or flow in this step: friction holds the shaft, and the idle bridge carries no current
     /// (without motion there is no voltage that its diodes could rectify).
     #[inline]
     fn rests(&self, actuation: &Actuation) -> bool {
-        actuation.inverter == Inverter::Open
+        self.inverter(actuation) == Inverter::Open
             && self.pmsm.current_a == Dq::default()
             && self.rotor.stands()
             && self.model.rotor.holds(&self.rig.load, self.model.brake.torque_nm(actuation.brake_released))
@@ -155,6 +236,14 @@ impl HubMotor {
     /// Heat of the last steps into the bodies, the winding's resistance, and the magnets' direction afresh.
     fn step_slow(&mut self) {
         self.rig.step_slow(&self.model.rig, self.model.pmsm.resistance_ohm);
+        let heat_sink = &self.rig.heat_sink;
+        let melts = heat_sink.hold_c.is_none() && heat_sink.temperature_c > self.model.power_stage_limit_c;
+        if melts || (self.power_stage_burnt && self.rig.supply.connected) {
+            self.burn_power_stage();
+        }
+        if self.rotor.velocity_rad_s.abs() > self.model.bearing_limit_rad_s {
+            self.seize();
+        }
         self.axis = Axis::at_turns(self.model.pmsm.electrical_turns(self.rotor.angle));
     }
 

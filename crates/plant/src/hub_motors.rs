@@ -21,7 +21,7 @@
 use crate::brake::BrakeModel;
 use crate::encoder::EncoderModel;
 use crate::hall::HallModel;
-use crate::hub_motor::HubMotorModel;
+use crate::hub_motor::{ClampModel, HubMotorModel};
 use crate::mechanics::RotorModel;
 use crate::pmsm::{PmsmModel, SQRT_3};
 use crate::rig::RigModel;
@@ -83,6 +83,17 @@ const SUPPLY: SupplyModel = SupplyModel {
     bleeder: BLEEDER,
 };
 
+/// Assumed: a transient suppressor of 78 V stand-off, the first of the usual row above the 75 V at which the drive reports
+/// over-voltage. The data sheets of 1.5 kW types have 86.7 to 95.8 V at 1 mA, and 126 V at 11.9 A.
+const CLAMP: ClampModel = ClampModel { from_v: 91.25, resistance_ohm: (126.0 - 91.25) / 11.9 };
+
+/// Assumed: the absolute maximum of the junctions of power MOSFETs, by their data sheets. A heat sink that is as hot leaves
+/// nothing to the junction.
+const POWER_STAGE_LIMIT_C: f64 = 175.0;
+
+/// Assumed: sealed ball bearings for a shaft of 20 mm (6204-2RS), whose makers limit them to 10,000 r/min.
+const BEARING_LIMIT_RAD_S: f64 = 10_000.0 * core::f64::consts::TAU / 60.0;
+
 impl HubMotorModel {
     /// ZLTECH ZLLG65ASM250-L, the 24 V to 48 V wheel motor: 0.761 N m/A, 261 r/min at 24 V, 521 r/min at 48 V.
     pub const ZLLG65ASM250_L: HubMotorModel = wheel_motor("ZLLG65ASM250-L", 0.255, 0.697e-3, 0.8791);
@@ -119,5 +130,8 @@ const fn wheel_motor(name: &'static str, resistance_ohm: f64, inductance_h: f64,
             switch_resistance_ohm: SWITCH_RESISTANCE_OHM,
             supply: SUPPLY,
         },
+        clamp: CLAMP,
+        power_stage_limit_c: POWER_STAGE_LIMIT_C,
+        bearing_limit_rad_s: BEARING_LIMIT_RAD_S,
     }
 }

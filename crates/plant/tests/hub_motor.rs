@@ -308,3 +308,82 @@ proptest! {
         }
     }
 }
+
+/// A load that drives a free wheel ends where its power is what friction and the clamp take: with a clamp of `U` and `R`,
+/// `P = V (V - U) / R` and the speed is `V / K`, a little more for the current.
+#[test]
+fn a_wheel_that_a_load_drives_ends_at_the_speed_where_drag_and_the_clamp_take_its_power() {
+    let mut motor = motor();
+    motor.rig.load.torque_nm = 2.5;
+    let stored = motor.stored_j();
+    for _ in 0..200_000 {
+        motor.step(DT_S, &Actuation { brake_released: true, ..Actuation::default() });
+    }
+    let (bus_v, speed) = (motor.rig.supply.bus_v, -motor.rotor.velocity_rad_s);
+    let drag_nm = MODEL.rotor.coulomb_nm + MODEL.rotor.viscous_nm_s * speed;
+    let current_a = (2.5 - drag_nm) / MODEL.pmsm.torque_constant_nm_a();
+    let copper_w = 1.5 * (MODEL.pmsm.resistance_ohm + MODEL.rig.switch_resistance_ohm) * current_a * current_a;
+    let clamp_w = (2.5 - drag_nm) * speed - copper_w - MODEL.rig.supply.consumption_w;
+    let clamp = MODEL.clamp;
+    let expected_v = 0.5 * (clamp.from_v + (clamp.from_v.powi(2) + 4.0 * clamp_w * clamp.resistance_ohm).sqrt());
+    assert!((bus_v - expected_v).abs() < 0.5, "{bus_v} V, expected {expected_v}");
+    let expected = bus_v / 3_f64.sqrt() / MODEL.pmsm.back_emf_constant_v_s();
+    assert!(speed > expected && speed < 1.03 * expected, "{speed} rad/s, back-emf equals the bus at {expected}");
+    assert!(motor.rig.heat_sink.temperature_c > 30.0, "the clamp's heat");
+    assert_energy_closes(&motor, stored);
+}
+
+/// 5 N m feed the clamp with 540 W; 150 K of the heat sink are 40 kJ, less what it gives off on the way.
+#[test]
+fn a_clamp_that_is_fed_for_long_melts_the_power_stage_which_then_brakes_the_wheel_and_shorts_the_bus() {
+    let mut motor = motor();
+    motor.rig.load.torque_nm = 5.0;
+    let off = Actuation { brake_released: true, ..Actuation::default() };
+    let mut seconds = 0.0;
+    while !motor.is_power_stage_burnt() {
+        motor.step(DT_S, &off);
+        seconds += DT_S;
+        assert!(seconds < 100.0, "{} degC", motor.rig.heat_sink.temperature_c);
+    }
+    assert!(seconds > 0.95 * 150.0 * MODEL.rig.heat_sink.capacity_j_k / 560.0, "{seconds} s");
+    for _ in 0..40_000 {
+        motor.step(DT_S, &off);
+    }
+    assert_eq!((motor.rig.supply.bus_v, motor.rig.supply.connected), (0.0, false));
+    // Joined wires at a crawl: the load less the dry friction over 3/2 (p psi)^2 / R and the viscous friction.
+    let ohm = MODEL.rig.switch_resistance_ohm
+        + MODEL.pmsm.resistance_ohm * (1.0 + MODEL.rig.resistance_per_k * (motor.rig.winding.temperature_c - 20.0));
+    let damping = 1.5 * MODEL.pmsm.back_emf_constant_v_s().powi(2) / ohm + MODEL.rotor.viscous_nm_s;
+    let expected = (5.0 - MODEL.rotor.coulomb_nm) / damping;
+    let speed = -motor.rotor.velocity_rad_s;
+    assert!((speed / expected - 1.0).abs() < 0.03, "{speed} rad/s, expected {expected}");
+    motor.mend_power_stage();
+    motor.rig.load.torque_nm = 0.0;
+    motor.rig.heat_sink.temperature_c = 25.0;
+    for _ in 0..100 {
+        motor.step(DT_S, &off);
+    }
+    assert!(!motor.is_power_stage_burnt());
+}
+
+/// 20 N m are more than the motor brakes with at any speed: its inductance keeps the current down.
+#[test]
+fn a_wheel_that_runs_away_seizes_at_the_speed_limit_of_its_bearings() {
+    let mut motor = motor();
+    motor.rig.load.torque_nm = 20.0;
+    let off = Actuation { brake_released: true, ..Actuation::default() };
+    let (mut seconds, mut fastest, stored) = (0.0, 0.0_f64, motor.stored_j());
+    while !motor.is_seized() {
+        fastest = fastest.max(motor.rotor.velocity_rad_s.abs());
+        motor.step(DT_S, &off);
+        seconds += DT_S;
+        assert!(seconds < 20.0, "{} rad/s", motor.rotor.velocity_rad_s);
+    }
+    assert!((fastest / MODEL.bearing_limit_rad_s - 1.0).abs() < 0.01, "{fastest} rad/s");
+    assert_eq!(motor.rotor.velocity_rad_s, 0.0);
+    assert_energy_closes(&motor, stored);
+    motor.lock_rotor(false);
+    motor.rig.load.torque_nm = 0.0;
+    motor.step(DT_S, &off);
+    assert!(!motor.is_seized() && !motor.rig.load.locked);
+}

@@ -291,6 +291,8 @@ pub struct Report {
     pub outputs: Levels,
     /// The holding brake, where there is one.
     pub brake: Option<Brake>,
+    /// What has been destroyed, and what to do about it.
+    pub damage: Option<&'static str>,
     /// True angle of the motor shaft in rad, many turns, from where it stood at the start.
     pub shaft_angle_rad: f64,
 }

@@ -60,10 +60,10 @@ fn no_lock_holds_in_fault() {
     assert!(turns_under(&mut bench, 2.0) < -1.0);
 }
 
-/// 3 A are 2.28 N m: 2 N m are held, 3.5 N m are not; without parking both are.
+/// 3 A are 2.28 N m: 2 N m are held, 2.7 N m are not; without parking both are.
 #[test]
 fn parking_holds_what_3_a_can_hold_and_no_more() {
-    for (parking, torque_nm, holds) in [(1, 2.0, true), (1, 3.5, false), (0, 3.5, true)] {
+    for (parking, torque_nm, holds) in [(1, 2.0, true), (1, 2.7, false), (0, 2.7, true)] {
         let mut bench = Bench::new();
         bench.enable_in(3);
         bench.set(0x202F, 4, parking);

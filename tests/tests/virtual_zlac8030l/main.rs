@@ -9,6 +9,7 @@ use ferrodrive_tests::bench::zlac8030l as bench;
 mod communication;
 mod datagrams;
 mod determinism;
+mod driven_from_outside;
 mod drivers;
 mod eds_defaults;
 mod emergency;

@@ -135,6 +135,8 @@ struct Got<'a> {
     supply_v: f64,
     outputs: BTreeMap<&'a str, u8>,
     brake: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    damage: Option<&'a str>,
     motor_c: Option<f64>,
     driver_c: Option<f64>,
     statusword: Option<u16>,
@@ -168,6 +170,7 @@ fn get(world: &mut World, number: u8, id: StationId, service: Service) -> Result
         supply_v,
         outputs: report.outputs.iter().map(|(name, level)| (name, u8::from(level))).collect(),
         brake: brake_text(report.brake),
+        damage: report.damage,
         motor_c: report.motor_c,
         driver_c: report.driver_c,
         statusword: report.statusword,

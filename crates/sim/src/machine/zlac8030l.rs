@@ -31,6 +31,10 @@ const SUPPLY_V: f64 = 48.0;
 /// motor's rated torque (6 N·m, see [`HubMotorModel::ZLLG65ASM250_L`]).
 const BRAKE_NM: f64 = 6.0;
 
+/// What has been destroyed, and what to do about it.
+const SEIZED: &str = "bearings seized by over-speed: 'rotor free' puts in new ones";
+const BURNT: &str = "power stage burnt: 'fault bridge off' puts in a new one, 'power cycle' starts it";
+
 /// A ZLAC8030L with its wheel, as a station of a world.
 pub type Zlac8030lMachine = Machine<HubWheel>;
 
@@ -84,6 +88,11 @@ impl HubWheel {
     /// The motor and all that is joined to it.
     pub fn motor(&self) -> &HubMotor {
         &self.motor
+    }
+
+    fn damage(&self) -> Option<&'static str> {
+        let seized = self.motor.is_seized().then_some(SEIZED);
+        self.motor.is_power_stage_burnt().then_some(BURNT).or(seized)
     }
 
     /// The motor and all that is joined to it, to change.
@@ -148,6 +157,7 @@ impl Assembly for HubWheel {
         let report = Report {
             statusword: common.powered.then(|| firmware.values().get(objects::STATUSWORD)),
             outputs: Levels::new(OUTPUTS, &self.last.outputs),
+            damage: self.damage(),
             brake: Some(if self.last.brake_engaged { Brake::Engaged } else { Brake::Released }),
             ..common
         };
@@ -171,6 +181,10 @@ impl Assembly for HubWheel {
         self.image = Image::from_bytes(image);
     }
 
+    fn set_rotor_locked(&mut self, locked: bool) {
+        self.motor.lock_rotor(locked);
+    }
+
     fn set_fault(&mut self, component: Component, broken: bool) -> Result<(), Refused> {
         match component {
             Component::Hall => {
@@ -182,7 +196,9 @@ impl Assembly for HubWheel {
             Component::Eeprom => self.eeprom_broken = broken,
             Component::Reference => self.reference_broken = broken,
             Component::Phase => self.motor.lost_phase = broken.then_some(Phase::U),
-            Component::Short | Component::Bridge => {
+            Component::Bridge if broken => self.motor.burn_power_stage(),
+            Component::Bridge => self.motor.mend_power_stage(),
+            Component::Short => {
                 return Err(Refused::Absent { model: Self::MODEL, what: "short circuit to simulate" });
             }
         }
