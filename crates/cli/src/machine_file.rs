@@ -11,7 +11,7 @@ use std::path::Path;
 use can::{Bitrate, Instant};
 use canopen::NodeId;
 use serde::Deserialize;
-use sim::World;
+use sim::{Source, World};
 
 use crate::embedded::{self, Embedded, SEED};
 use crate::failure::Failure;
@@ -36,6 +36,8 @@ struct DriveTable {
     model: String,
     node: u8,
     supply_v: Option<f64>,
+    #[serde(default)]
+    supply: Supply,
     /// What is special about this one: the keys and values that follow a comma in `sim --drive`.
     #[serde(default)]
     options: BTreeMap<String, OptionValue>,
@@ -55,6 +57,15 @@ struct DriveTable {
     /// Broken components.
     #[serde(default)]
     faults: Vec<String>,
+}
+
+/// The supply: its voltage (also `supply_v`) and what is behind it.
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Supply {
+    voltage_v: Option<f64>,
+    limit_a: Option<f64>,
+    resistance_ohm: Option<f64>,
 }
 
 #[derive(Default, Deserialize)]
@@ -119,10 +130,8 @@ fn build(text: &str) -> Result<Embedded, String> {
         let spec = table.spec()?;
         let order = spec.order(bitrate);
         let mut drive = embedded::ordered_drive(spec.model, &order).map_err(|failure| failure.what)?;
-        if let Some(supply_v) = table.supply_v {
-            // Before the power comes on: capacitors once charged would hold another voltage for a while.
-            drive.set_supply(supply_v, Instant::ZERO).map_err(|refused| refused.to_string())?;
-        }
+        // Before the power comes on: capacitors once charged would hold another voltage for a while.
+        drive.set_source(table.source(), Instant::ZERO).map_err(|refused| refused.to_string())?;
         world.add_drive(spec.node.raw(), drive).map_err(|error| error.to_string())?;
         for command in table.commands() {
             obey(&mut world, &command)?;
@@ -147,6 +156,11 @@ impl DriveTable {
             spec.set(key, &value.to_string()).map_err(|reason| format!("options of node {}: {reason}", self.node))?;
         }
         Ok(spec)
+    }
+
+    fn source(&self) -> Source {
+        let Supply { voltage_v, limit_a, resistance_ohm } = self.supply;
+        Source { voltage_v: voltage_v.or(self.supply_v), limit_a, resistance_ohm }
     }
 
     /// What the table says, as world commands.
@@ -226,6 +240,10 @@ mod tests {
             refusal("[[drive]]\nmodel = 'zlac8030l'\nnode = 4\noptions = { colour = 'red' }").contains("no 'colour'")
         );
         assert_eq!(refusal("[[drive]]\nmodel = 'zlac8030l'\nnode = 4\noptions = { 2014 = 100 }"), "");
+        let supplied = |supply: &str| refusal(&format!("[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nsupply = {supply}"));
+        assert_eq!(supplied("{ voltage_v = 36, limit_a = 10, resistance_ohm = 0.2 }"), "");
+        assert!(supplied("{ limit_a = 0 }").contains("0.01 to 1000 A"));
+        assert!(supplied("{ voltage_v = 101 }").contains("0 to 100 V"));
         assert!(refusal("bitrate = '7k'\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4").contains("bit rate must be"));
     }
 }

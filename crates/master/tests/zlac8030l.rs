@@ -140,7 +140,7 @@ fn a_drive_whose_supply_fails_in_the_middle_of_a_move_is_explained() {
     let options = MotionOptions { wait: false, ..slowly() };
     block_on(&mut world, drives[0].move_absolute(Turns(100.0), options)).unwrap().unwrap();
     block_on(&mut world, network.sleep(Duration::from_millis(500))).unwrap();
-    world.set_power(4, false).unwrap();
+    world.cut_power(4).unwrap();
     let error = block_on(&mut world, drives[0].supervise(Duration::from_secs(5))).unwrap().unwrap_err();
     assert!(error.to_string().contains("stopped answering"), "{error}");
 }
@@ -208,7 +208,7 @@ fn a_tpdo_is_configured_saved_and_comes_back_after_a_power_cycle() {
     block_on(&mut world, node.configure_pdo(&config, units)).unwrap().unwrap();
     block_on(&mut world, drives[0].save()).unwrap().unwrap();
     block_on(&mut world, network.sleep(Duration::from_secs(1))).unwrap();
-    world.set_power(4, false).unwrap();
+    world.cut_power(4).unwrap();
     world.run_for(Duration::from_secs(1));
     let booted = node.wait_boot_up(Duration::from_secs(5));
     world.set_power(4, true).unwrap();

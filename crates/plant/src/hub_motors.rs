@@ -57,9 +57,13 @@ const HEAT_SINK_CAPACITY_J_K: f64 = 270.0;
 
 /// Assumed: battery or power supply with cable.
 const SOURCE_RESISTANCE_OHM: f64 = 0.05;
-/// Assumed: four electrolytics of 470 uF in the drive, and 8,000 uF at the output of a 48 V supply of some 500 W. A
-/// bare wheel that brakes from its full speed at 48 V stays under 76 V with it; a loaded one does not.
-const BUS_CAPACITANCE_F: f64 = 1_880e-6 + 8_000e-6;
+/// Assumed: what the protection circuit of a 48 V battery of some 20 Ah lets through, as a wheeled robot has one.
+const SOURCE_LIMIT_A: f64 = 60.0;
+/// Assumed: at the output of a 48 V supply of some 500 W. A bare wheel that brakes from its full speed at 48 V stays
+/// under 76 V with it; a loaded one does not.
+const SOURCE_CAPACITANCE_F: f64 = 8_000e-6;
+/// Assumed: four electrolytics of 470 uF in the drive.
+const BUS_CAPACITANCE_F: f64 = 1_880e-6;
 /// Assumed: controller, gate drivers and encoder supply.
 const CONSUMPTION_W: f64 = 3.0;
 /// Assumed: where the drive's own converter stops.
@@ -77,6 +81,8 @@ const BLEEDER: BleederModel = BleederModel {
 
 const SUPPLY: SupplyModel = SupplyModel {
     source_resistance_ohm: SOURCE_RESISTANCE_OHM,
+    source_limit_a: SOURCE_LIMIT_A,
+    source_capacitance_f: SOURCE_CAPACITANCE_F,
     capacitance_f: BUS_CAPACITANCE_F,
     consumption_w: CONSUMPTION_W,
     consumption_from_v: CONSUMPTION_FROM_V,

@@ -87,6 +87,10 @@ const ENCODER: AbsoluteEncoderModel = AbsoluteEncoderModel {
 const SUPPLY: SupplyModel = SupplyModel {
     // Assumed: power supply with cable.
     source_resistance_ohm: 0.1,
+    // Assumed: a 36 V supply of 600 W, which is rated 16.6 A and limits at 120 % of it.
+    source_limit_a: 20.0,
+    // What is at the supply's output is of the machine that the joint is in.
+    source_capacitance_f: 0.0,
     // Assumed: what fits into the joint.
     capacitance_f: 470e-6,
     // Assumed: controller, drivers, encoder.

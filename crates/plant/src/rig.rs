@@ -13,6 +13,9 @@ use crate::thermal::{BodyData, BodyModel, resistance_at_ohm};
 /// a million steps slow, and turning the direction on by its series is off by 1e-11 in so many steps.
 const SLOW_EVERY: u32 = 16;
 
+/// A bus under this counts as empty, so that its voltage does not fall towards zero for ever.
+const EMPTY_V: f64 = 1e-3;
+
 /// What never changes about it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RigModel {
@@ -114,6 +117,35 @@ impl Rig {
         }
     }
 
+    /// Connects the source or disconnects it, its capacitor with it. The inrush limiter has charged the bus by the time
+    /// the drive's converter starts.
+    pub fn switch_source(&mut self, model: &RigModel, on: bool) {
+        let before_j = model.supply.stored_energy_j(&self.supply);
+        if on && !self.supply.connected {
+            self.supply.bus_v = self.supply.bus_v.max(self.supply.source_v);
+        }
+        self.supply.connected = on;
+        self.energy.source_j += model.supply.stored_energy_j(&self.supply) - before_j;
+    }
+
+    /// Sets the source's voltage. A source that is turned down discharges the capacitor at its own output, and the bus
+    /// with it; only the motor's energy it cannot take.
+    pub fn set_source_v(&mut self, model: &RigModel, source_v: f64) {
+        let before_j = model.supply.stored_energy_j(&self.supply);
+        self.supply.source_v = source_v;
+        if self.supply.connected && model.supply.source_capacitance_f > 0.0 {
+            self.supply.bus_v = self.supply.bus_v.min(source_v);
+        }
+        self.energy.source_j += model.supply.stored_energy_j(&self.supply) - before_j;
+    }
+
+    /// Disconnects the source and shorts the bus: no voltage from one step to the next.
+    pub fn cut_source(&mut self, model: &RigModel) {
+        self.switch_source(model, false);
+        self.energy.switches_j += model.supply.stored_energy_j(&self.supply);
+        self.supply.bus_v = 0.0;
+    }
+
     /// Resistance of one phase's path: winding, switches and wires.
     #[inline]
     pub(crate) fn path_ohm(&self, model: &RigModel) -> f64 {
@@ -141,6 +173,10 @@ impl Rig {
 
     /// Heat of the steps since the last call into the bodies, and the winding's resistance. The time of those steps, s.
     pub(crate) fn step_slow(&mut self, model: &RigModel, cold_ohm: f64) -> f64 {
+        if self.supply.bus_v < EMPTY_V && self.supply.bus_v > 0.0 {
+            self.energy.consumption_j += model.supply.stored_energy_j(&self.supply);
+            self.supply.bus_v = 0.0;
+        }
         let Slow { time_s, winding_j, heat_sink_j, .. } = self.slow;
         let into_winding_j = self.energy.winding_j;
         let into_heat_sink_j = self.energy.switches_j + self.energy.consumption_j;

@@ -55,6 +55,10 @@ const CONVERTER_STOPS_V: f64 = 19.3;
 const SUPPLY: SupplyModel = SupplyModel {
     // Assumed: power supply with cable.
     source_resistance_ohm: 0.1,
+    // Assumed: a 24 V supply of 150 W, which is rated 6.5 A and limits at 120 % of it.
+    source_limit_a: 7.8,
+    // Assumed: cable long enough that the supply's own capacitor hardly helps.
+    source_capacitance_f: 0.0,
     // Assumed: two electrolytics of 100 uF and ceramics; an integrated drive has no room for more.
     capacitance_f: 220e-6,
     // Assumed: controller, bridges' drivers and optocouplers.

@@ -2,8 +2,13 @@
 //! a bleeder (brake chopper) resistor.
 //!
 //! ```text
-//! C dV/dt = (V_source - V) / R_source [only while V < V_source] - P_load / V - V / R_bleeder [while switched on]
+//! C dV/dt = I_source - P_load / V - V / R_bleeder [while switched on]
+//! I_source = (V_source - V) / R_source, from 0 (it cannot take) to the limit of the source
 //! ```
+//!
+//! Asked for more than its limit the source gives the limit, and the bus sags to where the load takes no more. A source
+//! that is disconnected takes the capacitor at its output with it: what is left drains through what draws from it, at
+//! constant power while the drive's converter runs and as through a resistor below that.
 //!
 //! Regeneration is a negative load; with no way back into the source it raises the capacitor's voltage. The implicit
 //! midpoint rule makes this one quadratic equation per step, and the energies close to the last bits.
@@ -15,11 +20,15 @@ use crate::thermal::{BodyData, BodyModel};
 pub struct SupplyModel {
     /// Resistance of source and wires.
     pub source_resistance_ohm: f64,
-    /// Bus capacitor.
+    /// The most that the source gives.
+    pub source_limit_a: f64,
+    /// Capacitor at the output of the source: on the bus while it is connected.
+    pub source_capacitance_f: f64,
+    /// Bus capacitor in the drive.
     pub capacitance_f: f64,
     /// What the drive's own electronics take while the bus holds at least `consumption_from_v`.
     pub consumption_w: f64,
-    /// Bus voltage under which the drive's electronics are off.
+    /// Bus voltage under which the drive's converter is off; what it takes then falls with the square of the voltage.
     pub consumption_from_v: f64,
     /// The bleeder.
     pub bleeder: BleederModel,
@@ -85,9 +94,14 @@ pub struct SupplyOutput {
 }
 
 impl SupplyModel {
-    /// Energy in the bus capacitor.
+    /// Energy in the capacitors of the bus.
     pub fn stored_energy_j(&self, data: &SupplyData) -> f64 {
-        0.5 * self.capacitance_f * data.bus_v * data.bus_v
+        0.5 * self.bus_capacitance_f(data) * data.bus_v * data.bus_v
+    }
+
+    #[inline]
+    fn bus_capacitance_f(&self, data: &SupplyData) -> f64 {
+        if data.connected { self.capacitance_f + self.source_capacitance_f } else { self.capacitance_f }
     }
 
     /// Moves the bus by one step while the inverter takes `load_w` (negative: gives back).
@@ -97,10 +111,11 @@ impl SupplyModel {
     #[inline(always)]
     pub fn step(&self, data: &mut SupplyData, dt_s: f64, load_w: f64, bleeder_on: bool) -> SupplyOutput {
         let before = data.bus_v;
-        let consumption_j = if before > self.consumption_from_v { self.consumption_w * dt_s } else { 0.0 };
+        let consumption_j =
+            if before > self.consumption_from_v { self.consumption_w * dt_s } else { self.residual_w(before) * dt_s };
         let bleeder_on = bleeder_on && !data.bleeder_burnt;
         let step = BusStep {
-            store: 2.0 * self.capacitance_f,
+            store: 2.0 * self.bus_capacitance_f(data),
             source: dt_s / self.source_resistance_ohm,
             source_v: if data.connected { data.source_v } else { 0.0 },
             bleeder: if bleeder_on { dt_s / self.bleeder.resistance_ohm } else { 0.0 },
@@ -111,6 +126,9 @@ impl SupplyModel {
         let mean = step.mean_voltage(before, guess);
         let conducts = mean < step.source_v;
         let mean = if conducts == guess { mean } else { step.mean_voltage(before, conducts) };
+        let limit_c = self.source_limit_a * dt_s;
+        let limited = conducts && (step.source_v - mean) * step.source > limit_c;
+        let mean = if limited { step.limited_mean_voltage(before, limit_c) } else { mean };
         // A source charges no bus beyond its own voltage, in however short a time.
         let full = conducts && step.load_j >= 0.0 && 2.0 * mean - before > step.source_v;
         let mean = if full { 0.5 * (before + step.source_v) } else { mean };
@@ -122,10 +140,18 @@ impl SupplyModel {
         }
         let source_j = match conducts {
             true if full => step.store * (step.source_v - before) * mean * 0.5 + step.load_j + bleeder_j,
+            true if limited => limit_c * mean,
             true => (step.source_v - mean) * step.source * mean,
             false => 0.0,
         };
         SupplyOutput { source_j, consumption_j, bleeder_j }
+    }
+
+    /// What draws from a bus on which the drive's converter is off.
+    #[cold]
+    fn residual_w(&self, bus_v: f64) -> f64 {
+        let share = if self.consumption_from_v > 0.0 { bus_v / self.consumption_from_v } else { 0.0 };
+        self.consumption_w * share * share
     }
 
     fn warm_bleeder(&self, data: &mut SupplyData, dt_s: f64, bleeder_w: f64) {
@@ -155,6 +181,15 @@ impl BusStep {
         let discriminant = (b * b - 4.0 * a * self.load_j).max(0.0);
         (b + libm::sqrt(discriminant)) * (0.5 / a)
     }
+
+    /// The same while the source gives the charge `limit_c` in the step.
+    #[cold]
+    fn limited_mean_voltage(&self, before: f64, limit_c: f64) -> f64 {
+        let a = self.store + self.bleeder;
+        let b = self.store * before + limit_c;
+        let discriminant = (b * b - 4.0 * a * self.load_j).max(0.0);
+        (b + libm::sqrt(discriminant)) * (0.5 / a)
+    }
 }
 
 #[cfg(test)]
@@ -163,6 +198,8 @@ mod tests {
 
     const SUPPLY: SupplyModel = SupplyModel {
         source_resistance_ohm: 0.1,
+        source_limit_a: f64::INFINITY,
+        source_capacitance_f: 0.0,
         capacitance_f: 2e-3,
         consumption_w: 0.0,
         consumption_from_v: 10.0,
@@ -241,6 +278,57 @@ mod tests {
             stiff.step(&mut over, 1e-3, 0.0, true);
         }
         assert!(over.bleeder_burnt);
+    }
+
+    #[test]
+    fn beyond_its_limit_the_source_gives_the_limit_and_the_bus_sags_to_what_a_resistor_takes() {
+        let limited = SupplyModel { source_limit_a: 5.0, ..SUPPLY };
+        for (load_ohm, expected_v) in [
+            // 48 V over 0.1 + 10 ohm is 4.75 A: a divider. Over 4 ohm it would be 11.7 A: 5 A through 4 ohm.
+            (10.0, 48.0 * 10.0 / 10.1),
+            (4.0, 20.0),
+            (0.5, 2.5),
+        ] {
+            let mut data = SupplyData::charged(48.0);
+            let (mut energy_j, stored_j) = (0.0, limited.stored_energy_j(&data));
+            for _ in 0..20_000 {
+                let load_w = data.bus_v * data.bus_v / load_ohm;
+                energy_j += limited.step(&mut data, 50e-6, load_w, false).source_j - load_w * 50e-6;
+            }
+            assert!((data.bus_v - expected_v).abs() < 2e-2 * expected_v, "{load_ohm} ohm: {} V", data.bus_v);
+            let stored = limited.stored_energy_j(&data) - stored_j;
+            assert!((energy_j - stored).abs() < 1e-9, "{load_ohm} ohm: {energy_j} J came, {stored} J are there");
+        }
+    }
+
+    #[test]
+    fn charging_at_the_limit_is_a_straight_line() {
+        let limited = SupplyModel { source_limit_a: 5.0, ..SUPPLY };
+        let mut data = SupplyData { connected: true, ..SupplyData::switched_off(48.0) };
+        for _ in 0..200 {
+            limited.step(&mut data, 50e-6, 0.0, false);
+        }
+        // 5 A for 10 ms into 2 mF.
+        assert!((data.bus_v - 25.0).abs() < 1e-9, "{} V", data.bus_v);
+    }
+
+    #[test]
+    fn what_is_switched_off_drains_at_constant_power_and_then_as_through_a_resistor() {
+        let model = SupplyModel { consumption_w: 4.0, source_capacitance_f: 8e-3, ..SUPPLY };
+        let mut data = SupplyData { connected: false, ..SupplyData::charged(48.0) };
+        let mut steps = 0;
+        while data.bus_v > 10.0 {
+            model.step(&mut data, 50e-6, 0.0, false);
+            steps += 1;
+        }
+        // C (48^2 - 10^2) / 2 P, the capacitor of the source not among it.
+        let expected_s = 2e-3 * (48.0 * 48.0 - 10.0 * 10.0) / (2.0 * 4.0);
+        assert!((f64::from(steps) * 50e-6 - expected_s).abs() < 1e-4, "{steps} steps, expected {expected_s} s");
+        // From there (10 V)^2 / 4 W = 25 ohm, R C = 50 ms, after 50 ms.
+        for _ in 0..1000 {
+            model.step(&mut data, 50e-6, 0.0, false);
+        }
+        assert!((data.bus_v - 10.0 * libm::exp(-1.0)).abs() < 2e-2, "{} V", data.bus_v);
     }
 
     #[test]

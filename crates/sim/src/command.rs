@@ -12,7 +12,7 @@ use core::time::Duration;
 
 use serde::Serialize;
 
-use crate::{Component, PulseTrain, Refused, SwitchRange, TemperatureSensor, World};
+use crate::{Component, PulseTrain, Refused, Source, SwitchRange, TemperatureSensor, World};
 
 /// One line, understood.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,10 +35,12 @@ pub enum Command {
 /// What to do with a drive and the machine around it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
-    /// `power on`, `power off`: the supply.
+    /// `power on`, `power off`: the supply. Switched off the drive lives on until the bus has drained.
     Power(bool),
-    /// `power cycle`: off and on again.
+    /// `power cycle`: off, and on again when the drive has died of it.
     PowerCycle,
+    /// `power cut`: dead at once, in the middle of whatever it does.
+    PowerCut,
     /// `input X0 1`: a digital input's level.
     Input {
         /// The input's name.
@@ -59,8 +61,8 @@ pub enum Action {
     LoadInertia(f64),
     /// `rotor lock`, `rotor free`.
     RotorLock(bool),
-    /// `supply 48`: V.
-    Supply(f64),
+    /// `supply 48`: V; `supply 48 limit 10 resistance 0.2`: with what is behind it.
+    Supply(Source),
     /// `temperature motor 95`, `temperature driver auto`: °C held, or back to the model.
     Temperature(TemperatureSensor, Option<f64>),
     /// `fault hall on`.

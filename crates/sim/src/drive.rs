@@ -16,8 +16,16 @@ pub trait VirtualDrive: Station + VirtualDriveClone + Send {
     /// The model's name as users type it: `zlac8030l`.
     fn model(&self) -> &'static str;
 
-    /// Switches the supply. Switching on boots the firmware; switching off loses all that is not stored.
+    /// Switches the supply. Switching on boots the firmware. Switched off it lives on the charge of its bus, sees the
+    /// voltage fall, and loses all that is not stored when it dies. Switched on before that, the supply waits: each time
+    /// off ends in a restart.
     fn set_power(&mut self, on: bool, now: Instant);
+
+    /// Takes the supply away and the charge of the bus with it: the firmware is dead at once, in the middle of whatever
+    /// it did.
+    fn cut_power(&mut self, now: Instant) {
+        self.set_power(false, now);
+    }
 
     /// The bit rate of its CAN controller at present; `None` while it takes no part in the bus (no power).
     fn bitrate(&self) -> Option<Bitrate>;
@@ -51,6 +59,14 @@ pub trait VirtualDrive: Station + VirtualDriveClone + Send {
 
     /// Supply voltage in V.
     fn set_supply(&mut self, supply_v: f64, now: Instant) -> Result<(), Refused>;
+
+    /// Supply voltage and what is behind it: all of it or nothing.
+    fn set_source(&mut self, source: Source, now: Instant) -> Result<(), Refused> {
+        match source {
+            Source { voltage_v: Some(supply_v), limit_a: None, resistance_ohm: None } => self.set_supply(supply_v, now),
+            _ => Err(Refused::Absent { model: self.model(), what: "limit or resistance of its supply" }),
+        }
+    }
 
     /// Holds a temperature in °C, or gives it back to the thermal model (`None`).
     fn hold_temperature(
@@ -155,6 +171,17 @@ pub enum Refused {
         /// What is wrong with it.
         reason: &'static str,
     },
+}
+
+/// A supply; `None` leaves that as it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Source {
+    /// Open-circuit voltage in V.
+    pub voltage_v: Option<f64>,
+    /// The most that it gives, in A. Asked for more its voltage falls.
+    pub limit_a: Option<f64>,
+    /// Resistance of source and wires, in ohm.
+    pub resistance_ohm: Option<f64>,
 }
 
 /// A stretch of the actual position in the drive's counts, ends included; `None` reaches for ever.

@@ -22,7 +22,7 @@ mod world;
 
 pub use block_on::{BlockOnError, block_on, block_on_for};
 pub use drive::{
-    Brake, Component, Levels, PulseTrain, Refused, Report, SwitchRange, TemperatureSensor, VirtualDrive,
+    Brake, Component, Levels, PulseTrain, Refused, Report, Source, SwitchRange, TemperatureSensor, VirtualDrive,
     VirtualDriveClone,
 };
 pub use drives::RegisterError;

@@ -134,7 +134,7 @@ fn errors_say_what_is_there_and_change_nothing() {
     assert_eq!(refusal(&mut world, "4 fault hall on"), "a testdrive has no Hall sensor");
     assert_eq!(refusal(&mut world, "4 temperature driver 5"), "a testdrive has no driver temperature sensor");
     assert_eq!(refusal(&mut world, "4 supply 1000"), "supply voltage must be 0 to 100 V, not 1000");
-    assert_eq!(refusal(&mut world, "4 supply"), "expected: NODE supply VOLTS");
+    assert_eq!(refusal(&mut world, "4 supply"), "expected: NODE supply VOLTS [limit AMPERES] [resistance OHMS]");
     assert!(refusal(&mut world, "\u{7}\"quoted\\").starts_with("unknown command"));
     assert_eq!(refusal(&mut World::new(Bitrate::M1, 1), "4 get"), "no drive was started as node 4; there is none");
 }

@@ -287,7 +287,7 @@ impl<S: Subject> Bench<S> {
 
     /// Off for 0.1 s, and on again until it has booted.
     pub fn power_cycle(&mut self) {
-        self.operate(|drive, now| drive.set_power(false, now));
+        self.operate(|drive, now| drive.cut_power(now));
         self.run_ms(100);
         self.operate(|drive, now| drive.set_power(true, now));
         self.run_ms(10);

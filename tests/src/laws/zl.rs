@@ -1,6 +1,7 @@
 //! The firmwares of the two ZLTECH drives under frames, sensors and gaps in time that nobody sane would give them.
 
 use can::{CanId, Frame, Instant};
+use canopen::AbortCode;
 use canopen::od::{Slot, Table};
 use canopen::sdo::wire::Reply;
 use drives::{Firmware, zlac8030l, zlim42c};
@@ -102,8 +103,10 @@ fn drain<F: Subject>(firmware: &mut F, after: &Frame) -> usize {
         let Some(sent) = firmware.poll_transmit() else { break };
         if sent.id() == CanId::standard(0x580 + u16::from(NODE)) {
             let raw = sent.data().first_chunk::<8>().expect("an SDO answer has eight bytes");
-            assert!(!matches!(Reply::parse(raw), Reply::Unknown { .. }), "{sent} after {after}");
-            answers += 1;
+            let reply = Reply::parse(raw);
+            assert!(!matches!(reply, Reply::Unknown { .. }), "{sent} after {after}");
+            // A server that gives a transfer up tells of it without being asked.
+            answers += usize::from(!matches!(reply, Reply::Abort(_, AbortCode::TIMED_OUT)));
         }
         if sent.id() == CanId::standard(0x700 + u16::from(NODE)) {
             assert_eq!(sent.dlc(), 1, "{sent} after {after}");

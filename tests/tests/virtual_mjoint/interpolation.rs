@@ -19,7 +19,7 @@ fn three(synchronised: i64, apart_us: u64) -> Bench {
     }
     // The joints' own rhythms are apart from each other, as those of real ones are.
     for node in 2..=3_u8 {
-        bench.tell(&format!("{node} power off"));
+        bench.tell(&format!("{node} power cut"));
         bench.run(Duration::from_micros(1_730 * u64::from(node) + apart_us));
         bench.tell(&format!("{node} power on"));
         bench.run_ms(20);

@@ -21,7 +21,7 @@ fn turn_to(bench: &mut Bench, counts: i64) {
 fn turns_are_kept_by_the_battery_also_when_the_shaft_is_turned_without_power() {
     let mut bench = Bench::new();
     turn_to(&mut bench, 7 * TURN + 5000);
-    bench.tell("1 power off");
+    bench.tell("1 power cut");
     bench.tell("1 load torque -20");
     bench.run_ms(3000);
     bench.tell("1 load torque 0");
@@ -203,7 +203,7 @@ fn a_battery_that_runs_empty_without_power_loses_the_turns_and_is_charged_again(
 #[test]
 fn beyond_60000_turns_the_position_goes_on_from_the_other_end_and_the_move_does_not_notice() {
     let mut bench = Bench::open();
-    bench.operate(|drive, now| drive.set_power(false, now));
+    bench.operate(|drive, now| drive.cut_power(now));
     bench.machine().assembly_mut().motor_mut().rotor.angle = plant::Angle::new(59_999, 0.5);
     bench.power_cycle();
     assert_eq!(bench.position(), 59_999 * TURN + TURN / 2);

@@ -24,6 +24,7 @@ mod position;
 mod power_state;
 mod robustness;
 mod stopping;
+mod supply;
 mod terminals;
 mod torque;
 mod traps;

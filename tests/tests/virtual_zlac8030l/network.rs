@@ -190,7 +190,7 @@ fn the_dip_switch_goes_before_200dh() {
         world.send(host, frame).expect("room");
         world.run_for(Duration::from_millis(10));
     }
-    world.set_power(3, false).expect("the drive");
+    world.cut_power(3).expect("the drive");
     world.set_power(3, true).expect("the drive");
     world.run_for(Duration::from_millis(10));
     let heard: Vec<_> = std::iter::from_fn(|| world.poll_received(host)).map(|(_, frame)| frame.to_string()).collect();

@@ -248,7 +248,7 @@ fn a_brown_out_in_motion_restarts_the_drive_with_its_stored_values() {
     bench.set(0x60FF, 0, 200);
     bench.run_ms(1000);
     bench.heard();
-    bench.operate(|drive, now| drive.set_power(false, now));
+    bench.operate(|drive, now| drive.cut_power(now));
     bench.run_ms(3000);
     assert_within("speed: it coasted", bench.report().velocity_rpm, -0.1, 120.0);
     bench.operate(|drive, now| drive.set_power(true, now));

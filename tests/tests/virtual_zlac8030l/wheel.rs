@@ -39,7 +39,11 @@ pub(crate) fn inertia_kg_m2() -> f64 {
 }
 
 pub(crate) fn bus_capacitance_f() -> f64 {
-    MODEL.rig.supply.capacitance_f
+    MODEL.rig.supply.capacitance_f + MODEL.rig.supply.source_capacitance_f
+}
+
+pub(crate) fn source_capacitance_f() -> f64 {
+    MODEL.rig.supply.source_capacitance_f
 }
 
 /// Time that the free wheel takes from a speed to rest: J dw/dt = -(dry + viscous w).

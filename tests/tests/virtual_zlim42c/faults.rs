@@ -179,7 +179,7 @@ fn the_green_light_is_on_with_the_supply_and_the_red_one_is_off_without_a_fault(
         bench.run_ms(100);
         assert_eq!(lit(&mut bench), (true, false));
     }
-    bench.operate(|drive, now| drive.set_power(false, now));
+    bench.operate(|drive, now| drive.cut_power(now));
     bench.run_ms(100);
     assert_eq!(lit(&mut bench), (false, false));
 }

@@ -53,7 +53,7 @@ fn a_drive_without_power_has_its_outputs_off() {
     let mut bench = Bench::new();
     bench.set(0x2030, 0x0C, 3);
     assert_eq!(outputs(&mut bench), 3);
-    bench.operate(|drive, now| drive.set_power(false, now));
+    bench.operate(|drive, now| drive.cut_power(now));
     bench.run_ms(10);
     assert_eq!(bench.report().outputs.bits, 0);
 }

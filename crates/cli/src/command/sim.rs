@@ -31,10 +31,13 @@ use crate::session::{bus_failure, failure_of};
 /// from standard input, one a line, and answers each with one line of JSON; `quit` ends, the end of input does not.
 #[derive(clap::Args)]
 #[command(after_help = "World commands (4 is the node of --drive):\n  \
-    4 power off|on|cycle      4 input X0 1              4 switch X0 -5000 max\n  \
+    4 power off|on|cycle|cut  4 input X0 1              4 switch X0 -5000 max\n  \
     4 load torque 2.5         4 load inertia 0.02       4 rotor lock|free\n  \
     4 supply 48               4 temperature motor 95    4 fault hall on\n  \
-    4 cable cut|join          4 get                     now, help, quit\n\
+    4 cable cut|join          4 get                     now, help, quit\n  \
+    4 supply 48 limit 10 resistance 0.2     (what the supply gives at most, in A, and its resistance in ohm)\n\
+    Switched off a drive lives on the charge of its bus, and its under-voltage, until it dies; a supply that comes back\n\
+    before that, and a cycle, wait for it. Cut, it is dead at once.\n\
     Of the joints, here node 1:\n  \
     1 battery off|on          1 pulses 8192 10000       1 quadrature -400 1000\n  \
     1 duty 40                 1 clock 10000\n\n\

@@ -42,12 +42,13 @@ fn apply_to_drive(world: &mut World, number: u8, id: StationId, action: &Action)
 fn act(drive: &mut dyn VirtualDrive, action: &Action, now: Instant) -> Result<(), CommandError> {
     match action {
         Action::Power(on) => drive.set_power(*on, now),
+        Action::PowerCut => drive.cut_power(now),
         Action::Input { name, level } => drive.set_input(input_number(drive, name)?, *level, now)?,
         Action::Switch { name, range } => drive.set_switch(input_number(drive, name)?, *range, now)?,
         Action::LoadTorque(torque_nm) => drive.set_load_torque(*torque_nm, now)?,
         Action::LoadInertia(inertia_kg_m2) => drive.set_load_inertia(*inertia_kg_m2, now)?,
         Action::RotorLock(locked) => drive.set_rotor_locked(*locked, now)?,
-        Action::Supply(supply_v) => drive.set_supply(*supply_v, now)?,
+        Action::Supply(source) => drive.set_source(*source, now)?,
         Action::Temperature(sensor, celsius) => drive.hold_temperature(*sensor, *celsius, now)?,
         Action::Fault(component, broken) => drive.set_fault(*component, *broken, now)?,
         Action::Battery(connected) => drive.set_battery(*connected, now)?,

@@ -3,7 +3,7 @@
 use std::str::FromStr;
 
 use super::{Action, Command, CommandError};
-use crate::{Component, PulseTrain, SwitchRange, TemperatureSensor};
+use crate::{Component, PulseTrain, Source, SwitchRange, TemperatureSensor};
 
 impl FromStr for Command {
     type Err = CommandError;
@@ -26,12 +26,12 @@ impl FromStr for Command {
     }
 }
 
-const POWER: &str = "NODE power on|off|cycle";
+const POWER: &str = "NODE power on|off|cycle|cut";
 const INPUT: &str = "NODE input NAME 0|1";
 const SWITCH: &str = "NODE switch NAME LOW|min HIGH|max";
 const LOAD: &str = "NODE load torque N·m, or NODE load inertia kg·m²";
 const ROTOR: &str = "NODE rotor lock|free";
-const SUPPLY: &str = "NODE supply VOLTS";
+const SUPPLY: &str = "NODE supply VOLTS [limit AMPERES] [resistance OHMS]";
 const TEMPERATURE: &str = "NODE temperature motor|driver CELSIUS|auto";
 const FAULT: &str = "NODE fault hall|encoder|eeprom|reference|phase|short|bridge on|off";
 const BATTERY: &str = "NODE battery on|off";
@@ -84,10 +84,7 @@ fn parse_action(node: u8, words: &[&str]) -> Result<Action, CommandError> {
         "switch" => parse_switch(arguments),
         "load" => parse_load(arguments),
         "rotor" => Ok(Action::RotorLock(choice(arguments, "lock", "free", ROTOR)?)),
-        "supply" => match arguments {
-            [volts] => Ok(Action::Supply(number(volts, "voltage", 0.0, SUPPLY)?)),
-            _ => Err(CommandError::Usage(SUPPLY)),
-        },
+        "supply" => parse_supply(arguments),
         "temperature" => parse_temperature(arguments),
         "fault" => parse_fault(arguments),
         "battery" => Ok(Action::Battery(choice(arguments, "on", "off", BATTERY)?)),
@@ -117,6 +114,7 @@ fn parse_action(node: u8, words: &[&str]) -> Result<Action, CommandError> {
 fn parse_power(arguments: &[&str]) -> Result<Action, CommandError> {
     match arguments {
         ["cycle"] => Ok(Action::PowerCycle),
+        ["cut"] => Ok(Action::PowerCut),
         _ => Ok(Action::Power(choice(arguments, "on", "off", POWER)?)),
     }
 }
@@ -143,6 +141,20 @@ fn parse_load(arguments: &[&str]) -> Result<Action, CommandError> {
         ["inertia", inertia] => Ok(Action::LoadInertia(number(inertia, "inertia", 0.0, LOAD)?)),
         _ => Err(CommandError::Usage(LOAD)),
     }
+}
+
+fn parse_supply(arguments: &[&str]) -> Result<Action, CommandError> {
+    let Some((volts, pairs)) = arguments.split_first() else { return Err(CommandError::Usage(SUPPLY)) };
+    let mut source = Source { voltage_v: Some(number(volts, "voltage", 0.0, SUPPLY)?), ..Source::default() };
+    for pair in pairs.chunks(2) {
+        let place = match pair {
+            ["limit", _] => &mut source.limit_a,
+            ["resistance", _] => &mut source.resistance_ohm,
+            _ => return Err(CommandError::Usage(SUPPLY)),
+        };
+        *place = Some(number(pair[1], "number", 0.0, SUPPLY)?);
+    }
+    Ok(Action::Supply(source))
 }
 
 fn parse_temperature(arguments: &[&str]) -> Result<Action, CommandError> {
@@ -232,7 +244,13 @@ mod tests {
         assert_eq!(action("4 load inertia 0.02"), Action::LoadInertia(0.02));
         assert_eq!(action("4 rotor lock"), Action::RotorLock(true));
         assert_eq!(action("4 rotor free"), Action::RotorLock(false));
-        assert_eq!(action("4 supply 48"), Action::Supply(48.0));
+        let source = Source { voltage_v: Some(48.0), limit_a: None, resistance_ohm: None };
+        assert_eq!(action("4 supply 48"), Action::Supply(source));
+        let source = Source { limit_a: Some(10.0), ..source };
+        assert_eq!(action("4 supply 48 limit 10"), Action::Supply(source));
+        let source = Source { resistance_ohm: Some(0.2), ..source };
+        assert_eq!(action("4 supply 48 limit 10 resistance 0.2"), Action::Supply(source));
+        assert_eq!(action("4 power cut"), Action::PowerCut);
         assert_eq!(action("4 temperature motor 95"), Action::Temperature(TemperatureSensor::Motor, Some(95.0)));
         assert_eq!(action("4 temperature driver auto"), Action::Temperature(TemperatureSensor::Driver, None));
         assert_eq!(action("4 fault hall on"), Action::Fault(Component::Hall, true));
@@ -277,9 +295,9 @@ mod tests {
                 "unknown command \"Power\" for a node; expected power, input, switch, load, rotor, supply, \
                  temperature, fault, battery, pulses, quadrature, duty, clock, cable or get",
             ),
-            ("4 power", "expected: NODE power on|off|cycle"),
-            ("4 power up", "expected: NODE power on|off|cycle"),
-            ("4 power on now", "expected: NODE power on|off|cycle"),
+            ("4 power", "expected: NODE power on|off|cycle|cut"),
+            ("4 power up", "expected: NODE power on|off|cycle|cut"),
+            ("4 power on now", "expected: NODE power on|off|cycle|cut"),
             ("4 input X0", "expected: NODE input NAME 0|1"),
             ("4 input X0 2", "expected: NODE input NAME 0|1"),
             ("4 switch X0 5", "expected: NODE switch NAME LOW|min HIGH|max"),
@@ -293,9 +311,14 @@ mod tests {
             ("4 load torque nan", "\"nan\" is no torque; expected: NODE load torque N·m, or NODE load inertia kg·m²"),
             ("4 load inertia -1", "\"-1\" is no inertia; expected: NODE load torque N·m, or NODE load inertia kg·m²"),
             ("4 rotor stuck", "expected: NODE rotor lock|free"),
-            ("4 supply", "expected: NODE supply VOLTS"),
-            ("4 supply -1", "\"-1\" is no voltage; expected: NODE supply VOLTS"),
-            ("4 supply 1e999", "\"1e999\" is no voltage; expected: NODE supply VOLTS"),
+            ("4 supply", "expected: NODE supply VOLTS [limit AMPERES] [resistance OHMS]"),
+            ("4 supply 48 limit", "expected: NODE supply VOLTS [limit AMPERES] [resistance OHMS]"),
+            ("4 supply 48 10A", "expected: NODE supply VOLTS [limit AMPERES] [resistance OHMS]"),
+            ("4 supply -1", "\"-1\" is no voltage; expected: NODE supply VOLTS [limit AMPERES] [resistance OHMS]"),
+            (
+                "4 supply 1e999",
+                "\"1e999\" is no voltage; expected: NODE supply VOLTS [limit AMPERES] [resistance OHMS]",
+            ),
             ("4 temperature oil 5", "expected: NODE temperature motor|driver CELSIUS|auto"),
             (
                 "4 temperature motor hot",

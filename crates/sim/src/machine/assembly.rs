@@ -4,17 +4,24 @@ use drives::engine::axis::Demand;
 use drives::{Firmware, RegisterError};
 use plant::Rig;
 use plant::mechanics::RotorData;
-use plant::supply::SupplyData;
+use plant::rig::RigModel;
 
 use super::quantity::Quantity;
-use crate::{Component, PulseTrain, Refused, Report, TemperatureSensor};
+use crate::{Component, PulseTrain, Refused, Report, Source, TemperatureSensor};
 
 /// Temperature of the surroundings.
 pub(super) const AMBIENT_C: f64 = 25.0;
 
 /// What the supply can be set to.
-pub(super) const SUPPLY_VOLTAGE: Quantity =
-    Quantity { what: "supply", expected: "0 to 100 V", least: 0.0, greatest: 100.0 };
+const SUPPLY_VOLTAGE: Quantity = Quantity { what: "supply", expected: "0 to 100 V", least: 0.0, greatest: 100.0 };
+
+/// From what a bench supply can be turned down to, to what a traction battery gives into a short circuit.
+const SUPPLY_LIMIT: Quantity =
+    Quantity { what: "limit of the supply", expected: "0.01 to 1000 A", least: 0.01, greatest: 1000.0 };
+
+/// From a few centimetres of thick wire to what hardly lets a drive start.
+const SUPPLY_RESISTANCE: Quantity =
+    Quantity { what: "resistance of the supply", expected: "0.001 to 100 ohm", least: 0.001, greatest: 100.0 };
 
 const TEMPERATURE: Quantity =
     Quantity { what: "temperature", expected: "-55 to 200 °C", least: -55.0, greatest: 200.0 };
@@ -67,10 +74,13 @@ pub trait Assembly: Clone + Send + 'static {
     /// What can be measured from outside: `common`, what is measured alike at every model, with the model's own.
     fn report(&self, firmware: &Self::Firmware, common: Report) -> Report;
 
-    /// Connects or disconnects the supply.
-    fn connect_supply(&mut self, on: bool) {
-        connect(&mut self.rig_mut().supply, on);
+    /// The drive's own converter has started, or stopped: what lives on it follows.
+    fn set_supplied(&mut self, supplied: bool) {
+        let _ = supplied;
     }
+
+    /// What never changes about the rig, and the rig.
+    fn rig_and_model_mut(&mut self) -> (&mut Rig, &mut RigModel);
 
     /// Whether the voltage is enough for the firmware to run on (`running`), or to start.
     #[inline]
@@ -116,13 +126,16 @@ pub trait Assembly: Clone + Send + 'static {
         self.rig_mut().load.locked = locked;
     }
 
-    /// Voltage of the supply.
-    fn set_supply(&mut self, supply_v: f64) -> Result<(), Refused> {
-        let supply = &mut self.rig_mut().supply;
-        supply.source_v = SUPPLY_VOLTAGE.check(supply_v)?;
-        // A supply that is turned down discharges its own output; only the motor's energy it cannot take.
-        if supply.connected {
-            supply.bus_v = supply.bus_v.min(supply_v);
+    /// Voltage of the supply and what is behind it: all of it or nothing.
+    fn set_source(&mut self, source: Source) -> Result<(), Refused> {
+        let voltage_v = source.voltage_v.map(|voltage_v| SUPPLY_VOLTAGE.check(voltage_v)).transpose()?;
+        let limit_a = source.limit_a.map(|limit_a| SUPPLY_LIMIT.check(limit_a)).transpose()?;
+        let ohm = source.resistance_ohm.map(|ohm| SUPPLY_RESISTANCE.check(ohm)).transpose()?;
+        let (rig, model) = self.rig_and_model_mut();
+        model.supply.source_limit_a = limit_a.unwrap_or(model.supply.source_limit_a);
+        model.supply.source_resistance_ohm = ohm.unwrap_or(model.supply.source_resistance_ohm);
+        if let Some(voltage_v) = voltage_v {
+            rig.set_source_v(model, voltage_v);
         }
         Ok(())
     }
@@ -171,15 +184,6 @@ pub trait Assembly: Clone + Send + 'static {
         let _ = (firmware, address, words);
         Err(RegisterError::NoSuchAddress)
     }
-}
-
-/// Connects a supply or disconnects it. The inrush limiter has charged the capacitor by the time the drive's converter
-/// starts.
-pub(super) fn connect(supply: &mut SupplyData, on: bool) {
-    if on && !supply.connected {
-        supply.bus_v = supply.bus_v.max(supply.source_v);
-    }
-    supply.connected = on;
 }
 
 /// `report` with the set-points of the control loops; `rpm` turns the velocity of a set-point into r/min.

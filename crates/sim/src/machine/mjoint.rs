@@ -14,10 +14,12 @@ use drives::profile::DriveProfile;
 use plant::absolute_encoder::BatteryState;
 use plant::mechanics::RotorData;
 use plant::pmsm::Phase;
+use plant::rig::RigModel;
+use plant::supply::SupplyData;
 use plant::{Angle, Inverter, JointMotor, JointMotorModel, Rig, joint_motor};
 
 use super::Machine;
-use super::assembly::{AMBIENT_C, Assembly, connect, with_demand};
+use super::assembly::{AMBIENT_C, Assembly, with_demand};
 use super::order::{Order, OrderError};
 use super::pulse_source::PulseSource;
 use crate::{Component, Levels, PulseTrain, Refused, Report, VirtualDrive};
@@ -74,9 +76,8 @@ impl Joint {
     /// At rest at ambient temperature, the supply not yet connected.
     pub fn new(model: &'static Model, image: Image, bitrate: Bitrate) -> Self {
         let mut motor = JointMotor::new(motor_of(model), Angle::default(), SUPPLY_V, AMBIENT_C);
-        motor.model.rig.supply.capacitance_f += SUPPLY_CAPACITANCE_F;
-        motor.rig.supply.connected = false;
-        motor.rig.supply.bus_v = 0.0;
+        motor.model.rig.supply.source_capacitance_f = SUPPLY_CAPACITANCE_F;
+        motor.rig.supply = SupplyData::switched_off(SUPPLY_V);
         Self {
             model,
             motor,
@@ -192,6 +193,10 @@ impl Assembly for Joint {
         &mut self.motor.rig
     }
 
+    fn rig_and_model_mut(&mut self) -> (&mut Rig, &mut RigModel) {
+        (&mut self.motor.rig, &mut self.motor.model.rig)
+    }
+
     fn report(&self, firmware: &MJoint, common: Report) -> Report {
         let running = common.powered;
         let engaged =
@@ -206,18 +211,10 @@ impl Assembly for Joint {
         with_demand(firmware.demand(), |counts_s| counts_s / COUNTS_S_PER_RPM, report)
     }
 
-    fn connect_supply(&mut self, on: bool) {
-        let JointMotor { rig, encoder, model, rotor, .. } = &mut self.motor;
-        let was_on = rig.supply.connected;
-        connect(&mut rig.supply, on);
-        if !on {
-            // However short the off time of a person's hand: the capacitor is empty after it, and the encoder lives on
-            // its battery or not at all.
-            rig.supply.bus_v = 0.0;
-        }
-        if !(on && was_on) {
-            model.encoder.step(encoder, 0.0, rotor.angle, on);
-        }
+    /// Without the converter's voltage the encoder lives on its battery or not at all.
+    fn set_supplied(&mut self, supplied: bool) {
+        let JointMotor { encoder, model, rotor, .. } = &mut self.motor;
+        model.encoder.step(encoder, 0.0, rotor.angle, supplied);
     }
 
     #[inline]

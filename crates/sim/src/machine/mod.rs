@@ -24,11 +24,15 @@ pub use quantity::Quantity;
 pub use zlac8030l::{HubWheel, Zlac8030lMachine, zlac8030l};
 pub use zlim42c::{Stepper, Zlim42c82Machine, Zlim42cMachine, zlim42c, zlim42c_82};
 
-use crate::{Component, PulseTrain, Refused, Report, SwitchRange, TemperatureSensor, VirtualDrive};
+use crate::{Component, PulseTrain, Refused, Report, Source, SwitchRange, TemperatureSensor, VirtualDrive};
 use switch::{Inputs, stretch};
 
 /// How often a drive without enough voltage to run looks whether it has come.
 const WAKE_PERIOD_NS: u64 = 1_000_000;
+
+/// How long a supply that is to come back waits for the bus to drain. A motor that is driven from outside feeds the bus
+/// for ever: then it is shorted.
+const DRAIN_PATIENCE_NS: u64 = 10_000_000_000;
 
 const RPM_PER_RAD_S: f64 = 30.0 / core::f64::consts::PI;
 
@@ -39,9 +43,18 @@ pub struct Machine<A: Assembly> {
     assembly: A,
     actuation: <A::Firmware as Firmware>::Actuation,
     inputs: Inputs,
-    switched_on: bool,
+    supply: Supply,
     running: bool,
     next_tick: Instant,
+}
+
+/// The switch between the supply and the drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Supply {
+    On,
+    Off,
+    /// Off, and on again when the drive has died of it, or now at the latest.
+    Cycling(Instant),
 }
 
 impl<A: Assembly> Machine<A> {
@@ -52,7 +65,7 @@ impl<A: Assembly> Machine<A> {
             assembly,
             actuation: Default::default(),
             inputs: Inputs::default(),
-            switched_on: false,
+            supply: Supply::Off,
             running: false,
             next_tick: Instant::ZERO,
         }
@@ -88,16 +101,48 @@ impl<A: Assembly> Machine<A> {
         }
     }
 
-    /// Starts the firmware when its voltage comes and stops it when it goes.
+    /// Starts the firmware when its voltage comes and stops it when it goes. It lives on whatever charges the bus, but is
+    /// started by the supply alone.
+    #[inline]
     fn watch_supply(&mut self, at: Instant) {
-        let supplied = self.switched_on && self.assembly.supplies_firmware(self.running);
+        let supplied = self.assembly.supplies_firmware(self.running) && (self.running || self.supply == Supply::On);
         if supplied != self.running {
             self.set_running(supplied, at);
         }
+        if let Supply::Cycling(patience) = self.supply {
+            self.finish_cycle(patience, at);
+        }
+    }
+
+    /// Switches on again once the drive has died.
+    #[cold]
+    fn finish_cycle(&mut self, patience: Instant, at: Instant) {
+        if self.running && at < patience {
+            return;
+        }
+        if self.running {
+            self.cut_source(at);
+        }
+        self.switch_on(at);
+    }
+
+    fn switch_on(&mut self, at: Instant) {
+        self.supply = Supply::On;
+        let (rig, model) = self.assembly.rig_and_model_mut();
+        rig.switch_source(model, true);
+        self.watch_supply(at);
+    }
+
+    fn cut_source(&mut self, at: Instant) {
+        self.supply = Supply::Off;
+        let (rig, model) = self.assembly.rig_and_model_mut();
+        rig.cut_source(model);
+        self.watch_supply(at);
     }
 
     fn set_running(&mut self, running: bool, now: Instant) {
         self.running = running;
+        self.assembly.set_supplied(running);
         if running {
             let hardware = self.assembly.hardware();
             self.firmware.power_on(&hardware, now);
@@ -138,10 +183,14 @@ impl<A: Assembly> Station for Machine<A> {
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        match (self.running, self.switched_on) {
-            (true, _) => self.firmware.poll_timeout(),
-            (false, true) => Some(self.next_tick.plus_nanos(WAKE_PERIOD_NS)),
-            (false, false) => None,
+        match (self.running, self.supply) {
+            (true, Supply::On) => self.firmware.poll_timeout(),
+            (false, Supply::Off) => None,
+            // Its life or its supply may change without a frame or a deadline of its own.
+            _ => {
+                let look = self.next_tick.plus_nanos(WAKE_PERIOD_NS);
+                self.firmware.poll_timeout().filter(|due| self.running && *due < look).or(Some(look))
+            }
         }
     }
 
@@ -158,9 +207,21 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
 
     fn set_power(&mut self, on: bool, now: Instant) {
         self.advance(now);
-        self.switched_on = on;
-        self.assembly.connect_supply(on);
-        self.watch_supply(now);
+        if !on {
+            self.supply = Supply::Off;
+            let (rig, model) = self.assembly.rig_and_model_mut();
+            rig.switch_source(model, false);
+            self.watch_supply(now);
+        } else if self.running && self.supply != Supply::On {
+            self.supply = Supply::Cycling(now.plus_nanos(DRAIN_PATIENCE_NS));
+        } else {
+            self.switch_on(now);
+        }
+    }
+
+    fn cut_power(&mut self, now: Instant) {
+        self.advance(now);
+        self.cut_source(now);
     }
 
     fn bitrate(&self) -> Option<Bitrate> {
@@ -231,8 +292,12 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
     }
 
     fn set_supply(&mut self, supply_v: f64, now: Instant) -> Result<(), Refused> {
+        self.set_source(Source { voltage_v: Some(supply_v), ..Source::default() }, now)
+    }
+
+    fn set_source(&mut self, source: Source, now: Instant) -> Result<(), Refused> {
         self.advance(now);
-        self.assembly.set_supply(supply_v)
+        self.assembly.set_source(source)
     }
 
     fn hold_temperature(

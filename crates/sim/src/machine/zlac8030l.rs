@@ -17,7 +17,8 @@ use plant::hall::HallFault;
 use plant::hub_motor::{self, HubMotor, HubMotorModel, Inverter};
 use plant::mechanics::RotorData;
 use plant::pmsm::Phase;
-use plant::rig::Rig;
+use plant::rig::{Rig, RigModel};
+use plant::supply::SupplyData;
 
 use super::Machine;
 use super::assembly::{AMBIENT_C, Assembly, with_demand};
@@ -81,7 +82,7 @@ impl HubWheel {
         let mut model = if fast { HubMotorModel::ZLLG65ASM250 } else { HubMotorModel::ZLLG65ASM250_L };
         model.brake.holding_nm = BRAKE_NM;
         let mut motor = HubMotor::new(model, Angle::default(), SUPPLY_V, AMBIENT_C);
-        motor.rig.supply.connected = false;
+        motor.rig.supply = SupplyData::switched_off(SUPPLY_V);
         Self { motor, dip_address, image, eeprom_broken: false, reference_broken: false, last: Actuation::default() }
     }
 
@@ -150,6 +151,10 @@ impl Assembly for HubWheel {
 
     fn rig_mut(&mut self) -> &mut Rig {
         &mut self.motor.rig
+    }
+
+    fn rig_and_model_mut(&mut self) -> (&mut Rig, &mut RigModel) {
+        (&mut self.motor.rig, &mut self.motor.model.rig)
     }
 
     fn report(&self, firmware: &Zlac8030l, common: Report) -> Report {

@@ -14,12 +14,13 @@ use drives::zlim42c::variations::VARIANT;
 use drives::zlim42c::{Zlim42c, objects, storage};
 use plant::angle::Angle;
 use plant::mechanics::RotorData;
-use plant::rig::Rig;
+use plant::rig::{Rig, RigModel};
 use plant::stepper::{Bridges, Phase};
 use plant::stepper_motor::{StepperMotor, StepperMotorModel};
+use plant::supply::SupplyData;
 
 use super::Machine;
-use super::assembly::{AMBIENT_C, Assembly, SUPPLY_VOLTAGE};
+use super::assembly::{AMBIENT_C, Assembly};
 use super::order::{Order, OrderError, baud_rate};
 use super::quantity::Quantity;
 use crate::{Component, Levels, Refused, Report, TemperatureSensor, VirtualDrive};
@@ -99,7 +100,7 @@ impl<const LENGTH_MM: u16> Stepper<LENGTH_MM> {
     pub fn new(dip_address: u8, image: Image) -> Self {
         let model = if LENGTH_MM == LONG { StepperMotorModel::ZLIM42_C_82 } else { StepperMotorModel::ZLIM42_C_70 };
         let mut motor = StepperMotor::new(model, Angle::default(), SUPPLY_V, AMBIENT_C);
-        motor.rig.supply.connected = false;
+        motor.rig.supply = SupplyData::switched_off(SUPPLY_V);
         Self {
             motor,
             dip_address,
@@ -204,6 +205,10 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
         &mut self.motor.rig
     }
 
+    fn rig_and_model_mut(&mut self) -> (&mut Rig, &mut RigModel) {
+        (&mut self.motor.rig, &mut self.motor.model.rig)
+    }
+
     fn report(&self, firmware: &Zlim42c, common: Report) -> Report {
         let rpm = |pulses_s: f64| pulses_s * 60.0 / f64::from(firmware.pulses_per_turn());
         let demand = match *firmware.demand() {
@@ -241,12 +246,6 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
     fn keep_image(&mut self, image: &[u8]) {
         self.image = Image::from_bytes(image);
         self.zero = None;
-    }
-
-    fn set_supply(&mut self, supply_v: f64) -> Result<(), Refused> {
-        // Its bus capacitor is the drive's alone: a supply that is turned down takes nothing out of that.
-        self.motor.rig.supply.source_v = SUPPLY_VOLTAGE.check(supply_v)?;
-        Ok(())
     }
 
     fn hold_temperature(&mut self, _sensor: TemperatureSensor, _celsius: Option<f64>) -> Result<(), Refused> {

@@ -33,9 +33,14 @@ impl World {
         })
     }
 
-    /// Switches the supply of the drive added under `number`.
+    /// Switches the supply of the drive added under `number`: see [`VirtualDrive::set_power`].
     pub fn set_power(&mut self, number: u8, on: bool) -> Result<(), WorldError> {
         self.with_drive(number, |drive, now| drive.set_power(on, now))
+    }
+
+    /// Takes supply and charge from the drive added under `number`: it is dead at once.
+    pub fn cut_power(&mut self, number: u8) -> Result<(), WorldError> {
+        self.with_drive(number, |drive, now| drive.cut_power(now))
     }
 
     /// The station of the drive added under `number`.

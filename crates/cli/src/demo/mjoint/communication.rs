@@ -162,7 +162,7 @@ pub(super) fn address(bench: &mut Bench) {
     bench.step("restart");
     let begin = bench.now();
     bench.machine("power off");
-    bench.run_ms(100);
+    bench.run_ms(200);
     bench.machine("power on");
     bench.run_ms(10);
     let heard = !bench.heard_since(begin, 0x705).is_empty();

@@ -76,7 +76,7 @@ fn prepare(bench: &mut Bench) {
     bench.run_ms(20);
     for node in NODES {
         bench.talk_to(node);
-        bench.machine("power off");
+        bench.machine("power cut");
         bench.run(Duration::from_micros(1_730 * u64::from(node)));
         bench.machine("power on");
         bench.run_ms(20);
