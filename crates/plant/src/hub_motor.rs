@@ -208,9 +208,7 @@ impl HubMotor {
     #[cold]
     pub fn burn_power_stage(&mut self) {
         self.power_stage_burnt = true;
-        self.rig.energy.switches_j += self.model.rig.supply.stored_energy_j(&self.rig.supply);
-        self.rig.supply.connected = false;
-        self.rig.supply.bus_v = 0.0;
+        self.rig.cut_source(&self.model.rig);
     }
 
     /// A new power stage. The source is connected again by whoever put it in.

@@ -66,12 +66,14 @@ fn a_burnt_power_stage_brakes_the_wheel_takes_the_drive_off_the_bus_and_a_new_on
     bench.run_ms(500);
     assert_within("speed", bench.report().velocity_rpm, -1.0, 1.0);
     assert_eq!(bench.sdo(&[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]), None);
+    bench.heard();
     bench.tell("4 power cycle");
-    bench.run_ms(100);
+    bench.run_ms(500);
+    assert!(bench.heard().is_empty(), "no boot-up");
     assert!(!bench.report().powered && bench.report().damage.is_some(), "it burns the next fuse");
     bench.tell("4 fault bridge off");
     bench.tell("4 power cycle");
-    bench.run_ms(100);
+    bench.run_ms(500);
     assert_eq!(bench.report().damage, None);
     bench.enable_in(3);
     bench.set(0x60FF, 0, 60);

@@ -145,6 +145,13 @@ impl Assembly for HubWheel {
         self.motor.step(Self::PERIOD_S, &pins);
     }
 
+    /// Behind a burnt power stage there is no voltage.
+    #[inline]
+    fn supplies_firmware(&self, running: bool) -> bool {
+        let least_v = if running { Self::STOPS_BELOW_V } else { Self::STARTS_AT_V };
+        !self.motor.is_power_stage_burnt() && self.motor.rig.supply.bus_v >= least_v
+    }
+
     fn shaft_and_rig(&self) -> (&RotorData, &Rig) {
         (&self.motor.rotor, &self.motor.rig)
     }
