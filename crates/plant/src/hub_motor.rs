@@ -6,6 +6,7 @@
 
 use crate::angle::{Angle, Axis};
 use crate::brake::BrakeModel;
+use crate::clamp::ClampModel;
 use crate::encoder::{EncoderData, EncoderModel};
 use crate::hall::{HallFault, HallModel};
 use crate::mechanics::{RotorData, RotorModel};
@@ -35,25 +36,6 @@ pub struct HubMotorModel {
     pub power_stage_limit_c: f64,
     /// Speed at which the bearings seize.
     pub bearing_limit_rad_s: f64,
-}
-
-/// Suppressors across the bus: a motor that is driven faster than its bus charges it through the diodes of the idle bridge,
-/// and the source takes nothing back. Their heat goes into the heat sink.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ClampModel {
-    /// Voltage from which they conduct.
-    pub from_v: f64,
-    /// Voltage above that per ampere.
-    pub resistance_ohm: f64,
-}
-
-impl ClampModel {
-    /// What they take from a bus of this voltage.
-    #[inline]
-    fn power_w(&self, bus_v: f64) -> f64 {
-        let above_v = bus_v - self.from_v;
-        if above_v > 0.0 { bus_v * above_v / self.resistance_ohm } else { 0.0 }
-    }
 }
 
 /// What the drive's power stage does during one step.

@@ -19,9 +19,10 @@
 //! What is assumed is a named constant with its reason.
 
 use crate::brake::BrakeModel;
+use crate::clamp::ClampModel;
 use crate::encoder::EncoderModel;
 use crate::hall::HallModel;
-use crate::hub_motor::{ClampModel, HubMotorModel};
+use crate::hub_motor::HubMotorModel;
 use crate::mechanics::RotorModel;
 use crate::pmsm::{PmsmModel, SQRT_3};
 use crate::rig::RigModel;

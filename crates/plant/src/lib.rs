@@ -16,6 +16,7 @@
 pub mod absolute_encoder;
 pub mod angle;
 pub mod brake;
+pub mod clamp;
 pub mod encoder;
 pub mod gear;
 pub mod hall;

@@ -5,11 +5,16 @@
 //! readings says so; only [`StepperMotor::rotor`], the truth, does. The load, the supply, the faults and the
 //! surroundings are plain fields that a test or a person at a bench changes at any time.
 //!
+//! A rotor that a load drives has its friction, its iron loss, and from some speed on the bus that its voltage charges through
+//! the diodes, up to the suppressors. A board that these have heated through loses a transistor; bearings beyond their limit
+//! seize.
+//!
 //! The rotor hangs on the field as on a spring and rings at some 300 Hz with hardly any damping, as the real one does
 //! when a drive dwells at its resonance. [`RotorData::turn`] moves the angle before the torque of the step is known,
 //! which gives such a ringing `(w dt)^3 / 8` of critical damping back: 1e-4 at 50 µs, a thirtieth of its friction's.
 
 use crate::angle::{Angle, Axis};
+use crate::clamp::ClampModel;
 use crate::mechanics::{RotorData, RotorModel};
 use crate::rig::{Flows, Rig, RigModel};
 use crate::stepper::{Bridges, Phase, StepperData, StepperInput, StepperModel, Turn};
@@ -31,6 +36,12 @@ pub struct StepperMotorModel {
     pub rotor: RotorModel,
     /// Warm bodies, power stage and supply. The drive has no bleeder: it is never switched on.
     pub rig: RigModel,
+    /// What limits the voltage of the bus.
+    pub clamp: ClampModel,
+    /// Temperature of the board at which a transistor breaks down.
+    pub power_stage_limit_c: f64,
+    /// Speed at which the bearings seize.
+    pub bearing_limit_rad_s: f64,
 }
 
 /// What the drive's sensors read at the end of a step.
@@ -67,6 +78,8 @@ pub struct StepperMotor {
     pub rig: Rig,
     /// Torque of the motor on its rotor, detent included, mean over the last step.
     pub torque_nm: f64,
+    seized: bool,
+    overheated: bool,
     axis: Axis,
     bus_current_a: f64,
     /// Current through the contact of two wires.
@@ -85,6 +98,8 @@ impl StepperMotor {
             broken_down: false,
             rig: Rig::new(&model.rig, model.stepper.resistance_ohm, source_v, ambient_c),
             torque_nm: 0.0,
+            seized: false,
+            overheated: false,
             axis: magnet_axis(&model, angle),
             bus_current_a: 0.0,
             short_a: 0.0,
@@ -115,16 +130,53 @@ impl StepperMotor {
 
         let bus_w = motor.bus_w + broken_w;
         self.bus_current_a = if bus_v > 0.0 { bus_w / bus_v } else { 0.0 };
+        let seized_j = if self.rotor.velocity_rad_s.abs() > model.bearing_limit_rad_s { self.seize() } else { 0.0 };
+        let clamp_w = self.model.clamp.power_w(bus_v);
         let flows = Flows {
-            bus_w,
+            bus_w: bus_w + clamp_w,
             heat_w_per_ohm: motor.heat_w_per_ohm,
-            arc_j: motor.arc_j + broken_w * dt_s,
-            friction_j: moved.friction_j,
+            arc_j: motor.arc_j + (broken_w + clamp_w) * dt_s,
+            friction_j: moved.friction_j + seized_j,
             load_j: moved.load_j,
         };
-        if self.rig.step(&model.rig, dt_s, &flows, false) {
+        if self.rig.step(&self.model.rig, dt_s, &flows, false) {
             self.step_slow();
         }
+    }
+
+    /// Blocks the rotor, or frees it; seized bearings are new ones then.
+    pub fn lock_rotor(&mut self, locked: bool) {
+        self.rig.load.locked = locked;
+        self.seized = false;
+    }
+
+    /// The bearings have seized.
+    pub fn is_seized(&self) -> bool {
+        self.seized
+    }
+
+    /// A transistor breaks down, or a new, cold board is put in.
+    pub fn set_broken_down(&mut self, broken: bool) {
+        if self.overheated {
+            self.rig.heat_sink.temperature_c = self.rig.ambient_c;
+        }
+        self.broken_down = broken;
+        self.overheated = false;
+    }
+
+    /// Heat has broken a transistor down.
+    pub fn is_overheated(&self) -> bool {
+        self.overheated
+    }
+
+    /// What turned goes into the bearings as heat.
+    #[cold]
+    fn seize(&mut self) -> f64 {
+        let kinetic_j = self.model.rotor.kinetic_energy_j(&self.rotor, &self.rig.load);
+        self.rotor = RotorData { angle: self.rotor.angle, ..RotorData::default() };
+        self.rig.load.locked = true;
+        self.seized = true;
+        kinetic_j
     }
 
     /// Power that goes into what is broken, and the current of a short circuit.
@@ -146,6 +198,10 @@ impl StepperMotor {
     /// Heat of the last steps into the bodies, the windings' resistance, and the magnets' direction afresh.
     fn step_slow(&mut self) {
         self.rig.step_slow(&self.model.rig, self.model.stepper.resistance_ohm);
+        let board = &self.rig.heat_sink;
+        if board.hold_c.is_none() && board.temperature_c > self.model.power_stage_limit_c && !self.broken_down {
+            (self.broken_down, self.overheated) = (true, true);
+        }
         self.axis = magnet_axis(&self.model, self.rotor.angle);
     }
 

@@ -78,7 +78,10 @@ for _model, _torque in HOLDING_TORQUE.items():
         torque = HOLDING_TORQUE[bench.drives[0].partition("@")[0]]
         bench.enable(POSITION)
         bench.sleep(0.3)
-        bench.world(f"load torque {0.85 * torque}")
+        # Come at once, a torque above 72 % would swing an undamped rotor over its crest.
+        for part in range(1, 18):
+            bench.world(f"load torque {0.05 * part * torque}")
+            bench.sleep(0.05)
         bench.sleep(0.5)
         near(bench.world("get")["rotor_position"], 0, TOOTH / 4 + 2, "where the rotor is under 85 %, within a full step")
         bench.world(f"load torque {1.2 * torque}")

@@ -10,6 +10,7 @@ mod address;
 mod communication;
 mod current;
 mod datagrams;
+mod driven;
 mod faults;
 mod homing;
 mod limits;

@@ -349,7 +349,7 @@ mod tests {
             let mut bench = Bench::new();
             bench.run_with(&model, TrajectoryPoint::rest(0));
             (0..150).for_each(|_| bench.run_with(&model, TrajectoryPoint::rest(pulses)));
-            let angle = f64::from(pulses) / 80.0 + f64::from(across_a / 1.2) / core::f64::consts::TAU;
+            let angle = f64::from(pulses) / 80.0 + across_a / 1.2 / core::f64::consts::TAU;
             assert!((bench.angle_turns() - angle).abs() < 2e-4, "{pulses}: {} turns", bench.angle_turns());
             assert!((bench.stepper.current_a() - 1.2).abs() < 0.005, "{pulses}: {} A", bench.stepper.current_a());
         }

@@ -28,6 +28,10 @@ use crate::{Component, Levels, Refused, Report, TemperatureSensor, VirtualDrive}
 const OUTPUTS: &[&str] = &["Y0", "Y1", "RED", "GREEN"];
 const SUPPLY_V: f64 = 24.0;
 
+/// What has been destroyed, and what to do about it.
+const SEIZED: &str = "bearings seized by over-speed: 'rotor free' puts in new ones";
+const BURNT: &str = "a transistor of the bridges has burnt: 'fault bridge off' puts in a new board";
+
 /// Length of the longer motor's body, mm.
 const LONG: u16 = 82;
 
@@ -131,6 +135,11 @@ impl<const LENGTH_MM: u16> Stepper<LENGTH_MM> {
         Self::new(dip_address(node), Image::of(&storage::addressed(&VARIANT, node, baud_rate)))
     }
 
+    fn damage(&self) -> Option<&'static str> {
+        let seized = self.motor.is_seized().then_some(SEIZED);
+        self.motor.is_overheated().then_some(BURNT).or(seized)
+    }
+
     /// Electrical turns of the rotor.
     fn rotor_turns(&self) -> f64 {
         self.motor.rotor.angle.as_rad() / core::f64::consts::TAU * f64::from(TEETH)
@@ -225,9 +234,14 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
             motor_c: None,
             driver_c: None,
             statusword: common.powered.then(|| firmware.values().get(objects::STATUSWORD)),
+            damage: self.damage(),
             outputs: Levels::new(OUTPUTS, &levels.map(|level| common.powered && level)),
             ..common
         }
+    }
+
+    fn set_rotor_locked(&mut self, locked: bool) {
+        self.motor.lock_rotor(locked);
     }
 
     #[inline]
@@ -260,7 +274,7 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
             Component::Reference => self.reference_broken = broken,
             Component::Phase => self.motor.lost_phase = broken.then_some(Phase::A),
             Component::Short => self.motor.shorted_phase = broken.then_some(Phase::A),
-            Component::Bridge => self.motor.broken_down = broken,
+            Component::Bridge => self.motor.set_broken_down(broken),
         }
         Ok(())
     }
