@@ -42,10 +42,11 @@ pub(crate) struct Global {
     #[arg(long = "model", value_name = "NODE=MODEL", value_parser = node_model, global = true)]
     pub(crate) models: Vec<(NodeId, &'static DriveProfile)>,
 
-    /// Machine file that says which models are where on a real bus; the same file describes a virtual one to sim:FILE.toml
+    /// Machine file that says which models are where on a real bus; `sim` serves the drives that it describes
     ///
-    /// Of each [[drive]] its `model` and `node` count. An embedded bus knows its drives and does not need it.
-    #[arg(long, value_name = "FILE.toml", value_parser = machine_file::models, env = "FERRODRIVE_MACHINE", global = true)]
+    /// On a real bus the `model` and `node` of each [[drive]] count. The same file describes a bus of a command's own to --bus
+    /// sim:FILE.toml, which knows its drives.
+    #[arg(long, value_name = "FILE.toml", value_parser = machine_file::machine, env = "FERRODRIVE_MACHINE", global = true)]
     pub(crate) machine: Option<Machine>,
 
     /// Longest wait for each answer of a node

@@ -11,6 +11,7 @@ use master::{Error, Network, Node};
 
 use crate::args::Global;
 use crate::failure::Failure;
+use crate::machine_file::Machine;
 use crate::models::{self, DriveProfile};
 use crate::progress::Progress;
 
@@ -61,8 +62,8 @@ impl Context {
         embedded: Option<&[(NodeId, &'static DriveProfile)]>,
         progress: Progress,
     ) -> Self {
-        let of_machine = global.machine.iter().filter(|_| embedded.is_none()).flat_map(|machine| machine.0.iter());
-        let by_user = of_machine.chain(&global.models).map(|(node, model)| (*node, Told::ByUser(model)));
+        let of_machine = global.machine.iter().filter(|_| embedded.is_none()).flat_map(Machine::models);
+        let by_user = of_machine.chain(global.models.iter().copied()).map(|(node, model)| (node, Told::ByUser(model)));
         let by_bus = embedded.unwrap_or_default().iter().map(|(node, model)| (*node, Told::ByBus(model)));
         let models = by_bus.chain(by_user).collect();
         Self { network, progress, timeout: global.timeout, models, json: global.json, embedded: embedded.is_some() }

@@ -20,6 +20,7 @@ mod plain;
 mod plot;
 mod progress;
 mod readings;
+mod scope;
 mod serve;
 mod session;
 mod signals;
@@ -49,7 +50,9 @@ fn main() -> ExitCode {
         Err(error) => return refuse_command_line(&error),
     };
     let format = Format { json: cli.global.json, paint: Paint::for_stream(&io::stdout()) };
-    match run(&cli.global, format, &cli.command, typed_bus(&matches)) {
+    let ran = scope::refuse_unheeded(&cli.global, &cli.command, &matches)
+        .and_then(|()| run(&cli.global, format, &cli.command, Typed::of(&matches)));
+    match ran {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             complain(format, &failure);
@@ -63,11 +66,23 @@ fn refuse_command_line(error: &clap::Error) -> ExitCode {
     let before_dashes = std::env::args_os().take_while(|argument| argument != "--");
     let json = before_dashes.into_iter().any(|argument| argument == "--json");
     if !json || !error.use_stderr() {
-        error.exit();
+        return show_usage(error);
     }
     let failure = Failure::of_command_line(error);
     complain(Format { json, paint: Paint::for_stream(&io::stdout()) }, &failure);
     ExitCode::from(failure.status as u8)
+}
+
+/// Help, or what is wrong with the command line, in the parser's own words and colours; what was typed may have brought
+/// commands for the terminal along, which are spelled out.
+fn show_usage(error: &clap::Error) -> ExitCode {
+    let text = error.render().to_string();
+    let shown = plain(&text);
+    if shown == text {
+        error.exit();
+    }
+    let _ = write!(io::stderr(), "{shown}");
+    ExitCode::from(error.exit_code() as u8)
 }
 
 /// Says why: to people on standard error, to programs as a line of JSON on standard output. Who sent a signal knows,
@@ -91,12 +106,21 @@ fn complain(format: Format, failure: &Failure) {
     let _ = writeln!(io::stderr(), "{error} {}", plain(&failure.to_string()));
 }
 
-/// True if the bus was given on the command line, not by the environment.
-fn typed_bus(matches: &ArgMatches) -> bool {
-    matches.value_source("bus") == Some(ValueSource::CommandLine)
+/// What was given on the command line, not by the environment.
+#[derive(Clone, Copy)]
+struct Typed {
+    bus: bool,
+    machine: bool,
 }
 
-fn run(global: &Global, format: Format, command: &Command, typed_bus: bool) -> Result<(), Failure> {
+impl Typed {
+    fn of(matches: &ArgMatches) -> Self {
+        let typed = |option| matches.value_source(option) == Some(ValueSource::CommandLine);
+        Self { bus: typed("bus"), machine: typed("machine") }
+    }
+}
+
+fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Result<(), Failure> {
     match command {
         Command::Demo(demo) => {
             let report = demo.run(global)?;
@@ -108,7 +132,9 @@ fn run(global: &Global, format: Format, command: &Command, typed_bus: bool) -> R
                 None => Ok(()),
             }
         }
-        Command::Sim(sim) => sim.run(global, typed_bus.then_some(&global.bus)),
+        Command::Sim(sim) => {
+            sim.run(global, typed.bus.then_some(&global.bus), global.machine.as_ref().filter(|_| typed.machine))
+        }
         Command::Scan(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Read(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Write(command) => on_bus(global, format, async |context| command.run(context).await),

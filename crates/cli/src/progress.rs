@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::plain::plain;
+
 /// One line on standard error that says what is being waited for; nothing if that is no terminal.
 #[derive(Clone, Debug)]
 pub(crate) struct Progress {
@@ -33,7 +35,7 @@ impl Progress {
     /// A line on standard error that stays, terminal or not.
     pub(crate) fn note(&self, text: &str) {
         // Nobody may be listening any more.
-        self.bar.suspend(|| drop(writeln!(io::stderr(), "note: {text}")));
+        self.bar.suspend(|| drop(writeln!(io::stderr(), "note: {}", plain(text))));
     }
 
     /// Keeps the line moving while nothing changes.

@@ -20,6 +20,9 @@ const SERVO: (&str, &str) = ("4", "4=zlac8030l");
 /// Stopping from 60 r/min with the ramps as delivered, and a busy machine.
 const SLACK: Duration = Duration::from_millis(1500);
 
+/// Far longer than any of them takes to boot.
+const BOOT: Duration = Duration::from_secs(1);
+
 struct Bench {
     simulator: Simulator,
     bus: String,
@@ -30,6 +33,8 @@ impl Bench {
         let drives = ["--drive", "m4230e17b50@1", "--drive", "zlim42c@2", "--drive", "zlac8030l@4"];
         let simulator = Simulator::start(&[&drives[..], &["--serve", "socketcand://127.0.0.1:0"]].concat());
         let bus = simulator.bus("socketcand");
+        // A drive that boots hears nothing.
+        std::thread::sleep(BOOT);
         Self { simulator, bus }
     }
 
@@ -77,7 +82,7 @@ impl Bench {
     }
 
     fn json(&self, (_, model): (&str, &str), arguments: &[&str]) -> Value {
-        done(&[&["--json", "--bus", &self.bus, "--model", model], arguments].concat()).json()
+        done(&[&["--json", "--timeout", "3s", "--bus", &self.bus, "--model", model], arguments].concat()).json()
     }
 }
 

@@ -15,6 +15,29 @@ fn simulator(more: &[&str]) -> Simulator {
 }
 
 #[test]
+fn a_machine_file_and_the_command_line_put_drives_on_one_bus() {
+    let directory = scratch("served-machine");
+    let file = directory.join("machine.toml");
+    let text = "bitrate = '250k'\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nsupply_v = 30\n\
+                [[drive]]\nmodel = 'zlim42c'\nnode = 2\nswitches = { X0 = ['min', 'max'] }\n";
+    std::fs::write(&file, text).unwrap();
+    let path = file.to_str().unwrap();
+    let serve = ["--serve", "socketcand://127.0.0.1:0"];
+    let mut simulator = Simulator::start(&[&["--machine", path, "--drive", "m4230e17b50@1"][..], &serve].concat());
+    let bus = simulator.bus("socketcand");
+    let read = |bus: &str, node: &str, object: &str| done(&["--bus", bus, "--json", "read", node, object]).json();
+    let supplies = ["4", "2", "1"].map(|node| simulator.ask(&format!("{node} get"))["supply_v"].as_f64().unwrap());
+    assert!((supplies[0] - 30.0).abs() < 0.5 && supplies[1] < 25.0 && supplies[2] > 35.0, "{supplies:?}");
+    assert_eq!(read(&bus, "4", "200E")["meaning"], "250 kbit/s");
+    assert_eq!(read(&bus, "1", "1000")["value"], 0x2_0192);
+    // Without --drive, and at the command line's own rate.
+    let mut alone = Simulator::start(&[&["--machine", path, "--bitrate", "500k"][..], &serve].concat());
+    assert_eq!(read(&alone.bus("socketcand"), "4", "200E")["meaning"], "500 kbit/s");
+    assert_eq!(alone.ask("1 get")["ok"], false);
+    std::fs::remove_dir_all(directory).unwrap();
+}
+
+#[test]
 fn the_ready_line_names_every_listener_with_its_port() {
     let simulator = simulator(&[]);
     assert!(simulator.ready.starts_with("ready "), "{:?}", simulator.ready);

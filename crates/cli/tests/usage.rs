@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::ferrodrive;
+use common::{ferrodrive, scratch};
 
 #[track_caller]
 fn refused(arguments: &[&str], parts: &[&str]) {
@@ -82,6 +82,88 @@ fn simulator_arguments_are_checked_before_anything_listens() {
     refused_sim(&["--drive", "zlac8030l@4", "--drive", "zlac8030l@4"], &["two drives at node 4"]);
     refused_sim(&["--drive", "zlac8030l@4", "--bitrate", "7k"], &["500k"]);
     refused_sim(&["--drive", "zlac8030l@4", "--serve", "tcp://127.0.0.1:1"], &["socketcand://HOST:PORT"]);
+}
+
+/// An option that means nothing to a command is refused where it is typed, with the reason; nothing is ignored.
+#[test]
+fn options_that_mean_nothing_are_refused_with_the_reason() {
+    let sim = ["sim", "--drive", "zlac8030l@4"];
+    let with = |more: &[&'static str]| [&sim[..], more].concat();
+    refused(&with(&["--model", "4=zlac8030l"]), &["--model means nothing to sim", "--drive MODEL@NODE"]);
+    refused(&with(&["--timeout", "1s"]), &["--timeout means nothing to sim", "waits for no answer"]);
+    refused(&["demo", "--bus", "slcan://127.0.0.1:1"], &["--bus means nothing to demo", "buses of their own"]);
+    refused(&["dump", "--timeout", "1s"], &["--timeout means nothing to dump", "--for TIME"]);
+    refused(&["completions", "bash", "--timeout", "1s"], &["--timeout means nothing to completions"]);
+    refused(&["objects", "zlac8030l", "--model", "4=zlac8030l"], &["the same on every bus"]);
+    refused(&["readings", "zlim42c", "--timeout", "1s"], &["about a model"]);
+    let two = ["--model", "4=zlac8030l", "--model", "4=zlim42c", "scan"];
+    refused(&two, &["two models for node 4: zlac8030l and zlim42c", "give one --model 4=MODEL"]);
+}
+
+#[test]
+fn machine_files_are_checked() {
+    let directory = scratch("machine-files");
+    let file = directory.join("machine.toml");
+    let path = file.to_str().unwrap();
+    std::fs::write(&file, "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\n").unwrap();
+    refused(&["--machine", path, "state", "4"], &["--machine means nothing", "--bus sim:FILE.toml"]);
+    refused(&["sim", "--machine", path, "--drive", "zlim42c@4"], &["two drives at node 4"]);
+    std::fs::write(&file, "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nswitches = { X0 = [1, 2, 3] }\n").unwrap();
+    let bus = format!("sim:{path}");
+    for arguments in [&["--bus", &bus, "scan"][..], &["sim", "--machine", path], &["--machine", path, "scan"]] {
+        refused(arguments, &["line 4: 'X0' is a list of 3; expected two bounds, [low, high]"]);
+    }
+    std::fs::write(&file, "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nfaults = ['gear']\n").unwrap();
+    refused(&["sim", "--machine", path], &["cannot use the machine file", "4 fault gear on"]);
+    std::fs::write(&file, format!("# {}", "x".repeat(1 << 20))).unwrap();
+    refused(&["--bus", &bus, "scan"], &["more than 1 MB"]);
+    #[cfg(unix)]
+    {
+        let pipe = directory.join("pipe.toml");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
+        assert!(made.success());
+        let pipe = pipe.to_str().unwrap();
+        refused(&["sim", "--machine", pipe], &["it is no file but a directory, a pipe or a device"]);
+        refused(&["--bus", &format!("sim:{pipe}"), "scan"], &["it is no file"]);
+    }
+    std::fs::remove_dir_all(directory).unwrap();
+}
+
+/// A terminal obeys ESC (1Bh) and CSI (9Bh): ECMA-48, 5.3 and 5.4.
+#[test]
+fn control_characters_of_others_are_not_echoed() {
+    let directory = scratch("escape");
+    let file = directory.join("machine.toml");
+    let texts = [
+        "[[drive]]\nmodel = 'zlac\u{1b}[31m'\nnode = 4\n",
+        "[[drive]]\nmodel = \"zlac\\u001b[31m\"\nnode = 4\n",
+        "\u{9b}2J = 1\n",
+        "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nfaults = [\"\\u001b[2J\"]\n",
+    ];
+    let bus = format!("sim:{}", file.display());
+    let machine = file.to_str().unwrap();
+    let mut ended: Vec<_> = [
+        &["\u{1b}[31mreed"][..],
+        &["read", "4", "\u{1b}[31m6064"],
+        &["--bus", "\u{1b}]0;title\u{7}", "scan"],
+        &["--bus", "sim:/\u{1b}[31m.toml", "scan"],
+        &["write", "4", "6060", "\u{9b}31m"],
+        &["sim", "--drive", "\u{1b}[31m@4"],
+        &["velocity", "4", "\u{1b}[31m"],
+    ]
+    .map(ferrodrive)
+    .into();
+    for text in texts {
+        std::fs::write(&file, text).unwrap();
+        ended.push(ferrodrive(&["--bus", &bus, "scan"]));
+        ended.push(ferrodrive(&["sim", "--machine", machine]));
+    }
+    for ended in ended {
+        let said = [ended.out, ended.err].concat();
+        assert_eq!(ended.status, Some(2), "{said:?}");
+        assert!(!said.contains(|c: char| c.is_control() && c != '\n'), "{said:?}");
+    }
+    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]

@@ -15,6 +15,7 @@ use transport::{AnyBus, AsyncBus, BusError, BusSpec, WallClock};
 use crate::args::Global;
 use crate::embedded;
 use crate::failure::Failure;
+use crate::machine_file::Machine;
 use crate::output::{Format, Report};
 use crate::paint::Paint;
 use crate::session::{bus_failure, exit_on_signal, runtime};
@@ -127,9 +128,9 @@ async fn follow(bus: &mut AnyBus, sink: &mut Sink) -> Result<Option<BusError>, F
 impl Sink {
     fn new(global: &Global, format: Format, path: Option<&Path>) -> Result<Self, Failure> {
         let mut decoder = Decoder::new();
-        let of_machine = global.machine.iter().flat_map(|machine| machine.0.iter());
-        for (node, model) in of_machine.chain(&global.models) {
-            decoder.set_model(*node, model);
+        let of_machine = global.machine.iter().flat_map(Machine::models);
+        for (node, model) in of_machine.chain(global.models.iter().copied()) {
+            decoder.set_model(node, model);
         }
         let log = path.map(File::create).transpose().map_err(|error| log_failure(path, &error))?;
         let log = log.map(|file| LogWriter::new(BufWriter::new(file), "can0"));

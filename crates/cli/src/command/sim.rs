@@ -15,6 +15,7 @@ use transport::{
 use crate::args::Global;
 use crate::embedded;
 use crate::failure::Failure;
+use crate::machine_file::{Machine, Placed};
 use crate::parse::drive_spec::{DriveSpec, drive_spec};
 use crate::serve::eeprom::{EepromError, Eeproms};
 use crate::serve::files::create_log;
@@ -44,15 +45,15 @@ use crate::session::{bus_failure, failure_of};
     Example:\n  ferrodrive sim --drive zlac8030l@4 --serve socketcand://127.0.0.1:29536\n  \
     ferrodrive --bus socketcand://127.0.0.1:29536/can0 move 4 90deg")]
 pub(crate) struct Sim {
-    /// A drive and its node-ID, e.g. zlac8030l@4; may be repeated
+    /// A drive and its node-ID, e.g. zlac8030l@4; may be repeated, and comes on top of those of --machine FILE.toml
     ///
     /// After a comma: what is special about this one (`ferrodrive readings MODEL` lists it), e.g. zlim42c@2,reading=Z050:prose;
     /// or the value that an object has at power-on, as if stored, e.g. zlac8030l@4,2014=100.
-    #[arg(long = "drive", value_name = "MODEL@NODE[,KEY=VALUE..]", value_parser = drive_spec, required = true)]
+    #[arg(long = "drive", value_name = "MODEL@NODE[,KEY=VALUE..]", value_parser = drive_spec)]
     drives: Vec<DriveSpec>,
-    /// Bit rate of the bus
-    #[arg(long, value_name = "RATE", default_value = "500k")]
-    bitrate: Bitrate,
+    /// Bit rate of the bus; without it the machine file's, or 500k
+    #[arg(long, value_name = "RATE")]
+    bitrate: Option<Bitrate>,
     /// Where to serve the bus: socketcand://HOST:PORT or slcan://HOST:PORT; port 0 takes a free one; may be repeated
     #[arg(long = "serve", value_name = "URL")]
     places: Vec<ServeSpec>,
@@ -63,9 +64,9 @@ pub(crate) struct Sim {
     /// Keep EEPROM contents in this directory; without it every start is factory-fresh
     #[arg(long, value_name = "DIR")]
     state: Option<PathBuf>,
-    /// Decides everything random
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
+    /// Decides everything random; without it the machine file's, or 1
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
     /// Write all frames to this file, in candump format
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
@@ -82,9 +83,10 @@ const REQUESTS_WAITING: usize = 64;
 const TASKS_A_TURN: u32 = 16;
 
 impl Sim {
-    /// Runs until `quit`, Ctrl-C or a lost `bridge` (the bus given with `--bus` beside `sim`).
-    pub(crate) fn run(&self, global: &Global, bridge: Option<&BusSpec>) -> Result<(), Failure> {
-        self.refuse_duplicates()?;
+    /// Runs until `quit`, Ctrl-C or a lost `bridge` (the bus given with `--bus` beside `sim`). The drives of `file` (given with
+    /// `--machine` beside `sim`) come first.
+    pub(crate) fn run(&self, global: &Global, bridge: Option<&BusSpec>, file: Option<&Machine>) -> Result<(), Failure> {
+        let machine = self.machine(file)?;
         if let Some(BusSpec::Sim { .. } | BusSpec::Log { .. }) = bridge {
             return Err(Failure::usage(format!("sim cannot join its drives to {}", global.bus))
                 .because("it makes a virtual bus itself, and joins it to a live one only")
@@ -92,9 +94,9 @@ impl Sim {
         }
         let warnings = Speaker::of_warnings();
         let eeproms = self.state.as_deref().map(Eeproms::open).transpose()?;
-        let mut world = World::new(self.bitrate, self.seed);
-        for spec in &self.drives {
-            self.add_drive(&mut world, spec, eeproms.as_ref(), &warnings)?;
+        let mut world = machine.world();
+        for placed in &machine.drives {
+            add_drive(&mut world, placed, eeproms.as_ref(), &warnings)?;
         }
         let log = self.log.as_deref().map(create_log).transpose().map_err(|error| {
             Failure::new(format!("cannot write the log {}", self.log.clone().unwrap_or_default().display()))
@@ -109,53 +111,22 @@ impl Sim {
         ended
     }
 
-    fn refuse_duplicates(&self) -> Result<(), Failure> {
+    /// The machine of the file, if there is one, with what the command line says beside it.
+    fn machine(&self, file: Option<&Machine>) -> Result<Machine, Failure> {
+        let mut machine = file.cloned().unwrap_or_default();
+        machine.bitrate = self.bitrate.or(machine.bitrate);
+        machine.seed = self.seed.or(machine.seed);
+        machine.drives.extend(self.drives.iter().cloned().map(Placed::from));
+        if machine.drives.is_empty() {
+            return Err(Failure::usage("no drive to run")
+                .next("give --drive MODEL@NODE, e.g. --drive zlac8030l@4, or --machine FILE.toml"));
+        }
         let mut nodes = BTreeSet::new();
-        match self.drives.iter().find(|spec| !nodes.insert(spec.node)) {
-            None => Ok(()),
+        match machine.drives.iter().map(|placed| &placed.spec).find(|spec| !nodes.insert(spec.node)) {
+            None => Ok(machine),
             Some(spec) => Err(Failure::usage(format!("two drives at node {}", spec.node))
                 .because("a node-ID may be used once on a bus")
                 .next(format!("give the second --drive {}@... another node-ID", spec.model.model))),
-        }
-    }
-
-    fn add_drive(
-        &self,
-        world: &mut World,
-        spec: &DriveSpec,
-        eeproms: Option<&Eeproms>,
-        warnings: &Speaker,
-    ) -> Result<(), Failure> {
-        let mut drive = embedded::ordered_drive(spec.model, &spec.order(self.bitrate))?;
-        let number = spec.node.raw();
-        let name = file_name(spec.model.model, number);
-        let image = eeproms.map(|eeproms| eeproms.load(&name, spec.model.model)).transpose()?.flatten();
-        if let Some(image) = &image {
-            drive.load_nvm(image).map_err(|error| {
-                Failure::new(format!("the EEPROM contents kept for {name} cannot be used")).because(error)
-            })?;
-        }
-        world.add_drive(number, drive).map_err(|error| Failure::usage(error.to_string()))?;
-        if image.is_some() {
-            self.note_what_the_image_changes(world, number, &name, warnings);
-        }
-        Ok(())
-    }
-
-    /// Says it if a drive is not where the command line puts it, because its EEPROM contents say otherwise.
-    fn note_what_the_image_changes(&self, world: &mut World, number: u8, name: &str, warnings: &Speaker) {
-        let found = world.with_drive(number, |drive, _| (drive.bitrate(), drive.report().node));
-        let Ok((bitrate, node)) = found else { return };
-        if let Some(bitrate) = bitrate.filter(|bitrate| *bitrate != self.bitrate) {
-            warnings.say(&format!(
-                "warning: {name} is off the bus: its EEPROM contents say {bitrate}, and the bus has {}",
-                self.bitrate
-            ));
-        }
-        if node != number {
-            warnings.say(&format!(
-                "note: {name} is node {node} on the bus, as its EEPROM contents say; world commands call it {number}"
-            ));
         }
     }
 
@@ -182,7 +153,7 @@ impl Sim {
         if outer.is_some() {
             places.push(ServeSpec { protocol: Protocol::Socketcand, address: "127.0.0.1:0".into() });
         }
-        let options = HubOptions { bitrate: Some(self.bitrate), zero: clock.unix_zero(), ..HubOptions::default() };
+        let options = HubOptions { bitrate: Some(world.bitrate()), zero: clock.unix_zero(), ..HubOptions::default() };
         let mut hub = Hub::bind(&places, options, &clock).await.map_err(|error| failure_of(&error))?;
         let modbus = self.serve_registers(&requests, &clock).await?;
         if let (Some(outer), Some(inner)) = (outer, hub.listeners().last()) {
@@ -223,6 +194,44 @@ impl Sim {
         let Some(place) = &self.modbus else { return Ok(None) };
         let server = ModbusServer::bind(place, requests.clone(), clock).await;
         server.map(Some).map_err(|error| failure_of(&error))
+    }
+}
+
+/// Adds a drive with what it remembers and what is around it.
+fn add_drive(world: &mut World, placed: &Placed, eeproms: Option<&Eeproms>, warnings: &Speaker) -> Result<(), Failure> {
+    let spec = &placed.spec;
+    let unusable = |reason| Failure::usage("cannot use the machine file").because(reason);
+    let mut drive = embedded::ordered_drive(spec.model, &spec.order(world.bitrate()))?;
+    placed.supply(drive.as_mut()).map_err(unusable)?;
+    let number = spec.node.raw();
+    let name = file_name(spec.model.model, number);
+    let image = eeproms.map(|eeproms| eeproms.load(&name, spec.model.model)).transpose()?.flatten();
+    if let Some(image) = &image {
+        drive.load_nvm(image).map_err(|error| {
+            Failure::new(format!("the EEPROM contents kept for {name} cannot be used")).because(error)
+        })?;
+    }
+    world.add_drive(number, drive).map_err(|error| Failure::usage(error.to_string()))?;
+    if image.is_some() {
+        note_what_the_image_changes(world, number, &name, warnings);
+    }
+    placed.furnish(world).map_err(unusable)
+}
+
+/// Says it if a drive is not where the command line puts it, because its EEPROM contents say otherwise.
+fn note_what_the_image_changes(world: &mut World, number: u8, name: &str, warnings: &Speaker) {
+    let found = world.with_drive(number, |drive, _| (drive.bitrate(), drive.report().node));
+    let Ok((bitrate, node)) = found else { return };
+    let of_bus = world.bitrate();
+    if let Some(bitrate) = bitrate.filter(|bitrate| *bitrate != of_bus) {
+        warnings.say(&format!(
+            "warning: {name} is off the bus: its EEPROM contents say {bitrate}, and the bus has {of_bus}"
+        ));
+    }
+    if node != number {
+        warnings.say(&format!(
+            "note: {name} is node {node} on the bus, as its EEPROM contents say; world commands call it {number}"
+        ));
     }
 }
 

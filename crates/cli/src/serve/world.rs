@@ -6,7 +6,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use can::{Frame, Instant};
+use can::{Bitrate, Frame, Instant};
 use sim::command::{Answer, Service};
 use sim::wire::WireEvent;
 use sim::{StationId, World};
@@ -60,6 +60,11 @@ impl ServedWorld {
     /// From now on what drives store is kept, and acknowledged when it is.
     pub(crate) fn keep_stores(&mut self, keeper: Keeper) {
         self.stores = Some(Stores::guard(&mut self.world, keeper, self.speaker.clone()));
+    }
+
+    /// The bus's rate.
+    pub(crate) fn bitrate(&self) -> Bitrate {
+        self.world.bitrate()
     }
 
     /// Does what a world command says.

@@ -1,0 +1,112 @@
+//! Options of every command that mean nothing to one of them: typed there they are refused, so that nobody believes that
+//! they were heeded. The environment may set them for all commands.
+
+use std::collections::BTreeMap;
+
+use clap::ArgMatches;
+use clap::parser::ValueSource;
+use transport::BusSpec;
+
+use crate::args::{Command, Global};
+use crate::command::objects::Whose;
+use crate::failure::Failure;
+
+/// Options that a command does not heed, by their names in the parser, and why.
+struct Unheeded {
+    command: &'static str,
+    options: &'static [&'static str],
+    why: &'static str,
+    next: &'static str,
+}
+
+const BUS: &str = "bus";
+const MODEL: &str = "models";
+const MACHINE: &str = "machine";
+const TIMEOUT: &str = "timeout";
+
+const UNHEEDED: [Unheeded; 6] = [
+    Unheeded {
+        command: "sim",
+        options: &[MODEL],
+        why: "it makes its drives itself, each of the model that its --drive names",
+        next: "give --drive MODEL@NODE, e.g. --drive zlac8030l@4",
+    },
+    Unheeded {
+        command: "sim",
+        options: &[TIMEOUT],
+        why: "it asks nobody anything, and waits for no answer",
+        next: "leave it away",
+    },
+    Unheeded {
+        command: "demo",
+        options: &[BUS, MODEL, MACHINE, TIMEOUT],
+        why: "it shows virtual drives on buses of their own",
+        next: "leave it away; --drive MODEL chooses the drive",
+    },
+    Unheeded {
+        command: "dump",
+        options: &[TIMEOUT],
+        why: "it only listens, and waits for no answer",
+        next: "leave it away; --for TIME says how long it listens",
+    },
+    Unheeded {
+        command: "completions",
+        options: &[BUS, MODEL, MACHINE, TIMEOUT],
+        why: "a script for a shell depends on none of them",
+        next: "leave it away",
+    },
+    Unheeded {
+        command: "readings",
+        options: &[BUS, MODEL, MACHINE, TIMEOUT],
+        why: "it is about a model, not about a node of a bus",
+        next: "leave it away",
+    },
+];
+
+const OBJECTS_OF_A_MODEL: Unheeded = Unheeded {
+    command: "objects",
+    options: &[BUS, MODEL, MACHINE, TIMEOUT],
+    why: "the objects of a model are the same on every bus",
+    next: "leave it away, or give a node-ID in place of the model",
+};
+
+/// Refuses typed options that the command does not heed, and options that contradict each other.
+pub(crate) fn refuse_unheeded(global: &Global, command: &Command, matches: &ArgMatches) -> Result<(), Failure> {
+    let typed = |option: &str| matches.value_source(option) == Some(ValueSource::CommandLine);
+    let own_bus = matches!(global.bus, BusSpec::Sim { .. });
+    // The bus that every command has by itself is no contradiction.
+    let given = |option: &&&str| typed(option) && (**option != BUS || global.bus != BusSpec::Sim { file: None });
+    let of_model = matches!(command, Command::Objects(objects) if matches!(objects.whose, Whose::Model(_)));
+    let name = matches.subcommand_name().unwrap_or_default();
+    let rows = UNHEEDED.iter().filter(|row| row.command == name).chain(of_model.then_some(&OBJECTS_OF_A_MODEL));
+    for row in rows {
+        if let Some(option) = row.options.iter().find(given) {
+            return Err(Failure::usage(format!("--{} means nothing to {name}", spelled(option)))
+                .because(row.why)
+                .next(row.next));
+        }
+    }
+    if typed(MACHINE) && own_bus && name != "sim" {
+        return Err(Failure::usage("--machine means nothing on a virtual bus of this command alone")
+            .because("such a bus knows its drives")
+            .next("give --bus sim:FILE.toml to have the drives of the file on it, or --bus with the bus that it describes"));
+    }
+    refuse_two_models(global)
+}
+
+/// The option as it is typed.
+fn spelled(option: &str) -> &str {
+    if option == MODEL { "model" } else { option }
+}
+
+fn refuse_two_models(global: &Global) -> Result<(), Failure> {
+    let mut said = BTreeMap::new();
+    for (node, model) in &global.models {
+        if let Some(other) = said.insert(*node, model.model) {
+            return Err(Failure::usage(format!("two models for node {node}: {other} and {}", model.model))
+                .because("a node is one drive")
+                .next(format!("give one --model {node}=MODEL")));
+        }
+    }
+    Ok(())
+}
