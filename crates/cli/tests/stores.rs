@@ -35,11 +35,6 @@ fn simulator(state: &Path) -> Simulator {
     ])
 }
 
-fn send_signal(simulator: &Simulator, signal: &str) {
-    let sent = Command::new("kill").args([signal, &simulator.id().to_string()]).status().unwrap();
-    assert!(sent.success());
-}
-
 /// The value that a fresh start finds.
 fn found(state: &Path) -> u32 {
     let simulator = simulator(state);
@@ -58,7 +53,7 @@ fn a_store_is_there_after_every_end_that_came_with_its_acknowledgement() {
         if *end == "quit" {
             assert_eq!(simulator.ask("quit")["ok"], true);
         } else {
-            send_signal(&simulator, end);
+            simulator.signal(end);
         }
         let status = match *end {
             "-HUP" => Some(129),

@@ -215,6 +215,35 @@ async fn a_client_that_never_reads_is_dropped_and_holds_up_nobody() {
 }
 
 #[tokio::test]
+async fn idle_clients_make_room_and_those_that_listen_go_last() {
+    let clock = WallClock::start();
+    let mut hub = hub(&clock).await;
+    let address = socketcand_port(&hub);
+    let mut listener = Raw::connect(address, &clock).await;
+    listener.enter_raw_mode().await;
+    let mut idle = Vec::new();
+    for _ in 1..256 {
+        let mut client = Raw::connect(address, &clock).await;
+        assert_eq!(client.read_once().await, "< hi >");
+        idle.push(client);
+    }
+    assert_eq!(hub.client_count(), 256);
+    // The one that was silent for the longest has spoken since, so the second goes.
+    idle[0].say(b"< echo >").await;
+    assert_eq!(idle[0].read_once().await, "< echo >");
+    let mut late = Raw::connect(address, &clock).await;
+    late.enter_raw_mode().await;
+    assert_eq!(left(&mut hub, &clock).await, LeaveReason::Displaced);
+    assert_eq!(hub.client_count(), 256);
+    assert_eq!(idle[1].read_once().await, "");
+    idle[0].say(b"< echo >").await;
+    assert_eq!(idle[0].read_once().await, "< echo >");
+    hub.broadcast(&frame("701#05"), Instant::ZERO, None);
+    assert_eq!(listener.read_until(">").await, "< frame 701 0.000000 05 >");
+    assert_eq!(late.read_until(">").await, "< frame 701 0.000000 05 >");
+}
+
+#[tokio::test]
 async fn a_closed_slcan_channel_and_bcm_mode_hear_nothing() {
     let clock = WallClock::start();
     let hub = hub(&clock).await;

@@ -11,7 +11,9 @@ use std::time::Duration;
 use can::{CanId, Frame, Instant, Station};
 use common::{Raw, frame, heard, hub, socketcand, socketcand_port, soon};
 use tokio::sync::{Notify, mpsc};
-use transport::{AsyncBus, BusError, BusSpec, ClientId, Heard, RealTimeWorld, WallClock, run_station, run_world};
+use transport::{
+    AsyncBus, BusError, BusSpec, ClientId, Heard, LeaveReason, RealTimeWorld, WallClock, run_station, run_world,
+};
 
 /// Answers each frame with the next identifier, sends what its handles queue, and beats once at a deadline.
 #[derive(Clone, Default)]
@@ -185,6 +187,9 @@ struct Wire {
     due: Option<Instant>,
     longest_step: Duration,
     steps: usize,
+    worst_lag: Duration,
+    lag: Duration,
+    gone: Vec<LeaveReason>,
 }
 
 impl Wire {
@@ -233,6 +238,15 @@ impl RealTimeWorld for Wire {
 
     fn take_heard(&mut self) -> Option<Heard> {
         self.heard.pop_front()
+    }
+
+    fn left(&mut self, _: ClientId, reason: LeaveReason) {
+        self.gone.push(reason);
+    }
+
+    fn set_lag(&mut self, lag: Duration) {
+        self.lag = lag;
+        self.worst_lag = lag.max(self.worst_lag);
     }
 }
 
@@ -305,6 +319,30 @@ async fn a_late_world_catches_up_in_steps_and_then_wakes_once_a_deadline() {
     assert!(run_late(&mut world).await >= Instant::from_millis(400));
     assert!(world.longest_step <= 3 * period, "{:?}", world.longest_step);
     assert!((12..60).contains(&world.steps), "{} steps", world.steps);
+    // It is told how late it is, and when it is no more.
+    assert!(world.worst_lag >= Duration::from_millis(150), "{:?}", world.worst_lag);
+    assert!(world.lag < Duration::from_millis(150), "{:?}", world.lag);
+}
+
+#[tokio::test]
+async fn a_world_is_told_when_a_client_is_gone_and_after_its_frames() {
+    let clock = WallClock::start();
+    let mut hub = hub(&clock).await;
+    let address = socketcand_port(&hub);
+    let (orders, mut commands) = mpsc::channel(1);
+    let mut world = Wire::default();
+    let clients = async {
+        let mut listener = socketcand(address, &clock).await;
+        let mut sender = socketcand(address, &clock).await;
+        sender.send(&frame("123#01")).await.unwrap();
+        drop(sender);
+        assert_eq!(heard(&mut listener, &clock).await, frame("123#01"));
+        clock.sleep(Duration::from_millis(50)).await;
+        orders.send(Order::Stop).await.unwrap();
+    };
+    let running = run_world(&mut world, &mut hub, &clock, &mut commands, obey);
+    soon(&clock, async { tokio::join!(running, clients) }).await;
+    assert_eq!(world.gone, [LeaveReason::Closed]);
 }
 
 #[tokio::test]

@@ -20,9 +20,14 @@ pub(crate) struct Turns<K> {
 }
 
 impl<K: Copy + Ord> Turns<K> {
-    /// Nobody waits.
+    /// With nobody in it.
     pub(crate) fn new() -> Self {
         Self { waiting: BTreeMap::new(), order: VecDeque::new() }
+    }
+
+    /// Nobody waits.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.order.is_empty()
     }
 
     /// A frame of `client`, behind those that it has here already.

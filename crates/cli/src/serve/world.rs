@@ -1,12 +1,14 @@
 //! A virtual world whose bus is served to other programs: its wire's frames go to clients, theirs go onto its wire.
 //!
 //! All clients share one CAN adapter of the virtual bus. It is given one frame at a time, each client's in turn, so that
-//! who sends much waits and who sends little does not.
+//! who sends much waits and who sends little does not. As an adapter with one mailbox does it takes the next frame when the
+//! one before is out, which is too late for the arbitration that follows: a station that waits has its turn then, whatever
+//! the identifiers are.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use can::{Bitrate, Frame, Instant};
+use can::{Bitrate, Frame, INTERFRAME_SPACE_BITS, Instant};
 use sim::command::{Answer, Service};
 use sim::wire::WireEvent;
 use sim::{StationId, World};
@@ -27,6 +29,8 @@ pub(crate) struct ServedWorld {
     turns: Turns<ClientId>,
     /// Whose frame the adapter has.
     offered: Option<ClientId>,
+    /// When the adapter takes another.
+    free_at: Instant,
     heard: VecDeque<Heard>,
     /// Frames carried since the last call of [`Self::take_carried`], for a log.
     carried: Option<Vec<(Instant, Frame)>>,
@@ -47,6 +51,7 @@ impl ServedWorld {
             adapter,
             turns: Turns::new(),
             offered: None,
+            free_at: Instant::ZERO,
             heard: VecDeque::new(),
             carried: logged.then(Vec::new),
             stores: None,
@@ -114,7 +119,11 @@ impl ServedWorld {
     fn collect(&mut self) {
         while let Some(event) = self.world.log_mut().pull() {
             let WireEvent::Frame { end, source, frame, .. } = event else { continue };
-            let from = if source == self.adapter.index() { self.offered.take() } else { None };
+            let mut from = None;
+            if source == self.adapter.index() {
+                from = self.offered.take();
+                self.free_at = end.plus_nanos(u64::from(INTERFRAME_SPACE_BITS) * self.world.bitrate().bit_nanos());
+            }
             self.heard.push_back(Heard::Carried { frame, at: end, from });
             if let Some(carried) = &mut self.carried {
                 carried.push((end, frame));
@@ -122,11 +131,31 @@ impl ServedWorld {
         }
         // What the adapter heard is in the log too.
         while self.world.poll_received(self.adapter).is_some() {}
-        self.offer_next();
     }
 
+    /// Moves the world to `instant`; false if the adapter has become free on the way, and somebody waits for it.
+    fn run_to(&mut self, instant: Instant) -> bool {
+        while self.world.next_event().is_some_and(|at| at <= instant) {
+            let was_busy = self.offered.is_some();
+            self.world.step();
+            self.collect();
+            if was_busy && self.next_offer().is_some() {
+                return false;
+            }
+        }
+        self.world.run_until(instant);
+        true
+    }
+
+    /// When the adapter takes the frame that waits for it.
+    fn next_offer(&self) -> Option<Instant> {
+        let waits = self.offered.is_none() && !self.turns.is_empty();
+        waits.then(|| self.free_at.max(self.world.now()))
+    }
+
+    /// Gives the adapter the next frame, if it takes one now.
     fn offer_next(&mut self) {
-        while self.offered.is_none() {
+        while self.offered.is_none() && self.free_at <= self.world.now() {
             let Some((client, frame)) = self.turns.pop() else { return };
             match self.world.send(self.adapter, frame) {
                 Ok(()) => self.offered = Some(client),
@@ -153,16 +182,19 @@ impl RealTimeWorld for ServedWorld {
 
     fn next_deadline(&self) -> Option<Instant> {
         let stores = self.stores.as_ref().and_then(|stores| stores.next_deadline(&self.world));
-        self.world.next_event().into_iter().chain(stores).min()
+        [self.world.next_event(), self.next_offer(), stores].into_iter().flatten().min()
     }
 
     fn advance_to(&mut self, instant: Instant) {
-        // Step by step, so that the adapter has its next frame before the wire is free again.
-        while self.world.next_event().is_some_and(|at| at <= instant) {
-            self.world.step();
-            self.collect();
+        loop {
+            let offer = self.next_offer().filter(|at| *at <= instant);
+            let reached = self.run_to(offer.unwrap_or(instant));
+            match offer {
+                Some(_) => self.offer_next(),
+                None if reached => break,
+                None => {}
+            }
         }
-        self.world.run_until(instant);
         if let Some(stores) = &mut self.stores {
             stores.settle(&mut self.world);
         }

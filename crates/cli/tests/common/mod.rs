@@ -3,10 +3,10 @@
 
 pub(crate) mod raw_bus;
 
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::path::PathBuf;
 use std::process::{Child, ChildStdin, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
 
 use serde_json::Value;
@@ -56,26 +56,72 @@ pub(crate) struct Simulator {
     child: Child,
     input: Option<ChildStdin>,
     lines: Receiver<String>,
+    errors: Option<Receiver<String>>,
     /// The first line.
     pub(crate) ready: String,
+}
+
+/// The lines of a stream. Of a `deaf` reader's no more is read than is asked for, but for a few kB.
+fn lines_of(stream: impl Read + Send + 'static, deaf: bool) -> Receiver<String> {
+    let (sender, lines) = sync_channel(if deaf { 0 } else { 1 << 20 });
+    let stream = BufReader::new(stream);
+    std::thread::spawn(move || stream.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
+    lines
 }
 
 impl Simulator {
     /// Starts one and waits until it is ready.
     pub(crate) fn start(arguments: &[&str]) -> Self {
+        Self::start_with(arguments, Stdio::inherit(), false)
+    }
+
+    /// Starts one whose standard error is kept for [`error`](Self::error), and whose standard output is read only as far as
+    /// it is asked for.
+    pub(crate) fn start_deaf(arguments: &[&str]) -> Self {
+        Self::start_with(arguments, Stdio::piped(), true)
+    }
+
+    /// Starts one whose standard error is kept for [`error`](Self::error).
+    pub(crate) fn start_heard(arguments: &[&str]) -> Self {
+        Self::start_with(arguments, Stdio::piped(), false)
+    }
+
+    fn start_with(arguments: &[&str], errors: Stdio, deaf: bool) -> Self {
         let mut child = command(&[&["sim"], arguments].concat())
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
-            .stderr(Stdio::inherit())
+            .stderr(errors)
             .spawn()
             .expect("the binary runs");
-        let output = BufReader::new(child.stdout.take().expect("piped"));
-        let (sender, lines) = channel();
-        std::thread::spawn(move || output.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
+        let lines = lines_of(child.stdout.take().expect("piped"), deaf);
+        let errors = child.stderr.take().map(|stream| lines_of(stream, false));
         let input = child.stdin.take();
-        let mut simulator = Self { child, input, lines, ready: String::new() };
+        let mut simulator = Self { child, input, lines, errors, ready: String::new() };
         simulator.ready = simulator.line();
         simulator
+    }
+
+    /// The next line on its standard error that contains `part`.
+    pub(crate) fn error(&self, part: &str) -> String {
+        let errors = self.errors.as_ref().expect("standard error is kept");
+        loop {
+            let line =
+                errors.recv_timeout(PATIENCE).unwrap_or_else(|_| panic!("no {part:?} on standard error in time"));
+            if line.contains(part) {
+                return line;
+            }
+        }
+    }
+
+    /// Its standard input, to write to it from elsewhere.
+    pub(crate) fn take_input(&mut self) -> ChildStdin {
+        self.input.take().expect("standard input is open")
+    }
+
+    /// Sends it a signal such as `-TERM`.
+    pub(crate) fn signal(&self, signal: &str) {
+        let sent = Command::new("kill").args([signal, &self.id().to_string()]).status();
+        assert!(sent.is_ok_and(|status| status.success()), "{signal} cannot be sent");
     }
 
     /// The next line that it prints.
