@@ -122,7 +122,8 @@ fn a_drive_that_loses_its_power_says_nothing_of_before() {
     exchange(&mut world, tap, Some(WRITE_700), 5);
     assert!(world.longest_held().is_some());
     world.set_power(4, false).unwrap();
-    exchange(&mut world, tap, None, 200);
+    // Until its capacitor is empty.
+    exchange(&mut world, tap, None, 2000);
     world.set_power(4, true).unwrap();
     keep(&mut world);
     let heard = exchange(&mut world, tap, None, 500);

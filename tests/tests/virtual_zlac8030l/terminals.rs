@@ -82,8 +82,25 @@ fn input_levels_show_in_2003h() {
     let mut bench = Bench::new();
     for (input, level, shown) in [(1, true, 2), (0, true, 3), (1, false, 1), (0, false, 0)] {
         bench.operate(|drive, now| drive.set_input(input, level, now)).expect("an input");
-        bench.run_ms(10);
+        bench.run_ms(11);
         assert_eq!(bench.get(0x2003, 0), shown);
+    }
+}
+
+/// The maker's hardware manual V1.00: a level has to last for more than 10 ms (docs/drives/zlac8030l.md, L040).
+#[test]
+fn a_pulse_of_10_ms_at_an_input_is_not_seen_and_one_of_11_ms_is() {
+    for (ms, seen) in [(1, 0), (10, 0), (11, 1)] {
+        let mut bench = Bench::new();
+        bench.operate(|drive, now| drive.set_input(0, true, now)).expect("there is X0");
+        bench.run_ms(ms);
+        let shown = bench.operate(|drive, now| {
+            drive.set_input(0, false, now).expect("there is X0");
+            drive.report().statusword.expect("it has power")
+        });
+        assert_eq!(shown >> 15, seen, "{ms} ms");
+        bench.run_ms(2);
+        assert_eq!(bench.get(0x2003, 0), i64::from(seen), "{ms} ms, as long again as it was on");
     }
 }
 

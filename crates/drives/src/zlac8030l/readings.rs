@@ -83,9 +83,8 @@ pub const TORQUE_REACHED_A: f32 = 0.2;
 /// (4096 to the turn) in 30 ms.
 pub const STANDSTILL_RPM: f32 = 1.0;
 
-/// How long a digital input must hold a level: two supervision periods keep switching noise out and are far below what
-/// a person or a relay notices.
-pub const INPUT_DEBOUNCE_PERIODS: u8 = 2;
+/// How long a digital input must hold a level: more than 10 ms, by the maker's hardware manual V1.00.
+pub const INPUT_DEBOUNCE_PERIODS: u8 = 21;
 
 /// Control period in seconds.
 pub const CONTROL_PERIOD_S: f32 = 50e-6;
