@@ -312,8 +312,6 @@ mod tests {
             ("4 load inertia -1", "\"-1\" is no inertia; expected: NODE load torque N·m, or NODE load inertia kg·m²"),
             ("4 rotor stuck", "expected: NODE rotor lock|free"),
             ("4 supply", "expected: NODE supply VOLTS [limit AMPERES] [resistance OHMS]"),
-            ("4 supply 48 limit", "expected: NODE supply VOLTS [limit AMPERES] [resistance OHMS]"),
-            ("4 supply 48 10A", "expected: NODE supply VOLTS [limit AMPERES] [resistance OHMS]"),
             ("4 supply -1", "\"-1\" is no voltage; expected: NODE supply VOLTS [limit AMPERES] [resistance OHMS]"),
             (
                 "4 supply 1e999",
@@ -341,6 +339,15 @@ mod tests {
         ] {
             let result: Result<Command, CommandError> = line.parse();
             assert_eq!(result.unwrap_err().to_string(), error, "{line:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_behind_a_supply_comes_in_pairs() {
+        let expected = "expected: NODE supply VOLTS [limit AMPERES] [resistance OHMS]";
+        for line in ["4 supply 48 limit", "4 supply 48 10A", "4 supply 48 limit 10 resistance"] {
+            let result: Result<Command, CommandError> = line.parse();
+            assert_eq!(result.unwrap_err().to_string(), expected, "{line:?}");
         }
     }
 }
