@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::models::DriveProfile;
 use crate::paint::Paint;
-use crate::parse::unit::split_number;
+use crate::parse::unit::split_factor;
 
 /// A decoded value.
 #[derive(Clone, Debug, Serialize)]
@@ -69,14 +69,24 @@ pub(crate) fn decode(model: Option<&DriveProfile>, row: Option<&'static Entry>, 
 }
 
 impl Decoded {
+    /// The same value where this many counts make one of the unit.
+    pub(crate) fn at_resolution(mut self, counts: i64) -> Self {
+        if counts > 1 {
+            self.quantity = self.quantity.map(|quantity| quantity / counts as f64);
+            self.decimals += (counts as f64).log10().ceil() as usize;
+        }
+        self
+    }
+
     fn measure(&mut self, unit: &'static str, value: i64) {
         if unit.is_empty() {
             return;
         }
-        let (factor, name) = split_number(unit).unwrap_or((1.0, unit));
+        let (factor, name) = split_factor(unit);
         self.quantity = Some(value as f64 * factor);
         self.unit = Some(name);
-        self.decimals = (-factor.log10()).ceil().max(0.0) as usize;
+        // A small margin: 1e-3 must not ask for a fourth decimal.
+        self.decimals = (-factor.log10() - 1e-9).ceil().max(0.0) as usize;
     }
 
     /// One line.
@@ -133,6 +143,25 @@ mod tests {
         assert_eq!(text(&SPEED, &[0x18, 0xFC, 0xFF, 0xFF]), "-100.0 r/min (-1000)");
         assert_eq!(text(&POSITION, &[0, 0x7D, 0, 0]), "32000 counts");
         assert_eq!(text(&MODE, &[3]), "3  profile velocity");
+    }
+
+    #[test]
+    fn a_finer_resolution_divides_the_unit() {
+        let target = Entry { unit: "r/min", ..SPEED };
+        let target: &'static Entry = Box::leak(Box::new(target));
+        let text = |counts| decode(None, Some(target), &[0x1B, 0, 0, 0]).at_resolution(counts).text(Paint::OFF);
+        assert_eq!((text(1), text(10)), ("27 r/min".into(), "2.7 r/min (27)".into()));
+    }
+
+    #[test]
+    fn counts_that_are_a_fraction_of_a_unit_are_shown_in_the_unit() {
+        // "M Robot Joint Motor CanOpen Manual", 5.04: 6078h in 1/2000 A, 6079h in 1/327 V.
+        let text = |index, bytes: &[u8]| {
+            let joint = &drives::mjoint::M4230E17B50;
+            decode(Some(joint), joint.row(canopen::Mux::new(index, 0)), bytes).text(Paint::OFF)
+        };
+        assert_eq!(text(0x6078, &[0xD0, 0x07]), "1.0000 A (2000)");
+        assert_eq!(text(0x6079, &[0x48, 0x01]), "1.003 V (328)");
     }
 
     #[test]

@@ -194,7 +194,7 @@ impl From<master::Error> for Failure {
         let subject = Subject { node: Some(error.node()), object: error.object(), abort: error.abort() };
         let failure = Self { kind: error.kind(), subject, ..parts(&error) };
         match error {
-            Error::OutOfLimits { .. } => Self { status: Status::Usage, ..failure },
+            Error::OutOfLimits { .. } | Error::TooFine { .. } => Self { status: Status::Usage, ..failure },
             Error::GuessedModel { node, guess, .. } => {
                 let fitting: Vec<_> = guess.fitting().map(|model| model.model).collect();
                 failure.next(format!("say which it is: {}", how_to_say(node, &fitting)))

@@ -293,23 +293,15 @@ pub struct Units {
 pub struct Quantity {
     /// Where it is.
     pub object: Mux,
-    /// Physical units in one count.
+    /// Physical units in one count, at a resolution of 1 where the object's row has one
+    /// ([`Entry::resolution`]).
     pub per_count: f64,
-    /// An object whose value divides further: the resolution that is set on the drive.
-    pub divisor: Option<Mux>,
 }
 
 impl Quantity {
-    /// An object with a fixed scale.
+    /// An object and its scale.
     pub const fn new(index: u16, sub_index: u8, per_count: f64) -> Self {
-        Self { object: Mux::new(index, sub_index), per_count, divisor: None }
-    }
-
-    /// The same with an object that divides further.
-    #[must_use]
-    pub const fn divided_by(mut self, index: u16, sub_index: u8) -> Self {
-        self.divisor = Some(Mux::new(index, sub_index));
-        self
+        Self { object: Mux::new(index, sub_index), per_count }
     }
 }
 

@@ -7,8 +7,9 @@ use canopen::sdo::client;
 use canopen::{AbortCode, Mux, NmtState, NodeId};
 use cia402::ModeOfOperation;
 
-use crate::drive::Explanation;
+use crate::drive::{Explanation, Limits, Setting};
 use crate::identify::{Guess, Identity};
+use crate::units::Shown;
 
 /// Why the master could not do what it was asked.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -155,26 +156,37 @@ pub enum Error {
         /// Those that it has.
         modes: &'static [ModeOfOperation],
     },
-    /// A value is outside what the model takes: nothing was sent.
-    #[error("node {node}: {asked} is out of range for {mux} ({title}), which takes {}{}{unit}. Nothing was sent",
-        range(*low, *high, listed), if unit.is_empty() { "" } else { " in units of " })]
+    /// A value is outside what the drive takes, or would be held back by another object: it was not sent.
+    #[error("node {node}: {asked} is out of range for {} {}, which takes {limits}. It was not sent",
+        limits.object, limits.name)]
     OutOfLimits {
         /// The node.
         node: NodeId,
-        /// The object.
-        mux: Mux,
-        /// Its name in the manual.
-        title: &'static str,
-        /// Unit of one count; empty for none.
-        unit: &'static str,
         /// What was asked for, in counts.
         asked: i64,
-        /// Smallest value.
-        low: i64,
-        /// Largest value.
-        high: i64,
-        /// The only values, with what they mean, where not all between are taken.
-        listed: &'static [(i64, &'static str)],
+        /// What the object takes, and why.
+        limits: Box<Limits>,
+    },
+    /// A value is less than half of what one count of its object is worth, and not zero: it was not sent.
+    #[error(
+        "node {node}: {asked} {unit} is too little for {object} {name}: one count of it is {step} {unit}{}. It was not sent",
+        finer.map(|setting| format!(", by {setting}")).unwrap_or_default()
+    )]
+    TooFine {
+        /// The node.
+        node: NodeId,
+        /// The object.
+        object: Mux,
+        /// Its name.
+        name: &'static str,
+        /// What was asked for.
+        asked: Shown,
+        /// What one count is worth.
+        step: Shown,
+        /// The unit of both.
+        unit: &'static str,
+        /// An object that makes the counts finer.
+        finer: Option<Setting>,
     },
 }
 
@@ -196,6 +208,7 @@ impl Error {
             Self::NoFactorySettings { .. } => "no_factory_settings",
             Self::NoSuchMode { .. } => "no_such_mode",
             Self::OutOfLimits { .. } => "out_of_limits",
+            Self::TooFine { .. } => "too_fine",
         }
     }
 
@@ -214,19 +227,21 @@ impl Error {
             | Self::OtherModel { node, .. }
             | Self::NoFactorySettings { node, .. }
             | Self::NoSuchMode { node, .. }
-            | Self::OutOfLimits { node, .. } => *node,
+            | Self::OutOfLimits { node, .. }
+            | Self::TooFine { node, .. } => *node,
             Self::NotReached(explanation) => explanation.node,
         }
     }
 
     /// The object that it is about, if it is about one.
-    pub const fn object(&self) -> Option<Mux> {
+    pub fn object(&self) -> Option<Mux> {
         match self {
             Self::NoAnswer { mux, .. }
             | Self::Aborted { mux, .. }
             | Self::BadAnswer { mux, .. }
             | Self::WrongLength { mux, .. }
-            | Self::OutOfLimits { mux, .. } => Some(*mux),
+            | Self::TooFine { object: mux, .. } => Some(*mux),
+            Self::OutOfLimits { limits, .. } => Some(limits.object),
             Self::OtherModel { hallmark, .. } => Some(*hallmark),
             _ => None,
         }
@@ -312,14 +327,6 @@ impl fmt::Display for Hints {
 
 fn list(items: &[impl fmt::Display]) -> String {
     items.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
-}
-
-/// The values that an object takes.
-fn range(low: i64, high: i64, listed: &[(i64, &str)]) -> String {
-    if listed.is_empty() {
-        return format!("{low} to {high}");
-    }
-    list(&listed.iter().map(|(value, meaning)| format!("{value} ({meaning})")).collect::<Vec<_>>())
 }
 
 /// What to do about an abort code.

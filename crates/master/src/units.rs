@@ -89,6 +89,26 @@ impl From<Counts> for Angle {
     }
 }
 
+/// A number as people read it: the digits that matter, and no others. `2.7`, `60`, `0.088`, `12345.7`.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+pub struct Shown(pub f64);
+
+/// Decimals that may matter: four digits of a number below one, fewer of a larger one, never more than six.
+const MOST_DECIMALS: i32 = 6;
+const DIGITS_BEHIND_THE_FIRST: i32 = 3;
+
+impl fmt::Display for Shown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let magnitude = self.0.abs().log10().floor();
+        // Of zero the logarithm is minus infinity.
+        let first = if magnitude.is_finite() { magnitude as i32 } else { 0 };
+        let decimals = (DIGITS_BEHIND_THE_FIRST - first).clamp(1, MOST_DECIMALS) as usize;
+        let text = format!("{:.decimals$}", self.0);
+        let text = text.trim_end_matches('0').trim_end_matches('.');
+        f.write_str(if text == "-0" { "0" } else { text })
+    }
+}
+
 /// A text that is not the quantity it should be.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ParseUnitError {
@@ -193,6 +213,9 @@ impl FromStr for Ramp {
         }
         match unit {
             "ms" | "s" => parse_duration(text).map(Self::Time),
+            "rpm/s" | "r/min/s" | "rad/s2" | "rad/s²" | "rad/s^2" if number == 0.0 => {
+                Err(out_of_range(text, "at a rate of zero no speed is ever reached; without a ramp it is 0ms"))
+            }
             "rpm/s" | "r/min/s" => Ok(Self::RpmPerSecond(number)),
             "rad/s2" | "rad/s²" | "rad/s^2" => Ok(Self::RpmPerSecond(Rpm::from(RadiansPerSecond(number)).0)),
             "" => Err(ParseUnitError::NoUnit { text: text.to_owned(), expected: RAMP }),
@@ -263,21 +286,26 @@ macro_rules! display {
     ($($unit:ty => $form:literal;)*) => {$(
         impl fmt::Display for $unit {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                write!(f, $form, self.0)
+                write!(f, $form, Shown(self.0))
             }
         }
     )*};
 }
 
 display! {
-    Rpm => "{:.1} r/min";
-    RadiansPerSecond => "{:.3} rad/s";
-    Degrees => "{:.2}°";
-    Turns => "{:.4} turns";
-    Counts => "{} counts";
-    Amperes => "{:.2} A";
-    Volts => "{:.2} V";
-    Celsius => "{:.1} °C";
+    Rpm => "{} r/min";
+    RadiansPerSecond => "{} rad/s";
+    Degrees => "{}°";
+    Turns => "{} turns";
+    Amperes => "{} A";
+    Volts => "{} V";
+    Celsius => "{} °C";
+}
+
+impl fmt::Display for Counts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} counts", self.0)
+    }
 }
 
 impl fmt::Display for Angle {
@@ -292,8 +320,8 @@ impl fmt::Display for Angle {
 impl fmt::Display for Ramp {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::RpmPerSecond(rate) => write!(f, "{rate:.1} r/min/s"),
-            Self::Time(time) => write!(f, "{} ms", time.as_millis()),
+            Self::RpmPerSecond(rate) => write!(f, "{} r/min/s", Shown(*rate)),
+            Self::Time(time) => write!(f, "{} ms", Shown(time.as_secs_f64() * 1e3)),
         }
     }
 }
@@ -318,6 +346,14 @@ mod tests {
         assert_eq!("90deg".parse(), Ok(Angle::Turns(0.25)));
         assert_eq!("0.5turn".parse(), Ok(Angle::Turns(0.5)));
         assert_eq!("0.5rev".parse(), Ok(Angle::Turns(0.5)));
+    }
+
+    #[test]
+    fn numbers_are_shown_with_the_digits_that_matter() {
+        let shown = [2.7, 60.0, -0.0, 0.3 - 1e-17, 1.0 / 3.0, 12_345.678, 0.087_890_6, 1e-9, -1234.5678, 1e12];
+        let texts = shown.map(|number| Shown(number).to_string());
+        assert_eq!(texts, ["2.7", "60", "0", "0.3", "0.3333", "12345.7", "0.08789", "0", "-1234.6", "1000000000000"]);
+        assert_eq!(Rpm(2.75).to_string(), "2.75 r/min");
     }
 
     #[test]

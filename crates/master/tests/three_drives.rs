@@ -255,7 +255,7 @@ fn homing_that_fails_or_finds_nothing_is_explained_and_stopped() {
     let error = block_on(&mut world, servo.home(17, HomingOptions::default())).unwrap().unwrap_err();
     assert!(matches!(error, Error::NoSuchMode { mode: ModeOfOperation::HOMING, .. }), "{error}");
     let error = block_on(&mut world, joint.home(24, HomingOptions::default())).unwrap().unwrap_err();
-    assert!(matches!(error, Error::OutOfLimits { low: 17, high: 22, .. }), "{error}");
+    assert!(matches!(&error, Error::OutOfLimits { limits, .. } if (limits.low, limits.high) == (17, 22)), "{error}");
     // Method 0 is accepted and fails at once ("ZLIM42-C user manual V1.03", 5.3.6: bit 8 off, 10 on, 14 off).
     let error = block_on(&mut world, stepper.home(0, HomingOptions::default())).unwrap().unwrap_err();
     assert!(error.to_string().contains("ended homing with method 0"), "{error}");

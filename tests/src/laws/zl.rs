@@ -125,7 +125,13 @@ fn fixed<F: Subject>(firmware: &F) -> Vec<i64> {
 fn judge<F: Subject>(firmware: &F, first: &[i64], frame: &Frame) {
     for (slot, row) in F::table().iter().filter(|(_, row)| row.access.is_writable()) {
         let value = firmware.value(slot);
-        assert_eq!(row.check_value(value), Ok(()), "{frame} put {value} into {}", row.mux());
+        let fits = match row.resolution.map(|object| F::table().find(object).expect("a row's resolution is an object"))
+        {
+            // Which resolution is in effect is the firmware's business; the finest is the widest.
+            Some(resolution) => row.check_value_at(value, F::table().row(resolution).limits_at(1).1),
+            None => row.check_value(value),
+        };
+        assert_eq!(fits, Ok(()), "{frame} put {value} into {}", row.mux());
     }
     assert_eq!(fixed(firmware), first, "{frame} changed what is fixed");
     let report = firmware.report();

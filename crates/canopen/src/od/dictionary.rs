@@ -8,7 +8,8 @@ use crate::{AbortCode, Mux, NodeId};
 pub struct Dictionary<const N: usize> {
     table: &'static Table,
     cells: [u32; N],
-    in_effect: u32,
+    /// See [`set_resolution`](Self::set_resolution).
+    resolution: u32,
 }
 
 /// All values, to look at only; what a [`super::Check`] sees.
@@ -16,7 +17,6 @@ pub struct Dictionary<const N: usize> {
 pub struct View<'a> {
     table: &'static Table,
     cells: &'a [u32],
-    in_effect: u32,
 }
 
 impl<const N: usize> Dictionary<N> {
@@ -26,7 +26,7 @@ impl<const N: usize> Dictionary<N> {
     /// If the table has more than `N` rows.
     pub fn new(table: &'static Table, node_id: NodeId) -> Self {
         assert!(table.rows().len() <= N, "the table has more rows than the dictionary has cells");
-        let mut dictionary = Self { table, cells: [0; N], in_effect: 0 };
+        let mut dictionary = Self { table, cells: [0; N], resolution: 1 };
         for (slot, _) in table.iter() {
             dictionary.cells[slot.position()] = default_raw(table, slot, node_id);
         }
@@ -74,18 +74,18 @@ impl<const N: usize> Dictionary<N> {
 
     /// All values, to look at.
     pub fn view(&self) -> View<'_> {
-        View { table: self.table, cells: &self.cells, in_effect: self.in_effect }
+        View { table: self.table, cells: &self.cells }
     }
 
-    /// Lends a word of the device's own to the rows' checks: what it goes by though no object shows it, such as a setting
-    /// as it was at the last restart. 0 until then.
-    pub const fn set_in_effect(&mut self, word: u32) {
-        self.in_effect = word;
+    /// Sets the resolution in effect, of the rows that have one ([`Entry::resolution`](super::Entry::resolution)): a device may
+    /// take the object's value over later than it is written. 1 until then; 0 counts as 1.
+    pub fn set_resolution(&mut self, resolution: u32) {
+        self.resolution = resolution.max(1);
     }
 
-    /// The word that the device lent.
-    pub const fn in_effect(&self) -> u32 {
-        self.in_effect
+    /// The resolution in effect.
+    pub const fn resolution(&self) -> u32 {
+        self.resolution
     }
 
     /// Whether a peer (SDO or RPDO) may write `raw` to this row: access, listed values, limits, the row's check.
@@ -125,7 +125,11 @@ impl<const N: usize> Dictionary<N> {
         if !self.table.summary(slot).is_writable() {
             return Err(AbortCode::READ_ONLY);
         }
-        row.check_value(row.data_type.value(raw))?;
+        let value = row.data_type.value(raw);
+        match row.resolution {
+            Some(_) => row.check_value_at(value, self.resolution.into())?,
+            None => row.check_value(value)?,
+        }
         row.check.map_or(Ok(()), |check| check(&self.view(), raw))
     }
 }
@@ -144,11 +148,6 @@ impl View<'_> {
     /// The cell of a row.
     pub fn raw(&self, slot: Slot) -> u32 {
         self.cells[slot.position()]
-    }
-
-    /// The word that the device lent; see [`Dictionary::set_in_effect`].
-    pub const fn in_effect(&self) -> u32 {
-        self.in_effect
     }
 
     /// The value at a multiplexor as a number.
@@ -175,14 +174,17 @@ mod tests {
     use super::super::{Access, DataType, Entry, keys};
     use super::*;
 
-    static ROWS: [Entry; 4] = [
+    static ROWS: [Entry; 5] = [
         Entry::new(0x1000, 0, DataType::Unsigned32, Access::Const, "device_type", "").default(0x0004_0192),
         Entry::new(0x1014, 0, DataType::Unsigned32, Access::ReadWrite, "cob_id_emcy", "").node_id_plus(0x80),
         Entry::new(0x6060, 0, DataType::Integer8, Access::ReadWrite, "modes_of_operation", "")
             .values(&[(0, "none"), (3, "velocity")]),
         Entry::new(0x6071, 0, DataType::Integer16, Access::ReadWrite, "target_torque", "").range(-300, 300),
+        Entry::new(0x60FF, 0, DataType::Integer32, Access::ReadWrite, "target_velocity", "")
+            .range(-1000, 1000)
+            .resolution(0x2001, 0),
     ];
-    static KEYS: [u32; 4] = keys(&ROWS);
+    static KEYS: [u32; 5] = keys(&ROWS);
     static TABLE: Table = Table::new(&ROWS, &KEYS);
     const TORQUE: Object<i16> = TABLE.object(0x6071, 0);
 
@@ -221,5 +223,20 @@ mod tests {
         assert_eq!(check(Mux::new(0x6060, 0), 3), Ok(()));
         assert_eq!(check(Mux::new(0x6071, 0), 301), Err(AbortCode::VALUE_TOO_HIGH));
         assert_eq!(check(Mux::new(0x6071, 0), 0xFED3), Err(AbortCode::VALUE_TOO_LOW));
+    }
+
+    #[test]
+    fn limits_move_with_the_resolution_in_effect() {
+        let mut dictionary = dictionary();
+        let slot = TABLE.slot(0x60FF, 0);
+        let check = |dictionary: &Dictionary<8>, value: i32| dictionary.check_write(slot, value as u32);
+        for (resolution, limit) in [(1, 1000), (10, 10_000), (0, 1000)] {
+            dictionary.set_resolution(resolution);
+            assert_eq!((check(&dictionary, limit), check(&dictionary, -limit)), (Ok(()), Ok(())));
+            assert_eq!(check(&dictionary, limit + 1), Err(AbortCode::VALUE_TOO_HIGH));
+            assert_eq!(check(&dictionary, -limit - 1), Err(AbortCode::VALUE_TOO_LOW));
+        }
+        // Never beyond the type.
+        assert_eq!(TABLE.row(slot).limits_at(i64::from(i32::MAX)), DataType::Integer32.range());
     }
 }

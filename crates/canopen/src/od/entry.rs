@@ -67,6 +67,15 @@ pub enum Default {
     Text(&'static str),
 }
 
+/// Another object that holds the values of an object back: one beyond it is accepted, and acts as if it were at it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HeldTo {
+    /// That object.
+    pub object: Mux,
+    /// Counts of the object held back in one count of that one, at a resolution of 1.
+    pub counts: i64,
+}
+
 /// What must hold for a download besides type, access and range: sees all values, refuses with an abort code.
 ///
 /// The second argument is the raw cell to be written. Nothing is stored when the check fails.
@@ -91,12 +100,18 @@ pub struct Entry {
     pub title: &'static str,
     /// Factory value.
     pub default: Default,
-    /// Smallest and largest value accepted, if narrower than the type.
+    /// Smallest and largest value accepted, if narrower than the type; at a [`resolution`](Self::resolution) of 1, where there
+    /// is one.
     pub limits: Option<(i64, i64)>,
     /// The only values accepted, with their meaning; empty when any value in the limits is.
     pub values: &'static [(i64, &'static str)],
-    /// Unit of one count of the value, e.g. `0.1 r/min`; empty for none.
+    /// Unit of one count of the value, e.g. `0.1 r/min`; empty for none. At a [`resolution`](Self::resolution) of 1, where
+    /// there is one.
     pub unit: &'static str,
+    /// An object whose value divides the unit and multiplies the limits.
+    pub resolution: Option<Mux>,
+    /// An object that holds back what a value effects.
+    pub held_to: Option<HeldTo>,
     /// Kept in the device's parameter store.
     pub stored: bool,
     /// Kept there as well, but only by a save of everything: not with each write.
@@ -130,6 +145,8 @@ impl Entry {
             limits: None,
             values: &[],
             unit: "",
+            resolution: None,
+            held_to: None,
             stored: false,
             saved: false,
             pdo: PdoMapping::No,
@@ -171,6 +188,18 @@ impl Entry {
     /// Unit of one count.
     pub const fn unit(mut self, unit: &'static str) -> Self {
         self.unit = unit;
+        self
+    }
+
+    /// The value of this object divides the unit and multiplies the limits.
+    pub const fn resolution(mut self, index: u16, sub_index: u8) -> Self {
+        self.resolution = Some(Mux::new(index, sub_index));
+        self
+    }
+
+    /// Values beyond that of this object, `counts` of whose counts are one of its own, act as if they were at it.
+    pub const fn held_to(mut self, index: u16, sub_index: u8, counts: i64) -> Self {
+        self.held_to = Some(HeldTo { object: Mux::new(index, sub_index), counts });
         self
     }
 
@@ -234,7 +263,14 @@ impl Entry {
         self.values.iter().find(|(listed, _)| *listed == value).map(|(_, text)| *text)
     }
 
-    /// Checks a number against listed values and limits.
+    /// Smallest and largest number accepted while the object of [`resolution`](Self::resolution) has this value; 1 for a row
+    /// without one.
+    pub fn limits_at(&self, resolution: i64) -> (i64, i64) {
+        let (low, high) = self.data_type.range();
+        self.limits.map_or((low, high), |(min, max)| ((min * resolution).max(low), (max * resolution).min(high)))
+    }
+
+    /// Checks a number against listed values and limits, those at a resolution of 1.
     ///
     /// # Errors
     /// [`AbortCode::INVALID_VALUE`] if values are listed and this is none of them, [`AbortCode::VALUE_TOO_HIGH`]
@@ -243,10 +279,24 @@ impl Entry {
         if !self.values.is_empty() && self.meaning(value).is_none() {
             return Err(AbortCode::INVALID_VALUE);
         }
-        match self.limits {
-            Some((_, max)) if value > max => Err(AbortCode::VALUE_TOO_HIGH),
-            Some((min, _)) if value < min => Err(AbortCode::VALUE_TOO_LOW),
-            _ => Ok(()),
-        }
+        self.limits.map_or(Ok(()), |limits| check_limits(value, limits))
+    }
+
+    /// Checks a number of a row with a resolution against the limits at that resolution.
+    ///
+    /// # Errors
+    /// [`AbortCode::VALUE_TOO_HIGH`] and [`AbortCode::VALUE_TOO_LOW`] outside the limits.
+    pub fn check_value_at(&self, value: i64, resolution: i64) -> Result<(), AbortCode> {
+        check_limits(value, self.limits_at(resolution))
+    }
+}
+
+const fn check_limits(value: i64, (min, max): (i64, i64)) -> Result<(), AbortCode> {
+    if value > max {
+        Err(AbortCode::VALUE_TOO_HIGH)
+    } else if value < min {
+        Err(AbortCode::VALUE_TOO_LOW)
+    } else {
+        Ok(())
     }
 }

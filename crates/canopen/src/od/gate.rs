@@ -20,7 +20,7 @@ impl Gate {
     pub(super) const CLOSED: Self = Self { check: None, mask: u32::MAX, low: 0, span: 0, listed: 0 };
 
     /// Closed, and the row itself has to be asked, where nothing may be written or where a list's values lie too far apart
-    /// for the bits.
+    /// for the bits. Limits that move with a resolution are those at 1, which are the narrowest: beyond them the row is asked.
     pub(super) const fn of(row: &Entry) -> Self {
         let mask = row.data_type.mask();
         if !Summary::of(row).is_writable() {

@@ -14,7 +14,7 @@ mod table;
 
 pub use data_type::{DataType, Scalar};
 pub use dictionary::{Dictionary, View};
-pub use entry::{Access, Check, Default, Entry, PdoMapping, TpdoForm};
+pub use entry::{Access, Check, Default, Entry, HeldTo, PdoMapping, TpdoForm};
 use gate::Gate;
 use summary::Summary;
 pub use table::{MAX_ROWS, Object, Slot, Table, keys};

@@ -52,7 +52,7 @@ impl Home {
         let guard = self.guard.begin(context, &drive).await?;
         let motion = drive.home(self.method, options).await?;
         let then = Then::goes_on_if(motion.reached_after.is_none());
-        outcome(context, &drive, format!("home with method {}", self.method), motion, then, guard).await
+        outcome(context, &drive, ("home with method", &self.method), motion, then, guard).await
     }
 
     fn refusal(&self, model: &DriveProfile) -> Failure {

@@ -1,11 +1,12 @@
 //! `ferrodrive velocity`, `move` and `torque`: motion in physical units.
 
+use std::fmt;
 use std::time::Duration;
 
 use canopen::{Mux, NodeId};
 use drives::profile::{Quantity, Ramps};
-use master::drive::{Drive, MotionOptions, MotionReport, Note};
-use master::units::{Amperes, Angle, Ramp, Rpm, parse_duration};
+use master::drive::{Commanded, Drive, MotionOptions, MotionReport, Note};
+use master::units::{Amperes, Angle, Ramp, Rpm, Shown, parse_duration};
 use serde::Serialize;
 
 use super::drive::{Motion, StateReport};
@@ -108,6 +109,11 @@ pub(super) fn speed(text: &str) -> Result<Rpm, String> {
 #[derive(Debug, Serialize)]
 pub(crate) struct MotionOutcome {
     asked: String,
+    /// The same with what was sent, where that differs.
+    #[serde(skip)]
+    done: String,
+    /// Each value that was asked for, and what was sent for it.
+    commanded: Vec<Sent>,
     reached: bool,
     reached_after_s: Option<f64>,
     stopped: bool,
@@ -119,6 +125,29 @@ pub(crate) struct MotionOutcome {
     #[serde(flatten)]
     state: StateReport,
     notes: Vec<String>,
+}
+
+/// A value that was asked for, and what the drive was sent for it.
+#[derive(Debug, Serialize)]
+struct Sent {
+    what: &'static str,
+    requested: f64,
+    commanded: f64,
+    unit: &'static str,
+    object: String,
+    raw: i64,
+    /// The two differ by more than a thousandth.
+    rounded: bool,
+    #[serde(skip)]
+    text: String,
+}
+
+impl From<&Commanded> for Sent {
+    fn from(sent: &Commanded) -> Self {
+        let Commanded { what, requested, commanded, unit, object, raw } = *sent;
+        let (object, rounded) = (object.to_string(), sent.is_rounded());
+        Self { what, requested, commanded, unit, object, raw, rounded, text: sent.to_string() }
+    }
 }
 
 /// The limits that the drive keeps to.
@@ -140,7 +169,7 @@ impl Velocity {
         let guard = self.ramps.guard.begin(context, &drive).await?;
         let motion = drive.velocity(self.speed, self.ramps.options(None)).await?;
         let then = self.duration.map_or(Then::goes_on_if(self.speed.0 != 0.0), Then::StopAfter);
-        outcome(context, &drive, format!("turn at {}", self.speed), motion, then, guard).await
+        outcome(context, &drive, ("turn at", &self.speed), motion, then, guard).await
     }
 }
 
@@ -149,8 +178,8 @@ impl Move {
     pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
         let drive = context.known_drive(self.node).await?;
         let options = self.ramps.options(self.profile_velocity);
-        let how = if self.relative { "by" } else { "to" };
-        context.progress.show(format!("node {}: {how} {}", self.node, self.position));
+        let verb = if self.relative { "move by" } else { "move to" };
+        context.progress.show(format!("node {}: {verb} {}", self.node, self.position));
         let guard = self.ramps.guard.begin(context, &drive).await?;
         let motion = if self.relative {
             drive.move_relative(self.position, options).await?
@@ -158,7 +187,7 @@ impl Move {
             drive.move_absolute(self.position, options).await?
         };
         let then = Then::goes_on_if(motion.reached_after.is_none());
-        outcome(context, &drive, format!("move {how} {}", self.position), motion, then, guard).await
+        outcome(context, &drive, (verb, &self.position), motion, then, guard).await
     }
 }
 
@@ -169,7 +198,7 @@ impl Torque {
         let guard = self.guard.begin(context, &drive).await?;
         let motion = drive.torque(self.current).await?;
         let then = self.duration.map_or(Then::goes_on_if(self.current.0 != 0.0), Then::StopAfter);
-        outcome(context, &drive, format!("push with {}", self.current), motion, then, guard).await
+        outcome(context, &drive, ("push with", &self.current), motion, then, guard).await
     }
 }
 
@@ -197,19 +226,24 @@ impl Then {
     }
 }
 
-/// Reads what came of a motion, and ends it if it is to be ended.
+/// Reads what came of a motion, and ends it if it is to be ended. `verb` and `value` say what was asked for.
 pub(super) async fn outcome(
     context: &Context,
     drive: &Drive,
-    asked: String,
+    (verb, value): (&str, &dyn fmt::Display),
     motion: MotionReport,
     then: Then,
     guard: Guard,
 ) -> Result<MotionOutcome, Failure> {
+    let asked = format!("{verb} {value}");
+    let done = match motion.commanded.first().filter(|sent| sent.is_rounded()) {
+        Some(sent) => format!("{verb} {} {} ({value} asked for)", Shown(sent.commanded), sent.unit),
+        None => asked.clone(),
+    };
     let limits = limits(drive).await;
     let mut before_stop = None;
     if let Then::StopAfter(duration) = then {
-        context.progress.show(format!("node {}: {asked} for {} s", drive.node().id(), duration.as_secs_f64()));
+        context.progress.show(format!("node {}: {done} for {} s", drive.node().id(), duration.as_secs_f64()));
         drive.supervise(duration).await?;
         before_stop = Some(StateReport::read(drive).await?.motion);
         drive.stop().await?;
@@ -220,6 +254,8 @@ pub(super) async fn outcome(
     let notes = motion.notes.iter().filter(|note| !matches!(note, Note::HostLoss(_))).map(ToString::to_string);
     Ok(MotionOutcome {
         asked,
+        done,
+        commanded: motion.commanded.iter().map(Sent::from).collect(),
         reached: motion.reached_after.is_some(),
         reached_after_s: motion.reached_after.map(|time| time.as_secs_f64()),
         stopped: before_stop.is_some(),
@@ -250,7 +286,7 @@ async fn limits(drive: &Drive) -> Limits {
 }
 
 const fn raw(object: Mux) -> Quantity {
-    Quantity { object, per_count: 1.0, divisor: None }
+    Quantity { object, per_count: 1.0 }
 }
 
 async fn number(drive: &Drive, quantity: Quantity) -> Option<f64> {
@@ -278,7 +314,9 @@ impl Report for MotionOutcome {
             None => "commanded, not waited for".into(),
         };
         let then = if self.stopped { "; stopped again" } else { "" };
-        let mut lines = vec![format!("node {}: {}: {reached}{then}", self.state.node, self.asked)];
+        let mut lines = vec![format!("node {}: {}: {reached}{then}", self.state.node, self.done)];
+        let rounded = self.commanded.iter().filter(|sent| sent.rounded);
+        lines.extend(rounded.map(|sent| format!("  sent    {}", sent.text)));
         lines.extend(self.before_stop.as_ref().map(|motion| format!("  before  {}", motion.text())));
         lines.push(format!("  at      {}", self.state.motion.text()));
         lines.push(format!("  limits  {}", self.limits.text()));

@@ -1,7 +1,8 @@
 //! `ferrodrive objects`: the object dictionary of a model, searchable.
 
-use canopen::NodeId;
 use canopen::od::{Default, Entry, PdoMapping};
+use canopen::{Mux, NodeId};
+use master::drive::{Limits, Setting};
 use serde::Serialize;
 
 use super::sdo::guessed;
@@ -59,7 +60,7 @@ pub(crate) struct ObjectList {
 struct Row {
     object: String,
     #[serde(skip)]
-    communication: bool,
+    mux: Mux,
     name: &'static str,
     title: &'static str,
     data_type: &'static str,
@@ -67,7 +68,17 @@ struct Row {
     stored: bool,
     mappable: bool,
     default: Factory,
+    /// Smallest and largest value, if narrower than the type.
     limits: Option<(i64, i64)>,
+    /// The object that multiplies them, and divides the unit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    limits_times: Option<String>,
+    /// The object beyond whose value a value is taken and has no more effect.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    acts_up_to: Option<String>,
+    /// What is in force on the node that was asked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    now: Option<Now>,
     unit: &'static str,
     values: Vec<Meaning>,
 }
@@ -81,6 +92,44 @@ enum Factory {
     Text(&'static str),
 }
 
+/// The limits in force on a node, and the objects that they follow from.
+#[derive(Debug, Serialize)]
+struct Now {
+    limits: (i64, i64),
+    #[serde(skip_serializing_if = "Option::is_none")]
+    acts_up_to: Option<i64>,
+    by: Vec<By>,
+    #[serde(skip)]
+    text: String,
+}
+
+#[derive(Debug, Serialize)]
+struct By {
+    object: String,
+    name: &'static str,
+    value: i64,
+    /// The drive goes by the value of its last restart.
+    since_restart: bool,
+}
+
+impl Now {
+    fn of(limits: &Limits) -> Self {
+        let settings = limits.resolution.into_iter().chain(limits.held_to.map(|(_, setting)| setting));
+        let by = settings.map(|Setting { object, name, value, since_restart }| By {
+            object: object.to_string(),
+            name,
+            value,
+            since_restart,
+        });
+        Self {
+            limits: (limits.low, limits.high),
+            acts_up_to: limits.held_to.map(|(most, _)| most),
+            by: by.collect(),
+            text: limits.to_string(),
+        }
+    }
+}
+
 #[derive(Debug, Serialize)]
 struct Meaning {
     value: i64,
@@ -92,7 +141,11 @@ impl Objects {
     pub(crate) async fn of_node(&self, context: &Context, node: NodeId) -> Result<ObjectList, Failure> {
         let drive = context.known_drive(node).await?;
         let model = drive.profile().ok_or_else(|| Failure::new(format!("the model of node {node} is not known")))?;
-        Ok(ObjectList { guess: guessed(&drive), ..self.list(model)? })
+        let mut list = ObjectList { guess: guessed(&drive), ..self.list(model)? };
+        for row in list.objects.iter_mut().filter(|row| row.limits_times.is_some() || row.acts_up_to.is_some()) {
+            row.now = Some(Now::of(&drive.limits(row.mux).await?));
+        }
+        Ok(list)
     }
 
     /// Searches the table of `model`.
@@ -133,7 +186,7 @@ impl Row {
     fn new(row: &Entry) -> Self {
         Self {
             object: row.mux().to_string(),
-            communication: row.is_communication(),
+            mux: row.mux(),
             name: row.name,
             title: row.title,
             data_type: row.data_type.name(),
@@ -142,14 +195,23 @@ impl Row {
             mappable: row.pdo == PdoMapping::Yes,
             default: Factory::of(row),
             limits: row.limits,
+            limits_times: row.resolution.map(|object| object.to_string()),
+            acts_up_to: row.held_to.map(|held_to| held_to.object.to_string()),
+            now: None,
             unit: row.unit,
             values: row.values.iter().map(|(value, meaning)| Meaning { value: *value, meaning }).collect(),
         }
     }
 
     fn accepts(&self) -> String {
+        if let Some(now) = &self.now {
+            return now.text.clone();
+        }
         if self.values.is_empty() {
-            return self.limits.map(|(low, high)| format!("{low} to {high}")).unwrap_or_default();
+            let limits = self.limits.map(|(low, high)| format!("{low} to {high}")).unwrap_or_default();
+            let times = self.limits_times.as_ref().map(|object| format!(", times {object}")).unwrap_or_default();
+            let held = self.acts_up_to.as_ref().map(|object| format!("; acts up to {object}")).unwrap_or_default();
+            return limits + &times + &held;
         }
         let listed = self.values.iter().map(|row| format!("{} {}", row.value, row.meaning));
         listed.collect::<Vec<_>>().join("; ")
@@ -191,7 +253,7 @@ impl Report for ObjectList {
                 row.name.into(),
                 row.data_type.into(),
                 row.rights(),
-                row.default.text(row.communication),
+                row.default.text(matches!(row.mux.index, 0x1000..=0x1FFF)),
                 row.unit.into(),
                 row.accepts(),
             ]);

@@ -3,6 +3,7 @@
 use canopen::od::Entry;
 use canopen::{AbortCode, Mux, NodeId};
 use master::decode::common_row;
+use master::drive::Limits;
 use master::{Drive, Error};
 use serde::Serialize;
 
@@ -57,6 +58,9 @@ pub(crate) struct ObjectReport {
     guess: Option<&'static str>,
     #[serde(flatten)]
     value: Decoded,
+    /// What to know about what was written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    note: Option<String>,
     #[serde(skip)]
     written: bool,
 }
@@ -76,7 +80,8 @@ impl Read {
             None => drive.node().upload(mux).await?,
         };
         let row = if drive.profile().is_some() { row } else { common_row(mux) };
-        Ok(ObjectReport::new(&drive, mux, row, payload.as_bytes(), false))
+        let limits = moving_limits(&drive, row).await?;
+        Ok(ObjectReport::new(&drive, mux, row, payload.as_bytes(), limits.as_ref(), false))
     }
 }
 
@@ -85,38 +90,64 @@ impl Write {
     pub(crate) async fn run(&self, context: &Context) -> Result<ObjectReport, Failure> {
         let drive = context.drive_untold(self.node).await?;
         let (mux, row) = resolve(&drive, &self.object)?;
+        let limits = moving_limits(&drive, row).await?;
         let wrong = |reason| Failure::usage(reason).at_node(self.node).at_object(mux);
         let (data_type, number) = match row {
-            Some(row) => (row.data_type, value(row, &self.value).map_err(wrong)?),
+            Some(row) => (row.data_type, value(row, &self.value, counts_per_unit(limits.as_ref())).map_err(wrong)?),
             None => typed_value(&self.value).map_err(wrong)?,
         };
         drive.check_write(mux, number)?;
         context.tell_guess(&drive);
         let bytes = data_type.raw(number).to_le_bytes();
         let bytes = &bytes[..data_type.size()];
-        drive.node().download(mux, bytes).await.map_err(|error| with_limits(error, row))?;
-        Ok(ObjectReport::new(&drive, mux, row, bytes, true))
+        if let Err(error) = drive.node().download(mux, bytes).await {
+            return Err(with_limits(&drive, error, number).await);
+        }
+        let mut report = ObjectReport::new(&drive, mux, row, bytes, limits.as_ref(), true);
+        report.note = note(&drive, mux, number, limits.as_ref());
+        Ok(report)
     }
 }
 
-/// A refusal of a value, with what the object takes.
-fn with_limits(error: Error, row: Option<&Entry>) -> Failure {
+/// What the object takes now, where other objects have a say in it.
+async fn moving_limits(drive: &Drive, row: Option<&Entry>) -> Result<Option<Limits>, Failure> {
+    match row.filter(|row| drive.profile().is_some() && (row.resolution.is_some() || row.held_to.is_some())) {
+        Some(row) => Ok(Some(drive.limits(row.mux()).await?)),
+        None => Ok(None),
+    }
+}
+
+fn counts_per_unit(limits: Option<&Limits>) -> i64 {
+    limits.map_or(1, Limits::counts_per_unit)
+}
+
+/// What to know about a value that the drive has taken.
+fn note(drive: &Drive, mux: Mux, number: i64, limits: Option<&Limits>) -> Option<String> {
+    let storage = drive.profile().map(|profile| profile.storage);
+    if storage.is_some_and(|storage| storage.effective_after_restart.contains(&mux)) {
+        let node = drive.node().id();
+        return Some(format!("it takes effect at the next restart, if it is stored by then: ferrodrive save {node}"));
+    }
+    let (limits, setting) = limits.and_then(|limits| Some((limits, limits.holding_back(number)?)))?;
+    let most = limits.held_to.map_or(0, |(most, _)| most);
+    Some(format!("the drive holds it to {most}, by {setting}"))
+}
+
+/// A refusal of a value, with what the object takes now and where that comes from.
+async fn with_limits(drive: &Drive, error: Error, number: i64) -> Failure {
     let by_value = [AbortCode::INVALID_VALUE, AbortCode::VALUE_TOO_HIGH, AbortCode::VALUE_TOO_LOW];
-    let refused = matches!(error, Error::Aborted { code, .. } if by_value.contains(&code));
+    let refused = error.object().filter(|_| error.abort().is_some_and(|code| by_value.contains(&code)));
     let failure = Failure::from(error);
-    match row.filter(|_| refused) {
-        Some(row) => failure.next(format!("{} {} takes {}", row.mux(), row.name, accepted(row))),
+    let Some(mux) = refused else { return failure };
+    let Ok(limits) = drive.limits(mux).await else { return failure };
+    let failure = failure.next(format!("{mux} {} takes {limits}", limits.name));
+    match limits.resolution.filter(|setting| limits.take(number) && setting.since_restart) {
+        Some(setting) => failure.next(format!(
+            "{} has been written since the drive's last restart: until the next one its value before counts",
+            setting.object
+        )),
         None => failure,
     }
-}
-
-fn accepted(row: &Entry) -> String {
-    if row.values.is_empty() {
-        let (low, high) = row.limits.unwrap_or(row.data_type.range());
-        let unit = if row.unit.is_empty() { String::new() } else { format!(" in units of {}", row.unit) };
-        return format!("{low} to {high}{unit}");
-    }
-    row.values.iter().map(|(value, meaning)| format!("{value} ({meaning})")).collect::<Vec<_>>().join(", ")
 }
 
 /// The multiplexor, and the row if the node's model is known and has it.
@@ -126,13 +157,21 @@ fn resolve(drive: &Drive, object: &ObjectArg) -> Result<(Mux, Option<&'static En
 }
 
 impl ObjectReport {
-    fn new(drive: &Drive, mux: Mux, row: Option<&'static Entry>, bytes: &[u8], written: bool) -> Self {
+    fn new(
+        drive: &Drive,
+        mux: Mux,
+        row: Option<&'static Entry>,
+        bytes: &[u8],
+        limits: Option<&Limits>,
+        written: bool,
+    ) -> Self {
         Self {
             node: drive.node().id().raw(),
             object: mux.to_string(),
             name: row.map(|row| row.name),
             guess: guessed(drive),
-            value: decode(drive.profile(), row, bytes),
+            value: decode(drive.profile(), row, bytes).at_resolution(counts_per_unit(limits)),
+            note: None,
             written,
         }
     }
@@ -147,6 +186,7 @@ impl Report for ObjectReport {
     fn text(&self, paint: Paint) -> String {
         let name = self.name.map(|name| format!(" {name}")).unwrap_or_default();
         let verb = if self.written { " written:" } else { " =" };
-        format!("node {} {}{name}{verb} {}", self.node, self.object, self.value.text(paint))
+        let note = self.note.as_ref().map(|note| format!("\n  note    {note}")).unwrap_or_default();
+        format!("node {} {}{name}{verb} {}{note}", self.node, self.object, self.value.text(paint))
     }
 }

@@ -70,9 +70,18 @@ impl Unit {
     /// The unit of an object row, e.g. `0.1 r/min` or `*10counts`: how many of which unit one count stands for.
     pub(crate) fn of_object(text: &str) -> Option<Self> {
         let text = text.trim().trim_start_matches(['*', '×']);
-        let (number, name) = split_number(text).unwrap_or((1.0, text));
-        let unit = Self::named(name.trim())?;
+        let (number, name) = split_factor(text);
+        let unit = Self::named(name)?;
         Some(Self { factor: unit.factor * number, ..unit })
+    }
+}
+
+/// How much of which unit one count is: `0.1 r/min`, `1/2000 A`, `100/32768 %`.
+pub(crate) fn split_factor(text: &str) -> (f64, &str) {
+    let (number, rest) = split_number(text).unwrap_or((1.0, text));
+    match rest.strip_prefix('/').and_then(split_number) {
+        Some((divisor, name)) if divisor > 0.0 => (number / divisor, name),
+        _ => (number, rest.trim()),
     }
 }
 
@@ -128,6 +137,10 @@ mod tests {
         let unit = Unit::of_object("0.1 r/min").unwrap();
         assert_eq!((unit.dimension, unit.factor), (AngularVelocity, 0.1));
         assert_eq!(Unit::of_object("mA").unwrap().factor, 1e-3);
+        let unit = Unit::of_object("1/2000 A").unwrap();
+        assert_eq!((unit.dimension, unit.factor), (Current, 1.0 / 2000.0));
+        assert_eq!(split_factor("1/327 V/(1000 r/min)"), (1.0 / 327.0, "V/(1000 r/min)"));
+        assert_eq!(split_factor("r/min"), (1.0, "r/min"));
         assert_eq!(Unit::of_object(""), None);
     }
 

@@ -5,13 +5,14 @@ use canopen::od::{DataType, Entry};
 use super::suggest::{did_you_mean, near};
 use super::unit::{Unit, split_number};
 
-/// Reads what `row` is to be set to. Its data type bounds the value; its limits are for the drive to check.
-pub(crate) fn value(row: &Entry, text: &str) -> Result<i64, String> {
+/// Reads what `row` is to be set to, where `resolution` counts make one of its unit. Its data type bounds the value; its
+/// limits are for the drive to check.
+pub(crate) fn value(row: &Entry, text: &str, resolution: i64) -> Result<i64, String> {
     let (low, high) = row.data_type.range();
     let value = match integer(text) {
         Some(value) => value,
         None => match split_number(text) {
-            Some((number, unit)) => with_unit(row, text, number, unit)?,
+            Some((number, unit)) => with_unit(row, text, number * resolution as f64, unit)?,
             None => word(row, text)?,
         },
     };
@@ -73,7 +74,8 @@ fn with_unit(row: &Entry, text: &str, number: f64, unit: &str) -> Result<i64, St
     let counts = number * given.factor / own.factor;
     let whole = counts.round();
     if (counts - whole).abs() > 1e-6 * counts.abs().max(1.0) || whole.abs() > u32::MAX.into() {
-        return Err(format!("'{text}' is {counts} steps of {}; a whole number in range is needed", row.unit));
+        let counts = master::units::Shown(counts);
+        return Err(format!("'{text}' is {counts} counts of {}; a whole number of them in range is needed", row.mux()));
     }
     Ok(whole as i64)
 }
@@ -128,12 +130,24 @@ mod tests {
         assert_eq!(value(&SPEED, "-0x10"), Ok(-16));
     }
 
+    fn value(row: &Entry, text: &str) -> Result<i64, String> {
+        super::value(row, text, 1)
+    }
+
+    #[test]
+    fn a_finer_resolution_makes_more_counts_of_a_unit_and_the_same_of_a_bare_number() {
+        assert_eq!(super::value(&SPEED, "2.7rpm", 10), Ok(27));
+        assert_eq!(super::value(&SPEED, "27", 10), Ok(27));
+        let error = value(&SPEED, "2.7rpm").unwrap_err();
+        assert!(error.starts_with("'2.7rpm' is 2.7 counts of 60FFh:00"), "{error}");
+    }
+
     #[test]
     fn units_are_converted_to_the_objects_own() {
         assert_eq!(value(&SPEED, "60rpm"), Ok(60));
         assert_eq!(value(&ACTUAL, "60 rpm"), Ok(600));
         assert_eq!(value(&ACTUAL, "360deg/s"), Ok(600));
-        assert!(value(&ACTUAL, "0.05rpm").unwrap_err().contains("0.1 r/min"));
+        assert!(value(&ACTUAL, "0.05rpm").unwrap_err().contains("0.5 counts of 606Ch:00"));
         assert!(value(&SPEED, "5A").unwrap_err().contains("r/min"));
         assert!(value(&WORD, "5rpm").unwrap_err().contains("no unit"));
     }

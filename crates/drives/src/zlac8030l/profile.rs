@@ -31,7 +31,7 @@ pub static PROFILE: DriveProfile = DriveProfile {
     host_watch: HostWatch::Silence { time: Mux::new(0x2000, 0) },
     units: Units {
         counts_per_turn: CountsPerTurn::Object { object: Mux::new(0x200B, 0), factor: 4, default: 1024 },
-        target_velocity: Quantity::new(0x60FF, 0, 1.0).divided_by(0x202F, 5),
+        target_velocity: Quantity::new(0x60FF, 0, 1.0),
         actual_velocity: Quantity::new(0x606C, 0, 0.1),
         profile_velocity: Quantity::new(0x6081, 0, 1.0),
         ramps: zl::RAMPS,

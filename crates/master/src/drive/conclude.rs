@@ -6,6 +6,7 @@ use drives::profile::PowerStyle;
 
 use super::explain::{Fact, Trigger};
 use crate::error::Error;
+use crate::units::Shown;
 
 /// What follows from the facts, and what to do.
 pub(super) fn conclude(trigger: &Trigger, facts: &[Fact], style: PowerStyle) -> (String, String) {
@@ -91,8 +92,10 @@ fn by_trigger(trigger: &Trigger, style: PowerStyle) -> (String, String) {
         ),
         Trigger::Late { at, target, unit, waited } => (
             format!(
-                "After {:.1} s it is at {at:.1} {unit} where {target:.1} {unit} was asked for, and reports no fault",
-                waited.as_secs_f64()
+                "After {:.1} s it is at {} {unit} where {} {unit} was asked for, and reports no fault",
+                waited.as_secs_f64(),
+                Shown(*at),
+                Shown(*target)
             ),
             "The load may be too heavy or the motor blocked: look at its current; check its speed limit, current limit \
              and ramp times"

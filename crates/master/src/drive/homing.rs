@@ -46,14 +46,16 @@ impl Drive {
         let profile = self.known(INTENT)?;
         let rules = profile.homing.ok_or_else(|| self.no_such_mode(profile, ModeOfOperation::HOMING))?;
         self.write_number(rules.method, method.into()).await?;
+        let mut commanded = Vec::new();
         if let (Some(search), Some(Rpm(speed))) = (rules.search_speed, options.speed) {
-            let raw = self.raw_quantity(search, speed.abs()).await?;
-            self.write_number(search.object, raw).await?;
+            let speed = self.quantity(("search speed", "r/min"), search, speed.abs()).await?;
+            self.write_number(speed.object, speed.raw).await?;
+            commanded.push(speed);
         }
         let stopped = self.start_homing(&rules).await?;
         let notes = self.notes(stopped).await;
         if !options.wait {
-            return Ok(MotionReport { reached_after: None, notes });
+            return Ok(MotionReport { reached_after: None, commanded, notes });
         }
         let reached = match self.watch(INTENT, Goal::Home { rules, method, looks: 0 }, options.limit).await {
             Err(error @ Error::NotReached(_)) => {
@@ -67,7 +69,7 @@ impl Drive {
             self.write_controlword(Controlword(ENABLED)).await?;
         }
         self.node.network().note_stopped(self.node.id());
-        Ok(MotionReport { reached_after: Some(reached), notes })
+        Ok(MotionReport { reached_after: Some(reached), commanded, notes })
     }
 
     async fn start_homing(&self, rules: &HomingRules) -> Result<Option<Note>, Error> {

@@ -11,6 +11,7 @@ mod explain;
 mod goal;
 pub(crate) mod guard;
 mod homing;
+mod limits;
 mod motion;
 mod position;
 mod power;
@@ -33,8 +34,10 @@ use crate::network::Node;
 pub use explain::{Explanation, Fact, faults_in};
 pub use guard::{HostLoss, SwitchedOff};
 pub use homing::HomingOptions;
+pub use limits::{Limits, Setting};
 pub use motion::{MotionOptions, MotionReport, Note};
 pub use safety::StopGuard;
+pub use scale::Commanded;
 pub use state::DriveState;
 
 const CONTROLWORD: Mux = Mux::new(0x6040, 0);
@@ -231,22 +234,10 @@ impl Drive {
         Ok(row.data_type.value(payload.raw()))
     }
 
-    /// Writes an object as the model's table types it, after checking the table's limits.
+    /// Writes an object as the model's table types it, after checking its limits.
     async fn write_number(&self, mux: Mux, value: i64) -> Result<(), Error> {
-        let row = self.check_number(mux, value)?;
+        let row = self.check_number(mux, value).await?;
         let bytes = row.data_type.raw(value).to_le_bytes();
         self.node.download(mux, &bytes[..row.data_type.size()]).await
-    }
-
-    /// Checks a value against the limits of the model's table, and gives the object's row.
-    fn check_number(&self, mux: Mux, value: i64) -> Result<&'static Entry, Error> {
-        let row = self.row(mux, "write an object by its model's table")?;
-        let (low, high) = row.limits.unwrap_or(row.data_type.range());
-        let listed = row.values.is_empty() || row.meaning(value).is_some();
-        if value < low || value > high || !listed {
-            let (node, title, unit, listed) = (self.node.id(), row.title, row.unit, row.values);
-            return Err(Error::OutOfLimits { node, mux, title, unit, asked: value, low, high, listed });
-        }
-        Ok(row)
     }
 }

@@ -7,7 +7,7 @@ use cia402::{Controlword, ModeOfOperation, PowerState};
 
 use super::goal::Goal;
 use super::guard::HostLoss;
-use super::{CONTROLWORD, Drive};
+use super::{CONTROLWORD, Commanded, Drive};
 use crate::error::Error;
 use crate::units::{Amperes, Ramp, Rpm};
 
@@ -35,6 +35,8 @@ impl Default for MotionOptions {
 pub struct MotionReport {
     /// From the command to the target; `None` if it was not waited for.
     pub reached_after: Option<Duration>,
+    /// Each value that was asked for, and what was sent for it.
+    pub commanded: Vec<Commanded>,
     /// What to know about it.
     pub notes: Vec<Note>,
 }
@@ -70,7 +72,7 @@ impl fmt::Display for Note {
 /// Part of the target within which a speed or current counts as reached, and the least such band: the resolution
 /// that drives of this kind show when they run smoothly.
 const REACHED_SHARE: f64 = 0.05;
-const REACHED_LEAST_RPM: f64 = 2.0;
+pub(super) const REACHED_LEAST_RPM: f64 = 2.0;
 
 /// What a computed duration is stretched by, and what is added to it, before a motion counts as late: for jerk
 /// limits, load, and settling.
@@ -81,14 +83,17 @@ impl Drive {
     /// Turns at this speed (profile velocity) until told otherwise. Enables the drive first.
     ///
     /// # Errors
-    /// [`Error::OutOfLimits`] before anything moves; [`Error::NotReached`] with an explanation; those of the requests.
+    /// [`Error::OutOfLimits`] and [`Error::TooFine`] before anything moves; [`Error::NotReached`] with an explanation; those
+    /// of the requests.
     pub async fn velocity(&self, speed: impl Into<Rpm>, options: MotionOptions) -> Result<MotionReport, Error> {
         const INTENT: &str = "turn it at the wanted speed";
-        let Rpm(target) = speed.into();
+        let Rpm(requested) = speed.into();
         let units = self.known(INTENT)?.units;
-        let raw = self.raw_quantity(units.target_velocity, target).await?;
-        let present = self.read_quantity(units.actual_velocity).await?;
-        self.write_ramps(options.acceleration, options.deceleration, target - present).await?;
+        let speed = self.quantity(("speed", "r/min"), units.target_velocity, requested).await?;
+        let Commanded { raw, commanded: target, .. } = speed;
+        let change = target - self.ramp_start_rpm().await?;
+        let ramps = self.write_ramps(options.acceleration, options.deceleration, change).await?;
+        let commanded = [vec![speed], ramps].concat();
         let stopped = self.set_mode(ModeOfOperation::PROFILE_VELOCITY).await?;
         self.enable().await?;
         self.node.network().note_moved(self.node.id());
@@ -96,7 +101,7 @@ impl Drive {
         self.release_halt().await?;
         let notes = self.notes(stopped).await;
         if !options.wait {
-            return Ok(MotionReport { reached_after: None, notes });
+            return Ok(MotionReport { reached_after: None, commanded, notes });
         }
         let (up, down) = self.ramp_times_s().await?;
         let limit = Duration::from_secs_f64((up.max(down) * LATE_FACTOR + LATE_MARGIN_S).clamp(0.0, 3600.0));
@@ -106,7 +111,7 @@ impl Drive {
         if target == 0.0 {
             self.node.network().note_stopped(self.node.id());
         }
-        Ok(MotionReport { reached_after: Some(reached), notes })
+        Ok(MotionReport { reached_after: Some(reached), commanded, notes })
     }
 
     /// Lets the motor push with this current (profile torque) until told otherwise. Enables the drive first.
@@ -121,13 +126,13 @@ impl Drive {
         let Some(target) = profile.units.target_current else {
             return Err(self.no_such_mode(profile, ModeOfOperation::PROFILE_TORQUE));
         };
-        let raw = self.raw_quantity(target, current.0).await?;
+        let commanded = self.quantity(("current", "A"), target, current.0).await?;
         let stopped = self.set_mode(ModeOfOperation::PROFILE_TORQUE).await?;
         self.enable().await?;
         self.node.network().note_moved(self.node.id());
-        self.write_number(target.object, raw).await?;
+        self.write_number(target.object, commanded.raw).await?;
         self.release_halt().await?;
-        Ok(MotionReport { reached_after: None, notes: self.notes(stopped).await })
+        Ok(MotionReport { reached_after: None, commanded: vec![commanded], notes: self.notes(stopped).await })
     }
 
     /// Stops by the drive's deceleration ramp and stays enabled: target zero, or halt (bit 8) in a position move.

@@ -9,7 +9,7 @@ use drives::profile::Quirk;
 use super::explain::Trigger;
 use super::goal::Goal;
 use super::motion::{LATE_FACTOR, LATE_MARGIN_S, MotionOptions, MotionReport};
-use super::{CONTROLWORD, Drive, POLL, POSITION_ACTUAL, STEP_TIMEOUT, TARGET_POSITION};
+use super::{CONTROLWORD, Commanded, Drive, POLL, POSITION_ACTUAL, STEP_TIMEOUT, TARGET_POSITION};
 use crate::error::Error;
 use crate::units::{Angle, Rpm};
 
@@ -23,10 +23,10 @@ impl Drive {
     /// Turns to an absolute position. Enables the drive first.
     ///
     /// # Errors
-    /// [`Error::OutOfLimits`] before anything moves; [`Error::NotReached`] with an explanation when the drive faults,
+    /// [`Error::OutOfLimits`] and [`Error::TooFine`] before anything moves; [`Error::NotReached`] with an explanation when the drive faults,
     /// is stopped, falls silent or does not get there; those of the requests.
     pub async fn move_absolute(&self, to: impl Into<Angle>, options: MotionOptions) -> Result<MotionReport, Error> {
-        let target = self.counts(to.into()).await?;
+        let target = self.position("position", to.into()).await?;
         self.move_counts(target, false, options).await
     }
 
@@ -35,20 +35,21 @@ impl Drive {
     /// # Errors
     /// As [`move_absolute`](Self::move_absolute).
     pub async fn move_relative(&self, by: impl Into<Angle>, options: MotionOptions) -> Result<MotionReport, Error> {
-        let distance = self.counts(by.into()).await?;
+        let distance = self.position("distance", by.into()).await?;
         self.move_counts(distance, true, options).await
     }
 
-    async fn move_counts(&self, counts: i64, relative: bool, options: MotionOptions) -> Result<MotionReport, Error> {
+    async fn move_counts(&self, to: Commanded, relative: bool, options: MotionOptions) -> Result<MotionReport, Error> {
         const INTENT: &str = "move it to the wanted position";
         let units = self.known(INTENT)?.units;
-        self.check_number(TARGET_POSITION, counts)?;
+        let (counts, mut commanded) = (to.raw, vec![to]);
         if let Some(Rpm(speed)) = options.speed {
-            let raw = self.raw_quantity(units.profile_velocity, speed.abs()).await?;
-            self.write_number(units.profile_velocity.object, raw).await?;
+            let speed = self.quantity(("profile velocity", "r/min"), units.profile_velocity, speed.abs()).await?;
+            self.write_number(speed.object, speed.raw).await?;
+            commanded.push(speed);
         }
         let speed = self.read_quantity(units.profile_velocity).await?;
-        self.write_ramps(options.acceleration, options.deceleration, speed).await?;
+        commanded.extend(self.write_ramps(options.acceleration, options.deceleration, speed).await?);
         let stopped = self.set_mode(ModeOfOperation::PROFILE_POSITION).await?;
         self.enable().await?;
         let began_at = self.read_number(POSITION_ACTUAL).await?;
@@ -58,12 +59,12 @@ impl Drive {
         self.give_set_point(INTENT, counts, relative).await?;
         let notes = self.notes(stopped).await;
         if !options.wait {
-            return Ok(MotionReport { reached_after: None, notes });
+            return Ok(MotionReport { reached_after: None, commanded, notes });
         }
         let band = (turn * REACHED_TURNS).max(1.0);
         let reached = self.watch(INTENT, Goal::Position { target, band, seen_clear: false }, limit).await?;
         self.node.network().note_stopped(self.node.id());
-        Ok(MotionReport { reached_after: Some(reached), notes })
+        Ok(MotionReport { reached_after: Some(reached), commanded, notes })
     }
 
     /// Target into 607Ah, then a rising edge of bit 4, acknowledged by statusword bit 12, and bit 4 back.

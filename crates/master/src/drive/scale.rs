@@ -1,9 +1,54 @@
+use core::fmt;
+use std::time::Duration;
+
 use canopen::Mux;
+use canopen::od::Entry;
 use drives::profile::{CountsPerTurn, Quantity, Ramps};
 
-use super::Drive;
+use super::motion::REACHED_LEAST_RPM;
+use super::{Drive, TARGET_POSITION};
 use crate::error::Error;
-use crate::units::{Angle, Ramp};
+use crate::units::{Angle, Ramp, Shown};
+
+/// A physical value as it was asked for, and as the drive was told it: an object holds whole counts.
+///
+/// What would come to zero counts and is not zero is refused ([`Error::TooFine`]); everything else is rounded to the nearest
+/// count, and whoever asked can see by how much.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Commanded {
+    /// What it is: `speed`, `position`, `acceleration`, ...
+    pub what: &'static str,
+    /// What was asked for, in [`unit`](Self::unit).
+    pub requested: f64,
+    /// What the counts sent are worth.
+    pub commanded: f64,
+    /// The unit of both.
+    pub unit: &'static str,
+    /// The object that was written.
+    pub object: Mux,
+    /// The counts sent.
+    pub raw: i64,
+}
+
+/// Part of a value by which it may differ from what was asked for without a word: a thousandth, which is finer than any of
+/// these drives keeps its speed, current or ramp.
+const UNSAID_SHARE: f64 = 1e-3;
+
+impl Commanded {
+    /// True if what was sent differs from what was asked for by more than a thousandth of it.
+    pub fn is_rounded(&self) -> bool {
+        (self.commanded - self.requested).abs() > self.requested.abs() * UNSAID_SHARE
+    }
+}
+
+/// `speed: 2.7 r/min asked for, 3 r/min sent (60FFh:00 = 3)`.
+impl fmt::Display for Commanded {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { what, unit, object, raw, .. } = self;
+        let (requested, commanded) = (Shown(self.requested), Shown(self.commanded));
+        write!(f, "{what}: {requested} {unit} asked for, {commanded} {unit} sent ({object} = {raw})")
+    }
+}
 
 /// Conversion between physical units and what this drive's objects hold, read from the drive where it is set there.
 impl Drive {
@@ -26,57 +71,131 @@ impl Drive {
         }
     }
 
-    /// An angle in counts, rounded to the nearest.
-    pub(super) async fn counts(&self, angle: Angle) -> Result<i64, Error> {
-        match angle {
-            Angle::Counts(counts) => Ok(counts),
-            Angle::Turns(turns) => Ok((turns * self.counts_per_turn().await?).round() as i64),
-        }
+    /// An angle as 607Ah holds it.
+    pub(super) async fn position(&self, what: &'static str, angle: Angle) -> Result<Commanded, Error> {
+        let (requested, counts_per_turn) = match angle {
+            Angle::Counts(raw) => {
+                self.check_number(TARGET_POSITION, raw).await?;
+                let exact = raw as f64;
+                let (requested, commanded, unit) = (exact, exact, "counts");
+                return Ok(Commanded { what, requested, commanded, unit, object: TARGET_POSITION, raw });
+            }
+            Angle::Turns(turns) => (turns, self.counts_per_turn().await?),
+        };
+        let raw = (requested * counts_per_turn).round() as i64;
+        let (requested, step) = (requested * 360.0, 360.0 / counts_per_turn);
+        let row = self.check_number(TARGET_POSITION, raw).await?;
+        let commanded =
+            Commanded { what, requested, commanded: raw as f64 * step, unit: "deg", object: row.mux(), raw };
+        self.refuse_too_fine(&commanded, step, row).await
     }
 
-    /// A physical value as its object holds it, rounded to the nearest count and within the object's limits.
-    pub(super) async fn raw_quantity(&self, quantity: Quantity, value: f64) -> Result<i64, Error> {
-        let counts = value / quantity.per_count * self.divisor(quantity).await?;
-        let raw = counts.round() as i64;
-        self.check_number(quantity.object, raw).map(|_| raw)
+    /// A physical value as its object holds it, and so that it comes into effect.
+    pub(super) async fn quantity(
+        &self,
+        (what, unit): (&'static str, &'static str),
+        quantity: Quantity,
+        value: f64,
+    ) -> Result<Commanded, Error> {
+        let step = quantity.per_count / self.resolution(quantity).await?;
+        let raw = (value / step).round() as i64;
+        let row = self.check_effect(quantity.object, raw).await?;
+        let commanded =
+            Commanded { what, requested: value, commanded: raw as f64 * step, unit, object: row.mux(), raw };
+        self.refuse_too_fine(&commanded, step, row).await
+    }
+
+    async fn refuse_too_fine(&self, commanded: &Commanded, step: f64, row: &'static Entry) -> Result<Commanded, Error> {
+        let Commanded { requested, raw, unit, object, .. } = *commanded;
+        if raw != 0 || requested == 0.0 {
+            return Ok(*commanded);
+        }
+        let finer = self.limits_of(row).await?.resolution;
+        let (node, name) = (self.node.id(), row.name);
+        Err(Error::TooFine { node, object, name, asked: Shown(requested), step: Shown(step), unit, finer })
     }
 
     /// Reads a physical value from its object.
     pub(super) async fn read_quantity(&self, quantity: Quantity) -> Result<f64, Error> {
         let raw = self.read_number(quantity.object).await? as f64;
-        Ok(raw * quantity.per_count / self.divisor(quantity).await?)
+        Ok(raw * quantity.per_count / self.resolution(quantity).await?)
     }
 
-    async fn divisor(&self, quantity: Quantity) -> Result<f64, Error> {
-        let Some(object) = quantity.divisor else { return Ok(1.0) };
+    /// How many counts make one of the object's unit, by the resolution that is set on the drive.
+    async fn resolution(&self, quantity: Quantity) -> Result<f64, Error> {
+        let Some(object) = self.row(quantity.object, "convert units")?.resolution else { return Ok(1.0) };
         // A drive that holds 0 where its manual allows 1 to 10 does not divide.
         Ok((self.read_number(object).await? as f64).max(1.0))
     }
 
-    /// Sets acceleration and deceleration for a change of speed by `change_rpm`.
+    /// Sets acceleration and deceleration for a change of speed by `change_rpm`, and says what was sent. Where the speed does
+    /// not change there is nothing to ramp, and the drive's own ramps stay.
     pub(super) async fn write_ramps(
         &self,
         acceleration: Option<Ramp>,
         deceleration: Option<Ramp>,
         change_rpm: f64,
-    ) -> Result<(), Error> {
+    ) -> Result<Vec<Commanded>, Error> {
+        let change_rpm = change_rpm.abs();
+        let wishes = [("acceleration", acceleration), ("deceleration", deceleration)];
+        let wishes = wishes.into_iter().filter_map(|(what, ramp)| Some((what, ramp?)));
+        if change_rpm < LEAST_CHANGE_RPM {
+            return Ok(Vec::new());
+        }
+        let mut sent = Vec::new();
         match self.known("set its ramps")?.units.ramps {
             Ramps::Milliseconds { acceleration: up, deceleration: down, .. } => {
-                for (object, ramp) in [(up, acceleration), (down, deceleration)] {
-                    if let Some(ramp) = ramp {
-                        self.write_number(object, ramp_ms(ramp, change_rpm)).await?;
-                    }
+                for (what, ramp) in wishes {
+                    let object = if what == "acceleration" { up } else { down };
+                    let raw = ramp_ms(ramp, change_rpm);
+                    sent.push(self.ramp(what, ramp, change_rpm, object, raw, raw as f64 * 1e-3).await?);
                 }
             }
             Ramps::Acceleration { both, none_from } => {
                 // One object for both: the gentler of two wishes.
-                let wishes = [acceleration, deceleration].into_iter().flatten();
-                if let Some(rate) = wishes.map(|ramp| ramp_rpm_s(ramp, change_rpm, none_from)).min() {
-                    self.write_number(both, rate).await?;
+                let rates = wishes.clone().map(|(_, ramp)| ramp_rpm_s(ramp, change_rpm, none_from));
+                let Some(raw) = rates.min() else { return Ok(sent) };
+                let none = raw >= i64::from(none_from);
+                let time_s = if none { 0.0 } else { change_rpm / raw.max(1) as f64 };
+                for (what, ramp) in wishes {
+                    sent.push(self.ramp(what, ramp, change_rpm, both, raw, time_s).await?);
                 }
             }
         }
-        Ok(())
+        // Nothing is written before all of it has been found good.
+        for Commanded { object, raw, .. } in &sent {
+            self.write_number(*object, *raw).await?;
+        }
+        Ok(sent)
+    }
+
+    /// The speed from which a ramp to a new target begins: the one that is kept, without the noise of what is measured; where
+    /// the shaft does not follow its target, as it turns.
+    pub(super) async fn ramp_start_rpm(&self) -> Result<f64, Error> {
+        let units = self.known("set its ramps")?.units;
+        let actual = self.read_quantity(units.actual_velocity).await?;
+        let target = self.read_quantity(units.target_velocity).await?;
+        Ok(if (actual - target).abs() <= REACHED_LEAST_RPM { target } else { actual })
+    }
+
+    /// A ramp of `raw` counts that takes `time_s` for the change, in the words in which it was asked for.
+    async fn ramp(
+        &self,
+        what: &'static str,
+        asked: Ramp,
+        change_rpm: f64,
+        object: Mux,
+        raw: i64,
+        time_s: f64,
+    ) -> Result<Commanded, Error> {
+        let row = self.check_effect(object, raw).await?;
+        let rate = if time_s > 0.0 { change_rpm / time_s } else { raw as f64 };
+        let (requested, commanded, unit, step) = match asked {
+            Ramp::Time(time) => (milliseconds(time), time_s * 1e3, "ms", 1.0),
+            Ramp::RpmPerSecond(requested) => (requested, rate, "(r/min)/s", 1.0),
+        };
+        let commanded = Commanded { what, requested, commanded, unit, object, raw };
+        self.refuse_too_fine(&commanded, step, row).await
     }
 
     /// The drive's ramp times for a whole change of speed, in seconds: up, down.
@@ -107,7 +226,7 @@ impl Drive {
     fn largest_change_rpm(&self) -> Result<f64, Error> {
         let target = self.known("read its limits")?.units.target_velocity;
         let row = self.row(target.object, "read its limits")?;
-        let (low, high) = row.limits.unwrap_or(row.data_type.range());
+        let (low, high) = row.limits_at(1);
         Ok((high - low) as f64 * target.per_count)
     }
 
@@ -116,10 +235,14 @@ impl Drive {
     }
 }
 
-/// A ramp as an acceleration in (r/min)/s; a change without a ramp is `none_from`.
+/// A change of speed below this is none: half a count of the speed objects.
+const LEAST_CHANGE_RPM: f64 = 0.5;
+
+/// A ramp as an acceleration in (r/min)/s; a change without a ramp is `none_from`. A time that is longer than the gentlest
+/// acceleration takes gets that one.
 fn ramp_rpm_s(ramp: Ramp, change_rpm: f64, none_from: u32) -> i64 {
     match ramp {
-        Ramp::RpmPerSecond(rate) => (rate.max(1.0).round() as i64).min(i64::from(none_from)),
+        Ramp::RpmPerSecond(rate) => (rate.round() as i64).min(i64::from(none_from)),
         Ramp::Time(time) => {
             let rate = change_rpm.abs() / time.as_secs_f64().max(1e-6);
             (rate.round() as i64).clamp(1, i64::from(none_from))
@@ -127,27 +250,30 @@ fn ramp_rpm_s(ramp: Ramp, change_rpm: f64, none_from: u32) -> i64 {
     }
 }
 
-/// A ramp as the time of one change of speed, in ms.
+/// A ramp as the time of one change of speed, in ms. A rate that is steeper than 1 ms gets that: 0 ms is no ramp at all.
 fn ramp_ms(ramp: Ramp, change_rpm: f64) -> i64 {
     match ramp {
-        Ramp::Time(time) => i64::try_from(time.as_millis()).unwrap_or(i64::MAX),
+        Ramp::Time(time) => milliseconds(time).round() as i64,
         // A rate of zero asks for a ramp without end: more than any drive's limit.
         Ramp::RpmPerSecond(rate) if rate <= 0.0 => i64::MAX,
-        Ramp::RpmPerSecond(rate) => (change_rpm.abs() / rate * 1e3).round() as i64,
+        Ramp::RpmPerSecond(rate) => ((change_rpm.abs() / rate * 1e3).round() as i64).max(1),
     }
+}
+
+fn milliseconds(time: Duration) -> f64 {
+    time.as_nanos() as f64 / 1e6
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::time::Duration;
 
     #[test]
     fn a_time_becomes_the_acceleration_of_the_change() {
         assert_eq!(ramp_rpm_s(Ramp::Time(Duration::from_millis(500)), -60.0, 60_000), 120);
         assert_eq!(ramp_rpm_s(Ramp::RpmPerSecond(20_000.0), 60.0, 60_000), 20_000);
         assert_eq!(ramp_rpm_s(Ramp::Time(Duration::ZERO), 60.0, 60_000), 60_000);
-        assert_eq!(ramp_rpm_s(Ramp::RpmPerSecond(0.0), 60.0, 60_000), 1);
+        assert_eq!(ramp_rpm_s(Ramp::Time(Duration::from_secs(3600)), 60.0, 60_000), 1);
     }
 
     #[test]
@@ -155,6 +281,19 @@ mod tests {
         assert_eq!(ramp_ms(Ramp::RpmPerSecond(120.0), 60.0), 500);
         assert_eq!(ramp_ms(Ramp::RpmPerSecond(120.0), -60.0), 500);
         assert_eq!(ramp_ms(Ramp::Time(Duration::from_millis(300)), 60.0), 300);
+        assert_eq!(ramp_ms(Ramp::Time(Duration::from_micros(1600)), 60.0), 2);
+        assert_eq!(ramp_ms(Ramp::RpmPerSecond(1e9), 60.0), 1);
         assert_eq!(ramp_ms(Ramp::RpmPerSecond(0.0), 60.0), i64::MAX);
+    }
+
+    #[test]
+    fn a_difference_of_more_than_a_thousandth_is_told() {
+        let sent = |requested, commanded| {
+            let (what, unit, object) = ("speed", "r/min", Mux::new(0x60FF, 0));
+            Commanded { what, requested, commanded, unit, object, raw: commanded as i64 }
+        };
+        assert!(sent(2.7, 3.0).is_rounded() && sent(-2.7, -3.0).is_rounded());
+        assert!(!sent(59.999_99, 60.0).is_rounded() && !sent(0.0, 0.0).is_rounded());
+        assert_eq!(sent(2.7, 3.0).to_string(), "speed: 2.7 r/min asked for, 3 r/min sent (60FFh:00 = 3)");
     }
 }

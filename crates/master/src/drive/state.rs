@@ -54,11 +54,11 @@ impl Drive {
     /// Those of the SDO reads. An object that this drive refuses is left out; silence is an error.
     pub async fn state(&self) -> Result<DriveState, Error> {
         let statusword = self.statusword().await?;
-        let mode = optional(self.mode().await)?;
+        let mode = refused_is_none(self.mode().await)?;
         let code = self.profile.map_or(ERROR_CODE, |profile| profile.faults.code);
-        let fault_code = optional(self.node.upload(code).await)?.map_or(0, |payload| payload.raw() as u16);
+        let fault_code = refused_is_none(self.node.upload(code).await)?.map_or(0, |payload| payload.raw() as u16);
         let faults = self.profile.map(|profile| faults_in(profile, fault_code)).unwrap_or_default();
-        let position = optional(self.node.read::<i32>(POSITION_ACTUAL).await)?.map(|raw| Counts(raw.into()));
+        let position = refused_is_none(self.node.read::<i32>(POSITION_ACTUAL).await)?.map(|raw| Counts(raw.into()));
         let angle = match (position, self.profile) {
             (Some(Counts(counts)), Some(_)) => {
                 let turn = self.counts_per_turn().await?;
@@ -90,7 +90,7 @@ impl Drive {
 
     async fn measure(&self, quantity: Option<Quantity>) -> Result<Option<f64>, Error> {
         match quantity {
-            Some(quantity) => optional(self.read_quantity(quantity).await),
+            Some(quantity) => refused_is_none(self.read_quantity(quantity).await),
             None => Ok(None),
         }
     }
@@ -140,7 +140,7 @@ impl DriveState {
 }
 
 /// What the drive refuses is left out.
-fn optional<T>(result: Result<T, Error>) -> Result<Option<T>, Error> {
+pub(super) fn refused_is_none<T>(result: Result<T, Error>) -> Result<Option<T>, Error> {
     match result {
         Ok(value) => Ok(Some(value)),
         Err(Error::Aborted { .. }) => Ok(None),

@@ -84,7 +84,7 @@ impl Zlac8030l {
         let parameters = Parameters::of(device.values(), device.variant());
         // 202F:05 acts from a restart on (5.3).
         let resolution = device.values().get(VELOCITY_RESOLUTION);
-        device.values_mut().set_in_effect(u32::from(resolution));
+        device.values_mut().set_resolution(u32::from(resolution));
         Self {
             servo: Servo::new(&parameters.model, 0, 0),
             device,
@@ -236,7 +236,7 @@ impl Zlac8030l {
 
     fn read_targets(&mut self) {
         let values = self.device.values();
-        let rpm = f64::from(values.get(TARGET_VELOCITY)) / f64::from(values.in_effect().max(1));
+        let rpm = f64::from(values.get(TARGET_VELOCITY)) / f64::from(values.resolution());
         let max_rpm = self.parameters.max_rpm;
         self.speed_setting_wrong = rpm.abs() > max_rpm
             && self.axis.mode() == ModeOfOperation::PROFILE_VELOCITY

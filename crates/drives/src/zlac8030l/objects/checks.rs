@@ -8,9 +8,6 @@ use super::{CONTROLWORD, MODES_OF_OPERATION_DISPLAY, TARGET_POSITION};
 /// Largest absolute target position (607Ah: ±3FFFFFFFh absolute, ±7FFFFFFFh relative).
 pub const ABSOLUTE_TARGET_LIMIT: i32 = 0x3FFF_FFFF;
 
-/// Largest target velocity at a resolution of 1 r/min (60FFh).
-const TARGET_VELOCITY_LIMIT: i32 = 1000;
-
 /// 6040h: refuses the controlword that would take an absolute set-point out of range.
 ///
 /// The range of 607Ah depends on bit 6 of the controlword, so it can only be judged when bit 4 rises.
@@ -26,15 +23,4 @@ pub(super) fn set_point_in_range(values: &View<'_>, raw: u32) -> Result<(), Abor
         return Err(AbortCode::INVALID_VALUE);
     }
     Ok(())
-}
-
-/// 60FFh: ±1000 r/min in the resolution of 202F:05. A new resolution acts from the next restart on (5.3), here too: the
-/// drive lends the one in effect.
-pub(super) fn target_velocity_in_range(values: &View<'_>, raw: u32) -> Result<(), AbortCode> {
-    let limit = TARGET_VELOCITY_LIMIT * values.in_effect().max(1) as i32;
-    match raw as i32 {
-        value if value > limit => Err(AbortCode::VALUE_TOO_HIGH),
-        value if value < -limit => Err(AbortCode::VALUE_TOO_LOW),
-        _ => Ok(()),
-    }
 }

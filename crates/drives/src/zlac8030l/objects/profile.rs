@@ -25,13 +25,15 @@ pub(super) const ROWS: [Entry; 22] = [
     ro(0x6061, 0, I8, "modes_of_operation_display", "Operating mode status").values(MODES).mappable(),
     ro(0x6064, 0, I32, "position_actual_value", "Actual position feedback").unit("counts").mappable(),
     ro(0x606C, 0, I32, "velocity_actual_value", "Actual speed feedback").unit("0.1 r/min").mappable(),
-    rw(0x6071, 0, I16, "target_torque", "Target torque").range(-30000, 30000).unit("mA").mappable(),
+    rw(0x6071, 0, I16, "target_torque", "Target torque")
+        .range(-30000, 30000).unit("mA").held_to(0x2015, 0, 100).mappable(),
     // Both show what flows, up to the 60 A that 2015h goes to; 16 bits of 1 mA end before that.
     ro(0x6074, 0, I16, "torque_demand", "Real-time target torque").unit("mA").mappable(),
     ro(0x6077, 0, I16, "torque_actual_value", "Real-time torque feedback").range(-600, 600).unit("0.1 A").mappable(),
     rw(0x607A, 0, I32, "target_position", "Target position")
         .range(-0x7FFF_FFFF, 0x7FFF_FFFF).unit("counts").mappable(),
-    rw(0x6081, 0, U32, "profile_velocity", "Max speed").range(1, 1000).default(120).unit("r/min").mappable(),
+    rw(0x6081, 0, U32, "profile_velocity", "Max speed")
+        .range(1, 1000).default(120).unit("r/min").held_to(0x200A, 0, 1).mappable(),
     rw(0x6082, 0, U32, "end_velocity", "Start / stop speed in profile position mode")
         .range(1, 1000).default(1).unit("r/min").mappable(),
     rw(0x6083, 0, U32, "profile_acceleration", "S-shaped acceleration time")
@@ -41,8 +43,7 @@ pub(super) const ROWS: [Entry; 22] = [
     rw(0x6085, 0, U32, "quick_stop_deceleration", "Emergency stop deceleration time")
         .range(0, 32767).default(10).unit("ms").mappable(),
     rw(0x6087, 0, U32, "torque_slope", "Torque slope").default(300).unit("mA/s").mappable(),
-    // Printed -1000 to 1000 for a resolution of 1 r/min; 202F:05 makes one count finer and the range wider.
+    // 202F:05 makes one count finer and the range wider, from the next restart on (5.3).
     rw(0x60FF, 0, I32, "target_velocity", "Target speed")
-        .range(-10_000, 10_000).unit("r/min").mappable()
-        .check(checks::target_velocity_in_range),
+        .range(-1000, 1000).unit("r/min").resolution(0x202F, 5).held_to(0x200A, 0, 1).mappable(),
 ];
