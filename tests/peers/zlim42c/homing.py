@@ -26,8 +26,8 @@ STARTS = {
     "below_home_without_home_switch": (-1500, {HOME: None}),
     "home_on_at_negative_limit": (0, {HOME: ("min", 200)}),
     "no_input_configured": (0, {NEGATIVE_LIMIT: None, HOME: None, POSITIVE_LIMIT: None}),
-    "bit_4_falls_on_the_way": (1000, {}),
-    "halt_on_the_way": (1000, {}),
+    "bit_4_falls_on_the_way": (2900, {}),
+    "halt_on_the_way": (2900, {}),
 }
 #: The edge that becomes the origin: where it is, and the direction in which it is crossed.
 LATCHES = {17: (-3000, -1), 18: (3000, 1), 24: (-200, 1), 29: (-200, 1)}

@@ -12,6 +12,7 @@ use crate::zlim42c::faults::row;
 use crate::zlim42c::objects::effects::{Effect, effect};
 use crate::zlim42c::objects::*;
 use crate::zlim42c::restart;
+use crate::zlim42c::variations::FAULTS_STAY;
 
 impl Application<ROW_COUNT> for Zlim42c {
     fn device(&mut self) -> &mut Device<ROW_COUNT> {
@@ -65,7 +66,7 @@ impl Zlim42c {
         self.refresh_parameters();
         self.controlword = controlword;
         let target = self.values().get(TARGET_POSITION);
-        if self.axis.command(controlword, target, &self.parameters.axis) {
+        if self.axis.command(controlword, target, &self.parameters.axis) && self.can_reset_faults() {
             self.reset_faults(now);
         }
     }
@@ -82,10 +83,14 @@ impl Zlim42c {
 
     /// 2011h: reads 0 again when it is done.
     fn fault_reset(&mut self, raw: u32, now: Instant) {
-        if raw == 1 && self.axis.state() == PowerState::Fault {
+        if raw == 1 && self.axis.state() == PowerState::Fault && self.can_reset_faults() {
             self.reset_faults(now);
         }
         self.device.values_mut().set(FAULT_RESET, 0);
+    }
+
+    fn can_reset_faults(&self) -> bool {
+        !self.device.variant().is(FAULTS_STAY)
     }
 
     /// 2012h: reads 0 again when it is done.
