@@ -7,6 +7,7 @@
 //! ```no_run
 //! # async fn example() -> Result<(), Box<dyn std::error::Error>> {
 //! use canopen::NodeId;
+//! use master::drive::SwitchedOff;
 //! use master::units::{Degrees, Rpm};
 //! use master::{Drive, MotionOptions, Network};
 //!
@@ -14,11 +15,20 @@
 //! let model = drives::profile::model("zlac8030l").ok_or("no such model")?;
 //! let node = network.node(NodeId::new(4).ok_or("no such node")?);
 //! let drive = Drive::new(node, model);
+//! let loss = drive.guard(SwitchedOff::Leave).await?;
+//! if loss.stops_after().is_none() {
+//!     eprintln!("when this program dies, {loss}");
+//! }
 //! let slowly = MotionOptions { speed: Some(Rpm(30.0)), ..MotionOptions::default() };
 //! drive.move_relative(Degrees(90.0), slowly).await?;
+//! drive.release_guard().await?;
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! A program that dies stops nothing by itself: [`Drive::guard`] arms what a drive has against that (a watch for silence, a
+//! heartbeat that this master then produces), and tells what it has not. While its runner runs, a guarded drive is kept
+//! content, whatever the tasks wait for.
 
 pub mod core;
 pub mod decode;

@@ -57,7 +57,9 @@ impl Random {
     fn command(&mut self, core: &mut Core) -> Command {
         let ticket = core.ticket();
         let node = self.node();
-        match self.below(8) {
+        match self.below(10) {
+            8 => Command::Heartbeat(node, Some(Duration::from_micros(self.below(10_000).into()))),
+            9 => Command::KeepFed(node, Some(Duration::from_micros(self.below(10_000).into()))),
             0 => Command::Timer(ticket, Duration::from_micros(self.below(5_000).into())),
             1 => Command::Nmt(NmtTarget::All, NmtCommand::Start),
             2 => Command::Sync((self.below(2) == 0).then(|| Duration::from_micros(self.below(10_000).into()))),

@@ -17,6 +17,8 @@ pub(super) const SAMPLES: &[&[u8]] = &[
     b"\x02\x00\x01\x08\x10\x00\x20\0\0\0\0\0\x00\x10\0\x08\x41\x08\x10\0\xFF\xFF\xFF\xFF\x00\x10\0\x08\x00\x01\x02\x03\x04\x05\x06\x07",
     // Download of 20 bytes, its answers, an abort.
     b"\x03\x00\x01\x08\x10\x14\x20\0\0\0\0\0\x00\x10\0\x08\x60\x08\x10\0\0\0\0\0\x00\x10\0\x08\x20\0\0\0\0\0\0\0\x00\x10\0\x08\x80\x08\x10\0\0\0\x02\x06",
+    // A heartbeat of its own and a node that is kept fed, for some time and then no more.
+    b"\x0A\x00\x01\x01\0\0\x14\0\0\0\0\0\x0B\x00\x00\x01\0\0\x0A\0\0\0\0\0\x08\xC8\0\0\0\0\0\0\0\0\0\0\x08\xC8\0\0\0\0\0\0\0\0\0\0\x0B\x00\x00\0\0\0\0\0\0\0\0\0",
     // A watched heartbeat that comes and stays away, a timer, SYNC, TPDO and RPDO.
     b"\x04\x00\x01\x20\0\0\0\0\0\0\0\0\x00\x10\x03\x01\x05\0\0\0\0\0\0\0\x05\xFF\x01\0\0\0\0\0\0\0\0\0\x06\x10\x08\0\0\0\0\0\0\0\0\0\x00\x10\x05\x08\x37\x02\0\0\0\0\0\0\x07\x10\x0F\0\0\0\0\0\0\0\0\0",
 ];
@@ -47,8 +49,8 @@ pub(super) fn master_core(data: &[u8]) {
         let at = if byte(1) == 0xFF { Instant::from_millis(500) } else { now + wait };
         now = now.max(at);
         match command(&mut core, chunk) {
-            None if byte(0) % 10 == 8 => core.handle_timeout(at),
-            None if byte(0) % 10 == 7 => {
+            None if byte(0) % 12 == 8 => core.handle_timeout(at),
+            None if byte(0) % 12 == 7 => {
                 core.image_mut().write(node, Mux::new(0x6041, 0), u64::from(byte(2)));
             }
             None => core.handle_frame(&selected_frame(chunk.get(2..).unwrap_or(&[]), &IDS), at),
@@ -72,7 +74,7 @@ fn command(core: &mut Core, chunk: &[u8]) -> Option<Command> {
         Request { node, mux, transfer, timeout: time }
     };
     let ticket = core.ticket();
-    Some(match byte(0) % 10 {
+    Some(match byte(0) % 12 {
         1 => Command::Cancel(ticket),
         2 => Command::Request(ticket, request(Transfer::Upload)),
         3 => Command::Request(ticket, request(Transfer::Download(Payload::new(&vec![byte(7); usize::from(byte(5))])))),
@@ -80,6 +82,8 @@ fn command(core: &mut Core, chunk: &[u8]) -> Option<Command> {
         5 => Command::Timer(ticket, Duration::from_millis(u64::from(byte(3)))),
         6 => Command::Sync((byte(2) != 0).then(|| Duration::from_millis(u64::from(byte(2))))),
         9 => Command::Nmt(NmtTarget::All, NmtCommand::Start),
+        10 => Command::Heartbeat(node, (byte(3) != 0).then_some(time)),
+        11 => Command::KeepFed(node, (byte(3) != 0).then_some(time)),
         _ => return None,
     })
 }

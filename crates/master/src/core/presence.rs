@@ -9,6 +9,9 @@ use super::NodeSet;
 /// Longest heartbeat period, as 1017h has it: UNSIGNED16 of ms (CiA 301, 7.5.2.17).
 const LONGEST_PERIOD_MS: u128 = u16::MAX as u128;
 
+/// Shortest time without a frame that a node is fed after: that of the fastest heartbeat.
+const SHORTEST_FEED: Duration = Duration::from_millis(1);
+
 /// How drives notice that this master lives: by its heartbeat, or by being asked something before they lose patience.
 ///
 /// Heartbeats lie on a grid, as SYNC does. A node that is kept fed is asked only after a time in which nothing else was
@@ -47,6 +50,7 @@ impl Presence {
         self.feeds.retain(|feed| feed.node != node);
         self.fed.remove(node);
         if let Some(period) = period.filter(|period| !period.is_zero()) {
+            let period = period.max(SHORTEST_FEED);
             self.feeds.push(Feed { node, period, due: now + period });
             self.fed.insert(node);
         }

@@ -20,6 +20,9 @@ use crate::network::{Network, join_all};
 /// How often a drive that watches for silence or for a heartbeat is content within its time: two may get lost.
 const SIGNS_IN_TIME: u32 = 4;
 
+/// The shortest period of a heartbeat (1017h has milliseconds).
+const SHORTEST_PERIOD: Duration = Duration::from_millis(1);
+
 /// How long a node that this program does not move is waited for, when it is asked whether it watches too.
 const BYSTANDER_TIMEOUT: Duration = Duration::from_millis(100);
 
@@ -194,7 +197,7 @@ impl Drive {
         if self.has_lost_its_host().await? {
             self.stop().await?;
         }
-        let guard = Guard { loss, period: time / SIGNS_IN_TIME, before, armed };
+        let guard = Guard { loss, period: (time / SIGNS_IN_TIME).max(SHORTEST_PERIOD), before, armed };
         network.with_guards(|guards| guards.insert(id, guard));
         network.show_presence(id, guard.loss, Some(guard.period));
         Ok(loss)
