@@ -155,6 +155,20 @@ fn as_delivered_less_than_the_overload_factor_lasts_longer_and_the_rated_current
     assert_eq!(bench.get(0x603F, 0), 0, "the rated current");
 }
 
+#[test]
+fn with_l101_factor_less_than_the_overload_factor_is_borne_for_ever() {
+    for (current_ma, code) in [(9500, 0), (10_000, 0x0008)] {
+        let mut bench = Bench::choosing("L101", "factor");
+        bench.set(0x2014, 0, 50);
+        bench.set(0x6087, 0, 0);
+        bench.operate(|drive, now| drive.set_rotor_locked(true, now)).expect("a rotor");
+        bench.enable_in(4);
+        bench.set(0x6071, 0, current_ma);
+        bench.run_ms(20_000);
+        assert_eq!(bench.get(0x603F, 0), code, "{current_ma} mA of 5 A with a factor of 200 %");
+    }
+}
+
 /// Nothing of the watch's own settings is touched: 15 A rated, 30 A at most, 2012h 200 %, 2016h 3 s.
 #[test]
 fn as_delivered_the_overload_ends_a_stall_long_before_the_winding_is_at_its_limit() {
