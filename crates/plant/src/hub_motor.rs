@@ -7,6 +7,7 @@
 use crate::angle::{Angle, Axis};
 use crate::brake::BrakeModel;
 use crate::clamp::ClampModel;
+use crate::cogging::Cogging;
 use crate::encoder::{EncoderData, EncoderModel};
 use crate::hall::{HallFault, HallModel};
 use crate::mechanics::{RotorData, RotorModel};
@@ -93,9 +94,11 @@ pub struct HubMotor {
     pub hall_fault: HallFault,
     /// A motor wire that has come off.
     pub lost_phase: Option<Phase>,
+    /// The pull of the magnets at the teeth; none if nobody asks for it.
+    pub cogging: Option<Cogging>,
     /// Load, supply, temperatures and energies.
     pub rig: Rig,
-    /// Torque of the motor on its rotor, mean over the last step.
+    /// Torque of the motor on its rotor, mean over the last step, cogging included.
     pub torque_nm: f64,
     power_stage_burnt: bool,
     seized: bool,
@@ -112,6 +115,7 @@ impl HubMotor {
             encoder: model.encoder.power_on(angle),
             hall_fault: HallFault::None,
             lost_phase: None,
+            cogging: None,
             rig: Rig::new(&model.rig, model.pmsm.resistance_ohm, source_v, ambient_c),
             torque_nm: 0.0,
             power_stage_burnt: false,
@@ -144,9 +148,10 @@ impl HubMotor {
         self.axis = input.axis.turned_by(half_turn);
         let motor = model.pmsm.step(&mut self.pmsm, dt_s, &input);
         let brake_nm = model.brake.torque_nm(actuation.brake_released);
-        let moved = model.rotor.step(&mut self.rotor, dt_s, motor.torque_nm, &self.rig.load, brake_nm);
+        let torque_nm = motor.torque_nm + self.cogging.map_or(0.0, |cogging| cogging.torque_nm(self.rotor.angle));
+        let moved = model.rotor.step(&mut self.rotor, dt_s, torque_nm, &self.rig.load, brake_nm);
         model.encoder.step(&mut self.encoder, self.rotor.angle);
-        self.torque_nm = motor.torque_nm;
+        self.torque_nm = torque_nm;
 
         let flows = self.clamped(motor.flows(moved.friction_j, moved.load_j), dt_s);
         if self.rig.step(&self.model.rig, dt_s, &flows, actuation.bleeder_on) {
@@ -208,6 +213,7 @@ impl HubMotor {
     #[inline]
     fn rests(&self, actuation: &Actuation) -> bool {
         self.inverter(actuation) == Inverter::Open
+            && self.cogging.is_none()
             && self.pmsm.current_a == Dq::default()
             && self.rotor.stands()
             && self.model.rotor.holds(&self.rig.load, self.model.brake.torque_nm(actuation.brake_released))
@@ -246,6 +252,7 @@ impl HubMotor {
         self.model.rotor.kinetic_energy_j(&self.rotor, &self.rig.load)
             + self.model.pmsm.magnetic_energy_j(&self.pmsm)
             + self.model.rig.supply.stored_energy_j(&self.rig.supply)
+            + self.cogging.map_or(0.0, |cogging| cogging.energy_j(self.rotor.angle))
     }
 }
 

@@ -8,6 +8,7 @@
 use crate::absolute_encoder::{AbsoluteEncoderData, AbsoluteEncoderModel, BatteryState};
 use crate::angle::{Angle, Axis};
 use crate::brake::BrakeModel;
+use crate::cogging::Cogging;
 use crate::gear::{GearData, GearInput, GearModel};
 use crate::hub_motor::Inverter;
 use crate::mechanics::{RotorData, RotorModel};
@@ -82,10 +83,12 @@ pub struct JointMotor {
     pub lost_phase: Option<Phase>,
     /// An external discharge module is wired to the bus, and conducts above this voltage.
     pub discharge_from_v: Option<f64>,
+    /// The pull of the magnets at the teeth; none if nobody asks for it.
+    pub cogging: Option<Cogging>,
     /// Load, supply, temperatures and energies. A locked load holds the output. Friction includes all of the gear's; the
     /// encoder's battery is not in the book.
     pub rig: Rig,
-    /// Torque of the motor on its rotor, mean over the last step.
+    /// Torque of the motor on its rotor, mean over the last step, cogging included.
     pub torque_nm: f64,
     axis: Axis,
 }
@@ -102,6 +105,7 @@ impl JointMotor {
             encoder: model.encoder.with_full_battery(),
             lost_phase: None,
             discharge_from_v: None,
+            cogging: None,
             rig: Rig::new(&model.rig, model.pmsm.resistance_ohm, source_v, ambient_c),
             torque_nm: 0.0,
             axis: Axis::at_turns(model.pmsm.electrical_turns(motor_angle)),
@@ -125,14 +129,15 @@ impl JointMotor {
         };
         let motor = model.pmsm.step(&mut self.pmsm, dt_s, &input);
         let brake_nm = model.brake.torque_nm(actuation.brake_released);
-        let shafts = GearInput { motor_nm: motor.torque_nm, brake_nm, load: &self.rig.load };
+        let motor_nm = motor.torque_nm + self.cogging.map_or(0.0, |cogging| cogging.torque_nm(self.rotor.angle));
+        let shafts = GearInput { motor_nm, brake_nm, load: &self.rig.load };
         let moved = model.gear.step(&mut self.gear, &model.rotor, &mut self.rotor, dt_s, &shafts);
         self.axis = self.axis.turned_by(Axis::at_small_rad(electrical_s * moved.motor_velocity_rad_s));
         let discharging = self.discharge_from_v.is_some_and(|from_v| self.rig.supply.bus_v > from_v);
         if actuation.set_origin {
             model.encoder.set_origin(&mut self.encoder, self.rotor.angle);
         }
-        self.torque_nm = motor.torque_nm;
+        self.torque_nm = motor_nm;
 
         let flows = motor.flows(moved.friction_j, moved.load_j);
         if self.rig.step(&model.rig, dt_s, &flows, discharging) {
@@ -176,5 +181,6 @@ impl JointMotor {
             + gear.spring_energy_j(&self.gear)
             + pmsm.magnetic_energy_j(&self.pmsm)
             + rig.supply.stored_energy_j(&self.rig.supply)
+            + self.cogging.map_or(0.0, |cogging| cogging.energy_j(self.rotor.angle))
     }
 }

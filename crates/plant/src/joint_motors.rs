@@ -93,8 +93,8 @@ const SUPPLY: SupplyModel = SupplyModel {
     source_capacitance_f: 0.0,
     // Assumed: what fits into the joint.
     capacitance_f: 470e-6,
-    // Assumed: controller, drivers, encoder.
-    consumption_w: 2.0,
+    // Assumed: controller, drivers, encoder; as much as the drive of a wheel motor takes.
+    consumption_w: 3.0,
     // Assumed: where the drive's own converter stops.
     consumption_from_v: 9.0,
     // The "discharge module" that the manual asks for when generation raises the voltage. Assumed: 10 ohm, 50 W.

@@ -17,6 +17,7 @@ pub mod absolute_encoder;
 pub mod angle;
 pub mod brake;
 pub mod clamp;
+pub mod cogging;
 pub mod encoder;
 pub mod gear;
 pub mod hall;

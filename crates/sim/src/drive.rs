@@ -5,6 +5,8 @@
 use can::{Bitrate, Instant, Station};
 use drives::RegisterError;
 
+use crate::machine::Realism;
+
 /// A drive joined to its physics: firmware, motor, load, supply and sensors as one station.
 ///
 /// Every method that changes something takes `now`: the drive first does everything that was due
@@ -25,6 +27,11 @@ pub trait VirtualDrive: Station + VirtualDriveClone + Send {
     /// it did.
     fn cut_power(&mut self, now: Instant) {
         self.set_power(false, now);
+    }
+
+    /// Whether it is as it is calculated, or has the noise and the flaws of one on a bench; `seed` decides all of that.
+    fn set_realism(&mut self, realism: Realism, seed: u64, now: Instant) {
+        let _ = (realism, seed, now);
     }
 
     /// The bit rate of its CAN controller at present; `None` while it takes no part in the bus (no power).

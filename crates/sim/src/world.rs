@@ -34,6 +34,7 @@ use tap::Tap;
 #[derive(Clone)]
 pub struct World {
     now: Instant,
+    seed: u64,
     bus: Bus,
     members: Vec<Member>,
     due: DueTimes,
@@ -78,6 +79,7 @@ impl World {
         let mut seeds = Prng::new(seed);
         Self {
             now: Instant::ZERO,
+            seed,
             bus: Bus::new(bitrate, seeds.next_u64()),
             members: Vec::new(),
             due: DueTimes::default(),

@@ -154,7 +154,7 @@ def wrong_unit(bench):
     with registers(bench, unit=9) as nobody:
         refused(nobody.client.read_holding_registers(ACTUAL, count=2, device_id=9), NO_ANSWER_BEHIND_GATEWAY, "unit 9")
         bench.world("power off")
-        bench.sleep(0.1)
+        bench.sleep(0.3)
         refused(nobody.client.read_holding_registers(ACTUAL, count=2, device_id=1), NO_ANSWER_BEHIND_GATEWAY, "a unit without supply")
 
 

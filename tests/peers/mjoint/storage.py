@@ -183,7 +183,7 @@ def returns_with_brake(bench):
     bench.power_cycle()
     absolute(bench, 4 * COUNTS_PER_TURN)
     bench.world("power off")
-    bench.sleep(0.1)
+    bench.sleep(0.3)
     equal(bench.world("get")["brake"], "engaged", "the brake without supply")
     bench.world("power on")
     bench.sleep(0.3)

@@ -7,6 +7,7 @@ use plant::mechanics::RotorData;
 use plant::rig::RigModel;
 
 use super::quantity::Quantity;
+use super::realism::{Noise, Realism};
 use crate::{Component, PulseTrain, Refused, Report, Source, TemperatureSensor};
 
 /// Temperature of the surroundings.
@@ -61,6 +62,12 @@ pub trait Assembly: Clone + Send + 'static {
 
     /// What the sensors read now; bit `n` of `inputs` is the level of input `n`.
     fn sense(&self, inputs: u32) -> <Self::Firmware as Firmware>::Sensors;
+
+    /// Ideal switches and no cogging, or not.
+    fn set_realism(&mut self, realism: Realism);
+
+    /// Puts noise on what the sensors read.
+    fn disturb(&self, sensors: &mut <Self::Firmware as Firmware>::Sensors, noise: &mut Noise);
 
     /// One control period of physics under `actuation`.
     fn step(&mut self, actuation: &<Self::Firmware as Firmware>::Actuation);

@@ -22,6 +22,9 @@ use super::Machine;
 use super::assembly::{AMBIENT_C, Assembly, with_demand};
 use super::order::{Order, OrderError};
 use super::pulse_source::PulseSource;
+use super::realism::{
+    JOINT_COGGING, LARGE_CURRENT_STEP_A, Noise, Realism, TEMPERATURE_STEP_C, VOLTAGE_STEP_V, with_dead_time,
+};
 use crate::{Component, Levels, PulseTrain, Refused, Report, VirtualDrive};
 
 const OUTPUTS: &[&str] = &["ZO", "WR", "RED", "GREEN"];
@@ -61,6 +64,7 @@ pub struct Joint {
     /// A brake that was fitted holds the shaft when the drive has no power.
     braked_without_power: bool,
     eeprom_broken: bool,
+    dead_time: bool,
     /// The line to the encoder is broken: the drive goes on reading what came last.
     last_reading: Option<EncoderReading>,
 }
@@ -87,6 +91,7 @@ impl Joint {
             last: Actuation::default(),
             braked_without_power: false,
             eeprom_broken: false,
+            dead_time: false,
             last_reading: None,
         }
     }
@@ -170,12 +175,30 @@ impl Assembly for Joint {
         }
     }
 
+    fn set_realism(&mut self, realism: Realism) {
+        self.dead_time = realism == Realism::Full;
+        self.motor.cogging = self.dead_time.then_some(JOINT_COGGING);
+    }
+
+    fn disturb(&self, sensors: &mut Sensors, noise: &mut Noise) {
+        let off = i32::from(noise.misplaced_edge(self.motor.rotor.angle, COUNTS_PER_TURN));
+        let within_turn = i32::from(sensors.angle_count) + off;
+        sensors.angle_count = within_turn.rem_euclid(COUNTS_PER_TURN as i32) as u16;
+        sensors.position_counts = sensors.position_counts.saturating_add(off);
+        sensors.phase_current_a = sensors.phase_current_a.map(|a| noise.flicker(a, LARGE_CURRENT_STEP_A));
+        sensors.bus_v = noise.flicker(sensors.bus_v, VOLTAGE_STEP_V);
+        sensors.driver_c = noise.flicker(sensors.driver_c, TEMPERATURE_STEP_C);
+    }
+
     #[inline]
     fn step(&mut self, actuation: &Actuation) {
         self.last = *actuation;
         let pins = joint_motor::Actuation {
             inverter: match actuation.power_stage {
                 PowerStage::Off => Inverter::Open,
+                PowerStage::Modulate { duty } if self.dead_time => {
+                    Inverter::Driven(with_dead_time(duty.map(f64::from), self.motor.sense().phase_current_a))
+                }
                 PowerStage::Modulate { duty } => Inverter::Driven(duty.map(f64::from)),
             },
             brake_released: !self.is_braked(actuation),

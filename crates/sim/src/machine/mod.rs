@@ -10,6 +10,7 @@ mod mjoint;
 mod order;
 mod pulse_source;
 mod quantity;
+mod realism;
 mod switch;
 mod zlac8030l;
 mod zlim42c;
@@ -21,6 +22,7 @@ pub use assembly::Assembly;
 pub use mjoint::{Joint, MJointMachine, mjoint};
 pub use order::{Order, OrderError, order};
 pub use quantity::Quantity;
+pub use realism::{Noise, Realism};
 pub use zlac8030l::{HubWheel, Zlac8030lMachine, zlac8030l};
 pub use zlim42c::{Stepper, Zlim42c82Machine, Zlim42cMachine, zlim42c, zlim42c_82};
 
@@ -43,6 +45,7 @@ pub struct Machine<A: Assembly> {
     assembly: A,
     actuation: <A::Firmware as Firmware>::Actuation,
     inputs: Inputs,
+    noise: Option<Noise>,
     supply: Supply,
     running: bool,
     next_tick: Instant,
@@ -65,6 +68,7 @@ impl<A: Assembly> Machine<A> {
             assembly,
             actuation: Default::default(),
             inputs: Inputs::default(),
+            noise: None,
             supply: Supply::Off,
             running: false,
             next_tick: Instant::ZERO,
@@ -92,7 +96,10 @@ impl<A: Assembly> Machine<A> {
         self.watch_supply(at);
         if self.running {
             let levels = self.inputs.levels(|| self.assembly.shaft_counts());
-            let sensors = self.assembly.sense(levels);
+            let mut sensors = self.assembly.sense(levels);
+            if let Some(noise) = &mut self.noise {
+                self.assembly.disturb(&mut sensors, noise);
+            }
             let next = self.firmware.tick(&sensors, at);
             self.assembly.step(&self.actuation);
             self.actuation = next;
@@ -217,6 +224,12 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
         } else {
             self.switch_on(now);
         }
+    }
+
+    fn set_realism(&mut self, realism: Realism, seed: u64, now: Instant) {
+        self.advance(now);
+        self.noise = (realism == Realism::Full).then(|| Noise::new(seed));
+        self.assembly.set_realism(realism);
     }
 
     fn cut_power(&mut self, now: Instant) {

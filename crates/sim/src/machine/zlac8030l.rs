@@ -23,6 +23,9 @@ use plant::supply::SupplyData;
 use super::Machine;
 use super::assembly::{AMBIENT_C, Assembly, with_demand};
 use super::order::{Order, OrderError, baud_rate};
+use super::realism::{
+    HUB_COGGING, LARGE_CURRENT_STEP_A, Noise, Realism, TEMPERATURE_STEP_C, VOLTAGE_STEP_V, with_dead_time,
+};
 use crate::{Brake, Component, Levels, Refused, Report, VirtualDrive};
 
 const OUTPUTS: &[&str] = &["Y0", "Y1"];
@@ -72,6 +75,7 @@ pub struct HubWheel {
     image: Image,
     eeprom_broken: bool,
     reference_broken: bool,
+    dead_time: bool,
     last: Actuation,
 }
 
@@ -83,7 +87,15 @@ impl HubWheel {
         model.brake.holding_nm = BRAKE_NM;
         let mut motor = HubMotor::new(model, Angle::default(), SUPPLY_V, AMBIENT_C);
         motor.rig.supply = SupplyData::switched_off(SUPPLY_V);
-        Self { motor, dip_address, image, eeprom_broken: false, reference_broken: false, last: Actuation::default() }
+        Self {
+            motor,
+            dip_address,
+            image,
+            eeprom_broken: false,
+            reference_broken: false,
+            dead_time: false,
+            last: Actuation::default(),
+        }
     }
 
     /// The motor and all that is joined to it.
@@ -129,12 +141,29 @@ impl Assembly for HubWheel {
         }
     }
 
+    fn set_realism(&mut self, realism: Realism) {
+        self.dead_time = realism == Realism::Full;
+        self.motor.cogging = self.dead_time.then_some(HUB_COGGING);
+    }
+
+    fn disturb(&self, sensors: &mut Sensors, noise: &mut Noise) {
+        let off = noise.misplaced_edge(self.motor.rotor.angle, self.motor.model.encoder.counts_per_turn());
+        sensors.encoder_count = sensors.encoder_count.wrapping_add_signed(off);
+        sensors.phase_current_a = sensors.phase_current_a.map(|a| noise.flicker(a, LARGE_CURRENT_STEP_A));
+        sensors.bus_v = noise.flicker(sensors.bus_v, VOLTAGE_STEP_V);
+        sensors.motor_c = noise.flicker(sensors.motor_c, TEMPERATURE_STEP_C);
+        sensors.driver_c = noise.flicker(sensors.driver_c, TEMPERATURE_STEP_C);
+    }
+
     #[inline]
     fn step(&mut self, actuation: &Actuation) {
         self.last = *actuation;
         let inverter = match actuation.power_stage {
             PowerStage::Off => Inverter::Open,
             PowerStage::Shorted => Inverter::Shorted,
+            PowerStage::Modulate { duty } if self.dead_time => {
+                Inverter::Driven(with_dead_time(duty.map(f64::from), self.motor.sense().phase_current_a))
+            }
             PowerStage::Modulate { duty } => Inverter::Driven(duty.map(f64::from)),
         };
         let pins = hub_motor::Actuation {

@@ -23,6 +23,7 @@ use super::Machine;
 use super::assembly::{AMBIENT_C, Assembly};
 use super::order::{Order, OrderError, baud_rate};
 use super::quantity::Quantity;
+use super::realism::{Noise, Realism, SMALL_CURRENT_STEP_A, VOLTAGE_STEP_V, with_dead_time};
 use crate::{Component, Levels, Refused, Report, TemperatureSensor, VirtualDrive};
 
 const OUTPUTS: &[&str] = &["Y0", "Y1", "RED", "GREEN"];
@@ -94,6 +95,7 @@ pub struct Stepper<const LENGTH_MM: u16> {
     image: Image,
     eeprom_broken: bool,
     reference_broken: bool,
+    dead_time: bool,
     last: Actuation,
     /// The electrical turn that the rotor stood in at power-on: there the drive's vector points to its zero.
     zero: Option<f64>,
@@ -111,6 +113,7 @@ impl<const LENGTH_MM: u16> Stepper<LENGTH_MM> {
             image,
             eeprom_broken: false,
             reference_broken: false,
+            dead_time: false,
             last: Actuation::default(),
             zero: None,
         }
@@ -184,6 +187,16 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
         }
     }
 
+    /// Its detent is there anyway, and it has no encoder.
+    fn set_realism(&mut self, realism: Realism) {
+        self.dead_time = realism == Realism::Full;
+    }
+
+    fn disturb(&self, sensors: &mut Sensors, noise: &mut Noise) {
+        sensors.phase_current_a = sensors.phase_current_a.map(|a| noise.flicker(a, SMALL_CURRENT_STEP_A));
+        sensors.bus_v = noise.flicker(sensors.bus_v, VOLTAGE_STEP_V);
+    }
+
     #[inline]
     fn step(&mut self, actuation: &Actuation) {
         self.last = *actuation;
@@ -193,6 +206,9 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
         }
         let bridges = match actuation.power_stage {
             PowerStage::Off => Bridges::Open,
+            PowerStage::Modulate { duty } if self.dead_time => {
+                Bridges::Driven(with_dead_time(duty.map(f64::from), self.motor.sense().phase_current_a))
+            }
             PowerStage::Modulate { duty } => Bridges::Driven(duty.map(f64::from)),
         };
         self.motor.step(Self::PERIOD_S, &bridges);

@@ -4,9 +4,10 @@ use can::{Bitrate, Instant};
 
 use super::member::Member;
 use super::{Digest, FrameLog, StationId, World, WorldError};
+use crate::machine::Realism;
 use crate::recorder::Recorder;
 use crate::wire::{ControllerOptions, ErrorCounters, Statistics};
-use crate::{Report, VirtualDrive};
+use crate::{Prng, Report, VirtualDrive};
 
 impl World {
     /// Operates the drive added under `number`: inputs, loads, faults, power.
@@ -36,6 +37,12 @@ impl World {
     /// Switches the supply of the drive added under `number`: see [`VirtualDrive::set_power`].
     pub fn set_power(&mut self, number: u8, on: bool) -> Result<(), WorldError> {
         self.with_drive(number, |drive, now| drive.set_power(on, now))
+    }
+
+    /// Makes the drive added under `number` as it is calculated, or as one on a bench. The world's seed decides its noise.
+    pub fn set_realism(&mut self, number: u8, realism: Realism) -> Result<(), WorldError> {
+        let seed = Prng::new(self.seed ^ u64::from(number) << 32).next_u64();
+        self.with_drive(number, |drive, now| drive.set_realism(realism, seed, now))
     }
 
     /// Takes supply and charge from the drive added under `number`: it is dead at once.
