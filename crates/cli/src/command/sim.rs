@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use can::Bitrate;
 use sim::World;
+use sim::machine::Realism;
 use tokio::sync::mpsc;
 use transport::{
     AsyncBus, BusSpec, Hub, HubOptions, ModbusServer, ModbusSpec, Protocol, ServeSpec, SocketcandBus, WallClock,
@@ -67,6 +68,10 @@ pub(crate) struct Sim {
     /// Decides everything random; without it the machine file's, or 1
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// Whether the drives are as calculated (ideal) or have what real ones have (full): noise of encoder, current, voltage
+    /// and temperature, dead time, cogging; without it the machine file's, or ideal
+    #[arg(long, value_name = "ideal|full")]
+    realism: Option<Realism>,
     /// Write all frames to this file, in candump format
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
@@ -98,6 +103,7 @@ impl Sim {
         for placed in &machine.drives {
             add_drive(&mut world, placed, eeproms.as_ref(), &warnings)?;
         }
+        machine.make_real(&mut world);
         let log = self.log.as_deref().map(create_log).transpose().map_err(|error| {
             Failure::new(format!("cannot write the log {}", self.log.clone().unwrap_or_default().display()))
                 .because(error)
@@ -116,6 +122,7 @@ impl Sim {
         let mut machine = file.cloned().unwrap_or_default();
         machine.bitrate = self.bitrate.or(machine.bitrate);
         machine.seed = self.seed.or(machine.seed);
+        machine.realism = self.realism.or(machine.realism);
         machine.drives.extend(self.drives.iter().cloned().map(Placed::from));
         if machine.drives.is_empty() {
             return Err(Failure::usage("no drive to run")

@@ -12,6 +12,7 @@ use std::path::Path;
 
 use can::{Bitrate, Instant};
 use canopen::NodeId;
+use sim::machine::Realism;
 use sim::{Source, VirtualDrive, World};
 
 use crate::embedded::{self, Embedded, SEED};
@@ -33,6 +34,8 @@ pub(crate) struct Machine {
     pub(crate) bitrate: Option<Bitrate>,
     /// What decides everything random, where it says so.
     pub(crate) seed: Option<u64>,
+    /// Whether its drives have the noise and the flaws of real ones, where it says so.
+    pub(crate) realism: Option<Realism>,
     /// The drives, each at a node of its own.
     pub(crate) drives: Vec<Placed>,
 }
@@ -78,9 +81,10 @@ fn text_of(path: &Path) -> Result<String, String> {
 impl Machine {
     fn parse(text: &str) -> Result<Self, String> {
         reader::read(text, "a machine file", |file| {
-            file.takes_only(&["bitrate", "seed", "drive"])?;
+            file.takes_only(&["bitrate", "seed", "realism", "drive"])?;
             let bitrate = file.get("bitrate").map(|field| rate(&field)).transpose()?;
             let seed = file.get("seed").map(|field| field.whole("a whole number from 0 on")).transpose()?;
+            let realism = file.get("realism").map(|field| realism(&field)).transpose()?;
             let expected = "a table of its own for each drive, begun by [[drive]]";
             let tables = file.get("drive").map_or(Ok(Vec::new()), |field| field.list(expected))?;
             let mut drives: Vec<Placed> = Vec::new();
@@ -91,7 +95,11 @@ impl Machine {
                 }
                 drives.push(drive);
             }
-            if drives.is_empty() { Err("it has no [[drive]]".into()) } else { Ok(Self { bitrate, seed, drives }) }
+            if drives.is_empty() {
+                Err("it has no [[drive]]".into())
+            } else {
+                Ok(Self { bitrate, seed, realism, drives })
+            }
         })
     }
 
@@ -105,6 +113,14 @@ impl Machine {
         World::new(self.bitrate.unwrap_or(Bitrate::K500), self.seed.unwrap_or(SEED))
     }
 
+    /// Makes the drives of its world, which are there already, as real as it says.
+    pub(crate) fn make_real(&self, world: &mut World) {
+        for placed in &self.drives {
+            // A drive that is not there has been refused before.
+            let _ = world.set_realism(placed.spec.node.raw(), self.realism.unwrap_or_default());
+        }
+    }
+
     fn build(&self) -> Result<Embedded, String> {
         let mut world = self.world();
         for placed in &self.drives {
@@ -115,6 +131,7 @@ impl Machine {
             world.add_drive(spec.node.raw(), drive).map_err(|error| error.to_string())?;
             placed.furnish(&mut world)?;
         }
+        self.make_real(&mut world);
         Ok((world, self.models().collect()))
     }
 }
@@ -129,6 +146,11 @@ impl From<DriveSpec> for Placed {
 fn rate(field: &Field<'_>) -> Result<Bitrate, String> {
     let expected = "a bit rate as text, e.g. \"500k\"";
     field.text(expected)?.parse().map_err(|error| field.at(&format!("{error}")))
+}
+
+fn realism(field: &Field<'_>) -> Result<Realism, String> {
+    let expected = "\"ideal\" or \"full\"";
+    field.text(expected)?.parse().map_err(|_| field.wrong(expected))
 }
 
 impl Placed {
@@ -319,6 +341,8 @@ mod tests {
         assert!(with("supply_v = nan").contains("expected a voltage"));
         assert_eq!(with("supply = { voltage_v = 36, limit_a = 10, resistance_ohm = 0.2 }"), "");
         assert!(with("supply = { limit_a = 0 }").contains("0.01 to 1000 A"));
+        assert_eq!(refusal("realism = 'full'\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4"), "");
+        assert!(refusal("realism = 'much'\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4").contains("ideal"));
         assert!(with("supply = { voltage_v = 101 }").contains("0 to 100 V"));
         assert!(with("supply = 48").contains("'supply' is 48; expected a table"));
         assert!(with("load = 5").contains("'load' is 5; expected a table, e.g. { torque_nm = 0.5 }"));
