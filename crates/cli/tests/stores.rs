@@ -5,7 +5,8 @@
 
 mod common;
 
-use std::io::Write;
+use std::io::{Read, Write};
+use std::net::TcpStream;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
@@ -22,6 +23,10 @@ const SAVED: u16 = 0x2604;
 /// An SDO answer to a download that was taken (CiA 301, 7.2.4.3.4).
 const TAKEN: &str = "60";
 
+/// Register of the weak magnetic angle, and of 2614h, which asks for a save (manual of the joint, Modbus addresses).
+const SAVED_REGISTER: u8 = 0x06;
+const SAVE_REGISTER: u8 = 0x16;
+
 fn simulator(state: &Path) -> Simulator {
     Simulator::start(&[
         "--drive",
@@ -30,6 +35,8 @@ fn simulator(state: &Path) -> Simulator {
         "m4230e17b50@1",
         "--serve",
         "socketcand://127.0.0.1:0",
+        "--modbus",
+        "127.0.0.1:0",
         "--state",
         state.to_str().unwrap(),
     ])
@@ -121,6 +128,34 @@ fn what_a_joint_says_to_have_saved_survives_a_kill() {
         let mut bus = RawBus::connect(&again.address("socketcand"));
         let answer = bus.upload(1, SAVED, 0).unwrap();
         assert!(answer.starts_with(&format!("4B042600{value:02X}")), "{answer} after {value}");
+    }
+    std::fs::remove_dir_all(state).unwrap();
+}
+
+/// One Modbus request of the joint, of function, address and a count or value; the answer after its function code.
+fn register(stream: &mut TcpStream, function: u8, address: u8, value: u8) -> Vec<u8> {
+    stream.write_all(&[0, 1, 0, 0, 0, 6, 1, function, 0, address, 0, value]).unwrap();
+    let mut head = [0; 8];
+    stream.read_exact(&mut head).unwrap();
+    assert_eq!(head[7], function, "an exception: {head:?}");
+    let mut rest = vec![0; usize::from(head[5]) - 2];
+    stream.read_exact(&mut rest).unwrap();
+    rest
+}
+
+#[test]
+fn what_a_joint_says_over_modbus_to_have_saved_survives_a_kill() {
+    let state = scratch("modbus");
+    for value in [50, 51, 52] {
+        let mut simulator = simulator(&state);
+        let mut line = TcpStream::connect(simulator.address("modbus")).unwrap();
+        register(&mut line, 6, SAVED_REGISTER, value);
+        register(&mut line, 6, SAVE_REGISTER, 1);
+        while register(&mut line, 3, SAVE_REGISTER, 1) != [2, 0, 2] {}
+        simulator.kill();
+        let again = self::simulator(&state);
+        let mut line = TcpStream::connect(again.address("modbus")).unwrap();
+        assert_eq!(register(&mut line, 3, SAVED_REGISTER, 1), [2, 0, value]);
     }
     std::fs::remove_dir_all(state).unwrap();
 }

@@ -30,7 +30,12 @@ use crate::session::{bus_failure, failure_of};
 /// Run virtual drives in real time, for other programs
 ///
 /// Prints one line that begins with `ready` and names every listener once all of them listen. Then reads world commands
-/// from standard input, one a line, and answers each with one line of JSON; `quit` ends, the end of input does not.
+/// from standard input, one a line, and answers each with one line of JSON; `quit` ends, the end of input does not. Blank
+/// lines and `# comments` have no answer; `help` lists the commands.
+///
+/// Time on the bus is that of the clock. Nobody holds it up: answers that nobody reads are dropped when 4 MiB wait, and
+/// counted; clients have the wire in turn, at most 256 at a time, of which idle ones make room. `now` and `get` tell
+/// `behind_ms`, how far the bus is behind the clock; falling behind and catching up are also said on standard error.
 #[derive(clap::Args)]
 #[command(after_help = "World commands (4 is the node of --drive):\n  \
     4 power off|on|cycle|cut  4 input X0 1              4 switch X0 -5000 max\n  \
@@ -63,6 +68,12 @@ pub(crate) struct Sim {
     #[arg(long, value_name = "PLACE")]
     modbus: Option<ModbusSpec>,
     /// Keep EEPROM contents in this directory; without it every start is factory-fresh
+    ///
+    /// A store is on the disk before the drive acknowledges it: before the SDO answer to a write that is stored, before the
+    /// answer that reads 2 from a joint's 2614h, over Modbus too. So no end of the simulator loses one, be it a signal or
+    /// kill -9. A disk that takes more than 250 ms, or cannot be written, is not waited for; that is said on standard error.
+    /// What nobody acknowledges (stored values that come by PDO, the position that a joint notes when its supply falls)
+    /// follows within 100 ms and what the disk takes. Symbolic links and files of others are refused, and never changed.
     #[arg(long, value_name = "DIR")]
     state: Option<PathBuf>,
     /// Decides everything random; without it the machine file's, or 1
@@ -73,6 +84,9 @@ pub(crate) struct Sim {
     #[arg(long, value_name = "ideal|full")]
     realism: Option<Realism>,
     /// Write all frames to this file, in candump format
+    ///
+    /// It is a new file, or an empty one, or a candump log, which is replaced. Any other file, a symbolic link, a device and
+    /// a FIFO are refused. When the disk is too slow frames are left out, which is said on standard error.
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
 }
