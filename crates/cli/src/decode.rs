@@ -69,6 +69,15 @@ pub(crate) fn decode(model: Option<&DriveProfile>, row: Option<&'static Entry>, 
 }
 
 impl Decoded {
+    /// The same bytes as a number of a type, where only that is known of them.
+    pub(crate) fn typed(mut self, data_type: Option<DataType>) -> Self {
+        if let (Some(data_type), Some(value)) = (data_type, self.value) {
+            self.value = Some(data_type.value(value as u32));
+            self.hexadecimal = false;
+        }
+        self
+    }
+
     /// The same value where this many counts make one of the unit.
     pub(crate) fn at_resolution(mut self, counts: i64) -> Self {
         if counts > 1 {

@@ -24,8 +24,12 @@ pub(crate) struct Format {
 impl Format {
     /// Prints a report on standard output, one line of JSON or its text.
     pub(crate) fn print(self, report: &impl Report) -> io::Result<()> {
-        let text = if self.json { sim::json::to_string(report)? } else { report.text(self.paint) };
-        print_line(&text)
+        if self.json { self.print_json(report) } else { print_line(&report.text(self.paint)) }
+    }
+
+    /// Prints one line of JSON.
+    pub(crate) fn print_json(self, value: &impl Serialize) -> io::Result<()> {
+        print_line(&sim::json::to_string(value)?)
     }
 }
 

@@ -7,6 +7,7 @@
 use core::fmt;
 use std::time::Duration;
 
+use can::Instant;
 use canopen::{AbortCode, Mux, NmtState, NodeId};
 use drives::profile::{self, DriveProfile, models_by_identity};
 
@@ -19,6 +20,16 @@ const WINDOW: usize = 32;
 /// How long a node is given to answer: drives answer within a few milliseconds, a window of requests takes 8 more
 /// at 500 kbit/s and 40 more at 100 kbit/s.
 pub const SCAN_TIMEOUT: Duration = Duration::from_millis(100);
+
+/// 1017h, in ms, 16 bits. Source: CiA 301, 7.5.2.20.
+const PRODUCER_HEARTBEAT_TIME: Mux = Mux::new(0x1017, 0);
+
+/// Longest heartbeat period that a scan waits for: twice that of the joint as delivered, the slowest of the drives here. A
+/// guess of what somebody who scans likes to wait; of slower ones the period is told.
+const HEARTBEAT_PATIENCE: Duration = Duration::from_secs(2);
+
+/// How much later than its period a heartbeat may come: behind a bus full of other frames.
+const HEARTBEAT_JITTER: Duration = Duration::from_millis(100);
 
 /// What a node says that it is. What it refuses to say is `None`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -176,6 +187,8 @@ pub struct Found {
     pub identity: Option<Identity>,
     /// Its NMT state by its last boot-up or heartbeat message, or the NMT command sent since.
     pub nmt_state: Option<NmtState>,
+    /// How often it sends a heartbeat, as it says in 1017h; zero for never, `None` if it does not tell.
+    pub heartbeat: Option<Duration>,
     /// What that tells of its model.
     pub knowledge: Knowledge,
 }
@@ -285,13 +298,30 @@ impl Network {
         let nodes: Vec<NodeId> = NodeId::all().collect();
         let mut found = Vec::new();
         let mut asked = 0;
+        let began = self.now();
         for window in nodes.chunks(WINDOW) {
             let asking = window.iter().map(|id| self.look_at(*id, timeout));
             found.extend(join_all(asking.collect::<Vec<_>>()).await.into_iter().flatten());
             asked += window.len();
             progress(asked);
         }
+        self.hear_heartbeats(&mut found, began).await;
         found
+    }
+
+    /// Waits for the first heartbeat of those that have sent none since `began` and soon will, and puts down what all have
+    /// said by then: a node that beats more slowly than the scan looks is not silent.
+    async fn hear_heartbeats(&self, found: &mut [Found], began: Instant) {
+        let passed = self.now() - began;
+        let due = found.iter().filter(|found| found.nmt_state.is_none()).filter_map(|found| {
+            let period = found.heartbeat.filter(|period| !period.is_zero() && *period <= HEARTBEAT_PATIENCE)?;
+            let left = (period + HEARTBEAT_JITTER).saturating_sub(passed);
+            Some(self.node(found.node).wait(|node| node.facts.heartbeat_at, left))
+        });
+        let _ = join_all(due.collect::<Vec<_>>()).await;
+        for found in found {
+            found.nmt_state = self.facts(found.node).probable_state(found.knowledge.profile());
+        }
     }
 
     async fn look_at(&self, id: NodeId, timeout: Duration) -> Option<Found> {
@@ -303,7 +333,12 @@ impl Network {
         }
         let answering = identity.map(models_answering).unwrap_or_default();
         let knowledge = told_apart(&node, &answering).await.unwrap_or(Knowledge::Unknown);
-        Some(Found { node: id, identity, nmt_state: facts.probable_state(knowledge.profile()), knowledge })
+        let heartbeat = match identity {
+            Some(_) => optional(&node, PRODUCER_HEARTBEAT_TIME).await.ok().flatten(),
+            None => None,
+        };
+        let heartbeat = heartbeat.map(|ms| Duration::from_millis(u64::from(ms) & 0xFFFF));
+        Some(Found { node: id, identity, nmt_state: facts.probable_state(knowledge.profile()), heartbeat, knowledge })
     }
 }
 

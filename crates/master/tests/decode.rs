@@ -77,7 +77,7 @@ fn sdo_requests_and_answers_show_object_and_value() {
     let shown = lines(&mut Decoder::new(), &["604#4002650000000000", "584#8002650000000206"]);
     assert_eq!(
         shown[1],
-        "SDO node 4: the drive aborts 6502h:00: 0602 0000h (object does not exist in the object dictionary)"
+        "SDO node 4: the drive aborts 6502h:00 supported_drive_modes: 0602 0000h (object does not exist in the object dictionary)"
     );
 }
 
@@ -94,8 +94,8 @@ fn segmented_transfers_are_put_together() {
             "582#1B74610000000000",
         ],
     );
-    assert_eq!(shown[1], "SDO node 2: segmented transfer of 1008h:00, 9 bytes");
-    assert_eq!(shown[5], "SDO node 2: 1008h:00 = \"Ferranata\"");
+    assert_eq!(shown[1], "SDO node 2: segmented transfer of 1008h:00 manufacturer_device_name, 9 bytes");
+    assert_eq!(shown[5], "SDO node 2: 1008h:00 manufacturer_device_name = \"Ferranata\"");
 }
 
 #[test]
@@ -115,7 +115,7 @@ fn pdos_are_split_by_the_mapping_that_went_over_the_bus() {
             "584#60001A0000000000",
         ],
     );
-    assert_eq!(lines(&mut decoder, &["184#64000000"]), ["TPDO0 node 4: 606Ch:00 = 00000064h (100)"]);
+    assert_eq!(lines(&mut decoder, &["184#64000000"]), ["TPDO0 node 4: 606Ch:00 velocity_actual_value = 100"]);
     assert_eq!(
         lines(&mut decoder, &["184#6400"]),
         ["TPDO0 node 4: (too short: 2 of 4 bytes, the receiver ignores it)"]
@@ -197,4 +197,19 @@ fn random_frames_never_panic() {
         let id = if next() % 4 == 0 { next() as u16 } else { [0x584, 0x604][next() as usize % 2] };
         let _ = decoder.decode(&Frame::new(can::CanId::standard(id), &data)).to_string();
     }
+}
+
+#[test]
+fn an_object_that_all_models_name_alike_is_named_without_its_unit_whatever_its_length() {
+    let mut decoder = Decoder::new();
+    // 606Ch: INTEGER16 of 0.1 r/min, INTEGER32 of 0.1 r/min, INTEGER32 of r/min.
+    let shown = lines(&mut decoder, &["584#4B6C6000C4FF0000", "584#436C6000C4FFFFFF", "584#4F6C6000C4000000"]);
+    assert_eq!(
+        shown,
+        [
+            "SDO node 4: 606Ch:00 velocity_actual_value = -60",
+            "SDO node 4: 606Ch:00 velocity_actual_value = -60",
+            "SDO node 4: 606Ch:00 velocity_actual_value = C4h (196)",
+        ]
+    );
 }

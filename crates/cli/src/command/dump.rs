@@ -1,7 +1,7 @@
 //! `ferrodrive dump`: the bus in words, line by line, and into a candump log.
 
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use can::{Frame, Instant};
 use master::decode::Decoder;
 use serde::Serialize;
 use sim::wire::WireEvent;
-use transport::log::LogWriter;
+use transport::log::{LogError, LogWriter};
 use transport::{AnyBus, AsyncBus, BusError, BusSpec, WallClock};
 
 use crate::args::Global;
@@ -55,12 +55,34 @@ impl Report for Line {
     }
 }
 
+/// A line of a log that is no frame, and was passed over.
+#[derive(Debug, Serialize)]
+struct Skipped {
+    /// Counted from 1.
+    line: usize,
+    /// The line, shortened.
+    skipped: String,
+    reason: String,
+}
+
+/// What came of a log with lines that are no frames.
+#[derive(Debug, Serialize)]
+struct Summary {
+    frames: u64,
+    lines_skipped: u64,
+}
+
+/// Lines that are no frames are shown one by one up to this many, then only counted: a file that is no log has thousands.
+const SKIPPED_SHOWN: u64 = 20;
+
 /// Where decoded lines and logged frames go.
 struct Sink {
     decoder: Decoder,
     format: Format,
     log: Option<LogWriter<BufWriter<File>>>,
     path: Option<PathBuf>,
+    /// Frames shown, and lines of a log that were none.
+    summary: Summary,
     /// Unix time of the time axis's zero, for the log; a recorded bus has Unix times already.
     unix_zero: Duration,
 }
@@ -120,6 +142,9 @@ async fn follow(bus: &mut AnyBus, sink: &mut Sink) -> Result<Option<BusError>, F
         match bus.recv().await {
             Ok((at, frame)) => sink.take(at, &frame)?,
             Err(BusError::EndOfLog { .. }) => return Ok(None),
+            Err(BusError::Log { source: LogError::Line { line, text, source }, .. }) => {
+                sink.skip(Skipped { line, skipped: text, reason: source.to_string() })?;
+            }
             Err(error) => return Ok(Some(error)),
         }
     }
@@ -134,16 +159,51 @@ impl Sink {
         }
         let log = path.map(File::create).transpose().map_err(|error| log_failure(path, &error))?;
         let log = log.map(|file| LogWriter::new(BufWriter::new(file), "can0"));
-        Ok(Self { decoder, format, log, path: path.map(Into::into), unix_zero: Duration::ZERO })
+        let summary = Summary { frames: 0, lines_skipped: 0 };
+        Ok(Self { decoder, format, log, path: path.map(Into::into), summary, unix_zero: Duration::ZERO })
     }
 
     fn take(&mut self, at: Instant, frame: &Frame) -> Result<(), Failure> {
         if let Some(log) = &mut self.log {
             log.write(at + self.unix_zero, frame).map_err(|error| log_failure(self.path.as_deref(), &error))?;
         }
+        self.summary.frames += 1;
         let text = self.decoder.decode(frame).to_string();
         let line = Line { t: at.as_secs_f64(), frame: frame.to_string(), text };
-        self.format.print(&line).map_err(|error| Failure::new("cannot write to standard output").because(error))
+        self.format.print(&line).map_err(|error| not_printed(&error))
+    }
+
+    /// Tells of a line that is passed over: among the frames to programs, beside them to people.
+    fn skip(&mut self, line: Skipped) -> Result<(), Failure> {
+        self.summary.lines_skipped += 1;
+        if self.summary.lines_skipped > SKIPPED_SHOWN {
+            return Ok(());
+        }
+        if self.format.json {
+            return self.format.print_json(&line).map_err(|error| not_printed(&error));
+        }
+        let Skipped { line, skipped, reason } = line;
+        // Nobody may be listening any more.
+        let _ = writeln!(io::stderr(), "warning: line {line} passed over, '{skipped}': {reason}");
+        Ok(())
+    }
+
+    /// Tells how many lines were passed over, if any were. A log without a single frame is none.
+    fn summarise(&self) -> Result<(), Failure> {
+        let Summary { frames, lines_skipped } = self.summary;
+        if lines_skipped == 0 {
+            return Ok(());
+        }
+        if frames == 0 {
+            return Err(Failure::new(format!("no frame in {lines_skipped} lines: this is no candump log"))
+                .of_kind("no_log")
+                .next("candump -L can0 writes one"));
+        }
+        if self.format.json {
+            return self.format.print_json(&self.summary).map_err(|error| not_printed(&error));
+        }
+        let _ = writeln!(io::stderr(), "warning: {lines_skipped} lines were passed over; {frames} frames shown");
+        Ok(())
     }
 
     fn flush(&mut self) -> Result<(), Failure> {
@@ -152,8 +212,13 @@ impl Sink {
     }
 
     fn finish(mut self) -> Result<(), Failure> {
-        self.flush()
+        self.flush()?;
+        self.summarise()
     }
+}
+
+fn not_printed(error: &io::Error) -> Failure {
+    Failure::new("cannot write to standard output").because(error)
 }
 
 fn log_failure(path: Option<&Path>, error: &std::io::Error) -> Failure {

@@ -38,6 +38,8 @@ struct Node {
     evidence: Option<String>,
     /// As its last heartbeat said.
     nmt_state: Option<String>,
+    /// How often it sends one by its own word (1017h), in ms; 0 for never.
+    heartbeat_ms: Option<u64>,
     device_type: Option<u32>,
     vendor_id: Option<u32>,
     product_code: Option<u32>,
@@ -78,12 +80,25 @@ impl Node {
             evidence: evidence.map(|mux| mux.to_string()),
             // A boot-up message says only that the node has just left the state it names.
             nmt_state: found.nmt_state.filter(|state| *state != NmtState::Initialising).map(|state| state.to_string()),
+            heartbeat_ms: found.heartbeat.map(|period| period.as_millis() as u64),
             device_type: identity.device_type,
             vendor_id: identity.vendor_id,
             product_code: identity.product_code,
             revision_number: identity.revision_number,
             remark: contradiction
                 .or_else(|| found.doubt().filter(|_| told.is_none()).map(|doubt| remark(found, doubt))),
+        }
+    }
+}
+
+impl Node {
+    /// The NMT state, or why it is not known.
+    fn nmt_text(&self) -> String {
+        match (&self.nmt_state, self.heartbeat_ms) {
+            (Some(state), _) => state.clone(),
+            (None, Some(0)) => "sends no heartbeat".into(),
+            (None, Some(ms)) => format!("heartbeat each {ms} ms, not heard yet"),
+            (None, None) => "no heartbeat heard".into(),
         }
     }
 }
@@ -119,7 +134,7 @@ impl Report for ScanReport {
             table.row([
                 node.node.to_string(),
                 node.model.unwrap_or(if node.models.is_empty() { "unknown" } else { "cannot tell" }).into(),
-                node.nmt_state.clone().unwrap_or_else(|| "no heartbeat".into()),
+                node.nmt_text(),
                 hex(node.device_type),
                 identity,
             ]);

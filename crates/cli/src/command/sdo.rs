@@ -2,7 +2,7 @@
 
 use canopen::od::Entry;
 use canopen::{AbortCode, Mux, NodeId};
-use master::decode::common_row;
+use master::decode::{common_name, common_row, common_type};
 use master::drive::Limits;
 use master::{Drive, Error};
 use serde::Serialize;
@@ -165,12 +165,15 @@ impl ObjectReport {
         limits: Option<&Limits>,
         written: bool,
     ) -> Self {
+        let unknown = row.is_none() && drive.profile().is_none();
+        let data_type = common_type(mux, bytes.len()).filter(|_| unknown);
+        let value = decode(drive.profile(), row, bytes).typed(data_type);
         Self {
             node: drive.node().id().raw(),
             object: mux.to_string(),
-            name: row.map(|row| row.name),
+            name: row.map(|row| row.name).or_else(|| common_name(mux).filter(|_| drive.profile().is_none())),
             guess: guessed(drive),
-            value: decode(drive.profile(), row, bytes).at_resolution(counts_per_unit(limits)),
+            value: value.at_resolution(counts_per_unit(limits)),
             note: None,
             written,
         }

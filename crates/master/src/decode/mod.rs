@@ -4,6 +4,7 @@
 //! are reassembled; PDOs are split by the mapping that was given, comes from a model's object table, or was seen
 //! being written or read by SDO. The decoder never sends and keeps no time.
 
+mod common;
 mod pdo;
 mod sdo;
 mod value;
@@ -25,9 +26,10 @@ use crate::identify::Model;
 use pdo::PdoBook;
 use sdo::Conversations;
 
+pub use common::{common_name, common_row, common_type};
 pub use pdo::{Direction, Pdo};
 pub use sdo::{Sdo, SdoStep, Side};
-pub use value::{Value, common_row, statusword_words};
+pub use value::{Value, statusword_words};
 
 /// What one frame says.
 #[derive(Clone, Debug)]

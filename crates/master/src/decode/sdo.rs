@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use canopen::sdo::wire::{LENGTH, Payload, Reply, Request, Segment};
 use canopen::{AbortCode, Mux, NodeId};
 
-use super::value::{Value, find, write_name};
+use super::value::{Value, write_name};
 use crate::identify::Model;
 
 /// Longest object that is put together; a longer one is shown without its value.
@@ -171,7 +171,7 @@ impl Conversations {
 impl fmt::Display for Sdo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let model = self.model.map(|model| model.0);
-        let named = |f: &mut fmt::Formatter<'_>, mux| write_name(f, mux, find(model, mux));
+        let named = |f: &mut fmt::Formatter<'_>, mux| write_name(f, mux, model);
         write!(f, "SDO node {}: ", self.node)?;
         match &self.step {
             SdoStep::Read(mux) => {

@@ -3,7 +3,9 @@ use core::fmt;
 use canopen::Mux;
 use canopen::od::{DataType, Entry};
 use cia402::{Controlword, ModeOfOperation, Statusword};
-use drives::profile::{DriveProfile, MODELS, PowerStyle, reads_alike};
+use drives::profile::{DriveProfile, PowerStyle};
+
+use super::common::{common_name, common_row, common_type};
 
 /// The bytes of one object, with what is known about it. Prints as `6041h:00 statusword = 0237h (Operation enabled)`.
 #[derive(Clone)]
@@ -33,10 +35,12 @@ impl<'a> Value<'a> {
     /// The number that the bytes stand for, by the table's data type.
     pub fn number(&self) -> Option<i64> {
         let raw = self.raw()?;
-        match self.form(self.entry?).0 {
-            DataType::VisibleString => None,
-            data_type => Some(data_type.value(raw)),
-        }
+        let data_type = match self.entry {
+            Some(entry) => self.form(entry).0,
+            None if self.model.is_none() && common_name(self.mux).is_some() => common_type(self.mux, self.bytes.len())?,
+            None => return None,
+        };
+        (data_type != DataType::VisibleString).then(|| data_type.value(raw))
     }
 
     /// Type and unit of the bytes: an object may have another form in TPDOs, which its length tells.
@@ -56,7 +60,7 @@ impl fmt::Debug for Value<'_> {
 
 impl fmt::Display for Value<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_name(f, self.mux, self.entry)?;
+        write_name(f, self.mux, self.model)?;
         f.write_str(" = ")?;
         let Some(raw) = self.raw().filter(|_| !self.bytes.is_empty()) else { return write_long(f, self.bytes) };
         if let Some(words) = standard_words(self.mux, raw, self.model) {
@@ -64,28 +68,22 @@ impl fmt::Display for Value<'_> {
         }
         match (self.number(), self.entry) {
             (Some(number), Some(entry)) => write_number(f, number, raw, entry, self.form(entry).1),
+            (Some(number), None) => write!(f, "{number}"),
             _ => write!(f, "{raw:0width$X}h ({raw})", width = self.bytes.len() * 2),
         }
     }
 }
 
 /// An object's multiplexor and its name, if known.
-pub(super) fn write_name(f: &mut fmt::Formatter<'_>, mux: Mux, entry: Option<&Entry>) -> fmt::Result {
-    match entry {
-        Some(entry) => write!(f, "{mux} {}", entry.name),
+pub(super) fn write_name(f: &mut fmt::Formatter<'_>, mux: Mux, model: Option<&'static DriveProfile>) -> fmt::Result {
+    match model.map_or_else(|| common_name(mux), |model| model.row(mux).map(|row| row.name)) {
+        Some(name) => write!(f, "{mux} {name}"),
         None => write!(f, "{mux}"),
     }
 }
 
-pub(super) fn find(model: Option<&'static DriveProfile>, mux: Mux) -> Option<&'static Entry> {
+fn find(model: Option<&'static DriveProfile>, mux: Mux) -> Option<&'static Entry> {
     model.map_or_else(|| common_row(mux), |model| model.row(mux))
-}
-
-/// The row of an object on which all models agree that have it, for a node whose model is not known.
-pub fn common_row(mux: Mux) -> Option<&'static Entry> {
-    let mut rows = MODELS.iter().filter_map(|profile| profile.row(mux));
-    let first = rows.next()?;
-    rows.all(|row| reads_alike(row, first)).then_some(first)
 }
 
 /// A statusword in words: its state and the bits that say more, or for a model without states its bits.

@@ -60,6 +60,10 @@ impl<R: BufRead> LogReader<R> {
             if read.map_err(|source| LogError::Io { line: self.line, source })? == 0 {
                 return Ok(None);
             }
+            if !self.buffer.ends_with(b"\n") {
+                // What is beyond the longest line belongs to this one.
+                self.input.skip_until(b'\n').map_err(|source| LogError::Io { line: self.line, source })?;
+            }
             let text = String::from_utf8_lossy(&self.buffer);
             let record = parse_line(&text).map_err(|source| LogError::Line {
                 line: self.line,
@@ -117,6 +121,15 @@ mod tests {
         assert!(error.source().unwrap().to_string().contains("pairs of hexadecimal digits"));
         assert_eq!(reader.next_frame().unwrap(), Some((Instant::from_secs(1), "702#05".parse().unwrap())));
         assert_eq!(reader.next_frame().unwrap(), Some((Instant::from_millis(1700), "703#".parse().unwrap())));
+        assert!(reader.next_frame().unwrap().is_none());
+    }
+
+    #[test]
+    fn a_line_that_is_too_long_is_one_line() {
+        let log = format!("(1.0) can0 701#{}\n(1.5) can0 702#05\n", "0".repeat(5000));
+        let mut reader = LogReader::new(log.as_bytes());
+        assert!(matches!(reader.next_frame(), Err(LogError::Line { line: 1, .. })));
+        assert_eq!(reader.next_frame().unwrap(), Some((Instant::from_millis(1500), "702#05".parse().unwrap())));
         assert!(reader.next_frame().unwrap().is_none());
     }
 
