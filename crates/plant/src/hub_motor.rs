@@ -127,19 +127,40 @@ impl HubMotor {
     /// One step: winding, rotor, bus, encoder, energies, and now and then heat. Meant for 50 µs and less.
     #[inline]
     pub fn step(&mut self, dt_s: f64, actuation: &Actuation) {
-        if self.rests(actuation) {
+        if self.power_stage_burnt || self.rig.supply.bus_v > self.model.clamp.from_v {
+            self.step_in_trouble(dt_s, actuation);
+        } else if self.rests(actuation) {
             self.torque_nm = 0.0;
-            let flows = self.clamped(Flows::default(), dt_s);
-            if self.rig.step(&self.model.rig, dt_s, &flows, actuation.bleeder_on) {
-                self.step_slow();
-            }
-            return;
+            self.book(dt_s, &Flows::default(), actuation);
+        } else {
+            let flows = self.turn(dt_s, actuation, actuation.inverter.terminals(self.rig.supply.bus_v));
+            self.book(dt_s, &flows, actuation);
         }
+    }
+
+    /// The same while the bus is so high that its suppressors conduct, or with molten switches, which join the wires whatever
+    /// the drive wants. Apart, so that other steps pay for no more than the question.
+    #[cold]
+    #[inline(never)]
+    fn step_in_trouble(&mut self, dt_s: f64, actuation: &Actuation) {
+        let bus_v = self.rig.supply.bus_v;
+        let inverter = if self.power_stage_burnt { Inverter::Shorted } else { actuation.inverter };
+        let mut flows = self.turn(dt_s, actuation, inverter.terminals(bus_v));
+        let clamp_w = self.model.clamp.power_w(bus_v);
+        flows.bus_w += clamp_w;
+        flows.arc_j += clamp_w * dt_s;
+        self.book(dt_s, &flows, actuation);
+    }
+
+    /// Winding, rotor and encoder.
+    // Inlined by force: it has two callers, and the frequent one would not get it.
+    #[inline(always)]
+    fn turn(&mut self, dt_s: f64, actuation: &Actuation, terminals: Terminals) -> Flows {
         let model = &self.model;
         let velocity_rad_s = self.rotor.turn(dt_s, &self.rig.load);
         let half_turn = Axis::at_small_rad(0.5 * dt_s * f64::from(model.pmsm.pole_pairs) * velocity_rad_s);
         let input = PmsmInput {
-            terminals: self.inverter(actuation).terminals(self.rig.supply.bus_v),
+            terminals,
             lost_phase: self.lost_phase,
             resistance_ohm: self.rig.path_ohm(&model.rig),
             axis: self.axis.turned_by(half_turn),
@@ -152,24 +173,15 @@ impl HubMotor {
         let moved = model.rotor.step(&mut self.rotor, dt_s, torque_nm, &self.rig.load, brake_nm);
         model.encoder.step(&mut self.encoder, self.rotor.angle);
         self.torque_nm = torque_nm;
+        motor.flows(moved.friction_j, moved.load_j)
+    }
 
-        let flows = self.clamped(motor.flows(moved.friction_j, moved.load_j), dt_s);
-        if self.rig.step(&self.model.rig, dt_s, &flows, actuation.bleeder_on) {
+    /// Bus and energies, and now and then the slow things.
+    #[inline(always)]
+    fn book(&mut self, dt_s: f64, flows: &Flows, actuation: &Actuation) {
+        if self.rig.step(&self.model.rig, dt_s, flows, actuation.bleeder_on) {
             self.step_slow();
         }
-    }
-
-    /// With what the clamp takes, where the bus is so high.
-    #[inline]
-    fn clamped(&self, flows: Flows, dt_s: f64) -> Flows {
-        let clamp_w = self.model.clamp.power_w(self.rig.supply.bus_v);
-        Flows { bus_w: flows.bus_w + clamp_w, arc_j: flows.arc_j + clamp_w * dt_s, ..flows }
-    }
-
-    /// What the bridge does: molten switches join the wires, whatever the drive wants.
-    #[inline]
-    fn inverter(&self, actuation: &Actuation) -> Inverter {
-        if self.power_stage_burnt { Inverter::Shorted } else { actuation.inverter }
     }
 
     /// Blocks the rotor, or frees it; seized bearings are new ones then.
@@ -212,7 +224,7 @@ impl HubMotor {
     /// (without motion there is no voltage that its diodes could rectify).
     #[inline]
     fn rests(&self, actuation: &Actuation) -> bool {
-        self.inverter(actuation) == Inverter::Open
+        actuation.inverter == Inverter::Open
             && self.cogging.is_none()
             && self.pmsm.current_a == Dq::default()
             && self.rotor.stands()
