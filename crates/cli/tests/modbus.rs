@@ -111,6 +111,9 @@ async fn only_a_joint_with_power_answers_and_only_its_registers() {
     let mut simulator = Simulator::start(&ARGUMENTS);
     let mut joint = client(&simulator, JOINT).await;
     assert_eq!(joint.read_holding_registers(0x27, 1).await.unwrap(), Err(ExceptionCode::IllegalDataAddress));
+    // "0: modbus forbid" (5.04, 2600h): only 2600h itself is written.
+    assert_eq!(joint.write_single_register(MODE, 3).await.unwrap(), Err(ExceptionCode::IllegalFunction));
+    write(&mut joint, MODBUS_ENABLE, &[1]).await;
     assert_eq!(joint.write_single_register(VOLTAGE, 1).await.unwrap(), Err(ExceptionCode::IllegalDataAddress));
     assert_eq!(joint.write_single_register(MODE, 2).await.unwrap(), Err(ExceptionCode::IllegalDataValue));
     // A ZLAC8030L has no RS485 here.
@@ -131,6 +134,7 @@ async fn only_a_joint_with_power_answers_and_only_its_registers() {
 async fn clients_share_a_joint_and_one_that_leaves_does_not_stop_it() {
     let simulator = Simulator::start(&ARGUMENTS);
     let (mut first, mut second) = (client(&simulator, JOINT).await, client(&simulator, JOINT).await);
+    write(&mut first, MODBUS_ENABLE, &[1]).await;
     write(&mut first, MODE, &[3]).await;
     write(&mut first, TARGET_VELOCITY, &[100, 0]).await;
     write(&mut second, CONTROLWORD, &[0x0F]).await;

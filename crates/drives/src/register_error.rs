@@ -7,6 +7,8 @@ pub enum RegisterError {
     NoSuchAddress,
     /// One of the registers cannot be written.
     ReadOnly,
+    /// The drive takes no writes as it is set.
+    Forbidden,
     /// A value that its object does not take: the code that an SDO download of it would be aborted with.
     BadValue(AbortCode),
 }

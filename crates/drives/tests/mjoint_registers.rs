@@ -72,11 +72,14 @@ fn every_written_value_is_taken_or_refused_as_over_sdo() {
             [limits.0, limits.1, type_range.0, type_range.1].into_iter().flat_map(|edge| [edge - 1, edge, edge + 1]);
         for value in edges.chain([0, 1, 2, 3, 17, -1]).filter(|value| (type_range.0..=type_range.1).contains(value)) {
             let (mut by_sdo, mut by_register) = (Bench::<Joint>::new(), Bench::<Joint>::new());
+            by_sdo.write(0x2600, 0, 1);
+            by_register.write(0x2600, 0, 1);
             let expected = by_sdo.try_write(index, sub_index, value);
             let written = by_register.drive.write_registers(register.address, &words_of(register, value));
             let as_abort = written.map_err(|error| match error {
                 RegisterError::ReadOnly => AbortCode::READ_ONLY.0,
                 RegisterError::BadValue(code) => code.0,
+                RegisterError::Forbidden => panic!("2600h is 1"),
                 RegisterError::NoSuchAddress => panic!("{:02X}h is in the table", register.address),
             });
             assert_eq!(as_abort, expected, "{value} to {:02X}h", register.address);
@@ -132,6 +135,7 @@ fn two_words_of_a_move_act_once_and_one_word_acts_with_the_present_other_half() 
 #[test]
 fn half_of_a_value_is_checked_as_the_whole_value() {
     let mut bench = Bench::<Joint>::new();
+    bench.write(0x2600, 0, 1);
     bench.write(0x60FF, 0, 100);
     // 100 with the high half FFFFh is -65436 r/min.
     let refused = bench.drive.write_registers(TARGET_VELOCITY + 1, &[0xFFFF]);
@@ -146,6 +150,7 @@ fn half_of_a_value_is_checked_as_the_whole_value() {
 #[test]
 fn a_refused_word_leaves_the_words_before_it_unwritten() {
     let mut bench = Bench::<Joint>::new();
+    bench.write(0x2600, 0, 1);
     // 60F9h:01 takes 0 to 10000 at 07h, 60F9h:02 only 2 to 2000 at 08h.
     let before = bench.read(0x60F9, 1);
     let refused = bench.drive.write_registers(0x07, &[1234, 1]);
@@ -159,6 +164,7 @@ fn a_refused_word_leaves_the_words_before_it_unwritten() {
 #[test]
 fn addresses_outside_the_table_are_refused() {
     let mut bench = Bench::<Joint>::new();
+    bench.write(0x2600, 0, 1);
     let mut words = [0; 3];
     for address in [0x27, 0x100, 0x2600, 0xFFFE, 0xFFFF] {
         assert_eq!(find(address), None);
@@ -171,6 +177,7 @@ fn addresses_outside_the_table_are_refused() {
 #[test]
 fn a_word_that_does_not_fit_into_eight_bits_is_refused() {
     let mut bench = Bench::<Joint>::new();
+    bench.write(0x2600, 0, 1);
     for (word, expected) in [
         (0x0103, Err(RegisterError::BadValue(AbortCode::VALUE_TOO_HIGH))),
         (0xFF03, Err(RegisterError::BadValue(AbortCode::VALUE_TOO_LOW))),
@@ -184,6 +191,7 @@ fn a_word_that_does_not_fit_into_eight_bits_is_refused() {
 #[test]
 fn it_has_no_address_without_power() {
     let mut bench = Bench::<Joint>::new();
+    bench.write(0x2600, 0, 1);
     assert_eq!(bench.drive.modbus_address(), Some(1));
     // 2615h counts from the next power-on, when it was saved.
     bench.drive.write_registers(0x17, &[9]).unwrap();
@@ -197,4 +205,24 @@ fn it_has_no_address_without_power() {
     bench.node = 9;
     bench.power_on();
     assert_eq!(bench.drive.modbus_address(), Some(9));
+}
+
+#[test]
+fn with_2600h_0_only_2600h_itself_is_written() {
+    // 5.04: "0: modbus forbid".
+    let mut bench = Bench::<Joint>::new();
+    assert_eq!(bench.drive.write_registers(TARGET_VELOCITY, &[100, 0]), Err(RegisterError::Forbidden));
+    assert_eq!(bench.drive.write_registers(MODBUS_ENABLE, &[0, 0]), Err(RegisterError::Forbidden));
+    assert_eq!(bench.read(0x60FF, 0), 0);
+    let mut word = [9];
+    bench.drive.read_registers(MODBUS_ENABLE, &mut word).unwrap();
+    assert_eq!(word, [0], "reading is not forbidden");
+    bench.drive.write_registers(MODBUS_ENABLE, &[1]).unwrap();
+    bench.drive.write_registers(TARGET_VELOCITY, &[100, 0]).unwrap();
+    assert_eq!(bench.read(0x60FF, 0), 100);
+    bench.drive.write_registers(MODBUS_ENABLE, &[0]).unwrap();
+    assert_eq!(bench.drive.write_registers(TARGET_VELOCITY, &[0, 0]), Err(RegisterError::Forbidden));
+    // Together with what follows it.
+    bench.drive.write_registers(MODBUS_ENABLE, &[1, 1]).unwrap();
+    assert_eq!(bench.read(0x2600, 0), 1);
 }

@@ -48,6 +48,8 @@ class Registers:
 def registers(bench, unit=None):
     client = ModbusTcpClient("127.0.0.1", port=bench.simulator.port("modbus"), timeout=3)
     true(client.connect(), "pymodbus connects")
+    # "0: modbus forbid" (2600h) is the value as delivered. Nobody may be there to hear it.
+    client.write_register(0, 1, device_id=bench.node_id if unit is None else unit)
     try:
         yield Registers(client, bench.node_id if unit is None else unit)
     finally:
@@ -149,6 +151,17 @@ def exceptions(bench):
         equal(unit.read(MODE), [1], "the mode afterwards")
 
 
+@check("2600h = 0 forbids writes by Modbus but its own, with exception 01, and no reads", extra=SERVED)
+def forbidden(bench):
+    with registers(bench) as unit:
+        unit.write(0, 0)
+        refused(unit.client.write_register(MODE, 3, device_id=1), ILLEGAL_FUNCTION, "a write of the mode")
+        equal(unit.read(MODE), [1], "the mode afterwards")
+        unit.write(0, 1)
+        unit.write(MODE, 3)
+        equal(unit.read(MODE), [3], "the mode")
+
+
 @check("a unit that is not there gets no answer but the gateway's exception 0B", extra=SERVED)
 def wrong_unit(bench):
     with registers(bench, unit=9) as nobody:
@@ -235,6 +248,7 @@ def serial(bench):
         true(client.connect(), "pymodbus opens the line")
         try:
             unit = Registers(client, 1)
+            unit.write(0, 1)
             equal(unit.read(GEAR, 2), [32768, 8192], "the electronic gear")
             unit.write(CONTROLWORD, 0x2F)
             unit.write_long(TARGET, 40_000)

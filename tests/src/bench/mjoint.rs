@@ -4,9 +4,11 @@ use std::sync::LazyLock;
 
 use can::Bitrate;
 use canopen::NodeId;
-use drives::mjoint::{M4230E17B50, Model};
+use drives::engine::storage::Image;
+use drives::mjoint::variations::VARIANT;
+use drives::mjoint::{M4230E17B50, Model, storage};
 use sim::VirtualDrive;
-use sim::machine::{self, MJointMachine, Order, mjoint};
+use sim::machine::{self, Joint, MJointMachine, Machine, Order, mjoint};
 
 use super::{Rows, Subject};
 use crate::mjoint::objects;
@@ -56,6 +58,17 @@ impl Bench {
         let mut order = Order::new(model, NodeId::MIN, MJoint::BITRATE);
         order.variant.choose(key, choice).expect("a reading of the joint");
         Self::with(vec![machine::order(model, &order).expect("a joint")])
+    }
+
+    /// The same with its [`machine`](Self::machine) open to the eye.
+    #[must_use]
+    #[track_caller]
+    pub fn open_as(key: &str, choice: &str) -> Self {
+        let mut variant = VARIANT;
+        variant.choose(key, choice).expect("a reading of the joint");
+        let (model, image) = (&Model::M4230E17B50, Image::of(&storage::addressed(&variant, MJoint::NODE)));
+        let firmware = drives::mjoint::MJoint::of(model, variant);
+        Self::open_with(Machine::new(firmware, Joint::new(model, image, MJoint::BITRATE)))
     }
 
     /// Writes to another joint than the first.

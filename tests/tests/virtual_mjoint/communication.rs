@@ -303,3 +303,26 @@ fn identifiers_that_cia_301_reserves_are_no_pdos() {
         assert_eq!(bench.get(index, 1), before);
     }
 }
+
+#[test]
+fn a_device_address_is_in_the_identifiers_of_pdos_at_once_and_the_node_id_after_a_power_cycle() {
+    // 5.08.2: "setting the device address via SDO sets this value as well".
+    let mut bench = Bench::new();
+    bench.set(0x1402, 1, 0x444);
+    for address in [7, 5] {
+        bench.set(0x2615, 0, address);
+        assert_eq!((bench.get(0x1400, 1), bench.get(0x1800, 1)), (0x200 + address, 0x180 + address));
+        assert_eq!(bench.get(0x1402, 1), 0x444, "one that somebody chose stays");
+    }
+    bench.heard();
+    bench.send("201#0F0001E8030000");
+    bench.run_ms(5);
+    assert!(bench.heard().iter().all(|frame| !frame.starts_with("181#")), "nobody listens to 201h");
+    bench.send("205#0F0001E8030000");
+    bench.run_ms(5);
+    assert!(bench.heard().iter().any(|frame| frame.starts_with("185#")));
+    bench.set(0x6040, 0, 0);
+    bench.save();
+    bench.power_cycle();
+    assert!(bench.heard().contains(&"705#00".to_string()), "the node-ID");
+}

@@ -57,6 +57,12 @@ impl<const N: usize> Node<N> {
         Ok(())
     }
 
+    /// The device's own write to a communication object: unchecked, in effect at once, not told to the owner.
+    pub fn write_own(&mut self, slot: Slot, raw: u32) {
+        self.dictionary.set_raw(slot, raw);
+        self.take_up(self.dictionary.table().row(slot).mux());
+    }
+
     fn check_communication(&self, mux: Mux, raw: u32) -> Result<(), AbortCode> {
         let values = self.dictionary.view();
         match (mux.index, Record::of(mux.index)) {

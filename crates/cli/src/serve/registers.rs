@@ -37,6 +37,9 @@ fn carry_out(world: &mut World, number: u8, access: &RegisterAccess) -> Result<V
         RegisterAccess::Write { address, words } => drive.write_registers(*address, words, now).map(|()| Vec::new()),
     });
     done.map_err(|_| ModbusException::ServerDeviceFailure)?.map_err(|error| match error {
+        // "It may also indicate that the server is in the wrong state to process a request of this type": MODBUS
+        // Application Protocol V1.1b3, 7, exception 01.
+        RegisterError::Forbidden => ModbusException::IllegalFunction,
         RegisterError::NoSuchAddress | RegisterError::ReadOnly => ModbusException::IllegalDataAddress,
         RegisterError::BadValue(_) => ModbusException::IllegalDataValue,
     })

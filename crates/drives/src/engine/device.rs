@@ -128,6 +128,11 @@ impl<const N: usize> Device<N> {
         self.next_task = now.plus_nanos(self.task_period_ns);
     }
 
+    /// Writes a communication object as the device itself; it takes effect at once.
+    pub fn write_own(&mut self, slot: Slot, raw: u32) {
+        self.node.write_own(slot, raw);
+    }
+
     /// Communication begins with the values that are there.
     pub fn boot(&mut self, now: Instant) {
         self.node.boot(now);

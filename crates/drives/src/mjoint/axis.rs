@@ -94,11 +94,16 @@ impl Axis {
         }
     }
 
+    /// Stays where the shaft is now: what was planned is over.
+    pub(super) fn stay(&mut self) {
+        self.trajectory = Trajectory::resting(self.feedback.position);
+        self.task = Task::Hold;
+    }
+
     /// Forgets the target of what is under way; a stop lies over it.
     pub(super) fn abandon(&mut self) {
         if !matches!(self.task, Task::Hold) {
-            self.trajectory = Trajectory::resting(self.feedback.position);
-            self.task = Task::Hold;
+            self.stay();
         }
     }
 

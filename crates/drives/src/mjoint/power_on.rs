@@ -42,6 +42,11 @@ impl Function {
         })
     }
 
+    /// Pulses are positions: pulse and direction, or an encoder.
+    pub const fn takes_pulses(self) -> bool {
+        matches!(self, Self::PulseAndDirection | Self::EncoderFollowing)
+    }
+
     /// The drive moves a holding brake.
     pub const fn has_brake(self) -> bool {
         matches!(self, Self::Brake | Self::BrakeAndReturn)

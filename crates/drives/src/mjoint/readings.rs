@@ -121,5 +121,8 @@ pub const DUTY_FULL: f32 = 0.9;
 /// See [`DUTY_ZERO`].
 pub const DUTY_FULL_RPM: f64 = 1000.0;
 
+/// 6063h in the parameter store of a joint that has never been switched off: beyond its 60000 turns.
+pub const NO_RECORD: i32 = i32::MIN;
+
 /// 260Ah: the first and second value of setting the multi-turn origin.
 pub const SET_ORIGIN: [u16; 2] = [60006, 60016];

@@ -4,7 +4,8 @@ use canopen::NodeId;
 use canopen::od::Default;
 
 use super::Values;
-use super::objects::{DEVICE_ADDRESS, TABLE};
+use super::objects::{DEVICE_ADDRESS, POSITION_ACTUAL_INTERNAL_VALUE, TABLE};
+use super::readings::NO_RECORD;
 use crate::engine::storage::stored_rows;
 use crate::variant::Variant;
 
@@ -22,6 +23,7 @@ pub fn addressed(variant: &Variant, node_id: u8) -> Values {
     if TABLE.row(DEVICE_ADDRESS.slot()).check_value(i64::from(node_id)).is_ok() {
         values.set(DEVICE_ADDRESS, u16::from(node_id));
     }
+    values.set(POSITION_ACTUAL_INTERNAL_VALUE, NO_RECORD);
     values
 }
 

@@ -148,9 +148,12 @@ pub(super) fn registers(bench: &mut Bench) {
         bench.expect("register", Expect::Near(object, 40.0 * f64::from(u8::from(index == 0x6079))), "", register);
     }
     let from = bench.report().position as f64;
+    bench.step("Modbus enable (00h)");
+    bench.write_registers(0x00, &[1]);
     bench.step("write incremental position 10000 (0Eh)");
     bench.write_registers(0x0E, &[10_000, 0]);
     super::until_reached(bench, from + 10_000.0, from, super::move_time_s(10_000.0, 1000.0, 20_000.0));
+    bench.write("Modbus forbid", 0x2600, 0, 0);
     idle(bench);
 }
 

@@ -3,7 +3,7 @@
 use can::Instant;
 use canopen::heartbeat::Consumer;
 use canopen::node::Via;
-use canopen::od::Slot;
+use canopen::od::{Default, Slot};
 use cia402::{Controlword, ModeOfOperation};
 
 use super::{Homing, MJoint, OwnMotion};
@@ -58,6 +58,8 @@ impl MJoint {
             Effect::Target => self.target_written(raw as i32, via),
             Effect::Increment => self.increment(raw as i32),
             Effect::Follow => {}
+            Effect::ModbusEnable => self.modbus_enable(raw == 1),
+            Effect::DeviceAddress => self.device_address(raw),
             Effect::OutputEnabled => self.output_enabled(raw == 1),
             Effect::AlarmCode => self.clear_alarm(raw == 0),
             Effect::GearNumerator => self.gear_numerator(raw as u16),
@@ -79,7 +81,7 @@ impl MJoint {
             self.reset_alarms();
         }
         if asked.has(Controlword::SWITCH_ON) {
-            self.own_motion = OwnMotion::None;
+            self.take_from_pulses();
         }
         self.controlword = Controlword(asked.0 & !Controlword::NEW_SET_POINT);
         self.device.values_mut().set(CONTROLWORD, self.controlword.0);
@@ -105,7 +107,7 @@ impl MJoint {
     fn select_mode(&mut self, mode: ModeOfOperation) {
         self.refresh_parameters();
         if mode == ModeOfOperation::HOMING {
-            if !matches!(self.homing, Homing::Running(_)) {
+            if !self.homing.is_under_way() {
                 self.begin_homing(mode);
             }
         } else if mode != self.mode {
@@ -171,6 +173,35 @@ impl MJoint {
             self.refresh_parameters();
             let target = self.axis.base().wrapping_add(by);
             self.axis.move_to(target, &self.parameters.moves);
+        }
+    }
+
+    /// 2600h: 1 makes pulses invalid, as bit 0 of the controlword does.
+    fn modbus_enable(&mut self, enabled: bool) {
+        if enabled {
+            self.take_from_pulses();
+            self.take_or_let_go();
+        }
+    }
+
+    /// The motor is the host's: what it did by itself ends where it is.
+    fn take_from_pulses(&mut self) {
+        if core::mem::replace(&mut self.own_motion, OwnMotion::None) != OwnMotion::None {
+            self.axis.hold(&self.parameters.ramps);
+        }
+    }
+
+    /// 2615h: "setting the device address via SDO sets this value as well" (5.08.2), the identifiers of PDOs, at once. The
+    /// node-ID itself waits for a power cycle.
+    fn device_address(&mut self, address: u32) {
+        let before = core::mem::replace(&mut self.address, address);
+        for (slot, row) in TABLE.iter() {
+            let Default::NodeIdPlus(base) = row.default else { continue };
+            // After an NMT reset of communication they may be those of the node-ID again.
+            let raw = self.values().raw(slot);
+            if raw == base + before || raw == base + u32::from(self.device.node().node_id().raw()) {
+                self.device.write_own(slot, base + address);
+            }
         }
     }
 
@@ -244,7 +275,7 @@ impl MJoint {
 
     /// The power stage drives the motor: bit 1 of the controlword, homing in mode 6, or the joint's own motion.
     fn wants_to_be_live(&self) -> bool {
-        let homing = matches!(self.homing, Homing::Running(_) | Homing::Attained);
+        let homing = self.homing.is_live();
         let own = matches!(self.own_motion, OwnMotion::Returning | OwnMotion::Following);
         self.can_be_live() && (self.controlword.has(Controlword::ENABLE_VOLTAGE) || homing || own)
     }

@@ -17,6 +17,7 @@ use crate::mjoint::parameters::{Parameters, TimeBase};
 use crate::mjoint::power_on::Function;
 use crate::mjoint::protection::Situation;
 use crate::mjoint::readings::*;
+use crate::mjoint::variations::{ORIGIN_AT_EDGE, STAYS_FREE};
 
 const DT_S: f64 = SUPERVISION_PERIOD_S as f64;
 /// Amplitude of a phase over the voltage of the bus.
@@ -54,9 +55,16 @@ impl MJoint {
     pub(super) fn watch_for_origin(&mut self, sensors: &Sensors) {
         let Homing::Running(run) = &mut self.homing else { return };
         if run.update(sensors.pu, sensors.dir, self.axis.direction()) {
-            self.homing = Homing::Attained;
-            self.make_origin();
+            self.homing = Homing::Slowing;
+            if self.device.variant().is(ORIGIN_AT_EDGE) {
+                self.end_homing();
+            }
         }
+    }
+
+    fn end_homing(&mut self) {
+        self.homing = Homing::Attained;
+        self.make_origin();
     }
 
     /// Every tenth control period.
@@ -71,6 +79,10 @@ impl MJoint {
         self.take_or_let_go();
         if self.axis.is_engaged() {
             self.direct();
+        }
+        if matches!(self.homing, Homing::Slowing) && self.axis.is_done() && feedback.standing {
+            self.axis.stay();
+            self.end_homing();
         }
         let base_s = self.time_base_s();
         self.demand = self.axis.update(DT_S, base_s);
@@ -163,7 +175,7 @@ impl MJoint {
     }
 
     pub(super) fn fail_homing(&mut self) {
-        if matches!(self.homing, Homing::Running(_)) {
+        if self.homing.is_under_way() {
             self.homing = Homing::Failed;
         }
     }
@@ -183,7 +195,7 @@ impl MJoint {
             OwnMotion::Returning if self.axis.is_done() => self.own_motion = OwnMotion::Following,
             OwnMotion::Returning => {}
             _ if self.is_host_in_control() || !self.can_be_live() => {}
-            _ if matches!(self.homing, Homing::Running(_)) => {}
+            _ if self.homing.is_under_way() => {}
             _ if self.function == Function::DutyCycleSpeed => self.follow_duty(sensors),
             _ => self.follow_pulses(by),
         }
@@ -192,8 +204,14 @@ impl MJoint {
     /// Turns that are lost are no place to go to.
     fn start_by_itself(&mut self, sensors: &Sensors) {
         self.own_motion = OwnMotion::None;
-        let known = self.turns.are_known(sensors.turns_lost) || matches!(self.function, Function::TurnToAngle(_));
-        let Some(target) = self.function.target(self.position).filter(|_| known && self.can_be_live()) else { return };
+        let record = self.power_off_position.take();
+        let known = self.turns.are_known(sensors.turns_lost);
+        let target = match self.function {
+            Function::TurnToAngle(_) => self.function.target(self.position),
+            _ if self.returns_to_power_off_position() => Some(record.filter(|_| known).unwrap_or(self.position)),
+            _ => self.function.target(self.position).filter(|_| known),
+        };
+        let Some(target) = target.filter(|_| self.can_be_live()) else { return };
         self.own_motion = OwnMotion::Returning;
         self.take_or_let_go();
         let ramps = crate::engine::trajectory::StraightRamps {
@@ -201,6 +219,11 @@ impl MJoint {
             ..self.parameters.ramps
         };
         self.axis.move_to(target, &ramps);
+    }
+
+    /// "Pulse mode: reenergize automatically back to the power off position" ("Characteristic").
+    fn returns_to_power_off_position(&self) -> bool {
+        self.function.takes_pulses() && !self.is_host_in_control() && !self.device.variant().is(STAYS_FREE)
     }
 
     fn follow_pulses(&mut self, by: i32) {
@@ -226,7 +249,7 @@ impl MJoint {
     fn direct(&mut self) {
         let ramps = self.parameters.ramps;
         let by_host = self.own_motion == OwnMotion::None;
-        let homing = matches!(self.homing, Homing::Running(_) | Homing::Attained);
+        let homing = self.homing.is_live();
         let forbidden = by_host && !homing && !self.may_move();
         if forbidden {
             // Quick stop and disabled operation end a move; halt and a lost host let it go on afterwards.

@@ -66,6 +66,10 @@ pub struct MJoint {
     amplitude: f32,
     parameters: Parameters,
     parameters_changed: bool,
+    /// 2615h, which the identifiers of PDOs follow at once.
+    address: u32,
+    /// The position at the last power-off, until the joint has looked where it is now.
+    power_off_position: Option<i32>,
     /// 260Ah without the two values that set the origin.
     gear_numerator: u16,
     /// 60006 has been written to 260Ah.
@@ -115,8 +119,21 @@ enum Homing {
     /// Not begun.
     None,
     Running(Run),
+    /// The edge has passed: it slows down, and where it then stands is the origin.
+    Slowing,
     Attained,
     Failed,
+}
+
+impl Homing {
+    const fn is_under_way(&self) -> bool {
+        matches!(self, Self::Running(_) | Self::Slowing)
+    }
+
+    /// It has the motor: on the way, and holding at its end.
+    const fn is_live(&self) -> bool {
+        self.is_under_way() || matches!(self, Self::Attained)
+    }
 }
 
 /// What the joint does without being told over CAN.
@@ -152,6 +169,7 @@ impl MJoint {
         Self {
             model,
             gear_numerator: device.values().get(GEAR_NUMERATOR),
+            address: u32::from(device.values().get(DEVICE_ADDRESS)),
             servo: Servo::new(&parameters.servo, 0, 0),
             weakening: FieldWeakening::default(),
             amplitude,
@@ -162,6 +180,7 @@ impl MJoint {
             function,
             parameters,
             parameters_changed: false,
+            power_off_position: None,
             origin_asked: false,
             set_origin: false,
             save_asked: false,
@@ -217,8 +236,11 @@ impl MJoint {
     fn start(&mut self, node_id: NodeId, bitrate: Bitrate, now: Instant) {
         self.device.restart(node_id, bitrate, now);
         let started = Self::over(self.model, self.device.clone());
-        let (powered_at, turns) = (self.powered_at, self.turns);
-        *self = Self { powered_at, turns, own_motion: OwnMotion::Starting, ..started };
+        let (powered_at, turns, power_off_position) = (self.powered_at, self.turns, self.power_off_position.take());
+        *self = Self { powered_at, turns, power_off_position, own_motion: OwnMotion::Starting, ..started };
+        if self.values().get(POSITION_ACTUAL_INTERNAL_VALUE) == NO_RECORD {
+            self.device.values_mut().set(POSITION_ACTUAL_INTERNAL_VALUE, 0);
+        }
         let by_host = self.gear_numerator == 0 || self.function == Function::CommunicationControl;
         self.device.values_mut().set(MODBUS_ENABLE, u16::from(by_host));
         self.host = Consumer::from_raw(self.values().get(CONSUMER_HEARTBEAT_TIME));
@@ -330,7 +352,9 @@ impl Firmware for MJoint {
         let values = self.device.stored_values();
         let readable = self.device.is_eeprom_sound();
         let has_brake = Function::from_raw(values.get(MODE_SELECTION)).is_some_and(Function::has_brake);
-        self.turns = Turns::new((readable && has_brake).then(|| values.get(POSITION_ACTUAL_INTERNAL_VALUE)));
+        let record = Some(values.get(POSITION_ACTUAL_INTERNAL_VALUE)).filter(|record| readable && *record != NO_RECORD);
+        self.turns = Turns::new(record.filter(|_| has_brake));
+        self.power_off_position = record;
         let address = u8::try_from(values.get(DEVICE_ADDRESS)).ok().and_then(NodeId::new);
         self.start(address.unwrap_or(NodeId::MIN), hardware.bitrate, now);
     }

@@ -59,12 +59,19 @@ impl MJoint {
             controlword: self.controlword,
             output_enabled: self.values().get(OUTPUT_ENABLED) == 1,
             alarm: !self.alarms.latched().is_empty(),
-            live: self.axis.is_engaged(),
+            live: self.is_shown_live(),
             reached: self.is_target_reached(),
             homing_attained: in_homing && matches!(self.homing, Homing::Attained),
             homing_error: in_homing && matches!(self.homing, Homing::Failed),
         };
         self.device.values_mut().set(STATUSWORD, statusword(&condition).0);
+    }
+
+    /// Bit 4: of a joint that takes pulses it tells nothing until the host asks. 0404h is what 5.10.1 prints for one that
+    /// was just switched on, and such a one holds its shaft.
+    fn is_shown_live(&self) -> bool {
+        let by_host = self.controlword.has(Controlword::ENABLE_VOLTAGE) || self.homing.is_live();
+        self.axis.is_engaged() && (by_host || !self.function.takes_pulses())
     }
 
     /// Bit 10: nothing is left to be done. An alarm that stops the motor leaves it undone.

@@ -3,7 +3,8 @@
 //!
 //! Addresses and words go in, words or a [`RegisterError`] come out; framing, checksums and lines are others' work. A
 //! write is checked against the object table and has the consequences of an SDO download of the same value. Unlike
-//! SDO, registers do not depend on the NMT state. 2600h forbids no access: it says whose targets count.
+//! SDO, registers do not depend on the NMT state. While 2600h is 0, "modbus forbid", only 2600h itself can be written: it is
+//! the first register, so that a master can enable itself.
 
 use canopen::AbortCode;
 use canopen::node::Via;
@@ -11,8 +12,12 @@ use canopen::od::{Entry, Slot};
 
 use super::MJoint;
 use crate::RegisterError;
-use crate::mjoint::objects::TABLE;
 use crate::mjoint::objects::modbus::{Register, find};
+use crate::mjoint::objects::{MODBUS_ENABLE, TABLE};
+use crate::mjoint::variations::FORBIDS_NOTHING;
+
+/// Address of 2600h.
+const ENABLE_ADDRESS: u16 = 0x00;
 
 /// What some of the given words mean for one object.
 struct Change {
@@ -51,6 +56,9 @@ impl MJoint {
     /// # Errors
     /// See [`RegisterError`].
     pub fn write_registers(&mut self, address: u16, words: &[u16]) -> Result<(), RegisterError> {
+        if !self.takes_writes(address, words) {
+            return Err(RegisterError::Forbidden);
+        }
         let mut done = 0;
         while done < words.len() {
             let change = self.change(address, done, &words[done..])?;
@@ -66,6 +74,12 @@ impl MJoint {
         }
         self.publish_status();
         Ok(())
+    }
+
+    /// 2600h is 1, or this write makes it so, or touches nothing else.
+    fn takes_writes(&self, address: u16, words: &[u16]) -> bool {
+        let enabled = self.values().get(MODBUS_ENABLE) == 1 || self.device.variant().is(FORBIDS_NOTHING);
+        enabled || (address == ENABLE_ADDRESS && (words.len() <= 1 || words[0] == 1))
     }
 
     /// What the first of `words`, at `address + offset`, and the next if it belongs to it, make of their object.

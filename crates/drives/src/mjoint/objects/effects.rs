@@ -16,6 +16,8 @@ pub enum Effect {
     Increment,
     /// 60FFh: read each period.
     Follow,
+    /// 2600h: 1 takes the motor away from pulses.
+    ModbusEnable,
     /// 2601h: the power stage; from 0 to 1 it resets alarms.
     OutputEnabled,
     /// 260Eh: 0 clears the alarm.
@@ -24,6 +26,8 @@ pub enum Effect {
     GearNumerator,
     /// 2614h.
     Save,
+    /// 2615h: the identifiers of PDOs.
+    DeviceAddress,
     /// 1016h:01: another watch over the host.
     ConsumerHeartbeat,
     /// Anything else.
@@ -36,7 +40,9 @@ crate::row::effects! { ROW_COUNT else Parameter:
     TARGET_POSITION => Target;
     TARGET_VELOCITY => Follow;
     INCREMENTAL_POSITION => Increment;
+    MODBUS_ENABLE => ModbusEnable;
     OUTPUT_ENABLED => OutputEnabled;
+    DEVICE_ADDRESS => DeviceAddress;
     ALARM_CODE => AlarmCode;
     GEAR_NUMERATOR => GearNumerator;
     DATA_SAVE_FLAG => Save;
