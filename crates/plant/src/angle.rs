@@ -76,6 +76,13 @@ pub struct Axis {
     pub cos: f64,
 }
 
+impl Default for Axis {
+    /// The direction at angle zero.
+    fn default() -> Self {
+        Axis { sin: 0.0, cos: 1.0 }
+    }
+}
+
 impl Axis {
     /// The direction at an angle in turns.
     #[inline]

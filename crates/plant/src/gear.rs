@@ -16,10 +16,18 @@
 //! step in which a side turns round its work may therefore have either sign.
 //! The loss in the teeth is a dry friction of the motor's side that grows with the torque transmitted: driving
 //! forward costs `mesh_loss`, and driving backward too. The output's angle is the motor's less the twist: the two
-//! never drift apart. In a step in which teeth meet or part the spring's torque is what its energy changes by over the
+//! never drift apart. A harmonic gear has three more traits, each of which may be left at zero:
+//!
+//! * a kinematic error, twice per turn of its wave generator: the twist is `motor angle / ratio + error * sin(2 motor angle)
+//!   - output angle`, and the ratio of the moment goes with it, so that it drives vibrations;
+//! * dry friction of its output side, behind the spring: the output stands on one side or the other of where the motor
+//!   points, as it came;
+//! * ratcheting: from a torque on its teeth jump, what is wound up is gone as heat, and the output stands elsewhere.
+//!
+//! In a step in which teeth meet or part the spring's torque is what its energy changes by over the
 //! twist, solved by Newton's rule, so that a backlash neither gives nor takes energy.
 
-use crate::angle::Angle;
+use crate::angle::{Angle, Axis};
 use crate::mechanics::{Load, RotorData, RotorModel};
 
 const INV_TAU: f64 = 1.0 / core::f64::consts::TAU;
@@ -27,6 +35,8 @@ const INV_TAU: f64 = 1.0 / core::f64::consts::TAU;
 const NEWTON_STEPS: u32 = 12;
 /// Relative change of the twist's rate at which it is done.
 const NEWTON_DONE: f64 = 1e-12;
+/// An overload is over, and the next one another, when the torque has fallen to this share of the peak.
+const OVERLOAD_ENDS: f64 = 0.9;
 
 /// What never changes about a gear.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,6 +57,14 @@ pub struct GearModel {
     pub viscous_nm_s: f64,
     /// Loss in the teeth as a share of the torque transmitted.
     pub mesh_loss: f64,
+    /// Dry friction of the output side, at the output: flexspline, bearing and seal.
+    pub output_coulomb_nm: f64,
+    /// Amplitude of the kinematic error, at the output.
+    pub kinematic_error_rad: f64,
+    /// Torque that it may transmit for moments; more is counted as an overload.
+    pub peak_nm: f64,
+    /// Torque from which its teeth jump.
+    pub ratchet_nm: f64,
 }
 
 /// State of the gear and its output. The motor's side is a [`RotorData`].
@@ -58,6 +76,24 @@ pub struct GearData {
     pub output_velocity_rad_s: f64,
     /// Torque on the output, mean over the last step.
     pub torque_nm: f64,
+    /// What the output was left behind by, over all jumps of the teeth.
+    pub slip_rad: f64,
+    /// The most that has been transmitted so far.
+    pub most_nm: f64,
+    /// How often the torque rose over what the gear may transmit.
+    pub overloads: u32,
+    /// How often the teeth have jumped.
+    pub jumps: u32,
+    overloaded: bool,
+    /// Direction at twice the motor's angle: where in its error the gear is.
+    error_axis: Axis,
+}
+
+impl GearData {
+    /// A new gear in the place of this one: it has not slipped and borne nothing.
+    pub fn forget_damage(&mut self) {
+        (self.slip_rad, self.most_nm, self.overloads, self.jumps, self.overloaded) = (0.0, 0.0, 0, 0, false);
+    }
 }
 
 /// What acts on both sides during one step.
@@ -87,7 +123,22 @@ pub struct GearOutput {
 impl GearModel {
     /// The output's angle.
     pub fn output_angle(&self, data: &GearData, motor: Angle) -> Angle {
-        Angle::from_turns(motor.as_turns() / self.ratio - data.twist_rad * INV_TAU)
+        let error_rad = self.kinematic_error_rad * Axis::at_turns(2.0 * motor.fraction()).sin;
+        Angle::from_turns(motor.as_turns() / self.ratio + (error_rad - data.twist_rad - data.slip_rad) * INV_TAU)
+    }
+
+    /// A gear that has nothing wound up while its motor stands at an angle.
+    pub fn at_rest(&self, motor: Angle) -> GearData {
+        let mut data = GearData::default();
+        self.align(&mut data, motor);
+        data
+    }
+
+    /// Takes the motor's angle afresh: what is summed up from step to step would drift in the long run.
+    pub(crate) fn align(&self, data: &mut GearData, motor: Angle) {
+        if self.kinematic_error_rad != 0.0 {
+            data.error_axis = Axis::at_turns(2.0 * motor.fraction());
+        }
     }
 
     /// Twist beyond the backlash: what the spring feels.
@@ -113,7 +164,7 @@ impl GearModel {
     pub fn driven_torque_nm(&self, rotor: &RotorModel, motor_nm: f64, motor_velocity_rad_s: f64) -> f64 {
         let viscous = rotor.viscous_nm_s + self.viscous_nm_s;
         let lost = rotor.coulomb_nm + self.coulomb_nm + viscous * motor_velocity_rad_s;
-        self.ratio * (motor_nm - lost) / (1.0 + self.mesh_loss)
+        self.ratio * (motor_nm - lost) / (1.0 + self.mesh_loss) - self.output_coulomb_nm
     }
 
     /// Moves both sides by one step, angles included.
@@ -131,7 +182,14 @@ impl GearModel {
             data.output_velocity_rad_s = 0.0;
         }
         let windup_rad = self.windup_rad(data.twist_rad);
-        let masses = Masses::new(self, data, rotor, motor.velocity_rad_s, dt_s, input);
+        // The ratio of the moment, in the middle of the step as far as it can be known.
+        let lead = if self.kinematic_error_rad == 0.0 {
+            0.0
+        } else {
+            let half_way = dt_s * (motor.velocity_rad_s + 0.5 * motor.velocity_change_rad_s);
+            2.0 * self.kinematic_error_rad * data.error_axis.turned_by(Axis::at_small_rad(half_way)).cos
+        };
+        let masses = Masses::new(self, data, rotor, motor, lead, dt_s, input);
         let side = self.side(data.twist_rad);
         let (spring_nm, coupling) = if side == 0.0 {
             (0.0, 0.0)
@@ -149,6 +207,13 @@ impl GearModel {
         let mean = [0.5 * (masses.before[0] + moved.after[0]), 0.5 * (masses.before[1] + moved.after[1])];
 
         data.twist_rad += dt_s * moved.twist_rate;
+        if self.kinematic_error_rad != 0.0 {
+            // What the error truly changed by, in place of what the ratio in the middle of the step made of it.
+            let before = data.error_axis;
+            data.error_axis = before.turned_by(Axis::at_small_rad(2.0 * dt_s * mean[0]));
+            data.twist_rad += self.kinematic_error_rad * (data.error_axis.sin - before.sin) - lead * dt_s * mean[0];
+        }
+        self.watch_strength(data, moved.torque_nm);
         data.output_velocity_rad_s = moved.after[1];
         data.torque_nm = moved.torque_nm;
         motor.angle = motor.angle.advanced_by(mean[0] * dt_s * INV_TAU);
@@ -168,6 +233,34 @@ impl GearModel {
             output_velocity_rad_s: mean[1],
             friction_j: motor_nm * mean[0] * dt_s - load_j - gained_j,
             load_j,
+        }
+    }
+
+    /// Counts overloads, and lets the teeth jump.
+    #[inline]
+    fn watch_strength(&self, data: &mut GearData, torque_nm: f64) {
+        let size_nm = torque_nm.abs();
+        if size_nm > data.most_nm {
+            data.most_nm = size_nm;
+        }
+        if size_nm > self.peak_nm {
+            self.overload(data);
+        } else if data.overloaded && size_nm < OVERLOAD_ENDS * self.peak_nm {
+            data.overloaded = false;
+        }
+    }
+
+    #[inline(never)]
+    fn overload(&self, data: &mut GearData) {
+        if !data.overloaded {
+            data.overloaded = true;
+            data.overloads = data.overloads.saturating_add(1);
+        }
+        let windup_rad = self.windup_rad(data.twist_rad);
+        if self.stiffness_nm_rad * windup_rad.abs() > self.ratchet_nm {
+            data.twist_rad -= windup_rad;
+            data.slip_rad += windup_rad;
+            data.jumps = data.jumps.saturating_add(1);
         }
     }
 
@@ -244,12 +337,13 @@ impl Masses {
         gear: &GearModel,
         data: &GearData,
         rotor: &RotorModel,
-        velocity_rad_s: f64,
+        shaft: &RotorData,
+        lead: f64,
         dt_s: f64,
         input: &GearInput<'_>,
     ) -> Self {
         let GearInput { motor_nm, brake_nm, load } = *input;
-        let inverse_ratio = 1.0 / gear.ratio;
+        let inverse_ratio = 1.0 / gear.ratio + lead;
         let twice_rate = 2.0 / dt_s;
         let motor = rotor.inertia_kg_m2 * twice_rate;
         let output = (gear.output_inertia_kg_m2 + load.inertia_kg_m2) * twice_rate;
@@ -258,11 +352,11 @@ impl Masses {
         let touching = gear.side(data.twist_rad) != 0.0;
         let mesh_nm = if touching { gear.mesh_loss * data.torque_nm.abs() * inverse_ratio } else { 0.0 };
         Masses {
-            before: [velocity_rad_s, data.output_velocity_rad_s],
+            before: [shaft.velocity_rad_s, data.output_velocity_rad_s],
             sum: [motor + viscous[0], output + viscous[1]],
             difference: [motor - viscous[0], output - viscous[1]],
             drive: [motor_nm, -load.torque_nm],
-            dry: [rotor.coulomb_nm + gear.coulomb_nm + brake_nm + mesh_nm, load.coulomb_nm],
+            dry: [rotor.coulomb_nm + gear.coulomb_nm + brake_nm + mesh_nm, load.coulomb_nm + gear.output_coulomb_nm],
             inverse_ratio,
             locked: load.locked,
         }

@@ -8,12 +8,16 @@
 use crate::absolute_encoder::{AbsoluteEncoderData, AbsoluteEncoderModel, BatteryState};
 use crate::angle::{Angle, Axis};
 use crate::brake::BrakeModel;
+use crate::clamp::ClampModel;
 use crate::cogging::Cogging;
 use crate::gear::{GearData, GearInput, GearModel};
 use crate::hub_motor::Inverter;
 use crate::mechanics::{RotorData, RotorModel};
 use crate::pmsm::{Phase, PmsmData, PmsmInput, PmsmModel};
 use crate::rig::{Rig, RigModel};
+
+/// Assumed: what a seized bearing holds against, far more than the motor or the load through the gear gives.
+const SEIZED_NM: f64 = 100.0;
 
 /// What never changes about a joint and the power stage it is built with.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,6 +38,12 @@ pub struct JointMotorModel {
     pub brake: BrakeModel,
     /// Warm bodies, power stage and supply; the supply's bleeder is the external discharge module.
     pub rig: RigModel,
+    /// What limits the voltage of the bus.
+    pub clamp: ClampModel,
+    /// Temperature of the heat sink at which the power stage melts through.
+    pub power_stage_limit_c: f64,
+    /// Speed at which the wave generator's bearing seizes.
+    pub bearing_limit_rad_s: f64,
 }
 
 /// What the drive does during one step.
@@ -91,6 +101,8 @@ pub struct JointMotor {
     /// Torque of the motor on its rotor, mean over the last step, cogging included.
     pub torque_nm: f64,
     axis: Axis,
+    power_stage_burnt: bool,
+    seized: bool,
 }
 
 impl JointMotor {
@@ -101,7 +113,7 @@ impl JointMotor {
             model,
             pmsm: PmsmData::default(),
             rotor: RotorData { angle: motor_angle, ..RotorData::default() },
-            gear: GearData::default(),
+            gear: model.gear.at_rest(motor_angle),
             encoder: model.encoder.with_full_battery(),
             lost_phase: None,
             discharge_from_v: None,
@@ -109,6 +121,8 @@ impl JointMotor {
             rig: Rig::new(&model.rig, model.pmsm.resistance_ohm, source_v, ambient_c),
             torque_nm: 0.0,
             axis: Axis::at_turns(model.pmsm.electrical_turns(motor_angle)),
+            power_stage_burnt: false,
+            seized: false,
         }
     }
 
@@ -121,14 +135,16 @@ impl JointMotor {
         // The winding goes by the velocity that is expected in the middle of the step, the angle by the real one.
         let velocity_rad_s = self.rotor.velocity_rad_s + 0.5 * self.rotor.velocity_change_rad_s;
         let input = PmsmInput {
-            terminals: actuation.inverter.terminals(self.rig.supply.bus_v),
+            terminals: self.inverter(actuation).terminals(self.rig.supply.bus_v),
             lost_phase: self.lost_phase,
             resistance_ohm: self.rig.path_ohm(&model.rig),
             axis: self.axis.turned_by(Axis::at_small_rad(0.5 * electrical_s * velocity_rad_s)),
             velocity_rad_s,
         };
         let motor = model.pmsm.step(&mut self.pmsm, dt_s, &input);
-        let brake_nm = model.brake.torque_nm(actuation.brake_released);
+        // A seized bearing is a brake that nothing lets go of.
+        let seized_nm = if self.seized { SEIZED_NM } else { 0.0 };
+        let brake_nm = model.brake.torque_nm(actuation.brake_released) + seized_nm;
         let motor_nm = motor.torque_nm + self.cogging.map_or(0.0, |cogging| cogging.torque_nm(self.rotor.angle));
         let shafts = GearInput { motor_nm, brake_nm, load: &self.rig.load };
         let moved = model.gear.step(&mut self.gear, &model.rotor, &mut self.rotor, dt_s, &shafts);
@@ -139,10 +155,47 @@ impl JointMotor {
         }
         self.torque_nm = motor_nm;
 
-        let flows = motor.flows(moved.friction_j, moved.load_j);
+        let clamp_w = model.clamp.power_w(self.rig.supply.bus_v);
+        let mut flows = motor.flows(moved.friction_j, moved.load_j);
+        flows.bus_w += clamp_w;
+        flows.arc_j += clamp_w * dt_s;
         if self.rig.step(&model.rig, dt_s, &flows, discharging) {
             self.step_slow();
         }
+    }
+
+    /// What the bridge does: molten switches join the wires, whatever the drive wants.
+    #[inline]
+    fn inverter(&self, actuation: &Actuation) -> Inverter {
+        if self.power_stage_burnt { Inverter::Shorted } else { actuation.inverter }
+    }
+
+    /// Molten switches join the motor's wires and short the bus, so that the source's fuse blows.
+    #[cold]
+    pub fn burn_power_stage(&mut self) {
+        self.power_stage_burnt = true;
+        self.rig.cut_source(&self.model.rig);
+    }
+
+    /// A new power stage. The source is connected again by whoever put it in.
+    pub fn mend_power_stage(&mut self) {
+        self.power_stage_burnt = false;
+    }
+
+    /// The power stage has melted through.
+    pub fn is_power_stage_burnt(&self) -> bool {
+        self.power_stage_burnt
+    }
+
+    /// The wave generator's bearing has seized: the motor's shaft stands.
+    pub fn is_seized(&self) -> bool {
+        self.seized
+    }
+
+    /// A new reducer, wave generator and all: nothing is seized, nothing has slipped.
+    pub fn replace_reducer(&mut self) {
+        self.seized = false;
+        self.gear.forget_damage();
     }
 
     /// Heat of the last steps into the bodies, the winding's resistance, the encoder's battery, and the magnets'
@@ -150,9 +203,17 @@ impl JointMotor {
     fn step_slow(&mut self) {
         let model = &self.model;
         let time_s = self.rig.step_slow(&model.rig, model.pmsm.resistance_ohm);
+        let heat_sink = &self.rig.heat_sink;
+        let melts = heat_sink.hold_c.is_none() && heat_sink.temperature_c > model.power_stage_limit_c;
+        if melts || (self.power_stage_burnt && self.rig.supply.connected) {
+            self.burn_power_stage();
+        }
+        let model = &self.model;
+        self.seized |= self.rotor.velocity_rad_s.abs() > model.bearing_limit_rad_s;
         let powered = self.rig.supply.bus_v > model.rig.supply.consumption_from_v;
         model.encoder.step(&mut self.encoder, time_s, self.rotor.angle, powered);
         self.axis = Axis::at_turns(model.pmsm.electrical_turns(self.rotor.angle));
+        model.gear.align(&mut self.gear, self.rotor.angle);
     }
 
     /// What the sensors read now.

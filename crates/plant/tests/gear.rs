@@ -17,6 +17,10 @@ const GEAR: GearModel = GearModel {
     coulomb_nm: 0.0,
     viscous_nm_s: 0.0,
     mesh_loss: 0.0,
+    output_coulomb_nm: 0.0,
+    kinematic_error_rad: 0.0,
+    peak_nm: f64::INFINITY,
+    ratchet_nm: f64::INFINITY,
 };
 
 /// Both shafts.
@@ -204,12 +208,12 @@ fn the_loss_in_the_teeth_costs_when_driving_and_when_driven() {
     // Held against the same load between (1 - 0.25) and (1 + 0.25) of 40 / 50 N m it does not move.
     for motor_nm in [0.61, 0.99] {
         let mut held = Bench::new(gear, ROTOR, bench.load);
-        held.data = GearData { twist_rad: 40.0 / gear.stiffness_nm_rad, torque_nm: 40.0, ..GearData::default() };
+        (held.data.twist_rad, held.data.torque_nm) = (40.0 / gear.stiffness_nm_rad, 40.0);
         held.run(20_000, motor_nm);
         assert!(held.motor.angle.as_rad().abs() < 1e-9, "{}", held.motor.angle.as_rad());
     }
     let mut falling = Bench::new(gear, ROTOR, bench.load);
-    falling.data = GearData { twist_rad: 40.0 / gear.stiffness_nm_rad, torque_nm: 40.0, ..GearData::default() };
+    (falling.data.twist_rad, falling.data.torque_nm) = (40.0 / gear.stiffness_nm_rad, 40.0);
     falling.run(20_000, 0.59);
     assert!(falling.motor.velocity_rad_s < -1.0);
 }
@@ -281,4 +285,82 @@ proptest! {
             prop_assert!(bench.motor.velocity_rad_s.is_finite() && bench.data.twist_rad.is_finite());
         }
     }
+}
+
+const ERROR_RAD: f64 = 2.2e-4;
+
+#[test]
+fn the_output_runs_ahead_and_behind_twice_a_turn_of_the_motor() {
+    let gear = GearModel { kinematic_error_rad: ERROR_RAD, damping_nm_s_rad: 40.0, ..GEAR };
+    let mut bench = Bench::new(gear, ROTOR, Load::default());
+    bench.motor.velocity_rad_s = 10.0;
+    bench.data.output_velocity_rad_s = 0.2;
+    let (mut most, mut turns, mut before, mut off_rad): (f64, u32, f64, f64) = (0.0, 0, 0.0, 0.0);
+    while bench.motor.angle.as_turns() < 20.0 {
+        bench.step(0.0);
+        let ahead = bench.output_rad() - bench.motor.angle.as_rad() / gear.ratio;
+        let expected = ERROR_RAD * libm::sin(2.0 * bench.motor.angle.as_rad());
+        most = most.max(ahead.abs());
+        off_rad = off_rad.max((ahead - expected).abs());
+        turns += u32::from(before < 0.0 && ahead >= 0.0);
+        before = ahead;
+    }
+    assert!(near(most, ERROR_RAD, 0.05), "{most}");
+    assert!(off_rad < 0.05 * ERROR_RAD, "{off_rad}: an unloaded spring follows");
+    assert!((39..=41).contains(&turns), "{turns} periods in 20 turns");
+}
+
+#[test]
+fn an_error_drives_the_twist_of_a_locked_output_and_keeps_the_energies() {
+    let gear = GearModel { kinematic_error_rad: ERROR_RAD, output_coulomb_nm: 1.0, damping_nm_s_rad: 5.0, ..GEAR };
+    for locked in [false, true] {
+        let load = Load { inertia_kg_m2: 0.1, locked, ..Load::default() };
+        let mut bench = Bench::new(gear, ROTOR, load);
+        for step in 0..40_000_u32 {
+            bench.step(0.3 * libm::sin(f64::from(step) * 2e-3));
+        }
+        let rest_j = bench.brought_j - bench.stored_j() - bench.friction_j - bench.load_j;
+        assert!(rest_j.abs() < 1e-9 * bench.friction_j.max(1.0), "{rest_j} J missing");
+        assert!(bench.friction_j > 0.0);
+        assert!(!locked || bench.output_rad().abs() < 1e-12, "{}", bench.output_rad());
+    }
+}
+
+#[test]
+fn behind_a_held_motor_the_output_stands_by_its_dry_friction_over_the_stiffness_off_the_middle_as_it_came() {
+    let gear = GearModel { output_coulomb_nm: 2.0, damping_nm_s_rad: 40.0, ..GEAR };
+    let rotor = RotorModel { coulomb_nm: 100.0, ..ROTOR };
+    let stands_after = |from_nm: f64| {
+        let mut bench = Bench::new(gear, rotor, Load::default());
+        for step in 0..=20_000_u32 {
+            bench.load.torque_nm = from_nm * (1.0 - f64::from(step) / 20_000.0);
+            bench.step(0.0);
+        }
+        bench.output_rad()
+    };
+    let width = stands_after(-30.0) - stands_after(30.0);
+    assert!(near(width, 2.0 * 2.0 / GEAR.stiffness_nm_rad, 0.1), "{width} rad");
+}
+
+#[test]
+fn above_its_peak_a_gear_counts_overloads_and_from_its_ratcheting_torque_its_teeth_jump() {
+    let gear = GearModel { peak_nm: 44.0, ratchet_nm: 190.0, damping_nm_s_rad: 40.0, ..GEAR };
+    let load = Load { locked: true, ..Load::default() };
+    let mut bench = Bench::new(gear, ROTOR, load);
+    // 0.4 and 1.0 N m are 20 and 50 N m at the output.
+    for (motor_nm, overloads) in [(0.4, 0), (1.0, 1), (0.4, 1), (1.0, 2)] {
+        for step in 0..40_000_u32 {
+            let before = bench.data.torque_nm / gear.ratio;
+            bench.step(before + (motor_nm - before) * f64::from(step) / 40_000.0);
+        }
+        assert_eq!((bench.data.overloads, bench.data.jumps), (overloads, 0), "{motor_nm} N m");
+    }
+    assert_eq!(bench.data.slip_rad, 0.0);
+    bench.run(20_000, 5.0);
+    assert!(bench.data.jumps > 0 && bench.data.most_nm > gear.ratchet_nm, "{:?}", bench.data);
+    // It jumps by what 190 N m wind up, at least, and the output has not moved.
+    assert!(bench.data.slip_rad >= f64::from(bench.data.jumps) * 190.0 / GEAR.stiffness_nm_rad);
+    assert!(bench.output_rad().abs() < 1e-12);
+    let rest_j = bench.brought_j - bench.stored_j() - bench.friction_j;
+    assert!(rest_j.abs() < 1e-9 * bench.friction_j, "{rest_j} J missing");
 }

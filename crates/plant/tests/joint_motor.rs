@@ -134,7 +134,8 @@ fn without_load_and_without_a_weakened_field_a_joint_ends_where_its_back_emf_is_
         let most = 36.0 / libm::sqrt(3.0) * 1.5 * libm::sqrt(2.0) * current_a / motor_nm;
         let velocity = joint.rotor.velocity_rad_s;
         assert!((0.97 * most..most).contains(&velocity), "{}: {velocity} of {most} rad/s", model.name);
-        assert!(near(joint.gear.output_velocity_rad_s, velocity / ratio, 1e-3), "{}", model.name);
+        // The kinematic error makes the output's speed swing by twice its amplitude times the ratio, up to 3.5 %.
+        assert!(near(joint.gear.output_velocity_rad_s, velocity / ratio, 0.04), "{}", model.name);
     }
 }
 
@@ -154,9 +155,10 @@ fn a_joint_lifts_its_printed_torque_as_fast_as_the_voltage_allows() {
             q_v = (q_v + 2e-3 * (target - joint.gear.output_velocity_rad_s)).clamp(0.0, full);
             run(&mut joint, 1, q_v);
         }
-        let velocity = joint.gear.output_velocity_rad_s;
+        let velocity = joint.rotor.velocity_rad_s / ratio;
         assert!(near(velocity, target, 0.03), "{}: {velocity} of {target} rad/s at {q_v} V", model.name);
-        assert!(near(joint.gear.torque_nm, output_nm, 0.05), "{}: {} N m", model.name, joint.gear.torque_nm);
+        // With the output's own friction, and the swing of the kinematic error.
+        assert!(near(joint.gear.torque_nm, output_nm, 0.1), "{}: {} N m", model.name, joint.gear.torque_nm);
     }
 }
 
@@ -179,8 +181,13 @@ fn the_encoder_counts_the_motors_shaft_and_the_output_turns_by_the_ratio_less() 
     let counted = joint.sense().position_counts - before;
     assert!(counted > 5 * 32_768);
     let turned = joint.output_angle().as_turns() - output;
-    // Backlash of 20 arc seconds at most, and the windup of friction.
-    assert!((turned * 50.0 - f64::from(counted) / 32_768.0).abs() < 50.0 * 20.0 / 3600.0 / 360.0 + 1.0 / 32_768.0);
+    // Backlash of 20 arc seconds at most, the windup of friction, and the kinematic error.
+    let gear = &MODEL.gear;
+    let off_rad = (20.0_f64 / 3600.0).to_radians()
+        + 2.0 * gear.kinematic_error_rad
+        + gear.output_coulomb_nm / gear.stiffness_nm_rad;
+    let off_turns = (turned * 50.0 - f64::from(counted) / 32_768.0).abs();
+    assert!(off_turns < 50.0 * off_rad / TAU + 1.0 / 32_768.0, "{off_turns} turns of the motor");
 }
 
 #[test]
@@ -233,7 +240,8 @@ fn an_origin_set_by_command_is_zero_and_clears_the_loss() {
 
 #[test]
 fn a_locked_output_winds_up_by_torque_over_stiffness_and_the_encoder_sees_only_that() {
-    let frictionless = plant::gear::GearModel { coulomb_nm: 0.0, mesh_loss: 0.0, ..MODEL.gear };
+    let frictionless =
+        plant::gear::GearModel { coulomb_nm: 0.0, mesh_loss: 0.0, kinematic_error_rad: 0.0, ..MODEL.gear };
     let model = JointMotorModel {
         gear: frictionless,
         rotor: RotorModel { coulomb_nm: 0.0, viscous_nm_s: 0.01, ..MODEL.rotor },

@@ -290,6 +290,23 @@ impl Levels {
     }
 }
 
+/// The shaft behind a reducer, and what the reducer has borne. No drive measures it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OutputShaft {
+    /// Its angle in rad, many turns: the motor's over the ratio, but for the reducer's error, twist and slip.
+    pub angle_rad: f64,
+    /// Torque that the reducer gives it in N·m.
+    pub torque_nm: f64,
+    /// The most that there has been in N·m.
+    pub most_nm: f64,
+    /// How often it was more than the reducer may transmit.
+    pub overloads: u32,
+    /// How often the reducer's teeth have jumped.
+    pub jumps: u32,
+    /// What the output was left behind by in doing so, in rad.
+    pub slip_rad: f64,
+}
+
 /// What can be measured at a drive from outside, and what its own actual values say.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
@@ -325,6 +342,8 @@ pub struct Report {
     pub outputs: Levels,
     /// The holding brake, where there is one.
     pub brake: Option<Brake>,
+    /// The shaft behind a reducer, where there is one.
+    pub output: Option<OutputShaft>,
     /// What has been destroyed, and what to do about it.
     pub damage: Option<&'static str>,
     /// True angle of the motor shaft in rad, many turns, from where it stood at the start.

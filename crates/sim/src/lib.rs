@@ -22,8 +22,8 @@ mod world;
 
 pub use block_on::{BlockOnError, block_on, block_on_for};
 pub use drive::{
-    Brake, Component, Levels, PulseTrain, Refused, Report, Source, SwitchRange, TemperatureSensor, VirtualDrive,
-    VirtualDriveClone,
+    Brake, Component, Levels, OutputShaft, PulseTrain, Refused, Report, Source, SwitchRange, TemperatureSensor,
+    VirtualDrive, VirtualDriveClone,
 };
 pub use drives::RegisterError;
 pub use prng::Prng;

@@ -248,6 +248,7 @@ fn of_several_cached_positions_sync_takes_the_last() {
     bench.send("080#");
     bench.until_reached(1000);
     assert!((bench.position() - 1000).abs() <= 30, "{}", bench.position());
+    bench.run_ms(500);
     bench.send("080#");
     assert_eq!(bench.statusword(), 0x0437, "it is used up");
 }

@@ -17,4 +17,5 @@ mod objects;
 mod power_on;
 mod pulses;
 mod ratings;
+mod reducer;
 mod robustness;

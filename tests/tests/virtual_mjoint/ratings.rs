@@ -81,7 +81,7 @@ fn at_the_rated_current_the_rated_torque_comes_out_and_the_supply_pays_for_it() 
         bench.run_ms(500);
         let shown_a = bench.get(0x6078, 0) as f64 / 2000.0;
         // Printed at the rated speed, where friction is a little more.
-        assert!((0.95..1.005).contains(&(shown_a / rated[n])), "{}: {shown_a} A", model.name);
+        assert!((0.93..1.02).contains(&(shown_a / rated[n])), "{}: {shown_a} A", model.name);
         let speed_rpm = bench.get(0x606C, 0) as f64 / 10.0;
         let energy = |bench: &mut Bench| bench.machine().assembly().motor().rig.energy;
         let before = energy(&mut bench);
@@ -93,7 +93,8 @@ fn at_the_rated_current_the_rated_torque_comes_out_and_the_supply_pays_for_it() 
         let load_w = torque[n] * speed_rpm / model.ratio * std::f64::consts::TAU / 60.0;
         let copper_w = 3.0 * shown_a * shown_a * (0.5 * resistance[n] + 0.01);
         let expected_w = load_w + friction_w + copper_w + 2.0;
-        assert!((given_w / expected_w - 1.0).abs() < 0.02, "{}: {given_w} W, not {expected_w}", model.name);
+        // The gear's kinematic error makes the current swing, which costs a little more.
+        assert!((given_w / expected_w - 1.0).abs() < 0.03, "{}: {given_w} W, not {expected_w}", model.name);
         // With rated current allowed and no more, it still turns; half as much again stops it.
         bench.set(0x261D, 0, (rated[n] * 1000.0) as i64);
         bench.run_ms(500);

@@ -25,6 +25,8 @@ pub(super) struct Protection {
 pub(super) struct Situation<'a> {
     pub(super) servo: &'a Servo,
     pub(super) live: bool,
+    /// Amplitude of the current, over some supervision periods: a gear that swings makes it dip.
+    pub(super) current_a: f32,
     pub(super) velocity_rpm: f32,
     pub(super) latched: FaultSet,
     /// The heartbeat of the host is missing.
@@ -69,7 +71,7 @@ impl Protection {
     /// The current stays at the limit of 261Dh.
     fn locked_rotor(&mut self, parameters: &Parameters, now: &Situation<'_>) -> bool {
         let limit_a = parameters.limits.current_a;
-        let at_limit = now.live && limit_a > 0.0 && now.servo.current_magnitude_a() >= AT_CURRENT_LIMIT_SHARE * limit_a;
+        let at_limit = now.live && limit_a > 0.0 && now.current_a >= AT_CURRENT_LIMIT_SHARE * limit_a;
         lasts(&mut self.at_current_limit_s, at_limit, parameters.current_time_s)
     }
 

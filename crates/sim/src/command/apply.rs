@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::{Action, Command, CommandError, Service, parse, to_json};
 use crate::wire::ErrorState;
-use crate::{Brake, Report, StationId, VirtualDrive, World};
+use crate::{Brake, OutputShaft, Report, StationId, VirtualDrive, World};
 
 /// Does what `command` says; returns the line of JSON that answers it.
 pub(super) fn apply(world: &mut World, command: &Command, service: Service) -> Result<String, CommandError> {
@@ -137,6 +137,8 @@ struct Got<'a> {
     outputs: BTreeMap<&'a str, u8>,
     brake: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
+    output_shaft: Option<Output>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     damage: Option<&'a str>,
     motor_c: Option<f64>,
     driver_c: Option<f64>,
@@ -148,6 +150,25 @@ struct Got<'a> {
     tec: u16,
     rec: u16,
     behind_ms: u64,
+}
+
+/// The shaft behind a reducer.
+#[derive(Serialize)]
+struct Output {
+    angle_deg: f64,
+    torque_nm: f64,
+    most_nm: f64,
+    overloads: u32,
+    jumps: u32,
+    slip_deg: f64,
+}
+
+impl From<OutputShaft> for Output {
+    fn from(shaft: OutputShaft) -> Self {
+        let OutputShaft { angle_rad, torque_nm, most_nm, overloads, jumps, slip_rad } = shaft;
+        let (angle_deg, slip_deg) = (angle_rad.to_degrees(), slip_rad.to_degrees());
+        Self { angle_deg, torque_nm, most_nm, overloads, jumps, slip_deg }
+    }
 }
 
 fn get(world: &mut World, number: u8, id: StationId, service: Service) -> Result<String, CommandError> {
@@ -171,6 +192,7 @@ fn get(world: &mut World, number: u8, id: StationId, service: Service) -> Result
         supply_v,
         outputs: report.outputs.iter().map(|(name, level)| (name, u8::from(level))).collect(),
         brake: brake_text(report.brake),
+        output_shaft: report.output.map(Output::from),
         damage: report.damage,
         motor_c: report.motor_c,
         driver_c: report.driver_c,

@@ -12,6 +12,7 @@ use drives::mjoint::variations::VARIANT;
 use drives::mjoint::{Actuation, Battery, Brake, Hardware, MJoint, Model, PowerStage, Sensors, objects, storage};
 use drives::profile::DriveProfile;
 use plant::absolute_encoder::BatteryState;
+use plant::gear::GearData;
 use plant::mechanics::RotorData;
 use plant::pmsm::Phase;
 use plant::rig::RigModel;
@@ -25,7 +26,12 @@ use super::pulse_source::PulseSource;
 use super::realism::{
     JOINT_COGGING, LARGE_CURRENT_STEP_A, Noise, Realism, TEMPERATURE_STEP_C, VOLTAGE_STEP_V, with_dead_time,
 };
-use crate::{Component, Levels, PulseTrain, Refused, Report, VirtualDrive};
+use crate::{Component, Levels, OutputShaft, PulseTrain, Refused, Report, VirtualDrive};
+
+/// What has been destroyed, and what to do about it.
+const SEIZED: &str = "bearing of the reducer seized by over-speed: 'rotor free' puts in a new reducer";
+const SLIPPED: &str = "teeth of the reducer jumped, its output stands elsewhere: 'rotor free' puts in a new reducer";
+const BURNT: &str = "power stage burnt: 'fault bridge off' puts in a new one, 'power cycle' starts it";
 
 const OUTPUTS: &[&str] = &["ZO", "WR", "RED", "GREEN"];
 const SUPPLY_V: f64 = 36.0;
@@ -104,6 +110,17 @@ impl Joint {
     /// The motor and all that is joined to it, to change.
     pub fn motor_mut(&mut self) -> &mut JointMotor {
         &mut self.motor
+    }
+
+    fn output_shaft(&self) -> OutputShaft {
+        let GearData { torque_nm, slip_rad, most_nm, overloads, jumps, .. } = self.motor.gear;
+        OutputShaft { angle_rad: self.motor.output_angle().as_rad(), torque_nm, most_nm, overloads, jumps, slip_rad }
+    }
+
+    fn damage(&self) -> Option<&'static str> {
+        let seized = self.motor.is_seized().then_some(SEIZED);
+        let slipped = (self.motor.gear.jumps > 0).then_some(SLIPPED);
+        self.motor.is_power_stage_burnt().then_some(BURNT).or(seized).or(slipped)
     }
 
     fn encoder_reading(&self, position_counts: i32) -> EncoderReading {
@@ -220,6 +237,21 @@ impl Assembly for Joint {
         (&mut self.motor.rig, &mut self.motor.model.rig)
     }
 
+    /// Behind a burnt power stage there is no voltage.
+    #[inline]
+    fn supplies_firmware(&self, running: bool) -> bool {
+        let least_v = if running { Self::STOPS_BELOW_V } else { Self::STARTS_AT_V };
+        !self.motor.is_power_stage_burnt() && self.motor.rig.supply.bus_v >= least_v
+    }
+
+    /// Blocks the output, or frees it with a new reducer in place of a broken one.
+    fn set_rotor_locked(&mut self, locked: bool) {
+        self.motor.rig.load.locked = locked;
+        if !locked && (self.motor.is_seized() || self.motor.gear.jumps > 0) {
+            self.motor.replace_reducer();
+        }
+    }
+
     fn report(&self, firmware: &MJoint, common: Report) -> Report {
         let running = common.powered;
         let engaged =
@@ -227,6 +259,8 @@ impl Assembly for Joint {
         let levels = [self.last.zero_output, self.last.alarm_output, self.last.red_led, self.last.green_led];
         let report = Report {
             statusword: running.then(|| firmware.values().get(objects::STATUSWORD)),
+            output: Some(self.output_shaft()),
+            damage: self.damage(),
             outputs: Levels::new(OUTPUTS, &levels.map(|level| running && level)),
             brake: Some(if engaged { crate::Brake::Engaged } else { crate::Brake::Released }),
             ..common
@@ -261,7 +295,9 @@ impl Assembly for Joint {
         match component {
             Component::Hall => return absent("Hall sensors: its encoder is absolute"),
             Component::Reference => return absent("reference voltage that it watches: no alarm tells of one"),
-            Component::Short | Component::Bridge => return absent("short circuit to simulate"),
+            Component::Short => return absent("short circuit to simulate"),
+            Component::Bridge if broken => self.motor.burn_power_stage(),
+            Component::Bridge => self.motor.mend_power_stage(),
             Component::Encoder => {
                 let now = self.encoder_reading(self.motor.sense().position_counts);
                 self.last_reading = broken.then_some(now);

@@ -49,8 +49,8 @@ fn stall(bench: &mut Bench) {
     run_at_300(bench);
     bench.step("stall");
     bench.machine("rotor lock");
-    // The motor swings on the gear's spring before it stands.
-    expect_alarm(bench, 0x14, "stall (14h)", 1.0 + 0.2);
+    // The motor swings on the gear's spring for half a second before it stands.
+    expect_alarm(bench, 0x14, "stall (14h)", 1.0 + 0.5);
     expect_flashes(bench, 1, 4);
     bench.machine("rotor free");
     bench.write("2601h: output forbidden", 0x2601, 0, 0);

@@ -151,6 +151,7 @@ impl MJoint {
         let situation = Situation {
             servo: &self.servo,
             live: self.axis.is_engaged(),
+            current_a: self.shown_current_a.value.abs() * self.amplitude,
             velocity_rpm: self.servo.velocity_rpm(),
             latched: self.alarms.latched(),
             host_lost: self.host_lost,
