@@ -10,6 +10,8 @@ SWITCHES = {17: ("DIR", -1), 18: ("PU", 1), 19: ("DIR", 1), 20: ("DIR", 1), 21: 
 WAY = 16_000
 #: 6083h: 100 r/min for homing in the ones digit; a ramp of 0.1 s, so that the way back from an edge can be seen.
 RAMP = 1000
+#: The same as delivered: 20000 (r/min)/s.
+DELIVERED_OVERSHOOT = 32768 * 100 / 60 * 0.005 / 2
 OVERSHOOT = 32768 * 100 / 60 * 0.1 / 2
 #: At 100 r/min a millisecond is 55 counts.
 CLOSE = 120
@@ -92,7 +94,7 @@ def other_terminal(bench):
     bench.write(0x6060, HOMING)
     bench.status_becomes(ORIGIN_FOUND, ORIGIN_FOUND, "bit 12", 12)
     bench.sleep(0.3)
-    near(abs(origin + shaft(bench) - bench.read(0x6064) - edge), OVERSHOOT, 800, "the place where 6064h is 0")
+    near(origin + shaft(bench) - bench.read(0x6064), edge + DELIVERED_OVERSHOOT, CLOSE, "the place where 6064h is 0")
 
 
 @check("the ones digit of 6083h is the homing speed: 0 is 100 r/min, 5 is 600 r/min")
@@ -136,7 +138,7 @@ def then_moves(bench):
     bench.status_becomes(ORIGIN_FOUND, ORIGIN_FOUND, "bit 12", 12)
     absolute(bench, COUNTS_PER_TURN)
     bench.sleep(0.3)
-    near(origin + shaft(bench), edge + OVERSHOOT + COUNTS_PER_TURN, 800, "where the motor is")
+    near(origin + shaft(bench), edge + DELIVERED_OVERSHOOT + COUNTS_PER_TURN, CLOSE, "where the motor is")
 
 
 @check("homing can be started again, by writing 6 again")

@@ -99,7 +99,7 @@ def moves(bench):
         for target in (100_000, -70_000):
             unit.write_long(TARGET, target)
             eventually(lambda: unit.read(STATUSWORD)[0], lambda word: word == 0x0437, "the status word", 12)
-            near(unit.long(ACTUAL), target, 30, "actual position")
+            near(unit.long(ACTUAL), target, 60, "actual position")
             is_at(bench, target)
 
 
