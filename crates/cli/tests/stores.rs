@@ -25,10 +25,12 @@ const TAKEN: &str = "60";
 
 /// Register of the weak magnetic angle, and of 2614h, which asks for a save (manual of the joint, Modbus addresses).
 const SAVED_REGISTER: u8 = 0x06;
+/// Register of 2600h, which forbids writes to all others while it is 0, as delivered.
+const ENABLE_REGISTER: u8 = 0x00;
 const SAVE_REGISTER: u8 = 0x16;
 
 fn simulator(state: &Path) -> Simulator {
-    Simulator::start(&[
+    Simulator::start_heard(&[
         "--drive",
         "zlac8030l@4",
         "--drive",
@@ -101,7 +103,9 @@ fn a_kill_in_a_stream_of_stores_loses_none_that_was_acknowledged() {
         }
         killing.join().unwrap();
         simulator.wait();
-        if let Some(acknowledged) = acknowledged {
+        // A disk that takes longer than clients wait is not waited for, and that is said: then nothing is promised.
+        let slow = simulator.errors_left().iter().any(|line| line.contains("the disk of --state is slow"));
+        if let Some(acknowledged) = acknowledged.filter(|_| !slow) {
             let found = found(&state);
             // The one that was under way may be there or not.
             assert!(found == acknowledged || found == value, "kill {round}: {found} after {acknowledged}");
@@ -149,6 +153,7 @@ fn what_a_joint_says_over_modbus_to_have_saved_survives_a_kill() {
     for value in [50, 51, 52] {
         let mut simulator = simulator(&state);
         let mut line = TcpStream::connect(simulator.address("modbus")).unwrap();
+        register(&mut line, 6, ENABLE_REGISTER, 1);
         register(&mut line, 6, SAVED_REGISTER, value);
         register(&mut line, 6, SAVE_REGISTER, 1);
         while register(&mut line, 3, SAVE_REGISTER, 1) != [2, 0, 2] {}

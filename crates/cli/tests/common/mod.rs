@@ -113,6 +113,11 @@ impl Simulator {
         }
     }
 
+    /// All lines left on the standard error of one that has ended.
+    pub(crate) fn errors_left(&self) -> Vec<String> {
+        self.errors.as_ref().expect("standard error is kept").iter().collect()
+    }
+
     /// Its standard input, to write to it from elsewhere.
     pub(crate) fn take_input(&mut self) -> ChildStdin {
         self.input.take().expect("standard input is open")
