@@ -74,6 +74,11 @@ impl Context {
         self.network.node(id).with_timeout(self.timeout)
     }
 
+    /// True on a virtual bus of this command alone.
+    pub(crate) const fn is_embedded(&self) -> bool {
+        self.embedded
+    }
+
     /// Which model a node is as the user or the embedded bus says.
     pub(crate) fn told_model(&self, id: NodeId) -> Option<&'static DriveProfile> {
         self.models.get(&id).map(|told| told.profile())

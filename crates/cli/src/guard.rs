@@ -72,10 +72,16 @@ impl GuardArgs {
 }
 
 impl Guard {
-    /// Releases the drive; what there is to know of one that `goes_on` moving.
-    pub(crate) async fn end(self, drive: &Drive, goes_on: bool) -> Result<(GuardReport, Option<String>), Failure> {
+    /// Releases the drive; what there is to know of one that `goes_on` moving. A bus of this command's own ends with it, and
+    /// its drives go nowhere.
+    pub(crate) async fn end(
+        self,
+        context: &Context,
+        drive: &Drive,
+        goes_on: bool,
+    ) -> Result<(GuardReport, Option<String>), Failure> {
         drive.release_guard().await?;
-        let note = goes_on.then(|| self.farewell(drive));
+        let note = (goes_on && !context.is_embedded()).then(|| self.farewell(drive));
         let report = GuardReport {
             armed: self.armed,
             stops_after_ms: self.loss.stops_after().map(|time| time.as_millis() as u64),
@@ -89,8 +95,8 @@ impl Guard {
         let node = drive.node().id();
         match self.loss {
             HostLoss::StopsInSilence { object, .. } => format!(
-                "this command ends here, and {}: watch it (--for), or let it go on alone \
-                 (ferrodrive write {node} {object} 0)",
+                "this command ends here, and {}: hold it with --for TIME; to let it go on alone, write 0 to {object} before \
+                 the motion",
                 self.loss
             ),
             _ => format!(

@@ -215,6 +215,23 @@ fn the_heartbeat_goes_on_until_the_last_guard_is_released() {
     assert!(joints.iter().all(|id| bench.turns(*id)));
 }
 
+#[test]
+fn a_watch_that_was_off_is_off_again_when_its_guard_ends_though_the_heartbeat_goes_on_for_another() {
+    let mut bench = Bench::new();
+    let watch = mux(0x1016, 1);
+    let own = bench.network.node(node(JOINT));
+    bench.run(own.write(watch, 0_u32)).unwrap();
+    bench.guard(OTHER_JOINT);
+    let drive = bench.drive(JOINT);
+    bench.run(drive.guard(SwitchedOff::SwitchOn)).unwrap();
+    assert_ne!(bench.run(own.read::<u32>(watch)).unwrap(), 0);
+    bench.run(drive.release_guard()).unwrap();
+    assert_eq!(bench.run(own.read::<u32>(watch)).unwrap(), 0);
+    let network = bench.network.clone();
+    bench.run(network.release_guards()).unwrap();
+    assert_eq!(bench.run(own.read::<u32>(watch)).unwrap(), 0);
+}
+
 /// J112: the next heartbeat lets the joint go on with what it was told.
 #[test]
 fn the_motion_of_a_dead_program_does_not_come_back_with_the_next_one() {

@@ -249,7 +249,7 @@ pub(super) async fn outcome(
         drive.stop().await?;
     }
     let state = StateReport::read(drive).await?;
-    let (guard, farewell) = guard.end(drive, then == Then::GoesOn).await?;
+    let (guard, farewell) = guard.end(context, drive, then == Then::GoesOn).await?;
     // What the drive does without its host is the guard's to tell.
     let notes = motion.notes.iter().filter(|note| !matches!(note, Note::HostLoss(_))).map(ToString::to_string);
     Ok(MotionOutcome {

@@ -26,8 +26,8 @@ const READER_PATIENCE: Duration = Duration::from_secs(1);
 const DISK_PATIENCE: Duration = Duration::from_secs(5);
 const PARTING_PATIENCE: Duration = Duration::from_millis(500);
 
-/// How long after a signal the process ends in any case.
-const END_PATIENCE: Duration = Duration::from_secs(8);
+/// How long after a signal the process ends in any case: what stores, log and the last words may take together.
+const END_PATIENCE: Duration = Duration::from_secs(12);
 
 /// Something to be served between two steps of the world.
 pub(crate) enum Request {

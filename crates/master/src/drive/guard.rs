@@ -185,22 +185,33 @@ impl Drive {
             None => self.read_number(object).await?,
         };
         let mut armed = held.map_or(before, |guard| guard.armed);
-        if armed == 0
-            && switched_off == SwitchedOff::SwitchOn
-            && let Default::Value(factory) = self.row(object, "guard it")?.default
-        {
+        let switches_on = armed == 0 && switched_off == SwitchedOff::SwitchOn;
+        if switches_on && let Default::Value(factory) = self.row(object, "guard it")?.default {
             armed = factory;
-            self.write_number(object, armed).await?;
         }
         let loss = self.loss(armed);
         let Some(time) = loss.stops_after() else { return Ok(loss) };
+        let guard = Guard { loss, period: (time / SIGNS_IN_TIME).max(SHORTEST_PERIOD), before, armed };
+        // Noted before anything changes on the drive: whatever fails from here on, a release puts it back.
+        network.with_guards(|guards| guards.insert(id, guard));
+        if let Err(error) = self.begin_guard(object, &guard, switches_on).await {
+            // The first error is the one to tell.
+            let _ = network.release_guard(id).await;
+            return Err(error);
+        }
+        network.show_presence(id, guard.loss, Some(guard.period));
+        Ok(loss)
+    }
+
+    /// Arms the drive's watch where it was off, and ends a motion that would go on with the first heartbeat.
+    async fn begin_guard(&self, object: Mux, guard: &Guard, switches_on: bool) -> Result<(), Error> {
+        if switches_on {
+            self.write_number(object, guard.armed).await?;
+        }
         if self.has_lost_its_host().await? {
             self.stop().await?;
         }
-        let guard = Guard { loss, period: (time / SIGNS_IN_TIME).max(SHORTEST_PERIOD), before, armed };
-        network.with_guards(|guards| guards.insert(id, guard));
-        network.show_presence(id, guard.loss, Some(guard.period));
-        Ok(loss)
+        Ok(())
     }
 
     /// Ends the guard: the drive no longer watches this program. To be called when it stands still, or is to go on alone.
@@ -291,8 +302,9 @@ impl Network {
                 let others = self.with_guards(|guards| heartbeat_period(guards.values(), host));
                 self.heartbeat(host, others);
                 if others.is_some() {
-                    // The heartbeat goes on for others, and would arm the watch anew.
-                    return Ok(());
+                    // The heartbeat goes on for others, and would arm anew any watch but one that is switched off.
+                    let off = guard.before == 0 && guard.armed != 0;
+                    return if off { self.node(id).write(object, 0_u32).await } else { Ok(()) };
                 }
                 self.disarm_bystanders(id, object, host).await;
                 disarm(&self.node(id), object, host, Some(guard.before as u32)).await
