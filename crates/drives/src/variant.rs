@@ -4,8 +4,8 @@
 //! Each model lists its [`Variation`]s as const data; a [`Variant`] is what one drive picked of them, the first choice of each
 //! unless somebody said otherwise. A firmware asks its variant with a [`Pick`] that was looked up at compile time.
 
-use canopen::od::{Dictionary, Entry};
-use canopen::{AbortCode, Mux};
+use canopen::od::{Dictionary, Entry, Table};
+use canopen::{AbortCode, Mux, NodeId};
 
 /// How sure it is that the real drive does this, from most to least.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -188,6 +188,13 @@ impl Variant {
             .map(|(variation, number)| (variation, &variation.choices[usize::from(*number)]))
     }
 
+    /// The values as delivered, of a device with this node-ID: those of the object table, and of the choices on top.
+    pub fn delivered<const N: usize>(&self, table: &'static Table, node_id: NodeId) -> Dictionary<N> {
+        let mut values = Dictionary::new(table, node_id);
+        self.apply_factory_values(&mut values, |_| true);
+        values
+    }
+
     /// Puts the factory values of the choices into a dictionary that holds those of the object table, for the rows that
     /// `wanted` names. Objects that the table does not have are passed over.
     pub fn apply_factory_values<const N: usize>(&self, values: &mut Dictionary<N>, wanted: fn(&Entry) -> bool) {
@@ -255,8 +262,7 @@ const fn is_same(a: &str, b: &str) -> bool {
 mod tests {
     use super::*;
     use crate::row::{U16, rw, rws};
-    use canopen::NodeId;
-    use canopen::od::{Table, keys};
+    use canopen::od::keys;
 
     const VARIATIONS: &[Variation] = &[
         Variation {

@@ -92,9 +92,7 @@ impl<const N: usize> Device<N> {
 
     /// The values as delivered, of a device with this node-ID.
     fn factory_values(&self, node_id: NodeId) -> Dictionary<N> {
-        let mut values = Dictionary::new(self.profile.table, node_id);
-        self.variant.apply_factory_values(&mut values, |_| true);
-        values
+        self.variant.delivered(self.profile.table, node_id)
     }
 
     /// Supply voltage arrives, and this is found in the EEPROM. [`restart`](Self::restart) and [`boot`](Self::boot) follow.

@@ -18,8 +18,7 @@ pub fn delivered(variant: &Variant) -> Values {
 
 /// The values as delivered but for the node-ID (2615h).
 pub fn addressed(variant: &Variant, node_id: u8) -> Values {
-    let mut values = Values::new(&TABLE, NodeId::new(node_id).unwrap_or(NodeId::MIN));
-    variant.apply_factory_values(&mut values, |_| true);
+    let mut values: Values = variant.delivered(&TABLE, NodeId::new(node_id).unwrap_or(NodeId::MIN));
     if TABLE.row(DEVICE_ADDRESS.slot()).check_value(i64::from(node_id)).is_ok() {
         values.set(DEVICE_ADDRESS, u16::from(node_id));
     }

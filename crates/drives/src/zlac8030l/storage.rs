@@ -11,9 +11,7 @@ const _: usize = stored_rows(&TABLE);
 
 /// The values as delivered.
 pub fn delivered(variant: &Variant) -> Values {
-    let mut values = Values::new(&TABLE, NodeId::MIN);
-    variant.apply_factory_values(&mut values, |_| true);
-    values
+    variant.delivered(&TABLE, NodeId::MIN)
 }
 
 /// The same of a drive for this node-ID (4 to 127, else 4) and number of a bit rate (200Eh).

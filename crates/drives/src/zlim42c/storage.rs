@@ -12,9 +12,7 @@ const _: usize = stored_rows(&TABLE);
 
 /// The values as delivered.
 pub fn delivered(variant: &Variant) -> Values {
-    let mut values = Values::new(&TABLE, NodeId::MIN);
-    variant.apply_factory_values(&mut values, |_| true);
-    values
+    variant.delivered(&TABLE, NodeId::MIN)
 }
 
 /// The same of a drive for this custom node-ID (2008h, 32 to 127; others leave it alone) and number of a bit rate (2009h).
