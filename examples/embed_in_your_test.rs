@@ -1,6 +1,7 @@
 //! A virtual drive inside your own test: no hardware, no waiting, the same run every time.
 //!
-//! Copy the test below into your project. It is run by `cargo test`, and by `cargo run --example embed_in_your_test`.
+//! Copy the test below into your project. It is run by `cargo test`, and by
+//! `cargo run -p ferrodrive-examples --example embed_in_your_test`.
 #![allow(clippy::print_stdout, reason = "an example shows what it does")]
 
 use std::time::Duration;

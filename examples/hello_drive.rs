@@ -1,8 +1,10 @@
 //! Hello, drive: enable it, turn at 60 r/min for a second, stop.
 //!
 //! ```sh
-//! cargo run --example hello_drive                                                # a virtual drive, in virtual time
-//! cargo run --example hello_drive -- --bus socketcand://127.0.0.1:29536/can0     # the same code on another bus
+//! # a virtual drive, in virtual time
+//! cargo run -p ferrodrive-examples --example hello_drive
+//! # the same code on another bus
+//! cargo run -p ferrodrive-examples --example hello_drive -- --bus socketcand://127.0.0.1:29536/can0
 //! ```
 #![allow(clippy::print_stdout, reason = "an example shows what it does")]
 
