@@ -302,6 +302,44 @@ fn the_same_input_gives_the_same_bits() {
     assert_eq!(play(), play());
 }
 
+#[test]
+fn a_wave_generator_spun_beyond_its_bearings_limit_seizes_until_the_reducer_is_replaced() {
+    for (share, seizes) in [(0.97, false), (1.03, true)] {
+        let mut joint = joint();
+        joint.rotor.velocity_rad_s = share * MODEL.bearing_limit_rad_s;
+        run(&mut joint, 16, 0.0);
+        assert_eq!(joint.is_seized(), seizes, "at {share} of the limit");
+    }
+    let mut joint = joint();
+    joint.rotor.velocity_rad_s = 1.03 * MODEL.bearing_limit_rad_s;
+    run(&mut joint, 4_000, 0.0);
+    // It stands, and the motor's whole voltage does not turn it: 36 V over the winding are far below what seizing holds.
+    run(&mut joint, 400, 10.0);
+    assert_eq!(joint.rotor.velocity_rad_s, 0.0);
+    joint.replace_reducer();
+    run(&mut joint, 400, 10.0);
+    assert!(!joint.is_seized() && joint.rotor.velocity_rad_s > 1.0, "{} rad/s", joint.rotor.velocity_rad_s);
+}
+
+#[test]
+fn a_power_stage_above_its_limit_joins_the_wires_and_blows_the_fuse() {
+    let idle = Actuation { inverter: Inverter::Open, brake_released: true, set_origin: false };
+    let after_20_ms = |celsius: f64| {
+        let mut joint = joint();
+        joint.rig.heat_sink.temperature_c = celsius;
+        joint.rotor.velocity_rad_s = 100.0;
+        (0..400).for_each(|_| joint.step(DT_S, &idle));
+        joint
+    };
+    let sound = after_20_ms(MODEL.power_stage_limit_c - 1.0);
+    assert!(!sound.is_power_stage_burnt() && sound.rig.supply.connected);
+    let burnt = after_20_ms(MODEL.power_stage_limit_c + 1.0);
+    assert!(burnt.is_power_stage_burnt());
+    assert_eq!((burnt.rig.supply.bus_v, burnt.rig.supply.connected), (0.0, false));
+    // Joined wires brake: friction alone leaves most of the speed in 20 ms.
+    assert!(burnt.rotor.velocity_rad_s.abs() < 0.2 * sound.rotor.velocity_rad_s, "{}", burnt.rotor.velocity_rad_s);
+}
+
 fn any_inverter() -> impl Strategy<Value = Inverter> {
     prop_oneof![
         Just(Inverter::Open),
