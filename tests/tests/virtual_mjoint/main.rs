@@ -11,6 +11,7 @@ mod communication;
 mod components;
 mod datagrams;
 mod homing;
+mod hosts_of_real_joints;
 mod interpolation;
 mod motion;
 mod objects;

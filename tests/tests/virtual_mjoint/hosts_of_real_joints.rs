@@ -1,0 +1,51 @@
+//! What programs for real joints of this family do and see, from public code and its notes: the joint here does the same.
+
+use crate::bench::{Bench, TURN};
+
+/// 5.07.1: 10Fh is halt, with bit 5 = 0, and without bit 5 a target is only kept (5.06.1, the order of the steps).
+#[test]
+fn after_10fh_the_next_target_is_kept_and_the_one_after_2fh_runs() {
+    let mut bench = Bench::new();
+    bench.set(0x6040, 0, 0x2F);
+    bench.set(0x607A, 0, TURN);
+    bench.until_reached(2000);
+    bench.set(0x6040, 0, 0x10F);
+    bench.set(0x607A, 0, 3 * TURN);
+    bench.run_ms(500);
+    assert!((bench.position() - TURN).abs() <= 30, "{}", bench.position());
+    bench.set(0x6040, 0, 0x2F);
+    bench.run_ms(500);
+    assert!((bench.position() - TURN).abs() <= 30, "{}", bench.position());
+    bench.set(0x607A, 0, 3 * TURN);
+    bench.until_reached(3000);
+    assert!((bench.position() - 3 * TURN).abs() <= 30, "{}", bench.position());
+}
+
+/// 5.05: an answer repeats the multiplexor of its request. Nobody waits for the answer before the next request here.
+#[test]
+fn three_reads_back_to_back_are_answered_in_their_order() {
+    let mut bench = Bench::new();
+    bench.heard();
+    for request in ["601#4064600000000000", "601#4041600000000000", "601#4079600000000000"] {
+        bench.send(request);
+    }
+    bench.run_ms(10);
+    let answers = bench.heard_of("581#");
+    let beginnings = ["581#43646000", "581#4B416000", "581#4B796000"];
+    assert_eq!(answers.len(), beginnings.len(), "{answers:?}");
+    for (answer, beginning) in answers.iter().zip(beginnings) {
+        assert!(answer.starts_with(beginning), "{answers:?}");
+    }
+}
+
+/// 5.11.2: the watch begins with the first heartbeat of the host, and this one sends none. No NMT command either (5.11.1).
+#[test]
+fn a_host_without_heartbeat_and_without_an_nmt_command_is_served_for_as_long_as_it_likes() {
+    let mut bench = Bench::new();
+    bench.set(0x6040, 0, 0x2F);
+    bench.send("401#2F000364000000");
+    bench.run_ms(10_000);
+    assert_eq!(bench.get(0x260E, 0), 0);
+    let rpm = bench.report().velocity_rpm;
+    assert!((rpm - 100.0).abs() < 2.0, "{rpm}");
+}
