@@ -254,46 +254,46 @@ impl<const N: usize> Device<N> {
     }
 
     /// Sends an EMCY message for each new fault; the error register shows all that are latched.
-    pub fn tell_faults<const F: usize>(&mut self, new: FaultSet, faults: &FaultMonitor<F>, now: Instant) {
+    pub fn report_faults<const F: usize>(&mut self, new: FaultSet, faults: &FaultMonitor<F>, now: Instant) {
         self.fault_bits = faults.error_register();
         for row in new.rows() {
-            self.tell_error(faults.row(row).emcy, now);
+            self.report_error(faults.row(row).emcy, now);
         }
     }
 
     /// After a reset of faults: the error register shows what is left, and EMCY tells when nothing is.
-    pub fn tell_reset<const F: usize>(&mut self, faults: &FaultMonitor<F>, now: Instant) {
+    pub fn report_reset<const F: usize>(&mut self, faults: &FaultMonitor<F>, now: Instant) {
         self.fault_bits = faults.error_register();
         self.communication_errors.remove(CommunicationErrors::EVENTS_LOST);
-        self.tell_end(now);
+        self.report_end_of_error(now);
     }
 
     /// An RPDO came too short, or has its length again: an error that the profile may have a code for.
-    fn tell_length(&mut self, number: PdoNumber, fits: bool, now: Instant) {
+    fn report_rpdo_length(&mut self, number: PdoNumber, fits: bool, now: Instant) {
         let Some(code) = self.profile.short_rpdo else { return };
         let error = CommunicationErrors::short_rpdo(number);
         if fits {
             self.communication_errors.remove(error);
-            self.tell_end(now);
+            self.report_end_of_error(now);
         } else {
             self.communication_errors.insert(error);
-            self.tell_error(code, now);
+            self.report_error(code, now);
         }
     }
 
     /// Events of the node were lost: what CiA 301 calls objects lost. It stands until faults are reset, since what was
     /// lost does not come back.
-    fn tell_lost_events(&mut self, now: Instant) {
+    fn report_lost_events(&mut self, now: Instant) {
         self.communication_errors.insert(CommunicationErrors::EVENTS_LOST);
-        self.tell_error(EmcyErrorCode::CAN_OVERRUN, now);
+        self.report_error(EmcyErrorCode::CAN_OVERRUN, now);
     }
 
-    fn tell_error(&mut self, code: EmcyErrorCode, now: Instant) {
+    fn report_error(&mut self, code: EmcyErrorCode, now: Instant) {
         self.node.raise_emcy(code, self.fault_bits | self.communication_errors.register_bits(), [0; 5], now);
     }
 
     /// An error ended: the error register shows what is left, and EMCY tells when nothing is.
-    fn tell_end(&mut self, now: Instant) {
+    fn report_end_of_error(&mut self, now: Instant) {
         let register = self.fault_bits | self.communication_errors.register_bits();
         if let Some(slot) = self.error_register() {
             self.node.dictionary_mut().set_raw(slot, u32::from(register));
@@ -381,9 +381,9 @@ pub(crate) trait Application<const N: usize> {
                 NodeEvent::Written { slot, raw, via } => commanded |= self.written(slot, raw, via, now),
                 NodeEvent::ResetNode => self.restart(now),
                 NodeEvent::ResetCommunication => self.restart_communication(now),
-                NodeEvent::RpdoTooShort(number) => self.device().tell_length(number, false, now),
-                NodeEvent::RpdoFits(number) => self.device().tell_length(number, true, now),
-                NodeEvent::EventsLost => self.device().tell_lost_events(now),
+                NodeEvent::RpdoTooShort(number) => self.device().report_rpdo_length(number, false, now),
+                NodeEvent::RpdoFits(number) => self.device().report_rpdo_length(number, true, now),
+                NodeEvent::EventsLost => self.device().report_lost_events(now),
                 NodeEvent::Sync => self.synchronised(now),
                 NodeEvent::Nmt(_) => {}
             }
@@ -511,14 +511,14 @@ mod tests {
         let mut device = started();
         let mut faults = FaultMonitor::new(&FAULTS);
         faults.raise(0);
-        device.tell_faults(faults.latched(), &faults, Instant::ZERO);
+        device.report_faults(faults.latched(), &faults, Instant::ZERO);
         device.values_mut().set(PARAMETER, 8);
         device.values_mut().set(HEARTBEAT, 200);
         device.restart_communication(at(1, 0));
         let values = device.values();
         assert_eq!((values.get(ERROR_REGISTER), values.get(HEARTBEAT), values.get(PARAMETER)), (0b101, 100, 8));
         assert!(faults.reset());
-        device.tell_reset(&faults, at(1, 0));
+        device.report_reset(&faults, at(1, 0));
         assert_eq!(device.values().get(ERROR_REGISTER), 0);
     }
 
@@ -536,27 +536,27 @@ mod tests {
         let mut device = started();
         let mut faults = FaultMonitor::new(&FAULTS);
         let [first, second, ..] = PdoNumber::ALL;
-        device.tell_length(first, false, at(1, 0));
-        device.tell_length(second, false, at(1, 0));
+        device.report_rpdo_length(first, false, at(1, 0));
+        device.report_rpdo_length(second, false, at(1, 0));
         assert_sent(&mut device, ["701#00", "081#1082110000000000", "081#1082110000000000"], 0b1_0001);
         faults.raise(0);
-        device.tell_faults(faults.latched(), &faults, at(1, 0));
+        device.report_faults(faults.latched(), &faults, at(1, 0));
         assert_sent(&mut device, ["081#1032150000000000"], 0b1_0101);
-        device.tell_length(first, true, at(1, 0));
+        device.report_rpdo_length(first, true, at(1, 0));
         assert!(faults.reset());
-        device.tell_reset(&faults, at(1, 0));
+        device.report_reset(&faults, at(1, 0));
         assert_sent(&mut device, [], 0b1_0001);
-        device.tell_length(second, true, at(1, 0));
+        device.report_rpdo_length(second, true, at(1, 0));
         assert_sent(&mut device, ["081#0000000000000000"], 0);
     }
 
     #[test]
     fn lost_events_are_told_as_objects_lost_until_faults_are_reset_or_communication_is() {
         let mut device = started();
-        device.tell_lost_events(at(1, 0));
+        device.report_lost_events(at(1, 0));
         assert_sent(&mut device, ["701#00", "081#1081110000000000"], 0b1_0001);
         let mut again = device.clone();
-        device.tell_reset(&FaultMonitor::new(&FAULTS), at(1, 0));
+        device.report_reset(&FaultMonitor::new(&FAULTS), at(1, 0));
         assert_sent(&mut device, ["081#0000000000000000"], 0);
         again.restart_communication(at(1, 0));
         assert_sent(&mut again, ["701#00"], 0);

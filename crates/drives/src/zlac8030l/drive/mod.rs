@@ -207,7 +207,7 @@ impl Zlac8030l {
         self.axis.fault();
         self.demand = Demand::Off;
         self.device.values_mut().set(ERROR_CODE, self.faults.code_bits());
-        self.device.tell_faults(new, &self.faults, now);
+        self.device.report_faults(new, &self.faults, now);
         self.publish_status();
     }
 
@@ -216,7 +216,7 @@ impl Zlac8030l {
         self.protection.reset();
         let all_gone = self.faults.reset();
         self.device.values_mut().set(ERROR_CODE, self.faults.code_bits());
-        self.device.tell_reset(&self.faults, now);
+        self.device.report_reset(&self.faults, now);
         if all_gone {
             self.axis.reset_fault();
         }

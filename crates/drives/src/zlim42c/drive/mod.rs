@@ -179,7 +179,7 @@ impl Zlim42c {
         for row in new.rows() {
             self.shown_fault = Some(row);
         }
-        self.device.tell_faults(new, &self.faults, now);
+        self.device.report_faults(new, &self.faults, now);
         self.publish_error_code();
         self.publish_status();
     }
@@ -190,7 +190,7 @@ impl Zlim42c {
         self.shown_fault = self.shown_fault.filter(|row| self.faults.latched().has(*row));
         self.shown_fault = self.shown_fault.or_else(|| self.faults.latched().rows().last());
         self.publish_error_code();
-        self.device.tell_reset(&self.faults, now);
+        self.device.report_reset(&self.faults, now);
         if all_gone {
             self.axis.reset_fault();
         }
