@@ -9,7 +9,7 @@ use std::time::Duration;
 use can::Bitrate;
 use canopen::NodeId;
 use cia402::PowerState;
-use drives::zlac8030l;
+use devices::zltech::ZLAC8030L;
 use master::Network;
 use master::drive::{Drive, MotionOptions};
 use master::units::Rpm;
@@ -29,7 +29,7 @@ fn bench() -> (World, Drive) {
     let network = Network::new();
     world.add_station(network.clone());
     world.run_for(Duration::from_secs(1));
-    (world, Drive::new(network.node(node), &zlac8030l::PROFILE))
+    (world, Drive::new(network.node(node), &ZLAC8030L))
 }
 
 /// What your software does when the drive reports a fault is worth a test. Here the Hall sensors break while it turns.

@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use can::Bitrate;
 use canopen::NodeId;
-use drives::zlac8030l;
+use devices::zltech::ZLAC8030L;
 use master::drive::{Drive, MotionOptions};
 use master::units::Rpm;
 use master::{Network, Node};
@@ -28,7 +28,7 @@ const BAUD_RATE_500K: u16 = 1;
 
 /// What is to be done. It knows nothing of the bus it runs on: it asks, and waits for answers.
 async fn hello(node: Node) -> Result<(), master::Error> {
-    let drive = Drive::new(node, &zlac8030l::PROFILE);
+    let drive = Drive::new(node, &ZLAC8030L);
 
     // Enables the drive (the three steps of CiA 402), sets the speed, and returns when it is reached.
     let motion = drive.velocity(Rpm(60.0), MotionOptions::default()).await?;

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use can::Bitrate;
 use canopen::NodeId;
-use drives::zlac8030l;
+use devices::zltech::ZLAC8030L;
 use master::drive::{Drive, MotionOptions};
 use master::units::{Rpm, Turns};
 use master::{Network, join_all};
@@ -77,7 +77,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     for number in [1, 2] {
         let node = NodeId::new(number).ok_or("no node-ID")?;
         world.add_drive(number, Box::new(sim::machine::zlac8030l(number, BAUD_RATE_500K)))?;
-        wheels.push(Drive::new(network.node(node), &zlac8030l::PROFILE));
+        wheels.push(Drive::new(network.node(node), &ZLAC8030L));
     }
     world.run_for(Duration::from_secs(1));
     let robot = Robot { left: wheels.remove(0), right: wheels.remove(0) };

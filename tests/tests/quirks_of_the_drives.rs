@@ -2,7 +2,7 @@
 //!
 //! Those of motion, homing, units and storage have tests of their own beside what they are about.
 
-use drives::profile::{Quirk, model};
+use devices::{Quirk, model};
 use ferrodrive_tests::bench::{Abort, Bench, Subject, mjoint, zlac8030l, zlim42c};
 
 const NO_SUCH_OBJECT: Abort = 0x0602_0000;

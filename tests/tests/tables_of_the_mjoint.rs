@@ -2,10 +2,10 @@
 
 use canopen::NodeId;
 use cia402::Controlword;
+use devices::model;
 use drives::mjoint::objects::modbus::REGISTERS;
 use drives::mjoint::objects::{ROW_COUNT, TABLE};
 use drives::mjoint::statusword::{Condition, statusword};
-use drives::profile::model;
 use ferrodrive_tests::manual::ObjectRow;
 use ferrodrive_tests::mjoint::{MODELS, Situation, figures, objects, situations};
 use ferrodrive_tests::side_by_side;

@@ -5,7 +5,7 @@
 
 use std::time::Duration;
 
-use drives::profile::{CountsPerTurn, DriveProfile, Quirk, model};
+use devices::{CountsPerTurn, Description, Quirk, model};
 use ferrodrive_tests::bench::{zlac8030l, zlim42c};
 
 type Servo = zlac8030l::Bench;
@@ -14,7 +14,7 @@ type Stepper = zlim42c::Bench;
 const INVALID_VALUE: u32 = 0x0609_0030;
 const NO_SUCH_OBJECT: u32 = 0x0602_0000;
 
-fn profiles() -> [&'static DriveProfile; 2] {
+fn profiles() -> [&'static Description; 2] {
     ["zlac8030l", "zlim42c"].map(|name| model(name).expect("a model"))
 }
 
@@ -94,7 +94,7 @@ fn the_numbers_that_both_have_among_2000h_to_2012h_mean_other_things() {
     // of writes and save, Hall offset and fault reset, overload and clearing.
     let [servo, stepper] = profiles();
     for index in [0x2000, 0x2001, 0x2005, 0x2008, 0x2009, 0x2010, 0x2011, 0x2012] {
-        let row = |profile: &DriveProfile| {
+        let row = |profile: &Description| {
             let slot = profile.table.find(canopen::Mux::new(index, 0)).unwrap_or_else(|_| panic!("{index:04X}h"));
             profile.table.row(slot).name
         };

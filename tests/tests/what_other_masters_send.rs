@@ -1,7 +1,7 @@
 //! Frames that other masters and tools send and that the manuals do not speak of, asked of the running drives: RPDOs of a
 //! wrong length and remote frames. `docs/drives` has the readings.
 
-use drives::profile::model;
+use devices::model;
 use ferrodrive_tests::bench::{Bench, Subject, mjoint, zlac8030l, zlim42c};
 
 /// A drive in operational.

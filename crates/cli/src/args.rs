@@ -8,7 +8,7 @@ use transport::BusSpec;
 
 use crate::command::{completions, demo, drive, dump, home, motion, nmt, objects, readings, scan, sdo, sim, store};
 use crate::machine_file::{self, Machine};
-use crate::models::DriveProfile;
+use crate::models::Description;
 use crate::parse::drive_spec::node_model;
 
 /// CANopen motor drives, virtual and real: simulate them, look into them, move them.
@@ -40,7 +40,7 @@ pub(crate) struct Global {
 
     /// Which model a node is, where its identity cannot tell (e.g. 4=zlac8030l); may be repeated
     #[arg(long = "model", value_name = "NODE=MODEL", value_parser = node_model, global = true)]
-    pub(crate) models: Vec<(NodeId, &'static DriveProfile)>,
+    pub(crate) models: Vec<(NodeId, &'static Description)>,
 
     /// Machine file that says which models are where on a real bus; `sim` serves the drives that it describes
     ///

@@ -12,7 +12,7 @@ use master::{Error, Network, Node};
 use crate::args::Global;
 use crate::failure::Failure;
 use crate::machine_file::Machine;
-use crate::models::{self, DriveProfile};
+use crate::models::{self, Description};
 use crate::progress::Progress;
 
 /// Time for a frame without an answer (NMT) to get onto the bus before a command ends.
@@ -40,13 +40,13 @@ pub(crate) struct Context {
 #[derive(Clone, Copy)]
 enum Told {
     /// By the embedded bus, whose drive it is.
-    ByBus(&'static DriveProfile),
+    ByBus(&'static Description),
     /// By the user, who may be wrong.
-    ByUser(&'static DriveProfile),
+    ByUser(&'static Description),
 }
 
 impl Told {
-    const fn profile(self) -> &'static DriveProfile {
+    const fn profile(self) -> &'static Description {
         match self {
             Self::ByBus(profile) | Self::ByUser(profile) => profile,
         }
@@ -59,7 +59,7 @@ impl Context {
     pub(crate) fn new(
         global: &Global,
         network: Network,
-        embedded: Option<&[(NodeId, &'static DriveProfile)]>,
+        embedded: Option<&[(NodeId, &'static Description)]>,
         progress: Progress,
     ) -> Self {
         let of_machine = global.machine.iter().filter(|_| embedded.is_none()).flat_map(Machine::models);
@@ -80,7 +80,7 @@ impl Context {
     }
 
     /// Which model a node is as the user or the embedded bus says.
-    pub(crate) fn told_model(&self, id: NodeId) -> Option<&'static DriveProfile> {
+    pub(crate) fn told_model(&self, id: NodeId) -> Option<&'static Description> {
         self.models.get(&id).map(|told| told.profile())
     }
 

@@ -5,7 +5,7 @@ use cia402::{Controlword, Statusword};
 use master::decode::statusword_words;
 use serde::Serialize;
 
-use crate::models::DriveProfile;
+use crate::models::Description;
 use crate::paint::Paint;
 use crate::parse::unit::split_factor;
 
@@ -35,7 +35,7 @@ pub(crate) struct Decoded {
 }
 
 /// Decodes `bytes`, which came from the object of `row`, if that is known, on a node of `model`.
-pub(crate) fn decode(model: Option<&DriveProfile>, row: Option<&'static Entry>, bytes: &[u8]) -> Decoded {
+pub(crate) fn decode(model: Option<&Description>, row: Option<&'static Entry>, bytes: &[u8]) -> Decoded {
     let mut decoded = Decoded {
         bytes: bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" "),
         value: None,
@@ -125,7 +125,7 @@ fn is_bit_field(row: &Entry) -> bool {
         || matches!(row.index, 0x1000 | 0x1001 | 0x1005 | 0x1009 | 0x100A | 0x1014 | 0x603F..=0x6041)
 }
 
-fn meaning(model: Option<&DriveProfile>, row: &Entry, value: i64) -> Option<String> {
+fn meaning(model: Option<&Description>, row: &Entry, value: i64) -> Option<String> {
     match (row.index, row.sub_index) {
         (0x6041, 0) => Some(statusword_words(Statusword(value as u16), model)),
         (0x6040, 0) => Some(Controlword(value as u16).command().name().into()),
@@ -166,7 +166,7 @@ mod tests {
     fn counts_that_are_a_fraction_of_a_unit_are_shown_in_the_unit() {
         // "M Robot Joint Motor CanOpen Manual", 5.04: 6078h in 1/2000 A, 6079h in 1/327 V.
         let text = |index, bytes: &[u8]| {
-            let joint = &drives::mjoint::M4230E17B50;
+            let joint = &devices::mjoint::M4230E17B50;
             decode(Some(joint), joint.row(canopen::Mux::new(index, 0)), bytes).text(Paint::OFF)
         };
         assert_eq!(text(0x6078, &[0xD0, 0x07]), "1.0000 A (2000)");
@@ -178,7 +178,7 @@ mod tests {
         let decoded = decode(None, Some(&STATUS), &[0x37, 0x06]);
         assert_eq!(decoded.text(Paint::OFF), "0x637 (1591)  Operation enabled, target reached");
         // "M Robot Joint Motor CanOpen Manual", 5.10.1: an idle joint.
-        let joint = decode(Some(&drives::mjoint::M4230E17B50), Some(&STATUS), &[0x04, 0x04]);
+        let joint = decode(Some(&devices::mjoint::M4230E17B50), Some(&STATUS), &[0x04, 0x04]);
         assert_eq!(joint.text(Paint::OFF), "0x404 (1028)  output enabled, target reached");
     }
 

@@ -11,7 +11,7 @@ use sim::{VirtualDrive, World};
 
 use crate::failure::Failure;
 use crate::machine_file;
-use crate::models::{DriveProfile, EMBEDDED};
+use crate::models::{Description, EMBEDDED};
 
 /// Decides everything random on the embedded bus: runs are repeatable.
 pub(crate) const SEED: u64 = 1;
@@ -23,7 +23,7 @@ const BOOT_PATIENCE: Duration = Duration::from_secs(5);
 const SETTLING_TIME: Duration = Duration::from_millis(200);
 
 /// A world with drives, and which they are.
-pub(crate) type Embedded = (World, Vec<(NodeId, &'static DriveProfile)>);
+pub(crate) type Embedded = (World, Vec<(NodeId, &'static Description)>);
 
 /// The world that `--bus sim` or `--bus sim:FILE.toml` means: the drives of [`EMBEDDED`], or what the file
 /// says.
@@ -44,7 +44,7 @@ pub(crate) fn world(file: Option<&Path>) -> Result<Embedded, Failure> {
 
 /// A factory-fresh virtual drive of a model, but for its node-ID and bit rate, without power.
 pub(crate) fn virtual_drive(
-    model: &DriveProfile,
+    model: &Description,
     node: NodeId,
     bitrate: Bitrate,
 ) -> Result<Box<dyn VirtualDrive>, Failure> {
@@ -52,14 +52,14 @@ pub(crate) fn virtual_drive(
 }
 
 /// A virtual drive as it was ordered, without power.
-pub(crate) fn ordered_drive(model: &DriveProfile, order: &Order) -> Result<Box<dyn VirtualDrive>, Failure> {
+pub(crate) fn ordered_drive(model: &Description, order: &Order) -> Result<Box<dyn VirtualDrive>, Failure> {
     sim::machine::order(model, order).map_err(|error| Failure::usage(error.to_string()))
 }
 
 /// Waits until every drive has booted and looked about.
 pub(crate) async fn wait_until_booted(
     network: &Network,
-    drives: &[(NodeId, &'static DriveProfile)],
+    drives: &[(NodeId, &'static Description)],
 ) -> Result<(), Failure> {
     for (node, _) in drives {
         let booted = network.node(*node).wait(|node| node.facts.boot_up, BOOT_PATIENCE).await;

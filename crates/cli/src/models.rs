@@ -1,10 +1,10 @@
 //! The drives that Ferrodrive knows, as the command line names them.
 
-pub(crate) use drives::profile::{DriveProfile, MODELS, model as find};
+pub(crate) use devices::{Description, MODELS, model as find};
 
 /// The drives on the embedded virtual bus and their node-IDs: as delivered, but for the ZLIM42-C, whose 1 is the joint's.
-pub(crate) const EMBEDDED: &[(&DriveProfile, u8)] =
-    &[(&drives::zlac8030l::PROFILE, 4), (&drives::mjoint::M4230E17B50, 1), (&drives::zlim42c::PROFILE, 2)];
+pub(crate) const EMBEDDED: &[(&Description, u8)] =
+    &[(&devices::zltech::ZLAC8030L, 4), (&devices::mjoint::M4230E17B50, 1), (&devices::zltech::ZLIM42C, 2)];
 
 /// The names of all models, for messages.
 pub(crate) fn names() -> String {

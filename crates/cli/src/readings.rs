@@ -5,7 +5,7 @@
 
 use serde::Serialize;
 
-use crate::models::DriveProfile;
+use crate::models::Description;
 
 /// The pages by the manuals that they are about.
 const PAGES: [(&str, &str); 3] = [
@@ -47,7 +47,7 @@ impl Reading {
 }
 
 /// The readings of a model's manual, in the order of the page.
-pub(crate) fn of(model: &DriveProfile) -> Vec<Reading> {
+pub(crate) fn of(model: &Description) -> Vec<Reading> {
     let page = PAGES.iter().find(|(manual, _)| *manual == model.manual);
     page.map(|(_, text)| parse(text)).unwrap_or_default()
 }
@@ -141,7 +141,7 @@ fn plain(text: &str) -> String {
 mod tests {
     use super::*;
     use crate::models::MODELS;
-    use drives::variant::VariationKind;
+    use devices::variant::VariationKind;
 
     const PAGE: &str = "# Title\n\n| word | means |\n|---|---|\n| guess | nothing |\n\n## 5.3 Homing\n\n\
         | id | the manual prints | the drive here | why | how sure |\n|---|---|---|---|---|\n\

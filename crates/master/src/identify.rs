@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use can::Instant;
 use canopen::{AbortCode, Mux, NmtState, NodeId};
-use drives::profile::{self, DriveProfile, models_by_identity};
+use devices::{Description, models_by_identity};
 
 use crate::error::Error;
 use crate::network::{Network, Node, join_all};
@@ -46,7 +46,7 @@ pub struct Identity {
 
 impl Identity {
     /// True if nothing that it says speaks against the model.
-    pub fn matches(&self, model: &profile::Identity) -> bool {
+    pub fn matches(&self, model: &devices::Identity) -> bool {
         let fits = |said: Option<u32>, expected| said.is_none_or(|said| said == expected);
         fits(self.device_type, model.device_type)
             && fits(self.vendor_id, model.vendor_id)
@@ -88,7 +88,7 @@ pub enum Knowledge {
 
 impl Knowledge {
     /// The profile to work with: of a guess, the one that all models it may be agree with.
-    pub const fn profile(self) -> Option<&'static DriveProfile> {
+    pub const fn profile(self) -> Option<&'static Description> {
         match self {
             Self::Named(Model(profile)) => Some(profile),
             Self::Guessed(guess) => Some(guess.profile),
@@ -102,15 +102,15 @@ impl Knowledge {
     }
 }
 
-impl From<&'static DriveProfile> for Knowledge {
-    fn from(profile: &'static DriveProfile) -> Self {
+impl From<&'static Description> for Knowledge {
+    fn from(profile: &'static Description) -> Self {
         Self::Named(Model(profile))
     }
 }
 
 /// A model's profile, which prints as its name.
 #[derive(Clone, Copy)]
-pub struct Model(pub &'static DriveProfile);
+pub struct Model(pub &'static Description);
 
 impl fmt::Debug for Model {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -123,13 +123,13 @@ impl fmt::Debug for Model {
 /// Models with the same objects differ in their motors only: they are read and moved in the same way.
 #[derive(Clone, Copy)]
 pub struct Guess {
-    profile: &'static DriveProfile,
+    profile: &'static Description,
     evidence: Option<Mux>,
 }
 
 impl Guess {
     /// The profile to read and move with.
-    pub const fn profile(self) -> &'static DriveProfile {
+    pub const fn profile(self) -> &'static Description {
         self.profile
     }
 
@@ -139,7 +139,7 @@ impl Guess {
     }
 
     /// The models that it may be by its objects.
-    pub fn fitting(self) -> impl Iterator<Item = &'static DriveProfile> {
+    pub fn fitting(self) -> impl Iterator<Item = &'static Description> {
         self.profile.with_same_objects()
     }
 
@@ -169,7 +169,7 @@ impl fmt::Display for Guess {
 }
 
 /// Names in a sentence, and whether they are several.
-fn names(models: impl Iterator<Item = &'static DriveProfile>) -> (String, bool) {
+fn names(models: impl Iterator<Item = &'static Description>) -> (String, bool) {
     let names: Vec<_> = models.map(|model| model.model).collect();
     match names.split_last() {
         Some((last, [])) => ((*last).to_owned(), false),
@@ -195,7 +195,7 @@ pub struct Found {
 
 impl Found {
     /// The models that answer so. More than one: it cannot be told which.
-    pub fn models(&self) -> Vec<&'static DriveProfile> {
+    pub fn models(&self) -> Vec<&'static Description> {
         self.identity.map(models_answering).unwrap_or_default()
     }
 
@@ -251,7 +251,7 @@ pub async fn knowledge(node: &Node) -> Result<Knowledge, Error> {
 }
 
 /// What the node's objects tell of which of `models` it is.
-async fn told_apart(node: &Node, models: &[&'static DriveProfile]) -> Result<Knowledge, Error> {
+async fn told_apart(node: &Node, models: &[&'static Description]) -> Result<Knowledge, Error> {
     let Some((first, others)) = models.split_first() else { return Ok(Knowledge::Unknown) };
     if others.is_empty() {
         return Ok((*first).into());
@@ -342,12 +342,12 @@ impl Network {
     }
 }
 
-fn models_answering(said: Identity) -> Vec<&'static DriveProfile> {
+fn models_answering(said: Identity) -> Vec<&'static Description> {
     let Identity { device_type: Some(device_type), vendor_id, product_code, revision_number } = said else {
         return Vec::new();
     };
     let zero = |value: Option<u32>| value.unwrap_or(0);
-    let identity = profile::Identity {
+    let identity = devices::Identity {
         device_type,
         vendor_id: zero(vendor_id),
         product_code: zero(product_code),

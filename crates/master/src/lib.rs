@@ -12,7 +12,7 @@
 //! use master::{Drive, MotionOptions, Network};
 //!
 //! let network = Network::new(); // a clone of it goes to the runner
-//! let model = drives::profile::model("zlac8030l").ok_or("no such model")?;
+//! let model = devices::model("zlac8030l").ok_or("no such model")?;
 //! let node = network.node(NodeId::new(4).ok_or("no such node")?);
 //! let drive = Drive::new(node, model);
 //! let loss = drive.guard(SwitchedOff::Leave).await?;

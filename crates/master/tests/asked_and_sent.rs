@@ -6,8 +6,8 @@ mod support;
 use std::time::Duration;
 
 use can::{Bitrate, Instant};
+use devices::{MODELS, model};
 use drives::mjoint::Model;
-use drives::profile::{MODELS, model};
 use master::drive::{Commanded, MotionOptions};
 use master::units::{Amperes, Counts, Degrees, Ramp, Rpm, Shown, Turns};
 use master::{Drive, Error, Network};

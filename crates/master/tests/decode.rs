@@ -2,7 +2,7 @@
 
 use can::Frame;
 use canopen::NodeId;
-use drives::profile::model;
+use devices::model;
 use master::core::{MappedObject, PdoMap};
 use master::decode::{Decoder, Direction};
 
@@ -125,7 +125,7 @@ fn pdos_are_split_by_the_mapping_that_went_over_the_bus() {
 #[test]
 fn a_joint_is_put_into_its_own_words() {
     let mut decoder = Decoder::new();
-    decoder.set_model(NodeId::new(1).unwrap(), &drives::mjoint::M4230E17B50);
+    decoder.set_model(NodeId::new(1).unwrap(), &devices::mjoint::M4230E17B50);
     // "M Robot Joint Motor CanOpen Manual", 5.10.1: 0404h idle; 5.11.1: heartbeat 05h, and 04h in alarm; 606Ch is
     // INTEGER16 of 0.1 r/min by SDO (5.04) and INTEGER32 of r/min in TPDO3 (5.08).
     let shown = lines(

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use can::Instant;
 use cia402::PowerState;
-use drives::profile::model;
+use devices::model;
 use master::drive::{MotionOptions, Note};
 use master::units::{Amperes, Counts, Degrees, Ramp, Rpm, Turns};
 use master::{Drive, Error};

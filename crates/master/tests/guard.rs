@@ -7,8 +7,8 @@ mod support;
 use std::time::Duration;
 
 use can::{Bitrate, Frame, Instant, Station};
+use devices::model;
 use drives::mjoint::Model;
-use drives::profile::model;
 use master::drive::{HostLoss, MotionOptions, SwitchedOff};
 use master::units::{Ramp, Rpm};
 use master::{Drive, Network};

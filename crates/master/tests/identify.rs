@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use can::{Bitrate, Instant};
 use canopen::NmtState;
+use devices::{MODELS, models_by_identity};
 use drives::mjoint::Model;
-use drives::profile::{MODELS, models_by_identity};
 use master::drive::MotionOptions;
 use master::identify::{Found, Guess, Knowledge, knowledge};
 use master::units::Rpm;
@@ -50,7 +50,7 @@ fn guessed_drive(world: &mut World, network: &Network, id: u8) -> Drive {
     Drive::known_as(network.node(node(id)), Knowledge::Guessed(guess))
 }
 
-fn names(models: impl IntoIterator<Item = &'static drives::profile::DriveProfile>) -> Vec<&'static str> {
+fn names(models: impl IntoIterator<Item = &'static devices::Description>) -> Vec<&'static str> {
     models.into_iter().map(|model| model.model).collect()
 }
 
@@ -127,7 +127,7 @@ fn a_guess_is_good_for_writing_what_means_the_same_on_both_zl_drives() {
 fn a_name_that_the_objects_speak_against_is_refused_before_anything_is_written() {
     let (mut world, network) = bench();
     for (id, wrong, missing) in [(SERVO, "zlim42c", mux(0x2069, 0)), (STEPPER, "zlac8030l", mux(0x2029, 0))] {
-        let drive = Drive::new(network.node(node(id)), drives::profile::model(wrong).unwrap());
+        let drive = Drive::new(network.node(node(id)), devices::model(wrong).unwrap());
         let tap = world.add_tap();
         let error = block_on(&mut world, drive.check_identity()).unwrap().unwrap_err();
         assert!(matches!(error, Error::OtherModel { hallmark, .. } if hallmark == missing), "{error}");
@@ -163,7 +163,7 @@ fn objects_that_speak_for_two_models_or_for_none_leave_it_unknown() {
 fn models_with_the_same_objects_are_the_same_to_a_master() {
     for one in MODELS {
         for other in one.with_same_objects() {
-            let units = |profile: &drives::profile::DriveProfile| (profile.units, profile.storage, profile.pdo);
+            let units = |profile: &devices::Description| (profile.units, profile.storage, profile.pdo);
             assert_eq!(units(one), units(other), "{} and {}", one.model, other.model);
             assert_eq!((one.power, one.homing, one.modes), (other.power, other.homing, other.modes));
             assert_eq!((one.mode_display, one.host_watch), (other.mode_display, other.host_watch));

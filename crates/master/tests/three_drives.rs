@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use can::{Bitrate, Instant};
 use cia402::{ModeOfOperation, PowerState};
+use devices::{Description, HostWatch, MODELS, PowerStyle, Quirk, model};
 use drives::mjoint::Model;
-use drives::profile::{DriveProfile, HostWatch, MODELS, PowerStyle, Quirk, model};
 use master::drive::{Fact, HomingOptions, HostLoss, MotionOptions, Note};
 use master::units::{Amperes, Degrees, Ramp, Rpm, Turns};
 use master::{Drive, Error, Network};
@@ -383,7 +383,7 @@ fn every_drive_saves_by_its_own_command_and_restores_where_it_can() {
 
 #[test]
 fn models_of_one_identity_and_different_tables_have_hallmarks_that_tell_them_apart() {
-    let has = |profile: &DriveProfile, object| profile.table.find(object).is_ok();
+    let has = |profile: &Description, object| profile.table.find(object).is_ok();
     for one in MODELS {
         for other in MODELS {
             let same_table = core::ptr::eq(one.table, other.table);

@@ -5,7 +5,7 @@ mod support;
 use std::time::Duration;
 
 use can::{Bitrate, Instant};
-use drives::profile::model;
+use devices::model;
 use master::core::{MappedObject, PdoMap};
 use master::decode::Direction;
 use master::drive::MotionOptions;

@@ -7,7 +7,7 @@ use std::time::Duration;
 use can::{Bitrate, Instant};
 use canopen::NmtCommand;
 use cia402::PowerState;
-use drives::profile::model;
+use devices::model;
 use master::core::{MappedObject, PdoMap};
 use master::decode::Direction;
 use master::drive::{HostLoss, MotionOptions, Note};

@@ -4,9 +4,10 @@ use std::sync::LazyLock;
 
 use can::Bitrate;
 use canopen::NodeId;
+use devices::mjoint::M4230E17B50;
 use drives::engine::storage::Image;
 use drives::mjoint::variations::VARIANT;
-use drives::mjoint::{M4230E17B50, Model, storage};
+use drives::mjoint::{Model, storage};
 use sim::VirtualDrive;
 use sim::machine::{self, Joint, MJointMachine, Machine, Order, mjoint};
 

@@ -4,8 +4,8 @@ use std::sync::LazyLock;
 
 use can::Bitrate;
 use canopen::NodeId;
-use drives::variant::Preset;
-use drives::zlac8030l::PROFILE;
+use devices::variant::Preset;
+use devices::zltech::ZLAC8030L;
 use plant::hub_motor::HubMotor;
 use sim::Component;
 use sim::machine::{Order, Zlac8030lMachine, order, zlac8030l};
@@ -64,10 +64,10 @@ impl Bench {
     /// The same with values of its own in its parameter store.
     #[must_use]
     pub fn ordered(key: &str, choice: &str, presets: &[Preset]) -> Self {
-        let mut wanted = Order::new(&PROFILE, NodeId::new(NODE).expect("a node-ID"), Zlac8030l::BITRATE);
+        let mut wanted = Order::new(&ZLAC8030L, NodeId::new(NODE).expect("a node-ID"), Zlac8030l::BITRATE);
         wanted.variant.choose(key, choice).expect("a choice of this model");
         wanted.presets = presets.to_vec();
-        Self::with(vec![order(&PROFILE, &wanted).expect("a drive that can be ordered")])
+        Self::with(vec![order(&ZLAC8030L, &wanted).expect("a drive that can be ordered")])
     }
 
     /// Selects a mode and enables operation, without the watch over the host (2000h), so that a test may just look.

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use can::Bitrate;
 use canopen::NodeId;
-use drives::zlim42c::PROFILE;
+use devices::zltech::ZLIM42C;
 use sim::Component;
 use sim::machine::{Order, order};
 use sim::machine::{Zlim42cMachine, zlim42c, zlim42c_82};
@@ -60,9 +60,9 @@ impl Bench {
     /// A drive that takes another choice at one point (`Z092`, `brake`), and has just booted.
     #[must_use]
     pub fn choosing(key: &str, choice: &str) -> Self {
-        let mut wanted = Order::new(&PROFILE, NodeId::MIN, Zlim42c::BITRATE);
+        let mut wanted = Order::new(&ZLIM42C, NodeId::MIN, Zlim42c::BITRATE);
         wanted.variant.choose(key, choice).expect("a choice of this model");
-        Self::with(vec![order(&PROFILE, &wanted).expect("a drive that can be ordered")])
+        Self::with(vec![order(&ZLIM42C, &wanted).expect("a drive that can be ordered")])
     }
 
     /// Selects a mode and enables operation.

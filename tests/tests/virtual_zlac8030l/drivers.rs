@@ -1,7 +1,7 @@
 //! What public drivers of real robots do with this drive, and what it does for them (docs/drives/zlac8030l.md: L024, L044 to
 //! L046, L056, L075, L077, L083, L090, L093, L127, "What drivers show").
 
-use drives::variant::Preset;
+use devices::variant::Preset;
 
 use crate::bench::{Bench, assert_within};
 

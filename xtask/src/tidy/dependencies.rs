@@ -6,7 +6,7 @@ use super::Finding;
 use crate::workspace::Package;
 
 /// The crates that run without an operating system and without an allocator.
-pub(crate) const NO_STD: &[&str] = &["can", "canopen", "cia402", "motion", "plant", "drives"];
+pub(crate) const NO_STD: &[&str] = &["can", "canopen", "cia402", "motion", "plant", "devices", "drives"];
 
 /// What a crate of `crates/` may use: the project's own crates by folder name.
 const MAY_USE: &[(&str, &[&str])] = &[
@@ -15,13 +15,33 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("cia402", &[]),
     ("motion", &[]),
     ("plant", &[]),
-    ("drives", &["can", "canopen", "cia402", "motion"]),
-    ("sim", &["can", "canopen", "cia402", "motion", "plant", "drives"]),
-    ("eds", &["can", "canopen", "cia402", "drives"]),
-    ("master", &["can", "canopen", "cia402", "drives", "eds"]),
+    ("devices", &["can", "canopen", "cia402"]),
+    ("eds", &["can", "canopen", "cia402", "devices"]),
+    ("drives", &["can", "canopen", "cia402", "motion", "devices"]),
+    ("sim", &["can", "canopen", "cia402", "motion", "plant", "devices", "eds", "drives"]),
+    ("master", &["can", "canopen", "cia402", "devices"]),
     ("transport", &["can"]),
-    ("studio", &["can", "canopen", "cia402", "drives", "sim", "eds", "master", "transport"]),
-    ("cli", &["can", "canopen", "cia402", "motion", "plant", "drives", "sim", "eds", "master", "transport", "studio"]),
+    (
+        "showcase",
+        &["can", "canopen", "cia402", "motion", "plant", "devices", "eds", "drives", "sim", "master", "transport"],
+    ),
+    (
+        "cli",
+        &[
+            "can",
+            "canopen",
+            "cia402",
+            "motion",
+            "plant",
+            "devices",
+            "eds",
+            "drives",
+            "sim",
+            "master",
+            "transport",
+            "showcase",
+        ],
+    ),
 ];
 
 /// The crates of others that a `no_std` crate may use. None of them wants an allocator.

@@ -11,7 +11,7 @@ use super::motion::{MotionOutcome, Then, outcome, speed};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::guard::GuardArgs;
-use crate::models::DriveProfile;
+use crate::models::Description;
 use crate::parse::node::node;
 
 /// Find a drive's reference position
@@ -55,7 +55,7 @@ impl Home {
         outcome(context, &drive, ("home with method", &self.method), motion, then, guard).await
     }
 
-    fn refusal(&self, model: &DriveProfile) -> Failure {
+    fn refusal(&self, model: &Description) -> Failure {
         let modes = model.modes.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
         let mode = ModeOfOperation::HOMING;
         Failure::new(format!("node {}: no homing with method {}", self.node, self.method))

@@ -4,7 +4,7 @@ use std::fmt;
 use std::time::Duration;
 
 use canopen::{Mux, NodeId};
-use drives::profile::{Quantity, Ramps};
+use devices::{Quantity, Ramps};
 use master::drive::{Commanded, Drive, MotionOptions, MotionReport, Note};
 use master::units::{Amperes, Angle, Ramp, Rpm, Shown, parse_duration};
 use serde::Serialize;

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::sdo::guessed;
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::models::DriveProfile;
+use crate::models::Description;
 use crate::output::Report;
 use crate::paint::Paint;
 use crate::parse::drive_spec::model;
@@ -33,7 +33,7 @@ pub(crate) struct Objects {
 #[derive(Clone, Copy)]
 pub(crate) enum Whose {
     /// A model's.
-    Model(&'static DriveProfile),
+    Model(&'static Description),
     /// That of a node, whose model is to be found out.
     Node(NodeId),
 }
@@ -149,7 +149,7 @@ impl Objects {
     }
 
     /// Searches the table of `model`.
-    pub(crate) fn list(&self, model: &'static DriveProfile) -> Result<ObjectList, Failure> {
+    pub(crate) fn list(&self, model: &'static Description) -> Result<ObjectList, Failure> {
         let rows = model.table.rows();
         let wanted = |row: &&Entry| self.search.iter().all(|word| matches(row, word));
         let objects: Vec<Row> = rows.iter().filter(wanted).map(Row::new).collect();

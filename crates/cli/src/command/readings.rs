@@ -1,10 +1,10 @@
 //! `ferrodrive readings`: where a manual is silent or contradicts itself, and what the drives here do there.
 
-use drives::variant::{Variation, VariationKind};
+use devices::variant::{Variation, VariationKind};
 use serde::Serialize;
 
 use crate::failure::Failure;
-use crate::models::DriveProfile;
+use crate::models::Description;
 use crate::output::Report;
 use crate::paint::Paint;
 use crate::parse::drive_spec::model;
@@ -20,7 +20,7 @@ use crate::readings::{self, Reading};
 pub(crate) struct Readings {
     /// Model, e.g. zlac8030l
     #[arg(value_parser = model)]
-    model: &'static DriveProfile,
+    model: &'static Description,
     /// Only places with this number or with these words
     search: Vec<String>,
     /// Only what can be chosen for a virtual drive (sim --drive MODEL@NODE,...)
@@ -163,7 +163,7 @@ mod tests {
     use super::*;
     use crate::models::MODELS;
 
-    fn list(model: &'static DriveProfile, words: &[&str], guesses: bool) -> Result<ReadingList, Failure> {
+    fn list(model: &'static Description, words: &[&str], guesses: bool) -> Result<ReadingList, Failure> {
         let search = words.iter().map(|word| (*word).into()).collect();
         Readings { model, search, choices: false, guesses }.list()
     }

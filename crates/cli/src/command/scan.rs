@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::context::{Context, how_to_say};
 use crate::failure::Failure;
-use crate::models::DriveProfile;
+use crate::models::Description;
 use crate::output::Report;
 use crate::paint::Paint;
 use crate::table::Table;
@@ -104,7 +104,7 @@ impl Node {
 }
 
 /// What speaks against the model that a node is said to be.
-fn contradiction(told: &'static DriveProfile, found: &Found) -> Option<String> {
+fn contradiction(told: &'static Description, found: &Found) -> Option<String> {
     let said = format!("it is said to be a {}", told.model);
     if !found.identity?.matches(&told.identity) {
         return Some(format!("{said}, but its identity is another one: say the right model"));

@@ -1,7 +1,7 @@
 //! `ferrodrive save` and `restore`: a drive's own parameter memory, by its model's own commands.
 
 use canopen::NodeId;
-use drives::profile::{ParameterStorage, Write};
+use devices::{ParameterStorage, Write};
 use master::{Drive, Error};
 use serde::Serialize;
 

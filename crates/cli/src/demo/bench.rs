@@ -8,7 +8,7 @@ use std::time::Duration;
 use can::{Bitrate, CanId, Frame, Instant};
 use canopen::od::Entry;
 use canopen::{Mux, NodeId};
-use drives::profile::HostWatch;
+use devices::HostWatch;
 use sim::recorder::{Channel, Recorder, Signal};
 use sim::{Report, StationId, World};
 
@@ -18,7 +18,7 @@ use super::row::Row;
 use super::set_points::{Axis, SetPoints};
 use crate::embedded::{self, SEED};
 use crate::failure::Failure;
-use crate::models::DriveProfile;
+use crate::models::Description;
 use crate::plot::{Event, EventKind};
 use crate::progress::Progress;
 
@@ -33,7 +33,7 @@ const SAMPLING_PERIOD: Duration = Duration::from_millis(5);
 
 /// See the [module](self).
 pub(super) struct Bench {
-    drives: Vec<(&'static DriveProfile, u8)>,
+    drives: Vec<(&'static Description, u8)>,
     /// Which of them is talked to.
     subject: usize,
     world: World,
@@ -106,7 +106,7 @@ pub(super) const SIGNALS: [Signal; 6] = [
 impl Bench {
     /// A bench with factory-fresh drives that are being powered. The first one is talked to.
     pub(super) fn new(
-        drives: &[(&'static DriveProfile, u8)],
+        drives: &[(&'static Description, u8)],
         bitrate: Bitrate,
         progress: Progress,
     ) -> Result<Self, Failure> {
@@ -142,7 +142,7 @@ impl Bench {
     }
 
     /// The drives and their node-IDs.
-    pub(super) fn drives(&self) -> &[(&'static DriveProfile, u8)] {
+    pub(super) fn drives(&self) -> &[(&'static Description, u8)] {
         &self.drives
     }
 
@@ -152,7 +152,7 @@ impl Bench {
     }
 
     /// What is known of the drive that is talked to.
-    pub(super) fn model(&self) -> &'static DriveProfile {
+    pub(super) fn model(&self) -> &'static Description {
         self.drives[self.subject].0
     }
 

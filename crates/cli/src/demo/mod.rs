@@ -21,7 +21,7 @@ mod zlim42c;
 
 use bench::Bench;
 use can::Bitrate;
-use drives::profile::DriveProfile;
+use devices::Description;
 pub(crate) use report::DemoReport;
 use report::PartReport;
 
@@ -35,15 +35,15 @@ struct Part {
     /// As in the table's heading.
     name: &'static str,
     /// The drives with their node-IDs; the first one is talked to.
-    drives: &'static [(&'static DriveProfile, u8)],
+    drives: &'static [(&'static Description, u8)],
     bitrate: Bitrate,
     procedures: fn(&mut Bench),
     draw: fn(&bench::Finished, &'static str) -> Vec<Vec<crate::plot::Figure>>,
 }
 
 /// "Set to different addresses in advance, such as addresses 1, 2, 3" (5.10.3).
-const JOINTS: [(&DriveProfile, u8); 3] = {
-    let joint = &drives::mjoint::M4230E17B50;
+const JOINTS: [(&Description, u8); 3] = {
+    let joint = &devices::mjoint::M4230E17B50;
     [(joint, 1), (joint, 2), (joint, 3)]
 };
 
@@ -51,21 +51,21 @@ const JOINTS: [(&DriveProfile, u8); 3] = {
 const PARTS: [Part; 5] = [
     Part {
         name: "ZLAC8030L",
-        drives: &[(&drives::zlac8030l::PROFILE, 4)],
+        drives: &[(&devices::zltech::ZLAC8030L, 4)],
         bitrate: Bitrate::K500,
         procedures: zlac8030l::procedures,
         draw: figure::zlac8030l,
     },
     Part {
         name: "M4230E17B50",
-        drives: &[(&drives::mjoint::M4230E17B50, 1)],
+        drives: &[(&devices::mjoint::M4230E17B50, 1)],
         bitrate: Bitrate::M1,
         procedures: mjoint::procedures,
         draw: figure::mjoint,
     },
     Part {
         name: "ZLIM42-C",
-        drives: &[(&drives::zlim42c::PROFILE, 1)],
+        drives: &[(&devices::zltech::ZLIM42C, 1)],
         bitrate: Bitrate::K500,
         procedures: zlim42c::procedures,
         draw: figure::zlim42c,
@@ -87,7 +87,7 @@ const PARTS: [Part; 5] = [
 ];
 
 /// Runs the demo, or the part of one model: the table, and the picture of the motion.
-pub(crate) fn run(only: Option<&'static DriveProfile>, progress: &Progress) -> Result<(DemoReport, Poster), Failure> {
+pub(crate) fn run(only: Option<&'static Description>, progress: &Progress) -> Result<(DemoReport, Poster), Failure> {
     let mut parts = Vec::new();
     let mut poster = figure::poster(only.is_some());
     for part in &PARTS {
@@ -109,7 +109,7 @@ pub(crate) fn run(only: Option<&'static DriveProfile>, progress: &Progress) -> R
 
 impl Part {
     /// The part with another model in place of its drive, if the manual is the same: then the objects are too.
-    fn with(&self, model: &'static DriveProfile) -> Option<Vec<(&'static DriveProfile, u8)>> {
+    fn with(&self, model: &'static Description) -> Option<Vec<(&'static Description, u8)>> {
         match *self.drives {
             [(profile, node)] if std::ptr::eq(profile.table, model.table) => Some(vec![(model, node)]),
             _ => None,

@@ -17,7 +17,7 @@ use sim::{Source, VirtualDrive, World};
 
 use crate::embedded::{self, Embedded, SEED};
 use crate::failure::Failure;
-use crate::models::DriveProfile;
+use crate::models::Description;
 use crate::parse::drive_spec::{DriveSpec, drive_spec};
 use reader::{Field, Table};
 
@@ -104,7 +104,7 @@ impl Machine {
     }
 
     /// Which models are where.
-    pub(crate) fn models(&self) -> impl Iterator<Item = (NodeId, &'static DriveProfile)> {
+    pub(crate) fn models(&self) -> impl Iterator<Item = (NodeId, &'static Description)> {
         self.drives.iter().map(|drive| (drive.spec.node, drive.spec.model))
     }
 

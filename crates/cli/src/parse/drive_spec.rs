@@ -2,19 +2,19 @@
 
 use can::Bitrate;
 use canopen::{Mux, NodeId};
-use drives::variant::{NoSuchChoice, Preset, Variant, VariationKind};
+use devices::variant::{NoSuchChoice, Preset, Variant, VariationKind};
 use sim::machine::Order;
 
 use super::node::node;
 use super::object;
 use super::suggest::{did_you_mean, near};
-use crate::models::{self, DriveProfile, MODELS};
+use crate::models::{self, Description, MODELS};
 
 /// A drive to put on a virtual bus.
 #[derive(Clone)]
 pub(crate) struct DriveSpec {
     /// Which drive.
-    pub(crate) model: &'static DriveProfile,
+    pub(crate) model: &'static Description,
     /// Its node-ID at the first start.
     pub(crate) node: NodeId,
     variant: Variant,
@@ -23,7 +23,7 @@ pub(crate) struct DriveSpec {
 
 impl DriveSpec {
     /// A drive as delivered.
-    pub(crate) fn new(model: &'static DriveProfile, node: NodeId) -> Self {
+    pub(crate) fn new(model: &'static Description, node: NodeId) -> Self {
         Self { model, node, variant: Variant::first_of(model.variations), presets: Vec::new() }
     }
 
@@ -75,7 +75,7 @@ impl DriveSpec {
 }
 
 /// The object that somebody means by a name, an index or an index with a sub-index.
-fn object_of(model: &DriveProfile, text: &str) -> Option<Mux> {
+fn object_of(model: &Description, text: &str) -> Option<Mux> {
     let (mux, _) = object::object(text).ok()?.resolve(Some(model.table)).ok()?;
     Some(mux)
 }
@@ -104,14 +104,14 @@ pub(crate) fn drive_spec(text: &str) -> Result<DriveSpec, String> {
 }
 
 /// `4=zlac8030l`.
-pub(crate) fn node_model(text: &str) -> Result<(NodeId, &'static DriveProfile), String> {
+pub(crate) fn node_model(text: &str) -> Result<(NodeId, &'static Description), String> {
     let (number, name) =
         text.split_once('=').ok_or_else(|| format!("'{text}' is incomplete; expected NODE=MODEL, e.g. 4=zlac8030l"))?;
     Ok((node(number)?, model(name)?))
 }
 
 /// `zlac8030l`.
-pub(crate) fn model(name: &str) -> Result<&'static DriveProfile, String> {
+pub(crate) fn model(name: &str) -> Result<&'static Description, String> {
     models::find(name).ok_or_else(|| {
         let near = near(name, MODELS.iter().map(|model| model.model));
         format!("'{name}' is no model{}; expected one of: {}", did_you_mean(&near), models::names())

@@ -13,7 +13,7 @@ use canopen::{EmcyErrorCode, Mux, NodeId};
 use super::communication_errors::CommunicationErrors;
 use super::faults::{FaultMonitor, FaultSet};
 use super::storage::{Image, Store};
-use crate::variant::Variant;
+use devices::variant::Variant;
 
 /// Node, store and communication task of a drive whose table has `N` rows.
 #[derive(Clone)]
@@ -435,8 +435,8 @@ pub(crate) use station;
 mod tests {
     use super::*;
     use crate::engine::faults::{FaultRow, error_register};
-    use crate::row::{U8, U16, ro, rws};
     use canopen::od::{Object, Table, keys};
+    use devices::row::{U8, U16, ro, rws};
 
     const PERIOD_NS: u64 = 500_000;
 
@@ -448,7 +448,7 @@ mod tests {
     static KEYS: [u32; 3] = keys(&ROWS);
     static TABLE: Table = Table::new(&ROWS, &KEYS);
     static PROFILE: NodeProfile = NodeProfile::cia_301(&TABLE);
-    static FAULTS: [FaultRow; 1] = [FaultRow::new(0x3210, "over-voltage", error_register::VOLTAGE, 1, "")];
+    static FAULTS: [FaultRow; 1] = [FaultRow::new(0x3210, "over-voltage", error_register::VOLTAGE, "")];
     const ERROR_REGISTER: Object<u8> = TABLE.object(0x1001, 0);
     const HEARTBEAT: Object<u16> = TABLE.object(0x1017, 0);
     const PARAMETER: Object<u16> = TABLE.object(0x2000, 0);
@@ -509,7 +509,7 @@ mod tests {
     #[test]
     fn a_restart_of_communication_leaves_parameters_and_the_error_register() {
         let mut device = started();
-        let mut faults = FaultMonitor::new(&FAULTS);
+        let mut faults = FaultMonitor::new(&FAULTS, &[1]);
         faults.raise(0);
         device.report_faults(faults.latched(), &faults, Instant::ZERO);
         device.values_mut().set(PARAMETER, 8);
@@ -534,7 +534,7 @@ mod tests {
     #[test]
     fn errors_of_communication_stand_beside_the_faults_and_no_error_is_told_when_the_last_has_ended() {
         let mut device = started();
-        let mut faults = FaultMonitor::new(&FAULTS);
+        let mut faults = FaultMonitor::new(&FAULTS, &[1]);
         let [first, second, ..] = PdoNumber::ALL;
         device.report_rpdo_length(first, false, at(1, 0));
         device.report_rpdo_length(second, false, at(1, 0));
@@ -556,7 +556,7 @@ mod tests {
         device.report_lost_events(at(1, 0));
         assert_sent(&mut device, ["701#00", "081#1081110000000000"], 0b1_0001);
         let mut again = device.clone();
-        device.report_reset(&FaultMonitor::new(&FAULTS), at(1, 0));
+        device.report_reset(&FaultMonitor::new(&FAULTS, &[1]), at(1, 0));
         assert_sent(&mut device, ["081#0000000000000000"], 0);
         again.restart_communication(at(1, 0));
         assert_sent(&mut again, ["701#00"], 0);

@@ -1,51 +1,9 @@
 //! Faults of a drive: a const table, and what is present, confirmed and latched of it.
 //!
-//! A fault is a row of the drive's table. Its cause has to be present for the row's debounce time to be confirmed;
+//! A fault is a row of the drive's table. Its cause has to be present for its debounce time to be confirmed;
 //! once confirmed the fault stays latched until a reset finds the cause gone.
 
-use canopen::EmcyErrorCode;
-
-/// One fault of a drive.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FaultRow {
-    /// Its value in the drive's fault code object.
-    pub code: u16,
-    /// What it is.
-    pub name: &'static str,
-    /// What may cause it and what to do about it.
-    pub remedy: &'static str,
-    /// Bits of the error register 1001h. Source: CiA 301, 7.5.2.2.
-    pub error_register: u8,
-    /// Error code of the EMCY message.
-    pub emcy: EmcyErrorCode,
-    /// How many supervision periods the cause must last.
-    pub debounce: u16,
-}
-
-impl FaultRow {
-    /// A fault whose EMCY error code is the value of the drive's fault code object.
-    pub const fn new(code: u16, name: &'static str, error_register: u8, debounce: u16, remedy: &'static str) -> Self {
-        Self { code, name, remedy, error_register, emcy: EmcyErrorCode(code), debounce }
-    }
-}
-
-/// Bits of the error register 1001h (CiA 301, 7.5.2.2). Bit 0, generic, is set with each other.
-pub mod error_register {
-    /// Any error.
-    pub const GENERIC: u8 = 1 << 0;
-    /// Current.
-    pub const CURRENT: u8 = 1 << 1;
-    /// Voltage.
-    pub const VOLTAGE: u8 = 1 << 2;
-    /// Temperature.
-    pub const TEMPERATURE: u8 = 1 << 3;
-    /// Communication.
-    pub const COMMUNICATION: u8 = 1 << 4;
-    /// Device profile specific.
-    pub const PROFILE: u8 = 1 << 5;
-    /// Manufacturer specific.
-    pub const MANUFACTURER: u8 = 1 << 7;
-}
+pub use devices::faults::{FaultRow, error_register};
 
 /// A set of faults: bit *n* is row *n* of the drive's table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -110,15 +68,16 @@ pub fn within(value: f32, nominal: f32, tolerance: f32) -> bool {
 #[derive(Clone, Debug)]
 pub struct FaultMonitor<const N: usize> {
     table: &'static [FaultRow; N],
+    debounce: &'static [u16; N],
     present_for: [u16; N],
     present: FaultSet,
     latched: FaultSet,
 }
 
 impl<const N: usize> FaultMonitor<N> {
-    /// Nothing present, nothing latched.
-    pub const fn new(table: &'static [FaultRow; N]) -> Self {
-        Self { table, present_for: [0; N], present: FaultSet::NONE, latched: FaultSet::NONE }
+    /// Nothing present, nothing latched. `debounce` is how many supervision periods the cause of each row must last.
+    pub const fn new(table: &'static [FaultRow; N], debounce: &'static [u16; N]) -> Self {
+        Self { table, debounce, present_for: [0; N], present: FaultSet::NONE, latched: FaultSet::NONE }
     }
 
     /// Takes in which causes are present now, once each supervision period; returns what is newly latched.
@@ -183,14 +142,25 @@ impl<const N: usize> FaultMonitor<N> {
 
     fn count(&mut self, present: FaultSet) -> FaultSet {
         let mut new = FaultSet::NONE;
-        for (row, fault) in self.table.iter().enumerate() {
+        for (row, debounce) in self.debounce.iter().enumerate() {
             let lasts = &mut self.present_for[row];
             *lasts = if present.has(row) { lasts.saturating_add(1) } else { 0 };
-            let confirmed = *lasts > 0 && *lasts >= fault.debounce;
+            let confirmed = *lasts > 0 && *lasts >= *debounce;
             new = new.with(row, confirmed && !self.latched.has(row));
         }
         self.present = present;
         self.latched = FaultSet(self.latched.0 | new.0);
         new
     }
+}
+
+/// The debounce times of a table of `N` faults, in supervision periods: those named by their rows, and 1 for all others.
+pub(crate) const fn debounces<const N: usize>(named: &[(usize, u16)]) -> [u16; N] {
+    let mut all = [1; N];
+    let mut i = 0;
+    while i < named.len() {
+        all[named[i].0] = named[i].1;
+        i += 1;
+    }
+    all
 }

@@ -18,7 +18,6 @@ mod model;
 pub mod objects;
 mod parameters;
 pub mod power_on;
-mod profile;
 mod protection;
 pub mod pulses;
 pub mod readings;
@@ -30,7 +29,6 @@ pub mod variations;
 pub use drive::{MJoint, NODE_PROFILE};
 pub use hardware::{Actuation, Battery, Brake, Hardware, PowerStage, Sensors};
 pub use model::Model;
-pub use profile::{M4230E17B50, M4230E17B80, M8025E25B50, M8025E25B80};
 
 /// The values of the drive's objects.
 pub type Values = canopen::od::Dictionary<{ objects::ROW_COUNT }>;

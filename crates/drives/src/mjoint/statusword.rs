@@ -3,14 +3,9 @@
 //! The manual names the bits after CiA 402, yet 0404h, 0014h, 1414h, 0037h and 0437h of its examples fit no state of
 //! it. This rule gives all five.
 
-use cia402::{Controlword, Statusword};
+pub use devices::mjoint::statusword::*;
 
-/// Bit 4: the power stage drives the motor.
-pub const LIVE: u16 = 1 << 4;
-/// Bit 12 in mode 6: the origin is found.
-pub const HOMING_ATTAINED: u16 = 1 << 12;
-/// Bit 13 in mode 6: the origin was not found.
-pub const HOMING_ERROR: u16 = 1 << 13;
+use cia402::{Controlword, Statusword};
 
 /// What the statusword is made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

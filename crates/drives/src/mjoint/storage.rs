@@ -7,7 +7,7 @@ use super::Values;
 use super::objects::{DEVICE_ADDRESS, POSITION_ACTUAL_INTERNAL_VALUE, TABLE};
 use super::readings::NO_RECORD;
 use crate::engine::storage::stored_rows;
-use crate::variant::Variant;
+use devices::variant::Variant;
 
 const _: usize = stored_rows(&TABLE);
 

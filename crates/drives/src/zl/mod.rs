@@ -1,16 +1,23 @@
-//! What the two ZLTECH drives have in common: one maker's firmware, with the same identity, the same communication
-//! objects, the same way of storing parameters and the same meaning of most CiA 402 objects.
+//! What the two ZLTECH drives have in common: one maker's firmware, with the same way of storing parameters and the same
+//! meaning of most CiA 402 objects.
 //!
-//! Sources: "ZLAC8030L quick start guide V1.00" and "ZLIM42-C user manual V1.03". What differs, and be it the number of an
-//! object, stands in the drive's own folder.
+//! Sources: "ZLAC8030L quick start guide V1.00" and "ZLIM42-C user manual V1.03". What differs stands in the drive's own folder.
 
-pub(crate) mod communication;
-mod model;
 mod parameters;
 mod storage;
 pub(crate) mod terminals;
-pub(crate) mod values;
 
-pub(crate) use model::{IDENTITY, PDO_RULES, RAMPS, node_profile, parameter_storage};
+use canopen::node::NodeProfile;
+use canopen::pdo::EventTrigger;
+use devices::Description;
+
+use crate::communication::communication;
+
 pub(crate) use parameters::ProfileObjects;
 pub(crate) use storage::{note_write, register_command};
+
+/// How the drives communicate: as described, event-driven PDOs as the ZLAC8030L's manual has them (6.1; the ZLIM42-C's gives
+/// no more than the object table).
+pub(crate) const fn node_profile(description: &Description) -> NodeProfile {
+    NodeProfile { event_trigger: EventTrigger::ChangeOr255ByTimer, ..communication(description) }
+}

@@ -3,7 +3,8 @@
 
 use canopen::od::{Entry, Object, Slot};
 
-use super::model::{RESTORE, SAVE};
+use devices::zltech::{RESTORE, SAVE};
+
 use crate::engine::device::Device;
 
 /// A write to the register parameter setting, which reads 0 again when it is done; it is about the rows that `wanted` names.

@@ -9,7 +9,6 @@ pub mod gains;
 pub mod hardware;
 pub mod objects;
 mod parameters;
-mod profile;
 mod protection;
 pub mod readings;
 mod restart;
@@ -20,7 +19,6 @@ pub mod variations;
 
 pub use drive::{NODE_PROFILE, Zlac8030l};
 pub use hardware::{Actuation, Hardware, PowerStage, Sensors};
-pub use profile::PROFILE;
 
 /// The values of the drive's objects.
 pub type Values = canopen::od::Dictionary<{ objects::ROW_COUNT }>;

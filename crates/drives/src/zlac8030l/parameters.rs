@@ -13,8 +13,8 @@ use crate::engine::axis::{AxisParameters, ExternalStop, StopRamp, Tolerances};
 use crate::engine::bleeder::BleederLimits;
 use crate::engine::overload::{OverloadLimits, between};
 use crate::engine::servo::{ServoGains, ServoLimits, ServoModel};
-use crate::variant::Variant;
 use crate::zl::ProfileObjects;
+use devices::variant::Variant;
 
 const PROFILE_OBJECTS: ProfileObjects = ProfileObjects::of(&TABLE);
 

@@ -1,10 +1,6 @@
 //! Figures that the manual ("ZLAC8030L quick start guide V1.00") does not give, each with the reason for its value.
 
-/// 1009h. The manual prints no value; the maker's EDS has 2608h.
-pub const HARDWARE_VERSION: i64 = 0x2608;
-
-/// 100Ah and 2025h. The manual prints no value: version 1.00, as the manual itself.
-pub const SOFTWARE_VERSION: i64 = 0x0100;
+pub use devices::zltech::zlac8030l::assumptions::*;
 
 /// Control period: 20 kHz, usual for the switching of such a power stage.
 pub const CONTROL_PERIOD_NS: u64 = 50_000;

@@ -5,7 +5,7 @@ use canopen::NodeId;
 use super::Values;
 use super::objects::{CAN_BAUD_RATE, CAN_NODE_ID, TABLE};
 use crate::engine::storage::stored_rows;
-use crate::variant::Variant;
+use devices::variant::Variant;
 
 const _: usize = stored_rows(&TABLE);
 

@@ -1,53 +1,20 @@
-//! The faults of the drive as one table: 603Fh of 5.4 and the lights of 3.4 ("ZLIM42-C user manual V1.03").
-//!
-//! The two lists do not match one to one. Over-current of the bus has a light (five flashes) and no code: FF02h. The
-//! EEPROM has a code and no light. EMCY messages carry the value of 603Fh as error code (5.2).
+//! How long the causes of faults must last before they count; the faults themselves are those of the description.
+
+pub use devices::zltech::zlim42c::faults::*;
 
 use super::readings::{
     BUS_OVER_CURRENT_DEBOUNCE_PERIODS, OVER_CURRENT_DEBOUNCE_PERIODS, REFERENCE_DEBOUNCE_PERIODS,
     VOLTAGE_DEBOUNCE_PERIODS,
 };
-use crate::engine::faults::FaultRow;
-use crate::engine::faults::error_register::{CURRENT, MANUFACTURER, VOLTAGE};
+use crate::engine::faults::debounces;
 
-/// Rows of [`FAULTS`].
-pub mod row {
-    /// FF01h.
-    pub const OVER_VOLTAGE: usize = 0;
-    /// FF02h: a phase.
-    pub const OVER_CURRENT: usize = 1;
-    /// FF04h.
-    pub const PHASE_LOSS: usize = 2;
-    /// FF08h.
-    pub const REFERENCE_VOLTAGE: usize = 3;
-    /// FF10h.
-    pub const EEPROM: usize = 4;
-    /// FF02h: the supply.
-    pub const BUS_OVER_CURRENT: usize = 5;
-}
-
-/// Number of faults.
-pub const FAULT_COUNT: usize = 6;
-
-/// Also of what has a debounce of its own, as the phases have.
-const AT_ONCE: u16 = 1;
-
-/// All faults that occur.
-#[rustfmt::skip]
-pub static FAULTS: [FaultRow; FAULT_COUNT] = [
-    FaultRow::new(0xFF01, "over-voltage", VOLTAGE, VOLTAGE_DEBOUNCE_PERIODS,
-        "Lower the supply: 24 V, at most 30 V. If it rises while the motor brakes, slow down longer (6084h)."),
-    FaultRow::new(0xFF02, "over-current", CURRENT, OVER_CURRENT_DEBOUNCE_PERIODS,
-        "Look for a short circuit between the motor's wires; lower 2005h; set 2040h and 2041h back."),
-    FaultRow::new(0xFF04, "phase loss", MANUFACTURER, AT_ONCE,
-        "A motor wire has bad contact to the drive's board: have it repaired."),
-    FaultRow::new(0xFF08, "internal reference voltage", MANUFACTURER, REFERENCE_DEBOUNCE_PERIODS,
-        "The drive's reference voltage circuit is out of order: replace the drive."),
-    FaultRow::new(0xFF10, "EEPROM read and write", MANUFACTURER, AT_ONCE,
-        "Write 1 to 2010h (factory settings). If it comes back, the EEPROM is damaged."),
-    FaultRow::new(0xFF02, "bus over-current", CURRENT, BUS_OVER_CURRENT_DEBOUNCE_PERIODS,
-        "The drive draws too much from its supply: lower 2005h; look for a short circuit in the motor."),
-];
+/// Supervision periods for each row of [`FAULTS`].
+pub(super) static DEBOUNCE: [u16; FAULT_COUNT] = debounces(&[
+    (row::OVER_VOLTAGE, VOLTAGE_DEBOUNCE_PERIODS),
+    (row::OVER_CURRENT, OVER_CURRENT_DEBOUNCE_PERIODS),
+    (row::REFERENCE_VOLTAGE, REFERENCE_DEBOUNCE_PERIODS),
+    (row::BUS_OVER_CURRENT, BUS_OVER_CURRENT_DEBOUNCE_PERIODS),
+]);
 
 /// Red flashes of each row of [`FAULTS`] (3.4). None is printed for the EEPROM: the next free count.
 pub const FLASHES: [u8; FAULT_COUNT] = [1, 2, 3, 4, 6, 5];

@@ -8,7 +8,7 @@ use cia402::HomingSwitch::{Home, NegativeLimit, PositiveLimit};
 use cia402::{Direction, HomingMethod, HomingRow, HomingSwitch, SwitchEdge};
 
 use super::variations::HOMING_BY_PROSE;
-use crate::variant::Variant;
+use devices::variant::Variant;
 
 /// The directions of the labels: 24 and 29 with the edge of CiA 402-2, which is the negative one of the home switch for both.
 #[rustfmt::skip]

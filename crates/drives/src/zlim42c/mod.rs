@@ -11,7 +11,6 @@ pub mod homing;
 pub mod led;
 pub mod objects;
 mod parameters;
-mod profile;
 mod protection;
 pub mod readings;
 mod restart;
@@ -23,7 +22,6 @@ pub mod variations;
 
 pub use drive::{NODE_PROFILE, Zlim42c};
 pub use hardware::{Actuation, Hardware, PowerStage, Sensors};
-pub use profile::{PROFILE, PROFILE_82};
 
 /// The values of the drive's objects.
 pub type Values = canopen::od::Dictionary<{ objects::ROW_COUNT }>;

@@ -10,8 +10,8 @@ use super::{Values, homing};
 use crate::engine::axis::{AxisParameters, StopRamp, Tolerances};
 use crate::engine::modes::{HomingParameters, VelocityRamps};
 use crate::engine::stepper::{StepperCurrents, StepperGains, StepperModel};
-use crate::variant::Variant;
 use crate::zl::ProfileObjects;
+use devices::variant::Variant;
 
 const PROFILE_OBJECTS: ProfileObjects = ProfileObjects::of(&TABLE);
 

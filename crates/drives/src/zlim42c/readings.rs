@@ -1,10 +1,6 @@
 //! Figures that the manual ("ZLIM42-C user manual V1.03") does not give, each with the reason for its value.
 
-/// 1009h. The manual prints no value: version 1.00.
-pub const HARDWARE_VERSION: i64 = 0x0100;
-
-/// 100Ah and 2088h. The manual prints no value: version 1.03, as the manual itself.
-pub const SOFTWARE_VERSION: i64 = 0x0103;
+pub use devices::zltech::zlim42c::assumptions::*;
 
 /// Rotor teeth of a motor with 200 full steps: electrical turns in a turn of the shaft.
 pub const TEETH: u32 = 50;
@@ -85,14 +81,6 @@ pub const HOLD_AFTER_PERIODS: u16 = 200;
 /// How far beyond the home switch methods 24 and 29 go before they come back slowly (5.3.6, "goes back some way"), in
 /// turns: 18 degrees, ten full steps, more than a switch's hysteresis and the way of its filter time at 60 r/min.
 pub const HOMING_BACK_OFF_TURNS: f64 = 0.05;
-
-/// Factory value of 204Bh and 204Ch, ms: 3.2 asks for pulses longer than 10 ms. No unit is printed.
-pub const INPUT_FILTER_MS: i64 = 10;
-
-/// Factory values of 2040h and 2041h: those of the sibling ZLAC8030L, since none are printed.
-pub const CURRENT_KP: i64 = 600;
-/// See [`CURRENT_KP`].
-pub const CURRENT_KI: i64 = 300;
 
 /// One count of 2040h, V/A: 600 counts give 15 V/A, a loop gain `kp T / L` of 0.27 and 0.14 with the windings of the two
 /// lengths (2.8 and 5.4 mH). A voltage acts one control period late, so 0.25 is critically damped and 1 unstable.

@@ -6,7 +6,7 @@ use super::Values;
 use super::objects::{CAN_BAUD_RATE, CUSTOM_NODE_ID, TABLE};
 use super::restart::CUSTOM_NODE_IDS;
 use crate::engine::storage::stored_rows;
-use crate::variant::Variant;
+use devices::variant::Variant;
 
 const _: usize = stored_rows(&TABLE);
 

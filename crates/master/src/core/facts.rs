@@ -4,7 +4,7 @@ use std::time::Duration;
 use can::Instant;
 use canopen::emcy::Emcy;
 use canopen::{NmtCommand, NmtState};
-use drives::profile::DriveProfile;
+use devices::Description;
 
 /// How many emergency messages are kept for each node.
 const EMCY_KEPT: usize = 8;
@@ -79,7 +79,7 @@ impl NodeFacts {
 
     /// The state that it must be in: what this master last told it, or what it has said since, as a node of this model
     /// means it (as the standard says, if the model is not known).
-    pub fn probable_state(&self, profile: Option<&DriveProfile>) -> Option<NmtState> {
+    pub fn probable_state(&self, profile: Option<&Description>) -> Option<NmtState> {
         let told = self.nmt_sent.and_then(|(at, command)| Some((at, state_after(command)?)));
         let said = self.nmt_state.map(|said| match profile {
             // Such a model's heartbeat cannot say that it is stopped: what it was told decides.

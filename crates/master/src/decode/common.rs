@@ -3,7 +3,7 @@
 
 use canopen::Mux;
 use canopen::od::{DataType, Entry};
-use drives::profile::{MODELS, reads_alike};
+use devices::{MODELS, reads_alike};
 
 use DataType::{Integer16 as I16, Integer32 as I32};
 use DataType::{Unsigned8 as U8, Unsigned16 as U16, Unsigned32 as U32};
@@ -125,7 +125,7 @@ mod tests {
     fn standard_objects_ascend_and_no_model_has_them() {
         assert!(STANDARD.is_sorted_by(|(a, ..), (b, ..)| a < b));
         for (index, name, _) in STANDARD {
-            let has = |profile: &&&drives::profile::DriveProfile| profile.row(Mux::new(index, 0)).is_some();
+            let has = |profile: &&&devices::Description| profile.row(Mux::new(index, 0)).is_some();
             assert!(
                 !MODELS.iter().any(|profile| has(&profile)),
                 "{index:04X}h {name}: a model's own row speaks for it"

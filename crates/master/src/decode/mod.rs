@@ -18,8 +18,8 @@ use canopen::heartbeat::Heartbeat;
 use canopen::nmt::{NmtRequest, NmtTarget};
 use canopen::sync::Sync;
 use canopen::{Mux, NmtState, NodeId};
-use drives::engine::faults::FaultRow;
-use drives::profile::{DriveProfile, MODELS};
+use devices::faults::FaultRow;
+use devices::{Description, MODELS};
 
 use crate::core::PdoMap;
 use crate::identify::Model;
@@ -89,7 +89,7 @@ impl Decoder {
 
     /// Puts what a node says in its model's words, and takes the model's factory PDO mappings for granted until others
     /// are seen.
-    pub fn set_model(&mut self, node: NodeId, model: &'static DriveProfile) {
+    pub fn set_model(&mut self, node: NodeId, model: &'static Description) {
         self.models.0.insert(node.raw(), Model(model));
         self.pdos.load_defaults(node, model.table);
     }

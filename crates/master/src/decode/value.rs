@@ -3,7 +3,7 @@ use core::fmt;
 use canopen::Mux;
 use canopen::od::{DataType, Entry};
 use cia402::{Controlword, ModeOfOperation, Statusword};
-use drives::profile::{DriveProfile, PowerStyle};
+use devices::{Description, PowerStyle};
 
 use super::common::{common_name, common_row, common_type};
 
@@ -16,12 +16,12 @@ pub struct Value<'a> {
     pub bytes: &'a [u8],
     /// Its row in the model's table.
     pub entry: Option<&'static Entry>,
-    model: Option<&'static DriveProfile>,
+    model: Option<&'static Description>,
 }
 
 impl<'a> Value<'a> {
     /// The bytes of an object, looked up in the model's table, or in what all models agree on.
-    pub fn new(mux: Mux, bytes: &'a [u8], model: Option<&'static DriveProfile>) -> Self {
+    pub fn new(mux: Mux, bytes: &'a [u8], model: Option<&'static Description>) -> Self {
         Self { mux, bytes, entry: find(model, mux), model }
     }
 
@@ -75,19 +75,19 @@ impl fmt::Display for Value<'_> {
 }
 
 /// An object's multiplexor and its name, if known.
-pub(super) fn write_name(f: &mut fmt::Formatter<'_>, mux: Mux, model: Option<&'static DriveProfile>) -> fmt::Result {
+pub(super) fn write_name(f: &mut fmt::Formatter<'_>, mux: Mux, model: Option<&'static Description>) -> fmt::Result {
     match model.map_or_else(|| common_name(mux), |model| model.row(mux).map(|row| row.name)) {
         Some(name) => write!(f, "{mux} {name}"),
         None => write!(f, "{mux}"),
     }
 }
 
-fn find(model: Option<&'static DriveProfile>, mux: Mux) -> Option<&'static Entry> {
+fn find(model: Option<&'static Description>, mux: Mux) -> Option<&'static Entry> {
     model.map_or_else(|| common_row(mux), |model| model.row(mux))
 }
 
 /// A statusword in words: its state and the bits that say more, or for a model without states its bits.
-pub fn statusword_words(word: Statusword, model: Option<&DriveProfile>) -> String {
+pub fn statusword_words(word: Statusword, model: Option<&Description>) -> String {
     const BITS: [(u16, &str); 2] = [(Statusword::WARNING, "warning"), (Statusword::TARGET_REACHED, "target reached")];
     let own = model.map_or(&[][..], |model| model.statusword_bits);
     let (state, common) = match model {
@@ -100,7 +100,7 @@ pub fn statusword_words(word: Statusword, model: Option<&DriveProfile>) -> Strin
 }
 
 /// Objects whose bits the standard or the model gives a meaning.
-fn standard_words(mux: Mux, raw: u32, model: Option<&DriveProfile>) -> Option<String> {
+fn standard_words(mux: Mux, raw: u32, model: Option<&Description>) -> Option<String> {
     match (mux.index, mux.sub_index) {
         (0x6040, 0) => Some(Controlword(raw as u16).to_string()),
         (0x6041, 0) => Some(format!("{raw:04X}h ({})", statusword_words(Statusword(raw as u16), model))),
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn an_object_with_another_form_in_tpdos_is_read_by_its_length() {
-        let joint = Some(&drives::mjoint::M4230E17B50);
+        let joint = Some(&devices::mjoint::M4230E17B50);
         let speed = |bytes| Value::new(Mux::new(0x606C, 0), bytes, joint).to_string();
         assert_eq!(speed(&[0x90, 0xE8]), "606Ch:00 velocity_actual_value = -6000 [0.1 r/min]");
         assert_eq!(speed(&[0xA8, 0xFD, 0xFF, 0xFF]), "606Ch:00 velocity_actual_value = -600 [r/min]");

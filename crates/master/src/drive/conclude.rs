@@ -1,8 +1,8 @@
 //! From facts to a conclusion: the one place that decides what an explanation says.
 
 use cia402::PowerState;
-use drives::engine::faults::FaultRow;
-use drives::profile::PowerStyle;
+use devices::PowerStyle;
+use devices::faults::FaultRow;
 
 use super::explain::{Fact, Trigger};
 use crate::error::Error;

@@ -4,8 +4,8 @@ use std::time::Duration;
 use canopen::emcy::Emcy;
 use canopen::{NmtState, NodeId};
 use cia402::{ModeOfOperation, PowerCommand, PowerState, Statusword};
-use drives::engine::faults::FaultRow;
-use drives::profile::DriveProfile;
+use devices::Description;
+use devices::faults::FaultRow;
 
 use super::conclude::conclude;
 use super::{Drive, ERROR_CODE, MODE};
@@ -76,7 +76,7 @@ pub(super) enum Trigger {
 }
 
 /// The faults that a code of this model stands for.
-pub fn faults_in(profile: &DriveProfile, code: u16) -> Vec<&'static FaultRow> {
+pub fn faults_in(profile: &Description, code: u16) -> Vec<&'static FaultRow> {
     let matches = |row: &&FaultRow| if profile.faults.bit_field { row.code & code != 0 } else { row.code == code };
     profile.faults.table.iter().filter(matches).collect()
 }

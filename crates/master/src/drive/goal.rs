@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use cia402::{PowerState, Statusword};
-use drives::profile::{HomingRules, Quantity};
+use devices::{HomingRules, Quantity};
 
 use super::explain::Trigger;
 use super::{Drive, POLL, POSITION_ACTUAL};

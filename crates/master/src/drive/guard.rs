@@ -10,7 +10,7 @@ use std::time::Duration;
 use canopen::heartbeat::Consumer;
 use canopen::od::Default;
 use canopen::{Mux, NodeId};
-use drives::profile::HostWatch;
+use devices::HostWatch;
 
 use super::Drive;
 use crate::core::NodeSet;

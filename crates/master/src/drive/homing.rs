@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use cia402::{Controlword, ModeOfOperation};
-use drives::profile::{HomingRules, HomingStart};
+use devices::{HomingRules, HomingStart};
 
 use super::goal::Goal;
 use super::motion::{MotionReport, Note};

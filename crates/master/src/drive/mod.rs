@@ -2,7 +2,7 @@
 //!
 //! In: what a person wants ("turn 90 degrees at 30 r/min"). Out: SDO requests to the node in the order that CiA 402-2
 //! and the model's manual ask for, and either success or an [`Explanation`]. What a model's raw values are worth, and
-//! where it departs from the standard, comes from its [`DriveProfile`]; no model is known here by its name, and 6502h is
+//! where it departs from the standard, comes from its [`Description`]; no model is known here by its name, and 6502h is
 //! never asked for. Without a profile only what the standard fixes is offered.
 //! While a motion is supervised, the polling keeps the drive's watch over its host content.
 
@@ -25,7 +25,7 @@ use std::time::Duration;
 use canopen::Mux;
 use canopen::od::Entry;
 use cia402::{Controlword, ModeOfOperation, PowerState, Statusword};
-use drives::profile::{DriveProfile, PowerStyle};
+use devices::{Description, PowerStyle};
 
 use crate::error::{Access, Error};
 use crate::identify::{Guess, Knowledge};
@@ -59,7 +59,7 @@ const STEP_TIMEOUT: Duration = Duration::from_secs(1);
 #[derive(Clone)]
 pub struct Drive {
     node: Node,
-    profile: Option<&'static DriveProfile>,
+    profile: Option<&'static Description>,
     /// Set where the profile is no more than that.
     guess: Option<Guess>,
 }
@@ -78,7 +78,7 @@ impl core::fmt::Debug for Drive {
 
 impl Drive {
     /// A drive of a known model.
-    pub const fn new(node: Node, profile: &'static DriveProfile) -> Self {
+    pub const fn new(node: Node, profile: &'static Description) -> Self {
         Self { node, profile: Some(profile), guess: None }
     }
 
@@ -98,7 +98,7 @@ impl Drive {
     }
 
     /// The model's profile, or of a guess the one to read and move with.
-    pub const fn profile(&self) -> Option<&'static DriveProfile> {
+    pub const fn profile(&self) -> Option<&'static Description> {
         self.profile
     }
 
@@ -189,11 +189,11 @@ impl Drive {
         Ok(stopped.then_some(Note::StoppedFirst { before }))
     }
 
-    const fn no_such_mode(&self, profile: &DriveProfile, mode: ModeOfOperation) -> Error {
+    const fn no_such_mode(&self, profile: &Description, mode: ModeOfOperation) -> Error {
         Error::NoSuchMode { node: self.node.id(), model: profile.title, mode, modes: profile.modes }
     }
 
-    async fn stop_if_turning(&self, profile: &DriveProfile) -> Result<bool, Error> {
+    async fn stop_if_turning(&self, profile: &Description) -> Result<bool, Error> {
         let turning = self.read_quantity(profile.units.actual_velocity).await?.abs() >= power::STANDSTILL_RPM;
         let follows = self.power_state(self.statusword().await?) == Some(PowerState::OperationEnabled);
         if turning && follows {
@@ -203,12 +203,12 @@ impl Drive {
     }
 
     /// The model's profile, or an error that says what it was needed for.
-    fn known(&self, intent: &'static str) -> Result<&'static DriveProfile, Error> {
+    fn known(&self, intent: &'static str) -> Result<&'static Description, Error> {
         self.profile.ok_or(Error::UnknownModel { node: self.node.id(), intent })
     }
 
     /// The model's profile, if it is more than a guess.
-    fn named(&self, intent: &'static str) -> Result<&'static DriveProfile, Error> {
+    fn named(&self, intent: &'static str) -> Result<&'static Description, Error> {
         match self.guess {
             Some(guess) => Err(Error::GuessedModel { node: self.node.id(), intent: intent.to_owned(), guess }),
             None => self.known(intent),

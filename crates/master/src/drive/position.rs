@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use cia402::{Controlword, ModeOfOperation, Statusword};
-use drives::profile::Quirk;
+use devices::Quirk;
 
 use super::explain::Trigger;
 use super::goal::Goal;

@@ -1,7 +1,7 @@
 use std::time::Duration;
 
 use cia402::{Controlword, ModeOfOperation, PowerCommand, PowerState, Statusword, next_command};
-use drives::profile::{HomingStart, PowerStyle};
+use devices::{HomingStart, PowerStyle};
 
 use super::explain::Trigger;
 use super::{Drive, MODE, POLL, STEP_TIMEOUT};

@@ -3,7 +3,7 @@ use std::time::Duration;
 
 use canopen::Mux;
 use canopen::od::Entry;
-use drives::profile::{CountsPerTurn, Quantity, Ramps};
+use devices::{CountsPerTurn, Quantity, Ramps};
 
 use super::motion::REACHED_LEAST_RPM;
 use super::{Drive, TARGET_POSITION};

@@ -2,8 +2,8 @@ use std::time::Duration;
 
 use canopen::NmtState;
 use cia402::{ModeOfOperation, PowerState, Statusword};
-use drives::engine::faults::FaultRow;
-use drives::profile::{PowerStyle, Quantity};
+use devices::faults::FaultRow;
+use devices::{PowerStyle, Quantity};
 
 use super::explain::faults_in;
 use super::{Drive, ERROR_CODE, POSITION_ACTUAL};

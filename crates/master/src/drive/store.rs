@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use drives::profile::Write;
+use devices::Write;
 
 use super::Drive;
 use crate::error::Error;

@@ -5,12 +5,12 @@
 //! motors are those of `plant`; what is assumed of the surroundings is a constant below.
 
 use can::Bitrate;
+use devices::Description;
 use drives::RegisterError;
 use drives::engine::storage::Image;
 use drives::mjoint::readings::{COUNTS_PER_TURN, COUNTS_S_PER_RPM};
 use drives::mjoint::variations::VARIANT;
 use drives::mjoint::{Actuation, Battery, Brake, Hardware, MJoint, Model, PowerStage, Sensors, objects, storage};
-use drives::profile::DriveProfile;
 use plant::absolute_encoder::BatteryState;
 use plant::gear::GearData;
 use plant::mechanics::RotorData;
@@ -52,7 +52,7 @@ pub fn mjoint(model: &'static Model, node: u8, bitrate: Bitrate) -> MJointMachin
 }
 
 /// The same as it was ordered.
-pub(super) fn ordered(model: &DriveProfile, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
+pub(super) fn ordered(model: &Description, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
     let joint = Model::named(model.model).ok_or(OrderError::NoSuchModel { model: model.model })?;
     let image = order.image(storage::addressed(&order.variant, order.node.raw()))?;
     Ok(Box::new(Machine::new(MJoint::of(joint, order.variant), Joint::new(joint, image, order.bitrate))))

@@ -5,10 +5,11 @@
 use can::Bitrate;
 use canopen::od::Dictionary;
 use canopen::{Mux, NodeId};
+use devices::Description;
+use devices::mjoint;
+use devices::variant::{Preset, PresetError, Variant};
+use devices::zltech::{ZLAC8030L, ZLIM42C, ZLIM42C_82};
 use drives::engine::storage::Image;
-use drives::profile::DriveProfile;
-use drives::variant::{Preset, PresetError, Variant};
-use drives::{mjoint, zlac8030l, zlim42c};
 
 use crate::VirtualDrive;
 
@@ -27,7 +28,7 @@ pub struct Order {
 
 impl Order {
     /// A drive of `model` as delivered, but for its address and bit rate.
-    pub fn new(model: &DriveProfile, node: NodeId, bitrate: Bitrate) -> Self {
+    pub fn new(model: &Description, node: NodeId, bitrate: Bitrate) -> Self {
         Self { node, bitrate, variant: Variant::first_of(model.variations), presets: Vec::new() }
     }
 
@@ -89,13 +90,13 @@ fn reason(error: &PresetError) -> String {
     }
 }
 
-type Maker = fn(&DriveProfile, &Order) -> Result<Box<dyn VirtualDrive>, OrderError>;
+type Maker = fn(&Description, &Order) -> Result<Box<dyn VirtualDrive>, OrderError>;
 
 /// Who builds which model.
-static MAKERS: [(&DriveProfile, Maker); 7] = [
-    (&zlac8030l::PROFILE, super::zlac8030l::ordered),
-    (&zlim42c::PROFILE, super::zlim42c::ordered),
-    (&zlim42c::PROFILE_82, super::zlim42c::ordered_82),
+static MAKERS: [(&Description, Maker); 7] = [
+    (&ZLAC8030L, super::zlac8030l::ordered),
+    (&ZLIM42C, super::zlim42c::ordered),
+    (&ZLIM42C_82, super::zlim42c::ordered_82),
     (&mjoint::M4230E17B50, super::mjoint::ordered),
     (&mjoint::M4230E17B80, super::mjoint::ordered),
     (&mjoint::M8025E25B50, super::mjoint::ordered),
@@ -106,14 +107,14 @@ static MAKERS: [(&DriveProfile, Maker); 7] = [
 ///
 /// # Errors
 /// [`OrderError`] says what the model cannot be.
-pub fn order(model: &DriveProfile, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
+pub fn order(model: &Description, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
     let maker = MAKERS.iter().find(|(known, _)| known.model == model.model);
     let (_, make) = maker.ok_or(OrderError::NoSuchModel { model: model.model })?;
     make(model, order)
 }
 
 /// The number that stands for a bit rate in a drive's object, by the words of the object's row.
-pub(super) fn baud_rate(model: &DriveProfile, object: Mux, bitrate: Bitrate) -> Result<u16, OrderError> {
+pub(super) fn baud_rate(model: &Description, object: Mux, bitrate: Bitrate) -> Result<u16, OrderError> {
     let values = model.row(object).map_or(&[][..], |row| row.values);
     let words = format!("{} kbit/s", bitrate.bits_per_second() / 1000);
     let number =
@@ -127,7 +128,7 @@ pub(super) fn baud_rate(model: &DriveProfile, object: Mux, bitrate: Bitrate) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drives::profile::MODELS;
+    use devices::MODELS;
 
     fn node(raw: u8) -> NodeId {
         NodeId::new(raw).unwrap()
@@ -143,7 +144,7 @@ mod tests {
 
     #[test]
     fn a_bit_rate_that_the_drive_does_not_know_is_refused_with_those_it_knows() {
-        let wanted = |bitrate| order(&zlac8030l::PROFILE, &Order::new(&zlac8030l::PROFILE, node(4), bitrate));
+        let wanted = |bitrate| order(&ZLAC8030L, &Order::new(&ZLAC8030L, node(4), bitrate));
         assert!(wanted(Bitrate::K125).is_ok());
         let refusal = wanted(Bitrate::K50).err().unwrap().to_string();
         assert!(refusal.contains("cannot run at 50k") && refusal.contains("100 kbit/s"), "{refusal}");
@@ -151,17 +152,17 @@ mod tests {
 
     #[test]
     fn a_node_id_that_the_switches_do_not_have_is_refused() {
-        let wanted = |raw| order(&zlim42c::PROFILE, &Order::new(&zlim42c::PROFILE, node(raw), Bitrate::K500));
+        let wanted = |raw| order(&ZLIM42C, &Order::new(&ZLIM42C, node(raw), Bitrate::K500));
         assert!(wanted(15).is_ok() && wanted(32).is_ok());
         assert!(matches!(wanted(16), Err(OrderError::Node { .. })));
     }
 
     #[test]
     fn a_preset_that_the_drive_would_not_keep_is_refused_with_the_reason() {
-        let with = |preset| Order { presets: vec![preset], ..Order::new(&zlac8030l::PROFILE, node(4), Bitrate::K500) };
-        let refusal = |preset| order(&zlac8030l::PROFILE, &with(preset)).err().unwrap().to_string();
+        let with = |preset| Order { presets: vec![preset], ..Order::new(&ZLAC8030L, node(4), Bitrate::K500) };
+        let refusal = |preset| order(&ZLAC8030L, &with(preset)).err().unwrap().to_string();
         // 2014h, rated current, is RW/S; 60FFh, target velocity, is RW.
-        assert!(order(&zlac8030l::PROFILE, &with(Preset::new(0x2014, 0, 100))).is_ok());
+        assert!(order(&ZLAC8030L, &with(Preset::new(0x2014, 0, 100))).is_ok());
         assert!(refusal(Preset::new(0x60FF, 0, 10)).contains("does not store"));
         assert!(refusal(Preset::new(0x5000, 0, 10)).contains("no such object"));
         assert!(refusal(Preset::new(0x200E, 0, 77)).contains("0609 0030"));

@@ -4,9 +4,9 @@
 //! Figures of the motor are those of `plant`; what is assumed of the surroundings is a constant below.
 
 use canopen::Mux;
+use devices::Description;
+use devices::variant::Variant;
 use drives::engine::storage::Image;
-use drives::profile::DriveProfile;
-use drives::variant::Variant;
 use drives::zlac8030l::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use drives::zlac8030l::readings::REFERENCE_V;
 use drives::zlac8030l::variations::{FAST_MOTOR, VARIANT};
@@ -55,7 +55,7 @@ pub fn zlac8030l(node: u8, baud_rate: u16) -> Zlac8030lMachine {
 const BAUD_RATE: Mux = Mux::new(0x200E, 0);
 
 /// The same as it was ordered.
-pub(super) fn ordered(model: &DriveProfile, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
+pub(super) fn ordered(model: &Description, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
     let (node, variant) = (order.node.raw(), order.variant);
     let baud_rate = baud_rate(model, BAUD_RATE, order.bitrate)?;
     let image = order.image(storage::addressed(&variant, node, baud_rate))?;

@@ -5,9 +5,9 @@
 //! the motors are those of `plant`; what is assumed of the surroundings is a constant below.
 
 use canopen::Mux;
+use devices::Description;
 use drives::engine::axis::Demand;
 use drives::engine::storage::Image;
-use drives::profile::DriveProfile;
 use drives::zlim42c::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use drives::zlim42c::readings::{REFERENCE_V, TEETH};
 use drives::zlim42c::variations::VARIANT;
@@ -62,16 +62,16 @@ pub fn zlim42c_82(node: u8, baud_rate: u16) -> Zlim42c82Machine {
 const BAUD_RATE: Mux = Mux::new(0x2009, 0);
 
 /// The same as it was ordered, of 70 mm.
-pub(super) fn ordered(model: &DriveProfile, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
+pub(super) fn ordered(model: &Description, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
     Ok(Box::new(of_length::<70>(model, order)?))
 }
 
 /// The same as it was ordered, of 82 mm.
-pub(super) fn ordered_82(model: &DriveProfile, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
+pub(super) fn ordered_82(model: &Description, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
     Ok(Box::new(of_length::<LONG>(model, order)?))
 }
 
-fn of_length<const MM: u16>(model: &DriveProfile, order: &Order) -> Result<Machine<Stepper<MM>>, OrderError> {
+fn of_length<const MM: u16>(model: &Description, order: &Order) -> Result<Machine<Stepper<MM>>, OrderError> {
     let (node, variant) = (order.node.raw(), order.variant);
     if (16..=31).contains(&node) {
         let reason = "its switches have 1 to 15, and 2008h takes 32 to 127";

@@ -27,27 +27,26 @@ use super::model::Model;
 use super::objects::*;
 use super::parameters::Parameters;
 use super::power_on::Function;
-use super::profile::{PDO_RULES, QUIRKS};
 use super::protection::Protection;
 use super::pulses::Pulses;
 use super::readings::*;
 use super::turns::Turns;
 use super::variations::{self, VARIANT};
 use super::{Values, storage};
+use crate::communication::communication;
 use crate::engine::axis::Demand;
 use crate::engine::device::{Application, Device};
 use crate::engine::faults::FaultMonitor;
 use crate::engine::inputs::Inputs;
 use crate::engine::servo::Servo;
 use crate::engine::storage::Image;
-use crate::profile::communication;
-use crate::variant::Variant;
 use crate::{Firmware, Report};
+use devices::variant::Variant;
 
 /// How this drive communicates: operational from the start, SDO requests as short as they may be, TPDO n answers
 /// RPDO n, no EMCY (5.05, 5.08, 5.11).
 pub static NODE_PROFILE: NodeProfile =
-    NodeProfile { sdo_frame_length: FrameLength::Used, ..communication(&TABLE, &PDO_RULES, QUIRKS) };
+    NodeProfile { sdo_frame_length: FrameLength::Used, ..communication(&devices::mjoint::M4230E17B50) };
 
 /// State byte of heartbeats while there is an alarm (5.11.1).
 const HEARTBEAT_ALARM: u8 = 0x04;
@@ -193,7 +192,7 @@ impl MJoint {
             axis: Axis::new(),
             demand: Demand::Off,
             duty: [0.0; 3],
-            alarms: FaultMonitor::new(&ALARMS),
+            alarms: FaultMonitor::new(&ALARMS, &alarms::DEBOUNCE),
             protection: Protection::default(),
             pulses: Pulses::default(),
             inputs: Inputs::default(),

@@ -10,11 +10,10 @@ use canopen::node::{Node, NodeProfile};
 use cia402::{ModeOfOperation, PowerState};
 use motion::filter::{LowPass, LowPassGains};
 
-use super::faults::{FAULT_COUNT, FAULTS, row};
+use super::faults::{DEBOUNCE, FAULT_COUNT, FAULTS, row};
 use super::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use super::objects::*;
 use super::parameters::Parameters;
-use super::profile::{PDO_RULES, QUIRKS};
 use super::protection::{Protection, Situation, is_over_current};
 use super::readings::*;
 use super::statusword::statusword;
@@ -29,12 +28,12 @@ use crate::engine::host_watchdog::HostWatchdog;
 use crate::engine::inputs::Inputs;
 use crate::engine::servo::Servo;
 use crate::engine::storage::Image;
-use crate::variant::Variant;
 use crate::zl::terminals::Conditions;
 use crate::{Firmware, Report, zl};
+use devices::variant::Variant;
 
 /// How this drive communicates.
-pub static NODE_PROFILE: NodeProfile = zl::node_profile(&TABLE, &PDO_RULES, QUIRKS);
+pub static NODE_PROFILE: NodeProfile = zl::node_profile(&devices::zltech::ZLAC8030L);
 
 /// The firmware of a ZLAC8030L V2.0.
 #[derive(Clone)]
@@ -97,7 +96,7 @@ impl Zlac8030l {
             targets: Targets::default(),
             speed_setting_wrong: false,
             position_offset: 0,
-            faults: FaultMonitor::new(&FAULTS),
+            faults: FaultMonitor::new(&FAULTS, &DEBOUNCE),
             protection: Protection::default(),
             inputs: Inputs::default(),
             external_stop: false,

@@ -9,11 +9,10 @@ use can::{Bitrate, Instant};
 use canopen::node::{Node, NodeProfile};
 use cia402::{Controlword, PowerState};
 
-use super::faults::{FAULT_COUNT, FAULTS, FLASHES, row};
+use super::faults::{DEBOUNCE, FAULT_COUNT, FAULTS, FLASHES, row};
 use super::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use super::objects::*;
 use super::parameters::Parameters;
-use super::profile::QUIRKS;
 use super::protection::{PhaseWatch, Situation, causes, is_over_current};
 use super::readings::*;
 use super::statusword::{self, statusword};
@@ -26,12 +25,12 @@ use crate::engine::faults::{FaultMonitor, FaultSet};
 use crate::engine::inputs::Inputs;
 use crate::engine::stepper::Stepper;
 use crate::engine::storage::Image;
-use crate::variant::Variant;
 use crate::zl::terminals::Conditions;
 use crate::{Firmware, Report, zl};
+use devices::variant::Variant;
 
 /// How this drive communicates.
-pub static NODE_PROFILE: NodeProfile = zl::node_profile(&TABLE, &zl::PDO_RULES, QUIRKS);
+pub static NODE_PROFILE: NodeProfile = zl::node_profile(&devices::zltech::ZLIM42C);
 
 /// The firmware of a ZLIM42-C.
 #[derive(Clone)]
@@ -81,7 +80,7 @@ impl Zlim42c {
             demand: Demand::Off,
             targets: Targets::default(),
             controlword: Controlword(0),
-            faults: FaultMonitor::new(&FAULTS),
+            faults: FaultMonitor::new(&FAULTS, &DEBOUNCE),
             phases: PhaseWatch::default(),
             bus_a: 0.0,
             shown_fault: None,

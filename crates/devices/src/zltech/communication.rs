@@ -10,7 +10,7 @@ use canopen::od::Entry;
 use crate::row::{U8, U16, U32, join, ro, rw, rws};
 
 /// The rows of a drive with these versions (1009h, 100Ah).
-pub(crate) const fn rows(hardware_version: i64, software_version: i64) -> [Entry; 102] {
+pub(super) const fn rows(hardware_version: i64, software_version: i64) -> [Entry; 102] {
     let general = general(hardware_version, software_version);
     join(&[&general, &RPDO_PARAMETERS, &RPDO_MAPPINGS, &TPDO_PARAMETERS, &TPDO_MAPPINGS])
 }

@@ -3,11 +3,10 @@
 use canopen::AbortCode;
 use canopen::od::{DataType, TpdoForm, View};
 
-use crate::mjoint::power_on::Function;
-
 /// 2619h: the functions that the manual lists.
 pub(super) fn mode_selection(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
-    Function::from_raw(raw as u16).map(|_| ()).ok_or(AbortCode::INVALID_VALUE)
+    let listed = matches!(raw, 0..=3 | 6..=9 | 30..=32768);
+    if listed { Ok(()) } else { Err(AbortCode::INVALID_VALUE) }
 }
 
 /// 606Ch in TPDO3: 32 bits of r/min (5.10.2), of the 16 bits of 0.1 r/min that SDO shows (5.04).

@@ -8,8 +8,8 @@ use canopen::od::Entry;
 
 use super::values::{BAUD_RATES, CURRENTS, LOCK_CURRENTS, MICROSTEPS, OUTPUT_FUNCTIONS, RESET};
 use crate::row::{I16, U16, join, ro, rw, rws};
-use crate::zl::values::{CLEAR, LIMIT_STOP, REGISTER_COMMANDS, SAVE_ON_WRITE, SHAFT_LOCK};
-use crate::zlim42c::readings::{CURRENT_KI, CURRENT_KP, INPUT_FILTER_MS, SOFTWARE_VERSION};
+use crate::zltech::values::{CLEAR, LIMIT_STOP, REGISTER_COMMANDS, SAVE_ON_WRITE, SHAFT_LOCK};
+use crate::zltech::zlim42c::assumptions::{CURRENT_KI, CURRENT_KP, INPUT_FILTER_MS, SOFTWARE_VERSION};
 
 pub(super) const ROWS: [Entry; 32] = join(&[&GENERAL, &TERMINALS, &DEVICE]);
 

@@ -1,37 +1,37 @@
 //! What masters and tools have to know about a model before they talk to it, as const data.
 //!
 //! Two of the drives answer the same identity, and the drives differ in units, in how they store parameters and in
-//! what an object number means. A [`DriveProfile`] says it all; [`model`] finds one by name.
+//! what an object number means. A [`Description`] says it all; [`model`] finds one by name.
 
 use can::Bitrate;
-use canopen::node::NodeProfile;
 use canopen::od::{Entry, Table};
-use canopen::pdo::{EventTrigger, MappingRules};
+use canopen::pdo::MappingRules;
 use canopen::{EmcyErrorCode, Mux, NmtState};
 use cia402::{ModeOfOperation, PowerState, Statusword};
 
-use crate::engine::faults::FaultRow;
+use crate::faults::FaultRow;
+use crate::mjoint;
 use crate::variant::Variation;
-use crate::{mjoint, zlac8030l, zlim42c};
+use crate::zltech::{ZLAC8030L, ZLIM42C, ZLIM42C_82};
 
 /// All models.
-pub static MODELS: [&DriveProfile; 7] = [
-    &zlac8030l::PROFILE,
+pub static MODELS: [&Description; 7] = [
+    &ZLAC8030L,
     &mjoint::M4230E17B50,
     &mjoint::M4230E17B80,
     &mjoint::M8025E25B50,
     &mjoint::M8025E25B80,
-    &zlim42c::PROFILE,
-    &zlim42c::PROFILE_82,
+    &ZLIM42C,
+    &ZLIM42C_82,
 ];
 
 /// The model of this name (`zlac8030l`), in any case of letters.
-pub fn model(name: &str) -> Option<&'static DriveProfile> {
+pub fn model(name: &str) -> Option<&'static Description> {
     MODELS.iter().find(|profile| profile.model.eq_ignore_ascii_case(name)).copied()
 }
 
 /// The models that answer this identity: more than one may.
-pub fn models_by_identity(identity: Identity) -> impl Iterator<Item = &'static DriveProfile> + use<> {
+pub fn models_by_identity(identity: Identity) -> impl Iterator<Item = &'static Description> + use<> {
     MODELS.iter().copied().filter(move |profile| profile.identity == identity)
 }
 
@@ -42,7 +42,7 @@ pub fn reads_alike(a: &Entry, b: &Entry) -> bool {
 
 /// One model of drive.
 #[derive(Clone, Copy)]
-pub struct DriveProfile {
+pub struct Description {
     /// Name to type: `zlac8030l`.
     pub model: &'static str,
     /// Name to print.
@@ -86,7 +86,7 @@ pub struct DriveProfile {
     pub variations: &'static [Variation],
 }
 
-impl DriveProfile {
+impl Description {
     /// The power state that a statusword shows, or for a drive without the state machine the one that comes closest.
     pub const fn power_state(&self, statusword: Statusword) -> Option<PowerState> {
         self.power.state(statusword)
@@ -402,26 +402,6 @@ pub struct PdoRules {
     /// Error code of the EMCY message when an RPDO has fewer bytes than are mapped; `None` for none. It is not used in
     /// either case. Of a longer one the mapped bytes are used, and nothing is told.
     pub short_rpdo: Option<EmcyErrorCode>,
-}
-
-/// How a firmware with these rules and quirks communicates: a master reads of a drive what the drive does.
-pub(crate) const fn communication(table: &'static Table, pdo: &PdoRules, quirks: &[Quirk]) -> NodeProfile {
-    let standard = NodeProfile::cia_301(table);
-    NodeProfile {
-        start_state: if Quirk::StartsOperational.is_in(quirks) { NmtState::Operational } else { standard.start_state },
-        emcy: !Quirk::NoEmcy.is_in(quirks),
-        inhibit_unit_ns: pdo.inhibit_unit_ns,
-        event_timer_unit_ns: pdo.event_timer_unit_ns,
-        event_trigger: if Quirk::TpdoAnswersRpdo.is_in(quirks) {
-            EventTrigger::AnswersRpdo
-        } else {
-            standard.event_trigger
-        },
-        pdo_changes_while_valid: pdo.remap_while_valid,
-        mapping: pdo.mapping,
-        short_rpdo: pdo.short_rpdo,
-        ..standard
-    }
 }
 
 /// A way in which a model differs from what a program written to the standard expects.

@@ -8,7 +8,7 @@ use canopen::od::Entry;
 use super::checks;
 use super::values::{DISABLE_OPTIONS, HALT_OPTIONS, MODES, QUICK_STOP_OPTIONS};
 use crate::row::{I8, I16, I32, U16, U32, ro, rw};
-use crate::zl::values::SHUTDOWN_OPTIONS;
+use crate::zltech::values::SHUTDOWN_OPTIONS;
 
 #[rustfmt::skip]
 pub(super) const ROWS: [Entry; 22] = [

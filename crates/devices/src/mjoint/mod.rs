@@ -1,31 +1,41 @@
-//! The four models as masters and tools see them.
+//! The M-series robot joint motors M4230E17B50, M4230E17B80, M8025E25B50 and M8025E25B80: a servo motor with its drive,
+//! a multi-turn absolute encoder on a battery, and a reducer. To a host the four are alike but for their names.
+//!
+//! Source: "M Robot Joint Motor CanOpen Manual" (Zhengzhou Defy Mechanical & Electrical Equipment). Where it contradicts itself
+//! or is silent, the choice stands beside the row of [`objects`] or in [`assumptions`], with its reason.
+
+pub mod alarms;
+pub mod assumptions;
+pub mod objects;
+pub mod statusword;
+pub mod variations;
 
 use can::Bitrate;
 use canopen::Mux;
 use canopen::pdo::MappingRules;
 use cia402::{ModeOfOperation, Statusword};
 
-use super::alarms::ALARMS;
-use super::objects::TABLE;
-use super::readings::COUNTS_PER_TURN;
-use super::statusword::{HOMING_ATTAINED, HOMING_ERROR, LIVE};
-use super::variations::VARIATIONS;
-use crate::profile::{
-    BitPattern, CountsPerTurn, DriveProfile, Faults, HomingRules, HomingStart, HostWatch, Identity, ParameterStorage,
+use crate::description::{
+    BitPattern, CountsPerTurn, Description, Faults, HomingRules, HomingStart, HostWatch, Identity, ParameterStorage,
     PdoRules, PowerStyle, Quantity, Quirk, Ramps, Units, Write,
 };
+use alarms::ALARMS;
+use assumptions::{COUNTS_PER_TURN, NO_RAMP_FROM};
+use objects::TABLE;
+use statusword::{HOMING_ATTAINED, HOMING_ERROR, LIVE};
+use variations::VARIATIONS;
 
 /// The M4230E17B50.
-pub static M4230E17B50: DriveProfile = joint("m4230e17b50", "M4230E17B50 joint motor");
+pub static M4230E17B50: Description = joint("m4230e17b50", "M4230E17B50 joint motor");
 /// The M4230E17B80.
-pub static M4230E17B80: DriveProfile = joint("m4230e17b80", "M4230E17B80 joint motor");
+pub static M4230E17B80: Description = joint("m4230e17b80", "M4230E17B80 joint motor");
 /// The M8025E25B50.
-pub static M8025E25B50: DriveProfile = joint("m8025e25b50", "M8025E25B50 joint motor");
+pub static M8025E25B50: Description = joint("m8025e25b50", "M8025E25B50 joint motor");
 /// The M8025E25B80.
-pub static M8025E25B80: DriveProfile = joint("m8025e25b80", "M8025E25B80 joint motor");
+pub static M8025E25B80: Description = joint("m8025e25b80", "M8025E25B80 joint motor");
 
-const fn joint(model: &'static str, title: &'static str) -> DriveProfile {
-    DriveProfile {
+const fn joint(model: &'static str, title: &'static str) -> Description {
+    Description {
         model,
         title,
         manual: "M Robot Joint Motor CanOpen Manual",
@@ -61,7 +71,7 @@ const fn joint(model: &'static str, title: &'static str) -> DriveProfile {
 }
 
 /// The mapping is fixed; an identifier may be changed at any time, since no bit of it makes a PDO invalid (5.08).
-pub(super) const PDO_RULES: PdoRules = PdoRules {
+const PDO_RULES: PdoRules = PdoRules {
     inhibit_unit_ns: 100_000,
     event_timer_unit_ns: 1_000_000,
     max_objects: 3,
@@ -99,7 +109,7 @@ const UNITS: Units = Units {
     target_velocity: Quantity::new(0x60FF, 0, 1.0),
     actual_velocity: Quantity::new(0x606C, 0, 0.1),
     profile_velocity: Quantity::new(0x6081, 0, 1.0),
-    ramps: Ramps::Acceleration { both: Mux::new(0x6083, 0), none_from: 60_000 },
+    ramps: Ramps::Acceleration { both: Mux::new(0x6083, 0), none_from: NO_RAMP_FROM },
     target_current: None,
     actual_current: Some(Quantity::new(0x6078, 0, 1.0 / 2000.0)),
     bus_voltage: Some(Quantity::new(0x6079, 0, 1.0 / 327.0)),
@@ -107,7 +117,7 @@ const UNITS: Units = Units {
     driver_temperature: Some(Quantity::new(0x2612, 0, 1.0)),
 };
 
-pub(super) const QUIRKS: &[Quirk] = &[
+const QUIRKS: &[Quirk] = &[
     Quirk::NoPowerStateMachine,
     Quirk::StartsOperational,
     Quirk::HeartbeatTellsAlarm,

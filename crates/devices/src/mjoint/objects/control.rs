@@ -1,14 +1,14 @@
 //! Control objects, 2600h to 60FFh ("M Robot Joint Motor CanOpen Manual", 5.04, "Control class parameter list").
 //!
 //! Tables are laid out by hand: a row of the manual is a row here, sorted by index. Defaults that the manual does not
-//! print are those of [`readings`](crate::mjoint::readings). Stored is what configures the joint; what commands it
+//! print are those of [`assumptions`](crate::mjoint::assumptions). Stored is what configures the joint; what commands it
 //! (6040h, 6060h, 607Ah, 60FFh, 260Ch, 2600h, 2601h) is not, or it would move at power-on.
 
 use canopen::od::Entry;
 
 use super::checks::{mode_selection, revolutions_in_tpdo};
 use super::values::{self, MODES, OFF_ON};
-use crate::mjoint::readings::*;
+use crate::mjoint::assumptions::*;
 use crate::row::{I8, I16, I32, U8, U16, U32, join, ro, rw, rws};
 
 pub(super) const ROWS: [Entry; 36] = join(&[&MANUFACTURER, &PROFILE]);

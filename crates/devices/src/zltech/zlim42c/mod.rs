@@ -1,32 +1,43 @@
-//! The two models as masters and tools see them: they differ in their motors only.
+//! The ZLIM42-C: an integrated open-loop stepper, motor and drive in one, in two lengths (70 and 82 mm) that differ in their
+//! motors only.
+//!
+//! Source: "ZLIM42-C user manual V1.03" (2022-03-03, Chinese; names are translated). Where it contradicts itself or is silent,
+//! the choice stands beside the row of [`objects`] or in [`assumptions`], with its reason.
+
+pub mod assumptions;
+pub mod faults;
+pub mod objects;
+pub mod statusword;
+pub mod tables;
+pub mod variations;
 
 use can::Bitrate;
 use canopen::Mux;
 use cia402::{ModeOfOperation, Statusword};
 
-use super::faults::FAULTS;
-use super::objects::TABLE;
-use super::statusword::{BIT_4_OF_CONTROLWORD, ENERGISED, HOMING_ATTAINED, IN_POSITION, RUNNING};
-use super::tables::PULSES_PER_TURN;
-use super::variations::VARIATIONS;
-use crate::profile::{
-    BitPattern, CountsPerTurn, DriveProfile, Faults, HomingRules, HomingStart, HostWatch, PowerStyle, Quantity, Quirk,
+use crate::description::{
+    BitPattern, CountsPerTurn, Description, Faults, HomingRules, HomingStart, HostWatch, PowerStyle, Quantity, Quirk,
     Units,
 };
-use crate::zl;
+use crate::zltech;
+use faults::FAULTS;
+use objects::TABLE;
+use statusword::{BIT_4_OF_CONTROLWORD, ENERGISED, HOMING_ATTAINED, IN_POSITION, RUNNING};
+use tables::PULSES_PER_TURN;
+use variations::VARIATIONS;
 
 /// The ZLIM42-C of 70 mm.
-pub static PROFILE: DriveProfile = profile("zlim42c", "ZLTECH ZLIM42-C (70 mm)");
+pub static ZLIM42C: Description = stepper("zlim42c", "ZLTECH ZLIM42-C (70 mm)");
 
 /// The ZLIM42-C of 82 mm.
-pub static PROFILE_82: DriveProfile = profile("zlim42c-82", "ZLTECH ZLIM42-C (82 mm)");
+pub static ZLIM42C_82: Description = stepper("zlim42c-82", "ZLTECH ZLIM42-C (82 mm)");
 
-const fn profile(model: &'static str, title: &'static str) -> DriveProfile {
-    DriveProfile {
+const fn stepper(model: &'static str, title: &'static str) -> Description {
+    Description {
         model,
         title,
         manual: "ZLIM42-C user manual V1.03",
-        identity: zl::IDENTITY,
+        identity: zltech::IDENTITY,
         // The ZLAC8030L has its bus voltage in 2029h.
         hallmark: Some(Mux::new(0x2069, 0)),
         table: &TABLE,
@@ -39,9 +50,9 @@ const fn profile(model: &'static str, title: &'static str) -> DriveProfile {
         homing: Some(HOMING),
         host_watch: HostWatch::None,
         units: UNITS,
-        storage: zl::parameter_storage(0x2010, 0x200C, RESTART),
+        storage: zltech::parameter_storage(0x2010, 0x200C, RESTART),
         faults: Faults { code: Mux::new(0x603F, 0), bit_field: false, table: &FAULTS },
-        pdo: zl::PDO_RULES,
+        pdo: zltech::PDO_RULES,
         quirks: QUIRKS,
         variations: VARIATIONS,
     }
@@ -71,7 +82,7 @@ const UNITS: Units = Units {
     target_velocity: Quantity::new(0x60FF, 0, 1.0),
     actual_velocity: Quantity::new(0x606C, 0, 1.0),
     profile_velocity: Quantity::new(0x6081, 0, 1.0),
-    ramps: zl::RAMPS,
+    ramps: zltech::RAMPS,
     target_current: None,
     actual_current: None,
     bus_voltage: Some(Quantity::new(0x2069, 0, 1.0)),
@@ -81,7 +92,7 @@ const UNITS: Units = Units {
 
 const RESTART: &[Mux] = &[Mux::new(0x2008, 0), Mux::new(0x2009, 0)];
 
-pub(super) const QUIRKS: &[Quirk] = &[
+const QUIRKS: &[Quirk] = &[
     Quirk::NoSupportedDriveModes,
     Quirk::NoStandardStore,
     Quirk::NoErrorHistory,

@@ -8,8 +8,8 @@ use canopen::od::Entry;
 
 use super::values::{BAUD_RATES, BRAKE, DIRECTIONS, IO_STOP, OFF_ON, OUTPUT_FUNCTIONS, RS485_BAUD_RATES};
 use crate::row::{I16, U16, join, ro, rw, rws};
-use crate::zl::values::{CLEAR, LIMIT_STOP, REGISTER_COMMANDS, SAVE_ON_WRITE, SHAFT_LOCK};
-use crate::zlac8030l::readings::SOFTWARE_VERSION;
+use crate::zltech::values::{CLEAR, LIMIT_STOP, REGISTER_COMMANDS, SAVE_ON_WRITE, SHAFT_LOCK};
+use crate::zltech::zlac8030l::assumptions::SOFTWARE_VERSION;
 
 pub(super) const ROWS: [Entry; 71] = join(&[&GENERAL, &LIMITS, &LOOPS, &DEVICE, &POWER, &TERMINALS]);
 
@@ -136,7 +136,7 @@ const TERMINALS: [Entry; 10] = [
 ];
 
 /// A coefficient of the control loops: U16, RW/S, 0 to 30000, without a unit. What one count is worth is a choice of
-/// [`crate::zlac8030l::gains`].
+/// the gains of the firmware.
 const fn gain(index: u16, name: &'static str, title: &'static str, default: i64) -> Entry {
     rws(index, 0, U16, name, title).range(0, 30000).default(default).mappable()
 }

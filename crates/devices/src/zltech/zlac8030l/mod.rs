@@ -1,23 +1,32 @@
-//! The model as masters and tools see it.
+//! The ZLAC8030L V2.0: a 30 A servo drive for hub motors with Hall sensors and incremental encoder.
+//!
+//! Source: "ZLAC8030L quick start guide V1.00" (2023-09-11). Where it contradicts itself or is silent, the choice stands beside
+//! the row of [`objects`] or in [`assumptions`], with its reason.
+
+pub mod assumptions;
+pub mod faults;
+pub mod objects;
+pub mod statusword;
+pub mod variations;
 
 use can::Bitrate;
 use canopen::Mux;
 use canopen::pdo::MappingRules;
 use cia402::ModeOfOperation;
 
-use super::faults::FAULTS;
-use super::objects::TABLE;
-use super::statusword::{EXTERNAL_STOP, IN_POSITION, RUNNING};
-use super::variations::VARIATIONS;
-use crate::profile::{CountsPerTurn, DriveProfile, Faults, HostWatch, PdoRules, PowerStyle, Quantity, Quirk, Units};
-use crate::zl;
+use crate::description::{CountsPerTurn, Description, Faults, HostWatch, PdoRules, PowerStyle, Quantity, Quirk, Units};
+use crate::zltech;
+use faults::FAULTS;
+use objects::TABLE;
+use statusword::{EXTERNAL_STOP, IN_POSITION, RUNNING};
+use variations::VARIATIONS;
 
 /// The ZLAC8030L V2.0.
-pub static PROFILE: DriveProfile = DriveProfile {
+pub static ZLAC8030L: Description = Description {
     model: "zlac8030l",
     title: "ZLTECH ZLAC8030L V2.0",
     manual: "ZLAC8030L quick start guide V1.00",
-    identity: zl::IDENTITY,
+    identity: zltech::IDENTITY,
     // The ZLIM42-C, of the same identity, has its bus voltage in 2069h.
     hallmark: Some(Mux::new(0x2029, 0)),
     table: &TABLE,
@@ -34,14 +43,14 @@ pub static PROFILE: DriveProfile = DriveProfile {
         target_velocity: Quantity::new(0x60FF, 0, 1.0),
         actual_velocity: Quantity::new(0x606C, 0, 0.1),
         profile_velocity: Quantity::new(0x6081, 0, 1.0),
-        ramps: zl::RAMPS,
+        ramps: zltech::RAMPS,
         target_current: Some(Quantity::new(0x6071, 0, 1e-3)),
         actual_current: Some(Quantity::new(0x6077, 0, 0.1)),
         bus_voltage: Some(Quantity::new(0x2029, 0, 0.01)),
         motor_temperature: Some(Quantity::new(0x2026, 1, 0.1)),
         driver_temperature: Some(Quantity::new(0x2026, 2, 0.1)),
     },
-    storage: zl::parameter_storage(0x2009, 0x2010, RESTART),
+    storage: zltech::parameter_storage(0x2009, 0x2010, RESTART),
     faults: Faults { code: Mux::new(0x603F, 0), bit_field: true, table: &FAULTS },
     pdo: PDO_RULES,
     quirks: QUIRKS,
@@ -49,12 +58,12 @@ pub static PROFILE: DriveProfile = DriveProfile {
 };
 
 /// Working robots map 6077h with 32 bits; the maker's EDS counts empty entries in.
-pub(super) const PDO_RULES: PdoRules =
-    PdoRules { mapping: MappingRules { longer_entries: true, empty_entries: true }, ..zl::PDO_RULES };
+const PDO_RULES: PdoRules =
+    PdoRules { mapping: MappingRules { longer_entries: true, empty_entries: true }, ..zltech::PDO_RULES };
 
 const RESTART: &[Mux] = &[Mux::new(0x200D, 0), Mux::new(0x200E, 0), Mux::new(0x202F, 5)];
 
-pub(super) const QUIRKS: &[Quirk] = &[
+const QUIRKS: &[Quirk] = &[
     Quirk::NoSupportedDriveModes,
     Quirk::NoStandardStore,
     Quirk::NoErrorHistory,

@@ -1,27 +1,30 @@
-//! What both models are on the bus, as const data: for the firmware and for [`DriveProfile`](crate::profile::DriveProfile).
+//! The two drives of ZLTECH: one maker's firmware, with the same identity, the same communication objects and the same way of
+//! storing parameters.
+//!
+//! Sources: "ZLAC8030L quick start guide V1.00" and "ZLIM42-C user manual V1.03". What differs, and be it the number of an
+//! object, stands in the drive's own folder.
 
-use canopen::node::NodeProfile;
-use canopen::od::Table;
-use canopen::pdo::{EventTrigger, MappingRules};
+mod communication;
+mod values;
+pub mod zlac8030l;
+pub mod zlim42c;
+
+use canopen::pdo::MappingRules;
 use canopen::{EmcyErrorCode, Mux};
 
-use crate::profile::{Identity, ParameterStorage, PdoRules, Quirk, Ramps, Write, communication};
+use crate::description::{Identity, ParameterStorage, PdoRules, Ramps, Write};
+
+pub use zlac8030l::ZLAC8030L;
+pub use zlim42c::{ZLIM42C, ZLIM42C_82};
 
 /// One count of a PDO's inhibit time and event timer (ZLAC8030L, 6.1; the ZLIM42-C's manual gives none).
 const PDO_TIMER_UNIT_NS: u64 = 500_000;
 
-/// How the drives communicate: by their PDO rules and quirks, event-driven PDOs as the ZLAC8030L's manual has them
-/// (6.1; the ZLIM42-C's gives no more than the object table).
-pub(crate) const fn node_profile(table: &'static Table, pdo: &PdoRules, quirks: &[Quirk]) -> NodeProfile {
-    NodeProfile { event_trigger: EventTrigger::ChangeOr255ByTimer, ..communication(table, pdo, quirks) }
-}
-
 /// The same for both, though their objects have other meanings.
-pub(crate) const IDENTITY: Identity =
-    Identity { device_type: 0x0004_0192, vendor_id: 0x100, product_code: 1, revision_number: 0 };
+const IDENTITY: Identity = Identity { device_type: 0x0004_0192, vendor_id: 0x100, product_code: 1, revision_number: 0 };
 
 /// PDO timers in 0.5 ms, PDOs that may be changed while they are valid, four objects in a mapping.
-pub(crate) const PDO_RULES: PdoRules = PdoRules {
+const PDO_RULES: PdoRules = PdoRules {
     inhibit_unit_ns: PDO_TIMER_UNIT_NS,
     event_timer_unit_ns: PDO_TIMER_UNIT_NS,
     max_objects: 4,
@@ -33,21 +36,21 @@ pub(crate) const PDO_RULES: PdoRules = PdoRules {
 };
 
 /// 6083h to 6085h are times.
-pub(crate) const RAMPS: Ramps = Ramps::Milliseconds {
+const RAMPS: Ramps = Ramps::Milliseconds {
     acceleration: Mux::new(0x6083, 0),
     deceleration: Mux::new(0x6084, 0),
     quick_stop: Mux::new(0x6085, 0),
 };
 
 /// Value of the register parameter setting that restores factory settings.
-pub(crate) const RESTORE: u32 = 1;
+pub const RESTORE: u32 = 1;
 
 /// Value of the register parameter setting that saves all stored parameters.
-pub(crate) const SAVE: u32 = 2;
+pub const SAVE: u32 = 2;
 
 /// How parameters are stored: by the object `register` as a whole, each with its write while the object `save_on_write` is
 /// 0, as delivered.
-pub(crate) const fn parameter_storage(
+const fn parameter_storage(
     register: u16,
     save_on_write: u16,
     effective_after_restart: &'static [Mux],

@@ -1,0 +1,43 @@
+//! Faults of a device: what a row of its fault list says.
+
+use canopen::EmcyErrorCode;
+
+/// One fault of a drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FaultRow {
+    /// Its value in the drive's fault code object.
+    pub code: u16,
+    /// What it is.
+    pub name: &'static str,
+    /// What may cause it and what to do about it.
+    pub remedy: &'static str,
+    /// Bits of the error register 1001h. Source: CiA 301, 7.5.2.2.
+    pub error_register: u8,
+    /// Error code of the EMCY message.
+    pub emcy: EmcyErrorCode,
+}
+
+impl FaultRow {
+    /// A fault whose EMCY error code is the value of the drive's fault code object.
+    pub const fn new(code: u16, name: &'static str, error_register: u8, remedy: &'static str) -> Self {
+        Self { code, name, remedy, error_register, emcy: EmcyErrorCode(code) }
+    }
+}
+
+/// Bits of the error register 1001h (CiA 301, 7.5.2.2). Bit 0, generic, is set with each other.
+pub mod error_register {
+    /// Any error.
+    pub const GENERIC: u8 = 1 << 0;
+    /// Current.
+    pub const CURRENT: u8 = 1 << 1;
+    /// Voltage.
+    pub const VOLTAGE: u8 = 1 << 2;
+    /// Temperature.
+    pub const TEMPERATURE: u8 = 1 << 3;
+    /// Communication.
+    pub const COMMUNICATION: u8 = 1 << 4;
+    /// Device profile specific.
+    pub const PROFILE: u8 = 1 << 5;
+    /// Manufacturer specific.
+    pub const MANUFACTURER: u8 = 1 << 7;
+}

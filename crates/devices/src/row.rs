@@ -1,0 +1,63 @@
+//! The vocabulary of the table: the manual's type letters and attributes as short `const fn`s.
+
+use canopen::od::{Access, DataType, Entry};
+
+/// UNSIGNED8.
+pub const U8: DataType = DataType::Unsigned8;
+/// UNSIGNED16.
+pub const U16: DataType = DataType::Unsigned16;
+/// UNSIGNED32.
+pub const U32: DataType = DataType::Unsigned32;
+/// INTEGER8.
+pub const I8: DataType = DataType::Integer8;
+/// INTEGER16.
+pub const I16: DataType = DataType::Integer16;
+/// INTEGER32.
+pub const I32: DataType = DataType::Integer32;
+
+/// The values that an object accepts, with what each means.
+pub type Values = &'static [(i64, &'static str)];
+
+/// Attribute RO.
+pub const fn ro(index: u16, sub: u8, data_type: DataType, name: &'static str, title: &'static str) -> Entry {
+    Entry::new(index, sub, data_type, Access::ReadOnly, name, title)
+}
+
+/// Attribute RW.
+pub const fn rw(index: u16, sub: u8, data_type: DataType, name: &'static str, title: &'static str) -> Entry {
+    Entry::new(index, sub, data_type, Access::ReadWrite, name, title)
+}
+
+/// Attribute RW/S: kept in the EEPROM.
+pub const fn rws(index: u16, sub: u8, data_type: DataType, name: &'static str, title: &'static str) -> Entry {
+    rw(index, sub, data_type, name, title).stored()
+}
+
+/// The rows of all `parts`, in order.
+///
+/// # Panics
+/// If they are not `N` rows, at compile time in a `const`.
+pub const fn join<const N: usize>(parts: &[&[Entry]]) -> [Entry; N] {
+    let mut rows = [ro(0, 0, U8, "", ""); N];
+    let (mut part, mut at) = (0, 0);
+    while part < parts.len() {
+        let mut i = 0;
+        while i < parts[part].len() {
+            rows[at] = parts[part][i];
+            i += 1;
+            at += 1;
+        }
+        part += 1;
+    }
+    assert!(at == N, "the parts do not have N rows");
+    rows
+}
+
+/// Constants for objects of a table, checked at compile time: `NAME: type = index sub-index;`.
+macro_rules! objects {
+    ($table:ident: $($name:ident: $type:ty = $index:literal $sub:literal;)*) => {
+        $(#[doc = concat!("Object ", stringify!($index), ":", stringify!($sub), ".")]
+        pub const $name: canopen::od::Object<$type> = $table.object($index, $sub);)*
+    };
+}
+pub(crate) use objects;
