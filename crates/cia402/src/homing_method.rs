@@ -1,7 +1,9 @@
-//! The homing methods without index pulse as one table. Source: CiA 402-2, clause 11.3 (methods 17 to 30).
+//! The homing methods as two tables. Source: CiA 402-2, clause 11.3 (IEC 61800-7-201 has the same numbers).
 //!
-//! A method looks for a switch, and then takes one edge of it, crossed slowly in one direction, as the home position.
-//! Methods with an index pulse (1 to 14, 33, 34) and "here" (35, 37) have no switch edge and are not in the table.
+//! A method looks for a switch, and takes one edge of it, crossed slowly in one direction ([`HOMING_METHODS`], 17 to 30).
+//! Methods 1 to 14 do the same, sixteen numbers further on, and go on to the encoder's next index pulse
+//! ([`INDEX_METHODS`]). 33 and 34 look for the index pulse alone; 35 and 37 take the position where the shaft is.
+//! [`HomingMethod::sequence`] joins the tables. Numbers below 0 are the makers'.
 
 /// Homing method, object 6098h. Open: makers have methods of their own below 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -77,6 +79,53 @@ pub const HOMING_METHODS: [HomingRow; 14] = [
     row(30, Home, Negative, true,  Falling, Negative),
 ];
 
+/// One method that ends at an index pulse.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct IndexRow {
+    /// Value of 6098h.
+    pub method: HomingMethod,
+    /// The method of [`HOMING_METHODS`] whose edge comes first; [`HomingMethod::NONE`] if there is none.
+    pub after: HomingMethod,
+    /// The direction in which the first index pulse is then taken as home position.
+    pub direction: Direction,
+}
+
+/// All methods of clause 11.3 with an index pulse; 15 and 16 are reserved there. The pulse is looked for onwards from the
+/// edge, in the direction in which the edge was crossed.
+#[rustfmt::skip]
+pub const INDEX_METHODS: [IndexRow; 16] = [
+    index( 1, 17, Positive),
+    index( 2, 18, Negative),
+    index( 3, 19, Negative),
+    index( 4, 20, Positive),
+    index( 5, 21, Positive),
+    index( 6, 22, Negative),
+    index( 7, 23, Negative),
+    index( 8, 24, Positive),
+    index( 9, 25, Negative),
+    index(10, 26, Positive),
+    index(11, 27, Positive),
+    index(12, 28, Negative),
+    index(13, 29, Positive),
+    index(14, 30, Negative),
+    index(33,  0, Negative),
+    index(34,  0, Positive),
+];
+
+const fn index(method: i8, after: i8, direction: Direction) -> IndexRow {
+    IndexRow { method: HomingMethod(method), after: HomingMethod(after), direction }
+}
+
+/// What a method does, in this order; what is not there is left out. Without either the home position is where the shaft
+/// is, and nothing moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HomingSequence {
+    /// The edge of a switch.
+    pub switch: Option<&'static HomingRow>,
+    /// The first index pulse in this direction.
+    pub index: Option<Direction>,
+}
+
 const fn row(
     method: i8,
     switch: HomingSwitch,
@@ -92,10 +141,30 @@ impl HomingMethod {
     /// No method chosen.
     pub const NONE: Self = Self(0);
 
-    /// What the method does; `None` if it is not in [`HOMING_METHODS`].
+    /// The home position is where the shaft is; the number of the standard's first edition.
+    pub const HERE_FORMERLY: Self = Self(35);
+    /// The home position is where the shaft is.
+    pub const HERE: Self = Self(37);
+
+    /// All methods of the standard, ascending.
+    pub fn standard() -> impl Iterator<Item = Self> {
+        (1..=37).map(Self).filter(|method| method.sequence().is_some())
+    }
+
+    /// What the method does at a switch; `None` if it is not in [`HOMING_METHODS`].
     pub fn row(self) -> Option<&'static HomingRow> {
         const ROWS: &[HomingRow] = &HOMING_METHODS;
         ROWS.iter().find(|row| row.method == self)
+    }
+
+    /// What the method does; `None` for numbers that the standard does not define.
+    pub fn sequence(self) -> Option<HomingSequence> {
+        if let Some(row) = INDEX_METHODS.iter().find(|row| row.method == self) {
+            return Some(HomingSequence { switch: row.after.row(), index: Some(row.direction) });
+        }
+        let here = matches!(self, Self::HERE | Self::HERE_FORMERLY);
+        let switch = self.row();
+        (here || switch.is_some()).then_some(HomingSequence { switch, index: None })
     }
 }
 
@@ -140,6 +209,33 @@ mod tests {
             let row = HomingMethod(method).row().unwrap();
             assert_eq!((row.edge, row.crossing, row.search), (Falling, crossing, crossing.reversed()));
         }
+    }
+
+    #[test]
+    fn methods_1_to_14_go_on_from_the_edge_of_the_method_16_further_on() {
+        for method in 1..=14 {
+            let sequence = HomingMethod(method).sequence().unwrap();
+            let edge = HomingMethod(method + 16).row().unwrap();
+            assert_eq!(sequence, HomingSequence { switch: Some(edge), index: Some(edge.crossing) }, "{method}");
+        }
+    }
+
+    #[test]
+    fn all_methods_of_the_standard_and_no_others_have_a_sequence() {
+        let standard = (1..=14).chain(17..=30).chain([33, 34, 35, 37]);
+        assert!(HomingMethod::standard().map(|method| method.0).eq(standard.clone()));
+        for method in (i8::MIN..=i8::MAX).filter(|number| !standard.clone().any(|method| method == *number)) {
+            assert_eq!(HomingMethod(method).sequence(), None, "{method}");
+        }
+    }
+
+    #[test]
+    fn without_a_switch_there_is_the_index_pulse_or_the_place() {
+        let index = |direction| Some(HomingSequence { switch: None, index: direction });
+        assert_eq!(HomingMethod(33).sequence(), index(Some(Negative)));
+        assert_eq!(HomingMethod(34).sequence(), index(Some(Positive)));
+        assert_eq!(HomingMethod::HERE.sequence(), index(None));
+        assert_eq!(HomingMethod::HERE_FORMERLY.sequence(), index(None));
     }
 
     #[test]

@@ -1,20 +1,38 @@
 //! The drive profile CiA 402-2 as tables and pure functions.
 //!
-//! Controlword and statusword by bit, the power drive state machine as one const table, modes and option
-//! codes as open newtypes. Nothing here moves a motor or knows a dictionary: the drives' firmware and the
+//! Controlword and statusword by bit, the power drive state machine and the homing methods as const tables, modes, option
+//! and error codes as open newtypes, the factor group as exact fractions, windows and touch probes as small machines. Nothing here moves a motor or knows a dictionary: the drives' firmware and the
 //! master both read these tables. Manufacturer meanings of bits are deliberately absent: they are the drives'.
 #![no_std]
 
 mod controlword;
+mod error_code;
 mod homing_method;
+mod interpolation;
 mod mode;
 mod option_code;
 mod power;
 mod statusword;
+mod terminals;
+mod touch_probe;
+mod units;
+mod window;
 
 pub use controlword::{Controlword, PowerCommand};
-pub use homing_method::{Direction, HOMING_METHODS, HomingMethod, HomingRow, HomingSwitch, SwitchEdge};
-pub use mode::ModeOfOperation;
-pub use option_code::{DisableOperationOption, HaltOption, QuickStopOption, ShutdownOption};
+pub use error_code::ErrorCode;
+pub use homing_method::{
+    Direction, HOMING_METHODS, HomingMethod, HomingRow, HomingSequence, HomingSwitch, INDEX_METHODS, IndexRow,
+    SwitchEdge,
+};
+pub use interpolation::{BufferOrganisation, InterpolationPeriod, InterpolationSubMode};
+pub use mode::{ModeOfOperation, SupportedModes};
+pub use option_code::{
+    AbortConnectionOption, DisableOperationOption, FaultReactionOption, HaltOption, QuickStopOption, ShutdownOption,
+    StopRamp,
+};
 pub use power::{PowerEvent, PowerState, TRANSITIONS, Transition, next_command, transition};
 pub use statusword::Statusword;
+pub use terminals::{DigitalInputs, DigitalOutputs};
+pub use touch_probe::{Latched, TouchProbe, TouchProbeFunction, TouchProbeSource};
+pub use units::{FactorGroup, Factors, NoFactor, Polarity, Ratio, SiUnit};
+pub use window::{Dwell, Window};

@@ -30,8 +30,24 @@ impl Statusword {
     pub const REMOTE: u16 = 1 << 9;
     /// Bit 10.
     pub const TARGET_REACHED: u16 = 1 << 10;
+    /// Bit 11: a limit of the drive holds the set-point back.
+    pub const INTERNAL_LIMIT_ACTIVE: u16 = 1 << 11;
     /// Bit 12 in profile position.
     pub const SET_POINT_ACKNOWLEDGE: u16 = 1 << 12;
+    /// Bit 12 in profile velocity: the motor stands.
+    pub const SPEED: u16 = 1 << 12;
+    /// Bit 12 in homing.
+    pub const HOMING_ATTAINED: u16 = 1 << 12;
+    /// Bit 12 in interpolated position.
+    pub const INTERPOLATION_ACTIVE: u16 = 1 << 12;
+    /// Bit 12 in the cyclic synchronous modes.
+    pub const FOLLOWS_COMMAND_VALUE: u16 = 1 << 12;
+    /// Bit 13 in profile position and cyclic synchronous position.
+    pub const FOLLOWING_ERROR: u16 = 1 << 13;
+    /// Bit 13 in profile velocity: slower than an asynchronous motor's slip allows.
+    pub const MAX_SLIPPAGE_ERROR: u16 = 1 << 13;
+    /// Bit 13 in homing.
+    pub const HOMING_ERROR: u16 = 1 << 13;
 
     /// True if all bits of `mask` are set.
     pub const fn has(self, mask: u16) -> bool {
