@@ -1,16 +1,18 @@
 //! `ferrodrive demo`: every procedure of the manuals against the virtual drives.
 
+mod report;
+
 use std::path::PathBuf;
 
 use clap::builder::PossibleValuesParser;
 use transport::WallClock;
 
 use crate::args::Global;
-use crate::demo::{self, DemoReport};
 use crate::failure::Failure;
 use crate::models::{self, MODELS};
 use crate::progress::Progress;
 use crate::session::exit_on_signal;
+use report::DemoReport;
 
 /// Show the whole thing on an embedded virtual bus: every procedure of the three manuals against the three drives
 ///
@@ -32,12 +34,14 @@ impl Demo {
         exit_on_signal();
         let clock = WallClock::start();
         let progress = Progress::new(global.json);
-        let (mut report, poster) = demo::run(self.drive.as_deref().and_then(models::find), &progress)?;
+        let shown = progress.clone();
+        let only = self.drive.as_deref().and_then(models::find);
+        let showcase =
+            showcase::run(only, move |section| shown.show(section)).map_err(|error| Failure::new(error.to_string()))?;
         progress.clear();
-        std::fs::write(&self.svg, poster.to_svg())
+        std::fs::write(&self.svg, showcase.poster.to_svg())
             .map_err(|error| Failure::new(format!("cannot write the picture {}", self.svg.display())).because(error))?;
-        report.svg = self.svg.display().to_string();
-        report.took_s = clock.now().as_secs_f64();
-        Ok(report)
+        let (svg, took_s) = (self.svg.display().to_string(), clock.now().as_secs_f64());
+        Ok(DemoReport::new(showcase.parts, svg, took_s))
     }
 }
