@@ -186,7 +186,7 @@ impl Subject for zlim42c::Zlim42c {
             phase_current_a: if has(2) { [f32::from(place) * 1e3, -1e6] } else { [0.5, 0.25] },
             bus_v: if has(3) { f32::from(place) } else { 24.0 },
             bus_current_a: if has(2) { 30.0 } else { 0.5 },
-            reference_v: if has(4) { 0.0 } else { zlim42c::readings::REFERENCE_V },
+            reference_v: if has(4) { 0.0 } else { zlim42c::assumptions::REFERENCE_V },
             inputs: [has(0), has(1), has(5), has(6)],
             eeprom_ok: !has(7),
         }

@@ -2,7 +2,7 @@
 
 pub use devices::mjoint::alarms::*;
 
-use super::readings::VOLTAGE_DEBOUNCE_PERIODS;
+use super::assumptions::VOLTAGE_DEBOUNCE_PERIODS;
 use crate::engine::faults::{FaultSet, debounces};
 
 /// Supervision periods that the cause of each row of [`ALARMS`] must last.

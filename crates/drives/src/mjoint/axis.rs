@@ -6,7 +6,7 @@
 
 use super::interpolation::Interpolation;
 use crate::engine::axis::Demand;
-use crate::engine::trajectory::{StraightRamps, Trajectory, TrajectoryPoint};
+use crate::engine::axis::{StraightRamps, Trajectory, TrajectoryPoint};
 
 /// What the shaft does.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -16,11 +16,11 @@ use motion::foc::{FeedForward, FocGains};
 use motion::pid::PiGains;
 
 use super::Values;
+use super::assumptions::{CONTROL_PERIOD_S, SUPERVISION_PERIOD_S, VELOCITY_FILTER_S};
 use super::model::Model;
 use super::objects::{POSITION_PROPORTIONAL, VELOCITY_FEED_FORWARD, VELOCITY_INTEGRAL_TIME, VELOCITY_PROPORTIONAL};
-use super::readings::{CONTROL_PERIOD_S, SUPERVISION_PERIOD_S, VELOCITY_FILTER_S};
-use crate::engine::servo::ServoGains;
-use crate::engine::tracking::TrackingGains;
+use crate::engine::actuator::observer::TrackingGains;
+use crate::engine::actuator::servo::ServoGains;
 
 const VELOCITY_KP_A_PER_RAD_S: f32 = 0.2 / 3000.0;
 const POSITION_KP_PER_S: f32 = 0.02;

@@ -5,8 +5,8 @@
 
 use motion::interpolate::linear;
 
-use super::readings::{INTERPOLATION_PERIODS, SUPERVISION_PERIOD_S};
-use crate::engine::trajectory::TrajectoryPoint;
+use super::assumptions::{INTERPOLATION_PERIODS, SUPERVISION_PERIOD_S};
+use crate::engine::axis::TrajectoryPoint;
 
 const PERIOD_S: f64 = INTERPOLATION_PERIODS as f64 * SUPERVISION_PERIOD_S as f64;
 

@@ -3,10 +3,11 @@
 //!
 //! Source: "M Robot Joint Motor CanOpen Manual" (Zhengzhou Defy Mechanical & Electrical Equipment). The four models are
 //! one firmware; [`Model`] holds what differs. It is no CiA 402 state machine: the [statusword] mirrors the
-//! controlword. Where the manual contradicts itself or is silent, the choice is a named constant in [`readings`] or
+//! controlword. Where the manual contradicts itself or is silent, the choice is a named constant in [`assumptions`] or
 //! [`gains`], or stands beside the row of [`objects`], with its reason.
 
 pub mod alarms;
+pub mod assumptions;
 mod axis;
 mod drive;
 pub mod gains;
@@ -20,7 +21,6 @@ mod parameters;
 pub mod power_on;
 mod protection;
 pub mod pulses;
-pub mod readings;
 pub mod statusword;
 pub mod storage;
 mod turns;

@@ -4,15 +4,15 @@ use motion::commutation::CommutationModel;
 use motion::field_weakening::FieldWeakeningGains;
 use motion::observer::ObserverGains;
 
+use super::assumptions::*;
 use super::gains::gains;
 use super::model::Model;
 use super::objects::*;
 use super::power_on::Function;
 use super::pulses::PulseParameters;
-use super::readings::*;
 use super::{Values, homing};
-use crate::engine::servo::{ServoGains, ServoLimits, ServoModel};
-use crate::engine::trajectory::StraightRamps;
+use crate::engine::actuator::servo::{ServoGains, ServoLimits, ServoModel};
+use crate::engine::axis::StraightRamps;
 
 /// rad/s in one r/min.
 const RAD_S_PER_RPM: f32 = core::f32::consts::TAU / 60.0;

@@ -1,7 +1,7 @@
 //! What the joint does by itself after power-on: 2619h ("M Robot Joint Motor CanOpen Manual", 5.04, "Mode selection",
 //! and "Instructions for multi-turn absolute value").
 
-use super::readings::COUNTS_PER_TURN;
+use super::assumptions::COUNTS_PER_TURN;
 
 /// The function that 2619h selects; it acts from the next power-on on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

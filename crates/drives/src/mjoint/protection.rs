@@ -1,12 +1,12 @@
 //! Which causes of alarms are present, judged once each supervision period.
 
 use super::alarms::row;
+use super::assumptions::*;
 use super::gains::MODULATION_LIMIT;
 use super::hardware::{Battery, Sensors};
 use super::parameters::Parameters;
-use super::readings::*;
+use crate::engine::actuator::servo::Servo;
 use crate::engine::faults::{FaultSet, exceeds_with_hysteresis};
-use crate::engine::servo::Servo;
 
 /// What has to be remembered from one period to the next.
 #[derive(Clone, Debug, Default)]

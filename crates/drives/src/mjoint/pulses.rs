@@ -1,8 +1,8 @@
 //! Pulse inputs PU and DIR: counts from pulses and direction or from an encoder, speed from a duty cycle, and the
 //! electronic gear ("M Robot Joint Motor CanOpen Manual", "Driver wiring diagram and control mode", 2 and 3, and 5.04).
 
+use super::assumptions::{DUTY_FULL, DUTY_FULL_RPM, DUTY_ZERO};
 use super::power_on::Function;
-use super::readings::{DUTY_FULL, DUTY_FULL_RPM, DUTY_ZERO};
 
 /// The timers behind PU and DIR, as a microcontroller's capture units give them. Counters wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -4,8 +4,8 @@ use canopen::NodeId;
 use canopen::od::Default;
 
 use super::Values;
+use super::assumptions::NO_RECORD;
 use super::objects::{DEVICE_ADDRESS, POSITION_ACTUAL_INTERNAL_VALUE, TABLE};
-use super::readings::NO_RECORD;
 use crate::engine::storage::stored_rows;
 use devices::variant::Variant;
 

@@ -4,7 +4,7 @@
 //! The position is recorded at power-off ("could record the position when power off"). The brake holds the shaft until
 //! the next power-on; the encoder then knows the place within the turn, and the record the turn.
 
-use super::readings::COUNTS_PER_TURN;
+use super::assumptions::COUNTS_PER_TURN;
 
 const TURN: i32 = COUNTS_PER_TURN as i32;
 

@@ -2,7 +2,7 @@
 
 pub use devices::zltech::zlac8030l::faults::*;
 
-use super::readings::{
+use super::assumptions::{
     OVER_CURRENT_DEBOUNCE_PERIODS, SENSOR_DEBOUNCE_PERIODS, TEMPERATURE_DEBOUNCE_PERIODS, VOLTAGE_DEBOUNCE_PERIODS,
 };
 use crate::engine::faults::debounces;

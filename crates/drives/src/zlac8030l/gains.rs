@@ -15,7 +15,7 @@
 //! | 2021h | 200 | 1/200 | 1 | no lag behind a planned velocity |
 //! | 2018h | 1000 | 1 us | 1 ms | below the velocity loop's 8 ms, above the encoder's noise |
 //! | 201Bh, 201Ch | 100 | 1 us | 0.1 ms | a fifth of a supervision period |
-//! | 202Ah to 202Dh | 0 | corrections and share of [`Tracking`](crate::engine::tracking::Tracking) | off | the sibling's 1000, 750, 350, 1000 place three poles near 300 rad/s |
+//! | 202Ah to 202Dh | 0 | corrections and share of [`Tracking`](crate::engine::actuator::observer::Tracking) | off | the sibling's 1000, 750, 350, 1000 place three poles near 300 rad/s |
 
 use canopen::od::Object;
 use motion::cascade::CascadeGains;
@@ -24,14 +24,14 @@ use motion::foc::FocGains;
 use motion::pid::PiGains;
 
 use super::Values;
+use super::assumptions::{CONTROL_PERIOD_S, SUPERVISION_PERIOD_S};
 use super::objects::{
     CURRENT_KI, CURRENT_KP, FEEDFORWARD_SMOOTHING, POSITION_KF, POSITION_KP, TORQUE_SMOOTHING, VELOCITY_KF,
     VELOCITY_KI, VELOCITY_KP, VELOCITY_OBSERVER_1, VELOCITY_OBSERVER_2, VELOCITY_OBSERVER_3, VELOCITY_OBSERVER_4,
     VELOCITY_SMOOTHING,
 };
-use super::readings::{CONTROL_PERIOD_S, SUPERVISION_PERIOD_S};
-use crate::engine::servo::ServoGains;
-use crate::engine::tracking::TrackingGains;
+use crate::engine::actuator::observer::TrackingGains;
+use crate::engine::actuator::servo::ServoGains;
 
 /// rad/s in one r/min.
 const RAD_S_PER_RPM: f32 = core::f32::consts::TAU / 60.0;

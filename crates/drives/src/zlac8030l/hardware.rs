@@ -21,7 +21,7 @@ pub struct Sensors {
     pub motor_c: f32,
     /// Temperature of the power stage, degC.
     pub driver_c: f32,
-    /// The reference of the current measurement; [`REFERENCE_V`](super::readings::REFERENCE_V) when sound.
+    /// The reference of the current measurement; [`REFERENCE_V`](super::assumptions::REFERENCE_V) when sound.
     pub reference_v: f32,
     /// Levels of inputs X0 and X1; an unconnected input is low.
     pub inputs: [bool; 2],
@@ -40,7 +40,7 @@ impl Default for Sensors {
             bus_v: 48.0,
             motor_c: 25.0,
             driver_c: 25.0,
-            reference_v: super::readings::REFERENCE_V,
+            reference_v: super::assumptions::REFERENCE_V,
             inputs: [false; 2],
             eeprom_ok: true,
         }

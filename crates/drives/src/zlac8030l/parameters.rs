@@ -5,15 +5,15 @@ use motion::commutation::CommutationModel;
 use motion::observer::ObserverGains;
 
 use super::Values;
+use super::assumptions::*;
 use super::gains::gains;
 use super::objects::*;
-use super::readings::*;
 use super::variations::{EMERGENCY_COAST, EMERGENCY_RAMP, OVERLOAD_FROM_FACTOR, STOPPED_ENABLED};
-use crate::engine::axis::{AxisParameters, ExternalStop, StopRamp, Tolerances};
-use crate::engine::bleeder::BleederLimits;
-use crate::engine::overload::{OverloadLimits, between};
-use crate::engine::servo::{ServoGains, ServoLimits, ServoModel};
-use crate::zl::ProfileObjects;
+use crate::engine::actuator::bleeder::BleederLimits;
+use crate::engine::actuator::overload::{OverloadLimits, between};
+use crate::engine::actuator::servo::{ServoGains, ServoLimits, ServoModel};
+use crate::engine::cia402::{ExternalStop, Parameters as AxisParameters, StopRamp, Tolerances};
+use crate::zltech::ProfileObjects;
 use devices::variant::Variant;
 
 const PROFILE_OBJECTS: ProfileObjects = ProfileObjects::of(&TABLE);

@@ -2,14 +2,14 @@
 //!
 //! A cause that a fault was latched for counts as gone only some way back from its threshold (hysteresis).
 
+use super::assumptions::*;
 use super::faults::row;
 use super::hardware::Sensors;
 use super::parameters::Parameters;
-use super::readings::*;
+use crate::engine::actuator::overload::Overload;
+use crate::engine::actuator::servo::Servo;
 use crate::engine::axis::Demand;
 use crate::engine::faults::{FaultSet, exceeds, exceeds_with_hysteresis, within};
-use crate::engine::overload::Overload;
-use crate::engine::servo::Servo;
 
 /// What has to be remembered from one period to the next.
 #[derive(Clone, Debug, Default)]

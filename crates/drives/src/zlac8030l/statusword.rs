@@ -4,10 +4,10 @@ pub use devices::zltech::zlac8030l::statusword::*;
 
 use cia402::{ModeOfOperation, PowerState, Statusword};
 
-use crate::engine::axis::AxisStatus;
+use crate::engine::cia402::Status;
 
 /// The value of 6041h.
-pub(super) fn statusword(state: PowerState, mode: ModeOfOperation, status: &AxisStatus) -> Statusword {
+pub(super) fn statusword(state: PowerState, mode: ModeOfOperation, status: &Status) -> Statusword {
     let bit = |mask: u16, set: bool| if set { mask } else { 0 };
     let fault = matches!(state, PowerState::Fault | PowerState::FaultReactionActive);
     let by_mode = match mode {

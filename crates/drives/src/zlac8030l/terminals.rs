@@ -7,7 +7,7 @@ use super::objects::{
     BRAKE_B0, INPUT_POLARITY, INPUT_X0_FUNCTION, INPUT_X1_FUNCTION, OUTPUT_POLARITY, OUTPUT_Y0_FUNCTION,
     OUTPUT_Y1_FUNCTION,
 };
-use crate::zl::terminals::Terminals;
+use crate::zltech::terminals::Terminals;
 
 pub(super) const TERMINALS: Terminals<2> = Terminals {
     input_polarity: INPUT_POLARITY,

@@ -2,7 +2,7 @@
 
 pub use devices::zltech::zlim42c::faults::*;
 
-use super::readings::{
+use super::assumptions::{
     BUS_OVER_CURRENT_DEBOUNCE_PERIODS, OVER_CURRENT_DEBOUNCE_PERIODS, REFERENCE_DEBOUNCE_PERIODS,
     VOLTAGE_DEBOUNCE_PERIODS,
 };

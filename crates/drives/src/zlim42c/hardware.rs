@@ -14,7 +14,7 @@ pub struct Sensors {
     pub bus_v: f32,
     /// Current that the bridges take from the bus, A.
     pub bus_current_a: f32,
-    /// The reference of the current measurement; [`REFERENCE_V`](super::readings::REFERENCE_V) when sound.
+    /// The reference of the current measurement; [`REFERENCE_V`](super::assumptions::REFERENCE_V) when sound.
     pub reference_v: f32,
     /// Levels of inputs X0 to X3; an unconnected input is low.
     pub inputs: [bool; 4],
@@ -29,7 +29,7 @@ impl Default for Sensors {
             phase_current_a: [0.0; 2],
             bus_v: 24.0,
             bus_current_a: 0.0,
-            reference_v: super::readings::REFERENCE_V,
+            reference_v: super::assumptions::REFERENCE_V,
             inputs: [false; 4],
             eeprom_ok: true,
         }

@@ -1,9 +1,10 @@
 //! The ZLIM42-C: an integrated open-loop stepper, motor and drive in one, in two lengths (70 and 82 mm).
 //!
 //! Source: "ZLIM42-C user manual V1.03" (2022-03-03, Chinese; names are translated). Where it contradicts itself or is
-//! silent, the choice is a named constant in [`readings`], or stands beside the row of [`objects`], with its reason.
+//! silent, the choice is a named constant in [`assumptions`], or stands beside the row of [`objects`], with its reason.
 //! Nothing measures the rotor: positions and velocities are the commanded ones.
 
+pub mod assumptions;
 mod drive;
 pub mod faults;
 pub mod hardware;
@@ -12,7 +13,6 @@ pub mod led;
 pub mod objects;
 mod parameters;
 mod protection;
-pub mod readings;
 mod restart;
 pub mod statusword;
 pub mod storage;

@@ -2,15 +2,15 @@
 
 use motion::pid::PiGains;
 
+use super::assumptions::*;
 use super::objects::*;
-use super::readings::*;
 use super::tables::{PEAK_CURRENTS_A, PULSES_PER_TURN, entry};
 use super::variations::{EMERGENCY_BRAKE, EMERGENCY_COAST};
 use super::{Values, homing};
-use crate::engine::axis::{AxisParameters, StopRamp, Tolerances};
-use crate::engine::modes::{HomingParameters, VelocityRamps};
-use crate::engine::stepper::{StepperCurrents, StepperGains, StepperModel};
-use crate::zl::ProfileObjects;
+use crate::engine::actuator::stepper::{StepperCurrents, StepperGains, StepperModel};
+use crate::engine::axis::{HomingParameters, VelocityRamps};
+use crate::engine::cia402::{Parameters as AxisParameters, StopRamp, Tolerances};
+use crate::zltech::ProfileObjects;
 use devices::variant::Variant;
 
 const PROFILE_OBJECTS: ProfileObjects = ProfileObjects::of(&TABLE);

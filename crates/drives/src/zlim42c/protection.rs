@@ -1,10 +1,10 @@
 //! Which causes of faults are present, judged once each supervision period from the largest values in it.
 
+use super::assumptions::*;
 use super::faults::row;
 use super::hardware::Sensors;
-use super::readings::*;
+use crate::engine::actuator::stepper::Peaks;
 use crate::engine::faults::{FaultSet, exceeds, exceeds_with_hysteresis, within};
-use crate::engine::stepper::Peaks;
 
 /// What the causes are judged by, besides the sensors.
 pub(super) struct Situation {

@@ -5,7 +5,7 @@ pub use devices::zltech::zlim42c::statusword::*;
 
 use cia402::{Controlword, ModeOfOperation, PowerState, Statusword};
 
-use crate::engine::axis::AxisStatus;
+use crate::engine::cia402::Status;
 
 /// What the statusword is made of.
 #[derive(Clone, Copy)]
@@ -14,7 +14,7 @@ pub(super) struct Situation {
     pub(super) mode: ModeOfOperation,
     pub(super) controlword: Controlword,
     pub(super) energised: bool,
-    pub(super) axis: AxisStatus,
+    pub(super) axis: Status,
 }
 
 /// The value of 6041h.

@@ -14,7 +14,7 @@ mod tests {
     #[test]
     fn every_number_of_pulses_divides_into_electrical_turns() {
         for pulses in PULSES_PER_TURN {
-            assert_eq!(u32::from(pulses) % super::super::readings::TEETH, 0, "{pulses}");
+            assert_eq!(u32::from(pulses) % super::super::assumptions::TEETH, 0, "{pulses}");
         }
     }
 }

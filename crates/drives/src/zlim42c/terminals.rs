@@ -3,12 +3,12 @@
 use canopen::od::Object;
 
 use super::Values;
+use super::assumptions::SUPERVISION_PERIOD_S;
 use super::objects::{
     INPUT_POLARITY, INPUT_X0_FUNCTION, INPUT_X1_FUNCTION, INPUT_X2_FUNCTION, INPUT_X3_FUNCTION, OUTPUT_POLARITY,
     OUTPUT_Y0_FUNCTION, OUTPUT_Y1_FUNCTION, X0_X1_FILTER_TIME, X2_X3_FILTER_TIME,
 };
-use super::readings::SUPERVISION_PERIOD_S;
-use crate::zl::terminals::Terminals;
+use crate::zltech::terminals::Terminals;
 
 pub(super) const TERMINALS: Terminals<4> = Terminals {
     input_polarity: INPUT_POLARITY,

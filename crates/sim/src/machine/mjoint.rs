@@ -8,7 +8,7 @@ use can::Bitrate;
 use devices::Description;
 use drives::RegisterError;
 use drives::engine::storage::Image;
-use drives::mjoint::readings::{COUNTS_PER_TURN, COUNTS_S_PER_RPM};
+use drives::mjoint::assumptions::{COUNTS_PER_TURN, COUNTS_S_PER_RPM};
 use drives::mjoint::variations::VARIANT;
 use drives::mjoint::{Actuation, Battery, Brake, Hardware, MJoint, Model, PowerStage, Sensors, objects, storage};
 use plant::absolute_encoder::BatteryState;

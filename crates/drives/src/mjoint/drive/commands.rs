@@ -8,11 +8,11 @@ use cia402::{Controlword, ModeOfOperation};
 
 use super::{Homing, MJoint, OwnMotion};
 use crate::engine::device::{Application, Device};
+use crate::mjoint::assumptions::{SET_ORIGIN, SUPERVISION_DIVIDER};
 use crate::mjoint::homing::Run;
 use crate::mjoint::objects::effects::{Effect, effect};
 use crate::mjoint::objects::*;
 use crate::mjoint::parameters::TimeBase;
-use crate::mjoint::readings::{SET_ORIGIN, SUPERVISION_DIVIDER};
 
 /// Bits 1 to 3 of the controlword, without which nothing moves.
 const MAY_MOVE: u16 = Controlword::ENABLE_VOLTAGE | Controlword::QUICK_STOP | Controlword::ENABLE_OPERATION;
@@ -64,7 +64,7 @@ impl MJoint {
             Effect::AlarmCode => self.clear_alarm(raw == 0),
             Effect::GearNumerator => self.gear_numerator(raw as u16),
             Effect::Save => self.save_asked = raw == 1,
-            Effect::ConsumerHeartbeat => self.watch_another_host(raw),
+            Effect::ConsumerHeartbeat => self.configure_host(raw),
             Effect::Parameter => self.parameters_changed = true,
         }
     }
@@ -85,7 +85,7 @@ impl MJoint {
         }
         self.controlword = Controlword(asked.0 & !Controlword::NEW_SET_POINT);
         self.device.values_mut().set(CONTROLWORD, self.controlword.0);
-        self.take_or_let_go();
+        self.update_power_stage();
         if !self.may_move() {
             self.next_point = None;
         }
@@ -116,7 +116,7 @@ impl MJoint {
             self.axis.hold(&self.parameters.ramps);
         }
         self.mode = mode;
-        self.take_or_let_go();
+        self.update_power_stage();
     }
 
     fn begin_homing(&mut self, mode: ModeOfOperation) {
@@ -180,7 +180,7 @@ impl MJoint {
     fn modbus_enable(&mut self, enabled: bool) {
         if enabled {
             self.take_from_pulses();
-            self.take_or_let_go();
+            self.update_power_stage();
         }
     }
 
@@ -215,7 +215,7 @@ impl MJoint {
             self.own_motion = OwnMotion::None;
             self.fail_homing();
         }
-        self.take_or_let_go();
+        self.update_power_stage();
     }
 
     fn clear_alarm(&mut self, clear: bool) {
@@ -250,7 +250,7 @@ impl MJoint {
     }
 
     /// 1016h:01. The watch begins anew with the next heartbeat.
-    fn watch_another_host(&mut self, raw: u32) {
+    fn configure_host(&mut self, raw: u32) {
         self.host = Consumer::from_raw(raw);
         self.host_lost = false;
         self.alarms.release(crate::mjoint::alarms::row::COMMUNICATION);
@@ -281,7 +281,7 @@ impl MJoint {
     }
 
     /// Takes the shaft over or lets go of it, as it has become right.
-    pub(super) fn take_or_let_go(&mut self) {
+    pub(super) fn update_power_stage(&mut self) {
         let live = self.wants_to_be_live();
         if live && !self.axis.is_engaged() {
             self.axis.engage(&self.parameters.ramps);

@@ -5,10 +5,11 @@ use motion::field_weakening::torque_share;
 use motion::filter::LowPassGains;
 
 use super::{Homing, MJoint, OwnMotion};
+use crate::engine::actuator::servo::ServoLimits;
 use crate::engine::axis::Demand;
 use crate::engine::faults::FaultSet;
-use crate::engine::servo::ServoLimits;
 use crate::mjoint::alarms::{self, row};
+use crate::mjoint::assumptions::*;
 use crate::mjoint::axis::Feedback;
 use crate::mjoint::gains::MODULATION_LIMIT;
 use crate::mjoint::hardware::Sensors;
@@ -16,7 +17,6 @@ use crate::mjoint::objects::TARGET_VELOCITY;
 use crate::mjoint::parameters::{Parameters, TimeBase};
 use crate::mjoint::power_on::Function;
 use crate::mjoint::protection::Situation;
-use crate::mjoint::readings::*;
 use crate::mjoint::variations::{ORIGIN_AT_EDGE, STAYS_FREE};
 
 const DT_S: f64 = SUPERVISION_PERIOD_S as f64;
@@ -76,7 +76,7 @@ impl MJoint {
         self.inputs.update([sensors.pu, sensors.dir], INPUT_DEBOUNCE_PERIODS);
         self.watch_alarms(sensors);
         self.move_by_itself(sensors);
-        self.take_or_let_go();
+        self.update_power_stage();
         if self.axis.is_engaged() {
             self.direct();
         }
@@ -161,16 +161,16 @@ impl MJoint {
         let causes = self.protection.causes(&self.parameters, sensors, &situation);
         let new = self.alarms.observe(causes);
         if !new.is_empty() {
-            self.fall(new);
+            self.enter_fault(new);
         }
     }
 
     /// New alarms. Those that stop the motor leave it free, and end what was under way.
-    fn fall(&mut self, new: FaultSet) {
+    fn enter_fault(&mut self, new: FaultSet) {
         if new.0 & alarms::RELEASING.0 != 0 {
             self.own_motion = OwnMotion::None;
             self.fail_homing();
-            self.take_or_let_go();
+            self.update_power_stage();
         }
         self.publish_alarms();
     }
@@ -214,11 +214,9 @@ impl MJoint {
         };
         let Some(target) = target.filter(|_| self.can_be_live()) else { return };
         self.own_motion = OwnMotion::Returning;
-        self.take_or_let_go();
-        let ramps = crate::engine::trajectory::StraightRamps {
-            max_speed: self.parameters.homing_speed,
-            ..self.parameters.ramps
-        };
+        self.update_power_stage();
+        let ramps =
+            crate::engine::axis::StraightRamps { max_speed: self.parameters.homing_speed, ..self.parameters.ramps };
         self.axis.move_to(target, &ramps);
     }
 
@@ -232,7 +230,7 @@ impl MJoint {
             return;
         }
         self.own_motion = OwnMotion::Following;
-        self.take_or_let_go();
+        self.update_power_stage();
         self.axis.follow(by, &self.parameters.ramps, DT_S);
     }
 
@@ -242,7 +240,7 @@ impl MJoint {
             return;
         }
         self.own_motion = OwnMotion::Following;
-        self.take_or_let_go();
+        self.update_power_stage();
         self.axis.turn(rpm * COUNTS_S_PER_RPM, &self.parameters.ramps);
     }
 

@@ -19,6 +19,7 @@ use motion::field_weakening::FieldWeakening;
 use motion::filter::LowPass;
 
 use super::alarms::{self, ALARM_COUNT, ALARMS, row};
+use super::assumptions::*;
 use super::axis::Axis;
 use super::hardware::{Actuation, Battery, Brake, Hardware, PowerStage, Sensors};
 use super::homing::Run;
@@ -29,16 +30,15 @@ use super::parameters::Parameters;
 use super::power_on::Function;
 use super::protection::Protection;
 use super::pulses::Pulses;
-use super::readings::*;
 use super::turns::Turns;
 use super::variations::{self, VARIANT};
 use super::{Values, storage};
 use crate::communication::communication;
+use crate::engine::actuator::servo::Servo;
 use crate::engine::axis::Demand;
 use crate::engine::device::{Application, Device};
 use crate::engine::faults::FaultMonitor;
 use crate::engine::inputs::Inputs;
-use crate::engine::servo::Servo;
 use crate::engine::storage::Image;
 use crate::{Firmware, Report};
 use devices::variant::Variant;
@@ -247,7 +247,7 @@ impl MJoint {
         self.device.boot(now);
     }
 
-    fn heard(&mut self, event: Option<ConsumerEvent>) {
+    fn on_heartbeat(&mut self, event: Option<ConsumerEvent>) {
         match event {
             Some(ConsumerEvent::Lost) => {
                 self.host_lost = true;
@@ -309,14 +309,14 @@ impl MJoint {
 impl Station for MJoint {
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
         let event = self.host.as_mut().and_then(|host| host.handle_frame(frame, now));
-        self.heard(event);
+        self.on_heartbeat(event);
         self.device.handle_frame(frame, now);
         self.handle_events(now);
     }
 
     fn handle_timeout(&mut self, now: Instant) {
         let event = self.host.as_mut().and_then(|host| host.handle_timeout(now));
-        self.heard(event);
+        self.on_heartbeat(event);
         self.device.handle_timeout(now);
         self.handle_events(now);
         if self.device.is_task_due(now) {

@@ -5,9 +5,9 @@ use cia402::{Controlword, ModeOfOperation};
 use super::{HEARTBEAT_ALARM, Homing, MJoint, OwnMotion};
 use crate::engine::axis::Demand;
 use crate::mjoint::alarms;
+use crate::mjoint::assumptions::{COUNTS_S_PER_RPM, POSITION_REACHED_COUNTS, SPEED_REACHED_RPM, STANDSTILL_RPM};
 use crate::mjoint::hardware::Sensors;
 use crate::mjoint::objects::*;
-use crate::mjoint::readings::{COUNTS_S_PER_RPM, POSITION_REACHED_COUNTS, SPEED_REACHED_RPM, STANDSTILL_RPM};
 use crate::mjoint::statusword::{Condition, statusword};
 
 /// 6078h: 1/2000 A.

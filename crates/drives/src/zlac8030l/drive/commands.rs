@@ -8,12 +8,12 @@ use cia402::{Controlword, ModeOfOperation, PowerState};
 use super::Zlac8030l;
 use crate::engine::axis::Demand;
 use crate::engine::device::{self, Application, Device};
-use crate::zl;
 use crate::zlac8030l::faults::row;
 use crate::zlac8030l::objects::effects::{Effect, effect};
 use crate::zlac8030l::objects::*;
 use crate::zlac8030l::restart;
 use crate::zlac8030l::variations::{MODE_NOT_SAVED, SYNC_FEEDS_WATCHDOG};
+use crate::zltech;
 
 impl Application<ROW_COUNT> for Zlac8030l {
     fn device(&mut self) -> &mut Device<ROW_COUNT> {
@@ -32,7 +32,7 @@ impl Application<ROW_COUNT> for Zlac8030l {
 
     #[inline]
     fn written(&mut self, slot: Slot, raw: u32, _via: Via, now: Instant) -> bool {
-        zl::note_write(&mut self.device, SAVE_ON_WRITE, slot);
+        zltech::mark_if_saving(&mut self.device, SAVE_ON_WRITE, slot);
         let effect = effect(slot);
         match effect {
             Effect::Command => self.command(Controlword(raw as u16), now),
@@ -56,7 +56,7 @@ impl Application<ROW_COUNT> for Zlac8030l {
         let armed = self.axis.state() == PowerState::OperationEnabled;
         let heard = self.device.last_addressed().max(self.last_sync);
         if self.watchdog.poll(armed, heard, timeout_ns, now) {
-            self.axis.lose_host();
+            self.axis.on_host_timeout();
             self.drop_targets();
         }
         self.device.commit();
@@ -91,7 +91,7 @@ impl Zlac8030l {
     /// Save or restore. An EEPROM fault ends with the factory settings.
     fn registers(&mut self, command: u32, now: Instant) {
         let about = if self.device.variant().is(MODE_NOT_SAVED) { |row: &Entry| row.stored } else { Entry::is_kept };
-        if zl::register_command(&mut self.device, REGISTER_PARAMETER_SETTING, command, about) {
+        if zltech::register_command(&mut self.device, REGISTER_PARAMETER_SETTING, command, about) {
             self.parameters_changed = true;
             self.select_mode();
             if self.faults.forget(row::EEPROM) {

@@ -10,30 +10,31 @@ use canopen::node::{Node, NodeProfile};
 use cia402::{ModeOfOperation, PowerState};
 use motion::filter::{LowPass, LowPassGains};
 
+use super::assumptions::*;
 use super::faults::{DEBOUNCE, FAULT_COUNT, FAULTS, row};
 use super::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use super::objects::*;
 use super::parameters::Parameters;
 use super::protection::{Protection, Situation, is_over_current};
-use super::readings::*;
 use super::statusword::statusword;
 use super::terminals::{self, TERMINALS};
 use super::variations::{SPEED_SETTING_FAULTS, VARIANT};
 use super::{Values, storage};
-use crate::engine::axis::{Axis, Demand, Feedback, Targets};
-use crate::engine::bleeder::Bleeder;
+use crate::engine::actuator::bleeder::Bleeder;
+use crate::engine::actuator::servo::Servo;
+use crate::engine::axis::{Demand, Feedback};
+use crate::engine::cia402::{PowerDrive, Targets};
 use crate::engine::device::{Application, Device};
 use crate::engine::faults::{FaultMonitor, FaultSet};
 use crate::engine::host_watchdog::HostWatchdog;
 use crate::engine::inputs::Inputs;
-use crate::engine::servo::Servo;
 use crate::engine::storage::Image;
-use crate::zl::terminals::Conditions;
-use crate::{Firmware, Report, zl};
+use crate::zltech::terminals::Conditions;
+use crate::{Firmware, Report, zltech};
 use devices::variant::Variant;
 
 /// How this drive communicates.
-pub static NODE_PROFILE: NodeProfile = zl::node_profile(&devices::zltech::ZLAC8030L);
+pub static NODE_PROFILE: NodeProfile = zltech::node_profile(&devices::zltech::ZLAC8030L);
 
 /// The firmware of a ZLAC8030L V2.0.
 #[derive(Clone)]
@@ -42,7 +43,7 @@ pub struct Zlac8030l {
     dip_address: u8,
     parameters: Parameters,
     parameters_changed: bool,
-    axis: Axis,
+    axis: PowerDrive,
     servo: Servo,
     /// The sensors have been looked at since the restart.
     awake: bool,
@@ -90,7 +91,7 @@ impl Zlac8030l {
             dip_address: 0,
             parameters,
             parameters_changed: false,
-            axis: Axis::new(&[]),
+            axis: PowerDrive::new(&[]),
             awake: false,
             demand: Demand::Off,
             targets: Targets::default(),
@@ -195,11 +196,11 @@ impl Zlac8030l {
             // Told once: whether encoder and Hall sensors still disagree shows at the next edges.
             self.servo.realign(&self.parameters.model, sensors.hall, sensors.encoder_count);
         }
-        self.fall(new, now);
+        self.enter_fault(new, now);
     }
 
     /// New faults: off, and tell.
-    fn fall(&mut self, new: FaultSet, now: Instant) {
+    fn enter_fault(&mut self, new: FaultSet, now: Instant) {
         if new.is_empty() {
             return;
         }
@@ -326,7 +327,7 @@ impl Firmware for Zlac8030l {
 
     fn power_off(&mut self, _now: Instant) {
         self.device.power_off();
-        self.axis = Axis::new(&[]);
+        self.axis = PowerDrive::new(&[]);
         self.demand = Demand::Off;
     }
 
@@ -339,7 +340,7 @@ impl Firmware for Zlac8030l {
         }
         self.servo.sense(&self.parameters.model, sensors.hall, sensors.encoder_count);
         if is_over_current(sensors) && self.faults.raise(row::OVER_CURRENT) {
-            self.fall(FaultSet::row(row::OVER_CURRENT), now);
+            self.enter_fault(FaultSet::row(row::OVER_CURRENT), now);
         }
         self.periods += 1;
         if self.periods >= SUPERVISION_DIVIDER {

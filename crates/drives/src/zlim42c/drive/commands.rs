@@ -7,12 +7,12 @@ use cia402::{Controlword, ModeOfOperation, PowerState};
 
 use super::Zlim42c;
 use crate::engine::device::{self, Application, Device};
-use crate::zl;
 use crate::zlim42c::faults::row;
 use crate::zlim42c::objects::effects::{Effect, effect};
 use crate::zlim42c::objects::*;
 use crate::zlim42c::restart;
 use crate::zlim42c::variations::FAULTS_STAY;
+use crate::zltech;
 
 impl Application<ROW_COUNT> for Zlim42c {
     fn device(&mut self) -> &mut Device<ROW_COUNT> {
@@ -35,7 +35,7 @@ impl Application<ROW_COUNT> for Zlim42c {
 
     #[inline]
     fn written(&mut self, slot: Slot, raw: u32, _via: Via, now: Instant) -> bool {
-        zl::note_write(&mut self.device, SAVE_ON_WRITE, slot);
+        zltech::mark_if_saving(&mut self.device, SAVE_ON_WRITE, slot);
         let effect = effect(slot);
         match effect {
             Effect::Command => self.command(Controlword(raw as u16), now),
@@ -73,7 +73,7 @@ impl Zlim42c {
 
     /// Save or restore. An EEPROM fault ends with the factory settings.
     fn registers(&mut self, command: u32, now: Instant) {
-        if zl::register_command(&mut self.device, REGISTER_PARAMETER_SETTING, command, |_| true) {
+        if zltech::register_command(&mut self.device, REGISTER_PARAMETER_SETTING, command, |_| true) {
             self.parameters_changed = true;
             if self.faults.forget(row::EEPROM) {
                 self.reset_faults(now);

@@ -9,28 +9,29 @@ use can::{Bitrate, Instant};
 use canopen::node::{Node, NodeProfile};
 use cia402::{Controlword, PowerState};
 
+use super::assumptions::*;
 use super::faults::{DEBOUNCE, FAULT_COUNT, FAULTS, FLASHES, row};
 use super::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use super::objects::*;
 use super::parameters::Parameters;
 use super::protection::{PhaseWatch, Situation, causes, is_over_current};
-use super::readings::*;
 use super::statusword::{self, statusword};
 use super::terminals::{self, TERMINALS};
 use super::variations::VARIANT;
 use super::{Values, led, storage};
-use crate::engine::axis::{Axis, Demand, Feedback, Targets};
+use crate::engine::actuator::stepper::Stepper;
+use crate::engine::axis::{Demand, Feedback};
+use crate::engine::cia402::{PowerDrive, Targets};
 use crate::engine::device::{Application, Device};
 use crate::engine::faults::{FaultMonitor, FaultSet};
 use crate::engine::inputs::Inputs;
-use crate::engine::stepper::Stepper;
 use crate::engine::storage::Image;
-use crate::zl::terminals::Conditions;
-use crate::{Firmware, Report, zl};
+use crate::zltech::terminals::Conditions;
+use crate::{Firmware, Report, zltech};
 use devices::variant::Variant;
 
 /// How this drive communicates.
-pub static NODE_PROFILE: NodeProfile = zl::node_profile(&devices::zltech::ZLIM42C);
+pub static NODE_PROFILE: NodeProfile = zltech::node_profile(&devices::zltech::ZLIM42C);
 
 /// The firmware of a ZLIM42-C.
 #[derive(Clone)]
@@ -39,7 +40,7 @@ pub struct Zlim42c {
     dip_address: u8,
     parameters: Parameters,
     parameters_changed: bool,
-    axis: Axis,
+    axis: PowerDrive,
     stepper: Stepper,
     demand: Demand,
     targets: Targets,
@@ -75,7 +76,7 @@ impl Zlim42c {
             device,
             dip_address: 0,
             parameters_changed: false,
-            axis: Axis::new(&[]),
+            axis: PowerDrive::new(&[]),
             stepper: Stepper::default(),
             demand: Demand::Off,
             targets: Targets::default(),
@@ -165,11 +166,11 @@ impl Zlim42c {
             latched: self.faults.latched(),
         };
         let new = self.faults.observe(causes(sensors, &situation));
-        self.fall(new, now);
+        self.enter_fault(new, now);
     }
 
     /// New faults: off, and tell.
-    fn fall(&mut self, new: FaultSet, now: Instant) {
+    fn enter_fault(&mut self, new: FaultSet, now: Instant) {
         if new.is_empty() {
             return;
         }
@@ -323,7 +324,7 @@ impl Firmware for Zlim42c {
 
     fn power_off(&mut self, _now: Instant) {
         self.device.power_off();
-        self.axis = Axis::new(&[]);
+        self.axis = PowerDrive::new(&[]);
         self.energise(Demand::Off);
     }
 
@@ -332,7 +333,7 @@ impl Firmware for Zlim42c {
             return Actuation::default();
         }
         if is_over_current(sensors) && self.faults.raise(row::OVER_CURRENT) {
-            self.fall(FaultSet::row(row::OVER_CURRENT), now);
+            self.enter_fault(FaultSet::row(row::OVER_CURRENT), now);
         }
         self.bus_a += sensors.bus_current_a / f32::from(SUPERVISION_DIVIDER);
         self.periods += 1;

@@ -4,11 +4,11 @@ use motion::slew::Slew;
 
 /// The demanded current, on its way to the target.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct ProfileTorque {
+pub struct Torque {
     slew: Slew,
 }
 
-impl ProfileTorque {
+impl Torque {
     /// One period; returns the demanded current in A. `slope_a_s` of 0 follows at once.
     pub fn update(&mut self, target_a: f32, slope_a_s: f32, dt_s: f32) -> f32 {
         let rate = if slope_a_s > 0.0 { slope_a_s } else { f32::INFINITY };

@@ -14,7 +14,7 @@ use devices::Description;
 use crate::communication::communication;
 
 pub(crate) use parameters::ProfileObjects;
-pub(crate) use storage::{note_write, register_command};
+pub(crate) use storage::{mark_if_saving, register_command};
 
 /// How the drives communicate: as described, event-driven PDOs as the ZLAC8030L's manual has them (6.1; the ZLIM42-C's gives
 /// no more than the object table).

@@ -10,9 +10,9 @@ pub enum StopCause {
     /// A digital input.
     External,
     /// Shutdown or disable operation with a ramp.
-    StepDown,
+    RampDown,
     /// The host is silent.
-    HostLost,
+    HostTimeout,
     /// A limit switch at the end that the shaft moves to.
     Limit,
     /// Bit 8 of the controlword.

@@ -3,10 +3,10 @@
 use canopen::od::{Dictionary, Object, Table};
 use cia402::{DisableOperationOption, HaltOption, QuickStopOption, ShutdownOption};
 
-use crate::engine::axis::{AxisParameters, ExternalStop, StopRamp, Tolerances};
-use crate::engine::modes::{HomingParameters, VelocityRamps};
-use crate::engine::power::StepDownOptions;
-use crate::engine::trajectory::MoveLimits;
+use crate::engine::axis::MoveLimits;
+use crate::engine::axis::{HomingParameters, VelocityRamps};
+use crate::engine::cia402::DisableOptions;
+use crate::engine::cia402::{ExternalStop, Parameters as AxisParameters, StopRamp, Tolerances};
 
 /// Where a drive's table has them.
 pub(crate) struct ProfileObjects {
@@ -62,7 +62,7 @@ impl ProfileObjects {
             quick_stop_time_s: time_s(self.quick_stop_deceleration),
             torque_slope_a_s: 0.0,
             quick_stop: QuickStopOption(values.get(self.quick_stop_option_code)),
-            step_down: StepDownOptions {
+            disable: DisableOptions {
                 shutdown: ShutdownOption(values.get(self.shutdown_option_code)),
                 disable_operation: DisableOperationOption(values.get(self.disable_operation_option_code)),
             },

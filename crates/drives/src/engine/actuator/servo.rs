@@ -12,8 +12,8 @@ use motion::foc::{Dq, Foc, FocGains, FocInput, clarke, park};
 use motion::limits::symmetric;
 use motion::observer::{Observer, ObserverGains};
 
-use super::axis::Demand;
-use super::tracking::{Tracking, TrackingGains};
+use super::observer::{Tracking, TrackingGains};
+use crate::engine::axis::Demand;
 
 const TAU: f32 = core::f32::consts::TAU;
 

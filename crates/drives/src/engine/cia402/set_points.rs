@@ -1,6 +1,6 @@
 //! Profile position (CiA 402-2, clause 10): set-points with a queue of one, and the handshake of bits 4, 5, 6 and 12.
 
-use crate::engine::trajectory::{MoveLimits, Trajectory};
+use crate::engine::axis::{MoveLimits, Trajectory};
 
 /// A set-point as the controlword hands it over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,7 +15,7 @@ pub struct SetPoint {
 
 /// The set-point under way, the one that waits, and the acknowledge bit.
 #[derive(Clone, Copy, Debug)]
-pub struct ProfilePosition {
+pub struct SetPoints {
     /// The present or last target: relative moves count from here.
     target: i32,
     under_way: bool,
@@ -23,7 +23,7 @@ pub struct ProfilePosition {
     acknowledged: bool,
 }
 
-impl ProfilePosition {
+impl SetPoints {
     /// Nothing under way; `position` stands for the preceding target.
     pub const fn resting(position: i32) -> Self {
         Self { target: position, under_way: false, waiting: None, acknowledged: false }
@@ -123,13 +123,13 @@ mod tests {
     };
 
     struct Bench {
-        mode: ProfilePosition,
+        mode: SetPoints,
         trajectory: Trajectory,
     }
 
     impl Bench {
         fn new() -> Self {
-            Self { mode: ProfilePosition::resting(0), trajectory: Trajectory::resting(0) }
+            Self { mode: SetPoints::resting(0), trajectory: Trajectory::resting(0) }
         }
 
         fn take(&mut self, target: i32, relative: bool, immediately: bool) {

@@ -1,6 +1,6 @@
 //! Profile velocity (CiA 402-2, clause 16): the target velocity is followed along timed S-shaped ramps.
 
-use crate::engine::trajectory::{Trajectory, TrajectoryPoint};
+use super::trajectory::{Trajectory, TrajectoryPoint};
 
 /// Speeds in counts/s, times in seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -17,12 +17,12 @@ pub struct VelocityRamps {
 
 /// What the trajectory leads to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ProfileVelocity {
+pub struct Speed {
     /// End of the ramp under way; `None` when the trajectory is not of this mode yet.
     heading_for: Option<f64>,
 }
 
-impl ProfileVelocity {
+impl Speed {
     /// Plans anew when the target (counts/s) has changed or a ramp down to zero has ended on the way to the other
     /// direction.
     pub fn update(&mut self, target: f64, trajectory: &mut Trajectory, ramps: &VelocityRamps) {
@@ -63,13 +63,13 @@ mod tests {
         VelocityRamps { start_speed: 0.0, max_speed: 5000.0, acceleration_time_s: 0.5, deceleration_time_s: 0.2 };
 
     struct Bench {
-        mode: ProfileVelocity,
+        mode: Speed,
         trajectory: Trajectory,
     }
 
     impl Bench {
         fn new() -> Self {
-            Self { mode: ProfileVelocity::default(), trajectory: Trajectory::resting(0) }
+            Self { mode: Speed::default(), trajectory: Trajectory::resting(0) }
         }
 
         /// Seconds until the velocity is there, and the point then.

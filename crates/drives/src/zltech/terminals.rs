@@ -2,7 +2,7 @@
 
 use canopen::od::{Dictionary, Object};
 
-use crate::engine::modes::Switches;
+use crate::engine::axis::Switches;
 
 /// What the inputs say.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

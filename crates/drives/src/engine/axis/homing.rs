@@ -12,8 +12,8 @@
 
 use cia402::{Direction, HomingRow, HomingSwitch, SwitchEdge};
 
-use super::VelocityRamps;
-use crate::engine::trajectory::TrajectoryPoint;
+use super::speed::VelocityRamps;
+use super::trajectory::TrajectoryPoint;
 
 /// The switches along the axis: true is on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

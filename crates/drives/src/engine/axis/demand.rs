@@ -27,12 +27,3 @@ pub struct Feedback {
     /// Slower than the drive's threshold of standstill.
     pub standing: bool,
 }
-
-/// What the host wants of the modes that follow a target at all times.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Targets {
-    /// Counts/s.
-    pub velocity: f64,
-    /// A.
-    pub current_a: f32,
-}

@@ -21,8 +21,7 @@
 use motion::angle::sin_cos_turns;
 use motion::pid::{Pi, PiGains};
 
-use super::axis::Demand;
-use super::trajectory::TrajectoryPoint;
+use crate::engine::axis::{Demand, TrajectoryPoint};
 
 /// What the drive knows about the motor and its own rhythm.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,19 +6,17 @@
 
 use cia402::{Controlword, Direction, HaltOption, ModeOfOperation, PowerState, QuickStopOption, Transition};
 
-pub use super::demand::{Demand, Feedback, Targets};
-use super::modes::{
-    Homing, HomingParameters, HomingStep, ProfilePosition, ProfileTorque, ProfileVelocity, SetPoint, Switches,
-    VelocityRamps,
+use super::power::{DisableOptions, PowerMachine};
+use super::set_points::{SetPoint, SetPoints};
+use super::stop::{ExternalStop, Stop, StopCause, StopRamp};
+use crate::engine::axis::{
+    Demand, Feedback, Homing, HomingParameters, HomingStep, MoveLimits, Speed, Switches, Torque, Trajectory,
+    TrajectoryPoint, VelocityRamps,
 };
-use super::power::{PowerMachine, StepDownOptions};
-use super::stop::Stop;
-pub use super::stop::{ExternalStop, StopCause, StopRamp};
-use super::trajectory::{MoveLimits, Trajectory, TrajectoryPoint};
 
 /// How the axis is set.
 #[derive(Clone, Copy, Debug)]
-pub struct AxisParameters {
+pub struct Parameters {
     /// Speeds and times of position moves.
     pub moves: MoveLimits,
     /// Speeds and times of velocity changes.
@@ -30,7 +28,7 @@ pub struct AxisParameters {
     /// 605Ah; also of the external stop and of the watch over the host.
     pub quick_stop: QuickStopOption,
     /// 605Bh and 605Ch.
-    pub step_down: StepDownOptions,
+    pub disable: DisableOptions,
     /// 605Dh.
     pub halt: HaltOption,
     /// What 605Ah and 605Dh call an emergency stop: how the drive reads their last value.
@@ -49,6 +47,15 @@ pub struct AxisParameters {
     pub tolerances: Tolerances,
 }
 
+/// What the host wants of the modes that follow a target at all times.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Targets {
+    /// Counts/s.
+    pub velocity: f64,
+    /// A.
+    pub current_a: f32,
+}
+
 /// When a target counts as reached.
 #[derive(Clone, Copy, Debug)]
 pub struct Tolerances {
@@ -62,7 +69,7 @@ pub struct Tolerances {
 
 /// What the statusword has to tell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct AxisStatus {
+pub struct Status {
     /// The mode's target is reached; while stopping: the motor stands.
     pub target_reached: bool,
     /// Set-point acknowledge.
@@ -79,16 +86,16 @@ pub struct AxisStatus {
     pub homing_attained: bool,
 }
 
-/// The axis.
+/// Power state machine, mode and motion of one axis.
 #[derive(Clone, Debug)]
-pub struct Axis {
+pub struct PowerDrive {
     power: PowerMachine,
     mode: ModeOfOperation,
     requested_mode: ModeOfOperation,
     trajectory: Trajectory,
-    position: ProfilePosition,
-    velocity: ProfileVelocity,
-    torque: ProfileTorque,
+    position: SetPoints,
+    velocity: Speed,
+    torque: Torque,
     homing: Homing,
     /// Where the home position was found, until somebody asks.
     home: Option<i32>,
@@ -114,7 +121,7 @@ enum Engaged {
 /// A stop is over when the motor stands, or this long after its ramp: a load that drives the motor may never let it.
 const STANDSTILL_PATIENCE_S: f64 = 1.0;
 
-impl Axis {
+impl PowerDrive {
     /// Not ready to switch on, without a mode.
     pub fn new(extra: &'static [Transition]) -> Self {
         Self {
@@ -122,9 +129,9 @@ impl Axis {
             mode: ModeOfOperation::NONE,
             requested_mode: ModeOfOperation::NONE,
             trajectory: Trajectory::resting(0),
-            position: ProfilePosition::resting(0),
-            velocity: ProfileVelocity::default(),
-            torque: ProfileTorque::default(),
+            position: SetPoints::resting(0),
+            velocity: Speed::default(),
+            torque: Torque::default(),
             homing: Homing::default(),
             home: None,
             switches: Switches::default(),
@@ -169,13 +176,13 @@ impl Axis {
 
     /// Takes a controlword; `target` is the target position that a rising bit 4 takes. True if a fault reset is asked
     /// for.
-    pub fn command(&mut self, controlword: Controlword, target: i32, parameters: &AxisParameters) -> bool {
+    pub fn command(&mut self, controlword: Controlword, target: i32, parameters: &Parameters) -> bool {
         let before = self.power.controlword();
-        let wants_reset = self.power.command(controlword, parameters.step_down);
+        let wants_reset = self.power.command(controlword, parameters.disable);
         if self.is_live() && self.engaged != Engaged::Yes {
             self.engage();
         }
-        if self.power.is_stepping_down() && self.is_at_rest() {
+        if self.power.is_ramping_down() && self.is_at_rest() {
             self.power.ramp_done();
         }
         let new = controlword.has(Controlword::NEW_SET_POINT);
@@ -215,13 +222,13 @@ impl Axis {
     }
 
     /// The power stage is to be on: enabled and not let go, or held for another reason.
-    pub fn is_energised(&self, parameters: &AxisParameters) -> bool {
+    pub fn is_energised(&self, parameters: &Parameters) -> bool {
         let coasts = self.stop.is_some_and(|stop| stop.free);
         (self.is_live() && !coasts) || self.is_locked(parameters)
     }
 
     /// The host is silent: stops the motor once.
-    pub fn lose_host(&mut self) {
+    pub fn on_host_timeout(&mut self) {
         self.host_lost = self.power.state() == PowerState::OperationEnabled;
     }
 
@@ -244,7 +251,7 @@ impl Axis {
     }
 
     /// One period.
-    pub fn update(&mut self, feedback: Feedback, targets: &Targets, parameters: &AxisParameters, dt_s: f64) -> Demand {
+    pub fn update(&mut self, feedback: Feedback, targets: &Targets, parameters: &Parameters, dt_s: f64) -> Demand {
         self.feedback = feedback;
         self.adopt_mode();
         if !self.is_live() {
@@ -261,9 +268,9 @@ impl Axis {
     }
 
     /// What the statusword has to tell.
-    pub fn status(&self, targets: &Targets, parameters: &AxisParameters) -> AxisStatus {
+    pub fn status(&self, targets: &Targets, parameters: &Parameters) -> Status {
         let standing = self.feedback.standing;
-        AxisStatus {
+        Status {
             target_reached: self.target_reached(targets, parameters),
             acknowledged: self.position.is_acknowledged(),
             in_position: self.is_in_position(&parameters.tolerances),
@@ -277,7 +284,7 @@ impl Axis {
     }
 
     /// Bit 4 rose: a set-point or homing begins.
-    fn start(&mut self, set_point: SetPoint, parameters: &AxisParameters) {
+    fn start(&mut self, set_point: SetPoint, parameters: &Parameters) {
         let SetPoint { target, relative, .. } = set_point;
         let way = if relative { target } else { target.wrapping_sub(self.trajectory.point().position) };
         match self.mode {
@@ -302,7 +309,7 @@ impl Axis {
         self.power.state() == PowerState::OperationEnabled
             && !stopped
             && !self.external_stop
-            && !self.power.is_stepping_down()
+            && !self.power.is_ramping_down()
     }
 
     fn is_at_rest(&self) -> bool {
@@ -346,7 +353,7 @@ impl Axis {
     }
 
     /// Held without being enabled.
-    fn is_locked(&self, parameters: &AxisParameters) -> bool {
+    fn is_locked(&self, parameters: &Parameters) -> bool {
         if self.external_stop && parameters.external_stop != ExternalStop::Hold {
             return false;
         }
@@ -357,7 +364,7 @@ impl Axis {
         }
     }
 
-    fn idle(&mut self, parameters: &AxisParameters) -> Demand {
+    fn idle(&mut self, parameters: &Parameters) -> Demand {
         if !self.is_locked(parameters) {
             if self.engaged != Engaged::No {
                 self.disengage();
@@ -372,7 +379,7 @@ impl Axis {
         Demand::Position(self.trajectory.point())
     }
 
-    fn choose_stop(&mut self, targets: &Targets, parameters: &AxisParameters) {
+    fn choose_stop(&mut self, targets: &Targets, parameters: &Parameters) {
         let wanted = self.wanted_stop(targets, parameters);
         let present = self.stop.map(|stop| (stop.cause, stop.ramp));
         let free = self.stop.is_some_and(|stop| stop.free);
@@ -396,7 +403,7 @@ impl Axis {
         }
     }
 
-    fn wanted_stop(&self, targets: &Targets, parameters: &AxisParameters) -> Option<(StopCause, StopRamp)> {
+    fn wanted_stop(&self, targets: &Targets, parameters: &Parameters) -> Option<(StopCause, StopRamp)> {
         let quick = StopRamp::of_quick_stop(parameters.quick_stop, parameters.emergency_stop);
         let external = parameters.external_stop.ramp(parameters.quick_stop, parameters.emergency_stop);
         // A stop that ends disabled goes before one that holds the motor.
@@ -406,10 +413,10 @@ impl Axis {
             Some((StopCause::QuickStop, quick))
         } else if self.external_stop {
             Some((StopCause::External, external))
-        } else if self.power.is_stepping_down() {
-            Some((StopCause::StepDown, StopRamp::SlowDown))
+        } else if self.power.is_ramping_down() {
+            Some((StopCause::RampDown, StopRamp::SlowDown))
         } else if self.host_lost {
-            Some((StopCause::HostLost, quick))
+            Some((StopCause::HostTimeout, quick))
         } else if let Some(ramp) = parameters.limit_stop.filter(|_| self.meets_limit(self.heading(targets), parameters))
         {
             Some((StopCause::Limit, ramp))
@@ -430,12 +437,12 @@ impl Axis {
         }
     }
 
-    fn meets_limit(&self, heading: f64, parameters: &AxisParameters) -> bool {
+    fn meets_limit(&self, heading: f64, parameters: &Parameters) -> bool {
         let direction = if heading < 0.0 { Direction::Negative } else { Direction::Positive };
         heading != 0.0 && parameters.limit_stop.is_some() && self.switches.limit(direction)
     }
 
-    fn begin_stop(&mut self, cause: StopCause, ramp: StopRamp, parameters: &AxisParameters) {
+    fn begin_stop(&mut self, cause: StopCause, ramp: StopRamp, parameters: &Parameters) {
         let from = match self.mode {
             ModeOfOperation::PROFILE_TORQUE if self.stop.is_none() => {
                 TrajectoryPoint::moving(self.feedback.position, self.feedback.velocity)
@@ -455,7 +462,7 @@ impl Axis {
     }
 
     /// Nothing asks for a stop any more.
-    fn resume(&mut self, parameters: &AxisParameters) {
+    fn resume(&mut self, parameters: &Parameters) {
         // A halted move or homing goes on, from wherever the motor coasted to.
         if self.stop.is_some_and(|stop| stop.free && stop.cause != StopCause::Halt) {
             self.engage();
@@ -467,7 +474,7 @@ impl Axis {
         self.position.resume(&mut self.trajectory, &parameters.moves);
     }
 
-    fn stopping(&mut self, mut stop: Stop, parameters: &AxisParameters, dt_s: f64) -> Demand {
+    fn stopping(&mut self, mut stop: Stop, parameters: &Parameters, dt_s: f64) -> Demand {
         let point = self.trajectory.advance(dt_s);
         let follows_position = self.mode == ModeOfOperation::PROFILE_POSITION && stop.ramp == StopRamp::SlowDown;
         if (self.trajectory.is_resting() || stop.free) && !stop.held {
@@ -501,7 +508,7 @@ impl Axis {
         }
     }
 
-    fn following(&mut self, targets: &Targets, parameters: &AxisParameters, dt_s: f64) -> Demand {
+    fn following(&mut self, targets: &Targets, parameters: &Parameters, dt_s: f64) -> Demand {
         match self.mode {
             ModeOfOperation::PROFILE_POSITION => {
                 self.slow_down_if_adrift(parameters);
@@ -545,14 +552,14 @@ impl Axis {
     }
 
     /// Enabled on a turning shaft, with nothing that asks for it: bring it to rest.
-    fn slow_down_if_adrift(&mut self, parameters: &AxisParameters) {
+    fn slow_down_if_adrift(&mut self, parameters: &Parameters) {
         if self.trajectory.is_done() && !self.trajectory.is_resting() {
             let time_s = parameters.moves.deceleration_time_s;
             self.trajectory = Trajectory::change_velocity(self.trajectory.point(), 0.0, time_s);
         }
     }
 
-    fn target_reached(&self, targets: &Targets, parameters: &AxisParameters) -> bool {
+    fn target_reached(&self, targets: &Targets, parameters: &Parameters) -> bool {
         let Tolerances { velocity, current_a, .. } = parameters.tolerances;
         let homing = self.mode == ModeOfOperation::HOMING;
         if homing && !self.homing.has_ended() && self.stop_cause() != Some(StopCause::Halt) {

@@ -9,7 +9,7 @@ use cia402::{
 
 /// What "shutdown" and "disable operation" do in Operation enabled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct StepDownOptions {
+pub struct DisableOptions {
     /// 605Bh.
     pub shutdown: ShutdownOption,
     /// 605Ch.
@@ -42,7 +42,7 @@ impl PowerMachine {
     }
 
     /// A command waits until the motor stands.
-    pub const fn is_stepping_down(&self) -> bool {
+    pub const fn is_ramping_down(&self) -> bool {
         self.pending.is_some()
     }
 
@@ -53,7 +53,7 @@ impl PowerMachine {
 
     /// Takes a controlword. True if it asks for a fault reset, by the rising edge of bit 7: whether the cause is gone
     /// is for the caller to judge, who then calls [`reset_fault`](Self::reset_fault).
-    pub fn command(&mut self, controlword: Controlword, options: StepDownOptions) -> bool {
+    pub fn command(&mut self, controlword: Controlword, options: DisableOptions) -> bool {
         let before = core::mem::replace(&mut self.controlword, controlword);
         match (self.state, controlword.command()) {
             (_, PowerCommand::FaultReset) => {
@@ -116,12 +116,12 @@ impl PowerMachine {
 mod tests {
     use super::*;
 
-    const AT_ONCE: StepDownOptions =
-        StepDownOptions { shutdown: ShutdownOption::DISABLE, disable_operation: DisableOperationOption::DISABLE };
-    const RAMP: StepDownOptions =
-        StepDownOptions { shutdown: ShutdownOption::SLOW_DOWN, disable_operation: DisableOperationOption::SLOW_DOWN };
+    const AT_ONCE: DisableOptions =
+        DisableOptions { shutdown: ShutdownOption::DISABLE, disable_operation: DisableOperationOption::DISABLE };
+    const RAMP: DisableOptions =
+        DisableOptions { shutdown: ShutdownOption::SLOW_DOWN, disable_operation: DisableOperationOption::SLOW_DOWN };
 
-    fn after(words: &[u16], options: StepDownOptions) -> PowerMachine {
+    fn after(words: &[u16], options: DisableOptions) -> PowerMachine {
         let mut power = PowerMachine::new(&[]);
         power.self_test_done();
         for word in words {
@@ -138,10 +138,10 @@ mod tests {
     }
 
     #[test]
-    fn stepping_down_waits_for_the_ramp_only_when_the_option_asks_for_one() {
+    fn disabling_waits_for_the_ramp_only_when_the_option_asks_for_one() {
         for (word, to) in [(6, PowerState::ReadyToSwitchOn), (7, PowerState::SwitchedOn)] {
             let mut power = after(&[6, 7, 0xF, word], RAMP);
-            assert!(power.is_stepping_down() && power.state() == PowerState::OperationEnabled);
+            assert!(power.is_ramping_down() && power.state() == PowerState::OperationEnabled);
             power.ramp_done();
             assert_eq!(power.state(), to);
             assert_eq!(after(&[6, 7, 0xF, word], AT_ONCE).state(), to);
@@ -151,7 +151,7 @@ mod tests {
     #[test]
     fn enabling_again_during_the_ramp_stays_enabled() {
         let mut power = after(&[6, 7, 0xF, 7, 0xF], RAMP);
-        assert!(!power.is_stepping_down());
+        assert!(!power.is_ramping_down());
         power.ramp_done();
         assert_eq!(power.state(), PowerState::OperationEnabled);
     }

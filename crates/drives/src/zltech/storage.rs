@@ -29,7 +29,7 @@ pub(crate) fn register_command<const N: usize>(
 
 /// A peer's write to a row: stored by the next task if each write is.
 #[inline]
-pub(crate) fn note_write<const N: usize>(device: &mut Device<N>, save_on_write: Object<u16>, slot: Slot) {
+pub(crate) fn mark_if_saving<const N: usize>(device: &mut Device<N>, save_on_write: Object<u16>, slot: Slot) {
     if device.values().get(save_on_write) == 0 {
         device.mark(slot);
     }
