@@ -21,7 +21,9 @@ pub mod observer;
 pub mod pid;
 pub mod profile;
 pub mod scurve;
+pub mod set_points;
 pub mod slew;
 pub mod trapezoid;
+pub mod travel;
 
 pub use profile::{Point, Profile};
