@@ -8,7 +8,7 @@
 //! The same input gives the same bits on every machine: only IEEE 754 basic operations and `libm` are used, and
 //! nothing here reads a clock or a random source. The crate knows nothing of drives, controllers or CAN.
 //!
-//! Three compositions, one for each kind of drive: [`hub_motor`] is a [`pmsm`] with incremental encoder and Hall
+//! Three compositions: [`hub_motor`] is a [`pmsm`] with incremental encoder and Hall
 //! sensors, [`stepper_motor`] a two-phase [`stepper`] without any, [`joint_motor`] a [`pmsm`] with a battery-backed
 //! [`absolute_encoder`] behind a [`gear`]. Each is on a [`rig`]: load, power stage, supply, heat and the book of energies.
 #![no_std]
@@ -33,6 +33,7 @@ pub mod thermal;
 
 mod hub_motors;
 mod joint_motors;
+mod servo_motors;
 mod stepper_motors;
 
 pub use angle::Angle;
