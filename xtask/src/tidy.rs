@@ -5,39 +5,23 @@
 //! overlook is named in `exceptions`, each with its reason.
 
 mod banned;
+mod circles;
 mod conventions;
 mod dependencies;
 mod exceptions;
+mod finding;
 mod sizes;
 mod source;
 mod text;
 
-use std::fmt;
 use std::process::{Command, ExitCode};
 
 pub(crate) use dependencies::NO_STD;
+use finding::Finding;
 use source::Source;
 
 use crate::tally::Tally;
 use crate::{process, workspace};
-
-/// Something that a rule found. Printed as `path:line: what: why: what to do`.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Finding {
-    path: String,
-    line: usize,
-    /// The rule's name, which an exception refers to.
-    rule: &'static str,
-    what: String,
-    why: &'static str,
-    remedy: &'static str,
-}
-
-impl fmt::Display for Finding {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}: {}: {}: {}", self.path, self.line, self.what, self.why, self.remedy)
-    }
-}
 
 /// A rule about one Rust file.
 type SourceRule = fn(&Source) -> Vec<Finding>;
@@ -81,6 +65,7 @@ fn findings() -> Result<Vec<Finding>, String> {
     let mut found = dependencies::directions(&workspace::packages()?, |folder| {
         std::fs::read_to_string(workspace::root().join(folder).join("Cargo.toml")).unwrap_or_default()
     });
+    let mut sources = Vec::new();
     for path in tracked_files()? {
         // A file that is listed but deleted, or that is not text, has no style.
         let Ok(text) = std::fs::read_to_string(workspace::root().join(&path)) else { continue };
@@ -88,8 +73,10 @@ fn findings() -> Result<Vec<Finding>, String> {
         if path.ends_with(".rs") {
             let source = Source::new(&path, &text);
             SOURCE_RULES.iter().for_each(|rule| found.extend(rule(&source)));
+            sources.push(source);
         }
     }
+    found.extend(circles::in_crates(&sources));
     let mut found = exceptions::apply(found, exceptions::EXCEPTIONS);
     found.sort();
     Ok(found)
@@ -104,22 +91,4 @@ fn tracked_files() -> Result<Vec<String>, String> {
     paths.sort();
     paths.dedup();
     Ok(paths)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_finding_says_where_what_why_and_what_to_do() {
-        let finding = Finding {
-            path: "a.rs".into(),
-            line: 3,
-            rule: "sample",
-            what: "a thing".into(),
-            why: "it is bad",
-            remedy: "do another",
-        };
-        assert_eq!(finding.to_string(), "a.rs:3: a thing: it is bad: do another");
-    }
 }

@@ -1,6 +1,6 @@
 //! Field-oriented control: phase currents in, three duty cycles out.
 //!
-//! Amplitude-invariant Clarke and Park transforms, one PI controller for each axis with optional feed-forward of the
+//! The [frames](crate::frames)' transforms, one PI controller for each axis with optional feed-forward of the
 //! back-emf and the cross-coupling, a circle limit to what the bus can give, inverse Park, and a zero-sequence shift
 //! that centres the three voltages (equivalent to space-vector modulation): the phase amplitude reaches
 //! `bus / sqrt(3)`.
@@ -11,54 +11,11 @@
 //! ```
 
 use crate::angle::sin_cos_turns;
+use crate::frames::{AlphaBeta, Dq, clarke, inverse_clarke, inverse_park, park};
 use crate::limits::circle;
 use crate::pid::{Pi, PiGains};
 
 const INV_SQRT_3: f32 = 0.577_350_26;
-const HALF_SQRT_3: f32 = 0.866_025_4;
-
-/// A vector in the rotor's frame: d along the magnets, q across them.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Dq {
-    /// Along the magnets.
-    pub d: f32,
-    /// Across the magnets: the torque-producing axis.
-    pub q: f32,
-}
-
-/// A vector in the stator's frame.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct AlphaBeta {
-    /// Along phase U's axis.
-    pub alpha: f32,
-    /// A quarter of an electrical turn on.
-    pub beta: f32,
-}
-
-/// Three phase values to a vector; a common part is dropped.
-#[inline]
-pub fn clarke([u, v, w]: [f32; 3]) -> AlphaBeta {
-    AlphaBeta { alpha: u * (2.0 / 3.0) - (v + w) * (1.0 / 3.0), beta: (v - w) * INV_SQRT_3 }
-}
-
-/// A vector to three phase values of sum zero.
-#[inline]
-pub fn inverse_clarke(AlphaBeta { alpha, beta }: AlphaBeta) -> [f32; 3] {
-    let (half, side) = (-0.5 * alpha, HALF_SQRT_3 * beta);
-    [alpha, half + side, half - side]
-}
-
-/// Stator frame to rotor frame.
-#[inline]
-pub fn park(AlphaBeta { alpha, beta }: AlphaBeta, sin: f32, cos: f32) -> Dq {
-    Dq { d: alpha * cos + beta * sin, q: beta * cos - alpha * sin }
-}
-
-/// Rotor frame to stator frame.
-#[inline]
-pub fn inverse_park(Dq { d, q }: Dq, sin: f32, cos: f32) -> AlphaBeta {
-    AlphaBeta { alpha: d * cos - q * sin, beta: d * sin + q * cos }
-}
 
 /// Duty cycles, 0 to 1, that give a voltage vector on a bus: the phase voltages centred between the rails.
 ///

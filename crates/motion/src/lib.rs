@@ -15,6 +15,7 @@ pub mod commutation;
 pub mod field_weakening;
 pub mod filter;
 pub mod foc;
+pub mod frames;
 pub mod interpolate;
 pub mod limits;
 pub mod observer;

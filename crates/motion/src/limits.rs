@@ -1,6 +1,6 @@
 //! Limits that loops share.
 
-use crate::foc::Dq;
+use crate::frames::Dq;
 
 /// Shortens a voltage vector to a circle: the d axis keeps its part first (it holds the field), q gets the rest.
 #[inline]

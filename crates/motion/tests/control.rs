@@ -1,7 +1,8 @@
 //! The control loops against closed forms, on plants of the test's own.
 
 use motion::commutation::{Commutation, CommutationModel};
-use motion::foc::{AlphaBeta, Dq, clarke, inverse_clarke, inverse_park, modulate, park};
+use motion::foc::modulate;
+use motion::frames::{AlphaBeta, Dq, clarke, inverse_clarke, inverse_park, park};
 use motion::observer::{Observer, ObserverGains};
 use motion::pid::{Pi, PiGains};
 use proptest::prelude::*;

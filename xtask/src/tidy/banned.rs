@@ -1,7 +1,7 @@
 //! What code may not say: clocks, threads, printing and statics where the design has none, and work left undone.
 
-use super::Finding;
 use super::dependencies::NO_STD;
+use super::finding::Finding;
 use super::source::{Source, occurrences};
 
 /// A word, the crates that may say it all the same, and why the others may not.

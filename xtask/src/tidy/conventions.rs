@@ -1,6 +1,6 @@
 //! Conventions of names, documentation and attributes.
 
-use super::Finding;
+use super::finding::Finding;
 use super::source::{Source, occurrences};
 
 /// Every file says at its top what it is, or is one thing whose own documentation says so.

@@ -2,7 +2,7 @@
 //!
 //! The table is the one of ARCHITECTURE.md. Tests, examples and benches may look sideways.
 
-use super::Finding;
+use super::finding::Finding;
 use crate::workspace::Package;
 
 /// The crates that run without an operating system and without an allocator.

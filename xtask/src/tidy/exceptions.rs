@@ -1,6 +1,6 @@
 //! What the rules overlook, each with its reason. An exception that matches nothing is itself a finding.
 
-use super::Finding;
+use super::finding::Finding;
 
 /// One finding that stands.
 pub(super) struct Exception {
@@ -16,6 +16,20 @@ pub(super) struct Exception {
 
 /// The list.
 pub(super) const EXCEPTIONS: &[Exception] = &[];
+
+/// Crates whose import circles are not all mended yet, and how many of their files still lie in one. The numbers only
+/// fall.
+pub(super) const STILL_IN_CIRCLES: &[(&str, usize)] = &[
+    ("canopen", 5),
+    ("cia402", 2),
+    ("cli", 23),
+    ("devices", 8),
+    ("master", 19),
+    ("showcase", 29),
+    ("sim", 9),
+    ("tests", 5),
+    ("transport", 15),
+];
 
 /// The findings without those that an exception names, and a finding for each exception that names none.
 pub(super) fn apply(mut found: Vec<Finding>, exceptions: &[Exception]) -> Vec<Finding> {

@@ -1,6 +1,6 @@
 //! How long a file and a function may be. Every feared giant was a small state machine once that nobody split.
 
-use super::Finding;
+use super::finding::Finding;
 use super::source::{Source, closing_brace, occurrences};
 
 const FILE_LINES: usize = 600;

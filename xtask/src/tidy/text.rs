@@ -1,6 +1,6 @@
 //! Rules for every text file: plain typography, no paths of anybody's machine, clean line ends.
 
-use super::Finding;
+use super::finding::Finding;
 
 /// Files that people write by hand. Others (licences, lock files, pictures) come as they are.
 const WRITTEN: &[&str] = &[".rs", ".md", ".toml", ".py", ".csv", ".can", ".yml", ".sh"];

@@ -8,7 +8,8 @@ use motion::angle::sin_cos_turns;
 use motion::cascade::{Cascade, CascadeGains, PositionDemand, VelocityDemand};
 use motion::commutation::{Commutation, CommutationModel};
 use motion::filter::{LowPass, LowPassGains};
-use motion::foc::{Dq, Foc, FocGains, FocInput, clarke, park};
+use motion::foc::{Foc, FocGains, FocInput};
+use motion::frames::{Dq, clarke, park};
 use motion::limits::symmetric;
 use motion::observer::{Observer, ObserverGains};
 
