@@ -34,11 +34,15 @@ pub mod core;
 pub mod decode;
 pub mod drive;
 mod error;
+mod host_loss;
 pub mod identify;
+mod limits;
 mod network;
 pub mod pdo;
 pub mod units;
 
 pub use drive::{Drive, MotionOptions};
 pub use error::{Access, Error, Hints};
-pub use network::{DEFAULT_TIMEOUT, Elapsed, Network, Node, NodeView, Sleep, Wait, join_all};
+pub use network::{
+    DEFAULT_TIMEOUT, Elapsed, Exchange, Network, NextSync, NoCycle, Node, NodeView, Sleep, Wait, join_all,
+};

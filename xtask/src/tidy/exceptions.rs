@@ -24,7 +24,6 @@ pub(super) const STILL_IN_CIRCLES: &[(&str, usize)] = &[
     ("cia402", 2),
     ("cli", 23),
     ("devices", 8),
-    ("master", 19),
     ("showcase", 29),
     ("sim", 9),
     ("tests", 5),

@@ -5,7 +5,8 @@ use canopen::sdo::client::{self, Client};
 use canopen::sdo::wire::{Payload as Initiation, Reply};
 use canopen::{AbortCode, Mux, NodeId};
 
-use super::{Failure, Outcome, Payload, Request, Ticket, Transfer};
+use super::payload::Payload;
+use super::request::{Failure, Outcome, Request, Ticket, Transfer};
 
 /// Requests that may wait for one node.
 const QUEUE: usize = 64;

@@ -6,6 +6,8 @@ use can::Instant;
 use canopen::emcy::Emcy;
 use canopen::{AbortCode, Mux, NmtState, NodeId};
 
+use super::supervision::CycleLoss;
+
 /// Something that happened on the bus and that a person may want to know. Pulled with [`super::Core::poll_event`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
@@ -23,6 +25,14 @@ pub enum Event {
     NoAnswer(NodeId, Mux, Duration),
     /// A node aborted an SDO request.
     Aborted(NodeId, Mux, AbortCode),
+    /// So many periods directly before this one had no SYNC.
+    CyclesMissed(u32),
+    /// The SYNC of another producer stays away, for this long now.
+    SyncLost(Duration),
+    /// The SYNC of another producer has come back.
+    SyncBack,
+    /// A drive that was moved cycle by cycle has been stopped by this master.
+    CyclicStopped(NodeId, CycleLoss),
 }
 
 impl fmt::Display for Event {
@@ -36,6 +46,11 @@ impl fmt::Display for Event {
             Self::NoAnswer(node, mux, time) => {
                 write!(f, "node {node} did not answer about {mux} within {} ms", time.as_millis())
             }
+            Self::CyclesMissed(1) => f.write_str("one cycle had no SYNC"),
+            Self::CyclesMissed(cycles) => write!(f, "{cycles} cycles had no SYNC"),
+            Self::SyncLost(time) => write!(f, "no SYNC for {} ms", time.as_secs_f64() * 1e3),
+            Self::SyncBack => f.write_str("SYNC is back"),
+            Self::CyclicStopped(node, loss) => write!(f, "node {node} was stopped: {loss}"),
             Self::Aborted(node, mux, code) => write!(f, "node {node} refused {mux}: {code}"),
         }
     }

@@ -4,58 +4,8 @@ use std::ops::Range;
 use can::{CanId, Frame, Instant, MAX_DATA_LENGTH};
 use canopen::{Mux, NodeId};
 
-/// One object in a PDO.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MappedObject {
-    /// Which object of the device.
-    pub mux: Mux,
-    /// Its length in bits, 1 to 64.
-    pub bits: u8,
-}
-
-impl MappedObject {
-    /// From a mapping record (1600h.., 1A00h..): index, sub-index, length. Source: CiA 301, 7.5.2.36.
-    pub const fn from_record(record: u32) -> Self {
-        Self { mux: Mux::from_key(record >> 8), bits: record as u8 }
-    }
-
-    /// As a mapping record.
-    pub const fn to_record(self) -> u32 {
-        self.mux.key() << 8 | self.bits as u32
-    }
-}
-
-/// What a PDO carries, in order.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct PdoMap(pub Vec<MappedObject>);
-
-impl PdoMap {
-    /// Total length in bits.
-    pub fn bits(&self) -> u32 {
-        self.0.iter().map(|object| u32::from(object.bits)).sum()
-    }
-
-    /// Total length in bytes, begun ones counted.
-    pub fn bytes(&self) -> usize {
-        self.bits().div_ceil(8) as usize
-    }
-
-    /// Every object with the bits it takes, bit 0 being the lowest bit of byte 0.
-    pub fn fields(&self) -> impl Iterator<Item = (MappedObject, Range<u32>)> {
-        let mut at = 0;
-        self.0.iter().map(move |object| {
-            let from = at;
-            at += u32::from(object.bits);
-            (*object, from..at)
-        })
-    }
-
-    /// The bits of `mux`; `None` if it is not mapped or lies beyond the 64 bits of a frame.
-    pub fn find(&self, mux: Mux) -> Option<Range<u32>> {
-        let (_, bits) = self.fields().find(|(object, _)| object.mux == mux)?;
-        (bits.end <= u64::BITS).then_some(bits)
-    }
-}
+use super::field::{Place, bits_of, mask_of};
+use super::pdo_map::PdoMap;
 
 /// A value that came by PDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,20 +37,28 @@ pub struct Image {
     by_id: Vec<u16>,
     /// Positions in `rpdos` to send, each at most once.
     pending: VecDeque<u16>,
+    /// Positions in `rpdos` that were written and wait for a SYNC, each at most once.
+    waiting: Vec<u16>,
+    /// The newest cycle, for the age of what comes.
+    cycle: u64,
 }
 
 const NONE: u16 = u16::MAX;
 
+/// A PDO keeps its position for ever; one that is no longer used has no identifier.
 #[derive(Clone, Debug)]
 struct Tpdo {
     node: NodeId,
     number: u8,
-    id: u16,
+    /// Counts its mappings, so that a [`Place`] in an old one finds nothing.
+    generation: u16,
+    id: Option<u16>,
     map: PdoMap,
     /// Cached, for the receive path.
     bytes: usize,
-    data: [u8; MAX_DATA_LENGTH],
+    data: u64,
     at: Option<Instant>,
+    cycle: u64,
     too_short: u32,
 }
 
@@ -108,89 +66,192 @@ struct Tpdo {
 struct Rpdo {
     node: NodeId,
     number: u8,
-    id: CanId,
+    generation: u16,
+    id: Option<CanId>,
     map: PdoMap,
+    bytes: usize,
     trigger: RpdoTrigger,
     data: u64,
-    written: bool,
-    pending: bool,
+    state: SendState,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum SendState {
+    Idle,
+    /// Among those that wait for a SYNC.
+    Waiting,
+    /// Among those to send.
+    Pending,
 }
 
 impl Default for Image {
     fn default() -> Self {
         let by_id = vec![NONE; usize::from(CanId::MAX_STANDARD) + 1];
-        Self { tpdos: Vec::new(), rpdos: Vec::new(), by_id, pending: VecDeque::new() }
+        let (pending, waiting) = (VecDeque::new(), Vec::new());
+        Self { tpdos: Vec::new(), rpdos: Vec::new(), by_id, pending, waiting, cycle: 0 }
     }
 }
 
 impl Image {
     /// Receives a node's TPDO under `id` from now on, in place of what that TPDO was before.
     pub fn set_tpdo(&mut self, node: NodeId, number: u8, id: u16, map: PdoMap) {
-        self.remove_tpdo(node, number);
         let bytes = map.bytes();
-        self.tpdos.push(Tpdo { node, number, id, map, bytes, data: [0; 8], at: None, too_short: 0 });
+        let before = self.tpdos.iter().position(|pdo| (pdo.node, pdo.number) == (node, number));
+        let generation = before.map_or(0, |position| self.tpdos[position].generation.wrapping_add(1));
+        let id = Some(id);
+        let new = Tpdo { node, number, generation, id, map, bytes, data: 0, at: None, cycle: 0, too_short: 0 };
+        match before {
+            Some(position) => self.tpdos[position] = new,
+            None => self.tpdos.push(new),
+        }
         self.index();
     }
 
     /// Receives a node's TPDO no longer.
     pub fn remove_tpdo(&mut self, node: NodeId, number: u8) {
-        self.tpdos.retain(|pdo| (pdo.node, pdo.number) != (node, number));
+        if let Some(pdo) = self.tpdos.iter_mut().find(|pdo| (pdo.node, pdo.number) == (node, number)) {
+            pdo.generation = pdo.generation.wrapping_add(1);
+            (pdo.id, pdo.map, pdo.at) = (None, PdoMap::default(), None);
+        }
         self.index();
     }
 
     /// Prepares a node's RPDO for sending under `id`, all bits zero.
     pub fn set_rpdo(&mut self, node: NodeId, number: u8, id: u16, map: PdoMap, trigger: RpdoTrigger) {
         self.remove_rpdo(node, number);
-        let id = CanId::standard(id);
-        self.rpdos.push(Rpdo { node, number, id, map, trigger, data: 0, written: false, pending: false });
+        let bytes = map.bytes().min(MAX_DATA_LENGTH);
+        let id = Some(CanId::standard(id));
+        let before = self.rpdos.iter().position(|pdo| (pdo.node, pdo.number) == (node, number));
+        let generation = before.map_or(0, |position| self.rpdos[position].generation);
+        let new = Rpdo { node, number, generation, id, map, bytes, trigger, data: 0, state: SendState::Idle };
+        match before {
+            Some(position) => self.rpdos[position] = new,
+            None => {
+                self.rpdos.push(new);
+                // No cycle has to make room.
+                self.pending.reserve(self.rpdos.len());
+                self.waiting.reserve(self.rpdos.len());
+            }
+        }
     }
 
     /// Sends a node's RPDO no longer.
     pub fn remove_rpdo(&mut self, node: NodeId, number: u8) {
-        self.pending.clear();
-        self.rpdos.retain(|pdo| (pdo.node, pdo.number) != (node, number));
-        let pending = self.rpdos.iter().enumerate().filter(|(_, pdo)| pdo.pending);
-        self.pending.extend(pending.map(|(position, _)| position as u16));
+        let Some(position) = self.rpdos.iter().position(|pdo| (pdo.node, pdo.number) == (node, number)) else { return };
+        let pdo = &mut self.rpdos[position];
+        pdo.generation = pdo.generation.wrapping_add(1);
+        (pdo.id, pdo.map, pdo.state) = (None, PdoMap::default(), SendState::Idle);
+        self.pending.retain(|other| usize::from(*other) != position);
+        self.waiting.retain(|other| usize::from(*other) != position);
     }
 
     /// The newest value of an object that a node sends by PDO; `None` if it is not mapped or none has come.
     pub fn value(&self, node: NodeId, mux: Mux) -> Option<Received> {
-        self.tpdos.iter().filter(|pdo| pdo.node == node).find_map(|pdo| {
-            let raw = bits_of(u64::from_le_bytes(pdo.data), pdo.map.find(mux)?);
+        let carriers = self.tpdos.iter().filter(|pdo| pdo.node == node);
+        let values = carriers.filter_map(|pdo| {
+            let raw = bits_of(pdo.data, pdo.map.find(mux)?);
             Some(Received { raw, at: pdo.at? })
-        })
+        });
+        values.max_by_key(|received| received.at)
     }
 
     /// The mapping under which a node's TPDO is received.
     pub fn tpdo_map(&self, node: NodeId, number: u8) -> Option<&PdoMap> {
-        self.tpdos.iter().find(|pdo| (pdo.node, pdo.number) == (node, number)).map(|pdo| &pdo.map)
+        self.tpdo(node, number).map(|pdo| &pdo.map)
     }
 
     /// When a node's TPDO last came.
     pub fn tpdo_at(&self, node: NodeId, number: u8) -> Option<Instant> {
-        self.tpdos.iter().find(|pdo| (pdo.node, pdo.number) == (node, number))?.at
+        self.tpdo(node, number)?.at
     }
 
     /// How many frames of a node's TPDO were shorter than its mapping and therefore ignored.
     pub fn too_short(&self, node: NodeId, number: u8) -> u32 {
-        self.tpdos.iter().find(|pdo| (pdo.node, pdo.number) == (node, number)).map_or(0, |pdo| pdo.too_short)
+        self.tpdo(node, number).map_or(0, |pdo| pdo.too_short)
+    }
+
+    fn tpdo(&self, node: NodeId, number: u8) -> Option<&Tpdo> {
+        self.tpdos.iter().find(|pdo| (pdo.node, pdo.number) == (node, number) && pdo.id.is_some())
     }
 
     /// Puts a value into every RPDO of the node that carries the object and queues them by their trigger.
     /// False if none carries it. Bits that do not fit are dropped.
     pub fn write(&mut self, node: NodeId, mux: Mux, raw: u64) -> bool {
         let mut found = false;
-        for (position, pdo) in self.rpdos.iter_mut().enumerate().filter(|(_, pdo)| pdo.node == node) {
-            let Some(bits) = pdo.map.find(mux) else { continue };
-            let mask = mask_of(&bits);
-            pdo.data = pdo.data & !(mask << bits.start) | (raw & mask) << bits.start;
-            pdo.written = true;
-            found = true;
-            if pdo.trigger == RpdoTrigger::Write && !core::mem::replace(&mut pdo.pending, true) {
-                self.pending.push_back(position as u16);
-            }
+        for position in 0..self.rpdos.len() {
+            let pdo = &self.rpdos[position];
+            let Some(bits) = pdo.map.find(mux).filter(|_| pdo.node == node) else { continue };
+            let place = Self::place(position, pdo.generation, &bits);
+            found |= self.put(place, raw);
         }
         found
+    }
+
+    /// Where a node's TPDOs have an object, in the order in which they were set up.
+    pub(crate) fn find_signals(&self, node: NodeId, mux: Mux) -> impl Iterator<Item = (u8, Place)> {
+        let tpdos = self.tpdos.iter().enumerate().filter(move |(_, pdo)| pdo.node == node);
+        tpdos.filter_map(move |(position, pdo)| {
+            Some((pdo.number, Self::place(position, pdo.generation, &pdo.map.find(mux)?)))
+        })
+    }
+
+    /// Where a node's RPDOs have an object.
+    pub(crate) fn find_set_points(&self, node: NodeId, mux: Mux) -> impl Iterator<Item = (u8, RpdoTrigger, Place)> {
+        let rpdos = self.rpdos.iter().enumerate().filter(move |(_, pdo)| pdo.node == node);
+        rpdos.filter_map(move |(position, pdo)| {
+            let place = Self::place(position, pdo.generation, &pdo.map.find(mux)?);
+            Some((pdo.number, pdo.trigger, place))
+        })
+    }
+
+    /// What is carried by the PDOs of a node that are in use, by their numbers.
+    pub(crate) fn carried(&self, node: NodeId, to_device: bool) -> Vec<(u8, Vec<Mux>)> {
+        let tpdos = self.tpdos.iter().filter(|pdo| !to_device && pdo.id.is_some());
+        let rpdos = self.rpdos.iter().filter(|pdo| to_device && pdo.id.is_some());
+        let all =
+            tpdos.map(|pdo| (pdo.node, pdo.number, &pdo.map)).chain(rpdos.map(|pdo| (pdo.node, pdo.number, &pdo.map)));
+        let objects = |map: &PdoMap| map.0.iter().map(|object| object.mux).collect();
+        all.filter(|(of, ..)| *of == node).map(|(_, number, map)| (number, objects(map))).collect()
+    }
+
+    fn place(position: usize, generation: u16, bits: &Range<u32>) -> Place {
+        Place { slot: position as u16, generation, shift: bits.start as u8, mask: mask_of(bits) }
+    }
+
+    /// The bits of a place in a TPDO, and when they came; `None` before the first, and after a new mapping.
+    #[inline]
+    pub(super) fn at(&self, place: Place) -> Option<Received> {
+        let pdo = self.tpdos.get(usize::from(place.slot)).filter(|pdo| pdo.generation == place.generation)?;
+        Some(Received { raw: place.of(pdo.data), at: pdo.at? })
+    }
+
+    /// Cycles that have begun since the TPDO of a place came; `None` before the first, and after a new mapping.
+    #[inline]
+    pub(super) fn cycles_since(&self, place: Place) -> Option<u64> {
+        let pdo = self.tpdos.get(usize::from(place.slot)).filter(|pdo| pdo.generation == place.generation)?;
+        pdo.at.map(|_| self.cycle.saturating_sub(pdo.cycle))
+    }
+
+    /// Puts bits into a place of an RPDO and queues it by its trigger. False after a new mapping.
+    #[inline]
+    pub(super) fn put(&mut self, place: Place, raw: u64) -> bool {
+        let Some(pdo) = self.rpdos.get_mut(usize::from(place.slot)) else { return false };
+        if pdo.generation != place.generation {
+            return false;
+        }
+        pdo.data = place.put(pdo.data, raw);
+        match (pdo.state, pdo.trigger) {
+            (SendState::Idle, RpdoTrigger::Sync) => {
+                pdo.state = SendState::Waiting;
+                self.waiting.push(place.slot);
+            }
+            (SendState::Idle, RpdoTrigger::Write) => {
+                pdo.state = SendState::Pending;
+                self.pending.push_back(place.slot);
+            }
+            (SendState::Waiting | SendState::Pending, _) => {}
+        }
+        true
     }
 
     /// Takes in a frame if it is a known TPDO; says whose.
@@ -200,51 +261,48 @@ impl Image {
         if frame.data().len() < pdo.bytes {
             pdo.too_short = pdo.too_short.saturating_add(1);
         } else {
-            pdo.data = *frame.padded();
+            pdo.data = u64::from_le_bytes(*frame.padded());
             pdo.at = Some(now);
+            pdo.cycle = self.cycle;
         }
         Some(pdo.node)
     }
 
-    /// A SYNC is going out: what waited for it follows.
-    pub(super) fn handle_sync(&mut self) {
-        for (position, pdo) in self.rpdos.iter_mut().enumerate() {
-            let due = pdo.trigger == RpdoTrigger::Sync && core::mem::take(&mut pdo.written);
-            if due && !core::mem::replace(&mut pdo.pending, true) {
-                self.pending.push_back(position as u16);
+    /// A cycle has begun.
+    pub(super) const fn begin_cycle(&mut self, number: u64) {
+        self.cycle = number;
+    }
+
+    /// Everything that was written and waited is to be sent.
+    pub(super) fn release_waiting(&mut self) {
+        for position in self.waiting.drain(..) {
+            if let Some(pdo) = self.rpdos.get_mut(usize::from(position)) {
+                pdo.state = SendState::Pending;
+                self.pending.push_back(position);
             }
         }
     }
 
     pub(super) fn poll_transmit(&mut self) -> Option<Frame> {
         let pdo = self.rpdos.get_mut(usize::from(self.pending.pop_front()?))?;
-        pdo.pending = false;
-        let data = pdo.data.to_le_bytes();
-        Some(Frame::new(pdo.id, &data[..pdo.map.bytes().min(MAX_DATA_LENGTH)]))
+        pdo.state = SendState::Idle;
+        Some(Frame::new(pdo.id?, &pdo.data.to_le_bytes()[..pdo.bytes]))
     }
 
     fn index(&mut self) {
         self.by_id.fill(NONE);
         for (position, pdo) in self.tpdos.iter().enumerate() {
-            if let Some(entry) = self.by_id.get_mut(usize::from(pdo.id)) {
+            let id = pdo.id.map(usize::from);
+            if let Some(entry) = id.and_then(|id| self.by_id.get_mut(id)) {
                 *entry = position as u16;
             }
         }
     }
 }
 
-const fn mask_of(bits: &Range<u32>) -> u64 {
-    let width = bits.end - bits.start;
-    if width >= u64::BITS { u64::MAX } else { (1 << width) - 1 }
-}
-
-/// The bits `bits` of a frame's data.
-pub(crate) const fn bits_of(data: u64, bits: Range<u32>) -> u64 {
-    data >> bits.start & mask_of(&bits)
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::pdo_map::MappedObject;
     use super::*;
 
     const STATUSWORD: MappedObject = MappedObject::from_record(0x6041_0010);
@@ -294,9 +352,9 @@ mod tests {
         image.set_rpdo(node(4), 1, 0x304, PdoMap(vec![POSITION]), RpdoTrigger::Sync);
         image.write(node(4), POSITION.mux, 7);
         assert_eq!(image.poll_transmit(), None);
-        image.handle_sync();
+        image.release_waiting();
         assert_eq!(image.poll_transmit().unwrap().to_string(), "304#07000000");
-        image.handle_sync();
+        image.release_waiting();
         assert_eq!(image.poll_transmit(), None);
     }
 

@@ -6,14 +6,20 @@
 //! Nothing here waits: the async face is [`crate::Network`]. Drives are unknown here: see [`crate::drive`].
 
 mod channel;
+mod cycle;
 mod event;
 mod facts;
+mod field;
 mod image;
+mod nmt;
 mod node_set;
 mod payload;
+mod pdo_map;
 mod presence;
+mod process;
+mod receive;
 mod request;
-mod sync;
+mod supervision;
 mod timers;
 
 use std::collections::VecDeque;
@@ -21,23 +27,25 @@ use std::time::Duration;
 
 use can::{Frame, Instant, Station};
 use canopen::cob::Service;
-use canopen::emcy::Emcy;
-use canopen::heartbeat::Heartbeat;
-use canopen::nmt::{NmtRequest, NmtTarget};
-use canopen::{Mux, NmtCommand, NmtState, NodeId};
+use canopen::{Mux, NodeId};
 
+pub use cycle::Cycle;
 pub use event::Event;
 pub use facts::{HeartbeatWatch, NodeFacts};
-pub(crate) use image::bits_of;
-pub use image::{Image, MappedObject, PdoMap, Received, RpdoTrigger};
+pub(crate) use field::bits_of;
+pub use field::{Field, NumberForm, Sample, SetPoint, Signal};
+pub use image::{Image, Received, RpdoTrigger};
 pub use node_set::NodeSet;
 pub use payload::Payload;
+pub use pdo_map::{MappedObject, PdoMap};
 pub use request::{Command, Failure, Finished, Outcome, Request, Ticket, Transfer};
+pub use supervision::{CycleLoss, CycleRules, WatchId};
 
 use channel::Channel;
+use cycle::SyncClock;
 use event::Events;
 use presence::Presence;
-use sync::SyncProducer;
+use supervision::Supervision;
 use timers::Timers;
 
 /// Frames that wait for [`Core::poll_transmit`] besides SDO, SYNC and PDO; a further one replaces the oldest.
@@ -65,13 +73,18 @@ pub struct Core {
     sending: NodeSet,
     /// Nodes whose facts changed since the last [`Core::take_changed`].
     changed: NodeSet,
+    /// A cycle has begun or SYNC was lost since the last [`Core::take_cycle_change`].
+    cycle_changed: bool,
     watched: NodeSet,
     /// No watched heartbeat is lost before this; it may be too early, never too late.
     heartbeat_check: Instant,
     /// The earliest of all deadlines; heartbeats may make it too early, never too late.
     due: Instant,
     image: Image,
-    sync: SyncProducer,
+    sync: SyncClock,
+    supervision: Supervision,
+    /// Drives to stop, for the length of a call.
+    lost: Vec<(CycleRules, CycleLoss)>,
     presence: Presence,
     timers: Timers,
     outbox: VecDeque<Frame>,
@@ -103,11 +116,14 @@ impl Core {
             busy: NodeSet::EMPTY,
             sending: NodeSet::EMPTY,
             changed: NodeSet::EMPTY,
+            cycle_changed: false,
             watched: NodeSet::EMPTY,
             heartbeat_check: Instant::FAR_FUTURE,
             due: Instant::FAR_FUTURE,
             image: Image::default(),
-            sync: SyncProducer::default(),
+            sync: SyncClock::default(),
+            supervision: Supervision::default(),
+            lost: Vec::new(),
             presence: Presence::default(),
             timers: Timers::default(),
             outbox: VecDeque::with_capacity(OUTBOX),
@@ -148,10 +164,8 @@ impl Core {
             Command::Timer(ticket, after) => self.timers.arm(self.now + after, ticket),
             Command::Cancel(ticket) => self.cancel(ticket),
             Command::Nmt(target, command) => self.send_nmt(target, command),
-            Command::Sync(period) => {
-                self.sync.set_period(period, self.now);
-                self.produce_sync();
-            }
+            Command::Sync(period) => self.produce_sync(period),
+            Command::FollowSync(period) => self.follow_sync(period),
             Command::WatchHeartbeat(node, time) => self.watch_heartbeat(node, time),
             Command::Heartbeat(node, period) => {
                 self.presence.set_heartbeat(node, period, self.now);
@@ -216,23 +230,6 @@ impl Core {
         }
     }
 
-    fn send_nmt(&mut self, target: NmtTarget, command: NmtCommand) {
-        let now = self.now;
-        for node in NodeId::all().filter(|node| target.includes(*node)) {
-            self.member_mut(node).facts.nmt_sent = Some((now, command));
-        }
-        self.push_frame(NmtRequest::new(command, target).emit());
-    }
-
-    fn watch_heartbeat(&mut self, node: NodeId, time: Option<Duration>) {
-        let facts = &mut self.member_mut(node).facts;
-        facts.heartbeat_watch = time.map(|time| HeartbeatWatch { time, deadline: None, lost: false });
-        match time {
-            Some(_) => self.watched.insert(node),
-            None => self.watched.remove(node),
-        }
-    }
-
     /// Collects what a node's channel has to say after it was called.
     fn settle(&mut self, node: NodeId) {
         let now = self.now;
@@ -250,88 +247,6 @@ impl Core {
             self.busy.remove(node)
         }
         self.sending.insert(node);
-    }
-
-    fn note_outcome(&mut self, node: NodeId, mux: Mux, outcome: &Outcome) {
-        let now = self.now;
-        let facts = &mut self.member_mut(node).facts;
-        match *outcome {
-            Ok(_) | Err(Failure::BadAnswer(_) | Failure::QueueFull) => facts.unanswered = 0,
-            Err(Failure::Aborted(code)) => {
-                facts.unanswered = 0;
-                self.events.push(Event::Aborted(node, mux, code), now);
-            }
-            Err(Failure::NoAnswer { waited, .. }) => {
-                facts.unanswered = facts.unanswered.saturating_add(1);
-                // Silence of a node that was never heard is no news: a scan meets it a hundred times.
-                if facts.seen_at.is_some() {
-                    self.events.push(Event::NoAnswer(node, mux, waited), now);
-                }
-            }
-        }
-    }
-
-    fn handle_sdo_reply(&mut self, node: NodeId, frame: &Frame) {
-        if self.busy.contains(node) {
-            let now = self.now;
-            self.member_mut(node).channel.handle_frame(frame, now);
-            self.settle(node);
-            self.find_due();
-        }
-    }
-
-    fn handle_heartbeat(&mut self, node: NodeId, frame: &Frame) {
-        let now = self.now;
-        let Some(state) = Heartbeat::parse(frame).and_then(Heartbeat::nmt_state) else { return };
-        let facts = &mut self.member_mut(node).facts;
-        let before = facts.nmt_state.replace(state);
-        let back = facts.note_heartbeat(state, now);
-        let deadline = facts.heartbeat_watch.and_then(|watch| watch.deadline);
-        if state == NmtState::Initialising {
-            self.events.push(Event::BootUp(node), now);
-        } else if before != Some(state) {
-            self.events.push(Event::NmtState(node, state), now);
-        }
-        if back {
-            self.events.push(Event::HeartbeatBack(node), now);
-        }
-        if let Some(deadline) = deadline {
-            self.heartbeat_check = self.heartbeat_check.min(deadline);
-            self.due = self.due.min(deadline);
-        }
-    }
-
-    fn handle_emcy(&mut self, node: NodeId, frame: &Frame) {
-        let Some(emcy) = Emcy::parse(frame) else { return };
-        let now = self.now;
-        self.member_mut(node).facts.push_emcy(emcy, now);
-        self.events.push(Event::Emcy(node, emcy), now);
-    }
-
-    fn check_heartbeats(&mut self) {
-        let now = self.now;
-        if self.heartbeat_check > now {
-            return;
-        }
-        self.heartbeat_check = Instant::FAR_FUTURE;
-        for node in self.watched.iter() {
-            let facts = &mut self.member_mut(node).facts;
-            let lost = facts.check_heartbeat(now);
-            let Some(watch) = facts.heartbeat_watch else { continue };
-            if lost {
-                self.changed.insert(node);
-                self.events.push(Event::HeartbeatLost(node, watch.time), now);
-            }
-            if let Some(deadline) = watch.deadline {
-                self.heartbeat_check = self.heartbeat_check.min(deadline);
-            }
-        }
-    }
-
-    fn produce_sync(&mut self) {
-        if self.sync.handle_timeout(self.now) {
-            self.image.handle_sync();
-        }
     }
 
     /// Sends heartbeats that are due, and asks for the statusword of drives that would lose patience. A node that is being
@@ -410,6 +325,7 @@ impl Station for Core {
                 self.handle_emcy(node, frame);
                 node
             }
+            Some(Service::Sync) => return self.handle_sync(),
             _ => return,
         };
         self.member_mut(node).facts.seen_at = Some(now);
@@ -433,7 +349,7 @@ impl Station for Core {
         while let Some(ticket) = self.timers.pop_due(now) {
             self.finished.push_back(Finished { ticket, outcome: Ok(Payload::EMPTY) });
         }
-        self.produce_sync();
+        self.count_cycle();
         self.show_presence();
         self.check_heartbeats();
         self.find_due();

@@ -4,7 +4,7 @@ use can::{Frame, Instant};
 use canopen::heartbeat::{Heartbeat, Producer};
 use canopen::{NmtState, NodeId};
 
-use super::NodeSet;
+use super::node_set::NodeSet;
 
 /// Longest heartbeat period, as 1017h has it: UNSIGNED16 of ms (CiA 301, 7.5.2.17).
 const LONGEST_PERIOD_MS: u128 = u16::MAX as u128;

@@ -5,7 +5,7 @@ use canopen::nmt::NmtTarget;
 use canopen::sdo::client;
 use canopen::{AbortCode, Mux, NmtCommand, NodeId};
 
-use super::Payload;
+use super::payload::Payload;
 
 /// Names a request or a timer until it has finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -46,6 +46,8 @@ pub enum Command {
     Nmt(NmtTarget, NmtCommand),
     /// Produce SYNC with this period, or stop.
     Sync(Option<Duration>),
+    /// Count the SYNCs that another node produces with this period, or stop.
+    FollowSync(Option<Duration>),
     /// Expect a heartbeat of the node at least this often, or stop watching.
     WatchHeartbeat(NodeId, Option<Duration>),
     /// Produce this master's heartbeat under a node-ID with this period in whole ms, or stop. Source: CiA 301, 7.2.8.3.2.1.

@@ -2,7 +2,7 @@ use std::collections::BTreeSet;
 
 use can::Instant;
 
-use super::Ticket;
+use super::request::Ticket;
 
 /// Deadlines that futures wait for, ordered by time. Arming and the next deadline cost O(log n).
 #[derive(Clone, Debug, Default)]

@@ -5,6 +5,7 @@
 //! being written or read by SDO. The decoder never sends and keeps no time.
 
 mod common;
+mod models;
 mod pdo;
 mod sdo;
 mod value;
@@ -23,6 +24,7 @@ use devices::{Description, MODELS};
 
 use crate::core::PdoMap;
 use crate::identify::Model;
+use models::Models;
 use pdo::PdoBook;
 use sdo::Conversations;
 
@@ -68,16 +70,6 @@ pub struct Decoder {
     models: Models,
     conversations: Conversations,
     pdos: PdoBook,
-}
-
-/// The profile of each node whose model is known, or one that all models it may be read alike.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Models(std::collections::BTreeMap<u8, Model>);
-
-impl Models {
-    fn get(&self, node: NodeId) -> Option<Model> {
-        self.0.get(&node.raw()).copied()
-    }
 }
 
 impl Decoder {

@@ -6,7 +6,7 @@ use canopen::cob::{self, PdoNumber};
 use canopen::od::{Default as Factory, Table};
 use canopen::{CobId, Mux, NodeId};
 
-use super::Models;
+use super::models::Models;
 use super::value::Value;
 use crate::core::{MappedObject, PdoMap, bits_of};
 use crate::identify::Model;

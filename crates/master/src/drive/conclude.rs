@@ -1,12 +1,40 @@
 //! From facts to a conclusion: the one place that decides what an explanation says.
 
-use cia402::PowerState;
+use std::time::Duration;
+
+use cia402::{ModeOfOperation, PowerCommand, PowerState};
 use devices::PowerStyle;
 use devices::faults::FaultRow;
 
-use super::explain::{Fact, Trigger};
-use crate::error::Error;
+use crate::error::{Error, Fact};
 use crate::units::Shown;
+
+/// What made the explanation necessary.
+#[derive(Clone, Debug)]
+pub(super) enum Trigger {
+    /// It is at fault.
+    Fault,
+    /// The state machine does not move by itself where it should.
+    Waiting,
+    /// A command had no effect.
+    Ignored(PowerCommand),
+    /// 6061h does not follow 6060h.
+    Mode(ModeOfOperation),
+    /// The shaft does not come to rest; speed in r/min.
+    StillTurning(f64),
+    /// Operation ended in the middle of a motion.
+    LostOperation,
+    /// The set-point was not acknowledged (bit 12).
+    NoAcknowledge,
+    /// The target was not reached in the time it should take: where it is, where it should be, in `unit`.
+    Late { at: f64, target: f64, unit: &'static str, waited: Duration },
+    /// Homing has not ended in the time given to it; position in counts.
+    NotHome { at: f64, waited: Duration },
+    /// Homing ended without a home position.
+    HomingFailed(i8),
+    /// It stopped answering.
+    Silent(Error),
+}
 
 /// What follows from the facts, and what to do.
 pub(super) fn conclude(trigger: &Trigger, facts: &[Fact], style: PowerStyle) -> (String, String) {

@@ -5,8 +5,8 @@ use std::time::Duration;
 use cia402::{PowerState, Statusword};
 use devices::{HomingRules, Quantity};
 
-use super::explain::Trigger;
-use super::{Drive, POLL, POSITION_ACTUAL};
+use super::conclude::Trigger;
+use super::handle::{Drive, POLL, POSITION_ACTUAL};
 use crate::error::Error;
 
 /// What counts as reached.

@@ -4,7 +4,6 @@
 //! at all. A guard lasts until it is released; meanwhile the core keeps the drive content, so long as somebody runs it.
 //! That the program lives and yet does nothing sensible is not noticed here.
 
-use core::fmt;
 use std::time::Duration;
 
 use canopen::heartbeat::Consumer;
@@ -12,10 +11,11 @@ use canopen::od::Default;
 use canopen::{Mux, NodeId};
 use devices::HostWatch;
 
-use super::Drive;
+use super::handle::Drive;
 use crate::core::NodeSet;
 use crate::error::Error;
-use crate::network::{Network, join_all};
+use crate::host_loss::{Guard, HostLoss};
+use crate::network::{Network, Node, join_all};
 
 /// How often a drive that watches for silence or for a heartbeat is content within its time: two may get lost.
 const SIGNS_IN_TIME: u32 = 4;
@@ -26,99 +26,6 @@ const SHORTEST_PERIOD: Duration = Duration::from_millis(1);
 /// How long a node that this program does not move is waited for, when it is asked whether it watches too.
 const BYSTANDER_TIMEOUT: Duration = Duration::from_millis(100);
 
-/// What a drive does when the program that moves it dies in the middle of a motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum HostLoss {
-    /// It stops when no frame for it has come for this long.
-    StopsInSilence {
-        /// The object that sets it.
-        object: Mux,
-        /// The time.
-        time: Duration,
-    },
-    /// It stops when this program's heartbeat has stayed away for this long.
-    StopsWithoutHeartbeat {
-        /// The object that sets it.
-        object: Mux,
-        /// The node-ID whose heartbeat it is.
-        host: NodeId,
-        /// The time.
-        time: Duration,
-    },
-    /// It goes on: its watch for a heartbeat is armed by the first one, and this program sends none.
-    NotArmed {
-        /// The object that sets the watch.
-        object: Mux,
-    },
-    /// It goes on: its watch is set to 0.
-    SwitchedOff {
-        /// The object that sets the watch.
-        object: Mux,
-    },
-    /// It goes on: it watches for the heartbeat of a node-ID that another device on the bus has.
-    WatchesAnother {
-        /// The object that sets the watch.
-        object: Mux,
-        /// That node-ID.
-        host: NodeId,
-    },
-    /// It goes on: its model has no watch over its host.
-    GoesOn,
-}
-
-impl HostLoss {
-    /// After how long the drive stops by itself, if it does.
-    pub const fn stops_after(self) -> Option<Duration> {
-        match self {
-            Self::StopsInSilence { time, .. } | Self::StopsWithoutHeartbeat { time, .. } => Some(time),
-            _ => None,
-        }
-    }
-
-    /// The object that sets the drive's watch over its host, if it has one.
-    pub const fn object(self) -> Option<Mux> {
-        match self {
-            Self::StopsInSilence { object, .. }
-            | Self::StopsWithoutHeartbeat { object, .. }
-            | Self::NotArmed { object }
-            | Self::SwitchedOff { object }
-            | Self::WatchesAnother { object, .. } => Some(object),
-            Self::GoesOn => None,
-        }
-    }
-}
-
-impl fmt::Display for HostLoss {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::StopsInSilence { object, time } => {
-                write!(f, "it stops by itself {} ms after the last frame for it ({object})", time.as_millis())
-            }
-            Self::StopsWithoutHeartbeat { object, host, time } => {
-                let ms = time.as_millis();
-                write!(
-                    f,
-                    "it stops by itself {ms} ms after the last heartbeat of node {host}, which is this program ({object})"
-                )
-            }
-            Self::NotArmed { object } => {
-                write!(
-                    f,
-                    "nothing stops it: its watch over a host ({object}) is armed by heartbeats, and none are sent"
-                )
-            }
-            Self::SwitchedOff { object } => write!(f, "nothing stops it: its watch over a host ({object}) is set to 0"),
-            Self::WatchesAnother { object, host } => write!(
-                f,
-                "nothing of this program stops it: {object} has it watch node {host}, which is another device on this bus"
-            ),
-            Self::GoesOn => {
-                f.write_str("nothing stops it: this model has no watch over its host and goes on as it was told")
-            }
-        }
-    }
-}
-
 /// What is to be done with a watch that is set to 0 on the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SwitchedOff {
@@ -126,18 +33,6 @@ pub enum SwitchedOff {
     Leave,
     /// It is set to its factory value until the guard is released. A drive that stores each write stores these two.
     SwitchOn,
-}
-
-/// A drive that watches this program.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Guard {
-    loss: HostLoss,
-    /// How often it needs a sign of life.
-    period: Duration,
-    /// What the watch's object had before.
-    before: i64,
-    /// What it has now.
-    armed: i64,
 }
 
 impl Drive {
@@ -345,7 +240,7 @@ fn heartbeat_period<'a>(guards: impl Iterator<Item = &'a Guard>, host: NodeId) -
 
 /// Has a consumer of the heartbeat of `host` wait for a first one again, with `value` in its entry, or what was there. A
 /// consumer entry of 0 watches nothing (CiA 301, 7.5.2.16), and each write begins anew.
-async fn disarm(node: &crate::Node, object: Mux, host: NodeId, value: Option<u32>) -> Result<(), Error> {
+async fn disarm(node: &Node, object: Mux, host: NodeId, value: Option<u32>) -> Result<(), Error> {
     let present: u32 = node.read(object).await?;
     if Consumer::from_raw(present).is_none_or(|consumer| consumer.node() != host) {
         return Ok(());

@@ -9,8 +9,8 @@ use cia402::{Controlword, ModeOfOperation};
 use devices::{HomingRules, HomingStart};
 
 use super::goal::Goal;
+use super::handle::{Drive, MODE};
 use super::motion::{MotionReport, Note};
-use super::{Drive, MODE};
 use crate::error::Error;
 use crate::units::Rpm;
 

@@ -9,9 +9,11 @@
 mod conclude;
 mod explain;
 mod goal;
-pub(crate) mod guard;
+mod guard;
+mod handle;
 mod homing;
 mod limits;
+mod mode;
 mod motion;
 mod position;
 mod power;
@@ -20,224 +22,14 @@ mod scale;
 mod state;
 mod store;
 
-use std::time::Duration;
-
-use canopen::Mux;
-use canopen::od::Entry;
-use cia402::{Controlword, ModeOfOperation, PowerState, Statusword};
-use devices::{Description, PowerStyle};
-
-use crate::error::{Access, Error};
-use crate::identify::{Guess, Knowledge};
-use crate::network::Node;
-
-pub use explain::{Explanation, Fact, faults_in};
-pub use guard::{HostLoss, SwitchedOff};
+pub use crate::error::{Explanation, Fact};
+pub use crate::host_loss::HostLoss;
+pub use crate::limits::{Limits, Setting};
+pub use explain::faults_in;
+pub use guard::SwitchedOff;
+pub use handle::Drive;
 pub use homing::HomingOptions;
-pub use limits::{Limits, Setting};
 pub use motion::{MotionOptions, MotionReport, Note};
 pub use safety::StopGuard;
 pub use scale::Commanded;
 pub use state::DriveState;
-
-const CONTROLWORD: Mux = Mux::new(0x6040, 0);
-const STATUSWORD: Mux = Mux::new(0x6041, 0);
-const MODE: Mux = Mux::new(0x6060, 0);
-const MODE_DISPLAY: Mux = Mux::new(0x6061, 0);
-const POSITION_ACTUAL: Mux = Mux::new(0x6064, 0);
-const TARGET_POSITION: Mux = Mux::new(0x607A, 0);
-const ERROR_CODE: Mux = Mux::new(0x603F, 0);
-
-/// How often a drive is looked at while something is waited for: quick to a person, about 10 % of a 500 kbit/s bus
-/// for two objects.
-const POLL: Duration = Duration::from_millis(10);
-
-/// How long one step of the power state machine, or a change of mode, may take.
-const STEP_TIMEOUT: Duration = Duration::from_secs(1);
-
-/// A drive on a network.
-#[derive(Clone)]
-pub struct Drive {
-    node: Node,
-    profile: Option<&'static Description>,
-    /// Set where the profile is no more than that.
-    guess: Option<Guess>,
-}
-
-impl core::fmt::Debug for Drive {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let model = self.profile.map(|profile| profile.model);
-        let guessed = self.guess.is_some();
-        f.debug_struct("Drive")
-            .field("node", &self.node.id())
-            .field("model", &model)
-            .field("guessed", &guessed)
-            .finish()
-    }
-}
-
-impl Drive {
-    /// A drive of a known model.
-    pub const fn new(node: Node, profile: &'static Description) -> Self {
-        Self { node, profile: Some(profile), guess: None }
-    }
-
-    /// A drive of a model that is known this well. One that is guessed can be moved, and its parameters not be stored.
-    pub const fn known_as(node: Node, knowledge: Knowledge) -> Self {
-        Self { node, profile: knowledge.profile(), guess: knowledge.guess() }
-    }
-
-    /// A CiA 402 drive of unknown model: it can be enabled, disabled, quick-stopped and reset, not moved or stored.
-    pub const fn of_unknown_model(node: Node) -> Self {
-        Self { node, profile: None, guess: None }
-    }
-
-    /// Its node.
-    pub const fn node(&self) -> &Node {
-        &self.node
-    }
-
-    /// The model's profile, or of a guess the one to read and move with.
-    pub const fn profile(&self) -> Option<&'static Description> {
-        self.profile
-    }
-
-    /// Why its model is no more than a guess, if it is.
-    pub const fn guess(&self) -> Option<Guess> {
-        self.guess
-    }
-
-    /// Checks that the node says it is this model, and has the object that tells it from others that say so too.
-    ///
-    /// # Errors
-    /// [`Error::WrongModel`] when its device type or vendor differ, [`Error::OtherModel`] when it lacks that object;
-    /// those of the SDO reads.
-    pub async fn check_identity(&self) -> Result<(), Error> {
-        let profile = self.known("compare its identity")?;
-        let (node, model) = (self.node.id(), profile.title);
-        let found = crate::identify::identity(&self.node).await?;
-        if !found.matches(&profile.identity) {
-            return Err(Error::WrongModel { node, model, found });
-        }
-        match profile.hallmark {
-            Some(hallmark) if !crate::identify::has(&self.node, hallmark).await? => {
-                Err(Error::OtherModel { node, model, hallmark })
-            }
-            _ => Ok(()),
-        }
-    }
-
-    /// Checks that this value of this object means the same on every model that the drive may be.
-    ///
-    /// # Errors
-    /// [`Error::GuessedModel`] where it does not and the model is no more than a guess.
-    pub fn check_write(&self, mux: Mux, value: i64) -> Result<(), Error> {
-        match self.guess.filter(|guess| !guess.may_write(mux, value)) {
-            Some(guess) => Err(Error::GuessedModel { node: self.node.id(), intent: format!("write {mux}"), guess }),
-            None => Ok(()),
-        }
-    }
-
-    /// The statusword.
-    ///
-    /// # Errors
-    /// Those of the SDO read.
-    pub async fn statusword(&self) -> Result<Statusword, Error> {
-        self.node.read::<u16>(STATUSWORD).await.map(Statusword)
-    }
-
-    /// The power state that a statusword of this model shows.
-    fn power_state(&self, statusword: Statusword) -> Option<PowerState> {
-        self.power_style().state(statusword)
-    }
-
-    fn power_style(&self) -> PowerStyle {
-        self.profile.map_or(PowerStyle::Cia402, |profile| profile.power)
-    }
-
-    /// The mode that the drive is in.
-    async fn mode(&self) -> Result<ModeOfOperation, Error> {
-        let display = self.profile.map_or(MODE_DISPLAY, |profile| profile.mode_display);
-        self.node.read::<i8>(display).await.map(ModeOfOperation)
-    }
-
-    async fn write_controlword(&self, controlword: Controlword) -> Result<(), Error> {
-        self.node.write(CONTROLWORD, controlword.0).await
-    }
-
-    /// Sets 6060h and waits until the drive shows it. A shaft that turns in another mode is stopped first: drives change
-    /// their mode at standstill, or jump.
-    async fn set_mode(&self, mode: ModeOfOperation) -> Result<Option<Note>, Error> {
-        let profile = self.known("set its mode")?;
-        if !profile.modes.contains(&mode) {
-            return Err(self.no_such_mode(profile, mode));
-        }
-        let before = self.mode().await?;
-        if before == mode {
-            return Ok(None);
-        }
-        let stopped = self.stop_if_turning(profile).await?;
-        self.node.write(MODE, mode.0).await?;
-        let mut waited = Duration::ZERO;
-        while self.mode().await? != mode {
-            if waited >= STEP_TIMEOUT {
-                return Err(self.not_reached("change its mode", explain::Trigger::Mode(mode)).await);
-            }
-            self.node.network().sleep(POLL).await;
-            waited += POLL;
-        }
-        Ok(stopped.then_some(Note::StoppedFirst { before }))
-    }
-
-    const fn no_such_mode(&self, profile: &Description, mode: ModeOfOperation) -> Error {
-        Error::NoSuchMode { node: self.node.id(), model: profile.title, mode, modes: profile.modes }
-    }
-
-    async fn stop_if_turning(&self, profile: &Description) -> Result<bool, Error> {
-        let turning = self.read_quantity(profile.units.actual_velocity).await?.abs() >= power::STANDSTILL_RPM;
-        let follows = self.power_state(self.statusword().await?) == Some(PowerState::OperationEnabled);
-        if turning && follows {
-            self.stop().await?;
-        }
-        Ok(turning && follows)
-    }
-
-    /// The model's profile, or an error that says what it was needed for.
-    fn known(&self, intent: &'static str) -> Result<&'static Description, Error> {
-        self.profile.ok_or(Error::UnknownModel { node: self.node.id(), intent })
-    }
-
-    /// The model's profile, if it is more than a guess.
-    fn named(&self, intent: &'static str) -> Result<&'static Description, Error> {
-        match self.guess {
-            Some(guess) => Err(Error::GuessedModel { node: self.node.id(), intent: intent.to_owned(), guess }),
-            None => self.known(intent),
-        }
-    }
-
-    /// The model's row of an object.
-    fn row(&self, mux: Mux, intent: &'static str) -> Result<&'static Entry, Error> {
-        let profile = self.known(intent)?;
-        let slot = profile.table.find(mux);
-        let slot = slot.map_err(|code| Error::Aborted { node: self.node.id(), mux, access: Access::Read, code })?;
-        Ok(profile.table.row(slot))
-    }
-
-    /// Reads an object as the model's table types it.
-    async fn read_number(&self, mux: Mux) -> Result<i64, Error> {
-        let row = self.row(mux, "read an object by its model's table")?;
-        let payload = self.node.upload(mux).await?;
-        let (expected, received) = (row.data_type.size(), payload.as_bytes().len());
-        if expected != received {
-            return Err(Error::WrongLength { node: self.node.id(), mux, expected, received });
-        }
-        Ok(row.data_type.value(payload.raw()))
-    }
-
-    /// Writes an object as the model's table types it, after checking its limits.
-    async fn write_number(&self, mux: Mux, value: i64) -> Result<(), Error> {
-        let row = self.check_number(mux, value).await?;
-        let bytes = row.data_type.raw(value).to_le_bytes();
-        self.node.download(mux, &bytes[..row.data_type.size()]).await
-    }
-}

@@ -6,9 +6,10 @@ use std::time::Duration;
 use cia402::{Controlword, ModeOfOperation, PowerState};
 
 use super::goal::Goal;
-use super::guard::HostLoss;
-use super::{CONTROLWORD, Commanded, Drive};
+use super::handle::{CONTROLWORD, Drive};
+use super::scale::{Commanded, REACHED_LEAST_RPM};
 use crate::error::Error;
+use crate::host_loss::HostLoss;
 use crate::units::{Amperes, Ramp, Rpm};
 
 /// How a motion is to be made. What is `None` is left as the drive has it.
@@ -69,10 +70,8 @@ impl fmt::Display for Note {
     }
 }
 
-/// Part of the target within which a speed or current counts as reached, and the least such band: the resolution
-/// that drives of this kind show when they run smoothly.
+/// Part of the target within which a speed or current counts as reached.
 const REACHED_SHARE: f64 = 0.05;
-pub(super) const REACHED_LEAST_RPM: f64 = 2.0;
 
 /// What a computed duration is stretched by, and what is added to it, before a motion counts as late: for jerk
 /// limits, load, and settling.

@@ -6,10 +6,11 @@ use std::time::Duration;
 use cia402::{Controlword, ModeOfOperation, Statusword};
 use devices::Quirk;
 
-use super::explain::Trigger;
+use super::conclude::Trigger;
 use super::goal::Goal;
+use super::handle::{CONTROLWORD, Drive, POLL, POSITION_ACTUAL, STEP_TIMEOUT, TARGET_POSITION};
 use super::motion::{LATE_FACTOR, LATE_MARGIN_S, MotionOptions, MotionReport};
-use super::{CONTROLWORD, Commanded, Drive, POLL, POSITION_ACTUAL, STEP_TIMEOUT, TARGET_POSITION};
+use super::scale::Commanded;
 use crate::error::Error;
 use crate::units::{Angle, Rpm};
 

@@ -3,8 +3,8 @@ use std::time::Duration;
 use cia402::{Controlword, ModeOfOperation, PowerCommand, PowerState, Statusword, next_command};
 use devices::{HomingStart, PowerStyle};
 
-use super::explain::Trigger;
-use super::{Drive, MODE, POLL, STEP_TIMEOUT};
+use super::conclude::Trigger;
+use super::handle::{CONTROLWORD, Drive, MODE, POLL, STEP_TIMEOUT};
 use crate::error::Error;
 
 /// Speed below which a shaft counts as standing still: the rounding of the coarsest velocity object.
@@ -54,7 +54,7 @@ impl Drive {
     async fn enable_mirrored(&self, intent: &'static str, statusword: Statusword) -> Result<(), Error> {
         let command = PowerCommand::EnableOperation;
         let follows = self.power_state(statusword) == Some(PowerState::OperationEnabled);
-        let present = self.node.read::<u16>(super::CONTROLWORD).await.map(Controlword)?;
+        let present = self.node.read::<u16>(CONTROLWORD).await.map(Controlword)?;
         if follows && present.command() == command {
             return Ok(());
         }
@@ -133,7 +133,7 @@ impl Drive {
             // A fault has taken the power off: what was commanded before must not come back by itself.
             Some(PowerState::Fault) | None => Controlword(0),
             // An alarm that has stopped nothing: who follows or holds goes on so.
-            Some(_) => Controlword(self.node.read::<u16>(super::CONTROLWORD).await? & !Controlword::FAULT_RESET),
+            Some(_) => Controlword(self.node.read::<u16>(CONTROLWORD).await? & !Controlword::FAULT_RESET),
         };
         self.write_controlword(rest).await?;
         self.write_controlword(Controlword(rest.0 | Controlword::FAULT_RESET)).await?;

@@ -1,7 +1,7 @@
 use canopen::NodeId;
 use cia402::{Controlword, PowerCommand};
 
-use super::CONTROLWORD;
+use super::handle::CONTROLWORD;
 use crate::core::{Command, NodeSet, Payload, Request, Transfer};
 use crate::error::Error;
 use crate::network::{DEFAULT_TIMEOUT, Network, join_all};

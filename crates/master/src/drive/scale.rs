@@ -5,10 +5,13 @@ use canopen::Mux;
 use canopen::od::Entry;
 use devices::{CountsPerTurn, Quantity, Ramps};
 
-use super::motion::REACHED_LEAST_RPM;
-use super::{Drive, TARGET_POSITION};
+use super::handle::{Drive, TARGET_POSITION};
 use crate::error::Error;
 use crate::units::{Angle, Ramp, Shown};
+
+/// The least band within which a speed counts as reached: the resolution that drives of this kind show when they run
+/// smoothly.
+pub(super) const REACHED_LEAST_RPM: f64 = 2.0;
 
 /// A physical value as it was asked for, and as the drive was told it: an object holds whole counts.
 ///

@@ -6,7 +6,7 @@ use devices::faults::FaultRow;
 use devices::{PowerStyle, Quantity};
 
 use super::explain::faults_in;
-use super::{Drive, ERROR_CODE, POSITION_ACTUAL};
+use super::handle::{Drive, ERROR_CODE, POSITION_ACTUAL};
 use crate::error::Error;
 use crate::units::{Amperes, Celsius, Counts, Degrees, Rpm, Volts};
 

@@ -2,7 +2,7 @@ use std::time::Duration;
 
 use devices::Write;
 
-use super::Drive;
+use super::handle::Drive;
 use crate::error::Error;
 
 /// How long a drive may take to write its whole parameter memory before it answers: EEPROMs take 5 to 10 ms a page.

@@ -7,7 +7,7 @@ use std::time::Duration;
 use can::Instant;
 use canopen::{Mux, NodeId};
 
-use super::{Network, Slot, Watcher};
+use super::handle::{Network, Shared, Slot, Watcher};
 use crate::core::{Command, Core, NodeFacts, Outcome, Received, Request, Ticket};
 
 /// A request or timer that is started by the first poll. Dropping it cancels it: an SDO transfer that is on the
@@ -74,7 +74,7 @@ impl Drop for Pending {
     }
 }
 
-impl super::Shared {
+impl Shared {
     fn start(&mut self, context: &mut Context<'_>) -> Ticket {
         let ticket = self.core.ticket();
         self.slots.insert(ticket, Slot::Waiting(context.waker().clone()));
@@ -92,15 +92,16 @@ impl super::Shared {
     }
 }
 
+impl Network {
+    /// Waits this long, in the time of the bus.
+    pub fn sleep(&self, duration: Duration) -> Sleep {
+        Sleep(Pending::timer(self.clone(), duration))
+    }
+}
+
 /// Ends when its time has passed on the bus. See [`Network::sleep`].
 #[must_use = "futures do nothing unless awaited"]
 pub struct Sleep(Pending);
-
-impl Sleep {
-    pub(super) fn new(network: Network, duration: Duration) -> Self {
-        Self(Pending::timer(network, duration))
-    }
-}
 
 impl Future for Sleep {
     type Output = ();

@@ -4,8 +4,8 @@ use canopen::nmt::NmtTarget;
 use canopen::od::Scalar;
 use canopen::{Mux, NmtCommand, NodeId};
 
-use super::future::{Elapsed, Pending};
-use super::{Network, NodeView, Wait};
+use super::future::{Elapsed, NodeView, Pending, Wait};
+use super::handle::Network;
 use crate::core::{Command, Failure, NodeFacts, Payload, Request, Transfer};
 use crate::error::{Access, Error, Hints};
 
@@ -21,11 +21,14 @@ pub struct Node {
     timeout: Duration,
 }
 
-impl Node {
-    pub(super) const fn new(network: Network, id: NodeId) -> Self {
-        Self { network, id, timeout: DEFAULT_TIMEOUT }
+impl Network {
+    /// A handle on one node.
+    pub fn node(&self, id: NodeId) -> Node {
+        Node { network: self.clone(), id, timeout: DEFAULT_TIMEOUT }
     }
+}
 
+impl Node {
     /// The same node with another longest wait for each SDO answer.
     #[must_use]
     pub const fn with_timeout(mut self, timeout: Duration) -> Self {

@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use canopen::{AbortCode, CobId, Mux};
 
-use super::{PdoConfig, PdoError, PdoName, TimerUnits, TransmissionType};
+use super::config::{PdoConfig, TimerUnits, TransmissionType};
+use super::error::{PdoError, PdoName};
 use crate::core::{MappedObject, PdoMap};
 use crate::decode::Direction;
 use crate::error::Error;

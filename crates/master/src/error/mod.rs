@@ -1,15 +1,22 @@
 //! Errors that say which node, which object, what was expected, what came, and what to do next.
 
+mod hints;
+
 use core::fmt;
 use std::time::Duration;
 
+use canopen::emcy::Emcy;
 use canopen::sdo::client;
 use canopen::{AbortCode, Mux, NmtState, NodeId};
-use cia402::ModeOfOperation;
+use cia402::{ModeOfOperation, PowerState, Statusword};
+use devices::faults::FaultRow;
 
-use crate::drive::{Explanation, Limits, Setting};
-use crate::identify::{Guess, Identity};
-use crate::units::Shown;
+use crate::identify::knowledge::{Guess, Identity};
+use crate::limits::{Limits, Setting};
+use crate::units::{Shown, Volts};
+use hints::advice;
+
+pub use hints::{Access, Hints};
 
 /// Why the master could not do what it was asked.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -263,96 +270,78 @@ impl Error {
     }
 }
 
-/// Direction of an SDO request.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Access {
-    /// Upload.
-    Read,
-    /// Download.
-    Write,
-}
-
-impl fmt::Display for Access {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Read => "read",
-            Self::Write => "write",
-        })
-    }
-}
-
-/// What the master knows when a node is silent. Prints as the likeliest cause and what to do.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Hints {
-    /// The request never left the master.
-    pub unsent: bool,
-    /// The state that the node must be in by its last heartbeat or the NMT command sent since.
-    pub nmt_state: Option<NmtState>,
-    /// Time since any frame of the node.
-    pub silent_for: Option<Duration>,
-    /// Other nodes have been heard.
-    pub others: bool,
-}
-
-impl fmt::Display for Hints {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (self.unsent, self.nmt_state, self.silent_for) {
-            (true, ..) => f.write_str(
-                "The request never left this computer: check that the CAN interface is up and that another node \
-                 acknowledges frames (cable, bit rate, termination)",
-            ),
-            (_, Some(NmtState::Stopped), _) => f.write_str(
-                "By its last heartbeat, or the last NMT command to it, it is stopped, where SDO does not exist: send NMT \
-                 pre-operational or start. Some drives' heartbeats say so in an alarm: then check supply and cable",
-            ),
-            (_, _, Some(age)) => write!(
-                f,
-                "It was last heard {} ms ago: check whether it has lost its supply or its cable, or is too busy to \
-                 answer in time",
-                age.as_millis()
-            ),
-            (_, _, None) if self.others => f.write_str(
-                "Other nodes are on the bus but this one has never been heard: check its node-ID and its supply \
-                 (a scan shows who is there); if it is in the NMT state stopped, it answers after NMT start",
-            ),
-            (_, _, None) => {
-                f.write_str(
-                "Nothing at all has been heard on the bus: check supply, cable, termination and bit rate; if the node is \
-                 in the NMT state stopped, it answers after NMT start",
-            )
-            }
-        }
-    }
-}
-
 fn list(items: &[impl fmt::Display]) -> String {
     items.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
-/// What to do about an abort code.
-fn advice(code: AbortCode, access: Access) -> &'static str {
-    match code {
-        AbortCode::NO_SUCH_OBJECT | AbortCode::NO_SUCH_SUB_INDEX => {
-            "This model has no such object: check index and \
-             sub-index against its object dictionary"
+/// Why a drive is not where it was meant to be: what was seen, what follows from it, what to do.
+#[derive(Clone, Debug)]
+pub struct Explanation {
+    /// The drive.
+    pub node: NodeId,
+    /// What was wanted, as in "could not enable it".
+    pub intent: &'static str,
+    /// What was seen, in the order it was asked for.
+    pub facts: Vec<Fact>,
+    /// What follows.
+    pub conclusion: String,
+    /// What to do.
+    pub advice: String,
+}
+
+/// One thing seen.
+#[derive(Clone, Debug)]
+pub enum Fact {
+    /// 6041h, and the state that it shows.
+    Statusword(Statusword, Option<PowerState>),
+    /// The model's fault code, with what its bits mean.
+    FaultCode(u16, Vec<&'static FaultRow>),
+    /// 6060h and 6061h.
+    Mode(ModeOfOperation, ModeOfOperation),
+    /// Supply voltage at the drive.
+    Supply(Volts),
+    /// State by its last heartbeat or the NMT command sent since.
+    Nmt(NmtState),
+    /// Age of its last heartbeat; `None` if none ever came.
+    Heartbeat(Option<Duration>),
+    /// Its last emergency message, how long ago it came, and what it means on this model.
+    Emcy(Duration, Emcy, Option<&'static FaultRow>),
+    /// A request that failed while looking.
+    Failed(Box<Error>),
+}
+
+impl fmt::Display for Explanation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "node {}: could not {}. {}.", self.node, self.intent, self.conclusion)?;
+        f.write_str("  Seen: ")?;
+        for (position, fact) in self.facts.iter().enumerate() {
+            write!(f, "{}{fact}", if position == 0 { "" } else { "; " })?;
         }
-        AbortCode::READ_ONLY => "The object can only be read",
-        AbortCode::WRITE_ONLY => "The object can only be written",
-        AbortCode::INVALID_VALUE | AbortCode::VALUE_TOO_HIGH | AbortCode::VALUE_TOO_LOW => {
-            "Give a value within the limits of its object dictionary"
+        write!(f, ".\n  Do: {}.", self.advice.trim_end_matches('.'))
+    }
+}
+
+impl fmt::Display for Fact {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Statusword(word, Some(state)) => write!(f, "statusword {:04X}h ({})", word.0, state.name()),
+            Self::Statusword(word, None) => write!(f, "statusword {word}"),
+            Self::FaultCode(0, _) => f.write_str("no fault code"),
+            Self::FaultCode(code, rows) => {
+                write!(f, "fault code {code:04X}h")?;
+                rows.iter().try_for_each(|row| write!(f, ", {}", row.name))
+            }
+            Self::Mode(wanted, shown) if wanted == shown => write!(f, "mode {shown}"),
+            Self::Mode(wanted, shown) => write!(f, "mode {shown}, asked for {wanted}"),
+            Self::Supply(volts) => write!(f, "supply {volts}"),
+            Self::Nmt(state) => write!(f, "NMT state {state}"),
+            Self::Heartbeat(None) => f.write_str("no heartbeat or boot-up seen"),
+            Self::Heartbeat(Some(age)) => write!(f, "last heartbeat or boot-up {:.1} s ago", age.as_secs_f64()),
+            Self::Emcy(age, emcy, Some(row)) => {
+                write!(f, "EMCY {:04X}h ({}) {:.1} s ago", emcy.code.0, row.name, age.as_secs_f64())
+            }
+            Self::Emcy(age, emcy, None) => write!(f, "EMCY {} {:.1} s ago", emcy.code, age.as_secs_f64()),
+            Self::Failed(error) => write!(f, "{error}"),
         }
-        AbortCode::LENGTH_MISMATCH | AbortCode::TOO_LONG | AbortCode::TOO_SHORT => {
-            "The value was sent with another length than the object has: check its data type"
-        }
-        AbortCode::NOT_MAPPABLE | AbortCode::PDO_TOO_LONG => "Map other objects, or fewer of them, into this PDO",
-        AbortCode::DEVICE_STATE | AbortCode::LOCAL_CONTROL | AbortCode::CANNOT_TRANSFER => {
-            "The drive does not accept this in its present state: look at its statusword, and try it disabled"
-        }
-        AbortCode::UNSUPPORTED_ACCESS => match access {
-            Access::Read => "The object cannot be read now",
-            Access::Write => "The object cannot be changed now: a PDO mapping may have to be disabled first",
-        },
-        AbortCode::HARDWARE_ERROR => "The drive's parameter memory may be faulty",
-        _ => "Look the code up in the drive's manual",
     }
 }

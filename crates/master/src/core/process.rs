@@ -1,0 +1,155 @@
+use std::time::Duration;
+
+use super::Core;
+use super::FEED;
+use super::cycle::{Cycle, Tick};
+use super::event::Event;
+use super::field::{Sample, SetPoint, Signal};
+use super::image::Received;
+use super::payload::Payload;
+use super::request::{Request, Transfer};
+use super::supervision::{CycleLoss, CycleRules, WatchId};
+
+/// How long the answer to a stop is waited for; nobody is told of it.
+const STOP_TIMEOUT: Duration = Duration::from_millis(500);
+
+/// Cycles of SYNC, what is read and written in them, and who is stopped when they fail.
+impl Core {
+    /// The newest cycle of SYNC; `None` before the first.
+    pub const fn cycle(&self) -> Option<Cycle> {
+        self.sync.cycle()
+    }
+
+    /// Periods without a SYNC since cycles are counted.
+    pub const fn missed_cycles(&self) -> u64 {
+        self.sync.missed()
+    }
+
+    /// Time from one SYNC to the next; `None` while SYNC is neither produced nor followed.
+    pub const fn sync_period(&self) -> Option<Duration> {
+        self.sync.period()
+    }
+
+    /// True while the SYNC of another producer, which is followed, stays away.
+    pub const fn sync_is_lost(&self) -> bool {
+        self.sync.is_lost()
+    }
+
+    /// The newest value that came; `None` before the first, and once the PDO got another mapping.
+    #[inline]
+    pub fn read<T: Sample>(&self, signal: &Signal<T>) -> Option<T> {
+        self.image.at(signal.place).map(|Received { raw, .. }| T::from_field(raw, &signal.field))
+    }
+
+    /// Cycles that have begun since the value came: 0 in its own. `None` where there is none.
+    pub fn cycles_since<T>(&self, signal: &Signal<T>) -> Option<u64> {
+        self.image.cycles_since(signal.place)
+    }
+
+    /// Puts a value into its RPDO, which is sent by its transmission type. False if the object cannot hold the value, or if
+    /// the PDO got another mapping: then nothing was changed.
+    #[inline]
+    pub fn write<T: Sample>(&mut self, set_point: &SetPoint<T>, value: T) -> bool {
+        value.to_field(&set_point.field).is_some_and(|raw| self.image.put(set_point.place, raw))
+    }
+
+    /// Sends every RPDO that was written and waits for a SYNC at once: it then lies at the device before the next one.
+    pub fn release_rpdos(&mut self) {
+        self.image.release_waiting();
+    }
+
+    /// True, once, when a cycle has begun or there will be none: SYNC was lost, or is neither produced nor followed any more.
+    pub const fn take_cycle_change(&mut self) -> bool {
+        core::mem::replace(&mut self.cycle_changed, false)
+    }
+
+    pub(super) fn produce_sync(&mut self, period: Option<Duration>) {
+        self.sync.produce(period, self.now);
+        self.cycle_changed = true;
+        self.count_cycle();
+    }
+
+    pub(super) fn follow_sync(&mut self, period: Option<Duration>) {
+        self.sync.follow(period, self.now);
+        self.cycle_changed = true;
+    }
+
+    /// Watches over a program that moves a drive by process data.
+    pub fn watch_cycles(&mut self, rules: CycleRules) -> WatchId {
+        self.supervision.set(rules)
+    }
+
+    /// A set-point was given in the newest cycle.
+    pub fn note_moving(&mut self, id: WatchId) {
+        self.supervision.note_moving(id, self.sync.cycle().map_or(0, |cycle| cycle.number));
+    }
+
+    /// Nothing is in motion any more; a loss is forgotten.
+    pub fn note_resting(&mut self, id: WatchId) {
+        self.supervision.note_resting(id);
+    }
+
+    /// Why the drive was stopped, until it rests.
+    pub fn cycle_loss(&self, id: WatchId) -> Option<CycleLoss> {
+        self.supervision.loss(id)
+    }
+
+    /// Time may have brought a cycle, or the end of the patience for one.
+    pub(super) fn count_cycle(&mut self) {
+        if let Some(tick) = self.sync.handle_timeout(self.now) {
+            self.take_tick(tick);
+        }
+    }
+
+    /// A SYNC has come.
+    pub(super) fn handle_sync(&mut self) {
+        if let Some(tick) = self.sync.handle_sync(self.now) {
+            self.take_tick(tick);
+            self.find_due();
+        }
+    }
+
+    fn take_tick(&mut self, tick: Tick) {
+        let (cycle, now) = match tick {
+            Tick::Lost => return self.lose_sync(),
+            Tick::Begun(cycle) => (cycle, self.now),
+            Tick::Back(cycle) => {
+                self.events.push(Event::SyncBack, self.now);
+                (cycle, self.now)
+            }
+        };
+        if cycle.missed > 0 {
+            self.events.push(Event::CyclesMissed(cycle.missed), now);
+        }
+        self.cycle_changed = true;
+        self.image.begin_cycle(cycle.number);
+        self.image.release_waiting();
+        self.lost.extend(self.supervision.begin_cycle(cycle.number, &self.image));
+        self.stop_lost();
+    }
+
+    fn lose_sync(&mut self) {
+        let waited = self.sync.cycle().map_or(Duration::ZERO, |cycle| self.now - cycle.at);
+        self.cycle_changed = true;
+        self.events.push(Event::SyncLost(waited), self.now);
+        self.lost.extend(self.supervision.lose_sync(waited));
+        self.stop_lost();
+    }
+
+    /// Stops the drives that were found lost, by SDO: a synchronous RPDO waits for a SYNC that may not come. What an RPDO
+    /// carries from here on says the same.
+    fn stop_lost(&mut self) {
+        while let Some((rules, loss)) = self.lost.pop() {
+            let CycleRules { node, stop, controlword: mux, place, .. } = rules;
+            if let Some(place) = place {
+                self.image.put(place, stop.into());
+                self.image.release_waiting();
+            }
+            let transfer = Transfer::Download(Payload::new(&stop.to_le_bytes()));
+            let request = Request { node, mux, transfer, timeout: STOP_TIMEOUT };
+            self.start_request(FEED, request);
+            self.events.push(Event::CyclicStopped(node, loss), self.now);
+            self.changed.insert(node);
+        }
+    }
+}

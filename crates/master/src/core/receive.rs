@@ -1,0 +1,67 @@
+use can::Frame;
+use canopen::emcy::Emcy;
+use canopen::heartbeat::Heartbeat;
+use canopen::{Mux, NmtState, NodeId};
+
+use super::Core;
+use super::event::Event;
+use super::request::{Failure, Outcome};
+
+/// What a node's frames change.
+impl Core {
+    pub(super) fn note_outcome(&mut self, node: NodeId, mux: Mux, outcome: &Outcome) {
+        let now = self.now;
+        let facts = &mut self.member_mut(node).facts;
+        match *outcome {
+            Ok(_) | Err(Failure::BadAnswer(_) | Failure::QueueFull) => facts.unanswered = 0,
+            Err(Failure::Aborted(code)) => {
+                facts.unanswered = 0;
+                self.events.push(Event::Aborted(node, mux, code), now);
+            }
+            Err(Failure::NoAnswer { waited, .. }) => {
+                facts.unanswered = facts.unanswered.saturating_add(1);
+                // Silence of a node that was never heard is no news: a scan meets it a hundred times.
+                if facts.seen_at.is_some() {
+                    self.events.push(Event::NoAnswer(node, mux, waited), now);
+                }
+            }
+        }
+    }
+
+    pub(super) fn handle_sdo_reply(&mut self, node: NodeId, frame: &Frame) {
+        if self.busy.contains(node) {
+            let now = self.now;
+            self.member_mut(node).channel.handle_frame(frame, now);
+            self.settle(node);
+            self.find_due();
+        }
+    }
+
+    pub(super) fn handle_heartbeat(&mut self, node: NodeId, frame: &Frame) {
+        let now = self.now;
+        let Some(state) = Heartbeat::parse(frame).and_then(Heartbeat::nmt_state) else { return };
+        let facts = &mut self.member_mut(node).facts;
+        let before = facts.nmt_state.replace(state);
+        let back = facts.note_heartbeat(state, now);
+        let deadline = facts.heartbeat_watch.and_then(|watch| watch.deadline);
+        if state == NmtState::Initialising {
+            self.events.push(Event::BootUp(node), now);
+        } else if before != Some(state) {
+            self.events.push(Event::NmtState(node, state), now);
+        }
+        if back {
+            self.events.push(Event::HeartbeatBack(node), now);
+        }
+        if let Some(deadline) = deadline {
+            self.heartbeat_check = self.heartbeat_check.min(deadline);
+            self.due = self.due.min(deadline);
+        }
+    }
+
+    pub(super) fn handle_emcy(&mut self, node: NodeId, frame: &Frame) {
+        let Some(emcy) = Emcy::parse(frame) else { return };
+        let now = self.now;
+        self.member_mut(node).facts.push_emcy(emcy, now);
+        self.events.push(Event::Emcy(node, emcy), now);
+    }
+}

@@ -1,0 +1,139 @@
+//! Watches over programs that move drives by process data: a program that stays away for some cycles, a drive whose TPDOs
+//! stay away, and a SYNC that stays away each end the motion.
+
+use core::fmt;
+use std::time::Duration;
+
+use canopen::{Mux, NodeId};
+
+use super::field::Place;
+use super::image::Image;
+
+/// How a drive that is moved cycle by cycle is stopped, and when.
+#[derive(Clone, Copy, Debug)]
+pub struct CycleRules {
+    pub(crate) node: NodeId,
+    /// The word that stops it.
+    pub(crate) stop: u16,
+    /// The object that takes the word.
+    pub(crate) controlword: Mux,
+    /// That object in an RPDO, where it is mapped.
+    pub(crate) place: Option<Place>,
+    /// The TPDO that has to come.
+    pub(crate) heard: Place,
+    /// Cycles in a row for which the program, or that TPDO, may stay away.
+    pub(crate) tolerance: u32,
+}
+
+/// Names a watch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WatchId(u16);
+
+/// Why a drive that was moved cycle by cycle has been stopped by its master.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CycleLoss {
+    /// The program gave no set-point for so many cycles.
+    ProgramLate(u64),
+    /// The drive's TPDO did not come for so many cycles.
+    Silent(u64),
+    /// The SYNC of another producer stayed away for this long.
+    NoSync(Duration),
+}
+
+impl fmt::Display for CycleLoss {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ProgramLate(cycles) => write!(f, "its program gave no set-point for {cycles} cycles"),
+            Self::Silent(cycles) => write!(f, "its TPDO did not come for {cycles} cycles"),
+            Self::NoSync(time) => write!(f, "no SYNC came for {} ms", time.as_secs_f64() * 1e3),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Watch {
+    rules: CycleRules,
+    state: WatchState,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum WatchState {
+    /// Nothing is in motion.
+    Resting,
+    /// Since the cycle in which the last set-point was given.
+    Moving(u64),
+    Stopped(CycleLoss),
+}
+
+/// All watches. A watch is never taken away: a node and its controlword have one.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Supervision {
+    watches: Vec<Watch>,
+}
+
+impl Supervision {
+    /// A watch with these rules, at rest; in place of the one that the same controlword had.
+    pub(super) fn set(&mut self, rules: CycleRules) -> WatchId {
+        let watch = Watch { rules, state: WatchState::Resting };
+        let same = |other: &Watch| (other.rules.node, other.rules.controlword) == (rules.node, rules.controlword);
+        let position = self.watches.iter().position(same).unwrap_or(self.watches.len());
+        match self.watches.get_mut(position) {
+            Some(before) => *before = watch,
+            None => self.watches.push(watch),
+        }
+        WatchId(position as u16)
+    }
+
+    /// A set-point was given in this cycle.
+    pub(super) fn note_moving(&mut self, id: WatchId, cycle: u64) {
+        if let Some(watch) = self.watches.get_mut(usize::from(id.0))
+            && !matches!(watch.state, WatchState::Stopped(_))
+        {
+            watch.state = WatchState::Moving(cycle);
+        }
+    }
+
+    /// Nothing is in motion any more; a loss is forgotten.
+    pub(super) fn note_resting(&mut self, id: WatchId) {
+        if let Some(watch) = self.watches.get_mut(usize::from(id.0)) {
+            watch.state = WatchState::Resting;
+        }
+    }
+
+    /// Why the drive was stopped, until it rests.
+    pub(super) fn loss(&self, id: WatchId) -> Option<CycleLoss> {
+        match self.watches.get(usize::from(id.0))?.state {
+            WatchState::Stopped(loss) => Some(loss),
+            WatchState::Resting | WatchState::Moving(_) => None,
+        }
+    }
+
+    /// The drives to stop now that this cycle has begun.
+    pub(super) fn begin_cycle(&mut self, number: u64, image: &Image) -> impl Iterator<Item = (CycleRules, CycleLoss)> {
+        self.watches.iter_mut().filter_map(move |watch| {
+            let WatchState::Moving(last) = watch.state else { return None };
+            let tolerated = u64::from(watch.rules.tolerance);
+            let late = number.saturating_sub(last).saturating_sub(1);
+            let silent = image.cycles_since(watch.rules.heard).map_or(number, |since| since.saturating_sub(1));
+            let loss = if late > tolerated {
+                CycleLoss::ProgramLate(late)
+            } else if silent > tolerated {
+                CycleLoss::Silent(silent)
+            } else {
+                return None;
+            };
+            watch.state = WatchState::Stopped(loss);
+            Some((watch.rules, loss))
+        })
+    }
+
+    /// The drives to stop now that nobody counts the cycles any more.
+    pub(super) fn lose_sync(&mut self, waited: Duration) -> impl Iterator<Item = (CycleRules, CycleLoss)> {
+        self.watches.iter_mut().filter_map(move |watch| {
+            let WatchState::Moving(_) = watch.state else { return None };
+            let loss = CycleLoss::NoSync(waited);
+            watch.state = WatchState::Stopped(loss);
+            Some((watch.rules, loss))
+        })
+    }
+}

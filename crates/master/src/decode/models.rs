@@ -1,0 +1,15 @@
+use std::collections::BTreeMap;
+
+use canopen::NodeId;
+
+use crate::identify::Model;
+
+/// The profile of each node whose model is known, or one that all models it may be read alike.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Models(pub(super) BTreeMap<u8, Model>);
+
+impl Models {
+    pub(super) fn get(&self, node: NodeId) -> Option<Model> {
+        self.0.get(&node.raw()).copied()
+    }
+}

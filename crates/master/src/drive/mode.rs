@@ -1,0 +1,47 @@
+//! Changing the mode of operation (CiA 402-2, 8.5): at standstill, and until the drive shows it.
+
+use std::time::Duration;
+
+use cia402::{ModeOfOperation, PowerState};
+use devices::Description;
+
+use super::conclude::Trigger;
+use super::handle::{Drive, MODE, POLL, STEP_TIMEOUT};
+use super::motion::Note;
+use super::power::STANDSTILL_RPM;
+use crate::error::Error;
+
+impl Drive {
+    /// Sets 6060h and waits until the drive shows it. A shaft that turns in another mode is stopped first: drives change
+    /// their mode at standstill, or jump.
+    pub(super) async fn set_mode(&self, mode: ModeOfOperation) -> Result<Option<Note>, Error> {
+        let profile = self.known("set its mode")?;
+        if !profile.modes.contains(&mode) {
+            return Err(self.no_such_mode(profile, mode));
+        }
+        let before = self.mode().await?;
+        if before == mode {
+            return Ok(None);
+        }
+        let stopped = self.stop_if_turning(profile).await?;
+        self.node.write(MODE, mode.0).await?;
+        let mut waited = Duration::ZERO;
+        while self.mode().await? != mode {
+            if waited >= STEP_TIMEOUT {
+                return Err(self.not_reached("change its mode", Trigger::Mode(mode)).await);
+            }
+            self.node.network().sleep(POLL).await;
+            waited += POLL;
+        }
+        Ok(stopped.then_some(Note::StoppedFirst { before }))
+    }
+
+    async fn stop_if_turning(&self, profile: &Description) -> Result<bool, Error> {
+        let turning = self.read_quantity(profile.units.actual_velocity).await?.abs() >= STANDSTILL_RPM;
+        let follows = self.power_state(self.statusword().await?) == Some(PowerState::OperationEnabled);
+        if turning && follows {
+            self.stop().await?;
+        }
+        Ok(turning && follows)
+    }
+}

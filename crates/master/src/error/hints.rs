@@ -1,0 +1,94 @@
+use core::fmt;
+use std::time::Duration;
+
+use canopen::{AbortCode, NmtState};
+
+/// Direction of an SDO request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// Upload.
+    Read,
+    /// Download.
+    Write,
+}
+
+impl fmt::Display for Access {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Read => "read",
+            Self::Write => "write",
+        })
+    }
+}
+
+/// What the master knows when a node is silent. Prints as the likeliest cause and what to do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Hints {
+    /// The request never left the master.
+    pub unsent: bool,
+    /// The state that the node must be in by its last heartbeat or the NMT command sent since.
+    pub nmt_state: Option<NmtState>,
+    /// Time since any frame of the node.
+    pub silent_for: Option<Duration>,
+    /// Other nodes have been heard.
+    pub others: bool,
+}
+
+impl fmt::Display for Hints {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.unsent, self.nmt_state, self.silent_for) {
+            (true, ..) => f.write_str(
+                "The request never left this computer: check that the CAN interface is up and that another node \
+                 acknowledges frames (cable, bit rate, termination)",
+            ),
+            (_, Some(NmtState::Stopped), _) => f.write_str(
+                "By its last heartbeat, or the last NMT command to it, it is stopped, where SDO does not exist: send NMT \
+                 pre-operational or start. Some drives' heartbeats say so in an alarm: then check supply and cable",
+            ),
+            (_, _, Some(age)) => write!(
+                f,
+                "It was last heard {} ms ago: check whether it has lost its supply or its cable, or is too busy to \
+                 answer in time",
+                age.as_millis()
+            ),
+            (_, _, None) if self.others => f.write_str(
+                "Other nodes are on the bus but this one has never been heard: check its node-ID and its supply \
+                 (a scan shows who is there); if it is in the NMT state stopped, it answers after NMT start",
+            ),
+            (_, _, None) => {
+                f.write_str(
+                "Nothing at all has been heard on the bus: check supply, cable, termination and bit rate; if the node is \
+                 in the NMT state stopped, it answers after NMT start",
+            )
+            }
+        }
+    }
+}
+
+/// What to do about an abort code.
+pub(super) fn advice(code: AbortCode, access: Access) -> &'static str {
+    match code {
+        AbortCode::NO_SUCH_OBJECT | AbortCode::NO_SUCH_SUB_INDEX => {
+            "This model has no such object: check index and \
+             sub-index against its object dictionary"
+        }
+        AbortCode::READ_ONLY => "The object can only be read",
+        AbortCode::WRITE_ONLY => "The object can only be written",
+        AbortCode::INVALID_VALUE | AbortCode::VALUE_TOO_HIGH | AbortCode::VALUE_TOO_LOW => {
+            "Give a value within the limits of its object dictionary"
+        }
+        AbortCode::LENGTH_MISMATCH | AbortCode::TOO_LONG | AbortCode::TOO_SHORT => {
+            "The value was sent with another length than the object has: check its data type"
+        }
+        AbortCode::NOT_MAPPABLE | AbortCode::PDO_TOO_LONG => "Map other objects, or fewer of them, into this PDO",
+        AbortCode::DEVICE_STATE | AbortCode::LOCAL_CONTROL | AbortCode::CANNOT_TRANSFER => {
+            "The drive does not accept this in its present state: look at its statusword, and try it disabled"
+        }
+        AbortCode::UNSUPPORTED_ACCESS => match access {
+            Access::Read => "The object cannot be read now",
+            Access::Write => "The object cannot be changed now: a PDO mapping may have to be disabled first",
+        },
+        AbortCode::HARDWARE_ERROR => "The drive's parameter memory may be faulty",
+        _ => "Look the code up in the drive's manual",
+    }
+}

@@ -1,0 +1,151 @@
+use core::fmt;
+
+use canopen::Mux;
+use devices::Description;
+
+/// What a node says that it is. What it refuses to say is `None`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Identity {
+    /// 1000h.
+    pub device_type: Option<u32>,
+    /// 1018h:01.
+    pub vendor_id: Option<u32>,
+    /// 1018h:02.
+    pub product_code: Option<u32>,
+    /// 1018h:03.
+    pub revision_number: Option<u32>,
+}
+
+impl Identity {
+    /// True if nothing that it says speaks against the model.
+    pub fn matches(&self, model: &devices::Identity) -> bool {
+        let fits = |said: Option<u32>, expected| said.is_none_or(|said| said == expected);
+        fits(self.device_type, model.device_type)
+            && fits(self.vendor_id, model.vendor_id)
+            && fits(self.product_code, model.product_code)
+            && fits(self.revision_number, model.revision_number)
+    }
+}
+
+impl fmt::Display for Identity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let parts = [
+            ("device type", self.device_type),
+            ("vendor", self.vendor_id),
+            ("product", self.product_code),
+            ("revision", self.revision_number),
+        ];
+        let mut separator = "";
+        for (name, value) in parts {
+            match value {
+                Some(value) => write!(f, "{separator}{name} {value:X}h")?,
+                None => write!(f, "{separator}{name} not given")?,
+            }
+            separator = ", ";
+        }
+        Ok(())
+    }
+}
+
+/// What is known of a node's model.
+#[derive(Clone, Copy, Debug)]
+pub enum Knowledge {
+    /// This model: somebody has said so who must know, or no other model answers so.
+    Named(Model),
+    /// One of several that answer so: good for reading and moving, not for what only one model means.
+    Guessed(Guess),
+    /// No model known here answers so, or models with other objects do and nothing speaks for one of them.
+    Unknown,
+}
+
+impl Knowledge {
+    /// The profile to work with: of a guess, the one that all models it may be agree with.
+    pub const fn profile(self) -> Option<&'static Description> {
+        match self {
+            Self::Named(Model(profile)) => Some(profile),
+            Self::Guessed(guess) => Some(guess.profile),
+            Self::Unknown => None,
+        }
+    }
+
+    /// The guess, if it is one.
+    pub const fn guess(self) -> Option<Guess> {
+        if let Self::Guessed(guess) = self { Some(guess) } else { None }
+    }
+}
+
+impl From<&'static Description> for Knowledge {
+    fn from(profile: &'static Description) -> Self {
+        Self::Named(Model(profile))
+    }
+}
+
+/// A model's profile, which prints as its name.
+#[derive(Clone, Copy)]
+pub struct Model(pub &'static Description);
+
+impl fmt::Debug for Model {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.0.model)
+    }
+}
+
+/// A model that several answer like, chosen by an object that it has, if the others have other objects.
+///
+/// Models with the same objects differ in their motors only: they are read and moved in the same way.
+#[derive(Clone, Copy)]
+pub struct Guess {
+    pub(super) profile: &'static Description,
+    pub(super) evidence: Option<Mux>,
+}
+
+impl Guess {
+    /// The profile to read and move with.
+    pub const fn profile(self) -> &'static Description {
+        self.profile
+    }
+
+    /// The object that speaks for it; `None` where all that answer so have the same objects.
+    pub const fn evidence(self) -> Option<Mux> {
+        self.evidence
+    }
+
+    /// The models that it may be by its objects.
+    pub fn fitting(self) -> impl Iterator<Item = &'static Description> {
+        self.profile.with_same_objects()
+    }
+
+    /// True if this value of this object means the same on every model that answers so.
+    pub fn may_write(self, mux: Mux, value: i64) -> bool {
+        self.profile.shares(mux, value)
+    }
+}
+
+impl fmt::Debug for Guess {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Guess {{ {}, {:?} }}", self.profile.model, self.evidence)
+    }
+}
+
+/// Why it is no more than a guess: "zlac8030l, zlim42c and zlim42c-82 answer the same identity; it has 2029h:00 as zlac8030l has".
+impl fmt::Display for Guess {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (answering, _) = names(self.profile.answering_alike());
+        let (fitting, several) = names(self.fitting());
+        write!(f, "{answering} answer the same identity")?;
+        match self.evidence {
+            Some(evidence) => write!(f, "; it has {evidence} as {fitting} {}", if several { "have" } else { "has" }),
+            None => f.write_str(" and have the same objects"),
+        }
+    }
+}
+
+/// Names in a sentence, and whether they are several.
+pub(super) fn names(models: impl Iterator<Item = &'static Description>) -> (String, bool) {
+    let names: Vec<_> = models.map(|model| model.model).collect();
+    match names.split_last() {
+        Some((last, [])) => ((*last).to_owned(), false),
+        Some((last, others)) => (format!("{} and {last}", others.join(", ")), true),
+        None => ("no model".to_owned(), false),
+    }
+}

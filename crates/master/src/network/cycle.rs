@@ -1,0 +1,178 @@
+//! Cycles of SYNC for programs: waiting for the next one, and the exchange of process data in it.
+
+use core::fmt;
+use core::future::Future;
+use core::pin::Pin;
+use core::task::{Context, Poll};
+use std::time::Duration;
+
+use can::Instant;
+
+use super::handle::{CycleWaiter, Network};
+use crate::core::{Command, Core, Cycle, CycleLoss, Sample, SetPoint, Signal, Ticket, WatchId};
+
+/// Why there is no next cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NoCycle {
+    /// Nobody's SYNC counts the cycles.
+    #[error("SYNC is neither produced nor followed: call Network::sync or Network::follow_sync first")]
+    NoSync,
+    /// The SYNC of another producer stays away.
+    #[error("no SYNC has come for {} ms: check its producer and the cable", period.as_secs_f64() * 3e3)]
+    Lost {
+        /// The period with which it should come.
+        period: Duration,
+    },
+}
+
+impl Network {
+    /// Counts the SYNCs that another node produces with this period, or stops. See [`next_sync`](Self::next_sync).
+    pub fn follow_sync(&self, period: Option<Duration>) {
+        self.submit(Command::FollowSync(period));
+    }
+
+    /// Waits for the next SYNC, produced ([`sync`](Self::sync)) or followed ([`follow_sync`](Self::follow_sync)) by this
+    /// master. Counted from the first poll: a program that comes late does not see the cycles in which it was busy, and
+    /// finds them missing in [`Cycle::number`].
+    ///
+    /// # Errors
+    /// [`NoCycle`], at once, where no SYNC can be waited for or it stays away.
+    pub fn next_sync(&self) -> NextSync {
+        NextSync { network: self.clone(), ticket: None, after: 0 }
+    }
+
+    /// The newest cycle; `None` before the first.
+    pub fn cycle(&self) -> Option<Cycle> {
+        self.lock().core.cycle()
+    }
+
+    /// Reads and writes process data in one go: no frame comes in between, and every RPDO that was written leaves at once,
+    /// whole, whatever its transmission type. Called after [`next_sync`](Self::next_sync), that is right behind the SYNC:
+    /// a synchronous RPDO then lies at its device before the next one. Allocates nothing.
+    pub fn exchange<T>(&self, step: impl FnOnce(&mut Exchange<'_>) -> T) -> T {
+        self.with_core(|core| {
+            let result = step(&mut Exchange { core });
+            core.release_rpdos();
+            result
+        })
+    }
+}
+
+/// Process data for the length of one call of [`Network::exchange`].
+#[derive(Debug)]
+pub struct Exchange<'a> {
+    core: &'a mut Core,
+}
+
+impl Exchange<'_> {
+    /// The newest cycle; `None` before the first.
+    pub const fn cycle(&self) -> Option<Cycle> {
+        self.core.cycle()
+    }
+
+    /// Time from one SYNC to the next; `None` while SYNC is neither produced nor followed.
+    pub const fn sync_period(&self) -> Option<Duration> {
+        self.core.sync_period()
+    }
+
+    /// The latest time that the runner has told.
+    pub const fn now(&self) -> Instant {
+        self.core.now()
+    }
+
+    /// The newest value that came; `None` before the first, and once the PDO got another mapping.
+    #[inline]
+    pub fn read<T: Sample>(&self, signal: Signal<T>) -> Option<T> {
+        self.core.read(&signal)
+    }
+
+    /// As [`read`](Self::read), of no value that is older than this many cycles: 0 for one that came in this cycle.
+    #[inline]
+    pub fn read_fresh<T: Sample>(&self, signal: Signal<T>, cycles: u64) -> Option<T> {
+        let fresh = self.core.cycles_since(&signal)? <= cycles;
+        if fresh { self.core.read(&signal) } else { None }
+    }
+
+    /// Cycles that have begun since the value came. `None` where there is no value.
+    pub fn cycles_since<T>(&self, signal: Signal<T>) -> Option<u64> {
+        self.core.cycles_since(&signal)
+    }
+
+    /// Puts a value into its RPDO. False if the object cannot hold the value, or if the PDO got another mapping: then nothing
+    /// was changed.
+    #[inline]
+    pub fn write<T: Sample>(&mut self, set_point: SetPoint<T>, value: T) -> bool {
+        self.core.write(&set_point, value)
+    }
+
+    /// A set-point was given in this cycle.
+    pub fn note_moving(&mut self, watch: WatchId) {
+        self.core.note_moving(watch);
+    }
+
+    /// Nothing is in motion any more; a loss is forgotten.
+    pub fn note_resting(&mut self, watch: WatchId) {
+        self.core.note_resting(watch);
+    }
+
+    /// Why the drive was stopped, until it rests.
+    pub fn cycle_loss(&self, watch: WatchId) -> Option<CycleLoss> {
+        self.core.cycle_loss(watch)
+    }
+}
+
+/// Ends with the next SYNC. See [`Network::next_sync`].
+#[must_use = "futures do nothing unless awaited"]
+pub struct NextSync {
+    network: Network,
+    ticket: Option<Ticket>,
+    /// The number of the cycle in which it was first polled.
+    after: u64,
+}
+
+impl Future for NextSync {
+    type Output = Result<Cycle, NoCycle>;
+
+    fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
+        let this = self.get_mut();
+        // What was asked for is carried out at the runner's next call: SYNC may only be on its way.
+        let mut shared = this.network.lock();
+        let cycle = shared.core.cycle();
+        let ticket = match this.ticket {
+            Some(ticket) => {
+                if let Some(cycle) = cycle.filter(|cycle| cycle.number > this.after) {
+                    return Poll::Ready(Ok(cycle));
+                }
+                ticket
+            }
+            None => {
+                this.after = cycle.map_or(0, |cycle| cycle.number);
+                *this.ticket.insert(shared.core.ticket())
+            }
+        };
+        match shared.core.sync_period() {
+            None if !shared.expects_sync() => return Poll::Ready(Err(NoCycle::NoSync)),
+            Some(period) if shared.core.sync_is_lost() => return Poll::Ready(Err(NoCycle::Lost { period })),
+            _ => {}
+        }
+        match shared.cycle_waiters.iter_mut().find(|waiter| waiter.ticket == ticket) {
+            Some(waiter) => waiter.waker.clone_from(context.waker()),
+            None => shared.cycle_waiters.push(CycleWaiter { ticket, waker: context.waker().clone() }),
+        }
+        Poll::Pending
+    }
+}
+
+impl Drop for NextSync {
+    fn drop(&mut self) {
+        if let Some(ticket) = self.ticket {
+            self.network.lock().cycle_waiters.retain(|waiter| waiter.ticket != ticket);
+        }
+    }
+}
+
+impl fmt::Debug for NextSync {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("NextSync").field("after", &self.after).finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,302 @@
+use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, Waker};
+use std::time::Duration;
+
+use can::{Frame, Instant, Station};
+use canopen::nmt::NmtTarget;
+use canopen::{Mux, NmtCommand, NodeId};
+
+use crate::core::{Command, Core, Event, NodeFacts, NodeSet, Outcome, Received, Ticket};
+use crate::host_loss::Guard;
+
+/// A CANopen network as its master sees it: a cheap handle that all tasks and the runner share.
+///
+/// Futures that it hands out wait for facts in the core; dropping one cancels what it asked for.
+#[derive(Clone, Debug, Default)]
+pub struct Network {
+    shared: Arc<Mutex<Shared>>,
+}
+
+#[derive(Debug, Default)]
+pub(super) struct Shared {
+    pub(super) core: Core,
+    /// Commands that wait to be told the time.
+    inbox: VecDeque<Command>,
+    pub(super) slots: HashMap<Ticket, Slot>,
+    pub(super) watchers: Vec<Watcher>,
+    /// Woken by the next cycle, or when there will be none.
+    pub(super) cycle_waiters: Vec<CycleWaiter>,
+    /// Room for the wakers of one call, kept so that a cycle allocates nothing.
+    woken: Vec<Waker>,
+    /// Something was asked for since the runner last came.
+    fresh: bool,
+    /// Woken whenever a command comes into the inbox.
+    on_activity: Option<Waker>,
+    /// Woken once by the next command that comes into the inbox.
+    activity: Option<Waker>,
+    /// What this program has set in motion.
+    moved: NodeSet,
+    /// What watches this program, by node.
+    guards: BTreeMap<NodeId, Guard>,
+}
+
+/// Commands that wait for a runner. Requests and timers are bounded by the futures that wait for them; the rest by
+/// this.
+const INBOX: usize = 4096;
+
+/// What a future waits for.
+#[derive(Debug)]
+pub(super) enum Slot {
+    Waiting(Waker),
+    Done(Outcome),
+}
+
+/// A future that wants to look again when a node's facts change.
+#[derive(Debug)]
+pub(super) struct Watcher {
+    pub(super) node: NodeId,
+    pub(super) ticket: Ticket,
+    pub(super) waker: Waker,
+}
+
+/// A future that waits for a cycle after the one with this number.
+#[derive(Debug)]
+pub(super) struct CycleWaiter {
+    pub(super) ticket: Ticket,
+    pub(super) waker: Waker,
+}
+
+impl Network {
+    /// A network of which nothing is known yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Produces SYNC with this period, or stops.
+    pub fn sync(&self, period: Option<Duration>) {
+        self.submit(Command::Sync(period));
+    }
+
+    /// Produces this master's heartbeat under a node-ID, the first one at once, or stops. Periods are whole milliseconds.
+    ///
+    /// Any drive that consumes that heartbeat (1016h) and hears it watches this program from then on, not only those that
+    /// it moves. [`crate::Drive::guard`] does what a drive needs; this is for masters that do the rest themselves.
+    pub fn heartbeat(&self, own: NodeId, period: Option<Duration>) {
+        self.submit(Command::Heartbeat(own, period));
+    }
+
+    /// Sends an NMT command to every node.
+    pub fn nmt_all(&self, command: NmtCommand) {
+        self.submit(Command::Nmt(NmtTarget::All, command));
+    }
+
+    /// Sends a frame as it is.
+    pub fn transmit(&self, frame: Frame) {
+        self.submit(Command::Transmit(frame));
+    }
+
+    /// The next event for people, with its time.
+    pub fn poll_event(&self) -> Option<(Instant, Event)> {
+        self.lock().core.poll_event()
+    }
+
+    /// What has been seen of a node.
+    pub fn facts(&self, node: NodeId) -> NodeFacts {
+        self.lock().core.facts(node).clone()
+    }
+
+    /// The nodes of which any frame has been seen.
+    pub fn seen(&self) -> NodeSet {
+        let shared = self.lock();
+        NodeId::all().filter(|node| shared.core.facts(*node).seen_at.is_some()).collect()
+    }
+
+    /// The newest value of an object that a node sends by PDO.
+    pub fn received(&self, node: NodeId, mux: Mux) -> Option<Received> {
+        self.lock().core.image().value(node, mux)
+    }
+
+    /// The latest time that the runner has told.
+    pub fn now(&self) -> Instant {
+        self.lock().core.now()
+    }
+
+    /// Looks into the core, or changes mappings and values to send. The runner is told to come and fetch frames.
+    pub fn with_core<T>(&self, look: impl FnOnce(&mut Core) -> T) -> T {
+        let mut shared = self.lock();
+        let result = look(&mut shared.core);
+        let wakers = shared.activity_wakers();
+        drop(shared);
+        wakers.wake();
+        result
+    }
+
+    /// Looks into the core without the runner being told.
+    pub(crate) fn look<T>(&self, look: impl FnOnce(&Core) -> T) -> T {
+        look(&self.lock().core)
+    }
+
+    /// Wakes `waker` each time that a command is queued, until another one is given. For a runner that sleeps.
+    pub fn on_activity(&self, waker: Waker) {
+        self.lock().on_activity = Some(waker);
+    }
+
+    /// Ready, once, when something was asked for since the runner last called
+    /// [`handle_timeout`](Station::handle_timeout). For a runner that waits in async code.
+    pub fn poll_activity(&self, context: &mut Context<'_>) -> Poll<()> {
+        let mut shared = self.lock();
+        if !shared.fresh {
+            shared.activity = Some(context.waker().clone());
+            return Poll::Pending;
+        }
+        shared.fresh = false;
+        Poll::Ready(())
+    }
+
+    /// Notes that this program has set a node in motion.
+    pub fn note_moved(&self, node: NodeId) {
+        self.lock().moved.insert(node);
+    }
+
+    /// Notes that a node stands still again.
+    pub fn note_stopped(&self, node: NodeId) {
+        self.lock().moved.remove(node);
+    }
+
+    /// The nodes that this program has set in motion and not stopped again.
+    pub fn moved(&self) -> NodeSet {
+        self.lock().moved
+    }
+
+    /// The guards of this program, to look at or to change.
+    pub(crate) fn with_guards<T>(&self, look: impl FnOnce(&mut BTreeMap<NodeId, Guard>) -> T) -> T {
+        look(&mut self.lock().guards)
+    }
+
+    pub(crate) fn submit(&self, command: Command) {
+        let mut shared = self.lock();
+        let plain = |command: &Command| {
+            use Command::{FollowSync, Heartbeat, KeepFed, Nmt, Sync, Transmit};
+            matches!(command, Nmt(..) | Transmit(_) | Sync(_) | FollowSync(_) | Heartbeat(..) | KeepFed(..))
+        };
+        // Nobody has run the bus for thousands of commands: the newest replaces the oldest.
+        if shared.inbox.len() >= INBOX
+            && plain(&command)
+            && let Some(oldest) = shared.inbox.iter().position(plain)
+        {
+            shared.inbox.remove(oldest);
+        }
+        shared.inbox.push_back(command);
+        let wakers = shared.activity_wakers();
+        drop(shared);
+        wakers.wake();
+    }
+
+    /// Takes back a request or timer: before it reached the core without a trace, else by a cancel.
+    pub(super) fn withdraw(&self, ticket: Ticket) {
+        let mut shared = self.lock();
+        let Some(Slot::Waiting(_)) = shared.slots.remove(&ticket) else { return };
+        let before = shared.inbox.len();
+        shared.inbox.retain(|command| command.ticket() != Some(ticket));
+        let known_to_core = shared.inbox.len() == before;
+        drop(shared);
+        if known_to_core {
+            self.submit(Command::Cancel(ticket));
+        }
+    }
+
+    /// Calls the core at `now`, waiting commands first, and wakes whoever waited for what came of it.
+    fn run(&self, now: Instant, call: impl FnOnce(&mut Core)) {
+        let mut shared = self.lock();
+        shared.fresh = false;
+        while let Some(command) = shared.inbox.pop_front() {
+            shared.core.execute(command, now);
+        }
+        call(&mut shared.core);
+        let mut woken = shared.collect();
+        drop(shared);
+        if woken.is_empty() {
+            return;
+        }
+        woken.drain(..).for_each(Waker::wake);
+        self.lock().woken = woken;
+    }
+
+    pub(super) fn lock(&self) -> MutexGuard<'_, Shared> {
+        // A panic elsewhere leaves the core whole: every call finishes its own step.
+        self.shared.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Shared {
+    /// Hands outcomes to their slots. The wakers are for after the lock.
+    fn collect(&mut self) -> Vec<Waker> {
+        let mut wakers = core::mem::take(&mut self.woken);
+        while let Some(finished) = self.core.poll_finished() {
+            // No slot: the future has been dropped.
+            let Some(slot) = self.slots.get_mut(&finished.ticket) else { continue };
+            if let Slot::Waiting(waker) = core::mem::replace(slot, Slot::Done(finished.outcome)) {
+                wakers.push(waker);
+            }
+        }
+        let changed = self.core.take_changed();
+        if !changed.is_empty() {
+            let due = self.watchers.extract_if(.., |watcher| changed.contains(watcher.node));
+            wakers.extend(due.map(|watcher| watcher.waker));
+        }
+        if self.core.take_cycle_change() {
+            wakers.extend(self.cycle_waiters.drain(..).map(|waiter| waiter.waker));
+        }
+        wakers
+    }
+
+    /// True if SYNC has been asked for and the runner has not come since.
+    pub(super) fn expects_sync(&self) -> bool {
+        let newest = self.inbox.iter().rev().find_map(|command| match command {
+            Command::Sync(period) | Command::FollowSync(period) => Some(period.is_some()),
+            _ => None,
+        });
+        newest.unwrap_or(false)
+    }
+
+    fn activity_wakers(&mut self) -> ActivityWakers {
+        self.fresh = true;
+        ActivityWakers { lasting: self.on_activity.clone(), once: self.activity.take() }
+    }
+}
+
+/// Whom a new command wakes; kept apart so that it happens after the lock.
+struct ActivityWakers {
+    lasting: Option<Waker>,
+    once: Option<Waker>,
+}
+
+impl ActivityWakers {
+    fn wake(self) {
+        [self.lasting, self.once].into_iter().flatten().for_each(Waker::wake);
+    }
+}
+
+impl Station for Network {
+    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
+        self.run(now, |core| core.handle_frame(frame, now));
+    }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        self.run(now, |core| core.handle_timeout(now));
+    }
+
+    fn poll_transmit(&mut self) -> Option<Frame> {
+        self.lock().core.poll_transmit()
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        let shared = self.lock();
+        if shared.inbox.is_empty() { shared.core.poll_timeout() } else { Some(shared.core.now()) }
+    }
+
+    fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
+        self.run(now, |core| core.handle_transmitted(frame, now));
+    }
+}

@@ -1,0 +1,53 @@
+//! What a node offers of its PDOs: setting them up, reading how they are set up, sending one.
+
+use canopen::{CobId, Mux};
+
+use super::config::{PdoConfig, TimerUnits};
+use super::error::PdoError;
+use super::transaction::{apply, read};
+use crate::core::RpdoTrigger;
+use crate::decode::Direction;
+use crate::error::Error;
+use crate::network::Node;
+
+impl Node {
+    /// Sets up a PDO of the device and, when every value reads back right, sends or receives it by its mapping.
+    ///
+    /// # Errors
+    /// [`PdoError`]; the device's PDO is then put back as it was, as far as it answers.
+    pub async fn configure_pdo(&self, config: &PdoConfig, units: TimerUnits) -> Result<(), PdoError> {
+        let cob_id = apply(self, config, units).await?;
+        self.use_pdo(config, cob_id);
+        Ok(())
+    }
+
+    /// Reads how a PDO of the device is set up and sends or receives it by that.
+    ///
+    /// # Errors
+    /// Those of the SDO reads.
+    pub async fn adopt_pdo(&self, direction: Direction, number: u8, units: TimerUnits) -> Result<PdoConfig, Error> {
+        let (config, cob_id) = read(self, direction, number, units).await?;
+        self.use_pdo(&config, cob_id);
+        Ok(config)
+    }
+
+    fn use_pdo(&self, config: &PdoConfig, cob_id: CobId) {
+        let (node, number, map) = (self.id(), config.number, config.map.clone());
+        let id = cob_id.can_id().as_standard().filter(|_| cob_id.is_valid());
+        self.network().with_core(|core| match (config.direction, id) {
+            (Direction::Tpdo, Some(id)) => core.image_mut().set_tpdo(node, number, id, map),
+            (Direction::Tpdo, None) => core.image_mut().remove_tpdo(node, number),
+            (Direction::Rpdo, Some(id)) => {
+                let synchronous = config.transmission.is_synchronous();
+                let trigger = if synchronous { RpdoTrigger::Sync } else { RpdoTrigger::Write };
+                core.image_mut().set_rpdo(node, number, id, map, trigger);
+            }
+            (Direction::Rpdo, None) => core.image_mut().remove_rpdo(node, number),
+        });
+    }
+
+    /// Puts a value into the RPDOs that carry the object; false if none does. Sent by the PDO's transmission type.
+    pub fn send_by_pdo(&self, mux: Mux, raw: u64) -> bool {
+        self.network().with_core(|core| core.image_mut().write(self.id(), mux, raw))
+    }
+}
