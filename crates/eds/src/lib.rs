@@ -1,0 +1,41 @@
+//! Electronic data sheets of CANopen devices: EDS and DCF files (CiA 306-1).
+//!
+//! [`Document`](document::Document) is the file as it stands, line by line, to look at and to change a value without
+//! touching the rest. [`Eds`] is what it says, typed: objects, defaults, limits, and in a DCF the values of one device.
+//! Reading takes what real files have and tells what is not as the standard has it, with the line and what was taken
+//! instead.
+//!
+//! ```
+//! use eds::{Eds, Severity};
+//!
+//! let file = "[FileInfo]\nFileName=small.eds\n[MandatoryObjects]\nSupportedObjects=1\n1=0x1000\n\
+//!             [1000]\nParameterName=Device type\nObjectType=0x7\nDataType=0x0007\nAccessType=RO\n\
+//!             DefaultValue=0x20192\nLowLimit=0x30000\n";
+//! let reading = Eds::load(file.as_bytes())?;
+//! assert_eq!(reading.eds.object(0x1000).map(|object| object.name.as_str()), Some("Device type"));
+//! let first = reading.findings.iter().find(|finding| finding.line > 0).expect("the limit is wrong");
+//! assert_eq!((first.line, first.severity), (12, Severity::Error));
+//! assert_eq!(first.taken_instead.as_deref(), Some("no low limit"));
+//! # Ok::<(), eds::Refusal>(())
+//! ```
+//!
+//! It does not look into modules (CiA 306-1, clause 4.7): their sections are kept as they are. XML device descriptions
+//! (CiA 311) are not read.
+
+mod check;
+mod data_type;
+mod finding;
+mod model;
+mod read;
+mod value;
+
+pub mod document;
+
+pub use data_type::{Form, TypeCode};
+pub use finding::{Finding, Findings, Refusal, Severity};
+pub use model::{
+    AccessType, Commissioning, DeviceInfo, DynamicChannel, Eds, FileInfo, KeptSection, List, Object, ObjectType,
+    Variable,
+};
+pub use read::Reading;
+pub use value::{Number, Value};

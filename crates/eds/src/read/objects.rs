@@ -1,0 +1,268 @@
+//! Objects, put together from their sections.
+
+use super::fields::Fields;
+use super::places::{Part, Role};
+use super::reader::{Reader, shortened};
+use crate::document::Section;
+use crate::{Object, ObjectType, Refusal, TypeCode, Value, Variable};
+
+/// Most values of a file, those of compact sub-objects counted.
+pub(super) const MOST_VARIABLES: usize = 60_000;
+
+impl Reader {
+    /// All objects, from their sections in order.
+    pub(super) fn objects(&mut self, parts: &[Part<'_>]) -> Result<(), Refusal> {
+        self.eds.objects.reserve(parts.iter().filter(|part| part.key.role == Role::Object).count());
+        for of_one in parts.chunk_by(|a, b| a.key.index == b.key.index) {
+            if let Some(object) = self.object(of_one)? {
+                self.eds.objects.push(object);
+            }
+        }
+        Ok(())
+    }
+
+    /// One object from its sections, the one with its index first.
+    fn object(&mut self, parts: &[Part<'_>]) -> Result<Option<Object>, Refusal> {
+        let parts = self.without_doubles(parts);
+        let (first, rest) = parts.split_first().ok_or_else(|| Refusal::new(0, "an object without a section", ""))?;
+        let index = first.key.index;
+        if first.key.role != Role::Object {
+            return self.orphans(index, &parts);
+        }
+        let section = first.section;
+        let fields = self.fields(section);
+        let subs: Vec<Part<'_>> = rest.iter().copied().filter(|part| matches!(part.key.role, Role::Sub(_))).collect();
+        let compact =
+            fields.compact_sub_obj.and_then(|entry| self.count::<u8>(section, entry)).filter(|count| *count > 0);
+        let object_type = self.object_type(section, &fields, !subs.is_empty() || compact.is_some());
+        let name = self.name(section, &fields);
+        let flags = fields.obj_flags.and_then(|entry| self.count(section, entry)).unwrap_or(0);
+        let mut object = Object {
+            line: section.line(),
+            index,
+            name,
+            object_type,
+            list: None,
+            flags,
+            compact,
+            variables: Vec::new(),
+        };
+        if !subs.is_empty() {
+            if compact.is_some() {
+                self.warn_section(section, "CompactSubObj and sections of sub-objects", Some("the sections".into()));
+                object.compact = None;
+            }
+            object.variables = self.subs(&subs)?;
+            self.check_sub_number(section, &fields, &object);
+        } else if let Some(count) = compact {
+            self.take(section, usize::from(count) + 1)?;
+            object.variables = self.compact_variables(section, &fields, &object.name, count, rest);
+        } else {
+            self.take(section, 1)?;
+            self.single(section, &fields, &mut object);
+        }
+        Ok(Some(object))
+    }
+
+    /// Counts values, so that a few lines cannot ask for all memory.
+    fn take(&mut self, section: Section<'_>, count: usize) -> Result<(), Refusal> {
+        self.variables += count;
+        if self.variables <= MOST_VARIABLES {
+            return Ok(());
+        }
+        let reason = format!("more than {MOST_VARIABLES} objects and sub-objects");
+        Err(Refusal::new(section.line() as usize, reason, "a device has some thousand: is this the right file?"))
+    }
+
+    /// The first of each section that stands twice.
+    fn without_doubles<'a>(&mut self, parts: &[Part<'a>]) -> Vec<Part<'a>> {
+        let mut kept: Vec<Part<'a>> = Vec::with_capacity(parts.len());
+        for part in parts {
+            match kept.last() {
+                Some(first) if first.key == part.key => {
+                    let taken = format!("the one in line {}", first.section.line());
+                    self.error_section(part.section, "two sections of this name", taken);
+                }
+                _ => kept.push(*part),
+            }
+        }
+        kept
+    }
+
+    /// Sub-objects of an index that has no section of its own.
+    fn orphans(&mut self, index: u16, parts: &[Part<'_>]) -> Result<Option<Object>, Refusal> {
+        let section = parts[0].section;
+        let subs: Vec<Part<'_>> = parts.iter().copied().filter(|part| matches!(part.key.role, Role::Sub(_))).collect();
+        if subs.is_empty() {
+            self.error_section(section, format!("there is no section [{index:04X}]"), "nothing");
+            return Ok(None);
+        }
+        self.error_section(section, format!("there is no section [{index:04X}]"), "a RECORD without a name");
+        Ok(Some(Object {
+            line: section.line(),
+            index,
+            name: String::new(),
+            object_type: ObjectType::Record,
+            list: None,
+            flags: 0,
+            compact: None,
+            variables: self.subs(&subs)?,
+        }))
+    }
+
+    fn object_type(&mut self, section: Section<'_>, fields: &Fields<'_>, has_subs: bool) -> ObjectType {
+        let inferred = if has_subs { ObjectType::Record } else { ObjectType::Var };
+        let Some(entry) = fields.object_type.filter(|entry| !entry.value.is_empty()) else {
+            // Without the key it is a VAR (CiA 306-1).
+            if has_subs {
+                self.error_section(section, "no ObjectType, which makes a VAR, but sub-objects", inferred.name());
+            }
+            return inferred;
+        };
+        let Some(kind) = self.count::<u16>(section, entry).and_then(ObjectType::of) else {
+            self.error(section, entry, format!("no type of an object: {:?}", shortened(entry.value)), inferred.name());
+            return inferred;
+        };
+        if has_subs && !kind.has_sub_objects() && kind != ObjectType::DefType {
+            self.error(section, entry, format!("a {} has no sub-objects, but there are some", kind.name()), "RECORD");
+            return ObjectType::Record;
+        }
+        kind
+    }
+
+    /// Without one the file is still clear.
+    pub(super) fn name(&mut self, section: Section<'_>, fields: &Fields<'_>) -> String {
+        match fields.parameter_name {
+            Some(entry) => entry.value.to_owned(),
+            None => {
+                self.warn_section(section, "no ParameterName", None);
+                String::new()
+            }
+        }
+    }
+
+    fn subs(&mut self, subs: &[Part<'_>]) -> Result<Vec<Variable>, Refusal> {
+        let mut variables = Vec::with_capacity(subs.len());
+        for part in subs {
+            let Role::Sub(sub_index) = part.key.role else { continue };
+            self.take(part.section, 1)?;
+            let fields = self.fields(part.section);
+            let kind = self.object_type(part.section, &fields, false);
+            if kind.has_sub_objects() {
+                self.error_section(part.section, format!("a sub-object cannot be a {}", kind.name()), "VAR");
+            }
+            let name = self.name(part.section, &fields);
+            variables.push(self.variable(part.section, &fields, kind == ObjectType::Domain, sub_index, name));
+        }
+        Ok(variables)
+    }
+
+    /// An object without sub-objects.
+    fn single(&mut self, section: Section<'_>, fields: &Fields<'_>, object: &mut Object) {
+        if matches!(object.object_type, ObjectType::DefType | ObjectType::DefStruct) && fields.data_type.is_none() {
+            return;
+        }
+        if object.object_type.has_sub_objects() {
+            let what = format!("a {} without sub-objects", object.object_type.name());
+            if fields.data_type.is_none() {
+                self.error_section(section, what, "an object without values");
+                return;
+            }
+            self.error_section(section, what, "VAR");
+            object.object_type = ObjectType::Var;
+        }
+        let is_domain = object.object_type == ObjectType::Domain;
+        object.variables = vec![self.variable(section, fields, is_domain, 0, object.name.clone())];
+    }
+
+    /// A value with all that is said of it.
+    pub(super) fn variable(
+        &mut self,
+        section: Section<'_>,
+        fields: &Fields<'_>,
+        is_domain: bool,
+        sub_index: u8,
+        name: String,
+    ) -> Variable {
+        let data_type = self.data_type(section, fields, is_domain);
+        let mut value = |entry| self.value(section, entry, data_type);
+        let default = fields.default_value.and_then(&mut value);
+        let low = fields.low_limit.and_then(&mut value);
+        let high = fields.high_limit.and_then(&mut value);
+        let parameter_value = fields.parameter_value.and_then(&mut value);
+        let mut variable = Variable {
+            line: section.line(),
+            sub_index,
+            name,
+            is_domain: is_domain || data_type == TypeCode::DOMAIN,
+            data_type,
+            access: self.access(section, fields, is_domain),
+            default,
+            low,
+            high,
+            pdo_mapping: fields.pdo_mapping.is_some_and(|entry| self.flag(section, entry)),
+            flags: fields.obj_flags.and_then(|entry| self.count(section, entry)).unwrap_or(0),
+            value: parameter_value,
+            denotation: text(fields.denotation),
+            upload_file: text(fields.upload_file),
+            download_file: text(fields.download_file),
+        };
+        self.check_limits(section, fields, &mut variable);
+        variable
+    }
+
+    /// Limits that contradict each other or the default are not taken: the device is delivered with its default.
+    fn check_limits(&mut self, section: Section<'_>, fields: &Fields<'_>, variable: &mut Variable) {
+        let (low, high) = (magnitude(&variable.low), magnitude(&variable.high));
+        if let (Some(low), Some(high), Some(entry)) = (low, high, fields.low_limit)
+            && low > high
+        {
+            self.error(section, entry, "the low limit lies above the high limit", "no limits");
+            (variable.low, variable.high) = (None, None);
+            return;
+        }
+        let default = magnitude(&variable.default);
+        if let (Some(low), Some(default), Some(entry)) = (low, default, fields.low_limit)
+            && low > default
+        {
+            self.error(section, entry, "the low limit lies above the default value", "no low limit");
+            variable.low = None;
+        }
+        if let (Some(high), Some(default), Some(entry)) = (high, default, fields.high_limit)
+            && high < default
+        {
+            self.error(section, entry, "the high limit lies below the default value", "no high limit");
+            variable.high = None;
+        }
+    }
+
+    fn check_sub_number(&mut self, section: Section<'_>, fields: &Fields<'_>, object: &Object) {
+        let Some(entry) = fields.sub_number else {
+            self.warn_section(section, "no SubNumber", None);
+            return;
+        };
+        let Some(said) = self.count::<usize>(section, entry) else { return };
+        let there = object.variables.len();
+        if said != there {
+            self.warn(
+                section,
+                entry,
+                format!("SubNumber is {said}, but there are {there} sub-objects"),
+                Some(there.to_string()),
+            );
+        }
+    }
+}
+
+fn text(entry: Option<crate::document::Entry<'_>>) -> String {
+    entry.map(|entry| entry.value.to_owned()).unwrap_or_default()
+}
+
+/// A number to compare; limits that depend on the node-ID are compared without it.
+fn magnitude(value: &Option<Value>) -> Option<f64> {
+    match value.as_ref()? {
+        Value::Number(number) => Some(number.base as f64),
+        Value::Real(real) => Some(*real),
+        Value::Text(_) => None,
+    }
+}

@@ -1,0 +1,106 @@
+//! What has been read so far, and how findings are put down.
+
+use super::places::{self, Part, Place};
+use crate::document::{Document, Entry, LineKind, Section};
+use crate::{Eds, Finding, Findings, Refusal, Severity};
+
+/// What has been read so far.
+#[derive(Default)]
+pub(super) struct Reader {
+    pub(super) eds: Eds,
+    pub(super) findings: Findings,
+    pub(super) variables: usize,
+}
+
+impl Reader {
+    /// Lines that are nothing, and lines that belong to no section.
+    pub(super) fn strays(&mut self, document: &Document) -> Result<(), Refusal> {
+        let Some(first) = document.sections().next() else {
+            let next = "an EDS begins with [FileInfo] and [DeviceInfo]: is this the right file?";
+            return Err(Refusal::new(0, "the file has no sections", next));
+        };
+        for (line, kind, text) in document.lines() {
+            let what = match kind {
+                LineKind::Stray => "the line is no section, no key=value and no comment",
+                LineKind::Entry { .. } if line < first.line() => "a value before the first section",
+                _ => continue,
+            };
+            self.findings.push(Finding {
+                line,
+                section: String::new(),
+                key: None,
+                severity: Severity::Warning,
+                what: format!("{what}: {:?}", shortened(text.trim())),
+                taken_instead: Some("nothing".into()),
+            });
+        }
+        Ok(())
+    }
+
+    /// Reads a section, or puts it aside for its object.
+    pub(super) fn section<'a>(&mut self, section: Section<'a>, parts: &mut Vec<Part<'a>>) {
+        if !section.is_well_formed() {
+            let what = "the heading is not [name] and nothing else";
+            self.warn_section(section, what, Some(format!("[{}]", section.name())));
+        }
+        match places::place(section.name()) {
+            Place::Part(key) => parts.push(Part { key, section }),
+            Place::List => {}
+            Place::Info(which) => self.info(which, section),
+            Place::Module | Place::Unknown => self.keep(section),
+        }
+    }
+
+    pub(super) fn find(
+        &mut self,
+        severity: Severity,
+        section: &str,
+        entry: Option<Entry<'_>>,
+        line: u32,
+        what: String,
+        taken: Option<String>,
+    ) {
+        self.findings.push(Finding {
+            line: entry.map_or(line, |entry| entry.line),
+            section: section.to_owned(),
+            key: entry.map(|entry| entry.key.to_owned()),
+            severity,
+            what,
+            taken_instead: taken,
+        });
+    }
+
+    pub(super) fn warn(
+        &mut self,
+        section: Section<'_>,
+        entry: Entry<'_>,
+        what: impl Into<String>,
+        taken: Option<String>,
+    ) {
+        self.find(Severity::Warning, section.name(), Some(entry), 0, what.into(), taken);
+    }
+
+    pub(super) fn error(
+        &mut self,
+        section: Section<'_>,
+        entry: Entry<'_>,
+        what: impl Into<String>,
+        taken: impl Into<String>,
+    ) {
+        self.find(Severity::Error, section.name(), Some(entry), 0, what.into(), Some(taken.into()));
+    }
+
+    pub(super) fn warn_section(&mut self, section: Section<'_>, what: impl Into<String>, taken: Option<String>) {
+        self.find(Severity::Warning, section.name(), None, section.line(), what.into(), taken);
+    }
+
+    pub(super) fn error_section(&mut self, section: Section<'_>, what: impl Into<String>, taken: impl Into<String>) {
+        self.find(Severity::Error, section.name(), None, section.line(), what.into(), Some(taken.into()));
+    }
+}
+
+/// Text of a file as it is shown in a finding.
+pub(super) fn shortened(text: &str) -> String {
+    const MOST: usize = 40;
+    if text.chars().count() <= MOST { text.to_owned() } else { text.chars().take(MOST).chain("...".chars()).collect() }
+}

@@ -1,0 +1,64 @@
+//! Files of real makers, where somebody has some: `FERRODRIVE_EDS_FILES` names the folder. The project has none of them.
+
+use std::fs;
+use std::path::PathBuf;
+
+use eds::document::Document;
+use eds::{Eds, Severity};
+
+fn files() -> Vec<PathBuf> {
+    let Some(folder) = std::env::var_os("FERRODRIVE_EDS_FILES") else {
+        say("skipped: FERRODRIVE_EDS_FILES names no folder with EDS and DCF files");
+        return Vec::new();
+    };
+    let entries = fs::read_dir(&folder).expect("the folder of FERRODRIVE_EDS_FILES");
+    let paths = entries.map(|entry| entry.expect("a readable folder").path());
+    let ends = |path: &PathBuf| {
+        path.extension().is_some_and(|end| end.eq_ignore_ascii_case("eds") || end.eq_ignore_ascii_case("dcf"))
+    };
+    let mut files: Vec<PathBuf> = paths.filter(ends).collect();
+    files.sort();
+    assert!(!files.is_empty(), "no EDS or DCF in {}", folder.display());
+    files
+}
+
+#[allow(clippy::print_stderr, reason = "a test that has nothing to do says so")]
+fn say(text: &str) {
+    eprintln!("{text}");
+}
+
+#[test]
+fn every_file_is_read_or_refused_with_what_to_do() {
+    for path in files() {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        match Eds::load(&fs::read(&path).expect("a readable file")) {
+            Ok(reading) => {
+                let variables = reading.eds.variables().count();
+                let (errors, warnings) =
+                    (reading.findings.count(Severity::Error), reading.findings.count(Severity::Warning));
+                say(&format!(
+                    "{name}: {} objects, {variables} values, {errors} errors, {warnings} warnings",
+                    reading.eds.objects.len()
+                ));
+                if std::env::var_os("FERRODRIVE_EDS_FINDINGS").is_some() {
+                    reading.findings.iter().for_each(|finding| say(&format!("    {finding}")));
+                }
+                assert!(!reading.eds.objects.is_empty(), "{name}");
+                assert!(variables >= reading.eds.objects.len() / 2, "{name}");
+            }
+            Err(refusal) => {
+                say(&format!("{name}: refused: {refusal}"));
+                assert!(!refusal.reason.is_empty() && !refusal.next.is_empty(), "{name}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_file_comes_back_byte_by_byte() {
+    for path in files() {
+        let bytes = fs::read(&path).expect("a readable file");
+        let document = Document::parse(&bytes).expect("a file of a real size");
+        assert!(document.to_bytes() == bytes, "{}", path.display());
+    }
+}
