@@ -11,6 +11,7 @@ mod description;
 pub mod faults;
 pub mod mjoint;
 pub mod row;
+pub mod servo;
 pub mod variant;
 pub mod zltech;
 
