@@ -3,7 +3,7 @@
 //! Each public function is the body of one test and fails with the list of what differs.
 
 use canopen::NodeId;
-use canopen::od::{Access, Default, Dictionary, Entry, PdoMapping, Table};
+use canopen::od::{Access, DefaultValue, Dictionary, Entry, Table};
 use cia402::{Controlword, PowerEvent, PowerState, Statusword, transition};
 
 use crate::manual::{ObjectRow, PowerCell};
@@ -24,9 +24,9 @@ pub fn columns_are_the_manuals<const N: usize>(table: &'static Table, rows: &[Ob
 
 fn differences<const N: usize>(table: &'static Table, node: NodeId, ours: &Entry, row: &ObjectRow) -> Vec<String> {
     let default = match ours.default {
-        Default::Value(value) => Some(value),
-        Default::NodeIdPlus(base) => Some(i64::from(base) + i64::from(node.raw())),
-        Default::Text(_) => None,
+        DefaultValue::Value(value) => Some(value),
+        DefaultValue::NodeIdPlus(base) => Some(i64::from(base) + i64::from(node.raw())),
+        _ => None,
     };
     let pairs = [
         ("size", ours.data_type.size().to_string(), row.size.to_string()),
@@ -34,7 +34,7 @@ fn differences<const N: usize>(table: &'static Table, node: NodeId, ours: &Entry
         ("writable", ours.access.is_writable().to_string(), row.writable.to_string()),
         ("readable", (ours.access != Access::WriteOnly).to_string(), true.to_string()),
         ("stored", ours.stored.to_string(), row.stored.to_string()),
-        ("mappable", (ours.pdo == PdoMapping::Yes).to_string(), row.pdo_mappable.to_string()),
+        ("mappable", ours.pdo.is_allowed().to_string(), row.pdo_mappable.to_string()),
         // A measurement's default is what the drive puts there, not a figure of the manual.
         ("default", shown(default, row), shown(row.default, row)),
     ];

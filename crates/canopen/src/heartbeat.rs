@@ -2,7 +2,7 @@
 
 use can::{CanId, Frame, Instant};
 
-use crate::{NmtState, NodeId, cob};
+use crate::{NmtState, NodeId, connection_set};
 
 const NANOS_PER_MILLI: u64 = 1_000_000;
 
@@ -33,13 +33,13 @@ impl Heartbeat {
 
     /// Reads a frame with identifier 700h + node-ID and at least one byte; `None` for any other.
     pub fn parse(frame: &Frame) -> Option<Self> {
-        let cob::Service::Heartbeat(node) = cob::Service::of(frame.id())? else { return None };
+        let connection_set::Service::Heartbeat(node) = connection_set::Service::of(frame.id())? else { return None };
         frame.data().first().map(|state| Self { node, state: *state })
     }
 
     /// The frame.
     pub fn emit(self) -> Frame {
-        Frame::new(cob::heartbeat(self.node), &[self.state])
+        Frame::new(connection_set::heartbeat(self.node), &[self.state])
     }
 }
 
@@ -137,7 +137,7 @@ impl Consumer {
 
     /// The identifier of the frames that it wants.
     pub const fn can_id(&self) -> CanId {
-        cob::heartbeat(self.node)
+        connection_set::heartbeat(self.node)
     }
 
     /// True between a heartbeat and its loss.

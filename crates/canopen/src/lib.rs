@@ -6,8 +6,8 @@
 #![no_std]
 
 mod abort;
-pub mod cob;
 mod cob_id;
+pub mod connection_set;
 pub mod emcy;
 pub mod heartbeat;
 mod mux;

@@ -7,7 +7,7 @@ use core::fmt;
 
 use can::Frame;
 
-use crate::{NodeId, cob};
+use crate::{NodeId, connection_set};
 
 /// State of an NMT slave. Source: CiA 301, 7.3.2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -192,7 +192,7 @@ impl NmtRequest {
     /// # Errors
     /// What is wrong with the frame.
     pub fn parse(frame: &Frame) -> Result<Self, MalformedNmt> {
-        if frame.id() != cob::NMT || frame.is_remote() {
+        if frame.id() != connection_set::NMT || frame.is_remote() {
             return Err(MalformedNmt::OtherFrame);
         }
         let [code, node, ..] = frame.data() else { return Err(MalformedNmt::TooShort { dlc: frame.dlc() }) };
@@ -210,7 +210,7 @@ impl NmtRequest {
             NmtTarget::All => 0,
             NmtTarget::Node(node) => node.raw(),
         };
-        Frame::new(cob::NMT, &[self.command.code(), node])
+        Frame::new(connection_set::NMT, &[self.command.code(), node])
     }
 }
 

@@ -27,12 +27,12 @@ impl Sync {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cob;
+    use crate::connection_set;
 
     #[test]
     fn what_is_emitted_is_parsed_back() {
         for sync in [Sync { counter: None }, Sync { counter: Some(1) }, Sync { counter: Some(240) }] {
-            assert_eq!(Sync::parse(&sync.emit(cob::SYNC)), sync);
+            assert_eq!(Sync::parse(&sync.emit(connection_set::SYNC)), sync);
         }
     }
 }

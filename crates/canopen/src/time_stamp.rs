@@ -32,13 +32,13 @@ impl TimeOfDay {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cob;
+    use crate::connection_set;
 
     #[test]
     fn what_is_emitted_is_parsed_back() {
         // Noon of 2 January 1984.
         let time = TimeOfDay { millis: 43_200_000, days: 1 };
-        let frame = time.emit(cob::TIME);
+        let frame = time.emit(connection_set::TIME);
         assert_eq!(frame, "100#002E93020100".parse().unwrap());
         assert_eq!(TimeOfDay::parse(&frame), Some(time));
         assert_eq!(TimeOfDay::parse(&"100#002E930201".parse().unwrap()), None);

@@ -59,7 +59,10 @@ pub(crate) fn decode(model: Option<&Description>, row: Option<&'static Entry>, b
         decoded.meaning = meaning(model, row, value);
         decoded.hexadecimal = is_bit_field(row);
         decoded.measure(row.unit, value);
-    } else if let Some(form) = row.tpdo_form.filter(|form| form.data_type.size() == bytes.len()) {
+    } else if let Some(form) = model
+        .and_then(|model| model.pdo.mapping.tpdo_form(row.mux()))
+        .filter(|form| form.data_type.size() == bytes.len())
+    {
         // An object may have another length and unit in TPDOs.
         let value = form.data_type.value(raw());
         decoded.value = Some(value);

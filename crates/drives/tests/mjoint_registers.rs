@@ -67,7 +67,7 @@ fn every_written_value_is_taken_or_refused_as_over_sdo() {
     for register in &REGISTERS {
         let Mux { index, sub_index } = register.object;
         let type_range = row(register).data_type.range();
-        let limits = row(register).limits.unwrap_or(type_range);
+        let limits = row(register).integer_limits().unwrap_or(type_range);
         let edges =
             [limits.0, limits.1, type_range.0, type_range.1].into_iter().flat_map(|edge| [edge - 1, edge, edge + 1]);
         for value in edges.chain([0, 1, 2, 3, 17, -1]).filter(|value| (type_range.0..=type_range.1).contains(value)) {

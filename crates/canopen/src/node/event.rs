@@ -1,12 +1,12 @@
 use crate::NmtState;
-use crate::cob::PdoNumber;
 use crate::od::Slot;
 use crate::pdo::MAX_OBJECTS;
+use crate::pdo::PdoNumber;
 
 /// SYNC, and the objects of every RPDO that waited for it.
-const MOST_OF_SYNC: usize = 1 + PdoNumber::COUNT * MAX_OBJECTS;
+const MOST_OF_SYNC: usize = 1 + PdoNumber::PREDEFINED * MAX_OBJECTS;
 /// A frame that all RPDOs listen to, each of which was too short before: [`NodeEvent::RpdoFits`] and its objects.
-const MOST_OF_AN_RPDO: usize = PdoNumber::COUNT * (1 + MAX_OBJECTS);
+const MOST_OF_AN_RPDO: usize = PdoNumber::PREDEFINED * (1 + MAX_OBJECTS);
 
 /// How many events may wait for the owner: at least what one frame makes. An owner that polls after every `handle_*`
 /// never loses one; another is told [`NodeEvent::EventsLost`].

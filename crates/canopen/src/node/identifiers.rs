@@ -1,7 +1,8 @@
 //! Which of a node's services an identifier belongs to: looked up for every frame on the bus.
 
 use crate::NodeId;
-use crate::cob::{self, PdoNumber};
+use crate::connection_set;
+use crate::pdo::PdoNumber;
 
 /// Up to eight identifiers, side by side, so that a frame's is compared with all of them at once. Most frames on a bus
 /// are for others.
@@ -37,8 +38,8 @@ impl Identifiers {
     /// NMT and SDO requests to `node_id`.
     pub(super) fn of_requests(node_id: NodeId) -> Self {
         let mut identifiers = Self::NONE;
-        identifiers.set(Lane::NMT, cob::NMT.as_standard());
-        identifiers.set(Lane::SDO, cob::sdo_request(node_id).as_standard());
+        identifiers.set(Lane::NMT, connection_set::NMT.as_standard());
+        identifiers.set(Lane::SDO, connection_set::sdo_request(node_id).as_standard());
         identifiers
     }
 
@@ -59,7 +60,7 @@ impl Identifiers {
     }
 }
 
-const _: () = assert!(Lane::rpdo(PdoNumber::COUNT - 1).0 < LANES, "a lane for every service");
+const _: () = assert!(Lane::rpdo(PdoNumber::PREDEFINED - 1).0 < LANES, "a lane for every service");
 
 #[cfg(test)]
 mod tests {

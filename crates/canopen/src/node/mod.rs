@@ -35,6 +35,7 @@
 mod event;
 mod identifiers;
 mod objects;
+mod pdo_set;
 mod pending;
 mod profile;
 mod receive;
@@ -46,15 +47,16 @@ use event::EventQueue;
 pub use event::{EVENT_QUEUE_LENGTH, NodeEvent, Via};
 pub use profile::NodeProfile;
 
-use crate::cob::{PdoNumber, PdoSet};
 use crate::emcy::{self, Emcy, EmcyErrorCode};
 use crate::heartbeat;
 use crate::nmt::Transition;
 use crate::od::{Dictionary, Table};
+use crate::pdo::PdoNumber;
 use crate::pdo::{Rpdo, Tpdo};
 use crate::sdo::Server;
 use crate::{Mux, NmtCommand, NmtState, NodeId};
 use identifiers::Identifiers;
+use pdo_set::PdoSet;
 use pending::{Pending, Source};
 
 /// One device on the bus, with a dictionary of up to `N` entries.
@@ -81,8 +83,8 @@ pub struct Node<const N: usize> {
     emcy: emcy::Producer,
     emcy_id: Option<CanId>,
     sdo: Server,
-    rpdos: [Rpdo; PdoNumber::COUNT],
-    tpdos: [Tpdo; PdoNumber::COUNT],
+    rpdos: [Rpdo; PdoNumber::PREDEFINED],
+    tpdos: [Tpdo; PdoNumber::PREDEFINED],
     /// Active TPDOs that look at SYNC.
     synchronous_tpdos: PdoSet,
     /// RPDOs whose data waits for SYNC.
@@ -100,7 +102,7 @@ impl<const N: usize> Node<N> {
         Self {
             profile,
             node_id,
-            dictionary: Dictionary::new(profile.table, node_id),
+            dictionary: profile.factory_values(node_id),
             state: NmtState::Initialising,
             now: Instant::ZERO,
             deadline: Instant::FAR_FUTURE,
@@ -113,8 +115,8 @@ impl<const N: usize> Node<N> {
             emcy: emcy::Producer::new(),
             emcy_id: None,
             sdo: Server::new(profile.sdo_frame_length, profile.sdo_timeout_ns),
-            rpdos: [Rpdo::INVALID; PdoNumber::COUNT],
-            tpdos: [Tpdo::INVALID; PdoNumber::COUNT],
+            rpdos: [Rpdo::INVALID; PdoNumber::PREDEFINED],
+            tpdos: [Tpdo::INVALID; PdoNumber::PREDEFINED],
             synchronous_tpdos: PdoSet::NONE,
             latched_rpdos: PdoSet::NONE,
             short_rpdos: PdoSet::NONE,
@@ -199,7 +201,7 @@ impl<const N: usize> Node<N> {
         if !self.state.allows_pdo() {
             return;
         }
-        for position in 0..PdoNumber::COUNT {
+        for position in 0..PdoNumber::PREDEFINED {
             if self.tpdos[position].notice_change(&self.dictionary.view()) {
                 self.offer_tpdo(position);
             }
@@ -263,7 +265,7 @@ impl<const N: usize> Node<N> {
         self.state = state;
         self.push(NodeEvent::Nmt(state));
         if state.allows_pdo() {
-            for position in 0..PdoNumber::COUNT {
+            for position in 0..PdoNumber::PREDEFINED {
                 self.tpdos[position].start(self.now);
                 self.offer_tpdo(position);
             }
@@ -287,7 +289,7 @@ impl<const N: usize> Node<N> {
 
     fn stop_pdos(&mut self) {
         self.latched_rpdos = PdoSet::NONE;
-        for position in 0..PdoNumber::COUNT {
+        for position in 0..PdoNumber::PREDEFINED {
             let _ = self.rpdos[position].take_latched();
             self.tpdos[position].stop();
             self.pending.remove(Source::Tpdo(position));
@@ -340,7 +342,7 @@ impl<const N: usize> Station for Node<N> {
             self.offer_emcy();
             return;
         }
-        for position in 0..PdoNumber::COUNT {
+        for position in 0..PdoNumber::PREDEFINED {
             if self.tpdos[position].can_id() == frame.id() {
                 self.tpdos[position].handle_transmitted(now);
                 self.offer_tpdo(position);

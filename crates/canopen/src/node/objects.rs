@@ -2,15 +2,15 @@
 
 use super::identifiers::{Identifiers, Lane};
 use super::{Node, NodeEvent, Via};
-use crate::cob::PdoNumber;
 use crate::heartbeat;
 use crate::od::{Slot, View};
+use crate::pdo::PdoNumber;
 use crate::pdo::parameter::{COB_ID, INHIBIT_TIME, TRANSMISSION_TYPE};
 use crate::pdo::{
     Direction, Mapping, MappingRecord, Parameter, RPDO_MAPPING, RPDO_PARAMETER, Rpdo, TPDO_MAPPING, TPDO_PARAMETER,
     Tpdo, TransmissionType,
 };
-use crate::{AbortCode, CobId, Mux, cob};
+use crate::{AbortCode, CobId, Mux, connection_set};
 
 /// A PDO record of a multiplexor.
 #[derive(Clone, Copy)]
@@ -24,10 +24,10 @@ impl Record {
     const fn of(index: u16) -> Self {
         let position = (index & 3) as usize;
         match index & !3 {
-            RPDO_PARAMETER => Self::Parameter(Direction::Receive, position),
-            RPDO_MAPPING => Self::Mapping(Direction::Receive, position),
-            TPDO_PARAMETER => Self::Parameter(Direction::Transmit, position),
-            TPDO_MAPPING => Self::Mapping(Direction::Transmit, position),
+            RPDO_PARAMETER => Self::Parameter(Direction::Rpdo, position),
+            RPDO_MAPPING => Self::Mapping(Direction::Rpdo, position),
+            TPDO_PARAMETER => Self::Parameter(Direction::Tpdo, position),
+            TPDO_MAPPING => Self::Mapping(Direction::Tpdo, position),
             _ => Self::Other,
         }
     }
@@ -114,10 +114,10 @@ impl<const N: usize> Node<N> {
                 self.heartbeat = heartbeat::Producer::from_write(self.heartbeat_period_ms(), self.now);
                 self.offer_heartbeat();
             }
-            (_, Record::Parameter(Direction::Receive, position) | Record::Mapping(Direction::Receive, position)) => {
+            (_, Record::Parameter(Direction::Rpdo, position) | Record::Mapping(Direction::Rpdo, position)) => {
                 self.take_up_rpdo(position);
             }
-            (_, Record::Parameter(Direction::Transmit, position) | Record::Mapping(Direction::Transmit, position)) => {
+            (_, Record::Parameter(Direction::Tpdo, position) | Record::Mapping(Direction::Tpdo, position)) => {
                 let old = self.tpdos[position];
                 self.take_up_tpdo(position);
                 let tpdo = &mut self.tpdos[position];
@@ -135,7 +135,7 @@ impl<const N: usize> Node<N> {
         self.received = Identifiers::of_requests(self.node_id);
         self.take_up_sync();
         self.take_up_emcy();
-        for position in 0..PdoNumber::COUNT {
+        for position in 0..PdoNumber::PREDEFINED {
             self.take_up_rpdo(position);
             self.take_up_tpdo(position);
         }
@@ -156,7 +156,7 @@ impl<const N: usize> Node<N> {
 
     /// 1014h, or what it would be by default on a device without it.
     fn emcy_cob_id(&self) -> CobId {
-        self.object(0x1014).map_or(CobId(cob::emcy(self.node_id).raw()), CobId)
+        self.object(0x1014).map_or(CobId(connection_set::emcy(self.node_id).raw()), CobId)
     }
 
     fn take_up_emcy(&mut self) {
@@ -168,7 +168,7 @@ impl<const N: usize> Node<N> {
     fn take_up_rpdo(&mut self, position: usize) {
         let values = self.dictionary.view();
         let parameter = Parameter::read(&values, RPDO_PARAMETER + position as u16);
-        let mapping = Mapping::read(&values, RPDO_MAPPING + position as u16, Direction::Receive, self.profile.mapping);
+        let mapping = Mapping::read(&values, RPDO_MAPPING + position as u16, Direction::Rpdo, self.profile.mapping);
         // A mapping that does not resolve (a store of another firmware) maps nothing.
         let rpdo = Rpdo::configure(&parameter, mapping.unwrap_or(None));
         self.received.set(Lane::rpdo(position), rpdo.standard_id());
@@ -179,7 +179,7 @@ impl<const N: usize> Node<N> {
     fn take_up_tpdo(&mut self, position: usize) {
         let values = self.dictionary.view();
         let parameter = Parameter::read(&values, TPDO_PARAMETER + position as u16);
-        let mapping = Mapping::read(&values, TPDO_MAPPING + position as u16, Direction::Transmit, self.profile.mapping);
+        let mapping = Mapping::read(&values, TPDO_MAPPING + position as u16, Direction::Tpdo, self.profile.mapping);
         let tpdo = Tpdo::configure(
             &parameter,
             mapping.unwrap_or(None),

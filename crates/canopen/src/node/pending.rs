@@ -1,4 +1,4 @@
-use crate::cob::PdoNumber;
+use crate::pdo::PdoNumber;
 
 /// A service that may have a frame to send.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,7 +35,7 @@ impl Source {
     }
 }
 
-const _: () = assert!(FIRST_TPDO as usize + PdoNumber::COUNT == 7, "a bit for every source");
+const _: () = assert!(FIRST_TPDO as usize + PdoNumber::PREDEFINED == 7, "a bit for every source");
 
 /// Which services have a frame that may be sent now.
 #[derive(Clone, Copy, Debug)]

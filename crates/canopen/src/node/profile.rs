@@ -1,8 +1,8 @@
-use crate::NmtState;
 use crate::emcy::EmcyErrorCode;
-use crate::od::Table;
+use crate::od::{Conditions, Dictionary, Table};
 use crate::pdo::{EventTrigger, MappingRules};
 use crate::sdo::server::FrameLength;
+use crate::{NmtState, NodeId};
 
 /// What differs between devices in their communication. Constant data.
 ///
@@ -11,6 +11,8 @@ use crate::sdo::server::FrameLength;
 pub struct NodeProfile {
     /// The object rows.
     pub table: &'static Table,
+    /// What downloads have to pass besides their rows.
+    pub conditions: &'static Conditions,
     /// NMT state entered after boot-up.
     pub start_state: NmtState,
     /// The device sends EMCY messages.
@@ -45,6 +47,7 @@ impl NodeProfile {
     pub const fn cia_301(table: &'static Table) -> Self {
         Self {
             table,
+            conditions: Conditions::NONE,
             start_state: NmtState::PreOperational,
             emcy: true,
             inhibit_unit_ns: 100_000,
@@ -56,6 +59,16 @@ impl NodeProfile {
             sdo_frame_length: FrameLength::Eight,
             sdo_timeout_ns: Self::SDO_TIMEOUT_NS,
         }
+    }
+}
+
+impl NodeProfile {
+    /// Factory values for a device with this node-ID.
+    ///
+    /// # Panics
+    /// If the table has more than `N` rows.
+    pub fn factory_values<const N: usize>(&self, node_id: NodeId) -> Dictionary<N> {
+        Dictionary::new(self.table, node_id).with_conditions(self.conditions)
     }
 }
 

@@ -5,8 +5,8 @@ use can::Frame;
 use super::identifiers::Lane;
 use super::pending::Source;
 use super::{Node, NodeEvent, Via};
-use crate::cob::PdoNumber;
 use crate::nmt;
+use crate::pdo::PdoNumber;
 use crate::pdo::Reception;
 
 impl<const N: usize> Node<N> {
@@ -73,7 +73,7 @@ impl<const N: usize> Node<N> {
 
     #[inline(never)]
     fn receive_rpdos(&mut self, frame: &Frame, id: u16) {
-        for position in 0..PdoNumber::COUNT {
+        for position in 0..PdoNumber::PREDEFINED {
             if self.received.has(Lane::rpdo(position), id) {
                 self.receive_rpdo(frame, position);
             }
@@ -106,7 +106,7 @@ impl<const N: usize> Node<N> {
     fn refuse_short_rpdo(&mut self, position: usize) {
         if !self.short_rpdos.contains(position) {
             self.short_rpdos.set(position, true);
-            self.push(NodeEvent::RpdoTooShort(PdoNumber::ALL[position]));
+            self.push(NodeEvent::RpdoTooShort(number_at(position)));
         }
     }
 
@@ -114,14 +114,14 @@ impl<const N: usize> Node<N> {
     fn accept_after_short(&mut self, position: usize) {
         if self.short_rpdos.contains(position) {
             self.short_rpdos.set(position, false);
-            self.push(NodeEvent::RpdoFits(PdoNumber::ALL[position]));
+            self.push(NodeEvent::RpdoFits(number_at(position)));
         }
     }
 
     /// Stores each mapped object whose value may be written; the others keep their value.
     #[inline(always)]
     fn apply_rpdo(&mut self, position: usize, data: u64) {
-        let via = Via::Rpdo(PdoNumber::ALL[position]);
+        let via = Via::Rpdo(number_at(position));
         let Some(mapping) = self.rpdos[position].mapping() else { return };
         for object in mapping.objects() {
             // A refused value has nobody to tell: RPDOs are not confirmed. Communication objects cannot be mapped.
@@ -130,4 +130,8 @@ impl<const N: usize> Node<N> {
             }
         }
     }
+}
+
+fn number_at(position: usize) -> PdoNumber {
+    PdoNumber::at(position).unwrap_or(PdoNumber::FIRST)
 }

@@ -4,8 +4,9 @@ use can::{CanId, Frame};
 
 use super::Node;
 use super::pending::Source;
-use crate::cob::{self, PdoNumber};
+use crate::connection_set;
 use crate::heartbeat::Heartbeat;
+use crate::pdo::PdoNumber;
 
 impl<const N: usize> Node<N> {
     #[inline(never)]
@@ -25,7 +26,7 @@ impl<const N: usize> Node<N> {
     pub(super) fn reschedule(&mut self) {
         self.deadline = self.heartbeat.deadline().min(self.sdo.deadline());
         self.offer_emcy();
-        for position in 0..PdoNumber::COUNT {
+        for position in 0..PdoNumber::PREDEFINED {
             self.offer_tpdo(position);
         }
     }
@@ -45,8 +46,8 @@ impl<const N: usize> Node<N> {
             Source::BootUp => 0,
             Source::Emcy => self.emcy_id.map_or(u32::MAX, CanId::raw),
             Source::Tpdo(position) => self.tpdos[position].can_id().raw(),
-            Source::SdoReply => cob::sdo_reply(self.node_id).raw(),
-            Source::Heartbeat => cob::heartbeat(self.node_id).raw(),
+            Source::SdoReply => connection_set::sdo_reply(self.node_id).raw(),
+            Source::Heartbeat => connection_set::heartbeat(self.node_id).raw(),
         }
     }
 
@@ -57,7 +58,9 @@ impl<const N: usize> Node<N> {
                 let state = self.heartbeat_state.unwrap_or(self.state.heartbeat_byte());
                 Some(Heartbeat { node: self.node_id, state }.emit())
             }
-            Source::SdoReply => self.sdo.take_reply().map(|bytes| Frame::full(cob::sdo_reply(self.node_id), bytes)),
+            Source::SdoReply => {
+                self.sdo.take_reply().map(|bytes| Frame::full(connection_set::sdo_reply(self.node_id), bytes))
+            }
             Source::Tpdo(position) => {
                 let frame = self.tpdos[position].take(&self.dictionary.view(), self.now);
                 self.deadline = self.deadline.min(self.tpdos[position].deadline(self.now));

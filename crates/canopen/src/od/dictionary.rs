@@ -1,4 +1,4 @@
-use super::{Default, Gate, Object, Scalar, Slot, Table};
+use super::{Condition, Conditions, DefaultValue, Gate, Kind, Object, Scalar, Slot, Table, ValueRange};
 use crate::{AbortCode, Mux, NodeId};
 
 /// The values of a device's objects: one 32-bit cell a row of its [`Table`], little endian in the low bytes.
@@ -7,12 +7,13 @@ use crate::{AbortCode, Mux, NodeId};
 #[derive(Clone)]
 pub struct Dictionary<const N: usize> {
     table: &'static Table,
+    conditions: &'static Conditions,
     cells: [u32; N],
     /// See [`set_resolution`](Self::set_resolution).
     resolution: u32,
 }
 
-/// All values, to look at only; what a [`super::Check`] sees.
+/// All values, to look at only; what a [`Check`](super::Check) sees.
 #[derive(Clone, Copy)]
 pub struct View<'a> {
     table: &'static Table,
@@ -26,11 +27,18 @@ impl<const N: usize> Dictionary<N> {
     /// If the table has more than `N` rows.
     pub fn new(table: &'static Table, node_id: NodeId) -> Self {
         assert!(table.rows().len() <= N, "the table has more rows than the dictionary has cells");
-        let mut dictionary = Self { table, cells: [0; N], resolution: 1 };
+        let mut dictionary = Self { table, conditions: Conditions::NONE, cells: [0; N], resolution: 1 };
         for (slot, _) in table.iter() {
             dictionary.cells[slot.position()] = default_raw(table, slot, node_id);
         }
         dictionary
+    }
+
+    /// The same values under the conditions of a firmware.
+    #[must_use]
+    pub const fn with_conditions(mut self, conditions: &'static Conditions) -> Self {
+        self.conditions = conditions;
+        self
     }
 
     /// The rows.
@@ -88,7 +96,8 @@ impl<const N: usize> Dictionary<N> {
         self.resolution
     }
 
-    /// Whether a peer (SDO or RPDO) may write `raw` to this row: access, listed values, limits, the row's check.
+    /// Whether a peer (SDO or RPDO) may write `raw` to this row: access, listed values, limits, the firmware's
+    /// condition.
     ///
     /// # Errors
     /// The abort code that an SDO server answers. Nothing is stored.
@@ -115,7 +124,7 @@ impl<const N: usize> Dictionary<N> {
         if !gate.admits(raw) {
             return self.ask_row(slot, raw);
         }
-        gate.check().map_or(Ok(()), |check| check(&self.view(), raw))
+        self.check_condition(slot, raw)
     }
 
     /// Why a row does not take a value, if that is so.
@@ -126,11 +135,20 @@ impl<const N: usize> Dictionary<N> {
             return Err(AbortCode::READ_ONLY);
         }
         let value = row.data_type.value(raw);
-        match row.resolution {
-            Some(_) => row.check_value_at(value, self.resolution.into())?,
-            None => row.check_value(value)?,
+        match (row.data_type.kind(), row.resolution) {
+            (Kind::Real, _) => check_real(f32::from_raw(raw).into(), row.limits)?,
+            (_, Some(_)) => row.check_value_at(value, self.resolution.into())?,
+            (_, None) => row.check_value(value)?,
         }
-        row.check.map_or(Ok(()), |check| check(&self.view(), raw))
+        self.check_condition(slot, raw)
+    }
+
+    #[inline(always)]
+    fn check_condition(&self, slot: Slot, raw: u32) -> Result<(), AbortCode> {
+        match self.conditions.of(slot) {
+            None => Ok(()),
+            Some(Condition::Check(check)) => check(&self.view(), raw),
+        }
     }
 }
 
@@ -163,9 +181,19 @@ impl View<'_> {
 fn default_raw(table: &Table, slot: Slot, node_id: NodeId) -> u32 {
     let row = table.row(slot);
     match row.default {
-        Default::Value(value) => row.data_type.raw(value),
-        Default::NodeIdPlus(base) => base + u32::from(node_id.raw()),
-        Default::Text(_) => 0,
+        DefaultValue::Value(value) => row.data_type.raw(value),
+        DefaultValue::Real(value) => (value as f32).to_raw(),
+        DefaultValue::NodeIdPlus(base) => base.wrapping_add(node_id.raw().into()) & row.data_type.mask(),
+        DefaultValue::Unsigned(_) | DefaultValue::Text(_) | DefaultValue::Bytes(_) => 0,
+    }
+}
+
+fn check_real(value: f64, limits: Option<ValueRange>) -> Result<(), AbortCode> {
+    match limits {
+        Some(ValueRange::Real(min, _)) if value < min => Err(AbortCode::VALUE_TOO_LOW),
+        Some(ValueRange::Real(_, max)) if value > max => Err(AbortCode::VALUE_TOO_HIGH),
+        Some(ValueRange::Real(..)) if value.is_nan() => Err(AbortCode::INVALID_VALUE),
+        _ => Ok(()),
     }
 }
 

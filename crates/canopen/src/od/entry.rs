@@ -1,4 +1,4 @@
-use super::{DataType, View};
+use super::{DataType, Kind, ValueRange};
 use crate::{AbortCode, Mux};
 
 /// How SDO may use an object. Source: CiA 301, table 43.
@@ -43,28 +43,34 @@ pub enum PdoMapping {
     No,
     /// Into TPDOs if readable, into RPDOs if writable.
     Yes,
+    /// Into RPDOs only (`rww` of an EDS file).
+    Receive,
+    /// Into TPDOs only (`rwr` of an EDS file).
+    Transmit,
 }
 
-/// How an object looks in TPDOs, where SDO shows it otherwise.
-#[derive(Clone, Copy, Debug)]
-pub struct TpdoForm {
-    /// Its type there.
-    pub data_type: DataType,
-    /// Unit of one count of the value there.
-    pub unit: &'static str,
-    /// The value there from the object's cell.
-    pub convert: fn(u32) -> u32,
+impl PdoMapping {
+    /// Into PDOs of one direction at least.
+    pub const fn is_allowed(self) -> bool {
+        !matches!(self, Self::No)
+    }
 }
 
 /// The value after a factory reset.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Default {
-    /// A number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DefaultValue {
+    /// A whole number, of BOOLEAN, INTEGER and UNSIGNED; of a time its milliseconds.
     Value(i64),
+    /// An UNSIGNED64 beyond the largest `i64`.
+    Unsigned(u64),
+    /// A REAL32 or REAL64.
+    Real(f64),
     /// A number plus the node-ID, as COB-IDs have it.
     NodeIdPlus(u32),
-    /// A constant text (VISIBLE_STRING).
+    /// The text of a VISIBLE_STRING.
     Text(&'static str),
+    /// The bytes of any type as an SDO carries them.
+    Bytes(&'static [u8]),
 }
 
 /// Another object that holds the values of an object back: one beyond it is accepted, and acts as if it were at it.
@@ -75,11 +81,6 @@ pub struct HeldTo {
     /// Counts of the object held back in one count of that one, at a resolution of 1.
     pub counts: i64,
 }
-
-/// What must hold for a download besides type, access and range: sees all values, refuses with an abort code.
-///
-/// The second argument is the raw cell to be written. Nothing is stored when the check fails.
-pub type Check = fn(&View<'_>, u32) -> Result<(), AbortCode>;
 
 /// One row of an object table: what a manual prints about one sub-index.
 ///
@@ -99,10 +100,10 @@ pub struct Entry {
     /// The manual's words, or the standard's.
     pub title: &'static str,
     /// Factory value.
-    pub default: Default,
+    pub default: DefaultValue,
     /// Smallest and largest value accepted, if narrower than the type; at a [`resolution`](Self::resolution) of 1, where there
     /// is one.
-    pub limits: Option<(i64, i64)>,
+    pub limits: Option<ValueRange>,
     /// The only values accepted, with their meaning; empty when any value in the limits is.
     pub values: &'static [(i64, &'static str)],
     /// Unit of one count of the value, e.g. `0.1 r/min`; empty for none. At a [`resolution`](Self::resolution) of 1, where
@@ -118,10 +119,8 @@ pub struct Entry {
     pub saved: bool,
     /// May be mapped into PDOs.
     pub pdo: PdoMapping,
-    /// Another type and scale in TPDOs.
-    pub tpdo_form: Option<TpdoForm>,
-    /// Further condition on downloads.
-    pub check: Option<Check>,
+    /// Most bytes of a string or DOMAIN; 0 for one that never changes.
+    pub capacity: u32,
 }
 
 impl Entry {
@@ -141,7 +140,7 @@ impl Entry {
             access,
             name,
             title,
-            default: Default::Value(0),
+            default: DefaultValue::Value(0),
             limits: None,
             values: &[],
             unit: "",
@@ -150,32 +149,68 @@ impl Entry {
             stored: false,
             saved: false,
             pdo: PdoMapping::No,
-            tpdo_form: None,
-            check: None,
+            capacity: 0,
         }
     }
 
     /// Factory value.
     pub const fn default(mut self, value: i64) -> Self {
-        self.default = Default::Value(value);
+        self.default = DefaultValue::Value(value);
         self
     }
 
     /// Factory value `base` + node-ID.
     pub const fn node_id_plus(mut self, base: u32) -> Self {
-        self.default = Default::NodeIdPlus(base);
+        self.default = DefaultValue::NodeIdPlus(base);
         self
     }
 
-    /// Constant text.
+    /// Factory value of an UNSIGNED64.
+    pub const fn default_unsigned(mut self, value: u64) -> Self {
+        self.default = DefaultValue::Unsigned(value);
+        self
+    }
+
+    /// Factory value of a REAL32 or REAL64.
+    pub const fn default_real(mut self, value: f64) -> Self {
+        self.default = DefaultValue::Real(value);
+        self
+    }
+
+    /// The text of a VISIBLE_STRING: constant without a [`capacity`](Self::capacity), else the factory value.
     pub const fn text(mut self, text: &'static str) -> Self {
-        self.default = Default::Text(text);
+        self.default = DefaultValue::Text(text);
+        self
+    }
+
+    /// Factory value of any type, as an SDO carries it; constant for a string or DOMAIN without a
+    /// [`capacity`](Self::capacity).
+    pub const fn bytes(mut self, bytes: &'static [u8]) -> Self {
+        self.default = DefaultValue::Bytes(bytes);
+        self
+    }
+
+    /// Most bytes that a string or DOMAIN holds: it can be written, by a peer if its access allows it.
+    pub const fn capacity(mut self, bytes: u32) -> Self {
+        self.capacity = bytes;
         self
     }
 
     /// Smallest and largest value accepted.
     pub const fn range(mut self, min: i64, max: i64) -> Self {
-        self.limits = Some((min, max));
+        self.limits = Some(ValueRange::Integer(min, max));
+        self
+    }
+
+    /// Smallest and largest value accepted of an UNSIGNED64.
+    pub const fn range_unsigned(mut self, min: u64, max: u64) -> Self {
+        self.limits = Some(ValueRange::Unsigned(min, max));
+        self
+    }
+
+    /// Smallest and largest value accepted of a REAL32 or REAL64.
+    pub const fn range_real(mut self, min: f64, max: f64) -> Self {
+        self.limits = Some(ValueRange::Real(min, max));
         self
     }
 
@@ -226,16 +261,9 @@ impl Entry {
         self
     }
 
-    /// May be mapped into TPDOs, with another type and scale than SDO shows.
-    pub const fn mappable_as(mut self, form: TpdoForm) -> Self {
-        self.pdo = PdoMapping::Yes;
-        self.tpdo_form = Some(form);
-        self
-    }
-
-    /// Further condition on downloads.
-    pub const fn check(mut self, check: Check) -> Self {
-        self.check = Some(check);
+    /// May be mapped into PDOs in this way.
+    pub const fn mapping(mut self, pdo: PdoMapping) -> Self {
+        self.pdo = pdo;
         self
     }
 
@@ -249,12 +277,22 @@ impl Entry {
         matches!(self.index, 0x1000..=0x1FFF)
     }
 
-    /// The text of a VISIBLE_STRING; `None` for a number.
-    pub const fn constant_text(&self) -> Option<&'static str> {
-        match (self.data_type, self.default) {
-            (DataType::VisibleString, Default::Text(text)) => Some(text),
-            (DataType::VisibleString, _) => Some(""),
+    /// The bytes of a string or DOMAIN that never changes, as an SDO carries them; `None` for any other object.
+    pub const fn constant_bytes(&self) -> Option<&'static [u8]> {
+        match (self.data_type.kind(), self.default) {
+            (Kind::Bytes, _) if self.capacity > 0 => None,
+            (Kind::Bytes, DefaultValue::Text(text)) => Some(text.as_bytes()),
+            (Kind::Bytes, DefaultValue::Bytes(bytes)) => Some(bytes),
+            (Kind::Bytes, _) => Some(&[]),
             _ => None,
+        }
+    }
+
+    /// Smallest and largest whole number accepted, where the row has narrower ones than the type.
+    pub const fn integer_limits(&self) -> Option<(i64, i64)> {
+        match self.limits {
+            Some(limits) => limits.integers(),
+            None => None,
         }
     }
 
@@ -267,7 +305,9 @@ impl Entry {
     /// without one.
     pub fn limits_at(&self, resolution: i64) -> (i64, i64) {
         let (low, high) = self.data_type.range();
-        self.limits.map_or((low, high), |(min, max)| ((min * resolution).max(low), (max * resolution).min(high)))
+        let limits = self.integer_limits();
+        let times = |limit: i64| limit.saturating_mul(resolution);
+        limits.map_or((low, high), |(min, max)| (times(min).max(low), times(max).min(high)))
     }
 
     /// Checks a number against listed values and limits, those at a resolution of 1.
@@ -279,7 +319,7 @@ impl Entry {
         if !self.values.is_empty() && self.meaning(value).is_none() {
             return Err(AbortCode::INVALID_VALUE);
         }
-        self.limits.map_or(Ok(()), |limits| check_limits(value, limits))
+        check_limits(value, self.limits_at(1))
     }
 
     /// Checks a number of a row with a resolution against the limits at that resolution.

@@ -1,10 +1,9 @@
-use super::{Check, Entry, Summary};
+use super::{Entry, Summary};
 
 /// What a written value has to pass, resolved from the row at compile time: one subtraction, one comparison and one bit,
-/// whatever the row's type, limits and list are, and the row's own check.
+/// whatever the row's type, limits and list are.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gate {
-    check: Option<Check>,
     /// Which bits of a cell the type uses.
     mask: u32,
     /// The cell of the smallest value taken.
@@ -17,17 +16,17 @@ pub(super) struct Gate {
 
 impl Gate {
     /// Of no row: nothing passes.
-    pub(super) const CLOSED: Self = Self { check: None, mask: u32::MAX, low: 0, span: 0, listed: 0 };
+    pub(super) const CLOSED: Self = Self { mask: u32::MAX, low: 0, span: 0, listed: 0 };
 
-    /// Closed, and the row itself has to be asked, where nothing may be written or where a list's values lie too far apart
-    /// for the bits. Limits that move with a resolution are those at 1, which are the narrowest: beyond them the row is asked.
+    /// Closed, and the row itself has to be asked, where nothing may be written, of reals, and where a list's values lie too
+    /// far apart for the bits. ValueRange that move with a resolution are those at 1, which are the narrowest: beyond them the row is asked.
     pub(super) const fn of(row: &Entry) -> Self {
         let mask = row.data_type.mask();
-        if !Summary::of(row).is_writable() {
+        if !Summary::of(row).is_writable() || !row.data_type.is_integer() {
             return Self { mask, ..Self::CLOSED };
         }
         let (mut low, mut high) = row.data_type.range();
-        if let Some((min, max)) = row.limits {
+        if let Some((min, max)) = row.integer_limits() {
             low = if min > low { min } else { low };
             high = if max < high { max } else { high };
         }
@@ -35,19 +34,13 @@ impl Gate {
         if low > high {
             return Self { mask, ..Self::CLOSED };
         }
-        Self { check: row.check, mask, low: row.data_type.raw(low), span: (high - low) as u32, listed }
+        Self { mask, low: row.data_type.raw(low), span: (high - low) as u32, listed }
     }
 
     /// Which bits of a cell the type uses.
     #[inline]
     pub(super) const fn mask(&self) -> u32 {
         self.mask
-    }
-
-    /// The row's own check.
-    #[inline]
-    pub(super) const fn check(&self) -> Option<Check> {
-        self.check
     }
 
     /// True if the row may be written and takes this cell. If not, the row knows why, or knows better.
@@ -87,10 +80,13 @@ const fn listed(row: &Entry, low: i64, high: i64) -> (i64, i64, u32) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Access, DataType};
+    use super::super::{Access, DataType, ValueRange};
     use super::*;
 
-    const TYPES: [DataType; 6] = [
+    const TYPES: [DataType; 9] = [
+        DataType::Boolean,
+        DataType::Integer24,
+        DataType::Unsigned24,
         DataType::Integer8,
         DataType::Integer16,
         DataType::Integer32,
@@ -102,8 +98,9 @@ mod tests {
     /// Asks of every cell of a narrow type, and of those about every bound of a wide one.
     fn assert_agrees(row: &Entry, only_if_it_says_so: bool) {
         let (gate, mask) = (Gate::of(row), row.data_type.mask());
-        let ends = [0, mask, mask / 2, 0x8000_0000, row.data_type.raw(row.limits.map_or(0, |limits| limits.0))];
-        let bounds = ends.into_iter().chain(row.limits.map(|limits| row.data_type.raw(limits.1)));
+        let ends =
+            [0, mask, mask / 2, 0x8000_0000, row.data_type.raw(row.integer_limits().map_or(0, |limits| limits.0))];
+        let bounds = ends.into_iter().chain(row.integer_limits().map(|limits| row.data_type.raw(limits.1)));
         let near =
             bounds.flat_map(|bound| (0..200_u32).map(move |off| bound.wrapping_add(off).wrapping_sub(100) & mask));
         let narrow = if mask < 0x1_0000 { mask } else { 0 };
@@ -123,7 +120,7 @@ mod tests {
             for values in LISTS {
                 for limits in limits {
                     let mut row = Entry::new(0x2000, 0, data_type, Access::ReadWrite, "", "").values(values);
-                    row.limits = limits;
+                    row.limits = limits.map(|(min, max)| ValueRange::Integer(min, max));
                     assert_agrees(&row, false);
                 }
             }

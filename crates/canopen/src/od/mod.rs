@@ -5,16 +5,20 @@
 //! one 32-bit cell a row. Objects longer than four bytes are constant texts of the table: none of the drives
 //! has a writable one.
 
+mod condition;
 mod data_type;
 mod dictionary;
 mod entry;
 mod gate;
 mod summary;
 mod table;
+mod value_range;
 
-pub use data_type::{DataType, Scalar};
+pub use condition::{Check, Condition, Conditions, condition_numbers};
+pub use data_type::{DataType, Kind, Scalar};
 pub use dictionary::{Dictionary, View};
-pub use entry::{Access, Check, Default, Entry, HeldTo, PdoMapping, TpdoForm};
+pub use entry::{Access, DefaultValue, Entry, HeldTo, PdoMapping};
 use gate::Gate;
 use summary::Summary;
 pub use table::{MAX_ROWS, Object, Slot, Table, keys};
+pub use value_range::ValueRange;

@@ -1,4 +1,4 @@
-use super::{DataType, Entry};
+use super::Entry;
 
 /// What every request must know of a row, in one byte: an upload needs no more of it, a download its [`Gate`](super::Gate)
 /// too. Rows are wide; the summaries of a whole table take a few cache lines.
@@ -7,7 +7,7 @@ pub(crate) struct Summary(u8);
 
 /// Bytes of a cell that the type leaves zero.
 const UNUSED_BYTES: u8 = 0b11;
-const TEXT: u8 = 1 << 2;
+const LONG: u8 = 1 << 2;
 const READABLE: u8 = 1 << 3;
 const WRITABLE: u8 = 1 << 4;
 const COMMUNICATION: u8 = 1 << 5;
@@ -17,13 +17,13 @@ impl Summary {
     pub(super) const NONE: Self = Self(0);
 
     pub(super) const fn of(row: &Entry) -> Self {
-        let is_text = matches!(row.data_type, DataType::VisibleString);
-        let unused = if is_text { 0 } else { MAX_SIZE - row.data_type.size() as u8 };
+        let is_long = !row.data_type.fits_cell();
+        let unused = if is_long { 0 } else { MAX_SIZE - row.data_type.size() as u8 };
         Self(
             unused
-                | flag(TEXT, is_text)
+                | flag(LONG, is_long)
                 | flag(READABLE, row.access.is_readable())
-                | flag(WRITABLE, row.access.is_writable() && !is_text)
+                | flag(WRITABLE, row.access.is_writable() && !is_long)
                 | flag(COMMUNICATION, row.is_communication()),
         )
     }
@@ -40,10 +40,10 @@ impl Summary {
         u32::MAX >> ((self.0 & UNUSED_BYTES) * 8)
     }
 
-    /// A constant text.
+    /// Not in a cell.
     #[inline]
-    pub(crate) const fn is_text(self) -> bool {
-        self.0 & TEXT != 0
+    pub(crate) const fn is_long(self) -> bool {
+        self.0 & LONG != 0
     }
 
     /// SDO upload is allowed.
@@ -52,7 +52,7 @@ impl Summary {
         self.0 & READABLE != 0
     }
 
-    /// SDO download is allowed: never of a text.
+    /// SDO download is allowed.
     #[inline]
     pub(crate) const fn is_writable(self) -> bool {
         self.0 & WRITABLE != 0
@@ -74,7 +74,7 @@ const fn flag(bit: u8, set: bool) -> u8 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Access;
+    use super::super::{Access, DataType};
     use super::*;
 
     #[test]
@@ -87,15 +87,15 @@ mod tests {
                 assert_eq!(summary.mask(), data_type.mask());
                 assert_eq!(summary.is_readable(), access.is_readable());
                 assert_eq!(summary.is_writable(), access.is_writable());
-                assert!(!summary.is_text() && !summary.is_communication());
+                assert!(!summary.is_long() && !summary.is_communication());
             }
         }
     }
 
     #[test]
-    fn a_text_is_readable_only() {
+    fn a_constant_text_is_readable_only() {
         let summary = Summary::of(&Entry::new(0x1008, 0, DataType::VisibleString, Access::ReadWrite, "", ""));
-        assert!(summary.is_text() && summary.is_communication() && summary.is_readable());
+        assert!(summary.is_long() && summary.is_communication() && summary.is_readable());
         assert!(!summary.is_writable());
     }
 }

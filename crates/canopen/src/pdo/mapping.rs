@@ -1,21 +1,13 @@
 //! What a PDO carries (CiA 301, 7.5.2.36 and 7.5.2.38): records 1600h and 1A00h, resolved to cells.
 
-use crate::od::{PdoMapping, Slot, View};
+use super::{Direction, TpdoForm};
+use crate::od::{DataType, PdoMapping, Slot, View};
 use crate::{AbortCode, Mux};
 
 /// Most objects in one PDO: eight of one byte.
 pub const MAX_OBJECTS: usize = 8;
 /// Bits of a PDO.
 pub const MAX_BITS: u32 = 64;
-
-/// Device's point of view.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Direction {
-    /// To the device: objects must be writable.
-    Receive,
-    /// From the device: objects must be readable.
-    Transmit,
-}
 
 /// What entries of a mapping record a device takes beyond those of CiA 301.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,11 +16,18 @@ pub struct MappingRules {
     pub longer_entries: bool,
     /// Entries of 0 may be counted in. They carry nothing.
     pub empty_entries: bool,
+    /// The objects that TPDOs show in another form than SDO does.
+    pub tpdo_forms: &'static [TpdoForm],
 }
 
 impl MappingRules {
     /// None.
-    pub const CIA_301: Self = Self { longer_entries: false, empty_entries: false };
+    pub const CIA_301: Self = Self { longer_entries: false, empty_entries: false, tpdo_forms: &[] };
+
+    /// The form of an object in TPDOs, where it is another than SDO shows.
+    pub fn tpdo_form(&self, object: Mux) -> Option<&'static TpdoForm> {
+        self.tpdo_forms.iter().find(|form| form.object == object)
+    }
 }
 
 /// One entry of a mapping record: which object, how many bits.
@@ -58,18 +57,20 @@ impl MappingRecord {
     pub fn resolve(self, values: &View<'_>, direction: Direction, rules: MappingRules) -> Result<Slot, AbortCode> {
         let slot = values.table().find(self.mux).map_err(|_| AbortCode::NO_SUCH_OBJECT)?;
         let row = values.table().row(slot);
-        let allowed = match direction {
+        let allowed = match (direction, row.pdo) {
+            (_, PdoMapping::No) | (Direction::Rpdo, PdoMapping::Transmit) => false,
+            (Direction::Tpdo, PdoMapping::Receive) => false,
             // Communication objects take effect by more than their value: by SDO only.
-            Direction::Receive => row.access.is_writable() && !row.is_communication(),
-            Direction::Transmit => row.access.is_readable(),
+            (Direction::Rpdo, _) => row.access.is_writable() && !row.is_communication(),
+            (Direction::Tpdo, _) => row.access.is_readable(),
         };
-        let data_type = match (direction, row.tpdo_form) {
-            (Direction::Transmit, Some(form)) => form.data_type,
+        let data_type = match rules.tpdo_form(self.mux) {
+            Some(form) if direction == Direction::Tpdo => form.data_type,
             _ => row.data_type,
         };
         let longer = self.bits > data_type.bits() && self.bits.is_multiple_of(8) && u32::from(self.bits) <= MAX_BITS;
         let fits = data_type.bits() > 0 && (self.bits == data_type.bits() || (rules.longer_entries && longer));
-        if row.pdo == PdoMapping::Yes && allowed && fits { Ok(slot) } else { Err(AbortCode::NOT_MAPPABLE) }
+        if allowed && fits { Ok(slot) } else { Err(AbortCode::NOT_MAPPABLE) }
     }
 }
 
@@ -87,8 +88,8 @@ pub struct Mapped {
     /// The row.
     pub slot: Slot,
     shift: u8,
-    /// The row has another form in TPDOs.
-    converted: bool,
+    /// The form in TPDOs, if it is another than the row's.
+    form: Option<&'static TpdoForm>,
 }
 
 impl Mapping {
@@ -134,14 +135,19 @@ impl Mapping {
             }
             let record = MappingRecord::from_raw(raw as u32);
             let slot = record.resolve(values, direction, rules)?;
-            let converted = direction == Direction::Transmit && values.table().row(slot).tpdo_form.is_some();
-            mapping = Some(Self::extended(mapping, slot, record.bits, converted)?);
+            let form = rules.tpdo_form(record.mux).filter(|_| direction == Direction::Tpdo);
+            mapping = Some(Self::extended(mapping, slot, record.bits, form)?);
         }
         Ok(mapping)
     }
 
-    fn extended(mapping: Option<Self>, slot: Slot, bits: u8, converted: bool) -> Result<Self, AbortCode> {
-        let first = Mapped { slot, shift: 0, converted };
+    fn extended(
+        mapping: Option<Self>,
+        slot: Slot,
+        bits: u8,
+        form: Option<&'static TpdoForm>,
+    ) -> Result<Self, AbortCode> {
+        let first = Mapped { slot, shift: 0, form };
         let Some(mut mapping) = mapping else {
             return Ok(Self { objects: [first; MAX_OBJECTS], count: 1, length: bits / 8 });
         };
@@ -149,7 +155,7 @@ impl Mapping {
         if u32::from(used_bits) + u32::from(bits) > MAX_BITS {
             return Err(AbortCode::PDO_TOO_LONG);
         }
-        mapping.objects[usize::from(mapping.count)] = Mapped { slot, shift: used_bits, converted };
+        mapping.objects[usize::from(mapping.count)] = Mapped { slot, shift: used_bits, form };
         mapping.count += 1;
         mapping.length += bits / 8;
         Ok(mapping)
@@ -178,12 +184,7 @@ impl Mapped {
     #[inline]
     fn sample(&self, values: &View<'_>) -> u32 {
         let raw = values.raw(self.slot);
-        if self.converted { self.convert(values, raw) } else { raw }
-    }
-
-    #[cold]
-    fn convert(&self, values: &View<'_>, raw: u32) -> u32 {
-        values.table().row(self.slot).tpdo_form.map_or(raw, |form| (form.convert)(raw))
+        self.form.map_or(raw, |form| convert(values.table().row(self.slot).data_type, raw, form))
     }
 
     /// The object's value within `data` of a received PDO, in its low bytes; what stands above them means nothing.
@@ -193,20 +194,26 @@ impl Mapped {
     }
 }
 
+#[cold]
+fn convert(data_type: DataType, raw: u32, form: &TpdoForm) -> u32 {
+    form.data_type.raw(form.value(data_type.value(raw)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::NodeId;
-    use crate::od::{Access, DataType, Dictionary, Entry, Object, Table, TpdoForm, keys};
+    use crate::od::{Access, Dictionary, Entry, Object, Table, keys};
 
     /// A speed that SDO shows in 16 bits of 0.1 r/min and TPDOs in 32 bits of r/min.
-    const IN_TPDO: TpdoForm =
-        TpdoForm { data_type: DataType::Integer32, unit: "r/min", convert: |raw| (i32::from(raw as i16) / 10) as u32 };
+    static IN_TPDO: [TpdoForm; 1] =
+        [TpdoForm { object: Mux::new(0x606C, 0), data_type: DataType::Integer32, unit: "r/min", divisor: 10 }];
+    const RULES: MappingRules = MappingRules { tpdo_forms: &IN_TPDO, ..MappingRules::CIA_301 };
 
     static ROWS: [Entry; 3] = [
         Entry::new(0x1A00, 0, DataType::Unsigned8, Access::ReadOnly, "mapping", "Mapping").default(1),
         Entry::new(0x1A00, 1, DataType::Unsigned32, Access::ReadOnly, "mapping_1", "Mapping 1").default(0x606C_0020),
-        Entry::new(0x606C, 0, DataType::Integer16, Access::ReadWrite, "speed", "Speed").mappable_as(IN_TPDO),
+        Entry::new(0x606C, 0, DataType::Integer16, Access::ReadWrite, "speed", "Speed").mappable(),
     ];
     static KEYS: [u32; 3] = keys(&ROWS);
     static TABLE: Table = Table::new(&ROWS, &KEYS);
@@ -216,8 +223,7 @@ mod tests {
     fn an_object_with_another_form_in_tpdos_is_mapped_and_sent_in_it() {
         let mut values = Dictionary::<3>::new(&TABLE, NodeId::MIN);
         values.set(SPEED, -6004);
-        let rules = MappingRules::CIA_301;
-        let mapping = Mapping::read(&values.view(), 0x1A00, Direction::Transmit, rules).unwrap().unwrap();
+        let mapping = Mapping::read(&values.view(), 0x1A00, Direction::Tpdo, RULES).unwrap().unwrap();
         assert_eq!(mapping.length(), 4);
         assert_eq!(mapping.gather(&values.view()) as u32 as i32, -600);
     }
@@ -225,18 +231,17 @@ mod tests {
     #[test]
     fn in_rpdos_and_by_its_sdo_length_in_tpdos_the_forms_are_kept_apart() {
         let values = Dictionary::<3>::new(&TABLE, NodeId::MIN);
-        let resolve =
-            |raw, direction| MappingRecord::from_raw(raw).resolve(&values.view(), direction, MappingRules::CIA_301);
-        assert_eq!(resolve(0x606C_0010, Direction::Transmit), Err(AbortCode::NOT_MAPPABLE));
-        assert_eq!(resolve(0x606C_0020, Direction::Receive), Err(AbortCode::NOT_MAPPABLE));
-        assert!(resolve(0x606C_0010, Direction::Receive).is_ok());
+        let resolve = |raw, direction| MappingRecord::from_raw(raw).resolve(&values.view(), direction, RULES);
+        assert_eq!(resolve(0x606C_0010, Direction::Tpdo), Err(AbortCode::NOT_MAPPABLE));
+        assert_eq!(resolve(0x606C_0020, Direction::Rpdo), Err(AbortCode::NOT_MAPPABLE));
+        assert!(resolve(0x606C_0010, Direction::Rpdo).is_ok());
     }
 
     #[test]
     fn a_device_may_take_longer_entries_in_whole_bytes_and_never_shorter_ones() {
         let values = Dictionary::<3>::new(&TABLE, NodeId::MIN);
         let rules = MappingRules { longer_entries: true, ..MappingRules::CIA_301 };
-        let resolve = |raw, rules| MappingRecord::from_raw(raw).resolve(&values.view(), Direction::Receive, rules);
+        let resolve = |raw, rules| MappingRecord::from_raw(raw).resolve(&values.view(), Direction::Rpdo, rules);
         for (bits, taken) in [(0, false), (8, false), (16, true), (17, false), (24, true), (64, true), (72, false)] {
             let entry = 0x606C_0000 | bits;
             assert_eq!(resolve(entry, rules).is_ok(), taken, "{bits} bits");

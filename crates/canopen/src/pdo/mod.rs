@@ -4,12 +4,16 @@
 //! when they are written; [`Rpdo`] and [`Tpdo`] then work on resolved cells. Deliberately absent: RTR (types 252
 //! and 253 are refused, remote frames ignored), MPDO, dummy entries, SYNC start value, RPDO deadline monitoring.
 
+mod form;
 pub mod mapping;
+mod number;
 pub mod parameter;
 mod rpdo;
 mod tpdo;
 
-pub use mapping::{Direction, MAX_OBJECTS, Mapping, MappingRecord, MappingRules};
+pub use form::TpdoForm;
+pub use mapping::{MAX_OBJECTS, Mapping, MappingRecord, MappingRules};
+pub use number::{Direction, PdoId, PdoNumber};
 pub use parameter::{Parameter, TransmissionType};
 pub use rpdo::{Reception, Rpdo};
 pub use tpdo::{EventTrigger, Tpdo};

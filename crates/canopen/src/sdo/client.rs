@@ -10,7 +10,7 @@ use core::time::Duration;
 use can::{CanId, Frame, Instant};
 
 use super::wire::{LENGTH, MAX_SEGMENT, Payload, Reply, Request, Segment};
-use crate::{AbortCode, Mux, NodeId, cob};
+use crate::{AbortCode, Mux, NodeId, connection_set};
 
 /// What a finished transfer did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -146,8 +146,8 @@ impl Client {
     /// The default channel of `server`. `timeout` is for each reply.
     pub const fn new(server: NodeId, timeout: Duration) -> Self {
         Self {
-            request_id: cob::sdo_request(server),
-            reply_id: cob::sdo_reply(server),
+            request_id: connection_set::sdo_request(server),
+            reply_id: connection_set::sdo_reply(server),
             timeout,
             state: State::Idle,
             deadline: Instant::FAR_FUTURE,

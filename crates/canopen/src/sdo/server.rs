@@ -147,9 +147,9 @@ impl Server {
         if !row.is_readable() {
             return self.refuse(mux, AbortCode::WRITE_ONLY);
         }
-        if row.is_text() {
-            let text = table.row(slot).constant_text().unwrap_or_default();
-            return self.initiate_text(mux, text.as_bytes(), now);
+        if row.is_long() {
+            let bytes = table.row(slot).constant_bytes().unwrap_or_default();
+            return self.initiate_text(mux, bytes, now);
         }
         let length = row.size();
         let bytes = values.raw(slot).to_le_bytes();

@@ -197,7 +197,7 @@ fn every_reply_is_survived_at_every_stage() {
             for length in 0..=8 {
                 let (_, mut client) = replies(uploading(NAME), &mut [0; 32], stage);
                 let bytes = [command, 0x08, 0x10, 0x00, 0xFF, 0xFF, 0xFF, 0xFF];
-                let frame = Frame::new(canopen::cob::sdo_reply(NodeId::new(4).unwrap()), &bytes[..length]);
+                let frame = Frame::new(canopen::connection_set::sdo_reply(NodeId::new(4).unwrap()), &bytes[..length]);
                 let _ = client.handle_frame(&frame, &mut [0; 32], Instant::ZERO);
             }
         }

@@ -1,6 +1,6 @@
 //! A small drive-like device for the conversations: node 4, in two profiles.
 
-use canopen::od::{Access, DataType, Entry, Table, keys};
+use canopen::od::{Access, Condition, Conditions, DataType, Entry, Slot, Table, condition_numbers, keys};
 use canopen::pdo::EventTrigger;
 use canopen::{AbortCode, NodeProfile};
 
@@ -72,7 +72,7 @@ const APPLICATION: [Entry; 14] = [
     row(0x2000, 0, Unsigned16, WriteOnly, "write_only"),
     row(0x2001, 0, Unsigned8, ReadWrite, "byte_1").mappable(),
     row(0x2002, 0, Unsigned8, ReadWrite, "byte_2").mappable(),
-    row(0x2003, 0, Unsigned8, ReadWrite, "guarded").check(only_while_2001_is_zero).mappable(),
+    row(0x2003, 0, Unsigned8, ReadWrite, "guarded").mappable(),
     row(0x2004, 0, Unsigned16, ReadWrite, "unmappable"),
     row(0x2005, 2, Unsigned8, ReadWrite, "sparse"),
     row(0x6040, 0, Unsigned16, ReadWrite, "controlword").mappable(),
@@ -133,8 +133,12 @@ static KEYS: [u32; COUNT] = keys(&ROWS);
 /// The rows of the device.
 pub(crate) static TABLE: Table = Table::new(&ROWS, &KEYS);
 
+static GUARDED: [(Slot, Condition); 1] = [(TABLE.slot(0x2003, 0), Condition::Check(only_while_2001_is_zero))];
+static NUMBERS: [u8; COUNT] = condition_numbers(&GUARDED);
+static CONDITIONS: Conditions = Conditions::new(&GUARDED, &NUMBERS);
+
 /// As CiA 301 has it.
-pub(crate) static STANDARD: NodeProfile = NodeProfile::cia_301(&TABLE);
+pub(crate) static STANDARD: NodeProfile = NodeProfile { conditions: &CONDITIONS, ..NodeProfile::cia_301(&TABLE) };
 
 /// As the ZLAC8030L quick start guide V1.00, 6.1 has it: timers in 0.5 ms, changes while valid, 255 by its timer.
 pub(crate) static LOOSE: NodeProfile = NodeProfile {
@@ -142,5 +146,6 @@ pub(crate) static LOOSE: NodeProfile = NodeProfile {
     event_timer_unit_ns: 500_000,
     event_trigger: EventTrigger::ChangeOr255ByTimer,
     pdo_changes_while_valid: true,
+    conditions: &CONDITIONS,
     ..NodeProfile::cia_301(&TABLE)
 };

@@ -1,13 +1,13 @@
 //! What RPDOs do, and when. RPDO 1 maps the controlword 6040h, RPDO 2 the target velocity 60FFh.
 
-use canopen::cob::PdoNumber;
 use canopen::node::Via;
+use canopen::pdo::PdoNumber;
 use canopen::{Mux, NmtState, NodeEvent};
 
 use crate::bench::Bench;
 use crate::device::STANDARD;
 
-fn via(number: u8) -> Via {
+fn via(number: u16) -> Via {
     Via::Rpdo(PdoNumber::new(number).unwrap())
 }
 

@@ -1,6 +1,6 @@
 //! `ferrodrive objects`: the object dictionary of a model, searchable.
 
-use canopen::od::{Default, Entry, PdoMapping};
+use canopen::od::{DefaultValue, Entry, ValueRange};
 use canopen::{Mux, NodeId};
 use master::drive::{Limits, Setting};
 use serde::Serialize;
@@ -69,7 +69,7 @@ struct Row {
     mappable: bool,
     default: Factory,
     /// Smallest and largest value, if narrower than the type.
-    limits: Option<(i64, i64)>,
+    limits: Option<Bounds>,
     /// The object that multiplies them, and divides the unit.
     #[serde(skip_serializing_if = "Option::is_none")]
     limits_times: Option<String>,
@@ -88,8 +88,20 @@ struct Row {
 #[serde(untagged)]
 enum Factory {
     Number(i64),
+    Unsigned(u64),
+    Real(f64),
     PlusNodeId { plus_node_id: u32 },
     Text(&'static str),
+    Bytes(&'static [u8]),
+}
+
+/// Limits as programs read them: two numbers.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+enum Bounds {
+    Integer((i64, i64)),
+    Unsigned((u64, u64)),
+    Real((f64, f64)),
 }
 
 /// The limits in force on a node, and the objects that they follow from.
@@ -192,9 +204,9 @@ impl Row {
             data_type: row.data_type.name(),
             access: row.access.name(),
             stored: row.stored,
-            mappable: row.pdo == PdoMapping::Yes,
+            mappable: row.pdo.is_allowed(),
             default: Factory::of(row),
-            limits: row.limits,
+            limits: row.limits.map(Bounds::of),
             limits_times: row.resolution.map(|object| object.to_string()),
             acts_up_to: row.held_to.map(|held_to| held_to.object.to_string()),
             now: None,
@@ -208,7 +220,7 @@ impl Row {
             return now.text.clone();
         }
         if self.values.is_empty() {
-            let limits = self.limits.map(|(low, high)| format!("{low} to {high}")).unwrap_or_default();
+            let limits = self.limits.as_ref().map(Bounds::text).unwrap_or_default();
             let times = self.limits_times.as_ref().map(|object| format!(", times {object}")).unwrap_or_default();
             let held = self.acts_up_to.as_ref().map(|object| format!("; acts up to {object}")).unwrap_or_default();
             return limits + &times + &held;
@@ -227,9 +239,12 @@ impl Row {
 impl Factory {
     const fn of(row: &Entry) -> Self {
         match row.default {
-            Default::Value(value) => Self::Number(value),
-            Default::NodeIdPlus(base) => Self::PlusNodeId { plus_node_id: base },
-            Default::Text(text) => Self::Text(text),
+            DefaultValue::Value(value) => Self::Number(value),
+            DefaultValue::Unsigned(value) => Self::Unsigned(value),
+            DefaultValue::Real(value) => Self::Real(value),
+            DefaultValue::NodeIdPlus(base) => Self::PlusNodeId { plus_node_id: base },
+            DefaultValue::Text(text) => Self::Text(text),
+            DefaultValue::Bytes(bytes) => Self::Bytes(bytes),
         }
     }
 
@@ -238,8 +253,29 @@ impl Factory {
         match self {
             Self::Number(value) if in_communication_area && *value > 255 => format!("0x{value:X}"),
             Self::Number(value) => value.to_string(),
+            Self::Unsigned(value) => value.to_string(),
+            Self::Real(value) => value.to_string(),
             Self::PlusNodeId { plus_node_id } => format!("0x{plus_node_id:X} + node-ID"),
             Self::Text(text) => format!("{text:?}"),
+            Self::Bytes(bytes) => bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" "),
+        }
+    }
+}
+
+impl Bounds {
+    const fn of(limits: ValueRange) -> Self {
+        match limits {
+            ValueRange::Integer(low, high) => Self::Integer((low, high)),
+            ValueRange::Unsigned(low, high) => Self::Unsigned((low, high)),
+            ValueRange::Real(low, high) => Self::Real((low, high)),
+        }
+    }
+
+    fn text(&self) -> String {
+        match self {
+            Self::Integer((low, high)) => format!("{low} to {high}"),
+            Self::Unsigned((low, high)) => format!("{low} to {high}"),
+            Self::Real((low, high)) => format!("{low} to {high}"),
         }
     }
 }

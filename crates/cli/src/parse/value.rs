@@ -103,7 +103,7 @@ fn plain(text: &str) -> String {
 }
 
 fn example(row: &Entry) -> String {
-    match row.limits {
+    match row.integer_limits() {
         Some((_, high)) => format!("{high} or 0x{high:X}"),
         None => "100 or 0x64".into(),
     }

@@ -12,7 +12,8 @@ pub mod variations;
 
 use can::Bitrate;
 use canopen::Mux;
-use canopen::pdo::MappingRules;
+use canopen::od::DataType;
+use canopen::pdo::{MappingRules, TpdoForm};
 use cia402::{ModeOfOperation, Statusword};
 
 use crate::description::{
@@ -70,6 +71,10 @@ const fn joint(model: &'static str, title: &'static str) -> Description {
     }
 }
 
+/// 606Ch in TPDO3: 32 bits of r/min (5.10.2), of the 16 bits of 0.1 r/min that SDO shows (5.04).
+static IN_TPDO: [TpdoForm; 1] =
+    [TpdoForm { object: Mux::new(0x606C, 0), data_type: DataType::Integer32, unit: "r/min", divisor: 10 }];
+
 /// The mapping is fixed; an identifier may be changed at any time, since no bit of it makes a PDO invalid (5.08).
 const PDO_RULES: PdoRules = PdoRules {
     inhibit_unit_ns: 100_000,
@@ -77,7 +82,7 @@ const PDO_RULES: PdoRules = PdoRules {
     max_objects: 3,
     remap_while_valid: true,
     fixed_mapping: true,
-    mapping: MappingRules::CIA_301,
+    mapping: MappingRules { tpdo_forms: &IN_TPDO, ..MappingRules::CIA_301 },
     // It has no EMCY.
     short_rpdo: None,
 };

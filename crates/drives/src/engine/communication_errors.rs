@@ -1,4 +1,4 @@
-use canopen::cob::PdoNumber;
+use canopen::pdo::PdoNumber;
 
 use super::faults::error_register::{COMMUNICATION, GENERIC};
 
@@ -11,7 +11,7 @@ impl CommunicationErrors {
     /// No error.
     pub(super) const NONE: Self = Self(0);
     /// Events of the node were lost.
-    pub(super) const EVENTS_LOST: Self = Self(1 << PdoNumber::COUNT);
+    pub(super) const EVENTS_LOST: Self = Self(1 << PdoNumber::PREDEFINED);
 
     /// The last frame of an RPDO was shorter than its mapping.
     pub(super) const fn short_rpdo(number: PdoNumber) -> Self {

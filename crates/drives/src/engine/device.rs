@@ -5,9 +5,9 @@
 //! (1001h).
 
 use can::{Bitrate, Frame, Instant, Station};
-use canopen::cob::PdoNumber;
 use canopen::node::{Node, NodeEvent, NodeProfile, Via};
 use canopen::od::{Dictionary, Entry, Slot};
+use canopen::pdo::PdoNumber;
 use canopen::{EmcyErrorCode, Mux, NodeId};
 
 use super::communication_errors::CommunicationErrors;
@@ -92,7 +92,7 @@ impl<const N: usize> Device<N> {
 
     /// The values as delivered, of a device with this node-ID.
     fn factory_values(&self, node_id: NodeId) -> Dictionary<N> {
-        self.variant.delivered(self.profile.table, node_id)
+        self.variant.delivered(self.profile.table, node_id).with_conditions(self.profile.conditions)
     }
 
     /// Supply voltage arrives, and this is found in the EEPROM. [`restart`](Self::restart) and [`boot`](Self::boot) follow.
@@ -535,7 +535,7 @@ mod tests {
     fn errors_of_communication_stand_beside_the_faults_and_no_error_is_told_when_the_last_has_ended() {
         let mut device = started();
         let mut faults = FaultMonitor::new(&FAULTS, &[1]);
-        let [first, second, ..] = PdoNumber::ALL;
+        let [first, second] = [1, 2].map(|number| PdoNumber::new(number).unwrap());
         device.report_rpdo_length(first, false, at(1, 0));
         device.report_rpdo_length(second, false, at(1, 0));
         assert_sent(&mut device, ["701#00", "081#1082110000000000", "081#1082110000000000"], 0b1_0001);

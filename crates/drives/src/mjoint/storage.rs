@@ -1,11 +1,11 @@
 //! What the joint's EEPROM holds as delivered and after a save. Which rows it holds stands in the object table.
 
 use canopen::NodeId;
-use canopen::od::Default;
+use canopen::od::DefaultValue;
 
 use super::Values;
 use super::assumptions::NO_RECORD;
-use super::objects::{DEVICE_ADDRESS, POSITION_ACTUAL_INTERNAL_VALUE, TABLE};
+use super::objects::{CONDITIONS, DEVICE_ADDRESS, POSITION_ACTUAL_INTERNAL_VALUE, TABLE};
 use crate::engine::storage::stored_rows;
 use devices::variant::Variant;
 
@@ -18,7 +18,8 @@ pub fn delivered(variant: &Variant) -> Values {
 
 /// The values as delivered but for the node-ID (2615h).
 pub fn addressed(variant: &Variant, node_id: u8) -> Values {
-    let mut values: Values = variant.delivered(&TABLE, NodeId::new(node_id).unwrap_or(NodeId::MIN));
+    let node = NodeId::new(node_id).unwrap_or(NodeId::MIN);
+    let mut values: Values = variant.delivered(&TABLE, node).with_conditions(&CONDITIONS);
     if TABLE.row(DEVICE_ADDRESS.slot()).check_value(i64::from(node_id)).is_ok() {
         values.set(DEVICE_ADDRESS, u16::from(node_id));
     }
@@ -32,8 +33,7 @@ pub(super) fn contents(values: &Values, node_id: NodeId) -> Values {
     let mut contents = values.clone();
     let address = u8::try_from(values.get(DEVICE_ADDRESS)).ok().and_then(NodeId::new).unwrap_or(node_id);
     for (slot, row) in TABLE.iter() {
-        let own =
-            matches!(row.default, Default::NodeIdPlus(base) if values.raw(slot) == base + u32::from(node_id.raw()));
+        let own = matches!(row.default, DefaultValue::NodeIdPlus(base) if values.raw(slot) == base + u32::from(node_id.raw()));
         if own {
             contents.restore_default(slot, address);
         }

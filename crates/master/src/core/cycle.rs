@@ -1,7 +1,7 @@
 use std::time::Duration;
 
 use can::{Frame, Instant};
-use canopen::cob;
+use canopen::connection_set;
 use canopen::sync::Sync;
 
 /// One period of SYNC. Source: CiA 301, 7.2.5.
@@ -131,7 +131,7 @@ impl SyncClock {
     }
 
     pub(super) fn poll_transmit(&mut self) -> Option<Frame> {
-        core::mem::take(&mut self.pending).then(|| Sync { counter: None }.emit(cob::SYNC))
+        core::mem::take(&mut self.pending).then(|| Sync { counter: None }.emit(connection_set::SYNC))
     }
 
     pub(super) const fn next(&self) -> Option<Instant> {

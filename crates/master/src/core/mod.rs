@@ -26,7 +26,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use can::{Frame, Instant, Station};
-use canopen::cob::Service;
+use canopen::connection_set::Service;
 use canopen::{Mux, NodeId};
 
 pub use cycle::Cycle;

@@ -27,8 +27,10 @@ pub fn common_name(mux: Mux) -> Option<&'static str> {
 /// The type of an object that came with this many bytes, where those models that have it with this length agree on it, or
 /// the standard's. An object may have another form in TPDOs.
 pub fn common_type(mux: Mux, length: usize) -> Option<DataType> {
-    let rows = MODELS.iter().filter_map(|profile| profile.row(mux));
-    let forms = rows.flat_map(|row| [Some(row.data_type), row.tpdo_form.map(|form| form.data_type)]);
+    let forms = MODELS.iter().flat_map(|profile| {
+        let in_tpdo = profile.pdo.mapping.tpdo_form(mux).map(|form| form.data_type);
+        [profile.row(mux).map(|row| row.data_type), in_tpdo]
+    });
     let mut fitting = forms.flatten().filter(|data_type| data_type.size() == length && length > 0);
     match fitting.next() {
         Some(first) => fitting.all(|other| other == first).then_some(first),

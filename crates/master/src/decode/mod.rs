@@ -13,7 +13,7 @@ mod value;
 use core::fmt;
 
 use can::Frame;
-use canopen::cob::Service;
+use canopen::connection_set::Service;
 use canopen::emcy::Emcy;
 use canopen::heartbeat::Heartbeat;
 use canopen::nmt::{NmtRequest, NmtTarget};
@@ -28,8 +28,9 @@ use models::Models;
 use pdo::PdoBook;
 use sdo::Conversations;
 
+pub use canopen::pdo::Direction;
 pub use common::{common_name, common_row, common_type};
-pub use pdo::{Direction, Pdo};
+pub use pdo::Pdo;
 pub use sdo::{Sdo, SdoStep, Side};
 pub use value::{Value, statusword_words};
 

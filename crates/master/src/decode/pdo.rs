@@ -2,47 +2,15 @@ use core::fmt;
 use std::collections::BTreeMap;
 
 use can::Frame;
-use canopen::cob::{self, PdoNumber};
-use canopen::od::{Default as Factory, Table};
+use canopen::connection_set;
+use canopen::od::{DefaultValue, Table};
+use canopen::pdo::{Direction, PdoNumber};
 use canopen::{CobId, Mux, NodeId};
 
 use super::models::Models;
 use super::value::Value;
 use crate::core::{MappedObject, PdoMap, bits_of};
 use crate::identify::Model;
-
-/// Which way a PDO goes, from the device's side.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Direction {
-    /// To the device.
-    Rpdo,
-    /// From the device.
-    Tpdo,
-}
-
-impl Direction {
-    /// Index of the communication parameter of PDO 0. Source: CiA 301, 7.5.2.35 and 7.5.2.37.
-    pub const fn parameter_base(self) -> u16 {
-        match self {
-            Self::Rpdo => 0x1400,
-            Self::Tpdo => 0x1800,
-        }
-    }
-
-    /// Index of the mapping parameter of PDO 0. Source: CiA 301, 7.5.2.36 and 7.5.2.38.
-    pub const fn mapping_base(self) -> u16 {
-        self.parameter_base() + 0x200
-    }
-}
-
-impl fmt::Display for Direction {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Rpdo => "RPDO",
-            Self::Tpdo => "TPDO",
-        })
-    }
-}
 
 /// A PDO frame split into its objects.
 #[derive(Clone, Debug)]
@@ -128,12 +96,12 @@ impl Known {
 }
 
 fn predefined_id(node: NodeId, direction: Direction, number: u16) -> Option<u16> {
-    let number = PdoNumber::new(u8::try_from(number).ok()?.checked_add(1)?)?;
+    let number = PdoNumber::at(number.into())?;
     let id = match direction {
-        Direction::Rpdo => cob::rpdo(number, node),
-        Direction::Tpdo => cob::tpdo(number, node),
+        Direction::Rpdo => connection_set::rpdo(number, node),
+        Direction::Tpdo => connection_set::tpdo(number, node),
     };
-    id.as_standard()
+    id?.as_standard()
 }
 
 impl PdoBook {
@@ -148,9 +116,9 @@ impl PdoBook {
     pub(super) fn load_defaults(&mut self, node: NodeId, table: &Table) {
         for row in table.rows() {
             let raw = match row.default {
-                Factory::Value(value) => row.data_type.raw(value),
-                Factory::NodeIdPlus(base) => base + u32::from(node.raw()),
-                Factory::Text(_) => continue,
+                DefaultValue::Value(value) => row.data_type.raw(value),
+                DefaultValue::NodeIdPlus(base) => base + u32::from(node.raw()),
+                _ => continue,
             };
             self.note(node, row.mux(), raw);
         }

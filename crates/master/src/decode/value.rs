@@ -40,12 +40,13 @@ impl<'a> Value<'a> {
             None if self.model.is_none() && common_name(self.mux).is_some() => common_type(self.mux, self.bytes.len())?,
             None => return None,
         };
-        (data_type != DataType::VisibleString).then(|| data_type.value(raw))
+        data_type.is_integer().then(|| data_type.value(raw))
     }
 
     /// Type and unit of the bytes: an object may have another form in TPDOs, which its length tells.
     fn form(&self, entry: &Entry) -> (DataType, &'static str) {
-        match entry.tpdo_form {
+        let form = self.model.and_then(|model| model.pdo.mapping.tpdo_form(self.mux));
+        match form {
             Some(form) if form.data_type.size() == self.bytes.len() => (form.data_type, form.unit),
             _ => (entry.data_type, entry.unit),
         }

@@ -7,7 +7,7 @@
 use std::time::Duration;
 
 use canopen::heartbeat::Consumer;
-use canopen::od::Default;
+use canopen::od::DefaultValue;
 use canopen::{Mux, NodeId};
 use devices::HostWatch;
 
@@ -81,7 +81,7 @@ impl Drive {
         };
         let mut armed = held.map_or(before, |guard| guard.armed);
         let switches_on = armed == 0 && switched_off == SwitchedOff::SwitchOn;
-        if switches_on && let Default::Value(factory) = self.row(object, "guard it")?.default {
+        if switches_on && let DefaultValue::Value(factory) = self.row(object, "guard it")?.default {
             armed = factory;
         }
         let loss = self.loss(armed);

@@ -3,7 +3,7 @@ use std::time::Duration;
 use canopen::Mux;
 
 use crate::core::PdoMap;
-use crate::decode::Direction;
+use canopen::pdo::Direction;
 
 /// When a PDO is sent or taken over. Source: CiA 301, tables 64 and 68.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

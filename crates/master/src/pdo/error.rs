@@ -3,8 +3,8 @@ use std::time::Duration;
 
 use canopen::{Mux, NodeId};
 
-use crate::decode::Direction;
 use crate::error::Error;
+use canopen::pdo::Direction;
 
 /// Why a PDO could not be set up.
 #[derive(Clone, Debug, thiserror::Error)]

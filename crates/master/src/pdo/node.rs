@@ -6,9 +6,9 @@ use super::config::{PdoConfig, TimerUnits};
 use super::error::PdoError;
 use super::transaction::{apply, read};
 use crate::core::RpdoTrigger;
-use crate::decode::Direction;
 use crate::error::Error;
 use crate::network::Node;
+use canopen::pdo::Direction;
 
 impl Node {
     /// Sets up a PDO of the device and, when every value reads back right, sends or receives it by its mapping.

@@ -2,8 +2,8 @@ use canopen::Mux;
 
 use super::error::SignalError;
 use crate::core::{NumberForm, RpdoTrigger, Sample, SetPoint, Signal};
-use crate::decode::Direction;
 use crate::network::Node;
+use canopen::pdo::Direction;
 
 /// Finding objects in the process data of a node, once, so that reading and writing them is an index and a shift.
 ///

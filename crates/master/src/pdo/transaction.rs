@@ -7,9 +7,9 @@ use canopen::{AbortCode, CobId, Mux};
 use super::config::{PdoConfig, TimerUnits, TransmissionType};
 use super::error::{PdoError, PdoName};
 use crate::core::{MappedObject, PdoMap};
-use crate::decode::Direction;
 use crate::error::Error;
 use crate::network::Node;
+use canopen::pdo::Direction;
 
 /// Most objects in one PDO. Source: CiA 301, 7.5.2.36.
 const MAX_OBJECTS: usize = 64;

@@ -8,7 +8,7 @@
 use std::collections::VecDeque;
 
 use can::{Frame, Instant};
-use canopen::cob::SDO_REPLY_BASE;
+use canopen::connection_set::SDO_REPLY_BASE;
 
 use super::member::Member;
 use super::{StationId, World};

@@ -6,7 +6,6 @@
 
 use canopen::od::Entry;
 
-use super::checks::{mode_selection, revolutions_in_tpdo};
 use super::values::{self, MODES, OFF_ON};
 use crate::mjoint::assumptions::*;
 use crate::row::{I8, I16, I32, U8, U16, U32, join, ro, rw, rws};
@@ -36,7 +35,7 @@ const MANUFACTURER: [Entry; 17] = [
     rws(0x2618, 0, U16, "stationary_max_output", "Stationary maximum allowable output")
         .range(0, 609).default(STATIONARY_MAX_OUTPUT),
     // Printed 0 to 100, with angles from 30 to 32768.
-    rws(0x2619, 0, U16, "mode_selection", "Mode selection").range(0, 32768).check(mode_selection),
+    rws(0x2619, 0, U16, "mode_selection", "Mode selection").range(0, 32768),
     rws(0x261C, 0, U16, "synchronous_control_word", "CAN communication synchronous control word"),
     rws(0x261D, 0, U16, "max_allowable_current", "maximum allowable current")
         .range(0, 10009).default(MAX_ALLOWABLE_CURRENT).unit("mA"),
@@ -52,7 +51,7 @@ const PROFILE: [Entry; 19] = [
     ro(0x6064, 0, I32, "position_actual_value", "Actual position").unit("counts").mappable(),
     // Printed read and write, with a range in r/min.
     ro(0x606C, 0, I16, "velocity_actual_value", "Motor actual speed")
-        .range(-30000, 30000).unit("0.1 r/min").mappable_as(revolutions_in_tpdo()),
+        .range(-30000, 30000).unit("0.1 r/min").mappable(),
     ro(0x6078, 0, U16, "current_actual_value", "Actual current").range(0, 32767).unit("1/2000 A").mappable(),
     ro(0x6079, 0, U16, "dc_link_voltage", "System voltage").range(0, 32767).unit("1/327 V"),
     // Printed without M, though RPDO1, 2 and 4 carry it.

@@ -4,7 +4,6 @@
 //! models share it. The constants below it are the objects that a firmware itself reads and writes. Where the
 //! RS485 side finds an object stands in [`modbus`].
 
-mod checks;
 mod communication;
 mod control;
 pub mod modbus;

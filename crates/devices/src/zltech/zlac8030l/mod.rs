@@ -58,8 +58,10 @@ pub static ZLAC8030L: Description = Description {
 };
 
 /// Working robots map 6077h with 32 bits; the maker's EDS counts empty entries in.
-const PDO_RULES: PdoRules =
-    PdoRules { mapping: MappingRules { longer_entries: true, empty_entries: true }, ..zltech::PDO_RULES };
+const PDO_RULES: PdoRules = PdoRules {
+    mapping: MappingRules { longer_entries: true, empty_entries: true, tpdo_forms: &[] },
+    ..zltech::PDO_RULES
+};
 
 const RESTART: &[Mux] = &[Mux::new(0x200D, 0), Mux::new(0x200E, 0), Mux::new(0x202F, 5)];
 

@@ -3,7 +3,7 @@
 use can::Instant;
 use canopen::heartbeat::Consumer;
 use canopen::node::Via;
-use canopen::od::{Default, Slot};
+use canopen::od::{DefaultValue, Slot};
 use cia402::{Controlword, ModeOfOperation};
 
 use super::{Homing, MJoint, OwnMotion};
@@ -18,7 +18,7 @@ use crate::mjoint::parameters::TimeBase;
 const MAY_MOVE: u16 = Controlword::ENABLE_VOLTAGE | Controlword::QUICK_STOP | Controlword::ENABLE_OPERATION;
 
 /// The RPDO whose position waits for SYNC.
-const SYNCHRONOUS_RPDO: u8 = 4;
+const SYNCHRONOUS_RPDO: u16 = 4;
 
 impl Application<ROW_COUNT> for MJoint {
     fn device(&mut self) -> &mut Device<ROW_COUNT> {
@@ -196,7 +196,7 @@ impl MJoint {
     fn device_address(&mut self, address: u32) {
         let before = core::mem::replace(&mut self.address, address);
         for (slot, row) in TABLE.iter() {
-            let Default::NodeIdPlus(base) = row.default else { continue };
+            let DefaultValue::NodeIdPlus(base) = row.default else { continue };
             // After an NMT reset of communication they may be those of the node-ID again.
             let raw = self.values().raw(slot);
             if raw == base + before || raw == base + u32::from(self.device.node().node_id().raw()) {

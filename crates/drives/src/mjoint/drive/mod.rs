@@ -45,8 +45,11 @@ use devices::variant::Variant;
 
 /// How this drive communicates: operational from the start, SDO requests as short as they may be, TPDO n answers
 /// RPDO n, no EMCY (5.05, 5.08, 5.11).
-pub static NODE_PROFILE: NodeProfile =
-    NodeProfile { sdo_frame_length: FrameLength::Used, ..communication(&devices::mjoint::M4230E17B50) };
+pub static NODE_PROFILE: NodeProfile = NodeProfile {
+    conditions: &CONDITIONS,
+    sdo_frame_length: FrameLength::Used,
+    ..communication(&devices::mjoint::M4230E17B50)
+};
 
 /// State byte of heartbeats while there is an alarm (5.11.1).
 const HEARTBEAT_ALARM: u8 = 0x04;

@@ -1,5 +1,7 @@
 //! The object table of the description, and in [`effects`] what a write sets in motion.
 
+mod conditions;
 pub mod effects;
 
+pub use conditions::CONDITIONS;
 pub use devices::mjoint::objects::*;

@@ -34,7 +34,8 @@ use crate::{Firmware, Report, zltech};
 use devices::variant::Variant;
 
 /// How this drive communicates.
-pub static NODE_PROFILE: NodeProfile = zltech::node_profile(&devices::zltech::ZLAC8030L);
+pub static NODE_PROFILE: NodeProfile =
+    NodeProfile { conditions: &CONDITIONS, ..zltech::node_profile(&devices::zltech::ZLAC8030L) };
 
 /// The firmware of a ZLAC8030L V2.0.
 #[derive(Clone)]

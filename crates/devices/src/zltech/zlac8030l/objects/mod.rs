@@ -5,14 +5,11 @@
 //! The constants below it are the objects that a firmware itself reads and writes. 1000h to 1FFFh are those of both drives of
 //! the maker, beside this folder.
 
-mod checks;
 mod manufacturer;
 mod profile;
 mod values;
 
 use canopen::od::{Entry, Table, keys};
-
-pub use checks::ABSOLUTE_TARGET_LIMIT;
 
 use super::assumptions::{HARDWARE_VERSION, SOFTWARE_VERSION};
 use crate::row::join;

@@ -5,7 +5,6 @@
 
 use canopen::od::Entry;
 
-use super::checks;
 use super::values::{DISABLE_OPTIONS, HALT_OPTIONS, MODES, QUICK_STOP_OPTIONS};
 use crate::row::{I8, I16, I32, U16, U32, ro, rw};
 use crate::zltech::values::SHUTDOWN_OPTIONS;
@@ -13,7 +12,7 @@ use crate::zltech::values::SHUTDOWN_OPTIONS;
 #[rustfmt::skip]
 pub(super) const ROWS: [Entry; 22] = [
     ro(0x603F, 0, U16, "error_code", "Driver last fault code").mappable(),
-    rw(0x6040, 0, U16, "controlword", "Control word").mappable().check(checks::set_point_in_range),
+    rw(0x6040, 0, U16, "controlword", "Control word").mappable(),
     ro(0x6041, 0, U16, "statusword", "Status word").mappable(),
     rw(0x605A, 0, I16, "quick_stop_option_code", "Quick stop code").values(QUICK_STOP_OPTIONS).default(5),
     rw(0x605B, 0, I16, "shutdown_option_code", "Close operation code").values(SHUTDOWN_OPTIONS).default(1),

@@ -7,6 +7,7 @@
 use can::CanId;
 
 use crate::NodeId;
+use crate::pdo::PdoNumber;
 
 /// NMT node control, from the master to all.
 pub const NMT: CanId = CanId::standard(0x000);
@@ -33,69 +34,6 @@ pub const SDO_REPLY_BASE: u16 = 0x580;
 pub const SDO_REQUEST_BASE: u16 = 0x600;
 /// Function code base of boot-up and heartbeat.
 pub const HEARTBEAT_BASE: u16 = 0x700;
-
-/// The number of a predefined PDO, 1 to 4, as CiA 301 counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct PdoNumber(u8);
-
-impl PdoNumber {
-    /// How many PDOs of each direction the predefined connection set has.
-    pub const COUNT: usize = 4;
-    /// PDO 1 to PDO 4.
-    pub const ALL: [Self; Self::COUNT] = [Self(1), Self(2), Self(3), Self(4)];
-
-    /// PDO `number`, if it is in 1..=4.
-    pub const fn new(number: u8) -> Option<Self> {
-        if number >= 1 && number <= 4 { Some(Self(number)) } else { None }
-    }
-
-    /// 1 to 4.
-    pub const fn number(self) -> u8 {
-        self.0
-    }
-
-    /// 0 to 3: position in an array, and the low bits of the PDO's object indices.
-    pub const fn position(self) -> usize {
-        self.0 as usize - 1
-    }
-}
-
-/// Some of the four PDOs of one direction, by position: a bit each.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct PdoSet(u8);
-
-impl PdoSet {
-    pub(crate) const NONE: Self = Self(0);
-
-    pub(crate) const fn set(&mut self, position: usize, contained: bool) {
-        let bit = 1 << position;
-        self.0 = if contained { self.0 | bit } else { self.0 & !bit };
-    }
-
-    pub(crate) const fn is_empty(self) -> bool {
-        self.0 == 0
-    }
-
-    pub(crate) const fn contains(self, position: usize) -> bool {
-        self.0 >> position & 1 == 1
-    }
-
-    /// What is contained; nothing is left.
-    pub(crate) const fn take(&mut self) -> Self {
-        core::mem::replace(self, Self::NONE)
-    }
-
-    /// The positions contained, ascending.
-    #[inline]
-    pub(crate) fn iter(self) -> impl Iterator<Item = usize> {
-        let mut rest = self.0;
-        core::iter::from_fn(move || {
-            let position = rest.trailing_zeros() as usize;
-            rest &= rest.wrapping_sub(1);
-            (position < PdoNumber::COUNT).then_some(position)
-        })
-    }
-}
 
 /// What an identifier of the predefined connection set carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -143,27 +81,33 @@ impl Service {
             SDO_REPLY_BASE => Self::SdoReply(node),
             SDO_REQUEST_BASE => Self::SdoRequest(node),
             HEARTBEAT_BASE => Self::Heartbeat(node),
-            0x180 | 0x280 | 0x380 | 0x480 => Self::Tpdo(PdoNumber((base / PDO_STEP) as u8), node),
-            0x200 | 0x300 | 0x400 | 0x500 => Self::Rpdo(PdoNumber((base / PDO_STEP) as u8 - 1), node),
+            0x180 | 0x280 | 0x380 | 0x480 => match PdoNumber::new(base / PDO_STEP) {
+                Some(number) => Self::Tpdo(number, node),
+                None => return None,
+            },
+            0x200 | 0x300 | 0x400 | 0x500 => match PdoNumber::new(base / PDO_STEP - 1) {
+                Some(number) => Self::Rpdo(number, node),
+                None => return None,
+            },
             _ => return None,
         })
     }
 
-    /// The identifier of the service.
-    pub const fn can_id(self) -> CanId {
-        match self {
+    /// The identifier of the service; `None` for PDO 5 and further ones, which have none before they are given one.
+    pub const fn can_id(self) -> Option<CanId> {
+        Some(match self {
             Self::Nmt => NMT,
             Self::Sync => SYNC,
             Self::Emcy(node) => emcy(node),
             Self::Time => TIME,
-            Self::Tpdo(number, node) => tpdo(number, node),
-            Self::Rpdo(number, node) => rpdo(number, node),
+            Self::Tpdo(number, node) => return tpdo(number, node),
+            Self::Rpdo(number, node) => return rpdo(number, node),
             Self::SdoReply(node) => sdo_reply(node),
             Self::SdoRequest(node) => sdo_request(node),
             Self::Heartbeat(node) => heartbeat(node),
             Self::LssSlave => LSS_SLAVE,
             Self::LssMaster => LSS_MASTER,
-        }
+        })
     }
 }
 
@@ -172,14 +116,19 @@ pub const fn emcy(node: NodeId) -> CanId {
     of_node(EMCY_BASE, node)
 }
 
-/// TPDO 1 to 4 of `node`: 180h, 280h, 380h, 480h + node-ID.
-pub const fn tpdo(number: PdoNumber, node: NodeId) -> CanId {
-    of_node(TPDO_BASE + PDO_STEP * number.position() as u16, node)
+/// TPDO 1 to 4 of `node`: 180h, 280h, 380h, 480h + node-ID; further ones have no default.
+pub const fn tpdo(number: PdoNumber, node: NodeId) -> Option<CanId> {
+    of_pdo(TPDO_BASE, number, node)
 }
 
-/// RPDO 1 to 4 of `node`: 200h, 300h, 400h, 500h + node-ID.
-pub const fn rpdo(number: PdoNumber, node: NodeId) -> CanId {
-    of_node(RPDO_BASE + PDO_STEP * number.position() as u16, node)
+/// RPDO 1 to 4 of `node`: 200h, 300h, 400h, 500h + node-ID; further ones have no default.
+pub const fn rpdo(number: PdoNumber, node: NodeId) -> Option<CanId> {
+    of_pdo(RPDO_BASE, number, node)
+}
+
+const fn of_pdo(base: u16, number: PdoNumber, node: NodeId) -> Option<CanId> {
+    let position = number.position();
+    if position < PdoNumber::PREDEFINED { Some(of_node(base + PDO_STEP * position as u16, node)) } else { None }
 }
 
 /// SDO reply of `node`: 580h + node-ID.
@@ -210,7 +159,7 @@ mod tests {
         let mut named = 0;
         for raw in 0..=CanId::MAX_STANDARD {
             if let Some(service) = Service::of(CanId::standard(raw)) {
-                assert_eq!(service.can_id(), CanId::standard(raw));
+                assert_eq!(service.can_id(), Some(CanId::standard(raw)));
                 named += 1;
             }
         }
@@ -223,8 +172,9 @@ mod tests {
         let node = NodeId::new(4).unwrap();
         let third = PdoNumber::new(3).unwrap();
         assert_eq!(emcy(node), CanId::standard(0x084));
-        assert_eq!(tpdo(third, node), CanId::standard(0x384));
-        assert_eq!(rpdo(third, node), CanId::standard(0x404));
+        assert_eq!(tpdo(third, node), Some(CanId::standard(0x384)));
+        assert_eq!(rpdo(third, node), Some(CanId::standard(0x404)));
+        assert_eq!(PdoNumber::new(5).and_then(|fifth| tpdo(fifth, node)), None);
         assert_eq!(sdo_reply(node), CanId::standard(0x584));
         assert_eq!(sdo_request(node), CanId::standard(0x604));
         assert_eq!(heartbeat(node), CanId::standard(0x704));

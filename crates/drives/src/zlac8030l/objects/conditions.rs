@@ -1,9 +1,15 @@
 //! Conditions on writes that need more than the row: they see the other values and refuse with an abort code.
 
 use canopen::AbortCode;
-use canopen::od::View;
+use canopen::od::{Condition, Conditions, Slot, View, condition_numbers};
 
-use super::{CONTROLWORD, MODES_OF_OPERATION_DISPLAY, TARGET_POSITION};
+use super::{CONTROLWORD, MODES_OF_OPERATION_DISPLAY, ROW_COUNT, TARGET_POSITION};
+
+static LIST: [(Slot, Condition); 1] = [(CONTROLWORD.slot(), Condition::Check(set_point_in_range))];
+static NUMBERS: [u8; ROW_COUNT] = condition_numbers(&LIST);
+
+/// The conditions of this firmware.
+pub static CONDITIONS: Conditions = Conditions::new(&LIST, &NUMBERS);
 
 /// Largest absolute target position (607Ah: ±3FFFFFFFh absolute, ±7FFFFFFFh relative).
 pub const ABSOLUTE_TARGET_LIMIT: i32 = 0x3FFF_FFFF;
@@ -11,7 +17,7 @@ pub const ABSOLUTE_TARGET_LIMIT: i32 = 0x3FFF_FFFF;
 /// 6040h: refuses the controlword that would take an absolute set-point out of range.
 ///
 /// The range of 607Ah depends on bit 6 of the controlword, so it can only be judged when bit 4 rises.
-pub(super) fn set_point_in_range(values: &View<'_>, raw: u32) -> Result<(), AbortCode> {
+fn set_point_in_range(values: &View<'_>, raw: u32) -> Result<(), AbortCode> {
     const ENABLED_NEW_SET_POINT: u32 = 0x1F;
     const NEW_SET_POINT: u32 = 0x10;
     const RELATIVE: u32 = 0x40;

@@ -1,0 +1,77 @@
+//! What a download has to pass besides its row: conditions of the firmware, by slot.
+
+use super::{Slot, View};
+use crate::AbortCode;
+
+/// What must hold for a download besides type, access and range: sees all values, refuses with an abort code.
+///
+/// The second argument is the raw cell to be written. Nothing is stored when the check fails.
+pub type Check = fn(&View<'_>, u32) -> Result<(), AbortCode>;
+
+/// A condition on downloads to one object.
+#[derive(Clone, Copy, Debug)]
+pub enum Condition {
+    /// This function must agree.
+    Check(Check),
+}
+
+/// The conditions of a firmware on downloads to its objects. Built at compile time, so that a download finds its own
+/// with one access:
+///
+/// ```
+/// use canopen::AbortCode;
+/// use canopen::od::{Access, Condition, Conditions, DataType, Entry, Slot, Table, View, condition_numbers, keys};
+///
+/// static ROWS: [Entry; 1] = [Entry::new(0x2000, 0, DataType::Unsigned8, Access::ReadWrite, "even_number", "")];
+/// static KEYS: [u32; 1] = keys(&ROWS);
+/// static TABLE: Table = Table::new(&ROWS, &KEYS);
+///
+/// fn even(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
+///     if raw % 2 == 0 { Ok(()) } else { Err(AbortCode::INVALID_VALUE) }
+/// }
+/// static LIST: [(Slot, Condition); 1] = [(TABLE.slot(0x2000, 0), Condition::Check(even))];
+/// static NUMBERS: [u8; 1] = condition_numbers(&LIST);
+/// static CONDITIONS: Conditions = Conditions::new(&LIST, &NUMBERS);
+/// ```
+#[derive(Debug)]
+pub struct Conditions {
+    list: &'static [(Slot, Condition)],
+    /// By slot: 0 for none, else one more than the place in the list.
+    numbers: &'static [u8],
+}
+
+impl Conditions {
+    /// No object has one.
+    pub const NONE: &'static Self = &Self { list: &[], numbers: &[] };
+
+    /// The conditions of `list`, with `numbers` = [`condition_numbers`]`(list)`.
+    pub const fn new(list: &'static [(Slot, Condition)], numbers: &'static [u8]) -> Self {
+        Self { list, numbers }
+    }
+
+    /// The condition on downloads to a row.
+    #[inline]
+    pub(super) fn of(&self, slot: Slot) -> Option<Condition> {
+        match self.numbers.get(slot.position()) {
+            None | Some(0) => None,
+            Some(number) => self.list.get(usize::from(*number) - 1).map(|(_, condition)| *condition),
+        }
+    }
+}
+
+/// Where in `list` the condition of each of `N` rows stands; for a `static` beside the list.
+///
+/// # Panics
+/// At compile time if a row is named twice or the list has more than 255 conditions.
+pub const fn condition_numbers<const N: usize>(list: &[(Slot, Condition)]) -> [u8; N] {
+    assert!(list.len() <= u8::MAX as usize, "more conditions than can be numbered");
+    let mut numbers = [0; N];
+    let mut i = 0;
+    while i < list.len() {
+        let position = list[i].0.position();
+        assert!(numbers[position] == 0, "two conditions on one object");
+        numbers[position] = i as u8 + 1;
+        i += 1;
+    }
+    numbers
+}
