@@ -6,7 +6,7 @@ use canopen::od::{DataType, Entry};
 use crate::row::{U8, U16, U32, join, ro, rw};
 
 /// All of them.
-pub(super) const ROWS: [Entry; ROW_COUNT] = join(&[
+pub(super) static ROWS: [Entry; ROW_COUNT] = join(&[
     &GENERAL,
     &rpdo!(0x1400, "rpdo1", 0x200),
     &rpdo!(0x1401, "rpdo2", 0x300),

@@ -23,7 +23,7 @@ const PER_MILLE: &str = "0.1 %";
 pub(super) const ROW_COUNT: usize = 104;
 
 #[rustfmt::skip]
-pub(super) const ROWS: [Entry; ROW_COUNT] = [
+pub(super) static ROWS: [Entry; ROW_COUNT] = [
     rw(0x6007, 0, I16, "abort_connection_option_code", "What a lost connection does").values(ABORT_CONNECTION).default(1).saved(),
     ro(0x603F, 0, U16, "error_code", "Code of the latest error").mappable(),
     rw(0x6040, 0, U16, "controlword", "Controlword").mappable(),
