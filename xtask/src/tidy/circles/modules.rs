@@ -174,7 +174,7 @@ impl<'a> Reader<'a> {
                     self.at += 1;
                 }
                 name => {
-                    if !(name == "self" && !path.is_empty()) {
+                    if name != "self" || path.is_empty() {
                         path.push(name.to_owned());
                     }
                     if self.text(0) != "::" {
@@ -196,10 +196,10 @@ impl<'a> Reader<'a> {
         let (token, line) = (self.text(0), self.line());
         let next = self.peek(1).filter(Token::is_name);
         match (token, next) {
-            ("fn" | "struct" | "enum" | "union" | "trait" | "type" | "const" | "static", Some(next)) => {
-                if at_module_level {
-                    self.tree.modules[module].defined.insert(next.text.to_owned());
-                }
+            ("fn" | "struct" | "enum" | "union" | "trait" | "type" | "const" | "static", Some(next))
+                if at_module_level =>
+            {
+                self.tree.modules[module].defined.insert(next.text.to_owned());
             }
             ("macro_rules", _) => {
                 let name = self.text(2).to_owned();
