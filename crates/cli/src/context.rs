@@ -9,8 +9,8 @@ use master::drive::Drive;
 use master::identify::Knowledge;
 use master::{Error, Network, Node};
 
-use crate::args::Global;
 use crate::failure::Failure;
+use crate::global::Global;
 use crate::machine_file::Machine;
 use crate::models::{self, Description};
 use crate::progress::Progress;
@@ -133,7 +133,7 @@ impl Context {
         let Some(guess) = drive.guess().filter(|guess| guess.evidence().is_some() && !self.json) else { return };
         let id = drive.node().id();
         let fitting: Vec<_> = guess.fitting().map(|model| model.model).collect();
-        let how = how_to_say(id, &fitting);
+        let how = models::how_to_say(id, &fitting);
         self.progress.note(&format!("node {id}: cannot tell its model: {guess}. Taken for that; to be sure: {how}"));
     }
 
@@ -167,11 +167,4 @@ impl Context {
     pub(crate) async fn settle(&self) {
         self.network.sleep(SETTLING_TIME).await;
     }
-}
-
-/// How the user says which of `models` a node is.
-pub(crate) fn how_to_say(node: NodeId, models: &[&str]) -> String {
-    let (first, others) = models.split_first().unwrap_or((&"MODEL", &[]));
-    let others = if others.is_empty() { String::new() } else { format!(" (or {})", others.join(", ")) };
-    format!("--model {node}={first}{others}, or a machine file (--machine FILE)")
 }

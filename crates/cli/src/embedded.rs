@@ -1,6 +1,5 @@
 //! The embedded virtual bus and the drives on it.
 
-use std::path::Path;
 use std::time::Duration;
 
 use can::Bitrate;
@@ -10,7 +9,6 @@ use sim::machine::Order;
 use sim::{VirtualDrive, World};
 
 use crate::failure::Failure;
-use crate::machine_file;
 use crate::models::{Description, EMBEDDED};
 
 /// Decides everything random on the embedded bus: runs are repeatable.
@@ -25,30 +23,17 @@ const SETTLING_TIME: Duration = Duration::from_millis(200);
 /// A world with drives, and which they are.
 pub(crate) type Embedded = (World, Vec<(NodeId, &'static Description)>);
 
-/// The world that `--bus sim` or `--bus sim:FILE.toml` means: the drives of [`EMBEDDED`], or what the file
-/// says.
-pub(crate) fn world(file: Option<&Path>) -> Result<Embedded, Failure> {
-    if let Some(path) = file {
-        return machine_file::load(path);
-    }
+/// The world that `--bus sim` means: the drives of [`EMBEDDED`], factory-fresh but for node-ID and bit rate.
+pub(crate) fn world() -> Result<Embedded, Failure> {
     let mut world = World::new(Bitrate::K500, SEED);
     let mut drives = Vec::new();
     for (model, node) in EMBEDDED.iter().copied() {
         let node = NodeId::new(node).unwrap_or(NodeId::MIN);
-        let drive = virtual_drive(model, node, world.bitrate())?;
+        let drive = ordered_drive(model, &Order::new(model, node, world.bitrate()))?;
         world.add_drive(node.raw(), drive).map_err(|error| Failure::new(error.to_string()))?;
         drives.push((node, model));
     }
     Ok((world, drives))
-}
-
-/// A factory-fresh virtual drive of a model, but for its node-ID and bit rate, without power.
-pub(crate) fn virtual_drive(
-    model: &Description,
-    node: NodeId,
-    bitrate: Bitrate,
-) -> Result<Box<dyn VirtualDrive>, Failure> {
-    ordered_drive(model, &Order::new(model, node, bitrate))
 }
 
 /// A virtual drive as it was ordered, without power.

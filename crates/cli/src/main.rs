@@ -9,6 +9,7 @@ mod context;
 mod decode;
 mod embedded;
 mod failure;
+mod global;
 mod guard;
 mod machine_file;
 mod models;
@@ -22,6 +23,7 @@ mod scope;
 mod serve;
 mod session;
 mod signals;
+mod status;
 mod table;
 
 use std::io::{self, Write};
@@ -30,10 +32,11 @@ use std::process::ExitCode;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
 
-use crate::args::{Cli, Command, Global};
+use crate::args::{Cli, Command};
 use crate::command::objects::Whose;
 use crate::context::Context;
 use crate::failure::{Failure, FailureReport};
+use crate::global::Global;
 use crate::output::{Format, Report};
 use crate::paint::Paint;
 use crate::plain::plain;
@@ -155,7 +158,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         },
         Command::Readings(readings) => print(format, &readings.list()?),
         Command::Dump(dump) => dump.run(global, format),
-        Command::Completions(completions) => completions.run(),
+        Command::Completions(completions) => completions.run(&mut Cli::command()),
     }
 }
 

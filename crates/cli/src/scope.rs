@@ -7,9 +7,10 @@ use clap::ArgMatches;
 use clap::parser::ValueSource;
 use transport::BusSpec;
 
-use crate::args::{Command, Global};
+use crate::args::Command;
 use crate::command::objects::Whose;
 use crate::failure::Failure;
+use crate::global::Global;
 
 /// Options that a command does not heed, by their names in the parser, and why.
 struct Unheeded {

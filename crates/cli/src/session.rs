@@ -2,6 +2,7 @@
 //! driven by `transport` under tokio. The command is the same async code on both.
 
 use std::error::Error;
+use std::path::Path;
 use std::time::Duration;
 
 use canopen::{Mux, NodeId};
@@ -9,10 +10,11 @@ use master::Network;
 use tokio::sync::Notify;
 use transport::{BusSpec, WallClock, run_station};
 
-use crate::args::Global;
 use crate::context::Context;
-use crate::embedded;
+use crate::embedded::{self, Embedded};
 use crate::failure::Failure;
+use crate::global::Global;
+use crate::machine_file;
 use crate::progress::Progress;
 use crate::signals::asked_to_end;
 
@@ -45,13 +47,18 @@ pub(crate) fn runtime() -> Result<tokio::runtime::Runtime, Failure> {
     built.map_err(|error| Failure::new("cannot start the runtime").because(error))
 }
 
+/// The world that `--bus sim` or `--bus sim:FILE.toml` means, and which drives are in it.
+pub(crate) fn virtual_world(file: Option<&Path>) -> Result<Embedded, Failure> {
+    file.map_or_else(embedded::world, machine_file::load)
+}
+
 fn virtual_bus<R>(
     global: &Global,
-    file: Option<&std::path::Path>,
+    file: Option<&Path>,
     command: impl AsyncFnOnce(&Context) -> Result<R, Failure>,
 ) -> Result<R, Failure> {
     exit_on_signal();
-    let (mut world, drives) = embedded::world(file)?;
+    let (mut world, drives) = virtual_world(file)?;
     let network = Network::new();
     world.add_station(network.clone());
     let progress = Progress::new(global.json);

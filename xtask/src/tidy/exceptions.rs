@@ -22,7 +22,6 @@ pub(super) const EXCEPTIONS: &[Exception] = &[];
 pub(super) const STILL_IN_CIRCLES: &[(&str, usize)] = &[
     ("canopen", 5),
     ("cia402", 2),
-    ("cli", 23),
     ("devices", 8),
     ("showcase", 29),
     ("sim", 9),

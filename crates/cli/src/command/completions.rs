@@ -1,9 +1,7 @@
 //! `ferrodrive completions`: completion scripts for shells.
 
-use clap::CommandFactory;
 use clap_complete::Shell;
 
-use crate::args::Cli;
 use crate::failure::Failure;
 use crate::output::print;
 
@@ -19,11 +17,11 @@ pub(crate) struct Completions {
 }
 
 impl Completions {
-    /// Writes the script to standard output.
-    pub(crate) fn run(&self) -> Result<(), Failure> {
+    /// Writes the script for a command line to standard output.
+    pub(crate) fn run(&self, whole: &mut clap::Command) -> Result<(), Failure> {
         // The generator panics where it cannot write, so it writes to memory.
         let mut script = Vec::new();
-        clap_complete::generate(self.shell, &mut Cli::command(), "ferrodrive", &mut script);
+        clap_complete::generate(self.shell, whole, "ferrodrive", &mut script);
         print(&script).map_err(|error| Failure::new("cannot write to standard output").because(error))
     }
 }

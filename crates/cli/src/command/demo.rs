@@ -7,8 +7,8 @@ use std::path::PathBuf;
 use clap::builder::PossibleValuesParser;
 use transport::WallClock;
 
-use crate::args::Global;
 use crate::failure::Failure;
+use crate::global::Global;
 use crate::models::{self, MODELS};
 use crate::progress::Progress;
 use crate::session::exit_on_signal;

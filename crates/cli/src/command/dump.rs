@@ -12,13 +12,12 @@ use sim::wire::WireEvent;
 use transport::log::{LogError, LogWriter};
 use transport::{AnyBus, AsyncBus, BusError, BusSpec, WallClock};
 
-use crate::args::Global;
-use crate::embedded;
 use crate::failure::Failure;
+use crate::global::Global;
 use crate::machine_file::Machine;
 use crate::output::{Format, Report};
 use crate::paint::Paint;
-use crate::session::{bus_failure, exit_on_signal, runtime};
+use crate::session::{bus_failure, exit_on_signal, runtime, virtual_world};
 use crate::signals::asked_to_end;
 
 /// Show the bus decoded: SDO with object names and values, PDOs by their mapping, statuswords in words
@@ -100,7 +99,7 @@ impl Dump {
 
     fn embedded(&self, file: Option<&Path>, sink: &mut Sink) -> Result<(), Failure> {
         exit_on_signal();
-        let (mut world, drives) = embedded::world(file)?;
+        let (mut world, drives) = virtual_world(file)?;
         for (node, model) in drives {
             sink.decoder.set_model(node, model);
         }

@@ -4,9 +4,9 @@ use canopen::NmtState;
 use master::identify::{Found, Knowledge};
 use serde::Serialize;
 
-use crate::context::{Context, how_to_say};
+use crate::context::Context;
 use crate::failure::Failure;
-use crate::models::Description;
+use crate::models::{Description, how_to_say};
 use crate::output::Report;
 use crate::paint::Paint;
 use crate::table::Table;

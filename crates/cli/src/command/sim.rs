@@ -13,9 +13,9 @@ use transport::{
     run_world,
 };
 
-use crate::args::Global;
 use crate::embedded;
 use crate::failure::Failure;
+use crate::global::Global;
 use crate::machine_file::{Machine, Placed};
 use crate::parse::drive_spec::{DriveSpec, drive_spec};
 use crate::serve::eeprom::{EepromError, Eeproms};

@@ -1,0 +1,41 @@
+//! What every command takes from the command line.
+
+use std::time::Duration;
+
+use canopen::NodeId;
+use transport::BusSpec;
+
+use crate::machine_file::{self, Machine};
+use crate::models::Description;
+use crate::parse::drive_spec::node_model;
+
+/// What every command takes.
+#[derive(Clone, clap::Args)]
+#[command(next_help_heading = "On every command")]
+pub(crate) struct Global {
+    /// The bus: sim, sim:FILE.toml, socketcand://HOST:PORT/can0, slcan:///dev/ttyACM0?bitrate=500k,
+    /// slcan://HOST:PORT, log:FILE
+    ///
+    /// `sim` is a virtual bus of this command alone, with factory-fresh drives, as fast as the machine goes.
+    #[arg(long, value_name = "BUS", env = "FERRODRIVE_BUS", default_value = "sim", global = true)]
+    pub(crate) bus: BusSpec,
+
+    /// Print JSON instead of text
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+
+    /// Which model a node is, where its identity cannot tell (e.g. 4=zlac8030l); may be repeated
+    #[arg(long = "model", value_name = "NODE=MODEL", value_parser = node_model, global = true)]
+    pub(crate) models: Vec<(NodeId, &'static Description)>,
+
+    /// Machine file that says which models are where on a real bus; `sim` serves the drives that it describes
+    ///
+    /// On a real bus the `model` and `node` of each [[drive]] count. The same file describes a bus of a command's own to --bus
+    /// sim:FILE.toml, which knows its drives.
+    #[arg(long, value_name = "FILE.toml", value_parser = machine_file::machine, env = "FERRODRIVE_MACHINE", global = true)]
+    pub(crate) machine: Option<Machine>,
+
+    /// Longest wait for each answer of a node
+    #[arg(long, value_name = "TIME", value_parser = master::units::parse_duration, default_value = "500ms", global = true)]
+    pub(crate) timeout: Duration,
+}
