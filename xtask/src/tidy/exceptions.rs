@@ -23,7 +23,6 @@ pub(super) const STILL_IN_CIRCLES: &[(&str, usize)] = &[
     ("canopen", 5),
     ("cia402", 2),
     ("devices", 8),
-    ("showcase", 29),
     ("sim", 9),
     ("tests", 5),
     ("transport", 15),

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use super::{ALARM, idle};
+use super::steps::{ALARM, idle};
 use crate::bench::Bench;
 use crate::expect::Expect;
 use crate::lights::red_flashes;

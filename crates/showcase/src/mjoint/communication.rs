@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use can::Instant;
 
-use super::{ALARM, idle, power_cycle, save};
+use super::steps::{ALARM, idle, move_time_s, power_cycle, save, until_reached};
 use crate::bench::Bench;
 use crate::datagram::frame;
 use crate::expect::Expect;
@@ -152,7 +152,7 @@ pub(super) fn registers(bench: &mut Bench) {
     bench.write_registers(0x00, &[1]);
     bench.step("write incremental position 10000 (0Eh)");
     bench.write_registers(0x0E, &[10_000, 0]);
-    super::until_reached(bench, from + 10_000.0, from, super::move_time_s(10_000.0, 1000.0, 20_000.0));
+    until_reached(bench, from + 10_000.0, from, move_time_s(10_000.0, 1000.0, 20_000.0));
     bench.write("Modbus forbid", 0x2600, 0, 0);
     idle(bench);
 }

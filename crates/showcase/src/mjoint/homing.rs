@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::time::Duration;
 
-use super::{COUNTS_PER_TURN, idle};
+use super::steps::{COUNTS_PER_TURN, idle};
 use crate::bench::Bench;
 use crate::expect::Expect;
 use crate::plot::EventKind;

@@ -1,7 +1,7 @@
 //! 5.06 and 5.07: position and speed mode by SDO, with the datagrams of the worked examples; 5.04: incremental moves and
 //! the values that can be read.
 
-use super::{TARGET_REACHED, counts_s, idle, move_time_s, until_reached};
+use super::steps::{TARGET_REACHED, counts_s, idle, move_time_s, until_reached};
 use crate::bench::Bench;
 use crate::expect::Expect;
 use crate::plot::EventKind;

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use super::{ALARM, COUNTS_PER_TURN, IN_PLACE_COUNTS, TARGET_REACHED, idle, power_cycle, save};
+use super::steps::{ALARM, COUNTS_PER_TURN, IN_PLACE_COUNTS, TARGET_REACHED, expect_time, idle, power_cycle, save};
 use crate::bench::Bench;
 use crate::expect::Expect;
 use crate::plot::EventKind;
@@ -96,7 +96,7 @@ pub(super) fn return_to_origin(bench: &mut Bench) {
     let took_s = (bench.now() - begin).as_secs_f64();
     // 8 turns at 600 r/min, and the ramps of 10005 (r/min)/s.
     let expected_s = 8.0 / 10.0 + 600.0 / 10_005.0;
-    super::expect_time(bench, "at its origin after", expected_s, took_s);
+    expect_time(bench, "at its origin after", expected_s, took_s);
     bench.expect_object(0x6064, 0, Expect::Near(0.0, IN_PLACE_COUNTS), "counts");
     bench.aim_at_nothing();
     bench.write("special function 0", 0x2619, 0, 0);

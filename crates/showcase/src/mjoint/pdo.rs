@@ -2,7 +2,7 @@
 
 use can::Frame;
 
-use super::{TARGET_REACHED, idle, move_time_s, until_reached};
+use super::steps::{IN_PLACE_COUNTS, TARGET_REACHED, idle, move_time_s, until_reached};
 use crate::bench::Bench;
 use crate::datagram::frame;
 use crate::expect::Expect;
@@ -102,7 +102,7 @@ pub(super) fn speed(bench: &mut Bench) {
 
 /// The position that a TPDO carries.
 fn position(bench: &mut Bench, answer: Option<Frame>, expected: f64) {
-    let near = Expect::Near(expected, super::IN_PLACE_COUNTS + 10.0);
+    let near = Expect::Near(expected, IN_PLACE_COUNTS + 10.0);
     bench.expect("position", near, "counts", first_number(answer));
 }
 

@@ -1,7 +1,7 @@
 //! "2. Command pulse + direction position control mode", "3. Orthogonal instruction pulse position control mode" and "1.
 //! Internal acceleration and deceleration curve".
 
-use super::{COUNTS_PER_TURN, counts_s, power_cycle, save};
+use super::steps::{COUNTS_PER_TURN, counts_s, power_cycle, save};
 use crate::bench::Bench;
 use crate::expect::Expect;
 use crate::plot::EventKind;

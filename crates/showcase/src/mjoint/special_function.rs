@@ -6,7 +6,7 @@ use std::time::Duration;
 use sim::Brake;
 
 use super::multi_turn::go_to;
-use super::{COUNTS_PER_TURN, IN_PLACE_COUNTS, TARGET_REACHED, idle, power_cycle, save};
+use super::steps::{COUNTS_PER_TURN, IN_PLACE_COUNTS, TARGET_REACHED, idle, power_cycle, save};
 use crate::bench::Bench;
 use crate::expect::Expect;
 

@@ -1,9 +1,10 @@
 //! Layout and drawing: where panels, ticks, labels and marks go.
 
+use super::lanes;
+use super::poster::{Colour, Event, EventKind, Figure, Panel, Poster, Style, Trace};
 use super::svg::{Anchor, Font, Svg};
 use super::thin::thin;
 use super::ticks::Ticks;
-use super::{Colour, Event, EventKind, Figure, Panel, Poster, Style, Trace, lanes};
 
 /// Chosen for pages that show pictures about 900 px wide: letters stay readable there.
 const WIDTH: f64 = 1000.0;
@@ -309,7 +310,7 @@ fn text_colour(style: Style) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Section;
+    use super::super::poster::Section;
     use super::*;
 
     fn example() -> Poster {

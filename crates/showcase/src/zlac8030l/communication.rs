@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use can::{CanId, Frame, Instant};
 
-use super::NODE;
+use super::as_delivered::NODE;
 use crate::bench::Bench;
 use crate::expect::Expect;
 use crate::timing::largest_gap_ms;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::NODE;
+use super::as_delivered::NODE;
 use super::functions::{clear_fault, velocity_mode};
 use super::position::position_mode;
 use crate::bench::Bench;

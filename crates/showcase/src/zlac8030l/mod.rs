@@ -1,5 +1,6 @@
 //! Every procedure of the ZLAC8030L's manual ("ZLAC8030L quick start guide V1.00").
 
+mod as_delivered;
 mod communication;
 mod faults;
 mod functions;
@@ -9,12 +10,6 @@ mod torque;
 mod velocity;
 
 use super::bench::Bench;
-
-/// Node-ID as delivered (3.1).
-const NODE: u8 = 4;
-
-/// Counts in a turn of the shaft: 4 edges of 1024 encoder lines (200Bh).
-const COUNTS_PER_TURN: f64 = 4096.0;
 
 /// All of it, in the manual's order as far as the drive's state allows.
 pub(super) fn procedures(bench: &mut Bench) {

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use can::{CanId, Frame};
 
-use super::NODE;
+use super::as_delivered::NODE;
 use super::functions::{stop, velocity_mode};
 use crate::bench::Bench;
 use crate::expect::Expect;

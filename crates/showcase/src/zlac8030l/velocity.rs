@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::COUNTS_PER_TURN;
+use super::as_delivered::COUNTS_PER_TURN;
 use crate::bench::Bench;
 use crate::expect::Expect;
 use crate::plot::EventKind;

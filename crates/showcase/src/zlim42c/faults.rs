@@ -1,7 +1,7 @@
 //! 3.4 and 603Fh: every fault, provoked, seen in 603Fh, 1001h, the statusword, the EMCY message and the red light, and
 //! reset both ways.
 
-use super::enable_in;
+use super::steps::enable_in;
 use crate::bench::Bench;
 use crate::expect::Expect;
 use crate::lights::red_flashes;

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use std::time::Duration;
 
 use super::position::go_to;
-use super::{PULSES_PER_TURN, PULSES_S_PER_RPM, release};
+use super::steps::{PULSES_PER_TURN, PULSES_S_PER_RPM, release};
 use crate::bench::Bench;
 use crate::datagram::frame;
 use crate::expect::Expect;

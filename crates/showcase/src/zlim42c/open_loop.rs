@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::position::go_to;
-use super::{TARGET_REACHED, release};
+use super::steps::{TARGET_REACHED, release};
 use crate::bench::Bench;
 use crate::expect::Expect;
 use crate::plot::EventKind;

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::position::go_to;
-use super::{TARGET_REACHED, enable_in, release};
+use super::steps::{TARGET_REACHED, enable_in, release};
 use crate::bench::Bench;
 use crate::expect::Expect;
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::release;
+use super::steps::{enable_in, release};
 use crate::bench::Bench;
 use crate::datagram::frame;
 use crate::expect::Expect;
@@ -50,7 +50,7 @@ fn by_timer(bench: &mut Bench) {
 fn by_sync(bench: &mut Bench) {
     bench.write("TPDO0 type 1", 0x1800, 2, 1);
     bench.write("RPDO1 type 1", 0x1401, 2, 1);
-    super::enable_in(bench, 3);
+    enable_in(bench, 3);
     bench.step("RPDO1: 60 r/min, waits for SYNC");
     bench.send(frame("301 3C 00 00 00"));
     bench.expect_object(0x60FF, 0, Expect::Near(0.0, 0.0), "r/min");

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{ACKNOWLEDGE, TARGET_REACHED, enable_in, expect_position, move_time_s, release};
+use super::steps::{ACKNOWLEDGE, TARGET_REACHED, enable_in, expect_position, move_time_s, release};
 use crate::bench::Bench;
 use crate::datagram::frame;
 use crate::expect::Expect;

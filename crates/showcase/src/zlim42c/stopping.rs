@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::position::go_to;
-use super::{enable_in, release};
+use super::steps::{enable_in, expect_position, release};
 use crate::bench::Bench;
 use crate::expect::Expect;
 use crate::plot::EventKind;
@@ -27,7 +27,7 @@ pub(super) fn halt(bench: &mut Bench) {
     bench.expect_status("bit 10: stands", 0x0400, 0x0400);
     bench.write("goes on, 1Fh", 0x6040, 0, 0x1F);
     bench.run_ms(2_500);
-    super::expect_position(bench, 8000.0);
+    expect_position(bench, 8000.0);
     release(bench);
 }
 

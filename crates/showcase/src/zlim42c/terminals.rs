@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use super::position::go_to;
+use super::steps::{TARGET_REACHED, enable_in, release};
 use super::stopping::until_standing;
-use super::{enable_in, release};
 use crate::bench::Bench;
 use crate::expect::Expect;
 use crate::plot::EventKind;
@@ -106,7 +106,7 @@ pub(super) fn outputs(bench: &mut Bench) {
     bench.run_ms(5);
     expect_outputs(bench, "inverted: Y0", 0b01);
     bench.write("not inverted", 0x2030, 0x0C, 0);
-    bench.run_until(Duration::from_secs(2), |word| word & super::TARGET_REACHED != 0);
+    bench.run_until(Duration::from_secs(2), |word| word & TARGET_REACHED != 0);
     bench.step("alarm");
     bench.machine("fault reference on");
     bench.run_ms(50);

@@ -1,6 +1,6 @@
 //! 5.3.5: velocity mode. The example, and the S-shaped ramp by its middle.
 
-use super::{PULSES_S_PER_RPM, START_RPM, enable_in, release};
+use super::steps::{PULSES_S_PER_RPM, START_RPM, enable_in, release};
 use crate::bench::Bench;
 use crate::datagram::frame;
 use crate::expect::Expect;
