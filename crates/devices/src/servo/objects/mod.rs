@@ -38,7 +38,7 @@ mod tests {
             let mapped = ROWS.iter().filter(|row| row.index == index && row.sub_index > 0);
             let mut bits = 0;
             for entry in mapped {
-                let canopen::od::Default::Value(record) = entry.default else { panic!("{}", entry.name) };
+                let canopen::od::DefaultValue::Value(record) = entry.default else { panic!("{}", entry.name) };
                 if record == 0 {
                     continue;
                 }
