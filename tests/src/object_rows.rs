@@ -49,10 +49,10 @@ pub fn are_read_with_their_width_and_default<S: Subject>() {
         |_| true,
         |row| {
             let mut bench = Bench::<S>::new();
-            let width = bench.read(row.index, row.sub).map(|bytes| bytes.len());
+            let width = bench.read((row.index, row.sub)).map(|bytes| bytes.len());
             expect("bytes on the wire", width, Ok(row.size))?;
             match row.default {
-                Some(default) if !row.live => expect("default", bench.get(row.index, row.sub), default),
+                Some(default) if !row.live => expect("default", bench.get((row.index, row.sub)), default),
                 _ => Ok(()),
             }
         },
@@ -63,7 +63,7 @@ pub fn are_read_with_their_width_and_default<S: Subject>() {
 pub fn refuse_writes_where_they_are_read_only<S: Subject>() {
     assert_rows::<S>(
         |row| !row.writable,
-        |row| expect("a write", Bench::<S>::new().write(row.index, row.sub, 1), Err(READ_ONLY)),
+        |row| expect("a write", Bench::<S>::new().write((row.index, row.sub), 1), Err(READ_ONLY)),
     );
 }
 
@@ -74,7 +74,7 @@ pub fn take_their_range_and_refuse_what_lies_beyond<S: Subject>() {
         |row| {
             let (low, high) = row.limits.unwrap_or_default();
             for value in [low, high] {
-                expect(&format!("write {value}"), Bench::<S>::new().write(row.index, row.sub, value), Ok(()))?;
+                expect(&format!("write {value}"), Bench::<S>::new().write((row.index, row.sub), value), Ok(()))?;
             }
             refused::<S>(row, low - 1, TOO_LOW)?;
             refused::<S>(row, high + 1, TOO_HIGH)
@@ -88,18 +88,18 @@ fn refused<S: Subject>(row: &ObjectRow, value: i64, code: Abort) -> Result<(), S
         return Ok(());
     }
     let mut bench = Bench::<S>::new();
-    let before = bench.get(row.index, row.sub);
-    let answer = bench.write(row.index, row.sub, value);
+    let before = bench.get((row.index, row.sub));
+    let answer = bench.write((row.index, row.sub), value);
     if answer != Err(code) && answer != Err(INVALID_VALUE) {
         return Err(format!("write {value}: {answer:X?}, expected {code:08X}h"));
     }
-    expect("value after it", bench.get(row.index, row.sub), before)
+    expect("value after it", bench.get((row.index, row.sub)), before)
 }
 
 /// These values of these objects lie between the listed ones, and are refused.
 pub fn refuse_values_between_the_listed<S: Subject>(values: &[(u16, i64)]) {
     for (index, value) in values {
-        let answer = Bench::<S>::new().write(*index, 0, *value);
+        let answer = Bench::<S>::new().write(*index, *value);
         assert_eq!(answer, Err(INVALID_VALUE), "{index:04X}h = {value}");
     }
 }
@@ -110,7 +110,7 @@ pub fn refuse_another_width<S: Subject>() {
         |row| row.writable,
         |row| {
             let mut bench = Bench::<S>::new();
-            let before = bench.get(row.index, row.sub);
+            let before = bench.get((row.index, row.sub));
             let [low, high] = row.index.to_le_bytes();
             for (size, command) in [(1, 0x2F), (2, 0x2B), (4, 0x23)] {
                 if size == row.size {
@@ -123,7 +123,7 @@ pub fn refuse_another_width<S: Subject>() {
                     return Err(format!("{size} bytes: answered {answer:02X?}, expected abort {expected:08X}h"));
                 }
             }
-            expect("value after it", bench.get(row.index, row.sub), before)
+            expect("value after it", bench.get((row.index, row.sub)), before)
         },
     );
 }
@@ -132,10 +132,10 @@ pub fn refuse_another_width<S: Subject>() {
 pub fn are_missed_by_object_or_by_sub_index<S: Subject>(objects: &[u16], sub_indexes: &[(u16, u8)]) {
     let mut bench = Bench::<S>::new();
     for index in objects {
-        assert_eq!(bench.read(*index, 0), Err(NO_SUCH_OBJECT), "{index:04X}h");
+        assert_eq!(bench.read(*index), Err(NO_SUCH_OBJECT), "{index:04X}h");
     }
     for (index, sub) in sub_indexes {
-        assert_eq!(bench.read(*index, *sub), Err(NO_SUCH_SUB_INDEX), "{index:04X}h:{sub:02X}");
+        assert_eq!(bench.read((*index, *sub)), Err(NO_SUCH_SUB_INDEX), "{index:04X}h:{sub:02X}");
     }
 }
 
@@ -143,7 +143,7 @@ pub fn are_missed_by_object_or_by_sub_index<S: Subject>(objects: &[u16], sub_ind
 pub fn read_at_rest<S: Subject>(expected: &[(u16, u8, RangeInclusive<i64>)], elsewhere: &[u16]) {
     let mut bench = Bench::<S>::new();
     for (index, sub, range) in expected {
-        let value = bench.get(*index, *sub);
+        let value = bench.get((*index, *sub));
         assert!(range.contains(&value), "{index:04X}h:{sub:02X} reads {value}, expected {range:?}");
     }
     let checked = |row: &ObjectRow| expected.iter().any(|(index, sub, _)| (*index, *sub) == (row.index, row.sub));
@@ -162,7 +162,7 @@ pub fn outlive_a_power_cycle_if_and_only_if_stored<S: Subject>(memory: &Memory) 
             let mut bench = Bench::<S>::new();
             write_other(&mut bench, row, other)?;
             memory.restart(&mut bench, row, kept);
-            expect("after a power cycle", bench.get(row.index, row.sub), kept)
+            expect("after a power cycle", bench.get((row.index, row.sub)), kept)
         },
     );
 }
@@ -174,23 +174,22 @@ pub fn are_kept_and_restored_only_on_command<S: Subject>(memory: &Memory) {
         |row| {
             let (other, default) = memory.values::<S>(row);
             let mut bench = Bench::<S>::new();
-            bench.set(memory.switch, 0, 1);
+            bench.set(memory.switch, 1);
             write_other(&mut bench, row, other)?;
             memory.restart(&mut bench, row, default);
-            expect("not stored, after a power cycle", bench.get(row.index, row.sub), default)?;
+            expect("not stored, after a power cycle", bench.get((row.index, row.sub)), default)?;
 
-            bench.set(memory.switch, 0, 1);
+            bench.set(memory.switch, 1);
             write_other(&mut bench, row, other)?;
-            bench.set(memory.command, 0, 2);
-            expect("the command", bench.get(memory.command, 0), 0)?;
+            bench.set(memory.command, 2);
+            expect("the command", bench.get(memory.command), 0)?;
             bench.let_store();
             memory.restart(&mut bench, row, other);
-            expect("stored, after a power cycle", bench.get(row.index, row.sub), other)?;
+            expect("stored, after a power cycle", bench.get((row.index, row.sub)), other)?;
 
-            bench.set(memory.command, 0, 1);
-            bench.let_store();
+            bench.set(memory.command, 1).let_store();
             memory.restart(&mut bench, row, default);
-            expect("restored, after a power cycle", bench.get(row.index, row.sub), default)
+            expect("restored, after a power cycle", bench.get((row.index, row.sub)), default)
         },
     );
 }
@@ -202,18 +201,17 @@ pub fn are_saved_together_or_not_at_all<S: Subject>(memory: &Memory, objects: &[
     let (mut olds, mut news) = (0, 0);
     for delay_us in (0..3000).step_by(50) {
         let mut bench = Bench::<S>::new();
-        bench.set(memory.switch, 0, 1);
+        bench.set(memory.switch, 1);
         for (index, _, value) in objects {
-            bench.set(*index, 0, *value);
+            bench.set(*index, *value);
         }
         let [low, high] = memory.command.to_le_bytes();
         let save = Frame::full(CanId::standard(0x600 + u16::from(S::NODE)), [0x2B, low, high, 0, 2, 0, 0, 0]);
         bench.world.send(bench.host, save).expect("room at the host");
-        bench.run(Duration::from_micros(delay_us));
-        bench.power_cycle();
-        let kept: Vec<_> = objects.iter().map(|(index, ..)| bench.get(*index, 0)).collect();
+        bench.run(Duration::from_micros(delay_us)).power_cycle();
+        let kept: Vec<_> = objects.iter().map(|(index, ..)| bench.get(*index)).collect();
         assert!(kept == old || kept == new, "off after {delay_us} us: {kept:?}");
-        assert_eq!(bench.get(0x603F, 0), 0, "off after {delay_us} us");
+        assert_eq!(bench.get(0x603F), 0, "off after {delay_us} us");
         (olds, news) = if kept == old { (olds + 1, news) } else { (olds, news + 1) };
     }
     assert!(olds > 0 && news > 0, "both happen: {olds} and {news}");
@@ -258,13 +256,13 @@ fn velocity_mapping(row: &ObjectRow) -> i64 {
 /// Writes the value the way the object wants it: mapping entries while sub-index 00 is 0.
 fn write_other<S: Subject>(bench: &mut Bench<S>, row: &ObjectRow, value: i64) -> Result<(), String> {
     if matches!(row.index, 0x1600..=0x1603 | 0x1A00..=0x1A03) {
-        expect("clear the mapping", bench.write(row.index, 0, 0), Ok(()))?;
+        expect("clear the mapping", bench.write(row.index, 0), Ok(()))?;
         if row.sub == 0 && value == 1 {
-            expect("map", bench.write(row.index, 1, velocity_mapping(row)), Ok(()))?;
+            expect("map", bench.write((row.index, 1), velocity_mapping(row)), Ok(()))?;
         }
     }
-    expect(&format!("write {value}"), bench.write(row.index, row.sub, value), Ok(()))?;
-    expect("value read back", bench.get(row.index, row.sub), value)?;
+    expect(&format!("write {value}"), bench.write((row.index, row.sub), value), Ok(()))?;
+    expect("value read back", bench.get((row.index, row.sub)), value)?;
     bench.let_store();
     Ok(())
 }

@@ -46,30 +46,25 @@ impl<S: PowerSubject> Bench<S> {
         };
         S::let_take_time(self);
         for controlword in controlwords {
-            self.set(0x6040, 0, *controlword);
+            self.set(0x6040, *controlword);
         }
         if state == "fault" {
-            self.set_fault(true);
-            self.set_fault(false);
+            self.break_down(true).break_down(false);
         }
     }
 
     /// Breaks the component whose break is a fault, or mends it, and lets the drive notice.
-    pub fn set_fault(&mut self, broken: bool) {
-        self.operate(|drive, now| drive.set_fault(S::BREAKABLE, broken, now)).expect("the drive has it");
-        self.run_ms(50);
+    pub fn break_down(&mut self, broken: bool) -> &mut Self {
+        self.set_fault(S::BREAKABLE, broken).run_ms(50)
     }
 
     fn cause(&mut self, cell: &PowerCell) {
         match (cell.controlword, &*cell.event) {
-            (Some(controlword), _) => {
-                self.set(0x6040, 0, 0x00FF & i64::from(controlword));
-                self.run_ms(10);
-            }
-            (None, "fault_occurs") => self.set_fault(true),
+            (Some(controlword), _) => self.set(0x6040, 0x00FF & i64::from(controlword)).run_ms(10),
+            (None, "fault_occurs") => self.break_down(true),
             // Ends of what the drive does by itself: there is nothing of the kind under way, time passes.
             (None, _) => self.run_ms(1000),
-        }
+        };
     }
 }
 

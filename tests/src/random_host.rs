@@ -39,7 +39,7 @@ pub fn is_answered_and_breaks_nothing<S: Subject>(play: &Play<S>) {
             let row = among[seeded.below(among.len())];
             let value = any_value(&mut seeded, row);
             // Taken or refused, but answered: `write` panics without an answer.
-            let _ = bench.write(row.index, row.sub, value);
+            let _ = bench.write((row.index, row.sub), value);
             (play.disturb)(&mut bench, &mut seeded);
             bench.run_ms(seeded.below(20) as u64);
             let report = bench.report();

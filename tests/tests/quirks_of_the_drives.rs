@@ -10,7 +10,7 @@ const NO_SUCH_OBJECT: Abort = 0x0602_0000;
 /// What a drive answers to questions that tell quirks.
 fn asked<S: Subject>(bench: &mut Bench<S>) -> Vec<(Quirk, bool)> {
     let node = bench.node;
-    let mut lacks = |index| bench.read(index, 0) == Err(NO_SUCH_OBJECT);
+    let mut lacks = |index| bench.read(index) == Err(NO_SUCH_OBJECT);
     let mut seen = vec![
         (Quirk::NoSupportedDriveModes, lacks(0x6502)),
         (Quirk::NoStandardStore, lacks(0x1010) && lacks(0x1011)),
@@ -19,8 +19,8 @@ fn asked<S: Subject>(bench: &mut Bench<S>) -> Vec<(Quirk, bool)> {
         (Quirk::NoModeDisplay, lacks(0x6061)),
     ];
     let length = |bytes: Result<Vec<u8>, Abort>| bytes.map_or(0, |bytes| bytes.len());
-    seen.push((Quirk::SubIndexZeroIsUnsigned16, length(bench.read(0x2030, 0)) == 2));
-    seen.push((Quirk::VersionsAreNumbers, length(bench.read(0x1009, 0)) == 2));
+    seen.push((Quirk::SubIndexZeroIsUnsigned16, length(bench.read(0x2030)) == 2));
+    seen.push((Quirk::VersionsAreNumbers, length(bench.read(0x1009)) == 2));
     // Bit 6, switch on disabled: where a drive that follows CiA 402 begins.
     seen.push((Quirk::NoPowerStateMachine, bench.statusword() & 1 << 6 == 0));
 
@@ -30,25 +30,22 @@ fn asked<S: Subject>(bench: &mut Bench<S>) -> Vec<(Quirk, bool)> {
         bench.run_ms(150);
         bench.heard_of(&format!("{:03X}#", 0x700 + u16::from(node))).last().cloned().expect("a heartbeat")
     };
-    bench.set(0x1017, 0, 100);
+    bench.set(0x1017, 100);
     seen.push((Quirk::StartsOperational, beat(bench).ends_with("#05")));
 
     // Operational, nothing mapped or changed by the host: a TPDO can only be an answer.
-    bench.send(&format!("000#01{node:02X}"));
-    bench.run_ms(50);
+    bench.send(&format!("000#01{node:02X}")).run_ms(50);
     bench.heard();
-    bench.send(&format!("{:03X}#0000000000000000", 0x200 + u16::from(node)));
-    bench.run_ms(20);
+    bench.send(&format!("{:03X}#0000000000000000", 0x200 + u16::from(node))).run_ms(20);
     let answered = !bench.heard_of(&format!("{:03X}#", 0x180 + u16::from(node))).is_empty();
     seen.push((Quirk::TpdoAnswersRpdo, answered));
 
-    bench.set(0x6040, 0, 0x1F);
-    seen.push((Quirk::NewSetPointClearsItself, bench.get(0x6040, 0) & 0x10 == 0));
+    bench.set(0x6040, 0x1F);
+    seen.push((Quirk::NewSetPointClearsItself, bench.get(0x6040) & 0x10 == 0));
 
     // Too much for each of them: a fault, or an alarm.
     bench.heard();
-    bench.tell(&format!("{node} supply 90"));
-    bench.run_ms(500);
+    bench.tell(&format!("{node} supply 90")).run_ms(500);
     seen.push((Quirk::NoEmcy, bench.heard_of(&format!("{:03X}#", 0x080 + u16::from(node))).is_empty()));
     seen.push((Quirk::HeartbeatTellsAlarm, beat(bench).ends_with("#04")));
     seen

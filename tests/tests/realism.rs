@@ -23,11 +23,7 @@ fn wheel(realism: Realism) -> zlac8030l::Bench {
 /// TPDOs of an object that is sent when it changes, in a second of standing still.
 fn tpdos_in_a_second(realism: Realism, record: i64) -> usize {
     let mut bench = wheel(realism);
-    bench.map(0x1A00, &[record]);
-    bench.set(0x1800, 2, 0xFF);
-    bench.set(0x1800, 3, 0);
-    bench.set(0x1800, 5, 0);
-    bench.send("000#0100");
+    bench.map(0x1A00, &[record]).set((0x1800, 2), 0xFF).set((0x1800, 3), 0).set((0x1800, 5), 0).send("000#0100");
     bench.run_ms(500);
     bench.heard();
     bench.run_ms(1000);
@@ -46,17 +42,14 @@ fn event_driven_tpdos_of_voltage_and_temperature_send_by_the_flicker_of_their_re
 /// Mean and peak-to-peak of the true speed at 2 r/min, the slowest that is of use.
 fn crawl(realism: Realism) -> (f64, f64) {
     let mut bench = wheel(realism);
-    bench.set(0x202F, 5, 1);
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 2);
-    bench.run_ms(4000);
+    bench.set((0x202F, 5), 1).enable_in(3).set(0x60FF, 2).run_ms(4000);
     let (mut sum, mut least, mut most) = (0.0, f64::MAX, f64::MIN);
     for _ in 0..4000 {
         bench.run_ms(1);
         let rpm = bench.report().velocity_rpm;
         (sum, least, most) = (sum + rpm, rpm.min(least), rpm.max(most));
     }
-    assert_eq!(bench.get(0x603F, 0), 0);
+    bench.reads(0x603F, 0);
     (sum / 4000.0, most - least)
 }
 
@@ -71,43 +64,34 @@ fn a_wheel_with_cogging_and_noise_crawls_less_evenly_and_as_far() {
 #[test]
 fn a_real_wheel_reaches_a_position_and_keeps_it_within_some_counts() {
     let mut bench = wheel(Realism::Full);
-    bench.set(0x6081, 0, 120);
-    bench.enable_in(1);
-    bench.set(0x607A, 0, 20_000);
-    bench.set(0x6040, 0, 0x1F);
-    bench.run_ms(6000);
+    bench.set(0x6081, 120).enable_in(1).set(0x607A, 20_000).set(0x6040, 0x1F).run_ms(6000);
     let mut voltages: Vec<i64> = Vec::new();
     for _ in 0..50 {
         bench.run_ms(7);
-        let position = bench.get(0x6064, 0);
+        let position = bench.get(0x6064);
         assert!((position - 20_000).abs() <= 3, "{position}");
-        voltages.push(bench.get(0x2029, 0));
+        voltages.push(bench.get(0x2029));
     }
     assert!(voltages.iter().any(|voltage| *voltage != voltages[0]), "nothing flickers: {voltages:?}");
-    assert_eq!(bench.get(0x603F, 0), 0);
+    bench.reads(0x603F, 0);
 }
 
 #[test]
 fn a_real_joint_and_a_real_stepper_turn_as_they_are_told_without_a_fault() {
     let mut joint = mjoint::Bench::new();
     make_real(&mut joint.world);
-    joint.set(0x6060, 0, 3);
-    joint.set(0x60FF, 0, 600);
-    joint.set(0x6040, 0, 0x0F);
-    joint.run_ms(2000);
+    joint.set(0x6060, 3).set(0x60FF, 600).set(0x6040, 0x0F).run_ms(2000);
     assert!((joint.report().velocity_rpm - 600.0).abs() < 12.0, "{:?}", joint.report());
-    assert_eq!(joint.get(0x260E, 0), 0);
+    joint.reads(0x260E, 0);
 
     let mut stepper = zlim42c::Bench::new();
     make_real(&mut stepper.world);
-    stepper.enable_in(3);
-    stepper.set(0x60FF, 0, 300);
-    stepper.run_ms(2000);
+    stepper.enable_in(3).set(0x60FF, 300).run_ms(2000);
     let angle = stepper.report().shaft_angle_rad;
     stepper.run_ms(1000);
     let turned = (stepper.report().shaft_angle_rad - angle) / core::f64::consts::TAU;
     assert!((turned - 5.0).abs() < 0.05, "{turned} turns in a second");
-    assert_eq!(stepper.get(0x603F, 0), 0);
+    stepper.reads(0x603F, 0);
 }
 
 #[test]

@@ -22,12 +22,12 @@ fn profiles() -> [&'static Description; 2] {
 fn both_zl_drives_say_the_same_identity_and_only_their_objects_tell_them_apart() {
     let (mut servo, mut stepper) = (Servo::new(), Stepper::new());
     for (sub, expected) in [(0, 3), (1, 0x100), (2, 1), (3, 0)] {
-        assert_eq!((servo.get(0x1018, sub), stepper.get(0x1018, sub)), (expected, expected), "1018h:{sub:02X}");
+        assert_eq!((servo.get((0x1018, sub)), stepper.get((0x1018, sub))), (expected, expected), "1018h:{sub:02X}");
     }
-    assert_eq!((servo.get(0x1000, 0), stepper.get(0x1000, 0)), (0x0004_0192, 0x0004_0192));
+    assert_eq!((servo.get(0x1000), stepper.get(0x1000)), (0x0004_0192, 0x0004_0192));
     // The bus voltage: 2029h in 0.01 V, 2069h in 1 V.
-    assert_eq!((servo.get(0x2029, 0), stepper.read(0x2029, 0)), (4800, Err(NO_SUCH_OBJECT)));
-    assert_eq!((servo.read(0x2069, 0), stepper.get(0x2069, 0)), (Err(NO_SUCH_OBJECT), 24));
+    assert_eq!((servo.get(0x2029), stepper.read(0x2029)), (4800, Err(NO_SUCH_OBJECT)));
+    assert_eq!((servo.read(0x2069), stepper.get(0x2069)), (Err(NO_SUCH_OBJECT), 24));
     for profile in profiles() {
         assert!(profile.quirks.contains(&Quirk::IdentityShared), "{}", profile.model);
     }
@@ -40,14 +40,13 @@ fn the_save_bytes_of_the_zlac8030l_set_250_kbit_s_on_the_zlim42_c_and_those_of_t
     let done = Some([0x60, 0x09, 0x20, 0x00, 0, 0, 0, 0]);
     let (mut servo, mut stepper) = (Servo::new(), Stepper::new());
     assert_eq!((servo.sdo(&save_of_the_servo), stepper.sdo(&save_of_the_servo)), (done, done), "nothing warns");
-    assert_eq!((servo.get(0x2009, 0), stepper.get(0x2009, 0)), (0, 2));
-    stepper.let_store();
-    stepper.power_cycle();
+    assert_eq!((servo.get(0x2009), stepper.get(0x2009)), (0, 2));
+    stepper.let_store().power_cycle();
     let rate = stepper.operate(|drive, _| drive.bitrate()).expect("it has power");
     assert_eq!(rate.bits_per_second(), 250_000);
     assert_eq!(stepper.sdo(&[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]), None, "lost to a bus of 500 kbit/s");
     // 2010h = 2 saves a stepper; a servo has there whether writes are stored.
-    assert!(servo.write(0x2010, 0, 2).is_err());
+    assert!(servo.write(0x2010, 2).is_err());
     let saves = profiles().map(|profile| (profile.storage.save.object.to_string(), profile.storage.save.value));
     assert_eq!(saves, [("2009h:00".to_owned(), 2), ("2010h:00".to_owned(), 2)]);
 }
@@ -57,11 +56,11 @@ fn object_606ch_counts_0_1_r_min_on_the_zlac8030l_and_1_r_min_on_the_zlim42_c() 
     let (mut servo, mut stepper) = (Servo::new(), Stepper::new());
     servo.enable_in(3);
     stepper.enable_in(3);
-    servo.set(0x60FF, 0, 60);
-    stepper.set(0x60FF, 0, 60);
+    servo.set(0x60FF, 60);
+    stepper.set(0x60FF, 60);
     servo.run(Duration::from_secs(3));
     stepper.run(Duration::from_secs(3));
-    let (tenths, whole) = (servo.get(0x606C, 0), stepper.get(0x606C, 0));
+    let (tenths, whole) = (servo.get(0x606C), stepper.get(0x606C));
     assert!((590..=610).contains(&tenths) && whole == 60, "{tenths} and {whole} for 60 r/min");
     let scales = profiles().map(|profile| profile.units.actual_velocity.per_count);
     assert_eq!(scales, [0.1, 1.0]);
@@ -70,22 +69,22 @@ fn object_606ch_counts_0_1_r_min_on_the_zlac8030l_and_1_r_min_on_the_zlim42_c() 
 #[test]
 fn torque_mode_is_4_and_6_is_homing_where_there_is_one() {
     let (mut servo, mut stepper) = (Servo::new(), Stepper::new());
-    assert_eq!((servo.write(0x6060, 0, 4), servo.write(0x6060, 0, 6)), (Ok(()), Err(INVALID_VALUE)));
-    assert_eq!((stepper.write(0x6060, 0, 4), stepper.write(0x6060, 0, 6)), (Err(INVALID_VALUE), Ok(())));
+    assert_eq!((servo.write(0x6060, 4), servo.write(0x6060, 6)), (Ok(()), Err(INVALID_VALUE)));
+    assert_eq!((stepper.write(0x6060, 4), stepper.write(0x6060, 6)), (Err(INVALID_VALUE), Ok(())));
     servo.run_ms(5);
     stepper.run_ms(5);
-    assert_eq!((servo.get(0x6061, 0), stepper.get(0x6061, 0)), (4, 6));
-    assert_eq!(stepper.read(0x6071, 0), Err(NO_SUCH_OBJECT), "no torque to be commanded");
+    assert_eq!((servo.get(0x6061), stepper.get(0x6061)), (4, 6));
+    assert_eq!(stepper.read(0x6071), Err(NO_SUCH_OBJECT), "no torque to be commanded");
 }
 
 #[test]
 fn velocity_mode_is_3_and_2_is_refused_whatever_5_3_3_of_the_zlim42_c_prints() {
     let (mut servo, mut stepper) = (Servo::new(), Stepper::new());
-    assert_eq!((servo.write(0x6060, 0, 2), stepper.write(0x6060, 0, 2)), (Err(INVALID_VALUE), Err(INVALID_VALUE)));
-    assert_eq!((servo.write(0x6060, 0, 3), stepper.write(0x6060, 0, 3)), (Ok(()), Ok(())));
+    assert_eq!((servo.write(0x6060, 2), stepper.write(0x6060, 2)), (Err(INVALID_VALUE), Err(INVALID_VALUE)));
+    assert_eq!((servo.write(0x6060, 3), stepper.write(0x6060, 3)), (Ok(()), Ok(())));
     servo.run_ms(5);
     stepper.run_ms(5);
-    assert_eq!((servo.get(0x6061, 0), stepper.get(0x6061, 0)), (3, 3));
+    assert_eq!((servo.get(0x6061), stepper.get(0x6061)), (3, 3));
 }
 
 #[test]
@@ -108,10 +107,7 @@ fn a_turn_has_4096_counts_on_the_zlac8030l_and_what_2006h_says_on_the_zlim42_c()
     assert!(!matches!(servo, CountsPerTurn::Table { .. }) && matches!(stepper, CountsPerTurn::Table { .. }));
     let mut bench = Stepper::new();
     // 2006h = 4 is 3200 pulses a turn.
-    bench.set(0x2006, 0, 4);
-    bench.enable_in(1);
-    bench.move_by(3200);
-    bench.run_ms(1500);
+    bench.set(0x2006, 4).enable_in(1).move_by(3200).run_ms(1500);
     let turns = bench.report().shaft_angle_rad / std::f64::consts::TAU;
     assert!((turns - 1.0).abs() < 1e-3, "{turns}");
 }

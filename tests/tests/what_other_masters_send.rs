@@ -7,8 +7,7 @@ use ferrodrive_tests::bench::{Bench, Subject, mjoint, zlac8030l, zlim42c};
 /// A drive in operational.
 fn operational<S: Subject>() -> Bench<S> {
     let mut bench = Bench::new();
-    bench.send(&format!("000#01{:02X}", S::NODE));
-    bench.run_ms(50);
+    bench.send(&format!("000#01{:02X}", S::NODE)).run_ms(50);
     bench.heard();
     bench
 }
@@ -26,22 +25,21 @@ fn tells_a_short_rpdo<S: Subject>() {
     }
     bench.run_ms(10);
     assert_eq!(bench.heard_of(&of::<S>(0x080, "")), [of::<S>(0x080, "1082110000000000")], "told once");
-    assert_eq!((bench.get(0x1001, 0), bench.get(0x6040, 0), bench.get(0x603F, 0)), (0b1_0001, 0, 0));
+    assert_eq!((bench.get(0x1001), bench.get(0x6040), bench.get(0x603F)), (0b1_0001, 0, 0));
     for _ in 0..3 {
         bench.send(&of::<S>(0x200, "0600"));
     }
     bench.run_ms(10);
     assert_eq!(bench.heard_of(&of::<S>(0x080, "")), [of::<S>(0x080, "0000000000000000")]);
-    assert_eq!((bench.get(0x1001, 0), bench.get(0x6040, 0), bench.statusword() & 0x6F), (0, 6, 0x21));
+    assert_eq!((bench.get(0x1001), bench.get(0x6040), bench.statusword() & 0x6F), (0, 6, 0x21));
 }
 
 /// The mapped bytes count, as CiA 301 has it; 8220h is a choice, and none is made of it.
 fn takes_a_long_rpdo<S: Subject>(mapped: &str) -> Bench<S> {
     let mut bench = operational::<S>();
-    bench.send(&of::<S>(0x200, &format!("{mapped:A<16}")));
-    bench.run_ms(10);
+    bench.send(&of::<S>(0x200, &format!("{mapped:A<16}"))).run_ms(10);
     assert_eq!(bench.heard_of(&of::<S>(0x080, "")), [""; 0]);
-    assert_eq!(bench.get(0x1001, 0), 0);
+    bench.reads(0x1001, 0);
     bench
 }
 
@@ -55,22 +53,20 @@ fn a_zl_drive_tells_8210h_of_an_rpdo_that_is_too_short_and_uses_nothing_of_it() 
 fn a_joint_discards_an_rpdo_that_is_too_short_without_an_emcy_or_an_answer() {
     let mut bench = operational::<mjoint::MJoint>();
     // RPDO1: controlword, mode, position; without the last byte.
-    bench.send("201#0F0003000000");
-    bench.run_ms(10);
+    bench.send("201#0F0003000000").run_ms(10);
     assert_eq!(bench.heard_of("081#"), [""; 0]);
-    assert_eq!((bench.get(0x1001, 0), bench.get(0x6040, 0)), (0, 0));
+    assert_eq!((bench.get(0x1001), bench.get(0x6040)), (0, 0));
     assert_eq!(bench.heard_of("181#"), [""; 0]);
-    bench.send("201#0F000300000000");
-    bench.run_ms(10);
-    assert_eq!((bench.get(0x6040, 0), bench.heard_of("181#").len()), (0x0F, 1));
+    bench.send("201#0F000300000000").run_ms(10);
+    assert_eq!((bench.get(0x6040), bench.heard_of("181#").len()), (0x0F, 1));
 }
 
 #[test]
 fn every_drive_uses_the_mapped_bytes_of_an_rpdo_that_is_too_long_and_tells_nothing() {
-    assert_eq!(takes_a_long_rpdo::<zlac8030l::Zlac8030l>("0600").get(0x6040, 0), 6);
-    assert_eq!(takes_a_long_rpdo::<zlim42c::Zlim42c>("0600").get(0x6040, 0), 6);
+    assert_eq!(takes_a_long_rpdo::<zlac8030l::Zlac8030l>("0600").get(0x6040), 6);
+    assert_eq!(takes_a_long_rpdo::<zlim42c::Zlim42c>("0600").get(0x6040), 6);
     let mut joint = takes_a_long_rpdo::<mjoint::MJoint>("0F000300000000");
-    assert_eq!((joint.get(0x6040, 0), joint.get(0x6060, 0)), (0x0F, 3));
+    assert_eq!((joint.get(0x6040), joint.get(0x6060)), (0x0F, 3));
 }
 
 #[test]
@@ -84,24 +80,21 @@ fn what_is_told_of_a_short_rpdo_stands_in_the_profile_that_masters_read() {
 fn ignores_remote_frames<S: Subject>() {
     let mut bench = operational::<S>();
     for number in 0..4 {
-        let cob_id = bench.get(0x1800 + number, 1) as u32;
+        let cob_id = bench.get((0x1800 + number, 1)) as u32;
         assert_eq!(cob_id >> 30 & 1, 0, "TPDO{number}");
         for raw in [252, 253] {
-            assert_eq!(bench.write(0x1800 + number, 2, raw), Err(0x0609_0030), "TPDO{number}: type {raw}");
+            assert_eq!(bench.write((0x1800 + number, 2), raw), Err(0x0609_0030), "TPDO{number}: type {raw}");
         }
     }
-    bench.set(0x1017, 0, 0);
-    bench.run_ms(50);
+    bench.set(0x1017, 0).run_ms(50);
     bench.heard();
     // TPDO 1 to 4, node guarding, SDO, RPDO 1, EMCY; SYNC and NMT.
     for base in [0x180, 0x280, 0x380, 0x480, 0x700, 0x580, 0x600, 0x200, 0x080] {
         bench.send(&of::<S>(base, "R"));
     }
-    bench.send("080#R");
-    bench.send("000#R");
-    bench.run_ms(200);
+    bench.send("080#R").send("000#R").run_ms(200);
     assert_eq!(bench.heard(), [""; 0]);
-    assert_eq!(bench.get(0x1001, 0), 0);
+    bench.reads(0x1001, 0);
 }
 
 #[test]

@@ -11,7 +11,7 @@ use drives::mjoint::{Model, storage};
 use sim::VirtualDrive;
 use sim::machine::{self, Joint, MJointMachine, Machine, Order, mjoint};
 
-use super::{Rows, Subject};
+use super::{Place, Rows, Subject};
 use crate::mjoint::objects;
 
 pub use super::{Abort, head};
@@ -73,14 +73,14 @@ impl Bench {
     }
 
     /// Writes to another joint than the first.
-    pub fn write_to(&mut self, node: u8, index: u16, sub: u8, value: i64) -> Result<(), Abort> {
-        self.at(node, |bench| bench.write(index, sub, value))
+    pub fn write_to(&mut self, node: u8, object: impl Place, value: i64) -> Result<(), Abort> {
+        self.at(node, |bench| bench.write(object, value))
     }
 
     /// Reads from another joint than the first.
     #[track_caller]
-    pub fn get_from(&mut self, node: u8, index: u16, sub: u8) -> i64 {
-        self.at(node, |bench| bench.get(index, sub))
+    pub fn get_from(&mut self, node: u8, object: impl Place) -> i64 {
+        self.at(node, |bench| bench.get(object))
     }
 
     #[track_caller]
@@ -93,7 +93,7 @@ impl Bench {
 
     /// 6064h.
     pub fn position(&mut self) -> i64 {
-        self.get(0x6064, 0)
+        self.get(0x6064)
     }
 
     /// Milliseconds until the target is reached; panics after `limit_ms`.
@@ -103,9 +103,8 @@ impl Bench {
     }
 
     /// 2614h = 1, and its 2.
-    pub fn save(&mut self) {
-        self.set(0x2614, 0, 1);
-        self.run_ms(5);
-        assert_eq!(self.get(0x2614, 0), 2);
+    #[track_caller]
+    pub fn save(&mut self) -> &mut Self {
+        self.set(0x2614, 1).run_ms(5).reads(0x2614, 2)
     }
 }

@@ -12,7 +12,7 @@ use std::marker::PhantomData;
 use std::time::Duration;
 
 use can::{Bitrate, CanId, Frame, Instant};
-use sim::{Report, StationId, VirtualDrive, World};
+use sim::{Component, Report, StationId, VirtualDrive, World};
 
 use crate::manual::ObjectRow;
 
@@ -27,6 +27,24 @@ const SEND_BITS: u64 = 500;
 
 /// An abort code that a drive answered.
 pub type Abort = u32;
+
+/// Where an object stands: its index, or its index and its sub-index.
+pub trait Place: Copy {
+    /// Index and sub-index.
+    fn place(self) -> (u16, u8);
+}
+
+impl Place for u16 {
+    fn place(self) -> (u16, u8) {
+        (self, 0)
+    }
+}
+
+impl Place for (u16, u8) {
+    fn place(self) -> (u16, u8) {
+        self
+    }
+}
 
 /// A drive that is tested, as it is delivered.
 pub trait Subject: 'static {
@@ -133,14 +151,15 @@ impl<S: Subject> Bench<S> {
     }
 
     /// Lets time pass.
-    pub fn run_ms(&mut self, ms: u64) {
-        self.run(Duration::from_millis(ms));
+    pub fn run_ms(&mut self, ms: u64) -> &mut Self {
+        self.run(Duration::from_millis(ms))
     }
 
     /// Lets time pass.
-    pub fn run(&mut self, duration: Duration) {
+    pub fn run(&mut self, duration: Duration) -> &mut Self {
         self.world.run_for(duration);
         self.listen();
+        self
     }
 
     /// Virtual time.
@@ -171,9 +190,16 @@ impl<S: Subject> Bench<S> {
     }
 
     /// Sends a frame in candump notation and lets it arrive.
-    pub fn send(&mut self, frame: &str) {
+    #[track_caller]
+    pub fn send(&mut self, frame: &str) -> &mut Self {
+        self.offer(frame).run(bits::<S>(SEND_BITS))
+    }
+
+    /// Sends a frame in candump notation and waits for nothing.
+    #[track_caller]
+    pub fn offer(&mut self, frame: &str) -> &mut Self {
         self.world.send(self.host, frame.parse().expect("a frame")).expect("room at the host");
-        self.run(bits::<S>(SEND_BITS));
+        self
     }
 
     /// Sends a frame; the first frame heard with the identifier `answers` within the time of an answer.
@@ -200,7 +226,8 @@ impl<S: Subject> Bench<S> {
     }
 
     /// Writes `value` with the object's width; four bytes for one that the manual does not have.
-    pub fn write(&mut self, index: u16, sub: u8, value: i64) -> Result<(), Abort> {
+    pub fn write(&mut self, object: impl Place, value: i64) -> Result<(), Abort> {
+        let (index, sub) = object.place();
         let size = S::rows().find(index, sub).map_or(4, |row| row.size);
         let mut request = head(0x23 | (4 - size as u8) << 2, index, sub);
         request[4..4 + size].copy_from_slice(&value.to_le_bytes()[..size]);
@@ -213,13 +240,16 @@ impl<S: Subject> Bench<S> {
 
     /// Writes a value that the drive must take.
     #[track_caller]
-    pub fn set(&mut self, index: u16, sub: u8, value: i64) {
-        let done = self.write(index, sub, value);
+    pub fn set(&mut self, object: impl Place, value: i64) -> &mut Self {
+        let (index, sub) = object.place();
+        let done = self.write(object, value);
         assert_eq!(done, Ok(()), "{index:04X}h:{sub:02X} = {value} at {} s", self.seconds());
+        self
     }
 
     /// The bytes of an object, as many as the drive sends.
-    pub fn read(&mut self, index: u16, sub: u8) -> Result<Vec<u8>, Abort> {
+    pub fn read(&mut self, object: impl Place) -> Result<Vec<u8>, Abort> {
+        let (index, sub) = object.place();
         let answer = self.sdo(&head(0x40, index, sub));
         let answer = answer.unwrap_or_else(|| panic!("no answer to a read of {index:04X}h:{sub:02X}"));
         match answer[0] {
@@ -230,31 +260,58 @@ impl<S: Subject> Bench<S> {
 
     /// The value of an object, with the sign that its type has.
     #[track_caller]
-    pub fn get(&mut self, index: u16, sub: u8) -> i64 {
-        let bytes = self.read(index, sub).unwrap_or_else(|abort| panic!("{index:04X}h:{sub:02X}: {abort:08X}h"));
+    pub fn get(&mut self, object: impl Place) -> i64 {
+        let (index, sub) = object.place();
+        let bytes = self.read(object).unwrap_or_else(|abort| panic!("{index:04X}h:{sub:02X}: {abort:08X}h"));
         value_of(&bytes, S::rows().find(index, sub).is_some_and(|row| row.signed))
+    }
+
+    /// Asserts that an object reads this value now.
+    #[track_caller]
+    pub fn reads(&mut self, object: impl Place, expected: i64) -> &mut Self {
+        let (value, (index, sub)) = (self.get(object), object.place());
+        let at = self.seconds();
+        assert_eq!(value, expected, "{index:04X}h:{sub:02X} is {value:X}h, expected {expected:X}h, at {at} s");
+        self
+    }
+
+    /// Asserts that the statusword has these bits among those of `mask` now.
+    #[track_caller]
+    pub fn shows(&mut self, mask: u16, bits: u16) -> &mut Self {
+        let (statusword, at) = (self.statusword(), self.seconds());
+        assert_eq!(
+            statusword & mask,
+            bits,
+            "6041h is {statusword:04X}h, expected {bits:04X}h of {mask:04X}h, at {at} s"
+        );
+        self
+    }
+
+    /// Asserts that the motor turns with a speed between these, r/min.
+    #[track_caller]
+    pub fn turns_at(&mut self, low_rpm: f64, high_rpm: f64) -> &mut Self {
+        assert_within("speed in r/min", self.report().velocity_rpm, low_rpm, high_rpm);
+        self
     }
 
     /// Maps objects into a PDO, as CiA 301 wants it: none, then each, then how many. `record` is 1600h or 1A00h and on.
     #[track_caller]
-    pub fn map(&mut self, record: u16, objects: &[i64]) {
-        self.set(record, 0, 0);
+    pub fn map(&mut self, record: u16, objects: &[i64]) -> &mut Self {
+        self.set(record, 0);
         for (sub, object) in (1..).zip(objects) {
-            self.set(record, sub, *object);
+            self.set((record, sub), *object);
         }
-        self.set(record, 0, objects.len() as i64);
+        self.set(record, objects.len() as i64)
     }
 
     /// 6041h.
     pub fn statusword(&mut self) -> u16 {
-        self.get(0x6041, 0) as u16
+        self.get(0x6041) as u16
     }
 
     /// The controlwords of CiA 402: shutdown, switch on, enable operation.
-    pub fn enable(&mut self) {
-        for controlword in [0x06, 0x07, 0x0F] {
-            self.set(0x6040, 0, controlword);
-        }
+    pub fn enable(&mut self) -> &mut Self {
+        self.set(0x6040, 0x06).set(0x6040, 0x07).set(0x6040, 0x0F)
     }
 
     /// Does something to the drive, as a person beside the machine.
@@ -269,9 +326,58 @@ impl<S: Subject> Bench<S> {
         result
     }
 
+    /// A torque on the shaft, N m: a positive one opposes positive motion.
+    #[track_caller]
+    pub fn set_load_torque(&mut self, torque_nm: f64) -> &mut Self {
+        self.operate(|drive, now| drive.set_load_torque(torque_nm, now)).expect("a shaft");
+        self
+    }
+
+    /// Inertia on the shaft, kg m².
+    #[track_caller]
+    pub fn set_load_inertia(&mut self, inertia_kg_m2: f64) -> &mut Self {
+        self.operate(|drive, now| drive.set_load_inertia(inertia_kg_m2, now)).expect("a shaft");
+        self
+    }
+
+    /// The shaft is held fast, or not.
+    #[track_caller]
+    pub fn set_rotor_locked(&mut self, locked: bool) -> &mut Self {
+        self.operate(|drive, now| drive.set_rotor_locked(locked, now)).expect("a rotor");
+        self
+    }
+
+    /// Voltage of the supply.
+    #[track_caller]
+    pub fn set_supply(&mut self, supply_v: f64) -> &mut Self {
+        self.operate(|drive, now| drive.set_supply(supply_v, now)).expect("a supply");
+        self
+    }
+
+    /// Level of a digital input.
+    #[track_caller]
+    pub fn set_input(&mut self, input: usize, level: bool) -> &mut Self {
+        self.operate(|drive, now| drive.set_input(input, level, now)).expect("an input");
+        self
+    }
+
+    /// Breaks a component, or mends it.
+    #[track_caller]
+    pub fn set_fault(&mut self, component: Component, broken: bool) -> &mut Self {
+        self.operate(|drive, now| drive.set_fault(component, broken, now)).expect("the drive has it");
+        self
+    }
+
     /// A line for the world, as a person at the machine types it; it must be taken.
     #[track_caller]
-    pub fn tell(&mut self, line: &str) -> String {
+    pub fn tell(&mut self, line: &str) -> &mut Self {
+        self.told(line);
+        self
+    }
+
+    /// The answer to a line for the world, which must be taken.
+    #[track_caller]
+    pub fn told(&mut self, line: &str) -> String {
         let answer = sim::command::answer(&mut self.world, line).expect("a line is answered").json;
         assert!(answer.starts_with("{\"ok\":true"), "{line}: {answer}");
         answer
@@ -286,16 +392,16 @@ impl<S: Subject> Bench<S> {
     }
 
     /// Off for 0.1 s, and on again until it has booted.
-    pub fn power_cycle(&mut self) {
+    pub fn power_cycle(&mut self) -> &mut Self {
         self.operate(|drive, now| drive.cut_power(now));
         self.run_ms(100);
         self.operate(|drive, now| drive.set_power(true, now));
-        self.run_ms(10);
+        self.run_ms(10)
     }
 
     /// Time for the EEPROM to take what was written.
-    pub fn let_store(&mut self) {
-        self.run_ms(5);
+    pub fn let_store(&mut self) -> &mut Self {
+        self.run_ms(5)
     }
 
     /// The machine of an [`open`](Self::open) bench, as it is now.

@@ -50,7 +50,7 @@ impl PowerSubject for Zlac8030l {
 
     fn let_take_time(bench: &mut Bench) {
         // The watch over the host.
-        bench.set(0x2000, 0, 0);
+        bench.set(0x2000, 0);
     }
 }
 
@@ -71,10 +71,9 @@ impl Bench {
     }
 
     /// Selects a mode and enables operation, without the watch over the host (2000h), so that a test may just look.
-    pub fn enable_in(&mut self, mode: i64) {
-        self.set(0x2000, 0, 0);
-        self.set(0x6060, 0, mode);
-        self.enable();
+    #[track_caller]
+    pub fn enable_in(&mut self, mode: i64) -> &mut Self {
+        self.set(0x2000, 0).set(0x6060, mode).enable()
     }
 
     /// The motor of an [`open`](Self::open) bench, as it is now.

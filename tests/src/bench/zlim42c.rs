@@ -66,21 +66,20 @@ impl Bench {
     }
 
     /// Selects a mode and enables operation.
-    pub fn enable_in(&mut self, mode: i64) {
-        self.set(0x6060, 0, mode);
-        self.enable();
+    #[track_caller]
+    pub fn enable_in(&mut self, mode: i64) -> &mut Self {
+        self.set(0x6060, mode).enable()
     }
 
     /// Level of a digital input, held long enough to pass its filter.
-    pub fn input(&mut self, input: usize, level: bool) {
-        self.operate(|drive, now| drive.set_input(input, level, now)).expect("X0 to X3");
-        self.run_ms(15);
+    #[track_caller]
+    pub fn input(&mut self, input: usize, level: bool) -> &mut Self {
+        self.set_input(input, level).run_ms(15)
     }
 
     /// Relative move of profile position.
-    pub fn move_by(&mut self, pulses: i64) {
-        self.set(0x607A, 0, pulses);
-        self.set(0x6040, 0, 0x4F);
-        self.set(0x6040, 0, 0x5F);
+    #[track_caller]
+    pub fn move_by(&mut self, pulses: i64) -> &mut Self {
+        self.set(0x607A, pulses).set(0x6040, 0x4F).set(0x6040, 0x5F)
     }
 }

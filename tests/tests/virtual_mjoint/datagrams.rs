@@ -42,10 +42,10 @@ fn begin(section: &str) -> Bench {
     let mut bench = Bench::of(3, &Model::M4230E17B50);
     match section {
         // A switch that is reached between the third and the fourth datagram: 100 r/min are 54613 counts/s.
-        "5.09" => drop(bench.tell("1 switch DIR min -80000")),
+        "5.09" => drop(bench.told("1 switch DIR min -80000")),
         "5.10.3" => {
             for node in 1..=3 {
-                bench.write_to(node, 0x6040, 0, 0x0F).expect("enabled");
+                bench.write_to(node, 0x6040, 0x0F).expect("enabled");
             }
         }
         _ => {}
@@ -66,11 +66,9 @@ fn compare_value(id: u16, answer: &[u8], printed: &[u8], at: &str) {
 
 /// All that waits for SYNC moves with it.
 fn sync(bench: &mut Bench, at: &str) {
-    let before: Vec<i64> = (1..=3).map(|node| bench.get_from(node, 0x6064, 0)).collect();
-    bench.send("080#");
-    bench.run_ms(1000);
-    let moved: Vec<bool> =
-        (1..=3).zip(before).map(|(node, before)| bench.get_from(node, 0x6064, 0) != before).collect();
+    let before: Vec<i64> = (1..=3).map(|node| bench.get_from(node, 0x6064)).collect();
+    bench.send("080#").run_ms(1000);
+    let moved: Vec<bool> = (1..=3).zip(before).map(|(node, before)| bench.get_from(node, 0x6064) != before).collect();
     // 5.08.4 prints the signal alone; nothing waits there.
     let waits = at.contains("5.10.3");
     assert_eq!(moved, [waits; 3], "{at}");

@@ -37,10 +37,8 @@ fn switch_of(method: i64) -> (&'static str, bool) {
 
 fn started(run: &HomingStatus, line: &str) -> Bench {
     let mut bench = Bench::new();
-    bench.tell(line);
-    bench.run_ms(5);
-    bench.set(0x6098, 0, i64::from(run.row.method));
-    bench.set(0x6060, 0, 6);
+    bench.tell(line).run_ms(5);
+    bench.set(0x6098, i64::from(run.row.method)).set(0x6060, 6);
     assert_eq!(bench.statusword(), run.running, "{run:?}");
     bench
 }
@@ -82,14 +80,10 @@ fn goes_on(run: &HomingStatus) {
 fn fails_at_the_stop(run: &HomingStatus) {
     let mut bench = Bench::new();
     // 30 % of the output at rest for 1 s, and a current limit that is not reached.
-    bench.set(0x2618, 0, 101);
-    bench.set(0x261D, 0, 10_000);
-    bench.set(0x6098, 0, i64::from(run.row.method));
-    bench.set(0x6060, 0, 6);
-    bench.run_ms(500);
+    bench.set(0x2618, 101).set(0x261D, 10_000).set(0x6098, i64::from(run.row.method)).set(0x6060, 6).run_ms(500);
     assert_eq!(bench.statusword(), run.running);
     bench.tell("1 rotor lock");
-    bench.until(6000, |bench| bench.get(0x260E, 0) == 0x14);
+    bench.until(6000, |bench| bench.get(0x260E) == 0x14);
     assert_eq!(bench.statusword(), run.after);
     bench.heard();
     bench.run_ms(1010);
@@ -100,8 +94,7 @@ fn is_left(run: &HomingStatus) {
     let mut bench = started(run, "1 input DIR 0");
     bench.run_ms(500);
     let before = bench.position();
-    bench.set(0x6060, 0, 1);
-    bench.run_ms(500);
+    bench.set(0x6060, 1).run_ms(500);
     assert_eq!(bench.statusword(), run.after);
     assert!((bench.position() - before).abs() < TURN, "stopped, and no new origin: {before}, {}", bench.position());
     assert!(bench.report().velocity_rpm.abs() < 1.0);
@@ -113,10 +106,8 @@ fn after_homing_the_position_is_about_zero_whatever_the_ramp_unless_the_edge_is_
     for acceleration in [20_000, 20_005, 20_009, 5_009, 1_000, 60_000] {
         for (choice, at_edge) in [("stand", false), ("edge", true)] {
             let mut bench = Bench::read_as("J113", choice);
-            bench.tell("1 switch DIR min -20000");
-            bench.run_ms(5);
-            bench.set(0x6083, 0, acceleration);
-            bench.set(0x6060, 0, 6);
+            bench.tell("1 switch DIR min -20000").run_ms(5);
+            bench.set(0x6083, acceleration).set(0x6060, 6);
             bench.until(20_000, |bench| bench.statusword() == 0x1414);
             bench.run_ms(1500);
             let rpm = (acceleration % 10 + 1) as f64 * 100.0;
@@ -137,42 +128,30 @@ fn after_homing_the_position_is_about_zero_whatever_the_ramp_unless_the_edge_is_
 #[test]
 fn the_ones_digit_of_the_acceleration_is_the_speed() {
     let mut bench = Bench::new();
-    bench.set(0x6083, 0, 10_005);
-    bench.set(0x6060, 0, 6);
-    bench.run_ms(500);
+    bench.set(0x6083, 10_005).set(0x6060, 6).run_ms(500);
     assert!((bench.report().velocity_rpm + 600.0).abs() < 10.0, "{}", bench.report().velocity_rpm);
 }
 
 #[test]
 fn a_halt_holds_homing_and_its_end_lets_it_go_on() {
     let mut bench = Bench::new();
-    bench.set(0x6060, 0, 6);
-    bench.run_ms(300);
-    bench.set(0x6040, 0, 0x0100);
-    bench.run_ms(300);
-    assert_eq!(bench.statusword(), 0x0414);
+    bench.set(0x6060, 6).run_ms(300);
+    bench.set(0x6040, 0x0100).run_ms(300).shows(0xFFFF, 0x0414);
     let held = bench.position();
     bench.run_ms(300);
     assert!((bench.position() - held).abs() <= 2);
-    bench.set(0x6040, 0, 0);
-    bench.run_ms(300);
-    assert_eq!(bench.statusword(), 0x0014);
+    bench.set(0x6040, 0).run_ms(300).shows(0xFFFF, 0x0014);
     assert!(bench.position() < held - 1000);
 }
 
 #[test]
 fn homing_under_power_shows_the_mirrored_bits_and_position_mode_goes_on_from_the_origin() {
     let mut bench = Bench::new();
-    bench.tell("1 switch DIR min -5000");
-    bench.set(0x6040, 0, 0x0F);
-    bench.set(0x6060, 0, 6);
-    assert_eq!(bench.statusword(), 0x0037);
+    bench.tell("1 switch DIR min -5000").set(0x6040, 0x0F).set(0x6060, 6).shows(0xFFFF, 0x0037);
     bench.until(3000, |bench| bench.statusword() == 0x1437);
     bench.run_ms(50);
-    bench.set(0x6060, 0, 1);
-    assert_eq!(bench.statusword(), 0x0437);
-    bench.set(0x6040, 0, 0x2F);
-    bench.set(0x607A, 0, 0);
+    bench.set(0x6060, 1).shows(0xFFFF, 0x0437);
+    bench.set(0x6040, 0x2F).set(0x607A, 0);
     bench.until_reached(1000);
     let turns = bench.report().shaft_angle_rad / core::f64::consts::TAU;
     assert!((turns * TURN as f64 + 4999.0 - 137.0).abs() < 90.0, "{turns}: the edge, and the way of the ramp");
@@ -181,20 +160,17 @@ fn homing_under_power_shows_the_mirrored_bits_and_position_mode_goes_on_from_the
 #[test]
 fn homing_that_cannot_begin_fails_at_once() {
     let mut bench = Bench::new();
-    bench.set(0x2601, 0, 0);
-    bench.set(0x6060, 0, 6);
-    assert_eq!(bench.statusword(), 0x2400);
+    bench.set(0x2601, 0).set(0x6060, 6).shows(0xFFFF, 0x2400);
     bench.run_ms(500);
     assert_eq!((bench.statusword(), bench.report().velocity_rpm.abs() < 1.0), (0x2400, true));
-    bench.set(0x2601, 0, 1);
+    bench.set(0x2601, 1);
     assert_eq!(bench.statusword(), 0x2404, "allowing the output begins nothing");
-    bench.set(0x6060, 0, 6);
+    bench.set(0x6060, 6);
     assert_eq!(bench.statusword(), 0x0014, "the next write does");
     let mut bench = Bench::new();
-    bench.tell("1 supply 60");
-    bench.run_ms(300);
-    bench.set(0x6060, 0, 6);
-    assert_eq!((bench.get(0x260E, 0), bench.statusword()), (0x15, 0x200C));
+    bench.tell("1 supply 60").run_ms(300);
+    bench.set(0x6060, 6);
+    assert_eq!((bench.get(0x260E), bench.statusword()), (0x15, 0x200C));
 }
 
 #[test]
@@ -204,13 +180,11 @@ fn the_origin_lies_within_three_control_periods_of_the_edge_at_every_speed_and_f
         // (6083 mod 10 + 1) * 100 r/min, and the way to the edge: less than it takes to get up to speed, or to slow down.
         for (digit, distance) in [(0, 40), (3, 700), (4, 20_000), (9, 300), (9, 60_000)] {
             let mut bench = Bench::read_as("J113", "edge");
-            bench.set(0x6083, 0, 20_000 + digit);
-            bench.set(0x6098, 0, method);
+            bench.set(0x6083, 20_000 + digit).set(0x6098, method);
             let edge = if positive { distance } else { -distance };
             let range = if positive { format!("{edge} max") } else { format!("min {edge}") };
-            bench.tell(&format!("1 switch {pin} {range}"));
-            bench.run_ms(5);
-            bench.set(0x6060, 0, 6);
+            bench.tell(&format!("1 switch {pin} {range}")).run_ms(5);
+            bench.set(0x6060, 6);
             bench.until(6000, |bench| bench.statusword() == 0x1414);
             bench.run_ms(300);
             let shaft = (bench.report().shaft_angle_rad / core::f64::consts::TAU * TURN as f64).round() as i64;
@@ -228,12 +202,10 @@ fn a_host_that_sends_mode_6_each_cycle_homes_once() {
     let mut bench = Bench::new();
     bench.tell("1 switch DIR min -5000");
     for _ in 0..600 {
-        bench.send("201#0F000600000000");
-        bench.run_ms(2);
+        bench.send("201#0F000600000000").run_ms(2);
     }
-    assert_eq!(bench.statusword(), 0x1437);
+    bench.shows(0xFFFF, 0x1437);
     assert!(bench.position().abs() < 200, "{}", bench.position());
-    bench.send("201#0F000100000000");
-    bench.send("201#0F000600000000");
+    bench.send("201#0F000100000000").send("201#0F000600000000");
     assert_eq!(bench.statusword(), 0x0037, "and again after another mode");
 }

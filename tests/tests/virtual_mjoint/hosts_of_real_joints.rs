@@ -6,17 +6,13 @@ use crate::bench::{Bench, TURN};
 #[test]
 fn after_10fh_the_next_target_is_kept_and_the_one_after_2fh_runs() {
     let mut bench = Bench::new();
-    bench.set(0x6040, 0, 0x2F);
-    bench.set(0x607A, 0, TURN);
+    bench.set(0x6040, 0x2F).set(0x607A, TURN);
     bench.until_reached(2000);
-    bench.set(0x6040, 0, 0x10F);
-    bench.set(0x607A, 0, 3 * TURN);
-    bench.run_ms(500);
+    bench.set(0x6040, 0x10F).set(0x607A, 3 * TURN).run_ms(500);
     assert!((bench.position() - TURN).abs() <= 30, "{}", bench.position());
-    bench.set(0x6040, 0, 0x2F);
-    bench.run_ms(500);
+    bench.set(0x6040, 0x2F).run_ms(500);
     assert!((bench.position() - TURN).abs() <= 30, "{}", bench.position());
-    bench.set(0x607A, 0, 3 * TURN);
+    bench.set(0x607A, 3 * TURN);
     bench.until_reached(3000);
     assert!((bench.position() - 3 * TURN).abs() <= 30, "{}", bench.position());
 }
@@ -42,10 +38,7 @@ fn three_reads_back_to_back_are_answered_in_their_order() {
 #[test]
 fn a_host_without_heartbeat_and_without_an_nmt_command_is_served_for_as_long_as_it_likes() {
     let mut bench = Bench::new();
-    bench.set(0x6040, 0, 0x2F);
-    bench.send("401#2F000364000000");
-    bench.run_ms(10_000);
-    assert_eq!(bench.get(0x260E, 0), 0);
+    bench.set(0x6040, 0x2F).send("401#2F000364000000").run_ms(10_000).reads(0x260E, 0);
     let rpm = bench.report().velocity_rpm;
     assert!((rpm - 100.0).abs() < 2.0, "{rpm}");
 }

@@ -14,17 +14,15 @@ fn three(synchronised: i64, apart_us: u64) -> Bench {
     let mut bench = Bench::of(3, &Model::M4230E17B50);
     for node in 1..=3 {
         for (index, value) in [(0x261C, synchronised), (0x6060, 7), (0x6040, 0x0F)] {
-            bench.write_to(node, index, 0, value).expect("a setting");
+            bench.write_to(node, index, value).expect("a setting");
         }
     }
     // The joints' own rhythms are apart from each other, as those of real ones are.
     for node in 2..=3_u8 {
-        bench.tell(&format!("{node} power cut"));
-        bench.run(Duration::from_micros(1_730 * u64::from(node) + apart_us));
-        bench.tell(&format!("{node} power on"));
-        bench.run_ms(20);
+        bench.tell(&format!("{node} power cut")).run(Duration::from_micros(1_730 * u64::from(node) + apart_us));
+        bench.tell(&format!("{node} power on")).run_ms(20);
         for (index, value) in [(0x261C, synchronised), (0x6060, 7), (0x6040, 0x0F)] {
-            bench.write_to(node, index, 0, value).expect("a setting");
+            bench.write_to(node, index, value).expect("a setting");
         }
     }
     bench.run_ms(20);
@@ -94,12 +92,9 @@ fn with_261ch_the_axes_start_within_a_control_period_of_each_other_and_without_i
 fn a_point_waits_for_sync() {
     let mut bench = three(1, 0);
     let before = bench.position();
-    bench.send("501#50C30000");
-    bench.run_ms(50);
+    bench.send("501#50C30000").run_ms(50);
     assert_eq!(bench.position(), before);
-    bench.send("080#");
-    bench.run_ms(1);
-    assert_eq!(bench.statusword(), 0x0037);
+    bench.send("080#").run_ms(1).shows(0xFFFF, 0x0037);
 }
 
 #[test]
@@ -122,7 +117,7 @@ fn a_line_of_points_is_followed_with_a_steady_speed_and_little_lag() {
     assert!(lag.abs() < 1000, "{lag} counts");
     bench.run_ms(300);
     for node in 1..=3 {
-        let end = bench.get_from(node, 0x6064, 0);
+        let end = bench.get_from(node, 0x6064);
         assert!((end - position as i64).abs() <= 30, "node {node}: {end}");
     }
 }
@@ -142,7 +137,7 @@ fn with_255_a_host_that_goes_by_a_slow_dir_clock_is_followed_without_a_pause_bet
     let speeds = |time_base: i64| {
         let mut bench = Bench::new();
         for (index, value) in [(0x261C, time_base), (0x6060, 7), (0x6040, 0x0F)] {
-            bench.set(index, 0, value);
+            bench.set(index, value);
         }
         bench.tell("1 clock 4000");
         let (mut least, mut most) = (f64::MAX, f64::MIN);
@@ -171,24 +166,20 @@ fn with_255_a_host_that_goes_by_a_slow_dir_clock_is_followed_without_a_pause_bet
 #[test]
 fn with_255_a_point_waits_while_dir_stands_still() {
     let mut bench = three(255, 0);
-    bench.send("501#E8030000");
-    bench.run_ms(1);
-    bench.send("080#");
-    bench.run_ms(100);
+    bench.send("501#E8030000").run_ms(1);
+    bench.send("080#").run_ms(100);
     assert!(bench.position().abs() < 3, "{}", bench.position());
-    assert_eq!(bench.statusword(), 0x0037);
+    bench.shows(0xFFFF, 0x0037);
     // Half of the stretch: 10 changes of the level.
     for n in 1..=10 {
-        bench.tell(&format!("1 input DIR {}", n % 2));
-        bench.run_ms(1);
+        bench.tell(&format!("1 input DIR {}", n % 2)).run_ms(1);
     }
     bench.run_ms(300);
     assert!((bench.position() - 500).abs() <= 12, "{}", bench.position());
     for n in 1..=11 {
-        bench.tell(&format!("1 input DIR {}", n % 2));
-        bench.run_ms(1);
+        bench.tell(&format!("1 input DIR {}", n % 2)).run_ms(1);
     }
     bench.run_ms(300);
     assert!((bench.position() - 1000).abs() <= 12, "{}", bench.position());
-    assert_eq!(bench.statusword(), 0x0437);
+    bench.shows(0xFFFF, 0x0437);
 }

@@ -4,60 +4,50 @@ use crate::bench::{Bench, TURN};
 
 fn saved(function: i64) -> Bench {
     let mut bench = Bench::new();
-    bench.set(0x2619, 0, function);
-    bench.save();
+    bench.set(0x2619, function).save();
     bench
 }
 
 fn turn_to(bench: &mut Bench, counts: i64) {
-    bench.set(0x6060, 0, 1);
-    bench.set(0x6040, 0, 0x2F);
-    bench.set(0x607A, 0, counts);
+    bench.set(0x6060, 1).set(0x6040, 0x2F).set(0x607A, counts);
     bench.until_reached(5000);
-    bench.set(0x6040, 0, 0);
+    bench.set(0x6040, 0);
 }
 
 #[test]
 fn turns_are_kept_by_the_battery_also_when_the_shaft_is_turned_without_power() {
     let mut bench = Bench::read_as("J005", "free");
     turn_to(&mut bench, 7 * TURN + 5000);
-    bench.tell("1 power cut");
-    bench.tell("1 load torque -20");
-    bench.run_ms(3000);
-    bench.tell("1 load torque 0");
-    bench.run_ms(500);
+    bench.tell("1 power cut").tell("1 load torque -20").run_ms(3000);
+    bench.tell("1 load torque 0").run_ms(500);
     let turned = bench.report().shaft_angle_rad / core::f64::consts::TAU * TURN as f64;
     assert!(turned > (8 * TURN) as f64, "the load turned it on: {turned}");
-    bench.tell("1 power on");
-    bench.run_ms(10);
+    bench.tell("1 power on").run_ms(10);
     assert!((bench.position() as f64 - turned).abs() < 2.0, "{} {turned}", bench.position());
-    assert_eq!(bench.get(0x260E, 0), 0);
+    bench.reads(0x260E, 0);
 }
 
 #[test]
 fn without_battery_and_power_the_turns_are_lost_and_the_place_in_the_turn_is_known() {
     let mut bench = Bench::new();
     turn_to(&mut bench, 7 * TURN + 5000);
-    bench.tell("1 battery off");
-    bench.power_cycle();
+    bench.tell("1 battery off").power_cycle();
     let position = bench.position();
     assert!((position - 5000).abs() <= 30, "{position}");
-    assert_eq!(bench.get(0x260E, 0), 0x10);
+    bench.reads(0x260E, 0x10);
 }
 
 #[test]
 fn an_origin_set_with_60006_and_60016_outlives_a_power_cycle() {
     let mut bench = Bench::new();
     turn_to(&mut bench, 3 * TURN + 777);
-    bench.set(0x260A, 0, 60_016);
-    assert_eq!(bench.get(0x260A, 0), 60_016, "alone it is a gear");
-    bench.set(0x260A, 0, 1234);
-    bench.set(0x260A, 0, 60_006);
+    bench.set(0x260A, 60_016);
+    assert_eq!(bench.get(0x260A), 60_016, "alone it is a gear");
+    bench.set(0x260A, 1234).set(0x260A, 60_006);
     assert!(bench.position() > 3 * TURN);
-    bench.set(0x260A, 0, 60_016);
-    bench.run_ms(1);
+    bench.set(0x260A, 60_016).run_ms(1);
     assert!(bench.position().abs() < 5);
-    assert_eq!(bench.get(0x260A, 0), 1234);
+    bench.reads(0x260A, 1234);
     bench.power_cycle();
     assert!(bench.position().abs() < 5);
 }
@@ -65,11 +55,9 @@ fn an_origin_set_with_60006_and_60016_outlives_a_power_cycle() {
 #[test]
 fn function_6_goes_back_to_the_origin_at_the_speed_of_the_ones_digit() {
     let mut bench = saved(6);
-    bench.set(0x6083, 0, 20_002);
-    bench.save();
+    bench.set(0x6083, 20_002).save();
     turn_to(&mut bench, 8 * TURN);
-    bench.power_cycle();
-    bench.run_ms(500);
+    bench.power_cycle().run_ms(500);
     let speed = bench.report().velocity_rpm;
     assert!((speed + 300.0).abs() < 10.0, "{speed}");
     assert_eq!(bench.statusword(), 0x0014, "it drives the motor by itself");
@@ -81,9 +69,7 @@ fn function_6_goes_back_to_the_origin_at_the_speed_of_the_ones_digit() {
 fn turns_that_are_lost_are_no_place_to_go_back_to() {
     let mut bench = saved(6);
     turn_to(&mut bench, 8 * TURN + 9000);
-    bench.tell("1 battery off");
-    bench.power_cycle();
-    bench.run_ms(1000);
+    bench.tell("1 battery off").power_cycle().run_ms(1000);
     assert!((bench.position() - 9000).abs() <= 30 && bench.statusword() & 0x10 == 0);
 }
 
@@ -103,16 +89,12 @@ fn functions_7_and_8_move_a_brake() {
     bench.power_cycle();
     assert_eq!(bench.report().brake, Some(sim::Brake::Engaged));
     let before = bench.position();
-    bench.tell("1 load torque 20");
-    bench.run_ms(500);
+    bench.tell("1 load torque 20").run_ms(500);
     assert!((bench.position() - before).abs() < 200, "the brake holds");
-    bench.set(0x6040, 0, 0x0F);
-    bench.run_ms(5);
+    bench.set(0x6040, 0x0F).run_ms(5);
     assert_eq!(bench.report().brake, Some(sim::Brake::Released));
-    bench.set(0x6040, 0, 0);
-    bench.run_ms(5);
-    bench.tell("1 power off");
-    bench.run_ms(300);
+    bench.set(0x6040, 0).run_ms(5);
+    bench.tell("1 power off").run_ms(300);
     assert_eq!(bench.report().brake, Some(sim::Brake::Engaged), "without power it holds");
 }
 
@@ -120,13 +102,10 @@ fn functions_7_and_8_move_a_brake() {
 fn function_9_and_a_gear_of_0_put_the_host_in_control() {
     for (index, value) in [(0x2619, 9), (0x260A, 0)] {
         let mut bench = Bench::new();
-        bench.set(index, 0, value);
-        bench.save();
-        assert_eq!(bench.get(0x2600, 0), 0);
+        bench.set(index, value).save().reads(0x2600, 0);
         bench.power_cycle();
-        assert_eq!(bench.get(0x2600, 0), 1, "{index:04X}h");
-        bench.tell("1 pulses 1000 10000");
-        bench.run_ms(300);
+        assert_eq!(bench.get(0x2600), 1, "{index:04X}h");
+        bench.tell("1 pulses 1000 10000").run_ms(300);
         assert!(bench.position().abs() < 2, "pulses are ignored");
     }
 }
@@ -134,34 +113,24 @@ fn function_9_and_a_gear_of_0_put_the_host_in_control() {
 #[test]
 fn with_a_brake_the_turns_outlive_a_power_off_without_a_battery() {
     let mut bench = saved(7);
-    bench.tell("1 battery off");
-    bench.power_cycle();
-    assert_eq!(bench.get(0x260E, 0), 0, "a brake in place of a battery: nothing is missing");
+    bench.tell("1 battery off").power_cycle();
+    assert_eq!(bench.get(0x260E), 0, "a brake in place of a battery: nothing is missing");
     turn_to(&mut bench, 7 * TURN + 5000);
-    bench.tell("1 load torque 20");
-    bench.run_ms(10);
-    bench.tell("1 power off");
-    bench.run_ms(500);
-    bench.tell("1 power on");
-    bench.run_ms(10);
-    assert_eq!(bench.get(0x260E, 0), 0);
+    bench.tell("1 load torque 20").run_ms(10);
+    bench.tell("1 power off").run_ms(500);
+    bench.tell("1 power on").run_ms(10).reads(0x260E, 0);
     let position = bench.position();
     assert!((position - (7 * TURN + 5000)).abs() < 300, "{position}");
-    bench.send("000#8101");
-    bench.run_ms(10);
-    assert_eq!((bench.position(), bench.get(0x260E, 0)), (position, 0), "and an NMT reset");
+    bench.send("000#8101").run_ms(10);
+    assert_eq!((bench.position(), bench.get(0x260E)), (position, 0), "and an NMT reset");
 }
 
 #[test]
 fn function_8_goes_back_to_the_origin_without_a_battery() {
     let mut bench = saved(8);
-    bench.tell("1 battery off");
-    bench.power_cycle();
+    bench.tell("1 battery off").power_cycle();
     bench.until_reached(2000);
-    bench.set(0x6040, 0, 0x0F);
-    bench.set(0x260A, 0, 60_006);
-    bench.set(0x260A, 0, 60_016);
-    bench.run_ms(1);
+    bench.set(0x6040, 0x0F).set(0x260A, 60_006).set(0x260A, 60_016).run_ms(1);
     turn_to(&mut bench, -3 * TURN);
     bench.power_cycle();
     // Already on its way: 100 r/min for less than 10 ms.
@@ -176,10 +145,7 @@ fn function_8_goes_back_to_the_origin_without_a_battery() {
 fn a_brake_without_a_readable_record_does_not_guess_the_turns() {
     let mut bench = saved(7);
     turn_to(&mut bench, 2 * TURN);
-    bench.tell("1 battery off");
-    bench.tell("1 fault eeprom on");
-    bench.power_cycle();
-    assert_eq!(bench.get(0x260E, 0), 0x10);
+    bench.tell("1 battery off").tell("1 fault eeprom on").power_cycle().reads(0x260E, 0x10);
 }
 
 #[test]
@@ -191,7 +157,7 @@ fn a_battery_that_runs_empty_without_power_loses_the_turns_and_is_charged_again(
         bench.machine().assembly_mut().motor_mut().encoder.battery.charge_mah = charge_mah;
         bench.power_cycle();
         assert!((bench.position() - position).abs() <= 60, "{charge_mah} mA·h: {}", bench.position());
-        assert_eq!(bench.get(0x260E, 0), alarm, "{charge_mah} mA·h");
+        assert_eq!(bench.get(0x260E), alarm, "{charge_mah} mA·h");
         let charged = |bench: &mut Bench| bench.machine().assembly().motor().encoder.battery.charge_mah;
         let before = charged(&mut bench);
         bench.run_ms(900);
@@ -207,9 +173,7 @@ fn beyond_60000_turns_the_position_goes_on_from_the_other_end_and_the_move_does_
     bench.machine().assembly_mut().motor_mut().rotor.angle = plant::Angle::new(59_999, 0.5);
     bench.power_cycle();
     assert_eq!(bench.position(), 59_999 * TURN + TURN / 2);
-    bench.set(0x607A, 0, TURN);
-    bench.set(0x6040, 0, 0x4F);
-    bench.set(0x6040, 0, 0x5F);
+    bench.set(0x607A, TURN).set(0x6040, 0x4F).set(0x6040, 0x5F);
     let mut most: f64 = 0.0;
     for _ in 0..500 {
         bench.run_ms(1);
@@ -218,9 +182,7 @@ fn beyond_60000_turns_the_position_goes_on_from_the_other_end_and_the_move_does_
     assert!((bench.position() - (-60_000 * TURN + TURN / 2)).abs() <= 30, "{}", bench.position());
     assert!(most < 1700.0 && bench.statusword() == 0x0437, "one turn at 1500 r/min, and no more: {most}");
     // Back by two turns, over the same edge.
-    bench.set(0x607A, 0, -2 * TURN);
-    bench.set(0x6040, 0, 0x5F);
-    bench.run_ms(500);
+    bench.set(0x607A, -2 * TURN).set(0x6040, 0x5F).run_ms(500);
     assert!((bench.position() - (59_998 * TURN + TURN / 2)).abs() <= 30, "{}", bench.position());
 }
 
@@ -229,13 +191,9 @@ fn a_joint_that_takes_pulses_goes_back_to_where_it_was_at_power_off_and_holds() 
     // "Characteristic": "reenergize automatically back to the power off position".
     let pushed_away = |bench: &mut Bench| {
         turn_to(bench, 2 * TURN + 5000);
-        bench.tell("1 power cut");
-        bench.tell("1 load torque -20");
-        bench.run_ms(2000);
-        bench.tell("1 load torque 0");
-        bench.run_ms(500);
-        bench.tell("1 power on");
-        bench.run_ms(10);
+        bench.tell("1 power cut").tell("1 load torque -20").run_ms(2000);
+        bench.tell("1 load torque 0").run_ms(500);
+        bench.tell("1 power on").run_ms(10);
         assert!(bench.position() > 3 * TURN, "{}", bench.position());
     };
     let mut bench = Bench::new();
@@ -243,13 +201,11 @@ fn a_joint_that_takes_pulses_goes_back_to_where_it_was_at_power_off_and_holds() 
     assert_eq!(bench.statusword() & !0x0400, 0x0004, "as printed for a joint that nobody has enabled");
     bench.run_ms(10_000);
     assert!((bench.position() - 2 * TURN - 5000).abs() <= 40, "{}", bench.position());
-    assert_eq!(bench.statusword(), 0x0404);
-    bench.tell("1 load torque 20");
-    bench.run_ms(500);
+    bench.shows(0xFFFF, 0x0404);
+    bench.tell("1 load torque 20").run_ms(500);
     assert!((bench.position() - 2 * TURN - 5000).abs() <= 200, "it holds: {}", bench.position());
     // Bit 0 of the controlword makes it the host's, and bit 1 is 0: free.
-    bench.set(0x6040, 0, 1);
-    bench.run_ms(500);
+    bench.set(0x6040, 1).run_ms(500);
     assert!(bench.position() < 2 * TURN, "{}", bench.position());
 
     let mut bench = Bench::read_as("J005", "free");
@@ -263,17 +219,12 @@ fn a_joint_that_takes_pulses_goes_back_to_where_it_was_at_power_off_and_holds() 
 fn at_the_first_power_on_after_an_nmt_reset_and_without_its_turns_a_joint_holds_where_it_is() {
     let mut bench = Bench::new();
     turn_to(&mut bench, TURN);
-    bench.tell("1 power cycle");
-    bench.run_ms(500);
+    bench.tell("1 power cycle").run_ms(500);
     turn_to(&mut bench, 3 * TURN + 9000);
-    bench.send("000#8101");
-    bench.run_ms(2000);
+    bench.send("000#8101").run_ms(2000);
     assert!((bench.position() - 3 * TURN - 9000).abs() <= 60, "not to the last power-off: {}", bench.position());
-    bench.tell("1 battery off");
-    bench.power_cycle();
-    bench.run_ms(2000);
+    bench.tell("1 battery off").power_cycle().run_ms(2000);
     assert!((bench.position() - 9000).abs() <= 60, "the place in the turn: {}", bench.position());
-    bench.tell("1 load torque 20");
-    bench.run_ms(500);
+    bench.tell("1 load torque 20").run_ms(500);
     assert!((bench.position() - 9000).abs() <= 260, "it holds: {}", bench.position());
 }

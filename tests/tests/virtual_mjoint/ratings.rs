@@ -15,9 +15,7 @@ fn figure(parameter: &str) -> [f64; 4] {
 
 fn turning(model: &'static Model, rpm: f64) -> Bench {
     let mut bench = Bench::of(1, model);
-    bench.set(0x6060, 0, 3);
-    bench.set(0x60FF, 0, rpm as i64);
-    bench.set(0x6040, 0, 0x0F);
+    bench.set(0x6060, 3).set(0x60FF, rpm as i64).set(0x6040, 0x0F);
     bench
 }
 
@@ -31,10 +29,9 @@ fn without_load_each_model_reaches_its_maximum_speed_at_36_v_and_says_so_in_bit_
         bench.run_ms(2500);
         let report = bench.report();
         assert!((report.velocity_rpm - maximum).abs() < 10.0, "{}: {} r/min", model.name, report.velocity_rpm);
-        assert_eq!((bench.statusword(), bench.get(0x260E, 0)), (0x0437, 0), "{}", model.name);
+        assert_eq!((bench.statusword(), bench.get(0x260E)), (0x0437, 0), "{}", model.name);
         // Nothing is faster, whatever 60FFh asks for.
-        bench.set(0x60FF, 0, 3000);
-        bench.run_ms(500);
+        bench.set(0x60FF, 3000).run_ms(500);
         assert!(bench.report().velocity_rpm < maximum + 10.0, "{}", model.name);
     }
 }
@@ -46,9 +43,7 @@ fn at_24_v_and_without_an_advance_in_2604h_the_voltage_ends_the_speed() {
     for (n, model) in MODELS.into_iter().enumerate() {
         for (supply_v, advance) in [(36.0, 0), (24.0, 0), (24.0, 200)] {
             let mut bench = turning(model, 3000.0);
-            bench.set(0x2604, 0, advance);
-            bench.tell(&format!("1 supply {supply_v}"));
-            bench.run_ms(2500);
+            bench.set(0x2604, advance).tell(&format!("1 supply {supply_v}")).run_ms(2500);
             // Back-emf less what the d current takes of it, against the bus: v = speed * (Kt / 1.5 - p L i_d).
             let constant = torque[n] / (2.0_f64.sqrt() * current[n]) / 1.5;
             let direct_a = 10.0 * 2.0_f64.sqrt() * (0.1 * advance as f64).to_radians().sin();
@@ -57,7 +52,7 @@ fn at_24_v_and_without_an_advance_in_2604h_the_voltage_ends_the_speed() {
             let share = bench.report().velocity_rpm / most.min(maximum[n]);
             // Friction, resistance and the switching's dead time take some of it.
             assert!((0.92..1.001).contains(&share), "{} at {supply_v} V, {advance}: {share}", model.name);
-            assert_eq!(bench.get(0x260E, 0), 0, "{}", model.name);
+            assert_eq!(bench.get(0x260E), 0, "{}", model.name);
         }
     }
 }
@@ -69,9 +64,7 @@ fn at_the_rated_current_the_rated_torque_comes_out_and_the_supply_pays_for_it() 
         (figure("Output torque after deceleration"), figure("Motor rated current"), figure("Resistance"));
     for (n, model) in MODELS.into_iter().enumerate() {
         let mut bench = Bench::open_with(mjoint(model, 1, Bitrate::M1));
-        bench.set(0x6060, 0, 3);
-        bench.set(0x60FF, 0, 500);
-        bench.set(0x6040, 0, 0x0F);
+        bench.set(0x6060, 3).set(0x60FF, 500).set(0x6040, 0x0F);
         let load =
             |bench: &mut Bench, torque_nm| bench.machine().assembly_mut().motor_mut().rig.load.torque_nm = torque_nm;
         for share in 1..=20 {
@@ -79,10 +72,10 @@ fn at_the_rated_current_the_rated_torque_comes_out_and_the_supply_pays_for_it() 
             bench.run_ms(50);
         }
         bench.run_ms(500);
-        let shown_a = bench.get(0x6078, 0) as f64 / 2000.0;
+        let shown_a = bench.get(0x6078) as f64 / 2000.0;
         // Printed at the rated speed, where friction is a little more.
         assert!((0.93..1.02).contains(&(shown_a / rated[n])), "{}: {shown_a} A", model.name);
-        let speed_rpm = bench.get(0x606C, 0) as f64 / 10.0;
+        let speed_rpm = bench.get(0x606C) as f64 / 10.0;
         let energy = |bench: &mut Bench| bench.machine().assembly().motor().rig.energy;
         let before = energy(&mut bench);
         bench.run_ms(1000);
@@ -96,12 +89,11 @@ fn at_the_rated_current_the_rated_torque_comes_out_and_the_supply_pays_for_it() 
         // The gear's kinematic error makes the current swing, which costs a little more.
         assert!((given_w / expected_w - 1.0).abs() < 0.03, "{}: {given_w} W, not {expected_w}", model.name);
         // With rated current allowed and no more, it still turns; half as much again stops it.
-        bench.set(0x261D, 0, (rated[n] * 1000.0) as i64);
-        bench.run_ms(500);
-        assert!((bench.get(0x606C, 0) - 5000).abs() < 100, "{}", model.name);
+        bench.set(0x261D, (rated[n] * 1000.0) as i64).run_ms(500);
+        assert!((bench.get(0x606C) - 5000).abs() < 100, "{}", model.name);
         load(&mut bench, 1.5 * torque[n]);
         bench.run_ms(1000);
-        assert!(bench.get(0x606C, 0) < 2500, "{}", model.name);
+        assert!(bench.get(0x606C) < 2500, "{}", model.name);
     }
 }
 
@@ -118,8 +110,7 @@ fn as_delivered_each_model_lifts_its_printed_torque_at_its_printed_speed() {
         let mut bench = turning(model, rpm);
         bench.run_ms(500);
         for share in 1..=20 {
-            bench.tell(&format!("1 load torque {}", torque[n] * f64::from(share) / 20.0));
-            bench.run_ms(50);
+            bench.tell(&format!("1 load torque {}", torque[n] * f64::from(share) / 20.0)).run_ms(50);
         }
         bench.run_ms(7000);
         let report = bench.report();
@@ -129,7 +120,7 @@ fn as_delivered_each_model_lifts_its_printed_torque_at_its_printed_speed() {
             model.name,
             report.velocity_rpm
         );
-        assert_eq!(bench.get(0x260E, 0), 0, "{} at {} A", model.name, report.current_a);
+        assert_eq!(bench.get(0x260E), 0, "{} at {} A", model.name, report.current_a);
     }
 }
 
@@ -138,8 +129,7 @@ fn keeps(model: &'static Model, torque_nm: f64) -> f64 {
     let mut bench = turning(model, 300.0);
     bench.run_ms(300);
     for share in 1..=20 {
-        bench.tell(&format!("1 load torque {}", torque_nm * f64::from(share) / 20.0));
-        bench.run_ms(50);
+        bench.tell(&format!("1 load torque {}", torque_nm * f64::from(share) / 20.0)).run_ms(50);
     }
     bench.run_ms(1000);
     bench.report().velocity_rpm / 300.0

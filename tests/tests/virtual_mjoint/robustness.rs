@@ -61,9 +61,8 @@ fn random_writes_pdos_and_hands_at_the_machine_break_nothing() {
             assert!(report.supply_v.is_finite() && report.supply_v < 500.0, "seed {seed}: {report:?}");
         }
         // A power cycle and it answers.
-        bench.tell("1 supply 36");
-        bench.power_cycle();
-        bench.get(0x1000, 0);
+        bench.tell("1 supply 36").power_cycle();
+        bench.get(0x1000);
     }
 }
 
@@ -160,12 +159,11 @@ fn after_any_lawful_mess_a_host_that_begins_anew_reaches_its_target() {
             (0x6040, 0x0F),
             (0x6040, 0x2F),
         ] {
-            bench.set(index, u8::from(index == 0x1016), value);
+            bench.set((index, u8::from(index == 0x1016)), value);
         }
         bench.run_ms(300);
         let target = bench.position() + 100_000;
-        bench.set(0x607A, 0, target);
-        bench.run_ms(3000);
+        bench.set(0x607A, target).run_ms(3000);
         let (position, statusword) = (bench.position(), bench.statusword());
         assert!(
             (position - target).abs() <= 30,

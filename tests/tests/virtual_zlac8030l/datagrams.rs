@@ -82,14 +82,14 @@ impl Conversation {
 
     /// 6.1: four bytes, little-endian, the value of 606Ch; a shaft that is turned by hand makes it differ from zero.
     fn hear_velocity_by_tpdo(&mut self, length: usize) -> Result<(), String> {
-        self.bench.set(0x2030, 0x0E, 0);
+        self.bench.set((0x2030, 0x0E), 0);
         self.turn_by_hand(-1.5);
         self.bench.run_ms(2000);
         self.bench.heard();
         self.bench.run_ms(600);
         let tpdo = |(_, frame): &(_, Frame)| (frame.standard_data_id() == Some(0x184)).then(|| frame.data().to_vec());
         let data = self.bench.heard_at().iter().find_map(tpdo).ok_or("no TPDO")?;
-        let velocity = self.bench.get(0x606C, 0);
+        let velocity = self.bench.get(0x606C);
         self.turn_by_hand(0.0);
         let sent = i64::from(i32::from_le_bytes(data[..].try_into().map_err(|_| format!("data {data:02X?}"))?));
         // It turns at its own steady speed by then.
@@ -98,7 +98,7 @@ impl Conversation {
     }
 
     fn turn_by_hand(&mut self, torque_nm: f64) {
-        self.bench.operate(|drive, now| drive.set_load_torque(torque_nm, now)).expect("a torque");
+        self.bench.set_load_torque(torque_nm);
     }
 
     /// 6.2: the bytes reach 60FFh in their order. The printed ones, 04030201h, are outside its range and are not stored.
@@ -106,7 +106,7 @@ impl Conversation {
         let bytes: String = printed.iter().map(|byte| format!("{byte:02X}")).collect();
         for (data, expected) in [("2C010000", 300), (&bytes, 300), ("D4FEFFFF", -300), ("00000000", 0)] {
             self.bench.send(&format!("304#{data}"));
-            let target = self.bench.get(0x60FF, 0);
+            let target = self.bench.get(0x60FF);
             if target != expected {
                 return Err(format!("after 304#{data} 60FFh reads {target}, expected {expected}"));
             }

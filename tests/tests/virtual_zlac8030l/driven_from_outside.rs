@@ -12,17 +12,16 @@ const DRIVER_TEMPERATURE: i64 = 0x0800;
 fn a_free_wheel_under_2_5_nm_ends_where_the_bus_is_limited_and_over_voltage_is_told() {
     let mut bench = Bench::new();
     bench.heard();
-    bench.tell("4 load torque 2.5");
-    bench.run_ms(5000);
+    bench.tell("4 load torque 2.5").run_ms(5000);
     let report = bench.report();
     assert_within("bus in V: 91 V and what 1 kW of suppressors rise by", report.supply_v, 91.25, 105.0);
     // Line-to-line back-EMF is the bus voltage, and the current's drop is small.
     let rad_s = -report.velocity_rpm * RAD_S_PER_RPM;
     let emf_v = rad_s * wheel::emf_per_rad_s() * 3_f64.sqrt();
     assert_within("back-EMF in V", emf_v, report.supply_v, report.supply_v * 1.03);
-    assert_eq!((bench.get(0x603F, 0), bench.get(0x1001, 0)), (OVER_VOLTAGE, 0x05));
+    assert_eq!((bench.get(0x603F), bench.get(0x1001)), (OVER_VOLTAGE, 0x05));
     assert_eq!(bench.heard_of("084#"), ["084#0100050000000000"], "told once");
-    assert_within("2029h in V", bench.get(0x2029, 0) as f64 * 0.01, report.supply_v - 0.1, report.supply_v + 0.1);
+    assert_within("2029h in V", bench.get(0x2029) as f64 * 0.01, report.supply_v - 0.1, report.supply_v + 0.1);
     bench.run_ms(10_000);
     assert_within(
         "speed in the end",
@@ -35,11 +34,9 @@ fn a_free_wheel_under_2_5_nm_ends_where_the_bus_is_limited_and_over_voltage_is_t
 #[test]
 fn the_bleeder_keeps_a_driven_bus_at_its_voltage() {
     let mut bench = Bench::new();
-    bench.set(0x202E, 5, 1);
-    bench.tell("4 load torque 1.5");
-    bench.run_ms(3000);
+    bench.set((0x202E, 5), 1).tell("4 load torque 1.5").run_ms(3000);
     assert_within("bus in V", bench.report().supply_v, 61.9, 70.5);
-    assert_eq!(bench.get(0x603F, 0), 0);
+    bench.reads(0x603F, 0);
 }
 
 #[test]
@@ -52,43 +49,31 @@ fn a_bus_that_is_fed_for_long_makes_the_power_stage_hot_which_is_told_before_it_
     assert_within("driver in degC", bench.report().driver_c.expect("a sensor"), 79.0, 82.0);
     let burnt_s = bench.seconds_until(100.0, std::time::Duration::from_millis(100), |report| report.damage.is_some());
     assert!(told_s > 10.0 && burnt_s > 30.0, "{told_s} s, then {burnt_s} s");
-    let answer = bench.tell("4 get");
+    let answer = bench.told("4 get");
     assert!(answer.contains("\"powered\":false") && answer.contains("power stage burnt"), "{answer}");
 }
 
 #[test]
 fn a_burnt_power_stage_brakes_the_wheel_takes_the_drive_off_the_bus_and_a_new_one_is_as_before() {
     let mut bench = Bench::new();
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 200);
-    bench.run_ms(1000);
-    bench.tell("4 fault bridge on");
-    bench.run_ms(500);
-    assert_within("speed", bench.report().velocity_rpm, -1.0, 1.0);
+    bench.enable_in(3).set(0x60FF, 200).run_ms(1000);
+    bench.tell("4 fault bridge on").run_ms(500).turns_at(-1.0, 1.0);
     assert_eq!(bench.sdo(&[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]), None);
     bench.heard();
-    bench.tell("4 power cycle");
-    bench.run_ms(500);
+    bench.tell("4 power cycle").run_ms(500);
     assert!(bench.heard().is_empty(), "no boot-up");
     assert!(!bench.report().powered && bench.report().damage.is_some(), "it burns the next fuse");
-    bench.tell("4 fault bridge off");
-    bench.tell("4 power cycle");
-    bench.run_ms(500);
+    bench.tell("4 fault bridge off").tell("4 power cycle").run_ms(500);
     assert_eq!(bench.report().damage, None);
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 60);
-    bench.run_ms(1000);
-    assert_within("speed", bench.report().velocity_rpm, 59.0, 61.0);
+    bench.enable_in(3).set(0x60FF, 60).run_ms(1000).turns_at(59.0, 61.0);
 }
 
 #[test]
 fn a_wheel_that_runs_away_seizes_and_is_freed_by_hand() {
     let mut bench = Bench::new();
-    bench.tell("4 load torque 20");
-    bench.run_ms(10_000);
+    bench.tell("4 load torque 20").run_ms(10_000);
     let report = bench.report();
     assert!(report.damage.is_some_and(|damage| damage.contains("seized")) && report.velocity_rpm == 0.0, "{report:?}");
-    bench.tell("4 load torque 0");
-    bench.tell("4 rotor free");
+    bench.tell("4 load torque 0").tell("4 rotor free");
     assert_eq!(bench.report().damage, None);
 }

@@ -43,36 +43,26 @@ fn each_value_is_that_of_the_eds_after_power_on_a_reset_and_factory_settings() {
     let mut manual = Bench::new();
     let mut bench = eds();
     for (index, sub, printed, given) in DIFFERENT {
-        assert_eq!((manual.get(index, sub), bench.get(index, sub)), (printed, given), "{index:04X}h:{sub:02X}");
+        assert_eq!((manual.get((index, sub)), bench.get((index, sub))), (printed, given), "{index:04X}h:{sub:02X}");
     }
-    bench.set(0x2014, 0, 77);
-    bench.set(0x1800, 3, 7);
-    bench.set(0x60FF, 0, 7);
-    bench.let_store();
-    bench.set(0x2009, 0, 1);
-    bench.let_store();
-    bench.power_cycle();
+    bench.set(0x2014, 77).set((0x1800, 3), 7).set(0x60FF, 7).let_store();
+    bench.set(0x2009, 1).let_store().power_cycle();
     for (index, sub, _, given) in DIFFERENT {
-        assert_eq!(bench.get(index, sub), given, "{index:04X}h:{sub:02X} after factory settings");
+        assert_eq!(bench.get((index, sub)), given, "{index:04X}h:{sub:02X} after factory settings");
     }
-    bench.set(0x2010, 0, 1);
-    bench.set(0x1A00, 0, 0);
-    bench.send("000#8204");
-    bench.run_ms(10);
-    assert_eq!((bench.get(0x1A00, 0), bench.get(0x1800, 3)), (4, 100), "after NMT reset communication");
+    bench.set(0x2010, 1).set(0x1A00, 0).send("000#8204").run_ms(10);
+    assert_eq!((bench.get(0x1A00), bench.get((0x1800, 3))), (4, 100), "after NMT reset communication");
 }
 
 #[test]
 fn rpdo_0_carries_controlword_and_mode_and_tpdo_0_the_statusword_at_most_every_50_ms() {
     let mut bench = eds();
-    bench.set(0x2000, 0, 0);
-    bench.set(0x60FF, 0, 0);
+    bench.set(0x2000, 0).set(0x60FF, 0);
     bench.heard();
-    bench.send("000#0104");
-    bench.run_ms(60);
+    bench.send("000#0104").run_ms(60);
     assert_eq!(bench.heard_of("184#"), ["184#7006"], "once on entering operational");
     bench.send("204#060003");
-    assert_eq!((bench.get(0x6060, 0), bench.statusword() & 0x6F), (3, 0x21));
+    assert_eq!((bench.get(0x6060), bench.statusword() & 0x6F), (3, 0x21));
     bench.run_ms(60);
     bench.heard();
     for frame in ["204#070003", "204#0F0003"] {
@@ -86,16 +76,13 @@ fn rpdo_0_carries_controlword_and_mode_and_tpdo_0_the_statusword_at_most_every_5
     assert_within("ms between two TPDOs: 100 of 0.5 ms", apart_ms, 50.0, 50.6);
     assert_eq!(times[1].1.data()[0] & 0x6F, 0x27);
     // Two bytes are fewer than are mapped.
-    bench.send("204#0000");
-    assert_eq!(bench.statusword() & 0x6F, 0x27);
+    bench.send("204#0000").shows(0x6F, 0x27);
 }
 
 #[test]
 fn entries_of_zero_that_are_counted_in_carry_nothing() {
     let mut bench = eds();
-    bench.map(0x1A01, &[0x606C_0020, 0, 0x6077_0010]);
-    bench.send("000#0104");
-    bench.run_ms(5);
+    bench.map(0x1A01, &[0x606C_0020, 0, 0x6077_0010]).send("000#0104").run_ms(5);
     let sent = bench.heard_of("284#");
     assert_eq!(sent, ["284#000000000000"]);
     assert!(bench.heard_of("384#").is_empty(), "nothing but zeros is nothing");
@@ -104,11 +91,8 @@ fn entries_of_zero_that_are_counted_in_carry_nothing() {
 #[test]
 fn enabled_in_profile_velocity_it_turns_at_120_rpm_at_once_and_holds_its_speed_with_the_observer_on() {
     let mut bench = eds();
-    bench.enable_in(3);
-    bench.run_ms(1500);
-    assert_within("speed", bench.report().velocity_rpm, 119.5, 120.5);
-    bench.operate(|drive, now| drive.set_load_torque(3.0, now)).expect("a load");
-    bench.run_ms(1500);
+    bench.enable_in(3).run_ms(1500).turns_at(119.5, 120.5);
+    bench.set_load_torque(3.0).run_ms(1500);
     assert_within("speed under 3 N m", bench.report().velocity_rpm, 119.0, 121.0);
-    assert_eq!(bench.get(0x603F, 0), 0);
+    bench.reads(0x603F, 0);
 }

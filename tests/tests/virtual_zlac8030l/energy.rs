@@ -12,12 +12,7 @@ const OVER_VOLTAGE: i64 = 0x0001;
 fn turning(rpm: f64, inertia_kg_m2: f64, stop_ms: i64) -> Bench {
     let mut bench = Bench::open();
     bench.motor().rig.load.inertia_kg_m2 = inertia_kg_m2;
-    bench.set(0x605A, 0, 6);
-    bench.set(0x6085, 0, stop_ms);
-    bench.set(0x6083, 0, 2000);
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, rpm as i64);
-    bench.run_ms(4000);
+    bench.set(0x605A, 6).set(0x6085, stop_ms).set(0x6083, 2000).enable_in(3).set(0x60FF, rpm as i64).run_ms(4000);
     bench
 }
 
@@ -32,20 +27,18 @@ fn highest_bus_v(bench: &mut Bench, ms: u64) -> f64 {
 #[test]
 fn the_energy_book_closes_over_a_day_of_work() {
     let mut bench = turning(200.0, 0.05, 300);
-    bench.set(0x202E, 5, 1);
+    bench.set((0x202E, 5), 1);
     let mut stored_before = bench.motor().stored_j();
     let mut booked_before = bench.motor().rig.energy.balance_j();
     for (step, target) in [150, -200, 30, 0].into_iter().enumerate() {
-        bench.set(0x60FF, 0, target);
-        bench.operate(|drive, now| drive.set_load_torque(step as f64 - 1.0, now)).expect("a load");
-        bench.run_ms(1500);
+        bench.set(0x60FF, target).set_load_torque(step as f64 - 1.0).run_ms(1500);
         let (stored, booked) = (bench.motor().stored_j(), bench.motor().rig.energy.balance_j());
         let turnover = bench.motor().rig.energy.source_j;
         let gap = (stored - stored_before) - (booked - booked_before);
         assert_within("J missing, by J turned over", gap / turnover, -1e-6, 1e-6);
         (stored_before, booked_before) = (stored, booked);
     }
-    assert_eq!(bench.get(0x603F, 0), 0);
+    bench.reads(0x603F, 0);
 }
 
 /// What the wheel loses less what friction, copper and electronics take is in the capacitor: 1/2 C V^2.
@@ -56,7 +49,7 @@ fn braking_raises_the_bus_by_what_the_wheel_gives_back() {
     let rad_s = 300.0 * RAD_S_PER_RPM;
     let kinetic_j = 0.5 * wheel::inertia_kg_m2() * rad_s.powi(2);
     let start_v = bench.motor().rig.supply.bus_v;
-    bench.set(0x6040, 0, 0x02);
+    bench.set(0x6040, 0x02);
     let highest_v = highest_bus_v(&mut bench, 150);
     // The S brakes with a peak of twice the mean: its copper loss is 4/3 of the mean torque's.
     let mean_nm = wheel::inertia_kg_m2() * rad_s / 0.1;
@@ -76,20 +69,19 @@ fn braking_raises_the_bus_by_what_the_wheel_gives_back() {
 #[test]
 fn hard_braking_without_a_bleeder_ends_in_over_voltage() {
     let mut bench = turning(300.0, 0.1, 600);
-    bench.set(0x6040, 0, 0x02);
+    bench.set(0x6040, 0x02);
     let highest_v = highest_bus_v(&mut bench, 700);
-    assert_eq!((bench.get(0x603F, 0), bench.get(0x1001, 0)), (OVER_VOLTAGE, 0x05), "generic and voltage");
-    assert_eq!(bench.statusword() & 0xFF, 0x98);
+    assert_eq!((bench.get(0x603F), bench.get(0x1001)), (OVER_VOLTAGE, 0x05), "generic and voltage");
+    bench.shows(0xFF, 0x98);
     assert_within("highest bus voltage", highest_v, 75.0, 78.0);
 }
 
 #[test]
 fn hard_braking_with_a_bleeder_stays_between_its_two_voltages() {
     let mut bench = turning(300.0, 0.1, 600);
-    bench.set(0x202E, 5, 1);
-    bench.set(0x6040, 0, 0x02);
+    bench.set((0x202E, 5), 1).set(0x6040, 0x02);
     let highest_v = highest_bus_v(&mut bench, 700);
-    assert_eq!((bench.get(0x603F, 0), bench.statusword() & 0xFF), (0, 0x17));
+    assert_eq!((bench.get(0x603F), bench.statusword() & 0xFF), (0, 0x17));
     assert_within("highest bus voltage", highest_v, 69.9, 70.5);
     let burnt_j = bench.motor().rig.energy.bleeder_j;
     let kinetic_j = 0.5 * (wheel::inertia_kg_m2() + 0.1) * (300.0 * RAD_S_PER_RPM).powi(2);
@@ -99,10 +91,7 @@ fn hard_braking_with_a_bleeder_stays_between_its_two_voltages() {
 #[test]
 fn the_bleeder_switches_at_202e_03_and_202e_04() {
     let mut bench = turning(300.0, 0.1, 600);
-    bench.set(0x202E, 3, 600);
-    bench.set(0x202E, 4, 550);
-    bench.set(0x202E, 5, 1);
-    bench.set(0x6040, 0, 0x02);
+    bench.set((0x202E, 3), 600).set((0x202E, 4), 550).set((0x202E, 5), 1).set(0x6040, 0x02);
     assert_within("highest bus voltage", highest_bus_v(&mut bench, 700), 59.9, 60.5);
 }
 
@@ -111,11 +100,8 @@ fn the_bleeder_switches_at_202e_03_and_202e_04() {
 fn a_steady_current_warms_the_winding_as_its_time_constant_says() {
     let mut bench = Bench::open();
     bench.motor().rig.load.locked = true;
-    bench.set(0x6087, 0, 0);
-    bench.enable_in(4);
-    bench.set(0x6071, 0, 10_000);
-    bench.run_ms(60_000);
-    let reading_c = bench.get(0x2026, 1) as f64 * 0.1;
+    bench.set(0x6087, 0).enable_in(4).set(0x6071, 10_000).run_ms(60_000);
+    let reading_c = bench.get((0x2026, 1)) as f64 * 0.1;
     let cold_k = wheel::warming_k(1.5 * wheel::winding_ohm(25.0) * 100.0, 60.0);
     let warm_k = wheel::warming_k(1.5 * wheel::winding_ohm(25.0 + cold_k) * 100.0, 60.0);
     assert_within("warming in K", reading_c - 25.0, cold_k - 0.06, warm_k + 0.06);
@@ -126,18 +112,16 @@ fn too_hot_a_motor_or_driver_faults_at_2013h_and_is_reset_once_it_has_cooled() {
     let sensors = [(sim::TemperatureSensor::Motor, 1, 0x0400), (sim::TemperatureSensor::Driver, 2, 0x0800)];
     for (sensor, sub, code) in sensors {
         let mut bench = Bench::new();
-        bench.set(0x2013, sub, 600);
+        bench.set((0x2013, sub), 600);
         let hold = |bench: &mut Bench, celsius: f64| {
             bench.operate(|drive, now| drive.hold_temperature(sensor, Some(celsius), now)).expect("a sensor");
             bench.run_ms(200);
-            bench.set(0x6040, 0, 0x00);
-            bench.set(0x6040, 0, 0x80);
-            bench.run_ms(100);
-            bench.get(0x603F, 0)
+            bench.set(0x6040, 0x00).set(0x6040, 0x80).run_ms(100);
+            bench.get(0x603F)
         };
         assert_eq!(hold(&mut bench, 59.5), 0);
         assert_eq!(hold(&mut bench, 60.5), code);
-        assert_eq!(bench.get(0x1001, 0), 0x09, "generic and temperature");
+        assert_eq!(bench.get(0x1001), 0x09, "generic and temperature");
         assert_eq!(hold(&mut bench, 40.0), 0);
     }
 }
@@ -147,9 +131,9 @@ fn too_hot_a_motor_or_driver_faults_at_2013h_and_is_reset_once_it_has_cooled() {
 fn after_a_fault_alarm_pwm_brakes_the_wheel_and_without_it_the_wheel_coasts() {
     let stop_after_fault = |alarm_pwm: i64| {
         let mut bench = turning(150.0, 0.0, 100);
-        bench.set(0x202F, 1, alarm_pwm);
+        bench.set((0x202F, 1), alarm_pwm);
         let rad_s = bench.report().velocity_rpm * RAD_S_PER_RPM;
-        bench.operate(|drive, now| drive.set_fault(sim::Component::Hall, true, now)).expect("Hall sensors");
+        bench.set_fault(sim::Component::Hall, true);
         (rad_s, bench.seconds_until(5.0, Duration::from_millis(1), |report| report.velocity_rpm.abs() < 0.01))
     };
     let (rad_s, coasting_s) = stop_after_fault(0);
@@ -168,10 +152,9 @@ fn after_a_fault_alarm_pwm_brakes_the_wheel_and_without_it_the_wheel_coasts() {
 fn under_voltage_and_over_voltage_of_the_supply_are_told() {
     for (supply_v, code) in [(15.5, 0x0002), (75.5, 0x0001), (16.5, 0), (74.5, 0)] {
         let mut bench = Bench::new();
-        bench.operate(|drive, now| drive.set_supply(supply_v, now)).expect("a supply");
-        bench.run_ms(2000);
-        assert_eq!(bench.get(0x603F, 0), code, "{supply_v} V");
-        let read_v = bench.get(0x2029, 0) as f64 * 0.01;
+        bench.set_supply(supply_v).run_ms(2000);
+        assert_eq!(bench.get(0x603F), code, "{supply_v} V");
+        let read_v = bench.get(0x2029) as f64 * 0.01;
         assert_within("2029h", read_v, supply_v - 0.1, supply_v + 0.1);
     }
 }

@@ -15,55 +15,39 @@ fn fast() -> Bench {
 fn at_48_v_the_fast_motor_reaches_1000_rpm_either_way_and_bit_10_comes() {
     let mut bench = fast();
     // A bare wheel gives 77 J back on its way down.
-    bench.set(0x202E, 5, 1);
-    bench.enable_in(3);
+    bench.set((0x202E, 5), 1).enable_in(3);
     for target in [600, 1000, -1000] {
-        bench.set(0x60FF, 0, target);
-        bench.run_ms(2000);
+        bench.set(0x60FF, target).run_ms(2000);
         let goal = target as f64;
-        assert_within("speed", bench.report().velocity_rpm, goal - 3.0, goal + 3.0);
-        assert_within("606Ch", bench.get(0x606C, 0) as f64, goal * 10.0 - 30.0, goal * 10.0 + 30.0);
-        assert_eq!((bench.statusword() & TARGET_REACHED, bench.get(0x603F, 0)), (TARGET_REACHED, 0), "{target}");
+        bench.turns_at(goal - 3.0, goal + 3.0);
+        assert_within("606Ch", bench.get(0x606C) as f64, goal * 10.0 - 30.0, goal * 10.0 + 30.0);
+        assert_eq!((bench.statusword() & TARGET_REACHED, bench.get(0x603F)), (TARGET_REACHED, 0), "{target}");
     }
 }
 
 #[test]
 fn a_position_move_at_1000_rpm_arrives_with_the_fast_motor() {
     let mut bench = fast();
-    bench.set(0x202E, 5, 1);
-    bench.enable_in(1);
-    bench.set(0x6081, 0, 1000);
-    bench.set(0x607A, 0, 100_000);
-    bench.set(0x6040, 0, 0x1F);
-    bench.run_ms(1000);
-    assert_within("speed", bench.report().velocity_rpm, 990.0, 1010.0);
+    bench.set((0x202E, 5), 1).enable_in(1).set(0x6081, 1000).set(0x607A, 100_000).set(0x6040, 0x1F).run_ms(1000);
+    bench.turns_at(990.0, 1010.0);
     bench.run_ms(2000);
     assert_within("position", bench.report().position as f64, 99_970.0, 100_030.0);
-    assert_eq!(bench.get(0x603F, 0), 0);
+    bench.reads(0x603F, 0);
 }
 
 /// 48 V carry the slow motor to some 510 r/min: the way that it lags behind a faster move grows past 2017h.
 #[test]
 fn a_position_move_faster_than_the_slow_motor_follows_ends_out_of_tolerance() {
     let mut bench = Bench::choosing("motor", "slow");
-    bench.enable_in(1);
-    bench.set(0x6081, 0, 800);
-    bench.set(0x607A, 0, 200_000);
-    bench.set(0x6040, 0, 0x1F);
-    bench.run_ms(2000);
-    assert_eq!(bench.get(0x603F, 0), 0x0020);
+    bench.enable_in(1).set(0x6081, 800).set(0x607A, 200_000).set(0x6040, 0x1F).run_ms(2000).reads(0x603F, 0x0020);
 }
 
 #[test]
 fn the_fast_motor_needs_two_and_a_half_times_the_current_for_the_same_torque() {
     let mut bench = fast();
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 60);
-    bench.run_ms(800);
-    bench.operate(|drive, now| drive.set_load_torque(3.0, now)).expect("a load");
-    bench.run_ms(1500);
-    assert_within("speed", bench.report().velocity_rpm, 59.5, 60.5);
+    bench.enable_in(3).set(0x60FF, 60).run_ms(800);
+    bench.set_load_torque(3.0).run_ms(1500).turns_at(59.5, 60.5);
     let friction_nm = MODEL.rotor.coulomb_nm + MODEL.rotor.viscous_nm_s * 60.0 * core::f64::consts::PI / 30.0;
     let current_a = (3.0 + friction_nm) / MODEL.pmsm.torque_constant_nm_a();
-    assert_within("6077h in 0.1 A", bench.get(0x6077, 0) as f64, current_a * 10.0 - 2.5, current_a * 10.0 + 2.5);
+    assert_within("6077h in 0.1 A", bench.get(0x6077) as f64, current_a * 10.0 - 2.5, current_a * 10.0 + 2.5);
 }

@@ -1,13 +1,12 @@
 //! `firmware=2.01`: what the maker's CANopen guide V2.01 of 2024 has that the manual V1.00 does not.
 
-use crate::bench::{Bench, assert_within};
+use crate::bench::Bench;
 
 const SPEED_SETTING: i64 = 0x2000;
 
 fn in_velocity_mode(firmware: &str) -> Bench {
     let mut bench = Bench::choosing("firmware", firmware);
-    bench.set(0x200A, 0, 100);
-    bench.enable_in(3);
+    bench.set(0x200A, 100).enable_in(3);
     bench
 }
 
@@ -17,13 +16,10 @@ fn firmware_2_01_takes_a_target_above_the_maximum_speed_for_a_fault_and_1_00_lim
     for (firmware, code) in [("1.00", 0), ("2.01", SPEED_SETTING)] {
         for target in [101, -101] {
             let mut bench = in_velocity_mode(firmware);
-            bench.set(0x60FF, 0, 100);
-            bench.run_ms(800);
-            assert_within("speed", bench.report().velocity_rpm, 99.0, 101.0);
+            bench.set(0x60FF, 100).run_ms(800).turns_at(99.0, 101.0);
             bench.heard();
-            bench.set(0x60FF, 0, target);
-            bench.run_ms(5);
-            assert_eq!(bench.get(0x603F, 0), code, "{firmware}: {target}");
+            bench.set(0x60FF, target).run_ms(5);
+            assert_eq!(bench.get(0x603F), code, "{firmware}: {target}");
             let told = bench.heard_of("084#");
             assert_eq!(told, if code == 0 { vec![] } else { vec!["084#0020210000000000"] }, "generic and profile");
         }
@@ -33,21 +29,18 @@ fn firmware_2_01_takes_a_target_above_the_maximum_speed_for_a_fault_and_1_00_lim
 #[test]
 fn the_fault_of_firmware_2_01_is_reset_once_the_target_is_within_the_maximum() {
     let mut bench = in_velocity_mode("2.01");
-    bench.set(0x60FF, 0, 200);
-    bench.run_ms(5);
-    bench.set(0x6040, 0, 0x80);
-    assert_eq!((bench.get(0x603F, 0), bench.statusword() & 0x6F), (SPEED_SETTING, 0x08), "the cause is still there");
-    bench.set(0x60FF, 0, 50);
-    bench.run_ms(5);
-    bench.set(0x6040, 0, 0x00);
-    bench.set(0x6040, 0, 0x80);
-    assert_eq!((bench.get(0x603F, 0), bench.statusword() & 0x6F), (0, 0x60));
+    bench.set(0x60FF, 200).run_ms(5);
+    bench.set(0x6040, 0x80);
+    assert_eq!((bench.get(0x603F), bench.statusword() & 0x6F), (SPEED_SETTING, 0x08), "the cause is still there");
+    bench.set(0x60FF, 50).run_ms(5);
+    bench.set(0x6040, 0x00).set(0x6040, 0x80);
+    assert_eq!((bench.get(0x603F), bench.statusword() & 0x6F), (0, 0x60));
 }
 
 #[test]
 fn the_version_is_that_of_the_firmware() {
     for (firmware, version) in [("1.00", 0x0100), ("2.01", 0x0201)] {
         let mut bench = Bench::choosing("firmware", firmware);
-        assert_eq!((bench.get(0x100A, 0), bench.get(0x2025, 0)), (version, version));
+        assert_eq!((bench.get(0x100A), bench.get(0x2025)), (version, version));
     }
 }

@@ -5,27 +5,23 @@ use crate::bench::{Bench, assert_within};
 /// Turns of the shaft in 1 s under a torque that pulls it backwards.
 fn turns_under(bench: &mut Bench, torque_nm: f64) -> f64 {
     let before = bench.report().shaft_angle_rad;
-    bench.operate(|drive, now| drive.set_load_torque(torque_nm, now)).expect("a load");
-    bench.run_ms(1000);
+    bench.set_load_torque(torque_nm).run_ms(1000);
     (bench.report().shaft_angle_rad - before) / core::f64::consts::TAU
 }
 
 #[test]
 fn the_brake_holds_its_torque_and_slides_beyond_and_the_drive_never_moves_it() {
     let mut bench = Bench::new();
-    assert_eq!(bench.get(0x2004, 0) & 4, 0, "open at power-on");
-    bench.set(0x2030, 0x0E, 1);
-    bench.run_ms(2);
-    assert_eq!(bench.get(0x2004, 0) & 4, 4);
+    assert_eq!(bench.get(0x2004) & 4, 0, "open at power-on");
+    bench.set((0x2030, 0x0E), 1).run_ms(2);
+    assert_eq!(bench.get(0x2004) & 4, 4);
     // The virtual machine's brake holds 6 N m.
     assert_eq!(turns_under(&mut bench, 5.0), 0.0);
     assert!(turns_under(&mut bench, 8.0) < -0.5);
-    bench.operate(|drive, now| drive.set_load_torque(0.0, now)).expect("a load");
-    bench.run_ms(1000);
+    bench.set_load_torque(0.0).run_ms(1000);
     bench.enable_in(3);
-    assert_eq!(bench.get(0x2030, 0x0E), 1, "enabling does not open it");
-    bench.set(0x6040, 0, 0);
-    bench.set(0x2030, 0x0E, 0);
+    assert_eq!(bench.get((0x2030, 0x0E)), 1, "enabling does not open it");
+    bench.set(0x6040, 0).set((0x2030, 0x0E), 0);
     assert!(turns_under(&mut bench, 1.0) < -0.2);
 }
 
@@ -34,9 +30,7 @@ fn a_disabled_drive_lets_its_shaft_go_unless_200fh_locks_it() {
     // A stronger pull on the free wheel would end in over-voltage.
     for (lock, torque_nm, low, high) in [(0, 0.5, -10.0, -1.0), (1, 2.0, -0.02, 0.001)] {
         let mut bench = Bench::new();
-        bench.set(0x200F, 0, lock);
-        bench.run_ms(10);
-        assert_eq!(bench.statusword() & 0xFF, 0x70);
+        bench.set(0x200F, lock).run_ms(10).shows(0xFF, 0x70);
         assert_within(&format!("turns with 200Fh = {lock}"), turns_under(&mut bench, torque_nm), low, high);
         assert_eq!(bench.statusword() & 0xFF, 0x70, "holding is not enabling");
     }
@@ -45,18 +39,14 @@ fn a_disabled_drive_lets_its_shaft_go_unless_200fh_locks_it() {
 #[test]
 fn a_lock_holds_from_power_on_when_it_is_stored() {
     let mut bench = Bench::new();
-    bench.set(0x200F, 0, 1);
-    bench.let_store();
-    bench.power_cycle();
+    bench.set(0x200F, 1).let_store().power_cycle();
     assert_within("turns", turns_under(&mut bench, 2.0), -0.02, 0.001);
 }
 
 #[test]
 fn no_lock_holds_in_fault() {
     let mut bench = Bench::new();
-    bench.set(0x200F, 0, 1);
-    bench.operate(|drive, now| drive.set_fault(sim::Component::Hall, true, now)).expect("Hall sensors");
-    bench.run_ms(50);
+    bench.set(0x200F, 1).set_fault(sim::Component::Hall, true).run_ms(50);
     assert!(turns_under(&mut bench, 2.0) < -1.0);
 }
 
@@ -65,8 +55,7 @@ fn no_lock_holds_in_fault() {
 fn parking_holds_what_3_a_can_hold_and_no_more() {
     for (parking, torque_nm, holds) in [(1, 2.0, true), (1, 2.7, false), (0, 2.7, true)] {
         let mut bench = Bench::new();
-        bench.enable_in(3);
-        bench.set(0x202F, 4, parking);
+        bench.enable_in(3).set((0x202F, 4), parking);
         turns_under(&mut bench, torque_nm);
         bench.run_ms(500);
         let speed = bench.report().velocity_rpm;

@@ -94,16 +94,16 @@ fn one_sync_starts_both_drives_at_the_same_instant() {
 #[test]
 fn noise_costs_time_and_never_changes_a_value() {
     let mut bench = Bench::new();
-    bench.set(0x2010, 0, 1);
+    bench.set(0x2010, 1);
     let rows: Vec<_> = objects().into_iter().filter(|row| row.index >= 0x2000 && !row.live).collect();
-    let values = |bench: &mut Bench| -> Vec<i64> { rows.iter().map(|row| bench.get(row.index, row.sub)).collect() };
+    let values = |bench: &mut Bench| -> Vec<i64> { rows.iter().map(|row| bench.get((row.index, row.sub))).collect() };
     let mut expected = values(&mut bench);
     bench.world.set_corruption(Corruption::with_probability(0.05));
     for round in 0..10 {
         for (row, value) in rows.iter().zip(&mut expected) {
             if (0x2018..=0x2021).contains(&row.index) {
                 *value = round * 1111 + 7;
-                bench.set(row.index, row.sub, *value);
+                bench.set((row.index, row.sub), *value);
             }
         }
         assert_eq!(values(&mut bench), expected, "round {round}");
@@ -116,27 +116,24 @@ fn noise_costs_time_and_never_changes_a_value() {
 fn an_rpdo_arrives_once_or_later_but_never_twice_or_damaged_under_noise() {
     let mut bench = Bench::new();
     for (sub, value) in [(0, 0), (1, 0x60FF_0020), (0, 1)] {
-        bench.set(0x1601, sub, value);
+        bench.set((0x1601, sub), value);
     }
     bench.send("000#0104");
     bench.world.set_corruption(Corruption::with_probability(0.05));
     for target in 1..=200_i32 {
         let data = target.to_le_bytes().map(|byte| format!("{byte:02X}")).concat();
-        bench.send(&format!("304#{data}"));
-        bench.run_ms(2);
-        assert_eq!(bench.get(0x60FF, 0), i64::from(target));
+        bench.send(&format!("304#{data}")).run_ms(2).reads(0x60FF, i64::from(target));
     }
 }
 
 #[test]
 fn a_new_bit_rate_acts_after_a_restart_and_then_only_its_own_bus_hears_the_drive() {
     let mut bench = Bench::new();
-    bench.set(0x200E, 0, i64::from(RATE_250K));
-    assert_eq!(bench.get(0x200E, 0), i64::from(RATE_250K), "until the restart it talks at the old rate");
+    bench.set(0x200E, i64::from(RATE_250K));
+    assert_eq!(bench.get(0x200E), i64::from(RATE_250K), "until the restart it talks at the old rate");
     bench.let_store();
     bench.heard();
-    bench.power_cycle();
-    bench.run_ms(500);
+    bench.power_cycle().run_ms(500);
     assert_eq!(bench.heard(), [""; 0], "no boot-up on the old bus");
     assert_eq!(bench.sdo(&[0x40, 0, 0x10, 0, 0, 0, 0, 0]), None);
 
@@ -166,8 +163,8 @@ fn every_bit_rate_of_200eh_is_the_one_that_the_manual_lists() {
 #[test]
 fn a_new_node_id_acts_after_a_restart_and_moves_every_identifier_with_it() {
     let mut bench = Bench::new();
-    bench.set(0x200D, 0, 0x15);
-    assert_eq!(bench.get(0x200D, 0), 0x15, "until the restart it is the old node");
+    bench.set(0x200D, 0x15);
+    assert_eq!(bench.get(0x200D), 0x15, "until the restart it is the old node");
     bench.let_store();
     bench.heard();
     bench.power_cycle();
@@ -175,7 +172,7 @@ fn a_new_node_id_acts_after_a_restart_and_moves_every_identifier_with_it() {
     bench.node = 0x15;
     let moved = [(0x1200, 1, 0x615), (0x1200, 2, 0x595), (0x1014, 0, 0x95), (0x1400, 1, 0x215), (0x1803, 1, 0x495)];
     for (index, sub, identifier) in moved {
-        assert_eq!(bench.get(index, sub), identifier, "{index:04X}h:{sub:02X}");
+        assert_eq!(bench.get((index, sub)), identifier, "{index:04X}h:{sub:02X}");
     }
 }
 
@@ -200,15 +197,12 @@ fn the_dip_switch_goes_before_200dh() {
 #[test]
 fn a_cable_cut_in_motion_stops_the_motor_by_the_watch_over_the_host() {
     let mut bench = Bench::new();
-    bench.set(0x6060, 0, 3);
-    bench.set(0x6084, 0, 300);
-    bench.enable();
-    bench.set(0x60FF, 0, 60);
+    bench.set(0x6060, 3).set(0x6084, 300).enable().set(0x60FF, 60);
     for _ in 0..20 {
         bench.run_ms(100);
         bench.statusword();
     }
-    assert_within("speed", bench.report().velocity_rpm, 59.0, 61.0);
+    bench.turns_at(59.0, 61.0);
     let drive = bench.world.drive_id(NODE).expect("the drive");
     bench.world.cut(drive);
     bench.run_ms(990);
@@ -217,8 +211,7 @@ fn a_cable_cut_in_motion_stops_the_motor_by_the_watch_over_the_host() {
     assert_within("speed after 1490 ms", bench.report().velocity_rpm, -0.5, 0.5);
     bench.world.join(drive);
     bench.run_ms(50);
-    assert_eq!((bench.statusword() & 0xFF, bench.get(0x603F, 0), bench.get(0x60FF, 0)), (0x37, 0, 0));
-    bench.set(0x60FF, 0, 60);
-    bench.run_ms(700);
+    assert_eq!((bench.statusword() & 0xFF, bench.get(0x603F), bench.get(0x60FF)), (0x37, 0, 0));
+    bench.set(0x60FF, 60).run_ms(700);
     assert_within("speed with a new target", bench.report().velocity_rpm, 59.0, 61.0);
 }

@@ -17,21 +17,18 @@ const IN_PLACE_COUNTS: i64 = 30;
 
 fn ready() -> Bench {
     let mut bench = Bench::new();
-    bench.enable_in(1);
-    bench.set(0x6081, 0, 60);
+    bench.enable_in(1).set(0x6081, 60);
     bench
 }
 
 /// Target, then the edge of bit 4 as 4.2 and 4.3 write it: with the bit down and with the bit up.
 fn start(bench: &mut Bench, target: i64, bits: i64) {
-    bench.set(0x607A, 0, target);
-    bench.set(0x6040, 0, 0x0F | bits);
-    bench.set(0x6040, 0, 0x1F | bits);
+    bench.set(0x607A, target).set(0x6040, 0x0F | bits).set(0x6040, 0x1F | bits);
 }
 
 #[track_caller]
 fn assert_at(bench: &mut Bench, expected: i64) {
-    let position = bench.get(0x6064, 0);
+    let position = bench.get(0x6064);
     assert!((position - expected).abs() <= IN_PLACE_COUNTS, "at {position}, expected {expected}");
     let statusword = bench.statusword();
     assert_eq!(statusword & (REACHED | IN_PLACE), REACHED | IN_PLACE, "{statusword:04X}h");
@@ -88,8 +85,7 @@ fn a_move_keeps_to_the_speed_of_6081h_and_ends_without_overshoot() {
 #[test]
 fn a_move_begins_with_2008h_and_ends_from_6082h() {
     let mut bench = ready();
-    bench.set(0x2008, 0, 20);
-    bench.set(0x6082, 0, 10);
+    bench.set(0x2008, 20).set(0x6082, 10);
     start(&mut bench, 20_000, 0);
     let mut demands = Vec::new();
     for _ in 0..12_000 {
@@ -104,30 +100,24 @@ fn a_move_begins_with_2008h_and_ends_from_6082h() {
 #[test]
 fn nothing_moves_without_a_rising_bit_4() {
     let mut bench = ready();
-    bench.set(0x607A, 0, 4096);
-    bench.set(0x6040, 0, 0x0F);
-    bench.run_ms(500);
-    assert_eq!(bench.get(0x6064, 0), 0);
+    bench.set(0x607A, 4096).set(0x6040, 0x0F).run_ms(500).reads(0x6064, 0);
     start(&mut bench, 4096, 0);
     bench.run_ms(2500);
     assert_at(&mut bench, 4096);
     // Bit 4 is still up: a new target waits for its next edge.
-    bench.set(0x607A, 0, 0);
-    bench.set(0x6040, 0, 0x1F);
-    bench.run_ms(500);
+    bench.set(0x607A, 0).set(0x6040, 0x1F).run_ms(500);
     assert_at(&mut bench, 4096);
 }
 
 #[test]
 fn the_acknowledge_bit_rises_with_the_set_point_and_falls_with_bit_4() {
     let mut bench = ready();
-    assert_eq!(bench.statusword() & ACKNOWLEDGED, 0);
+    bench.shows(ACKNOWLEDGED, 0);
     start(&mut bench, 4096, 0);
-    assert_eq!(bench.statusword() & ACKNOWLEDGED, ACKNOWLEDGED);
+    bench.shows(ACKNOWLEDGED, ACKNOWLEDGED);
     bench.run_ms(200);
     assert_eq!(bench.statusword() & ACKNOWLEDGED, ACKNOWLEDGED, "bit 4 is still up");
-    bench.set(0x6040, 0, 0x0F);
-    assert_eq!(bench.statusword() & ACKNOWLEDGED, 0);
+    bench.set(0x6040, 0x0F).shows(ACKNOWLEDGED, 0);
 }
 
 #[test]
@@ -135,7 +125,7 @@ fn one_set_point_waits_for_the_end_of_the_other() {
     let mut bench = ready();
     start(&mut bench, 8192, 0);
     start(&mut bench, 4096, 0);
-    bench.set(0x6040, 0, 0x0F);
+    bench.set(0x6040, 0x0F);
     assert_eq!(bench.statusword() & ACKNOWLEDGED, ACKNOWLEDGED, "no room for a third");
     let way = bench.seconds_until(5.0, LOOK, |report| report.position >= 8192 - 2);
     assert_within("seconds to the first", way, duration_s(8192.0) - 0.05, duration_s(8192.0) + 0.05);
@@ -176,13 +166,10 @@ fn relative_moves_add_up_even_when_they_are_told_in_one_breath() {
 fn an_absolute_target_beyond_3fffffffh_is_refused_when_it_is_to_start_and_a_relative_one_is_not() {
     let mut bench = ready();
     for target in [0x4000_0000, -0x4000_0000] {
-        bench.set(0x607A, 0, target);
-        bench.set(0x6040, 0, 0x0F);
-        assert_eq!(bench.write(0x6040, 0, 0x1F), Err(0x0609_0030), "{target:X}h");
+        bench.set(0x607A, target).set(0x6040, 0x0F);
+        assert_eq!(bench.write(0x6040, 0x1F), Err(0x0609_0030), "{target:X}h");
     }
-    bench.set(0x6040, 0, 0x4F);
-    bench.set(0x6040, 0, 0x5F);
-    bench.run_ms(300);
+    bench.set(0x6040, 0x4F).set(0x6040, 0x5F).run_ms(300);
     assert!(bench.report().velocity_rpm < -20.0, "the relative move has begun");
 }
 
@@ -191,14 +178,13 @@ fn an_absolute_target_beyond_3fffffffh_is_refused_when_it_is_to_start_and_a_rela
 fn a_blocked_shaft_faults_with_0020h_when_the_lag_passes_2017h() {
     for (threshold, lag) in [(409, 4090.0), (200, 2000.0)] {
         let mut bench = ready();
-        bench.set(0x2017, 0, threshold);
-        bench.operate(|drive, now| drive.set_rotor_locked(true, now)).expect("a rotor");
+        bench.set(0x2017, threshold).set_rotor_locked(true);
         start(&mut bench, 40_000, 0);
         let (speed, edge) = (COUNTS_PER_TURN, COUNTS_PER_TURN / 60.0);
         let expected = 0.5 + (lag - 0.5 * (speed + edge) / 2.0) / speed;
         let seconds = bench.seconds_until(3.0, LOOK, |report| report.error_code != 0);
         assert_within("seconds to the fault", seconds, expected - 0.01, expected + 0.01);
-        assert_eq!((bench.get(0x603F, 0), bench.get(0x1001, 0)), (0x0020, 0x21), "drive profile and generic");
+        assert_eq!((bench.get(0x603F), bench.get(0x1001)), (0x0020, 0x21), "drive profile and generic");
     }
 }
 
@@ -207,13 +193,13 @@ fn clearing_with_2006h_moves_the_origin_of_absolute_moves() {
     let mut bench = ready();
     start(&mut bench, 4096, 0);
     bench.run_ms(2500);
-    bench.set(0x2006, 0, 1);
-    assert_within("6064h", bench.get(0x6064, 0) as f64, -2.0, 2.0);
+    bench.set(0x2006, 1);
+    assert_within("6064h", bench.get(0x6064) as f64, -2.0, 2.0);
     start(&mut bench, 2048, 0);
     bench.run_ms(2500);
     let turned = bench.report().shaft_angle_rad / core::f64::consts::TAU * COUNTS_PER_TURN;
     assert_within("counts from where it began", turned, 6144.0 - 60.0, 6144.0 + 60.0);
-    assert_within("6064h", bench.get(0x6064, 0) as f64, 2018.0, 2078.0);
+    assert_within("6064h", bench.get(0x6064) as f64, 2018.0, 2078.0);
 }
 
 /// 60F2h is absent, so its default holds: relative to the preceding target (CiA 402-2).

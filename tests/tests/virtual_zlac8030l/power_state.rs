@@ -23,7 +23,7 @@ fn every_event_in_every_state_leads_where_the_table_says() {
 fn the_drive_says_that_it_has_booted_and_is_in_switch_on_disabled() {
     let mut bench = Bench::new();
     assert_eq!(bench.heard(), ["704#00"]);
-    assert_eq!(bench.statusword() & 0x6F, 0x60);
+    bench.shows(0x6F, 0x60);
 }
 
 #[test]
@@ -40,7 +40,7 @@ fn the_statusword_of_each_state_has_bits_4_and_9_and_the_pattern_of_cia_402() {
     for mode in [0, 1, 3, 4] {
         for (state, pattern) in patterns {
             let mut bench = Bench::new();
-            bench.set(0x6060, 0, mode);
+            bench.set(0x6060, mode);
             bench.reach(state);
             bench.run_ms(50);
             let statusword = bench.statusword();
@@ -58,31 +58,25 @@ fn a_drive_that_has_just_booted_shows_0670h_as_the_recorded_one_does() {
 #[test]
 fn in_profile_velocity_bits_10_12_and_14_tell_reached_standing_and_running() {
     let mut bench = Bench::new();
-    bench.enable_in(3);
-    bench.run_ms(100);
+    bench.enable_in(3).run_ms(100);
     assert_eq!(bench.statusword() & MODE_BITS, REACHED | BIT_12, "at the target 0");
-    bench.set(0x60FF, 0, 100);
-    bench.run_ms(250);
+    bench.set(0x60FF, 100).run_ms(250);
     assert_eq!(bench.statusword() & MODE_BITS, RUNNING, "half way up the ramp");
     bench.run_ms(750);
     assert_eq!(bench.statusword() & MODE_BITS, REACHED | RUNNING, "at 100 r/min");
-    bench.set(0x60FF, 0, 0);
-    bench.run_ms(1000);
+    bench.set(0x60FF, 0).run_ms(1000);
     assert_eq!(bench.statusword() & MODE_BITS, REACHED | BIT_12, "stopped");
 }
 
 #[test]
 fn in_profile_position_bits_10_12_13_and_14_tell_reached_acknowledged_in_place_and_running() {
     let mut bench = Bench::new();
-    bench.enable_in(1);
-    bench.run_ms(100);
+    bench.enable_in(1).run_ms(100);
     assert_eq!(bench.statusword() & MODE_BITS, REACHED | IN_PLACE, "nothing to do");
-    bench.set(0x607A, 0, 4096);
-    bench.set(0x6040, 0, 0x1F);
+    bench.set(0x607A, 4096).set(0x6040, 0x1F);
     let taken = bench.statusword();
     assert_eq!(taken & (REACHED | BIT_12), BIT_12, "{taken:04X}h");
-    bench.set(0x6040, 0, 0x0F);
-    bench.run_ms(300);
+    bench.set(0x6040, 0x0F).run_ms(300);
     assert_eq!(bench.statusword() & (REACHED | BIT_12 | RUNNING), RUNNING, "under way, bit 4 is down");
     bench.run_ms(2000);
     assert_eq!(bench.statusword() & MODE_BITS, REACHED | IN_PLACE, "arrived");
@@ -91,16 +85,10 @@ fn in_profile_position_bits_10_12_13_and_14_tell_reached_acknowledged_in_place_a
 #[test]
 fn in_profile_torque_bits_10_and_14_tell_reached_and_running() {
     let mut bench = Bench::new();
-    bench.operate(|drive, now| drive.set_rotor_locked(true, now)).expect("a rotor");
-    bench.enable_in(4);
-    bench.set(0x6087, 0, 1000);
-    bench.set(0x6071, 0, 2000);
-    bench.run_ms(1000);
+    bench.set_rotor_locked(true).enable_in(4).set(0x6087, 1000).set(0x6071, 2000).run_ms(1000);
     assert_eq!(bench.statusword() & MODE_BITS, 0, "1 A of 2 A, a shaft that cannot turn");
-    bench.run_ms(1500);
-    assert_eq!(bench.statusword() & MODE_BITS, REACHED);
-    bench.operate(|drive, now| drive.set_rotor_locked(false, now)).expect("a rotor");
-    bench.run_ms(200);
+    bench.run_ms(1500).shows(MODE_BITS, REACHED);
+    bench.set_rotor_locked(false).run_ms(200);
     assert_eq!(bench.statusword() & MODE_BITS, REACHED | RUNNING);
 }
 
@@ -108,13 +96,10 @@ fn in_profile_torque_bits_10_and_14_tell_reached_and_running() {
 fn bit_15_tells_of_the_external_stop_whatever_the_mode() {
     for mode in [1, 3, 4] {
         let mut bench = Bench::new();
-        bench.enable_in(mode);
-        bench.operate(|drive, now| drive.set_input(0, true, now)).expect("there is X0");
-        bench.run_ms(20);
+        bench.enable_in(mode).set_input(0, true).run_ms(20);
         assert_eq!(bench.statusword() & 0x8000, 0x8000, "mode {mode}");
-        assert_eq!(bench.get(0x2003, 0), 1);
-        bench.operate(|drive, now| drive.set_input(0, false, now)).expect("there is X0");
-        bench.run_ms(20);
+        bench.reads(0x2003, 1);
+        bench.set_input(0, false).run_ms(20);
         assert_eq!(bench.statusword() & 0x8000, 0, "mode {mode}");
     }
 }
@@ -122,26 +107,21 @@ fn bit_15_tells_of_the_external_stop_whatever_the_mode() {
 #[test]
 fn a_fault_is_cleared_only_by_a_rising_bit_7_and_only_when_its_cause_is_gone() {
     let mut bench = Bench::in_state("switched_on");
-    bench.set_fault(true);
-    assert_eq!((bench.get(0x603F, 0), bench.get(0x1001, 0)), (0x0200, 0x81), "Hall error; generic and manufacturer");
-    bench.set(0x6040, 0, 0x80);
+    bench.break_down(true);
+    assert_eq!((bench.get(0x603F), bench.get(0x1001)), (0x0200, 0x81), "Hall error; generic and manufacturer");
+    bench.set(0x6040, 0x80);
     assert_eq!(bench.statusword() & 0xFF, 0x98, "the cause is still there");
-    bench.set_fault(false);
-    bench.set(0x6040, 0, 0x80);
+    bench.break_down(false).set(0x6040, 0x80);
     assert_eq!(bench.statusword() & 0xFF, 0x98, "bit 7 did not rise");
-    bench.set(0x6040, 0, 0x00);
-    bench.set(0x6040, 0, 0x80);
-    assert_eq!(bench.statusword() & 0xFF, 0x70);
-    assert_eq!((bench.get(0x603F, 0), bench.get(0x1001, 0)), (0, 0));
+    bench.set(0x6040, 0x00).set(0x6040, 0x80).shows(0xFF, 0x70);
+    assert_eq!((bench.get(0x603F), bench.get(0x1001)), (0, 0));
 }
 
 #[test]
 fn a_fault_and_its_end_are_told_by_emcy() {
     let mut bench = Bench::in_state("switch_on_disabled");
     bench.heard();
-    bench.set_fault(true);
-    bench.set_fault(false);
-    bench.set(0x6040, 0, 0x80);
+    bench.break_down(true).break_down(false).set(0x6040, 0x80);
     let told: Vec<_> = bench.heard().into_iter().filter(|frame| frame.starts_with("084#")).collect();
     assert_eq!(told, ["084#0002810000000000", "084#0000000000000000"]);
 }
@@ -149,9 +129,7 @@ fn a_fault_and_its_end_are_told_by_emcy() {
 #[test]
 fn a_slow_wheel_is_a_running_one() {
     let mut bench = Bench::new();
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 3);
-    bench.run_ms(2000);
+    bench.enable_in(3).set(0x60FF, 3).run_ms(2000);
     assert_eq!(bench.statusword() & (BIT_12 | RUNNING), RUNNING, "3 r/min is not 0 r/min");
-    assert_eq!(bench.get(0x2027, 0), 1);
+    bench.reads(0x2027, 1);
 }

@@ -62,21 +62,15 @@ fn recovers(bench: &mut Bench, seed: u64) {
         drive.set_load_inertia(0.0, now).unwrap_or_default();
         drive.set_input(0, false, now).unwrap_or_default();
     });
-    bench.set(0x6040, 0, 0);
-    bench.set(0x200F, 0, 0);
+    bench.set(0x6040, 0).set(0x200F, 0);
     // A wheel that the load drove fast has charged the bus, and only the electronics discharge it.
     let calm = |report: &sim::Report| report.velocity_rpm.abs() < 1.0 && report.supply_v < 60.0;
     bench.seconds_until(60.0, Duration::from_millis(100), calm);
-    bench.set(0x2009, 0, 1);
-    bench.let_store();
-    bench.power_cycle();
-    bench.run_ms(500);
+    bench.set(0x2009, 1).let_store().power_cycle().run_ms(500);
     for row in objects().iter().filter(|row| row.stored && !row.live) {
-        assert_eq!(Some(bench.get(row.index, row.sub)), row.default, "seed {seed}: {}", row.name);
+        assert_eq!(Some(bench.get((row.index, row.sub))), row.default, "seed {seed}: {}", row.name);
     }
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 60);
-    bench.run_ms(1500);
+    bench.enable_in(3).set(0x60FF, 60).run_ms(1500);
     assert_within(&format!("speed after seed {seed}"), bench.report().velocity_rpm, 59.0, 61.0);
 }
 
@@ -96,42 +90,30 @@ fn requests_sent_without_waiting_for_answers_are_all_answered_in_order() {
 #[test]
 fn a_speed_that_the_supply_cannot_give_is_no_fault_and_the_way_back_is_quick() {
     let mut bench = Bench::new();
-    bench.operate(|drive, now| drive.set_supply(24.0, now)).expect("a supply");
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 1000);
-    bench.run_ms(5000);
+    bench.set_supply(24.0).enable_in(3).set(0x60FF, 1000).run_ms(5000);
     assert_within("speed", bench.report().velocity_rpm, 240.0, wheel::no_load_rpm(24.0, 1.0));
-    bench.set(0x60FF, 0, 100);
+    bench.set(0x60FF, 100);
     // The demand comes down from 1000 in 500 ms; the wheel joins it on the way.
-    bench.run_ms(900);
-    assert_within("speed", bench.report().velocity_rpm, 95.0, 105.0);
-    assert_eq!(bench.get(0x603F, 0), 0);
+    bench.run_ms(900).turns_at(95.0, 105.0).reads(0x603F, 0);
 }
 
 #[test]
 fn times_of_zero_are_steps_at_the_current_limit_without_a_fault() {
     let mut bench = Bench::new();
     for index in [0x6083, 0x6084, 0x6085] {
-        bench.set(index, 0, 0);
+        bench.set(index, 0);
     }
     bench.enable_in(3);
     for target in [100, -100, 0] {
-        bench.set(0x60FF, 0, target);
-        bench.run_ms(400);
-        assert_within("speed", bench.report().velocity_rpm, target as f64 - 2.0, target as f64 + 2.0);
+        bench.set(0x60FF, target).run_ms(400).turns_at(target as f64 - 2.0, target as f64 + 2.0);
     }
-    assert_eq!(bench.get(0x603F, 0), 0);
+    bench.reads(0x603F, 0);
 }
 
 #[test]
 fn a_heavy_load_is_accelerated_at_the_current_limit_and_no_more() {
     let mut bench = Bench::new();
-    bench.operate(|drive, now| drive.set_load_inertia(1.0, now)).expect("a load");
-    bench.set(0x2015, 0, 100);
-    bench.set(0x6083, 0, 0);
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 60);
-    bench.run_ms(200);
+    bench.set_load_inertia(1.0).set(0x2015, 100).set(0x6083, 0).enable_in(3).set(0x60FF, 60).run_ms(200);
     let first = bench.report();
     assert_within("current", first.current_a, 9.8, 10.2);
     bench.run_ms(400);
@@ -143,36 +125,22 @@ fn a_heavy_load_is_accelerated_at_the_current_limit_and_no_more() {
 #[test]
 fn a_load_that_drives_the_motor_is_held_at_its_speed_and_feeds_the_bus_until_it_is_too_much() {
     let mut bench = Bench::new();
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 200);
-    bench.run_ms(1000);
-    bench.operate(|drive, now| drive.set_load_torque(-3.0, now)).expect("a load");
-    bench.run_ms(300);
-    assert_within("speed", bench.report().velocity_rpm, 195.0, 206.0);
+    bench.enable_in(3).set(0x60FF, 200).run_ms(1000);
+    bench.set_load_torque(-3.0).run_ms(300).turns_at(195.0, 206.0);
     assert!(bench.report().supply_v > 49.0, "{} V", bench.report().supply_v);
-    bench.run_ms(5000);
-    assert_eq!(bench.get(0x603F, 0), 0x0001);
+    bench.run_ms(5000).reads(0x603F, 0x0001);
 
     let mut bench = Bench::new();
-    bench.set(0x202E, 5, 1);
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 200);
-    bench.run_ms(1000);
-    bench.operate(|drive, now| drive.set_load_torque(-3.0, now)).expect("a load");
-    bench.run_ms(5000);
-    assert_eq!(bench.get(0x603F, 0), 0, "the bleeder takes it");
-    assert_within("speed", bench.report().velocity_rpm, 199.0, 201.0);
+    bench.set((0x202E, 5), 1).enable_in(3).set(0x60FF, 200).run_ms(1000);
+    bench.set_load_torque(-3.0).run_ms(5000);
+    assert_eq!(bench.get(0x603F), 0, "the bleeder takes it");
+    bench.turns_at(199.0, 201.0);
 }
 
 #[test]
 fn without_a_mode_an_enabled_drive_stands_whatever_its_targets_are() {
     let mut bench = Bench::new();
-    bench.enable_in(0);
-    bench.set(0x60FF, 0, 100);
-    bench.set(0x6071, 0, 1000);
-    bench.set(0x607A, 0, 4096);
-    bench.set(0x6040, 0, 0x1F);
-    bench.run_ms(1000);
+    bench.enable_in(0).set(0x60FF, 100).set(0x6071, 1000).set(0x607A, 4096).set(0x6040, 0x1F).run_ms(1000);
     assert_within("counts", bench.report().position as f64, -2.0, 2.0);
 }
 
@@ -180,18 +148,11 @@ fn without_a_mode_an_enabled_drive_stands_whatever_its_targets_are() {
 fn an_external_stop_that_is_active_lets_nothing_start_in_any_mode() {
     for mode in [1, 3, 4] {
         let mut bench = Bench::new();
-        bench.operate(|drive, now| drive.set_input(0, true, now)).expect("there is X0");
-        bench.run_ms(10);
-        bench.enable_in(mode);
-        bench.set(0x60FF, 0, 100);
-        bench.set(0x6071, 0, 2000);
-        bench.set(0x607A, 0, 8192);
-        bench.set(0x6040, 0, 0x1F);
-        bench.run_ms(2000);
+        bench.set_input(0, true).run_ms(10);
+        bench.enable_in(mode).set(0x60FF, 100).set(0x6071, 2000).set(0x607A, 8192).set(0x6040, 0x1F).run_ms(2000);
         assert_within(&format!("counts in mode {mode}"), bench.report().position as f64, -5.0, 5.0);
         // Nothing starts by itself when it ends.
-        bench.operate(|drive, now| drive.set_input(0, false, now)).expect("there is X0");
-        bench.run_ms(2000);
+        bench.set_input(0, false).run_ms(2000);
         assert_within(&format!("counts in mode {mode}"), bench.report().position as f64, -10.0, 10.0);
     }
 }
@@ -199,54 +160,33 @@ fn an_external_stop_that_is_active_lets_nothing_start_in_any_mode() {
 #[test]
 fn a_lower_limit_is_followed_in_motion() {
     let mut bench = Bench::new();
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 200);
-    bench.run_ms(1000);
-    bench.set(0x200A, 0, 80);
-    bench.run_ms(1000);
-    assert_within("speed", bench.report().velocity_rpm, 79.0, 81.0);
+    bench.enable_in(3).set(0x60FF, 200).run_ms(1000);
+    bench.set(0x200A, 80).run_ms(1000).turns_at(79.0, 81.0);
     let mut bench = Bench::new();
-    bench.set(0x200A, 0, 30);
-    bench.enable_in(1);
-    bench.set(0x607A, 0, 8192);
-    bench.set(0x6040, 0, 0x1F);
-    bench.run_ms(1500);
+    bench.set(0x200A, 30).enable_in(1).set(0x607A, 8192).set(0x6040, 0x1F).run_ms(1500);
     assert_within("speed of a move with 6081h = 120", bench.report().velocity_rpm, 29.0, 31.0);
 }
 
 #[test]
 fn a_current_limit_of_zero_moves_nothing_and_an_overload_watch_of_zero_is_off() {
     let mut bench = Bench::new();
-    bench.set(0x2015, 0, 0);
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 100);
-    bench.run_ms(1000);
-    assert_within("speed", bench.report().velocity_rpm, -0.1, 0.1);
-    assert_eq!(bench.get(0x603F, 0), 0);
+    bench.set(0x2015, 0).enable_in(3).set(0x60FF, 100).run_ms(1000).turns_at(-0.1, 0.1).reads(0x603F, 0);
 
     for (object, value) in [(0x2014, 0), (0x2012, 0), (0x2016, 0)] {
         let mut bench = Bench::new();
-        bench.operate(|drive, now| drive.set_rotor_locked(true, now)).expect("a rotor");
+        bench.set_rotor_locked(true);
         bench
             .operate(|drive, now| drive.hold_temperature(TemperatureSensor::Motor, Some(40.0), now))
             .expect("a sensor");
-        bench.set(object, 0, value);
-        bench.set(0x6087, 0, 0);
-        bench.enable_in(4);
-        bench.set(0x6071, 0, 30_000);
-        bench.run_ms(10_000);
-        assert_eq!(bench.get(0x603F, 0), 0, "{object:04X}h = {value}");
+        bench.set(object, value).set(0x6087, 0).enable_in(4).set(0x6071, 30_000).run_ms(10_000);
+        assert_eq!(bench.get(0x603F), 0, "{object:04X}h = {value}");
     }
 }
 
 #[test]
 fn a_brown_out_in_motion_restarts_the_drive_with_its_stored_values() {
     let mut bench = Bench::new();
-    bench.set(0x6060, 0, 3);
-    bench.set(0x2000, 0, 0);
-    bench.enable();
-    bench.set(0x60FF, 0, 200);
-    bench.run_ms(1000);
+    bench.set(0x6060, 3).set(0x2000, 0).enable().set(0x60FF, 200).run_ms(1000);
     bench.heard();
     bench.operate(|drive, now| drive.cut_power(now));
     bench.run_ms(3000);
@@ -254,8 +194,8 @@ fn a_brown_out_in_motion_restarts_the_drive_with_its_stored_values() {
     bench.operate(|drive, now| drive.set_power(true, now));
     bench.run_ms(100);
     assert_eq!(bench.heard().iter().filter(|frame| *frame == "704#00").count(), 1);
-    assert_eq!((bench.get(0x2000, 0), bench.get(0x6060, 0), bench.get(0x60FF, 0)), (0, 0, 0));
-    assert_eq!(bench.statusword() & 0x6F, 0x60);
+    assert_eq!((bench.get(0x2000), bench.get(0x6060), bench.get(0x60FF)), (0, 0, 0));
+    bench.shows(0x6F, 0x60);
 }
 
 #[test]
@@ -266,14 +206,12 @@ fn power_that_goes_at_any_moment_of_a_save_leaves_the_old_values_or_the_new_ones
 #[test]
 fn turning_by_hand_counts_in_every_state_and_raises_nothing() {
     let mut bench = Bench::new();
-    bench.operate(|drive, now| drive.set_load_torque(-0.3, now)).expect("a load");
-    bench.run_ms(500);
-    bench.operate(|drive, now| drive.set_load_torque(0.0, now)).expect("a load");
-    bench.run_ms(200);
+    bench.set_load_torque(-0.3).run_ms(500);
+    bench.set_load_torque(0.0).run_ms(200);
     let turned = bench.report().shaft_angle_rad / core::f64::consts::TAU * wheel::COUNTS_PER_TURN;
-    bench.operate(|drive, now| drive.set_rotor_locked(true, now)).expect("a rotor");
-    let position = bench.get(0x6064, 0) as f64;
+    bench.set_rotor_locked(true);
+    let position = bench.get(0x6064) as f64;
     assert_within("6064h", position, turned - 2.0, turned + 2.0);
     assert!(turned > 500.0);
-    assert_eq!(bench.get(0x603F, 0), 0);
+    bench.reads(0x603F, 0);
 }

@@ -15,11 +15,7 @@ pub(crate) fn turning() -> Bench {
 
 /// The same with this drive.
 pub(crate) fn brought_to_speed(mut bench: Bench) -> Bench {
-    bench.set(0x6084, 0, 400);
-    bench.set(0x6085, 0, 100);
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, RPM as i64);
-    bench.run_ms(1500);
+    bench.set(0x6084, 400).set(0x6085, 100).enable_in(3).set(0x60FF, RPM as i64).run_ms(1500);
     bench
 }
 
@@ -60,13 +56,11 @@ pub(crate) enum Ramp {
 fn quick_stop_ramps_as_605ah_says_and_holds_the_shaft() {
     for (option, ramp) in [(5, Ramp::Time(0.4)), (6, Ramp::Time(0.1)), (7, Ramp::CurrentLimit)] {
         let mut bench = turning();
-        bench.set(0x605A, 0, option);
-        bench.set(0x6040, 0, 0x02);
+        bench.set(0x605A, option).set(0x6040, 0x02);
         assert_stops(&mut bench, ramp);
         assert_eq!(bench.statusword() & 0xFF, 0x17, "the drive stays in quick stop active");
         let held = bench.report().position;
-        bench.operate(|drive, now| drive.set_load_torque(3.0, now)).expect("a load");
-        bench.run_ms(2000);
+        bench.set_load_torque(3.0).run_ms(2000);
         assert_within("the motor holds", (bench.report().position - held) as f64, -30.0, 30.0);
     }
 }
@@ -74,59 +68,42 @@ fn quick_stop_ramps_as_605ah_says_and_holds_the_shaft() {
 #[test]
 fn enabling_again_after_a_quick_stop_goes_on_with_the_target() {
     let mut bench = turning();
-    bench.set(0x6040, 0, 0x02);
-    bench.run_ms(600);
-    bench.set(0x6040, 0, 0x0F);
-    bench.run_ms(800);
-    assert_eq!(bench.statusword() & 0xFF, 0x37);
-    assert_within("speed", bench.report().velocity_rpm, RPM - 1.0, RPM + 1.0);
+    bench.set(0x6040, 0x02).run_ms(600);
+    bench.set(0x6040, 0x0F).run_ms(800).shows(0xFF, 0x37).turns_at(RPM - 1.0, RPM + 1.0);
 }
 
 #[test]
 fn halt_ramps_as_605dh_says_stays_enabled_and_goes_on_when_it_ends() {
     for (option, ramp) in [(1, Ramp::Time(0.4)), (2, Ramp::Time(0.1)), (3, Ramp::CurrentLimit)] {
         let mut bench = turning();
-        bench.set(0x605D, 0, option);
-        bench.set(0x6040, 0, 0x10F);
+        bench.set(0x605D, option).set(0x6040, 0x10F);
         assert_stops(&mut bench, ramp);
         let statusword = bench.statusword();
         assert_eq!((statusword & 0xFF, statusword & 0x0400), (0x37, 0x0400), "standing under halt is reached");
-        bench.set(0x6040, 0, 0x0F);
-        bench.run_ms(800);
-        assert_within("speed", bench.report().velocity_rpm, RPM - 1.0, RPM + 1.0);
+        bench.set(0x6040, 0x0F).run_ms(800).turns_at(RPM - 1.0, RPM + 1.0);
     }
 }
 
 #[test]
 fn a_halted_position_move_goes_on_to_its_target() {
     let mut bench = Bench::new();
-    bench.enable_in(1);
-    bench.set(0x607A, 0, 16_384);
-    bench.set(0x6040, 0, 0x1F);
-    bench.run_ms(1000);
-    bench.set(0x6040, 0, 0x11F);
-    bench.run_ms(1000);
+    bench.enable_in(1).set(0x607A, 16_384).set(0x6040, 0x1F).run_ms(1000);
+    bench.set(0x6040, 0x11F).run_ms(1000);
     let halted = bench.report();
     assert!(halted.velocity_rpm.abs() < 0.5 && (2000..15_000).contains(&halted.position), "{halted:?}");
     bench.run_ms(1000);
     assert_within("the shaft stays", (bench.report().position - halted.position) as f64, -5.0, 5.0);
-    bench.set(0x6040, 0, 0x1F);
-    bench.run_ms(4000);
+    bench.set(0x6040, 0x1F).run_ms(4000);
     assert_within("position", bench.report().position as f64, 16_354.0, 16_414.0);
 }
 
 #[test]
 fn a_set_point_given_under_halt_waits_for_its_end() {
     let mut bench = Bench::new();
-    bench.enable_in(1);
-    bench.set(0x6040, 0, 0x10F);
-    bench.set(0x607A, 0, 8192);
-    bench.set(0x6040, 0, 0x11F);
-    bench.run_ms(1000);
+    bench.enable_in(1).set(0x6040, 0x10F).set(0x607A, 8192).set(0x6040, 0x11F).run_ms(1000);
     assert_within("the shaft stays", bench.report().position as f64, -5.0, 5.0);
     assert_ne!(bench.statusword() & 0x1000, 0, "the set-point is acknowledged");
-    bench.set(0x6040, 0, 0x0F);
-    bench.run_ms(4000);
+    bench.set(0x6040, 0x0F).run_ms(4000);
     assert_within("position", bench.report().position as f64, 8162.0, 8222.0);
 }
 
@@ -134,16 +111,14 @@ fn a_set_point_given_under_halt_waits_for_its_end() {
 fn shutdown_and_disable_operation_ramp_first_or_switch_off_at_once_as_605bh_and_605ch_say() {
     for (object, controlword, low_byte) in [(0x605B, 0x06, 0x31), (0x605C, 0x07, 0x33)] {
         let mut bench = turning();
-        bench.set(0x6040, 0, controlword);
-        bench.run_ms(100);
+        bench.set(0x6040, controlword).run_ms(100);
         assert_eq!(bench.statusword() & 0xFF, 0x37, "still ramping down");
         let (seconds, _) = stop_of(&mut bench);
         assert_within("seconds left of the ramp of 400 ms", seconds, 0.2, 0.35);
         assert_eq!(bench.statusword() & 0xFF, low_byte);
 
         let mut bench = turning();
-        bench.set(object, 0, 0);
-        bench.set(0x6040, 0, controlword);
+        bench.set(object, 0).set(0x6040, controlword);
         assert_eq!(bench.statusword() & 0xFF, low_byte, "at once");
         assert_coasts(&mut bench);
     }
@@ -152,8 +127,7 @@ fn shutdown_and_disable_operation_ramp_first_or_switch_off_at_once_as_605bh_and_
 #[test]
 fn controlword_0_lets_the_motor_coast() {
     let mut bench = turning();
-    bench.set(0x6040, 0, 0);
-    assert_eq!(bench.statusword() & 0xFF, 0x70);
+    bench.set(0x6040, 0).shows(0xFF, 0x70);
     assert_coasts(&mut bench);
 }
 
@@ -168,31 +142,26 @@ pub(crate) fn assert_coasts(bench: &mut Bench) {
 #[test]
 fn only_an_input_with_function_9_stops_and_2030_01_turns_its_level_over() {
     let mut bench = turning();
-    bench.operate(|drive, now| drive.set_input(1, true, now)).expect("there is X1");
-    bench.run_ms(500);
+    bench.set_input(1, true).run_ms(500);
     assert_within("X1 has function 0", bench.report().velocity_rpm, RPM - 1.0, RPM + 1.0);
-    bench.set(0x2030, 3, 9);
-    bench.run_ms(800);
+    bench.set((0x2030, 3), 9).run_ms(800);
     assert_within("X1 has function 9", bench.report().velocity_rpm, -0.5, 0.5);
 
     let mut bench = turning();
-    bench.set(0x2030, 1, 1);
-    bench.run_ms(800);
+    bench.set((0x2030, 1), 1).run_ms(800);
     assert_within("X0 is active low and not connected", bench.report().velocity_rpm, -0.5, 0.5);
 }
 
 #[test]
 fn a_silent_host_stops_the_motor_after_2000h_and_leaves_it_enabled_without_a_fault() {
     let mut bench = turning();
-    bench.set(0x2000, 0, 500);
-    bench.run_ms(490);
+    bench.set(0x2000, 500).run_ms(490);
     assert_within("just before", bench.report().velocity_rpm, RPM - 1.0, RPM + 1.0);
     bench.run_ms(20);
     assert_stops(&mut bench, Ramp::Time(0.4));
-    assert_eq!((bench.statusword() & 0xFF, bench.get(0x603F, 0), bench.get(0x60FF, 0)), (0x37, 0, 0));
-    bench.set(0x60FF, 0, 60);
-    bench.run_ms(400);
-    let again = bench.get(0x606C, 0);
+    assert_eq!((bench.statusword() & 0xFF, bench.get(0x603F), bench.get(0x60FF)), (0x37, 0, 0));
+    bench.set(0x60FF, 60).run_ms(400);
+    let again = bench.get(0x606C);
     assert!(again > 100, "a new target is followed: {again}");
 }
 
@@ -208,8 +177,7 @@ fn data_to_the_node_keeps_the_watch_quiet_and_what_goes_on_without_a_host_does_n
         ("77F#05", "heartbeat of a master", false),
     ] {
         let mut bench = turning();
-        bench.send("000#0104");
-        bench.set(0x2000, 0, 300);
+        bench.send("000#0104").set(0x2000, 300);
         for _ in 0..10 {
             bench.run_ms(150);
             bench.send(frame);
@@ -221,12 +189,12 @@ fn data_to_the_node_keeps_the_watch_quiet_and_what_goes_on_without_a_host_does_n
 #[test]
 fn with_l083_sync_a_sync_keeps_the_watch_quiet_too_and_its_end_stops_the_motor() {
     let mut bench = brought_to_speed(Bench::choosing("L083", "sync"));
-    bench.set(0x2000, 0, 300);
+    bench.set(0x2000, 300);
     for _ in 0..10 {
         bench.run_ms(150);
         bench.send("080#");
     }
-    assert_within("speed", bench.report().velocity_rpm, RPM - 1.0, RPM + 1.0);
+    bench.turns_at(RPM - 1.0, RPM + 1.0);
     bench.run_ms(300);
     assert_stops(&mut bench, Ramp::Time(0.4));
 }
@@ -234,10 +202,7 @@ fn with_l083_sync_a_sync_keeps_the_watch_quiet_too_and_its_end_stops_the_motor()
 #[test]
 fn the_watch_is_on_as_delivered_with_1000_ms() {
     let mut bench = Bench::new();
-    bench.set(0x6060, 0, 3);
-    bench.enable();
-    bench.set(0x60FF, 0, 60);
-    bench.run_ms(990);
+    bench.set(0x6060, 3).enable().set(0x60FF, 60).run_ms(990);
     assert!(bench.report().velocity_rpm > 59.0);
     let stopped = bench.seconds_until(2.0, LOOK, |report| report.velocity_rpm < 1.0);
     assert_within("seconds to stand, 10 ms and a ramp of 500 ms", stopped, 0.40, 0.55);
@@ -246,50 +211,30 @@ fn the_watch_is_on_as_delivered_with_1000_ms() {
 #[test]
 fn a_silent_host_stops_the_motor_with_the_ramp_of_605ah_in_each_mode() {
     let mut bench = turning();
-    bench.set(0x605A, 0, 6);
-    bench.set(0x2000, 0, 300);
-    bench.run_ms(299);
+    bench.set(0x605A, 6).set(0x2000, 300).run_ms(299);
     assert_stops(&mut bench, Ramp::Time(0.1));
 
     let mut bench = Bench::new();
-    bench.set(0x605A, 0, 6);
-    bench.set(0x6085, 0, 100);
-    bench.enable_in(1);
-    bench.set(0x2000, 0, 1000);
-    bench.set(0x607A, 0, 100_000);
-    bench.set(0x6040, 0, 0x1F);
+    bench.set(0x605A, 6).set(0x6085, 100).enable_in(1).set(0x2000, 1000).set(0x607A, 100_000).set(0x6040, 0x1F);
     bench.run_ms(980);
     assert_within("speed of the move", bench.report().velocity_rpm, 118.0, 122.0);
-    bench.run_ms(300);
-    assert_within("speed", bench.report().velocity_rpm, -1.0, 1.0);
+    bench.run_ms(300).turns_at(-1.0, 1.0);
     let stands = bench.report().position;
-    bench.set(0x2000, 0, 0);
-    bench.run_ms(1000);
+    bench.set(0x2000, 0).run_ms(1000);
     assert_within("the move is over", (bench.report().position - stands) as f64, -30.0, 30.0);
 
     let mut bench = Bench::new();
-    bench.set(0x6087, 0, 0);
-    bench.enable_in(4);
-    bench.set(0x2000, 0, 500);
-    bench.set(0x6071, 0, 1000);
-    bench.run_ms(400);
+    bench.set(0x6087, 0).enable_in(4).set(0x2000, 500).set(0x6071, 1000).run_ms(400);
     assert!(bench.report().velocity_rpm > 100.0);
-    bench.run_ms(1500);
-    assert_within("speed", bench.report().velocity_rpm, -1.0, 1.0);
-    assert_eq!((bench.get(0x6071, 0), bench.statusword() & 0xFF), (0, 0x37));
+    bench.run_ms(1500).turns_at(-1.0, 1.0);
+    assert_eq!((bench.get(0x6071), bench.statusword() & 0xFF), (0, 0x37));
 }
 
 #[test]
 fn a_shutdown_ends_even_when_a_load_never_lets_the_motor_stand() {
     let mut bench = turning();
-    bench.set(0x202E, 5, 1);
-    bench.set(0x2015, 0, 20);
-    bench.operate(|drive, now| drive.set_load_inertia(0.3, now)).expect("a load");
-    bench.operate(|drive, now| drive.set_load_torque(-2.0, now)).expect("a load");
-    bench.set(0x6040, 0, 0x06);
-    bench.run_ms(300);
+    bench.set((0x202E, 5), 1).set(0x2015, 20).set_load_inertia(0.3).set_load_torque(-2.0).set(0x6040, 0x06).run_ms(300);
     assert_eq!(bench.statusword() & 0xFF, 0x37, "on the ramp");
-    bench.run_ms(1700);
-    assert_eq!(bench.statusword() & 0xFF, 0x31);
+    bench.run_ms(1700).shows(0xFF, 0x31);
     assert!(bench.report().velocity_rpm > 60.0, "1.5 N m of the motor against 2 N m");
 }

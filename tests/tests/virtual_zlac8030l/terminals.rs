@@ -9,13 +9,12 @@ const Y1: usize = 1;
 
 fn output(bench: &mut Bench, number: usize) -> bool {
     let level = bench.report().outputs.bits >> number & 1 == 1;
-    assert_eq!(bench.get(0x2004, 0) >> number & 1 == 1, level, "2004h shows what the terminal has");
+    assert_eq!(bench.get(0x2004) >> number & 1 == 1, level, "2004h shows what the terminal has");
     level
 }
 
 fn break_hall(bench: &mut Bench, broken: bool) {
-    bench.operate(|drive, now| drive.set_fault(Component::Hall, broken, now)).expect("Hall sensors");
-    bench.run_ms(50);
+    bench.set_fault(Component::Hall, broken).run_ms(50);
 }
 
 #[test]
@@ -25,35 +24,27 @@ fn y0_as_delivered_tells_of_an_alarm() {
     break_hall(&mut bench, true);
     assert!(output(&mut bench, Y0));
     break_hall(&mut bench, false);
-    bench.set(0x6040, 0, 0x80);
-    bench.run_ms(5);
+    bench.set(0x6040, 0x80).run_ms(5);
     assert!(!output(&mut bench, Y0));
 }
 
 #[test]
 fn an_output_with_function_2_tells_that_the_drive_is_enabled() {
     let mut bench = Bench::new();
-    bench.set(0x2030, 0x0F, 2);
-    bench.run_ms(5);
+    bench.set((0x2030, 0x0F), 2).run_ms(5);
     assert!(!output(&mut bench, Y1));
-    bench.enable_in(3);
-    bench.run_ms(5);
+    bench.enable_in(3).run_ms(5);
     assert!(output(&mut bench, Y1));
-    bench.set(0x6040, 0, 0);
-    bench.run_ms(5);
+    bench.set(0x6040, 0).run_ms(5);
     assert!(!output(&mut bench, Y1));
 }
 
 #[test]
 fn an_output_with_function_4_tells_that_the_target_is_reached() {
     let mut bench = Bench::new();
-    bench.set(0x2030, 0x0D, 4);
-    bench.enable_in(1);
-    bench.run_ms(5);
+    bench.set((0x2030, 0x0D), 4).enable_in(1).run_ms(5);
     assert!(output(&mut bench, Y0));
-    bench.set(0x607A, 0, 4096);
-    bench.set(0x6040, 0, 0x1F);
-    bench.run_ms(300);
+    bench.set(0x607A, 4096).set(0x6040, 0x1F).run_ms(300);
     assert!(!output(&mut bench, Y0));
     bench.run_ms(2000);
     assert!(output(&mut bench, Y0));
@@ -64,16 +55,12 @@ fn functions_0_and_3_leave_an_output_alone_and_2030_0c_turns_levels_over() {
     let mut bench = Bench::new();
     break_hall(&mut bench, true);
     for function in [0, 3] {
-        bench.set(0x2030, 0x0D, function);
-        bench.run_ms(5);
+        bench.set((0x2030, 0x0D), function).run_ms(5);
         assert!(!output(&mut bench, Y0), "function {function}");
     }
-    bench.set(0x2030, 0x0D, 1);
-    bench.set(0x2030, 0x0C, 1);
-    bench.run_ms(5);
+    bench.set((0x2030, 0x0D), 1).set((0x2030, 0x0C), 1).run_ms(5);
     assert!(!output(&mut bench, Y0), "an alarm, turned over");
-    bench.set(0x2030, 0x0C, 2);
-    bench.run_ms(5);
+    bench.set((0x2030, 0x0C), 2).run_ms(5);
     assert!(output(&mut bench, Y0) && output(&mut bench, Y1));
 }
 
@@ -81,9 +68,7 @@ fn functions_0_and_3_leave_an_output_alone_and_2030_0c_turns_levels_over() {
 fn input_levels_show_in_2003h() {
     let mut bench = Bench::new();
     for (input, level, shown) in [(1, true, 2), (0, true, 3), (1, false, 1), (0, false, 0)] {
-        bench.operate(|drive, now| drive.set_input(input, level, now)).expect("an input");
-        bench.run_ms(11);
-        assert_eq!(bench.get(0x2003, 0), shown);
+        bench.set_input(input, level).run_ms(11).reads(0x2003, shown);
     }
 }
 
@@ -92,29 +77,26 @@ fn input_levels_show_in_2003h() {
 fn a_pulse_of_10_ms_at_an_input_is_not_seen_and_one_of_11_ms_is() {
     for (ms, seen) in [(1, 0), (10, 0), (11, 1)] {
         let mut bench = Bench::new();
-        bench.operate(|drive, now| drive.set_input(0, true, now)).expect("there is X0");
-        bench.run_ms(ms);
+        bench.set_input(0, true).run_ms(ms);
         let shown = bench.operate(|drive, now| {
             drive.set_input(0, false, now).expect("there is X0");
             drive.report().statusword.expect("it has power")
         });
         assert_eq!(shown >> 15, seen, "{ms} ms");
         bench.run_ms(2);
-        assert_eq!(bench.get(0x2003, 0), i64::from(seen), "{ms} ms, as long again as it was on");
+        assert_eq!(bench.get(0x2003), i64::from(seen), "{ms} ms, as long again as it was on");
     }
 }
 
 #[test]
 fn the_hall_sensors_pass_their_six_states_in_one_electrical_turn_and_read_0_or_7_when_broken() {
     let mut bench = Bench::new();
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 10);
-    bench.run_ms(1000);
+    bench.enable_in(3).set(0x60FF, 10).run_ms(1000);
     // 10 r/min and 15 pole pairs: an electrical turn takes 0.4 s, a state 67 ms.
     let mut states = Vec::new();
     for _ in 0..80 {
         bench.run_ms(5);
-        let state = bench.get(0x2028, 0);
+        let state = bench.get(0x2028);
         if states.last() != Some(&state) {
             states.push(state);
         }
@@ -128,20 +110,15 @@ fn the_hall_sensors_pass_their_six_states_in_one_electrical_turn_and_read_0_or_7
         assert_eq!((pair[0] ^ pair[1]).count_ones(), 1, "one sensor changes at a time: {states:?}");
     }
     break_hall(&mut bench, true);
-    assert!([0, 7].contains(&bench.get(0x2028, 0)));
+    assert!([0, 7].contains(&bench.get(0x2028)));
 }
 
 #[test]
 fn the_motor_status_register_tells_whether_it_turns() {
     let mut bench = Bench::new();
-    assert_eq!(bench.get(0x2027, 0), 0);
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 30);
-    bench.run_ms(800);
-    assert_eq!(bench.get(0x2027, 0), 1);
-    bench.set(0x60FF, 0, 0);
-    bench.run_ms(1200);
-    assert_eq!(bench.get(0x2027, 0), 0);
+    bench.reads(0x2027, 0);
+    bench.enable_in(3).set(0x60FF, 30).run_ms(800).reads(0x2027, 1);
+    bench.set(0x60FF, 0).run_ms(1200).reads(0x2027, 0);
 }
 
 #[test]
@@ -149,17 +126,14 @@ fn two_faults_show_together_and_the_last_one_to_go_ends_the_fault() {
     let mut bench = Bench::new();
     bench.heard();
     break_hall(&mut bench, true);
-    bench.operate(|drive, now| drive.set_fault(Component::Reference, true, now)).expect("a reference");
-    bench.run_ms(50);
-    assert_eq!((bench.get(0x603F, 0), bench.get(0x1001, 0)), (0x0280, 0x81));
+    bench.set_fault(Component::Reference, true).run_ms(50);
+    assert_eq!((bench.get(0x603F), bench.get(0x1001)), (0x0280, 0x81));
     break_hall(&mut bench, false);
-    bench.set(0x6040, 0, 0x80);
-    assert_eq!((bench.get(0x603F, 0), bench.statusword() & 0xFF), (0x0080, 0x98));
-    bench.operate(|drive, now| drive.set_fault(Component::Reference, false, now)).expect("a reference");
-    bench.run_ms(50);
-    bench.set(0x6040, 0, 0x00);
-    bench.set(0x6040, 0, 0x80);
-    assert_eq!((bench.get(0x603F, 0), bench.statusword() & 0xFF), (0, 0x70));
+    bench.set(0x6040, 0x80);
+    assert_eq!((bench.get(0x603F), bench.statusword() & 0xFF), (0x0080, 0x98));
+    bench.set_fault(Component::Reference, false).run_ms(50);
+    bench.set(0x6040, 0x00).set(0x6040, 0x80);
+    assert_eq!((bench.get(0x603F), bench.statusword() & 0xFF), (0, 0x70));
     let told: Vec<_> = bench.heard().into_iter().filter(|frame| frame.starts_with("084#")).collect();
     assert_eq!(told, ["084#0002810000000000", "084#8000810000000000", "084#0000000000000000"]);
 }
@@ -168,12 +142,9 @@ fn two_faults_show_together_and_the_last_one_to_go_ends_the_fault() {
 fn the_in_place_threshold_of_2002h_decides_on_bits_10_and_13() {
     for (threshold, in_place) in [(2, false), (200, true)] {
         let mut bench = Bench::new();
-        bench.set(0x2002, 0, threshold);
-        bench.enable_in(1);
-        bench.run_ms(100);
+        bench.set(0x2002, threshold).enable_in(1).run_ms(100);
         // A push that the position loop gives way to by some tens of counts at first.
-        bench.operate(|drive, now| drive.set_load_torque(3.0, now)).expect("a load");
-        bench.run_ms(40);
+        bench.set_load_torque(3.0).run_ms(40);
         let statusword = bench.statusword();
         let off = bench.report().position.abs();
         assert!((3..200).contains(&off), "{off} counts off");

@@ -12,15 +12,12 @@ const LOOK: Duration = Duration::from_millis(1);
 /// The shaft has turned before, so that the drive knows its angle by a Hall edge.
 fn stalled(slope_ma_s: i64) -> Bench {
     let mut bench = Bench::open();
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 30);
-    bench.run_ms(1000);
-    bench.set(0x60FF, 0, 0);
-    bench.run_ms(1000);
-    bench.set(0x6060, 0, 4);
+    bench.enable_in(3).set(0x60FF, 30).run_ms(1000);
+    bench.set(0x60FF, 0).run_ms(1000);
+    bench.set(0x6060, 4);
     bench.motor().rig.load.locked = true;
-    bench.set(0x6087, 0, slope_ma_s);
-    assert_eq!((bench.get(0x6061, 0), bench.statusword() & 0xFF), (4, 0x37));
+    bench.set(0x6087, slope_ma_s);
+    assert_eq!((bench.get(0x6061), bench.statusword() & 0xFF), (4, 0x37));
     bench
 }
 
@@ -32,10 +29,9 @@ fn current_a(bench: &mut Bench) -> f64 {
 fn the_example_of_4_4_pulls_with_plus_and_minus_1000_ma() {
     let mut bench = stalled(10_000);
     for target in [1000, -1000] {
-        bench.set(0x6071, 0, target);
-        bench.run_ms(500);
-        assert_eq!(bench.get(0x6077, 0), target / 100, "6077h in 0.1 A");
-        assert_eq!(bench.get(0x6074, 0), target, "6074h in mA");
+        bench.set(0x6071, target).run_ms(500);
+        assert_eq!(bench.get(0x6077), target / 100, "6077h in 0.1 A");
+        assert_eq!(bench.get(0x6074), target, "6074h in mA");
         // The shaft's torque is 3/2 p psi a peak ampere.
         let expected_nm = target as f64 * 1e-3 * wheel::torque_per_a();
         assert_within("torque in N m", bench.motor().torque_nm, expected_nm - 0.02, expected_nm + 0.02);
@@ -46,10 +42,9 @@ fn the_example_of_4_4_pulls_with_plus_and_minus_1000_ma() {
 fn the_current_rises_with_the_slope_of_6087h() {
     for (slope_ma_s, from) in [(300, "the manual"), (2000, "a host")] {
         let mut bench = stalled(slope_ma_s);
-        bench.set(0x6071, 0, 6000);
-        bench.run_ms(1999);
+        bench.set(0x6071, 6000).run_ms(1999);
         let expected_ma = 2.0 * slope_ma_s as f64;
-        let demand_ma = bench.get(0x6074, 0) as f64;
+        let demand_ma = bench.get(0x6074) as f64;
         assert_within(&format!("6074h with the slope of {from}"), demand_ma, expected_ma - 5.0, expected_ma + 5.0);
         assert_within("current in A", current_a(&mut bench) * 1e3, expected_ma - 25.0, expected_ma + 25.0);
     }
@@ -59,19 +54,15 @@ fn the_current_rises_with_the_slope_of_6087h() {
 fn the_slope_as_delivered_is_300_ma_a_second() {
     let mut bench = Bench::open();
     bench.motor().rig.load.locked = true;
-    bench.enable_in(4);
-    bench.set(0x6071, 0, 3000);
-    bench.run_ms(1000);
-    assert_within("6074h after 1 s", bench.get(0x6074, 0) as f64, 295.0, 305.0);
+    bench.enable_in(4).set(0x6071, 3000).run_ms(1000);
+    assert_within("6074h after 1 s", bench.get(0x6074) as f64, 295.0, 305.0);
 }
 
 #[test]
 fn a_stalled_motor_carries_the_current_that_is_asked_for_but_no_more_than_2015h() {
     for (limit, expected_a) in [(300, 20.0), (150, 15.0), (50, 5.0)] {
         let mut bench = stalled(0);
-        bench.set(0x2015, 0, limit);
-        bench.set(0x6071, 0, 20_000);
-        bench.run_ms(300);
+        bench.set(0x2015, limit).set(0x6071, 20_000).run_ms(300);
         assert_within("stall current", current_a(&mut bench), expected_a * 0.99, expected_a * 1.01);
         let torque_nm = bench.motor().torque_nm;
         let expected_nm = expected_a * wheel::torque_per_a();
@@ -84,10 +75,7 @@ fn a_stalled_motor_carries_the_current_that_is_asked_for_but_no_more_than_2015h(
 fn before_the_shaft_has_turned_a_sixth_of_its_torque_may_be_missing() {
     let mut bench = Bench::open();
     bench.motor().rig.load.locked = true;
-    bench.set(0x6087, 0, 0);
-    bench.enable_in(4);
-    bench.set(0x6071, 0, 10_000);
-    bench.run_ms(300);
+    bench.set(0x6087, 0).enable_in(4).set(0x6071, 10_000).run_ms(300);
     let full_nm = 10.0 * wheel::torque_per_a();
     assert_within("torque", bench.motor().torque_nm, full_nm * 30_f64.to_radians().cos() * 0.99, full_nm * 1.01);
 }
@@ -96,8 +84,7 @@ fn before_the_shaft_has_turned_a_sixth_of_its_torque_may_be_missing() {
 #[test]
 fn a_stalled_motor_draws_only_what_its_resistance_turns_into_heat() {
     let mut bench = stalled(0);
-    bench.set(0x6071, 0, 10_000);
-    bench.run_ms(200);
+    bench.set(0x6071, 10_000).run_ms(200);
     let before = bench.motor().rig.energy;
     bench.run_ms(1000);
     let after = bench.motor().rig.energy;
@@ -113,14 +100,11 @@ fn a_stalled_motor_draws_only_what_its_resistance_turns_into_heat() {
 fn with_overload_handling_on_the_motor_bears_its_multiples_as_long_as_the_note_says() {
     for (multiple, expected_s) in [(1.0, 20.0), (2.0, 6.0), (3.0, 4.0)] {
         let mut bench = stalled(0);
-        bench.set(0x202F, 2, 1);
-        bench.set(0x2014, 0, 50);
-        bench.set(0x2012, 0, 100);
-        bench.set(0x2016, 0, 2000);
-        bench.set(0x6071, 0, (multiple * 5000.0) as i64);
+        bench.set((0x202F, 2), 1).set(0x2014, 50).set(0x2012, 100).set(0x2016, 2000);
+        bench.set(0x6071, (multiple * 5000.0) as i64);
         let seconds = bench.seconds_until(30.0, LOOK, |report| report.error_code != 0);
         assert_within(&format!("{multiple} times"), seconds, expected_s * 0.97, expected_s * 1.03);
-        assert_eq!((bench.get(0x603F, 0), bench.get(0x1001, 0)), (0x0008, 0x03), "overload: generic and current");
+        assert_eq!((bench.get(0x603F), bench.get(0x1001)), (0x0008, 0x03), "overload: generic and current");
     }
 }
 
@@ -128,9 +112,7 @@ fn with_overload_handling_on_the_motor_bears_its_multiples_as_long_as_the_note_s
 fn as_delivered_twice_the_rated_current_lasts_for_2016h() {
     for (time, expected_s) in [(300, 3.0), (100, 1.0)] {
         let mut bench = stalled(0);
-        bench.set(0x2014, 0, 80);
-        bench.set(0x2016, 0, time);
-        bench.set(0x6071, 0, 16_000);
+        bench.set(0x2014, 80).set(0x2016, time).set(0x6071, 16_000);
         let seconds = bench.seconds_until(5.0, LOOK, |report| report.error_code != 0);
         assert_within("seconds", seconds, expected_s * 0.98, expected_s + 0.05);
     }
@@ -142,30 +124,22 @@ fn as_delivered_less_than_the_overload_factor_lasts_longer_and_the_rated_current
     // 2012h = 200 %: 3 s of 2016h at twice the rated current, where the note has 6 s, so half of the note's times.
     for (current_ma, expected_s) in [(7500, 6.5), (9500, 3.7), (10_000, 3.0), (20_000, 3.0)] {
         let mut bench = stalled(0);
-        bench.set(0x2014, 0, 50);
-        bench.set(0x6071, 0, current_ma);
+        bench.set(0x2014, 50).set(0x6071, current_ma);
         let seconds = bench.seconds_until(15.0, LOOK, |report| report.error_code != 0);
         assert_within(&format!("{current_ma} mA of 5 A"), seconds, expected_s * 0.98, expected_s * 1.02 + 0.02);
-        assert_eq!(bench.get(0x603F, 0), 0x0008);
+        bench.reads(0x603F, 0x0008);
     }
     let mut bench = stalled(0);
-    bench.set(0x2014, 0, 50);
-    bench.set(0x6071, 0, 5000);
-    bench.run_ms(60_000);
-    assert_eq!(bench.get(0x603F, 0), 0, "the rated current");
+    bench.set(0x2014, 50).set(0x6071, 5000).run_ms(60_000);
+    assert_eq!(bench.get(0x603F), 0, "the rated current");
 }
 
 #[test]
 fn with_l101_factor_less_than_the_overload_factor_is_borne_for_ever() {
     for (current_ma, code) in [(9500, 0), (10_000, 0x0008)] {
         let mut bench = Bench::choosing("L101", "factor");
-        bench.set(0x2014, 0, 50);
-        bench.set(0x6087, 0, 0);
-        bench.operate(|drive, now| drive.set_rotor_locked(true, now)).expect("a rotor");
-        bench.enable_in(4);
-        bench.set(0x6071, 0, current_ma);
-        bench.run_ms(20_000);
-        assert_eq!(bench.get(0x603F, 0), code, "{current_ma} mA of 5 A with a factor of 200 %");
+        bench.set(0x2014, 50).set(0x6087, 0).set_rotor_locked(true).enable_in(4).set(0x6071, current_ma).run_ms(20_000);
+        assert_eq!(bench.get(0x603F), code, "{current_ma} mA of 5 A with a factor of 200 %");
     }
 }
 
@@ -174,10 +148,10 @@ fn with_l101_factor_less_than_the_overload_factor_is_borne_for_ever() {
 fn as_delivered_the_overload_ends_a_stall_long_before_the_winding_is_at_its_limit() {
     for current_a in [16_i32, 20, 25, 29] {
         let mut bench = stalled(0);
-        bench.set(0x6071, 0, i64::from(current_a) * 1000);
+        bench.set(0x6071, i64::from(current_a) * 1000);
         bench.seconds_until(60.0, Duration::from_millis(10), |report| report.error_code != 0);
-        assert_eq!(bench.get(0x603F, 0), 0x0008, "{current_a} A");
-        assert_within("winding in degC, of 80", bench.get(0x2026, 1) as f64 * 0.1, 25.0, 40.0);
+        assert_eq!(bench.get(0x603F), 0x0008, "{current_a} A");
+        assert_within("winding in degC, of 80", bench.get((0x2026, 1)) as f64 * 0.1, 25.0, 40.0);
     }
 }
 
@@ -185,27 +159,21 @@ fn as_delivered_the_overload_ends_a_stall_long_before_the_winding_is_at_its_limi
 #[test]
 fn what_6077h_shows_is_what_flows_up_to_the_60_a_of_2015h() {
     let mut bench = stalled(0);
-    bench.set(0x2014, 0, 300);
-    bench.set(0x6060, 0, 3);
-    bench.set(0x60FF, 0, 1000);
+    bench.set(0x2014, 300).set(0x6060, 3).set(0x60FF, 1000);
     for (limit, shown, demand_ma) in [(300, 300, 30_000), (200, 200, 20_000), (600, 600, 32_767)] {
-        bench.set(0x2015, 0, limit);
-        bench.run_ms(200);
+        bench.set(0x2015, limit).run_ms(200);
         assert_within("current in A", current_a(&mut bench), shown as f64 * 0.0995, shown as f64 * 0.1005);
-        assert_within("6077h in 0.1 A", bench.get(0x6077, 0) as f64, shown as f64 - 2.0, shown as f64 + 2.0);
-        assert_eq!(bench.get(0x6074, 0), demand_ma, "6074h in mA");
+        assert_within("6077h in 0.1 A", bench.get(0x6077) as f64, shown as f64 - 2.0, shown as f64 + 2.0);
+        assert_eq!(bench.get(0x6074), demand_ma, "6074h in mA");
     }
 }
 
 #[test]
 fn parking_holds_the_current_to_3_a_and_its_end_gives_it_back() {
     let mut bench = stalled(0);
-    bench.set(0x6071, 0, 8000);
-    bench.set(0x202F, 4, 1);
-    bench.run_ms(200);
+    bench.set(0x6071, 8000).set((0x202F, 4), 1).run_ms(200);
     assert_within("parked", current_a(&mut bench), 2.9, 3.05);
-    bench.set(0x202F, 4, 0);
-    bench.run_ms(200);
+    bench.set((0x202F, 4), 0).run_ms(200);
     assert_within("not parked", current_a(&mut bench), 7.9, 8.1);
 }
 
@@ -213,10 +181,7 @@ fn parking_holds_the_current_to_3_a_and_its_end_gives_it_back() {
 fn a_free_wheel_in_torque_mode_accelerates_with_torque_over_inertia() {
     let mut bench = Bench::open();
     bench.motor().rig.load.inertia_kg_m2 = 0.05;
-    bench.set(0x6087, 0, 0);
-    bench.enable_in(4);
-    bench.set(0x6071, 0, 2000);
-    bench.run_ms(100);
+    bench.set(0x6087, 0).enable_in(4).set(0x6071, 2000).run_ms(100);
     let first = bench.motor().rotor.velocity_rad_s;
     bench.run_ms(200);
     let gained = bench.motor().rotor.velocity_rad_s - first;
@@ -228,41 +193,25 @@ fn a_free_wheel_in_torque_mode_accelerates_with_torque_over_inertia() {
 #[test]
 fn in_torque_mode_the_speed_stays_below_200ah() {
     let mut bench = Bench::new();
-    bench.set(0x200A, 0, 60);
-    bench.set(0x6087, 0, 0);
-    bench.enable_in(4);
-    bench.set(0x6071, 0, 5000);
-    bench.run_ms(3000);
-    assert_within("speed", bench.report().velocity_rpm, 50.0, 61.0);
+    bench.set(0x200A, 60).set(0x6087, 0).enable_in(4).set(0x6071, 5000).run_ms(3000).turns_at(50.0, 61.0);
 }
 
 #[test]
 fn a_rest_between_overloads_gives_their_time_back() {
     let mut bench = stalled(0);
-    bench.set(0x202F, 2, 1);
-    bench.set(0x2014, 0, 50);
-    bench.set(0x2012, 0, 100);
-    bench.set(0x2016, 0, 2000);
+    bench.set((0x202F, 2), 1).set(0x2014, 50).set(0x2012, 100).set(0x2016, 2000);
     for _ in 0..4 {
-        bench.set(0x6071, 0, 10_000);
-        bench.run_ms(5000);
-        bench.set(0x6071, 0, 0);
-        bench.run_ms(20_000);
-        assert_eq!(bench.get(0x603F, 0), 0, "5 s of the 6 s, then a rest");
+        bench.set(0x6071, 10_000).run_ms(5000);
+        bench.set(0x6071, 0).run_ms(20_000);
+        assert_eq!(bench.get(0x603F), 0, "5 s of the 6 s, then a rest");
     }
-    bench.set(0x6071, 0, 10_000);
-    bench.run_ms(6500);
-    assert_eq!(bench.get(0x603F, 0), 0x0008);
+    bench.set(0x6071, 10_000).run_ms(6500).reads(0x603F, 0x0008);
 }
 
 #[test]
 fn the_times_of_the_note_scale_with_2016h() {
     let mut bench = stalled(0);
-    bench.set(0x202F, 2, 1);
-    bench.set(0x2014, 0, 50);
-    bench.set(0x2012, 0, 100);
-    bench.set(0x2016, 0, 1000);
-    bench.set(0x6071, 0, 10_000);
+    bench.set((0x202F, 2), 1).set(0x2014, 50).set(0x2012, 100).set(0x2016, 1000).set(0x6071, 10_000);
     let seconds = bench.seconds_until(10.0, LOOK, |report| report.error_code != 0);
     assert_within("seconds of half of 6 s", seconds, 2.9, 3.1);
 }

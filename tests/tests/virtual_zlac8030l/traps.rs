@@ -7,15 +7,10 @@ use crate::bench::{Bench, assert_within};
 #[test]
 fn a_mode_asked_for_in_motion_takes_effect_at_standstill() {
     let mut bench = Bench::new();
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 100);
-    bench.run_ms(800);
-    bench.set(0x6060, 0, 1);
-    bench.run_ms(100);
-    assert_eq!((bench.get(0x6060, 0), bench.get(0x6061, 0)), (1, 3));
-    bench.set(0x60FF, 0, 0);
-    bench.run_ms(800);
-    assert_eq!(bench.get(0x6061, 0), 1);
+    bench.enable_in(3).set(0x60FF, 100).run_ms(800);
+    bench.set(0x6060, 1).run_ms(100);
+    assert_eq!((bench.get(0x6060), bench.get(0x6061)), (1, 3));
+    bench.set(0x60FF, 0).run_ms(800).reads(0x6061, 1);
     let stands = bench.report().position;
     bench.run_ms(1000);
     assert_within("counts", (bench.report().position - stands) as f64, -5.0, 5.0);
@@ -24,36 +19,23 @@ fn a_mode_asked_for_in_motion_takes_effect_at_standstill() {
 #[test]
 fn halt_set_during_a_mode_change_ends_without_a_jump() {
     let mut bench = Bench::new();
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 100);
-    bench.run_ms(800);
-    bench.set(0x6040, 0, 0x10F);
-    bench.set(0x6060, 0, 1);
-    bench.set(0x607A, 0, 0);
-    bench.run_ms(1000);
-    assert_eq!(bench.get(0x6061, 0), 1, "it stands under halt, so the mode has changed");
+    bench.enable_in(3).set(0x60FF, 100).run_ms(800);
+    bench.set(0x6040, 0x10F).set(0x6060, 1).set(0x607A, 0).run_ms(1000);
+    assert_eq!(bench.get(0x6061), 1, "it stands under halt, so the mode has changed");
     let stands = bench.report().position;
-    bench.set(0x6040, 0, 0x0F);
-    bench.run_ms(1000);
+    bench.set(0x6040, 0x0F).run_ms(1000);
     assert_within("counts after the halt", (bench.report().position - stands) as f64, -30.0, 30.0);
-    bench.set(0x6040, 0, 0x1F);
-    bench.run_ms(5000);
+    bench.set(0x6040, 0x1F).run_ms(5000);
     assert_within("position after the set-point", bench.report().position as f64, -30.0, 30.0);
 }
 
 #[test]
 fn a_move_left_behind_by_a_mode_change_under_halt_does_not_come_back() {
     let mut bench = Bench::new();
-    bench.enable_in(1);
-    bench.set(0x607A, 0, 40_000);
-    bench.set(0x6040, 0, 0x1F);
-    bench.run_ms(800);
-    bench.set(0x6040, 0, 0x10F);
-    bench.run_ms(1000);
-    bench.set(0x6060, 0, 3);
-    bench.set(0x6040, 0, 0x0F);
-    bench.run_ms(1000);
-    bench.set(0x6060, 0, 1);
+    bench.enable_in(1).set(0x607A, 40_000).set(0x6040, 0x1F).run_ms(800);
+    bench.set(0x6040, 0x10F).run_ms(1000);
+    bench.set(0x6060, 3).set(0x6040, 0x0F).run_ms(1000);
+    bench.set(0x6060, 1);
     let stands = bench.report().position;
     assert!(stands < 10_000);
     bench.run_ms(2000);
@@ -66,22 +48,15 @@ fn a_move_ended_by_quick_stop_fault_or_disabling_does_not_go_on_when_enabled_aga
         [("quick stop", &[0x02, 0x0F][..]), ("disabled", &[0x00, 0x06, 0x07, 0x0F]), ("fault", &[])]
     {
         let mut bench = Bench::new();
-        bench.enable_in(1);
-        bench.set(0x607A, 0, 40_000);
-        bench.set(0x6040, 0, 0x1F);
-        bench.run_ms(800);
+        bench.enable_in(1).set(0x607A, 40_000).set(0x6040, 0x1F).run_ms(800);
         if name == "fault" {
-            bench.operate(|drive, now| drive.set_fault(Component::Hall, true, now)).expect("Hall sensors");
-            bench.run_ms(3000);
-            bench.operate(|drive, now| drive.set_fault(Component::Hall, false, now)).expect("Hall sensors");
-            bench.run_ms(50);
-            bench.set(0x6040, 0, 0x80);
-            assert_eq!(bench.get(0x603F, 0), 0);
+            bench.set_fault(Component::Hall, true).run_ms(3000);
+            bench.set_fault(Component::Hall, false).run_ms(50);
+            bench.set(0x6040, 0x80).reads(0x603F, 0);
             bench.enable();
         }
         for controlword in controlwords {
-            bench.set(0x6040, 0, *controlword);
-            bench.run_ms(2500);
+            bench.set(0x6040, *controlword).run_ms(2500);
         }
         let stands = bench.report();
         assert!(stands.position < 15_000 && stands.velocity_rpm.abs() < 1.0, "{name}: {stands:?}");
@@ -89,10 +64,7 @@ fn a_move_ended_by_quick_stop_fault_or_disabling_does_not_go_on_when_enabled_aga
         assert_within(name, (bench.report().position - stands.position) as f64, -30.0, 30.0);
         assert_eq!(bench.statusword() & 0x6F, 0x27, "{name}: enabled");
         // A relative move counts from where it stands now.
-        bench.set(0x607A, 0, 4096);
-        bench.set(0x6040, 0, 0x4F);
-        bench.set(0x6040, 0, 0x5F);
-        bench.run_ms(2500);
+        bench.set(0x607A, 4096).set(0x6040, 0x4F).set(0x6040, 0x5F).run_ms(2500);
         assert_within(name, (bench.report().position - stands.position) as f64, 4066.0, 4126.0);
     }
 }
@@ -100,14 +72,8 @@ fn a_move_ended_by_quick_stop_fault_or_disabling_does_not_go_on_when_enabled_aga
 #[test]
 fn a_new_target_or_speed_in_a_move_waits_for_the_next_set_point() {
     let mut bench = Bench::new();
-    bench.enable_in(1);
-    bench.set(0x607A, 0, 12_288);
-    bench.set(0x6040, 0, 0x1F);
-    bench.run_ms(800);
-    bench.set(0x607A, 0, -5000);
-    bench.set(0x6081, 0, 10);
-    bench.run_ms(400);
-    assert_within("speed", bench.report().velocity_rpm, 118.0, 122.0);
+    bench.enable_in(1).set(0x607A, 12_288).set(0x6040, 0x1F).run_ms(800);
+    bench.set(0x607A, -5000).set(0x6081, 10).run_ms(400).turns_at(118.0, 122.0);
     bench.run_ms(2000);
     assert_within("position", bench.report().position as f64, 12_258.0, 12_318.0);
 }
@@ -115,10 +81,9 @@ fn a_new_target_or_speed_in_a_move_waits_for_the_next_set_point() {
 #[test]
 fn controlword_and_set_point_may_come_in_one_rpdo() {
     let mut bench = Bench::new();
-    bench.set(0x2000, 0, 0);
-    bench.set(0x6060, 0, 1);
+    bench.set(0x2000, 0).set(0x6060, 1);
     for (sub, value) in [(0, 0), (1, 0x607A_0020), (2, 0x6040_0010), (0, 2)] {
-        bench.set(0x1600, sub, value);
+        bench.set((0x1600, sub), value);
     }
     bench.send("000#0104");
     for frame in ["204#000000000600", "204#000000000700", "204#000000000F00", "204#001000001F00"] {
@@ -132,29 +97,22 @@ fn controlword_and_set_point_may_come_in_one_rpdo() {
 fn enabling_a_turning_wheel_catches_it_without_a_fault() {
     for mode in [1, 3, 4] {
         let mut bench = Bench::new();
-        bench.set(0x2000, 0, 0);
-        bench.set(0x6060, 0, mode);
-        bench.operate(|drive, now| drive.set_load_torque(-1.0, now)).expect("a load");
-        bench.run_ms(150);
-        bench.operate(|drive, now| drive.set_load_torque(0.0, now)).expect("a load");
+        bench.set(0x2000, 0).set(0x6060, mode).set_load_torque(-1.0).run_ms(150);
+        bench.set_load_torque(0.0);
         assert!(bench.report().velocity_rpm > 50.0);
-        bench.enable();
-        bench.run_ms(3000);
-        assert_eq!((bench.get(0x603F, 0), bench.statusword() & 0x6F), (0, 0x27), "mode {mode}");
-        assert_within("speed", bench.report().velocity_rpm, -0.5, 0.5);
+        bench.enable().run_ms(3000);
+        assert_eq!((bench.get(0x603F), bench.statusword() & 0x6F), (0, 0x27), "mode {mode}");
+        bench.turns_at(-0.5, 0.5);
     }
 }
 
 #[test]
 fn lines_and_direction_changed_while_enabled_wait_until_the_motor_is_free() {
     let mut bench = Bench::new();
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 60);
-    bench.run_ms(1000);
-    bench.set(0x2001, 0, 1);
-    bench.run_ms(1000);
+    bench.enable_in(3).set(0x60FF, 60).run_ms(1000);
+    bench.set(0x2001, 1).run_ms(1000);
     assert_within("speed", bench.report().velocity_rpm.abs(), 59.0, 61.0);
-    assert_eq!(bench.get(0x603F, 0), 0);
+    bench.reads(0x603F, 0);
     let turned = bench.report().shaft_angle_rad;
     bench.run_ms(500);
     assert!(bench.report().shaft_angle_rad > turned, "still the old way");
@@ -163,31 +121,24 @@ fn lines_and_direction_changed_while_enabled_wait_until_the_motor_is_free() {
 #[test]
 fn an_eeprom_that_cannot_be_written_is_told_and_factory_settings_mend_it() {
     let mut bench = Bench::new();
-    bench.operate(|drive, now| drive.set_fault(Component::Eeprom, true, now)).expect("an EEPROM");
-    bench.run_ms(20);
-    assert_eq!((bench.get(0x603F, 0), bench.get(0x1001, 0)), (0x0100, 0x81));
-    bench.operate(|drive, now| drive.set_fault(Component::Eeprom, false, now)).expect("an EEPROM");
-    bench.run_ms(5);
-    bench.set(0x2009, 0, 1);
-    bench.run_ms(20);
-    assert_eq!((bench.get(0x603F, 0), bench.statusword() & 0xFF), (0, 0x70));
+    bench.set_fault(Component::Eeprom, true).run_ms(20);
+    assert_eq!((bench.get(0x603F), bench.get(0x1001)), (0x0100, 0x81));
+    bench.set_fault(Component::Eeprom, false).run_ms(5);
+    bench.set(0x2009, 1).run_ms(20);
+    assert_eq!((bench.get(0x603F), bench.statusword() & 0xFF), (0, 0x70));
 }
 
 #[test]
 fn each_broken_part_has_its_fault_code() {
     for (component, code) in [(Component::Hall, 0x0200), (Component::Reference, 0x0080), (Component::Eeprom, 0x0100)] {
         let mut bench = Bench::new();
-        bench.operate(|drive, now| drive.set_fault(component, true, now)).expect("a component");
-        bench.run_ms(50);
-        assert_eq!(bench.get(0x603F, 0), code, "{component:?}");
+        bench.set_fault(component, true).run_ms(50);
+        assert_eq!(bench.get(0x603F), code, "{component:?}");
     }
     for (component, code) in [(Component::Encoder, 0x1000), (Component::Phase, 0x0004)] {
         let mut bench = Bench::new();
-        bench.enable_in(3);
-        bench.operate(|drive, now| drive.set_fault(component, true, now)).expect("a component");
-        bench.set(0x60FF, 0, 60);
-        bench.run_ms(2500);
-        let found = bench.get(0x603F, 0);
+        bench.enable_in(3).set_fault(component, true).set(0x60FF, 60).run_ms(2500);
+        let found = bench.get(0x603F);
         assert!(found & code != 0, "{component:?}: {found:04X}h");
     }
 }
@@ -195,16 +146,10 @@ fn each_broken_part_has_its_fault_code() {
 #[test]
 fn a_quick_stop_in_a_move_ramps_down_and_the_move_is_over() {
     let mut bench = Bench::new();
-    bench.set(0x605A, 0, 6);
-    bench.set(0x6085, 0, 200);
-    bench.enable_in(1);
-    bench.set(0x607A, 0, 40_000);
-    bench.set(0x6040, 0, 0x1F);
-    bench.run_ms(1500);
+    bench.set(0x605A, 6).set(0x6085, 200).enable_in(1).set(0x607A, 40_000).set(0x6040, 0x1F).run_ms(1500);
     let before = bench.report();
     assert_within("speed", before.velocity_rpm, 118.0, 122.0);
-    bench.set(0x6040, 0, 0x02);
-    bench.run_ms(600);
+    bench.set(0x6040, 0x02).run_ms(600);
     // 120 r/min to rest in 200 ms: 0.2 turns.
     assert_within("counts", (bench.report().position - before.position) as f64, 780.0, 900.0);
     assert_eq!(bench.statusword() & 0x04FF, 0x0417, "it stands: reached");

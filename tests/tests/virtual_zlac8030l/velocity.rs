@@ -10,9 +10,7 @@ const LOOK: Duration = Duration::from_millis(1);
 /// Enabled in profile velocity with ramp times in ms.
 fn ready(acceleration_ms: i64, deceleration_ms: i64) -> Bench {
     let mut bench = Bench::new();
-    bench.set(0x6083, 0, acceleration_ms);
-    bench.set(0x6084, 0, deceleration_ms);
-    bench.enable_in(3);
+    bench.set(0x6083, acceleration_ms).set(0x6084, deceleration_ms).enable_in(3);
     bench
 }
 
@@ -24,13 +22,13 @@ fn rpm(bench: &mut Bench) -> f64 {
 fn the_example_of_4_1_runs_at_the_speeds_that_it_sets() {
     let mut bench = ready(500, 500);
     for target in [100, -100, 50, -50] {
-        bench.set(0x60FF, 0, target);
+        bench.set(0x60FF, target);
         // Down to zero and up again: two ramps of 500 ms.
         bench.run_ms(1300);
         assert_within("speed in r/min", rpm(&mut bench), target as f64 - 1.0, target as f64 + 1.0);
         assert_within(
             "606Ch in 0.1 r/min",
-            bench.get(0x606C, 0) as f64,
+            bench.get(0x606C) as f64,
             target as f64 * 10.0 - 10.0,
             target as f64 * 10.0 + 10.0,
         );
@@ -41,7 +39,7 @@ fn the_example_of_4_1_runs_at_the_speeds_that_it_sets() {
 #[test]
 fn an_acceleration_is_an_s_that_takes_the_time_of_6083h() {
     let mut bench = ready(1000, 500);
-    bench.set(0x60FF, 0, 200);
+    bench.set(0x60FF, 200);
     // Velocity control lags a few ms behind the plan: 5 ms of the steepest slope, 400 r/min/s, is 2 r/min.
     for (ms, share) in [(250, 1.0 / 8.0), (250, 0.5), (250, 7.0 / 8.0)] {
         bench.run_ms(ms);
@@ -56,9 +54,8 @@ fn an_acceleration_is_an_s_that_takes_the_time_of_6083h() {
 #[test]
 fn a_deceleration_is_an_s_that_takes_the_time_of_6084h() {
     let mut bench = ready(100, 800);
-    bench.set(0x60FF, 0, 200);
-    bench.run_ms(1000);
-    bench.set(0x60FF, 0, 0);
+    bench.set(0x60FF, 200).run_ms(1000);
+    bench.set(0x60FF, 0);
     for (ms, share) in [(200, 7.0 / 8.0), (200, 0.5), (200, 1.0 / 8.0)] {
         bench.run_ms(ms);
         assert_within("speed on the S", rpm(&mut bench), 200.0 * share - 2.5, 200.0 * share + 5.0);
@@ -71,9 +68,7 @@ fn a_deceleration_is_an_s_that_takes_the_time_of_6084h() {
 fn a_motion_from_rest_begins_with_the_initial_speed_of_2008h() {
     for initial in [1, 30] {
         let mut bench = ready(2000, 500);
-        bench.set(0x2008, 0, initial);
-        bench.set(0x60FF, 0, 200);
-        bench.run_ms(50);
+        bench.set(0x2008, initial).set(0x60FF, 200).run_ms(50);
         // The S itself has covered 2 (50 / 2000)^2 of the way to 200 r/min: 0.25 r/min.
         assert_within("speed after 50 ms", rpm(&mut bench), initial as f64 - 3.0, initial as f64 + 3.0);
     }
@@ -82,10 +77,9 @@ fn a_motion_from_rest_begins_with_the_initial_speed_of_2008h() {
 #[test]
 fn no_target_is_followed_beyond_the_maximum_speed_of_200ah() {
     let mut bench = ready(200, 200);
-    bench.set(0x200A, 0, 50);
+    bench.set(0x200A, 50);
     for target in [300, -300] {
-        bench.set(0x60FF, 0, target);
-        bench.run_ms(1000);
+        bench.set(0x60FF, target).run_ms(1000);
         let limit = 50.0 * (target as f64).signum();
         assert_within("speed", rpm(&mut bench), limit - 1.0, limit + 1.0);
     }
@@ -95,66 +89,53 @@ fn no_target_is_followed_beyond_the_maximum_speed_of_200ah() {
 fn a_resolution_of_10_or_5_makes_the_target_finer_after_it_was_saved_and_the_drive_restarted() {
     for (resolution, expected_rpm) in [(1, 100.0), (5, 20.0), (10, 10.0)] {
         let mut bench = ready(200, 200);
-        bench.set(0x202F, 5, resolution);
-        bench.set(0x2009, 0, 2);
-        bench.set(0x60FF, 0, 100);
-        bench.run_ms(600);
+        bench.set((0x202F, 5), resolution).set(0x2009, 2).set(0x60FF, 100).run_ms(600);
         assert_within("speed before the restart", rpm(&mut bench), 99.0, 101.0);
         bench.power_cycle();
-        bench.enable_in(3);
-        bench.set(0x60FF, 0, 100);
-        bench.run_ms(1500);
+        bench.enable_in(3).set(0x60FF, 100).run_ms(1500);
         assert_within("speed after the restart", rpm(&mut bench), expected_rpm - 0.5, expected_rpm + 0.5);
         // 606Ch stays in 0.1 r/min.
-        assert_within("606Ch", bench.get(0x606C, 0) as f64, expected_rpm * 10.0 - 5.0, expected_rpm * 10.0 + 5.0);
+        assert_within("606Ch", bench.get(0x606C) as f64, expected_rpm * 10.0 - 5.0, expected_rpm * 10.0 + 5.0);
     }
 }
 
 #[test]
 fn the_range_of_60ffh_grows_with_the_resolution_so_that_1000_rpm_stay_in_reach() {
     let mut bench = Bench::new();
-    assert_eq!(bench.write(0x60FF, 0, 1001), Err(0x0609_0031));
-    bench.set(0x202F, 5, 10);
-    bench.power_cycle();
-    bench.set(0x60FF, 0, 10_000);
-    assert_eq!(bench.write(0x60FF, 0, 10_001), Err(0x0609_0031));
-    assert_eq!(bench.write(0x60FF, 0, -10_001), Err(0x0609_0032));
+    assert_eq!(bench.write(0x60FF, 1001), Err(0x0609_0031));
+    bench.set((0x202F, 5), 10).power_cycle();
+    bench.set(0x60FF, 10_000);
+    assert_eq!(bench.write(0x60FF, 10_001), Err(0x0609_0031));
+    assert_eq!(bench.write(0x60FF, -10_001), Err(0x0609_0032));
 }
 
 /// 5.3: a resolution is in effect after a restart, and so is the range that it gives.
 #[test]
 fn a_resolution_that_waits_for_its_restart_does_not_widen_the_range_of_60ffh() {
     let mut bench = Bench::new();
-    bench.set(0x202F, 5, 10);
-    assert_eq!(bench.write(0x60FF, 0, 1001), Err(0x0609_0031));
-    bench.let_store();
-    bench.power_cycle();
-    bench.set(0x60FF, 0, 1001);
-    bench.set(0x202F, 5, 1);
-    bench.set(0x60FF, 0, 5000);
-    bench.send("000#8104");
-    bench.run_ms(10);
-    assert_eq!(bench.write(0x60FF, 0, 1001), Err(0x0609_0031), "after NMT reset node too");
+    bench.set((0x202F, 5), 10);
+    assert_eq!(bench.write(0x60FF, 1001), Err(0x0609_0031));
+    bench.let_store().power_cycle();
+    bench.set(0x60FF, 1001).set((0x202F, 5), 1).set(0x60FF, 5000).send("000#8104").run_ms(10);
+    assert_eq!(bench.write(0x60FF, 1001), Err(0x0609_0031), "after NMT reset node too");
 }
 
 /// 7.1: bit 12 says that the speed is 0, bit 14 that the motor runs.
 #[test]
 fn bits_12_and_14_are_never_both_set_however_slowly_the_motor_turns() {
     let mut bench = Bench::new();
-    bench.set(0x202F, 5, 10);
-    bench.let_store();
-    bench.power_cycle();
+    bench.set((0x202F, 5), 10).let_store().power_cycle();
     bench.enable_in(3);
     // 0.5 r/min, then faster, to rest, and back through rest.
     for target in [5, 300, 0, -5, 5, 0] {
-        bench.set(0x60FF, 0, target);
+        bench.set(0x60FF, target);
         for _ in 0..700 {
             bench.run_ms(2);
             let statusword = bench.statusword();
             assert!(matches!(statusword & 0x5000, 0x1000 | 0x4000), "{statusword:04X}h at {target}");
         }
         assert_eq!(bench.statusword() & 0x5000, if target == 0 { 0x1000 } else { 0x4000 }, "target {target}");
-        assert_eq!(bench.get(0x2027, 0), i64::from(target != 0), "2027h");
+        assert_eq!(bench.get(0x2027), i64::from(target != 0), "2027h");
     }
 }
 
@@ -162,11 +143,8 @@ fn bits_12_and_14_are_never_both_set_however_slowly_the_motor_turns() {
 fn direction_2001h_turns_the_shaft_the_other_way_round_for_the_same_target() {
     let turned = |direction| {
         let mut bench = Bench::new();
-        bench.set(0x2001, 0, direction);
-        bench.enable_in(3);
-        bench.set(0x60FF, 0, 60);
-        bench.run_ms(1500);
-        let (position, velocity) = (bench.get(0x6064, 0), bench.get(0x606C, 0));
+        bench.set(0x2001, direction).enable_in(3).set(0x60FF, 60).run_ms(1500);
+        let (position, velocity) = (bench.get(0x6064), bench.get(0x606C));
         assert!(position > 1000 && velocity > 500, "the drive's own numbers keep their sign: {position}, {velocity}");
         bench.report().shaft_angle_rad
     };
@@ -180,8 +158,7 @@ fn direction_2001h_turns_the_shaft_the_other_way_round_for_the_same_target() {
 #[test]
 fn the_position_counts_4096_a_turn_of_the_shaft() {
     let mut bench = ready(200, 200);
-    bench.set(0x60FF, 0, 120);
-    bench.run_ms(3000);
+    bench.set(0x60FF, 120).run_ms(3000);
     let turns = bench.report().shaft_angle_rad / core::f64::consts::TAU;
     let counts = bench.report().position as f64;
     assert_within("turns", turns, 5.0, 6.0);
@@ -193,11 +170,9 @@ fn the_position_counts_4096_a_turn_of_the_shaft() {
 fn the_supply_limits_the_speed_by_the_back_emf() {
     for supply_v in [24.0, 36.0] {
         let mut bench = ready(1000, 500);
-        bench.operate(|drive, now| drive.set_supply(supply_v, now)).expect("a supply");
-        bench.set(0x60FF, 0, 1000);
-        bench.run_ms(8000);
+        bench.set_supply(supply_v).set(0x60FF, 1000).run_ms(8000);
         let speed = rpm(&mut bench);
-        assert_eq!(bench.get(0x603F, 0), 0, "{supply_v} V");
+        assert_eq!(bench.get(0x603F), 0, "{supply_v} V");
         // The power stage gives all of the voltage but its dead time, a few per cent.
         assert_within(
             &format!("no-load speed at {supply_v} V"),
@@ -211,22 +186,19 @@ fn the_supply_limits_the_speed_by_the_back_emf() {
 #[test]
 fn a_load_within_the_current_limit_does_not_change_the_speed_and_takes_its_current() {
     let mut bench = ready(200, 200);
-    bench.set(0x60FF, 0, 60);
-    bench.run_ms(500);
-    bench.operate(|drive, now| drive.set_load_torque(4.0, now)).expect("a load");
-    bench.run_ms(1500);
+    bench.set(0x60FF, 60).run_ms(500);
+    bench.set_load_torque(4.0).run_ms(1500);
     let speed = rpm(&mut bench);
     assert_within("speed", speed, 59.5, 60.5);
     let torque_nm = 4.0 + wheel::friction_nm(speed * wheel::RAD_S_PER_RPM);
     let current_a = torque_nm / wheel::torque_per_a();
-    assert_within("6077h in 0.1 A", bench.get(0x6077, 0) as f64, current_a * 10.0 - 1.5, current_a * 10.0 + 1.5);
+    assert_within("6077h in 0.1 A", bench.get(0x6077) as f64, current_a * 10.0 - 1.5, current_a * 10.0 + 1.5);
 }
 
 #[test]
 fn a_target_written_before_enabling_is_followed_when_operation_is_enabled() {
     let mut bench = Bench::new();
-    bench.set(0x60FF, 0, 60);
-    bench.run_ms(500);
+    bench.set(0x60FF, 60).run_ms(500);
     assert_eq!(bench.report().velocity_rpm, 0.0);
     bench.enable_in(3);
     let seconds = bench.seconds_until(1.0, LOOK, |report| report.velocity_rpm > 59.0);
@@ -236,9 +208,8 @@ fn a_target_written_before_enabling_is_followed_when_operation_is_enabled() {
 #[test]
 fn a_reversal_slows_down_in_6084h_and_then_speeds_up_in_6083h() {
     let mut bench = ready(200, 800);
-    bench.set(0x60FF, 0, 100);
-    bench.run_ms(600);
-    bench.set(0x60FF, 0, -100);
+    bench.set(0x60FF, 100).run_ms(600);
+    bench.set(0x60FF, -100);
     for (ms, low, high) in [(400, 46.0, 54.0), (400, -6.0, 4.0), (100, -56.0, -38.0), (150, -102.0, -98.0)] {
         bench.run_ms(ms);
         assert_within("speed", rpm(&mut bench), low, high);

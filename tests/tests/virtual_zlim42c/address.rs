@@ -36,12 +36,10 @@ fn stored_numbers_from_32_on_are_used_and_others_give_node_1() {
 #[test]
 fn another_node_number_takes_effect_with_the_next_start_unless_the_switches_decide() {
     let mut machine = Bench::new();
-    machine.set(0x2008, 0, 42);
-    assert_eq!(machine.get(0x2000, 0), 1);
-    machine.let_store();
-    machine.power_cycle();
+    machine.set(0x2008, 42).reads(0x2000, 1);
+    machine.let_store().power_cycle();
     // The bench's drive has its switches at 1: they decide.
-    assert_eq!((machine.get(0x2000, 0), machine.get(0x2008, 0)), (1, 42));
+    assert_eq!((machine.get(0x2000), machine.get(0x2008)), (1, 42));
 
     let mut world = World::new(Bitrate::K500, 1);
     let host = world.add_tap();
@@ -59,8 +57,7 @@ fn another_node_number_takes_effect_with_the_next_start_unless_the_switches_deci
 fn every_bit_rate_of_the_table_takes_effect_with_the_next_start() {
     for number in 0..7_i64 {
         let mut bench = Bench::new();
-        bench.set(0x2009, 0, number);
-        bench.let_store();
+        bench.set(0x2009, number).let_store();
         assert_eq!(bench.operate(|drive, _| drive.bitrate()), Some(Bitrate::K500));
         bench.power_cycle();
         let rate = bench.operate(|drive, _| drive.bitrate()).expect("it has power");

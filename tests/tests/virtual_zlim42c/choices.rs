@@ -24,17 +24,13 @@ fn a_fault_goes_with_a_reset_or_by_3_4_with_the_supply_only() {
     for (choice, resets) in [("reset", true), ("power-cycle", false)] {
         for (index, value) in [(0x6040, 0x80), (0x2011, 1)] {
             let mut bench = Bench::choosing("Z010", choice);
-            bench.tell("1 supply 45");
-            bench.run_ms(50);
-            assert_eq!(bench.get(0x603F, 0), 0xFF01);
-            bench.tell("1 supply 24");
-            bench.run_ms(500);
-            bench.set(index, 0, value);
-            bench.run_ms(5);
+            bench.tell("1 supply 45").run_ms(50).reads(0x603F, 0xFF01);
+            bench.tell("1 supply 24").run_ms(500);
+            bench.set(index, value).run_ms(5);
             let expected = if resets { (0, 0x40) } else { (0xFF01, 0x08) };
-            assert_eq!((bench.get(0x603F, 0), bench.statusword() & 0x4F), expected, "{choice}, {index:04X}h");
+            assert_eq!((bench.get(0x603F), bench.statusword() & 0x4F), expected, "{choice}, {index:04X}h");
             bench.power_cycle();
-            assert_eq!((bench.get(0x603F, 0), bench.statusword() & 0x4F), (0, 0x40), "{choice}: after a power cycle");
+            assert_eq!((bench.get(0x603F), bench.statusword() & 0x4F), (0, 0x40), "{choice}: after a power cycle");
         }
     }
 }
@@ -43,19 +39,13 @@ fn a_fault_goes_with_a_reset_or_by_3_4_with_the_supply_only() {
 fn each_factory_value_is_the_manuals_or_that_of_the_eds_also_after_a_restore() {
     let (mut manual, mut bench) = (Bench::new(), Bench::choosing("defaults", "eds"));
     for (index, sub, printed, given) in DIFFERENT {
-        assert_eq!((manual.get(index, sub), bench.get(index, sub)), (printed, given), "{index:04X}h:{sub:02X}");
+        assert_eq!((manual.get((index, sub)), bench.get((index, sub))), (printed, given), "{index:04X}h:{sub:02X}");
     }
-    bench.set(0x1800, 3, 7);
-    bench.set(0x60FF, 0, 7);
-    bench.set(0x2010, 0, 2);
-    bench.let_store();
-    bench.power_cycle();
-    assert_eq!((bench.get(0x1800, 3), bench.get(0x60FF, 0)), (7, 120), "what is stored, and what is not");
-    bench.set(0x2010, 0, 1);
-    bench.let_store();
-    bench.power_cycle();
+    bench.set((0x1800, 3), 7).set(0x60FF, 7).set(0x2010, 2).let_store().power_cycle();
+    assert_eq!((bench.get((0x1800, 3)), bench.get(0x60FF)), (7, 120), "what is stored, and what is not");
+    bench.set(0x2010, 1).let_store().power_cycle();
     for (index, sub, _, given) in DIFFERENT {
-        assert_eq!(bench.get(index, sub), given, "{index:04X}h:{sub:02X} after factory settings");
+        assert_eq!(bench.get((index, sub)), given, "{index:04X}h:{sub:02X} after factory settings");
     }
 }
 
@@ -63,14 +53,11 @@ fn each_factory_value_is_the_manuals_or_that_of_the_eds_also_after_a_restore() {
 fn by_the_eds_rpdo_0_carries_controlword_and_mode_and_a_drive_enabled_in_mode_3_turns_at_120_rpm() {
     let mut bench = Bench::choosing("defaults", "eds");
     bench.heard();
-    bench.send("000#0101");
-    bench.run_ms(60);
+    bench.send("000#0101").run_ms(60);
     assert_eq!(bench.heard_of("181#"), ["181#7002"], "once on entering operational");
     for frame in ["201#060003", "201#070003", "201#0F0003"] {
-        bench.send(frame);
-        bench.run_ms(5);
+        bench.send(frame).run_ms(5);
     }
-    bench.run_ms(500);
-    assert_eq!(bench.get(0x6061, 0), 3);
+    bench.run_ms(500).reads(0x6061, 3);
     assert_within("r/min", bench.report().velocity_rpm, 100.0, 140.0);
 }

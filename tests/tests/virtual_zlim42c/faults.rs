@@ -46,7 +46,7 @@ fn each_fault_frees_the_motor_and_is_told_by_603fh_1001h_and_emcy() {
     for (cause, code, _, register) in CAUSES {
         let mut bench = faulty(cause);
         assert_eq!(bench.statusword() & 0x20FF, 0x0098, "{cause:?}: bit 13 off");
-        assert_eq!((bench.get(0x603F, 0), bench.get(0x1001, 0)), (i64::from(code), i64::from(register)), "{cause:?}");
+        assert_eq!((bench.get(0x603F), bench.get(0x1001)), (i64::from(code), i64::from(register)), "{cause:?}");
         let [low, high] = code.to_le_bytes();
         let told: Vec<_> = bench.heard().into_iter().filter(|frame| frame.starts_with("081#")).collect();
         assert_eq!(told, [format!("081#{low:02X}{high:02X}{register:02X}0000000000")]);
@@ -61,11 +61,9 @@ fn a_rising_bit_7_or_2011h_resets_a_fault_whose_cause_is_gone() {
             let mut bench = faulty(cause);
             let reset = |bench: &mut Bench| {
                 if by_2011h {
-                    bench.set(0x2011, 0, 1);
-                    assert_eq!(bench.get(0x2011, 0), 0);
+                    bench.set(0x2011, 1).reads(0x2011, 0);
                 } else {
-                    bench.set(0x6040, 0, 0x00);
-                    bench.set(0x6040, 0, 0x80);
+                    bench.set(0x6040, 0x00).set(0x6040, 0x80);
                 }
                 bench.statusword() & 0xFF
             };
@@ -74,7 +72,7 @@ fn a_rising_bit_7_or_2011h_resets_a_fault_whose_cause_is_gone() {
             assert_eq!(reset(&mut bench), if unseen { 0x70 } else { 0x98 }, "{cause:?} is still there");
             set(&mut bench, cause, false);
             assert_eq!(reset(&mut bench), 0x70, "{cause:?}");
-            assert_eq!((bench.get(0x603F, 0), bench.get(0x1001, 0)), (0, 0));
+            assert_eq!((bench.get(0x603F), bench.get(0x1001)), (0, 0));
             assert!(bench.heard().contains(&"081#0000000000000000".to_owned()));
         }
     }
@@ -112,12 +110,12 @@ fn touching_wires_and_a_broken_transistor_trip_the_drive_in_every_state_that_fee
             let mut bench = Bench::new();
             match state {
                 "enabled" => bench.enable_in(1),
-                "locked" => bench.set(0x200B, 0, 1),
-                _ => {}
-            }
+                "locked" => bench.set(0x200B, 1),
+                _ => &mut bench,
+            };
             bench.run_ms(50);
             set(&mut bench, Cause::Broken(component), true);
-            assert_eq!(bench.get(0x603F, 0), code, "{component:?}, {state}");
+            assert_eq!(bench.get(0x603F), code, "{component:?}, {state}");
             assert_eq!(bench.report().current_a == 0.0, state == "free" || code != 0, "{component:?}, {state}");
         }
     }
@@ -129,17 +127,12 @@ fn a_vector_that_jumps_is_no_over_current() {
     for supply_v in [20.0, 24.0, 30.0] {
         for (setting, rpm) in (0..8).flat_map(|setting| [300, 900, 1200, 1800, 3000].map(|rpm| (setting, rpm))) {
             let mut bench = Bench::new();
-            bench.operate(|drive, now| drive.set_supply(supply_v, now)).expect("a supply");
-            bench.set(0x2005, 0, setting);
-            bench.set(0x6083, 0, 500);
-            bench.enable_in(3);
-            bench.set(0x60FF, 0, rpm);
-            bench.run_ms(700);
+            bench.set_supply(supply_v).set(0x2005, setting).set(0x6083, 500).enable_in(3).set(0x60FF, rpm).run_ms(700);
             for (object, value) in [(0x6083, 0), (0x6084, 0), (0x60FF, -600)] {
-                bench.set(object, 0, value);
+                bench.set(object, value);
             }
             bench.run_ms(100);
-            let code = bench.get(0x603F, 0);
+            let code = bench.get(0x603F);
             assert!(matches!(code, 0 | 0xFF01), "2005h = {setting}, {rpm} r/min, {supply_v} V: {code:X}h");
         }
     }
@@ -149,22 +142,18 @@ fn a_vector_that_jumps_is_no_over_current() {
 fn the_current_of_hard_work_is_no_bus_over_current() {
     // Nearly what the longer motor can carry, at the highest setting.
     let mut bench = Bench::long();
-    bench.set(0x2005, 0, 7);
-    bench.set(0x6083, 0, 2000);
-    bench.enable_in(3);
+    bench.set(0x2005, 7).set(0x6083, 2000).enable_in(3);
     for (rpm, most_nm) in [(120, 0.4), (300, 0.35), (600, 0.19)] {
-        bench.set(0x60FF, 0, rpm);
-        bench.run_ms(2100);
+        bench.set(0x60FF, rpm).run_ms(2100);
         for part in 1..=10 {
             let torque_nm = most_nm * f64::from(part) / 10.0;
-            bench.operate(|drive, now| drive.set_load_torque(torque_nm, now)).expect("a torque");
-            bench.run_ms(100);
+            bench.set_load_torque(torque_nm).run_ms(100);
         }
         let report = bench.report();
         let lag = report.position - report.rotor_position.expect("known here");
         assert!((0..80).contains(&lag), "it carries the load at {rpm} r/min: {lag} pulses");
-        bench.operate(|drive, now| drive.set_load_torque(0.0, now)).expect("a torque");
-        assert_eq!(bench.get(0x603F, 0), 0, "{rpm} r/min");
+        bench.set_load_torque(0.0);
+        assert_eq!(bench.get(0x603F), 0, "{rpm} r/min");
     }
 }
 
@@ -189,15 +178,11 @@ fn a_lost_phase_is_noticed_whichever_way_the_vector_points_once_it_moves() {
     // Half an electrical turn is 40 pulses; a vector across the lost phase needs no current there until it turns.
     for pulses in [20, 60] {
         let mut bench = Bench::new();
-        bench.enable_in(1);
-        bench.move_by(pulses);
-        bench.run_ms(200);
+        bench.enable_in(1).move_by(pulses).run_ms(200);
         set(&mut bench, Cause::Broken(Component::Phase), true);
-        assert_eq!(bench.get(0x603F, 0), 0, "{pulses}: the vector points across phase A");
-        bench.set(0x6040, 0, 0x0F);
-        bench.move_by(30);
-        bench.run_ms(200);
-        assert_eq!(bench.get(0x603F, 0), 0xFF04, "{pulses}");
+        assert_eq!(bench.get(0x603F), 0, "{pulses}: the vector points across phase A");
+        bench.set(0x6040, 0x0F).move_by(30).run_ms(200);
+        assert_eq!(bench.get(0x603F), 0xFF04, "{pulses}");
     }
 }
 
@@ -205,15 +190,12 @@ fn a_lost_phase_is_noticed_whichever_way_the_vector_points_once_it_moves() {
 fn the_other_phase_is_watched_too() {
     use plant::stepper::Phase;
     let mut bench = Bench::open();
-    bench.enable_in(1);
-    bench.run_ms(50);
+    bench.enable_in(1).run_ms(50);
     bench.machine().assembly_mut().motor_mut().lost_phase = Some(Phase::B);
     bench.run_ms(200);
-    assert_eq!(bench.get(0x603F, 0), 0, "the vector stands along phase A");
+    assert_eq!(bench.get(0x603F), 0, "the vector stands along phase A");
     // A full step on it stands along phase B.
-    bench.move_by(20);
-    bench.run_ms(200);
-    assert_eq!(bench.get(0x603F, 0), 0xFF04);
+    bench.move_by(20).run_ms(200).reads(0x603F, 0xFF04);
 }
 
 #[test]
@@ -221,14 +203,10 @@ fn a_lost_phase_is_noticed_at_every_speed() {
     // At 60 to 200 r/min a phase is asked for current for some ms at a time, at 1000 r/min for less than one.
     for rpm in [10, 60, 100, 150, 200, 300, 600, 1000, 2000] {
         let mut bench = Bench::new();
-        bench.set(0x6083, 0, 1000);
-        bench.enable_in(3);
-        bench.set(0x60FF, 0, rpm);
-        bench.run_ms(1200);
-        assert_eq!(bench.get(0x603F, 0), 0, "{rpm} r/min");
-        bench.operate(|drive, now| drive.set_fault(Component::Phase, true, now)).expect("phases");
-        bench.run_ms(400);
-        assert_eq!(bench.get(0x603F, 0), 0xFF04, "{rpm} r/min");
+        bench.set(0x6083, 1000).enable_in(3).set(0x60FF, rpm).run_ms(1200);
+        assert_eq!(bench.get(0x603F), 0, "{rpm} r/min");
+        bench.set_fault(Component::Phase, true).run_ms(400);
+        assert_eq!(bench.get(0x603F), 0xFF04, "{rpm} r/min");
     }
 }
 
@@ -238,12 +216,8 @@ fn a_sound_motor_whose_own_voltage_holds_its_current_down_has_lost_no_phase() {
     // any current flows, in either phase.
     for rpm in (520..=700).step_by(20) {
         let mut bench = Bench::long();
-        bench.operate(|drive, now| drive.set_supply(20.0, now)).expect("a supply");
-        bench.set(0x6083, 0, 1000);
-        bench.enable_in(3);
-        bench.set(0x60FF, 0, rpm);
-        bench.run_ms(3000);
-        assert_eq!((bench.get(0x603F, 0), bench.get(0x606C, 0)), (0, rpm));
+        bench.set_supply(20.0).set(0x6083, 1000).enable_in(3).set(0x60FF, rpm).run_ms(3000);
+        assert_eq!((bench.get(0x603F), bench.get(0x606C)), (0, rpm));
         assert_within("r/min", bench.report().velocity_rpm, 0.8 * rpm as f64, 1.2 * rpm as f64);
     }
 }
@@ -253,17 +227,12 @@ fn a_load_that_drives_the_motor_raises_the_bus_until_over_voltage() {
     // 0.25 N m at 1000 r/min are 26 W, the windings turn 2.2² * 1.85 = 9 W into heat, and the source cannot take the rest.
     for (torque_nm, code) in [(0.25, 0), (-0.05, 0), (-0.25, 0xFF01)] {
         let mut bench = Bench::new();
-        bench.set(0x2005, 0, 7);
-        bench.set(0x6083, 0, 2000);
-        bench.enable_in(3);
-        bench.set(0x60FF, 0, 1000);
-        bench.run_ms(2500);
+        bench.set(0x2005, 7).set(0x6083, 2000).enable_in(3).set(0x60FF, 1000).run_ms(2500);
         for part in 1..=10 {
             let torque_nm = torque_nm * f64::from(part) / 10.0;
-            bench.operate(|drive, now| drive.set_load_torque(torque_nm, now)).expect("a torque");
-            bench.run_ms(50);
+            bench.set_load_torque(torque_nm).run_ms(50);
         }
-        assert_eq!(bench.get(0x603F, 0), code, "{torque_nm} N m: {:?}", bench.report());
+        assert_eq!(bench.get(0x603F), code, "{torque_nm} N m: {:?}", bench.report());
     }
 }
 
@@ -271,9 +240,8 @@ fn a_load_that_drives_the_motor_raises_the_bus_until_over_voltage() {
 fn over_voltage_begins_above_40_v() {
     for (supply_v, code) in [(20.0, 0), (30.0, 0), (39.5, 0), (40.5, 0xFF01)] {
         let mut bench = Bench::new();
-        bench.operate(|drive, now| drive.set_supply(supply_v, now)).expect("a supply");
-        bench.run_ms(300);
-        assert_eq!(bench.get(0x603F, 0), code, "{supply_v} V");
+        bench.set_supply(supply_v).run_ms(300);
+        assert_eq!(bench.get(0x603F), code, "{supply_v} V");
     }
 }
 
@@ -283,40 +251,31 @@ fn two_faults_are_told_one_by_one_and_go_one_by_one() {
     set(&mut bench, Cause::OverVoltage, true);
     let told: Vec<_> = bench.heard().into_iter().filter(|frame| frame.starts_with("081#")).collect();
     assert_eq!(told, ["081#08FF810000000000", "081#01FF850000000000"], "the register gathers both");
-    assert_eq!(bench.get(0x603F, 0), 0xFF01, "the last");
+    assert_eq!(bench.get(0x603F), 0xFF01, "the last");
     set(&mut bench, Cause::OverVoltage, false);
-    bench.set(0x2011, 0, 1);
-    assert_eq!((bench.get(0x603F, 0), bench.get(0x1001, 0), bench.statusword() & 0x4F), (0xFF08, 0x81, 0x08));
+    bench.set(0x2011, 1);
+    assert_eq!((bench.get(0x603F), bench.get(0x1001), bench.statusword() & 0x4F), (0xFF08, 0x81, 0x08));
     set(&mut bench, Cause::Broken(Component::Reference), false);
-    bench.set(0x2011, 0, 1);
-    assert_eq!((bench.get(0x603F, 0), bench.get(0x1001, 0), bench.statusword() & 0x4F), (0, 0, 0x40));
+    bench.set(0x2011, 1);
+    assert_eq!((bench.get(0x603F), bench.get(0x1001), bench.statusword() & 0x4F), (0, 0, 0x40));
 }
 
 #[test]
 fn a_reset_without_a_fault_changes_nothing() {
     let mut bench = Bench::new();
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 60);
-    bench.run_ms(300);
+    bench.enable_in(3).set(0x60FF, 60).run_ms(300);
     bench.heard();
-    bench.set(0x2011, 0, 1);
-    assert_eq!((bench.get(0x2011, 0), bench.get(0x606C, 0), bench.statusword() & 0x6F), (0, 60, 0x27));
+    bench.set(0x2011, 1);
+    assert_eq!((bench.get(0x2011), bench.get(0x606C), bench.statusword() & 0x6F), (0, 60, 0x27));
     assert!(!bench.heard().iter().any(|frame| frame.starts_with("081#")));
 }
 
 #[test]
 fn a_broken_eeprom_keeps_the_old_values_and_a_mended_one_goes_on() {
     let mut bench = faulty(Cause::Broken(Component::Eeprom));
-    bench.set(0x2005, 0, 5);
-    bench.let_store();
-    bench.power_cycle();
-    assert_eq!(bench.get(0x2005, 0), 3);
+    bench.set(0x2005, 5).let_store().power_cycle().reads(0x2005, 3);
     set(&mut bench, Cause::Broken(Component::Eeprom), false);
-    bench.set(0x2011, 0, 1);
-    bench.set(0x2005, 0, 5);
-    bench.let_store();
-    bench.power_cycle();
-    assert_eq!(bench.get(0x2005, 0), 5);
+    bench.set(0x2011, 1).set(0x2005, 5).let_store().power_cycle().reads(0x2005, 5);
 }
 
 #[test]

@@ -59,20 +59,12 @@ fn put_on_track(mut bench: Bench, start: &str, method: i64) -> Bench {
     for (n, switch) in switches.into_iter().enumerate() {
         if let Some(range) = switch {
             bench.operate(|drive, now| drive.set_switch(n, range, now)).expect("an input");
-            bench.set(0x2030, 2 + n as u8, n as i64 + 1);
+            bench.set((0x2030, 2 + n as u8), n as i64 + 1);
         }
     }
-    bench.set(0x200A, 0, 2);
-    bench.enable_in(1);
-    bench.move_by(position);
-    bench.run_ms(2500);
+    bench.set(0x200A, 2).enable_in(1).move_by(position).run_ms(2500);
     assert_eq!(bench.report().rotor_position, Some(position));
-    bench.set(0x6040, 0, 0x0F);
-    bench.set(0x6098, 0, method);
-    bench.set(0x607C, 0, HOME_OFFSET);
-    bench.set(0x6060, 0, 6);
-    bench.run_ms(5);
-    assert_eq!(bench.get(0x6061, 0), 6);
+    bench.set(0x6040, 0x0F).set(0x6098, method).set(0x607C, HOME_OFFSET).set(0x6060, 6).run_ms(5).reads(0x6061, 6);
     bench
 }
 
@@ -141,12 +133,11 @@ fn goes_and_ends_as_the_table_says(bench: Bench, run: &HomingResult) {
     let at = format!("method {method}, {start}");
     let mut bench = put_on_track(bench, start, i64::from(method));
     assert_eq!(bench.statusword() & BITS, 0, "5.3.6, bit 10: no home position before the first run");
-    bench.set(0x6040, 0, 0x1F);
+    bench.set(0x6040, 0x1F);
     let seen = match start {
         "bit_4_falls_on_the_way" | "halt_on_the_way" => {
             let seen = plateaus(&mut bench, 300);
-            bench.set(0x6040, 0, if start == "halt_on_the_way" { 0x11F } else { 0x0F });
-            bench.run_ms(300);
+            bench.set(0x6040, if start == "halt_on_the_way" { 0x11F } else { 0x0F }).run_ms(300);
             seen
         }
         _ => plateaus(&mut bench, 6000),
@@ -160,8 +151,8 @@ fn goes_and_ends_as_the_table_says(bench: Bench, run: &HomingResult) {
         let (edge, direction, input) = edge(latch);
         let beyond = (zero - HOME_OFFSET as f64 - edge) * direction;
         assert_within(&at, beyond, *FILTER_WAY.start(), *FILTER_WAY.end());
-        assert_eq!(bench.get(0x6064, 0), -HOME_OFFSET, "{at}: it stops when the switch is found");
-        assert_ne!(bench.get(0x2003, 0) as u16 & 1 << input, 0, "{at}: it ends on the switch");
+        assert_eq!(bench.get(0x6064), -HOME_OFFSET, "{at}: it stops when the switch is found");
+        assert_ne!(bench.get(0x2003) as u16 & 1 << input, 0, "{at}: it ends on the switch");
     } else {
         // A rotor that turns swings by a few pulses about its vector.
         assert_within(&format!("{at}: the zero is not moved"), zero, -6.0, 6.0);
@@ -171,13 +162,9 @@ fn goes_and_ends_as_the_table_says(bench: Bench, run: &HomingResult) {
 #[test]
 fn a_halted_homing_goes_on_and_attains() {
     let mut bench = on_track("halt_on_the_way", 17);
-    bench.set(0x6040, 0, 0x1F);
-    bench.run_ms(300);
-    bench.set(0x6040, 0, 0x11F);
-    bench.run_ms(500);
-    assert_eq!(bench.get(0x606C, 0), 0);
-    bench.set(0x6040, 0, 0x1F);
-    bench.run_ms(5000);
+    bench.set(0x6040, 0x1F).run_ms(300);
+    bench.set(0x6040, 0x11F).run_ms(500).reads(0x606C, 0);
+    bench.set(0x6040, 0x1F).run_ms(5000);
     assert_eq!(bench.statusword() & BITS, 1 << 8 | 1 << 10);
 }
 
@@ -185,29 +172,22 @@ fn a_halted_homing_goes_on_and_attains() {
 fn an_interrupted_homing_starts_again_with_the_next_edge_and_a_quick_stop_ends_it() {
     let mut bench = on_track("between", 18);
     for controlword in [0x1F, 0x0F, 0x1F] {
-        bench.set(0x6040, 0, controlword);
-        bench.run_ms(200);
+        bench.set(0x6040, controlword).run_ms(200);
     }
     assert_eq!(bench.statusword() & BITS, 1 << 14);
-    bench.set(0x6040, 0, 0x02);
-    bench.run_ms(300);
-    bench.set(0x6040, 0, 0x0F);
-    bench.run_ms(300);
-    assert_eq!((bench.get(0x606C, 0), bench.statusword() & BITS), (0, 1 << 10), "it does not go on");
+    bench.set(0x6040, 0x02).run_ms(300);
+    bench.set(0x6040, 0x0F).run_ms(300);
+    assert_eq!((bench.get(0x606C), bench.statusword() & BITS), (0, 1 << 10), "it does not go on");
 }
 
 #[test]
 fn an_output_tells_that_homing_is_done() {
     let mut bench = on_track("between", 18);
-    bench.set(0x2030, 0x0E, 3);
-    bench.set(0x6040, 0, 0x1F);
-    bench.run_ms(500);
-    assert_eq!(bench.get(0x2004, 0), 0);
+    bench.set((0x2030, 0x0E), 3).set(0x6040, 0x1F).run_ms(500).reads(0x2004, 0);
     bench.run_ms(4500);
-    assert_eq!(bench.get(0x2004, 0), 2, "Y1");
-    bench.set(0x2030, 0x0C, 2);
-    bench.run_ms(2);
-    assert_eq!(bench.get(0x2004, 0), 0, "reversed");
+    assert_eq!(bench.get(0x2004), 2, "Y1");
+    bench.set((0x2030, 0x0C), 2).run_ms(2);
+    assert_eq!(bench.get(0x2004), 0, "reversed");
 }
 
 #[test]
@@ -221,13 +201,8 @@ fn a_switch_on_any_input_reversed_too_is_found() {
             SwitchRange { low: Some(2000), high: None }
         };
         bench.operate(|drive, now| drive.set_switch(input, range, now)).expect("an input");
-        bench.set(0x2030, 1, if reversed { 1 << input } else { 0 });
-        bench.run_ms(20);
-        bench.set(0x2030, 2 + input as u8, 2);
-        bench.set(0x6098, 0, 18);
-        bench.enable_in(6);
-        bench.set(0x6040, 0, 0x1F);
-        bench.run_ms(4000);
+        bench.set((0x2030, 1), if reversed { 1 << input } else { 0 }).run_ms(20);
+        bench.set((0x2030, 2 + input as u8), 2).set(0x6098, 18).enable_in(6).set(0x6040, 0x1F).run_ms(4000);
         assert_eq!(bench.statusword() & BITS, 1 << 8 | 1 << 10, "X{input}");
         let zero = shaft_pulses(&mut bench) - bench.report().position as f64;
         assert_within("pulses beyond the edge", zero - 2000.0, *FILTER_WAY.start(), *FILTER_WAY.end());
@@ -250,20 +225,18 @@ fn any_start_and_any_speed_leads_to_the_edge_of_the_method() {
             let at = format!("seed {seed}, method {method} from {start}");
             let mut bench = Bench::new();
             let track = [(Some(-half), Some(half)), (Some(end), None), (None, Some(-end))];
-            bench.set(0x2006, 0, setting);
+            bench.set(0x2006, setting);
             for (n, (low, high)) in track.into_iter().enumerate() {
                 let shifted = |edge: Option<i64>| edge.map(|edge| edge - start);
                 let range = SwitchRange { low: shifted(low), high: shifted(high) };
                 bench.operate(|drive, now| drive.set_switch(n, range, now)).expect("an input");
-                bench.set(0x2030, 2 + n as u8, n as i64 + 1);
+                bench.set((0x2030, 2 + n as u8), n as i64 + 1);
             }
             for (index, sub, value) in [(0x6099, 1, search_rpm), (0x6099, 2, latch_rpm), (0x607C, 0, offset)] {
-                bench.set(index, sub, value);
+                bench.set((index, sub), value);
             }
-            bench.set(0x6098, 0, method);
-            bench.enable_in(6);
-            bench.run_ms(50);
-            bench.set(0x6040, 0, 0x1F);
+            bench.set(0x6098, method).enable_in(6).run_ms(50);
+            bench.set(0x6040, 0x1F);
             let attained = |report: &sim::Report| report.statusword.is_some_and(|word| word & BITS == 1 << 8 | 1 << 10);
             bench.seconds_until(200.0, std::time::Duration::from_millis(10), attained);
             bench.run_ms(100);
@@ -288,9 +261,7 @@ fn any_start_and_any_speed_leads_to_the_edge_of_the_method() {
 fn homing_that_fails_stops_at_once_and_not_along_a_ramp() {
     // 5.3.6: at the other limit the motor stops at once. 609Ah = 2 s would be a long way.
     let mut bench = on_track("above_home_without_home_switch", 24);
-    bench.set(0x609A, 0, 2000);
-    bench.set(0x6099, 1, 300);
-    bench.set(0x6040, 0, 0x1F);
+    bench.set(0x609A, 2000).set((0x6099, 1), 300).set(0x6040, 0x1F);
     let look = std::time::Duration::from_micros(500);
     let backwards = |report: &sim::Report| report.velocity_demand_rpm.is_some_and(|rpm| rpm < -20.0);
     bench.seconds_until(20.0, look, backwards);
@@ -313,11 +284,9 @@ fn the_search_keeps_to_the_step_rate_limit() {
     // 6099h:01 = 3000 r/min at 25600 pulses a turn are 1.28 MHz; 200 kHz are 468.75 r/min (2.1).
     let mut bench = Bench::new();
     for (index, sub, value) in [(0x2006, 0, 7), (0x6098, 0, 18), (0x6099, 1, 3000), (0x609A, 0, 500)] {
-        bench.set(index, sub, value);
+        bench.set((index, sub), value);
     }
-    bench.enable_in(6);
-    bench.set(0x6040, 0, 0x1F);
-    bench.run_ms(700);
+    bench.enable_in(6).set(0x6040, 0x1F).run_ms(700);
     assert_eq!(bench.report().velocity_demand_rpm, Some(468.75));
 }
 
@@ -332,9 +301,7 @@ fn off_its_switch_the_motor_goes_back_some_way_before_it_returns() {
         (18, "on_positive_limit", -1, -8000),
     ] {
         let mut bench = on_track(start, method);
-        bench.set(0x6099, 2, 5);
-        bench.set(0x609A, 0, 30);
-        bench.set(0x6040, 0, 0x1F);
+        bench.set((0x6099, 2), 5).set(0x609A, 30).set(0x6040, 0x1F);
         let (mut farthest, back) = (i64::MIN, f64::from(back));
         while bench.report().velocity_demand_rpm.is_none_or(|rpm| rpm * back >= 0.0) {
             bench.run_ms(1);

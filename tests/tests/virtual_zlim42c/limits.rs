@@ -11,11 +11,9 @@ const REACHED: u16 = 1 << 10;
 fn with_switches(stop_mode: i64) -> Bench {
     let mut bench = Bench::new();
     for (sub, function) in [(2, 2), (3, 3), (4, 9)] {
-        bench.set(0x2030, sub, function);
+        bench.set((0x2030, sub), function);
     }
-    bench.set(0x200A, 0, stop_mode);
-    bench.set(0x6084, 0, 300);
-    bench.set(0x6085, 0, 50);
+    bench.set(0x200A, stop_mode).set(0x6084, 300).set(0x6085, 50);
     bench
 }
 
@@ -23,10 +21,8 @@ fn with_switches(stop_mode: i64) -> Bench {
 fn a_limit_stops_the_velocity_towards_it_as_200ah_says() {
     for (mode, expected) in [(0, Some(0.3)), (1, Some(0.05)), (2, None)] {
         let mut bench = with_switches(mode);
-        bench.enable_in(3);
-        bench.set(0x60FF, 0, 60);
-        bench.run_ms(500);
-        bench.operate(|drive, now| drive.set_input(0, true, now)).expect("X0");
+        bench.enable_in(3).set(0x60FF, 60).run_ms(500);
+        bench.set_input(0, true);
         match expected {
             Some(expected) => {
                 let taken = bench.seconds_until(1.0, LOOK, |report| report.velocity_demand_rpm == Some(0.0));
@@ -34,8 +30,7 @@ fn a_limit_stops_the_velocity_towards_it_as_200ah_says() {
                 assert_within("seconds", taken - 0.010, expected - 0.002, expected + 0.003);
             }
             None => {
-                bench.run_ms(500);
-                assert_eq!(bench.get(0x606C, 0), 60);
+                bench.run_ms(500).reads(0x606C, 60);
             }
         }
     }
@@ -44,54 +39,33 @@ fn a_limit_stops_the_velocity_towards_it_as_200ah_says() {
 #[test]
 fn the_way_out_of_a_limit_is_free_and_the_way_in_is_not() {
     let mut bench = with_switches(0);
-    bench.enable_in(3);
-    bench.input(1, true);
-    bench.set(0x60FF, 0, -60);
-    bench.run_ms(300);
-    assert_eq!(bench.get(0x6064, 0), 0, "into the negative limit: no step");
-    bench.set(0x60FF, 0, 60);
-    bench.run_ms(300);
-    assert_eq!(bench.get(0x606C, 0), 60);
-    bench.input(1, false);
-    bench.set(0x60FF, 0, -60);
-    bench.run_ms(700);
-    assert_eq!(bench.get(0x606C, 0), -60);
+    bench.enable_in(3).input(1, true).set(0x60FF, -60).run_ms(300);
+    assert_eq!(bench.get(0x6064), 0, "into the negative limit: no step");
+    bench.set(0x60FF, 60).run_ms(300).reads(0x606C, 60);
+    bench.input(1, false).set(0x60FF, -60).run_ms(700).reads(0x606C, -60);
 }
 
 #[test]
 fn a_velocity_goes_on_when_the_limit_goes_off_and_a_move_does_not() {
     let mut bench = with_switches(0);
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 60);
-    bench.run_ms(300);
-    bench.input(0, true);
-    bench.run_ms(400);
-    assert_eq!(bench.get(0x606C, 0), 0);
+    bench.enable_in(3).set(0x60FF, 60).run_ms(300);
+    bench.input(0, true).run_ms(400).reads(0x606C, 0);
     assert_eq!(bench.statusword() & 1 << 14, 0, "it stands");
-    bench.input(0, false);
-    bench.run_ms(300);
-    assert_eq!(bench.get(0x606C, 0), 60);
+    bench.input(0, false).run_ms(300).reads(0x606C, 60);
 
     let mut bench = with_switches(0);
-    bench.enable_in(1);
-    bench.move_by(40_000);
-    bench.run_ms(300);
-    bench.input(0, true);
-    bench.run_ms(400);
-    let stopped = bench.get(0x6064, 0);
-    bench.input(0, false);
-    bench.run_ms(300);
-    assert_eq!(bench.get(0x6064, 0), stopped);
+    bench.enable_in(1).move_by(40_000).run_ms(300);
+    bench.input(0, true).run_ms(400);
+    let stopped = bench.get(0x6064);
+    bench.input(0, false).run_ms(300).reads(0x6064, stopped);
 }
 
 #[test]
 fn a_move_is_stopped_by_a_limit_as_200ah_says() {
     for (mode, seconds) in [(0, 0.3), (1, 0.05)] {
         let mut bench = with_switches(mode);
-        bench.enable_in(1);
-        bench.move_by(-100_000);
-        bench.run_ms(500);
-        bench.operate(|drive, now| drive.set_input(1, true, now)).expect("X1");
+        bench.enable_in(1).move_by(-100_000).run_ms(500);
+        bench.set_input(1, true);
         let taken = bench.seconds_until(1.0, LOOK, |report| report.velocity_demand_rpm == Some(0.0));
         assert_within("seconds", taken - 0.010, seconds - 0.002, seconds + 0.003);
     }
@@ -100,72 +74,48 @@ fn a_move_is_stopped_by_a_limit_as_200ah_says() {
 #[test]
 fn a_move_that_meets_a_limit_ends_there_and_does_not_count_as_reached() {
     let mut bench = with_switches(0);
-    bench.enable_in(1);
-    bench.move_by(40_000);
-    bench.run_ms(500);
-    bench.input(0, true);
-    bench.run_ms(500);
-    let stopped = bench.get(0x6064, 0);
-    assert_eq!(bench.statusword() & REACHED, 0);
-    bench.move_by(1000);
-    bench.run_ms(500);
-    assert_eq!(bench.get(0x6064, 0), stopped, "further in: no step");
-    bench.set(0x6040, 0, 0x0F);
-    bench.move_by(-1000);
-    bench.run_ms(1000);
-    assert_eq!(bench.get(0x6064, 0), stopped - 1000);
+    bench.enable_in(1).move_by(40_000).run_ms(500);
+    bench.input(0, true).run_ms(500);
+    let stopped = bench.get(0x6064);
+    bench.shows(REACHED, 0);
+    bench.move_by(1000).run_ms(500);
+    assert_eq!(bench.get(0x6064), stopped, "further in: no step");
+    bench.set(0x6040, 0x0F).move_by(-1000).run_ms(1000).reads(0x6064, stopped - 1000);
     assert_ne!(bench.statusword() & REACHED, 0);
 }
 
 #[test]
 fn the_emergency_stop_holds_while_it_is_active_and_nothing_starts_by_itself_after_it() {
     let mut bench = with_switches(0);
-    bench.set(0x605A, 0, 6);
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 60);
-    bench.run_ms(500);
-    bench.input(2, true);
-    bench.run_ms(60);
-    assert_eq!(bench.get(0x606C, 0), 0, "605Ah = 6: as 6085h");
+    bench.set(0x605A, 6).enable_in(3).set(0x60FF, 60).run_ms(500);
+    bench.input(2, true).run_ms(60);
+    assert_eq!(bench.get(0x606C), 0, "605Ah = 6: as 6085h");
     assert!(bench.report().current_a > 0.5, "and holds");
-    bench.set(0x60FF, 0, 60);
-    bench.run_ms(300);
-    assert_eq!(bench.get(0x606C, 0), 0);
-    bench.input(2, false);
-    bench.run_ms(300);
-    assert_eq!((bench.get(0x606C, 0), bench.get(0x60FF, 0)), (0, 0));
-    bench.set(0x60FF, 0, 60);
-    bench.run_ms(500);
-    assert_eq!(bench.get(0x606C, 0), 60);
+    bench.set(0x60FF, 60).run_ms(300).reads(0x606C, 0);
+    bench.input(2, false).run_ms(300);
+    assert_eq!((bench.get(0x606C), bench.get(0x60FF)), (0, 0));
+    bench.set(0x60FF, 60).run_ms(500).reads(0x606C, 60);
 }
 
 #[test]
 fn pulses_shorter_than_10_ms_are_not_seen() {
     let mut bench = with_switches(1);
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 60);
-    bench.run_ms(500);
+    bench.enable_in(3).set(0x60FF, 60).run_ms(500);
     for (ms, seen) in [(5, false), (9, false), (12, true)] {
-        bench.operate(|drive, now| drive.set_input(2, true, now)).expect("X2");
-        bench.run_ms(ms);
-        bench.operate(|drive, now| drive.set_input(2, false, now)).expect("X2");
-        bench.run_ms(500);
-        assert_eq!(bench.get(0x606C, 0) == 0, seen, "{ms} ms");
+        bench.set_input(2, true).run_ms(ms);
+        bench.set_input(2, false).run_ms(500);
+        assert_eq!(bench.get(0x606C) == 0, seen, "{ms} ms");
     }
 }
 
 #[test]
 fn each_pair_of_inputs_has_its_own_filter_time() {
     let mut bench = Bench::new();
-    bench.set(0x204B, 0, 2);
-    bench.set(0x204C, 0, 50);
+    bench.set(0x204B, 2).set(0x204C, 50);
     for input in 0..4 {
-        bench.operate(|drive, now| drive.set_input(input, true, now)).expect("X0 to X3");
+        bench.set_input(input, true);
     }
-    bench.run_ms(1);
-    assert_eq!(bench.get(0x2003, 0), 0);
-    bench.run_ms(10);
-    assert_eq!(bench.get(0x2003, 0), 0b0011);
-    bench.run_ms(50);
-    assert_eq!(bench.get(0x2003, 0), 0b1111);
+    bench.run_ms(1).reads(0x2003, 0);
+    bench.run_ms(10).reads(0x2003, 0b0011);
+    bench.run_ms(50).reads(0x2003, 0b1111);
 }

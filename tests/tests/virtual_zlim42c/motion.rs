@@ -26,27 +26,24 @@ fn duration_of(bench: &mut Bench, pulses: i64) -> f64 {
 #[test]
 fn a_move_takes_its_two_ramps_and_the_plateau() {
     let mut bench = Bench::new();
-    bench.enable_in(1);
-    bench.set(0x6081, 0, 60);
+    bench.enable_in(1).set(0x6081, 60);
     let (start, top, end) = (5.0 * PULSES_S, 60.0 * PULSES_S, 10.0 * PULSES_S);
     for (speeding_ms, slowing_ms) in [(100, 100), (200, 50), (0, 400)] {
-        bench.set(0x6083, 0, speeding_ms);
-        bench.set(0x6084, 0, slowing_ms);
+        bench.set(0x6083, speeding_ms).set(0x6084, slowing_ms);
         let (speeding, slowing) = (speeding_ms as f64 * 1e-3, slowing_ms as f64 * 1e-3);
         let ramps = 0.5 * (start + top) * speeding + 0.5 * (top + end) * slowing;
         let expected = speeding + slowing + (3200.0 - ramps) / top;
         let taken = duration_of(&mut bench, 3200);
         assert_within("seconds", taken, expected - 0.003, expected + 0.003);
     }
-    assert_eq!(bench.get(0x6064, 0), 9600);
+    bench.reads(0x6064, 9600);
 }
 
 #[test]
 fn a_move_too_short_for_its_speed_turns_back_at_a_lower_peak() {
     // Each ramp keeps its pace p = T / change of speed: d = (v² - v0²) pa / 2 + (v² - ve²) pd / 2 gives the peak.
     let mut bench = Bench::new();
-    bench.enable_in(1);
-    bench.set(0x6081, 0, 60);
+    bench.enable_in(1).set(0x6081, 60);
     let (start, top, end, ramp) = (5.0 * PULSES_S, 60.0 * PULSES_S, 10.0 * PULSES_S, 0.1);
     let (up, down) = (ramp / (top - start), ramp / (top - end));
     for pulses in [40, 100, 200, 400] {
@@ -56,28 +53,24 @@ fn a_move_too_short_for_its_speed_turns_back_at_a_lower_peak() {
         let taken = duration_of(&mut bench, i64::from(pulses));
         assert_within("seconds", taken, expected - 0.003, expected + 0.003);
     }
-    assert_eq!(bench.get(0x6064, 0), 740);
+    bench.reads(0x6064, 740);
 }
 
 #[test]
 fn half_way_in_time_an_s_shaped_ramp_is_half_way_in_speed() {
     let mut bench = Bench::new();
-    bench.set(0x6083, 0, 400);
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 300);
-    bench.run_ms(200);
-    let half = bench.get(0x606C, 0);
+    bench.set(0x6083, 400).enable_in(3).set(0x60FF, 300).run_ms(200);
+    let half = bench.get(0x606C);
     assert!((150..=158).contains(&half), "{half} r/min, expected (5 + 300) / 2 and 1.5 r/min a ms");
     bench.run_ms(210);
-    assert_eq!((bench.get(0x606C, 0), bench.get(0x2002, 0)), (300, 300));
-    assert_eq!(bench.statusword() & (REACHED | ACKNOWLEDGED | RUNNING), REACHED | RUNNING);
+    assert_eq!((bench.get(0x606C), bench.get(0x2002)), (300, 300));
+    bench.shows(REACHED | ACKNOWLEDGED | RUNNING, REACHED | RUNNING);
     // The way of the ramp: the mean of both speeds. 10 ms and the talk at 300 r/min come on top.
-    let way = bench.get(0x6064, 0) as f64;
+    let way = bench.get(0x6064) as f64;
     let ramp = 0.5 * 305.0 * PULSES_S * 0.4;
     assert_within("pulses", way, ramp, ramp + 300.0 * PULSES_S * 0.02);
-    bench.set(0x60FF, 0, 0);
-    bench.run_ms(120);
-    assert_eq!(bench.get(0x606C, 0), 0, "6084h: 100 ms");
+    bench.set(0x60FF, 0).run_ms(120);
+    assert_eq!(bench.get(0x606C), 0, "6084h: 100 ms");
     assert_eq!(bench.statusword() & (REACHED | ACKNOWLEDGED | RUNNING), REACHED | ACKNOWLEDGED, "bit 12: speed is 0");
 }
 
@@ -86,12 +79,8 @@ fn no_speed_is_above_200_000_steps_a_second() {
     // 2.1: 468 r/min at 25600 pulses a turn, and 1875 r/min at 6400.
     for (setting, pulses_per_turn) in [(7, 25_600.0_f64), (5, 6_400.0)] {
         let mut bench = Bench::new();
-        bench.set(0x2006, 0, setting);
-        bench.set(0x6083, 0, 1000);
-        bench.enable_in(3);
-        bench.set(0x60FF, 0, 3000);
-        bench.run_ms(1100);
-        assert_eq!(bench.get(0x606C, 0), (200_000.0 * 60.0 / pulses_per_turn).round() as i64);
+        bench.set(0x2006, setting).set(0x6083, 1000).enable_in(3).set(0x60FF, 3000).run_ms(1100);
+        bench.reads(0x606C, (200_000.0 * 60.0 / pulses_per_turn).round() as i64);
         let before = bench.report().position;
         bench.run_ms(1000);
         assert_eq!(bench.report().position - before, 200_000);
@@ -104,15 +93,9 @@ fn a_motor_without_load_follows_to_3000_rpm_and_back_without_losing_a_step() {
     // 6081h and 60FFh allow 3000 r/min; there the pull-out torque with 24 V is still twice the friction.
     for supply_v in [24.0, 30.0] {
         let mut bench = Bench::new();
-        bench.operate(|drive, now| drive.set_supply(supply_v, now)).expect("a supply");
-        bench.set(0x6083, 0, 1000);
-        bench.set(0x6084, 0, 2000);
-        bench.enable_in(3);
-        bench.set(0x60FF, 0, 3000);
-        bench.run_ms(2000);
+        bench.set_supply(supply_v).set(0x6083, 1000).set(0x6084, 2000).enable_in(3).set(0x60FF, 3000).run_ms(2000);
         assert_within("r/min", bench.report().velocity_rpm, 2800.0, 3200.0);
-        bench.set(0x60FF, 0, 0);
-        bench.run_ms(2500);
+        bench.set(0x60FF, 0).run_ms(2500);
         let report = bench.report();
         let away = report.position - report.rotor_position.expect("known here");
         // Dry friction may hold it some pulses off; four full steps are 80.
@@ -125,11 +108,9 @@ fn every_microstep_setting_makes_one_turn_of_its_pulses() {
     use ferrodrive_tests::zlim42c::figure;
     for setting in 0..16 {
         let mut bench = Bench::new();
-        bench.set(0x2006, 0, setting);
-        bench.enable_in(1);
+        bench.set(0x2006, setting).enable_in(1);
         let pulses = figure("microstep", &setting.to_string(), "pulses_per_turn") as i64;
-        bench.move_by(pulses);
-        bench.run_ms(1200);
+        bench.move_by(pulses).run_ms(1200);
         let report = bench.report();
         assert_eq!(report.position, pulses, "setting {setting}");
         assert_within("turns", report.shaft_angle_rad / std::f64::consts::TAU, 0.999, 1.001);
@@ -139,54 +120,34 @@ fn every_microstep_setting_makes_one_turn_of_its_pulses() {
 #[test]
 fn a_microstep_setting_written_while_energised_waits_and_other_settings_do_not() {
     let mut bench = Bench::new();
-    bench.enable_in(1);
-    bench.set(0x2006, 0, 0);
-    bench.set(0x6081, 0, 30);
-    bench.move_by(4000);
-    bench.run_ms(500);
-    assert_eq!(bench.get(0x606C, 0), 30);
+    bench.enable_in(1).set(0x2006, 0).set(0x6081, 30).move_by(4000).run_ms(500).reads(0x606C, 30);
     bench.run_ms(2500);
     assert_within("turns", bench.report().shaft_angle_rad / std::f64::consts::TAU, 0.999, 1.001);
-    bench.set(0x6040, 0, 0);
-    bench.run_ms(5);
-    bench.enable();
-    bench.move_by(200);
-    bench.run_ms(3000);
+    bench.set(0x6040, 0).run_ms(5);
+    bench.enable().move_by(200).run_ms(3000);
     assert_within("turns", bench.report().shaft_angle_rad / std::f64::consts::TAU, 1.999, 2.001);
 }
 
 #[test]
 fn bits_10_12_and_15_follow_a_set_point() {
     let mut bench = Bench::new();
-    bench.enable_in(1);
-    bench.run_ms(10);
+    bench.enable_in(1).run_ms(10);
     assert_eq!(bench.statusword() & (REACHED | ACKNOWLEDGED | IN_POSITION), REACHED | IN_POSITION, "nothing to do");
-    bench.move_by(4000);
-    assert_eq!(bench.statusword() & (REACHED | ACKNOWLEDGED | IN_POSITION), ACKNOWLEDGED);
-    bench.set(0x6040, 0, 0x0F);
-    bench.run_ms(100);
-    assert_eq!(bench.statusword() & (REACHED | ACKNOWLEDGED | IN_POSITION | RUNNING), RUNNING);
-    bench.run_ms(1000);
-    assert_eq!(bench.statusword() & (REACHED | ACKNOWLEDGED | IN_POSITION | RUNNING), REACHED | IN_POSITION);
+    bench.move_by(4000).shows(REACHED | ACKNOWLEDGED | IN_POSITION, ACKNOWLEDGED);
+    bench.set(0x6040, 0x0F).run_ms(100).shows(REACHED | ACKNOWLEDGED | IN_POSITION | RUNNING, RUNNING);
+    bench.run_ms(1000).shows(REACHED | ACKNOWLEDGED | IN_POSITION | RUNNING, REACHED | IN_POSITION);
 }
 
 #[test]
 fn a_halted_move_goes_on_to_its_target() {
     for option in [1, 2, 3] {
         let mut bench = Bench::new();
-        bench.set(0x605D, 0, option);
-        bench.enable_in(1);
-        bench.move_by(8000);
-        bench.run_ms(300);
-        bench.set(0x6040, 0, 0x15F);
-        bench.run_ms(150);
-        let halted = bench.get(0x6064, 0);
+        bench.set(0x605D, option).enable_in(1).move_by(8000).run_ms(300);
+        bench.set(0x6040, 0x15F).run_ms(150);
+        let halted = bench.get(0x6064);
         assert_eq!(bench.statusword() & (REACHED | RUNNING), REACHED, "605Dh = {option}: the motor stands");
-        bench.run_ms(300);
-        assert_eq!(bench.get(0x6064, 0), halted);
-        bench.set(0x6040, 0, 0x5F);
-        bench.run_ms(2000);
-        assert_eq!(bench.get(0x6064, 0), 8000);
+        bench.run_ms(300).reads(0x6064, halted);
+        bench.set(0x6040, 0x5F).run_ms(2000).reads(0x6064, 8000);
     }
 }
 
@@ -195,13 +156,8 @@ fn each_stop_takes_the_time_that_its_option_names() {
     // 605Ah: 5 slows down (6084h), 6 and 7 as 6085h says; each stays in quick stop active.
     for (option, seconds) in [(5, 0.3), (6, 0.05), (7, 0.05)] {
         let mut bench = Bench::new();
-        bench.set(0x605A, 0, option);
-        bench.set(0x6084, 0, 300);
-        bench.set(0x6085, 0, 50);
-        bench.enable_in(3);
-        bench.set(0x60FF, 0, 120);
-        bench.run_ms(500);
-        bench.set(0x6040, 0, 0x02);
+        bench.set(0x605A, option).set(0x6084, 300).set(0x6085, 50).enable_in(3).set(0x60FF, 120).run_ms(500);
+        bench.set(0x6040, 0x02);
         let taken = bench.seconds_until(1.0, LOOK, |report| report.velocity_demand_rpm == Some(0.0));
         assert_within("seconds", taken, seconds - 0.003, seconds + 0.002);
         bench.run_ms(500);
@@ -214,12 +170,8 @@ fn a_shutdown_ramps_first_or_switches_off_at_once() {
     for (index, controlword, state) in [(0x605B, 0x06, 0x21), (0x605C, 0x07, 0x23)] {
         for option in [1, 0] {
             let mut bench = Bench::new();
-            bench.set(index, 0, option);
-            bench.set(0x6084, 0, 300);
-            bench.enable_in(3);
-            bench.set(0x60FF, 0, 120);
-            bench.run_ms(500);
-            bench.set(0x6040, 0, controlword);
+            bench.set(index, option).set(0x6084, 300).enable_in(3).set(0x60FF, 120).run_ms(500);
+            bench.set(0x6040, controlword);
             let at_once = bench.statusword() & 0x6F;
             assert_eq!(at_once == state, option == 0, "{index:04X}h = {option}: {at_once:02X}h");
             bench.run_ms(500);
@@ -231,17 +183,15 @@ fn a_shutdown_ramps_first_or_switches_off_at_once() {
 #[test]
 fn a_target_beyond_its_range_is_refused() {
     let mut bench = Bench::new();
-    assert!(bench.write(0x607A, 0, 1_000_001).is_err());
-    assert_eq!(bench.get(0x607A, 0), 5000);
+    assert!(bench.write(0x607A, 1_000_001).is_err());
+    bench.reads(0x607A, 5000);
 }
 
 #[test]
 fn a_move_at_the_step_rate_limit_takes_its_closed_form() {
     // 6081h = 3000 r/min at 25600 pulses a turn: 200 kHz, 468.75 r/min, is what there is.
     let mut bench = Bench::new();
-    bench.set(0x2006, 0, 7);
-    bench.set(0x6081, 0, 3000);
-    bench.enable_in(1);
+    bench.set(0x2006, 7).set(0x6081, 3000).enable_in(1);
     let pulses_s = 25_600.0 / 60.0;
     let (start, top, end) = (5.0 * pulses_s, 200_000.0, 10.0 * pulses_s);
     let ramps = 0.5 * (start + top) * 0.1 + 0.5 * (top + end) * 0.1;
@@ -257,10 +207,9 @@ fn a_move_at_the_step_rate_limit_takes_its_closed_form() {
 fn a_motion_begins_at_200eh_and_a_move_ends_from_6082h() {
     let mut bench = Bench::new();
     for (index, value) in [(0x200E, 40), (0x6082, 30), (0x6081, 120), (0x6083, 500), (0x6084, 500)] {
-        bench.set(index, 0, value);
+        bench.set(index, value);
     }
-    bench.enable_in(1);
-    bench.move_by(8000);
+    bench.enable_in(1).move_by(8000);
     let mut speeds = Vec::new();
     while bench.report().velocity_demand_rpm != Some(0.0) || speeds.is_empty() {
         bench.run(LOOK);
@@ -270,8 +219,7 @@ fn a_motion_begins_at_200eh_and_a_move_ends_from_6082h() {
     assert_within("r/min at the beginning", speeds[0], 40.0, 40.2);
     assert_within("r/min at the end", speeds[speeds.len() - 1], 30.0, 30.2);
     assert_within("r/min in between", speeds.iter().copied().fold(0.0, f64::max), 119.9, 120.0);
-    bench.set(0x6060, 0, 3);
-    bench.set(0x60FF, 0, -120);
+    bench.set(0x6060, 3).set(0x60FF, -120);
     let first = bench.seconds_until(0.1, LOOK, |report| report.velocity_demand_rpm != Some(0.0));
     assert!(first < 0.01, "{first} s");
     assert_within("r/min", bench.report().velocity_demand_rpm.expect("enabled"), -40.2, -40.0);
@@ -280,19 +228,15 @@ fn a_motion_begins_at_200eh_and_a_move_ends_from_6082h() {
 #[test]
 fn a_reversal_ramps_down_by_6084h_and_up_by_6083h() {
     let mut bench = Bench::new();
-    bench.set(0x6083, 0, 200);
-    bench.set(0x6084, 0, 400);
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 300);
-    bench.run_ms(500);
-    bench.set(0x60FF, 0, -300);
+    bench.set(0x6083, 200).set(0x6084, 400).enable_in(3).set(0x60FF, 300).run_ms(500);
+    bench.set(0x60FF, -300);
     let down = bench.seconds_until(1.0, LOOK, |report| report.velocity_demand_rpm.is_some_and(|rpm| rpm <= 0.0));
     let up = bench.seconds_until(1.0, LOOK, |report| report.velocity_demand_rpm == Some(-300.0));
     // The answer to the write takes 0.5 ms of the first ramp.
     assert_within("seconds down", down, 0.397, 0.402);
     assert_within("seconds up", up, 0.197, 0.202);
     bench.run_ms(10);
-    let told = [0x2001, 0x2002, 0x606C].map(|index| bench.get(index, 0));
+    let told = [0x2001, 0x2002, 0x606C].map(|index| bench.get(index));
     assert_eq!(told, [1, -300, -300], "it runs, and both speeds have their sign");
 }
 
@@ -301,47 +245,36 @@ fn a_second_set_point_waits_for_the_first_and_a_third_is_not_taken() {
     let mut bench = Bench::new();
     bench.enable_in(1);
     let start = |bench: &mut Bench, target| {
-        bench.set(0x607A, 0, target);
-        bench.set(0x6040, 0, 0x0F);
-        bench.set(0x6040, 0, 0x1F);
+        bench.set(0x607A, target).set(0x6040, 0x0F).set(0x6040, 0x1F);
     };
     start(&mut bench, 2000);
     start(&mut bench, 500);
-    bench.set(0x6040, 0, 0x0F);
+    bench.set(0x6040, 0x0F);
     assert_ne!(bench.statusword() & ACKNOWLEDGED, 0, "the queue is full");
     start(&mut bench, 9000);
     let mut highest = 0;
     while bench.statusword() & REACHED == 0 {
         highest = highest.max(bench.report().position);
     }
-    assert_eq!((highest, bench.get(0x6064, 0)), (2000, 500));
+    assert_eq!((highest, bench.get(0x6064)), (2000, 500));
 }
 
 #[test]
 fn clearing_the_position_in_motion_changes_the_numbers_and_not_the_way() {
     let mut bench = Bench::new();
-    bench.enable_in(1);
-    bench.move_by(8000);
-    bench.run_ms(400);
-    bench.set(0x2012, 0, 1);
-    bench.run_ms(2000);
+    bench.enable_in(1).move_by(8000).run_ms(400);
+    bench.set(0x2012, 1).run_ms(2000);
     let turns = bench.report().shaft_angle_rad / std::f64::consts::TAU;
     assert_within("turns", turns, 1.999, 2.001);
-    assert_within("6064h", bench.get(0x6064, 0) as f64, 4000.0, 7900.0);
+    assert_within("6064h", bench.get(0x6064) as f64, 4000.0, 7900.0);
     // A relative move goes on from there, an absolute one counts from the new zero.
-    let here = bench.get(0x6064, 0);
-    bench.set(0x6040, 0, 0x0F);
-    bench.move_by(400);
-    bench.run_ms(500);
-    assert_eq!(bench.get(0x6064, 0), here + 400);
+    let here = bench.get(0x6064);
+    bench.set(0x6040, 0x0F).move_by(400).run_ms(500).reads(0x6064, here + 400);
 }
 
 /// Speeds of the rotor at a constant commanded one, r/min about it.
 fn swings(mut bench: Bench, setting: i64, rpm: i64) -> Vec<f64> {
-    bench.set(0x2006, 0, setting);
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, rpm);
-    bench.run_ms(1000);
+    bench.set(0x2006, setting).enable_in(3).set(0x60FF, rpm).run_ms(1000);
     let mut look = |_| {
         bench.run(Duration::from_micros(250));
         bench.report().velocity_rpm - rpm as f64

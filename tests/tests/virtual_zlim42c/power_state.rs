@@ -20,7 +20,7 @@ fn every_event_in_every_state_leads_where_the_table_says() {
 fn the_drive_says_that_it_has_booted_and_is_in_switch_on_disabled() {
     let mut bench = Bench::new();
     assert_eq!(bench.heard(), ["701#00"]);
-    assert_eq!(bench.statusword() & 0x6F, 0x60);
+    bench.shows(0x6F, 0x60);
 }
 
 #[test]
@@ -60,12 +60,12 @@ fn the_statusword_of_each_state_in_each_mode_at_rest() {
     for (mode, always, when_live) in modes {
         for (state, pattern, live) in states {
             let mut bench = Bench::new();
-            bench.set(0x6060, 0, mode);
+            bench.set(0x6060, mode);
             bench.reach(state);
             bench.run_ms(50);
             let expected = pattern | always | if live { when_live } else { 0 };
             assert_eq!(format!("{:04X}", bench.statusword()), format!("{expected:04X}"), "{state}, mode {mode}");
-            assert_eq!(bench.get(0x6061, 0), mode, "{state}");
+            assert_eq!(bench.get(0x6061), mode, "{state}");
         }
     }
 }
@@ -75,10 +75,8 @@ fn a_locked_shaft_stands_against_a_load_that_turns_a_free_one() {
     // 200Bh, not enabled. A tenth of the holding torque turns a motor that has its detent (0.012 N m) and its friction only.
     for (lock, stands) in [(0, false), (1, true)] {
         let mut bench = Bench::new();
-        bench.set(0x200B, 0, lock);
-        bench.run_ms(50);
-        bench.operate(|drive, now| drive.set_load_torque(0.05, now)).expect("a torque");
-        bench.run_ms(200);
+        bench.set(0x200B, lock).run_ms(50);
+        bench.set_load_torque(0.05).run_ms(200);
         let away = bench.report().rotor_position.expect("known here").abs();
         assert_eq!(away < 40, stands, "200Bh = {lock}: {away} pulses");
     }
@@ -97,7 +95,7 @@ fn the_motor_carries_current_from_switched_on_and_when_locked() {
         ("fault", 1, false),
     ] {
         let mut bench = Bench::new();
-        bench.set(0x200B, 0, locked);
+        bench.set(0x200B, locked);
         bench.reach(state);
         bench.run_ms(50);
         let current_a = bench.report().current_a;
@@ -110,7 +108,7 @@ fn the_motor_carries_current_from_switched_on_and_when_locked() {
 fn bit_11_mirrors_bit_4_of_the_controlword_in_every_state() {
     let mut bench = Bench::new();
     for (controlword, bit_11) in [(0x10, true), (0x06, false), (0x16, true), (0x0F, false), (0x1F, true)] {
-        bench.set(0x6040, 0, controlword);
+        bench.set(0x6040, controlword);
         assert_eq!(bench.statusword() & 1 << 11 != 0, bit_11, "{controlword:02X}h");
     }
 }

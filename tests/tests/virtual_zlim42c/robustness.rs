@@ -66,38 +66,27 @@ fn recovers(bench: &mut Bench, seed: u64) {
     });
     // What it has fed, up to a hundred volts, goes away with the drive's own 1 W.
     bench.run_ms(2000);
-    bench.operate(|drive, now| drive.set_rotor_locked(false, now)).expect("a rotor");
-    bench.set(0x2010, 0, 1);
-    bench.let_store();
-    bench.power_cycle();
-    bench.run_ms(100);
-    assert_eq!((bench.statusword(), bench.get(0x603F, 0), bench.get(0x2006, 0)), (0x0270, 0, 10), "seed {seed}");
-    bench.enable_in(1);
-    bench.move_by(400);
-    bench.run_ms(1000);
-    assert_eq!(bench.get(0x6064, 0), 400, "seed {seed}");
+    bench.set_rotor_locked(false).set(0x2010, 1).let_store().power_cycle().run_ms(100);
+    assert_eq!((bench.statusword(), bench.get(0x603F), bench.get(0x2006)), (0x0270, 0, 10), "seed {seed}");
+    bench.enable_in(1).move_by(400).run_ms(1000);
+    assert_eq!(bench.get(0x6064), 400, "seed {seed}");
 }
 
 #[test]
 fn a_brown_out_in_motion_restarts_the_drive_at_position_0_with_its_stored_values() {
     let mut bench = Bench::new();
-    bench.set(0x2005, 0, 5);
-    bench.set(0x200E, 0, 50);
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, 120);
-    bench.run_ms(1000);
-    let turned = bench.get(0x6064, 0);
+    bench.set(0x2005, 5).set(0x200E, 50).enable_in(3).set(0x60FF, 120).run_ms(1000);
+    let turned = bench.get(0x6064);
     assert!(turned > 4000, "{turned} pulses");
     bench.heard();
     // Down to 5 V, where no converter of the drive runs, and back.
     for supply_v in [5.0, 24.0] {
-        bench.operate(|drive, now| drive.set_supply(supply_v, now)).expect("a supply");
-        bench.run_ms(1000);
+        bench.set_supply(supply_v).run_ms(1000);
     }
     assert_eq!(bench.heard().iter().filter(|frame| *frame == "701#00").count(), 1);
-    assert_eq!((bench.statusword(), bench.get(0x6064, 0), bench.get(0x603F, 0)), (0x0270, 0, 0));
-    assert_eq!((bench.get(0x6060, 0), bench.get(0x60FF, 0), bench.get(0x606C, 0)), (0, 0, 0));
-    assert_eq!((bench.get(0x2005, 0), bench.get(0x200E, 0)), (5, 5), "2005h is stored, 200Eh is not");
+    assert_eq!((bench.statusword(), bench.get(0x6064), bench.get(0x603F)), (0x0270, 0, 0));
+    assert_eq!((bench.get(0x6060), bench.get(0x60FF), bench.get(0x606C)), (0, 0, 0));
+    assert_eq!((bench.get(0x2005), bench.get(0x200E)), (5, 5), "2005h is stored, 200Eh is not");
     // The free rotor rests in its detent, at most half an electrical turn from where the vector will stand up.
     let rotor = bench.report().rotor_position.expect("known here");
     assert!(rotor.abs() <= 40, "both begin anew: {rotor}");
@@ -112,14 +101,11 @@ fn power_that_goes_at_any_moment_of_a_save_leaves_the_old_values_or_the_new_ones
 fn power_that_goes_while_factory_settings_are_restored_leaves_the_old_values_or_the_factory_ones() {
     for delay_us in (0..2000).step_by(50) {
         let mut bench = Bench::new();
-        bench.set(0x2005, 0, 7);
-        bench.set(0x2006, 0, 4);
-        bench.let_store();
+        bench.set(0x2005, 7).set(0x2006, 4).let_store();
         let restore = "601#2B10200001000000".parse().expect("a frame");
         bench.world.send(bench.host, restore).expect("room");
-        bench.run(Duration::from_micros(delay_us));
-        bench.power_cycle();
-        let kept = (bench.get(0x2005, 0), bench.get(0x2006, 0));
+        bench.run(Duration::from_micros(delay_us)).power_cycle();
+        let kept = (bench.get(0x2005), bench.get(0x2006));
         assert!(kept == (3, 10) || kept == (7, 4), "off after {delay_us} us: {kept:?}");
     }
 }
@@ -130,7 +116,7 @@ fn speeds_and_times_at_the_ends_of_their_ranges_still_end_on_the_target() {
         for (up_ms, down_ms) in [(0, 0), (2000, 0), (0, 2000), (2000, 2000)] {
             let mut bench = Bench::new();
             for (index, value) in [(0x6081, top), (0x200E, start), (0x6082, end), (0x6083, up_ms), (0x6084, down_ms)] {
-                bench.set(index, 0, value);
+                bench.set(index, value);
             }
             bench.enable_in(1);
             let mut expected = 0;
@@ -139,7 +125,7 @@ fn speeds_and_times_at_the_ends_of_their_ranges_still_end_on_the_target() {
                 expected += pulses;
                 bench.seconds_until(30.0, Duration::from_millis(5), |report| report.velocity_demand_rpm == Some(0.0));
                 bench.run_ms(2);
-                assert_eq!(bench.get(0x6064, 0), expected, "{pulses} at {top}, {start}, {end}, {up_ms}, {down_ms}");
+                assert_eq!(bench.get(0x6064), expected, "{pulses} at {top}, {start}, {end}, {up_ms}, {down_ms}");
                 assert_ne!(bench.statusword() & 1 << 10, 0);
             }
         }
@@ -151,20 +137,19 @@ fn set_points_that_replace_each_other_at_any_moment_end_on_the_last_one() {
     for seed in 0..40 {
         let mut seeded = Seeded::new(seed);
         let mut bench = Bench::new();
-        bench.set(0x2006, 0, seeded.below(16) as i64);
-        bench.enable_in(1);
+        bench.set(0x2006, seeded.below(16) as i64).enable_in(1);
         let mut expected = 0;
         for _ in 0..12 {
             let mut up_to = |most: usize| seeded.below(most) as i64;
             let settings =
                 [(0x6081, 60 + up_to(900)), (0x6082, 5 + up_to(100)), (0x200E, 2 + up_to(100)), (0x6083, up_to(300))];
             for (index, value) in settings.into_iter().chain([(0x6084, up_to(300))]) {
-                bench.set(index, 0, value);
+                bench.set(index, value);
             }
             let (target, relative) = (up_to(4000) - 2000, up_to(2) == 0);
             let controlword = if relative { 0x6F } else { 0x2F };
             for (index, value) in [(0x607A, target), (0x6040, controlword), (0x6040, controlword | 0x10)] {
-                bench.set(index, 0, value);
+                bench.set(index, value);
             }
             expected = if relative { expected + target } else { target };
             let mut last = bench.report().position;
@@ -177,7 +162,7 @@ fn set_points_that_replace_each_other_at_any_moment_end_on_the_last_one() {
         }
         bench.seconds_until(100.0, Duration::from_millis(20), |report| report.velocity_demand_rpm == Some(0.0));
         bench.run_ms(2);
-        assert_eq!(bench.get(0x6064, 0), expected, "seed {seed}");
+        assert_eq!(bench.get(0x6064), expected, "seed {seed}");
     }
 }
 
@@ -213,10 +198,8 @@ fn any_bytes_on_the_sdo_channel_are_survived() {
             // A block transfer's end and an abort get no answer; nothing gets more than one.
             let _ = bench.sdo(&request);
         }
-        bench.set(0x2010, 0, 1);
-        bench.let_store();
-        bench.power_cycle();
-        assert_eq!((bench.statusword(), bench.get(0x1000, 0)), (0x0270, 0x0004_0192), "seed {seed}");
+        bench.set(0x2010, 1).let_store().power_cycle();
+        assert_eq!((bench.statusword(), bench.get(0x1000)), (0x0270, 0x0004_0192), "seed {seed}");
     }
 }
 
@@ -224,8 +207,7 @@ fn any_bytes_on_the_sdo_channel_are_survived() {
 fn a_run_is_the_same_whatever_the_strides_of_time() {
     let run = |strides_us: &[u64]| {
         let mut bench = Bench::new();
-        bench.enable_in(1);
-        bench.move_by(12_345);
+        bench.enable_in(1).move_by(12_345);
         let end = bench.world.now() + Duration::from_millis(700);
         for stride_us in strides_us.iter().cycle() {
             let left = Duration::from_nanos(end.nanos_since(bench.world.now()));
@@ -249,17 +231,16 @@ fn a_sound_motor_has_no_fault_but_over_voltage_whatever_it_is_asked_and_whatever
         let mut seeded = Seeded::new(seed);
         let mut bench = if seed % 2 == 0 { Bench::new() } else { Bench::long() };
         let supply_v = 20.0 + seeded.below(11) as f64;
-        bench.operate(|drive, now| drive.set_supply(supply_v, now)).expect("a supply");
+        bench.set_supply(supply_v);
         for (index, most) in [(0x2005, 8), (0x2006, 16), (0x2007, 2)] {
-            bench.set(index, 0, seeded.below(most) as i64);
+            bench.set(index, seeded.below(most) as i64);
         }
         bench.enable_in(3);
         for step in 0..30 {
             // Now and then nearly no ramp: the vector jumps.
             let ramp_ms = if seeded.below(3) == 0 { 5 } else { 1000 };
-            bench.set(0x6083, 0, seeded.below(ramp_ms) as i64);
-            bench.set(0x6084, 0, seeded.below(ramp_ms) as i64);
-            bench.set(0x60FF, 0, seeded.below(6001) as i64 - 3000);
+            bench.set(0x6083, seeded.below(ramp_ms) as i64).set(0x6084, seeded.below(ramp_ms) as i64);
+            bench.set(0x60FF, seeded.below(6001) as i64 - 3000);
             let (torque_nm, choice) = (seeded.below(13) as f64 * 0.1 - 0.6, seeded.below(6));
             bench.operate(|drive, now| {
                 match choice {

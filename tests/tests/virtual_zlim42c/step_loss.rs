@@ -9,7 +9,7 @@ use crate::bench::{Bench, assert_within};
 const FOUR_STEPS: i64 = 80;
 
 fn load(bench: &mut Bench, torque_nm: f64) {
-    bench.operate(|drive, now| drive.set_load_torque(torque_nm, now)).expect("a torque");
+    bench.set_load_torque(torque_nm);
 }
 
 /// Enabled with the highest current, also at standstill.
@@ -18,23 +18,19 @@ fn strong() -> Bench {
 }
 
 fn at_the_highest_current(mut bench: Bench) -> Bench {
-    bench.set(0x2005, 0, 7);
-    bench.set(0x2007, 0, 1);
-    bench.enable_in(1);
-    bench.run_ms(50);
+    bench.set(0x2005, 7).set(0x2007, 1).enable_in(1).run_ms(50);
     bench
 }
 
 /// Moves two turns while `disturb` does something to the shaft; pulses that the rotor lost.
 fn lost_in_a_move(disturb: impl FnOnce(&mut Bench)) -> i64 {
     let mut bench = strong();
-    bench.move_by(8000);
-    bench.run_ms(400);
+    bench.move_by(8000).run_ms(400);
     disturb(&mut bench);
     bench.run_ms(3000);
     let report = bench.report();
     assert_eq!((report.position, report.error_code), (8000, 0), "{report:?}");
-    assert_eq!((bench.get(0x6064, 0), bench.get(0x603F, 0)), (8000, 0), "the drive knows nothing");
+    assert_eq!((bench.get(0x6064), bench.get(0x603F)), (8000, 0), "the drive knows nothing");
     assert_ne!(bench.statusword() & 1 << 10, 0, "target reached, as far as the drive knows");
     report.position - report.rotor_position.expect("the rotor's place is known here")
 }
@@ -43,9 +39,8 @@ fn lost_in_a_move(disturb: impl FnOnce(&mut Bench)) -> i64 {
 fn a_blocked_rotor_loses_a_multiple_of_four_full_steps_and_the_drive_does_not_notice() {
     for blocked_ms in [30, 100, 333] {
         let lost = lost_in_a_move(|bench| {
-            bench.operate(|drive, now| drive.set_rotor_locked(true, now)).expect("a rotor");
-            bench.run_ms(blocked_ms);
-            bench.operate(|drive, now| drive.set_rotor_locked(false, now)).expect("a rotor");
+            bench.set_rotor_locked(true).run_ms(blocked_ms);
+            bench.set_rotor_locked(false);
         });
         // 120 r/min are 8 pulses a ms; the rotor falls in at one of the turns around where it is.
         let missed = 8 * blocked_ms as i64;
@@ -60,7 +55,7 @@ fn an_overloaded_rotor_loses_a_multiple_of_four_full_steps_and_a_pushed_one_gain
     for torque_nm in [0.6, -0.6] {
         let losses = [8, 10, 12].map(|ms| {
             lost_in_a_move(|bench| {
-                bench.operate(|drive, now| drive.set_load_inertia(5e-5, now)).expect("an inertia");
+                bench.set_load_inertia(5e-5);
                 load(bench, torque_nm);
                 bench.run_ms(ms);
                 load(bench, 0.0);
@@ -118,7 +113,7 @@ fn the_longer_motor_holds_what_the_manual_gives_it() {
 fn a_rotor_pulled_while_it_is_held_falls_in_again_whole_turns_of_the_field_away() {
     for torque_nm in [0.8, -0.8] {
         let mut bench = strong();
-        bench.operate(|drive, now| drive.set_load_inertia(5e-5, now)).expect("an inertia");
+        bench.set_load_inertia(5e-5);
         load(&mut bench, torque_nm);
         bench.run_ms(7);
         load(&mut bench, 0.0);
@@ -126,14 +121,9 @@ fn a_rotor_pulled_while_it_is_held_falls_in_again_whole_turns_of_the_field_away(
         let report = bench.report();
         let pulled = report.rotor_position.expect("known here");
         assert_eq!((pulled % FOUR_STEPS, pulled.signum() as f64), (0, -torque_nm.signum()), "{pulled} pulses");
-        assert_eq!(
-            (bench.get(0x6064, 0), bench.get(0x606C, 0), bench.get(0x603F, 0)),
-            (0, 0, 0),
-            "the drive knows nothing"
-        );
+        assert_eq!((bench.get(0x6064), bench.get(0x606C), bench.get(0x603F)), (0, 0, 0), "the drive knows nothing");
         // The next move starts from where the drive believes to be: the loss stays.
-        bench.move_by(4000);
-        bench.run_ms(1500);
+        bench.move_by(4000).run_ms(1500);
         let report = bench.report();
         assert_eq!((report.position, report.rotor_position), (4000, Some(4000 + pulled)));
     }
@@ -148,10 +138,7 @@ fn a_load_that_is_carried_slowly_is_lost_at_speed() {
     // The fast rotor is let go after some ms: a load that drives it would feed the bus until the drive trips.
     for (rpm, load_ms, keeps) in [(60, 500, true), (2400, 5, false)] {
         let mut bench = strong();
-        bench.set(0x6060, 0, 3);
-        bench.set(0x6083, 0, 2000);
-        bench.set(0x60FF, 0, rpm);
-        bench.run_ms(2500);
+        bench.set(0x6060, 3).set(0x6083, 2000).set(0x60FF, rpm).run_ms(2500);
         assert_within("r/min", bench.report().velocity_rpm, 0.5 * rpm as f64, 1.5 * rpm as f64);
         load(&mut bench, 0.25);
         bench.run_ms(load_ms);
@@ -160,7 +147,7 @@ fn a_load_that_is_carried_slowly_is_lost_at_speed() {
         let report = bench.report();
         let lost = report.position - report.rotor_position.expect("known here");
         assert_eq!(lost.abs() < FOUR_STEPS, keeps, "{rpm} r/min: {lost} pulses, {report:?}");
-        assert_eq!((bench.get(0x606C, 0), bench.get(0x603F, 0)), (rpm, 0), "the drive knows nothing");
+        assert_eq!((bench.get(0x606C), bench.get(0x603F)), (rpm, 0), "the drive knows nothing");
     }
 }
 
@@ -169,12 +156,8 @@ fn a_higher_setting_of_2005h_carries_a_load_that_a_lower_one_loses() {
     // K = 0.48 N m / 2.2 A: 0.8 A give 0.17 N m, 2.2 A give 0.48 N m.
     for (setting, keeps) in [(2, false), (7, true)] {
         let mut bench = Bench::new();
-        bench.set(0x2005, 0, setting);
-        bench.set(0x2007, 0, 1);
-        bench.enable_in(1);
-        bench.run_ms(50);
-        bench.move_by(4000);
-        bench.run_ms(300);
+        bench.set(0x2005, setting).set(0x2007, 1).enable_in(1).run_ms(50);
+        bench.move_by(4000).run_ms(300);
         for part in 1..=10 {
             load(&mut bench, 0.03 * f64::from(part));
             bench.run_ms(10);
@@ -191,8 +174,7 @@ fn a_higher_setting_of_2005h_carries_a_load_that_a_lower_one_loses() {
 #[test]
 fn half_the_current_at_rest_holds_half_the_load() {
     let mut bench = strong();
-    bench.set(0x2007, 0, 0);
-    bench.run_ms(50);
+    bench.set(0x2007, 0).run_ms(50);
     load(&mut bench, 0.35);
     bench.run_ms(500);
     let report = bench.report();
@@ -203,7 +185,6 @@ fn half_the_current_at_rest_holds_half_the_load() {
 fn a_free_rotor_turns_under_its_load_and_the_position_stays() {
     let mut bench = Bench::new();
     load(&mut bench, -0.1);
-    bench.run_ms(200);
-    assert_eq!(bench.get(0x6064, 0), 0);
+    bench.run_ms(200).reads(0x6064, 0);
     assert!(bench.report().shaft_angle_rad > 1.0, "6040h = 0: free but for the detent");
 }

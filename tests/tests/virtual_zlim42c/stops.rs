@@ -20,17 +20,16 @@ const RUNNING: u16 = 1 << 14;
 fn turning(mode: i64) -> Bench {
     let mut bench = Bench::new();
     for (index, value) in [(0x6084, 300), (0x6085, 50), (0x609A, 200), (0x6098, 18)] {
-        bench.set(index, 0, value);
+        bench.set(index, value);
     }
-    bench.set(0x2030, 4, EMERGENCY_STOP);
-    bench.enable_in(mode);
+    bench.set((0x2030, 4), EMERGENCY_STOP).enable_in(mode);
     match mode {
         1 => bench.move_by(100_000),
-        3 => bench.set(0x60FF, 0, 120),
-        _ => bench.set(0x6040, 0, 0x1F),
-    }
+        3 => bench.set(0x60FF, 120),
+        _ => bench.set(0x6040, 0x1F),
+    };
     bench.run_ms(500);
-    assert_eq!(bench.get(0x606C, 0), 120, "mode {mode}");
+    assert_eq!(bench.get(0x606C), 120, "mode {mode}");
     bench
 }
 
@@ -55,9 +54,9 @@ fn halt_takes_the_ramp_of_605dh_in_every_mode_and_stays_enabled() {
         for option in [1, 2, 3] {
             let at = format!("mode {mode}, 605Dh = {option}");
             let mut bench = turning(mode);
-            bench.set(0x605D, 0, option);
+            bench.set(0x605D, option);
             let controlword = if mode == 3 { 0x10F } else { 0x15F };
-            bench.set(0x6040, 0, controlword);
+            bench.set(0x6040, controlword);
             if option == 1 {
                 assert_eq!(bench.statusword() & (REACHED | RUNNING), RUNNING, "{at}: it slows down");
             }
@@ -66,9 +65,8 @@ fn halt_takes_the_ramp_of_605dh_in_every_mode_and_stays_enabled() {
             bench.run_ms(2);
             assert_eq!(bench.statusword() & 0x6F, 0x27, "{at}: operation enabled");
             assert_eq!(bench.statusword() & (REACHED | RUNNING), REACHED, "{at}: it stands");
-            bench.set(0x6040, 0, controlword & 0xFF);
-            bench.run_ms(300);
-            assert_eq!(bench.get(0x606C, 0), 120, "{at}: it goes on");
+            bench.set(0x6040, controlword & 0xFF).run_ms(300);
+            assert_eq!(bench.get(0x606C), 120, "{at}: it goes on");
         }
     }
 }
@@ -79,20 +77,15 @@ fn a_set_point_given_under_halt_waits_for_its_end_at_rest_and_on_the_way() {
         let mut bench = Bench::new();
         bench.enable_in(1);
         if on_the_way {
-            bench.move_by(100_000);
-            bench.run_ms(500);
+            bench.move_by(100_000).run_ms(500);
         }
-        bench.set(0x6040, 0, 0x10F);
-        bench.set(0x607A, 0, 3000);
-        bench.set(0x6040, 0, 0x13F);
+        bench.set(0x6040, 0x10F).set(0x607A, 3000).set(0x6040, 0x13F).run_ms(500);
+        let halted = bench.get(0x6064);
         bench.run_ms(500);
-        let halted = bench.get(0x6064, 0);
-        bench.run_ms(500);
-        assert_eq!(bench.get(0x6064, 0), halted, "on the way: {on_the_way}");
+        assert_eq!(bench.get(0x6064), halted, "on the way: {on_the_way}");
         assert!(on_the_way || halted == 0, "{halted}");
-        bench.set(0x6040, 0, 0x0F);
-        bench.run_ms(2000);
-        assert_eq!(bench.get(0x6064, 0), 3000, "on the way: {on_the_way}");
+        bench.set(0x6040, 0x0F).run_ms(2000);
+        assert_eq!(bench.get(0x6064), 3000, "on the way: {on_the_way}");
     }
 }
 
@@ -102,15 +95,13 @@ fn quick_stop_takes_the_ramp_of_605ah_in_every_mode_and_nothing_goes_on_by_itsel
         for (option, kind) in [(5, 1), (6, 2), (7, 3)] {
             let at = format!("mode {mode}, 605Ah = {option}");
             let mut bench = turning(mode);
-            bench.set(0x605A, 0, option);
-            bench.set(0x6040, 0, 0x02);
+            bench.set(0x605A, option).set(0x6040, 0x02);
             stops_within(&mut bench, &at, (ramp_s(mode, kind) - 0.0005).max(0.0));
             bench.run_ms(100);
             assert_eq!(bench.statusword() & 0x206F, 0x2007, "{at}: quick stop active, energised");
-            bench.set(0x6040, 0, 0x0F);
-            bench.run_ms(300);
+            bench.set(0x6040, 0x0F).run_ms(300);
             assert_eq!(bench.statusword() & 0x6F, 0x27, "{at}: transition 16");
-            assert_eq!(bench.get(0x606C, 0), if mode == 3 { 120 } else { 0 }, "{at}");
+            assert_eq!(bench.get(0x606C), if mode == 3 { 120 } else { 0 }, "{at}");
         }
     }
 }
@@ -119,18 +110,13 @@ fn quick_stop_takes_the_ramp_of_605ah_in_every_mode_and_nothing_goes_on_by_itsel
 fn an_emergency_stop_input_ends_a_move_and_a_homing_for_good() {
     for mode in [1, 3, 6] {
         let mut bench = turning(mode);
-        bench.set(0x605A, 0, 6);
-        bench.input(2, true);
-        bench.run_ms(60);
-        assert_eq!(bench.get(0x606C, 0), 0, "mode {mode}");
-        let stopped = bench.get(0x6064, 0);
+        bench.set(0x605A, 6).input(2, true).run_ms(60);
+        assert_eq!(bench.get(0x606C), 0, "mode {mode}");
+        let stopped = bench.get(0x6064);
         // No start while it is active, none by itself after it.
-        bench.set(0x6040, 0, 0x0F);
-        bench.set(0x6040, 0, 0x5F);
-        bench.run_ms(100);
-        bench.input(2, false);
-        bench.run_ms(300);
-        assert_eq!((bench.get(0x6064, 0), bench.get(0x60FF, 0)), (stopped, 0), "mode {mode}");
+        bench.set(0x6040, 0x0F).set(0x6040, 0x5F).run_ms(100);
+        bench.input(2, false).run_ms(300);
+        assert_eq!((bench.get(0x6064), bench.get(0x60FF)), (stopped, 0), "mode {mode}");
         assert_eq!(bench.statusword() & (1 << 8), 0, "mode {mode}: homing attained");
         assert_eq!(bench.statusword() & 0x6F, 0x27, "mode {mode}");
     }
@@ -142,16 +128,14 @@ fn shutdown_and_disable_operation_ramp_down_in_every_mode_before_they_act() {
         for (controlword, state) in [(0x06, 0x21), (0x07, 0x23)] {
             let at = format!("mode {mode}, 6040h = {controlword:02X}h");
             let mut bench = turning(mode);
-            bench.set(0x6040, 0, controlword);
+            bench.set(0x6040, controlword);
             assert_eq!(bench.statusword() & 0x6F, 0x27, "{at}: enabled on the ramp");
             stops_within(&mut bench, &at, ramp_s(mode, 1) - 0.0015);
             bench.run_ms(2);
             assert_eq!(bench.statusword() & 0x6F, state, "{at}");
             // What was under way is over.
-            bench.set(0x60FF, 0, 0);
-            bench.set(0x6040, 0, 0x0F);
-            bench.run_ms(300);
-            assert_eq!((bench.statusword() & 0x6F, bench.get(0x606C, 0)), (0x27, 0), "{at}: enabled again");
+            bench.set(0x60FF, 0).set(0x6040, 0x0F).run_ms(300);
+            assert_eq!((bench.statusword() & 0x6F, bench.get(0x606C)), (0x27, 0), "{at}: enabled again");
         }
     }
 }
@@ -160,22 +144,20 @@ fn shutdown_and_disable_operation_ramp_down_in_every_mode_before_they_act() {
 fn disable_voltage_frees_the_motor_at_once_in_every_mode() {
     for mode in [1, 3, 6] {
         let mut bench = turning(mode);
-        bench.set(0x6040, 0, 0x00);
+        bench.set(0x6040, 0x00);
         assert_eq!(bench.statusword() & 0x4F, 0x40, "mode {mode}: switch on disabled");
         assert_eq!(bench.report().velocity_demand_rpm, None, "mode {mode}: no ramp");
         bench.run_ms(50);
-        assert_eq!((bench.report().current_a, bench.get(0x606C, 0)), (0.0, 0), "mode {mode}");
+        assert_eq!((bench.report().current_a, bench.get(0x606C)), (0.0, 0), "mode {mode}");
     }
 }
 
 /// Turning at `rpm` in profile velocity, after a ramp of a second.
 fn at_speed(mut bench: Bench, rpm: i64) -> Bench {
     for index in [0x6083, 0x6084] {
-        bench.set(index, 0, 1000);
+        bench.set(index, 1000);
     }
-    bench.enable_in(3);
-    bench.set(0x60FF, 0, rpm);
-    bench.run_ms(1500);
+    bench.enable_in(3).set(0x60FF, rpm).run_ms(1500);
     bench
 }
 
@@ -193,18 +175,16 @@ const EMERGENCY_STOPS: [&str; 3] = ["605Ah = 7", "605Dh = 3", "200Ah = 1"];
 fn emergency_stop(bench: &mut Bench, how: &str) {
     match how {
         "605Ah = 7" => {
-            bench.set(0x605A, 0, 7);
-            bench.set(0x6040, 0, 0x02);
+            bench.set(0x605A, 7).set(0x6040, 0x02);
         }
         "605Dh = 3" => {
-            bench.set(0x605D, 0, 3);
-            bench.set(0x6040, 0, 0x10F);
+            bench.set(0x605D, 3).set(0x6040, 0x10F);
         }
         _ => {
             for (index, sub, value) in [(0x200A, 0, 1), (0x2030, 2, 2), (0x204B, 0, 0)] {
-                bench.set(index, sub, value);
+                bench.set((index, sub), value);
             }
-            bench.operate(|drive, now| drive.set_input(0, true, now)).expect("X0");
+            bench.set_input(0, true);
         }
     }
 }
@@ -214,7 +194,7 @@ fn every_emergency_stop_takes_the_time_of_6085h() {
     for how in EMERGENCY_STOPS {
         for ms in [50, 400] {
             let mut bench = at_speed(Bench::new(), 120);
-            bench.set(0x6085, 0, ms);
+            bench.set(0x6085, ms);
             emergency_stop(&mut bench, how);
             stops_within(&mut bench, how, ms as f64 * 1e-3 - 0.0005);
         }
@@ -247,42 +227,29 @@ fn an_emergency_stop_that_coasts_switches_the_bridges_off_and_takes_the_motor_ag
         let state = if how == "605Ah = 7" { 0x07 } else { 0x27 };
         assert_eq!(bench.statusword() & 0x6F, state, "{how}");
         // The cause goes, and the target velocity holds again.
-        bench.operate(|drive, now| drive.set_input(0, false, now)).expect("X0");
-        bench.set(0x6040, 0, 0x0F);
-        bench.run_ms(1200);
-        assert_eq!((bench.statusword() & 0x206F, bench.get(0x606C, 0)), (0x2027, 300), "{how}");
+        bench.set_input(0, false).set(0x6040, 0x0F).run_ms(1200);
+        assert_eq!((bench.statusword() & 0x206F, bench.get(0x606C)), (0x2027, 300), "{how}");
     }
 }
 
 #[test]
 fn a_move_halted_by_coasting_goes_on_to_its_target() {
     let mut bench = Bench::choosing("Z092", "coast");
-    bench.set(0x605D, 0, 3);
-    bench.enable_in(1);
-    bench.move_by(8000);
-    bench.run_ms(300);
-    bench.set(0x6040, 0, 0x15F);
-    bench.run_ms(300);
+    bench.set(0x605D, 3).enable_in(1).move_by(8000).run_ms(300);
+    bench.set(0x6040, 0x15F).run_ms(300);
     assert_eq!(bench.report().current_a, 0.0);
-    bench.set(0x6040, 0, 0x5F);
-    bench.run_ms(2000);
-    assert_eq!(bench.get(0x6064, 0), 8000);
+    bench.set(0x6040, 0x5F).run_ms(2000).reads(0x6064, 8000);
 }
 
 #[test]
 fn another_mode_waits_until_the_motor_stands() {
     let mut bench = turning(3);
-    bench.set(0x6060, 0, 1);
-    bench.run_ms(100);
-    assert_eq!((bench.get(0x6060, 0), bench.get(0x6061, 0), bench.get(0x606C, 0)), (1, 3, 120));
-    bench.set(0x60FF, 0, 0);
-    bench.run_ms(350);
-    assert_eq!((bench.get(0x6061, 0), bench.get(0x606C, 0)), (1, 0));
-    bench.set(0x6060, 0, 0);
-    bench.run_ms(5);
-    bench.set(0x60FF, 0, 120);
-    bench.set(0x6040, 0, 0x1F);
-    bench.run_ms(100);
-    assert_eq!((bench.get(0x6061, 0), bench.get(0x606C, 0)), (0, 0), "without a mode nothing moves");
-    assert_eq!(bench.statusword(), 0x2A37);
+    bench.set(0x6060, 1).run_ms(100);
+    assert_eq!((bench.get(0x6060), bench.get(0x6061), bench.get(0x606C)), (1, 3, 120));
+    bench.set(0x60FF, 0).run_ms(350);
+    assert_eq!((bench.get(0x6061), bench.get(0x606C)), (1, 0));
+    bench.set(0x6060, 0).run_ms(5);
+    bench.set(0x60FF, 120).set(0x6040, 0x1F).run_ms(100);
+    assert_eq!((bench.get(0x6061), bench.get(0x606C)), (0, 0), "without a mode nothing moves");
+    bench.shows(0xFFFF, 0x2A37);
 }

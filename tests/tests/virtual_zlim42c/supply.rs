@@ -3,8 +3,7 @@
 use crate::bench::Bench;
 
 fn supply(bench: &mut Bench, supply_v: f64) {
-    bench.operate(|drive, now| drive.set_supply(supply_v, now)).expect("a supply");
-    bench.run_ms(200);
+    bench.set_supply(supply_v).run_ms(200);
 }
 
 #[test]
@@ -12,14 +11,9 @@ fn from_20_to_30_v_the_motor_does_its_work() {
     for supply_v in [20.0, 24.0, 30.0] {
         let mut bench = Bench::new();
         supply(&mut bench, supply_v);
-        bench.set(0x2005, 0, 7);
-        bench.set(0x2007, 0, 1);
-        bench.enable_in(1);
+        bench.set(0x2005, 7).set(0x2007, 1).enable_in(1);
         // Come at once, a torque swings the rotor twice as far: a third of the holding torque.
-        bench.operate(|drive, now| drive.set_load_torque(0.16, now)).expect("a torque");
-        bench.set(0x6081, 0, 300);
-        bench.move_by(8000);
-        bench.run_ms(2000);
+        bench.set_load_torque(0.16).set(0x6081, 300).move_by(8000).run_ms(2000);
         let report = bench.report();
         assert_eq!((report.position, report.error_code, report.powered), (8000, 0, true), "{supply_v} V");
         assert!(report.rotor_position.is_some_and(|rotor| (rotor - 8000).abs() < 20), "{supply_v} V: {report:?}");
@@ -30,9 +24,7 @@ fn from_20_to_30_v_the_motor_does_its_work() {
 fn below_20_v_the_drive_is_off_and_it_starts_anew_when_the_voltage_comes_back() {
     for supply_v in [19.0, 15.0, 0.0] {
         let mut bench = Bench::new();
-        bench.enable_in(3);
-        bench.set(0x60FF, 0, 60);
-        bench.run_ms(300);
+        bench.enable_in(3).set(0x60FF, 60).run_ms(300);
         bench.heard();
         supply(&mut bench, supply_v);
         let report = bench.report();
@@ -40,7 +32,7 @@ fn below_20_v_the_drive_is_off_and_it_starts_anew_when_the_voltage_comes_back() 
         assert_eq!(bench.sdo(&[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]), None, "{supply_v} V: nobody answers");
         supply(&mut bench, 24.0);
         assert_eq!(bench.heard_of("701#"), ["701#00"], "{supply_v} V");
-        assert_eq!((bench.statusword(), bench.get(0x60FF, 0)), (0x0270, 0), "{supply_v} V");
+        assert_eq!((bench.statusword(), bench.get(0x60FF)), (0x0270, 0), "{supply_v} V");
     }
 }
 
