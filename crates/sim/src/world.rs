@@ -3,6 +3,7 @@
 mod access;
 mod digest;
 mod due;
+mod ledger;
 mod log;
 mod member;
 mod step;
@@ -23,8 +24,8 @@ use crate::recorder::Recorder;
 use crate::wire::{Bus, ControllerOptions};
 use crate::{Prng, VirtualDrive};
 use due::DueTimes;
+use ledger::Ledger;
 use member::{Member, Nobody};
-use stores::Ledger;
 use tap::Tap;
 
 /// A bus with everything on it.

@@ -6,9 +6,8 @@ use std::path::PathBuf;
 
 use can::{Bitrate, Frame, Instant};
 
-use crate::log::{LogBus, LogError};
-use crate::slcan::SlcanBus;
-use crate::socketcand::{self, SocketcandBus};
+use crate::log::LogError;
+use crate::socketcand;
 
 /// A CAN bus behind a socket, a serial line or a file. Own frames do not come back.
 pub trait AsyncBus {
@@ -141,44 +140,4 @@ pub enum BusError {
     /// A virtual bus is part of the program that asks for it, not of this crate.
     #[error("a simulated bus is not reached through a connection; the program that wants it has to embed it")]
     Simulated,
-}
-
-/// Any bus that [`crate::BusSpec::open`] opens.
-#[derive(Debug)]
-pub enum AnyBus {
-    /// A socketcand server.
-    Socketcand(SocketcandBus),
-    /// An slcan adapter or server.
-    Slcan(SlcanBus),
-    /// A log.
-    Log(LogBus),
-}
-
-impl AnyBus {
-    /// Takes leave: an slcan adapter's channel is closed, so that it stops acknowledging frames on the bus. Dropping does
-    /// for the others.
-    pub async fn close(self) -> Result<(), BusError> {
-        match self {
-            Self::Slcan(bus) => bus.close().await,
-            Self::Socketcand(_) | Self::Log(_) => Ok(()),
-        }
-    }
-}
-
-impl AsyncBus for AnyBus {
-    async fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        match self {
-            Self::Socketcand(bus) => bus.send(frame).await,
-            Self::Slcan(bus) => bus.send(frame).await,
-            Self::Log(bus) => bus.send(frame).await,
-        }
-    }
-
-    async fn recv(&mut self) -> Result<(Instant, Frame), BusError> {
-        match self {
-            Self::Socketcand(bus) => bus.recv().await,
-            Self::Slcan(bus) => bus.recv().await,
-            Self::Log(bus) => bus.recv().await,
-        }
-    }
 }

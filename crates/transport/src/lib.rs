@@ -23,6 +23,7 @@
 //!
 //! Linux SocketCAN is deliberately absent so far: it needs a kernel module that few test machines have.
 
+mod any_bus;
 mod bus;
 mod bus_spec;
 mod clock;
@@ -37,7 +38,8 @@ pub mod socketcand;
 mod testing;
 mod text;
 
-pub use bus::{AnyBus, AsyncBus, BusError};
+pub use any_bus::AnyBus;
+pub use bus::{AsyncBus, BusError};
 pub use bus_spec::{BusSpec, ParseBusError, Protocol, ServeSpec};
 pub use clock::{Sleep, WallClock};
 pub use hub::{ClientId, Hub, HubError, HubEvent, HubOptions, LeaveReason, Listener};

@@ -8,7 +8,7 @@ use canopen::nmt::NmtTarget;
 use canopen::{Mux, NmtCommand, NodeId};
 use master::core::{Command, Core, MappedObject, Payload, PdoMap, Request, RpdoTrigger, Ticket, Transfer};
 
-use super::selected_frame;
+use super::selected_frame::selected_frame;
 
 /// A chunk is an action, how long it waits before, and ten bytes that are a frame or the command's arguments.
 pub(super) const SAMPLES: &[&[u8]] = &[

@@ -5,7 +5,7 @@ use drives::Firmware;
 use drives::mjoint::objects::{DATA_SAVE_FLAG, STATUSWORD, TABLE};
 use drives::mjoint::{Hardware, MJoint, Model, PowerStage, Sensors};
 
-use super::selected_frame;
+use super::selected_frame::selected_frame;
 
 /// A chunk is a selector, a length and eight bytes, see [`selected_frame`], and two for what the sensors read, see [`sensors`].
 pub(super) const SAMPLES: &[&[u8]] = &[

@@ -9,11 +9,10 @@ mod master_core;
 mod mjoint;
 mod modbus;
 mod node;
+mod selected_frame;
 mod stream;
 mod world_command;
 mod zl;
-
-use can::{CanId, Frame};
 
 /// A law, the name that a fuzz target has for it, and valid inputs to start from.
 #[derive(Debug, Clone, Copy)]
@@ -52,16 +51,4 @@ pub const ALL: &[Law] = &[
 pub fn check(name: &str, data: &[u8]) {
     let law = ALL.iter().find(|law| law.name == name).unwrap_or_else(|| panic!("no law is called {name}"));
     (law.holds)(data);
-}
-
-/// A frame out of ten bytes: the first picks one of `ids`, the second the kind and the length, which may be too short for
-/// what is sent there; missing bytes are 0.
-fn selected_frame(chunk: &[u8], ids: &[u16]) -> Frame {
-    let byte = |at: usize| chunk.get(at).copied().unwrap_or(0);
-    let data: [u8; 8] = std::array::from_fn(|at| byte(at + 2));
-    let id = CanId::standard(ids[usize::from(byte(0)) % ids.len()]);
-    if byte(1) & 0x80 != 0 {
-        return Frame::remote(id, byte(1) % 9);
-    }
-    Frame::new(id, &data[..usize::from(byte(1) % 9)])
 }

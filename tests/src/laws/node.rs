@@ -8,7 +8,7 @@ use canopen::sdo::wire;
 use canopen::{Node, NodeId, NodeProfile};
 use drives::zlac8030l::objects::{ROW_COUNT, TABLE};
 
-use super::selected_frame;
+use super::selected_frame::selected_frame;
 
 pub(super) const SDO_WIRE_SAMPLES: &[&[u8]] = &[
     b"\x2B\x40\x60\x00\x06\x00\x00\x00",

@@ -6,7 +6,7 @@ use canopen::od::{Slot, Table};
 use canopen::sdo::wire::Reply;
 use drives::{Firmware, zlac8030l, zlim42c};
 
-use super::selected_frame;
+use super::selected_frame::selected_frame;
 
 /// A chunk is a selector, a length and eight bytes, see [`selected_frame`], one byte for how long it lasts, see [`wait`],
 /// and two for what the sensors read.

@@ -5,17 +5,11 @@
 //! that a drive gives after a store, or while one is due, stays off the wire until [`World::confirm_store`]. Nothing else
 //! waits: process data and heartbeats acknowledge nothing.
 
-use std::collections::VecDeque;
-
 use can::{Frame, Instant};
-use canopen::connection_set::SDO_REPLY_BASE;
 
+use super::ledger::Ledger;
 use super::member::Member;
 use super::{StationId, World};
-use crate::VirtualDrive;
-
-/// Answers of one drive that may wait here. With as many waiting, what else it sends waits in the drive, by its own rules.
-const MAX_HELD: usize = 8;
 
 /// A new content of a drive's non-volatile memory.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -28,53 +22,6 @@ pub struct StoredImage {
     pub generation: u64,
     /// The content.
     pub bytes: Vec<u8>,
-}
-
-/// What is known of the stores of one drive.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Ledger {
-    handed_out: u64,
-    confirmed: u64,
-    held: VecDeque<Held>,
-}
-
-/// An answer that waits for a store.
-#[derive(Clone, Debug)]
-struct Held {
-    frame: Frame,
-    needs: u64,
-    since: Instant,
-}
-
-impl Ledger {
-    /// The store that an answer given now stands for: the last one, or the one that is due.
-    fn needed(drive: &dyn VirtualDrive) -> u64 {
-        drive.nvm_generation() + u64::from(drive.is_storing())
-    }
-
-    /// The next frame that may go to the wire. `limit` is the last store that the drive has made or is about to make: an
-    /// answer cannot wait for one that will not come.
-    fn next_frame(&mut self, drive: &mut dyn VirtualDrive, now: Instant) -> Option<Frame> {
-        let limit = Self::needed(drive);
-        if self.held.front().is_some_and(|held| held.needs.min(limit) <= self.confirmed) {
-            return self.held.pop_front().map(|held| held.frame);
-        }
-        while self.held.len() < MAX_HELD {
-            let frame = drive.poll_transmit()?;
-            let needs = Self::needed(drive);
-            if !is_sdo_answer(&frame) || needs <= self.confirmed {
-                return Some(frame);
-            }
-            self.held.push_back(Held { frame, needs, since: now });
-        }
-        None
-    }
-}
-
-/// The SDO answers of the predefined connection set (CiA 301, 7.3.5); no drive here moves them.
-fn is_sdo_answer(frame: &Frame) -> bool {
-    let id = frame.id();
-    !id.is_extended() && id.raw() & !0x7F == u32::from(SDO_REPLY_BASE)
 }
 
 impl World {
@@ -145,18 +92,6 @@ impl World {
     pub(super) fn forget_held(&mut self, i: usize) {
         if let Some(Some(ledger)) = self.ledgers.get_mut(i) {
             ledger.held.clear();
-        }
-    }
-}
-
-impl Ledger {
-    fn of_member(member: &Member) -> Option<Self> {
-        match member {
-            Member::Drive { drive, .. } => {
-                let generation = drive.nvm_generation();
-                Some(Self { handed_out: generation, confirmed: generation, held: VecDeque::new() })
-            }
-            _ => None,
         }
     }
 }

@@ -11,7 +11,8 @@ use tokio::net::TcpStream;
 use tokio::net::tcp::{ReadHalf, WriteHalf};
 use tokio::sync::{Semaphore, mpsc};
 
-use super::{ClientId, HubEvent, Session};
+use super::event::{ClientId, HubEvent};
+use super::session::Session;
 use crate::WallClock;
 use crate::link::within;
 

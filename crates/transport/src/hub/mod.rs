@@ -9,6 +9,7 @@
 //! place of the one that matters least: one that does not listen, or else the one that has been silent for the longest.
 
 mod client;
+mod event;
 mod session;
 
 use std::fmt;
@@ -26,6 +27,7 @@ use crate::slcan::SlcanSession;
 use crate::socketcand::SocketcandSession;
 use crate::{AsyncBus, BusError, Protocol, ServeSpec, WallClock};
 use client::{Stamped, Vitals};
+pub use event::{ClientId, HubEvent, LeaveReason};
 pub(crate) use session::{MAX_WAITING_REPLIES, Session};
 
 /// Frames of one client that may wait for the wire: the send queue of its controller. Linux gives an interface 10; a
@@ -40,16 +42,6 @@ const MAX_CLIENTS: usize = 256;
 
 /// Pause after a failed accept (out of file descriptors): the clients that are there go on.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
-
-/// A client of a hub; never used twice.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ClientId(u64);
-
-impl fmt::Display for ClientId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "client {}", self.0)
-    }
-}
 
 /// What a hub serves.
 #[derive(Clone, Debug)]
@@ -95,47 +87,6 @@ impl fmt::Display for Listener {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}://{}", self.protocol, self.address)
     }
-}
-
-/// Something that a client did.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum HubEvent {
-    /// A client connected.
-    Joined {
-        /// Who.
-        client: ClientId,
-        /// The protocol it came by.
-        protocol: Protocol,
-        /// Where from.
-        peer: SocketAddr,
-    },
-    /// A client sends a frame. Answer it with [`Hub::broadcast`] or [`Hub::discard`], now or later.
-    Frame {
-        /// Who.
-        client: ClientId,
-        /// What.
-        frame: Frame,
-    },
-    /// A client is gone. Its frames that came before still count.
-    Left {
-        /// Who.
-        client: ClientId,
-        /// Why.
-        reason: LeaveReason,
-    },
-}
-
-/// Why a client is gone.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LeaveReason {
-    /// It closed the connection, or asked for a bus that is not here.
-    Closed,
-    /// The connection broke.
-    Broken,
-    /// It did not read for so long that too many frames waited for it.
-    TooSlow,
-    /// It made room for another: it did not listen, or was silent for the longest, and there were too many.
-    Displaced,
 }
 
 /// Serves one bus on any number of listeners. Dropping it ends every connection.

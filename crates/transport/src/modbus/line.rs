@@ -3,7 +3,7 @@
 //! Silence is hard to see behind the buffers of an operating system, so a frame is taken as soon as its own length says
 //! that it is whole and its check is right. Only what has no such length, or contradicts itself, waits for the silence.
 
-use super::session::Adu;
+use super::adu::Adu;
 
 /// Longest frame (2.5.1.1).
 const MAX_FRAME: usize = 256;

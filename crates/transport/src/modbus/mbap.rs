@@ -1,8 +1,8 @@
 //! The header of Modbus TCP ("MODBUS Messaging on TCP/IP Implementation Guide V1.0b", 3.1.3): transaction, protocol,
 //! length of what follows, unit.
 
+use super::adu::Adu;
 use super::pdu::MAX_LENGTH;
-use super::session::Adu;
 
 /// Transaction, protocol and length.
 const HEAD: usize = 6;

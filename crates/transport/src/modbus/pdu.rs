@@ -1,7 +1,7 @@
 //! Requests and responses without what a medium puts around them ("MODBUS Application Protocol Specification V1.1b3",
 //! chapters 4, 6 and 7). Any bytes are a request, a refusal with the exception of the standard, or nothing to answer.
 
-use super::{ModbusException, RegisterAccess};
+use super::request::{ModbusException, RegisterAccess};
 
 /// Longest request or response (4.1).
 pub(super) const MAX_LENGTH: usize = 253;

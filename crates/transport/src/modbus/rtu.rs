@@ -5,8 +5,9 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 use tokio_serial::{SerialPortBuilder, SerialStream};
 
+use super::request::ModbusRequest;
+use super::service;
 use super::session::{ModbusMedium, ModbusSession};
-use super::{ModbusRequest, service};
 use crate::WallClock;
 
 /// Pause before a line that failed is opened again.

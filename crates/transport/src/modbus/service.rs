@@ -7,8 +7,8 @@ use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::sync::{mpsc, oneshot};
 
+use super::request::{ModbusException, ModbusRequest, RegisterAnswer};
 use super::session::{ModbusInquiry, ModbusSession};
-use super::{ModbusException, ModbusRequest, RegisterAnswer};
 use crate::WallClock;
 
 /// Read at once, in bytes: two of the longest requests.

@@ -1,6 +1,8 @@
 //! The server's end of one connection or line, sans-IO: bytes in, requests out; an answer in, bytes out.
 
-use super::{ModbusException, RegisterAccess, RegisterAnswer, line, mbap, pdu};
+use super::adu::Adu;
+use super::request::{ModbusException, RegisterAccess, RegisterAnswer};
+use super::{line, mbap, pdu};
 
 /// Address of a request to all on a serial line (serial line, 2.2).
 const BROADCAST: u8 = 0;
@@ -32,14 +34,6 @@ pub struct ModbusSession {
 enum Input {
     Tcp(Vec<u8>),
     SerialLine(line::Line),
-}
-
-/// A request as it came, without what the medium adds for itself.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Adu {
-    pub(super) transaction: u16,
-    pub(super) unit: u8,
-    pub(super) pdu: Vec<u8>,
 }
 
 impl ModbusSession {

@@ -9,8 +9,9 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::mpsc;
 use tokio::task::{AbortHandle, JoinSet};
 
+use super::request::ModbusRequest;
+use super::service;
 use super::session::{ModbusMedium, ModbusSession};
-use super::{ModbusRequest, service};
 use crate::WallClock;
 
 /// Clients served at a time.

@@ -1,0 +1,48 @@
+//! A bus of any of the kinds that this crate knows.
+
+use can::{Frame, Instant};
+
+use crate::bus::{AsyncBus, BusError};
+use crate::log::LogBus;
+use crate::slcan::SlcanBus;
+use crate::socketcand::SocketcandBus;
+
+/// Any bus that [`crate::BusSpec::open`] opens.
+#[derive(Debug)]
+pub enum AnyBus {
+    /// A socketcand server.
+    Socketcand(SocketcandBus),
+    /// An slcan adapter or server.
+    Slcan(SlcanBus),
+    /// A log.
+    Log(LogBus),
+}
+
+impl AnyBus {
+    /// Takes leave: an slcan adapter's channel is closed, so that it stops acknowledging frames on the bus. Dropping does
+    /// for the others.
+    pub async fn close(self) -> Result<(), BusError> {
+        match self {
+            Self::Slcan(bus) => bus.close().await,
+            Self::Socketcand(_) | Self::Log(_) => Ok(()),
+        }
+    }
+}
+
+impl AsyncBus for AnyBus {
+    async fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        match self {
+            Self::Socketcand(bus) => bus.send(frame).await,
+            Self::Slcan(bus) => bus.send(frame).await,
+            Self::Log(bus) => bus.send(frame).await,
+        }
+    }
+
+    async fn recv(&mut self) -> Result<(Instant, Frame), BusError> {
+        match self {
+            Self::Socketcand(bus) => bus.recv().await,
+            Self::Slcan(bus) => bus.recv().await,
+            Self::Log(bus) => bus.recv().await,
+        }
+    }
+}
