@@ -24,14 +24,17 @@
 
 mod check;
 mod data_type;
+mod diff;
 mod finding;
 mod model;
 mod read;
 mod value;
+mod write;
 
 pub mod document;
 
 pub use data_type::{Form, TypeCode};
+pub use diff::{Difference, diff};
 pub use finding::{Finding, Findings, Refusal, Severity};
 pub use model::{
     AccessType, Commissioning, DeviceInfo, DynamicChannel, Eds, FileInfo, KeptSection, List, Object, ObjectType,
@@ -39,3 +42,7 @@ pub use model::{
 };
 pub use read::Reading;
 pub use value::{Number, Value};
+pub use write::write;
+
+/// Bit rates that `[DeviceInfo]` has keys for, in kbit/s.
+pub const BIT_RATES: [u16; 8] = [10, 20, 50, 125, 250, 500, 800, 1000];

@@ -109,7 +109,8 @@ pub(crate) fn number(text: &str) -> Option<(Number, Option<Oddity>)> {
         (before, "") => before.strip_suffix('+')?.trim(),
         _ => return None,
     };
-    integer(other).map(|(base, oddity)| (Number { base, plus_node_id: true }, oddity))
+    let (base, oddity) = integer(other).filter(|(base, _)| *base >= 0)?;
+    Some((Number { base, plus_node_id: true }, oddity))
 }
 
 /// What most numbers of a file are: up to nine digits without a leading zero.
@@ -207,7 +208,7 @@ mod tests {
             assert_eq!(read(text), Some((0x180, true)), "{text}");
         }
         assert_eq!(read("$NODEID"), Some((0, true)));
-        for text in ["$NODEID-1", "$NODEID 1", "1+$NODEID+1", "$NODE", "$NODEID+", "$", "$NODEI\u{e4}"] {
+        for text in ["$NODEID-1", "$NODEID 1", "$NODEID+-1", "1+$NODEID+1", "$NODE", "$NODEID+", "$", "$NODEI\u{e4}"] {
             assert_eq!(read(text), None, "{text}");
         }
     }

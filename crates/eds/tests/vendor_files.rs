@@ -4,7 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use eds::document::Document;
-use eds::{Eds, Severity};
+use eds::{Eds, Severity, diff, write};
 
 fn files() -> Vec<PathBuf> {
     let Some(folder) = std::env::var_os("FERRODRIVE_EDS_FILES") else {
@@ -60,5 +60,15 @@ fn every_file_comes_back_byte_by_byte() {
         let bytes = fs::read(&path).expect("a readable file");
         let document = Document::parse(&bytes).expect("a file of a real size");
         assert!(document.to_bytes() == bytes, "{}", path.display());
+    }
+}
+
+#[test]
+fn every_file_reads_the_same_when_it_is_written_anew() {
+    for path in files() {
+        let eds = Eds::load(&fs::read(&path).expect("a readable file")).expect("a file that is read").eds;
+        let again = Eds::load(write(&eds).as_bytes()).expect("what is written can be read").eds;
+        assert_eq!(diff(&eds, &again), [], "{}", path.display());
+        assert_eq!(eds.variables().count(), again.variables().count(), "{}", path.display());
     }
 }

@@ -3,10 +3,7 @@
 use super::places::Info;
 use super::reader::{Reader, shortened};
 use crate::document::{Entry, Section};
-use crate::{DynamicChannel, KeptSection, TypeCode};
-
-/// Bit rates that `[DeviceInfo]` has keys for, in kbit/s.
-pub(crate) const BIT_RATES: [u16; 8] = [10, 20, 50, 125, 250, 500, 800, 1000];
+use crate::{BIT_RATES, DynamicChannel, KeptSection, TypeCode};
 
 impl Reader {
     pub(super) fn info(&mut self, which: Info, section: Section<'_>) {
