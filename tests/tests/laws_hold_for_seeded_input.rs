@@ -67,6 +67,11 @@ fn a_zlim42c_under_any_frames_and_sensors_keeps_its_objects_lawful() {
 }
 
 #[test]
+fn any_bytes_are_kept_as_they_are_and_what_they_say_can_be_written_and_read_again() {
+    check("eds");
+}
+
+#[test]
 fn any_memory_image_boots_to_values_within_their_limits() {
     check("eeprom");
 }

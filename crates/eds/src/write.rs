@@ -212,9 +212,15 @@ fn present(text: &str) -> Option<String> {
     (!text.is_empty()).then(|| one_line(text))
 }
 
-/// A text as one line.
+/// A text as one line that a reader takes.
 fn one_line(text: &str) -> String {
-    text.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
+    const MOST_LETTERS: usize = 1_000;
+    let plain = |letter| match letter {
+        '\t' => ' ',
+        letter if char::is_control(letter) => '?',
+        letter => letter,
+    };
+    text.chars().take(MOST_LETTERS).map(plain).collect::<String>().trim().to_owned()
 }
 
 /// A value as its type is usually written: identifiers and mapping records, which are of the communication profile and
@@ -288,6 +294,6 @@ mod tests {
     fn a_text_of_two_lines_is_written_as_one() {
         let mut eds = load(DCF);
         eds.objects[0].name = "Device\n[2000]".into();
-        assert!(write(&eds).contains("ParameterName=Device [2000]\n"));
+        assert!(write(&eds).contains("ParameterName=Device?[2000]\n"));
     }
 }

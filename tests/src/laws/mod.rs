@@ -3,6 +3,7 @@
 //!
 //! Each law is a function of bytes that panics when it is broken. [`ALL`] names them with samples to damage.
 
+mod eds;
 mod eeprom;
 mod frame;
 mod master_core;
@@ -38,6 +39,7 @@ pub const ALL: &[Law] = &[
     Law { name: "mjoint", holds: mjoint::joint, samples: mjoint::SAMPLES },
     Law { name: "zlac8030l", holds: zl::zlac8030l, samples: zl::ZLAC8030L_SAMPLES },
     Law { name: "zlim42c", holds: zl::zlim42c, samples: zl::ZLIM42C_SAMPLES },
+    Law { name: "eds", holds: eds::eds, samples: eds::SAMPLES },
     Law { name: "eeprom", holds: eeprom::eeprom, samples: eeprom::SAMPLES },
     Law { name: "world_command", holds: world_command::world_command, samples: world_command::SAMPLES },
     Law { name: "master_core", holds: master_core::master_core, samples: master_core::SAMPLES },

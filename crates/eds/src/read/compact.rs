@@ -47,6 +47,7 @@ impl Reader {
                     Role::Values => {
                         let value = self.value(part.section, entry, variable.data_type);
                         variable.default = value.or(variable.default.take());
+                        self.check_limits(part.section, [Some(entry); 2], variable);
                     }
                     Role::Object | Role::Sub(_) => {}
                 }

@@ -3,11 +3,13 @@
 use super::fields::Fields;
 use super::places::{Part, Role};
 use super::reader::{Reader, shortened};
-use crate::document::Section;
+use crate::document::{Entry, Section};
 use crate::{Object, ObjectType, Refusal, TypeCode, Value, Variable};
 
 /// Most values of a file, those of compact sub-objects counted.
-pub(super) const MOST_VARIABLES: usize = 60_000;
+const MOST_VARIABLES: usize = 60_000;
+/// Most bytes of text that compact sub-objects repeat.
+const MOST_REPEATED: usize = 8 << 20;
 
 impl Reader {
     /// All objects, from their sections in order.
@@ -56,6 +58,7 @@ impl Reader {
             self.check_sub_number(section, &fields, &object);
         } else if let Some(count) = compact {
             self.take(section, usize::from(count) + 1)?;
+            self.repeat(section, usize::from(count))?;
             object.variables = self.compact_variables(section, &fields, &object.name, count, rest);
         } else {
             self.take(section, 1)?;
@@ -72,6 +75,16 @@ impl Reader {
         }
         let reason = format!("more than {MOST_VARIABLES} objects and sub-objects");
         Err(Refusal::new(section.line() as usize, reason, "a device has some thousand: is this the right file?"))
+    }
+
+    /// Counts the text of a section that is repeated in `count` compact sub-objects.
+    fn repeat(&mut self, section: Section<'_>, count: usize) -> Result<(), Refusal> {
+        self.repeated += count * section.entries().map(|entry| entry.value.len()).sum::<usize>();
+        if self.repeated <= MOST_REPEATED {
+            return Ok(());
+        }
+        let reason = "compact sub-objects repeat texts of megabytes";
+        Err(Refusal::new(section.line() as usize, reason, "shorten the texts of this object"))
     }
 
     /// The first of each section that stands twice.
@@ -207,14 +220,15 @@ impl Reader {
             upload_file: text(fields.upload_file),
             download_file: text(fields.download_file),
         };
-        self.check_limits(section, fields, &mut variable);
+        self.check_limits(section, [fields.low_limit, fields.high_limit], &mut variable);
         variable
     }
 
     /// Limits that contradict each other or the default are not taken: the device is delivered with its default.
-    fn check_limits(&mut self, section: Section<'_>, fields: &Fields<'_>, variable: &mut Variable) {
+    /// `at` are the entries to name for the low and the high limit.
+    pub(super) fn check_limits(&mut self, section: Section<'_>, at: [Option<Entry<'_>>; 2], variable: &mut Variable) {
         let (low, high) = (magnitude(&variable.low), magnitude(&variable.high));
-        if let (Some(low), Some(high), Some(entry)) = (low, high, fields.low_limit)
+        if let (Some(low), Some(high), Some(entry)) = (low, high, at[0])
             && low > high
         {
             self.error(section, entry, "the low limit lies above the high limit", "no limits");
@@ -222,13 +236,13 @@ impl Reader {
             return;
         }
         let default = magnitude(&variable.default);
-        if let (Some(low), Some(default), Some(entry)) = (low, default, fields.low_limit)
+        if let (Some(low), Some(default), Some(entry)) = (low, default, at[0])
             && low > default
         {
             self.error(section, entry, "the low limit lies above the default value", "no low limit");
             variable.low = None;
         }
-        if let (Some(high), Some(default), Some(entry)) = (high, default, fields.high_limit)
+        if let (Some(high), Some(default), Some(entry)) = (high, default, at[1])
             && high < default
         {
             self.error(section, entry, "the high limit lies below the default value", "no high limit");
@@ -254,7 +268,7 @@ impl Reader {
     }
 }
 
-fn text(entry: Option<crate::document::Entry<'_>>) -> String {
+fn text(entry: Option<Entry<'_>>) -> String {
     entry.map(|entry| entry.value.to_owned()).unwrap_or_default()
 }
 

@@ -10,6 +10,7 @@ pub(super) struct Reader {
     pub(super) eds: Eds,
     pub(super) findings: Findings,
     pub(super) variables: usize,
+    pub(super) repeated: usize,
 }
 
 impl Reader {
@@ -62,8 +63,8 @@ impl Reader {
     ) {
         self.findings.push(Finding {
             line: entry.map_or(line, |entry| entry.line),
-            section: section.to_owned(),
-            key: entry.map(|entry| entry.key.to_owned()),
+            section: shortened(section),
+            key: entry.map(|entry| shortened(entry.key)),
             severity,
             what,
             taken_instead: taken,

@@ -151,6 +151,19 @@ fn a_few_lines_of_compact_sub_objects_cannot_ask_for_all_memory() {
 }
 
 #[test]
+fn texts_that_compact_sub_objects_repeat_are_bounded() {
+    let long = "x".repeat(4_000);
+    let mut text = String::new();
+    for index in 0x2000..0x2010 {
+        text += &format!(
+            "[{index:04X}]\nParameterName={long}\nObjectType=8\nDataType=9\nAccessType=rw\nCompactSubObj=254\n"
+        );
+    }
+    let refused = Eds::load(text.as_bytes()).expect_err("16 MB from 64 KB");
+    assert_eq!((refused.line, refused.reason.as_str()), (8 * 6 + 1, "compact sub-objects repeat texts of megabytes"));
+}
+
+#[test]
 fn sub_objects_without_their_object_and_a_var_with_sub_objects_are_records() {
     let sub = "[2000sub0]\nParameterName=Count\nDataType=5\nAccessType=ro\nDefaultValue=1\n[2000sub1]\nParameterName=A\nDataType=6\nAccessType=rw\n";
     let orphan = reading(&[0x2000], sub);

@@ -70,11 +70,14 @@ impl Reader {
         if fits(found.at_node(1)) && fits(found.at_node(127)) {
             return Some(found);
         }
-        let what = format!("{} is beyond {data_type}", entry.value);
+        let what = format!("{} is beyond {data_type}", shortened(entry.value));
         // FFFFh for an INTEGER16, -1 for an UNSIGNED16: the same bits.
         let span = high - low + 1;
         let same_bits = if found.base > high { found.base - span } else { found.base + span };
-        let is_pattern = if low < 0 { found.base > high } else { found.base < 0 && found.base >= -span / 2 };
+        // A low limit of -1 is one below all values, not the highest.
+        let is_low_limit = entry.key.eq_ignore_ascii_case("LowLimit");
+        let is_pattern =
+            if low < 0 { found.base > high } else { found.base < 0 && found.base >= -span / 2 && !is_low_limit };
         if !found.plus_node_id && is_pattern && fits(same_bits) {
             self.warn(section, entry, what, Some(same_bits.to_string()));
             return Some(Number::plain(same_bits));
@@ -108,8 +111,9 @@ impl Reader {
             entry.value.strip_suffix(['f', 'F']).filter(|rest| !rest.contains(['x', 'X'])).unwrap_or(entry.value);
         // Words such as `inf` are no numbers of an EDS.
         let digits = text.bytes().any(|byte| byte.is_ascii_digit()) && !text.contains(['n', 'N']);
-        if digits && let Ok(real) = text.parse::<f64>() {
-            return Some(Value::Real(if bits == 32 { f64::from(real as f32) } else { real }));
+        let rounded = |real: f64| if bits == 32 { f64::from(real as f32) } else { real };
+        if let Some(real) = text.parse().ok().map(rounded).filter(|real| digits && real.is_finite()) {
+            return Some(Value::Real(real));
         }
         let Some((pattern, _)) = number(entry.value).filter(|(number, _)| !number.plus_node_id && number.base >= 0)
         else {
