@@ -31,6 +31,7 @@
 //! content, whatever the tasks wait for.
 
 pub mod core;
+pub mod cyclic;
 pub mod decode;
 pub mod drive;
 mod error;

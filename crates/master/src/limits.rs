@@ -5,7 +5,7 @@ use core::fmt;
 use canopen::Mux;
 
 /// What an object of a drive takes at this time.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// The object.
     pub object: Mux,

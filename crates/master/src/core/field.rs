@@ -233,6 +233,9 @@ macro_rules! handles {
                 let field = Field { bits: place.bits(), form, per_count };
                 T::suits(&field).then_some(Self { place, field, kind: PhantomData })
             }
+            pub(crate) const fn place(&self) -> Place {
+                self.place
+            }
             /// How the object's bits are a number.
             pub const fn field(&self) -> &Field {
                 &self.field

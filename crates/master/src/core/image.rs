@@ -93,9 +93,14 @@ impl Default for Image {
 }
 
 impl Image {
-    /// Receives a node's TPDO under `id` from now on, in place of what that TPDO was before.
+    /// Receives a node's TPDO under `id` from now on, in place of what that TPDO was before. Nothing changes where it is so
+    /// already.
     pub fn set_tpdo(&mut self, node: NodeId, number: u8, id: u16, map: PdoMap) {
         let bytes = map.bytes();
+        let unchanged = |pdo: &Tpdo| (pdo.node, pdo.number, pdo.id, &pdo.map) == (node, number, Some(id), &map);
+        if self.tpdos.iter().any(unchanged) {
+            return;
+        }
         let before = self.tpdos.iter().position(|pdo| (pdo.node, pdo.number) == (node, number));
         let generation = before.map_or(0, |position| self.tpdos[position].generation.wrapping_add(1));
         let id = Some(id);
@@ -116,11 +121,16 @@ impl Image {
         self.index();
     }
 
-    /// Prepares a node's RPDO for sending under `id`, all bits zero.
+    /// Prepares a node's RPDO for sending under `id`, all bits zero. What it carries stays where it is so already.
     pub fn set_rpdo(&mut self, node: NodeId, number: u8, id: u16, map: PdoMap, trigger: RpdoTrigger) {
+        let id = Some(CanId::standard(id));
+        let same = |pdo: &&mut Rpdo| (pdo.node, pdo.number, pdo.id, &pdo.map) == (node, number, id, &map);
+        if let Some(pdo) = self.rpdos.iter_mut().find(same) {
+            pdo.trigger = trigger;
+            return;
+        }
         self.remove_rpdo(node, number);
         let bytes = map.bytes().min(MAX_DATA_LENGTH);
-        let id = Some(CanId::standard(id));
         let before = self.rpdos.iter().position(|pdo| (pdo.node, pdo.number) == (node, number));
         let generation = before.map_or(0, |position| self.rpdos[position].generation);
         let new = Rpdo { node, number, generation, id, map, bytes, trigger, data: 0, state: SendState::Idle };
@@ -252,6 +262,15 @@ impl Image {
             (SendState::Waiting | SendState::Pending, _) => {}
         }
         true
+    }
+
+    /// Puts bits into an RPDO without queueing it: what it is to carry when it is sent for another object.
+    pub(crate) fn preset(&mut self, node: NodeId, number: u8, mux: Mux, raw: u64) {
+        let mut rpdos = self.rpdos.iter_mut().enumerate();
+        let Some((position, pdo)) = rpdos.find(|(_, pdo)| (pdo.node, pdo.number) == (node, number)) else { return };
+        if let Some(bits) = pdo.map.find(mux) {
+            pdo.data = Self::place(position, pdo.generation, &bits).put(pdo.data, raw);
+        }
     }
 
     /// Takes in a frame if it is a known TPDO; says whose.

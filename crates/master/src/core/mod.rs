@@ -39,7 +39,8 @@ pub use node_set::NodeSet;
 pub use payload::Payload;
 pub use pdo_map::{MappedObject, PdoMap};
 pub use request::{Command, Failure, Finished, Outcome, Request, Ticket, Transfer};
-pub use supervision::{CycleLoss, CycleRules, WatchId};
+pub use supervision::CycleLoss;
+pub(crate) use supervision::{CycleRules, WatchId};
 
 use channel::Channel;
 use cycle::SyncClock;

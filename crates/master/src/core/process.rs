@@ -1,5 +1,7 @@
 use std::time::Duration;
 
+use canopen::{Mux, NodeId};
+
 use super::Core;
 use super::FEED;
 use super::cycle::{Cycle, Tick};
@@ -10,8 +12,8 @@ use super::payload::Payload;
 use super::request::{Request, Transfer};
 use super::supervision::{CycleLoss, CycleRules, WatchId};
 
-/// How long the answer to a stop is waited for; nobody is told of it.
-const STOP_TIMEOUT: Duration = Duration::from_millis(500);
+/// How long the answer to a write is awaited that nobody is told of.
+const POST_TIMEOUT: Duration = Duration::from_millis(500);
 
 /// Cycles of SYNC, what is read and written in them, and who is stopped when they fail.
 impl Core {
@@ -75,23 +77,40 @@ impl Core {
     }
 
     /// Watches over a program that moves a drive by process data.
-    pub fn watch_cycles(&mut self, rules: CycleRules) -> WatchId {
+    pub(crate) fn watch_cycles(&mut self, rules: CycleRules) -> WatchId {
         self.supervision.set(rules)
     }
 
     /// A set-point was given in the newest cycle.
-    pub fn note_moving(&mut self, id: WatchId) {
+    pub(crate) fn note_moving(&mut self, id: WatchId) {
         self.supervision.note_moving(id, self.sync.cycle().map_or(0, |cycle| cycle.number));
     }
 
-    /// Nothing is in motion any more; a loss is forgotten.
-    pub fn note_resting(&mut self, id: WatchId) {
+    /// Nothing is in motion any more.
+    pub(crate) fn note_resting(&mut self, id: WatchId) {
         self.supervision.note_resting(id);
     }
 
-    /// Why the drive was stopped, until it rests.
-    pub fn cycle_loss(&self, id: WatchId) -> Option<CycleLoss> {
+    /// A loss is forgotten.
+    pub(crate) fn forget_loss(&mut self, id: WatchId) {
+        self.supervision.forget_loss(id);
+    }
+
+    /// Why the drive was stopped, until that is forgotten.
+    pub(crate) fn cycle_loss(&self, id: WatchId) -> Option<CycleLoss> {
         self.supervision.loss(id)
+    }
+
+    /// All drives that are moved cycle by cycle are being stopped: no step moves them on.
+    pub(crate) fn stop_cyclic(&mut self) {
+        self.supervision.stop_all();
+    }
+
+    /// Writes an object by SDO; nobody waits for the answer.
+    pub(crate) fn post(&mut self, node: NodeId, mux: Mux, value: u16) {
+        let transfer = Transfer::Download(Payload::new(&value.to_le_bytes()));
+        self.start_request(FEED, Request { node, mux, transfer, timeout: POST_TIMEOUT });
+        self.find_due();
     }
 
     /// Time may have brought a cycle, or the end of the patience for one.
@@ -145,9 +164,7 @@ impl Core {
                 self.image.put(place, stop.into());
                 self.image.release_waiting();
             }
-            let transfer = Transfer::Download(Payload::new(&stop.to_le_bytes()));
-            let request = Request { node, mux, transfer, timeout: STOP_TIMEOUT };
-            self.start_request(FEED, request);
+            self.post(node, mux, stop);
             self.events.push(Event::CyclicStopped(node, loss), self.now);
             self.changed.insert(node);
         }

@@ -11,7 +11,7 @@ use super::image::Image;
 
 /// How a drive that is moved cycle by cycle is stopped, and when.
 #[derive(Clone, Copy, Debug)]
-pub struct CycleRules {
+pub(crate) struct CycleRules {
     pub(crate) node: NodeId,
     /// The word that stops it.
     pub(crate) stop: u16,
@@ -27,7 +27,7 @@ pub struct CycleRules {
 
 /// Names a watch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct WatchId(u16);
+pub(crate) struct WatchId(u16);
 
 /// Why a drive that was moved cycle by cycle has been stopped by its master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +38,8 @@ pub enum CycleLoss {
     Silent(u64),
     /// The SYNC of another producer stayed away for this long.
     NoSync(Duration),
+    /// The program has told all that it moves to stop ([`crate::Network::stop_all_moved`]).
+    Told,
 }
 
 impl fmt::Display for CycleLoss {
@@ -45,6 +47,7 @@ impl fmt::Display for CycleLoss {
         match self {
             Self::ProgramLate(cycles) => write!(f, "its program gave no set-point for {cycles} cycles"),
             Self::Silent(cycles) => write!(f, "its TPDO did not come for {cycles} cycles"),
+            Self::Told => f.write_str("its program told all drives to stop"),
             Self::NoSync(time) => write!(f, "no SYNC came for {} ms", time.as_secs_f64() * 1e3),
         }
     }
@@ -93,14 +96,23 @@ impl Supervision {
         }
     }
 
-    /// Nothing is in motion any more; a loss is forgotten.
+    /// Nothing is in motion any more.
     pub(super) fn note_resting(&mut self, id: WatchId) {
+        if let Some(watch) = self.watches.get_mut(usize::from(id.0))
+            && let WatchState::Moving(_) = watch.state
+        {
+            watch.state = WatchState::Resting;
+        }
+    }
+
+    /// A loss is forgotten.
+    pub(super) fn forget_loss(&mut self, id: WatchId) {
         if let Some(watch) = self.watches.get_mut(usize::from(id.0)) {
             watch.state = WatchState::Resting;
         }
     }
 
-    /// Why the drive was stopped, until it rests.
+    /// Why the drive was stopped, until that is forgotten.
     pub(super) fn loss(&self, id: WatchId) -> Option<CycleLoss> {
         match self.watches.get(usize::from(id.0))?.state {
             WatchState::Stopped(loss) => Some(loss),
@@ -125,6 +137,12 @@ impl Supervision {
             watch.state = WatchState::Stopped(loss);
             Some((watch.rules, loss))
         })
+    }
+
+    /// All drives in motion are being stopped by other means.
+    pub(super) fn stop_all(&mut self) {
+        let moving = self.watches.iter_mut().filter(|watch| matches!(watch.state, WatchState::Moving(_)));
+        moving.for_each(|watch| watch.state = WatchState::Stopped(CycleLoss::Told));
     }
 
     /// The drives to stop now that nobody counts the cycles any more.

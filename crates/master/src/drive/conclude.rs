@@ -11,7 +11,7 @@ use crate::units::Shown;
 
 /// What made the explanation necessary.
 #[derive(Clone, Debug)]
-pub(super) enum Trigger {
+pub(crate) enum Trigger {
     /// It is at fault.
     Fault,
     /// The state machine does not move by itself where it should.

@@ -15,7 +15,7 @@ pub fn faults_in(profile: &Description, code: u16) -> Vec<&'static FaultRow> {
 
 impl Drive {
     /// Looks at everything that may explain why `intent` failed.
-    pub(super) async fn not_reached(&self, intent: &'static str, trigger: Trigger) -> Error {
+    pub(crate) async fn not_reached(&self, intent: &'static str, trigger: Trigger) -> Error {
         let mut facts = Vec::new();
         if let Trigger::Silent(error) = &trigger {
             facts.push(Fact::Failed(Box::new(error.clone())));

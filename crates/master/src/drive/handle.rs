@@ -11,12 +11,12 @@ use crate::error::{Access, Error};
 use crate::identify::{Guess, Knowledge};
 use crate::network::Node;
 
-pub(super) const CONTROLWORD: Mux = Mux::new(0x6040, 0);
-pub(super) const STATUSWORD: Mux = Mux::new(0x6041, 0);
+pub(crate) const CONTROLWORD: Mux = Mux::new(0x6040, 0);
+pub(crate) const STATUSWORD: Mux = Mux::new(0x6041, 0);
 pub(super) const MODE: Mux = Mux::new(0x6060, 0);
 pub(super) const MODE_DISPLAY: Mux = Mux::new(0x6061, 0);
-pub(super) const POSITION_ACTUAL: Mux = Mux::new(0x6064, 0);
-pub(super) const TARGET_POSITION: Mux = Mux::new(0x607A, 0);
+pub(crate) const POSITION_ACTUAL: Mux = Mux::new(0x6064, 0);
+pub(crate) const TARGET_POSITION: Mux = Mux::new(0x607A, 0);
 pub(super) const ERROR_CODE: Mux = Mux::new(0x603F, 0);
 
 /// How often a drive is looked at while something is waited for: quick to a person, about 10 % of a 500 kbit/s bus
@@ -136,12 +136,12 @@ impl Drive {
         self.node.write(CONTROLWORD, controlword.0).await
     }
 
-    pub(super) const fn no_such_mode(&self, profile: &Description, mode: ModeOfOperation) -> Error {
+    pub(crate) const fn no_such_mode(&self, profile: &Description, mode: ModeOfOperation) -> Error {
         Error::NoSuchMode { node: self.node.id(), model: profile.title, mode, modes: profile.modes }
     }
 
     /// The model's profile, or an error that says what it was needed for.
-    pub(super) fn known(&self, intent: &'static str) -> Result<&'static Description, Error> {
+    pub(crate) fn known(&self, intent: &'static str) -> Result<&'static Description, Error> {
         self.profile.ok_or(Error::UnknownModel { node: self.node.id(), intent })
     }
 
@@ -162,7 +162,7 @@ impl Drive {
     }
 
     /// Reads an object as the model's table types it.
-    pub(super) async fn read_number(&self, mux: Mux) -> Result<i64, Error> {
+    pub(crate) async fn read_number(&self, mux: Mux) -> Result<i64, Error> {
         let row = self.row(mux, "read an object by its model's table")?;
         let payload = self.node.upload(mux).await?;
         let (expected, received) = (row.data_type.size(), payload.as_bytes().len());

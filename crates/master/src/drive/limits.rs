@@ -63,7 +63,7 @@ impl Drive {
 
     /// As [`check_number`](Self::check_number), for what is to be effected: a value that the drive would take and hold back
     /// is refused too.
-    pub(super) async fn check_effect(&self, mux: Mux, value: i64) -> Result<&'static Entry, Error> {
+    pub(crate) async fn check_effect(&self, mux: Mux, value: i64) -> Result<&'static Entry, Error> {
         let row = self.check_number(mux, value).await?;
         if row.held_to.is_none() || value == 0 {
             return Ok(row);

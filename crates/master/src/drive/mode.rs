@@ -14,7 +14,7 @@ use crate::error::Error;
 impl Drive {
     /// Sets 6060h and waits until the drive shows it. A shaft that turns in another mode is stopped first: drives change
     /// their mode at standstill, or jump.
-    pub(super) async fn set_mode(&self, mode: ModeOfOperation) -> Result<Option<Note>, Error> {
+    pub(crate) async fn set_mode(&self, mode: ModeOfOperation) -> Result<Option<Note>, Error> {
         let profile = self.known("set its mode")?;
         if !profile.modes.contains(&mode) {
             return Err(self.no_such_mode(profile, mode));

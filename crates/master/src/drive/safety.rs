@@ -2,18 +2,19 @@ use canopen::NodeId;
 use cia402::{Controlword, PowerCommand};
 
 use super::handle::CONTROLWORD;
-use crate::core::{Command, NodeSet, Payload, Request, Transfer};
+use crate::core::{Command, Core, NodeSet, Payload, Request, Transfer};
 use crate::error::Error;
 use crate::network::{DEFAULT_TIMEOUT, Network, join_all};
 
 /// Quick stop, with the halt bit for drives that look for their reference whatever the quick stop bit says; where there is
 /// a state machine, halt means nothing in Quick stop active (CiA 402-2, 8.4.1).
-const STOP: Controlword = Controlword(PowerCommand::QuickStop.controlword().0 | Controlword::HALT);
+pub(crate) const STOP: Controlword = Controlword(PowerCommand::QuickStop.controlword().0 | Controlword::HALT);
 
 /// Stopping what this program has set in motion, and only that.
 impl Network {
     /// Quick-stops every node that this program has set in motion, all at the same time, and says what each answered.
     pub async fn stop_all_moved(&self) -> Vec<(NodeId, Result<(), Error>)> {
+        self.with_core(Core::stop_cyclic);
         let stops = self.moved().iter().map(|id| {
             let node = self.node(id);
             async move { (id, node.write(CONTROLWORD, STOP.0).await) }
@@ -26,11 +27,12 @@ impl Network {
     /// Queues the same without waiting; the runner has to be kept going until the frames are out.
     pub fn quick_stop_moved(&self) -> NodeSet {
         let stop = Payload::new(&STOP.0.to_le_bytes());
+        self.with_core(Core::stop_cyclic);
         let moved = self.moved();
         for node in moved.iter() {
             let transfer = Transfer::Download(stop.clone());
             let request = Request { node, mux: CONTROLWORD, transfer, timeout: DEFAULT_TIMEOUT };
-            let ticket = self.with_core(crate::core::Core::ticket);
+            let ticket = self.with_core(Core::ticket);
             self.submit(Command::Request(ticket, request));
             self.note_stopped(node);
         }

@@ -125,7 +125,7 @@ impl Drive {
     }
 
     /// How many counts make one of the object's unit, by the resolution that is set on the drive.
-    async fn resolution(&self, quantity: Quantity) -> Result<f64, Error> {
+    pub(crate) async fn resolution(&self, quantity: Quantity) -> Result<f64, Error> {
         let Some(object) = self.row(quantity.object, "convert units")?.resolution else { return Ok(1.0) };
         // A drive that holds 0 where its manual allows 1 to 10 does not divide.
         Ok((self.read_number(object).await? as f64).max(1.0))

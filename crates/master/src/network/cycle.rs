@@ -7,9 +7,10 @@ use core::task::{Context, Poll};
 use std::time::Duration;
 
 use can::Instant;
+use canopen::{Mux, NodeId};
 
 use super::handle::{CycleWaiter, Network};
-use crate::core::{Command, Core, Cycle, CycleLoss, Sample, SetPoint, Signal, Ticket, WatchId};
+use crate::core::{Command, Core, Cycle, CycleLoss, NodeSet, Sample, SetPoint, Signal, Ticket, WatchId};
 
 /// Why there is no next cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -50,9 +51,9 @@ impl Network {
     /// whole, whatever its transmission type. Called after [`next_sync`](Self::next_sync), that is right behind the SYNC:
     /// a synchronous RPDO then lies at its device before the next one. Allocates nothing.
     pub fn exchange<T>(&self, step: impl FnOnce(&mut Exchange<'_>) -> T) -> T {
-        self.with_core(|core| {
-            let result = step(&mut Exchange { core });
-            core.release_rpdos();
+        self.with_shared(|shared| {
+            let result = step(&mut Exchange { core: &mut shared.core, moved: &mut shared.moved });
+            shared.core.release_rpdos();
             result
         })
     }
@@ -62,6 +63,7 @@ impl Network {
 #[derive(Debug)]
 pub struct Exchange<'a> {
     core: &'a mut Core,
+    moved: &'a mut NodeSet,
 }
 
 impl Exchange<'_> {
@@ -105,19 +107,31 @@ impl Exchange<'_> {
         self.core.write(&set_point, value)
     }
 
-    /// A set-point was given in this cycle.
-    pub fn note_moving(&mut self, watch: WatchId) {
+    /// A set-point was given in this cycle: the node is in motion.
+    pub(crate) fn note_moving(&mut self, node: NodeId, watch: WatchId) {
         self.core.note_moving(watch);
+        self.moved.insert(node);
     }
 
-    /// Nothing is in motion any more; a loss is forgotten.
-    pub fn note_resting(&mut self, watch: WatchId) {
+    /// Nothing was given in this cycle that moves the node.
+    pub(crate) fn note_resting(&mut self, watch: WatchId) {
         self.core.note_resting(watch);
     }
 
-    /// Why the drive was stopped, until it rests.
-    pub fn cycle_loss(&self, watch: WatchId) -> Option<CycleLoss> {
+    /// The drive was told to switch off; a loss is forgotten.
+    pub(crate) fn note_off(&mut self, node: NodeId, watch: WatchId) {
+        self.core.forget_loss(watch);
+        self.moved.remove(node);
+    }
+
+    /// Why the drive was stopped, until it was told to switch off.
+    pub(crate) fn cycle_loss(&self, watch: WatchId) -> Option<CycleLoss> {
         self.core.cycle_loss(watch)
+    }
+
+    /// Writes an object by SDO, without waiting for the answer.
+    pub(crate) fn command(&mut self, node: NodeId, object: Mux, value: u16) {
+        self.core.post(node, object, value);
     }
 }
 

@@ -36,7 +36,7 @@ pub(super) struct Shared {
     /// Woken once by the next command that comes into the inbox.
     activity: Option<Waker>,
     /// What this program has set in motion.
-    moved: NodeSet,
+    pub(super) moved: NodeSet,
     /// What watches this program, by node.
     guards: BTreeMap<NodeId, Guard>,
 }
@@ -124,8 +124,13 @@ impl Network {
 
     /// Looks into the core, or changes mappings and values to send. The runner is told to come and fetch frames.
     pub fn with_core<T>(&self, look: impl FnOnce(&mut Core) -> T) -> T {
+        self.with_shared(|shared| look(&mut shared.core))
+    }
+
+    /// As [`with_core`](Self::with_core), with what else the handles share.
+    pub(super) fn with_shared<T>(&self, look: impl FnOnce(&mut Shared) -> T) -> T {
         let mut shared = self.lock();
-        let result = look(&mut shared.core);
+        let result = look(&mut shared);
         let wakers = shared.activity_wakers();
         drop(shared);
         wakers.wake();

@@ -36,6 +36,14 @@ impl Node {
         self.scaled_set_point(mux, T::FORM, 1.0).map(|(_, set_point)| set_point)
     }
 
+    /// As [`set_point`](Self::set_point), in one RPDO only, counted from 0.
+    ///
+    /// # Errors
+    /// [`SignalError`].
+    pub fn set_point_in<T: Sample>(&self, number: u8, mux: Mux) -> Result<SetPoint<T>, SignalError> {
+        self.find_set_point(mux, Some(number), T::FORM, 1.0).map(|(_, set_point)| set_point)
+    }
+
     pub(crate) fn scaled_signal<T: Sample>(
         &self,
         mux: Mux,
@@ -58,8 +66,19 @@ impl Node {
         form: NumberForm,
         per_count: f64,
     ) -> Result<(u8, SetPoint<T>), SignalError> {
+        self.find_set_point(mux, None, form, per_count)
+    }
+
+    fn find_set_point<T: Sample>(
+        &self,
+        mux: Mux,
+        number: Option<u8>,
+        form: NumberForm,
+        per_count: f64,
+    ) -> Result<(u8, SetPoint<T>), SignalError> {
         let found = self.network().look(|core| {
             let all = core.image().find_set_points(self.id(), mux);
+            let all = all.filter(|(of, ..)| number.is_none_or(|number| number == *of));
             // The first of the least.
             all.min_by_key(|(_, trigger, _)| *trigger != RpdoTrigger::Sync).map(|(number, _, place)| (number, place))
         });

@@ -1,0 +1,336 @@
+use core::time::Duration;
+
+use canopen::{Mux, NmtCommand, NmtState, NodeId};
+use cia402::ModeOfOperation;
+use devices::{Description, Quantity, Quirk};
+
+use super::demand::Bound;
+use super::drive::{ControlwordPath, CyclicDrive, Progress};
+use super::target::{Kind, Target};
+use crate::core::{CycleRules, MappedObject, NumberForm, PdoMap, Sample, Signal};
+use crate::decode::Direction;
+use crate::drive::{CONTROLWORD, Drive, POSITION_ACTUAL, STATUSWORD, STOP, TARGET_POSITION};
+use crate::error::Error;
+use crate::pdo::{PdoConfig, PdoError, SignalError, TimerUnits, TransmissionType};
+
+/// The interpolation data record (CiA 402-2, 12.3).
+const INTERPOLATION_DATA: Mux = Mux::new(0x60C1, 1);
+
+const INTENT: &str = "move it cycle by cycle";
+
+/// How a drive is moved cycle by cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CyclicOptions {
+    /// Cycles in a row for which the program may give no set-point, or the drive's TPDO may stay away, before the drive is
+    /// stopped.
+    pub tolerance: u32,
+}
+
+impl Default for CyclicOptions {
+    /// Two cycles: one lost frame and a late program at once stop nothing.
+    fn default() -> Self {
+        Self { tolerance: 2 }
+    }
+}
+
+/// Why a drive cannot be moved cycle by cycle.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum CyclicError {
+    /// A request failed, or the model lacks something.
+    #[error(transparent)]
+    Drive(#[from] Error),
+    /// A PDO could not be set up.
+    #[error(transparent)]
+    Pdo(#[from] PdoError),
+    /// An object that is needed in a PDO is in none.
+    #[error(transparent)]
+    NotMapped(#[from] SignalError),
+    /// The mode has no set-point that could be given each cycle.
+    #[error(
+        "node {node} cannot be moved cycle by cycle in mode {mode}: choose a mode for speed, torque, interpolated or \
+             cyclic synchronous position"
+    )]
+    NoSetPoint {
+        /// The node.
+        node: NodeId,
+        /// The mode.
+        mode: ModeOfOperation,
+    },
+    /// The TPDO with the statusword comes when something changes, so that its absence tells nothing.
+    #[error(
+        "the TPDO of node {node} with {STATUSWORD} is sent when something changes: that it stays away would tell \
+             nothing. Give it transmission type 1 or an event timer, or call configure_cyclic"
+    )]
+    OnEventsOnly {
+        /// The node.
+        node: NodeId,
+    },
+}
+
+/// What the set-point of a mode is.
+#[derive(Clone, Copy)]
+enum SetPointKind {
+    Position(Mux),
+    Quantity(Quantity),
+}
+
+/// The set-point of a mode that follows one each cycle.
+fn set_point_of(profile: &Description, mode: ModeOfOperation) -> Option<SetPointKind> {
+    match mode {
+        ModeOfOperation::INTERPOLATED_POSITION if profile.row(INTERPOLATION_DATA).is_some() => {
+            Some(SetPointKind::Position(INTERPOLATION_DATA))
+        }
+        ModeOfOperation::INTERPOLATED_POSITION | ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION => {
+            Some(SetPointKind::Position(TARGET_POSITION))
+        }
+        ModeOfOperation::PROFILE_VELOCITY | ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY => {
+            Some(SetPointKind::Quantity(profile.units.target_velocity))
+        }
+        ModeOfOperation::PROFILE_TORQUE | ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE => {
+            profile.units.target_current.map(SetPointKind::Quantity)
+        }
+        _ => None,
+    }
+}
+
+/// What a device says of its PDOs.
+struct Mapped {
+    rpdos: Vec<PdoConfig>,
+    tpdos: Vec<PdoConfig>,
+}
+
+impl Drive {
+    /// Prepares the drive to be moved cycle by cycle in this mode: reads its PDO mapping, units and limits, starts it (NMT),
+    /// and sets the mode. It is enabled by the first step that wants motion. Mappings are as the device has them, see
+    /// [`configure_cyclic`](Self::configure_cyclic).
+    ///
+    /// # Errors
+    /// [`CyclicError`].
+    pub async fn cyclic(&self, mode: ModeOfOperation, options: CyclicOptions) -> Result<CyclicDrive, CyclicError> {
+        let profile = self.known(INTENT)?;
+        if !profile.modes.contains(&mode) {
+            return Err(self.no_such_mode(profile, mode).into());
+        }
+        let mapped = self.adopt_pdos(profile).await?;
+        let (number, mut target) = self.target(profile, mode).await?;
+        let (statusword_in, every) = self.statusword_carrier(profile, number, &mapped)?;
+        let statusword = self.node().signal_in(statusword_in, STATUSWORD)?;
+        if let Kind::Position { actual, .. } = &mut target.kind {
+            // A TPDO that comes, if one of them does.
+            *actual = self.node().signal_in(statusword_in, POSITION_ACTUAL).unwrap_or(*actual);
+        }
+        let controlword = self.controlword_path(number, &mapped);
+        self.preset_rpdos(&mapped, number, mode).await?;
+        let tolerance = options.tolerance.saturating_add(every - 1);
+        let rules = CycleRules {
+            node: self.node().id(),
+            stop: STOP.0,
+            controlword: CONTROLWORD,
+            place: if let ControlwordPath::Pdo(set_point) = controlword { Some(set_point.place()) } else { None },
+            heard: statusword.place(),
+            tolerance,
+        };
+        let drive = CyclicDrive {
+            node: self.node().id(),
+            mode,
+            style: profile.power,
+            statusword,
+            controlword,
+            position: self.position_signal(statusword_in).await?,
+            velocity: self.quantity_signal(profile, statusword_in, Some(profile.units.actual_velocity)).await?,
+            current: self.quantity_signal(profile, statusword_in, profile.units.actual_current).await?,
+            target,
+            tolerance,
+            watch: self.node().network().with_core(|core| core.watch_cycles(rules)),
+            progress: Progress::default(),
+        };
+        if self.node().facts().probable_state(Some(profile)) != Some(NmtState::Operational) {
+            self.node().nmt(NmtCommand::Start);
+        }
+        self.set_mode(mode).await?;
+        Ok(drive)
+    }
+
+    /// Maps what the mode needs: RPDO1 gets the controlword and the set-point; TPDO1 the statusword, the position and, where
+    /// it fits, the current; TPDO2 the speed; all with each SYNC. A model with a fixed mapping is left as it is.
+    ///
+    /// # Errors
+    /// [`CyclicError`].
+    pub async fn configure_cyclic(&self, mode: ModeOfOperation) -> Result<(), CyclicError> {
+        let profile = self.known(INTENT)?;
+        let node = self.node().id();
+        let target = match set_point_of(profile, mode) {
+            Some(SetPointKind::Position(object)) => object,
+            Some(SetPointKind::Quantity(quantity)) => quantity.object,
+            None => return Err(CyclicError::NoSetPoint { node, mode }),
+        };
+        if profile.pdo.fixed_mapping {
+            return Ok(());
+        }
+        let record =
+            |mux: Mux| profile.row(mux).map(|row| MappedObject { mux, bits: (row.data_type.size() * 8) as u8 });
+        let map = |objects: &[Option<Mux>]| {
+            let mut map = PdoMap(Vec::new());
+            for object in objects.iter().filter_map(|mux| record((*mux)?)) {
+                let fits = map.bits() + u32::from(object.bits) <= u64::BITS;
+                let room = map.0.len() < usize::from(profile.pdo.max_objects);
+                if fits && room {
+                    map.0.push(object);
+                }
+            }
+            map
+        };
+        let current = profile.units.actual_current.map(|quantity| quantity.object);
+        let velocity = Some(profile.units.actual_velocity.object);
+        let pdos = [
+            (Direction::Rpdo, 0, map(&[Some(CONTROLWORD), Some(target)])),
+            (Direction::Tpdo, 0, map(&[Some(STATUSWORD), Some(POSITION_ACTUAL), current])),
+            (Direction::Tpdo, 1, map(&[velocity])),
+        ];
+        for (direction, number, map) in pdos {
+            let config = PdoConfig::new(direction, number, map).transmission(TransmissionType::EVERY_SYNC);
+            self.node().configure_pdo(&config, timer_units(profile)).await?;
+        }
+        Ok(())
+    }
+
+    /// Reads every PDO that the model has, and has this master send and receive them as they are set up.
+    async fn adopt_pdos(&self, profile: &Description) -> Result<Mapped, Error> {
+        let units = timer_units(profile);
+        let mut mapped = Mapped { rpdos: Vec::new(), tpdos: Vec::new() };
+        for direction in [Direction::Rpdo, Direction::Tpdo] {
+            let base = direction.parameter_base();
+            let numbers = profile.table.rows().iter().filter(|row| row.mux().sub_index == 1);
+            let numbers = numbers.filter_map(|row| row.mux().index.checked_sub(base).filter(|number| *number < 0x200));
+            for number in numbers.filter_map(|number| u8::try_from(number).ok()) {
+                let config = self.node().adopt_pdo(direction, number, units).await?;
+                match direction {
+                    Direction::Rpdo => mapped.rpdos.push(config),
+                    Direction::Tpdo => mapped.tpdos.push(config),
+                }
+            }
+        }
+        Ok(mapped)
+    }
+
+    /// The set-point of the mode, and the RPDO that carries it.
+    async fn target(&self, profile: &Description, mode: ModeOfOperation) -> Result<(u8, Target), CyclicError> {
+        let quantity = match set_point_of(profile, mode) {
+            Some(SetPointKind::Position(object)) => return self.position_target(profile, object).await,
+            Some(SetPointKind::Quantity(quantity)) => quantity,
+            None => return Err(CyclicError::NoSetPoint { node: self.node().id(), mode }),
+        };
+        let (number, set_point) = self.node().scaled_set_point(quantity.object, NumberForm::Signed, 1.0)?;
+        let per_count = quantity.per_count / self.resolution(quantity).await?;
+        let speed = quantity.object == profile.units.target_velocity.object;
+        let kind = if speed { Kind::Velocity { per_count } } else { Kind::Current { per_count } };
+        Ok((number, Target { set_point, limits: self.limits(quantity.object).await?, kind, held: 0 }))
+    }
+
+    async fn position_target(&self, profile: &Description, object: Mux) -> Result<(u8, Target), CyclicError> {
+        let (number, set_point) = self.node().scaled_set_point(object, NumberForm::Signed, 1.0)?;
+        let counts_per_turn = self.counts_per_turn().await?;
+        let velocity = profile.units.target_velocity;
+        let speed = Bound::from(self.limits(velocity.object).await?);
+        let rpm = speed.high as f64 * velocity.per_count / self.resolution(velocity).await?;
+        let kind = Kind::Position {
+            actual: self.node().signal(POSITION_ACTUAL)?,
+            counts_per_turn,
+            counts_per_s: rpm / 60.0 * counts_per_turn,
+            speed,
+        };
+        let held = self.read_number(POSITION_ACTUAL).await?;
+        Ok((number, Target { set_point, limits: self.limits(object).await?, kind, held }))
+    }
+
+    /// The TPDO with the statusword that comes by itself, the one of the set-point's number first; and in how many cycles it
+    /// comes once.
+    fn statusword_carrier(&self, profile: &Description, number: u8, mapped: &Mapped) -> Result<(u8, u32), CyclicError> {
+        let answers = profile.has(Quirk::TpdoAnswersRpdo);
+        let carriers = mapped.tpdos.iter().filter(|pdo| carries(&pdo.map, STATUSWORD));
+        let regular = carriers.filter_map(|pdo| {
+            let every = match pdo.transmission.0 {
+                every @ 1..=240 => u32::from(every),
+                _ if answers && pdo.number == number => 1,
+                _ if pdo.event_time.is_some_and(|time| !time.is_zero()) => 1,
+                _ => return None,
+            };
+            Some((pdo.number != number, every, pdo.number))
+        });
+        if let Some((_, every, number)) = regular.min() {
+            return Ok((number, every));
+        }
+        // Not mapped at all, or on events only.
+        self.node().signal::<u16>(STATUSWORD)?;
+        Err(CyclicError::OnEventsOnly { node: self.node().id() })
+    }
+
+    /// The controlword in the set-point's RPDO, or in one that does not carry the set-point a second time; else by SDO.
+    fn controlword_path(&self, number: u8, mapped: &Mapped) -> ControlwordPath {
+        let by_sdo = ControlwordPath::Sdo { object: CONTROLWORD, sent: None };
+        let together = mapped.rpdos.iter().any(|pdo| pdo.number == number && carries(&pdo.map, CONTROLWORD));
+        if !together {
+            return by_sdo;
+        }
+        match self.node().set_point_in(number, CONTROLWORD) {
+            Ok(set_point) => ControlwordPath::Pdo(set_point),
+            Err(_) => by_sdo,
+        }
+    }
+
+    /// What else the set-point's RPDO carries is sent with it: as the device has it now, and with the mode.
+    async fn preset_rpdos(&self, mapped: &Mapped, number: u8, mode: ModeOfOperation) -> Result<(), Error> {
+        let Some(pdo) = mapped.rpdos.iter().find(|pdo| pdo.number == number) else { return Ok(()) };
+        for object in &pdo.map.0 {
+            let raw = match object.mux {
+                Mux { index: 0x6060, .. } => u64::from(mode.0 as u8),
+                mux => match self.node().upload(mux).await {
+                    Ok(payload) => payload.raw().into(),
+                    // An object that can only be written, or a gap.
+                    Err(Error::Aborted { .. }) => 0,
+                    Err(error) => return Err(error),
+                },
+            };
+            let (node, mux) = (self.node().id(), object.mux);
+            self.node().network().with_core(|core| core.image_mut().preset(node, number, mux, raw));
+        }
+        Ok(())
+    }
+
+    async fn position_signal<T: Sample>(&self, near: u8) -> Result<Option<Signal<T>>, Error> {
+        let per_count = 1.0 / self.counts_per_turn().await?;
+        Ok(self.signal_near(near, POSITION_ACTUAL, NumberForm::Signed, per_count))
+    }
+
+    /// An object in this TPDO, or else in another one.
+    fn signal_near<T: Sample>(&self, near: u8, mux: Mux, form: NumberForm, per_count: f64) -> Option<Signal<T>> {
+        let found = [Some(near), None].map(|number| self.node().scaled_signal(mux, number, form, per_count).ok());
+        found.into_iter().flatten().next()
+    }
+
+    /// A physical value, if it is mapped in the form that the model's table has.
+    async fn quantity_signal<T: Sample>(
+        &self,
+        profile: &Description,
+        near: u8,
+        quantity: Option<Quantity>,
+    ) -> Result<Option<Signal<T>>, Error> {
+        let Some(quantity) = quantity else { return Ok(None) };
+        let Some(row) = profile.row(quantity.object) else { return Ok(None) };
+        let form = if row.data_type.is_signed() { NumberForm::Signed } else { NumberForm::Unsigned };
+        let per_count = quantity.per_count / self.resolution(quantity).await?;
+        let signal = self.signal_near::<T>(near, quantity.object, form, per_count);
+        Ok(signal.filter(|signal| signal.field().bits as usize == row.data_type.size() * 8))
+    }
+}
+
+const fn timer_units(profile: &Description) -> TimerUnits {
+    TimerUnits {
+        inhibit: Duration::from_nanos(profile.pdo.inhibit_unit_ns),
+        event: Duration::from_nanos(profile.pdo.event_timer_unit_ns),
+    }
+}
+
+fn carries(map: &PdoMap, mux: Mux) -> bool {
+    map.find(mux).is_some()
+}

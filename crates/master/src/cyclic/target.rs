@@ -1,0 +1,79 @@
+//! The set-point of one cycle: from what was asked for to counts, within the limits in force.
+
+use core::time::Duration;
+
+use super::demand::{Bound, Demand, Refusal};
+use crate::core::{SetPoint, Signal};
+use crate::limits::Limits;
+use crate::units::{Amperes, Angle, Rpm};
+
+/// The object that the mode follows.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Target {
+    pub(super) set_point: SetPoint<i64>,
+    pub(super) limits: Limits,
+    pub(super) kind: Kind,
+    /// What was sent last.
+    pub(super) held: i64,
+}
+
+/// What the set-point is.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Kind {
+    /// A position in counts. The way from one to the next is bounded by the highest speed.
+    Position { actual: Signal<i64>, counts_per_turn: f64, counts_per_s: f64, speed: Bound },
+    /// A speed: r/min in one count.
+    Velocity { per_count: f64 },
+    /// A current: A in one count.
+    Current { per_count: f64 },
+}
+
+impl Target {
+    /// What to send for a demand that wants power.
+    pub(super) fn follow(&self, demand: Demand, period: Duration) -> Result<i64, Refusal> {
+        let raw = match (demand, self.kind) {
+            (Demand::Hold, Kind::Position { .. }) => return Ok(self.held),
+            (Demand::Hold, Kind::Velocity { .. } | Kind::Current { .. }) => return Ok(0),
+            (Demand::Position(Angle::Counts(counts)), Kind::Position { .. }) => counts,
+            (Demand::Position(Angle::Turns(turns)), Kind::Position { counts_per_turn, .. }) => {
+                whole(turns * counts_per_turn)?
+            }
+            (Demand::Velocity(Rpm(value)), Kind::Velocity { per_count })
+            | (Demand::Current(Amperes(value)), Kind::Current { per_count }) => whole(value / per_count)?,
+            _ => return Err(Refusal::WrongKind),
+        };
+        let limits = self.limits;
+        if !limits.take(raw) || limits.holding_back(raw).is_some() {
+            return Err(Refusal::OutOfLimits { asked: raw, bound: limits.into() });
+        }
+        self.check_step(raw, period)?;
+        Ok(raw)
+    }
+
+    /// What to send while the drive has no power: where it is, so that it does not jump when it gets some; no speed, no current.
+    pub(super) const fn rest(&self, actual: Option<i64>) -> i64 {
+        match (self.kind, actual) {
+            (Kind::Position { .. }, Some(actual)) => actual,
+            (Kind::Position { .. }, None) => self.held,
+            (Kind::Velocity { .. } | Kind::Current { .. }, _) => 0,
+        }
+    }
+
+    fn check_step(&self, raw: i64, period: Duration) -> Result<(), Refusal> {
+        let Kind::Position { counts_per_s, speed, .. } = self.kind else { return Ok(()) };
+        let way = raw.saturating_sub(self.held);
+        // A drive that was given nothing for some cycles stands where it was: the next step is no longer for that.
+        // A count more, for set-points that are rounded to whole ones.
+        let longest = (counts_per_s * period.as_secs_f64()) as i64 + 1;
+        if way.saturating_abs() <= longest {
+            return Ok(());
+        }
+        Err(Refusal::StepTooLarge { way, longest, bound: speed })
+    }
+}
+
+/// The nearest count.
+fn whole(value: f64) -> Result<i64, Refusal> {
+    // Beyond this no object of 64 bits goes.
+    if value.abs() < 9e18 { Ok(value.round() as i64) } else { Err(Refusal::NoNumber) }
+}
