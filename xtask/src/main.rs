@@ -6,6 +6,7 @@
 
 mod cargo_tests;
 mod examples;
+mod packages;
 mod peers;
 mod pgo;
 mod process;

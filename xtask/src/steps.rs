@@ -4,7 +4,7 @@
 //! is compiled twice: clippy only checks, and the later steps use what the test step has built.
 
 use crate::tally::Tally;
-use crate::{cargo_tests, examples, peers, process, program, tidy, workspace};
+use crate::{cargo_tests, examples, packages, peers, process, program, tidy, workspace};
 
 /// One step: its name for `--only`, what it does for the progress line, and the function that does it.
 pub(crate) struct Step {
@@ -20,6 +20,7 @@ pub(crate) const STEPS: &[Step] = &[
     Step { name: "tests", does: "unit, property and integration tests of every crate", run: tests },
     Step { name: "doctests", does: "the code in the documentation", run: doctests },
     Step { name: "docs", does: "the documentation builds and its links lead somewhere", run: docs },
+    Step { name: "packages", does: "every crate packs, as cargo publish would", run: packages::run },
     Step { name: "no_std", does: "the core crates build for a Cortex-M4", run: no_std },
     Step { name: "examples", does: "every example runs, to its end or until it is ready to serve", run: examples::run },
     Step {

@@ -10,6 +10,7 @@ mod conventions;
 mod dependencies;
 mod exceptions;
 mod finding;
+mod manifests;
 mod sizes;
 mod source;
 mod text;
@@ -37,6 +38,7 @@ const SOURCE_RULES: &[SourceRule] = &[
     conventions::reasons,
     conventions::field_words,
     conventions::banners,
+    manifests::includes,
     sizes::files,
     sizes::functions,
 ];
@@ -70,6 +72,7 @@ fn findings() -> Result<Vec<Finding>, String> {
         // A file that is listed but deleted, or that is not text, has no style.
         let Ok(text) = std::fs::read_to_string(workspace::root().join(&path)) else { continue };
         TEXT_RULES.iter().for_each(|rule| found.extend(rule(&path, &text)));
+        found.extend(manifests::of_crates(&path, &text, |path| workspace::root().join(path).exists()));
         if path.ends_with(".rs") {
             let source = Source::new(&path, &text);
             SOURCE_RULES.iter().for_each(|rule| found.extend(rule(&source)));
