@@ -14,6 +14,7 @@ pub mod mjoint;
 pub mod object_rows;
 pub mod power_states;
 pub mod random_host;
+pub mod scenarios;
 pub mod seeded;
 pub mod side_by_side;
 pub mod zlac8030l;

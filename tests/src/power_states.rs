@@ -19,10 +19,21 @@ pub trait PowerSubject: Subject {
     /// A component whose break is a fault in every state, and which can be mended.
     const BREAKABLE: Component;
 
+    /// The statusword of a drive that has just booted.
+    const BOOTED: u16;
+
+    /// 606Ch counts so many in 1 r/min.
+    const COUNTS_PER_RPM: i64;
+
+    /// How far the speed of a motor that turns steadily may be from what is asked for, r/min.
+    const RIPPLE_RPM: f64;
+
     /// What has to be set so that a test may take its time between two commands.
-    fn let_take_time(bench: &mut Bench<Self>)
+    fn let_take_time(_bench: &mut Bench<Self>)
     where
-        Self: Sized;
+        Self: Sized,
+    {
+    }
 }
 
 impl<S: PowerSubject> Bench<S> {
@@ -51,6 +62,33 @@ impl<S: PowerSubject> Bench<S> {
         if state == "fault" {
             self.break_down(true).break_down(false);
         }
+    }
+
+    /// Selects a mode and enables operation.
+    #[track_caller]
+    pub fn enable_in(&mut self, mode: i64) -> &mut Self {
+        S::let_take_time(self);
+        self.set(0x6060, mode).enable()
+    }
+
+    /// Turning with this speed in profile velocity, and steadily.
+    #[track_caller]
+    pub fn turn(&mut self, rpm: i64) -> &mut Self {
+        self.enable_in(3).set(0x60FF, rpm).run_ms(800)
+    }
+
+    /// Asserts that the motor turns steadily at this speed, and that 606Ch says so.
+    #[track_caller]
+    pub fn goes_at(&mut self, rpm: i64) -> &mut Self {
+        let (told, asked) = (self.get(0x606C), rpm * S::COUNTS_PER_RPM);
+        assert!((told - asked).abs() <= S::COUNTS_PER_RPM, "606Ch is {told} for {rpm} r/min, at {} s", self.seconds());
+        self.turns_at(rpm as f64 - S::RIPPLE_RPM, rpm as f64 + S::RIPPLE_RPM)
+    }
+
+    /// Relative move of profile position.
+    #[track_caller]
+    pub fn move_by(&mut self, counts: i64) -> &mut Self {
+        self.set(0x607A, counts).set(0x6040, 0x4F).set(0x6040, 0x5F)
     }
 
     /// Breaks the component whose break is a fault, or mends it, and lets the drive notice.

@@ -64,3 +64,9 @@ fn a_quirk_that_can_be_asked_for_is_listed_where_the_running_drive_has_it_and_on
     assert_listed("zlim42c", asked(&mut zlim42c::Bench::new()));
     assert_listed("m4230e17b50", asked(&mut mjoint::Bench::new()));
 }
+
+#[test]
+fn what_is_told_of_a_short_rpdo_stands_in_the_profile_that_masters_read() {
+    let told = |name| model(name).and_then(|model| model.pdo.short_rpdo).map(|code| code.0);
+    assert_eq!(["zlac8030l", "zlim42c", "m4230e17b50"].map(told), [Some(0x8210), Some(0x8210), None]);
+}

@@ -23,6 +23,9 @@ pub const TURN: i64 = 32_768;
 #[derive(Debug)]
 pub struct MJoint;
 
+/// Of all benches the same name.
+pub type Drive = MJoint;
+
 /// Its bench.
 pub type Bench = super::Bench<MJoint>;
 

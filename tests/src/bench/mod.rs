@@ -178,9 +178,35 @@ impl<S: Subject> Bench<S> {
         self.heard_at().into_iter().map(|(_, frame)| frame.to_string()).collect()
     }
 
-    /// Those of them that begin like this: `704#`.
+    /// Those of them that begin like this: `704#`, or `70n#` for the node that the host talks to.
     pub fn heard_of(&mut self, beginning: &str) -> Vec<String> {
-        self.heard().into_iter().filter(|frame| frame.starts_with(beginning)).collect()
+        let beginning = self.named(beginning);
+        self.heard().into_iter().filter(|frame| frame.starts_with(&beginning)).collect()
+    }
+
+    /// What was heard since the last call is of no interest.
+    pub fn forget(&mut self) -> &mut Self {
+        self.heard_at();
+        self
+    }
+
+    /// Asserts that this and nothing else was heard since the last call; `n` stands for the node.
+    #[track_caller]
+    pub fn hears(&mut self, expected: &[&str]) -> &mut Self {
+        self.hears_of("", expected)
+    }
+
+    /// Asserts that of what begins like this, this and nothing else was heard since the last call.
+    #[track_caller]
+    pub fn hears_of(&mut self, beginning: &str, expected: &[&str]) -> &mut Self {
+        let expected: Vec<_> = expected.iter().map(|frame| self.named(frame)).collect();
+        assert_eq!(self.heard_of(beginning), expected, "heard, and expected, at {} s", self.seconds());
+        self
+    }
+
+    /// A frame's text in which `n` stands for the last digit of the node-ID.
+    fn named(&self, text: &str) -> String {
+        text.replace('n', &format!("{:X}", self.node & 0xF))
     }
 
     /// Everything that the host heard since the last call.
@@ -189,7 +215,7 @@ impl<S: Subject> Bench<S> {
         std::mem::take(&mut self.heard)
     }
 
-    /// Sends a frame in candump notation and lets it arrive.
+    /// Sends a frame in candump notation and lets it arrive; `n` stands for the node (below 16) that the host talks to.
     #[track_caller]
     pub fn send(&mut self, frame: &str) -> &mut Self {
         self.offer(frame).run(bits::<S>(SEND_BITS))
@@ -198,7 +224,8 @@ impl<S: Subject> Bench<S> {
     /// Sends a frame in candump notation and waits for nothing.
     #[track_caller]
     pub fn offer(&mut self, frame: &str) -> &mut Self {
-        self.world.send(self.host, frame.parse().expect("a frame")).expect("room at the host");
+        let frame = self.named(frame).parse().expect("a frame");
+        self.world.send(self.host, frame).expect("room at the host");
         self
     }
 
@@ -291,6 +318,28 @@ impl<S: Subject> Bench<S> {
     #[track_caller]
     pub fn turns_at(&mut self, low_rpm: f64, high_rpm: f64) -> &mut Self {
         assert_within("speed in r/min", self.report().velocity_rpm, low_rpm, high_rpm);
+        self
+    }
+
+    /// Asserts that a write is refused with this code.
+    #[track_caller]
+    pub fn refuses(&mut self, object: impl Place, value: i64, code: Abort) -> &mut Self {
+        let (answer, (index, sub)) = (self.write(object, value), object.place());
+        assert_eq!(answer, Err(code), "{index:04X}h:{sub:02X} = {value:X}h: {answer:08X?}, expected {code:08X}h");
+        self
+    }
+
+    /// Asserts that an SDO request gets this answer.
+    #[track_caller]
+    pub fn answers(&mut self, request: [u8; 8], answer: [u8; 8]) -> &mut Self {
+        assert_eq!(self.sdo(&request), Some(answer), "to {request:02X?}");
+        self
+    }
+
+    /// Asserts that nobody answers an SDO request.
+    #[track_caller]
+    pub fn is_silent(&mut self) -> &mut Self {
+        assert_eq!(self.sdo(&head(0x40, 0x6041, 0)), None, "at {} s", self.seconds());
         self
     }
 

@@ -26,6 +26,9 @@ pub const NODE: u8 = Zlac8030l::NODE;
 #[derive(Debug)]
 pub struct Zlac8030l;
 
+/// Of all benches the same name.
+pub type Drive = Zlac8030l;
+
 /// Its bench.
 pub type Bench = super::Bench<Zlac8030l>;
 
@@ -47,6 +50,9 @@ impl Subject for Zlac8030l {
 
 impl PowerSubject for Zlac8030l {
     const BREAKABLE: Component = Component::Hall;
+    const BOOTED: u16 = 0x0670;
+    const COUNTS_PER_RPM: i64 = 10;
+    const RIPPLE_RPM: f64 = 1.0;
 
     fn let_take_time(bench: &mut Bench) {
         // The watch over the host.
@@ -68,12 +74,6 @@ impl Bench {
         wanted.variant.choose(key, choice).expect("a choice of this model");
         wanted.presets = presets.to_vec();
         Self::with(vec![order(&ZLAC8030L, &wanted).expect("a drive that can be ordered")])
-    }
-
-    /// Selects a mode and enables operation, without the watch over the host (2000h), so that a test may just look.
-    #[track_caller]
-    pub fn enable_in(&mut self, mode: i64) -> &mut Self {
-        self.set(0x2000, 0).set(0x6060, mode).enable()
     }
 
     /// The motor of an [`open`](Self::open) bench, as it is now.

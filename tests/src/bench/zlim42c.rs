@@ -25,6 +25,9 @@ pub const NODE: u8 = Zlim42c::NODE;
 #[derive(Debug)]
 pub struct Zlim42c;
 
+/// Of all benches the same name.
+pub type Drive = Zlim42c;
+
 /// Its bench.
 pub type Bench = super::Bench<Zlim42c>;
 
@@ -46,8 +49,10 @@ impl Subject for Zlim42c {
 
 impl PowerSubject for Zlim42c {
     const BREAKABLE: Component = Component::Reference;
-
-    fn let_take_time(_bench: &mut Bench) {}
+    const BOOTED: u16 = 0x0270;
+    const COUNTS_PER_RPM: i64 = 1;
+    // A fifth at 60 r/min: full steps excite the rotor.
+    const RIPPLE_RPM: f64 = 12.0;
 }
 
 impl Bench {
@@ -65,21 +70,9 @@ impl Bench {
         Self::with(vec![order(&ZLIM42C, &wanted).expect("a drive that can be ordered")])
     }
 
-    /// Selects a mode and enables operation.
-    #[track_caller]
-    pub fn enable_in(&mut self, mode: i64) -> &mut Self {
-        self.set(0x6060, mode).enable()
-    }
-
     /// Level of a digital input, held long enough to pass its filter.
     #[track_caller]
     pub fn input(&mut self, input: usize, level: bool) -> &mut Self {
         self.set_input(input, level).run_ms(15)
-    }
-
-    /// Relative move of profile position.
-    #[track_caller]
-    pub fn move_by(&mut self, pulses: i64) -> &mut Self {
-        self.set(0x607A, pulses).set(0x6040, 0x4F).set(0x6040, 0x5F)
     }
 }

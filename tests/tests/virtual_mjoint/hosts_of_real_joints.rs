@@ -17,23 +17,6 @@ fn after_10fh_the_next_target_is_kept_and_the_one_after_2fh_runs() {
     assert!((bench.position() - 3 * TURN).abs() <= 30, "{}", bench.position());
 }
 
-/// 5.05: an answer repeats the multiplexor of its request. Nobody waits for the answer before the next request here.
-#[test]
-fn three_reads_back_to_back_are_answered_in_their_order() {
-    let mut bench = Bench::new();
-    bench.heard();
-    for request in ["601#4064600000000000", "601#4041600000000000", "601#4079600000000000"] {
-        bench.send(request);
-    }
-    bench.run_ms(10);
-    let answers = bench.heard_of("581#");
-    let beginnings = ["581#43646000", "581#4B416000", "581#4B796000"];
-    assert_eq!(answers.len(), beginnings.len(), "{answers:?}");
-    for (answer, beginning) in answers.iter().zip(beginnings) {
-        assert!(answer.starts_with(beginning), "{answers:?}");
-    }
-}
-
 /// 5.11.2: the watch begins with the first heartbeat of the host, and this one sends none. No NMT command either (5.11.1).
 #[test]
 fn a_host_without_heartbeat_and_without_an_nmt_command_is_served_for_as_long_as_it_likes() {

@@ -144,8 +144,7 @@ fn with_255_a_host_that_goes_by_a_slow_dir_clock_is_followed_without_a_pause_bet
         let mut position = 0.0;
         for cycle in 0..300 {
             position += 655.36 * f64::from(cycle.min(150)) / 150.0;
-            bench.send(&format!("501#{:08X}", (position as i32).swap_bytes()));
-            bench.send("080#");
+            bench.send(&format!("501#{:08X}", (position as i32).swap_bytes())).send("080#");
             for _ in 0..16 {
                 bench.run(Duration::from_micros(250));
                 let speed = bench.report().velocity_rpm;

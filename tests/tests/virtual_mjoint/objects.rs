@@ -34,8 +34,7 @@ fn refusals_are_those_of_cia_301() {
     for index in [0x603F, 0x6061, 0x607C, 0x6084, 0x6099, 0x609A, 0x6502, 0x1003, 0x1008, 0x1010, 0x1014, 0x1200] {
         assert_eq!(bench.write(index, 0), Err(NO_SUCH_OBJECT), "{index:04X}h");
     }
-    assert_eq!(bench.write((0x60F9, 3), 0), Err(NO_SUCH_SUB_INDEX));
-    assert_eq!(bench.write(0x6083, 65_536), Err(TOO_HIGH));
+    bench.refuses((0x60F9, 3), 0, NO_SUCH_SUB_INDEX).refuses(0x6083, 65_536, TOO_HIGH);
     for (index, sub, value) in [(0x6060, 0, 2), (0x6060, 0, 8), (0x2619, 0, 5), (0x2619, 0, 29), (0x1403, 2, 255)] {
         assert_eq!(bench.write((index, sub), value), Err(INVALID_VALUE), "{index:04X}h = {value}");
     }

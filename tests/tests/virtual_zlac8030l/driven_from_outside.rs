@@ -11,8 +11,7 @@ const DRIVER_TEMPERATURE: i64 = 0x0800;
 #[test]
 fn a_free_wheel_under_2_5_nm_ends_where_the_bus_is_limited_and_over_voltage_is_told() {
     let mut bench = Bench::new();
-    bench.heard();
-    bench.tell("4 load torque 2.5").run_ms(5000);
+    bench.forget().tell("4 load torque 2.5").run_ms(5000);
     let report = bench.report();
     assert_within("bus in V: 91 V and what 1 kW of suppressors rise by", report.supply_v, 91.25, 105.0);
     // Line-to-line back-EMF is the bus voltage, and the current's drop is small.
@@ -57,10 +56,8 @@ fn a_bus_that_is_fed_for_long_makes_the_power_stage_hot_which_is_told_before_it_
 fn a_burnt_power_stage_brakes_the_wheel_takes_the_drive_off_the_bus_and_a_new_one_is_as_before() {
     let mut bench = Bench::new();
     bench.enable_in(3).set(0x60FF, 200).run_ms(1000);
-    bench.tell("4 fault bridge on").run_ms(500).turns_at(-1.0, 1.0);
-    assert_eq!(bench.sdo(&[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]), None);
-    bench.heard();
-    bench.tell("4 power cycle").run_ms(500);
+    bench.tell("4 fault bridge on").run_ms(500).turns_at(-1.0, 1.0).is_silent();
+    bench.forget().tell("4 power cycle").run_ms(500);
     assert!(bench.heard().is_empty(), "no boot-up");
     assert!(!bench.report().powered && bench.report().damage.is_some(), "it burns the next fuse");
     bench.tell("4 fault bridge off").tell("4 power cycle").run_ms(500);

@@ -6,7 +6,6 @@
 
 use ferrodrive_tests::bench::zlac8030l as bench;
 
-mod communication;
 mod datagrams;
 mod determinism;
 mod driven_from_outside;

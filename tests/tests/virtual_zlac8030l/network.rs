@@ -132,8 +132,7 @@ fn a_new_bit_rate_acts_after_a_restart_and_then_only_its_own_bus_hears_the_drive
     bench.set(0x200E, i64::from(RATE_250K));
     assert_eq!(bench.get(0x200E), i64::from(RATE_250K), "until the restart it talks at the old rate");
     bench.let_store();
-    bench.heard();
-    bench.power_cycle().run_ms(500);
+    bench.forget().power_cycle().run_ms(500);
     assert_eq!(bench.heard(), [""; 0], "no boot-up on the old bus");
     assert_eq!(bench.sdo(&[0x40, 0, 0x10, 0, 0, 0, 0, 0]), None);
 
@@ -166,9 +165,7 @@ fn a_new_node_id_acts_after_a_restart_and_moves_every_identifier_with_it() {
     bench.set(0x200D, 0x15);
     assert_eq!(bench.get(0x200D), 0x15, "until the restart it is the old node");
     bench.let_store();
-    bench.heard();
-    bench.power_cycle();
-    assert_eq!(bench.heard(), ["715#00"]);
+    bench.forget().power_cycle().hears(&["715#00"]);
     bench.node = 0x15;
     let moved = [(0x1200, 1, 0x615), (0x1200, 2, 0x595), (0x1014, 0, 0x95), (0x1400, 1, 0x215), (0x1803, 1, 0x495)];
     for (index, sub, identifier) in moved {

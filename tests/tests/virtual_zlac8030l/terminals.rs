@@ -124,7 +124,7 @@ fn the_motor_status_register_tells_whether_it_turns() {
 #[test]
 fn two_faults_show_together_and_the_last_one_to_go_ends_the_fault() {
     let mut bench = Bench::new();
-    bench.heard();
+    bench.forget();
     break_hall(&mut bench, true);
     bench.set_fault(Component::Reference, true).run_ms(50);
     assert_eq!((bench.get(0x603F), bench.get(0x1001)), (0x0280, 0x81));

@@ -79,21 +79,6 @@ fn a_new_target_or_speed_in_a_move_waits_for_the_next_set_point() {
 }
 
 #[test]
-fn controlword_and_set_point_may_come_in_one_rpdo() {
-    let mut bench = Bench::new();
-    bench.set(0x2000, 0).set(0x6060, 1);
-    for (sub, value) in [(0, 0), (1, 0x607A_0020), (2, 0x6040_0010), (0, 2)] {
-        bench.set((0x1600, sub), value);
-    }
-    bench.send("000#0104");
-    for frame in ["204#000000000600", "204#000000000700", "204#000000000F00", "204#001000001F00"] {
-        bench.send(frame);
-    }
-    bench.run_ms(2500);
-    assert_within("position", bench.report().position as f64, 4066.0, 4126.0);
-}
-
-#[test]
 fn enabling_a_turning_wheel_catches_it_without_a_fault() {
     for mode in [1, 3, 4] {
         let mut bench = Bench::new();

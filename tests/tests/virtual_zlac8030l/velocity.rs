@@ -102,19 +102,16 @@ fn a_resolution_of_10_or_5_makes_the_target_finer_after_it_was_saved_and_the_dri
 #[test]
 fn the_range_of_60ffh_grows_with_the_resolution_so_that_1000_rpm_stay_in_reach() {
     let mut bench = Bench::new();
-    assert_eq!(bench.write(0x60FF, 1001), Err(0x0609_0031));
+    bench.refuses(0x60FF, 1001, 0x0609_0031);
     bench.set((0x202F, 5), 10).power_cycle();
-    bench.set(0x60FF, 10_000);
-    assert_eq!(bench.write(0x60FF, 10_001), Err(0x0609_0031));
-    assert_eq!(bench.write(0x60FF, -10_001), Err(0x0609_0032));
+    bench.set(0x60FF, 10_000).refuses(0x60FF, 10_001, 0x0609_0031).refuses(0x60FF, -10_001, 0x0609_0032);
 }
 
 /// 5.3: a resolution is in effect after a restart, and so is the range that it gives.
 #[test]
 fn a_resolution_that_waits_for_its_restart_does_not_widen_the_range_of_60ffh() {
     let mut bench = Bench::new();
-    bench.set((0x202F, 5), 10);
-    assert_eq!(bench.write(0x60FF, 1001), Err(0x0609_0031));
+    bench.set((0x202F, 5), 10).refuses(0x60FF, 1001, 0x0609_0031);
     bench.let_store().power_cycle();
     bench.set(0x60FF, 1001).set((0x202F, 5), 1).set(0x60FF, 5000).send("000#8104").run_ms(10);
     assert_eq!(bench.write(0x60FF, 1001), Err(0x0609_0031), "after NMT reset node too");

@@ -52,8 +52,7 @@ fn each_factory_value_is_the_manuals_or_that_of_the_eds_also_after_a_restore() {
 #[test]
 fn by_the_eds_rpdo_0_carries_controlword_and_mode_and_a_drive_enabled_in_mode_3_turns_at_120_rpm() {
     let mut bench = Bench::choosing("defaults", "eds");
-    bench.heard();
-    bench.send("000#0101").run_ms(60);
+    bench.forget().send("000#0101").run_ms(60);
     assert_eq!(bench.heard_of("181#"), ["181#7002"], "once on entering operational");
     for frame in ["201#060003", "201#070003", "201#0F0003"] {
         bench.send(frame).run_ms(5);

@@ -21,8 +21,7 @@ fn a_load_of_four_holding_torques_makes_the_free_shaft_run_away_until_its_bearin
     assert!(told.contains("\"velocity_rpm\":0") && told.contains("bearings seized"), "{told}");
     assert_eq!(bench.get(0x603F), 0xFF01, "the drive saw the bus above 40 V (2.1)");
     // New bearings, and it works again.
-    bench.tell("1 load torque 0");
-    bench.tell("1 rotor free").run_ms(2000);
+    bench.tell("1 load torque 0").tell("1 rotor free").run_ms(2000);
     bench.set(0x2011, 1).enable_in(1).run_ms(200);
     bench.move_by(4000).run_ms(1500);
     let report = bench.report();

@@ -8,7 +8,6 @@ use ferrodrive_tests::bench::zlim42c as bench;
 
 mod address;
 mod choices;
-mod communication;
 mod current;
 mod datagrams;
 mod driven;

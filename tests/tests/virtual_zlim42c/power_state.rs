@@ -19,8 +19,7 @@ fn every_event_in_every_state_leads_where_the_table_says() {
 #[test]
 fn the_drive_says_that_it_has_booted_and_is_in_switch_on_disabled() {
     let mut bench = Bench::new();
-    assert_eq!(bench.heard(), ["701#00"]);
-    bench.shows(0x6F, 0x60);
+    bench.hears(&["701#00"]).shows(0x6F, 0x60);
 }
 
 #[test]

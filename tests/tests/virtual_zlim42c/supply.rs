@@ -25,7 +25,7 @@ fn below_20_v_the_drive_is_off_and_it_starts_anew_when_the_voltage_comes_back() 
     for supply_v in [19.0, 15.0, 0.0] {
         let mut bench = Bench::new();
         bench.enable_in(3).set(0x60FF, 60).run_ms(300);
-        bench.heard();
+        bench.forget();
         supply(&mut bench, supply_v);
         let report = bench.report();
         assert_eq!((report.powered, report.current_a, report.statusword), (false, 0.0, None), "{supply_v} V");

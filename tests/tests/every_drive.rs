@@ -1,0 +1,44 @@
+//! Which scenario is asked of which drive. A further drive is a further name in these rows, and its bench.
+
+ferrodrive_tests::scenarios! {
+    network {
+        commands_to_all_nodes_and_to_this_one_act_and_commands_to_others_do_not: zlac8030l zlim42c mjoint;
+        a_reset_leaves_the_node_able_to_speak: zlac8030l zlim42c;
+        a_stopped_node_answers_no_sdo_and_its_motor_goes_on: zlac8030l zlim42c;
+        a_communication_reset_leaves_the_motor_turning_and_a_node_reset_frees_it: zlac8030l zlim42c;
+        the_heartbeat_comes_back_by_itself_after_a_power_cycle: zlac8030l zlim42c;
+        a_heartbeat_of_100_ms_comes_a_hundred_times_in_ten_seconds_without_drift_and_one_of_0_never: zlac8030l zlim42c mjoint;
+        emcy_is_sent_on_the_identifier_of_1014h_and_not_at_all_with_bit_31: zlac8030l zlim42c;
+        no_emcy_and_no_pdo_leave_a_stopped_node: zlac8030l zlim42c;
+        sync_is_heard_on_the_identifier_of_1005h: zlac8030l zlim42c;
+        nothing_that_the_manual_does_not_name_is_answered: zlac8030l zlim42c mjoint;
+        remote_frames_get_no_answer_though_the_cob_ids_say_that_rtr_is_allowed: zlac8030l zlim42c mjoint;
+    }
+    sdo {
+        malformed_requests_are_survived_and_change_nothing: zlac8030l zlim42c;
+        a_block_transfer_is_refused_and_an_abort_in_its_place_is_ignored: zlac8030l zlim42c mjoint;
+        an_answer_comes_within_about_a_millisecond: zlac8030l zlim42c;
+        a_segmented_download_carries_a_small_object_too: zlac8030l zlim42c mjoint;
+        an_expedited_download_without_a_size_takes_what_the_object_needs: zlac8030l zlim42c mjoint;
+        an_upload_ignores_its_low_five_bits_and_three_bytes_are_too_few: zlac8030l zlim42c mjoint;
+        requests_sent_without_waiting_for_answers_are_all_answered_in_order: zlac8030l zlim42c mjoint;
+    }
+    pdo {
+        an_rpdo_acts_in_operational_only: zlac8030l zlim42c;
+        each_of_the_four_rpdos_sets_the_objects_it_maps: zlac8030l zlim42c;
+        each_of_the_four_tpdos_tells_the_objects_it_maps: zlac8030l zlim42c;
+        an_rpdo_of_types_0_to_240_waits_for_the_sync_and_one_of_254_or_255_does_not: zlac8030l zlim42c;
+        a_synchronous_tpdo_comes_with_each_nth_sync_and_one_of_type_0_after_a_change: zlac8030l zlim42c;
+        each_asynchronous_tpdo_is_sent_once_on_entering_operational: zlac8030l zlim42c;
+        inhibit_time_and_event_timer_count_half_milliseconds: zlac8030l zlim42c;
+        a_pdo_is_mapped_with_bit_31_as_masters_do_and_without_as_the_manuals_do: zlac8030l zlim42c;
+        a_switched_off_pdo_is_silent_and_deaf: zlac8030l zlim42c;
+        a_wrong_mapping_is_refused_with_the_codes_of_cia_301: zlac8030l zlim42c;
+        what_the_table_refuses_an_rpdo_does_not_do_either: zlac8030l zlim42c;
+        a_short_rpdo_is_not_half_applied_and_a_long_one_counts_as_far_as_mapped: zlac8030l zlim42c;
+        an_rpdo_that_is_too_short_is_told_once_by_8210h_and_one_that_is_too_long_is_not: zlac8030l zlim42c;
+        controlword_and_target_in_one_rpdo_start_the_move_whichever_comes_first: zlac8030l zlim42c;
+        a_stored_mapping_works_after_a_power_cycle: zlac8030l zlim42c;
+        a_reserved_transmission_type_is_refused: zlac8030l zlim42c;
+    }
+}
