@@ -3,6 +3,22 @@
 //! Controlword and statusword by bit, the power drive state machine and the homing methods as const tables, modes, option
 //! and error codes as open newtypes, the factor group as exact fractions, windows and touch probes as small machines. Nothing here moves a motor or knows a dictionary: the drives' firmware and the
 //! master both read these tables. Manufacturer meanings of bits are deliberately absent: they are the drives'.
+//!
+//! ```
+//! use cia402::{PowerEvent, PowerState, Statusword, next_command, transition};
+//!
+//! // What a drive with this statusword has to be told, one controlword after another, until it moves its motor.
+//! let mut state = Statusword(0x1250).state().ok_or("no state has these bits")?;
+//! assert_eq!(state, PowerState::SwitchOnDisabled);
+//! let mut controlwords = Vec::new();
+//! while let Some(command) = next_command(state) {
+//!     controlwords.push(command.controlword().0);
+//!     state = transition(state, PowerEvent::Command(command)).ok_or("no way on")?.to;
+//! }
+//! assert_eq!(controlwords, [0x06, 0x07, 0x0F]);
+//! assert_eq!(state, PowerState::OperationEnabled);
+//! # Ok::<(), &str>(())
+//! ```
 #![no_std]
 
 mod controlword;

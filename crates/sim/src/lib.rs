@@ -6,6 +6,31 @@
 //! [`block_on`] runs a future against a world, [`command`] is the text protocol of `ferrodrive sim`,
 //! [`pace`] ties virtual time to a wall clock that somebody else reads.
 //!
+//! ```
+//! use can::{Bitrate, Frame};
+//! use canopen::NodeId;
+//! use core::time::Duration;
+//! use sim::World;
+//! use sim::machine::{Order, order};
+//!
+//! // A drive as it is delivered, and an adapter to send and hear frames with.
+//! let model = devices::model("zlac8030l").ok_or("no such model")?;
+//! let node = NodeId::new(4).ok_or("no such node")?;
+//! let mut world = World::new(Bitrate::K500, 1);
+//! world.add_drive(4, order(model, &Order::new(model, node, Bitrate::K500))?)?;
+//! let adapter = world.add_tap();
+//! world.run_for(Duration::from_secs(1));
+//! assert_eq!(world.poll_received(adapter).map(|(_, frame)| frame), Some("704#00".parse()?)); // boot-up
+//!
+//! // Read the statusword, and what a person beside the machine could measure.
+//! world.send(adapter, "604#4041600000000000".parse()?)?;
+//! world.run_for(Duration::from_millis(10));
+//! let (at, answer) = world.poll_received(adapter).ok_or("no answer")?;
+//! assert_eq!(answer.data()[..4], [0x4B, 0x41, 0x60, 0x00]);
+//! assert!(at.as_secs_f64() < 1.01 && world.report(4)?.velocity_rpm == 0.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! Deliberately absent: clocks, threads, sockets and files.
 
 mod block_on;

@@ -8,17 +8,41 @@
 //!
 //! This crate holds the only clock ([`WallClock`]) and the only sockets of the project. Everything else is sans-IO.
 //!
-//! ```no_run
-//! use transport::{AsyncBus, BusSpec, WallClock};
+//! A bus that is served, and a program that reaches it:
 //!
-//! # async fn listen() -> Result<(), Box<dyn std::error::Error>> {
-//! let bus: BusSpec = "socketcand://127.0.0.1:29536/can0".parse()?;
-//! let mut bus = bus.open(&WallClock::start()).await?;
-//! bus.send(&"000#0100".parse()?).await?; // NMT: start all nodes
-//! let (at, frame) = bus.recv().await?;
-//! # let _ = (at, frame);
+//! ```
+//! use can::{Bitrate, Frame};
+//! use transport::{AsyncBus, BusSpec, Hub, HubEvent, HubOptions, WallClock};
+//!
+//! # async fn served() -> Result<(), Box<dyn std::error::Error>> {
+//! let clock = WallClock::start();
+//! let place = "socketcand://127.0.0.1:0".parse()?; // any free port
+//! let mut hub = Hub::bind(&[place], HubOptions::default(), &clock).await?;
+//! let address = hub.listeners()[0].to_string();
+//!
+//! // The program: NMT "start all nodes", then wait for what others say.
+//! let program = async {
+//!     let spec: BusSpec = format!("{address}/can0").parse()?;
+//!     let mut bus = spec.open(&clock).await?;
+//!     bus.send(&"000#0100".parse()?).await?;
+//!     let (_at, frame) = bus.recv().await?;
+//!     Ok::<Frame, Box<dyn std::error::Error>>(frame)
+//! };
+//!
+//! // The bus: it hears the program's frame, and answers with a node's boot-up.
+//! let bus = async {
+//!     loop {
+//!         if let HubEvent::Frame { client, frame } = hub.next_event().await {
+//!             hub.broadcast(&frame, clock.now(), Some(client)); // the wire took it
+//!             return hub.broadcast(&Frame::new(can::CanId::standard(0x701), &[0]), clock.now(), None);
+//!         }
+//!     }
+//! };
+//! let (heard, ()) = tokio::join!(program, bus);
+//! assert_eq!(heard?, "701#00".parse()?);
 //! # Ok(())
 //! # }
+//! # tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap().block_on(served()).unwrap();
 //! ```
 //!
 //! Linux SocketCAN is deliberately absent so far: it needs a kernel module that few test machines have.
