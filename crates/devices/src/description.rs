@@ -397,6 +397,8 @@ pub struct PdoRules {
     pub remap_while_valid: bool,
     /// The mapping cannot be changed at all.
     pub fixed_mapping: bool,
+    /// What the manual calls PDO 1 of CiA 301, whose objects are 1400h and 1800h: 1, or 0.
+    pub first_in_manual: u8,
     /// What entries of a mapping are taken.
     pub mapping: MappingRules,
     /// Error code of the EMCY message when an RPDO has fewer bytes than are mapped; `None` for none. It is not used in

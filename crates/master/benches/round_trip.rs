@@ -6,9 +6,10 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use can::{Frame, Instant, Station};
+use canopen::pdo::{MappingRecord, PdoNumber};
 use canopen::{Mux, NodeId};
 use criterion::{Criterion, criterion_group, criterion_main};
-use master::core::{Command, Core, MappedObject, PdoMap};
+use master::core::{Command, Core, PdoMap};
 
 const NODE: NodeId = NodeId::MIN;
 
@@ -24,8 +25,8 @@ fn armed_core() -> Core {
         core.execute(Command::WatchHeartbeat(node, Some(Duration::from_secs(1))), Instant::ZERO);
     }
     core.execute(Command::Sync(Some(Duration::from_secs(1))), Instant::ZERO);
-    let map = PdoMap(vec![MappedObject::from_record(0x6041_0010), MappedObject::from_record(0x6064_0020)]);
-    core.image_mut().set_tpdo(NODE, 0, 0x181, map);
+    let map = PdoMap(vec![MappingRecord::from_raw(0x6041_0010), MappingRecord::from_raw(0x6064_0020)]);
+    core.image_mut().set_tpdo(NODE, PdoNumber::FIRST, 0x181, map);
     core
 }
 

@@ -2,9 +2,12 @@
 
 use can::Frame;
 use canopen::NodeId;
+use canopen::pdo::{Direction, MappingRecord, PdoId, PdoNumber};
 use devices::model;
-use master::core::{MappedObject, PdoMap};
-use master::decode::{Decoder, Direction};
+use master::core::PdoMap;
+use master::decode::Decoder;
+
+const TPDO1: PdoId = PdoId { direction: Direction::Tpdo, number: PdoNumber::FIRST };
 
 fn lines(decoder: &mut Decoder, frames: &[&str]) -> Vec<String> {
     frames.iter().map(|text| decoder.decode(&text.parse::<Frame>().unwrap()).to_string()).collect()
@@ -25,7 +28,7 @@ fn single_frame_services_are_told_in_words() {
             "boot-up node 4",
             "heartbeat node 4: operational",
             "EMCY node 4: 2110h (current, CANopen device input side), error register 02h",
-            "remote request for TPDO0 of node 4",
+            "remote request for TPDO1 of node 4",
             "malformed NMT command",
             "unknown",
         ]
@@ -101,9 +104,9 @@ fn segmented_transfers_are_put_together() {
 #[test]
 fn pdos_are_split_by_the_mapping_that_went_over_the_bus() {
     let mut decoder = Decoder::new();
-    // Quick start guide 6.1: 606Ch into TPDO0.
+    // Quick start guide 6.1: 606Ch into TPDO0, which is TPDO1 of CiA 301.
     let shown = lines(&mut decoder, &["184#01020304"]);
-    assert_eq!(shown, ["TPDO0 node 4: 01 02 03 04 (mapping not known)"]);
+    assert_eq!(shown, ["TPDO1 node 4: 01 02 03 04 (mapping not known)"]);
     lines(
         &mut decoder,
         &[
@@ -115,10 +118,10 @@ fn pdos_are_split_by_the_mapping_that_went_over_the_bus() {
             "584#60001A0000000000",
         ],
     );
-    assert_eq!(lines(&mut decoder, &["184#64000000"]), ["TPDO0 node 4: 606Ch:00 velocity_actual_value = 100"]);
+    assert_eq!(lines(&mut decoder, &["184#64000000"]), ["TPDO1 node 4: 606Ch:00 velocity_actual_value = 100"]);
     assert_eq!(
         lines(&mut decoder, &["184#6400"]),
-        ["TPDO0 node 4: (too short: 2 of 4 bytes, the receiver ignores it)"]
+        ["TPDO1 node 4: (too short: 2 of 4 bytes, the receiver ignores it)"]
     );
 }
 
@@ -147,7 +150,7 @@ fn a_joint_is_put_into_its_own_words() {
             "heartbeat node 1: operational",
             "heartbeat node 1: in alarm (04h; it does not mean stopped)",
             "SDO node 1: 606Ch:00 velocity_actual_value = -6000 [0.1 r/min]",
-            "TPDO2 node 1: 606Ch:00 velocity_actual_value = -600 [r/min], 6041h:00 statusword = 0437h (follows its host, \
+            "TPDO3 node 1: 606Ch:00 velocity_actual_value = -600 [r/min], 6041h:00 statusword = 0437h (follows its host, \
              output enabled, power stage live, no quick stop, target reached)",
         ]
     );
@@ -173,12 +176,23 @@ fn a_joint_is_known_by_its_device_type_and_a_zl_drive_is_not() {
 }
 
 #[test]
+fn a_pdo_has_the_number_of_cia_301_and_that_of_its_manual_where_it_differs() {
+    let mut decoder = Decoder::new();
+    decoder.set_model(NodeId::new(4).unwrap(), model("zlac8030l").unwrap());
+    decoder.set_model(NodeId::new(1).unwrap(), model("m4230e17b50").unwrap());
+    let shown = lines(&mut decoder, &["284#00", "381#0A0000003704"]);
+    // "ZLAC8030L quick start guide V1.00", 6: 1801h is TPDO1; "M Robot Joint Motor CanOpen Manual", 5.08: 1802h is TPDO3.
+    assert_eq!(shown[0].split(" node").next(), Some("TPDO2 (in the manual TPDO1)"));
+    assert_eq!(shown[1].split(" node").next(), Some("TPDO3"));
+}
+
+#[test]
 fn a_refused_mapping_changes_nothing() {
     let mut decoder = Decoder::new();
-    let map = PdoMap(vec![MappedObject::from_record(0x6041_0010)]);
-    decoder.set_pdo(NodeId::new(4).unwrap(), Direction::Tpdo, 0, 0x184, &map);
+    let map = PdoMap(vec![MappingRecord::from_raw(0x6041_0010)]);
+    decoder.set_pdo(NodeId::new(4).unwrap(), TPDO1, 0x184, &map);
     lines(&mut decoder, &["604#2F001A0000000000", "584#80001A0022000008"]);
-    assert_eq!(lines(&mut decoder, &["184#3702"]), ["TPDO0 node 4: 6041h:00 statusword = 0237h (Operation enabled)"]);
+    assert_eq!(lines(&mut decoder, &["184#3702"]), ["TPDO1 node 4: 6041h:00 statusword = 0237h (Operation enabled)"]);
 }
 
 #[test]

@@ -5,26 +5,34 @@ mod support;
 use std::time::Duration;
 
 use can::{Frame, Instant, Station};
-use master::core::{Event, MappedObject, PdoMap, RpdoTrigger};
-use master::decode::Direction;
+use canopen::pdo::{Direction, MappingRecord, PdoId, PdoNumber};
+use master::core::{Event, PdoMap, RpdoTrigger};
 use master::pdo::{SignalError, TimerUnits};
 use master::units::Rpm;
 use master::{Network, NoCycle, Node};
 use support::toy::Toy;
 use support::{Bus, mux, node};
 
+const TPDO1: PdoId = PdoId { direction: Direction::Tpdo, number: PdoNumber::FIRST };
+
 const PERIOD: Duration = Duration::from_millis(10);
 
 fn map(records: &[u32]) -> PdoMap {
-    PdoMap(records.iter().map(|record| MappedObject::from_record(*record)).collect())
+    PdoMap(records.iter().map(|record| MappingRecord::from_raw(*record)).collect())
 }
 
 /// A node with statusword and position in TPDO1, controlword and target in RPDO1, both with SYNC.
 fn node_with_pdos(network: &Network) -> Node {
     let node = network.node(node(4));
     network.with_core(|core| {
-        core.image_mut().set_tpdo(node.id(), 0, 0x184, map(&[0x6041_0010, 0x6064_0020]));
-        core.image_mut().set_rpdo(node.id(), 0, 0x204, map(&[0x6040_0010, 0x607A_0020]), RpdoTrigger::Sync);
+        core.image_mut().set_tpdo(node.id(), PdoNumber::FIRST, 0x184, map(&[0x6041_0010, 0x6064_0020]));
+        core.image_mut().set_rpdo(
+            node.id(),
+            PdoNumber::FIRST,
+            0x204,
+            map(&[0x6040_0010, 0x607A_0020]),
+            RpdoTrigger::Sync,
+        );
     });
     node
 }
@@ -88,7 +96,9 @@ fn a_signal_is_read_with_its_sign_and_its_age() {
         assert_eq!((io.read_fresh(position, 1), io.read_fresh(position, 2)), (None, Some(-2)));
     });
     // Another mapping ends the handle: it finds nothing, and no other object's bits.
-    network.with_core(|core| core.image_mut().set_tpdo(node.id(), 0, 0x184, map(&[0x6064_0020, 0x6041_0010])));
+    network.with_core(|core| {
+        core.image_mut().set_tpdo(node.id(), PdoNumber::FIRST, 0x184, map(&[0x6064_0020, 0x6041_0010]))
+    });
     network.handle_frame(&frame("184#010000003702"), Instant::from_millis(21));
     assert_eq!(network.exchange(|io| io.read(position)), None);
     let position = node.signal::<i32>(mux(0x6064, 0)).unwrap();
@@ -114,7 +124,7 @@ fn an_object_that_is_not_mapped_or_does_not_suit_is_told_with_what_is_there() {
     assert!(matches!(error, SignalError::NotMapped { direction: Direction::Tpdo, .. }));
     assert_eq!(
         error.to_string(),
-        "606Ch:00 of node 4 is in no TPDO that this master knows: TPDO0 has 6041h:00 6064h:00. Map it with configure_pdo"
+        "606Ch:00 of node 4 is in no TPDO that this master knows: TPDO1 has 6041h:00 6064h:00. Map it with configure_pdo"
     );
     let error = node.signal::<i16>(mux(0x6064, 0)).unwrap_err();
     assert!(matches!(error, SignalError::DoesNotSuit { bits: 32, .. }), "{error}");
@@ -196,7 +206,7 @@ fn mappings_are_read_from_the_device() {
     let mut bus = Bus::new(vec![toy]);
     let network = bus.network.clone();
     let node = network.node(node(4));
-    bus.block_on(node.adopt_pdo(Direction::Tpdo, 0, TimerUnits::STANDARD)).unwrap();
+    bus.block_on(node.adopt_pdo(TPDO1, TimerUnits::STANDARD)).unwrap();
     let speed = node.signal::<i32>(mux(0x606C, 0)).unwrap();
     bus.toys[0].send(0x180, &[0x37, 0x02, 0x9C, 0xFF]);
     bus.settle();

@@ -7,8 +7,9 @@ use std::time::Duration;
 
 use can::{CanId, Frame, Instant, Station};
 use canopen::nmt::NmtTarget;
+use canopen::pdo::{MappingRecord, PdoNumber};
 use canopen::{Mux, NmtCommand, NodeId};
-use master::core::{Command, Core, MappedObject, Payload, PdoMap, Request, RpdoTrigger, Transfer};
+use master::core::{Command, Core, Payload, PdoMap, Request, RpdoTrigger, Transfer};
 
 /// Marsaglia's xorshift32.
 struct Random(u32);
@@ -81,9 +82,9 @@ fn random_traffic_never_panics_and_every_request_ends_once() {
     for seed in 1..=40 {
         let mut random = Random(0x9E37_79B9_u32.wrapping_mul(seed));
         let mut core = Core::new();
-        let map = PdoMap(vec![MappedObject::from_record(random.next()), MappedObject::from_record(0x6041_0010)]);
-        core.image_mut().set_tpdo(NodeId::MIN, 0, 0x181, map.clone());
-        core.image_mut().set_rpdo(NodeId::MIN, 0, 0x201, map, RpdoTrigger::Sync);
+        let map = PdoMap(vec![MappingRecord::from_raw(random.next()), MappingRecord::from_raw(0x6041_0010)]);
+        core.image_mut().set_tpdo(NodeId::MIN, PdoNumber::FIRST, 0x181, map.clone());
+        core.image_mut().set_rpdo(NodeId::MIN, PdoNumber::FIRST, 0x201, map, RpdoTrigger::Sync);
         let mut now = Instant::ZERO;
         let mut open = BTreeSet::new();
         for _ in 0..4_000 {

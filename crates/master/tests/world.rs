@@ -5,9 +5,9 @@ mod support;
 use std::time::Duration;
 
 use can::{Bitrate, Instant};
+use canopen::pdo::{Direction, MappingRecord, PdoId, PdoNumber};
 use devices::model;
-use master::core::{MappedObject, PdoMap};
-use master::decode::Direction;
+use master::core::PdoMap;
 use master::drive::MotionOptions;
 use master::pdo::{PdoConfig, TimerUnits, TransmissionType};
 use master::units::{Rpm, Turns};
@@ -17,6 +17,9 @@ use sim::{StationId, World, block_on};
 use support::toy::Toy;
 use support::toy_drive::zlac8030l;
 use support::{mux, node};
+
+const RPDO1: PdoId = PdoId { direction: Direction::Rpdo, number: PdoNumber::FIRST };
+const TPDO1: PdoId = PdoId { direction: Direction::Tpdo, number: PdoNumber::FIRST };
 
 const DEVICE_TYPE: canopen::Mux = mux(0x1000, 0);
 
@@ -127,7 +130,7 @@ fn sync_keeps_its_period_and_synchronous_rpdos_follow_it() {
     let tap = world.add_tap();
     let node = network.node(node(4));
     let half_ms = Duration::from_micros(500);
-    let adopt = node.adopt_pdo(Direction::Rpdo, 0, TimerUnits { inhibit: half_ms, event: half_ms });
+    let adopt = node.adopt_pdo(RPDO1, TimerUnits { inhibit: half_ms, event: half_ms });
     let config = block_on(&mut world, adopt).unwrap().unwrap();
     assert_eq!(config.transmission, TransmissionType::EVERY_SYNC);
     // Past the intermission after the last answer.
@@ -153,10 +156,10 @@ fn a_condition_sees_values_that_come_by_pdo() {
     toy.send(0x180, &[0x37, 0x06]);
     let (mut world, network, _) = world([toy]);
     let node = network.node(node(4));
-    let map = PdoMap(vec![MappedObject::from_record(0x6041_0010)]);
-    network.with_core(|core| core.image_mut().set_tpdo(node.id(), 0, 0x184, map.clone()));
+    let map = PdoMap(vec![MappingRecord::from_raw(0x6041_0010)]);
+    network.with_core(|core| core.image_mut().set_tpdo(node.id(), PdoNumber::FIRST, 0x184, map.clone()));
     let enabled = node.wait(|node| node.received(mux(0x6041, 0)).map(|value| value.raw), Duration::from_secs(1));
     assert_eq!(block_on(&mut world, enabled).unwrap(), Ok(0x0637));
-    let config = PdoConfig::new(Direction::Tpdo, 0, map);
+    let config = PdoConfig::new(TPDO1, map);
     block_on(&mut world, node.configure_pdo(&config, TimerUnits::STANDARD)).unwrap().unwrap();
 }

@@ -6,10 +6,10 @@ use std::time::Duration;
 
 use can::{Bitrate, Instant};
 use canopen::NmtCommand;
+use canopen::pdo::{Direction, MappingRecord, PdoId, PdoNumber};
 use cia402::PowerState;
 use devices::model;
-use master::core::{MappedObject, PdoMap};
-use master::decode::Direction;
+use master::core::PdoMap;
 use master::drive::{HostLoss, MotionOptions, Note};
 use master::pdo::{PdoConfig, TimerUnits};
 use master::units::{Amperes, Counts, Degrees, Ramp, Rpm, Turns};
@@ -17,6 +17,8 @@ use master::{Drive, Error, Network, join_all};
 use sim::machine::zlac8030l;
 use sim::{World, block_on};
 use support::{mux, node};
+
+const TPDO1: PdoId = PdoId { direction: Direction::Tpdo, number: PdoNumber::FIRST };
 
 /// The value of 200Eh for 500 kbit/s.
 const K500: u16 = 1;
@@ -202,8 +204,8 @@ fn a_tpdo_is_configured_saved_and_comes_back_after_a_power_cycle() {
         inhibit: Duration::from_nanos(profile.pdo.inhibit_unit_ns),
         event: Duration::from_nanos(profile.pdo.event_timer_unit_ns),
     };
-    let map = PdoMap(vec![MappedObject::from_record(0x6041_0010), MappedObject::from_record(0x6064_0020)]);
-    let config = PdoConfig::new(Direction::Tpdo, 0, map).event_time(Duration::from_millis(50));
+    let map = PdoMap(vec![MappingRecord::from_raw(0x6041_0010), MappingRecord::from_raw(0x6064_0020)]);
+    let config = PdoConfig::new(TPDO1, map).event_time(Duration::from_millis(50));
     let node = drives[0].node().clone();
     block_on(&mut world, node.configure_pdo(&config, units)).unwrap().unwrap();
     block_on(&mut world, drives[0].save()).unwrap().unwrap();
@@ -213,7 +215,7 @@ fn a_tpdo_is_configured_saved_and_comes_back_after_a_power_cycle() {
     let booted = node.wait_boot_up(Duration::from_secs(5));
     world.set_power(4, true).unwrap();
     block_on(&mut world, booted).unwrap().unwrap();
-    let after = block_on(&mut world, node.adopt_pdo(Direction::Tpdo, 0, units)).unwrap().unwrap();
+    let after = block_on(&mut world, node.adopt_pdo(TPDO1, units)).unwrap().unwrap();
     assert_eq!((after.map, after.event_time), (config.map, config.event_time));
     node.nmt(NmtCommand::Start);
     block_on(&mut world, network.sleep(Duration::from_millis(200))).unwrap();

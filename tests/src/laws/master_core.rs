@@ -5,8 +5,9 @@ use std::time::Duration;
 
 use can::{CanId, Frame, Instant, Station};
 use canopen::nmt::NmtTarget;
+use canopen::pdo::{MappingRecord, PdoNumber};
 use canopen::{Mux, NmtCommand, NodeId};
-use master::core::{Command, Core, MappedObject, Payload, PdoMap, Request, RpdoTrigger, Ticket, Transfer};
+use master::core::{Command, Core, Payload, PdoMap, Request, RpdoTrigger, Ticket, Transfer};
 
 use super::selected_frame::selected_frame;
 
@@ -37,9 +38,9 @@ const MOST_EVENTS: usize = 256;
 pub(super) fn master_core(data: &[u8]) {
     let mut core = Core::new();
     let node = NodeId::MIN;
-    let map = PdoMap(vec![MappedObject::from_record(0x6041_0010), MappedObject::from_record(0x6064_0020)]);
-    core.image_mut().set_tpdo(node, 0, 0x181, map.clone());
-    core.image_mut().set_rpdo(node, 0, 0x201, map, RpdoTrigger::Sync);
+    let map = PdoMap(vec![MappingRecord::from_raw(0x6041_0010), MappingRecord::from_raw(0x6064_0020)]);
+    core.image_mut().set_tpdo(node, PdoNumber::FIRST, 0x181, map.clone());
+    core.image_mut().set_rpdo(node, PdoNumber::FIRST, 0x201, map, RpdoTrigger::Sync);
     let mut open = BTreeSet::new();
     let mut now = Instant::from_secs(1);
     for chunk in data.chunks(CHUNK) {

@@ -82,6 +82,7 @@ const PDO_RULES: PdoRules = PdoRules {
     max_objects: 3,
     remap_while_valid: true,
     fixed_mapping: true,
+    first_in_manual: 1,
     mapping: MappingRules { tpdo_forms: &IN_TPDO, ..MappingRules::CIA_301 },
     // It has no EMCY.
     short_rpdo: None,

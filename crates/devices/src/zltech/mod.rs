@@ -30,6 +30,7 @@ const PDO_RULES: PdoRules = PdoRules {
     max_objects: 4,
     remap_while_valid: true,
     fixed_mapping: false,
+    first_in_manual: 0,
     mapping: MappingRules::CIA_301,
     // The manuals are silent; CiA 301 asks it of a device with EMCY.
     short_rpdo: Some(EmcyErrorCode::PDO_NOT_PROCESSED),

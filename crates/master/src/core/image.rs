@@ -2,6 +2,7 @@ use std::collections::VecDeque;
 use std::ops::Range;
 
 use can::{CanId, Frame, Instant, MAX_DATA_LENGTH};
+use canopen::pdo::PdoNumber;
 use canopen::{Mux, NodeId};
 
 use super::field::{Place, bits_of, mask_of};
@@ -27,7 +28,7 @@ pub enum RpdoTrigger {
 
 /// Process image: the newest data of every mapped PDO, with the time it came, and what is to be sent.
 ///
-/// RPDO and TPDO are from the device's side; PDOs are numbered from 0 (1400h, 1800h). A frame that is shorter
+/// RPDO and TPDO are from the device's side. A frame that is shorter
 /// than its mapping is not taken over (CiA 301, 7.2.2.5). An unsent RPDO is overwritten by its newer value.
 #[derive(Clone, Debug)]
 pub struct Image {
@@ -49,7 +50,7 @@ const NONE: u16 = u16::MAX;
 #[derive(Clone, Debug)]
 struct Tpdo {
     node: NodeId,
-    number: u8,
+    number: PdoNumber,
     /// Counts its mappings, so that a [`Place`] in an old one finds nothing.
     generation: u16,
     id: Option<u16>,
@@ -65,7 +66,7 @@ struct Tpdo {
 #[derive(Clone, Debug)]
 struct Rpdo {
     node: NodeId,
-    number: u8,
+    number: PdoNumber,
     generation: u16,
     id: Option<CanId>,
     map: PdoMap,
@@ -95,7 +96,7 @@ impl Default for Image {
 impl Image {
     /// Receives a node's TPDO under `id` from now on, in place of what that TPDO was before. Nothing changes where it is so
     /// already.
-    pub fn set_tpdo(&mut self, node: NodeId, number: u8, id: u16, map: PdoMap) {
+    pub fn set_tpdo(&mut self, node: NodeId, number: PdoNumber, id: u16, map: PdoMap) {
         let bytes = map.bytes();
         let unchanged = |pdo: &Tpdo| (pdo.node, pdo.number, pdo.id, &pdo.map) == (node, number, Some(id), &map);
         if self.tpdos.iter().any(unchanged) {
@@ -113,7 +114,7 @@ impl Image {
     }
 
     /// Receives a node's TPDO no longer.
-    pub fn remove_tpdo(&mut self, node: NodeId, number: u8) {
+    pub fn remove_tpdo(&mut self, node: NodeId, number: PdoNumber) {
         if let Some(pdo) = self.tpdos.iter_mut().find(|pdo| (pdo.node, pdo.number) == (node, number)) {
             pdo.generation = pdo.generation.wrapping_add(1);
             (pdo.id, pdo.map, pdo.at) = (None, PdoMap::default(), None);
@@ -122,7 +123,7 @@ impl Image {
     }
 
     /// Prepares a node's RPDO for sending under `id`, all bits zero. What it carries stays where it is so already.
-    pub fn set_rpdo(&mut self, node: NodeId, number: u8, id: u16, map: PdoMap, trigger: RpdoTrigger) {
+    pub fn set_rpdo(&mut self, node: NodeId, number: PdoNumber, id: u16, map: PdoMap, trigger: RpdoTrigger) {
         let id = Some(CanId::standard(id));
         let same = |pdo: &&mut Rpdo| (pdo.node, pdo.number, pdo.id, &pdo.map) == (node, number, id, &map);
         if let Some(pdo) = self.rpdos.iter_mut().find(same) {
@@ -146,7 +147,7 @@ impl Image {
     }
 
     /// Sends a node's RPDO no longer.
-    pub fn remove_rpdo(&mut self, node: NodeId, number: u8) {
+    pub fn remove_rpdo(&mut self, node: NodeId, number: PdoNumber) {
         let Some(position) = self.rpdos.iter().position(|pdo| (pdo.node, pdo.number) == (node, number)) else { return };
         let pdo = &mut self.rpdos[position];
         pdo.generation = pdo.generation.wrapping_add(1);
@@ -166,21 +167,27 @@ impl Image {
     }
 
     /// The mapping under which a node's TPDO is received.
-    pub fn tpdo_map(&self, node: NodeId, number: u8) -> Option<&PdoMap> {
+    pub fn tpdo_map(&self, node: NodeId, number: PdoNumber) -> Option<&PdoMap> {
         self.tpdo(node, number).map(|pdo| &pdo.map)
     }
 
     /// When a node's TPDO last came.
-    pub fn tpdo_at(&self, node: NodeId, number: u8) -> Option<Instant> {
+    pub fn tpdo_at(&self, node: NodeId, number: PdoNumber) -> Option<Instant> {
         self.tpdo(node, number)?.at
     }
 
+    /// The identifier of a node's TPDO, and how many bytes it carries.
+    pub fn tpdo_id(&self, node: NodeId, number: PdoNumber) -> Option<(u16, usize)> {
+        let pdo = self.tpdo(node, number)?;
+        Some((pdo.id?, pdo.bytes))
+    }
+
     /// How many frames of a node's TPDO were shorter than its mapping and therefore ignored.
-    pub fn too_short(&self, node: NodeId, number: u8) -> u32 {
+    pub fn too_short(&self, node: NodeId, number: PdoNumber) -> u32 {
         self.tpdo(node, number).map_or(0, |pdo| pdo.too_short)
     }
 
-    fn tpdo(&self, node: NodeId, number: u8) -> Option<&Tpdo> {
+    fn tpdo(&self, node: NodeId, number: PdoNumber) -> Option<&Tpdo> {
         self.tpdos.iter().find(|pdo| (pdo.node, pdo.number) == (node, number) && pdo.id.is_some())
     }
 
@@ -198,7 +205,7 @@ impl Image {
     }
 
     /// Where a node's TPDOs have an object, in the order in which they were set up.
-    pub(crate) fn find_signals(&self, node: NodeId, mux: Mux) -> impl Iterator<Item = (u8, Place)> {
+    pub(crate) fn find_signals(&self, node: NodeId, mux: Mux) -> impl Iterator<Item = (PdoNumber, Place)> {
         let tpdos = self.tpdos.iter().enumerate().filter(move |(_, pdo)| pdo.node == node);
         tpdos.filter_map(move |(position, pdo)| {
             Some((pdo.number, Self::place(position, pdo.generation, &pdo.map.find(mux)?)))
@@ -206,7 +213,11 @@ impl Image {
     }
 
     /// Where a node's RPDOs have an object.
-    pub(crate) fn find_set_points(&self, node: NodeId, mux: Mux) -> impl Iterator<Item = (u8, RpdoTrigger, Place)> {
+    pub(crate) fn find_set_points(
+        &self,
+        node: NodeId,
+        mux: Mux,
+    ) -> impl Iterator<Item = (PdoNumber, RpdoTrigger, Place)> {
         let rpdos = self.rpdos.iter().enumerate().filter(move |(_, pdo)| pdo.node == node);
         rpdos.filter_map(move |(position, pdo)| {
             let place = Self::place(position, pdo.generation, &pdo.map.find(mux)?);
@@ -215,7 +226,7 @@ impl Image {
     }
 
     /// What is carried by the PDOs of a node that are in use, by their numbers.
-    pub(crate) fn carried(&self, node: NodeId, to_device: bool) -> Vec<(u8, Vec<Mux>)> {
+    pub(crate) fn carried(&self, node: NodeId, to_device: bool) -> Vec<(PdoNumber, Vec<Mux>)> {
         let tpdos = self.tpdos.iter().filter(|pdo| !to_device && pdo.id.is_some());
         let rpdos = self.rpdos.iter().filter(|pdo| to_device && pdo.id.is_some());
         let all =
@@ -265,7 +276,7 @@ impl Image {
     }
 
     /// Puts bits into an RPDO without queueing it: what it is to carry when it is sent for another object.
-    pub(crate) fn preset(&mut self, node: NodeId, number: u8, mux: Mux, raw: u64) {
+    pub(crate) fn preset(&mut self, node: NodeId, number: PdoNumber, mux: Mux, raw: u64) {
         let mut rpdos = self.rpdos.iter_mut().enumerate();
         let Some((position, pdo)) = rpdos.find(|(_, pdo)| (pdo.node, pdo.number) == (node, number)) else { return };
         if let Some(bits) = pdo.map.find(mux) {
@@ -321,12 +332,13 @@ impl Image {
 
 #[cfg(test)]
 mod tests {
-    use super::super::pdo_map::MappedObject;
+    use canopen::pdo::MappingRecord;
+
     use super::*;
 
-    const STATUSWORD: MappedObject = MappedObject::from_record(0x6041_0010);
-    const POSITION: MappedObject = MappedObject::from_record(0x6064_0020);
-    const MODE: MappedObject = MappedObject::from_record(0x6060_0008);
+    const STATUSWORD: MappingRecord = MappingRecord::from_raw(0x6041_0010);
+    const POSITION: MappingRecord = MappingRecord::from_raw(0x6064_0020);
+    const MODE: MappingRecord = MappingRecord::from_raw(0x6060_0008);
 
     fn node(raw: u8) -> NodeId {
         NodeId::new(raw).unwrap()
@@ -335,7 +347,7 @@ mod tests {
     #[test]
     fn splits_a_frame_by_its_mapping() {
         let mut image = Image::default();
-        image.set_tpdo(node(4), 0, 0x184, PdoMap(vec![STATUSWORD, POSITION]));
+        image.set_tpdo(node(4), PdoNumber::FIRST, 0x184, PdoMap(vec![STATUSWORD, POSITION]));
         let now = Instant::from_millis(5);
         assert_eq!(image.value(node(4), POSITION.mux), None);
         assert_eq!(image.handle_frame(0x184, &"184#3702FFFFFFFF".parse().unwrap(), now), Some(node(4)));
@@ -347,16 +359,16 @@ mod tests {
     #[test]
     fn a_short_frame_is_not_half_applied() {
         let mut image = Image::default();
-        image.set_tpdo(node(4), 0, 0x184, PdoMap(vec![STATUSWORD, POSITION]));
+        image.set_tpdo(node(4), PdoNumber::FIRST, 0x184, PdoMap(vec![STATUSWORD, POSITION]));
         image.handle_frame(0x184, &"184#370201".parse().unwrap(), Instant::ZERO);
         assert_eq!(image.value(node(4), STATUSWORD.mux), None);
-        assert_eq!(image.too_short(node(4), 0), 1);
+        assert_eq!(image.too_short(node(4), PdoNumber::FIRST), 1);
     }
 
     #[test]
     fn an_unsent_rpdo_is_overwritten_by_its_newer_value() {
         let mut image = Image::default();
-        image.set_rpdo(node(4), 0, 0x204, PdoMap(vec![STATUSWORD, MODE]), RpdoTrigger::Write);
+        image.set_rpdo(node(4), PdoNumber::FIRST, 0x204, PdoMap(vec![STATUSWORD, MODE]), RpdoTrigger::Write);
         assert!(image.write(node(4), STATUSWORD.mux, 6));
         assert!(image.write(node(4), MODE.mux, 3));
         assert!(image.write(node(4), STATUSWORD.mux, 0x1_000F));
@@ -368,7 +380,7 @@ mod tests {
     #[test]
     fn a_synchronous_rpdo_waits_for_the_sync() {
         let mut image = Image::default();
-        image.set_rpdo(node(4), 1, 0x304, PdoMap(vec![POSITION]), RpdoTrigger::Sync);
+        image.set_rpdo(node(4), PdoNumber::FIRST, 0x304, PdoMap(vec![POSITION]), RpdoTrigger::Sync);
         image.write(node(4), POSITION.mux, 7);
         assert_eq!(image.poll_transmit(), None);
         image.release_waiting();
@@ -381,8 +393,8 @@ mod tests {
     fn a_mapping_beyond_eight_bytes_is_never_read_or_written_past_the_frame() {
         let mut image = Image::default();
         let long = PdoMap(vec![POSITION, POSITION, STATUSWORD]);
-        image.set_tpdo(node(4), 0, 0x184, long.clone());
-        image.set_rpdo(node(4), 0, 0x204, long, RpdoTrigger::Write);
+        image.set_tpdo(node(4), PdoNumber::FIRST, 0x184, long.clone());
+        image.set_rpdo(node(4), PdoNumber::FIRST, 0x204, long, RpdoTrigger::Write);
         image.handle_frame(0x184, &"184#0102030405060708".parse().unwrap(), Instant::ZERO);
         assert_eq!(image.value(node(4), STATUSWORD.mux), None);
         assert!(!image.write(node(4), STATUSWORD.mux, 1));

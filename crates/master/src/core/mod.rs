@@ -37,7 +37,7 @@ pub use field::{Field, NumberForm, Sample, SetPoint, Signal};
 pub use image::{Image, Received, RpdoTrigger};
 pub use node_set::NodeSet;
 pub use payload::Payload;
-pub use pdo_map::{MappedObject, PdoMap};
+pub use pdo_map::PdoMap;
 pub use request::{Command, Failure, Finished, Outcome, Request, Ticket, Transfer};
 pub use supervision::CycleLoss;
 pub(crate) use supervision::{CycleRules, WatchId};

@@ -1,31 +1,11 @@
 use core::ops::Range;
 
 use canopen::Mux;
-
-/// One object in a PDO.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MappedObject {
-    /// Which object of the device.
-    pub mux: Mux,
-    /// Its length in bits, 1 to 64.
-    pub bits: u8,
-}
-
-impl MappedObject {
-    /// From a mapping record (1600h.., 1A00h..): index, sub-index, length. Source: CiA 301, 7.5.2.36.
-    pub const fn from_record(record: u32) -> Self {
-        Self { mux: Mux::from_key(record >> 8), bits: record as u8 }
-    }
-
-    /// As a mapping record.
-    pub const fn to_record(self) -> u32 {
-        self.mux.key() << 8 | self.bits as u32
-    }
-}
+use canopen::pdo::MappingRecord;
 
 /// What a PDO carries, in order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct PdoMap(pub Vec<MappedObject>);
+pub struct PdoMap(pub Vec<MappingRecord>);
 
 impl PdoMap {
     /// Total length in bits.
@@ -39,7 +19,7 @@ impl PdoMap {
     }
 
     /// Every object with the bits it takes, bit 0 being the lowest bit of byte 0.
-    pub fn fields(&self) -> impl Iterator<Item = (MappedObject, Range<u32>)> {
+    pub fn fields(&self) -> impl Iterator<Item = (MappingRecord, Range<u32>)> {
         let mut at = 0;
         self.0.iter().map(move |object| {
             let from = at;

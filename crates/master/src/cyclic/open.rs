@@ -1,5 +1,6 @@
 use core::time::Duration;
 
+use canopen::pdo::{Direction, PdoId, PdoNumber};
 use canopen::{Mux, NmtCommand, NmtState, NodeId};
 use cia402::ModeOfOperation;
 use devices::{Description, Quantity, Quirk};
@@ -7,14 +8,21 @@ use devices::{Description, Quantity, Quirk};
 use super::demand::Bound;
 use super::drive::{ControlwordPath, CyclicDrive, Progress};
 use super::target::{Kind, Target};
-use crate::core::{CycleRules, MappedObject, NumberForm, PdoMap, Sample, Signal};
-use crate::decode::Direction;
+use crate::core::{CycleRules, NumberForm, PdoMap, Sample, Signal};
+use canopen::pdo::MappingRecord;
+
 use crate::drive::{CONTROLWORD, Drive, POSITION_ACTUAL, STATUSWORD, STOP, TARGET_POSITION};
 use crate::error::Error;
 use crate::pdo::{PdoConfig, PdoError, SignalError, TimerUnits, TransmissionType};
 
 /// The interpolation data record (CiA 402-2, 12.3).
 const INTERPOLATION_DATA: Mux = Mux::new(0x60C1, 1);
+
+/// The TPDO that gets what does not fit into the first.
+const SECOND: PdoNumber = match PdoNumber::new(2) {
+    Some(number) => number,
+    None => PdoNumber::FIRST,
+};
 
 const INTENT: &str = "move it cycle by cycle";
 
@@ -168,7 +176,7 @@ impl Drive {
             return Ok(());
         }
         let record =
-            |mux: Mux| profile.row(mux).map(|row| MappedObject { mux, bits: (row.data_type.size() * 8) as u8 });
+            |mux: Mux| profile.row(mux).map(|row| MappingRecord { mux, bits: (row.data_type.size() * 8) as u8 });
         let map = |objects: &[Option<Mux>]| {
             let mut map = PdoMap(Vec::new());
             for object in objects.iter().filter_map(|mux| record((*mux)?)) {
@@ -183,12 +191,12 @@ impl Drive {
         let current = profile.units.actual_current.map(|quantity| quantity.object);
         let velocity = Some(profile.units.actual_velocity.object);
         let pdos = [
-            (Direction::Rpdo, 0, map(&[Some(CONTROLWORD), Some(target)])),
-            (Direction::Tpdo, 0, map(&[Some(STATUSWORD), Some(POSITION_ACTUAL), current])),
-            (Direction::Tpdo, 1, map(&[velocity])),
+            (Direction::Rpdo, PdoNumber::FIRST, map(&[Some(CONTROLWORD), Some(target)])),
+            (Direction::Tpdo, PdoNumber::FIRST, map(&[Some(STATUSWORD), Some(POSITION_ACTUAL), current])),
+            (Direction::Tpdo, SECOND, map(&[velocity])),
         ];
         for (direction, number, map) in pdos {
-            let config = PdoConfig::new(direction, number, map).transmission(TransmissionType::EVERY_SYNC);
+            let config = PdoConfig::new(PdoId { direction, number }, map).transmission(TransmissionType::EVERY_SYNC);
             self.node().configure_pdo(&config, timer_units(profile)).await?;
         }
         Ok(())
@@ -198,23 +206,22 @@ impl Drive {
     async fn adopt_pdos(&self, profile: &Description) -> Result<Mapped, Error> {
         let units = timer_units(profile);
         let mut mapped = Mapped { rpdos: Vec::new(), tpdos: Vec::new() };
-        for direction in [Direction::Rpdo, Direction::Tpdo] {
-            let base = direction.parameter_base();
-            let numbers = profile.table.rows().iter().filter(|row| row.mux().sub_index == 1);
-            let numbers = numbers.filter_map(|row| row.mux().index.checked_sub(base).filter(|number| *number < 0x200));
-            for number in numbers.filter_map(|number| u8::try_from(number).ok()) {
-                let config = self.node().adopt_pdo(direction, number, units).await?;
-                match direction {
-                    Direction::Rpdo => mapped.rpdos.push(config),
-                    Direction::Tpdo => mapped.tpdos.push(config),
-                }
+        let parameters = profile.table.rows().iter().map(|row| row.mux()).filter(|mux| mux.sub_index == 1);
+        for (pdo, is_mapping) in parameters.filter_map(|mux| PdoId::of_object(mux.index)) {
+            if is_mapping {
+                continue;
+            }
+            let config = self.node().adopt_pdo(pdo, units).await?;
+            match pdo.direction {
+                Direction::Rpdo => mapped.rpdos.push(config),
+                Direction::Tpdo => mapped.tpdos.push(config),
             }
         }
         Ok(mapped)
     }
 
     /// The set-point of the mode, and the RPDO that carries it.
-    async fn target(&self, profile: &Description, mode: ModeOfOperation) -> Result<(u8, Target), CyclicError> {
+    async fn target(&self, profile: &Description, mode: ModeOfOperation) -> Result<(PdoNumber, Target), CyclicError> {
         let quantity = match set_point_of(profile, mode) {
             Some(SetPointKind::Position(object)) => return self.position_target(profile, object).await,
             Some(SetPointKind::Quantity(quantity)) => quantity,
@@ -227,7 +234,7 @@ impl Drive {
         Ok((number, Target { set_point, limits: self.limits(quantity.object).await?, kind, held: 0 }))
     }
 
-    async fn position_target(&self, profile: &Description, object: Mux) -> Result<(u8, Target), CyclicError> {
+    async fn position_target(&self, profile: &Description, object: Mux) -> Result<(PdoNumber, Target), CyclicError> {
         let (number, set_point) = self.node().scaled_set_point(object, NumberForm::Signed, 1.0)?;
         let counts_per_turn = self.counts_per_turn().await?;
         let velocity = profile.units.target_velocity;
@@ -245,17 +252,22 @@ impl Drive {
 
     /// The TPDO with the statusword that comes by itself, the one of the set-point's number first; and in how many cycles it
     /// comes once.
-    fn statusword_carrier(&self, profile: &Description, number: u8, mapped: &Mapped) -> Result<(u8, u32), CyclicError> {
+    fn statusword_carrier(
+        &self,
+        profile: &Description,
+        number: PdoNumber,
+        mapped: &Mapped,
+    ) -> Result<(PdoNumber, u32), CyclicError> {
         let answers = profile.has(Quirk::TpdoAnswersRpdo);
         let carriers = mapped.tpdos.iter().filter(|pdo| carries(&pdo.map, STATUSWORD));
         let regular = carriers.filter_map(|pdo| {
             let every = match pdo.transmission.0 {
                 every @ 1..=240 => u32::from(every),
-                _ if answers && pdo.number == number => 1,
+                _ if answers && pdo.pdo.number == number => 1,
                 _ if pdo.event_time.is_some_and(|time| !time.is_zero()) => 1,
                 _ => return None,
             };
-            Some((pdo.number != number, every, pdo.number))
+            Some((pdo.pdo.number != number, every, pdo.pdo.number))
         });
         if let Some((_, every, number)) = regular.min() {
             return Ok((number, every));
@@ -266,9 +278,9 @@ impl Drive {
     }
 
     /// The controlword in the set-point's RPDO, or in one that does not carry the set-point a second time; else by SDO.
-    fn controlword_path(&self, number: u8, mapped: &Mapped) -> ControlwordPath {
+    fn controlword_path(&self, number: PdoNumber, mapped: &Mapped) -> ControlwordPath {
         let by_sdo = ControlwordPath::Sdo { object: CONTROLWORD, sent: None };
-        let together = mapped.rpdos.iter().any(|pdo| pdo.number == number && carries(&pdo.map, CONTROLWORD));
+        let together = mapped.rpdos.iter().any(|pdo| pdo.pdo.number == number && carries(&pdo.map, CONTROLWORD));
         if !together {
             return by_sdo;
         }
@@ -279,8 +291,8 @@ impl Drive {
     }
 
     /// What else the set-point's RPDO carries is sent with it: as the device has it now, and with the mode.
-    async fn preset_rpdos(&self, mapped: &Mapped, number: u8, mode: ModeOfOperation) -> Result<(), Error> {
-        let Some(pdo) = mapped.rpdos.iter().find(|pdo| pdo.number == number) else { return Ok(()) };
+    async fn preset_rpdos(&self, mapped: &Mapped, number: PdoNumber, mode: ModeOfOperation) -> Result<(), Error> {
+        let Some(pdo) = mapped.rpdos.iter().find(|pdo| pdo.pdo.number == number) else { return Ok(()) };
         for object in &pdo.map.0 {
             let raw = match object.mux {
                 Mux { index: 0x6060, .. } => u64::from(mode.0 as u8),
@@ -297,13 +309,13 @@ impl Drive {
         Ok(())
     }
 
-    async fn position_signal<T: Sample>(&self, near: u8) -> Result<Option<Signal<T>>, Error> {
+    async fn position_signal<T: Sample>(&self, near: PdoNumber) -> Result<Option<Signal<T>>, Error> {
         let per_count = 1.0 / self.counts_per_turn().await?;
         Ok(self.signal_near(near, POSITION_ACTUAL, NumberForm::Signed, per_count))
     }
 
     /// An object in this TPDO, or else in another one.
-    fn signal_near<T: Sample>(&self, near: u8, mux: Mux, form: NumberForm, per_count: f64) -> Option<Signal<T>> {
+    fn signal_near<T: Sample>(&self, near: PdoNumber, mux: Mux, form: NumberForm, per_count: f64) -> Option<Signal<T>> {
         let found = [Some(near), None].map(|number| self.node().scaled_signal(mux, number, form, per_count).ok());
         found.into_iter().flatten().next()
     }
@@ -312,15 +324,21 @@ impl Drive {
     async fn quantity_signal<T: Sample>(
         &self,
         profile: &Description,
-        near: u8,
+        near: PdoNumber,
         quantity: Option<Quantity>,
     ) -> Result<Option<Signal<T>>, Error> {
         let Some(quantity) = quantity else { return Ok(None) };
         let Some(row) = profile.row(quantity.object) else { return Ok(None) };
-        let form = if row.data_type.is_signed() { NumberForm::Signed } else { NumberForm::Unsigned };
         let per_count = quantity.per_count / self.resolution(quantity).await?;
+        let as_in_sdo = (row.data_type, per_count);
+        let in_tpdo = profile.pdo.mapping.tpdo_form(quantity.object);
+        // One count in the TPDO is so many of those by SDO.
+        let in_tpdo = in_tpdo.map(|form| (form.data_type, per_count * f64::from(form.divisor)));
+        let (data_type, per_count) = in_tpdo.unwrap_or(as_in_sdo);
+        let form = if data_type.is_signed() { NumberForm::Signed } else { NumberForm::Unsigned };
         let signal = self.signal_near::<T>(near, quantity.object, form, per_count);
-        Ok(signal.filter(|signal| signal.field().bits as usize == row.data_type.size() * 8))
+        // Mapped with another length it is something else.
+        Ok(signal.filter(|signal| signal.field().bits as usize == data_type.size() * 8))
     }
 }
 

@@ -17,6 +17,7 @@ use canopen::connection_set::Service;
 use canopen::emcy::Emcy;
 use canopen::heartbeat::Heartbeat;
 use canopen::nmt::{NmtRequest, NmtTarget};
+use canopen::pdo::{Direction, PdoId, PdoNumber};
 use canopen::sync::Sync;
 use canopen::{Mux, NmtState, NodeId};
 use devices::faults::FaultRow;
@@ -28,7 +29,6 @@ use models::Models;
 use pdo::PdoBook;
 use sdo::Conversations;
 
-pub use canopen::pdo::Direction;
 pub use common::{common_name, common_row, common_type};
 pub use pdo::Pdo;
 pub use sdo::{Sdo, SdoStep, Side};
@@ -98,9 +98,9 @@ impl Decoder {
         }
     }
 
-    /// Takes a PDO's identifier and mapping for granted. `number` counts from 0 (1400h, 1800h).
-    pub fn set_pdo(&mut self, node: NodeId, direction: Direction, number: u16, id: u16, map: &PdoMap) {
-        self.pdos.set(node, direction, number, id, map);
+    /// Takes a PDO's identifier and mapping for granted.
+    pub fn set_pdo(&mut self, node: NodeId, pdo: PdoId, id: u16, map: &PdoMap) {
+        self.pdos.set(node, pdo, id, map);
     }
 
     /// What a frame says. Frames must come in the order they were on the bus.
@@ -137,14 +137,14 @@ impl Decoder {
             },
             Service::SdoRequest(node) => Decoded::Sdo(self.decode_sdo(node, Side::Client, frame)?),
             Service::SdoReply(node) => Decoded::Sdo(self.decode_sdo(node, Side::Server, frame)?),
-            Service::Tpdo(number, node) => {
-                Decoded::Pdo(Pdo::unmapped(node, Direction::Tpdo, number.position() as u16, frame))
-            }
-            Service::Rpdo(number, node) => {
-                Decoded::Pdo(Pdo::unmapped(node, Direction::Rpdo, number.position() as u16, frame))
-            }
+            Service::Tpdo(number, node) => self.unmapped(node, Direction::Tpdo, number, frame),
+            Service::Rpdo(number, node) => self.unmapped(node, Direction::Rpdo, number, frame),
             Service::LssSlave | Service::LssMaster => Decoded::Lss,
         })
+    }
+
+    fn unmapped(&self, node: NodeId, direction: Direction, number: PdoNumber, frame: &Frame) -> Decoded {
+        Decoded::Pdo(Pdo::unmapped(node, PdoId { direction, number }, self.models.get(node), frame))
     }
 
     fn decode_sdo(&mut self, node: NodeId, from: Side, frame: &Frame) -> Option<Sdo> {
@@ -219,8 +219,8 @@ fn service_name(service: Service) -> String {
         Service::Sync => "SYNC".to_owned(),
         Service::Time => "TIME".to_owned(),
         Service::Emcy(node) => format!("EMCY of node {node}"),
-        Service::Tpdo(number, node) => format!("TPDO{} of node {node}", number.position()),
-        Service::Rpdo(number, node) => format!("RPDO{} of node {node}", number.position()),
+        Service::Tpdo(number, node) => format!("TPDO{number} of node {node}"),
+        Service::Rpdo(number, node) => format!("RPDO{number} of node {node}"),
         Service::SdoReply(node) => format!("SDO reply of node {node}"),
         Service::SdoRequest(node) => format!("SDO request to node {node}"),
         Service::Heartbeat(node) => format!("heartbeat of node {node}"),

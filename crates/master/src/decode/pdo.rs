@@ -4,25 +4,25 @@ use std::collections::BTreeMap;
 use can::Frame;
 use canopen::connection_set;
 use canopen::od::{DefaultValue, Table};
-use canopen::pdo::{Direction, PdoNumber};
+use canopen::pdo::{Direction, PdoId};
 use canopen::{CobId, Mux, NodeId};
+use devices::Description;
 
 use super::models::Models;
 use super::value::Value;
-use crate::core::{MappedObject, PdoMap, bits_of};
+use crate::core::{PdoMap, bits_of};
 use crate::identify::Model;
+use canopen::pdo::MappingRecord;
 
 /// A PDO frame split into its objects.
 #[derive(Clone, Debug)]
 pub struct Pdo {
     /// The device that receives or sends it.
     pub node: NodeId,
-    /// RPDO or TPDO.
-    pub direction: Direction,
-    /// Counted from 0, as the objects 1400h and 1800h are.
-    pub number: u16,
+    /// Which one.
+    pub pdo: PdoId,
     /// Every mapped object that the frame is long enough for, with its bits.
-    pub fields: Vec<(MappedObject, u64)>,
+    pub fields: Vec<(MappingRecord, u64)>,
     /// The frame's bytes.
     pub bytes: Vec<u8>,
     /// Bytes that the mapping asks for; `None` if the mapping is not known.
@@ -31,16 +31,25 @@ pub struct Pdo {
 }
 
 impl Pdo {
-    pub(super) fn unmapped(node: NodeId, direction: Direction, number: u16, frame: &Frame) -> Self {
+    pub(super) fn unmapped(node: NodeId, pdo: PdoId, model: Option<Model>, frame: &Frame) -> Self {
         let bytes = frame.data().to_vec();
-        Self { node, direction, number, fields: Vec::new(), bytes, mapped_bytes: None, model: None }
+        Self { node, pdo, fields: Vec::new(), bytes, mapped_bytes: None, model }
+    }
+}
+
+/// `TPDO1`, and what a manual that counts otherwise calls it: `TPDO1 (in the manual TPDO0)`.
+fn pdo_name(pdo: PdoId, model: Option<&Description>) -> String {
+    let PdoId { direction, number } = pdo;
+    match model.map(|model| model.pdo.first_in_manual) {
+        None | Some(1) => pdo.to_string(),
+        Some(first) => format!("{pdo} (in the manual {direction}{})", number.position() + usize::from(first)),
     }
 }
 
 impl fmt::Display for Pdo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}{} node {}:", self.direction, self.number, self.node)?;
         let model = self.model.map(|model| model.0);
+        write!(f, "{} node {}:", pdo_name(self.pdo, model), self.node)?;
         for (position, (object, raw)) in self.fields.iter().enumerate() {
             f.write_str(if position == 0 { " " } else { ", " })?;
             let bytes = raw.to_le_bytes();
@@ -61,7 +70,7 @@ impl fmt::Display for Pdo {
     }
 }
 
-type Key = (u8, Direction, u16);
+type Key = (u8, PdoId);
 
 /// What is known of all PDOs on the bus.
 #[derive(Clone, Debug, Default)]
@@ -82,21 +91,20 @@ struct Known {
 impl Known {
     /// The mapping, when the count and every counted record are known.
     fn map(&self) -> Option<PdoMap> {
-        let records = (1..=self.count?).map(|sub| self.records.get(&sub).copied().map(MappedObject::from_record));
+        let records = (1..=self.count?).map(|sub| self.records.get(&sub).copied().map(MappingRecord::from_raw));
         records.collect::<Option<Vec<_>>>().map(PdoMap)
     }
 
-    fn id(&self, (node, direction, number): Key) -> Option<u16> {
+    fn id(&self, (node, pdo): Key) -> Option<u16> {
         match self.cob_id {
             Some(raw) if !CobId(raw).is_valid() || CobId(raw).is_extended() => None,
             Some(raw) => CobId(raw).can_id().as_standard(),
-            None => predefined_id(NodeId::new(node)?, direction, number),
+            None => predefined_id(NodeId::new(node)?, pdo),
         }
     }
 }
 
-fn predefined_id(node: NodeId, direction: Direction, number: u16) -> Option<u16> {
-    let number = PdoNumber::at(number.into())?;
+fn predefined_id(node: NodeId, PdoId { direction, number }: PdoId) -> Option<u16> {
     let id = match direction {
         Direction::Rpdo => connection_set::rpdo(number, node),
         Direction::Tpdo => connection_set::tpdo(number, node),
@@ -105,10 +113,10 @@ fn predefined_id(node: NodeId, direction: Direction, number: u16) -> Option<u16>
 }
 
 impl PdoBook {
-    pub(super) fn set(&mut self, node: NodeId, direction: Direction, number: u16, id: u16, map: &PdoMap) {
-        let records = map.0.iter().enumerate().map(|(at, object)| (at as u8 + 1, object.to_record())).collect();
+    pub(super) fn set(&mut self, node: NodeId, pdo: PdoId, id: u16, map: &PdoMap) {
+        let records = map.0.iter().enumerate().map(|(at, object)| (at as u8 + 1, object.raw())).collect();
         let known = Known { cob_id: Some(u32::from(id)), count: Some(map.0.len() as u8), records };
-        self.pdos.insert((node.raw(), direction, number), known);
+        self.pdos.insert((node.raw(), pdo), known);
         self.index();
     }
 
@@ -136,15 +144,14 @@ impl PdoBook {
     }
 
     pub(super) fn decode(&self, frame: &Frame, models: &Models) -> Option<Pdo> {
-        let ((node, direction, number), map) = self.by_id.get(&frame.standard_data_id()?)?;
+        let ((node, pdo), map) = self.by_id.get(&frame.standard_data_id()?)?;
         let node = NodeId::new(*node)?;
         let data = u64::from_le_bytes(*frame.padded());
         let length = frame.data().len() as u32 * 8;
         let fields = map.fields().take_while(|(_, bits)| bits.end <= length);
         Some(Pdo {
             node,
-            direction: *direction,
-            number: *number,
+            pdo: *pdo,
             fields: fields.map(|(object, bits)| (object, bits_of(data, bits))).collect(),
             bytes: frame.data().to_vec(),
             mapped_bytes: Some(map.bytes()),
@@ -154,14 +161,8 @@ impl PdoBook {
 
     /// True if the object says something about a PDO.
     fn note(&mut self, node: NodeId, mux: Mux, raw: u32) -> bool {
-        let (direction, number, is_mapping) = match mux.index {
-            0x1400..=0x15FF => (Direction::Rpdo, mux.index - 0x1400, false),
-            0x1600..=0x17FF => (Direction::Rpdo, mux.index - 0x1600, true),
-            0x1800..=0x19FF => (Direction::Tpdo, mux.index - 0x1800, false),
-            0x1A00..=0x1BFF => (Direction::Tpdo, mux.index - 0x1A00, true),
-            _ => return false,
-        };
-        let known = self.pdos.entry((node.raw(), direction, number)).or_default();
+        let Some((pdo, is_mapping)) = PdoId::of_object(mux.index) else { return false };
+        let known = self.pdos.entry((node.raw(), pdo)).or_default();
         match (is_mapping, mux.sub_index) {
             (false, 1) => known.cob_id = Some(raw),
             (false, _) => return false,

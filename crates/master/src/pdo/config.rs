@@ -3,7 +3,7 @@ use std::time::Duration;
 use canopen::Mux;
 
 use crate::core::PdoMap;
-use canopen::pdo::Direction;
+use canopen::pdo::PdoId;
 
 /// When a PDO is sent or taken over. Source: CiA 301, tables 64 and 68.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,6 +14,10 @@ impl TransmissionType {
     pub const SYNC_ACYCLIC: Self = Self(0);
     /// After every SYNC.
     pub const EVERY_SYNC: Self = Self(1);
+    /// Sampled with each SYNC, sent when a remote frame asks for it.
+    pub const SYNC_RTR: Self = Self(252);
+    /// Sampled and sent when a remote frame asks for it.
+    pub const EVENT_RTR: Self = Self(253);
     /// Event-driven, the manufacturer's events.
     pub const EVENT_MANUFACTURER: Self = Self(254);
     /// Event-driven, the device profile's events.
@@ -42,10 +46,8 @@ impl TimerUnits {
 /// How one PDO of a device is set up.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PdoConfig {
-    /// RPDO or TPDO, from the device's side.
-    pub direction: Direction,
-    /// Counted from 0: 1400h, 1800h.
-    pub number: u8,
+    /// Which one.
+    pub pdo: PdoId,
     /// What it carries.
     pub map: PdoMap,
     /// When it is sent or taken over.
@@ -60,9 +62,9 @@ pub struct PdoConfig {
 
 impl PdoConfig {
     /// A PDO that carries `map`, event-driven, with the device's own identifier and timers.
-    pub const fn new(direction: Direction, number: u8, map: PdoMap) -> Self {
+    pub const fn new(pdo: PdoId, map: PdoMap) -> Self {
         let transmission = TransmissionType::EVENT_PROFILE;
-        Self { direction, number, map, transmission, inhibit_time: None, event_time: None, id: None }
+        Self { pdo, map, transmission, inhibit_time: None, event_time: None, id: None }
     }
 
     /// With another transmission type.
@@ -87,10 +89,10 @@ impl PdoConfig {
     }
 
     pub(super) const fn parameter(&self, sub_index: u8) -> Mux {
-        Mux::new(self.direction.parameter_base() + self.number as u16, sub_index)
+        Mux::new(self.pdo.parameter_index(), sub_index)
     }
 
     pub(super) const fn mapping(&self, sub_index: u8) -> Mux {
-        Mux::new(self.direction.mapping_base() + self.number as u16, sub_index)
+        Mux::new(self.pdo.mapping_index(), sub_index)
     }
 }

@@ -1,10 +1,9 @@
-use core::fmt;
 use std::time::Duration;
 
 use canopen::{Mux, NodeId};
 
 use crate::error::Error;
-use canopen::pdo::Direction;
+use canopen::pdo::{Direction, PdoId, PdoNumber};
 
 /// Why a PDO could not be set up.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -18,7 +17,7 @@ pub enum PdoError {
         /// The device.
         node: NodeId,
         /// Which PDO.
-        pdo: PdoName,
+        pdo: PdoId,
         /// Bits asked for.
         bits: u32,
         /// Objects asked for.
@@ -31,7 +30,7 @@ pub enum PdoError {
         /// The device.
         node: NodeId,
         /// Which PDO.
-        pdo: PdoName,
+        pdo: PdoId,
         /// Time asked for.
         asked: Duration,
         /// One count of the device's timer.
@@ -43,7 +42,7 @@ pub enum PdoError {
         /// The device.
         node: NodeId,
         /// Which PDO.
-        pdo: PdoName,
+        pdo: PdoId,
         /// What was being done.
         step: &'static str,
         /// What went wrong.
@@ -58,7 +57,7 @@ pub enum PdoError {
         /// The device.
         node: NodeId,
         /// Which PDO.
-        pdo: PdoName,
+        pdo: PdoId,
         /// The object.
         mux: Mux,
         /// What was being done.
@@ -85,7 +84,7 @@ pub enum SignalError {
         /// To or from the device.
         direction: Direction,
         /// The PDOs of this direction, with what they carry.
-        mapped: Vec<(u8, Vec<Mux>)>,
+        mapped: Vec<(PdoNumber, Vec<Mux>)>,
     },
     /// It is mapped with another length than such a value has, or is a number of another kind.
     #[error("{mux} of node {node} is mapped with {bits} bits: a {wanted} does not hold them, or has another sign")]
@@ -101,26 +100,20 @@ pub enum SignalError {
     },
 }
 
-/// `TPDO0 has 6041h:00 6064h:00`.
-fn carried(mapped: &[(u8, Vec<Mux>)], direction: Direction) -> String {
+/// `TPDO1 has 6041h:00 6064h:00`.
+fn carried(mapped: &[(PdoNumber, Vec<Mux>)], direction: Direction) -> String {
     if mapped.is_empty() {
         return format!("none was read from it or set up. Call adopt_pdo or configure_pdo for the {direction} first");
     }
     let pdos = mapped.iter().map(|(number, objects)| {
         let objects = objects.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
-        format!("{} has {}", PdoName(direction, *number), if objects.is_empty() { "nothing" } else { &objects })
+        format!(
+            "{} has {}",
+            PdoId { direction, number: *number },
+            if objects.is_empty() { "nothing" } else { &objects }
+        )
     });
     format!("{}. Map it with configure_pdo", pdos.collect::<Vec<_>>().join(", "))
-}
-
-/// `TPDO0`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PdoName(pub Direction, pub u8);
-
-impl fmt::Display for PdoName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}{}", self.0, self.1)
-    }
 }
 
 const fn back(restored: bool) -> &'static str {

@@ -12,4 +12,4 @@ mod signal;
 mod transaction;
 
 pub use config::{PdoConfig, TimerUnits, TransmissionType};
-pub use error::{PdoError, PdoName, SignalError};
+pub use error::{PdoError, SignalError};

@@ -8,7 +8,8 @@ use super::transaction::{apply, read};
 use crate::core::RpdoTrigger;
 use crate::error::Error;
 use crate::network::Node;
-use canopen::pdo::Direction;
+use can::{CanId, Frame};
+use canopen::pdo::{Direction, PdoId, PdoNumber};
 
 impl Node {
     /// Sets up a PDO of the device and, when every value reads back right, sends or receives it by its mapping.
@@ -25,16 +26,16 @@ impl Node {
     ///
     /// # Errors
     /// Those of the SDO reads.
-    pub async fn adopt_pdo(&self, direction: Direction, number: u8, units: TimerUnits) -> Result<PdoConfig, Error> {
-        let (config, cob_id) = read(self, direction, number, units).await?;
+    pub async fn adopt_pdo(&self, pdo: PdoId, units: TimerUnits) -> Result<PdoConfig, Error> {
+        let (config, cob_id) = read(self, pdo, units).await?;
         self.use_pdo(&config, cob_id);
         Ok(config)
     }
 
     fn use_pdo(&self, config: &PdoConfig, cob_id: CobId) {
-        let (node, number, map) = (self.id(), config.number, config.map.clone());
+        let (node, number, map) = (self.id(), config.pdo.number, config.map.clone());
         let id = cob_id.can_id().as_standard().filter(|_| cob_id.is_valid());
-        self.network().with_core(|core| match (config.direction, id) {
+        self.network().with_core(|core| match (config.pdo.direction, id) {
             (Direction::Tpdo, Some(id)) => core.image_mut().set_tpdo(node, number, id, map),
             (Direction::Tpdo, None) => core.image_mut().remove_tpdo(node, number),
             (Direction::Rpdo, Some(id)) => {
@@ -44,6 +45,16 @@ impl Node {
             }
             (Direction::Rpdo, None) => core.image_mut().remove_rpdo(node, number),
         });
+    }
+
+    /// Asks the device for a TPDO with a remote frame: what types 252 and 253 wait for. False if this master does not know the
+    /// TPDO.
+    pub fn request_tpdo(&self, number: PdoNumber) -> bool {
+        let known = self.network().with_core(|core| core.image().tpdo_id(self.id(), number));
+        if let Some((id, bytes)) = known {
+            self.network().transmit(Frame::remote(CanId::standard(id), bytes as u8));
+        }
+        known.is_some()
     }
 
     /// Puts a value into the RPDOs that carry the object; false if none does. Sent by the PDO's transmission type.

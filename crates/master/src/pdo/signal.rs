@@ -3,7 +3,7 @@ use canopen::Mux;
 use super::error::SignalError;
 use crate::core::{NumberForm, RpdoTrigger, Sample, SetPoint, Signal};
 use crate::network::Node;
-use canopen::pdo::Direction;
+use canopen::pdo::{Direction, PdoNumber};
 
 /// Finding objects in the process data of a node, once, so that reading and writing them is an index and a shift.
 ///
@@ -19,11 +19,11 @@ impl Node {
         self.scaled_signal(mux, None, T::FORM, 1.0)
     }
 
-    /// As [`signal`](Self::signal), from one TPDO only, counted from 0.
+    /// As [`signal`](Self::signal), from one TPDO only.
     ///
     /// # Errors
     /// [`SignalError`].
-    pub fn signal_in<T: Sample>(&self, number: u8, mux: Mux) -> Result<Signal<T>, SignalError> {
+    pub fn signal_in<T: Sample>(&self, number: PdoNumber, mux: Mux) -> Result<Signal<T>, SignalError> {
         self.scaled_signal(mux, Some(number), T::FORM, 1.0)
     }
 
@@ -36,18 +36,18 @@ impl Node {
         self.scaled_set_point(mux, T::FORM, 1.0).map(|(_, set_point)| set_point)
     }
 
-    /// As [`set_point`](Self::set_point), in one RPDO only, counted from 0.
+    /// As [`set_point`](Self::set_point), in one RPDO only.
     ///
     /// # Errors
     /// [`SignalError`].
-    pub fn set_point_in<T: Sample>(&self, number: u8, mux: Mux) -> Result<SetPoint<T>, SignalError> {
+    pub fn set_point_in<T: Sample>(&self, number: PdoNumber, mux: Mux) -> Result<SetPoint<T>, SignalError> {
         self.find_set_point(mux, Some(number), T::FORM, 1.0).map(|(_, set_point)| set_point)
     }
 
     pub(crate) fn scaled_signal<T: Sample>(
         &self,
         mux: Mux,
-        number: Option<u8>,
+        number: Option<PdoNumber>,
         form: NumberForm,
         per_count: f64,
     ) -> Result<Signal<T>, SignalError> {
@@ -65,17 +65,17 @@ impl Node {
         mux: Mux,
         form: NumberForm,
         per_count: f64,
-    ) -> Result<(u8, SetPoint<T>), SignalError> {
+    ) -> Result<(PdoNumber, SetPoint<T>), SignalError> {
         self.find_set_point(mux, None, form, per_count)
     }
 
     fn find_set_point<T: Sample>(
         &self,
         mux: Mux,
-        number: Option<u8>,
+        number: Option<PdoNumber>,
         form: NumberForm,
         per_count: f64,
-    ) -> Result<(u8, SetPoint<T>), SignalError> {
+    ) -> Result<(PdoNumber, SetPoint<T>), SignalError> {
         let found = self.network().look(|core| {
             let all = core.image().find_set_points(self.id(), mux);
             let all = all.filter(|(of, ..)| number.is_none_or(|number| number == *of));

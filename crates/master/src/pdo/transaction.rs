@@ -5,11 +5,12 @@ use std::time::Duration;
 use canopen::{AbortCode, CobId, Mux};
 
 use super::config::{PdoConfig, TimerUnits, TransmissionType};
-use super::error::{PdoError, PdoName};
-use crate::core::{MappedObject, PdoMap};
+use super::error::PdoError;
+use crate::core::PdoMap;
 use crate::error::Error;
 use crate::network::Node;
-use canopen::pdo::Direction;
+use canopen::pdo::MappingRecord;
+use canopen::pdo::PdoId;
 
 /// Most objects in one PDO. Source: CiA 301, 7.5.2.36.
 const MAX_OBJECTS: usize = 64;
@@ -37,7 +38,7 @@ enum Trouble {
 /// Sets the PDO up and gives its COB-ID.
 pub(super) async fn apply(node: &Node, config: &PdoConfig, units: TimerUnits) -> Result<CobId, PdoError> {
     let writes = plan(node, config, units)?;
-    let pdo = PdoName(config.direction, config.number);
+    let pdo = config.pdo;
     let failed = |step, cause| PdoError::Step { node: node.id(), pdo, step, cause, restored: true };
     let before = snapshot(node, config, &writes).await.map_err(|cause| failed("read what is there", cause))?;
     let cob_id = config.id.map_or(CobId(before.cob_id.0 & !CobId::INVALID), CobId::standard);
@@ -56,19 +57,14 @@ pub(super) async fn apply(node: &Node, config: &PdoConfig, units: TimerUnits) ->
 }
 
 /// Reads how a PDO is set up.
-pub(super) async fn read(
-    node: &Node,
-    direction: Direction,
-    number: u8,
-    units: TimerUnits,
-) -> Result<(PdoConfig, CobId), Error> {
-    let mut config = PdoConfig::new(direction, number, PdoMap::default());
+pub(super) async fn read(node: &Node, pdo: PdoId, units: TimerUnits) -> Result<(PdoConfig, CobId), Error> {
+    let mut config = PdoConfig::new(pdo, PdoMap::default());
     let cob_id = CobId(cell(node, config.parameter(1)).await?);
     config.transmission = TransmissionType(cell(node, config.parameter(2)).await? as u8);
     let count = cell(node, config.mapping(0)).await?.min(MAX_OBJECTS as u32) as u8;
     for sub_index in 1..=count {
         let record = cell(node, config.mapping(sub_index)).await?;
-        config.map.0.push(MappedObject::from_record(record));
+        config.map.0.push(MappingRecord::from_raw(record));
     }
     // Both timers are optional (CiA 301, 7.5.2.37).
     config.inhibit_time = cell(node, config.parameter(3)).await.ok().map(|raw| units.inhibit * raw);
@@ -78,7 +74,7 @@ pub(super) async fn read(
 
 /// Everything between invalidation and validation, in the standard's order.
 fn plan(node: &Node, config: &PdoConfig, units: TimerUnits) -> Result<Vec<Write>, PdoError> {
-    let pdo = PdoName(config.direction, config.number);
+    let pdo = config.pdo;
     let (bits, objects) = (config.map.bits(), config.map.0.len());
     if bits > u64::BITS || objects > MAX_OBJECTS {
         return Err(PdoError::TooLong { node: node.id(), pdo, bits, objects });
@@ -86,7 +82,7 @@ fn plan(node: &Node, config: &PdoConfig, units: TimerUnits) -> Result<Vec<Write>
     let mut writes = vec![Write { step: "clear the mapping", mux: config.mapping(0), raw: 0, bytes: 1 }];
     for (sub_index, object) in (1..).zip(&config.map.0) {
         let mux = config.mapping(sub_index);
-        writes.push(Write { step: "map an object", mux, raw: object.to_record(), bytes: 4 });
+        writes.push(Write { step: "map an object", mux, raw: object.raw(), bytes: 4 });
     }
     writes.push(Write { step: "set the number of objects", mux: config.mapping(0), raw: objects as u32, bytes: 1 });
     let transmission = u32::from(config.transmission.0);
