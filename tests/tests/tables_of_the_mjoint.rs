@@ -67,7 +67,7 @@ fn the_four_models_have_the_ratio_and_highest_speed_of_the_manual() {
     assert_eq!(ours.map(|model| model.name), MODELS);
     assert_eq!(ours.map(|model| model.ratio), figure("Reduction ratio"));
     assert_eq!(ours.map(|model| model.max_rpm), figure("Maximum rotational speed"));
-    assert!(MODELS.iter().all(|name| model(name).is_some_and(|profile| profile.model == *name)));
+    assert!(MODELS.iter().all(|name| model(name).is_some_and(|profile| profile.name == *name)));
 }
 
 #[test]

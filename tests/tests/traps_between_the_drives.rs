@@ -5,7 +5,7 @@
 
 use std::time::Duration;
 
-use devices::{CountsPerTurn, Description, Quirk, model};
+use devices::{AxisDescription, CountsPerTurn, Description, Scale, all, model};
 use ferrodrive_tests::bench::{zlac8030l, zlim42c};
 
 type Servo = zlac8030l::Bench;
@@ -16,6 +16,10 @@ const NO_SUCH_OBJECT: u32 = 0x0602_0000;
 
 fn profiles() -> [&'static Description; 2] {
     ["zlac8030l", "zlim42c"].map(|name| model(name).expect("a model"))
+}
+
+fn axes() -> [&'static AxisDescription; 2] {
+    profiles().map(|profile| profile.first_axis().expect("an axis"))
 }
 
 #[test]
@@ -29,7 +33,7 @@ fn both_zl_drives_say_the_same_identity_and_only_their_objects_tell_them_apart()
     assert_eq!((servo.get(0x2029), stepper.read(0x2029)), (4800, Err(NO_SUCH_OBJECT)));
     assert_eq!((servo.read(0x2069), stepper.get(0x2069)), (Err(NO_SUCH_OBJECT), 24));
     for profile in profiles() {
-        assert!(profile.quirks.contains(&Quirk::IdentityShared), "{}", profile.model);
+        assert!(profile.departures(all()).any(|departure| departure.key() == "identity_shared"), "{}", profile.name);
     }
 }
 
@@ -47,7 +51,8 @@ fn the_save_bytes_of_the_zlac8030l_set_250_kbit_s_on_the_zlim42_c_and_those_of_t
     assert_eq!(stepper.sdo(&[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]), None, "lost to a bus of 500 kbit/s");
     // 2010h = 2 saves a stepper; a servo has there whether writes are stored.
     assert!(servo.write(0x2010, 2).is_err());
-    let saves = profiles().map(|profile| (profile.storage.save.object.to_string(), profile.storage.save.value));
+    let saves = profiles().map(|profile| profile.storage.save.expect("a store"));
+    let saves = saves.map(|save| (save.object.to_string(), save.value));
     assert_eq!(saves, [("2009h:00".to_owned(), 2), ("2010h:00".to_owned(), 2)]);
 }
 
@@ -62,8 +67,8 @@ fn object_606ch_counts_0_1_r_min_on_the_zlac8030l_and_1_r_min_on_the_zlim42_c() 
     stepper.run(Duration::from_secs(3));
     let (tenths, whole) = (servo.get(0x606C), stepper.get(0x606C));
     assert!((590..=610).contains(&tenths) && whole == 60, "{tenths} and {whole} for 60 r/min");
-    let scales = profiles().map(|profile| profile.units.actual_velocity.per_count);
-    assert_eq!(scales, [0.1, 1.0]);
+    let scales = axes().map(|axis| axis.units.actual_velocity.map(|velocity| velocity.scale));
+    assert_eq!(scales, [Some(Scale::PerCount(0.1)), Some(Scale::PerCount(1.0))]);
 }
 
 #[test]
@@ -94,8 +99,8 @@ fn the_numbers_that_both_have_among_2000h_to_2012h_mean_other_things() {
     let [servo, stepper] = profiles();
     for index in [0x2000, 0x2001, 0x2005, 0x2008, 0x2009, 0x2010, 0x2011, 0x2012] {
         let row = |profile: &Description| {
-            let slot = profile.table.find(canopen::Mux::new(index, 0)).unwrap_or_else(|_| panic!("{index:04X}h"));
-            profile.table.row(slot).name
+            let slot = profile.dictionary.find(canopen::Mux::new(index, 0)).unwrap_or_else(|_| panic!("{index:04X}h"));
+            profile.dictionary.row(slot).name
         };
         assert_ne!(row(servo), row(stepper), "{index:04X}h");
     }
@@ -103,7 +108,7 @@ fn the_numbers_that_both_have_among_2000h_to_2012h_mean_other_things() {
 
 #[test]
 fn a_turn_has_4096_counts_on_the_zlac8030l_and_what_2006h_says_on_the_zlim42_c() {
-    let [servo, stepper] = profiles().map(|profile| profile.units.counts_per_turn);
+    let [servo, stepper] = axes().map(|axis| axis.units.counts_per_turn);
     assert!(!matches!(servo, CountsPerTurn::Table { .. }) && matches!(stepper, CountsPerTurn::Table { .. }));
     let mut bench = Stepper::new();
     // 2006h = 4 is 3200 pulses a turn.

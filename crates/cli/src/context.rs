@@ -132,7 +132,7 @@ impl Context {
     pub(crate) fn tell_guess(&self, drive: &Drive) {
         let Some(guess) = drive.guess().filter(|guess| guess.evidence().is_some() && !self.json) else { return };
         let id = drive.node().id();
-        let fitting: Vec<_> = guess.fitting().map(|model| model.model).collect();
+        let fitting: Vec<_> = guess.fitting().map(|model| model.name).collect();
         let how = models::how_to_say(id, &fitting);
         self.progress.note(&format!("node {id}: cannot tell its model: {guess}. Taken for that; to be sure: {how}"));
     }

@@ -9,7 +9,7 @@ use sim::machine::Order;
 use sim::{VirtualDrive, World};
 
 use crate::failure::Failure;
-use crate::models::{Description, EMBEDDED};
+use crate::models::{Description, embedded};
 
 /// Decides everything random on the embedded bus: runs are repeatable.
 pub(crate) const SEED: u64 = 1;
@@ -23,12 +23,11 @@ const SETTLING_TIME: Duration = Duration::from_millis(200);
 /// A world with drives, and which they are.
 pub(crate) type Embedded = (World, Vec<(NodeId, &'static Description)>);
 
-/// The world that `--bus sim` means: the drives of [`EMBEDDED`], factory-fresh but for node-ID and bit rate.
+/// The world that `--bus sim` means: the drives of [`embedded`], factory-fresh but for node-ID and bit rate.
 pub(crate) fn world() -> Result<Embedded, Failure> {
     let mut world = World::new(Bitrate::K500, SEED);
     let mut drives = Vec::new();
-    for (model, node) in EMBEDDED.iter().copied() {
-        let node = NodeId::new(node).unwrap_or(NodeId::MIN);
+    for (node, model) in embedded() {
         let drive = ordered_drive(model, &Order::new(model, node, world.bitrate()))?;
         world.add_drive(node.raw(), drive).map_err(|error| Failure::new(error.to_string()))?;
         drives.push((node, model));

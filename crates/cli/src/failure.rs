@@ -173,7 +173,7 @@ impl From<master::Error> for Failure {
         match error {
             Error::OutOfLimits { .. } | Error::TooFine { .. } => Self { status: Status::Usage, ..failure },
             Error::GuessedModel { node, guess, .. } => {
-                let fitting: Vec<_> = guess.fitting().map(|model| model.model).collect();
+                let fitting: Vec<_> = guess.fitting().map(|model| model.name).collect();
                 failure.next(format!("say which it is: {}", how_to_say(node, &fitting)))
             }
             Error::WrongModel { node, .. } | Error::OtherModel { node, .. } => failure.next(format!(

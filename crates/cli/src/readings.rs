@@ -152,8 +152,8 @@ fn plain(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::models::MODELS;
     use devices::variant::VariationKind;
+    use sim::machine::models;
 
     const PAGE: &str = "# Title\n\n| word | means |\n|---|---|\n| guess | nothing |\n\n## 5.3 Homing\n\n\
         | id | the manual prints | the drive here | why | how sure |\n|---|---|---|---|---|\n\
@@ -186,7 +186,7 @@ mod tests {
 
     #[test]
     fn every_row_of_every_page_is_found() {
-        for model in MODELS {
+        for model in models() {
             let (_, text) = PAGES.iter().find(|(manual, _)| *manual == model.manual).unwrap();
             let numbered = |line: &&str| {
                 let id = line.strip_prefix("| ").and_then(|line| line.get(..4)).unwrap_or_default();
@@ -194,17 +194,17 @@ mod tests {
             };
             let rows = text.lines().filter(numbered).count();
             let found = of(model).iter().filter(|reading| !reading.id.is_empty()).count();
-            assert!(rows > 50 && found == rows, "{}: {found} of {rows}", model.model);
+            assert!(rows > 50 && found == rows, "{}: {found} of {rows}", model.name);
         }
     }
 
     #[test]
     fn every_reading_that_can_be_chosen_stands_on_its_page() {
-        for model in MODELS {
+        for model in models() {
             let readings = of(model);
             for variation in model.variations.iter().filter(|variation| variation.kind == VariationKind::Reading) {
                 let known = readings.iter().any(|reading| reading.is_of(variation.key));
-                assert!(known, "{} {}", model.model, variation.key);
+                assert!(known, "{} {}", model.name, variation.key);
             }
         }
     }

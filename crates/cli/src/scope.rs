@@ -103,8 +103,8 @@ fn spelled(option: &str) -> &str {
 fn refuse_two_models(global: &Global) -> Result<(), Failure> {
     let mut said = BTreeMap::new();
     for (node, model) in &global.models {
-        if let Some(other) = said.insert(*node, model.model) {
-            return Err(Failure::usage(format!("two models for node {node}: {other} and {}", model.model))
+        if let Some(other) = said.insert(*node, model.name) {
+            return Err(Failure::usage(format!("two models for node {node}: {other} and {}", model.name))
                 .because("a node is one drive")
                 .next(format!("give one --model {node}=MODEL")));
         }

@@ -1,6 +1,17 @@
-//! Faults of a device: what a row of its fault list says.
+//! Faults of a device: where it shows them, and what a row of its fault list says.
 
-use canopen::EmcyErrorCode;
+use canopen::{EmcyErrorCode, Mux};
+
+/// How faults are told.
+#[derive(Clone, Copy)]
+pub struct Faults {
+    /// The object with the present code (603Fh), where there is one.
+    pub code: Option<Mux>,
+    /// The code is a bit field: several faults at once.
+    pub bit_field: bool,
+    /// All faults.
+    pub table: &'static [FaultRow],
+}
 
 /// One fault of a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -38,12 +38,14 @@ mod error;
 mod host_loss;
 pub mod identify;
 mod limits;
+mod models;
 mod network;
 pub mod pdo;
 pub mod units;
 
 pub use drive::{Drive, MotionOptions};
 pub use error::{Access, Error, Hints};
+pub use models::Models;
 pub use network::{
     DEFAULT_TIMEOUT, Elapsed, Exchange, Network, NextSync, NoCycle, Node, NodeView, Sleep, Wait, join_all,
 };

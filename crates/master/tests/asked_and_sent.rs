@@ -6,7 +6,7 @@ mod support;
 use std::time::Duration;
 
 use can::{Bitrate, Instant};
-use devices::{MODELS, model};
+use devices::{all, model};
 use drives::mjoint::Model;
 use master::drive::{Commanded, MotionOptions};
 use master::units::{Amperes, Counts, Degrees, Ramp, Rpm, Shown, Turns};
@@ -191,17 +191,17 @@ fn what_a_row_says_of_its_limits_names_objects_of_the_same_model_in_units_that_f
         }
     }
     let mut found = 0;
-    for profile in MODELS {
-        for row in profile.table.rows() {
+    for profile in all().iter() {
+        for row in profile.dictionary.rows() {
             let moved_by = [row.resolution, row.held_to.map(|held_to| held_to.object)];
             for object in moved_by.into_iter().flatten() {
                 found += 1;
-                assert!(profile.row(object).is_some(), "{} of the {}: {object}", row.mux(), profile.model);
+                assert!(profile.row(object).is_some(), "{} of the {}: {object}", row.mux(), profile.name);
             }
             let Some(held_to) = row.held_to else { continue };
             let ((count, unit), (other, same)) = (worth(row.unit), worth(profile.row(held_to.object).unwrap().unit));
-            assert_eq!(unit, same, "{} of the {}", row.mux(), profile.model);
-            assert!((held_to.counts as f64 * count - other).abs() < 1e-12, "{} of the {}", row.mux(), profile.model);
+            assert_eq!(unit, same, "{} of the {}", row.mux(), profile.name);
+            assert!((held_to.counts as f64 * count - other).abs() < 1e-12, "{} of the {}", row.mux(), profile.name);
         }
     }
     assert!(found >= 4, "{found}");

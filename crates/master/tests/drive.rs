@@ -299,7 +299,7 @@ fn a_scan_finds_who_answers_and_who_only_beats() {
     let mut progress = Vec::new();
     let found = bus.block_on(network.scan(Duration::from_millis(100), |asked| progress.push(asked)));
     assert_eq!(found.iter().map(|node| node.node.raw()).collect::<Vec<_>>(), [4, 7, 9]);
-    assert_eq!(found[0].models().first().map(|model| model.model), Some("zlac8030l"));
+    assert_eq!(found[0].models.first().map(|model| model.name), Some("zlac8030l"));
     assert!(found[0].doubt().is_some(), "the maker gives two models this identity");
     assert!(found[1].doubt().unwrap().contains("no model known"));
     assert!(found[2].identity.is_none());

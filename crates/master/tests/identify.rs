@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use can::{Bitrate, Instant};
 use canopen::NmtState;
-use devices::{MODELS, models_by_identity};
+use devices::all;
 use drives::mjoint::Model;
 use master::drive::MotionOptions;
 use master::identify::{Found, Guess, Knowledge, knowledge};
@@ -51,7 +51,7 @@ fn guessed_drive(world: &mut World, network: &Network, id: u8) -> Drive {
 }
 
 fn names(models: impl IntoIterator<Item = &'static devices::Description>) -> Vec<&'static str> {
-    models.into_iter().map(|model| model.model).collect()
+    models.into_iter().map(|model| model.name).collect()
 }
 
 #[test]
@@ -67,7 +67,7 @@ fn a_scan_says_that_it_cannot_tell_the_two_zl_drives_and_what_their_objects_spea
     ];
     for (id, says) in expected {
         let node = found.iter().find(|found| found.node == node(id)).unwrap();
-        assert_eq!(names(node.models()), zl, "{node:?}");
+        assert_eq!(names(node.models.clone()), zl, "{node:?}");
         assert!(matches!(node.knowledge, Knowledge::Guessed(_)), "{node:?}");
         let doubt = node.doubt().unwrap();
         assert!(
@@ -77,7 +77,7 @@ fn a_scan_says_that_it_cannot_tell_the_two_zl_drives_and_what_their_objects_spea
         assert!(doubt.ends_with(says), "{doubt}");
     }
     let joint = found.iter().find(|found| found.node == node(JOINT)).unwrap();
-    assert_eq!(joint.models().len(), 4);
+    assert_eq!(joint.models.len(), 4);
     assert!(joint.doubt().unwrap().ends_with("answer the same identity and have the same objects"), "{joint:?}");
 }
 
@@ -130,7 +130,7 @@ fn a_name_that_the_objects_speak_against_is_refused_before_anything_is_written()
         let drive = Drive::new(network.node(node(id)), devices::model(wrong).unwrap());
         let tap = world.add_tap();
         let error = block_on(&mut world, drive.check_identity()).unwrap().unwrap_err();
-        assert!(matches!(error, Error::OtherModel { hallmark, .. } if hallmark == missing), "{error}");
+        assert!(matches!(error, Error::OtherModel { object, .. } if object == missing), "{error}");
         let saved = block_on(&mut world, drive.save()).unwrap();
         assert!(matches!(saved, Err(Error::OtherModel { .. })), "{saved:?}");
         let mut requests = 0;
@@ -161,20 +161,18 @@ fn objects_that_speak_for_two_models_or_for_none_leave_it_unknown() {
 
 #[test]
 fn models_with_the_same_objects_are_the_same_to_a_master() {
-    for one in MODELS {
-        for other in one.with_same_objects() {
-            let units = |profile: &devices::Description| (profile.units, profile.storage, profile.pdo);
-            assert_eq!(units(one), units(other), "{} and {}", one.model, other.model);
-            assert_eq!((one.power, one.homing, one.modes), (other.power, other.homing, other.modes));
-            assert_eq!((one.mode_display, one.host_watch), (other.mode_display, other.host_watch));
-            assert_eq!(
-                (one.statusword_bits, one.quirks, one.hallmark),
-                (other.statusword_bits, other.quirks, other.hallmark)
-            );
+    for one in all().iter() {
+        for other in all().same_objects(one) {
+            let rules = |profile: &devices::Description| (profile.axes, profile.storage, profile.pdo, profile.nmt);
+            assert_eq!(rules(one), rules(other), "{} and {}", one.name, other.name);
+            let told = |profile: &devices::Description| {
+                (profile.host_watch, profile.stated_departures, profile.distinguishing_object)
+            };
+            assert_eq!(told(one), told(other), "{} and {}", one.name, other.name);
         }
     }
     // Nobody of today's models is alone with its identity.
-    assert!(MODELS.iter().all(|model| models_by_identity(model.identity).count() > 1));
+    assert!(all().iter().all(|model| all().of_identity(model.identity).count() > 1));
 }
 
 #[test]

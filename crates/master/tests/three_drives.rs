@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use can::{Bitrate, Instant};
 use cia402::{ModeOfOperation, PowerState};
-use devices::{Description, HostWatch, MODELS, PowerStyle, Quirk, model};
+use devices::{Departure, Description, HostWatch, PowerStyle, all, model};
 use drives::mjoint::Model;
 use master::drive::{Fact, HomingOptions, HostLoss, MotionOptions, Note};
 use master::units::{Amperes, Degrees, Ramp, Rpm, Turns};
@@ -352,7 +352,7 @@ fn saving_a_zlac_writes_2009h_2_and_the_same_bytes_set_250_kbit_s_on_a_zlim42_c(
     let mistaken = Drive::new(stepper.node().clone(), model("zlac8030l").unwrap());
     for outcome in [block_on(&mut world, mistaken.save()).unwrap(), block_on(&mut world, mistaken.restore()).unwrap()] {
         let error = outcome.unwrap_err();
-        assert!(matches!(error, Error::OtherModel { hallmark, .. } if hallmark == mux(0x2029, 0)), "{error}");
+        assert!(matches!(error, Error::OtherModel { object, .. } if object == mux(0x2029, 0)), "{error}");
     }
     assert_eq!(block_on(&mut world, rate()).unwrap().unwrap(), K500);
     // One that is not told the model, too.
@@ -361,7 +361,7 @@ fn saving_a_zlac_writes_2009h_2_and_the_same_bytes_set_250_kbit_s_on_a_zlim42_c(
     // This is what would have happened.
     block_on(&mut world, stepper.node().write(mux(0x2009, 0), 2_u16)).unwrap().unwrap();
     assert_eq!(block_on(&mut world, rate()).unwrap().unwrap(), 2);
-    let table = model("zlim42c").unwrap().table;
+    let table = model("zlim42c").unwrap().dictionary;
     assert_eq!(table.row(table.find(mux(0x2009, 0)).unwrap()).meaning(2), Some("250 kbit/s"));
 }
 
@@ -382,32 +382,34 @@ fn every_drive_saves_by_its_own_command_and_restores_where_it_can() {
 }
 
 #[test]
-fn models_of_one_identity_and_different_tables_have_hallmarks_that_tell_them_apart() {
-    let has = |profile: &Description, object| profile.table.find(object).is_ok();
-    for one in MODELS {
-        for other in MODELS {
-            let same_table = core::ptr::eq(one.table, other.table);
+fn models_of_one_identity_and_different_tables_have_objects_that_tell_them_apart() {
+    let has = |profile: &Description, object| profile.dictionary.find(object).is_ok();
+    for one in all().iter() {
+        for other in all().iter() {
+            let same_table = one.same_objects(other);
             if one.identity != other.identity || same_table {
                 continue;
             }
-            let hallmark = one.hallmark.unwrap_or_else(|| panic!("{} and {}", one.model, other.model));
-            assert!(has(one, hallmark) && !has(other, hallmark), "{} and {}", one.model, other.model);
-            assert!(one.quirks.contains(&Quirk::IdentityShared));
+            let object = one.distinguishing_object.unwrap_or_else(|| panic!("{} and {}", one.name, other.name));
+            assert!(has(one, object) && !has(other, object), "{} and {}", one.name, other.name);
+            assert!(one.departures(all()).any(|departure| departure == Departure::IdentityShared(Some(object))));
         }
     }
 }
 
 #[test]
-fn a_profile_says_of_power_and_homing_what_its_quirks_say() {
-    for profile in MODELS {
-        let quirk = |quirk| profile.quirks.contains(&quirk);
-        assert_eq!(profile.power != PowerStyle::Cia402, quirk(Quirk::NoPowerStateMachine), "{}", profile.model);
-        assert_eq!(profile.mode_display == mux(0x6060, 0), quirk(Quirk::NoModeDisplay), "{}", profile.model);
+fn a_description_says_of_power_and_homing_what_its_departures_say() {
+    for profile in all().iter() {
+        let listed: Vec<_> = profile.departures(all()).map(|departure| departure.key()).collect();
+        let departs = |key| listed.contains(&key);
+        let (name, axis) = (profile.name, profile.first_axis().unwrap());
+        assert_eq!(axis.power != PowerStyle::Cia402, departs("echoes_controlword"), "{name}");
+        assert_eq!(axis.mode_display == mux(0x6060, 0), departs("no_mode_display"), "{name}");
         let by_silence = matches!(profile.host_watch, HostWatch::Silence { .. });
-        assert_eq!(by_silence, quirk(Quirk::HostWatchdogOnByDefault), "{}", profile.model);
+        assert_eq!(by_silence, departs("watches_for_silence"), "{name}");
         let half_milliseconds = [profile.pdo.inhibit_unit_ns, profile.pdo.event_timer_unit_ns] == [500_000; 2];
-        assert_eq!(half_milliseconds, quirk(Quirk::PdoTimersInHalfMilliseconds), "{}", profile.model);
-        assert_eq!(profile.homing.is_some(), profile.modes.contains(&ModeOfOperation::HOMING), "{}", profile.model);
-        assert!(profile.table.find(profile.mode_display).is_ok(), "{}", profile.model);
+        assert_eq!(half_milliseconds, departs("pdo_timers"), "{name}");
+        assert_eq!(axis.homing.is_some(), axis.modes.contains(&ModeOfOperation::HOMING), "{name}");
+        assert!(profile.dictionary.find(axis.mode_display).is_ok(), "{name}");
     }
 }

@@ -468,7 +468,7 @@ impl Bench {
     }
 
     fn object(&self, index: u16, sub_index: u8) -> Option<&'static Entry> {
-        let table = self.model().table;
+        let table = self.model().dictionary;
         Some(table.row(table.find(Mux::new(index, sub_index)).ok()?))
     }
 

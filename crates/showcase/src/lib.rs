@@ -139,7 +139,7 @@ impl Part {
     /// The part with another model in place of its drive, if the manual is the same: then the objects are too.
     fn with(&self, model: &'static Description) -> Option<Vec<(&'static Description, u8)>> {
         match *self.drives {
-            [(profile, node)] if std::ptr::eq(profile.table, model.table) => Some(vec![(model, node)]),
+            [(profile, node)] if std::ptr::eq(profile.dictionary, model.dictionary) => Some(vec![(model, node)]),
             _ => None,
         }
     }

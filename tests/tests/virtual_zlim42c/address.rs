@@ -68,7 +68,7 @@ fn every_bit_rate_of_the_table_takes_effect_with_the_next_start() {
 
 #[test]
 fn both_lengths_are_models_of_their_own() {
-    let names: Vec<_> = devices::MODELS.iter().map(|model| model.model).collect();
+    let names: Vec<_> = devices::all().iter().map(|model| model.name).collect();
     assert!(names.contains(&"zlim42c") && names.contains(&"zlim42c-82"));
     assert_eq!(zlim42c(1, RATE_500K).model(), "zlim42c");
     assert_eq!(sim::machine::zlim42c_82(1, RATE_500K).model(), "zlim42c-82");

@@ -5,11 +5,12 @@ mod report;
 use std::path::PathBuf;
 
 use clap::builder::PossibleValuesParser;
+use sim::machine::models;
 use transport::WallClock;
 
 use crate::failure::Failure;
 use crate::global::Global;
-use crate::models::{self, MODELS};
+use crate::models::resolve;
 use crate::progress::Progress;
 use crate::session::exit_on_signal;
 use report::DemoReport;
@@ -24,7 +25,7 @@ pub(crate) struct Demo {
     #[arg(long, value_name = "FILE", default_value = "demo.svg")]
     svg: PathBuf,
     /// Only the part of one drive, which may be any model that its manual is about
-    #[arg(long, value_name = "MODEL", value_parser = PossibleValuesParser::new(MODELS.iter().map(|known| known.model)))]
+    #[arg(long, value_name = "MODEL", value_parser = PossibleValuesParser::new(models().map(|known| known.name)))]
     drive: Option<String>,
 }
 
@@ -35,7 +36,7 @@ impl Demo {
         let clock = WallClock::start();
         let progress = Progress::new(global.json);
         let shown = progress.clone();
-        let only = self.drive.as_deref().and_then(models::find);
+        let only = self.drive.as_deref().and_then(|name| resolve(name).ok());
         let showcase =
             showcase::run(only, move |section| shown.show(section)).map_err(|error| Failure::new(error.to_string()))?;
         progress.clear();

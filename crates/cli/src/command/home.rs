@@ -13,6 +13,7 @@ use crate::failure::Failure;
 use crate::guard::GuardArgs;
 use crate::models::Description;
 use crate::parse::node::node;
+use devices::AxisDescription;
 
 /// Find a drive's reference position
 ///
@@ -44,8 +45,10 @@ impl Home {
     /// Homes; refuses for drives without homing, with the reason.
     pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
         let drive = context.known_drive(self.node).await?;
-        if let Some(model) = drive.profile().filter(|model| model.homing.is_none()) {
-            return Err(self.refusal(model));
+        if let Some(model) = drive.profile()
+            && let Some(axis) = model.first_axis().filter(|axis| axis.homing.is_none())
+        {
+            return Err(self.refusal(model, axis));
         }
         context.progress.show(format!("node {}: looking for its reference", self.node));
         let options = HomingOptions { speed: self.profile_velocity, limit: self.within, wait: !self.no_wait };
@@ -55,8 +58,8 @@ impl Home {
         outcome(context, &drive, ("home with method", &self.method), motion, then, guard).await
     }
 
-    fn refusal(&self, model: &Description) -> Failure {
-        let modes = model.modes.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    fn refusal(&self, model: &Description, axis: &AxisDescription) -> Failure {
+        let modes = axis.modes.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
         let mode = ModeOfOperation::HOMING;
         Failure::new(format!("node {}: no homing with method {}", self.node, self.method))
             .of_kind("no_such_mode")
@@ -64,7 +67,7 @@ impl Home {
             .because(format!("the {} has no homing: 6060h takes {modes} only, not {}", model.title, mode.0))
             .next(format!(
                 "move it to its reference, then set the position to zero there: ferrodrive objects {} position",
-                model.model
+                model.name
             ))
     }
 }
@@ -83,7 +86,8 @@ mod tests {
             no_wait: false,
             guard: GuardArgs::default(),
         };
-        let text = home.refusal(crate::models::find("zlac8030l").unwrap()).to_string();
+        let model = crate::models::resolve("zlac8030l").unwrap();
+        let text = home.refusal(model, &model.axes[0]).to_string();
         assert!(text.contains("6060h takes 1") && text.contains("objects zlac8030l position"), "{text}");
     }
 }

@@ -3,8 +3,8 @@
 use std::fmt;
 use std::time::Duration;
 
-use canopen::{Mux, NodeId};
-use devices::{Quantity, Ramps};
+use canopen::NodeId;
+use devices::{Quantity, Ramps, Scale};
 use master::drive::{Commanded, Drive, MotionOptions, MotionReport, Note};
 use master::units::{Amperes, Angle, Ramp, Rpm, Shown, parse_duration};
 use serde::Serialize;
@@ -269,29 +269,26 @@ pub(super) async fn outcome(
 
 /// What limits a motion, as far as the drive tells.
 async fn limits(drive: &Drive) -> Limits {
-    let Some(profile) = drive.profile() else { return Limits::default() };
-    let profile_velocity_rpm = number(drive, profile.units.profile_velocity).await;
-    match profile.units.ramps {
-        Ramps::Milliseconds { acceleration, deceleration, quick_stop } => Limits {
-            profile_velocity_rpm,
-            acceleration_ms: number(drive, raw(acceleration)).await,
-            deceleration_ms: number(drive, raw(deceleration)).await,
-            quick_stop_ms: number(drive, raw(quick_stop)).await,
-            ..Limits::default()
+    let Some(axis) = drive.axis_description() else { return Limits::default() };
+    let profile_velocity_rpm = match axis.units.profile_velocity {
+        Some(quantity) => drive.read_quantity(quantity).await.ok(),
+        None => None,
+    };
+    let limits = Limits { profile_velocity_rpm, ..Limits::default() };
+    let number = async |object, scale| drive.read_quantity(Quantity { object, scale }).await.ok();
+    let ms = Scale::PerCount(1.0);
+    match axis.units.ramps {
+        Some(Ramps::Times { acceleration, deceleration, quick_stop }) => Limits {
+            acceleration_ms: number(acceleration, ms).await,
+            deceleration_ms: number(deceleration, ms).await,
+            quick_stop_ms: number(quick_stop, ms).await,
+            ..limits
         },
-        Ramps::Acceleration { both, .. } => {
-            Limits { profile_velocity_rpm, acceleration_rpm_s: number(drive, raw(both)).await, ..Limits::default() }
+        Some(Ramps::Rates { acceleration, scale, .. }) => {
+            Limits { acceleration_rpm_s: number(acceleration, scale).await, ..limits }
         }
+        None => limits,
     }
-}
-
-const fn raw(object: Mux) -> Quantity {
-    Quantity { object, per_count: 1.0 }
-}
-
-async fn number(drive: &Drive, quantity: Quantity) -> Option<f64> {
-    let payload = drive.node().upload(quantity.object).await.ok()?;
-    Some(f64::from(payload.raw()) * quantity.per_count)
 }
 
 impl Limits {

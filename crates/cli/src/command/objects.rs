@@ -8,10 +8,9 @@ use serde::Serialize;
 use super::sdo::guessed;
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::models::Description;
+use crate::models::{Description, resolve};
 use crate::output::Report;
 use crate::paint::Paint;
-use crate::parse::drive_spec::model;
 use crate::parse::node::node;
 use crate::parse::object::{ObjectArg, object};
 use crate::table::Table;
@@ -42,7 +41,7 @@ fn whose(text: &str) -> Result<Whose, String> {
     if text.starts_with(|first: char| first.is_ascii_digit() || first == '-') {
         return node(text).map(Whose::Node);
     }
-    model(text).map(Whose::Model)
+    resolve(text).map(Whose::Model)
 }
 
 /// The rows found.
@@ -162,19 +161,19 @@ impl Objects {
 
     /// Searches the table of `model`.
     pub(crate) fn list(&self, model: &'static Description) -> Result<ObjectList, Failure> {
-        let rows = model.table.rows();
+        let rows = model.dictionary.rows();
         let wanted = |row: &&Entry| self.search.iter().all(|word| matches(row, word));
         let objects: Vec<Row> = rows.iter().filter(wanted).map(Row::new).collect();
         if objects.is_empty() {
             let words = self.search.join(" ");
-            return Err(Failure::new(format!("no object of the {} matches '{words}'", model.model)).next(format!(
+            return Err(Failure::new(format!("no object of the {} matches '{words}'", model.name)).next(format!(
                 "ferrodrive objects {} lists all {}",
-                model.model,
+                model.name,
                 rows.len()
             )));
         }
         Ok(ObjectList {
-            model: model.model,
+            model: model.name,
             guess: None,
             title: format!("{}, object dictionary of \"{}\"", model.title, model.manual),
             objects,
@@ -301,11 +300,12 @@ impl Report for ObjectList {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::models::EMBEDDED;
+    use crate::models::embedded;
 
     fn found(words: &[&str]) -> Vec<&'static str> {
         let search = words.iter().map(|word| (*word).into()).collect();
-        let list = Objects { whose: Whose::Model(EMBEDDED[0].0), search }.list(EMBEDDED[0].0);
+        let (_, model) = embedded()[0];
+        let list = Objects { whose: Whose::Model(model), search }.list(model);
         list.map(|list| list.objects.iter().map(|row| row.name).collect()).unwrap_or_default()
     }
 

@@ -4,10 +4,9 @@ use devices::variant::{Variation, VariationKind};
 use serde::Serialize;
 
 use crate::failure::Failure;
-use crate::models::Description;
+use crate::models::{Description, resolve};
 use crate::output::Report;
 use crate::paint::Paint;
-use crate::parse::drive_spec::model;
 use crate::readings::{self, Reading};
 
 /// List where a model's manual is silent or contradicts itself, what is done there, and what can be chosen
@@ -19,7 +18,7 @@ use crate::readings::{self, Reading};
     ferrodrive readings zlac8030l --choices")]
 pub(crate) struct Readings {
     /// Model, e.g. zlac8030l
-    #[arg(value_parser = model)]
+    #[arg(value_parser = resolve)]
     model: &'static Description,
     /// Only places with this number or with these words
     search: Vec<String>,
@@ -110,10 +109,10 @@ impl Readings {
         let builds = variations.iter().filter(|variation| variation.kind == VariationKind::Build);
         let options: Vec<_> = builds.filter(|_| self.search.is_empty() && !self.guesses).map(Options::of).collect();
         if readings.is_empty() && options.is_empty() {
-            return Err(Failure::new(format!("no reading of the {} matches", self.model.model))
-                .next(format!("ferrodrive readings {} lists all", self.model.model)));
+            return Err(Failure::new(format!("no reading of the {} matches", self.model.name))
+                .next(format!("ferrodrive readings {} lists all", self.model.name)));
         }
-        Ok(ReadingList { model: self.model.model, manual: self.model.manual, readings, options, guesses })
+        Ok(ReadingList { model: self.model.name, manual: self.model.manual, readings, options, guesses })
     }
 
     fn matches(&self, row: &Row) -> bool {
@@ -161,7 +160,7 @@ impl Report for ReadingList {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::models::MODELS;
+    use sim::machine::models;
 
     fn list(model: &'static Description, words: &[&str], guesses: bool) -> Result<ReadingList, Failure> {
         let search = words.iter().map(|word| (*word).into()).collect();
@@ -170,7 +169,7 @@ mod tests {
 
     #[test]
     fn a_place_is_found_by_its_number_and_by_words() {
-        let zlac = MODELS[0];
+        let zlac = models().next().unwrap();
         let found = list(zlac, &["l004"], false).unwrap_or_else(|failure| panic!("{failure}"));
         assert_eq!(found.readings.len(), 1);
         assert!(found.text(Paint::OFF).contains("L004"), "{}", found.text(Paint::OFF));
@@ -180,9 +179,9 @@ mod tests {
 
     #[test]
     fn every_model_has_guesses_and_says_how_many() {
-        for model in MODELS {
+        for model in models() {
             let guesses = list(model, &[], true).map(|found| (found.readings.len(), found.guesses));
-            assert!(guesses.is_ok_and(|(shown, all)| shown == all && all > 10), "{}", model.model);
+            assert!(guesses.is_ok_and(|(shown, all)| shown == all && all > 10), "{}", model.name);
         }
     }
 }

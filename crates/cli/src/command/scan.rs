@@ -68,15 +68,15 @@ impl Node {
         let told = context.told_model(found.node);
         let identity = found.identity.unwrap_or_default();
         let contradiction = told.and_then(|told| contradiction(told, found));
-        let named = if let Knowledge::Named(model) = found.knowledge { Some(model.0) } else { None };
+        let named = if let Knowledge::Named(model) = &found.knowledge { Some(model.0) } else { None };
         let model = told.filter(|_| contradiction.is_none()).or(named);
         let guess = found.knowledge.guess().filter(|_| model.is_none());
-        let evidence = guess.and_then(|guess| guess.evidence());
+        let evidence = guess.as_ref().and_then(|guess| guess.evidence());
         Self {
             node: found.node.raw(),
-            model: model.map(|model| model.model),
-            models: found.models().iter().map(|model| model.model).collect(),
-            guess: guess.filter(|_| evidence.is_some()).map(|guess| guess.profile().model),
+            model: model.map(|model| model.name),
+            models: found.models.iter().map(|model| model.name).collect(),
+            guess: guess.filter(|_| evidence.is_some()).map(|guess| guess.profile().name),
             evidence: evidence.map(|mux| mux.to_string()),
             // A boot-up message says only that the node has just left the state it names.
             nmt_state: found.nmt_state.filter(|state| *state != NmtState::Initialising).map(|state| state.to_string()),
@@ -105,22 +105,22 @@ impl Node {
 
 /// What speaks against the model that a node is said to be.
 fn contradiction(told: &'static Description, found: &Found) -> Option<String> {
-    let said = format!("it is said to be a {}", told.model);
+    let said = format!("it is said to be a {}", told.name);
     if !found.identity?.matches(&told.identity) {
         return Some(format!("{said}, but its identity is another one: say the right model"));
     }
     let guess = found.knowledge.guess()?;
-    let evidence = guess.evidence().filter(|_| guess.fitting().all(|model| model.model != told.model))?;
-    let fitting = guess.profile().model;
+    let evidence = guess.evidence().filter(|_| guess.fitting().all(|model| model.name != told.name))?;
+    let fitting = guess.profile().name;
     Some(format!("{said}, but has {evidence} as a {fitting} has: say the right model"))
 }
 
 /// What cannot be told, and what the user can do about it.
 fn remark(found: &Found, doubt: String) -> String {
-    let candidates = match found.knowledge {
+    let candidates = match &found.knowledge {
         Knowledge::Named(_) => Vec::new(),
-        Knowledge::Guessed(guess) => guess.fitting().map(|model| model.model).collect(),
-        Knowledge::Unknown => found.models().iter().map(|model| model.model).collect(),
+        Knowledge::Guessed(guess) => guess.fitting().map(|model| model.name).collect(),
+        Knowledge::Unknown => found.models.iter().map(|model| model.name).collect(),
     };
     if candidates.is_empty() { doubt } else { format!("{doubt}. Say which: {}", how_to_say(found.node, &candidates)) }
 }

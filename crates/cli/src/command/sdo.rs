@@ -152,7 +152,7 @@ async fn with_limits(drive: &Drive, error: Error, number: i64) -> Failure {
 
 /// The multiplexor, and the row if the node's model is known and has it.
 fn resolve(drive: &Drive, object: &ObjectArg) -> Result<(Mux, Option<&'static Entry>), Failure> {
-    let found = object.resolve(drive.profile().map(|model| model.table));
+    let found = object.resolve(drive.profile().map(|model| model.dictionary));
     found.map_err(|reason| Failure::usage(reason).at_node(drive.node().id()))
 }
 
@@ -182,7 +182,7 @@ impl ObjectReport {
 
 /// The model that a drive is taken for on the evidence of its objects.
 pub(super) fn guessed(drive: &Drive) -> Option<&'static str> {
-    drive.guess().filter(|guess| guess.evidence().is_some()).map(|guess| guess.profile().model)
+    drive.guess().filter(|guess| guess.evidence().is_some()).map(|guess| guess.profile().name)
 }
 
 impl Report for ObjectReport {

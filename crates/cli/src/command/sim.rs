@@ -147,7 +147,7 @@ impl Sim {
             None => Ok(machine),
             Some(spec) => Err(Failure::usage(format!("two drives at node {}", spec.node))
                 .because("a node-ID may be used once on a bus")
-                .next(format!("give the second --drive {}@... another node-ID", spec.model.model))),
+                .next(format!("give the second --drive {}@... another node-ID", spec.model.name))),
         }
     }
 
@@ -225,8 +225,8 @@ fn add_drive(world: &mut World, placed: &Placed, eeproms: Option<&Eeproms>, warn
     let mut drive = embedded::ordered_drive(spec.model, &spec.order(world.bitrate()))?;
     placed.supply(drive.as_mut()).map_err(unusable)?;
     let number = spec.node.raw();
-    let name = file_name(spec.model.model, number);
-    let image = eeproms.map(|eeproms| eeproms.load(&name, spec.model.model)).transpose()?.flatten();
+    let name = file_name(spec.model.name, number);
+    let image = eeproms.map(|eeproms| eeproms.load(&name, spec.model.name)).transpose()?.flatten();
     if let Some(image) = &image {
         drive.load_nvm(image).map_err(|error| {
             Failure::new(format!("the EEPROM contents kept for {name} cannot be used")).because(error)

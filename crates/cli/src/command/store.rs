@@ -48,7 +48,7 @@ impl Save {
     pub(crate) async fn run(&self, context: &Context) -> Result<StoreReport, Failure> {
         let drive = context.drive_untold(self.node).await?;
         drive.save().await?;
-        StoreReport::new(&drive, "stored", |storage| Some(storage.save))
+        StoreReport::new(&drive, "stored", |storage| storage.save)
     }
 }
 
@@ -72,7 +72,8 @@ impl StoreReport {
         let after_restart = model.storage.effective_after_restart.iter();
         let after_restart =
             after_restart.map(|mux| Named { object: mux.to_string(), name: model.row(*mux).map(|row| row.name) });
-        let object = write(&model.storage).unwrap_or(model.storage.save).object;
+        let intent = "say through which object";
+        let object = write(&model.storage).or(model.storage.save).ok_or(Error::UnknownModel { node, intent })?.object;
         Ok(Self {
             node: node.raw(),
             done,

@@ -314,7 +314,7 @@ mod tests {
     #[test]
     fn a_file_says_which_models_are_where_and_no_node_twice() {
         let text = "[[drive]]\nmodel = 'zlim42c'\nnode = 2\nload = { torque_nm = 0.5 }\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4";
-        let said: Vec<_> = parsed(text).models().map(|(node, model)| (node.raw(), model.model)).collect();
+        let said: Vec<_> = parsed(text).models().map(|(node, model)| (node.raw(), model.name)).collect();
         assert_eq!(said, [(2, "zlim42c"), (4, "zlac8030l")]);
         let twice = "[[drive]]\nmodel = 'zlim42c'\nnode = 2\n[[drive]]\nmodel = 'zlac8030l'\nnode = 2";
         assert_eq!(refusal(twice), "line 4: two drives at node 2");

@@ -8,7 +8,7 @@ use sim::machine::Order;
 use super::node::node;
 use super::object;
 use super::suggest::{did_you_mean, near};
-use crate::models::{self, Description, MODELS};
+use crate::models::{Description, resolve};
 
 /// A drive to put on a virtual bus.
 #[derive(Clone)]
@@ -45,7 +45,7 @@ impl DriveSpec {
             Ok(()) => Ok(()),
             Err(NoSuchChoice::Choice(variation)) => {
                 let known: Vec<_> = variation.choices.iter().map(|choice| choice.name).collect();
-                Err(format!("{key} of a {} is no '{value}'; expected one of: {}", self.model.model, known.join(", ")))
+                Err(format!("{key} of a {} is no '{value}'; expected one of: {}", self.model.name, known.join(", ")))
             }
             Err(NoSuchChoice::Variation) => {
                 let object = object_of(self.model, key).ok_or_else(|| self.unknown(key))?;
@@ -70,13 +70,13 @@ impl DriveSpec {
         });
         let known = keys.chain(["OBJECT=VALUE, e.g. 6060=3".to_owned()]).collect::<Vec<_>>().join("; ");
         let near = near(key, self.model.variations.iter().map(|variation| variation.key));
-        format!("a {} takes no '{key}'{}; it takes: {known}", self.model.model, did_you_mean(&near))
+        format!("a {} takes no '{key}'{}; it takes: {known}", self.model.name, did_you_mean(&near))
     }
 }
 
 /// The object that somebody means by a name, an index or an index with a sub-index.
 fn object_of(model: &Description, text: &str) -> Option<Mux> {
-    let (mux, _) = object::object(text).ok()?.resolve(Some(model.table)).ok()?;
+    let (mux, _) = object::object(text).ok()?.resolve(Some(model.dictionary)).ok()?;
     Some(mux)
 }
 
@@ -93,7 +93,7 @@ pub(crate) fn drive_spec(text: &str) -> Result<DriveSpec, String> {
     let place = words.next().unwrap_or_default();
     let (name, number) =
         place.split_once('@').ok_or_else(|| format!("'{place}' is no drive; expected MODEL@NODE, e.g. zlac8030l@4"))?;
-    let mut spec = DriveSpec::new(model(name)?, node(number)?);
+    let mut spec = DriveSpec::new(resolve(name)?, node(number)?);
     for word in words {
         let (key, value) = word
             .split_once('=')
@@ -107,15 +107,7 @@ pub(crate) fn drive_spec(text: &str) -> Result<DriveSpec, String> {
 pub(crate) fn node_model(text: &str) -> Result<(NodeId, &'static Description), String> {
     let (number, name) =
         text.split_once('=').ok_or_else(|| format!("'{text}' is incomplete; expected NODE=MODEL, e.g. 4=zlac8030l"))?;
-    Ok((node(number)?, model(name)?))
-}
-
-/// `zlac8030l`.
-pub(crate) fn model(name: &str) -> Result<&'static Description, String> {
-    models::find(name).ok_or_else(|| {
-        let near = near(name, MODELS.iter().map(|model| model.model));
-        format!("'{name}' is no model{}; expected one of: {}", did_you_mean(&near), models::names())
-    })
+    Ok((node(number)?, resolve(name)?))
 }
 
 #[cfg(test)]
@@ -129,8 +121,8 @@ mod tests {
     #[test]
     fn drives_are_model_at_node() {
         let spec = drive_spec("zlac8030l@4").ok().unwrap();
-        assert_eq!((spec.model.model, spec.node.raw()), ("zlac8030l", 4));
-        assert_eq!(node_model("4=ZLAC8030L").ok().unwrap().1.model, "zlac8030l");
+        assert_eq!((spec.model.name, spec.node.raw()), ("zlac8030l", 4));
+        assert_eq!(node_model("4=ZLAC8030L").ok().unwrap().1.name, "zlac8030l");
     }
 
     #[test]

@@ -11,15 +11,16 @@ pub mod statusword;
 pub mod variations;
 
 use can::Bitrate;
-use canopen::Mux;
 use canopen::od::DataType;
-use canopen::pdo::{MappingRules, TpdoForm};
+use canopen::pdo::{EventTrigger, MappingRules, TpdoForm};
+use canopen::{Mux, NmtState, NodeId};
 use cia402::{ModeOfOperation, Statusword};
 
-use crate::description::{
-    BitPattern, CountsPerTurn, Description, Faults, HomingRules, HomingStart, HostWatch, Identity, ParameterStorage,
-    PdoRules, PowerStyle, Quantity, Quirk, Ramps, Units, Write,
-};
+use crate::axis::{AxisDescription, BitPattern, HomingRules, HomingStart, NewSetPoint, PowerStyle};
+use crate::description::{Description, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules, Write};
+use crate::faults::Faults;
+use crate::placement::Placement;
+use crate::units::{CountsPerTurn, Quantity, Ramps, Scale, Units};
 use alarms::ALARMS;
 use assumptions::{COUNTS_PER_TURN, NO_RAMP_FROM};
 use objects::TABLE;
@@ -35,38 +36,24 @@ pub static M8025E25B50: Description = joint("m8025e25b50", "M8025E25B50 joint mo
 /// The M8025E25B80.
 pub static M8025E25B80: Description = joint("m8025e25b80", "M8025E25B80 joint motor");
 
-const fn joint(model: &'static str, title: &'static str) -> Description {
+const fn joint(name: &'static str, title: &'static str) -> Description {
     Description {
-        model,
+        name,
         title,
         manual: "M Robot Joint Motor CanOpen Manual",
         identity: Identity { device_type: 0x0002_0192, vendor_id: 0x331, product_code: 1, revision_number: 0x100 },
         // The four models of the identity have the same objects.
-        hallmark: None,
-        table: &TABLE,
-        node_id: 1,
-        bitrate: Bitrate::M1,
-        modes: &[
-            ModeOfOperation::PROFILE_POSITION,
-            ModeOfOperation::PROFILE_VELOCITY,
-            ModeOfOperation::HOMING,
-            ModeOfOperation::INTERPOLATED_POSITION,
-        ],
-        mode_display: Mux::new(0x6060, 0),
-        power: PowerStyle::Mirror { following: 0b10_0111, live: LIVE, alarm: Statusword::FAULT },
-        statusword_bits: STATUSWORD_BITS,
-        homing: Some(HOMING),
+        distinguishing_object: None,
+        dictionary: &TABLE,
+        node_id: NodeId::new(1),
+        bitrate: Some(Bitrate::M1),
+        axes: &[AXIS],
         host_watch: HostWatch::Heartbeat { consumer: Mux::new(0x1016, 1), fault: 0x20 },
-        units: UNITS,
-        storage: ParameterStorage {
-            save: Write { object: Mux::new(0x2614, 0), value: 1 },
-            restore: None,
-            save_on_write: None,
-            effective_after_restart: AFTER_RESTART,
-        },
-        faults: Faults { code: Mux::new(0x260E, 0), bit_field: false, table: &ALARMS },
+        storage: STORAGE,
+        faults: Faults { code: Some(Mux::new(0x260E, 0)), bit_field: false, table: &ALARMS },
+        nmt: NmtRules { start_state: NmtState::Operational, heartbeat_tells_alarm: true },
         pdo: PDO_RULES,
-        quirks: QUIRKS,
+        stated_departures: &[],
         variations: VARIATIONS,
     }
 }
@@ -74,6 +61,29 @@ const fn joint(model: &'static str, title: &'static str) -> Description {
 /// 606Ch in TPDO3: 32 bits of r/min (5.10.2), of the 16 bits of 0.1 r/min that SDO shows (5.04).
 static IN_TPDO: [TpdoForm; 1] =
     [TpdoForm { object: Mux::new(0x606C, 0), data_type: DataType::Integer32, unit: "r/min", divisor: 10 }];
+
+const AXIS: AxisDescription = AxisDescription {
+    placement: Placement::FIRST,
+    modes: &[
+        ModeOfOperation::PROFILE_POSITION,
+        ModeOfOperation::PROFILE_VELOCITY,
+        ModeOfOperation::HOMING,
+        ModeOfOperation::INTERPOLATED_POSITION,
+    ],
+    mode_display: Mux::new(0x6060, 0),
+    power: PowerStyle::EchoesControlword { following: 0b10_0111, live: LIVE, alarm: Statusword::FAULT },
+    new_set_point: NewSetPoint::ClearsItself,
+    statusword_bits: STATUSWORD_BITS,
+    homing: Some(HOMING),
+    units: UNITS,
+};
+
+const STORAGE: ParameterStorage = ParameterStorage {
+    save: Some(Write { object: Mux::new(0x2614, 0), value: 1 }),
+    restore: None,
+    save_on_write: None,
+    effective_after_restart: &[Mux::new(0x2615, 0), Mux::new(0x2619, 0)],
+};
 
 /// The mapping is fixed; an identifier may be changed at any time, since no bit of it makes a PDO invalid (5.08).
 const PDO_RULES: PdoRules = PdoRules {
@@ -84,11 +94,10 @@ const PDO_RULES: PdoRules = PdoRules {
     fixed_mapping: true,
     first_in_manual: 1,
     mapping: MappingRules { tpdo_forms: &IN_TPDO, ..MappingRules::CIA_301 },
+    event_trigger: EventTrigger::AnswersRpdo,
     // It has no EMCY.
     short_rpdo: None,
 };
-
-const AFTER_RESTART: &[Mux] = &[Mux::new(0x2615, 0), Mux::new(0x2619, 0)];
 
 /// Bits of 5.04 as the examples show them.
 const STATUSWORD_BITS: &[(u16, &str)] = &[
@@ -112,30 +121,19 @@ const HOMING: HomingRules = HomingRules {
 
 const UNITS: Units = Units {
     counts_per_turn: CountsPerTurn::Fixed(COUNTS_PER_TURN),
-    target_velocity: Quantity::new(0x60FF, 0, 1.0),
-    actual_velocity: Quantity::new(0x606C, 0, 0.1),
-    profile_velocity: Quantity::new(0x6081, 0, 1.0),
-    ramps: Ramps::Acceleration { both: Mux::new(0x6083, 0), none_from: NO_RAMP_FROM },
+    target_velocity: Some(Quantity::new(0x60FF, 0, 1.0)),
+    actual_velocity: Some(Quantity::new(0x606C, 0, 0.1)),
+    profile_velocity: Some(Quantity::new(0x6081, 0, 1.0)),
+    ramps: Some(Ramps::Rates {
+        acceleration: Mux::new(0x6083, 0),
+        deceleration: Mux::new(0x6083, 0),
+        quick_stop: None,
+        scale: Scale::PerCount(1.0),
+        none_from: Some(NO_RAMP_FROM),
+    }),
     target_current: None,
     actual_current: Some(Quantity::new(0x6078, 0, 1.0 / 2000.0)),
     bus_voltage: Some(Quantity::new(0x6079, 0, 1.0 / 327.0)),
     motor_temperature: None,
     driver_temperature: Some(Quantity::new(0x2612, 0, 1.0)),
 };
-
-const QUIRKS: &[Quirk] = &[
-    Quirk::NoPowerStateMachine,
-    Quirk::StartsOperational,
-    Quirk::HeartbeatTellsAlarm,
-    Quirk::TpdoAnswersRpdo,
-    Quirk::NoEmcy,
-    Quirk::NoModeDisplay,
-    Quirk::HomingStartsWithMode,
-    Quirk::NewSetPointClearsItself,
-    Quirk::SpeedInTpdoDiffers,
-    Quirk::VelocityUnitsDiffer,
-    Quirk::NoSupportedDriveModes,
-    Quirk::NoStandardStore,
-    Quirk::NoErrorHistory,
-    Quirk::IdentityShared,
-];

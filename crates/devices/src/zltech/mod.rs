@@ -9,10 +9,12 @@ mod values;
 pub mod zlac8030l;
 pub mod zlim42c;
 
-use canopen::pdo::MappingRules;
+use canopen::pdo::{EventTrigger, MappingRules};
 use canopen::{EmcyErrorCode, Mux};
 
-use crate::description::{Identity, ParameterStorage, PdoRules, Ramps, Write};
+use crate::description::{Identity, ParameterStorage, PdoRules, Write};
+use crate::stated::Stated;
+use crate::units::Ramps;
 
 pub use zlac8030l::ZLAC8030L;
 pub use zlim42c::{ZLIM42C, ZLIM42C_82};
@@ -32,12 +34,14 @@ const PDO_RULES: PdoRules = PdoRules {
     fixed_mapping: false,
     first_in_manual: 0,
     mapping: MappingRules::CIA_301,
+    // Event-driven PDOs as the ZLAC8030L's manual has them (6.1); the ZLIM42-C's gives no more than the object table.
+    event_trigger: EventTrigger::ChangeOr255ByTimer,
     // The manuals are silent; CiA 301 asks it of a device with EMCY.
     short_rpdo: Some(EmcyErrorCode::PDO_NOT_PROCESSED),
 };
 
 /// 6083h to 6085h are times.
-const RAMPS: Ramps = Ramps::Milliseconds {
+const RAMPS: Ramps = Ramps::Times {
     acceleration: Mux::new(0x6083, 0),
     deceleration: Mux::new(0x6084, 0),
     quick_stop: Mux::new(0x6085, 0),
@@ -57,9 +61,17 @@ const fn parameter_storage(
     effective_after_restart: &'static [Mux],
 ) -> ParameterStorage {
     ParameterStorage {
-        save: Write { object: Mux::new(register, 0), value: SAVE },
+        save: Some(Write { object: Mux::new(register, 0), value: SAVE }),
         restore: Some(Write { object: Mux::new(register, 0), value: RESTORE }),
         save_on_write: Some((Write { object: Mux::new(save_on_write, 0), value: 0 }, true)),
         effective_after_restart,
     }
 }
+
+/// As the ZLAC8030L's recordings show it (CiA 402-2, 8.4.2 has a warning beside the fault, not with it).
+const WARNING_IN_FAULT: Stated = Stated {
+    key: "warning_bit_in_fault",
+    object: Mux::new(0x6041, 0),
+    what: "bit 7 is set in fault",
+    remedy: "take it for a warning only while bit 3 is clear",
+};

@@ -7,17 +7,5 @@ mod parameters;
 mod storage;
 pub(crate) mod terminals;
 
-use canopen::node::NodeProfile;
-use canopen::pdo::EventTrigger;
-use devices::Description;
-
-use crate::communication::communication;
-
 pub(crate) use parameters::ProfileObjects;
 pub(crate) use storage::{mark_if_saving, register_command};
-
-/// How the drives communicate: as described, event-driven PDOs as the ZLAC8030L's manual has them (6.1; the ZLIM42-C's gives
-/// no more than the object table).
-pub(crate) const fn node_profile(description: &Description) -> NodeProfile {
-    NodeProfile { event_trigger: EventTrigger::ChangeOr255ByTimer, ..communication(description) }
-}

@@ -23,6 +23,8 @@ const REPEAT_AFTER: core::time::Duration = core::time::Duration::from_millis(100
 #[derive(Clone, Debug)]
 pub struct CyclicDrive {
     pub(super) node: NodeId,
+    /// Where its controlword is: which axis of the node it is.
+    pub(super) place: Mux,
     pub(super) mode: ModeOfOperation,
     pub(super) style: PowerStyle,
     pub(super) statusword: Signal<u16>,
@@ -75,7 +77,7 @@ impl CyclicDrive {
         if matches!(demand, Demand::Off | Demand::ResetFault) {
             self.progress.latched = None;
             self.progress.followed = false;
-            io.note_off(self.node, self.watch);
+            io.note_off((self.node, self.place), self.watch);
         } else if let Some(loss) = io.cycle_loss(self.watch) {
             self.progress.latched = Some(Refusal::Stopped(loss));
         }
@@ -96,7 +98,7 @@ impl CyclicDrive {
         let sent = self.send(io, wish.unwrap_or(self.target.held), word, &seen);
         self.progress.followed = follows;
         if follows {
-            io.note_moving(self.node, self.watch);
+            io.note_moving((self.node, self.place), self.watch);
         } else {
             io.note_resting(self.watch);
         }

@@ -1,17 +1,15 @@
 use core::time::Duration;
 
-use canopen::pdo::{Direction, PdoId, PdoNumber};
+use canopen::pdo::{Direction, EventTrigger, MappingRecord, PdoId, PdoNumber};
 use canopen::{Mux, NmtCommand, NmtState, NodeId};
 use cia402::ModeOfOperation;
-use devices::{Description, Quantity, Quirk};
+use devices::{AxisDescription, Description, Quantity};
 
 use super::demand::Bound;
 use super::drive::{ControlwordPath, CyclicDrive, Progress};
 use super::target::{Kind, Target};
 use crate::core::{CycleRules, NumberForm, PdoMap, Sample, Signal};
-use canopen::pdo::MappingRecord;
-
-use crate::drive::{CONTROLWORD, Drive, POSITION_ACTUAL, STATUSWORD, STOP, TARGET_POSITION};
+use crate::drive::{CONTROLWORD, Drive, MODE, POSITION_ACTUAL, STATUSWORD, STOP, TARGET_POSITION};
 use crate::error::Error;
 use crate::pdo::{PdoConfig, PdoError, SignalError, TimerUnits, TransmissionType};
 
@@ -83,19 +81,20 @@ enum SetPointKind {
 }
 
 /// The set-point of a mode that follows one each cycle.
-fn set_point_of(profile: &Description, mode: ModeOfOperation) -> Option<SetPointKind> {
+fn set_point_of(profile: &Description, axis: &AxisDescription, mode: ModeOfOperation) -> Option<SetPointKind> {
+    let interpolation_data = axis.object(INTERPOLATION_DATA);
     match mode {
-        ModeOfOperation::INTERPOLATED_POSITION if profile.row(INTERPOLATION_DATA).is_some() => {
-            Some(SetPointKind::Position(INTERPOLATION_DATA))
+        ModeOfOperation::INTERPOLATED_POSITION if profile.row(interpolation_data).is_some() => {
+            Some(SetPointKind::Position(interpolation_data))
         }
         ModeOfOperation::INTERPOLATED_POSITION | ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION => {
-            Some(SetPointKind::Position(TARGET_POSITION))
+            Some(SetPointKind::Position(axis.object(TARGET_POSITION)))
         }
         ModeOfOperation::PROFILE_VELOCITY | ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY => {
-            Some(SetPointKind::Quantity(profile.units.target_velocity))
+            axis.units.target_velocity.map(SetPointKind::Quantity)
         }
         ModeOfOperation::PROFILE_TORQUE | ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE => {
-            profile.units.target_current.map(SetPointKind::Quantity)
+            axis.units.target_current.map(SetPointKind::Quantity)
         }
         _ => None,
     }
@@ -115,38 +114,40 @@ impl Drive {
     /// # Errors
     /// [`CyclicError`].
     pub async fn cyclic(&self, mode: ModeOfOperation, options: CyclicOptions) -> Result<CyclicDrive, CyclicError> {
-        let profile = self.known(INTENT)?;
-        if !profile.modes.contains(&mode) {
-            return Err(self.no_such_mode(profile, mode).into());
+        let (profile, axis) = (self.known(INTENT)?, self.motion(INTENT)?);
+        if !axis.modes.contains(&mode) {
+            return Err(self.no_such_mode(axis, mode).into());
         }
         let mapped = self.adopt_pdos(profile).await?;
-        let (number, mut target) = self.target(profile, mode).await?;
+        let (number, mut target) = self.target(profile, axis, mode).await?;
         let (statusword_in, every) = self.statusword_carrier(profile, number, &mapped)?;
-        let statusword = self.node().signal_in(statusword_in, STATUSWORD)?;
+        let statusword = self.node().signal_in(statusword_in, axis.object(STATUSWORD))?;
         if let Kind::Position { actual, .. } = &mut target.kind {
             // A TPDO that comes, if one of them does.
-            *actual = self.node().signal_in(statusword_in, POSITION_ACTUAL).unwrap_or(*actual);
+            *actual = self.node().signal_in(statusword_in, axis.object(POSITION_ACTUAL)).unwrap_or(*actual);
         }
+        let place = axis.object(CONTROLWORD);
         let controlword = self.controlword_path(number, &mapped);
         self.preset_rpdos(&mapped, number, mode).await?;
         let tolerance = options.tolerance.saturating_add(every - 1);
         let rules = CycleRules {
             node: self.node().id(),
             stop: STOP.0,
-            controlword: CONTROLWORD,
+            controlword: place,
             place: if let ControlwordPath::Pdo(set_point) = controlword { Some(set_point.place()) } else { None },
             heard: statusword.place(),
             tolerance,
         };
         let drive = CyclicDrive {
             node: self.node().id(),
+            place,
             mode,
-            style: profile.power,
+            style: axis.power,
             statusword,
             controlword,
             position: self.position_signal(statusword_in).await?,
-            velocity: self.quantity_signal(profile, statusword_in, Some(profile.units.actual_velocity)).await?,
-            current: self.quantity_signal(profile, statusword_in, profile.units.actual_current).await?,
+            velocity: self.quantity_signal(profile, statusword_in, axis.units.actual_velocity).await?,
+            current: self.quantity_signal(profile, statusword_in, axis.units.actual_current).await?,
             target,
             tolerance,
             watch: self.node().network().with_core(|core| core.watch_cycles(rules)),
@@ -165,9 +166,9 @@ impl Drive {
     /// # Errors
     /// [`CyclicError`].
     pub async fn configure_cyclic(&self, mode: ModeOfOperation) -> Result<(), CyclicError> {
-        let profile = self.known(INTENT)?;
+        let (profile, axis) = (self.known(INTENT)?, self.motion(INTENT)?);
         let node = self.node().id();
-        let target = match set_point_of(profile, mode) {
+        let target = match set_point_of(profile, axis, mode) {
             Some(SetPointKind::Position(object)) => object,
             Some(SetPointKind::Quantity(quantity)) => quantity.object,
             None => return Err(CyclicError::NoSetPoint { node, mode }),
@@ -188,11 +189,15 @@ impl Drive {
             }
             map
         };
-        let current = profile.units.actual_current.map(|quantity| quantity.object);
-        let velocity = Some(profile.units.actual_velocity.object);
+        let current = axis.units.actual_current.map(|quantity| quantity.object);
+        let velocity = axis.units.actual_velocity.map(|quantity| quantity.object);
         let pdos = [
-            (Direction::Rpdo, PdoNumber::FIRST, map(&[Some(CONTROLWORD), Some(target)])),
-            (Direction::Tpdo, PdoNumber::FIRST, map(&[Some(STATUSWORD), Some(POSITION_ACTUAL), current])),
+            (Direction::Rpdo, PdoNumber::FIRST, map(&[Some(axis.object(CONTROLWORD)), Some(target)])),
+            (
+                Direction::Tpdo,
+                PdoNumber::FIRST,
+                map(&[Some(axis.object(STATUSWORD)), Some(axis.object(POSITION_ACTUAL)), current]),
+            ),
             (Direction::Tpdo, SECOND, map(&[velocity])),
         ];
         for (direction, number, map) in pdos {
@@ -206,7 +211,7 @@ impl Drive {
     async fn adopt_pdos(&self, profile: &Description) -> Result<Mapped, Error> {
         let units = timer_units(profile);
         let mut mapped = Mapped { rpdos: Vec::new(), tpdos: Vec::new() };
-        let parameters = profile.table.rows().iter().map(|row| row.mux()).filter(|mux| mux.sub_index == 1);
+        let parameters = profile.dictionary.rows().iter().map(|row| row.mux()).filter(|mux| mux.sub_index == 1);
         for (pdo, is_mapping) in parameters.filter_map(|mux| PdoId::of_object(mux.index)) {
             if is_mapping {
                 continue;
@@ -221,32 +226,37 @@ impl Drive {
     }
 
     /// The set-point of the mode, and the RPDO that carries it.
-    async fn target(&self, profile: &Description, mode: ModeOfOperation) -> Result<(PdoNumber, Target), CyclicError> {
-        let quantity = match set_point_of(profile, mode) {
-            Some(SetPointKind::Position(object)) => return self.position_target(profile, object).await,
+    async fn target(
+        &self,
+        profile: &Description,
+        axis: &AxisDescription,
+        mode: ModeOfOperation,
+    ) -> Result<(PdoNumber, Target), CyclicError> {
+        let quantity = match set_point_of(profile, axis, mode) {
+            Some(SetPointKind::Position(object)) => return self.position_target(axis, object).await,
             Some(SetPointKind::Quantity(quantity)) => quantity,
             None => return Err(CyclicError::NoSetPoint { node: self.node().id(), mode }),
         };
         let (number, set_point) = self.node().scaled_set_point(quantity.object, NumberForm::Signed, 1.0)?;
-        let per_count = quantity.per_count / self.resolution(quantity).await?;
-        let speed = quantity.object == profile.units.target_velocity.object;
+        let per_count = self.step_of(quantity).await?;
+        let speed = axis.units.target_velocity.is_some_and(|velocity| velocity.object == quantity.object);
         let kind = if speed { Kind::Velocity { per_count } } else { Kind::Current { per_count } };
         Ok((number, Target { set_point, limits: self.limits(quantity.object).await?, kind, held: 0 }))
     }
 
-    async fn position_target(&self, profile: &Description, object: Mux) -> Result<(PdoNumber, Target), CyclicError> {
+    async fn position_target(&self, axis: &AxisDescription, object: Mux) -> Result<(PdoNumber, Target), CyclicError> {
         let (number, set_point) = self.node().scaled_set_point(object, NumberForm::Signed, 1.0)?;
         let counts_per_turn = self.counts_per_turn().await?;
-        let velocity = profile.units.target_velocity;
+        let velocity = self.has(axis.units.target_velocity, "a target velocity")?;
         let speed = Bound::from(self.limits(velocity.object).await?);
-        let rpm = speed.high as f64 * velocity.per_count / self.resolution(velocity).await?;
+        let rpm = speed.high as f64 * self.step_of(velocity).await?;
         let kind = Kind::Position {
-            actual: self.node().signal(POSITION_ACTUAL)?,
+            actual: self.node().signal(axis.object(POSITION_ACTUAL))?,
             counts_per_turn,
             counts_per_s: rpm / 60.0 * counts_per_turn,
             speed,
         };
-        let held = self.read_number(POSITION_ACTUAL).await?;
+        let held = self.read_number(axis.object(POSITION_ACTUAL)).await?;
         Ok((number, Target { set_point, limits: self.limits(object).await?, kind, held }))
     }
 
@@ -258,8 +268,9 @@ impl Drive {
         number: PdoNumber,
         mapped: &Mapped,
     ) -> Result<(PdoNumber, u32), CyclicError> {
-        let answers = profile.has(Quirk::TpdoAnswersRpdo);
-        let carriers = mapped.tpdos.iter().filter(|pdo| carries(&pdo.map, STATUSWORD));
+        let answers = profile.pdo.event_trigger == EventTrigger::AnswersRpdo;
+        let statusword = self.place(STATUSWORD);
+        let carriers = mapped.tpdos.iter().filter(|pdo| carries(&pdo.map, statusword));
         let regular = carriers.filter_map(|pdo| {
             let every = match pdo.transmission.0 {
                 every @ 1..=240 => u32::from(every),
@@ -273,18 +284,19 @@ impl Drive {
             return Ok((number, every));
         }
         // Not mapped at all, or on events only.
-        self.node().signal::<u16>(STATUSWORD)?;
+        self.node().signal::<u16>(statusword)?;
         Err(CyclicError::OnEventsOnly { node: self.node().id() })
     }
 
     /// The controlword in the set-point's RPDO, or in one that does not carry the set-point a second time; else by SDO.
     fn controlword_path(&self, number: PdoNumber, mapped: &Mapped) -> ControlwordPath {
-        let by_sdo = ControlwordPath::Sdo { object: CONTROLWORD, sent: None };
-        let together = mapped.rpdos.iter().any(|pdo| pdo.pdo.number == number && carries(&pdo.map, CONTROLWORD));
+        let object = self.place(CONTROLWORD);
+        let by_sdo = ControlwordPath::Sdo { object, sent: None };
+        let together = mapped.rpdos.iter().any(|pdo| pdo.pdo.number == number && carries(&pdo.map, object));
         if !together {
             return by_sdo;
         }
-        match self.node().set_point_in(number, CONTROLWORD) {
+        match self.node().set_point_in(number, object) {
             Ok(set_point) => ControlwordPath::Pdo(set_point),
             Err(_) => by_sdo,
         }
@@ -295,7 +307,7 @@ impl Drive {
         let Some(pdo) = mapped.rpdos.iter().find(|pdo| pdo.pdo.number == number) else { return Ok(()) };
         for object in &pdo.map.0 {
             let raw = match object.mux {
-                Mux { index: 0x6060, .. } => u64::from(mode.0 as u8),
+                mux if mux == self.place(MODE) => u64::from(mode.0 as u8),
                 mux => match self.node().upload(mux).await {
                     Ok(payload) => payload.raw().into(),
                     // An object that can only be written, or a gap.
@@ -311,7 +323,7 @@ impl Drive {
 
     async fn position_signal<T: Sample>(&self, near: PdoNumber) -> Result<Option<Signal<T>>, Error> {
         let per_count = 1.0 / self.counts_per_turn().await?;
-        Ok(self.signal_near(near, POSITION_ACTUAL, NumberForm::Signed, per_count))
+        Ok(self.signal_near(near, self.place(POSITION_ACTUAL), NumberForm::Signed, per_count))
     }
 
     /// An object in this TPDO, or else in another one.
@@ -329,7 +341,7 @@ impl Drive {
     ) -> Result<Option<Signal<T>>, Error> {
         let Some(quantity) = quantity else { return Ok(None) };
         let Some(row) = profile.row(quantity.object) else { return Ok(None) };
-        let per_count = quantity.per_count / self.resolution(quantity).await?;
+        let per_count = self.step_of(quantity).await?;
         let as_in_sdo = (row.data_type, per_count);
         let in_tpdo = profile.pdo.mapping.tpdo_form(quantity.object);
         // One count in the TPDO is so many of those by SDO.

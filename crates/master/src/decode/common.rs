@@ -3,21 +3,19 @@
 
 use canopen::Mux;
 use canopen::od::{DataType, Entry};
-use devices::{MODELS, reads_alike};
+use devices::all;
 
 use DataType::{Integer16 as I16, Integer32 as I32};
 use DataType::{Unsigned8 as U8, Unsigned16 as U16, Unsigned32 as U32};
 
 /// The row of an object on which all models agree that have it, for a node whose model is not known.
 pub fn common_row(mux: Mux) -> Option<&'static Entry> {
-    let mut rows = MODELS.iter().filter_map(|profile| profile.row(mux));
-    let first = rows.next()?;
-    rows.all(|row| reads_alike(row, first)).then_some(first)
+    all().common_row(mux)
 }
 
 /// The name of an object that all models that have it give it, whatever its type and unit, or that the standard gives it.
 pub fn common_name(mux: Mux) -> Option<&'static str> {
-    let mut names = MODELS.iter().filter_map(|profile| profile.row(mux)).map(|row| row.name);
+    let mut names = all().rows(mux).map(|row| row.name);
     match names.next() {
         Some(first) => names.all(|name| name == first).then_some(first),
         None => standard(mux).map(|(_, name, _)| *name),
@@ -27,7 +25,7 @@ pub fn common_name(mux: Mux) -> Option<&'static str> {
 /// The type of an object that came with this many bytes, where those models that have it with this length agree on it, or
 /// the standard's. An object may have another form in TPDOs.
 pub fn common_type(mux: Mux, length: usize) -> Option<DataType> {
-    let forms = MODELS.iter().flat_map(|profile| {
+    let forms = all().iter().flat_map(|profile| {
         let in_tpdo = profile.pdo.mapping.tpdo_form(mux).map(|form| form.data_type);
         [profile.row(mux).map(|row| row.data_type), in_tpdo]
     });
@@ -127,11 +125,8 @@ mod tests {
     fn standard_objects_ascend_and_no_model_has_them() {
         assert!(STANDARD.is_sorted_by(|(a, ..), (b, ..)| a < b));
         for (index, name, _) in STANDARD {
-            let has = |profile: &&&devices::Description| profile.row(Mux::new(index, 0)).is_some();
-            assert!(
-                !MODELS.iter().any(|profile| has(&profile)),
-                "{index:04X}h {name}: a model's own row speaks for it"
-            );
+            let has = |profile: &&devices::Description| profile.row(Mux::new(index, 0)).is_some();
+            assert!(!all().iter().any(|profile| has(&profile)), "{index:04X}h {name}: a model's own row speaks for it");
         }
     }
 

@@ -5,7 +5,7 @@
 //! being written or read by SDO. The decoder never sends and keeps no time.
 
 mod common;
-mod models;
+mod node_models;
 mod pdo;
 mod sdo;
 mod value;
@@ -20,12 +20,13 @@ use canopen::nmt::{NmtRequest, NmtTarget};
 use canopen::pdo::{Direction, PdoId, PdoNumber};
 use canopen::sync::Sync;
 use canopen::{Mux, NmtState, NodeId};
+use devices::Description;
 use devices::faults::FaultRow;
-use devices::{Description, MODELS};
 
 use crate::core::PdoMap;
 use crate::identify::Model;
-use models::Models;
+use crate::models::Models;
+use node_models::NodeModels;
 use pdo::PdoBook;
 use sdo::Conversations;
 
@@ -68,7 +69,8 @@ pub enum Decoded {
 /// Turns frames into words. See the [module](self).
 #[derive(Clone, Debug, Default)]
 pub struct Decoder {
-    models: Models,
+    known: Models,
+    models: NodeModels,
     conversations: Conversations,
     pdos: PdoBook,
 }
@@ -80,20 +82,25 @@ impl Decoder {
         Self::default()
     }
 
+    /// The same, which looks for nodes among these models.
+    pub fn knowing(known: Models) -> Self {
+        Self { known, ..Self::default() }
+    }
+
     /// Puts what a node says in its model's words, and takes the model's factory PDO mappings for granted until others
     /// are seen.
     pub fn set_model(&mut self, node: NodeId, model: &'static Description) {
         self.models.0.insert(node.raw(), Model(model));
-        self.pdos.load_defaults(node, model.table);
+        self.pdos.load_defaults(node, model.dictionary);
     }
 
     /// A node has said its device type (1000h): enough where all models that say so have the same objects.
     fn learn_model(&mut self, node: NodeId, device_type: &[u8]) {
         let Ok(bytes) = <[u8; 4]>::try_from(device_type) else { return };
         let said = u32::from_le_bytes(bytes);
-        let mut models = MODELS.iter().filter(|model| model.identity.device_type == said);
+        let mut models = self.known.catalogue().iter().filter(|model| model.identity.device_type == said);
         let Some(first) = models.next().filter(|_| self.models.get(node).is_none()) else { return };
-        if models.all(|model| core::ptr::eq(model.table, first.table)) {
+        if models.all(|model| model.same_objects(first)) {
             self.models.0.insert(node.raw(), Model(first));
         }
     }

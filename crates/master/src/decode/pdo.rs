@@ -8,7 +8,7 @@ use canopen::pdo::{Direction, PdoId};
 use canopen::{CobId, Mux, NodeId};
 use devices::Description;
 
-use super::models::Models;
+use super::node_models::NodeModels;
 use super::value::Value;
 use crate::core::{PdoMap, bits_of};
 use crate::identify::Model;
@@ -143,7 +143,7 @@ impl PdoBook {
         }
     }
 
-    pub(super) fn decode(&self, frame: &Frame, models: &Models) -> Option<Pdo> {
+    pub(super) fn decode(&self, frame: &Frame, models: &NodeModels) -> Option<Pdo> {
         let ((node, pdo), map) = self.by_id.get(&frame.standard_data_id()?)?;
         let node = NodeId::new(*node)?;
         let data = u64::from_le_bytes(*frame.padded());

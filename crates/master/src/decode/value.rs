@@ -90,9 +90,10 @@ fn find(model: Option<&'static Description>, mux: Mux) -> Option<&'static Entry>
 /// A statusword in words: its state and the bits that say more, or for a model without states its bits.
 pub fn statusword_words(word: Statusword, model: Option<&Description>) -> String {
     const BITS: [(u16, &str); 2] = [(Statusword::WARNING, "warning"), (Statusword::TARGET_REACHED, "target reached")];
-    let own = model.map_or(&[][..], |model| model.statusword_bits);
-    let (state, common) = match model {
-        Some(model) if model.power != PowerStyle::Cia402 => (None, &[][..]),
+    let axis = model.and_then(Description::first_axis);
+    let own = axis.map_or(&[][..], |axis| axis.statusword_bits);
+    let (state, common) = match axis {
+        Some(axis) if axis.power != PowerStyle::Cia402 => (None, &[][..]),
         _ => (Some(word.state().map_or("no state of CiA 402", |state| state.name())), &BITS[..]),
     };
     let set = common.iter().chain(own).filter(|(mask, _)| word.has(*mask)).map(|(_, name)| *name);

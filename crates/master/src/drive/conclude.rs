@@ -88,7 +88,7 @@ fn by_trigger(trigger: &Trigger, style: PowerStyle) -> (String, String) {
                     "Check that statusword bit 9 (remote) is set, that no other master writes 6040h, and its enable \
                      input and motor supply"
                 }
-                PowerStyle::Mirror { .. } => {
+                PowerStyle::EchoesControlword { .. } => {
                     "Check that no other master writes 6040h, that its output is enabled, and its motor supply"
                 }
             }

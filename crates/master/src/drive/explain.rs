@@ -3,7 +3,7 @@ use devices::Description;
 use devices::faults::FaultRow;
 
 use super::conclude::{Trigger, conclude};
-use super::handle::{Drive, ERROR_CODE, MODE};
+use super::handle::{Drive, MODE};
 use crate::error::{Error, Explanation, Fact};
 use crate::units::Volts;
 
@@ -41,15 +41,14 @@ impl Drive {
             Ok(statusword) => facts.push(Fact::Statusword(statusword, self.power_state(statusword))),
             Err(error) => return facts.push(Fact::Failed(Box::new(error))),
         }
-        let code = self.profile.map_or(ERROR_CODE, |profile| profile.faults.code);
-        if let Ok(payload) = self.node.upload(code).await {
+        if let Ok(payload) = self.node.upload(self.fault_code()).await {
             let code = payload.raw() as u16;
             facts.push(Fact::FaultCode(code, self.profile.map(|profile| faults_in(profile, code)).unwrap_or_default()));
         }
-        if let (Ok(wanted), Ok(shown)) = (self.node.read::<i8>(MODE).await, self.mode().await) {
+        if let (Ok(wanted), Ok(shown)) = (self.node.read::<i8>(self.place(MODE)).await, self.mode().await) {
             facts.push(Fact::Mode(ModeOfOperation(wanted), shown));
         }
-        if let Some(voltage) = self.profile.and_then(|profile| profile.units.bus_voltage)
+        if let Some(voltage) = self.axis_description().and_then(|axis| axis.units.bus_voltage)
             && let Ok(volts) = self.read_quantity(voltage).await
         {
             facts.push(Fact::Supply(Volts(volts)));

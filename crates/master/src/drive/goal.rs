@@ -40,7 +40,7 @@ impl Goal {
                 if settled && rules.failed.matches(statusword) {
                     return Err(drive.not_reached(intent, Trigger::HomingFailed(*method)).await);
                 }
-                let at = drive.read_number(POSITION_ACTUAL).await?;
+                let at = drive.read_number(drive.place(POSITION_ACTUAL)).await?;
                 Ok((settled && rules.attained.matches(statusword), at as f64))
             }
             Self::Speed { quantity, target_rpm, band_rpm } => {
@@ -48,7 +48,7 @@ impl Goal {
                 Ok(((speed - *target_rpm).abs() <= *band_rpm, speed))
             }
             Self::Position { target, band, seen_clear } => {
-                let at = drive.read_number(POSITION_ACTUAL).await?;
+                let at = drive.read_number(drive.place(POSITION_ACTUAL)).await?;
                 let reached = statusword.has(Statusword::TARGET_REACHED);
                 let near = at.abs_diff(*target) as f64 <= *band;
                 let believed = near || *seen_clear;

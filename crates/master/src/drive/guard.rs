@@ -157,7 +157,7 @@ impl Drive {
     async fn has_lost_its_host(&self) -> Result<bool, Error> {
         let Some(profile) = self.profile else { return Ok(false) };
         match profile.host_watch {
-            HostWatch::Heartbeat { fault, .. } => Ok(self.read_number(profile.faults.code).await? == i64::from(fault)),
+            HostWatch::Heartbeat { fault, .. } => Ok(self.read_number(self.fault_code()).await? == i64::from(fault)),
             HostWatch::None | HostWatch::Silence { .. } => Ok(false),
         }
     }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use canopen::Mux;
 use canopen::od::Entry;
 use cia402::{Controlword, ModeOfOperation, PowerState, Statusword};
-use devices::{Description, PowerStyle};
+use devices::{AxisDescription, AxisId, Description, PowerStyle, Quantity};
 
 use crate::error::{Access, Error};
 use crate::identify::{Guess, Knowledge};
@@ -13,7 +13,7 @@ use crate::network::Node;
 
 pub(crate) const CONTROLWORD: Mux = Mux::new(0x6040, 0);
 pub(crate) const STATUSWORD: Mux = Mux::new(0x6041, 0);
-pub(super) const MODE: Mux = Mux::new(0x6060, 0);
+pub(crate) const MODE: Mux = Mux::new(0x6060, 0);
 pub(super) const MODE_DISPLAY: Mux = Mux::new(0x6061, 0);
 pub(crate) const POSITION_ACTUAL: Mux = Mux::new(0x6064, 0);
 pub(crate) const TARGET_POSITION: Mux = Mux::new(0x607A, 0);
@@ -26,10 +26,11 @@ pub(super) const POLL: Duration = Duration::from_millis(10);
 /// How long one step of the power state machine, or a change of mode, may take.
 pub(super) const STEP_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// A drive on a network.
+/// A drive on a network, or one axis of a drive that has several.
 #[derive(Clone)]
 pub struct Drive {
     pub(super) node: Node,
+    pub(super) axis: AxisId,
     pub(super) profile: Option<&'static Description>,
     /// Set where the profile is no more than that.
     pub(super) guess: Option<Guess>,
@@ -37,10 +38,11 @@ pub struct Drive {
 
 impl core::fmt::Debug for Drive {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let model = self.profile.map(|profile| profile.model);
+        let model = self.profile.map(|profile| profile.name);
         let guessed = self.guess.is_some();
         f.debug_struct("Drive")
             .field("node", &self.node.id())
+            .field("axis", &self.axis.0)
             .field("model", &model)
             .field("guessed", &guessed)
             .finish()
@@ -50,17 +52,37 @@ impl core::fmt::Debug for Drive {
 impl Drive {
     /// A drive of a known model.
     pub const fn new(node: Node, profile: &'static Description) -> Self {
-        Self { node, profile: Some(profile), guess: None }
+        Self { node, axis: AxisId::FIRST, profile: Some(profile), guess: None }
     }
 
     /// A drive of a model that is known this well. One that is guessed can be moved, and its parameters not be stored.
-    pub const fn known_as(node: Node, knowledge: Knowledge) -> Self {
-        Self { node, profile: knowledge.profile(), guess: knowledge.guess() }
+    pub fn known_as(node: Node, knowledge: Knowledge) -> Self {
+        Self { node, axis: AxisId::FIRST, profile: knowledge.profile(), guess: knowledge.guess() }
     }
 
     /// A CiA 402 drive of unknown model: it can be enabled, disabled, quick-stopped and reset, not moved or stored.
     pub const fn of_unknown_model(node: Node) -> Self {
-        Self { node, profile: None, guess: None }
+        Self { node, axis: AxisId::FIRST, profile: None, guess: None }
+    }
+
+    /// Another axis of the same drive. What concerns the whole device (its parameter store, the watch over its host) is the
+    /// same whichever axis it is asked of.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchAxis`] where the model has none of that number; [`Error::UnknownModel`].
+    pub fn axis(&self, axis: AxisId) -> Result<Self, Error> {
+        let other = Self { axis, ..self.clone() };
+        other.motion("move another axis").map(|_| other)
+    }
+
+    /// Which axis this is.
+    pub const fn axis_id(&self) -> AxisId {
+        self.axis
+    }
+
+    /// What is known of this axis; `None` of an unknown model, or one that is no drive.
+    pub fn axis_description(&self) -> Option<&'static AxisDescription> {
+        self.profile?.axes.get(usize::from(self.axis.0))
     }
 
     /// Its node.
@@ -74,8 +96,8 @@ impl Drive {
     }
 
     /// Why its model is no more than a guess, if it is.
-    pub const fn guess(&self) -> Option<Guess> {
-        self.guess
+    pub fn guess(&self) -> Option<Guess> {
+        self.guess.clone()
     }
 
     /// Checks that the node says it is this model, and has the object that tells it from others that say so too.
@@ -90,9 +112,9 @@ impl Drive {
         if !found.matches(&profile.identity) {
             return Err(Error::WrongModel { node, model, found });
         }
-        match profile.hallmark {
-            Some(hallmark) if !crate::identify::has(&self.node, hallmark).await? => {
-                Err(Error::OtherModel { node, model, hallmark })
+        match profile.distinguishing_object {
+            Some(object) if !crate::identify::has(&self.node, object).await? => {
+                Err(Error::OtherModel { node, model, object })
             }
             _ => Ok(()),
         }
@@ -103,7 +125,7 @@ impl Drive {
     /// # Errors
     /// [`Error::GuessedModel`] where it does not and the model is no more than a guess.
     pub fn check_write(&self, mux: Mux, value: i64) -> Result<(), Error> {
-        match self.guess.filter(|guess| !guess.may_write(mux, value)) {
+        match self.guess().filter(|guess| !guess.may_write(mux, value)) {
             Some(guess) => Err(Error::GuessedModel { node: self.node.id(), intent: format!("write {mux}"), guess }),
             None => Ok(()),
         }
@@ -114,7 +136,7 @@ impl Drive {
     /// # Errors
     /// Those of the SDO read.
     pub async fn statusword(&self) -> Result<Statusword, Error> {
-        self.node.read::<u16>(STATUSWORD).await.map(Statusword)
+        self.node.read::<u16>(self.place(STATUSWORD)).await.map(Statusword)
     }
 
     /// The power state that a statusword of this model shows.
@@ -123,21 +145,42 @@ impl Drive {
     }
 
     pub(super) fn power_style(&self) -> PowerStyle {
-        self.profile.map_or(PowerStyle::Cia402, |profile| profile.power)
+        self.axis_description().map_or(PowerStyle::Cia402, |axis| axis.power)
     }
 
     /// The mode that the drive is in.
     pub(super) async fn mode(&self) -> Result<ModeOfOperation, Error> {
-        let display = self.profile.map_or(MODE_DISPLAY, |profile| profile.mode_display);
+        let display = self.axis_description().map_or(MODE_DISPLAY, |axis| axis.mode_display);
         self.node.read::<i8>(display).await.map(ModeOfOperation)
     }
 
     pub(super) async fn write_controlword(&self, controlword: Controlword) -> Result<(), Error> {
-        self.node.write(CONTROLWORD, controlword.0).await
+        self.node.write(self.place(CONTROLWORD), controlword.0).await
     }
 
-    pub(crate) const fn no_such_mode(&self, profile: &Description, mode: ModeOfOperation) -> Error {
-        Error::NoSuchMode { node: self.node.id(), model: profile.title, mode, modes: profile.modes }
+    pub(crate) fn no_such_mode(&self, axis: &AxisDescription, mode: ModeOfOperation) -> Error {
+        Error::NoSuchMode { node: self.node.id(), model: self.title(), mode, modes: axis.modes }
+    }
+
+    pub(crate) fn title(&self) -> &'static str {
+        self.profile.map_or("drive", |profile| profile.title)
+    }
+
+    /// What is known of this axis, or an error that says what it was needed for.
+    pub(crate) fn motion(&self, intent: &'static str) -> Result<&'static AxisDescription, Error> {
+        let profile = self.known(intent)?;
+        let (node, model, axes) = (self.node.id(), profile.title, profile.axes.len());
+        self.axis_description().ok_or(Error::NoSuchAxis { node, model, axis: self.axis, axes })
+    }
+
+    /// Where this axis has an object of the standard.
+    pub(crate) fn place(&self, object: Mux) -> Mux {
+        self.axis_description().map_or(object, |axis| axis.object(object))
+    }
+
+    /// Where the axis has a quantity, or an error that says which is missing.
+    pub(crate) fn has(&self, quantity: Option<Quantity>, what: &'static str) -> Result<Quantity, Error> {
+        quantity.ok_or(Error::NoSuchQuantity { node: self.node.id(), model: self.title(), what })
     }
 
     /// The model's profile, or an error that says what it was needed for.
@@ -147,7 +190,7 @@ impl Drive {
 
     /// The model's profile, if it is more than a guess.
     pub(super) fn named(&self, intent: &'static str) -> Result<&'static Description, Error> {
-        match self.guess {
+        match self.guess() {
             Some(guess) => Err(Error::GuessedModel { node: self.node.id(), intent: intent.to_owned(), guess }),
             None => self.known(intent),
         }
@@ -156,9 +199,9 @@ impl Drive {
     /// The model's row of an object.
     pub(super) fn row(&self, mux: Mux, intent: &'static str) -> Result<&'static Entry, Error> {
         let profile = self.known(intent)?;
-        let slot = profile.table.find(mux);
+        let slot = profile.dictionary.find(mux);
         let slot = slot.map_err(|code| Error::Aborted { node: self.node.id(), mux, access: Access::Read, code })?;
-        Ok(profile.table.row(slot))
+        Ok(profile.dictionary.row(slot))
     }
 
     /// Reads an object as the model's table types it.

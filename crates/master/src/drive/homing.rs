@@ -43,8 +43,8 @@ impl Drive {
     /// anything moves; [`Error::NotReached`] with an explanation; those of the requests.
     pub async fn home(&self, method: i8, options: HomingOptions) -> Result<MotionReport, Error> {
         const INTENT: &str = "find its reference position";
-        let profile = self.known(INTENT)?;
-        let rules = profile.homing.ok_or_else(|| self.no_such_mode(profile, ModeOfOperation::HOMING))?;
+        let axis = self.motion(INTENT)?;
+        let rules = axis.homing.ok_or_else(|| self.no_such_mode(axis, ModeOfOperation::HOMING))?;
         self.write_number(rules.method, method.into()).await?;
         let mut commanded = Vec::new();
         if let (Some(search), Some(Rpm(speed))) = (rules.search_speed, options.speed) {
@@ -68,7 +68,7 @@ impl Drive {
         if rules.start == HomingStart::ControlwordBit4 {
             self.write_controlword(Controlword(ENABLED)).await?;
         }
-        self.node.network().note_stopped(self.node.id());
+        self.note_stopped();
         Ok(MotionReport { reached_after: Some(reached), commanded, notes })
     }
 
@@ -79,15 +79,15 @@ impl Drive {
                 self.enable().await?;
                 // Bit 4, which has to rise, may be left over.
                 self.write_controlword(Controlword(ENABLED)).await?;
-                self.node.network().note_moved(self.node.id());
+                self.note_moved();
                 self.write_controlword(Controlword(ENABLED | Controlword::NEW_SET_POINT)).await?;
                 Ok(stopped)
             }
             HomingStart::ModeWrite => {
                 self.enable().await?;
                 self.release_halt().await?;
-                self.node.network().note_moved(self.node.id());
-                self.node.write(MODE, ModeOfOperation::HOMING.0).await?;
+                self.note_moved();
+                self.node.write(self.place(MODE), ModeOfOperation::HOMING.0).await?;
                 Ok(None)
             }
         }

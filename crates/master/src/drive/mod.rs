@@ -29,7 +29,7 @@ pub(crate) use conclude::Trigger;
 pub use explain::faults_in;
 pub use guard::SwitchedOff;
 pub use handle::Drive;
-pub(crate) use handle::{CONTROLWORD, POSITION_ACTUAL, STATUSWORD, TARGET_POSITION};
+pub(crate) use handle::{CONTROLWORD, MODE, POSITION_ACTUAL, STATUSWORD, TARGET_POSITION};
 pub use homing::HomingOptions;
 pub use motion::{MotionOptions, MotionReport, Note};
 pub(crate) use safety::STOP;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use cia402::{ModeOfOperation, PowerState};
-use devices::Description;
+use devices::AxisDescription;
 
 use super::conclude::Trigger;
 use super::handle::{Drive, MODE, POLL, STEP_TIMEOUT};
@@ -15,16 +15,16 @@ impl Drive {
     /// Sets 6060h and waits until the drive shows it. A shaft that turns in another mode is stopped first: drives change
     /// their mode at standstill, or jump.
     pub(crate) async fn set_mode(&self, mode: ModeOfOperation) -> Result<Option<Note>, Error> {
-        let profile = self.known("set its mode")?;
-        if !profile.modes.contains(&mode) {
-            return Err(self.no_such_mode(profile, mode));
+        let axis = self.motion("set its mode")?;
+        if !axis.modes.contains(&mode) {
+            return Err(self.no_such_mode(axis, mode));
         }
         let before = self.mode().await?;
         if before == mode {
             return Ok(None);
         }
-        let stopped = self.stop_if_turning(profile).await?;
-        self.node.write(MODE, mode.0).await?;
+        let stopped = self.stop_if_turning(axis).await?;
+        self.node.write(self.place(MODE), mode.0).await?;
         let mut waited = Duration::ZERO;
         while self.mode().await? != mode {
             if waited >= STEP_TIMEOUT {
@@ -36,8 +36,9 @@ impl Drive {
         Ok(stopped.then_some(Note::StoppedFirst { before }))
     }
 
-    async fn stop_if_turning(&self, profile: &Description) -> Result<bool, Error> {
-        let turning = self.read_quantity(profile.units.actual_velocity).await?.abs() >= STANDSTILL_RPM;
+    async fn stop_if_turning(&self, axis: &AxisDescription) -> Result<bool, Error> {
+        let Some(velocity) = axis.units.actual_velocity else { return Ok(false) };
+        let turning = self.read_quantity(velocity).await?.abs() >= STANDSTILL_RPM;
         let follows = self.power_state(self.statusword().await?) == Some(PowerState::OperationEnabled);
         if turning && follows {
             self.stop().await?;

@@ -87,16 +87,17 @@ impl Drive {
     pub async fn velocity(&self, speed: impl Into<Rpm>, options: MotionOptions) -> Result<MotionReport, Error> {
         const INTENT: &str = "turn it at the wanted speed";
         let Rpm(requested) = speed.into();
-        let units = self.known(INTENT)?.units;
-        let speed = self.quantity(("speed", "r/min"), units.target_velocity, requested).await?;
+        let units = self.motion(INTENT)?.units;
+        let target_velocity = self.has(units.target_velocity, "a target velocity")?;
+        let speed = self.quantity(("speed", "r/min"), target_velocity, requested).await?;
         let Commanded { raw, commanded: target, .. } = speed;
         let change = target - self.ramp_start_rpm().await?;
         let ramps = self.write_ramps(options.acceleration, options.deceleration, change).await?;
         let commanded = [vec![speed], ramps].concat();
         let stopped = self.set_mode(ModeOfOperation::PROFILE_VELOCITY).await?;
         self.enable().await?;
-        self.node.network().note_moved(self.node.id());
-        self.write_number(units.target_velocity.object, raw).await?;
+        self.note_moved();
+        self.write_number(target_velocity.object, raw).await?;
         self.release_halt().await?;
         let notes = self.notes(stopped).await;
         if !options.wait {
@@ -105,10 +106,11 @@ impl Drive {
         let (up, down) = self.ramp_times_s().await?;
         let limit = Duration::from_secs_f64((up.max(down) * LATE_FACTOR + LATE_MARGIN_S).clamp(0.0, 3600.0));
         let band = (target.abs() * REACHED_SHARE).max(REACHED_LEAST_RPM);
-        let goal = Goal::Speed { quantity: units.actual_velocity, target_rpm: target, band_rpm: band };
+        let quantity = self.has(units.actual_velocity, "the actual velocity")?;
+        let goal = Goal::Speed { quantity, target_rpm: target, band_rpm: band };
         let reached = self.watch(INTENT, goal, limit).await?;
         if target == 0.0 {
-            self.node.network().note_stopped(self.node.id());
+            self.note_stopped();
         }
         Ok(MotionReport { reached_after: Some(reached), commanded, notes })
     }
@@ -121,14 +123,14 @@ impl Drive {
     /// As [`velocity`](Self::velocity).
     pub async fn torque(&self, current: Amperes) -> Result<MotionReport, Error> {
         const INTENT: &str = "set its torque";
-        let profile = self.known(INTENT)?;
-        let Some(target) = profile.units.target_current else {
-            return Err(self.no_such_mode(profile, ModeOfOperation::PROFILE_TORQUE));
+        let axis = self.motion(INTENT)?;
+        let Some(target) = axis.units.target_current else {
+            return Err(self.no_such_mode(axis, ModeOfOperation::PROFILE_TORQUE));
         };
         let commanded = self.quantity(("current", "A"), target, current.0).await?;
         let stopped = self.set_mode(ModeOfOperation::PROFILE_TORQUE).await?;
         self.enable().await?;
-        self.node.network().note_moved(self.node.id());
+        self.note_moved();
         self.write_number(target.object, commanded.raw).await?;
         self.release_halt().await?;
         Ok(MotionReport { reached_after: None, commanded: vec![commanded], notes: self.notes(stopped).await })
@@ -140,20 +142,16 @@ impl Drive {
     /// As [`velocity`](Self::velocity).
     pub async fn stop(&self) -> Result<(), Error> {
         const INTENT: &str = "stop it";
-        let units = self.known(INTENT)?.units;
+        let units = self.motion(INTENT)?.units;
         if self.power_state(self.statusword().await?) == Some(PowerState::OperationEnabled) {
             match self.mode().await? {
-                ModeOfOperation::PROFILE_VELOCITY => self.write_number(units.target_velocity.object, 0).await?,
-                ModeOfOperation::PROFILE_TORQUE => {
-                    if let Some(current) = units.target_current {
-                        self.write_number(current.object, 0).await?;
-                    }
-                }
+                ModeOfOperation::PROFILE_VELOCITY => self.write_zero(units.target_velocity).await?,
+                ModeOfOperation::PROFILE_TORQUE => self.write_zero(units.target_current).await?,
                 _ => self.write_controlword(Controlword(0x0F | Controlword::HALT)).await?,
             }
         }
         self.wait_standstill(INTENT).await?;
-        self.node.network().note_stopped(self.node.id());
+        self.note_stopped();
         Ok(())
     }
 
@@ -174,7 +172,11 @@ impl Drive {
     /// Takes a halt bit back that an earlier stop has left, now that the target is the new one.
     pub(super) async fn release_halt(&self) -> Result<(), Error> {
         // A controlword that cannot be read has no halt that this master could know of.
-        let halted = self.node.read::<u16>(CONTROLWORD).await.is_ok_and(|raw| Controlword(raw).has(Controlword::HALT));
+        let halted = self
+            .node
+            .read::<u16>(self.place(CONTROLWORD))
+            .await
+            .is_ok_and(|raw| Controlword(raw).has(Controlword::HALT));
         if halted { self.write_controlword(Controlword(0x0F)).await } else { Ok(()) }
     }
 

@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use cia402::{Controlword, ModeOfOperation, Statusword};
-use devices::Quirk;
+use devices::NewSetPoint;
 
 use super::conclude::Trigger;
 use super::goal::Goal;
@@ -42,18 +42,19 @@ impl Drive {
 
     async fn move_counts(&self, to: Commanded, relative: bool, options: MotionOptions) -> Result<MotionReport, Error> {
         const INTENT: &str = "move it to the wanted position";
-        let units = self.known(INTENT)?.units;
+        let units = self.motion(INTENT)?.units;
+        let profile_velocity = self.has(units.profile_velocity, "a profile velocity")?;
         let (counts, mut commanded) = (to.raw, vec![to]);
         if let Some(Rpm(speed)) = options.speed {
-            let speed = self.quantity(("profile velocity", "r/min"), units.profile_velocity, speed.abs()).await?;
+            let speed = self.quantity(("profile velocity", "r/min"), profile_velocity, speed.abs()).await?;
             self.write_number(speed.object, speed.raw).await?;
             commanded.push(speed);
         }
-        let speed = self.read_quantity(units.profile_velocity).await?;
+        let speed = self.read_quantity(profile_velocity).await?;
         commanded.extend(self.write_ramps(options.acceleration, options.deceleration, speed).await?);
         let stopped = self.set_mode(ModeOfOperation::PROFILE_POSITION).await?;
         self.enable().await?;
-        let began_at = self.read_number(POSITION_ACTUAL).await?;
+        let began_at = self.read_number(self.place(POSITION_ACTUAL)).await?;
         let target = if relative { began_at.saturating_add(counts) } else { counts };
         let turn = self.counts_per_turn().await?.max(1.0);
         let limit = self.time_for(target.abs_diff(began_at) as f64 / turn, speed).await?;
@@ -64,7 +65,7 @@ impl Drive {
         }
         let band = (turn * REACHED_TURNS).max(1.0);
         let reached = self.watch(INTENT, Goal::Position { target, band, seen_clear: false }, limit).await?;
-        self.node.network().note_stopped(self.node.id());
+        self.note_stopped();
         Ok(MotionReport { reached_after: Some(reached), commanded, notes })
     }
 
@@ -73,9 +74,9 @@ impl Drive {
     /// A drive left halted gets the new set-point in place of the one it was halted in, not after it. A drive that acts
     /// on each write of bit 4 acknowledges nothing, and takes every set-point in place of the one before.
     async fn give_set_point(&self, intent: &'static str, counts: i64, relative: bool) -> Result<(), Error> {
-        let before = self.node.read::<u16>(CONTROLWORD).await.map_or(Controlword(ENABLED), Controlword);
+        let before = self.node.read::<u16>(self.place(CONTROLWORD)).await.map_or(Controlword(ENABLED), Controlword);
         let halted = before.has(Controlword::HALT);
-        let self_clearing = self.known(intent)?.has(Quirk::NewSetPointClearsItself);
+        let self_clearing = self.motion(intent)?.new_set_point == NewSetPoint::ClearsItself;
         let held = if halted { Controlword::HALT } else { 0 };
         let replace = if halted && !self_clearing { Controlword::CHANGE_SET_IMMEDIATELY } else { 0 };
         let kind = ENABLED | if relative { Controlword::RELATIVE } else { 0 };
@@ -83,8 +84,8 @@ impl Drive {
         if !self_clearing {
             self.wait_acknowledge(intent, false).await?;
         }
-        self.write_number(TARGET_POSITION, counts).await?;
-        self.node.network().note_moved(self.node.id());
+        self.write_number(self.place(TARGET_POSITION), counts).await?;
+        self.note_moved();
         self.write_controlword(Controlword(kind | replace | Controlword::NEW_SET_POINT)).await?;
         if self_clearing {
             return Ok(());

@@ -1,7 +1,7 @@
 use std::time::Duration;
 
 use cia402::{Controlword, ModeOfOperation, PowerCommand, PowerState, Statusword, next_command};
-use devices::{HomingStart, PowerStyle};
+use devices::{HomingStart, PowerStyle, Quantity};
 
 use super::conclude::Trigger;
 use super::handle::{CONTROLWORD, Drive, MODE, POLL, STEP_TIMEOUT};
@@ -27,7 +27,7 @@ impl Drive {
         const INTENT: &str = "enable it";
         let mut statusword = self.answered(INTENT, self.statusword().await).await?;
         if self.power_style() != PowerStyle::Cia402 {
-            return self.enable_mirrored(INTENT, statusword).await;
+            return self.enable_echoing(INTENT, statusword).await;
         }
         if statusword.state() != Some(PowerState::OperationEnabled) {
             self.clear_targets().await?;
@@ -50,11 +50,11 @@ impl Drive {
         }
     }
 
-    /// A drive that mirrors its controlword: the statusword does not show bit 3, so the controlword is looked at too.
-    async fn enable_mirrored(&self, intent: &'static str, statusword: Statusword) -> Result<(), Error> {
+    /// A drive that echoes its controlword: the statusword does not show bit 3, so the controlword is looked at too.
+    async fn enable_echoing(&self, intent: &'static str, statusword: Statusword) -> Result<(), Error> {
         let command = PowerCommand::EnableOperation;
         let follows = self.power_state(statusword) == Some(PowerState::OperationEnabled);
-        let present = self.node.read::<u16>(CONTROLWORD).await.map(Controlword)?;
+        let present = self.node.read::<u16>(self.place(CONTROLWORD)).await.map(Controlword)?;
         if follows && present.command() == command {
             return Ok(());
         }
@@ -83,38 +83,38 @@ impl Drive {
             })
             .await?;
         }
-        // A fault has taken the power off already; a drive that mirrors its controlword would act on an old one after it.
+        // A fault has taken the power off already; a drive that echoes its controlword would act on an old one after it.
         self.write_controlword(PowerCommand::DisableVoltage.controlword()).await?;
         self.leave_homing().await?;
         if self.power_state(self.statusword().await?) != Some(PowerState::Fault) {
             let command = PowerCommand::DisableVoltage;
             self.wait_for(INTENT, command, STEP_TIMEOUT, |state| state == PowerState::SwitchOnDisabled).await?;
         }
-        self.node.network().note_stopped(self.node.id());
+        self.note_stopped();
         Ok(())
     }
 
     /// Quick stop: the steepest ramp that the drive is set to (605Ah). Ends at standstill. A motor without power is left so:
-    /// a drive that mirrors its controlword would energise it to hold it.
+    /// a drive that echoes its controlword would energise it to hold it.
     ///
     /// # Errors
     /// [`Error::NotReached`]; those of the SDO requests.
     pub async fn quick_stop(&self) -> Result<(), Error> {
         const INTENT: &str = "quick-stop it";
-        if let PowerStyle::Mirror { live, .. } = self.power_style()
+        if let PowerStyle::EchoesControlword { live, .. } = self.power_style()
             && self.statusword().await.is_ok_and(|statusword| !statusword.has(live))
         {
-            self.node.network().note_stopped(self.node.id());
+            self.note_stopped();
             return Ok(());
         }
         self.write_controlword(PowerCommand::QuickStop.controlword()).await?;
         self.leave_homing().await?;
         let stopping = |state| state != PowerState::OperationEnabled;
         self.wait_for(INTENT, PowerCommand::QuickStop, STEP_TIMEOUT, stopping).await?;
-        if self.profile.is_some() {
+        if self.axis_description().is_some_and(|axis| axis.units.actual_velocity.is_some()) {
             self.wait_standstill(INTENT).await?;
         }
-        self.node.network().note_stopped(self.node.id());
+        self.note_stopped();
         Ok(())
     }
 
@@ -133,7 +133,7 @@ impl Drive {
             // A fault has taken the power off: what was commanded before must not come back by itself.
             Some(PowerState::Fault) | None => Controlword(0),
             // An alarm that has stopped nothing: who follows or holds goes on so.
-            Some(_) => Controlword(self.node.read::<u16>(CONTROLWORD).await? & !Controlword::FAULT_RESET),
+            Some(_) => Controlword(self.node.read::<u16>(self.place(CONTROLWORD)).await? & !Controlword::FAULT_RESET),
         };
         self.write_controlword(rest).await?;
         self.write_controlword(Controlword(rest.0 | Controlword::FAULT_RESET)).await?;
@@ -150,7 +150,7 @@ impl Drive {
 
     /// Waits until the shaft stands still and goes on doing so, as long as the drive's ramps may take.
     pub(super) async fn wait_standstill(&self, intent: &'static str) -> Result<(), Error> {
-        let velocity = self.known(intent)?.units.actual_velocity;
+        let velocity = self.has(self.motion(intent)?.units.actual_velocity, "the actual velocity")?;
         let limit = self.stop_time().await;
         let (mut waited, mut looks) = (Duration::ZERO, 0);
         loop {
@@ -211,24 +211,29 @@ impl Drive {
 
     /// Ends homing where its mode alone keeps it going, whatever the controlword says.
     async fn leave_homing(&self) -> Result<(), Error> {
-        let rules = self.profile.and_then(|profile| profile.homing);
+        let rules = self.axis_description().and_then(|axis| axis.homing);
         let by_mode = rules.is_some_and(|rules| rules.start == HomingStart::ModeWrite);
         if by_mode && self.mode().await? == ModeOfOperation::HOMING {
-            self.node.write(MODE, ModeOfOperation::PROFILE_POSITION.0).await?;
+            self.node.write(self.place(MODE), ModeOfOperation::PROFILE_POSITION.0).await?;
         }
         Ok(())
     }
 
     /// Zeroes a target speed or torque left over.
     async fn clear_targets(&self) -> Result<(), Error> {
-        let Some(profile) = self.profile else { return Ok(()) };
+        let Some(axis) = self.axis_description() else { return Ok(()) };
         match self.mode().await? {
-            ModeOfOperation::PROFILE_VELOCITY => self.write_number(profile.units.target_velocity.object, 0).await,
-            ModeOfOperation::PROFILE_TORQUE => match profile.units.target_current {
-                Some(current) => self.write_number(current.object, 0).await,
-                None => Ok(()),
-            },
+            ModeOfOperation::PROFILE_VELOCITY => self.write_zero(axis.units.target_velocity).await,
+            ModeOfOperation::PROFILE_TORQUE => self.write_zero(axis.units.target_current).await,
             _ => Ok(()),
+        }
+    }
+
+    /// Zero to a target, where the axis has it.
+    pub(super) async fn write_zero(&self, target: Option<Quantity>) -> Result<(), Error> {
+        match target {
+            Some(target) => self.write_number(target.object, 0).await,
+            None => Ok(()),
         }
     }
 }

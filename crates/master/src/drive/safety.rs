@@ -1,7 +1,7 @@
 use canopen::NodeId;
 use cia402::{Controlword, PowerCommand};
 
-use super::handle::CONTROLWORD;
+use super::handle::{CONTROLWORD, Drive};
 use crate::core::{Command, Core, NodeSet, Payload, Request, Transfer};
 use crate::error::Error;
 use crate::network::{DEFAULT_TIMEOUT, Network, join_all};
@@ -12,16 +12,18 @@ pub(crate) const STOP: Controlword = Controlword(PowerCommand::QuickStop.control
 
 /// Stopping what this program has set in motion, and only that.
 impl Network {
-    /// Quick-stops every node that this program has set in motion, all at the same time, and says what each answered.
+    /// Quick-stops every axis that this program has set in motion, all at the same time, and says what each answered.
     pub async fn stop_all_moved(&self) -> Vec<(NodeId, Result<(), Error>)> {
         self.with_core(Core::stop_cyclic);
-        let stops = self.moved().iter().map(|id| {
+        let stops = self.moved_axes().into_iter().map(|(id, controlword)| {
             let node = self.node(id);
-            async move { (id, node.write(CONTROLWORD, STOP.0).await) }
+            async move { (id, controlword, node.write(controlword, STOP.0).await) }
         });
         let stopped = join_all(stops.collect::<Vec<_>>()).await;
-        stopped.iter().filter(|(_, outcome)| outcome.is_ok()).for_each(|(id, _)| self.note_stopped(*id));
-        stopped
+        for (id, controlword, _) in stopped.iter().filter(|(_, _, outcome)| outcome.is_ok()) {
+            self.note_stopped(*id, *controlword);
+        }
+        stopped.into_iter().map(|(id, _, outcome)| (id, outcome)).collect()
     }
 
     /// Queues the same without waiting; the runner has to be kept going until the frames are out.
@@ -29,12 +31,12 @@ impl Network {
         let stop = Payload::new(&STOP.0.to_le_bytes());
         self.with_core(Core::stop_cyclic);
         let moved = self.moved();
-        for node in moved.iter() {
+        for (node, mux) in self.moved_axes() {
             let transfer = Transfer::Download(stop.clone());
-            let request = Request { node, mux: CONTROLWORD, transfer, timeout: DEFAULT_TIMEOUT };
+            let request = Request { node, mux, transfer, timeout: DEFAULT_TIMEOUT };
             let ticket = self.with_core(Core::ticket);
             self.submit(Command::Request(ticket, request));
-            self.note_stopped(node);
+            self.note_stopped(node, mux);
         }
         moved
     }
@@ -45,7 +47,19 @@ impl Network {
     }
 }
 
-/// Quick-stops, when dropped, every node that this program has set in motion. See [`Network::stop_guard`].
+impl Drive {
+    /// Notes that this program has set this axis in motion.
+    pub(super) fn note_moved(&self) {
+        self.node.network().note_moved(self.node.id(), self.place(CONTROLWORD));
+    }
+
+    /// Notes that this axis stands still again.
+    pub(super) fn note_stopped(&self) {
+        self.node.network().note_stopped(self.node.id(), self.place(CONTROLWORD));
+    }
+}
+
+/// Quick-stops, when dropped, every axis that this program has set in motion. See [`Network::stop_guard`].
 #[derive(Debug)]
 #[must_use = "a guard that is dropped at once stops at once"]
 pub struct StopGuard {

@@ -3,7 +3,7 @@ use std::time::Duration;
 
 use canopen::Mux;
 use canopen::od::Entry;
-use devices::{CountsPerTurn, Quantity, Ramps};
+use devices::{CountsPerTurn, Quantity, Ramps, Scale};
 
 use super::handle::{Drive, TARGET_POSITION};
 use crate::error::Error;
@@ -60,34 +60,43 @@ impl Drive {
     /// # Errors
     /// [`Error::UnknownModel`]; those of the SDO read.
     pub async fn counts_per_turn(&self) -> Result<f64, Error> {
-        match self.known("convert positions")?.units.counts_per_turn {
+        match self.motion("convert positions")?.units.counts_per_turn {
             CountsPerTurn::Fixed(counts) => Ok(f64::from(counts)),
-            CountsPerTurn::Object { object, factor, .. } => {
-                Ok(self.read_number(object).await? as f64 * f64::from(factor))
-            }
+            CountsPerTurn::Object { object, factor } => Ok(self.read_number(object).await? as f64 * f64::from(factor)),
             CountsPerTurn::Table { object, counts, default } => {
                 let place = usize::try_from(self.read_number(object).await?).ok();
                 // A value beyond the table: the drive's own table refuses it, so it is as delivered.
                 let known = place.and_then(|place| counts.get(place)).or(counts.get(default as usize));
                 Ok(known.copied().map_or(1.0, f64::from))
             }
+            CountsPerTurn::Ratio { times, over } => Ok(self.product(times).await? / self.product(over).await?),
         }
+    }
+
+    /// The product of some objects that are never 0 by the standard; where a drive holds 0 nevertheless it counts as 1.
+    async fn product(&self, objects: [Option<Mux>; 2]) -> Result<f64, Error> {
+        let mut product = 1.0;
+        for object in objects.into_iter().flatten() {
+            product *= (self.read_number(object).await? as f64).max(1.0);
+        }
+        Ok(product)
     }
 
     /// An angle as 607Ah holds it.
     pub(super) async fn position(&self, what: &'static str, angle: Angle) -> Result<Commanded, Error> {
+        let object = self.place(TARGET_POSITION);
         let (requested, counts_per_turn) = match angle {
             Angle::Counts(raw) => {
-                self.check_number(TARGET_POSITION, raw).await?;
+                self.check_number(object, raw).await?;
                 let exact = raw as f64;
                 let (requested, commanded, unit) = (exact, exact, "counts");
-                return Ok(Commanded { what, requested, commanded, unit, object: TARGET_POSITION, raw });
+                return Ok(Commanded { what, requested, commanded, unit, object, raw });
             }
             Angle::Turns(turns) => (turns, self.counts_per_turn().await?),
         };
         let raw = (requested * counts_per_turn).round() as i64;
         let (requested, step) = (requested * 360.0, 360.0 / counts_per_turn);
-        let row = self.check_number(TARGET_POSITION, raw).await?;
+        let row = self.check_number(object, raw).await?;
         let commanded =
             Commanded { what, requested, commanded: raw as f64 * step, unit: "deg", object: row.mux(), raw };
         self.refuse_too_fine(&commanded, step, row).await
@@ -100,7 +109,7 @@ impl Drive {
         quantity: Quantity,
         value: f64,
     ) -> Result<Commanded, Error> {
-        let step = quantity.per_count / self.resolution(quantity).await?;
+        let step = self.step_of(quantity).await?;
         let raw = (value / step).round() as i64;
         let row = self.check_effect(quantity.object, raw).await?;
         let commanded =
@@ -119,9 +128,27 @@ impl Drive {
     }
 
     /// Reads a physical value from its object.
-    pub(super) async fn read_quantity(&self, quantity: Quantity) -> Result<f64, Error> {
+    ///
+    /// # Errors
+    /// [`Error::UnknownModel`]; those of the SDO reads.
+    pub async fn read_quantity(&self, quantity: Quantity) -> Result<f64, Error> {
         let raw = self.read_number(quantity.object).await? as f64;
-        Ok(raw * quantity.per_count / self.resolution(quantity).await?)
+        Ok(raw * self.step_of(quantity).await?)
+    }
+
+    /// Physical units in one count, by the resolution that is set on the drive.
+    pub(crate) async fn step_of(&self, quantity: Quantity) -> Result<f64, Error> {
+        Ok(self.worth(quantity.scale).await? / self.resolution(quantity).await?)
+    }
+
+    /// Physical units in one count at a resolution of 1.
+    async fn worth(&self, scale: Scale) -> Result<f64, Error> {
+        Ok(match scale {
+            Scale::PerCount(worth) => worth,
+            // Counts of position in a second, as turns in a minute.
+            Scale::Positions(counts) => counts * 60.0 / self.counts_per_turn().await?,
+            Scale::Rated { rated, per_count } => per_count * self.read_number(rated).await? as f64,
+        })
     }
 
     /// How many counts make one of the object's unit, by the resolution that is set on the drive.
@@ -146,22 +173,24 @@ impl Drive {
             return Ok(Vec::new());
         }
         let mut sent = Vec::new();
-        match self.known("set its ramps")?.units.ramps {
-            Ramps::Milliseconds { acceleration: up, deceleration: down, .. } => {
+        match self.ramps("set its ramps")? {
+            Ramps::Times { acceleration: up, deceleration: down, .. } => {
                 for (what, ramp) in wishes {
                     let object = if what == "acceleration" { up } else { down };
                     let raw = ramp_ms(ramp, change_rpm);
                     sent.push(self.ramp(what, ramp, change_rpm, object, raw, raw as f64 * 1e-3).await?);
                 }
             }
-            Ramps::Acceleration { both, none_from } => {
+            Ramps::Rates { acceleration: up, deceleration: down, scale, none_from, .. } => {
+                let worth = self.worth(scale).await?;
+                let rates = wishes.clone().map(|(_, ramp)| ramp_counts(ramp, change_rpm, worth, none_from));
                 // One object for both: the gentler of two wishes.
-                let rates = wishes.clone().map(|(_, ramp)| ramp_rpm_s(ramp, change_rpm, none_from));
-                let Some(raw) = rates.min() else { return Ok(sent) };
-                let none = raw >= i64::from(none_from);
-                let time_s = if none { 0.0 } else { change_rpm / raw.max(1) as f64 };
-                for (what, ramp) in wishes {
-                    sent.push(self.ramp(what, ramp, change_rpm, both, raw, time_s).await?);
+                let gentler = if up == down { rates.clone().min() } else { None };
+                for ((what, ramp), own) in wishes.zip(rates) {
+                    let object = if what == "acceleration" { up } else { down };
+                    let raw = gentler.unwrap_or(own);
+                    let time_s = rate_time_s(raw, change_rpm, worth, none_from);
+                    sent.push(self.ramp(what, ramp, change_rpm, object, raw, time_s).await?);
                 }
             }
         }
@@ -175,9 +204,9 @@ impl Drive {
     /// The speed from which a ramp to a new target begins: the one that is kept, without the noise of what is measured; where
     /// the shaft does not follow its target, as it turns.
     pub(super) async fn ramp_start_rpm(&self) -> Result<f64, Error> {
-        let units = self.known("set its ramps")?.units;
-        let actual = self.read_quantity(units.actual_velocity).await?;
-        let target = self.read_quantity(units.target_velocity).await?;
+        let units = self.motion("set its ramps")?.units;
+        let actual = self.read_quantity(self.has(units.actual_velocity, "the actual velocity")?).await?;
+        let target = self.read_quantity(self.has(units.target_velocity, "a target velocity")?).await?;
         Ok(if (actual - target).abs() <= REACHED_LEAST_RPM { target } else { actual })
     }
 
@@ -203,34 +232,47 @@ impl Drive {
 
     /// The drive's ramp times for a whole change of speed, in seconds: up, down.
     pub(super) async fn ramp_times_s(&self) -> Result<(f64, f64), Error> {
-        match self.known("read its ramps")?.units.ramps {
-            Ramps::Milliseconds { acceleration, deceleration, .. } => {
+        match self.ramps("read its ramps")? {
+            Ramps::Times { acceleration, deceleration, .. } => {
                 Ok((self.seconds(acceleration).await?, self.seconds(deceleration).await?))
             }
-            Ramps::Acceleration { both, none_from } => {
-                let rate = self.read_number(both).await?;
-                let none = rate >= i64::from(none_from);
-                let seconds = if none { 0.0 } else { self.largest_change_rpm()? / rate.max(1) as f64 };
-                Ok((seconds, seconds))
+            Ramps::Rates { acceleration, deceleration, scale, none_from, .. } => {
+                let (worth, change_rpm) = (self.worth(scale).await?, self.largest_change_rpm()?);
+                let (up, down) = (self.read_number(acceleration).await?, self.read_number(deceleration).await?);
+                Ok((rate_time_s(up, change_rpm, worth, none_from), rate_time_s(down, change_rpm, worth, none_from)))
             }
         }
     }
 
     /// Time of the drive's quick stop in seconds.
     pub(super) async fn quick_stop_time_s(&self) -> Result<f64, Error> {
-        match self.known("read its ramps")?.units.ramps {
-            Ramps::Milliseconds { quick_stop, .. } => self.seconds(quick_stop).await,
+        match self.ramps("read its ramps")? {
+            Ramps::Times { quick_stop, .. } => self.seconds(quick_stop).await,
+            Ramps::Rates { quick_stop: Some(rate), scale, none_from, .. } => {
+                let (worth, change_rpm) = (self.worth(scale).await?, self.largest_change_rpm()?);
+                Ok(rate_time_s(self.read_number(rate).await?, change_rpm, worth, none_from))
+            }
             // Such a drive stops without a ramp.
-            Ramps::Acceleration { .. } => Ok(0.0),
+            Ramps::Rates { quick_stop: None, .. } => Ok(0.0),
         }
     }
 
     /// The largest change of speed that can be asked for, r/min: from one limit of the target velocity to the other.
     fn largest_change_rpm(&self) -> Result<f64, Error> {
-        let target = self.known("read its limits")?.units.target_velocity;
+        let target = self.has(self.motion("read its limits")?.units.target_velocity, "a target velocity")?;
         let row = self.row(target.object, "read its limits")?;
         let (low, high) = row.limits_at(1);
-        Ok((high - low) as f64 * target.per_count)
+        let span = (high - low) as f64;
+        Ok(match target.scale {
+            Scale::PerCount(rpm) => span * rpm,
+            // Without limits of its own: there and back at the fastest that a drive of this kind turns.
+            Scale::Positions(_) | Scale::Rated { .. } => 2.0 * FASTEST_RPM,
+        })
+    }
+
+    fn ramps(&self, intent: &'static str) -> Result<Ramps, Error> {
+        let (node, model, what) = (self.node.id(), self.title(), "ramps");
+        self.motion(intent)?.units.ramps.ok_or(Error::NoSuchQuantity { node, model, what })
     }
 
     async fn seconds(&self, object: Mux) -> Result<f64, Error> {
@@ -241,16 +283,26 @@ impl Drive {
 /// A change of speed below this is none: half a count of the speed objects.
 const LEAST_CHANGE_RPM: f64 = 0.5;
 
-/// A ramp as an acceleration in (r/min)/s; a change without a ramp is `none_from`. A time that is longer than the gentlest
-/// acceleration takes gets that one.
-fn ramp_rpm_s(ramp: Ramp, change_rpm: f64, none_from: u32) -> i64 {
+/// The speed of a servo motor that no limit of an object tells, r/min: more than those of its kind turn.
+const FASTEST_RPM: f64 = 10_000.0;
+
+/// A ramp as an acceleration in counts that are `worth` (r/min)/s each; a change without a ramp is `none_from`. A time that is
+/// longer than the gentlest acceleration takes gets that one.
+fn ramp_counts(ramp: Ramp, change_rpm: f64, worth: f64, none_from: Option<u32>) -> i64 {
+    let most = none_from.map_or(i64::MAX, i64::from);
     match ramp {
-        Ramp::RpmPerSecond(rate) => (rate.round() as i64).min(i64::from(none_from)),
+        Ramp::RpmPerSecond(rate) => ((rate / worth).round() as i64).min(most),
         Ramp::Time(time) => {
             let rate = change_rpm.abs() / time.as_secs_f64().max(1e-6);
-            (rate.round() as i64).clamp(1, i64::from(none_from))
+            ((rate / worth).round() as i64).clamp(1, most)
         }
     }
+}
+
+/// How long a change of speed takes at an acceleration of `raw` counts, in seconds.
+fn rate_time_s(raw: i64, change_rpm: f64, worth: f64, none_from: Option<u32>) -> f64 {
+    let none = none_from.is_some_and(|none_from| raw >= i64::from(none_from));
+    if none { 0.0 } else { change_rpm / (raw.max(1) as f64 * worth) }
 }
 
 /// A ramp as the time of one change of speed, in ms. A rate that is steeper than 1 ms gets that: 0 ms is no ramp at all.
@@ -273,10 +325,10 @@ mod tests {
 
     #[test]
     fn a_time_becomes_the_acceleration_of_the_change() {
-        assert_eq!(ramp_rpm_s(Ramp::Time(Duration::from_millis(500)), -60.0, 60_000), 120);
-        assert_eq!(ramp_rpm_s(Ramp::RpmPerSecond(20_000.0), 60.0, 60_000), 20_000);
-        assert_eq!(ramp_rpm_s(Ramp::Time(Duration::ZERO), 60.0, 60_000), 60_000);
-        assert_eq!(ramp_rpm_s(Ramp::Time(Duration::from_secs(3600)), 60.0, 60_000), 1);
+        assert_eq!(ramp_counts(Ramp::Time(Duration::from_millis(500)), -60.0, 1.0, Some(60_000)), 120);
+        assert_eq!(ramp_counts(Ramp::RpmPerSecond(20_000.0), 60.0, 1.0, Some(60_000)), 20_000);
+        assert_eq!(ramp_counts(Ramp::Time(Duration::ZERO), 60.0, 1.0, Some(60_000)), 60_000);
+        assert_eq!(ramp_counts(Ramp::Time(Duration::from_secs(3600)), 60.0, 1.0, Some(60_000)), 1);
     }
 
     #[test]

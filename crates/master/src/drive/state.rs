@@ -9,6 +9,7 @@ use super::explain::faults_in;
 use super::handle::{Drive, ERROR_CODE, POSITION_ACTUAL};
 use crate::error::Error;
 use crate::units::{Amperes, Celsius, Counts, Degrees, Rpm, Volts};
+use canopen::Mux;
 
 /// Everything that a drive says of itself at one time. What the model does not have is `None`.
 #[derive(Clone, Debug)]
@@ -55,30 +56,31 @@ impl Drive {
     pub async fn state(&self) -> Result<DriveState, Error> {
         let statusword = self.statusword().await?;
         let mode = refused_is_none(self.mode().await)?;
-        let code = self.profile.map_or(ERROR_CODE, |profile| profile.faults.code);
-        let fault_code = refused_is_none(self.node.upload(code).await)?.map_or(0, |payload| payload.raw() as u16);
+        let fault_code =
+            refused_is_none(self.node.upload(self.fault_code()).await)?.map_or(0, |payload| payload.raw() as u16);
         let faults = self.profile.map(|profile| faults_in(profile, fault_code)).unwrap_or_default();
-        let position = refused_is_none(self.node.read::<i32>(POSITION_ACTUAL).await)?.map(|raw| Counts(raw.into()));
-        let angle = match (position, self.profile) {
+        let position =
+            refused_is_none(self.node.read::<i32>(self.place(POSITION_ACTUAL)).await)?.map(|raw| Counts(raw.into()));
+        let angle = match (position, self.axis_description()) {
             (Some(Counts(counts)), Some(_)) => {
                 let turn = self.counts_per_turn().await?;
                 (turn > 0.0).then(|| Degrees(counts as f64 / turn * 360.0))
             }
             _ => None,
         };
-        let units = self.profile.map(|profile| &profile.units);
+        let units = self.axis_description().map(|axis| &axis.units);
         let facts = self.node.facts();
         Ok(DriveState {
             statusword,
             power: self.power_state(statusword),
             style: self.power_style(),
-            own_bits: self.profile.map_or(&[], |profile| profile.statusword_bits),
+            own_bits: self.axis_description().map_or(&[], |axis| axis.statusword_bits),
             mode,
             fault_code,
             faults,
             position,
             angle,
-            velocity: self.measure(units.map(|units| units.actual_velocity)).await?.map(Rpm),
+            velocity: self.measure(units.and_then(|units| units.actual_velocity)).await?.map(Rpm),
             current: self.measure(units.and_then(|units| units.actual_current)).await?.map(Amperes),
             supply: self.measure(units.and_then(|units| units.bus_voltage)).await?.map(Volts),
             motor_temperature: self.measure(units.and_then(|units| units.motor_temperature)).await?.map(Celsius),
@@ -86,6 +88,11 @@ impl Drive {
             nmt: facts.probable_state(self.profile),
             heartbeat_age: facts.heartbeat_age(self.node.network().now()),
         })
+    }
+
+    /// Where the present fault code is.
+    pub(super) fn fault_code(&self) -> Mux {
+        self.place(self.profile.and_then(|profile| profile.faults.code).unwrap_or(ERROR_CODE))
     }
 
     async fn measure(&self, quantity: Option<Quantity>) -> Result<Option<f64>, Error> {

@@ -13,12 +13,14 @@ impl Drive {
     /// Stores all parameters.
     ///
     /// # Errors
-    /// [`Error::UnknownModel`], [`Error::GuessedModel`], [`Error::WrongModel`], [`Error::OtherModel`], and nothing is
+    /// [`Error::NoParameterStore`]; [`Error::UnknownModel`], [`Error::GuessedModel`], [`Error::WrongModel`], [`Error::OtherModel`], and nothing is
     /// written: what means "save" to one model may be anything to another of the same identity. Those of the SDO write.
     pub async fn save(&self) -> Result<(), Error> {
-        let storage = self.named("save its parameters")?.storage;
+        let profile = self.named("save its parameters")?;
+        let model = profile.title;
+        let save = profile.storage.save.ok_or(Error::NoParameterStore { node: self.node.id(), model })?;
         self.check_identity().await?;
-        self.command(storage.save).await
+        self.command(save).await
     }
 
     /// Puts all parameters back to their factory values. Some take effect after a restart only.

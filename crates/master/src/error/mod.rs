@@ -9,6 +9,7 @@ use canopen::emcy::Emcy;
 use canopen::sdo::client;
 use canopen::{AbortCode, Mux, NmtState, NodeId};
 use cia402::{ModeOfOperation, PowerState, Statusword};
+use devices::AxisId;
 use devices::faults::FaultRow;
 
 use crate::identify::knowledge::{Guess, Identity};
@@ -132,7 +133,7 @@ pub enum Error {
     },
     /// The node lacks an object that the model has, though both say the same identity.
     #[error(
-        "node {node} is not a {model}, though it says the same of itself: it has no {hallmark}. Name the right model; \
+        "node {node} is not a {model}, though it says the same of itself: it has no {object}. Name the right model; \
          what stores parameters on one may set something else on the other"
     )]
     OtherModel {
@@ -141,7 +142,37 @@ pub enum Error {
         /// The model it was taken for.
         model: &'static str,
         /// The object that the model has.
-        hallmark: Mux,
+        object: Mux,
+    },
+    /// The drive has no axis of this number.
+    #[error("node {node}: the {model} has {axes} axes, and none of number {}", axis.0)]
+    NoSuchAxis {
+        /// The node.
+        node: NodeId,
+        /// Its model.
+        model: &'static str,
+        /// The axis asked for.
+        axis: AxisId,
+        /// How many it has.
+        axes: usize,
+    },
+    /// The axis has no object for something that is needed.
+    #[error("node {node}: the {model} has no object for {what}: what needs it cannot be done with this model")]
+    NoSuchQuantity {
+        /// The node.
+        node: NodeId,
+        /// Its model.
+        model: &'static str,
+        /// What it is, as in "no object for the actual velocity".
+        what: &'static str,
+    },
+    /// The model has no parameter store.
+    #[error("node {node}: the {model} stores no parameters: write them after each start")]
+    NoParameterStore {
+        /// The node.
+        node: NodeId,
+        /// The model's name.
+        model: &'static str,
     },
     /// The model has no command that restores factory settings.
     #[error("node {node}: the {model} cannot be told to restore its factory settings: write each object instead")]
@@ -212,6 +243,9 @@ impl Error {
             Self::GuessedModel { .. } => "guessed_model",
             Self::WrongModel { .. } => "wrong_model",
             Self::OtherModel { .. } => "other_model",
+            Self::NoSuchAxis { .. } => "no_such_axis",
+            Self::NoSuchQuantity { .. } => "no_such_quantity",
+            Self::NoParameterStore { .. } => "no_parameter_store",
             Self::NoFactorySettings { .. } => "no_factory_settings",
             Self::NoSuchMode { .. } => "no_such_mode",
             Self::OutOfLimits { .. } => "out_of_limits",
@@ -232,6 +266,9 @@ impl Error {
             | Self::GuessedModel { node, .. }
             | Self::WrongModel { node, .. }
             | Self::OtherModel { node, .. }
+            | Self::NoSuchAxis { node, .. }
+            | Self::NoSuchQuantity { node, .. }
+            | Self::NoParameterStore { node, .. }
             | Self::NoFactorySettings { node, .. }
             | Self::NoSuchMode { node, .. }
             | Self::OutOfLimits { node, .. }
@@ -249,7 +286,7 @@ impl Error {
             | Self::WrongLength { mux, .. }
             | Self::TooFine { object: mux, .. } => Some(*mux),
             Self::OutOfLimits { limits, .. } => Some(limits.object),
-            Self::OtherModel { hallmark, .. } => Some(*hallmark),
+            Self::OtherModel { object, .. } => Some(*object),
             _ => None,
         }
     }

@@ -2,10 +2,11 @@ use std::time::Duration;
 
 use can::Instant;
 use canopen::{AbortCode, Mux, NmtState, NodeId};
-use devices::{Description, models_by_identity};
+use devices::Description;
 
 use super::knowledge::{Guess, Identity, Knowledge, names};
 use crate::error::Error;
+use crate::models::Models;
 use crate::network::{Network, Node, join_all};
 
 /// Nodes asked at the same time: their requests take about 8 ms of a 500 kbit/s bus, well within the wait for each.
@@ -38,21 +39,18 @@ pub struct Found {
     pub heartbeat: Option<Duration>,
     /// What that tells of its model.
     pub knowledge: Knowledge,
+    /// The models that answer so. More than one: it cannot be told which by its identity.
+    pub models: Vec<&'static Description>,
 }
 
 impl Found {
-    /// The models that answer so. More than one: it cannot be told which.
-    pub fn models(&self) -> Vec<&'static Description> {
-        self.identity.map(models_answering).unwrap_or_default()
-    }
-
     /// What cannot be told about it, and why.
     pub fn doubt(&self) -> Option<String> {
-        match (self.identity, self.knowledge) {
+        match (self.identity, &self.knowledge) {
             (None, _) => Some("it is heard but answers no SDO: stopped, or busy, or its SDO is elsewhere".to_owned()),
             (Some(_), Knowledge::Named(_)) => None,
             (Some(_), Knowledge::Guessed(guess)) => Some(format!("cannot tell: {guess}")),
-            (Some(identity), Knowledge::Unknown) => Some(match names(models_answering(identity).into_iter()) {
+            (Some(_), Knowledge::Unknown) => Some(match names(self.models.iter().copied()) {
                 (answering, true) => {
                     format!("cannot tell: {answering} answer the same identity, and its objects speak for none of them")
                 }
@@ -94,30 +92,32 @@ fn node_silent(node: &Node, mux: Mux) -> Error {
 /// [`Error::NoAnswer`] when it is silent.
 pub async fn knowledge(node: &Node) -> Result<Knowledge, Error> {
     let said = identity(node).await?;
-    told_apart(node, &models_answering(said)).await
+    let known = node.network().models();
+    told_apart(node, &known, &answering(&known, said)).await
 }
 
 /// What the node's objects tell of which of `models` it is.
-async fn told_apart(node: &Node, models: &[&'static Description]) -> Result<Knowledge, Error> {
+async fn told_apart(node: &Node, known: &Models, models: &[&'static Description]) -> Result<Knowledge, Error> {
     let Some((first, others)) = models.split_first() else { return Ok(Knowledge::Unknown) };
     if others.is_empty() {
         return Ok((*first).into());
     }
-    if others.iter().all(|other| core::ptr::eq(other.table, first.table)) {
-        return Ok(Knowledge::Guessed(Guess { profile: first, evidence: None }));
+    let guessed = |profile, evidence| Guess { profile, evidence, known: known.clone() };
+    if others.iter().all(|other| other.same_objects(first)) {
+        return Ok(Knowledge::Guessed(guessed(first, None)));
     }
     let mut guess: Option<Guess> = None;
     for model in models {
-        let Some(hallmark) = model.hallmark else { continue };
-        let same = |guess: &Guess| core::ptr::eq(guess.profile().table, model.table);
-        if guess.as_ref().is_some_and(same) || !has(node, hallmark).await? {
+        let Some(object) = model.distinguishing_object else { continue };
+        let same = |guess: &Guess| guess.profile().same_objects(model);
+        if guess.as_ref().is_some_and(same) || !has(node, object).await? {
             continue;
         }
         if guess.is_some() {
             // It has what should be one model's own and what should be another's.
             return Ok(Knowledge::Unknown);
         }
-        guess = Some(Guess { profile: model, evidence: Some(hallmark) });
+        guess = Some(guessed(model, Some(object)));
     }
     Ok(guess.map_or(Knowledge::Unknown, Knowledge::Guessed))
 }
@@ -178,18 +178,20 @@ impl Network {
         if identity.is_none() && facts.seen_at.is_none() {
             return None;
         }
-        let answering = identity.map(models_answering).unwrap_or_default();
-        let knowledge = told_apart(&node, &answering).await.unwrap_or(Knowledge::Unknown);
+        let known = self.models();
+        let models = identity.map(|said| answering(&known, said)).unwrap_or_default();
+        let knowledge = told_apart(&node, &known, &models).await.unwrap_or(Knowledge::Unknown);
         let heartbeat = match identity {
             Some(_) => optional(&node, PRODUCER_HEARTBEAT_TIME).await.ok().flatten(),
             None => None,
         };
         let heartbeat = heartbeat.map(|ms| Duration::from_millis(u64::from(ms) & 0xFFFF));
-        Some(Found { node: id, identity, nmt_state: facts.probable_state(knowledge.profile()), heartbeat, knowledge })
+        let nmt_state = facts.probable_state(knowledge.profile());
+        Some(Found { node: id, identity, nmt_state, heartbeat, knowledge, models })
     }
 }
 
-fn models_answering(said: Identity) -> Vec<&'static Description> {
+fn answering(known: &Models, said: Identity) -> Vec<&'static Description> {
     let Identity { device_type: Some(device_type), vendor_id, product_code, revision_number } = said else {
         return Vec::new();
     };
@@ -200,5 +202,5 @@ fn models_answering(said: Identity) -> Vec<&'static Description> {
         product_code: zero(product_code),
         revision_number: zero(revision_number),
     };
-    models_by_identity(identity).collect()
+    known.catalogue().of_identity(identity).collect()
 }

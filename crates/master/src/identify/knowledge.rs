@@ -3,6 +3,8 @@ use core::fmt;
 use canopen::Mux;
 use devices::Description;
 
+use crate::models::Models;
+
 /// What a node says that it is. What it refuses to say is `None`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Identity {
@@ -48,7 +50,7 @@ impl fmt::Display for Identity {
 }
 
 /// What is known of a node's model.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub enum Knowledge {
     /// This model: somebody has said so who must know, or no other model answers so.
     Named(Model),
@@ -60,7 +62,7 @@ pub enum Knowledge {
 
 impl Knowledge {
     /// The profile to work with: of a guess, the one that all models it may be agree with.
-    pub const fn profile(self) -> Option<&'static Description> {
+    pub const fn profile(&self) -> Option<&'static Description> {
         match self {
             Self::Named(Model(profile)) => Some(profile),
             Self::Guessed(guess) => Some(guess.profile),
@@ -69,8 +71,8 @@ impl Knowledge {
     }
 
     /// The guess, if it is one.
-    pub const fn guess(self) -> Option<Guess> {
-        if let Self::Guessed(guess) = self { Some(guess) } else { None }
+    pub fn guess(&self) -> Option<Guess> {
+        if let Self::Guessed(guess) = self { Some(guess.clone()) } else { None }
     }
 }
 
@@ -86,51 +88,53 @@ pub struct Model(pub &'static Description);
 
 impl fmt::Debug for Model {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.0.model)
+        f.write_str(self.0.name)
     }
 }
 
 /// A model that several answer like, chosen by an object that it has, if the others have other objects.
 ///
 /// Models with the same objects differ in their motors only: they are read and moved in the same way.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct Guess {
     pub(super) profile: &'static Description,
     pub(super) evidence: Option<Mux>,
+    /// Those among which the model was looked for.
+    pub(super) known: Models,
 }
 
 impl Guess {
     /// The profile to read and move with.
-    pub const fn profile(self) -> &'static Description {
+    pub const fn profile(&self) -> &'static Description {
         self.profile
     }
 
     /// The object that speaks for it; `None` where all that answer so have the same objects.
-    pub const fn evidence(self) -> Option<Mux> {
+    pub const fn evidence(&self) -> Option<Mux> {
         self.evidence
     }
 
     /// The models that it may be by its objects.
-    pub fn fitting(self) -> impl Iterator<Item = &'static Description> {
-        self.profile.with_same_objects()
+    pub fn fitting(&self) -> impl Iterator<Item = &'static Description> {
+        self.known.catalogue().same_objects(self.profile)
     }
 
     /// True if this value of this object means the same on every model that answers so.
-    pub fn may_write(self, mux: Mux, value: i64) -> bool {
-        self.profile.shares(mux, value)
+    pub fn may_write(&self, mux: Mux, value: i64) -> bool {
+        self.known.catalogue().agree_on(self.profile, mux, value)
     }
 }
 
 impl fmt::Debug for Guess {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Guess {{ {}, {:?} }}", self.profile.model, self.evidence)
+        write!(f, "Guess {{ {}, {:?} }}", self.profile.name, self.evidence)
     }
 }
 
 /// Why it is no more than a guess: "zlac8030l, zlim42c and zlim42c-82 answer the same identity; it has 2029h:00 as zlac8030l has".
 impl fmt::Display for Guess {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (answering, _) = names(self.profile.answering_alike());
+        let (answering, _) = names(self.known.catalogue().same_identity(self.profile));
         let (fitting, several) = names(self.fitting());
         write!(f, "{answering} answer the same identity")?;
         match self.evidence {
@@ -142,7 +146,7 @@ impl fmt::Display for Guess {
 
 /// Names in a sentence, and whether they are several.
 pub(super) fn names(models: impl Iterator<Item = &'static Description>) -> (String, bool) {
-    let names: Vec<_> = models.map(|model| model.model).collect();
+    let names: Vec<_> = models.map(|model| model.name).collect();
     match names.split_last() {
         Some((last, [])) => ((*last).to_owned(), false),
         Some((last, others)) => (format!("{} and {last}", others.join(", ")), true),

@@ -10,7 +10,8 @@ use can::Instant;
 use canopen::{Mux, NodeId};
 
 use super::handle::{CycleWaiter, Network};
-use crate::core::{Command, Core, Cycle, CycleLoss, NodeSet, Sample, SetPoint, Signal, Ticket, WatchId};
+use super::moved::Moved;
+use crate::core::{Command, Core, Cycle, CycleLoss, Sample, SetPoint, Signal, Ticket, WatchId};
 
 /// Why there is no next cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -63,7 +64,7 @@ impl Network {
 #[derive(Debug)]
 pub struct Exchange<'a> {
     core: &'a mut Core,
-    moved: &'a mut NodeSet,
+    moved: &'a mut Moved,
 }
 
 impl Exchange<'_> {
@@ -107,10 +108,10 @@ impl Exchange<'_> {
         self.core.write(&set_point, value)
     }
 
-    /// A set-point was given in this cycle: the node is in motion.
-    pub(crate) fn note_moving(&mut self, node: NodeId, watch: WatchId) {
+    /// A set-point was given in this cycle: the axis with this controlword is in motion.
+    pub(crate) fn note_moving(&mut self, (node, controlword): (NodeId, Mux), watch: WatchId) {
         self.core.note_moving(watch);
-        self.moved.insert(node);
+        self.moved.insert(node, controlword);
     }
 
     /// Nothing was given in this cycle that moves the node.
@@ -119,9 +120,9 @@ impl Exchange<'_> {
     }
 
     /// The drive was told to switch off; a loss is forgotten.
-    pub(crate) fn note_off(&mut self, node: NodeId, watch: WatchId) {
+    pub(crate) fn note_off(&mut self, (node, controlword): (NodeId, Mux), watch: WatchId) {
         self.core.forget_loss(watch);
-        self.moved.remove(node);
+        self.moved.remove(node, controlword);
     }
 
     /// Why the drive was stopped, until it was told to switch off.

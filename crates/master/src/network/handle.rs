@@ -7,8 +7,10 @@ use can::{Frame, Instant, Station};
 use canopen::nmt::NmtTarget;
 use canopen::{Mux, NmtCommand, NodeId};
 
+use super::moved::Moved;
 use crate::core::{Command, Core, Event, NodeFacts, NodeSet, Outcome, Received, Ticket};
 use crate::host_loss::Guard;
+use crate::models::Models;
 
 /// A CANopen network as its master sees it: a cheap handle that all tasks and the runner share.
 ///
@@ -36,7 +38,9 @@ pub(super) struct Shared {
     /// Woken once by the next command that comes into the inbox.
     activity: Option<Waker>,
     /// What this program has set in motion.
-    pub(super) moved: NodeSet,
+    pub(super) moved: Moved,
+    /// The models that a node may be.
+    models: Models,
     /// What watches this program, by node.
     guards: BTreeMap<NodeId, Guard>,
 }
@@ -101,6 +105,16 @@ impl Network {
         self.lock().core.poll_event()
     }
 
+    /// The models among which nodes are looked for: those of crate `devices`, unless others were given.
+    pub fn models(&self) -> Models {
+        self.lock().models.clone()
+    }
+
+    /// Looks for nodes among these models from now on.
+    pub fn set_models(&self, models: Models) {
+        self.lock().models = models;
+    }
+
     /// What has been seen of a node.
     pub fn facts(&self, node: NodeId) -> NodeFacts {
         self.lock().core.facts(node).clone()
@@ -159,19 +173,24 @@ impl Network {
         Poll::Ready(())
     }
 
-    /// Notes that this program has set a node in motion.
-    pub fn note_moved(&self, node: NodeId) {
-        self.lock().moved.insert(node);
+    /// Notes that this program has set the axis with this controlword in motion.
+    pub(crate) fn note_moved(&self, node: NodeId, controlword: Mux) {
+        self.lock().moved.insert(node, controlword);
     }
 
-    /// Notes that a node stands still again.
-    pub fn note_stopped(&self, node: NodeId) {
-        self.lock().moved.remove(node);
+    /// Notes that it stands still again.
+    pub(crate) fn note_stopped(&self, node: NodeId, controlword: Mux) {
+        self.lock().moved.remove(node, controlword);
     }
 
     /// The nodes that this program has set in motion and not stopped again.
     pub fn moved(&self) -> NodeSet {
-        self.lock().moved
+        self.lock().moved.nodes()
+    }
+
+    /// The controlwords of the axes that this program has set in motion and not stopped again.
+    pub(crate) fn moved_axes(&self) -> Vec<(NodeId, Mux)> {
+        self.lock().moved.axes()
     }
 
     /// The guards of this program, to look at or to change.

@@ -9,6 +9,7 @@ mod cycle;
 mod future;
 mod handle;
 mod join;
+mod moved;
 mod node;
 
 pub use cycle::{Exchange, NextSync, NoCycle};

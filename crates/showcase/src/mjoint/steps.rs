@@ -40,7 +40,7 @@ pub(super) fn until_reached(bench: &mut Bench, goal: f64, from: f64, time_s: f64
 /// How long a move took, beside its plan. How long the loops take to settle at its end the manual does not print. The
 /// M8025's rotor is 2.5 times as heavy as the M4230's, with the same gains as delivered.
 pub(super) fn expect_time(bench: &mut Bench, what: &str, planned_s: f64, took_s: f64) {
-    let settling_s = if bench.model().model.starts_with("m8025") { 0.3 } else { 0.03 };
+    let settling_s = if bench.model().name.starts_with("m8025") { 0.3 } else { 0.03 };
     bench.expect(what, Expect::Near(planned_s, 0.05 * planned_s + settling_s), "s", took_s);
 }
 

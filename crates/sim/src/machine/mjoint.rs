@@ -53,7 +53,7 @@ pub fn mjoint(model: &'static Model, node: u8, bitrate: Bitrate) -> MJointMachin
 
 /// The same as it was ordered.
 pub(super) fn ordered(model: &Description, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
-    let joint = Model::named(model.model).ok_or(OrderError::NoSuchModel { model: model.model })?;
+    let joint = Model::named(model.name).ok_or(OrderError::NoSuchModel { model: model.name })?;
     let image = order.image(storage::addressed(&order.variant, order.node.raw()))?;
     Ok(Box::new(Machine::new(MJoint::of(joint, order.variant), Joint::new(joint, image, order.bitrate))))
 }

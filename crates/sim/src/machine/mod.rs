@@ -11,6 +11,7 @@ mod order;
 mod pulse_source;
 mod quantity;
 mod realism;
+mod registry;
 mod switch;
 mod zlac8030l;
 mod zlim42c;
@@ -20,9 +21,10 @@ use drives::{Firmware, RegisterError};
 
 pub use assembly::Assembly;
 pub use mjoint::{Joint, MJointMachine, mjoint};
-pub use order::{Order, OrderError, order};
+pub use order::{Order, OrderError};
 pub use quantity::Quantity;
 pub use realism::{Noise, Realism};
+pub use registry::{models, order};
 pub use zlac8030l::{HubWheel, Zlac8030lMachine, zlac8030l};
 pub use zlim42c::{Stepper, Zlim42c82Machine, Zlim42cMachine, zlim42c, zlim42c_82};
 

@@ -6,6 +6,7 @@
 use canopen::Mux;
 use devices::Description;
 use devices::variant::Variant;
+use devices::zltech::ZLAC8030L;
 use drives::engine::storage::Image;
 use drives::zlac8030l::assumptions::REFERENCE_V;
 use drives::zlac8030l::hardware::{Actuation, Hardware, PowerStage, Sensors};
@@ -117,7 +118,7 @@ impl HubWheel {
 impl Assembly for HubWheel {
     type Firmware = Zlac8030l;
 
-    const MODEL: &'static str = "zlac8030l";
+    const MODEL: &'static str = ZLAC8030L.name;
     const INPUTS: &'static [&'static str] = &["X0", "X1"];
 
     fn hardware(&self) -> Hardware {

@@ -6,6 +6,7 @@
 
 use canopen::Mux;
 use devices::Description;
+use devices::zltech::{ZLIM42C, ZLIM42C_82};
 use drives::engine::axis::Demand;
 use drives::engine::storage::Image;
 use drives::zlim42c::assumptions::{REFERENCE_V, TEETH};
@@ -75,7 +76,7 @@ fn of_length<const MM: u16>(model: &Description, order: &Order) -> Result<Machin
     let (node, variant) = (order.node.raw(), order.variant);
     if (16..=31).contains(&node) {
         let reason = "its switches have 1 to 15, and 2008h takes 32 to 127";
-        return Err(OrderError::Node { model: model.model, node: order.node, reason });
+        return Err(OrderError::Node { model: model.name, node: order.node, reason });
     }
     let baud_rate = baud_rate(model, BAUD_RATE, order.bitrate)?;
     let image = order.image(storage::addressed(&variant, node, baud_rate))?;
@@ -159,7 +160,7 @@ impl<const LENGTH_MM: u16> Stepper<LENGTH_MM> {
 impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
     type Firmware = Zlim42c;
 
-    const MODEL: &'static str = if LENGTH_MM == LONG { "zlim42c-82" } else { "zlim42c" };
+    const MODEL: &'static str = if LENGTH_MM == LONG { ZLIM42C_82.name } else { ZLIM42C.name };
     const INPUTS: &'static [&'static str] = &["X0", "X1", "X2", "X3"];
     // It is off below the 20 V of 2.1, and has no fault for a low supply. A guess: half a volt of hysteresis, and that its
     // 20 V are those of the supply, of which cable and bus take some tenths when the motor draws its most.

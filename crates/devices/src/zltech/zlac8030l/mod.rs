@@ -10,11 +10,16 @@ pub mod statusword;
 pub mod variations;
 
 use can::Bitrate;
-use canopen::Mux;
 use canopen::pdo::MappingRules;
+use canopen::{Mux, NodeId};
 use cia402::ModeOfOperation;
 
-use crate::description::{CountsPerTurn, Description, Faults, HostWatch, PdoRules, PowerStyle, Quantity, Quirk, Units};
+use crate::axis::{AxisDescription, NewSetPoint, PowerStyle};
+use crate::description::{Description, HostWatch, NmtRules, PdoRules};
+use crate::faults::Faults;
+use crate::placement::Placement;
+use crate::stated::Stated;
+use crate::units::{CountsPerTurn, Quantity, Units};
 use crate::zltech;
 use faults::FAULTS;
 use objects::TABLE;
@@ -23,38 +28,45 @@ use variations::VARIATIONS;
 
 /// The ZLAC8030L V2.0.
 pub static ZLAC8030L: Description = Description {
-    model: "zlac8030l",
+    name: "zlac8030l",
     title: "ZLTECH ZLAC8030L V2.0",
     manual: "ZLAC8030L quick start guide V1.00",
     identity: zltech::IDENTITY,
     // The ZLIM42-C, of the same identity, has its bus voltage in 2069h.
-    hallmark: Some(Mux::new(0x2029, 0)),
-    table: &TABLE,
-    node_id: 4,
-    bitrate: Bitrate::K500,
+    distinguishing_object: Some(Mux::new(0x2029, 0)),
+    dictionary: &TABLE,
+    node_id: NodeId::new(4),
+    bitrate: Some(Bitrate::K500),
+    axes: &[AXIS],
+    host_watch: HostWatch::Silence { time: Mux::new(0x2000, 0) },
+    storage: zltech::parameter_storage(0x2009, 0x2010, RESTART),
+    faults: Faults { code: Some(Mux::new(0x603F, 0)), bit_field: true, table: &FAULTS },
+    nmt: NmtRules::CIA_301,
+    pdo: PDO_RULES,
+    stated_departures: DEPARTURES,
+    variations: VARIATIONS,
+};
+
+const AXIS: AxisDescription = AxisDescription {
+    placement: Placement::FIRST,
     modes: &[ModeOfOperation::PROFILE_POSITION, ModeOfOperation::PROFILE_VELOCITY, ModeOfOperation::PROFILE_TORQUE],
     mode_display: Mux::new(0x6061, 0),
     power: PowerStyle::Cia402,
+    new_set_point: NewSetPoint::Handshake,
     statusword_bits: &[(IN_POSITION, "in position"), (RUNNING, "running"), (EXTERNAL_STOP, "external stop")],
     homing: None,
-    host_watch: HostWatch::Silence { time: Mux::new(0x2000, 0) },
     units: Units {
-        counts_per_turn: CountsPerTurn::Object { object: Mux::new(0x200B, 0), factor: 4, default: 1024 },
-        target_velocity: Quantity::new(0x60FF, 0, 1.0),
-        actual_velocity: Quantity::new(0x606C, 0, 0.1),
-        profile_velocity: Quantity::new(0x6081, 0, 1.0),
-        ramps: zltech::RAMPS,
+        counts_per_turn: CountsPerTurn::Object { object: Mux::new(0x200B, 0), factor: 4 },
+        target_velocity: Some(Quantity::new(0x60FF, 0, 1.0)),
+        actual_velocity: Some(Quantity::new(0x606C, 0, 0.1)),
+        profile_velocity: Some(Quantity::new(0x6081, 0, 1.0)),
+        ramps: Some(zltech::RAMPS),
         target_current: Some(Quantity::new(0x6071, 0, 1e-3)),
         actual_current: Some(Quantity::new(0x6077, 0, 0.1)),
         bus_voltage: Some(Quantity::new(0x2029, 0, 0.01)),
         motor_temperature: Some(Quantity::new(0x2026, 1, 0.1)),
         driver_temperature: Some(Quantity::new(0x2026, 2, 0.1)),
     },
-    storage: zltech::parameter_storage(0x2009, 0x2010, RESTART),
-    faults: Faults { code: Mux::new(0x603F, 0), bit_field: true, table: &FAULTS },
-    pdo: PDO_RULES,
-    quirks: QUIRKS,
-    variations: VARIATIONS,
 };
 
 /// Working robots map 6077h with 32 bits; the maker's EDS counts empty entries in.
@@ -65,22 +77,18 @@ const PDO_RULES: PdoRules = PdoRules {
 
 const RESTART: &[Mux] = &[Mux::new(0x200D, 0), Mux::new(0x200E, 0), Mux::new(0x202F, 5)];
 
-const QUIRKS: &[Quirk] = &[
-    Quirk::NoSupportedDriveModes,
-    Quirk::NoStandardStore,
-    Quirk::NoErrorHistory,
-    Quirk::NoHeartbeatConsumer,
-    Quirk::DeviceTypeSaysStepper,
-    Quirk::IdentityShared,
-    Quirk::TorqueTargetIsCurrent,
-    Quirk::TorqueActualIsCurrent,
-    Quirk::VelocityUnitsDiffer,
-    Quirk::RampsAreTimes,
-    Quirk::PdoTimersInHalfMilliseconds,
-    Quirk::SubIndexZeroIsUnsigned16,
-    Quirk::VersionsAreNumbers,
-    Quirk::InPositionInBit13,
-    Quirk::WarningBitInFault,
-    Quirk::HostWatchdogOnByDefault,
-    Quirk::BrakeIsManual,
+const DEPARTURES: &[Stated] = &[
+    Stated {
+        key: "device_type_says_stepper",
+        object: Mux::new(0x1000, 0),
+        what: "bits 16 to 23 say stepper though the motor is a servo",
+        remedy: "do not choose by the type of motor in 1000h",
+    },
+    zltech::WARNING_IN_FAULT,
+    Stated {
+        key: "brake_is_manual",
+        object: Mux::new(0x2030, 0x0E),
+        what: "the drive never moves the brake output by itself",
+        remedy: "open the brake with 0 before the motor is to turn, and close it with 1 when it stands",
+    },
 ];

@@ -12,13 +12,15 @@ pub mod tables;
 pub mod variations;
 
 use can::Bitrate;
-use canopen::Mux;
+use canopen::{Mux, NodeId};
 use cia402::{ModeOfOperation, Statusword};
 
-use crate::description::{
-    BitPattern, CountsPerTurn, Description, Faults, HomingRules, HomingStart, HostWatch, PowerStyle, Quantity, Quirk,
-    Units,
-};
+use crate::axis::{AxisDescription, BitPattern, HomingRules, HomingStart, NewSetPoint, PowerStyle};
+use crate::description::{Description, HostWatch, NmtRules};
+use crate::faults::Faults;
+use crate::placement::Placement;
+use crate::stated::Stated;
+use crate::units::{CountsPerTurn, Quantity, Units};
 use crate::zltech;
 use faults::FAULTS;
 use objects::TABLE;
@@ -32,31 +34,38 @@ pub static ZLIM42C: Description = stepper("zlim42c", "ZLTECH ZLIM42-C (70 mm)");
 /// The ZLIM42-C of 82 mm.
 pub static ZLIM42C_82: Description = stepper("zlim42c-82", "ZLTECH ZLIM42-C (82 mm)");
 
-const fn stepper(model: &'static str, title: &'static str) -> Description {
+const fn stepper(name: &'static str, title: &'static str) -> Description {
     Description {
-        model,
+        name,
         title,
         manual: "ZLIM42-C user manual V1.03",
         identity: zltech::IDENTITY,
         // The ZLAC8030L has its bus voltage in 2029h.
-        hallmark: Some(Mux::new(0x2069, 0)),
-        table: &TABLE,
-        node_id: 1,
-        bitrate: Bitrate::K500,
-        modes: &[ModeOfOperation::PROFILE_POSITION, ModeOfOperation::PROFILE_VELOCITY, ModeOfOperation::HOMING],
-        mode_display: Mux::new(0x6061, 0),
-        power: PowerStyle::Cia402,
-        statusword_bits: STATUSWORD_BITS,
-        homing: Some(HOMING),
+        distinguishing_object: Some(Mux::new(0x2069, 0)),
+        dictionary: &TABLE,
+        node_id: NodeId::new(1),
+        bitrate: Some(Bitrate::K500),
+        axes: &[AXIS],
         host_watch: HostWatch::None,
-        units: UNITS,
         storage: zltech::parameter_storage(0x2010, 0x200C, RESTART),
-        faults: Faults { code: Mux::new(0x603F, 0), bit_field: false, table: &FAULTS },
+        faults: Faults { code: Some(Mux::new(0x603F, 0)), bit_field: false, table: &FAULTS },
+        nmt: NmtRules::CIA_301,
         pdo: zltech::PDO_RULES,
-        quirks: QUIRKS,
+        stated_departures: DEPARTURES,
         variations: VARIATIONS,
     }
 }
+
+const AXIS: AxisDescription = AxisDescription {
+    placement: Placement::FIRST,
+    modes: &[ModeOfOperation::PROFILE_POSITION, ModeOfOperation::PROFILE_VELOCITY, ModeOfOperation::HOMING],
+    mode_display: Mux::new(0x6061, 0),
+    power: PowerStyle::Cia402,
+    new_set_point: NewSetPoint::Handshake,
+    statusword_bits: STATUSWORD_BITS,
+    homing: Some(HOMING),
+    units: UNITS,
+};
 
 const STATUSWORD_BITS: &[(u16, &str)] = &[
     (HOMING_ATTAINED, "homing attained"),
@@ -79,10 +88,10 @@ const HOMING: HomingRules = HomingRules {
 
 const UNITS: Units = Units {
     counts_per_turn: CountsPerTurn::Table { object: Mux::new(0x2006, 0), counts: &PULSES_PER_TURN, default: 10 },
-    target_velocity: Quantity::new(0x60FF, 0, 1.0),
-    actual_velocity: Quantity::new(0x606C, 0, 1.0),
-    profile_velocity: Quantity::new(0x6081, 0, 1.0),
-    ramps: zltech::RAMPS,
+    target_velocity: Some(Quantity::new(0x60FF, 0, 1.0)),
+    actual_velocity: Some(Quantity::new(0x606C, 0, 1.0)),
+    profile_velocity: Some(Quantity::new(0x6081, 0, 1.0)),
+    ramps: Some(zltech::RAMPS),
     target_current: None,
     actual_current: None,
     bus_voltage: Some(Quantity::new(0x2069, 0, 1.0)),
@@ -92,20 +101,18 @@ const UNITS: Units = Units {
 
 const RESTART: &[Mux] = &[Mux::new(0x2008, 0), Mux::new(0x2009, 0)];
 
-const QUIRKS: &[Quirk] = &[
-    Quirk::NoSupportedDriveModes,
-    Quirk::NoStandardStore,
-    Quirk::NoErrorHistory,
-    Quirk::NoHeartbeatConsumer,
-    Quirk::IdentityShared,
-    Quirk::RampsAreTimes,
-    Quirk::PdoTimersInHalfMilliseconds,
-    Quirk::SubIndexZeroIsUnsigned16,
-    Quirk::VersionsAreNumbers,
-    Quirk::InPositionInBit15,
-    Quirk::WarningBitInFault,
-    Quirk::NoPositionSensor,
-    Quirk::EnergisedWhenSwitchedOn,
-    Quirk::HomingAttainedInBit8,
-    Quirk::BitRateWhereSiblingSaves,
+const DEPARTURES: &[Stated] = &[
+    zltech::WARNING_IN_FAULT,
+    Stated {
+        key: "no_position_sensor",
+        object: Mux::new(0x6064, 0),
+        what: "6064h and 606Ch are commanded values: nothing measures the rotor, and a stall is not seen",
+        remedy: "home again after whatever may have made the motor lose steps",
+    },
+    Stated {
+        key: "energised_when_switched_on",
+        object: Mux::new(0x6040, 0),
+        what: "the motor is energised from switched on",
+        remedy: "go to ready to switch on where the shaft has to be free",
+    },
 ];

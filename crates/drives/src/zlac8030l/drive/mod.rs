@@ -20,6 +20,7 @@ use super::statusword::statusword;
 use super::terminals::{self, TERMINALS};
 use super::variations::{SPEED_SETTING_FAULTS, VARIANT};
 use super::{Values, storage};
+use crate::communication::communication;
 use crate::engine::actuator::bleeder::Bleeder;
 use crate::engine::actuator::servo::Servo;
 use crate::engine::axis::{Demand, Feedback};
@@ -30,12 +31,12 @@ use crate::engine::host_watchdog::HostWatchdog;
 use crate::engine::inputs::Inputs;
 use crate::engine::storage::Image;
 use crate::zltech::terminals::Conditions;
-use crate::{Firmware, Report, zltech};
+use crate::{Firmware, Report};
 use devices::variant::Variant;
 
 /// How this drive communicates.
 pub static NODE_PROFILE: NodeProfile =
-    NodeProfile { conditions: &CONDITIONS, ..zltech::node_profile(&devices::zltech::ZLAC8030L) };
+    NodeProfile { conditions: &CONDITIONS, ..communication(&devices::zltech::ZLAC8030L) };
 
 /// The firmware of a ZLAC8030L V2.0.
 #[derive(Clone)]

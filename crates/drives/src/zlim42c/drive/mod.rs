@@ -19,6 +19,7 @@ use super::statusword::{self, statusword};
 use super::terminals::{self, TERMINALS};
 use super::variations::VARIANT;
 use super::{Values, led, storage};
+use crate::communication::communication;
 use crate::engine::actuator::stepper::Stepper;
 use crate::engine::axis::{Demand, Feedback};
 use crate::engine::cia402::{PowerDrive, Targets};
@@ -27,11 +28,11 @@ use crate::engine::faults::{FaultMonitor, FaultSet};
 use crate::engine::inputs::Inputs;
 use crate::engine::storage::Image;
 use crate::zltech::terminals::Conditions;
-use crate::{Firmware, Report, zltech};
+use crate::{Firmware, Report};
 use devices::variant::Variant;
 
 /// How this drive communicates.
-pub static NODE_PROFILE: NodeProfile = zltech::node_profile(&devices::zltech::ZLIM42C);
+pub static NODE_PROFILE: NodeProfile = communication(&devices::zltech::ZLIM42C);
 
 /// The firmware of a ZLIM42-C.
 #[derive(Clone)]

@@ -1,28 +1,29 @@
-//! The quirks that a model's profile lists, asked of the running drive: each is there where it is listed, and only there.
+//! Where a model departs from the standard by its description, asked of the running drive: each departure is there where it is
+//! listed, and only there.
 //!
 //! Those of motion, homing, units and storage have tests of their own beside what they are about.
 
-use devices::{Quirk, model};
+use devices::{all, model};
 use ferrodrive_tests::bench::{Abort, Bench, Subject, mjoint, zlac8030l, zlim42c};
 
 const NO_SUCH_OBJECT: Abort = 0x0602_0000;
 
-/// What a drive answers to questions that tell quirks.
-fn asked<S: Subject>(bench: &mut Bench<S>) -> Vec<(Quirk, bool)> {
+/// What a drive answers to questions that tell departures.
+fn asked<S: Subject>(bench: &mut Bench<S>) -> Vec<(&'static str, bool)> {
     let node = bench.node;
     let mut lacks = |index| bench.read(index) == Err(NO_SUCH_OBJECT);
     let mut seen = vec![
-        (Quirk::NoSupportedDriveModes, lacks(0x6502)),
-        (Quirk::NoStandardStore, lacks(0x1010) && lacks(0x1011)),
-        (Quirk::NoErrorHistory, lacks(0x1003)),
-        (Quirk::NoHeartbeatConsumer, lacks(0x1016)),
-        (Quirk::NoModeDisplay, lacks(0x6061)),
+        ("no_supported_drive_modes", lacks(0x6502)),
+        ("no_store_parameters", lacks(0x1010) && lacks(0x1011)),
+        ("no_error_history", lacks(0x1003)),
+        ("no_heartbeat_consumer", lacks(0x1016)),
+        ("no_mode_display", lacks(0x6061)),
     ];
     let length = |bytes: Result<Vec<u8>, Abort>| bytes.map_or(0, |bytes| bytes.len());
-    seen.push((Quirk::SubIndexZeroIsUnsigned16, length(bench.read(0x2030)) == 2));
-    seen.push((Quirk::VersionsAreNumbers, length(bench.read(0x1009)) == 2));
+    seen.push(("sub_index_zero", length(bench.read(0x2030)) == 2));
+    seen.push(("version_is_number", length(bench.read(0x1009)) == 2));
     // Bit 6, switch on disabled: where a drive that follows CiA 402 begins.
-    seen.push((Quirk::NoPowerStateMachine, bench.statusword() & 1 << 6 == 0));
+    seen.push(("echoes_controlword", bench.statusword() & 1 << 6 == 0));
 
     // As it booted: no NMT command was sent.
     let beat = |bench: &mut Bench<S>| {
@@ -31,35 +32,35 @@ fn asked<S: Subject>(bench: &mut Bench<S>) -> Vec<(Quirk, bool)> {
         bench.heard_of(&format!("{:03X}#", 0x700 + u16::from(node))).last().cloned().expect("a heartbeat")
     };
     bench.set(0x1017, 100);
-    seen.push((Quirk::StartsOperational, beat(bench).ends_with("#05")));
+    seen.push(("starts_operational", beat(bench).ends_with("#05")));
 
     // Operational, nothing mapped or changed by the host: a TPDO can only be an answer.
     bench.send(&format!("000#01{node:02X}")).run_ms(50);
     bench.heard();
     bench.send(&format!("{:03X}#0000000000000000", 0x200 + u16::from(node))).run_ms(20);
     let answered = !bench.heard_of(&format!("{:03X}#", 0x180 + u16::from(node))).is_empty();
-    seen.push((Quirk::TpdoAnswersRpdo, answered));
+    seen.push(("tpdo_answers_rpdo", answered));
 
     bench.set(0x6040, 0x1F);
-    seen.push((Quirk::NewSetPointClearsItself, bench.get(0x6040) & 0x10 == 0));
+    seen.push(("new_set_point_clears_itself", bench.get(0x6040) & 0x10 == 0));
 
     // Too much for each of them: a fault, or an alarm.
     bench.heard();
     bench.tell(&format!("{node} supply 90")).run_ms(500);
-    seen.push((Quirk::NoEmcy, bench.heard_of(&format!("{:03X}#", 0x080 + u16::from(node))).is_empty()));
-    seen.push((Quirk::HeartbeatTellsAlarm, beat(bench).ends_with("#04")));
+    seen.push(("no_emcy", bench.heard_of(&format!("{:03X}#", 0x080 + u16::from(node))).is_empty()));
+    seen.push(("heartbeat_tells_alarm", beat(bench).ends_with("#04")));
     seen
 }
 
-fn assert_listed(name: &str, seen: Vec<(Quirk, bool)>) {
-    let profile = model(name).expect("a model");
-    for (quirk, seen) in seen {
-        assert_eq!(quirk.is_in(profile.quirks), seen, "{name}: {}", quirk.text());
+fn assert_listed(name: &str, seen: Vec<(&'static str, bool)>) {
+    let listed: Vec<_> = model(name).expect("a model").departures(all()).map(|departure| departure.key()).collect();
+    for (key, seen) in seen {
+        assert_eq!(listed.contains(&key), seen, "{name}: {key}");
     }
 }
 
 #[test]
-fn a_quirk_that_can_be_asked_for_is_listed_where_the_running_drive_has_it_and_only_there() {
+fn a_departure_that_can_be_asked_for_is_listed_where_the_running_drive_has_it_and_only_there() {
     assert_listed("zlac8030l", asked(&mut zlac8030l::Bench::new()));
     assert_listed("zlim42c", asked(&mut zlim42c::Bench::new()));
     assert_listed("m4230e17b50", asked(&mut mjoint::Bench::new()));

@@ -6,9 +6,9 @@ use crate::identify::Model;
 
 /// The profile of each node whose model is known, or one that all models it may be read alike.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Models(pub(super) BTreeMap<u8, Model>);
+pub(super) struct NodeModels(pub(super) BTreeMap<u8, Model>);
 
-impl Models {
+impl NodeModels {
     pub(super) fn get(&self, node: NodeId) -> Option<Model> {
         self.0.get(&node.raw()).copied()
     }

@@ -1,0 +1,81 @@
+//! Which machine is built for which description: the one list that joins the two.
+
+use devices::zltech::{ZLAC8030L, ZLIM42C, ZLIM42C_82};
+use devices::{Description, mjoint};
+
+use super::order::{Order, OrderError};
+use crate::VirtualDrive;
+
+/// Builds a machine, without power.
+type Maker = fn(&Description, &Order) -> Result<Box<dyn VirtualDrive>, OrderError>;
+
+static MACHINES: [(&Description, Maker); 7] = [
+    (&ZLAC8030L, super::zlac8030l::ordered),
+    (&mjoint::M4230E17B50, super::mjoint::ordered),
+    (&mjoint::M4230E17B80, super::mjoint::ordered),
+    (&mjoint::M8025E25B50, super::mjoint::ordered),
+    (&mjoint::M8025E25B80, super::mjoint::ordered),
+    (&ZLIM42C, super::zlim42c::ordered),
+    (&ZLIM42C_82, super::zlim42c::ordered_82),
+];
+
+/// The models that can be simulated.
+pub fn models() -> impl ExactSizeIterator<Item = &'static Description> + Clone {
+    MACHINES.iter().map(|(model, _)| *model)
+}
+
+/// A virtual drive of `model`, without power.
+///
+/// # Errors
+/// [`OrderError`] says what the model cannot be.
+pub fn order(model: &Description, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
+    let machine = MACHINES.iter().find(|(known, _)| known.name == model.name);
+    let (_, make) = machine.ok_or(OrderError::NoSuchModel { model: model.name })?;
+    make(model, order)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use can::Bitrate;
+    use canopen::NodeId;
+    use devices::variant::Preset;
+
+    fn node(raw: u8) -> NodeId {
+        NodeId::new(raw).unwrap()
+    }
+
+    #[test]
+    fn every_model_that_is_described_can_be_had() {
+        for model in devices::all().iter() {
+            let drive = order(model, &Order::new(model, node(33), Bitrate::K500)).map(|drive| drive.model());
+            assert_eq!(drive, Ok(model.name));
+        }
+    }
+
+    #[test]
+    fn a_bit_rate_that_the_drive_does_not_know_is_refused_with_those_it_knows() {
+        let wanted = |bitrate| order(&ZLAC8030L, &Order::new(&ZLAC8030L, node(4), bitrate));
+        assert!(wanted(Bitrate::K125).is_ok());
+        let refusal = wanted(Bitrate::K50).err().unwrap().to_string();
+        assert!(refusal.contains("cannot run at 50k") && refusal.contains("100 kbit/s"), "{refusal}");
+    }
+
+    #[test]
+    fn a_node_id_that_the_switches_do_not_have_is_refused() {
+        let wanted = |raw| order(&ZLIM42C, &Order::new(&ZLIM42C, node(raw), Bitrate::K500));
+        assert!(wanted(15).is_ok() && wanted(32).is_ok());
+        assert!(matches!(wanted(16), Err(OrderError::Node { .. })));
+    }
+
+    #[test]
+    fn a_preset_that_the_drive_would_not_keep_is_refused_with_the_reason() {
+        let with = |preset| Order { presets: vec![preset], ..Order::new(&ZLAC8030L, node(4), Bitrate::K500) };
+        let refusal = |preset| order(&ZLAC8030L, &with(preset)).err().unwrap().to_string();
+        // 2014h, rated current, is RW/S; 60FFh, target velocity, is RW.
+        assert!(order(&ZLAC8030L, &with(Preset::new(0x2014, 0, 100))).is_ok());
+        assert!(refusal(Preset::new(0x60FF, 0, 10)).contains("does not store"));
+        assert!(refusal(Preset::new(0x5000, 0, 10)).contains("no such object"));
+        assert!(refusal(Preset::new(0x200E, 0, 77)).contains("0609 0030"));
+    }
+}
