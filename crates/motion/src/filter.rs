@@ -13,11 +13,6 @@ impl LowPassGains {
     pub fn from_time_constant(time_constant_s: f32, dt_s: f32) -> Self {
         LowPassGains { share: dt_s / (time_constant_s.max(0.0) + dt_s) }
     }
-
-    /// A corner frequency at a period.
-    pub fn from_bandwidth(bandwidth_rad_s: f32, dt_s: f32) -> Self {
-        LowPassGains { share: dt_s * bandwidth_rad_s / (1.0 + dt_s * bandwidth_rad_s) }
-    }
 }
 
 /// State: the filtered value.

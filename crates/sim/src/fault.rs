@@ -14,7 +14,7 @@ use crate::Prng;
 #[derive(Clone, Debug, Default)]
 pub struct Corruption {
     probability: f64,
-    nth: BTreeMap<u64, Option<u32>>,
+    nth: BTreeMap<u64, u32>,
     seen: u64,
 }
 
@@ -29,16 +29,10 @@ impl Corruption {
         Self { probability: probability.clamp(0.0, 1.0), ..Self::default() }
     }
 
-    /// Also destroys the `n`-th attempt from here on (the next is 1), at a random bit.
-    pub fn and_nth(mut self, n: u64) -> Self {
-        self.nth.insert(n, None);
-        self
-    }
-
-    /// Also destroys the `n`-th attempt from here on, so that everybody sees the error in the
+    /// Also destroys the `n`-th attempt from here on (the next is 1), so that everybody sees the error in the
     /// `bit`-th bit of the frame (start of frame is 1, stuff bits count).
     pub fn and_nth_at_bit(mut self, n: u64, bit: u32) -> Self {
-        self.nth.insert(n, Some(bit));
+        self.nth.insert(n, bit);
         self
     }
 
@@ -48,8 +42,7 @@ impl Corruption {
         let planned = self.nth.remove(&self.seen);
         let by_chance = self.probability > 0.0 && prng.chance(self.probability);
         match planned {
-            Some(Some(bit)) => Some(bit.clamp(1, bits)),
-            Some(None) => Some(1 + prng.below(bits.into()) as u32),
+            Some(bit) => Some(bit.clamp(1, bits)),
             None => by_chance.then(|| 1 + prng.below(bits.into()) as u32),
         }
     }

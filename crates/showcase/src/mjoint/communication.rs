@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use can::Instant;
 
-use super::steps::{ALARM, idle, move_time_s, power_cycle, save, until_reached};
+use super::steps::{ALARM, idle, move_time_s, power_cycle, restart_as, save, until_reached};
 use crate::bench::Bench;
 use crate::datagram::frame;
 use crate::expect::Expect;
@@ -162,14 +162,7 @@ pub(super) fn address(bench: &mut Bench) {
     bench.section("5.04", "address");
     bench.ask("device location 5", "2B 15 26 00 05 00", "60 15 26 00");
     save(bench);
-    bench.step("restart");
-    let begin = bench.now();
-    bench.machine("power off");
-    bench.run_ms(200);
-    bench.machine("power on");
-    bench.run_ms(10);
-    let heard = !bench.heard_since(begin, 0x705).is_empty();
-    bench.compare("705#00", if heard { "705#00" } else { "nothing" }, heard);
+    restart_as(bench, 5);
     // The new address answers.
     bench.exchange_pdo("address 1 again", "605 2B 15 26 00 01 00", "585 60 15 26 00 00 00 00 00");
     bench.exchange_pdo("save", "605 2B 14 26 00 01 00", "585 60 14 26 00 00 00 00 00");

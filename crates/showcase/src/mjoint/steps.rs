@@ -58,14 +58,21 @@ pub(super) fn save(bench: &mut Bench) {
     bench.ask("saved: 2614h shows 2", "40 14 26 00", "4B 14 26 00 02 00");
 }
 
-/// Supply off and on, and the boot-up message after it.
+/// Supply off and on, and the boot-up message after it from the joint as delivered.
 pub(super) fn power_cycle(bench: &mut Bench) {
+    restart_as(bench, 1);
+}
+
+/// Supply off and on, and the boot-up message after it from the address that was saved.
+pub(super) fn restart_as(bench: &mut Bench, address: u16) {
     bench.step("restart");
     let begin = bench.now();
     bench.machine("power off");
     bench.run_ms(200);
     bench.machine("power on");
     bench.run_ms(10);
-    let heard = !bench.heard_since(begin, 0x701).is_empty();
-    bench.compare("701#00", if heard { "701#00" } else { "nothing" }, heard);
+    let id = 0x700 + address;
+    let heard = !bench.heard_since(begin, id).is_empty();
+    let boot_up = format!("{id:03X}#00");
+    bench.compare(&boot_up, if heard { boot_up.as_str() } else { "nothing" }, heard);
 }
