@@ -2,7 +2,9 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::command::{completions, demo, drive, dump, home, motion, nmt, objects, readings, scan, sdo, sim, store};
+use crate::command::{
+    completions, demo, drive, dump, eds, home, motion, nmt, objects, readings, scan, sdo, sim, store,
+};
 use crate::global::Global;
 
 /// CANopen motor drives, virtual and real: simulate them, look into them, move them.
@@ -27,6 +29,7 @@ pub(crate) enum Command {
     Write(sdo::Write),
     Objects(objects::Objects),
     Readings(readings::Readings),
+    Eds(eds::Eds),
     Nmt(nmt::Nmt),
     State(drive::State),
     Enable(drive::Enable),

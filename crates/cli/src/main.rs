@@ -157,6 +157,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
             Whose::Node(node) => on_bus(global, format, async |context| objects.of_node(context, node).await),
         },
         Command::Readings(readings) => print(format, &readings.list()?),
+        Command::Eds(eds) => eds.run(format),
         Command::Dump(dump) => dump.run(global, format),
         Command::Completions(completions) => completions.run(&mut Cli::command()),
     }

@@ -25,7 +25,7 @@ const MODEL: &str = "models";
 const MACHINE: &str = "machine";
 const TIMEOUT: &str = "timeout";
 
-const UNHEEDED: [Unheeded; 6] = [
+const UNHEEDED: [Unheeded; 7] = [
     Unheeded {
         command: "sim",
         options: &[MODEL],
@@ -54,6 +54,12 @@ const UNHEEDED: [Unheeded; 6] = [
         command: "completions",
         options: &[BUS, MODEL, MACHINE, TIMEOUT],
         why: "a script for a shell depends on none of them",
+        next: "leave it away",
+    },
+    Unheeded {
+        command: "eds",
+        options: &[BUS, MODEL, MACHINE, TIMEOUT],
+        why: "it is about files, not about a node of a bus",
         next: "leave it away",
     },
     Unheeded {

@@ -1,6 +1,5 @@
 //! Two files compared, object by object.
 
-use crate::write::text;
 use crate::{DeviceInfo, Eds, Object, Value, Variable};
 
 /// One thing in which two files differ.
@@ -90,7 +89,7 @@ fn of_index(index: u16, a: Option<&Object>, b: Option<&Object>, found: &mut Vec<
 fn variables(index: u16, a: &Variable, b: &Variable, found: &mut Vec<Difference>) {
     let is_dcf = a.value.is_some() || b.value.is_some();
     let shown = |variable: &Variable, value: &Option<Value>| {
-        value.as_ref().map(|value| mapped(index, value).unwrap_or_else(|| text(index, variable.data_type, value)))
+        value.as_ref().map(|value| mapped(index, value).unwrap_or_else(|| value.in_file(index, variable.data_type)))
     };
     let effective = |variable: &Variable| {
         shown(variable, if variable.value.is_some() { &variable.value } else { &variable.default })

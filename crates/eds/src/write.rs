@@ -177,7 +177,7 @@ impl File {
     }
 
     fn variable(&mut self, index: u16, variable: &Variable) -> fmt::Result {
-        let value = |value: &Option<Value>| value.as_ref().map(|value| text(index, variable.data_type, value));
+        let value = |value: &Option<Value>| value.as_ref().map(|value| value.in_file(index, variable.data_type));
         writeln!(self.text, "DataType=0x{:04X}", variable.data_type.0)?;
         self.said("LowLimit", value(&variable.low))?;
         self.said("HighLimit", value(&variable.high))?;
@@ -223,17 +223,19 @@ fn one_line(text: &str) -> String {
     text.chars().take(MOST_LETTERS).map(plain).collect::<String>().trim().to_owned()
 }
 
-/// A value as its type is usually written: identifiers and mapping records, which are of the communication profile and
-/// 32 bits wide, in hexadecimal.
-pub(crate) fn text(index: u16, data_type: TypeCode, value: &Value) -> String {
-    match value {
-        Value::Number(Number { base, plus_node_id: false })
-            if data_type == TypeCode::UNSIGNED32 && matches!(index, 0x1000..=0x1FFF) && *base > 9 =>
-        {
-            format!("0x{base:X}")
+impl Value {
+    /// As a file has it: identifiers and mapping records, which are of the communication profile and 32 bits wide, in
+    /// hexadecimal.
+    pub fn in_file(&self, index: u16, data_type: TypeCode) -> String {
+        match self {
+            Self::Number(Number { base, plus_node_id: false })
+                if data_type == TypeCode::UNSIGNED32 && matches!(index, 0x1000..=0x1FFF) && *base > 9 =>
+            {
+                format!("0x{base:X}")
+            }
+            Self::Text(text) => one_line(text),
+            value => value.to_string(),
         }
-        Value::Text(text) => one_line(text),
-        value => value.to_string(),
     }
 }
 

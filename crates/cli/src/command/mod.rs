@@ -4,6 +4,7 @@ pub(crate) mod completions;
 pub(crate) mod demo;
 pub(crate) mod drive;
 pub(crate) mod dump;
+pub(crate) mod eds;
 pub(crate) mod home;
 pub(crate) mod motion;
 pub(crate) mod nmt;

@@ -1,0 +1,81 @@
+//! `ferrodrive eds diff`: in what two files differ.
+
+use std::path::PathBuf;
+
+use canopen::Mux;
+use eds::{Difference, diff};
+use serde::Serialize;
+
+use super::source;
+use crate::failure::Failure;
+use crate::output::Report;
+use crate::paint::Paint;
+use crate::plain::plain;
+use crate::table::Table;
+
+/// Compare two EDS or DCF files: objects, types, access, defaults, limits, PDOs
+///
+/// Of a DCF the values count, where it has some. Names are not compared.
+#[derive(clap::Args)]
+pub(crate) struct Diff {
+    /// EDS or DCF file
+    first: PathBuf,
+    /// EDS or DCF file
+    second: PathBuf,
+}
+
+/// What differs.
+#[derive(Debug, Serialize)]
+pub(crate) struct DiffReport {
+    first: String,
+    second: String,
+    differences: Vec<Row>,
+}
+
+#[derive(Debug, Serialize)]
+struct Row {
+    /// `6040h:00`, or `6040h` for an object as a whole; `None` for the device.
+    object: Option<String>,
+    name: String,
+    aspect: &'static str,
+    first: Option<String>,
+    second: Option<String>,
+}
+
+impl Diff {
+    /// Reads both and compares them.
+    pub(super) fn run(&self) -> Result<DiffReport, Failure> {
+        let (first, second) = (source::reading(&self.first)?.eds, source::reading(&self.second)?.eds);
+        Ok(DiffReport {
+            first: self.first.display().to_string(),
+            second: self.second.display().to_string(),
+            differences: diff(&first, &second).into_iter().map(Row::of).collect(),
+        })
+    }
+}
+
+impl Row {
+    fn of(found: Difference) -> Self {
+        let object = found.index.map(|index| match found.sub_index {
+            Some(sub_index) => Mux::new(index, sub_index).to_string(),
+            None => format!("{index:04X}h"),
+        });
+        Self { object, name: found.name, aspect: found.aspect, first: found.first, second: found.second }
+    }
+}
+
+impl Report for DiffReport {
+    fn text(&self, paint: Paint) -> String {
+        let (first, second) = (plain(&self.first), plain(&self.second));
+        if self.differences.is_empty() {
+            return format!("{first} and {second} say the same");
+        }
+        let mut table = Table::new(&["object", "name", "what", "first", "second"]);
+        for row in &self.differences {
+            let say = |text: &Option<String>| text.as_deref().map_or("-".to_owned(), plain);
+            let object = row.object.clone().unwrap_or_else(|| "device".into());
+            table.row([object, plain(&row.name), row.aspect.to_owned(), say(&row.first), say(&row.second)]);
+        }
+        format!("first   {first}\nsecond  {second}\n\n{}", table.plain(paint))
+    }
+}

@@ -1,0 +1,169 @@
+//! `ferrodrive eds lint`: what is wrong with a file, line by line.
+
+use std::path::PathBuf;
+
+use eds::{Finding, Severity};
+use serde::Serialize;
+
+use super::source;
+use crate::failure::Failure;
+use crate::output::Report;
+use crate::paint::Paint;
+use crate::plain::plain;
+use crate::table::Table;
+
+/// Say what is wrong with EDS and DCF files, with lines, and what is taken instead
+///
+/// Errors are what had to be guessed or left out, and what strict tools refuse; warnings are what is readable all the same.
+#[derive(clap::Args)]
+pub(crate) struct Lint {
+    /// EDS or DCF files
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Fail for warnings too
+    #[arg(long)]
+    pub(super) strict: bool,
+}
+
+/// What was found.
+#[derive(Debug, Serialize)]
+pub(crate) struct LintReport {
+    files: Vec<OfFile>,
+}
+
+#[derive(Debug, Serialize)]
+struct OfFile {
+    file: String,
+    /// Why it is not read at all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    refused: Option<Refused>,
+    objects: usize,
+    values: usize,
+    errors: usize,
+    warnings: usize,
+    /// Counted, not listed.
+    beyond: u32,
+    findings: Vec<Row>,
+}
+
+#[derive(Debug, Serialize)]
+struct Refused {
+    message: String,
+    next: String,
+}
+
+#[derive(Debug, Serialize)]
+struct Row {
+    /// 0 for the file as a whole.
+    line: u32,
+    section: String,
+    key: Option<String>,
+    severity: &'static str,
+    what: String,
+    taken_instead: Option<String>,
+}
+
+impl Lint {
+    /// Looks into all files.
+    pub(super) fn run(&self) -> LintReport {
+        LintReport { files: self.files.iter().map(OfFile::of).collect() }
+    }
+}
+
+impl LintReport {
+    /// Why the command fails, if it does.
+    pub(super) fn failure(&self, strict: bool) -> Option<Failure> {
+        let bad = |file: &&OfFile| file.refused.is_some() || file.errors > 0 || (strict && file.warnings > 0);
+        let count = self.files.iter().filter(bad).count();
+        let of = self.files.len();
+        let what = if strict { "errors or warnings" } else { "errors" };
+        let next = "the lines above say where; CiA 306 says how it has to be";
+        (count > 0).then(|| Failure::new(format!("{count} of {of} files with {what}")).of_kind("lint").next(next))
+    }
+}
+
+impl OfFile {
+    fn of(path: &PathBuf) -> Self {
+        let empty = Self {
+            file: path.display().to_string(),
+            refused: None,
+            objects: 0,
+            values: 0,
+            errors: 0,
+            warnings: 0,
+            beyond: 0,
+            findings: Vec::new(),
+        };
+        match source::reading(path) {
+            Ok(reading) => Self {
+                objects: reading.eds.objects.len(),
+                values: reading.eds.variables().count(),
+                errors: reading.findings.count(Severity::Error),
+                warnings: reading.findings.count(Severity::Warning),
+                beyond: reading.findings.beyond(),
+                findings: reading.findings.iter().map(Row::of).collect(),
+                ..empty
+            },
+            Err(failure) => {
+                let message = format!("{}: {}", failure.what, failure.because.join("; "));
+                Self { refused: Some(Refused { message, next: failure.next.join("; ") }), ..empty }
+            }
+        }
+    }
+
+    fn text(&self, paint: Paint) -> String {
+        if let Some(refused) = &self.refused {
+            return format!("{}\n  next: {}", paint.bad(&plain(&refused.message)), plain(&refused.next));
+        }
+        let counts = format!("{}, {}", counted(self.errors, "error"), counted(self.warnings, "warning"));
+        let counts = match (self.errors, self.warnings) {
+            (0, 0) => paint.good("nothing wrong"),
+            (0, _) => counts,
+            _ => paint.bad(&counts),
+        };
+        let file = plain(&self.file);
+        let head = format!("{file}: {} objects with {} values; {counts}", self.objects, self.values);
+        if self.findings.is_empty() {
+            return head;
+        }
+        let mut table = Table::new(&["line", "severity", "section", "key", "what", "taken instead"]);
+        for row in &self.findings {
+            let line = if row.line > 0 { row.line.to_string() } else { String::new() };
+            let texts = [&row.section, row.key.as_ref().unwrap_or(&String::new()), &row.what].map(|text| plain(text));
+            let [section, key, what] = texts;
+            let taken = row.taken_instead.as_deref().map(plain).unwrap_or_default();
+            table.row([line, row.severity.to_owned(), section, key, what, taken]);
+        }
+        let error = |_: usize, column: usize, cell: &str| {
+            (column == 1 && cell == Severity::Error.name()).then(|| paint.bad(cell))
+        };
+        let beyond = match self.beyond {
+            0 => String::new(),
+            more => format!("\nand {more} more"),
+        };
+        format!("{head}\n\n{}{beyond}", table.text(paint, error))
+    }
+}
+
+impl Row {
+    fn of(finding: &Finding) -> Self {
+        Self {
+            line: finding.line,
+            section: finding.section.clone(),
+            key: finding.key.clone(),
+            severity: finding.severity.name(),
+            what: finding.what.clone(),
+            taken_instead: finding.taken_instead.clone(),
+        }
+    }
+}
+
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
+impl Report for LintReport {
+    fn text(&self, paint: Paint) -> String {
+        self.files.iter().map(|file| file.text(paint)).collect::<Vec<_>>().join("\n\n")
+    }
+}
