@@ -8,12 +8,10 @@
 
 pub mod alarms;
 pub mod assumptions;
-mod axis;
 mod drive;
 pub mod gains;
 pub mod hardware;
 pub mod homing;
-mod interpolation;
 pub mod leds;
 mod model;
 pub mod objects;

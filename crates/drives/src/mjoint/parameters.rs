@@ -12,7 +12,7 @@ use super::power_on::Function;
 use super::pulses::PulseParameters;
 use super::{Values, homing};
 use crate::engine::actuator::servo::{ServoGains, ServoLimits, ServoModel};
-use crate::engine::axis::StraightRamps;
+use crate::engine::axis::{Control, HomingParameters, MoveLimits, Ramp, VelocityRamps};
 
 /// rad/s in one r/min.
 const RAD_S_PER_RPM: f32 = core::f32::consts::TAU / 60.0;
@@ -23,12 +23,16 @@ pub(super) struct Parameters {
     /// Highest speed of the motor, counts/s.
     pub(super) max_speed: f64,
     /// Of position moves.
-    pub(super) moves: StraightRamps,
-    /// Of everything else.
-    pub(super) ramps: StraightRamps,
-    /// The speed in the ones digit of 6083h, counts/s.
-    pub(super) homing_speed: f64,
-    pub(super) homing_method: Option<&'static homing::Method>,
+    pub(super) moves: MoveLimits,
+    /// Of what pulses ask for.
+    pub(super) pulse_moves: MoveLimits,
+    /// Of what it does by itself after power-on.
+    pub(super) returning: MoveLimits,
+    /// Of speeds.
+    pub(super) velocity: VelocityRamps,
+    /// Of everything that ends at rest.
+    pub(super) ramp: Ramp,
+    pub(super) homing: HomingParameters,
     pub(super) pulses: PulseParameters,
     pub(super) servo: ServoModel,
     pub(super) gains: ServoGains,
@@ -72,17 +76,26 @@ impl Parameters {
     /// for each ampere of 261Dh and 6078h.
     pub(super) fn from(values: &Values, model: &Model, function: Function, amplitude: f32) -> Self {
         let max_speed = model.max_rpm * COUNTS_S_PER_RPM;
-        let acceleration = acceleration(values);
+        let ramp = Ramp::Rate(acceleration(values));
+        let moves = |speed: f64| MoveLimits {
+            max_speed: speed.min(max_speed),
+            acceleration: ramp,
+            deceleration: ramp,
+            ..MoveLimits::default()
+        };
+        let velocity = VelocityRamps { start_speed: 0.0, max_speed, acceleration: ramp, deceleration: ramp };
         let (allowed_a, current_time_s) = with_seconds(values.get(ALLOWABLE_CURRENT));
         let current_a = allowed_a * amplitude;
         let (stationary_output, stationary_time_s) = with_seconds(values.get(STATIONARY_OUTPUT));
         let profile_speed = f64::from(values.get(PROFILE_VELOCITY)) * COUNTS_S_PER_RPM;
         Self {
             max_speed,
-            moves: StraightRamps { max_speed: profile_speed.min(max_speed), acceleration },
-            ramps: StraightRamps { max_speed, acceleration },
-            homing_speed: homing_speed(values).min(max_speed),
-            homing_method: homing::method(values.get(HOMING_METHOD)),
+            moves: moves(profile_speed),
+            pulse_moves: moves(max_speed),
+            returning: moves(homing_speed(values)),
+            velocity,
+            ramp,
+            homing: homing_parameters(values, velocity),
             pulses: pulses(values, function),
             servo: servo_model(model),
             gains: gains(values, model),
@@ -126,6 +139,21 @@ fn with_seconds(raw: u16) -> (f32, f32) {
 
 fn is_odd(raw: u16) -> bool {
     raw % 2 == 1
+}
+
+/// One speed, and the position is given up on the way: the shaft is held where it comes to rest.
+fn homing_parameters(values: &Values, ramps: VelocityRamps) -> HomingParameters {
+    let speed = homing_speed(values).min(ramps.max_speed);
+    HomingParameters {
+        sequence: homing::sequence(values.get(HOMING_METHOD)),
+        search_speed: speed,
+        latch_speed: speed,
+        ramps,
+        end: ramps.deceleration,
+        back_off: 0,
+        single_pass: true,
+        control: Control::Velocity,
+    }
 }
 
 fn pulses(values: &Values, function: Function) -> PulseParameters {

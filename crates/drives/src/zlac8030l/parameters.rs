@@ -1,6 +1,7 @@
 //! The dictionary's parameters in physical units, as the engine wants them. Written anew when one changes.
 
 use canopen::od::Object;
+use cia402::StopRamp;
 use motion::commutation::CommutationModel;
 use motion::observer::ObserverGains;
 
@@ -12,7 +13,7 @@ use super::variations::{EMERGENCY_COAST, EMERGENCY_RAMP, OVERLOAD_FROM_FACTOR, S
 use crate::engine::actuator::bleeder::BleederLimits;
 use crate::engine::actuator::overload::{OverloadLimits, between};
 use crate::engine::actuator::servo::{ServoGains, ServoLimits, ServoModel};
-use crate::engine::cia402::{ExternalStop, Parameters as AxisParameters, StopRamp, Tolerances};
+use crate::engine::cia402::{ExternalStop, Parameters as AxisParameters, Tolerances};
 use crate::zltech::ProfileObjects;
 use devices::variant::Variant;
 
@@ -47,6 +48,8 @@ pub(super) struct Parameters {
     pub(super) driver_limit_c: f32,
     /// 202F:01.
     pub(super) alarm_pwm: bool,
+    /// The shaft is held while the drive is not enabled.
+    pub(super) locked_when_disabled: bool,
 }
 
 impl Parameters {
@@ -68,6 +71,7 @@ impl Parameters {
             motor_limit_c: tenths(values, MOTOR_TEMPERATURE_THRESHOLD),
             driver_limit_c: tenths(values, DRIVER_TEMPERATURE_THRESHOLD),
             alarm_pwm: values.get(ALARM_PWM) == 1,
+            locked_when_disabled: values.get(SHAFT_LOCK_WHEN_DISABLED) == 1,
         }
     }
 
@@ -82,7 +86,6 @@ fn axis(values: &Values, variant: &Variant, counts_s_per_rpm: f64) -> AxisParame
     let speed = |rpm: f64| rpm.min(max_rpm) * counts_s_per_rpm;
     AxisParameters {
         torque_slope_a_s: values.get(TORQUE_SLOPE) as f32 * 1e-3,
-        lock_when_disabled: values.get(SHAFT_LOCK_WHEN_DISABLED) == 1,
         emergency_stop: emergency_stop(variant),
         external_stop: match values.get(IO_STOP_PROCESSING) {
             0 => ExternalStop::Hold,
@@ -103,7 +106,7 @@ fn emergency_stop(variant: &Variant) -> StopRamp {
     if variant.is(EMERGENCY_RAMP) {
         StopRamp::QuickStop
     } else if variant.is(EMERGENCY_COAST) {
-        StopRamp::Coast
+        StopRamp::Free
     } else {
         StopRamp::CurrentLimit
     }

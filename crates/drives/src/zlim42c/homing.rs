@@ -5,7 +5,7 @@
 
 use cia402::Direction::{Negative, Positive};
 use cia402::HomingSwitch::{Home, NegativeLimit, PositiveLimit};
-use cia402::{Direction, HomingMethod, HomingRow, HomingSwitch, SwitchEdge};
+use cia402::{Direction, HomingMethod, HomingRow, HomingSequence, HomingSwitch, SwitchEdge};
 
 use super::variations::HOMING_BY_PROSE;
 use devices::variant::Variant;
@@ -39,9 +39,10 @@ const fn row(
     HomingRow { method, switch, search, reverses_at_limit, edge, crossing }
 }
 
-/// The row of 6098h; `None` for 0, no method.
-pub(super) fn method(value: u8, variant: &Variant) -> Option<&'static HomingRow> {
+/// What 6098h asks for; `None` for 0, no method.
+pub(super) fn sequence(value: u8, variant: &Variant) -> Option<HomingSequence> {
     static TABLES: [[HomingRow; 4]; 2] = [BY_LABEL, BY_PROSE];
     let table = &TABLES[usize::from(variant.is(HOMING_BY_PROSE))];
-    table.iter().find(|row| row.method.0 == value as i8)
+    let row = table.iter().find(|row| row.method.0 == value as i8)?;
+    Some(HomingSequence { switch: Some(row), index: None })
 }

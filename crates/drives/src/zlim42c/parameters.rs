@@ -1,5 +1,6 @@
 //! The dictionary's parameters in physical units, as the engine wants them. Written anew when one changes.
 
+use cia402::StopRamp;
 use motion::pid::PiGains;
 
 use super::assumptions::*;
@@ -8,8 +9,8 @@ use super::tables::{PEAK_CURRENTS_A, PULSES_PER_TURN, entry};
 use super::variations::{EMERGENCY_BRAKE, EMERGENCY_COAST};
 use super::{Values, homing};
 use crate::engine::actuator::stepper::{StepperCurrents, StepperGains, StepperModel};
-use crate::engine::axis::{HomingParameters, VelocityRamps};
-use crate::engine::cia402::{Parameters as AxisParameters, StopRamp, Tolerances};
+use crate::engine::axis::{HomingParameters, Ramp, VelocityRamps};
+use crate::engine::cia402::{Parameters as AxisParameters, Tolerances};
 use crate::zltech::ProfileObjects;
 use devices::variant::Variant;
 
@@ -23,6 +24,8 @@ pub(super) struct Parameters {
     /// Pulses/s in one r/min.
     pub(super) pulses_s_per_rpm: f64,
     pub(super) axis: AxisParameters,
+    /// The shaft is held while the drive is not enabled.
+    pub(super) locked_when_disabled: bool,
     pub(super) model: StepperModel,
     pub(super) gains: StepperGains,
     pub(super) currents: StepperCurrents,
@@ -39,6 +42,7 @@ impl Parameters {
             pulses_per_turn,
             pulses_s_per_rpm: f64::from(pulses_per_turn) / 60.0,
             axis: axis(values, variant, pulses_per_turn),
+            locked_when_disabled: values.get(SHAFT_LOCK_WHEN_DISABLED) == 1,
             model: StepperModel {
                 pulses_per_electrical_turn: pulses_per_turn / TEETH as u16,
                 periods_per_command: SUPERVISION_DIVIDER,
@@ -66,27 +70,22 @@ fn pulses_per_turn(values: &Values) -> u16 {
 fn axis(values: &Values, variant: &Variant, pulses_per_turn: u16) -> AxisParameters {
     let speed = |rpm: f64| (rpm * f64::from(pulses_per_turn) / 60.0).min(STEP_FREQUENCY_HZ);
     let shared = PROFILE_OBJECTS.axis(values, values.get(START_SPEED), MAX_SPEED_RPM, speed);
-    let homing_time_s = f64::from(values.get(HOMING_ACCELERATION)) * 1e-3;
+    let homing_ramp = Ramp::Time(f64::from(values.get(HOMING_ACCELERATION)) * 1e-3);
     let emergency_stop = emergency_stop(variant);
     AxisParameters {
         emergency_stop,
-        lock_when_disabled: values.get(SHAFT_LOCK_WHEN_DISABLED) == 1,
-        hold_when_switched_on: true,
         limit_stop: match values.get(LIMIT_STOP_MODE) {
             0 => Some(StopRamp::SlowDown),
             1 => Some(emergency_stop),
             _ => None,
         },
         homing: HomingParameters {
-            row: homing::method(values.get(HOMING_METHOD), variant),
+            sequence: homing::sequence(values.get(HOMING_METHOD), variant),
             search_speed: speed(f64::from(values.get(HOMING_SPEED))),
             latch_speed: speed(f64::from(values.get(HOMING_SEARCH_SPEED))),
-            ramps: VelocityRamps {
-                acceleration_time_s: homing_time_s,
-                deceleration_time_s: homing_time_s,
-                ..shared.velocity
-            },
+            ramps: VelocityRamps { acceleration: homing_ramp, deceleration: homing_ramp, ..shared.velocity },
             back_off: (HOMING_BACK_OFF_TURNS * f64::from(pulses_per_turn)) as u32,
+            ..HomingParameters::default()
         },
         // What is commanded is what there is: every target is reached exactly.
         tolerances: Tolerances { position: 0, velocity: VELOCITY_ROUNDING, current_a: 0.0 },
@@ -100,7 +99,7 @@ fn emergency_stop(variant: &Variant) -> StopRamp {
     if variant.is(EMERGENCY_BRAKE) {
         StopRamp::CurrentLimit
     } else if variant.is(EMERGENCY_COAST) {
-        StopRamp::Coast
+        StopRamp::Free
     } else {
         StopRamp::QuickStop
     }

@@ -7,5 +7,5 @@ mod parameters;
 mod storage;
 pub(crate) mod terminals;
 
-pub(crate) use parameters::ProfileObjects;
+pub(crate) use parameters::{ProfileObjects, idle_task};
 pub(crate) use storage::{mark_if_saving, register_command};

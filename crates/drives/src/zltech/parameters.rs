@@ -1,12 +1,11 @@
 //! The CiA 402 objects that mean the same in both drives, in physical units: speeds in r/min, ramps as times in ms.
 
 use canopen::od::{Dictionary, Object, Table};
-use cia402::{DisableOperationOption, HaltOption, QuickStopOption, ShutdownOption};
+use cia402::{DisableOperationOption, HaltOption, PowerState, QuickStopOption, ShutdownOption, StopRamp};
 
-use crate::engine::axis::MoveLimits;
-use crate::engine::axis::{HomingParameters, VelocityRamps};
+use crate::engine::axis::{Control, HomingParameters, MoveLimits, Ramp, Task, VelocityRamps};
 use crate::engine::cia402::DisableOptions;
-use crate::engine::cia402::{ExternalStop, Parameters as AxisParameters, StopRamp, Tolerances};
+use crate::engine::cia402::{ExternalStop, Parameters as AxisParameters, PowerDrive, Tolerances};
 
 /// Where a drive's table has them.
 pub(crate) struct ProfileObjects {
@@ -46,20 +45,19 @@ impl ProfileObjects {
         max_rpm: f64,
         speed: impl Fn(f64) -> f64,
     ) -> AxisParameters {
-        let time_s = |object| f64::from(values.get(object)) * 1e-3;
+        let ramp = |object| Ramp::Time(f64::from(values.get(object)) * 1e-3);
         let (start_speed, max_speed) = (speed(f64::from(start_rpm)), speed(max_rpm));
-        let (acceleration_time_s, deceleration_time_s) =
-            (time_s(self.profile_acceleration), time_s(self.profile_deceleration));
+        let (acceleration, deceleration) = (ramp(self.profile_acceleration), ramp(self.profile_deceleration));
         AxisParameters {
             moves: MoveLimits {
                 start_speed,
                 max_speed: speed(f64::from(values.get(self.profile_velocity))),
                 end_speed: speed(f64::from(values.get(self.end_velocity))),
-                acceleration_time_s,
-                deceleration_time_s,
+                acceleration,
+                deceleration,
             },
-            velocity: VelocityRamps { start_speed, max_speed, acceleration_time_s, deceleration_time_s },
-            quick_stop_time_s: time_s(self.quick_stop_deceleration),
+            velocity: VelocityRamps { start_speed, max_speed, acceleration, deceleration },
+            quick_stop_ramp: ramp(self.quick_stop_deceleration),
             torque_slope_a_s: 0.0,
             quick_stop: QuickStopOption(values.get(self.quick_stop_option_code)),
             disable: DisableOptions {
@@ -68,12 +66,22 @@ impl ProfileObjects {
             },
             halt: HaltOption(values.get(self.halt_option_code)),
             emergency_stop: StopRamp::CurrentLimit,
-            lock_when_disabled: false,
-            hold_when_switched_on: false,
             limit_stop: None,
             homing: HomingParameters::default(),
             external_stop: ExternalStop::Hold,
-            tolerances: Tolerances { position: 0, velocity: 0.0, current_a: 0.0 },
+            tolerances: Tolerances::default(),
         }
     }
+}
+
+/// What a shaft does that is not enabled: locked if `locked` says so, and from Switched on if `held` does. An external stop
+/// that is to leave the motor free does so here too.
+pub(crate) fn idle_task(axis: &PowerDrive, external_stop: ExternalStop, locked: bool, held: bool) -> Option<Task> {
+    let freed = axis.is_stopped_externally() && external_stop != ExternalStop::Hold;
+    let holds = match axis.state() {
+        PowerState::NotReadyToSwitchOn | PowerState::FaultReactionActive | PowerState::Fault => false,
+        PowerState::SwitchedOn => locked || held,
+        _ => locked,
+    };
+    (holds && !freed).then_some(Task::Hold { control: Control::Position, ramp: Ramp::NONE })
 }

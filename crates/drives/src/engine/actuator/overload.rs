@@ -63,7 +63,7 @@ pub fn between(curve: &[(f32, f32); 3], x: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// The note below the object table of the ZLAC8030L: 20 s, 6 s and 4 s at once, twice and three times.
+    /// As a manual gives it: 20 s, 6 s and 4 s at once, twice and three times.
     const LIMITS: OverloadLimits =
         OverloadLimits { rated_a: 10.0, begins_at: 1.0, curve: [(1.0, 20.0), (2.0, 6.0), (3.0, 4.0)] };
 

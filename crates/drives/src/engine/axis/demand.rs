@@ -27,3 +27,23 @@ pub struct Feedback {
     /// Slower than the drive's threshold of standstill.
     pub standing: bool,
 }
+
+/// The loop that a demand closes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Control {
+    /// Position, with the velocity fed forward.
+    #[default]
+    Position,
+    /// Velocity alone: a load may push the shaft away.
+    Velocity,
+}
+
+impl Control {
+    /// The demand for a point of a trajectory.
+    pub(super) const fn demand(self, point: TrajectoryPoint) -> Demand {
+        match self {
+            Self::Position => Demand::Position(point),
+            Self::Velocity => Demand::Velocity(point),
+        }
+    }
+}

@@ -1,23 +1,24 @@
-//! Profile velocity (CiA 402-2, clause 16): the target velocity is followed along timed S-shaped ramps.
+//! A velocity that is followed along ramps, as profile velocity (CiA 402-2, clause 16) asks for.
 
+use super::ramp::Ramp;
 use super::trajectory::{Trajectory, TrajectoryPoint};
 
-/// Speeds in counts/s, times in seconds.
+/// Speeds in counts/s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VelocityRamps {
     /// A motion from rest begins with this speed.
     pub start_speed: f64,
     /// No target is faster.
     pub max_speed: f64,
-    /// Time of a change to a higher speed.
-    pub acceleration_time_s: f64,
-    /// Time of a change to a lower speed.
-    pub deceleration_time_s: f64,
+    /// Of a change to a higher speed.
+    pub acceleration: Ramp,
+    /// Of a change to a lower speed.
+    pub deceleration: Ramp,
 }
 
 /// What the trajectory leads to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Speed {
+pub(super) struct Speed {
     /// End of the ramp under way; `None` when the trajectory is not of this mode yet.
     heading_for: Option<f64>,
 }
@@ -25,22 +26,31 @@ pub struct Speed {
 impl Speed {
     /// Plans anew when the target (counts/s) has changed or a ramp down to zero has ended on the way to the other
     /// direction.
-    pub fn update(&mut self, target: f64, trajectory: &mut Trajectory, ramps: &VelocityRamps) {
+    #[inline]
+    pub(super) fn update(&mut self, target: f64, trajectory: &mut Trajectory, ramps: &VelocityRamps) {
         let target = target.clamp(-ramps.max_speed, ramps.max_speed);
+        if self.heading_for != Some(target) {
+            self.plan(target, trajectory, ramps);
+        }
+    }
+
+    fn plan(&mut self, target: f64, trajectory: &mut Trajectory, ramps: &VelocityRamps) {
         let now = trajectory.point();
-        let reverses = now.velocity * target < 0.0;
+        // One rate for both ways is one straight line through zero.
+        let straight = ramps.acceleration == ramps.deceleration && matches!(ramps.acceleration, Ramp::Rate(_));
+        let reverses = now.velocity * target < 0.0 && !straight;
         let next = if reverses { 0.0 } else { target };
         if self.heading_for == Some(next) && !(trajectory.is_done() && now.velocity != next) {
             return;
         }
         self.heading_for = Some(next);
         let faster = next.abs() > now.velocity.abs();
-        let time_s = if faster { ramps.acceleration_time_s } else { ramps.deceleration_time_s };
-        *trajectory = Trajectory::change_velocity(self.from(now, next, ramps), next, time_s);
+        let ramp = if faster { ramps.acceleration } else { ramps.deceleration };
+        *trajectory = Trajectory::change_velocity(self.from(now, next, ramps), next, ramp);
     }
 
     /// The trajectory has been put elsewhere: plan anew.
-    pub fn restart(&mut self) {
+    pub(super) fn restart(&mut self) {
         self.heading_for = None;
     }
 
@@ -59,8 +69,12 @@ impl Speed {
 mod tests {
     use super::*;
 
-    const RAMPS: VelocityRamps =
-        VelocityRamps { start_speed: 0.0, max_speed: 5000.0, acceleration_time_s: 0.5, deceleration_time_s: 0.2 };
+    const RAMPS: VelocityRamps = VelocityRamps {
+        start_speed: 0.0,
+        max_speed: 5000.0,
+        acceleration: Ramp::Time(0.5),
+        deceleration: Ramp::Time(0.2),
+    };
 
     struct Bench {
         mode: Speed,
@@ -105,6 +119,18 @@ mod tests {
     }
 
     #[test]
+    fn rates_take_the_time_of_the_change_and_a_reversal_by_one_rate_is_straight() {
+        let (up, down) = (Ramp::Rate(1000.0), Ramp::Rate(2000.0));
+        for (down, reversal_s) in [(up, 2.0), (down, 1.5)] {
+            let ramps = VelocityRamps { acceleration: up, deceleration: down, ..RAMPS };
+            let mut bench = Bench::new();
+            assert!(close(bench.time_to(1000.0, &ramps), 1.0));
+            let time_s = bench.time_to(-1000.0, &ramps);
+            assert!(close(time_s, reversal_s), "{down:?}: {time_s} s");
+        }
+    }
+
+    #[test]
     fn targets_are_held_to_the_highest_speed() {
         let mut bench = Bench::new();
         bench.time_to(9999.0, &RAMPS);
@@ -124,7 +150,7 @@ mod tests {
     #[test]
     fn no_time_is_a_step() {
         let mut bench = Bench::new();
-        let ramps = VelocityRamps { acceleration_time_s: 0.0, ..RAMPS };
+        let ramps = VelocityRamps { acceleration: Ramp::NONE, ..RAMPS };
         assert!(bench.time_to(1000.0, &ramps) <= 2e-3);
     }
 }

@@ -1,9 +1,11 @@
 //! Where the shaft is to be: a planned profile anchored to a position, moved on period by period.
 //!
-//! Units are encoder counts and counts/s. The anchor is a wrapping 32-bit position, so a shaft may turn for ever; the
+//! Units are counts and counts/s. The anchor is a wrapping 32-bit position, so a shaft may turn for ever; the
 //! way since the anchor is in double precision, so a move over 2^31 counts ends exactly.
 
 use motion::{Profile, scurve, trapezoid};
+
+use super::ramp::Ramp;
 
 /// A planned motion and how far it has come.
 #[derive(Clone, Copy, Debug)]
@@ -39,16 +41,7 @@ impl TrajectoryPoint {
     }
 }
 
-/// Speed and acceleration that a move of straight ramps keeps to, in counts and seconds.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StraightRamps {
-    /// Speed of the plateau.
-    pub max_speed: f64,
-    /// Of speeding up and slowing down; 0 for no ramp.
-    pub acceleration: f64,
-}
-
-/// Speeds and times that a move keeps to, in counts and seconds.
+/// What a move keeps to, in counts and seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MoveLimits {
     /// Speed that a motion from rest begins with.
@@ -57,10 +50,10 @@ pub struct MoveLimits {
     pub max_speed: f64,
     /// Speed that the motion ends from.
     pub end_speed: f64,
-    /// Time from the present speed to the plateau.
-    pub acceleration_time_s: f64,
-    /// Time from the plateau to the end speed.
-    pub deceleration_time_s: f64,
+    /// From the present speed to the plateau.
+    pub acceleration: Ramp,
+    /// From the plateau to the end speed.
+    pub deceleration: Ramp,
 }
 
 impl Trajectory {
@@ -69,50 +62,59 @@ impl Trajectory {
         Self { origin: position, fraction: 0.0, profile: scurve::velocity_change(0.0, 0.0, 0.0), elapsed_s: 0.0 }
     }
 
-    /// From `from` to the position `target`, the short way round if the counter wraps in between.
-    pub fn move_to(from: TrajectoryPoint, target: i32, limits: &MoveLimits) -> Self {
-        let distance = f64::from(target.wrapping_sub(from.position)) - from.fraction;
-        let plan = scurve::PositionMove {
-            distance,
-            velocity: from.velocity,
-            start_speed: limits.start_speed,
-            max_speed: limits.max_speed,
-            end_speed: limits.end_speed,
-            acceleration_time_s: limits.acceleration_time_s,
-            deceleration_time_s: limits.deceleration_time_s,
-        };
-        Self { origin: from.position, fraction: from.fraction, profile: plan.plan(), elapsed_s: 0.0 }
+    /// Moving on as at `from`, for as long as nothing else is planned.
+    pub fn steady(from: TrajectoryPoint) -> Self {
+        Self::change_velocity(from, from.velocity, Ramp::NONE)
     }
 
-    /// From the velocity of `from` to `velocity` in `time_s`.
+    /// From `from` to the position `target`, the short way round if the counter wraps in between. With one ramp that is a
+    /// rate the move is straight, and a time stands for the rate that reaches the plateau in it.
+    pub fn move_to(from: TrajectoryPoint, target: i32, limits: &MoveLimits) -> Self {
+        let MoveLimits { start_speed, max_speed, end_speed, .. } = *limits;
+        let distance = f64::from(target.wrapping_sub(from.position)) - from.fraction;
+        let velocity = from.velocity;
+        let profile = match (limits.acceleration, limits.deceleration) {
+            (Ramp::Time(acceleration_time_s), Ramp::Time(deceleration_time_s)) => scurve::PositionMove {
+                distance,
+                velocity,
+                start_speed,
+                max_speed,
+                end_speed,
+                acceleration_time_s,
+                deceleration_time_s,
+            }
+            .plan(),
+            (up, down) => trapezoid::PositionMove {
+                distance,
+                velocity,
+                start_speed,
+                max_speed,
+                end_speed,
+                acceleration: up.rate(max_speed),
+                deceleration: down.rate(max_speed),
+            }
+            .plan(),
+        };
+        Self { origin: from.position, fraction: from.fraction, profile, elapsed_s: 0.0 }
+    }
+
+    /// From the velocity of `from` to `velocity`.
     ///
-    /// An acceleration that already leads there goes on: the change is planned as the rest of a longer one that
-    /// passes `from` with its acceleration. A host that sends a new target every 20 ms is followed smoothly so,
-    /// where ever new beginnings of the S would hardly move. From rest it is the plain S of the time.
-    pub fn change_velocity(from: TrajectoryPoint, velocity: f64, time_s: f64) -> Self {
+    /// Where the ramp is a time, an acceleration that already leads there goes on: the change is planned as the rest of a
+    /// longer one that passes `from` with its acceleration. A host that sends a new target every 20 ms is followed smoothly
+    /// so, where ever new beginnings of the S would hardly move. From rest it is the plain S of the time.
+    pub fn change_velocity(from: TrajectoryPoint, velocity: f64, ramp: Ramp) -> Self {
+        let time_s = match ramp {
+            Ramp::Time(time_s) => time_s,
+            Ramp::Rate(rate) => {
+                let profile = trapezoid::velocity_change(from.velocity, velocity, rate);
+                return Self { origin: from.position, fraction: from.fraction, profile, elapsed_s: 0.0 };
+            }
+        };
         let (change, elapsed_s) = passing(velocity - from.velocity, from.acceleration, time_s);
         let profile = scurve::velocity_change(velocity - change, velocity, time_s);
         let passed = profile.at(elapsed_s).position;
         Self { origin: from.position, fraction: from.fraction - passed, profile, elapsed_s }
-    }
-
-    /// From `from` to the position `target` with straight ramps, the short way round if the counter wraps in between.
-    pub fn move_straight(from: TrajectoryPoint, target: i32, ramps: &StraightRamps) -> Self {
-        let plan = trapezoid::PositionMove {
-            distance: f64::from(target.wrapping_sub(from.position)) - from.fraction,
-            velocity: from.velocity,
-            max_speed: ramps.max_speed,
-            acceleration: ramps.acceleration,
-            deceleration: ramps.acceleration,
-            ..Default::default()
-        };
-        Self { origin: from.position, fraction: from.fraction, profile: plan.plan(), elapsed_s: 0.0 }
-    }
-
-    /// From the velocity of `from` to `velocity` along a straight ramp; an acceleration of 0 is a step.
-    pub fn ramp_velocity(from: TrajectoryPoint, velocity: f64, acceleration: f64) -> Self {
-        let profile = trapezoid::velocity_change(from.velocity, velocity, acceleration);
-        Self { origin: from.position, fraction: from.fraction, profile, elapsed_s: 0.0 }
     }
 
     /// One period on; returns the new point.
@@ -152,6 +154,12 @@ impl Trajectory {
         self.origin = self.origin.wrapping_sub(by);
     }
 
+    /// The motion goes on as planned, from another place.
+    pub fn place(&mut self, position: i32) {
+        self.origin = position;
+        self.fraction = -self.profile.at(self.elapsed_s).position;
+    }
+
     /// A steady motion has no end: begin it anew where it is, so that its way stays small and exact.
     fn re_anchor(&mut self) {
         let now = self.point();
@@ -188,7 +196,7 @@ mod tests {
 
     #[test]
     fn a_velocity_change_takes_its_time_and_half_of_it_is_half_way() {
-        let mut trajectory = Trajectory::change_velocity(TrajectoryPoint::rest(0), 1000.0, 0.5);
+        let mut trajectory = Trajectory::change_velocity(TrajectoryPoint::rest(0), 1000.0, Ramp::Time(0.5));
         let mut points = std::vec::Vec::new();
         while !trajectory.is_done() {
             points.push(trajectory.advance(DT_S));
@@ -201,12 +209,12 @@ mod tests {
     #[test]
     fn a_changed_target_neither_jumps_in_velocity_nor_in_acceleration_nor_in_position() {
         for elapsed in [0, 100, 400, 600, 950] {
-            let mut trajectory = Trajectory::change_velocity(TrajectoryPoint::rest(7), 1000.0, 0.5);
+            let mut trajectory = Trajectory::change_velocity(TrajectoryPoint::rest(7), 1000.0, Ramp::Time(0.5));
             for _ in 0..elapsed {
                 trajectory.advance(DT_S);
             }
             let before = trajectory.point();
-            let after = Trajectory::change_velocity(before, 1500.0, 0.5).point();
+            let after = Trajectory::change_velocity(before, 1500.0, Ramp::Time(0.5)).point();
             assert!((after.velocity - before.velocity).abs() < 1e-6, "{elapsed}");
             assert!((after.acceleration - before.acceleration).abs() < 1e-3, "{elapsed}");
             let way = f64::from(after.position - before.position) + after.fraction - before.fraction;
@@ -222,7 +230,7 @@ mod tests {
         for period in 0..4000 {
             if period % 40 == 0 {
                 target += 50.0;
-                trajectory = Trajectory::change_velocity(trajectory.point(), target, 0.5);
+                trajectory = Trajectory::change_velocity(trajectory.point(), target, Ramp::Time(0.5));
             }
             trajectory.advance(DT_S);
         }
@@ -232,11 +240,11 @@ mod tests {
 
     #[test]
     fn no_velocity_overshoots_a_target_that_comes_nearer() {
-        let mut trajectory = Trajectory::change_velocity(TrajectoryPoint::rest(0), 1000.0, 0.5);
+        let mut trajectory = Trajectory::change_velocity(TrajectoryPoint::rest(0), 1000.0, Ramp::Time(0.5));
         for _ in 0..500 {
             trajectory.advance(DT_S);
         }
-        let mut trajectory = Trajectory::change_velocity(trajectory.point(), 510.0, 0.5);
+        let mut trajectory = Trajectory::change_velocity(trajectory.point(), 510.0, Ramp::Time(0.5));
         while !trajectory.is_done() {
             assert!(trajectory.advance(DT_S).velocity <= 510.0 + 1e-6);
         }
@@ -244,8 +252,8 @@ mod tests {
 
     #[test]
     fn a_move_across_the_wrap_of_the_counter_ends_on_its_target() {
-        let limits =
-            MoveLimits { max_speed: 1e5, acceleration_time_s: 0.1, deceleration_time_s: 0.1, ..Default::default() };
+        let ramp = Ramp::Time(0.1);
+        let limits = MoveLimits { max_speed: 1e5, acceleration: ramp, deceleration: ramp, ..Default::default() };
         let mut trajectory = Trajectory::move_to(TrajectoryPoint::rest(i32::MAX - 10), i32::MIN + 10, &limits);
         while !trajectory.is_resting() {
             trajectory.advance(DT_S);
@@ -256,27 +264,42 @@ mod tests {
     #[test]
     fn straight_ramps_take_the_time_of_their_trapezoid() {
         // 1000 counts at most 1000 counts/s and 2000 counts/s²: 0.5 s up, 0.5 s level, 0.5 s down.
-        let ramps = StraightRamps { max_speed: 1000.0, acceleration: 2000.0 };
-        let mut trajectory = Trajectory::move_straight(TrajectoryPoint::rest(-200), 800, &ramps);
-        let mut periods = 0;
-        while !trajectory.is_resting() {
-            trajectory.advance(DT_S);
-            periods += 1;
+        let up = Ramp::Rate(2000.0);
+        for down in [Ramp::Rate(2000.0), Ramp::Time(0.5)] {
+            let limits = MoveLimits { max_speed: 1000.0, acceleration: up, deceleration: down, ..Default::default() };
+            let mut trajectory = Trajectory::move_to(TrajectoryPoint::rest(-200), 800, &limits);
+            let mut periods = 0;
+            while !trajectory.is_resting() {
+                trajectory.advance(DT_S);
+                periods += 1;
+            }
+            assert!((f64::from(periods) * DT_S - 1.5).abs() < 2.0 * DT_S, "{periods}");
+            assert_eq!(trajectory.point().position, 800);
         }
-        assert!((f64::from(periods) * DT_S - 1.5).abs() < 2.0 * DT_S, "{periods}");
-        assert_eq!(trajectory.point().position, 800);
-        let mut trajectory = Trajectory::ramp_velocity(TrajectoryPoint::rest(0), -500.0, 2000.0);
+        let mut trajectory = Trajectory::change_velocity(TrajectoryPoint::rest(0), -500.0, up);
         for _ in 0..500 {
             trajectory.advance(DT_S);
         }
         assert!(trajectory.is_done() && trajectory.point().velocity == -500.0);
-        let stepped = Trajectory::ramp_velocity(TrajectoryPoint::rest(0), 500.0, 0.0);
-        assert_eq!(stepped.point().velocity, 500.0);
+        for step in [Ramp::NONE, Ramp::Rate(0.0)] {
+            let stepped = Trajectory::change_velocity(TrajectoryPoint::rest(0), 500.0, step);
+            assert!(step.is_none() && stepped.point().velocity == 500.0);
+        }
+    }
+
+    #[test]
+    fn a_motion_goes_on_from_another_place_as_it_was_planned() {
+        let mut trajectory = Trajectory::change_velocity(TrajectoryPoint::rest(0), 1000.0, Ramp::Time(0.5));
+        (0..300).for_each(|_| _ = trajectory.advance(DT_S));
+        let before = trajectory.point();
+        trajectory.place(70_000);
+        assert_eq!(trajectory.point(), TrajectoryPoint { position: 70_000, fraction: 0.0, ..before });
+        assert!(trajectory.advance(DT_S).velocity > before.velocity);
     }
 
     #[test]
     fn a_steady_motion_stays_exact_for_hours() {
-        let mut trajectory = Trajectory::change_velocity(TrajectoryPoint::rest(0), 2000.0, 0.0);
+        let mut trajectory = Trajectory::change_velocity(TrajectoryPoint::rest(0), 2000.0, Ramp::Time(0.0));
         for _ in 0..2_000_000 {
             trajectory.advance(DT_S);
         }

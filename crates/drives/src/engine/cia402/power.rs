@@ -92,11 +92,20 @@ impl PowerMachine {
         self.take(PowerEvent::Command(PowerCommand::DisableVoltage));
     }
 
-    /// A fault occurred. These drives switch off or short the motor at once, so the fault reaction ends as it begins.
+    /// A fault occurred: its reaction begins.
     pub fn fault(&mut self) {
         self.pending = None;
         self.take(PowerEvent::FaultOccurred);
+    }
+
+    /// The fault reaction has ended.
+    pub fn fault_reaction_done(&mut self) {
         self.take(PowerEvent::FaultReactionDone);
+    }
+
+    /// The quick stop has ended, and its option code says to leave Quick stop active.
+    pub fn quick_stop_done(&mut self) {
+        self.take(PowerEvent::QuickStopDone);
     }
 
     /// The cause of the fault is gone and its reset was asked for.
@@ -160,6 +169,10 @@ mod tests {
     fn only_a_rising_bit_7_in_fault_asks_for_a_reset() {
         let mut power = after(&[6, 7, 0x80], RAMP);
         power.fault();
+        assert_eq!(power.state(), PowerState::FaultReactionActive);
+        assert!(!power.command(Controlword(0), RAMP), "nothing is taken before the reaction has ended");
+        power.command(Controlword(0x80), RAMP);
+        power.fault_reaction_done();
         assert_eq!(power.state(), PowerState::Fault);
         assert!(!power.command(Controlword(0x80), RAMP), "it stood already");
         power.command(Controlword(0), RAMP);

@@ -1,7 +1,5 @@
 //! Profile position (CiA 402-2, clause 10): set-points with a queue of one, and the handshake of bits 4, 5, 6 and 12.
 
-use crate::engine::axis::{MoveLimits, Trajectory};
-
 /// A set-point as the controlword hands it over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SetPoint {
@@ -30,8 +28,7 @@ impl SetPoints {
     }
 
     /// Bit 4 rose. Aims at the set-point, or puts it into the queue; a set-point that finds the queue full is lost, and
-    /// the acknowledge bit shows it by not falling before. Whether to set off now: without it the move begins with
-    /// [`resume`](Self::resume), as after a halt.
+    /// the acknowledge bit shows it by not falling before. True if the move to [`target`](Self::target) begins now.
     #[must_use]
     pub fn take(&mut self, set_point: SetPoint) -> bool {
         let at_once = !self.under_way || set_point.immediately;
@@ -47,17 +44,21 @@ impl SetPoints {
         at_once
     }
 
-    /// One period, after the trajectory has moved on: a set-point that waits follows one that has ended, and the
-    /// acknowledge bit falls once bit 4 (`new_set_point`) is down and the queue has room.
-    pub fn update(&mut self, new_set_point: bool, trajectory: &mut Trajectory, limits: &MoveLimits) {
-        if self.under_way && trajectory.is_resting() {
+    /// One period, after the shaft has moved on: a set-point that waits follows one that has ended (`at_rest`), and the
+    /// acknowledge bit falls once bit 4 (`new_set_point`) is down and the queue has room. True if the move to
+    /// [`target`](Self::target) begins now.
+    #[must_use]
+    pub fn update(&mut self, new_set_point: bool, at_rest: bool) -> bool {
+        let mut begins = false;
+        if self.under_way && at_rest {
             self.under_way = false;
             if let Some(next) = self.waiting.take() {
                 self.aim(next);
-                self.resume(trajectory, limits);
+                begins = true;
             }
         }
         self.release(new_set_point);
+        begins
     }
 
     /// The acknowledge bit falls when bit 4 is down and the queue has room.
@@ -67,11 +68,9 @@ impl SetPoints {
         }
     }
 
-    /// Sets off to the target from where the shaft is, or goes on after a halt.
-    pub fn resume(&mut self, trajectory: &mut Trajectory, limits: &MoveLimits) {
-        if self.under_way {
-            *trajectory = Trajectory::move_to(trajectory.point(), self.target, limits);
-        }
+    /// The present or last target.
+    pub const fn target(&self) -> i32 {
+        self.target
     }
 
     /// The shaft stands elsewhere than the target: relative moves count from here, unless a move is to go on.
@@ -113,13 +112,14 @@ impl SetPoints {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::axis::{MoveLimits, Ramp, Trajectory};
 
     const LIMITS: MoveLimits = MoveLimits {
         start_speed: 0.0,
         max_speed: 1000.0,
         end_speed: 0.0,
-        acceleration_time_s: 0.1,
-        deceleration_time_s: 0.1,
+        acceleration: Ramp::Time(0.1),
+        deceleration: Ramp::Time(0.1),
     };
 
     struct Bench {
@@ -134,14 +134,20 @@ mod tests {
 
         fn take(&mut self, target: i32, relative: bool, immediately: bool) {
             if self.mode.take(SetPoint { target, relative, immediately }) {
-                self.mode.resume(&mut self.trajectory, &LIMITS);
+                self.set_off();
             }
+        }
+
+        fn set_off(&mut self) {
+            self.trajectory = Trajectory::move_to(self.trajectory.point(), self.mode.target(), &LIMITS);
         }
 
         fn run(&mut self, periods: u32, bit_4: bool) -> i32 {
             for _ in 0..periods {
                 self.trajectory.advance(1e-3);
-                self.mode.update(bit_4, &mut self.trajectory, &LIMITS);
+                if self.mode.update(bit_4, self.trajectory.is_resting()) {
+                    self.set_off();
+                }
             }
             self.trajectory.point().position
         }

@@ -1,10 +1,12 @@
-//! What stops a motor, and how fast.
+//! What stops a motor, and how.
 
-use cia402::{HaltOption, QuickStopOption};
+use cia402::{HaltOption, QuickStopOption, StopRamp};
 
-/// What may stop the motor while the axis is enabled; the first that applies decides on the ramp.
+/// What may stop the motor while the axis is live; the first that applies decides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopCause {
+    /// Fault reaction active.
+    Fault,
     /// Quick stop active.
     QuickStop,
     /// A digital input.
@@ -17,32 +19,6 @@ pub enum StopCause {
     Limit,
     /// Bit 8 of the controlword.
     Halt,
-}
-
-/// How fast to stop.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StopRamp {
-    /// With the deceleration of the profiles.
-    SlowDown,
-    /// With the quick stop's deceleration.
-    QuickStop,
-    /// As fast as the current limit allows.
-    CurrentLimit,
-    /// The power stage is off, and the motor coasts.
-    Coast,
-}
-
-/// A stop under way.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Stop {
-    pub(super) cause: StopCause,
-    pub(super) ramp: StopRamp,
-    /// How long the ramp has been over, s.
-    pub(super) over_for_s: f64,
-    /// The shaft is held where it came to rest.
-    pub(super) held: bool,
-    /// The power stage is off.
-    pub(super) free: bool,
 }
 
 /// How an external stop ends.
@@ -61,43 +37,27 @@ impl ExternalStop {
     /// one that is to be held has to stop first.
     pub(super) fn ramp(self, option: QuickStopOption, emergency: StopRamp) -> StopRamp {
         match (self, emergency) {
-            (Self::Hold, StopRamp::Coast) => StopRamp::of_quick_stop(option, StopRamp::CurrentLimit),
-            (Self::Hold, _) => StopRamp::of_quick_stop(option, emergency),
-            (Self::LetGo | Self::Disable, _) => StopRamp::of_quick_stop(option, StopRamp::Coast),
+            (Self::Hold, StopRamp::Free) => of_quick_stop(option, StopRamp::CurrentLimit),
+            (Self::Hold, _) => of_quick_stop(option, emergency),
+            (Self::LetGo | Self::Disable, _) => of_quick_stop(option, StopRamp::Free),
         }
     }
 }
 
-impl Stop {
-    /// The motor is to be free: it coasts, or it was held and is let go.
-    pub(super) fn is_released(&self, end: ExternalStop) -> bool {
-        let let_go = self.held && self.cause == StopCause::External && end == ExternalStop::LetGo;
-        self.ramp == StopRamp::Coast || let_go
-    }
-
-    /// The axis is to be disabled now.
-    pub(super) fn disables(&self, end: ExternalStop) -> bool {
-        let over = self.held || self.ramp == StopRamp::Coast;
-        self.cause == StopCause::External && end == ExternalStop::Disable && over
-    }
+/// The ramp of 605Ah; `emergency` is what the drive does where CiA 402 has the current or the voltage limit.
+pub(super) fn of_quick_stop(option: QuickStopOption, emergency: StopRamp) -> StopRamp {
+    or_emergency(option.ramp(), emergency)
 }
 
-impl StopRamp {
-    /// The ramp of 605Ah; `emergency` is what the drive does where CiA 402 has the current limit.
-    pub const fn of_quick_stop(option: QuickStopOption, emergency: Self) -> Self {
-        match option {
-            QuickStopOption::SLOW_DOWN | QuickStopOption::SLOW_DOWN_AND_STAY => Self::SlowDown,
-            QuickStopOption::QUICK_STOP | QuickStopOption::QUICK_STOP_AND_STAY => Self::QuickStop,
-            _ => emergency,
-        }
-    }
+/// The ramp of 605Dh; `emergency` as for [`of_quick_stop`].
+pub(super) fn of_halt(option: HaltOption, emergency: StopRamp) -> StopRamp {
+    or_emergency(option.ramp(), emergency)
+}
 
-    /// The ramp of 605Dh; `emergency` as for [`of_quick_stop`](Self::of_quick_stop).
-    pub const fn of_halt(option: HaltOption, emergency: Self) -> Self {
-        match option {
-            HaltOption::SLOW_DOWN => Self::SlowDown,
-            HaltOption::QUICK_STOP => Self::QuickStop,
-            _ => emergency,
-        }
+/// Values that the standard leaves to makers stop as hard as the drive can.
+pub(super) fn or_emergency(ramp: Option<StopRamp>, emergency: StopRamp) -> StopRamp {
+    match ramp {
+        Some(ramp @ (StopRamp::Free | StopRamp::SlowDown | StopRamp::QuickStop)) => ramp,
+        Some(StopRamp::CurrentLimit | StopRamp::VoltageLimit) | None => emergency,
     }
 }

@@ -6,16 +6,21 @@ use canopen::node::Via;
 use canopen::od::{DefaultValue, Slot};
 use cia402::{Controlword, ModeOfOperation};
 
-use super::{Homing, MJoint, OwnMotion};
+use super::{HomingState, MJoint, OwnMotion};
+use crate::engine::axis::{Control, Demand, Task};
 use crate::engine::device::{Application, Device};
-use crate::mjoint::assumptions::{SET_ORIGIN, SUPERVISION_DIVIDER};
-use crate::mjoint::homing::Run;
+use crate::mjoint::assumptions::{INTERPOLATION_PERIODS, SET_ORIGIN, SUPERVISION_DIVIDER, SUPERVISION_PERIOD_S};
+use crate::mjoint::homing::switches;
 use crate::mjoint::objects::effects::{Effect, effect};
 use crate::mjoint::objects::*;
 use crate::mjoint::parameters::TimeBase;
+use crate::mjoint::variations::ORIGIN_AT_EDGE;
 
 /// Bits 1 to 3 of the controlword, without which nothing moves.
 const MAY_MOVE: u16 = Controlword::ENABLE_VOLTAGE | Controlword::QUICK_STOP | Controlword::ENABLE_OPERATION;
+
+/// From one point of an interpolation to the next.
+const INTERPOLATION_PERIOD_S: f64 = INTERPOLATION_PERIODS as f64 * SUPERVISION_PERIOD_S as f64;
 
 /// The RPDO whose position waits for SYNC.
 const SYNCHRONOUS_RPDO: u16 = 4;
@@ -107,13 +112,13 @@ impl MJoint {
     fn select_mode(&mut self, mode: ModeOfOperation) {
         self.refresh_parameters();
         if mode == ModeOfOperation::HOMING {
-            if !self.homing.is_under_way() {
+            if !self.is_homing() {
                 self.begin_homing(mode);
             }
         } else if mode != self.mode {
-            self.homing = Homing::None;
             self.next_point = None;
-            self.axis.hold(&self.parameters.ramps);
+            self.rest();
+            self.axis.forget_homing();
         }
         self.mode = mode;
         self.update_power_stage();
@@ -124,8 +129,37 @@ impl MJoint {
         self.next_point = None;
         self.own_motion = OwnMotion::None;
         let (pu, dir) = (self.inputs.levels() & 1 != 0, self.inputs.levels() & 2 != 0);
-        let run = self.parameters.homing_method.filter(|_| self.can_be_live()).map(|method| Run::new(method, pu, dir));
-        self.homing = run.map_or(Homing::Failed, Homing::Running);
+        let mut homing = self.parameters.homing;
+        self.axis.set_switches(switches(homing.sequence, pu, dir));
+        if self.can_be_live() {
+            self.engage();
+        } else {
+            homing.sequence = None;
+        }
+        self.axis.begin(Task::Home(homing));
+    }
+
+    /// Homing is on its way.
+    pub(super) fn is_homing(&self) -> bool {
+        matches!(self.homing(), HomingState::Running | HomingState::Stopping)
+    }
+
+    /// Homing has the motor: on the way, and holding at its end.
+    pub(super) fn has_homing_the_motor(&self) -> bool {
+        self.is_homing() || self.homing() == HomingState::Attained
+    }
+
+    /// Where homing stands; the origin may be made at the edge, before the shaft has come to rest.
+    pub(super) fn homing(&self) -> HomingState {
+        match self.axis.homing() {
+            HomingState::Stopping if self.device.variant().is(ORIGIN_AT_EDGE) => HomingState::Attained,
+            state => state,
+        }
+    }
+
+    /// Slows down and stays: whatever was under way is over.
+    pub(super) fn rest(&mut self) {
+        self.axis.begin(Task::Hold { control: Control::Position, ramp: self.parameters.ramp });
     }
 
     /// 607Ah: with bit 5 each write starts a move, and so does SYNC with the position of RPDO4. Else it waits.
@@ -145,7 +179,7 @@ impl MJoint {
         if self.parameters.time_base != TimeBase::Own {
             self.dir_changes = 0;
             let at_rest = self.axis.is_resting();
-            self.axis.interpolate(target, self.parameters.max_speed);
+            self.interpolate(target);
             self.base_periods = 0;
             // On the way a SYNC that comes a control period early or late does not move the loops. From rest all axes
             // begin in the next control period, wherever in their own rhythm they are.
@@ -157,22 +191,28 @@ impl MJoint {
         }
     }
 
+    /// To the next point of an interpolation.
+    pub(super) fn interpolate(&mut self, target: i32) {
+        let max_speed = self.parameters.max_speed;
+        self.axis.begin(Task::Interpolate { target, time_s: INTERPOLATION_PERIOD_S, max_speed });
+    }
+
     fn start_move(&mut self, target: i32) {
         if !self.may_move() {
             return;
         }
         self.refresh_parameters();
         let relative = self.controlword.has(Controlword::RELATIVE);
-        let target = if relative { self.axis.base().wrapping_add(target) } else { target };
-        self.axis.move_to(target, &self.parameters.moves);
+        let target = if relative { self.axis.target().wrapping_add(target) } else { target };
+        self.axis.begin(Task::Move { target, limits: self.parameters.moves });
     }
 
     /// 260Ch: so many counts more, at once.
     fn increment(&mut self, by: i32) {
         if self.may_move() && self.mode == ModeOfOperation::PROFILE_POSITION {
             self.refresh_parameters();
-            let target = self.axis.base().wrapping_add(by);
-            self.axis.move_to(target, &self.parameters.moves);
+            let target = self.axis.target().wrapping_add(by);
+            self.axis.begin(Task::Move { target, limits: self.parameters.moves });
         }
     }
 
@@ -187,7 +227,7 @@ impl MJoint {
     /// The motor is the host's: what it did by itself ends where it is.
     fn take_from_pulses(&mut self) {
         if core::mem::replace(&mut self.own_motion, OwnMotion::None) != OwnMotion::None {
-            self.axis.hold(&self.parameters.ramps);
+            self.rest();
         }
     }
 
@@ -275,7 +315,7 @@ impl MJoint {
 
     /// The power stage drives the motor: bit 1 of the controlword, homing in mode 6, or the joint's own motion.
     fn wants_to_be_live(&self) -> bool {
-        let homing = self.homing.is_live();
+        let homing = self.has_homing_the_motor();
         let own = matches!(self.own_motion, OwnMotion::Returning | OwnMotion::Following);
         self.can_be_live() && (self.controlword.has(Controlword::ENABLE_VOLTAGE) || homing || own)
     }
@@ -283,12 +323,20 @@ impl MJoint {
     /// Takes the shaft over or lets go of it, as it has become right.
     pub(super) fn update_power_stage(&mut self) {
         let live = self.wants_to_be_live();
-        if live && !self.axis.is_engaged() {
-            self.axis.engage(&self.parameters.ramps);
+        if live {
+            self.engage();
         } else if !live && self.axis.is_engaged() {
             self.axis.release();
             self.next_point = None;
-            self.demand = crate::engine::axis::Demand::Off;
+            self.demand = Demand::Off;
+        }
+    }
+
+    /// Takes the shaft over as it turns, and brings it to rest.
+    fn engage(&mut self) {
+        if !self.axis.is_engaged() {
+            self.axis.engage();
+            self.rest();
         }
     }
 }

@@ -4,22 +4,26 @@ use cia402::{Controlword, ModeOfOperation};
 use motion::field_weakening::torque_share;
 use motion::filter::LowPassGains;
 
-use super::{Homing, MJoint, OwnMotion};
+use super::{HomingState, MJoint, OwnMotion};
 use crate::engine::actuator::servo::ServoLimits;
-use crate::engine::axis::Demand;
+use crate::engine::axis::{Braking, Demand, Feedback, Stop, StopEnd, Task};
 use crate::engine::faults::FaultSet;
 use crate::mjoint::alarms::{self, row};
 use crate::mjoint::assumptions::*;
-use crate::mjoint::axis::Feedback;
 use crate::mjoint::gains::MODULATION_LIMIT;
 use crate::mjoint::hardware::Sensors;
+use crate::mjoint::homing::switches;
 use crate::mjoint::objects::TARGET_VELOCITY;
 use crate::mjoint::parameters::{Parameters, TimeBase};
 use crate::mjoint::power_on::Function;
 use crate::mjoint::protection::Situation;
-use crate::mjoint::variations::{ORIGIN_AT_EDGE, STAYS_FREE};
+use crate::mjoint::variations::STAYS_FREE;
 
 const DT_S: f64 = SUPERVISION_PERIOD_S as f64;
+/// A stop is abrupt and then holds ("stops abruptly, but is still in the self-locking state"); what was under way goes on
+/// afterwards.
+const STOP: Stop =
+    Stop { braking: Braking::CurrentLimit, on_path: false, end: StopEnd::Hold, patience_s: f64::INFINITY };
 /// Amplitude of a phase over the voltage of the bus.
 const INV_SQRT_3: f32 = 0.577_350_26;
 
@@ -32,7 +36,7 @@ impl MJoint {
             self.awake = true;
             self.dir = sensors.dir;
             (self.angle_count, self.position) = (angle, position);
-            self.axis.observe(Feedback { position: self.position, velocity: 0.0, standing: true });
+            self.axis.observe(Feedback { position: self.position, standing: true, ..Feedback::default() });
         }
         let moved = within_half_a_turn(angle.wrapping_sub(self.angle_count));
         self.angle_count = angle;
@@ -53,18 +57,11 @@ impl MJoint {
 
     /// Homing looks at its switch every control period, undelayed.
     pub(super) fn watch_for_origin(&mut self, sensors: &Sensors) {
-        let Homing::Running(run) = &mut self.homing else { return };
-        if run.update(sensors.pu, sensors.dir, self.axis.direction()) {
-            self.homing = Homing::Slowing;
-            if self.device.variant().is(ORIGIN_AT_EDGE) {
-                self.end_homing();
-            }
+        let (HomingState::Running, Task::Home(homing)) = (self.axis.homing(), self.axis.task()) else { return };
+        self.axis.watch(switches(homing.sequence, sensors.pu, sensors.dir));
+        if self.homing() == HomingState::Attained {
+            self.make_origin();
         }
-    }
-
-    fn end_homing(&mut self) {
-        self.homing = Homing::Attained;
-        self.make_origin();
     }
 
     /// Every tenth control period.
@@ -80,12 +77,12 @@ impl MJoint {
         if self.axis.is_engaged() {
             self.direct();
         }
-        if matches!(self.homing, Homing::Slowing) && self.axis.is_done() && feedback.standing {
-            self.axis.stay();
-            self.end_homing();
-        }
         let base_s = self.time_base_s();
-        self.demand = self.axis.update(DT_S, base_s);
+        let homing = self.homing();
+        self.demand = self.axis.update_by(DT_S, base_s);
+        if homing == HomingState::Stopping && self.homing() == HomingState::Attained {
+            self.make_origin();
+        }
         let direct_a = self.weaken_field(sensors);
         let Parameters { servo, gains, limits, .. } = &self.parameters;
         let limits = ServoLimits { current_a: torque_share(limits.current_a, direct_a), ..*limits };
@@ -112,7 +109,8 @@ impl MJoint {
     /// By how much the time base of the interpolation went on in this period.
     fn time_base_s(&mut self) -> f64 {
         let changes = core::mem::take(&mut self.dir_changes);
-        if self.parameters.time_base == TimeBase::Dir { f64::from(changes) * DIR_CLOCK_S } else { DT_S }
+        let by_dir = self.parameters.time_base == TimeBase::Dir && self.own_motion == OwnMotion::None;
+        if by_dir { f64::from(changes) * DIR_CLOCK_S } else { DT_S }
     }
 
     pub(super) fn modulate(&mut self, sensors: &Sensors) {
@@ -143,6 +141,7 @@ impl MJoint {
         Feedback {
             position: self.position,
             velocity: f64::from(rpm) * COUNTS_S_PER_RPM,
+            current_a,
             standing: rpm.abs() < STANDSTILL_RPM,
         }
     }
@@ -176,8 +175,8 @@ impl MJoint {
     }
 
     pub(super) fn fail_homing(&mut self) {
-        if self.homing.is_under_way() {
-            self.homing = Homing::Failed;
+        if self.is_homing() {
+            self.rest();
         }
     }
 
@@ -196,7 +195,7 @@ impl MJoint {
             OwnMotion::Returning if self.axis.is_done() => self.own_motion = OwnMotion::Following,
             OwnMotion::Returning => {}
             _ if self.is_host_in_control() || !self.can_be_live() => {}
-            _ if self.homing.is_under_way() => {}
+            _ if self.is_homing() => {}
             _ if self.function == Function::DutyCycleSpeed => self.follow_duty(sensors),
             _ => self.follow_pulses(by),
         }
@@ -215,9 +214,7 @@ impl MJoint {
         let Some(target) = target.filter(|_| self.can_be_live()) else { return };
         self.own_motion = OwnMotion::Returning;
         self.update_power_stage();
-        let ramps =
-            crate::engine::axis::StraightRamps { max_speed: self.parameters.homing_speed, ..self.parameters.ramps };
-        self.axis.move_to(target, &ramps);
+        self.axis.begin(Task::Move { target, limits: self.parameters.returning });
     }
 
     /// "Pulse mode: reenergize automatically back to the power off position" ("Characteristic").
@@ -231,7 +228,12 @@ impl MJoint {
         }
         self.own_motion = OwnMotion::Following;
         self.update_power_stage();
-        self.axis.follow(by, &self.parameters.ramps, DT_S);
+        let target = self.axis.target().wrapping_add(by);
+        if self.parameters.ramp.is_none() {
+            self.axis.begin(Task::Interpolate { target, time_s: DT_S, max_speed: 0.0 });
+        } else if by != 0 || !matches!(self.axis.task(), Task::Move { .. }) {
+            self.axis.begin(Task::Move { target, limits: self.parameters.pulse_moves });
+        }
     }
 
     fn follow_duty(&mut self, sensors: &Sensors) {
@@ -241,45 +243,42 @@ impl MJoint {
         }
         self.own_motion = OwnMotion::Following;
         self.update_power_stage();
-        self.axis.turn(rpm * COUNTS_S_PER_RPM, &self.parameters.ramps);
+        self.axis.begin(Task::Speed { velocity: rpm * COUNTS_S_PER_RPM, ramps: self.parameters.velocity });
     }
 
     /// Stops, and modes that give a new demand each period.
     fn direct(&mut self) {
-        let ramps = self.parameters.ramps;
         let by_host = self.own_motion == OwnMotion::None;
-        let homing = self.homing.is_live();
+        let homing = self.has_homing_the_motor();
         let forbidden = by_host && !homing && !self.may_move();
+        let halted = self.controlword.has(Controlword::HALT) && by_host;
+        let host_lost = self.alarms.latched().has(row::COMMUNICATION);
+        self.axis.set_stop((forbidden || halted || host_lost).then_some(STOP));
         if forbidden {
             // Quick stop and disabled operation end a move; halt and a lost host let it go on afterwards.
             self.next_point = None;
-            self.axis.abandon();
+            self.rest();
         }
-        let halted = self.controlword.has(Controlword::HALT) && by_host;
-        let host_lost = self.alarms.latched().has(row::COMMUNICATION);
-        self.axis.set_stop(forbidden || halted || host_lost, &ramps, self.parameters.max_speed);
         if by_host && !forbidden {
             self.direct_by_mode();
         }
     }
 
     fn direct_by_mode(&mut self) {
-        let ramps = self.parameters.ramps;
-        match (self.mode, &self.homing) {
-            (ModeOfOperation::HOMING, Homing::Running(run)) => {
-                let speed = f64::from(run.direction()) * self.parameters.homing_speed;
-                self.axis.turn(speed, &ramps);
+        match self.mode {
+            ModeOfOperation::PROFILE_VELOCITY => {
+                let (velocity, ramps) = (self.target_velocity(), self.parameters.velocity);
+                self.axis.begin(Task::Speed { velocity, ramps });
             }
-            (ModeOfOperation::PROFILE_VELOCITY, _) => self.axis.turn(self.target_velocity(), &ramps),
-            (ModeOfOperation::INTERPOLATED_POSITION, _) => {
+            ModeOfOperation::INTERPOLATED_POSITION => {
                 self.base_periods = (self.base_periods + 1) % INTERPOLATION_PERIODS;
                 if self.base_periods == 0
                     && let Some(target) = self.next_point.take()
                 {
-                    self.axis.interpolate(target, self.parameters.max_speed);
+                    self.interpolate(target);
                 }
             }
-            (ModeOfOperation::HOMING, _) => self.axis.hold(&ramps),
+            ModeOfOperation::HOMING if !matches!(self.axis.task(), Task::Home(_)) => self.rest(),
             _ => {}
         }
     }

@@ -20,9 +20,7 @@ use motion::filter::LowPass;
 
 use super::alarms::{self, ALARM_COUNT, ALARMS, row};
 use super::assumptions::*;
-use super::axis::Axis;
 use super::hardware::{Actuation, Battery, Brake, Hardware, PowerStage, Sensors};
-use super::homing::Run;
 use super::leds::leds;
 use super::model::Model;
 use super::objects::*;
@@ -35,7 +33,7 @@ use super::variations::{self, VARIANT};
 use super::{Values, storage};
 use crate::communication::communication;
 use crate::engine::actuator::servo::Servo;
-use crate::engine::axis::Demand;
+use crate::engine::axis::{Axis, Demand, HomingState};
 use crate::engine::device::{Application, Device};
 use crate::engine::faults::FaultMonitor;
 use crate::engine::inputs::Inputs;
@@ -82,7 +80,6 @@ pub struct MJoint {
 
     controlword: Controlword,
     mode: ModeOfOperation,
-    homing: Homing,
     own_motion: OwnMotion,
     /// A target of mode 7 that waits for the free-running time base.
     next_point: Option<i32>,
@@ -113,29 +110,6 @@ pub struct MJoint {
     periods: u8,
     /// Supervision periods in the present 2 ms.
     base_periods: u8,
-}
-
-/// Where homing is.
-#[derive(Clone, Copy, Debug)]
-enum Homing {
-    /// Not begun.
-    None,
-    Running(Run),
-    /// The edge has passed: it slows down, and where it then stands is the origin.
-    Slowing,
-    Attained,
-    Failed,
-}
-
-impl Homing {
-    const fn is_under_way(&self) -> bool {
-        matches!(self, Self::Running(_) | Self::Slowing)
-    }
-
-    /// It has the motor: on the way, and holding at its end.
-    const fn is_live(&self) -> bool {
-        self.is_under_way() || matches!(self, Self::Attained)
-    }
 }
 
 /// What the joint does without being told over CAN.
@@ -189,7 +163,6 @@ impl MJoint {
             output_was_enabled: true,
             controlword: Controlword(0),
             mode: ModeOfOperation::PROFILE_POSITION,
-            homing: Homing::None,
             own_motion: OwnMotion::None,
             next_point: None,
             axis: Axis::new(),

@@ -2,7 +2,7 @@
 
 use cia402::{Controlword, ModeOfOperation};
 
-use super::{HEARTBEAT_ALARM, Homing, MJoint, OwnMotion};
+use super::{HEARTBEAT_ALARM, HomingState, MJoint, OwnMotion};
 use crate::engine::axis::Demand;
 use crate::mjoint::alarms;
 use crate::mjoint::assumptions::{COUNTS_S_PER_RPM, POSITION_REACHED_COUNTS, SPEED_REACHED_RPM, STANDSTILL_RPM};
@@ -61,8 +61,8 @@ impl MJoint {
             alarm: !self.alarms.latched().is_empty(),
             live: self.is_shown_live(),
             reached: self.is_target_reached(),
-            homing_attained: in_homing && matches!(self.homing, Homing::Attained),
-            homing_error: in_homing && matches!(self.homing, Homing::Failed),
+            homing_attained: in_homing && self.homing() == HomingState::Attained,
+            homing_error: in_homing && self.homing() == HomingState::Failed,
         };
         self.device.values_mut().set(STATUSWORD, statusword(&condition).0);
     }
@@ -70,7 +70,7 @@ impl MJoint {
     /// Bit 4: of a joint that takes pulses it tells nothing until the host asks. 0404h is what 5.10.1 prints for one that
     /// was just switched on, and such a one holds its shaft.
     fn is_shown_live(&self) -> bool {
-        let by_host = self.controlword.has(Controlword::ENABLE_VOLTAGE) || self.homing.is_live();
+        let by_host = self.controlword.has(Controlword::ENABLE_VOLTAGE) || self.has_homing_the_motor();
         self.axis.is_engaged() && (by_host || !self.function.takes_pulses())
     }
 
@@ -89,7 +89,7 @@ impl MJoint {
         }
         match self.mode {
             _ if self.own_motion != OwnMotion::None => self.is_there(),
-            ModeOfOperation::HOMING => matches!(self.homing, Homing::Attained),
+            ModeOfOperation::HOMING => self.homing() == HomingState::Attained,
             ModeOfOperation::PROFILE_VELOCITY if self.may_move() => self.is_at_speed(),
             _ => self.is_there() && self.next_point.is_none(),
         }

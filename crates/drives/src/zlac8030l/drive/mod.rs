@@ -7,7 +7,7 @@ mod commands;
 
 use can::{Bitrate, Instant};
 use canopen::node::{Node, NodeProfile};
-use cia402::{ModeOfOperation, PowerState};
+use cia402::{FaultReactionOption, ModeOfOperation, PowerState};
 use motion::filter::{LowPass, LowPassGains};
 
 use super::assumptions::*;
@@ -31,7 +31,7 @@ use crate::engine::host_watchdog::HostWatchdog;
 use crate::engine::inputs::Inputs;
 use crate::engine::storage::Image;
 use crate::zltech::terminals::Conditions;
-use crate::{Firmware, Report};
+use crate::{Firmware, Report, zltech};
 use devices::variant::Variant;
 
 /// How this drive communicates.
@@ -141,7 +141,7 @@ impl Zlac8030l {
         self.watch_faults(sensors, now);
         self.read_inputs(sensors);
         self.read_targets();
-        self.demand = self.axis.update(feedback, &self.targets, &self.parameters.axis, f64::from(SUPERVISION_PERIOD_S));
+        self.demand = self.move_axis(feedback);
         let Parameters { model, gains, limits, .. } = &self.parameters;
         self.servo.control(model, gains, &self.demand, feedback.position, limits);
         self.publish(sensors);
@@ -181,6 +181,16 @@ impl Zlac8030l {
         }
     }
 
+    fn move_axis(&mut self, feedback: Feedback) -> Demand {
+        let Parameters { axis, locked_when_disabled, .. } = &self.parameters;
+        let dt_s = f64::from(SUPERVISION_PERIOD_S);
+        let demand = self.axis.update(feedback, &self.targets, axis, dt_s);
+        demand.unwrap_or_else(|| {
+            let task = zltech::idle_task(&self.axis, axis.external_stop, *locked_when_disabled, false);
+            self.axis.idle(task, dt_s)
+        })
+    }
+
     fn watch_faults(&mut self, sensors: &Sensors, now: Instant) {
         self.device.set_eeprom_ok(sensors.eeprom_ok);
         let situation = Situation {
@@ -206,7 +216,7 @@ impl Zlac8030l {
         if new.is_empty() {
             return;
         }
-        self.axis.fault();
+        self.axis.fault(FaultReactionOption::DISABLE);
         self.demand = Demand::Off;
         self.device.values_mut().set(ERROR_CODE, self.faults.code_bits());
         self.device.report_faults(new, &self.faults, now);
@@ -246,6 +256,7 @@ impl Zlac8030l {
         self.targets = Targets {
             velocity: rpm.clamp(-max_rpm, max_rpm) * self.parameters.counts_s_per_rpm,
             current_a: f32::from(values.get(TARGET_TORQUE)) * 1e-3,
+            cyclic: None,
         };
     }
 

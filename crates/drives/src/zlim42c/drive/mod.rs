@@ -7,7 +7,7 @@ mod commands;
 
 use can::{Bitrate, Instant};
 use canopen::node::{Node, NodeProfile};
-use cia402::{Controlword, PowerState};
+use cia402::{Controlword, FaultReactionOption, PowerState};
 
 use super::assumptions::*;
 use super::faults::{DEBOUNCE, FAULT_COUNT, FAULTS, FLASHES, row};
@@ -21,14 +21,14 @@ use super::variations::VARIANT;
 use super::{Values, led, storage};
 use crate::communication::communication;
 use crate::engine::actuator::stepper::Stepper;
-use crate::engine::axis::{Demand, Feedback};
+use crate::engine::axis::{Demand, Feedback, Task};
 use crate::engine::cia402::{PowerDrive, Targets};
 use crate::engine::device::{Application, Device};
 use crate::engine::faults::{FaultMonitor, FaultSet};
 use crate::engine::inputs::Inputs;
 use crate::engine::storage::Image;
 use crate::zltech::terminals::Conditions;
-use crate::{Firmware, Report};
+use crate::{Firmware, Report, zltech};
 use devices::variant::Variant;
 
 /// How this drive communicates.
@@ -131,6 +131,7 @@ impl Zlim42c {
         self.read_targets();
         let feedback = self.feedback();
         let demand = self.axis.update(feedback, &self.targets, &self.parameters.axis, SUPERVISION_PERIOD_S);
+        let demand = demand.unwrap_or_else(|| self.axis.idle(self.idle_task(), SUPERVISION_PERIOD_S));
         self.energise(demand);
         if let Some(home) = self.axis.take_home() {
             let offset = self.values().get(HOME_OFFSET);
@@ -175,7 +176,7 @@ impl Zlim42c {
         if new.is_empty() {
             return;
         }
-        self.axis.fault();
+        self.axis.fault(FaultReactionOption::DISABLE);
         self.energise(Demand::Off);
         for row in new.rows() {
             self.shown_fault = Some(row);
@@ -215,7 +216,7 @@ impl Zlim42c {
         let max_speed = self.parameters.axis.velocity.max_speed;
         let target_rpm = f64::from(self.values().get(TARGET_VELOCITY));
         let velocity = (target_rpm * self.parameters.pulses_s_per_rpm).clamp(-max_speed, max_speed);
-        self.targets = Targets { velocity, current_a: 0.0 };
+        self.targets = Targets { velocity, ..Targets::default() };
     }
 
     /// The motor follows what it is told, as far as the drive knows.
@@ -227,6 +228,12 @@ impl Zlim42c {
             current_a: self.stepper.current_a(),
             standing: velocity == 0.0,
         }
+    }
+
+    /// The motor is held from Switched on.
+    fn idle_task(&self) -> Option<Task> {
+        let Parameters { axis, locked_when_disabled, .. } = &self.parameters;
+        zltech::idle_task(&self.axis, axis.external_stop, *locked_when_disabled, true)
     }
 
     fn energise(&mut self, demand: Demand) {
@@ -259,7 +266,7 @@ impl Zlim42c {
     fn publish_status(&mut self) {
         let status = self.axis.status(&self.targets, &self.parameters.axis);
         let (state, mode) = (self.axis.state(), self.axis.mode());
-        let energised = self.axis.is_energised(&self.parameters.axis);
+        let energised = self.axis.is_driven() || (!self.axis.is_live() && self.idle_task().is_some());
         let word =
             statusword(statusword::Situation { state, mode, controlword: self.controlword, energised, axis: status });
         let conditions = Conditions {

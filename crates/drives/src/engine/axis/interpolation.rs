@@ -1,14 +1,11 @@
-//! Interpolation, mode 7 ("M Robot Joint Motor CanOpen Manual", 5.10.3): straight from each target to the next in the
-//! 2 ms of its time base.
+//! Straight from each target to the next in the time of one set-point, as interpolated position (CiA 402-2, clause 12)
+//! asks for.
 //!
-//! A target further away than the motor's highest speed allows is approached with that speed.
+//! A target further away than the highest speed allows is approached with that speed. Past its end a stretch rests.
 
 use motion::interpolate::linear;
 
-use super::assumptions::{INTERPOLATION_PERIODS, SUPERVISION_PERIOD_S};
-use crate::engine::axis::TrajectoryPoint;
-
-const PERIOD_S: f64 = INTERPOLATION_PERIODS as f64 * SUPERVISION_PERIOD_S as f64;
+use super::trajectory::TrajectoryPoint;
 
 /// A stretch under way.
 #[derive(Clone, Copy, Debug)]
@@ -25,11 +22,11 @@ impl Interpolation {
         Self { from: TrajectoryPoint::rest(position), target: position, duration_s: 0.0, elapsed_s: 0.0 }
     }
 
-    /// From where it is to `target`, no faster than `max_speed` counts/s.
-    pub(super) fn lead_to(&mut self, target: i32, max_speed: f64) {
+    /// From where it is to `target` in `time_s`, no faster than `max_speed` counts/s (0 for any speed).
+    pub(super) fn lead_to(&mut self, target: i32, time_s: f64, max_speed: f64) {
         self.from = self.point();
         self.target = target;
-        self.duration_s = if max_speed > 0.0 { (self.way().abs() / max_speed).max(PERIOD_S) } else { PERIOD_S };
+        self.duration_s = if max_speed > 0.0 { (self.way().abs() / max_speed).max(time_s) } else { time_s };
         self.elapsed_s = 0.0;
     }
 
@@ -38,11 +35,7 @@ impl Interpolation {
         self.point()
     }
 
-    pub(super) const fn target(&self) -> i32 {
-        self.target
-    }
-
-    /// Rounding of the sum of periods.
+    /// At the end of its stretch, but for the rounding of a sum of periods.
     pub(super) fn is_done(&self) -> bool {
         self.elapsed_s >= self.duration_s - 1e-9
     }
@@ -82,13 +75,14 @@ impl Interpolation {
 mod tests {
     use super::*;
 
-    const DT_S: f64 = SUPERVISION_PERIOD_S as f64;
+    const TIME_S: f64 = 2e-3;
+    const DT_S: f64 = 0.5e-3;
 
     #[test]
     fn a_target_each_2_ms_is_followed_at_its_slope_and_met_at_its_end() {
         let mut interpolation = Interpolation::resting(100);
         for k in 1..=50 {
-            interpolation.lead_to(100 + 400 * k, 1e6);
+            interpolation.lead_to(100 + 400 * k, TIME_S, 1e6);
             for quarter in 1..=4 {
                 let point = interpolation.advance(DT_S);
                 let expected = 100.0 + 400.0 * f64::from(k - 1) + 100.0 * f64::from(quarter);
@@ -103,7 +97,7 @@ mod tests {
     #[test]
     fn a_far_target_takes_the_time_that_the_speed_limit_gives_it() {
         let mut interpolation = Interpolation::resting(0);
-        interpolation.lead_to(-50_000, 1e6);
+        interpolation.lead_to(-50_000, TIME_S, 1e6);
         let mut periods = 0;
         while !interpolation.is_done() {
             interpolation.advance(DT_S);
