@@ -23,7 +23,9 @@
 //! (CiA 311) are not read.
 
 mod check;
+mod configuration;
 mod data_type;
+mod describe;
 mod diff;
 mod finding;
 mod model;
@@ -33,7 +35,9 @@ mod write;
 
 pub mod document;
 
+pub use configuration::{Configuration, SetError};
 pub use data_type::{Form, TypeCode};
+pub use describe::{Flavour, Sheet, Unkept, keep};
 pub use diff::{Difference, diff};
 pub use finding::{Finding, Findings, Refusal, Severity};
 pub use model::{

@@ -1,7 +1,7 @@
 //! What only shows when a file is looked at as a whole: traps for tools that work with it.
 
 mod at;
-mod names;
+pub(crate) mod names;
 mod pdo;
 mod records;
 

@@ -1,0 +1,154 @@
+//! Descriptions of devices that files describe.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::{Mutex, PoisonError};
+
+use can::Bitrate;
+use canopen::od::{DefaultValue, Entry, MAX_ROWS, Table};
+use canopen::{Mux, NodeId};
+use devices::faults::Faults;
+use devices::{Description, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules};
+
+use super::axis::axes;
+use super::names;
+use super::rows::{leak, rows};
+use crate::{Eds, write};
+
+/// All descriptions that were made of files, by what the files say.
+static KEPT: Mutex<BTreeMap<String, &'static Description>> = Mutex::new(BTreeMap::new());
+
+/// EMCY and 603Fh code of a heartbeat that stayed away (CiA 301, table 21).
+const HEARTBEAT_ERROR: u16 = 0x8130;
+
+/// The description of the device that a file describes, kept for the life of the program: the same file, or another that
+/// says the same, gives the same one.
+///
+/// An axis has what the file has of CiA 402, in the units of the standard; faults, stored objects and departures are not in
+/// a file. Of a DCF the values stand in place of the defaults.
+///
+/// # Errors
+/// If there is no object in the file, or more of them than a dictionary holds.
+pub fn keep(eds: &Eds) -> Result<&'static Description, Unkept> {
+    let content = write(eds);
+    // A panic while it was locked has left the map as it was.
+    let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(known) = kept.get(&content) {
+        return Ok(known);
+    }
+    let description: &'static Description = Box::leak(Box::new(describe(eds)?));
+    kept.insert(content, description);
+    Ok(description)
+}
+
+/// Why a file makes no description.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unkept {
+    /// It has no objects.
+    NoObjects,
+    /// It has more objects and sub-objects than a dictionary holds.
+    TooManyRows {
+        /// So many.
+        rows: usize,
+        /// It holds so many.
+        most: usize,
+    },
+}
+
+impl fmt::Display for Unkept {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoObjects => write!(f, "the file has no objects; `ferrodrive eds lint` says why"),
+            Self::TooManyRows { rows, most } => write!(
+                f,
+                "the file has {rows} objects and sub-objects, more than the {most} of a dictionary; take those out that are not needed"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for Unkept {}
+
+fn describe(eds: &Eds) -> Result<Description, Unkept> {
+    let count = eds.variables().count();
+    match count {
+        0 => return Err(Unkept::NoObjects),
+        rows if rows > MAX_ROWS => return Err(Unkept::TooManyRows { rows, most: MAX_ROWS }),
+        _ => {}
+    }
+    let table = table(rows(eds));
+    let identity = identity(eds, table);
+    let axes: &'static [_] = Box::leak(axes(table, identity.device_type).into_boxed_slice());
+    let has = |index, sub_index| table.find(Mux::new(index, sub_index)).is_ok();
+    let watches = !axes.is_empty() && has(0x1016, 1);
+    Ok(Description {
+        name: leak(name(eds)),
+        title: leak(title(eds)),
+        manual: leak(format!("the file {}", eds.file.file_name)),
+        identity,
+        distinguishing_object: None,
+        dictionary: table,
+        node_id: eds.commissioning.as_ref().and_then(|of| of.node_id).and_then(NodeId::new),
+        bitrate: eds.commissioning.as_ref().and_then(|of| of.bit_rate).and_then(|k| Bitrate::new(u32::from(k) * 1_000)),
+        axes,
+        host_watch: if watches {
+            HostWatch::Heartbeat { consumer: Mux::new(0x1016, 1), fault: HEARTBEAT_ERROR }
+        } else {
+            HostWatch::None
+        },
+        storage: ParameterStorage {
+            save: ParameterStorage::CIA_301.save.filter(|_| has(0x1010, 1)),
+            restore: ParameterStorage::CIA_301.restore.filter(|_| has(0x1011, 1)),
+            ..ParameterStorage::NONE
+        },
+        faults: Faults { code: has(0x603F, 0).then(|| Mux::new(0x603F, 0)), bit_field: false, table: &[] },
+        nmt: NmtRules::CIA_301,
+        pdo: pdo_rules(table.rows()),
+        stated_departures: &[],
+        variations: &[],
+    })
+}
+
+fn table(rows: Vec<Entry>) -> &'static Table {
+    let keys: Vec<u32> = rows.iter().map(|row| row.mux().key()).collect();
+    Box::leak(Box::new(Table::new(Box::leak(rows.into_boxed_slice()), Box::leak(keys.into_boxed_slice()))))
+}
+
+/// What 1000h and 1018h answer; what they leave open, `[DeviceInfo]` says.
+fn identity(eds: &Eds, table: &'static Table) -> Identity {
+    let number = |index, sub_index| {
+        let row = table.find(Mux::new(index, sub_index)).ok().map(|slot| table.row(slot))?;
+        match row.default {
+            DefaultValue::Value(value) => u32::try_from(value).ok(),
+            _ => None,
+        }
+    };
+    let or = |said: Option<u32>, device: Option<u32>| said.filter(|value| *value != 0).or(device).unwrap_or(0);
+    Identity {
+        device_type: number(0x1000, 0).unwrap_or(0),
+        vendor_id: or(number(0x1018, 1), eds.device.vendor_number),
+        product_code: or(number(0x1018, 2), eds.device.product_number),
+        revision_number: or(number(0x1018, 3), eds.device.revision_number),
+    }
+}
+
+/// A name to type: the product's, else the file's.
+fn name(eds: &Eds) -> String {
+    let of_file = eds.file.file_name.rsplit_once('.').map_or(eds.file.file_name.as_str(), |(stem, _)| stem);
+    let names = [names::name(&eds.device.product_name), names::name(of_file)];
+    names.into_iter().find(|name| !name.is_empty()).unwrap_or_else(|| "device".to_owned())
+}
+
+fn title(eds: &Eds) -> String {
+    let (vendor, product) = (eds.device.vendor_name.as_str(), eds.device.product_name.as_str());
+    let title = if product.starts_with(vendor) { product.to_owned() } else { format!("{vendor} {product}") };
+    if title.trim().is_empty() { "a device without a name".to_owned() } else { title.trim().to_owned() }
+}
+
+/// The standard's, as far as the mapping objects do not say less.
+fn pdo_rules(rows: &[Entry]) -> PdoRules {
+    let of_mappings = || rows.iter().filter(|row| matches!(row.index, 0x1600..=0x17FF | 0x1A00..=0x1BFF));
+    let highest = of_mappings().map(|row| row.sub_index).max().unwrap_or(0);
+    let can_change = of_mappings().any(|row| row.sub_index == 0 && row.access.is_writable());
+    PdoRules { max_objects: highest.min(64), fixed_mapping: highest > 0 && !can_change, ..PdoRules::CIA_301 }
+}

@@ -1,0 +1,214 @@
+//! The sheet of every model reads back as the model, as far as a sheet goes.
+
+use canopen::NodeId;
+use canopen::od::{Access, DefaultValue, Entry};
+use devices::{Description, Placement};
+
+use super::names;
+use super::{Flavour, Sheet, keep};
+use crate::{Eds, Number, Reading, TypeCode, Value, write};
+
+fn models() -> impl Iterator<Item = &'static Description> {
+    devices::all().iter()
+}
+
+fn read(sheet: &Sheet<'_>) -> Reading {
+    Eds::load(write(&sheet.eds()).as_bytes()).expect("a sheet is of a real size")
+}
+
+/// What is found, but for one thing that the drive itself has: 2030h of the ZLAC8030L counts to 16 and ends with 15.
+fn findings(reading: &Reading) -> Vec<String> {
+    let all = reading.findings.iter().filter(|finding| finding.section != "2030sub0");
+    all.map(ToString::to_string).collect()
+}
+
+#[test]
+fn nothing_is_wrong_with_the_sheet_of_any_model() {
+    for model in models() {
+        let whats = findings(&read(&Sheet::of(model)));
+        // One file cannot say that a TPDO carries 32 bits of what an SDO answers with 16.
+        assert_eq!(whats.len(), model.pdo.mapping.tpdo_forms.len(), "{}: {whats:?}", model.name);
+        let form = "606Ch:00 is mapped with 32 bits, but is INTEGER16";
+        assert!(whats.iter().all(|what| what.contains(form)), "{whats:?}");
+    }
+}
+
+#[test]
+fn nothing_is_wrong_with_the_variant_for_ros2_canopen() {
+    for model in models() {
+        let reading = read(&Sheet { flavour: Flavour::Ros2Canopen, ..Sheet::of(model) });
+        assert_eq!(findings(&reading), [""; 0], "{}", model.name);
+        assert!(reading.eds.comments.iter().any(|line| line.contains("ros2_canopen")));
+        assert!(reading.eds.object(0x6061).is_some(), "{}", model.name);
+    }
+    let default = |name: &str, index: u16| {
+        let model = devices::model(name).expect("a model");
+        let eds = read(&Sheet { flavour: Flavour::Ros2Canopen, ..Sheet::of(model) }).eds;
+        eds.variable(index, 0).map(|variable| (variable.data_type, variable.default.clone()))
+    };
+    let number = |value| Some(Value::Number(Number::plain(value)));
+    assert_eq!(default("zlac8030l", 0x6502), Some((TypeCode::UNSIGNED32, number(0x0D))));
+    assert_eq!(default("zlim42c", 0x6502), Some((TypeCode::UNSIGNED32, number(0x25))));
+    assert_eq!(default("m4230e17b50", 0x606C).map(|(data_type, _)| data_type), Some(TypeCode::INTEGER32));
+}
+
+#[test]
+fn every_model_reads_back_as_itself() {
+    for model in models() {
+        let kept = keep(&read(&Sheet::of(model)).eds).expect("no more rows than the model");
+        assert_eq!(kept.identity, model.identity, "{}", model.name);
+        assert_eq!(kept.axes.len(), model.axes.len(), "{}", model.name);
+        assert_eq!(kept.axes[0].placement, Placement::FIRST);
+        assert_eq!(kept.pdo.fixed_mapping, model.pdo.fixed_mapping, "{}", model.name);
+        assert_eq!(kept.storage.save.is_some(), model.has_index(0x1010), "{}", model.name);
+        assert_eq!(kept.title, names::plain(model.title));
+        let (rows, of_file) = (model.dictionary.rows(), kept.dictionary.rows());
+        assert_eq!(rows.len(), of_file.len(), "{}", model.name);
+        for (row, read) in rows.iter().zip(of_file) {
+            same_row(model, row, read);
+        }
+    }
+}
+
+fn same_row(model: &Description, row: &Entry, read: &Entry) {
+    let place = format!("{} {} {}", model.name, row.mux(), row.name);
+    assert_eq!(read.mux(), row.mux(), "{place}");
+    let is_count = row.sub_index == 0 && model.row(canopen::Mux::new(row.index, 1)).is_some();
+    let code = if is_count { TypeCode::UNSIGNED8.0 } else { row.data_type.code() };
+    assert_eq!(read.data_type.code(), code, "{place}");
+    assert_eq!(read.access, row.access, "{place}");
+    assert_eq!(read.pdo.is_allowed(), row.pdo.is_allowed(), "{place}");
+    assert_eq!(read.title, names::plain(row.title), "{place}");
+    let default =
+        Sheet::of(model).eds().variable(row.index, row.sub_index).and_then(|variable| variable.default.clone());
+    if default.is_some() || row.access != Access::ReadOnly {
+        assert_eq!(read.default, row.default, "{place}");
+    } else {
+        assert_eq!(read.default, DefaultValue::Value(0), "{place}: what is measured has no default");
+    }
+    if row.resolution.is_none() && row.check_value(value(row.default)).is_ok() {
+        let own =
+            |row: &Entry| row.limits.and_then(|limits| limits.integers()).filter(|own| *own != row.data_type.range());
+        assert_eq!(own(read), own(row), "{place}");
+    }
+    if matches!(row.index, 0x6040 | 0x6041 | 0x6060 | 0x6064 | 0x607A | 0x60FF) {
+        assert_eq!(read.name, row.name, "{place}: the standard's name");
+    }
+}
+
+fn value(default: DefaultValue) -> i64 {
+    match default {
+        DefaultValue::Value(value) => value,
+        _ => 0,
+    }
+}
+
+#[test]
+fn the_same_content_is_kept_once() {
+    let model = devices::model("zlac8030l").expect("a model");
+    let first = keep(&read(&Sheet::of(model)).eds).expect("it fits");
+    let again = keep(&read(&Sheet::of(model)).eds).expect("it fits");
+    assert!(std::ptr::eq(first, again));
+    let other = keep(&read(&Sheet { node_id: NodeId::new(9), ..Sheet::of(model) }).eds).expect("it fits");
+    assert!(!std::ptr::eq(first, other));
+}
+
+#[test]
+fn choices_presets_and_a_node_change_the_sheet() {
+    let model = devices::model("zlac8030l").expect("a model");
+    let mut sheet = Sheet::of(model);
+    let default = |sheet: &Sheet<'_>, index, sub_index| match sheet
+        .eds()
+        .variable(index, sub_index)
+        .and_then(|variable| variable.default.clone())
+    {
+        Some(Value::Number(number)) => Some(number),
+        _ => None,
+    };
+    assert_eq!(default(&sheet, 0x2014, 0), Some(Number::plain(150)));
+    assert_eq!(default(&sheet, 0x1014, 0), Some(Number { base: 0x80, plus_node_id: true }));
+    sheet.variant.choose("defaults", "eds").expect("a choice of this model");
+    assert_eq!(default(&sheet, 0x2014, 0), Some(Number::plain(300)), "of the maker's own EDS");
+    let presets = [devices::variant::Preset::new(0x2014, 0, 77)];
+    let sheet = Sheet { presets: &presets, node_id: NodeId::new(5), ..sheet };
+    assert_eq!(default(&sheet, 0x2014, 0), Some(Number::plain(77)));
+    assert_eq!(default(&sheet, 0x1014, 0), Some(Number::plain(0x85)));
+}
+
+/// Two axes of the standard, 800h apart (CiA 402-1), and what else a file may have.
+const TWO_AXES: &str = "[FileInfo]\nFileName=two.eds\n[DeviceInfo]\nVendorName=V\nProductName=Two\nVendorNumber=7\n\
+    [1000]\nParameterName=Device type\nDataType=7\nAccessType=ro\nDefaultValue=0x20192\n\
+    [1010]\nParameterName=Store\nObjectType=8\nSubNumber=2\n[1010sub0]\nParameterName=n\nDataType=5\nAccessType=ro\nDefaultValue=1\n\
+    [1010sub1]\nParameterName=All\nDataType=7\nAccessType=rw\n\
+    [2000]\nParameterName=My gain\nDataType=8\nAccessType=rw\nDefaultValue=0.5\nHighLimit=2.5\n\
+    [2001]\nParameterName=Text\nDataType=9\nAccessType=rw\nDefaultValue=abc\n\
+    [2002]\nParameterName=Bytes\nDataType=0xA\nAccessType=ro\nDefaultValue=01 02FF\n\
+    [2003]\nParameterName=My gain\nDataType=0x1B\nAccessType=rw\nDefaultValue=0xFFFFFFFFFFFFFFFF\n\
+    [6040]\nParameterName=CW\nDataType=6\nAccessType=rww\nPDOMapping=1\n\
+    [6060]\nParameterName=Mode\nDataType=2\nAccessType=rw\n\
+    [60FF]\nParameterName=Target velocity\nDataType=4\nAccessType=rww\nPDOMapping=1\n\
+    [6840]\nParameterName=CW 2\nDataType=6\nAccessType=rww\nPDOMapping=1\n\
+    [6861]\nParameterName=Display\nDataType=2\nAccessType=ro\nPDOMapping=1\n\
+    [6D02]\nParameterName=Modes\nDataType=7\nAccessType=ro\nDefaultValue=0x85\n";
+
+#[test]
+fn a_file_of_two_axes_is_a_description_with_two() {
+    let kept = keep(&Eds::load(TWO_AXES.as_bytes()).expect("a small file").eds).expect("it fits");
+    assert_eq!((kept.name, kept.title, kept.identity.vendor_id), ("two", "V Two", 7));
+    let modes: Vec<Vec<i8>> = kept.axes.iter().map(|axis| axis.modes.iter().map(|mode| mode.0).collect()).collect();
+    assert_eq!(modes, [vec![3], vec![1, 3, 8]], "by their targets, by 6502h");
+    assert_eq!(kept.axes[0].mode_display.to_string(), "6060h:00");
+    assert_eq!(kept.axes[1].mode_display.to_string(), "6861h:00");
+    assert_eq!(kept.axes[1].units.target_velocity, None, "the second has no 68FFh");
+    assert!(kept.storage.save.is_some() && kept.storage.restore.is_none());
+    let rows: Vec<_> = kept.dictionary.rows().iter().filter(|row| row.index >= 0x2000).map(|row| row.name).collect();
+    assert_eq!(
+        rows,
+        [
+            "my_gain",
+            "text",
+            "bytes",
+            "my_gain_2003_00",
+            "controlword",
+            "modes_of_operation",
+            "target_velocity",
+            "controlword_2",
+            "modes_of_operation_display_2",
+            "supported_drive_modes_2",
+        ]
+    );
+}
+
+#[test]
+fn values_of_every_kind_are_those_of_the_file() {
+    let kept = keep(&Eds::load(TWO_AXES.as_bytes()).expect("a small file").eds).expect("it fits");
+    let row = |index| kept.row(canopen::Mux::new(index, 0)).expect("it is there");
+    assert_eq!(row(0x2000).default, DefaultValue::Real(0.5));
+    assert_eq!(row(0x2001).default, DefaultValue::Text("abc"));
+    assert_eq!(row(0x2002).default, DefaultValue::Bytes(&[1, 2, 0xFF]));
+    assert_eq!(row(0x2003).default, DefaultValue::Unsigned(u64::MAX));
+    assert!(row(0x2000).saved && row(0x2001).capacity >= 3 && !row(0x6040).saved);
+}
+
+#[test]
+fn a_dcf_is_the_device_as_configured_and_a_device_of_another_profile_has_no_axis() {
+    let file = "[FileInfo]\nFileName=io.dcf\n[DeviceComissioning]\nNodeID=9\nBaudrate=250\n\
+        [1000]\nParameterName=Device type\nDataType=7\nAccessType=ro\nDefaultValue=0x30191\n\
+        [6000]\nParameterName=Inputs\nDataType=5\nAccessType=rw\nDefaultValue=1\nParameterValue=2\n";
+    let kept = keep(&Eds::load(file.as_bytes()).expect("a small file").eds).expect("it fits");
+    assert_eq!((kept.axes.len(), kept.name), (0, "io"));
+    assert_eq!(kept.node_id, NodeId::new(9));
+    assert_eq!(kept.bitrate.map(|rate| rate.to_string()), Some("250k".into()));
+    assert_eq!(kept.row(canopen::Mux::new(0x6000, 0)).map(|row| row.default), Some(DefaultValue::Value(2)));
+}
+
+#[test]
+fn a_file_without_objects_or_with_too_many_is_not_kept() {
+    let keep = |text: &str| keep(&Eds::load(text.as_bytes()).expect("a small file").eds).map(|kept| kept.name);
+    assert_eq!(keep("[FileInfo]\n"), Err(super::Unkept::NoObjects));
+    let compact = |index: u16| {
+        format!("[{index:04X}]\nParameterName=P\nObjectType=8\nDataType=7\nAccessType=rw\nCompactSubObj=254\n")
+    };
+    let many: String = (0x2000..0x20E0).map(compact).collect();
+    assert!(matches!(keep(&many), Err(super::Unkept::TooManyRows { rows: 57_120, .. })));
+}
