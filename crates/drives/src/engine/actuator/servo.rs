@@ -75,6 +75,8 @@ pub struct Servo {
     electrical_turns: f32,
     velocity_rad_s: f32,
     setpoint_a: f32,
+    /// Added to what the loops ask for.
+    torque_offset_a: f32,
     /// Current along the magnets that is asked for.
     direct_setpoint_a: f32,
     current_a: Dq,
@@ -104,6 +106,7 @@ impl Servo {
             electrical_turns: 0.0,
             velocity_rad_s: 0.0,
             setpoint_a: 0.0,
+            torque_offset_a: 0.0,
             direct_setpoint_a: 0.0,
             current_a: Dq::default(),
             wanted_v: Dq::default(),
@@ -191,7 +194,17 @@ impl Servo {
                 current_a
             }
         };
+        let current_a = if self.torque_offset_a == 0.0 {
+            current_a
+        } else {
+            symmetric(current_a + self.torque_offset_a, limits.current_a)
+        };
         self.setpoint_a = if current_a.is_finite() { current_a } else { 0.0 };
+    }
+
+    /// A current that somebody knows to be needed besides what the loops find out, A (CiA 402-2, object 60B2h).
+    pub const fn set_torque_offset(&mut self, current_a: f32) {
+        self.torque_offset_a = current_a;
     }
 
     /// The current loop: every control period. Duty cycles of U, V, W.

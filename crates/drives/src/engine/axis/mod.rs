@@ -302,3 +302,6 @@ impl Default for Axis {
 
 /// Nothing to do: stays where the trajectory is, and steps to rest.
 const REST: Task = Task::Hold { control: Control::Position, ramp: Ramp::NONE };
+
+#[cfg(test)]
+mod tests;

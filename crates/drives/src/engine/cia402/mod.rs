@@ -16,3 +16,6 @@ pub use power::{DisableOptions, PowerMachine};
 pub use power_drive::PowerDrive;
 pub use set_points::{SetPoint, SetPoints};
 pub use stop::{ExternalStop, StopCause};
+
+#[cfg(test)]
+mod tests;
