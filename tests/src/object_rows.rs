@@ -1,28 +1,23 @@
 //! What is asked of every row of a manual's object table on a running drive: width, default, access, range and store.
 //!
-//! Each function is the body of one test; it asks all rows that it is about, each at a fresh [`Bench`], and fails with the
-//! list of those that answer otherwise. What a drive's manual says of single objects stays in that drive's tests.
+//! Each function is a scenario; it asks all rows that it is about, each at a fresh [`Bench`], and fails with the
+//! list of those that answer otherwise. What a drive's manual says of single objects stands in its `refused.csv` and `at_rest.csv`.
 
-use std::ops::RangeInclusive;
 use std::time::Duration;
 
 use can::{CanId, Frame};
 
 use crate::bench::{Abort, Bench, Subject};
-use crate::manual::ObjectRow;
+use crate::manual::{ObjectRow, hex, integer, rows};
 
 /// Abort codes of CiA 301, 7.2.4.3.17.
 pub const READ_ONLY: Abort = 0x0601_0002;
-/// The object does not exist.
-pub const NO_SUCH_OBJECT: Abort = 0x0602_0000;
 /// The length does not match.
 pub const WRONG_LENGTH: Abort = 0x0607_0010;
 /// The length does not match: too long.
 pub const TOO_LONG: Abort = 0x0607_0012;
 /// The length does not match: too short.
 pub const TOO_SHORT: Abort = 0x0607_0013;
-/// The sub-index does not exist.
-pub const NO_SUCH_SUB_INDEX: Abort = 0x0609_0011;
 /// Not among the values of the object.
 pub const INVALID_VALUE: Abort = 0x0609_0030;
 /// Above the range.
@@ -41,6 +36,14 @@ pub struct Memory {
     pub without: &'static [u16],
     /// The object that gives the drive another node after its next start.
     pub node_id: Option<u16>,
+    /// Two stored objects, each with its default and another value.
+    pub two: [(u16, i64, i64); 2],
+}
+
+/// A drive that stores each write, or all on command.
+pub trait KeepingSubject: Subject {
+    /// How.
+    const MEMORY: Memory;
 }
 
 /// Every row is read with its width, and with its default unless it is a measurement.
@@ -96,11 +99,19 @@ fn refused<S: Subject>(row: &ObjectRow, value: i64, code: Abort) -> Result<(), S
     expect("value after it", bench.get((row.index, row.sub)), before)
 }
 
-/// These values of these objects lie between the listed ones, and are refused.
-pub fn refuse_values_between_the_listed<S: Subject>(values: &[(u16, i64)]) {
-    for (index, value) in values {
-        let answer = Bench::<S>::new().write(*index, *value);
-        assert_eq!(answer, Err(INVALID_VALUE), "{index:04X}h = {value}");
+/// `refused.csv`: objects and sub-indexes that the manual does not have are told apart, and so are values that lie between
+/// the listed ones. An empty value is a read.
+pub fn refuse_what_the_manual_does_not_have<S: Subject>() {
+    for (index, sub, value, abort) in rows(S::REFUSED, |row| {
+        let abort = u32::from_str_radix(row.get("abort"), 16).expect("an abort code");
+        (hex(row.get("index")), hex(row.get("sub")) as u8, integer(row.get("value")), abort)
+    }) {
+        let mut bench = Bench::<S>::new();
+        let answer = match value {
+            Some(value) => bench.write((index, sub), value),
+            None => bench.read((index, sub)).map(|_| ()),
+        };
+        assert_eq!(answer, Err(abort), "{index:04X}h:{sub:02X} {value:?}: {answer:08X?}, expected {abort:08X}h");
     }
 }
 
@@ -128,32 +139,25 @@ pub fn refuse_another_width<S: Subject>() {
     );
 }
 
-/// Neither these objects nor these sub-indexes exist, and the drive tells the two apart.
-pub fn are_missed_by_object_or_by_sub_index<S: Subject>(objects: &[u16], sub_indexes: &[(u16, u8)]) {
+/// `at_rest.csv`: what every measurement and state reads at a drive that has just booted and rests.
+pub fn read_at_rest_what_a_resting_drive_has<S: Subject>() {
+    let expected = rows(S::AT_REST, |row| {
+        let bound = |name| integer(row.get(name)).expect("a number");
+        ((hex(row.get("index")), hex(row.get("sub")) as u8), bound("low")..=bound("high"))
+    });
     let mut bench = Bench::<S>::new();
-    for index in objects {
-        assert_eq!(bench.read(*index), Err(NO_SUCH_OBJECT), "{index:04X}h");
-    }
-    for (index, sub) in sub_indexes {
-        assert_eq!(bench.read((*index, *sub)), Err(NO_SUCH_SUB_INDEX), "{index:04X}h:{sub:02X}");
-    }
-}
-
-/// What is live reads this at a drive that has just booted and rests. `elsewhere` is live too and checked by others.
-pub fn read_at_rest<S: Subject>(expected: &[(u16, u8, RangeInclusive<i64>)], elsewhere: &[u16]) {
-    let mut bench = Bench::<S>::new();
-    for (index, sub, range) in expected {
+    for ((index, sub), range) in &expected {
         let value = bench.get((*index, *sub));
         assert!(range.contains(&value), "{index:04X}h:{sub:02X} reads {value}, expected {range:?}");
     }
-    let checked = |row: &ObjectRow| expected.iter().any(|(index, sub, _)| (*index, *sub) == (row.index, row.sub));
-    let live = S::rows().all().iter().filter(|row| row.live);
-    let unchecked: Vec<_> = live.filter(|row| !checked(row) && !elsewhere.contains(&row.index)).collect();
-    assert!(unchecked.is_empty(), "{unchecked:?}");
+    let told = |row: &&ObjectRow| row.live && !expected.iter().any(|(key, _)| *key == row.key());
+    let untold: Vec<_> = S::rows().all().iter().filter(told).collect();
+    assert!(untold.is_empty(), "{untold:?}");
 }
 
 /// With the memory's switch at 0, a write outlives a power cycle if and only if the object is stored.
-pub fn outlive_a_power_cycle_if_and_only_if_stored<S: Subject>(memory: &Memory) {
+pub fn outlive_a_power_cycle_if_and_only_if_stored<S: KeepingSubject>() {
+    let memory = &S::MEMORY;
     assert_rows::<S>(
         |row| memory.other_value::<S>(row).is_some(),
         |row| {
@@ -168,7 +172,8 @@ pub fn outlive_a_power_cycle_if_and_only_if_stored<S: Subject>(memory: &Memory) 
 }
 
 /// With the memory's switch at 1, nothing is kept until the command stores it, and the command for it restores it.
-pub fn are_kept_and_restored_only_on_command<S: Subject>(memory: &Memory) {
+pub fn are_kept_and_restored_only_on_command<S: KeepingSubject>() {
+    let memory = &S::MEMORY;
     assert_rows::<S>(
         |row| row.stored && memory.other_value::<S>(row).is_some(),
         |row| {
@@ -194,9 +199,9 @@ pub fn are_kept_and_restored_only_on_command<S: Subject>(memory: &Memory) {
     );
 }
 
-/// Power that goes at any moment of a save leaves the old values of these objects or the new ones, all of them, and no
-/// fault. Each comes with its default and another value.
-pub fn are_saved_together_or_not_at_all<S: Subject>(memory: &Memory, objects: &[(u16, i64, i64)]) {
+/// Power that goes at any moment of a save leaves the old values of two objects or the new ones, both of them, and no fault.
+pub fn are_saved_together_or_not_at_all<S: KeepingSubject>() {
+    let (memory, objects) = (&S::MEMORY, &S::MEMORY.two);
     let (old, new): (Vec<i64>, Vec<i64>) = objects.iter().map(|(_, old, new)| (*old, *new)).unzip();
     let (mut olds, mut news) = (0, 0);
     for delay_us in (0..3000).step_by(50) {

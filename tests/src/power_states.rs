@@ -22,6 +22,9 @@ pub trait PowerSubject: Subject {
     /// The statusword of a drive that has just booted.
     const BOOTED: u16;
 
+    /// Objects that clear the position.
+    const CLEARS_POSITION: &'static [u16];
+
     /// 606Ch counts so many in 1 r/min.
     const COUNTS_PER_RPM: i64;
 

@@ -1,6 +1,17 @@
 //! Which scenario is asked of which drive. A further drive is a further name in these rows, and its bench.
 
 ferrodrive_tests::scenarios! {
+    objects {
+        are_read_with_their_width_and_default: zlac8030l zlim42c mjoint;
+        refuse_writes_where_they_are_read_only: zlac8030l zlim42c mjoint;
+        take_their_range_and_refuse_what_lies_beyond: zlac8030l zlim42c mjoint;
+        refuse_what_the_manual_does_not_have: zlac8030l zlim42c mjoint;
+        refuse_another_width: zlac8030l zlim42c mjoint;
+        read_at_rest_what_a_resting_drive_has: zlac8030l zlim42c mjoint;
+        outlive_a_power_cycle_if_and_only_if_stored: zlac8030l zlim42c;
+        are_kept_and_restored_only_on_command: zlac8030l zlim42c;
+        are_saved_together_or_not_at_all: zlac8030l zlim42c;
+    }
     network {
         commands_to_all_nodes_and_to_this_one_act_and_commands_to_others_do_not: zlac8030l zlim42c mjoint;
         a_reset_leaves_the_node_able_to_speak: zlac8030l zlim42c;
@@ -40,5 +51,8 @@ ferrodrive_tests::scenarios! {
         controlword_and_target_in_one_rpdo_start_the_move_whichever_comes_first: zlac8030l zlim42c;
         a_stored_mapping_works_after_a_power_cycle: zlac8030l zlim42c;
         a_reserved_transmission_type_is_refused: zlac8030l zlim42c;
+    }
+    motion {
+        clearing_the_position_reads_zero_again_and_zeroes_the_position: zlac8030l zlim42c;
     }
 }

@@ -34,6 +34,8 @@ impl Subject for MJoint {
 
     const NODE: u8 = 1;
     const BITRATE: Bitrate = Bitrate::M1;
+    const REFUSED: &'static str = include_str!("../../data/mjoint/refused.csv");
+    const AT_REST: &'static str = include_str!("../../data/mjoint/at_rest.csv");
 
     fn machine() -> MJointMachine {
         mjoint(&Model::M4230E17B50, Self::NODE, Self::BITRATE)
@@ -99,10 +101,17 @@ impl Bench {
         self.get(0x6064)
     }
 
-    /// Milliseconds until the target is reached; panics after `limit_ms`.
+    /// Lets time pass until the target is reached; panics after `limit_ms`.
     #[track_caller]
-    pub fn until_reached(&mut self, limit_ms: u64) -> u64 {
-        self.until(limit_ms, |bench| bench.statusword() & 0x0400 != 0)
+    pub fn reaches(&mut self, limit_ms: u64) -> &mut Self {
+        self.until(limit_ms, |bench| bench.statusword() & 0x0400 != 0);
+        self
+    }
+
+    /// Enabled in speed mode with this target.
+    #[track_caller]
+    pub fn turn(&mut self, rpm: i64) -> &mut Self {
+        self.set(0x6060, 3).set(0x60FF, rpm).set(0x6040, 0x0F)
     }
 
     /// 2614h = 1, and its 2.

@@ -61,6 +61,11 @@ pub trait Subject: 'static {
 
     /// The manual's object table.
     fn rows() -> &'static Rows;
+
+    /// Its `refused.csv`.
+    const REFUSED: &'static str;
+    /// Its `at_rest.csv`.
+    const AT_REST: &'static str;
 }
 
 /// A manual's object table with an index.
@@ -340,6 +345,20 @@ impl<S: Subject> Bench<S> {
     #[track_caller]
     pub fn is_silent(&mut self) -> &mut Self {
         assert_eq!(self.sdo(&head(0x40, 0x6041, 0)), None, "at {} s", self.seconds());
+        self
+    }
+
+    /// Asserts that the motor turns at this speed, r/min, give or take.
+    #[track_caller]
+    pub fn turns_about(&mut self, rpm: f64, tolerance_rpm: f64) -> &mut Self {
+        self.turns_at(rpm - tolerance_rpm, rpm + tolerance_rpm)
+    }
+
+    /// Asserts that 6064h reads this, give or take.
+    #[track_caller]
+    pub fn is_at(&mut self, position: i64, tolerance: i64) -> &mut Self {
+        let (read, at) = (self.get(0x6064), self.seconds());
+        assert!((read - position).abs() <= tolerance, "6064h is {read}, expected {position} ± {tolerance}, at {at} s");
         self
     }
 

@@ -11,6 +11,7 @@ use sim::Component;
 use sim::machine::{Order, Zlac8030lMachine, order, zlac8030l};
 
 use super::{Rows, Subject};
+use crate::object_rows::{KeepingSubject, Memory};
 use crate::power_states::PowerSubject;
 use crate::zlac8030l::objects;
 
@@ -37,6 +38,8 @@ impl Subject for Zlac8030l {
 
     const NODE: u8 = 4;
     const BITRATE: Bitrate = Bitrate::K500;
+    const REFUSED: &'static str = include_str!("../../data/zlac8030l/refused.csv");
+    const AT_REST: &'static str = include_str!("../../data/zlac8030l/at_rest.csv");
 
     fn machine() -> Zlac8030lMachine {
         zlac8030l(NODE, RATE_500K)
@@ -51,6 +54,7 @@ impl Subject for Zlac8030l {
 impl PowerSubject for Zlac8030l {
     const BREAKABLE: Component = Component::Hall;
     const BOOTED: u16 = 0x0670;
+    const CLEARS_POSITION: &'static [u16] = &[0x2005, 0x2006];
     const COUNTS_PER_RPM: i64 = 10;
     const RIPPLE_RPM: f64 = 1.0;
 
@@ -58,6 +62,17 @@ impl PowerSubject for Zlac8030l {
         // The watch over the host.
         bench.set(0x2000, 0);
     }
+}
+
+impl KeepingSubject for Zlac8030l {
+    const MEMORY: Memory = Memory {
+        switch: 0x2010,
+        command: 0x2009,
+        // The bit rate: see `network`. The others do something and read 0 again.
+        without: &[0x200E, 0x2005, 0x2006, 0x2009],
+        node_id: Some(0x200D),
+        two: [(0x2014, 150, 77), (0x2015, 300, 88)],
+    };
 }
 
 impl Bench {

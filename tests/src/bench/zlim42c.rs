@@ -10,6 +10,7 @@ use sim::machine::{Order, order};
 use sim::machine::{Zlim42cMachine, zlim42c, zlim42c_82};
 
 use super::{Rows, Subject};
+use crate::object_rows::{KeepingSubject, Memory};
 use crate::power_states::PowerSubject;
 use crate::zlim42c::objects;
 
@@ -36,6 +37,8 @@ impl Subject for Zlim42c {
 
     const NODE: u8 = 1;
     const BITRATE: Bitrate = Bitrate::K500;
+    const REFUSED: &'static str = include_str!("../../data/zlim42c/refused.csv");
+    const AT_REST: &'static str = include_str!("../../data/zlim42c/at_rest.csv");
 
     fn machine() -> Zlim42cMachine {
         zlim42c(NODE, RATE_500K)
@@ -50,9 +53,22 @@ impl Subject for Zlim42c {
 impl PowerSubject for Zlim42c {
     const BREAKABLE: Component = Component::Reference;
     const BOOTED: u16 = 0x0270;
+    const CLEARS_POSITION: &'static [u16] = &[0x2012];
     const COUNTS_PER_RPM: i64 = 1;
     // A fifth at 60 r/min: full steps excite the rotor.
     const RIPPLE_RPM: f64 = 12.0;
+}
+
+impl KeepingSubject for Zlim42c {
+    const MEMORY: Memory = Memory {
+        switch: 0x200C,
+        command: 0x2010,
+        // The bit rate: see `address`. The others do something and read 0 again.
+        without: &[0x2009, 0x2010, 0x2011, 0x2012],
+        // The address switches are set, and go before 2008h.
+        node_id: None,
+        two: [(0x2005, 3, 7), (0x2006, 10, 4)],
+    };
 }
 
 impl Bench {

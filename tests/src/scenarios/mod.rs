@@ -3,9 +3,12 @@
 //! `tests/every_drive.rs` says which of them each drive is asked. What differs between drives stands with their benches;
 //! what only one of them has, in that drive's own tests. In frames `n` stands for the node.
 
+pub mod motion;
 pub mod network;
 pub mod pdo;
 pub mod sdo;
+
+pub use crate::object_rows as objects;
 
 /// The tests of a table `file { scenario: drive drive; }`: one for each drive of each row, `file::scenario::drive`.
 #[macro_export]

@@ -7,7 +7,7 @@ fn a_joint_boots_into_operational_and_sends_nothing_but_heartbeats_unasked() {
     let mut bench = Bench::new();
     let boot: Vec<String> = bench.heard();
     assert_eq!(boot, ["701#00"]);
-    bench.set(0x6060, 3).set(0x60FF, 500).set(0x6040, 0x0F).forget().run_ms(3500);
+    bench.turn(500).forget().run_ms(3500);
     let heard = bench.heard();
     assert!(heard.iter().all(|frame| frame == "701#05"), "{heard:?}");
     assert!((3..=4).contains(&heard.len()), "{heard:?}");
@@ -50,20 +50,17 @@ fn requests_may_be_as_short_as_they_need_and_answers_have_eight_bytes() {
 #[test]
 fn the_first_heartbeat_of_the_host_arms_a_watch_that_stops_the_motor_and_clears_itself() {
     let mut bench = Bench::new();
-    bench.set(0x6060, 3).set(0x60FF, 600).set(0x6040, 0x0F).run_ms(5000);
+    bench.turn(600).run_ms(5000);
     assert_eq!(bench.statusword(), 0x0437, "not watched before the first heartbeat");
     bench.send("77F#05").run_ms(1900).reads(0x260E, 0);
-    bench.run_ms(200);
-    assert_eq!((bench.get(0x260E), bench.statusword()), (0x20, 0x003F));
-    bench.reads(0x1001, 1);
+    bench.run_ms(200).reads(0x260E, 0x20).shows(0xFFFF, 0x003F).reads(0x1001, 1);
     bench.run_ms(200);
     assert!(bench.report().velocity_rpm.abs() < 1.0, "stopped, and held");
     bench.forget().run_ms(1010);
     assert!(bench.heard().contains(&"701#04".to_string()));
     bench.send("77E#05");
     assert_eq!(bench.get(0x260E), 0x20, "another node's heartbeat");
-    bench.send("77F#05");
-    assert_eq!((bench.get(0x260E), bench.get(0x1001)), (0, 0));
+    bench.send("77F#05").reads(0x260E, 0).reads(0x1001, 0);
     bench.run_ms(500);
     assert!((bench.report().velocity_rpm - 600.0).abs() < 10.0, "it goes on");
 }
@@ -75,9 +72,7 @@ fn a_move_goes_on_to_its_target_after_a_silence_of_the_host() {
     bench.run_ms(400);
     let stopped = bench.position();
     assert!(stopped < 2 * TURN && bench.get(0x260E) == 0x20, "{stopped}");
-    bench.send("77F#05").set((0x1016, 1), 0);
-    bench.until_reached(3000);
-    assert!((bench.position() - 10 * TURN).abs() <= 30);
+    bench.send("77F#05").set((0x1016, 1), 0).reaches(3000).is_at(10 * TURN, 30);
 }
 
 #[test]
@@ -164,9 +159,7 @@ fn of_several_cached_positions_sync_takes_the_last() {
     for position in ["501#10270000", "501#E8030000"] {
         bench.send(position);
     }
-    bench.send("080#");
-    bench.until_reached(1000);
-    assert!((bench.position() - 1000).abs() <= 30, "{}", bench.position());
+    bench.send("080#").reaches(1000).is_at(1000, 30);
     bench.run_ms(500);
     bench.send("080#");
     assert_eq!(bench.statusword(), 0x0437, "it is used up");
@@ -201,8 +194,7 @@ fn a_device_address_is_in_the_identifiers_of_pdos_at_once_and_the_node_id_after_
     let mut bench = Bench::new();
     bench.set((0x1402, 1), 0x444);
     for address in [7, 5] {
-        bench.set(0x2615, address);
-        assert_eq!((bench.get((0x1400, 1)), bench.get((0x1800, 1))), (0x200 + address, 0x180 + address));
+        bench.set(0x2615, address).reads((0x1400, 1), 0x200 + address).reads((0x1800, 1), 0x180 + address);
         assert_eq!(bench.get((0x1402, 1)), 0x444, "one that somebody chose stays");
     }
     bench.forget().send("201#0F0001E8030000").run_ms(5);

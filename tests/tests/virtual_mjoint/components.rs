@@ -3,7 +3,7 @@
 use crate::bench::Bench;
 
 fn turning(bench: &mut Bench, rpm: i64) {
-    bench.set(0x6060, 3).set(0x60FF, rpm).set(0x6040, 0x0F).run_ms(400);
+    bench.turn(rpm).run_ms(400);
 }
 
 #[test]
@@ -51,8 +51,7 @@ fn an_encoder_that_stands_still_looks_like_a_stall() {
     bench.until(5000, |bench| bench.get(0x260E) == 0x14);
     assert_eq!(bench.position(), stuck);
     bench.tell("1 fault encoder off").set(0x6040, 0x8F).set(0x6040, 0x0F).run_ms(500);
-    assert_eq!((bench.get(0x260E), bench.statusword()), (0, 0x0437));
-    assert!((bench.report().velocity_rpm - 300.0).abs() < 10.0);
+    bench.reads(0x260E, 0).shows(0xFFFF, 0x0437).turns_about(300.0, 10.0);
 }
 
 #[test]
@@ -60,8 +59,7 @@ fn a_lost_phase_takes_torque_and_a_heavy_load_locks_the_rotor() {
     let mut bench = Bench::new();
     turning(&mut bench, 300);
     // 5 A lift half as much again as the printed 34 N·m, two wires on average half of that.
-    bench.set(0x261D, 5005).tell("1 load torque 34").run_ms(1000);
-    assert!((bench.report().velocity_rpm - 300.0).abs() < 10.0);
+    bench.set(0x261D, 5005).tell("1 load torque 34").run_ms(1000).turns_about(300.0, 10.0);
     bench.tell("1 fault phase on").run_ms(1000);
     assert!((bench.report().velocity_rpm - 300.0).abs() > 100.0, "{}", bench.report().velocity_rpm);
 }

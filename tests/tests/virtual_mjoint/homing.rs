@@ -96,7 +96,7 @@ fn is_left(run: &HomingStatus) {
     bench.set(0x6060, 1).run_ms(500);
     assert_eq!(bench.statusword(), run.after);
     assert!((bench.position() - before).abs() < TURN, "stopped, and no new origin: {before}, {}", bench.position());
-    assert!(bench.report().velocity_rpm.abs() < 1.0);
+    bench.turns_about(0.0, 1.0);
 }
 
 #[test]
@@ -127,8 +127,7 @@ fn after_homing_the_position_is_about_zero_whatever_the_ramp_unless_the_edge_is_
 #[test]
 fn the_ones_digit_of_the_acceleration_is_the_speed() {
     let mut bench = Bench::new();
-    bench.set(0x6083, 10_005).set(0x6060, 6).run_ms(500);
-    assert!((bench.report().velocity_rpm + 600.0).abs() < 10.0, "{}", bench.report().velocity_rpm);
+    bench.set(0x6083, 10_005).set(0x6060, 6).run_ms(500).turns_about(-600.0, 10.0);
 }
 
 #[test]
@@ -137,8 +136,7 @@ fn a_halt_holds_homing_and_its_end_lets_it_go_on() {
     bench.set(0x6060, 6).run_ms(300);
     bench.set(0x6040, 0x0100).run_ms(300).shows(0xFFFF, 0x0414);
     let held = bench.position();
-    bench.run_ms(300);
-    assert!((bench.position() - held).abs() <= 2);
+    bench.run_ms(300).is_at(held, 2);
     bench.set(0x6040, 0).run_ms(300).shows(0xFFFF, 0x0014);
     assert!(bench.position() < held - 1000);
 }
@@ -150,8 +148,7 @@ fn homing_under_power_shows_the_mirrored_bits_and_position_mode_goes_on_from_the
     bench.until(3000, |bench| bench.statusword() == 0x1437);
     bench.run_ms(50);
     bench.set(0x6060, 1).shows(0xFFFF, 0x0437);
-    bench.set(0x6040, 0x2F).set(0x607A, 0);
-    bench.until_reached(1000);
+    bench.set(0x6040, 0x2F).set(0x607A, 0).reaches(1000);
     let turns = bench.report().shaft_angle_rad / core::f64::consts::TAU;
     assert!((turns * TURN as f64 + 4999.0 - 137.0).abs() < 90.0, "{turns}: the edge, and the way of the ramp");
 }
@@ -168,8 +165,7 @@ fn homing_that_cannot_begin_fails_at_once() {
     assert_eq!(bench.statusword(), 0x0014, "the next write does");
     let mut bench = Bench::new();
     bench.tell("1 supply 60").run_ms(300);
-    bench.set(0x6060, 6);
-    assert_eq!((bench.get(0x260E), bench.statusword()), (0x15, 0x200C));
+    bench.set(0x6060, 6).reads(0x260E, 0x15).shows(0xFFFF, 0x200C);
 }
 
 #[test]
@@ -203,8 +199,7 @@ fn a_host_that_sends_mode_6_each_cycle_homes_once() {
     for _ in 0..600 {
         bench.send("201#0F000600000000").run_ms(2);
     }
-    bench.shows(0xFFFF, 0x1437);
-    assert!(bench.position().abs() < 200, "{}", bench.position());
+    bench.shows(0xFFFF, 0x1437).is_at(0, 200);
     bench.send("201#0F000100000000").send("201#0F000600000000");
     assert_eq!(bench.statusword(), 0x0037, "and again after another mode");
 }

@@ -6,15 +6,10 @@ use crate::bench::{Bench, TURN};
 #[test]
 fn after_10fh_the_next_target_is_kept_and_the_one_after_2fh_runs() {
     let mut bench = Bench::new();
-    bench.set(0x6040, 0x2F).set(0x607A, TURN);
-    bench.until_reached(2000);
-    bench.set(0x6040, 0x10F).set(0x607A, 3 * TURN).run_ms(500);
-    assert!((bench.position() - TURN).abs() <= 30, "{}", bench.position());
-    bench.set(0x6040, 0x2F).run_ms(500);
-    assert!((bench.position() - TURN).abs() <= 30, "{}", bench.position());
-    bench.set(0x607A, 3 * TURN);
-    bench.until_reached(3000);
-    assert!((bench.position() - 3 * TURN).abs() <= 30, "{}", bench.position());
+    bench.set(0x6040, 0x2F).set(0x607A, TURN).reaches(2000);
+    bench.set(0x6040, 0x10F).set(0x607A, 3 * TURN).run_ms(500).is_at(TURN, 30);
+    bench.set(0x6040, 0x2F).run_ms(500).is_at(TURN, 30);
+    bench.set(0x607A, 3 * TURN).reaches(3000).is_at(3 * TURN, 30);
 }
 
 /// 5.11.2: the watch begins with the first heartbeat of the host, and this one sends none. No NMT command either (5.11.1).

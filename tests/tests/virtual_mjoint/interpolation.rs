@@ -166,19 +166,14 @@ fn with_255_a_host_that_goes_by_a_slow_dir_clock_is_followed_without_a_pause_bet
 fn with_255_a_point_waits_while_dir_stands_still() {
     let mut bench = three(255, 0);
     bench.send("501#E8030000").run_ms(1);
-    bench.send("080#").run_ms(100);
-    assert!(bench.position().abs() < 3, "{}", bench.position());
-    bench.shows(0xFFFF, 0x0037);
+    bench.send("080#").run_ms(100).is_at(0, 3).shows(0xFFFF, 0x0037);
     // Half of the stretch: 10 changes of the level.
     for n in 1..=10 {
         bench.tell(&format!("1 input DIR {}", n % 2)).run_ms(1);
     }
-    bench.run_ms(300);
-    assert!((bench.position() - 500).abs() <= 12, "{}", bench.position());
+    bench.run_ms(300).is_at(500, 12);
     for n in 1..=11 {
         bench.tell(&format!("1 input DIR {}", n % 2)).run_ms(1);
     }
-    bench.run_ms(300);
-    assert!((bench.position() - 1000).abs() <= 12, "{}", bench.position());
-    bench.shows(0xFFFF, 0x0437);
+    bench.run_ms(300).is_at(1000, 12).shows(0xFFFF, 0x0437);
 }

@@ -14,10 +14,8 @@ fn with_2f_each_write_of_the_target_starts_and_with_0f_it_only_waits() {
     bench.set(0x6040, 0x2F).run_ms(300);
     assert!(bench.position().abs() < 5, "bit 5 by itself starts nothing");
     bench.set(0x607A, 2 * TURN).shows(0xFFFF, 0x0037);
-    bench.until_reached(2000);
-    bench.set(0x607A, TURN);
-    bench.until_reached(2000);
-    assert!((bench.position() - TURN).abs() <= 30);
+    bench.reaches(2000);
+    bench.set(0x607A, TURN).reaches(2000).is_at(TURN, 30);
 }
 
 #[test]
@@ -26,18 +24,14 @@ fn bit_4_acts_on_each_write_and_clears_itself_and_bit_6_counts_from_the_target()
     bench.set(0x607A, 10_000).set(0x6040, 0x4F);
     for turn in 1..=3 {
         bench.set(0x6040, 0x5F).reads(0x6040, 0x4F).shows(0xFFFF, 0x0037);
-        bench.until_reached(2000);
-        assert!((bench.position() - 10_000 * turn).abs() <= 30);
+        bench.reaches(2000).is_at(10_000 * turn, 30);
     }
 }
 
 #[test]
 fn rpdo_1_may_change_the_mode_and_start_a_move_in_one_frame() {
     let mut bench = Bench::new();
-    bench.send("401#0F000300000000").send("201#1F000110270000");
-    bench.until_reached(1000);
-    assert!((bench.position() - 10_000).abs() <= 30, "{}", bench.position());
-    bench.reads(0x6040, 0x0F);
+    bench.send("401#0F000300000000").send("201#1F000110270000").reaches(1000).is_at(10_000, 30).reads(0x6040, 0x0F);
 }
 
 #[test]
@@ -52,7 +46,7 @@ fn a_target_that_is_sent_again_and_again_is_reached_in_the_same_time() {
             }
             bench.run_ms(1);
         }
-        assert!((bench.position() - 10 * TURN).abs() <= 30);
+        bench.is_at(10 * TURN, 30);
         bench.world.now().as_secs_f64() - from.as_secs_f64()
     };
     assert!((time(true) - time(false)).abs() < 0.02);
@@ -62,9 +56,7 @@ fn a_target_that_is_sent_again_and_again_is_reached_in_the_same_time() {
 fn the_incremental_position_moves_at_once() {
     let mut bench = Bench::new();
     bench.set(0x6040, 0x0F).set(0x260C, -5000).run_ms(100);
-    bench.set(0x260C, -5000);
-    bench.until_reached(2000);
-    assert!((bench.position() + 10_000).abs() <= 30, "{}", bench.position());
+    bench.set(0x260C, -5000).reaches(2000).is_at(-10_000, 30);
 }
 
 #[test]
@@ -74,7 +66,7 @@ fn a_move_takes_the_time_of_its_trapezoid_and_no_ramp_at_60000() {
         let mut bench = Bench::new();
         bench.set(0x6081, 600).set(0x6083, acceleration).set(0x6040, 0x2F).set(0x607A, 10 * TURN);
         let from = bench.world.now();
-        bench.until_reached(4000);
+        bench.reaches(4000);
         let ms = (bench.world.now().as_secs_f64() - from.as_secs_f64()) * 1e3;
         assert!((ms - f64::from(expected_ms)).abs() < 60.0, "{acceleration}: {ms} ms");
     }
@@ -94,8 +86,7 @@ fn halt_stops_within_milliseconds_and_holds_and_the_move_goes_on_afterwards() {
     assert!((bench.position() - held).abs() < 200, "self-locked: {}", bench.position() - held);
     bench.shows(0xFFFF, 0x0437);
     bench.tell("1 load torque 0").set(0x6040, 0x2F).shows(0xFFFF, 0x0037);
-    bench.until_reached(4000);
-    assert!((bench.position() - 30 * TURN).abs() <= 30);
+    bench.reaches(4000).is_at(30 * TURN, 30);
 }
 
 #[test]
@@ -118,14 +109,14 @@ fn quick_stop_ends_a_move_and_no_voltage_frees_the_shaft() {
 fn the_load_is_felt_through_the_gear() {
     // 20 N m at the output of a ratio of 50, and the gear's losses: 0.4 N m at the motor and some more.
     let mut bench = Bench::new();
-    bench.set(0x6060, 3).set(0x60FF, 500).set(0x6040, 0x0F).run_ms(500);
+    bench.turn(500).run_ms(500);
     let free = bench.report().current_a;
     bench.tell("1 load torque 20").run_ms(500);
     let more = bench.report().current_a - free;
     // The motor gives 1 N m at 3.5 A.
     let least = 20.0 / 50.0 * 3.5;
     assert!((least..1.6 * least).contains(&more), "{more} A more, at least {least} A");
-    assert!((bench.report().velocity_rpm - 500.0).abs() < 5.0);
+    bench.turns_about(500.0, 5.0);
 }
 
 #[test]
@@ -176,15 +167,14 @@ fn the_gains_of_60f9h_and_60fbh_are_the_loops_own() {
 #[test]
 fn targets_faster_than_the_motor_are_held_to_its_highest_speed() {
     let mut bench = Bench::of(1, &Model::M8025E25B50);
-    bench.tell("1 supply 48").set(0x6060, 3).set(0x6040, 0x0F).set(0x60FF, 3000).run_ms(1000);
-    assert!((bench.report().velocity_rpm - 1500.0).abs() < 15.0, "{}", bench.report().velocity_rpm);
+    bench.tell("1 supply 48").set(0x6060, 3).set(0x6040, 0x0F).set(0x60FF, 3000).run_ms(1000).turns_about(1500.0, 15.0);
     bench.shows(0xFFFF, 0x0437);
 }
 
 #[test]
 fn actual_values_are_in_the_manuals_units() {
     let mut bench = Bench::new();
-    bench.set(0x6060, 3).set(0x60FF, -600).set(0x6040, 0x0F).tell("1 load torque -10").run_ms(500);
+    bench.turn(-600).tell("1 load torque -10").run_ms(500);
     let report = bench.report();
     assert!((bench.get(0x606C) + 6000).abs() < 60);
     assert!((bench.get(0x6079) as f64 / 327.0 - report.supply_v).abs() < 0.1);

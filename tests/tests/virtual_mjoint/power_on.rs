@@ -9,8 +9,7 @@ fn saved(function: i64) -> Bench {
 }
 
 fn turn_to(bench: &mut Bench, counts: i64) {
-    bench.set(0x6060, 1).set(0x6040, 0x2F).set(0x607A, counts);
-    bench.until_reached(5000);
+    bench.set(0x6060, 1).set(0x6040, 0x2F).set(0x607A, counts).reaches(5000);
     bench.set(0x6040, 0);
 }
 
@@ -45,11 +44,8 @@ fn an_origin_set_with_60006_and_60016_outlives_a_power_cycle() {
     assert_eq!(bench.get(0x260A), 60_016, "alone it is a gear");
     bench.set(0x260A, 1234).set(0x260A, 60_006);
     assert!(bench.position() > 3 * TURN);
-    bench.set(0x260A, 60_016).run_ms(1);
-    assert!(bench.position().abs() < 5);
-    bench.reads(0x260A, 1234);
-    bench.power_cycle();
-    assert!(bench.position().abs() < 5);
+    bench.set(0x260A, 60_016).run_ms(1).is_at(0, 5).reads(0x260A, 1234);
+    bench.power_cycle().is_at(0, 5);
 }
 
 #[test]
@@ -61,8 +57,7 @@ fn function_6_goes_back_to_the_origin_at_the_speed_of_the_ones_digit() {
     let speed = bench.report().velocity_rpm;
     assert!((speed + 300.0).abs() < 10.0, "{speed}");
     assert_eq!(bench.statusword(), 0x0014, "it drives the motor by itself");
-    bench.until_reached(4000);
-    assert!(bench.position().abs() <= 30, "{}", bench.position());
+    bench.reaches(4000).is_at(0, 30);
 }
 
 #[test]
@@ -77,9 +72,7 @@ fn turns_that_are_lost_are_no_place_to_go_back_to() {
 fn an_angle_is_turned_to_within_the_present_turn() {
     let mut bench = saved(16_384);
     turn_to(&mut bench, 2 * TURN + 1000);
-    bench.power_cycle();
-    bench.until_reached(3000);
-    assert!((bench.position() - (2 * TURN + 16_384)).abs() <= 30, "{}", bench.position());
+    bench.power_cycle().reaches(3000).is_at(2 * TURN + 16_384, 30);
 }
 
 #[test]
@@ -128,17 +121,14 @@ fn with_a_brake_the_turns_outlive_a_power_off_without_a_battery() {
 #[test]
 fn function_8_goes_back_to_the_origin_without_a_battery() {
     let mut bench = saved(8);
-    bench.tell("1 battery off").power_cycle();
-    bench.until_reached(2000);
+    bench.tell("1 battery off").power_cycle().reaches(2000);
     bench.set(0x6040, 0x0F).set(0x260A, 60_006).set(0x260A, 60_016).run_ms(1);
     turn_to(&mut bench, -3 * TURN);
     bench.power_cycle();
     // Already on its way: 100 r/min for less than 10 ms.
     assert!((bench.position() + 3 * TURN).abs() < 1000, "{}", bench.position());
-    bench.until_reached(4000);
-    assert!(bench.position().abs() <= 30, "{}", bench.position());
-    bench.power_cycle();
-    assert!(bench.position().abs() <= 30, "{}", bench.position());
+    bench.reaches(4000).is_at(0, 30);
+    bench.power_cycle().is_at(0, 30);
 }
 
 #[test]
@@ -179,11 +169,10 @@ fn beyond_60000_turns_the_position_goes_on_from_the_other_end_and_the_move_does_
         bench.run_ms(1);
         most = most.max(bench.report().velocity_rpm.abs());
     }
-    assert!((bench.position() - (-60_000 * TURN + TURN / 2)).abs() <= 30, "{}", bench.position());
+    bench.is_at(-60_000 * TURN + TURN / 2, 30);
     assert!(most < 1700.0 && bench.statusword() == 0x0437, "one turn at 1500 r/min, and no more: {most}");
     // Back by two turns, over the same edge.
-    bench.set(0x607A, -2 * TURN).set(0x6040, 0x5F).run_ms(500);
-    assert!((bench.position() - (59_998 * TURN + TURN / 2)).abs() <= 30, "{}", bench.position());
+    bench.set(0x607A, -2 * TURN).set(0x6040, 0x5F).run_ms(500).is_at(59_998 * TURN + TURN / 2, 30);
 }
 
 #[test]
@@ -199,9 +188,7 @@ fn a_joint_that_takes_pulses_goes_back_to_where_it_was_at_power_off_and_holds() 
     let mut bench = Bench::new();
     pushed_away(&mut bench);
     assert_eq!(bench.statusword() & !0x0400, 0x0004, "as printed for a joint that nobody has enabled");
-    bench.run_ms(10_000);
-    assert!((bench.position() - 2 * TURN - 5000).abs() <= 40, "{}", bench.position());
-    bench.shows(0xFFFF, 0x0404);
+    bench.run_ms(10_000).is_at(2 * TURN - 5000, 40).shows(0xFFFF, 0x0404);
     bench.tell("1 load torque 20").run_ms(500);
     assert!((bench.position() - 2 * TURN - 5000).abs() <= 200, "it holds: {}", bench.position());
     // Bit 0 of the controlword makes it the host's, and bit 1 is 0: free.

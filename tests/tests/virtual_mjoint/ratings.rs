@@ -15,7 +15,7 @@ fn figure(parameter: &str) -> [f64; 4] {
 
 fn turning(model: &'static Model, rpm: f64) -> Bench {
     let mut bench = Bench::of(1, model);
-    bench.set(0x6060, 3).set(0x60FF, rpm as i64).set(0x6040, 0x0F);
+    bench.turn(rpm as i64);
     bench
 }
 
@@ -64,7 +64,7 @@ fn at_the_rated_current_the_rated_torque_comes_out_and_the_supply_pays_for_it() 
         (figure("Output torque after deceleration"), figure("Motor rated current"), figure("Resistance"));
     for (n, model) in MODELS.into_iter().enumerate() {
         let mut bench = Bench::open_with(mjoint(model, 1, Bitrate::M1));
-        bench.set(0x6060, 3).set(0x60FF, 500).set(0x6040, 0x0F);
+        bench.turn(500);
         let load =
             |bench: &mut Bench, torque_nm| bench.machine().assembly_mut().motor_mut().rig.load.torque_nm = torque_nm;
         for share in 1..=20 {

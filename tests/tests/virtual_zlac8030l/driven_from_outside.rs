@@ -18,7 +18,7 @@ fn a_free_wheel_under_2_5_nm_ends_where_the_bus_is_limited_and_over_voltage_is_t
     let rad_s = -report.velocity_rpm * RAD_S_PER_RPM;
     let emf_v = rad_s * wheel::emf_per_rad_s() * 3_f64.sqrt();
     assert_within("back-EMF in V", emf_v, report.supply_v, report.supply_v * 1.03);
-    assert_eq!((bench.get(0x603F), bench.get(0x1001)), (OVER_VOLTAGE, 0x05));
+    bench.reads(0x603F, OVER_VOLTAGE).reads(0x1001, 0x05);
     assert_eq!(bench.heard_of("084#"), ["084#0100050000000000"], "told once");
     assert_within("2029h in V", bench.get(0x2029) as f64 * 0.01, report.supply_v - 0.1, report.supply_v + 0.1);
     bench.run_ms(10_000);

@@ -16,7 +16,7 @@ fn drives_without_a_mode(bench: &mut Bench) -> f64 {
 #[test]
 fn a_driver_that_never_writes_6060h_turns_the_wheel_of_a_drive_that_was_given_its_mode() {
     let mut bench = Bench::ordered("L090", "mode", &[Preset::new(0x6060, 0, 3)]);
-    assert_eq!((bench.get(0x6060), bench.get(0x6061)), (3, 3));
+    bench.reads(0x6060, 3).reads(0x6061, 3);
     assert_within("speed", drives_without_a_mode(&mut bench), 59.0, 61.0);
     assert_eq!(drives_without_a_mode(&mut Bench::new()), 0.0, "as delivered the mode is 0");
 }
@@ -26,13 +26,11 @@ fn a_save_keeps_the_mode_a_write_alone_does_not_and_factory_settings_take_it_awa
     let mut bench = Bench::new();
     bench.set(0x6060, 3).let_store().power_cycle();
     assert_eq!(bench.get(0x6060), 0, "written, not saved");
-    bench.set(0x6060, 3).set(0x2009, 2).let_store().power_cycle();
-    assert_eq!((bench.get(0x6060), bench.get(0x6061)), (3, 3));
+    bench.set(0x6060, 3).set(0x2009, 2).let_store().power_cycle().reads(0x6060, 3).reads(0x6061, 3);
     bench.send("000#8104").run_ms(10);
     assert_within("speed", drives_without_a_mode(&mut bench), 59.0, 61.0);
     bench.set(0x6040, 0).run_ms(2000);
-    bench.set(0x2009, 1).let_store();
-    assert_eq!((bench.get(0x6060), bench.get(0x6061)), (0, 0));
+    bench.set(0x2009, 1).let_store().reads(0x6060, 0).reads(0x6061, 0);
     bench.power_cycle().reads(0x6060, 0);
 }
 
@@ -40,8 +38,7 @@ fn a_save_keeps_the_mode_a_write_alone_does_not_and_factory_settings_take_it_awa
 fn with_l090_marked_neither_a_save_nor_factory_settings_are_about_the_mode() {
     let mut bench = Bench::choosing("L090", "marked");
     bench.set(0x6060, 3).set(0x2009, 1).let_store().reads(0x6060, 3);
-    bench.set(0x2009, 2).let_store().power_cycle();
-    assert_eq!((bench.get(0x6060), bench.get(0x6061)), (0, 0));
+    bench.set(0x2009, 2).let_store().power_cycle().reads(0x6060, 0).reads(0x6061, 0);
 }
 
 /// -1.0 A of 6077h mapped with 32 bits were seen as F6 FF 00 00.
@@ -65,9 +62,8 @@ fn an_object_mapped_with_more_bits_than_it_has_is_sent_with_zeros_above_and_with
 fn an_rpdo_entry_with_more_bits_than_its_object_gives_it_the_lowest_of_them() {
     let mut bench = Bench::new();
     bench.map(0x1601, &[0x6071_0020, 0x6060_0008]).send("000#0104").send("304#18FCFFFF03");
-    assert_eq!((bench.get(0x6071), bench.get(0x6060)), (-1000, 3));
-    bench.send("304#E803345604");
-    assert_eq!((bench.get(0x6071), bench.get(0x6060)), (1000, 4));
+    bench.reads(0x6071, -1000).reads(0x6060, 3);
+    bench.send("304#E803345604").reads(0x6071, 1000).reads(0x6060, 4);
 }
 
 #[test]

@@ -59,8 +59,7 @@ fn rpdo_0_carries_controlword_and_mode_and_tpdo_0_the_statusword_at_most_every_5
     let mut bench = eds();
     bench.set(0x2000, 0).set(0x60FF, 0).forget().send("000#0104").run_ms(60);
     assert_eq!(bench.heard_of("184#"), ["184#7006"], "once on entering operational");
-    bench.send("204#060003");
-    assert_eq!((bench.get(0x6060), bench.statusword() & 0x6F), (3, 0x21));
+    bench.send("204#060003").reads(0x6060, 3).shows(0x6F, 0x21);
     bench.run_ms(60);
     bench.forget();
     for frame in ["204#070003", "204#0F0003"] {

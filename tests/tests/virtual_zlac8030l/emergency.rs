@@ -55,7 +55,7 @@ fn an_external_stop_with_202f_03_1_ramps_as_605ah_says_and_ends_disabled() {
         assert_stops(&mut bench, ramp);
         bench.shows(0x80FF, DISABLED_FROM_OUTSIDE);
         assert!(gives_way(&mut bench), "605Ah = {option}");
-        assert_eq!((bench.get(0x603F), bench.get(0x60FF)), (0, 0));
+        bench.reads(0x603F, 0).reads(0x60FF, 0);
     }
 }
 

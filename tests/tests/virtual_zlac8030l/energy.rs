@@ -81,7 +81,7 @@ fn hard_braking_with_a_bleeder_stays_between_its_two_voltages() {
     let mut bench = turning(300.0, 0.1, 600);
     bench.set((0x202E, 5), 1).set(0x6040, 0x02);
     let highest_v = highest_bus_v(&mut bench, 700);
-    assert_eq!((bench.get(0x603F), bench.statusword() & 0xFF), (0, 0x17));
+    bench.reads(0x603F, 0).shows(0xFF, 0x17);
     assert_within("highest bus voltage", highest_v, 69.9, 70.5);
     let burnt_j = bench.motor().rig.energy.bleeder_j;
     let kinetic_j = 0.5 * (wheel::inertia_kg_m2() + 0.1) * (300.0 * RAD_S_PER_RPM).powi(2);

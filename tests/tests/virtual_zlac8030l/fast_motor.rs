@@ -30,9 +30,7 @@ fn a_position_move_at_1000_rpm_arrives_with_the_fast_motor() {
     let mut bench = fast();
     bench.set((0x202E, 5), 1).enable_in(1).set(0x6081, 1000).set(0x607A, 100_000).set(0x6040, 0x1F).run_ms(1000);
     bench.turns_at(990.0, 1010.0);
-    bench.run_ms(2000);
-    assert_within("position", bench.report().position as f64, 99_970.0, 100_030.0);
-    bench.reads(0x603F, 0);
+    bench.run_ms(2000).is_at(100000, 30).reads(0x603F, 0);
 }
 
 /// 48 V carry the slow motor to some 510 r/min: the way that it lags behind a faster move grows past 2017h.

@@ -32,14 +32,13 @@ fn the_fault_of_firmware_2_01_is_reset_once_the_target_is_within_the_maximum() {
     bench.set(0x6040, 0x80);
     assert_eq!((bench.get(0x603F), bench.statusword() & 0x6F), (SPEED_SETTING, 0x08), "the cause is still there");
     bench.set(0x60FF, 50).run_ms(5);
-    bench.set(0x6040, 0x00).set(0x6040, 0x80);
-    assert_eq!((bench.get(0x603F), bench.statusword() & 0x6F), (0, 0x60));
+    bench.set(0x6040, 0x00).set(0x6040, 0x80).reads(0x603F, 0).shows(0x6F, 0x60);
 }
 
 #[test]
 fn the_version_is_that_of_the_firmware() {
     for (firmware, version) in [("1.00", 0x0100), ("2.01", 0x0201)] {
         let mut bench = Bench::choosing("firmware", firmware);
-        assert_eq!((bench.get(0x100A), bench.get(0x2025)), (version, version));
+        bench.reads(0x100A, version).reads(0x2025, version);
     }
 }

@@ -18,7 +18,6 @@ mod firmware;
 mod holding;
 mod motor_parameters;
 mod network;
-mod objects;
 mod position;
 mod power_state;
 mod robustness;

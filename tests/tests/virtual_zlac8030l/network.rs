@@ -207,8 +207,7 @@ fn a_cable_cut_in_motion_stops_the_motor_by_the_watch_over_the_host() {
     bench.run_ms(500);
     assert_within("speed after 1490 ms", bench.report().velocity_rpm, -0.5, 0.5);
     bench.world.join(drive);
-    bench.run_ms(50);
-    assert_eq!((bench.statusword() & 0xFF, bench.get(0x603F), bench.get(0x60FF)), (0x37, 0, 0));
+    bench.run_ms(50).shows(0xFF, 0x37).reads(0x603F, 0).reads(0x60FF, 0);
     bench.set(0x60FF, 60).run_ms(700);
     assert_within("speed with a new target", bench.report().velocity_rpm, 59.0, 61.0);
 }

@@ -193,13 +193,12 @@ fn clearing_with_2006h_moves_the_origin_of_absolute_moves() {
     let mut bench = ready();
     start(&mut bench, 4096, 0);
     bench.run_ms(2500);
-    bench.set(0x2006, 1);
-    assert_within("6064h", bench.get(0x6064) as f64, -2.0, 2.0);
+    bench.set(0x2006, 1).is_at(0, 2);
     start(&mut bench, 2048, 0);
     bench.run_ms(2500);
     let turned = bench.report().shaft_angle_rad / core::f64::consts::TAU * COUNTS_PER_TURN;
     assert_within("counts from where it began", turned, 6144.0 - 60.0, 6144.0 + 60.0);
-    assert_within("6064h", bench.get(0x6064) as f64, 2018.0, 2078.0);
+    bench.is_at(2048, 30);
 }
 
 /// 60F2h is absent, so its default holds: relative to the preceding target (CiA 402-2).

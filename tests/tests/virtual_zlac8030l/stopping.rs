@@ -93,8 +93,7 @@ fn a_halted_position_move_goes_on_to_its_target() {
     assert!(halted.velocity_rpm.abs() < 0.5 && (2000..15_000).contains(&halted.position), "{halted:?}");
     bench.run_ms(1000);
     assert_within("the shaft stays", (bench.report().position - halted.position) as f64, -5.0, 5.0);
-    bench.set(0x6040, 0x1F).run_ms(4000);
-    assert_within("position", bench.report().position as f64, 16_354.0, 16_414.0);
+    bench.set(0x6040, 0x1F).run_ms(4000).is_at(16384, 30);
 }
 
 #[test]
@@ -103,8 +102,7 @@ fn a_set_point_given_under_halt_waits_for_its_end() {
     bench.enable_in(1).set(0x6040, 0x10F).set(0x607A, 8192).set(0x6040, 0x11F).run_ms(1000);
     assert_within("the shaft stays", bench.report().position as f64, -5.0, 5.0);
     assert_ne!(bench.statusword() & 0x1000, 0, "the set-point is acknowledged");
-    bench.set(0x6040, 0x0F).run_ms(4000);
-    assert_within("position", bench.report().position as f64, 8162.0, 8222.0);
+    bench.set(0x6040, 0x0F).run_ms(4000).is_at(8192, 30);
 }
 
 #[test]
@@ -159,7 +157,7 @@ fn a_silent_host_stops_the_motor_after_2000h_and_leaves_it_enabled_without_a_fau
     assert_within("just before", bench.report().velocity_rpm, RPM - 1.0, RPM + 1.0);
     bench.run_ms(20);
     assert_stops(&mut bench, Ramp::Time(0.4));
-    assert_eq!((bench.statusword() & 0xFF, bench.get(0x603F), bench.get(0x60FF)), (0x37, 0, 0));
+    bench.shows(0xFF, 0x37).reads(0x603F, 0).reads(0x60FF, 0);
     bench.set(0x60FF, 60).run_ms(400);
     let again = bench.get(0x606C);
     assert!(again > 100, "a new target is followed: {again}");
@@ -226,8 +224,7 @@ fn a_silent_host_stops_the_motor_with_the_ramp_of_605ah_in_each_mode() {
     let mut bench = Bench::new();
     bench.set(0x6087, 0).enable_in(4).set(0x2000, 500).set(0x6071, 1000).run_ms(400);
     assert!(bench.report().velocity_rpm > 100.0);
-    bench.run_ms(1500).turns_at(-1.0, 1.0);
-    assert_eq!((bench.get(0x6071), bench.statusword() & 0xFF), (0, 0x37));
+    bench.run_ms(1500).turns_at(-1.0, 1.0).reads(0x6071, 0).shows(0xFF, 0x37);
 }
 
 #[test]

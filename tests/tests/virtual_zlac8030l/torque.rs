@@ -16,8 +16,7 @@ fn stalled(slope_ma_s: i64) -> Bench {
     bench.set(0x60FF, 0).run_ms(1000);
     bench.set(0x6060, 4);
     bench.motor().rig.load.locked = true;
-    bench.set(0x6087, slope_ma_s);
-    assert_eq!((bench.get(0x6061), bench.statusword() & 0xFF), (4, 0x37));
+    bench.set(0x6087, slope_ma_s).reads(0x6061, 4).shows(0xFF, 0x37);
     bench
 }
 

@@ -8,8 +8,7 @@ use crate::bench::{Bench, assert_within};
 fn a_mode_asked_for_in_motion_takes_effect_at_standstill() {
     let mut bench = Bench::new();
     bench.enable_in(3).set(0x60FF, 100).run_ms(800);
-    bench.set(0x6060, 1).run_ms(100);
-    assert_eq!((bench.get(0x6060), bench.get(0x6061)), (1, 3));
+    bench.set(0x6060, 1).run_ms(100).reads(0x6060, 1).reads(0x6061, 3);
     bench.set(0x60FF, 0).run_ms(800).reads(0x6061, 1);
     let stands = bench.report().position;
     bench.run_ms(1000);
@@ -74,8 +73,7 @@ fn a_new_target_or_speed_in_a_move_waits_for_the_next_set_point() {
     let mut bench = Bench::new();
     bench.enable_in(1).set(0x607A, 12_288).set(0x6040, 0x1F).run_ms(800);
     bench.set(0x607A, -5000).set(0x6081, 10).run_ms(400).turns_at(118.0, 122.0);
-    bench.run_ms(2000);
-    assert_within("position", bench.report().position as f64, 12_258.0, 12_318.0);
+    bench.run_ms(2000).is_at(12288, 30);
 }
 
 #[test]
@@ -106,11 +104,9 @@ fn lines_and_direction_changed_while_enabled_wait_until_the_motor_is_free() {
 #[test]
 fn an_eeprom_that_cannot_be_written_is_told_and_factory_settings_mend_it() {
     let mut bench = Bench::new();
-    bench.set_fault(Component::Eeprom, true).run_ms(20);
-    assert_eq!((bench.get(0x603F), bench.get(0x1001)), (0x0100, 0x81));
+    bench.set_fault(Component::Eeprom, true).run_ms(20).reads(0x603F, 0x0100).reads(0x1001, 0x81);
     bench.set_fault(Component::Eeprom, false).run_ms(5);
-    bench.set(0x2009, 1).run_ms(20);
-    assert_eq!((bench.get(0x603F), bench.statusword() & 0xFF), (0, 0x70));
+    bench.set(0x2009, 1).run_ms(20).reads(0x603F, 0).shows(0xFF, 0x70);
 }
 
 #[test]

@@ -39,7 +39,7 @@ fn another_node_number_takes_effect_with_the_next_start_unless_the_switches_deci
     machine.set(0x2008, 42).reads(0x2000, 1);
     machine.let_store().power_cycle();
     // The bench's drive has its switches at 1: they decide.
-    assert_eq!((machine.get(0x2000), machine.get(0x2008)), (1, 42));
+    machine.reads(0x2000, 1).reads(0x2008, 42);
 
     let mut world = World::new(Bitrate::K500, 1);
     let host = world.add_tap();

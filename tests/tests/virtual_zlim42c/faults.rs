@@ -71,7 +71,7 @@ fn a_rising_bit_7_or_2011h_resets_a_fault_whose_cause_is_gone() {
             assert_eq!(reset(&mut bench), if unseen { 0x70 } else { 0x98 }, "{cause:?} is still there");
             set(&mut bench, cause, false);
             assert_eq!(reset(&mut bench), 0x70, "{cause:?}");
-            assert_eq!((bench.get(0x603F), bench.get(0x1001)), (0, 0));
+            bench.reads(0x603F, 0).reads(0x1001, 0);
             assert!(bench.heard().contains(&"081#0000000000000000".to_owned()));
         }
     }
@@ -216,7 +216,7 @@ fn a_sound_motor_whose_own_voltage_holds_its_current_down_has_lost_no_phase() {
     for rpm in (520..=700).step_by(20) {
         let mut bench = Bench::long();
         bench.set_supply(20.0).set(0x6083, 1000).enable_in(3).set(0x60FF, rpm).run_ms(3000);
-        assert_eq!((bench.get(0x603F), bench.get(0x606C)), (0, rpm));
+        bench.reads(0x603F, 0).reads(0x606C, rpm);
         assert_within("r/min", bench.report().velocity_rpm, 0.8 * rpm as f64, 1.2 * rpm as f64);
     }
 }
@@ -252,19 +252,16 @@ fn two_faults_are_told_one_by_one_and_go_one_by_one() {
     assert_eq!(told, ["081#08FF810000000000", "081#01FF850000000000"], "the register gathers both");
     assert_eq!(bench.get(0x603F), 0xFF01, "the last");
     set(&mut bench, Cause::OverVoltage, false);
-    bench.set(0x2011, 1);
-    assert_eq!((bench.get(0x603F), bench.get(0x1001), bench.statusword() & 0x4F), (0xFF08, 0x81, 0x08));
+    bench.set(0x2011, 1).reads(0x603F, 0xFF08).reads(0x1001, 0x81).shows(0x4F, 0x08);
     set(&mut bench, Cause::Broken(Component::Reference), false);
-    bench.set(0x2011, 1);
-    assert_eq!((bench.get(0x603F), bench.get(0x1001), bench.statusword() & 0x4F), (0, 0, 0x40));
+    bench.set(0x2011, 1).reads(0x603F, 0).reads(0x1001, 0).shows(0x4F, 0x40);
 }
 
 #[test]
 fn a_reset_without_a_fault_changes_nothing() {
     let mut bench = Bench::new();
     bench.enable_in(3).set(0x60FF, 60).run_ms(300);
-    bench.forget().set(0x2011, 1);
-    assert_eq!((bench.get(0x2011), bench.get(0x606C), bench.statusword() & 0x6F), (0, 60, 0x27));
+    bench.forget().set(0x2011, 1).reads(0x2011, 0).reads(0x606C, 60).shows(0x6F, 0x27);
     assert!(!bench.heard().iter().any(|frame| frame.starts_with("081#")));
 }
 

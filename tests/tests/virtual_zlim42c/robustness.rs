@@ -3,14 +3,12 @@
 use std::time::Duration;
 
 use ferrodrive_tests::bench::zlim42c::Zlim42c;
-use ferrodrive_tests::object_rows;
 use ferrodrive_tests::random_host::{self, Play};
 use ferrodrive_tests::seeded::Seeded;
 use ferrodrive_tests::zlim42c::objects;
 use sim::Component;
 
 use crate::bench::Bench;
-use crate::objects::MEMORY;
 
 /// Writes that a random host may not do: node-ID and bit rate take the drive off this bus at its next restart, and 1005h
 /// would make other frames SYNC.
@@ -84,17 +82,11 @@ fn a_brown_out_in_motion_restarts_the_drive_at_position_0_with_its_stored_values
         bench.set_supply(supply_v).run_ms(1000);
     }
     assert_eq!(bench.heard().iter().filter(|frame| *frame == "701#00").count(), 1);
-    assert_eq!((bench.statusword(), bench.get(0x6064), bench.get(0x603F)), (0x0270, 0, 0));
-    assert_eq!((bench.get(0x6060), bench.get(0x60FF), bench.get(0x606C)), (0, 0, 0));
+    bench.shows(0xFFFF, 0x0270).reads(0x6064, 0).reads(0x603F, 0).reads(0x6060, 0).reads(0x60FF, 0).reads(0x606C, 0);
     assert_eq!((bench.get(0x2005), bench.get(0x200E)), (5, 5), "2005h is stored, 200Eh is not");
     // The free rotor rests in its detent, at most half an electrical turn from where the vector will stand up.
     let rotor = bench.report().rotor_position.expect("known here");
     assert!(rotor.abs() <= 40, "both begin anew: {rotor}");
-}
-
-#[test]
-fn power_that_goes_at_any_moment_of_a_save_leaves_the_old_values_or_the_new_ones() {
-    object_rows::are_saved_together_or_not_at_all::<Zlim42c>(&MEMORY, &[(0x2005, 3, 7), (0x2006, 10, 4)]);
 }
 
 #[test]

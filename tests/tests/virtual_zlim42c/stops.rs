@@ -244,10 +244,8 @@ fn a_move_halted_by_coasting_goes_on_to_its_target() {
 #[test]
 fn another_mode_waits_until_the_motor_stands() {
     let mut bench = turning(3);
-    bench.set(0x6060, 1).run_ms(100);
-    assert_eq!((bench.get(0x6060), bench.get(0x6061), bench.get(0x606C)), (1, 3, 120));
-    bench.set(0x60FF, 0).run_ms(350);
-    assert_eq!((bench.get(0x6061), bench.get(0x606C)), (1, 0));
+    bench.set(0x6060, 1).run_ms(100).reads(0x6060, 1).reads(0x6061, 3).reads(0x606C, 120);
+    bench.set(0x60FF, 0).run_ms(350).reads(0x6061, 1).reads(0x606C, 0);
     bench.set(0x6060, 0).run_ms(5);
     bench.set(0x60FF, 120).set(0x6040, 0x1F).run_ms(100);
     assert_eq!((bench.get(0x6061), bench.get(0x606C)), (0, 0), "without a mode nothing moves");
