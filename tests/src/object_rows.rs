@@ -38,6 +38,8 @@ pub struct Memory {
     pub node_id: Option<u16>,
     /// Two stored objects, each with its default and another value.
     pub two: [(u16, i64, i64); 2],
+    /// `eds_defaults.csv`.
+    pub eds: &'static str,
 }
 
 /// A drive that stores each write, or all on command.
@@ -153,6 +155,26 @@ pub fn read_at_rest_what_a_resting_drive_has<S: Subject>() {
     let told = |row: &&ObjectRow| row.live && !expected.iter().any(|(key, _)| *key == row.key());
     let untold: Vec<_> = S::rows().all().iter().filter(told).collect();
     assert!(untold.is_empty(), "{untold:?}");
+}
+
+/// `eds_defaults.csv`: where the maker's EDS has another default than the manual, a drive that is delivered by the EDS has
+/// it after power-on and after a restore. What is written to is stored or not as with the manual's values.
+pub fn have_the_factory_values_of_the_eds_where_that_is_chosen<S: KeepingSubject>() {
+    let different = rows(S::MEMORY.eds, |row| {
+        let default = integer(row.get("default")).expect("a default");
+        ((hex(row.get("index")), hex(row.get("sub")) as u8), default)
+    });
+    let mut bench = Bench::<S>::choosing("defaults", "eds");
+    for (object, given) in &different {
+        let printed = S::rows().find(object.0, object.1).and_then(|row| row.default);
+        assert_ne!(printed, Some(*given), "{object:X?} of the manual");
+        bench.reads(*object, *given);
+    }
+    bench.set((0x1800, 3), 7).set(0x60FF, 7).set(S::MEMORY.command, 2).let_store().power_cycle();
+    bench.reads((0x1800, 3), 7).reads(0x60FF, 120).set(S::MEMORY.command, 1).let_store().power_cycle();
+    for (object, given) in different {
+        bench.reads(object, given);
+    }
 }
 
 /// With the memory's switch at 0, a write outlives a power cycle if and only if the object is stored.

@@ -25,6 +25,12 @@ pub trait PowerSubject: Subject {
     /// Objects that clear the position.
     const CLEARS_POSITION: &'static [u16];
 
+    /// How many digital inputs it has.
+    const INPUTS: usize;
+
+    /// Sub-indexes of 2030h that hold the functions of Y0 and Y1.
+    const OUTPUT_FUNCTIONS: [u8; 2];
+
     /// 606Ch counts so many in 1 r/min.
     const COUNTS_PER_RPM: i64;
 

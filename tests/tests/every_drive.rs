@@ -8,6 +8,7 @@ ferrodrive_tests::scenarios! {
         refuse_what_the_manual_does_not_have: zlac8030l zlim42c mjoint;
         refuse_another_width: zlac8030l zlim42c mjoint;
         read_at_rest_what_a_resting_drive_has: zlac8030l zlim42c mjoint;
+        have_the_factory_values_of_the_eds_where_that_is_chosen: zlac8030l zlim42c;
         outlive_a_power_cycle_if_and_only_if_stored: zlac8030l zlim42c;
         are_kept_and_restored_only_on_command: zlac8030l zlim42c;
         are_saved_together_or_not_at_all: zlac8030l zlim42c;
@@ -54,5 +55,10 @@ ferrodrive_tests::scenarios! {
     }
     motion {
         clearing_the_position_reads_zero_again_and_zeroes_the_position: zlac8030l zlim42c;
+    }
+    terminals {
+        an_output_tells_what_its_function_names_in_either_polarity: zlac8030l zlim42c;
+        a_drive_without_power_has_its_outputs_off: zlac8030l zlim42c;
+        input_status_shows_the_levels_whatever_the_polarity_and_the_functions: zlac8030l zlim42c;
     }
 }

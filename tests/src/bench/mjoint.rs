@@ -3,13 +3,11 @@
 use std::sync::LazyLock;
 
 use can::Bitrate;
-use canopen::NodeId;
-use devices::mjoint::M4230E17B50;
 use drives::engine::storage::Image;
 use drives::mjoint::variations::VARIANT;
 use drives::mjoint::{Model, storage};
 use sim::VirtualDrive;
-use sim::machine::{self, Joint, MJointMachine, Machine, Order, mjoint};
+use sim::machine::{Joint, MJointMachine, Machine, mjoint};
 
 use super::{Place, Rows, Subject};
 use crate::mjoint::objects;
@@ -32,6 +30,7 @@ pub type Bench = super::Bench<MJoint>;
 impl Subject for MJoint {
     type Machine = MJointMachine;
 
+    const MODEL: &'static str = "m4230e17b50";
     const NODE: u8 = 1;
     const BITRATE: Bitrate = Bitrate::M1;
     const REFUSED: &'static str = include_str!("../../data/mjoint/refused.csv");
@@ -56,17 +55,7 @@ impl Bench {
         Self::with((1..=count).map(joint).collect())
     }
 
-    /// One that is read in another way, as `ferrodrive readings` lists them.
-    #[must_use]
-    #[track_caller]
-    pub fn read_as(key: &str, choice: &str) -> Self {
-        let model = &M4230E17B50;
-        let mut order = Order::new(model, NodeId::MIN, MJoint::BITRATE);
-        order.variant.choose(key, choice).expect("a reading of the joint");
-        Self::with(vec![machine::order(model, &order).expect("a joint")])
-    }
-
-    /// The same with its [`machine`](Self::machine) open to the eye.
+    /// One that is read in another way, with its [`machine`](Self::machine) open to the eye.
     #[must_use]
     #[track_caller]
     pub fn open_as(key: &str, choice: &str) -> Self {

@@ -12,6 +12,9 @@ use std::marker::PhantomData;
 use std::time::Duration;
 
 use can::{Bitrate, CanId, Frame, Instant};
+use canopen::NodeId;
+use devices::variant::Preset;
+use sim::machine::{Order, order};
 use sim::{Component, Report, StationId, VirtualDrive, World};
 
 use crate::manual::ObjectRow;
@@ -51,6 +54,8 @@ pub trait Subject: 'static {
     /// Firmware and physics.
     type Machine: VirtualDrive + Clone + 'static;
 
+    /// Its model's name.
+    const MODEL: &'static str;
     /// Its node, and its number in the world.
     const NODE: u8;
     /// Its bit rate.
@@ -131,6 +136,24 @@ impl<S: Subject> Bench<S> {
             .map(|(number, drive)| world.add_drive(number, drive).expect("a free number"))
             .collect();
         Self::booted(world, host, stations[0], false)
+    }
+
+    /// A drive that takes another choice at one point, as `ferrodrive readings` lists them (`L123`, `coast`).
+    #[must_use]
+    #[track_caller]
+    pub fn choosing(key: &str, choice: &str) -> Self {
+        Self::ordered(key, choice, &[])
+    }
+
+    /// The same with values of its own in its parameter store.
+    #[must_use]
+    #[track_caller]
+    pub fn ordered(key: &str, choice: &str, presets: &[Preset]) -> Self {
+        let model = devices::model(S::MODEL).expect("a model");
+        let mut wanted = Order::new(model, NodeId::new(S::NODE).expect("a node-ID"), S::BITRATE);
+        wanted.variant.choose(key, choice).expect("a choice of this model");
+        wanted.presets = presets.to_vec();
+        Self::with(vec![order(model, &wanted).expect("a drive that can be ordered")])
     }
 
     /// A drive as delivered that has just booted, with its [`machine`](Self::machine) open to the eye.

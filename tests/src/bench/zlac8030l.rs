@@ -3,12 +3,9 @@
 use std::sync::LazyLock;
 
 use can::Bitrate;
-use canopen::NodeId;
-use devices::variant::Preset;
-use devices::zltech::ZLAC8030L;
 use plant::hub_motor::HubMotor;
 use sim::Component;
-use sim::machine::{Order, Zlac8030lMachine, order, zlac8030l};
+use sim::machine::{Zlac8030lMachine, zlac8030l};
 
 use super::{Rows, Subject};
 use crate::object_rows::{KeepingSubject, Memory};
@@ -36,6 +33,7 @@ pub type Bench = super::Bench<Zlac8030l>;
 impl Subject for Zlac8030l {
     type Machine = Zlac8030lMachine;
 
+    const MODEL: &'static str = "zlac8030l";
     const NODE: u8 = 4;
     const BITRATE: Bitrate = Bitrate::K500;
     const REFUSED: &'static str = include_str!("../../data/zlac8030l/refused.csv");
@@ -55,6 +53,8 @@ impl PowerSubject for Zlac8030l {
     const BREAKABLE: Component = Component::Hall;
     const BOOTED: u16 = 0x0670;
     const CLEARS_POSITION: &'static [u16] = &[0x2005, 0x2006];
+    const INPUTS: usize = 2;
+    const OUTPUT_FUNCTIONS: [u8; 2] = [0x0D, 0x0F];
     const COUNTS_PER_RPM: i64 = 10;
     const RIPPLE_RPM: f64 = 1.0;
 
@@ -72,25 +72,11 @@ impl KeepingSubject for Zlac8030l {
         without: &[0x200E, 0x2005, 0x2006, 0x2009],
         node_id: Some(0x200D),
         two: [(0x2014, 150, 77), (0x2015, 300, 88)],
+        eds: include_str!("../../data/zlac8030l/eds_defaults.csv"),
     };
 }
 
 impl Bench {
-    /// A drive that takes another choice at one point (`L123`, `coast`), and has just booted.
-    #[must_use]
-    pub fn choosing(key: &str, choice: &str) -> Self {
-        Self::ordered(key, choice, &[])
-    }
-
-    /// The same with values of its own in its parameter store.
-    #[must_use]
-    pub fn ordered(key: &str, choice: &str, presets: &[Preset]) -> Self {
-        let mut wanted = Order::new(&ZLAC8030L, NodeId::new(NODE).expect("a node-ID"), Zlac8030l::BITRATE);
-        wanted.variant.choose(key, choice).expect("a choice of this model");
-        wanted.presets = presets.to_vec();
-        Self::with(vec![order(&ZLAC8030L, &wanted).expect("a drive that can be ordered")])
-    }
-
     /// The motor of an [`open`](Self::open) bench, as it is now.
     pub fn motor(&mut self) -> &mut HubMotor {
         self.machine().assembly_mut().motor_mut()

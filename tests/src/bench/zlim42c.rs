@@ -3,10 +3,7 @@
 use std::sync::LazyLock;
 
 use can::Bitrate;
-use canopen::NodeId;
-use devices::zltech::ZLIM42C;
 use sim::Component;
-use sim::machine::{Order, order};
 use sim::machine::{Zlim42cMachine, zlim42c, zlim42c_82};
 
 use super::{Rows, Subject};
@@ -35,6 +32,7 @@ pub type Bench = super::Bench<Zlim42c>;
 impl Subject for Zlim42c {
     type Machine = Zlim42cMachine;
 
+    const MODEL: &'static str = "zlim42c";
     const NODE: u8 = 1;
     const BITRATE: Bitrate = Bitrate::K500;
     const REFUSED: &'static str = include_str!("../../data/zlim42c/refused.csv");
@@ -54,6 +52,8 @@ impl PowerSubject for Zlim42c {
     const BREAKABLE: Component = Component::Reference;
     const BOOTED: u16 = 0x0270;
     const CLEARS_POSITION: &'static [u16] = &[0x2012];
+    const INPUTS: usize = 4;
+    const OUTPUT_FUNCTIONS: [u8; 2] = [0x0D, 0x0E];
     const COUNTS_PER_RPM: i64 = 1;
     // A fifth at 60 r/min: full steps excite the rotor.
     const RIPPLE_RPM: f64 = 12.0;
@@ -68,6 +68,7 @@ impl KeepingSubject for Zlim42c {
         // The address switches are set, and go before 2008h.
         node_id: None,
         two: [(0x2005, 3, 7), (0x2006, 10, 4)],
+        eds: include_str!("../../data/zlim42c/eds_defaults.csv"),
     };
 }
 
@@ -76,14 +77,6 @@ impl Bench {
     #[must_use]
     pub fn long() -> Self {
         Self::with(vec![Box::new(zlim42c_82(NODE, RATE_500K))])
-    }
-
-    /// A drive that takes another choice at one point (`Z092`, `brake`), and has just booted.
-    #[must_use]
-    pub fn choosing(key: &str, choice: &str) -> Self {
-        let mut wanted = Order::new(&ZLIM42C, NodeId::MIN, Zlim42c::BITRATE);
-        wanted.variant.choose(key, choice).expect("a choice of this model");
-        Self::with(vec![order(&ZLIM42C, &wanted).expect("a drive that can be ordered")])
     }
 
     /// Level of a digital input, held long enough to pass its filter.

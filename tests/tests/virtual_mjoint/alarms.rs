@@ -89,7 +89,7 @@ fn without_an_alarm_in_2618h_the_output_of_a_stalled_motor_is_halved_after_3_s_a
 #[test]
 fn the_amperes_of_261dh_and_6078h_are_r_m_s_or_amplitudes_as_the_table_is_read() {
     for (choice, amplitude) in [("rms", 2.0_f64.sqrt()), ("amplitude", 1.0)] {
-        let mut bench = Bench::read_as("J047", choice);
+        let mut bench = Bench::choosing("J047", choice);
         bench.set(0x261D, 3500).set(0x2618, 600);
         running(&mut bench);
         bench.tell("1 rotor lock").run_ms(1000);

@@ -104,7 +104,7 @@ fn after_homing_the_position_is_about_zero_whatever_the_ramp_unless_the_edge_is_
     // 5.10.1, note 3. The ramp's way is v^2 / 2a: at 600 r/min and 5009 (r/min)/s 1000 r/min take 0.2 s, 54,500 counts.
     for acceleration in [20_000, 20_005, 20_009, 5_009, 1_000, 60_000] {
         for (choice, at_edge) in [("stand", false), ("edge", true)] {
-            let mut bench = Bench::read_as("J113", choice);
+            let mut bench = Bench::choosing("J113", choice);
             bench.tell("1 switch DIR min -20000").run_ms(5);
             bench.set(0x6083, acceleration).set(0x6060, 6);
             bench.until(20_000, |bench| bench.statusword() == 0x1414);
@@ -174,7 +174,7 @@ fn the_origin_lies_within_three_control_periods_of_the_edge_at_every_speed_and_f
         let (pin, positive) = switch_of(method);
         // (6083 mod 10 + 1) * 100 r/min, and the way to the edge: less than it takes to get up to speed, or to slow down.
         for (digit, distance) in [(0, 40), (3, 700), (4, 20_000), (9, 300), (9, 60_000)] {
-            let mut bench = Bench::read_as("J113", "edge");
+            let mut bench = Bench::choosing("J113", "edge");
             bench.set(0x6083, 20_000 + digit).set(0x6098, method);
             let edge = if positive { distance } else { -distance };
             let range = if positive { format!("{edge} max") } else { format!("min {edge}") };

@@ -4,72 +4,8 @@ use sim::Component;
 
 use crate::bench::Bench;
 
-const Y0: usize = 0;
-const Y1: usize = 1;
-
-fn output(bench: &mut Bench, number: usize) -> bool {
-    let level = bench.report().outputs.bits >> number & 1 == 1;
-    assert_eq!(bench.get(0x2004) >> number & 1 == 1, level, "2004h shows what the terminal has");
-    level
-}
-
 fn break_hall(bench: &mut Bench, broken: bool) {
     bench.set_fault(Component::Hall, broken).run_ms(50);
-}
-
-#[test]
-fn y0_as_delivered_tells_of_an_alarm() {
-    let mut bench = Bench::new();
-    assert!(!output(&mut bench, Y0));
-    break_hall(&mut bench, true);
-    assert!(output(&mut bench, Y0));
-    break_hall(&mut bench, false);
-    bench.set(0x6040, 0x80).run_ms(5);
-    assert!(!output(&mut bench, Y0));
-}
-
-#[test]
-fn an_output_with_function_2_tells_that_the_drive_is_enabled() {
-    let mut bench = Bench::new();
-    bench.set((0x2030, 0x0F), 2).run_ms(5);
-    assert!(!output(&mut bench, Y1));
-    bench.enable_in(3).run_ms(5);
-    assert!(output(&mut bench, Y1));
-    bench.set(0x6040, 0).run_ms(5);
-    assert!(!output(&mut bench, Y1));
-}
-
-#[test]
-fn an_output_with_function_4_tells_that_the_target_is_reached() {
-    let mut bench = Bench::new();
-    bench.set((0x2030, 0x0D), 4).enable_in(1).run_ms(5);
-    assert!(output(&mut bench, Y0));
-    bench.set(0x607A, 4096).set(0x6040, 0x1F).run_ms(300);
-    assert!(!output(&mut bench, Y0));
-    bench.run_ms(2000);
-    assert!(output(&mut bench, Y0));
-}
-
-#[test]
-fn functions_0_and_3_leave_an_output_alone_and_2030_0c_turns_levels_over() {
-    let mut bench = Bench::new();
-    break_hall(&mut bench, true);
-    for function in [0, 3] {
-        bench.set((0x2030, 0x0D), function).run_ms(5);
-        assert!(!output(&mut bench, Y0), "function {function}");
-    }
-    bench.set((0x2030, 0x0D), 1).set((0x2030, 0x0C), 1).run_ms(5);
-    assert!(!output(&mut bench, Y0), "an alarm, turned over");
-    bench.set((0x2030, 0x0C), 2).run_ms(5);
-    assert!(output(&mut bench, Y0) && output(&mut bench, Y1));
-}
-
-#[test]
-fn input_levels_show_in_2003h() {
-    let mut bench = Bench::new();
-    for (input, level, shown) in [(1, true, 2), (0, true, 3), (1, false, 1), (0, false, 0)] {
-        bench.set_input(input, level).run_ms(11).reads(0x2003, shown);
-    }
 }
 
 /// The maker's hardware manual V1.00: a level has to last for more than 10 ms (docs/drives/zlac8030l.md, L040).

@@ -2,23 +2,6 @@
 
 use crate::bench::{Bench, assert_within};
 
-/// Object, the manual's default (5.4) and the EDS's; of its mappings those entries that map something.
-const DIFFERENT: [(u16, u8, i64, i64); 13] = [
-    (0x1600, 0, 1, 2),
-    (0x1600, 2, 0, 0x6060_0008),
-    (0x1800, 2, 255, 254),
-    (0x1800, 3, 0, 100),
-    (0x1801, 2, 255, 254),
-    (0x1801, 3, 0, 100),
-    (0x1803, 2, 255, 254),
-    (0x1803, 3, 0, 100),
-    (0x1A00, 0, 0, 1),
-    (0x1A00, 1, 0, 0x6041_0010),
-    (0x2030, 0, 16, 14),
-    (0x6081, 0, 120, 60),
-    (0x60FF, 0, 0, 120),
-];
-
 #[test]
 fn a_fault_goes_with_a_reset_or_by_3_4_with_the_supply_only() {
     for (choice, resets) in [("reset", true), ("power-cycle", false)] {
@@ -32,20 +15,6 @@ fn a_fault_goes_with_a_reset_or_by_3_4_with_the_supply_only() {
             bench.power_cycle();
             assert_eq!((bench.get(0x603F), bench.statusword() & 0x4F), (0, 0x40), "{choice}: after a power cycle");
         }
-    }
-}
-
-#[test]
-fn each_factory_value_is_the_manuals_or_that_of_the_eds_also_after_a_restore() {
-    let (mut manual, mut bench) = (Bench::new(), Bench::choosing("defaults", "eds"));
-    for (index, sub, printed, given) in DIFFERENT {
-        assert_eq!((manual.get((index, sub)), bench.get((index, sub))), (printed, given), "{index:04X}h:{sub:02X}");
-    }
-    bench.set((0x1800, 3), 7).set(0x60FF, 7).set(0x2010, 2).let_store().power_cycle();
-    assert_eq!((bench.get((0x1800, 3)), bench.get(0x60FF)), (7, 120), "what is stored, and what is not");
-    bench.set(0x2010, 1).let_store().power_cycle();
-    for (index, sub, _, given) in DIFFERENT {
-        assert_eq!(bench.get((index, sub)), given, "{index:04X}h:{sub:02X} after factory settings");
     }
 }
 

@@ -45,16 +45,3 @@ fn the_example_of_the_position_mode_turns_0_8_of_a_turn() {
     // Reached, bit 4 mirrored, acknowledged while bit 4 is up, energised, in position.
     bench.shows(0xFFFF, 0xBE37);
 }
-
-#[test]
-fn the_save_line_of_the_zlac8030l_sets_250_kbit_s_here() {
-    // Both drives answer the same identity. On the ZLAC8030L, 2009h = 2 saves; here it is the bit rate (5.4), and 200Ch
-    // = 0 stores it, so that the drive is gone from the bus after its next start.
-    let mut bench = Bench::new();
-    let answer = bench.sdo(&[0x2B, 0x09, 0x20, 0x00, 0x02, 0x00, 0x00, 0x00]);
-    assert_eq!(answer, Some([0x60, 0x09, 0x20, 0x00, 0, 0, 0, 0]));
-    assert_eq!(bench.get(0x2009), 2, "it is a setting and does not read 0 again");
-    bench.let_store().power_cycle();
-    assert_eq!(bench.operate(|drive, _| drive.bitrate()), Some(can::Bitrate::K250));
-    assert_eq!(bench.sdo(&[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]), None, "it hears nothing on a bus of 500 kbit/s");
-}

@@ -1,0 +1,72 @@
+//! Digital inputs and outputs: 2003h, 2004h and 2030h of both ZLTECH drives (ZLAC8030L, 5.4 and 5.5; ZLIM42-C, 3.2 and 5.4).
+
+use crate::bench::Bench;
+use crate::power_states::PowerSubject;
+
+/// Functions of an output.
+const ALARM: i64 = 1;
+const DRIVE_STATUS: i64 = 2;
+const IN_POSITION: i64 = 4;
+
+/// What the drive says of Y0 and Y1 (2004h), which is what a meter at them shows.
+#[track_caller]
+fn outputs<S: PowerSubject>(bench: &mut Bench<S>) -> i64 {
+    let told = bench.run_ms(5).get(0x2004) & 3;
+    assert_eq!(i64::from(bench.report().outputs.bits & 3), told);
+    told
+}
+
+/// 0 is no function, and 3 is not connected or tells of a homing that has not been.
+pub fn an_output_tells_what_its_function_names_in_either_polarity<S: PowerSubject>() {
+    for (sub, mask) in S::OUTPUT_FUNCTIONS.iter().zip([1, 2]) {
+        for reversed in [false, true] {
+            let mut bench = Bench::<S>::new();
+            bench.set((0x2030, 0x0C), if reversed { mask } else { 0 });
+            let tells = |bench: &mut Bench<S>, function, active: bool| {
+                let now = outputs(bench.set((0x2030, *sub), function));
+                assert_eq!(now & mask != 0, active != reversed, "{function} at 2030h:{sub:02X}, reversed {reversed}");
+                assert_eq!(now & !mask, 0, "the other output");
+            };
+            for function in [0, ALARM, DRIVE_STATUS, 3] {
+                tells(&mut bench, function, false);
+            }
+            tells(&mut bench, IN_POSITION, S::BOOTED & 1 << 10 != 0);
+            bench.enable_in(1);
+            tells(&mut bench, DRIVE_STATUS, true);
+            tells(&mut bench, IN_POSITION, true);
+            bench.move_by(4_000).run_ms(100);
+            tells(&mut bench, IN_POSITION, false);
+            tells(&mut bench, DRIVE_STATUS, true);
+            bench.run_ms(2500);
+            tells(&mut bench, IN_POSITION, true);
+            bench.set(0x6040, 0);
+            tells(&mut bench, DRIVE_STATUS, false);
+            bench.enable().set((0x2030, S::OUTPUT_FUNCTIONS[0]), 0).break_down(true);
+            for (function, active) in [(0, false), (ALARM, true), (DRIVE_STATUS, false), (3, false)] {
+                tells(&mut bench, function, active);
+            }
+            bench.break_down(false).set(0x6040, 0).set(0x6040, 0x80);
+            tells(&mut bench, ALARM, false);
+        }
+    }
+}
+
+/// 2004h and the terminals themselves.
+pub fn a_drive_without_power_has_its_outputs_off<S: PowerSubject>() {
+    let mut bench = Bench::<S>::new();
+    assert_eq!(outputs(bench.set((0x2030, 0x0C), 3)), 3);
+    bench.operate(|drive, now| drive.cut_power(now));
+    bench.run_ms(10);
+    assert_eq!(bench.report().outputs.bits, 0);
+}
+
+/// 2003h.
+pub fn input_status_shows_the_levels_whatever_the_polarity_and_the_functions<S: PowerSubject>() {
+    let mut bench = Bench::<S>::new();
+    bench.set((0x2030, 1), 0b0101);
+    for input in 0..S::INPUTS {
+        bench.set_input(input, true).run_ms(15).reads(0x2003, (2 << input) - 1);
+    }
+    bench.set_input(1, false).run_ms(15).reads(0x2003, ((1 << S::INPUTS) - 1) & !2);
+    bench.set_input(0, false).run_ms(15).reads(0x2003, ((1 << S::INPUTS) - 1) & !3);
+}
