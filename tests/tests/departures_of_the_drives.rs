@@ -3,8 +3,10 @@
 //!
 //! Those of motion, homing, units and storage have tests of their own beside what they are about.
 
+use canopen::Mux;
 use devices::{all, model};
 use ferrodrive_tests::bench::{Abort, Bench, Subject, mjoint, zlac8030l, zlim42c};
+use ferrodrive_tests::csv::Table;
 
 const NO_SUCH_OBJECT: Abort = 0x0602_0000;
 
@@ -70,4 +72,44 @@ fn a_departure_that_can_be_asked_for_is_listed_where_the_running_drive_has_it_an
 fn what_is_told_of_a_short_rpdo_stands_in_the_profile_that_masters_read() {
     let told = |name| model(name).and_then(|model| model.pdo.short_rpdo).map(|code| code.0);
     assert_eq!(["zlac8030l", "zlim42c", "m4230e17b50"].map(told), [Some(0x8210), Some(0x8210), None]);
+}
+
+/// Name and object of each departure, sorted.
+fn described(name: &str) -> Vec<(String, String)> {
+    let departures = model(name).expect("a model").departures(all());
+    let object = |mux: Mux| format!("{:04X}:{:02X}", mux.index, mux.sub_index);
+    let mut found: Vec<_> = departures
+        .map(|departure| (departure.key().to_owned(), departure.object().map(object).unwrap_or_default()))
+        .collect();
+    found.sort();
+    found
+}
+
+/// The same as the manual has it.
+fn printed(file: &str) -> Vec<(String, String)> {
+    let table = Table::parse(file).expect("a table");
+    let mut rows: Vec<_> =
+        table.rows().map(|row| (row.get("departure").to_owned(), row.get("object").to_owned())).collect();
+    rows.sort();
+    rows
+}
+
+#[test]
+fn each_drive_departs_from_the_standard_where_its_manual_does_and_nowhere_else() {
+    assert_eq!(described("zlac8030l"), printed(include_str!("../data/zlac8030l/departures.csv")));
+    for name in ["zlim42c", "zlim42c-82"] {
+        assert_eq!(described(name), printed(include_str!("../data/zlim42c/departures.csv")), "{name}");
+    }
+    for name in ferrodrive_tests::mjoint::MODELS {
+        assert_eq!(described(name), printed(include_str!("../data/mjoint/departures.csv")), "{name}");
+    }
+}
+
+#[test]
+fn each_departure_says_what_is_so_and_what_to_do() {
+    for departure in all().iter().flat_map(|model| model.departures(all()).collect::<Vec<_>>()) {
+        let (what, remedy) = (departure.to_string(), departure.remedy().to_string());
+        assert!(what.len() > 15 && !what.ends_with('.'), "{what}");
+        assert!(remedy.len() > 15 && !remedy.ends_with('.'), "{what}: {remedy}");
+    }
 }

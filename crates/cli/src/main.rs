@@ -33,6 +33,7 @@ use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
 
 use crate::args::{Cli, Command};
+use crate::command::departures::DepartureList;
 use crate::command::objects::Whose;
 use crate::context::Context;
 use crate::failure::{Failure, FailureReport};
@@ -153,6 +154,10 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Restore(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Home(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Objects(objects) => match objects.whose {
+            Whose::Model(model) if objects.departures => print(format, &DepartureList::of(model, None)),
+            Whose::Node(node) if objects.departures => {
+                on_bus(global, format, async |context| objects.departures_of_node(context, node).await)
+            }
             Whose::Model(model) => print(format, &objects.list(model)?),
             Whose::Node(node) => on_bus(global, format, async |context| objects.of_node(context, node).await),
         },

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{ferrodrive, scratch};
+use common::{done, ferrodrive, scratch};
 
 #[track_caller]
 fn refused(arguments: &[&str], parts: &[&str]) {
@@ -187,4 +187,26 @@ fn no_help_shows_a_bus_that_is_refused() {
     }
     refused(&["--bus", "bus!", "scan"], &["expected sim, sim:FILE.toml, socketcand://"]);
     assert!(ferrodrive(&["--bus", "can0", "scan"]).err.contains("use socketcand://HOST:29536/can0"));
+}
+
+#[test]
+fn departures_from_the_standard_are_listed_with_their_object_and_what_to_do() {
+    let text = done(&["objects", "zlac8030l", "--departures"]).out;
+    for part in [
+        "6083h:00  ramps are times, not accelerations",
+        "write the time that the change of speed is to take",
+        "the manual counts PDOs from 0: RPDO1 is its RPDO0",
+        "store with 2 to 2009h:00, restore with 1",
+    ] {
+        assert!(text.contains(part), "{part:?} in {text}");
+    }
+    let list = done(&["--json", "objects", "zlim42c", "--departures"]).json();
+    let rows = list["departures"].as_array().unwrap();
+    let homing = rows.iter().find(|row| row["departure"] == "homing_shown_by").unwrap();
+    assert_eq!(homing["object"], "6041h:00");
+    assert_eq!(homing["remedy"], "found: bit 8 on, 10 on, 14 off; not found: bit 8 off, 10 on, 14 off");
+    // Of a node of the embedded bus: its model is known.
+    let of_node = done(&["--json", "objects", "2", "--departures"]).json();
+    assert_eq!((&of_node["model"], &of_node["departures"]), (&list["model"], &list["departures"]));
+    assert_eq!(ferrodrive(&["objects", "zlac8030l", "speed", "--departures"]).status, Some(2));
 }

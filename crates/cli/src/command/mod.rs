@@ -2,6 +2,7 @@
 
 pub(crate) mod completions;
 pub(crate) mod demo;
+pub(crate) mod departures;
 pub(crate) mod drive;
 pub(crate) mod dump;
 pub(crate) mod eds;

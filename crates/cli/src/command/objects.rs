@@ -5,6 +5,7 @@ use canopen::{Mux, NodeId};
 use master::drive::{Limits, Setting};
 use serde::Serialize;
 
+use super::departures::DepartureList;
 use super::sdo::guessed;
 use crate::context::Context;
 use crate::failure::Failure;
@@ -18,7 +19,8 @@ use crate::table::Table;
 /// List the object dictionary of a model or of a node
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  ferrodrive objects zlac8030l\n  ferrodrive objects 4 velocity\n  ferrodrive objects zlim42c homing"
+    after_help = "Examples:\n  ferrodrive objects zlac8030l\n  ferrodrive objects 4 velocity\n  ferrodrive objects zlim42c homing\n  \
+        ferrodrive objects zlac8030l --departures"
 )]
 pub(crate) struct Objects {
     /// Model (e.g. zlac8030l) or node-ID
@@ -26,6 +28,9 @@ pub(crate) struct Objects {
     pub(crate) whose: Whose,
     /// Only objects with this index, or with this word in name, title or meaning
     search: Vec<String>,
+    /// Show where the model departs from CiA 301 and CiA 402, and what a program written to them has to do
+    #[arg(long, conflicts_with = "search")]
+    pub(crate) departures: bool,
 }
 
 /// Whose dictionary.
@@ -148,6 +153,13 @@ struct Meaning {
 }
 
 impl Objects {
+    /// Where a node's model departs from the standards.
+    pub(crate) async fn departures_of_node(&self, context: &Context, node: NodeId) -> Result<DepartureList, Failure> {
+        let drive = context.known_drive(node).await?;
+        let model = drive.profile().ok_or_else(|| Failure::new(format!("the model of node {node} is not known")))?;
+        Ok(DepartureList::of(model, guessed(&drive)))
+    }
+
     /// Searches the table of a node's model.
     pub(crate) async fn of_node(&self, context: &Context, node: NodeId) -> Result<ObjectList, Failure> {
         let drive = context.known_drive(node).await?;
@@ -305,7 +317,7 @@ mod tests {
     fn found(words: &[&str]) -> Vec<&'static str> {
         let search = words.iter().map(|word| (*word).into()).collect();
         let (_, model) = embedded()[0];
-        let list = Objects { whose: Whose::Model(model), search }.list(model);
+        let list = Objects { whose: Whose::Model(model), search, departures: false }.list(model);
         list.map(|list| list.objects.iter().map(|row| row.name).collect()).unwrap_or_default()
     }
 

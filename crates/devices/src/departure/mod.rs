@@ -51,6 +51,8 @@ pub enum Departure {
     HeartbeatTellsAlarm,
     /// The PDOs' timers have other units.
     PdoTimers(PdoRules),
+    /// The manual calls PDO 1 of CiA 301 by this number.
+    PdosCountedFrom(u8),
     /// TPDO n answers RPDO n.
     TpdoAnswersRpdo,
     /// The mapping cannot be changed.
@@ -126,7 +128,7 @@ impl Description {
         [shared.then_some(Departure::IdentityShared(self.distinguishing_object)), { stores }.next()]
     }
 
-    fn of_communication(&self) -> [Option<Departure>; 13] {
+    fn of_communication(&self) -> [Option<Departure>; 14] {
         let lacks = |index| !self.has_index(index);
         let when = |so: bool, departure| so.then_some(departure);
         let number = |index| {
@@ -151,6 +153,7 @@ impl Description {
             when(self.nmt.start_state == NmtState::Operational, Departure::StartsOperational),
             when(self.nmt.heartbeat_tells_alarm, Departure::HeartbeatTellsAlarm),
             when(timers, Departure::PdoTimers(self.pdo)),
+            when(self.pdo.first_in_manual != 1, Departure::PdosCountedFrom(self.pdo.first_in_manual)),
             when(self.pdo.event_trigger == EventTrigger::AnswersRpdo, Departure::TpdoAnswersRpdo),
             when(self.pdo.fixed_mapping, Departure::FixedMapping),
             self.silence(),

@@ -25,6 +25,7 @@ impl Departure {
             Self::StartsOperational => "starts_operational",
             Self::HeartbeatTellsAlarm => "heartbeat_tells_alarm",
             Self::PdoTimers(_) => "pdo_timers",
+            Self::PdosCountedFrom(_) => "pdos_counted_from",
             Self::TpdoAnswersRpdo => "tpdo_answers_rpdo",
             Self::FixedMapping => "fixed_mapping",
             Self::AnotherFormInTpdos(_) => "another_form_in_tpdos",
@@ -53,6 +54,7 @@ impl Departure {
             Self::NoHeartbeatConsumer(_) => Mux::new(0x1016, 0),
             Self::StartsOperational | Self::HeartbeatTellsAlarm => return None,
             Self::PdoTimers(_) => Mux::new(0x1800, 3),
+            Self::PdosCountedFrom(_) => Mux::new(0x1400, 0),
             Self::TpdoAnswersRpdo => Mux::new(0x1800, 2),
             Self::FixedMapping => Mux::new(0x1600, 0),
             Self::AnotherFormInTpdos(TpdoForm { object, .. }) => *object,
@@ -100,9 +102,10 @@ impl fmt::Display for Departure {
                 f.write_str("heartbeats say 04h while there is an alarm; it does not mean stopped")
             }
             Self::PdoTimers(PdoRules { inhibit_unit_ns, event_timer_unit_ns, .. }) => {
-                let (inhibit, event) = (Microseconds(*inhibit_unit_ns), Microseconds(*event_timer_unit_ns));
+                let (inhibit, event) = (Milliseconds(*inhibit_unit_ns), Milliseconds(*event_timer_unit_ns));
                 write!(f, "one count of a PDO's inhibit time is {inhibit}, of its event timer {event}")
             }
+            Self::PdosCountedFrom(first) => write!(f, "the manual counts PDOs from {first}: RPDO1 is its RPDO{first}"),
             Self::TpdoAnswersRpdo => f.write_str("TPDO n answers RPDO n; nothing is sent unasked"),
             Self::FixedMapping => f.write_str("the mapping of PDOs is fixed"),
             Self::AnotherFormInTpdos(TpdoForm { object, data_type, unit, .. }) => {
@@ -167,6 +170,7 @@ impl fmt::Display for Remedy<'_> {
             }
             Departure::HeartbeatTellsAlarm => f.write_str("take 04h in a heartbeat for an alarm; SDO goes on"),
             Departure::PdoTimers(_) => f.write_str("convert the times that are written to 1400h to 19FFh"),
+            Departure::PdosCountedFrom(_) => f.write_str("go by the index: 1400h and 1800h are the first"),
             Departure::TpdoAnswersRpdo => {
                 f.write_str("send RPDO n to be told; there is no change of state to wait for")
             }
@@ -248,9 +252,9 @@ impl fmt::Display for One {
 }
 
 /// A time that is given in ns.
-struct Microseconds(u64);
+struct Milliseconds(u64);
 
-impl fmt::Display for Microseconds {
+impl fmt::Display for Milliseconds {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} ms", self.0 as f64 / 1e6)
     }

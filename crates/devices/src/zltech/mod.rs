@@ -68,7 +68,8 @@ const fn parameter_storage(
     }
 }
 
-/// As the ZLAC8030L's recordings show it (CiA 402-2, 8.4.2 has a warning beside the fault, not with it).
+/// Both tables of the ZLIM42-C (5.3.1, 5.3.2), and the other sibling of the ZLAC8030L; CiA 402-2, 8.4.2 has a warning beside the
+/// fault, not with it.
 const WARNING_IN_FAULT: Stated = Stated {
     key: "warning_bit_in_fault",
     object: Mux::new(0x6041, 0),
