@@ -25,6 +25,27 @@ pub trait PowerSubject: Subject {
     /// Objects that clear the position.
     const CLEARS_POSITION: &'static [u16];
 
+    /// Modes in which it moves, but for torque.
+    const MOVING_MODES: &'static [i64];
+
+    /// The object with the speed that a motion from rest begins with, r/min.
+    const START_SPEED: u16;
+
+    /// How far 6064h may be from a target that is reached.
+    const IN_POSITION: i64;
+
+    /// The time of an emergency stop (605Ah = 7, 605Dh = 3) from 120 r/min with 6085h = 50 ms: that of the command.
+    const EMERGENCY_STOP_S: f64;
+
+    /// The ramp of homing, as [`let_home`](Self::let_home) sets it.
+    const HOMING_RAMP_S: f64;
+
+    /// How long after its command the motor stands.
+    const STANDS_AFTER_MS: u64;
+
+    /// A torque that turns a free shaft and not one that is held, N m.
+    const HAND_NM: f64;
+
     /// How many digital inputs it has.
     const INPUTS: usize;
 
@@ -36,6 +57,13 @@ pub trait PowerSubject: Subject {
 
     /// How far the speed of a motor that turns steadily may be from what is asked for, r/min.
     const RIPPLE_RPM: f64;
+
+    /// What homing needs besides its mode, so that it searches at 120 r/min.
+    fn let_home(_bench: &mut Bench<Self>)
+    where
+        Self: Sized,
+    {
+    }
 
     /// What has to be set so that a test may take its time between two commands.
     fn let_take_time(_bench: &mut Bench<Self>)
@@ -71,6 +99,14 @@ impl<S: PowerSubject> Bench<S> {
         if state == "fault" {
             self.break_down(true).break_down(false);
         }
+    }
+
+    /// The power stage drives the motor: it carries current, or holds its shaft against a hand.
+    pub fn is_energised(&mut self) -> bool {
+        let before = self.set_load_torque(S::HAND_NM).run_ms(200).report().shaft_angle_rad;
+        let after = self.run_ms(200).report().shaft_angle_rad;
+        self.set_load_torque(0.0).run_ms(200);
+        (after - before).abs() < 0.01
     }
 
     /// Selects a mode and enables operation.

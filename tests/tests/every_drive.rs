@@ -55,6 +55,18 @@ ferrodrive_tests::scenarios! {
     }
     motion {
         clearing_the_position_reads_zero_again_and_zeroes_the_position: zlac8030l zlim42c;
+        another_mode_waits_until_the_motor_stands: zlac8030l zlim42c;
+        a_second_set_point_waits_for_the_first_and_a_third_is_not_taken: zlac8030l zlim42c;
+        a_motion_begins_at_its_start_speed_and_a_move_ends_from_6082h: zlac8030l zlim42c;
+        a_reversal_ramps_down_by_6084h_and_up_by_6083h: zlac8030l zlim42c;
+    }
+    stops {
+        halt_takes_the_ramp_of_605dh_in_every_mode_and_stays_enabled: zlac8030l zlim42c;
+        quick_stop_takes_the_ramp_of_605ah_in_every_mode_and_holds: zlac8030l zlim42c;
+        shutdown_and_disable_operation_ramp_down_before_they_act_or_act_at_once: zlac8030l zlim42c;
+        disable_voltage_frees_the_motor_at_once_in_every_mode: zlac8030l zlim42c;
+        a_halted_move_goes_on_to_its_target: zlac8030l zlim42c;
+        a_set_point_given_under_halt_waits_for_its_end: zlac8030l zlim42c;
     }
     terminals {
         an_output_tells_what_its_function_names_in_either_polarity: zlac8030l zlim42c;

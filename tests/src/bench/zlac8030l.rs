@@ -53,6 +53,15 @@ impl PowerSubject for Zlac8030l {
     const BREAKABLE: Component = Component::Hall;
     const BOOTED: u16 = 0x0670;
     const CLEARS_POSITION: &'static [u16] = &[0x2005, 0x2006];
+    const MOVING_MODES: &'static [i64] = &[1, 3];
+    const START_SPEED: u16 = 0x2008;
+    // 2002h as delivered.
+    const IN_POSITION: i64 = 30;
+    // At the current limit, L123.
+    const EMERGENCY_STOP_S: f64 = 0.0;
+    const HOMING_RAMP_S: f64 = 0.0;
+    const STANDS_AFTER_MS: u64 = 600;
+    const HAND_NM: f64 = 0.5;
     const INPUTS: usize = 2;
     const OUTPUT_FUNCTIONS: [u8; 2] = [0x0D, 0x0F];
     const COUNTS_PER_RPM: i64 = 10;

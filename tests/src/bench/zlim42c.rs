@@ -52,11 +52,23 @@ impl PowerSubject for Zlim42c {
     const BREAKABLE: Component = Component::Reference;
     const BOOTED: u16 = 0x0270;
     const CLEARS_POSITION: &'static [u16] = &[0x2012];
+    const MOVING_MODES: &'static [i64] = &[1, 3, 6];
+    const START_SPEED: u16 = 0x200E;
+    const IN_POSITION: i64 = 0;
+    // 5.4 has one word for 605Ah = 7, 605Dh = 3, 200Ah = 1 and 6085h (Z092).
+    const EMERGENCY_STOP_S: f64 = 0.05;
+    const HOMING_RAMP_S: f64 = 0.2;
+    const STANDS_AFTER_MS: u64 = 2;
+    const HAND_NM: f64 = 0.05;
     const INPUTS: usize = 4;
     const OUTPUT_FUNCTIONS: [u8; 2] = [0x0D, 0x0E];
     const COUNTS_PER_RPM: i64 = 1;
     // A fifth at 60 r/min: full steps excite the rotor.
     const RIPPLE_RPM: f64 = 12.0;
+
+    fn let_home(bench: &mut Bench) {
+        bench.set(0x609A, 200).set(0x6098, 18);
+    }
 }
 
 impl KeepingSubject for Zlim42c {

@@ -7,6 +7,7 @@ pub mod motion;
 pub mod network;
 pub mod pdo;
 pub mod sdo;
+pub mod stops;
 pub mod terminals;
 
 pub use crate::object_rows as objects;

@@ -83,21 +83,6 @@ fn a_move_keeps_to_the_speed_of_6081h_and_ends_without_overshoot() {
 }
 
 #[test]
-fn a_move_begins_with_2008h_and_ends_from_6082h() {
-    let mut bench = ready();
-    bench.set(0x2008, 20).set(0x6082, 10);
-    start(&mut bench, 20_000, 0);
-    let mut demands = Vec::new();
-    for _ in 0..12_000 {
-        bench.run(Duration::from_micros(500));
-        demands.push(bench.report().velocity_demand_rpm.unwrap_or_default());
-    }
-    let moving: Vec<_> = demands.into_iter().filter(|demand| *demand > 0.0).collect();
-    assert_within("first speed", moving[0], 19.9, 21.0);
-    assert_within("last speed", moving[moving.len() - 1], 9.9, 10.5);
-}
-
-#[test]
 fn nothing_moves_without_a_rising_bit_4() {
     let mut bench = ready();
     bench.set(0x607A, 4096).set(0x6040, 0x0F).run_ms(500).reads(0x6064, 0);
@@ -118,21 +103,6 @@ fn the_acknowledge_bit_rises_with_the_set_point_and_falls_with_bit_4() {
     bench.run_ms(200);
     assert_eq!(bench.statusword() & ACKNOWLEDGED, ACKNOWLEDGED, "bit 4 is still up");
     bench.set(0x6040, 0x0F).shows(ACKNOWLEDGED, 0);
-}
-
-#[test]
-fn one_set_point_waits_for_the_end_of_the_other() {
-    let mut bench = ready();
-    start(&mut bench, 8192, 0);
-    start(&mut bench, 4096, 0);
-    bench.set(0x6040, 0x0F);
-    assert_eq!(bench.statusword() & ACKNOWLEDGED, ACKNOWLEDGED, "no room for a third");
-    let way = bench.seconds_until(5.0, LOOK, |report| report.position >= 8192 - 2);
-    assert_within("seconds to the first", way, duration_s(8192.0) - 0.05, duration_s(8192.0) + 0.05);
-    bench.run_ms(300);
-    assert_eq!(bench.statusword() & ACKNOWLEDGED, 0, "the second is under way");
-    bench.run_ms(2500);
-    assert_at(&mut bench, 4096);
 }
 
 #[test]

@@ -66,13 +66,6 @@ fn quick_stop_ramps_as_605ah_says_and_holds_the_shaft() {
 }
 
 #[test]
-fn enabling_again_after_a_quick_stop_goes_on_with_the_target() {
-    let mut bench = turning();
-    bench.set(0x6040, 0x02).run_ms(600);
-    bench.set(0x6040, 0x0F).run_ms(800).shows(0xFF, 0x37).turns_at(RPM - 1.0, RPM + 1.0);
-}
-
-#[test]
 fn halt_ramps_as_605dh_says_stays_enabled_and_goes_on_when_it_ends() {
     for (option, ramp) in [(1, Ramp::Time(0.4)), (2, Ramp::Time(0.1)), (3, Ramp::CurrentLimit)] {
         let mut bench = turning();
@@ -81,44 +74,6 @@ fn halt_ramps_as_605dh_says_stays_enabled_and_goes_on_when_it_ends() {
         let statusword = bench.statusword();
         assert_eq!((statusword & 0xFF, statusword & 0x0400), (0x37, 0x0400), "standing under halt is reached");
         bench.set(0x6040, 0x0F).run_ms(800).turns_at(RPM - 1.0, RPM + 1.0);
-    }
-}
-
-#[test]
-fn a_halted_position_move_goes_on_to_its_target() {
-    let mut bench = Bench::new();
-    bench.enable_in(1).set(0x607A, 16_384).set(0x6040, 0x1F).run_ms(1000);
-    bench.set(0x6040, 0x11F).run_ms(1000);
-    let halted = bench.report();
-    assert!(halted.velocity_rpm.abs() < 0.5 && (2000..15_000).contains(&halted.position), "{halted:?}");
-    bench.run_ms(1000);
-    assert_within("the shaft stays", (bench.report().position - halted.position) as f64, -5.0, 5.0);
-    bench.set(0x6040, 0x1F).run_ms(4000).is_at(16384, 30);
-}
-
-#[test]
-fn a_set_point_given_under_halt_waits_for_its_end() {
-    let mut bench = Bench::new();
-    bench.enable_in(1).set(0x6040, 0x10F).set(0x607A, 8192).set(0x6040, 0x11F).run_ms(1000);
-    assert_within("the shaft stays", bench.report().position as f64, -5.0, 5.0);
-    assert_ne!(bench.statusword() & 0x1000, 0, "the set-point is acknowledged");
-    bench.set(0x6040, 0x0F).run_ms(4000).is_at(8192, 30);
-}
-
-#[test]
-fn shutdown_and_disable_operation_ramp_first_or_switch_off_at_once_as_605bh_and_605ch_say() {
-    for (object, controlword, low_byte) in [(0x605B, 0x06, 0x31), (0x605C, 0x07, 0x33)] {
-        let mut bench = turning();
-        bench.set(0x6040, controlword).run_ms(100);
-        assert_eq!(bench.statusword() & 0xFF, 0x37, "still ramping down");
-        let (seconds, _) = stop_of(&mut bench);
-        assert_within("seconds left of the ramp of 400 ms", seconds, 0.2, 0.35);
-        assert_eq!(bench.statusword() & 0xFF, low_byte);
-
-        let mut bench = turning();
-        bench.set(object, 0).set(0x6040, controlword);
-        assert_eq!(bench.statusword() & 0xFF, low_byte, "at once");
-        assert_coasts(&mut bench);
     }
 }
 

@@ -5,17 +5,6 @@ use sim::Component;
 use crate::bench::{Bench, assert_within};
 
 #[test]
-fn a_mode_asked_for_in_motion_takes_effect_at_standstill() {
-    let mut bench = Bench::new();
-    bench.enable_in(3).set(0x60FF, 100).run_ms(800);
-    bench.set(0x6060, 1).run_ms(100).reads(0x6060, 1).reads(0x6061, 3);
-    bench.set(0x60FF, 0).run_ms(800).reads(0x6061, 1);
-    let stands = bench.report().position;
-    bench.run_ms(1000);
-    assert_within("counts", (bench.report().position - stands) as f64, -5.0, 5.0);
-}
-
-#[test]
 fn halt_set_during_a_mode_change_ends_without_a_jump() {
     let mut bench = Bench::new();
     bench.enable_in(3).set(0x60FF, 100).run_ms(800);

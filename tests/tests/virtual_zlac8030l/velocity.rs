@@ -201,14 +201,3 @@ fn a_target_written_before_enabling_is_followed_when_operation_is_enabled() {
     let seconds = bench.seconds_until(1.0, LOOK, |report| report.velocity_rpm > 59.0);
     assert_within("seconds of the ramp of 500 ms", seconds, 0.4, 0.56);
 }
-
-#[test]
-fn a_reversal_slows_down_in_6084h_and_then_speeds_up_in_6083h() {
-    let mut bench = ready(200, 800);
-    bench.set(0x60FF, 100).run_ms(600);
-    bench.set(0x60FF, -100);
-    for (ms, low, high) in [(400, 46.0, 54.0), (400, -6.0, 4.0), (100, -56.0, -38.0), (150, -102.0, -98.0)] {
-        bench.run_ms(ms);
-        assert_within("speed", rpm(&mut bench), low, high);
-    }
-}

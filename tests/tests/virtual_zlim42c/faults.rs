@@ -50,6 +50,7 @@ fn each_fault_frees_the_motor_and_is_told_by_603fh_1001h_and_emcy() {
         let told: Vec<_> = bench.heard().into_iter().filter(|frame| frame.starts_with("081#")).collect();
         assert_eq!(told, [format!("081#{low:02X}{high:02X}{register:02X}0000000000")]);
         assert_eq!(bench.report().current_a, 0.0);
+        bench.set(0x2011, 0).shows(0xFF, 0x98);
     }
 }
 

@@ -137,55 +137,6 @@ fn bits_10_12_and_15_follow_a_set_point() {
 }
 
 #[test]
-fn a_halted_move_goes_on_to_its_target() {
-    for option in [1, 2, 3] {
-        let mut bench = Bench::new();
-        bench.set(0x605D, option).enable_in(1).move_by(8000).run_ms(300);
-        bench.set(0x6040, 0x15F).run_ms(150);
-        let halted = bench.get(0x6064);
-        assert_eq!(bench.statusword() & (REACHED | RUNNING), REACHED, "605Dh = {option}: the motor stands");
-        bench.run_ms(300).reads(0x6064, halted);
-        bench.set(0x6040, 0x5F).run_ms(2000).reads(0x6064, 8000);
-    }
-}
-
-#[test]
-fn each_stop_takes_the_time_that_its_option_names() {
-    // 605Ah: 5 slows down (6084h), 6 and 7 as 6085h says; each stays in quick stop active.
-    for (option, seconds) in [(5, 0.3), (6, 0.05), (7, 0.05)] {
-        let mut bench = Bench::new();
-        bench.set(0x605A, option).set(0x6084, 300).set(0x6085, 50).enable_in(3).set(0x60FF, 120).run_ms(500);
-        bench.set(0x6040, 0x02);
-        let taken = bench.seconds_until(1.0, LOOK, |report| report.velocity_demand_rpm == Some(0.0));
-        assert_within("seconds", taken, seconds - 0.003, seconds + 0.002);
-        bench.run_ms(500);
-        assert_eq!(bench.statusword() & 0x6F, 0x07, "605Ah = {option}");
-    }
-}
-
-#[test]
-fn a_shutdown_ramps_first_or_switches_off_at_once() {
-    for (index, controlword, state) in [(0x605B, 0x06, 0x21), (0x605C, 0x07, 0x23)] {
-        for option in [1, 0] {
-            let mut bench = Bench::new();
-            bench.set(index, option).set(0x6084, 300).enable_in(3).set(0x60FF, 120).run_ms(500);
-            bench.set(0x6040, controlword);
-            let at_once = bench.statusword() & 0x6F;
-            assert_eq!(at_once == state, option == 0, "{index:04X}h = {option}: {at_once:02X}h");
-            bench.run_ms(500);
-            assert_eq!(bench.statusword() & 0x6F, state);
-        }
-    }
-}
-
-#[test]
-fn a_target_beyond_its_range_is_refused() {
-    let mut bench = Bench::new();
-    assert!(bench.write(0x607A, 1_000_001).is_err());
-    bench.reads(0x607A, 5000);
-}
-
-#[test]
 fn a_move_at_the_step_rate_limit_takes_its_closed_form() {
     // 6081h = 3000 r/min at 25600 pulses a turn: 200 kHz, 468.75 r/min, is what there is.
     let mut bench = Bench::new();
@@ -199,62 +150,6 @@ fn a_move_at_the_step_rate_limit_takes_its_closed_form() {
     bench.run_ms(2000);
     let rotor = bench.report().rotor_position.expect("known here");
     assert!((rotor - 256_000).abs() <= 16, "{rotor}: dry friction may hold it some pulses off");
-}
-
-#[test]
-fn a_motion_begins_at_200eh_and_a_move_ends_from_6082h() {
-    let mut bench = Bench::new();
-    for (index, value) in [(0x200E, 40), (0x6082, 30), (0x6081, 120), (0x6083, 500), (0x6084, 500)] {
-        bench.set(index, value);
-    }
-    bench.enable_in(1).move_by(8000);
-    let mut speeds = Vec::new();
-    while bench.report().velocity_demand_rpm != Some(0.0) || speeds.is_empty() {
-        bench.run(LOOK);
-        speeds.extend(bench.report().velocity_demand_rpm.filter(|rpm| *rpm != 0.0));
-    }
-    // An S of 80 or 90 r/min in 0.5 s moves by 0.1 r/min in its first 10 ms.
-    assert_within("r/min at the beginning", speeds[0], 40.0, 40.2);
-    assert_within("r/min at the end", speeds[speeds.len() - 1], 30.0, 30.2);
-    assert_within("r/min in between", speeds.iter().copied().fold(0.0, f64::max), 119.9, 120.0);
-    bench.set(0x6060, 3).set(0x60FF, -120);
-    let first = bench.seconds_until(0.1, LOOK, |report| report.velocity_demand_rpm != Some(0.0));
-    assert!(first < 0.01, "{first} s");
-    assert_within("r/min", bench.report().velocity_demand_rpm.expect("enabled"), -40.2, -40.0);
-}
-
-#[test]
-fn a_reversal_ramps_down_by_6084h_and_up_by_6083h() {
-    let mut bench = Bench::new();
-    bench.set(0x6083, 200).set(0x6084, 400).enable_in(3).set(0x60FF, 300).run_ms(500);
-    bench.set(0x60FF, -300);
-    let down = bench.seconds_until(1.0, LOOK, |report| report.velocity_demand_rpm.is_some_and(|rpm| rpm <= 0.0));
-    let up = bench.seconds_until(1.0, LOOK, |report| report.velocity_demand_rpm == Some(-300.0));
-    // The answer to the write takes 0.5 ms of the first ramp.
-    assert_within("seconds down", down, 0.397, 0.402);
-    assert_within("seconds up", up, 0.197, 0.202);
-    bench.run_ms(10);
-    let told = [0x2001, 0x2002, 0x606C].map(|index| bench.get(index));
-    assert_eq!(told, [1, -300, -300], "it runs, and both speeds have their sign");
-}
-
-#[test]
-fn a_second_set_point_waits_for_the_first_and_a_third_is_not_taken() {
-    let mut bench = Bench::new();
-    bench.enable_in(1);
-    let start = |bench: &mut Bench, target| {
-        bench.set(0x607A, target).set(0x6040, 0x0F).set(0x6040, 0x1F);
-    };
-    start(&mut bench, 2000);
-    start(&mut bench, 500);
-    bench.set(0x6040, 0x0F);
-    assert_ne!(bench.statusword() & ACKNOWLEDGED, 0, "the queue is full");
-    start(&mut bench, 9000);
-    let mut highest = 0;
-    while bench.statusword() & REACHED == 0 {
-        highest = highest.max(bench.report().position);
-    }
-    assert_eq!((highest, bench.get(0x6064)), (2000, 500));
 }
 
 #[test]
