@@ -83,6 +83,11 @@ impl TouchProbe {
         self.status
     }
 
+    /// The signal that is looked at.
+    pub const fn source(self) -> TouchProbeSource {
+        self.function.source()
+    }
+
     /// The value of 60B9h.
     pub const fn object(channels: [Self; 2]) -> u16 {
         u16::from_le_bytes([channels[0].status, channels[1].status])

@@ -31,29 +31,34 @@ impl Window {
 /// How long a condition has held without a break.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Dwell {
+    /// It held at the last look.
+    held: bool,
+    /// Since the first look at which it held, at the last one.
     held_ms: f64,
 }
 
 impl Dwell {
     /// Takes in whether the condition holds now, `dt_ms` after the last time; true once it has held for `time_ms`.
     /// A time of 0 answers at once.
-    #[must_use]
     pub fn update(&mut self, holds: bool, time_ms: u16, dt_ms: f64) -> bool {
-        if !holds {
-            self.held_ms = 0.0;
-            return false;
-        }
-        let done = self.held_ms + ROUNDING_MS >= f64::from(time_ms);
-        self.held_ms = (self.held_ms + dt_ms).min(f64::from(u16::MAX) + 1.0);
-        done
+        let since_ms = if self.held { self.held_ms + dt_ms } else { 0.0 };
+        *self = Self { held: holds, held_ms: if holds { since_ms.min(LONGEST_MS) } else { 0.0 } };
+        self.has_lasted(time_ms)
+    }
+
+    /// At the last look the condition had held for this long.
+    pub fn has_lasted(&self, time_ms: u16) -> bool {
+        self.held && self.held_ms + ROUNDING_MS >= f64::from(time_ms)
     }
 
     /// Starts over.
     pub fn restart(&mut self) {
-        self.held_ms = 0.0;
+        *self = Self::default();
     }
 }
 
+/// No time of an object is longer.
+const LONGEST_MS: f64 = u16::MAX as f64 + 1.0;
 /// Periods that add up to a whole time are not to fall short of it by rounding.
 const ROUNDING_MS: f64 = 1e-6;
 

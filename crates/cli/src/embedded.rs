@@ -36,7 +36,7 @@ pub(crate) fn world() -> Result<Embedded, Failure> {
 }
 
 /// A virtual drive as it was ordered, without power.
-pub(crate) fn ordered_drive(model: &Description, order: &Order) -> Result<Box<dyn VirtualDrive>, Failure> {
+pub(crate) fn ordered_drive(model: &'static Description, order: &Order) -> Result<Box<dyn VirtualDrive>, Failure> {
     sim::machine::order(model, order).map_err(|error| Failure::usage(error.to_string()))
 }
 

@@ -5,9 +5,10 @@ use canopen::od::Entry;
 
 use crate::description::{Description, Identity};
 use crate::mjoint;
+use crate::servo::CIA402;
 use crate::zltech::{ZLAC8030L, ZLIM42C, ZLIM42C_82};
 
-static ALL: [&Description; 7] = [
+static ALL: [&Description; 8] = [
     &ZLAC8030L,
     &mjoint::M4230E17B50,
     &mjoint::M4230E17B80,
@@ -15,6 +16,7 @@ static ALL: [&Description; 7] = [
     &mjoint::M8025E25B80,
     &ZLIM42C,
     &ZLIM42C_82,
+    &CIA402,
 ];
 
 /// The models that are described in this crate.

@@ -106,10 +106,22 @@ impl Preset {
     /// # Errors
     /// [`PresetError`]; the values are as before.
     pub fn store<const N: usize>(self, values: &mut Dictionary<N>) -> Result<(), PresetError> {
+        self.store_if(values, Entry::is_kept)
+    }
+
+    /// The same of a device that keeps the rows that `is_kept` names.
+    ///
+    /// # Errors
+    /// [`PresetError`]; the values are as before.
+    pub fn store_if<const N: usize>(
+        self,
+        values: &mut Dictionary<N>,
+        is_kept: impl Fn(&Entry) -> bool,
+    ) -> Result<(), PresetError> {
         let table = values.table();
         let slot = table.find(self.object).map_err(|_| PresetError::NoSuchObject)?;
         let row = table.row(slot);
-        if !row.is_kept() {
+        if !is_kept(row) {
             return Err(PresetError::NotStored);
         }
         let raw = row.data_type.raw(self.value);

@@ -4,7 +4,7 @@ use canopen::node::NodeProfile;
 use devices::Description;
 
 /// How a firmware with this description communicates: a master reads of a drive what the drive does.
-pub(crate) const fn communication(description: &Description) -> NodeProfile {
+pub const fn communication(description: &Description) -> NodeProfile {
     let pdo = &description.pdo;
     NodeProfile {
         start_state: description.nmt.start_state,

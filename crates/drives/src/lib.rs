@@ -10,12 +10,14 @@
 #[cfg(test)]
 extern crate std;
 
-mod communication;
+pub mod communication;
 pub mod engine;
 mod firmware;
 pub mod mjoint;
+pub mod node;
 mod register_error;
 mod row;
+pub mod servo;
 pub mod zlac8030l;
 pub mod zlim42c;
 mod zltech;

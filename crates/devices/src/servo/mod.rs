@@ -1,5 +1,112 @@
 //! The standard's own servo: a drive with the objects, modes and defaults of CiA 402-2 and nothing else.
 //!
 //! It is what a drive of any vendor is simulated as when there is no file of it, and what its file is held against.
+//! [`axis`] and [`FAULTS`](faults::FAULTS) are also those of a drive that is described by a file.
 
+pub mod faults;
 pub mod objects;
+pub mod variations;
+
+use canopen::Mux;
+use cia402::{ModeOfOperation, Statusword};
+
+use crate::axis::{AxisDescription, BitPattern, HomingRules, HomingStart, NewSetPoint, PowerStyle};
+use crate::description::{Description, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules};
+use crate::faults::Faults;
+use crate::placement::Placement;
+use crate::units::{CountsPerTurn, Quantity, Ramps, Scale, Units};
+
+/// A CiA 402 servo as the standard has it.
+pub static CIA402: Description = Description {
+    name: "cia402",
+    title: "CiA 402 servo",
+    manual: "CiA 301 V4.2.0, CiA 402-2 V4.0",
+    identity: Identity { device_type: 0x0002_0192, vendor_id: 0, product_code: 402, revision_number: 0x0001_0000 },
+    distinguishing_object: None,
+    dictionary: &objects::TABLE,
+    node_id: None,
+    bitrate: None,
+    axes: &[axis(Placement::FIRST, MODES)],
+    host_watch: HostWatch::Heartbeat {
+        consumer: Mux::new(0x1016, 1),
+        fault: cia402::ErrorCode::LIFE_GUARD_OR_HEARTBEAT.0,
+    },
+    storage: ParameterStorage::CIA_301,
+    faults: FAULTS,
+    nmt: NmtRules::CIA_301,
+    pdo: PdoRules { max_objects: 8, ..PdoRules::CIA_301 },
+    stated_departures: &[],
+    variations: variations::VARIATIONS,
+};
+
+/// How a CiA 402 drive tells its faults: by the codes of the standard.
+pub const FAULTS: Faults = Faults { code: Some(Mux::new(0x603F, 0)), bit_field: false, table: &faults::FAULTS };
+
+/// All modes of the standard but velocity mode (frequency converters).
+pub const MODES: &[ModeOfOperation] = &[
+    ModeOfOperation::PROFILE_POSITION,
+    ModeOfOperation::PROFILE_VELOCITY,
+    ModeOfOperation::PROFILE_TORQUE,
+    ModeOfOperation::HOMING,
+    ModeOfOperation::INTERPOLATED_POSITION,
+    ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION,
+    ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY,
+    ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE,
+];
+
+/// An axis as the standard has it, where it is placed, with its modes: all units are the standard's.
+pub const fn axis(placement: Placement, modes: &'static [ModeOfOperation]) -> AxisDescription {
+    AxisDescription {
+        placement: Placement::FIRST,
+        modes,
+        mode_display: Mux::new(0x6061, 0),
+        power: PowerStyle::Cia402,
+        new_set_point: NewSetPoint::Handshake,
+        statusword_bits: &[],
+        homing: Some(HOMING),
+        units: UNITS,
+    }
+    .placed(placement)
+}
+
+const HOMING_BITS: u16 = Statusword::HOMING_ATTAINED | Statusword::HOMING_ERROR | Statusword::TARGET_REACHED;
+
+const HOMING: HomingRules = HomingRules {
+    method: Mux::new(0x6098, 0),
+    search_speed: Some(Quantity { object: Mux::new(0x6099, 1), scale: Scale::Positions(1.0) }),
+    start: HomingStart::ControlwordBit4,
+    attained: BitPattern { mask: HOMING_BITS, value: Statusword::HOMING_ATTAINED | Statusword::TARGET_REACHED },
+    failed: BitPattern { mask: HOMING_BITS & !Statusword::TARGET_REACHED, value: Statusword::HOMING_ERROR },
+};
+
+const UNITS: Units = Units {
+    // Feed over gear: position units in a turn of the motor.
+    counts_per_turn: CountsPerTurn::Ratio {
+        times: [Some(Mux::new(0x6092, 1)), Some(Mux::new(0x6091, 2))],
+        over: [Some(Mux::new(0x6092, 2)), Some(Mux::new(0x6091, 1))],
+    },
+    target_velocity: Some(velocity(0x60FF)),
+    actual_velocity: Some(velocity(0x606C)),
+    profile_velocity: Some(velocity(0x6081)),
+    ramps: Some(Ramps::Rates {
+        acceleration: Mux::new(0x6083, 0),
+        deceleration: Mux::new(0x6084, 0),
+        quick_stop: Some(Mux::new(0x6085, 0)),
+        scale: Scale::Positions(1.0),
+        none_from: None,
+    }),
+    target_current: Some(current(0x6071)),
+    actual_current: Some(current(0x6078)),
+    bus_voltage: Some(Quantity::new(0x6079, 0, 1e-3)),
+    motor_temperature: None,
+    driver_temperature: None,
+};
+
+const fn velocity(index: u16) -> Quantity {
+    Quantity { object: Mux::new(index, 0), scale: Scale::Positions(1.0) }
+}
+
+/// Thousandths of the rated current, which is in mA. A target torque counts as that share of it too.
+const fn current(index: u16) -> Quantity {
+    Quantity { object: Mux::new(index, 0), scale: Scale::Rated { rated: Mux::new(0x6075, 0), per_count: 1e-6 } }
+}

@@ -12,6 +12,8 @@ impl CommunicationErrors {
     pub(super) const NONE: Self = Self(0);
     /// Events of the node were lost.
     pub(super) const EVENTS_LOST: Self = Self(1 << PdoNumber::PREDEFINED);
+    /// A heartbeat that is watched has stayed away.
+    pub(super) const HEARTBEAT: Self = Self(Self::EVENTS_LOST.0 << 1);
 
     /// The last frame of an RPDO was shorter than its mapping.
     pub(super) const fn short_rpdo(number: PdoNumber) -> Self {
@@ -20,6 +22,10 @@ impl CommunicationErrors {
 
     pub(super) const fn is_empty(self) -> bool {
         self.0 == 0
+    }
+
+    pub(super) const fn contains(self, errors: Self) -> bool {
+        self.0 & errors.0 == errors.0
     }
 
     pub(super) const fn insert(&mut self, errors: Self) {

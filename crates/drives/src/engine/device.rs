@@ -288,6 +288,18 @@ impl<const N: usize> Device<N> {
         self.report_error(EmcyErrorCode::CAN_OVERRUN, now);
     }
 
+    /// A heartbeat that is watched has stayed away, or is heard again (CiA 301, 7.2.8.3.2.2).
+    pub fn report_heartbeat(&mut self, heard: bool, now: Instant) {
+        let error = CommunicationErrors::HEARTBEAT;
+        if !heard {
+            self.communication_errors.insert(error);
+            self.report_error(EmcyErrorCode::HEARTBEAT, now);
+        } else if self.communication_errors.contains(error) {
+            self.communication_errors.remove(error);
+            self.report_end_of_error(now);
+        }
+    }
+
     fn report_error(&mut self, code: EmcyErrorCode, now: Instant) {
         self.node.raise_emcy(code, self.fault_bits | self.communication_errors.register_bits(), [0; 5], now);
     }

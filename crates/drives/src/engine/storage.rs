@@ -284,7 +284,7 @@ fn put_word(bytes: &mut [u8], at: usize, value: u32) {
 }
 
 /// CRC-32 of ISO 3309 (reflected polynomial EDB88320h), half a byte at a time.
-fn crc32(bytes: &[u8]) -> u32 {
+pub(crate) fn crc32(bytes: &[u8]) -> u32 {
     const TABLE: [u32; 16] = {
         let mut table = [0; 16];
         let mut i = 0;

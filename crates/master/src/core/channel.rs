@@ -46,7 +46,6 @@ struct Active {
 pub(super) struct Ended {
     pub(super) ticket: Ticket,
     pub(super) mux: Mux,
-    pub(super) downloads: bool,
     pub(super) outcome: Outcome,
 }
 
@@ -162,7 +161,7 @@ impl Channel {
 
     fn end(&mut self, outcome: Outcome) {
         if let Some(active) = self.active.take() {
-            self.ended = Some(Ended { ticket: active.ticket, mux: active.mux, downloads: !active.uploads, outcome });
+            self.ended = Some(Ended { ticket: active.ticket, mux: active.mux, outcome });
         }
     }
 

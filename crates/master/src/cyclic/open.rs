@@ -3,7 +3,7 @@ use core::time::Duration;
 use canopen::pdo::{Direction, EventTrigger, MappingRecord, PdoId, PdoNumber};
 use canopen::{Mux, NmtCommand, NmtState, NodeId};
 use cia402::ModeOfOperation;
-use devices::{AxisDescription, AxisId, Description, Quantity};
+use devices::{AxisDescription, Description, Quantity};
 
 use super::demand::Bound;
 use super::drive::{ControlwordPath, CyclicDrive, Progress};
@@ -15,6 +15,12 @@ use crate::pdo::{PdoConfig, PdoError, SignalError, TimerUnits, TransmissionType}
 
 /// The interpolation data record (CiA 402-2, 12.3).
 const INTERPOLATION_DATA: Mux = Mux::new(0x60C1, 1);
+
+/// The TPDO that gets what does not fit into the first.
+const SECOND: PdoNumber = match PdoNumber::new(2) {
+    Some(number) => number,
+    None => PdoNumber::FIRST,
+};
 
 const INTENT: &str = "move it cycle by cycle";
 
@@ -155,7 +161,7 @@ impl Drive {
     }
 
     /// Maps what the mode needs: RPDO1 gets the controlword and the set-point; TPDO1 the statusword, the position and, where
-    /// it fits, the current; TPDO2 the speed; all with each SYNC. A second axis gets RPDO2, TPDO3 and TPDO4. A model with a fixed mapping is left as it is.
+    /// it fits, the current; TPDO2 the speed; all with each SYNC. A model with a fixed mapping is left as it is.
     ///
     /// # Errors
     /// [`CyclicError`].
@@ -185,15 +191,14 @@ impl Drive {
         };
         let current = axis.units.actual_current.map(|quantity| quantity.object);
         let velocity = axis.units.actual_velocity.map(|quantity| quantity.object);
-        let [command, state, speed] = pdos_of(self.axis_id());
         let pdos = [
-            (Direction::Rpdo, command, map(&[Some(axis.object(CONTROLWORD)), Some(target)])),
+            (Direction::Rpdo, PdoNumber::FIRST, map(&[Some(axis.object(CONTROLWORD)), Some(target)])),
             (
                 Direction::Tpdo,
-                state,
+                PdoNumber::FIRST,
                 map(&[Some(axis.object(STATUSWORD)), Some(axis.object(POSITION_ACTUAL)), current]),
             ),
-            (Direction::Tpdo, speed, map(&[velocity])),
+            (Direction::Tpdo, SECOND, map(&[velocity])),
         ];
         for (direction, number, map) in pdos {
             let config = PdoConfig::new(PdoId { direction, number }, map).transmission(TransmissionType::EVERY_SYNC);
@@ -347,13 +352,6 @@ impl Drive {
         // Mapped with another length it is something else.
         Ok(signal.filter(|signal| signal.field().bits as usize == data_type.size() * 8))
     }
-}
-
-/// The RPDO of an axis, its TPDO, and the TPDO that gets what does not fit into that: 1, 1 and 2 of the first axis, 2, 3 and
-/// 4 of the second.
-fn pdos_of(axis: AxisId) -> [PdoNumber; 3] {
-    let axis = usize::from(axis.0);
-    [axis, 2 * axis, 2 * axis + 1].map(|position| PdoNumber::at(position).unwrap_or(PdoNumber::FIRST))
 }
 
 const fn timer_units(profile: &Description) -> TimerUnits {

@@ -13,9 +13,6 @@ use crate::{Component, PulseTrain, Refused, Report, Source, TemperatureSensor};
 /// Temperature of the surroundings.
 pub(super) const AMBIENT_C: f64 = 25.0;
 
-/// What the supply can be set to.
-const SUPPLY_VOLTAGE: Quantity = Quantity { what: "supply", expected: "0 to 100 V", least: 0.0, greatest: 100.0 };
-
 /// From what a bench supply can be turned down to, to what a traction battery gives into a short circuit.
 const SUPPLY_LIMIT: Quantity =
     Quantity { what: "limit of the supply", expected: "0.01 to 1000 A", least: 0.01, greatest: 1000.0 };
@@ -45,6 +42,8 @@ pub trait Assembly: Clone + Send + 'static {
     const STARTS_AT_V: f64 = 12.0;
     /// Bus voltage below which it stops; assumed likewise.
     const STOPS_BELOW_V: f64 = 9.0;
+    /// What the supply can be set to.
+    const SUPPLY_VOLTAGE: Quantity = Quantity { what: "supply", expected: "0 to 100 V", least: 0.0, greatest: 100.0 };
     /// What can be asked of the load at the output shaft.
     const LOAD_TORQUE: Quantity =
         Quantity { what: "load torque", expected: "-1000 to 1000 N·m", least: -1000.0, greatest: 1000.0 };
@@ -135,7 +134,7 @@ pub trait Assembly: Clone + Send + 'static {
 
     /// Voltage of the supply and what is behind it: all of it or nothing.
     fn set_source(&mut self, source: Source) -> Result<(), Refused> {
-        let voltage_v = source.voltage_v.map(|voltage_v| SUPPLY_VOLTAGE.check(voltage_v)).transpose()?;
+        let voltage_v = source.voltage_v.map(|voltage_v| Self::SUPPLY_VOLTAGE.check(voltage_v)).transpose()?;
         let limit_a = source.limit_a.map(|limit_a| SUPPLY_LIMIT.check(limit_a)).transpose()?;
         let ohm = source.resistance_ohm.map(|ohm| SUPPLY_RESISTANCE.check(ohm)).transpose()?;
         let (rig, model) = self.rig_and_model_mut();

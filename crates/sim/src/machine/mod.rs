@@ -6,12 +6,15 @@
 //! communication deadlines only, and the result does not depend on when it looked.
 
 mod assembly;
+mod kept;
 mod mjoint;
+mod node;
 mod order;
 mod pulse_source;
 mod quantity;
 mod realism;
 mod registry;
+mod servo;
 mod switch;
 mod zlac8030l;
 mod zlim42c;
@@ -21,10 +24,12 @@ use drives::{Firmware, RegisterError};
 
 pub use assembly::Assembly;
 pub use mjoint::{Joint, MJointMachine, mjoint};
+pub use node::NodeMachine;
 pub use order::{Order, OrderError};
 pub use quantity::Quantity;
 pub use realism::{Noise, Realism};
 pub use registry::{models, order};
+pub use servo::{ServoBench, ServoMachine, servo, without_effect};
 pub use zlac8030l::{HubWheel, Zlac8030lMachine, zlac8030l};
 pub use zlim42c::{Stepper, Zlim42c82Machine, Zlim42cMachine, zlim42c, zlim42c_82};
 

@@ -6,6 +6,7 @@ use canopen::{Mux, NodeId};
 use devices::Description;
 use devices::variant::{Preset, PresetError, Variant};
 use drives::engine::storage::Image;
+use drives::node::{Memory, Values, is_parameter};
 
 /// What is wanted of a drive beside its model.
 #[derive(Clone, Debug)]
@@ -94,4 +95,18 @@ pub(super) fn baud_rate(model: &Description, object: Mux, bitrate: Bitrate) -> R
         let known = values.iter().map(|(_, meaning)| *meaning).collect::<Vec<_>>().join(", ");
         OrderError::Bitrate { model: model.name, bitrate, object, known }
     })
+}
+
+/// The memory of a described device as ordered: values that are not the table's.
+pub(super) fn memory(model: &'static Description, order: &Order) -> Result<Memory, OrderError> {
+    let mut memory = Memory::empty();
+    if order.presets.is_empty() {
+        return Ok(memory);
+    }
+    let mut values = Values::new(model.dictionary, order.node);
+    for preset in &order.presets {
+        preset.store_if(&mut values, is_parameter).map_err(|error| OrderError::Preset { preset: *preset, error })?;
+    }
+    memory.save(&values, |row| order.presets.iter().any(|preset| preset.object == row.mux()));
+    Ok(memory)
 }

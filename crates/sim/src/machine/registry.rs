@@ -1,5 +1,6 @@
 //! Which machine is built for which description: the one list that joins the two.
 
+use devices::servo::CIA402;
 use devices::zltech::{ZLAC8030L, ZLIM42C, ZLIM42C_82};
 use devices::{Description, mjoint};
 
@@ -7,9 +8,9 @@ use super::order::{Order, OrderError};
 use crate::VirtualDrive;
 
 /// Builds a machine, without power.
-type Maker = fn(&Description, &Order) -> Result<Box<dyn VirtualDrive>, OrderError>;
+type Maker = fn(&'static Description, &Order) -> Result<Box<dyn VirtualDrive>, OrderError>;
 
-static MACHINES: [(&Description, Maker); 7] = [
+static MACHINES: [(&Description, Maker); 8] = [
     (&ZLAC8030L, super::zlac8030l::ordered),
     (&mjoint::M4230E17B50, super::mjoint::ordered),
     (&mjoint::M4230E17B80, super::mjoint::ordered),
@@ -17,6 +18,7 @@ static MACHINES: [(&Description, Maker); 7] = [
     (&mjoint::M8025E25B80, super::mjoint::ordered),
     (&ZLIM42C, super::zlim42c::ordered),
     (&ZLIM42C_82, super::zlim42c::ordered_82),
+    (&CIA402, super::servo::ordered),
 ];
 
 /// The models that can be simulated.
@@ -24,13 +26,18 @@ pub fn models() -> impl ExactSizeIterator<Item = &'static Description> + Clone {
     MACHINES.iter().map(|(model, _)| *model)
 }
 
-/// A virtual drive of `model`, without power.
+/// A virtual drive of `model`, without power. One that is not among [`models`], but read from a file, is the generic servo if
+/// it has an axis, and else a node with its objects.
 ///
 /// # Errors
 /// [`OrderError`] says what the model cannot be.
-pub fn order(model: &Description, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
-    let machine = MACHINES.iter().find(|(known, _)| known.name == model.name);
-    let (_, make) = machine.ok_or(OrderError::NoSuchModel { model: model.name })?;
+pub fn order(model: &'static Description, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
+    let machine = MACHINES.iter().find(|(known, _)| std::ptr::eq(*known, model));
+    let make = match machine {
+        Some((_, make)) => *make,
+        None if model.axes.is_empty() => super::node::ordered,
+        None => super::servo::ordered,
+    };
     make(model, order)
 }
 

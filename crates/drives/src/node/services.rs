@@ -1,0 +1,194 @@
+//! Services of CiA 301 that a described device has by its objects, beside those of [`Device`]: the error history (1003h),
+//! consumers of heartbeats (1016h), and the store of parameters (1010h, 1011h).
+
+use can::{Frame, Instant};
+use canopen::heartbeat::{Consumer, ConsumerEvent};
+use canopen::od::{Condition, Entry, Slot, Table, View};
+use canopen::{AbortCode, Mux};
+
+use super::memory::Memory;
+use super::{ROWS, Values};
+use crate::engine::device::Device;
+
+/// Most nodes that are watched.
+const CONSUMERS: u8 = 8;
+
+/// "save" and "load" (CiA 301, 7.5.2.13 and 7.5.2.14).
+const SAVE: u32 = u32::from_le_bytes(*b"save");
+const LOAD: u32 = u32::from_le_bytes(*b"load");
+
+const HISTORY: u16 = 0x1003;
+const STORE: u16 = 0x1010;
+const RESTORE: u16 = 0x1011;
+const WATCH: u16 = 0x1016;
+const EMCY_COB_ID: Mux = Mux::new(0x1014, 0);
+
+/// The services of one device.
+#[derive(Clone, Debug)]
+pub struct Services {
+    consumers: [Option<Consumer>; CONSUMERS as usize],
+    memory: Memory,
+    generation: u32,
+}
+
+impl Services {
+    /// With what is found in the memory at power-on.
+    pub fn new(memory: Memory) -> Self {
+        Self { consumers: [None; CONSUMERS as usize], memory, generation: 0 }
+    }
+
+    /// The supply is back: the memory is as it was left.
+    pub fn power_on(&mut self, memory: Memory) {
+        self.memory = memory;
+    }
+
+    /// Contents of the memory, and a number that changes with them.
+    pub const fn memory(&self) -> (&Memory, u32) {
+        (&self.memory, self.generation)
+    }
+
+    /// The memory can be read.
+    pub fn is_sound(&self) -> bool {
+        self.memory.is_sound()
+    }
+
+    /// After the device's restart, before it boots: the stored values of the rows that `wanted` names, and the watches.
+    pub fn start(&mut self, device: &mut Device<ROWS>, wanted: fn(&Entry) -> bool) {
+        self.memory.load(device.values_mut(), wanted);
+        let values = device.values();
+        for (consumer, sub_index) in self.consumers.iter_mut().zip(1..) {
+            let entry = values.table().find(Mux::new(WATCH, sub_index));
+            *consumer = entry.ok().and_then(|slot| Consumer::from_raw(values.raw(slot)));
+        }
+    }
+
+    /// A peer wrote to `slot`; true if it was one of these services.
+    pub fn written(&mut self, device: &mut Device<ROWS>, slot: Slot, raw: u32) -> bool {
+        let mux = device.values().table().row(slot).mux();
+        match (mux.index, mux.sub_index) {
+            (WATCH, sub_index @ 1..=CONSUMERS) => {
+                self.consumers[usize::from(sub_index) - 1] = Consumer::from_raw(raw);
+            }
+            (HISTORY, 0) => forget_history(device.values_mut()),
+            (STORE, sub_index) => {
+                if raw == SAVE {
+                    self.memory.save(device.values(), |row| is_in_group(row.mux(), sub_index));
+                    self.generation = self.generation.wrapping_add(1);
+                }
+                restore_default(device, slot);
+            }
+            (RESTORE, sub_index) => {
+                if raw == LOAD {
+                    self.memory.forget(|mux| is_in_group(mux, sub_index));
+                    self.generation = self.generation.wrapping_add(1);
+                }
+                restore_default(device, slot);
+            }
+            _ => return false,
+        }
+        true
+    }
+
+    /// The frame is a heartbeat that is watched.
+    #[inline]
+    pub fn wants(&self, frame: &Frame) -> bool {
+        self.consumers.iter().flatten().any(|consumer| consumer.can_id() == frame.id())
+    }
+
+    /// A frame arrived; true if a node that is watched has booted, and so has lost its state.
+    pub fn handle_frame(&mut self, frame: &Frame, now: Instant) -> bool {
+        let events = self.consumers.iter_mut().flatten().filter_map(|consumer| consumer.handle_frame(frame, now));
+        events.fold(false, |booted, event| booted | (event == ConsumerEvent::BootUp))
+    }
+
+    /// Time has reached `now`; true if a heartbeat has stayed away.
+    pub fn handle_timeout(&mut self, now: Instant) -> bool {
+        let events = self.consumers.iter_mut().flatten().filter_map(|consumer| consumer.handle_timeout(now));
+        events.fold(false, |lost, event| lost | (event == ConsumerEvent::Lost))
+    }
+
+    /// When [`handle_timeout`](Self::handle_timeout) should next be called.
+    pub fn poll_timeout(&self) -> Option<Instant> {
+        self.consumers.iter().flatten().filter_map(Consumer::poll_timeout).min()
+    }
+
+    /// A frame was handed to the bus: an EMCY message goes into the error history.
+    pub fn sent(&self, values: &mut Values, frame: &Frame) {
+        let Ok(slot) = values.table().find(EMCY_COB_ID) else { return };
+        let is_emcy = frame.id().raw() == values.raw(slot) & 0x7FF;
+        let &[low, high, _, manufacturer_low, manufacturer_high, ..] = frame.data() else { return };
+        if is_emcy && (low, high) != (0, 0) {
+            remember(values, u32::from_le_bytes([low, high, manufacturer_low, manufacturer_high]));
+        }
+    }
+}
+
+/// What a device with these objects refuses beyond its rows: for [`Conditions`](canopen::od::Conditions).
+pub fn conditions(table: &'static Table) -> impl Iterator<Item = (Slot, Condition)> {
+    table.iter().filter_map(|(slot, row)| {
+        let check: fn(&View<'_>, u32) -> Result<(), AbortCode> = match (row.index, row.sub_index) {
+            (HISTORY, 0) => only_zero,
+            (STORE, 1..) => only_save,
+            (RESTORE, 1..) => only_load,
+            _ => return None,
+        };
+        Some((slot, Condition::Check(check)))
+    })
+}
+
+fn only_zero(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
+    if raw == 0 { Ok(()) } else { Err(AbortCode::INVALID_VALUE) }
+}
+
+fn only_save(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
+    if raw == SAVE { Ok(()) } else { Err(AbortCode::CANNOT_TRANSFER) }
+}
+
+fn only_load(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
+    if raw == LOAD { Ok(()) } else { Err(AbortCode::CANNOT_TRANSFER) }
+}
+
+/// Sub-index 1 is everything, 2 communication (1000h to 1FFFh), 3 the profile (6000h to 9FFFh), and those from 4 on the
+/// maker's.
+const fn is_in_group(mux: Mux, group: u8) -> bool {
+    match group {
+        1 => true,
+        2 => matches!(mux.index, 0x1000..=0x1FFF),
+        3 => matches!(mux.index, 0x6000..=0x9FFF),
+        _ => matches!(mux.index, 0x2000..=0x5FFF),
+    }
+}
+
+/// The object shows again what it can do.
+fn restore_default(device: &mut Device<ROWS>, slot: Slot) {
+    let node_id = device.node().node_id();
+    device.values_mut().restore_default(slot, node_id);
+}
+
+/// The latest error goes to sub-index 1, the others move up.
+fn remember(values: &mut Values, error: u32) {
+    let table = values.table();
+    let field = |sub_index| table.find(Mux::new(HISTORY, sub_index));
+    let Ok(count_slot) = field(0) else { return };
+    let mut moved = error;
+    let mut count = 0;
+    for sub_index in 1..=254 {
+        let Ok(slot) = field(sub_index) else { break };
+        let before = values.raw(slot);
+        values.set_raw(slot, moved);
+        count = sub_index;
+        moved = before;
+        if before == 0 {
+            break;
+        }
+    }
+    values.set_raw(count_slot, u32::from(count));
+}
+
+fn forget_history(values: &mut Values) {
+    let table = values.table();
+    for sub_index in 1..=254 {
+        let Ok(slot) = table.find(Mux::new(HISTORY, sub_index)) else { break };
+        values.set_raw(slot, 0);
+    }
+}

@@ -1,0 +1,296 @@
+//! The objects of one axis in increments and amperes, as the engine wants them. Written anew when one changes.
+
+use canopen::od::Slot;
+use cia402::{
+    AbortConnectionOption, DisableOperationOption, FaultReactionOption, HaltOption, HomingMethod, InterpolationPeriod,
+    InterpolationSubMode, QuickStopOption, ShutdownOption, StopRamp, Window,
+};
+use motion::set_points::{Course, Following};
+use motion::travel::{Bounds, Travel};
+
+use super::motor::Motor;
+use super::scales::Scales;
+use super::slots::AxisSlots;
+use super::{Values, read};
+use crate::engine::axis::{Control, HomingParameters, MoveLimits, Ramp, VelocityRamps};
+use crate::engine::cia402::{self as power, DisableOptions, ExternalStop, Tolerances};
+
+/// Deceleration of a device without any: that of the motor's rated torque on its own inertia would be rough; this stops
+/// from the highest speed in a fifth of a second.
+const STOPS_IN_S: f64 = 0.2;
+/// Periods of the bus that a cyclic set-point may stay away before the motion is brought to rest.
+const FORGIVEN_PERIODS: f64 = 2.0;
+/// Windows in increments of a device that has no object for them.
+const POSITION_WINDOW: i64 = 100;
+const WINDOW_TIME_MS: i64 = 10;
+/// Speeds and torques that count as reached without an object, share of the highest speed and of the rated torque.
+const VELOCITY_WINDOW_SHARE: f64 = 0.005;
+const STANDSTILL_SHARE: f64 = 0.001;
+const TORQUE_WINDOW_SHARE: f32 = 0.05;
+
+/// Everything that an axis reads of the dictionary besides its targets.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Parameters {
+    pub(super) scales: Scales,
+    pub(super) power: power::Parameters,
+    /// Position window 6067h, increments, and its time.
+    pub(super) position_window: Window,
+    /// Velocity window 606Dh, increments/s, and its time.
+    pub(super) velocity_window: (f64, u16),
+    /// Velocity threshold 606Fh, increments/s, and its time.
+    pub(super) velocity_threshold: (f64, u16),
+    /// Following error window 6065h, increments, and its time.
+    pub(super) following_error: Window,
+    /// How set-points of ip and csp are followed.
+    pub(super) following: Following,
+    pub(super) travel: Option<Travel>,
+    pub(super) bounds: Bounds,
+    /// 607Fh and 6080h, increments/s.
+    pub(super) max_speed: f64,
+    /// Torque at which 6071h is 1000, N m.
+    pub(super) rated_torque_nm: f32,
+    /// Largest currents towards larger and smaller positions, A.
+    pub(super) max_current_a: [f32; 2],
+    pub(super) home_offset: i32,
+    pub(super) abort_connection: AbortConnectionOption,
+    pub(super) fault_reaction: FaultReactionOption,
+}
+
+/// Reads the objects of one axis.
+struct Reader<'a> {
+    values: &'a Values,
+    slots: &'a AxisSlots,
+    scales: Scales,
+    motor: &'a Motor,
+}
+
+impl Parameters {
+    pub(super) fn of(values: &Values, slots: &AxisSlots, motor: &Motor) -> Self {
+        let scales = Scales::of(values, slots, motor.increments_per_turn);
+        Reader { values, slots, scales, motor }.parameters()
+    }
+
+    /// A torque in thousandths of the rated one as a current, A.
+    pub(super) fn current_a(&self, per_mille: i64, motor: &Motor) -> f32 {
+        per_mille as f32 * 1e-3 * self.rated_torque_nm / motor.torque_constant_nm_a()
+    }
+
+    /// A current as a torque in thousandths of the rated one.
+    pub(super) fn torque(&self, current_a: f32, motor: &Motor) -> i64 {
+        libm::roundf(current_a * motor.torque_constant_nm_a() / self.rated_torque_nm * 1e3) as i64
+    }
+}
+
+impl Reader<'_> {
+    fn parameters(&self) -> Parameters {
+        let slots = self.slots;
+        let max_speed = self.max_speed();
+        let bounds = self.bounds(max_speed);
+        let rated_torque_nm = match self.read(slots.rated_torque, 0) {
+            millis @ 1.. => millis as f32 * 1e-3,
+            _ => self.motor.rated_torque_nm,
+        };
+        let deceleration = self.rate(slots.deceleration, bounds.deceleration);
+        Parameters {
+            scales: self.scales,
+            power: self.power(&bounds, rated_torque_nm),
+            position_window: Window {
+                half_width: self.window(slots.position_window, POSITION_WINDOW),
+                time_ms: self.time_ms(slots.position_window_time, WINDOW_TIME_MS),
+            },
+            velocity_window: (
+                self.speed(slots.velocity_window, VELOCITY_WINDOW_SHARE * self.fastest()),
+                self.time_ms(slots.velocity_window_time, WINDOW_TIME_MS),
+            ),
+            velocity_threshold: (
+                self.speed(slots.velocity_threshold, STANDSTILL_SHARE * self.fastest()),
+                self.time_ms(slots.velocity_threshold_time, WINDOW_TIME_MS),
+            ),
+            following_error: Window {
+                half_width: self.window(slots.following_error_window, i64::from(Window::OFF)),
+                time_ms: self.time_ms(slots.following_error_time, 0),
+            },
+            following: self.following(deceleration),
+            travel: self.travel(),
+            bounds,
+            max_speed,
+            rated_torque_nm,
+            max_current_a: self.max_current_a(rated_torque_nm),
+            home_offset: self.scales.increments(self.read(slots.home_offset, 0)),
+            abort_connection: AbortConnectionOption(self.read(slots.abort_connection, 1) as i16),
+            fault_reaction: self.fault_reaction(),
+        }
+    }
+
+    fn power(&self, bounds: &Bounds, rated_torque_nm: f32) -> power::Parameters {
+        let slots = self.slots;
+        let profile_speed = match slots.profile_velocity {
+            Some(_) => self.scales.speed(self.read(slots.profile_velocity, 0)).min(bounds.speed),
+            None => bounds.speed,
+        };
+        let acceleration = Ramp::Rate(self.rate(slots.acceleration, bounds.acceleration).min(bounds.acceleration));
+        let deceleration = Ramp::Rate(self.rate(slots.deceleration, bounds.deceleration).min(bounds.deceleration));
+        let ramps = VelocityRamps { start_speed: 0.0, max_speed: bounds.speed, acceleration, deceleration };
+        let per_mille_a = rated_torque_nm * 1e-3 / self.motor.torque_constant_nm_a();
+        power::Parameters {
+            moves: MoveLimits {
+                start_speed: 0.0,
+                max_speed: profile_speed,
+                end_speed: 0.0,
+                acceleration,
+                deceleration,
+            },
+            velocity: ramps,
+            quick_stop_ramp: Ramp::Rate(self.rate(slots.quick_stop_deceleration, self.default_rate())),
+            torque_slope_a_s: self.read(slots.torque_slope, 0) as f32 * per_mille_a,
+            quick_stop: QuickStopOption(self.read(slots.quick_stop, 2) as i16),
+            disable: DisableOptions {
+                shutdown: ShutdownOption(self.read(slots.shutdown, 0) as i16),
+                disable_operation: DisableOperationOption(self.read(slots.disable_operation, 1) as i16),
+            },
+            halt: HaltOption(self.read(slots.halt, 1) as i16),
+            emergency_stop: StopRamp::CurrentLimit,
+            limit_stop: Some(StopRamp::QuickStop),
+            homing: self.homing(bounds),
+            external_stop: ExternalStop::Hold,
+            tolerances: Tolerances {
+                position: self.window(slots.position_window, POSITION_WINDOW),
+                velocity: self.speed(slots.velocity_window, VELOCITY_WINDOW_SHARE * self.fastest()),
+                current_a: TORQUE_WINDOW_SHARE * self.motor.rated_current_a,
+            },
+        }
+    }
+
+    fn homing(&self, bounds: &Bounds) -> HomingParameters {
+        let slots = self.slots;
+        let slow = self.fastest() * 0.01;
+        let rate = Ramp::Rate(self.rate(slots.homing_acceleration, self.default_rate()));
+        HomingParameters {
+            sequence: HomingMethod(self.read(slots.homing_method, 0) as i8).sequence(),
+            search_speed: self.speed(slots.homing_speed_switch, 5.0 * slow).min(bounds.speed),
+            latch_speed: self.speed(slots.homing_speed_zero, slow).min(bounds.speed),
+            ramps: VelocityRamps { start_speed: 0.0, max_speed: bounds.speed, acceleration: rate, deceleration: rate },
+            end: rate,
+            back_off: 0,
+            single_pass: false,
+            control: Control::Position,
+        }
+    }
+
+    /// 60C2h, and linear unless 60C0h says otherwise.
+    fn following(&self, deceleration: f64) -> Following {
+        let slots = self.slots;
+        let period = InterpolationPeriod {
+            value: self.read(slots.interpolation_period_value, 1) as u8,
+            index: self.read(slots.interpolation_period_index, -3) as i8,
+        };
+        let sub_mode = InterpolationSubMode(self.read(slots.interpolation_sub_mode, 0) as i16);
+        Following {
+            course: if sub_mode == InterpolationSubMode::CUBIC { Course::Cubic } else { Course::Linear },
+            period_s: period.nanos().unwrap_or_default() as f64 * 1e-9,
+            forgiven: FORGIVEN_PERIODS,
+            deceleration,
+        }
+    }
+
+    /// 607Dh; the wrong way round it is off, as most makers have it.
+    fn travel(&self) -> Option<Travel> {
+        let (low, high) = (self.slots.min_position?, self.slots.max_position?);
+        let [a, b] = [low, high].map(|slot| self.read(Some(slot), 0));
+        if a >= b || (a == i64::from(i32::MIN) && b == i64::from(i32::MAX)) {
+            return None;
+        }
+        let [a, b] = [a, b].map(|limit| f64::from(self.scales.increments(limit)));
+        Travel::new(a.min(b), a.max(b))
+    }
+
+    fn bounds(&self, speed: f64) -> Bounds {
+        let most = |slot| match self.read(slot, 0) {
+            0 => f64::INFINITY,
+            rate => self.scales.rate(rate),
+        };
+        Bounds {
+            speed,
+            acceleration: most(self.slots.max_acceleration),
+            deceleration: most(self.slots.max_deceleration),
+        }
+    }
+
+    /// The least of what 607Fh, 6080h and the motor allow.
+    fn max_speed(&self) -> f64 {
+        let profile = match self.read(self.slots.max_profile_velocity, 0) {
+            0 => f64::INFINITY,
+            speed => self.scales.speed(speed),
+        };
+        let motor = match self.read(self.slots.max_motor_speed, 0) {
+            0 => f64::INFINITY,
+            rpm => rpm as f64 / 60.0 * f64::from(self.motor.increments_per_turn),
+        };
+        profile.min(motor).min(self.fastest())
+    }
+
+    /// The motor's own highest speed, increments/s.
+    fn fastest(&self) -> f64 {
+        f64::from(self.motor.max_velocity_rad_s) / core::f64::consts::TAU * f64::from(self.motor.increments_per_turn)
+    }
+
+    /// The least of 6072h, 6073h, 60E0h and 60E1h, and what the power stage bears.
+    fn max_current_a(&self, rated_torque_nm: f32) -> [f32; 2] {
+        let slots = self.slots;
+        let kt = self.motor.torque_constant_nm_a();
+        let torque_a = |slot: Option<Slot>| match slot {
+            Some(_) => self.read(slot, 0) as f32 * 1e-3 * rated_torque_nm / kt,
+            None => f32::INFINITY,
+        };
+        let rated_a = match self.read(slots.rated_current, 0) {
+            millis @ 1.. => millis as f32 * 1e-3 * core::f32::consts::SQRT_2,
+            _ => self.motor.rated_current_a,
+        };
+        let current_a = match self.read(slots.max_current, 0) {
+            0 => f32::INFINITY,
+            per_mille => per_mille as f32 * 1e-3 * rated_a,
+        };
+        let most_a = self.motor.max_current_a.min(current_a).min(torque_a(slots.max_torque));
+        [slots.positive_torque_limit, slots.negative_torque_limit].map(|slot| most_a.min(torque_a(slot)))
+    }
+
+    /// Codes that mean nothing to this firmware count as the standard's default.
+    fn fault_reaction(&self) -> FaultReactionOption {
+        let code = FaultReactionOption(self.read(self.slots.fault_reaction, 2) as i16);
+        if code.ramp().is_some() { code } else { FaultReactionOption::QUICK_STOP }
+    }
+
+    /// A rate of an object; without the object, or with 0 in it, the default or `most` if that is less.
+    fn rate(&self, slot: Option<Slot>, most: f64) -> f64 {
+        match self.read(slot, 0) {
+            0 => self.default_rate().min(most),
+            rate => self.scales.rate(rate),
+        }
+    }
+
+    fn default_rate(&self) -> f64 {
+        self.fastest() / STOPS_IN_S
+    }
+
+    fn speed(&self, slot: Option<Slot>, absent: f64) -> f64 {
+        match slot {
+            Some(_) => self.scales.speed(self.read(slot, 0)),
+            None => absent,
+        }
+    }
+
+    fn window(&self, slot: Option<Slot>, absent: i64) -> u32 {
+        match self.read(slot, absent) as u32 {
+            Window::OFF => Window::OFF,
+            width => self.scales.length(width),
+        }
+    }
+
+    fn time_ms(&self, slot: Option<Slot>, absent: i64) -> u16 {
+        self.read(slot, absent) as u16
+    }
+
+    fn read(&self, slot: Option<Slot>, absent: i64) -> i64 {
+        read(self.values, slot, absent)
+    }
+}

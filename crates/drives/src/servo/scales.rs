@@ -1,0 +1,121 @@
+//! User units and encoder increments of one axis, by the objects of its factor group.
+
+use canopen::od::Slot;
+use cia402::{FactorGroup, Factors, NoFactor, Polarity, Ratio};
+
+use super::slots::AxisSlots;
+use super::{Values, read};
+
+/// How one axis counts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Scales {
+    factors: Factors,
+    polarity: Polarity,
+    /// The objects make no sense: increments are used in place of all units.
+    pub(super) wrong: Option<NoFactor>,
+}
+
+impl Scales {
+    pub(super) fn of(values: &Values, slots: &AxisSlots, increments_per_turn: u32) -> Self {
+        let pair = |numerator: Option<Slot>, divisor: Option<Slot>| {
+            (numerator.is_some() && divisor.is_some())
+                .then(|| [numerator, divisor].map(|slot| read(values, slot, 0) as u32))
+        };
+        let group = FactorGroup {
+            position_encoder_resolution: pair(slots.encoder_increments, slots.encoder_turns),
+            gear_ratio: pair(slots.gear_motor, slots.gear_shaft),
+            feed_constant: pair(slots.feed, slots.feed_turns),
+            position_factor: pair(slots.position_factor_numerator, slots.position_factor_divisor),
+            velocity_encoder_factor: pair(slots.velocity_encoder_numerator, slots.velocity_encoder_divisor),
+            velocity_factor: pair(slots.velocity_factor_numerator, slots.velocity_factor_divisor),
+            acceleration_factor: pair(slots.acceleration_factor_numerator, slots.acceleration_factor_divisor),
+        };
+        let (factors, wrong) = match in_increments(&group, increments_per_turn) {
+            Ok(factors) => (factors, None),
+            Err(error) => (INCREMENTS, Some(error)),
+        };
+        Self { factors, polarity: Polarity(read(values, slots.polarity, 0) as u8), wrong }
+    }
+
+    /// A position in increments; positions wrap, as the counter does.
+    pub(super) fn increments(&self, position: i64) -> i32 {
+        self.factors.position.scale(position * self.polarity.position()) as i32
+    }
+
+    /// A position in user units, held to 32 bits.
+    pub(super) fn position(&self, increments: i32) -> i64 {
+        saturated(self.factors.position.inverse().scale(i64::from(increments)) * self.polarity.position())
+    }
+
+    /// A length in increments, whatever its sign.
+    pub(super) fn length(&self, user: u32) -> u32 {
+        u32::try_from(self.factors.position.scale(i64::from(user))).unwrap_or(u32::MAX)
+    }
+
+    /// Increments per second.
+    pub(super) fn increments_s(&self, velocity: i64) -> f64 {
+        velocity as f64 * self.factors.velocity.as_f64() * self.polarity.velocity() as f64
+    }
+
+    /// Increments per second, whatever the sign.
+    pub(super) fn speed(&self, user: i64) -> f64 {
+        user as f64 * self.factors.velocity.as_f64()
+    }
+
+    /// A velocity in user units, held to 32 bits.
+    pub(super) fn velocity(&self, increments_s: f64) -> i64 {
+        let user = increments_s / self.factors.velocity.as_f64() * self.polarity.velocity() as f64;
+        saturated(libm::round(user) as i64)
+    }
+
+    /// Increments per second squared.
+    pub(super) fn rate(&self, user: i64) -> f64 {
+        user as f64 * self.factors.acceleration.as_f64()
+    }
+
+    /// -1 if velocities and torques change their sign, else 1.
+    pub(super) fn direction(&self) -> f64 {
+        self.polarity.velocity() as f64
+    }
+}
+
+const INCREMENTS: Factors = Factors { position: Ratio::ONE, velocity: Ratio::ONE, acceleration: Ratio::ONE };
+
+/// The factors in increments of the encoder that is there: 608Fh is that of the drive that the table was read from, and
+/// only says what a turn is.
+fn in_increments(group: &FactorGroup, increments_per_turn: u32) -> Result<Factors, NoFactor> {
+    let factors = group.factors(increments_per_turn)?;
+    let Some([increments, turns]) = group.position_encoder_resolution else { return Ok(factors) };
+    let no_factor = NoFactor { index: 0x608F };
+    let resolution = Ratio::new(increments, turns).ok_or(no_factor)?;
+    let there = Ratio::new(increments_per_turn, 1).and_then(|there| there.over(resolution)).ok_or(no_factor)?;
+    let scaled = |factor: Ratio| factor.times(there).ok_or(no_factor);
+    Ok(Factors {
+        position: scaled(factors.position)?,
+        velocity: scaled(factors.velocity)?,
+        acceleration: scaled(factors.acceleration)?,
+    })
+}
+
+fn saturated(value: i64) -> i64 {
+    value.clamp(i64::from(i32::MIN), i64::from(i32::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_resolution_of_another_encoder_only_says_what_a_turn_is() {
+        // A drive of 10000 increments a turn, 36000 units of feed: on an encoder of 131072.
+        let group = FactorGroup {
+            position_encoder_resolution: Some([10_000, 1]),
+            feed_constant: Some([36_000, 1]),
+            ..FactorGroup::default()
+        };
+        assert_eq!(in_increments(&group, 131_072).unwrap().position.scale(36_000), 131_072);
+        // Without a feed a unit is an increment of that other encoder.
+        let bare = FactorGroup { feed_constant: None, ..group };
+        assert_eq!(in_increments(&bare, 131_072).unwrap().position.scale(10_000), 131_072);
+    }
+}

@@ -1,0 +1,283 @@
+//! One axis: its objects, who may move it, its loops, and what is told of it.
+//!
+//! [`sense`](Shaft::sense) and [`actuate`](Shaft::actuate) run every control period, [`supervise`](Shaft::supervise) every
+//! supervision period.
+
+mod commands;
+mod publish;
+mod targets;
+
+use canopen::od::Table;
+use cia402::{Dwell, ModeOfOperation, PowerState, SupportedModes};
+use devices::AxisDescription;
+use devices::servo::faults::row;
+use motion::set_points::SetPoints;
+
+pub(super) use commands::Written;
+
+use super::hardware::{AxisActuation, AxisSensors};
+use super::motor::{Motor, SUPERVISION_PERIOD_S};
+use super::parameters::Parameters;
+use super::slots::AxisSlots;
+use super::touch_probes::TouchProbes;
+use super::{Values, read};
+use crate::engine::actuator::overload::{Overload, OverloadLimits};
+use crate::engine::actuator::servo::{Servo, ServoGains, ServoLimits, ServoModel};
+use crate::engine::axis::{Demand, Feedback, Switches};
+use crate::engine::cia402::{PowerDrive, Targets};
+use crate::engine::faults::{FaultSet, exceeds, exceeds_with_hysteresis};
+
+/// How long a motor may carry how much more than its rated current. Assumed: the usual class of servo drives.
+const OVERLOAD_FROM: f32 = 1.15;
+const OVERLOAD_CURVE: [(f32, f32); 3] = [(1.15, 60.0), (2.0, 10.0), (3.0, 3.0)];
+/// Currents beyond this multiple of the power stage's own limit are no overload but a short circuit.
+const OVER_CURRENT: f32 = 1.5;
+/// Assumed: a winding of thermal class B with some reserve.
+const MOTOR_LIMIT_C: f32 = 120.0;
+const TEMPERATURE_HYSTERESIS_C: f32 = 10.0;
+/// Encoder and commutation tracks may disagree by this many electrical turns.
+const DISAGREEMENT_TURNS: f32 = 0.2;
+/// A shaft slower than this share of its highest speed stands, for the engine's stops.
+const STANDING_SHARE: f32 = 0.001;
+const SUPERVISION_MS: f64 = SUPERVISION_PERIOD_S as f64 * 1e3;
+
+/// One axis of the drive.
+#[derive(Clone)]
+pub(super) struct Shaft {
+    slots: AxisSlots,
+    /// What 6060h accepts.
+    modes: SupportedModes,
+    motor: Motor,
+    model: ServoModel,
+    gains: ServoGains,
+    parameters: Parameters,
+    parameters_changed: bool,
+    power: PowerDrive,
+    servo: Servo,
+    /// The sensors have been looked at since the restart.
+    awake: bool,
+    demand: Demand,
+    targets: Targets,
+    /// What is added to the counts since power-on to give the position.
+    position_offset: i32,
+    /// Where the index pulse came since the last supervision.
+    index: Option<i32>,
+    set_points: SetPoints,
+    /// The last set-point was beyond the software limits.
+    set_point_held: bool,
+    /// Since the last set-point, s; `None` before the first one of the mode.
+    set_point_age_s: Option<f64>,
+    overload: Overload,
+    reached: Dwell,
+    standing: Dwell,
+    outside: Dwell,
+    /// The following error has been outside its window for its time.
+    following_error: bool,
+    /// A limit holds a target back.
+    limited: bool,
+    probes: TouchProbes,
+}
+
+impl Shaft {
+    /// Motor free, position 0, and these values in effect.
+    pub(super) fn new(description: &AxisDescription, table: &'static Table, motor: Motor, values: &Values) -> Self {
+        let slots = AxisSlots::of(table, description.placement);
+        let parameters = Parameters::of(values, &slots, &motor);
+        let model = motor.model();
+        let declared = SupportedModes(read(values, slots.supported_modes, 0) as u32);
+        let described = description.modes.iter().fold(SupportedModes::default(), |modes, mode| modes.with(*mode));
+        Self {
+            slots,
+            modes: if slots.supported_modes.is_some() { declared } else { described },
+            motor,
+            model,
+            gains: motor.gains(),
+            parameters,
+            parameters_changed: false,
+            power: PowerDrive::new(&[]),
+            servo: Servo::new(&model, 0, 0),
+            awake: false,
+            demand: Demand::Off,
+            targets: Targets::default(),
+            position_offset: 0,
+            index: None,
+            set_points: SetPoints::resting(0.0),
+            set_point_held: false,
+            set_point_age_s: None,
+            overload: Overload::default(),
+            reached: Dwell::default(),
+            standing: Dwell::default(),
+            outside: Dwell::default(),
+            following_error: false,
+            limited: false,
+            probes: TouchProbes::default(),
+        }
+    }
+
+    pub(super) const fn slots(&self) -> &AxisSlots {
+        &self.slots
+    }
+
+    pub(super) const fn power(&self) -> &PowerDrive {
+        &self.power
+    }
+
+    pub(super) const fn parameters(&self) -> &Parameters {
+        &self.parameters
+    }
+
+    pub(super) const fn demand(&self) -> &Demand {
+        &self.demand
+    }
+
+    /// Position in increments.
+    pub(super) fn position(&self) -> i32 {
+        self.position_offset.wrapping_add(self.servo.position(&self.model))
+    }
+
+    pub(super) fn velocity_rpm(&self) -> f32 {
+        self.servo.velocity_rpm()
+    }
+
+    pub(super) const fn current_a(&self) -> f32 {
+        self.servo.current_a()
+    }
+
+    /// Every control period: the shaft's sensors. True if a phase carries more than the power stage bears.
+    pub(super) fn sense(&mut self, sensors: &AxisSensors) -> bool {
+        if !self.awake {
+            self.awake = true;
+            self.servo = Servo::new(&self.model, sensors.tracks, sensors.encoder_count);
+        }
+        self.servo.sense(&self.model, sensors.tracks, sensors.encoder_count);
+        if let Some(count) = sensors.index_count {
+            let since = sensors.encoder_count.wrapping_sub(count) as i16;
+            self.index = Some(self.position().wrapping_sub(i32::from(since)));
+        }
+        let [u, v] = sensors.phase_current_a;
+        let limit_a = OVER_CURRENT * self.motor.max_current_a;
+        [u, v, u + v].iter().any(|current_a| exceeds(current_a.abs(), limit_a))
+    }
+
+    /// Every control period: the power stage.
+    pub(super) fn actuate(&mut self, values: &Values, sensors: &AxisSensors, bus_v: f32) -> AxisActuation {
+        let energised = self.demand != Demand::Off;
+        let duty = energised.then(|| self.servo.modulate(&self.model, &self.gains, sensors.phase_current_a, bus_v));
+        let outputs = self.outputs(values);
+        AxisActuation { duty, brake_released: energised && !outputs.set_brake, outputs: outputs.manufacturer }
+    }
+
+    /// Every supervision period, first: parameters and what is measured.
+    pub(super) fn measure(&mut self, values: &Values, sensors: &AxisSensors) -> Feedback {
+        if self.parameters_changed {
+            self.parameters_changed = false;
+            self.parameters = Parameters::of(values, &self.slots, &self.motor);
+        }
+        self.servo.measure(&self.model, &self.gains, sensors.phase_current_a);
+        let velocity_rad_s = self.servo.velocity_rad_s();
+        Feedback {
+            position: self.position(),
+            velocity: f64::from(velocity_rad_s / self.model.rad_per_count()),
+            current_a: self.servo.current_a(),
+            standing: velocity_rad_s.abs() < STANDING_SHARE * self.motor.max_velocity_rad_s,
+        }
+    }
+
+    /// Then: the causes of faults that are present at this axis.
+    pub(super) fn causes(&mut self, sensors: &AxisSensors, latched: FaultSet) -> FaultSet {
+        let limits =
+            OverloadLimits { rated_a: self.motor.rated_current_a, begins_at: OVERLOAD_FROM, curve: OVERLOAD_CURVE };
+        let hot = latched.has(row::MOTOR_TEMPERATURE);
+        let misaligned = exceeds(self.servo.disagreement_turns().abs(), DISAGREEMENT_TURNS);
+        if misaligned {
+            self.servo.realign(&self.model, sensors.tracks, sensors.encoder_count);
+        }
+        FaultSet::NONE
+            .with(row::OVERLOAD, self.overload.update(&limits, self.servo.current_a(), SUPERVISION_PERIOD_S))
+            .with(
+                row::MOTOR_TEMPERATURE,
+                exceeds_with_hysteresis(sensors.motor_c, MOTOR_LIMIT_C, TEMPERATURE_HYSTERESIS_C, hot),
+            )
+            .with(row::ENCODER, !sensors.encoder_wired || misaligned || matches!(sensors.tracks & 7, 0 | 7))
+            .with(row::FOLLOWING_ERROR, self.following_error)
+    }
+
+    /// Last: demand, loops, and what is told of them.
+    pub(super) fn supervise(&mut self, values: &mut Values, sensors: &AxisSensors, feedback: Feedback, bus_v: f32) {
+        let index = self.index.take();
+        self.power.set_switches(Switches {
+            home: sensors.home,
+            positive_limit: sensors.positive_limit,
+            negative_limit: sensors.negative_limit,
+            index,
+        });
+        self.read_targets(values, &feedback);
+        let dt_s = f64::from(SUPERVISION_PERIOD_S);
+        let demand = self.power.update(feedback, &self.targets, &self.parameters.power, dt_s);
+        self.demand = match demand {
+            Some(demand) => demand,
+            None => self.power.idle(None, dt_s),
+        };
+        if let Some(home) = self.power.take_home() {
+            // Zero position = home position + home offset.
+            self.shift(home.wrapping_add(self.parameters.home_offset));
+        }
+        let position = self.position();
+        let limits = self.limits();
+        self.servo.control(&self.model, &self.gains, &self.demand, position, &limits);
+        let shown = self.parameters.scales.position(position);
+        let index = index.map(|at| self.parameters.scales.position(at));
+        self.probes.update(values, &self.slots, sensors.probes, shown, index);
+        self.judge(&feedback);
+        self.publish(values, sensors, bus_v);
+    }
+
+    /// The current limit of the direction that the motor pulls in.
+    fn limits(&self) -> ServoLimits {
+        let [positive_a, negative_a] = self.parameters.max_current_a;
+        let downwards = self.servo.setpoint_a() * self.parameters.scales.direction() as f32 <= 0.0;
+        ServoLimits {
+            current_a: if downwards { negative_a } else { positive_a },
+            velocity_rad_s: self.parameters.max_speed as f32 * self.model.rad_per_count(),
+        }
+    }
+
+    /// What was `by` is 0 from now on.
+    fn shift(&mut self, by: i32) {
+        self.power.shift_position(by);
+        self.set_points.shift(f64::from(by));
+        self.position_offset = self.position_offset.wrapping_sub(by);
+        if let Demand::Position(point) = &mut self.demand {
+            point.position = point.position.wrapping_sub(by);
+        }
+    }
+
+    /// Windows with their times.
+    fn judge(&mut self, feedback: &Feedback) {
+        let status = self.power.status(&self.targets, &self.parameters.power);
+        let time_ms = match self.power.mode() {
+            ModeOfOperation::PROFILE_POSITION => self.parameters.position_window.time_ms,
+            ModeOfOperation::PROFILE_VELOCITY => self.parameters.velocity_window.1,
+            _ => 0,
+        };
+        let _ = self.reached.update(status.target_reached, time_ms, SUPERVISION_MS);
+        let (threshold, time_ms) = self.parameters.velocity_threshold;
+        let _ = self.standing.update(feedback.velocity.abs() <= threshold, time_ms, SUPERVISION_MS);
+        let window = self.parameters.following_error;
+        let outside = self.error().is_some_and(|error| !window.holds(error));
+        self.following_error = self.outside.update(outside, window.time_ms, SUPERVISION_MS);
+    }
+
+    /// Following error in increments, while a position is followed.
+    fn error(&self) -> Option<i64> {
+        match &self.demand {
+            Demand::Position(point) => Some(i64::from(point.position.wrapping_sub(self.position()))),
+            _ => None,
+        }
+    }
+
+    /// Operation enabled, with no fault on its way.
+    fn is_enabled(&self) -> bool {
+        self.power.state() == PowerState::OperationEnabled
+    }
+}

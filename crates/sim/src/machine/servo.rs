@@ -1,0 +1,361 @@
+//! A described servo on its hardware: a motor with encoder, index pulse, brake, switches, supply and memory for each axis.
+//!
+//! The motor is chosen by the order (`motor=sgmah-04a-brake`). What a description has and the firmware does not act on:
+//! [`without_effect`].
+
+use canopen::Mux;
+use devices::Description;
+use devices::servo::variations::VARIATIONS;
+use devices::variant::Pick;
+use drives::node::{MEMORY_SIZE, Memory};
+use drives::servo::{
+    Actuation, AxisActuation, AxisSensors, Hardware, MAX_AXES, Motor, Sensors, ServoDrive, acts_on, conditions,
+};
+use plant::angle::Angle;
+use plant::encoder::EncoderFault;
+use plant::hall::HallFault;
+use plant::hub_motor::{self, HubMotor, HubMotorModel, Inverter};
+use plant::mechanics::RotorData;
+use plant::pmsm::Phase;
+use plant::rig::{Rig, RigModel};
+use plant::supply::SupplyData;
+
+use super::Machine;
+use super::assembly::{AMBIENT_C, Assembly, with_demand};
+use super::order::{Order, OrderError};
+use super::quantity::Quantity;
+use super::realism::{
+    HUB_COGGING, LARGE_CURRENT_STEP_A, Noise, Realism, TEMPERATURE_STEP_C, VOLTAGE_STEP_V, with_dead_time,
+};
+use super::{kept, order};
+use crate::{Brake, Component, Levels, Refused, Report, VirtualDrive};
+
+const WITH_BRAKE: Pick = Pick::of(VARIATIONS, "motor", "sgmah-04a-brake");
+const WHEEL: Pick = Pick::of(VARIATIONS, "motor", "zllg65asm250-l");
+
+/// Where the rotor stands when it is put together: not at its index pulse.
+const FIRST_TURNS: f64 = 0.3;
+
+const OUTPUTS: &[&str] = &["brake released"];
+
+/// What has been destroyed, and what to do about it.
+const SEIZED: &str = "bearings seized by over-speed: 'rotor free' puts in new ones";
+const BURNT: &str = "power stage burnt: 'fault bridge off' puts in a new one, 'power cycle' starts it";
+
+/// A described servo, as a station of a world.
+pub type ServoMachine = Machine<ServoBench>;
+
+/// A servo of this description as ordered, without power.
+///
+/// # Errors
+/// [`OrderError`] if a value cannot be in its parameter store.
+pub fn servo(model: &'static Description, order: &Order) -> Result<ServoMachine, OrderError> {
+    let memory = order::memory(model, order)?;
+    let hardware = hardware(order, memory);
+    let profile = kept::profile(model, conditions(model));
+    let bench = ServoBench::new(model, &kit(order), hardware);
+    Ok(Machine::new(ServoDrive::new(model, profile, &hardware), bench))
+}
+
+pub(super) fn ordered(model: &'static Description, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
+    Ok(Box::new(servo(model, order)?))
+}
+
+/// The objects that a description has and the firmware does not act on: they are stored and answered, and have no effect.
+pub fn without_effect(model: &Description) -> impl Iterator<Item = Mux> {
+    let rows = model.dictionary.rows().iter().map(canopen::od::Entry::mux);
+    rows.filter(|mux| !acts_on(model, *mux))
+}
+
+/// A motor with the figures that its data sheet has beyond the model's.
+struct Kit {
+    model: HubMotorModel,
+    rated_torque_nm: f64,
+    rated_current_a_rms: f64,
+    max_current_a_rms: f64,
+    max_rpm: f64,
+    bus_v: f64,
+}
+
+fn kit(order: &Order) -> Kit {
+    if order.variant.is(WHEEL) {
+        // "Rated 6 N m at 6 A, peak 18 A"; 521 r/min at 48 V.
+        return Kit {
+            model: HubMotorModel::ZLLG65ASM250_L,
+            rated_torque_nm: 6.0,
+            rated_current_a_rms: 6.0,
+            max_current_a_rms: 18.0,
+            max_rpm: 500.0,
+            bus_v: 48.0,
+        };
+    }
+    let with_brake = order.variant.is(WITH_BRAKE);
+    Kit {
+        model: if with_brake { HubMotorModel::SGMAH_04A_BRAKE } else { HubMotorModel::SGMAH_04A },
+        rated_torque_nm: 1.27,
+        rated_current_a_rms: 2.8,
+        max_current_a_rms: 8.5,
+        max_rpm: 5000.0,
+        bus_v: 283.0,
+    }
+}
+
+fn hardware(order: &Order, memory: Memory) -> Hardware {
+    let Kit { model, rated_torque_nm, rated_current_a_rms, max_current_a_rms, max_rpm, bus_v } = kit(order);
+    let amplitude = |rms: f64| (rms * core::f64::consts::SQRT_2) as f32;
+    let bleeder = model.rig.supply.bleeder;
+    let motor = Motor {
+        pole_pairs: model.pmsm.pole_pairs,
+        increments_per_turn: model.encoder.counts_per_turn(),
+        resistance_ohm: model.pmsm.resistance_ohm as f32,
+        inductance_h: model.pmsm.inductance_q_h as f32,
+        flux_linkage_wb: model.pmsm.flux_linkage_wb as f32,
+        inertia_kg_m2: model.rotor.inertia_kg_m2 as f32,
+        rated_torque_nm: rated_torque_nm as f32,
+        rated_current_a: amplitude(rated_current_a_rms),
+        max_current_a: amplitude(max_current_a_rms),
+        max_velocity_rad_s: (max_rpm * core::f64::consts::TAU / 60.0) as f32,
+        braking_ohm: bleeder.resistance_ohm as f32,
+        braking_w: bleeder.rated_power_w as f32,
+        bus_v: bus_v as f32,
+    };
+    Hardware { node_id: order.node, bitrate: order.bitrate, motors: [motor; MAX_AXES], memory }
+}
+
+/// Motors, loads, supply and memory of a described servo.
+#[derive(Clone, Debug)]
+pub struct ServoBench {
+    name: &'static str,
+    motors: Vec<HubMotor>,
+    /// The counter of each motor where its index pulse came in the last period.
+    indexes: Vec<Option<u16>>,
+    hardware: Hardware,
+    store_broken: bool,
+    dead_time: bool,
+    last: Actuation,
+}
+
+impl ServoBench {
+    /// At rest at ambient temperature, the supply not yet connected.
+    fn new(model: &Description, kit: &Kit, hardware: Hardware) -> Self {
+        let mut motor = HubMotor::new(kit.model, Angle::from_turns(FIRST_TURNS), kit.bus_v, AMBIENT_C);
+        motor.rig.supply = SupplyData::switched_off(kit.bus_v);
+        let count = model.axes.len().clamp(1, MAX_AXES);
+        Self {
+            name: model.name,
+            motors: vec![motor; count],
+            indexes: vec![None; count],
+            hardware,
+            store_broken: false,
+            dead_time: false,
+            last: Actuation::default(),
+        }
+    }
+
+    /// The motor of an axis and all that is joined to it.
+    pub fn motor(&self, axis: usize) -> Option<&HubMotor> {
+        self.motors.get(axis)
+    }
+
+    /// The motor of an axis and all that is joined to it, to change.
+    pub fn motor_mut(&mut self, axis: usize) -> Option<&mut HubMotor> {
+        self.motors.get_mut(axis)
+    }
+
+    fn first(&self) -> &HubMotor {
+        &self.motors[0]
+    }
+
+    fn damage(&self) -> Option<&'static str> {
+        let seized = self.motors.iter().any(HubMotor::is_seized).then_some(SEIZED);
+        self.motors.iter().any(HubMotor::is_power_stage_burnt).then_some(BURNT).or(seized)
+    }
+
+    fn sense_axis(&self, axis: usize, inputs: u32) -> AxisSensors {
+        let Some(motor) = self.motors.get(axis) else { return AxisSensors::default() };
+        let sensed = motor.sense();
+        let level = |input: usize| inputs >> (axis * SWITCHES + input) & 1 != 0;
+        AxisSensors {
+            encoder_count: sensed.encoder_count,
+            index_count: self.indexes[axis],
+            encoder_wired: motor.encoder.fault != EncoderFault::Disconnected,
+            tracks: sensed.hall,
+            phase_current_a: [sensed.phase_current_a[0] as f32, sensed.phase_current_a[1] as f32],
+            motor_c: sensed.winding_c as f32,
+            negative_limit: level(0),
+            positive_limit: level(1),
+            home: level(2),
+            probes: [level(3), level(4)],
+        }
+    }
+
+    /// The source and its switch are those of the first axis; each power stage has its own bus behind it.
+    fn share_source(&mut self) {
+        let Some((first, others)) = self.motors.split_first_mut() else { return };
+        let supply = first.rig.supply;
+        for motor in others {
+            motor.rig.supply.source_v = supply.source_v;
+            if motor.rig.supply.connected != supply.connected {
+                motor.rig.switch_source(&motor.model.rig, supply.connected);
+            }
+        }
+    }
+
+    fn step_axis(&mut self, axis: usize, actuation: &AxisActuation, bleeder_on: bool) {
+        let dead_time = self.dead_time;
+        let motor = &mut self.motors[axis];
+        let inverter = match actuation.duty.map(|duty| duty.map(f64::from)) {
+            None => Inverter::Open,
+            Some(duty) if dead_time => Inverter::Driven(with_dead_time(duty, motor.sense().phase_current_a)),
+            Some(duty) => Inverter::Driven(duty),
+        };
+        let before = motor.rotor.angle.turns();
+        let pins = hub_motor::Actuation { inverter, bleeder_on, brake_released: actuation.brake_released };
+        motor.step(Self::PERIOD_S, &pins);
+        self.indexes[axis] = index_count(motor, before);
+    }
+}
+
+/// The counter where the index pulse came, if the shaft has passed a whole turn since it stood in turn `before`.
+fn index_count(motor: &HubMotor, before: i64) -> Option<u16> {
+    let angle = motor.rotor.angle;
+    let turns = angle.turns();
+    if turns == before {
+        return None;
+    }
+    let per_turn = motor.model.encoder.counts_per_turn();
+    let beyond = angle.count(per_turn) - turns.max(before) * i64::from(per_turn);
+    Some(motor.encoder.count.wrapping_sub(beyond as u16))
+}
+
+/// Inputs of one axis.
+const SWITCHES: usize = 5;
+
+impl Assembly for ServoBench {
+    type Firmware = ServoDrive;
+
+    const MODEL: &'static str = "cia402";
+    const INPUTS: &'static [&'static str] =
+        &["NEG", "POS", "HOME", "P1", "P2", "NEG2", "POS2", "HOME2", "P1_2", "P2_2"];
+    const STARTS_AT_V: f64 = 24.0;
+    const STOPS_BELOW_V: f64 = 18.0;
+    const SUPPLY_VOLTAGE: Quantity = Quantity { what: "supply", expected: "0 to 450 V", least: 0.0, greatest: 450.0 };
+
+    fn model(&self) -> &'static str {
+        self.name
+    }
+
+    fn hardware(&self) -> Hardware {
+        self.hardware
+    }
+
+    fn sense(&self, inputs: u32) -> Sensors {
+        let first = self.first();
+        let mut at = 0;
+        let axes = [(); MAX_AXES].map(|()| {
+            at += 1;
+            self.sense_axis(at - 1, inputs)
+        });
+        Sensors {
+            axes,
+            bus_v: first.rig.supply.bus_v as f32,
+            drive_c: first.rig.heat_sink.temperature_c as f32,
+            store_ok: !self.store_broken,
+        }
+    }
+
+    fn set_realism(&mut self, realism: Realism) {
+        self.dead_time = realism == Realism::Full;
+        let cogging = self.dead_time.then_some(HUB_COGGING);
+        self.motors.iter_mut().for_each(|motor| motor.cogging = cogging);
+    }
+
+    fn disturb(&self, sensors: &mut Sensors, noise: &mut Noise) {
+        for (axis, motor) in sensors.axes.iter_mut().zip(&self.motors) {
+            let off = noise.misplaced_edge(motor.rotor.angle, motor.model.encoder.counts_per_turn());
+            axis.encoder_count = axis.encoder_count.wrapping_add_signed(off);
+            axis.phase_current_a = axis.phase_current_a.map(|a| noise.flicker(a, LARGE_CURRENT_STEP_A));
+            axis.motor_c = noise.flicker(axis.motor_c, TEMPERATURE_STEP_C);
+        }
+        sensors.bus_v = noise.flicker(sensors.bus_v, VOLTAGE_STEP_V);
+        sensors.drive_c = noise.flicker(sensors.drive_c, TEMPERATURE_STEP_C);
+    }
+
+    fn step(&mut self, actuation: &Actuation) {
+        self.last = *actuation;
+        self.share_source();
+        for axis in 0..self.motors.len() {
+            self.step_axis(axis, &actuation.axes[axis], actuation.bleeder_on);
+        }
+    }
+
+    /// Behind a burnt power stage there is no voltage.
+    fn supplies_firmware(&self, running: bool) -> bool {
+        let least_v = if running { Self::STOPS_BELOW_V } else { Self::STARTS_AT_V };
+        !self.first().is_power_stage_burnt() && self.first().rig.supply.bus_v >= least_v
+    }
+
+    fn shaft_and_rig(&self) -> (&RotorData, &Rig) {
+        (&self.first().rotor, &self.first().rig)
+    }
+
+    fn rig_mut(&mut self) -> &mut Rig {
+        &mut self.motors[0].rig
+    }
+
+    fn rig_and_model_mut(&mut self) -> (&mut Rig, &mut RigModel) {
+        let first = &mut self.motors[0];
+        (&mut first.rig, &mut first.model.rig)
+    }
+
+    fn report(&self, firmware: &ServoDrive, common: Report) -> Report {
+        let counts_per_turn = f64::from(self.first().model.encoder.counts_per_turn());
+        let released = self.last.axes[0].brake_released;
+        let report = Report {
+            statusword: common.powered.then(|| firmware.statusword()).flatten(),
+            outputs: Levels::new(OUTPUTS, &[released]),
+            damage: self.damage(),
+            brake: Some(if released { Brake::Released } else { Brake::Engaged }),
+            ..common
+        };
+        match firmware.demand(0) {
+            Some(demand) => with_demand(demand, |counts_s| counts_s * 60.0 / counts_per_turn, report),
+            None => report,
+        }
+    }
+
+    fn shaft_counts(&self) -> i64 {
+        let first = self.first();
+        first.rotor.angle.count(first.model.encoder.counts_per_turn())
+    }
+
+    fn image(&self) -> &[u8] {
+        self.hardware.memory.bytes()
+    }
+
+    fn keep_image(&mut self, image: &[u8]) {
+        self.hardware.memory = Memory::from_bytes(&image[..image.len().min(MEMORY_SIZE)]);
+    }
+
+    fn set_rotor_locked(&mut self, locked: bool) {
+        self.motors.iter_mut().for_each(|motor| motor.lock_rotor(locked));
+    }
+
+    fn set_fault(&mut self, component: Component, broken: bool) -> Result<(), Refused> {
+        let motor = &mut self.motors[0];
+        match component {
+            Component::Hall => motor.hall_fault = if broken { HallFault::Disconnected } else { HallFault::None },
+            Component::Encoder => {
+                motor.encoder.fault = if broken { EncoderFault::Disconnected } else { EncoderFault::None };
+            }
+            Component::Eeprom => self.store_broken = broken,
+            Component::Phase => motor.lost_phase = broken.then_some(Phase::U),
+            Component::Bridge if broken => motor.burn_power_stage(),
+            Component::Bridge => motor.mend_power_stage(),
+            Component::Short | Component::Reference => {
+                return Err(Refused::Absent { model: self.name, what: "such component" });
+            }
+        }
+        Ok(())
+    }
+}

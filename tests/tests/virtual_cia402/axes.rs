@@ -1,0 +1,111 @@
+//! Two axes on one node: by CiA 402's index offset of 800h, and at a second sub-index as some makers have it.
+
+use canopen::Mux;
+use canopen::od::{Entry, Table};
+use devices::servo::{CIA402, MODES, axis};
+use devices::{AxisDescription, Description, Placement};
+
+use crate::bench::{Bench, TURN};
+
+fn leak<T>(value: T) -> &'static T {
+    Box::leak(Box::new(value))
+}
+
+fn table(mut rows: Vec<Entry>) -> &'static Table {
+    rows.sort_by_key(|row| row.mux().key());
+    let rows: &'static [Entry] = rows.leak();
+    let keys: &'static [u32] = rows.iter().map(|row| row.mux().key()).collect::<Vec<_>>().leak();
+    leak(Table::new(rows, keys))
+}
+
+fn described(name: &'static str, dictionary: &'static Table, axes: [AxisDescription; 2]) -> &'static Description {
+    leak(Description { name, dictionary, axes: leak(axes), ..CIA402 })
+}
+
+fn by_offset() -> &'static Description {
+    let rows = CIA402.dictionary.rows();
+    let second = rows.iter().filter(|row| row.index >= 0x6000).map(|row| Entry { index: row.index + 0x800, ..*row });
+    let both = rows.iter().copied().chain(second).collect();
+    let axes = [axis(Placement::FIRST, MODES), axis(Placement::IndexOffset(0x800), MODES)];
+    described("two-axes-by-offset", table(both), axes)
+}
+
+/// Each object of sub-index 0 has the first axis at sub-index 1 and the second at 2; records are shared.
+fn by_sub_index() -> &'static Description {
+    let rows = CIA402.dictionary.rows();
+    let is_record = |index: u16| rows.iter().any(|row| row.index == index && row.sub_index > 0);
+    let placed = rows.iter().flat_map(|row| {
+        let twice = row.index >= 0x6000 && row.sub_index == 0 && !is_record(row.index);
+        let at = if twice { vec![1, 2] } else { vec![row.sub_index] };
+        at.into_iter().map(|sub_index| Entry { sub_index, ..*row })
+    });
+    let side = |sub_index| axis(Placement::SubIndex { sub_index, shared: &[] }, MODES);
+    // What is mapped as delivered is elsewhere here.
+    let unmapped = placed.map(|row| match row.index {
+        0x1600..=0x1603 | 0x1A00..=0x1A03 => row.default(0),
+        _ => row,
+    });
+    described("two-axes-by-sub-index", table(unmapped.collect()), [side(1), side(2)])
+}
+
+/// Enables both axes in profile velocity and turns them apart.
+fn check(mut bench: Bench) {
+    let description = bench.machine.firmware().description();
+    let axes = description.axes;
+    let place = |axis: usize, index: u16| {
+        let Mux { index, sub_index } = axes[axis].placement.place(Mux::new(index, 0));
+        (index, sub_index)
+    };
+    for (axis, speed) in [(0, 10), (1, -5)] {
+        let write = |bench: &mut Bench, index, value| {
+            let (index, sub) = place(axis, index);
+            bench.set(&[(index, sub, value)]);
+        };
+        write(&mut bench, 0x6060, 3);
+        for word in [0x06, 0x07, 0x0F] {
+            write(&mut bench, 0x6040, word);
+        }
+        write(&mut bench, 0x60FF, speed * TURN);
+    }
+    bench.run_ms(500);
+    for (axis, rpm) in [(0, 600.0), (1, -300.0)] {
+        let motor = bench.machine.assembly().motor(axis).unwrap();
+        let turning = motor.rotor.velocity_rad_s * 60.0 / std::f64::consts::TAU;
+        assert!((turning - rpm).abs() < 8.0, "axis {axis}: {turning}");
+        let (index, sub) = place(axis, 0x606C);
+        assert!((bench.read(index, sub) as f64 / TURN as f64 * 60.0 - rpm).abs() < 8.0, "axis {axis}");
+    }
+    // A quick stop of one leaves the other alone.
+    let (index, sub) = place(1, 0x6040);
+    bench.set(&[(index, sub, 0x02)]);
+    bench.run_ms(300);
+    let speed = |bench: &Bench, axis| bench.machine.assembly().motor(axis).unwrap().rotor.velocity_rad_s;
+    assert!(speed(&bench, 0) > 60.0 && speed(&bench, 1).abs() < 0.5);
+    let (index, sub) = place(1, 0x6041);
+    assert_eq!(bench.read(index, sub) & 0x4F, 0x40);
+}
+
+#[test]
+fn two_axes_800h_apart_run_apart() {
+    check(Bench::of(by_offset()));
+}
+
+#[test]
+fn two_axes_at_two_sub_indexes_run_apart() {
+    check(Bench::of(by_sub_index()));
+}
+
+#[test]
+fn what_both_axes_need_stops_both() {
+    let mut bench = Bench::of(by_offset());
+    for index in [0x6040, 0x6840] {
+        bench.set(&[(index, 0, 0x06), (index, 0, 0x07), (index, 0, 0x0F)]);
+    }
+    sim::VirtualDrive::hold_temperature(&mut bench.machine, sim::TemperatureSensor::Driver, Some(120.0), bench.now)
+        .unwrap();
+    bench.run_ms(100);
+    for (status, error) in [(0x6041, 0x603F), (0x6841, 0x683F)] {
+        assert_eq!((bench.read(status, 0) & 0x4F, bench.read(error, 0)), (0x08, 0x4210));
+    }
+    assert_eq!(bench.emcy(), [0x4210], "told once");
+}

@@ -1,0 +1,166 @@
+//! The modes that follow something at all times: torque, interpolated position, and the cyclic synchronous ones.
+
+use crate::bench::{Bench, TURN};
+use sim::VirtualDrive;
+
+/// Sends a set-point and SYNC every millisecond, and hands each period on.
+fn cycle(bench: &mut Bench, periods: i64, mut set: impl FnMut(&mut Bench, i64)) {
+    for period in 0..periods {
+        set(bench, period);
+        bench.sync();
+        bench.run_ms(1);
+    }
+}
+
+/// RPDO3 (controlword and target position), sent with each SYNC.
+fn map_cyclic_position(bench: &mut Bench) {
+    bench.set(&[(0x1402, 1, 0x8000_0405), (0x1402, 2, 1), (0x1402, 1, 0x405)]);
+}
+
+fn rpdo3(bench: &mut Bench, controlword: u16, position: i64) {
+    let [a, b] = controlword.to_le_bytes();
+    let p: String = (position as i32).to_le_bytes().iter().map(|byte| format!("{byte:02X}")).collect();
+    bench.frame(&format!("405#{a:02X}{b:02X}{p}"));
+}
+
+/// A ramp of velocity and then a steady one, in increments after so many milliseconds.
+fn way(ms: i64) -> i64 {
+    // 10 turns/s after 100 ms.
+    let (ramp, speed) = (100, 10.0 * TURN as f64 / 1000.0);
+    let t = ms.min(ramp) as f64;
+    (speed * t * t / (2.0 * ramp as f64) + speed * (ms - ramp).max(0) as f64).round() as i64
+}
+
+#[test]
+fn cyclic_position_follows_the_set_points_one_period_late() {
+    let mut bench = Bench::new();
+    map_cyclic_position(&mut bench);
+    bench.enable(8);
+    assert_eq!(bench.status() & 0x1000, 0, "nothing to follow yet");
+    let mut worst = 0;
+    cycle(&mut bench, 400, |bench, period| {
+        rpdo3(bench, 0x0F, way(period));
+        if period > 150 {
+            let lag = way(period - 1) - bench.read(0x6062, 0);
+            worst = worst.max(lag.abs());
+        }
+    });
+    assert!(bench.has(0x1000), "{:04X}", bench.status());
+    // The demand is looked at between two supervision periods: half a millisecond at 1311 increments each.
+    assert!(worst <= 1400, "{worst}");
+    assert!((bench.rpm() - 600.0).abs() < 6.0, "{}", bench.rpm());
+    let error = bench.read(0x60F4, 0);
+    assert!(error.abs() < TURN / 100, "{error}");
+}
+
+#[test]
+fn a_missed_set_point_is_bridged_and_silence_stops_the_motion() {
+    let mut bench = Bench::new();
+    map_cyclic_position(&mut bench);
+    bench.enable(8);
+    cycle(&mut bench, 300, |bench, period| rpdo3(bench, 0x0F, way(period)));
+    let before = bench.rpm();
+    bench.run_ms(1);
+    cycle(&mut bench, 50, |bench, period| rpdo3(bench, 0x0F, way(period + 301)));
+    assert!((bench.rpm() - before).abs() < 20.0, "{} {before}", bench.rpm());
+    assert!(bench.emcy().is_empty());
+    bench.run_ms(500);
+    assert!(bench.rpm().abs() < 1.0, "{}", bench.rpm());
+    assert_eq!(bench.status() & 0x6F, 0x27);
+}
+
+#[test]
+fn cyclic_velocity_and_its_offset_add_up() {
+    let mut bench = Bench::new();
+    bench.enable(9);
+    bench.set(&[(0x60FF, 0, 10 * TURN), (0x60B1, 0, 5 * TURN)]);
+    bench.run_ms(200);
+    assert!((bench.rpm() - 900.0).abs() < 9.0, "{}", bench.rpm());
+    assert!(bench.has(0x1000));
+    // Never faster than 6080h: 5000 r/min.
+    bench.set(&[(0x607F, 0, 0xFFFF_FFFF), (0x60FF, 0, 200 * TURN)]);
+    bench.run_ms(500);
+    assert!((bench.rpm() - 5000.0).abs() < 50.0, "{}", bench.rpm());
+    assert!(bench.has(0x0800), "internal limit");
+}
+
+#[test]
+fn torque_is_thousandths_of_the_rated_one_and_accelerates_as_newton_has_it() {
+    for mode in [4, 10] {
+        let mut bench = Bench::new();
+        // Ten times the rotor's inertia, so that the speed is not there at once.
+        let inertia = 10.0 * bench.machine.assembly().motor(0).unwrap().model.rotor.inertia_kg_m2;
+        bench.machine.assembly_mut().motor_mut(0).unwrap().rig.load.inertia_kg_m2 = inertia;
+        bench.set(&[(0x6087, 0, 0)]);
+        bench.enable(mode);
+        bench.set(&[(0x6071, 0, 500)]);
+        bench.run_ms(5);
+        let before = bench.rpm();
+        bench.run_ms(20);
+        let acceleration = (bench.rpm() - before) * std::f64::consts::TAU / 60.0 / 0.020;
+        let rotor = bench.machine.assembly().motor(0).unwrap().model.rotor;
+        let expected = (0.5 * 1.27 - rotor.coulomb_nm) / (11.0 * rotor.inertia_kg_m2);
+        assert!((acceleration / expected - 1.0).abs() < 0.05, "mode {mode}: {acceleration} {expected}");
+        let torque = bench.read(0x6077, 0);
+        assert!((torque - 500).abs() < 15, "{torque}");
+    }
+}
+
+#[test]
+fn torque_rises_along_its_slope_and_keeps_to_its_limits() {
+    let mut bench = Bench::new();
+    bench.machine.set_rotor_locked(true, bench.now).unwrap();
+    bench.set(&[(0x6087, 0, 5000), (0x60E0, 0, 600), (0x6072, 0, 900)]);
+    bench.enable(4);
+    bench.set(&[(0x6071, 0, 1000)]);
+    bench.run_ms(60);
+    let rising = bench.read(0x6077, 0);
+    assert!((rising - 300).abs() < 30, "5000 a second for 60 ms: {rising}");
+    bench.run_ms(400);
+    let held = bench.read(0x6077, 0);
+    assert!((held - 600).abs() < 15, "60E0h: {held}");
+    bench.set(&[(0x6071, 0, -1000)]);
+    bench.run_ms(800);
+    let held = bench.read(0x6077, 0);
+    assert!((held + 900).abs() < 15, "6072h: {held}");
+}
+
+#[test]
+fn interpolation_runs_while_bit_4_is_set() {
+    let mut bench = Bench::new();
+    bench.enable(7);
+    cycle(&mut bench, 50, |bench, period| bench.set(&[(0x60C1, 1, way(period))]));
+    assert!(!bench.has(0x1000) && bench.position().abs() < 100, "bit 4 is not set");
+    let start = bench.position();
+    bench.control(0x1F);
+    cycle(&mut bench, 300, |bench, period| bench.set(&[(0x60C1, 1, start + way(period))]));
+    assert!(bench.has(0x1000), "{:04X}", bench.status());
+    assert!((bench.rpm() - 600.0).abs() < 6.0, "{}", bench.rpm());
+    bench.control(0x0F);
+    bench.run_ms(300);
+    assert!(bench.rpm().abs() < 1.0 && !bench.has(0x1000));
+}
+
+#[test]
+fn a_cubic_path_is_as_late_as_one_more_set_point() {
+    let mut bench = Bench::new();
+    bench.set(&[(0x60C0, 0, -1), (0x60C2, 1, 4)]);
+    bench.enable(8);
+    for period in 0..150 {
+        bench.set(&[(0x607A, 0, way(period * 4))]);
+        bench.run_ms(4);
+    }
+    let late = way(149 * 4) - bench.read(0x6062, 0);
+    // One period of 4 ms behind the last set-point, which came 4 ms ago, at 1311 increments a millisecond.
+    assert!((late - 4 * 1311).abs() < 1311, "{late}");
+    assert!((bench.rpm() - 600.0).abs() < 6.0, "{}", bench.rpm());
+}
+
+#[test]
+fn modes_that_6502h_does_not_name_are_refused() {
+    let mut bench = Bench::new();
+    for mode in [2, 5, 11, -1] {
+        assert_eq!(bench.write(0x6060, 0, mode), Err(canopen::AbortCode::INVALID_VALUE), "{mode}");
+    }
+    assert_eq!(bench.read(0x6060, 0), 0);
+}
