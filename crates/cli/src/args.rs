@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    completions, demo, drive, dump, eds, home, motion, nmt, objects, readings, scan, sdo, sim, store,
+    completions, dcf, demo, drive, dump, eds, home, motion, nmt, objects, readings, scan, sdo, sim, store,
 };
 use crate::global::Global;
 
@@ -30,6 +30,7 @@ pub(crate) enum Command {
     Objects(objects::Objects),
     Readings(readings::Readings),
     Eds(eds::Eds),
+    Dcf(dcf::Dcf),
     Nmt(nmt::Nmt),
     State(drive::State),
     Enable(drive::Enable),

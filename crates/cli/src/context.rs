@@ -144,6 +144,13 @@ impl Context {
         }
     }
 
+    /// Tells people something beside what the command prints; programs read the report.
+    pub(crate) fn tell(&self, text: &str) {
+        if !self.json {
+            self.progress.note(text);
+        }
+    }
+
     /// A drive that is to be stopped: as what the user takes it for, be that right or wrong.
     pub(crate) async fn drive_to_stop(&self, id: NodeId) -> Result<Drive, Failure> {
         match self.told_model(id) {

@@ -163,6 +163,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         },
         Command::Readings(readings) => print(format, &readings.list()?),
         Command::Eds(eds) => eds.run(format),
+        Command::Dcf(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Dump(dump) => dump.run(global, format),
         Command::Completions(completions) => completions.run(&mut Cli::command()),
     }

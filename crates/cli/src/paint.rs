@@ -10,7 +10,6 @@ pub(crate) struct Paint {
 
 impl Paint {
     /// Never colours.
-    #[cfg(test)]
     pub(crate) const OFF: Self = Self { on: false };
 
     /// Colours if `stream` is a terminal and the user did not forbid it (NO_COLOR, TERM=dumb).

@@ -1,6 +1,7 @@
 //! The commands, one file each (commands that share everything but a word share a file).
 
 pub(crate) mod completions;
+pub(crate) mod dcf;
 pub(crate) mod demo;
 pub(crate) mod departures;
 pub(crate) mod drive;

@@ -32,6 +32,16 @@ impl DriveSpec {
         Order { node: self.node, bitrate, variant: self.variant, presets: self.presets.clone() }
     }
 
+    /// What was chosen for it.
+    pub(crate) const fn variant(&self) -> Variant {
+        self.variant
+    }
+
+    /// The values that objects have at power-on besides.
+    pub(crate) fn presets(&self) -> &[Preset] {
+        &self.presets
+    }
+
     /// Takes one option: a choice of the model's (`firmware=2.01`, `reading=Z050:prose` or `Z050=prose`), or the value that an
     /// object has at power-on (`6060=3`, `2030:02=9`).
     pub(crate) fn set(&mut self, key: &str, value: &str) -> Result<(), String> {

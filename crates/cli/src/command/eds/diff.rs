@@ -1,7 +1,5 @@
 //! `ferrodrive eds diff`: in what two files differ.
 
-use std::path::PathBuf;
-
 use canopen::Mux;
 use eds::{Difference, diff};
 use serde::Serialize;
@@ -13,15 +11,17 @@ use crate::paint::Paint;
 use crate::plain::plain;
 use crate::table::Table;
 
-/// Compare two EDS or DCF files: objects, types, access, defaults, limits, PDOs
+/// Compare two EDS or DCF files, or one with a model: objects, types, access, defaults, limits, PDOs
 ///
 /// Of a DCF the values count, where it has some. Names are not compared.
 #[derive(clap::Args)]
 pub(crate) struct Diff {
-    /// EDS or DCF file
-    first: PathBuf,
-    /// EDS or DCF file
-    second: PathBuf,
+    /// EDS or DCF file, or a model
+    #[arg(value_name = "FILE|MODEL")]
+    first: String,
+    /// EDS or DCF file, or a model
+    #[arg(value_name = "FILE|MODEL")]
+    second: String,
 }
 
 /// What differs.
@@ -45,10 +45,10 @@ struct Row {
 impl Diff {
     /// Reads both and compares them.
     pub(super) fn run(&self) -> Result<DiffReport, Failure> {
-        let (first, second) = (source::reading(&self.first)?.eds, source::reading(&self.second)?.eds);
+        let (first, second) = (source::sheet(&self.first)?, source::sheet(&self.second)?);
         Ok(DiffReport {
-            first: self.first.display().to_string(),
-            second: self.second.display().to_string(),
+            first: self.first.clone(),
+            second: self.second.clone(),
             differences: diff(&first, &second).into_iter().map(Row::of).collect(),
         })
     }

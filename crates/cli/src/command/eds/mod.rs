@@ -1,25 +1,31 @@
-//! `ferrodrive eds`: data sheets of devices as files (CiA 306): look into them, check them, compare them.
+//! `ferrodrive eds`: data sheets of devices as files (CiA 306): write that of a model, look into files, check and compare
+//! them.
 
 mod diff;
 mod lint;
+mod sheet;
 mod show;
-mod source;
+pub(crate) mod source;
 
 use clap::Subcommand;
 
 use crate::failure::Failure;
 use crate::output::{Format, Report};
 
-/// Check, show and compare EDS and DCF files (CiA 306)
+/// Write the EDS of a model; check, show and compare EDS and DCF files (CiA 306)
 #[derive(clap::Args)]
 #[command(
     arg_required_else_help = true,
-    after_help = "Examples:\n  ferrodrive eds lint vendor.eds\n  ferrodrive eds show vendor.eds 6040\n  \
-                  ferrodrive eds diff vendor.eds vendor.dcf"
+    args_conflicts_with_subcommands = true,
+    after_help = "Examples:\n  ferrodrive eds zlac8030l > zlac8030l.eds\n  ferrodrive eds zlac8030l defaults=eds --node 4\n  \
+                  ferrodrive eds lint vendor.eds\n  ferrodrive eds show vendor.eds 6040\n  \
+                  ferrodrive eds diff vendor.eds zlac8030l"
 )]
 pub(crate) struct Eds {
     #[command(subcommand)]
-    what: What,
+    what: Option<What>,
+    #[command(flatten)]
+    sheet: sheet::SheetArgs,
 }
 
 #[derive(Subcommand)]
@@ -33,14 +39,15 @@ impl Eds {
     /// Does it, and prints what came of it.
     pub(crate) fn run(&self, format: Format) -> Result<(), Failure> {
         match &self.what {
-            What::Lint(lint) => {
+            Some(What::Lint(lint)) => {
                 let report = lint.run();
                 print(format, &report)?;
                 // For programs the report has it.
                 report.failure(lint.strict).map_or(Ok(()), |failure| Err(Failure { told: format.json, ..failure }))
             }
-            What::Show(show) => print(format, &show.run()?),
-            What::Diff(diff) => print(format, &diff.run()?),
+            Some(What::Show(show)) => print(format, &show.run()?),
+            Some(What::Diff(diff)) => print(format, &diff.run()?),
+            None => print(format, &self.sheet.run()?),
         }
     }
 }

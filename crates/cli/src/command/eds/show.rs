@@ -1,7 +1,5 @@
 //! `ferrodrive eds show`: what a file says.
 
-use std::path::PathBuf;
-
 use canopen::Mux;
 use eds::{Commissioning, Eds, Object, Value, Variable};
 use serde::Serialize;
@@ -17,8 +15,9 @@ use crate::table::Table;
 /// Show the device and the objects of an EDS or DCF file
 #[derive(clap::Args)]
 pub(crate) struct Show {
-    /// EDS or DCF file
-    file: PathBuf,
+    /// EDS or DCF file, or a model
+    #[arg(value_name = "FILE|MODEL")]
+    file: String,
     /// Only objects with this index, or with this word in the name
     #[arg(value_name = "OBJECT")]
     search: Vec<String>,
@@ -73,7 +72,7 @@ struct Row {
 impl Show {
     /// Reads the file and picks the objects.
     pub(super) fn run(&self) -> Result<ShowReport, Failure> {
-        let eds = source::reading(&self.file)?.eds;
+        let eds = source::sheet(&self.file)?;
         let wanted =
             |object: &Object, variable: &Variable| self.search.iter().all(|word| matches(object, variable, word));
         let of_object = |object: &Object| -> Vec<Row> {
@@ -82,13 +81,13 @@ impl Show {
         let objects: Vec<Row> = eds.objects.iter().flat_map(of_object).collect();
         if objects.is_empty() && !self.search.is_empty() {
             let words = self.search.join(" ");
-            return Err(Failure::new(format!("no object of {} matches '{words}'", self.file.display())).next(format!(
+            return Err(Failure::new(format!("no object of {} matches '{words}'", self.file)).next(format!(
                 "ferrodrive eds show {} lists all {}",
-                self.file.display(),
+                self.file,
                 eds.variables().count()
             )));
         }
-        Ok(ShowReport::of(self.file.display().to_string(), &eds, objects))
+        Ok(ShowReport::of(self.file.clone(), &eds, objects))
     }
 }
 

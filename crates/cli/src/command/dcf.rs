@@ -1,0 +1,235 @@
+//! `ferrodrive dcf`: what a device's parameters are, as a device configuration file (CiA 306-1, clause 5).
+
+use std::fs::{File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use canopen::{Mux, NodeId};
+use eds::document::Document;
+use eds::{Commissioning, Configuration, Sheet, write};
+use master::{Error, Node};
+use serde::Serialize;
+
+use super::eds::source;
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::models::Description;
+use crate::output::Report;
+use crate::paint::Paint;
+use crate::parse::node::node;
+use crate::plain::plain;
+use crate::table::Table;
+
+/// Read a device's parameters into a device configuration file (DCF)
+///
+/// The file is the data sheet with the values that differ from it. What is read-only is left out, and so are commands and
+/// set-points, which are no configuration.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive dcf 4 --output left-wheel.dcf\n  \
+    ferrodrive --bus can0 dcf 5 --eds vendor.eds --output axis.dcf\n  ferrodrive dcf 4 --model 4=zlac8030l > left-wheel.dcf")]
+pub(crate) struct Dcf {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+    /// The device's data sheet; without it that of its model
+    #[arg(long, value_name = "FILE")]
+    eds: Option<PathBuf>,
+    /// Write the file here, and say what was read; without it the file goes to standard output
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Every value that was read, not only those that differ from the data sheet
+    #[arg(long)]
+    all: bool,
+    /// Write over a file that is there
+    #[arg(long, requires = "output")]
+    force: bool,
+    /// The device's name in the plan
+    #[arg(long, value_name = "NAME", default_value = "")]
+    name: String,
+}
+
+/// What was read.
+#[derive(Debug, Serialize)]
+pub(crate) struct DcfReport {
+    node: u8,
+    /// Where the file is; absent if it is [`dcf`](Self::dcf).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    file: Option<String>,
+    /// The file itself, if it was not written anywhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    dcf: Option<String>,
+    /// Objects that were read.
+    read: usize,
+    /// Values in the file.
+    values: usize,
+    /// Objects that could not be read.
+    refused: Vec<Refused>,
+    /// Commands and set-points.
+    left_out: Vec<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct Refused {
+    object: String,
+    name: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    abort: Option<u32>,
+    why: String,
+}
+
+impl Dcf {
+    /// Reads the values and writes the file.
+    pub(crate) async fn run(&self, context: &Context) -> Result<DcfReport, Failure> {
+        // Before anything is asked for: nobody waits for what cannot be kept.
+        if let Some(path) = self.output.as_deref().filter(|path| !self.force && path.exists()) {
+            return Err(exists(path));
+        }
+        let (mut made, model) = self.sheet(context).await?;
+        let node = context.node(self.node);
+        let (values, read, refused) = self.read_values(context, &node, &mut made).await?;
+        let left_out = made.left_out().iter().map(ToString::to_string).collect();
+        let device = self.commissioning(&node, model).await;
+        let file_name =
+            self.output.as_deref().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
+        let file_name = file_name.unwrap_or_else(|| format!("node{}.dcf", self.node));
+        made.commission(&device, &file_name).map_err(|error| Failure::usage(error.to_string()))?;
+        let document = made.into_document();
+        let mut report = DcfReport { node: self.node.raw(), file: None, dcf: None, read, values, refused, left_out };
+        match &self.output {
+            Some(path) => {
+                keep(path, &document.to_bytes(), self.force)?;
+                report.file = Some(path.display().to_string());
+            }
+            None => {
+                report.dcf = Some(document.text().to_owned());
+                context.progress.clear();
+                context.tell(&report.summary(Paint::OFF));
+            }
+        }
+        Ok(report)
+    }
+
+    /// The data sheet to begin with.
+    async fn sheet(&self, context: &Context) -> Result<(Configuration, Option<&'static Description>), Failure> {
+        let (document, model) = match &self.eds {
+            Some(path) => (source::document(path)?, None),
+            None => {
+                let drive = context.known_drive(self.node).await?;
+                let model = drive.profile().ok_or_else(|| Failure::new("the model is not known").at_node(self.node))?;
+                let sheet = Document::parse(write(&Sheet::of(model).eds()).as_bytes());
+                (sheet.map_err(|refusal| Failure::new(refusal.to_string()))?, Some(model))
+            }
+        };
+        let made = Configuration::new(document, self.node.raw());
+        Ok((made.map_err(|refusal| Failure::new(refusal.to_string()).of_kind("not_an_eds"))?, model))
+    }
+
+    /// Reads all that is wanted. An object that the device refuses is noted; a device that does not answer ends it.
+    async fn read_values(
+        &self,
+        context: &Context,
+        node: &Node,
+        made: &mut Configuration,
+    ) -> Result<(usize, usize, Vec<Refused>), Failure> {
+        let wanted = made.wanted();
+        let (mut values, mut read, mut refused) = (0, 0, Vec::new());
+        for (number, place) in wanted.iter().enumerate() {
+            context.progress.show(format!("{} of {}: {place}", number + 1, wanted.len()));
+            let name = made.eds().variable(place.index, place.sub_index).map(|variable| variable.name.clone());
+            let name = name.unwrap_or_default();
+            let mut refuse = |why: String, abort: Option<u32>| {
+                refused.push(Refused { object: place.to_string(), name: name.clone(), abort, why });
+            };
+            match node.upload(*place).await {
+                Ok(payload) => {
+                    read += 1;
+                    match made.set(*place, payload.as_bytes(), self.all) {
+                        Ok(is_there) => values += usize::from(is_there),
+                        Err(error) => refuse(error.to_string(), None),
+                    }
+                }
+                Err(error @ Error::Aborted { .. }) => {
+                    let abort = error.abort();
+                    let why = abort.map_or_else(|| error.to_string(), |code| code.to_string());
+                    refuse(why, abort.map(|code| code.0));
+                }
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Ok((values, read, refused))
+    }
+
+    /// Which device it is: its serial number and its bit rate, where it says them.
+    async fn commissioning(&self, node: &Node, model: Option<&'static Description>) -> Commissioning {
+        let bit_rate = match model {
+            Some(model) => bit_rate(node, model).await,
+            None => None,
+        };
+        Commissioning {
+            node_id: Some(self.node.raw()),
+            node_name: self.name.clone(),
+            bit_rate,
+            net_number: Some(1),
+            lss_serial_number: node.read::<u32>(Mux::new(0x1018, 4)).await.ok(),
+            ..Commissioning::default()
+        }
+    }
+}
+
+/// In kbit/s, by the object that chooses it; of a model without one, that of the model.
+async fn bit_rate(node: &Node, model: &Description) -> Option<u16> {
+    let Some(row) = model.dictionary.rows().iter().find(|row| row.name == "can_baud_rate") else {
+        return model.bitrate.map(|rate| (rate.bits_per_second() / 1_000) as u16);
+    };
+    let value = node.read::<u16>(row.mux()).await.ok()?;
+    row.meaning(value.into())?.strip_suffix(" kbit/s")?.parse().ok()
+}
+
+fn exists(path: &Path) -> Failure {
+    Failure::new(format!("{} is there already", path.display()))
+        .of_kind("file_exists")
+        .next("--force writes over it, or give another --output")
+}
+
+/// Writes the file at once or not at all: beside its place, then to it.
+fn keep(path: &Path, bytes: &[u8], force: bool) -> Result<(), Failure> {
+    let cannot = |error: std::io::Error| Failure::new(format!("cannot write {}", path.display())).because(error);
+    if !force {
+        // Made only if nobody was faster.
+        let mut file = OpenOptions::new().write(true).create_new(true).open(path).map_err(cannot)?;
+        return file.write_all(bytes).map_err(cannot);
+    }
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".new");
+    let mut file = File::create(&beside).map_err(cannot)?;
+    file.write_all(bytes).and_then(|()| file.sync_all()).map_err(cannot)?;
+    std::fs::rename(&beside, path).map_err(cannot)
+}
+
+impl DcfReport {
+    fn summary(&self, paint: Paint) -> String {
+        let kept = if self.values == 1 { "1 value" } else { &format!("{} values", self.values) };
+        let mut text = format!("node {}: {} objects read, {kept} in the file", self.node, self.read);
+        if !self.left_out.is_empty() {
+            text += &format!("; left out, being commands or set-points: {}", self.left_out.join(", "));
+        }
+        if self.refused.is_empty() {
+            return text;
+        }
+        let mut table = Table::new(&["object", "name", "not read"]);
+        for row in &self.refused {
+            table.row([row.object.clone(), plain(&row.name), row.why.clone()]);
+        }
+        format!("{text}\n\n{}", table.plain(paint))
+    }
+}
+
+impl Report for DcfReport {
+    fn text(&self, paint: Paint) -> String {
+        match (&self.dcf, &self.file) {
+            (Some(dcf), _) => dcf.trim_end().to_owned(),
+            (None, Some(file)) => format!("{}: {}", plain(file), self.summary(paint)),
+            (None, None) => self.summary(paint),
+        }
+    }
+}

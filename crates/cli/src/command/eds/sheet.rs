@@ -1,0 +1,90 @@
+//! `ferrodrive eds MODEL`: the data sheet of a model, written from its description.
+
+use canopen::NodeId;
+use clap::ValueEnum;
+use devices::variant::Preset;
+use eds::{Flavour, Sheet, write};
+use serde::Serialize;
+
+use crate::failure::Failure;
+use crate::models::{Description, resolve};
+use crate::output::Report;
+use crate::paint::Paint;
+use crate::parse::drive_spec::DriveSpec;
+use crate::parse::node::node;
+
+/// Which model's, and what is special about it.
+#[derive(clap::Args)]
+pub(super) struct SheetArgs {
+    /// Model, e.g. zlac8030l: write its EDS on standard output
+    #[arg(value_parser = resolve)]
+    model: Option<&'static Description>,
+    /// What is special about the device, as `sim --drive` takes it: defaults=eds, firmware=2.01, 6060=3
+    #[arg(value_name = "KEY=VALUE")]
+    choices: Vec<String>,
+    /// For this node alone: identifiers as numbers, without $NODEID
+    #[arg(long, value_name = "NODE", value_parser = node)]
+    node: Option<NodeId>,
+    /// For a program that asks for more than the device has
+    #[arg(long)]
+    variant: Option<Variant>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Variant {
+    /// With 6502h and 6061h, and types as they are mapped
+    #[value(name = "ros2_canopen")]
+    Ros2Canopen,
+}
+
+/// The sheet.
+#[derive(Debug, Serialize)]
+pub(super) struct SheetReport {
+    model: &'static str,
+    file_name: String,
+    eds: String,
+}
+
+impl SheetArgs {
+    /// Writes it.
+    pub(super) fn run(&self) -> Result<SheetReport, Failure> {
+        let model = self.model.ok_or_else(|| Failure::usage("no model given"))?;
+        // Which node it is does not matter to the choices.
+        let mut spec = DriveSpec::new(model, self.node.unwrap_or(NodeId::MIN));
+        for choice in &self.choices {
+            let (key, value) = choice.split_once('=').ok_or_else(|| {
+                Failure::usage(format!("'{choice}' is no option of a drive; expected KEY=VALUE, e.g. defaults=eds"))
+            })?;
+            spec.set(key.trim(), value.trim()).map_err(Failure::usage)?;
+        }
+        check(model, spec.presets())?;
+        let sheet = Sheet {
+            description: model,
+            variant: spec.variant(),
+            presets: spec.presets(),
+            node_id: self.node,
+            flavour: self.variant.map_or(Flavour::Standard, |Variant::Ros2Canopen| Flavour::Ros2Canopen),
+        };
+        let eds = sheet.eds();
+        Ok(SheetReport { model: model.name, file_name: eds.file.file_name.clone(), eds: write(&eds) })
+    }
+}
+
+/// Values that the device would refuse are none to be delivered with.
+fn check(model: &Description, presets: &[Preset]) -> Result<(), Failure> {
+    for Preset { object, value } in presets {
+        let refused = model.row(*object).and_then(|row| row.check_value(*value).err());
+        if let Some(code) = refused {
+            return Err(
+                Failure::usage(format!("{object} of a {} cannot be {value}: {code}", model.name)).at_object(*object)
+            );
+        }
+    }
+    Ok(())
+}
+
+impl Report for SheetReport {
+    fn text(&self, _: Paint) -> String {
+        self.eds.trim_end().to_owned()
+    }
+}

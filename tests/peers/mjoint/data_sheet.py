@@ -1,0 +1,3 @@
+import eds
+
+eds.COMMON.into("mjoint")
