@@ -4,7 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use eds::document::Document;
-use eds::{Eds, Severity, diff, write};
+use eds::{Eds, Severity, Unkept, diff, keep, write};
 
 fn files() -> Vec<PathBuf> {
     let Some(folder) = std::env::var_os("FERRODRIVE_EDS_FILES") else {
@@ -70,5 +70,33 @@ fn every_file_reads_the_same_when_it_is_written_anew() {
         let again = Eds::load(write(&eds).as_bytes()).expect("what is written can be read").eds;
         assert_eq!(diff(&eds, &again), [], "{}", path.display());
         assert_eq!(eds.variables().count(), again.variables().count(), "{}", path.display());
+    }
+}
+
+#[test]
+fn every_file_makes_a_description_that_is_kept_once_or_says_that_it_is_too_large() {
+    for path in files() {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let eds = Eds::load(&fs::read(&path).expect("a readable file")).expect("a file that is read").eds;
+        match keep(&eds) {
+            Ok(kept) => {
+                let again = keep(&eds).expect("the same");
+                assert!(std::ptr::eq(kept, again), "{name}");
+                assert_eq!(kept.dictionary.rows().len(), eds.variables().count(), "{name}");
+                let modes: Vec<_> =
+                    kept.axes.iter().map(|axis| axis.modes.iter().map(|mode| mode.0).collect::<Vec<_>>()).collect();
+                let title = kept.title;
+                say(&format!(
+                    "{name}: {title}, {:05X}h, {} axes {modes:?}",
+                    kept.identity.device_type,
+                    kept.axes.len()
+                ));
+            }
+            Err(Unkept::TooManyRows { rows, most }) => {
+                assert!(rows > most);
+                say(&format!("{name}: {rows} rows are too many"));
+            }
+            Err(error) => panic!("{name}: {error}"),
+        }
     }
 }

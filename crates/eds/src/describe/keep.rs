@@ -7,8 +7,9 @@ use std::sync::{Mutex, PoisonError};
 use can::Bitrate;
 use canopen::od::{DefaultValue, Entry, MAX_ROWS, Table};
 use canopen::{Mux, NodeId};
+use cia402::ErrorCode;
 use devices::faults::Faults;
-use devices::{Description, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules};
+use devices::{Description, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules, servo};
 
 use super::axis::axes;
 use super::names;
@@ -18,14 +19,11 @@ use crate::{Eds, write};
 /// All descriptions that were made of files, by what the files say.
 static KEPT: Mutex<BTreeMap<String, &'static Description>> = Mutex::new(BTreeMap::new());
 
-/// EMCY and 603Fh code of a heartbeat that stayed away (CiA 301, table 21).
-const HEARTBEAT_ERROR: u16 = 0x8130;
-
 /// The description of the device that a file describes, kept for the life of the program: the same file, or another that
 /// says the same, gives the same one.
 ///
-/// An axis has what the file has of CiA 402, in the units of the standard; faults, stored objects and departures are not in
-/// a file. Of a DCF the values stand in place of the defaults.
+/// An axis has what the file has of CiA 402, in the units and with the error codes of the standard; what is stored and where the
+/// device departs from the standard is not in a file. Of a DCF the values stand in place of the defaults.
 ///
 /// # Errors
 /// If there is no object in the file, or more of them than a dictionary holds.
@@ -92,7 +90,7 @@ fn describe(eds: &Eds) -> Result<Description, Unkept> {
         bitrate: eds.commissioning.as_ref().and_then(|of| of.bit_rate).and_then(|k| Bitrate::new(u32::from(k) * 1_000)),
         axes,
         host_watch: if watches {
-            HostWatch::Heartbeat { consumer: Mux::new(0x1016, 1), fault: HEARTBEAT_ERROR }
+            HostWatch::Heartbeat { consumer: Mux::new(0x1016, 1), fault: ErrorCode::LIFE_GUARD_OR_HEARTBEAT.0 }
         } else {
             HostWatch::None
         },
@@ -101,7 +99,7 @@ fn describe(eds: &Eds) -> Result<Description, Unkept> {
             restore: ParameterStorage::CIA_301.restore.filter(|_| has(0x1011, 1)),
             ..ParameterStorage::NONE
         },
-        faults: Faults { code: has(0x603F, 0).then(|| Mux::new(0x603F, 0)), bit_field: false, table: &[] },
+        faults: Faults { code: servo::FAULTS.code.filter(|_| has(0x603F, 0)), ..servo::FAULTS },
         nmt: NmtRules::CIA_301,
         pdo: pdo_rules(table.rows()),
         stated_departures: &[],

@@ -102,7 +102,7 @@ impl<'a> Sheet<'a> {
             u16::try_from(objects.iter().filter(|object| range.contains(&object.index)).count()).ok()
         };
         DeviceInfo {
-            vendor_name: vendor(of.title).to_owned(),
+            vendor_name: vendor(of).to_owned(),
             vendor_number: Some(of.identity.vendor_id),
             product_name: names::plain(of.title),
             product_number: Some(of.identity.product_code),
@@ -205,18 +205,22 @@ fn is_measured(row: &Entry) -> bool {
     read_only && (row.index >= 0x2000 && says_nothing || matches!(row.index, 0x1001..=0x1003))
 }
 
-/// The maker, where the title begins with it: a word and no number.
-fn vendor(title: &str) -> &str {
-    let first = title.split(' ').next().unwrap_or_default();
-    if first.bytes().all(|letter| letter.is_ascii_alphabetic()) { first } else { "" }
+/// The maker, where there is one and the title begins with it: a word and no number.
+fn vendor(of: &Description) -> &str {
+    let first = of.title.split(' ').next().unwrap_or_default();
+    let is_word = first.bytes().all(|letter| letter.is_ascii_alphabetic());
+    if is_word && of.identity.vendor_id != 0 { first } else { "" }
 }
 
-/// Bit rates that the object of the bit rate lists, else the one as delivered.
+/// Bit rates that the object of the bit rate lists, else the one as delivered; all of them where nothing is said.
 fn bit_rates(of: &Description) -> Vec<u16> {
     let rate = |meaning: &str| meaning.strip_suffix(" kbit/s")?.parse::<u16>().ok();
     let rows = of.dictionary.rows().iter().filter(|row| row.name == "can_baud_rate");
     let mut rates: Vec<u16> = rows.flat_map(|row| row.values).filter_map(|(_, meaning)| rate(meaning)).collect();
     rates.extend(of.bitrate.map(|rate| (rate.bits_per_second() / 1_000) as u16));
+    if rates.is_empty() {
+        rates.extend(BIT_RATES);
+    }
     rates.retain(|rate| BIT_RATES.contains(rate));
     rates.sort_unstable();
     rates.dedup();

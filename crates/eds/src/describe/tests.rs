@@ -145,9 +145,11 @@ const TWO_AXES: &str = "[FileInfo]\nFileName=two.eds\n[DeviceInfo]\nVendorName=V
     [2002]\nParameterName=Bytes\nDataType=0xA\nAccessType=ro\nDefaultValue=01 02FF\n\
     [2003]\nParameterName=My gain\nDataType=0x1B\nAccessType=rw\nDefaultValue=0xFFFFFFFFFFFFFFFF\n\
     [6040]\nParameterName=CW\nDataType=6\nAccessType=rww\nPDOMapping=1\n\
+    [6041]\nParameterName=SW\nDataType=6\nAccessType=ro\nPDOMapping=1\n\
     [6060]\nParameterName=Mode\nDataType=2\nAccessType=rw\n\
     [60FF]\nParameterName=Target velocity\nDataType=4\nAccessType=rww\nPDOMapping=1\n\
     [6840]\nParameterName=CW 2\nDataType=6\nAccessType=rww\nPDOMapping=1\n\
+    [6841]\nParameterName=SW 2\nDataType=6\nAccessType=ro\nPDOMapping=1\n\
     [6861]\nParameterName=Display\nDataType=2\nAccessType=ro\nPDOMapping=1\n\
     [6D02]\nParameterName=Modes\nDataType=7\nAccessType=ro\nDefaultValue=0x85\n";
 
@@ -170,13 +172,22 @@ fn a_file_of_two_axes_is_a_description_with_two() {
             "bytes",
             "my_gain_2003_00",
             "controlword",
+            "statusword",
             "modes_of_operation",
             "target_velocity",
             "controlword_2",
+            "statusword_2",
             "modes_of_operation_display_2",
             "supported_drive_modes_2",
         ]
     );
+}
+
+#[test]
+fn a_file_that_leaves_the_device_type_open_is_a_drive_by_its_objects() {
+    let axes = |text: &str| keep(&Eds::load(text.as_bytes()).expect("a small file").eds).map(|kept| kept.axes.len());
+    assert_eq!(axes(&TWO_AXES.replace("DefaultValue=0x20192\n", "")), Ok(2));
+    assert_eq!(axes(&TWO_AXES.replace("0x20192", "0x30191")), Ok(0), "an I/O module with objects there");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! `ferrodrive eds lint`: what is wrong with a file, line by line.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use eds::{Finding, Severity};
 use serde::Serialize;
@@ -66,7 +66,7 @@ struct Row {
 impl Lint {
     /// Looks into all files.
     pub(super) fn run(&self) -> LintReport {
-        LintReport { files: self.files.iter().map(OfFile::of).collect() }
+        LintReport { files: self.files.iter().map(|path| OfFile::of(path)).collect() }
     }
 }
 
@@ -83,7 +83,7 @@ impl LintReport {
 }
 
 impl OfFile {
-    fn of(path: &PathBuf) -> Self {
+    fn of(path: &Path) -> Self {
         let empty = Self {
             file: path.display().to_string(),
             refused: None,
