@@ -1,0 +1,79 @@
+//! The commands of `docs/handbook`, as a reader would type them: each ends well, and each line for a simulator's terminal
+//! is answered. They stand in the project's folder, not in the package.
+
+mod common;
+
+use std::path::Path;
+
+use common::{Simulator, done};
+
+/// The port that the pages print; here it is a free one.
+const PRINTED_PORT: &str = "29536";
+
+/// What is no command of ours: checked elsewhere, or another program's.
+const OTHERS: &[&str] = &["cargo ", "git ", "#"];
+
+fn page(name: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/handbook").join(name);
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// The blocks of a page with their languages.
+fn blocks(text: &str) -> Vec<(&str, Vec<&str>)> {
+    let mut found = Vec::new();
+    let mut lines = text.lines();
+    while let Some(line) = lines.next() {
+        if let Some(language) = line.strip_prefix("```") {
+            found.push((language, lines.by_ref().take_while(|line| !line.starts_with("```")).collect()));
+        }
+    }
+    found
+}
+
+/// Does what a page says, from top to bottom; how many commands that were.
+fn follow(name: &str) -> usize {
+    let text = page(name);
+    let mut simulator: Option<(Simulator, String)> = None;
+    let mut commands = 0;
+    for (language, lines) in blocks(&text) {
+        for line in lines.into_iter().filter(|line| !line.trim().is_empty()) {
+            match (language, &mut simulator) {
+                ("sh", _) if OTHERS.iter().any(|other| line.starts_with(other)) => {}
+                ("sh", running) => {
+                    let line = line.split(" #").next().unwrap_or_default();
+                    let port = running.as_ref().map_or("0", |(_, port)| port);
+                    let line = line.replace(PRINTED_PORT, port);
+                    let words: Vec<&str> = line.split_whitespace().collect();
+                    let arguments = words.strip_prefix(&["ferrodrive"]).unwrap_or_else(|| panic!("{name}: {line}"));
+                    if arguments[0] == "sim" {
+                        let started = Simulator::start(&arguments[1..]);
+                        let port = started.ready.rsplit(':').next().unwrap_or_default().to_owned();
+                        *running = Some((started, port));
+                    } else {
+                        done(arguments);
+                    }
+                    commands += 1;
+                }
+                ("text", Some((simulator, _))) => {
+                    let answer = simulator.ask(line);
+                    assert_eq!(answer["ok"], true, "{name}: {line}: {answer}");
+                    commands += 1;
+                }
+                _ => {}
+            }
+        }
+    }
+    commands
+}
+
+#[test]
+fn every_command_of_the_page_on_testing_ends_well() {
+    assert_eq!(follow("test-your-software.md"), 10);
+}
+
+#[test]
+fn every_command_of_the_other_pages_ends_well() {
+    follow("two-axes-from-a-test.md");
+    follow("add-an-object.md");
+    follow("add-a-drive.md");
+}
