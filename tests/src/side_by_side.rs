@@ -2,23 +2,31 @@
 //!
 //! Each public function is the body of one test and fails with the list of what differs.
 
-use canopen::NodeId;
 use canopen::od::{Access, DefaultValue, Dictionary, Entry, Table};
+use canopen::{Mux, NodeId};
 use cia402::{Controlword, PowerEvent, PowerState, Statusword, transition};
 
 use crate::manual::{ObjectRow, PowerCell};
 
 /// The drive has exactly the objects of the manual, in its order.
 pub fn objects_are_the_manuals(table: &'static Table, rows: &[ObjectRow]) {
-    let ours: Vec<_> = table.rows().iter().map(|row| (row.index, row.sub_index)).collect();
-    let manual: Vec<_> = rows.iter().map(|row| (row.index, row.sub)).collect();
-    assert_eq!(ours, manual);
+    let ours: Vec<Mux> = table.rows().iter().map(Entry::mux).collect();
+    let manual: Vec<Mux> = rows.iter().map(|row| Mux::new(row.index, row.sub)).collect();
+    let only_in = |these: &[Mux], those: &[Mux]| -> Vec<String> {
+        these.iter().filter(|object| !those.contains(object)).map(Mux::to_string).collect()
+    };
+    assert_eq!(only_in(&manual, &ours), [""; 0], "in the manual's data only: a row of the drive's table is missing");
+    assert_eq!(only_in(&ours, &manual), [""; 0], "in the drive's table only: a line of objects.csv is missing");
+    assert_eq!(ours, manual, "the same objects, in another order");
 }
 
 /// Every object agrees with the manual in every column, at this node.
 pub fn columns_are_the_manuals<const N: usize>(table: &'static Table, rows: &[ObjectRow], node: NodeId) {
-    let pairs = table.rows().iter().zip(rows);
-    let differences: Vec<String> = pairs.flat_map(|(ours, row)| differences::<N>(table, node, ours, row)).collect();
+    let ours = |row: &ObjectRow| Some(&table.rows()[table.find(Mux::new(row.index, row.sub)).ok()?.position()]);
+    let pairs: Vec<_> = rows.iter().filter_map(|row| Some((ours(row)?, row))).collect();
+    assert!(!pairs.is_empty(), "no object is in both");
+    let found = pairs.into_iter().flat_map(|(ours, row)| differences::<N>(table, node, ours, row));
+    let differences: Vec<String> = found.collect();
     assert!(differences.is_empty(), "{} differences:\n{}", differences.len(), differences.join("\n"));
 }
 
