@@ -1,6 +1,7 @@
 use can::{Bitrate, Instant, Station};
 use canopen::NodeId;
 use cia402::{ModeOfOperation, PowerState};
+use devices::AxisId;
 
 /// The firmware of a drive: a station on the bus that also owns a power stage.
 ///
@@ -40,11 +41,11 @@ pub trait Firmware: Station + Clone {
     /// communication task, which changes the generation by one.
     fn is_storing(&self) -> bool;
 
-    /// How the drive is, for people.
-    fn report(&self) -> Report;
+    /// How an axis of the drive is, for people; of one that it does not have, how the first is.
+    fn report(&self, axis: AxisId) -> Report;
 }
 
-/// How a drive is, in its own terms.
+/// How an axis of a drive is, in its own terms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Report {
     /// Supplied and running.

@@ -199,7 +199,7 @@ fn a_joint_is_operational_from_its_boot_up_message_on_and_the_zl_drives_are_not(
 fn a_joint_in_alarm_is_operational_though_its_heartbeat_says_04h() {
     let (mut world, network) = bench();
     let drive = guessed_drive(&mut world, &network, JOINT);
-    world.with_drive(JOINT, |drive, now| drive.set_battery(false, now)).unwrap().unwrap();
+    world.apply(sim::Place::node(JOINT), &sim::Stimulus::Battery(false)).unwrap().unwrap();
     world.run_for(Duration::from_secs(3));
     assert_eq!(network.facts(node(JOINT)).nmt_state, Some(NmtState::Stopped), "05h, and 04h in alarm: 5.11.1");
     let state = block_on(&mut world, drive.state()).unwrap().unwrap();

@@ -321,7 +321,7 @@ fn a_quick_stop_does_not_energise_a_motor_without_power() {
 fn an_alarm_that_stops_nothing_is_reset_or_explained_and_does_not_stop_the_joint() {
     let (mut world, network, [joint, ..]) = bench();
     block_on(&mut world, joint.velocity(Rpm(60.0), slowly())).unwrap().unwrap();
-    world.with_drive(JOINT, |drive, now| drive.set_battery(false, now)).unwrap().unwrap();
+    world.apply(sim::Place::node(JOINT), &sim::Stimulus::Battery(false)).unwrap().unwrap();
     block_on(&mut world, network.sleep(Duration::from_millis(100))).unwrap();
     // 10h: the turns are unknown until an origin is set ("M Robot Joint Motor CanOpen Manual", 5.12).
     let error = block_on(&mut world, joint.reset_fault()).unwrap().unwrap_err();

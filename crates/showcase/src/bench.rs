@@ -12,7 +12,7 @@ use canopen::{Mux, NodeId};
 use devices::{Description, HostWatch};
 use sim::machine::Order;
 use sim::recorder::{Channel, Recorder, Signal};
-use sim::{Report, StationId, World};
+use sim::{Place, Report, StationId, World};
 
 use super::datagram::{Pattern, bytes, frame, hex};
 use super::error::Error;
@@ -122,7 +122,8 @@ impl Bench {
             let drive = sim::machine::order(model, &Order::new(model, node, bitrate))?;
             world.add_drive(number, drive)?;
         }
-        let channels = drives.iter().flat_map(|(_, number)| SIGNALS.map(|signal| Channel { drive: *number, signal }));
+        let channels =
+            drives.iter().flat_map(|(_, number)| SIGNALS.map(|signal| Channel { place: Place::node(*number), signal }));
         world.start_recording(Recorder::new(SAMPLING_PERIOD, channels));
         Ok(Self {
             drives: drives.to_vec(),

@@ -5,14 +5,15 @@
 //! and a comment (`# ...`) have no answer.
 //! Node numbers are those under which drives were added, whatever their node-IDs are by now.
 
-mod apply;
-mod parse;
+mod answer;
 
 use core::time::Duration;
+use std::str::FromStr;
 
 use serde::Serialize;
 
-use crate::{Component, PulseTrain, Refused, Source, SwitchRange, TemperatureSensor, World};
+use crate::stimulus::{GET, Place, Stimulus, StimulusError};
+use crate::{Refused, World};
 
 /// One line, understood.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,58 +24,44 @@ pub enum Command {
     Help,
     /// `quit`: the end.
     Quit,
-    /// `4 ...`: something about the drive added under a number.
-    Drive {
-        /// The number.
-        number: u8,
-        /// What to do.
-        action: Action,
-    },
+    /// `4 get`: what can be measured at a node.
+    Get(Place),
+    /// `4 power off`: what the outer world does to a node.
+    Apply(Place, Stimulus),
 }
 
-/// What to do with a drive and the machine around it.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Action {
-    /// `power on`, `power off`: the supply. Switched off the drive lives on until the bus has drained.
-    Power(bool),
-    /// `power cycle`: off, and on again when the drive has died of it.
-    PowerCycle,
-    /// `power cut`: dead at once, in the middle of whatever it does.
-    PowerCut,
-    /// `input X0 1`: a digital input's level.
-    Input {
-        /// The input's name.
-        name: String,
-        /// Its level.
-        level: bool,
-    },
-    /// `switch X0 -5000 max`: an input tied to the position.
-    Switch {
-        /// The input's name.
-        name: String,
-        /// Where it is active, in counts of the present actual position.
-        range: SwitchRange,
-    },
-    /// `load torque 2.5`: N·m at the output shaft.
-    LoadTorque(f64),
-    /// `load inertia 0.02`: kg·m² at the output shaft.
-    LoadInertia(f64),
-    /// `rotor lock`, `rotor free`.
-    RotorLock(bool),
-    /// `supply 48`: V; `supply 48 limit 10 resistance 0.2`: with what is behind it.
-    Supply(Source),
-    /// `temperature motor 95`, `temperature driver auto`: °C held, or back to the model.
-    Temperature(TemperatureSensor, Option<f64>),
-    /// `fault hall on`.
-    Fault(Component, bool),
-    /// `battery off`.
-    Battery(bool),
-    /// `pulses 8192 10000`, `quadrature -400 1000`, `duty 40`, `clock 10000`: what is sent to the pulse inputs.
-    Pulses(PulseTrain),
-    /// `cable cut` is true, `cable join` is false.
-    CableCut(bool),
-    /// `get`: what can be measured.
-    Get,
+impl FromStr for Command {
+    type Err = CommandError;
+
+    fn from_str(line: &str) -> Result<Self, CommandError> {
+        let line = line.trim();
+        let (first, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+        let alone = |command: Self, form: &'static str| {
+            if rest.is_empty() { Ok(command) } else { Err(StimulusError::Usage(form).into()) }
+        };
+        match first {
+            "now" => return alone(Self::Now, "now"),
+            "help" => return alone(Self::Help, "help"),
+            "quit" => return alone(Self::Quit, "quit"),
+            _ => {}
+        }
+        let place = parse_place(first)?;
+        let rest = rest.trim();
+        match rest.split_whitespace().next() {
+            None => Err(CommandError::NoAction(first.to_owned())),
+            Some("get") if rest == "get" => Ok(Self::Get(place)),
+            Some("get") => Err(StimulusError::Usage(GET).into()),
+            Some(_) => Ok(Self::Apply(place, rest.parse()?)),
+        }
+    }
+}
+
+fn parse_place(word: &str) -> Result<Place, CommandError> {
+    let looks_numeric = word.starts_with(|first: char| first.is_ascii_digit() || first == '-' || first == '+');
+    word.parse().map_err(|()| {
+        let word = word.to_string();
+        if looks_numeric { CommandError::BadNode(word) } else { CommandError::Unknown(word) }
+    })
 }
 
 /// Why a line was not done.
@@ -92,36 +79,12 @@ pub enum CommandError {
     /// A node number and nothing after it.
     #[error(
         "nothing to do is said after node {0}; expected power, input, switch, load, rotor, supply, temperature, fault, \
-         battery, pulses, quadrature, duty, clock, cable or get, as in: {0} get"
+         battery, pulses, quadrature, duty, clock, cable, set or get, as in: {0} get"
     )]
-    NoAction(u8),
-    /// A node number and something unknown after it.
-    #[error(
-        "unknown command {0:?} for a node; expected power, input, switch, load, rotor, supply, temperature, fault, \
-         battery, pulses, quadrature, duty, clock, cable or get"
-    )]
-    UnknownAction(String),
-    /// Missing, surplus or unknown words.
-    #[error("expected: {0}")]
-    Usage(&'static str),
-    /// No finite number, or one that makes no sense.
-    #[error("{text:?} is no {what}; expected: {usage}")]
-    BadValue {
-        /// What was given.
-        text: String,
-        /// What it should be.
-        what: &'static str,
-        /// The whole command.
-        usage: &'static str,
-    },
-    /// A switch that could never be active.
-    #[error("the range from {low} to {high} is empty; give the lower bound first")]
-    EmptyRange {
-        /// Lower bound as given.
-        low: i64,
-        /// Upper bound as given.
-        high: i64,
-    },
+    NoAction(String),
+    /// The words are no stimulus.
+    #[error(transparent)]
+    Stimulus(#[from] StimulusError),
     /// No drive has this number.
     #[error("no drive was started as node {number}; there is {present}")]
     NoSuchDrive {
@@ -130,17 +93,7 @@ pub enum CommandError {
         /// The numbers there are, or `none`.
         present: String,
     },
-    /// The drive has no input of this name.
-    #[error("a {model} has no input {name:?}; it has {present}")]
-    NoSuchInput {
-        /// The drive's model.
-        model: &'static str,
-        /// The name given.
-        name: String,
-        /// The names there are, or `none`.
-        present: String,
-    },
-    /// The drive does not take it.
+    /// The node does not take it.
     #[error(transparent)]
     Refused(#[from] Refused),
 }
@@ -179,7 +132,8 @@ pub fn answer_served(world: &mut World, line: &str, service: Service) -> Option<
     if !asks_for_an_answer(line) {
         return None;
     }
-    let done = line.parse().and_then(|command| Ok((command == Command::Quit, apply::apply(world, &command, service)?)));
+    let done =
+        line.parse().and_then(|command| Ok((command == Command::Quit, answer::answer(world, &command, service)?)));
     let (quit, json) = match done {
         Ok((quit, json)) => (quit, json),
         Err(error) => (false, refused(&error)),
@@ -209,3 +163,6 @@ fn to_json(answer: &impl Serialize) -> String {
     crate::json::to_string(answer)
         .unwrap_or_else(|_| r#"{"ok":false,"error":"an answer cannot be written"}"#.to_owned())
 }
+
+#[cfg(test)]
+mod tests;

@@ -3,9 +3,12 @@
 //! Units are SI, positions are the drive's own counts, speeds are those of the motor shaft in r/min.
 
 use can::{Bitrate, Instant, Station};
+use canopen::Mux;
+use devices::AxisId;
 use drives::RegisterError;
 
 use crate::machine::Realism;
+use crate::stimulus::{Component, Power, Source, Stimulus, SwitchRange, TemperatureSensor};
 
 /// A drive joined to its physics: firmware, motor, load, supply and sensors as one station.
 ///
@@ -18,16 +21,19 @@ pub trait VirtualDrive: Station + VirtualDriveClone + Send {
     /// The model's name as users type it: `zlac8030l`.
     fn model(&self) -> &'static str;
 
-    /// Switches the supply. Switching on boots the firmware. Switched off it lives on the charge of its bus, sees the
-    /// voltage fall, and loses all that is not stored when it dies. Switched on before that, the supply waits: each time
-    /// off ends in a restart.
-    fn set_power(&mut self, on: bool, now: Instant);
-
-    /// Takes the supply away and the charge of the bus with it: the firmware is dead at once, in the middle of whatever
-    /// it did.
-    fn cut_power(&mut self, now: Instant) {
-        self.set_power(false, now);
+    /// How many axes it has: motors that its one node moves.
+    fn axes(&self) -> u8 {
+        1
     }
+
+    /// Whether it has this axis.
+    fn check_axis(&self, axis: AxisId) -> Result<(), Refused> {
+        let (model, axes) = (self.model(), self.axes());
+        if axis.0 < axes { Ok(()) } else { Err(Refused::NoSuchAxis { model, axis: u16::from(axis.0) + 1, axes }) }
+    }
+
+    /// What the outer world does to it, all of it or nothing. What is no axis' own is the whole drive's, whatever the axis.
+    fn apply(&mut self, axis: AxisId, stimulus: &Stimulus, now: Instant) -> Result<(), Refused>;
 
     /// Whether it is as it is calculated, or has the noise and the flaws of one on a bench; `seed` decides all of that.
     fn set_realism(&mut self, realism: Realism, seed: u64, now: Instant) {
@@ -40,62 +46,94 @@ pub trait VirtualDrive: Station + VirtualDriveClone + Send {
     /// Brings control loops and physics up to `now`. Never changes what happens, only when it is computed.
     fn advance(&mut self, now: Instant);
 
-    /// What a person standing beside the machine could measure, as of the last [`advance`](Self::advance).
+    /// What a person standing beside the machine could measure, as of the last [`advance`](Self::advance); of a machine with
+    /// several axes, at the first.
     fn report(&self) -> Report;
+
+    /// The same at an axis that it has.
+    fn report_of(&self, axis: AxisId) -> Report {
+        let _ = axis;
+        self.report()
+    }
 
     /// Names of the digital inputs, e.g. `X0`, `X1`; an input is addressed by its place in this list.
     fn inputs(&self) -> &'static [&'static str];
 
-    /// Sets the level at digital input number `input`; removes a switch tied to it.
-    fn set_input(&mut self, input: usize, level: bool, now: Instant) -> Result<(), Refused>;
-
-    /// Ties digital input number `input` to a switch that is active while the shaft is in `range`.
-    ///
-    /// The range is given in counts of the present actual position and is fixed in the machine from
-    /// then on: zeroing the drive's position later does not move the switch.
-    fn set_switch(&mut self, input: usize, range: SwitchRange, now: Instant) -> Result<(), Refused>;
-
-    /// Torque at the output shaft in N·m; positive opposes positive motion, also at standstill.
-    fn set_load_torque(&mut self, torque_nm: f64, now: Instant) -> Result<(), Refused>;
-
-    /// Inertia added at the output shaft in kg·m².
-    fn set_load_inertia(&mut self, inertia_kg_m2: f64, now: Instant) -> Result<(), Refused>;
-
-    /// Blocks the rotor mechanically, or frees it.
-    fn set_rotor_locked(&mut self, locked: bool, now: Instant) -> Result<(), Refused>;
-
-    /// Supply voltage in V.
-    fn set_supply(&mut self, supply_v: f64, now: Instant) -> Result<(), Refused>;
-
-    /// Supply voltage and what is behind it: all of it or nothing.
-    fn set_source(&mut self, source: Source, now: Instant) -> Result<(), Refused> {
-        match source {
-            Source { voltage_v: Some(supply_v), limit_a: None, resistance_ohm: None } => self.set_supply(supply_v, now),
-            _ => Err(Refused::Absent { model: self.model(), what: "limit or resistance of its supply" }),
-        }
+    /// [`Power::On`] or [`Power::Off`]: no drive refuses them.
+    fn set_power(&mut self, on: bool, now: Instant) {
+        let _ = self.apply(AxisId::FIRST, &Stimulus::Power(if on { Power::On } else { Power::Off }), now);
     }
 
-    /// Holds a temperature in °C, or gives it back to the thermal model (`None`).
+    /// [`Power::Cut`]: no drive refuses it.
+    fn cut_power(&mut self, now: Instant) {
+        let _ = self.apply(AxisId::FIRST, &Stimulus::Power(Power::Cut), now);
+    }
+
+    /// [`Stimulus::Input`] of input number `input`.
+    fn set_input(&mut self, input: usize, level: bool, now: Instant) -> Result<(), Refused> {
+        let name = self.input_name(input)?;
+        self.apply(AxisId::FIRST, &Stimulus::Input { name, level }, now)
+    }
+
+    /// [`Stimulus::Switch`] at input number `input`.
+    fn set_switch(&mut self, input: usize, range: SwitchRange, now: Instant) -> Result<(), Refused> {
+        let name = self.input_name(input)?;
+        self.apply(AxisId::FIRST, &Stimulus::Switch { name, range }, now)
+    }
+
+    /// [`Stimulus::LoadTorque`], N·m.
+    fn set_load_torque(&mut self, torque_nm: f64, now: Instant) -> Result<(), Refused> {
+        self.apply(AxisId::FIRST, &Stimulus::LoadTorque(torque_nm), now)
+    }
+
+    /// [`Stimulus::LoadInertia`], kg·m².
+    fn set_load_inertia(&mut self, inertia_kg_m2: f64, now: Instant) -> Result<(), Refused> {
+        self.apply(AxisId::FIRST, &Stimulus::LoadInertia(inertia_kg_m2), now)
+    }
+
+    /// [`Stimulus::RotorLock`].
+    fn set_rotor_locked(&mut self, locked: bool, now: Instant) -> Result<(), Refused> {
+        self.apply(AxisId::FIRST, &Stimulus::RotorLock(locked), now)
+    }
+
+    /// [`Stimulus::Supply`] of a voltage alone, V.
+    fn set_supply(&mut self, supply_v: f64, now: Instant) -> Result<(), Refused> {
+        self.set_source(Source { voltage_v: Some(supply_v), ..Source::default() }, now)
+    }
+
+    /// [`Stimulus::Supply`].
+    fn set_source(&mut self, source: Source, now: Instant) -> Result<(), Refused> {
+        self.apply(AxisId::FIRST, &Stimulus::Supply(source), now)
+    }
+
+    /// [`Stimulus::Temperature`], °C.
     fn hold_temperature(
         &mut self,
         sensor: TemperatureSensor,
         celsius: Option<f64>,
         now: Instant,
-    ) -> Result<(), Refused>;
-
-    /// Breaks or mends a component.
-    fn set_fault(&mut self, component: Component, broken: bool, now: Instant) -> Result<(), Refused>;
-
-    /// Disconnects or connects the multi-turn battery.
-    fn set_battery(&mut self, connected: bool, now: Instant) -> Result<(), Refused> {
-        let _ = (connected, now);
-        Err(Refused::Absent { model: self.model(), what: "battery" })
+    ) -> Result<(), Refused> {
+        self.apply(AxisId::FIRST, &Stimulus::Temperature(sensor, celsius), now)
     }
 
-    /// Sends pulses to the pulse inputs; what was being sent ends.
-    fn set_pulses(&mut self, train: PulseTrain, now: Instant) -> Result<(), Refused> {
-        let _ = (train, now);
-        Err(Refused::Absent { model: self.model(), what: "pulse input" })
+    /// [`Stimulus::Fault`].
+    fn set_fault(&mut self, component: Component, broken: bool, now: Instant) -> Result<(), Refused> {
+        self.apply(AxisId::FIRST, &Stimulus::Fault(component, broken), now)
+    }
+
+    /// The name of input number `input`, as stimuli have it.
+    fn input_name(&self, input: usize) -> Result<String, Refused> {
+        let absent = Refused::Absent { model: self.model(), what: "such input" };
+        self.inputs().get(input).map(|name| (*name).to_owned()).ok_or(absent)
+    }
+
+    /// The number of the input of this name, in any case of letters.
+    fn input_number(&self, name: &str) -> Result<usize, Refused> {
+        let inputs = self.inputs();
+        inputs.iter().position(|input| input.eq_ignore_ascii_case(name)).ok_or_else(|| {
+            let present = if inputs.is_empty() { "none".to_owned() } else { inputs.join(", ") };
+            Refused::NoSuchInput { model: self.model(), name: name.to_owned(), present }
+        })
     }
 
     /// The unit identifier that it answers to over Modbus; `None` without such an interface, or without power.
@@ -160,6 +198,42 @@ pub enum Refused {
         /// What it does not have.
         what: &'static str,
     },
+    /// The model has no input of this name.
+    #[error("a {model} has no input {name:?}; it has {present}")]
+    NoSuchInput {
+        /// The drive's model.
+        model: &'static str,
+        /// The name given.
+        name: String,
+        /// The names there are, or `none`.
+        present: String,
+    },
+    /// The model has no such axis.
+    #[error("a {model} has no axis {axis}; it has {axes}")]
+    NoSuchAxis {
+        /// The drive's model.
+        model: &'static str,
+        /// The axis asked for, counted from 1.
+        axis: u16,
+        /// How many there are.
+        axes: u8,
+    },
+    /// The objects are the firmware's.
+    #[error("a {model} sets its objects by itself; write {object} over the bus, as its host does")]
+    OwnObjects {
+        /// The drive's model.
+        model: &'static str,
+        /// The object.
+        object: Mux,
+    },
+    /// The object does not take the value.
+    #[error("object {object} does not take it: {reason}")]
+    BadObject {
+        /// The object.
+        object: Mux,
+        /// Why, and what it would take.
+        reason: String,
+    },
     /// The value makes no sense for this machine.
     #[error("{what} must be {expected}, not {value}")]
     OutOfRange {
@@ -178,84 +252,6 @@ pub enum Refused {
         /// What is wrong with it.
         reason: &'static str,
     },
-}
-
-/// A supply; `None` leaves that as it is.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Source {
-    /// Open-circuit voltage in V.
-    pub voltage_v: Option<f64>,
-    /// The most that it gives, in A. Asked for more its voltage falls.
-    pub limit_a: Option<f64>,
-    /// Resistance of source and wires, in ohm.
-    pub resistance_ohm: Option<f64>,
-}
-
-/// A stretch of the actual position in the drive's counts, ends included; `None` reaches for ever.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SwitchRange {
-    /// Lower end.
-    pub low: Option<i64>,
-    /// Upper end.
-    pub high: Option<i64>,
-}
-
-impl SwitchRange {
-    /// True while the switch is active.
-    pub fn contains(&self, position: i64) -> bool {
-        self.low.is_none_or(|low| low <= position) && self.high.is_none_or(|high| position <= high)
-    }
-}
-
-/// Where a temperature is measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TemperatureSensor {
-    /// Winding or housing of the motor.
-    Motor,
-    /// Power stage.
-    Driver,
-}
-
-/// A component that can break.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Component {
-    /// Hall sensors.
-    Hall,
-    /// Encoder.
-    Encoder,
-    /// Parameter memory.
-    Eeprom,
-    /// Reference voltage of the current measurement.
-    Reference,
-    /// A motor phase, open.
-    Phase,
-    /// A motor phase, its wires touching.
-    Short,
-    /// The power stage: a transistor that has broken down takes current from the bus.
-    Bridge,
-}
-
-/// What a controller sends to a drive's pulse inputs.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum PulseTrain {
-    /// Pulses with a direction.
-    Pulses {
-        /// How many; negative with the direction input conducting.
-        count: i64,
-        /// Pulses a second.
-        hz: f64,
-    },
-    /// Two channels of an encoder.
-    Quadrature {
-        /// Counts, four a line; negative with the second channel ahead.
-        count: i64,
-        /// Counts a second.
-        hz: f64,
-    },
-    /// A square wave of this duty cycle in per cent, for ever.
-    Duty(f64),
-    /// A level on the second input that changes so many times a second, for ever.
-    Clock(f64),
 }
 
 /// State of the holding brake.

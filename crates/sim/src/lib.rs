@@ -42,14 +42,14 @@ pub mod machine;
 pub mod pace;
 mod prng;
 pub mod recorder;
+pub mod stimulus;
 pub mod wire;
 mod world;
 
 pub use block_on::{BlockOnError, block_on, block_on_for};
-pub use drive::{
-    Brake, Component, Levels, OutputShaft, PulseTrain, Refused, Report, Source, SwitchRange, TemperatureSensor,
-    VirtualDrive, VirtualDriveClone,
-};
+pub use devices::AxisId;
+pub use drive::{Brake, Levels, OutputShaft, Refused, Report, VirtualDrive, VirtualDriveClone};
 pub use drives::RegisterError;
 pub use prng::Prng;
+pub use stimulus::{Component, Place, PulseTrain, Source, Stimulus, SwitchRange, TemperatureSensor};
 pub use world::{AnyStation, Digest, FrameLog, StationId, StoredImage, World, WorldError};

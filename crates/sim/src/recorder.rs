@@ -10,6 +10,7 @@ use std::fmt::Write;
 use can::Instant;
 
 use crate::Report;
+use crate::stimulus::{Place, Stimulus};
 
 /// What can be recorded of a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,11 +76,11 @@ impl Signal {
     }
 }
 
-/// A signal of one drive.
+/// A signal of one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Channel {
-    /// The number the drive was added under.
-    pub drive: u8,
+    /// The number the drive was added under, and its axis.
+    pub place: Place,
     /// Which of its signals.
     pub signal: Signal,
 }
@@ -93,6 +94,7 @@ pub struct Recorder {
     times: Vec<Instant>,
     values: Vec<f64>,
     marks: Vec<(Instant, String)>,
+    stimuli: Vec<(Instant, Place, Stimulus)>,
 }
 
 impl Recorder {
@@ -105,6 +107,7 @@ impl Recorder {
             times: Vec::new(),
             values: Vec::new(),
             marks: Vec::new(),
+            stimuli: Vec::new(),
         }
     }
 
@@ -130,6 +133,15 @@ impl Recorder {
         &self.marks
     }
 
+    /// What the outer world did, and when: each can be applied again, or printed.
+    pub fn stimuli(&self) -> &[(Instant, Place, Stimulus)] {
+        &self.stimuli
+    }
+
+    pub(crate) fn note(&mut self, at: Instant, place: Place, stimulus: &Stimulus) {
+        self.stimuli.push((at, place, stimulus.clone()));
+    }
+
     /// Notes that something happened.
     pub fn mark(&mut self, at: Instant, text: impl Into<String>) {
         self.marks.push((at, text.into()));
@@ -139,8 +151,8 @@ impl Recorder {
     /// field. The last column, `mark`, tells what happened since the line before.
     pub fn to_csv(&self) -> String {
         let mut csv = String::from("t_s");
-        for Channel { drive, signal } in &self.channels {
-            let _ = write!(csv, ",{drive}.{}", signal.name());
+        for Channel { place, signal } in &self.channels {
+            let _ = write!(csv, ",{place}.{}", signal.name());
         }
         csv.push_str(",mark\n");
         let mut marks = self.marks.iter().peekable();

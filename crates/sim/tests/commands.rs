@@ -7,6 +7,7 @@ use std::time::Duration;
 use can::{Bitrate, Instant};
 use common::{TestDrive, frame, heard, texts};
 use serde_json::Value;
+use sim::Place;
 use sim::command::{MAX_LINE_LENGTH, Service, answer, answer_served};
 use sim::recorder::{Channel, Recorder, Signal};
 use sim::{StationId, World, WorldError};
@@ -186,7 +187,7 @@ fn a_recorder_samples_at_its_period_and_changes_nothing() {
     let (mut plain, _) = world();
     let (mut world, _) = world();
     let channels = [Signal::Position, Signal::Velocity, Signal::MotorTemperature];
-    let channels = channels.map(|signal| Channel { drive: 4, signal });
+    let channels = channels.map(|signal| Channel { place: Place::node(4), signal });
     world.start_recording(Recorder::new(std::time::Duration::from_millis(100), channels));
     world.run_until(Instant::from_millis(650));
     ask(&mut world, "4 rotor lock");

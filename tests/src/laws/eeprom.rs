@@ -118,7 +118,7 @@ fn boots<F: Subject>(mut firmware: F, hardware: &F::Hardware) {
 
 /// An upload of 1000h is answered with the object, whatever address the image gave it.
 fn answers<F: Subject>(firmware: &mut F, mut now: Instant) {
-    let node = u16::from(firmware.report().node_id.raw());
+    let node = u16::from(firmware.report(devices::AxisId::FIRST).node_id.raw());
     firmware.handle_frame(&Frame::new(CanId::standard(0x600 + node), &[0x40, 0, 0x10, 0, 0, 0, 0, 0]), now);
     // A device may take its time.
     for _ in 0..2_000 {

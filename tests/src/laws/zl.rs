@@ -134,7 +134,7 @@ fn judge<F: Subject>(firmware: &F, first: &[i64], frame: &Frame) {
         assert_eq!(fits, Ok(()), "{frame} put {value} into {}", row.mux());
     }
     assert_eq!(fixed(firmware), first, "{frame} changed what is fixed");
-    let report = firmware.report();
+    let report = firmware.report(devices::AxisId::FIRST);
     assert!(report.velocity_rpm.is_finite() && report.current_a.is_finite(), "{frame}: {report:?}");
 }
 

@@ -7,6 +7,7 @@ pub(crate) mod joint;
 use can::{CanId, Frame, Instant, Station};
 use canopen::Mux;
 use canopen::od::Table;
+use devices::AxisId;
 use drives::Firmware;
 
 /// Control period of all drives, s.
@@ -79,7 +80,7 @@ impl<R: Rig> Bench<R> {
             }
             self.run_ms(1);
         }
-        let (report, statusword) = (self.drive.report(), self.statusword());
+        let (report, statusword) = (self.drive.report(AxisId::FIRST), self.statusword());
         panic!("not within {limit_ms} ms: {report:?}, statusword {statusword:04X}h");
     }
 

@@ -1,5 +1,6 @@
 //! What a machine asks of one model's hardware, and what all models answer alike: supply, load and temperatures.
 
+use devices::AxisId;
 use drives::engine::axis::Demand;
 use drives::{Firmware, RegisterError};
 use plant::Rig;
@@ -71,14 +72,19 @@ pub trait Assembly: Clone + Send + 'static {
     /// One control period of physics under `actuation`.
     fn step(&mut self, actuation: &<Self::Firmware as Firmware>::Actuation);
 
-    /// The motor's shaft, and load, supply, temperatures and energies around it.
-    fn shaft_and_rig(&self) -> (&RotorData, &Rig);
+    /// How many axes it has.
+    fn axes(&self) -> u8 {
+        1
+    }
+
+    /// The shaft of an axis, and load, supply, temperatures and energies around it.
+    fn shaft_and_rig(&self, axis: AxisId) -> (&RotorData, &Rig);
 
     /// Load, supply, temperatures and energies, to change.
-    fn rig_mut(&mut self) -> &mut Rig;
+    fn rig_mut(&mut self, axis: AxisId) -> &mut Rig;
 
     /// What can be measured from outside: `common`, what is measured alike at every model, with the model's own.
-    fn report(&self, firmware: &Self::Firmware, common: Report) -> Report;
+    fn report(&self, firmware: &Self::Firmware, axis: AxisId, common: Report) -> Report;
 
     /// The drive's own converter has started, or stopped: what lives on it follows.
     fn set_supplied(&mut self, supplied: bool) {
@@ -91,21 +97,22 @@ pub trait Assembly: Clone + Send + 'static {
     /// Whether the voltage is enough for the firmware to run on (`running`), or to start.
     #[inline]
     fn supplies_firmware(&self, running: bool) -> bool {
-        self.shaft_and_rig().1.supply.bus_v >= if running { Self::STOPS_BELOW_V } else { Self::STARTS_AT_V }
+        self.shaft_and_rig(AxisId::FIRST).1.supply.bus_v
+            >= if running { Self::STOPS_BELOW_V } else { Self::STARTS_AT_V }
     }
 
     /// Where the motor shaft truly is, in counts of a fixed size, from an arbitrary zero.
-    fn shaft_counts(&self) -> i64;
+    fn shaft_counts(&self, axis: AxisId) -> i64;
 
     /// How many of those are one count of the drive as it is set now.
-    fn shaft_counts_per_count(&self, firmware: &Self::Firmware) -> i64 {
-        let _ = firmware;
+    fn shaft_counts_per_count(&self, firmware: &Self::Firmware, axis: AxisId) -> i64 {
+        let _ = (firmware, axis);
         1
     }
 
     /// The drive counts against the shaft's own direction.
-    fn counts_reversed(&self, firmware: &Self::Firmware) -> bool {
-        let _ = firmware;
+    fn counts_reversed(&self, firmware: &Self::Firmware, axis: AxisId) -> bool {
+        let _ = (firmware, axis);
         false
     }
 
@@ -116,20 +123,20 @@ pub trait Assembly: Clone + Send + 'static {
     fn keep_image(&mut self, image: &[u8]);
 
     /// Torque at the output shaft, positive against positive motion.
-    fn set_load_torque(&mut self, torque_nm: f64) -> Result<(), Refused> {
-        self.rig_mut().load.torque_nm = Self::LOAD_TORQUE.check(torque_nm)?;
+    fn set_load_torque(&mut self, axis: AxisId, torque_nm: f64) -> Result<(), Refused> {
+        self.rig_mut(axis).load.torque_nm = Self::LOAD_TORQUE.check(torque_nm)?;
         Ok(())
     }
 
     /// Inertia added at the output shaft.
-    fn set_load_inertia(&mut self, inertia_kg_m2: f64) -> Result<(), Refused> {
-        self.rig_mut().load.inertia_kg_m2 = Self::LOAD_INERTIA.check(inertia_kg_m2)?;
+    fn set_load_inertia(&mut self, axis: AxisId, inertia_kg_m2: f64) -> Result<(), Refused> {
+        self.rig_mut(axis).load.inertia_kg_m2 = Self::LOAD_INERTIA.check(inertia_kg_m2)?;
         Ok(())
     }
 
     /// Blocks the rotor, or frees it.
-    fn set_rotor_locked(&mut self, locked: bool) {
-        self.rig_mut().load.locked = locked;
+    fn set_rotor_locked(&mut self, axis: AxisId, locked: bool) {
+        self.rig_mut(axis).load.locked = locked;
     }
 
     /// Voltage of the supply and what is behind it: all of it or nothing.
@@ -147,9 +154,14 @@ pub trait Assembly: Clone + Send + 'static {
     }
 
     /// Holds a temperature, or gives it back to the model.
-    fn hold_temperature(&mut self, sensor: TemperatureSensor, celsius: Option<f64>) -> Result<(), Refused> {
+    fn hold_temperature(
+        &mut self,
+        axis: AxisId,
+        sensor: TemperatureSensor,
+        celsius: Option<f64>,
+    ) -> Result<(), Refused> {
         let hold_c = celsius.map(|celsius| TEMPERATURE.check(celsius)).transpose()?;
-        let rig = self.rig_mut();
+        let rig = self.rig_mut(axis);
         let body = match sensor {
             TemperatureSensor::Motor => &mut rig.winding,
             TemperatureSensor::Driver => &mut rig.heat_sink,
@@ -159,7 +171,7 @@ pub trait Assembly: Clone + Send + 'static {
     }
 
     /// Breaks or mends a component.
-    fn set_fault(&mut self, component: Component, broken: bool) -> Result<(), Refused>;
+    fn set_fault(&mut self, axis: AxisId, component: Component, broken: bool) -> Result<(), Refused>;
 
     /// Connects or disconnects the multi-turn battery, where there is one.
     fn set_battery(&mut self, connected: bool) -> Result<(), Refused> {

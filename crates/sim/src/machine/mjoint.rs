@@ -5,6 +5,7 @@
 //! motors are those of `plant`; what is assumed of the surroundings is a constant below.
 
 use can::Bitrate;
+use devices::AxisId;
 use devices::Description;
 use drives::RegisterError;
 use drives::engine::storage::Image;
@@ -225,11 +226,11 @@ impl Assembly for Joint {
         self.pulses.advance(Self::PERIOD_S);
     }
 
-    fn shaft_and_rig(&self) -> (&RotorData, &Rig) {
+    fn shaft_and_rig(&self, _axis: AxisId) -> (&RotorData, &Rig) {
         (&self.motor.rotor, &self.motor.rig)
     }
 
-    fn rig_mut(&mut self) -> &mut Rig {
+    fn rig_mut(&mut self, _axis: AxisId) -> &mut Rig {
         &mut self.motor.rig
     }
 
@@ -245,17 +246,20 @@ impl Assembly for Joint {
     }
 
     /// Blocks the output, or frees it with a new reducer in place of a broken one.
-    fn set_rotor_locked(&mut self, locked: bool) {
+    fn set_rotor_locked(&mut self, _axis: AxisId, locked: bool) {
         self.motor.rig.load.locked = locked;
         if !locked && (self.motor.is_seized() || self.motor.gear.jumps > 0) {
             self.motor.replace_reducer();
         }
     }
 
-    fn report(&self, firmware: &MJoint, common: Report) -> Report {
+    fn report(&self, firmware: &MJoint, _axis: AxisId, common: Report) -> Report {
         let running = common.powered;
-        let engaged =
-            if running { drives::Firmware::report(firmware).brake_engaged } else { self.braked_without_power };
+        let engaged = if running {
+            drives::Firmware::report(firmware, AxisId::FIRST).brake_engaged
+        } else {
+            self.braked_without_power
+        };
         let levels = [self.last.zero_output, self.last.alarm_output, self.last.red_led, self.last.green_led];
         let report = Report {
             statusword: running.then(|| firmware.values().get(objects::STATUSWORD)),
@@ -275,7 +279,7 @@ impl Assembly for Joint {
     }
 
     #[inline]
-    fn shaft_counts(&self) -> i64 {
+    fn shaft_counts(&self, _axis: AxisId) -> i64 {
         self.motor.rotor.angle.count(COUNTS_PER_TURN)
     }
 
@@ -290,7 +294,7 @@ impl Assembly for Joint {
         }
     }
 
-    fn set_fault(&mut self, component: Component, broken: bool) -> Result<(), Refused> {
+    fn set_fault(&mut self, _axis: AxisId, component: Component, broken: bool) -> Result<(), Refused> {
         let absent = |what| Err(Refused::Absent { model: self.model(), what });
         match component {
             Component::Hall => return absent("Hall sensors: its encoder is absolute"),

@@ -20,6 +20,7 @@ mod zlac8030l;
 mod zlim42c;
 
 use can::{Bitrate, Frame, Instant, Station};
+use devices::AxisId;
 use drives::{Firmware, RegisterError};
 
 pub use assembly::Assembly;
@@ -33,7 +34,8 @@ pub use servo::{ServoBench, ServoMachine, servo, without_effect};
 pub use zlac8030l::{HubWheel, Zlac8030lMachine, zlac8030l};
 pub use zlim42c::{Stepper, Zlim42c82Machine, Zlim42cMachine, zlim42c, zlim42c_82};
 
-use crate::{Component, PulseTrain, Refused, Report, Source, SwitchRange, TemperatureSensor, VirtualDrive};
+use crate::stimulus::{Power, Stimulus, SwitchRange};
+use crate::{Refused, Report, VirtualDrive};
 use switch::{Inputs, stretch};
 
 /// How often a drive without enough voltage to run looks whether it has come.
@@ -102,7 +104,7 @@ impl<A: Assembly> Machine<A> {
     fn tick(&mut self, at: Instant) {
         self.watch_supply(at);
         if self.running {
-            let levels = self.inputs.levels(|| self.assembly.shaft_counts());
+            let levels = self.inputs.levels(|axis| self.assembly.shaft_counts(axis));
             let mut sensors = self.assembly.sense(levels);
             if let Some(noise) = &mut self.noise {
                 self.assembly.disturb(&mut sensors, noise);
@@ -167,9 +169,32 @@ impl<A: Assembly> Machine<A> {
         }
     }
 
-    fn input(&self, input: usize) -> Result<usize, Refused> {
-        let absent = Refused::Absent { model: self.assembly.model(), what: "such input" };
-        if input < A::INPUTS.len() { Ok(input) } else { Err(absent) }
+    fn switch_supply(&mut self, power: Power, now: Instant) {
+        match power {
+            Power::On if self.running && self.supply != Supply::On => {
+                self.supply = Supply::Cycling(now.plus_nanos(DRAIN_PATIENCE_NS));
+            }
+            Power::On => self.switch_on(now),
+            Power::Off => {
+                self.supply = Supply::Off;
+                let (rig, model) = self.assembly.rig_and_model_mut();
+                rig.switch_source(model, false);
+                self.watch_supply(now);
+            }
+            Power::Cycle => {
+                self.switch_supply(Power::Off, now);
+                self.switch_supply(Power::On, now);
+            }
+            Power::Cut => self.cut_source(now),
+        }
+    }
+
+    fn tie_switch(&mut self, axis: AxisId, input: usize, range: SwitchRange) {
+        let shaft = self.assembly.shaft_counts(axis);
+        let scale = self.assembly.shaft_counts_per_count(&self.firmware, axis);
+        let position = i64::from(self.firmware.report(axis).position_counts);
+        let reversed = self.assembly.counts_reversed(&self.firmware, axis);
+        self.inputs.tie(input, axis, stretch(range, position, shaft, scale, reversed));
     }
 }
 
@@ -219,18 +244,33 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
         self.assembly.model()
     }
 
-    fn set_power(&mut self, on: bool, now: Instant) {
+    fn axes(&self) -> u8 {
+        self.assembly.axes()
+    }
+
+    fn apply(&mut self, axis: AxisId, stimulus: &Stimulus, now: Instant) -> Result<(), Refused> {
+        self.check_axis(axis)?;
         self.advance(now);
-        if !on {
-            self.supply = Supply::Off;
-            let (rig, model) = self.assembly.rig_and_model_mut();
-            rig.switch_source(model, false);
-            self.watch_supply(now);
-        } else if self.running && self.supply != Supply::On {
-            self.supply = Supply::Cycling(now.plus_nanos(DRAIN_PATIENCE_NS));
-        } else {
-            self.switch_on(now);
+        match *stimulus {
+            Stimulus::Power(power) => self.switch_supply(power, now),
+            Stimulus::Input { ref name, level } => self.inputs.set(self.input_number(name)?, level),
+            Stimulus::Switch { ref name, range } => self.tie_switch(axis, self.input_number(name)?, range),
+            Stimulus::LoadTorque(torque_nm) => self.assembly.set_load_torque(axis, torque_nm)?,
+            Stimulus::LoadInertia(inertia_kg_m2) => self.assembly.set_load_inertia(axis, inertia_kg_m2)?,
+            Stimulus::RotorLock(locked) => self.assembly.set_rotor_locked(axis, locked),
+            Stimulus::Supply(source) => self.assembly.set_source(source)?,
+            Stimulus::Temperature(sensor, celsius) => self.assembly.hold_temperature(axis, sensor, celsius)?,
+            Stimulus::Fault(component, broken) => self.assembly.set_fault(axis, component, broken)?,
+            Stimulus::Battery(connected) => self.assembly.set_battery(connected)?,
+            Stimulus::Pulses(train) => self.assembly.set_pulses(train)?,
+            Stimulus::CableCut(_) => {
+                return Err(Refused::Absent { model: self.model(), what: "cable but the world's" });
+            }
+            Stimulus::Object { mux, .. } => {
+                return Err(Refused::OwnObjects { model: self.model(), object: mux });
+            }
         }
+        Ok(())
     }
 
     fn set_realism(&mut self, realism: Realism, seed: u64, now: Instant) {
@@ -239,13 +279,8 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
         self.assembly.set_realism(realism);
     }
 
-    fn cut_power(&mut self, now: Instant) {
-        self.advance(now);
-        self.cut_source(now);
-    }
-
     fn bitrate(&self) -> Option<Bitrate> {
-        self.running.then(|| self.firmware.report().bitrate)
+        self.running.then(|| self.firmware.report(AxisId::FIRST).bitrate)
     }
 
     fn advance(&mut self, now: Instant) {
@@ -256,9 +291,13 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
     }
 
     fn report(&self) -> Report {
-        let own = self.firmware.report();
-        let (shaft, rig) = self.assembly.shaft_and_rig();
-        let direction = if self.assembly.counts_reversed(&self.firmware) { -1.0 } else { 1.0 };
+        self.report_of(AxisId::FIRST)
+    }
+
+    fn report_of(&self, axis: AxisId) -> Report {
+        let own = self.firmware.report(axis);
+        let (shaft, rig) = self.assembly.shaft_and_rig(axis);
+        let direction = if self.assembly.counts_reversed(&self.firmware, axis) { -1.0 } else { 1.0 };
         let common = Report {
             node: own.node_id.raw(),
             powered: self.running,
@@ -272,77 +311,11 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
             shaft_angle_rad: shaft.angle.as_rad(),
             ..Report::default()
         };
-        self.assembly.report(&self.firmware, common)
+        self.assembly.report(&self.firmware, axis, common)
     }
 
     fn inputs(&self) -> &'static [&'static str] {
         A::INPUTS
-    }
-
-    fn set_input(&mut self, input: usize, level: bool, now: Instant) -> Result<(), Refused> {
-        self.advance(now);
-        self.inputs.set(self.input(input)?, level);
-        Ok(())
-    }
-
-    fn set_switch(&mut self, input: usize, range: SwitchRange, now: Instant) -> Result<(), Refused> {
-        self.advance(now);
-        let shaft = self.assembly.shaft_counts();
-        let scale = self.assembly.shaft_counts_per_count(&self.firmware);
-        let position = i64::from(self.firmware.report().position_counts);
-        let reversed = self.assembly.counts_reversed(&self.firmware);
-        self.inputs.tie(self.input(input)?, stretch(range, position, shaft, scale, reversed));
-        Ok(())
-    }
-
-    fn set_load_torque(&mut self, torque_nm: f64, now: Instant) -> Result<(), Refused> {
-        self.advance(now);
-        self.assembly.set_load_torque(torque_nm)
-    }
-
-    fn set_load_inertia(&mut self, inertia_kg_m2: f64, now: Instant) -> Result<(), Refused> {
-        self.advance(now);
-        self.assembly.set_load_inertia(inertia_kg_m2)
-    }
-
-    fn set_rotor_locked(&mut self, locked: bool, now: Instant) -> Result<(), Refused> {
-        self.advance(now);
-        self.assembly.set_rotor_locked(locked);
-        Ok(())
-    }
-
-    fn set_supply(&mut self, supply_v: f64, now: Instant) -> Result<(), Refused> {
-        self.set_source(Source { voltage_v: Some(supply_v), ..Source::default() }, now)
-    }
-
-    fn set_source(&mut self, source: Source, now: Instant) -> Result<(), Refused> {
-        self.advance(now);
-        self.assembly.set_source(source)
-    }
-
-    fn hold_temperature(
-        &mut self,
-        sensor: TemperatureSensor,
-        celsius: Option<f64>,
-        now: Instant,
-    ) -> Result<(), Refused> {
-        self.advance(now);
-        self.assembly.hold_temperature(sensor, celsius)
-    }
-
-    fn set_fault(&mut self, component: Component, broken: bool, now: Instant) -> Result<(), Refused> {
-        self.advance(now);
-        self.assembly.set_fault(component, broken)
-    }
-
-    fn set_battery(&mut self, connected: bool, now: Instant) -> Result<(), Refused> {
-        self.advance(now);
-        self.assembly.set_battery(connected)
-    }
-
-    fn set_pulses(&mut self, train: PulseTrain, now: Instant) -> Result<(), Refused> {
-        self.advance(now);
-        self.assembly.set_pulses(train)
     }
 
     fn modbus_unit(&self) -> Option<u8> {

@@ -1,3 +1,5 @@
+use devices::AxisId;
+
 use crate::SwitchRange;
 
 /// What the digital inputs of a drive are wired to: levels that somebody sets, low when nothing is connected, and
@@ -5,26 +7,34 @@ use crate::SwitchRange;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Inputs {
     levels: u32,
-    switches: Vec<(usize, SwitchRange)>,
+    switches: Vec<Switch>,
+}
+
+/// A switch beside a shaft.
+#[derive(Clone, Copy, Debug)]
+struct Switch {
+    input: usize,
+    axis: AxisId,
+    range: SwitchRange,
 }
 
 impl Inputs {
     /// Sets the level at input `n`; removes a switch tied to it.
     pub(super) fn set(&mut self, n: usize, level: bool) {
-        self.switches.retain(|(tied, _)| *tied != n);
+        self.switches.retain(|switch| switch.input != n);
         self.levels = self.levels & !(1 << n) | u32::from(level) << n;
     }
 
-    /// Ties input `n` to a switch that is high while the shaft is in a stretch of its own counts.
-    pub(super) fn tie(&mut self, n: usize, range: SwitchRange) {
+    /// Ties input `n` to a switch that is high while the shaft of an axis is in a stretch of its own counts.
+    pub(super) fn tie(&mut self, n: usize, axis: AxisId, range: SwitchRange) {
         self.set(n, false);
-        self.switches.push((n, range));
+        self.switches.push(Switch { input: n, axis, range });
     }
 
-    /// Bit `n` is the level of input `n` while the shaft is at these counts.
+    /// Bit `n` is the level of input `n` while the shafts are at these counts.
     #[inline]
-    pub(super) fn levels(&self, shaft_counts: impl Fn() -> i64) -> u32 {
-        let high = |(n, range): &(usize, SwitchRange)| u32::from(range.contains(shaft_counts())) << n;
+    pub(super) fn levels(&self, shaft_counts: impl Fn(AxisId) -> i64) -> u32 {
+        let high = |switch: &Switch| u32::from(switch.range.contains(shaft_counts(switch.axis))) << switch.input;
         self.switches.iter().map(high).fold(self.levels, |levels, level| levels | level)
     }
 }
@@ -49,8 +59,8 @@ mod tests {
 
     fn is_high(stretch: SwitchRange, shaft: i64) -> bool {
         let mut inputs = Inputs::default();
-        inputs.tie(1, stretch);
-        inputs.levels(|| shaft) == 2
+        inputs.tie(1, AxisId::FIRST, stretch);
+        inputs.levels(|_| shaft) == 2
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! Figures of the motor are those of `plant`; what is assumed of the surroundings is a constant below.
 
 use canopen::Mux;
+use devices::AxisId;
 use devices::Description;
 use devices::variant::Variant;
 use devices::zltech::ZLAC8030L;
@@ -182,11 +183,11 @@ impl Assembly for HubWheel {
         !self.motor.is_power_stage_burnt() && self.motor.rig.supply.bus_v >= least_v
     }
 
-    fn shaft_and_rig(&self) -> (&RotorData, &Rig) {
+    fn shaft_and_rig(&self, _axis: AxisId) -> (&RotorData, &Rig) {
         (&self.motor.rotor, &self.motor.rig)
     }
 
-    fn rig_mut(&mut self) -> &mut Rig {
+    fn rig_mut(&mut self, _axis: AxisId) -> &mut Rig {
         &mut self.motor.rig
     }
 
@@ -194,7 +195,7 @@ impl Assembly for HubWheel {
         (&mut self.motor.rig, &mut self.motor.model.rig)
     }
 
-    fn report(&self, firmware: &Zlac8030l, common: Report) -> Report {
+    fn report(&self, firmware: &Zlac8030l, _axis: AxisId, common: Report) -> Report {
         let counts_per_turn = f64::from(self.motor.model.encoder.counts_per_turn());
         let report = Report {
             statusword: common.powered.then(|| firmware.values().get(objects::STATUSWORD)),
@@ -207,11 +208,11 @@ impl Assembly for HubWheel {
     }
 
     #[inline]
-    fn shaft_counts(&self) -> i64 {
+    fn shaft_counts(&self, _axis: AxisId) -> i64 {
         self.motor.rotor.angle.count(self.motor.model.encoder.counts_per_turn())
     }
 
-    fn counts_reversed(&self, firmware: &Zlac8030l) -> bool {
+    fn counts_reversed(&self, firmware: &Zlac8030l, _axis: AxisId) -> bool {
         firmware.values().get(objects::MOTOR_DIRECTION) != 0
     }
 
@@ -223,11 +224,11 @@ impl Assembly for HubWheel {
         self.image = Image::from_bytes(image);
     }
 
-    fn set_rotor_locked(&mut self, locked: bool) {
+    fn set_rotor_locked(&mut self, _axis: AxisId, locked: bool) {
         self.motor.lock_rotor(locked);
     }
 
-    fn set_fault(&mut self, component: Component, broken: bool) -> Result<(), Refused> {
+    fn set_fault(&mut self, _axis: AxisId, component: Component, broken: bool) -> Result<(), Refused> {
         match component {
             Component::Hall => {
                 self.motor.hall_fault = if broken { HallFault::Disconnected } else { HallFault::None };

@@ -5,6 +5,7 @@
 //! the motors are those of `plant`; what is assumed of the surroundings is a constant below.
 
 use canopen::Mux;
+use devices::AxisId;
 use devices::Description;
 use devices::zltech::{ZLIM42C, ZLIM42C_82};
 use drives::engine::axis::Demand;
@@ -223,11 +224,11 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
         supply.bus_v >= if running { Self::STOPS_BELOW_V } else { Self::STARTS_AT_V } && (running || may_start)
     }
 
-    fn shaft_and_rig(&self) -> (&RotorData, &Rig) {
+    fn shaft_and_rig(&self, _axis: AxisId) -> (&RotorData, &Rig) {
         (&self.motor.rotor, &self.motor.rig)
     }
 
-    fn rig_mut(&mut self) -> &mut Rig {
+    fn rig_mut(&mut self, _axis: AxisId) -> &mut Rig {
         &mut self.motor.rig
     }
 
@@ -235,7 +236,7 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
         (&mut self.motor.rig, &mut self.motor.model.rig)
     }
 
-    fn report(&self, firmware: &Zlim42c, common: Report) -> Report {
+    fn report(&self, firmware: &Zlim42c, _axis: AxisId, common: Report) -> Report {
         let rpm = |pulses_s: f64| pulses_s * 60.0 / f64::from(firmware.pulses_per_turn());
         let demand = match *firmware.demand() {
             Demand::Position(point) | Demand::Velocity(point) => Some(point),
@@ -257,16 +258,16 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
         }
     }
 
-    fn set_rotor_locked(&mut self, locked: bool) {
+    fn set_rotor_locked(&mut self, _axis: AxisId, locked: bool) {
         self.motor.lock_rotor(locked);
     }
 
     #[inline]
-    fn shaft_counts(&self) -> i64 {
+    fn shaft_counts(&self, _axis: AxisId) -> i64 {
         self.motor.rotor.angle.count(SHAFT_COUNTS)
     }
 
-    fn shaft_counts_per_count(&self, firmware: &Zlim42c) -> i64 {
+    fn shaft_counts_per_count(&self, firmware: &Zlim42c, _axis: AxisId) -> i64 {
         i64::from(SHAFT_COUNTS) / i64::from(firmware.pulses_per_turn())
     }
 
@@ -279,11 +280,16 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
         self.zero = None;
     }
 
-    fn hold_temperature(&mut self, _sensor: TemperatureSensor, _celsius: Option<f64>) -> Result<(), Refused> {
+    fn hold_temperature(
+        &mut self,
+        _axis: AxisId,
+        _sensor: TemperatureSensor,
+        _celsius: Option<f64>,
+    ) -> Result<(), Refused> {
         Err(Refused::Absent { model: Self::MODEL, what: "temperature sensor" })
     }
 
-    fn set_fault(&mut self, component: Component, broken: bool) -> Result<(), Refused> {
+    fn set_fault(&mut self, _axis: AxisId, component: Component, broken: bool) -> Result<(), Refused> {
         match component {
             Component::Hall => return Err(Refused::Absent { model: Self::MODEL, what: "Hall sensor" }),
             Component::Encoder => return Err(Refused::Absent { model: Self::MODEL, what: "encoder" }),

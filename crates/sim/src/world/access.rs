@@ -6,8 +6,9 @@ use super::member::Member;
 use super::{Digest, FrameLog, StationId, World, WorldError};
 use crate::machine::Realism;
 use crate::recorder::Recorder;
+use crate::stimulus::{Place, Stimulus};
 use crate::wire::{ControllerOptions, ErrorCounters, Statistics};
-use crate::{Prng, Report, VirtualDrive};
+use crate::{Prng, Refused, Report, VirtualDrive};
 
 impl World {
     /// Operates the drive added under `number`: inputs, loads, faults, power.
@@ -24,6 +25,30 @@ impl World {
         self.serve(id.0);
         self.keep_events();
         Ok(result)
+    }
+
+    /// Does to a node what the outer world may do, and notes it in the recording.
+    ///
+    /// # Errors
+    /// [`WorldError::NoSuchDrive`], or what the node does not take; nothing is changed then.
+    pub fn apply(&mut self, place: Place, stimulus: &Stimulus) -> Result<Result<(), Refused>, WorldError> {
+        let Place { node, axis } = place;
+        let applied = match stimulus {
+            Stimulus::CableCut(cut) => {
+                let id = self.drive_id(node).ok_or(WorldError::NoSuchDrive(node))?;
+                if *cut {
+                    self.cut(id)
+                } else {
+                    self.join(id)
+                }
+                Ok(())
+            }
+            stimulus => self.with_drive(node, |drive, now| drive.apply(axis, stimulus, now))?,
+        };
+        if let (Ok(()), Some(recorder)) = (&applied, &mut self.recorder) {
+            recorder.note(self.now, place, stimulus);
+        }
+        Ok(applied)
     }
 
     /// What can be measured at the drive added under `number`, now.

@@ -5,6 +5,7 @@ use can::Instant;
 use super::World;
 use super::member::Member;
 use crate::recorder::Channel;
+use crate::stimulus::Place;
 use crate::wire::{Part, Passed};
 
 /// A station that leaves its deadline in the past is asked again after this time: it cannot stop the world.
@@ -57,14 +58,14 @@ impl World {
     }
 
     fn measure(&mut self, channel: Channel) -> f64 {
-        let number = channel.drive;
+        let Place { node, axis } = channel.place;
         let drive = self.members.iter_mut().find_map(|member| match member {
-            Member::Drive { number: it, drive } if *it == number => Some(drive),
+            Member::Drive { number, drive } if *number == node => Some(drive),
             _ => None,
         });
         drive.map_or(f64::NAN, |drive| {
             drive.advance(self.now);
-            channel.signal.of(&drive.report())
+            channel.signal.of(&drive.report_of(axis))
         })
     }
 

@@ -5,8 +5,9 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use can::{Bitrate, CanId, Frame, Instant, Station};
+use sim::stimulus::{Component, Power, Source, Stimulus, TemperatureSensor};
 use sim::wire::{ErrorCause, ErrorState, WireEvent};
-use sim::{Brake, Component, Levels, Refused, Report, StationId, SwitchRange, TemperatureSensor, VirtualDrive, World};
+use sim::{AxisId, Brake, Levels, Refused, Report, StationId, VirtualDrive, World};
 
 pub fn frame(text: &str) -> Frame {
     text.parse().unwrap()
@@ -133,6 +134,17 @@ impl TestDrive {
     }
 }
 
+impl TestDrive {
+    fn switch(&mut self, on: bool) {
+        self.powered = on;
+        self.answers.clear();
+        self.out.clear();
+        if on {
+            self.out.push_back(Frame::new(CanId::standard(0x700 + u16::from(self.node)), &[0]));
+        }
+    }
+}
+
 impl Station for TestDrive {
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
         if frame.standard_data_id() == Some(0x600 + u16::from(self.node)) && self.powered {
@@ -161,14 +173,40 @@ impl VirtualDrive for TestDrive {
         "testdrive"
     }
 
-    fn set_power(&mut self, on: bool, now: Instant) {
-        self.advance(now);
-        self.powered = on;
-        self.answers.clear();
-        self.out.clear();
-        if on {
-            self.out.push_back(Frame::new(CanId::standard(0x700 + u16::from(self.node)), &[0]));
+    fn apply(&mut self, axis: AxisId, stimulus: &Stimulus, now: Instant) -> Result<(), Refused> {
+        self.check_axis(axis)?;
+        let absent = |what| Refused::Absent { model: "testdrive", what };
+        if !matches!(stimulus, Stimulus::Input { .. } | Stimulus::LoadTorque(_)) {
+            self.advance(now);
         }
+        match *stimulus {
+            Stimulus::Power(Power::Cycle) => {
+                self.switch(false);
+                self.switch(true);
+            }
+            Stimulus::Power(power) => self.switch(power == Power::On),
+            Stimulus::Input { ref name, level } => self.inputs[self.input_number(name)?] = level,
+            Stimulus::Switch { ref name, range } => {
+                self.inputs[self.input_number(name)?] = range.contains(self.position);
+            }
+            Stimulus::LoadTorque(torque_nm) => self.torque_nm = torque_nm,
+            Stimulus::RotorLock(locked) => self.speed_rpm = if locked { 0.0 } else { 60.0 },
+            Stimulus::Supply(Source { voltage_v: Some(value), limit_a: None, resistance_ohm: None }) => {
+                if value > 100.0 {
+                    return Err(Refused::OutOfRange { what: "supply voltage", expected: "0 to 100 V", value });
+                }
+                self.supply_v = value;
+            }
+            Stimulus::Supply(_) => return Err(absent("limit or resistance of its supply")),
+            Stimulus::Temperature(TemperatureSensor::Motor, celsius) => self.motor_c = celsius,
+            Stimulus::Temperature(TemperatureSensor::Driver, _) => return Err(absent("driver temperature sensor")),
+            Stimulus::Fault(Component::Hall, _) => return Err(absent("Hall sensor")),
+            Stimulus::Battery(_) => return Err(absent("battery")),
+            Stimulus::Pulses(_) => return Err(absent("pulse input")),
+            Stimulus::Object { mux, .. } => return Err(Refused::OwnObjects { model: "testdrive", object: mux }),
+            Stimulus::LoadInertia(_) | Stimulus::Fault(..) | Stimulus::CableCut(_) => {}
+        }
+        Ok(())
     }
 
     fn bitrate(&self) -> Option<Bitrate> {
@@ -202,57 +240,6 @@ impl VirtualDrive for TestDrive {
 
     fn inputs(&self) -> &'static [&'static str] {
         &["X0", "X1"]
-    }
-
-    fn set_input(&mut self, input: usize, level: bool, _: Instant) -> Result<(), Refused> {
-        self.inputs[input] = level;
-        Ok(())
-    }
-
-    fn set_switch(&mut self, input: usize, range: SwitchRange, now: Instant) -> Result<(), Refused> {
-        self.advance(now);
-        self.inputs[input] = range.contains(self.position);
-        Ok(())
-    }
-
-    fn set_load_torque(&mut self, torque_nm: f64, _: Instant) -> Result<(), Refused> {
-        self.torque_nm = torque_nm;
-        Ok(())
-    }
-
-    fn set_load_inertia(&mut self, _: f64, _: Instant) -> Result<(), Refused> {
-        Ok(())
-    }
-
-    fn set_rotor_locked(&mut self, locked: bool, now: Instant) -> Result<(), Refused> {
-        self.advance(now);
-        self.speed_rpm = if locked { 0.0 } else { 60.0 };
-        Ok(())
-    }
-
-    fn set_supply(&mut self, supply_v: f64, _: Instant) -> Result<(), Refused> {
-        if supply_v > 100.0 {
-            return Err(Refused::OutOfRange { what: "supply voltage", expected: "0 to 100 V", value: supply_v });
-        }
-        self.supply_v = supply_v;
-        Ok(())
-    }
-
-    fn hold_temperature(&mut self, sensor: TemperatureSensor, celsius: Option<f64>, _: Instant) -> Result<(), Refused> {
-        match sensor {
-            TemperatureSensor::Motor => self.motor_c = celsius,
-            TemperatureSensor::Driver => {
-                return Err(Refused::Absent { model: self.model(), what: "driver temperature sensor" });
-            }
-        }
-        Ok(())
-    }
-
-    fn set_fault(&mut self, component: Component, _: bool, _: Instant) -> Result<(), Refused> {
-        match component {
-            Component::Hall => Err(Refused::Absent { model: self.model(), what: "Hall sensor" }),
-            _ => Ok(()),
-        }
     }
 
     fn nvm_generation(&self) -> u64 {

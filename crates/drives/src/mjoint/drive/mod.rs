@@ -15,6 +15,7 @@ use canopen::heartbeat::{Consumer, ConsumerEvent};
 use canopen::node::{Node, NodeProfile};
 use canopen::sdo::server::FrameLength;
 use cia402::{Controlword, ModeOfOperation, PowerState};
+use devices::AxisId;
 use motion::field_weakening::FieldWeakening;
 use motion::filter::LowPass;
 
@@ -366,7 +367,7 @@ impl Firmware for MJoint {
         self.device.is_storing()
     }
 
-    fn report(&self) -> Report {
+    fn report(&self, _axis: AxisId) -> Report {
         Report {
             powered: self.device.is_running(),
             node_id: self.device.node().node_id(),

@@ -8,6 +8,7 @@ mod commands;
 use can::{Bitrate, Instant};
 use canopen::node::{Node, NodeProfile};
 use cia402::{FaultReactionOption, ModeOfOperation, PowerState};
+use devices::AxisId;
 use motion::filter::{LowPass, LowPassGains};
 
 use super::assumptions::*;
@@ -376,7 +377,7 @@ impl Firmware for Zlac8030l {
         self.device.is_storing()
     }
 
-    fn report(&self) -> Report {
+    fn report(&self, _axis: AxisId) -> Report {
         Report {
             powered: self.device.is_running(),
             node_id: self.device.node().node_id(),

@@ -8,6 +8,7 @@ mod commands;
 use can::{Bitrate, Instant};
 use canopen::node::{Node, NodeProfile};
 use cia402::{Controlword, FaultReactionOption, PowerState};
+use devices::AxisId;
 
 use super::assumptions::*;
 use super::faults::{DEBOUNCE, FAULT_COUNT, FAULTS, FLASHES, row};
@@ -361,7 +362,7 @@ impl Firmware for Zlim42c {
         self.device.is_storing()
     }
 
-    fn report(&self) -> Report {
+    fn report(&self, _axis: AxisId) -> Report {
         Report {
             powered: self.device.is_running(),
             node_id: self.device.node().node_id(),

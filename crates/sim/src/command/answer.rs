@@ -3,80 +3,26 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use can::Instant;
 use serde::Serialize;
 
-use super::{Action, Command, CommandError, Service, parse, to_json};
+use super::{Command, CommandError, Service, to_json};
+use crate::stimulus::{FORMS, Place};
 use crate::wire::ErrorState;
-use crate::{Brake, OutputShaft, Report, StationId, VirtualDrive, World};
+use crate::{Brake, OutputShaft, Report, StationId, World};
 
 /// Does what `command` says; returns the line of JSON that answers it.
-pub(super) fn apply(world: &mut World, command: &Command, service: Service) -> Result<String, CommandError> {
+pub(super) fn answer(world: &mut World, command: &Command, service: Service) -> Result<String, CommandError> {
     match command {
         Command::Now => Ok(now(world, service)),
-        Command::Help => Ok(to_json(&Help { ok: true, help: parse::FORMS })),
+        Command::Help => Ok(to_json(&Help { ok: true, help: FORMS })),
         Command::Quit => Ok(done(world)),
-        Command::Drive { number, action } => {
-            let id = world.drive_id(*number).ok_or_else(|| no_such_drive(world, *number))?;
-            if *action == Action::Get {
-                return get(world, *number, id, service);
-            }
-            apply_to_drive(world, *number, id, action)
+        Command::Get(place) => get(world, *place, service),
+        Command::Apply(place, stimulus) => {
+            let applied = world.apply(*place, stimulus).map_err(|_| no_such_drive(world, place.node))?;
+            applied?;
+            Ok(done(world))
         }
     }
-}
-
-fn apply_to_drive(world: &mut World, number: u8, id: StationId, action: &Action) -> Result<String, CommandError> {
-    match action {
-        Action::CableCut(true) => world.cut(id),
-        Action::CableCut(false) => world.join(id),
-        Action::PowerCycle => {
-            operate(world, number, |drive, now| act(drive, &Action::Power(false), now))?;
-            operate(world, number, |drive, now| act(drive, &Action::Power(true), now))?;
-        }
-        action => operate(world, number, |drive, now| act(drive, action, now))?,
-    }
-    Ok(done(world))
-}
-
-fn act(drive: &mut dyn VirtualDrive, action: &Action, now: Instant) -> Result<(), CommandError> {
-    match action {
-        Action::Power(on) => drive.set_power(*on, now),
-        Action::PowerCut => drive.cut_power(now),
-        Action::Input { name, level } => drive.set_input(input_number(drive, name)?, *level, now)?,
-        Action::Switch { name, range } => drive.set_switch(input_number(drive, name)?, *range, now)?,
-        Action::LoadTorque(torque_nm) => drive.set_load_torque(*torque_nm, now)?,
-        Action::LoadInertia(inertia_kg_m2) => drive.set_load_inertia(*inertia_kg_m2, now)?,
-        Action::RotorLock(locked) => drive.set_rotor_locked(*locked, now)?,
-        Action::Supply(source) => drive.set_source(*source, now)?,
-        Action::Temperature(sensor, celsius) => drive.hold_temperature(*sensor, *celsius, now)?,
-        Action::Fault(component, broken) => drive.set_fault(*component, *broken, now)?,
-        Action::Battery(connected) => drive.set_battery(*connected, now)?,
-        Action::Pulses(train) => drive.set_pulses(*train, now)?,
-        // The cable, the power cycle and the report are the world's.
-        Action::CableCut(_) | Action::PowerCycle | Action::Get => {}
-    }
-    Ok(())
-}
-
-fn operate(
-    world: &mut World,
-    number: u8,
-    operation: impl FnOnce(&mut dyn VirtualDrive, Instant) -> Result<(), CommandError>,
-) -> Result<(), CommandError> {
-    match world.with_drive(number, operation) {
-        Ok(result) => result,
-        Err(_) => Err(no_such_drive(world, number)),
-    }
-}
-
-fn input_number(drive: &dyn VirtualDrive, name: &str) -> Result<usize, CommandError> {
-    let inputs = drive.inputs();
-    let place = inputs.iter().position(|input| input.eq_ignore_ascii_case(name));
-    place.ok_or_else(|| {
-        let present = if inputs.is_empty() { "none".to_string() } else { inputs.join(", ") };
-        CommandError::NoSuchInput { model: drive.model(), name: name.to_string(), present }
-    })
 }
 
 fn no_such_drive(world: &World, number: u8) -> CommandError {
@@ -171,12 +117,14 @@ impl From<OutputShaft> for Output {
     }
 }
 
-fn get(world: &mut World, number: u8, id: StationId, service: Service) -> Result<String, CommandError> {
-    let measured = world.with_drive(number, |drive, now| {
+fn get(world: &mut World, place: Place, service: Service) -> Result<String, CommandError> {
+    let id = world.drive_id(place.node).ok_or_else(|| no_such_drive(world, place.node))?;
+    let measured = world.with_drive(place.node, |drive, now| {
         drive.advance(now);
-        (drive.model(), drive.bitrate(), drive.report())
+        drive.check_axis(place.axis)?;
+        Ok::<_, CommandError>((drive.model(), drive.bitrate(), drive.report_of(place.axis)))
     });
-    let (model, bitrate, report) = measured.map_err(|_| no_such_drive(world, number))?;
+    let (model, bitrate, report) = measured.map_err(|_| no_such_drive(world, place.node))??;
     let Report { node, powered, position, velocity_rpm, current_a, supply_v, .. } = report;
     let counters = world.counters(id);
     Ok(to_json(&Got {

@@ -1,0 +1,24 @@
+//! What the outer world does to a node: one value that is parsed from words, applied to a world, recorded, and printed again.
+//!
+//! ```
+//! use sim::stimulus::{Source, Stimulus};
+//!
+//! let stimulus: Stimulus = "supply 48 limit 10".parse()?;
+//! assert_eq!(stimulus, Stimulus::Supply(Source { voltage_v: Some(48.0), limit_a: Some(10.0), resistance_ohm: None }));
+//! assert_eq!(stimulus.to_string(), "supply 48 limit 10");
+//! # Ok::<(), sim::stimulus::StimulusError>(())
+//! ```
+
+mod error;
+mod kinds;
+mod parse;
+mod place;
+mod print;
+
+pub use error::StimulusError;
+pub use kinds::{Component, ObjectValue, Power, PulseTrain, Source, Stimulus, SwitchRange, TemperatureSensor};
+pub use parse::{FORMS, GET};
+pub use place::Place;
+
+#[cfg(test)]
+mod tests;

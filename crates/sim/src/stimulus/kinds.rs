@@ -1,0 +1,153 @@
+//! What the outer world does to a node, as values.
+
+use canopen::Mux;
+
+/// One thing that the outer world does to a node and the machine around it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Stimulus {
+    /// `power on`, `power off`, `power cycle`, `power cut`.
+    Power(Power),
+    /// `input X0 1`: a digital input's level. Takes a switch away that is tied to it.
+    Input {
+        /// The input's name, in any case of letters.
+        name: String,
+        /// Its level.
+        level: bool,
+    },
+    /// `switch X0 -5000 max`: an input tied to the position. The range is given in counts of the present actual position and
+    /// fixed in the machine from then on: zeroing the position later does not move the switch.
+    Switch {
+        /// The input's name, in any case of letters.
+        name: String,
+        /// Where it is active.
+        range: SwitchRange,
+    },
+    /// `load torque 2.5`: N·m at the output shaft; positive opposes positive motion, also at standstill.
+    LoadTorque(f64),
+    /// `load inertia 0.02`: kg·m² added at the output shaft.
+    LoadInertia(f64),
+    /// `rotor lock`, `rotor free`.
+    RotorLock(bool),
+    /// `supply 48`: V; `supply 48 limit 10 resistance 0.2`: with what is behind it.
+    Supply(Source),
+    /// `temperature motor 95`, `temperature driver auto`: °C held, or back to the model.
+    Temperature(TemperatureSensor, Option<f64>),
+    /// `fault hall on`: breaks or mends a component.
+    Fault(Component, bool),
+    /// `battery off`: the multi-turn battery.
+    Battery(bool),
+    /// `pulses 8192 10000`, `quadrature -400 1000`, `duty 40`, `clock 10000`: what is sent to the pulse inputs; what was being
+    /// sent ends.
+    Pulses(PulseTrain),
+    /// `cable cut` is true, `cable join` is false: the bus cable of the node.
+    CableCut(bool),
+    /// `set 6000:01 FFh`: the value of an object of a node whose objects are the outer world's.
+    Object {
+        /// The object.
+        mux: Mux,
+        /// Its value.
+        value: ObjectValue,
+    },
+}
+
+/// What happens to the supply.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Power {
+    /// On: the firmware boots.
+    On,
+    /// Off: the drive lives on until its bus has drained.
+    Off,
+    /// Off, and on again when the drive has died of it.
+    Cycle,
+    /// Dead at once, in the middle of whatever it does.
+    Cut,
+}
+
+/// The value of an object; the object's type decides what fits.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ObjectValue {
+    /// `255`, `-5`, `FFh`, `0xFF`.
+    Integer(i128),
+    /// `1.5`, with a point or an exponent.
+    Real(f64),
+    /// `"text"`.
+    Text(String),
+}
+
+/// A supply; `None` leaves that as it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Source {
+    /// Open-circuit voltage in V.
+    pub voltage_v: Option<f64>,
+    /// The most that it gives, in A. Asked for more its voltage falls.
+    pub limit_a: Option<f64>,
+    /// Resistance of source and wires, in ohm.
+    pub resistance_ohm: Option<f64>,
+}
+
+/// A stretch of the actual position in the drive's counts, ends included; `None` reaches for ever.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SwitchRange {
+    /// Lower end.
+    pub low: Option<i64>,
+    /// Upper end.
+    pub high: Option<i64>,
+}
+
+impl SwitchRange {
+    /// True while the switch is active.
+    pub fn contains(&self, position: i64) -> bool {
+        self.low.is_none_or(|low| low <= position) && self.high.is_none_or(|high| position <= high)
+    }
+}
+
+/// Where a temperature is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TemperatureSensor {
+    /// Winding or housing of the motor.
+    Motor,
+    /// Power stage.
+    Driver,
+}
+
+/// A component that can break.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Component {
+    /// Hall sensors.
+    Hall,
+    /// Encoder.
+    Encoder,
+    /// Parameter memory.
+    Eeprom,
+    /// Reference voltage of the current measurement.
+    Reference,
+    /// A motor phase, open.
+    Phase,
+    /// A motor phase, its wires touching.
+    Short,
+    /// The power stage: a transistor that has broken down takes current from the bus.
+    Bridge,
+}
+
+/// What a controller sends to a drive's pulse inputs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PulseTrain {
+    /// Pulses with a direction.
+    Pulses {
+        /// How many; negative with the direction input conducting.
+        count: i64,
+        /// Pulses a second.
+        hz: f64,
+    },
+    /// Two channels of an encoder.
+    Quadrature {
+        /// Counts, four a line; negative with the second channel ahead.
+        count: i64,
+        /// Counts a second.
+        hz: f64,
+    },
+    /// A square wave of this duty cycle in per cent, for ever.
+    Duty(f64),
+    /// A level on the second input that changes so many times a second, for ever.
+    Clock(f64),
+}

@@ -1,0 +1,115 @@
+//! Whatever a stimulus is, its words say it: `parse(print(x)) == x`.
+
+use canopen::Mux;
+
+use super::*;
+use crate::Prng;
+
+/// Numbers of all sizes, not below `least`.
+fn number(random: &mut Prng, least: f64) -> f64 {
+    let value = match random.below(4) {
+        0 => f64::from(random.below(100) as u32),
+        1 => random.below(1 << 40) as f64 * 1e-9,
+        2 => -(random.below(1 << 40) as f64) * 1e-21,
+        _ => f64::from_bits(random.next_u64()),
+    };
+    if value.is_finite() && value >= least { value } else { least.max(0.5) }
+}
+
+fn name(random: &mut Prng) -> String {
+    ["X0", "PU", "DIR", "ä", "any"][random.below(5) as usize].to_owned()
+}
+
+fn some<T>(random: &mut Prng, value: T) -> Option<T> {
+    (random.below(2) == 0).then_some(value)
+}
+
+fn any(random: &mut Prng) -> Stimulus {
+    let coin = random.below(2) == 0;
+    match random.below(15) {
+        0 => Stimulus::Power(Power::ALL[random.below(4) as usize]),
+        1 => Stimulus::Input { name: name(random), level: coin },
+        2 => {
+            let (a, b) = (random.next_u64() as i64, random.next_u64() as i64);
+            let range = SwitchRange { low: some(random, a.min(b)), high: some(random, a.max(b)) };
+            Stimulus::Switch { name: name(random), range }
+        }
+        3 => Stimulus::LoadTorque(number(random, f64::MIN)),
+        4 => Stimulus::LoadInertia(number(random, 0.0)),
+        5 => Stimulus::RotorLock(coin),
+        6 => {
+            let [voltage_v, limit_a, ohm] = [(); 3].map(|()| number(random, 0.0));
+            let (limit_a, resistance_ohm) = (some(random, limit_a), some(random, ohm));
+            let voltage_v = Some(voltage_v).filter(|_| coin || (limit_a, resistance_ohm) == (None, None));
+            Stimulus::Supply(Source { voltage_v, limit_a, resistance_ohm })
+        }
+        7 => {
+            let celsius = number(random, -273.15);
+            Stimulus::Temperature(TemperatureSensor::ALL[usize::from(coin)], some(random, celsius))
+        }
+        8 => Stimulus::Fault(Component::ALL[random.below(7) as usize], coin),
+        9 => Stimulus::Battery(coin),
+        10 => Stimulus::Pulses(PulseTrain::Pulses { count: random.next_u64() as i64, hz: number(random, 0.0) }),
+        11 => Stimulus::Pulses(PulseTrain::Quadrature { count: random.next_u64() as i64, hz: number(random, 0.0) }),
+        12 => Stimulus::Pulses(match coin {
+            true => PulseTrain::Duty(number(random, 0.0)),
+            false => PulseTrain::Clock(number(random, 0.0)),
+        }),
+        13 => Stimulus::CableCut(coin),
+        _ => Stimulus::Object {
+            mux: Mux::new(random.next_u64() as u16, random.next_u64() as u8),
+            value: match random.below(3) {
+                0 => ObjectValue::Integer(i128::from(random.next_u64()) - i128::from(random.next_u64())),
+                1 => ObjectValue::Real(number(random, f64::MIN)),
+                _ => {
+                    ObjectValue::Text(["", "one", "two  words ", "\"quoted\"", "é\t"][random.below(5) as usize].into())
+                }
+            },
+        },
+    }
+}
+
+#[test]
+fn every_stimulus_is_read_back_from_its_words() {
+    let mut random = Prng::new(402);
+    for n in 0..50_000 {
+        let stimulus = any(&mut random);
+        let words = stimulus.to_string();
+        assert_eq!(words.parse().as_ref(), Ok(&stimulus), "{n}: {words}");
+    }
+}
+
+#[test]
+fn an_object_is_given_in_any_of_the_usual_spellings() {
+    let parsed = |words: &str| words.parse::<Stimulus>();
+    let set = |index, sub_index, value| Ok(Stimulus::Object { mux: Mux::new(index, sub_index), value });
+    for words in ["set 6000:01 FFh", "set 6000h:01h 0xff", "set 0x6000:0x1 255"] {
+        assert_eq!(parsed(words), set(0x6000, 1, ObjectValue::Integer(255)), "{words}");
+    }
+    assert_eq!(parsed("set 2000 -5"), set(0x2000, 0, ObjectValue::Integer(-5)));
+    assert_eq!(parsed("set 2000 1.5"), set(0x2000, 0, ObjectValue::Real(1.5)));
+    assert_eq!(parsed("set  2000 \"two  words\""), set(0x2000, 0, ObjectValue::Text("two  words".into())));
+    for (words, error) in [
+        ("set", "expected: NODE set OBJECT VALUE"),
+        ("set 6000:01", "expected: NODE set OBJECT VALUE"),
+        ("set 60000 1", "\"60000\" is no object; expected: NODE set OBJECT VALUE"),
+        ("set 6000:100 1", "\"6000:100\" is no object; expected: NODE set OBJECT VALUE"),
+        ("set 6000 -FFh", "\"-FFh\" is no value; expected: NODE set OBJECT VALUE"),
+        ("set 6000 \"open", "\"\\\"open\" is no value; expected: NODE set OBJECT VALUE"),
+        ("set 6000 nan", "\"nan\" is no value; expected: NODE set OBJECT VALUE"),
+    ] {
+        assert_eq!(parsed(words).unwrap_err().to_string(), error, "{words}");
+    }
+}
+
+#[test]
+fn a_place_is_a_node_or_an_axis_of_it_counted_from_1() {
+    for (text, node, axis) in [("5", 5, 0), ("5.2", 5, 1), ("127.8", 127, 7)] {
+        let place = Place { node, axis: devices::AxisId(axis) };
+        assert_eq!((text.parse(), place.to_string()), (Ok(place), text.to_owned()));
+    }
+    assert_eq!("5.1".parse(), Ok(Place::node(5)));
+    for text in ["", "0", "128", "5.", "5.0", ".2", "5.-1", "5.257", "+5", "5.2.1", "5 2"] {
+        assert_eq!(text.parse::<Place>(), Err(()), "{text:?}");
+    }
+}
