@@ -1,9 +1,15 @@
 //! Two axes on one node: by CiA 402's index offset of 800h, and at a second sub-index as some makers have it.
 
-use canopen::Mux;
-use canopen::od::{Entry, Table};
+use std::time::Duration;
+
+use can::Bitrate;
+use canopen::od::{Access, DataType, Entry, Table};
+use canopen::{Mux, NodeId};
 use devices::servo::{CIA402, MODES, axis};
-use devices::{AxisDescription, Description, Placement};
+use devices::{AxisDescription, AxisId, Description, Placement};
+use sim::machine::{Order, order as order_machine};
+use sim::recorder::{Channel, Recorder, Signal};
+use sim::{Place, VirtualDrive, World};
 
 use crate::bench::{Bench, TURN};
 
@@ -108,4 +114,84 @@ fn what_both_axes_need_stops_both() {
         assert_eq!((bench.read(status, 0) & 0x4F, bench.read(error, 0)), (0x08, 0x4210));
     }
     assert_eq!(bench.emcy(), [0x4210], "told once");
+}
+
+/// A world with a two-axis servo as node 5.
+fn world() -> World {
+    let model = by_offset();
+    let order = Order::new(model, NodeId::new(5).unwrap(), Bitrate::M1);
+    let mut world = World::new(Bitrate::M1, 1);
+    world.add_tap();
+    world.add_drive(5, order_machine(model, &order).unwrap()).unwrap();
+    world.run_for(Duration::from_millis(300));
+    world
+}
+
+fn tell(world: &mut World, line: &str) -> String {
+    sim::command::answer(world, line).unwrap().json
+}
+
+fn report(world: &mut World, axis: u8) -> sim::Report {
+    let look = |drive: &mut dyn VirtualDrive, now| {
+        drive.advance(now);
+        drive.report_of(AxisId(axis))
+    };
+    world.with_drive(5, look).unwrap()
+}
+
+#[test]
+fn the_outer_world_reaches_each_axis_by_its_number() {
+    let mut world = world();
+    let channel = |axis| Channel { place: Place { node: 5, axis: AxisId(axis) }, signal: Signal::Velocity };
+    world.start_recording(Recorder::new(Duration::from_millis(10), [channel(0), channel(1)]));
+    // Nothing is enabled: the load alone turns the second shaft.
+    assert!(tell(&mut world, "5.2 load torque -0.3").starts_with("{\"ok\":true"));
+    world.run_for(Duration::from_millis(200));
+    let (first, second) = (report(&mut world, 0), report(&mut world, 1));
+    assert!(first.velocity_rpm.abs() < 1e-6 && second.velocity_rpm > 100.0, "{first:?} {second:?}");
+    assert!(second.position > first.position);
+    assert!(tell(&mut world, "5.2 get").contains(&format!("\"position\":{}", second.position)));
+    tell(&mut world, "5.2 rotor lock");
+    world.run_for(Duration::from_millis(10));
+    assert_eq!(report(&mut world, 1).velocity_rpm, 0.0);
+    assert_eq!(tell(&mut world, "5.3 get"), r#"{"ok":false,"error":"a two-axes-by-offset has no axis 3; it has 2"}"#);
+    let recorder = world.stop_recording().unwrap();
+    assert!(recorder.to_csv().starts_with("t_s,5.velocity_rpm,5.2.velocity_rpm,mark\n"));
+    assert!(recorder.samples(1).any(|rpm| rpm > 100.0) && recorder.samples(0).all(|rpm| rpm.abs() < 1e-6));
+}
+
+#[test]
+fn the_objects_of_a_node_that_is_no_drive_are_the_outer_worlds() {
+    const ROWS: &[Entry] = &[
+        Entry::new(0x1000, 0, DataType::Unsigned32, Access::ReadOnly, "device_type", "").default(0x191),
+        Entry::new(0x1001, 0, DataType::Unsigned8, Access::ReadOnly, "error_register", ""),
+        Entry::new(0x6000, 1, DataType::Unsigned8, Access::ReadOnly, "read_input_8_bit", ""),
+        Entry::new(0x6401, 1, DataType::Integer16, Access::ReadOnly, "read_analogue_input", ""),
+    ];
+    let model = leak(Description { name: "inputs", dictionary: table(ROWS.to_vec()), axes: &[], ..CIA402 });
+    let order = Order::new(model, NodeId::new(9).unwrap(), Bitrate::M1);
+    let mut world = World::new(Bitrate::M1, 1);
+    let host = world.add_tap();
+    world.add_drive(9, order_machine(model, &order).unwrap()).unwrap();
+    world.run_for(Duration::from_millis(300));
+    for line in ["9 set 6000:01 FFh", "9 set 6401:01 -2"] {
+        assert!(tell(&mut world, line).starts_with("{\"ok\":true"), "{line}");
+    }
+    while world.poll_received(host).is_some() {}
+    for (request, answer) in [("40006001", "4F006001FF000000"), ("40016401", "4B016401FEFF0000")] {
+        world.send(host, format!("609#{request}00000000").parse().unwrap()).unwrap();
+        world.run_for(Duration::from_millis(20));
+        let (_, frame) = world.poll_received(host).unwrap();
+        assert_eq!(frame.to_string(), format!("589#{answer}"));
+    }
+    for (line, error) in [
+        ("9 set 6000:01 256", "object 6000h:01 does not take it: UNSIGNED8 takes 0 to 255"),
+        ("9 set 6001:00 1", "object 6001h:00 does not take it: the device has no such object"),
+        ("9 set 6000:01 \\\"on\\\"", "object 6000h:01 does not take it: it is of type UNSIGNED8"),
+        ("9 load torque 1", "a inputs has no motor"),
+        ("9 input X0 1", "a inputs has no input \\\"X0\\\"; it has none"),
+    ] {
+        let answer = tell(&mut world, &line.replace("\\\"", "\""));
+        assert_eq!(answer, format!("{{\"ok\":false,\"error\":\"{error}\"}}"), "{line}");
+    }
 }

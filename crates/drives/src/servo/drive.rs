@@ -10,10 +10,10 @@ use canopen::NodeId;
 use canopen::node::NodeProfile;
 use canopen::od::Entry;
 use cia402::{AbortConnectionOption, FaultReactionOption, PowerCommand};
-use devices::Description;
 use devices::faults::FaultRow;
 use devices::servo::faults::{FAULT_COUNT, FAULTS, row};
 use devices::variant::Variant;
+use devices::{AxisId, Description};
 
 use super::hardware::{Actuation, Hardware, MAX_AXES, Sensors};
 use super::motor::{CONTROL_PERIOD_NS, CONTROL_PERIOD_S, Motor, SUPERVISION_DIVIDER};
@@ -114,18 +114,22 @@ impl ServoDrive {
 
     /// What the control loops of an axis are asked for, to look at.
     pub fn demand(&self, axis: usize) -> Option<&crate::engine::axis::Demand> {
-        Some(self.shafts.get(axis)?.as_ref()?.demand())
+        Some(self.shaft(axis)?.demand())
     }
 
-    /// The statusword of the first axis, where it has one.
-    pub fn statusword(&self) -> Option<u16> {
-        let slot = self.shafts[0].as_ref()?.slots().statusword?;
+    /// The statusword of an axis, where it has one.
+    pub fn statusword(&self, axis: usize) -> Option<u16> {
+        let slot = self.shaft(axis)?.slots().statusword?;
         Some(self.values().raw(slot) as u16)
     }
 
     /// Position of an axis in encoder increments.
     pub fn increments(&self, axis: usize) -> Option<i32> {
-        Some(self.shafts.get(axis)?.as_ref()?.position())
+        Some(self.shaft(axis)?.position())
+    }
+
+    fn shaft(&self, axis: usize) -> Option<&Shaft> {
+        self.shafts.get(axis)?.as_ref()
     }
 
     fn make_shafts(&mut self) {
@@ -338,19 +342,19 @@ impl Firmware for ServoDrive {
         false
     }
 
-    fn report(&self) -> Report {
-        let first = self.shafts[0].as_ref().expect("a servo has an axis");
+    fn report(&self, axis: AxisId) -> Report {
+        let shaft = self.shaft(usize::from(axis.0)).or(self.shaft(0)).expect("a servo has an axis");
         Report {
             powered: self.device.is_running(),
             node_id: self.device.node().node_id(),
             bitrate: self.device.bitrate(),
-            state: first.power().state(),
-            mode: first.power().mode(),
-            fault_code: super::read(self.values(), first.slots().error_code, 0) as u16,
-            position_counts: first.parameters().scales.position(first.position()) as i32,
-            velocity_rpm: first.velocity_rpm(),
-            current_a: first.current_a(),
-            brake_engaged: *first.demand() == crate::engine::axis::Demand::Off,
+            state: shaft.power().state(),
+            mode: shaft.power().mode(),
+            fault_code: super::read(self.values(), shaft.slots().error_code, 0) as u16,
+            position_counts: shaft.parameters().scales.position(shaft.position()) as i32,
+            velocity_rpm: shaft.velocity_rpm(),
+            current_a: shaft.current_a(),
+            brake_engaged: *shaft.demand() == crate::engine::axis::Demand::Off,
         }
     }
 }

@@ -1,12 +1,15 @@
 //! A described device that is no drive: its objects on the bus, a supply switch and a memory, and nothing that turns.
 
 use can::{Bitrate, Frame, Instant, Station};
-use devices::Description;
+use canopen::Mux;
+use canopen::od::{DataType, Entry};
+use devices::{AxisId, Description};
 use drives::node::{DescribedNode, Memory, conditions};
 
 use super::kept;
 use super::order::{self, Order, OrderError};
-use crate::{Component, Refused, Report, SwitchRange, TemperatureSensor, VirtualDrive};
+use crate::stimulus::{ObjectValue, Power, Stimulus};
+use crate::{Refused, Report, VirtualDrive};
 
 /// Supply that such devices have. Assumed: the 24 V of control cabinets.
 const SUPPLY_V: f64 = 24.0;
@@ -31,8 +34,47 @@ impl NodeMachine {
         &self.firmware
     }
 
+    fn switch(&mut self, on: bool, now: Instant) {
+        if self.firmware.is_running() {
+            self.memory = *self.firmware.memory().0;
+            self.firmware.power_off();
+        }
+        if on {
+            self.firmware.power_on(self.memory, now);
+        }
+    }
+
+    /// As the device's application would: what a sensor measured, whatever the object's access is.
+    fn set_object(&mut self, object: Mux, value: &ObjectValue, now: Instant) -> Result<(), Refused> {
+        let bad = |reason: String| Refused::BadObject { object, reason };
+        let slot = self.firmware.find(object).ok_or_else(|| bad("the device has no such object".to_owned()))?;
+        if !self.firmware.is_running() {
+            return Err(bad("the device has no power".to_owned()));
+        }
+        let raw = raw(self.firmware.values().table().row(slot), value).map_err(bad)?;
+        self.firmware.set(slot, raw, now);
+        Ok(())
+    }
+
     const fn absent(&self, what: &'static str) -> Refused {
         Refused::Absent { model: self.firmware.description().name, what }
+    }
+}
+
+/// The cell of an object for a value, or what the object would take.
+fn raw(row: &Entry, value: &ObjectValue) -> Result<u32, String> {
+    let (data_type, name) = (row.data_type, row.data_type.name());
+    match (data_type, value) {
+        (DataType::Real32, ObjectValue::Real(real)) => Ok((*real as f32).to_bits()),
+        (DataType::Real32, ObjectValue::Integer(integer)) => Ok((*integer as f32).to_bits()),
+        (DataType::Boolean, ObjectValue::Integer(integer @ 0..=1)) => Ok(u32::from(*integer == 1)),
+        (_, ObjectValue::Integer(integer)) if data_type.fits_cell() && data_type.is_integer() => {
+            let (low, high) = data_type.range();
+            let fits = i64::try_from(*integer).ok().filter(|integer| (low..=high).contains(integer));
+            fits.map(|integer| data_type.raw(integer)).ok_or_else(|| format!("{name} takes {low} to {high}"))
+        }
+        _ if !data_type.fits_cell() => Err(format!("it is of type {name}, which cannot be set from outside")),
+        _ => Err(format!("it is of type {name}")),
     }
 }
 
@@ -67,14 +109,29 @@ impl VirtualDrive for NodeMachine {
         self.firmware.description().name
     }
 
-    fn set_power(&mut self, on: bool, now: Instant) {
-        if self.firmware.is_running() {
-            self.memory = *self.firmware.memory().0;
-            self.firmware.power_off();
+    fn apply(&mut self, axis: AxisId, stimulus: &Stimulus, now: Instant) -> Result<(), Refused> {
+        self.check_axis(axis)?;
+        match stimulus {
+            Stimulus::Power(Power::Cycle) => {
+                self.switch(false, now);
+                self.switch(true, now);
+            }
+            Stimulus::Power(power) => self.switch(*power == Power::On, now),
+            Stimulus::Object { mux, value } => return self.set_object(*mux, value, now),
+            Stimulus::Input { name, .. } | Stimulus::Switch { name, .. } => {
+                self.input_number(name)?;
+            }
+            Stimulus::LoadTorque(_) | Stimulus::LoadInertia(_) | Stimulus::RotorLock(_) => {
+                return Err(self.absent("motor"));
+            }
+            Stimulus::Supply(_) => return Err(self.absent("supply but on and off")),
+            Stimulus::Temperature(..) => return Err(self.absent("such sensor")),
+            Stimulus::Fault(..) => return Err(self.absent("such component")),
+            Stimulus::Battery(_) => return Err(self.absent("battery")),
+            Stimulus::Pulses(_) => return Err(self.absent("pulse input")),
+            Stimulus::CableCut(_) => return Err(self.absent("cable but the world's")),
         }
-        if on {
-            self.firmware.power_on(self.memory, now);
-        }
+        Ok(())
     }
 
     fn bitrate(&self) -> Option<Bitrate> {
@@ -91,43 +148,6 @@ impl VirtualDrive for NodeMachine {
 
     fn inputs(&self) -> &'static [&'static str] {
         &[]
-    }
-
-    fn set_input(&mut self, _input: usize, _level: bool, _now: Instant) -> Result<(), Refused> {
-        Err(self.absent("such input"))
-    }
-
-    fn set_switch(&mut self, _input: usize, _range: SwitchRange, _now: Instant) -> Result<(), Refused> {
-        Err(self.absent("such input"))
-    }
-
-    fn set_load_torque(&mut self, _torque_nm: f64, _now: Instant) -> Result<(), Refused> {
-        Err(self.absent("motor"))
-    }
-
-    fn set_load_inertia(&mut self, _inertia_kg_m2: f64, _now: Instant) -> Result<(), Refused> {
-        Err(self.absent("motor"))
-    }
-
-    fn set_rotor_locked(&mut self, _locked: bool, _now: Instant) -> Result<(), Refused> {
-        Err(self.absent("motor"))
-    }
-
-    fn set_supply(&mut self, _supply_v: f64, _now: Instant) -> Result<(), Refused> {
-        Err(self.absent("supply but on and off"))
-    }
-
-    fn hold_temperature(
-        &mut self,
-        _sensor: TemperatureSensor,
-        _celsius: Option<f64>,
-        _now: Instant,
-    ) -> Result<(), Refused> {
-        Err(self.absent("such sensor"))
-    }
-
-    fn set_fault(&mut self, _component: Component, _broken: bool, _now: Instant) -> Result<(), Refused> {
-        Err(self.absent("such component"))
     }
 
     fn nvm_generation(&self) -> u64 {

@@ -4,9 +4,9 @@
 //! [`without_effect`].
 
 use canopen::Mux;
-use devices::Description;
 use devices::servo::variations::VARIATIONS;
 use devices::variant::Pick;
+use devices::{AxisId, Description};
 use drives::node::{MEMORY_SIZE, Memory};
 use drives::servo::{
     Actuation, AxisActuation, AxisSensors, Hardware, MAX_AXES, Motor, Sensors, ServoDrive, acts_on, conditions,
@@ -162,6 +162,16 @@ impl ServoBench {
         self.motors.get_mut(axis)
     }
 
+    /// The motor of an axis; of one that there is not, the first.
+    fn at(&self, axis: AxisId) -> &HubMotor {
+        self.motors.get(usize::from(axis.0)).unwrap_or(self.first())
+    }
+
+    fn at_mut(&mut self, axis: AxisId) -> &mut HubMotor {
+        let number = Some(usize::from(axis.0)).filter(|number| *number < self.motors.len());
+        &mut self.motors[number.unwrap_or(0)]
+    }
+
     fn first(&self) -> &HubMotor {
         &self.motors[0]
     }
@@ -295,12 +305,17 @@ impl Assembly for ServoBench {
         !self.first().is_power_stage_burnt() && self.first().rig.supply.bus_v >= least_v
     }
 
-    fn shaft_and_rig(&self) -> (&RotorData, &Rig) {
-        (&self.first().rotor, &self.first().rig)
+    fn axes(&self) -> u8 {
+        self.motors.len() as u8
     }
 
-    fn rig_mut(&mut self) -> &mut Rig {
-        &mut self.motors[0].rig
+    fn shaft_and_rig(&self, axis: AxisId) -> (&RotorData, &Rig) {
+        let motor = self.at(axis);
+        (&motor.rotor, &motor.rig)
+    }
+
+    fn rig_mut(&mut self, axis: AxisId) -> &mut Rig {
+        &mut self.at_mut(axis).rig
     }
 
     fn rig_and_model_mut(&mut self) -> (&mut Rig, &mut RigModel) {
@@ -308,25 +323,26 @@ impl Assembly for ServoBench {
         (&mut first.rig, &mut first.model.rig)
     }
 
-    fn report(&self, firmware: &ServoDrive, common: Report) -> Report {
-        let counts_per_turn = f64::from(self.first().model.encoder.counts_per_turn());
-        let released = self.last.axes[0].brake_released;
+    fn report(&self, firmware: &ServoDrive, axis: AxisId, common: Report) -> Report {
+        let counts_per_turn = f64::from(self.at(axis).model.encoder.counts_per_turn());
+        let number = usize::from(axis.0);
+        let released = self.last.axes.get(number).is_some_and(|axis| axis.brake_released);
         let report = Report {
-            statusword: common.powered.then(|| firmware.statusword()).flatten(),
+            statusword: common.powered.then(|| firmware.statusword(number)).flatten(),
             outputs: Levels::new(OUTPUTS, &[released]),
             damage: self.damage(),
             brake: Some(if released { Brake::Released } else { Brake::Engaged }),
             ..common
         };
-        match firmware.demand(0) {
+        match firmware.demand(number) {
             Some(demand) => with_demand(demand, |counts_s| counts_s * 60.0 / counts_per_turn, report),
             None => report,
         }
     }
 
-    fn shaft_counts(&self) -> i64 {
-        let first = self.first();
-        first.rotor.angle.count(first.model.encoder.counts_per_turn())
+    fn shaft_counts(&self, axis: AxisId) -> i64 {
+        let motor = self.at(axis);
+        motor.rotor.angle.count(motor.model.encoder.counts_per_turn())
     }
 
     fn image(&self) -> &[u8] {
@@ -337,12 +353,12 @@ impl Assembly for ServoBench {
         self.hardware.memory = Memory::from_bytes(&image[..image.len().min(MEMORY_SIZE)]);
     }
 
-    fn set_rotor_locked(&mut self, locked: bool) {
-        self.motors.iter_mut().for_each(|motor| motor.lock_rotor(locked));
+    fn set_rotor_locked(&mut self, axis: AxisId, locked: bool) {
+        self.at_mut(axis).lock_rotor(locked);
     }
 
-    fn set_fault(&mut self, component: Component, broken: bool) -> Result<(), Refused> {
-        let motor = &mut self.motors[0];
+    fn set_fault(&mut self, axis: AxisId, component: Component, broken: bool) -> Result<(), Refused> {
+        let motor = self.at_mut(axis);
         match component {
             Component::Hall => motor.hall_fault = if broken { HallFault::Disconnected } else { HallFault::None },
             Component::Encoder => {
