@@ -2,7 +2,7 @@
 //!
 //! Each public function is the body of one test and fails with the list of what differs.
 
-use canopen::od::{Access, DefaultValue, Dictionary, Entry, Table};
+use canopen::od::{Access, DefaultValue, Dictionary, Entry, Fixed, Table};
 use canopen::{Mux, NodeId};
 use cia402::{Controlword, PowerEvent, PowerState, Statusword, transition};
 
@@ -68,7 +68,7 @@ fn limit_differences<const N: usize>(
     if !row.writable {
         return Vec::new();
     }
-    let dictionary: Dictionary<N> = Dictionary::new(table, node);
+    let dictionary: Dictionary<Fixed<N>> = Dictionary::new(table, node);
     let slot = table.find(ours.mux()).expect("a row of the table");
     let (least, most) = ours.data_type.range();
     let (low, high) = row.limits.unwrap_or((least, most));

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use can::{Frame, Instant, Station};
 use canopen::node::{Node, NodeProfile};
-use canopen::od::{Access, DataType, Entry, Table, keys};
+use canopen::od::{Access, DataType, Entry, Fixed, Index, Table};
 use canopen::sdo::Client;
 use canopen::sdo::client::Outcome;
 use canopen::{Mux, NodeId};
@@ -106,11 +106,11 @@ static ROWS: [Entry; ROW_COUNT] = {
     assert!(all.count == ROW_COUNT);
     all.rows
 };
-static KEYS: [u32; ROW_COUNT] = keys(&ROWS);
-static TABLE: Table = Table::new(&ROWS, &KEYS);
+static INDEX: Index<ROW_COUNT> = Index::of(&ROWS);
+static TABLE: Table = Table::new(&ROWS, &INDEX);
 static PROFILE: NodeProfile = NodeProfile::cia_301(&TABLE);
 
-type BenchNode = Node<256>;
+type BenchNode = Node<Fixed<256>>;
 
 fn node_id() -> NodeId {
     NodeId::new(4).unwrap()

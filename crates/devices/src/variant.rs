@@ -4,7 +4,7 @@
 //! Each model lists its [`Variation`]s as const data; a [`Variant`] is what one drive picked of them, the first choice of each
 //! unless somebody said otherwise. A firmware asks its variant with a [`Pick`] that was looked up at compile time.
 
-use canopen::od::{Dictionary, Entry, Table};
+use canopen::od::{Dictionary, Entry, Storage, Table};
 use canopen::{AbortCode, Mux, NodeId};
 
 /// How sure it is that the real drive does this, from most to least.
@@ -105,7 +105,7 @@ impl Preset {
     ///
     /// # Errors
     /// [`PresetError`]; the values are as before.
-    pub fn store<const N: usize>(self, values: &mut Dictionary<N>) -> Result<(), PresetError> {
+    pub fn store<S: Storage>(self, values: &mut Dictionary<S>) -> Result<(), PresetError> {
         self.store_if(values, Entry::is_kept)
     }
 
@@ -113,9 +113,9 @@ impl Preset {
     ///
     /// # Errors
     /// [`PresetError`]; the values are as before.
-    pub fn store_if<const N: usize>(
+    pub fn store_if<S: Storage>(
         self,
-        values: &mut Dictionary<N>,
+        values: &mut Dictionary<S>,
         is_kept: impl Fn(&Entry) -> bool,
     ) -> Result<(), PresetError> {
         let table = values.table();
@@ -201,7 +201,7 @@ impl Variant {
     }
 
     /// The values as delivered, of a device with this node-ID: those of the object table, and of the choices on top.
-    pub fn delivered<const N: usize>(&self, table: &'static Table, node_id: NodeId) -> Dictionary<N> {
+    pub fn delivered<S: Storage>(&self, table: &'static Table, node_id: NodeId) -> Dictionary<S> {
         let mut values = Dictionary::new(table, node_id);
         self.apply_factory_values(&mut values, |_| true);
         values
@@ -209,7 +209,7 @@ impl Variant {
 
     /// Puts the factory values of the choices into a dictionary that holds those of the object table, for the rows that
     /// `wanted` names. Objects that the table does not have are passed over.
-    pub fn apply_factory_values<const N: usize>(&self, values: &mut Dictionary<N>, wanted: fn(&Entry) -> bool) {
+    pub fn apply_factory_values<S: Storage>(&self, values: &mut Dictionary<S>, wanted: fn(&Entry) -> bool) {
         let table = values.table();
         for preset in self.choices().flat_map(|(_, choice)| choice.factory) {
             let Ok(slot) = table.find(preset.object) else { continue };
@@ -274,7 +274,7 @@ const fn is_same(a: &str, b: &str) -> bool {
 mod tests {
     use super::*;
     use crate::row::{U16, rw, rws};
-    use canopen::od::keys;
+    use canopen::od::{Fixed, Index};
 
     const VARIATIONS: &[Variation] = &[
         Variation {
@@ -301,8 +301,8 @@ mod tests {
     const RIGHT: Pick = Pick::of(VARIATIONS, "X001", "right");
     static ROWS: [Entry; 2] =
         [rws(0x2000, 0, U16, "a", "").default(7).range(0, 100), rw(0x2001, 0, U16, "b", "").default(8)];
-    static KEYS: [u32; 2] = keys(&ROWS);
-    static TABLE: Table = Table::new(&ROWS, &KEYS);
+    static INDEX: Index<2> = Index::of(&ROWS);
+    static TABLE: Table = Table::new(&ROWS, &INDEX);
 
     #[test]
     fn the_first_choice_holds_until_another_is_taken() {
@@ -324,7 +324,7 @@ mod tests {
 
     #[test]
     fn factory_values_are_those_of_the_choice() {
-        let mut values = Dictionary::<2>::new(&TABLE, NodeId::MIN);
+        let mut values = Dictionary::<Fixed<2>>::new(&TABLE, NodeId::MIN);
         let mut variant = Variant::first_of(VARIATIONS);
         variant.apply_factory_values(&mut values, |_| true);
         assert_eq!(values.value(TABLE.slot(0x2000, 0)), 7);
@@ -335,7 +335,7 @@ mod tests {
 
     #[test]
     fn a_preset_is_held_to_what_the_drive_would_store() {
-        let mut values = Dictionary::<2>::new(&TABLE, NodeId::MIN);
+        let mut values = Dictionary::<Fixed<2>>::new(&TABLE, NodeId::MIN);
         assert_eq!(Preset::new(0x2000, 0, 5).store(&mut values), Ok(()));
         assert_eq!(values.value(TABLE.slot(0x2000, 0)), 5);
         assert_eq!(Preset::new(0x2001, 0, 5).store(&mut values), Err(PresetError::NotStored));

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use can::{CanId, Frame, Instant, Station};
-use canopen::od::Access;
+use canopen::od::{Access, Fixed};
 use canopen::sdo::wire;
 use canopen::{Node, NodeId, NodeProfile};
 use drives::zlac8030l::objects::{ROW_COUNT, TABLE};
@@ -46,7 +46,7 @@ pub(super) fn sdo_wire(data: &[u8]) {
 /// Any sequence of frames leaves a node that answers an SDO request with at most one frame of eight bytes, whose
 /// read-only objects have not changed and whose other objects lie within their limits.
 pub(super) fn node(data: &[u8]) {
-    let mut node: Node<ROW_COUNT> = Node::new(&PROFILE, NodeId::new(NODE_ID).expect("4 is a node-ID"));
+    let mut node: Node<Fixed<ROW_COUNT>> = Node::new(&PROFILE, NodeId::new(NODE_ID).expect("4 is a node-ID"));
     let mut now = Instant::ZERO;
     node.boot(now);
     drain(&mut node);
@@ -65,16 +65,16 @@ pub(super) fn node(data: &[u8]) {
     }
 }
 
-fn drain(node: &mut Node<ROW_COUNT>) -> Vec<Frame> {
+fn drain(node: &mut Node<Fixed<ROW_COUNT>>) -> Vec<Frame> {
     while node.poll_event().is_some() {}
     std::iter::from_fn(|| node.poll_transmit()).take(64).collect()
 }
 
-fn values(node: &Node<ROW_COUNT>) -> HashMap<u32, i64> {
+fn values(node: &Node<Fixed<ROW_COUNT>>) -> HashMap<u32, i64> {
     TABLE.iter().map(|(slot, row)| (row.mux().key(), node.dictionary().value(slot))).collect()
 }
 
-fn judge(node: &Node<ROW_COUNT>, first: &HashMap<u32, i64>, frame: &Frame) {
+fn judge(node: &Node<Fixed<ROW_COUNT>>, first: &HashMap<u32, i64>, frame: &Frame) {
     for (slot, row) in TABLE.iter() {
         let value = node.dictionary().value(slot);
         if matches!(row.access, Access::ReadOnly | Access::Const) {

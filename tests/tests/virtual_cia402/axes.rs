@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use can::Bitrate;
-use canopen::od::{Access, DataType, Entry, Table};
+use canopen::od::{Access, DataType, Entry, FREE_PLACES, RowFacts, Table};
 use canopen::{Mux, NodeId};
 use devices::servo::{CIA402, MODES, axis};
 use devices::{AxisDescription, AxisId, Description, Placement};
@@ -20,8 +20,8 @@ fn leak<T>(value: T) -> &'static T {
 fn table(mut rows: Vec<Entry>) -> &'static Table {
     rows.sort_by_key(|row| row.mux().key());
     let rows: &'static [Entry] = rows.leak();
-    let keys: &'static [u32] = rows.iter().map(|row| row.mux().key()).collect::<Vec<_>>().leak();
-    leak(Table::new(rows, keys))
+    let (facts, places) = (vec![RowFacts::NONE; rows.len()].leak(), vec![FREE_PLACES; rows.len()].leak());
+    leak(Table::at_run_time(rows, facts, places).expect("no object twice"))
 }
 
 fn described(name: &'static str, dictionary: &'static Table, axes: [AxisDescription; 2]) -> &'static Description {

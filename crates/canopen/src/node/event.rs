@@ -1,17 +1,6 @@
 use crate::NmtState;
-use crate::od::Slot;
-use crate::pdo::MAX_OBJECTS;
-use crate::pdo::PdoNumber;
-
-/// SYNC, and the objects of every RPDO that waited for it.
-const MOST_OF_SYNC: usize = 1 + PdoNumber::PREDEFINED * MAX_OBJECTS;
-/// A frame that all RPDOs listen to, each of which was too short before: [`NodeEvent::RpdoFits`] and its objects.
-const MOST_OF_AN_RPDO: usize = PdoNumber::PREDEFINED * (1 + MAX_OBJECTS);
-
-/// How many events may wait for the owner: at least what one frame makes. An owner that polls after every `handle_*`
-/// never loses one; another is told [`NodeEvent::EventsLost`].
-pub const EVENT_QUEUE_LENGTH: usize =
-    if MOST_OF_SYNC > MOST_OF_AN_RPDO { MOST_OF_SYNC } else { MOST_OF_AN_RPDO }.next_power_of_two();
+use crate::od::{Slot, Storage, Table};
+use crate::pdo::{Direction, MAX_OBJECTS, PdoId, PdoNumber};
 
 /// What a node tells its owner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,10 +10,21 @@ pub enum NodeEvent {
     Written {
         /// The entry.
         slot: Slot,
-        /// Its cell after this write.
+        /// Its cell after this write; of a value longer than a cell how many bytes it has.
         raw: u32,
         /// The way it came.
         via: Via,
+    },
+    /// A peer wants to write an entry with [`Condition::Ask`](crate::od::Condition::Ask), and its SDO waits for
+    /// [`Node::answer`](super::Node::answer). The dictionary has the old value; access, length and limits are in order.
+    Asked {
+        /// The entry.
+        slot: Slot,
+        /// What would be stored, in as many low bytes as the entry has; of a value longer than a cell how many bytes wait:
+        /// [`Node::asked_bytes`](super::Node::asked_bytes).
+        raw: u32,
+        /// Which question this is.
+        ticket: Ticket,
     },
     /// A new NMT state was entered.
     Nmt(NmtState),
@@ -44,25 +44,56 @@ pub enum NodeEvent {
     EventsLost,
 }
 
-/// What waits for the owner, in the order of arrival. When full, the oldest are lost, and that is told in their place.
-#[derive(Clone, Debug)]
-pub(super) struct EventQueue {
-    events: [NodeEvent; EVENT_QUEUE_LENGTH],
-    /// How many were ever taken and put, modulo 256: two counters, so that neither waits for the other.
-    taken: u8,
-    put: u8,
+/// Which question to the owner: an answer to an older one is not taken for this one's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ticket(pub(super) u16);
+
+/// How many events one frame can make: an owner that polls after every `handle_*` and has room for them never loses one;
+/// another is told [`NodeEvent::EventsLost`].
+pub(super) fn most_of_a_frame(table: &Table) -> usize {
+    // SYNC and the objects of every RPDO that waited for it; or a frame that all RPDOs listen to, each of which was too short
+    // before: `RpdoFits` and its objects. The entries of a mapping record are as many as its rows, without sub-index 00h.
+    let rpdos = table.rows().iter().filter_map(|row| match PdoId::of_object(row.index) {
+        Some((PdoId { direction: Direction::Rpdo, .. }, true)) => Some(usize::from(row.sub_index) <= MAX_OBJECTS),
+        _ => None,
+    });
+    1 + rpdos.filter(|counts| *counts).count()
 }
 
-const _: () = assert!(EVENT_QUEUE_LENGTH < 256, "the counters are told apart by their difference");
+/// What waits for the owner, in the order of arrival. When full, the oldest are lost, and that is told in their place.
+#[derive(Clone)]
+pub(super) struct EventQueue<S: Storage> {
+    events: S::Events<NodeEvent>,
+    /// How many were ever taken and put, modulo 2^32: two counters, so that neither waits for the other.
+    taken: u32,
+    put: u32,
+}
 
-impl EventQueue {
-    pub(super) const EMPTY: Self = Self { events: [NodeEvent::Sync; EVENT_QUEUE_LENGTH], taken: 0, put: 0 };
+impl<S: Storage> EventQueue<S> {
+    /// Room for at least `count`.
+    pub(super) fn empty(count: usize) -> Self {
+        Self { events: S::events(count.next_power_of_two(), NodeEvent::Sync), taken: 0, put: 0 }
+    }
+
+    pub(super) const fn clear(&mut self) {
+        self.taken = self.put;
+    }
+
+    pub(super) fn capacity(&self) -> usize {
+        self.events.as_ref().len()
+    }
+
+    #[inline]
+    fn place(&self, number: u32) -> usize {
+        number as usize & (self.events.as_ref().len() - 1)
+    }
 
     #[inline]
     pub(super) fn push(&mut self, event: NodeEvent) {
-        self.events[usize::from(self.put) % EVENT_QUEUE_LENGTH] = event;
+        let place = self.place(self.put);
+        self.events.as_mut()[place] = event;
         self.put = self.put.wrapping_add(1);
-        if usize::from(self.put.wrapping_sub(self.taken)) > EVENT_QUEUE_LENGTH {
+        if self.put.wrapping_sub(self.taken) as usize > self.capacity() {
             self.lose_oldest();
         }
     }
@@ -70,7 +101,8 @@ impl EventQueue {
     #[cold]
     fn lose_oldest(&mut self) {
         self.taken = self.taken.wrapping_add(1);
-        self.events[usize::from(self.taken) % EVENT_QUEUE_LENGTH] = NodeEvent::EventsLost;
+        let place = self.place(self.taken);
+        self.events.as_mut()[place] = NodeEvent::EventsLost;
     }
 
     #[inline]
@@ -78,7 +110,7 @@ impl EventQueue {
         if self.taken == self.put {
             return None;
         }
-        let event = self.events[usize::from(self.taken) % EVENT_QUEUE_LENGTH];
+        let event = self.events.as_ref()[self.place(self.taken)];
         self.taken = self.taken.wrapping_add(1);
         Some(event)
     }

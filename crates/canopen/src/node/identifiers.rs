@@ -1,87 +1,104 @@
 //! Which of a node's services an identifier belongs to: looked up for every frame on the bus.
 
-use crate::NodeId;
-use crate::connection_set;
-use crate::pdo::PdoNumber;
+use crate::od::Storage;
+use crate::{NodeId, connection_set};
 
-/// Up to eight identifiers, side by side, so that a frame's is compared with all of them at once. Most frames on a bus
-/// are for others.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Identifiers([u16; LANES]);
+/// The identifiers that a node listens to. Most frames on a bus are for others: a bit for each of the 2048 identifiers
+/// tells with one access.
+#[derive(Clone)]
+pub(super) struct Identifiers<S: Storage> {
+    heard: [u32; WORDS],
+    sync: u16,
+    sdo: u16,
+    rpdos: S::Pdos<u16>,
+}
 
-const LANES: usize = 8;
+const WORDS: usize = 2048 / 32;
 /// Equal to no identifier.
 const UNUSED: u16 = u16::MAX;
 
-/// A service that has an identifier.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Lane(usize);
-
-impl Lane {
-    /// NMT commands.
-    pub(super) const NMT: Self = Self(0);
-    /// SYNC.
-    pub(super) const SYNC: Self = Self(1);
-    /// SDO requests.
-    pub(super) const SDO: Self = Self(2);
-
-    /// The RPDO at `position`.
-    pub(super) const fn rpdo(position: usize) -> Self {
-        Self(Self::SDO.0 + 1 + position)
-    }
-}
-
-impl Identifiers {
+impl<S: Storage> Identifiers<S> {
     /// Deaf.
-    pub(super) const NONE: Self = Self([UNUSED; LANES]);
-
-    /// NMT and SDO requests to `node_id`.
-    pub(super) fn of_requests(node_id: NodeId) -> Self {
-        let mut identifiers = Self::NONE;
-        identifiers.set(Lane::NMT, connection_set::NMT.as_standard());
-        identifiers.set(Lane::SDO, connection_set::sdo_request(node_id).as_standard());
-        identifiers
+    pub(super) fn none(rpdos: usize) -> Self {
+        Self { heard: [0; WORDS], sync: UNUSED, sdo: UNUSED, rpdos: S::pdos(rpdos, UNUSED) }
     }
 
-    pub(super) fn set(&mut self, lane: Lane, id: Option<u16>) {
-        self.0[lane.0] = id.unwrap_or(UNUSED);
+    /// Deaf until the next [`listen`](Self::listen).
+    pub(super) const fn deafen(&mut self) {
+        self.heard = [0; WORDS];
     }
 
-    /// True if a service has this identifier. All are compared, without a branch between them.
+    /// NMT, SDO requests to `node_id`, and what was set for the other services, are heard from now on.
+    pub(super) fn listen(&mut self, node_id: NodeId) {
+        self.sdo = connection_set::sdo_request(node_id).as_standard().unwrap_or(UNUSED);
+        self.deafen();
+        let others = [NMT, self.sync, self.sdo];
+        for id in others.iter().chain(self.rpdos.as_ref()) {
+            if let Some(word) = self.heard.get_mut(usize::from(*id) / 32) {
+                *word |= 1 << (id % 32);
+            }
+        }
+    }
+
+    /// Takes effect with [`listen`](Self::listen).
+    pub(super) fn set_sync(&mut self, id: Option<u16>) {
+        self.sync = id.unwrap_or(UNUSED);
+    }
+
+    /// Takes effect with [`listen`](Self::listen).
+    pub(super) fn set_rpdo(&mut self, position: usize, id: Option<u16>) {
+        self.rpdos.as_mut()[position] = id.unwrap_or(UNUSED);
+    }
+
+    /// True if a service has this identifier.
     #[inline]
-    pub(super) fn contain(&self, id: u16) -> bool {
-        self.0.iter().fold(false, |found, own| found | (*own == id))
+    pub(super) const fn contain(&self, id: u16) -> bool {
+        self.heard[id as usize / 32 % WORDS] >> (id % 32) & 1 == 1
     }
 
-    /// True if this service has it.
     #[inline]
-    pub(super) const fn has(&self, lane: Lane, id: u16) -> bool {
-        self.0[lane.0] == id
+    pub(super) const fn is_nmt(&self, id: u16) -> bool {
+        id == NMT
+    }
+
+    #[inline]
+    pub(super) const fn is_sync(&self, id: u16) -> bool {
+        id == self.sync
+    }
+
+    #[inline]
+    pub(super) const fn is_sdo(&self, id: u16) -> bool {
+        id == self.sdo
+    }
+
+    /// The identifiers of RPDO 1 and on.
+    #[inline]
+    pub(super) fn rpdos(&self) -> &[u16] {
+        self.rpdos.as_ref()
     }
 }
 
-const _: () = assert!(Lane::rpdo(PdoNumber::PREDEFINED - 1).0 < LANES, "a lane for every service");
+/// NMT commands, from the master to all.
+const NMT: u16 = 0;
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::od::Fixed;
 
     #[test]
-    fn an_identifier_is_found_in_every_lane_that_has_it_and_in_no_other() {
-        let mut identifiers = Identifiers::of_requests(NodeId::MAX);
-        let rpdos = [Some(0x001), Some(0x7FE), None, Some(0x001)];
-        identifiers.set(Lane::SYNC, Some(0x080));
-        for (position, id) in rpdos.into_iter().enumerate() {
-            identifiers.set(Lane::rpdo(position), id);
+    fn an_identifier_is_heard_if_a_service_has_it_and_no_other_is() {
+        let mut identifiers = Identifiers::<Fixed<0>>::none(4);
+        assert!((0..=0x7FF).all(|id| !identifiers.contain(id)));
+        identifiers.set_sync(Some(0x080));
+        for (position, id) in [Some(0x001), Some(0x7FE), None, Some(0x001)].into_iter().enumerate() {
+            identifiers.set_rpdo(position, id);
         }
-        let listened: [Option<u16>; LANES] =
-            [Some(0), Some(0x080), Some(0x67F), Some(0x001), Some(0x7FE), None, Some(0x001), None];
+        identifiers.listen(NodeId::MAX);
         for id in 0..=0x7FF {
-            assert_eq!(identifiers.contain(id), listened.contains(&Some(id)), "{id:#X}");
-            for (lane, own) in listened.into_iter().enumerate() {
-                assert_eq!(identifiers.has(Lane(lane), id), own == Some(id), "{id:#X} in lane {lane}");
-            }
-            assert!(!Identifiers::NONE.contain(id));
+            assert_eq!(identifiers.contain(id), [0, 0x080, 0x67F, 0x001, 0x7FE].contains(&id), "{id:#X}");
         }
+        identifiers.deafen();
+        assert!((0..=0x7FF).all(|id| !identifiers.contain(id)));
     }
 }

@@ -1,5 +1,6 @@
-//! A CANopen device's communication: NMT slave, heartbeat producer, SYNC consumer, EMCY producer, SDO server, four
-//! RPDOs and four TPDOs over one object dictionary (CiA 301).
+//! A CANopen device's communication: NMT slave, heartbeat producer, SYNC consumer, EMCY producer, SDO server,
+//! RPDOs and TPDOs over one object dictionary (CiA 301).
+//! As many PDOs as the dictionary has records for, up to 512 each way.
 //!
 //! [`Node`] is what a firmware owns. Frames and time go in as [`can::Station`] says. Out come frames, a deadline, and
 //! [`NodeEvent`]s: which entries a peer wrote, NMT changes, reset requests. The node never acts on the application;
@@ -8,20 +9,20 @@
 //!
 //! ```
 //! use can::{Instant, Station};
-//! use canopen::od::{Access, DataType, Entry, Object, Table, keys};
+//! use canopen::od::{Access, DataType, Entry, Fixed, Index, Object, Table};
 //! use canopen::{Node, NodeEvent, NodeId, NodeProfile};
 //!
 //! static ROWS: [Entry; 2] = [
 //!     Entry::new(0x1000, 0, DataType::Unsigned32, Access::Const, "device_type", "Device type").default(0x0002_0192),
 //!     Entry::new(0x6040, 0, DataType::Unsigned16, Access::ReadWrite, "controlword", "Controlword"),
 //! ];
-//! static KEYS: [u32; 2] = keys(&ROWS);
-//! static TABLE: Table = Table::new(&ROWS, &KEYS);
+//! static INDEX: Index<2> = Index::of(&ROWS);
+//! static TABLE: Table = Table::new(&ROWS, &INDEX);
 //! static PROFILE: NodeProfile = NodeProfile::cia_301(&TABLE);
 //! const CONTROLWORD: Object<u16> = TABLE.object(0x6040, 0);
 //!
 //! let now = Instant::ZERO;
-//! let mut node: Node<2> = Node::new(&PROFILE, NodeId::new(4).unwrap());
+//! let mut node: Node<Fixed<2>> = Node::new(&PROFILE, NodeId::new(4).unwrap());
 //! node.boot(now);
 //! assert_eq!(node.poll_transmit().unwrap().to_string(), "704#00");
 //!
@@ -36,6 +37,7 @@ mod event;
 mod identifiers;
 mod objects;
 mod pdo_set;
+mod pdos;
 mod pending;
 mod profile;
 mod receive;
@@ -44,61 +46,57 @@ mod transmit;
 use can::{CanId, Frame, Instant, Station};
 
 use event::EventQueue;
-pub use event::{EVENT_QUEUE_LENGTH, NodeEvent, Via};
+pub use event::{NodeEvent, Ticket, Via};
 pub use profile::NodeProfile;
 
 use crate::emcy::{self, Emcy, EmcyErrorCode};
 use crate::heartbeat;
 use crate::nmt::Transition;
-use crate::od::{Dictionary, Table};
-use crate::pdo::PdoNumber;
-use crate::pdo::{Rpdo, Tpdo};
+use crate::od::{Dictionary, Storage, Table};
+use crate::pdo::{PdoNumber, Tpdo};
 use crate::sdo::Server;
 use crate::{Mux, NmtCommand, NmtState, NodeId};
 use identifiers::Identifiers;
-use pdo_set::PdoSet;
+use pdos::Pdos;
 use pending::{Pending, Source};
 
-/// One device on the bus, with a dictionary of up to `N` entries.
+/// One device on the bus, with as much room as its [`Storage`] has.
 ///
 /// After [`new`](Self::new) it is silent and deaf until [`boot`](Self::boot). Call order: `handle_*`, then drain
 /// [`poll_event`](Self::poll_event), let the application act, then drain `poll_transmit`.
 #[derive(Clone)]
-pub struct Node<const N: usize> {
+pub struct Node<S: Storage> {
     profile: &'static NodeProfile,
     node_id: NodeId,
-    dictionary: Dictionary<N>,
+    dictionary: Dictionary<S>,
     state: NmtState,
     /// Latest time seen.
     now: Instant,
     /// Nothing is due before this.
     deadline: Instant,
     /// What it listens to.
-    received: Identifiers,
-    pending: Pending,
-    events: EventQueue,
+    received: Identifiers<S>,
+    pending: Pending<S>,
+    events: EventQueue<S>,
     last_addressed: Option<Instant>,
     heartbeat: heartbeat::Producer,
     heartbeat_state: Option<u8>,
     emcy: emcy::Producer,
     emcy_id: Option<CanId>,
     sdo: Server,
-    rpdos: [Rpdo; PdoNumber::PREDEFINED],
-    tpdos: [Tpdo; PdoNumber::PREDEFINED],
-    /// Active TPDOs that look at SYNC.
-    synchronous_tpdos: PdoSet,
-    /// RPDOs whose data waits for SYNC.
-    latched_rpdos: PdoSet,
-    /// RPDOs whose last frame was too short.
-    short_rpdos: PdoSet,
+    /// The latest question to the owner.
+    ticket: Ticket,
+    pdos: Pdos<S>,
 }
 
-impl<const N: usize> Node<N> {
+impl<S: Storage> Node<S> {
     /// A device with factory values, not booted yet.
     ///
     /// # Panics
-    /// If the profile's table has more than `N` rows.
+    /// If the storage has not enough room for the profile's table: rows, longer values, PDOs, and the events that one frame
+    /// can make.
     pub fn new(profile: &'static NodeProfile, node_id: NodeId) -> Self {
+        let pdos = Pdos::of(profile.table);
         Self {
             profile,
             node_id,
@@ -106,20 +104,17 @@ impl<const N: usize> Node<N> {
             state: NmtState::Initialising,
             now: Instant::ZERO,
             deadline: Instant::FAR_FUTURE,
-            received: Identifiers::NONE,
-            pending: Pending::NONE,
-            events: EventQueue::EMPTY,
+            received: pdos.identifiers(),
+            pending: Pending::none(pdos.tpdos.as_ref().len()),
+            events: EventQueue::empty(event::most_of_a_frame(profile.table)),
             last_addressed: None,
             heartbeat: heartbeat::Producer::OFF,
             heartbeat_state: None,
             emcy: emcy::Producer::new(),
             emcy_id: None,
             sdo: Server::new(profile.sdo_frame_length, profile.sdo_timeout_ns),
-            rpdos: [Rpdo::INVALID; PdoNumber::PREDEFINED],
-            tpdos: [Tpdo::INVALID; PdoNumber::PREDEFINED],
-            synchronous_tpdos: PdoSet::NONE,
-            latched_rpdos: PdoSet::NONE,
-            short_rpdos: PdoSet::NONE,
+            ticket: Ticket(0),
+            pdos,
         }
     }
 
@@ -130,11 +125,11 @@ impl<const N: usize> Node<N> {
         self.now = now;
         self.sdo.reset();
         self.emcy = emcy::Producer::new();
-        self.pending = Pending::NONE;
-        self.events = EventQueue::EMPTY;
+        self.pending.clear();
+        self.events.clear();
         self.last_addressed = None;
-        self.short_rpdos = PdoSet::NONE;
-        self.take_up_objects();
+        self.pdos.short.clear();
+        self.configure_objects();
         self.pending.insert(Source::BootUp);
         self.heartbeat = heartbeat::Producer::from_boot_up(self.heartbeat_period_ms(), now);
         self.enter(self.profile.start_state);
@@ -162,12 +157,12 @@ impl<const N: usize> Node<N> {
     /// Falls silent and deaf until the next [`boot`](Self::boot): the supply is gone.
     pub fn power_off(&mut self) {
         self.state = NmtState::Initialising;
-        self.received = Identifiers::NONE;
-        self.pending = Pending::NONE;
+        self.received.deafen();
+        self.pending.clear();
         self.deadline = Instant::FAR_FUTURE;
         self.sdo.reset();
         self.stop_pdos();
-        self.events = EventQueue::EMPTY;
+        self.events.clear();
     }
 
     /// What happened since, in the order of arrival. Poll after every `handle_*`.
@@ -201,10 +196,12 @@ impl<const N: usize> Node<N> {
         if !self.state.allows_pdo() {
             return;
         }
-        for position in 0..PdoNumber::PREDEFINED {
-            if self.tpdos[position].notice_change(&self.dictionary.view()) {
+        let mut from = 0;
+        while let Some(position) = self.pdos.watching.next(from) {
+            if self.pdos.tpdos.as_mut()[position].notice_change(&self.dictionary) {
                 self.offer_tpdo(position);
             }
+            from = position + 1;
         }
     }
 
@@ -215,14 +212,14 @@ impl<const N: usize> Node<N> {
 
     /// The values.
     #[inline]
-    pub const fn dictionary(&self) -> &Dictionary<N> {
+    pub const fn dictionary(&self) -> &Dictionary<S> {
         &self.dictionary
     }
 
     /// The values, to write as the device itself. Communication objects take effect with [`boot`](Self::boot); for
     /// mapped values see [`notice_changes`](Self::notice_changes).
     #[inline]
-    pub const fn dictionary_mut(&mut self) -> &mut Dictionary<N> {
+    pub const fn dictionary_mut(&mut self) -> &mut Dictionary<S> {
         &mut self.dictionary
     }
 
@@ -243,13 +240,12 @@ impl<const N: usize> Node<N> {
 
     /// The identifier of TPDO `number`, if it is valid and maps something.
     pub fn tpdo_id(&self, number: PdoNumber) -> Option<CanId> {
-        let tpdo = &self.tpdos[number.position()];
-        tpdo.is_active().then(|| tpdo.can_id())
+        self.pdos.tpdos.as_ref().get(number.position()).filter(|tpdo| tpdo.is_active()).map(Tpdo::can_id)
     }
 
     /// The identifier of RPDO `number`, if it is valid.
     pub fn rpdo_id(&self, number: PdoNumber) -> Option<CanId> {
-        self.rpdos[number.position()].standard_id().map(CanId::standard)
+        self.pdos.rpdos.as_ref().get(number.position())?.standard_id().map(CanId::standard)
     }
 
     fn handle_nmt(&mut self, command: NmtCommand) {
@@ -265,8 +261,8 @@ impl<const N: usize> Node<N> {
         self.state = state;
         self.push(NodeEvent::Nmt(state));
         if state.allows_pdo() {
-            for position in 0..PdoNumber::PREDEFINED {
-                self.tpdos[position].start(self.now);
+            for position in 0..self.pdos.tpdos.as_ref().len() {
+                self.pdos.tpdos.as_mut()[position].start(self.now);
                 self.offer_tpdo(position);
             }
         } else {
@@ -288,10 +284,12 @@ impl<const N: usize> Node<N> {
     }
 
     fn stop_pdos(&mut self) {
-        self.latched_rpdos = PdoSet::NONE;
-        for position in 0..PdoNumber::PREDEFINED {
-            let _ = self.rpdos[position].take_latched();
-            self.tpdos[position].stop();
+        self.pdos.latched.clear();
+        for rpdo in self.pdos.rpdos.as_mut() {
+            let _ = rpdo.take_latched();
+        }
+        for position in 0..self.pdos.tpdos.as_ref().len() {
+            self.pdos.tpdos.as_mut()[position].stop();
             self.pending.remove(Source::Tpdo(position));
         }
     }
@@ -302,7 +300,7 @@ impl<const N: usize> Node<N> {
     }
 }
 
-impl<const N: usize> Station for Node<N> {
+impl<S: Storage> Station for Node<S> {
     #[inline]
     fn ignores(&self, frame: &Frame) -> bool {
         !frame.standard_data_id().is_some_and(|id| self.received.contain(id))
@@ -342,9 +340,9 @@ impl<const N: usize> Station for Node<N> {
             self.offer_emcy();
             return;
         }
-        for position in 0..PdoNumber::PREDEFINED {
-            if self.tpdos[position].can_id() == frame.id() {
-                self.tpdos[position].handle_transmitted(now);
+        for position in 0..self.pdos.tpdo_ids.as_ref().len() {
+            if self.pdos.tpdo_ids.as_ref()[position] == frame.id().raw() {
+                self.pdos.tpdos.as_mut()[position].handle_transmitted(now);
                 self.offer_tpdo(position);
             }
         }

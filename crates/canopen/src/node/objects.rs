@@ -1,77 +1,77 @@
 //! What a write to the communication objects (1000h to 1FFFh) must satisfy, and what it changes at once.
 
-use super::identifiers::{Identifiers, Lane};
 use super::{Node, NodeEvent, Via};
 use crate::heartbeat;
-use crate::od::{Slot, View};
-use crate::pdo::PdoNumber;
+use crate::od::{Refusal, RowFacts, Slot, Storage, View};
 use crate::pdo::parameter::{COB_ID, INHIBIT_TIME, TRANSMISSION_TYPE};
 use crate::pdo::{
-    Direction, Mapping, MappingRecord, Parameter, RPDO_MAPPING, RPDO_PARAMETER, Rpdo, TPDO_MAPPING, TPDO_PARAMETER,
-    Tpdo, TransmissionType,
+    Direction, Mapping, MappingRecord, Parameter, PdoId, RPDO_MAPPING, RPDO_PARAMETER, Rpdo, TPDO_MAPPING,
+    TPDO_PARAMETER, Tpdo, TransmissionType,
 };
-use crate::{AbortCode, CobId, Mux, connection_set};
+use crate::{AbortCode, CobId, Mux, NmtState, connection_set};
 
-/// A PDO record of a multiplexor.
-#[derive(Clone, Copy)]
-enum Record {
-    Parameter(Direction, usize),
-    Mapping(Direction, usize),
-    Other,
-}
-
-impl Record {
-    const fn of(index: u16) -> Self {
-        let position = (index & 3) as usize;
-        match index & !3 {
-            RPDO_PARAMETER => Self::Parameter(Direction::Rpdo, position),
-            RPDO_MAPPING => Self::Mapping(Direction::Rpdo, position),
-            TPDO_PARAMETER => Self::Parameter(Direction::Tpdo, position),
-            TPDO_MAPPING => Self::Mapping(Direction::Tpdo, position),
-            _ => Self::Other,
-        }
-    }
-}
-
-impl<const N: usize> Node<N> {
-    /// A peer's write: checks, stores, takes effect, is told to the owner.
+impl<S: Storage> Node<S> {
+    /// A client's write: checks, stores, takes effect, is told to the owner, unless the owner is to be asked before.
     #[inline(always)]
-    pub(super) fn write(&mut self, slot: Slot, raw: u32, via: Via) -> Result<(), AbortCode> {
-        if self.dictionary.table().summary(slot).is_communication() {
-            return self.write_communication(slot, raw, via);
+    pub(super) fn write(&mut self, slot: Slot, facts: &RowFacts, raw: u32) -> Result<(), Refusal> {
+        if facts.summary.is_special() {
+            return self.write_special(slot, raw);
         }
-        let raw = self.dictionary.write(slot, raw)?;
-        self.push(NodeEvent::Written { slot, raw, via });
+        let raw = self.dictionary.write_or_ask(slot, facts, raw)?;
+        self.push(NodeEvent::Written { slot, raw, via: Via::Sdo });
         Ok(())
     }
 
+    /// Of a communication object, or a value that is longer than a cell and waits in the dictionary.
     #[inline(never)]
-    fn write_communication(&mut self, slot: Slot, raw: u32, via: Via) -> Result<(), AbortCode> {
-        let row = self.dictionary.table().row(slot);
-        let (mux, raw) = (row.mux(), raw & row.data_type.mask());
-        self.dictionary.check_write(slot, raw)?;
-        self.check_communication(mux, raw)?;
-        self.dictionary.set_raw(slot, raw);
-        self.take_up(mux);
-        self.push(NodeEvent::Written { slot, raw, via });
+    fn write_special(&mut self, slot: Slot, raw: u32) -> Result<(), Refusal> {
+        let table = self.dictionary.table();
+        let (row, summary) = (table.row(slot), table.summary(slot));
+        let raw = if summary.is_long() { raw } else { raw & row.data_type.mask() };
+        let checked = if summary.is_long() {
+            self.dictionary.check_staged(slot, raw as usize)
+        } else {
+            self.dictionary.check_or_ask(slot, raw)
+        };
+        match checked {
+            Err(Refusal::Abort(code)) => return Err(code.into()),
+            _ if summary.is_communication() => self.check_communication(row.mux(), raw)?,
+            _ => {}
+        }
+        checked?;
+        self.commit(slot, raw);
         Ok(())
+    }
+
+    /// A client's checked value is stored, takes effect and is told to the owner.
+    pub(super) fn commit(&mut self, slot: Slot, raw: u32) {
+        let table = self.dictionary.table();
+        if table.summary(slot).is_long() {
+            self.dictionary.store_staged(slot, raw as usize);
+        } else {
+            self.dictionary.set_raw(slot, raw);
+        }
+        if table.summary(slot).is_communication() {
+            self.configure(table.row(slot).mux());
+        }
+        self.push(NodeEvent::Written { slot, raw: self.dictionary.raw(slot), via: Via::Sdo });
     }
 
     /// The device's own write to a communication object: unchecked, in effect at once, not told to the owner.
     pub fn write_own(&mut self, slot: Slot, raw: u32) {
         self.dictionary.set_raw(slot, raw);
-        self.take_up(self.dictionary.table().row(slot).mux());
+        self.configure(self.dictionary.table().row(slot).mux());
     }
 
     fn check_communication(&self, mux: Mux, raw: u32) -> Result<(), AbortCode> {
         let values = self.dictionary.view();
-        match (mux.index, Record::of(mux.index)) {
+        match (mux.index, PdoId::of_object(mux.index)) {
             // A consumer of SYNC only: bit 30 would make it a producer.
             (0x1005, _) if raw & CobId::NO_RTR != 0 => Err(AbortCode::INVALID_VALUE),
             (0x1005, _) => CobId(raw & !CobId::INVALID).check_identifier(),
             (0x1014, _) => self.emcy_cob_id().check_change(CobId(raw), self.profile.pdo_changes_while_valid),
-            (_, Record::Parameter(..)) => self.check_parameter(&values, mux, raw),
-            (_, Record::Mapping(direction, _)) => self.check_mapping(&values, mux, raw, direction),
+            (_, Some((_, false))) => self.check_parameter(&values, mux, raw),
+            (_, Some((pdo, true))) => self.check_mapping(&values, mux, raw, pdo),
             _ => Ok(()),
         }
     }
@@ -88,15 +88,14 @@ impl<const N: usize> Node<N> {
     }
 
     /// Entries may be written while sub-index 00h is 0; sub-index 00h when all entries then in use fit.
-    fn check_mapping(&self, values: &View<'_>, mux: Mux, raw: u32, direction: Direction) -> Result<(), AbortCode> {
-        let parameter_index = mux.index - (RPDO_MAPPING - RPDO_PARAMETER);
-        let is_valid = Parameter::read(values, parameter_index).cob_id.is_valid();
+    fn check_mapping(&self, values: &View<'_>, mux: Mux, raw: u32, pdo: PdoId) -> Result<(), AbortCode> {
+        let is_valid = Parameter::read(values, pdo.parameter_index()).cob_id.is_valid();
         if is_valid && !self.profile.pdo_changes_while_valid {
             return Err(AbortCode::UNSUPPORTED_ACCESS);
         }
-        let rules = self.profile.mapping;
+        let (direction, rules) = (pdo.direction, self.profile.mapping);
         if mux.sub_index == 0 {
-            return Mapping::with_count(values, mux.index, direction, rules, raw as u8).map(|_| ());
+            return Mapping::with_count(&self.dictionary, mux.index, direction, rules, raw as u8).map(|_| ());
         }
         if values.value(Mux::new(mux.index, 0)) != Ok(0) {
             return Err(AbortCode::UNSUPPORTED_ACCESS);
@@ -106,21 +105,26 @@ impl<const N: usize> Node<N> {
     }
 
     /// A communication object was stored: it takes effect at once.
-    fn take_up(&mut self, mux: Mux) {
-        match (mux.index, Record::of(mux.index)) {
-            (0x1005, _) => self.take_up_sync(),
-            (0x1014 | 0x1015, _) => self.take_up_emcy(),
+    fn configure(&mut self, mux: Mux) {
+        match (mux.index, PdoId::of_object(mux.index)) {
+            (0x1005, _) => {
+                self.configure_sync();
+                self.listen();
+            }
+            (0x1014 | 0x1015, _) => self.configure_emcy(),
             (0x1017, _) => {
                 self.heartbeat = heartbeat::Producer::from_write(self.heartbeat_period_ms(), self.now);
                 self.offer_heartbeat();
             }
-            (_, Record::Parameter(Direction::Rpdo, position) | Record::Mapping(Direction::Rpdo, position)) => {
-                self.take_up_rpdo(position);
+            (_, Some((PdoId { direction: Direction::Rpdo, number }, _))) => {
+                self.configure_rpdo(number.position());
+                self.listen();
             }
-            (_, Record::Parameter(Direction::Tpdo, position) | Record::Mapping(Direction::Tpdo, position)) => {
-                let old = self.tpdos[position];
-                self.take_up_tpdo(position);
-                let tpdo = &mut self.tpdos[position];
+            (_, Some((PdoId { direction: Direction::Tpdo, number }, _))) => {
+                let position = number.position();
+                let old = self.pdos.tpdos.as_ref()[position];
+                self.configure_tpdo(position);
+                let tpdo = &mut self.pdos.tpdos.as_mut()[position];
                 if self.state.allows_pdo() && tpdo.is_active() {
                     if old.is_active() { tpdo.take_over_from(&old, self.now) } else { tpdo.start(self.now) }
                 }
@@ -131,14 +135,16 @@ impl<const N: usize> Node<N> {
     }
 
     /// All communication objects take effect.
-    pub(super) fn take_up_objects(&mut self) {
-        self.received = Identifiers::of_requests(self.node_id);
-        self.take_up_sync();
-        self.take_up_emcy();
-        for position in 0..PdoNumber::PREDEFINED {
-            self.take_up_rpdo(position);
-            self.take_up_tpdo(position);
+    pub(super) fn configure_objects(&mut self) {
+        self.configure_sync();
+        self.configure_emcy();
+        for position in 0..self.pdos.rpdos.as_ref().len() {
+            self.configure_rpdo(position);
         }
+        for position in 0..self.pdos.tpdos.as_ref().len() {
+            self.configure_tpdo(position);
+        }
+        self.received.listen(self.node_id);
     }
 
     pub(super) fn heartbeat_period_ms(&self) -> u16 {
@@ -149,9 +155,16 @@ impl<const N: usize> Node<N> {
         self.dictionary.table().find(Mux::new(index, 0)).ok().map(|slot| self.dictionary.raw(slot))
     }
 
-    fn take_up_sync(&mut self) {
+    fn configure_sync(&mut self) {
         let cob_id = self.object(0x1005).map(CobId);
-        self.received.set(Lane::SYNC, cob_id.and_then(|cob_id| cob_id.can_id().as_standard()));
+        self.received.set_sync(cob_id.and_then(|cob_id| cob_id.can_id().as_standard()));
+    }
+
+    /// Identifiers have changed. A node that is down stays deaf.
+    fn listen(&mut self) {
+        if self.state != NmtState::Initialising {
+            self.received.listen(self.node_id);
+        }
     }
 
     /// 1014h, or what it would be by default on a device without it.
@@ -159,27 +172,29 @@ impl<const N: usize> Node<N> {
         self.object(0x1014).map_or(CobId(connection_set::emcy(self.node_id).raw()), CobId)
     }
 
-    fn take_up_emcy(&mut self) {
+    fn configure_emcy(&mut self) {
         let cob_id = self.emcy_cob_id();
         self.emcy_id = (self.profile.emcy && cob_id.is_valid()).then(|| cob_id.can_id());
         self.emcy.set_inhibit_time(self.object(0x1015).unwrap_or(0) as u16);
     }
 
-    fn take_up_rpdo(&mut self, position: usize) {
+    fn configure_rpdo(&mut self, position: usize) {
         let values = self.dictionary.view();
         let parameter = Parameter::read(&values, RPDO_PARAMETER + position as u16);
-        let mapping = Mapping::read(&values, RPDO_MAPPING + position as u16, Direction::Rpdo, self.profile.mapping);
+        let mapping =
+            Mapping::read(&self.dictionary, RPDO_MAPPING + position as u16, Direction::Rpdo, self.profile.mapping);
         // A mapping that does not resolve (a store of another firmware) maps nothing.
         let rpdo = Rpdo::configure(&parameter, mapping.unwrap_or(None));
-        self.received.set(Lane::rpdo(position), rpdo.standard_id());
-        self.latched_rpdos.set(position, false);
-        self.rpdos[position] = rpdo;
+        self.received.set_rpdo(position, rpdo.standard_id());
+        self.pdos.latched.set(position, false);
+        self.pdos.rpdos.as_mut()[position] = rpdo;
     }
 
-    fn take_up_tpdo(&mut self, position: usize) {
+    fn configure_tpdo(&mut self, position: usize) {
         let values = self.dictionary.view();
         let parameter = Parameter::read(&values, TPDO_PARAMETER + position as u16);
-        let mapping = Mapping::read(&values, TPDO_MAPPING + position as u16, Direction::Tpdo, self.profile.mapping);
+        let mapping =
+            Mapping::read(&self.dictionary, TPDO_MAPPING + position as u16, Direction::Tpdo, self.profile.mapping);
         let tpdo = Tpdo::configure(
             &parameter,
             mapping.unwrap_or(None),
@@ -187,7 +202,9 @@ impl<const N: usize> Node<N> {
             self.profile.inhibit_unit_ns,
             self.profile.event_timer_unit_ns,
         );
-        self.synchronous_tpdos.set(position, tpdo.is_active() && tpdo.is_synchronous());
-        self.tpdos[position] = tpdo;
+        self.pdos.synchronous.set(position, tpdo.is_active() && tpdo.is_synchronous());
+        self.pdos.watching.set(position, tpdo.watches());
+        self.pdos.tpdo_ids.as_mut()[position] = tpdo.can_id().raw();
+        self.pdos.tpdos.as_mut()[position] = tpdo;
     }
 }

@@ -1,4 +1,5 @@
-use crate::pdo::PdoNumber;
+use super::pdo_set::PdoSet;
+use crate::od::Storage;
 
 /// A service that may have a frame to send.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,67 +11,97 @@ pub(super) enum Source {
     BootUp,
 }
 
-const FIRST_TPDO: u8 = 3;
-const BOOT_UP: u8 = 1 << 7;
+const EMCY: u8 = 1 << 0;
+const SDO_REPLY: u8 = 1 << 1;
+const HEARTBEAT: u8 = 1 << 2;
+/// One or more of them.
+const TPDOS: u8 = 1 << 3;
+const BOOT_UP: u8 = 1 << 4;
 
 impl Source {
     const fn bit(self) -> u8 {
         match self {
-            Self::Emcy => 1 << 0,
-            Self::SdoReply => 1 << 1,
-            Self::Heartbeat => 1 << 2,
-            Self::Tpdo(position) => 1 << (FIRST_TPDO + position as u8),
+            Self::Emcy => EMCY,
+            Self::SdoReply => SDO_REPLY,
+            Self::Heartbeat => HEARTBEAT,
+            Self::Tpdo(_) => TPDOS,
             Self::BootUp => BOOT_UP,
-        }
-    }
-
-    const fn of_bit(number: u32) -> Self {
-        match number {
-            0 => Self::Emcy,
-            1 => Self::SdoReply,
-            2 => Self::Heartbeat,
-            7 => Self::BootUp,
-            number => Self::Tpdo(number as usize - FIRST_TPDO as usize),
         }
     }
 }
 
-const _: () = assert!(FIRST_TPDO as usize + PdoNumber::PREDEFINED == 7, "a bit for every source");
+const SINGLE: [Source; 4] = [Source::Emcy, Source::SdoReply, Source::Heartbeat, Source::BootUp];
 
 /// Which services have a frame that may be sent now.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Pending(u8);
+#[derive(Clone)]
+pub(super) struct Pending<S: Storage> {
+    /// A bit for each service.
+    services: u8,
+    tpdos: PdoSet<S>,
+}
 
-impl Pending {
-    pub(super) const NONE: Self = Self(0);
-
-    pub(super) const fn is_empty(self) -> bool {
-        self.0 == 0
+impl<S: Storage> Pending<S> {
+    /// None, of a node with this many TPDOs.
+    pub(super) fn none(tpdos: usize) -> Self {
+        Self { services: 0, tpdos: PdoSet::none(tpdos) }
     }
 
-    pub(super) const fn insert(&mut self, source: Source) {
-        self.0 |= source.bit();
+    pub(super) fn clear(&mut self) {
+        self.services = 0;
+        self.tpdos.clear();
     }
 
-    pub(super) const fn set(&mut self, source: Source, ready: bool) {
+    #[inline]
+    pub(super) const fn is_empty(&self) -> bool {
+        self.services == 0
+    }
+
+    #[inline]
+    pub(super) fn insert(&mut self, source: Source) {
+        self.services |= source.bit();
+        if let Source::Tpdo(position) = source {
+            self.tpdos.set(position, true);
+        }
+    }
+
+    #[inline]
+    pub(super) fn set(&mut self, source: Source, ready: bool) {
         if ready { self.insert(source) } else { self.remove(source) }
     }
 
-    pub(super) const fn remove(&mut self, source: Source) {
-        self.0 &= !source.bit();
+    #[inline]
+    pub(super) fn remove(&mut self, source: Source) {
+        if let Source::Tpdo(position) = source {
+            self.tpdos.set(position, false);
+            if !self.tpdos.is_empty() {
+                return;
+            }
+        }
+        self.services &= !source.bit();
     }
 
-    /// The one source that has a frame, if no other has.
-    pub(super) const fn only(self) -> Option<Source> {
-        if self.0.is_power_of_two() { Some(Source::of_bit(self.0.trailing_zeros())) } else { None }
+    /// Takes the one source that has a frame, if no other has and it is one of those with many frames.
+    #[inline(always)]
+    pub(super) fn take_only(&mut self) -> Option<Source> {
+        let source = if self.services == SDO_REPLY {
+            Source::SdoReply
+        } else if self.services == TPDOS {
+            Source::Tpdo(self.tpdos.take_only()?)
+        } else {
+            return None;
+        };
+        self.services = 0;
+        Some(source)
     }
 
-    pub(super) fn iter(self) -> impl Iterator<Item = Source> {
-        let mut rest = self.0;
-        core::iter::from_fn(move || {
-            let number = rest.trailing_zeros();
-            rest &= rest.wrapping_sub(1);
-            (number < u8::BITS).then(|| Source::of_bit(number))
-        })
+    /// All of them.
+    pub(super) fn iter(&self) -> impl Iterator<Item = Source> {
+        let mut from = 0;
+        let tpdos = core::iter::from_fn(move || {
+            let position = self.tpdos.next(from)?;
+            from = position + 1;
+            Some(Source::Tpdo(position))
+        });
+        SINGLE.into_iter().filter(|source| self.services & source.bit() != 0).chain(tpdos)
     }
 }

@@ -1,5 +1,5 @@
 use crate::emcy::EmcyErrorCode;
-use crate::od::{Conditions, Dictionary, Table};
+use crate::od::{Conditions, Dictionary, Storage, Table};
 use crate::pdo::{EventTrigger, MappingRules};
 use crate::sdo::server::FrameLength;
 use crate::{NmtState, NodeId};
@@ -66,8 +66,8 @@ impl NodeProfile {
     /// Factory values for a device with this node-ID.
     ///
     /// # Panics
-    /// If the table has more than `N` rows.
-    pub fn factory_values<const N: usize>(&self, node_id: NodeId) -> Dictionary<N> {
+    /// If the storage has not enough room.
+    pub fn factory_values<S: Storage>(&self, node_id: NodeId) -> Dictionary<S> {
         Dictionary::new(self.table, node_id).with_conditions(self.conditions)
     }
 }

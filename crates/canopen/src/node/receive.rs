@@ -1,24 +1,25 @@
 //! Frames to a node: what each of its services does with a frame.
 
-use can::Frame;
+use can::{Frame, Instant};
 
-use super::identifiers::Lane;
 use super::pending::Source;
-use super::{Node, NodeEvent, Via};
+use super::{Node, NodeEvent, Ticket, Via};
+use crate::AbortCode;
 use crate::nmt;
-use crate::pdo::PdoNumber;
-use crate::pdo::Reception;
+use crate::od::{Refusal, Storage};
+use crate::pdo::{PdoNumber, Reception, Tpdo};
+use crate::sdo::server::Write;
 
-impl<const N: usize> Node<N> {
+impl<S: Storage> Node<S> {
     /// A data frame with an identifier that somebody here listens to. SDO, NMT and SYNC share theirs with nobody; two
     /// RPDOs may have the same.
     #[inline(never)]
     pub(super) fn receive(&mut self, frame: &Frame, id: u16) {
-        if self.received.has(Lane::NMT, id) {
+        if self.received.is_nmt(id) {
             self.receive_nmt(frame);
-        } else if self.received.has(Lane::SYNC, id) {
+        } else if self.received.is_sync(id) {
             self.receive_sync();
-        } else if self.received.has(Lane::SDO, id) {
+        } else if self.received.is_sdo(id) {
             self.receive_sdo(frame);
         } else {
             self.receive_rpdos(frame, id);
@@ -40,14 +41,65 @@ impl<const N: usize> Node<N> {
         if !self.state.allows_sdo() {
             return;
         }
-        if let Some(write) = self.sdo.handle_frame(frame, &self.dictionary.view(), self.now) {
-            let result = self.write(write.slot, write.raw, Via::Sdo);
-            self.sdo.finish(write, result);
+        if let Some(write) = self.sdo.handle_frame(frame, &mut self.dictionary, self.now) {
+            match self.write(write.slot, write.facts, write.raw) {
+                Ok(()) => self.sdo.finish(write, Ok(())),
+                Err(refusal) => self.refuse(write, refusal),
+            }
         }
         if self.sdo.has_reply() {
             self.pending.insert(Source::SdoReply);
         }
         self.deadline = self.deadline.min(self.sdo.deadline());
+    }
+
+    /// A download is refused, or the owner is asked.
+    #[cold]
+    fn refuse(&mut self, write: Write, refusal: Refusal) {
+        match refusal {
+            Refusal::Abort(code) => self.sdo.finish(write, Err(code)),
+            Refusal::Ask => {
+                self.ticket = Ticket(self.ticket.0.wrapping_add(1));
+                self.sdo.hold(write, self.now);
+                let raw = self.asked_raw().unwrap_or(write.raw);
+                self.push(NodeEvent::Asked { slot: write.slot, raw, ticket: self.ticket });
+            }
+        }
+    }
+
+    /// The owner's word on the download that [`NodeEvent::Asked`] told of: the value is stored, takes effect and is told as
+    /// [`NodeEvent::Written`], or the client gets this abort code. False if nobody waits for it any more, and nothing is done:
+    /// the client gave up or asked for something else, [`NodeProfile::sdo_timeout_ns`](super::NodeProfile::sdo_timeout_ns)
+    /// is over, or communication was stopped.
+    pub fn answer(&mut self, ticket: Ticket, verdict: Result<(), AbortCode>, now: Instant) -> bool {
+        self.now = now;
+        if ticket != self.ticket {
+            return false;
+        }
+        let Some(write) = self.sdo.take_held() else { return false };
+        if verdict.is_ok() {
+            self.commit(write.slot, write.raw);
+        }
+        self.sdo.finish(write, verdict);
+        self.pending.insert(Source::SdoReply);
+        self.reschedule();
+        true
+    }
+
+    /// What is asked about.
+    fn asked_raw(&self) -> Option<u32> {
+        let write = self.sdo.held()?;
+        Some(if write.facts.summary.is_long() {
+            write.raw
+        } else {
+            write.raw & self.table().row(write.slot).data_type.mask()
+        })
+    }
+
+    /// Of a value longer than a cell, the bytes that [`NodeEvent::Asked`] asks about; none when nothing is asked.
+    pub fn asked_bytes(&self) -> &[u8] {
+        let length = self.sdo.held().map_or(0, |write| write.raw as usize);
+        self.dictionary.view().staged(length)
     }
 
     /// TPDOs first: their data is of the moment of SYNC, before what it lets take effect.
@@ -59,13 +111,16 @@ impl<const N: usize> Node<N> {
         if !self.state.allows_pdo() {
             return;
         }
-        for position in self.synchronous_tpdos.iter() {
-            if self.tpdos[position].handle_sync(&self.dictionary.view()) {
+        let mut from = 0;
+        while let Some(position) = self.pdos.synchronous.next(from) {
+            if self.pdos.tpdos.as_mut()[position].handle_sync(&self.dictionary) {
                 self.offer_tpdo(position);
             }
+            from = position + 1;
         }
-        for position in self.latched_rpdos.take().iter() {
-            if let Some(data) = self.rpdos[position].take_latched() {
+        while let Some(position) = self.pdos.latched.next(0) {
+            self.pdos.latched.set(position, false);
+            if let Some(data) = self.pdos.rpdos.as_mut()[position].take_latched() {
                 self.apply_rpdo(position, data);
             }
         }
@@ -73,8 +128,8 @@ impl<const N: usize> Node<N> {
 
     #[inline(never)]
     fn receive_rpdos(&mut self, frame: &Frame, id: u16) {
-        for position in 0..PdoNumber::PREDEFINED {
-            if self.received.has(Lane::rpdo(position), id) {
+        for position in 0..self.received.rpdos().len() {
+            if self.received.rpdos()[position] == id {
                 self.receive_rpdo(frame, position);
             }
         }
@@ -86,17 +141,17 @@ impl<const N: usize> Node<N> {
         if !self.state.allows_pdo() {
             return;
         }
-        let reception = self.rpdos[position].receive(frame);
-        if !self.short_rpdos.is_empty() && reception != Reception::TooShort {
+        let reception = self.pdos.rpdos.as_mut()[position].receive(frame);
+        if !self.pdos.short.is_empty() && reception != Reception::TooShort {
             self.accept_after_short(position);
         }
         match reception {
             Reception::Apply(data) => self.apply_rpdo(position, data),
-            Reception::Latched => self.latched_rpdos.set(position, true),
+            Reception::Latched => self.pdos.latched.set(position, true),
             Reception::TooShort => return self.refuse_short_rpdo(position),
             Reception::NothingMapped => return,
         }
-        if self.tpdos[position].handle_rpdo() {
+        if self.pdos.tpdos.as_mut().get_mut(position).is_some_and(Tpdo::handle_rpdo) {
             self.offer_tpdo(position);
         }
     }
@@ -104,16 +159,16 @@ impl<const N: usize> Node<N> {
     /// An error is told when it begins and when it ends (CiA 301, 7.2.7.1), not with each frame between.
     #[cold]
     fn refuse_short_rpdo(&mut self, position: usize) {
-        if !self.short_rpdos.contains(position) {
-            self.short_rpdos.set(position, true);
+        if !self.pdos.short.contains(position) {
+            self.pdos.short.set(position, true);
             self.push(NodeEvent::RpdoTooShort(number_at(position)));
         }
     }
 
     #[cold]
     fn accept_after_short(&mut self, position: usize) {
-        if self.short_rpdos.contains(position) {
-            self.short_rpdos.set(position, false);
+        if self.pdos.short.contains(position) {
+            self.pdos.short.set(position, false);
             self.push(NodeEvent::RpdoFits(number_at(position)));
         }
     }
@@ -122,16 +177,32 @@ impl<const N: usize> Node<N> {
     #[inline(always)]
     fn apply_rpdo(&mut self, position: usize, data: u64) {
         let via = Via::Rpdo(number_at(position));
-        let Some(mapping) = self.rpdos[position].mapping() else { return };
-        for object in mapping.objects() {
+        let Some(mapping) = self.pdos.rpdos.as_ref()[position].mapping() else { return };
+        let Some(objects) = mapping.plain_objects() else { return self.apply_at_the_bit(position, data) };
+        for object in objects {
             // A refused value has nobody to tell: RPDOs are not confirmed. Communication objects cannot be mapped.
-            if let Ok(raw) = self.dictionary.write(object.slot, object.extract(data)) {
+            if let Ok(raw) = self.dictionary.write_resolved(&object.write, object.extract(data)) {
+                self.events.push(NodeEvent::Written { slot: object.write.slot, raw, via });
+            }
+        }
+    }
+
+    /// The same where fields are no whole cells.
+    #[inline(never)]
+    fn apply_at_the_bit(&mut self, position: usize, data: u64) {
+        let via = Via::Rpdo(number_at(position));
+        let Some(mapping) = self.pdos.rpdos.as_ref()[position].mapping() else { return };
+        for object in mapping.objects_at_the_bit() {
+            let bytes = object.extract_bits(data).to_le_bytes();
+            let size = self.dictionary.table().row(object.slot).data_type.size();
+            if let Ok(raw) = self.dictionary.write_bytes(object.slot, &bytes[..size]) {
                 self.events.push(NodeEvent::Written { slot: object.slot, raw, via });
             }
         }
     }
 }
 
+/// The PDO at a position that a node has.
 fn number_at(position: usize) -> PdoNumber {
     PdoNumber::at(position).unwrap_or(PdoNumber::FIRST)
 }

@@ -6,9 +6,9 @@ use super::Node;
 use super::pending::Source;
 use crate::connection_set;
 use crate::heartbeat::Heartbeat;
-use crate::pdo::PdoNumber;
+use crate::od::Storage;
 
-impl<const N: usize> Node<N> {
+impl<S: Storage> Node<S> {
     #[inline(never)]
     pub(super) fn serve_deadlines(&mut self) {
         self.offer_heartbeat();
@@ -16,7 +16,7 @@ impl<const N: usize> Node<N> {
         if self.sdo.has_reply() {
             self.pending.insert(Source::SdoReply);
         }
-        for tpdo in &mut self.tpdos {
+        for tpdo in self.pdos.tpdos.as_mut() {
             tpdo.handle_timeout(self.now);
         }
         self.reschedule();
@@ -26,31 +26,38 @@ impl<const N: usize> Node<N> {
     pub(super) fn reschedule(&mut self) {
         self.deadline = self.heartbeat.deadline().min(self.sdo.deadline());
         self.offer_emcy();
-        for position in 0..PdoNumber::PREDEFINED {
+        for position in 0..self.pdos.tpdos.as_ref().len() {
             self.offer_tpdo(position);
         }
     }
 
     #[inline(never)]
     pub(super) fn take_most_urgent(&mut self) -> Option<Frame> {
-        let source = match self.pending.only() {
+        let source = match self.pending.take_only() {
             Some(source) => source,
-            None => self.pending.iter().min_by_key(|source| self.pending_id(*source))?,
+            None => self.choose_source()?,
         };
-        self.pending.remove(source);
         self.take(source)
+    }
+
+    #[inline(never)]
+    fn choose_source(&mut self) -> Option<Source> {
+        let source = self.pending.iter().min_by_key(|source| self.pending_id(*source))?;
+        self.pending.remove(source);
+        Some(source)
     }
 
     fn pending_id(&self, source: Source) -> u32 {
         match source {
             Source::BootUp => 0,
             Source::Emcy => self.emcy_id.map_or(u32::MAX, CanId::raw),
-            Source::Tpdo(position) => self.tpdos[position].can_id().raw(),
+            Source::Tpdo(position) => self.pdos.tpdos.as_ref()[position].can_id().raw(),
             Source::SdoReply => connection_set::sdo_reply(self.node_id).raw(),
             Source::Heartbeat => connection_set::heartbeat(self.node_id).raw(),
         }
     }
 
+    #[inline(always)]
     fn take(&mut self, source: Source) -> Option<Frame> {
         match source {
             Source::BootUp => Some(Heartbeat::boot_up(self.node_id).emit()),
@@ -62,8 +69,9 @@ impl<const N: usize> Node<N> {
                 self.sdo.take_reply().map(|bytes| Frame::full(connection_set::sdo_reply(self.node_id), bytes))
             }
             Source::Tpdo(position) => {
-                let frame = self.tpdos[position].take(&self.dictionary.view(), self.now);
-                self.deadline = self.deadline.min(self.tpdos[position].deadline(self.now));
+                let tpdo = &mut self.pdos.tpdos.as_mut()[position];
+                let frame = tpdo.take(&self.dictionary, self.now);
+                self.deadline = self.deadline.min(tpdo.deadline(self.now));
                 frame
             }
             Source::Emcy => {
@@ -83,7 +91,7 @@ impl<const N: usize> Node<N> {
     /// Offers a TPDO if it is due and not inhibited, and sees that it is looked at when it will be.
     #[inline]
     pub(super) fn offer_tpdo(&mut self, position: usize) {
-        let tpdo = &self.tpdos[position];
+        let tpdo = &self.pdos.tpdos.as_ref()[position];
         self.pending.set(Source::Tpdo(position), tpdo.is_ready(self.now));
         self.deadline = self.deadline.min(tpdo.deadline(self.now));
     }

@@ -13,6 +13,35 @@ pub type Check = fn(&View<'_>, u32) -> Result<(), AbortCode>;
 pub enum Condition {
     /// This function must agree.
     Check(Check),
+    /// The application is asked, and may take its time: [`NodeEvent::Asked`](crate::NodeEvent::Asked). SDO only; what an RPDO
+    /// brings is not asked about.
+    Ask,
+}
+
+/// Why a peer's value is not stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Refusal {
+    /// The application has to be asked; all else is in order.
+    Ask,
+    /// For this reason.
+    Abort(AbortCode),
+}
+
+impl From<AbortCode> for Refusal {
+    fn from(code: AbortCode) -> Self {
+        Self::Abort(code)
+    }
+}
+
+impl Refusal {
+    /// The same where nobody is asked.
+    #[inline(always)]
+    pub(super) fn unasked(result: Result<(), Self>) -> Result<(), AbortCode> {
+        match result {
+            Ok(()) | Err(Self::Ask) => Ok(()),
+            Err(Self::Abort(code)) => Err(code),
+        }
+    }
 }
 
 /// The conditions of a firmware on downloads to its objects. Built at compile time, so that a download finds its own
@@ -20,11 +49,11 @@ pub enum Condition {
 ///
 /// ```
 /// use canopen::AbortCode;
-/// use canopen::od::{Access, Condition, Conditions, DataType, Entry, Slot, Table, View, condition_numbers, keys};
+/// use canopen::od::{Access, Condition, Conditions, DataType, Entry, Index, Slot, Table, View, condition_numbers};
 ///
 /// static ROWS: [Entry; 1] = [Entry::new(0x2000, 0, DataType::Unsigned8, Access::ReadWrite, "even_number", "")];
-/// static KEYS: [u32; 1] = keys(&ROWS);
-/// static TABLE: Table = Table::new(&ROWS, &KEYS);
+/// static INDEX: Index<1> = Index::of(&ROWS);
+/// static TABLE: Table = Table::new(&ROWS, &INDEX);
 ///
 /// fn even(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
 ///     if raw % 2 == 0 { Ok(()) } else { Err(AbortCode::INVALID_VALUE) }
@@ -49,12 +78,23 @@ impl Conditions {
         Self { list, numbers }
     }
 
-    /// The condition on downloads to a row.
-    #[inline]
-    pub(super) fn of(&self, slot: Slot) -> Option<Condition> {
-        match self.numbers.get(slot.position()) {
-            None | Some(0) => None,
-            Some(number) => self.list.get(usize::from(*number) - 1).map(|(_, condition)| *condition),
+    /// By slot: 0 where there is no condition.
+    #[inline(always)]
+    pub(super) const fn numbers(&self) -> &'static [u8] {
+        self.numbers
+    }
+
+    /// The condition of a number.
+    #[inline(always)]
+    pub(super) fn numbered(&self, number: u8) -> Option<Condition> {
+        self.list.get(usize::from(number).wrapping_sub(1)).map(|(_, condition)| *condition)
+    }
+
+    /// The function that must agree to writes to a row, if there is one.
+    pub(super) fn check_of(&self, slot: Slot) -> Option<Check> {
+        match self.numbered(*self.numbers.get(slot.position())?)? {
+            Condition::Check(check) => Some(check),
+            Condition::Ask => None,
         }
     }
 }

@@ -192,10 +192,14 @@ impl DataType {
     }
 }
 
-/// A Rust number that an object can hold in a cell.
-pub trait Scalar: Copy {
+/// A Rust number that an object can hold.
+pub trait Held: Copy {
     /// The object's data type.
     const DATA_TYPE: DataType;
+}
+
+/// A number that fits a cell.
+pub trait Scalar: Held {
     /// From the low bytes of a cell.
     fn from_raw(raw: u32) -> Self;
     /// To a cell, higher bytes zero.
@@ -204,8 +208,11 @@ pub trait Scalar: Copy {
 
 macro_rules! scalar {
     ($($rust:ty, $unsigned:ty => $data_type:ident;)*) => {$(
-        impl Scalar for $rust {
+        impl Held for $rust {
             const DATA_TYPE: DataType = DataType::$data_type;
+        }
+
+        impl Scalar for $rust {
             fn from_raw(raw: u32) -> Self {
                 raw as Self
             }
@@ -225,8 +232,11 @@ scalar! {
     u32, u32 => Unsigned32;
 }
 
-impl Scalar for bool {
+impl Held for bool {
     const DATA_TYPE: DataType = DataType::Boolean;
+}
+
+impl Scalar for bool {
     fn from_raw(raw: u32) -> Self {
         raw & 1 != 0
     }
@@ -235,14 +245,48 @@ impl Scalar for bool {
     }
 }
 
-impl Scalar for f32 {
+impl Held for f32 {
     const DATA_TYPE: DataType = DataType::Real32;
+}
+
+impl Scalar for f32 {
     fn from_raw(raw: u32) -> Self {
         Self::from_bits(raw)
     }
     fn to_raw(self) -> u32 {
         self.to_bits()
     }
+}
+
+/// A number of 64 bits.
+pub trait LongScalar: Held {
+    /// From the bytes as an SDO carries them.
+    fn from_bytes(bytes: [u8; 8]) -> Self;
+    /// The bytes as an SDO carries them.
+    fn to_bytes(self) -> [u8; 8];
+}
+
+macro_rules! long_scalar {
+    ($($rust:ty => $data_type:ident;)*) => {$(
+        impl Held for $rust {
+            const DATA_TYPE: DataType = DataType::$data_type;
+        }
+
+        impl LongScalar for $rust {
+            fn from_bytes(bytes: [u8; 8]) -> Self {
+                Self::from_le_bytes(bytes)
+            }
+            fn to_bytes(self) -> [u8; 8] {
+                self.to_le_bytes()
+            }
+        }
+    )*};
+}
+
+long_scalar! {
+    i64 => Integer64;
+    u64 => Unsigned64;
+    f64 => Real64;
 }
 
 #[cfg(test)]

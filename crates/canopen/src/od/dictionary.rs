@@ -1,14 +1,20 @@
-use super::{Condition, Conditions, DefaultValue, Gate, Kind, Object, Scalar, Slot, Table, ValueRange};
+use super::{
+    Check, Condition, Conditions, DefaultValue, Gate, Kind, LongScalar, Object, Refusal, RowFacts, Scalar, Slot,
+    Storage, Table, Value, ValueRange,
+};
 use crate::{AbortCode, Mux, NodeId};
 
-/// The values of a device's objects: one 32-bit cell a row of its [`Table`], little endian in the low bytes.
+/// The values of a device's objects: one 32-bit cell a row of its [`Table`], little endian in the low bytes, and the
+/// bytes of those that are longer.
 ///
-/// `N` is the capacity in rows. Reading and writing by [`Object`] or [`Slot`] is an array access.
+/// Reading and writing by [`Object`] or [`Slot`] is an array access.
 #[derive(Clone)]
-pub struct Dictionary<const N: usize> {
+pub struct Dictionary<S: Storage> {
     table: &'static Table,
     conditions: &'static Conditions,
-    cells: [u32; N],
+    /// Of a value longer than a cell: how many bytes it has.
+    cells: S::Cells,
+    bytes: S::Bytes,
     /// See [`set_resolution`](Self::set_resolution).
     resolution: u32,
 }
@@ -18,30 +24,46 @@ pub struct Dictionary<const N: usize> {
 pub struct View<'a> {
     table: &'static Table,
     cells: &'a [u32],
+    bytes: &'a [u8],
 }
 
-impl<const N: usize> Dictionary<N> {
+/// See [`Dictionary::resolve`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ResolvedWrite {
+    gate: Gate,
+    pub(crate) slot: Slot,
+    /// Nobody is asked about what an RPDO brings.
+    check: Option<Check>,
+}
+
+impl ResolvedWrite {
+    /// Of no row.
+    pub(crate) const NONE: Self = Self { gate: Gate::CLOSED, slot: Slot::at(0), check: None };
+}
+
+impl<S: Storage> Dictionary<S> {
     /// Factory values for a device with this node-ID.
     ///
     /// # Panics
-    /// If the table has more than `N` rows.
+    /// If the table has more rows, or longer values, than the storage has room for.
     pub fn new(table: &'static Table, node_id: NodeId) -> Self {
-        assert!(table.rows().len() <= N, "the table has more rows than the dictionary has cells");
-        let mut dictionary = Self { table, conditions: Conditions::NONE, cells: [0; N], resolution: 1 };
+        let (cells, bytes) = (S::cells(table.rows().len()), S::bytes(table.byte_count()));
+        let mut dictionary = Self { table, conditions: Conditions::NONE, cells, bytes, resolution: 1 };
         for (slot, _) in table.iter() {
-            dictionary.cells[slot.position()] = default_raw(table, slot, node_id);
+            dictionary.restore_default(slot, node_id);
         }
         dictionary
     }
 
     /// The same values under the conditions of a firmware.
     #[must_use]
-    pub const fn with_conditions(mut self, conditions: &'static Conditions) -> Self {
+    pub fn with_conditions(mut self, conditions: &'static Conditions) -> Self {
         self.conditions = conditions;
         self
     }
 
     /// The rows.
+    #[inline]
     pub const fn table(&self) -> &'static Table {
         self.table
     }
@@ -49,40 +71,87 @@ impl<const N: usize> Dictionary<N> {
     /// The value of a typed object.
     #[inline]
     pub fn get<T: Scalar>(&self, object: Object<T>) -> T {
-        T::from_raw(self.cells[object.slot().position()])
+        T::from_raw(self.raw(object.slot()))
     }
 
     /// Stores the value of a typed object: the device's own right, no access or range is checked.
     #[inline]
     pub fn set<T: Scalar>(&mut self, object: Object<T>, value: T) {
-        self.cells[object.slot().position()] = value.to_raw();
+        self.cells.as_mut()[object.slot().position()] = value.to_raw();
     }
 
-    /// The cell of a row.
+    /// The value of a typed object of 64 bits.
+    pub fn get_long<T: LongScalar>(&self, object: Object<T>) -> T {
+        let mut bytes = [0; 8];
+        self.view().copy(object.slot(), &mut bytes);
+        T::from_bytes(bytes)
+    }
+
+    /// Stores the value of a typed object of 64 bits: the device's own right.
+    pub fn set_long<T: LongScalar>(&mut self, object: Object<T>, value: T) {
+        self.store_bytes(object.slot(), &value.to_bytes());
+    }
+
+    /// The cell of a row; of a value longer than a cell, how many bytes it has.
     #[inline]
     pub fn raw(&self, slot: Slot) -> u32 {
-        self.cells[slot.position()]
+        self.cells.as_ref()[slot.position()]
     }
 
-    /// Stores a cell; bits beyond the object's width are dropped. No access or range is checked.
+    /// Stores a cell; bits beyond the object's width are dropped. No access or range is checked. A value longer than a cell
+    /// stays as it is: see [`set_bytes`](Self::set_bytes).
     #[inline]
     pub fn set_raw(&mut self, slot: Slot, raw: u32) {
-        self.cells[slot.position()] = raw & self.table.summary(slot).mask();
+        let mask = self.table.gate(slot).mask();
+        if mask != 0 {
+            self.cells.as_mut()[slot.position()] = raw & mask;
+        }
     }
 
-    /// The value of a row as a number.
+    /// The value of a row as a whole number; see [`View::integer`].
     pub fn value(&self, slot: Slot) -> i64 {
-        self.table.row(slot).data_type.value(self.raw(slot))
+        self.view().integer(slot)
+    }
+
+    /// Stores a value as an SDO carries it: the device's own right, no access or range is checked.
+    ///
+    /// # Errors
+    /// [`AbortCode::TOO_LONG`] and [`AbortCode::TOO_SHORT`] if the type or the capacity is for another number of bytes,
+    /// [`AbortCode::READ_ONLY`] for a string that is constant.
+    pub fn set_bytes(&mut self, slot: Slot, bytes: &[u8]) -> Result<(), AbortCode> {
+        self.view().check_length(slot, bytes.len())?;
+        self.store_bytes(slot, bytes);
+        Ok(())
     }
 
     /// Puts one row back to its factory value.
     pub fn restore_default(&mut self, slot: Slot, node_id: NodeId) {
-        self.cells[slot.position()] = default_raw(self.table, slot, node_id);
+        let row = self.table.row(slot);
+        match row.default {
+            DefaultValue::Text(text) => return self.store_bytes(slot, text.as_bytes()),
+            DefaultValue::Bytes(bytes) => return self.store_bytes(slot, bytes),
+            _ if row.data_type.kind() == Kind::Bytes => return self.store_bytes(slot, &[]),
+            _ => {}
+        }
+        let bits = match (row.default, row.data_type.size()) {
+            (DefaultValue::Value(value), _) if row.data_type.is_integer() || row.data_type.kind() == Kind::Time => {
+                value as u64
+            }
+            (DefaultValue::Value(value), 4) => (value as f32).to_bits().into(),
+            (DefaultValue::Value(value), _) => (value as f64).to_bits(),
+            (DefaultValue::Real(value), 4) => (value as f32).to_bits().into(),
+            (DefaultValue::Real(value), _) => value.to_bits(),
+            (DefaultValue::NodeIdPlus(base), _) => base.wrapping_add(node_id.raw().into()).into(),
+            (DefaultValue::Unsigned(value), _) => value,
+            (DefaultValue::Text(_) | DefaultValue::Bytes(_), _) => 0,
+        };
+        self.store_bytes(slot, &bits.to_le_bytes());
     }
 
     /// All values, to look at.
+    #[inline(always)]
     pub fn view(&self) -> View<'_> {
-        View { table: self.table, cells: &self.cells }
+        View { table: self.table, cells: self.cells.as_ref(), bytes: self.bytes.as_ref() }
     }
 
     /// Sets the resolution in effect, of the rows that have one ([`Entry::resolution`](super::Entry::resolution)): a device may
@@ -97,13 +166,13 @@ impl<const N: usize> Dictionary<N> {
     }
 
     /// Whether a peer (SDO or RPDO) may write `raw` to this row: access, listed values, limits, the firmware's
-    /// condition.
+    /// condition. Of a row whose value fits a cell.
     ///
     /// # Errors
     /// The abort code that an SDO server answers. Nothing is stored.
     #[inline(always)]
     pub fn check_write(&self, slot: Slot, raw: u32) -> Result<(), AbortCode> {
-        self.check(self.table.gate(slot), slot, raw)
+        Refusal::unasked(self.check(self.table.gate(slot), slot, raw))
     }
 
     /// [`check_write`](Self::check_write), then stores. Returns the cell.
@@ -114,13 +183,45 @@ impl<const N: usize> Dictionary<N> {
     pub fn write(&mut self, slot: Slot, raw: u32) -> Result<u32, AbortCode> {
         let gate = self.table.gate(slot);
         let cell = raw & gate.mask();
-        self.check(gate, slot, cell)?;
-        self.cells[slot.position()] = cell;
+        Refusal::unasked(self.check(gate, slot, cell))?;
+        self.cells.as_mut()[slot.position()] = cell;
         Ok(cell)
     }
 
+    /// What a write to a row has to pass, resolved: for a row that is written often.
+    pub(crate) fn resolve(&self, slot: Slot) -> ResolvedWrite {
+        ResolvedWrite { gate: *self.table.gate(slot), slot, check: self.conditions.check_of(slot) }
+    }
+
+    /// [`write`](Self::write) of a row that was [resolved](Self::resolve) for this dictionary.
     #[inline(always)]
-    fn check(&self, gate: &Gate, slot: Slot, raw: u32) -> Result<(), AbortCode> {
+    pub(crate) fn write_resolved(&mut self, write: &ResolvedWrite, raw: u32) -> Result<u32, AbortCode> {
+        let cell = raw & write.gate.mask();
+        if !write.gate.admits(cell) {
+            Refusal::unasked(self.ask_row(write.slot, cell))?;
+        } else if let Some(check) = write.check {
+            check(&self.view(), cell)?;
+        }
+        self.cells.as_mut()[write.slot.position()] = cell;
+        Ok(cell)
+    }
+
+    /// [`write`](Self::write), unless the application is to be asked before.
+    #[inline(always)]
+    pub(crate) fn write_or_ask(&mut self, slot: Slot, facts: &RowFacts, raw: u32) -> Result<u32, Refusal> {
+        let cell = raw & facts.gate.mask();
+        self.check(&facts.gate, slot, cell)?;
+        self.cells.as_mut()[slot.position()] = cell;
+        Ok(cell)
+    }
+
+    /// [`check_write`](Self::check_write), which says whether the application is to be asked.
+    pub(crate) fn check_or_ask(&self, slot: Slot, raw: u32) -> Result<(), Refusal> {
+        self.check(self.table.gate(slot), slot, raw)
+    }
+
+    #[inline(always)]
+    fn check(&self, gate: &Gate, slot: Slot, raw: u32) -> Result<(), Refusal> {
         if !gate.admits(raw) {
             return self.ask_row(slot, raw);
         }
@@ -129,10 +230,14 @@ impl<const N: usize> Dictionary<N> {
 
     /// Why a row does not take a value, if that is so.
     #[cold]
-    fn ask_row(&self, slot: Slot, raw: u32) -> Result<(), AbortCode> {
+    fn ask_row(&self, slot: Slot, raw: u32) -> Result<(), Refusal> {
         let row = self.table.row(slot);
-        if !self.table.summary(slot).is_writable() {
-            return Err(AbortCode::READ_ONLY);
+        let summary = self.table.summary(slot);
+        if !summary.is_writable() {
+            return Err(AbortCode::READ_ONLY.into());
+        }
+        if summary.is_long() {
+            return Err(AbortCode::LENGTH_MISMATCH.into());
         }
         let value = row.data_type.value(raw);
         match (row.data_type.kind(), row.resolution) {
@@ -143,49 +248,206 @@ impl<const N: usize> Dictionary<N> {
         self.check_condition(slot, raw)
     }
 
+    /// Whether a peer may write `bytes` to this row: access, length, limits, the firmware's condition, which gets the
+    /// number of bytes for a value longer than a cell. Of any row.
+    ///
+    /// # Errors
+    /// The abort code that an SDO server answers.
+    pub fn check_bytes(&self, slot: Slot, bytes: &[u8]) -> Result<(), AbortCode> {
+        Refusal::unasked(self.check_bytes_or_ask(slot, bytes))
+    }
+
+    fn check_bytes_or_ask(&self, slot: Slot, bytes: &[u8]) -> Result<(), Refusal> {
+        let (row, summary) = (self.table.row(slot), self.table.summary(slot));
+        if !summary.is_writable() {
+            return Err(AbortCode::READ_ONLY.into());
+        }
+        self.view().check_length(slot, bytes.len())?;
+        if !summary.is_long() {
+            return self.check_or_ask(slot, cell_of(bytes));
+        }
+        match Value::parse(row.data_type, bytes).ok_or(AbortCode::LENGTH_MISMATCH)? {
+            Value::Integer(value) => row.check_value(value)?,
+            Value::Unsigned(value) => check_unsigned(value, row.limits)?,
+            Value::Real64(value) => check_real(value, row.limits)?,
+            Value::Real32(_) | Value::Time { .. } | Value::Bytes(_) => {}
+        }
+        self.check_condition(slot, bytes.len() as u32)
+    }
+
+    /// [`check_bytes`](Self::check_bytes), then stores. Returns the cell.
+    ///
+    /// # Errors
+    /// The abort code that an SDO server answers. Nothing is stored.
+    pub fn write_bytes(&mut self, slot: Slot, bytes: &[u8]) -> Result<u32, AbortCode> {
+        self.check_bytes(slot, bytes)?;
+        self.store_bytes(slot, bytes);
+        Ok(self.raw(slot))
+    }
+
+    /// Where a value waits until it is complete: as many bytes as the longest needs.
+    pub(crate) fn staging_mut(&mut self) -> &mut [u8] {
+        let range = self.view().staging_place();
+        &mut self.bytes.as_mut()[range]
+    }
+
+    /// Copies the value of a row to where values wait. Returns how many bytes.
+    pub(crate) fn stage(&mut self, slot: Slot) -> usize {
+        let (from, to) = (self.table.gate(slot).long_place(), self.view().staging_place());
+        let length = self.view().long_bytes(slot).len().min(to.len());
+        self.bytes.as_mut().copy_within(from.start..from.start + length, to.start);
+        length
+    }
+
+    /// The row takes what waits, its first `length` bytes: no access or range is checked.
+    pub(crate) fn store_staged(&mut self, slot: Slot, length: usize) {
+        let (from, to) = (self.view().staging_place(), self.table.gate(slot).long_place());
+        let length = length.min(to.len()).min(from.len());
+        self.bytes.as_mut().copy_within(from.start..from.start + length, to.start);
+        self.cells.as_mut()[slot.position()] = length as u32;
+    }
+
+    /// Whether a peer may write what waits, its first `length` bytes.
+    pub(crate) fn check_staged(&self, slot: Slot, length: usize) -> Result<(), Refusal> {
+        self.check_bytes_or_ask(slot, self.view().staged(length))
+    }
+
+    /// Stores what fits of `bytes`, from the lowest on.
+    fn store_bytes(&mut self, slot: Slot, bytes: &[u8]) {
+        if !self.table.summary(slot).is_long() {
+            return self.set_raw(slot, cell_of(bytes));
+        }
+        let place = self.table.gate(slot).long_place();
+        let length = bytes.len().min(place.len());
+        self.bytes.as_mut()[place][..length].copy_from_slice(&bytes[..length]);
+        self.cells.as_mut()[slot.position()] = length as u32;
+    }
+
     #[inline(always)]
-    fn check_condition(&self, slot: Slot, raw: u32) -> Result<(), AbortCode> {
-        match self.conditions.of(slot) {
+    fn check_condition(&self, slot: Slot, raw: u32) -> Result<(), Refusal> {
+        match self.conditions.numbers().get(slot.position()) {
+            None | Some(0) => Ok(()),
+            Some(number) => self.ask_condition(*number, raw),
+        }
+    }
+
+    #[inline(never)]
+    fn ask_condition(&self, number: u8, raw: u32) -> Result<(), Refusal> {
+        match self.conditions.numbered(number) {
             None => Ok(()),
-            Some(Condition::Check(check)) => check(&self.view(), raw),
+            Some(Condition::Check(check)) => check(&self.view(), raw).map_err(Refusal::Abort),
+            Some(Condition::Ask) => Err(Refusal::Ask),
         }
     }
 }
 
-impl View<'_> {
+impl<'a> View<'a> {
     /// The rows.
+    #[inline]
     pub const fn table(&self) -> &'static Table {
         self.table
     }
 
     /// The value of a typed object.
     pub fn get<T: Scalar>(&self, object: Object<T>) -> T {
-        T::from_raw(self.cells[object.slot().position()])
+        T::from_raw(self.raw(object.slot()))
     }
 
-    /// The cell of a row.
+    /// The cell of a row; of a value longer than a cell, how many bytes it has.
+    #[inline]
     pub fn raw(&self, slot: Slot) -> u32 {
         self.cells[slot.position()]
     }
 
-    /// The value at a multiplexor as a number.
+    /// The value at a multiplexor as a whole number; see [`integer`](Self::integer).
     ///
     /// # Errors
     /// [`AbortCode::NO_SUCH_OBJECT`] or [`AbortCode::NO_SUCH_SUB_INDEX`].
     pub fn value(&self, mux: Mux) -> Result<i64, AbortCode> {
-        let slot = self.table.find(mux)?;
-        Ok(self.table.row(slot).data_type.value(self.raw(slot)))
+        self.table.find(mux).map(|slot| self.integer(slot))
+    }
+
+    /// The value of a row as a whole number: UNSIGNED64 beyond the largest `i64` as that, reals cut to whole ones, times
+    /// their milliseconds; 0 for strings.
+    pub fn integer(&self, slot: Slot) -> i64 {
+        let data_type = self.table.row(slot).data_type;
+        if data_type.fits_cell() && data_type.is_integer() {
+            return data_type.value(self.raw(slot));
+        }
+        match self.typed(slot) {
+            Value::Integer(value) => value,
+            Value::Unsigned(_) => i64::MAX,
+            Value::Real32(value) => value as i64,
+            Value::Real64(value) => value as i64,
+            Value::Time { millis, .. } => millis.into(),
+            Value::Bytes(_) => 0,
+        }
+    }
+
+    /// The value of a row as its type has it.
+    pub fn typed(&self, slot: Slot) -> Value<'a> {
+        let data_type = self.table.row(slot).data_type;
+        if data_type.kind() == Kind::Bytes {
+            return Value::Bytes(self.long_bytes(slot));
+        }
+        let mut bytes = [0; 8];
+        self.copy(slot, &mut bytes);
+        Value::of_bits(data_type, u64::from_le_bytes(bytes))
+    }
+
+    /// How many bytes the value of a row has, as an SDO carries it.
+    pub fn length(&self, slot: Slot) -> usize {
+        let summary = self.table.summary(slot);
+        if summary.is_long() { self.long_bytes(slot).len() } else { summary.size().into() }
+    }
+
+    /// Copies the value of a row, as an SDO carries it, as much as there is room for. Returns how many bytes.
+    pub fn copy(&self, slot: Slot, to: &mut [u8]) -> usize {
+        let summary = self.table.summary(slot);
+        let cell = self.raw(slot).to_le_bytes();
+        let from = if summary.is_long() { self.long_bytes(slot) } else { &cell[..summary.size().into()] };
+        let length = from.len().min(to.len());
+        to[..length].copy_from_slice(&from[..length]);
+        length
+    }
+
+    /// The bytes of a value that is longer than a cell; none for one that fits.
+    pub fn long_bytes(&self, slot: Slot) -> &'a [u8] {
+        if let Some(constant) = self.table.row(slot).constant_bytes() {
+            return constant;
+        }
+        let value = &self.bytes[self.table.gate(slot).long_place()];
+        if self.table.summary(slot).is_long() { value.get(..self.raw(slot) as usize).unwrap_or(value) } else { &[] }
+    }
+
+    /// Whether a value of `length` bytes can be stored in a row.
+    pub(crate) fn check_length(&self, slot: Slot, length: usize) -> Result<(), AbortCode> {
+        let row = self.table.row(slot);
+        match (row.data_type.kind(), row.stored_bytes()) {
+            (Kind::Bytes, 0) => Err(AbortCode::READ_ONLY),
+            (Kind::Bytes, capacity) if length > capacity as usize => Err(AbortCode::TOO_LONG),
+            (Kind::Bytes, _) => Ok(()),
+            _ if length > row.data_type.size() => Err(AbortCode::TOO_LONG),
+            _ if length < row.data_type.size() => Err(AbortCode::TOO_SHORT),
+            _ => Ok(()),
+        }
+    }
+
+    /// The first `length` bytes of what waits until it is complete; fewer if there is no room for as many.
+    pub(crate) fn staged(&self, length: usize) -> &'a [u8] {
+        let staging = &self.bytes[self.staging_place()];
+        &staging[..length.min(staging.len())]
+    }
+
+    const fn staging_place(&self) -> core::ops::Range<usize> {
+        let end = self.table.byte_count();
+        end - self.table.staging()..end
     }
 }
 
-fn default_raw(table: &Table, slot: Slot, node_id: NodeId) -> u32 {
-    let row = table.row(slot);
-    match row.default {
-        DefaultValue::Value(value) => row.data_type.raw(value),
-        DefaultValue::Real(value) => (value as f32).to_raw(),
-        DefaultValue::NodeIdPlus(base) => base.wrapping_add(node_id.raw().into()) & row.data_type.mask(),
-        DefaultValue::Unsigned(_) | DefaultValue::Text(_) | DefaultValue::Bytes(_) => 0,
-    }
+/// The cell of a value of up to four bytes.
+fn cell_of(bytes: &[u8]) -> u32 {
+    bytes.iter().take(4).rev().fold(0, |raw, byte| raw << 8 | u32::from(*byte))
 }
 
 fn check_real(value: f64, limits: Option<ValueRange>) -> Result<(), AbortCode> {
@@ -197,9 +459,19 @@ fn check_real(value: f64, limits: Option<ValueRange>) -> Result<(), AbortCode> {
     }
 }
 
+/// Of an UNSIGNED64 beyond the largest `i64`.
+fn check_unsigned(value: u64, limits: Option<ValueRange>) -> Result<(), AbortCode> {
+    match limits {
+        Some(ValueRange::Unsigned(min, _)) if value < min => Err(AbortCode::VALUE_TOO_LOW),
+        Some(ValueRange::Unsigned(_, max)) if value > max => Err(AbortCode::VALUE_TOO_HIGH),
+        Some(ValueRange::Integer(..)) => Err(AbortCode::VALUE_TOO_HIGH),
+        _ => Ok(()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::{Access, DataType, Entry, keys};
+    use super::super::{Access, DataType, Entry, Fixed, Index};
     use super::*;
 
     static ROWS: [Entry; 5] = [
@@ -212,11 +484,11 @@ mod tests {
             .range(-1000, 1000)
             .resolution(0x2001, 0),
     ];
-    static KEYS: [u32; 5] = keys(&ROWS);
-    static TABLE: Table = Table::new(&ROWS, &KEYS);
+    static INDEX: Index<5> = Index::of(&ROWS);
+    static TABLE: Table = Table::new(&ROWS, &INDEX);
     const TORQUE: Object<i16> = TABLE.object(0x6071, 0);
 
-    fn dictionary() -> Dictionary<8> {
+    fn dictionary() -> Dictionary<Fixed<8>> {
         Dictionary::new(&TABLE, NodeId::new(4).unwrap())
     }
 
@@ -257,7 +529,7 @@ mod tests {
     fn limits_move_with_the_resolution_in_effect() {
         let mut dictionary = dictionary();
         let slot = TABLE.slot(0x60FF, 0);
-        let check = |dictionary: &Dictionary<8>, value: i32| dictionary.check_write(slot, value as u32);
+        let check = |dictionary: &Dictionary<Fixed<8>>, value: i32| dictionary.check_write(slot, value as u32);
         for (resolution, limit) in [(1, 1000), (10, 10_000), (0, 1000)] {
             dictionary.set_resolution(resolution);
             assert_eq!((check(&dictionary, limit), check(&dictionary, -limit)), (Ok(()), Ok(())));

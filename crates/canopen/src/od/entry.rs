@@ -288,6 +288,15 @@ impl Entry {
         }
     }
 
+    /// Bytes that a dictionary keeps for a value longer than a cell; 0 for one that fits and for one that never changes.
+    pub const fn stored_bytes(&self) -> u32 {
+        match self.data_type.kind() {
+            Kind::Bytes => self.capacity,
+            _ if self.data_type.fits_cell() => 0,
+            _ => self.data_type.size() as u32,
+        }
+    }
+
     /// Smallest and largest whole number accepted, where the row has narrower ones than the type.
     pub const fn integer_limits(&self) -> Option<(i64, i64)> {
         match self.limits {

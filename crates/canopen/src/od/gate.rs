@@ -2,7 +2,7 @@ use super::{Entry, Summary};
 
 /// What a written value has to pass, resolved from the row at compile time: one subtraction, one comparison and one bit,
 /// whatever the row's type, limits and list are.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Gate {
     /// Which bits of a cell the type uses.
     mask: u32,
@@ -37,7 +37,18 @@ impl Gate {
         Self { mask, low: row.data_type.raw(low), span: (high - low) as u32, listed }
     }
 
-    /// Which bits of a cell the type uses.
+    /// Of a value that is longer than a cell: no cell passes, and its `capacity` bytes stand at `offset`.
+    pub(super) const fn of_long(offset: u32, capacity: u32) -> Self {
+        Self { mask: 0, low: offset, span: capacity, listed: 0 }
+    }
+
+    /// Where the bytes of a value stand that is longer than a cell.
+    pub(super) const fn long_place(&self) -> core::ops::Range<usize> {
+        let start = self.low as usize;
+        start..start + self.span as usize
+    }
+
+    /// Which bits of a cell the type uses; none where the value is longer.
     #[inline]
     pub(super) const fn mask(&self) -> u32 {
         self.mask

@@ -23,7 +23,7 @@ impl Summary {
             unused
                 | flag(LONG, is_long)
                 | flag(READABLE, row.access.is_readable())
-                | flag(WRITABLE, row.access.is_writable() && !is_long)
+                | flag(WRITABLE, row.access.is_writable() && (!is_long || row.stored_bytes() > 0))
                 | flag(COMMUNICATION, row.is_communication()),
         )
     }
@@ -32,12 +32,6 @@ impl Summary {
     #[inline]
     pub(crate) const fn size(self) -> u8 {
         MAX_SIZE - (self.0 & UNUSED_BYTES)
-    }
-
-    /// Which bits of a cell the type uses.
-    #[inline]
-    pub(crate) const fn mask(self) -> u32 {
-        u32::MAX >> ((self.0 & UNUSED_BYTES) * 8)
     }
 
     /// Not in a cell.
@@ -52,10 +46,28 @@ impl Summary {
         self.0 & READABLE != 0
     }
 
+    /// SDO upload is allowed, of a cell.
+    #[inline]
+    pub(crate) const fn is_readable_cell(self) -> bool {
+        self.0 & (READABLE | LONG) == READABLE
+    }
+
+    /// SDO download is allowed, to a cell.
+    #[inline]
+    pub(crate) const fn is_writable_cell(self) -> bool {
+        self.0 & (WRITABLE | LONG) == WRITABLE
+    }
+
     /// SDO download is allowed.
     #[inline]
     pub(crate) const fn is_writable(self) -> bool {
         self.0 & WRITABLE != 0
+    }
+
+    /// Of the communication profile area, or not in a cell: a write does more than store a cell.
+    #[inline]
+    pub(crate) const fn is_special(self) -> bool {
+        self.0 & (COMMUNICATION | LONG) != 0
     }
 
     /// Of the communication profile area, 1000h to 1FFFh.
@@ -84,7 +96,6 @@ mod tests {
                 let row = Entry::new(0x2000, 0, data_type, access, "", "");
                 let summary = Summary::of(&row);
                 assert_eq!(usize::from(summary.size()), data_type.size());
-                assert_eq!(summary.mask(), data_type.mask());
                 assert_eq!(summary.is_readable(), access.is_readable());
                 assert_eq!(summary.is_writable(), access.is_writable());
                 assert!(!summary.is_long() && !summary.is_communication());

@@ -1,37 +1,47 @@
+use core::fmt;
 use core::marker::PhantomData;
 
-use super::{Entry, Gate, Scalar, Summary};
+use super::index::{FREE, fill, first_place, next_place};
+use super::{Entry, Gate, Held, Index, Places, RowFacts, Slot, Summary};
 use crate::{AbortCode, Mux};
 
-/// All rows of a device, ascending by index and sub-index, with their keys packed for the search.
+/// All rows of a device, ascending by index and sub-index, with what makes the search among them fast.
 ///
-/// Every request of a peer begins with a search, so it is made once, at compile time: a hash directory leads from a key
-/// to its row, most often in one step. Searching 200 sorted keys by halves takes three times as long.
-#[derive(Clone)]
+/// Every request of a peer begins with a search, so it is prepared once: a hash directory leads from a key to its row,
+/// most often in one step. Searching 200 sorted keys by halves takes three times as long.
+///
+/// A firmware builds its table at compile time, beside its rows:
+///
+/// ```
+/// use canopen::od::{Access, DataType, Entry, Index, Table};
+///
+/// static ROWS: [Entry; 1] = [Entry::new(0x1000, 0, DataType::Unsigned32, Access::Const, "device_type", "Device type")];
+/// static INDEX: Index<1> = Index::of(&ROWS);
+/// static TABLE: Table = Table::new(&ROWS, &INDEX);
+/// ```
+///
+/// A program that learns of the rows at run time, from a file say, makes room for the index and keeps rows, index and table
+/// for the rest of its life. Whoever may read the same file twice keeps what it has, by content:
+///
+/// ```
+/// use canopen::Mux;
+/// use canopen::od::{Access, DataType, Entry, FREE_PLACES, RowFacts, Table};
+///
+/// let rows = vec![Entry::new(0x1000, 0, DataType::Unsigned32, Access::Const, "device_type", "Device type")];
+/// let rows: &'static [Entry] = rows.leak();
+/// let facts = vec![RowFacts::NONE; rows.len()].leak();
+/// let places = vec![FREE_PLACES; rows.len()].leak();
+/// let table: &'static Table = Box::leak(Box::new(Table::at_run_time(rows, facts, places)?));
+/// assert!(table.find(Mux::new(0x1000, 0)).is_ok());
+/// # Ok::<(), canopen::od::TableError>(())
+/// ```
+#[derive(Clone, Copy)]
 pub struct Table {
     rows: &'static [Entry],
-    keys: &'static [u32],
-    directory: [u16; DIRECTORY_LENGTH],
-    summaries: [Summary; MAX_ROWS],
-    gates: [Gate; MAX_ROWS],
-}
-
-/// Places of the directory: a power of two, so that the hash needs no division.
-const DIRECTORY_LENGTH: usize = 1024;
-/// Most rows of a table: a quarter of the directory stays free, so that searches end soon.
-pub const MAX_ROWS: usize = DIRECTORY_LENGTH / 4 * 3;
-/// A free place.
-const FREE: u16 = u16::MAX;
-
-/// The number of a row in its table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Slot(u16);
-
-impl Slot {
-    /// The row's position, from 0.
-    pub const fn position(self) -> usize {
-        self.0 as usize
-    }
+    facts: &'static [RowFacts],
+    places: &'static [u16],
+    byte_count: u32,
+    staging: u32,
 }
 
 /// A row known at compile time to exist and to hold a `T`.
@@ -56,40 +66,56 @@ impl<T> Object<T> {
     }
 }
 
-/// The search keys of `rows`; for a `static` beside the rows.
-///
-/// # Panics
-/// At compile time if the rows are not strictly ascending by index and sub-index.
-pub const fn keys<const N: usize>(rows: &[Entry; N]) -> [u32; N] {
-    let mut keys = [0; N];
-    let mut i = 0;
-    while i < N {
-        keys[i] = rows[i].mux().key();
-        assert!(i == 0 || keys[i - 1] < keys[i], "object rows must ascend by index and sub-index");
-        i += 1;
-    }
-    keys
+/// Why rows make no table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TableError {
+    /// The row at this position has the index and sub-index of the one before it, or smaller ones.
+    NotAscending {
+        /// From 0.
+        position: usize,
+    },
+    /// More than [`MAX_ROWS`](super::MAX_ROWS).
+    TooManyRows,
+    /// The index is not as long as the rows.
+    OtherLength,
+    /// The values longer than a cell have 4 GiB or more.
+    TooManyBytes,
 }
 
-impl Table {
-    /// A table of `rows` with `keys` = [`keys`]`(rows)`.
-    pub const fn new(rows: &'static [Entry], keys: &'static [u32]) -> Self {
-        assert!(rows.len() == keys.len() && rows.len() <= MAX_ROWS);
-        let mut directory = [FREE; DIRECTORY_LENGTH];
-        let mut summaries = [Summary::NONE; MAX_ROWS];
-        let mut gates = [Gate::CLOSED; MAX_ROWS];
-        let mut position = 0;
-        while position < keys.len() {
-            let mut place = first_place(keys[position]);
-            while directory[place] != FREE {
-                place = next_place(place);
+impl fmt::Display for TableError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotAscending { position } => {
+                write!(f, "row {position} does not come after the one before it by index and sub-index")
             }
-            directory[place] = position as u16;
-            summaries[position] = Summary::of(&rows[position]);
-            gates[position] = Gate::of(&rows[position]);
-            position += 1;
+            Self::TooManyRows => write!(f, "more than {} rows", super::MAX_ROWS),
+            Self::OtherLength => f.write_str("the index is not as long as the rows"),
+            Self::TooManyBytes => f.write_str("strings and domains of 4 GiB or more"),
         }
-        Self { rows, keys, directory, summaries, gates }
+    }
+}
+
+impl core::error::Error for TableError {}
+
+impl Table {
+    /// A table of `rows` with `index` = [`Index::of`]`(rows)`.
+    pub const fn new<const N: usize>(rows: &'static [Entry; N], index: &'static Index<N>) -> Self {
+        let Index { facts, places, byte_count, staging } = index;
+        Self { rows, facts, places: places.as_flattened(), byte_count: *byte_count, staging: *staging }
+    }
+
+    /// A table of rows that are read at run time. `facts` and `places` are as long as the rows;
+    /// [`RowFacts::NONE`] and [`FREE_PLACES`](super::FREE_PLACES) to begin with.
+    ///
+    /// # Errors
+    /// [`TableError`].
+    pub fn at_run_time(
+        rows: &'static [Entry],
+        facts: &'static mut [RowFacts],
+        places: &'static mut [Places],
+    ) -> Result<Self, TableError> {
+        let (byte_count, staging) = fill(rows, facts, places)?;
+        Ok(Self { rows, facts, places: places.as_flattened(), byte_count, staging })
     }
 
     /// All rows, ascending.
@@ -102,21 +128,31 @@ impl Table {
         &self.rows[slot.position()]
     }
 
+    /// Bytes that a dictionary of this table needs for values longer than a cell, and to take one of them in.
+    pub const fn byte_count(&self) -> usize {
+        self.byte_count as usize
+    }
+
+    /// Of these, the bytes at the end in which a value waits until it is complete.
+    pub(super) const fn staging(&self) -> usize {
+        self.staging as usize
+    }
+
     /// The row of a slot of this table in short.
     #[inline]
     pub(crate) const fn summary(&self, slot: Slot) -> Summary {
-        self.summaries[slot.position()]
+        self.facts[slot.position()].summary
     }
 
     /// What a value has to pass that is written to the row of a slot of this table.
     #[inline]
-    pub(super) const fn gate(&self, slot: Slot) -> &Gate {
-        &self.gates[slot.position()]
+    pub(super) const fn gate(&self, slot: Slot) -> &'static Gate {
+        &self.facts[slot.position()].gate
     }
 
     /// All slots with their rows.
     pub fn iter(&self) -> impl Iterator<Item = (Slot, &'static Entry)> + use<> {
-        self.rows.iter().enumerate().map(|(i, row)| (Slot(i as u16), row))
+        self.rows.iter().enumerate().map(|(i, row)| (Slot::at(i), row))
     }
 
     /// Finds a row.
@@ -125,23 +161,34 @@ impl Table {
     /// [`AbortCode::NO_SUCH_OBJECT`] if no row has the index, [`AbortCode::NO_SUCH_SUB_INDEX`] if some have.
     #[inline]
     pub fn find(&self, mux: Mux) -> Result<Slot, AbortCode> {
+        self.look_up(mux).map(|(slot, _)| slot)
+    }
+
+    /// Finds a row and what requests must know of it.
+    ///
+    /// # Errors
+    /// As [`find`](Self::find).
+    #[inline(always)]
+    pub(crate) fn look_up(&self, mux: Mux) -> Result<(Slot, &'static RowFacts), AbortCode> {
         let key = mux.key();
-        let mut place = first_place(key);
-        // A free place comes before the directory has been gone round.
-        while let Some(found) = self.keys.get(usize::from(self.directory[place])) {
-            if *found == key {
-                return Ok(Slot(self.directory[place]));
+        let mut place = first_place(key, self.places.len());
+        // A free place, which is no row's position, comes before the directory has been gone round.
+        while let Some(position) = self.places.get(place)
+            && let Some(facts) = self.facts.get(usize::from(*position))
+        {
+            if facts.key == key {
+                return Ok((Slot::at(usize::from(*position)), facts));
             }
-            place = next_place(place);
+            place = next_place(place, self.places.len());
         }
         Err(self.missing(mux.index))
     }
 
     #[cold]
     fn missing(&self, index: u16) -> AbortCode {
-        let first = self.keys.partition_point(|key| key >> 8 < u32::from(index));
-        match self.keys.get(first) {
-            Some(key) if key >> 8 == u32::from(index) => AbortCode::NO_SUCH_SUB_INDEX,
+        let first = self.facts.partition_point(|facts| facts.key >> 8 < u32::from(index));
+        match self.facts.get(first) {
+            Some(facts) if facts.key >> 8 == u32::from(index) => AbortCode::NO_SUCH_SUB_INDEX,
             _ => AbortCode::NO_SUCH_OBJECT,
         }
     }
@@ -152,24 +199,24 @@ impl Table {
     /// If the table has no such row.
     pub const fn slot(&self, index: u16, sub_index: u8) -> Slot {
         let key = Mux::new(index, sub_index).key();
-        let (mut low, mut high) = (0, self.keys.len());
+        let (mut low, mut high) = (0, self.facts.len());
         while low < high {
             let middle = (low + high) / 2;
-            if self.keys[middle] < key {
+            if self.facts[middle].key < key {
                 low = middle + 1;
             } else {
                 high = middle;
             }
         }
-        assert!(low < self.keys.len() && self.keys[low] == key, "no such object in the table");
-        Slot(low as u16)
+        assert!(low < self.facts.len() && self.facts[low].key == key, "no such object in the table");
+        Slot::at(low)
     }
 
     /// A typed object, for a `const` of the device.
     ///
     /// # Panics
     /// If the table has no such row or its data type is not `T`'s: at compile time in a `const`.
-    pub const fn object<T: Scalar>(&self, index: u16, sub_index: u8) -> Object<T> {
+    pub const fn object<T: Held>(&self, index: u16, sub_index: u8) -> Object<T> {
         let slot = self.slot(index, sub_index);
         let same = self.rows[slot.position()].data_type.code() == T::DATA_TYPE.code();
         assert!(same, "the object has another data type");
@@ -177,12 +224,4 @@ impl Table {
     }
 }
 
-/// Where the search for a key begins: the high bits of a multiplicative hash (Knuth, vol. 3, 6.4).
-const fn first_place(key: u32) -> usize {
-    const GOLDEN_RATIO: u32 = 0x9E37_79B1;
-    (key.wrapping_mul(GOLDEN_RATIO) >> (u32::BITS - DIRECTORY_LENGTH.trailing_zeros())) as usize
-}
-
-const fn next_place(place: usize) -> usize {
-    (place + 1) % DIRECTORY_LENGTH
-}
+const _: () = assert!(FREE as usize >= super::MAX_ROWS, "a free place is no position");

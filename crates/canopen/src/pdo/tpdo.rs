@@ -1,7 +1,7 @@
 use can::{CanId, Frame, Instant};
 
 use super::{Mapping, Parameter, TransmissionType};
-use crate::od::View;
+use crate::od::{Dictionary, Storage};
 
 /// What makes a device send a TPDO of type 254 or 255, apart from its event timer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,6 +113,11 @@ impl Tpdo {
         !matches!(self.schedule, Schedule::Event { .. })
     }
 
+    /// True if what the application changes can send it.
+    pub const fn watches(&self) -> bool {
+        self.is_active() && matches!(self.schedule, Schedule::Acyclic { .. } | Schedule::Event { on_change: true })
+    }
+
     /// Operational is entered, or the PDO became active while operational: counts as an event, so that event-driven
     /// data is sent once. SYNCs and the event timer count from here.
     pub fn start(&mut self, now: Instant) {
@@ -152,7 +157,7 @@ impl Tpdo {
 
     /// A SYNC arrived while operational. True if a frame is to be sent; its data is sampled here.
     #[inline]
-    pub fn handle_sync(&mut self, values: &View<'_>) -> bool {
+    pub fn handle_sync<S: Storage>(&mut self, values: &Dictionary<S>) -> bool {
         let Some(mapping) = &self.mapping else { return false };
         let send = match &mut self.schedule {
             Schedule::Acyclic { event } => core::mem::take(event),
@@ -175,7 +180,7 @@ impl Tpdo {
 
     /// Looks whether a mapped value differs from the one last sent. True if that made the TPDO due.
     #[inline]
-    pub fn notice_change(&mut self, values: &View<'_>) -> bool {
+    pub fn notice_change<S: Storage>(&mut self, values: &Dictionary<S>) -> bool {
         let Some(mapping) = &self.mapping else { return false };
         match &mut self.schedule {
             Schedule::Event { on_change: true } if self.due.is_none() && mapping.gather(values) != self.data => {
@@ -225,7 +230,7 @@ impl Tpdo {
 
     /// The frame to offer at `now`. The inhibit time counts from here until the runner reports the transmission.
     #[inline]
-    pub fn take(&mut self, values: &View<'_>, now: Instant) -> Option<Frame> {
+    pub fn take<S: Storage>(&mut self, values: &Dictionary<S>, now: Instant) -> Option<Frame> {
         let mapping = self.mapping.as_ref()?;
         let cause = self.due.take();
         if let Schedule::Event { .. } = self.schedule {

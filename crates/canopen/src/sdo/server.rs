@@ -1,13 +1,15 @@
 //! The SDO server of a device: expedited and segmented transfer (CiA 301, 7.2.4).
 //!
-//! A frame goes in with a view of the values; out come a reply, or for a complete download the entry to write,
-//! which the owner checks, stores and reports back with [`Server::finish`]. One transfer at a time: a new request
-//! replaces an unfinished one. Block transfer is answered with 0504 0001h.
+//! A frame goes in with the values; out come a reply, or for a complete download the entry to write, which the owner
+//! checks, stores and reports back with [`Server::finish`], at once or later ([`Server::hold`]). A value longer than a cell
+//! waits in the dictionary until all of it has come, and an upload reads from a copy: a transfer that ends half way changes
+//! nothing, and one that takes its time gives the value of its first frame. One transfer at a time: a new request replaces
+//! an unfinished one. Block transfer is answered with 0504 0001h.
 
 use can::{Frame, Instant};
 
 use super::wire::{LENGTH, MAX_EXPEDITED, MAX_SEGMENT, Payload, Reply, Request, Segment};
-use crate::od::{Slot, Table, View};
+use crate::od::{Dictionary, RowFacts, Slot, Storage, View};
 use crate::{AbortCode, Mux};
 
 /// Which requests a server listens to, by their data length code.
@@ -20,12 +22,14 @@ pub enum FrameLength {
 }
 
 /// A complete download that waits for the owner's verdict: see [`Server::finish`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub struct Write {
     /// The entry.
     pub slot: Slot,
-    /// The value to store, in as many low bytes as the entry has; what stands above them means nothing.
+    /// The value to store, in as many low bytes as the entry has; what stands above them means nothing. Of a value longer
+    /// than a cell how many bytes wait in the dictionary.
     pub raw: u32,
+    pub(crate) facts: &'static RowFacts,
     mux: Mux,
     confirm: Confirm,
 }
@@ -46,36 +50,84 @@ pub struct Server {
     frame_length: FrameLength,
 }
 
-/// A segmented transfer under way.
+/// A transfer under way.
 #[derive(Clone, Debug)]
 enum Transfer {
     None,
-    Upload { mux: Mux, rest: &'static [u8], toggle: bool },
-    Download { mux: Mux, slot: Slot, declared: Option<u32>, bytes: [u8; MAX_EXPEDITED], length: usize, toggle: bool },
+    Upload {
+        mux: Mux,
+        source: Source,
+        sent: usize,
+        toggle: bool,
+    },
+    Download {
+        mux: Mux,
+        slot: Slot,
+        facts: &'static RowFacts,
+        room: Room,
+        declared: Option<u32>,
+        length: usize,
+        toggle: bool,
+    },
+    /// The owner has not decided yet.
+    Held(Write),
+}
+
+/// What an upload sends.
+#[derive(Clone, Copy, Debug)]
+enum Source {
+    Constant(&'static [u8]),
+    /// What waits in the dictionary, this many bytes.
+    Staged(usize),
+}
+
+/// Where a download puts what comes.
+#[derive(Clone, Copy, Debug)]
+enum Room {
+    Cell {
+        bytes: [u8; MAX_EXPEDITED],
+        size: usize,
+    },
+    /// In the dictionary, this many bytes at most.
+    Staging {
+        capacity: usize,
+    },
 }
 
 impl Server {
     /// A server with nothing under way. A segmented transfer whose client is silent for `timeout_ns` is aborted with
-    /// 0504 0000h; 0 waits forever.
+    /// 0504 0000h, as is a download on which the owner has not decided for so long; 0 waits forever.
     pub const fn new(frame_length: FrameLength, timeout_ns: u64) -> Self {
         Self { transfer: Transfer::None, reply: None, deadline: Instant::FAR_FUTURE, timeout_ns, frame_length }
     }
 
     /// A request arrived. Returns the write that the owner has to carry out, if it completes a download.
     #[inline]
-    pub fn handle_frame(&mut self, frame: &Frame, values: &View<'_>, now: Instant) -> Option<Write> {
+    pub fn handle_frame<S: Storage>(
+        &mut self,
+        frame: &Frame,
+        values: &mut Dictionary<S>,
+        now: Instant,
+    ) -> Option<Write> {
         if !self.listens_to(frame) {
             return None;
         }
         match Request::parse(frame.padded()) {
             Request::InitiateUpload(mux) => self.initiate_upload(mux, values, now),
-            Request::InitiateDownload(mux, payload) => {
-                return self.initiate_download(mux, payload, values.table(), now);
-            }
-            Request::UploadSegment { toggle } => self.upload_segment(toggle, now),
-            Request::DownloadSegment(segment) => return self.download_segment(segment, values.table(), now),
+            Request::InitiateDownload(mux, payload) => return self.initiate_download(mux, payload, values, now),
+            request => return self.go_on(request, values, now),
+        }
+        None
+    }
+
+    /// Any request but those with which a transfer begins.
+    #[inline(never)]
+    fn go_on<S: Storage>(&mut self, request: Request, values: &mut Dictionary<S>, now: Instant) -> Option<Write> {
+        match request {
+            Request::UploadSegment { toggle } => self.upload_segment(toggle, &values.view(), now),
+            Request::DownloadSegment(segment) => return self.download_segment(segment, values.staging_mut(), now),
             Request::Abort(..) => self.end(),
-            Request::Unknown { mux, .. } => {
+            Request::Unknown { mux, .. } | Request::InitiateUpload(mux) | Request::InitiateDownload(mux, _) => {
                 let mux = self.transfer_mux().unwrap_or(mux);
                 self.refuse(mux, AbortCode::UNKNOWN_COMMAND);
             }
@@ -96,7 +148,30 @@ impl Server {
         );
     }
 
-    /// Time has reached `now`: aborts a transfer whose client has gone silent.
+    /// The owner decides later: [`take_held`](Self::take_held), then [`finish`](Self::finish). A new request, the client's
+    /// abort and the timeout end it before.
+    #[cold]
+    pub fn hold(&mut self, write: Write, now: Instant) {
+        self.transfer = Transfer::Held(write);
+        self.restart_timeout(now);
+    }
+
+    /// Takes the download on which the owner decides now; `None` if it has ended meanwhile.
+    pub fn take_held(&mut self) -> Option<Write> {
+        let Transfer::Held(write) = self.transfer else { return None };
+        self.end();
+        Some(write)
+    }
+
+    /// The download on which the owner has to decide.
+    pub const fn held(&self) -> Option<&Write> {
+        match &self.transfer {
+            Transfer::Held(write) => Some(write),
+            _ => None,
+        }
+    }
+
+    /// Time has reached `now`: aborts a transfer whose client, or owner, has gone silent.
     pub fn handle_timeout(&mut self, now: Instant) {
         if now >= self.deadline
             && let Some(mux) = self.transfer_mux()
@@ -136,45 +211,61 @@ impl Server {
         }
     }
 
-    fn initiate_upload(&mut self, mux: Mux, values: &View<'_>, now: Instant) {
+    #[inline(always)]
+    fn initiate_upload<S: Storage>(&mut self, mux: Mux, values: &mut Dictionary<S>, now: Instant) {
         self.end();
         let table = values.table();
-        let slot = match table.find(mux) {
-            Ok(slot) => slot,
+        let (slot, facts) = match table.look_up(mux) {
+            Ok(found) => found,
             Err(code) => return self.refuse(mux, code),
         };
-        let row = table.summary(slot);
-        if !row.is_readable() {
-            return self.refuse(mux, AbortCode::WRITE_ONLY);
-        }
-        if row.is_long() {
-            let bytes = table.row(slot).constant_bytes().unwrap_or_default();
-            return self.initiate_text(mux, bytes, now);
+        let row = facts.summary;
+        if !row.is_readable_cell() {
+            return self.initiate_long_upload(mux, (slot, facts), values, now);
         }
         let length = row.size();
         let bytes = values.raw(slot).to_le_bytes();
         self.answer(Reply::InitiateUpload(mux, Payload::Expedited { length: Some(length), bytes }));
     }
 
+    /// Of a value that is longer than a cell, or may not be read.
     #[inline(never)]
-    fn initiate_text(&mut self, mux: Mux, text: &'static [u8], now: Instant) {
-        if let Some(payload) = Payload::expedited(text) {
+    fn initiate_long_upload<S: Storage>(
+        &mut self,
+        mux: Mux,
+        (slot, facts): (Slot, &'static RowFacts),
+        values: &mut Dictionary<S>,
+        now: Instant,
+    ) {
+        if !facts.summary.is_readable() {
+            return self.refuse(mux, AbortCode::WRITE_ONLY);
+        }
+        let source = match values.table().row(slot).constant_bytes() {
+            Some(constant) => Source::Constant(constant),
+            None => Source::Staged(values.stage(slot)),
+        };
+        let view = values.view();
+        let data = source.bytes(&view);
+        if let Some(payload) = Payload::expedited(data) {
             return self.answer(Reply::InitiateUpload(mux, payload));
         }
-        self.transfer = Transfer::Upload { mux, rest: text, toggle: false };
+        self.transfer = Transfer::Upload { mux, source, sent: 0, toggle: false };
         self.restart_timeout(now);
-        self.answer(Reply::InitiateUpload(mux, Payload::Segmented { size: Some(text.len() as u32) }));
+        self.answer(Reply::InitiateUpload(mux, Payload::Segmented { size: Some(data.len() as u32) }));
     }
 
-    fn upload_segment(&mut self, toggle: bool, now: Instant) {
-        let Transfer::Upload { mux, rest, toggle: expected } = &mut self.transfer else { return self.unexpected() };
+    fn upload_segment(&mut self, toggle: bool, values: &View<'_>, now: Instant) {
+        let Transfer::Upload { mux, source, sent, toggle: expected } = &mut self.transfer else {
+            return self.unexpected();
+        };
         if toggle != *expected {
             let mux = *mux;
             return self.refuse(mux, AbortCode::TOGGLE_BIT);
         }
+        let rest = &source.bytes(values)[*sent..];
         let (data, after) = rest.split_at(rest.len().min(MAX_SEGMENT));
         let last = after.is_empty();
-        (*rest, *expected) = (after, !toggle);
+        (*sent, *expected) = (*sent + data.len(), !toggle);
         self.answer(Reply::UploadSegment(Segment::new(toggle, last, data)));
         if last {
             self.end();
@@ -185,78 +276,140 @@ impl Server {
 
     // Inlined, the payload stays in registers.
     #[inline(always)]
-    fn initiate_download(&mut self, mux: Mux, payload: Payload, table: &Table, now: Instant) -> Option<Write> {
+    fn initiate_download<S: Storage>(
+        &mut self,
+        mux: Mux,
+        payload: Payload,
+        values: &mut Dictionary<S>,
+        now: Instant,
+    ) -> Option<Write> {
         self.end();
-        let (slot, size) = match writable(mux, table) {
+        let (slot, facts) = match values.table().look_up(mux) {
             Ok(found) => found,
             Err(code) => {
                 self.refuse(mux, code);
                 return None;
             }
         };
+        let row = facts.summary;
+        if !row.is_writable_cell() {
+            return self.initiate_long_download(mux, (slot, facts), payload, values, now);
+        }
         let declared = match payload {
             Payload::Expedited { length, .. } => length.map(u32::from),
             Payload::Segmented { size } => size,
         };
-        if let Err(code) = declared.map_or(Ok(()), |declared| check_length(declared as usize, size)) {
+        if let Err(code) = declared.map_or(Ok(()), |declared| check_length(declared as usize, row.size().into())) {
             self.refuse(mux, code);
             return None;
         }
         match payload {
             Payload::Expedited { bytes, .. } => {
-                Some(Write { slot, raw: u32::from_le_bytes(bytes), mux, confirm: Confirm::Expedited })
+                Some(Write { slot, raw: u32::from_le_bytes(bytes), facts, mux, confirm: Confirm::Expedited })
             }
             Payload::Segmented { size: declared } => {
-                self.begin_download(mux, slot, declared, now);
+                let room = Room::Cell { bytes: [0; MAX_EXPEDITED], size: row.size().into() };
+                self.begin_download(mux, (slot, facts), room, declared, now);
+                None
+            }
+        }
+    }
+
+    /// Of a value that is longer than a cell, or may not be written.
+    #[inline(never)]
+    fn initiate_long_download<S: Storage>(
+        &mut self,
+        mux: Mux,
+        (slot, facts): (Slot, &'static RowFacts),
+        payload: Payload,
+        values: &mut Dictionary<S>,
+        now: Instant,
+    ) -> Option<Write> {
+        let capacity = values.table().row(slot).stored_bytes() as usize;
+        let declared = match payload {
+            Payload::Expedited { length, .. } => Some(length.map_or(capacity.min(MAX_EXPEDITED), usize::from)),
+            Payload::Segmented { size } => size.map(|size| size as usize),
+        };
+        let fits = match declared {
+            _ if !facts.summary.is_writable() => Err(AbortCode::READ_ONLY),
+            Some(length) => values.view().check_length(slot, length),
+            None => Ok(()),
+        };
+        if let Err(code) = fits {
+            self.refuse(mux, code);
+            return None;
+        }
+        match payload {
+            Payload::Expedited { bytes, .. } => {
+                let length = declared.unwrap_or(0).min(MAX_EXPEDITED);
+                values.staging_mut()[..length].copy_from_slice(&bytes[..length]);
+                Some(Write { slot, raw: length as u32, facts, mux, confirm: Confirm::Expedited })
+            }
+            Payload::Segmented { size: declared } => {
+                self.begin_download(mux, (slot, facts), Room::Staging { capacity }, declared, now);
                 None
             }
         }
     }
 
     #[inline(never)]
-    fn begin_download(&mut self, mux: Mux, slot: Slot, declared: Option<u32>, now: Instant) {
-        let bytes = [0; MAX_EXPEDITED];
-        self.transfer = Transfer::Download { mux, slot, declared, bytes, length: 0, toggle: false };
+    fn begin_download(
+        &mut self,
+        mux: Mux,
+        (slot, facts): (Slot, &'static RowFacts),
+        room: Room,
+        declared: Option<u32>,
+        now: Instant,
+    ) {
+        self.transfer = Transfer::Download { mux, slot, facts, room, declared, length: 0, toggle: false };
         self.restart_timeout(now);
         self.answer(Reply::InitiateDownload(mux));
     }
 
-    #[inline(never)]
-    fn download_segment(&mut self, segment: Segment, table: &Table, now: Instant) -> Option<Write> {
-        let Transfer::Download { mux, slot, declared, bytes, length, toggle } = &mut self.transfer else {
+    fn download_segment(&mut self, segment: Segment, staging: &mut [u8], now: Instant) -> Option<Write> {
+        let Transfer::Download { mux, slot, facts, room, declared, length, toggle } = &mut self.transfer else {
             self.unexpected();
             return None;
         };
-        let (mux, slot) = (*mux, *slot);
-        let size = table.row(slot).data_type.size();
+        let (mux, slot, facts, declared) = (*mux, *slot, *facts, *declared);
         if segment.toggle != *toggle {
             self.refuse(mux, AbortCode::TOGGLE_BIT);
             return None;
         }
-        let end = *length + segment.data().len();
-        if end > size {
+        let (start, end) = (*length, *length + segment.data().len());
+        let most = declared.map_or(usize::MAX, |declared| declared as usize);
+        let (to, most) = match room {
+            Room::Cell { bytes, size } => (&mut bytes[..], most.min(*size)),
+            Room::Staging { capacity } => (staging, most.min(*capacity)),
+        };
+        if end > most {
             self.refuse(mux, AbortCode::TOO_LONG);
             return None;
         }
-        bytes[*length..end].copy_from_slice(segment.data());
+        to[start..end].copy_from_slice(segment.data());
         (*length, *toggle) = (end, !segment.toggle);
         if !segment.last {
             self.answer(Reply::DownloadSegment { toggle: segment.toggle });
             self.restart_timeout(now);
             return None;
         }
-        // A declared length was the object's when the transfer began; fewer bytes came than were declared.
-        let short = if declared.is_some() { AbortCode::LENGTH_MISMATCH } else { AbortCode::TOO_SHORT };
-        let raw = u32::from_le_bytes(*bytes);
+        // A declared length was checked when the transfer began; fewer bytes came than were declared.
+        let (raw, short) = match (*room, declared) {
+            (_, Some(declared)) if end < declared as usize => (0, Some(AbortCode::LENGTH_MISMATCH)),
+            (Room::Cell { size, .. }, None) if end < size => (0, Some(AbortCode::TOO_SHORT)),
+            (Room::Cell { bytes, .. }, _) => (u32::from_le_bytes(bytes), None),
+            (Room::Staging { .. }, _) => (end as u32, None),
+        };
         self.end();
-        if end < size {
-            self.refuse(mux, short);
+        if let Some(code) = short {
+            self.refuse(mux, code);
             return None;
         }
-        Some(Write { slot, raw, mux, confirm: Confirm::Segment { toggle: segment.toggle } })
+        Some(Write { slot, raw, facts, mux, confirm: Confirm::Segment { toggle: segment.toggle } })
     }
 
     /// A segment without a transfer, or of the other direction.
+    #[cold]
     fn unexpected(&mut self) {
         let mux = self.transfer_mux().unwrap_or(Mux::new(0, 0));
         self.refuse(mux, AbortCode::UNKNOWN_COMMAND);
@@ -285,18 +438,21 @@ impl Server {
     }
 
     fn transfer_mux(&self) -> Option<Mux> {
-        match self.transfer {
+        match &self.transfer {
             Transfer::None => None,
-            Transfer::Upload { mux, .. } | Transfer::Download { mux, .. } => Some(mux),
+            Transfer::Upload { mux, .. } | Transfer::Download { mux, .. } => Some(*mux),
+            Transfer::Held(write) => Some(write.mux),
         }
     }
 }
 
-/// The entry to write and its length in bytes.
-fn writable(mux: Mux, table: &Table) -> Result<(Slot, usize), AbortCode> {
-    let slot = table.find(mux)?;
-    let row = table.summary(slot);
-    if row.is_writable() { Ok((slot, usize::from(row.size()))) } else { Err(AbortCode::READ_ONLY) }
+impl Source {
+    fn bytes<'a>(&self, values: &View<'a>) -> &'a [u8] {
+        match self {
+            Self::Constant(bytes) => bytes,
+            Self::Staged(length) => values.staged(*length),
+        }
+    }
 }
 
 const fn check_length(length: usize, size: usize) -> Result<(), AbortCode> {

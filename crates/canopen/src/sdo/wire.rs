@@ -99,6 +99,8 @@ impl Payload {
         }
     }
 
+    // The variant is known where it is called.
+    #[inline(always)]
     fn emit(self, specifier: u8, mux: Mux) -> [u8; LENGTH] {
         let (flags, bytes) = match self {
             Self::Expedited { length: Some(length), bytes } => {

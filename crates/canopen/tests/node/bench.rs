@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use can::{Frame, Instant, Station};
 use canopen::node::Node;
+use canopen::od::Fixed;
 use canopen::od::Slot;
 use canopen::{Mux, NodeEvent, NodeId, NodeProfile};
 
@@ -13,7 +14,7 @@ use crate::device::{CELLS, STANDARD};
 /// The node, the time, and the frames that it sent and nobody has looked at yet.
 #[derive(Clone)]
 pub(crate) struct Bench {
-    pub(crate) node: Node<CELLS>,
+    pub(crate) node: Node<Fixed<CELLS>>,
     pub(crate) now: Instant,
     pub(crate) sent: VecDeque<(Instant, Frame)>,
 }

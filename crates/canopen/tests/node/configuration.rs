@@ -152,7 +152,9 @@ fn entry(record: &str, value: u32, answer: &str) {
 fn entries_for_missing_objects_abort_with_0602_0000() {
     entry("031A", 0x5FFF_0010, "80031A0100000206");
     entry("031A", 0x6041_0510, "80031A0100000206");
-    entry("0316", 0x0005_0008, "8003160100000206");
+    // A dummy entry of a type that there is none of, and one in a TPDO.
+    entry("0316", 0x0008_0020, "8003160100000206");
+    entry("031A", 0x0005_0008, "80031A0100000206");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! A small drive-like device for the conversations: node 4, in two profiles.
 
-use canopen::od::{Access, Condition, Conditions, DataType, Entry, Slot, Table, condition_numbers, keys};
+use canopen::od::{Access, Condition, Conditions, DataType, Entry, Index, Slot, Table, condition_numbers};
 use canopen::pdo::EventTrigger;
 use canopen::{AbortCode, NodeProfile};
 
@@ -128,10 +128,10 @@ impl Rows {
     }
 }
 
-static KEYS: [u32; COUNT] = keys(&ROWS);
+static INDEX: Index<COUNT> = Index::of(&ROWS);
 
 /// The rows of the device.
-pub(crate) static TABLE: Table = Table::new(&ROWS, &KEYS);
+pub(crate) static TABLE: Table = Table::new(&ROWS, &INDEX);
 
 static GUARDED: [(Slot, Condition); 1] = [(TABLE.slot(0x2003, 0), Condition::Check(only_while_2001_is_zero))];
 static NUMBERS: [u8; COUNT] = condition_numbers(&GUARDED);

@@ -2,8 +2,8 @@
 //!
 //! The device of these tests has all that CiA 301 allows: four RPDOs of eight objects.
 
-use canopen::node::{EVENT_QUEUE_LENGTH, NodeEvent, Via};
-use canopen::od::{Access, DataType, Entry, Table, keys};
+use canopen::node::{NodeEvent, Via};
+use canopen::od::{Access, DataType, Entry, Index, Table};
 use canopen::pdo::PdoNumber;
 use canopen::{NmtState, NodeProfile};
 
@@ -54,13 +54,16 @@ static ROWS: [Entry; COUNT] = {
     }
     rows
 };
-static KEYS: [u32; COUNT] = keys(&ROWS);
-static TABLE: Table = Table::new(&ROWS, &KEYS);
+static INDEX: Index<COUNT> = Index::of(&ROWS);
+static TABLE: Table = Table::new(&ROWS, &INDEX);
 static PROFILE: NodeProfile = NodeProfile::cia_301(&TABLE);
 
 fn first_four() -> [PdoNumber; 4] {
     [1, 2, 3, 4].map(|number| PdoNumber::new(number).unwrap())
 }
+
+/// Places for events in the node of these tests.
+const EVENT_QUEUE_LENGTH: usize = 64;
 
 fn operational() -> Bench {
     let mut bench = Bench::new(&PROFILE);

@@ -80,15 +80,15 @@ fn by_name(table: &'static Table, name: &str) -> Result<&'static Entry, String> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use canopen::od::{Access, DataType, keys};
+    use canopen::od::{Access, DataType, Index};
 
     static ROWS: [Entry; 3] = [
         Entry::new(0x1400, 0, DataType::Unsigned8, Access::ReadOnly, "highest_sub_index", ""),
         Entry::new(0x1401, 0, DataType::Unsigned8, Access::ReadOnly, "highest_sub_index", ""),
         Entry::new(0x6064, 0, DataType::Integer32, Access::ReadOnly, "position_actual_value", ""),
     ];
-    static KEYS: [u32; 3] = keys(&ROWS);
-    static TABLE: Table = Table::new(&ROWS, &KEYS);
+    static INDEX: Index<3> = Index::of(&ROWS);
+    static TABLE: Table = Table::new(&ROWS, &INDEX);
 
     #[test]
     fn numbers_are_hexadecimal_in_every_spelling() {

@@ -5,10 +5,10 @@
 //! (1001h).
 
 use can::{Bitrate, Frame, Instant, Station};
-use canopen::node::{Node, NodeEvent, NodeProfile, Via};
-use canopen::od::{Dictionary, Entry, Slot};
+use canopen::node::{Node, NodeEvent, NodeProfile, Ticket, Via};
+use canopen::od::{Dictionary, Entry, Slot, Storage};
 use canopen::pdo::PdoNumber;
-use canopen::{EmcyErrorCode, Mux, NodeId};
+use canopen::{AbortCode, EmcyErrorCode, Mux, NodeId};
 
 use super::communication_errors::CommunicationErrors;
 use super::faults::{FaultMonitor, FaultSet};
@@ -17,9 +17,9 @@ use devices::variant::Variant;
 
 /// Node, store and communication task of a drive whose table has `N` rows.
 #[derive(Clone)]
-pub struct Device<const N: usize> {
+pub struct Device<S: Storage> {
     profile: &'static NodeProfile,
-    node: Node<N>,
+    node: Node<S>,
     store: Store,
     /// Bits of the error register that the drive's faults set.
     fault_bits: u8,
@@ -32,7 +32,7 @@ pub struct Device<const N: usize> {
     variant: Variant,
 }
 
-impl<const N: usize> Device<N> {
+impl<S: Storage> Device<S> {
     /// A device without supply, with its bit rate and EEPROM as delivered, the time between two runs of its communication
     /// task, and how it differs from others of its model.
     pub fn new(
@@ -58,20 +58,25 @@ impl<const N: usize> Device<N> {
     }
 
     /// The node, to look at.
-    pub const fn node(&self) -> &Node<N> {
+    pub const fn node(&self) -> &Node<S> {
         &self.node
     }
 
     /// The values of the objects.
     #[inline]
-    pub const fn values(&self) -> &Dictionary<N> {
+    pub const fn values(&self) -> &Dictionary<S> {
         self.node.dictionary()
     }
 
     /// The values, to write as the drive itself.
     #[inline]
-    pub const fn values_mut(&mut self) -> &mut Dictionary<N> {
+    pub const fn values_mut(&mut self) -> &mut Dictionary<S> {
         self.node.dictionary_mut()
+    }
+
+    /// The application's word on a download that it was asked about: [`Node::answer`].
+    pub fn answer(&mut self, ticket: Ticket, verdict: Result<(), AbortCode>, now: Instant) -> bool {
+        self.node.answer(ticket, verdict, now)
     }
 
     /// Supplied and started.
@@ -91,7 +96,7 @@ impl<const N: usize> Device<N> {
     }
 
     /// The values as delivered, of a device with this node-ID.
-    fn factory_values(&self, node_id: NodeId) -> Dictionary<N> {
+    fn factory_values(&self, node_id: NodeId) -> Dictionary<S> {
         self.variant.delivered(self.profile.table, node_id).with_conditions(self.profile.conditions)
     }
 
@@ -108,7 +113,7 @@ impl<const N: usize> Device<N> {
     }
 
     /// The values that a restart finds. An unreadable store leaves factory values.
-    pub fn stored_values(&self) -> Dictionary<N> {
+    pub fn stored_values(&self) -> Dictionary<S> {
         let mut values = self.factory_values(NodeId::MIN);
         let _ = self.store.load(&mut values, |_| true);
         values
@@ -231,7 +236,7 @@ impl<const N: usize> Device<N> {
 
     /// Stores all rows that are to be stored, with their values in `contents`, whatever the EEPROM held. False if it does
     /// not answer; nothing is stored then.
-    pub fn save(&mut self, contents: &Dictionary<N>) -> bool {
+    pub fn save(&mut self, contents: &Dictionary<S>) -> bool {
         if self.eeprom_ok {
             self.store.format(contents);
         }
@@ -320,7 +325,7 @@ impl<const N: usize> Device<N> {
     }
 }
 
-impl<const N: usize> Station for Device<N> {
+impl<S: Storage> Station for Device<S> {
     #[inline]
     fn ignores(&self, frame: &Frame) -> bool {
         !self.running || self.node.ignores(frame)
@@ -357,12 +362,19 @@ impl<const N: usize> Station for Device<N> {
 }
 
 /// What a drive does with what its device hears.
-pub(crate) trait Application<const N: usize> {
+pub(crate) trait Application<S: Storage> {
     /// The device.
-    fn device(&mut self) -> &mut Device<N>;
+    fn device(&mut self) -> &mut Device<S>;
 
     /// A peer wrote `raw` to `slot`. True if it was a command: the status is shown anew once the whole frame has been taken.
     fn written(&mut self, slot: Slot, raw: u32, via: Via, now: Instant) -> bool;
+
+    /// A client wants to write `raw` to a row whose condition is [`Condition::Ask`](canopen::od::Condition::Ask). Answered with
+    /// [`Device::answer`], now or later; taken at once by default.
+    fn asked(&mut self, slot: Slot, raw: u32, ticket: Ticket, now: Instant) {
+        let _ = (slot, raw);
+        self.device().answer(ticket, Ok(()), now);
+    }
 
     /// SYNC came.
     #[inline]
@@ -391,6 +403,7 @@ pub(crate) trait Application<const N: usize> {
         while let Some(event) = self.device().poll_event() {
             match event {
                 NodeEvent::Written { slot, raw, via } => commanded |= self.written(slot, raw, via, now),
+                NodeEvent::Asked { slot, raw, ticket } => self.asked(slot, raw, ticket, now),
                 NodeEvent::ResetNode => self.restart(now),
                 NodeEvent::ResetCommunication => self.restart_communication(now),
                 NodeEvent::RpdoTooShort(number) => self.device().report_rpdo_length(number, false, now),
@@ -447,7 +460,7 @@ pub(crate) use station;
 mod tests {
     use super::*;
     use crate::engine::faults::{FaultRow, error_register};
-    use canopen::od::{Object, Table, keys};
+    use canopen::od::{Fixed, Index, Object, Table};
     use devices::row::{U8, U16, ro, rws};
 
     const PERIOD_NS: u64 = 500_000;
@@ -457,16 +470,16 @@ mod tests {
         rws(0x1017, 0, U16, "producer_heartbeat_time", "").default(100),
         rws(0x2000, 0, U16, "parameter", "").default(7),
     ];
-    static KEYS: [u32; 3] = keys(&ROWS);
-    static TABLE: Table = Table::new(&ROWS, &KEYS);
+    static INDEX: Index<3> = Index::of(&ROWS);
+    static TABLE: Table = Table::new(&ROWS, &INDEX);
     static PROFILE: NodeProfile = NodeProfile::cia_301(&TABLE);
     static FAULTS: [FaultRow; 1] = [FaultRow::new(0x3210, "over-voltage", error_register::VOLTAGE, "")];
     const ERROR_REGISTER: Object<u8> = TABLE.object(0x1001, 0);
     const HEARTBEAT: Object<u16> = TABLE.object(0x1017, 0);
     const PARAMETER: Object<u16> = TABLE.object(0x2000, 0);
 
-    fn started() -> Device<3> {
-        let image = Image::of(&Dictionary::<3>::new(&TABLE, NodeId::MIN));
+    fn started() -> Device<Fixed<3>> {
+        let image = Image::of(&Dictionary::<Fixed<3>>::new(&TABLE, NodeId::MIN));
         let mut device = Device::new(&PROFILE, Bitrate::K500, image, PERIOD_NS, Variant::first_of(&[]));
         device.power_on(image);
         device.restart(NodeId::MIN, Bitrate::K500, Instant::ZERO);
@@ -536,7 +549,7 @@ mod tests {
 
     /// These frames and no others wait to be sent; then what 1001h shows.
     #[track_caller]
-    fn assert_sent<const F: usize>(device: &mut Device<3>, frames: [&str; F], error_register: u8) {
+    fn assert_sent<const F: usize>(device: &mut Device<Fixed<3>>, frames: [&str; F], error_register: u8) {
         for frame in frames {
             assert_eq!(device.poll_transmit(), Some(frame.parse().unwrap()));
         }

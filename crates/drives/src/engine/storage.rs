@@ -6,7 +6,7 @@
 //! Values are checked against the table on the way in: an image can never put a value out of range into a dictionary.
 
 use canopen::Mux;
-use canopen::od::{Dictionary, Entry, MAX_ROWS, Slot, Table};
+use canopen::od::{Dictionary, Entry, Slot, Storage, Table};
 
 /// Bytes of one bank.
 pub const BANK_SIZE: usize = 1024;
@@ -32,7 +32,7 @@ impl Image {
     pub const BLANK: Self = Self([0xFF; IMAGE_SIZE]);
 
     /// The stored rows of a dictionary with their values.
-    pub fn of<const N: usize>(dictionary: &Dictionary<N>) -> Self {
+    pub fn of<S: Storage>(dictionary: &Dictionary<S>) -> Self {
         let mut store = Store::new(Self::BLANK);
         store.format(dictionary);
         store.image
@@ -50,9 +50,12 @@ impl Image {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unreadable;
 
-/// Which rows are waiting to be stored: a bit for each that a table can have.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Pending([u32; MAX_ROWS.div_ceil(32)]);
+/// Which rows are waiting to be stored: as many as a bank can hold.
+#[derive(Clone, Copy, Debug)]
+struct Pending {
+    slots: [Option<Slot>; CAPACITY],
+    count: u8,
+}
 
 /// An EEPROM with the rows that wait to be written into it.
 #[derive(Clone, Debug)]
@@ -95,9 +98,9 @@ impl Store {
     ///
     /// # Errors
     /// [`Unreadable`]; the dictionary is as before.
-    pub fn load<const N: usize>(
+    pub fn load<S: Storage>(
         &self,
-        dictionary: &mut Dictionary<N>,
+        dictionary: &mut Dictionary<S>,
         wanted: fn(&Entry) -> bool,
     ) -> Result<(), Unreadable> {
         let bank = self.active.ok_or(Unreadable)?;
@@ -135,7 +138,7 @@ impl Store {
 
     /// Writes the marked rows with their values in `dictionary`, all in one step. An unreadable image is left alone:
     /// only [`format`](Self::format) makes it readable again.
-    pub fn commit<const N: usize>(&mut self, dictionary: &Dictionary<N>) {
+    pub fn commit<S: Storage>(&mut self, dictionary: &Dictionary<S>) {
         let Some(bank) = self.active else {
             self.pending = Pending::NONE;
             return;
@@ -165,7 +168,7 @@ impl Store {
     }
 
     /// Writes all stored rows with their values in `dictionary`, whatever the image held.
-    pub fn format<const N: usize>(&mut self, dictionary: &Dictionary<N>) {
+    pub fn format<S: Storage>(&mut self, dictionary: &Dictionary<S>) {
         let bank = match self.active {
             Some(bank) => Bank { number: 1 - bank.number, sequence: bank.sequence.wrapping_add(1) },
             None => Bank { number: 0, sequence: 0 },
@@ -200,7 +203,7 @@ impl Store {
 /// If a bank cannot hold them; used in a `const` of the drive, at compile time:
 ///
 /// ```compile_fail,E0080
-/// use canopen::od::{Access, DataType, Entry, Table, keys};
+/// use canopen::od::{Access, DataType, Entry, Index, Table};
 /// use ferrodrive_drives::engine::storage::{CAPACITY, stored_rows};
 ///
 /// static ROWS: [Entry; CAPACITY + 1] = {
@@ -213,8 +216,8 @@ impl Store {
 ///     }
 ///     rows
 /// };
-/// static KEYS: [u32; CAPACITY + 1] = keys(&ROWS);
-/// static TABLE: Table = Table::new(&ROWS, &KEYS);
+/// static INDEX: Index<{ CAPACITY + 1 }> = Index::of(&ROWS);
+/// static TABLE: Table = Table::new(&ROWS, &INDEX);
 /// const _: usize = stored_rows(&TABLE); // without "+ 1" it compiles
 /// ```
 pub const fn stored_rows(table: &Table) -> usize {
@@ -229,18 +232,23 @@ pub const fn stored_rows(table: &Table) -> usize {
 }
 
 impl Pending {
-    const NONE: Self = Self([0; MAX_ROWS.div_ceil(32)]);
+    const NONE: Self = Self { slots: [None; CAPACITY], count: 0 };
 
     fn insert(&mut self, slot: Slot) {
-        self.0[slot.position() / 32] |= 1 << (slot.position() % 32);
+        if !self.contains(slot)
+            && let Some(place) = self.slots.get_mut(usize::from(self.count))
+        {
+            *place = Some(slot);
+            self.count += 1;
+        }
     }
 
     fn contains(&self, slot: Slot) -> bool {
-        self.0[slot.position() / 32] >> (slot.position() % 32) & 1 == 1
+        self.slots[..usize::from(self.count)].contains(&Some(slot))
     }
 
-    fn is_empty(&self) -> bool {
-        *self == Self::NONE
+    const fn is_empty(&self) -> bool {
+        self.count == 0
     }
 }
 
@@ -311,7 +319,7 @@ pub(crate) fn crc32(bytes: &[u8]) -> u32 {
 mod tests {
     use super::*;
     use canopen::NodeId;
-    use canopen::od::{Access, DataType, Object, keys};
+    use canopen::od::{Access, DataType, Fixed, Index, Object};
 
     static ROWS: [Entry; 4] = [
         Entry::new(0x2000, 0, DataType::Unsigned16, Access::ReadWrite, "a", "").default(7).range(0, 100).stored(),
@@ -319,13 +327,13 @@ mod tests {
         Entry::new(0x2002, 0, DataType::Integer16, Access::ReadWrite, "c", "").default(-9).stored(),
         Entry::new(0x2003, 0, DataType::Unsigned16, Access::ReadWrite, "d", "").default(4).saved(),
     ];
-    static KEYS: [u32; 4] = keys(&ROWS);
-    static TABLE: Table = Table::new(&ROWS, &KEYS);
+    static INDEX: Index<4> = Index::of(&ROWS);
+    static TABLE: Table = Table::new(&ROWS, &INDEX);
     const A: Object<u16> = TABLE.object(0x2000, 0);
     const B: Object<u16> = TABLE.object(0x2001, 0);
     const C: Object<i16> = TABLE.object(0x2002, 0);
 
-    fn defaults() -> Dictionary<4> {
+    fn defaults() -> Dictionary<Fixed<4>> {
         Dictionary::new(&TABLE, NodeId::MIN)
     }
 
@@ -437,26 +445,27 @@ mod tests {
         }
     }
 
-    /// As many rows as a table can have, of which the last ones are stored: as many as a bank can hold.
-    static WIDE_ROWS: [Entry; MAX_ROWS] = {
-        let mut rows = [ROWS[1]; MAX_ROWS];
+    const WIDE: usize = 1000;
+    /// Many rows, of which the last ones are stored: as many as a bank can hold.
+    static WIDE_ROWS: [Entry; WIDE] = {
+        let mut rows = [ROWS[1]; WIDE];
         let mut i = 0;
-        while i < MAX_ROWS {
+        while i < WIDE {
             rows[i] = Entry::new(0x2000 + i as u16, 0, DataType::Unsigned16, Access::ReadWrite, "row", "");
-            if i >= MAX_ROWS - CAPACITY {
+            if i >= WIDE - CAPACITY {
                 rows[i] = rows[i].stored();
             }
             i += 1;
         }
         rows
     };
-    static WIDE_KEYS: [u32; MAX_ROWS] = keys(&WIDE_ROWS);
-    static WIDE_TABLE: Table = Table::new(&WIDE_ROWS, &WIDE_KEYS);
+    static WIDE_INDEX: Index<WIDE> = Index::of(&WIDE_ROWS);
+    static WIDE_TABLE: Table = Table::new(&WIDE_ROWS, &WIDE_INDEX);
     const _: usize = stored_rows(&WIDE_TABLE);
 
     #[test]
-    fn every_row_that_a_table_can_have_is_stored_by_itself() {
-        let wide = || Dictionary::<MAX_ROWS>::new(&WIDE_TABLE, NodeId::MIN);
+    fn every_row_of_a_full_bank_is_stored_by_itself() {
+        let wide = || Dictionary::<Fixed<WIDE>>::new(&WIDE_TABLE, NodeId::MIN);
         let mut store = Store::new(Image::BLANK);
         store.format(&wide());
         for (slot, _) in WIDE_TABLE.iter().filter(|(_, row)| row.is_kept()) {

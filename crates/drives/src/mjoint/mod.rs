@@ -29,4 +29,4 @@ pub use hardware::{Actuation, Battery, Brake, Hardware, PowerStage, Sensors};
 pub use model::Model;
 
 /// The values of the drive's objects.
-pub type Values = canopen::od::Dictionary<{ objects::ROW_COUNT }>;
+pub type Values = canopen::od::Dictionary<objects::Room>;

@@ -2,12 +2,12 @@
 
 use can::{Bitrate, Frame, Instant, Station};
 use canopen::node::{NodeProfile, Via};
-use canopen::od::{Entry, Slot};
+use canopen::od::{Dictionary, Entry, Slot, Storage};
 use canopen::{Mux, NodeId};
 use devices::Description;
 use devices::variant::Variant;
 
-use super::{Memory, ROWS, Services, Values};
+use super::{Memory, Services};
 use crate::engine::device::{Application, Device};
 use crate::engine::storage::Image;
 
@@ -15,15 +15,15 @@ const COMMUNICATION_PERIOD_NS: u64 = 1_000_000;
 
 /// The firmware of a described device that is no drive.
 #[derive(Clone)]
-pub struct DescribedNode {
+pub struct DescribedNode<S: Storage> {
     description: &'static Description,
-    device: Device<ROWS>,
+    device: Device<S>,
     services: Services,
     node_id: NodeId,
     bitrate: Bitrate,
 }
 
-impl DescribedNode {
+impl<S: Storage> DescribedNode<S> {
     /// A device without supply: [`power_on`](Self::power_on) starts it. `profile` is how `description` communicates
     /// ([`communication`](crate::communication::communication)).
     ///
@@ -51,7 +51,7 @@ impl DescribedNode {
     }
 
     /// The values of the objects, to look at.
-    pub const fn values(&self) -> &Values {
+    pub const fn values(&self) -> &Dictionary<S> {
         self.device.values()
     }
 
@@ -100,8 +100,8 @@ impl DescribedNode {
     }
 }
 
-impl Application<ROWS> for DescribedNode {
-    fn device(&mut self) -> &mut Device<ROWS> {
+impl<S: Storage> Application<S> for DescribedNode<S> {
+    fn device(&mut self) -> &mut Device<S> {
         &mut self.device
     }
 
@@ -129,7 +129,7 @@ impl Application<ROWS> for DescribedNode {
     }
 }
 
-impl Station for DescribedNode {
+impl<S: Storage> Station for DescribedNode<S> {
     fn ignores(&self, frame: &Frame) -> bool {
         self.device.ignores(frame) && !self.services.wants(frame)
     }

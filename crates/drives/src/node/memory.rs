@@ -5,7 +5,7 @@
 //! a dictionary.
 
 use canopen::Mux;
-use canopen::od::{Access, Dictionary, Entry};
+use canopen::od::{Access, Dictionary, Entry, Storage};
 
 use crate::engine::storage::crc32;
 
@@ -52,7 +52,7 @@ impl Memory {
 
     /// Puts the stored values of the rows that `wanted` names into a dictionary; unknown keys and values that the table
     /// refuses are passed over, an unsound image is left alone.
-    pub fn load<const N: usize>(&self, values: &mut Dictionary<N>, wanted: impl Fn(&Entry) -> bool) {
+    pub fn load<S: Storage>(&self, values: &mut Dictionary<S>, wanted: impl Fn(&Entry) -> bool) {
         if !self.is_sound() {
             return;
         }
@@ -68,7 +68,7 @@ impl Memory {
 
     /// Stores the values of the parameters that `wanted` names; the other records stay. What does not fit any more is left
     /// out.
-    pub fn save<const N: usize>(&mut self, values: &Dictionary<N>, wanted: impl Fn(&Entry) -> bool) {
+    pub fn save<S: Storage>(&mut self, values: &Dictionary<S>, wanted: impl Fn(&Entry) -> bool) {
         let before = *self;
         let stored = |key| before.is_sound().then(|| before.records().find(|(known, _)| *known == key)).flatten();
         let mut records = values.table().iter().filter(|(_, row)| is_parameter(row)).filter_map(|(slot, row)| {
@@ -143,20 +143,20 @@ mod tests {
     use canopen::NodeId;
     use devices::servo::objects::TABLE;
 
-    const N: usize = canopen::od::MAX_ROWS;
+    type Values = Dictionary<canopen::od::Fixed<512, 512, 8, 256>>;
 
-    fn values() -> Dictionary<N> {
+    fn values() -> Values {
         Dictionary::new(&TABLE, NodeId::MIN)
     }
 
     const TORQUE_LIMIT: Mux = Mux::new(0x6072, 0);
     const HEARTBEAT: Mux = Mux::new(0x1017, 0);
 
-    fn set(values: &mut Dictionary<N>, mux: Mux, raw: u32) {
+    fn set(values: &mut Values, mux: Mux, raw: u32) {
         values.set_raw(TABLE.find(mux).unwrap(), raw);
     }
 
-    fn get(values: &Dictionary<N>, mux: Mux) -> u32 {
+    fn get(values: &Values, mux: Mux) -> u32 {
         values.raw(TABLE.find(mux).unwrap())
     }
 

@@ -12,13 +12,6 @@ pub use memory::{CAPACITY, MEMORY_SIZE, Memory, is_parameter};
 pub use services::{Services, conditions};
 
 use canopen::Mux;
-use canopen::od::{Dictionary, MAX_ROWS};
-
-/// Most rows of a described device.
-pub const ROWS: usize = MAX_ROWS;
-
-/// Its values.
-pub type Values = Dictionary<ROWS>;
 
 /// Whether these services do something with an object.
 pub const fn acts_on(mux: Mux) -> bool {

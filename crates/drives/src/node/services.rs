@@ -3,11 +3,10 @@
 
 use can::{Frame, Instant};
 use canopen::heartbeat::{Consumer, ConsumerEvent};
-use canopen::od::{Condition, Entry, Slot, Table, View};
+use canopen::od::{Condition, Dictionary, Entry, Slot, Storage, Table, View};
 use canopen::{AbortCode, Mux};
 
 use super::memory::Memory;
-use super::{ROWS, Values};
 use crate::engine::device::Device;
 
 /// Most nodes that are watched.
@@ -53,7 +52,7 @@ impl Services {
     }
 
     /// After the device's restart, before it boots: the stored values of the rows that `wanted` names, and the watches.
-    pub fn start(&mut self, device: &mut Device<ROWS>, wanted: fn(&Entry) -> bool) {
+    pub fn start(&mut self, device: &mut Device<impl Storage>, wanted: fn(&Entry) -> bool) {
         self.memory.load(device.values_mut(), wanted);
         let values = device.values();
         for (consumer, sub_index) in self.consumers.iter_mut().zip(1..) {
@@ -63,7 +62,7 @@ impl Services {
     }
 
     /// A peer wrote to `slot`; true if it was one of these services.
-    pub fn written(&mut self, device: &mut Device<ROWS>, slot: Slot, raw: u32) -> bool {
+    pub fn written(&mut self, device: &mut Device<impl Storage>, slot: Slot, raw: u32) -> bool {
         let mux = device.values().table().row(slot).mux();
         match (mux.index, mux.sub_index) {
             (WATCH, sub_index @ 1..=CONSUMERS) => {
@@ -113,7 +112,7 @@ impl Services {
     }
 
     /// A frame was handed to the bus: an EMCY message goes into the error history.
-    pub fn sent(&self, values: &mut Values, frame: &Frame) {
+    pub fn sent(&self, values: &mut Dictionary<impl Storage>, frame: &Frame) {
         let Ok(slot) = values.table().find(EMCY_COB_ID) else { return };
         let is_emcy = frame.id().raw() == values.raw(slot) & 0x7FF;
         let &[low, high, _, manufacturer_low, manufacturer_high, ..] = frame.data() else { return };
@@ -160,13 +159,13 @@ const fn is_in_group(mux: Mux, group: u8) -> bool {
 }
 
 /// The object shows again what it can do.
-fn restore_default(device: &mut Device<ROWS>, slot: Slot) {
+fn restore_default(device: &mut Device<impl Storage>, slot: Slot) {
     let node_id = device.node().node_id();
     device.values_mut().restore_default(slot, node_id);
 }
 
 /// The latest error goes to sub-index 1, the others move up.
-fn remember(values: &mut Values, error: u32) {
+fn remember(values: &mut Dictionary<impl Storage>, error: u32) {
     let table = values.table();
     let field = |sub_index| table.find(Mux::new(HISTORY, sub_index));
     let Ok(count_slot) = field(0) else { return };
@@ -185,7 +184,7 @@ fn remember(values: &mut Values, error: u32) {
     values.set_raw(count_slot, u32::from(count));
 }
 
-fn forget_history(values: &mut Values) {
+fn forget_history(values: &mut Dictionary<impl Storage>) {
     let table = values.table();
     for sub_index in 1..=254 {
         let Ok(slot) = table.find(Mux::new(HISTORY, sub_index)) else { break };

@@ -8,7 +8,7 @@ mod station;
 use can::{Bitrate, Instant};
 use canopen::NodeId;
 use canopen::node::NodeProfile;
-use canopen::od::Entry;
+use canopen::od::{Dictionary, Entry, Storage};
 use cia402::{AbortConnectionOption, FaultReactionOption, PowerCommand};
 use devices::faults::FaultRow;
 use devices::servo::faults::{FAULT_COUNT, FAULTS, row};
@@ -24,7 +24,7 @@ use crate::engine::actuator::bleeder::{Bleeder, BleederLimits};
 use crate::engine::device::Device;
 use crate::engine::faults::{FaultMonitor, FaultSet};
 use crate::engine::storage::Image;
-use crate::node::{Memory, ROWS, Services, Values};
+use crate::node::{Memory, Services};
 use crate::{Firmware, Report};
 
 const COMMUNICATION_PERIOD_NS: u64 = 500_000;
@@ -53,9 +53,9 @@ const BLEEDER_OVERLOAD_S: f32 = 5.0;
 
 /// The firmware of a described servo.
 #[derive(Clone)]
-pub struct ServoDrive {
+pub struct ServoDrive<S: Storage> {
     description: &'static Description,
-    device: Device<ROWS>,
+    device: Device<S>,
     services: Services,
     shafts: [Option<Shaft>; MAX_AXES],
     motors: [Motor; MAX_AXES],
@@ -72,7 +72,7 @@ pub struct ServoDrive {
     periods: u8,
 }
 
-impl ServoDrive {
+impl<S: Storage> ServoDrive<S> {
     /// A drive without supply: [`Firmware::power_on`] starts it. `profile` is how `description` communicates
     /// ([`communication`](crate::communication::communication)).
     ///
@@ -108,7 +108,7 @@ impl ServoDrive {
     }
 
     /// The values of the objects, to look at.
-    pub const fn values(&self) -> &Values {
+    pub const fn values(&self) -> &Dictionary<S> {
         self.device.values()
     }
 
@@ -280,7 +280,7 @@ fn bleeder_limits(motor: &Motor) -> BleederLimits {
     }
 }
 
-impl Firmware for ServoDrive {
+impl<S: Storage> Firmware for ServoDrive<S> {
     type Sensors = Sensors;
     type Actuation = Actuation;
     type Hardware = Hardware;

@@ -20,12 +20,12 @@ pub use drive::ServoDrive;
 pub use hardware::{Actuation, AxisActuation, AxisSensors, Hardware, MAX_AXES, Sensors};
 pub use motor::{CONTROL_PERIOD_NS, Motor};
 
-use canopen::od::{Condition, Slot, Table, View};
+use canopen::od::{Condition, Dictionary, Slot, Storage, Table, View};
 use canopen::{AbortCode, Mux};
 use cia402::{ModeOfOperation, SupportedModes};
 use devices::Description;
 
-use crate::node::{self, Values};
+use crate::node;
 
 /// Whether this firmware does something with an object of a device so described, or shows something in it.
 pub fn acts_on(description: &Description, mux: Mux) -> bool {
@@ -72,12 +72,12 @@ fn mode_is_supported(values: &View<'_>, declared: Mux, raw: u32) -> Result<(), A
 }
 
 /// The value of an object that may not be there.
-fn read(values: &Values, slot: Option<Slot>, absent: i64) -> i64 {
+fn read(values: &Dictionary<impl Storage>, slot: Option<Slot>, absent: i64) -> i64 {
     slot.map_or(absent, |slot| values.value(slot))
 }
 
 /// Shows a value in an object that may not be there, held to the range of its type.
-fn write(values: &mut Values, slot: Option<Slot>, value: i64) {
+fn write(values: &mut Dictionary<impl Storage>, slot: Option<Slot>, value: i64) {
     let Some(slot) = slot else { return };
     let data_type = Table::row(values.table(), slot).data_type;
     let (low, high) = data_type.range();

@@ -1,6 +1,6 @@
 //! The objects of one axis in increments and amperes, as the engine wants them. Written anew when one changes.
 
-use canopen::od::Slot;
+use canopen::od::{Dictionary, Slot, Storage};
 use cia402::{
     AbortConnectionOption, DisableOperationOption, FaultReactionOption, HaltOption, HomingMethod, InterpolationPeriod,
     InterpolationSubMode, QuickStopOption, ShutdownOption, StopRamp, Window,
@@ -9,9 +9,9 @@ use motion::set_points::{Course, Following};
 use motion::travel::{Bounds, Travel};
 
 use super::motor::Motor;
+use super::read;
 use super::scales::Scales;
 use super::slots::AxisSlots;
-use super::{Values, read};
 use crate::engine::axis::{Control, HomingParameters, MoveLimits, Ramp, VelocityRamps};
 use crate::engine::cia402::{self as power, DisableOptions, ExternalStop, Tolerances};
 
@@ -57,15 +57,15 @@ pub(super) struct Parameters {
 }
 
 /// Reads the objects of one axis.
-struct Reader<'a> {
-    values: &'a Values,
+struct Reader<'a, S: Storage> {
+    values: &'a Dictionary<S>,
     slots: &'a AxisSlots,
     scales: Scales,
     motor: &'a Motor,
 }
 
 impl Parameters {
-    pub(super) fn of(values: &Values, slots: &AxisSlots, motor: &Motor) -> Self {
+    pub(super) fn of(values: &Dictionary<impl Storage>, slots: &AxisSlots, motor: &Motor) -> Self {
         let scales = Scales::of(values, slots, motor.increments_per_turn);
         Reader { values, slots, scales, motor }.parameters()
     }
@@ -81,7 +81,7 @@ impl Parameters {
     }
 }
 
-impl Reader<'_> {
+impl<S: Storage> Reader<'_, S> {
     fn parameters(&self) -> Parameters {
         let slots = self.slots;
         let max_speed = self.max_speed();

@@ -1,10 +1,10 @@
 //! User units and encoder increments of one axis, by the objects of its factor group.
 
-use canopen::od::Slot;
+use canopen::od::{Dictionary, Slot, Storage};
 use cia402::{FactorGroup, Factors, NoFactor, Polarity, Ratio};
 
+use super::read;
 use super::slots::AxisSlots;
-use super::{Values, read};
 
 /// How one axis counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,7 +16,7 @@ pub(super) struct Scales {
 }
 
 impl Scales {
-    pub(super) fn of(values: &Values, slots: &AxisSlots, increments_per_turn: u32) -> Self {
+    pub(super) fn of(values: &Dictionary<impl Storage>, slots: &AxisSlots, increments_per_turn: u32) -> Self {
         let pair = |numerator: Option<Slot>, divisor: Option<Slot>| {
             (numerator.is_some() && divisor.is_some())
                 .then(|| [numerator, divisor].map(|slot| read(values, slot, 0) as u32))

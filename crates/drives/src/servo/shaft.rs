@@ -7,7 +7,7 @@ mod commands;
 mod publish;
 mod targets;
 
-use canopen::od::Table;
+use canopen::od::{Dictionary, Storage, Table};
 use cia402::{Dwell, ModeOfOperation, PowerState, SupportedModes};
 use devices::AxisDescription;
 use devices::servo::faults::row;
@@ -18,9 +18,9 @@ pub(super) use commands::Written;
 use super::hardware::{AxisActuation, AxisSensors};
 use super::motor::{Motor, SUPERVISION_PERIOD_S};
 use super::parameters::Parameters;
+use super::read;
 use super::slots::AxisSlots;
 use super::touch_probes::TouchProbes;
-use super::{Values, read};
 use crate::engine::actuator::overload::{Overload, OverloadLimits};
 use crate::engine::actuator::servo::{Servo, ServoGains, ServoLimits, ServoModel};
 use crate::engine::axis::{Demand, Feedback, Switches};
@@ -80,7 +80,12 @@ pub(super) struct Shaft {
 
 impl Shaft {
     /// Motor free, position 0, and these values in effect.
-    pub(super) fn new(description: &AxisDescription, table: &'static Table, motor: Motor, values: &Values) -> Self {
+    pub(super) fn new(
+        description: &AxisDescription,
+        table: &'static Table,
+        motor: Motor,
+        values: &Dictionary<impl Storage>,
+    ) -> Self {
         let slots = AxisSlots::of(table, description.placement);
         let parameters = Parameters::of(values, &slots, &motor);
         let model = motor.model();
@@ -160,7 +165,12 @@ impl Shaft {
     }
 
     /// Every control period: the power stage.
-    pub(super) fn actuate(&mut self, values: &Values, sensors: &AxisSensors, bus_v: f32) -> AxisActuation {
+    pub(super) fn actuate(
+        &mut self,
+        values: &Dictionary<impl Storage>,
+        sensors: &AxisSensors,
+        bus_v: f32,
+    ) -> AxisActuation {
         let energised = self.demand != Demand::Off;
         let duty = energised.then(|| self.servo.modulate(&self.model, &self.gains, sensors.phase_current_a, bus_v));
         let outputs = self.outputs(values);
@@ -168,7 +178,7 @@ impl Shaft {
     }
 
     /// Every supervision period, first: parameters and what is measured.
-    pub(super) fn measure(&mut self, values: &Values, sensors: &AxisSensors) -> Feedback {
+    pub(super) fn measure(&mut self, values: &Dictionary<impl Storage>, sensors: &AxisSensors) -> Feedback {
         if self.parameters_changed {
             self.parameters_changed = false;
             self.parameters = Parameters::of(values, &self.slots, &self.motor);
@@ -203,7 +213,13 @@ impl Shaft {
     }
 
     /// Last: demand, loops, and what is told of them.
-    pub(super) fn supervise(&mut self, values: &mut Values, sensors: &AxisSensors, feedback: Feedback, bus_v: f32) {
+    pub(super) fn supervise(
+        &mut self,
+        values: &mut Dictionary<impl Storage>,
+        sensors: &AxisSensors,
+        feedback: Feedback,
+        bus_v: f32,
+    ) {
         let index = self.index.take();
         self.power.set_switches(Switches {
             home: sensors.home,

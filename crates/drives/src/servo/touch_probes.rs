@@ -1,9 +1,10 @@
 //! The two touch probes of an axis over their objects.
 
+use canopen::od::{Dictionary, Storage};
 use cia402::{TouchProbe, TouchProbeFunction, TouchProbeSource};
 
 use super::slots::AxisSlots;
-use super::{Values, write};
+use super::write;
 
 /// Both channels.
 #[derive(Clone, Copy, Debug, Default)]
@@ -21,7 +22,7 @@ impl TouchProbes {
     /// One period: what the inputs say, where the index pulse came, and the position now.
     pub(super) fn update(
         &mut self,
-        values: &mut Values,
+        values: &mut Dictionary<impl Storage>,
         slots: &AxisSlots,
         inputs: [bool; 2],
         position: i64,

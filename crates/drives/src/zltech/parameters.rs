@@ -1,6 +1,6 @@
 //! The CiA 402 objects that mean the same in both drives, in physical units: speeds in r/min, ramps as times in ms.
 
-use canopen::od::{Dictionary, Object, Table};
+use canopen::od::{Dictionary, Object, Storage, Table};
 use cia402::{DisableOperationOption, HaltOption, PowerState, QuickStopOption, ShutdownOption, StopRamp};
 
 use crate::engine::axis::{Control, HomingParameters, MoveLimits, Ramp, Task, VelocityRamps};
@@ -38,9 +38,9 @@ impl ProfileObjects {
 
     /// Ramps, speeds and option codes, with nothing that only one of the drives has. `speed` turns r/min into counts/s, no
     /// faster than the drive allows.
-    pub(crate) fn axis<const N: usize>(
+    pub(crate) fn axis<S: Storage>(
         &self,
-        values: &Dictionary<N>,
+        values: &Dictionary<S>,
         start_rpm: u16,
         max_rpm: f64,
         speed: impl Fn(f64) -> f64,

@@ -1,7 +1,7 @@
 //! How parameters are stored: the register parameter setting (2009h of the ZLAC8030L, 2010h of the ZLIM42-C) and the object
 //! that has each write stored (2010h and 200Ch).
 
-use canopen::od::{Entry, Object, Slot};
+use canopen::od::{Entry, Object, Slot, Storage};
 
 use devices::zltech::{RESTORE, SAVE};
 
@@ -10,8 +10,8 @@ use crate::engine::device::Device;
 /// A write to the register parameter setting, which reads 0 again when it is done; it is about the rows that `wanted` names.
 /// True if all is as delivered now.
 #[cold]
-pub(crate) fn register_command<const N: usize>(
-    device: &mut Device<N>,
+pub(crate) fn register_command<S: Storage>(
+    device: &mut Device<S>,
     register: Object<u16>,
     command: u32,
     wanted: fn(&Entry) -> bool,
@@ -29,7 +29,7 @@ pub(crate) fn register_command<const N: usize>(
 
 /// A peer's write to a row: stored by the next task if each write is.
 #[inline]
-pub(crate) fn mark_if_saving<const N: usize>(device: &mut Device<N>, save_on_write: Object<u16>, slot: Slot) {
+pub(crate) fn mark_if_saving<S: Storage>(device: &mut Device<S>, save_on_write: Object<u16>, slot: Slot) {
     if device.values().get(save_on_write) == 0 {
         device.mark(slot);
     }

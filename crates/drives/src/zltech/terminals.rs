@@ -1,6 +1,6 @@
 //! Digital inputs and outputs by their functions: 2030h of both drives (ZLAC8030L, 5.4 and 5.5; ZLIM42-C, 3.2 and 5.4).
 
-use canopen::od::{Dictionary, Object};
+use canopen::od::{Dictionary, Object, Storage};
 
 use crate::engine::axis::Switches;
 
@@ -31,7 +31,7 @@ pub(crate) struct Terminals<const INPUTS: usize> {
 impl<const INPUTS: usize> Terminals<INPUTS> {
     /// What inputs at these `levels` (bit 0 is X0) say. Several may have one function: any of them acts.
     #[inline]
-    pub(crate) fn signals<const N: usize>(&self, values: &Dictionary<N>, levels: u16) -> Signals {
+    pub(crate) fn signals<S: Storage>(&self, values: &Dictionary<S>, levels: u16) -> Signals {
         let active = levels ^ values.get(self.input_polarity);
         let mut signals = Signals::default();
         for (n, function) in self.input_functions.iter().enumerate() {
@@ -49,7 +49,7 @@ impl<const INPUTS: usize> Terminals<INPUTS> {
 
     /// Levels of Y0 and Y1.
     #[inline]
-    pub(crate) fn outputs<const N: usize>(&self, values: &Dictionary<N>, now: Conditions) -> [bool; 2] {
+    pub(crate) fn outputs<S: Storage>(&self, values: &Dictionary<S>, now: Conditions) -> [bool; 2] {
         let polarity = values.get(self.output_polarity);
         // Bit n is function n; the tables list functions 0 to 4.
         let active = u32::from(now.alarm) << 1

@@ -5,7 +5,7 @@ use std::fmt;
 use std::sync::{Mutex, PoisonError};
 
 use can::Bitrate;
-use canopen::od::{DefaultValue, Entry, MAX_ROWS, Table};
+use canopen::od::{DefaultValue, Entry, FREE_PLACES, MAX_ROWS, RowFacts, Table, TableError};
 use canopen::{Mux, NodeId};
 use cia402::ErrorCode;
 use devices::faults::Faults;
@@ -51,12 +51,15 @@ pub enum Unkept {
         /// It holds so many.
         most: usize,
     },
+    /// They make no table.
+    Rows(TableError),
 }
 
 impl fmt::Display for Unkept {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoObjects => write!(f, "the file has no objects; `ferrodrive eds lint` says why"),
+            Self::Rows(error) => write!(f, "the objects of the file make no dictionary: {error}"),
             Self::TooManyRows { rows, most } => write!(
                 f,
                 "the file has {rows} objects and sub-objects, more than the {most} of a dictionary; take those out that are not needed"
@@ -74,7 +77,7 @@ fn describe(eds: &Eds) -> Result<Description, Unkept> {
         rows if rows > MAX_ROWS => return Err(Unkept::TooManyRows { rows, most: MAX_ROWS }),
         _ => {}
     }
-    let table = table(rows(eds));
+    let table = table(rows(eds))?;
     let identity = identity(eds, table);
     let axes: &'static [_] = Box::leak(axes(table, identity.device_type).into_boxed_slice());
     let has = |index, sub_index| table.find(Mux::new(index, sub_index)).is_ok();
@@ -107,9 +110,11 @@ fn describe(eds: &Eds) -> Result<Description, Unkept> {
     })
 }
 
-fn table(rows: Vec<Entry>) -> &'static Table {
-    let keys: Vec<u32> = rows.iter().map(|row| row.mux().key()).collect();
-    Box::leak(Box::new(Table::new(Box::leak(rows.into_boxed_slice()), Box::leak(keys.into_boxed_slice()))))
+fn table(rows: Vec<Entry>) -> Result<&'static Table, Unkept> {
+    let facts = vec![RowFacts::NONE; rows.len()].leak();
+    let places = vec![FREE_PLACES; rows.len()].leak();
+    let table = Table::at_run_time(rows.leak(), facts, places).map_err(Unkept::Rows)?;
+    Ok(Box::leak(Box::new(table)))
 }
 
 /// What 1000h and 1018h answer; what they leave open, `[DeviceInfo]` says.

@@ -6,6 +6,7 @@
 //! communication deadlines only, and the result does not depend on when it looked.
 
 mod assembly;
+mod boxed;
 mod kept;
 mod mjoint;
 mod node;
@@ -24,6 +25,7 @@ use devices::AxisId;
 use drives::{Firmware, RegisterError};
 
 pub use assembly::Assembly;
+pub use boxed::Boxed;
 pub use mjoint::{Joint, MJointMachine, mjoint};
 pub use node::NodeMachine;
 pub use order::{Order, OrderError};

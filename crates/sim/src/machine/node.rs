@@ -6,6 +6,7 @@ use canopen::od::{DataType, Entry};
 use devices::{AxisId, Description};
 use drives::node::{DescribedNode, Memory, conditions};
 
+use super::boxed::Boxed;
 use super::kept;
 use super::order::{self, Order, OrderError};
 use crate::stimulus::{ObjectValue, Power, Stimulus};
@@ -17,7 +18,7 @@ const SUPPLY_V: f64 = 24.0;
 /// A described node, as a station of a world.
 #[derive(Clone)]
 pub struct NodeMachine {
-    firmware: DescribedNode,
+    firmware: DescribedNode<Boxed>,
     memory: Memory,
 }
 
@@ -30,7 +31,7 @@ pub(super) fn ordered(model: &'static Description, order: &Order) -> Result<Box<
 
 impl NodeMachine {
     /// The firmware, to look at.
-    pub const fn firmware(&self) -> &DescribedNode {
+    pub const fn firmware(&self) -> &DescribedNode<Boxed> {
         &self.firmware
     }
 

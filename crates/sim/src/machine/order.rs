@@ -1,12 +1,12 @@
 //! Drives as one orders them: a model by its name, with an address, a bit rate, and what is special about this one.
 
 use can::Bitrate;
-use canopen::od::Dictionary;
+use canopen::od::{Dictionary, Storage};
 use canopen::{Mux, NodeId};
 use devices::Description;
 use devices::variant::{Preset, PresetError, Variant};
 use drives::engine::storage::Image;
-use drives::node::{Memory, Values, is_parameter};
+use drives::node::{Memory, is_parameter};
 
 /// What is wanted of a drive beside its model.
 #[derive(Clone, Debug)]
@@ -28,7 +28,7 @@ impl Order {
     }
 
     /// The parameter store of this drive, from the values of one as delivered.
-    pub(super) fn image<const N: usize>(&self, mut values: Dictionary<N>) -> Result<Image, OrderError> {
+    pub(super) fn image<S: Storage>(&self, mut values: Dictionary<S>) -> Result<Image, OrderError> {
         for preset in &self.presets {
             preset.store(&mut values).map_err(|error| OrderError::Preset { preset: *preset, error })?;
         }
@@ -103,7 +103,7 @@ pub(super) fn memory(model: &'static Description, order: &Order) -> Result<Memor
     if order.presets.is_empty() {
         return Ok(memory);
     }
-    let mut values = Values::new(model.dictionary, order.node);
+    let mut values = Dictionary::<super::boxed::Boxed>::new(model.dictionary, order.node);
     for preset in &order.presets {
         preset.store_if(&mut values, is_parameter).map_err(|error| OrderError::Preset { preset: *preset, error })?;
     }

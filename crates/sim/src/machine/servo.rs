@@ -22,6 +22,7 @@ use plant::supply::SupplyData;
 
 use super::Machine;
 use super::assembly::{AMBIENT_C, Assembly, with_demand};
+use super::boxed::Boxed;
 use super::order::{Order, OrderError};
 use super::quantity::Quantity;
 use super::realism::{
@@ -242,7 +243,7 @@ fn index_count(motor: &HubMotor, before: i64) -> Option<u16> {
 const SWITCHES: usize = 5;
 
 impl Assembly for ServoBench {
-    type Firmware = ServoDrive;
+    type Firmware = ServoDrive<Boxed>;
 
     const MODEL: &'static str = "cia402";
     const INPUTS: &'static [&'static str] =
@@ -323,7 +324,7 @@ impl Assembly for ServoBench {
         (&mut first.rig, &mut first.model.rig)
     }
 
-    fn report(&self, firmware: &ServoDrive, axis: AxisId, common: Report) -> Report {
+    fn report(&self, firmware: &ServoDrive<Boxed>, axis: AxisId, common: Report) -> Report {
         let counts_per_turn = f64::from(self.at(axis).model.encoder.counts_per_turn());
         let number = usize::from(axis.0);
         let released = self.last.axes.get(number).is_some_and(|axis| axis.brake_released);

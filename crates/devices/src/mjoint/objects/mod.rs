@@ -9,7 +9,7 @@ mod control;
 pub mod modbus;
 mod values;
 
-use canopen::od::{Entry, Table, keys};
+use canopen::od::{Entry, Index, Table};
 
 use crate::row::join;
 
@@ -17,10 +17,10 @@ use crate::row::join;
 pub const ROW_COUNT: usize = 104;
 
 static ROWS: [Entry; ROW_COUNT] = join(&[&communication::ROWS, &control::ROWS]);
-static KEYS: [u32; ROW_COUNT] = keys(&ROWS);
+static INDEX: Index<ROW_COUNT> = Index::of(&ROWS);
 
 /// All objects of the drive.
-pub static TABLE: Table = Table::new(&ROWS, &KEYS);
+pub static TABLE: Table = Table::new(&ROWS, &INDEX);
 
 crate::row::objects! { TABLE:
     ERROR_REGISTER: u8 = 0x1001 0x00;

@@ -5,7 +5,7 @@ mod communication;
 mod profile;
 mod values;
 
-use canopen::od::{Entry, Table, keys};
+use canopen::od::{Entry, Index, Table};
 
 use crate::row::join;
 
@@ -15,10 +15,10 @@ pub use profile::INCREMENTS_PER_TURN;
 pub const ROW_COUNT: usize = communication::ROW_COUNT + profile::ROW_COUNT;
 
 static ROWS: [Entry; ROW_COUNT] = join(&[&communication::ROWS, &profile::ROWS]);
-static KEYS: [u32; ROW_COUNT] = keys(&ROWS);
+static INDEX: Index<ROW_COUNT> = Index::of(&ROWS);
 
 /// All objects.
-pub static TABLE: Table = Table::new(&ROWS, &KEYS);
+pub static TABLE: Table = Table::new(&ROWS, &INDEX);
 
 #[cfg(test)]
 mod tests {

@@ -71,7 +71,7 @@ const AXIS: AxisDescription = AxisDescription {
 
 /// Working robots map 6077h with 32 bits; the maker's EDS counts empty entries in.
 const PDO_RULES: PdoRules = PdoRules {
-    mapping: MappingRules { longer_entries: true, empty_entries: true, tpdo_forms: &[] },
+    mapping: MappingRules { longer_entries: true, empty_entries: true, dummy_entries: 0, tpdo_forms: &[] },
     ..zltech::PDO_RULES
 };
 

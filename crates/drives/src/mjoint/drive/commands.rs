@@ -25,8 +25,8 @@ const INTERPOLATION_PERIOD_S: f64 = INTERPOLATION_PERIODS as f64 * SUPERVISION_P
 /// The RPDO whose position waits for SYNC.
 const SYNCHRONOUS_RPDO: u16 = 4;
 
-impl Application<ROW_COUNT> for MJoint {
-    fn device(&mut self) -> &mut Device<ROW_COUNT> {
+impl Application<Room> for MJoint {
+    fn device(&mut self) -> &mut Device<Room> {
         &mut self.device
     }
 

@@ -57,7 +57,7 @@ const HEARTBEAT_ALARM: u8 = 0x04;
 #[derive(Clone)]
 pub struct MJoint {
     model: &'static Model,
-    device: Device<ROW_COUNT>,
+    device: Device<Room>,
     powered_at: Instant,
     host: Option<Consumer>,
     host_lost: bool,
@@ -139,7 +139,7 @@ impl MJoint {
     }
 
     /// Motor free, and the values of `device` in effect.
-    fn over(model: &'static Model, device: Device<ROW_COUNT>) -> Self {
+    fn over(model: &'static Model, device: Device<Room>) -> Self {
         let function = Function::from_raw(device.values().get(MODE_SELECTION)).unwrap_or_default();
         let amplitude = variations::amplitude_per_a(device.variant());
         let parameters = Parameters::from(device.values(), model, function, amplitude);
@@ -204,7 +204,7 @@ impl MJoint {
     }
 
     /// The communication side, to look at.
-    pub const fn node(&self) -> &Node<ROW_COUNT> {
+    pub const fn node(&self) -> &Node<Room> {
         self.device.node()
     }
 

@@ -5,3 +5,6 @@ pub mod effects;
 
 pub use conditions::CONDITIONS;
 pub use devices::mjoint::objects::*;
+
+/// Room for the values and PDOs of the drive.
+pub type Room = canopen::od::Fixed<ROW_COUNT>;

@@ -2,15 +2,14 @@
 
 use can::{Frame, Instant, Station};
 use canopen::node::Via;
-use canopen::od::Slot;
+use canopen::od::{Slot, Storage};
 
 use super::ServoDrive;
 use crate::engine::device::{Application, Device};
-use crate::node::ROWS;
 use crate::servo::shaft::Written;
 
-impl Application<ROWS> for ServoDrive {
-    fn device(&mut self) -> &mut Device<ROWS> {
+impl<S: Storage> Application<S> for ServoDrive<S> {
+    fn device(&mut self) -> &mut Device<S> {
         &mut self.device
     }
 
@@ -55,7 +54,7 @@ impl Application<ROWS> for ServoDrive {
     }
 }
 
-impl Station for ServoDrive {
+impl<S: Storage> Station for ServoDrive<S> {
     fn ignores(&self, frame: &Frame) -> bool {
         self.device.ignores(frame) && !self.services.wants(frame)
     }

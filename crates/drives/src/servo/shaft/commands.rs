@@ -1,10 +1,10 @@
 //! What a host sets in motion at an axis.
 
-use canopen::od::Slot;
+use canopen::od::{Dictionary, Slot, Storage};
 use cia402::{Controlword, FaultReactionOption, ModeOfOperation, PowerCommand};
 
 use super::Shaft;
-use crate::servo::{Values, read};
+use crate::servo::read;
 
 /// What a write to an axis did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,13 +21,18 @@ pub(in crate::servo) enum Written {
 
 impl Shaft {
     /// The self-test has ended well, and 6060h is in effect.
-    pub(in crate::servo) fn start(&mut self, values: &Values) {
+    pub(in crate::servo) fn start(&mut self, values: &Dictionary<impl Storage>) {
         self.select_mode(read(values, self.slots.mode, 0));
         self.power.self_test_done();
     }
 
     /// A peer wrote to `slot`.
-    pub(in crate::servo) fn written(&mut self, values: &Values, slot: Slot, inputs: [bool; 2]) -> Written {
+    pub(in crate::servo) fn written(
+        &mut self,
+        values: &Dictionary<impl Storage>,
+        slot: Slot,
+        inputs: [bool; 2],
+    ) -> Written {
         let written = Some(slot);
         let slots = &self.slots;
         let value = read(values, written, 0);
@@ -99,7 +104,7 @@ impl Shaft {
         }
     }
 
-    fn command(&mut self, controlword: Controlword, values: &Values) -> Written {
+    fn command(&mut self, controlword: Controlword, values: &Dictionary<impl Storage>) -> Written {
         if self.parameters_changed {
             self.parameters_changed = false;
             self.parameters = crate::servo::parameters::Parameters::of(values, &self.slots, &self.motor);

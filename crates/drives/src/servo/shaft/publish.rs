@@ -1,12 +1,13 @@
 //! What an axis tells in its objects.
 
+use canopen::od::{Dictionary, Storage};
 use cia402::{DigitalInputs, DigitalOutputs, ModeOfOperation, PowerState};
 
 use super::{AxisSensors, Shaft};
 use crate::engine::axis::Demand;
 use crate::engine::cia402::StopCause;
 use crate::servo::statusword::{Facts, statusword};
-use crate::servo::{Values, read, write};
+use crate::servo::{read, write};
 
 /// Levels of an axis' outputs.
 pub(super) struct Outputs {
@@ -20,7 +21,7 @@ pub(super) struct Outputs {
 const PROBE_BITS: [u32; 2] = [1 << 16, 1 << 17];
 
 impl Shaft {
-    pub(super) fn publish(&self, values: &mut Values, sensors: &AxisSensors, bus_v: f32) {
+    pub(super) fn publish(&self, values: &mut Dictionary<impl Storage>, sensors: &AxisSensors, bus_v: f32) {
         let slots = &self.slots;
         let scales = &self.parameters.scales;
         let position = self.position();
@@ -41,7 +42,7 @@ impl Shaft {
         self.publish_status(values);
     }
 
-    fn publish_demand(&self, values: &mut Values, position: i32) {
+    fn publish_demand(&self, values: &mut Dictionary<impl Storage>, position: i32) {
         let slots = &self.slots;
         let scales = &self.parameters.scales;
         let (demanded, velocity) = match &self.demand {
@@ -58,7 +59,7 @@ impl Shaft {
     }
 
     /// Statusword and mode display; also right after a command, for a host that reads back.
-    pub(in crate::servo) fn publish_status(&self, values: &mut Values) {
+    pub(in crate::servo) fn publish_status(&self, values: &mut Dictionary<impl Storage>) {
         let mode = self.power.mode();
         let word = statusword(self.power.state(), mode, &self.facts());
         write(values, self.slots.statusword, i64::from(word.0));
@@ -88,7 +89,7 @@ impl Shaft {
         }
     }
 
-    pub(super) fn outputs(&self, values: &Values) -> Outputs {
+    pub(super) fn outputs(&self, values: &Dictionary<impl Storage>) -> Outputs {
         let outputs = DigitalOutputs {
             physical_outputs: read(values, self.slots.physical_outputs, 0) as u32,
             bit_mask: match self.slots.output_mask {

@@ -1,16 +1,17 @@
 //! What the modes that follow something at all times are given each period.
 
+use canopen::od::{Dictionary, Storage};
 use cia402::{Controlword, ModeOfOperation};
 use motion::profile::Point;
 
 use super::{SUPERVISION_PERIOD_S, Shaft};
 use crate::engine::axis::{Cyclic, Feedback, TrajectoryPoint};
 use crate::engine::cia402::Targets;
-use crate::servo::{Values, read};
+use crate::servo::read;
 
 impl Shaft {
     /// Targets from the objects, held to the limits.
-    pub(super) fn read_targets(&mut self, values: &Values, feedback: &Feedback) {
+    pub(super) fn read_targets(&mut self, values: &Dictionary<impl Storage>, feedback: &Feedback) {
         self.limited = false;
         let position = f64::from(feedback.position);
         let cyclic = match self.power.mode() {
@@ -64,7 +65,7 @@ impl Shaft {
         }
     }
 
-    fn cyclic_position(&mut self, values: &Values) -> Option<Cyclic> {
+    fn cyclic_position(&mut self, values: &Dictionary<impl Storage>) -> Option<Cyclic> {
         let age_s = self.set_point_age_s? + f64::from(SUPERVISION_PERIOD_S);
         self.set_point_age_s = Some(age_s);
         let point = self.set_points.at(age_s, &self.parameters.following);
@@ -80,16 +81,16 @@ impl Shaft {
     }
 
     /// 60FFh, increments/s.
-    fn velocity(&self, values: &Values) -> f64 {
+    fn velocity(&self, values: &Dictionary<impl Storage>) -> f64 {
         self.parameters.scales.increments_s(read(values, self.slots.target_velocity, 0))
     }
 
-    fn velocity_offset(&self, values: &Values) -> f64 {
+    fn velocity_offset(&self, values: &Dictionary<impl Storage>) -> f64 {
         self.parameters.scales.increments_s(read(values, self.slots.velocity_offset, 0))
     }
 
     /// 6071h and in the cyclic mode 60B2h, as a current.
-    fn torque_a(&self, values: &Values) -> f32 {
+    fn torque_a(&self, values: &Dictionary<impl Storage>) -> f32 {
         let cyclic = self.power.mode() == ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE;
         let offset = if cyclic { read(values, self.slots.torque_offset, 0) } else { 0 };
         let per_mille = read(values, self.slots.target_torque, 0) + offset;

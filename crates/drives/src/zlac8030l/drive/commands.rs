@@ -15,8 +15,8 @@ use crate::zlac8030l::restart;
 use crate::zlac8030l::variations::{MODE_NOT_SAVED, SYNC_FEEDS_WATCHDOG};
 use crate::zltech;
 
-impl Application<ROW_COUNT> for Zlac8030l {
-    fn device(&mut self) -> &mut Device<ROW_COUNT> {
+impl Application<Room> for Zlac8030l {
+    fn device(&mut self) -> &mut Device<Room> {
         &mut self.device
     }
 

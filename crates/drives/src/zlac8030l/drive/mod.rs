@@ -42,7 +42,7 @@ pub static NODE_PROFILE: NodeProfile =
 /// The firmware of a ZLAC8030L V2.0.
 #[derive(Clone)]
 pub struct Zlac8030l {
-    device: Device<ROW_COUNT>,
+    device: Device<Room>,
     dip_address: u8,
     parameters: Parameters,
     parameters_changed: bool,
@@ -83,7 +83,7 @@ impl Zlac8030l {
     }
 
     /// Motor free, position 0, and the values of `device` in effect.
-    fn over(mut device: Device<ROW_COUNT>) -> Self {
+    fn over(mut device: Device<Room>) -> Self {
         let parameters = Parameters::of(device.values(), device.variant());
         // 202F:05 acts from a restart on (5.3).
         let resolution = device.values().get(VELOCITY_RESOLUTION);
@@ -125,7 +125,7 @@ impl Zlac8030l {
     }
 
     /// The communication side, to look at.
-    pub const fn node(&self) -> &Node<ROW_COUNT> {
+    pub const fn node(&self) -> &Node<Room> {
         self.device.node()
     }
 

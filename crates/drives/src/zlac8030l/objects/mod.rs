@@ -5,3 +5,6 @@ pub mod effects;
 
 pub use conditions::{ABSOLUTE_TARGET_LIMIT, CONDITIONS};
 pub use devices::zltech::zlac8030l::objects::*;
+
+/// Room for the values and PDOs of the drive.
+pub type Room = canopen::od::Fixed<ROW_COUNT>;

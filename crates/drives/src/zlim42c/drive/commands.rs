@@ -14,8 +14,8 @@ use crate::zlim42c::restart;
 use crate::zlim42c::variations::FAULTS_STAY;
 use crate::zltech;
 
-impl Application<ROW_COUNT> for Zlim42c {
-    fn device(&mut self) -> &mut Device<ROW_COUNT> {
+impl Application<Room> for Zlim42c {
+    fn device(&mut self) -> &mut Device<Room> {
         &mut self.device
     }
 

@@ -38,7 +38,7 @@ pub static NODE_PROFILE: NodeProfile = communication(&devices::zltech::ZLIM42C);
 /// The firmware of a ZLIM42-C.
 #[derive(Clone)]
 pub struct Zlim42c {
-    device: Device<ROW_COUNT>,
+    device: Device<Room>,
     dip_address: u8,
     parameters: Parameters,
     parameters_changed: bool,
@@ -72,7 +72,7 @@ impl Zlim42c {
     }
 
     /// Motor free, position 0, and the values of `device` in effect.
-    fn over(device: Device<ROW_COUNT>) -> Self {
+    fn over(device: Device<Room>) -> Self {
         Self {
             parameters: Parameters::of(device.values(), device.variant()),
             device,
@@ -120,7 +120,7 @@ impl Zlim42c {
     }
 
     /// The communication side, to look at.
-    pub const fn node(&self) -> &Node<ROW_COUNT> {
+    pub const fn node(&self) -> &Node<Room> {
         self.device.node()
     }
 

@@ -3,3 +3,6 @@
 pub mod effects;
 
 pub use devices::zltech::zlim42c::objects::*;
+
+/// Room for the values and PDOs of the drive.
+pub type Room = canopen::od::Fixed<ROW_COUNT>;

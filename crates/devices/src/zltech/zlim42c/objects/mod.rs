@@ -9,7 +9,7 @@ mod manufacturer;
 mod profile;
 mod values;
 
-use canopen::od::{Entry, Table, keys};
+use canopen::od::{Entry, Index, Table};
 
 use super::assumptions::{HARDWARE_VERSION, SOFTWARE_VERSION};
 use crate::row::join;
@@ -20,10 +20,10 @@ pub const ROW_COUNT: usize = 158;
 
 static ROWS: [Entry; ROW_COUNT] =
     join(&[&communication::rows(HARDWARE_VERSION, SOFTWARE_VERSION), &manufacturer::ROWS, &profile::ROWS]);
-static KEYS: [u32; ROW_COUNT] = keys(&ROWS);
+static INDEX: Index<ROW_COUNT> = Index::of(&ROWS);
 
 /// All objects of the drive.
-pub static TABLE: Table = Table::new(&ROWS, &KEYS);
+pub static TABLE: Table = Table::new(&ROWS, &INDEX);
 
 crate::row::objects! { TABLE:
     NODE_ID: u16 = 0x2000 0x00;

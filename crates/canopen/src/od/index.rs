@@ -1,0 +1,111 @@
+//! What makes a search among rows fast: a hash directory from a key to its row, and of each row what requests must know.
+
+use super::{Entry, Gate, Summary, TableError};
+
+/// Most rows of a table.
+pub const MAX_ROWS: usize = FREE as usize;
+/// A free place of the directory.
+pub(super) const FREE: u16 = u16::MAX;
+
+/// What every request must know of a row.
+#[derive(Clone, Copy, Debug)]
+pub struct RowFacts {
+    pub(super) key: u32,
+    pub(super) gate: Gate,
+    pub(crate) summary: Summary,
+}
+
+impl RowFacts {
+    /// Of no row.
+    pub const NONE: Self = Self { key: 0, gate: Gate::CLOSED, summary: Summary::NONE };
+}
+
+/// Two places of the directory: it has twice as many places as there are rows, so that searches end soon.
+pub type Places = [u16; 2];
+
+/// Free places.
+pub const FREE_PLACES: Places = [FREE; 2];
+
+/// The index of a table that is known at compile time; for a `static` beside the rows.
+#[derive(Clone, Copy, Debug)]
+pub struct Index<const N: usize> {
+    pub(super) facts: [RowFacts; N],
+    pub(super) places: [Places; N],
+    pub(super) byte_count: u32,
+    pub(super) staging: u32,
+}
+
+impl<const N: usize> Index<N> {
+    /// The index of `rows`.
+    ///
+    /// # Panics
+    /// At compile time if the rows are not strictly ascending by index and sub-index, or are more than [`MAX_ROWS`].
+    pub const fn of(rows: &[Entry; N]) -> Self {
+        let (mut facts, mut places) = ([RowFacts::NONE; N], [FREE_PLACES; N]);
+        match fill(rows, &mut facts, &mut places) {
+            Ok((byte_count, staging)) => Self { facts, places, byte_count, staging },
+            Err(_) => panic!("object rows must ascend by index and sub-index"),
+        }
+    }
+}
+
+/// Fills `facts` and `places`, which are as long as `rows`. Gives the bytes of all long values, and of the longest.
+pub(super) const fn fill(
+    rows: &[Entry],
+    facts: &mut [RowFacts],
+    places: &mut [Places],
+) -> Result<(u32, u32), TableError> {
+    if rows.len() > MAX_ROWS {
+        return Err(TableError::TooManyRows);
+    }
+    if facts.len() != rows.len() || places.len() != rows.len() {
+        return Err(TableError::OtherLength);
+    }
+    let places = places.as_flattened_mut();
+    let (mut offset, mut staging, mut position) = (0_u32, 0, 0);
+    while position < rows.len() {
+        let row = &rows[position];
+        let key = row.mux().key();
+        if position > 0 && facts[position - 1].key >= key {
+            return Err(TableError::NotAscending { position });
+        }
+        let summary = Summary::of(row);
+        let mut gate = Gate::of(row);
+        if summary.is_long() {
+            let capacity = row.stored_bytes();
+            gate = Gate::of_long(offset, capacity);
+            staging = if capacity > staging { capacity } else { staging };
+            offset = match offset.checked_add(capacity) {
+                Some(sum) => sum,
+                None => return Err(TableError::TooManyBytes),
+            };
+        }
+        facts[position] = RowFacts { key, gate, summary };
+        insert(places, key, position as u16);
+        position += 1;
+    }
+    match offset.checked_add(staging) {
+        Some(byte_count) => Ok((byte_count, staging)),
+        None => Err(TableError::TooManyBytes),
+    }
+}
+
+const fn insert(places: &mut [u16], key: u32, position: u16) {
+    let mut place = first_place(key, places.len());
+    while places[place] != FREE {
+        place = next_place(place, places.len());
+    }
+    places[place] = position;
+}
+
+/// Where the search for a key begins: a multiplicative hash (Knuth, vol. 3, 6.4), scaled to the number of places.
+#[inline(always)]
+pub(super) const fn first_place(key: u32, count: usize) -> usize {
+    const GOLDEN_RATIO: u32 = 0x9E37_79B1;
+    ((key.wrapping_mul(GOLDEN_RATIO) as u64 * count as u64) >> u32::BITS) as usize
+}
+
+#[inline(always)]
+pub(super) const fn next_place(place: usize, count: usize) -> usize {
+    if place + 1 < count { place + 1 } else { 0 }
+}

@@ -1,0 +1,15 @@
+/// The number of a row in its table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Slot(u16);
+
+impl Slot {
+    /// The row at a position that a table has.
+    pub(crate) const fn at(position: usize) -> Self {
+        Self(position as u16)
+    }
+
+    /// The row's position, from 0.
+    pub const fn position(self) -> usize {
+        self.0 as usize
+    }
+}
