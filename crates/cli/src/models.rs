@@ -1,19 +1,47 @@
 //! The devices that Ferrodrive knows, as the command line names them.
 
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
 use canopen::NodeId;
+use eds::document::Bounds;
+use eds::{Eds, keep};
 use sim::machine::models;
 
 use crate::parse::suggest::{did_you_mean, near};
+use crate::plain::plain;
 
 pub(crate) use devices::Description;
 
-/// What a MODEL argument means: the name of a model.
+/// What a MODEL argument means: the name of a model, or an EDS or DCF file that describes one.
 pub(crate) fn resolve(text: &str) -> Result<&'static Description, String> {
+    if is_file(text) {
+        return described(Path::new(text));
+    }
     let known = || models().map(|model| model.name);
     models().find(|model| model.name.eq_ignore_ascii_case(text)).ok_or_else(|| {
         let near = near(text, known());
-        format!("'{text}' is no model{}; expected one of: {}", did_you_mean(&near), names())
+        format!("'{text}' is no model{}; expected one of: {}, or a file of it (FILE.eds)", did_you_mean(&near), names())
     })
+}
+
+/// True for what has the ending of a file that describes a device.
+fn is_file(text: &str) -> bool {
+    let ending = Path::new(text).extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+    ["eds", "dcf"].iter().any(|known| ending.eq_ignore_ascii_case(known))
+}
+
+/// The device that a file describes.
+fn described(path: &Path) -> Result<&'static Description, String> {
+    let shown = plain(&path.display().to_string());
+    let cannot = |error: std::io::Error| format!("cannot read {shown}: {error}");
+    let mut bytes = Vec::new();
+    let most = Bounds::DEFAULT.bytes as u64 + 1;
+    File::open(path).map_err(cannot)?.take(most).read_to_end(&mut bytes).map_err(cannot)?;
+    let reading = Eds::load(&bytes)
+        .map_err(|refusal| format!("{shown}, line {}: {}; {}", refusal.line, refusal.reason, refusal.next))?;
+    keep(&reading.eds).map_err(|error| format!("{shown}: {error}"))
 }
 
 /// The drives on the embedded virtual bus and their node-IDs: one of each kind that is delivered with a node-ID, at that

@@ -1,5 +1,7 @@
 //! `ferrodrive sim`: virtual drives in real time, for other programs.
 
+mod described;
+
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::path::PathBuf;
@@ -18,6 +20,7 @@ use crate::failure::Failure;
 use crate::global::Global;
 use crate::machine_file::{Machine, Placed};
 use crate::parse::drive_spec::{DriveSpec, drive_spec};
+use crate::plain::plain;
 use crate::serve::eeprom::{EepromError, Eeproms};
 use crate::serve::files::create_log;
 use crate::serve::frame_log::FrameLog;
@@ -26,6 +29,7 @@ use crate::serve::service::{Request, Service, listen_to_signals, read_lines, tic
 use crate::serve::speaker::Speaker;
 use crate::serve::world::ServedWorld;
 use crate::session::{bus_failure, failure_of};
+use described::notes;
 
 /// Run virtual drives in real time, for other programs
 ///
@@ -52,6 +56,9 @@ use crate::session::{bus_failure, failure_of};
     ferrodrive --bus socketcand://127.0.0.1:29536/can0 move 4 90deg")]
 pub(crate) struct Sim {
     /// A drive and its node-ID, e.g. zlac8030l@4; may be repeated, and comes on top of those of --machine FILE.toml
+    ///
+    /// cia402@5 is a servo as the standard has it. An EDS or DCF file in place of the model, e.g. vendor.eds@5, is a servo with
+    /// the objects of that file, or, if it describes no drive, a node with its objects.
     ///
     /// After a comma: what is special about this one (`ferrodrive readings MODEL` lists it), e.g. zlim42c@2,reading=Z050:prose;
     /// or the value that an object has at power-on, as if stored, e.g. zlac8030l@4,2014=100.
@@ -89,6 +96,9 @@ pub(crate) struct Sim {
     /// a FIFO are refused. When the disk is too slow frames are left out, which is said on standard error.
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
+    /// Name what is else only counted at the start: the objects of a file that have no effect
+    #[arg(short, long)]
+    verbose: bool,
 }
 
 /// What a simulator says that nobody can reach.
@@ -116,6 +126,8 @@ impl Sim {
         let mut world = machine.world();
         for placed in &machine.drives {
             add_drive(&mut world, placed, eeproms.as_ref(), &warnings)?;
+            let notes = notes(placed.spec.node, placed.spec.model, self.verbose);
+            notes.iter().for_each(|note| warnings.say(&plain(note)));
         }
         machine.make_real(&mut world);
         let log = self.log.as_deref().map(create_log).transpose().map_err(|error| {

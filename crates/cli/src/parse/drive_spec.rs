@@ -97,12 +97,13 @@ fn number(text: &str) -> Option<i64> {
     }
 }
 
-/// `zlac8030l@4,motor=fast,6060=3`.
+/// `zlac8030l@4,motor=fast,6060=3`, `vendor.eds@5`.
 pub(crate) fn drive_spec(text: &str) -> Result<DriveSpec, String> {
     let mut words = text.split(',');
     let place = words.next().unwrap_or_default();
-    let (name, number) =
-        place.split_once('@').ok_or_else(|| format!("'{place}' is no drive; expected MODEL@NODE, e.g. zlac8030l@4"))?;
+    let (name, number) = place
+        .rsplit_once('@')
+        .ok_or_else(|| format!("'{place}' is no drive; expected MODEL@NODE, e.g. zlac8030l@4"))?;
     let mut spec = DriveSpec::new(resolve(name)?, node(number)?);
     for word in words {
         let (key, value) = word

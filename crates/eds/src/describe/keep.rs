@@ -106,7 +106,7 @@ fn describe(eds: &Eds) -> Result<Description, Unkept> {
         nmt: NmtRules::CIA_301,
         pdo: pdo_rules(table.rows()),
         stated_departures: &[],
-        variations: &[],
+        variations: if axes.is_empty() { &[] } else { servo::variations::VARIATIONS },
     })
 }
 

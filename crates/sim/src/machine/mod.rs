@@ -31,7 +31,7 @@ pub use node::NodeMachine;
 pub use order::{Order, OrderError};
 pub use quantity::Quantity;
 pub use realism::{Noise, Realism};
-pub use registry::{models, order};
+pub use registry::{is_built_in, models, order};
 pub use servo::{ServoBench, ServoMachine, servo, without_effect};
 pub use zlac8030l::{HubWheel, Zlac8030lMachine, zlac8030l};
 pub use zlim42c::{Stepper, Zlim42c82Machine, Zlim42cMachine, zlim42c, zlim42c_82};

@@ -10,7 +10,7 @@ use super::boxed::Boxed;
 use super::kept;
 use super::order::{self, Order, OrderError};
 use crate::stimulus::{ObjectValue, Power, Stimulus};
-use crate::{Refused, Report, VirtualDrive};
+use crate::{Refused, Report, Source, VirtualDrive};
 
 /// Supply that such devices have. Assumed: the 24 V of control cabinets.
 const SUPPLY_V: f64 = 24.0;
@@ -125,6 +125,7 @@ impl VirtualDrive for NodeMachine {
             Stimulus::LoadTorque(_) | Stimulus::LoadInertia(_) | Stimulus::RotorLock(_) => {
                 return Err(self.absent("motor"));
             }
+            Stimulus::Supply(source) if *source == Source::default() => {}
             Stimulus::Supply(_) => return Err(self.absent("supply but on and off")),
             Stimulus::Temperature(..) => return Err(self.absent("such sensor")),
             Stimulus::Fault(..) => return Err(self.absent("such component")),

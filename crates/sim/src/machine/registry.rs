@@ -26,6 +26,11 @@ pub fn models() -> impl ExactSizeIterator<Item = &'static Description> + Clone {
     MACHINES.iter().map(|(model, _)| *model)
 }
 
+/// True for the models that have a machine of their own, which [`models`] lists.
+pub fn is_built_in(model: &Description) -> bool {
+    models().any(|known| std::ptr::eq(known, model))
+}
+
 /// A virtual drive of `model`, without power. One that is not among [`models`], but read from a file, is the generic servo if
 /// it has an axis, and else a node with its objects.
 ///

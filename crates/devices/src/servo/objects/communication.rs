@@ -76,7 +76,7 @@ const GENERAL: [Entry; 42] = [
     rw(0x1019, 0, U8, "synchronous_counter_overflow_value", "SYNC counter overflow; 0 is off").range(0, 0),
     ro(0x1029, 0, U8, "error_behaviour", "Number of entries").default(1),
     rw(0x1029, 1, U8, "communication_error", "What a loss of communication does to the NMT state")
-        .values(&[(0, "to pre-operational"), (1, "nothing"), (2, "to stopped")]).default(1).saved(),
+        .values(&[(1, "nothing")]).default(1).saved(),
     ro(0x1200, 0, U8, "sdo_server_parameter", "Number of entries").default(2),
     ro(0x1200, 1, U32, "sdo_cob_id_client_to_server", "COB-ID client to server").node_id_plus(0x600),
     ro(0x1200, 2, U32, "sdo_cob_id_server_to_client", "COB-ID server to client").node_id_plus(0x580),
