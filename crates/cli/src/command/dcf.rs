@@ -26,7 +26,7 @@ use crate::table::Table;
 /// set-points, which are no configuration.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive dcf 4 --output left-wheel.dcf\n  \
-    ferrodrive --bus can0 dcf 5 --eds vendor.eds --output axis.dcf\n  ferrodrive dcf 4 --model 4=zlac8030l > left-wheel.dcf")]
+    ferrodrive --bus socketcand://HOST:29536/can0 dcf 5 --eds vendor.eds --output axis.dcf\n  ferrodrive dcf 4 --model 4=zlac8030l > left-wheel.dcf")]
 pub(crate) struct Dcf {
     /// Node-ID
     #[arg(value_parser = node)]

@@ -38,6 +38,7 @@ impl Reader {
             name: format!("{name}{sub_index}"),
             ..one.clone()
         }));
+        let is_dcf = self.eds.commissioning.is_some();
         for part in beside {
             for entry in part.section.entries() {
                 let Some(variable) = self.compact_entry(part.section, entry, &mut variables) else { continue };
@@ -46,8 +47,11 @@ impl Reader {
                     Role::Denotations => entry.value.clone_into(&mut variable.denotation),
                     Role::Values => {
                         let value = self.value(part.section, entry, variable.data_type);
-                        variable.default = value.or(variable.default.take());
+                        // In a DCF they are what the device is to have (CiA 306-1, clause 5).
+                        let place = if is_dcf { &mut variable.value } else { &mut variable.default };
+                        *place = value.or(place.take());
                         self.check_limits(part.section, [Some(entry); 2], variable);
+                        self.check_value(part.section, Some(entry), variable);
                     }
                     Role::Object | Role::Sub(_) => {}
                 }

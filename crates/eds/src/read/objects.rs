@@ -221,6 +221,7 @@ impl Reader {
             download_file: text(fields.download_file),
         };
         self.check_limits(section, [fields.low_limit, fields.high_limit], &mut variable);
+        self.check_value(section, fields.parameter_value, &variable);
         variable
     }
 
@@ -247,6 +248,16 @@ impl Reader {
         {
             self.error(section, entry, "the high limit lies below the default value", "no high limit");
             variable.high = None;
+        }
+    }
+
+    /// The value of a DCF is what somebody wants, within the limits or not: the device will say what it thinks of it.
+    pub(super) fn check_value(&mut self, section: Section<'_>, at: Option<Entry<'_>>, variable: &Variable) {
+        let (Some(entry), Some(value)) = (at, magnitude(&variable.value)) else { return };
+        let too_low = magnitude(&variable.low).is_some_and(|low| value < low);
+        let too_high = magnitude(&variable.high).is_some_and(|high| value > high);
+        if too_low || too_high {
+            self.warn(section, entry, "the value lies outside of the limits", None);
         }
     }
 

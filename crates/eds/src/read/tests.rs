@@ -210,6 +210,26 @@ fn a_dcf_has_values_and_one_device() {
 }
 
 #[test]
+fn in_a_dcf_the_values_of_compact_sub_objects_are_values_and_one_beyond_its_limits_is_told() {
+    let object = "[2000]\nParameterName=W\nObjectType=8\nDataType=6\nAccessType=rw\nDefaultValue=1\nHighLimit=9\nCompactSubObj=2\n\
+                  [2000Value]\nNrOfEntries=1\n2=7\n";
+    let second = |text: &str| {
+        let reading = reading(&[0x2000], text);
+        let variable = reading.eds.variable(0x2000, 2).expect("it is there").clone();
+        (
+            variable.default,
+            variable.value,
+            reading.findings.iter().map(|finding| finding.what.clone()).collect::<Vec<_>>(),
+        )
+    };
+    assert_eq!(second(object), (plain(7), None, vec![]));
+    let dcf = format!("{object}[DeviceComissioning]\nNodeID=5\n");
+    assert_eq!(second(&dcf), (plain(1), plain(7), vec![]));
+    let beyond = vec!["the value lies outside of the limits".to_owned()];
+    assert_eq!(second(&dcf.replace("2=7", "2=10")), (plain(1), plain(10), beyond));
+}
+
+#[test]
 fn domains_reals_strings_and_times_keep_their_values() {
     let value = |data_type: &str, text: &str| {
         let reading = of_2000(&format!("ParameterName=P\nDataType={data_type}\nAccessType=rw\nDefaultValue={text}\n"));
