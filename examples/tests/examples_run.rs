@@ -4,6 +4,8 @@
 mod embed_in_your_test;
 #[path = "../hello_drive.rs"]
 mod hello_drive;
+#[path = "../stream_positions.rs"]
+mod stream_positions;
 #[path = "../two_drives.rs"]
 mod two_drives;
 
@@ -20,4 +22,9 @@ fn embed_in_your_test_runs() {
 #[test]
 fn two_drives_runs() {
     two_drives::main().unwrap();
+}
+
+#[test]
+fn stream_positions_runs() {
+    stream_positions::main().unwrap();
 }

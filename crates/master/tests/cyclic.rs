@@ -7,17 +7,21 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use can::{Bitrate, Frame, Instant, Station};
+use canopen::NmtCommand;
+use canopen::pdo::{Direction, MappingRecord, PdoId, PdoNumber};
 use cia402::{ModeOfOperation, PowerState};
 use devices::model;
 use drives::mjoint::Model;
-use master::core::{CycleLoss, Event};
+use master::core::{CycleLoss, Event, PdoMap};
 use master::cyclic::{CyclicDrive, CyclicError, CyclicOptions, CyclicState, Demand, Refusal};
-use master::drive::SwitchedOff;
+use master::drive::{MotionOptions, SwitchedOff};
+use master::pdo::{PdoConfig, TimerUnits, TransmissionType};
 use master::units::{Amperes, Angle, Rpm, Turns};
 use master::{Drive, Error, Network, NoCycle};
 use sim::machine::{mjoint, zlac8030l, zlim42c};
 use sim::{StationId, World, block_on};
-use support::{mux, node};
+use support::toy::Toy;
+use support::{Bus, mux, node};
 
 const JOINT: u8 = 1;
 const STEPPER: u8 = 2;
@@ -395,4 +399,76 @@ fn what_is_not_mapped_or_no_mode_of_set_points_is_told_before_anything_moves() {
     assert!(matches!(error.unwrap().unwrap_err(), CyclicError::NoSetPoint { .. }));
     let error = block_on(&mut bench.world, joint.cyclic(TQ, options)).unwrap().unwrap_err();
     assert!(matches!(error, CyclicError::Drive(Error::NoSuchMode { .. })), "{error}");
+}
+
+/// A motion of each kind, watched to its end; where the shaft is, and how often the drive was asked by SDO meanwhile.
+fn intents(bench: &mut Bench) -> (Vec<i64>, u32) {
+    let drive = bench.drive(SERVO);
+    let before = bench.sdo_requests();
+    let options = MotionOptions { speed: Some(Rpm(60.0)), ..MotionOptions::default() };
+    let mut places = Vec::new();
+    block_on(&mut bench.world, async {
+        drive.move_absolute(Turns(1.0), options).await?;
+        places.push(drive.state().await?.position.unwrap().0);
+        drive.velocity(Rpm(60.0), MotionOptions::default()).await?;
+        drive.supervise(Duration::from_secs(2)).await?;
+        drive.stop().await?;
+        drive.move_absolute(Turns(0.0), options).await?;
+        places.push(drive.state().await?.position.unwrap().0);
+        drive.disable().await
+    })
+    .unwrap()
+    .unwrap();
+    (places, bench.sdo_requests() - before)
+}
+
+#[test]
+fn intents_read_what_is_mapped_from_the_process_data_and_do_the_same() {
+    let mut by_sdo = Bench::new();
+    let (places, asked) = intents(&mut by_sdo);
+    let mut by_pdo = Bench::new();
+    let drive = by_pdo.drive(SERVO);
+    block_on(&mut by_pdo.world, async {
+        drive.configure_cyclic(PV).await?;
+        let pdo = PdoId { direction: Direction::Tpdo, number: PdoNumber::new(2).unwrap() };
+        let position = PdoConfig::new(pdo, PdoMap(vec![MappingRecord::from_raw(0x6064_0020)]));
+        let units = TimerUnits { inhibit: Duration::from_micros(500), event: Duration::from_micros(500) };
+        drive.node().configure_pdo(&position.transmission(TransmissionType::EVERY_SYNC), units).await?;
+        Ok::<_, CyclicError>(())
+    })
+    .unwrap()
+    .unwrap();
+    by_pdo.network.nmt_all(NmtCommand::Start);
+    by_pdo.network.sync(Some(PERIOD));
+    let (places_by_pdo, asked_by_pdo) = intents(&mut by_pdo);
+    for ((at, wanted), at_by_pdo) in places.iter().zip([4096_i64, 0]).zip(&places_by_pdo) {
+        assert!((at - wanted).abs() <= 41 && (at_by_pdo - wanted).abs() <= 41, "{at} and {at_by_pdo} of {wanted}");
+    }
+    // 2 s are supervised, and about 4 s watched, with a look each 10 ms: two questions a look become one each 100 ms.
+    assert!(asked > 1000 && asked_by_pdo * 5 < asked, "{asked} before, {asked_by_pdo} with process data");
+}
+
+#[test]
+fn a_value_that_was_sent_before_the_drive_was_told_something_is_not_believed() {
+    let mut toy = Toy::new(4).u16(0x6041, 0, 0x0231).u16(0x6040, 0, 0);
+    toy = toy.u8(0x6061, 0, 0);
+    let mut bus = Bus::new(vec![toy]);
+    let network = bus.network.clone();
+    let drive = Drive::new(network.node(node(4)), model("zlim42c").unwrap());
+    let map = PdoMap(vec![MappingRecord::from_raw(0x6041_0010)]);
+    network.with_core(|core| core.image_mut().set_tpdo(node(4), PdoNumber::FIRST, 0x184, map));
+    bus.toys[0].send(0x180, &[0x37, 0x02]);
+    bus.settle();
+    // Just come: believed, and nobody is asked.
+    assert_eq!(bus.block_on(drive.statusword()).unwrap().0, 0x0237);
+    assert!(bus.toys[0].requests.is_empty());
+    // Told something since: asked.
+    bus.block_on(drive.node().write(mux(0x6040, 0), 6_u16)).unwrap();
+    assert_eq!(bus.block_on(drive.statusword()).unwrap().0, 0x0231);
+    // Come again, and believed until it is as old as a poll.
+    bus.toys[0].send(0x180, &[0x37, 0x02]);
+    bus.settle();
+    assert_eq!(bus.block_on(drive.statusword()).unwrap().0, 0x0237);
+    bus.block_on(network.sleep(Duration::from_millis(10)));
+    assert_eq!(bus.block_on(drive.statusword()).unwrap().0, 0x0231);
 }

@@ -46,6 +46,7 @@ struct Active {
 pub(super) struct Ended {
     pub(super) ticket: Ticket,
     pub(super) mux: Mux,
+    pub(super) downloads: bool,
     pub(super) outcome: Outcome,
 }
 
@@ -161,7 +162,7 @@ impl Channel {
 
     fn end(&mut self, outcome: Outcome) {
         if let Some(active) = self.active.take() {
-            self.ended = Some(Ended { ticket: active.ticket, mux: active.mux, outcome });
+            self.ended = Some(Ended { ticket: active.ticket, mux: active.mux, downloads: !active.uploads, outcome });
         }
     }
 

@@ -26,6 +26,10 @@ pub struct NodeFacts {
     pub heartbeat_watch: Option<HeartbeatWatch>,
     /// SDO requests in a row that it has not answered.
     pub unanswered: u32,
+    /// When the last frame for it alone left this master: an SDO request or an RPDO.
+    pub talked_to_at: Option<Instant>,
+    /// When it was last told something: an SDO download had ended, or an RPDO left. What it sent before tells nothing of that.
+    pub told_at: Option<Instant>,
     emcys: VecDeque<(Instant, Emcy)>,
 }
 

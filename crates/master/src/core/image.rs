@@ -166,6 +166,12 @@ impl Image {
         values.max_by_key(|received| received.at)
     }
 
+    /// As [`value`](Self::value), of an object that is mapped with this length.
+    pub fn value_of_length(&self, node: NodeId, mux: Mux, bits: u32) -> Option<Received> {
+        let mapped = self.find_signals(node, mux).map(|(_, place)| place).filter(|place| place.bits() == bits);
+        mapped.filter_map(|place| self.at(place)).max_by_key(|received| received.at)
+    }
+
     /// The mapping under which a node's TPDO is received.
     pub fn tpdo_map(&self, node: NodeId, number: PdoNumber) -> Option<&PdoMap> {
         self.tpdo(node, number).map(|pdo| &pdo.map)
@@ -313,10 +319,11 @@ impl Image {
         }
     }
 
-    pub(super) fn poll_transmit(&mut self) -> Option<Frame> {
+    /// The next RPDO to send, and whose it is.
+    pub(super) fn poll_transmit(&mut self) -> Option<(NodeId, Frame)> {
         let pdo = self.rpdos.get_mut(usize::from(self.pending.pop_front()?))?;
         pdo.state = SendState::Idle;
-        Some(Frame::new(pdo.id?, &pdo.data.to_le_bytes()[..pdo.bytes]))
+        Some((pdo.node, Frame::new(pdo.id?, &pdo.data.to_le_bytes()[..pdo.bytes])))
     }
 
     fn index(&mut self) {
@@ -373,7 +380,7 @@ mod tests {
         assert!(image.write(node(4), MODE.mux, 3));
         assert!(image.write(node(4), STATUSWORD.mux, 0x1_000F));
         assert!(!image.write(node(4), POSITION.mux, 1));
-        assert_eq!(image.poll_transmit().unwrap().to_string(), "204#0F0003");
+        assert_eq!(image.poll_transmit().unwrap().1.to_string(), "204#0F0003");
         assert_eq!(image.poll_transmit(), None);
     }
 
@@ -384,7 +391,7 @@ mod tests {
         image.write(node(4), POSITION.mux, 7);
         assert_eq!(image.poll_transmit(), None);
         image.release_waiting();
-        assert_eq!(image.poll_transmit().unwrap().to_string(), "304#07000000");
+        assert_eq!(image.poll_transmit().unwrap().1.to_string(), "304#07000000");
         image.release_waiting();
         assert_eq!(image.poll_transmit(), None);
     }

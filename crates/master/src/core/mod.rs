@@ -236,6 +236,9 @@ impl Core {
         let now = self.now;
         while let Some(ended) = self.member_mut(node).channel.poll_finished() {
             self.note_outcome(node, ended.mux, &ended.outcome);
+            if ended.downloads {
+                self.member_mut(node).facts.told_at = Some(now);
+            }
             if ended.ticket != FEED {
                 self.finished.push_back(Finished { ticket: ended.ticket, outcome: ended.outcome });
             }
@@ -283,6 +286,8 @@ impl Core {
             match self.member_mut(node).channel.poll_transmit() {
                 Some(frame) => {
                     self.presence.note_sent(node, self.now);
+                    let now = self.now;
+                    self.member_mut(node).facts.talked_to_at = Some(now);
                     return Some(frame);
                 }
                 None => self.sending.remove(node),
@@ -362,7 +367,7 @@ impl Station for Core {
             .pop_front()
             .or_else(|| self.sync.poll_transmit())
             .or_else(|| self.presence.poll_transmit())
-            .or_else(|| self.image.poll_transmit())
+            .or_else(|| self.poll_rpdo())
             .or_else(|| self.poll_sdo())
     }
 

@@ -1,5 +1,6 @@
 use std::time::Duration;
 
+use can::Frame;
 use canopen::{Mux, NodeId};
 
 use super::Core;
@@ -111,6 +112,14 @@ impl Core {
         let transfer = Transfer::Download(Payload::new(&value.to_le_bytes()));
         self.start_request(FEED, Request { node, mux, transfer, timeout: POST_TIMEOUT });
         self.find_due();
+    }
+
+    pub(super) fn poll_rpdo(&mut self) -> Option<Frame> {
+        let (node, frame) = self.image.poll_transmit()?;
+        let now = self.now;
+        let facts = &mut self.member_mut(node).facts;
+        (facts.talked_to_at, facts.told_at) = (Some(now), Some(now));
+        Some(frame)
     }
 
     /// Time may have brought a cycle, or the end of the patience for one.

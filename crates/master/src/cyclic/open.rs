@@ -16,11 +16,11 @@ use crate::pdo::{PdoConfig, PdoError, SignalError, TimerUnits, TransmissionType}
 /// The interpolation data record (CiA 402-2, 12.3).
 const INTERPOLATION_DATA: Mux = Mux::new(0x60C1, 1);
 
-/// The TPDO that gets what does not fit into the first.
-const SECOND: PdoNumber = match PdoNumber::new(2) {
-    Some(number) => number,
-    None => PdoNumber::FIRST,
-};
+/// Highest velocity of profiles, in the units of the target velocity (CiA 402-2, 10.3).
+const MAX_PROFILE_VELOCITY: Mux = Mux::new(0x607F, 0);
+
+/// Highest speed of the motor, in r/min (CiA 402-2, 10.3).
+const MAX_MOTOR_SPEED: Mux = Mux::new(0x6080, 0);
 
 const INTENT: &str = "move it cycle by cycle";
 
@@ -160,8 +160,10 @@ impl Drive {
         Ok(drive)
     }
 
-    /// Maps what the mode needs: RPDO1 gets the controlword and the set-point; TPDO1 the statusword, the position and, where
-    /// it fits, the current; TPDO2 the speed; all with each SYNC. A model with a fixed mapping is left as it is.
+    /// Maps what the mode needs, to be sent with each SYNC: RPDO1 gets the controlword and the set-point; TPDO1 the statusword
+    /// and the position, or in other modes the speed and the current. A second axis gets RPDO2 and TPDO2. All other TPDOs are
+    /// switched off until they are set up again: they would take the room that each cycle needs. A model with a fixed mapping
+    /// is left as it is.
     ///
     /// # Errors
     /// [`CyclicError`].
@@ -189,20 +191,26 @@ impl Drive {
             }
             map
         };
-        let current = axis.units.actual_current.map(|quantity| quantity.object);
-        let velocity = axis.units.actual_velocity.map(|quantity| quantity.object);
-        let pdos = [
-            (Direction::Rpdo, PdoNumber::FIRST, map(&[Some(axis.object(CONTROLWORD)), Some(target)])),
-            (
-                Direction::Tpdo,
-                PdoNumber::FIRST,
-                map(&[Some(axis.object(STATUSWORD)), Some(axis.object(POSITION_ACTUAL)), current]),
-            ),
-            (Direction::Tpdo, SECOND, map(&[velocity])),
-        ];
-        for (direction, number, map) in pdos {
+        let quantities = [axis.units.actual_velocity, axis.units.actual_current];
+        let [velocity, current] = quantities.map(|quantity| quantity.map(|quantity| quantity.object));
+        let statusword = Some(axis.object(STATUSWORD));
+        let state = match set_point_of(profile, axis, mode) {
+            Some(SetPointKind::Position(_)) => map(&[statusword, Some(axis.object(POSITION_ACTUAL))]),
+            _ => map(&[statusword, velocity, current]),
+        };
+        let command = map(&[Some(axis.object(CONTROLWORD)), Some(target)]);
+        // A PDO of its own for each axis.
+        let number = PdoNumber::at(usize::from(self.axis_id().0)).unwrap_or(PdoNumber::FIRST);
+        for (direction, map) in [(Direction::Rpdo, command), (Direction::Tpdo, state)] {
             let config = PdoConfig::new(PdoId { direction, number }, map).transmission(TransmissionType::EVERY_SYNC);
             self.node().configure_pdo(&config, timer_units(profile)).await?;
+        }
+        for config in self.adopt_pdos(profile).await?.tpdos {
+            let number = config.pdo.number;
+            let known = self.node().network().look(|core| core.image().tpdo_id(node, number).is_some());
+            if known && number.position() >= profile.axes.len() && !config.map.0.is_empty() {
+                self.node().switch_pdo_off(config.pdo).await?;
+            }
         }
         Ok(())
     }
@@ -248,8 +256,7 @@ impl Drive {
         let (number, set_point) = self.node().scaled_set_point(object, NumberForm::Signed, 1.0)?;
         let counts_per_turn = self.counts_per_turn().await?;
         let velocity = self.has(axis.units.target_velocity, "a target velocity")?;
-        let speed = Bound::from(self.limits(velocity.object).await?);
-        let rpm = speed.high as f64 * self.step_of(velocity).await?;
+        let (rpm, speed) = self.highest_speed(axis, velocity).await?;
         let kind = Kind::Position {
             actual: self.node().signal(axis.object(POSITION_ACTUAL))?,
             counts_per_turn,
@@ -258,6 +265,28 @@ impl Drive {
         };
         let held = self.read_number(axis.object(POSITION_ACTUAL)).await?;
         Ok((number, Target { set_point, limits: self.limits(object).await?, kind, held }))
+    }
+
+    /// The highest speed that the drive follows, and the object that says so: the target velocity's own limits, and those of
+    /// profiles (607Fh) and of the motor (6080h, in r/min) where the model has them.
+    async fn highest_speed(&self, axis: &AxisDescription, velocity: Quantity) -> Result<(f64, Bound), Error> {
+        let step = self.step_of(velocity).await?;
+        let own = Bound::from(self.limits(velocity.object).await?);
+        let mut least = (own.high as f64 * step, own);
+        for (object, step) in [(MAX_PROFILE_VELOCITY, step), (MAX_MOTOR_SPEED, 1.0)] {
+            let object = axis.object(object);
+            if self.known(INTENT)?.row(object).is_none() {
+                continue;
+            }
+            let bound = Bound::from(self.limits(object).await?);
+            let value = self.read_number(object).await?;
+            let rpm = value as f64 * step;
+            // 0 is no limit that anything could move within.
+            if value > 0 && rpm < least.0 {
+                least = (rpm, Bound { high: value, ..bound });
+            }
+        }
+        Ok(least)
     }
 
     /// The TPDO with the statusword that comes by itself, the one of the set-point's number first; and in how many cycles it

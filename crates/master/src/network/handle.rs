@@ -238,11 +238,13 @@ impl Network {
             shared.core.execute(command, now);
         }
         call(&mut shared.core);
-        let mut woken = shared.collect();
-        drop(shared);
-        if woken.is_empty() {
+        shared.collect();
+        if shared.woken.is_empty() {
             return;
         }
+        // Woken after the lock; the room goes back for the next call.
+        let mut woken = core::mem::take(&mut shared.woken);
+        drop(shared);
         woken.drain(..).for_each(Waker::wake);
         self.lock().woken = woken;
     }
@@ -254,25 +256,23 @@ impl Network {
 }
 
 impl Shared {
-    /// Hands outcomes to their slots. The wakers are for after the lock.
-    fn collect(&mut self) -> Vec<Waker> {
-        let mut wakers = core::mem::take(&mut self.woken);
+    /// Hands outcomes to their slots, and collects the wakers of whoever waited.
+    fn collect(&mut self) {
         while let Some(finished) = self.core.poll_finished() {
             // No slot: the future has been dropped.
             let Some(slot) = self.slots.get_mut(&finished.ticket) else { continue };
             if let Slot::Waiting(waker) = core::mem::replace(slot, Slot::Done(finished.outcome)) {
-                wakers.push(waker);
+                self.woken.push(waker);
             }
         }
         let changed = self.core.take_changed();
         if !changed.is_empty() {
             let due = self.watchers.extract_if(.., |watcher| changed.contains(watcher.node));
-            wakers.extend(due.map(|watcher| watcher.waker));
+            self.woken.extend(due.map(|watcher| watcher.waker));
         }
         if self.core.take_cycle_change() {
-            wakers.extend(self.cycle_waiters.drain(..).map(|waiter| waiter.waker));
+            self.woken.extend(self.cycle_waiters.drain(..).map(|waiter| waiter.waker));
         }
-        wakers
     }
 
     /// True if SYNC has been asked for and the runner has not come since.

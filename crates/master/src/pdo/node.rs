@@ -1,6 +1,6 @@
 //! What a node offers of its PDOs: setting them up, reading how they are set up, sending one.
 
-use canopen::{CobId, Mux};
+use canopen::{AbortCode, CobId, Mux};
 
 use super::config::{PdoConfig, TimerUnits};
 use super::error::PdoError;
@@ -30,6 +30,25 @@ impl Node {
         let (config, cob_id) = read(self, pdo, units).await?;
         self.use_pdo(&config, cob_id);
         Ok(config)
+    }
+
+    /// Switches a PDO of the device off (bit 31 of its COB-ID), and sends or receives it no longer. A device that does not let
+    /// its COB-ID be written goes on with it.
+    ///
+    /// # Errors
+    /// Those of the SDO requests.
+    pub async fn switch_pdo_off(&self, pdo: PdoId) -> Result<(), Error> {
+        let object = Mux::new(pdo.parameter_index(), 1);
+        let cob_id: u32 = self.read(object).await?;
+        match self.write(object, cob_id | CobId::INVALID).await {
+            Err(Error::Aborted { code: AbortCode::READ_ONLY, .. }) => return Ok(()),
+            other => other?,
+        }
+        self.network().with_core(|core| match pdo.direction {
+            Direction::Tpdo => core.image_mut().remove_tpdo(self.id(), pdo.number),
+            Direction::Rpdo => core.image_mut().remove_rpdo(self.id(), pdo.number),
+        });
+        Ok(())
     }
 
     fn use_pdo(&self, config: &PdoConfig, cob_id: CobId) {

@@ -4,9 +4,14 @@
 use std::f64::consts::TAU;
 use std::time::Duration;
 
-use can::{CanId, Frame, Instant};
+use can::Instant;
+use canopen::NodeId;
+use cia402::ModeOfOperation;
 use drives::Firmware;
 use drives::mjoint::MJoint;
+use master::cyclic::{CyclicDrive, CyclicOptions, Demand, Refusal};
+use master::units::Angle;
+use master::{Drive, Network, join_all};
 
 use crate::bench::{Bench, Start};
 use crate::datagram::frame;
@@ -17,8 +22,8 @@ use crate::plot::EventKind;
 /// "The above procedure is performed every 2 ms".
 const CYCLE: Duration = Duration::from_millis(2);
 
-/// From RPDO4 to SYNC: three positions and three answers take 0.6 ms at 1 Mbit/s.
-const BEFORE_SYNC: Duration = Duration::from_micros(1_500);
+/// Longest time that opening the joints, or waiting for a SYNC, may take.
+const LIMIT: Duration = Duration::from_secs(5);
 
 /// How far a shaft turns until it counts as started.
 const STARTED_COUNTS: f64 = 2.0;
@@ -144,44 +149,86 @@ fn watch(bench: &mut Bench, setting: &'static str) -> Start {
     Start { setting, started_counts: STARTED_COUNTS, axes }
 }
 
-/// A path of 2 s, point by point; all axes come back to 0 at its end.
+/// A path of 2 s, point by point, by the master's process data; all axes come back to 0 at its end.
 fn path(bench: &mut Bench) {
     bench.step("1000 cycles of RPDO4 to three joints and SYNC");
     bench.mark("path", EventKind::Note);
     let cycles = (PATH_S / CYCLE.as_secs_f64()) as u32;
-    let (mut slowest_ms, mut farthest) = (0f64, 0f64);
-    let mut asked = [0f64; 3];
-    for cycle in 1..=cycles {
-        let begin = bench.now();
-        // Where the last SYNC sent them, they are by now.
-        for (node, asked) in NODES.into_iter().zip(asked) {
-            if cycle > 1 {
-                farthest = farthest.max((bench.report_of(node).position as f64 - asked).abs());
-            }
+    match lead(bench, cycles) {
+        Ok((slowest_ms, farthest)) => {
+            bench.asked("50n#pppppppp, 080#");
+            bench.answered_with("48n#ppppppppssss");
+            bench.expect("all answered within", Expect::AtMost(2.0), "ms", slowest_ms);
+            // Two cycles at the path's largest speed: one is the interpolation, the loops may take another.
+            let (turns, hz) = SWINGS[0];
+            let most = turns * TAU / 2.0 * hz * COUNTS_PER_TURN * 2.0 * CYCLE.as_secs_f64();
+            bench.expect("off the path", Expect::AtMost(most.round()), "counts", farthest);
         }
-        let time_s = f64::from(cycle) * CYCLE.as_secs_f64();
-        for ((node, swing), asked) in NODES.into_iter().zip(SWINGS).zip(&mut asked) {
-            *asked = (place_turns(swing, time_s) * COUNTS_PER_TURN).round();
-            let id = CanId::standard(0x500 + u16::from(node));
-            bench.transmit(Frame::new(id, &(*asked as i32).to_le_bytes()));
-        }
-        bench.run_silently(BEFORE_SYNC);
-        slowest_ms = slowest_ms.max(answered_after_ms(bench, begin));
-        bench.transmit(frame("80"));
-        bench.run_silently(CYCLE.saturating_sub(BEFORE_SYNC));
+        Err(trouble) => bench.compare("a path to its end", trouble, false),
     }
-    bench.asked("50n#pppppppp, 080#");
-    bench.answered_with("48n#ppppppppssss");
-    bench.expect("all answered within", Expect::AtMost(2.0), "ms", slowest_ms);
-    // Two cycles at the path's largest speed: one is the interpolation, the loops may take another.
-    let (turns, hz) = SWINGS[0];
-    let most = turns * TAU / 2.0 * hz * COUNTS_PER_TURN * 2.0 * CYCLE.as_secs_f64();
-    bench.expect("off the path", Expect::AtMost(most.round()), "counts", farthest);
     bench.run_ms(100);
     for node in NODES {
         bench.talk_to(node);
         bench.expect_object(0x6064, 0, Expect::Near(0.0, IN_PLACE_COUNTS), "counts");
     }
+}
+
+/// Gives each joint a point of its path in each cycle: the longest time to the last answer in ms, and how far a joint was
+/// from where it had been sent, in counts.
+fn lead(bench: &mut Bench, cycles: u32) -> Result<(f64, f64), String> {
+    let network = Network::new();
+    bench.world().add_station(network.clone());
+    let joint = bench.model();
+    let nodes = NODES.map(|node| network.node(NodeId::new(node).unwrap_or(NodeId::MIN)));
+    let open = join_all(nodes.map(|node| async move {
+        Drive::new(node, joint).cyclic(ModeOfOperation::INTERPOLATED_POSITION, CyclicOptions::default()).await
+    }));
+    let opened = sim::block_on_for(bench.world(), LIMIT, open).map_err(|error| error.to_string())?;
+    let opened: Result<Vec<_>, _> = opened.into_iter().collect();
+    let mut joints = opened.map_err(|error| error.to_string())?;
+    network.sync(Some(CYCLE));
+    // In the first cycle no joint has answered yet.
+    for _ in 0..3 {
+        next_cycle(bench, &network)?;
+        step(&network, &mut joints, [Demand::Hold; 3]);
+    }
+    let (mut slowest_ms, mut farthest) = (0f64, 0f64);
+    // What was asked for in the last two cycles: a SYNC leads there, the next one finds it reached.
+    let mut asked: [Option<[f64; 3]>; 2] = [None; 2];
+    let mut begin = None;
+    for cycle in 0..=cycles {
+        let next = next_cycle(bench, &network)?;
+        if let Some(begin) = begin.replace(next) {
+            slowest_ms = slowest_ms.max(answered_after_ms(bench, begin));
+        }
+        for (node, there) in NODES.into_iter().zip(asked[0].into_iter().flatten()) {
+            farthest = farthest.max((bench.report_of(node).position as f64 - there).abs());
+        }
+        let time_s = f64::from(cycle) * CYCLE.as_secs_f64();
+        let points = SWINGS.map(|swing| (place_turns(swing, time_s) * COUNTS_PER_TURN).round());
+        let demands = points.map(|point| Demand::Position(Angle::Counts(point as i64)));
+        if let Some(refusal) = step(&network, &mut joints, demands) {
+            return Err(refusal.to_string());
+        }
+        asked = [asked[1], Some(points)];
+    }
+    network.sync(None);
+    Ok((slowest_ms, farthest))
+}
+
+/// When the next cycle begins.
+fn next_cycle(bench: &mut Bench, network: &Network) -> Result<Instant, String> {
+    let next = sim::block_on_for(bench.world(), LIMIT, network.next_sync()).map_err(|error| error.to_string())?;
+    bench.run_silently(Duration::ZERO);
+    next.map(|cycle| cycle.at).map_err(|error| error.to_string())
+}
+
+/// One step of each joint; the first refusal.
+fn step(network: &Network, joints: &mut [CyclicDrive], demands: [Demand; 3]) -> Option<Refusal> {
+    network.exchange(|io| {
+        let steps = joints.iter_mut().zip(demands);
+        steps.fold(None, |refusal, (joint, demand)| refusal.or(joint.step(io, demand).refused))
+    })
 }
 
 /// A swing from 0 and back, at rest at both ends.
