@@ -65,7 +65,8 @@ impl Context {
         let of_machine = global.machine.iter().filter(|_| embedded.is_none()).flat_map(Machine::models);
         let by_user = of_machine.chain(global.models.iter().copied()).map(|(node, model)| (node, Told::ByUser(model)));
         let by_bus = embedded.unwrap_or_default().iter().map(|(node, model)| (*node, Told::ByBus(model)));
-        let models = by_bus.chain(by_user).collect();
+        let models: BTreeMap<_, _> = by_bus.chain(by_user).collect();
+        network.set_models(models::with_told(models.values().map(|told| told.profile())));
         Self { network, progress, timeout: global.timeout, models, json: global.json, embedded: embedded.is_some() }
     }
 

@@ -24,7 +24,7 @@ pub(crate) struct Global {
     #[arg(long, global = true)]
     pub(crate) json: bool,
 
-    /// Which model a node is, where its identity cannot tell (e.g. 4=zlac8030l); may be repeated
+    /// Which model a node is, where its identity cannot tell (e.g. 4=zlac8030l, 5=FILE.eds); may be repeated
     #[arg(long = "model", value_name = "NODE=MODEL", value_parser = node_model, global = true)]
     pub(crate) models: Vec<(NodeId, &'static Description)>,
 

@@ -6,6 +6,7 @@
 mod args;
 mod command;
 mod context;
+mod data_sheet;
 mod decode;
 mod embedded;
 mod failure;

@@ -1,14 +1,13 @@
 //! The devices that Ferrodrive knows, as the command line names them.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 use canopen::NodeId;
-use eds::document::Bounds;
-use eds::{Eds, keep};
+use eds::keep;
+use master::Models;
 use sim::machine::models;
 
+use crate::data_sheet::{self, Unread};
 use crate::parse::suggest::{did_you_mean, near};
 use crate::plain::plain;
 
@@ -35,13 +34,21 @@ fn is_file(text: &str) -> bool {
 /// The device that a file describes.
 fn described(path: &Path) -> Result<&'static Description, String> {
     let shown = plain(&path.display().to_string());
-    let cannot = |error: std::io::Error| format!("cannot read {shown}: {error}");
-    let mut bytes = Vec::new();
-    let most = Bounds::DEFAULT.bytes as u64 + 1;
-    File::open(path).map_err(cannot)?.take(most).read_to_end(&mut bytes).map_err(cannot)?;
-    let reading = Eds::load(&bytes)
-        .map_err(|refusal| format!("{shown}, line {}: {}; {}", refusal.line, refusal.reason, refusal.next))?;
+    let reading = data_sheet::reading(path).map_err(|unread| match unread {
+        Unread::File(error) => format!("cannot read {shown}: {error}"),
+        Unread::Refused(refusal) => format!("{shown}, line {}: {}; {}", refusal.line, refusal.reason, refusal.next),
+    })?;
     keep(&reading.eds).map_err(|error| format!("{shown}: {error}"))
+}
+
+/// True for a device that a data sheet describes: what one count of an object is worth, no data sheet says.
+pub(crate) fn is_from_file(model: &Description) -> bool {
+    !models().any(|known| core::ptr::eq(known, model))
+}
+
+/// The models known, and those told that are not among them.
+pub(crate) fn with_told(told: impl Iterator<Item = &'static Description>) -> Models {
+    told.filter(|model| is_from_file(model)).fold(Models::default(), |known, model| known.with(model))
 }
 
 /// The drives on the embedded virtual bus and their node-IDs: one of each kind that is delivered with a node-ID, at that

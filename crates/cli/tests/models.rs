@@ -176,3 +176,40 @@ fn signed_values_are_signed_whether_the_model_is_said_or_not() {
         assert_eq!(bench.json(&["read", node, "607A"])["value"], -5000, "node {node}");
     }
 }
+
+/// A data sheet of the servo by somebody who calls its bus voltage otherwise.
+const SHEET: &str = "[FileInfo]\nFileName=wheel.eds\n[DeviceInfo]\nVendorName=Somebody\nProductName=Wheel\n\
+    VendorNumber=0x100\nProductNumber=1\nRevisionNumber=0\n\
+    [MandatoryObjects]\nSupportedObjects=1\n1=0x1000\n\
+    [OptionalObjects]\nSupportedObjects=2\n1=0x6040\n2=0x6041\n\
+    [ManufacturerObjects]\nSupportedObjects=1\n1=0x2029\n\
+    [1000]\nParameterName=Device type\nObjectType=7\nDataType=7\nAccessType=ro\nDefaultValue=0x40192\n\
+    [2029]\nParameterName=Rail voltage\nObjectType=7\nDataType=6\nAccessType=ro\n\
+    [6040]\nParameterName=Controlword\nObjectType=7\nDataType=6\nAccessType=rw\n\
+    [6041]\nParameterName=Statusword\nObjectType=7\nDataType=6\nAccessType=ro\n";
+
+#[test]
+fn a_data_sheet_stands_for_a_model_wherever_one_is_asked_for() {
+    let folder = scratch("data_sheet");
+    let sheet = folder.join("wheel.eds");
+    std::fs::write(&sheet, SHEET).unwrap();
+    let sheet = sheet.to_str().unwrap();
+    let listed = done(&["--json", "objects", sheet]).json();
+    assert_eq!((&listed["model"], listed["objects"].as_array().unwrap().len()), (&json!("wheel"), 4));
+
+    let bench = bench();
+    let told = format!("4={sheet}");
+    let read = bench.json(&["--model", &told, "read", "4", "rail_voltage"]);
+    assert_eq!((&read["object"], &read["value"]), (&json!("2029h:00"), &json!(4800)));
+    let found = bench.json(&["--model", &told, "scan"]);
+    let four = found["nodes"].as_array().unwrap().iter().find(|node| node["node"] == 4).cloned().unwrap();
+    assert_eq!((&four["model"], &four["remark"]), (&json!("wheel"), &Value::Null));
+    assert!(four["models"].as_array().unwrap().contains(&json!("wheel")), "{four}");
+    // 1000h of the joint is another one.
+    bench.refused(&["--model", &format!("1={sheet}"), "read", "1", "6041"], &["Somebody Wheel", "device type 20192h"]);
+
+    std::fs::write(sheet, "no data sheet").unwrap();
+    let ended = ferrodrive(&["objects", sheet]);
+    assert_eq!(ended.status, Some(2));
+    assert!(ended.err.contains("wheel.eds"), "{}", ended.err);
+}

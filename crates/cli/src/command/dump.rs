@@ -15,6 +15,7 @@ use transport::{AnyBus, AsyncBus, BusError, BusSpec, WallClock};
 use crate::failure::Failure;
 use crate::global::Global;
 use crate::machine_file::Machine;
+use crate::models::with_told;
 use crate::output::{Format, Report};
 use crate::paint::Paint;
 use crate::session::{bus_failure, exit_on_signal, runtime, virtual_world};
@@ -151,7 +152,7 @@ async fn follow(bus: &mut AnyBus, sink: &mut Sink) -> Result<Option<BusError>, F
 
 impl Sink {
     fn new(global: &Global, format: Format, path: Option<&Path>) -> Result<Self, Failure> {
-        let mut decoder = Decoder::new();
+        let mut decoder = Decoder::knowing(with_told(global.models.iter().map(|(_, model)| *model)));
         let of_machine = global.machine.iter().flat_map(Machine::models);
         for (node, model) in of_machine.chain(global.models.iter().copied()) {
             decoder.set_model(node, model);

@@ -13,6 +13,7 @@ use super::drive::{Motion, StateReport};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::guard::{Guard, GuardArgs, GuardReport};
+use crate::models::is_from_file;
 use crate::output::Report;
 use crate::paint::Paint;
 use crate::parse::node::node;
@@ -249,6 +250,9 @@ pub(super) async fn outcome(
         drive.stop().await?;
     }
     let state = StateReport::read(drive).await?;
+    let from_file = drive.profile().is_some_and(is_from_file);
+    let units =
+        from_file.then(|| "the data sheet does not say what a count is worth: CiA 402's units are assumed".to_owned());
     let (guard, farewell) = guard.end(context, drive, then == Then::GoesOn).await?;
     // What the drive does without its host is the guard's to tell.
     let notes = motion.notes.iter().filter(|note| !matches!(note, Note::HostLoss(_))).map(ToString::to_string);
@@ -263,7 +267,7 @@ pub(super) async fn outcome(
         limits,
         guard,
         state,
-        notes: notes.chain(farewell).collect(),
+        notes: notes.chain(farewell).chain(units).collect(),
     })
 }
 

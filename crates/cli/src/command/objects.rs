@@ -23,8 +23,8 @@ use crate::table::Table;
         ferrodrive objects zlac8030l --departures"
 )]
 pub(crate) struct Objects {
-    /// Model (e.g. zlac8030l) or node-ID
-    #[arg(value_name = "MODEL|NODE", value_parser = whose)]
+    /// Model (e.g. zlac8030l), data sheet (FILE.eds) or node-ID
+    #[arg(value_name = "MODEL|FILE.eds|NODE", value_parser = whose)]
     pub(crate) whose: Whose,
     /// Only objects with this index, or with this word in name, title or meaning
     search: Vec<String>,

@@ -111,6 +111,8 @@ fn contradiction(told: &'static Description, found: &Found) -> Option<String> {
     }
     let guess = found.knowledge.guess()?;
     let evidence = guess.evidence().filter(|_| guess.fitting().all(|model| model.name != told.name))?;
+    // A data sheet that has the object too is not spoken against.
+    let evidence = told.row(evidence).is_none().then_some(evidence)?;
     let fitting = guess.profile().name;
     Some(format!("{said}, but has {evidence} as a {fitting} has: say the right model"))
 }

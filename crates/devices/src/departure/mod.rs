@@ -195,7 +195,9 @@ fn of_homing(axis: &AxisDescription) -> [Option<Departure>; 2] {
     let Some(rules) = axis.homing else { return [None; 2] };
     let (mode, statusword) = (axis.object(Mux::new(0x6060, 0)), axis.object(Mux::new(0x6041, 0)));
     let (attained, failed) = (rules.attained, rules.failed);
-    let standard = [attained.mask, failed.mask].iter().all(|mask| mask & HOMING_BITS == HOMING_BITS);
+    let standard = attained.mask & HOMING_BITS == HOMING_BITS
+        && attained.value & HOMING_BITS == ATTAINED
+        && failed.mask & failed.value & ERROR != 0;
     [
         (rules.start == HomingStart::ModeWrite).then_some(Departure::HomingStartsWithMode(mode)),
         (!standard).then_some(Departure::HomingShownBy { statusword, attained, failed }),
@@ -203,7 +205,9 @@ fn of_homing(axis: &AxisDescription) -> [Option<Departure>; 2] {
 }
 
 /// Homing attained and homing error (CiA 402-2, 12.3).
-const HOMING_BITS: u16 = 1 << 12 | 1 << 13;
+const ATTAINED: u16 = 1 << 12;
+const ERROR: u16 = 1 << 13;
+const HOMING_BITS: u16 = ATTAINED | ERROR;
 
 /// Objects of CiA 402-2 whose unit is not left to the device, with that unit.
 const FIXED_UNITS: [(u16, &str); 4] = [

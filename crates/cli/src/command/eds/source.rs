@@ -1,48 +1,45 @@
 //! Where a data sheet comes from: a file, or a model's description.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
-use eds::document::{Bounds, Document};
-use eds::{Eds, Reading, Refusal, Sheet};
+use eds::document::Document;
+use eds::{Eds, Reading, Sheet};
 
+use crate::data_sheet::{self, Unread};
 use crate::failure::Failure;
 use crate::models::resolve;
 
-/// Reads a file, no more of it than an EDS may have.
+/// Reads a file as it stands.
 pub(crate) fn document(path: &Path) -> Result<Document, Failure> {
-    let cannot = |error: std::io::Error| Failure::new(format!("cannot read {}", path.display())).because(error);
-    let mut bytes = Vec::new();
-    let most = Bounds::DEFAULT.bytes as u64 + 1;
-    File::open(path).map_err(cannot)?.take(most).read_to_end(&mut bytes).map_err(cannot)?;
-    Document::parse(&bytes).map_err(|refusal| refused(path, &refusal))
+    data_sheet::document(path).map_err(|unread| unreadable(path, &unread))
 }
 
 /// Reads a data sheet.
 pub(crate) fn reading(path: &Path) -> Result<Reading, Failure> {
-    Eds::read(&document(path)?).map_err(|refusal| refused(path, &refusal))
+    data_sheet::reading(path).map_err(|unread| unreadable(path, &unread))
 }
 
 /// A data sheet from a file, or that of a model where no file has this name.
 pub(super) fn sheet(name: &str) -> Result<Eds, Failure> {
     let path = Path::new(name);
-    if path.exists() {
+    if path.exists() || path.extension().is_some() {
         return reading(path).map(|reading| reading.eds);
     }
     match resolve(name) {
         Ok(model) => Ok(Sheet::of(model).eds()),
-        Err(unknown) if path.extension().is_none() => {
-            Err(Failure::usage(format!("there is no file {name}")).because(unknown))
-        }
-        Err(_) => reading(path).map(|reading| reading.eds),
+        Err(unknown) => Err(Failure::usage(format!("there is no file {name}")).because(unknown)),
     }
 }
 
-fn refused(path: &Path, refusal: &Refusal) -> Failure {
-    let at = if refusal.line > 0 { format!(", line {}", refusal.line) } else { String::new() };
-    Failure::new(format!("{}{at} is not read as an EDS", path.display()))
-        .of_kind("not_an_eds")
-        .because(&refusal.reason)
-        .next(&refusal.next)
+fn unreadable(path: &Path, unread: &Unread) -> Failure {
+    match unread {
+        Unread::File(error) => Failure::new(format!("cannot read {}", path.display())).because(error),
+        Unread::Refused(refusal) => {
+            let at = if refusal.line > 0 { format!(", line {}", refusal.line) } else { String::new() };
+            Failure::new(format!("{}{at} is not read as an EDS", path.display()))
+                .of_kind("not_an_eds")
+                .because(&refusal.reason)
+                .next(&refusal.next)
+        }
+    }
 }
