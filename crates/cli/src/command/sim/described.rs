@@ -1,13 +1,12 @@
 //! What is said at the start of a device that a file describes: what it is run as, what of it has no effect, and what in the
 //! file makes no sense.
 
-use canopen::od::{DefaultValue, Dictionary, Entry, View};
+use canopen::od::{DefaultValue, Dictionary, Entry};
 use canopen::pdo::{Direction, Mapping, PdoId, PdoNumber};
 use canopen::{Mux, NodeId};
 use devices::Description;
-use drives::node::ROWS;
 use drives::servo::MAX_AXES;
-use sim::machine::{is_built_in, without_effect};
+use sim::machine::{Boxed, is_built_in, without_effect};
 
 /// Profile number of drives in the low half of 1000h.
 const DRIVES: u32 = 402;
@@ -71,15 +70,14 @@ fn beyond_limits(row: &Entry) -> Option<String> {
 
 /// The PDOs whose mapping as delivered is refused, and why.
 fn unmapped(model: &'static Description, node: NodeId) -> Vec<String> {
-    let values = Dictionary::<ROWS>::new(model.dictionary, node);
-    let view = values.view();
+    let values = Dictionary::<Boxed>::new(model.dictionary, node);
     let pdos = [Direction::Rpdo, Direction::Tpdo].into_iter().flat_map(|direction| {
         (0..usize::from(PdoNumber::MAX)).filter_map(PdoNumber::at).map(move |number| PdoId { direction, number })
     });
-    pdos.filter_map(|pdo| refusal(model, &view, pdo).map(|reason| format!("{pdo} ({reason})"))).collect()
+    pdos.filter_map(|pdo| refusal(model, &values, pdo).map(|reason| format!("{pdo} ({reason})"))).collect()
 }
 
-fn refusal(model: &Description, values: &View<'_>, pdo: PdoId) -> Option<String> {
+fn refusal(model: &Description, values: &Dictionary<Boxed>, pdo: PdoId) -> Option<String> {
     model.row(Mux::new(pdo.mapping_index(), 0))?;
     let error = Mapping::read(values, pdo.mapping_index(), pdo.direction, model.pdo.mapping).err()?;
     Some(error.meaning().unwrap_or("it is refused").to_owned())
