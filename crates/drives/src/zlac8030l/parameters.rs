@@ -14,7 +14,7 @@ use crate::engine::actuator::bleeder::BleederLimits;
 use crate::engine::actuator::overload::{OverloadLimits, between};
 use crate::engine::actuator::servo::{ServoGains, ServoLimits, ServoModel};
 use crate::engine::cia402::{ExternalStop, Parameters as AxisParameters, Tolerances};
-use crate::zltech::ProfileObjects;
+use crate::zltech::{Holding, ProfileObjects};
 use devices::variant::Variant;
 
 const PROFILE_OBJECTS: ProfileObjects = ProfileObjects::of(&TABLE);
@@ -48,8 +48,8 @@ pub(super) struct Parameters {
     pub(super) driver_limit_c: f32,
     /// 202F:01.
     pub(super) alarm_pwm: bool,
-    /// The shaft is held while the drive is not enabled.
-    pub(super) locked_when_disabled: bool,
+    /// What is done with a shaft that is not enabled.
+    pub(super) holding: Holding,
 }
 
 impl Parameters {
@@ -71,7 +71,7 @@ impl Parameters {
             motor_limit_c: tenths(values, MOTOR_TEMPERATURE_THRESHOLD),
             driver_limit_c: tenths(values, DRIVER_TEMPERATURE_THRESHOLD),
             alarm_pwm: values.get(ALARM_PWM) == 1,
-            locked_when_disabled: values.get(SHAFT_LOCK_WHEN_DISABLED) == 1,
+            holding: Holding { when_disabled: values.get(SHAFT_LOCK_WHEN_DISABLED) == 1, when_switched_on: false },
         }
     }
 

@@ -11,7 +11,7 @@ use super::{Values, homing};
 use crate::engine::actuator::stepper::{StepperCurrents, StepperGains, StepperModel};
 use crate::engine::axis::{HomingParameters, Ramp, VelocityRamps};
 use crate::engine::cia402::{Parameters as AxisParameters, Tolerances};
-use crate::zltech::ProfileObjects;
+use crate::zltech::{Holding, ProfileObjects};
 use devices::variant::Variant;
 
 const PROFILE_OBJECTS: ProfileObjects = ProfileObjects::of(&TABLE);
@@ -24,8 +24,8 @@ pub(super) struct Parameters {
     /// Pulses/s in one r/min.
     pub(super) pulses_s_per_rpm: f64,
     pub(super) axis: AxisParameters,
-    /// The shaft is held while the drive is not enabled.
-    pub(super) locked_when_disabled: bool,
+    /// What is done with a shaft that is not enabled.
+    pub(super) holding: Holding,
     pub(super) model: StepperModel,
     pub(super) gains: StepperGains,
     pub(super) currents: StepperCurrents,
@@ -42,7 +42,7 @@ impl Parameters {
             pulses_per_turn,
             pulses_s_per_rpm: f64::from(pulses_per_turn) / 60.0,
             axis: axis(values, variant, pulses_per_turn),
-            locked_when_disabled: values.get(SHAFT_LOCK_WHEN_DISABLED) == 1,
+            holding: Holding { when_disabled: values.get(SHAFT_LOCK_WHEN_DISABLED) == 1, when_switched_on: true },
             model: StepperModel {
                 pulses_per_electrical_turn: pulses_per_turn / TEETH as u16,
                 periods_per_command: SUPERVISION_DIVIDER,

@@ -4,8 +4,10 @@
 //! Sources: "ZLAC8030L quick start guide V1.00" and "ZLIM42-C user manual V1.03". What differs stands in the drive's own folder.
 
 mod parameters;
+mod shell;
 mod storage;
 pub(crate) mod terminals;
 
-pub(crate) use parameters::{ProfileObjects, idle_task};
+pub(crate) use parameters::{Holding, ProfileObjects};
+pub(crate) use shell::Shell;
 pub(crate) use storage::{mark_if_saving, register_command};

@@ -1,11 +1,11 @@
 //! The CiA 402 objects that mean the same in both drives, in physical units: speeds in r/min, ramps as times in ms.
 
 use canopen::od::{Dictionary, Object, Storage, Table};
-use cia402::{DisableOperationOption, HaltOption, PowerState, QuickStopOption, ShutdownOption, StopRamp};
+use cia402::{DisableOperationOption, HaltOption, QuickStopOption, ShutdownOption, StopRamp};
 
-use crate::engine::axis::{Control, HomingParameters, MoveLimits, Ramp, Task, VelocityRamps};
+use crate::engine::axis::{HomingParameters, MoveLimits, Ramp, VelocityRamps};
 use crate::engine::cia402::DisableOptions;
-use crate::engine::cia402::{ExternalStop, Parameters as AxisParameters, PowerDrive, Tolerances};
+use crate::engine::cia402::{ExternalStop, Parameters as AxisParameters, Tolerances};
 
 /// Where a drive's table has them.
 pub(crate) struct ProfileObjects {
@@ -74,14 +74,11 @@ impl ProfileObjects {
     }
 }
 
-/// What a shaft does that is not enabled: locked if `locked` says so, and from Switched on if `held` does. An external stop
-/// that is to leave the motor free does so here too.
-pub(crate) fn idle_task(axis: &PowerDrive, external_stop: ExternalStop, locked: bool, held: bool) -> Option<Task> {
-    let freed = axis.is_stopped_externally() && external_stop != ExternalStop::Hold;
-    let holds = match axis.state() {
-        PowerState::NotReadyToSwitchOn | PowerState::FaultReactionActive | PowerState::Fault => false,
-        PowerState::SwitchedOn => locked || held,
-        _ => locked,
-    };
-    (holds && !freed).then_some(Task::Hold { control: Control::Position, ramp: Ramp::NONE })
+/// What is done with a shaft that is not enabled.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Holding {
+    /// It is locked.
+    pub(crate) when_disabled: bool,
+    /// It is held from Switched on.
+    pub(crate) when_switched_on: bool,
 }

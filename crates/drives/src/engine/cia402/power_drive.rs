@@ -97,11 +97,6 @@ impl PowerDrive {
         self.is_live() && self.axis.stop_state() != Some(StopState::Free)
     }
 
-    /// The external stop input is active.
-    pub const fn is_stopped_externally(&self) -> bool {
-        self.external_stop
-    }
-
     /// Self-test has ended well.
     pub fn self_test_done(&mut self) {
         self.power.self_test_done();

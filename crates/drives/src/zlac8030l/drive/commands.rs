@@ -6,7 +6,6 @@ use canopen::od::{Entry, Slot};
 use cia402::{Controlword, ModeOfOperation, PowerState};
 
 use super::Zlac8030l;
-use crate::engine::axis::Demand;
 use crate::engine::device::{self, Application, Device};
 use crate::zlac8030l::faults::row;
 use crate::zlac8030l::objects::effects::{Effect, effect};
@@ -25,7 +24,7 @@ impl Application<Room> for Zlac8030l {
         self.device.restart(restart::node_id(self.dip_address, &stored), restart::bitrate(&stored), now);
         *self = Self { dip_address: self.dip_address, ..Self::over(self.device.clone()) };
         self.select_mode();
-        self.axis.self_test_done();
+        self.shell.axis.self_test_done();
         self.publish_status();
         self.device.boot(now);
     }
@@ -40,7 +39,7 @@ impl Application<Room> for Zlac8030l {
             Effect::Registers => self.registers(raw, now),
             Effect::ClearPosition => self.clear_position(slot, raw),
             Effect::Target => {}
-            Effect::Parameter => self.parameters_changed = true,
+            Effect::Parameter => self.shell.parameters_changed = true,
         }
         matches!(effect, Effect::Command | Effect::SelectMode)
     }
@@ -53,10 +52,10 @@ impl Application<Room> for Zlac8030l {
 
     fn communication_task(&mut self, now: Instant) {
         let timeout_ns = u64::from(self.values().get(COMMUNICATION_OFFLINE_TIME)) * 1_000_000;
-        let armed = self.axis.state() == PowerState::OperationEnabled;
+        let armed = self.shell.axis.state() == PowerState::OperationEnabled;
         let heard = self.device.last_addressed().max(self.last_sync);
         if self.watchdog.poll(armed, heard, timeout_ns, now) {
-            self.axis.on_host_timeout();
+            self.shell.axis.on_host_timeout();
             self.drop_targets();
         }
         self.device.commit();
@@ -78,21 +77,21 @@ impl Zlac8030l {
         // An SDO write was refused for this already; an RPDO can only be ignored.
         let in_range = relative || target.unsigned_abs() <= ABSOLUTE_TARGET_LIMIT.unsigned_abs();
         let taken = if in_range { controlword } else { Controlword(controlword.0 & !Controlword::NEW_SET_POINT) };
-        if self.axis.command(taken, target, &self.parameters.axis) {
+        if self.shell.axis.command(taken, target, &self.parameters.axis) {
             self.reset_faults(now);
         }
     }
 
     /// 6060h.
     fn select_mode(&mut self) {
-        self.axis.request_mode(ModeOfOperation(self.values().get(MODES_OF_OPERATION)));
+        self.shell.axis.request_mode(ModeOfOperation(self.values().get(MODES_OF_OPERATION)));
     }
 
     /// Save or restore. An EEPROM fault ends with the factory settings.
     fn registers(&mut self, command: u32, now: Instant) {
         let about = if self.device.variant().is(MODE_NOT_SAVED) { |row: &Entry| row.stored } else { Entry::is_kept };
         if zltech::register_command(&mut self.device, REGISTER_PARAMETER_SETTING, command, about) {
-            self.parameters_changed = true;
+            self.shell.parameters_changed = true;
             self.select_mode();
             if self.faults.forget(row::EEPROM) {
                 self.reset_faults(now);
@@ -105,11 +104,7 @@ impl Zlac8030l {
         if raw == 1 {
             let position = self.position();
             self.position_offset = self.position_offset.wrapping_sub(position);
-            self.axis.shift_position(position);
-            // What is demanded at this moment stands at the same place of the shaft: no lag comes of it.
-            if let Demand::Position(point) = &mut self.demand {
-                point.position = point.position.wrapping_sub(position);
-            }
+            self.shell.shift_position(position);
             self.device.values_mut().set(POSITION_ACTUAL_VALUE, 0);
         }
         self.device.values_mut().set_raw(slot, 0);

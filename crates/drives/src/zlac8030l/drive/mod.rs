@@ -7,7 +7,7 @@ mod commands;
 
 use can::{Bitrate, Instant};
 use canopen::node::{Node, NodeProfile};
-use cia402::{FaultReactionOption, ModeOfOperation, PowerState};
+use cia402::{ModeOfOperation, PowerState};
 use devices::AxisId;
 use motion::filter::{LowPass, LowPassGains};
 
@@ -25,14 +25,14 @@ use crate::communication::communication;
 use crate::engine::actuator::bleeder::Bleeder;
 use crate::engine::actuator::servo::Servo;
 use crate::engine::axis::{Demand, Feedback};
-use crate::engine::cia402::{PowerDrive, Targets};
+use crate::engine::cia402::Targets;
 use crate::engine::device::{Application, Device};
 use crate::engine::faults::{FaultMonitor, FaultSet};
 use crate::engine::host_watchdog::HostWatchdog;
-use crate::engine::inputs::Inputs;
 use crate::engine::storage::Image;
+use crate::zltech::Shell;
 use crate::zltech::terminals::Conditions;
-use crate::{Firmware, Report, zltech};
+use crate::{Firmware, Report};
 use devices::variant::Variant;
 
 /// How this drive communicates.
@@ -45,29 +45,22 @@ pub struct Zlac8030l {
     device: Device<Room>,
     dip_address: u8,
     parameters: Parameters,
-    parameters_changed: bool,
-    axis: PowerDrive,
+    shell: Shell<2>,
     servo: Servo,
     /// The sensors have been looked at since the restart.
     awake: bool,
-    demand: Demand,
-    targets: Targets,
     /// 60FFh is above 200Ah, and this firmware minds.
     speed_setting_wrong: bool,
     /// What is added to the counts since power-on to give 6064h.
     position_offset: i32,
     faults: FaultMonitor<FAULT_COUNT>,
     protection: Protection,
-    inputs: Inputs<2>,
-    external_stop: bool,
-    outputs: [bool; 2],
     bleeder: Bleeder,
     watchdog: HostWatchdog,
     /// The last SYNC, where that counts as a sign of the host.
     last_sync: Option<Instant>,
     shown_velocity_rpm: LowPass,
     shown_current_a: LowPass,
-    periods: u8,
 }
 
 impl Zlac8030l {
@@ -93,24 +86,17 @@ impl Zlac8030l {
             device,
             dip_address: 0,
             parameters,
-            parameters_changed: false,
-            axis: PowerDrive::new(&[]),
+            shell: Shell::new(),
             awake: false,
-            demand: Demand::Off,
-            targets: Targets::default(),
             speed_setting_wrong: false,
             position_offset: 0,
             faults: FaultMonitor::new(&FAULTS, &DEBOUNCE),
             protection: Protection::default(),
-            inputs: Inputs::default(),
-            external_stop: false,
-            outputs: [false; 2],
             bleeder: Bleeder::default(),
             watchdog: HostWatchdog::default(),
             last_sync: None,
             shown_velocity_rpm: LowPass::default(),
             shown_current_a: LowPass::default(),
-            periods: 0,
         }
     }
 
@@ -121,7 +107,7 @@ impl Zlac8030l {
 
     /// What the control loops are asked for, to look at.
     pub const fn demand(&self) -> &Demand {
-        &self.demand
+        &self.shell.demand
     }
 
     /// The communication side, to look at.
@@ -142,27 +128,27 @@ impl Zlac8030l {
         self.watch_faults(sensors, now);
         self.read_inputs(sensors);
         self.read_targets();
-        self.demand = self.move_axis(feedback);
-        let Parameters { model, gains, limits, .. } = &self.parameters;
-        self.servo.control(model, gains, &self.demand, feedback.position, limits);
+        let Parameters { axis, holding, model, gains, limits, .. } = &self.parameters;
+        self.shell.demand = self.shell.move_axis(feedback, axis, *holding, f64::from(SUPERVISION_PERIOD_S));
+        self.servo.control(model, gains, &self.shell.demand, feedback.position, limits);
         self.publish(sensors);
     }
 
     /// Takes over changed parameters. Sensor and direction changes wait until the motor is free: they would turn
     /// position and angle over under the loops.
     fn refresh_parameters(&mut self) {
-        if !self.parameters_changed {
+        if !self.shell.parameters_changed {
             return;
         }
         let mut parameters = Parameters::of(self.device.values(), self.device.variant());
-        if self.demand == Demand::Off {
-            self.parameters_changed = false;
+        if self.shell.demand == Demand::Off {
+            self.shell.parameters_changed = false;
             let position = self.position();
             self.awake &= parameters.model.commutation == self.parameters.model.commutation;
             self.parameters = parameters;
             self.position_offset = position.wrapping_sub(self.servo.position(&parameters.model));
         } else {
-            self.parameters_changed = parameters.model != self.parameters.model;
+            self.shell.parameters_changed = parameters.model != self.parameters.model;
             parameters.model = self.parameters.model;
             self.parameters = parameters;
         }
@@ -182,21 +168,11 @@ impl Zlac8030l {
         }
     }
 
-    fn move_axis(&mut self, feedback: Feedback) -> Demand {
-        let Parameters { axis, locked_when_disabled, .. } = &self.parameters;
-        let dt_s = f64::from(SUPERVISION_PERIOD_S);
-        let demand = self.axis.update(feedback, &self.targets, axis, dt_s);
-        demand.unwrap_or_else(|| {
-            let task = zltech::idle_task(&self.axis, axis.external_stop, *locked_when_disabled, false);
-            self.axis.idle(task, dt_s)
-        })
-    }
-
     fn watch_faults(&mut self, sensors: &Sensors, now: Instant) {
         self.device.set_eeprom_ok(sensors.eeprom_ok);
         let situation = Situation {
             servo: &self.servo,
-            demand: &self.demand,
+            demand: &self.shell.demand,
             position: self.position(),
             velocity_rpm: self.servo.velocity_rpm(),
             eeprom_sound: self.device.is_eeprom_sound(),
@@ -217,8 +193,7 @@ impl Zlac8030l {
         if new.is_empty() {
             return;
         }
-        self.axis.fault(FaultReactionOption::DISABLE);
-        self.demand = Demand::Off;
+        self.shell.enter_fault();
         self.device.values_mut().set(ERROR_CODE, self.faults.code_bits());
         self.device.report_faults(new, &self.faults, now);
         self.publish_status();
@@ -231,18 +206,16 @@ impl Zlac8030l {
         self.device.values_mut().set(ERROR_CODE, self.faults.code_bits());
         self.device.report_reset(&self.faults, now);
         if all_gone {
-            self.axis.reset_fault();
+            self.shell.axis.reset_fault();
         }
         self.publish_status();
     }
 
-    /// Debounced inputs; both ends of an external stop take the targets away, so that nothing starts by itself.
+    /// Debounced inputs.
     fn read_inputs(&mut self, sensors: &Sensors) {
-        let levels = self.inputs.update(sensors.inputs, INPUT_DEBOUNCE_PERIODS);
-        let stop = TERMINALS.signals(self.values(), levels).emergency_stop;
-        if stop != self.external_stop {
-            self.external_stop = stop;
-            self.axis.set_external_stop(stop);
+        let levels = self.shell.inputs.update(sensors.inputs, INPUT_DEBOUNCE_PERIODS);
+        let signals = TERMINALS.signals(self.values(), levels);
+        if self.shell.take_signals(&signals) {
             self.drop_targets();
         }
     }
@@ -252,9 +225,9 @@ impl Zlac8030l {
         let rpm = f64::from(values.get(TARGET_VELOCITY)) / f64::from(values.resolution());
         let max_rpm = self.parameters.max_rpm;
         self.speed_setting_wrong = rpm.abs() > max_rpm
-            && self.axis.mode() == ModeOfOperation::PROFILE_VELOCITY
+            && self.shell.axis.mode() == ModeOfOperation::PROFILE_VELOCITY
             && self.device.variant().is(SPEED_SETTING_FAULTS);
-        self.targets = Targets {
+        self.shell.targets = Targets {
             velocity: rpm.clamp(-max_rpm, max_rpm) * self.parameters.counts_s_per_rpm,
             current_a: f32::from(values.get(TARGET_TORQUE)) * 1e-3,
             cyclic: None,
@@ -268,12 +241,12 @@ impl Zlac8030l {
     }
 
     fn power_stage(&mut self, sensors: &Sensors) -> PowerStage {
-        if self.demand != Demand::Off {
+        if self.shell.demand != Demand::Off {
             let Parameters { model, gains, .. } = &self.parameters;
             let duty = self.servo.modulate(model, gains, sensors.phase_current_a, sensors.bus_v);
             return PowerStage::Modulate { duty };
         }
-        let alarm = self.axis.state() == PowerState::Fault;
+        let alarm = self.shell.axis.state() == PowerState::Fault;
         if alarm && self.parameters.alarm_pwm { PowerStage::Shorted } else { PowerStage::Off }
     }
 
@@ -281,7 +254,7 @@ impl Zlac8030l {
         let position = self.position();
         let (velocity, current) = (self.shown_velocity_rpm.value, self.shown_current_a.value);
         let demand_ma = self.servo.setpoint_a() * 1e3;
-        let levels = self.inputs.levels();
+        let levels = self.shell.inputs.levels();
         let brake = terminals::brake_engaged(self.values());
         let values = self.device.values_mut();
         values.set(POSITION_ACTUAL_VALUE, position);
@@ -294,21 +267,21 @@ impl Zlac8030l {
         values.set(BUS_VOLTAGE, round(sensors.bus_v * 100.0) as u16);
         values.set(HALL_STATUS, u16::from(sensors.hall & 7));
         values.set(INPUT_STATUS, levels);
-        values.set(OUTPUT_STATUS, terminals::output_status(self.outputs, brake));
+        values.set(OUTPUT_STATUS, terminals::output_status(self.shell.outputs, brake));
         self.publish_status();
     }
 
     /// Statusword, mode display and what follows from them; also right after a command, for a host that reads back.
     fn publish_status(&mut self) {
-        let status = self.axis.status(&self.targets, &self.parameters.axis);
-        let (state, mode) = (self.axis.state(), self.axis.mode());
+        let status = self.shell.status(&self.parameters.axis);
+        let (state, mode) = (self.shell.axis.state(), self.shell.axis.mode());
         let conditions = Conditions {
             alarm: state == PowerState::Fault,
-            enabled: self.axis.is_live(),
+            enabled: self.shell.axis.is_live(),
             homing_attained: false,
             in_position: status.target_reached,
         };
-        self.outputs = TERMINALS.outputs(self.values(), conditions);
+        self.shell.outputs = TERMINALS.outputs(self.values(), conditions);
         let values = self.device.values_mut();
         values.set(STATUSWORD, statusword(state, mode, &status).0);
         values.set(MODES_OF_OPERATION_DISPLAY, mode.0);
@@ -341,8 +314,7 @@ impl Firmware for Zlac8030l {
 
     fn power_off(&mut self, _now: Instant) {
         self.device.power_off();
-        self.axis = PowerDrive::new(&[]);
-        self.demand = Demand::Off;
+        self.shell.power_off();
     }
 
     fn tick(&mut self, sensors: &Sensors, now: Instant) -> Actuation {
@@ -356,15 +328,13 @@ impl Firmware for Zlac8030l {
         if is_over_current(sensors) && self.faults.raise(row::OVER_CURRENT) {
             self.enter_fault(FaultSet::row(row::OVER_CURRENT), now);
         }
-        self.periods += 1;
-        if self.periods >= SUPERVISION_DIVIDER {
-            self.periods = 0;
+        if self.shell.is_supervision_due(SUPERVISION_DIVIDER) {
             self.supervise(sensors, now);
         }
         Actuation {
             power_stage: self.power_stage(sensors),
             bleeder_on: self.bleeder.update(&self.parameters.bleeder, sensors.bus_v, CONTROL_PERIOD_S),
-            outputs: self.outputs,
+            outputs: self.shell.outputs,
             brake_engaged: terminals::brake_engaged(self.values()),
         }
     }
@@ -377,18 +347,14 @@ impl Firmware for Zlac8030l {
         self.device.is_storing()
     }
 
-    fn report(&self, _axis: AxisId) -> Report {
+    fn report(&self, axis: AxisId) -> Report {
         Report {
-            powered: self.device.is_running(),
-            node_id: self.device.node().node_id(),
-            bitrate: self.device.bitrate(),
-            state: self.axis.state(),
-            mode: self.axis.mode(),
             fault_code: self.faults.code_bits(),
             position_counts: self.position(),
             velocity_rpm: self.servo.velocity_rpm(),
             current_a: self.shown_current_a.value,
             brake_engaged: self.device.is_running() && terminals::brake_engaged(self.values()),
+            ..self.shell.report(&self.device, axis)
         }
     }
 }

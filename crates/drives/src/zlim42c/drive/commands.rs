@@ -28,7 +28,7 @@ impl Application<Room> for Zlim42c {
         *self = Self { dip_address: self.dip_address, ..Self::over(self.device.clone()) };
         stepper.rescale(before.pulses_per_electrical_turn, self.parameters.model.pulses_per_electrical_turn);
         self.stepper = stepper;
-        self.axis.self_test_done();
+        self.shell.axis.self_test_done();
         self.publish_status();
         self.device.boot(now);
     }
@@ -39,12 +39,12 @@ impl Application<Room> for Zlim42c {
         let effect = effect(slot);
         match effect {
             Effect::Command => self.command(Controlword(raw as u16), now),
-            Effect::SelectMode => self.axis.request_mode(ModeOfOperation(raw as u8 as i8)),
+            Effect::SelectMode => self.shell.axis.request_mode(ModeOfOperation(raw as u8 as i8)),
             Effect::Registers => self.registers(raw, now),
             Effect::FaultReset => self.fault_reset(raw, now),
             Effect::ClearPosition => self.clear_position(raw),
             Effect::Target => {}
-            Effect::Parameter => self.parameters_changed = true,
+            Effect::Parameter => self.shell.parameters_changed = true,
         }
         matches!(effect, Effect::Command | Effect::SelectMode)
     }
@@ -66,7 +66,7 @@ impl Zlim42c {
         self.refresh_parameters();
         self.controlword = controlword;
         let target = self.values().get(TARGET_POSITION);
-        if self.axis.command(controlword, target, &self.parameters.axis) && self.can_reset_faults() {
+        if self.shell.axis.command(controlword, target, &self.parameters.axis) && self.can_reset_faults() {
             self.reset_faults(now);
         }
     }
@@ -74,7 +74,7 @@ impl Zlim42c {
     /// Save or restore. An EEPROM fault ends with the factory settings.
     fn registers(&mut self, command: u32, now: Instant) {
         if zltech::register_command(&mut self.device, REGISTER_PARAMETER_SETTING, command, |_| true) {
-            self.parameters_changed = true;
+            self.shell.parameters_changed = true;
             if self.faults.forget(row::EEPROM) {
                 self.reset_faults(now);
             }
@@ -83,7 +83,7 @@ impl Zlim42c {
 
     /// 2011h: reads 0 again when it is done.
     fn fault_reset(&mut self, raw: u32, now: Instant) {
-        if raw == 1 && self.axis.state() == PowerState::Fault && self.can_reset_faults() {
+        if raw == 1 && self.shell.axis.state() == PowerState::Fault && self.can_reset_faults() {
             self.reset_faults(now);
         }
         self.device.values_mut().set(FAULT_RESET, 0);

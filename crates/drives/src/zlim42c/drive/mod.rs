@@ -7,7 +7,7 @@ mod commands;
 
 use can::{Bitrate, Instant};
 use canopen::node::{Node, NodeProfile};
-use cia402::{Controlword, FaultReactionOption, PowerState};
+use cia402::{Controlword, PowerState};
 use devices::AxisId;
 
 use super::assumptions::*;
@@ -22,14 +22,14 @@ use super::variations::VARIANT;
 use super::{Values, led, storage};
 use crate::communication::communication;
 use crate::engine::actuator::stepper::Stepper;
-use crate::engine::axis::{Demand, Feedback, Task};
-use crate::engine::cia402::{PowerDrive, Targets};
+use crate::engine::axis::{Demand, Feedback};
+use crate::engine::cia402::Targets;
 use crate::engine::device::{Application, Device};
 use crate::engine::faults::{FaultMonitor, FaultSet};
-use crate::engine::inputs::Inputs;
 use crate::engine::storage::Image;
+use crate::zltech::Shell;
 use crate::zltech::terminals::Conditions;
-use crate::{Firmware, Report, zltech};
+use crate::{Firmware, Report};
 use devices::variant::Variant;
 
 /// How this drive communicates.
@@ -41,11 +41,8 @@ pub struct Zlim42c {
     device: Device<Room>,
     dip_address: u8,
     parameters: Parameters,
-    parameters_changed: bool,
-    axis: PowerDrive,
+    shell: Shell<4>,
     stepper: Stepper,
-    demand: Demand,
-    targets: Targets,
     controlword: Controlword,
     faults: FaultMonitor<FAULT_COUNT>,
     phases: PhaseWatch,
@@ -53,10 +50,6 @@ pub struct Zlim42c {
     bus_a: f32,
     /// The fault that 603Fh and the red light tell of: the last that came.
     shown_fault: Option<usize>,
-    inputs: Inputs<4>,
-    external_stop: bool,
-    outputs: [bool; 2],
-    periods: u8,
 }
 
 impl Zlim42c {
@@ -77,20 +70,13 @@ impl Zlim42c {
             parameters: Parameters::of(device.values(), device.variant()),
             device,
             dip_address: 0,
-            parameters_changed: false,
-            axis: PowerDrive::new(&[]),
+            shell: Shell::new(),
             stepper: Stepper::default(),
-            demand: Demand::Off,
-            targets: Targets::default(),
             controlword: Controlword(0),
             faults: FaultMonitor::new(&FAULTS, &DEBOUNCE),
             phases: PhaseWatch::default(),
             bus_a: 0.0,
             shown_fault: None,
-            inputs: Inputs::default(),
-            external_stop: false,
-            outputs: [false; 2],
-            periods: 0,
         }
     }
 
@@ -101,7 +87,7 @@ impl Zlim42c {
 
     /// What the current vector is asked for, to look at.
     pub const fn demand(&self) -> &Demand {
-        &self.demand
+        &self.shell.demand
     }
 
     /// Amplitude of the current vector asked for, A.
@@ -131,10 +117,10 @@ impl Zlim42c {
         self.read_inputs(sensors);
         self.read_targets();
         let feedback = self.feedback();
-        let demand = self.axis.update(feedback, &self.targets, &self.parameters.axis, SUPERVISION_PERIOD_S);
-        let demand = demand.unwrap_or_else(|| self.axis.idle(self.idle_task(), SUPERVISION_PERIOD_S));
+        let Parameters { axis, holding, .. } = &self.parameters;
+        let demand = self.shell.move_axis(feedback, axis, *holding, SUPERVISION_PERIOD_S);
         self.energise(demand);
-        if let Some(home) = self.axis.take_home() {
+        if let Some(home) = self.shell.axis.take_home() {
             let offset = self.values().get(HOME_OFFSET);
             self.shift_position(home.wrapping_add(offset));
         }
@@ -144,18 +130,18 @@ impl Zlim42c {
     /// Takes over changed parameters. Another number of pulses waits until the motor is free: it would turn the meaning of
     /// every position over under the trajectory.
     fn refresh_parameters(&mut self) {
-        if !self.parameters_changed {
+        if !self.shell.parameters_changed {
             return;
         }
         let (values, variant, before) = (self.device.values(), self.device.variant(), self.parameters);
         let mut after = Parameters::of(values, variant);
-        let waits = after.pulses_per_turn != before.pulses_per_turn && self.demand != Demand::Off;
+        let waits = after.pulses_per_turn != before.pulses_per_turn && self.shell.demand != Demand::Off;
         if waits {
             after = Parameters::with_pulses(values, variant, before.pulses_per_turn);
         } else {
             self.stepper.rescale(before.model.pulses_per_electrical_turn, after.model.pulses_per_electrical_turn);
         }
-        self.parameters_changed = waits;
+        self.shell.parameters_changed = waits;
         self.parameters = after;
     }
 
@@ -177,7 +163,7 @@ impl Zlim42c {
         if new.is_empty() {
             return;
         }
-        self.axis.fault(FaultReactionOption::DISABLE);
+        self.shell.enter_fault();
         self.energise(Demand::Off);
         for row in new.rows() {
             self.shown_fault = Some(row);
@@ -195,20 +181,17 @@ impl Zlim42c {
         self.publish_error_code();
         self.device.report_reset(&self.faults, now);
         if all_gone {
-            self.axis.reset_fault();
+            self.shell.axis.reset_fault();
         }
         self.publish_status();
     }
 
-    /// Debounced inputs; both ends of an external stop take the target away, so that nothing starts by itself.
+    /// Debounced inputs.
     fn read_inputs(&mut self, sensors: &Sensors) {
         let periods = terminals::filter_periods(self.values());
-        let levels = self.inputs.update_each(sensors.inputs, periods);
+        let levels = self.shell.inputs.update_each(sensors.inputs, periods);
         let signals = TERMINALS.signals(self.values(), levels);
-        self.axis.set_switches(signals.switches);
-        if signals.emergency_stop != self.external_stop {
-            self.external_stop = signals.emergency_stop;
-            self.axis.set_external_stop(self.external_stop);
+        if self.shell.take_signals(&signals) {
             self.device.values_mut().set(TARGET_VELOCITY, 0);
         }
     }
@@ -217,7 +200,7 @@ impl Zlim42c {
         let max_speed = self.parameters.axis.velocity.max_speed;
         let target_rpm = f64::from(self.values().get(TARGET_VELOCITY));
         let velocity = (target_rpm * self.parameters.pulses_s_per_rpm).clamp(-max_speed, max_speed);
-        self.targets = Targets { velocity, ..Targets::default() };
+        self.shell.targets = Targets { velocity, ..Targets::default() };
     }
 
     /// The motor follows what it is told, as far as the drive knows.
@@ -231,19 +214,13 @@ impl Zlim42c {
         }
     }
 
-    /// The motor is held from Switched on.
-    fn idle_task(&self) -> Option<Task> {
-        let Parameters { axis, locked_when_disabled, .. } = &self.parameters;
-        zltech::idle_task(&self.axis, axis.external_stop, *locked_when_disabled, true)
-    }
-
     fn energise(&mut self, demand: Demand) {
-        self.demand = demand;
+        self.shell.demand = demand;
         self.stepper.command(&self.parameters.model, &demand, &self.parameters.currents);
     }
 
     fn power_stage(&mut self, sensors: &Sensors) -> PowerStage {
-        if self.demand == Demand::Off {
+        if self.shell.demand == Demand::Off {
             return PowerStage::Off;
         }
         let Parameters { model, gains, .. } = &self.parameters;
@@ -253,7 +230,7 @@ impl Zlim42c {
     fn publish(&mut self, sensors: &Sensors) {
         let position = self.stepper.position();
         let rpm = libm::round(self.velocity_rpm()) as i32;
-        let levels = self.inputs.levels();
+        let levels = self.shell.inputs.levels();
         let values = self.device.values_mut();
         values.set(POSITION_ACTUAL_VALUE, position);
         values.set(VELOCITY_ACTUAL_VALUE, rpm);
@@ -265,19 +242,19 @@ impl Zlim42c {
 
     /// Statusword, mode display and what follows from them; also right after a command, for a host that reads back.
     fn publish_status(&mut self) {
-        let status = self.axis.status(&self.targets, &self.parameters.axis);
-        let (state, mode) = (self.axis.state(), self.axis.mode());
-        let energised = self.axis.is_driven() || (!self.axis.is_live() && self.idle_task().is_some());
+        let status = self.shell.status(&self.parameters.axis);
+        let (state, mode) = (self.shell.axis.state(), self.shell.axis.mode());
+        let energised = self.shell.is_energised(self.parameters.axis.external_stop, self.parameters.holding);
         let word =
             statusword(statusword::Situation { state, mode, controlword: self.controlword, energised, axis: status });
         let conditions = Conditions {
             alarm: state == PowerState::Fault,
-            enabled: self.axis.is_live(),
+            enabled: self.shell.axis.is_live(),
             homing_attained: status.homing_attained,
             in_position: word.has(statusword::IN_POSITION),
         };
-        self.outputs = TERMINALS.outputs(self.values(), conditions);
-        let [y0, y1] = self.outputs;
+        self.shell.outputs = TERMINALS.outputs(self.values(), conditions);
+        let [y0, y1] = self.shell.outputs;
         let values = self.device.values_mut();
         values.set(STATUSWORD, word.0);
         values.set(MODES_OF_OPERATION_DISPLAY, mode.0);
@@ -296,11 +273,8 @@ impl Zlim42c {
 
     /// The zero of the position: what was `by` is 0 from now on, and whatever moves goes on moving.
     fn shift_position(&mut self, by: i32) {
-        self.axis.shift_position(by);
+        self.shell.shift_position(by);
         self.stepper.shift(by);
-        if let Demand::Position(point) | Demand::Velocity(point) = &mut self.demand {
-            point.position = point.position.wrapping_sub(by);
-        }
         let position = self.stepper.position();
         self.device.values_mut().set(POSITION_ACTUAL_VALUE, position);
     }
@@ -333,7 +307,7 @@ impl Firmware for Zlim42c {
 
     fn power_off(&mut self, _now: Instant) {
         self.device.power_off();
-        self.axis = PowerDrive::new(&[]);
+        self.shell.power_off();
         self.energise(Demand::Off);
     }
 
@@ -345,13 +319,11 @@ impl Firmware for Zlim42c {
             self.enter_fault(FaultSet::row(row::OVER_CURRENT), now);
         }
         self.bus_a += sensors.bus_current_a / f32::from(SUPERVISION_DIVIDER);
-        self.periods += 1;
-        if self.periods >= SUPERVISION_DIVIDER {
-            self.periods = 0;
+        if self.shell.is_supervision_due(SUPERVISION_DIVIDER) {
             self.supervise(sensors, now);
         }
         let flashes = self.shown_fault.map_or(0, |row| FLASHES[row]);
-        Actuation { power_stage: self.power_stage(sensors), outputs: self.outputs, led: led::shown(flashes, now) }
+        Actuation { power_stage: self.power_stage(sensors), outputs: self.shell.outputs, led: led::shown(flashes, now) }
     }
 
     fn eeprom(&self) -> (&[u8], u32) {
@@ -362,18 +334,13 @@ impl Firmware for Zlim42c {
         self.device.is_storing()
     }
 
-    fn report(&self, _axis: AxisId) -> Report {
+    fn report(&self, axis: AxisId) -> Report {
         Report {
-            powered: self.device.is_running(),
-            node_id: self.device.node().node_id(),
-            bitrate: self.device.bitrate(),
-            state: self.axis.state(),
-            mode: self.axis.mode(),
             fault_code: self.error_code(),
             position_counts: self.stepper.position(),
             velocity_rpm: self.velocity_rpm() as f32,
             current_a: self.stepper.current_a(),
-            brake_engaged: false,
+            ..self.shell.report(&self.device, axis)
         }
     }
 }
