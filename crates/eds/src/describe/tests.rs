@@ -144,6 +144,7 @@ const TWO_AXES: &str = "[FileInfo]\nFileName=two.eds\n[DeviceInfo]\nVendorName=V
     [2001]\nParameterName=Text\nDataType=9\nAccessType=rw\nDefaultValue=abc\n\
     [2002]\nParameterName=Bytes\nDataType=0xA\nAccessType=ro\nDefaultValue=01 02FF\n\
     [2003]\nParameterName=My gain\nDataType=0x1B\nAccessType=rw\nDefaultValue=0xFFFFFFFFFFFFFFFF\n\
+    [2004]\nParameterName=Long\nDataType=0x15\nAccessType=rw\nDefaultValue=-1\n\
     [6040]\nParameterName=CW\nDataType=6\nAccessType=rww\nPDOMapping=1\n\
     [6041]\nParameterName=SW\nDataType=6\nAccessType=ro\nPDOMapping=1\n\
     [6060]\nParameterName=Mode\nDataType=2\nAccessType=rw\n\
@@ -171,6 +172,7 @@ fn a_file_of_two_axes_is_a_description_with_two() {
             "text",
             "bytes",
             "my_gain_2003_00",
+            "long",
             "controlword",
             "statusword",
             "modes_of_operation",
@@ -198,6 +200,7 @@ fn values_of_every_kind_are_those_of_the_file() {
     assert_eq!(row(0x2001).default, DefaultValue::Text("abc"));
     assert_eq!(row(0x2002).default, DefaultValue::Bytes(&[1, 2, 0xFF]));
     assert_eq!(row(0x2003).default, DefaultValue::Unsigned(u64::MAX));
+    assert_eq!((row(0x2004).default, row(0x2004).limits), (DefaultValue::Value(-1), None));
     assert!(row(0x2000).saved && row(0x2001).capacity >= 3 && !row(0x6040).saved);
 }
 
