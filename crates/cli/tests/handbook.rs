@@ -73,7 +73,7 @@ fn every_command_of_the_page_on_testing_ends_well() {
 
 #[test]
 fn every_command_of_the_other_pages_ends_well() {
-    follow("two-axes-from-a-test.md");
-    follow("add-an-object.md");
-    follow("add-a-drive.md");
+    assert_eq!(follow("two-axes-from-a-test.md"), 0);
+    assert_eq!(follow("add-an-object.md"), 0);
+    assert_eq!(follow("add-a-drive.md"), 2);
 }

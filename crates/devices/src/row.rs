@@ -53,6 +53,43 @@ pub const fn join<const N: usize>(parts: &[&[Entry]]) -> [Entry; N] {
     rows
 }
 
+/// The rows of all `parts`, ascending by index and sub-index; a row of a later part replaces that of an earlier one. So a
+/// maker's own objects and defaults go over those of a profile.
+///
+/// # Panics
+/// If they are not `N` different rows, at compile time in a `const`.
+pub const fn merge<const N: usize>(parts: &[&[Entry]]) -> [Entry; N] {
+    let mut rows = [ro(0, 0, U8, "", ""); N];
+    let (mut count, mut part) = (0, 0);
+    while part < parts.len() {
+        let mut i = 0;
+        while i < parts[part].len() {
+            let row = parts[part][i];
+            let key = row.mux().key();
+            let mut at = count;
+            while at > 0 && rows[at - 1].mux().key() > key {
+                at -= 1;
+            }
+            if at > 0 && rows[at - 1].mux().key() == key {
+                rows[at - 1] = row;
+            } else {
+                assert!(count < N, "the parts have more than N rows");
+                let mut behind = count;
+                while behind > at {
+                    rows[behind] = rows[behind - 1];
+                    behind -= 1;
+                }
+                rows[at] = row;
+                count += 1;
+            }
+            i += 1;
+        }
+        part += 1;
+    }
+    assert!(count == N, "the parts have fewer than N rows");
+    rows
+}
+
 /// Constants for objects of a table, checked at compile time: `NAME: type = index sub-index;`.
 macro_rules! objects {
     ($table:ident: $($name:ident: $type:ty = $index:literal $sub:literal;)*) => {
