@@ -1,7 +1,7 @@
 use std::time::Duration;
 
 use ferrodrive::can::Bitrate;
-use ferrodrive::canopen::od::{Entry, Table, keys};
+use ferrodrive::canopen::od::{Entry, Index, Table};
 use ferrodrive::canopen::{Mux, NodeId};
 use ferrodrive::devices::row::{U16, U32, merge, ro, rw};
 use ferrodrive::devices::servo::{CIA402, objects};
@@ -23,8 +23,8 @@ static OWN: [Entry; 4] = [
 /// Two of them are new; the other two replace rows.
 const ROW_COUNT: usize = objects::ROW_COUNT + 2;
 static ROWS: [Entry; ROW_COUNT] = merge(&[objects::TABLE.rows(), &OWN]);
-static KEYS: [u32; ROW_COUNT] = keys(&ROWS);
-static TABLE: Table = Table::new(&ROWS, &KEYS);
+static INDEX: Index<ROW_COUNT> = Index::of(&ROWS);
+static TABLE: Table = Table::new(&ROWS, &INDEX);
 
 /// A servo that keeps to the standard, of a maker with the (invented) vendor-ID 0ACE0000h.
 static ACME_S1: Description = Description {
