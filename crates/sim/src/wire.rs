@@ -14,9 +14,9 @@ mod bus;
 mod collision;
 mod confinement;
 mod controller;
-mod fate;
+mod delivery;
 
-pub use bus::{Bus, Part, Passed};
+pub use bus::{Bus, Delivered, Role};
 pub use confinement::{ErrorCounters, ErrorState};
 pub use controller::ControllerOptions;
 

@@ -2,7 +2,7 @@
 
 use can::{ERROR_FRAME_BITS, Instant, frame_bits};
 
-use super::fate::BITS_AFTER_ACK_SLOT;
+use super::delivery::BITS_AFTER_ACK_SLOT;
 use super::{Bus, ErrorCause, ErrorState, SUSPEND_BITS, Segment, Transmission, WireEvent};
 
 impl Bus {

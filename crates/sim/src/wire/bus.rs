@@ -1,6 +1,6 @@
 //! The wire and everybody's controller on it: how time passes there, and how frames end.
 //!
-//! How a frame starts and what will become of it is in `fate`, nodes with a cut cable are in `alone`.
+//! How a frame starts and what will become of it is in `delivery`, nodes with a cut cable are in `alone`.
 
 use std::collections::VecDeque;
 
@@ -40,7 +40,7 @@ pub struct Bus {
 
 /// A frame that got through on the main wire.
 #[derive(Clone, Copy, Debug)]
-pub struct Passed {
+pub struct Delivered {
     /// The frame.
     pub frame: Frame,
     /// Its sender.
@@ -53,7 +53,7 @@ pub struct Passed {
 
 /// A controller's part in a frame that got through.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
+pub enum Role {
     /// Its firmware's frame: the mailbox is free again.
     Transmitted(Frame),
     /// It has the frame for its firmware.
@@ -164,7 +164,7 @@ impl Bus {
     }
 
     /// Ends what is due at `now`. If a frame got through, [`conclude`](Self::conclude) it for every controller.
-    pub fn advance(&mut self, now: Instant) -> Option<Passed> {
+    pub fn advance(&mut self, now: Instant) -> Option<Delivered> {
         for place in 0..self.cut.len() {
             self.end_alone(self.cut[place], now);
         }
@@ -176,7 +176,7 @@ impl Bus {
             self.statistics.frames += 1;
             self.statistics.busy_ns += self.main.free_at.nanos_since(start);
             self.events.push_back(WireEvent::Frame { start, end, source, frame });
-            return Some(Passed { frame, source, start, end });
+            return Some(Delivered { frame, source, start, end });
         };
         self.main.recessive_since = end.plus_nanos(6 * bit_ns);
         self.main.free_at = end.plus_nanos(u64::from(ERROR_FRAME_BITS) * bit_ns);
@@ -190,26 +190,26 @@ impl Bus {
     }
 
     /// What `passed` means to controller `i`; to be called once for each controller.
-    pub fn conclude(&mut self, i: usize, passed: &Passed) -> Part {
+    pub fn conclude(&mut self, i: usize, passed: &Delivered) -> Role {
         let foreign = self.is_foreign(i);
         let controller = &mut self.controllers[i];
         if controller.alone.is_some() || !controller.is_active_since(passed.start) {
-            return Part::Nothing;
+            return Role::Nothing;
         }
         if controller.sending.is_some() {
             let frame = controller.sent(passed.end);
             self.count(i, passed.end, ErrorCounters::transmit_success);
             self.suspend_if_passive(i);
-            return frame.map_or(Part::Nothing, Part::Transmitted);
+            return frame.map_or(Role::Nothing, Role::Transmitted);
         }
         if foreign {
             self.count(i, passed.end, ErrorCounters::first_receive_error);
-            return Part::Nothing;
+            return Role::Nothing;
         }
         if controller.counters.rec() > 0 {
             self.count(i, passed.end, ErrorCounters::receive_success);
         }
-        if self.controllers[i].fetch(passed.end) { Part::Received } else { Part::Nothing }
+        if self.controllers[i].fetch(passed.end) { Role::Received } else { Role::Nothing }
     }
 
     /// The next thing that happened, oldest first.

@@ -6,7 +6,7 @@ use super::World;
 use super::member::Member;
 use crate::recorder::Channel;
 use crate::stimulus::Place;
-use crate::wire::{Part, Passed};
+use crate::wire::{Delivered, Role};
 
 /// A station that leaves its deadline in the past is asked again after this time: it cannot stop the world.
 const OVERDUE_RETRY_NS: u64 = 1_000;
@@ -69,14 +69,14 @@ impl World {
         })
     }
 
-    fn deliver(&mut self, passed: &Passed) {
+    fn deliver(&mut self, passed: &Delivered) {
         self.digest.frame(&passed.frame, passed.end);
         for i in 0..self.members.len() {
             match self.bus.conclude(i, passed) {
-                Part::Transmitted(frame) => self.members[i].station().handle_transmitted(&frame, self.now),
-                Part::Received if self.members[i].station().ignores(&passed.frame) => continue,
-                Part::Received => self.members[i].station().handle_frame(&passed.frame, self.now),
-                Part::Nothing => continue,
+                Role::Transmitted(frame) => self.members[i].station().handle_transmitted(&frame, self.now),
+                Role::Received if self.members[i].station().ignores(&passed.frame) => continue,
+                Role::Received => self.members[i].station().handle_frame(&passed.frame, self.now),
+                Role::Nothing => continue,
             }
             self.serve(i);
         }
