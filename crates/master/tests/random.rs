@@ -9,7 +9,7 @@ use can::{CanId, Frame, Instant, Station};
 use canopen::nmt::NmtTarget;
 use canopen::pdo::{MappingRecord, PdoNumber};
 use canopen::{Mux, NmtCommand, NodeId};
-use master::core::{Command, Core, Payload, PdoMap, Request, RpdoTrigger, Transfer};
+use master::core::{Command, Core, Cycle, Payload, PdoMap, Request, RpdoTrigger, Transfer};
 
 /// Marsaglia's xorshift32.
 struct Random(u32);
@@ -36,6 +36,7 @@ impl Random {
         let mut data: Vec<u8> = (0..length).map(|_| self.next() as u8).collect();
         let node = u16::from(self.node().raw());
         let id = match self.below(8) {
+            0 if self.below(2) == 0 => 0x080,
             0 => self.next() as u16,
             1 => 0x700 + node,
             2 => 0x80 + node,
@@ -58,7 +59,8 @@ impl Random {
     fn command(&mut self, core: &mut Core) -> Command {
         let ticket = core.ticket();
         let node = self.node();
-        match self.below(10) {
+        match self.below(11) {
+            10 => Command::FollowSync((self.below(2) == 0).then(|| Duration::from_micros(self.below(10_000).into()))),
             8 => Command::Heartbeat(node, Some(Duration::from_micros(self.below(10_000).into()))),
             9 => Command::KeepFed(node, Some(Duration::from_micros(self.below(10_000).into()))),
             0 => Command::Timer(ticket, Duration::from_micros(self.below(5_000).into())),
@@ -87,6 +89,7 @@ fn random_traffic_never_panics_and_every_request_ends_once() {
         core.image_mut().set_rpdo(NodeId::MIN, PdoNumber::FIRST, 0x201, map, RpdoTrigger::Sync);
         let mut now = Instant::ZERO;
         let mut open = BTreeSet::new();
+        let mut before: Option<Cycle> = None;
         for _ in 0..4_000 {
             now += Duration::from_micros(random.below(300).into());
             match random.below(6) {
@@ -103,6 +106,14 @@ fn random_traffic_never_panics_and_every_request_ends_once() {
                 }
                 _ => core.handle_frame(&random.frame(), now),
             }
+            // Cycles only go on, whoever counts them.
+            if let (Some(before), Some(cycle)) = (before, core.cycle()) {
+                assert!(
+                    cycle.number >= before.number && cycle.at >= before.at,
+                    "seed {seed}: {before:?} then {cycle:?}"
+                );
+            }
+            before = core.cycle();
             while core.poll_transmit().is_some() {}
             while let Some(finished) = core.poll_finished() {
                 assert!(open.remove(&finished.ticket), "seed {seed}: {:?} ended twice", finished.ticket);

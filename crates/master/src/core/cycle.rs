@@ -114,7 +114,7 @@ impl SyncClock {
         }
         self.due = Some(now.plus_nanos(self.patience_ns()));
         let since = self.cycle.map_or(0, |cycle| now.nanos_since(cycle.at));
-        let periods = (since + self.period_ns / 2) / self.period_ns;
+        let periods = since.saturating_add(self.period_ns / 2) / self.period_ns;
         let cycle = self.count(periods.saturating_sub(1), now);
         Some(if core::mem::take(&mut self.lost) { Tick::Back(cycle) } else { Tick::Begun(cycle) })
     }

@@ -231,7 +231,9 @@ macro_rules! handles {
             /// `None` if a field of this form and length does not hold such values.
             pub(crate) fn new(place: Place, form: NumberForm, per_count: f64) -> Option<Self> {
                 let field = Field { bits: place.bits(), form, per_count };
-                T::suits(&field).then_some(Self { place, field, kind: PhantomData })
+                // An entry of no bits holds nothing, and REAL numbers have 32 or 64.
+                let whole = field.bits > 0 && (form != NumberForm::Real || matches!(field.bits, 32 | 64));
+                (whole && T::suits(&field)).then_some(Self { place, field, kind: PhantomData })
             }
             pub(crate) const fn place(&self) -> Place {
                 self.place
@@ -288,6 +290,15 @@ mod tests {
     fn a_type_that_is_too_short_or_of_another_sign_is_told_apart() {
         assert!(i32::suits(&field(16, NumberForm::Signed, 1.0)) && !i8::suits(&field(16, NumberForm::Signed, 1.0)));
         assert!(!u32::suits(&field(16, NumberForm::Signed, 1.0)) && !i32::suits(&field(32, NumberForm::Real, 1.0)));
+    }
+
+    #[test]
+    fn a_field_without_bits_is_no_signal() {
+        let place = Place { slot: 0, generation: 0, shift: 0, mask: 0 };
+        assert!(Signal::<i32>::new(place, NumberForm::Signed, 1.0).is_none());
+        assert!(Signal::<bool>::new(place, NumberForm::Unsigned, 1.0).is_none());
+        let short = Place { mask: 0xFFFF, ..place };
+        assert!(SetPoint::<f64>::new(short, NumberForm::Real, 1.0).is_none());
     }
 
     #[test]

@@ -94,11 +94,13 @@ impl Decoder {
         self.pdos.load_defaults(node, model.dictionary);
     }
 
-    /// A node has said its device type (1000h): enough where all models that say so have the same objects.
+    /// A node has said its device type (1000h): enough where all makers' models that say so have the same objects. The servo
+    /// of no maker (vendor 0), whose device type any servo has, tells nothing of the others; it has to be named.
     fn learn_model(&mut self, node: NodeId, device_type: &[u8]) {
         let Ok(bytes) = <[u8; 4]>::try_from(device_type) else { return };
         let said = u32::from_le_bytes(bytes);
-        let mut models = self.known.catalogue().iter().filter(|model| model.identity.device_type == said);
+        let makers = self.known.catalogue().iter().filter(|model| model.identity.vendor_id != 0);
+        let mut models = makers.filter(|model| model.identity.device_type == said);
         let Some(first) = models.next().filter(|_| self.models.get(node).is_none()) else { return };
         if models.all(|model| model.same_objects(first)) {
             self.models.0.insert(node.raw(), Model(first));
