@@ -22,7 +22,8 @@ impl Gate {
     /// far apart for the bits. ValueRange that move with a resolution are those at 1, which are the narrowest: beyond them the row is asked.
     pub(super) const fn of(row: &Entry) -> Self {
         let mask = row.data_type.mask();
-        if !Summary::of(row).is_writable() || !row.data_type.is_integer() {
+        let is_cell = row.data_type.is_integer() && row.data_type.fits_cell();
+        if !Summary::of(row).is_writable() || !is_cell {
             return Self { mask, ..Self::CLOSED };
         }
         let (mut low, mut high) = row.data_type.range();

@@ -1,0 +1,9 @@
+//! Devices that are known at run time only: every data type, thousands of rows, hundreds of PDOs, fields of any length in
+//! bits, and an application that has its word on downloads.
+
+mod asked;
+mod bits;
+mod device;
+mod long_values;
+mod many_pdos;
+mod tables;
