@@ -35,7 +35,7 @@ impl Gate {
         if low > high {
             return Self { mask, ..Self::CLOSED };
         }
-        Self { mask, low: row.data_type.raw(low), span: high.wrapping_sub(low) as u32, listed }
+        Self { mask, low: row.data_type.raw(low), span: (high - low) as u32, listed }
     }
 
     /// Of a value that is longer than a cell: no cell passes, and its `capacity` bytes stand at `offset`.
