@@ -19,6 +19,15 @@ pub trait PowerSubject: Subject {
     /// A component whose break is a fault in every state, and which can be mended.
     const BREAKABLE: Component;
 
+    /// Its `power_state.csv`; with each cell the bits of the statusword above the low byte, of those in [`ABOVE`](Self::ABOVE).
+    fn power_states() -> Vec<(PowerCell, u16)>;
+
+    /// Bits above the low byte that the cells tell.
+    const ABOVE: u16;
+
+    /// Its `statusword_at_rest.csv`.
+    const STATUSWORD_AT_REST: &'static str;
+
     /// The statusword of a drive that has just booted.
     const BOOTED: u16;
 

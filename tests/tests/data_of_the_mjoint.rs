@@ -6,26 +6,6 @@ use ferrodrive_tests::homing::{Track, run};
 use ferrodrive_tests::mjoint::{HomingStatus, datagrams, figures, homing_runs, objects, situations};
 
 #[test]
-fn the_object_table_has_the_manuals_rows_and_those_that_the_standard_adds_in_order() {
-    let objects = objects();
-    assert_eq!(objects.len(), 93 + 11, "93 printed rows, 1001h, the counts of ten records");
-    assert!(objects.is_sorted_by(|one, next| one.row.key() < next.row.key()), "in order, none twice");
-}
-
-#[test]
-fn defaults_lie_within_their_limits_and_limits_within_their_types() {
-    for it in objects() {
-        it.row.check();
-    }
-}
-
-#[test]
-fn what_is_stored_can_be_written_but_for_the_position_that_is_recorded_at_power_off() {
-    let read_only: Vec<_> = objects().into_iter().filter(|it| it.row.stored && !it.row.writable).collect();
-    assert_eq!(read_only.iter().map(|it| it.row.index).collect::<Vec<_>>(), [0x6063]);
-}
-
-#[test]
 fn the_modbus_registers_lie_side_by_side_without_a_gap() {
     let mut registers: Vec<_> =
         objects().iter().filter_map(|it| it.registers.map(|place| (place, it.row.size))).collect();

@@ -13,6 +13,11 @@ ferrodrive_tests::scenarios! {
         are_kept_and_restored_only_on_command: zlac8030l zlim42c;
         are_saved_together_or_not_at_all: zlac8030l zlim42c;
     }
+    power {
+        every_event_in_every_state_leads_where_the_table_says: zlac8030l zlim42c;
+        a_drive_says_that_it_has_booted_and_is_in_switch_on_disabled: zlac8030l zlim42c;
+        the_statusword_of_each_state_in_each_mode_at_rest_is_that_of_the_table: zlac8030l zlim42c;
+    }
     network {
         commands_to_all_nodes_and_to_this_one_act_and_commands_to_others_do_not: zlac8030l zlim42c mjoint;
         a_reset_leaves_the_node_able_to_speak: zlac8030l zlim42c;

@@ -1,28 +1,11 @@
-//! The tables of the M joint's firmware and the data read from its manual, laid side by side. Two people made the two.
+//! What only the M joint has of tables, beside the data read from its manual.
 
-use canopen::NodeId;
 use cia402::Controlword;
 use devices::model;
+use drives::mjoint::objects::TABLE;
 use drives::mjoint::objects::modbus::REGISTERS;
-use drives::mjoint::objects::{ROW_COUNT, TABLE};
 use drives::mjoint::statusword::{Condition, statusword};
-use ferrodrive_tests::manual::ObjectRow;
 use ferrodrive_tests::mjoint::{MODELS, Situation, figures, objects, situations};
-use ferrodrive_tests::side_by_side;
-
-#[test]
-fn the_joint_has_exactly_the_objects_of_the_manual() {
-    side_by_side::objects_are_the_manuals(&TABLE, &rows());
-}
-
-#[test]
-fn every_object_agrees_with_the_manual_in_every_column() {
-    side_by_side::columns_are_the_manuals::<ROW_COUNT>(&TABLE, &rows(), NodeId::MIN);
-}
-
-fn rows() -> Vec<ObjectRow> {
-    objects().into_iter().map(|joint| joint.row).collect()
-}
 
 #[test]
 fn the_modbus_addresses_are_the_manuals() {

@@ -10,7 +10,7 @@ use sim::machine::{Zlac8030lMachine, zlac8030l};
 use super::{Rows, Subject};
 use crate::object_rows::{KeepingSubject, Memory};
 use crate::power_states::PowerSubject;
-use crate::zlac8030l::objects;
+use crate::zlac8030l::{PowerCell, objects, power_states};
 
 pub use super::{Abort, assert_within};
 
@@ -51,6 +51,9 @@ impl Subject for Zlac8030l {
 
 impl PowerSubject for Zlac8030l {
     const BREAKABLE: Component = Component::Hall;
+    const ABOVE: u16 = 0;
+    const STATUSWORD_AT_REST: &'static str = include_str!("../../data/zlac8030l/statusword_at_rest.csv");
+    // As the recorded one shows it.
     const BOOTED: u16 = 0x0670;
     const CLEARS_POSITION: &'static [u16] = &[0x2005, 0x2006];
     const MOVING_MODES: &'static [i64] = &[1, 3];
@@ -66,6 +69,10 @@ impl PowerSubject for Zlac8030l {
     const OUTPUT_FUNCTIONS: [u8; 2] = [0x0D, 0x0F];
     const COUNTS_PER_RPM: i64 = 10;
     const RIPPLE_RPM: f64 = 1.0;
+
+    fn power_states() -> Vec<(PowerCell, u16)> {
+        power_states().into_iter().map(|cell| (cell, 0)).collect()
+    }
 
     fn let_take_time(bench: &mut Bench) {
         // The watch over the host.

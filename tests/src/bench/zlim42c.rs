@@ -7,9 +7,10 @@ use sim::Component;
 use sim::machine::{Zlim42cMachine, zlim42c, zlim42c_82};
 
 use super::{Rows, Subject};
+use crate::manual::PowerCell;
 use crate::object_rows::{KeepingSubject, Memory};
 use crate::power_states::PowerSubject;
-use crate::zlim42c::objects;
+use crate::zlim42c::{objects, power_states};
 
 pub use super::{Abort, assert_within};
 
@@ -50,6 +51,9 @@ impl Subject for Zlim42c {
 
 impl PowerSubject for Zlim42c {
     const BREAKABLE: Component = Component::Reference;
+    // The motor is energised.
+    const ABOVE: u16 = 1 << 13;
+    const STATUSWORD_AT_REST: &'static str = include_str!("../../data/zlim42c/statusword_at_rest.csv");
     const BOOTED: u16 = 0x0270;
     const CLEARS_POSITION: &'static [u16] = &[0x2012];
     const MOVING_MODES: &'static [i64] = &[1, 3, 6];
@@ -65,6 +69,10 @@ impl PowerSubject for Zlim42c {
     const COUNTS_PER_RPM: i64 = 1;
     // A fifth at 60 r/min: full steps excite the rotor.
     const RIPPLE_RPM: f64 = 12.0;
+
+    fn power_states() -> Vec<(PowerCell, u16)> {
+        power_states().into_iter().map(|it| (it.cell, if it.bit_13_after { Self::ABOVE } else { 0 })).collect()
+    }
 
     fn let_home(bench: &mut Bench) {
         bench.set(0x609A, 200).set(0x6098, 18);

@@ -6,6 +6,7 @@
 pub mod motion;
 pub mod network;
 pub mod pdo;
+pub mod power;
 pub mod sdo;
 pub mod stops;
 pub mod terminals;

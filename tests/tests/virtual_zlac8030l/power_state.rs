@@ -1,8 +1,4 @@
-//! The power state machine on the running drive: every state with every event of the table, and the statuswords.
-
-use ferrodrive_tests::bench::zlac8030l::Zlac8030l;
-use ferrodrive_tests::power_states::lead_where_the_table_says;
-use ferrodrive_tests::zlac8030l::power_states;
+//! Bits of the statusword that belong to the mode, and how a fault ends.
 
 use crate::bench::Bench;
 
@@ -12,47 +8,6 @@ const BIT_12: u16 = 1 << 12;
 const IN_PLACE: u16 = 1 << 13;
 const RUNNING: u16 = 1 << 14;
 const MODE_BITS: u16 = REACHED | BIT_12 | IN_PLACE | RUNNING;
-
-#[test]
-fn every_event_in_every_state_leads_where_the_table_says() {
-    let cells: Vec<_> = power_states().into_iter().map(|cell| (cell, 0)).collect();
-    lead_where_the_table_says::<Zlac8030l>(&cells, 0);
-}
-
-#[test]
-fn the_drive_says_that_it_has_booted_and_is_in_switch_on_disabled() {
-    let mut bench = Bench::new();
-    bench.hears(&["704#00"]).shows(0x6F, 0x60);
-}
-
-#[test]
-fn the_statusword_of_each_state_has_bits_4_and_9_and_the_pattern_of_cia_402() {
-    // docs/drives/zlac8030l.md, chapter 7. Bits 10 and above belong to the mode.
-    let patterns = [
-        ("switch_on_disabled", 0x0270),
-        ("ready_to_switch_on", 0x0231),
-        ("switched_on", 0x0233),
-        ("operation_enabled", 0x0237),
-        ("quick_stop_active", 0x0217),
-        ("fault", 0x0298),
-    ];
-    for mode in [0, 1, 3, 4] {
-        for (state, pattern) in patterns {
-            let mut bench = Bench::new();
-            bench.set(0x6060, mode);
-            bench.reach(state);
-            bench.run_ms(50);
-            let statusword = bench.statusword();
-            assert_eq!(statusword & 0x03FF, pattern, "mode {mode}, {state}: {statusword:04X}h");
-            assert_eq!(statusword & 0xC000, 0, "{statusword:04X}h: neither running nor stopped from outside");
-        }
-    }
-}
-
-#[test]
-fn a_drive_that_has_just_booted_shows_0670h_as_the_recorded_one_does() {
-    assert_eq!(Bench::new().statusword(), 0x0670);
-}
 
 #[test]
 fn in_profile_velocity_bits_10_12_and_14_tell_reached_standing_and_running() {

@@ -1,73 +1,9 @@
-//! The power state machine on the running drive: every state with every event of the table, and the statuswords.
-
-use ferrodrive_tests::bench::zlim42c::Zlim42c;
-use ferrodrive_tests::power_states::lead_where_the_table_says;
-use ferrodrive_tests::zlim42c::{EnergisedCell, power_states};
+//! Which power states energise the motor (200Bh), and bit 11.
 
 use crate::bench::Bench;
 
 /// The motor is energised.
 const ENERGISED: u16 = 1 << 13;
-
-#[test]
-fn every_event_in_every_state_leads_where_the_table_says() {
-    let energised = |it: EnergisedCell| (it.cell, if it.bit_13_after { ENERGISED } else { 0 });
-    let cells: Vec<_> = power_states().into_iter().map(energised).collect();
-    lead_where_the_table_says::<Zlim42c>(&cells, ENERGISED);
-}
-
-#[test]
-fn the_drive_says_that_it_has_booted_and_is_in_switch_on_disabled() {
-    let mut bench = Bench::new();
-    bench.hears(&["701#00"]).shows(0x6F, 0x60);
-}
-
-#[test]
-fn the_statusword_of_each_state_is_that_of_the_readings() {
-    // docs/drives/zlim42c.md, 5.3.1 and 5.3.2, without a mode. In quick stop active bit 10 tells that the motor stands.
-    let patterns = [
-        ("switch_on_disabled", 0x0270),
-        ("ready_to_switch_on", 0x0231),
-        ("switched_on", 0x2233),
-        ("operation_enabled", 0x2237),
-        ("quick_stop_active", 0x2217),
-        ("fault", 0x0298),
-    ];
-    for (state, pattern) in patterns {
-        let mut bench = Bench::in_state(state);
-        bench.run_ms(50);
-        assert_eq!(format!("{:04X}", bench.statusword()), format!("{pattern:04X}"), "{state}");
-    }
-}
-
-#[test]
-fn the_statusword_of_each_state_in_each_mode_at_rest() {
-    // 5.3.4 to 5.3.6: bits 10 and 15 in position, bits 10 and 12 (speed is 0) in velocity, none in homing, where nothing has
-    // been looked for; there is nothing to be reached before the drive is enabled.
-    const REACHED: u16 = 1 << 10;
-    const SPEED_IS_ZERO: u16 = 1 << 12;
-    const IN_POSITION: u16 = 1 << 15;
-    let states = [
-        ("switch_on_disabled", 0x0270, false),
-        ("ready_to_switch_on", 0x0231, false),
-        ("switched_on", 0x2233, false),
-        ("operation_enabled", 0x2237, true),
-        ("quick_stop_active", 0x2217, true),
-        ("fault", 0x0298, false),
-    ];
-    let modes = [(1, 0, REACHED | IN_POSITION), (3, SPEED_IS_ZERO, REACHED), (6, 0, 0)];
-    for (mode, always, when_live) in modes {
-        for (state, pattern, live) in states {
-            let mut bench = Bench::new();
-            bench.set(0x6060, mode);
-            bench.reach(state);
-            bench.run_ms(50);
-            let expected = pattern | always | if live { when_live } else { 0 };
-            assert_eq!(format!("{:04X}", bench.statusword()), format!("{expected:04X}"), "{state}, mode {mode}");
-            assert_eq!(bench.get(0x6061), mode, "{state}");
-        }
-    }
-}
 
 #[test]
 fn a_locked_shaft_stands_against_a_load_that_turns_a_free_one() {

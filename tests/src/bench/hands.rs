@@ -1,0 +1,107 @@
+//! A person beside the machine: what hands do to it, and what can be measured.
+
+use can::Instant;
+use sim::{Component, Report, VirtualDrive};
+
+use super::{Bench, Subject};
+
+impl<S: Subject> Bench<S> {
+    /// Does something to the drive, as a person beside the machine.
+    pub fn operate<T>(&mut self, act: impl FnOnce(&mut dyn VirtualDrive, Instant) -> T) -> T {
+        if !self.bare {
+            return self.world.with_drive(S::NODE, act).expect("the drive is there");
+        }
+        let now = self.world.now();
+        let machine = self.world.station_mut::<S::Machine>(self.drive).expect("the drive is there");
+        let result = act(machine, now);
+        self.world.refresh();
+        result
+    }
+
+    /// A torque on the shaft, N m: a positive one opposes positive motion.
+    #[track_caller]
+    pub fn set_load_torque(&mut self, torque_nm: f64) -> &mut Self {
+        self.operate(|drive, now| drive.set_load_torque(torque_nm, now)).expect("a shaft");
+        self
+    }
+
+    /// Inertia on the shaft, kg m².
+    #[track_caller]
+    pub fn set_load_inertia(&mut self, inertia_kg_m2: f64) -> &mut Self {
+        self.operate(|drive, now| drive.set_load_inertia(inertia_kg_m2, now)).expect("a shaft");
+        self
+    }
+
+    /// The shaft is held fast, or not.
+    #[track_caller]
+    pub fn set_rotor_locked(&mut self, locked: bool) -> &mut Self {
+        self.operate(|drive, now| drive.set_rotor_locked(locked, now)).expect("a rotor");
+        self
+    }
+
+    /// Voltage of the supply.
+    #[track_caller]
+    pub fn set_supply(&mut self, supply_v: f64) -> &mut Self {
+        self.operate(|drive, now| drive.set_supply(supply_v, now)).expect("a supply");
+        self
+    }
+
+    /// Level of a digital input.
+    #[track_caller]
+    pub fn set_input(&mut self, input: usize, level: bool) -> &mut Self {
+        self.operate(|drive, now| drive.set_input(input, level, now)).expect("an input");
+        self
+    }
+
+    /// Breaks a component, or mends it.
+    #[track_caller]
+    pub fn set_fault(&mut self, component: Component, broken: bool) -> &mut Self {
+        self.operate(|drive, now| drive.set_fault(component, broken, now)).expect("the drive has it");
+        self
+    }
+
+    /// A line for the world, as a person at the machine types it; it must be taken.
+    #[track_caller]
+    pub fn tell(&mut self, line: &str) -> &mut Self {
+        self.told(line);
+        self
+    }
+
+    /// The answer to a line for the world, which must be taken.
+    #[track_caller]
+    pub fn told(&mut self, line: &str) -> String {
+        let answer = sim::command::answer(&mut self.world, line).expect("a line is answered").json;
+        assert!(answer.starts_with("{\"ok\":true"), "{line}: {answer}");
+        answer
+    }
+
+    /// What a person beside the machine could measure now.
+    pub fn report(&mut self) -> Report {
+        self.operate(|drive, now| {
+            drive.advance(now);
+            drive.report()
+        })
+    }
+
+    /// Off for 0.1 s, and on again until it has booted.
+    pub fn power_cycle(&mut self) -> &mut Self {
+        self.operate(|drive, now| drive.cut_power(now));
+        self.run_ms(100);
+        self.operate(|drive, now| drive.set_power(true, now));
+        self.run_ms(10)
+    }
+
+    /// Time for the EEPROM to take what was written.
+    pub fn let_store(&mut self) -> &mut Self {
+        self.run_ms(5)
+    }
+
+    /// The machine of an [`open`](Self::open) bench, as it is now.
+    pub fn machine(&mut self) -> &mut S::Machine {
+        assert!(self.bare, "only an open bench shows its machine");
+        let now = self.world.now();
+        let machine = self.world.station_mut::<S::Machine>(self.drive).expect("the drive is there");
+        machine.advance(now);
+        machine
+    }
+}
