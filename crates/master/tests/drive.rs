@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use can::Instant;
 use cia402::PowerState;
-use devices::model;
+use devices::servo::{CIA402, MODES, axis};
+use devices::{AxisId, Description, Placement, model};
 use master::drive::{MotionOptions, Note};
 use master::units::{Amperes, Counts, Degrees, Ramp, Rpm, Turns};
 use master::{Drive, Error};
@@ -343,4 +344,24 @@ fn a_move_after_a_stop_replaces_the_halted_one() {
     assert_eq!(object(&bus, 0x6064), 4096);
     // Halt stays until the edge that takes the new set-point at once (bit 5).
     assert_eq!(toy(&bus).controlwords[6..], [0x010F, 0x010F, 0x3F, 0x0F]);
+}
+
+/// Two axes of one node, 800h apart (CiA 402), of which the second is the one looked at.
+#[test]
+fn the_second_axis_of_a_node_is_asked_at_its_own_objects() {
+    static SERVO: Description =
+        Description { axes: &[axis(Placement::FIRST, MODES), axis(Placement::IndexOffset(0x800), MODES)], ..CIA402 };
+    let toy = Toy::new(4).u16(0x6041, 0, 0x0250).u16(0x6841, 0, 0x0237).u16(0x6840, 0, 0x0F).u8(0x6861, 0, 3);
+    let mut bus = Bus::new(vec![toy]);
+    let first = Drive::new(bus.network.node(node(4)), &SERVO);
+    let second = first.axis(AxisId(1)).unwrap();
+    assert_eq!((first.axis_id(), second.axis_id()), (AxisId::FIRST, AxisId(1)));
+    let states = [&first, &second].map(|axis| bus.block_on(axis.statusword()).unwrap().state());
+    assert_eq!(states, [Some(PowerState::SwitchOnDisabled), Some(PowerState::OperationEnabled)]);
+    // Enabled already, by its own statusword: nothing is written.
+    bus.block_on(second.enable()).unwrap();
+    let error = first.axis(AxisId(2)).unwrap_err();
+    assert!(matches!(error, Error::NoSuchAxis { axes: 2, .. }), "{error}");
+    let unknown = Drive::of_unknown_model(bus.network.node(node(4)));
+    assert!(matches!(unknown.axis(AxisId(1)), Err(Error::UnknownModel { .. })));
 }

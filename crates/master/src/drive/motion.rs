@@ -103,7 +103,7 @@ impl Drive {
         if !options.wait {
             return Ok(MotionReport { reached_after: None, commanded, notes });
         }
-        let (up, down) = self.ramp_times_s().await?;
+        let (up, down) = self.ramp_times_s(change).await?;
         let limit = Duration::from_secs_f64((up.max(down) * LATE_FACTOR + LATE_MARGIN_S).clamp(0.0, 3600.0));
         let band = (target.abs() * REACHED_SHARE).max(REACHED_LEAST_RPM);
         let quantity = self.has(units.actual_velocity, "the actual velocity")?;

@@ -107,7 +107,7 @@ impl Drive {
 
     /// Upper bound of a move's duration: the way at full speed plus both ramps, stretched by the margin.
     async fn time_for(&self, turns: f64, speed_rpm: f64) -> Result<Duration, Error> {
-        let (up, down) = self.ramp_times_s().await?;
+        let (up, down) = self.ramp_times_s(speed_rpm).await?;
         let cruise = if speed_rpm > 0.0 { turns / speed_rpm * 60.0 } else { f64::INFINITY };
         let seconds = (cruise + up + down) * LATE_FACTOR + LATE_MARGIN_S + POLL.as_secs_f64();
         // A day: the longest move that makes sense to wait for.

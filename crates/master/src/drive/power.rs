@@ -10,6 +10,9 @@ use crate::error::Error;
 /// Speed below which a shaft counts as standing still: the rounding of the coarsest velocity object.
 pub(super) const STANDSTILL_RPM: f64 = 1.0;
 
+/// The speed of a motor that does not tell it, r/min: more than those of its kind turn.
+const FASTEST_RPM: f64 = 10_000.0;
+
 /// How many looks in a row have to find it so: a shaft that swings about its rest passes zero.
 const STANDSTILL_LOOKS: u32 = 5;
 
@@ -196,7 +199,11 @@ impl Drive {
 
     /// How long a stop from full speed may take: twice the drive's slowest ramp, and a step.
     pub(super) async fn stop_time(&self) -> Duration {
-        let ramp = match (self.ramp_times_s().await, self.quick_stop_time_s().await) {
+        let turns = match self.axis_description().and_then(|axis| axis.units.actual_velocity) {
+            Some(velocity) => self.read_quantity(velocity).await.map_or(FASTEST_RPM, f64::abs),
+            None => FASTEST_RPM,
+        };
+        let ramp = match (self.ramp_times_s(turns).await, self.quick_stop_time_s(turns).await) {
             (Ok((_, down)), Ok(quick)) => down.max(quick),
             // The largest ramp of the drives known: 32767 ms.
             _ => 32.767,

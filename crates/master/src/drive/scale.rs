@@ -230,14 +230,15 @@ impl Drive {
         self.refuse_too_fine(&commanded, step, row).await
     }
 
-    /// The drive's ramp times for a whole change of speed, in seconds: up, down.
-    pub(super) async fn ramp_times_s(&self) -> Result<(f64, f64), Error> {
+    /// The drive's ramp times in seconds, up and down: for the largest change of speed that can be asked for, or where the drive
+    /// does not limit it for this one.
+    pub(super) async fn ramp_times_s(&self, change_rpm: f64) -> Result<(f64, f64), Error> {
         match self.ramps("read its ramps")? {
             Ramps::Times { acceleration, deceleration, .. } => {
                 Ok((self.seconds(acceleration).await?, self.seconds(deceleration).await?))
             }
             Ramps::Rates { acceleration, deceleration, scale, none_from, .. } => {
-                let (worth, change_rpm) = (self.worth(scale).await?, self.largest_change_rpm()?);
+                let (worth, change_rpm) = (self.worth(scale).await?, self.largest_change_rpm(change_rpm)?);
                 let (up, down) = (self.read_number(acceleration).await?, self.read_number(deceleration).await?);
                 Ok((rate_time_s(up, change_rpm, worth, none_from), rate_time_s(down, change_rpm, worth, none_from)))
             }
@@ -245,11 +246,11 @@ impl Drive {
     }
 
     /// Time of the drive's quick stop in seconds.
-    pub(super) async fn quick_stop_time_s(&self) -> Result<f64, Error> {
+    pub(super) async fn quick_stop_time_s(&self, change_rpm: f64) -> Result<f64, Error> {
         match self.ramps("read its ramps")? {
             Ramps::Times { quick_stop, .. } => self.seconds(quick_stop).await,
             Ramps::Rates { quick_stop: Some(rate), scale, none_from, .. } => {
-                let (worth, change_rpm) = (self.worth(scale).await?, self.largest_change_rpm()?);
+                let (worth, change_rpm) = (self.worth(scale).await?, self.largest_change_rpm(change_rpm)?);
                 Ok(rate_time_s(self.read_number(rate).await?, change_rpm, worth, none_from))
             }
             // Such a drive stops without a ramp.
@@ -257,16 +258,17 @@ impl Drive {
         }
     }
 
-    /// The largest change of speed that can be asked for, r/min: from one limit of the target velocity to the other.
-    fn largest_change_rpm(&self) -> Result<f64, Error> {
+    /// The largest change of speed that can be asked for, r/min: from one limit of the target velocity to the other, or this one
+    /// where it has no limits.
+    fn largest_change_rpm(&self, change_rpm: f64) -> Result<f64, Error> {
         let target = self.has(self.motion("read its limits")?.units.target_velocity, "a target velocity")?;
         let row = self.row(target.object, "read its limits")?;
         let (low, high) = row.limits_at(1);
         let span = (high - low) as f64;
         Ok(match target.scale {
             Scale::PerCount(rpm) => span * rpm,
-            // Without limits of its own: there and back at the fastest that a drive of this kind turns.
-            Scale::Positions(_) | Scale::Rated { .. } => 2.0 * FASTEST_RPM,
+            // The limits of the object are those of its type: what is to be changed counts.
+            Scale::Positions(_) | Scale::Rated { .. } => change_rpm.abs(),
         })
     }
 
@@ -282,9 +284,6 @@ impl Drive {
 
 /// A change of speed below this is none: half a count of the speed objects.
 const LEAST_CHANGE_RPM: f64 = 0.5;
-
-/// The speed of a servo motor that no limit of an object tells, r/min: more than those of its kind turn.
-const FASTEST_RPM: f64 = 10_000.0;
 
 /// A ramp as an acceleration in counts that are `worth` (r/min)/s each; a change without a ramp is `none_from`. A time that is
 /// longer than the gentlest acceleration takes gets that one.
