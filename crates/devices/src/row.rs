@@ -90,11 +90,33 @@ pub const fn merge<const N: usize>(parts: &[&[Entry]]) -> [Entry; N] {
     rows
 }
 
-/// Constants for objects of a table, checked at compile time: `NAME: type = index sub-index;`.
-macro_rules! objects {
-    ($table:ident: $($name:ident: $type:ty = $index:literal $sub:literal;)*) => {
-        $(#[doc = concat!("Object ", stringify!($index), ":", stringify!($sub), ".")]
-        pub const $name: canopen::od::Object<$type> = $table.object($index, $sub);)*
+/// Rows of a table, and a typed constant for each that is named behind its row (`=> NAME`): each stands once.
+///
+/// The rows come out as the constant array in the head. The constants come out where the macro in the head is called, beside
+/// the `TABLE` that they are places of: it lies above the rows.
+macro_rules! rows {
+    ($vis:vis const $rows:ident: [Entry; $count:literal], $objects:ident:
+        $($make:ident($index:literal, $sub:literal, $type:ident, $name:expr, $title:expr)
+            $(.$set:ident($($value:expr),*))* $(=> $object:ident)?;)*) => {
+        $vis const $rows: [Entry; $count] = [$($make($index, $sub, $type, $name, $title)$(.$set($($value),*))*),*];
+
+        macro_rules! $objects {
+            () => {
+                $($(#[doc = concat!("Object ", stringify!($index), ":", stringify!($sub), ".")]
+                pub const $object: canopen::od::Object<$crate::row::types::$type> = TABLE.object($index, $sub);)?)*
+            };
+        }
+        pub(super) use $objects;
     };
 }
-pub(crate) use objects;
+pub(crate) use rows;
+
+/// The types of Rust that hold the values of the rows' types.
+pub(crate) mod types {
+    pub(crate) type U8 = u8;
+    pub(crate) type U16 = u16;
+    pub(crate) type U32 = u32;
+    pub(crate) type I8 = i8;
+    pub(crate) type I16 = i16;
+    pub(crate) type I32 = i32;
+}

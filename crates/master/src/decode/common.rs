@@ -5,8 +5,8 @@ use canopen::Mux;
 use canopen::od::{DataType, Entry};
 use devices::all;
 
+use DataType::Unsigned32 as U32;
 use DataType::{Integer16 as I16, Integer32 as I32};
-use DataType::{Unsigned8 as U8, Unsigned16 as U16, Unsigned32 as U32};
 
 /// The row of an object on which all models agree that have it, for a node whose model is not known.
 pub fn common_row(mux: Mux) -> Option<&'static Entry> {

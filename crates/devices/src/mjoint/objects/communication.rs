@@ -9,22 +9,23 @@ use crate::row::{U8, U16, U32, join, ro, rws};
 pub(super) const ROWS: [Entry; 68] =
     join(&[&GENERAL, &RPDO_PARAMETERS, &RPDO_MAPPINGS, &TPDO_PARAMETERS, &TPDO_MAPPINGS]);
 
-const GENERAL: [Entry; 11] = [
-    ro(0x1000, 0, U32, "device_type", "Device type").default(0x0002_0192),
-    ro(0x1001, 0, U8, "error_register", "Error register"),
+crate::row::rows! { const GENERAL: [Entry; 11], general_objects:
+    ro(0x1000, 0, U32, "device_type", "Device type").default(0x0002_0192);
+    ro(0x1001, 0, U8, "error_register", "Error register") => ERROR_REGISTER;
     // The description prints 8h.
-    ro(0x1005, 0, U32, "cob_id_sync", "PDO synchronous ID").default(0x80),
-    ro(0x1016, 0, U8, "consumer_heartbeat", "0x1016 number of subindexes").default(1),
+    ro(0x1005, 0, U32, "cob_id_sync", "PDO synchronous ID").default(0x80);
+    ro(0x1016, 0, U8, "consumer_heartbeat", "0x1016 number of subindexes").default(1);
     // Node 7Fh, 2000 ms.
-    rws(0x1016, 1, U32, "consumer_heartbeat_time", "Consumption of time between heartbeats").default(0x007F_07D0),
-    rws(0x1017, 0, U16, "producer_heartbeat_time", "The heartbeat generates interval time").default(1000).unit("ms"),
+    rws(0x1016, 1, U32, "consumer_heartbeat_time", "Consumption of time between heartbeats").default(0x007F_07D0)
+        => CONSUMER_HEARTBEAT_TIME;
+    rws(0x1017, 0, U16, "producer_heartbeat_time", "The heartbeat generates interval time").default(1000).unit("ms");
     // Printed with 16 bits; CiA 301 has 8, as the manual's 1016h:00.
-    ro(0x1018, 0, U8, "identity_object", "0x1018 number of subindexes").default(4),
-    ro(0x1018, 1, U32, "vendor_id", "Vendor ID").default(0x331),
-    ro(0x1018, 2, U32, "product_code", "Product code").default(0x1),
-    ro(0x1018, 3, U32, "revision_number", "Version number").default(0x100),
-    ro(0x1018, 4, U32, "serial_number", "Serial number").default(0x1),
-];
+    ro(0x1018, 0, U8, "identity_object", "0x1018 number of subindexes").default(4);
+    ro(0x1018, 1, U32, "vendor_id", "Vendor ID").default(0x331);
+    ro(0x1018, 2, U32, "product_code", "Product code").default(0x1);
+    ro(0x1018, 3, U32, "revision_number", "Version number").default(0x100);
+    ro(0x1018, 4, U32, "serial_number", "Serial number").default(0x1);
+}
 
 const AT_ONCE: &[(i64, &str)] = &[(255, "asynchronous mode")];
 const WITH_SYNC: &[(i64, &str)] = &[(1, "synchronous mode: after one SYNC")];

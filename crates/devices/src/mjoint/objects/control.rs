@@ -12,66 +12,68 @@ use crate::row::{I8, I16, I32, U8, U16, U32, join, ro, rw, rws};
 
 pub(super) const ROWS: [Entry; 36] = join(&[&MANUFACTURER, &PROFILE]);
 
-#[rustfmt::skip]
-const MANUFACTURER: [Entry; 17] = [
-    rw(0x2600, 0, U16, "modbus_enable", "Modbus enable").values(OFF_ON),
+crate::row::rows! { const MANUFACTURER: [Entry; 17], manufacturer_objects:
+    rw(0x2600, 0, U16, "modbus_enable", "Modbus enable").values(OFF_ON) => MODBUS_ENABLE;
     // 1 from power-on: bit 2 of the statusword 0404h that 5.10.1 prints before anything is enabled.
-    rw(0x2601, 0, U16, "output_enabled", "Drive output enabled").values(OFF_ON).default(1),
+    rw(0x2601, 0, U16, "output_enabled", "Drive output enabled").values(OFF_ON).default(1) => OUTPUT_ENABLED;
     // Printed 0 to 306 r/min; the AIM servos' manual has 0 to 200 and tenths of a degree.
     rws(0x2604, 0, U16, "weak_magnetic_angle", "Weak magnetic Angle")
-        .range(0, 200).default(WEAK_MAGNETIC_ANGLE).unit("0.1 deg"),
-    rws(0x2609, 0, U16, "dir_polarity", "DIR polarity").values(values::DIR_POLARITY),
-    rws(0x260A, 0, U16, "electronic_gear_numerator", "Electronic gear molecule").default(32768),
+        .range(0, 200).default(WEAK_MAGNETIC_ANGLE).unit("0.1 deg") => WEAK_MAGNETIC;
+    rws(0x2609, 0, U16, "dir_polarity", "DIR polarity").values(values::DIR_POLARITY) => DIR_POLARITY;
+    rws(0x260A, 0, U16, "electronic_gear_numerator", "Electronic gear molecule").default(32768) => GEAR_NUMERATOR;
     rws(0x260B, 0, U16, "electronic_gear_denominator", "Electronic gear denominator")
-        .range(1, 65535).default(8192),
-    rw(0x260C, 0, I32, "incremental_position", "The incremental position").unit("counts"),
-    rw(0x260E, 0, U16, "alarm_code", "Alarm code"),
-    ro(0x2612, 0, U16, "driver_temperature", "System temperature").range(0, 100).unit("1 degC"),
-    ro(0x2613, 0, I16, "output_pwm", "PWM of system output").unit("100/32768 %"),
+        .range(1, 65535).default(8192) => GEAR_DENOMINATOR;
+    rw(0x260C, 0, I32, "incremental_position", "The incremental position").unit("counts") => INCREMENTAL_POSITION;
+    rw(0x260E, 0, U16, "alarm_code", "Alarm code") => ALARM_CODE;
+    ro(0x2612, 0, U16, "driver_temperature", "System temperature").range(0, 100).unit("1 degC") => DRIVER_TEMPERATURE;
+    ro(0x2613, 0, I16, "output_pwm", "PWM of system output").unit("100/32768 %") => OUTPUT_PWM;
     // Reads 2 when all is stored, which is outside the printed range.
-    rw(0x2614, 0, U16, "data_save_flag", "Data save flag").range(0, 1),
+    rw(0x2614, 0, U16, "data_save_flag", "Data save flag").range(0, 1) => DATA_SAVE_FLAG;
     // Printed 0 to 255; node-IDs are 1 to 127.
-    rws(0x2615, 0, U16, "device_address", "Device location").range(1, 127).default(1),
+    rws(0x2615, 0, U16, "device_address", "Device location").range(1, 127).default(1) => DEVICE_ADDRESS;
     rws(0x2618, 0, U16, "stationary_max_output", "Stationary maximum allowable output")
-        .range(0, 609).default(STATIONARY_MAX_OUTPUT),
+        .range(0, 609).default(STATIONARY_MAX_OUTPUT) => STATIONARY_OUTPUT;
     // Printed 0 to 100, with angles from 30 to 32768.
-    rws(0x2619, 0, U16, "mode_selection", "Mode selection").range(0, 32768),
-    rws(0x261C, 0, U16, "synchronous_control_word", "CAN communication synchronous control word"),
+    rws(0x2619, 0, U16, "mode_selection", "Mode selection").range(0, 32768) => MODE_SELECTION;
+    rws(0x261C, 0, U16, "synchronous_control_word", "CAN communication synchronous control word")
+        => SYNCHRONOUS_CONTROL_WORD;
     rws(0x261D, 0, U16, "max_allowable_current", "maximum allowable current")
-        .range(0, 10009).default(MAX_ALLOWABLE_CURRENT).unit("mA"),
-    rw(0x6040, 0, U16, "controlword", "Control word").mappable(),
-];
+        .range(0, 10009).default(MAX_ALLOWABLE_CURRENT).unit("mA") => ALLOWABLE_CURRENT;
+    rw(0x6040, 0, U16, "controlword", "Control word").mappable() => CONTROLWORD;
+}
 
-#[rustfmt::skip]
-const PROFILE: [Entry; 19] = [
-    ro(0x6041, 0, U16, "statusword", "Status word").default(0x0404).mappable(),
-    rw(0x6060, 0, I8, "modes_of_operation", "Work mode").values(MODES).default(1).mappable(),
+crate::row::rows! { const PROFILE: [Entry; 19], profile_objects:
+    ro(0x6041, 0, U16, "statusword", "Status word").default(0x0404).mappable() => STATUSWORD;
+    rw(0x6060, 0, I8, "modes_of_operation", "Work mode").values(MODES).default(1).mappable() => MODES_OF_OPERATION;
     // Printed on one row with 6064h. Recorded at power-off.
-    ro(0x6063, 0, I32, "position_actual_internal_value", "Position").unit("counts").mappable().stored(),
-    ro(0x6064, 0, I32, "position_actual_value", "Actual position").unit("counts").mappable(),
+    ro(0x6063, 0, I32, "position_actual_internal_value", "Position").unit("counts").mappable().stored()
+        => POSITION_ACTUAL_INTERNAL_VALUE;
+    ro(0x6064, 0, I32, "position_actual_value", "Actual position").unit("counts").mappable() => POSITION_ACTUAL_VALUE;
     // Printed read and write, with a range in r/min.
     ro(0x606C, 0, I16, "velocity_actual_value", "Motor actual speed")
-        .range(-30000, 30000).unit("0.1 r/min").mappable(),
-    ro(0x6078, 0, U16, "current_actual_value", "Actual current").range(0, 32767).unit("1/2000 A").mappable(),
-    ro(0x6079, 0, U16, "dc_link_voltage", "System voltage").range(0, 32767).unit("1/327 V"),
+        .range(-30000, 30000).unit("0.1 r/min").mappable() => VELOCITY_ACTUAL_VALUE;
+    ro(0x6078, 0, U16, "current_actual_value", "Actual current").range(0, 32767).unit("1/2000 A").mappable()
+        => CURRENT_ACTUAL_VALUE;
+    ro(0x6079, 0, U16, "dc_link_voltage", "System voltage").range(0, 32767).unit("1/327 V") => DC_LINK_VOLTAGE;
     // Printed without M, though RPDO1, 2 and 4 carry it.
-    rw(0x607A, 0, I32, "target_position", "Target location cache").unit("counts").mappable(),
+    rw(0x607A, 0, I32, "target_position", "Target location cache").unit("counts").mappable() => TARGET_POSITION;
     rws(0x6081, 0, U32, "profile_velocity", "Trapezoidal velocity(Position Mode Speed)")
-        .range(0, 3000).default(PROFILE_VELOCITY_RPM).unit("r/min").mappable(),
+        .range(0, 3000).default(PROFILE_VELOCITY_RPM).unit("r/min").mappable() => PROFILE_VELOCITY;
     rws(0x6083, 0, U32, "profile_acceleration", "Motor acceleration")
-        .range(0, 65535).default(ACCELERATION_RPM_S).unit("(r/min)/s"),
+        .range(0, 65535).default(ACCELERATION_RPM_S).unit("(r/min)/s") => PROFILE_ACCELERATION;
     // Printed 17 to 21 here, 17 to 22 in 5.09.
-    rws(0x6098, 0, I8, "homing_method", "Return to origin method").range(17, 22).default(17),
-    ro(0x60F9, 0, U8, "velocity_loop", "Number of sub-indexes").default(2),
+    rws(0x6098, 0, I8, "homing_method", "Return to origin method").range(17, 22).default(17) => HOMING_METHOD;
+    ro(0x60F9, 0, U8, "velocity_loop", "Number of sub-indexes").default(2);
     rws(0x60F9, 1, U16, "velocity_kp", "Velocity ring proportionality coefficient")
-        .range(0, 10000).default(VELOCITY_KP).unit("0.001"),
+        .range(0, 10000).default(VELOCITY_KP).unit("0.001") => VELOCITY_PROPORTIONAL;
     rws(0x60F9, 2, U16, "velocity_integral_time", "Velocity loop integration time")
-        .range(2, 2000).default(VELOCITY_INTEGRAL_TIME_MS).unit("ms"),
-    ro(0x60FB, 0, U8, "position_loop", "Number of sub-indexes").default(2),
+        .range(2, 2000).default(VELOCITY_INTEGRAL_TIME_MS).unit("ms") => VELOCITY_INTEGRAL_TIME;
+    ro(0x60FB, 0, U8, "position_loop", "Number of sub-indexes").default(2);
     rws(0x60FB, 1, U16, "position_kp", "Proportional coefficient of position ring")
-        .range(60, 30000).default(POSITION_KP),
+        .range(60, 30000).default(POSITION_KP) => POSITION_PROPORTIONAL;
     rws(0x60FB, 2, U16, "velocity_feed_forward", "Rate feed-forward")
-        .range(0, 3924).unit("1/327 V/(1000 r/min)"),
-    ro(0x60FD, 0, U16, "digital_inputs", "Input port state").mappable(),
-    rw(0x60FF, 0, I32, "target_velocity", "Speed mode speed").range(-3000, 3000).unit("r/min").mappable(),
-];
+        .range(0, 3924).unit("1/327 V/(1000 r/min)") => VELOCITY_FEED_FORWARD;
+    ro(0x60FD, 0, U16, "digital_inputs", "Input port state").mappable() => DIGITAL_INPUTS;
+    rw(0x60FF, 0, I32, "target_velocity", "Speed mode speed").range(-3000, 3000).unit("r/min").mappable()
+        => TARGET_VELOCITY;
+}
