@@ -29,6 +29,10 @@ class Drive:
         #: What 606Ch reads by SDO at 1 r/min.
         self.per_rpm = per_rpm
 
+    def arguments(self, program):
+        """The `--drive` arguments that put it on a bus; `program` may have to write something first."""
+        return (f"{self.model}@{self.node_id}",)
+
     def rows(self, name):
         """The rows of one of the data files, as dictionaries."""
         with open(DATA / self.folder / name, newline="", encoding="utf-8") as file:

@@ -18,7 +18,7 @@ from bench import Bench
 from checks import CHECKS, Skip
 
 HERE = pathlib.Path(__file__).resolve().parent
-FOLDERS = ("zlac8030l", "zlim42c", "mjoint")
+FOLDERS = ("zlac8030l", "zlim42c", "mjoint", "cia402")
 #: Checks mostly wait for a drive to move, so more of them run at once than the machine has cores.
 JOBS = 6
 

@@ -5,7 +5,9 @@
 //!
 //! A set-point that does not come leaves the path going on as it last went, for as many periods as are forgiven, and then
 //! slowing down to rest. The standard leaves this to makers; going on is what keeps a single lost frame from being a jerk.
-//! A set-point that comes late starts its period when it comes, from where the path is by then.
+//! Only a path whose last two set-points came in time goes on so: one that is written once, or comes in a bunch, is reached
+//! and held, for what its velocity says is not the host's. A set-point that comes late starts its period when it comes, from
+//! where the path is by then.
 
 use crate::interpolate::{cubic, linear};
 use crate::profile::Point;
@@ -41,23 +43,29 @@ pub struct SetPoints {
     from: f64,
     to: f64,
     after: f64,
+    /// The last set-point came in time,
+    in_time: bool,
+    /// and so did the one before.
+    steady: bool,
 }
 
 impl SetPoints {
     /// At rest.
     pub const fn resting(position: f64) -> Self {
-        Self { before: position, from: position, to: position, after: position }
+        Self { before: position, from: position, to: position, after: position, in_time: false, steady: false }
     }
 
-    /// The next set-point came `age_s` after the last one.
+    /// The next set-point came `age_s` after the last one; infinite for the first.
     pub fn push(&mut self, target: f64, age_s: f64, following: &Following) {
+        let in_time = self.is_in_time(age_s, following);
+        let steady = in_time && self.in_time;
         match following.course {
             Course::Linear => {
                 let here = self.at(age_s, following).position;
-                *self = Self { before: self.from, from: here, to: target, after: target };
+                *self = Self { before: self.from, from: here, to: target, after: target, in_time, steady };
             }
-            Course::Cubic if self.is_in_time(age_s, following) => {
-                *self = Self { before: self.from, from: self.to, to: self.after, after: target };
+            Course::Cubic if in_time => {
+                *self = Self { before: self.from, from: self.to, to: self.after, after: target, in_time, steady };
             }
             // Late: the path has left its set-points, and starts over from where and as fast as it goes.
             Course::Cubic => {
@@ -65,7 +73,7 @@ impl SetPoints {
                 let step = velocity * following.period_s;
                 // With these neighbours the slope at the start is `velocity`: (to - before) / 2 = step.
                 let to = 0.5 * (position + target);
-                *self = Self { before: to - 2.0 * step, from: position, to, after: target };
+                *self = Self { before: to - 2.0 * step, from: position, to, after: target, in_time, steady };
             }
         }
     }
@@ -77,6 +85,9 @@ impl SetPoints {
             return self.within(age_s, following);
         }
         let end = self.within(period_s, following);
+        if !self.steady {
+            return self.catching_up(end, age_s, following);
+        }
         let free_s = following.forgiven.max(0.0) * period_s;
         let over_s = age_s - period_s;
         if over_s < free_s {
@@ -95,6 +106,16 @@ impl SetPoints {
     pub fn shift(&mut self, by: f64) {
         for position in [&mut self.before, &mut self.from, &mut self.to, &mut self.after] {
             *position -= by;
+        }
+    }
+
+    /// After the period of a path that does not go on: at its end, which for the cubic is one period further.
+    fn catching_up(&self, end: Point, age_s: f64, following: &Following) -> Point {
+        match following.course {
+            Course::Cubic if age_s < 2.0 * following.period_s => {
+                linear(end.position, self.after, following.period_s, age_s - following.period_s)
+            }
+            Course::Cubic | Course::Linear => Point { position: self.after, ..Point::default() },
         }
     }
 
@@ -189,6 +210,7 @@ mod tests {
     #[test]
     fn beyond_what_is_forgiven_the_path_slows_down_to_rest() {
         let mut path = SetPoints::resting(0.0);
+        path.push(0.0, PERIOD_S, &LINEAR);
         path.push(2.0, PERIOD_S, &LINEAR);
         // On at 1000 units/s for two periods to 6, then 1000 / 50000 = 20 ms and 1000^2 / (2 * 50000) = 10 units more.
         let middle = path.at(3.0 * PERIOD_S + 0.010, &LINEAR);
@@ -199,6 +221,35 @@ mod tests {
         }
         let strict = Following { forgiven: 0.0, deceleration: 0.0, ..LINEAR };
         assert_eq!(path.at(PERIOD_S * 1.01, &strict), Point { position: 2.0, ..Point::default() });
+    }
+
+    #[test]
+    fn a_set_point_that_comes_alone_or_in_a_bunch_is_reached_and_held() {
+        for following in [LINEAR, CUBIC] {
+            let mut path = SetPoints::resting(0.0);
+            path.push(100.0, f64::INFINITY, &following);
+            for age_s in [2.0, 3.0, 10.0, 1e6] {
+                let point = path.at(age_s * PERIOD_S, &following);
+                assert_eq!((point.position, point.velocity), (100.0, 0.0), "{following:?} after {age_s} periods");
+            }
+        }
+        // Five at once, again and again: the path never leaves what was asked for.
+        let mut path = SetPoints::resting(0.0);
+        let mut target = 0.0;
+        for _ in 0..20 {
+            for _ in 0..5 {
+                target += 1.0;
+                path.push(target, 0.1 * PERIOD_S, &LINEAR);
+            }
+            for step in 0..50_u8 {
+                let point = path.at(f64::from(step) * 0.1 * PERIOD_S, &LINEAR);
+                assert!(
+                    point.position <= target && (step < 10 || point.position == target),
+                    "{} {target}",
+                    point.position
+                );
+            }
+        }
     }
 
     #[test]

@@ -157,10 +157,58 @@ fn a_cubic_path_is_as_late_as_one_more_set_point() {
 }
 
 #[test]
+fn the_torque_offset_is_added_to_what_the_loops_ask_for() {
+    for mode in [8, 9] {
+        let mut bench = Bench::new();
+        bench.machine.set_rotor_locked(true, bench.now).unwrap();
+        bench.enable(mode);
+        bench.set(&[(0x60B2, 0, 300)]);
+        bench.run_ms(50);
+        let torque = bench.read(0x6077, 0);
+        assert!((torque - 300).abs() < 15, "mode {mode}: {torque}");
+    }
+}
+
+#[test]
 fn modes_that_6502h_does_not_name_are_refused() {
     let mut bench = Bench::new();
     for mode in [2, 5, 11, -1] {
         assert_eq!(bench.write(0x6060, 0, mode), Err(canopen::AbortCode::INVALID_VALUE), "{mode}");
     }
     assert_eq!(bench.read(0x6060, 0), 0);
+}
+
+#[test]
+fn slow_set_points_are_joined_and_the_last_one_is_where_it_ends() {
+    let mut bench = Bench::new();
+    map_cyclic_position(&mut bench);
+    bench.set(&[(0x60C2, 1, 10)]);
+    bench.enable(8);
+    for step in 1..=150 {
+        rpdo3(&mut bench, 0x0F, step * TURN / 20);
+        bench.sync();
+        bench.run_ms(10);
+    }
+    bench.run_ms(500);
+    assert!((bench.position() - 150 * TURN / 20).abs() < TURN / 2, "{}", bench.position());
+    assert!(bench.rpm().abs() < 1.0, "{}", bench.rpm());
+}
+
+#[test]
+fn set_points_that_come_in_bunches_are_caught_up_with() {
+    let mut bench = Bench::new();
+    bench.set(&[(0x60C2, 1, 10)]);
+    bench.enable(8);
+    let mut target = 0;
+    for _ in 0..40 {
+        for _ in 0..5 {
+            target += TURN / 40;
+            bench.set(&[(0x607A, 0, target)]);
+        }
+        bench.run_ms(50);
+        let behind = target - bench.position();
+        assert!(behind.abs() < TURN / 4, "{behind} behind {target}");
+    }
+    bench.run_ms(100);
+    assert!((bench.position() - target).abs() < TURN / 500 && bench.emcy().is_empty(), "{}", bench.position());
 }

@@ -240,6 +240,7 @@ impl Shaft {
         }
         let position = self.position();
         let limits = self.limits();
+        self.servo.set_torque_offset(self.torque_offset_a(values));
         self.servo.control(&self.model, &self.gains, &self.demand, position, &limits);
         let shown = self.parameters.scales.position(position);
         let index = index.map(|at| self.parameters.scales.position(at));

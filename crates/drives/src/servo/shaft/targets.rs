@@ -52,8 +52,7 @@ impl Shaft {
         if self.set_point_age_s.is_none() {
             self.set_points = motion::set_points::SetPoints::resting(f64::from(feedback_position));
         }
-        // From rest the first one is a period old at once.
-        let age_s = self.set_point_age_s.unwrap_or(following.period_s);
+        let age_s = self.set_point_age_s.unwrap_or(f64::INFINITY);
         self.set_points.push(target, age_s, &following);
         self.set_point_age_s = Some(0.0);
     }
@@ -94,6 +93,16 @@ impl Shaft {
         let cyclic = self.power.mode() == ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE;
         let offset = if cyclic { read(values, self.slots.torque_offset, 0) } else { 0 };
         let per_mille = read(values, self.slots.target_torque, 0) + offset;
+        self.parameters.current_a(per_mille, &self.motor) * self.parameters.scales.direction() as f32
+    }
+
+    /// 60B2h in cyclic position and velocity, as a current: what the host knows to be needed beside the loops.
+    pub(super) fn torque_offset_a(&self, values: &Dictionary<impl Storage>) -> f32 {
+        let takes = [ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION, ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY];
+        if !self.is_enabled() || !takes.contains(&self.power.mode()) {
+            return 0.0;
+        }
+        let per_mille = read(values, self.slots.torque_offset, 0);
         self.parameters.current_a(per_mille, &self.motor) * self.parameters.scales.direction() as f32
     }
 
