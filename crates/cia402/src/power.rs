@@ -3,7 +3,7 @@
 //! Events in, states out. Ramps that delay a transition (option codes 605Ah to 605Eh) are the drive's: it raises
 //! the event when the ramp is done.
 
-use crate::{PowerCommand, Statusword};
+use crate::PowerCommand;
 
 /// A state of the power drive state machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -38,21 +38,6 @@ impl PowerState {
         Self::FaultReactionActive,
         Self::Fault,
     ];
-
-    /// Bits 0 to 3, 5 and 6 of the statusword in this state, bit 5 set where the standard leaves it open in
-    /// Switch on disabled.
-    pub const fn statusword_bits(self) -> u16 {
-        match self {
-            Self::NotReadyToSwitchOn => 0,
-            Self::SwitchOnDisabled => Statusword::SWITCH_ON_DISABLED | Statusword::QUICK_STOP,
-            Self::ReadyToSwitchOn => 0x21,
-            Self::SwitchedOn => 0x23,
-            Self::OperationEnabled => 0x27,
-            Self::QuickStopActive => 0x07,
-            Self::FaultReactionActive => 0x0F,
-            Self::Fault => 0x08,
-        }
-    }
 
     /// The standard's name.
     pub const fn name(self) -> &'static str {
@@ -163,6 +148,7 @@ pub const fn next_command(state: PowerState) -> Option<PowerCommand> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Statusword;
 
     #[test]
     fn quick_stop_from_switched_on_goes_to_switch_on_disabled() {

@@ -74,6 +74,23 @@ impl Statusword {
     }
 }
 
+impl PowerState {
+    /// Bits 0 to 3, 5 and 6 of the statusword in this state, bit 5 set where the standard leaves it open in
+    /// Switch on disabled.
+    pub const fn statusword_bits(self) -> u16 {
+        match self {
+            Self::NotReadyToSwitchOn => 0,
+            Self::SwitchOnDisabled => Statusword::SWITCH_ON_DISABLED | Statusword::QUICK_STOP,
+            Self::ReadyToSwitchOn => 0x21,
+            Self::SwitchedOn => 0x23,
+            Self::OperationEnabled => 0x27,
+            Self::QuickStopActive => 0x07,
+            Self::FaultReactionActive => 0x0F,
+            Self::Fault => 0x08,
+        }
+    }
+}
+
 impl fmt::Display for Statusword {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let state = self.state().map_or("no state of CiA 402", PowerState::name);
