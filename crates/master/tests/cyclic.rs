@@ -327,6 +327,17 @@ fn the_loss_of_another_nodes_sync_stops_the_drive() {
 }
 
 #[test]
+fn a_drive_that_moves_is_stopped_when_its_own_program_ends_sync() {
+    let mut bench = Bench::new();
+    let (_, mut cyclic) = bench.open(SERVO, PV);
+    bench.run(&mut cyclic, 400, |_| Demand::Velocity(Rpm(100.0)));
+    bench.network.sync(None);
+    bench.world.refresh();
+    bench.world.run_for(Duration::from_secs(1));
+    assert!(bench.speed_rpm(SERVO).abs() < 2.0, "{}", bench.speed_rpm(SERVO));
+}
+
+#[test]
 fn a_guarded_drive_stops_when_the_whole_program_dies() {
     let mut bench = Bench::new();
     let (drive, mut cyclic) = bench.open(SERVO, PV);

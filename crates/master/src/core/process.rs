@@ -69,12 +69,14 @@ impl Core {
     pub(super) fn produce_sync(&mut self, period: Option<Duration>) {
         self.sync.produce(period, self.now);
         self.cycle_changed = true;
+        self.stop_without_cycles();
         self.count_cycle();
     }
 
     pub(super) fn follow_sync(&mut self, period: Option<Duration>) {
         self.sync.follow(period, self.now);
         self.cycle_changed = true;
+        self.stop_without_cycles();
     }
 
     /// Watches over a program that moves a drive by process data.
@@ -156,8 +158,20 @@ impl Core {
         self.stop_lost();
     }
 
+    /// Where nobody counts cycles any more, nobody would find that a program stays away.
+    fn stop_without_cycles(&mut self) {
+        if self.sync.period().is_none() {
+            self.lost.extend(self.supervision.lose_sync(self.since_sync()));
+            self.stop_lost();
+        }
+    }
+
+    fn since_sync(&self) -> Duration {
+        self.sync.cycle().map_or(Duration::ZERO, |cycle| self.now - cycle.at)
+    }
+
     fn lose_sync(&mut self) {
-        let waited = self.sync.cycle().map_or(Duration::ZERO, |cycle| self.now - cycle.at);
+        let waited = self.since_sync();
         self.cycle_changed = true;
         self.events.push(Event::SyncLost(waited), self.now);
         self.lost.extend(self.supervision.lose_sync(waited));
