@@ -11,6 +11,8 @@ pub(super) struct Identifiers<S: Storage> {
     sync: u16,
     sdo: u16,
     rpdos: S::Pdos<u16>,
+    /// Two RPDOs have the same identifier.
+    rpdos_share: bool,
 }
 
 const WORDS: usize = 2048 / 32;
@@ -20,7 +22,7 @@ const UNUSED: u16 = u16::MAX;
 impl<S: Storage> Identifiers<S> {
     /// Deaf.
     pub(super) fn none(rpdos: usize) -> Self {
-        Self { heard: [0; WORDS], sync: UNUSED, sdo: UNUSED, rpdos: S::pdos(rpdos, UNUSED) }
+        Self { heard: [0; WORDS], sync: UNUSED, sdo: UNUSED, rpdos: S::pdos(rpdos, UNUSED), rpdos_share: false }
     }
 
     /// Deaf until the next [`listen`](Self::listen).
@@ -31,6 +33,8 @@ impl<S: Storage> Identifiers<S> {
     /// NMT, SDO requests to `node_id`, and what was set for the other services, are heard from now on.
     pub(super) fn listen(&mut self, node_id: NodeId) {
         self.sdo = connection_set::sdo_request(node_id).as_standard().unwrap_or(UNUSED);
+        let rpdos = self.rpdos.as_ref();
+        self.rpdos_share = rpdos.iter().enumerate().any(|(n, id)| *id != UNUSED && rpdos[..n].contains(id));
         self.deafen();
         let others = [NMT, self.sync, self.sdo];
         for id in others.iter().chain(self.rpdos.as_ref()) {
@@ -69,6 +73,12 @@ impl<S: Storage> Identifiers<S> {
     #[inline]
     pub(super) const fn is_sdo(&self, id: u16) -> bool {
         id == self.sdo
+    }
+
+    /// True if a frame may be for more than one RPDO.
+    #[inline]
+    pub(super) const fn rpdos_share(&self) -> bool {
+        self.rpdos_share
     }
 
     /// The identifiers of RPDO 1 and on.

@@ -131,6 +131,9 @@ impl<S: Storage> Node<S> {
         for position in 0..self.received.rpdos().len() {
             if self.received.rpdos()[position] == id {
                 self.receive_rpdo(frame, position);
+                if !self.received.rpdos_share() {
+                    return;
+                }
             }
         }
     }
