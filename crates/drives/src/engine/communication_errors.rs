@@ -1,39 +1,33 @@
-use canopen::pdo::PdoNumber;
-
 use super::faults::error_register::{COMMUNICATION, GENERIC};
 
 /// Errors of communication that have not ended: they stand in the error register (CiA 301, 7.5.2.2) beside the drive's
-/// faults. A bit each.
+/// faults.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct CommunicationErrors(u8);
+pub(super) struct CommunicationErrors {
+    /// Events of the node were lost.
+    pub(super) events_lost: bool,
+    /// A heartbeat that is watched has stayed away.
+    pub(super) heartbeat_lost: bool,
+    /// How many RPDOs had a last frame that was shorter than their mapping.
+    short_rpdos: u16,
+}
 
 impl CommunicationErrors {
     /// No error.
-    pub(super) const NONE: Self = Self(0);
-    /// Events of the node were lost.
-    pub(super) const EVENTS_LOST: Self = Self(1 << PdoNumber::PREDEFINED);
-    /// A heartbeat that is watched has stayed away.
-    pub(super) const HEARTBEAT: Self = Self(Self::EVENTS_LOST.0 << 1);
+    pub(super) const NONE: Self = Self { events_lost: false, heartbeat_lost: false, short_rpdos: 0 };
 
-    /// The last frame of an RPDO was shorter than its mapping.
-    pub(super) const fn short_rpdo(number: PdoNumber) -> Self {
-        Self(1 << number.position())
+    /// The frames of an RPDO have become too short. Told once, as its end.
+    pub(super) const fn begin_short_rpdo(&mut self) {
+        self.short_rpdos = self.short_rpdos.saturating_add(1);
+    }
+
+    /// They fit again.
+    pub(super) const fn end_short_rpdo(&mut self) {
+        self.short_rpdos = self.short_rpdos.saturating_sub(1);
     }
 
     pub(super) const fn is_empty(self) -> bool {
-        self.0 == 0
-    }
-
-    pub(super) const fn contains(self, errors: Self) -> bool {
-        self.0 & errors.0 == errors.0
-    }
-
-    pub(super) const fn insert(&mut self, errors: Self) {
-        self.0 |= errors.0;
-    }
-
-    pub(super) const fn remove(&mut self, errors: Self) {
-        self.0 &= !errors.0;
+        !self.events_lost && !self.heartbeat_lost && self.short_rpdos == 0
     }
 
     /// What they set in the error register.

@@ -7,7 +7,6 @@
 use can::{Bitrate, Frame, Instant, Station};
 use canopen::node::{Node, NodeEvent, NodeProfile, Ticket, Via};
 use canopen::od::{Dictionary, Entry, Slot, Storage};
-use canopen::pdo::PdoNumber;
 use canopen::{AbortCode, EmcyErrorCode, Mux, NodeId};
 
 use super::communication_errors::CommunicationErrors;
@@ -269,19 +268,18 @@ impl<S: Storage> Device<S> {
     /// After a reset of faults: the error register shows what is left, and EMCY tells when nothing is.
     pub fn report_reset<const F: usize>(&mut self, faults: &FaultMonitor<F>, now: Instant) {
         self.fault_bits = faults.error_register();
-        self.communication_errors.remove(CommunicationErrors::EVENTS_LOST);
+        self.communication_errors.events_lost = false;
         self.report_end_of_error(now);
     }
 
     /// An RPDO came too short, or has its length again: an error that the profile may have a code for.
-    fn report_rpdo_length(&mut self, number: PdoNumber, fits: bool, now: Instant) {
+    fn report_rpdo_length(&mut self, fits: bool, now: Instant) {
         let Some(code) = self.profile.short_rpdo else { return };
-        let error = CommunicationErrors::short_rpdo(number);
         if fits {
-            self.communication_errors.remove(error);
+            self.communication_errors.end_short_rpdo();
             self.report_end_of_error(now);
         } else {
-            self.communication_errors.insert(error);
+            self.communication_errors.begin_short_rpdo();
             self.report_error(code, now);
         }
     }
@@ -289,18 +287,17 @@ impl<S: Storage> Device<S> {
     /// Events of the node were lost: what CiA 301 calls objects lost. It stands until faults are reset, since what was
     /// lost does not come back.
     fn report_lost_events(&mut self, now: Instant) {
-        self.communication_errors.insert(CommunicationErrors::EVENTS_LOST);
+        self.communication_errors.events_lost = true;
         self.report_error(EmcyErrorCode::CAN_OVERRUN, now);
     }
 
     /// A heartbeat that is watched has stayed away, or is heard again (CiA 301, 7.2.8.3.2.2).
     pub fn report_heartbeat(&mut self, heard: bool, now: Instant) {
-        let error = CommunicationErrors::HEARTBEAT;
         if !heard {
-            self.communication_errors.insert(error);
+            self.communication_errors.heartbeat_lost = true;
             self.report_error(EmcyErrorCode::HEARTBEAT, now);
-        } else if self.communication_errors.contains(error) {
-            self.communication_errors.remove(error);
+        } else if self.communication_errors.heartbeat_lost {
+            self.communication_errors.heartbeat_lost = false;
             self.report_end_of_error(now);
         }
     }
@@ -406,8 +403,8 @@ pub(crate) trait Application<S: Storage> {
                 NodeEvent::Asked { slot, raw, ticket } => self.asked(slot, raw, ticket, now),
                 NodeEvent::ResetNode => self.restart(now),
                 NodeEvent::ResetCommunication => self.restart_communication(now),
-                NodeEvent::RpdoTooShort(number) => self.device().report_rpdo_length(number, false, now),
-                NodeEvent::RpdoFits(number) => self.device().report_rpdo_length(number, true, now),
+                NodeEvent::RpdoTooShort(_) => self.device().report_rpdo_length(false, now),
+                NodeEvent::RpdoFits(_) => self.device().report_rpdo_length(true, now),
                 NodeEvent::EventsLost => self.device().report_lost_events(now),
                 NodeEvent::Sync => self.synchronised(now),
                 NodeEvent::Nmt(_) => {}
@@ -560,18 +557,17 @@ mod tests {
     fn errors_of_communication_stand_beside_the_faults_and_no_error_is_told_when_the_last_has_ended() {
         let mut device = started();
         let mut faults = FaultMonitor::new(&FAULTS, &[1]);
-        let [first, second] = [1, 2].map(|number| PdoNumber::new(number).unwrap());
-        device.report_rpdo_length(first, false, at(1, 0));
-        device.report_rpdo_length(second, false, at(1, 0));
+        device.report_rpdo_length(false, at(1, 0));
+        device.report_rpdo_length(false, at(1, 0));
         assert_sent(&mut device, ["701#00", "081#1082110000000000", "081#1082110000000000"], 0b1_0001);
         faults.raise(0);
         device.report_faults(faults.latched(), &faults, at(1, 0));
         assert_sent(&mut device, ["081#1032150000000000"], 0b1_0101);
-        device.report_rpdo_length(first, true, at(1, 0));
+        device.report_rpdo_length(true, at(1, 0));
         assert!(faults.reset());
         device.report_reset(&faults, at(1, 0));
         assert_sent(&mut device, [], 0b1_0001);
-        device.report_rpdo_length(second, true, at(1, 0));
+        device.report_rpdo_length(true, at(1, 0));
         assert_sent(&mut device, ["081#0000000000000000"], 0);
     }
 
