@@ -1,4 +1,4 @@
-//! A CiA 402 servo of any vendor: the firmware is built from a [`Description`](devices::Description), of the standard's own
+//! A CiA 402 servo of any vendor: the firmware is built from a [`Description`], of the standard's own
 //! drive ([`devices::servo`]) or of a file.
 //!
 //! Objects are looked up once, when the firmware starts: what the table lacks is not there, and what it has beyond
