@@ -1,9 +1,7 @@
 //! What makes a search among rows fast: a hash directory from a key to its row, and of each row what requests must know.
 
-use super::{Entry, Gate, Summary, TableError};
+use super::{Entry, Gate, MAX_ROWS, Summary, TableError};
 
-/// Most rows of a table.
-pub const MAX_ROWS: usize = FREE as usize;
 /// A free place of the directory.
 pub(super) const FREE: u16 = u16::MAX;
 

@@ -1,3 +1,8 @@
+//! The numbers of rows in a table.
+
+/// Most rows of a table: one number is no row.
+pub const MAX_ROWS: usize = u16::MAX as usize;
+
 /// The number of a row in its table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Slot(u16);

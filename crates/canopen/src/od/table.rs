@@ -1,8 +1,7 @@
-use core::fmt;
 use core::marker::PhantomData;
 
 use super::index::{FREE, fill, first_place, next_place};
-use super::{Entry, Gate, Held, Index, Places, RowFacts, Slot, Summary};
+use super::{Entry, Gate, Held, Index, Places, RowFacts, Slot, Summary, TableError};
 use crate::{AbortCode, Mux};
 
 /// All rows of a device, ascending by index and sub-index, with what makes the search among them fast.
@@ -65,37 +64,6 @@ impl<T> Object<T> {
         self.slot
     }
 }
-
-/// Why rows make no table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TableError {
-    /// The row at this position has the index and sub-index of the one before it, or smaller ones.
-    NotAscending {
-        /// From 0.
-        position: usize,
-    },
-    /// More than [`MAX_ROWS`](super::MAX_ROWS).
-    TooManyRows,
-    /// The index is not as long as the rows.
-    OtherLength,
-    /// The values longer than a cell have 4 GiB or more.
-    TooManyBytes,
-}
-
-impl fmt::Display for TableError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotAscending { position } => {
-                write!(f, "row {position} does not come after the one before it by index and sub-index")
-            }
-            Self::TooManyRows => write!(f, "more than {} rows", super::MAX_ROWS),
-            Self::OtherLength => f.write_str("the index is not as long as the rows"),
-            Self::TooManyBytes => f.write_str("strings and domains of 4 GiB or more"),
-        }
-    }
-}
-
-impl core::error::Error for TableError {}
 
 impl Table {
     /// A table of `rows` with `index` = [`Index::of`]`(rows)`.
