@@ -186,7 +186,8 @@ mod tests {
 
     #[test]
     fn every_row_of_every_page_is_found() {
-        for model in models() {
+        // The standard's own servo is read from no manual.
+        for model in models().filter(|model| model.name != "cia402") {
             let (_, text) = PAGES.iter().find(|(manual, _)| *manual == model.manual).unwrap();
             let numbered = |line: &&str| {
                 let id = line.strip_prefix("| ").and_then(|line| line.get(..4)).unwrap_or_default();

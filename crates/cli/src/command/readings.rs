@@ -178,8 +178,9 @@ mod tests {
     }
 
     #[test]
-    fn every_model_has_guesses_and_says_how_many() {
-        for model in models() {
+    fn every_model_of_a_manual_has_guesses_and_says_how_many() {
+        // The standard's own servo is read from no manual.
+        for model in models().filter(|model| model.name != "cia402") {
             let guesses = list(model, &[], true).map(|found| (found.readings.len(), found.guesses));
             assert!(guesses.is_ok_and(|(shown, all)| shown == all && all > 10), "{}", model.name);
         }

@@ -107,7 +107,11 @@ impl<S: Storage> Reader<'_, S> {
                 self.time_ms(slots.velocity_threshold_time, WINDOW_TIME_MS),
             ),
             following_error: Window {
-                half_width: self.window(slots.following_error_window, i64::from(Window::OFF)),
+                // 0 would forbid every motion: a file that leaves it at 0 leaves it open.
+                half_width: match self.window(slots.following_error_window, i64::from(Window::OFF)) {
+                    0 => Window::OFF,
+                    width => width,
+                },
                 time_ms: self.time_ms(slots.following_error_time, 0),
             },
             following: self.following(deceleration),
