@@ -36,7 +36,7 @@ fn described(path: &Path) -> Result<&'static Description, String> {
     let shown = plain(&path.display().to_string());
     let reading = data_sheet::reading(path).map_err(|unread| match unread {
         Unread::File(error) => format!("cannot read {shown}: {error}"),
-        Unread::Refused(refusal) => format!("{shown}, line {}: {}; {}", refusal.line, refusal.reason, refusal.next),
+        Unread::Refused(refusal) => format!("{shown}: {refusal}"),
     })?;
     keep(&reading.eds).map_err(|error| format!("{shown}: {error}"))
 }

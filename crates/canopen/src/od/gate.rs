@@ -19,7 +19,8 @@ impl Gate {
     pub(super) const CLOSED: Self = Self { mask: u32::MAX, low: 0, span: 0, listed: 0 };
 
     /// Closed, and the row itself has to be asked, where nothing may be written, of reals, and where a list's values lie too
-    /// far apart for the bits. ValueRange that move with a resolution are those at 1, which are the narrowest: beyond them the row is asked.
+    /// far apart for the bits. Limits that move with a resolution are those at 1, which are the narrowest: beyond them the row is
+    /// asked.
     pub(super) const fn of(row: &Entry) -> Self {
         let mask = row.data_type.mask();
         let is_cell = row.data_type.is_integer() && row.data_type.fits_cell();

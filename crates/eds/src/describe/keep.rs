@@ -85,7 +85,10 @@ fn describe(eds: &Eds) -> Result<Description, Unkept> {
     Ok(Description {
         name: leak(name(eds)),
         title: leak(title(eds)),
-        manual: leak(format!("the file {}", eds.file.file_name)),
+        manual: match eds.file.file_name.trim() {
+            "" => "a file without a name",
+            name => leak(format!("the file {name}")),
+        },
         identity,
         distinguishing_object: None,
         dictionary: table,

@@ -33,7 +33,9 @@ pub(super) fn sheet(name: &str) -> Result<Eds, Failure> {
 
 fn unreadable(path: &Path, unread: &Unread) -> Failure {
     match unread {
-        Unread::File(error) => Failure::new(format!("cannot read {}", path.display())).because(error),
+        Unread::File(error) => Failure::new(format!("cannot read {}", path.display()))
+            .because(error)
+            .next("is the name right, and may this user read the file?"),
         Unread::Refused(refusal) => {
             let at = if refusal.line > 0 { format!(", line {}", refusal.line) } else { String::new() };
             Failure::new(format!("{}{at} is not read as an EDS", path.display()))
