@@ -7,7 +7,7 @@ use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use common::{Simulator, done};
+use common::{Simulator, done, is_heard};
 
 const DRIVES: [(&str, &str, &str); 3] =
     [("4", "zlac8030l", "4=zlac8030l"), ("2", "zlim42c", "2=zlim42c"), ("1", "m4230e17b50", "1=m4230e17b50")];
@@ -32,18 +32,6 @@ fn start(bus: &str, model: &str, arguments: &[&str]) -> Child {
 fn interrupt(child: Child) -> Output {
     send("INT", &child);
     child.wait_with_output().unwrap()
-}
-
-/// Started by `nohup` or the like, these tests and all that they start pass a hang-up over, which is as it should be.
-fn hang_ups_are_passed_over() -> bool {
-    const SIGHUP_BIT: u64 = 1;
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask & SIGHUP_BIT != 0)
-}
-
-fn is_heard(signal: &str) -> bool {
-    signal != "HUP" || !hang_ups_are_passed_over()
 }
 
 fn send(signal: &str, child: &Child) {

@@ -54,7 +54,9 @@ fn found(state: &Path) -> u32 {
 #[test]
 fn a_store_is_there_after_every_end_that_came_with_its_acknowledgement() {
     let state = scratch("ends");
-    for (round, end) in ["-HUP", "-INT", "-TERM", "-QUIT", "-KILL", "quit"].iter().cycle().take(12).enumerate() {
+    let ends = ["-HUP", "-INT", "-TERM", "-QUIT", "-KILL", "quit"];
+    let ends = ends.iter().filter(|end| common::is_heard(end));
+    for (round, end) in ends.cycle().take(12).enumerate() {
         let value = 500 + round as u32;
         let mut simulator = simulator(&state);
         let mut bus = RawBus::connect(&simulator.address("socketcand"));

@@ -77,7 +77,8 @@ fn answers_that_nobody_reads_stop_no_drive_and_their_number_is_told() {
 
 #[test]
 fn every_signal_ends_a_simulator_whose_answers_nobody_reads() {
-    for (signal, status) in [("-TERM", 143), ("-INT", 130), ("-HUP", 129), ("-QUIT", 131)] {
+    let signals = [("-TERM", 143), ("-INT", 130), ("-HUP", 129), ("-QUIT", 131)];
+    for (signal, status) in signals.into_iter().filter(|(signal, _)| common::is_heard(signal)) {
         let mut simulator = Simulator::start_deaf(&SERVED);
         let mut input = simulator.take_input();
         for _ in 0..2_000 {

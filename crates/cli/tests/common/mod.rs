@@ -201,3 +201,16 @@ pub(crate) fn scratch(name: &str) -> PathBuf {
     std::fs::create_dir_all(&path).expect("the temporary directory can be written");
     path
 }
+
+/// Started by `nohup` or the like, these tests and all that they start pass a hang-up over, which is as it should be.
+fn hang_ups_are_passed_over() -> bool {
+    const SIGHUP_BIT: u64 = 1;
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask & SIGHUP_BIT != 0)
+}
+
+/// True for a signal, `HUP` or `-HUP`, that what is started here does not pass over.
+pub(crate) fn is_heard(signal: &str) -> bool {
+    signal.trim_start_matches('-') != "HUP" || !hang_ups_are_passed_over()
+}

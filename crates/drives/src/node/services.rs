@@ -11,6 +11,8 @@ use crate::engine::device::Device;
 
 /// Most nodes that are watched.
 const CONSUMERS: u8 = 8;
+/// The first entry of 1016h beyond them.
+const FIRST_UNWATCHED: u8 = CONSUMERS + 1;
 
 /// "save" and "load" (CiA 301, 7.5.2.13 and 7.5.2.14).
 const SAVE: u32 = u32::from_le_bytes(*b"save");
@@ -26,6 +28,8 @@ const EMCY_COB_ID: Mux = Mux::new(0x1014, 0);
 #[derive(Clone, Debug)]
 pub struct Services {
     consumers: [Option<Consumer>; CONSUMERS as usize],
+    /// Whose heartbeat has stayed away.
+    lost: [bool; CONSUMERS as usize],
     memory: Memory,
     generation: u32,
 }
@@ -33,7 +37,7 @@ pub struct Services {
 impl Services {
     /// With what is found in the memory at power-on.
     pub fn new(memory: Memory) -> Self {
-        Self { consumers: [None; CONSUMERS as usize], memory, generation: 0 }
+        Self { consumers: [None; CONSUMERS as usize], lost: [false; CONSUMERS as usize], memory, generation: 0 }
     }
 
     /// The supply is back: the memory is as it was left.
@@ -54,6 +58,7 @@ impl Services {
     /// After the device's restart, before it boots: the stored values of the rows that `wanted` names, and the watches.
     pub fn start(&mut self, device: &mut Device<impl Storage>, wanted: fn(&Entry) -> bool) {
         self.memory.load(device.values_mut(), wanted);
+        self.lost = [false; CONSUMERS as usize];
         let values = device.values();
         for (consumer, sub_index) in self.consumers.iter_mut().zip(1..) {
             let entry = values.table().find(Mux::new(WATCH, sub_index));
@@ -66,7 +71,9 @@ impl Services {
         let mux = device.values().table().row(slot).mux();
         match (mux.index, mux.sub_index) {
             (WATCH, sub_index @ 1..=CONSUMERS) => {
-                self.consumers[usize::from(sub_index) - 1] = Consumer::from_raw(raw);
+                let position = usize::from(sub_index) - 1;
+                self.consumers[position] = Consumer::from_raw(raw);
+                self.lost[position] = false;
             }
             (HISTORY, 0) => forget_history(device.values_mut()),
             (STORE, sub_index) => {
@@ -94,16 +101,31 @@ impl Services {
         self.consumers.iter().flatten().any(|consumer| consumer.can_id() == frame.id())
     }
 
-    /// A frame arrived; true if a node that is watched has booted, and so has lost its state.
+    /// A frame arrived; true if the heartbeat of a watched node has come again, and no other is missing. A boot-up message is no
+    /// heartbeat yet: the node has lost its state.
     pub fn handle_frame(&mut self, frame: &Frame, now: Instant) -> bool {
-        let events = self.consumers.iter_mut().flatten().filter_map(|consumer| consumer.handle_frame(frame, now));
-        events.fold(false, |booted, event| booted | (event == ConsumerEvent::BootUp))
+        let mut heard = false;
+        for (consumer, lost) in self.consumers.iter_mut().zip(&mut self.lost) {
+            let event = consumer.as_mut().and_then(|consumer| consumer.handle_frame(frame, now));
+            if matches!(event, Some(ConsumerEvent::Heard(_))) {
+                *lost = false;
+                heard = true;
+            }
+        }
+        heard && !self.lost.contains(&true)
     }
 
     /// Time has reached `now`; true if a heartbeat has stayed away.
     pub fn handle_timeout(&mut self, now: Instant) -> bool {
-        let events = self.consumers.iter_mut().flatten().filter_map(|consumer| consumer.handle_timeout(now));
-        events.fold(false, |lost, event| lost | (event == ConsumerEvent::Lost))
+        let mut any = false;
+        for (consumer, lost) in self.consumers.iter_mut().zip(&mut self.lost) {
+            let event = consumer.as_mut().and_then(|consumer| consumer.handle_timeout(now));
+            if event == Some(ConsumerEvent::Lost) {
+                *lost = true;
+                any = true;
+            }
+        }
+        any
     }
 
     /// When [`handle_timeout`](Self::handle_timeout) should next be called.
@@ -129,6 +151,7 @@ pub fn conditions(table: &'static Table) -> impl Iterator<Item = (Slot, Conditio
             (HISTORY, 0) => only_zero,
             (STORE, 1..) => only_save,
             (RESTORE, 1..) => only_load,
+            (WATCH, FIRST_UNWATCHED..) => only_nobody,
             _ => return None,
         };
         Some((slot, Condition::Check(check)))
@@ -137,6 +160,11 @@ pub fn conditions(table: &'static Table) -> impl Iterator<Item = (Slot, Conditio
 
 fn only_zero(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
     if raw == 0 { Ok(()) } else { Err(AbortCode::INVALID_VALUE) }
+}
+
+/// More nodes than can be watched: nobody is told that a watch is there which is not.
+fn only_nobody(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
+    if Consumer::from_raw(raw).is_none() { Ok(()) } else { Err(AbortCode::PARAMETER_INCOMPATIBLE) }
 }
 
 fn only_save(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {

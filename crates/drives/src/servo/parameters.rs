@@ -209,7 +209,7 @@ impl<S: Storage> Reader<'_, S> {
     }
 
     fn bounds(&self, speed: f64) -> Bounds {
-        let most = |slot| match self.read(slot, 0) {
+        let most = |slot| match self.magnitude(slot) {
             0 => f64::INFINITY,
             rate => self.scales.rate(rate),
         };
@@ -220,13 +220,18 @@ impl<S: Storage> Reader<'_, S> {
         }
     }
 
+    /// A speed, rate or limit, which the standard has unsigned. A file may give it a signed type: its sign says nothing.
+    fn magnitude(&self, slot: Option<Slot>) -> i64 {
+        self.read(slot, 0).saturating_abs()
+    }
+
     /// The least of what 607Fh, 6080h and the motor allow.
     fn max_speed(&self) -> f64 {
-        let profile = match self.read(self.slots.max_profile_velocity, 0) {
+        let profile = match self.magnitude(self.slots.max_profile_velocity) {
             0 => f64::INFINITY,
             speed => self.scales.speed(speed),
         };
-        let motor = match self.read(self.slots.max_motor_speed, 0) {
+        let motor = match self.magnitude(self.slots.max_motor_speed) {
             0 => f64::INFINITY,
             rpm => rpm as f64 / 60.0 * f64::from(self.motor.increments_per_turn),
         };
@@ -243,14 +248,14 @@ impl<S: Storage> Reader<'_, S> {
         let slots = self.slots;
         let kt = self.motor.torque_constant_nm_a();
         let torque_a = |slot: Option<Slot>| match slot {
-            Some(_) => self.read(slot, 0) as f32 * 1e-3 * rated_torque_nm / kt,
+            Some(_) => self.magnitude(slot) as f32 * 1e-3 * rated_torque_nm / kt,
             None => f32::INFINITY,
         };
         let rated_a = match self.read(slots.rated_current, 0) {
             millis @ 1.. => millis as f32 * 1e-3 * core::f32::consts::SQRT_2,
             _ => self.motor.rated_current_a,
         };
-        let current_a = match self.read(slots.max_current, 0) {
+        let current_a = match self.magnitude(slots.max_current) {
             0 => f32::INFINITY,
             per_mille => per_mille as f32 * 1e-3 * rated_a,
         };
@@ -266,7 +271,7 @@ impl<S: Storage> Reader<'_, S> {
 
     /// A rate of an object; without the object, or with 0 in it, the default or `most` if that is less.
     fn rate(&self, slot: Option<Slot>, most: f64) -> f64 {
-        match self.read(slot, 0) {
+        match self.magnitude(slot) {
             0 => self.default_rate().min(most),
             rate => self.scales.rate(rate),
         }
@@ -278,7 +283,7 @@ impl<S: Storage> Reader<'_, S> {
 
     fn speed(&self, slot: Option<Slot>, absent: f64) -> f64 {
         match slot {
-            Some(_) => self.scales.speed(self.read(slot, 0)),
+            Some(_) => self.scales.speed(self.magnitude(slot)),
             None => absent,
         }
     }

@@ -5,6 +5,9 @@ use super::reader::{Reader, shortened};
 use crate::document::{Entry, Section};
 use crate::{BIT_RATES, DynamicChannel, KeptSection, TypeCode};
 
+/// Dynamic channels that are read: CiA 302 networks have a handful.
+const MOST_CHANNELS: usize = 256;
+
 impl Reader {
     pub(super) fn info(&mut self, which: Info, section: Section<'_>) {
         for entry in section.entries() {
@@ -99,7 +102,13 @@ impl Reader {
         let code = entry.key.get(..5).filter(|start| start.eq_ignore_ascii_case("dummy"));
         let Some(code) = code.and_then(|_| u16::from_str_radix(&entry.key[5..], 16).ok()) else { return false };
         let allowed = self.flag(section, entry);
-        self.eds.dummies.push((TypeCode(code), allowed));
+        // The types that may stand in a mapping as placeholders have the codes 1 to 1Fh (CiA 301, 7.4.7.1).
+        let known = self.eds.dummies.iter_mut().find(|(known, _)| known.0 == code);
+        match known {
+            Some((_, last)) => *last = allowed,
+            None if code < 0x20 => self.eds.dummies.push((TypeCode(code), allowed)),
+            None => return false,
+        }
         true
     }
 
@@ -150,6 +159,9 @@ impl Reader {
         let word = entry.key.trim_end_matches(|digit: char| digit.is_ascii_digit());
         let Ok(number) = entry.key[word.len()..].parse::<u16>() else { return false };
         let channels = &mut self.eds.dynamic_channels;
+        if usize::from(number) > MOST_CHANNELS {
+            return false;
+        }
         let at = channels.iter().position(|channel| channel.number == number).unwrap_or_else(|| {
             let [data_type, direction, range, offset, max_count] = Default::default();
             channels.push(DynamicChannel { number, data_type, direction, range, offset, max_count });

@@ -25,7 +25,8 @@ pub(super) fn profile(
 
 fn keep(list: Vec<(Slot, Condition)>, rows: usize) -> &'static Conditions {
     let mut numbers = vec![0; rows];
-    for ((slot, _), number) in list.iter().zip(1..) {
+    // Numbers end at 255: a file with more rows of commands than that has the rest of them checked by their limits only.
+    for ((slot, _), number) in list.iter().zip(1..=u8::MAX) {
         numbers[slot.position()] = number;
     }
     Box::leak(Box::new(Conditions::new(list.leak(), numbers.leak())))

@@ -60,8 +60,7 @@ impl<S: Storage> Station for ServoDrive<S> {
     }
 
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
-        if self.device.is_running() && self.services.wants(frame) {
-            let _ = self.services.handle_frame(frame, now);
+        if self.device.is_running() && self.services.wants(frame) && self.services.handle_frame(frame, now) {
             self.regain_connection(now);
         }
         self.device.handle_frame(frame, now);
@@ -71,7 +70,7 @@ impl<S: Storage> Station for ServoDrive<S> {
     fn handle_timeout(&mut self, now: Instant) {
         self.device.handle_timeout(now);
         self.handle_events(now);
-        if self.services.handle_timeout(now) {
+        if self.device.is_running() && self.services.handle_timeout(now) {
             self.lose_connection(now);
         }
         if self.device.is_task_due(now) {
