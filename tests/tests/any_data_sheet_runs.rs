@@ -10,7 +10,7 @@ use sim::VirtualDrive;
 use sim::machine::{Order, order};
 
 const NODE: u8 = 5;
-const RUNS: u64 = 120;
+const RUNS: u64 = 1_000;
 
 /// Values that a file gives by mistake: out of range, of another type, of nothing.
 const WRONG: [&str; 16] = [
@@ -73,8 +73,9 @@ fn run_ms(machine: &mut dyn VirtualDrive, now: &mut Instant, ms: u64) {
     }
 }
 
-/// Boots, starts the node, and asks for motion in each mode, by SDO and by SYNC.
-fn use_it(machine: &mut dyn VirtualDrive) {
+/// Boots, starts the node, and asks for motion in each mode, by SDO and by SYNC. True if it moved.
+fn use_it(machine: &mut dyn VirtualDrive) -> bool {
+    let mut moved = false;
     let mut now = Instant::ZERO;
     machine.set_power(true, now);
     run_ms(machine, &mut now, 20);
@@ -91,6 +92,7 @@ fn use_it(machine: &mut dyn VirtualDrive) {
         send(machine, "205#0F00010000000000", now);
         send(machine, "080#", now);
         run_ms(machine, &mut now, 10);
+        moved |= machine.report().velocity_rpm.abs() > 1.0;
     }
     send(machine, "605#2310100173617665", now);
     run_ms(machine, &mut now, 5);
@@ -98,30 +100,31 @@ fn use_it(machine: &mut dyn VirtualDrive) {
     run_ms(machine, &mut now, 5);
     let report = machine.report();
     assert!(report.velocity_rpm.is_finite() && report.current_a.is_finite(), "{report:?}");
+    moved
 }
 
 #[test]
 fn a_sheet_that_is_wrong_anywhere_makes_a_device_that_runs_or_is_refused() {
     let text = write(&Sheet::of(&servo::CIA402).eds());
     let node = NodeId::new(NODE).expect("a node-ID");
-    let mut built = 0;
+    let (mut built, mut turned) = (0, 0);
     for seed in 0..RUNS {
         let mut random = Seeded::new(seed);
         let file = damaged(&text, &mut random);
         let outcome = std::panic::catch_unwind(|| {
-            let Ok(reading) = Eds::load(file.as_bytes()) else { return false };
-            let Ok(description) = keep(&reading.eds) else { return false };
-            let Ok(mut machine) = order(description, &Order::new(description, node, Bitrate::K500)) else {
-                return false;
-            };
-            use_it(&mut *machine);
-            true
+            let reading = Eds::load(file.as_bytes()).ok()?;
+            let description = keep(&reading.eds).ok()?;
+            let mut machine = order(description, &Order::new(description, node, Bitrate::K500)).ok()?;
+            Some(use_it(&mut *machine))
         });
         match outcome {
-            Ok(ran) => built += u64::from(ran),
+            Ok(ran) => {
+                built += u64::from(ran.is_some());
+                turned += u64::from(ran == Some(true));
+            }
             Err(_) => panic!("seed {seed}"),
         }
     }
-    // Nearly all of them make a device: a reader that refuses would pass for nothing.
-    assert!(built * 10 >= RUNS * 9, "{built} of {RUNS}");
+    // Nearly all of them make a device, and most of these turn: a reader that refuses would pass for nothing.
+    assert!(built * 10 >= RUNS * 9 && turned * 2 >= RUNS, "{built} made and {turned} turned of {RUNS}");
 }
