@@ -8,9 +8,14 @@ use devices::all;
 use DataType::Unsigned32 as U32;
 use DataType::{Integer16 as I16, Integer32 as I32};
 
-/// The row of an object on which all models agree that have it, for a node whose model is not known.
+/// The row of an object on which all models agree that have it, for a node whose model is not known. Of an object of the
+/// profile area (6000h to 9FFFh) that one model alone has, the unit is that model's: a scale that others set by 6091h and the
+/// like.
 pub fn common_row(mux: Mux) -> Option<&'static Entry> {
-    all().common_row(mux)
+    let row = all().common_row(mux)?;
+    let is_profile = matches!(mux.index, 0x6000..=0x9FFF);
+    let is_alone = all().rows(mux).nth(1).is_none();
+    (row.unit.is_empty() || !is_profile || !is_alone).then_some(row)
 }
 
 /// The name of an object that all models that have it give it, whatever its type and unit, or that the standard gives it.
