@@ -19,7 +19,7 @@ use super::error::Error;
 use super::expect::Expect;
 use super::row::Row;
 use super::set_points::{Axis, SetPoints};
-use crate::plot::{Event, EventKind};
+use plot::{Event, EventKind};
 
 /// Is told of each section as it begins.
 pub(super) type Progress = Rc<dyn Fn(&str)>;

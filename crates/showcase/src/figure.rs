@@ -1,13 +1,14 @@
 //! The picture: position, velocity and current of each drive over time, with the manuals' sections and what
 //! happened; then the drives together.
 
+use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 use sim::recorder::Signal;
 
 use super::bench::{Finished, SIGNALS};
 use super::set_points::Axis;
-use crate::plot::{Colour, Figure, Panel, Poster, Section, Style, Trace};
+use plot::{Colour, Figure, Panel, Poster, Section, Style, Trace};
 
 /// The picture without its charts.
 pub(super) fn poster(of_one: bool) -> Poster {
@@ -63,7 +64,7 @@ pub(super) fn same_calls(finished: &Finished, _name: &'static str) -> Vec<Vec<Fi
     vec![vec![Figure {
         title: "Three drives on one bus".into(),
         subtitle: "the same call of the master on each, in degrees and r/min at the motor's shaft".into(),
-        time: "time, s",
+        time: "time, s".into(),
         panels: vec![
             axes(names, "Shaft angle", "°", |drive| angle(finished, drive, 360.0)),
             axes(names, "Velocity", "r/min", |drive| mean_rpm(finished, drive)),
@@ -80,18 +81,19 @@ pub(super) fn interpolation(finished: &Finished, _name: &'static str) -> Vec<Vec
     let starts = finished.starts.iter().map(|start| Figure {
         title: format!("{}: {:.0} µs apart", start.setting, start.spread_us()),
         subtitle: "three joints after one SYNC".into(),
-        time: "µs",
+        time: "µs".into(),
         panels: vec![Panel {
-            title: "Shaft",
-            unit: "counts",
+            title: "Shaft".into(),
+            unit: "counts".into(),
             height: 90.0,
+            with_zero: true,
             traces: names
                 .into_iter()
                 .zip(COLOURS)
                 .zip(&start.axes)
                 .zip(0..)
                 .map(|(((label, colour), points), place)| Trace {
-                    label,
+                    label: label.into(),
                     style: Style::OneOf(colour, place),
                     points: points.clone(),
                 })
@@ -102,7 +104,7 @@ pub(super) fn interpolation(finished: &Finished, _name: &'static str) -> Vec<Vec
     let path = Figure {
         title: "Three joints, interpolation".into(),
         subtitle: "mode 7: RPDO4 to each and SYNC, every 2 ms".into(),
-        time: "time, s",
+        time: "time, s".into(),
         panels: vec![axes(names, "Shaft angle", "turns of the motor", |drive| angle(finished, drive, 1.0))],
         sections: sections(finished),
         events: finished.events.clone(),
@@ -121,11 +123,11 @@ fn axes(
     points: impl Fn(usize) -> Vec<(f64, f64)>,
 ) -> Panel {
     let traces = names.into_iter().zip(COLOURS).zip(0..).map(|((label, colour), place)| Trace {
-        label,
+        label: label.into(),
         style: Style::OneOf(colour, place),
         points: points(place.into()),
     });
-    Panel { title, unit, height: 90.0, traces: traces.collect() }
+    Panel { title: title.into(), unit: unit.into(), height: 90.0, traces: traces.collect(), ..Panel::default() }
 }
 
 /// Angle of a shaft, in parts of a turn.
@@ -142,21 +144,22 @@ fn drive(
     position_unit: &'static str,
     position: Vec<(f64, f64)>,
 ) -> Figure {
-    let panel = |title, unit, height, colour, axis, demand, actual| Panel {
-        title,
-        unit,
+    let panel = |title: &'static str, unit: &'static str, height, colour, axis, demand, actual| Panel {
+        title: Cow::from(title),
+        unit: Cow::from(unit),
         height,
+        with_zero: true,
         traces: vec![
-            Trace { label: "demand", style: Style::Demand, points: samples(finished, 0, demand) },
-            Trace { label: "set-point", style: Style::SetPoint, points: finished.set_points.line(axis) },
-            Trace { label: "actual", style: Style::Actual(colour), points: actual },
+            Trace { label: "demand".into(), style: Style::Demand, points: samples(finished, 0, demand) },
+            Trace { label: "set-point".into(), style: Style::SetPoint, points: finished.set_points.line(axis) },
+            Trace { label: "actual".into(), style: Style::Actual(colour), points: actual },
         ],
     };
     let (velocity, current) = (mean_rpm(finished, 0), samples(finished, 0, Signal::Current));
     Figure {
         title: title.into(),
         subtitle: subtitle.into(),
-        time: "time, s",
+        time: "time, s".into(),
         panels: vec![
             panel("Position", position_unit, 80.0, Colour::Blue, Axis::Position, Signal::PositionDemand, position),
             panel("Velocity", "r/min", 80.0, Colour::Teal, Axis::Velocity, Signal::VelocityDemand, velocity),

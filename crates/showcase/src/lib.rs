@@ -25,7 +25,6 @@ mod figure;
 mod lights;
 mod mjoint;
 mod part;
-mod plot;
 mod row;
 mod set_points;
 mod timing;

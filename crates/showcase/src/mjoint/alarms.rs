@@ -7,7 +7,7 @@ use super::steps::{ALARM, idle};
 use crate::bench::Bench;
 use crate::expect::Expect;
 use crate::lights::red_flashes;
-use crate::plot::EventKind;
+use plot::EventKind;
 
 /// A flash that lasts this long is a long one. The table does not print times.
 const LONG: Duration = Duration::from_millis(500);

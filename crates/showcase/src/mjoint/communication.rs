@@ -8,8 +8,8 @@ use super::steps::{ALARM, idle, move_time_s, power_cycle, restart_as, save, unti
 use crate::bench::Bench;
 use crate::datagram::frame;
 use crate::expect::Expect;
-use crate::plot::EventKind;
 use crate::timing::largest_gap_ms;
+use plot::EventKind;
 
 /// 5.11.1: "Plug in the motor and receive one heartbeat pack every second"; 05 is normal operation.
 pub(super) fn boot_up(bench: &mut Bench) {

@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::steps::{COUNTS_PER_TURN, idle};
 use crate::bench::Bench;
 use crate::expect::Expect;
-use crate::plot::EventKind;
+use plot::EventKind;
 
 /// From where the motor starts to the switch's edge, counts.
 const WAY: i64 = 10_000;

@@ -4,7 +4,7 @@
 use super::steps::{TARGET_REACHED, counts_s, idle, move_time_s, until_reached};
 use crate::bench::Bench;
 use crate::expect::Expect;
-use crate::plot::EventKind;
+use plot::EventKind;
 
 /// As the examples set them.
 const SPEED_RPM: f64 = 1000.0;

@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::steps::{ALARM, COUNTS_PER_TURN, IN_PLACE_COUNTS, TARGET_REACHED, expect_time, idle, power_cycle, save};
 use crate::bench::Bench;
 use crate::expect::Expect;
-use crate::plot::EventKind;
+use plot::EventKind;
 
 /// 2: the battery is disconnected, the turns are lost, and a new origin is set with 60006 and 60016.
 pub(super) fn zero_setting(bench: &mut Bench) {

@@ -4,7 +4,7 @@
 use super::steps::{COUNTS_PER_TURN, counts_s, power_cycle, save};
 use crate::bench::Bench;
 use crate::expect::Expect;
-use crate::plot::EventKind;
+use plot::EventKind;
 
 /// Counts by which the following motor may be off at rest: 8 pulses of 4 counts.
 const FOLLOWING_COUNTS: f64 = 32.0;

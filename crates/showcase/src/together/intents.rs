@@ -12,7 +12,7 @@ use master::{Elapsed, Error, Network, Node, join_all};
 
 use crate::bench::Bench;
 use crate::expect::Expect;
-use crate::plot::EventKind;
+use plot::EventKind;
 
 /// Every drive boots well within a second.
 const BOOT_PATIENCE: Duration = Duration::from_secs(5);

@@ -17,7 +17,7 @@ use crate::bench::{Bench, Start};
 use crate::datagram::frame;
 use crate::expect::Expect;
 use crate::mjoint::{COUNTS_PER_TURN, IN_PLACE_COUNTS};
-use crate::plot::EventKind;
+use plot::EventKind;
 
 /// "The above procedure is performed every 2 ms".
 const CYCLE: Duration = Duration::from_millis(2);

@@ -7,7 +7,7 @@ use super::functions::{clear_fault, velocity_mode};
 use super::position::position_mode;
 use crate::bench::Bench;
 use crate::expect::Expect;
-use crate::plot::EventKind;
+use plot::EventKind;
 
 /// 1014h: 80h + node-ID.
 const EMCY: u16 = 0x80 + NODE as u16;

@@ -7,7 +7,7 @@ use sim::Brake;
 use super::velocity::enable_again;
 use crate::bench::Bench;
 use crate::expect::Expect;
-use crate::plot::EventKind;
+use plot::EventKind;
 
 const SAVE: (&str, &str) = ("2B 09 20 00 02 00 00 00", "60 09 20 00 00 00 00 00");
 const WRITE_OK_202F: &str = "60 2F 20";

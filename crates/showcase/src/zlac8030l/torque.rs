@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::velocity::enable_again;
 use crate::bench::Bench;
 use crate::expect::Expect;
-use crate::plot::EventKind;
+use plot::EventKind;
 
 /// Torque slope as delivered (6087h), A/s.
 const SLOPE_A_S: f64 = 0.3;

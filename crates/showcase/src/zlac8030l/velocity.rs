@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::as_delivered::COUNTS_PER_TURN;
 use crate::bench::Bench;
 use crate::expect::Expect;
-use crate::plot::EventKind;
+use plot::EventKind;
 
 /// Acceleration and deceleration time as delivered (6083h, 6084h), s: from the present speed to the target.
 const RAMP_S: f64 = 0.5;

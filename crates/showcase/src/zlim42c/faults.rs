@@ -5,7 +5,7 @@ use super::steps::enable_in;
 use crate::bench::Bench;
 use crate::expect::Expect;
 use crate::lights::red_flashes;
-use crate::plot::EventKind;
+use plot::EventKind;
 
 /// 1014h: 80h + node-ID.
 const EMCY: u16 = 0x81;

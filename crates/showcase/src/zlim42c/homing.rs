@@ -11,7 +11,7 @@ use super::steps::{PULSES_PER_TURN, PULSES_S_PER_RPM, release};
 use crate::bench::Bench;
 use crate::datagram::frame;
 use crate::expect::Expect;
-use crate::plot::EventKind;
+use plot::EventKind;
 
 const ACCEPTED: &str = "60 40 60 00 00 00 00 00";
 

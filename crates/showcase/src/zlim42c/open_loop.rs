@@ -6,7 +6,7 @@ use super::position::go_to;
 use super::steps::{TARGET_REACHED, release};
 use crate::bench::Bench;
 use crate::expect::Expect;
-use crate::plot::EventKind;
+use plot::EventKind;
 
 /// Holding torque of the 70 mm motor (2.1), N·m.
 const HOLDING_NM: f64 = 0.48;

@@ -6,7 +6,7 @@ use super::position::go_to;
 use super::steps::{enable_in, expect_position, release};
 use crate::bench::Bench;
 use crate::expect::Expect;
-use crate::plot::EventKind;
+use plot::EventKind;
 
 /// 6084h and 6085h as set here.
 const NORMAL_S: f64 = 0.3;

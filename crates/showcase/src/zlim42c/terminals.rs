@@ -7,7 +7,7 @@ use super::steps::{TARGET_REACHED, enable_in, release};
 use super::stopping::until_standing;
 use crate::bench::Bench;
 use crate::expect::Expect;
-use crate::plot::EventKind;
+use plot::EventKind;
 
 /// The input's filter (3.2).
 const FILTER_S: f64 = 0.010;

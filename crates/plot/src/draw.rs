@@ -1,10 +1,10 @@
 //! Layout and drawing: where panels, ticks, labels and marks go.
 
-use super::lanes;
-use super::poster::{Colour, Event, EventKind, Figure, Panel, Poster, Style, Trace};
-use super::svg::{Anchor, Font, Svg};
-use super::thin::thin;
-use super::ticks::Ticks;
+use crate::lanes;
+use crate::poster::{Colour, Event, EventKind, Figure, Panel, Poster, Style, Trace};
+use crate::svg::{Anchor, Font, Svg};
+use crate::thin::thin;
+use crate::ticks::Ticks;
 
 /// Chosen for pages that show pictures about 900 px wide: letters stay readable there.
 const WIDTH: f64 = 1000.0;
@@ -74,7 +74,7 @@ impl Layout<'_> {
 }
 
 /// The whole picture.
-pub(super) fn poster(poster: &Poster) -> String {
+pub(crate) fn poster(poster: &Poster) -> String {
     let mut body = Svg::default();
     body.text((24.0, 34.0), Anchor::Start, TITLE, &poster.title);
     body.text((24.0, 55.0), Anchor::Start, SUBTITLE, &poster.subtitle);
@@ -119,7 +119,7 @@ fn figure(svg: &mut Svg, figure: &Figure, (left, right): (f64, f64), top: f64) -
         draw_panel(svg, &layout, panel_top, panel);
         panel_top += panel.height + PANEL_GAP;
     }
-    time_axis(svg, &layout, figure.time);
+    time_axis(svg, &layout, &figure.time);
     layout.panels_bottom + BOTTOM
 }
 
@@ -147,10 +147,7 @@ fn sections(svg: &mut Svg, layout: &Layout<'_>, figure: &Figure) {
 }
 
 fn draw_panel(svg: &mut Svg, layout: &Layout<'_>, top: f64, panel: &Panel) {
-    let values = panel.traces.iter().flat_map(|trace| &trace.points).map(|point| point.1);
-    let (low, high) = values.fold((0f64, 0f64), |(low, high), value| (low.min(value), high.max(value)));
-    let (low, high) = if low < high { (low, high) } else { (-1.0, 1.0) };
-    let (low, high) = (low - (high - low) * HEADROOM, high + (high - low) * HEADROOM);
+    let (low, high) = value_span(panel);
     let ticks = Ticks::within(low, high, (panel.height / TICK_HEIGHT) as usize);
     let y = |value: f64| top + (high - value) / (high - low) * panel.height;
     for &tick in &ticks.values {
@@ -158,9 +155,9 @@ fn draw_panel(svg: &mut Svg, layout: &Layout<'_>, top: f64, panel: &Panel) {
         svg.line((layout.left, y(tick)), (layout.right, y(tick)), &format!(r#"stroke="{colour}""#));
         svg.text((layout.left - 8.0, y(tick) + 4.0), Anchor::End, AXIS, &ticks.text(tick));
     }
-    svg.rimmed_text((layout.left, top - 7.0), Anchor::Start, NAME, panel.title);
-    let after_title = layout.left + 7.0 + NAME.width(panel.title);
-    svg.rimmed_text((after_title, top - 7.0), Anchor::Start, AXIS, panel.unit);
+    svg.rimmed_text((layout.left, top - 7.0), Anchor::Start, NAME, &panel.title);
+    let after_title = layout.left + 7.0 + NAME.width(&panel.title);
+    svg.rimmed_text((after_title, top - 7.0), Anchor::Start, AXIS, &panel.unit);
     for trace in &panel.traces {
         // Where a trace has no value, its line has a gap.
         for piece in trace.points.split(|point| !point.1.is_finite()).filter(|piece| !piece.is_empty()) {
@@ -173,6 +170,23 @@ fn draw_panel(svg: &mut Svg, layout: &Layout<'_>, top: f64, panel: &Panel) {
     trace_labels(svg, (layout.right + 8.0, top), panel, y);
 }
 
+/// Lowest and highest value of a panel's axis.
+fn value_span(panel: &Panel) -> (f64, f64) {
+    let values = panel.traces.iter().flat_map(|trace| &trace.points).map(|point| point.1);
+    // A value that is not a number is a gap, and `min` and `max` pass it over.
+    let outside = if panel.with_zero { (0.0, 0.0) } else { (f64::INFINITY, f64::NEG_INFINITY) };
+    let (low, high) = values
+        .filter(|value| value.is_finite())
+        .fold(outside, |(low, high), value| (f64::min(low, value), f64::max(high, value)));
+    // A line that never changes lies in the middle.
+    let (low, high) = match low.partial_cmp(&high) {
+        Some(std::cmp::Ordering::Less) => (low, high),
+        Some(std::cmp::Ordering::Equal) => (low - low.abs().max(1.0) * 0.1, high + high.abs().max(1.0) * 0.1),
+        _ => (-1.0, 1.0),
+    };
+    (low - (high - low) * HEADROOM, high + (high - low) * HEADROOM)
+}
+
 fn trace_labels(svg: &mut Svg, (x, top): (f64, f64), panel: &Panel, y: impl Fn(f64) -> f64) {
     let traces = &panel.traces;
     let ends: Vec<f64> = traces.iter().map(|trace| y(last_value(trace))).collect();
@@ -180,7 +194,7 @@ fn trace_labels(svg: &mut Svg, (x, top): (f64, f64), panel: &Panel, y: impl Fn(f
     for (trace, height) in traces.iter().zip(heights) {
         svg.line((x, height), (x + 14.0, height), &paint(trace.style));
         let font = Font { size: 12.0, colour: text_colour(trace.style), bold: is_actual(trace.style) };
-        svg.text((x + 19.0, height + 4.0), Anchor::Start, font, trace.label);
+        svg.text((x + 19.0, height + 4.0), Anchor::Start, font, &trace.label);
     }
 }
 
@@ -297,6 +311,9 @@ fn line_colour(colour: Colour) -> &'static str {
         Colour::Blue => "#1d5fbf",
         Colour::Teal => "#00796b",
         Colour::Orange => "#c4500b",
+        Colour::Purple => "#7a3fb0",
+        Colour::Red => "#b3265e",
+        Colour::Grey => "#4d5a67",
     }
 }
 
@@ -310,8 +327,8 @@ fn text_colour(style: Style) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use super::super::poster::Section;
     use super::*;
+    use crate::poster::Section;
 
     fn example() -> Poster {
         Poster { title: "Title".into(), subtitle: "subtitle".into(), rows: vec![vec![figure()]] }
@@ -323,19 +340,28 @@ mod tests {
         Figure {
             title: "Drive".into(),
             subtitle: "in words".into(),
-            time: "time, s",
+            time: "time, s".into(),
             panels: vec![
                 Panel {
-                    title: "velocity",
-                    unit: "r/min",
+                    title: "velocity".into(),
+                    unit: "r/min".into(),
                     height: 100.0,
+                    with_zero: true,
                     traces: vec![
-                        Trace { label: "set-point", style: Style::SetPoint, points: vec![(0.0, 0.0), (5.0, 80.0)] },
-                        Trace { label: "demand", style: Style::Demand, points: wave(98.0).collect() },
-                        Trace { label: "actual", style: Style::Actual(Colour::Teal), points: wave(100.0).collect() },
+                        Trace {
+                            label: "set-point".into(),
+                            style: Style::SetPoint,
+                            points: vec![(0.0, 0.0), (5.0, 80.0)],
+                        },
+                        Trace { label: "demand".into(), style: Style::Demand, points: wave(98.0).collect() },
+                        Trace {
+                            label: "actual".into(),
+                            style: Style::Actual(Colour::Teal),
+                            points: wave(100.0).collect(),
+                        },
                     ],
                 },
-                Panel { title: "empty", unit: "A", height: 60.0, traces: Vec::new() },
+                Panel { title: "empty".into(), unit: "A".into(), height: 60.0, ..Panel::default() },
             ],
             sections: vec![Section {
                 from_s: 0.0,
@@ -355,6 +381,20 @@ mod tests {
         assert!(svg.contains(r##"fill="#ffffff""##) && !svg.contains("<script"));
         assert_eq!(svg.matches("<text").count(), svg.matches("</text>").count());
         assert!(svg.len() < 60_000, "{} bytes", svg.len());
+    }
+
+    #[test]
+    fn an_axis_without_zero_spans_its_values_and_gaps_are_none_of_them() {
+        let of = |with_zero, values: &[f64]| {
+            let points = values.iter().enumerate().map(|(i, value)| (i as f64, *value)).collect();
+            let trace = Trace { label: "".into(), style: Style::Demand, points };
+            value_span(&Panel { with_zero, traces: vec![trace], ..Panel::default() })
+        };
+        assert_eq!(of(false, &[48.0, f64::NAN, 50.0]), (48.0 - 2.0 * HEADROOM, 50.0 + 2.0 * HEADROOM));
+        assert_eq!(of(true, &[50.0]).0, -50.0 * HEADROOM);
+        let (low, high) = of(false, &[48.0, 48.0]);
+        assert!(low < 48.0 && 48.0 < high);
+        assert!(of(false, &[]).0 < of(false, &[]).1);
     }
 
     #[test]

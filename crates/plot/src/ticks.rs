@@ -2,16 +2,16 @@
 
 /// Ticks of an axis and how many decimals they need.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Ticks {
+pub(crate) struct Ticks {
     /// Ascending.
-    pub(super) values: Vec<f64>,
+    pub(crate) values: Vec<f64>,
     /// Distance of neighbours.
-    pub(super) step: f64,
+    pub(crate) step: f64,
 }
 
 impl Ticks {
     /// Ticks inside `low..=high`, at most `most` of them.
-    pub(super) fn within(low: f64, high: f64, most: usize) -> Self {
+    pub(crate) fn within(low: f64, high: f64, most: usize) -> Self {
         let step = round_step((high - low) / most.max(1) as f64);
         let first = (low / step - 1e-9).ceil() as i64;
         let last = (high / step + 1e-9).floor() as i64;
@@ -19,7 +19,7 @@ impl Ticks {
     }
 
     /// A tick as text, with as many decimals as the step needs and thousands set apart by a thin space.
-    pub(super) fn text(&self, value: f64) -> String {
+    pub(crate) fn text(&self, value: f64) -> String {
         let decimals = (-self.step.log10()).ceil().clamp(0.0, 9.0) as usize;
         let plain = format!("{:.decimals$}", value.abs());
         let (whole, fraction) = plain.split_once('.').unwrap_or((&plain, ""));

@@ -2,7 +2,7 @@
 
 /// Gives each span (`left`, `right`, ascending by `left`) the first lane in which it overlaps no earlier one.
 /// With all `most` lanes taken it shares the last.
-pub(super) fn assign(spans: &[(f64, f64)], most: usize) -> Vec<usize> {
+pub(crate) fn assign(spans: &[(f64, f64)], most: usize) -> Vec<usize> {
     let mut ends: Vec<f64> = Vec::new();
     spans
         .iter()
@@ -22,7 +22,7 @@ pub(super) fn assign(spans: &[(f64, f64)], most: usize) -> Vec<usize> {
 }
 
 /// Moves heights apart to at least `gap`, keeping their order and staying within `low..=high` where room allows.
-pub(super) fn spread(heights: &[f64], gap: f64, low: f64, high: f64) -> Vec<f64> {
+pub(crate) fn spread(heights: &[f64], gap: f64, low: f64, high: f64) -> Vec<f64> {
     let mut order: Vec<usize> = (0..heights.len()).collect();
     order.sort_by(|a, b| heights[*a].total_cmp(&heights[*b]));
     let mut placed = heights.to_vec();

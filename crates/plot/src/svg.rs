@@ -4,13 +4,13 @@ use std::fmt::Write;
 
 /// SVG text under construction.
 #[derive(Default)]
-pub(super) struct Svg {
+pub(crate) struct Svg {
     body: String,
 }
 
 /// Where a text is held.
 #[derive(Clone, Copy)]
-pub(super) enum Anchor {
+pub(crate) enum Anchor {
     /// At its left end.
     Start,
     /// At its middle.
@@ -21,18 +21,18 @@ pub(super) enum Anchor {
 
 /// Look of a text.
 #[derive(Clone, Copy)]
-pub(super) struct Font {
+pub(crate) struct Font {
     /// Height, px.
-    pub(super) size: f64,
+    pub(crate) size: f64,
     /// Colour.
-    pub(super) colour: &'static str,
+    pub(crate) colour: &'static str,
     /// Bold or not.
-    pub(super) bold: bool,
+    pub(crate) bold: bool,
 }
 
 impl Font {
     /// Width of a text, px; an estimate on the safe side from the advances of common sans-serif faces.
-    pub(super) fn width(self, text: &str) -> f64 {
+    pub(crate) fn width(self, text: &str) -> f64 {
         let advance_em = |letter: char| match letter {
             'i' | 'j' | 'l' | 'I' | '.' | ',' | ':' | ';' | '\'' | '|' | '(' | ')' | ' ' => 0.36,
             'f' | 'r' | 't' | '-' | '/' => 0.44,
@@ -47,12 +47,12 @@ impl Font {
 
 impl Svg {
     /// Puts what another one holds on top.
-    pub(super) fn append(&mut self, other: Self) {
+    pub(crate) fn append(&mut self, other: Self) {
         self.body.push_str(&other.body);
     }
 
     /// A rectangle with rounded corners.
-    pub(super) fn rect(&mut self, (x, y): (f64, f64), (width, height): (f64, f64), radius: f64, paint: &str) {
+    pub(crate) fn rect(&mut self, (x, y): (f64, f64), (width, height): (f64, f64), radius: f64, paint: &str) {
         let _ = writeln!(
             self.body,
             r#"<rect x="{x:.1}" y="{y:.1}" width="{width:.1}" height="{height:.1}" rx="{radius}" {paint}/>"#
@@ -60,17 +60,17 @@ impl Svg {
     }
 
     /// A straight line.
-    pub(super) fn line(&mut self, (x1, y1): (f64, f64), (x2, y2): (f64, f64), paint: &str) {
+    pub(crate) fn line(&mut self, (x1, y1): (f64, f64), (x2, y2): (f64, f64), paint: &str) {
         let _ = writeln!(self.body, r#"<line x1="{x1:.1}" y1="{y1:.1}" x2="{x2:.1}" y2="{y2:.1}" {paint}/>"#);
     }
 
     /// A dot.
-    pub(super) fn dot(&mut self, (x, y): (f64, f64), radius: f64, colour: &str) {
+    pub(crate) fn dot(&mut self, (x, y): (f64, f64), radius: f64, colour: &str) {
         let _ = writeln!(self.body, r#"<circle cx="{x:.1}" cy="{y:.1}" r="{radius}" fill="{colour}"/>"#);
     }
 
     /// A broken line through points. Points between neighbours of the same height are left out.
-    pub(super) fn path(&mut self, points: &[(f64, f64)], paint: &str) {
+    pub(crate) fn path(&mut self, points: &[(f64, f64)], paint: &str) {
         let mut data = String::with_capacity(points.len() * 12);
         let tenths = |point: &(f64, f64)| (point.1 * 10.0).round() as i64;
         for (i, point) in points.iter().enumerate() {
@@ -84,12 +84,12 @@ impl Svg {
     }
 
     /// A line of text; `y` is its base line.
-    pub(super) fn text(&mut self, at: (f64, f64), anchor: Anchor, font: Font, text: &str) {
+    pub(crate) fn text(&mut self, at: (f64, f64), anchor: Anchor, font: Font, text: &str) {
         self.painted_text(at, anchor, font, "", text);
     }
 
     /// A line of text with a light rim, which reads well where lines run under it.
-    pub(super) fn rimmed_text(&mut self, at: (f64, f64), anchor: Anchor, font: Font, text: &str) {
+    pub(crate) fn rimmed_text(&mut self, at: (f64, f64), anchor: Anchor, font: Font, text: &str) {
         let rim = r##" paint-order="stroke" stroke="#ffffff" stroke-width="3.5" stroke-opacity="0.9""##;
         self.painted_text(at, anchor, font, rim, text);
     }
@@ -111,7 +111,7 @@ impl Svg {
     }
 
     /// The whole document.
-    pub(super) fn document(self, (width, height): (f64, f64), title: &str) -> String {
+    pub(crate) fn document(self, (width, height): (f64, f64), title: &str) -> String {
         format!(
             concat!(
                 r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0} {height:.0}" "#,

@@ -1,62 +1,72 @@
 //! What a picture shows, as plain data.
 
+use std::borrow::Cow;
+
 /// A page of figures, as plain data.
 #[derive(Clone, Debug, Default)]
 pub struct Poster {
     /// Large line at the top.
-    pub(crate) title: String,
+    pub title: String,
     /// Small line under it.
-    pub(crate) subtitle: String,
+    pub subtitle: String,
     /// From top to bottom; those of a row stand side by side.
-    pub(crate) rows: Vec<Vec<Figure>>,
+    pub rows: Vec<Vec<Figure>>,
 }
 
 /// A figure: what to draw, not how.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Figure {
+pub struct Figure {
     /// Line above it.
-    pub(crate) title: String,
+    pub title: String,
     /// Small words after the title.
-    pub(crate) subtitle: String,
+    pub subtitle: String,
     /// What the time axis shows: "time, s".
-    pub(crate) time: &'static str,
+    pub time: Cow<'static, str>,
     /// From top to bottom.
-    pub(crate) panels: Vec<Panel>,
+    pub panels: Vec<Panel>,
     /// Spans of time with a name, not overlapping.
-    pub(crate) sections: Vec<Section>,
+    pub sections: Vec<Section>,
     /// Marked moments.
-    pub(crate) events: Vec<Event>,
+    pub events: Vec<Event>,
     /// Spans of time that are left out, ascending; a mark on the time axis tells of each.
-    pub(crate) cuts: Vec<(f64, f64)>,
+    pub cuts: Vec<(f64, f64)>,
 }
 
 /// One set of axes.
 #[derive(Clone, Debug)]
-pub(crate) struct Panel {
+pub struct Panel {
     /// The quantity: "velocity".
-    pub(crate) title: &'static str,
+    pub title: Cow<'static, str>,
     /// Its unit: "r/min".
-    pub(crate) unit: &'static str,
+    pub unit: Cow<'static, str>,
     /// Of its axes, px.
-    pub(crate) height: f64,
+    pub height: f64,
+    /// The axis reaches to 0, whatever the values are.
+    pub with_zero: bool,
     /// Drawn in order, the last one on top.
-    pub(crate) traces: Vec<Trace>,
+    pub traces: Vec<Trace>,
+}
+
+impl Default for Panel {
+    fn default() -> Self {
+        Self { title: "".into(), unit: "".into(), height: 80.0, with_zero: true, traces: Vec::new() }
+    }
 }
 
 /// One line of a panel.
 #[derive(Clone, Debug)]
-pub(crate) struct Trace {
+pub struct Trace {
     /// Written at the line's right end.
-    pub(crate) label: &'static str,
+    pub label: Cow<'static, str>,
     /// How it looks.
-    pub(crate) style: Style,
+    pub style: Style,
     /// Time in the figure's unit and value in the panel's unit, time ascending.
-    pub(crate) points: Vec<(f64, f64)>,
+    pub points: Vec<(f64, f64)>,
 }
 
 /// The role of a line decides its look; the same role looks alike in all panels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Style {
+pub enum Style {
     /// What was measured: a solid line in the colour of that number.
     Actual(Colour),
     /// What the drive's planner asks of its loops: broad and pale, so that the actual line lies inside it.
@@ -69,42 +79,53 @@ pub(crate) enum Style {
 
 /// Colours that stay apart for colour-blind readers on a light ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Colour {
+pub enum Colour {
     /// For positions, and for the first of several.
     Blue,
     /// For velocities, and for the second.
     Teal,
     /// For currents, and for the third.
     Orange,
+    /// For voltages, and for the fourth.
+    Purple,
+    /// For temperatures, and for the fifth.
+    Red,
+    /// For what is none of these, and for the sixth.
+    Grey,
+}
+
+impl Colour {
+    /// All of them, in the order in which several of a kind take them.
+    pub const ALL: [Self; 6] = [Self::Blue, Self::Teal, Self::Orange, Self::Purple, Self::Red, Self::Grey];
 }
 
 /// A span of time.
 #[derive(Clone, Debug)]
-pub(crate) struct Section {
+pub struct Section {
     /// Begin, s.
-    pub(crate) from_s: f64,
+    pub from_s: f64,
     /// End, s.
-    pub(crate) to_s: f64,
+    pub to_s: f64,
     /// Its number, written where there is room for it.
-    pub(crate) number: String,
+    pub number: String,
     /// Names from the longest to the shortest; the first that fits is written under the number.
-    pub(crate) names: Vec<String>,
+    pub names: Vec<String>,
 }
 
 /// A moment.
 #[derive(Clone, Debug)]
-pub(crate) struct Event {
+pub struct Event {
     /// When, s.
-    pub(crate) at_s: f64,
+    pub at_s: f64,
     /// What happened, in a few words.
-    pub(crate) label: String,
+    pub label: String,
     /// Decides the colour.
-    pub(crate) kind: EventKind,
+    pub kind: EventKind,
 }
 
 /// What sort of moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum EventKind {
+pub enum EventKind {
     /// The drive reports a fault.
     Fault,
     /// A stop was commanded.
@@ -115,7 +136,7 @@ pub(crate) enum EventKind {
 
 impl Figure {
     /// First and last moment of all traces.
-    pub(super) fn time_span(&self) -> (f64, f64) {
+    pub(crate) fn time_span(&self) -> (f64, f64) {
         let times = self
             .panels
             .iter()

@@ -1,7 +1,7 @@
 //! Thinning of long traces: the lowest and the highest point of each pixel column.
 
 /// Points in pixels, thinned to at most two for each column of one pixel width. `points` ascend in x.
-pub(super) fn thin(points: impl IntoIterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
+pub(crate) fn thin(points: impl IntoIterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     let mut thinned = Vec::new();
     let mut column: Option<Column> = None;
     for point in points {

@@ -1,0 +1,32 @@
+//! Time plots as SVG: a poster of figures, each with stacked panels over one time axis, named sections and marked events.
+//!
+//! A [`Poster`] is plain data in; [`Poster::to_svg`] is text out. It has its own light background, so that it
+//! reads the same on a white page and in a dark one, and holds no script and no fonts. Long traces are thinned to
+//! the smallest and largest value of each pixel column, so nothing that could be seen is lost.
+//!
+//! ```
+//! use plot::{Colour, Figure, Panel, Poster, Style, Trace};
+//!
+//! let points = (0..100).map(|i| (f64::from(i) * 0.1, (f64::from(i) * 0.1).sin())).collect();
+//! let trace = Trace { label: "actual".into(), style: Style::Actual(Colour::Teal), points };
+//! let panel = Panel { title: "Velocity".into(), unit: "r/min".into(), traces: vec![trace], ..Panel::default() };
+//! let figure = Figure { title: "node 4".into(), time: "time, s".into(), panels: vec![panel], ..Figure::default() };
+//! let svg = Poster { title: "A run".into(), rows: vec![vec![figure]], ..Poster::default() }.to_svg();
+//! assert!(svg.starts_with("<svg ") && svg.contains("r/min"));
+//! ```
+
+mod draw;
+mod lanes;
+mod poster;
+mod svg;
+mod thin;
+mod ticks;
+
+pub use poster::{Colour, Event, EventKind, Figure, Panel, Poster, Section, Style, Trace};
+
+impl Poster {
+    /// The picture, as the text of an SVG file.
+    pub fn to_svg(&self) -> String {
+        draw::poster(self)
+    }
+}
