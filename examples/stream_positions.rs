@@ -14,7 +14,6 @@ use canopen::NodeId;
 use cia402::ModeOfOperation;
 use devices::{Description, model};
 use master::cyclic::{CyclicDrive, CyclicOptions, Demand};
-use master::drive::SwitchedOff;
 use master::units::Turns;
 use master::{Drive, Network, join_all};
 use sim::World;
@@ -92,10 +91,11 @@ async fn stream(network: &Network, drives: &mut [CyclicDrive]) -> Result<Outcome
 async fn run(network: &Network, drives: &[Drive], mode: ModeOfOperation) -> Result<Outcome, Box<dyn Error>> {
     let mut cyclic = Vec::new();
     for drive in drives {
-        // What the drive does when this program dies in the middle of the path.
-        println!("  node {}: {}", drive.node().id(), drive.guard(SwitchedOff::Leave).await?);
         drive.configure_cyclic(mode).await?;
-        cyclic.push(drive.cyclic(mode, CyclicOptions::default()).await?);
+        let opened = drive.cyclic(mode, CyclicOptions::default()).await?;
+        // What the drive does when this program dies in the middle of the path.
+        println!("  node {}: {}", opened.node(), opened.host_loss());
+        cyclic.push(opened);
     }
     network.sync(Some(PERIOD));
     let outcome = stream(network, &mut cyclic).await?;

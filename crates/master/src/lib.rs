@@ -82,7 +82,7 @@
 //! # }
 //! ```
 //!
-//! A program that dies stops nothing by itself: [`Drive::guard`] arms what a drive has against that (a watch for silence, a
+//! A program that dies stops nothing by itself: [`Drive::guard`], which cyclic drives ask for of themselves, arms what a drive has against that (a watch for silence, a
 //! heartbeat that this master then produces), and tells what it has not. While its runner runs, a guarded drive is kept
 //! content, whatever the tasks wait for.
 

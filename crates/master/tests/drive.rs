@@ -5,15 +5,17 @@ mod support;
 use std::time::Duration;
 
 use can::Instant;
+use canopen::pdo::{MappingRecord, PdoNumber};
 use cia402::PowerState;
 use devices::servo::{CIA402, MODES, axis};
 use devices::{AxisId, Description, Placement, model};
+use master::core::PdoMap;
 use master::drive::{MotionOptions, Note};
 use master::units::{Amperes, Counts, Degrees, Ramp, Rpm, Turns};
 use master::{Drive, Error};
 use support::toy::Toy;
 use support::toy_drive::{ToyDrive, zlac8030l};
-use support::{Bus, first, node};
+use support::{Bus, first, mux, node};
 
 fn bus_with(change: impl FnOnce(&mut Toy)) -> (Bus, Drive) {
     let mut toy = zlac8030l(4);
@@ -364,4 +366,29 @@ fn the_second_axis_of_a_node_is_asked_at_its_own_objects() {
     assert!(matches!(error, Error::NoSuchAxis { axes: 2, .. }), "{error}");
     let unknown = Drive::of_unknown_model(bus.network.node(node(4)));
     assert!(matches!(unknown.axis(AxisId(1)), Err(Error::UnknownModel { .. })));
+}
+
+#[test]
+fn a_value_that_was_sent_before_the_drive_was_told_something_is_not_believed() {
+    let mut toy = Toy::new(4).u16(0x6041, 0, 0x0231).u16(0x6040, 0, 0);
+    toy = toy.u8(0x6061, 0, 0);
+    let mut bus = Bus::new(vec![toy]);
+    let network = bus.network.clone();
+    let drive = Drive::new(network.node(node(4)), model("zlim42c").unwrap());
+    let map = PdoMap(vec![MappingRecord::from_raw(0x6041_0010)]);
+    network.with_core(|core| core.image_mut().set_tpdo(node(4), PdoNumber::FIRST, 0x184, map));
+    bus.toys[0].send(0x180, &[0x37, 0x02]);
+    bus.settle();
+    // Just come: believed, and nobody is asked.
+    assert_eq!(bus.block_on(drive.statusword()).unwrap().0, 0x0237);
+    assert!(bus.toys[0].requests.is_empty());
+    // Told something since: asked.
+    bus.block_on(drive.node().write(mux(0x6040, 0), 6_u16)).unwrap();
+    assert_eq!(bus.block_on(drive.statusword()).unwrap().0, 0x0231);
+    // Come again, and believed until it is as old as a poll.
+    bus.toys[0].send(0x180, &[0x37, 0x02]);
+    bus.settle();
+    assert_eq!(bus.block_on(drive.statusword()).unwrap().0, 0x0237);
+    bus.block_on(network.sleep(Duration::from_millis(10)));
+    assert_eq!(bus.block_on(drive.statusword()).unwrap().0, 0x0231);
 }

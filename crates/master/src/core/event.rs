@@ -7,6 +7,7 @@ use canopen::emcy::Emcy;
 use canopen::{AbortCode, Mux, NmtState, NodeId};
 
 use super::supervision::CycleLoss;
+use crate::host_loss::HostLoss;
 
 /// Something that happened on the bus and that a person may want to know. Pulled with [`super::Core::poll_event`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,6 +34,8 @@ pub enum Event {
     SyncBack,
     /// A drive that was moved cycle by cycle has been stopped by this master.
     CyclicStopped(NodeId, CycleLoss),
+    /// A drive is about to be moved cycle by cycle, and nothing stops it when this program dies.
+    Unguarded(NodeId, HostLoss),
 }
 
 impl fmt::Display for Event {
@@ -51,6 +54,7 @@ impl fmt::Display for Event {
             Self::SyncLost(time) => write!(f, "no SYNC for {} ms", time.as_secs_f64() * 1e3),
             Self::SyncBack => f.write_str("SYNC is back"),
             Self::CyclicStopped(node, loss) => write!(f, "node {node} was stopped: {loss}"),
+            Self::Unguarded(node, loss) => write!(f, "node {node}: if this program dies, {loss}"),
             Self::Aborted(node, mux, code) => write!(f, "node {node} refused {mux}: {code}"),
         }
     }

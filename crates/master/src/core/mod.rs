@@ -40,7 +40,7 @@ pub use payload::Payload;
 pub use pdo_map::PdoMap;
 pub use request::{Command, Failure, Finished, Outcome, Request, Ticket, Transfer};
 pub use supervision::CycleLoss;
-pub(crate) use supervision::{CycleRules, WatchId};
+pub(crate) use supervision::{Cadence, CycleRules, WatchId};
 
 use channel::Channel;
 use cycle::SyncClock;

@@ -12,6 +12,7 @@ use super::image::Received;
 use super::payload::Payload;
 use super::request::{Request, Transfer};
 use super::supervision::{CycleLoss, CycleRules, WatchId};
+use crate::host_loss::HostLoss;
 
 /// How long the answer to a write is awaited that nobody is told of.
 const POST_TIMEOUT: Duration = Duration::from_millis(500);
@@ -89,6 +90,11 @@ impl Core {
         self.supervision.note_moving(id, self.sync.cycle().map_or(0, |cycle| cycle.number));
     }
 
+    /// A drive is about to be moved that nothing stops when this program dies.
+    pub(crate) fn note_unguarded(&mut self, node: NodeId, loss: HostLoss) {
+        self.events.push(Event::Unguarded(node, loss), self.now);
+    }
+
     /// Nothing is in motion any more.
     pub(crate) fn note_resting(&mut self, id: WatchId) {
         self.supervision.note_resting(id);
@@ -154,7 +160,7 @@ impl Core {
         self.cycle_changed = true;
         self.image.begin_cycle(cycle.number);
         self.image.release_waiting();
-        self.lost.extend(self.supervision.begin_cycle(cycle.number, &self.image));
+        self.lost.extend(self.supervision.begin_cycle(cycle.number, self.sync.period(), &self.image));
         self.stop_lost();
     }
 

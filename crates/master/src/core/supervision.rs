@@ -21,8 +21,32 @@ pub(crate) struct CycleRules {
     pub(crate) place: Option<Place>,
     /// The TPDO that has to come.
     pub(crate) heard: Place,
-    /// Cycles in a row for which the program, or that TPDO, may stay away.
+    /// How often it comes.
+    pub(crate) cadence: Cadence,
+    /// Cycles in a row for which the program may stay away, and that TPDO beyond its cadence.
     pub(crate) tolerance: u32,
+}
+
+/// How often a TPDO comes by itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Cadence {
+    /// Once in so many cycles of SYNC.
+    Cycles(u32),
+    /// Once in this time, whatever SYNC does: by its event timer, or as its inhibit time lets it.
+    Time(Duration),
+}
+
+impl Cadence {
+    /// Cycles of SYNC from one to the next, at most.
+    pub(crate) fn cycles(self, sync_period: Option<Duration>) -> u64 {
+        let nanos = |time: Duration| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
+        match (self, sync_period) {
+            (Self::Cycles(cycles), _) => cycles.max(1).into(),
+            (Self::Time(time), Some(period)) => nanos(time).div_ceil(nanos(period).max(1)).max(1),
+            // Without cycles nothing can be counted in them.
+            (Self::Time(_), None) => 1,
+        }
+    }
 }
 
 /// Names a watch.
@@ -121,16 +145,23 @@ impl Supervision {
     }
 
     /// The drives to stop now that this cycle has begun.
-    pub(super) fn begin_cycle(&mut self, number: u64, image: &Image) -> impl Iterator<Item = (CycleRules, CycleLoss)> {
+    pub(super) fn begin_cycle(
+        &mut self,
+        number: u64,
+        sync_period: Option<Duration>,
+        image: &Image,
+    ) -> impl Iterator<Item = (CycleRules, CycleLoss)> {
         self.watches.iter_mut().filter_map(move |watch| {
             let WatchState::Moving(last) = watch.state else { return None };
             let tolerated = u64::from(watch.rules.tolerance);
             let late = number.saturating_sub(last).saturating_sub(1);
-            let silent = image.cycles_since(watch.rules.heard).map_or(number, |since| since.saturating_sub(1));
+            // A TPDO that comes in each cycle came in the one before: nothing is missing yet.
+            let since = image.cycles_since(watch.rules.heard).unwrap_or(number);
+            let missing = since.saturating_sub(watch.rules.cadence.cycles(sync_period));
             let loss = if late > tolerated {
                 CycleLoss::ProgramLate(late)
-            } else if silent > tolerated {
-                CycleLoss::Silent(silent)
+            } else if missing > tolerated {
+                CycleLoss::Silent(since.saturating_sub(1))
             } else {
                 return None;
             };

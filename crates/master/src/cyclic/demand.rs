@@ -33,14 +33,14 @@ impl Demand {
     }
 }
 
-/// Why a demand was not carried out in a cycle.
+/// Why a demand was not carried out in a cycle. The drive was given [`Demand::Hold`] instead, if nothing else is said.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Refusal {
     /// SYNC is neither produced nor followed, or no cycle has begun yet.
     NoCycle,
     /// None of the drive's TPDOs has come yet, or not for some cycles.
     NotHeard,
-    /// A PDO of the drive got another mapping: it has to be opened again.
+    /// The RPDO of the drive got another mapping: it has to be opened again, and is stopped by SDO.
     Remapped,
     /// The drive was stopped, because the program, the drive or SYNC had stayed away. Until [`Demand::Off`].
     Stopped(CycleLoss),
@@ -111,7 +111,7 @@ impl fmt::Display for Refusal {
             Self::NotHeard => {
                 f.write_str("its TPDO does not come: check that it is operational and sends with each SYNC")
             }
-            Self::Remapped => f.write_str("one of its PDOs got another mapping: open it again"),
+            Self::Remapped => f.write_str("one of its PDOs got another mapping: open it again. It was stopped"),
             Self::Stopped(loss) => write!(f, "it was stopped, since {loss}. Switch it off to begin anew"),
             Self::Fault(statusword) => {
                 write!(f, "it is at fault (statusword {:04X}h): remove the cause, then reset the fault", statusword.0)
@@ -122,13 +122,17 @@ impl fmt::Display for Refusal {
             Self::LostOperation(None) => {
                 f.write_str("its statusword shows no state any more. Switch it off to begin anew")
             }
-            Self::WrongKind => f.write_str("its mode takes set-points of another kind"),
-            Self::NoNumber => f.write_str("the set-point is no number that its object can hold. It was not sent"),
-            Self::OutOfLimits { asked, bound } => write!(f, "{asked} is out of range for {bound}. It was not sent"),
+            Self::WrongKind => f.write_str("its mode takes set-points of another kind. The drive is held instead"),
+            Self::NoNumber => {
+                f.write_str("the set-point is no number that its object can hold. The drive is held instead")
+            }
+            Self::OutOfLimits { asked, bound } => {
+                write!(f, "{asked} is out of range for {bound}. The drive is held instead")
+            }
             Self::StepTooLarge { way, longest, bound } => write!(
                 f,
-                "a step of {way} counts is more than the {longest} that the highest speed covers in a cycle, by {bound}. It \
-                 was not sent"
+                "a step of {way} counts is more than the {longest} that the highest speed covers in a cycle, by {bound}. The \
+                 drive is held instead"
             ),
         }
     }

@@ -6,8 +6,9 @@ use devices::PowerStyle;
 use super::demand::{CyclicState, Demand, Refusal};
 use super::sequence::controlword;
 use super::target::{Kind, Target};
-use crate::core::{SetPoint, Signal, WatchId};
+use crate::core::{Cadence, SetPoint, Signal, WatchId};
 use crate::drive::STOP;
+use crate::host_loss::HostLoss;
 use crate::network::Exchange;
 use crate::units::{Amperes, Rpm, Turns};
 
@@ -19,7 +20,7 @@ const REPEAT_AFTER: core::time::Duration = core::time::Duration::from_millis(100
 ///
 /// From the first step that wants motion on, the master stops the drive when no step comes for some cycles, when the drive's
 /// TPDO does not come, or when SYNC stays away; the step after that says so. That the whole program dies is the drive's to
-/// notice: [`crate::Drive::guard`].
+/// notice: [`host_loss`](Self::host_loss) says whether it does.
 #[derive(Clone, Debug)]
 pub struct CyclicDrive {
     pub(super) node: NodeId,
@@ -33,8 +34,11 @@ pub struct CyclicDrive {
     pub(super) position: Option<Signal<Turns>>,
     pub(super) velocity: Option<Signal<Rpm>>,
     pub(super) current: Option<Signal<Amperes>>,
+    /// How often the TPDO with the statusword comes.
+    pub(super) cadence: Cadence,
     /// Cycles in a row that may be missed.
     pub(super) tolerance: u32,
+    pub(super) host_loss: HostLoss,
     pub(super) watch: WatchId,
     pub(super) progress: Progress,
 }
@@ -69,8 +73,13 @@ impl CyclicDrive {
         self.mode
     }
 
-    /// Looks at the drive and has it do what is wanted in this cycle. What cannot be done leaves the last set-point, and the
-    /// state says why. Allocates nothing.
+    /// What the drive does when this program dies in the middle of a motion.
+    pub const fn host_loss(&self) -> HostLoss {
+        self.host_loss
+    }
+
+    /// Looks at the drive and has it do what is wanted in this cycle. A demand that is refused stops the drive as
+    /// [`Demand::Hold`] does, for as long as it is refused, and the state says why. Allocates nothing.
     pub fn step(&mut self, io: &mut Exchange<'_>, demand: Demand) -> CyclicState {
         self.progress.odd_step ^= true;
         let mut seen = self.look(io);
@@ -84,18 +93,26 @@ impl CyclicDrive {
         if demand.wants_power() && self.progress.latched.is_none() {
             self.progress.latched = self.find_trouble(&seen);
         }
-        let free = self.progress.latched.is_none();
-        let follows = free && demand.wants_power() && seen.power == Some(PowerState::OperationEnabled);
-        let word = if free {
-            controlword(self.style, seen.power, demand, self.mode, self.progress.odd_step)
-        } else if let Some(Refusal::Fault(_)) = self.progress.latched {
-            Controlword(0)
+        let enabled = demand.wants_power() && seen.power == Some(PowerState::OperationEnabled);
+        let wish = if enabled && self.progress.latched.is_none() {
+            self.follow(io, demand)
         } else {
-            STOP
+            Ok(self.target.rest(self.actual(io)))
         };
-        let wish = if follows { self.follow(io, demand) } else { Ok(self.target.rest(self.actual(io))) };
-        let refused = self.progress.latched.or(wish.err());
-        let sent = self.send(io, wish.unwrap_or(self.target.held), word, &seen);
+        // The last speed or current, sent again, would be followed for ever.
+        let raw = wish.unwrap_or_else(|_| self.target.hold());
+        if io.write(self.target.set_point, raw) {
+            self.target.held = raw;
+        } else if demand.wants_power() {
+            self.progress.latched.get_or_insert(Refusal::Remapped);
+        }
+        let word = match self.progress.latched {
+            None => controlword(self.style, seen.power, demand, self.mode, self.progress.odd_step),
+            Some(Refusal::Fault(_)) => Controlword(0),
+            Some(_) => STOP,
+        };
+        self.send_controlword(io, word, seen.power);
+        let follows = enabled && self.progress.latched.is_none();
         self.progress.followed = follows;
         if follows {
             io.note_moving((self.node, self.place), self.watch);
@@ -104,13 +121,18 @@ impl CyclicDrive {
         }
         seen.follows = follows;
         let unheard = (demand.wants_power() && seen.statusword.is_none()).then_some(Refusal::NotHeard);
-        seen.refused = refused.or((!sent).then_some(Refusal::Remapped)).or(unheard);
+        seen.refused = self.progress.latched.or(wish.err()).or(unheard);
         seen
     }
 
-    fn look(&self, io: &Exchange<'_>) -> CyclicState {
+    /// For how many cycles a value counts as the drive's present one.
+    fn patience(&self, io: &Exchange<'_>) -> u64 {
         // What came in the cycle before is what a cycle begins with.
-        let cycles = u64::from(self.tolerance) + 1;
+        u64::from(self.tolerance) + self.cadence.cycles(io.sync_period())
+    }
+
+    fn look(&self, io: &Exchange<'_>) -> CyclicState {
+        let cycles = self.patience(io);
         let statusword = io.read_fresh(self.statusword, cycles).map(Statusword);
         CyclicState {
             statusword,
@@ -142,28 +164,25 @@ impl CyclicDrive {
 
     fn actual(&self, io: &Exchange<'_>) -> Option<i64> {
         match self.target.kind {
-            Kind::Position { actual, .. } => io.read_fresh(actual, u64::from(self.tolerance) + 1),
+            Kind::Position { actual, .. } => io.read_fresh(actual, self.patience(io)),
             Kind::Velocity { .. } | Kind::Current { .. } => None,
         }
     }
 
-    /// False if one of the PDOs got another mapping.
-    fn send(&mut self, io: &mut Exchange<'_>, raw: i64, word: Controlword, seen: &CyclicState) -> bool {
-        let taken = io.write(self.target.set_point, raw);
-        if taken {
-            self.target.held = raw;
+    fn send_controlword(&mut self, io: &mut Exchange<'_>, word: Controlword, power: Option<PowerState>) {
+        if let ControlwordPath::Pdo(set_point) = self.controlword {
+            if io.write(set_point, word.0) {
+                return;
+            }
+            // The RPDO got another mapping. The drive has to be stopped nevertheless.
+            self.controlword = ControlwordPath::Sdo { object: self.place, sent: None };
         }
-        match &mut self.controlword {
-            ControlwordPath::Pdo(set_point) => taken & io.write(*set_point, word.0),
-            ControlwordPath::Sdo { object, sent } => {
-                let shown = shows(word, seen.power);
-                let due =
-                    |(before, at): (Controlword, Instant)| before != word || !shown && io.now() - at >= REPEAT_AFTER;
-                if sent.is_none_or(due) {
-                    io.command(self.node, *object, word.0);
-                    *sent = Some((word, io.now()));
-                }
-                taken
+        if let ControlwordPath::Sdo { object, sent } = &mut self.controlword {
+            let shown = shows(word, power);
+            let due = |(before, at): (Controlword, Instant)| before != word || !shown && io.now() - at >= REPEAT_AFTER;
+            if sent.is_none_or(due) {
+                io.command(self.node, *object, word.0);
+                *sent = Some((word, io.now()));
             }
         }
     }

@@ -8,9 +8,10 @@ use devices::{AxisDescription, Description, Quantity};
 use super::demand::Bound;
 use super::drive::{ControlwordPath, CyclicDrive, Progress};
 use super::target::{Kind, Target};
-use crate::core::{CycleRules, NumberForm, PdoMap, Sample, Signal};
-use crate::drive::{CONTROLWORD, Drive, MODE, POSITION_ACTUAL, STATUSWORD, STOP, TARGET_POSITION};
+use crate::core::{Cadence, CycleRules, NumberForm, PdoMap, Sample, Signal};
+use crate::drive::{CONTROLWORD, Drive, MODE, POSITION_ACTUAL, STATUSWORD, STOP, SwitchedOff, TARGET_POSITION};
 use crate::error::Error;
+use crate::host_loss::HostLoss;
 use crate::pdo::{PdoConfig, PdoError, SignalError, TimerUnits, TransmissionType};
 
 /// The interpolation data record (CiA 402-2, 12.3).
@@ -27,15 +28,18 @@ const INTENT: &str = "move it cycle by cycle";
 /// How a drive is moved cycle by cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CyclicOptions {
+    /// Has the drive stop by itself when this program dies, as [`Drive::guard`] does; `None` leaves that to the caller.
+    pub guard: Option<SwitchedOff>,
     /// Cycles in a row for which the program may give no set-point, or the drive's TPDO may stay away, before the drive is
     /// stopped.
     pub tolerance: u32,
 }
 
 impl Default for CyclicOptions {
-    /// Two cycles: one lost frame and a late program at once stop nothing.
+    /// Guarded, if its watch is not switched off on the drive. Two cycles: one lost frame and a late program at once stop
+    /// nothing.
     fn default() -> Self {
-        Self { tolerance: 2 }
+        Self { guard: Some(SwitchedOff::Leave), tolerance: 2 }
     }
 }
 
@@ -111,6 +115,10 @@ impl Drive {
     /// and sets the mode. It is enabled by the first step that wants motion. Mappings are as the device has them, see
     /// [`configure_cyclic`](Self::configure_cyclic).
     ///
+    /// The drive is guarded, if the options do not say otherwise, and has to be released
+    /// ([`release_guard`](Self::release_guard)) when it stands still and is no longer moved. If nothing stops it when this
+    /// program dies, that is an [`Event::Unguarded`](crate::core::Event::Unguarded).
+    ///
     /// # Errors
     /// [`CyclicError`].
     pub async fn cyclic(&self, mode: ModeOfOperation, options: CyclicOptions) -> Result<CyclicDrive, CyclicError> {
@@ -120,7 +128,7 @@ impl Drive {
         }
         let mapped = self.adopt_pdos(profile).await?;
         let (number, mut target) = self.target(profile, axis, mode).await?;
-        let (statusword_in, every) = self.statusword_carrier(profile, number, &mapped)?;
+        let (statusword_in, cadence) = self.statusword_carrier(profile, number, &mapped)?;
         let statusword = self.node().signal_in(statusword_in, axis.object(STATUSWORD))?;
         if let Kind::Position { actual, .. } = &mut target.kind {
             // A TPDO that comes, if one of them does.
@@ -129,35 +137,67 @@ impl Drive {
         let place = axis.object(CONTROLWORD);
         let controlword = self.controlword_path(number, &mapped);
         self.preset_rpdos(&mapped, number, mode).await?;
-        let tolerance = options.tolerance.saturating_add(every - 1);
         let rules = CycleRules {
             node: self.node().id(),
             stop: STOP.0,
             controlword: place,
             place: if let ControlwordPath::Pdo(set_point) = controlword { Some(set_point.place()) } else { None },
             heard: statusword.place(),
-            tolerance,
+            cadence,
+            tolerance: options.tolerance,
         };
-        let drive = CyclicDrive {
+        let (position, velocity, current) = (
+            self.position_signal(statusword_in).await?,
+            self.quantity_signal(profile, statusword_in, axis.units.actual_velocity).await?,
+            self.quantity_signal(profile, statusword_in, axis.units.actual_current).await?,
+        );
+        let host_loss = self.begin_cyclic(profile, mode, options).await?;
+        Ok(CyclicDrive {
             node: self.node().id(),
             place,
             mode,
             style: axis.power,
             statusword,
             controlword,
-            position: self.position_signal(statusword_in).await?,
-            velocity: self.quantity_signal(profile, statusword_in, axis.units.actual_velocity).await?,
-            current: self.quantity_signal(profile, statusword_in, axis.units.actual_current).await?,
+            position,
+            velocity,
+            current,
             target,
-            tolerance,
+            cadence,
+            tolerance: options.tolerance,
+            host_loss,
             watch: self.node().network().with_core(|core| core.watch_cycles(rules)),
             progress: Progress::default(),
+        })
+    }
+
+    /// What changes the drive, once all is known: the guard, NMT start, the mode.
+    async fn begin_cyclic(
+        &self,
+        profile: &Description,
+        mode: ModeOfOperation,
+        options: CyclicOptions,
+    ) -> Result<HostLoss, Error> {
+        let (id, network) = (self.node().id(), self.node().network());
+        let guarded_before = network.guarded(id).is_some();
+        let host_loss = match options.guard {
+            Some(switched_off) => self.guard(switched_off).await?,
+            None => self.host_loss().await?,
         };
+        if host_loss.stops_after().is_none() {
+            network.with_core(|core| core.note_unguarded(id, host_loss));
+        }
         if self.node().facts().probable_state(Some(profile)) != Some(NmtState::Operational) {
             self.node().nmt(NmtCommand::Start);
         }
-        self.set_mode(mode).await?;
-        Ok(drive)
+        if let Err(error) = self.set_mode(mode).await {
+            if options.guard.is_some() && !guarded_before {
+                // The first error is the one to tell.
+                let _ = self.release_guard().await;
+            }
+            return Err(error);
+        }
+        Ok(host_loss)
     }
 
     /// Maps what the mode needs, to be sent with each SYNC: RPDO1 gets the controlword and the set-point; TPDO1 the statusword
@@ -289,28 +329,23 @@ impl Drive {
         Ok(least)
     }
 
-    /// The TPDO with the statusword that comes by itself, the one of the set-point's number first; and in how many cycles it
-    /// comes once.
+    /// The TPDO with the statusword that comes by itself, the one of the set-point's number first, then the one that comes with
+    /// SYNC; and how often it comes.
     fn statusword_carrier(
         &self,
         profile: &Description,
         number: PdoNumber,
         mapped: &Mapped,
-    ) -> Result<(PdoNumber, u32), CyclicError> {
+    ) -> Result<(PdoNumber, Cadence), CyclicError> {
         let answers = profile.pdo.event_trigger == EventTrigger::AnswersRpdo;
         let statusword = self.place(STATUSWORD);
         let carriers = mapped.tpdos.iter().filter(|pdo| carries(&pdo.map, statusword));
         let regular = carriers.filter_map(|pdo| {
-            let every = match pdo.transmission.0 {
-                every @ 1..=240 => u32::from(every),
-                _ if answers && pdo.pdo.number == number => 1,
-                _ if pdo.event_time.is_some_and(|time| !time.is_zero()) => 1,
-                _ => return None,
-            };
-            Some((pdo.pdo.number != number, every, pdo.pdo.number))
+            let answers = answers && pdo.pdo.number == number;
+            Some((pdo.pdo.number != number, cadence_of(pdo, answers)?, pdo.pdo.number))
         });
-        if let Some((_, every, number)) = regular.min() {
-            return Ok((number, every));
+        if let Some((_, cadence, number)) = regular.min() {
+            return Ok((number, cadence));
         }
         // Not mapped at all, or on events only.
         self.node().signal::<u16>(statusword)?;
@@ -387,6 +422,21 @@ const fn timer_units(profile: &Description) -> TimerUnits {
     TimerUnits {
         inhibit: Duration::from_nanos(profile.pdo.inhibit_unit_ns),
         event: Duration::from_nanos(profile.pdo.event_timer_unit_ns),
+    }
+}
+
+/// How often a TPDO comes by itself, if it does. With `answers` it is sent for each RPDO of its number.
+fn cadence_of(pdo: &PdoConfig, answers: bool) -> Option<Cadence> {
+    let time = |time: Option<Duration>| time.filter(|time| !time.is_zero());
+    let inhibited = time(pdo.inhibit_time);
+    match pdo.transmission {
+        _ if answers => Some(inhibited.map_or(Cadence::Cycles(1), Cadence::Time)),
+        TransmissionType(every @ 1..=240) => Some(Cadence::Cycles(every.into())),
+        // Neither timer counts for the other types (CiA 301, 7.5.2.37).
+        TransmissionType::EVENT_MANUFACTURER | TransmissionType::EVENT_PROFILE => {
+            time(pdo.event_time).map(|time| Cadence::Time(time.max(inhibited.unwrap_or_default())))
+        }
+        _ => None,
     }
 }
 

@@ -32,8 +32,7 @@ impl Target {
     /// What to send for a demand that wants power.
     pub(super) fn follow(&self, demand: Demand, period: Duration) -> Result<i64, Refusal> {
         let raw = match (demand, self.kind) {
-            (Demand::Hold, Kind::Position { .. }) => return Ok(self.held),
-            (Demand::Hold, Kind::Velocity { .. } | Kind::Current { .. }) => return Ok(0),
+            (Demand::Hold, _) => return Ok(self.hold()),
             (Demand::Position(Angle::Counts(counts)), Kind::Position { .. }) => counts,
             (Demand::Position(Angle::Turns(turns)), Kind::Position { counts_per_turn, .. }) => {
                 whole(turns * counts_per_turn)?
@@ -50,12 +49,19 @@ impl Target {
         Ok(raw)
     }
 
+    /// What to send so that the drive comes to rest with power: the last position; no speed, no current.
+    pub(super) const fn hold(&self) -> i64 {
+        match self.kind {
+            Kind::Position { .. } => self.held,
+            Kind::Velocity { .. } | Kind::Current { .. } => 0,
+        }
+    }
+
     /// What to send while the drive has no power: where it is, so that it does not jump when it gets some; no speed, no current.
     pub(super) const fn rest(&self, actual: Option<i64>) -> i64 {
         match (self.kind, actual) {
             (Kind::Position { .. }, Some(actual)) => actual,
-            (Kind::Position { .. }, None) => self.held,
-            (Kind::Velocity { .. } | Kind::Current { .. }, _) => 0,
+            _ => self.hold(),
         }
     }
 

@@ -58,7 +58,7 @@ impl Drive {
     /// [`HostLoss::stops_after`] is `None` where nothing can be done.
     ///
     /// From here on the runner keeps the drive content: a drive that watches for silence is asked for its statusword when
-    /// nothing else is sent to it, and for one that consumes a heartbeat this master produces it, under the node-ID that the
+    /// no other request is sent to it (whether process data count for it is not known of every drive), and for one that consumes a heartbeat this master produces it, under the node-ID that the
     /// drive watches. A drive that had lost its host, and would go on with an old motion at the first heartbeat, is stopped
     /// before. Ends with [`release_guard`](Self::release_guard); to stop in another way is to let the drive stop by itself.
     ///
