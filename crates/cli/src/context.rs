@@ -11,9 +11,9 @@ use master::{Error, Network, Node};
 
 use crate::failure::Failure;
 use crate::global::Global;
-use crate::machine_file::Machine;
-use crate::models::{self, Description};
 use crate::progress::Progress;
+use testbench::machine_file::Machine;
+use testbench::models::{self, Description};
 
 /// Time for a frame without an answer (NMT) to get onto the bus before a command ends.
 const SETTLING_TIME: Duration = Duration::from_millis(50);

@@ -5,9 +5,9 @@ use cia402::{Controlword, Statusword};
 use master::decode::statusword_words;
 use serde::Serialize;
 
-use crate::models::Description;
 use crate::paint::Paint;
-use crate::parse::unit::split_factor;
+use testbench::models::Description;
+use testbench::words::unit::split_factor;
 
 /// A decoded value.
 #[derive(Clone, Debug, Serialize)]

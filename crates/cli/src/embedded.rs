@@ -9,10 +9,8 @@ use sim::machine::Order;
 use sim::{VirtualDrive, World};
 
 use crate::failure::Failure;
-use crate::models::{Description, embedded};
-
-/// Decides everything random on the embedded bus: runs are repeatable.
-pub(crate) const SEED: u64 = 1;
+use testbench::machine_file::SEED;
+use testbench::models::{Description, embedded};
 
 /// Every drive boots well within a second.
 const BOOT_PATIENCE: Duration = Duration::from_secs(5);

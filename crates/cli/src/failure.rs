@@ -6,9 +6,9 @@ use canopen::{AbortCode, Mux, NodeId};
 use clap::error::{ContextKind, ErrorKind};
 use serde::Serialize;
 
-use crate::models::how_to_say;
 use crate::signals::Signal;
 use crate::status::Status;
+use testbench::models::how_to_say;
 
 /// A reason for people, in up to three parts, and what programs look for in it.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -5,9 +5,9 @@ use std::time::Duration;
 use canopen::NodeId;
 use transport::BusSpec;
 
-use crate::machine_file::{self, Machine};
-use crate::models::Description;
-use crate::parse::drive_spec::node_model;
+use testbench::machine_file::{self, Machine};
+use testbench::models::Description;
+use testbench::words::drive::node_model;
 
 /// What every command takes.
 #[derive(Clone, clap::Args)]

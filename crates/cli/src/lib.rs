@@ -31,6 +31,7 @@
 //! | you want to | begin at |
 //! |---|---|
 //! | test software against virtual drives | [`sim::World`], [`sim::block_on`] |
+//! | describe a machine in a file | [`testbench::machine_file`] |
 //! | move drives, virtual or real | [`master::Drive`], [`master::Network`] |
 //! | reach a bus: socketcand, slcan, a log | [`transport::BusSpec`], [`transport::run_station`] |
 //! | serve a virtual bus to other programs | [`transport::Hub`], [`transport::run_world`] |
@@ -47,4 +48,4 @@
 //! `ARCHITECTURE.md` shows how the crates fit together.
 
 #[doc(inline)]
-pub use {can, canopen, cia402, devices, drives, eds, master, motion, plant, showcase, sim, transport};
+pub use {can, canopen, cia402, devices, drives, eds, master, motion, plant, showcase, sim, testbench, transport};

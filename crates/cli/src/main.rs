@@ -6,17 +6,13 @@
 mod args;
 mod command;
 mod context;
-mod data_sheet;
 mod decode;
 mod embedded;
 mod failure;
 mod global;
 mod guard;
-mod machine_file;
-mod models;
 mod output;
 mod paint;
-mod parse;
 mod plain;
 mod progress;
 mod readings;

@@ -14,9 +14,9 @@ use crate::context::Context;
 use crate::embedded::{self, Embedded};
 use crate::failure::Failure;
 use crate::global::Global;
-use crate::machine_file;
 use crate::progress::Progress;
 use crate::signals::asked_to_end;
+use testbench::machine_file;
 
 /// Longest virtual time that a command may take; none comes near, and a hang would otherwise never end.
 const VIRTUAL_LIMIT: Duration = Duration::from_secs(24 * 3600);
@@ -49,7 +49,14 @@ pub(crate) fn runtime() -> Result<tokio::runtime::Runtime, Failure> {
 
 /// The world that `--bus sim` or `--bus sim:FILE.toml` means, and which drives are in it.
 pub(crate) fn virtual_world(file: Option<&Path>) -> Result<Embedded, Failure> {
-    file.map_or_else(embedded::world, machine_file::load)
+    let Some(path) = file else { return embedded::world() };
+    let unusable = |reason| {
+        Failure::usage(format!("cannot use the machine file {}", path.display()))
+            .because(reason)
+            .next(machine_file::example())
+    };
+    let machine = machine_file::read(path).map_err(unusable)?;
+    Ok((machine.build().map_err(unusable)?, machine.models().collect()))
 }
 
 fn virtual_bus<R>(

@@ -40,6 +40,10 @@ const MAY_USE: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "testbench",
+        &["can", "canopen", "cia402", "motion", "plant", "devices", "eds", "drives", "sim", "master", "plot"],
+    ),
+    (
         "cli",
         &[
             "can",
@@ -55,6 +59,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "transport",
             "plot",
             "showcase",
+            "testbench",
         ],
     ),
 ];

@@ -13,12 +13,12 @@ use serde::Serialize;
 use super::eds::source;
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::models::Description;
 use crate::output::Report;
 use crate::paint::Paint;
-use crate::parse::node::node;
 use crate::plain::plain;
 use crate::table::Table;
+use testbench::models::Description;
+use testbench::words::node::node;
 
 /// Read a device's parameters into a device configuration file (DCF)
 ///

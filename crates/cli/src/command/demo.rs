@@ -10,10 +10,10 @@ use transport::WallClock;
 
 use crate::failure::Failure;
 use crate::global::Global;
-use crate::models::resolve;
 use crate::progress::Progress;
 use crate::session::exit_on_signal;
 use report::DemoReport;
+use testbench::models::resolve;
 
 /// Show the whole thing on an embedded virtual bus: every procedure of the three manuals against the three drives
 ///

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-use crate::models::Description;
 use crate::output::Report;
 use crate::paint::Paint;
 use crate::table::Table;
+use testbench::models::Description;
 
 /// All departures of a model.
 #[derive(Debug, Serialize)]

@@ -11,7 +11,7 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
 use crate::paint::Paint;
-use crate::parse::node::node;
+use testbench::words::node::node;
 
 /// Show what a drive says of itself: power state, fault with remedy, position, speed, current, temperatures, supply
 #[derive(Debug, clap::Args)]

@@ -14,12 +14,12 @@ use transport::{AnyBus, AsyncBus, BusError, BusSpec, WallClock};
 
 use crate::failure::Failure;
 use crate::global::Global;
-use crate::machine_file::Machine;
-use crate::models::with_told;
 use crate::output::{Format, Report};
 use crate::paint::Paint;
 use crate::session::{bus_failure, exit_on_signal, runtime, virtual_world};
 use crate::signals::asked_to_end;
+use testbench::machine_file::Machine;
+use testbench::models::with_told;
 
 /// Show the bus decoded: SDO with object names and values, PDOs by their mapping, statuswords in words
 ///

@@ -11,9 +11,9 @@ use super::motion::{MotionOutcome, Then, outcome, speed};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::guard::GuardArgs;
-use crate::models::Description;
-use crate::parse::node::node;
 use devices::AxisDescription;
+use testbench::models::Description;
+use testbench::words::node::node;
 
 /// Find a drive's reference position
 ///
@@ -86,7 +86,7 @@ mod tests {
             no_wait: false,
             guard: GuardArgs::default(),
         };
-        let model = crate::models::resolve("zlac8030l").unwrap();
+        let model = testbench::models::resolve("zlac8030l").unwrap();
         let text = home.refusal(model, &model.axes[0]).to_string();
         assert!(text.contains("6060h takes 1") && text.contains("objects zlac8030l position"), "{text}");
     }

@@ -13,10 +13,10 @@ use super::drive::{Motion, StateReport};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::guard::{Guard, GuardArgs, GuardReport};
-use crate::models::is_from_file;
 use crate::output::Report;
 use crate::paint::Paint;
-use crate::parse::node::node;
+use testbench::models::is_from_file;
+use testbench::words::node::node;
 
 /// Turn at a speed
 ///

@@ -10,7 +10,7 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
 use crate::paint::Paint;
-use crate::parse::node::{Nodes, nodes};
+use testbench::words::node::{Nodes, nodes};
 
 /// Send a network management command to one node or to all
 #[derive(Debug, clap::Args)]

@@ -9,12 +9,12 @@ use super::departures::DepartureList;
 use super::sdo::guessed;
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::models::{Description, resolve};
 use crate::output::Report;
 use crate::paint::Paint;
-use crate::parse::node::node;
-use crate::parse::object::{ObjectArg, object};
 use crate::table::Table;
+use testbench::models::{Description, resolve};
+use testbench::words::node::node;
+use testbench::words::object::{ObjectArg, object};
 
 /// List the object dictionary of a model or of a node
 #[derive(clap::Args)]
@@ -312,7 +312,7 @@ impl Report for ObjectList {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::models::embedded;
+    use testbench::models::embedded;
 
     fn found(words: &[&str]) -> Vec<&'static str> {
         let search = words.iter().map(|word| (*word).into()).collect();

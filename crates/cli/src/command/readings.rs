@@ -4,10 +4,10 @@ use devices::variant::{Variation, VariationKind};
 use serde::Serialize;
 
 use crate::failure::Failure;
-use crate::models::{Description, resolve};
 use crate::output::Report;
 use crate::paint::Paint;
 use crate::readings::{self, Reading};
+use testbench::models::{Description, resolve};
 
 /// List where a model's manual is silent or contradicts itself, what is done there, and what can be chosen
 ///

@@ -6,10 +6,10 @@ use serde::Serialize;
 
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::models::{Description, how_to_say};
 use crate::output::Report;
 use crate::paint::Paint;
 use crate::table::Table;
+use testbench::models::{Description, how_to_say};
 
 /// Show who is on the bus
 ///

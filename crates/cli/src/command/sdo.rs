@@ -12,9 +12,9 @@ use crate::decode::{Decoded, decode};
 use crate::failure::Failure;
 use crate::output::Report;
 use crate::paint::Paint;
-use crate::parse::node::node;
-use crate::parse::object::{ObjectArg, object};
-use crate::parse::value::{typed_value, value};
+use testbench::words::node::node;
+use testbench::words::object::{ObjectArg, object};
+use testbench::words::value::{typed_value, value};
 
 /// Read an object of a node, decoded with unit and meaning
 #[derive(Debug, clap::Args)]

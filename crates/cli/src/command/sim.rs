@@ -18,8 +18,6 @@ use transport::{
 use crate::embedded;
 use crate::failure::Failure;
 use crate::global::Global;
-use crate::machine_file::{Machine, Placed};
-use crate::parse::drive_spec::{DriveSpec, drive_spec};
 use crate::plain::plain;
 use crate::serve::eeprom::{EepromError, Eeproms};
 use crate::serve::files::create_log;
@@ -30,6 +28,8 @@ use crate::serve::speaker::Speaker;
 use crate::serve::world::ServedWorld;
 use crate::session::{bus_failure, failure_of};
 use described::notes;
+use testbench::machine_file::{Machine, Placed};
+use testbench::words::drive::{DriveSpec, drive_spec};
 
 /// Run virtual drives in real time, for other programs
 ///

@@ -9,7 +9,7 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
 use crate::paint::Paint;
-use crate::parse::node::node;
+use testbench::words::node::node;
 
 /// Store a drive's parameters in its own memory
 #[derive(Debug, clap::Args)]

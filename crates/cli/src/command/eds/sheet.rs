@@ -7,11 +7,11 @@ use eds::{Flavour, Sheet, write};
 use serde::Serialize;
 
 use crate::failure::Failure;
-use crate::models::{Description, resolve};
 use crate::output::Report;
 use crate::paint::Paint;
-use crate::parse::drive_spec::DriveSpec;
-use crate::parse::node::node;
+use testbench::models::{Description, resolve};
+use testbench::words::drive::DriveSpec;
+use testbench::words::node::node;
 
 /// Which model's, and what is special about it.
 #[derive(clap::Args)]

@@ -8,9 +8,9 @@ use super::source;
 use crate::failure::Failure;
 use crate::output::Report;
 use crate::paint::Paint;
-use crate::parse::object::{ObjectArg, object};
 use crate::plain::plain;
 use crate::table::Table;
+use testbench::words::object::{ObjectArg, object};
 
 /// Show the device and the objects of an EDS or DCF file
 #[derive(clap::Args)]

@@ -5,9 +5,9 @@ use std::path::Path;
 use eds::document::Document;
 use eds::{Eds, Reading, Sheet};
 
-use crate::data_sheet::{self, Unread};
 use crate::failure::Failure;
-use crate::models::resolve;
+use testbench::data_sheet::{self, Unread};
+use testbench::models::resolve;
 
 /// Reads a file as it stands.
 pub(crate) fn document(path: &Path) -> Result<Document, Failure> {

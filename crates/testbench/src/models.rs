@@ -1,4 +1,4 @@
-//! The devices that Ferrodrive knows, as the command line names them.
+//! The devices that Ferrodrive knows, as people name them.
 
 use std::path::Path;
 
@@ -8,13 +8,12 @@ use master::Models;
 use sim::machine::models;
 
 use crate::data_sheet::{self, Unread};
-use crate::parse::suggest::{did_you_mean, near};
-use crate::plain::plain;
+use crate::words::suggest::{did_you_mean, near};
 
-pub(crate) use devices::Description;
+pub use devices::Description;
 
 /// What a MODEL argument means: the name of a model, or an EDS or DCF file that describes one.
-pub(crate) fn resolve(text: &str) -> Result<&'static Description, String> {
+pub fn resolve(text: &str) -> Result<&'static Description, String> {
     if is_file(text) {
         return described(Path::new(text));
     }
@@ -33,7 +32,7 @@ fn is_file(text: &str) -> bool {
 
 /// The device that a file describes.
 fn described(path: &Path) -> Result<&'static Description, String> {
-    let shown = plain(&path.display().to_string());
+    let shown = path.display();
     let reading = data_sheet::reading(path).map_err(|unread| match unread {
         Unread::File(error) => format!("cannot read {shown}: {error}"),
         Unread::Refused(refusal) => format!("{shown}: {refusal}"),
@@ -42,18 +41,18 @@ fn described(path: &Path) -> Result<&'static Description, String> {
 }
 
 /// True for a device that a data sheet describes: what one count of an object is worth, no data sheet says.
-pub(crate) fn is_from_file(model: &Description) -> bool {
+pub fn is_from_file(model: &Description) -> bool {
     !models().any(|known| core::ptr::eq(known, model))
 }
 
 /// The models known, and those told that are not among them.
-pub(crate) fn with_told(told: impl Iterator<Item = &'static Description>) -> Models {
+pub fn with_told(told: impl Iterator<Item = &'static Description>) -> Models {
     told.filter(|model| is_from_file(model)).fold(Models::default(), |known, model| known.with(model))
 }
 
 /// The drives on the embedded virtual bus and their node-IDs: one of each kind that is delivered with a node-ID, at that
 /// node-ID or the next one that is free.
-pub(crate) fn embedded() -> Vec<(NodeId, &'static Description)> {
+pub fn embedded() -> Vec<(NodeId, &'static Description)> {
     let mut drives: Vec<(NodeId, &'static Description)> = Vec::new();
     for model in models() {
         let Some(delivered) = model.node_id.filter(|_| !drives.iter().any(|(_, other)| model.same_objects(other)))
@@ -69,12 +68,12 @@ pub(crate) fn embedded() -> Vec<(NodeId, &'static Description)> {
 }
 
 /// The names of all models, for messages.
-pub(crate) fn names() -> String {
+pub fn names() -> String {
     models().map(|model| model.name).collect::<Vec<_>>().join(", ")
 }
 
 /// How the user says which of `models` a node is.
-pub(crate) fn how_to_say(node: NodeId, models: &[&str]) -> String {
+pub fn how_to_say(node: NodeId, models: &[&str]) -> String {
     let (first, others) = models.split_first().unwrap_or((&"MODEL", &[]));
     let others = if others.is_empty() { String::new() } else { format!(" (or {})", others.join(", ")) };
     format!("--model {node}={first}{others}, or a machine file (--machine FILE)")

@@ -4,26 +4,38 @@
 
 /// What a unit measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Dimension {
+pub enum Dimension {
+    /// In turns.
     Angle,
+    /// In r/min.
     AngularVelocity,
+    /// In A.
     Current,
+    /// In A/s.
     CurrentRate,
+    /// In V.
     Voltage,
+    /// In s.
     Time,
+    /// In °C.
     Temperature,
+    /// In W.
     Power,
+    /// In ohm.
     Resistance,
+    /// In 1.
     Ratio,
+    /// In counts.
     Counts,
 }
 
 /// A unit: `factor` of the dimension's base unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Unit {
-    pub(crate) dimension: Dimension,
+pub struct Unit {
+    /// What it measures.
+    pub dimension: Dimension,
     /// Base units: turn, r/min, A, A/s, V, s, degree Celsius, W, ohm, 1, count.
-    pub(crate) factor: f64,
+    pub factor: f64,
 }
 
 use Dimension::*;
@@ -59,7 +71,7 @@ const UNITS: &[(Dimension, f64, &[&str])] = &[
 
 impl Unit {
     /// The unit spelt `text`; exact spelling first (`mA` is no `MA`), then without regard to case.
-    pub(crate) fn named(text: &str) -> Option<Self> {
+    pub fn named(text: &str) -> Option<Self> {
         let find = |same: &dyn Fn(&str) -> bool| {
             let row = UNITS.iter().find(|(_, _, names)| names.iter().any(|name| same(name)))?;
             Some(Self { dimension: row.0, factor: row.1 })
@@ -68,7 +80,7 @@ impl Unit {
     }
 
     /// The unit of an object row, e.g. `0.1 r/min` or `*10counts`: how many of which unit one count stands for.
-    pub(crate) fn of_object(text: &str) -> Option<Self> {
+    pub fn of_object(text: &str) -> Option<Self> {
         let text = text.trim().trim_start_matches(['*', '×']);
         let (number, name) = split_factor(text);
         let unit = Self::named(name)?;
@@ -77,7 +89,7 @@ impl Unit {
 }
 
 /// How much of which unit one count is: `0.1 r/min`, `1/2000 A`, `100/32768 %`.
-pub(crate) fn split_factor(text: &str) -> (f64, &str) {
+pub fn split_factor(text: &str) -> (f64, &str) {
     let (number, rest) = split_number(text).unwrap_or((1.0, text));
     match rest.strip_prefix('/').and_then(split_number) {
         Some((divisor, name)) if divisor > 0.0 => (number / divisor, name),
@@ -86,7 +98,7 @@ pub(crate) fn split_factor(text: &str) -> (f64, &str) {
 }
 
 /// A number and what follows it without surrounding blanks; `None` if `text` begins with no number.
-pub(crate) fn split_number(text: &str) -> Option<(f64, &str)> {
+pub fn split_number(text: &str) -> Option<(f64, &str)> {
     let text = text.trim();
     let bytes = text.as_bytes();
     let digits = |from: usize| from + bytes[from..].iter().take_while(|byte| byte.is_ascii_digit()).count();

@@ -2,9 +2,9 @@
 //!
 //! Every error says what was wrong, what is expected, and shows an example; clap prints it with exit status 2.
 
-pub(crate) mod drive_spec;
-pub(crate) mod node;
-pub(crate) mod object;
-pub(crate) mod suggest;
-pub(crate) mod unit;
-pub(crate) mod value;
+pub mod drive;
+pub mod node;
+pub mod object;
+pub mod suggest;
+pub mod unit;
+pub mod value;

@@ -12,39 +12,39 @@ use crate::models::{Description, resolve};
 
 /// A drive to put on a virtual bus.
 #[derive(Clone)]
-pub(crate) struct DriveSpec {
+pub struct DriveSpec {
     /// Which drive.
-    pub(crate) model: &'static Description,
+    pub model: &'static Description,
     /// Its node-ID at the first start.
-    pub(crate) node: NodeId,
+    pub node: NodeId,
     variant: Variant,
     presets: Vec<Preset>,
 }
 
 impl DriveSpec {
     /// A drive as delivered.
-    pub(crate) fn new(model: &'static Description, node: NodeId) -> Self {
+    pub fn new(model: &'static Description, node: NodeId) -> Self {
         Self { model, node, variant: Variant::first_of(model.variations), presets: Vec::new() }
     }
 
     /// What to order for a bus of this rate.
-    pub(crate) fn order(&self, bitrate: Bitrate) -> Order {
+    pub fn order(&self, bitrate: Bitrate) -> Order {
         Order { node: self.node, bitrate, variant: self.variant, presets: self.presets.clone() }
     }
 
     /// What was chosen for it.
-    pub(crate) const fn variant(&self) -> Variant {
+    pub const fn variant(&self) -> Variant {
         self.variant
     }
 
     /// The values that objects have at power-on besides.
-    pub(crate) fn presets(&self) -> &[Preset] {
+    pub fn presets(&self) -> &[Preset] {
         &self.presets
     }
 
     /// Takes one option: a choice of the model's (`firmware=2.01`, `reading=Z050:prose` or `Z050=prose`), or the value that an
     /// object has at power-on (`6060=3`, `2030:02=9`).
-    pub(crate) fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
+    pub fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
         let (key, value) = match key {
             "reading" => value.split_once(':').ok_or_else(|| {
                 format!("'reading={value}' is incomplete; expected reading=PLACE:CHOICE, e.g. {}", self.an_example())
@@ -98,7 +98,7 @@ fn number(text: &str) -> Option<i64> {
 }
 
 /// `zlac8030l@4,motor=fast,6060=3`, `vendor.eds@5`.
-pub(crate) fn drive_spec(text: &str) -> Result<DriveSpec, String> {
+pub fn drive_spec(text: &str) -> Result<DriveSpec, String> {
     let mut words = text.split(',');
     let place = words.next().unwrap_or_default();
     let (name, number) = place
@@ -115,7 +115,7 @@ pub(crate) fn drive_spec(text: &str) -> Result<DriveSpec, String> {
 }
 
 /// `4=zlac8030l`.
-pub(crate) fn node_model(text: &str) -> Result<(NodeId, &'static Description), String> {
+pub fn node_model(text: &str) -> Result<(NodeId, &'static Description), String> {
     let (number, name) =
         text.split_once('=').ok_or_else(|| format!("'{text}' is incomplete; expected NODE=MODEL, e.g. 4=zlac8030l"))?;
     Ok((node(number)?, resolve(name)?))

@@ -7,7 +7,7 @@ use super::suggest::{did_you_mean, near};
 
 /// What was typed: a number, or a name to look up in the table of the node's model.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum ObjectArg {
+pub enum ObjectArg {
     /// Index and sub-index.
     Mux(Mux),
     /// A name in snake case.
@@ -18,7 +18,7 @@ const EXPECTED: &str = "an object is a hexadecimal index with an optional sub-in
                         e.g. 6064, 0x6064, 6064h, 2026:01, position_actual_value";
 
 /// Reads an object argument; names are looked up later, when the model is known.
-pub(crate) fn object(text: &str) -> Result<ObjectArg, String> {
+pub fn object(text: &str) -> Result<ObjectArg, String> {
     let (index, sub_index) = text.split_once(':').unwrap_or((text, "0"));
     let index = index.strip_suffix(['h', 'H']).unwrap_or(index);
     let index = index.strip_prefix("0x").or_else(|| index.strip_prefix("0X")).unwrap_or(index);
@@ -43,7 +43,7 @@ fn is_name(text: &str) -> bool {
 
 impl ObjectArg {
     /// The multiplexor, and the row if `table` has it. A number needs no row: the drive answers for itself.
-    pub(crate) fn resolve(&self, table: Option<&'static Table>) -> Result<(Mux, Option<&'static Entry>), String> {
+    pub fn resolve(&self, table: Option<&'static Table>) -> Result<(Mux, Option<&'static Entry>), String> {
         match self {
             Self::Mux(mux) => Ok((*mux, table.and_then(|table| row(table, *mux)))),
             Self::Name(name) => {

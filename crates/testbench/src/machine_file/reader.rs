@@ -8,7 +8,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::parse::suggest::{did_you_mean, near};
+use crate::words::suggest::{did_you_mean, near};
 
 /// The names of one table and what they stand for.
 pub(super) struct Table<'a> {

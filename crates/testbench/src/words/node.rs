@@ -5,14 +5,14 @@ use canopen::NodeId;
 const EXPECTED: &str = "a node-ID is a number from 1 to 127, e.g. 4";
 
 /// `4`.
-pub(crate) fn node(text: &str) -> Result<NodeId, String> {
+pub fn node(text: &str) -> Result<NodeId, String> {
     let number: u8 = text.parse().map_err(|_| format!("'{text}' is no node-ID; {EXPECTED}"))?;
     NodeId::new(number).ok_or_else(|| format!("there is no node {number}; {EXPECTED}"))
 }
 
 /// One node or all of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Nodes {
+pub enum Nodes {
     /// Every node on the bus.
     All,
     /// This one.
@@ -20,7 +20,7 @@ pub(crate) enum Nodes {
 }
 
 /// `4` or `all`.
-pub(crate) fn nodes(text: &str) -> Result<Nodes, String> {
+pub fn nodes(text: &str) -> Result<Nodes, String> {
     if text.eq_ignore_ascii_case("all") {
         return Ok(Nodes::All);
     }

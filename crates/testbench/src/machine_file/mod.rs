@@ -15,55 +15,61 @@ use canopen::NodeId;
 use sim::machine::Realism;
 use sim::{Source, VirtualDrive, World};
 
-use crate::embedded::{self, Embedded, SEED};
-use crate::failure::Failure;
 use crate::models::Description;
-use crate::parse::drive_spec::{DriveSpec, drive_spec};
+use crate::words::drive::{DriveSpec, drive_spec};
 use reader::{Field, Table};
 
 const EXAMPLE: &str =
     "[[drive]]\n           model = \"zlac8030l\"\n           node = 4\n           load = { torque_nm = 0.5 }";
+
+/// Decides everything random where no seed is given: runs are repeatable.
+pub const SEED: u64 = 1;
 
 /// Largest file that is read. A bus has 127 drives, and a drive some lines.
 const LARGEST: u64 = 1 << 20;
 
 /// A machine as its file describes it.
 #[derive(Clone, Default)]
-pub(crate) struct Machine {
+pub struct Machine {
     /// The bus's rate, where it says one.
-    pub(crate) bitrate: Option<Bitrate>,
+    pub bitrate: Option<Bitrate>,
     /// What decides everything random, where it says so.
-    pub(crate) seed: Option<u64>,
+    pub seed: Option<u64>,
     /// Whether its drives have the noise and the flaws of real ones, where it says so.
-    pub(crate) realism: Option<Realism>,
+    pub realism: Option<Realism>,
     /// The drives, each at a node of its own.
-    pub(crate) drives: Vec<Placed>,
+    pub drives: Vec<Placed>,
 }
 
 /// One drive of a machine and what is around it.
 #[derive(Clone)]
-pub(crate) struct Placed {
+pub struct Placed {
     /// Which drive, and where.
-    pub(crate) spec: DriveSpec,
+    pub spec: DriveSpec,
     source: Source,
     /// What is around it, as world commands.
     commands: Vec<String>,
 }
 
-/// The world that a file describes.
-pub(crate) fn load(path: &Path) -> Result<Embedded, Failure> {
-    text_of(path).and_then(|text| Machine::parse(&text)?.build()).map_err(|reason| {
-        Failure::usage(format!("cannot use the machine file {}", path.display()))
-            .because(reason)
-            .next(format!("a machine file looks like this:\n           {EXAMPLE}"))
-    })
+/// The machine that the file at `path` describes.
+///
+/// # Errors
+/// What is wrong with the file.
+pub fn read(path: &Path) -> Result<Machine, String> {
+    Machine::parse(&text_of(path)?)
 }
 
 /// The machine of `--machine`.
-pub(crate) fn machine(path: &str) -> Result<Machine, String> {
-    text_of(Path::new(path))
-        .and_then(|text| Machine::parse(&text))
-        .map_err(|reason| format!("cannot use it: {reason}\na machine file looks like this:\n           {EXAMPLE}"))
+///
+/// # Errors
+/// What is wrong with the file, and what one looks like.
+pub fn machine(path: &str) -> Result<Machine, String> {
+    read(Path::new(path)).map_err(|reason| format!("cannot use it: {reason}\n{}", example()))
+}
+
+/// What a machine file looks like, for messages.
+pub fn example() -> String {
+    format!("a machine file looks like this:\n           {EXAMPLE}")
 }
 
 /// The text of a file of sensible size. A pipe or a device, which may never end, is none.
@@ -79,7 +85,11 @@ fn text_of(path: &Path) -> Result<String, String> {
 }
 
 impl Machine {
-    fn parse(text: &str) -> Result<Self, String> {
+    /// Reads the text of a machine file.
+    ///
+    /// # Errors
+    /// What is wrong, at which line, and what is expected there.
+    pub fn parse(text: &str) -> Result<Self, String> {
         reader::read(text, "a machine file", |file| {
             file.takes_only(&["bitrate", "seed", "realism", "drive"])?;
             let bitrate = file.get("bitrate").map(|field| rate(&field)).transpose()?;
@@ -104,35 +114,39 @@ impl Machine {
     }
 
     /// Which models are where.
-    pub(crate) fn models(&self) -> impl Iterator<Item = (NodeId, &'static Description)> {
+    pub fn models(&self) -> impl Iterator<Item = (NodeId, &'static Description)> {
         self.drives.iter().map(|drive| (drive.spec.node, drive.spec.model))
     }
 
     /// Its bus, still without drives.
-    pub(crate) fn world(&self) -> World {
+    pub fn world(&self) -> World {
         World::new(self.bitrate.unwrap_or(Bitrate::K500), self.seed.unwrap_or(SEED))
     }
 
     /// Makes the drives of its world, which are there already, as real as it says.
-    pub(crate) fn make_real(&self, world: &mut World) {
+    pub fn make_real(&self, world: &mut World) {
         for placed in &self.drives {
             // A drive that is not there has been refused before.
             let _ = world.set_realism(placed.spec.node.raw(), self.realism.unwrap_or_default());
         }
     }
 
-    fn build(&self) -> Result<Embedded, String> {
+    /// Its bus with its drives and what is around them, at time zero.
+    ///
+    /// # Errors
+    /// What a drive does not take, in a sentence.
+    pub fn build(&self) -> Result<World, String> {
         let mut world = self.world();
         for placed in &self.drives {
             let spec = &placed.spec;
-            let mut drive =
-                embedded::ordered_drive(spec.model, &spec.order(world.bitrate())).map_err(|failure| failure.what)?;
+            let order = spec.order(world.bitrate());
+            let mut drive = sim::machine::order(spec.model, &order).map_err(|error| error.to_string())?;
             placed.supply(drive.as_mut())?;
             world.add_drive(spec.node.raw(), drive).map_err(|error| error.to_string())?;
             placed.furnish(&mut world)?;
         }
         self.make_real(&mut world);
-        Ok((world, self.models().collect()))
+        Ok(world)
     }
 }
 
@@ -156,13 +170,13 @@ fn realism(field: &Field<'_>) -> Result<Realism, String> {
 impl Placed {
     /// Sets the supply of the drive, before the power comes on: capacitors once charged would hold another voltage for a
     /// while.
-    pub(crate) fn supply(&self, drive: &mut dyn VirtualDrive) -> Result<(), String> {
+    pub fn supply(&self, drive: &mut dyn VirtualDrive) -> Result<(), String> {
         let set = drive.set_source(self.source, Instant::ZERO);
         set.map_err(|refused| format!("supply of node {}: {refused}", self.spec.node))
     }
 
     /// Puts into the world what is around the drive, which is there already.
-    pub(crate) fn furnish(&self, world: &mut World) -> Result<(), String> {
+    pub fn furnish(&self, world: &mut World) -> Result<(), String> {
         self.commands.iter().try_for_each(|command| obey(world, command))
     }
 

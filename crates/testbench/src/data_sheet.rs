@@ -8,7 +8,7 @@ use eds::document::{Bounds, Document};
 use eds::{Eds, Reading, Refusal};
 
 /// Why a file gave no data sheet.
-pub(crate) enum Unread {
+pub enum Unread {
     /// It cannot be read.
     File(io::Error),
     /// It is no data sheet.
@@ -16,7 +16,7 @@ pub(crate) enum Unread {
 }
 
 /// Reads a file as it stands, no more of it than an EDS may have.
-pub(crate) fn document(path: &Path) -> Result<Document, Unread> {
+pub fn document(path: &Path) -> Result<Document, Unread> {
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(Unread::File)?;
     file.take(Bounds::DEFAULT.bytes as u64 + 1).read_to_end(&mut bytes).map_err(Unread::File)?;
@@ -24,6 +24,6 @@ pub(crate) fn document(path: &Path) -> Result<Document, Unread> {
 }
 
 /// Reads a data sheet.
-pub(crate) fn reading(path: &Path) -> Result<Reading, Unread> {
+pub fn reading(path: &Path) -> Result<Reading, Unread> {
     Eds::read(&document(path)?).map_err(Unread::Refused)
 }

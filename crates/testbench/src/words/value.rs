@@ -7,7 +7,7 @@ use super::unit::{Unit, split_number};
 
 /// Reads what `row` is to be set to, where `resolution` counts make one of its unit. Its data type bounds the value; its
 /// limits are for the drive to check.
-pub(crate) fn value(row: &Entry, text: &str, resolution: i64) -> Result<i64, String> {
+pub fn value(row: &Entry, text: &str, resolution: i64) -> Result<i64, String> {
     let (low, high) = row.data_type.range();
     let value = match integer(text) {
         Some(value) => value,
@@ -23,7 +23,7 @@ pub(crate) fn value(row: &Entry, text: &str, resolution: i64) -> Result<i64, Str
 }
 
 /// Reads a value of an object that no table describes: `type:number`, e.g. `u16:15`.
-pub(crate) fn typed_value(text: &str) -> Result<(DataType, i64), String> {
+pub fn typed_value(text: &str) -> Result<(DataType, i64), String> {
     const EXPECTED: &str =
         "an object that is in no known table needs its type with the value, e.g. u16:15, i32:-100, u8:0x3";
     let (name, number) = text.split_once(':').ok_or(EXPECTED)?;

@@ -1,7 +1,7 @@
 //! "Did you mean": the nearest of some known words.
 
 /// Up to three of `known` that are near `typed`: those that contain it, else those within a few slips of the keys.
-pub(crate) fn near<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
+pub fn near<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
     const MOST: usize = 3;
     let typed = typed.to_ascii_lowercase();
     let mut scored: Vec<(usize, &str)> = known
@@ -34,7 +34,7 @@ fn distance(a: &str, b: &str) -> usize {
 }
 
 /// `; did you mean a, b?`, or nothing.
-pub(crate) fn did_you_mean(near: &[&str]) -> String {
+pub fn did_you_mean(near: &[&str]) -> String {
     if near.is_empty() { String::new() } else { format!("; did you mean {}?", near.join(", ")) }
 }
 
