@@ -9,8 +9,8 @@ use std::fmt::Write;
 
 use can::Instant;
 
-use crate::Report;
 use crate::stimulus::{Place, Stimulus};
+use crate::{Brake, Report};
 
 /// What can be recorded of a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,9 +37,45 @@ pub enum Signal {
     ShaftAngle,
     /// Statusword as a number.
     Statusword,
+    /// Code of the present fault; 0 for none.
+    ErrorCode,
+    /// Supply switched on: 1, or 0.
+    Powered,
+    /// Where the rotor of a drive that does not measure it truly is, in its counts.
+    RotorPosition,
+    /// Digital outputs, one bit each.
+    Outputs,
+    /// Holding brake engaged: 1, or 0.
+    Brake,
+    /// Angle of the shaft behind a reducer in rad.
+    OutputAngle,
+    /// Torque at the shaft behind a reducer in N·m.
+    OutputTorque,
 }
 
 impl Signal {
+    /// All of them, in the order of a record's columns.
+    pub const ALL: [Self; 18] = [
+        Self::Position,
+        Self::PositionDemand,
+        Self::Velocity,
+        Self::VelocityDemand,
+        Self::Current,
+        Self::CurrentDemand,
+        Self::Supply,
+        Self::MotorTemperature,
+        Self::DriverTemperature,
+        Self::ShaftAngle,
+        Self::Statusword,
+        Self::ErrorCode,
+        Self::Powered,
+        Self::RotorPosition,
+        Self::Outputs,
+        Self::Brake,
+        Self::OutputAngle,
+        Self::OutputTorque,
+    ];
+
     /// Name with unit, as in CSV headers.
     pub fn name(self) -> &'static str {
         match self {
@@ -54,6 +90,27 @@ impl Signal {
             Self::DriverTemperature => "driver_c",
             Self::ShaftAngle => "shaft_angle_rad",
             Self::Statusword => "statusword",
+            Self::ErrorCode => "error_code",
+            Self::Powered => "powered",
+            Self::RotorPosition => "rotor_position_counts",
+            Self::Outputs => "outputs",
+            Self::Brake => "brake",
+            Self::OutputAngle => "output_angle_rad",
+            Self::OutputTorque => "output_torque_nm",
+        }
+    }
+
+    /// Its unit as people write it; empty for what has none.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Position | Self::PositionDemand | Self::RotorPosition => "counts",
+            Self::Velocity | Self::VelocityDemand => "r/min",
+            Self::Current | Self::CurrentDemand => "A",
+            Self::Supply => "V",
+            Self::MotorTemperature | Self::DriverTemperature => "°C",
+            Self::ShaftAngle | Self::OutputAngle => "rad",
+            Self::OutputTorque => "N·m",
+            Self::Statusword | Self::ErrorCode | Self::Powered | Self::Outputs | Self::Brake => "",
         }
     }
 
@@ -71,6 +128,13 @@ impl Signal {
             Self::DriverTemperature => report.driver_c,
             Self::ShaftAngle => Some(report.shaft_angle_rad),
             Self::Statusword => report.statusword.map(f64::from),
+            Self::ErrorCode => Some(f64::from(report.error_code)),
+            Self::Powered => Some(f64::from(u8::from(report.powered))),
+            Self::RotorPosition => report.rotor_position.map(|position| position as f64),
+            Self::Outputs => (!report.outputs.names.is_empty()).then(|| f64::from(report.outputs.bits)),
+            Self::Brake => report.brake.map(|brake| f64::from(u8::from(brake == Brake::Engaged))),
+            Self::OutputAngle => report.output.map(|shaft| shaft.angle_rad),
+            Self::OutputTorque => report.output.map(|shaft| shaft.torque_nm),
         };
         value.unwrap_or(f64::NAN)
     }
@@ -109,6 +173,18 @@ impl Recorder {
             marks: Vec::new(),
             stimuli: Vec::new(),
         }
+    }
+
+    /// Hands out what was recorded so far and goes on without it: a long run is recorded in pieces, in bounded memory.
+    pub fn take(&mut self) -> Self {
+        let rest = Self { next_at: self.next_at, ..Self::new(self.period, self.channels.iter().copied()) };
+        std::mem::replace(self, rest)
+    }
+
+    /// The values of one time after the other, each in the order of [`channels`](Self::channels).
+    pub fn rows(&self) -> impl Iterator<Item = (Instant, &[f64])> + '_ {
+        let width = self.channels.len();
+        self.times.iter().enumerate().map(move |(row, at)| (*at, &self.values[row * width..(row + 1) * width]))
     }
 
     /// What is recorded, in the order of [`samples`](Self::samples).
@@ -156,16 +232,16 @@ impl Recorder {
         }
         csv.push_str(",mark\n");
         let mut marks = self.marks.iter().peekable();
-        for (row, at) in self.times.iter().enumerate() {
+        for (at, values) in self.rows() {
             let _ = write!(csv, "{at}");
-            for value in &self.values[row * self.channels.len()..(row + 1) * self.channels.len()] {
+            for value in values {
                 csv.push(',');
                 if !value.is_nan() {
                     let _ = write!(csv, "{value}");
                 }
             }
             let mut texts = Vec::new();
-            while let Some((_, text)) = marks.next_if(|(marked, _)| marked <= at) {
+            while let Some((_, text)) = marks.next_if(|(marked, _)| *marked <= at) {
                 texts.push(text.as_str());
             }
             csv.push(',');
@@ -184,9 +260,18 @@ impl Recorder {
         self.next_at.filter(|at| *at <= end)
     }
 
-    pub(crate) fn sample(&mut self, at: Instant, mut measure: impl FnMut(Channel) -> f64) {
+    /// Takes the samples of `at`. `measure` gives the report of an axis; `None` if there is no such axis.
+    pub(crate) fn sample(&mut self, at: Instant, mut measure: impl FnMut(Place) -> Option<Report>) {
         self.times.push(at);
-        self.values.extend(self.channels.iter().map(|channel| measure(*channel)));
+        // Channels of one axis mostly stand together: its report is made once for them.
+        let mut measured: Option<(Place, Option<Report>)> = None;
+        for Channel { place, signal } in &self.channels {
+            if measured.as_ref().is_none_or(|(known, _)| known != place) {
+                measured = Some((*place, measure(*place)));
+            }
+            let report = measured.as_ref().and_then(|(_, report)| report.as_ref());
+            self.values.push(report.map_or(f64::NAN, |report| signal.of(report)));
+        }
         self.next_at = Some(at + self.period);
     }
 }

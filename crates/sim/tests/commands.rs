@@ -183,6 +183,29 @@ fn power_and_cable_take_a_drive_off_the_bus() {
 }
 
 #[test]
+fn a_record_taken_in_pieces_is_the_whole_record() {
+    let recorded = |pieces: u64| {
+        let (mut world, _) = world();
+        let channels = Signal::ALL.map(|signal| Channel { place: Place::node(4), signal });
+        world.start_recording(Recorder::new(std::time::Duration::from_millis(5), channels));
+        let mut rows = Vec::new();
+        for piece in 1..=pieces {
+            world.run_until(Instant::from_micros(1_100_000 * piece / pieces));
+            world.mark("piece");
+            let taken = world.take_recorded().unwrap();
+            assert_eq!(taken.marks().len(), 1);
+            let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+            rows.extend(taken.rows().map(|(at, values)| (at, bits(values))));
+        }
+        rows
+    };
+    let whole = recorded(1);
+    // The world begins at 0.5 s; first and last moment count both.
+    assert_eq!(whole.len(), 121);
+    assert_eq!(recorded(7), whole);
+}
+
+#[test]
 fn a_recorder_samples_at_its_period_and_changes_nothing() {
     let (mut plain, _) = world();
     let (mut world, _) = world();

@@ -164,6 +164,11 @@ impl World {
         self.recorder.as_ref()
     }
 
+    /// Hands out what was recorded since the last call, while recording goes on.
+    pub fn take_recorded(&mut self) -> Option<Recorder> {
+        self.recorder.as_mut().map(Recorder::take)
+    }
+
     /// Notes in the recording that something happened now.
     pub fn mark(&mut self, text: &str) {
         if let Some(recorder) = &mut self.recorder {

@@ -4,7 +4,7 @@ use can::Instant;
 
 use super::World;
 use super::member::Member;
-use crate::recorder::Channel;
+use crate::Report;
 use crate::stimulus::Place;
 use crate::wire::{Delivered, Role};
 
@@ -50,22 +50,21 @@ impl World {
         if let Some(mut recorder) = self.recorder.take() {
             while let Some(due) = recorder.due_by(at) {
                 self.now = self.now.max(due);
-                recorder.sample(due, |channel| self.measure(channel));
+                recorder.sample(due, |place| self.measure(place));
             }
             self.recorder = Some(recorder);
         }
         self.now = self.now.max(at);
     }
 
-    fn measure(&mut self, channel: Channel) -> f64 {
-        let Place { node, axis } = channel.place;
-        let drive = self.members.iter_mut().find_map(|member| match member {
-            Member::Drive { number, drive } if *number == node => Some(drive),
+    fn measure(&mut self, place: Place) -> Option<Report> {
+        let now = self.now;
+        self.members.iter_mut().find_map(|member| match member {
+            Member::Drive { number, drive } if *number == place.node => {
+                drive.advance(now);
+                Some(drive.report_of(place.axis))
+            }
             _ => None,
-        });
-        drive.map_or(f64::NAN, |drive| {
-            drive.advance(self.now);
-            channel.signal.of(&drive.report_of(axis))
         })
     }
 
