@@ -12,7 +12,7 @@ use std::str::FromStr;
 
 use serde::Serialize;
 
-use crate::stimulus::{GET, Place, Stimulus, StimulusError};
+use crate::stimulus::{GET, Place, Stimulus, StimulusError, WireFault};
 use crate::{Refused, World};
 
 /// One line, understood.
@@ -26,6 +26,8 @@ pub enum Command {
     Quit,
     /// `4 get`: what can be measured at a node.
     Get(Place),
+    /// `bus corrupt 0.01`: what disturbs the wire.
+    Disturb(WireFault),
     /// `4 power off`: what the outer world does to a node.
     Apply(Place, Stimulus),
 }
@@ -43,6 +45,10 @@ impl FromStr for Command {
             "now" => return alone(Self::Now, "now"),
             "help" => return alone(Self::Help, "help"),
             "quit" => return alone(Self::Quit, "quit"),
+            "bus" => {
+                let words: Vec<&str> = rest.split_whitespace().collect();
+                return Ok(Self::Disturb(WireFault::parse(&words)?));
+            }
             _ => {}
         }
         let place = parse_place(first)?;
@@ -71,7 +77,7 @@ pub enum CommandError {
     #[error("the line is longer than {MAX_LINE_LENGTH} bytes; expected a command, as in: 4 get")]
     TooLong,
     /// The first word is neither a node nor a command.
-    #[error("unknown command {0:?}; expected now, help, quit, or a node number and a command, as in: 4 get")]
+    #[error("unknown command {0:?}; expected now, help, quit, bus, or a node number and a command, as in: 4 get")]
     Unknown(String),
     /// The number is no node number.
     #[error("{0:?} is no node number; expected 1 to 127")]
@@ -79,7 +85,7 @@ pub enum CommandError {
     /// A node number and nothing after it.
     #[error(
         "nothing to do is said after node {0}; expected power, input, switch, load, rotor, supply, temperature, fault, \
-         battery, pulses, quadrature, duty, clock, cable, set or get, as in: {0} get"
+         battery, pulses, quadrature, duty, clock, cable, bus, set or get, as in: {0} get"
     )]
     NoAction(String),
     /// The words are no stimulus.

@@ -36,6 +36,16 @@ impl Corruption {
         self
     }
 
+    /// From here on each frame is destroyed with `probability`; planned strikes stay.
+    pub(crate) fn set_probability(&mut self, probability: f64) {
+        self.probability = probability.clamp(0.0, 1.0);
+    }
+
+    /// Also destroys the `n`-th attempt from here on, at its `bit`-th bit.
+    pub(crate) fn strike_nth(&mut self, n: u64, bit: u32) {
+        self.nth.insert(self.seen.saturating_add(n), bit);
+    }
+
     /// Decides on the next attempt of a frame `bits` long: the bit with the error, 1..=`bits`.
     pub(crate) fn strike(&mut self, bits: u32, prng: &mut Prng) -> Option<u32> {
         self.seen += 1;
@@ -59,10 +69,20 @@ pub struct NodeFaults {
     pub babble: Option<Babble>,
     /// Loses frames that come too fast.
     pub overrun: Option<Overrun>,
+    /// The probability with which an attempt to send fails for a bad contact of its own: everybody sees the error, and
+    /// its error counter rises towards bus-off.
+    pub corrupt: f64,
+}
+
+impl NodeFaults {
+    /// Decides on an attempt of its own, `bits` long: the bit with the error. Draws nothing while its contact is good.
+    pub(crate) fn strike(&self, bits: u32, prng: &mut Prng) -> Option<u32> {
+        (self.corrupt > 0.0 && prng.chance(self.corrupt)).then(|| 1 + prng.below(bits.into()) as u32)
+    }
 }
 
 /// A delay drawn uniformly from a range, in nanoseconds. Frames keep their order.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Delay {
     /// Shortest delay.
     pub min_ns: u64,
@@ -83,7 +103,7 @@ impl Delay {
 }
 
 /// A babbling node ("babbling idiot"): `frame` is offered again `gap_ns` after it went out.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Babble {
     /// The frame sent over and over.
     pub frame: Frame,
@@ -94,7 +114,7 @@ pub struct Babble {
 /// A receiver with a buffer of `depth` frames and firmware that needs `service_ns` for each.
 ///
 /// A frame that finds the buffer full is lost; it was acknowledged all the same, as on a real controller.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Overrun {
     /// Frames the controller can hold.
     pub depth: u32,

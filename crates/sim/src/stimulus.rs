@@ -9,12 +9,14 @@
 //! # Ok::<(), sim::stimulus::StimulusError>(())
 //! ```
 
+mod bus_fault;
 mod error;
 mod kinds;
 mod parse;
 mod place;
 mod print;
 
+pub use bus_fault::{BusFault, WireFault};
 pub use error::StimulusError;
 pub use kinds::{Component, ObjectValue, Power, PulseTrain, Source, Stimulus, SwitchRange, TemperatureSensor};
 pub use parse::{FORMS, GET};

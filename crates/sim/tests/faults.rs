@@ -169,3 +169,54 @@ fn about_the_asked_share_of_frames_is_disturbed_and_none_is_lost() {
     assert_eq!(world.station::<Chatter>(b).unwrap().heard, sent);
     assert!(sent >= 19_999);
 }
+
+/// ISO 11898-1, fault confinement: each transmit error counts 8, above 255 a node is off the bus, and 128 times 11 recessive
+/// bits later it is back.
+#[test]
+fn a_bad_contact_drives_its_own_node_off_the_bus_and_mended_it_comes_back() {
+    let mut world = World::new(Bitrate::K500, 1);
+    let (a, b) = (world.add_tap(), world.add_tap());
+    world.run_until(at_ms(1));
+    world.set_node_faults(a, NodeFaults { corrupt: 1.0, ..NodeFaults::default() });
+    world.send(a, frame("704#05")).unwrap();
+    world.send(b, frame("123#")).unwrap();
+    while world.counters(a).state() != ErrorState::BusOff {
+        assert!(world.step(), "it fails for ever");
+    }
+    assert_eq!(world.statistics().errors, 32);
+    assert_eq!(heard(&mut world, a), ["123#"], "the others' frames get through");
+    let off = world.now();
+    world.set_node_faults(a, NodeFaults::default());
+    while world.counters(a).state() == ErrorState::BusOff {
+        assert!(world.step(), "it stays off for ever");
+    }
+    assert!(
+        world.now().nanos_since(off) >= 128 * 11 * 2_000 - 20 * 2_000,
+        "the last of its bits may be recessive already"
+    );
+    world.run_until(at_ms(20));
+    assert_eq!(heard(&mut world, b), ["704#05"]);
+}
+
+#[test]
+fn faults_of_the_bus_are_world_commands_too() {
+    let mut world = World::new(Bitrate::K500, 1);
+    let id = world.add_drive(4, Box::new(sim::machine::zlac8030l(4, 1))).unwrap();
+    world.add_tap(); // somebody has to acknowledge
+    let mut say = |line: &str| {
+        let answer = sim::command::answer(&mut world, line).unwrap().json;
+        assert!(answer.starts_with("{\"ok\":true"), "{line}: {answer}");
+        world.node_faults(id).clone()
+    };
+    let faults = say("4 bus late 5 20");
+    assert_eq!(faults.late, Some(Delay { min_ns: 5_000_000, max_ns: 20_000_000 }));
+    let faults = say("4 bus babble 080# 0.5");
+    assert!(faults.late.is_some() && faults.babble == Some(Babble { frame: frame("080#"), gap_ns: 500_000 }));
+    assert!(say("4 bus silent on").silent && !say("4 bus silent off").silent);
+    assert_eq!(say("4 bus late off").late, None);
+    say("4 bus babble off");
+    // The boot-up message is the first frame: destroyed once, it comes again.
+    say("bus destroy 1 20");
+    world.run_until(at_ms(2_000));
+    assert_eq!((world.statistics().errors, texts(&world)), (1, vec!["704#00".to_owned()]));
+}

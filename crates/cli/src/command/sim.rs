@@ -46,6 +46,8 @@ use testbench::words::drive::{DriveSpec, drive_spec};
     4 load torque 2.5         4 load inertia 0.02       4 rotor lock|free\n  \
     4 supply 48               4 temperature motor 95    4 fault hall on\n  \
     4 cable cut|join          4 get                     now, help, quit\n  \
+    4 bus corrupt 0.3         4 bus late 5 20           4 bus silent on|off\n  \
+    4 bus babble 080# 1       4 bus overrun 2 0.5       bus corrupt 0.01\n  \
     4 supply 48 limit 10 resistance 0.2     (what the supply gives at most, in A, and its resistance in ohm)\n\
     Switched off a drive lives on the charge of its bus, and its under-voltage, until it dies; a supply that comes back\n\
     before that, and a cycle, wait for it. Cut, it is dead at once.\n\

@@ -17,6 +17,10 @@ pub(super) fn answer(world: &mut World, command: &Command, service: Service) -> 
         Command::Help => Ok(to_json(&Help { ok: true, help: FORMS })),
         Command::Quit => Ok(done(world)),
         Command::Get(place) => get(world, *place, service),
+        Command::Disturb(fault) => {
+            world.disturb(*fault);
+            Ok(done(world))
+        }
         Command::Apply(place, stimulus) => {
             let applied = world.apply(*place, stimulus).map_err(|_| no_such_drive(world, place.node))?;
             applied?;

@@ -57,8 +57,11 @@ fn understands_every_line_of_the_manual_page() {
 #[test]
 fn says_what_it_expected_of_a_malformed_line() {
     for (line, error) in [
-        ("", "unknown command \"\"; expected now, help, quit, or a node number and a command, as in: 4 get"),
-        ("hello", "unknown command \"hello\"; expected now, help, quit, or a node number and a command, as in: 4 get"),
+        ("", "unknown command \"\"; expected now, help, quit, bus, or a node number and a command, as in: 4 get"),
+        (
+            "hello",
+            "unknown command \"hello\"; expected now, help, quit, bus, or a node number and a command, as in: 4 get",
+        ),
         ("now 4", "expected: now"),
         ("quit now", "expected: quit"),
         ("0 get", "\"0\" is no node number; expected 1 to 127"),
@@ -69,12 +72,12 @@ fn says_what_it_expected_of_a_malformed_line() {
         (
             "4",
             "nothing to do is said after node 4; expected power, input, switch, load, rotor, supply, temperature, \
-             fault, battery, pulses, quadrature, duty, clock, cable, set or get, as in: 4 get",
+             fault, battery, pulses, quadrature, duty, clock, cable, bus, set or get, as in: 4 get",
         ),
         (
             "4 Power on",
             "unknown command \"Power\" for a node; expected power, input, switch, load, rotor, supply, \
-             temperature, fault, battery, pulses, quadrature, duty, clock, cable, set or get",
+             temperature, fault, battery, pulses, quadrature, duty, clock, cable, bus, set or get",
         ),
         ("4 power", "expected: NODE power on|off|cycle|cut"),
         ("4 power up", "expected: NODE power on|off|cycle|cut"),
@@ -111,6 +114,15 @@ fn says_what_it_expected_of_a_malformed_line() {
         ("4 clock", "expected: NODE clock HZ"),
         ("4 cable off", "expected: NODE cable cut|join"),
         ("4 get position", "expected: NODE get"),
+        ("4 bus", "expected: NODE bus silent|late|babble|overrun|corrupt .."),
+        ("4 bus late 5", "expected: NODE bus late MIN_MS MAX_MS, or NODE bus late off"),
+        ("4 bus late 5 1", "\"1\" is no longest delay; expected: NODE bus late MIN_MS MAX_MS, or NODE bus late off"),
+        ("4 bus late nan 5", "\"nan\" is no time in ms; expected: NODE bus late MIN_MS MAX_MS, or NODE bus late off"),
+        (
+            "4 bus corrupt 1.5",
+            "\"1.5\" is no probability; expected: NODE bus corrupt PROBABILITY (0 to 1), or NODE bus corrupt off",
+        ),
+        ("bus", "expected: bus corrupt PROBABILITY (0 to 1), bus corrupt off, or bus destroy NTH_FRAME BIT"),
     ] {
         let result: Result<Command, CommandError> = line.parse();
         assert_eq!(result.unwrap_err().to_string(), error, "{line:?}");

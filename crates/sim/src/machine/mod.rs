@@ -265,7 +265,7 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
             Stimulus::Fault(component, broken) => self.assembly.set_fault(axis, component, broken)?,
             Stimulus::Battery(connected) => self.assembly.set_battery(connected)?,
             Stimulus::Pulses(train) => self.assembly.set_pulses(train)?,
-            Stimulus::CableCut(_) => {
+            Stimulus::CableCut(_) | Stimulus::Bus(_) => {
                 return Err(Refused::Absent { model: self.model(), what: "cable but the world's" });
             }
             Stimulus::Object { mux, .. } => {

@@ -131,7 +131,7 @@ impl VirtualDrive for NodeMachine {
             Stimulus::Fault(..) => return Err(self.absent("such component")),
             Stimulus::Battery(_) => return Err(self.absent("battery")),
             Stimulus::Pulses(_) => return Err(self.absent("pulse input")),
-            Stimulus::CableCut(_) => return Err(self.absent("cable but the world's")),
+            Stimulus::CableCut(_) | Stimulus::Bus(_) => return Err(self.absent("cable but the world's")),
         }
         Ok(())
     }

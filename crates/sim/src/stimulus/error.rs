@@ -6,7 +6,7 @@ pub enum StimulusError {
     /// The first word is unknown.
     #[error(
         "unknown command {0:?} for a node; expected power, input, switch, load, rotor, supply, temperature, fault, \
-         battery, pulses, quadrature, duty, clock, cable, set or get"
+         battery, pulses, quadrature, duty, clock, cable, bus, set or get"
     )]
     Unknown(String),
     /// Missing, surplus or unknown words.

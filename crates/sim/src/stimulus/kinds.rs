@@ -2,6 +2,8 @@
 
 use canopen::Mux;
 
+use super::bus_fault::BusFault;
+
 /// One thing that the outer world does to a node and the machine around it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Stimulus {
@@ -41,6 +43,8 @@ pub enum Stimulus {
     Pulses(PulseTrain),
     /// `cable cut` is true, `cable join` is false: the bus cable of the node.
     CableCut(bool),
+    /// `bus late 5 20`, `bus silent on`: what is wrong with the node's access to the bus.
+    Bus(BusFault),
     /// `set 6000:01 FFh`: the value of an object of a node whose objects are the outer world's.
     Object {
         /// The object.

@@ -4,6 +4,7 @@ use std::str::FromStr;
 
 use canopen::Mux;
 
+use super::bus_fault::{self, BusFault};
 use super::error::StimulusError;
 use super::kinds::{Component, ObjectValue, Power, PulseTrain, Source, Stimulus, SwitchRange, TemperatureSensor};
 
@@ -29,6 +30,7 @@ impl FromStr for Stimulus {
             "battery" => Ok(Self::Battery(choice(arguments, "on", "off", BATTERY)?)),
             "pulses" | "quadrature" | "duty" | "clock" => parse_pulses(verb, arguments).map(Self::Pulses),
             "cable" => Ok(Self::CableCut(choice(arguments, "cut", "join", CABLE)?)),
+            "bus" => BusFault::parse(arguments).map(Self::Bus),
             "set" => parse_set(text),
             _ => Err(StimulusError::Unknown(verb.to_string())),
         }
@@ -69,8 +71,14 @@ pub const FORMS: &[&str] = &[
     DUTY,
     CLOCK,
     CABLE,
+    bus_fault::SILENT,
+    bus_fault::LATE,
+    bus_fault::BABBLE,
+    bus_fault::OVERRUN,
+    bus_fault::CORRUPT,
     SET,
     GET,
+    bus_fault::WIRE,
     "now",
     "help",
     "quit",

@@ -26,7 +26,7 @@ fn some<T>(random: &mut Prng, value: T) -> Option<T> {
 
 fn any(random: &mut Prng) -> Stimulus {
     let coin = random.below(2) == 0;
-    match random.below(15) {
+    match random.below(16) {
         0 => Stimulus::Power(Power::ALL[random.below(4) as usize]),
         1 => Stimulus::Input { name: name(random), level: coin },
         2 => {
@@ -56,6 +56,7 @@ fn any(random: &mut Prng) -> Stimulus {
             false => PulseTrain::Clock(number(random, 0.0)),
         }),
         13 => Stimulus::CableCut(coin),
+        14 => Stimulus::Bus(bus_fault(random)),
         _ => Stimulus::Object {
             mux: Mux::new(random.next_u64() as u16, random.next_u64() as u8),
             value: match random.below(3) {
@@ -66,6 +67,22 @@ fn any(random: &mut Prng) -> Stimulus {
                 }
             },
         },
+    }
+}
+
+fn bus_fault(random: &mut Prng) -> BusFault {
+    use crate::fault::{Babble, Delay, Overrun};
+    let day_ns = 86_400_000_000_000;
+    let [a, b] = [(); 2].map(|()| random.below(day_ns));
+    match random.below(5) {
+        0 => BusFault::Silent(a > b),
+        1 => BusFault::Late(some(random, Delay { min_ns: a.min(b), max_ns: a.max(b) })),
+        2 => {
+            let frame = if a > b { "080#" } else { "18FF0102#0102" }.parse().expect("a frame");
+            BusFault::Babble(some(random, Babble { frame, gap_ns: a }))
+        }
+        3 => BusFault::Overrun(some(random, Overrun { depth: a as u32, service_ns: b })),
+        _ => BusFault::Corrupt(random.below(1_000_001) as f64 * 1e-6),
     }
 }
 

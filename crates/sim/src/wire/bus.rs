@@ -116,6 +116,16 @@ impl Bus {
         self.update_start(i);
     }
 
+    /// What is wrong with controller `i`.
+    pub fn faults(&self, i: usize) -> &NodeFaults {
+        &self.controllers[i].faults
+    }
+
+    /// How the wire is disturbed, to change it.
+    pub fn corruption_mut(&mut self) -> &mut Corruption {
+        &mut self.corruption
+    }
+
     /// Sets how the wire is disturbed from the next frame on.
     pub fn set_corruption(&mut self, corruption: Corruption) {
         self.corruption = corruption;

@@ -82,7 +82,9 @@ impl Bus {
     fn transmit(&mut self, source: usize, frame: Frame, collision: Option<u32>, now: Instant) {
         let bits = frame_bits(&frame);
         let collision = collision.map(|bit| (bit, ErrorCause::Collision));
-        let disturbed = self.corruption.strike(bits, &mut self.prng).map(|bit| (bit, ErrorCause::Disturbed));
+        let by_wire = self.corruption.strike(bits, &mut self.prng);
+        let by_sender = self.controllers[source].faults.strike(bits, &mut self.prng);
+        let disturbed = by_wire.into_iter().chain(by_sender).min().map(|bit| (bit, ErrorCause::Disturbed));
         let unacknowledged =
             (!self.is_acknowledged(now)).then_some((bits - BITS_AFTER_ACK_SLOT as u32, ErrorCause::NotAcknowledged));
         // The first error ends the frame.

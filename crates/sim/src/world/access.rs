@@ -4,9 +4,10 @@ use can::{Bitrate, Instant};
 
 use super::member::Member;
 use super::{Digest, FrameLog, StationId, World, WorldError};
+use crate::fault::NodeFaults;
 use crate::machine::Realism;
 use crate::recorder::Recorder;
-use crate::stimulus::{Place, Stimulus};
+use crate::stimulus::{Place, Stimulus, WireFault};
 use crate::wire::{ControllerOptions, ErrorCounters, Statistics};
 use crate::{Prng, Refused, Report, VirtualDrive};
 
@@ -43,12 +44,28 @@ impl World {
                 }
                 Ok(())
             }
+            Stimulus::Bus(fault) => {
+                let id = self.drive_id(node).ok_or(WorldError::NoSuchDrive(node))?;
+                let mut faults = self.node_faults(id).clone();
+                fault.put_into(&mut faults);
+                self.set_node_faults(id, faults);
+                Ok(())
+            }
             stimulus => self.with_drive(node, |drive, now| drive.apply(axis, stimulus, now))?,
         };
         if let (Ok(()), Some(recorder)) = (&applied, &mut self.recorder) {
             recorder.note(self.now, place, stimulus);
         }
         Ok(applied)
+    }
+
+    /// Disturbs the wire; other disturbances stay.
+    pub fn disturb(&mut self, fault: WireFault) {
+        let corruption = self.bus.corruption_mut();
+        match fault {
+            WireFault::Corrupt(probability) => corruption.set_probability(probability),
+            WireFault::Destroy { nth, bit } => corruption.strike_nth(nth, bit),
+        }
     }
 
     /// What can be measured at the drive added under `number`, now.
@@ -146,6 +163,11 @@ impl World {
     /// What happened on the wire, to pull it or to set how much is kept.
     pub fn log_mut(&mut self) -> &mut FrameLog {
         &mut self.log
+    }
+
+    /// What is wrong with a station's access to the bus.
+    pub fn node_faults(&self, id: StationId) -> &NodeFaults {
+        self.bus.faults(id.0)
     }
 
     /// True while a station's cable is cut.

@@ -204,7 +204,7 @@ impl VirtualDrive for TestDrive {
             Stimulus::Battery(_) => return Err(absent("battery")),
             Stimulus::Pulses(_) => return Err(absent("pulse input")),
             Stimulus::Object { mux, .. } => return Err(Refused::OwnObjects { model: "testdrive", object: mux }),
-            Stimulus::LoadInertia(_) | Stimulus::Fault(..) | Stimulus::CableCut(_) => {}
+            Stimulus::LoadInertia(_) | Stimulus::Fault(..) | Stimulus::CableCut(_) | Stimulus::Bus(_) => {}
         }
         Ok(())
     }
