@@ -58,11 +58,55 @@ class Remote:
         """Waits for bits of the statusword."""
         return eventually(self.statusword, lambda word: word & mask == expected, what, timeout_s)
 
+    def write_all(self, objects):
+        """Writes objects with their values: index, sub-index, value."""
+        for index, sub, value in objects:
+            self.write(index, value, sub)
+
+    def values(self, objects):
+        return [self.read(index, sub) for index, sub, _ in objects]
+
+    def becomes(self, index, value, tolerance=0, timeout_s=10.0):
+        """Waits until an object reads a value, give or take."""
+        fits = lambda now: abs(now - value) <= tolerance
+        return eventually(lambda: self.read(index), fits, f"{index:04X}h becomes {value} ± {tolerance}", timeout_s)
+
     def enable(self, mode):
-        """The ZL manuals' enabling steps: mode, 6, 7, Fh."""
+        """Selects a mode and enables operation: by canopen-python's profile where the drive has its power states."""
         self.write(0x6060, mode)
+        if self.drive.modes is None:
+            self.write(0x6040, 0x0F)
+            return
         self.node.state = "OPERATION ENABLED"
-        eventually(lambda: self.read(0x6061), lambda shown: shown == mode, "6061h shows the mode")
+        self.becomes(0x6061, mode)
+
+    def turn(self, r_min):
+        """Profile velocity, up to speed."""
+        self.enable(3)
+        self.write(0x60FF, r_min)
+        self.speed_becomes(r_min)
+
+    def speed_becomes(self, r_min):
+        """606Ch, within 2 r/min and 2 %."""
+        self.becomes(0x606C, self.drive.per_rpm * r_min, self.drive.per_rpm * max(2, abs(r_min) / 50))
+
+    def move(self, target, relative=False):
+        """A set-point of profile position by bits 4 and 12 of CiA 402-2, until bit 10; the joint has no bit 12."""
+        ready, acknowledged = 0x0F | relative << 6, 0 if self.drive.modes is None else 1 << 12
+        self.write(0x607A, target)
+        self.write(0x6040, ready)
+        self.status_becomes(acknowledged, 0, "bit 12 falls before the set-point")
+        self.write(0x6040, ready | 0x10)
+        self.status_becomes(acknowledged, acknowledged, "bit 12 acknowledges the set-point")
+        self.write(0x6040, ready)
+        self.status_becomes(acknowledged | 1 << 10, 1 << 10, "bit 10 tells that the target is reached", 20)
+
+    def save(self):
+        """The drive's command to store, and the time that a real EEPROM takes."""
+        index, command, done = self.drive.save
+        self.write(index, command)
+        self.becomes(index, done)
+        self.bench.sleep(0.3)
 
     def nmt(self, command, node=None):
         self.bench.send(0x000, [command, self.node_id if node is None else node])

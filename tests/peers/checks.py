@@ -7,11 +7,12 @@ CHECKS = []
 
 
 class Check(NamedTuple):
-    #: The drive's folder.
-    folder: str
+    drive: Any
     name: str
     function: Callable
-    #: What the bench is made with, beside the folder's own drive: see `Bench`.
+    #: What the function is given behind the bench: a row of its table, or nothing.
+    arguments: tuple
+    #: What the bench is made with: see `Bench`.
     setup: dict[str, Any]
 
 
@@ -19,31 +20,28 @@ class Skip(Exception):
     """The check cannot run here; the text says why."""
 
 
-def check(name, **setup):
-    """Adds a function of a bench to the list, under a sentence and for the drive in whose folder it stands."""
+def check(name, *drives, rows=None, **setup):
+    """Adds a function of a bench to the list, under a sentence, once for each drive.
+
+    With `rows` (a table, or a function of the drive that gives one) it is added once for each row, which the function is
+    given behind the bench. A row is a dictionary: the sentence may hold its fields in braces, and a field `drives` is an
+    argument of the bench.
+    """
 
     def add(function):
-        CHECKS.append(Check(function.__module__.partition(".")[0], name, function, setup))
+        for drive in drives:
+            for row in (rows(drive) if callable(rows) else rows) or [None]:
+                told = name if row is None else name.format_map(row)
+                made_with = setup | {"drives": row["drives"]} if row and "drives" in row else setup
+                CHECKS.append(Check(drive, told, function, () if row is None else (row,), made_with))
         return function
 
     return add
 
 
-class Common:
-    """Checks that hold for several drives: written once, taken into the list for each."""
-
-    def __init__(self):
-        self.members = []
-
-    def check(self, name, **setup):
-        def add(function):
-            self.members.append((name, function, setup))
-            return function
-
-        return add
-
-    def into(self, folder):
-        CHECKS.extend(Check(folder, *member) for member in self.members)
+def table(fields, *rows):
+    """Rows of a check from tuples under the names of their fields."""
+    return [dict(zip(fields.split(), row, strict=True)) for row in rows]
 
 
 def equal(actual, expected, what):

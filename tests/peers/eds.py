@@ -11,13 +11,12 @@ import venv
 import canopen
 from canopen.objectdictionary import ODVariable
 
-from checks import Common, Skip, equal, true
+from checks import Skip, check, equal, true
+from drive import ALL
 
 #: Lely's generator of concise DCFs, in an environment of its own: it wants other versions of things than the rest.
 DCF_TOOLS = "dcf-tools==2.4.2"
 VARIANTS = ((), ("--variant", "ros2_canopen"))
-
-COMMON = Common()
 
 
 def write(bench, folder, *options):
@@ -61,7 +60,7 @@ def variables(dictionary):
         yield from [item] if isinstance(item, ODVariable) else item.values()
 
 
-@COMMON.check("its EDS loads in canopen-python without a warning")
+@check("its EDS loads in canopen-python without a warning", *ALL)
 def loads(bench):
     with tempfile.TemporaryDirectory() as folder:
         for options in VARIANTS:
@@ -72,7 +71,7 @@ def loads(bench):
             equal(missing, set(), "objects of the manual that the file does not have")
 
 
-@COMMON.check("each default of its EDS is what the drive answers when it is fresh")
+@check("each default of its EDS is what the drive answers when it is fresh", *ALL)
 def defaults(bench):
     with tempfile.TemporaryDirectory() as folder:
         dictionary = load(write(bench, folder), bench.drive.node_id)
@@ -107,7 +106,7 @@ def dcfgen():
     return program
 
 
-@COMMON.check("Lely's dcfgen takes its EDS and makes a concise DCF of it")
+@check("Lely's dcfgen takes its EDS and makes a concise DCF of it", *ALL)
 def generates(bench):
     program = dcfgen()
     node_id = bench.drive.node_id
@@ -128,5 +127,3 @@ def generates(bench):
             concise = (pathlib.Path(folder) / "drive.bin").read_bytes()
             true(int.from_bytes(concise[:4], "little") >= 1, "the concise DCF writes something")
             true(b"\x17\x10" in concise, "1017h is in the concise DCF")
-
-

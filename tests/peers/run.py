@@ -18,7 +18,9 @@ from bench import Bench
 from checks import CHECKS, Skip
 
 HERE = pathlib.Path(__file__).resolve().parent
-FOLDERS = ("zlac8030l", "zlim42c", "mjoint", "cia402")
+#: Where checks stand: a file for each service, the data sheets, and the servo that is made from one.
+MODULES = [f"services.{path.stem}" for path in sorted((HERE / "services").glob("[a-z]*.py"))]
+MODULES += ["eds", "cia402.motion", "cia402.makers"]
 #: Checks mostly wait for a drive to move, so more of them run at once than the machine has cores.
 JOBS = 6
 
@@ -44,19 +46,18 @@ def load():
     """Fills the list of checks, in every process alike."""
     # The libraries log what the checks provoke on purpose.
     logging.disable(logging.CRITICAL)
-    for folder in FOLDERS:
-        for path in sorted((HERE / folder).glob("[a-z]*.py")):
-            importlib.import_module(f"{folder}.{path.stem}")
+    for module in MODULES:
+        importlib.import_module(module)
 
 
 def title(check):
-    return f"{check.folder}: {check.name}"
+    return f"{check.drive.name}: {check.name}"
 
 
 def parse(words):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", default="target/debug/ferrodrive", help="the ferrodrive binary")
-    parser.add_argument("--only", help="only the checks whose `folder: name` holds this text")
+    parser.add_argument("--only", help="only the checks whose `drive: name` holds this text")
     parser.add_argument("--jobs", type=int, default=JOBS, help="how many checks run at once")
     parser.add_argument("--list", action="store_true", help="name the checks")
     return parser.parse_args(words)
@@ -65,12 +66,11 @@ def parse(words):
 def run(number, program):
     """Runs one check on drives of its own. Returns its lines, and whether it did not fail."""
     check = CHECKS[number]
-    drive = sys.modules[check.folder].DRIVE
     start = time.monotonic()
     bench = None
     try:
-        with Bench(program, drive, **check.setup) as bench:
-            check.function(bench)
+        with Bench(program, check.drive, **check.setup) as bench:
+            check.function(bench, *check.arguments)
     except Skip as reason:
         return [f"skipped {title(check)}: {reason}"], True
     except Exception as error:  # any error of a check, a library or the program is this check's failure

@@ -29,4 +29,4 @@ class FileDrive(Drive):
         return BaseNode402(node_id, str(self.path))
 
 
-DRIVE = FileDrive("cia402", model="cia402", node_id=5, device_type=0x00020192, node_class=BaseNode402, per_rpm=TURN / 60)
+DRIVE = FileDrive("cia402", model="cia402", node_id=5, device_type=0x00020192, per_rpm=TURN / 60)

@@ -11,6 +11,7 @@ import canopen
 from canopen.profiles.p402 import BaseNode402
 
 from checks import Skip, check, eventually, true
+from cia402 import DRIVE
 from simulator import Simulator
 
 #: Bits of 6502h.
@@ -111,7 +112,7 @@ def drive(simulator, node, mode):
     eventually(lambda: abs(rpm()), lambda seen: seen < 5, "it stands")
 
 
-@check("servos made from makers' files are driven in the modes that they say they have")
+@check("servos made from makers' files are driven in the modes that they say they have", DRIVE)
 def makers(bench):
     driven = {}
     for path in files():

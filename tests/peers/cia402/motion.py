@@ -4,7 +4,7 @@ import time
 
 from checks import check, equal, eventually, near, true
 
-from cia402 import TURN
+from cia402 import DRIVE, TURN
 
 TARGET_REACHED = 1 << 10
 ATTAINED = 1 << 12
@@ -28,7 +28,7 @@ def ready(bench, mode):
     return node
 
 
-@check("canopen-python reads the modes of a servo made from an EDS, and finds those of 6502h")
+@check("canopen-python reads the modes of a servo made from an EDS, and finds those of 6502h", DRIVE)
 def modes(bench):
     node = bench.node
     for mode in ("PROFILED POSITION", "PROFILED VELOCITY", "PROFILED TORQUE", "HOMING", "INTERPOLATED POSITION",
@@ -37,7 +37,7 @@ def modes(bench):
     true(not node.is_op_mode_supported("VELOCITY"), "velocity mode of frequency converters is not")
 
 
-@check("a servo made from an EDS goes to a position")
+@check("a servo made from an EDS goes to a position", DRIVE)
 def profile_position(bench):
     node = ready(bench, "PROFILED POSITION")
     node.sdo[0x6081].raw = 20 * TURN
@@ -49,7 +49,7 @@ def profile_position(bench):
     near(bench.world("get")["position"], 7 * TURN, TURN // 1000, "position in the world")
 
 
-@check("a servo made from an EDS turns at a velocity, and stops")
+@check("a servo made from an EDS turns at a velocity, and stops", DRIVE)
 def profile_velocity(bench):
     node = ready(bench, "PROFILED VELOCITY")
     node.sdo[0x60FF].raw = 25 * TURN
@@ -59,7 +59,7 @@ def profile_velocity(bench):
     eventually(lambda: abs(bench.world("get")["velocity_rpm"]), lambda rpm: rpm < 1, "it stands")
 
 
-@check("a servo made from an EDS homes at a switch and at the index pulse")
+@check("a servo made from an EDS homes at a switch and at the index pulse", DRIVE)
 def homing(bench):
     node = ready(bench, "HOMING")
     bench.world(f"switch HOME {2 * TURN} {4 * TURN}")
@@ -70,7 +70,7 @@ def homing(bench):
         node.controlword = 0x0F
 
 
-@check("a servo made from an EDS follows set-points that come with SYNC")
+@check("a servo made from an EDS follows set-points that come with SYNC", DRIVE)
 def cyclic_position(bench):
     node = ready(bench, "CYCLIC SYNCHRONOUS POSITION")
     # 10 ms a set-point: what Python keeps to.

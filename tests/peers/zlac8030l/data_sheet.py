@@ -1,3 +1,0 @@
-import eds
-
-eds.COMMON.into("zlac8030l")

@@ -1,3 +1,0 @@
-import eds
-
-eds.COMMON.into("zlim42c")

@@ -1,5 +1,0 @@
-"""The simulator's servers and its world commands."""
-
-import servers
-
-servers.COMMON.into("zlim42c")

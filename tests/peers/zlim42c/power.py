@@ -1,5 +1,0 @@
-"""The CiA 402 power states."""
-
-from zl import power
-
-power.COMMON.into("zlim42c")
