@@ -11,6 +11,7 @@ use cia402::{ModeOfOperation, PowerState};
 use devices::servo::CIA402;
 use master::core::CycleLoss;
 use master::cyclic::{CyclicDrive, CyclicError, CyclicOptions, CyclicState, Demand, Refusal};
+use master::drive::MotionOptions;
 use master::units::{Amperes, Angle, Rpm, Turns};
 use master::{Drive, Network};
 use sim::machine::{Order, order};
@@ -131,6 +132,22 @@ fn speeds_and_currents_of_each_cycle_are_followed_in_csv_and_cst() {
     let Amperes(current) = state.current.unwrap();
     assert!((0.4..0.52).contains(&current), "{state} {:?}", bench.world.report(SERVO));
     assert!(bench.speed_rpm() > 60.0, "{}", bench.speed_rpm());
+}
+
+#[test]
+fn an_acceleration_of_zero_is_no_reason_to_wait_for_an_hour_and_is_told() {
+    let mut bench = Bench::new();
+    let began = bench.world.now();
+    let error = block_on(&mut bench.world, async {
+        // Without torque it never turns, whatever its ramps.
+        bench.drive.node().write(mux(0x6072, 0), 0_u16).await?;
+        bench.drive.node().write(mux(0x6083, 0), 0_u32).await?;
+        bench.drive.velocity(Rpm(60.0), MotionOptions::default()).await
+    });
+    let error = error.unwrap().unwrap_err().to_string();
+    assert!(error.contains("6083h:00 is 0") && error.contains("to 6083h:00"), "{error}");
+    let waited = (bench.world.now() - began).as_secs_f64();
+    assert!(waited < 10.0, "{waited} s");
 }
 
 #[test]

@@ -108,6 +108,23 @@ fn torque_is_mode_4_and_not_6_velocity_is_mode_3_and_not_2_on_both_zl_drives() {
 }
 
 #[test]
+fn a_shaft_that_is_said_to_have_reached_its_target_stands_there() {
+    // As delivered: the joint's ramp is 20000 (r/min)/s, and its bit 10 comes while it still turns.
+    let (mut world, _, drives) = bench();
+    for drive in &drives {
+        for degrees in [90.0, -30.0] {
+            let moved = drive.move_absolute(Degrees(degrees), MotionOptions::default());
+            block_on(&mut world, moved).unwrap().unwrap();
+            let state = block_on(&mut world, drive.state()).unwrap().unwrap();
+            let (Rpm(shown), Degrees(at)) = (state.velocity.unwrap(), state.angle.unwrap());
+            assert!(shown.abs() < 1.0, "{drive:?}: {shown} r/min at {at} of {degrees} degrees");
+            let turning = world.report(id(drive)).unwrap().velocity_rpm;
+            assert!(turning.abs() < 2.0 && (at - degrees).abs() < 0.5, "{drive:?}: {turning} r/min at {at} degrees");
+        }
+    }
+}
+
+#[test]
 fn ninety_degrees_are_a_quarter_turn_of_every_shaft() {
     let (mut world, _, drives) = bench();
     // Counts in a turn: 32768 of the encoder, 4000 pulses (2006h = 10), four edges of 1024 lines.

@@ -70,8 +70,16 @@ pub(super) fn conclude(trigger: &Trigger, facts: &[Fact], style: PowerStyle) -> 
             "Its statusword shows none of the states of CiA 402",
             "Check that the node is the drive model that it is taken for",
         ),
-        _ => by_trigger(trigger, style),
+        _ => without_ramp(by_trigger(trigger, style), facts),
     }
+}
+
+/// Adds what there is to do where a rate of 0 may be why the speed does not change.
+fn without_ramp((conclusion, advice): (String, String), facts: &[Fact]) -> (String, String) {
+    let zero = facts.iter().find_map(|fact| if let Fact::RateOfZero(object) = fact { Some(object) } else { None });
+    let Some(object) = zero else { return (conclusion, advice) };
+    let first = format!("Write how fast its speed may change to {object}: many drives do not move while it is 0");
+    (conclusion, format!("{first}. {advice}"))
 }
 
 /// For a drive that answers, is in a known state and not at fault.

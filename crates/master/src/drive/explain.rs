@@ -21,6 +21,9 @@ impl Drive {
             facts.push(Fact::Failed(Box::new(error.clone())));
         } else {
             self.ask(&mut facts).await;
+            if let Trigger::Late { .. } | Trigger::StillTurning(_) = trigger {
+                facts.extend(self.rates_of_zero().await.into_iter().map(Fact::RateOfZero));
+            }
         }
         self.recall(&mut facts);
         let (conclusion, advice) = conclude(&trigger, &facts, self.power_style());

@@ -7,6 +7,7 @@ use devices::{HomingRules, Quantity};
 
 use super::conclude::Trigger;
 use super::handle::{Drive, POLL, POSITION_ACTUAL};
+use super::power::STANDSTILL_RPM;
 use crate::error::Error;
 
 /// What counts as reached.
@@ -21,6 +22,9 @@ pub(super) enum Goal {
     /// then they may be those of the run before.
     Home { rules: HomingRules, method: i8, looks: u8 },
 }
+
+/// How long a shaft may swing about its target before that is taken for its rest.
+const SETTLE_TIME: Duration = Duration::from_millis(200);
 
 /// How often the drive is looked at before its verdict on homing is believed: 50 ms, many cycles of any drive.
 const LOOKS_BEFORE_VERDICT: u8 = 5;
@@ -85,6 +89,21 @@ impl Drive {
             }
             network.sleep(POLL).await;
         }
+    }
+
+    /// Waits until a shaft that has reached its target stands there. Bit 10 comes when the shaft is in its window, which it may
+    /// enter while it still turns, and 606Ch is a mean of what was. A shaft that swings on is at its target all the same.
+    pub(super) async fn settle(&self, intent: &'static str) -> Result<(), Error> {
+        let Some(velocity) = self.motion(intent)?.units.actual_velocity else { return Ok(()) };
+        let mut waited = Duration::ZERO;
+        while waited < SETTLE_TIME {
+            self.still_enabled(intent).await?;
+            if self.answered(intent, self.read_quantity(velocity).await).await?.abs() < STANDSTILL_RPM {
+                break;
+            }
+            self.wait_poll(&mut waited).await;
+        }
+        Ok(())
     }
 
     /// The statusword, if the drive still follows set-points.

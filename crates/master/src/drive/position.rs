@@ -65,6 +65,7 @@ impl Drive {
         }
         let band = (turn * REACHED_TURNS).max(1.0);
         let reached = self.watch(INTENT, Goal::Position { target, band, seen_clear: false }, limit).await?;
+        self.settle(INTENT).await?;
         self.note_stopped();
         Ok(MotionReport { reached_after: Some(reached), commanded, notes })
     }

@@ -245,6 +245,20 @@ impl Drive {
         }
     }
 
+    /// The objects of its ramps that are 0 although they are rates: by them no speed would ever change.
+    pub(super) async fn rates_of_zero(&self) -> Vec<Mux> {
+        let Ok(Ramps::Rates { acceleration, deceleration, .. }) = self.ramps("read its ramps") else {
+            return Vec::new();
+        };
+        let mut zero = Vec::new();
+        for object in [acceleration, deceleration] {
+            if !zero.contains(&object) && self.read_number(object).await.is_ok_and(|raw| raw == 0) {
+                zero.push(object);
+            }
+        }
+        zero
+    }
+
     /// Time of the drive's quick stop in seconds.
     pub(super) async fn quick_stop_time_s(&self, change_rpm: f64) -> Result<f64, Error> {
         match self.ramps("read its ramps")? {
@@ -298,10 +312,11 @@ fn ramp_counts(ramp: Ramp, change_rpm: f64, worth: f64, none_from: Option<u32>) 
     }
 }
 
-/// How long a change of speed takes at an acceleration of `raw` counts, in seconds.
+/// How long a change of speed takes at an acceleration of `raw` counts, in seconds. 0 counts say nothing of it (CiA 402-2 gives
+/// them no meaning): a drive that moves at all then moves by a ramp of its own.
 fn rate_time_s(raw: i64, change_rpm: f64, worth: f64, none_from: Option<u32>) -> f64 {
     let none = none_from.is_some_and(|none_from| raw >= i64::from(none_from));
-    if none { 0.0 } else { change_rpm / (raw.max(1) as f64 * worth) }
+    if none || raw <= 0 { 0.0 } else { change_rpm / (raw as f64 * worth) }
 }
 
 /// A ramp as the time of one change of speed, in ms. A rate that is steeper than 1 ms gets that: 0 ms is no ramp at all.

@@ -337,6 +337,8 @@ pub enum Fact {
     Mode(ModeOfOperation, ModeOfOperation),
     /// Supply voltage at the drive.
     Supply(Volts),
+    /// An acceleration or deceleration that is 0.
+    RateOfZero(Mux),
     /// State by its last heartbeat or the NMT command sent since.
     Nmt(NmtState),
     /// Age of its last heartbeat; `None` if none ever came.
@@ -371,6 +373,7 @@ impl fmt::Display for Fact {
             Self::Mode(wanted, shown) if wanted == shown => write!(f, "mode {shown}"),
             Self::Mode(wanted, shown) => write!(f, "mode {shown}, asked for {wanted}"),
             Self::Supply(volts) => write!(f, "supply {volts}"),
+            Self::RateOfZero(object) => write!(f, "{object} is 0"),
             Self::Nmt(state) => write!(f, "NMT state {state}"),
             Self::Heartbeat(None) => f.write_str("no heartbeat or boot-up seen"),
             Self::Heartbeat(Some(age)) => write!(f, "last heartbeat or boot-up {:.1} s ago", age.as_secs_f64()),
