@@ -55,6 +55,14 @@ fn a_sheet_is_for_one_node_with_choices_and_for_ros2_canopen() {
 }
 
 #[test]
+fn a_file_is_called_as_the_user_calls_it_and_not_as_it_calls_itself() {
+    let folder = folder("called");
+    let path = file(&folder, "wheel.eds", SMALL);
+    let objects = done(&["objects", &path]).out;
+    assert!(objects.contains(&format!("object dictionary of \"the file {path}\"")), "{objects}");
+}
+
+#[test]
 fn what_makes_no_sheet_is_a_usage_error() {
     for (words, why) in [
         (&["eds", "zlac8030"][..], "did you mean zlac8030l?"),

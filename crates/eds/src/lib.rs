@@ -37,7 +37,7 @@ pub mod document;
 
 pub use configuration::{Configuration, SetError};
 pub use data_type::{Form, TypeCode};
-pub use describe::{Flavour, Sheet, Unkept, keep};
+pub use describe::{Flavour, Sheet, Unkept, keep, keep_of};
 pub use diff::{Difference, diff};
 pub use finding::{Finding, Findings, Refusal, Severity};
 pub use model::{

@@ -16,11 +16,12 @@ use super::names;
 use super::rows::{leak, rows};
 use crate::{Eds, write};
 
-/// All descriptions that were made of files, by what the files say.
-static KEPT: Mutex<BTreeMap<String, &'static Description>> = Mutex::new(BTreeMap::new());
+/// All descriptions that were made of files, by what the files say: one for each place that such a file came from.
+static KEPT: Mutex<BTreeMap<String, Vec<&'static Description>>> = Mutex::new(BTreeMap::new());
 
 /// The description of the device that a file describes, kept for the life of the program: the same file, or another that
-/// says the same, gives the same one.
+/// says the same, gives the same one. As its document it names the file as the file names itself; [`keep_of`] names it as the
+/// user does.
 ///
 /// An axis has what the file has of CiA 402, in the units and with the error codes of the standard; what is stored and where the
 /// device departs from the standard is not in a file. Of a DCF the values stand in place of the defaults.
@@ -28,14 +29,35 @@ static KEPT: Mutex<BTreeMap<String, &'static Description>> = Mutex::new(BTreeMap
 /// # Errors
 /// If there is no object in the file, or more of them than a dictionary holds.
 pub fn keep(eds: &Eds) -> Result<&'static Description, Unkept> {
+    match eds.file.file_name.trim() {
+        "" => keep_named(eds, "a file without a name"),
+        name => keep_named(eds, &format!("the file {name}")),
+    }
+}
+
+/// As [`keep`], of a file that the user has called so: its path, as a rule.
+///
+/// # Errors
+/// As [`keep`].
+pub fn keep_of(eds: &Eds, file: &str) -> Result<&'static Description, Unkept> {
+    keep_named(eds, &format!("the file {file}"))
+}
+
+fn keep_named(eds: &Eds, manual: &str) -> Result<&'static Description, Unkept> {
     let content = write(eds);
     // A panic while it was locked has left the map as it was.
-    let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(known) = kept.get(&content) {
+    let mut all = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+    let kept = all.get(&content).map_or(&[][..], Vec::as_slice);
+    if let Some(known) = kept.iter().find(|known| known.manual == manual) {
         return Ok(known);
     }
-    let description: &'static Description = Box::leak(Box::new(describe(eds)?));
-    kept.insert(content, description);
+    let description = match kept.first() {
+        // All but the name is shared.
+        Some(known) => Description { manual: leak(manual.to_owned()), ..**known },
+        None => describe(eds, manual)?,
+    };
+    let description: &'static Description = Box::leak(Box::new(description));
+    all.entry(content).or_default().push(description);
     Ok(description)
 }
 
@@ -70,7 +92,7 @@ impl fmt::Display for Unkept {
 
 impl std::error::Error for Unkept {}
 
-fn describe(eds: &Eds) -> Result<Description, Unkept> {
+fn describe(eds: &Eds, manual: &str) -> Result<Description, Unkept> {
     let count = eds.variables().count();
     match count {
         0 => return Err(Unkept::NoObjects),
@@ -85,10 +107,7 @@ fn describe(eds: &Eds) -> Result<Description, Unkept> {
     Ok(Description {
         name: leak(name(eds)),
         title: leak(title(eds)),
-        manual: match eds.file.file_name.trim() {
-            "" => "a file without a name",
-            name => leak(format!("the file {name}")),
-        },
+        manual: leak(manual.to_owned()),
         identity,
         distinguishing_object: None,
         dictionary: table,

@@ -12,7 +12,7 @@ mod rows;
 mod sheet;
 mod sheet_values;
 
-pub use keep::{Unkept, keep};
+pub use keep::{Unkept, keep, keep_of};
 pub use sheet::{Flavour, Sheet};
 pub(crate) use sheet_values::of_bytes as value_of_bytes;
 

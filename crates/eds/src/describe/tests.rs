@@ -5,7 +5,7 @@ use canopen::od::{Access, DefaultValue, Entry};
 use devices::{Description, Placement};
 
 use super::names;
-use super::{Flavour, Sheet, keep};
+use super::{Flavour, Sheet, keep, keep_of};
 use crate::{Eds, Number, Reading, TypeCode, Value, write};
 
 fn models() -> impl Iterator<Item = &'static Description> {
@@ -111,6 +111,10 @@ fn the_same_content_is_kept_once() {
     assert!(std::ptr::eq(first, again));
     let other = keep(&read(&Sheet { node_id: NodeId::new(9), ..Sheet::of(model) }).eds).expect("it fits");
     assert!(!std::ptr::eq(first, other));
+    // Under another path it is called otherwise, and nothing else is kept twice.
+    let copy = keep_of(&read(&Sheet::of(model)).eds, "line/wheel.eds").expect("it fits");
+    assert_eq!((first.manual, copy.manual), ("the file zlac8030l.eds", "the file line/wheel.eds"));
+    assert!(std::ptr::eq(first.dictionary, copy.dictionary));
 }
 
 #[test]
