@@ -37,7 +37,7 @@ fn described(path: &Path) -> Result<&'static Description, String> {
         Unread::File(error) => format!("cannot read {shown}: {error}"),
         Unread::Refused(refusal) => format!("{shown}: {refusal}"),
     })?;
-    keep_of(&reading.eds, &shown).map_err(|error| format!("{shown}: {error}"))
+    keep_of(&reading.eds, &shown.to_string()).map_err(|error| format!("{shown}: {error}"))
 }
 
 /// True for a device that a data sheet describes: what one count of an object is worth, no data sheet says.
