@@ -16,7 +16,7 @@ use crate::failure::Failure;
 use crate::global::Global;
 use crate::progress::Progress;
 use crate::signals::asked_to_end;
-use testbench::machine_file;
+use testbench::machine_file::{self, Machine};
 
 /// Longest virtual time that a command may take; none comes near, and a hang would otherwise never end.
 const VIRTUAL_LIMIT: Duration = Duration::from_secs(24 * 3600);
@@ -50,13 +50,14 @@ pub(crate) fn runtime() -> Result<tokio::runtime::Runtime, Failure> {
 /// The world that `--bus sim` or `--bus sim:FILE.toml` means, and which drives are in it.
 pub(crate) fn virtual_world(file: Option<&Path>) -> Result<Embedded, Failure> {
     let Some(path) = file else { return embedded::world() };
-    let unusable = |reason| {
+    let unusable = |reason: String| {
         Failure::usage(format!("cannot use the machine file {}", path.display()))
             .because(reason)
             .next(machine_file::example())
     };
     let machine = machine_file::read(path).map_err(unusable)?;
-    Ok((machine.build().map_err(unusable)?, machine.models().collect()))
+    let world = machine.build().map_err(|bad| unusable(bad.named(path.display().to_string()).to_string()))?;
+    Ok((world, machine.models().collect()))
 }
 
 fn virtual_bus<R>(
@@ -86,6 +87,9 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     let progress = Progress::new(global.json);
     progress.spin();
     let context = Context::new(global, network.clone(), None, progress.clone());
+    if let Some(unused) = global.machine.as_ref().and_then(Machine::unused_by_a_master) {
+        context.tell(&format!("of the machine file a command on a real bus does not use: {unused}"));
+    }
     let until = async {
         tokio::select! {
             result = command(&context) => match result {

@@ -111,10 +111,18 @@ fn machine_files_are_checked() {
     std::fs::write(&file, "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nswitches = { X0 = [1, 2, 3] }\n").unwrap();
     let bus = format!("sim:{path}");
     for arguments in [&["--bus", &bus, "scan"][..], &["sim", "--machine", path], &["--machine", path, "scan"]] {
-        refused(arguments, &["line 4: 'X0' is a list of 3; expected two bounds, [low, high]"]);
+        refused(
+            arguments,
+            &[
+                "machine.toml:4:19: 'X0' is a list of 3; expected two bounds, [low, high]",
+                "  4 | switches = { X0 = [1, 2, 3] }",
+            ],
+        );
     }
     std::fs::write(&file, "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nfaults = ['gear']\n").unwrap();
-    refused(&["sim", "--machine", path], &["cannot use the machine file", "4 fault gear on"]);
+    refused(&["sim", "--machine", path], &["machine.toml:4:11: 'fault gear on' cannot be done"]);
+    std::fs::write(&file, "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nbattery = true\n").unwrap();
+    refused(&["sim", "--machine", path], &["cannot use the machine file", "line 4, column 11", "has no battery"]);
     std::fs::write(&file, format!("# {}", "x".repeat(1 << 20))).unwrap();
     refused(&["--bus", &bus, "scan"], &["more than 1 MB"]);
     #[cfg(unix)]

@@ -18,6 +18,7 @@
 //! and only regular ones of bounded size.
 
 pub mod data_sheet;
+pub mod document;
 pub mod machine_file;
 pub mod models;
 pub mod words;

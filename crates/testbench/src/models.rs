@@ -14,8 +14,16 @@ pub use devices::Description;
 
 /// What a MODEL argument means: the name of a model, or an EDS or DCF file that describes one.
 pub fn resolve(text: &str) -> Result<&'static Description, String> {
+    resolve_in(text, Path::new(""))
+}
+
+/// As [`resolve`], with files looked for in `folder`.
+///
+/// # Errors
+/// That it is neither, and what is near.
+pub fn resolve_in(text: &str, folder: &Path) -> Result<&'static Description, String> {
     if is_file(text) {
-        return described(Path::new(text));
+        return described(&folder.join(text));
     }
     let known = || models().map(|model| model.name);
     models().find(|model| model.name.eq_ignore_ascii_case(text)).ok_or_else(|| {
@@ -33,6 +41,10 @@ fn is_file(text: &str) -> bool {
 /// The device that a file describes.
 fn described(path: &Path) -> Result<&'static Description, String> {
     let shown = path.display();
+    // Of a pipe the end might never come.
+    if std::fs::metadata(path).is_ok_and(|kind| !kind.is_file()) {
+        return Err(format!("cannot read {shown}: it is no file but a directory, a pipe or a device"));
+    }
     let reading = data_sheet::reading(path).map_err(|unread| match unread {
         Unread::File(error) => format!("cannot read {shown}: {error}"),
         Unread::Refused(refusal) => format!("{shown}: {refusal}"),

@@ -28,6 +28,7 @@ use crate::serve::speaker::Speaker;
 use crate::serve::world::ServedWorld;
 use crate::session::{bus_failure, failure_of};
 use described::notes;
+use testbench::document::BadFile;
 use testbench::machine_file::{Machine, Placed};
 use testbench::words::drive::{DriveSpec, drive_spec};
 
@@ -235,7 +236,7 @@ impl Sim {
 /// Adds a drive with what it remembers and what is around it.
 fn add_drive(world: &mut World, placed: &Placed, eeproms: Option<&Eeproms>, warnings: &Speaker) -> Result<(), Failure> {
     let spec = &placed.spec;
-    let unusable = |reason| Failure::usage("cannot use the machine file").because(reason);
+    let unusable = |bad: BadFile| Failure::usage("cannot use the machine file").because(bad);
     let mut drive = embedded::ordered_drive(spec.model, &spec.order(world.bitrate()))?;
     placed.supply(drive.as_mut()).map_err(unusable)?;
     let number = spec.node.raw();

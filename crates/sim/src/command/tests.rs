@@ -114,6 +114,15 @@ fn says_what_it_expected_of_a_malformed_line() {
         ("4 clock", "expected: NODE clock HZ"),
         ("4 cable off", "expected: NODE cable cut|join"),
         ("4 get position", "expected: NODE get"),
+    ] {
+        let result: Result<Command, CommandError> = line.parse();
+        assert_eq!(result.unwrap_err().to_string(), error, "{line:?}");
+    }
+}
+
+#[test]
+fn says_what_it_expected_of_a_malformed_fault_of_the_bus() {
+    for (line, error) in [
         ("4 bus", "expected: NODE bus silent|late|babble|overrun|corrupt .."),
         ("4 bus late 5", "expected: NODE bus late MIN_MS MAX_MS, or NODE bus late off"),
         ("4 bus late 5 1", "\"1\" is no longest delay; expected: NODE bus late MIN_MS MAX_MS, or NODE bus late off"),

@@ -1,23 +1,23 @@
-//! Machine files: a virtual bus described in TOML, for `--bus sim:FILE.toml` and `sim --machine FILE.toml`, or which models
-//! are where on a real bus, for `--machine FILE.toml` of every other command.
+//! Machine files: drives and what is around them, described in TOML, for a virtual bus (`--bus sim:FILE.toml`, `sim --machine
+//! FILE.toml`, `run`), or which models are where on a real bus (`--machine FILE.toml` of every other command).
 //!
-//! A file names the drives and what is around them. Everything about a machine is put into the words of `ferrodrive sim`
-//! and done by the same code, so that a file can do what a world command can, and no more.
+//! Everything about a machine becomes a [`Stimulus`] of `ferrodrive sim` and is done by the same code, so that a file can do
+//! what a world command can, and no more. Each key is described in `docs/machine-file.md`.
 
-mod reader;
+mod surroundings;
 
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 use can::{Bitrate, Instant};
 use canopen::NodeId;
 use sim::machine::Realism;
-use sim::{Source, VirtualDrive, World};
+use sim::{Place, Source, Stimulus, VirtualDrive, World};
 
-use crate::models::Description;
-use crate::words::drive::{DriveSpec, drive_spec};
-use reader::{Field, Table};
+use crate::document::reader::{self, Field, Parameters, Table};
+use crate::document::{BadFile, Located, Problem, read_text};
+use crate::models::{Description, resolve_in};
+use crate::words::drive::DriveSpec;
+use crate::words::node::node;
 
 const EXAMPLE: &str =
     "[[drive]]\n           model = \"zlac8030l\"\n           node = 4\n           load = { torque_nm = 0.5 }";
@@ -25,11 +25,27 @@ const EXAMPLE: &str =
 /// Decides everything random where no seed is given: runs are repeatable.
 pub const SEED: u64 = 1;
 
-/// Largest file that is read. A bus has 127 drives, and a drive some lines.
-const LARGEST: u64 = 1 << 20;
+/// What a machine file may say of its bus.
+pub const BUS_KEYS: &[&str] = &["bitrate", "seed", "realism", "drive"];
+
+/// What it may say of a drive.
+pub const DRIVE_KEYS: &[&str] = &[
+    "model",
+    "node",
+    "supply_v",
+    "supply",
+    "options",
+    "load",
+    "inputs",
+    "switches",
+    "rotor_locked",
+    "temperatures_c",
+    "faults",
+    "battery",
+];
 
 /// A machine as its file describes it.
-#[derive(Clone, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Machine {
     /// The bus's rate, where it says one.
     pub bitrate: Option<Bitrate>,
@@ -42,21 +58,26 @@ pub struct Machine {
 }
 
 /// One drive of a machine and what is around it.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Placed {
     /// Which drive, and where.
     pub spec: DriveSpec,
     source: Source,
-    /// What is around it, as world commands.
-    commands: Vec<String>,
+    /// Where the supply is described.
+    source_at: Option<Located>,
+    /// What is around it, and where the file says so.
+    around: Vec<(Stimulus, Located)>,
+    /// The keys that the file has of it, `model` and `node` left out.
+    keys: Vec<&'static str>,
 }
 
-/// The machine that the file at `path` describes.
+/// The machine that the file at `path` describes. Data sheets that it names are looked for beside it.
 ///
 /// # Errors
 /// What is wrong with the file.
 pub fn read(path: &Path) -> Result<Machine, String> {
-    Machine::parse(&text_of(path)?)
+    let folder = path.parent().unwrap_or(Path::new(""));
+    Machine::parse_in(&read_text(path)?, folder).map_err(|bad| bad.named(path.display().to_string()).to_string())
 }
 
 /// The machine of `--machine`.
@@ -64,7 +85,7 @@ pub fn read(path: &Path) -> Result<Machine, String> {
 /// # Errors
 /// What is wrong with the file, and what one looks like.
 pub fn machine(path: &str) -> Result<Machine, String> {
-    read(Path::new(path)).map_err(|reason| format!("cannot use it: {reason}\n{}", example()))
+    read(Path::new(path)).map_err(|reason| format!("cannot use it:\n{reason}\n{}", example()))
 }
 
 /// What a machine file looks like, for messages.
@@ -72,45 +93,59 @@ pub fn example() -> String {
     format!("a machine file looks like this:\n           {EXAMPLE}")
 }
 
-/// The text of a file of sensible size. A pipe or a device, which may never end, is none.
-fn text_of(path: &Path) -> Result<String, String> {
-    let kind = std::fs::metadata(path).map_err(|error| error.to_string())?;
-    if !kind.is_file() {
-        return Err("it is no file but a directory, a pipe or a device".into());
-    }
-    let mut text = String::new();
-    let file = File::open(path).map_err(|error| error.to_string())?;
-    let read = file.take(LARGEST + 1).read_to_string(&mut text).map_err(|_| "it is no text".to_owned())?;
-    if read as u64 > LARGEST { Err("it has more than 1 MB; no machine needs that".into()) } else { Ok(text) }
-}
-
 impl Machine {
-    /// Reads the text of a machine file.
+    /// Reads the text of a machine file; data sheets that it names are looked for in the current folder.
     ///
     /// # Errors
-    /// What is wrong, at which line, and what is expected there.
-    pub fn parse(text: &str) -> Result<Self, String> {
-        reader::read(text, "a machine file", |file| {
-            file.takes_only(&["bitrate", "seed", "realism", "drive"])?;
-            let bitrate = file.get("bitrate").map(|field| rate(&field)).transpose()?;
-            let seed = file.get("seed").map(|field| field.whole("a whole number from 0 on")).transpose()?;
-            let realism = file.get("realism").map(|field| realism(&field)).transpose()?;
-            let expected = "a table of its own for each drive, begun by [[drive]]";
-            let tables = file.get("drive").map_or(Ok(Vec::new()), |field| field.list(expected))?;
-            let mut drives: Vec<Placed> = Vec::new();
-            for table in tables {
-                let drive = Placed::parse(&table.table("a drive", expected)?)?;
-                if drives.iter().any(|other| other.spec.node == drive.spec.node) {
-                    return Err(table.at(&format!("two drives at node {}", drive.spec.node)));
+    /// Everything that is wrong, with its place and what is expected there.
+    pub fn parse(text: &str) -> Result<Self, BadFile> {
+        Self::parse_in(text, Path::new(""))
+    }
+
+    /// As [`parse`](Self::parse), with data sheets looked for in `folder`.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn parse_in(text: &str, folder: &Path) -> Result<Self, BadFile> {
+        reader::read(text, &Parameters::new(), "a machine file", |file| Self::from_table(file, folder))
+            .map_err(|problems| BadFile::new(text, problems))
+    }
+
+    /// Takes a machine out of a table, be it a file of its own or a part of another.
+    ///
+    /// # Errors
+    /// Everything that is wrong.
+    pub fn from_table(file: &Table<'_>, folder: &Path) -> Result<Self, Vec<Problem>> {
+        let mut problems = file.strangers(BUS_KEYS);
+        let mut machine = Self::default();
+        machine.bitrate = noted(file.get("bitrate").map(|field| rate(&field)).transpose(), &mut problems);
+        let seed = file.get("seed").map(|field| field.whole("a whole number from 0 on")).transpose();
+        machine.seed = noted(seed, &mut problems);
+        machine.realism = noted(file.get("realism").map(|field| realism(&field)).transpose(), &mut problems);
+        let expected = "a table of its own for each drive, begun by [[drive]]";
+        let tables = file.get("drive").map_or(Ok(Vec::new()), |field| field.list(expected));
+        let tables = tables.unwrap_or_else(|problem| {
+            problems.push(problem);
+            Vec::new()
+        });
+        let none = tables.is_empty();
+        for field in tables {
+            match field
+                .table("a drive", expected)
+                .map_err(|problem| vec![problem])
+                .and_then(|table| Placed::parse(&table, folder))
+            {
+                Err(wrong) => problems.extend(wrong),
+                Ok(drive) if machine.drives.iter().any(|other| other.spec.node == drive.spec.node) => {
+                    problems.push(field.problem(format!("two drives at node {}", drive.spec.node)));
                 }
-                drives.push(drive);
+                Ok(drive) => machine.drives.push(drive),
             }
-            if drives.is_empty() {
-                Err("it has no [[drive]]".into())
-            } else {
-                Ok(Self { bitrate, seed, realism, drives })
-            }
-        })
+        }
+        if none && problems.is_empty() {
+            problems.push(Problem::new(file.place(), "it has no [[drive]]"));
+        }
+        if problems.is_empty() { Ok(machine) } else { Err(problems) }
     }
 
     /// Which models are where.
@@ -134,35 +169,56 @@ impl Machine {
     /// Its bus with its drives and what is around them, at time zero.
     ///
     /// # Errors
-    /// What a drive does not take, in a sentence.
-    pub fn build(&self) -> Result<World, String> {
+    /// What a drive does not take, with its place in the file.
+    pub fn build(&self) -> Result<World, BadFile> {
         let mut world = self.world();
         for placed in &self.drives {
             let spec = &placed.spec;
             let order = spec.order(world.bitrate());
-            let mut drive = sim::machine::order(spec.model, &order).map_err(|error| error.to_string())?;
+            let mut drive =
+                sim::machine::order(spec.model, &order).map_err(|error| placed.refused(None, &error.to_string()))?;
             placed.supply(drive.as_mut())?;
-            world.add_drive(spec.node.raw(), drive).map_err(|error| error.to_string())?;
+            let added = world.add_drive(spec.node.raw(), drive);
+            added.map_err(|error| placed.refused(None, &error.to_string()))?;
             placed.furnish(&mut world)?;
         }
         self.make_real(&mut world);
         Ok(world)
+    }
+
+    /// What of the file counts for a simulated machine only, in words: a master on a real bus does not use it. `None` if there
+    /// is nothing.
+    pub fn unused_by_a_master(&self) -> Option<String> {
+        let bus = [self.bitrate.map(|_| "bitrate"), self.seed.map(|_| "seed"), self.realism.map(|_| "realism")];
+        let bus = bus.into_iter().flatten().collect::<Vec<_>>().join(", ");
+        let of_drive = |placed: &Placed| format!("{} of node {}", placed.keys.join(", "), placed.spec.node);
+        let drives = self.drives.iter().filter(|placed| !placed.keys.is_empty()).map(of_drive);
+        let parts: Vec<_> = Some(bus).filter(|bus| !bus.is_empty()).into_iter().chain(drives).collect();
+        (!parts.is_empty()).then(|| parts.join("; "))
     }
 }
 
 /// A drive with nothing around it.
 impl From<DriveSpec> for Placed {
     fn from(spec: DriveSpec) -> Self {
-        Self { spec, source: Source::default(), commands: Vec::new() }
+        Self { spec, source: Source::default(), source_at: None, around: Vec::new(), keys: Vec::new() }
     }
 }
 
-fn rate(field: &Field<'_>) -> Result<Bitrate, String> {
-    let expected = "a bit rate as text, e.g. \"500k\"";
-    field.text(expected)?.parse().map_err(|error| field.at(&format!("{error}")))
+/// The value, or its problem among the others.
+fn noted<T: Default>(value: Result<T, Problem>, problems: &mut Vec<Problem>) -> T {
+    value.unwrap_or_else(|problem| {
+        problems.push(problem);
+        T::default()
+    })
 }
 
-fn realism(field: &Field<'_>) -> Result<Realism, String> {
+fn rate(field: &Field<'_>) -> Result<Bitrate, Problem> {
+    let expected = "a bit rate as text, e.g. \"500k\"";
+    field.text(expected)?.parse().map_err(|error| field.problem(format!("{error}")))
+}
+
+fn realism(field: &Field<'_>) -> Result<Realism, Problem> {
     let expected = "\"ideal\" or \"full\"";
     field.text(expected)?.parse().map_err(|_| field.wrong(expected))
 }
@@ -170,144 +226,78 @@ fn realism(field: &Field<'_>) -> Result<Realism, String> {
 impl Placed {
     /// Sets the supply of the drive, before the power comes on: capacitors once charged would hold another voltage for a
     /// while.
-    pub fn supply(&self, drive: &mut dyn VirtualDrive) -> Result<(), String> {
+    ///
+    /// # Errors
+    /// That the drive does not take it.
+    pub fn supply(&self, drive: &mut dyn VirtualDrive) -> Result<(), BadFile> {
         let set = drive.set_source(self.source, Instant::ZERO);
-        set.map_err(|refused| format!("supply of node {}: {refused}", self.spec.node))
+        let node = self.spec.node;
+        set.map_err(|refused| self.refused(self.source_at.as_ref(), &format!("supply of node {node}: {refused}")))
     }
 
     /// Puts into the world what is around the drive, which is there already.
-    pub fn furnish(&self, world: &mut World) -> Result<(), String> {
-        self.commands.iter().try_for_each(|command| obey(world, command))
+    ///
+    /// # Errors
+    /// What the drive does not take.
+    pub fn furnish(&self, world: &mut World) -> Result<(), BadFile> {
+        let place = Place::node(self.spec.node.raw());
+        for (stimulus, at) in &self.around {
+            let applied = world.apply(place, stimulus).map_err(|error| error.to_string());
+            let refused = applied.and_then(|applied| applied.map_err(|refused| refused.to_string()));
+            refused
+                .map_err(|reason| self.refused(Some(at), &format!("'{place} {stimulus}' cannot be done: {reason}")))?;
+        }
+        Ok(())
     }
 
-    fn parse(table: &Table<'_>) -> Result<Self, String> {
-        table.takes_only(&[
-            "model",
-            "node",
-            "supply_v",
-            "supply",
-            "options",
-            "load",
-            "inputs",
-            "switches",
-            "rotor_locked",
-            "temperatures_c",
-            "faults",
-        ])?;
-        let expected = "the drive's model as text, e.g. \"zlac8030l\"";
-        let model = table.need("model", expected)?;
-        let node = table.need("node", NODE)?;
-        let number: u8 = node.whole(NODE)?;
-        let mut spec =
-            drive_spec(&format!("{}@{number}", model.text(expected)?)).map_err(|reason| model.at(&reason))?;
-        for option in fields(table, "options", "a table of options, e.g. { 6060 = 3 }")? {
-            let value = option.word("a whole number or a text")?;
-            spec.set(option.name(), &value)
-                .map_err(|reason| option.at(&format!("options of node {number}: {reason}")))?;
+    /// A refusal, at a place of the file if it has one.
+    fn refused(&self, at: Option<&Located>, what: &str) -> BadFile {
+        let nowhere = Located { line: 1, column: 1, width: 1, shown: String::new(), what: String::new() };
+        BadFile::one(at.unwrap_or(&nowhere).saying(what))
+    }
+
+    fn parse(table: &Table<'_>, folder: &Path) -> Result<Self, Vec<Problem>> {
+        let one = |problem| vec![problem];
+        let mut problems = table.strangers(DRIVE_KEYS);
+        let expected = "the drive's model as text, e.g. \"zlac8030l\", or a data sheet, \"FILE.eds\"";
+        let model = table.need("model", expected).map_err(one)?;
+        let number = table.need("node", NODE).map_err(one)?;
+        let id = number.whole::<u8>(NODE).map_err(one)?;
+        let id = node(&id.to_string()).map_err(|reason| one(number.problem(reason)))?;
+        let described = model.words(expected).map_err(one)?;
+        let described = resolve_in(&described, folder).map_err(|reason| one(model.problem(reason)))?;
+        let mut spec = DriveSpec::new(described, id);
+        for option in
+            noted(surroundings::fields(table, "options", "a table of options, e.g. { 6060 = 3 }"), &mut problems)
+        {
+            let set = option.word("a whole number or a text").and_then(|value| {
+                spec.set(option.name(), &value)
+                    .map_err(|reason| option.problem(format!("options of node {id}: {reason}")))
+            });
+            noted(set, &mut problems);
         }
-        let commands = surroundings(table)?.into_iter().map(|command| format!("{number} {command}")).collect();
-        Ok(Self { spec, source: source(table)?, commands })
+        let source = noted(surroundings::source(table), &mut problems);
+        let source_at = ["supply", "supply_v"].into_iter().find_map(|name| table.get(name));
+        let source_at = source_at.map(|field| field.problem("").locate(table.text()));
+        let around = surroundings::around(table, &mut problems);
+        let keys =
+            DRIVE_KEYS.iter().copied().filter(|key| !matches!(*key, "model" | "node") && table.get(key).is_some());
+        if problems.is_empty() {
+            Ok(Self { spec, source, source_at, around, keys: keys.collect() })
+        } else {
+            Err(problems)
+        }
     }
 }
 
 const NODE: &str = "a node-ID from 1 to 127, e.g. 4";
-
-/// The supply: its voltage (also `supply_v`) and what is behind it.
-fn source(table: &Table<'_>) -> Result<Source, String> {
-    let number = |table: &Table<'_>, name: &str, expected: &str| -> Result<Option<f64>, String> {
-        table.get(name).map(|field| field.number(expected)).transpose()
-    };
-    let source = Source { voltage_v: number(table, "supply_v", VOLTAGE)?, limit_a: None, resistance_ohm: None };
-    let Some(supply) = table.get("supply") else { return Ok(source) };
-    let supply = supply.table("a supply", "a table, e.g. { voltage_v = 48, limit_a = 10 }")?;
-    supply.takes_only(&["voltage_v", "limit_a", "resistance_ohm"])?;
-    Ok(Source {
-        voltage_v: number(&supply, "voltage_v", VOLTAGE)?.or(source.voltage_v),
-        limit_a: number(&supply, "limit_a", "a current in A, e.g. 10")?,
-        resistance_ohm: number(&supply, "resistance_ohm", "a resistance in ohms, e.g. 0.2")?,
-    })
-}
-
-const VOLTAGE: &str = "a voltage in V, e.g. 48";
-
-/// What is around a drive, as world commands.
-fn surroundings(table: &Table<'_>) -> Result<Vec<String>, String> {
-    let mut commands: Vec<String> = Vec::new();
-    if let Some(load) = table.get("load") {
-        let load = load.table("a load", "a table, e.g. { torque_nm = 0.5 }")?;
-        load.takes_only(&["torque_nm", "inertia_kg_m2"])?;
-        for (name, word) in [("torque_nm", "torque"), ("inertia_kg_m2", "inertia")] {
-            let number = load.get(name).map(|field| field.number("a number, e.g. 0.5")).transpose()?;
-            commands.extend(number.map(|number| format!("load {word} {number}")));
-        }
-    }
-    for input in fields(table, "inputs", "a table of levels, e.g. { X0 = true }")? {
-        let level = u8::from(input.flag("true or false")?);
-        commands.push(format!("input {} {level}", word(&input)?));
-    }
-    for switch in fields(table, "switches", "a table of ranges, e.g. { X0 = [-5000, \"max\"] }")? {
-        let [low, high] = bounds(&switch)?;
-        commands.push(format!("switch {} {low} {high}", word(&switch)?));
-    }
-    if table.get("rotor_locked").map_or(Ok(false), |field| field.flag("true or false"))? {
-        commands.push("rotor lock".into());
-    }
-    for sensor in fields(table, "temperatures_c", "a table of sensors, e.g. { motor = 95 }")? {
-        commands.push(format!("temperature {} {}", word(&sensor)?, sensor.number("degrees Celsius, e.g. 95")?));
-    }
-    let expected = "a list of components, e.g. [\"hall\"]";
-    for component in table.get("faults").map_or(Ok(Vec::new()), |field| field.list(expected))? {
-        let name = component.text(expected)?;
-        commands.push(format!("fault {} on", one_word(&component, name)?));
-    }
-    Ok(commands)
-}
-
-/// The two ends of a switch's range.
-fn bounds(switch: &Field<'_>) -> Result<[String; 2], String> {
-    const EXPECTED: &str = "two bounds, [low, high], each a whole number of counts, \"min\" or \"max\"";
-    let ends = switch.list(EXPECTED)?;
-    let words = ends.iter().map(|end| match end.word(EXPECTED) {
-        Ok(word) if matches!(word.as_str(), "min" | "max") || word.parse::<i64>().is_ok() => Ok(word),
-        _ => Err(end.wrong(EXPECTED)),
-    });
-    let words = words.collect::<Result<Vec<_>, _>>()?;
-    <[String; 2]>::try_from(words).map_err(|_| switch.wrong(EXPECTED))
-}
-
-/// The names and values of the table behind `name`; none if it is not there.
-fn fields<'a>(table: &Table<'a>, name: &'static str, expected: &str) -> Result<Vec<Field<'a>>, String> {
-    let Some(field) = table.get(name) else { return Ok(Vec::new()) };
-    Ok(field.table(name, expected)?.fields().collect())
-}
-
-/// The name of a field as a word of a world command.
-fn word<'a>(field: &'a Field<'_>) -> Result<&'a str, String> {
-    one_word(field, field.name())
-}
-
-/// A name that is one word: it must not bring words of its own into a world command.
-fn one_word<'a>(field: &Field<'_>, name: &'a str) -> Result<&'a str, String> {
-    let word = !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
-    if word { Ok(name) } else { Err(field.at(&format!("'{name}' is no name of anything on a drive"))) }
-}
-
-/// Does what a world command says.
-fn obey(world: &mut World, command: &str) -> Result<(), String> {
-    let answer = sim::command::answer(world, command).map(|answer| answer.json).unwrap_or_default();
-    if answer.starts_with("{\"ok\":true") {
-        return Ok(());
-    }
-    let said: serde_json::Value = serde_json::from_str(&answer).unwrap_or_default();
-    Err(format!("'{command}' cannot be done: {}", said["error"].as_str().unwrap_or(&answer)))
-}
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn refusal(text: &str) -> String {
-        Machine::parse(text).and_then(|machine| machine.build()).err().unwrap_or_default()
+        Machine::parse(text).and_then(|machine| machine.build()).map_or_else(|bad| bad.to_string(), |_| String::new())
     }
 
     fn parsed(text: &str) -> Machine {
@@ -320,9 +310,8 @@ mod tests {
     fn a_table_becomes_world_commands() {
         let text = "[[drive]]\nmodel = 'zlac8030l'\nnode = 7\nload = { torque_nm = 0.5 }\n\
                     inputs = { X0 = true }\nswitches = { X1 = ['min', -100] }\nfaults = ['hall']\nrotor_locked = true";
-        let commands = &parsed(text).drives[0].commands;
-        let expected = ["7 load torque 0.5", "7 input X0 1", "7 switch X1 min -100", "7 rotor lock", "7 fault hall on"];
-        assert_eq!(*commands, expected);
+        let around: Vec<_> = parsed(text).drives[0].around.iter().map(|(stimulus, _)| stimulus.to_string()).collect();
+        assert_eq!(around, ["load torque 0.5", "input X0 1", "switch X1 min -100", "rotor lock", "fault hall on"]);
     }
 
     #[test]
@@ -331,7 +320,7 @@ mod tests {
         let said: Vec<_> = parsed(text).models().map(|(node, model)| (node.raw(), model.name)).collect();
         assert_eq!(said, [(2, "zlim42c"), (4, "zlac8030l")]);
         let twice = "[[drive]]\nmodel = 'zlim42c'\nnode = 2\n[[drive]]\nmodel = 'zlac8030l'\nnode = 2";
-        assert_eq!(refusal(twice), "line 4: two drives at node 2");
+        assert_eq!(refusal(twice), "line 4, column 1: two drives at node 2\n  4 | [[drive]]\n    | ^^^^^^^^^");
         assert!(machine("/nowhere/machine.toml").is_err_and(|reason| reason.contains("[[drive]]")));
     }
 
@@ -339,15 +328,15 @@ mod tests {
     fn what_is_wrong_is_said_with_its_place_and_what_is_expected() {
         let with = |line: &str| refusal(&format!("{DRIVE}{line}"));
         assert!(refusal("").contains("no [[drive]]"));
-        assert_eq!(with("colour = 1").split("; it has").next(), Some("line 4: a drive has no 'colour'"));
+        assert_eq!(with("colour = 1").split("; it has").next(), Some("line 4, column 1: a drive has no 'colour'"));
         assert!(with("suply_v = 1").contains("did you mean supply_v?"));
         assert!(
             refusal("[[drive]]\nmodel = 'zlac803'\nnode = 4")
-                .contains("line 2: 'zlac803' is no model; did you mean zlac8030l?")
+                .contains("line 2, column 9: 'zlac803' is no model; did you mean zlac8030l?")
         );
         assert!(refusal("[[drive]]\nmodel = 'zlac8030l'\nnode = 200").contains("no node 200"));
         assert!(refusal("[[drive]]\nmodel = 'zlac8030l'\nnode = 300").contains("'node' is 300; expected a node-ID"));
-        assert!(refusal("[[drive]]\nmodel = 'zlac8030l'").contains("line 1: a drive needs 'node'"));
+        assert!(refusal("[[drive]]\nmodel = 'zlac8030l'").contains("line 1, column 1: a drive needs 'node'"));
         assert!(refusal("[[drive]]\nmodel = 4\nnode = 4").contains("'model' is 4; expected the drive's model as text"));
         assert!(with("options = { colour = 'red' }").contains("no 'colour'"));
         assert_eq!(with("options = { 2014 = 100 }"), "");
@@ -363,19 +352,19 @@ mod tests {
         assert!(with("inputs = { X0 = 1 }").contains("'X0' is 1; expected true or false"));
         assert!(with("rotor_locked = 'yes'").contains("expected true or false"));
         assert!(with("faults = 'hall'").contains("expected a list of components"));
-        assert!(with("faults = ['gear']").contains("'4 fault gear on' cannot be done: "));
+        assert!(with("faults = ['gear']").contains("line 4, column 11: 'fault gear on' cannot be done: "));
         assert!(with("inputs = { 'X0 1\\n4 rotor lock' = true }").contains("is no name"));
         assert!(refusal("drive = 3").contains("begun by [[drive]]"));
         assert!(refusal(&format!("bitrate = '7k'\n{DRIVE}")).contains("bit rate must be"));
         assert!(refusal(&format!("bitrate = 500\n{DRIVE}")).contains("expected a bit rate as text"));
-        assert!(refusal("[[drive]]\nmodel = ").starts_with("line 2: "));
+        assert!(refusal("[[drive]]\nmodel = ").starts_with("line 2, column "));
     }
 
     #[test]
     fn a_switch_has_two_bounds() {
         let with = |range: &str| refusal(&format!("{DRIVE}switches = {{ X0 = {range} }}"));
         assert_eq!(with("[-5000, 'max']"), "");
-        assert!(with("[1, 2, 3]").contains("line 4: 'X0' is a list of 3; expected two bounds, [low, high]"));
+        assert!(with("[1, 2, 3]").contains("line 4, column 19: 'X0' is a list of 3; expected two bounds, [low, high]"));
         assert!(with("[1]").contains("expected two bounds"));
         assert!(with("[1, 'top']").contains("'X0' is \"top\"; expected two bounds"));
         assert!(with("[1.5, 2]").contains("'X0' is 1.5; expected two bounds"));
@@ -400,9 +389,33 @@ mod tests {
     }
 
     #[test]
+    fn all_that_is_wrong_is_said_at_once_in_the_order_of_the_file() {
+        let bad = Machine::parse("colour = 1\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nload = { torque_nm = 'much' }\nfaults = ['gear']\n[[drive]]\nmodel = 'x'\nnode = 5\n").err();
+        let lines: Vec<_> = bad.iter().flat_map(|bad| &bad.problems).map(|problem| problem.line).collect();
+        assert_eq!(lines, [1, 5, 6, 8]);
+    }
+
+    #[test]
+    fn what_only_a_machine_refuses_is_said_at_its_place() {
+        let bad = refusal(&format!("{DRIVE}battery = false"));
+        assert!(
+            bad.starts_with("line 4, column 11: '4 battery off' cannot be done: a zlac8030l has no battery"),
+            "{bad}"
+        );
+        assert!(refusal(&format!("{DRIVE}supply_v = 300")).starts_with("line 4, column 12: supply of node 4"));
+    }
+
+    #[test]
+    fn what_a_master_does_not_use_is_told() {
+        let text = format!("seed = 3\n{DRIVE}load = {{ torque_nm = 0.5 }}\nfaults = []");
+        assert_eq!(parsed(&text).unused_by_a_master().as_deref(), Some("seed; load, faults of node 4"));
+        assert_eq!(parsed(DRIVE).unused_by_a_master(), None);
+    }
+
+    #[test]
     fn only_a_file_of_sensible_size_is_read() {
         let path = std::env::temp_dir().join(format!("ferrodrive-large-{}.toml", std::process::id()));
-        std::fs::write(&path, format!("{DRIVE}# {}", " ".repeat(LARGEST as usize))).unwrap();
+        std::fs::write(&path, format!("{DRIVE}# {}", " ".repeat(crate::document::LARGEST as usize))).unwrap();
         let said = machine(path.to_str().unwrap()).err().unwrap_or_default();
         std::fs::remove_file(&path).unwrap();
         assert!(said.contains("more than 1 MB"), "{said}");

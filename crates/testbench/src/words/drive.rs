@@ -11,7 +11,7 @@ use super::suggest::{did_you_mean, near};
 use crate::models::{Description, resolve};
 
 /// A drive to put on a virtual bus.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct DriveSpec {
     /// Which drive.
     pub model: &'static Description,
