@@ -1,0 +1,22 @@
+//! Records of a run as files: what was sampled, what was carried, what happened.
+//!
+//! A [`Record`] is written piece by piece, so that a long run needs little memory, and [`read`] takes a file back, also one
+//! whose end is missing. Two kinds of file:
+//!
+//! - MCAP (<https://mcap.dev/spec>), which Foxglove, PlotJuggler and Rerun open: a topic for each axis (`/node/4`,
+//!   `/node/5/2`) and body (`/body/base`) with JSON messages and a JSON schema that tells the units, `/can` with the frames
+//!   and `/events` with what happened, as log lines.
+//! - CSV: `t_s`, a column for each signal (`4.velocity_rpm`), and `mark`, what happened since the line before. It has no
+//!   frames.
+//!
+//! Times are seconds, in MCAP nanoseconds, from the begin of the world or of the connection.
+
+mod column;
+mod csv;
+mod mcap_file;
+mod read;
+mod record;
+
+pub use column::{Column, Subject, columns_of_drives, select};
+pub use read::{Recorded, Series, read};
+pub use record::{Kind, Mark, Record, Severity};
