@@ -40,9 +40,10 @@ impl Instant {
         self.0
     }
 
-    /// Seconds since zero, for display and for physics; exact up to 104 days.
+    /// Seconds since zero, for display and for physics: the nearest number to the exact one, up to 104 days.
     pub const fn as_secs_f64(self) -> f64 {
-        self.0 as f64 * 1e-9
+        // Divided, for 1e-9 is no number of its own: 7.5 s would be 7.500000000000001.
+        self.0 as f64 / 1e9
     }
 
     /// This instant plus `nanos` nanoseconds.

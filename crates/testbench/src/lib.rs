@@ -21,4 +21,5 @@ pub mod data_sheet;
 pub mod document;
 pub mod machine_file;
 pub mod models;
+pub mod recording;
 pub mod words;

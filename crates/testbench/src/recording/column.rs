@@ -7,8 +7,10 @@ use std::str::FromStr;
 use sim::Place;
 use sim::recorder::{Channel, Signal};
 
+use crate::words::suggest::{did_you_mean, near};
+
 /// What a column tells about.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Subject {
     /// An axis of a node.
     Axis(Place),
@@ -163,15 +165,14 @@ fn fits(pattern: &str, name: &str) -> bool {
 }
 
 fn nothing_like(pattern: &str, names: &[String]) -> String {
-    let signals = names.iter().map(|name| name.rsplit_once('.').map_or(name.as_str(), |(_, signal)| signal));
-    let mut candidates: Vec<&str> = names.iter().map(String::as_str).chain(signals).collect();
-    candidates.sort_unstable();
-    candidates.dedup();
-    let near = crate::words::nearest(pattern, candidates.iter().copied());
-    let hint = near.map_or_else(String::new, |near| format!("; did you mean {near}?"));
-    let mut known: Vec<&str> = candidates.into_iter().filter(|name| !name.contains('.')).collect();
-    known.dedup();
-    format!("there is no signal '{pattern}'{hint} There are {}", known.join(", "))
+    let signal_of = |name: &'_ String| name.rsplit_once('.').map_or(name.clone(), |(_, signal)| signal.to_owned());
+    let mut signals: Vec<String> = names.iter().map(signal_of).collect();
+    signals.sort_unstable();
+    signals.dedup();
+    // Who names a node means one signal of it; who does not, means a kind.
+    let candidates = if pattern.contains('.') { names } else { &signals };
+    let hint = did_you_mean(&near(pattern, candidates.iter().map(String::as_str)));
+    format!("there is no signal '{pattern}'{hint}\nsignals: {}", signals.join(", "))
 }
 
 #[cfg(test)]

@@ -1,0 +1,210 @@
+//! A record as MCAP.
+//!
+//! Chunks are built in memory and written whole: the file of a program that was killed ends between two of them.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::io;
+
+use can::{Frame, Instant};
+use mcap::records::MessageHeader;
+use mcap::{McapError, WriteOptions, Writer};
+use serde_json::json;
+
+use super::column::{Column, Subject};
+use super::record::{Mark, Severity, Target};
+
+/// Bytes of a chunk, before it is written though nobody has asked for it.
+const CHUNK: u64 = 256 << 10;
+
+pub(super) const FRAMES: &str = "/can";
+pub(super) const EVENTS: &str = "/events";
+
+/// An MCAP file that is being written.
+pub(super) struct Mcap {
+    writer: Writer<Box<dyn Target>>,
+    topics: Vec<Topic>,
+    frames: u16,
+    events: u16,
+    /// Messages so far, which count on each channel alike: readers want them ascending.
+    sequence: u32,
+    text: String,
+}
+
+/// The signals of one subject.
+struct Topic {
+    channel: u16,
+    /// By their place in a row.
+    fields: Vec<(usize, String)>,
+}
+
+impl Mcap {
+    pub(super) fn begin(target: Box<dyn Target>, columns: &[Column]) -> io::Result<Self> {
+        let options = WriteOptions::new()
+            .compression(None)
+            .profile("")
+            .library(concat!("ferrodrive ", env!("CARGO_PKG_VERSION")))
+            .chunk_size(Some(CHUNK))
+            .disable_seeking(true);
+        let mut writer = options.create(target).map_err(broken)?;
+        let mut subjects: Vec<&Subject> = Vec::new();
+        for column in columns {
+            if !subjects.contains(&&column.subject) {
+                subjects.push(&column.subject);
+            }
+        }
+        let mut topics = Vec::new();
+        for subject in subjects {
+            let of_it = columns.iter().enumerate().filter(|(_, column)| column.subject == *subject);
+            let of_it: Vec<(usize, &Column)> = of_it.collect();
+            let (name, schema) = schema_of(subject, &of_it);
+            let channel = channel(&mut writer, &subject.topic(), &name, &schema)?;
+            let fields = of_it.iter().map(|(place, column)| (*place, json!(column.signal).to_string())).collect();
+            topics.push(Topic { channel, fields });
+        }
+        let frames = channel(&mut writer, FRAMES, "ferrodrive.Frame", &frame_schema())?;
+        // The name and the fields of a line of a log, as Foxglove knows them.
+        let events = channel(&mut writer, EVENTS, "foxglove.Log", &log_schema())?;
+        let mut file = Self { writer, topics, frames, events, sequence: 0, text: String::new() };
+        // A reader that follows the file sees its topics at once.
+        file.flush()?;
+        Ok(file)
+    }
+
+    pub(super) fn row(&mut self, at: Instant, values: &[f64]) -> io::Result<()> {
+        for place in 0..self.topics.len() {
+            let topic = &self.topics[place];
+            self.text.clear();
+            self.text.push('{');
+            for (column, name) in &topic.fields {
+                let value = values.get(*column).copied().unwrap_or(f64::NAN);
+                let comma = if self.text.len() > 1 { "," } else { "" };
+                // JSON has no number for what is none.
+                let _ = if value.is_finite() {
+                    write!(self.text, "{comma}{name}:{value}")
+                } else {
+                    write!(self.text, "{comma}{name}:null")
+                };
+            }
+            self.text.push('}');
+            let channel = topic.channel;
+            self.message(channel, at)?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn frame(&mut self, at: Instant, frame: &Frame) -> io::Result<()> {
+        self.text.clear();
+        let _ = write!(
+            self.text,
+            r#"{{"id":{},"extended":{},"remote":{},"length":{},"data":""#,
+            frame.id().raw(),
+            frame.id().is_extended(),
+            frame.is_remote(),
+            frame.dlc()
+        );
+        for byte in frame.data() {
+            let _ = write!(self.text, "{byte:02X}");
+        }
+        let _ = write!(self.text, r#"","text":"{frame}"}}"#);
+        self.message(self.frames, at)
+    }
+
+    pub(super) fn mark(&mut self, mark: &Mark) -> io::Result<()> {
+        // Levels of foxglove.Log: 2 is INFO, 3 WARNING, 4 ERROR.
+        let level = match mark.severity {
+            Severity::Note => 2,
+            Severity::Warning => 3,
+            Severity::Fault => 4,
+        };
+        let nanos = mark.at.as_nanos();
+        let timestamp = json!({ "sec": nanos / 1_000_000_000, "nsec": nanos % 1_000_000_000 });
+        let message = json!({
+            "timestamp": timestamp, "level": level, "message": mark.text, "name": mark.of, "file": "", "line": 0
+        });
+        self.text.clear();
+        let _ = write!(self.text, "{message}");
+        self.message(self.events, mark.at)
+    }
+
+    pub(super) fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush().map_err(broken)
+    }
+
+    pub(super) fn finish(mut self) -> io::Result<()> {
+        self.writer.finish().map(drop).map_err(broken)
+    }
+
+    /// Writes what stands in `text`.
+    fn message(&mut self, channel_id: u16, at: Instant) -> io::Result<()> {
+        let time = at.as_nanos();
+        let header = MessageHeader { channel_id, sequence: self.sequence, log_time: time, publish_time: time };
+        self.sequence = self.sequence.wrapping_add(1);
+        self.writer.write_to_known_channel(&header, self.text.as_bytes()).map_err(broken)
+    }
+}
+
+fn channel(
+    writer: &mut Writer<Box<dyn Target>>,
+    topic: &str,
+    name: &str,
+    schema: &serde_json::Value,
+) -> io::Result<u16> {
+    let schema = writer.add_schema(name, "jsonschema", schema.to_string().as_bytes()).map_err(broken)?;
+    writer.add_channel(schema, topic, "json", &BTreeMap::new()).map_err(broken)
+}
+
+/// Name and schema of the signals of one subject.
+fn schema_of(subject: &Subject, columns: &[(usize, &Column)]) -> (String, serde_json::Value) {
+    let property = |column: &Column| {
+        let unit = if column.unit.is_empty() { "no unit" } else { &column.unit };
+        json!({ "type": ["number", "null"], "description": unit, "unit": column.unit })
+    };
+    let properties: serde_json::Map<String, serde_json::Value> =
+        columns.iter().map(|(_, column)| (column.signal.to_string(), property(column))).collect();
+    let title = subject.title();
+    let schema = json!({ "title": title, "type": "object", "properties": properties });
+    // A schema of its own for each subject: readers keep the first of a name.
+    (format!("ferrodrive.Signals of {title}"), schema)
+}
+
+fn frame_schema() -> serde_json::Value {
+    json!({
+        "title": "a CAN frame, at the end of its last bit",
+        "type": "object",
+        "properties": {
+            "id": { "type": "integer", "description": "CAN identifier" },
+            "extended": { "type": "boolean", "description": "29 bits" },
+            "remote": { "type": "boolean", "description": "a remote transmission request" },
+            "length": { "type": "integer", "description": "data length code" },
+            "data": { "type": "string", "description": "hexadecimal" },
+            "text": { "type": "string", "description": "as candump writes it" }
+        }
+    })
+}
+
+fn log_schema() -> serde_json::Value {
+    json!({
+        "title": "foxglove.Log",
+        "description": "what happened",
+        "type": "object",
+        "properties": {
+            "timestamp": {
+                "type": "object", "title": "time",
+                "properties": { "sec": { "type": "integer" }, "nsec": { "type": "integer" } }
+            },
+            "level": { "type": "integer", "description": "2 note, 3 warning, 4 fault" },
+            "message": { "type": "string" },
+            "name": { "type": "string", "description": "to what it happened" },
+            "file": { "type": "string" },
+            "line": { "type": "integer" }
+        }
+    })
+}
+
+fn broken(error: McapError) -> io::Error {
+    match error {
+        McapError::Io(error) => error,
+        other => io::Error::other(other),
+    }
+}

@@ -1,0 +1,297 @@
+//! A record's file, read back.
+//!
+//! A file whose writer was killed, or that is still being written, ends in the middle of something: what stands before that
+//! is taken, and [`Recorded::torn`] says so.
+
+use std::collections::HashMap;
+
+use can::Instant;
+use mcap::read::Options;
+use mcap::{Channel, MessageStream};
+use serde_json::Value;
+
+use super::column::{Column, Subject};
+use super::mcap_file::EVENTS;
+use super::record::{Kind, Mark, Severity};
+
+/// One signal over time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    /// Which.
+    pub column: Column,
+    /// Time in s and value, times ascending; not a number where there was none.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// What a file holds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Recorded {
+    /// In the order of the file.
+    pub series: Vec<Series>,
+    /// What happened.
+    pub marks: Vec<Mark>,
+    /// The file ends in the middle of something.
+    pub torn: bool,
+}
+
+/// What stands in a file of this kind.
+///
+/// # Errors
+/// A sentence: it is no such file at all, or nothing in it is a record.
+pub fn read(kind: Kind, bytes: &[u8]) -> Result<Recorded, String> {
+    let mut recorded = match kind {
+        Kind::Mcap => read_mcap(bytes)?,
+        Kind::Csv => read_csv(bytes)?,
+    };
+    recorded.series.retain(|series| !series.points.is_empty());
+    Ok(recorded)
+}
+
+fn read_mcap(bytes: &[u8]) -> Result<Recorded, String> {
+    if !bytes.starts_with(mcap::MAGIC) {
+        return Err("it is no MCAP file: it does not begin as one".into());
+    }
+    let messages = MessageStream::new_with_options(bytes, Options::IgnoreEndMagic.into())
+        .map_err(|error| format!("it is no MCAP file: {error}"))?;
+    let mut recorded = Recorded { torn: !bytes.ends_with(mcap::MAGIC), ..Recorded::default() };
+    let mut places: HashMap<(u16, String), usize> = HashMap::new();
+    for message in messages {
+        let Ok(message) = message else {
+            recorded.torn = true;
+            break;
+        };
+        // A message of another program may be anything.
+        let Ok(Value::Object(fields)) = serde_json::from_slice(&message.data) else { continue };
+        let at = Instant::from_nanos(message.log_time);
+        if message.channel.topic == EVENTS {
+            recorded.marks.push(mark_of(at, &fields));
+            continue;
+        }
+        let Some(subject) = Subject::of_topic(&message.channel.topic) else { continue };
+        for (signal, value) in fields {
+            let value = match value {
+                Value::Number(number) => number.as_f64().unwrap_or(f64::NAN),
+                Value::Null => f64::NAN,
+                _ => continue,
+            };
+            let series = &mut recorded.series;
+            let place = *places.entry((message.channel.id, signal)).or_insert_with_key(|(_, signal)| {
+                let unit = unit_in(&message.channel, signal);
+                let column = Column { subject: subject.clone(), signal: signal.clone().into(), unit: unit.into() };
+                series.push(Series { column, points: Vec::new() });
+                series.len() - 1
+            });
+            recorded.series[place].points.push((at.as_secs_f64(), value));
+        }
+    }
+    Ok(recorded)
+}
+
+/// The unit that a channel's schema gives a signal.
+fn unit_in(channel: &Channel<'_>, signal: &str) -> String {
+    let schema = channel.schema.as_ref().and_then(|schema| serde_json::from_slice::<Value>(&schema.data).ok());
+    let unit = schema.and_then(|schema| Some(schema["properties"][signal]["unit"].as_str()?.to_owned()));
+    unit.unwrap_or_default()
+}
+
+fn mark_of(at: Instant, fields: &serde_json::Map<String, Value>) -> Mark {
+    let text = |name: &str| fields.get(name).and_then(Value::as_str).unwrap_or_default().to_owned();
+    let severity = match fields.get("level").and_then(Value::as_u64) {
+        Some(0..=2) | None => Severity::Note,
+        Some(3) => Severity::Warning,
+        Some(_) => Severity::Fault,
+    };
+    Mark { at, of: text("name").into(), severity, text: text("message") }
+}
+
+fn read_csv(bytes: &[u8]) -> Result<Recorded, String> {
+    // The line in which a writer was killed is none; no field holds the end of a line.
+    let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
+    let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(&bytes[..whole]);
+    let header = reader.headers().map_err(|error| format!("it is no CSV file: {error}"))?.clone();
+    if header.get(0) != Some("t_s") {
+        return Err("its first column is not t_s, the time in s".into());
+    }
+    let mut recorded = Recorded { torn: whole < bytes.len(), ..Recorded::default() };
+    let marks_at = header.iter().position(|name| name == "mark");
+    let mut places = Vec::new();
+    for (place, name) in header.iter().enumerate().skip(1).filter(|(place, _)| Some(*place) != marks_at) {
+        let column = name.parse().map_err(|reason| format!("column {}: {reason}", place + 1))?;
+        recorded.series.push(Series { column, points: Vec::new() });
+        places.push(place);
+    }
+    let mut line = csv::StringRecord::new();
+    while reader.read_record(&mut line).map_err(|error| format!("it is no CSV file: {error}"))? {
+        let row = line.position().map_or(0, csv::Position::line);
+        let number = |place: usize| match line.get(place) {
+            Some("") => Ok(f64::NAN),
+            Some(text) => text.parse().map_err(|_| format!("line {row}, column {}: '{text}' is no number", place + 1)),
+            None => Err(format!("line {row} has {} fields; the first line has {}", line.len(), header.len())),
+        };
+        let at: f64 = number(0)?;
+        if !at.is_finite() || at < 0.0 {
+            return Err(format!("line {row}: a time of {at} s"));
+        }
+        for (series, place) in recorded.series.iter_mut().zip(&places) {
+            series.points.push((at, number(*place)?));
+        }
+        let text = marks_at.and_then(|place| line.get(place)).unwrap_or_default();
+        if !text.is_empty() {
+            let at = Instant::from_nanos((at * 1e9) as u64);
+            recorded.marks.push(Mark { at, of: "".into(), severity: Severity::Note, text: text.to_owned() });
+        }
+    }
+    Ok(recorded)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Record, columns_of_drives};
+    use super::*;
+    use sim::Place;
+    use std::io::{Cursor, Seek, SeekFrom, Write};
+    use std::sync::{Arc, Mutex};
+
+    /// Memory that can be looked at while it is written.
+    #[derive(Clone, Default)]
+    struct Memory(Arc<Mutex<Cursor<Vec<u8>>>>);
+
+    impl Memory {
+        fn bytes(&self) -> Vec<u8> {
+            self.0.lock().unwrap().get_ref().clone()
+        }
+    }
+
+    impl Write for Memory {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            self.0.lock().unwrap().write(bytes)
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    impl Seek for Memory {
+        fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+            self.0.lock().unwrap().seek(to)
+        }
+    }
+
+    fn columns() -> Vec<Column> {
+        columns_of_drives([Place::node(4), "5.2".parse().unwrap()])
+    }
+
+    /// A value of its own in each field; every third is missing.
+    fn row(number: usize) -> Vec<f64> {
+        let value = |column: usize| (number * 100 + column) as f64 / 7.0;
+        (0..columns().len()).map(|column| if (number + column).is_multiple_of(3) { f64::NAN } else { value(column) }).collect()
+    }
+
+    fn at(number: usize) -> Instant {
+        Instant::from_millis(number as u64 * 500)
+    }
+
+    /// `rows` rows, flushed after each of them; a mark after the third.
+    fn written(kind: Kind, rows: usize) -> (Memory, Record) {
+        let memory = Memory::default();
+        let mut record = Record::begin(kind, Box::new(memory.clone()), &columns()).unwrap();
+        for number in 0..rows {
+            record.row(at(number), &row(number)).unwrap();
+            record.frame(at(number), &"604#4041600000000000".parse().unwrap()).unwrap();
+            if number == 2 {
+                let text = "over-voltage, \"hard\"".to_owned();
+                record.mark(&Mark { at: at(2), of: "node 4".into(), severity: Severity::Fault, text }).unwrap();
+            }
+            record.flush().unwrap();
+        }
+        (memory, record)
+    }
+
+    fn check(recorded: &Recorded, rows: usize) {
+        assert_eq!(recorded.series.len(), columns().len());
+        for column in columns() {
+            let place = columns().iter().position(|known| *known == column).unwrap();
+            let series = recorded.series.iter().find(|series| series.column == column).unwrap();
+            let bits = |value: f64| if value.is_nan() { 0 } else { value.to_bits() };
+            let seen: Vec<(f64, u64)> = series.points.iter().map(|(at, value)| (*at, bits(*value))).collect();
+            let given: Vec<(f64, u64)> =
+                (0..rows).map(|number| (at(number).as_secs_f64(), bits(row(number)[place]))).collect();
+            assert_eq!(seen, given, "{}", column.name());
+        }
+    }
+
+    #[test]
+    fn what_was_written_is_read_back_to_the_bit() {
+        for kind in [Kind::Mcap, Kind::Csv] {
+            let (memory, record) = written(kind, 40);
+            record.finish().unwrap();
+            let recorded = read(kind, &memory.bytes()).unwrap();
+            assert!(!recorded.torn, "{kind:?}");
+            check(&recorded, 40);
+            assert_eq!(recorded.marks.len(), 1);
+            assert!(recorded.marks[0].line().ends_with("node 4: over-voltage, \"hard\""));
+        }
+    }
+
+    #[test]
+    fn a_writer_that_is_killed_loses_nothing_of_before_the_last_flush() {
+        for kind in [Kind::Mcap, Kind::Csv] {
+            let (memory, mut record) = written(kind, 40);
+            let flushed = memory.bytes();
+            record.row(at(40), &row(40)).unwrap();
+            // What a killed process leaves: the file as it is.
+            std::mem::forget(record);
+            let recorded = read(kind, &flushed).unwrap();
+            check(&recorded, 40);
+            assert_eq!(recorded.torn, kind == Kind::Mcap);
+            // Torn anywhere: what stands before is read, and nothing panics.
+            let mut most = 0;
+            for end in (0..flushed.len()).step_by(97) {
+                let Ok(torn) = read(kind, &flushed[..end]) else { continue };
+                let rows = torn.series.first().map_or(0, |series| series.points.len());
+                assert!((most..=40).contains(&rows), "{kind:?} {end}: {rows}");
+                most = rows;
+            }
+            assert!(most >= 38, "{kind:?}: {most}");
+        }
+    }
+
+    #[test]
+    fn a_file_that_is_something_else_is_refused_with_the_reason() {
+        assert!(read(Kind::Mcap, b"t_s,4.velocity_rpm\n").unwrap_err().contains("no MCAP file"));
+        assert!(read(Kind::Mcap, b"").unwrap_err().contains("no MCAP file"));
+        assert!(read(Kind::Csv, b"a,b\n1,2\n").unwrap_err().contains("t_s"));
+        let bad = read(Kind::Csv, b"t_s,4.velocity_rpm,mark\n0,1,\n1,fast,\n").unwrap_err();
+        assert_eq!(bad, "line 3, column 2: 'fast' is no number");
+        assert!(read(Kind::Csv, b"t_s,4.velocity_rpm,mark\n0\n1,2,\n").unwrap_err().contains("line 2 has 1 fields"));
+        assert!(read(Kind::Csv, b"t_s,4.velocity_rpm,mark\n-1,1,\n").unwrap_err().contains("a time of -1 s"));
+        assert!(read(Kind::Csv, b"t_s,4.velocity_rpm,mark\n").unwrap().series.is_empty());
+    }
+
+    #[test]
+    fn a_disk_that_is_full_is_an_error_and_no_panic() {
+        struct Full;
+        impl Write for Full {
+            fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
+                Err(std::io::ErrorKind::StorageFull.into())
+            }
+            fn flush(&mut self) -> std::io::Result<()> {
+                Ok(())
+            }
+        }
+        impl Seek for Full {
+            fn seek(&mut self, _: SeekFrom) -> std::io::Result<u64> {
+                Ok(0)
+            }
+        }
+        for kind in [Kind::Mcap, Kind::Csv] {
+            let begun = Record::begin(kind, Box::new(Full), &columns());
+            let error = match begun {
+                Err(error) => error,
+                Ok(mut record) => record.row(at(0), &row(0)).and_then(|()| record.flush()).unwrap_err(),
+            };
+            assert_eq!(error.kind(), std::io::ErrorKind::StorageFull, "{kind:?}");
+        }
+    }
+}
