@@ -16,6 +16,7 @@ mod paint;
 mod plain;
 mod progress;
 mod readings;
+mod recording;
 mod scope;
 mod serve;
 mod session;

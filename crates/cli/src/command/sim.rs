@@ -19,9 +19,9 @@ use crate::embedded;
 use crate::failure::Failure;
 use crate::global::Global;
 use crate::plain::plain;
+use crate::recording::{FrameLog, RecordFile, RecordOptions};
 use crate::serve::eeprom::{EepromError, Eeproms};
 use crate::serve::files::create_log;
-use crate::serve::frame_log::FrameLog;
 use crate::serve::keeper::{Keeper, file_name};
 use crate::serve::service::{Request, Service, listen_to_signals, read_lines, tick};
 use crate::serve::speaker::Speaker;
@@ -99,6 +99,8 @@ pub(crate) struct Sim {
     /// a FIFO are refused. When the disk is too slow frames are left out, which is said on standard error.
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
+    #[command(flatten)]
+    recording: RecordOptions,
     /// Name what is else only counted at the start: the objects of a file that have no effect
     #[arg(short, long)]
     verbose: bool,
@@ -137,10 +139,11 @@ impl Sim {
             Failure::new(format!("cannot write the log {}", self.log.clone().unwrap_or_default().display()))
                 .because(error)
         })?;
-        let world = ServedWorld::new(world, log.is_some(), warnings.clone());
+        let record = self.recording.start(&mut world, warnings.clone())?;
+        let world = ServedWorld::new(world, log.is_some() || record.is_some(), warnings.clone());
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().event_interval(TASKS_A_TURN).build();
         let runtime = runtime.map_err(|error| Failure::new("cannot start the runtime").because(error))?;
-        let ended = runtime.block_on(self.serve(world, eeproms, log, warnings, global, bridge));
+        let ended = runtime.block_on(self.serve(world, eeproms, (log, record), warnings, global, bridge));
         // Threads that wait for standard input must not hold up the end.
         runtime.shutdown_background();
         ended
@@ -170,7 +173,7 @@ impl Sim {
         &self,
         mut world: ServedWorld,
         eeproms: Option<Eeproms>,
-        log: Option<File>,
+        (log, record): (Option<File>, Option<RecordFile>),
         warnings: Speaker,
         global: &Global,
         bridge: Option<&BusSpec>,
@@ -180,7 +183,7 @@ impl Sim {
         listen_to_signals(requests.clone());
         let answers = Speaker::of_answers(warnings.clone());
         let log = log.map(|file| FrameLog::start(file, clock.unix_zero(), warnings.clone()));
-        let mut service = Service { answers: answers.clone(), warnings: warnings.clone(), log };
+        let mut service = Service { answers: answers.clone(), warnings: warnings.clone(), log, record };
         let outer = match bridge {
             Some(spec) => Some(spec.open(&clock).await.map_err(|error| bus_failure(global, &error))?),
             None => None,

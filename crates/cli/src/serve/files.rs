@@ -7,6 +7,8 @@ use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, Read};
 use std::path::Path;
 
+use testbench::recording::Kind;
+
 /// What a path names, without following a last symbolic link.
 ///
 /// # Errors
@@ -59,14 +61,28 @@ pub(crate) fn create_new(path: &Path) -> io::Result<File> {
 /// An empty file to write a log to: a new one, or one that is empty or begins as a candump log does, with `(`. Any other
 /// file is somebody's, and stays as it is.
 pub(crate) fn create_log(path: &Path) -> io::Result<File> {
+    create_or_replace(path, b"(", "candump log")
+}
+
+/// An empty file to write a record to: a new one, or one that is empty or a record already.
+pub(crate) fn create_record(path: &Path, kind: Kind) -> io::Result<File> {
+    match kind {
+        Kind::Mcap => create_or_replace(path, b"\x89MCAP0\r\n", "MCAP file"),
+        Kind::Csv => create_or_replace(path, b"t_s,", "record"),
+    }
+}
+
+/// An empty file: a new one, or one that is empty or begins with `begin`, as `what` does.
+fn create_or_replace(path: &Path, begin: &[u8], what: &str) -> io::Result<File> {
     match create_new(path) {
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
         created => return created,
     }
     let mut file = open_regular(path, OpenOptions::new().read(true).write(true))?;
-    let mut first = [0];
-    if file.read(&mut first)? == 1 && first != *b"(" {
-        let reason = "it exists and is no candump log; remove it or choose another name";
+    let mut first = Vec::new();
+    (&mut file).take(begin.len() as u64).read_to_end(&mut first)?;
+    if !first.is_empty() && first != begin {
+        let reason = format!("it exists and is no {what}; remove it or choose another name");
         return Err(io::Error::new(io::ErrorKind::AlreadyExists, reason));
     }
     file.set_len(0)?;
@@ -104,6 +120,23 @@ mod tests {
         assert!(create_log(&letter).unwrap_err().to_string().contains("no candump log"));
         assert_eq!(fs::read(&letter).unwrap(), b"Dear reader");
         assert!(create_log(&place).unwrap_err().to_string().contains("directory"));
+        fs::remove_dir_all(place).unwrap();
+    }
+
+    #[test]
+    fn a_record_replaces_a_record_of_its_kind_and_nothing_else() {
+        let place = scratch("records");
+        let (mcap, csv) = (place.join("a.mcap"), place.join("a.csv"));
+        fs::write(&mcap, b"\x89MCAP0\r\nand more").unwrap();
+        fs::write(&csv, "t_s,4.velocity_rpm,mark\n").unwrap();
+        assert!(create_record(&csv, Kind::Mcap).unwrap_err().to_string().contains("no MCAP file"));
+        for (path, kind) in [(&mcap, Kind::Mcap), (&csv, Kind::Csv)] {
+            drop(create_record(path, kind).unwrap());
+            assert_eq!(fs::read(path).unwrap(), b"");
+        }
+        fs::write(&csv, "name,price\n").unwrap();
+        assert!(create_record(&csv, Kind::Csv).unwrap_err().to_string().contains("no record"));
+        assert_eq!(fs::read(&csv).unwrap(), b"name,price\n");
         fs::remove_dir_all(place).unwrap();
     }
 

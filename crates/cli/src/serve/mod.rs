@@ -2,7 +2,6 @@
 
 pub(crate) mod eeprom;
 pub(crate) mod files;
-pub(crate) mod frame_log;
 mod input;
 pub(crate) mod keeper;
 mod lag;

@@ -8,11 +8,11 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 use transport::{ModbusRequest, WallClock};
 
-use super::frame_log::FrameLog;
 use super::input::next_line;
 use super::speaker::Speaker;
 use super::world::ServedWorld;
 use crate::failure::Failure;
+use crate::recording::{Batch, FrameLog, RecordFile};
 use crate::session::runtime;
 use crate::signals::{Signal, Signals};
 
@@ -59,6 +59,8 @@ pub(crate) struct Service {
     pub(crate) warnings: Speaker,
     /// The log, if one is asked for.
     pub(crate) log: Option<FrameLog>,
+    /// The record, if one is asked for.
+    pub(crate) record: Option<RecordFile>,
 }
 
 impl Service {
@@ -78,7 +80,7 @@ impl Service {
             Request::Registers(request) => world.serve_registers(request),
             Request::Keep => {
                 world.look_for_stores();
-                self.write_log(world);
+                self.write_records(world);
             }
             // Whatever woke the loop, answers that may go out do so before it sleeps again.
             Request::Stored => {}
@@ -99,6 +101,9 @@ impl Service {
         if let Some(log) = self.log.take() {
             log.finish(DISK_PATIENCE);
         }
+        if let Some(record) = self.record.take() {
+            record.finish(DISK_PATIENCE);
+        }
         let read = self.answers.finish(PARTING_PATIENCE) & self.warnings.finish(PARTING_PATIENCE);
         if let Err(failure) = &mut ended {
             // Where nobody reads, the reason cannot be told either, and telling it would wait for ever.
@@ -109,7 +114,7 @@ impl Service {
 
     /// Brings to the disk what has happened since the last time.
     fn finish(&mut self, world: &mut ServedWorld) -> Result<(), Failure> {
-        self.write_log(world);
+        self.write_records(world);
         match world.finish_stores(DISK_PATIENCE) {
             Some(kept) => kept.map_err(Failure::from),
             None => Err(Failure::new("the last stores are not in --state")
@@ -117,9 +122,15 @@ impl Service {
         }
     }
 
-    fn write_log(&mut self, world: &mut ServedWorld) {
+    /// Hands on what has happened since the last time.
+    fn write_records(&mut self, world: &mut ServedWorld) {
+        let frames = world.take_carried();
+        if let Some(record) = &mut self.record {
+            let recorded = world.take_recorded();
+            record.write(Batch { recorded, frames: frames.clone(), marks: Vec::new() });
+        }
         if let Some(log) = &mut self.log {
-            log.write(world.take_carried());
+            log.write(frames);
         }
     }
 }

@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use can::{Bitrate, Frame, INTERFRAME_SPACE_BITS, Instant};
 use sim::command::{Answer, Service};
+use sim::recorder::Recorder;
 use sim::wire::WireEvent;
 use sim::{StationId, World};
 use transport::{ClientId, Heard, LeaveReason, ModbusRequest, RealTimeWorld};
@@ -87,6 +88,11 @@ impl ServedWorld {
                 request.answer(answer);
             }
         }
+    }
+
+    /// What was recorded since the last call, if anything is.
+    pub(crate) fn take_recorded(&mut self) -> Option<Recorder> {
+        self.world.take_recorded()
     }
 
     /// Frames carried since the last call.

@@ -185,7 +185,9 @@ mod tests {
     /// A value of its own in each field; every third is missing.
     fn row(number: usize) -> Vec<f64> {
         let value = |column: usize| (number * 100 + column) as f64 / 7.0;
-        (0..columns().len()).map(|column| if (number + column).is_multiple_of(3) { f64::NAN } else { value(column) }).collect()
+        (0..columns().len())
+            .map(|column| if (number + column).is_multiple_of(3) { f64::NAN } else { value(column) })
+            .collect()
     }
 
     fn at(number: usize) -> Instant {

@@ -1,0 +1,91 @@
+//! Files that a thread of their own writes: a slow disk costs what is in the file, never time of the bus.
+
+use std::io;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, channel, sync_channel};
+use std::time::Duration;
+
+use crate::serve::speaker::Speaker;
+
+/// Batches that may wait for the disk: some 10 s of the bus.
+pub(super) const MAX_BATCHES: usize = 100;
+
+/// What the file is called in messages, and what it is made of.
+#[derive(Clone, Copy)]
+pub(super) struct Words {
+    /// "the log".
+    pub(super) file: &'static str,
+    /// "frames".
+    pub(super) pieces: &'static str,
+}
+
+/// See the [module](self).
+pub(super) struct Background<B> {
+    batches: SyncSender<B>,
+    /// Ends when everything is written.
+    written: Receiver<()>,
+    words: Words,
+    missing: u64,
+    speaker: Speaker,
+}
+
+impl<B: Send + 'static> Background<B> {
+    /// Hands batches to `write` until it fails or all are written, then calls `end`. What goes wrong is told to `speaker`.
+    pub(super) fn start<W: Send + 'static>(
+        words: Words,
+        writer: W,
+        write: impl Fn(&mut W, B) -> io::Result<()> + Send + 'static,
+        end: impl FnOnce(W) -> io::Result<()> + Send + 'static,
+        speaker: Speaker,
+    ) -> Self {
+        let (batches, incoming) = sync_channel(MAX_BATCHES);
+        let (done, written) = channel();
+        let told = speaker.clone();
+        std::thread::spawn(move || {
+            let mut writer = writer;
+            let all = incoming.iter().try_for_each(|batch| write(&mut writer, batch));
+            if let Err(error) = all.and_then(|()| end(writer)) {
+                // The drives are worth more than what is written about them.
+                told.say(&format!("warning: cannot write {}: {error}; it ends here", words.file));
+            }
+            drop((incoming, done));
+        });
+        Self { batches, written, words, missing: 0, speaker }
+    }
+
+    /// Takes a batch of so many pieces.
+    pub(super) fn write(&mut self, batch: B, pieces: u64) {
+        let Words { file, pieces: what } = self.words;
+        match self.batches.try_send(batch) {
+            Ok(()) if self.missing > 0 => {
+                let missing = std::mem::take(&mut self.missing);
+                self.speaker.say(&format!("warning: {file} is written again; {missing} {what} are missing in it"));
+            }
+            // When the file has ended for good, that has been said.
+            Ok(()) | Err(TrySendError::Disconnected(_)) => {}
+            Err(TrySendError::Full(_)) => {
+                if self.missing == 0 {
+                    self.speaker.say(&format!(
+                        "warning: {file} cannot be written as fast as the bus goes; {what} are left out"
+                    ));
+                }
+                self.missing += pieces;
+            }
+        }
+    }
+
+    /// How many pieces are missing since the file was last written.
+    #[cfg(test)]
+    pub(super) fn missing(&self) -> u64 {
+        self.missing
+    }
+
+    /// Waits until everything is written, at most for `patience`.
+    pub(super) fn finish(self, patience: Duration) {
+        drop(self.batches);
+        let ended = self.written.recv_timeout(patience);
+        if ended == Err(RecvTimeoutError::Timeout) || self.missing > 0 {
+            let Words { file, pieces } = self.words;
+            self.speaker.say(&format!("warning: the end of {file} is missing, and {} {pieces} before", self.missing));
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! `--record` and what goes with it.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use devices::AxisId;
+use sim::recorder::{Channel, Recorder, Signal};
+use sim::{Place, World};
+use testbench::recording::{Column, Kind, columns_of_drives, select};
+
+use super::file::RecordFile;
+use crate::failure::Failure;
+use crate::serve::files::create_record;
+use crate::serve::speaker::Speaker;
+use master::units::parse_duration;
+
+/// Sample rate and choice of signals of a record.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub(crate) struct RecordOptions {
+    /// Record what moves, is measured and happens to this file: .mcap (for Foxglove, PlotJuggler, Rerun) or .csv
+    ///
+    /// It is a new file, or an empty one, or an earlier record, which is replaced. What is older than a second is on the
+    /// disk, whatever happens to this program. `ferrodrive plot FILE` draws it.
+    #[arg(long, value_name = "FILE", value_parser = record_path)]
+    record: Option<PathBuf>,
+    /// Time between two samples, from 50us on
+    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = record_period, requires = "record")]
+    record_period: Option<Duration>,
+    /// Which signals, e.g. velocity,4.current_a,5.*; without it all of them
+    #[arg(long, value_name = "SIGNAL,..", value_delimiter = ',', requires = "record")]
+    record_signals: Vec<String>,
+}
+
+/// The shortest control period of a drive: nothing that is sampled changes faster.
+const SHORTEST: Duration = Duration::from_micros(50);
+
+fn record_period(text: &str) -> Result<Duration, String> {
+    let period = parse_duration(text).map_err(|error| error.to_string())?;
+    if period < SHORTEST { Err("a control period is 50us; nothing changes within it".into()) } else { Ok(period) }
+}
+
+fn record_path(text: &str) -> Result<PathBuf, String> {
+    match Kind::of_name(text) {
+        Some(_) => Ok(text.into()),
+        None => Err("a record is called NAME.mcap or NAME.csv; for the frames alone there is --log".into()),
+    }
+}
+
+impl RecordOptions {
+    /// The file, if one is asked for.
+    pub(crate) fn path(&self) -> Option<&Path> {
+        self.record.as_deref()
+    }
+
+    /// Begins to record the drives of `world` as asked for; `None` if it is not.
+    pub(crate) fn start(&self, world: &mut World, speaker: Speaker) -> Result<Option<RecordFile>, Failure> {
+        let Some(path) = self.path() else { return Ok(None) };
+        let mut places = Vec::new();
+        let numbers: Vec<u8> = world.drive_numbers().collect();
+        for node in numbers {
+            let axes = world.with_drive(node, |drive, _| drive.axes()).unwrap_or(0);
+            places.extend((0..axes).map(|axis| Place { node, axis: AxisId(axis) }));
+        }
+        let channels: Vec<Channel> =
+            places.iter().flat_map(|place| Signal::ALL.map(|signal| Channel { place: *place, signal })).collect();
+        let mut columns = columns_of_drives(places);
+        let mut chosen: Vec<usize> = (0..columns.len()).collect();
+        if !self.record_signals.is_empty() {
+            let names: Vec<String> = columns.iter().map(Column::name).collect();
+            chosen = select(&names, &self.record_signals)
+                .map_err(|reason| Failure::usage("cannot record what --record-signals asks for").because(reason))?;
+        }
+        let channels: Vec<Channel> = chosen.iter().map(|i| channels[*i]).collect();
+        columns = chosen.iter().map(|i| columns[*i].clone()).collect();
+        let period = self.record_period.unwrap_or(Duration::from_millis(1));
+        let file = create(path).and_then(|(kind, file)| RecordFile::start(kind, file, &columns, speaker));
+        let file = file.map_err(|error| cannot_write(path, &error))?;
+        world.start_recording(Recorder::new(period, channels));
+        Ok(Some(file))
+    }
+}
+
+/// The file of a record, to be written.
+fn create(path: &Path) -> std::io::Result<(Kind, std::fs::File)> {
+    let kind = Kind::of_name(&path.to_string_lossy()).unwrap_or(Kind::Csv);
+    create_record(path, kind).map(|file| (kind, file))
+}
+
+fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
+    Failure::new(format!("cannot write the record {}", path.display())).because(error)
+}
