@@ -1,5 +1,5 @@
 use can::{Bitrate, Instant, Station};
-use canopen::NodeId;
+use canopen::{NmtState, NodeId};
 use cia402::{ModeOfOperation, PowerState};
 use devices::AxisId;
 
@@ -54,6 +54,8 @@ pub struct Report {
     pub node_id: NodeId,
     /// Bit rate in use.
     pub bitrate: Bitrate,
+    /// NMT state.
+    pub nmt: NmtState,
     /// State of the power drive state machine.
     pub state: PowerState,
     /// Mode in effect (6061h).

@@ -3,8 +3,9 @@
 //! Units are SI, positions are the drive's own counts, speeds are those of the motor shaft in r/min.
 
 use can::{Bitrate, Instant, Station};
-use canopen::Mux;
-use devices::AxisId;
+use canopen::{Mux, NmtState};
+use cia402::{ModeOfOperation, PowerState};
+use devices::{AxisId, Description};
 use drives::RegisterError;
 
 use crate::machine::Realism;
@@ -20,6 +21,11 @@ use crate::stimulus::{Component, Power, Source, Stimulus, SwitchRange, Temperatu
 pub trait VirtualDrive: Station + VirtualDriveClone + Send {
     /// The model's name as users type it: `zlac8030l`.
     fn model(&self) -> &'static str;
+
+    /// What is known of its model: axes, faults, objects.
+    fn description(&self) -> Option<&'static Description> {
+        devices::model(self.model())
+    }
 
     /// How many axes it has: motors that its one node moves.
     fn axes(&self) -> u8 {
@@ -312,6 +318,12 @@ pub struct Report {
     pub powered: bool,
     /// Statusword; `None` without power.
     pub statusword: Option<u16>,
+    /// NMT state; `None` without power.
+    pub nmt: Option<NmtState>,
+    /// State of the power drive system, or what comes closest to it; `None` without power.
+    pub state: Option<PowerState>,
+    /// Mode in effect; `None` without power.
+    pub mode: Option<ModeOfOperation>,
     /// Code of the present fault in the drive's own numbering; 0 for none.
     pub error_code: u32,
     /// Actual position in the drive's counts.

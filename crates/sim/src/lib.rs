@@ -36,6 +36,7 @@
 mod block_on;
 pub mod command;
 mod drive;
+pub mod events;
 pub mod fault;
 pub mod json;
 pub mod machine;

@@ -9,6 +9,7 @@ mod member;
 mod step;
 mod stores;
 mod tap;
+mod watch;
 
 use core::time::Duration;
 
@@ -27,6 +28,7 @@ use due::DueTimes;
 use ledger::Ledger;
 use member::{Member, Nobody};
 use tap::Tap;
+use watch::Watch;
 
 /// A bus with everything on it.
 ///
@@ -44,6 +46,7 @@ pub struct World {
     recorder: Option<Recorder>,
     /// By station, while stores are guarded.
     ledgers: Vec<Option<Ledger>>,
+    watch: Option<Box<Watch>>,
 }
 
 /// Names one station of one world: what `add_*` returned.
@@ -88,6 +91,7 @@ impl World {
             digest: Digest::default(),
             recorder: None,
             ledgers: Vec::new(),
+            watch: None,
         }
     }
 
@@ -97,7 +101,7 @@ impl World {
             return Err(WorldError::DuplicateDrive(number));
         }
         let id = self.add(Member::Drive { number, drive }, ControllerOptions::MICROCONTROLLER);
-        self.with_drive(number, |drive, now| drive.set_power(true, now))?;
+        self.set_power(number, true)?;
         Ok(id)
     }
 

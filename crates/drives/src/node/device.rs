@@ -3,7 +3,7 @@
 use can::{Bitrate, Frame, Instant, Station};
 use canopen::node::{NodeProfile, Via};
 use canopen::od::{Dictionary, Entry, Slot, Storage};
-use canopen::{Mux, NodeId};
+use canopen::{Mux, NmtState, NodeId};
 use devices::Description;
 use devices::variant::Variant;
 
@@ -63,6 +63,11 @@ impl<S: Storage> DescribedNode<S> {
     /// Bit rate in use.
     pub const fn bitrate(&self) -> Bitrate {
         self.device.bitrate()
+    }
+
+    /// NMT state.
+    pub const fn nmt_state(&self) -> NmtState {
+        self.device.node().state()
     }
 
     /// Supplied and started.

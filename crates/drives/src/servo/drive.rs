@@ -348,6 +348,7 @@ impl<S: Storage> Firmware for ServoDrive<S> {
             powered: self.device.is_running(),
             node_id: self.device.node().node_id(),
             bitrate: self.device.bitrate(),
+            nmt: self.device.node().state(),
             state: shaft.power().state(),
             mode: shaft.power().mode(),
             fault_code: super::read(self.values(), shaft.slots().error_code, 0) as u16,

@@ -130,6 +130,7 @@ impl<const INPUTS: usize> Shell<INPUTS> {
             powered: device.is_running(),
             node_id: device.node().node_id(),
             bitrate: device.bitrate(),
+            nmt: device.node().state(),
             state: self.axis.state(),
             mode: self.axis.mode(),
             fault_code: 0,

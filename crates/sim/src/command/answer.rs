@@ -7,7 +7,6 @@ use serde::Serialize;
 
 use super::{Command, CommandError, Service, to_json};
 use crate::stimulus::{FORMS, Place};
-use crate::wire::ErrorState;
 use crate::{Brake, OutputShaft, Report, StationId, World};
 
 /// Does what `command` says; returns the line of JSON that answers it.
@@ -174,11 +173,7 @@ fn bus_text(world: &World, id: StationId, powered: bool) -> &'static str {
     if world.is_cut(id) {
         return "cut";
     }
-    match world.counters(id).state() {
-        ErrorState::ErrorActive => "error-active",
-        ErrorState::ErrorPassive => "error-passive",
-        ErrorState::BusOff => "bus-off",
-    }
+    world.counters(id).state().word()
 }
 
 fn seconds(world: &World) -> f64 {

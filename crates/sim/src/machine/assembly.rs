@@ -1,6 +1,6 @@
 //! What a machine asks of one model's hardware, and what all models answer alike: supply, load and temperatures.
 
-use devices::AxisId;
+use devices::{AxisId, Description};
 use drives::engine::axis::Demand;
 use drives::{Firmware, RegisterError};
 use plant::Rig;
@@ -55,6 +55,12 @@ pub trait Assembly: Clone + Send + 'static {
     /// The model's name as users type it, where one assembly serves several.
     fn model(&self) -> &'static str {
         Self::MODEL
+    }
+
+    /// What is known of the model.
+    fn description(firmware: &Self::Firmware, assembly: &Self) -> Option<&'static Description> {
+        let _ = firmware;
+        devices::model(assembly.model())
     }
 
     /// What the firmware finds when it wakes.

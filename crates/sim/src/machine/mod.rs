@@ -21,7 +21,7 @@ mod zlac8030l;
 mod zlim42c;
 
 use can::{Bitrate, Frame, Instant, Station};
-use devices::AxisId;
+use devices::{AxisId, Description};
 use drives::{Firmware, RegisterError};
 
 pub use assembly::Assembly;
@@ -246,6 +246,10 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
         self.assembly.model()
     }
 
+    fn description(&self) -> Option<&'static Description> {
+        A::description(&self.firmware, &self.assembly)
+    }
+
     fn axes(&self) -> u8 {
         self.assembly.axes()
     }
@@ -303,6 +307,9 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
         let common = Report {
             node: own.node_id.raw(),
             powered: self.running,
+            nmt: self.running.then_some(own.nmt),
+            state: self.running.then_some(own.state),
+            mode: self.running.then_some(own.mode),
             error_code: u32::from(own.fault_code),
             position: i64::from(own.position_counts),
             velocity_rpm: direction * shaft.velocity_rad_s * RPM_PER_RAD_S,

@@ -110,6 +110,10 @@ impl VirtualDrive for NodeMachine {
         self.firmware.description().name
     }
 
+    fn description(&self) -> Option<&'static Description> {
+        Some(self.firmware.description())
+    }
+
     fn apply(&mut self, axis: AxisId, stimulus: &Stimulus, now: Instant) -> Result<(), Refused> {
         self.check_axis(axis)?;
         match stimulus {
@@ -145,7 +149,8 @@ impl VirtualDrive for NodeMachine {
     fn report(&self) -> Report {
         let powered = self.firmware.is_running();
         let supply_v = if powered { SUPPLY_V } else { 0.0 };
-        Report { node: self.firmware.node_id().raw(), powered, supply_v, ..Report::default() }
+        let nmt = powered.then(|| self.firmware.nmt_state());
+        Report { node: self.firmware.node_id().raw(), powered, nmt, supply_v, ..Report::default() }
     }
 
     fn inputs(&self) -> &'static [&'static str] {

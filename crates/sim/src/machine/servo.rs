@@ -256,6 +256,10 @@ impl Assembly for ServoBench {
         self.name
     }
 
+    fn description(firmware: &Self::Firmware, _: &Self) -> Option<&'static Description> {
+        Some(firmware.description())
+    }
+
     fn hardware(&self) -> Hardware {
         self.hardware
     }

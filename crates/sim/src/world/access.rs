@@ -53,8 +53,11 @@ impl World {
             }
             stimulus => self.with_drive(node, |drive, now| drive.apply(axis, stimulus, now))?,
         };
-        if let (Ok(()), Some(recorder)) = (&applied, &mut self.recorder) {
-            recorder.note(self.now, place, stimulus);
+        if applied.is_ok() {
+            if let Some(recorder) = &mut self.recorder {
+                recorder.note(self.now, place, stimulus);
+            }
+            self.note_stimulus(place, stimulus);
         }
         Ok(applied)
     }
@@ -78,7 +81,8 @@ impl World {
 
     /// Switches the supply of the drive added under `number`: see [`VirtualDrive::set_power`].
     pub fn set_power(&mut self, number: u8, on: bool) -> Result<(), WorldError> {
-        self.with_drive(number, |drive, now| drive.set_power(on, now))
+        self.with_drive(number, |drive, now| drive.set_power(on, now))?;
+        self.look_at_drive(number)
     }
 
     /// Makes the drive added under `number` as it is calculated, or as one on a bench. The world's seed decides its noise.
@@ -89,7 +93,8 @@ impl World {
 
     /// Takes supply and charge from the drive added under `number`: it is dead at once.
     pub fn cut_power(&mut self, number: u8) -> Result<(), WorldError> {
-        self.with_drive(number, |drive, now| drive.cut_power(now))
+        self.with_drive(number, |drive, now| drive.cut_power(now))?;
+        self.look_at_drive(number)
     }
 
     /// The station of the drive added under `number`.
@@ -216,7 +221,16 @@ impl World {
         digest
     }
 
+    fn look_at_drive(&mut self, number: u8) -> Result<(), WorldError> {
+        let StationId(i) = self.drive_id(number).ok_or(WorldError::NoSuchDrive(number))?;
+        self.look_at(i);
+        Ok(())
+    }
+
     pub(super) fn add(&mut self, member: Member, options: ControllerOptions) -> StationId {
+        if let Some(watch) = &mut self.watch {
+            watch.get_to_know(self.members.len(), &member);
+        }
         self.members.push(member);
         self.due.push();
         StationId(self.bus.add(options))

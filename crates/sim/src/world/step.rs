@@ -78,6 +78,7 @@ impl World {
                 Role::Nothing => continue,
             }
             self.serve(i);
+            self.look_at(i);
         }
     }
 
@@ -85,6 +86,7 @@ impl World {
         while let Some((_, i)) = self.due.first().filter(|(at, _)| *at <= self.now) {
             self.members[i].station().handle_timeout(self.now);
             self.serve(i);
+            self.look_at(i);
             if self.due.first().is_some_and(|(at, first)| first == i && at <= self.now) {
                 self.due.set(i, self.now.plus_nanos(OVERDUE_RETRY_NS));
             }
@@ -115,6 +117,7 @@ impl World {
 
     pub(super) fn keep_events(&mut self) {
         while let Some(event) = self.bus.poll_event() {
+            self.note_wire(&event);
             self.log.push(event);
         }
     }

@@ -372,6 +372,7 @@ impl Firmware for MJoint {
             powered: self.device.is_running(),
             node_id: self.device.node().node_id(),
             bitrate: self.device.bitrate(),
+            nmt: self.device.node().state(),
             state: self.power_state(),
             mode: self.mode,
             fault_code: alarms::code(self.alarms.latched()),
