@@ -119,7 +119,7 @@ impl Stage {
         };
         let node = node.parse().map_err(|_| format!("{node:?} is no node"))?;
         let mut world = World::new(Bitrate::K500, 1);
-        let host = world.add_tap();
+        let host = world.add_probe();
         world.add_drive(node, Box::new(zlac8030l(node, RATE_500K))).map_err(|error| error.to_string())?;
         world.run_for(Duration::from_millis(10));
         while world.poll_received(host).is_some() {}

@@ -46,7 +46,7 @@ enum Told {
 }
 
 impl Told {
-    const fn profile(self) -> &'static Description {
+    const fn description(self) -> &'static Description {
         match self {
             Self::ByBus(profile) | Self::ByUser(profile) => profile,
         }
@@ -66,7 +66,7 @@ impl Context {
         let by_user = of_machine.chain(global.models.iter().copied()).map(|(node, model)| (node, Told::ByUser(model)));
         let by_bus = embedded.unwrap_or_default().iter().map(|(node, model)| (*node, Told::ByBus(model)));
         let models: BTreeMap<_, _> = by_bus.chain(by_user).collect();
-        network.set_models(models::with_told(models.values().map(|told| told.profile())));
+        network.set_models(models::with_told(models.values().map(|told| told.description())));
         Self { network, progress, timeout: global.timeout, models, json: global.json, embedded: embedded.is_some() }
     }
 
@@ -82,7 +82,7 @@ impl Context {
 
     /// Which model a node is as the user or the embedded bus says.
     pub(crate) fn told_model(&self, id: NodeId) -> Option<&'static Description> {
-        self.models.get(&id).map(|told| told.profile())
+        self.models.get(&id).map(|told| told.description())
     }
 
     /// What is known of a node's model: as it was told, if the node does not contradict, else as its identity and objects
@@ -107,7 +107,7 @@ impl Context {
     /// A drive of a known or guessed model, for commands that cannot do without. A guess is told to the user.
     pub(crate) async fn known_drive(&self, id: NodeId) -> Result<Drive, Failure> {
         let drive = self.drive(id).await?;
-        if drive.profile().is_some() {
+        if drive.description().is_some() {
             return Ok(drive);
         }
         Err(Failure::new(format!("the model of node {id} is not known"))

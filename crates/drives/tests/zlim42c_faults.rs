@@ -2,7 +2,7 @@
 
 use can::{CanId, Frame, Instant, Station};
 use drives::Firmware;
-use drives::engine::storage::Image;
+use drives::engine::storage::StoredImage;
 use drives::zlim42c::{Actuation, Hardware, PowerStage, Sensors, Zlim42c, objects};
 
 struct Pins {
@@ -14,7 +14,7 @@ struct Pins {
 }
 
 impl Pins {
-    fn new(eeprom: Image) -> Self {
+    fn new(eeprom: StoredImage) -> Self {
         let mut drive = Zlim42c::new();
         drive.power_on(&Hardware { eeprom, ..Hardware::default() }, Instant::ZERO);
         let (sensors, now) = (Sensors::default(), Instant::ZERO);
@@ -96,12 +96,12 @@ fn bus_over_current_is_the_mean_of_10_ms_and_flashes_five_times() {
 
 #[test]
 fn a_blank_eeprom_is_a_fault_that_factory_settings_end() {
-    let mut pins = Pins::new(Image::BLANK);
+    let mut pins = Pins::new(StoredImage::BLANK);
     assert_eq!(pins.code(), 0xFF10);
     pins.write(0x2010, 1);
     pins.run_ms(5);
     assert_eq!(pins.code(), 0);
-    let image = Image::from_bytes(pins.drive.eeprom().0);
+    let image = StoredImage::from_bytes(pins.drive.eeprom().0);
     assert_eq!(Pins::new(image).code(), 0, "the next start finds them");
 }
 

@@ -1,7 +1,7 @@
 //! Physical units as people type them, and the one place where they are converted.
 //!
 //! In: texts like `60rpm`, `90deg`, `0.5turn`, `32000`, `1.5A`, `500ms`. Out: newtypes whose name is their unit.
-//! A drive's own raw units are not known here: its profile has them. Source of the SI symbols: BIPM
+//! A drive's own raw units are not known here: its description has them. Source of the SI symbols: BIPM
 //! brochure; `r/min` and `rpm` are one unit.
 
 use core::f64::consts::TAU;

@@ -281,8 +281,8 @@ fn a_watch_that_somebody_switched_off_stays_so_unless_asked_for() {
 #[test]
 fn the_heartbeat_of_another_device_is_left_to_it() {
     let mut bench = Bench::new();
-    let tap = bench.world.add_tap();
-    bench.world.send(tap, "77F#05".parse().unwrap()).unwrap();
+    let probe = bench.world.add_probe();
+    bench.world.send(probe, "77F#05".parse().unwrap()).unwrap();
     bench.wait(10);
     let loss = bench.guard(JOINT);
     assert_eq!(loss, HostLoss::WatchesAnother { object: mux(0x1016, 1), host: node(127) });

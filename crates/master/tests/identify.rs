@@ -89,14 +89,14 @@ fn a_guess_is_good_for_moving_and_not_for_the_parameter_memory() {
         let turning = MotionOptions::default();
         block_on(&mut world, drive.velocity(Rpm(60.0), turning)).unwrap().unwrap();
         block_on(&mut world, drive.stop()).unwrap().unwrap();
-        let tap = world.add_tap();
+        let probe = world.add_probe();
         for outcome in [block_on(&mut world, drive.save()).unwrap(), block_on(&mut world, drive.restore()).unwrap()] {
             let error = outcome.unwrap_err();
             assert!(matches!(error, Error::GuessedModel { .. }), "{error}");
             assert!(error.to_string().contains("answer the same identity"), "{error}");
         }
         world.run_for(Duration::from_millis(100));
-        let mut heard = core::iter::from_fn(|| world.poll_received(tap).map(|(_, frame)| frame));
+        let mut heard = core::iter::from_fn(|| world.poll_received(probe).map(|(_, frame)| frame));
         assert!(heard.all(|frame| frame.id().as_standard() != Some(0x600 + u16::from(id))), "asked for something");
     }
 }
@@ -128,13 +128,13 @@ fn a_name_that_the_objects_speak_against_is_refused_before_anything_is_written()
     let (mut world, network) = bench();
     for (id, wrong, missing) in [(SERVO, "zlim42c", mux(0x2069, 0)), (STEPPER, "zlac8030l", mux(0x2029, 0))] {
         let drive = Drive::new(network.node(node(id)), devices::model(wrong).unwrap());
-        let tap = world.add_tap();
+        let probe = world.add_probe();
         let error = block_on(&mut world, drive.check_identity()).unwrap().unwrap_err();
         assert!(matches!(error, Error::OtherModel { object, .. } if object == missing), "{error}");
         let saved = block_on(&mut world, drive.save()).unwrap();
         assert!(matches!(saved, Err(Error::OtherModel { .. })), "{saved:?}");
         let mut requests = 0;
-        while let Some((_, frame)) = world.poll_received(tap) {
+        while let Some((_, frame)) = world.poll_received(probe) {
             if frame.id().as_standard() == Some(0x600 + u16::from(id)) {
                 requests += 1;
                 // Command specifier 40h: initiate upload.

@@ -205,7 +205,7 @@ fn a_current_is_pushed_where_the_model_has_a_torque_mode_and_refused_where_not()
     for drive in [joint, stepper] {
         let error = block_on(&mut world, drive.torque(Amperes(0.5))).unwrap().unwrap_err();
         assert!(matches!(error, Error::NoSuchMode { mode: ModeOfOperation::PROFILE_TORQUE, .. }), "{error}");
-        assert!(error.to_string().contains(drive.profile().unwrap().title), "{error}");
+        assert!(error.to_string().contains(drive.description().unwrap().title), "{error}");
     }
 }
 
@@ -355,10 +355,10 @@ fn an_alarm_that_stops_nothing_is_reset_or_explained_and_does_not_stop_the_joint
 #[test]
 fn saving_a_zlac_writes_2009h_2_and_the_same_bytes_set_250_kbit_s_on_a_zlim42_c() {
     let (mut world, _, [_, stepper, servo]) = bench();
-    let tap = world.add_tap();
+    let probe = world.add_probe();
     block_on(&mut world, servo.save()).unwrap().unwrap();
     let mut heard = Vec::new();
-    while let Some((_, frame)) = world.poll_received(tap) {
+    while let Some((_, frame)) = world.poll_received(probe) {
         heard.push(frame.to_string());
     }
     assert!(heard.contains(&"604#2B09200002000000".to_owned()), "{heard:?}");

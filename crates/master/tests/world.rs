@@ -127,7 +127,7 @@ fn a_late_answer_to_a_request_that_was_given_up_does_not_disturb_the_next_one() 
 fn sync_keeps_its_period_and_synchronous_rpdos_follow_it() {
     let (mut world, network, _) =
         world([zlac8030l(4).u32(0x1400, 1, 0x204).u8(0x1400, 2, 1).u8(0x1600, 0, 1).u32(0x1600, 1, 0x60FF_0020)]);
-    let tap = world.add_tap();
+    let probe = world.add_probe();
     let node = network.node(node(4));
     let half_ms = Duration::from_micros(500);
     let adopt = node.adopt_pdo(RPDO1, TimerUnits { inhibit: half_ms, event: half_ms });
@@ -139,7 +139,7 @@ fn sync_keeps_its_period_and_synchronous_rpdos_follow_it() {
     assert!(node.send_by_pdo(mux(0x60FF, 0), 50));
     block_on(&mut world, network.sleep(Duration::from_millis(99))).unwrap();
     let mut heard = Vec::new();
-    while let Some((at, frame)) = world.poll_received(tap) {
+    while let Some((at, frame)) = world.poll_received(probe) {
         heard.push((at, frame.to_string()));
     }
     let heard = heard.split_off(heard.iter().position(|(_, frame)| frame == "080#").unwrap());

@@ -150,12 +150,12 @@ fn a_drive_whose_supply_fails_in_the_middle_of_a_move_is_explained() {
 #[test]
 fn a_quick_stop_from_elsewhere_ends_a_move_with_an_explanation() {
     let (mut world, network, drives) = world(&[4]);
-    let tap = world.add_tap();
+    let probe = world.add_probe();
     block_on(&mut world, drives[0].move_absolute(Turns(100.0), MotionOptions { wait: false, ..slowly() }))
         .unwrap()
         .unwrap();
     block_on(&mut world, network.sleep(Duration::from_millis(500))).unwrap();
-    world.send(tap, "604#2B40600002000000".parse().unwrap()).unwrap();
+    world.send(probe, "604#2B40600002000000".parse().unwrap()).unwrap();
     world.run_for(Duration::from_millis(5));
     let error = block_on(&mut world, drives[0].supervise(Duration::from_secs(5))).unwrap().unwrap_err();
     assert!(error.to_string().contains("A quick stop came in the middle of the motion"), "{error}");

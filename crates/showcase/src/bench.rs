@@ -116,7 +116,7 @@ impl Bench {
         progress: Progress,
     ) -> Result<Self, Error> {
         let mut world = World::new(bitrate, SEED);
-        let adapter = world.add_tap();
+        let adapter = world.add_probe();
         for (model, number) in drives.iter().copied() {
             let node = NodeId::new(number).unwrap_or(NodeId::MIN);
             let drive = sim::machine::order(model, &Order::new(model, node, bitrate))?;

@@ -18,7 +18,7 @@
 //! let node = NodeId::new(4).ok_or("no such node")?;
 //! let mut world = World::new(Bitrate::K500, 1);
 //! world.add_drive(4, order(model, &Order::new(model, node, Bitrate::K500))?)?;
-//! let adapter = world.add_tap();
+//! let adapter = world.add_probe();
 //! world.run_for(Duration::from_secs(1));
 //! assert_eq!(world.poll_received(adapter).map(|(_, frame)| frame), Some("704#00".parse()?)); // boot-up
 //!

@@ -6,9 +6,9 @@ mod due;
 mod ledger;
 mod log;
 mod member;
+mod probe;
 mod step;
 mod stores;
-mod tap;
 mod watch;
 
 use core::time::Duration;
@@ -26,8 +26,8 @@ use crate::wire::{Bus, ControllerOptions};
 use crate::{Prng, VirtualDrive};
 use due::DueTimes;
 use ledger::Ledger;
-use member::{Member, Nobody};
-use tap::Tap;
+use member::{Member, Vacant};
+use probe::Probe;
 use watch::Watch;
 
 /// A bus with everything on it.
@@ -69,12 +69,12 @@ pub enum WorldError {
     /// No drive was added under this number.
     #[error("there is no drive {0}")]
     NoSuchDrive(u8),
-    /// The station is no tap.
-    #[error("station {} is no tap", .0.0)]
-    NotATap(StationId),
-    /// More frames wait at this tap than it can hold.
+    /// The station is no probe.
+    #[error("station {} is no probe", .0.0)]
+    NotAProbe(StationId),
+    /// More frames wait at this probe than it can hold.
     #[error("too many frames wait to be sent")]
-    TapFull,
+    ProbeFull,
 }
 
 impl World {
@@ -124,15 +124,15 @@ impl World {
     }
 
     /// Adds a CAN adapter that is written and read from outside: [`send`](Self::send), [`poll_received`](Self::poll_received).
-    pub fn add_tap(&mut self) -> StationId {
-        let id = self.add(Member::Tap(Tap::default()), ControllerOptions::ADAPTER);
+    pub fn add_probe(&mut self) -> StationId {
+        let id = self.add(Member::Probe(Probe::default()), ControllerOptions::ADAPTER);
         self.bus.restart(id.0, Some(self.bus.bitrate()), self.now);
         id
     }
 
     /// Takes a station off the bus for good. Its identifier is not given to another.
     pub fn remove(&mut self, id: StationId) {
-        self.members[id.0] = Member::Gone(Nobody);
+        self.members[id.0] = Member::Gone(Vacant);
         self.bus.restart(id.0, None, self.now);
         self.due.set(id.0, Instant::FAR_FUTURE);
     }
@@ -155,18 +155,18 @@ impl World {
         self.run_until(self.now + duration);
     }
 
-    /// Queues a frame at a tap.
-    pub fn send(&mut self, tap: StationId, frame: Frame) -> Result<(), WorldError> {
-        let Member::Tap(it) = &mut self.members[tap.0] else { return Err(WorldError::NotATap(tap)) };
-        it.send(frame).map_err(|_| WorldError::TapFull)?;
-        self.collect(tap.0);
+    /// Queues a frame at a probe.
+    pub fn send(&mut self, probe: StationId, frame: Frame) -> Result<(), WorldError> {
+        let Member::Probe(it) = &mut self.members[probe.0] else { return Err(WorldError::NotAProbe(probe)) };
+        it.send(frame).map_err(|_| WorldError::ProbeFull)?;
+        self.collect(probe.0);
         Ok(())
     }
 
-    /// The next frame a tap heard, with the time of its last bit. Frames it sent itself are not among them.
-    pub fn poll_received(&mut self, tap: StationId) -> Option<(Instant, Frame)> {
-        match &mut self.members[tap.0] {
-            Member::Tap(tap) => tap.poll_received(),
+    /// The next frame a probe heard, with the time of its last bit. Frames it sent itself are not among them.
+    pub fn poll_received(&mut self, probe: StationId) -> Option<(Instant, Frame)> {
+        match &mut self.members[probe.0] {
+            Member::Probe(probe) => probe.poll_received(),
             _ => None,
         }
     }

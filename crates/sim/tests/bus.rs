@@ -29,7 +29,7 @@ fn a_frame_of_eight_bytes_takes_its_exact_bits() {
     // 555#AAAAAAAAAAAAAAAA alternates from start of frame to the last data bit but for RTR, IDE and r0 (three
     // zeros): nothing to stuff. Its CRC is 111110111001110: one stuff bit. 44 + 64 + 1 bits.
     let mut world = World::new(Bitrate::K500, 1);
-    let (a, b) = (world.add_tap(), world.add_tap());
+    let (a, b) = (world.add_probe(), world.add_probe());
     world.run_until(at_ms(1));
     world.send(a, frame("555#AAAAAAAAAAAAAAAA")).unwrap();
     world.run_until(at_ms(2));
@@ -42,10 +42,10 @@ fn a_frame_of_eight_bytes_takes_its_exact_bits() {
 #[test]
 fn the_lowest_identifier_wins_and_the_next_follows_three_bits_later() {
     let mut world = World::new(Bitrate::M1, 1);
-    let taps: Vec<_> = (0..5).map(|_| world.add_tap()).collect();
+    let probes: Vec<_> = (0..5).map(|_| world.add_probe()).collect();
     world.run_until(at_ms(1));
-    for (tap, text) in taps.iter().zip(["704#05", "181#0102", "000#0104", "181#R2", "00000604#"]) {
-        world.send(*tap, frame(text)).unwrap();
+    for (probe, text) in probes.iter().zip(["704#05", "181#0102", "000#0104", "181#R2", "00000604#"]) {
+        world.send(*probe, frame(text)).unwrap();
     }
     world.run_until(at_ms(10));
     let seen = frames(&world);
@@ -59,7 +59,7 @@ fn the_lowest_identifier_wins_and_the_next_follows_three_bits_later() {
 #[test]
 fn a_frame_offered_while_the_wire_is_taken_waits_even_if_it_is_urgent() {
     let mut world = World::new(Bitrate::K500, 1);
-    let (a, b) = (world.add_tap(), world.add_tap());
+    let (a, b) = (world.add_probe(), world.add_probe());
     world.run_until(at_ms(1));
     world.send(a, frame("123#")).unwrap();
     world.run_until(Instant::from_nanos(1_010_000));
@@ -89,7 +89,7 @@ fn mailboxes_give_the_urgent_frame_first_and_an_adapter_keeps_the_order_given() 
         (ControllerOptions::ADAPTER, ["704#05", "184#01", "084#0000000000000000", "184#02"]),
     ] {
         let mut world = World::new(Bitrate::K500, 1);
-        world.add_tap();
+        world.add_probe();
         world.add_station_with(burst.clone(), options, Bitrate::K500);
         world.run_until(at_ms(5));
         assert_eq!(texts(&world), expected);
@@ -99,7 +99,7 @@ fn mailboxes_give_the_urgent_frame_first_and_an_adapter_keeps_the_order_given() 
 #[test]
 fn a_station_takes_part_after_eleven_recessive_bits() {
     let mut world = World::new(Bitrate::K500, 1);
-    let (a, _) = (world.add_tap(), world.add_tap());
+    let (a, _) = (world.add_probe(), world.add_probe());
     world.send(a, frame("123#")).unwrap();
     world.run_until(at_ms(1));
     assert_eq!(frames(&world)[0].0, bits(11));
@@ -108,7 +108,7 @@ fn a_station_takes_part_after_eleven_recessive_bits() {
 #[test]
 fn a_lone_transmitter_becomes_error_passive_and_tries_for_ever() {
     let mut world = World::new(Bitrate::K500, 1);
-    let a = world.add_tap();
+    let a = world.add_probe();
     world.run_until(at_ms(1));
     world.send(a, frame("123#")).unwrap();
     world.run_until(at_ms(200));
@@ -124,7 +124,7 @@ fn a_lone_transmitter_becomes_error_passive_and_tries_for_ever() {
     assert!(frames(&world).is_empty());
 
     // A second node at last: the frame gets through.
-    let b = world.add_tap();
+    let b = world.add_probe();
     world.run_until(at_ms(201));
     assert_eq!(heard(&mut world, b), ["123#"]);
     assert_eq!(world.counters(a).tec(), 127);
@@ -134,7 +134,7 @@ fn a_lone_transmitter_becomes_error_passive_and_tries_for_ever() {
 #[test]
 fn a_disturbed_frame_costs_an_error_frame_and_a_resend_and_is_delivered_once() {
     let mut world = World::new(Bitrate::K500, 1);
-    let (a, b) = (world.add_tap(), world.add_tap());
+    let (a, b) = (world.add_probe(), world.add_probe());
     world.run_until(at_ms(1));
     world.set_corruption(Corruption::none().and_nth_at_bit(1, 30));
     world.send(a, frame("123#")).unwrap();
@@ -160,7 +160,7 @@ const THIRTY_SECOND_ERROR: u64 = 31 * (20 + ERROR_FRAME) + 16 * 8 + 20;
 #[test]
 fn thirty_two_failures_in_a_row_lead_to_bus_off_and_1408_recessive_bits_back() {
     let mut world = World::new(Bitrate::K500, 1);
-    let (a, b) = (world.add_tap(), world.add_tap());
+    let (a, b) = (world.add_probe(), world.add_probe());
     world.run_until(at_ms(1));
     world.set_corruption(disturb(32));
     world.send(a, frame("123#")).unwrap();
@@ -183,7 +183,7 @@ fn thirty_two_failures_in_a_row_lead_to_bus_off_and_1408_recessive_bits_back() {
 #[test]
 fn thirty_one_failures_do_not() {
     let mut world = World::new(Bitrate::K500, 1);
-    let (a, b) = (world.add_tap(), world.add_tap());
+    let (a, b) = (world.add_probe(), world.add_probe());
     world.run_until(at_ms(1));
     world.set_corruption(disturb(31));
     world.send(a, frame("123#")).unwrap();
@@ -196,7 +196,7 @@ fn thirty_one_failures_do_not() {
 #[test]
 fn traffic_delays_the_return_from_bus_off() {
     let mut world = World::new(Bitrate::K500, 1);
-    let (a, b, _c) = (world.add_tap(), world.add_tap(), world.add_tap());
+    let (a, b, _c) = (world.add_probe(), world.add_probe(), world.add_probe());
     world.run_until(at_ms(1));
     world.set_corruption(disturb(32));
     world.send(a, frame("123#")).unwrap();
@@ -213,7 +213,7 @@ fn traffic_delays_the_return_from_bus_off() {
 #[test]
 fn the_same_frame_from_two_nodes_goes_through_as_one() {
     let mut world = World::new(Bitrate::K500, 1);
-    let (a, b, c) = (world.add_tap(), world.add_tap(), world.add_tap());
+    let (a, b, c) = (world.add_probe(), world.add_probe(), world.add_probe());
     world.run_until(at_ms(1));
     world.send(a, frame("123#")).unwrap();
     world.send(b, frame("123#")).unwrap();
@@ -227,7 +227,7 @@ fn one_identifier_with_two_contents_is_a_bit_error_until_both_are_passive() {
     // 555 with DLC 8 has nothing to stuff before the data, whose first bit is the 20th.
     let (dominant, recessive) = ("555#0000000000000000", "555#8000000000000000");
     let mut world = World::new(Bitrate::K500, 1);
-    let (a, b, c) = (world.add_tap(), world.add_tap(), world.add_tap());
+    let (a, b, c) = (world.add_probe(), world.add_probe(), world.add_probe());
     world.run_until(at_ms(1));
     world.send(a, frame(recessive)).unwrap();
     world.send(b, frame(dominant)).unwrap();
@@ -245,7 +245,7 @@ fn one_identifier_with_two_contents_is_a_bit_error_until_both_are_passive() {
 #[test]
 fn a_node_cut_off_goes_on_alone_and_is_back_after_joining() {
     let mut world = World::new(Bitrate::K500, 1);
-    let (a, b, c) = (world.add_tap(), world.add_tap(), world.add_tap());
+    let (a, b, c) = (world.add_probe(), world.add_probe(), world.add_probe());
     world.run_until(at_ms(1));
     world.cut(a);
     world.send(a, frame("123#")).unwrap();
@@ -265,7 +265,7 @@ fn a_node_cut_off_goes_on_alone_and_is_back_after_joining() {
 #[test]
 fn cutting_a_sender_in_mid_frame_destroys_the_frame() {
     let mut world = World::new(Bitrate::K500, 1);
-    let (a, b, c) = (world.add_tap(), world.add_tap(), world.add_tap());
+    let (a, b, c) = (world.add_probe(), world.add_probe(), world.add_probe());
     world.run_until(at_ms(1));
     world.send(a, frame("123#")).unwrap();
     world.run_until(Instant::from_nanos(1_000_000 + bits(20)));
@@ -283,7 +283,7 @@ fn cutting_a_sender_in_mid_frame_destroys_the_frame() {
 fn cutting_the_only_listener_before_the_acknowledge_slot_leaves_the_frame_unacknowledged() {
     for (bit, got_through) in [(BITS_123 - 10, false), (BITS_123 - 7, true)] {
         let mut world = World::new(Bitrate::K500, 1);
-        let (a, b) = (world.add_tap(), world.add_tap());
+        let (a, b) = (world.add_probe(), world.add_probe());
         world.run_until(at_ms(1));
         world.send(a, frame("123#")).unwrap();
         world.run_until(Instant::from_nanos(1_000_000 + bits(bit)));
@@ -297,7 +297,7 @@ fn cutting_the_only_listener_before_the_acknowledge_slot_leaves_the_frame_unackn
 #[test]
 fn a_node_at_another_bit_rate_sees_and_makes_errors_only() {
     let mut world = World::new(Bitrate::K500, 1);
-    let (a, b) = (world.add_tap(), world.add_tap());
+    let (a, b) = (world.add_probe(), world.add_probe());
     let period = std::time::Duration::from_millis(100);
     let odd = common::Chatter::new(frame("704#05"), at_ms(500), period);
     let odd = world.add_station_with(odd, ControllerOptions::MICROCONTROLLER, Bitrate::K250);
@@ -326,7 +326,7 @@ fn a_node_at_another_bit_rate_sees_and_makes_errors_only() {
 #[test]
 fn the_bus_load_is_the_share_of_time_the_wire_is_taken() {
     let mut world = World::new(Bitrate::K500, 1);
-    let (a, _) = (world.add_tap(), world.add_tap());
+    let (a, _) = (world.add_probe(), world.add_probe());
     world.run_until(at_ms(1));
     let before = world.statistics();
     for _ in 0..10 {

@@ -14,11 +14,11 @@ use sim::{StationId, World, WorldError};
 
 fn world() -> (World, StationId) {
     let mut world = World::new(Bitrate::K500, 1);
-    let tap = world.add_tap();
+    let probe = world.add_probe();
     world.add_drive(4, Box::new(TestDrive::new(4))).unwrap();
     world.add_drive(2, Box::new(TestDrive::new(2))).unwrap();
     world.run_until(Instant::from_millis(500));
-    (world, tap)
+    (world, probe)
 }
 
 fn ask(world: &mut World, line: &str) -> Value {
@@ -38,12 +38,12 @@ fn refusal(world: &mut World, line: &str) -> String {
 
 #[test]
 fn drives_boot_when_they_are_added_and_answer_on_the_bus() {
-    let (mut world, tap) = world();
+    let (mut world, probe) = world();
     assert_eq!(texts(&world), ["702#00", "704#00"]);
-    heard(&mut world, tap);
-    world.send(tap, frame("604#4041600000000000")).unwrap();
+    heard(&mut world, probe);
+    world.send(probe, frame("604#4041600000000000")).unwrap();
     world.run_for(std::time::Duration::from_millis(2));
-    assert_eq!(heard(&mut world, tap), ["584#0000000000000000"]);
+    assert_eq!(heard(&mut world, probe), ["584#0000000000000000"]);
     let twice = world.add_drive(4, Box::new(TestDrive::new(9)));
     assert_eq!(twice, Err(WorldError::DuplicateDrive(4)));
 }
@@ -161,25 +161,25 @@ fn commands_reach_the_machine_under_the_number_given_at_the_start() {
 
 #[test]
 fn power_and_cable_take_a_drive_off_the_bus() {
-    let (mut world, tap) = world();
-    heard(&mut world, tap);
+    let (mut world, probe) = world();
+    heard(&mut world, probe);
     ask(&mut world, "4 power off");
     assert_eq!(ask(&mut world, "4 get")["bus"], "off");
-    world.send(tap, frame("604#4041600000000000")).unwrap();
+    world.send(probe, frame("604#4041600000000000")).unwrap();
     world.run_for(std::time::Duration::from_millis(2));
-    assert_eq!(heard(&mut world, tap), [""; 0]);
+    assert_eq!(heard(&mut world, probe), [""; 0]);
     ask(&mut world, "4 power on");
     world.run_for(std::time::Duration::from_millis(2));
-    assert_eq!(heard(&mut world, tap), ["704#00"]);
+    assert_eq!(heard(&mut world, probe), ["704#00"]);
     ask(&mut world, "4 power cycle");
     ask(&mut world, "4 cable cut");
     world.run_for(std::time::Duration::from_millis(50));
-    assert_eq!(heard(&mut world, tap), [""; 0]);
+    assert_eq!(heard(&mut world, probe), [""; 0]);
     let got = ask(&mut world, "4 get");
     assert_eq!((&got["bus"], &got["tec"]), (&Value::from("cut"), &Value::from(128)));
     ask(&mut world, "4 cable join");
     world.run_for(std::time::Duration::from_millis(2));
-    assert_eq!(heard(&mut world, tap), ["704#00"]);
+    assert_eq!(heard(&mut world, probe), ["704#00"]);
 }
 
 #[test]

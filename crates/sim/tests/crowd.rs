@@ -32,7 +32,7 @@ fn a_hundred_and_twenty_seven_nodes_boot_at_once_in_the_order_of_their_identifie
 #[test]
 fn a_station_that_never_serves_its_deadline_does_not_stop_the_world() {
     let mut world = World::new(Bitrate::K500, 1);
-    world.add_tap();
+    world.add_probe();
     let mut stuck = Chatter::new(frame("181#"), Instant::ZERO, Duration::ZERO);
     stuck.next = Instant::from_millis(1);
     world.add_station(stuck);

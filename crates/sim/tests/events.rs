@@ -14,10 +14,10 @@ use sim::{StationId, World};
 /// A ZLAC8030L at node 4 that has booted, and an adapter.
 fn world() -> (World, StationId) {
     let mut world = World::new(Bitrate::K500, 1);
-    let tap = world.add_tap();
+    let probe = world.add_probe();
     world.watch(true);
     world.add_drive(4, Box::new(zlac8030l(4, 1))).unwrap();
-    (world, tap)
+    (world, probe)
 }
 
 fn events(world: &mut World) -> Vec<Event> {
@@ -28,9 +28,9 @@ fn kinds(world: &mut World) -> Vec<EventKind> {
     events(world).into_iter().map(|event| event.kind).collect()
 }
 
-fn send(world: &mut World, tap: StationId, frames: &[&str]) {
+fn send(world: &mut World, probe: StationId, frames: &[&str]) {
     for frame in frames {
-        world.send(tap, frame.parse().unwrap()).unwrap();
+        world.send(probe, frame.parse().unwrap()).unwrap();
         world.run_for(Duration::from_millis(5));
     }
 }
@@ -60,10 +60,10 @@ fn a_drive_that_boots_tells_of_power_nmt_state_and_the_boot_up_message() {
 
 #[test]
 fn each_step_of_the_power_state_machine_is_told_where_it_comes_from() {
-    let (mut world, tap) = world();
+    let (mut world, probe) = world();
     world.run_for(Duration::from_secs(1));
     events(&mut world);
-    send(&mut world, tap, &ENABLE);
+    send(&mut world, probe, &ENABLE);
     let steps: Vec<_> = kinds(&mut world)
         .into_iter()
         .filter_map(|kind| match kind {
@@ -78,9 +78,9 @@ fn each_step_of_the_power_state_machine_is_told_where_it_comes_from() {
 
 #[test]
 fn a_fault_is_told_with_its_remedy_and_its_emcy_and_its_end() {
-    let (mut world, tap) = world();
+    let (mut world, probe) = world();
     world.run_for(Duration::from_secs(1));
-    send(&mut world, tap, &ENABLE);
+    send(&mut world, probe, &ENABLE);
     events(&mut world);
     world.act_as(Some("test".into()));
     // "ZLAC8030L quick start guide V1.00", chapter 8: 0001h is over-voltage, and its supply is 24 to 48 V.
@@ -97,24 +97,24 @@ fn a_fault_is_told_with_its_remedy_and_its_emcy_and_its_end() {
     assert!(told.iter().any(|event| matches!(event.kind, EventKind::State { to: PowerState::Fault, .. })));
     apply(&mut world, "supply 48");
     world.run_for(Duration::from_secs(1));
-    send(&mut world, tap, &["604#2B40600080000000"]);
+    send(&mut world, probe, &["604#2B40600080000000"]);
     assert!(kinds(&mut world).iter().any(|kind| matches!(kind, EventKind::FaultReset { code: 1, .. })));
 }
 
 #[test]
 fn arriving_storing_and_dying_are_told() {
-    let (mut world, tap) = world();
+    let (mut world, probe) = world();
     world.run_for(Duration::from_secs(1));
     // Profile velocity, 60 r/min.
-    send(&mut world, tap, &["604#2F60600003000000"]);
-    send(&mut world, tap, &ENABLE);
-    send(&mut world, tap, &["604#23FF60003C000000"]);
+    send(&mut world, probe, &["604#2F60600003000000"]);
+    send(&mut world, probe, &ENABLE);
+    send(&mut world, probe, &["604#23FF60003C000000"]);
     events(&mut world);
     world.run_for(Duration::from_secs(2));
     let told = events(&mut world);
     // Held by a controller the speed leaves the window now and then; each return is an arrival.
     assert!(told.iter().any(|event| event.kind == EventKind::TargetReached), "{told:?}");
-    send(&mut world, tap, &["604#2B002000BC020000"]);
+    send(&mut world, probe, &["604#2B002000BC020000"]);
     world.run_for(Duration::from_millis(500));
     let told = kinds(&mut world);
     let begun = told.iter().position(|kind| *kind == EventKind::StoreBegun);
@@ -170,13 +170,13 @@ fn bus_off_and_the_way_back_are_told() {
 fn a_watched_run_is_the_same_run() {
     let digest = |watched: bool| {
         let mut world = World::new(Bitrate::K500, 7);
-        let tap = world.add_tap();
+        let probe = world.add_probe();
         world.watch(watched);
         world.add_drive(4, Box::new(zlac8030l(4, 1))).unwrap();
         world.run_for(Duration::from_secs(1));
-        send(&mut world, tap, &["604#2F60600003000000"]);
-        send(&mut world, tap, &ENABLE);
-        send(&mut world, tap, &["604#23FF60003C000000"]);
+        send(&mut world, probe, &["604#2F60600003000000"]);
+        send(&mut world, probe, &ENABLE);
+        send(&mut world, probe, &["604#23FF60003C000000"]);
         apply(&mut world, "load torque 1");
         world.run_for(Duration::from_millis(777));
         let many = events(&mut world).len();

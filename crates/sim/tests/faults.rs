@@ -17,7 +17,7 @@ fn at_ms(millis: u64) -> Instant {
 #[test]
 fn a_silent_node_sends_nothing_acknowledges_nothing_and_hears() {
     let mut world = World::new(Bitrate::K500, 1);
-    let (a, b) = (world.add_tap(), world.add_tap());
+    let (a, b) = (world.add_probe(), world.add_probe());
     world.run_until(at_ms(1));
     world.set_node_faults(b, NodeFaults { silent: true, ..NodeFaults::default() });
     world.send(b, frame("704#05")).unwrap();
@@ -26,7 +26,7 @@ fn a_silent_node_sends_nothing_acknowledges_nothing_and_hears() {
     world.send(a, frame("123#")).unwrap();
     world.run_until(at_ms(50));
     assert_eq!(world.counters(a).state(), ErrorState::ErrorPassive, "nobody acknowledges");
-    let c = world.add_tap();
+    let c = world.add_probe();
     world.run_until(at_ms(51));
     assert_eq!(heard(&mut world, b), ["123#"]);
     world.set_node_faults(b, NodeFaults::default());
@@ -37,7 +37,7 @@ fn a_silent_node_sends_nothing_acknowledges_nothing_and_hears() {
 #[test]
 fn a_late_node_answers_late_and_in_order() {
     let mut world = World::new(Bitrate::K500, 1);
-    let (a, b) = (world.add_tap(), world.add_tap());
+    let (a, b) = (world.add_probe(), world.add_probe());
     world.run_until(at_ms(1));
     let late = Some(Delay::fixed(5_000_000));
     world.set_node_faults(a, NodeFaults { late, ..NodeFaults::default() });
@@ -62,7 +62,7 @@ fn a_late_node_answers_late_and_in_order() {
 #[test]
 fn a_babbling_node_starves_the_less_urgent_and_not_the_more_urgent() {
     let mut world = World::new(Bitrate::K500, 1);
-    let (a, b, c) = (world.add_tap(), world.add_tap(), world.add_tap());
+    let (a, b, c) = (world.add_probe(), world.add_probe(), world.add_probe());
     world.run_until(at_ms(1));
     let babble = Some(Babble { frame: frame("100#"), gap_ns: 0 });
     world.set_node_faults(a, NodeFaults { babble, ..NodeFaults::default() });
@@ -82,7 +82,7 @@ fn a_babbling_node_starves_the_less_urgent_and_not_the_more_urgent() {
 #[test]
 fn a_slow_receiver_loses_what_its_buffer_cannot_hold() {
     let mut world = World::new(Bitrate::M1, 1);
-    let (a, b) = (world.add_tap(), world.add_tap());
+    let (a, b) = (world.add_probe(), world.add_probe());
     world.run_until(at_ms(1));
     let overrun = Some(Overrun { depth: 3, service_ns: 10_000_000 });
     world.set_node_faults(b, NodeFaults { overrun, ..NodeFaults::default() });
@@ -175,7 +175,7 @@ fn about_the_asked_share_of_frames_is_disturbed_and_none_is_lost() {
 #[test]
 fn a_bad_contact_drives_its_own_node_off_the_bus_and_mended_it_comes_back() {
     let mut world = World::new(Bitrate::K500, 1);
-    let (a, b) = (world.add_tap(), world.add_tap());
+    let (a, b) = (world.add_probe(), world.add_probe());
     world.run_until(at_ms(1));
     world.set_node_faults(a, NodeFaults { corrupt: 1.0, ..NodeFaults::default() });
     world.send(a, frame("704#05")).unwrap();
@@ -202,7 +202,7 @@ fn a_bad_contact_drives_its_own_node_off_the_bus_and_mended_it_comes_back() {
 fn faults_of_the_bus_are_world_commands_too() {
     let mut world = World::new(Bitrate::K500, 1);
     let id = world.add_drive(4, Box::new(sim::machine::zlac8030l(4, 1))).unwrap();
-    world.add_tap(); // somebody has to acknowledge
+    world.add_probe(); // somebody has to acknowledge
     let mut say = |line: &str| {
         let answer = sim::command::answer(&mut world, line).unwrap().json;
         assert!(answer.starts_with("{\"ok\":true"), "{line}: {answer}");

@@ -9,32 +9,32 @@ use common::frames;
 use sim::fault::{Babble, Corruption, Delay, NodeFaults};
 use sim::{Prng, StationId, World};
 
-const TAPS: usize = 6;
+const PROBES: usize = 6;
 const BIT_NS: u64 = 2_000;
 
 /// Frames carry their sender and a running number.
-fn numbered(tap: usize, number: u64, prng: &mut Prng) -> Frame {
-    let id = CanId::standard((0x100 * (1 + prng.below(6)) + tap as u64) as u16);
+fn numbered(probe: usize, number: u64, prng: &mut Prng) -> Frame {
+    let id = CanId::standard((0x100 * (1 + prng.below(6)) + probe as u64) as u16);
     let mut data = number.to_be_bytes();
-    data[0] = tap as u8;
+    data[0] = probe as u8;
     Frame::full(id, data)
 }
 
-fn disturb_something(world: &mut World, taps: &[StationId], prng: &mut Prng) {
-    let tap = taps[prng.below(taps.len() as u64) as usize];
+fn disturb_something(world: &mut World, probes: &[StationId], prng: &mut Prng) {
+    let probe = probes[prng.below(probes.len() as u64) as usize];
     match prng.below(7) {
-        0 => world.cut(tap),
-        1 | 2 => taps.iter().for_each(|tap| world.join(*tap)),
+        0 => world.cut(probe),
+        1 | 2 => probes.iter().for_each(|probe| world.join(*probe)),
         3 => world.set_corruption(Corruption::with_probability(prng.below(4) as f64 * 0.1)),
         4 => {
             let late = Some(Delay { min_ns: 0, max_ns: prng.below(3_000_000) });
-            world.set_node_faults(tap, NodeFaults { late, ..NodeFaults::default() });
+            world.set_node_faults(probe, NodeFaults { late, ..NodeFaults::default() });
         }
         5 => {
             let babble = Some(Babble { frame: Frame::new(CanId::standard(0x7FF), &[]), gap_ns: prng.below(500_000) });
-            world.set_node_faults(tap, NodeFaults { babble, ..NodeFaults::default() });
+            world.set_node_faults(probe, NodeFaults { babble, ..NodeFaults::default() });
         }
-        _ => world.set_node_faults(tap, NodeFaults { silent: prng.below(2) == 0, ..NodeFaults::default() }),
+        _ => world.set_node_faults(probe, NodeFaults { silent: prng.below(2) == 0, ..NodeFaults::default() }),
     }
 }
 
@@ -56,22 +56,22 @@ fn in_any_turmoil_each_frame_gets_through_once() {
         let mut prng = Prng::new(seed);
         let mut world = World::new(Bitrate::K500, seed);
         world.log_mut().set_limit(usize::MAX);
-        let taps: Vec<StationId> = (0..TAPS).map(|_| world.add_tap()).collect();
+        let probes: Vec<StationId> = (0..PROBES).map(|_| world.add_probe()).collect();
         let mut sent = Vec::new();
         for number in 0..300 {
-            let tap = prng.below(TAPS as u64) as usize;
-            let frame = numbered(tap, number, &mut prng);
-            world.send(taps[tap], frame).unwrap();
+            let probe = prng.below(PROBES as u64) as usize;
+            let frame = numbered(probe, number, &mut prng);
+            world.send(probes[probe], frame).unwrap();
             sent.push(frame.to_string());
             if prng.below(10) == 0 {
-                disturb_something(&mut world, &taps, &mut prng);
+                disturb_something(&mut world, &probes, &mut prng);
             }
             world.run_for(Duration::from_nanos(prng.below(600_000)));
         }
         world.set_corruption(Corruption::none());
-        for tap in &taps {
-            world.join(*tap);
-            world.set_node_faults(*tap, NodeFaults::default());
+        for probe in &probes {
+            world.join(*probe);
+            world.set_node_faults(*probe, NodeFaults::default());
         }
         world.run_for(Duration::from_secs(2));
         laws_of_the_wire_hold(&world, seed);
@@ -87,12 +87,12 @@ fn a_world_resumed_in_the_middle_of_a_frame_ends_the_same() {
     for seed in 0..20 {
         let mut prng = Prng::new(seed);
         let mut world = World::new(Bitrate::K500, seed);
-        let taps: Vec<StationId> = (0..TAPS).map(|_| world.add_tap()).collect();
+        let probes: Vec<StationId> = (0..PROBES).map(|_| world.add_probe()).collect();
         world.set_corruption(Corruption::with_probability(0.2));
         world.run_until(Instant::from_millis(1));
         for number in 0..50 {
-            let tap = prng.below(TAPS as u64) as usize;
-            world.send(taps[tap], numbered(tap, number, &mut prng)).unwrap();
+            let probe = prng.below(PROBES as u64) as usize;
+            world.send(probes[probe], numbered(probe, number, &mut prng)).unwrap();
         }
         world.run_for(Duration::from_micros(prng.below(5_000)));
         let mut resumed = world.snapshot();

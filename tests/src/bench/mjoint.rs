@@ -3,7 +3,7 @@
 use std::sync::LazyLock;
 
 use can::Bitrate;
-use drives::engine::storage::Image;
+use drives::engine::storage::StoredImage;
 use drives::mjoint::variations::VARIANT;
 use drives::mjoint::{Model, storage};
 use sim::VirtualDrive;
@@ -61,7 +61,7 @@ impl Bench {
     pub fn open_as(key: &str, choice: &str) -> Self {
         let mut variant = VARIANT;
         variant.choose(key, choice).expect("a reading of the joint");
-        let (model, image) = (&Model::M4230E17B50, Image::of(&storage::addressed(&variant, MJoint::NODE)));
+        let (model, image) = (&Model::M4230E17B50, StoredImage::of(&storage::addressed(&variant, MJoint::NODE)));
         let firmware = drives::mjoint::MJoint::of(model, variant);
         Self::open_with(Machine::new(firmware, Joint::new(model, image, MJoint::BITRATE)))
     }

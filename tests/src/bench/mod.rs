@@ -115,7 +115,7 @@ impl<S: Subject> Bench<S> {
     #[must_use]
     pub fn with(drives: Vec<Box<dyn VirtualDrive>>) -> Self {
         let mut world = World::new(S::BITRATE, 1);
-        let host = world.add_tap();
+        let host = world.add_probe();
         let stations: Vec<_> = (S::NODE..)
             .zip(drives)
             .map(|(number, drive)| world.add_drive(number, drive).expect("a free number"))
@@ -151,7 +151,7 @@ impl<S: Subject> Bench<S> {
     #[must_use]
     pub fn open_with(mut machine: S::Machine) -> Self {
         let mut world = World::new(S::BITRATE, 1);
-        let host = world.add_tap();
+        let host = world.add_probe();
         machine.set_power(true, world.now());
         let drive = world.add_station(machine);
         Self::booted(world, host, drive, true)

@@ -3,7 +3,7 @@
 use can::{Bitrate, CanId, Frame, Instant};
 use canopen::od::{Slot, Table};
 use canopen::sdo::wire::Reply;
-use drives::engine::storage::{BANK_SIZE, IMAGE_SIZE, Image};
+use drives::engine::storage::{BANK_SIZE, IMAGE_SIZE, StoredImage};
 use drives::{Firmware, mjoint, zlac8030l, zlim42c};
 
 /// A selector (the drive in its low digits, what the image is above), then bytes for the damage.
@@ -36,7 +36,7 @@ pub(super) fn eeprom(data: &[u8]) {
     }
 }
 
-fn image(selector: u8, damage: &[u8]) -> Image {
+fn image(selector: u8, damage: &[u8]) -> StoredImage {
     let factory = |drive: u8| match drive & 3 {
         0 => zlac8030l::hardware::Hardware::default().eeprom,
         1 => zlim42c::hardware::Hardware::default().eeprom,
@@ -55,11 +55,11 @@ fn image(selector: u8, damage: &[u8]) -> Image {
         1 => {
             let length = damage.iter().fold(0, |length, byte| length << 8 | usize::from(*byte)) % (2 * IMAGE_SIZE);
             let file: Vec<u8> = image.0.iter().chain(&image.0).take(length).copied().collect();
-            image = Image::from_bytes(&file);
+            image = StoredImage::from_bytes(&file);
         }
         // Anything.
         2 => {
-            image = Image::from_bytes(
+            image = StoredImage::from_bytes(
                 &damage.iter().cycle().take(IMAGE_SIZE * damage.len().min(1)).copied().collect::<Vec<u8>>(),
             )
         }

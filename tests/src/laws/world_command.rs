@@ -50,7 +50,7 @@ pub(super) fn world_command(data: &[u8]) {
 /// The three drives, each told to turn.
 fn world() -> (World, StationId) {
     let mut world = World::new(Bitrate::K500, 1);
-    let host = world.add_tap();
+    let host = world.add_probe();
     let added = [
         world.add_drive(4, Box::new(zlac8030l(4, 1))),
         world.add_drive(2, Box::new(zlim42c(2, 1))),

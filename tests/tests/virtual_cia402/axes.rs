@@ -121,7 +121,7 @@ fn world() -> World {
     let model = by_offset();
     let order = Order::new(model, NodeId::new(5).unwrap(), Bitrate::M1);
     let mut world = World::new(Bitrate::M1, 1);
-    world.add_tap();
+    world.add_probe();
     world.add_drive(5, order_machine(model, &order).unwrap()).unwrap();
     world.run_for(Duration::from_millis(300));
     world
@@ -171,7 +171,7 @@ fn the_objects_of_a_node_that_is_no_drive_are_the_outer_worlds() {
     let model = leak(Description { name: "inputs", dictionary: table(ROWS.to_vec()), axes: &[], ..CIA402 });
     let order = Order::new(model, NodeId::new(9).unwrap(), Bitrate::M1);
     let mut world = World::new(Bitrate::M1, 1);
-    let host = world.add_tap();
+    let host = world.add_probe();
     world.add_drive(9, order_machine(model, &order).unwrap()).unwrap();
     world.run_for(Duration::from_millis(300));
     for line in ["9 set 6000:01 FFh", "9 set 6401:01 -2"] {

@@ -73,7 +73,7 @@ struct Run {
 impl Run {
     fn new(seed: u64) -> Self {
         let mut world = World::new(Bitrate::K500, seed);
-        let host = world.add_tap();
+        let host = world.add_probe();
         for node in [4, 5] {
             world.add_drive(node, Box::new(zlac8030l(node, RATE_500K))).expect("another drive");
         }

@@ -21,7 +21,7 @@ struct Pair {
 impl Pair {
     fn new() -> Self {
         let mut world = World::new(Bitrate::K500, 3);
-        let host = world.add_tap();
+        let host = world.add_probe();
         for node in [2, 5] {
             world.add_drive(node, Box::new(zlac8030l(node, RATE_500K))).expect("another drive");
         }
@@ -140,7 +140,7 @@ fn a_new_bit_rate_acts_after_a_restart_and_then_only_its_own_bus_hears_the_drive
     let mut machine = zlac8030l(NODE, RATE_500K);
     machine.load_nvm(&memory).expect("its own memory");
     let mut world = World::new(Bitrate::K250, 1);
-    let host = world.add_tap();
+    let host = world.add_probe();
     world.add_drive(NODE, Box::new(machine)).expect("the first drive");
     world.run_for(Duration::from_millis(20));
     assert_eq!(world.poll_received(host).map(|(_, frame)| frame.to_string()).as_deref(), Some("704#00"));
@@ -152,7 +152,7 @@ fn every_bit_rate_of_200eh_is_the_one_that_the_manual_lists() {
     for (value, bit_s) in listed {
         let bitrate = Bitrate::new(bit_s).expect("a bit rate");
         let mut world = World::new(bitrate, 1);
-        let host = world.add_tap();
+        let host = world.add_probe();
         world.add_drive(NODE, Box::new(zlac8030l(NODE, value))).expect("the first drive");
         world.run_for(Duration::from_millis(20));
         assert!(world.poll_received(host).is_some(), "200Eh = {value} at {bit_s} bit/s");
@@ -176,7 +176,7 @@ fn a_new_node_id_acts_after_a_restart_and_moves_every_identifier_with_it() {
 #[test]
 fn the_dip_switch_goes_before_200dh() {
     let mut world = World::new(Bitrate::K500, 1);
-    let host = world.add_tap();
+    let host = world.add_probe();
     world.add_drive(3, Box::new(zlac8030l(3, RATE_500K))).expect("the first drive");
     world.run_for(Duration::from_millis(10));
     let frames = ["603#400D200000000000", "603#2B0D200009000000"].map(|frame| frame.parse().expect("a frame"));

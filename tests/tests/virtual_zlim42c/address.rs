@@ -10,7 +10,7 @@ use crate::bench::{Bench, RATE_500K};
 /// The boot-up message of a machine on a bus of 500 kbit/s, if it can be heard.
 fn boots_as(machine: Zlim42cMachine) -> Option<String> {
     let mut world = World::new(Bitrate::K500, 1);
-    let host = world.add_tap();
+    let host = world.add_probe();
     world.add_drive(99, Box::new(machine)).expect("room");
     world.run_for(std::time::Duration::from_millis(10));
     world.poll_received(host).map(|(_, frame)| frame.to_string())
@@ -42,7 +42,7 @@ fn another_node_number_takes_effect_with_the_next_start_unless_the_switches_deci
     machine.reads(0x2000, 1).reads(0x2008, 42);
 
     let mut world = World::new(Bitrate::K500, 1);
-    let host = world.add_tap();
+    let host = world.add_probe();
     world.add_drive(32, Box::new(zlim42c(32, RATE_500K))).expect("room");
     world.run_for(std::time::Duration::from_millis(10));
     world.send(host, "620#2B08200021000000".parse().expect("a frame")).expect("room");

@@ -252,8 +252,8 @@ impl<S: Storage> Node<S> {
         match self.state.handle(command) {
             Transition::None => {}
             Transition::Enter(state) => self.enter(state),
-            Transition::ResetNode => self.go_down(NodeEvent::ResetNode),
-            Transition::ResetCommunication => self.go_down(NodeEvent::ResetCommunication),
+            Transition::ResetNode => self.begin_reset(NodeEvent::ResetNode),
+            Transition::ResetCommunication => self.begin_reset(NodeEvent::ResetCommunication),
         }
     }
 
@@ -278,7 +278,7 @@ impl<S: Storage> Node<S> {
     }
 
     /// Waits for the owner to boot again; what it was about to tell is void.
-    fn go_down(&mut self, request: NodeEvent) {
+    fn begin_reset(&mut self, request: NodeEvent) {
         self.power_off();
         self.push(request);
     }

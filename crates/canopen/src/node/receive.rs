@@ -60,7 +60,7 @@ impl<S: Storage> Node<S> {
             Refusal::Abort(code) => self.sdo.finish(write, Err(code)),
             Refusal::Ask => {
                 self.ticket = Ticket(self.ticket.0.wrapping_add(1));
-                self.sdo.hold(write, self.now);
+                self.sdo.defer(write, self.now);
                 let raw = self.asked_raw().unwrap_or(write.raw);
                 self.push(NodeEvent::Asked { slot: write.slot, raw, ticket: self.ticket });
             }
@@ -76,7 +76,7 @@ impl<S: Storage> Node<S> {
         if ticket != self.ticket {
             return false;
         }
-        let Some(write) = self.sdo.take_held() else { return false };
+        let Some(write) = self.sdo.take_deferred() else { return false };
         if verdict.is_ok() {
             self.commit(write.slot, write.raw);
         }
@@ -88,7 +88,7 @@ impl<S: Storage> Node<S> {
 
     /// What is asked about.
     fn asked_raw(&self) -> Option<u32> {
-        let write = self.sdo.held()?;
+        let write = self.sdo.deferred()?;
         Some(if write.facts.summary.is_long() {
             write.raw
         } else {
@@ -98,7 +98,7 @@ impl<S: Storage> Node<S> {
 
     /// Of a value longer than a cell, the bytes that [`NodeEvent::Asked`] asks about; none when nothing is asked.
     pub fn asked_bytes(&self) -> &[u8] {
-        let length = self.sdo.held().map_or(0, |write| write.raw as usize);
+        let length = self.sdo.deferred().map_or(0, |write| write.raw as usize);
         self.dictionary.view().staged(length)
     }
 

@@ -1,7 +1,7 @@
 //! The SDO server of a device: expedited and segmented transfer (CiA 301, 7.2.4).
 //!
 //! A frame goes in with the values; out come a reply, or for a complete download the entry to write, which the owner
-//! checks, stores and reports back with [`Server::finish`], at once or later ([`Server::hold`]). A value longer than a cell
+//! checks, stores and reports back with [`Server::finish`], at once or later ([`Server::defer`]). A value longer than a cell
 //! waits in the dictionary until all of it has come, and an upload reads from a copy: a transfer that ends half way changes
 //! nothing, and one that takes its time gives the value of its first frame. One transfer at a time: a new request replaces
 //! an unfinished one. Block transfer is answered with 0504 0001h.
@@ -70,7 +70,7 @@ enum Transfer {
         toggle: bool,
     },
     /// The owner has not decided yet.
-    Held(Write),
+    Deferred(Write),
 }
 
 /// What an upload sends.
@@ -148,25 +148,25 @@ impl Server {
         );
     }
 
-    /// The owner decides later: [`take_held`](Self::take_held), then [`finish`](Self::finish). A new request, the client's
+    /// The owner decides later: [`take_deferred`](Self::take_deferred), then [`finish`](Self::finish). A new request, the client's
     /// abort and the timeout end it before.
     #[cold]
-    pub fn hold(&mut self, write: Write, now: Instant) {
-        self.transfer = Transfer::Held(write);
+    pub fn defer(&mut self, write: Write, now: Instant) {
+        self.transfer = Transfer::Deferred(write);
         self.restart_timeout(now);
     }
 
     /// Takes the download on which the owner decides now; `None` if it has ended meanwhile.
-    pub fn take_held(&mut self) -> Option<Write> {
-        let Transfer::Held(write) = self.transfer else { return None };
+    pub fn take_deferred(&mut self) -> Option<Write> {
+        let Transfer::Deferred(write) = self.transfer else { return None };
         self.end();
         Some(write)
     }
 
     /// The download on which the owner has to decide.
-    pub const fn held(&self) -> Option<&Write> {
+    pub const fn deferred(&self) -> Option<&Write> {
         match &self.transfer {
-            Transfer::Held(write) => Some(write),
+            Transfer::Deferred(write) => Some(write),
             _ => None,
         }
     }
@@ -441,7 +441,7 @@ impl Server {
         match &self.transfer {
             Transfer::None => None,
             Transfer::Upload { mux, .. } | Transfer::Download { mux, .. } => Some(*mux),
-            Transfer::Held(write) => Some(write.mux),
+            Transfer::Deferred(write) => Some(write.mux),
         }
     }
 }

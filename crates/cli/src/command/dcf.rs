@@ -115,7 +115,8 @@ impl Dcf {
             Some(path) => (source::document(path)?, None),
             None => {
                 let drive = context.known_drive(self.node).await?;
-                let model = drive.profile().ok_or_else(|| Failure::new("the model is not known").at_node(self.node))?;
+                let model =
+                    drive.description().ok_or_else(|| Failure::new("the model is not known").at_node(self.node))?;
                 let sheet = Document::parse(write(&Sheet::of(model).eds()).as_bytes());
                 (sheet.map_err(|refusal| Failure::new(refusal.to_string()))?, Some(model))
             }

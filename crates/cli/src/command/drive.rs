@@ -162,7 +162,7 @@ impl StateReport {
         let faults = state.faults.iter().map(|row| FaultReport { code: row.code, name: row.name, remedy: row.remedy });
         Ok(Self {
             node: drive.node().id().raw(),
-            model: drive.profile().filter(|_| drive.guess().is_none()).map(|profile| profile.name),
+            model: drive.description().filter(|_| drive.guess().is_none()).map(|profile| profile.name),
             guess: guessed(drive),
             state: state.power.map_or("no state of CiA 402", |power| power.name()),
             mode: state.mode.map(|mode| mode.0),

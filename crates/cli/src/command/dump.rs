@@ -106,7 +106,7 @@ impl Dump {
         }
         world.log_mut().set_limit(usize::MAX);
         // Somebody has to acknowledge what a single drive sends.
-        world.add_tap();
+        world.add_probe();
         world.run_for(self.duration.unwrap_or(EMBEDDED_DURATION));
         while let Some(event) = world.log_mut().pull() {
             if let WireEvent::Frame { end, frame, .. } = event {

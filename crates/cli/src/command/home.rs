@@ -45,7 +45,7 @@ impl Home {
     /// Homes; refuses for drives without homing, with the reason.
     pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
         let drive = context.known_drive(self.node).await?;
-        if let Some(model) = drive.profile()
+        if let Some(model) = drive.description()
             && let Some(axis) = model.first_axis().filter(|axis| axis.homing.is_none())
         {
             return Err(self.refusal(model, axis));

@@ -250,7 +250,7 @@ pub(super) async fn outcome(
         drive.stop().await?;
     }
     let state = StateReport::read(drive).await?;
-    let from_file = drive.profile().is_some_and(is_from_file);
+    let from_file = drive.description().is_some_and(is_from_file);
     let units =
         from_file.then(|| "the data sheet does not say what a count is worth: CiA 402's units are assumed".to_owned());
     let (guard, farewell) = guard.end(context, drive, then == Then::GoesOn).await?;

@@ -76,7 +76,7 @@ impl Node {
             node: found.node.raw(),
             model: model.map(|model| model.name),
             models: found.models.iter().map(|model| model.name).collect(),
-            guess: guess.filter(|_| evidence.is_some()).map(|guess| guess.profile().name),
+            guess: guess.filter(|_| evidence.is_some()).map(|guess| guess.description().name),
             evidence: evidence.map(|mux| mux.to_string()),
             // A boot-up message says only that the node has just left the state it names.
             nmt_state: found.nmt_state.filter(|state| *state != NmtState::Initialising).map(|state| state.to_string()),
@@ -113,7 +113,7 @@ fn contradiction(told: &'static Description, found: &Found) -> Option<String> {
     let evidence = guess.evidence().filter(|_| guess.fitting().all(|model| model.name != told.name))?;
     // A data sheet that has the object too is not spoken against.
     let evidence = told.row(evidence).is_none().then_some(evidence)?;
-    let fitting = guess.profile().name;
+    let fitting = guess.description().name;
     Some(format!("{said}, but has {evidence} as a {fitting} has: say the right model"))
 }
 

@@ -79,7 +79,7 @@ impl Read {
             Some(payload) => payload,
             None => drive.node().upload(mux).await?,
         };
-        let row = if drive.profile().is_some() { row } else { common_row(mux) };
+        let row = if drive.description().is_some() { row } else { common_row(mux) };
         let limits = moving_limits(&drive, row).await?;
         Ok(ObjectReport::new(&drive, mux, row, payload.as_bytes(), limits.as_ref(), false))
     }
@@ -111,7 +111,7 @@ impl Write {
 
 /// What the object takes now, where other objects have a say in it.
 async fn moving_limits(drive: &Drive, row: Option<&Entry>) -> Result<Option<Limits>, Failure> {
-    match row.filter(|row| drive.profile().is_some() && (row.resolution.is_some() || row.held_to.is_some())) {
+    match row.filter(|row| drive.description().is_some() && (row.resolution.is_some() || row.held_to.is_some())) {
         Some(row) => Ok(Some(drive.limits(row.mux()).await?)),
         None => Ok(None),
     }
@@ -123,7 +123,7 @@ fn counts_per_unit(limits: Option<&Limits>) -> i64 {
 
 /// What to know about a value that the drive has taken.
 fn note(drive: &Drive, mux: Mux, number: i64, limits: Option<&Limits>) -> Option<String> {
-    let storage = drive.profile().map(|profile| profile.storage);
+    let storage = drive.description().map(|profile| profile.storage);
     if storage.is_some_and(|storage| storage.effective_after_restart.contains(&mux)) {
         let node = drive.node().id();
         return Some(format!("it takes effect at the next restart, if it is stored by then: ferrodrive save {node}"));
@@ -152,7 +152,7 @@ async fn with_limits(drive: &Drive, error: Error, number: i64) -> Failure {
 
 /// The multiplexor, and the row if the node's model is known and has it.
 fn resolve(drive: &Drive, object: &ObjectArg) -> Result<(Mux, Option<&'static Entry>), Failure> {
-    let found = object.resolve(drive.profile().map(|model| model.dictionary));
+    let found = object.resolve(drive.description().map(|model| model.dictionary));
     found.map_err(|reason| Failure::usage(reason).at_node(drive.node().id()))
 }
 
@@ -165,13 +165,13 @@ impl ObjectReport {
         limits: Option<&Limits>,
         written: bool,
     ) -> Self {
-        let unknown = row.is_none() && drive.profile().is_none();
+        let unknown = row.is_none() && drive.description().is_none();
         let data_type = common_type(mux, bytes.len()).filter(|_| unknown);
-        let value = decode(drive.profile(), row, bytes).typed(data_type);
+        let value = decode(drive.description(), row, bytes).typed(data_type);
         Self {
             node: drive.node().id().raw(),
             object: mux.to_string(),
-            name: row.map(|row| row.name).or_else(|| common_name(mux).filter(|_| drive.profile().is_none())),
+            name: row.map(|row| row.name).or_else(|| common_name(mux).filter(|_| drive.description().is_none())),
             guess: guessed(drive),
             value: value.at_resolution(counts_per_unit(limits)),
             note: None,
@@ -182,7 +182,7 @@ impl ObjectReport {
 
 /// The model that a drive is taken for on the evidence of its objects.
 pub(super) fn guessed(drive: &Drive) -> Option<&'static str> {
-    drive.guess().filter(|guess| guess.evidence().is_some()).map(|guess| guess.profile().name)
+    drive.guess().filter(|guess| guess.evidence().is_some()).map(|guess| guess.description().name)
 }
 
 impl Report for ObjectReport {

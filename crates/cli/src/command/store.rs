@@ -68,7 +68,7 @@ impl StoreReport {
         write: impl Fn(&ParameterStorage) -> Option<Write>,
     ) -> Result<Self, Failure> {
         let (node, intent) = (drive.node().id(), "say what was stored");
-        let model = drive.profile().ok_or(Error::UnknownModel { node, intent })?;
+        let model = drive.description().ok_or(Error::UnknownModel { node, intent })?;
         let after_restart = model.storage.effective_after_restart.iter();
         let after_restart =
             after_restart.map(|mux| Named { object: mux.to_string(), name: model.row(*mux).map(|row| row.name) });

@@ -46,7 +46,7 @@ impl ServedWorld {
     /// Adds the adapter to `world`. `logged` keeps carried frames for [`Self::take_carried`]; what is to be said of the
     /// service goes to `speaker`.
     pub(crate) fn new(mut world: World, logged: bool, speaker: Speaker) -> Self {
-        let adapter = world.add_tap();
+        let adapter = world.add_probe();
         Self {
             world,
             adapter,

@@ -11,7 +11,7 @@ use canopen::{AbortCode, EmcyErrorCode, Mux, NodeId};
 
 use super::communication_errors::CommunicationErrors;
 use super::faults::{FaultMonitor, FaultSet};
-use super::storage::{Image, Store};
+use super::storage::{Store, StoredImage};
 use devices::variant::Variant;
 
 /// Node, store and communication task of a drive whose table has `N` rows.
@@ -37,7 +37,7 @@ impl<S: Storage> Device<S> {
     pub fn new(
         profile: &'static NodeProfile,
         bitrate: Bitrate,
-        image: Image,
+        image: StoredImage,
         task_period_ns: u64,
         variant: Variant,
     ) -> Self {
@@ -100,7 +100,7 @@ impl<S: Storage> Device<S> {
     }
 
     /// Supply voltage arrives, and this is found in the EEPROM. [`restart`](Self::restart) and [`boot`](Self::boot) follow.
-    pub fn power_on(&mut self, image: Image) {
+    pub fn power_on(&mut self, image: StoredImage) {
         self.store.reopen(image);
         self.eeprom_ok = true;
     }
@@ -476,7 +476,7 @@ mod tests {
     const PARAMETER: Object<u16> = TABLE.object(0x2000, 0);
 
     fn started() -> Device<Fixed<3>> {
-        let image = Image::of(&Dictionary::<Fixed<3>>::new(&TABLE, NodeId::MIN));
+        let image = StoredImage::of(&Dictionary::<Fixed<3>>::new(&TABLE, NodeId::MIN));
         let mut device = Device::new(&PROFILE, Bitrate::K500, image, PERIOD_NS, Variant::first_of(&[]));
         device.power_on(image);
         device.restart(NodeId::MIN, Bitrate::K500, Instant::ZERO);

@@ -25,9 +25,9 @@ pub const CAPACITY: usize = (BANK_SIZE - HEADER_SIZE - CRC_SIZE) / RECORD_SIZE;
 
 /// Contents of an EEPROM, to be kept over power cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Image(pub [u8; IMAGE_SIZE]);
+pub struct StoredImage(pub [u8; IMAGE_SIZE]);
 
-impl Image {
+impl StoredImage {
     /// A chip that has never been written: no drive can read it until factory settings are restored.
     pub const BLANK: Self = Self([0xFF; IMAGE_SIZE]);
 
@@ -60,7 +60,7 @@ struct Pending {
 /// An EEPROM with the rows that wait to be written into it.
 #[derive(Clone, Debug)]
 pub struct Store {
-    image: Image,
+    image: StoredImage,
     active: Option<Bank>,
     pending: Pending,
     generation: u32,
@@ -74,17 +74,17 @@ struct Bank {
 
 impl Store {
     /// A store over what is found at power-on.
-    pub fn new(image: Image) -> Self {
+    pub fn new(image: StoredImage) -> Self {
         Self { image, active: newest_bank(&image), pending: Pending::NONE, generation: 0 }
     }
 
     /// The same EEPROM at the next power-on: what waited to be written is lost, the generation goes on.
-    pub fn reopen(&mut self, image: Image) {
+    pub fn reopen(&mut self, image: StoredImage) {
         *self = Self { generation: self.generation, ..Self::new(image) };
     }
 
     /// The image and its generation, which changes with it.
-    pub fn image(&self) -> (&Image, u32) {
+    pub fn image(&self) -> (&StoredImage, u32) {
         (&self.image, self.generation)
     }
 
@@ -252,7 +252,7 @@ impl Pending {
     }
 }
 
-fn newest_bank(image: &Image) -> Option<Bank> {
+fn newest_bank(image: &StoredImage) -> Option<Bank> {
     let bank = |number: usize| {
         let bytes = &image.0[number * BANK_SIZE..][..BANK_SIZE];
         is_sound(bytes).then(|| Bank { number, sequence: word(bytes, 8) })
@@ -338,12 +338,12 @@ mod tests {
     }
 
     fn formatted() -> Store {
-        let mut store = Store::new(Image::BLANK);
+        let mut store = Store::new(StoredImage::BLANK);
         store.format(&defaults());
         store
     }
 
-    fn values(image: Image) -> (u16, u16, i16) {
+    fn values(image: StoredImage) -> (u16, u16, i16) {
         let mut dictionary = defaults();
         Store::new(image).load(&mut dictionary, |_| true).unwrap();
         (dictionary.get(A), dictionary.get(B), dictionary.get(C))
@@ -356,7 +356,7 @@ mod tests {
 
     #[test]
     fn a_blank_image_is_unreadable_until_it_is_formatted() {
-        let mut store = Store::new(Image::BLANK);
+        let mut store = Store::new(StoredImage::BLANK);
         assert_eq!(store.load(&mut defaults(), |_| true), Err(Unreadable));
         store.mark_all(&TABLE, |_| true);
         store.commit(&defaults());
@@ -466,7 +466,7 @@ mod tests {
     #[test]
     fn every_row_of_a_full_bank_is_stored_by_itself() {
         let wide = || Dictionary::<Fixed<WIDE>>::new(&WIDE_TABLE, NodeId::MIN);
-        let mut store = Store::new(Image::BLANK);
+        let mut store = Store::new(StoredImage::BLANK);
         store.format(&wide());
         for (slot, _) in WIDE_TABLE.iter().filter(|(_, row)| row.is_kept()) {
             let mut store = store.clone();

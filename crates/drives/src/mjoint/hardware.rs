@@ -5,7 +5,7 @@ use can::Bitrate;
 use super::pulses::PulseInput;
 use super::storage;
 use super::variations::VARIANT;
-use crate::engine::storage::Image;
+use crate::engine::storage::StoredImage;
 
 /// The encoder's battery.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -96,7 +96,7 @@ pub struct Actuation {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hardware {
     /// Contents of the EEPROM.
-    pub eeprom: Image,
+    pub eeprom: StoredImage,
     /// Rate that the CAN controller is built for: 1 Mbit/s, with no object to change it.
     pub bitrate: Bitrate,
 }
@@ -104,6 +104,6 @@ pub struct Hardware {
 impl Default for Hardware {
     /// As delivered.
     fn default() -> Self {
-        Self { eeprom: Image::of(&storage::delivered(&VARIANT)), bitrate: Bitrate::M1 }
+        Self { eeprom: StoredImage::of(&storage::delivered(&VARIANT)), bitrate: Bitrate::M1 }
     }
 }

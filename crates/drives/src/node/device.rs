@@ -9,7 +9,7 @@ use devices::variant::Variant;
 
 use super::{Memory, Services};
 use crate::engine::device::{Application, Device};
-use crate::engine::storage::Image;
+use crate::engine::storage::StoredImage;
 
 const COMMUNICATION_PERIOD_NS: u64 = 1_000_000;
 
@@ -38,7 +38,7 @@ impl<S: Storage> DescribedNode<S> {
         let variant = Variant::first_of(description.variations);
         Self {
             description,
-            device: Device::new(profile, bitrate, Image::BLANK, COMMUNICATION_PERIOD_NS, variant),
+            device: Device::new(profile, bitrate, StoredImage::BLANK, COMMUNICATION_PERIOD_NS, variant),
             services: Services::new(Memory::empty()),
             node_id,
             bitrate,
@@ -77,7 +77,7 @@ impl<S: Storage> DescribedNode<S> {
 
     /// Supply voltage arrives: starts with what the memory holds, and sends the boot-up message.
     pub fn power_on(&mut self, memory: Memory, now: Instant) {
-        self.device.power_on(Image::BLANK);
+        self.device.power_on(StoredImage::BLANK);
         self.services.power_on(memory);
         self.restart(now);
     }

@@ -23,7 +23,7 @@ use super::write;
 use crate::engine::actuator::bleeder::{Bleeder, BleederLimits};
 use crate::engine::device::Device;
 use crate::engine::faults::{FaultMonitor, FaultSet};
-use crate::engine::storage::Image;
+use crate::engine::storage::StoredImage;
 use crate::node::{Memory, Services};
 use crate::{Firmware, Report};
 
@@ -81,7 +81,7 @@ impl<S: Storage> ServoDrive<S> {
     pub fn new(description: &'static Description, profile: &'static NodeProfile, hardware: &Hardware) -> Self {
         assert!(!description.axes.is_empty(), "a servo has an axis");
         let variant = Variant::first_of(description.variations);
-        let device = Device::new(profile, hardware.bitrate, Image::BLANK, COMMUNICATION_PERIOD_NS, variant);
+        let device = Device::new(profile, hardware.bitrate, StoredImage::BLANK, COMMUNICATION_PERIOD_NS, variant);
         let mut drive = Self {
             description,
             device,
@@ -291,7 +291,7 @@ impl<S: Storage> Firmware for ServoDrive<S> {
         self.node_id = hardware.node_id;
         self.bitrate = hardware.bitrate;
         self.motors = hardware.motors;
-        self.device.power_on(Image::BLANK);
+        self.device.power_on(StoredImage::BLANK);
         self.services.power_on(hardware.memory);
         self.restart_firmware(now);
     }

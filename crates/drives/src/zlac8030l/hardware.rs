@@ -2,7 +2,7 @@
 
 use super::storage;
 use super::variations::VARIANT;
-use crate::engine::storage::Image;
+use crate::engine::storage::StoredImage;
 
 /// What the drive measures, each control period.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,12 +81,12 @@ pub struct Hardware {
     /// The address switches: 1 to 3 are node-IDs, any other value lets 200Dh decide.
     pub dip_address: u8,
     /// Contents of the EEPROM.
-    pub eeprom: Image,
+    pub eeprom: StoredImage,
 }
 
 impl Default for Hardware {
     /// As delivered: switches at 0, factory settings.
     fn default() -> Self {
-        Self { dip_address: 0, eeprom: Image::of(&storage::delivered(&VARIANT)) }
+        Self { dip_address: 0, eeprom: StoredImage::of(&storage::delivered(&VARIANT)) }
     }
 }

@@ -3,7 +3,7 @@
 use super::led::Led;
 use super::storage;
 use super::variations::VARIANT;
-use crate::engine::storage::Image;
+use crate::engine::storage::StoredImage;
 
 /// What the drive measures, each control period. There is no position sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,12 +66,12 @@ pub struct Hardware {
     /// Switches SW2 to SW5, SW2 lowest, OFF counting 1 (4.1): 1 to 15 are node-IDs, 0 lets 2008h decide.
     pub dip_address: u8,
     /// Contents of the EEPROM.
-    pub eeprom: Image,
+    pub eeprom: StoredImage,
 }
 
 impl Default for Hardware {
     /// As delivered: all switches ON, factory settings.
     fn default() -> Self {
-        Self { dip_address: 0, eeprom: Image::of(&storage::delivered(&VARIANT)) }
+        Self { dip_address: 0, eeprom: StoredImage::of(&storage::delivered(&VARIANT)) }
     }
 }

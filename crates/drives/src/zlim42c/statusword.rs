@@ -9,7 +9,7 @@ use crate::engine::cia402::Status;
 
 /// What the statusword is made of.
 #[derive(Clone, Copy)]
-pub(super) struct Situation {
+pub(super) struct Condition {
     pub(super) state: PowerState,
     pub(super) mode: ModeOfOperation,
     pub(super) controlword: Controlword,
@@ -18,7 +18,7 @@ pub(super) struct Situation {
 }
 
 /// The value of 6041h.
-pub(super) fn statusword(now: Situation) -> Statusword {
+pub(super) fn statusword(now: Condition) -> Statusword {
     let bit = |mask: u16, set: bool| if set { mask } else { 0 };
     let fault = matches!(now.state, PowerState::Fault | PowerState::FaultReactionActive);
     // There is nothing to be reached before the drive is live and has a mode.

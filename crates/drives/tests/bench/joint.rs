@@ -2,7 +2,7 @@
 
 use canopen::od::Table;
 use drives::Firmware;
-use drives::engine::storage::Image;
+use drives::engine::storage::StoredImage;
 use drives::mjoint::objects::TABLE;
 use drives::mjoint::{Actuation, Battery, Brake, MJoint, Model, PowerStage, Sensors};
 use plant::absolute_encoder::BatteryState;
@@ -36,7 +36,7 @@ impl Bench<Joint> {
     /// The EEPROM keeps what it holds.
     pub(crate) fn power_off(&mut self) {
         self.drive.power_off(self.now);
-        self.hardware.eeprom = Image::from_bytes(self.drive.eeprom().0);
+        self.hardware.eeprom = StoredImage::from_bytes(self.drive.eeprom().0);
     }
 
     /// Counts of the shaft from where the bench began.

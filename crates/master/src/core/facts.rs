@@ -83,12 +83,14 @@ impl NodeFacts {
 
     /// The state that it must be in: what this master last told it, or what it has said since, as a node of this model
     /// means it (as the standard says, if the model is not known).
-    pub fn probable_state(&self, profile: Option<&Description>) -> Option<NmtState> {
+    pub fn probable_state(&self, description: Option<&Description>) -> Option<NmtState> {
         let told = self.nmt_sent.and_then(|(at, command)| Some((at, state_after(command)?)));
-        let said = self.nmt_state.map(|said| match profile {
+        let said = self.nmt_state.map(|said| match description {
             // Such a model's heartbeat cannot say that it is stopped: what it was told decides.
-            Some(profile) if profile.tells_alarm(said) => told.map_or(NmtState::Operational, |(_, state)| state),
-            Some(profile) => profile.nmt_state(said),
+            Some(description) if description.tells_alarm(said) => {
+                told.map_or(NmtState::Operational, |(_, state)| state)
+            }
+            Some(description) => description.nmt_state(said),
             None if said == NmtState::Initialising => NmtState::PreOperational,
             None => said,
         });

@@ -31,7 +31,7 @@ pub enum RpdoTrigger {
 /// RPDO and TPDO are from the device's side. A frame that is shorter
 /// than its mapping is not taken over (CiA 301, 7.2.2.5). An unsent RPDO is overwritten by its newer value.
 #[derive(Clone, Debug)]
-pub struct Image {
+pub struct ProcessImage {
     tpdos: Vec<Tpdo>,
     rpdos: Vec<Rpdo>,
     /// Position in `tpdos` by identifier; `NONE` for most.
@@ -85,7 +85,7 @@ enum SendState {
     Pending,
 }
 
-impl Default for Image {
+impl Default for ProcessImage {
     fn default() -> Self {
         let by_id = vec![NONE; usize::from(CanId::MAX_STANDARD) + 1];
         let (pending, waiting) = (VecDeque::new(), Vec::new());
@@ -93,7 +93,7 @@ impl Default for Image {
     }
 }
 
-impl Image {
+impl ProcessImage {
     /// Receives a node's TPDO under `id` from now on, in place of what that TPDO was before. Nothing changes where it is so
     /// already.
     pub fn set_tpdo(&mut self, node: NodeId, number: PdoNumber, id: u16, map: PdoMap) {
@@ -353,7 +353,7 @@ mod tests {
 
     #[test]
     fn splits_a_frame_by_its_mapping() {
-        let mut image = Image::default();
+        let mut image = ProcessImage::default();
         image.set_tpdo(node(4), PdoNumber::FIRST, 0x184, PdoMap(vec![STATUSWORD, POSITION]));
         let now = Instant::from_millis(5);
         assert_eq!(image.value(node(4), POSITION.mux), None);
@@ -365,7 +365,7 @@ mod tests {
 
     #[test]
     fn a_short_frame_is_not_half_applied() {
-        let mut image = Image::default();
+        let mut image = ProcessImage::default();
         image.set_tpdo(node(4), PdoNumber::FIRST, 0x184, PdoMap(vec![STATUSWORD, POSITION]));
         image.handle_frame(0x184, &"184#370201".parse().unwrap(), Instant::ZERO);
         assert_eq!(image.value(node(4), STATUSWORD.mux), None);
@@ -374,7 +374,7 @@ mod tests {
 
     #[test]
     fn an_unsent_rpdo_is_overwritten_by_its_newer_value() {
-        let mut image = Image::default();
+        let mut image = ProcessImage::default();
         image.set_rpdo(node(4), PdoNumber::FIRST, 0x204, PdoMap(vec![STATUSWORD, MODE]), RpdoTrigger::Write);
         assert!(image.write(node(4), STATUSWORD.mux, 6));
         assert!(image.write(node(4), MODE.mux, 3));
@@ -386,7 +386,7 @@ mod tests {
 
     #[test]
     fn a_synchronous_rpdo_waits_for_the_sync() {
-        let mut image = Image::default();
+        let mut image = ProcessImage::default();
         image.set_rpdo(node(4), PdoNumber::FIRST, 0x304, PdoMap(vec![POSITION]), RpdoTrigger::Sync);
         image.write(node(4), POSITION.mux, 7);
         assert_eq!(image.poll_transmit(), None);
@@ -398,7 +398,7 @@ mod tests {
 
     #[test]
     fn a_mapping_beyond_eight_bytes_is_never_read_or_written_past_the_frame() {
-        let mut image = Image::default();
+        let mut image = ProcessImage::default();
         let long = PdoMap(vec![POSITION, POSITION, STATUSWORD]);
         image.set_tpdo(node(4), PdoNumber::FIRST, 0x184, long.clone());
         image.set_rpdo(node(4), PdoNumber::FIRST, 0x204, long, RpdoTrigger::Write);

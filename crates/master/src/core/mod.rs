@@ -34,7 +34,7 @@ pub use event::Event;
 pub use facts::{HeartbeatWatch, NodeFacts};
 pub(crate) use field::bits_of;
 pub use field::{Field, NumberForm, Sample, SetPoint, Signal};
-pub use image::{Image, Received, RpdoTrigger};
+pub use image::{ProcessImage, Received, RpdoTrigger};
 pub use node_set::NodeSet;
 pub use payload::Payload;
 pub use pdo_map::PdoMap;
@@ -81,7 +81,7 @@ pub struct Core {
     heartbeat_check: Instant,
     /// The earliest of all deadlines; heartbeats may make it too early, never too late.
     due: Instant,
-    image: Image,
+    image: ProcessImage,
     sync: SyncClock,
     supervision: Supervision,
     /// Drives to stop, for the length of a call.
@@ -121,7 +121,7 @@ impl Core {
             watched: NodeSet::EMPTY,
             heartbeat_check: Instant::FAR_FUTURE,
             due: Instant::FAR_FUTURE,
-            image: Image::default(),
+            image: ProcessImage::default(),
             sync: SyncClock::default(),
             supervision: Supervision::default(),
             lost: Vec::new(),
@@ -199,12 +199,12 @@ impl Core {
     }
 
     /// Last values of mapped objects.
-    pub const fn image(&self) -> &Image {
+    pub const fn image(&self) -> &ProcessImage {
         &self.image
     }
 
     /// Last values of mapped objects, to change mappings and values to send.
-    pub const fn image_mut(&mut self) -> &mut Image {
+    pub const fn image_mut(&mut self) -> &mut ProcessImage {
         &mut self.image
     }
 

@@ -7,7 +7,7 @@ use std::time::Duration;
 use canopen::{Mux, NodeId};
 
 use super::field::Place;
-use super::image::Image;
+use super::image::ProcessImage;
 
 /// How a drive that is moved cycle by cycle is stopped, and when.
 #[derive(Clone, Copy, Debug)]
@@ -149,7 +149,7 @@ impl Supervision {
         &mut self,
         number: u64,
         sync_period: Option<Duration>,
-        image: &Image,
+        image: &ProcessImage,
     ) -> impl Iterator<Item = (CycleRules, CycleLoss)> {
         self.watches.iter_mut().filter_map(move |watch| {
             let WatchState::Moving(last) = watch.state else { return None };

@@ -102,7 +102,7 @@ impl CyclicDrive {
         // The last speed or current, sent again, would be followed for ever.
         let raw = wish.unwrap_or_else(|_| self.target.hold());
         if io.write(self.target.set_point, raw) {
-            self.target.held = raw;
+            self.target.last_sent = raw;
         } else if demand.wants_power() {
             self.progress.latched.get_or_insert(Refusal::Remapped);
         }

@@ -85,10 +85,10 @@ enum SetPointKind {
 }
 
 /// The set-point of a mode that follows one each cycle.
-fn set_point_of(profile: &Description, axis: &AxisDescription, mode: ModeOfOperation) -> Option<SetPointKind> {
+fn set_point_of(description: &Description, axis: &AxisDescription, mode: ModeOfOperation) -> Option<SetPointKind> {
     let interpolation_data = axis.object(INTERPOLATION_DATA);
     match mode {
-        ModeOfOperation::INTERPOLATED_POSITION if profile.row(interpolation_data).is_some() => {
+        ModeOfOperation::INTERPOLATED_POSITION if description.row(interpolation_data).is_some() => {
             Some(SetPointKind::Position(interpolation_data))
         }
         ModeOfOperation::INTERPOLATED_POSITION | ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION => {
@@ -122,13 +122,13 @@ impl Drive {
     /// # Errors
     /// [`CyclicError`].
     pub async fn cyclic(&self, mode: ModeOfOperation, options: CyclicOptions) -> Result<CyclicDrive, CyclicError> {
-        let (profile, axis) = (self.known(INTENT)?, self.motion(INTENT)?);
+        let (description, axis) = (self.known(INTENT)?, self.motion(INTENT)?);
         if !axis.modes.contains(&mode) {
             return Err(self.no_such_mode(axis, mode).into());
         }
-        let mapped = self.adopt_pdos(profile).await?;
-        let (number, mut target) = self.target(profile, axis, mode).await?;
-        let (statusword_in, cadence) = self.statusword_carrier(profile, number, &mapped)?;
+        let mapped = self.adopt_pdos(description).await?;
+        let (number, mut target) = self.target(description, axis, mode).await?;
+        let (statusword_in, cadence) = self.statusword_carrier(description, number, &mapped)?;
         let statusword = self.node().signal_in(statusword_in, axis.object(STATUSWORD))?;
         if let Kind::Position { actual, .. } = &mut target.kind {
             // A TPDO that comes, if one of them does.
@@ -148,10 +148,10 @@ impl Drive {
         };
         let (position, velocity, current) = (
             self.position_signal(statusword_in).await?,
-            self.quantity_signal(profile, statusword_in, axis.units.actual_velocity).await?,
-            self.quantity_signal(profile, statusword_in, axis.units.actual_current).await?,
+            self.quantity_signal(description, statusword_in, axis.units.actual_velocity).await?,
+            self.quantity_signal(description, statusword_in, axis.units.actual_current).await?,
         );
-        let host_loss = self.begin_cyclic(profile, mode, options).await?;
+        let host_loss = self.begin_cyclic(description, mode, options).await?;
         Ok(CyclicDrive {
             node: self.node().id(),
             place,
@@ -174,7 +174,7 @@ impl Drive {
     /// What changes the drive, once all is known: the guard, NMT start, the mode.
     async fn begin_cyclic(
         &self,
-        profile: &Description,
+        description: &Description,
         mode: ModeOfOperation,
         options: CyclicOptions,
     ) -> Result<HostLoss, Error> {
@@ -187,7 +187,7 @@ impl Drive {
         if host_loss.stops_after().is_none() {
             network.with_core(|core| core.note_unguarded(id, host_loss));
         }
-        if self.node().facts().probable_state(Some(profile)) != Some(NmtState::Operational) {
+        if self.node().facts().probable_state(Some(description)) != Some(NmtState::Operational) {
             self.node().nmt(NmtCommand::Start);
         }
         if let Err(error) = self.set_mode(mode).await {
@@ -208,23 +208,23 @@ impl Drive {
     /// # Errors
     /// [`CyclicError`].
     pub async fn configure_cyclic(&self, mode: ModeOfOperation) -> Result<(), CyclicError> {
-        let (profile, axis) = (self.known(INTENT)?, self.motion(INTENT)?);
+        let (description, axis) = (self.known(INTENT)?, self.motion(INTENT)?);
         let node = self.node().id();
-        let target = match set_point_of(profile, axis, mode) {
+        let target = match set_point_of(description, axis, mode) {
             Some(SetPointKind::Position(object)) => object,
             Some(SetPointKind::Quantity(quantity)) => quantity.object,
             None => return Err(CyclicError::NoSetPoint { node, mode }),
         };
-        if profile.pdo.fixed_mapping {
+        if description.pdo.fixed_mapping {
             return Ok(());
         }
         let record =
-            |mux: Mux| profile.row(mux).map(|row| MappingRecord { mux, bits: (row.data_type.size() * 8) as u8 });
+            |mux: Mux| description.row(mux).map(|row| MappingRecord { mux, bits: (row.data_type.size() * 8) as u8 });
         let map = |objects: &[Option<Mux>]| {
             let mut map = PdoMap(Vec::new());
             for object in objects.iter().filter_map(|mux| record((*mux)?)) {
                 let fits = map.bits() + u32::from(object.bits) <= u64::BITS;
-                let room = map.0.len() < usize::from(profile.pdo.max_objects);
+                let room = map.0.len() < usize::from(description.pdo.max_objects);
                 if fits && room {
                     map.0.push(object);
                 }
@@ -234,7 +234,7 @@ impl Drive {
         let quantities = [axis.units.actual_velocity, axis.units.actual_current];
         let [velocity, current] = quantities.map(|quantity| quantity.map(|quantity| quantity.object));
         let statusword = Some(axis.object(STATUSWORD));
-        let state = match set_point_of(profile, axis, mode) {
+        let state = match set_point_of(description, axis, mode) {
             Some(SetPointKind::Position(_)) => map(&[statusword, Some(axis.object(POSITION_ACTUAL))]),
             _ => map(&[statusword, velocity, current]),
         };
@@ -243,12 +243,12 @@ impl Drive {
         let number = PdoNumber::at(usize::from(self.axis_id().0)).unwrap_or(PdoNumber::FIRST);
         for (direction, map) in [(Direction::Rpdo, command), (Direction::Tpdo, state)] {
             let config = PdoConfig::new(PdoId { direction, number }, map).transmission(TransmissionType::EVERY_SYNC);
-            self.node().configure_pdo(&config, timer_units(profile)).await?;
+            self.node().configure_pdo(&config, timer_units(description)).await?;
         }
-        for config in self.adopt_pdos(profile).await?.tpdos {
+        for config in self.adopt_pdos(description).await?.tpdos {
             let number = config.pdo.number;
             let known = self.node().network().look(|core| core.image().tpdo_id(node, number).is_some());
-            if known && number.position() >= profile.axes.len() && !config.map.0.is_empty() {
+            if known && number.position() >= description.axes.len() && !config.map.0.is_empty() {
                 self.node().switch_pdo_off(config.pdo).await?;
             }
         }
@@ -256,10 +256,10 @@ impl Drive {
     }
 
     /// Reads every PDO that the model has, and has this master send and receive them as they are set up.
-    async fn adopt_pdos(&self, profile: &Description) -> Result<Mapped, Error> {
-        let units = timer_units(profile);
+    async fn adopt_pdos(&self, description: &Description) -> Result<Mapped, Error> {
+        let units = timer_units(description);
         let mut mapped = Mapped { rpdos: Vec::new(), tpdos: Vec::new() };
-        let parameters = profile.dictionary.rows().iter().map(|row| row.mux()).filter(|mux| mux.sub_index == 1);
+        let parameters = description.dictionary.rows().iter().map(|row| row.mux()).filter(|mux| mux.sub_index == 1);
         for (pdo, is_mapping) in parameters.filter_map(|mux| PdoId::of_object(mux.index)) {
             if is_mapping {
                 continue;
@@ -276,11 +276,11 @@ impl Drive {
     /// The set-point of the mode, and the RPDO that carries it.
     async fn target(
         &self,
-        profile: &Description,
+        description: &Description,
         axis: &AxisDescription,
         mode: ModeOfOperation,
     ) -> Result<(PdoNumber, Target), CyclicError> {
-        let quantity = match set_point_of(profile, axis, mode) {
+        let quantity = match set_point_of(description, axis, mode) {
             Some(SetPointKind::Position(object)) => return self.position_target(axis, object).await,
             Some(SetPointKind::Quantity(quantity)) => quantity,
             None => return Err(CyclicError::NoSetPoint { node: self.node().id(), mode }),
@@ -289,7 +289,7 @@ impl Drive {
         let per_count = self.step_of(quantity).await?;
         let speed = axis.units.target_velocity.is_some_and(|velocity| velocity.object == quantity.object);
         let kind = if speed { Kind::Velocity { per_count } } else { Kind::Current { per_count } };
-        Ok((number, Target { set_point, limits: self.limits(quantity.object).await?, kind, held: 0 }))
+        Ok((number, Target { set_point, limits: self.limits(quantity.object).await?, kind, last_sent: 0 }))
     }
 
     async fn position_target(&self, axis: &AxisDescription, object: Mux) -> Result<(PdoNumber, Target), CyclicError> {
@@ -303,8 +303,8 @@ impl Drive {
             counts_per_s: rpm / 60.0 * counts_per_turn,
             speed,
         };
-        let held = self.read_number(axis.object(POSITION_ACTUAL)).await?;
-        Ok((number, Target { set_point, limits: self.limits(object).await?, kind, held }))
+        let last_sent = self.read_number(axis.object(POSITION_ACTUAL)).await?;
+        Ok((number, Target { set_point, limits: self.limits(object).await?, kind, last_sent }))
     }
 
     /// The highest speed that the drive follows, and the object that says so: the target velocity's own limits, and those of
@@ -333,11 +333,11 @@ impl Drive {
     /// SYNC; and how often it comes.
     fn statusword_carrier(
         &self,
-        profile: &Description,
+        description: &Description,
         number: PdoNumber,
         mapped: &Mapped,
     ) -> Result<(PdoNumber, Cadence), CyclicError> {
-        let answers = profile.pdo.event_trigger == EventTrigger::AnswersRpdo;
+        let answers = description.pdo.event_trigger == EventTrigger::AnswersRpdo;
         let statusword = self.place(STATUSWORD);
         let carriers = mapped.tpdos.iter().filter(|pdo| carries(&pdo.map, statusword));
         let regular = carriers.filter_map(|pdo| {
@@ -399,15 +399,15 @@ impl Drive {
     /// A physical value, if it is mapped in the form that the model's table has.
     async fn quantity_signal<T: Sample>(
         &self,
-        profile: &Description,
+        description: &Description,
         near: PdoNumber,
         quantity: Option<Quantity>,
     ) -> Result<Option<Signal<T>>, Error> {
         let Some(quantity) = quantity else { return Ok(None) };
-        let Some(row) = profile.row(quantity.object) else { return Ok(None) };
+        let Some(row) = description.row(quantity.object) else { return Ok(None) };
         let per_count = self.step_of(quantity).await?;
         let as_in_sdo = (row.data_type, per_count);
-        let in_tpdo = profile.pdo.mapping.tpdo_form(quantity.object);
+        let in_tpdo = description.pdo.mapping.tpdo_form(quantity.object);
         // One count in the TPDO is so many of those by SDO.
         let in_tpdo = in_tpdo.map(|form| (form.data_type, per_count * f64::from(form.divisor)));
         let (data_type, per_count) = in_tpdo.unwrap_or(as_in_sdo);
@@ -418,10 +418,10 @@ impl Drive {
     }
 }
 
-const fn timer_units(profile: &Description) -> TimerUnits {
+const fn timer_units(description: &Description) -> TimerUnits {
     TimerUnits {
-        inhibit: Duration::from_nanos(profile.pdo.inhibit_unit_ns),
-        event: Duration::from_nanos(profile.pdo.event_timer_unit_ns),
+        inhibit: Duration::from_nanos(description.pdo.inhibit_unit_ns),
+        event: Duration::from_nanos(description.pdo.event_timer_unit_ns),
     }
 }
 

@@ -14,7 +14,7 @@ pub(super) struct Target {
     pub(super) limits: Limits,
     pub(super) kind: Kind,
     /// What was sent last.
-    pub(super) held: i64,
+    pub(super) last_sent: i64,
 }
 
 /// What the set-point is.
@@ -52,7 +52,7 @@ impl Target {
     /// What to send so that the drive comes to rest with power: the last position; no speed, no current.
     pub(super) const fn hold(&self) -> i64 {
         match self.kind {
-            Kind::Position { .. } => self.held,
+            Kind::Position { .. } => self.last_sent,
             Kind::Velocity { .. } | Kind::Current { .. } => 0,
         }
     }
@@ -67,7 +67,7 @@ impl Target {
 
     fn check_step(&self, raw: i64, period: Duration) -> Result<(), Refusal> {
         let Kind::Position { counts_per_s, speed, .. } = self.kind else { return Ok(()) };
-        let way = raw.saturating_sub(self.held);
+        let way = raw.saturating_sub(self.last_sent);
         // A drive that was given nothing for some cycles stands where it was: the next step is no longer for that.
         // A count more, for set-points that are rounded to whole ones.
         let longest = (counts_per_s * period.as_secs_f64()) as i64 + 1;

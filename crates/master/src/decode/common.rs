@@ -30,9 +30,9 @@ pub fn common_name(mux: Mux) -> Option<&'static str> {
 /// The type of an object that came with this many bytes, where those models that have it with this length agree on it, or
 /// the standard's. An object may have another form in TPDOs.
 pub fn common_type(mux: Mux, length: usize) -> Option<DataType> {
-    let forms = all().iter().flat_map(|profile| {
-        let in_tpdo = profile.pdo.mapping.tpdo_form(mux).map(|form| form.data_type);
-        [profile.row(mux).map(|row| row.data_type), in_tpdo]
+    let forms = all().iter().flat_map(|description| {
+        let in_tpdo = description.pdo.mapping.tpdo_form(mux).map(|form| form.data_type);
+        [description.row(mux).map(|row| row.data_type), in_tpdo]
     });
     let mut fitting = forms.flatten().filter(|data_type| data_type.size() == length && length > 0);
     match fitting.next() {
@@ -77,8 +77,11 @@ mod tests {
     fn standard_objects_ascend_and_no_model_has_them() {
         assert!(STANDARD.is_sorted_by(|(a, ..), (b, ..)| a < b));
         for (index, name, _) in STANDARD {
-            let has = |profile: &&devices::Description| profile.row(Mux::new(index, 0)).is_some();
-            assert!(!all().iter().any(|profile| has(&profile)), "{index:04X}h {name}: a model's own row speaks for it");
+            let has = |description: &&devices::Description| description.row(Mux::new(index, 0)).is_some();
+            assert!(
+                !all().iter().any(|description| has(&description)),
+                "{index:04X}h {name}: a model's own row speaks for it"
+            );
         }
     }
 

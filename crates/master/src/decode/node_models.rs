@@ -4,7 +4,7 @@ use canopen::NodeId;
 
 use crate::identify::Model;
 
-/// The profile of each node whose model is known, or one that all models it may be read alike.
+/// The description of each node whose model is known, or one that all models it may be read alike.
 #[derive(Clone, Debug, Default)]
 pub(super) struct NodeModels(pub(super) BTreeMap<u8, Model>);
 

@@ -8,9 +8,9 @@ use crate::error::{Error, Explanation, Fact};
 use crate::units::Volts;
 
 /// The faults that a code of this model stands for.
-pub fn faults_in(profile: &Description, code: u16) -> Vec<&'static FaultRow> {
-    let matches = |row: &&FaultRow| if profile.faults.bit_field { row.code & code != 0 } else { row.code == code };
-    profile.faults.table.iter().filter(matches).collect()
+pub fn faults_in(description: &Description, code: u16) -> Vec<&'static FaultRow> {
+    let matches = |row: &&FaultRow| if description.faults.bit_field { row.code & code != 0 } else { row.code == code };
+    description.faults.table.iter().filter(matches).collect()
 }
 
 impl Drive {
@@ -46,7 +46,10 @@ impl Drive {
         }
         if let Ok(payload) = self.node.upload(self.fault_code()).await {
             let code = payload.raw() as u16;
-            facts.push(Fact::FaultCode(code, self.profile.map(|profile| faults_in(profile, code)).unwrap_or_default()));
+            facts.push(Fact::FaultCode(
+                code,
+                self.description.map(|description| faults_in(description, code)).unwrap_or_default(),
+            ));
         }
         if let (Ok(wanted), Ok(shown)) = (self.node.read::<i8>(self.place(MODE)).await, self.mode().await) {
             facts.push(Fact::Mode(ModeOfOperation(wanted), shown));
@@ -62,10 +65,10 @@ impl Drive {
     fn recall(&self, facts: &mut Vec<Fact>) {
         let now = self.node.network().now();
         let seen = self.node.facts();
-        facts.extend(seen.probable_state(self.profile).map(Fact::Nmt));
+        facts.extend(seen.probable_state(self.description).map(Fact::Nmt));
         facts.push(Fact::Heartbeat(seen.heartbeat_age(now)));
         facts.extend(seen.last_emcy().map(|(at, emcy)| {
-            Fact::Emcy(now - *at, *emcy, self.profile.and_then(|profile| profile.fault_told_by(emcy.code)))
+            Fact::Emcy(now - *at, *emcy, self.description.and_then(|description| description.fault_told_by(emcy.code)))
         }));
     }
 }

@@ -120,7 +120,7 @@ impl Drive {
     /// What this value of the drive's watch stands for, when this program does its part.
     fn loss(&self, raw: i64) -> HostLoss {
         let time = |ms: i64| Duration::from_millis(ms.unsigned_abs());
-        match self.profile.map(|profile| profile.host_watch) {
+        match self.description.map(|description| description.host_watch) {
             None | Some(HostWatch::None) => HostLoss::GoesOn,
             Some(HostWatch::Silence { time: object }) if raw <= 0 => HostLoss::SwitchedOff { object },
             Some(HostWatch::Silence { time: object }) => HostLoss::StopsInSilence { object, time: time(raw) },
@@ -141,7 +141,8 @@ impl Drive {
 
     /// Ends the alarm of a drive that has stopped for want of a heartbeat, once its old motion is stopped for good.
     pub(super) async fn forget_lost_host(&self) -> Result<(), Error> {
-        let Some(HostWatch::Heartbeat { consumer, .. }) = self.profile.map(|profile| profile.host_watch) else {
+        let Some(HostWatch::Heartbeat { consumer, .. }) = self.description.map(|description| description.host_watch)
+        else {
             return Ok(());
         };
         if !self.has_lost_its_host().await? {
@@ -155,8 +156,8 @@ impl Drive {
 
     /// True if the drive has stopped for want of a heartbeat, and would go on with the next one.
     async fn has_lost_its_host(&self) -> Result<bool, Error> {
-        let Some(profile) = self.profile else { return Ok(false) };
-        match profile.host_watch {
+        let Some(description) = self.description else { return Ok(false) };
+        match description.host_watch {
             HostWatch::Heartbeat { fault, .. } => Ok(self.read_number(self.fault_code()).await? == i64::from(fault)),
             HostWatch::None | HostWatch::Silence { .. } => Ok(false),
         }

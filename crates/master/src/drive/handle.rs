@@ -35,14 +35,14 @@ pub(super) const STEP_TIMEOUT: Duration = Duration::from_secs(1);
 pub struct Drive {
     pub(super) node: Node,
     pub(super) axis: AxisId,
-    pub(super) profile: Option<&'static Description>,
-    /// Set where the profile is no more than that.
+    pub(super) description: Option<&'static Description>,
+    /// Set where the description is no more than that.
     pub(super) guess: Option<Guess>,
 }
 
 impl core::fmt::Debug for Drive {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let model = self.profile.map(|profile| profile.name);
+        let model = self.description.map(|description| description.name);
         let guessed = self.guess.is_some();
         f.debug_struct("Drive")
             .field("node", &self.node.id())
@@ -55,18 +55,18 @@ impl core::fmt::Debug for Drive {
 
 impl Drive {
     /// A drive of a known model.
-    pub const fn new(node: Node, profile: &'static Description) -> Self {
-        Self { node, axis: AxisId::FIRST, profile: Some(profile), guess: None }
+    pub const fn new(node: Node, description: &'static Description) -> Self {
+        Self { node, axis: AxisId::FIRST, description: Some(description), guess: None }
     }
 
     /// A drive of a model that is known this well. One that is guessed can be moved, and its parameters not be stored.
     pub fn known_as(node: Node, knowledge: Knowledge) -> Self {
-        Self { node, axis: AxisId::FIRST, profile: knowledge.profile(), guess: knowledge.guess() }
+        Self { node, axis: AxisId::FIRST, description: knowledge.description(), guess: knowledge.guess() }
     }
 
     /// A CiA 402 drive of unknown model: it can be enabled, disabled, quick-stopped and reset, not moved or stored.
     pub const fn of_unknown_model(node: Node) -> Self {
-        Self { node, axis: AxisId::FIRST, profile: None, guess: None }
+        Self { node, axis: AxisId::FIRST, description: None, guess: None }
     }
 
     /// Another axis of the same drive. What concerns the whole device (its parameter store, the watch over its host) is the
@@ -86,7 +86,7 @@ impl Drive {
 
     /// What is known of this axis; `None` of an unknown model, or one that is no drive.
     pub fn axis_description(&self) -> Option<&'static AxisDescription> {
-        self.profile?.axes.get(usize::from(self.axis.0))
+        self.description?.axes.get(usize::from(self.axis.0))
     }
 
     /// Its node.
@@ -94,9 +94,9 @@ impl Drive {
         &self.node
     }
 
-    /// The model's profile, or of a guess the one to read and move with.
-    pub const fn profile(&self) -> Option<&'static Description> {
-        self.profile
+    /// The model's description, or of a guess the one to read and move with.
+    pub const fn description(&self) -> Option<&'static Description> {
+        self.description
     }
 
     /// Why its model is no more than a guess, if it is.
@@ -110,13 +110,13 @@ impl Drive {
     /// [`Error::WrongModel`] when its device type or vendor differ, [`Error::OtherModel`] when it lacks that object;
     /// those of the SDO reads.
     pub async fn check_identity(&self) -> Result<(), Error> {
-        let profile = self.known("compare its identity")?;
-        let (node, model) = (self.node.id(), profile.title);
+        let description = self.known("compare its identity")?;
+        let (node, model) = (self.node.id(), description.title);
         let found = crate::identify::identity(&self.node).await?;
-        if !found.matches(&profile.identity) {
+        if !found.matches(&description.identity) {
             return Err(Error::WrongModel { node, model, found });
         }
-        match profile.distinguishing_object {
+        match description.distinguishing_object {
             Some(object) if !crate::identify::has(&self.node, object).await? => {
                 Err(Error::OtherModel { node, model, object })
             }
@@ -161,7 +161,7 @@ impl Drive {
     /// same: that keeps it content.
     fn in_process_data(&self, object: Mux, bits: u32) -> Option<u64> {
         let watches_for_silence =
-            matches!(self.profile.map(|profile| profile.host_watch), Some(HostWatch::Silence { .. }));
+            matches!(self.description.map(|description| description.host_watch), Some(HostWatch::Silence { .. }));
         let node = self.node.id();
         self.node.network().look(|core| {
             let received = core.image().value_of_length(node, object, bits)?;
@@ -190,13 +190,13 @@ impl Drive {
     }
 
     pub(crate) fn title(&self) -> &'static str {
-        self.profile.map_or("drive", |profile| profile.title)
+        self.description.map_or("drive", |description| description.title)
     }
 
     /// What is known of this axis, or an error that says what it was needed for.
     pub(crate) fn motion(&self, intent: &'static str) -> Result<&'static AxisDescription, Error> {
-        let profile = self.known(intent)?;
-        let (node, model, axes) = (self.node.id(), profile.title, profile.axes.len());
+        let description = self.known(intent)?;
+        let (node, model, axes) = (self.node.id(), description.title, description.axes.len());
         self.axis_description().ok_or(Error::NoSuchAxis { node, model, axis: self.axis, axes })
     }
 
@@ -210,12 +210,12 @@ impl Drive {
         quantity.ok_or(Error::NoSuchQuantity { node: self.node.id(), model: self.title(), what })
     }
 
-    /// The model's profile, or an error that says what it was needed for.
+    /// The model's description, or an error that says what it was needed for.
     pub(crate) fn known(&self, intent: &'static str) -> Result<&'static Description, Error> {
-        self.profile.ok_or(Error::UnknownModel { node: self.node.id(), intent })
+        self.description.ok_or(Error::UnknownModel { node: self.node.id(), intent })
     }
 
-    /// The model's profile, if it is more than a guess.
+    /// The model's description, if it is more than a guess.
     pub(super) fn named(&self, intent: &'static str) -> Result<&'static Description, Error> {
         match self.guess() {
             Some(guess) => Err(Error::GuessedModel { node: self.node.id(), intent: intent.to_owned(), guess }),
@@ -225,10 +225,10 @@ impl Drive {
 
     /// The model's row of an object.
     pub(super) fn row(&self, mux: Mux, intent: &'static str) -> Result<&'static Entry, Error> {
-        let profile = self.known(intent)?;
-        let slot = profile.dictionary.find(mux);
+        let description = self.known(intent)?;
+        let slot = description.dictionary.find(mux);
         let slot = slot.map_err(|code| Error::Aborted { node: self.node.id(), mux, access: Access::Read, code })?;
-        Ok(profile.dictionary.row(slot))
+        Ok(description.dictionary.row(slot))
     }
 
     /// Reads an object as the model's table types it.

@@ -42,9 +42,9 @@ impl Drive {
 
     async fn setting(&self, object: Mux) -> Result<Setting, Error> {
         let value = self.read_number(object).await?;
-        let profile = self.known("tell its limits")?;
-        let name = profile.row(object).map_or("", |row| row.name);
-        let since_restart = profile.storage.effective_after_restart.contains(&object);
+        let description = self.known("tell its limits")?;
+        let name = description.row(object).map_or("", |row| row.name);
+        let since_restart = description.storage.effective_after_restart.contains(&object);
         Ok(Setting { object, name, value, since_restart })
     }
 

@@ -3,7 +3,7 @@
 //! In: what a person wants ("turn 90 degrees at 30 r/min"). Out: SDO requests to the node in the order that CiA 402-2
 //! and the model's manual ask for, and either success or an [`Explanation`]. What a model's raw values are worth, and
 //! where it departs from the standard, comes from its [`Description`](devices::Description); no model is known here by its name, and 6502h is
-//! never asked for. Without a profile only what the standard fixes is offered.
+//! never asked for. Without a description only what the standard fixes is offered.
 //! While a motion is supervised, the polling keeps the drive's watch over its host content.
 
 mod conclude;

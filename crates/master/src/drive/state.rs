@@ -58,7 +58,7 @@ impl Drive {
         let mode = refused_is_none(self.mode().await)?;
         let fault_code =
             refused_is_none(self.node.upload(self.fault_code()).await)?.map_or(0, |payload| payload.raw() as u16);
-        let faults = self.profile.map(|profile| faults_in(profile, fault_code)).unwrap_or_default();
+        let faults = self.description.map(|description| faults_in(description, fault_code)).unwrap_or_default();
         let position =
             refused_is_none(self.node.read::<i32>(self.place(POSITION_ACTUAL)).await)?.map(|raw| Counts(raw.into()));
         let angle = match (position, self.axis_description()) {
@@ -85,14 +85,14 @@ impl Drive {
             supply: self.measure(units.and_then(|units| units.bus_voltage)).await?.map(Volts),
             motor_temperature: self.measure(units.and_then(|units| units.motor_temperature)).await?.map(Celsius),
             driver_temperature: self.measure(units.and_then(|units| units.driver_temperature)).await?.map(Celsius),
-            nmt: facts.probable_state(self.profile),
+            nmt: facts.probable_state(self.description),
             heartbeat_age: facts.heartbeat_age(self.node.network().now()),
         })
     }
 
     /// Where the present fault code is.
     pub(super) fn fault_code(&self) -> Mux {
-        self.place(self.profile.and_then(|profile| profile.faults.code).unwrap_or(ERROR_CODE))
+        self.place(self.description.and_then(|description| description.faults.code).unwrap_or(ERROR_CODE))
     }
 
     async fn measure(&self, quantity: Option<Quantity>) -> Result<Option<f64>, Error> {
@@ -105,7 +105,7 @@ impl Drive {
 
 impl DriveState {
     /// The bits of the statusword that are set, in words. Bits 8 and 11 to 15 are told by their number where mode
-    /// or maker decide what they mean, unless the model's profile says it.
+    /// or maker decide what they mean, unless the model's description says it.
     pub fn statusword_words(&self) -> Vec<&'static str> {
         let own = self.own_bits.iter().filter(|(mask, _)| self.statusword.has(*mask)).map(|(_, name)| *name);
         if self.style != PowerStyle::Cia402 {

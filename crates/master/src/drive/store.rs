@@ -16,9 +16,9 @@ impl Drive {
     /// [`Error::NoParameterStore`]; [`Error::UnknownModel`], [`Error::GuessedModel`], [`Error::WrongModel`], [`Error::OtherModel`], and nothing is
     /// written: what means "save" to one model may be anything to another of the same identity. Those of the SDO write.
     pub async fn save(&self) -> Result<(), Error> {
-        let profile = self.named("save its parameters")?;
-        let model = profile.title;
-        let save = profile.storage.save.ok_or(Error::NoParameterStore { node: self.node.id(), model })?;
+        let description = self.named("save its parameters")?;
+        let model = description.title;
+        let save = description.storage.save.ok_or(Error::NoParameterStore { node: self.node.id(), model })?;
         self.check_identity().await?;
         self.command(save).await
     }
@@ -28,9 +28,9 @@ impl Drive {
     /// # Errors
     /// As [`save`](Self::save); [`Error::NoFactorySettings`] for a model that cannot be told to.
     pub async fn restore(&self) -> Result<(), Error> {
-        let profile = self.named("restore its factory settings")?;
-        let model = profile.title;
-        let restore = profile.storage.restore.ok_or(Error::NoFactorySettings { node: self.node.id(), model })?;
+        let description = self.named("restore its factory settings")?;
+        let model = description.title;
+        let restore = description.storage.restore.ok_or(Error::NoFactorySettings { node: self.node.id(), model })?;
         self.check_identity().await?;
         self.command(restore).await
     }

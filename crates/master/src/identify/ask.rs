@@ -102,14 +102,14 @@ async fn told_apart(node: &Node, known: &Models, models: &[&'static Description]
     if others.is_empty() {
         return Ok((*first).into());
     }
-    let guessed = |profile, evidence| Guess { profile, evidence, known: known.clone() };
+    let guessed = |description, evidence| Guess { description, evidence, known: known.clone() };
     if others.iter().all(|other| other.same_objects(first)) {
         return Ok(Knowledge::Guessed(guessed(first, None)));
     }
     let mut guess: Option<Guess> = None;
     for model in models {
         let Some(object) = model.distinguishing_object else { continue };
-        let same = |guess: &Guess| guess.profile().same_objects(model);
+        let same = |guess: &Guess| guess.description().same_objects(model);
         if guess.as_ref().is_some_and(same) || !has(node, object).await? {
             continue;
         }
@@ -167,7 +167,7 @@ impl Network {
         });
         let _ = join_all(due.collect::<Vec<_>>()).await;
         for found in found {
-            found.nmt_state = self.facts(found.node).probable_state(found.knowledge.profile());
+            found.nmt_state = self.facts(found.node).probable_state(found.knowledge.description());
         }
     }
 
@@ -186,7 +186,7 @@ impl Network {
             None => None,
         };
         let heartbeat = heartbeat.map(|ms| Duration::from_millis(u64::from(ms) & 0xFFFF));
-        let nmt_state = facts.probable_state(knowledge.profile());
+        let nmt_state = facts.probable_state(knowledge.description());
         Some(Found { node: id, identity, nmt_state, heartbeat, knowledge, models })
     }
 }

@@ -61,11 +61,11 @@ pub enum Knowledge {
 }
 
 impl Knowledge {
-    /// The profile to work with: of a guess, the one that all models it may be agree with.
-    pub const fn profile(&self) -> Option<&'static Description> {
+    /// The description to work with: of a guess, the one that all models it may be agree with.
+    pub const fn description(&self) -> Option<&'static Description> {
         match self {
-            Self::Named(Model(profile)) => Some(profile),
-            Self::Guessed(guess) => Some(guess.profile),
+            Self::Named(Model(description)) => Some(description),
+            Self::Guessed(guess) => Some(guess.description),
             Self::Unknown => None,
         }
     }
@@ -77,12 +77,12 @@ impl Knowledge {
 }
 
 impl From<&'static Description> for Knowledge {
-    fn from(profile: &'static Description) -> Self {
-        Self::Named(Model(profile))
+    fn from(description: &'static Description) -> Self {
+        Self::Named(Model(description))
     }
 }
 
-/// A model's profile, which prints as its name.
+/// A model's description, which prints as its name.
 #[derive(Clone, Copy)]
 pub struct Model(pub &'static Description);
 
@@ -97,16 +97,16 @@ impl fmt::Debug for Model {
 /// Models with the same objects differ in their motors only: they are read and moved in the same way.
 #[derive(Clone)]
 pub struct Guess {
-    pub(super) profile: &'static Description,
+    pub(super) description: &'static Description,
     pub(super) evidence: Option<Mux>,
     /// Those among which the model was looked for.
     pub(super) known: Models,
 }
 
 impl Guess {
-    /// The profile to read and move with.
-    pub const fn profile(&self) -> &'static Description {
-        self.profile
+    /// The description to read and move with.
+    pub const fn description(&self) -> &'static Description {
+        self.description
     }
 
     /// The object that speaks for it; `None` where all that answer so have the same objects.
@@ -116,25 +116,25 @@ impl Guess {
 
     /// The models that it may be by its objects.
     pub fn fitting(&self) -> impl Iterator<Item = &'static Description> {
-        self.known.catalogue().same_objects(self.profile)
+        self.known.catalogue().same_objects(self.description)
     }
 
     /// True if this value of this object means the same on every model that answers so.
     pub fn may_write(&self, mux: Mux, value: i64) -> bool {
-        self.known.catalogue().agree_on(self.profile, mux, value)
+        self.known.catalogue().agree_on(self.description, mux, value)
     }
 }
 
 impl fmt::Debug for Guess {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Guess {{ {}, {:?} }}", self.profile.name, self.evidence)
+        write!(f, "Guess {{ {}, {:?} }}", self.description.name, self.evidence)
     }
 }
 
 /// Why it is no more than a guess: "zlac8030l, zlim42c and zlim42c-82 answer the same identity; it has 2029h:00 as zlac8030l has".
 impl fmt::Display for Guess {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (answering, _) = names(self.known.catalogue().same_identity(self.profile));
+        let (answering, _) = names(self.known.catalogue().same_identity(self.description));
         let (fitting, several) = names(self.fitting());
         write!(f, "{answering} answer the same identity")?;
         match self.evidence {

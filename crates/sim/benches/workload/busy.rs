@@ -32,7 +32,7 @@ const DRIVE_ON: [u8; 6] = [0x0F, 0, 100, 0, 0, 0];
 
 /// One drive whose host sends SYNC and three RPDOs each millisecond and gets four TPDOs.
 pub(super) fn controlled_each_millisecond() -> World {
-    let (mut world, tap) = turning(hub_servos(1));
+    let (mut world, probe) = turning(hub_servos(1));
     for (record, objects) in [
         (0x1600, &[CONTROLWORD, TARGET_VELOCITY][..]),
         (0x1601, &[TARGET_POSITION, PROFILE_VELOCITY]),
@@ -42,43 +42,43 @@ pub(super) fn controlled_each_millisecond() -> World {
         (0x1A02, &[BUS_VOLTAGE, MOTOR_TEMPERATURE, DRIVER_TEMPERATURE]),
         (0x1A03, &[MOTOR_STATUS, HALL_STATUS]),
     ] {
-        map(&mut world, tap, 1, record, objects);
+        map(&mut world, probe, 1, record, objects);
     }
     let rpdos = [
         Frame::new(CanId::standard(0x201), &DRIVE_ON),
         Frame::new(CanId::standard(0x301), &[0x00, 0x10, 0, 0, 120, 0, 0, 0]),
         Frame::new(CanId::standard(0x401), &[0, 0, 0x2C, 0x01, 0, 0]),
     ];
-    under_a_host(world, tap, Duration::from_millis(1), &rpdos, 1)
+    under_a_host(world, probe, Duration::from_millis(1), &rpdos, 1)
 }
 
 /// 127 drives with one RPDO and one TPDO each in a cycle of 40 ms.
 pub(super) fn many_in_one_cycle() -> World {
-    let (mut world, tap) = turning(hub_servos(127));
+    let (mut world, probe) = turning(hub_servos(127));
     for node in 1..=127 {
-        map(&mut world, tap, node, 0x1600, &[CONTROLWORD, TARGET_VELOCITY]);
-        map(&mut world, tap, node, 0x1A00, &[POSITION_ACTUAL_VALUE, VELOCITY_ACTUAL_VALUE]);
+        map(&mut world, probe, node, 0x1600, &[CONTROLWORD, TARGET_VELOCITY]);
+        map(&mut world, probe, node, 0x1A00, &[POSITION_ACTUAL_VALUE, VELOCITY_ACTUAL_VALUE]);
     }
     let rpdos: Vec<Frame> = (1..=127).map(|node| Frame::new(CanId::standard(0x200 + node), &DRIVE_ON)).collect();
-    under_a_host(world, tap, Duration::from_millis(40), &rpdos, 127)
+    under_a_host(world, probe, Duration::from_millis(40), &rpdos, 127)
 }
 
 /// Maps objects into a PDO; a TPDO is to be sent at each SYNC.
-fn map(world: &mut World, tap: StationId, node: u8, record: u16, objects: &[u32]) {
+fn map(world: &mut World, probe: StationId, node: u8, record: u16, objects: &[u32]) {
     let [low, high] = record.to_le_bytes();
-    request(world, tap, node, [0x2F, low, high, 0, 0, 0, 0, 0], false);
+    request(world, probe, node, [0x2F, low, high, 0, 0, 0, 0, 0], false);
     for (sub, object) in (1..).zip(objects) {
         let [a, b, c, d] = object.to_le_bytes();
-        request(world, tap, node, [0x23, low, high, sub, a, b, c, d], false);
+        request(world, probe, node, [0x23, low, high, sub, a, b, c, d], false);
     }
-    request(world, tap, node, [0x2F, low, high, 0, objects.len() as u8, 0, 0, 0], false);
+    request(world, probe, node, [0x2F, low, high, 0, objects.len() as u8, 0, 0, 0], false);
     if record >= 0x1A00 {
-        request(world, tap, node, [0x2F, low, 0x18, 2, 1, 0, 0, 0], false);
+        request(world, probe, node, [0x2F, low, 0x18, 2, 1, 0, 0, 0], false);
     }
 }
 
-fn under_a_host(mut world: World, tap: StationId, cycle: Duration, rpdos: &[Frame], drives: u8) -> World {
-    world.send(tap, Frame::new(CanId::standard(0), &[1, 0])).expect("the tap has room"); // NMT start, all
+fn under_a_host(mut world: World, probe: StationId, cycle: Duration, rpdos: &[Frame], drives: u8) -> World {
+    world.send(probe, Frame::new(CanId::standard(0), &[1, 0])).expect("the probe has room"); // NMT start, all
     let sync = Frame::new(CanId::standard(0x080), &[]);
     let frames = [&[sync], rpdos].concat();
     world.run_for(Duration::from_millis(2));

@@ -60,7 +60,7 @@ fn stepper(node: u8) -> (u8, Box<dyn VirtualDrive>) {
 fn not_enabled() -> World {
     let mut world = World::new(Bitrate::M1, 1);
     // Somebody who acknowledges: alone it would repeat its boot-up message for ever.
-    world.add_tap();
+    world.add_probe();
     world.add_drive(1, Box::new(zlac8030l(1, 0))).expect("numbers differ");
     world.run_for(Duration::from_secs(1));
     world
@@ -69,19 +69,19 @@ fn not_enabled() -> World {
 /// A bus of drives that all turn at 100 r/min, with next to no frame on it; and who may speak there.
 fn turning(drives: Drives) -> (World, StationId) {
     let mut world = World::new(Bitrate::M1, 1);
-    let tap = world.add_tap();
+    let probe = world.add_probe();
     let nodes: Vec<u8> = drives.iter().map(|(node, _)| *node).collect();
     for (node, drive) in drives {
         world.add_drive(node, drive).expect("numbers differ");
     }
     world.run_for(Duration::from_millis(20));
-    while world.poll_received(tap).is_some() {} // boot-up messages
+    while world.poll_received(probe).is_some() {} // boot-up messages
     for node in &nodes {
-        turn(&mut world, tap, *node);
+        turn(&mut world, probe, *node);
     }
     world.run_for(Duration::from_secs(1));
     assert_turning(&mut world, &nodes);
-    (world, tap)
+    (world, probe)
 }
 
 fn assert_turning(world: &mut World, nodes: &[u8]) {
@@ -93,21 +93,21 @@ fn assert_turning(world: &mut World, nodes: &[u8]) {
 }
 
 /// Profile velocity at 100 r/min, enabled as each of the drives can be; no watch over the host where there is one.
-fn turn(world: &mut World, tap: StationId, node: u8) {
-    request(world, tap, node, [0x2B, 0x00, 0x20, 0, 0, 0, 0, 0], true);
-    request(world, tap, node, [0x2F, 0x60, 0x60, 0, 3, 0, 0, 0], false);
+fn turn(world: &mut World, probe: StationId, node: u8) {
+    request(world, probe, node, [0x2B, 0x00, 0x20, 0, 0, 0, 0, 0], true);
+    request(world, probe, node, [0x2F, 0x60, 0x60, 0, 3, 0, 0, 0], false);
     for command in [0x06, 0x07, 0x0F] {
-        request(world, tap, node, [0x2B, 0x40, 0x60, 0, command, 0, 0, 0], false);
+        request(world, probe, node, [0x2B, 0x40, 0x60, 0, command, 0, 0, 0], false);
     }
-    request(world, tap, node, [0x23, 0xFF, 0x60, 0, 100, 0, 0, 0], false);
+    request(world, probe, node, [0x23, 0xFF, 0x60, 0, 100, 0, 0, 0], false);
 }
 
 /// An SDO request and its answer.
-fn request(world: &mut World, tap: StationId, node: u8, data: [u8; 8], may_refuse: bool) {
+fn request(world: &mut World, probe: StationId, node: u8, data: [u8; 8], may_refuse: bool) {
     let request = Frame::full(CanId::standard(0x600 + u16::from(node)), data);
-    world.send(tap, request).expect("the tap has room");
+    world.send(probe, request).expect("the probe has room");
     world.run_for(Duration::from_millis(1));
-    let answers = std::iter::from_fn(|| world.poll_received(tap)).map(|(_, frame)| frame);
+    let answers = std::iter::from_fn(|| world.poll_received(probe)).map(|(_, frame)| frame);
     let answer = answers.filter(|frame| frame.id() == CanId::standard(0x580 + u16::from(node))).last();
     let first = answer.and_then(|frame| frame.data().first().copied());
     assert!(first == Some(0x60) || (may_refuse && first == Some(0x80)), "{request} -> {answer:?}");

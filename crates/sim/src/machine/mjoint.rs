@@ -8,7 +8,7 @@ use can::Bitrate;
 use devices::AxisId;
 use devices::Description;
 use drives::RegisterError;
-use drives::engine::storage::Image;
+use drives::engine::storage::StoredImage;
 use drives::mjoint::assumptions::{COUNTS_PER_TURN, COUNTS_S_PER_RPM};
 use drives::mjoint::variations::VARIANT;
 use drives::mjoint::{Actuation, Battery, Brake, Hardware, MJoint, Model, PowerStage, Sensors, objects, storage};
@@ -48,7 +48,7 @@ pub type MJointMachine = Machine<Joint>;
 ///
 /// `bitrate` is the rate that its CAN controller is built for: 1 Mbit/s on a real one.
 pub fn mjoint(model: &'static Model, node: u8, bitrate: Bitrate) -> MJointMachine {
-    let image = Image::of(&storage::addressed(&VARIANT, node));
+    let image = StoredImage::of(&storage::addressed(&VARIANT, node));
     Machine::new(MJoint::new(model), Joint::new(model, image, bitrate))
 }
 
@@ -64,7 +64,7 @@ pub(super) fn ordered(model: &Description, order: &Order) -> Result<Box<dyn Virt
 pub struct Joint {
     model: &'static Model,
     motor: JointMotor,
-    image: Image,
+    image: StoredImage,
     bitrate: Bitrate,
     pulses: PulseSource,
     last: Actuation,
@@ -85,7 +85,7 @@ struct EncoderReading {
 
 impl Joint {
     /// At rest at ambient temperature, the supply not yet connected.
-    pub fn new(model: &'static Model, image: Image, bitrate: Bitrate) -> Self {
+    pub fn new(model: &'static Model, image: StoredImage, bitrate: Bitrate) -> Self {
         let mut motor = JointMotor::new(motor_of(model), Angle::default(), SUPPLY_V, AMBIENT_C);
         motor.model.rig.supply.source_capacitance_f = SUPPLY_CAPACITANCE_F;
         motor.rig.supply = SupplyData::switched_off(SUPPLY_V);
@@ -166,7 +166,7 @@ impl Assembly for Joint {
 
     /// A broken EEPROM reads as a blank one; what is in it comes back when it is mended.
     fn hardware(&self) -> Hardware {
-        let eeprom = if self.eeprom_broken { Image::from_bytes(&[]) } else { self.image };
+        let eeprom = if self.eeprom_broken { StoredImage::from_bytes(&[]) } else { self.image };
         Hardware { eeprom, bitrate: self.bitrate }
     }
 
@@ -290,7 +290,7 @@ impl Assembly for Joint {
     /// A blank image is what a firmware has that found the EEPROM broken: nothing was written then.
     fn keep_image(&mut self, image: &[u8]) {
         if image.iter().any(|byte| *byte != 0xFF) {
-            self.image = Image::from_bytes(image);
+            self.image = StoredImage::from_bytes(image);
         }
     }
 

@@ -5,7 +5,7 @@ use canopen::od::{Dictionary, Storage};
 use canopen::{Mux, NodeId};
 use devices::Description;
 use devices::variant::{Preset, PresetError, Variant};
-use drives::engine::storage::Image;
+use drives::engine::storage::StoredImage;
 use drives::node::{Memory, is_parameter};
 
 /// What is wanted of a drive beside its model.
@@ -28,11 +28,11 @@ impl Order {
     }
 
     /// The parameter store of this drive, from the values of one as delivered.
-    pub(super) fn image<S: Storage>(&self, mut values: Dictionary<S>) -> Result<Image, OrderError> {
+    pub(super) fn image<S: Storage>(&self, mut values: Dictionary<S>) -> Result<StoredImage, OrderError> {
         for preset in &self.presets {
             preset.store(&mut values).map_err(|error| OrderError::Preset { preset: *preset, error })?;
         }
-        Ok(Image::of(&values))
+        Ok(StoredImage::of(&values))
     }
 }
 

@@ -8,7 +8,7 @@ use devices::AxisId;
 use devices::Description;
 use devices::variant::Variant;
 use devices::zltech::ZLAC8030L;
-use drives::engine::storage::Image;
+use drives::engine::storage::StoredImage;
 use drives::zlac8030l::assumptions::REFERENCE_V;
 use drives::zlac8030l::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use drives::zlac8030l::variations::{FAST_MOTOR, VARIANT};
@@ -49,7 +49,7 @@ pub type Zlac8030lMachine = Machine<HubWheel>;
 /// `node` 1 to 3 is set at the DIP switches; any other number is stored in the EEPROM. `baud_rate` is the value of
 /// 200Eh in the EEPROM.
 pub fn zlac8030l(node: u8, baud_rate: u16) -> Zlac8030lMachine {
-    let image = Image::of(&storage::addressed(&VARIANT, node, baud_rate));
+    let image = StoredImage::of(&storage::addressed(&VARIANT, node, baud_rate));
     Machine::new(Zlac8030l::new(), HubWheel::new(dip_address(node), image, &VARIANT))
 }
 
@@ -74,7 +74,7 @@ const fn dip_address(node: u8) -> u8 {
 pub struct HubWheel {
     motor: HubMotor,
     dip_address: u8,
-    image: Image,
+    image: StoredImage,
     eeprom_broken: bool,
     reference_broken: bool,
     dead_time: bool,
@@ -83,7 +83,7 @@ pub struct HubWheel {
 
 impl HubWheel {
     /// At rest at ambient temperature, the supply not yet connected, with the motor of this variant.
-    pub fn new(dip_address: u8, image: Image, variant: &Variant) -> Self {
+    pub fn new(dip_address: u8, image: StoredImage, variant: &Variant) -> Self {
         let fast = variant.is(FAST_MOTOR);
         let mut model = if fast { HubMotorModel::ZLLG65ASM250 } else { HubMotorModel::ZLLG65ASM250_L };
         model.brake.holding_nm = BRAKE_NM;
@@ -221,7 +221,7 @@ impl Assembly for HubWheel {
     }
 
     fn keep_image(&mut self, image: &[u8]) {
-        self.image = Image::from_bytes(image);
+        self.image = StoredImage::from_bytes(image);
     }
 
     fn set_rotor_locked(&mut self, _axis: AxisId, locked: bool) {

@@ -9,7 +9,7 @@ use devices::AxisId;
 use devices::Description;
 use devices::zltech::{ZLIM42C, ZLIM42C_82};
 use drives::engine::axis::Demand;
-use drives::engine::storage::Image;
+use drives::engine::storage::StoredImage;
 use drives::zlim42c::assumptions::{REFERENCE_V, TEETH};
 use drives::zlim42c::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use drives::zlim42c::variations::VARIANT;
@@ -94,7 +94,7 @@ const fn dip_address(node: u8) -> u8 {
 pub struct Stepper<const LENGTH_MM: u16> {
     motor: StepperMotor,
     dip_address: u8,
-    image: Image,
+    image: StoredImage,
     eeprom_broken: bool,
     reference_broken: bool,
     dead_time: bool,
@@ -105,7 +105,7 @@ pub struct Stepper<const LENGTH_MM: u16> {
 
 impl<const LENGTH_MM: u16> Stepper<LENGTH_MM> {
     /// At rest at ambient temperature, the supply not yet connected.
-    pub fn new(dip_address: u8, image: Image) -> Self {
+    pub fn new(dip_address: u8, image: StoredImage) -> Self {
         let model = if LENGTH_MM == LONG { StepperMotorModel::ZLIM42_C_82 } else { StepperMotorModel::ZLIM42_C_70 };
         let mut motor = StepperMotor::new(model, Angle::default(), SUPPLY_V, AMBIENT_C);
         motor.rig.supply = SupplyData::switched_off(SUPPLY_V);
@@ -137,7 +137,7 @@ impl<const LENGTH_MM: u16> Stepper<LENGTH_MM> {
     }
 
     fn addressed(node: u8, baud_rate: u16) -> Self {
-        Self::new(dip_address(node), Image::of(&storage::addressed(&VARIANT, node, baud_rate)))
+        Self::new(dip_address(node), StoredImage::of(&storage::addressed(&VARIANT, node, baud_rate)))
     }
 
     fn damage(&self) -> Option<&'static str> {
@@ -276,7 +276,7 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
     }
 
     fn keep_image(&mut self, image: &[u8]) {
-        self.image = Image::from_bytes(image);
+        self.image = StoredImage::from_bytes(image);
         self.zero = None;
     }
 

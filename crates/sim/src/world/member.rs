@@ -1,10 +1,10 @@
-//! Who can be on the bus: drives, stations, taps.
+//! Who can be on the bus: drives, stations, probes.
 
 use std::any::Any;
 
 use can::{Frame, Instant, Station};
 
-use super::tap::Tap;
+use super::probe::Probe;
 use crate::VirtualDrive;
 
 /// A station that a world can copy and hand back; comes by itself with `Clone + Send`.
@@ -42,8 +42,8 @@ impl Clone for Box<dyn AnyStation> {
 pub(super) enum Member {
     Drive { number: u8, drive: Box<dyn VirtualDrive> },
     Station(Box<dyn AnyStation>),
-    Tap(Tap),
-    Gone(Nobody),
+    Probe(Probe),
+    Gone(Vacant),
 }
 
 impl Member {
@@ -51,7 +51,7 @@ impl Member {
         match self {
             Self::Drive { drive, .. } => &mut **drive,
             Self::Station(station) => &mut **station,
-            Self::Tap(tap) => tap,
+            Self::Probe(probe) => probe,
             Self::Gone(nobody) => nobody,
         }
     }
@@ -59,9 +59,9 @@ impl Member {
 
 /// What is left of a station that was removed.
 #[derive(Clone)]
-pub(super) struct Nobody;
+pub(super) struct Vacant;
 
-impl Station for Nobody {
+impl Station for Vacant {
     fn handle_frame(&mut self, _: &Frame, _: Instant) {}
 
     fn handle_timeout(&mut self, _: Instant) {}

@@ -44,8 +44,8 @@ pub fn states(world: &World, id: StationId) -> Vec<(u64, ErrorState)> {
     states.collect()
 }
 
-pub fn heard(world: &mut World, tap: StationId) -> Vec<String> {
-    std::iter::from_fn(|| world.poll_received(tap)).map(|(_, frame)| frame.to_string()).collect()
+pub fn heard(world: &mut World, probe: StationId) -> Vec<String> {
+    std::iter::from_fn(|| world.poll_received(probe)).map(|(_, frame)| frame.to_string()).collect()
 }
 
 /// Sends one frame again and again.

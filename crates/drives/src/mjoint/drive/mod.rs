@@ -38,7 +38,7 @@ use crate::engine::axis::{Axis, Demand, HomingState};
 use crate::engine::device::{Application, Device};
 use crate::engine::faults::FaultMonitor;
 use crate::engine::inputs::Inputs;
-use crate::engine::storage::Image;
+use crate::engine::storage::StoredImage;
 use crate::{Firmware, Report};
 use devices::variant::Variant;
 
@@ -134,7 +134,7 @@ impl MJoint {
 
     /// The same of another variant.
     pub fn of(model: &'static Model, variant: Variant) -> Self {
-        let image = Image::of(&storage::delivered(&variant));
+        let image = StoredImage::of(&storage::delivered(&variant));
         Self::over(model, Device::new(&NODE_PROFILE, Bitrate::M1, image, COMMUNICATION_PERIOD_NS, variant))
     }
 

@@ -29,7 +29,7 @@ use crate::engine::cia402::Targets;
 use crate::engine::device::{Application, Device};
 use crate::engine::faults::{FaultMonitor, FaultSet};
 use crate::engine::host_watchdog::HostWatchdog;
-use crate::engine::storage::Image;
+use crate::engine::storage::StoredImage;
 use crate::zltech::Shell;
 use crate::zltech::terminals::Conditions;
 use crate::{Firmware, Report};
@@ -71,7 +71,7 @@ impl Zlac8030l {
 
     /// The same of another variant.
     pub fn of(variant: Variant) -> Self {
-        let image = Image::of(&storage::delivered(&variant));
+        let image = StoredImage::of(&storage::delivered(&variant));
         Self::over(Device::new(&NODE_PROFILE, Bitrate::K500, image, COMMUNICATION_PERIOD_NS, variant))
     }
 

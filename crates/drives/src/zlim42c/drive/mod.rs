@@ -26,7 +26,7 @@ use crate::engine::axis::{Demand, Feedback};
 use crate::engine::cia402::Targets;
 use crate::engine::device::{Application, Device};
 use crate::engine::faults::{FaultMonitor, FaultSet};
-use crate::engine::storage::Image;
+use crate::engine::storage::StoredImage;
 use crate::zltech::Shell;
 use crate::zltech::terminals::Conditions;
 use crate::{Firmware, Report};
@@ -60,7 +60,7 @@ impl Zlim42c {
 
     /// The same of another variant.
     pub fn of(variant: Variant) -> Self {
-        let image = Image::of(&storage::delivered(&variant));
+        let image = StoredImage::of(&storage::delivered(&variant));
         Self::over(Device::new(&NODE_PROFILE, Bitrate::K500, image, COMMUNICATION_PERIOD_NS, variant))
     }
 
@@ -246,7 +246,7 @@ impl Zlim42c {
         let (state, mode) = (self.shell.axis.state(), self.shell.axis.mode());
         let energised = self.shell.is_energised(self.parameters.axis.external_stop, self.parameters.holding);
         let word =
-            statusword(statusword::Situation { state, mode, controlword: self.controlword, energised, axis: status });
+            statusword(statusword::Condition { state, mode, controlword: self.controlword, energised, axis: status });
         let conditions = Conditions {
             alarm: state == PowerState::Fault,
             enabled: self.shell.axis.is_live(),

@@ -4,17 +4,17 @@ use std::collections::VecDeque;
 
 use can::{Frame, Instant, Station};
 
-/// Frames a tap holds for sending, and heard frames it keeps: as much as a busy bus brings in a second.
+/// Frames a probe holds for sending, and heard frames it keeps: as much as a busy bus brings in a second.
 const QUEUE: usize = 8192;
 
 /// A CAN adapter: queues between the bus and somebody outside.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Tap {
+pub(super) struct Probe {
     outgoing: VecDeque<Frame>,
     received: VecDeque<(Instant, Frame)>,
 }
 
-impl Tap {
+impl Probe {
     pub(super) fn send(&mut self, frame: Frame) -> Result<(), Frame> {
         if self.outgoing.len() >= QUEUE {
             return Err(frame);
@@ -28,7 +28,7 @@ impl Tap {
     }
 }
 
-impl Station for Tap {
+impl Station for Probe {
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
         if self.received.len() >= QUEUE {
             self.received.pop_front();
