@@ -104,6 +104,18 @@ pub enum CommandError {
     Refused(#[from] Refused),
 }
 
+impl CommandError {
+    /// What kind it is, in a word that programs may rely on.
+    pub const fn kind(&self) -> &'static str {
+        match self {
+            Self::TooLong => "too_long",
+            Self::Unknown(_) | Self::BadNode(_) | Self::NoAction(_) | Self::Stimulus(_) => "usage",
+            Self::NoSuchDrive { .. } => "no_such_node",
+            Self::Refused(_) => "refused",
+        }
+    }
+}
+
 /// What to print for a line, and whether it was the last.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Answer {
@@ -123,6 +135,14 @@ pub struct Service {
     pub behind: Duration,
     /// Frames of clients that were given up.
     pub frames_lost: u64,
+}
+
+/// Does what `command` says; returns the line of JSON that answers it. `quit` changes nothing: its caller ends.
+///
+/// # Errors
+/// No such drive, or what it does not take; nothing is changed then.
+pub fn perform(world: &mut World, command: &Command, service: Service) -> Result<String, CommandError> {
+    answer::answer(world, command, service)
 }
 
 /// Does what a line says and answers it, in a world that nobody serves; `None` for a blank line or a comment.

@@ -17,8 +17,10 @@
 //! Deliberately absent: clocks, threads and sockets. Files are read where a name of one is the only thing that a user gives,
 //! and only regular ones of bounded size.
 
+pub mod control;
 pub mod data_sheet;
 pub mod document;
+pub mod events;
 pub mod machine_file;
 pub mod models;
 pub mod recording;

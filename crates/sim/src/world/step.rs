@@ -57,7 +57,9 @@ impl World {
         self.now = self.now.max(at);
     }
 
-    fn measure(&mut self, place: Place) -> Option<Report> {
+    /// What can be measured at an axis of a drive, now; `None` without such a drive. Unlike [`report`](Self::report) it does not
+    /// touch the drive: the run stays the same run.
+    pub fn measure(&mut self, place: Place) -> Option<Report> {
         let now = self.now;
         self.members.iter_mut().find_map(|member| match member {
             Member::Drive { number, drive } if *number == place.node => {

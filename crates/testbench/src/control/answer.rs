@@ -1,0 +1,67 @@
+//! Answers: one line of JSON each.
+
+use serde_json::{Value, json};
+use sim::command::CommandError;
+
+use super::request::Id;
+
+/// Why a request was not done, in the form of every error here: what kind, what, about which node, what to do.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{message}")]
+pub struct ControlError {
+    kind: &'static str,
+    message: String,
+    node: Option<u8>,
+    next: Option<String>,
+}
+
+impl ControlError {
+    /// Of a kind that programs may rely on.
+    pub fn new(kind: &'static str, message: impl Into<String>) -> Self {
+        Self { kind, message: message.into(), node: None, next: None }
+    }
+
+    /// The request makes no sense.
+    pub fn usage(message: impl Into<String>) -> Self {
+        Self::new("usage", message)
+    }
+
+    /// Says what to do.
+    #[must_use]
+    pub fn next(self, next: impl Into<String>) -> Self {
+        Self { next: Some(next.into()), ..self }
+    }
+
+    /// The kind.
+    pub const fn kind(&self) -> &'static str {
+        self.kind
+    }
+
+    pub(super) fn answer(&self, id: Option<&Id>) -> String {
+        let Self { kind, message, node, next } = self;
+        let error = json!({
+            "kind": kind, "message": message, "node": node, "object": null, "abort": null, "next": next
+        });
+        marked(id, &json!({ "ok": false, "error": error }).to_string())
+    }
+}
+
+impl From<CommandError> for ControlError {
+    fn from(error: CommandError) -> Self {
+        let node = match &error {
+            CommandError::NoSuchDrive { number, .. } => Some(*number),
+            _ => None,
+        };
+        Self { node, ..Self::new(error.kind(), error.to_string()) }
+    }
+}
+
+/// An answer with the mark of its request: `{"id":1,"ok":true,..}` of `{"ok":true,..}`.
+pub(super) fn marked(id: Option<&Id>, answer: &str) -> String {
+    let id = match id {
+        None => Value::Null,
+        Some(Id::Number(number)) => json!(number),
+        Some(Id::Text(text)) => json!(text),
+    };
+    format!("{{\"id\":{id},{}", answer.trim_start_matches('{'))
+}

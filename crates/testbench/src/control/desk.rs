@@ -1,0 +1,336 @@
+//! The clients of one world: their requests, their subscriptions, and who may ask.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use can::Instant;
+use serde_json::{Value, json};
+use sim::World;
+use sim::command::{Command, CommandError, Service};
+use sim::stimulus::FORMS;
+
+use super::answer::{ControlError, marked};
+use super::lines::{MAX_LINE_LENGTH, ReadLine};
+use super::outbox::Class;
+use super::request::{Goal, Id, Message, REQUESTS, Request};
+use super::subscription::{Subscription, Values};
+use crate::events::{self, KINDS};
+
+/// The version of this protocol. It grows by one when something that a client relies on changes; new fields, requests and
+/// kinds of events may come without.
+pub const PROTOCOL: u32 = 1;
+
+/// Subscriptions of one client.
+const MAX_SUBSCRIPTIONS: usize = 64;
+
+/// Wrong tokens, or requests without one, before a client is sent away.
+const MAX_STRANGER_REQUESTS: u32 = 3;
+
+/// Names a client of a [`Control`].
+pub type ClientNumber = u64;
+
+/// Where lines for a client go.
+pub trait Sink {
+    /// Takes a line without its end; never waits.
+    fn put(&mut self, class: Class, line: String);
+}
+
+/// What else is to be done about a request.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// Nothing: it is answered.
+    Answered,
+    /// The world is to be moved, and then [`Control::answer_run`] called.
+    Run(Pending),
+    /// The client is answered, and to be sent away.
+    Close,
+}
+
+/// A request to move the world that is not answered yet.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pending {
+    /// Whose.
+    pub client: ClientNumber,
+    /// How far.
+    pub goal: Goal,
+    id: Option<Id>,
+}
+
+/// See the [module](super).
+#[derive(Debug)]
+pub struct Control<S> {
+    clients: BTreeMap<ClientNumber, Client<S>>,
+    token: Option<String>,
+}
+
+#[derive(Debug)]
+struct Client<S> {
+    name: Arc<str>,
+    sink: S,
+    /// It has given the token, or none is asked for.
+    admitted: bool,
+    /// Requests without the token.
+    strange: u32,
+    subscriptions: BTreeMap<u64, Subscription>,
+    subscribed: u64,
+}
+
+impl<S: Sink> Control<S> {
+    /// With nobody in it. With a `token` each client has to give it first.
+    pub fn new(token: Option<String>) -> Self {
+        Self { clients: BTreeMap::new(), token }
+    }
+
+    /// A client comes under a number of its own.
+    pub fn join(&mut self, number: ClientNumber, sink: S) {
+        let client = Client {
+            name: format!("control client {number}").into(),
+            sink,
+            admitted: self.token.is_none(),
+            strange: 0,
+            subscriptions: BTreeMap::new(),
+            subscribed: 0,
+        };
+        self.clients.insert(number, client);
+    }
+
+    /// A client is gone, and with it what it subscribed to; what waits for it may still be sent. Its sink is handed back.
+    pub fn leave(&mut self, number: ClientNumber, world: &mut World) -> Option<S> {
+        let client = self.clients.remove(&number)?;
+        self.update_watch(world);
+        Some(client.sink)
+    }
+
+    /// Serves a line of a client, and answers it but for [`Outcome::Run`]. A blank line and a comment have no answer.
+    pub fn handle(&mut self, number: ClientNumber, line: &ReadLine, world: &mut World, service: Service) -> Outcome {
+        let Some(client) = self.clients.get_mut(&number) else { return Outcome::Close };
+        let ReadLine::Text(text) = line else {
+            let reason = format!("the line is longer than {MAX_LINE_LENGTH} bytes, and was thrown away");
+            client.refuse(None, &ControlError::new("too_long", reason));
+            return Outcome::Answered;
+        };
+        if !sim::command::asks_for_an_answer(text) {
+            return Outcome::Answered;
+        }
+        let Message { id, request } = match Message::parse(text) {
+            Ok(message) => message,
+            Err((id, error)) => {
+                client.refuse(id.as_ref(), &error);
+                return if client.admitted { Outcome::Answered } else { client.count_strange() };
+            }
+        };
+        if let Some(outcome) = client.check_token(id.as_ref(), &request, self.token.as_deref()) {
+            return outcome;
+        }
+        if let Request::Run(goal) = request {
+            return Outcome::Run(Pending { client: number, goal, id });
+        }
+        let answered = client.serve(request, world, service);
+        match answered {
+            Ok(answer) => client.sink.put(Class::Answer, marked(id.as_ref(), &answer)),
+            Err(error) => client.refuse(id.as_ref(), &error),
+        }
+        self.update_watch(world);
+        self.publish(world);
+        Outcome::Answered
+    }
+
+    /// Answers a request to move the world, with what has come of it.
+    pub fn answer_run(&mut self, pending: &Pending, done: Result<Instant, ControlError>) {
+        let Some(client) = self.clients.get_mut(&pending.client) else { return };
+        match done {
+            Ok(at) => {
+                let answer = json!({ "ok": true, "t": seconds(at), "t_ns": at.as_nanos() }).to_string();
+                client.sink.put(Class::Answer, marked(pending.id.as_ref(), &answer));
+            }
+            Err(error) => client.refuse(pending.id.as_ref(), &error),
+        }
+    }
+
+    /// When the next values are due: the world goes no further before [`publish`](Self::publish).
+    pub fn next_sample(&self) -> Option<Instant> {
+        let due = |client: &Client<S>| client.subscriptions.values().filter_map(Subscription::next_due).min();
+        self.clients.values().filter_map(due).min()
+    }
+
+    /// Sends what has happened, and the values that are due, to those who have subscribed to them.
+    pub fn publish(&mut self, world: &mut World) {
+        while let Some(event) = world.poll_event() {
+            let mut text = None;
+            for client in self.clients.values_mut() {
+                for (number, subscription) in &client.subscriptions {
+                    let Subscription::Events(filter) = subscription else { continue };
+                    if filter.takes(&event) {
+                        let value = text.get_or_insert_with(|| events::json(&event));
+                        client.sink.put(Class::Event, line(*number, "event", value));
+                    }
+                }
+            }
+        }
+        let now = world.now();
+        if self.next_sample().is_none_or(|due| due > now) {
+            return;
+        }
+        for client in self.clients.values_mut() {
+            for (number, subscription) in &mut client.subscriptions {
+                let Subscription::Values { values, next } = subscription else { continue };
+                if *next <= now {
+                    *next = next_after(*next, values.every_ns(), now);
+                    let sample = json!({ "t": seconds(now), "t_ns": now.as_nanos(), "values": values.sample(world) });
+                    client.sink.put(Class::Values, line(*number, "sample", &sample));
+                }
+            }
+        }
+    }
+
+    /// How many clients there are.
+    pub fn len(&self) -> usize {
+        self.clients.len()
+    }
+
+    /// Nobody is there.
+    pub fn is_empty(&self) -> bool {
+        self.clients.is_empty()
+    }
+
+    /// The world is watched while somebody wants its events.
+    fn update_watch(&self, world: &mut World) {
+        let mut all = self.clients.values().flat_map(|client| client.subscriptions.values());
+        world.watch(all.any(|subscription| matches!(subscription, Subscription::Events(_))));
+    }
+}
+
+impl<S: Sink> Client<S> {
+    fn refuse(&mut self, id: Option<&Id>, error: &ControlError) {
+        self.sink.put(Class::Answer, error.answer(id));
+    }
+
+    /// What a client gets that has not given the token; `None` for one that has, or does so now.
+    fn check_token(&mut self, id: Option<&Id>, request: &Request, token: Option<&str>) -> Option<Outcome> {
+        let given = match request {
+            Request::Hello { token, .. } => token.as_deref(),
+            _ => None,
+        };
+        if let (Some(token), Some(given)) = (token, given) {
+            self.admitted = equal(token.as_bytes(), given.as_bytes());
+        }
+        if self.admitted {
+            return None;
+        }
+        let reason = if given.is_some() { "this is not the token" } else { "a token is asked for first" };
+        let error = ControlError::new("token", reason).next(REQUESTS[0]);
+        self.refuse(id, &error);
+        Some(self.count_strange())
+    }
+
+    fn count_strange(&mut self) -> Outcome {
+        self.strange += 1;
+        if self.strange >= MAX_STRANGER_REQUESTS { Outcome::Close } else { Outcome::Answered }
+    }
+
+    fn serve(&mut self, request: Request, world: &mut World, service: Service) -> Result<String, ControlError> {
+        match request {
+            Request::Hello { name, .. } => {
+                if let Some(name) = name.filter(|name| !name.is_empty()) {
+                    self.name = name.into();
+                }
+                Ok(hello(world))
+            }
+            Request::Help => Ok(help()),
+            Request::Now => self.command(&Command::Now, world, service),
+            Request::Get(place) => self.command(&Command::Get(place), world, service),
+            Request::World(line) if line.len() > sim::command::MAX_LINE_LENGTH => Err(CommandError::TooLong.into()),
+            Request::World(line) => match line.parse()? {
+                Command::Quit => Err(ControlError::usage("quit is for who started the simulator")
+                    .next("close the connection; the simulator ends with `quit` on its standard input, or a signal")),
+                Command::Help => Ok(help()),
+                command => self.command(&command, world, service),
+            },
+            Request::SubscribeEvents(filter) => self.subscribe(Subscription::Events(filter)),
+            Request::SubscribeValues(values) => {
+                check_nodes(&values, world)?;
+                self.subscribe(Subscription::Values { values, next: world.now() })
+            }
+            Request::Unsubscribe(number) => match self.subscriptions.remove(&number) {
+                Some(_) => Ok(json!({ "ok": true, "subscription": number }).to_string()),
+                None => Err(ControlError::usage(format!("there is no subscription {number}"))),
+            },
+            // The caller has dealt with it.
+            Request::Run(_) => Err(ControlError::new("clock", "the time of this world is not moved by requests")),
+        }
+    }
+
+    fn command(&self, command: &Command, world: &mut World, service: Service) -> Result<String, ControlError> {
+        world.act_as(Some(self.name.clone()));
+        let answer = sim::command::perform(world, command, service);
+        world.act_as(None);
+        Ok(answer?)
+    }
+
+    fn subscribe(&mut self, subscription: Subscription) -> Result<String, ControlError> {
+        if self.subscriptions.len() >= MAX_SUBSCRIPTIONS {
+            let reason = format!("{MAX_SUBSCRIPTIONS} subscriptions are the most that one client may have");
+            return Err(ControlError::new("limit", reason).next(REQUESTS[8]));
+        }
+        self.subscribed += 1;
+        self.subscriptions.insert(self.subscribed, subscription);
+        Ok(json!({ "ok": true, "subscription": self.subscribed }).to_string())
+    }
+}
+
+impl Subscription {
+    const fn next_due(&self) -> Option<Instant> {
+        match self {
+            Self::Events(_) => None,
+            Self::Values { next, .. } => Some(*next),
+        }
+    }
+}
+
+/// The next point of the grid after `now`.
+fn next_after(due: Instant, every_ns: u64, now: Instant) -> Instant {
+    let passed = now.nanos_since(due) / every_ns;
+    due.plus_nanos((passed + 1) * every_ns)
+}
+
+fn check_nodes(values: &Values, world: &World) -> Result<(), ControlError> {
+    let there: Vec<u8> = world.drive_numbers().collect();
+    let Some(number) = values.nodes().find(|node| !there.contains(node)) else { return Ok(()) };
+    let present: Vec<String> = there.iter().map(ToString::to_string).collect();
+    Err(CommandError::NoSuchDrive { number, present: present.join(", ") }.into())
+}
+
+fn hello(world: &mut World) -> String {
+    let numbers: Vec<u8> = world.drive_numbers().collect();
+    let mut model = |number| world.with_drive(number, |drive, _| drive.model()).ok();
+    let nodes: Vec<Value> =
+        numbers.into_iter().map(|number| json!({ "node": number, "model": model(number) })).collect();
+    json!({
+        "ok": true,
+        "protocol": PROTOCOL,
+        "program": concat!("ferrodrive ", env!("CARGO_PKG_VERSION")),
+        "nodes": nodes,
+    })
+    .to_string()
+}
+
+fn help() -> String {
+    let kinds: Vec<&str> = KINDS.iter().map(|(name, _)| *name).collect();
+    let signals: Vec<&str> = sim::recorder::Signal::ALL.iter().map(|signal| signal.name()).collect();
+    json!({ "ok": true, "help": REQUESTS, "world": FORMS, "kinds": kinds, "signals": signals }).to_string()
+}
+
+/// A line that nobody asked for just now: `{"subscription":1,"event":{..}}`.
+fn line(subscription: u64, what: &str, value: &Value) -> String {
+    json!({ "subscription": subscription, what: value }).to_string()
+}
+
+fn seconds(at: Instant) -> f64 {
+    sim::json::rounded(at.as_nanos() as f64 / 1e9)
+}
+
+/// Takes as long for a wrong token as for the right one, so that nobody finds it letter by letter.
+fn equal(token: &[u8], given: &[u8]) -> bool {
+    let differences = token.iter().zip(given.iter().chain(core::iter::repeat(&0))).fold(0, |sum, (a, b)| sum | (a ^ b));
+    core::hint::black_box(differences) == 0 && token.len() == given.len()
+}

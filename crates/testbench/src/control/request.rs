@@ -1,0 +1,296 @@
+//! Requests: from a line of text to what is meant.
+
+use can::Instant;
+use core::time::Duration;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
+use sim::stimulus::Place;
+
+use super::answer::ControlError;
+use super::subscription::{Channel, Values};
+use crate::events::Filter;
+use crate::words::suggest::{did_you_mean, near};
+
+/// A request, and the mark that its answer will bear.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Message {
+    /// Whatever the client gave; `None` for none.
+    pub id: Option<Id>,
+    /// What is asked for.
+    pub request: Request,
+}
+
+/// A request's mark: a whole number, or a text of at most 128 bytes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Id {
+    /// A number.
+    Number(i64),
+    /// A text.
+    Text(String),
+}
+
+/// What a client can ask for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Request {
+    /// Who is there: versions, nodes. Gives the token where one is asked for.
+    Hello {
+        /// The token.
+        token: Option<String>,
+        /// What the client is called in events about its world commands.
+        name: Option<String>,
+    },
+    /// What can be asked for.
+    Help,
+    /// The world's time.
+    Now,
+    /// What can be measured at a node.
+    Get(Place),
+    /// A world command, as a line.
+    World(String),
+    /// Moves a world whose time nobody else moves.
+    Run(Goal),
+    /// Events from now on.
+    SubscribeEvents(Filter),
+    /// Values from now on.
+    SubscribeValues(Values),
+    /// Ends a subscription.
+    Unsubscribe(u64),
+}
+
+/// How far to move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Goal {
+    /// By so much.
+    For(Duration),
+    /// To this time.
+    Until(Instant),
+}
+
+/// Each request and its fields, one line each.
+pub const REQUESTS: [&str; 9] = [
+    r#"{"request":"hello","token":"..","name":".."}"#,
+    r#"{"request":"help"}"#,
+    r#"{"request":"now"}"#,
+    r#"{"request":"get","node":4,"axis":1}"#,
+    r#"{"request":"world","line":"4 supply 90"}"#,
+    r#"{"request":"world","node":4,"axis":1,"command":["supply",90]}"#,
+    r#"{"request":"run","for":"20ms"} or {"request":"run","until":"1.5s"}, with --clock manual"#,
+    r#"{"request":"subscribe","events":{"nodes":[4],"kinds":["fault"]}} or {"request":"subscribe","values":[{"node":4,"axis":1,"signals":["velocity_rpm"]}],"every":"10ms"}"#,
+    r#"{"request":"unsubscribe","subscription":1}"#,
+];
+
+const NAMES: [&str; 8] = ["hello", "help", "now", "get", "world", "run", "subscribe", "unsubscribe"];
+
+/// Longest text that marks a request, or names a client.
+const MAX_NAME_LENGTH: usize = 128;
+
+impl Message {
+    /// Reads a line. One that does not begin with `{` is a world command.
+    ///
+    /// # Errors
+    /// What is wrong, and the request's mark as far as it could be read.
+    pub fn parse(line: &str) -> Result<Self, (Option<Id>, ControlError)> {
+        let line = line.trim();
+        if !line.starts_with('{') {
+            return Ok(Self { id: None, request: Request::World(line.to_owned()) });
+        }
+        let syntax =
+            |error: serde_json::Error| (None, ControlError::new("syntax", format!("this is no JSON: {error}")));
+        let mut fields: Map<String, Value> = serde_json::from_str(line).map_err(syntax)?;
+        let id = match fields.remove("id") {
+            None | Some(Value::Null) => None,
+            Some(value) => Some(Id::of(value).map_err(|error| (None, error))?),
+        };
+        match Request::of(fields) {
+            Ok(request) => Ok(Self { id, request }),
+            Err(error) => Err((id, error)),
+        }
+    }
+}
+
+impl Id {
+    fn of(value: Value) -> Result<Self, ControlError> {
+        match value {
+            Value::Number(number) if number.is_i64() => Ok(Self::Number(number.as_i64().unwrap_or_default())),
+            Value::String(text) if text.len() <= MAX_NAME_LENGTH => Ok(Self::Text(text)),
+            _ => Err(ControlError::usage(format!(
+                "\"id\" must be a whole number or a text of at most {MAX_NAME_LENGTH} bytes"
+            ))),
+        }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Nothing {}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct HelloFields {
+    token: Option<String>,
+    name: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GetFields {
+    node: u8,
+    axis: Option<u8>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WorldFields {
+    line: Option<String>,
+    node: Option<u8>,
+    axis: Option<u8>,
+    command: Option<Vec<Value>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RunFields {
+    #[serde(rename = "for")]
+    duration: Option<String>,
+    until: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SubscribeFields {
+    events: Option<EventFields>,
+    values: Option<Vec<ValueFields>>,
+    every: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct EventFields {
+    #[serde(default)]
+    nodes: Vec<u8>,
+    #[serde(default)]
+    kinds: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ValueFields {
+    node: u8,
+    axis: Option<u8>,
+    signals: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct UnsubscribeFields {
+    subscription: u64,
+}
+
+impl Request {
+    fn of(mut fields: Map<String, Value>) -> Result<Self, ControlError> {
+        let Some(Value::String(name)) = fields.remove("request") else {
+            return Err(ControlError::usage("\"request\" is missing, the name of what is asked for").next(REQUESTS[1]));
+        };
+        match name.as_str() {
+            "hello" => {
+                let HelloFields { token, name } = read(fields)?;
+                let name =
+                    name.map(|name| name.chars().filter(|letter| !letter.is_control()).take(MAX_NAME_LENGTH).collect());
+                Ok(Self::Hello { token, name })
+            }
+            "help" => read(fields).map(|Nothing {}| Self::Help),
+            "now" => read(fields).map(|Nothing {}| Self::Now),
+            "get" => {
+                let GetFields { node, axis } = read(fields)?;
+                place(node, axis).map(Self::Get)
+            }
+            "world" => world(read(fields)?).map(Self::World),
+            "run" => run(&read(fields)?).map(Self::Run),
+            "subscribe" => subscribe(read(fields)?),
+            "unsubscribe" => read(fields).map(|UnsubscribeFields { subscription }| Self::Unsubscribe(subscription)),
+            _ => {
+                let guess = did_you_mean(&near(&name, NAMES));
+                Err(ControlError::usage(format!("there is no request {name:?}{guess}")).next(REQUESTS[1]))
+            }
+        }
+    }
+}
+
+fn read<T: DeserializeOwned>(fields: Map<String, Value>) -> Result<T, ControlError> {
+    serde_json::from_value(Value::Object(fields)).map_err(|error| ControlError::usage(error.to_string()))
+}
+
+fn place(node: u8, axis: Option<u8>) -> Result<Place, ControlError> {
+    let text = format!("{node}.{}", axis.unwrap_or(1));
+    text.parse().map_err(|()| {
+        ControlError::usage(format!(
+            "there is no node {node}, axis {}; expected a node of 1 to 127, and an axis from 1",
+            axis.unwrap_or(1)
+        ))
+    })
+}
+
+/// A line, or words and numbers that make one.
+fn world(fields: WorldFields) -> Result<String, ControlError> {
+    match fields {
+        WorldFields { line: Some(line), node: None, axis: None, command: None } if !line.contains(['\n', '\r']) => {
+            Ok(line)
+        }
+        WorldFields { line: None, node, axis, command: Some(command) } => {
+            let words = command.iter().map(word).collect::<Option<Vec<_>>>().filter(|words| !words.is_empty());
+            let words = words.ok_or_else(|| {
+                ControlError::usage("\"command\" must be a list of words and numbers").next(REQUESTS[5])
+            })?;
+            match node {
+                Some(node) => Ok(format!("{} {}", place(node, axis)?, words.join(" "))),
+                None => Ok(words.join(" ")),
+            }
+        }
+        _ => Err(ControlError::usage("a world command is either one \"line\", or a \"node\" and a \"command\"")
+            .next(REQUESTS[4])),
+    }
+}
+
+fn word(value: &Value) -> Option<String> {
+    match value {
+        Value::String(word) if !word.contains(char::is_control) => Some(word.clone()),
+        Value::Number(number) => Some(number.to_string()),
+        _ => None,
+    }
+}
+
+fn run(fields: &RunFields) -> Result<Goal, ControlError> {
+    match fields {
+        RunFields { duration: Some(text), until: None } => duration(text, "for").map(Goal::For),
+        RunFields { duration: None, until: Some(text) } => {
+            duration(text, "until").map(|at| Goal::Until(Instant::ZERO + at))
+        }
+        _ => Err(ControlError::usage("give one of \"for\" and \"until\"").next(REQUESTS[6])),
+    }
+}
+
+fn subscribe(fields: SubscribeFields) -> Result<Request, ControlError> {
+    let refused = |reason: String| ControlError::usage(reason).next(REQUESTS[7]);
+    match fields {
+        SubscribeFields { events: Some(EventFields { nodes, kinds }), values: None, every: None } => {
+            let filter = Filter::new(nodes, kinds).map_err(|error| ControlError::usage(error.to_string()))?;
+            Ok(Request::SubscribeEvents(filter))
+        }
+        SubscribeFields { events: None, values: Some(values), every: Some(every) } => {
+            let mut channels = Vec::new();
+            for ValueFields { node, axis, signals } in values {
+                let place = place(node, axis)?;
+                for name in signals {
+                    channels.push(Channel::named(place, &name)?);
+                }
+            }
+            Values::new(channels, duration(&every, "every")?).map(Request::SubscribeValues)
+        }
+        _ => Err(refused("subscribe to \"events\", or to \"values\" with \"every\"".to_owned())),
+    }
+}
+
+fn duration(text: &str, field: &str) -> Result<Duration, ControlError> {
+    master::units::parse_duration(text).map_err(|error| ControlError::usage(format!("\"{field}\": {error}")))
+}
