@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    completions, dcf, demo, drive, dump, eds, home, motion, nmt, objects, readings, scan, sdo, sim, store,
+    completions, dcf, demo, drive, dump, eds, home, motion, nmt, objects, plot, readings, scan, sdo, sim, store,
 };
 use crate::global::Global;
 
@@ -28,6 +28,7 @@ pub(crate) enum Command {
     Read(sdo::Read),
     Write(sdo::Write),
     Objects(objects::Objects),
+    Plot(plot::Plot),
     Readings(readings::Readings),
     Eds(eds::Eds),
     Dcf(dcf::Dcf),

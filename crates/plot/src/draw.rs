@@ -2,7 +2,7 @@
 
 use crate::lanes;
 use crate::poster::{Colour, Event, EventKind, Figure, Panel, Poster, Style, Trace};
-use crate::svg::{Anchor, Font, Svg};
+use crate::svg::{Anchor, Font, Scale, Svg};
 use crate::thin::thin;
 use crate::ticks::Ticks;
 
@@ -73,17 +73,19 @@ impl Layout<'_> {
     }
 }
 
-/// The whole picture.
-pub(crate) fn poster(poster: &Poster) -> String {
-    let mut body = Svg::default();
+/// The whole picture; `scripted` if a script is to find its scales and lines.
+pub(crate) fn poster(poster: &Poster, scripted: bool) -> String {
+    let mut body = Svg::new(scripted);
     body.text((24.0, 34.0), Anchor::Start, TITLE, &poster.title);
     body.text((24.0, 55.0), Anchor::Start, SUBTITLE, &poster.subtitle);
     let mut top = HEADING;
+    let mut number = 0;
     for row in &poster.rows {
         let width = WIDTH / row.len().max(1) as f64;
         let bottoms = row.iter().enumerate().map(|(place, it)| {
             let left = place as f64 * width;
-            figure(&mut body, it, (left + LEFT, left + width - RIGHT), top)
+            number += 1;
+            figure(&mut body, it, (left + LEFT, left + width - RIGHT), top, number)
         });
         top = bottoms.fold(top, f64::max);
     }
@@ -94,7 +96,7 @@ pub(crate) fn poster(poster: &Poster) -> String {
 }
 
 /// One figure; gives where the next one may begin.
-fn figure(svg: &mut Svg, figure: &Figure, (left, right): (f64, f64), top: f64) -> f64 {
+fn figure(svg: &mut Svg, figure: &Figure, (left, right): (f64, f64), top: f64, number: usize) -> f64 {
     let mut events: Vec<&Event> = figure.events.iter().collect();
     events.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
     let section_strip = if figure.sections.is_empty() { 0.0 } else { SECTION_STRIP };
@@ -116,7 +118,7 @@ fn figure(svg: &mut Svg, figure: &Figure, (left, right): (f64, f64), top: f64) -
     draw_events(svg, &layout, &events, &event_lanes);
     let mut panel_top = layout.panels_top;
     for panel in &figure.panels {
-        draw_panel(svg, &layout, panel_top, panel);
+        draw_panel(svg, &layout, panel_top, panel, number);
         panel_top += panel.height + PANEL_GAP;
     }
     time_axis(svg, &layout, &figure.time);
@@ -146,8 +148,16 @@ fn sections(svg: &mut Svg, layout: &Layout<'_>, figure: &Figure) {
     }
 }
 
-fn draw_panel(svg: &mut Svg, layout: &Layout<'_>, top: f64, panel: &Panel) {
+fn draw_panel(svg: &mut Svg, layout: &Layout<'_>, top: f64, panel: &Panel, figure: usize) {
     let (low, high) = value_span(panel);
+    svg.begin_panel(&Scale {
+        figure,
+        name: &panel.title,
+        unit: &panel.unit,
+        x: ((layout.left, layout.right), layout.time),
+        y: (top, panel.height),
+        values: (low, high),
+    });
     let ticks = Ticks::within(low, high, (panel.height / TICK_HEIGHT) as usize);
     let y = |value: f64| top + (high - value) / (high - low) * panel.height;
     for &tick in &ticks.values {
@@ -164,9 +174,10 @@ fn draw_panel(svg: &mut Svg, layout: &Layout<'_>, top: f64, panel: &Panel) {
             let shown = piece.iter().filter(|point| !layout.is_cut(point.0));
             let pixels = shown.map(|&(time, value)| (layout.x(time), y(value)));
             let line = if trace.style == Style::SetPoint { steps(pixels) } else { thin(pixels) };
-            svg.path(&line, &paint(trace.style));
+            svg.path(&line, &format!("{}{}", paint(trace.style), svg.label(&trace.label)));
         }
     }
+    svg.end_panel();
     trace_labels(svg, (layout.right + 8.0, top), panel, y);
 }
 
@@ -395,6 +406,20 @@ mod tests {
         let (low, high) = of(false, &[48.0, 48.0]);
         assert!(low < 48.0 && 48.0 < high);
         assert!(of(false, &[]).0 < of(false, &[]).1);
+    }
+
+    #[test]
+    fn a_page_holds_the_same_picture_with_its_scales_and_needs_nothing_else() {
+        let page = example().to_html();
+        assert_eq!(page.matches("<g data-figure=\"1\"").count(), 2);
+        assert_eq!(page.matches("</g>").count(), 2);
+        assert!(page.contains("data-label=\"set-point\"") && page.contains("data-unit=\"r/min\""));
+        let plain: String = example().to_svg();
+        let paths = |text: &str| text.matches("<path d=").count();
+        assert_eq!(paths(&page), paths(&plain));
+        // The two that are there are names of the SVG namespace, and nothing is fetched from them.
+        assert_eq!((plain.contains("data-"), page.matches("http:").count()), (false, 2));
+        assert!(!page.contains("https:") && !page.contains(" src="));
     }
 
     #[test]

@@ -17,6 +17,7 @@
 
 mod draw;
 mod lanes;
+mod page;
 mod poster;
 mod svg;
 mod thin;
@@ -27,6 +28,11 @@ pub use poster::{Colour, Event, EventKind, Figure, Panel, Poster, Section, Style
 impl Poster {
     /// The picture, as the text of an SVG file.
     pub fn to_svg(&self) -> String {
-        draw::poster(self)
+        draw::poster(self, false)
+    }
+
+    /// A web page with the picture that tells the values under the pointer. It needs nothing from anywhere.
+    pub fn to_html(&self) -> String {
+        page::page(self, &draw::poster(self, true))
     }
 }

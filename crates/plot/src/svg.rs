@@ -6,6 +6,24 @@ use std::fmt::Write;
 #[derive(Default)]
 pub(crate) struct Svg {
     body: String,
+    /// A script shall find the scales and the lines.
+    scripted: bool,
+}
+
+/// The scale of a panel.
+pub(crate) struct Scale<'a> {
+    /// Number of the figure that it belongs to.
+    pub(crate) figure: usize,
+    /// The quantity.
+    pub(crate) name: &'a str,
+    /// Its unit.
+    pub(crate) unit: &'a str,
+    /// Left and right end, px, and what they stand for.
+    pub(crate) x: ((f64, f64), (f64, f64)),
+    /// Upper end and height, px.
+    pub(crate) y: (f64, f64),
+    /// Value at the lower and the upper end.
+    pub(crate) values: (f64, f64),
 }
 
 /// Where a text is held.
@@ -46,6 +64,37 @@ impl Font {
 }
 
 impl Svg {
+    /// An empty one.
+    pub(crate) fn new(scripted: bool) -> Self {
+        Self { body: String::new(), scripted }
+    }
+
+    /// Begins a group that a script finds as a panel.
+    pub(crate) fn begin_panel(&mut self, scale: &Scale<'_>) {
+        if self.scripted {
+            let Scale { figure, name, unit, x: ((left, right), (begin, end)), y: (top, height), values: (low, high) } =
+                scale;
+            let _ = writeln!(
+                self.body,
+                r#"<g data-figure="{figure}" data-name="{}" data-unit="{}" data-left="{left}" data-right="{right}" data-begin="{begin}" data-end="{end}" data-top="{top}" data-height="{height}" data-low="{low}" data-high="{high}">"#,
+                escape(name),
+                escape(unit)
+            );
+        }
+    }
+
+    /// Ends it.
+    pub(crate) fn end_panel(&mut self) {
+        if self.scripted {
+            self.body.push_str("</g>\n");
+        }
+    }
+
+    /// What a script finds a line by.
+    pub(crate) fn label(&self, label: &str) -> String {
+        if self.scripted { format!(r#" data-label="{}""#, escape(label)) } else { String::new() }
+    }
+
     /// Puts what another one holds on top.
     pub(crate) fn append(&mut self, other: Self) {
         self.body.push_str(&other.body);
@@ -127,7 +176,8 @@ impl Svg {
     }
 }
 
-fn escape(text: &str) -> String {
+/// Text as it stands in SVG and HTML.
+pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

@@ -2,6 +2,7 @@
 
 mod report;
 
+use std::io::Write;
 use std::path::PathBuf;
 
 use clap::builder::PossibleValuesParser;
@@ -11,6 +12,7 @@ use transport::WallClock;
 use crate::failure::Failure;
 use crate::global::Global;
 use crate::progress::Progress;
+use crate::serve::files::create_picture;
 use crate::session::exit_on_signal;
 use report::DemoReport;
 use testbench::models::resolve;
@@ -40,7 +42,9 @@ impl Demo {
         let showcase =
             showcase::run(only, move |section| shown.show(section)).map_err(|error| Failure::new(error.to_string()))?;
         progress.clear();
-        std::fs::write(&self.svg, showcase.poster.to_svg())
+        // A picture of somebody else's stays.
+        create_picture(&self.svg, b"<svg")
+            .and_then(|mut file| file.write_all(showcase.poster.to_svg().as_bytes()))
             .map_err(|error| Failure::new(format!("cannot write the picture {}", self.svg.display())).because(error))?;
         let (svg, took_s) = (self.svg.display().to_string(), clock.now().as_secs_f64());
         Ok(DemoReport::new(showcase.parts, svg, took_s))

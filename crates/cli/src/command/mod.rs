@@ -11,6 +11,7 @@ pub(crate) mod home;
 pub(crate) mod motion;
 pub(crate) mod nmt;
 pub(crate) mod objects;
+pub(crate) mod plot;
 pub(crate) mod readings;
 pub(crate) mod scan;
 pub(crate) mod sdo;

@@ -72,6 +72,11 @@ pub(crate) fn create_record(path: &Path, kind: Kind) -> io::Result<File> {
     }
 }
 
+/// An empty file to write a picture to: a new one, or one that is empty or begins as our pictures of its kind do.
+pub(crate) fn create_picture(path: &Path, begin: &[u8]) -> io::Result<File> {
+    create_or_replace(path, begin, "picture of this program")
+}
+
 /// An empty file: a new one, or one that is empty or begins with `begin`, as `what` does.
 fn create_or_replace(path: &Path, begin: &[u8], what: &str) -> io::Result<File> {
     match create_new(path) {

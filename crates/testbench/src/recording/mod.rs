@@ -14,9 +14,11 @@
 mod column;
 mod csv;
 mod mcap_file;
+mod picture;
 mod read;
 mod record;
 
 pub use column::{Column, Subject, columns_of_drives, select};
+pub use picture::picture;
 pub use read::{Recorded, Series, read};
 pub use record::{Kind, Mark, Record, Severity};

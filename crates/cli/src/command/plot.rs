@@ -1,0 +1,117 @@
+//! `ferrodrive plot`: a record as a picture.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use testbench::recording::{Kind, Recorded, picture, read};
+
+use crate::failure::Failure;
+use crate::output::Report;
+use crate::paint::Paint;
+
+/// Draw a record of --record: a figure for each node, a panel for each quantity
+///
+/// The picture is SVG, or with --html a web page of its own that tells the values under the pointer and the differences
+/// between two places. A record whose writer was killed, or is still at work, is drawn as far as it goes.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  \
+    ferrodrive plot run.mcap --svg run.svg\n  \
+    ferrodrive plot run.csv --signals velocity,4.current_a --from 1.5 --to 3 --html run.html")]
+pub(crate) struct Plot {
+    /// The record: NAME.mcap or NAME.csv
+    file: PathBuf,
+    /// Which signals, e.g. velocity,4.current_a,5.*; without it positions, velocities, currents and supplies
+    #[arg(long, value_name = "SIGNAL,..", value_delimiter = ',')]
+    signals: Vec<String>,
+    /// Begin, in s
+    #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]
+    from: f64,
+    /// End, in s; without it that of the record
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    to: Option<f64>,
+    /// Write the picture to this file; without --svg and --html it goes beside the record, as NAME.svg
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// Write a web page with the picture to this file
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+}
+
+/// Largest record that is read: 4 GiB would be a day of three drives at 1 kHz.
+const LARGEST: u64 = 4 << 30;
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let wrong = || format!("'{text}' is no time in s, e.g. 1.5");
+    let number: f64 = text.trim_end_matches('s').parse().map_err(|_| wrong())?;
+    if number.is_finite() && number >= 0.0 { Ok(number) } else { Err(wrong()) }
+}
+
+/// What was drawn.
+#[derive(Debug, Serialize)]
+pub(crate) struct Drawn {
+    record: PathBuf,
+    /// How many signals and marks are in the picture.
+    signals: usize,
+    marks: usize,
+    torn: bool,
+    files: Vec<PathBuf>,
+}
+
+impl Plot {
+    /// Draws it.
+    pub(crate) fn draw(&self) -> Result<Drawn, Failure> {
+        let recorded = self.read()?;
+        let title = self.file.file_name().unwrap_or_default().to_string_lossy();
+        let span = self.from..=self.to.unwrap_or(f64::INFINITY);
+        if span.is_empty() {
+            return Err(Failure::usage("--to is before --from"));
+        }
+        let poster = picture(&title, &recorded, &self.signals, span)
+            .map_err(|reason| Failure::new(format!("cannot draw {}", self.file.display())).because(reason))?;
+        let mut files = Vec::new();
+        let beside = (self.svg.is_none() && self.html.is_none()).then(|| self.file.with_extension("svg"));
+        if let Some(path) = self.svg.clone().or(beside) {
+            write(&path, &poster.to_svg(), b"<svg")?;
+            files.push(path);
+        }
+        if let Some(path) = self.html.clone() {
+            write(&path, &poster.to_html(), b"<!doctype html>")?;
+            files.push(path);
+        }
+        let figures = || poster.rows.iter().flatten();
+        let signals = figures().flat_map(|figure| &figure.panels).map(|panel| panel.traces.len()).sum();
+        let marks = figures().map(|figure| figure.events.len()).max().unwrap_or(0);
+        Ok(Drawn { record: self.file.clone(), signals, marks, torn: recorded.torn, files })
+    }
+
+    fn read(&self) -> Result<Recorded, Failure> {
+        let unreadable = || Failure::new(format!("cannot read the record {}", self.file.display()));
+        let kind = Kind::of_name(&self.file.to_string_lossy()).ok_or_else(|| {
+            Failure::usage(format!("{} is no record", self.file.display()))
+                .because("a record is called NAME.mcap or NAME.csv")
+                .next("make one, e.g. ferrodrive sim --drive zlac8030l@4 --record run.mcap")
+        })?;
+        let length = std::fs::metadata(&self.file).map_err(|error| unreadable().because(error))?;
+        if !length.is_file() || length.len() > LARGEST {
+            return Err(unreadable().because("it is no file, or has more than 4 GiB"));
+        }
+        let bytes = std::fs::read(&self.file).map_err(|error| unreadable().because(error))?;
+        read(kind, &bytes).map_err(|reason| unreadable().because(reason))
+    }
+}
+
+/// Writes a picture to a new file, or over an earlier picture, and over nothing else.
+fn write(path: &Path, text: &str, begin: &[u8]) -> Result<(), Failure> {
+    let written = crate::serve::files::create_picture(path, begin).and_then(|mut file| file.write_all(text.as_bytes()));
+    written.map_err(|error| Failure::new(format!("cannot write the picture {}", path.display())).because(error))
+}
+
+impl Report for Drawn {
+    fn text(&self, _: Paint) -> String {
+        let files: Vec<String> = self.files.iter().map(|path| path.display().to_string()).collect();
+        let drawn = format!("{} signals and {} marks are drawn in {}", self.signals, self.marks, files.join(" and "));
+        let torn = "the end of the record is missing: its writer was killed, or is still at work";
+        if self.torn { format!("{drawn}\n{torn}") } else { drawn }
+    }
+}
