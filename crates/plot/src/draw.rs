@@ -195,6 +195,8 @@ fn value_span(panel: &Panel) -> (f64, f64) {
         Some(std::cmp::Ordering::Equal) => (low - low.abs().max(1.0) * 0.1, high + high.abs().max(1.0) * 0.1),
         _ => (-1.0, 1.0),
     };
+    let missing = (panel.least_span - (high - low)).max(0.0) / 2.0;
+    let (low, high) = (low - missing, high + missing);
     (low - (high - low) * HEADROOM, high + (high - low) * HEADROOM)
 }
 
@@ -357,7 +359,6 @@ mod tests {
                     title: "velocity".into(),
                     unit: "r/min".into(),
                     height: 100.0,
-                    with_zero: true,
                     traces: vec![
                         Trace {
                             label: "set-point".into(),
@@ -406,6 +407,10 @@ mod tests {
         let (low, high) = of(false, &[48.0, 48.0]);
         assert!(low < 48.0 && 48.0 < high);
         assert!(of(false, &[]).0 < of(false, &[]).1);
+        let still = Trace { label: "".into(), style: Style::Demand, points: vec![(0.0, 47.99), (1.0, 48.01)] };
+        let (low, high) =
+            value_span(&Panel { with_zero: false, least_span: 2.0, traces: vec![still], ..Panel::default() });
+        assert!((high - low - 2.0 * (1.0 + 2.0 * HEADROOM)).abs() < 1e-9 && ((low + high) / 2.0 - 48.0).abs() < 1e-9);
     }
 
     #[test]

@@ -43,13 +43,15 @@ pub struct Panel {
     pub height: f64,
     /// The axis reaches to 0, whatever the values are.
     pub with_zero: bool,
+    /// Its axis spans at least this much, in its unit: what changes by less is no change.
+    pub least_span: f64,
     /// Drawn in order, the last one on top.
     pub traces: Vec<Trace>,
 }
 
 impl Default for Panel {
     fn default() -> Self {
-        Self { title: "".into(), unit: "".into(), height: 80.0, with_zero: true, traces: Vec::new() }
+        Self { title: "".into(), unit: "".into(), height: 80.0, with_zero: true, least_span: 0.0, traces: Vec::new() }
     }
 }
 

@@ -86,7 +86,6 @@ pub(super) fn interpolation(finished: &Finished, _name: &'static str) -> Vec<Vec
             title: "Shaft".into(),
             unit: "counts".into(),
             height: 90.0,
-            with_zero: true,
             traces: names
                 .into_iter()
                 .zip(COLOURS)
@@ -98,6 +97,7 @@ pub(super) fn interpolation(finished: &Finished, _name: &'static str) -> Vec<Vec
                     points: points.clone(),
                 })
                 .collect(),
+            ..Panel::default()
         }],
         ..Figure::default()
     });
@@ -148,12 +148,12 @@ fn drive(
         title: Cow::from(title),
         unit: Cow::from(unit),
         height,
-        with_zero: true,
         traces: vec![
             Trace { label: "demand".into(), style: Style::Demand, points: samples(finished, 0, demand) },
             Trace { label: "set-point".into(), style: Style::SetPoint, points: finished.set_points.line(axis) },
             Trace { label: "actual".into(), style: Style::Actual(colour), points: actual },
         ],
+        ..Panel::default()
     };
     let (velocity, current) = (mean_rpm(finished, 0), samples(finished, 0, Signal::Current));
     Figure {

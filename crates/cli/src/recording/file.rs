@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use can::{Frame, Instant};
 use sim::recorder::Recorder;
-use testbench::recording::{Column, Kind, Mark, Record, Severity};
+use testbench::recording::{Column, Kind, Mark, Record, Severity, Subject};
 
 use super::background::{Background, Words};
 use crate::serve::speaker::Speaker;
@@ -51,11 +51,12 @@ impl RecordFile {
 /// Writes samples, frames and marks in the order of their times, and hands them to the system.
 fn write(record: &mut Record, batch: Batch) -> io::Result<()> {
     let mut frames = batch.frames.iter().peekable();
-    let note = |at: &Instant, text: String| Mark { at: *at, of: "".into(), severity: Severity::Note, text };
+    let note = |at: &Instant, of: String, text: String| Mark { at: *at, of: of.into(), severity: Severity::Note, text };
     let recorded = batch.recorded.iter();
     let stimuli = recorded.clone().flat_map(|recorded| recorded.stimuli());
-    let stimuli = stimuli.map(|(at, place, stimulus)| note(at, format!("{place} {stimulus}")));
-    let noted = recorded.clone().flat_map(|recorded| recorded.marks()).map(|(at, text)| note(at, text.clone()));
+    let stimuli = stimuli.map(|(at, place, stimulus)| note(at, Subject::Axis(*place).title(), stimulus.to_string()));
+    let noted = recorded.clone().flat_map(|recorded| recorded.marks());
+    let noted = noted.map(|(at, text)| note(at, String::new(), text.clone()));
     let mut marks: Vec<Mark> = batch.marks.into_iter().chain(stimuli).chain(noted).collect();
     marks.sort_by_key(|mark| mark.at);
     let mut marks = marks.iter().peekable();

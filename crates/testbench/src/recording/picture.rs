@@ -121,7 +121,10 @@ fn panel(quantity: &str, lines: &[&Series]) -> Panel {
             (label, Style::Actual(colour), series)
         }))
         .map(|(label, style, series)| Trace { label: label.into(), style, points: series.points.clone() });
-    Panel { title: title(quantity).into(), unit: unit.into(), height: 80.0, with_zero, traces: traces.collect() }
+    // A supply that gives a hundredth of a volt less is one that stands.
+    let least_span = if matches!(unit.as_str(), "V" | "°C") { 1.0 } else { 0.0 };
+    let traces = traces.collect();
+    Panel { title: title(quantity).into(), unit: unit.into(), with_zero, least_span, traces, ..Panel::default() }
 }
 
 /// `velocity_rpm` in words: `Velocity`.

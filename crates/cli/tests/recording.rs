@@ -1,0 +1,135 @@
+//! `--record` and `plot`: what is written while drives are served, and what is left of it when the simulator dies.
+
+mod common;
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use common::{Simulator, done, ferrodrive, scratch};
+use testbench::recording::{Kind, Recorded, read};
+
+/// Longest wait for something to be on the disk.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+fn recorded(path: &Path) -> Recorded {
+    let kind = Kind::of_name(path.to_str().unwrap()).unwrap();
+    read(kind, &std::fs::read(path).unwrap()).unwrap()
+}
+
+/// The time of the last sample.
+fn last(recorded: &Recorded) -> f64 {
+    recorded.series.first().and_then(|series| series.points.last()).map_or(0.0, |(at, _)| *at)
+}
+
+fn simulator(record: &Path, more: &[&str]) -> Simulator {
+    let drives =
+        ["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0", "--record", record.to_str().unwrap()];
+    Simulator::start_heard(&[&drives[..], more].concat())
+}
+
+#[test]
+fn a_record_tells_how_a_drive_turned_and_what_was_done_to_it() {
+    let place = scratch("record");
+    for name in ["run.mcap", "run.csv"] {
+        let path = place.join(name);
+        let mut simulator = simulator(&path, &[]);
+        let bus = simulator.bus("socketcand");
+        done(&["--bus", &bus, "--model", "4=zlac8030l", "move", "4", "360deg", "--profile-velocity", "60rpm"]);
+        let told = simulator.ask("4 get")["position"].as_f64().unwrap();
+        let done_at = simulator.ask("4 load torque 0.5")["t"].as_f64().unwrap();
+        assert_eq!(simulator.ask("quit")["ok"], true);
+        assert_eq!(simulator.wait(), Some(0));
+        let recorded = recorded(&path);
+        assert!(!recorded.torn, "{name}");
+        let of = |wanted: &str| {
+            let found = recorded.series.iter().find(|series| series.column.name() == wanted);
+            &found.unwrap_or_else(|| panic!("{wanted} in {name}")).points
+        };
+        // A turn has 4096 counts, and the drive measures within a count of where it is.
+        let (_, position) = of("4.position_counts").iter().rev().find(|(at, _)| *at <= done_at).unwrap();
+        assert!((position - told).abs() <= 2.0 && (position - 4096.0).abs() < 8.0, "{name}: {position}, {told}");
+        let fastest = of("4.velocity_rpm").iter().map(|(_, rpm)| *rpm).fold(0.0, f64::max);
+        assert!((50.0..70.0).contains(&fastest), "{name}: {fastest} r/min");
+        // A sample each millisecond, none missing, none twice.
+        let steps = of("4.supply_v").windows(2).map(|pair| ((pair[1].0 - pair[0].0) * 1e6).round() as i64);
+        assert!(steps.into_iter().all(|micros| micros == 1000), "{name}");
+        let mark = recorded.marks.iter().find(|mark| mark.text.ends_with("load torque 0.5")).expect(name);
+        assert!((mark.at.as_secs_f64() - done_at).abs() < 0.002, "{name}: {mark:?}");
+    }
+}
+
+#[test]
+fn what_is_on_the_disk_of_a_killed_simulator_is_a_record() {
+    let place = scratch("killed-record");
+    for name in ["run.mcap", "run.csv"] {
+        let path = place.join(name);
+        let mut simulator = simulator(&path, &["--record-period", "5ms", "--record-signals", "supply,4.position*"]);
+        let since = Instant::now();
+        let before = loop {
+            let found = std::fs::read(&path).ok().and_then(|bytes| read(Kind::of_name(name)?, &bytes).ok());
+            match found.map(|recorded| last(&recorded)) {
+                Some(at) if at > 0.5 => break at,
+                _ => assert!(since.elapsed() < PATIENCE, "{name}: nothing is written"),
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        simulator.kill();
+        let left = recorded(&path);
+        assert!(last(&left) >= before && left.series.len() == 3, "{name}: {} of {before}", last(&left));
+        // And it can be drawn.
+        let svg = place.join("run.svg");
+        let drawn = done(&["plot", path.to_str().unwrap(), "--signals", "supply", "--svg", svg.to_str().unwrap()]);
+        assert!(std::fs::read_to_string(&svg).unwrap().contains("Supply"), "{}", drawn.out);
+    }
+}
+
+#[test]
+fn a_picture_is_written_over_a_picture_and_nothing_else() {
+    let place = scratch("plots");
+    let csv = place.join("run.csv");
+    let text = "t_s,4.velocity_rpm,4.velocity_demand_rpm,5.current_a,mark\n0,0,0,1,\n1,60,60,1.5,node 4: started\n";
+    std::fs::write(&csv, text).unwrap();
+    let csv = csv.to_str().unwrap();
+    for _ in 0..2 {
+        let html = place.join("run.html");
+        let drawn = done(&["plot", csv, "--html", html.to_str().unwrap(), "--json"]).json();
+        assert_eq!((&drawn["signals"], &drawn["marks"]), (&3.into(), &1.into()), "{drawn}");
+        let page = std::fs::read_to_string(html).unwrap();
+        assert!(page.contains("Velocity") && page.contains("started") && page.ends_with("</html>\n"));
+    }
+    let letter = place.join("letter.svg");
+    std::fs::write(&letter, "Dear reader").unwrap();
+    let refused = |arguments: &[&str], parts: &[&str]| {
+        let ended = ferrodrive(arguments);
+        assert!(ended.status != Some(0), "{arguments:?}");
+        for part in parts {
+            assert!(ended.err.contains(part), "{arguments:?}: {part:?} in {}", ended.err);
+        }
+    };
+    refused(&["plot", csv, "--svg", letter.to_str().unwrap()], &["cannot write the picture", "choose another name"]);
+    assert_eq!(std::fs::read(&letter).unwrap(), b"Dear reader");
+    refused(&["plot", csv, "--signals", "velocty_rpm"], &["did you mean velocity_rpm"]);
+    refused(&["plot", csv, "--from", "5"], &["recorded from 0.000 s to 1.000 s"]);
+    refused(&["plot", csv, "--from", "1", "--to", "0.5"], &["--to is before --from"]);
+    refused(&["plot", letter.to_str().unwrap()], &["NAME.mcap or NAME.csv"]);
+    refused(&["plot", "/nowhere/run.mcap"], &["cannot read the record"]);
+    let wrong = place.join("wrong.mcap");
+    std::fs::write(&wrong, text).unwrap();
+    refused(&["plot", wrong.to_str().unwrap()], &["no MCAP file"]);
+}
+
+#[test]
+fn a_record_is_asked_for_in_words_that_make_sense() {
+    let refused = |arguments: &[&str], part: &str| {
+        let ended = ferrodrive(&[&["sim", "--drive", "zlac8030l@4"], arguments].concat());
+        assert_eq!(ended.status, Some(2), "{arguments:?}");
+        assert!(ended.err.contains(part), "{arguments:?}: {part:?} in {}", ended.err);
+    };
+    refused(&["--record", "run.txt"], "NAME.mcap or NAME.csv");
+    refused(&["--record", "run.csv", "--record-period", "1us"], "a control period is 50us");
+    refused(&["--record-period", "1ms"], "--record <FILE>");
+    let place = scratch("refused-record");
+    let csv = place.join("run.csv");
+    refused(&["--record", csv.to_str().unwrap(), "--record-signals", "5.*"], "no signal '5.*'");
+    assert!(!csv.exists());
+}
