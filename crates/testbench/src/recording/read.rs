@@ -132,10 +132,12 @@ fn read_csv(bytes: &[u8]) -> Result<Recorded, String> {
         if !at.is_finite() || at < 0.0 {
             return Err(format!("line {row}: a time of {at} s"));
         }
-        for (series, place) in recorded.series.iter_mut().zip(&places) {
-            series.points.push((at, number(*place)?));
-        }
         let text = marks_at.and_then(|place| line.get(place)).unwrap_or_default();
+        let values = places.iter().map(|place| number(*place)).collect::<Result<Vec<f64>, String>>()?;
+        // A line that has nothing but marks is no sample.
+        if text.is_empty() || values.iter().any(|value| !value.is_nan()) {
+            recorded.series.iter_mut().zip(&values).for_each(|(series, value)| series.points.push((at, *value)));
+        }
         if !text.is_empty() {
             let at = Instant::from_nanos((at * 1e9) as u64);
             recorded.marks.push(Mark { at, of: "".into(), severity: Severity::Note, text: text.to_owned() });
