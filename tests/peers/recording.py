@@ -1,0 +1,47 @@
+"""Checks of `ferrodrive sim --record`: the MCAP reader that Foxglove's tools are made of takes the file, and finds in it
+what canopen-python saw on the bus."""
+
+import json
+import pathlib
+import tempfile
+import time
+
+from mcap.reader import make_reader
+
+from checks import check, equal, true
+from drive import ALL
+from simulator import Simulator
+
+
+@check("The mcap reader takes its record and finds signals with units, frames and events", *ALL)
+def records(bench):
+    node_id = bench.drive.node_id
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder) / "run.mcap"
+        extra = ("--record", str(path), "--record-period", "2ms")
+        with Simulator(bench.program, [f"{bench.drive.model}@{node_id}"], extra=extra) as simulator:
+            # A drive takes a second or so to boot.
+            while simulator.world("now")["t"] < 2.0:
+                time.sleep(0.05)
+            simulator.world(f"{node_id} load torque 0.1")
+            told = simulator.world(f"{node_id} get")
+            simulator.quit()
+        with open(path, "rb") as file:
+            reader = make_reader(file)
+            summary = reader.get_summary()
+            topics = {channel.topic: channel for channel in summary.channels.values()}
+            counts = {topic: summary.statistics.channel_message_counts[it.id] for topic, it in topics.items()
+                      if it.id in summary.statistics.channel_message_counts}
+            messages = [(channel.topic, message) for _, channel, message in reader.iter_messages()]
+        equal(sorted(topics), ["/can", "/events", f"/node/{node_id}"], "topics")
+        schema = json.loads(summary.schemas[topics[f"/node/{node_id}"].schema_id].data)
+        equal(schema["properties"]["velocity_rpm"]["unit"], "r/min", "unit of the speed")
+        equal({channel.message_encoding for channel in topics.values()}, {"json"}, "encoding")
+        samples = [(message.log_time, json.loads(message.data)) for topic, message in messages if topic.startswith("/node")]
+        equal(len(samples), counts[f"/node/{node_id}"], "messages, as the summary counts them")
+        equal({later[0] - earlier[0] for earlier, later in zip(samples, samples[1:])}, {2_000_000}, "period, in ns")
+        true(abs(samples[-1][1]["supply_v"] - told["supply_v"]) < 0.5, "the supply of the last sample is that of `get`")
+        frames = [json.loads(message.data) for topic, message in messages if topic == "/can"]
+        true(any(frame["text"] == f"{0x700 + node_id:03X}#00" for frame in frames), "the boot-up is among the frames")
+        said = [json.loads(message.data) for topic, message in messages if topic == "/events"]
+        true(any(line["message"] == "load torque 0.1" for line in said), f"the world command is among the events: {said}")
