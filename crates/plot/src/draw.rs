@@ -372,6 +372,7 @@ mod tests {
                             points: wave(100.0).collect(),
                         },
                     ],
+                    ..Panel::default()
                 },
                 Panel { title: "empty".into(), unit: "A".into(), height: 60.0, ..Panel::default() },
             ],

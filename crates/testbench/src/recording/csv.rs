@@ -6,7 +6,7 @@ use std::io::{self, BufWriter, Write};
 use can::Instant;
 
 use super::column::Column;
-use super::record::{Mark, Target};
+use super::piece::{Mark, Target};
 
 /// A CSV file that is being written.
 pub(super) struct Csv {

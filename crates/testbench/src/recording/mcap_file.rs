@@ -12,7 +12,7 @@ use mcap::{McapError, WriteOptions, Writer};
 use serde_json::json;
 
 use super::column::{Column, Subject};
-use super::record::{Mark, Severity, Target};
+use super::piece::{Mark, Severity, Target};
 
 /// Bytes of a chunk, before it is written though nobody has asked for it.
 const CHUNK: u64 = 256 << 10;

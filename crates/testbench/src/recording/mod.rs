@@ -15,10 +15,12 @@ mod column;
 mod csv;
 mod mcap_file;
 mod picture;
+mod piece;
 mod read;
 mod record;
 
 pub use column::{Column, Subject, columns_of_drives, select};
 pub use picture::picture;
+pub use piece::{Kind, Mark, Severity, Target};
 pub use read::{Recorded, Series, read};
-pub use record::{Kind, Mark, Record, Severity};
+pub use record::Record;

@@ -5,8 +5,8 @@ use std::ops::RangeInclusive;
 use plot::{Colour, Event, EventKind, Figure, Panel, Poster, Style, Trace};
 
 use super::column::{Column, Subject, select};
+use super::piece::Severity;
 use super::read::{Recorded, Series};
-use super::record::Severity;
 
 /// What is drawn when nobody says what.
 const USUAL: [&str; 4] = ["position", "velocity", "current", "supply"];
@@ -150,7 +150,7 @@ fn look(quantity: &str, unit: &str) -> (Colour, bool) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::record::Mark;
+    use super::super::piece::Mark;
     use super::*;
     use can::Instant;
 

@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use super::column::{Column, Subject};
 use super::mcap_file::EVENTS;
-use super::record::{Kind, Mark, Severity};
+use super::piece::{Kind, Mark, Severity};
 
 /// One signal over time.
 #[derive(Clone, Debug, PartialEq)]

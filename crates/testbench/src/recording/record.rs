@@ -1,70 +1,13 @@
 //! A record that is being written.
 
-use std::borrow::Cow;
-use std::io::{self, Seek, Write};
+use std::io;
 
 use can::{Frame, Instant};
 
 use super::column::Column;
 use super::csv::Csv;
 use super::mcap_file::Mcap;
-
-/// The kinds of file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// MCAP: samples, frames and events.
-    Mcap,
-    /// CSV: samples and events.
-    Csv,
-}
-
-impl Kind {
-    /// The kind that a file's name ends with; `None` for another ending.
-    pub fn of_name(name: &str) -> Option<Self> {
-        let (_, ending) = name.rsplit_once('.')?;
-        match ending.to_ascii_lowercase().as_str() {
-            "mcap" => Some(Self::Mcap),
-            "csv" => Some(Self::Csv),
-            _ => None,
-        }
-    }
-}
-
-/// How much something that happened matters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Severity {
-    /// Worth a mark.
-    Note,
-    /// Something is not as it should be.
-    Warning,
-    /// A fault.
-    Fault,
-}
-
-/// Something that happened.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Mark {
-    /// When.
-    pub at: Instant,
-    /// To what: `node 4`; empty for the whole.
-    pub of: Cow<'static, str>,
-    /// How much it matters.
-    pub severity: Severity,
-    /// What, in words.
-    pub text: String,
-}
-
-impl Mark {
-    /// In one line: `node 4: over-voltage`.
-    pub(super) fn line(&self) -> Cow<'_, str> {
-        if self.of.is_empty() { self.text.as_str().into() } else { format!("{}: {}", self.of, self.text).into() }
-    }
-}
-
-/// What a file may be written to: a file, or memory.
-pub trait Target: Write + Seek + Send {}
-
-impl<T: Write + Seek + Send> Target for T {}
+use super::piece::{Kind, Mark, Target};
 
 /// A file that is being written.
 ///
