@@ -24,4 +24,6 @@ pub mod events;
 pub mod machine_file;
 pub mod models;
 pub mod recording;
+pub mod scenario;
+pub mod sweep;
 pub mod words;

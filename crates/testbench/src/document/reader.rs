@@ -115,6 +115,11 @@ impl<'a> Field<'a> {
         self.value.span()
     }
 
+    /// The text that it is of.
+    pub fn source_text(&self) -> &'a str {
+        self.source.text
+    }
+
     /// A number, whole or not.
     ///
     /// # Errors

@@ -1,0 +1,288 @@
+//! What the host of a scenario does, in words: `4 enable`, `4 move 90deg at 60rpm`, `4 write 6060 3`, `sync 10ms`.
+//!
+//! A host is a CANopen master with intents in physical units (crate `master`); each line is one of them.
+
+use std::str::FromStr;
+use std::time::Duration;
+
+use can::Frame;
+use canopen::{NmtCommand, NodeId};
+use master::drive::{HomingOptions, MotionOptions};
+use master::units::{Amperes, Angle, Ramp, Rpm, parse_duration};
+use sim::Place;
+
+use super::condition::Condition;
+use crate::words::object::{ObjectArg, object};
+
+/// Every form of a line of a host, for messages and the manual.
+pub const FORMS: &[&str] = &[
+    "NODE enable|disable|stop|quick-stop|reset|save|restore|guard|release",
+    "NODE velocity SPEED [acceleration RAMP] [deceleration RAMP] [no-wait]",
+    "NODE move [by] POSITION [at SPEED] [acceleration RAMP] [deceleration RAMP] [no-wait]",
+    "NODE torque CURRENT",
+    "NODE home METHOD [at SPEED] [within TIME] [no-wait]",
+    "NODE read OBJECT",
+    "NODE write OBJECT VALUE",
+    "NODE|all nmt start|stop|pre-operational|reset|reset-communication",
+    "NODE watch TIME (its heartbeat)",
+    "heartbeat NODE TIME (its own, under this node-ID)",
+    "sync PERIOD|off",
+    "send FRAME",
+    "wait TIME",
+    "wait for CONDITION [within TIME]",
+];
+
+/// How long a condition is waited for if nothing is said.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// One thing that a host does.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Deed {
+    /// An intent without a value.
+    Drive(Place, Intent),
+    /// Turns at a speed.
+    Velocity(Place, Rpm, MotionOptions),
+    /// Turns to a position, or by an angle.
+    Move {
+        /// Which axis.
+        place: Place,
+        /// Where to.
+        to: Angle,
+        /// By so much from the last target.
+        relative: bool,
+        /// How.
+        options: MotionOptions,
+    },
+    /// Pushes with a current.
+    Torque(Place, Amperes),
+    /// Finds the reference position.
+    Home(Place, i8, HomingOptions),
+    /// Uploads an object.
+    Read(NodeId, ObjectArg),
+    /// Downloads an object.
+    Write(NodeId, ObjectArg, String),
+    /// A network management command to a node, or to all.
+    Nmt(Option<NodeId>, NmtCommand),
+    /// Watches the heartbeat of a node.
+    Watch(NodeId, Duration),
+    /// Produces a heartbeat.
+    Heartbeat(NodeId, Duration),
+    /// Produces SYNC, or no more.
+    Sync(Option<Duration>),
+    /// Sends a frame.
+    Send(Frame),
+    /// Waits for some time.
+    Wait(Duration),
+    /// Waits until something is so.
+    WaitFor(Condition, Duration),
+}
+
+/// An intent without a value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Intent {
+    /// To operation enabled.
+    Enable,
+    /// To switched on or below.
+    Disable,
+    /// Stops with the ramp of the mode.
+    Stop,
+    /// Quick stop.
+    QuickStop,
+    /// Resets a fault.
+    Reset,
+    /// Stores the parameters.
+    Save,
+    /// Restores the factory's.
+    Restore,
+    /// Has the drive stop when this host falls silent.
+    Guard,
+    /// No more of that.
+    Release,
+}
+
+const INTENTS: [(&str, Intent); 9] = [
+    ("enable", Intent::Enable),
+    ("disable", Intent::Disable),
+    ("stop", Intent::Stop),
+    ("quick-stop", Intent::QuickStop),
+    ("reset", Intent::Reset),
+    ("save", Intent::Save),
+    ("restore", Intent::Restore),
+    ("guard", Intent::Guard),
+    ("release", Intent::Release),
+];
+
+const NMT: [(&str, NmtCommand); 5] = [
+    ("start", NmtCommand::Start),
+    ("stop", NmtCommand::Stop),
+    ("pre-operational", NmtCommand::EnterPreOperational),
+    ("reset", NmtCommand::ResetNode),
+    ("reset-communication", NmtCommand::ResetCommunication),
+];
+
+impl FromStr for Deed {
+    type Err = String;
+
+    fn from_str(line: &str) -> Result<Self, String> {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        match *words.as_slice() {
+            ["sync", "off"] => Ok(Self::Sync(None)),
+            ["sync", period] => match time(period)? {
+                Duration::ZERO => Err("SYNC needs a period of more than 0, as in: sync 10ms".into()),
+                period => Ok(Self::Sync(Some(period))),
+            },
+            ["heartbeat", number, period] => Ok(Self::Heartbeat(node(number)?, time(period)?)),
+            ["send", frame] => frame.parse().map(Self::Send).map_err(|error| format!("'{frame}' is no frame: {error}")),
+            ["wait", "for", ref rest @ ..] => {
+                let (condition, within) = match rest {
+                    [condition @ .., "within", limit] => (condition, time(limit)?),
+                    _ => (rest, PATIENCE),
+                };
+                Ok(Self::WaitFor(condition.join(" ").parse()?, within))
+            }
+            ["wait", duration] => Ok(Self::Wait(time(duration)?)),
+            ["all", "nmt", command] => Ok(Self::Nmt(None, nmt(command)?)),
+            [place, ref rest @ ..] if place.parse::<Place>().is_ok() => of_node(place, rest),
+            _ => Err(format!("'{line}' is nothing that a host does; expected one of: {}", FORMS.join("; "))),
+        }
+    }
+}
+
+fn of_node(place_word: &str, words: &[&str]) -> Result<Deed, String> {
+    let place: Place = place_word.parse().map_err(|()| format!("'{place_word}' is no node"))?;
+    let id = || node(&place.node.to_string());
+    match *words {
+        [word] if INTENTS.iter().any(|(name, _)| *name == word) => {
+            let found = INTENTS.iter().find(|(name, _)| *name == word);
+            found.map(|(_, intent)| Deed::Drive(place, *intent)).ok_or_else(|| unknown(words))
+        }
+        ["nmt", command] => Ok(Deed::Nmt(Some(id()?), nmt(command)?)),
+        ["watch", period] => Ok(Deed::Watch(id()?, time(period)?)),
+        ["read", name] => Ok(Deed::Read(id()?, object(name)?)),
+        ["write", name, ref value @ ..] if !value.is_empty() => Ok(Deed::Write(id()?, object(name)?, value.join(" "))),
+        ["velocity", speed, ref rest @ ..] => {
+            let Options { motion, speed: None, within: None } = options(rest)? else { return Err(unknown(words)) };
+            Ok(Deed::Velocity(place, quantity(speed)?, motion))
+        }
+        ["move", "by", to, ref rest @ ..] => movement(place, to, true, rest),
+        ["move", to, ref rest @ ..] => movement(place, to, false, rest),
+        ["torque", current] => Ok(Deed::Torque(place, quantity::<Amperes>(current)?)),
+        ["home", method, ref rest @ ..] => {
+            let method = method
+                .parse()
+                .map_err(|_| format!("'{method}' is no homing method; expected a number, as in: home 17"))?;
+            let Options { motion, speed, within } = options(rest)?;
+            let limit = within.unwrap_or(HomingOptions::default().limit);
+            Ok(Deed::Home(place, method, HomingOptions { speed, limit, wait: motion.wait }))
+        }
+        _ => Err(unknown(words)),
+    }
+}
+
+fn unknown(words: &[&str]) -> String {
+    format!("'{}' is nothing that a host does with a node; expected one of: {}", words.join(" "), FORMS[..9].join("; "))
+}
+
+fn movement(place: Place, to: &str, relative: bool, rest: &[&str]) -> Result<Deed, String> {
+    let Options { motion, speed, within: None } = options(rest)? else { return Err(unknown(rest)) };
+    Ok(Deed::Move { place, to: quantity(to)?, relative, options: MotionOptions { speed, ..motion } })
+}
+
+/// What may stand behind an intent.
+struct Options {
+    motion: MotionOptions,
+    speed: Option<Rpm>,
+    within: Option<Duration>,
+}
+
+fn options(mut words: &[&str]) -> Result<Options, String> {
+    let mut options = Options { motion: MotionOptions::default(), speed: None, within: None };
+    while let Some((&word, rest)) = words.split_first() {
+        words = rest;
+        if word == "no-wait" {
+            options.motion.wait = false;
+            continue;
+        }
+        let Some((&value, rest)) = rest.split_first() else {
+            return Err(format!(
+                "'{word}' stands alone; expected [at SPEED] [acceleration RAMP] [deceleration RAMP] [within TIME] [no-wait]"
+            ));
+        };
+        words = rest;
+        match word {
+            "at" => options.speed = Some(quantity(value)?),
+            "acceleration" => options.motion.acceleration = Some(quantity::<Ramp>(value)?),
+            "deceleration" => options.motion.deceleration = Some(quantity::<Ramp>(value)?),
+            "within" => options.within = Some(time(value)?),
+            _ => {
+                return Err(format!(
+                    "'{word}' says nothing about a motion; expected at, acceleration, deceleration, within or no-wait"
+                ));
+            }
+        }
+    }
+    Ok(options)
+}
+
+fn quantity<T: FromStr<Err = master::units::ParseUnitError>>(text: &str) -> Result<T, String> {
+    text.parse().map_err(|error: master::units::ParseUnitError| error.to_string())
+}
+
+fn time(text: &str) -> Result<Duration, String> {
+    parse_duration(text).map_err(|error| error.to_string())
+}
+
+fn node(text: &str) -> Result<NodeId, String> {
+    crate::words::node::node(text)
+}
+
+fn nmt(word: &str) -> Result<NmtCommand, String> {
+    let known = NMT.iter().find(|(name, _)| *name == word);
+    known
+        .map(|(_, command)| *command)
+        .ok_or_else(|| format!("'{word}' is no command; expected {}", NMT.map(|(name, _)| name).join(", ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_an_intent_and_what_is_none_is_told_what_may_be_said() {
+        for line in [
+            "4 enable",
+            "4 velocity -60rpm acceleration 500ms no-wait",
+            "5.2 move by 90deg at 30rpm",
+            "4 move 32000",
+            "2 home 17 at 60rpm within 5s",
+            "4 write 6060 profile velocity",
+            "4 read position_actual_value",
+            "all nmt start",
+            "sync 10ms",
+            "sync off",
+            "send 604#4041600000000000",
+            "wait 20ms",
+            "wait for 4 velocity > 50 and 4 powered within 2s",
+        ] {
+            assert!(line.parse::<Deed>().is_ok(), "{line}: {:?}", line.parse::<Deed>());
+        }
+        for (line, said) in [
+            ("", "expected one of"),
+            ("dance", "expected one of"),
+            ("4 dance", "NODE enable"),
+            ("4 velocity", "NODE enable"),
+            ("4 velocity fast", "does not begin with a number"),
+            ("4 velocity 60rpm at 5rpm", "nothing that a host does"),
+            ("4 move 90deg at", "stands alone"),
+            ("4 nmt go", "expected start"),
+            ("sync 0s", "more than 0"),
+            ("sync nans", "does not begin with a number"),
+            ("wait -5s", "between 0 and a year"),
+            ("wait for", "a condition is missing"),
+            ("0 enable", "expected one of"),
+        ] {
+            let refused = line.parse::<Deed>().err().unwrap_or_default();
+            assert!(refused.contains(said), "{line}: {refused}");
+        }
+    }
+}

@@ -1,0 +1,279 @@
+//! The host of a scenario at work: its lines, one after the other, as one future over a [`Network`].
+//!
+//! What it waits for beyond the bus (a condition, a time) it asks of the [`Desk`], which whoever steps the world looks at.
+
+use std::cell::RefCell;
+use std::future::{Future, poll_fn};
+use std::rc::Rc;
+use std::task::{Poll, Waker};
+use std::time::Duration;
+
+use can::Instant;
+use canopen::od::Entry;
+use canopen::{Mux, NodeId};
+use devices::Description;
+use master::drive::{MotionReport, SwitchedOff};
+use master::units::Shown;
+use master::{Drive, Network};
+use sim::Place;
+
+use super::deed::{Deed, Intent};
+use super::file::{HostLine, Wanted};
+use super::outcome::{Row, RowKind, Verdict};
+use crate::words::object::ObjectArg;
+use crate::words::value::{typed_value, value};
+
+/// How long a node may take until it says that it has booted, after a reset and at the start.
+const BOOT_PATIENCE: Duration = Duration::from_secs(5);
+
+/// After booting a drive looks at its supply, sensors and inputs for some tens of milliseconds before it judges them.
+const SETTLING_TIME: Duration = Duration::from_millis(200);
+
+/// What hosts and the one who steps the world tell each other.
+#[derive(Default)]
+pub(super) struct Desk {
+    /// What hosts wait for.
+    pub(super) waits: Vec<Waiting>,
+    /// What hosts have done.
+    pub(super) rows: Vec<Row>,
+    /// Hosts that are through.
+    pub(super) done: Vec<String>,
+}
+
+/// A condition that a host waits for.
+pub(super) struct Waiting {
+    pub(super) line: (usize, usize),
+    /// Set when it was so.
+    pub(super) so: bool,
+    pub(super) waker: Option<Waker>,
+}
+
+/// What a host needs to know.
+pub(super) struct Post {
+    /// Its number among the hosts.
+    pub(super) number: usize,
+    pub(super) name: String,
+    pub(super) network: Network,
+    pub(super) models: Vec<(NodeId, &'static Description)>,
+    pub(super) desk: Rc<RefCell<Desk>>,
+}
+
+/// Runs the lines of a host; gives up at the first that does not go as the scenario says.
+pub(super) async fn run(post: Post, start: Option<Duration>, lines: Vec<HostLine>) {
+    match start {
+        Some(start) => post.network.sleep(start).await,
+        None => post.wait_until_booted().await,
+    }
+    let mut failed = false;
+    for (n, line) in lines.iter().enumerate() {
+        let began = post.network.now();
+        let (verdict, seen) = if failed {
+            (Verdict::Skipped, "not reached".to_owned())
+        } else {
+            line.wanted.judge(post.perform(n, &line.deed).await, began, post.network.now())
+        };
+        failed |= verdict == Verdict::Failed;
+        let at = (verdict != Verdict::Skipped).then(|| post.network.now());
+        let name = line.name.clone().unwrap_or_else(|| post.name.clone());
+        let asked = line.asked.clone();
+        post.desk.borrow_mut().rows.push(Row {
+            kind: RowKind::Host,
+            name,
+            asked,
+            at,
+            seen,
+            verdict,
+            place: line.place.line,
+        });
+    }
+    if !failed {
+        post.desk.borrow_mut().done.push(post.name);
+    }
+}
+
+/// What came of a line: what was seen, with a number if it is one; or why it did not go.
+type Done = Result<(String, Option<f64>), String>;
+
+impl Wanted {
+    fn judge(&self, done: Done, began: Instant, now: Instant) -> (Verdict, String) {
+        if let Some(within) = self.within
+            && now - began > within
+        {
+            let seen = done.map_or_else(|error| error, |(seen, _)| seen);
+            return (Verdict::Failed, format!("took {} s: {seen}", Shown((now - began).as_secs_f64())));
+        }
+        match (&self.fails, done) {
+            (None, Err(error)) => (Verdict::Failed, error),
+            (Some(_), Ok((seen, _))) => (Verdict::Failed, format!("it did not fail: {seen}")),
+            (Some(part), Err(error)) if error.to_lowercase().contains(&part.to_lowercase()) => (Verdict::Passed, error),
+            (Some(_), Err(error)) => (Verdict::Failed, format!("it failed in another way: {error}")),
+            (None, Ok((seen, number))) => match self.value {
+                None => (Verdict::Passed, seen),
+                Some(value) if number.is_some_and(|number| (number - value).abs() <= self.tolerance) => {
+                    (Verdict::Passed, seen)
+                }
+                Some(_) => (Verdict::Failed, seen),
+            },
+        }
+    }
+}
+
+impl Post {
+    /// Waits until each drive has booted and looked about; not for ever for one that does not.
+    async fn wait_until_booted(&self) {
+        let boots =
+            self.models.iter().map(|(node, _)| self.network.node(*node).wait(|node| node.facts.boot_up, BOOT_PATIENCE));
+        master::join_all(boots).await;
+        self.network.sleep(SETTLING_TIME).await;
+    }
+
+    fn drive(&self, place: Place) -> Result<Drive, String> {
+        let id = NodeId::new(place.node).ok_or("there is no such node")?;
+        let node = self.network.node(id);
+        let drive = match self.model(id) {
+            Some(model) => Drive::new(node, model),
+            None => Drive::of_unknown_model(node),
+        };
+        drive.axis(place.axis).map_err(|error| error.to_string())
+    }
+
+    fn model(&self, id: NodeId) -> Option<&'static Description> {
+        self.models.iter().find(|(node, _)| *node == id).map(|(_, model)| *model)
+    }
+
+    async fn perform(&self, line: usize, deed: &Deed) -> Done {
+        let done = |seen: &str| Ok((seen.to_owned(), None));
+        let network = &self.network;
+        match deed {
+            Deed::Drive(place, intent) => self.intend(*place, *intent).await,
+            Deed::Velocity(place, speed, options) => moved(self.drive(*place)?.velocity(*speed, *options).await),
+            Deed::Move { place, to, relative: true, options } => {
+                moved(self.drive(*place)?.move_relative(*to, *options).await)
+            }
+            Deed::Move { place, to, options, .. } => moved(self.drive(*place)?.move_absolute(*to, *options).await),
+            Deed::Torque(place, current) => moved(self.drive(*place)?.torque(*current).await),
+            Deed::Home(place, method, options) => moved(self.drive(*place)?.home(*method, *options).await),
+            Deed::Read(node, object) => self.read(*node, object).await,
+            Deed::Write(node, object, text) => self.write(*node, object, text).await,
+            Deed::Nmt(None, command) => {
+                network.nmt_all(*command);
+                done("sent")
+            }
+            Deed::Nmt(Some(node), command) => {
+                use canopen::NmtCommand::{ResetCommunication, ResetNode};
+                let node = network.node(*node);
+                let booted = node.wait_boot_up(BOOT_PATIENCE);
+                node.nmt(*command);
+                if !matches!(command, ResetNode | ResetCommunication) {
+                    return done("sent");
+                }
+                booted.await.map_err(|error| error.to_string())?;
+                done("booted")
+            }
+            Deed::Watch(node, time) => {
+                network.node(*node).watch_heartbeat(Some(*time));
+                done("watching")
+            }
+            Deed::Heartbeat(own, period) => {
+                network.heartbeat(*own, Some(*period));
+                done("producing")
+            }
+            Deed::Sync(period) => {
+                network.sync(*period);
+                done(if period.is_some() { "producing" } else { "ended" })
+            }
+            Deed::Send(frame) => {
+                network.transmit(*frame);
+                done("sent")
+            }
+            Deed::Wait(duration) => {
+                network.sleep(*duration).await;
+                done("waited")
+            }
+            Deed::WaitFor(_, within) => self.wait_for(line, *within).await,
+        }
+    }
+
+    async fn intend(&self, place: Place, intent: Intent) -> Done {
+        let drive = self.drive(place)?;
+        let done = match intent {
+            Intent::Enable => drive.enable().await,
+            Intent::Disable => drive.disable().await,
+            Intent::Stop => drive.stop().await,
+            Intent::QuickStop => drive.quick_stop().await,
+            Intent::Reset => drive.reset_fault().await,
+            Intent::Save => drive.save().await,
+            Intent::Restore => drive.restore().await,
+            Intent::Guard => {
+                let loss = drive.guard(SwitchedOff::SwitchOn).await.map_err(|error| error.to_string())?;
+                return Ok((loss.to_string(), None));
+            }
+            Intent::Release => drive.release_guard().await,
+        };
+        done.map(|()| ("done".into(), None)).map_err(|error| error.to_string())
+    }
+
+    fn resolve(&self, node: NodeId, object: &ObjectArg) -> Result<(Mux, Option<&'static Entry>), String> {
+        object.resolve(self.model(node).map(|model| model.dictionary))
+    }
+
+    async fn read(&self, node: NodeId, object: &ObjectArg) -> Done {
+        let (mux, row) = self.resolve(node, object)?;
+        let payload = self.network.node(node).upload(mux).await.map_err(|error| error.to_string())?;
+        let bytes = payload.as_bytes();
+        if bytes.is_empty() || bytes.len() > 8 {
+            return Ok((String::from_utf8_lossy(bytes).into_owned(), None));
+        }
+        let raw = bytes.iter().rev().fold(0u64, |raw, byte| raw << 8 | u64::from(*byte));
+        // Shifted up and down again the sign is that of the object's length.
+        let unused = 64 - 8 * bytes.len() as u32;
+        let signed = row.is_some_and(|row| row.data_type.is_signed());
+        let number = if signed { i128::from((raw << unused) as i64 >> unused) } else { i128::from(raw) };
+        Ok((format!("{number} ({raw:0width$X}h)", width = 2 * bytes.len()), Some(number as f64)))
+    }
+
+    async fn write(&self, node: NodeId, object: &ObjectArg, text: &str) -> Done {
+        let (mux, row) = self.resolve(node, object)?;
+        let (data_type, number) = match row {
+            Some(row) => (row.data_type, value(row, text, 1)?),
+            None => typed_value(text)?,
+        };
+        let bytes = data_type.raw(number).to_le_bytes();
+        let written = self.network.node(node).download(mux, &bytes[..data_type.size()]).await;
+        written.map_err(|error| error.to_string())?;
+        Ok((format!("{number} written"), None))
+    }
+
+    /// Waits until the one who steps the world says that the condition of this line was so.
+    async fn wait_for(&self, line: usize, within: Duration) -> Done {
+        let key = (self.number, line);
+        self.desk.borrow_mut().waits.push(Waiting { line: key, so: false, waker: None });
+        let mut patience = std::pin::pin!(self.network.sleep(within));
+        let so = poll_fn(|context| {
+            let mut desk = self.desk.borrow_mut();
+            let Some(waiting) = desk.waits.iter_mut().find(|waiting| waiting.line == key) else {
+                return Poll::Ready(false);
+            };
+            if waiting.so {
+                return Poll::Ready(true);
+            }
+            waiting.waker = Some(context.waker().clone());
+            patience.as_mut().poll(context).map(|()| false)
+        })
+        .await;
+        self.desk.borrow_mut().waits.retain(|waiting| waiting.line != key);
+        if so {
+            Ok(("it is so".into(), None))
+        } else {
+            Err(format!("it was not so within {} s", Shown(within.as_secs_f64())))
+        }
+    }
+}
+
+fn moved(report: Result<MotionReport, master::Error>) -> Done {
+    let report = report.map_err(|error| error.to_string())?;
+    Ok(match report.reached_after {
+        Some(time) => (format!("reached after {} s", Shown(time.as_secs_f64())), None),
+        None => ("commanded".into(), None),
+    })
+}

@@ -1,0 +1,196 @@
+//! What came of a scenario: a row for each step, line and expectation, the named figures, and how the run can be told apart.
+
+use std::fmt::Write;
+
+use can::Instant;
+use serde::Serialize;
+
+/// What came of one run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// The scenario's title.
+    pub title: String,
+    /// What decided everything random.
+    pub seed: u64,
+    /// The parameters and their values in this run.
+    pub parameters: Vec<(String, String)>,
+    /// When it ended, in virtual time.
+    pub end: Instant,
+    /// What was asked and seen, in the order of time; what never came is last.
+    pub rows: Vec<Row>,
+    /// The named figures; not a number where there was nothing to measure.
+    pub figures: Vec<(String, f64)>,
+    /// Hash over all frames and shaft angles: equal for equal runs.
+    pub digest: u64,
+    /// The last frames on the wire, in candump format, of a run that failed.
+    pub last_frames: Vec<String>,
+}
+
+/// One thing that was asked, and what was seen.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// What it is.
+    pub kind: RowKind,
+    /// Its name, or that of its host.
+    pub name: String,
+    /// What was asked, in the words of the file.
+    pub asked: String,
+    /// When it was done or decided; `None` if that never came.
+    pub at: Option<Instant>,
+    /// What was seen.
+    pub seen: String,
+    /// Whether it is as asked.
+    pub verdict: Verdict,
+    /// The line of the file.
+    pub place: usize,
+}
+
+/// What a row is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RowKind {
+    /// What the outer world does.
+    Step,
+    /// What a host does.
+    Host,
+    /// What is expected.
+    Expect,
+}
+
+impl RowKind {
+    /// In a word.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Step => "step",
+            Self::Host => "host",
+            Self::Expect => "expect",
+        }
+    }
+}
+
+/// Whether a row is as asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// It is.
+    Passed,
+    /// It is not.
+    Failed,
+    /// It was not reached, for something before it failed.
+    Skipped,
+}
+
+impl Outcome {
+    /// True if everything is as asked.
+    pub fn passed(&self) -> bool {
+        self.rows.iter().all(|row| row.verdict == Verdict::Passed)
+    }
+
+    /// The rows that are not as asked.
+    pub fn failures(&self) -> impl Iterator<Item = &Row> {
+        self.rows.iter().filter(|row| row.verdict != Verdict::Passed)
+    }
+
+    /// As `ferrodrive run --json` prints it.
+    pub fn to_json(&self) -> OutcomeReport<'_> {
+        OutcomeReport {
+            ok: self.passed(),
+            title: &self.title,
+            seed: self.seed,
+            parameters: self.parameters.iter().map(|(name, value)| (name.as_str(), value.as_str())).collect(),
+            end_s: self.end.as_nanos() as f64 / 1e9,
+            rows: self.rows.iter().map(RowReport::from).collect(),
+            figures: self.figures.iter().map(|(name, value)| (name.as_str(), *value)).collect(),
+            digest: format!("{:016x}", self.digest),
+            last_frames: &self.last_frames,
+        }
+    }
+
+    /// As a test suite in JUnit's XML, which build servers read: a test case for each row.
+    pub fn to_junit(&self) -> String {
+        let failed = self.rows.iter().filter(|row| row.verdict == Verdict::Failed).count();
+        let skipped = self.rows.iter().filter(|row| row.verdict == Verdict::Skipped).count();
+        let mut xml = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
+        let title = escaped(&self.title);
+        // Writing into a text does not fail.
+        let _ = writeln!(
+            xml,
+            "<testsuites>\n  <testsuite name=\"{title}\" tests=\"{}\" failures=\"{failed}\" skipped=\"{skipped}\" time=\"{}\">",
+            self.rows.len(),
+            self.end
+        );
+        for row in &self.rows {
+            let name = escaped(&format!("line {}: {} {}", row.place, row.kind.word(), row.asked));
+            let time = row.at.unwrap_or(self.end);
+            let _ = write!(xml, "    <testcase classname=\"{title}\" name=\"{name}\" time=\"{time}\"");
+            let seen = escaped(&row.seen);
+            let _ = match row.verdict {
+                Verdict::Passed => writeln!(xml, "/>"),
+                Verdict::Failed => writeln!(xml, "><failure message=\"{seen}\"/></testcase>"),
+                Verdict::Skipped => writeln!(xml, "><skipped message=\"{seen}\"/></testcase>"),
+            };
+        }
+        if !self.last_frames.is_empty() {
+            let _ = writeln!(xml, "    <system-out>{}</system-out>", escaped(&self.last_frames.join("\n")));
+        }
+        xml.push_str("  </testsuite>\n</testsuites>\n");
+        xml
+    }
+}
+
+/// Text as XML takes it: no markup, and none of the letters that XML 1.0 does not have.
+fn escaped(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for letter in text.chars() {
+        match letter {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            '\n' | '\t' => escaped.push(letter),
+            _ if letter.is_control() || matches!(letter, '\u{FFFE}' | '\u{FFFF}') => escaped.push('\u{FFFD}'),
+            _ => escaped.push(letter),
+        }
+    }
+    escaped
+}
+
+/// An outcome in JSON.
+#[derive(Debug, Serialize)]
+pub struct OutcomeReport<'a> {
+    ok: bool,
+    title: &'a str,
+    seed: u64,
+    parameters: std::collections::BTreeMap<&'a str, &'a str>,
+    end_s: f64,
+    rows: Vec<RowReport<'a>>,
+    figures: std::collections::BTreeMap<&'a str, f64>,
+    digest: String,
+    last_frames: &'a [String],
+}
+
+#[derive(Debug, Serialize)]
+struct RowReport<'a> {
+    kind: RowKind,
+    name: &'a str,
+    asked: &'a str,
+    t: Option<f64>,
+    seen: &'a str,
+    verdict: Verdict,
+    line: usize,
+}
+
+impl<'a> From<&'a Row> for RowReport<'a> {
+    fn from(row: &'a Row) -> Self {
+        let t = row.at.map(|at| at.as_nanos() as f64 / 1e9);
+        Self {
+            kind: row.kind,
+            name: &row.name,
+            asked: &row.asked,
+            t,
+            seen: &row.seen,
+            verdict: row.verdict,
+            line: row.place,
+        }
+    }
+}

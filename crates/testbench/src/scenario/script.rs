@@ -1,0 +1,326 @@
+//! Where a run of a scenario stands: which steps are done, which expectations are decided, and when to look next.
+
+use std::time::Duration;
+
+use can::Instant;
+use sim::StationId;
+use sim::World;
+use sim::wire::WireEvent;
+
+use super::condition::View;
+use super::file::{Act, Base, Expect, Figure, Law, Measure, Scenario, Statistic, Step, Until};
+use super::outcome::{Row, RowKind, Verdict};
+
+/// The state of everything that is not a host.
+pub(super) struct Script {
+    steps: Vec<Progress>,
+    expects: Vec<Option<Verdict>>,
+    figures: Vec<Tally>,
+    pub(super) rows: Vec<Row>,
+    /// Names of steps and hosts, and when they were done.
+    done: Vec<(String, Instant)>,
+    /// A step has taken the host away.
+    pub(super) host_died: bool,
+    /// When values were looked at last.
+    looked: Option<Instant>,
+}
+
+/// How far a step is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Progress {
+    Waiting,
+    Due(Instant),
+    Done,
+}
+
+/// What is known of a figure so far.
+#[derive(Clone, Copy, Debug)]
+struct Tally {
+    value: f64,
+    sum: f64,
+    count: u64,
+}
+
+impl Tally {
+    const NOTHING: Self = Self { value: f64::NAN, sum: 0.0, count: 0 };
+
+    fn add(&mut self, statistic: Statistic, value: f64) {
+        if value.is_nan() {
+            return;
+        }
+        self.sum += value;
+        self.count += 1;
+        // Of a number and none, `min` and `max` give the number.
+        self.value = match statistic {
+            Statistic::Min => self.value.min(value),
+            Statistic::Max => self.value.max(value),
+            Statistic::Peak => self.value.max(value.abs()),
+            Statistic::Last => value,
+            Statistic::Mean => self.sum / self.count as f64,
+        };
+    }
+}
+
+/// An instant of the run that is `time` from its beginning.
+fn instant(time: Duration) -> Instant {
+    Instant::ZERO + time
+}
+
+impl Script {
+    pub(super) fn new(scenario: &Scenario) -> Self {
+        Self {
+            steps: vec![Progress::Waiting; scenario.steps.len()],
+            expects: vec![None; scenario.expects.len()],
+            figures: vec![Tally::NOTHING; scenario.figures.len()],
+            rows: Vec::new(),
+            done: Vec::new(),
+            host_died: false,
+            looked: None,
+        }
+    }
+
+    /// Notes that a step or a host is done.
+    pub(super) fn note_done(&mut self, name: &str, now: Instant) {
+        self.done.push((name.to_owned(), now));
+    }
+
+    /// Whether it is.
+    pub(super) fn is_done(&self, name: &str) -> bool {
+        self.done_at(name).is_some()
+    }
+
+    fn done_at(&self, name: &str) -> Option<Instant> {
+        self.done.iter().find(|(done, _)| done == name).map(|(_, at)| *at)
+    }
+
+    /// When something counts from, if that is known yet.
+    fn begin(&self, base: &Base) -> Option<Instant> {
+        match base {
+            Base::At(time) => Some(instant(*time)),
+            Base::After(name) => self.done_at(name),
+        }
+    }
+
+    fn end(&self, expect: &Expect) -> Option<Instant> {
+        match expect.until {
+            Until::End => None,
+            Until::At(time) => Some(instant(time)),
+            Until::Within(time) => self.begin(&expect.from).map(|begin| begin + time),
+        }
+    }
+
+    /// True if values have to be looked at again and again.
+    pub(super) fn samples(&self, scenario: &Scenario) -> bool {
+        let signals = scenario.figures.iter().any(|figure| matches!(figure.of, Measure::Signal(..)));
+        let steps = scenario.steps.iter().zip(&self.steps).any(|(step, progress)| {
+            *progress == Progress::Waiting && step.when.as_ref().is_some_and(|when| !when.is_event())
+        });
+        let expects = scenario.expects.iter().zip(&self.expects);
+        signals
+            || steps
+            || expects.into_iter().any(|(expect, verdict)| verdict.is_none() && !expect.condition.is_event())
+    }
+
+    /// The next time at which something begins, is due or ends, and at which values have not been looked at.
+    pub(super) fn next_time(&self, scenario: &Scenario) -> Option<Instant> {
+        let steps = scenario.steps.iter().zip(&self.steps).flat_map(|(step, progress)| match progress {
+            Progress::Due(at) => [Some(*at), None],
+            Progress::Done => [None, None],
+            Progress::Waiting => {
+                let begin = self.begin(&step.base);
+                let limit = begin.zip(step.within).map(|(begin, within)| begin + within);
+                [begin.map(|begin| if step.when.is_none() { begin + step.delay } else { begin }), limit]
+            }
+        });
+        let expects = scenario.expects.iter().zip(&self.expects).filter(|(_, verdict)| verdict.is_none());
+        let expects = expects.flat_map(|(expect, _)| [self.begin(&expect.from), self.end(expect)]);
+        steps.chain(expects).flatten().filter(|at| self.looked.is_none_or(|looked| *at > looked)).min()
+    }
+
+    /// Looks at everything: because of an event on the wire, or at values if there is none. Does what is due.
+    pub(super) fn look(&mut self, scenario: &Scenario, world: &mut World, host: StationId, event: Option<&WireEvent>) {
+        // What one step does may be what another waits for, at the same instant.
+        while self.look_at_steps(scenario, world, host, event) {}
+        self.look_at_expectations(scenario, world, event);
+        if event.is_none() {
+            self.looked = Some(world.now());
+            self.measure(scenario, world);
+        }
+    }
+
+    fn look_at_steps(
+        &mut self,
+        scenario: &Scenario,
+        world: &mut World,
+        host: StationId,
+        event: Option<&WireEvent>,
+    ) -> bool {
+        let now = world.now();
+        let mut changed = false;
+        for (n, step) in scenario.steps.iter().enumerate() {
+            if self.steps[n] == Progress::Waiting {
+                self.arm(n, step, world, event);
+            }
+            if matches!(self.steps[n], Progress::Due(at) if at <= now) {
+                self.steps[n] = Progress::Done;
+                let refused = self.act(step, world, host);
+                let verdict = if refused.is_none() { Verdict::Passed } else { Verdict::Failed };
+                self.row_of_step(step, Some(now), verdict, refused.unwrap_or_else(|| "done".into()));
+                if let Some(name) = &step.name {
+                    self.note_done(name, now);
+                }
+                changed = true;
+            }
+        }
+        changed
+    }
+
+    /// Decides whether a step that waits is due, and when; or that it has waited too long.
+    fn arm(&mut self, n: usize, step: &Step, world: &mut World, event: Option<&WireEvent>) {
+        let now = world.now();
+        let Some(begin) = self.begin(&step.base).filter(|begin| *begin <= now) else { return };
+        let Some(when) = &step.when else {
+            self.steps[n] = Progress::Due(begin + step.delay);
+            return;
+        };
+        if when.is_event() == event.is_some() {
+            let done = |name: &str| self.is_done(name);
+            if when.holds(&mut View { world, event, done: &done }) {
+                self.steps[n] = Progress::Due(now + step.delay);
+                return;
+            }
+        }
+        if step.within.is_some_and(|within| now >= begin + within) {
+            let done = |name: &str| self.is_done(name);
+            let seen = when.seen(&mut View { world, event: None, done: &done });
+            self.steps[n] = Progress::Done;
+            self.row_of_step(step, Some(now), Verdict::Failed, format!("its condition was not so in time: {seen}"));
+        }
+    }
+
+    /// Does what a step says; the first refusal ends it.
+    fn act(&mut self, step: &Step, world: &mut World, host: StationId) -> Option<String> {
+        for act in &step.acts {
+            match act {
+                Act::World(place, stimulus) => {
+                    let applied = world.apply(*place, stimulus).map_err(|error| error.to_string());
+                    let refused = applied.and_then(|applied| applied.map_err(|refused| refused.to_string()));
+                    if let Err(reason) = refused {
+                        return Some(format!("'{place} {stimulus}': {reason}"));
+                    }
+                }
+                Act::Wire(fault) => world.disturb(*fault),
+                Act::HostCable(true) => world.cut(host),
+                Act::HostCable(false) => world.join(host),
+                Act::HostDies => {
+                    world.remove(host);
+                    self.host_died = true;
+                }
+            }
+        }
+        None
+    }
+
+    fn row_of_step(&mut self, step: &Step, at: Option<Instant>, verdict: Verdict, seen: String) {
+        let (name, asked) = (step.name.clone().unwrap_or_default(), step.asked.clone());
+        self.rows.push(Row { kind: RowKind::Step, name, asked, at, seen, verdict, place: step.place.line });
+    }
+
+    fn look_at_expectations(&mut self, scenario: &Scenario, world: &mut World, event: Option<&WireEvent>) {
+        let now = world.now();
+        for (n, expect) in scenario.expects.iter().enumerate() {
+            let begun = self.begin(&expect.from).is_some_and(|begin| begin <= now);
+            if self.expects[n].is_some() || !begun {
+                continue;
+            }
+            let end = self.end(expect);
+            let over = end.is_some_and(|end| now >= end);
+            let asked = expect.condition.is_event() == event.is_some();
+            let done = |name: &str| self.is_done(name);
+            let mut view = View { world, event, done: &done };
+            let in_time = end.is_none_or(|end| now <= end);
+            let holds = asked && in_time && expect.condition.holds(&mut view);
+            let verdict = match (expect.law, asked && in_time, holds) {
+                (Law::Once, _, true) => Some(Verdict::Passed),
+                (Law::Always, true, false) | (Law::Never, _, true) => Some(Verdict::Failed),
+                // An event at this very instant may still come: what is about frames ends when values are looked at.
+                (Law::Once, ..) if over && event.is_none() => Some(Verdict::Failed),
+                (Law::Always | Law::Never, ..) if over && event.is_none() => Some(Verdict::Passed),
+                _ => None,
+            };
+            if let Some(verdict) = verdict {
+                let seen = expect.condition.seen(&mut view);
+                self.decide(n, expect, Some(now), verdict, seen);
+            }
+        }
+    }
+
+    fn decide(&mut self, n: usize, expect: &Expect, at: Option<Instant>, verdict: Verdict, seen: String) {
+        self.expects[n] = Some(verdict);
+        let (name, asked) = (expect.name.clone(), expect.asked.clone());
+        self.rows.push(Row { kind: RowKind::Expect, name, asked, at, seen, verdict, place: expect.place.line });
+    }
+
+    fn measure(&mut self, scenario: &Scenario, world: &mut World) {
+        for (tally, Figure { of, .. }) in self.figures.iter_mut().zip(&scenario.figures) {
+            let Measure::Signal(statistic, place, signal) = of else { continue };
+            let report = world.with_drive(place.node, |drive, now| {
+                drive.advance(now);
+                drive.report_of(place.axis)
+            });
+            if let Ok(report) = report {
+                tally.add(*statistic, signal.of(&report));
+            }
+        }
+    }
+
+    /// The figures as they stand.
+    pub(super) fn figures(&self, scenario: &Scenario) -> Vec<(String, f64)> {
+        let value = |(tally, figure): (&Tally, &Figure)| match &figure.of {
+            Measure::Signal(..) => tally.value,
+            Measure::Time(name) => self.done_at(name).map_or(f64::NAN, |at| at.as_nanos() as f64 / 1e9),
+        };
+        let figures = self.figures.iter().zip(&scenario.figures);
+        figures.map(|(tally, figure)| (figure.name.clone(), value((tally, figure)))).collect()
+    }
+
+    /// True if nothing is left to be done or decided, but for what counts to the end of the run.
+    pub(super) fn is_through(&self, scenario: &Scenario) -> bool {
+        let steps = self.steps.iter().all(|progress| *progress == Progress::Done);
+        let mut expects = scenario.expects.iter().zip(&self.expects);
+        steps
+            && expects.all(|(expect, verdict)| {
+                verdict.is_some()
+                    || expect.law != Law::Once && expect.until == Until::End && self.begin(&expect.from).is_some()
+            })
+    }
+
+    /// Decides what is still open at the end of the run.
+    pub(super) fn conclude(&mut self, scenario: &Scenario, world: &mut World) {
+        for (n, step) in scenario.steps.iter().enumerate() {
+            if self.steps[n] != Progress::Done {
+                let done = |name: &str| self.is_done(name);
+                let mut view = View { world, event: None, done: &done };
+                let seen = step.when.as_ref().map(|when| format!(": {}", when.seen(&mut view))).unwrap_or_default();
+                self.row_of_step(step, None, Verdict::Failed, format!("its time never came{seen}"));
+            }
+        }
+        for (n, expect) in scenario.expects.iter().enumerate() {
+            if self.expects[n].is_some() {
+                continue;
+            }
+            let begun = self.begin(&expect.from).is_some_and(|begin| begin <= world.now());
+            let done = |name: &str| self.is_done(name);
+            let seen = expect.condition.seen(&mut View { world, event: None, done: &done });
+            let now = world.now();
+            match (begun, expect.law, expect.until) {
+                (false, ..) => self.decide(n, expect, None, Verdict::Failed, "its time never began".into()),
+                (true, Law::Once, _) => {
+                    self.decide(n, expect, None, Verdict::Failed, format!("not by the end of the run: {seen}"));
+                }
+                (true, _, Until::End) => self.decide(n, expect, Some(now), Verdict::Passed, seen),
+                (true, ..) => self.decide(n, expect, None, Verdict::Failed, "the run ended before".into()),
+            }
+        }
+    }
+}
