@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    completions, dcf, demo, drive, dump, eds, home, motion, nmt, objects, plot, readings, scan, sdo, sim, store,
+    completions, dcf, demo, drive, dump, eds, home, motion, nmt, objects, plot, readings, run, scan, sdo, sim, store,
 };
 use crate::global::Global;
 
@@ -24,6 +24,7 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     Demo(demo::Demo),
     Sim(sim::Sim),
+    Run(run::Run),
     Scan(scan::Scan),
     Read(sdo::Read),
     Write(sdo::Write),

@@ -135,6 +135,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Sim(sim) => {
             sim.run(global, typed.bus.then_some(&global.bus), global.machine.as_ref().filter(|_| typed.machine))
         }
+        Command::Run(run) => run.run(format),
         Command::Scan(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Read(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Write(command) => on_bus(global, format, async |context| command.run(context).await),

@@ -25,7 +25,13 @@ const MODEL: &str = "models";
 const MACHINE: &str = "machine";
 const TIMEOUT: &str = "timeout";
 
-const UNHEEDED: [Unheeded; 7] = [
+const UNHEEDED: [Unheeded; 8] = [
+    Unheeded {
+        command: "run",
+        options: &[BUS, MODEL, MACHINE, TIMEOUT],
+        why: "a scenario has a machine and a bus of its own",
+        next: "leave it away; the scenario's machine may be the path of a machine file",
+    },
     Unheeded {
         command: "sim",
         options: &[MODEL],

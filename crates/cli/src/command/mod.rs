@@ -13,6 +13,7 @@ pub(crate) mod nmt;
 pub(crate) mod objects;
 pub(crate) mod plot;
 pub(crate) mod readings;
+pub(crate) mod run;
 pub(crate) mod scan;
 pub(crate) mod sdo;
 pub(crate) mod sim;

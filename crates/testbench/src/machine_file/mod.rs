@@ -117,11 +117,11 @@ impl Machine {
     /// Everything that is wrong.
     pub fn from_table(file: &Table<'_>, folder: &Path) -> Result<Self, Vec<Problem>> {
         let mut problems = file.strangers(BUS_KEYS);
-        let mut machine = Self::default();
-        machine.bitrate = noted(file.get("bitrate").map(|field| rate(&field)).transpose(), &mut problems);
+        let bitrate = noted(file.get("bitrate").map(|field| rate(&field)).transpose(), &mut problems);
         let seed = file.get("seed").map(|field| field.whole("a whole number from 0 on")).transpose();
-        machine.seed = noted(seed, &mut problems);
-        machine.realism = noted(file.get("realism").map(|field| realism(&field)).transpose(), &mut problems);
+        let seed = noted(seed, &mut problems);
+        let realism = noted(file.get("realism").map(|field| realism(&field)).transpose(), &mut problems);
+        let mut machine = Self { bitrate, seed, realism, drives: Vec::new() };
         let expected = "a table of its own for each drive, begun by [[drive]]";
         let tables = file.get("drive").map_or(Ok(Vec::new()), |field| field.list(expected));
         let tables = tables.unwrap_or_else(|problem| {

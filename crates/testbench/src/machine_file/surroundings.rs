@@ -25,8 +25,7 @@ pub(super) fn source(table: &Table<'_>) -> Result<Source, Problem> {
 
 /// What else is around a drive, with its places. What is wrong is added to `problems`.
 pub(super) fn around(table: &Table<'_>, problems: &mut Vec<Problem>) -> Vec<(Stimulus, Located)> {
-    let parts: [fn(&Table<'_>) -> Result<Vec<Words>, Problem>; 7] =
-        [load, inputs, switches, rotor, temperatures, faults, battery];
+    let parts: [Part; 7] = [load, inputs, switches, rotor, temperatures, faults, battery];
     let mut stimuli = Vec::new();
     for part in parts {
         match part(table) {
@@ -45,6 +44,9 @@ pub(super) fn around(table: &Table<'_>, problems: &mut Vec<Problem>) -> Vec<(Sti
     }
     stimuli
 }
+
+/// What makes world commands of a part of the table.
+type Part = fn(&Table<'_>) -> Result<Vec<Words>, Problem>;
 
 /// A world command without its node, and where it comes from.
 struct Words {

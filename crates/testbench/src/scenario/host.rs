@@ -18,8 +18,9 @@ use master::{Drive, Network};
 use sim::Place;
 
 use super::deed::{Deed, Intent};
-use super::file::{HostLine, Wanted};
+
 use super::outcome::{Row, RowKind, Verdict};
+use super::plan::{HostLine, Wanted};
 use crate::words::object::ObjectArg;
 use crate::words::value::{typed_value, value};
 

@@ -25,9 +25,11 @@
 
 pub mod condition;
 pub mod deed;
+pub mod entries;
 pub mod file;
 mod host;
 mod outcome;
+mod plan;
 mod runner;
 mod script;
 

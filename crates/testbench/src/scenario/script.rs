@@ -8,8 +8,9 @@ use sim::World;
 use sim::wire::WireEvent;
 
 use super::condition::View;
-use super::file::{Act, Base, Expect, Figure, Law, Measure, Scenario, Statistic, Step, Until};
+use super::file::Scenario;
 use super::outcome::{Row, RowKind, Verdict};
+use super::plan::{Act, Base, Expect, Figure, Law, Measure, Statistic, Step, Until};
 
 /// The state of everything that is not a host.
 pub(super) struct Script {

@@ -1,3 +1,107 @@
 //! Sweeps: one scenario with many seeds and values of its parameters.
+//!
+//! A [`Sweep`] numbers its runs; whoever has threads makes [`Sweep::run`] of the numbers in any order, and adds what comes of
+//! them to a [`Summary`]. The summary does not depend on that order, and its size not on the number of runs.
 
 pub mod file;
+mod summary;
+
+use std::ops::RangeInclusive;
+
+use serde::Serialize;
+
+use crate::document::BadFile;
+use crate::document::reader::Parameters;
+use crate::scenario::{Outcome, Runner, Scenario};
+use file::Axis;
+
+pub use summary::{Distribution, Failed, Summary};
+
+/// Runs that a sweep may have: more would take longer than anybody waits.
+pub const MOST_RUNS: u64 = 1_000_000_000;
+
+/// A scenario, the seeds and the values that it is run with.
+#[derive(Clone, Debug)]
+pub struct Sweep {
+    scenario: Scenario,
+    axes: Vec<Axis>,
+    seeds: RangeInclusive<u64>,
+    runs: u64,
+}
+
+/// One run of a sweep.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Point {
+    /// What decides everything random.
+    pub seed: u64,
+    /// The values that differ from run to run.
+    pub values: Parameters,
+}
+
+impl Point {
+    /// The options of `ferrodrive run` that repeat it.
+    pub fn options(&self) -> String {
+        let values = self.values.iter().map(|(name, value)| format!(" --set {name}={}", quoted(value)));
+        format!("--seed {}{}", self.seed, values.collect::<String>())
+    }
+}
+
+/// A value as a shell takes it.
+fn quoted(value: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "._-+:/".contains(c);
+    if !value.is_empty() && value.chars().all(plain) {
+        value.to_owned()
+    } else {
+        format!("'{}'", value.replace('\'', "'\\''"))
+    }
+}
+
+impl Sweep {
+    /// All seeds with all values of the scenario's `[sweep]`, each with each.
+    ///
+    /// # Errors
+    /// That there are none, or too many.
+    pub fn new(scenario: Scenario, seeds: RangeInclusive<u64>) -> Result<Self, String> {
+        let axes = scenario.sweep.clone();
+        let count = seeds.end().checked_sub(*seeds.start()).and_then(|span| span.checked_add(1));
+        let runs = axes.iter().try_fold(count.unwrap_or(0), |runs, axis| runs.checked_mul(axis.values.len() as u64));
+        match runs {
+            None | Some(0) if seeds.is_empty() => Err("there is no seed in this range".into()),
+            Some(runs @ 1..=MOST_RUNS) => Ok(Self { scenario, axes, seeds, runs }),
+            _ => Err(format!("more than {MOST_RUNS} runs; take fewer seeds or values")),
+        }
+    }
+
+    /// How many runs there are.
+    pub fn runs(&self) -> u64 {
+        self.runs
+    }
+
+    /// The run of this number, from 0 on: the seed changes first, then the parameters in the order of the alphabet.
+    pub fn point(&self, number: u64) -> Point {
+        let seeds = self.seeds.end() - self.seeds.start() + 1;
+        let mut rest = number / seeds;
+        let values = self.axes.iter().map(|axis| {
+            let count = axis.values.len() as u64;
+            let value = axis.values[(rest % count) as usize].clone();
+            rest /= count;
+            (axis.name.clone(), value)
+        });
+        Point { values: values.collect(), seed: self.seeds.start() + number % seeds }
+    }
+
+    /// Makes the run of this number.
+    ///
+    /// # Errors
+    /// That a value of it makes no sense in the scenario.
+    pub fn run(&self, number: u64) -> Result<Outcome, BadFile> {
+        let Point { seed, values } = self.point(number);
+        if values.is_empty() {
+            return Ok(Runner::new(&self.scenario, Some(seed))?.run());
+        }
+        // What the command line has set stays.
+        let mut all = self.scenario.parameters.clone();
+        all.extend(values);
+        Ok(Runner::new(&self.scenario.with(&all)?, Some(seed))?.run())
+    }
+}

@@ -1,0 +1,90 @@
+//! `ferrodrive run`: what it prints, what it writes, and how it ends.
+
+mod common;
+
+use std::path::PathBuf;
+
+use common::{ferrodrive, scratch};
+
+fn scenario(name: &str) -> String {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../examples/scenarios").join(name);
+    path.to_str().expect("a path").to_owned()
+}
+
+#[test]
+fn a_scenario_that_passes_ends_with_0_and_one_with_a_false_expectation_with_1_and_what_was_seen() {
+    let passed = ferrodrive(&["run", &scenario("brown_out.toml")]);
+    assert_eq!(passed.status, Some(0), "{}{}", passed.out, passed.err);
+    assert!(passed.out.contains("as expected") && !passed.out.contains("FAILED"), "{}", passed.out);
+
+    let directory = scratch("run-false");
+    let file = directory.join("false.toml");
+    let text = std::fs::read_to_string(scenario("brown_out.toml")).unwrap();
+    std::fs::write(&file, text.replace("that = \"4 fault 0x0002\"", "that = \"4 fault 0x0001\"")).unwrap();
+    let path = file.to_str().unwrap();
+    let junit = directory.join("result.xml");
+    let failed = ferrodrive(&["run", path, "--junit", junit.to_str().unwrap()]);
+    assert_eq!(failed.status, Some(1));
+    assert!(failed.out.contains("FAILED") && failed.out.contains("the last frames:"), "{}", failed.out);
+    assert!(failed.err.contains("4 fault 0x0001: fault 0002h") && failed.err.contains("--seed 1"), "{}", failed.err);
+    let xml = std::fs::read_to_string(&junit).unwrap();
+    assert!(xml.contains("failures=\"1\"") && xml.contains("message=\"fault 0002h\""), "{xml}");
+
+    let json = ferrodrive(&["run", path, "--json"]);
+    assert_eq!((json.status, json.out.lines().count(), json.err.as_str()), (Some(1), 1, ""));
+    let said: serde_json::Value = serde_json::from_str(&json.out).unwrap();
+    assert_eq!(said["ok"], false);
+    let rows = said["rows"].as_array().unwrap();
+    assert!(rows.iter().any(|row| row["verdict"] == "failed" && row["seen"] == "fault 0002h"), "{said}");
+    std::fs::remove_dir_all(directory).unwrap();
+}
+
+#[test]
+fn a_sweep_tells_how_many_failed_how_figures_are_spread_and_how_to_repeat_a_run() {
+    let swept = ferrodrive(&["run", &scenario("step_loss.toml"), "--seeds", "1..2", "--jobs", "2", "--json"]);
+    assert_eq!(swept.status, Some(0), "{}{}", swept.out, swept.err);
+    let said: serde_json::Value = serde_json::from_str(&swept.out).unwrap();
+    assert_eq!((said["runs"].as_u64(), said["passed"].as_u64()), (Some(6), Some(6)));
+    let figure = &said["figures"][0];
+    assert!(figure["min"].as_f64() < figure["median"].as_f64() && figure["median"].as_f64() < figure["max"].as_f64());
+    assert_eq!(figure["lowest"]["values"]["held"], "333ms", "held the longest it loses the most");
+
+    let directory = scratch("run-sweep");
+    let file = directory.join("swept.toml");
+    let text = std::fs::read_to_string(scenario("step_loss.toml")).unwrap();
+    // The longest hold alone loses more than 1000 pulses.
+    let text = text.replace("never = \"2 rotor_position = 8000 +- 40\"", "that = \"2 rotor_position > 7000\"");
+    std::fs::write(&file, text).unwrap();
+    let path = file.to_str().unwrap();
+    let failed = ferrodrive(&["run", path, "--seeds", "5..5"]);
+    assert_eq!(failed.status, Some(1), "{}", failed.out);
+    let again = format!("ferrodrive run {path} --seed 5 --set held=333ms");
+    assert!(failed.out.contains(&again) && failed.out.contains("2 of 3 runs passed, 1 failed"), "{}", failed.out);
+    let repeated = ferrodrive(&["run", path, "--seed", "5", "--set", "held=333ms"]);
+    assert_eq!(repeated.status, Some(1));
+    std::fs::remove_dir_all(directory).unwrap();
+}
+
+#[test]
+fn what_cannot_be_run_is_refused_with_its_place() {
+    let directory = scratch("run-refused");
+    let file = directory.join("bad.toml");
+    std::fs::write(
+        &file,
+        "machine = { drive = [{ model = 'zlac8030l', node = 4 }] }\n[[expect]]\nthat = '5 powered'\n",
+    )
+    .unwrap();
+    let path = file.to_str().unwrap();
+    let refused = |arguments: &[&str], said: &str| {
+        let ended = ferrodrive(arguments);
+        assert_eq!(ended.status, Some(2), "{arguments:?}: {}", ended.err);
+        assert!(ended.err.contains(said), "{arguments:?}: {}", ended.err);
+    };
+    refused(&["run", path], "bad.toml:3:8: the machine has no node 5; it has: 4");
+    refused(&["run", &scenario("step_loss.toml"), "--set", "hold=1s"], "it has no parameter 'hold'; it has: held");
+    refused(&["run", &scenario("step_loss.toml"), "--set", "held=long"], "does not begin with a number");
+    refused(&["run", "/nowhere.toml"], "cannot use the scenario /nowhere.toml");
+    refused(&["run", path, "--seeds", "9..1"], "FIRST..LAST");
+    refused(&["--timeout", "1s", "run", path], "--timeout means nothing to run");
+    std::fs::remove_dir_all(directory).unwrap();
+}

@@ -1,0 +1,221 @@
+//! What came of many runs, in a size that does not grow with them.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::{Point, Sweep};
+use crate::document::BadFile;
+use crate::scenario::Outcome;
+
+/// Failed runs that are told: those with the lowest numbers.
+const MOST_TOLD: usize = 10;
+
+/// Values of a figure that are kept for its median; of more runs every second, every fourth and so on.
+const MOST_KEPT: usize = 1 << 16;
+
+/// What came of the runs so far.
+#[derive(Clone, Debug, Default)]
+pub struct Summary {
+    passed: u64,
+    failed: BTreeMap<u64, Failed>,
+    failures: u64,
+    figures: BTreeMap<String, Figure>,
+}
+
+/// A run that failed.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Failed {
+    /// Which run.
+    #[serde(flatten)]
+    pub point: Point,
+    /// What was asked first that was not so.
+    pub asked: String,
+    /// What was seen.
+    pub seen: String,
+}
+
+/// How a figure is distributed over the runs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Distribution {
+    /// Its name.
+    pub name: String,
+    /// Runs in which there was something to measure.
+    pub runs: u64,
+    /// The least.
+    pub min: f64,
+    /// Half of the runs have less; of more than 65536 runs it is taken from a part that is spread evenly.
+    pub median: f64,
+    /// The most.
+    pub max: f64,
+    /// The run with the least.
+    pub lowest: Point,
+    /// The run with the most.
+    pub highest: Point,
+}
+
+#[derive(Clone, Debug)]
+struct Figure {
+    runs: u64,
+    /// Value and number of the run; among equals the lowest number.
+    min: (f64, u64),
+    max: (f64, u64),
+    kept: BTreeMap<u64, f64>,
+    stride: u64,
+}
+
+impl Summary {
+    /// Adds what came of the run of this number.
+    pub fn add(&mut self, sweep: &Sweep, number: u64, outcome: &Result<Outcome, BadFile>) {
+        let (asked, seen) = match outcome {
+            Ok(outcome) => {
+                for (name, value) in &outcome.figures {
+                    if value.is_finite() {
+                        let figure = self.figures.entry(name.clone());
+                        figure.or_insert_with(|| Figure::new(*value, number)).add(*value, number);
+                    }
+                }
+                match outcome.failures().next() {
+                    None => {
+                        self.passed += 1;
+                        return;
+                    }
+                    Some(row) => (row.asked.clone(), row.seen.clone()),
+                }
+            }
+            Err(bad) => ("the machine and the scenario".into(), bad.to_string()),
+        };
+        self.failures += 1;
+        self.failed.insert(number, Failed { point: sweep.point(number), asked, seen });
+        if self.failed.len() > MOST_TOLD {
+            self.failed.pop_last();
+        }
+    }
+
+    /// Runs that passed.
+    pub fn passed(&self) -> u64 {
+        self.passed
+    }
+
+    /// Runs that did not.
+    pub fn failures(&self) -> u64 {
+        self.failures
+    }
+
+    /// The first of those.
+    pub fn failed(&self) -> impl Iterator<Item = &Failed> {
+        self.failed.values()
+    }
+
+    /// How each named figure is distributed.
+    pub fn distributions(&self, sweep: &Sweep) -> Vec<Distribution> {
+        let distribution = |(name, figure): (&String, &Figure)| {
+            let mut kept: Vec<f64> = figure.kept.values().copied().collect();
+            kept.sort_by(f64::total_cmp);
+            let half = kept.len() / 2;
+            let upper = kept.get(half).copied().unwrap_or(f64::NAN);
+            let median = if kept.len().is_multiple_of(2) && half > 0 { (kept[half - 1] + upper) / 2.0 } else { upper };
+            Distribution {
+                name: name.clone(),
+                runs: figure.runs,
+                min: figure.min.0,
+                median,
+                max: figure.max.0,
+                lowest: sweep.point(figure.min.1),
+                highest: sweep.point(figure.max.1),
+            }
+        };
+        self.figures.iter().map(distribution).collect()
+    }
+}
+
+impl Figure {
+    fn new(value: f64, number: u64) -> Self {
+        Self { runs: 0, min: (value, number), max: (value, number), kept: BTreeMap::new(), stride: 1 }
+    }
+
+    fn add(&mut self, value: f64, number: u64) {
+        self.runs += 1;
+        if value < self.min.0 || value == self.min.0 && number < self.min.1 {
+            self.min = (value, number);
+        }
+        if value > self.max.0 || value == self.max.0 && number < self.max.1 {
+            self.max = (value, number);
+        }
+        if number.is_multiple_of(self.stride) {
+            self.kept.insert(number, value);
+        }
+        while self.kept.len() > MOST_KEPT {
+            self.stride *= 2;
+            self.kept.retain(|number, _| number.is_multiple_of(self.stride));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use can::Instant;
+
+    use super::*;
+    use crate::scenario::Scenario;
+
+    fn sweep(seeds: u64) -> Sweep {
+        let text = "machine = { drive = [{ model = 'zlac8030l', node = 4 }] }\n[parameters]\na = 1\nb = 'x'\n\
+                    [sweep]\na = { from = 0, to = 1, step = 0.1 }\nb = ['x', 'it is']\n";
+        let scenario = Scenario::parse(text, Path::new("")).unwrap_or_else(|bad| panic!("{bad}"));
+        Sweep::new(scenario, 1..=seeds).expect("a sweep")
+    }
+
+    fn outcome(value: f64) -> Result<Outcome, BadFile> {
+        Ok(Outcome {
+            title: String::new(),
+            seed: 1,
+            parameters: Vec::new(),
+            end: Instant::ZERO,
+            rows: Vec::new(),
+            figures: vec![("figure".into(), value)],
+            digest: 0,
+            last_frames: Vec::new(),
+        })
+    }
+
+    #[test]
+    fn each_value_meets_each_seed_once_and_the_options_repeat_a_run() {
+        let sweep = sweep(3);
+        assert_eq!(sweep.runs(), 3 * 11 * 2);
+        let all: std::collections::BTreeSet<_> =
+            (0..sweep.runs()).map(|number| sweep.point(number).options()).collect();
+        assert_eq!(all.len(), 66);
+        assert!(
+            all.contains("--seed 3 --set a=0.3 --set b='it is'") && all.contains("--seed 1 --set a=1 --set b=x"),
+            "{all:?}"
+        );
+    }
+
+    #[test]
+    fn the_order_in_which_runs_end_does_not_matter_and_their_number_does_not_fill_the_memory() {
+        let sweep = sweep(100_000);
+        let value = |number: u64| ((number * 7919) % 200_003) as f64;
+        let mut forth = Summary::default();
+        let mut back = Summary::default();
+        for number in 0..200_000 {
+            forth.add(&sweep, number, &outcome(value(number)));
+            back.add(&sweep, 199_999 - number, &outcome(value(199_999 - number)));
+        }
+        assert_eq!(forth.distributions(&sweep), back.distributions(&sweep));
+        let found = &forth.distributions(&sweep)[0];
+        assert!(found.runs == 200_000 && (found.median - 100_000.0).abs() < 2_000.0, "{found:?}");
+        assert!(forth.figures["figure"].kept.len() <= MOST_KEPT);
+    }
+
+    #[test]
+    fn too_many_runs_and_no_seed_are_refused() {
+        let scenario = sweep(1).scenario;
+        assert!(Sweep::new(scenario.clone(), 0..=u64::MAX).is_err());
+        assert!(
+            Sweep::new(scenario, std::ops::RangeInclusive::new(5, 4)).is_err_and(|reason| reason.contains("no seed"))
+        );
+    }
+}
