@@ -2,11 +2,12 @@
 //!
 //! In: a [`Description`]. Out: [`Departure`]s, which print as what is so. Most of it follows from the description's other fields and from the dictionary; the rest is stated beside them.
 
+mod objects;
 mod words;
 
 pub use words::Remedy;
 
-use canopen::od::{DataType, DefaultValue};
+use canopen::od::{Access, DataType, DefaultValue};
 use canopen::pdo::{EventTrigger, TpdoForm};
 use canopen::{Mux, NmtState};
 use cia402::ModeOfOperation;
@@ -98,6 +99,33 @@ pub enum Departure {
         /// One count of it by the standard.
         standard: &'static str,
     },
+    /// An object of the standard has another type.
+    OtherType {
+        /// The object.
+        object: Mux,
+        /// Its type here.
+        here: DataType,
+        /// Its type by the standard.
+        standard: DataType,
+    },
+    /// An object of the standard can be read or written where the standard says otherwise.
+    OtherAccess {
+        /// The object.
+        object: Mux,
+        /// What SDO may do here.
+        here: Access,
+        /// What SDO may do by the standard.
+        standard: Access,
+    },
+    /// Sub-index 00h of a record is not the highest sub-index that there is.
+    SubIndexCount {
+        /// Sub-index 00h.
+        object: Mux,
+        /// What it says.
+        says: i64,
+        /// What is so.
+        highest: u8,
+    },
     /// Target and actual velocity have different units.
     VelocityUnits {
         /// Where the actual velocity is, and its unit.
@@ -114,7 +142,7 @@ impl Description {
         let stated = self.stated_departures.iter().copied().map(Departure::Stated);
         let forms = self.pdo.mapping.tpdo_forms.iter().copied().map(Departure::AnotherFormInTpdos);
         let of_device = self.of_identity(known).into_iter().chain(self.of_communication()).flatten();
-        of_device.chain(forms).chain(axes).chain(stated)
+        of_device.chain(forms).chain(self.of_objects()).chain(axes).chain(stated)
     }
 
     fn of_identity(&self, known: Catalogue<'_>) -> [Option<Departure>; 2] {

@@ -4,6 +4,7 @@ use core::fmt;
 
 use canopen::Mux;
 use canopen::pdo::TpdoForm;
+use cia402::ModeOfOperation;
 
 use super::Departure;
 use crate::axis::BitPattern;
@@ -40,6 +41,9 @@ impl Departure {
             Self::RampsAreTimes(_) => "ramps_are_times",
             Self::OtherUnit { .. } => "other_unit",
             Self::VelocityUnits { .. } => "velocity_units",
+            Self::OtherType { .. } => "other_type",
+            Self::OtherAccess { .. } => "other_access",
+            Self::SubIndexCount { .. } => "sub_index_count",
         }
     }
 
@@ -71,6 +75,9 @@ impl Departure {
             | Self::HomingShownBy { statusword: object, .. }
             | Self::RampsAreTimes(object)
             | Self::OtherUnit { object, .. }
+            | Self::OtherType { object, .. }
+            | Self::OtherAccess { object, .. }
+            | Self::SubIndexCount { object, .. }
             | Self::VelocityUnits { actual: (object, _), .. } => *object,
         })
     }
@@ -132,6 +139,15 @@ impl fmt::Display for Departure {
             Self::OtherUnit { object, unit, standard } => {
                 write!(f, "one count of {object} is {}, not {standard}", One(unit))
             }
+            Self::OtherType { object, here, standard } => {
+                write!(f, "{object} is {}, not {}", here.name(), standard.name())
+            }
+            Self::OtherAccess { object, here, standard } => {
+                write!(f, "{object} is {} by SDO, not {}", here.name(), standard.name())
+            }
+            Self::SubIndexCount { object, says, highest } => {
+                write!(f, "{object} says {says}; the highest sub-index is {highest}")
+            }
             Self::VelocityUnits { actual: (actual, unit), target: (target, other) } => {
                 write!(f, "one count of {actual} is {}, of {target} {}", One(unit), One(other))
             }
@@ -181,15 +197,7 @@ impl fmt::Display for Remedy<'_> {
             Departure::WatchesForSilence { object, .. } => {
                 write!(f, "send it something in time while the motor turns, or write 0 to {object}")
             }
-            Departure::NoSupportedDriveModes(_, modes) => {
-                f.write_str("do not ask; it has modes ")?;
-                let mut separator = "";
-                modes.iter().try_for_each(|mode| {
-                    write!(f, "{separator}{}", mode.0)?;
-                    separator = ", ";
-                    Ok(())
-                })
-            }
+            Departure::NoSupportedDriveModes(_, modes) => write_modes(f, modes),
             Departure::NoModeDisplay(_, shown) => write!(f, "read the mode back from {shown}"),
             Departure::EchoesControlword(_) => {
                 f.write_str("enable it with one write of 0Fh, and take the bits as they are named")
@@ -203,9 +211,32 @@ impl fmt::Display for Remedy<'_> {
                 write!(f, "found: {}; not found: {}", Bits(*attained), Bits(*failed))
             }
             Departure::RampsAreTimes(_) => f.write_str("write the time that the change of speed is to take"),
+            Departure::OtherType { here, .. } => {
+                write!(
+                    f,
+                    "read, write and map it as {}: with another length it is refused or means something else",
+                    here.name()
+                )
+            }
+            Departure::OtherAccess { .. } => {
+                f.write_str("take what the dictionary says, and expect an abort for the rest")
+            }
+            Departure::SubIndexCount { .. } => {
+                f.write_str("do not count on each sub-index up to it: one that is missing is answered with 0609 0011h")
+            }
             Departure::OtherUnit { .. } | Departure::VelocityUnits { .. } => f.write_str("convert with these units"),
         }
     }
+}
+
+fn write_modes(f: &mut fmt::Formatter<'_>, modes: &[ModeOfOperation]) -> fmt::Result {
+    f.write_str("do not ask; it has modes ")?;
+    let mut separator = "";
+    modes.iter().try_for_each(|mode| {
+        write!(f, "{separator}{}", mode.0)?;
+        separator = ", ";
+        Ok(())
+    })
 }
 
 fn write_storage(f: &mut fmt::Formatter<'_>, storage: &ParameterStorage) -> fmt::Result {

@@ -1,7 +1,7 @@
 //! The sheet of every model reads back as the model, as far as a sheet goes.
 
-use canopen::NodeId;
 use canopen::od::{Access, DefaultValue, Entry};
+use canopen::{Mux, NodeId};
 use devices::{Description, Placement};
 
 use super::names;
@@ -229,4 +229,19 @@ fn a_file_without_objects_or_with_too_many_is_not_kept() {
     };
     let many: String = (0x2000..0x2110).map(compact).collect();
     assert!(Eds::load(many.as_bytes()).is_err());
+}
+
+#[test]
+fn an_object_with_other_rights_than_the_standard_gives_it_is_a_departure_of_the_file() {
+    let text = write(&Sheet::of(devices::model("cia402").expect("a model")).eds());
+    let section = text.find("[6081]").expect("the profile velocity");
+    let changed = format!("{}{}", &text[..section], text[section..].replacen("AccessType=rw", "AccessType=ro", 1));
+    let keys = |text: &str| {
+        let kept = keep(&Eds::load(text.as_bytes()).expect("a small file").eds).expect("it fits");
+        let all = kept.departures(devices::all());
+        all.map(|departure| (departure.key(), departure.object())).collect::<Vec<_>>()
+    };
+    let other = ("other_access", Some(Mux::new(0x6081, 0)));
+    assert!(keys(&changed).contains(&other) && !keys(&text).contains(&other));
+    assert_eq!(keys(&changed).len(), keys(&text).len() + 1);
 }

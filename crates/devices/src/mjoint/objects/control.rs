@@ -54,7 +54,7 @@ crate::row::rows! { const PROFILE: [Entry; 19], profile_objects:
         .range(-30000, 30000).unit("0.1 r/min").mappable() => VELOCITY_ACTUAL_VALUE;
     ro(0x6078, 0, U16, "current_actual_value", "Actual current").range(0, 32767).unit("1/2000 A").mappable()
         => CURRENT_ACTUAL_VALUE;
-    ro(0x6079, 0, U16, "dc_link_voltage", "System voltage").range(0, 32767).unit("1/327 V") => DC_LINK_VOLTAGE;
+    ro(0x6079, 0, U16, "dc_link_circuit_voltage", "System voltage").range(0, 32767).unit("1/327 V") => DC_LINK_CIRCUIT_VOLTAGE;
     // Printed without M, though RPDO1, 2 and 4 carry it.
     rw(0x607A, 0, I32, "target_position", "Target location cache").unit("counts").mappable() => TARGET_POSITION;
     rws(0x6081, 0, U32, "profile_velocity", "Trapezoidal velocity(Position Mode Speed)")

@@ -27,7 +27,7 @@ impl MJoint {
         let values = self.device.values_mut();
         values.set(VELOCITY_ACTUAL_VALUE, speed);
         values.set(CURRENT_ACTUAL_VALUE, current);
-        values.set(DC_LINK_VOLTAGE, round(sensors.bus_v * VOLTAGE_COUNTS_PER_V).clamp(0.0, LARGEST) as u16);
+        values.set(DC_LINK_CIRCUIT_VOLTAGE, round(sensors.bus_v * VOLTAGE_COUNTS_PER_V).clamp(0.0, LARGEST) as u16);
         values.set(DRIVER_TEMPERATURE, round(sensors.driver_c).clamp(0.0, 100.0) as u16);
         values.set(OUTPUT_PWM, pwm);
         values.set(DIGITAL_INPUTS, inputs);
