@@ -292,27 +292,51 @@ impl Server {
             }
         };
         let row = facts.summary;
-        if !row.is_writable_cell() {
-            return self.initiate_long_download(mux, (slot, facts), payload, values, now);
-        }
-        let declared = match payload {
-            Payload::Expedited { length, .. } => length.map(u32::from),
-            Payload::Segmented { size } => size,
+        // Made anew for the calls that need it whole: only the data of an expedited one is kept at hand.
+        let (length, bytes) = match payload {
+            Payload::Expedited { length, bytes } if row.is_writable_cell() => (length, bytes),
+            Payload::Expedited { length, bytes } => {
+                let payload = Payload::Expedited { length, bytes };
+                return self.initiate_long_download(mux, (slot, facts), payload, values, now);
+            }
+            Payload::Segmented { size } => {
+                return self.initiate_segmented_download(mux, (slot, facts), size, values, now);
+            }
         };
-        if let Err(code) = declared.map_or(Ok(()), |declared| check_length(declared as usize, row.size().into())) {
+        // The usual case first: one comparison.
+        if let Some(length) = length
+            && length != row.size()
+            && let Err(code) = check_length(length.into(), row.size().into())
+        {
             self.refuse(mux, code);
             return None;
         }
-        match payload {
-            Payload::Expedited { bytes, .. } => {
-                Some(Write { slot, raw: u32::from_le_bytes(bytes), facts, mux, confirm: Confirm::Expedited })
-            }
-            Payload::Segmented { size: declared } => {
-                let room = Room::Cell { bytes: [0; MAX_EXPEDITED], size: row.size().into() };
-                self.begin_download(mux, (slot, facts), room, declared, now);
-                None
-            }
+        Some(Write { slot, raw: u32::from_le_bytes(bytes), facts, mux, confirm: Confirm::Expedited })
+    }
+
+    #[inline(never)]
+    fn initiate_segmented_download<S: Storage>(
+        &mut self,
+        mux: Mux,
+        (slot, facts): (Slot, &'static RowFacts),
+        declared: Option<u32>,
+        values: &mut Dictionary<S>,
+        now: Instant,
+    ) -> Option<Write> {
+        let row = facts.summary;
+        if !row.is_writable_cell() {
+            let payload = Payload::Segmented { size: declared };
+            return self.initiate_long_download(mux, (slot, facts), payload, values, now);
         }
+        let size = row.size().into();
+        match declared.map_or(Ok(()), |declared| check_length(declared as usize, size)) {
+            Ok(()) => {
+                let room = Room::Cell { bytes: [0; MAX_EXPEDITED], size };
+                self.begin_download(mux, (slot, facts), room, declared, now);
+            }
+            Err(code) => self.refuse(mux, code),
+        }
+        None
     }
 
     /// Of a value that is longer than a cell, or may not be written.

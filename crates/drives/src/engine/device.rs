@@ -400,18 +400,26 @@ pub(crate) trait Application<S: Storage> {
         while let Some(event) = self.device().poll_event() {
             match event {
                 NodeEvent::Written { slot, raw, via } => commanded |= self.written(slot, raw, via, now),
-                NodeEvent::Asked { slot, raw, ticket } => self.asked(slot, raw, ticket, now),
-                NodeEvent::ResetNode => self.restart(now),
-                NodeEvent::ResetCommunication => self.restart_communication(now),
-                NodeEvent::RpdoTooShort(_) => self.device().report_rpdo_length(false, now),
-                NodeEvent::RpdoFits(_) => self.device().report_rpdo_length(true, now),
-                NodeEvent::EventsLost => self.device().report_lost_events(now),
                 NodeEvent::Sync => self.synchronised(now),
-                NodeEvent::Nmt(_) => {}
+                rare => self.handle_rare_event(rare, now),
             }
         }
         if commanded {
             self.show_status();
+        }
+    }
+
+    /// What comes neither with each frame nor with each SYNC. Apart, so that what it works on is not looked up for those.
+    #[inline(never)]
+    fn handle_rare_event(&mut self, event: NodeEvent, now: Instant) {
+        match event {
+            NodeEvent::Asked { slot, raw, ticket } => self.asked(slot, raw, ticket, now),
+            NodeEvent::ResetNode => self.restart(now),
+            NodeEvent::ResetCommunication => self.restart_communication(now),
+            NodeEvent::RpdoTooShort(_) => self.device().report_rpdo_length(false, now),
+            NodeEvent::RpdoFits(_) => self.device().report_rpdo_length(true, now),
+            NodeEvent::EventsLost => self.device().report_lost_events(now),
+            NodeEvent::Written { .. } | NodeEvent::Sync | NodeEvent::Nmt(_) => {}
         }
     }
 }
