@@ -42,6 +42,11 @@ impl Angle {
         self.as_turns() * core::f64::consts::TAU
     }
 
+    /// How many turns this angle is ahead of another, to the full resolution while they are near each other.
+    pub fn turns_from(self, other: Angle) -> f64 {
+        self.turns.wrapping_sub(other.turns) as f64 + (self.fraction - other.fraction)
+    }
+
     /// This angle moved on by `delta` turns.
     #[inline]
     pub fn advanced_by(self, delta: f64) -> Self {

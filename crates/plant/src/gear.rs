@@ -238,7 +238,7 @@ impl GearModel {
 
     /// Counts overloads, and lets the teeth jump.
     #[inline]
-    fn watch_strength(&self, data: &mut GearData, torque_nm: f64) {
+    pub(crate) fn watch_strength(&self, data: &mut GearData, torque_nm: f64) {
         let size_nm = torque_nm.abs();
         if size_nm > data.most_nm {
             data.most_nm = size_nm;
@@ -293,18 +293,22 @@ impl GearModel {
         moved
     }
 
-    /// Mean torque of the spring while the twist grows by `way_rad`, and its slope over that way.
     fn mean_spring_torque(&self, twist_rad: f64, way_rad: f64) -> (f64, f64) {
         let (before, after) = (self.windup_rad(twist_rad), self.windup_rad(twist_rad + way_rad));
-        let stiffness = self.stiffness_nm_rad;
-        if before * after > 0.0 {
-            (0.5 * stiffness * (before + after), 0.5 * stiffness)
-        } else if way_rad == 0.0 {
-            (stiffness * after, 0.0)
-        } else {
-            let torque_nm = 0.5 * stiffness * (after * after - before * before) / way_rad;
-            (torque_nm, (stiffness * after - torque_nm) / way_rad)
-        }
+        mean_spring_torque(self.stiffness_nm_rad, before, after, way_rad)
+    }
+}
+
+/// Mean torque of a one-sided spring that is wound up from `before` to `after` while its end moves by `way_rad`, and its slope
+/// over that way. It is what the spring's energy changes by over the way, so that none is made or lost.
+pub(crate) fn mean_spring_torque(stiffness: f64, before: f64, after: f64, way_rad: f64) -> (f64, f64) {
+    if before * after > 0.0 {
+        (0.5 * stiffness * (before + after), 0.5 * stiffness)
+    } else if way_rad == 0.0 {
+        (stiffness * after, 0.0)
+    } else {
+        let torque_nm = 0.5 * stiffness * (after * after - before * before) / way_rad;
+        (torque_nm, (stiffness * after - torque_nm) / way_rad)
     }
 }
 

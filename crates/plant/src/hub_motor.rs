@@ -5,14 +5,17 @@
 //! Deliberately absent: switching ripple (a step sees the mean voltage), measurement noise, the drive's firmware.
 
 use crate::angle::{Angle, Axis};
+use crate::attachment::Attachment;
 use crate::brake::BrakeModel;
 use crate::clamp::ClampModel;
 use crate::cogging::Cogging;
 use crate::encoder::{EncoderData, EncoderModel};
+use crate::flows::Flows;
 use crate::hall::{HallFault, HallModel};
 use crate::mechanics::{RotorData, RotorModel};
 use crate::pmsm::{Dq, Phase, PmsmData, PmsmInput, PmsmModel, Terminals};
-use crate::rig::{Flows, Rig, RigModel};
+use crate::rig::{Rig, RigModel};
+use crate::shaft::{Motion, Pending, Turned};
 
 /// What never changes about a hub motor and the power stage it is wired to.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -127,7 +130,7 @@ impl HubMotor {
     /// One step: winding, rotor, bus, encoder, energies, and now and then heat. Meant for 50 µs and less.
     #[inline]
     pub fn step(&mut self, dt_s: f64, actuation: &Actuation) {
-        if self.power_stage_burnt || self.rig.supply.bus_v > self.model.clamp.from_v {
+        if self.power_stage_burnt | self.rig.is_joined() || self.rig.supply.bus_v > self.model.clamp.from_v {
             self.step_in_trouble(dt_s, actuation);
         } else if self.rests(actuation) {
             self.torque_nm = 0.0;
@@ -143,6 +146,9 @@ impl HubMotor {
     #[cold]
     #[inline(never)]
     fn step_in_trouble(&mut self, dt_s: f64, actuation: &Actuation) {
+        if self.rig.is_joined() {
+            return self.step_joined(dt_s, actuation);
+        }
         let bus_v = self.rig.supply.bus_v;
         let inverter = if self.power_stage_burnt { Inverter::Shorted } else { actuation.inverter };
         let mut flows = self.turn(dt_s, actuation, inverter.terminals(bus_v));
@@ -150,6 +156,66 @@ impl HubMotor {
         flows.bus_w += clamp_w;
         flows.arc_j += clamp_w * dt_s;
         self.book(dt_s, &flows, actuation);
+    }
+
+    /// The same for a shaft that is no plain one. The winding goes by the velocity that is expected in the middle of the step, the
+    /// angle by the real one.
+    fn step_joined(&mut self, dt_s: f64, actuation: &Actuation) {
+        let model = &self.model;
+        let bus_v = self.rig.supply.bus_v;
+        let inverter = if self.power_stage_burnt { Inverter::Shorted } else { actuation.inverter };
+        let velocity_rad_s = self.rotor.velocity_rad_s + 0.5 * self.rotor.velocity_change_rad_s;
+        let half_turn_rad = 0.5 * dt_s * f64::from(model.pmsm.pole_pairs) * velocity_rad_s;
+        let input = PmsmInput {
+            terminals: inverter.terminals(bus_v),
+            lost_phase: self.lost_phase,
+            resistance_ohm: self.rig.path_ohm(&model.rig),
+            axis: self.axis.turned_by(Axis::at_small_rad(half_turn_rad)),
+            velocity_rad_s,
+        };
+        let motor = model.pmsm.step(&mut self.pmsm, dt_s, &input);
+        let motor_nm = motor.torque_nm + self.cogging.map_or(0.0, |cogging| cogging.torque_nm(self.rotor.angle));
+        let brake_nm = model.brake.torque_nm(actuation.brake_released);
+        let clamp_w = model.clamp.power_w(bus_v);
+        let mut flows = motor.flows(0.0, 0.0);
+        flows.bus_w += clamp_w;
+        flows.arc_j += clamp_w * dt_s;
+        let pending = Pending { flows, motor_nm, dt_s, bleeder_on: actuation.bleeder_on };
+        if self.rig.is_coupled() {
+            self.rig.push_directly((&model.rotor, &self.rotor), pending, brake_nm);
+        } else {
+            let turned = self.rig.turn_attached((&model.rotor, &mut self.rotor), dt_s, motor_nm, brake_nm);
+            self.finish_joined(pending, &turned);
+        }
+    }
+
+    fn finish_joined(&mut self, pending: Pending, turned: &Turned) {
+        let Pending { mut flows, motor_nm, dt_s, bleeder_on } = pending;
+        let turn_rad = dt_s * f64::from(self.model.pmsm.pole_pairs) * turned.mean_rad_s;
+        self.axis = self.axis.turned_by(Axis::at_small_rad(turn_rad));
+        self.model.encoder.step(&mut self.encoder, self.rotor.angle);
+        self.torque_nm = motor_nm;
+        (flows.friction_j, flows.load_j) = (turned.friction_j, turned.load_j);
+        if self.rig.step(&self.model.rig, dt_s, &flows, bleeder_on) {
+            self.step_slow();
+        }
+    }
+
+    /// Joins these things to the shaft, in place of those before. Not to a coupled one: what it shares it has already.
+    pub fn attach(&mut self, what: Attachment) {
+        self.rig.attach(what, &self.model.rotor, self.rotor.angle);
+    }
+
+    /// From now on the shaft is moved by [`follow`](Self::follow) after each step, for ever.
+    pub fn couple(&mut self) {
+        self.rig.couple();
+    }
+
+    /// Ends the step of a coupled motor.
+    pub fn follow(&mut self, motion: &Motion) {
+        if let Some((pending, turned)) = self.rig.follow(&mut self.rotor, motion) {
+            self.finish_joined(pending, &turned);
+        }
     }
 
     /// Winding, rotor and encoder.
@@ -198,8 +264,11 @@ impl HubMotor {
     #[cold]
     fn seize(&mut self) {
         self.seized = true;
-        self.rig.energy.friction_j += self.model.rotor.kinetic_energy_j(&self.rotor, &self.rig.load);
-        self.rotor = RotorData { angle: self.rotor.angle, ..RotorData::default() };
+        self.rig.energy.friction_j += self.rig.seize(&self.model.rotor, &self.rotor);
+        // A coupled one stops with its machine.
+        if !self.rig.is_coupled() {
+            self.rotor = RotorData { angle: self.rotor.angle, ..RotorData::default() };
+        }
         self.rig.load.locked = true;
     }
 
@@ -261,7 +330,7 @@ impl HubMotor {
 
     /// Energy stored now: in motion, in the winding's field and in the bus capacitor.
     pub fn stored_j(&self) -> f64 {
-        self.model.rotor.kinetic_energy_j(&self.rotor, &self.rig.load)
+        self.rig.mechanical_j(&self.model.rotor, &self.rotor)
             + self.model.pmsm.magnetic_energy_j(&self.pmsm)
             + self.model.rig.supply.stored_energy_j(&self.rig.supply)
             + self.cogging.map_or(0.0, |cogging| cogging.energy_j(self.rotor.angle))

@@ -7,14 +7,16 @@
 
 use crate::absolute_encoder::{AbsoluteEncoderData, AbsoluteEncoderModel, BatteryState};
 use crate::angle::{Angle, Axis};
+use crate::attachment::Attachment;
 use crate::brake::BrakeModel;
 use crate::clamp::ClampModel;
 use crate::cogging::Cogging;
 use crate::gear::{GearData, GearInput, GearModel};
 use crate::hub_motor::Inverter;
-use crate::mechanics::{RotorData, RotorModel};
+use crate::mechanics::{Load, RotorData, RotorModel};
 use crate::pmsm::{Phase, PmsmData, PmsmInput, PmsmModel};
 use crate::rig::{Rig, RigModel};
+use crate::shaft::{Coupled, HELD_NM, Motion, Pending, Push, Turned};
 
 /// Assumed: what a seized bearing holds against, far more than the motor or the load through the gear gives.
 const SEIZED_NM: f64 = 100.0;
@@ -146,22 +148,106 @@ impl JointMotor {
         let seized_nm = if self.seized { SEIZED_NM } else { 0.0 };
         let brake_nm = model.brake.torque_nm(actuation.brake_released) + seized_nm;
         let motor_nm = motor.torque_nm + self.cogging.map_or(0.0, |cogging| cogging.torque_nm(self.rotor.angle));
-        let shafts = GearInput { motor_nm, brake_nm, load: &self.rig.load };
-        let moved = model.gear.step(&mut self.gear, &model.rotor, &mut self.rotor, dt_s, &shafts);
-        self.axis = self.axis.turned_by(Axis::at_small_rad(electrical_s * moved.motor_velocity_rad_s));
-        let discharging = self.discharge_from_v.is_some_and(|from_v| self.rig.supply.bus_v > from_v);
-        if actuation.set_origin {
-            model.encoder.set_origin(&mut self.encoder, self.rotor.angle);
-        }
-        self.torque_nm = motor_nm;
-
         let clamp_w = model.clamp.power_w(self.rig.supply.bus_v);
-        let mut flows = motor.flows(moved.friction_j, moved.load_j);
+        let mut flows = motor.flows(0.0, 0.0);
         flows.bus_w += clamp_w;
         flows.arc_j += clamp_w * dt_s;
-        if self.rig.step(&model.rig, dt_s, &flows, discharging) {
+        let discharging = self.discharge_from_v.is_some_and(|from_v| self.rig.supply.bus_v > from_v);
+        self.torque_nm = motor_nm;
+        let pending = Pending { flows, motor_nm, dt_s, bleeder_on: discharging };
+        if self.rig.is_joined() {
+            self.step_joined(pending, brake_nm);
+        } else {
+            let shafts = GearInput { motor_nm, brake_nm, load: &self.rig.load };
+            let moved = model.gear.step(&mut self.gear, &model.rotor, &mut self.rotor, dt_s, &shafts);
+            let (mean_rad_s, friction_j) = (moved.motor_velocity_rad_s, moved.friction_j);
+            self.finish(pending, &Turned { mean_rad_s, friction_j, load_j: moved.load_j });
+        }
+        if actuation.set_origin {
+            self.model.encoder.set_origin(&mut self.encoder, self.rotor.angle);
+        }
+    }
+
+    /// Bus, energies and the magnets' direction, and now and then the slow things.
+    #[inline(always)]
+    fn finish(&mut self, pending: Pending, turned: &Turned) {
+        let Pending { mut flows, dt_s, bleeder_on, .. } = pending;
+        let turn_rad = dt_s * f64::from(self.model.pmsm.pole_pairs) * turned.mean_rad_s;
+        self.axis = self.axis.turned_by(Axis::at_small_rad(turn_rad));
+        (flows.friction_j, flows.load_j) = (turned.friction_j, turned.load_j);
+        if self.rig.step(&self.model.rig, dt_s, &flows, bleeder_on) {
             self.step_slow();
         }
+    }
+
+    /// The mechanical half of a step of an output that is no plain one.
+    #[cold]
+    #[inline(never)]
+    fn step_joined(&mut self, pending: Pending, brake_nm: f64) {
+        let JointMotorModel { gear: gear_model, rotor: rotor_model, .. } = &self.model;
+        let angle = gear_model.output_angle(&self.gear, self.rotor.angle);
+        if self.rig.is_coupled() {
+            let push = self.push(&pending, angle, brake_nm);
+            self.rig.coupled = Some(Coupled { push, pending });
+            return;
+        }
+        let what = self.rig.attachment();
+        let before = (self.rotor, self.gear);
+        let at = (angle, self.gear.output_velocity_rad_s);
+        let ((moved, out), work) = what.step(&self.rig.load, at, pending.dt_s, |load| {
+            let (mut rotor, mut gear) = before;
+            let input = GearInput { motor_nm: pending.motor_nm, brake_nm, load };
+            let out = gear_model.step(&mut gear, rotor_model, &mut rotor, pending.dt_s, &input);
+            (out.output_velocity_rad_s, ((rotor, gear), out))
+        });
+        (self.rotor, self.gear) = moved;
+        let friction_j = out.friction_j + out.load_j - work.stored_j - work.load_j;
+        self.finish(pending, &Turned { mean_rad_s: out.motor_velocity_rad_s, friction_j, load_j: work.load_j });
+    }
+
+    /// What a coupled joint does to its machine. Its gear is taken as stiff there: what is wound up in it stays.
+    fn push(&self, pending: &Pending, angle: Angle, brake_nm: f64) -> Push {
+        let JointMotorModel { gear, rotor, .. } = &self.model;
+        let ratio = gear.ratio;
+        let load = self.rig.expected_load(angle, self.rotor.velocity_rad_s / ratio, pending.dt_s);
+        let held_nm = if load.locked { HELD_NM } else { 0.0 };
+        let output_dry_nm = load.coulomb_nm + gear.output_coulomb_nm + gear.mesh_loss * self.gear.torque_nm.abs();
+        Push {
+            angle: self.rotor.angle,
+            velocity_rad_s: self.rotor.velocity_rad_s,
+            torque_nm: pending.motor_nm - load.torque_nm / ratio,
+            inertia_kg_m2: rotor.inertia_kg_m2 + (gear.output_inertia_kg_m2 + load.inertia_kg_m2) / (ratio * ratio),
+            dry_nm: rotor.coulomb_nm + gear.coulomb_nm + brake_nm + held_nm + output_dry_nm / ratio,
+            viscous_nm_s: rotor.viscous_nm_s + gear.viscous_nm_s + load.viscous_nm_s / (ratio * ratio),
+        }
+    }
+
+    /// Joins these things to the output, in place of those before. It has a gear already: none is taken from `what`.
+    pub fn attach(&mut self, what: Attachment) {
+        let angle = self.output_angle();
+        self.rig.attach(Attachment { gear: None, ..what }, &self.model.rotor, angle);
+    }
+
+    /// From now on the shaft is moved by [`follow`](Self::follow) after each step, for ever.
+    pub fn couple(&mut self) {
+        self.rig.couple();
+    }
+
+    /// Ends the step of a coupled joint.
+    pub fn follow(&mut self, motion: &Motion) {
+        let Some((pending, turned)) = self.rig.follow(&mut self.rotor, motion) else { return };
+        let GearModel { ratio, .. } = self.model.gear;
+        let JointMotorModel { rotor, gear, .. } = &self.model;
+        // What the motor's side does not take goes through the gear.
+        let gained_nm = rotor.inertia_kg_m2 * self.rotor.velocity_change_rad_s / pending.dt_s;
+        let viscous_nm = (rotor.viscous_nm_s + gear.viscous_nm_s) * motion.mean_rad_s;
+        let own_dry_nm = rotor.coulomb_nm + gear.coulomb_nm;
+        let dry_nm = motion.dry_nm.clamp(-own_dry_nm, own_dry_nm);
+        self.gear.output_velocity_rad_s = motion.velocity_rad_s / ratio;
+        let torque_nm = ratio * (pending.motor_nm - gained_nm - viscous_nm - dry_nm);
+        self.gear.torque_nm = torque_nm;
+        self.model.gear.watch_strength(&mut self.gear, torque_nm);
+        self.finish(pending, &turned);
     }
 
     /// What the bridge does: molten switches join the wires, whatever the drive wants.
@@ -238,7 +324,10 @@ impl JointMotor {
     /// Energy stored now: in motion, in the gear's spring, in the winding's field and in the bus capacitor.
     pub fn stored_j(&self) -> f64 {
         let JointMotorModel { gear, rotor, pmsm, rig, .. } = &self.model;
-        gear.kinetic_energy_j(&self.gear, rotor, &self.rotor, &self.rig.load)
+        let what = self.rig.attachment();
+        let load = Load { inertia_kg_m2: what.inertia_kg_m2(&self.rig.load), ..self.rig.load };
+        gear.kinetic_energy_j(&self.gear, rotor, &self.rotor, &load)
+            + what.energy_j(self.output_angle())
             + gear.spring_energy_j(&self.gear)
             + pmsm.magnetic_energy_j(&self.pmsm)
             + rig.supply.stored_energy_j(&self.rig.supply)

@@ -33,6 +33,7 @@
 
 pub mod absolute_encoder;
 pub mod angle;
+pub mod attachment;
 pub mod brake;
 pub mod clamp;
 pub mod cogging;
@@ -44,12 +45,15 @@ pub mod joint_motor;
 pub mod mechanics;
 pub mod pmsm;
 pub mod rig;
+pub mod shaft;
 pub mod stepper;
 pub mod stepper_motor;
 pub mod supply;
 pub mod thermal;
 
+mod flows;
 mod hub_motors;
+mod joining;
 mod joint_motors;
 mod servo_motors;
 mod stepper_motors;

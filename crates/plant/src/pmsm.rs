@@ -15,7 +15,7 @@
 //! Iron loss is left to the friction of [`mechanics`](crate::mechanics); saturation of the iron is not modelled.
 
 use crate::angle::{Angle, Axis};
-use crate::rig::Flows;
+use crate::flows::Flows;
 
 /// Below this current an idle bridge is taken as not conducting.
 const NO_CURRENT_A: f64 = 1e-9;

@@ -5,7 +5,9 @@
 //! the temperatures, the winding's resistance and the energies. The load, the source and the surroundings are plain
 //! fields that a test or a person at a bench changes at any time. What the load does to the shaft is the composition's.
 
+use crate::flows::Flows;
 use crate::mechanics::Load;
+use crate::shaft::{Attached, Coupled};
 use crate::supply::{SupplyData, SupplyModel};
 use crate::thermal::{BodyData, BodyModel, resistance_at_ohm};
 
@@ -73,6 +75,8 @@ pub struct Rig {
     pub ambient_c: f64,
     /// Energy book.
     pub energy: Energy,
+    pub(crate) attached: Option<Attached>,
+    pub(crate) coupled: Option<Coupled>,
     winding_ohm: f64,
     slow: Slow,
 }
@@ -86,21 +90,6 @@ struct Slow {
     heat_sink_j: f64,
 }
 
-/// What windings and shaft did during a step.
-#[derive(Default)]
-pub(crate) struct Flows {
-    /// Power that the windings took from the bus; negative while regenerating.
-    pub(crate) bus_w: f64,
-    /// Heat in the phases' resistance per ohm of it.
-    pub(crate) heat_w_per_ohm: f64,
-    /// Heat of an arc, and of short circuits.
-    pub(crate) arc_j: f64,
-    /// Heat of all friction.
-    pub(crate) friction_j: f64,
-    /// Work done on the active load torque.
-    pub(crate) load_j: f64,
-}
-
 impl Rig {
     /// No load, the bus charged from a source of `source_v`, all at `ambient_c`. A phase of the winding has `cold_ohm`
     /// at 20 °C.
@@ -112,6 +101,8 @@ impl Rig {
             heat_sink: model.heat_sink.at_ambient(ambient_c),
             ambient_c,
             energy: Energy::default(),
+            attached: None,
+            coupled: None,
             winding_ohm: resistance_at_ohm(cold_ohm, model.resistance_per_k, ambient_c),
             slow: Slow::default(),
         }

@@ -14,9 +14,12 @@
 //! which gives such a ringing `(w dt)^3 / 8` of critical damping back: 1e-4 at 50 µs, a thirtieth of its friction's.
 
 use crate::angle::{Angle, Axis};
+use crate::attachment::Attachment;
 use crate::clamp::ClampModel;
+use crate::flows::Flows;
 use crate::mechanics::{RotorData, RotorModel};
-use crate::rig::{Flows, Rig, RigModel};
+use crate::rig::{Rig, RigModel};
+use crate::shaft::{Motion, Pending, Turned};
 use crate::stepper::{Bridges, Phase, StepperData, StepperInput, StepperModel, Turn};
 
 /// Assumed: two wires that touch have 1 ohm with their contact. It is enough to be noticed before the bus collapses.
@@ -109,12 +112,24 @@ impl StepperMotor {
     /// One step: windings, rotor, bus, energies, and now and then heat. Meant for 50 µs and less.
     #[inline]
     pub fn step(&mut self, dt_s: f64, bridges: &Bridges) {
+        if self.rig.is_joined() {
+            return self.step_joined(dt_s, bridges);
+        }
+        let velocity_rad_s = self.rotor.turn(dt_s, &self.rig.load);
+        let turn = Turn::new(self.axis, 0.5 * dt_s * f64::from(self.model.stepper.teeth) * velocity_rad_s);
+        self.axis = turn.end();
+        let (torque_nm, mut flows) = self.drive(dt_s, bridges, turn);
+        let moved = self.model.rotor.step(&mut self.rotor, dt_s, torque_nm, &self.rig.load, 0.0);
+        (flows.friction_j, flows.load_j) = (moved.friction_j, moved.load_j);
+        self.book(dt_s, flows);
+    }
+
+    /// Windings, with what is broken and what the suppressors take: the torque on the rotor and where the energy went.
+    #[inline(always)]
+    fn drive(&mut self, dt_s: f64, bridges: &Bridges, turn: Turn) -> (f64, Flows) {
         let bus_v = self.rig.supply.bus_v;
         let broken_w = self.broken_w(bridges, bus_v);
         let model = &self.model;
-        let velocity_rad_s = self.rotor.turn(dt_s, &self.rig.load);
-        let turn = Turn::new(self.axis, 0.5 * dt_s * f64::from(model.stepper.teeth) * velocity_rad_s);
-        self.axis = turn.end();
         let input = StepperInput {
             bridges: *bridges,
             bus_v,
@@ -124,23 +139,70 @@ impl StepperMotor {
             turn,
         };
         let motor = model.stepper.step(&mut self.stepper, dt_s, &input);
-        let torque_nm = motor.torque_nm + model.stepper.detent_torque_nm(&turn);
-        let moved = model.rotor.step(&mut self.rotor, dt_s, torque_nm, &self.rig.load, 0.0);
-        self.torque_nm = torque_nm;
-
+        self.torque_nm = motor.torque_nm + model.stepper.detent_torque_nm(&turn);
         let bus_w = motor.bus_w + broken_w;
         self.bus_current_a = if bus_v > 0.0 { bus_w / bus_v } else { 0.0 };
-        let seized_j = if self.rotor.velocity_rad_s.abs() > model.bearing_limit_rad_s { self.seize() } else { 0.0 };
-        let clamp_w = self.model.clamp.power_w(bus_v);
+        let clamp_w = model.clamp.power_w(bus_v);
         let flows = Flows {
             bus_w: bus_w + clamp_w,
             heat_w_per_ohm: motor.heat_w_per_ohm,
             arc_j: motor.arc_j + (broken_w + clamp_w) * dt_s,
-            friction_j: moved.friction_j + seized_j,
-            load_j: moved.load_j,
+            ..Flows::default()
         };
+        (self.torque_nm, flows)
+    }
+
+    /// The step of a shaft that is no plain one. The windings go by the velocity that is expected in the middle of the step, the
+    /// angle by the real one.
+    #[cold]
+    #[inline(never)]
+    fn step_joined(&mut self, dt_s: f64, bridges: &Bridges) {
+        let velocity_rad_s = self.rotor.velocity_rad_s + 0.5 * self.rotor.velocity_change_rad_s;
+        let turn = Turn::new(self.axis, 0.5 * dt_s * f64::from(self.model.stepper.teeth) * velocity_rad_s);
+        let (motor_nm, flows) = self.drive(dt_s, bridges, turn);
+        let pending = Pending { flows, motor_nm, dt_s, bleeder_on: false };
+        let model = &self.model;
+        if self.rig.is_coupled() {
+            self.rig.push_directly((&model.rotor, &self.rotor), pending, 0.0);
+        } else {
+            let turned = self.rig.turn_attached((&model.rotor, &mut self.rotor), dt_s, motor_nm, 0.0);
+            self.finish_joined(pending, &turned);
+        }
+    }
+
+    fn finish_joined(&mut self, pending: Pending, turned: &Turned) {
+        let Pending { mut flows, dt_s, .. } = pending;
+        let turn_rad = dt_s * f64::from(self.model.stepper.teeth) * turned.mean_rad_s;
+        self.axis = self.axis.turned_by(Axis::at_small_rad(turn_rad));
+        (flows.friction_j, flows.load_j) = (turned.friction_j, turned.load_j);
+        self.book(dt_s, flows);
+    }
+
+    /// Bus and energies, and now and then the slow things.
+    #[inline(always)]
+    fn book(&mut self, dt_s: f64, mut flows: Flows) {
+        if self.rotor.velocity_rad_s.abs() > self.model.bearing_limit_rad_s {
+            flows.friction_j += self.seize();
+        }
         if self.rig.step(&self.model.rig, dt_s, &flows, false) {
             self.step_slow();
+        }
+    }
+
+    /// Joins these things to the shaft, in place of those before. Not to a coupled one: what it shares it has already.
+    pub fn attach(&mut self, what: Attachment) {
+        self.rig.attach(what, &self.model.rotor, self.rotor.angle);
+    }
+
+    /// From now on the shaft is moved by [`follow`](Self::follow) after each step, for ever.
+    pub fn couple(&mut self) {
+        self.rig.couple();
+    }
+
+    /// Ends the step of a coupled motor.
+    pub fn follow(&mut self, motion: &Motion) {
+        if let Some((pending, turned)) = self.rig.follow(&mut self.rotor, motion) {
+            self.finish_joined(pending, &turned);
         }
     }
 
@@ -172,8 +234,11 @@ impl StepperMotor {
     /// What turned goes into the bearings as heat.
     #[cold]
     fn seize(&mut self) -> f64 {
-        let kinetic_j = self.model.rotor.kinetic_energy_j(&self.rotor, &self.rig.load);
-        self.rotor = RotorData { angle: self.rotor.angle, ..RotorData::default() };
+        let kinetic_j = self.rig.seize(&self.model.rotor, &self.rotor);
+        // A coupled one stops with its machine.
+        if !self.rig.is_coupled() {
+            self.rotor = RotorData { angle: self.rotor.angle, ..RotorData::default() };
+        }
         self.rig.load.locked = true;
         self.seized = true;
         kinetic_j
@@ -223,7 +288,7 @@ impl StepperMotor {
 
     /// Energy stored now: in motion, in the windings' field, in the detent and in the bus capacitor.
     pub fn stored_j(&self) -> f64 {
-        self.model.rotor.kinetic_energy_j(&self.rotor, &self.rig.load)
+        self.rig.mechanical_j(&self.model.rotor, &self.rotor)
             + self.model.stepper.magnetic_energy_j(&self.stepper)
             + self.model.stepper.detent_energy_j(magnet_axis(&self.model, self.rotor.angle))
             + self.model.rig.supply.stored_energy_j(&self.rig.supply)
