@@ -38,6 +38,7 @@ pub mod brake;
 pub mod clamp;
 pub mod cogging;
 pub mod encoder;
+pub mod free_run;
 pub mod gear;
 pub mod hall;
 pub mod hub_motor;
@@ -59,6 +60,7 @@ mod servo_motors;
 mod stepper_motors;
 
 pub use angle::Angle;
+pub use free_run::FreeRun;
 pub use hub_motor::{Actuation, HubMotor, HubMotorModel, Inverter, Sensors};
 pub use joint_motor::{JointMotor, JointMotorModel};
 pub use rig::Rig;

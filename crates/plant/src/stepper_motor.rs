@@ -194,6 +194,11 @@ impl StepperMotor {
         self.rig.attach(what, &self.model.rotor, self.rotor.angle);
     }
 
+    /// Where the load is: the shaft, or what is behind its load gear.
+    pub fn load_angle(&self) -> Angle {
+        self.rig.attached().map_or(self.rotor.angle, |attached| attached.load_angle(self.rotor.angle))
+    }
+
     /// From now on the shaft is moved by [`follow`](Self::follow) after each step, for ever.
     pub fn couple(&mut self) {
         self.rig.couple();

@@ -7,6 +7,7 @@ use canopen::{Mux, NmtState};
 use cia402::{ModeOfOperation, PowerState};
 use devices::{AxisId, Description};
 use drives::RegisterError;
+use plant::FreeRun;
 
 use crate::machine::Realism;
 use crate::stimulus::{Component, Power, Source, Stimulus, SwitchRange, TemperatureSensor};
@@ -60,6 +61,13 @@ pub trait VirtualDrive: Station + VirtualDriveClone + Send {
     fn report_of(&self, axis: AxisId) -> Report {
         let _ = axis;
         self.report()
+    }
+
+    /// What the shaft of an axis will do in the end if its load stays as it is; `None` while the drive drives it, or where it
+    /// cannot be told. Velocities are the motor's.
+    fn free_run(&self, axis: AxisId) -> Option<FreeRun> {
+        let _ = axis;
+        None
     }
 
     /// Names of the digital inputs, e.g. `X0`, `X1`; an input is addressed by its place in this list.
@@ -249,6 +257,15 @@ pub enum Refused {
         expected: &'static str,
         /// What was given.
         value: f64,
+    },
+    /// Spring and stops stand where the load is, which another gear would change.
+    #[error("spring and stops stand where the load is; take them off before the gear is changed")]
+    Placed,
+    /// The shaft stands beyond the stops.
+    #[error("the shaft stands at {position}, beyond these stops; give positions on both sides of it, min or max")]
+    BeyondStops {
+        /// Actual position in the drive's counts.
+        position: i64,
     },
     /// The image does not come from this model's memory.
     #[error("not a memory image of a {model}: {reason}")]

@@ -52,5 +52,5 @@ pub use devices::AxisId;
 pub use drive::{Brake, Levels, OutputShaft, Refused, Report, VirtualDrive, VirtualDriveClone};
 pub use drives::RegisterError;
 pub use prng::Prng;
-pub use stimulus::{Component, Place, PulseTrain, Source, Stimulus, SwitchRange, TemperatureSensor};
+pub use stimulus::{Component, LoadPart, Place, PulseTrain, Source, Stimulus, SwitchRange, TemperatureSensor};
 pub use world::{AnyStation, Digest, FrameLog, StationId, StoredImage, World, WorldError};

@@ -12,15 +12,20 @@
 mod bus_fault;
 mod error;
 mod kinds;
+mod load;
 mod parse;
 mod place;
 mod print;
+mod range;
+mod words;
 
 pub use bus_fault::{BusFault, WireFault};
 pub use error::StimulusError;
-pub use kinds::{Component, ObjectValue, Power, PulseTrain, Source, Stimulus, SwitchRange, TemperatureSensor};
+pub use kinds::{Component, ObjectValue, Power, PulseTrain, Source, Stimulus, TemperatureSensor};
+pub use load::{Friction, LoadKind, LoadPart};
 pub use parse::{FORMS, GET};
 pub use place::Place;
+pub use range::SwitchRange;
 
 #[cfg(test)]
 mod tests;

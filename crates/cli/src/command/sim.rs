@@ -45,6 +45,10 @@ use testbench::words::drive::{DriveSpec, drive_spec};
 #[command(after_help = "World commands (4 is the node of --drive):\n  \
     4 power off|on|cycle|cut  4 input X0 1              4 switch X0 -5000 max\n  \
     4 load torque 2.5         4 load inertia 0.02       4 rotor lock|free\n  \
+    4 load friction 0.2 viscous 0.01 static 0.3         (N·m, N·m·s/rad, N·m at rest)\n  \
+    4 load pulley 2 0.05      4 load fan 2 300          (kg on a drum of so many m; N·m at r/min)\n  \
+    4 load spring 5           4 load stop -5000 max     (N·m/rad; positions)\n  \
+    4 load gear 10 0.5        4 load fan off, load none (ratio, degrees of backlash)\n  \
     4 supply 48               4 temperature motor 95    4 fault hall on\n  \
     4 cable cut|join          4 get                     now, help, quit\n  \
     4 bus corrupt 0.3         4 bus late 5 20           4 bus silent on|off\n  \

@@ -6,7 +6,9 @@ use std::time::Duration;
 use serde::Serialize;
 
 use super::{Command, CommandError, Service, to_json};
-use crate::stimulus::{FORMS, Place};
+use plant::FreeRun;
+
+use crate::stimulus::{FORMS, Place, Stimulus};
 use crate::{Brake, OutputShaft, Report, StationId, World};
 
 /// Does what `command` says; returns the line of JSON that answers it.
@@ -23,7 +25,8 @@ pub(super) fn answer(world: &mut World, command: &Command, service: Service) -> 
         Command::Apply(place, stimulus) => {
             let applied = world.apply(*place, stimulus).map_err(|_| no_such_drive(world, place.node))?;
             applied?;
-            Ok(done(world))
+            let note = if is_load(stimulus) { outlook(world, *place) } else { None };
+            Ok(to_json(&Done { ok: true, t: seconds(world), note }))
         }
     }
 }
@@ -38,10 +41,36 @@ fn no_such_drive(world: &World, number: u8) -> CommandError {
 struct Done {
     ok: bool,
     t: f64,
+    /// What will come of it, where a person may not expect it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    note: Option<String>,
 }
 
 fn done(world: &World) -> String {
-    to_json(&Done { ok: true, t: seconds(world) })
+    to_json(&Done { ok: true, t: seconds(world), note: None })
+}
+
+const fn is_load(stimulus: &Stimulus) -> bool {
+    matches!(stimulus, Stimulus::LoadTorque(_) | Stimulus::Load(_))
+}
+
+/// What a load will do to a shaft that nobody drives: it is active, and friction does not stop it.
+fn outlook(world: &mut World, place: Place) -> Option<String> {
+    let free_run = world.with_drive(place.node, |drive, now| {
+        drive.advance(now);
+        drive.free_run(place.axis)
+    });
+    let rpm = |velocity_rad_s: f64| (velocity_rad_s * 30.0 / core::f64::consts::PI).round();
+    Some(match free_run.ok()?? {
+        FreeRun::Held => "the shaft is not driven; its friction or its brake holds it".to_owned(),
+        FreeRun::Turns { velocity_rad_s } => {
+            format!("the shaft is free: it will turn at up to about {} r/min of the motor", rpm(velocity_rad_s))
+        }
+        FreeRun::Seizes { velocity_rad_s } => format!(
+            "the shaft is free: it will run away, and its bearings seize at {} r/min of the motor",
+            rpm(velocity_rad_s)
+        ),
+    })
 }
 
 /// The answer to `now`.

@@ -89,7 +89,7 @@ fn says_what_it_expected_of_a_malformed_line() {
         ("4 switch X0 max min", "\"max\" is no position; expected: NODE switch NAME LOW|min HIGH|max"),
         ("4 switch X0 1.5 2", "\"1.5\" is no position; expected: NODE switch NAME LOW|min HIGH|max"),
         ("4 switch X0 5 -5", "the range from 5 to -5 is empty; give the lower bound first"),
-        ("4 load", "expected: NODE load torque N·m, or NODE load inertia kg·m²"),
+        ("4 load", "expected: NODE load torque|inertia|friction|pulley|spring|stop|fan|gear VALUES, or NODE load none"),
         ("4 load torque x", "\"x\" is no torque; expected: NODE load torque N·m, or NODE load inertia kg·m²"),
         ("4 load torque inf", "\"inf\" is no torque; expected: NODE load torque N·m, or NODE load inertia kg·m²"),
         ("4 load torque nan", "\"nan\" is no torque; expected: NODE load torque N·m, or NODE load inertia kg·m²"),

@@ -3,9 +3,10 @@
 use devices::{AxisId, Description};
 use drives::engine::axis::Demand;
 use drives::{Firmware, RegisterError};
-use plant::Rig;
+use plant::attachment::Attachment;
 use plant::mechanics::RotorData;
 use plant::rig::RigModel;
+use plant::{Angle, FreeRun, Rig};
 
 use super::quantity::Quantity;
 use super::realism::{Noise, Realism};
@@ -24,6 +25,19 @@ const SUPPLY_RESISTANCE: Quantity =
 
 const TEMPERATURE: Quantity =
     Quantity { what: "temperature", expected: "-55 to 200 °C", least: -55.0, greatest: 200.0 };
+
+/// What is asked of one shaft to place things at it.
+#[derive(Clone, Copy, Debug)]
+pub struct ShaftFacts {
+    /// Counts of [`Assembly::shaft_counts`] in a turn of the motor.
+    pub counts_per_turn: u32,
+    /// Motor turns per turn of the output shaft, where a reducer is built in.
+    pub reducer: Option<f64>,
+    /// Inertia of the motor's rotor in kg·m².
+    pub rotor_inertia_kg_m2: f64,
+    /// Where what is joined to the shaft stands now.
+    pub load_angle: Angle,
+}
 
 /// One model's hardware: motor, load, supply, sensors, and the memory chip that outlives power.
 ///
@@ -121,6 +135,15 @@ pub trait Assembly: Clone + Send + 'static {
         let _ = (firmware, axis);
         false
     }
+
+    /// What things are placed by that are joined to the shaft of an axis.
+    fn shaft_facts(&self, axis: AxisId) -> ShaftFacts;
+
+    /// Joins these things to the output shaft, in place of those before.
+    fn attach(&mut self, axis: AxisId, what: Attachment);
+
+    /// What the shaft will do if its load stays as it is; `None` while the drive drives it, or where it cannot be told.
+    fn free_run(&self, axis: AxisId) -> Option<FreeRun>;
 
     /// Contents of the memory chip as of the last power-off.
     fn image(&self) -> &[u8];

@@ -13,15 +13,16 @@ use drives::mjoint::assumptions::{COUNTS_PER_TURN, COUNTS_S_PER_RPM};
 use drives::mjoint::variations::VARIANT;
 use drives::mjoint::{Actuation, Battery, Brake, Hardware, MJoint, Model, PowerStage, Sensors, objects, storage};
 use plant::absolute_encoder::BatteryState;
+use plant::attachment::Attachment;
 use plant::gear::GearData;
 use plant::mechanics::RotorData;
 use plant::pmsm::Phase;
 use plant::rig::RigModel;
 use plant::supply::SupplyData;
-use plant::{Angle, Inverter, JointMotor, JointMotorModel, Rig, joint_motor};
+use plant::{Angle, FreeRun, Inverter, JointMotor, JointMotorModel, Rig, joint_motor};
 
 use super::Machine;
-use super::assembly::{AMBIENT_C, Assembly, with_demand};
+use super::assembly::{AMBIENT_C, Assembly, ShaftFacts, with_demand};
 use super::order::{Order, OrderError};
 use super::pulse_source::PulseSource;
 use super::realism::{
@@ -281,6 +282,26 @@ impl Assembly for Joint {
     #[inline]
     fn shaft_counts(&self, _axis: AxisId) -> i64 {
         self.motor.rotor.angle.count(COUNTS_PER_TURN)
+    }
+
+    fn shaft_facts(&self, _axis: AxisId) -> ShaftFacts {
+        ShaftFacts {
+            counts_per_turn: COUNTS_PER_TURN,
+            reducer: Some(self.motor.model.gear.ratio),
+            rotor_inertia_kg_m2: self.motor.model.rotor.inertia_kg_m2,
+            load_angle: self.motor.output_angle(),
+        }
+    }
+
+    fn attach(&mut self, _axis: AxisId, what: Attachment) {
+        self.motor.attach(what);
+    }
+
+    fn free_run(&self, _axis: AxisId) -> Option<FreeRun> {
+        let idle = self.last.power_stage == PowerStage::Off;
+        let Actuation { running, brake, .. } = self.last;
+        let engaged = if running { brake == Brake::Engaged } else { self.braked_without_power };
+        idle.then(|| self.motor.free_run(!engaged)).flatten()
     }
 
     fn image(&self) -> &[u8] {

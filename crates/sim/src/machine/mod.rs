@@ -8,6 +8,7 @@
 mod assembly;
 mod boxed;
 mod kept;
+mod load;
 mod mjoint;
 mod node;
 mod order;
@@ -23,8 +24,9 @@ mod zlim42c;
 use can::{Bitrate, Frame, Instant, Station};
 use devices::{AxisId, Description};
 use drives::{Firmware, RegisterError};
+use plant::FreeRun;
 
-pub use assembly::Assembly;
+pub use assembly::{Assembly, ShaftFacts};
 pub use boxed::Boxed;
 pub use mjoint::{Joint, MJointMachine, mjoint};
 pub use node::NodeMachine;
@@ -263,6 +265,7 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
             Stimulus::Switch { ref name, range } => self.tie_switch(axis, self.input_number(name)?, range),
             Stimulus::LoadTorque(torque_nm) => self.assembly.set_load_torque(axis, torque_nm)?,
             Stimulus::LoadInertia(inertia_kg_m2) => self.assembly.set_load_inertia(axis, inertia_kg_m2)?,
+            Stimulus::Load(ref part) => self.join_load(axis, part)?,
             Stimulus::RotorLock(locked) => self.assembly.set_rotor_locked(axis, locked),
             Stimulus::Supply(source) => self.assembly.set_source(source)?,
             Stimulus::Temperature(sensor, celsius) => self.assembly.hold_temperature(axis, sensor, celsius)?,
@@ -321,6 +324,17 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
             ..Report::default()
         };
         self.assembly.report(&self.firmware, axis, common)
+    }
+
+    fn free_run(&self, axis: AxisId) -> Option<FreeRun> {
+        let turned = |velocity_rad_s: f64| {
+            if self.assembly.counts_reversed(&self.firmware, axis) { -velocity_rad_s } else { velocity_rad_s }
+        };
+        Some(match self.assembly.free_run(axis)? {
+            FreeRun::Held => FreeRun::Held,
+            FreeRun::Turns { velocity_rad_s } => FreeRun::Turns { velocity_rad_s: turned(velocity_rad_s) },
+            FreeRun::Seizes { velocity_rad_s } => FreeRun::Seizes { velocity_rad_s: turned(velocity_rad_s) },
+        })
     }
 
     fn inputs(&self) -> &'static [&'static str] {

@@ -126,7 +126,7 @@ impl VirtualDrive for NodeMachine {
             Stimulus::Input { name, .. } | Stimulus::Switch { name, .. } => {
                 self.input_number(name)?;
             }
-            Stimulus::LoadTorque(_) | Stimulus::LoadInertia(_) | Stimulus::RotorLock(_) => {
+            Stimulus::LoadTorque(_) | Stimulus::LoadInertia(_) | Stimulus::Load(_) | Stimulus::RotorLock(_) => {
                 return Err(self.absent("motor"));
             }
             Stimulus::Supply(source) if *source == Source::default() => {}

@@ -11,7 +11,9 @@ use drives::node::{MEMORY_SIZE, Memory};
 use drives::servo::{
     Actuation, AxisActuation, AxisSensors, Hardware, MAX_AXES, Motor, Sensors, ServoDrive, acts_on, conditions,
 };
+use plant::FreeRun;
 use plant::angle::Angle;
+use plant::attachment::Attachment;
 use plant::encoder::EncoderFault;
 use plant::hall::HallFault;
 use plant::hub_motor::{self, HubMotor, HubMotorModel, Inverter};
@@ -21,7 +23,7 @@ use plant::rig::{Rig, RigModel};
 use plant::supply::SupplyData;
 
 use super::Machine;
-use super::assembly::{AMBIENT_C, Assembly, with_demand};
+use super::assembly::{AMBIENT_C, Assembly, ShaftFacts, with_demand};
 use super::boxed::Boxed;
 use super::order::{Order, OrderError};
 use super::quantity::Quantity;
@@ -348,6 +350,25 @@ impl Assembly for ServoBench {
     fn shaft_counts(&self, axis: AxisId) -> i64 {
         let motor = self.at(axis);
         motor.rotor.angle.count(motor.model.encoder.counts_per_turn())
+    }
+
+    fn shaft_facts(&self, axis: AxisId) -> ShaftFacts {
+        let motor = self.at(axis);
+        ShaftFacts {
+            counts_per_turn: motor.model.encoder.counts_per_turn(),
+            reducer: None,
+            rotor_inertia_kg_m2: motor.model.rotor.inertia_kg_m2,
+            load_angle: motor.load_angle(),
+        }
+    }
+
+    fn attach(&mut self, axis: AxisId, what: Attachment) {
+        self.at_mut(axis).attach(what);
+    }
+
+    fn free_run(&self, axis: AxisId) -> Option<FreeRun> {
+        let actuation = self.last.axes.get(usize::from(axis.0))?;
+        if actuation.duty.is_some() { None } else { self.at(axis).free_run(actuation.brake_released) }
     }
 
     fn image(&self) -> &[u8] {

@@ -13,7 +13,9 @@ use drives::zlac8030l::assumptions::REFERENCE_V;
 use drives::zlac8030l::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use drives::zlac8030l::variations::{FAST_MOTOR, VARIANT};
 use drives::zlac8030l::{Zlac8030l, objects, storage};
+use plant::FreeRun;
 use plant::angle::Angle;
+use plant::attachment::Attachment;
 use plant::encoder::EncoderFault;
 use plant::hall::HallFault;
 use plant::hub_motor::{self, HubMotor, HubMotorModel, Inverter};
@@ -23,7 +25,7 @@ use plant::rig::{Rig, RigModel};
 use plant::supply::SupplyData;
 
 use super::Machine;
-use super::assembly::{AMBIENT_C, Assembly, with_demand};
+use super::assembly::{AMBIENT_C, Assembly, ShaftFacts, with_demand};
 use super::order::{Order, OrderError, baud_rate};
 use super::realism::{
     HUB_COGGING, LARGE_CURRENT_STEP_A, Noise, Realism, TEMPERATURE_STEP_C, VOLTAGE_STEP_V, with_dead_time,
@@ -210,6 +212,24 @@ impl Assembly for HubWheel {
     #[inline]
     fn shaft_counts(&self, _axis: AxisId) -> i64 {
         self.motor.rotor.angle.count(self.motor.model.encoder.counts_per_turn())
+    }
+
+    fn shaft_facts(&self, _axis: AxisId) -> ShaftFacts {
+        ShaftFacts {
+            counts_per_turn: self.motor.model.encoder.counts_per_turn(),
+            reducer: None,
+            rotor_inertia_kg_m2: self.motor.model.rotor.inertia_kg_m2,
+            load_angle: self.motor.load_angle(),
+        }
+    }
+
+    fn attach(&mut self, _axis: AxisId, what: Attachment) {
+        self.motor.attach(what);
+    }
+
+    fn free_run(&self, _axis: AxisId) -> Option<FreeRun> {
+        let idle = self.last.power_stage == PowerStage::Off;
+        idle.then(|| self.motor.free_run(!self.last.brake_engaged)).flatten()
     }
 
     fn counts_reversed(&self, firmware: &Zlac8030l, _axis: AxisId) -> bool {

@@ -14,7 +14,9 @@ use drives::zlim42c::assumptions::{REFERENCE_V, TEETH};
 use drives::zlim42c::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use drives::zlim42c::variations::VARIANT;
 use drives::zlim42c::{Zlim42c, objects, storage};
+use plant::FreeRun;
 use plant::angle::Angle;
+use plant::attachment::Attachment;
 use plant::mechanics::RotorData;
 use plant::rig::{Rig, RigModel};
 use plant::stepper::{Bridges, Phase};
@@ -22,7 +24,7 @@ use plant::stepper_motor::{StepperMotor, StepperMotorModel};
 use plant::supply::SupplyData;
 
 use super::Machine;
-use super::assembly::{AMBIENT_C, Assembly};
+use super::assembly::{AMBIENT_C, Assembly, ShaftFacts};
 use super::order::{Order, OrderError, baud_rate};
 use super::quantity::Quantity;
 use super::realism::{Noise, Realism, SMALL_CURRENT_STEP_A, VOLTAGE_STEP_V, with_dead_time};
@@ -265,6 +267,24 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
     #[inline]
     fn shaft_counts(&self, _axis: AxisId) -> i64 {
         self.motor.rotor.angle.count(SHAFT_COUNTS)
+    }
+
+    fn shaft_facts(&self, _axis: AxisId) -> ShaftFacts {
+        ShaftFacts {
+            counts_per_turn: SHAFT_COUNTS,
+            reducer: None,
+            rotor_inertia_kg_m2: self.motor.model.rotor.inertia_kg_m2,
+            load_angle: self.motor.load_angle(),
+        }
+    }
+
+    fn attach(&mut self, _axis: AxisId, what: Attachment) {
+        self.motor.attach(what);
+    }
+
+    fn free_run(&self, _axis: AxisId) -> Option<FreeRun> {
+        let idle = self.last.power_stage == PowerStage::Off;
+        idle.then(|| self.motor.free_run()).flatten()
     }
 
     fn shaft_counts_per_count(&self, firmware: &Zlim42c, _axis: AxisId) -> i64 {

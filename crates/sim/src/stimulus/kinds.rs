@@ -3,6 +3,8 @@
 use canopen::Mux;
 
 use super::bus_fault::BusFault;
+use super::load::LoadPart;
+use super::range::SwitchRange;
 
 /// One thing that the outer world does to a node and the machine around it.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,6 +30,8 @@ pub enum Stimulus {
     LoadTorque(f64),
     /// `load inertia 0.02`: kg·m² added at the output shaft.
     LoadInertia(f64),
+    /// `load pulley 2 0.05` and so on: what else hangs on the output shaft.
+    Load(LoadPart),
     /// `rotor lock`, `rotor free`.
     RotorLock(bool),
     /// `supply 48`: V; `supply 48 limit 10 resistance 0.2`: with what is behind it.
@@ -87,22 +91,6 @@ pub struct Source {
     pub limit_a: Option<f64>,
     /// Resistance of source and wires, in ohm.
     pub resistance_ohm: Option<f64>,
-}
-
-/// A stretch of the actual position in the drive's counts, ends included; `None` reaches for ever.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SwitchRange {
-    /// Lower end.
-    pub low: Option<i64>,
-    /// Upper end.
-    pub high: Option<i64>,
-}
-
-impl SwitchRange {
-    /// True while the switch is active.
-    pub fn contains(&self, position: i64) -> bool {
-        self.low.is_none_or(|low| low <= position) && self.high.is_none_or(|high| position <= high)
-    }
 }
 
 /// Where a temperature is measured.

@@ -6,7 +6,9 @@ use canopen::Mux;
 
 use super::bus_fault::{self, BusFault};
 use super::error::StimulusError;
-use super::kinds::{Component, ObjectValue, Power, PulseTrain, Source, Stimulus, SwitchRange, TemperatureSensor};
+use super::kinds::{Component, ObjectValue, Power, PulseTrain, Source, Stimulus, TemperatureSensor};
+use super::load::{self, LoadPart};
+use super::words::{number, range};
 
 impl FromStr for Stimulus {
     type Err = StimulusError;
@@ -41,6 +43,8 @@ const POWER: &str = "NODE power on|off|cycle|cut";
 const INPUT: &str = "NODE input NAME 0|1";
 const SWITCH: &str = "NODE switch NAME LOW|min HIGH|max";
 const LOAD: &str = "NODE load torque N·m, or NODE load inertia kg·m²";
+/// What may follow `load`.
+const LOADS: &str = "NODE load torque|inertia|friction|pulley|spring|stop|fan|gear VALUES, or NODE load none";
 const ROTOR: &str = "NODE rotor lock|free";
 const SUPPLY: &str = "NODE supply VOLTS [limit AMPERES] [resistance OHMS]";
 const TEMPERATURE: &str = "NODE temperature motor|driver CELSIUS|auto";
@@ -61,6 +65,13 @@ pub const FORMS: &[&str] = &[
     INPUT,
     SWITCH,
     LOAD,
+    load::FORMS[0],
+    load::FORMS[1],
+    load::FORMS[2],
+    load::FORMS[3],
+    load::FORMS[4],
+    load::FORMS[5],
+    load::FORMS[6],
     ROTOR,
     SUPPLY,
     TEMPERATURE,
@@ -94,20 +105,14 @@ fn parse_input(arguments: &[&str]) -> Result<Stimulus, StimulusError> {
 
 fn parse_switch(arguments: &[&str]) -> Result<Stimulus, StimulusError> {
     let [name, low, high] = arguments else { return Err(StimulusError::Usage(SWITCH)) };
-    let range = SwitchRange { low: bound(low, "min")?, high: bound(high, "max")? };
-    if let SwitchRange { low: Some(low), high: Some(high) } = range
-        && low > high
-    {
-        return Err(StimulusError::EmptyRange { low, high });
-    }
-    Ok(Stimulus::Switch { name: name.to_string(), range })
+    Ok(Stimulus::Switch { name: name.to_string(), range: range(low, high, SWITCH)? })
 }
 
 fn parse_load(arguments: &[&str]) -> Result<Stimulus, StimulusError> {
     match arguments {
         ["torque", torque_nm] => Ok(Stimulus::LoadTorque(number(torque_nm, "torque", f64::MIN, LOAD)?)),
         ["inertia", inertia] => Ok(Stimulus::LoadInertia(number(inertia, "inertia", 0.0, LOAD)?)),
-        _ => Err(StimulusError::Usage(LOAD)),
+        _ => LoadPart::parse(arguments).unwrap_or(Err(StimulusError::Usage(LOADS))).map(Stimulus::Load),
     }
 }
 
@@ -210,17 +215,4 @@ fn choice(arguments: &[&str], yes: &str, no: &str, usage: &'static str) -> Resul
         [word] if *word == no => Ok(false),
         _ => Err(StimulusError::Usage(usage)),
     }
-}
-
-fn number(text: &str, what: &'static str, least: f64, usage: &'static str) -> Result<f64, StimulusError> {
-    let value: Option<f64> = text.parse().ok().filter(|value: &f64| value.is_finite() && *value >= least);
-    value.ok_or_else(|| StimulusError::BadValue { text: text.to_string(), what, usage })
-}
-
-fn bound(text: &str, open: &str) -> Result<Option<i64>, StimulusError> {
-    if text == open {
-        return Ok(None);
-    }
-    let bad = |_| StimulusError::BadValue { text: text.to_string(), what: "position", usage: SWITCH };
-    text.parse().map(Some).map_err(bad)
 }

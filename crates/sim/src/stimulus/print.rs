@@ -2,7 +2,9 @@
 
 use std::fmt;
 
-use super::kinds::{Component, ObjectValue, Power, PulseTrain, Source, Stimulus, SwitchRange, TemperatureSensor};
+use super::kinds::{Component, ObjectValue, Power, PulseTrain, Source, Stimulus, TemperatureSensor};
+use super::range::SwitchRange;
+use super::words::bound_word;
 
 impl fmt::Display for Stimulus {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -11,13 +13,11 @@ impl fmt::Display for Stimulus {
             Self::Power(power) => write!(f, "power {}", power.word()),
             Self::Input { name, level } => write!(f, "input {name} {}", u8::from(*level)),
             Self::Switch { name, range: SwitchRange { low, high } } => {
-                write!(f, "switch {name} ")?;
-                bound(f, *low, "min")?;
-                f.write_str(" ")?;
-                bound(f, *high, "max")
+                write!(f, "switch {name} {} {}", bound_word(*low, "min"), bound_word(*high, "max"))
             }
             Self::LoadTorque(torque_nm) => write!(f, "load torque {torque_nm}"),
             Self::LoadInertia(inertia_kg_m2) => write!(f, "load inertia {inertia_kg_m2}"),
+            Self::Load(part) => part.fmt(f),
             Self::RotorLock(locked) => write!(f, "rotor {}", if *locked { "lock" } else { "free" }),
             Self::Supply(source) => supply(f, source),
             Self::Temperature(sensor, Some(celsius)) => write!(f, "temperature {} {celsius}", sensor.word()),
@@ -32,13 +32,6 @@ impl fmt::Display for Stimulus {
             Self::Bus(fault) => fault.fmt(f),
             Self::Object { mux, value } => write!(f, "set {:04X}:{:02X} {value}", mux.index, mux.sub_index),
         }
-    }
-}
-
-fn bound(f: &mut fmt::Formatter<'_>, bound: Option<i64>, open: &str) -> fmt::Result {
-    match bound {
-        Some(bound) => write!(f, "{bound}"),
-        None => f.write_str(open),
     }
 }
 

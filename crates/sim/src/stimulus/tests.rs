@@ -24,9 +24,28 @@ fn some<T>(random: &mut Prng, value: T) -> Option<T> {
     (random.below(2) == 0).then_some(value)
 }
 
+fn any_load(random: &mut Prng) -> LoadPart {
+    let [a, b, c, d] = [(); 4].map(|()| number(random, 0.0));
+    let [more, further] = [c, d].map(|value| some(random, value));
+    match random.below(8) {
+        0 => LoadPart::None,
+        1 => LoadPart::Off(LoadKind::ALL[random.below(6) as usize]),
+        2 => LoadPart::Friction(Friction { coulomb_nm: a, viscous_nm_s: b, static_nm: more, stribeck_rad_s: further }),
+        3 => LoadPart::Pulley { mass_kg: a, radius_m: number(random, f64::MIN) },
+        4 => LoadPart::Spring { stiffness_nm_rad: a, rest_deg: number(random, f64::MIN) },
+        5 => {
+            let (low, high) = (random.next_u64() as i64, random.next_u64() as i64);
+            let range = SwitchRange { low: some(random, low.min(high)), high: some(random, low.max(high)) };
+            LoadPart::Stop { range, stiffness_nm_rad: more, damping_nm_s_rad: further.filter(|_| more.is_some()) }
+        }
+        6 => LoadPart::Fan { torque_nm: a, speed_rpm: b },
+        _ => LoadPart::Gear { ratio: a, backlash_deg: b, stiffness_nm_rad: more },
+    }
+}
+
 fn any(random: &mut Prng) -> Stimulus {
     let coin = random.below(2) == 0;
-    match random.below(16) {
+    match random.below(18) {
         0 => Stimulus::Power(Power::ALL[random.below(4) as usize]),
         1 => Stimulus::Input { name: name(random), level: coin },
         2 => {
@@ -57,6 +76,7 @@ fn any(random: &mut Prng) -> Stimulus {
         }),
         13 => Stimulus::CableCut(coin),
         14 => Stimulus::Bus(bus_fault(random)),
+        15 | 16 => Stimulus::Load(any_load(random)),
         _ => Stimulus::Object {
             mux: Mux::new(random.next_u64() as u16, random.next_u64() as u8),
             value: match random.below(3) {
@@ -128,5 +148,23 @@ fn a_place_is_a_node_or_an_axis_of_it_counted_from_1() {
     assert_eq!("5.1".parse(), Ok(Place::node(5)));
     for text in ["", "0", "128", "5.", "5.0", ".2", "5.-1", "5.257", "+5", "5.2.1", "5 2"] {
         assert_eq!(text.parse::<Place>(), Err(()), "{text:?}");
+    }
+}
+
+#[test]
+fn what_is_wrong_with_a_load_is_said_with_its_own_form() {
+    for (words, error) in [
+        ("load", "expected: NODE load torque|inertia|friction|pulley|spring|stop|fan|gear VALUES, or NODE load none"),
+        ("load pulley 2", "expected: NODE load pulley KG METRES, or NODE load pulley off"),
+        ("load pulley -2 1", "\"-2\" is no mass; expected: NODE load pulley KG METRES, or NODE load pulley off"),
+        ("load fan 1 inf", "\"inf\" is no speed; expected: NODE load fan N·m R/MIN, or NODE load fan off"),
+        ("load stop 5 -5", "the range from 5 to -5 is empty; give the lower bound first"),
+        (
+            "load friction 1 static",
+            "expected: NODE load friction N·m [viscous N·m·s/rad] [static N·m] [stribeck rad/s], or NODE load friction off",
+        ),
+        ("load none of it", "expected: NODE load none"),
+    ] {
+        assert_eq!(words.parse::<Stimulus>().unwrap_err().to_string(), error, "{words}");
     }
 }

@@ -205,6 +205,7 @@ impl VirtualDrive for TestDrive {
             Stimulus::Pulses(_) => return Err(absent("pulse input")),
             Stimulus::Object { mux, .. } => return Err(Refused::OwnObjects { model: "testdrive", object: mux }),
             Stimulus::LoadInertia(_) | Stimulus::Fault(..) | Stimulus::CableCut(_) | Stimulus::Bus(_) => {}
+            Stimulus::Load(_) => return Err(absent("such load")),
         }
         Ok(())
     }

@@ -1,0 +1,37 @@
+//! Single words of a stimulus, and what is wrong with them.
+
+use super::error::StimulusError;
+use super::range::SwitchRange;
+
+/// A finite number, not below `least`.
+pub(super) fn number(text: &str, what: &'static str, least: f64, usage: &'static str) -> Result<f64, StimulusError> {
+    let value: Option<f64> = text.parse().ok().filter(|value: &f64| value.is_finite() && *value >= least);
+    value.ok_or_else(|| StimulusError::BadValue { text: text.to_string(), what, usage })
+}
+
+/// A finite number, not negative.
+pub(super) fn value(text: &str, what: &'static str, usage: &'static str) -> Result<f64, StimulusError> {
+    number(text, what, 0.0, usage)
+}
+
+/// A stretch of positions, whose ends may be `min` and `max`.
+pub(super) fn range(low: &str, high: &str, usage: &'static str) -> Result<SwitchRange, StimulusError> {
+    let range = SwitchRange { low: bound(low, "min", usage)?, high: bound(high, "max", usage)? };
+    match range {
+        SwitchRange { low: Some(low), high: Some(high) } if low > high => Err(StimulusError::EmptyRange { low, high }),
+        _ => Ok(range),
+    }
+}
+
+fn bound(text: &str, open: &str, usage: &'static str) -> Result<Option<i64>, StimulusError> {
+    if text == open {
+        return Ok(None);
+    }
+    let bad = |_| StimulusError::BadValue { text: text.to_string(), what: "position", usage };
+    text.parse().map(Some).map_err(bad)
+}
+
+/// An end of a stretch of positions.
+pub(super) fn bound_word(bound: Option<i64>, open: &str) -> String {
+    bound.map_or_else(|| open.to_owned(), |bound| bound.to_string())
+}
