@@ -94,7 +94,6 @@ impl Rig {
         let load = self.expected_load(data.angle, data.velocity_rad_s, pending.dt_s);
         let held_nm = if load.locked { HELD_NM } else { 0.0 };
         let push = Push {
-            angle: data.angle,
             velocity_rad_s: data.velocity_rad_s,
             torque_nm: pending.motor_nm - load.torque_nm,
             inertia_kg_m2: model.inertia_kg_m2 + load.inertia_kg_m2,

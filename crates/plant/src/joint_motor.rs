@@ -213,7 +213,6 @@ impl JointMotor {
         let held_nm = if load.locked { HELD_NM } else { 0.0 };
         let output_dry_nm = load.coulomb_nm + gear.output_coulomb_nm + gear.mesh_loss * self.gear.torque_nm.abs();
         Push {
-            angle: self.rotor.angle,
             velocity_rad_s: self.rotor.velocity_rad_s,
             torque_nm: pending.motor_nm - load.torque_nm / ratio,
             inertia_kg_m2: rotor.inertia_kg_m2 + (gear.output_inertia_kg_m2 + load.inertia_kg_m2) / (ratio * ratio),

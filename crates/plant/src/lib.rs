@@ -37,6 +37,7 @@ pub mod attachment;
 pub mod brake;
 pub mod clamp;
 pub mod cogging;
+pub mod coupled;
 pub mod encoder;
 pub mod free_run;
 pub mod gear;

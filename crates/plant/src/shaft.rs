@@ -19,8 +19,6 @@ pub(crate) const HELD_NM: f64 = 1e12;
 /// What a coupled motor does to its machine during one step. All of it is at the motor's shaft.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Push {
-    /// Where the shaft is.
-    pub angle: Angle,
     /// How fast it turns.
     pub velocity_rad_s: f64,
     /// Torque of the motor, less what its own load takes.

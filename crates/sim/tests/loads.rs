@@ -76,7 +76,7 @@ fn every_machine_coasts_down_by_the_friction_of_its_motor() {
         }
         done(&mut world, &format!("5 load torque {torque}"));
         let fast = after(&mut world, 5, 0.5).velocity_rpm.abs();
-        assert!(fast > 10.0, "{} turns at {fast}", model.name);
+        assert!(fast > 3.0, "{} turns at {fast}", model.name);
         done(&mut world, "5 load torque 0");
         let slow = after(&mut world, 5, 60.0).velocity_rpm;
         assert!(slow == 0.0, "{} still turns at {slow}", model.name);
