@@ -234,14 +234,16 @@ impl JointMotor {
 
     /// Ends the step of a coupled joint.
     pub fn follow(&mut self, motion: &Motion) {
+        let dry_nm = self.rig.push().map_or(0.0, |push| push.dry_nm);
+        let output_dry_nm = self.rig.load.coulomb_nm + self.model.gear.output_coulomb_nm;
         let Some((pending, turned)) = self.rig.follow(&mut self.rotor, motion) else { return };
-        let GearModel { ratio, .. } = self.model.gear;
         let JointMotorModel { rotor, gear, .. } = &self.model;
-        // What the motor's side does not take goes through the gear.
+        let ratio = gear.ratio;
+        // What the motor's side does not take goes through the gear. Of the friction it takes its share: motor, brake and teeth.
         let gained_nm = rotor.inertia_kg_m2 * self.rotor.velocity_change_rad_s / pending.dt_s;
         let viscous_nm = (rotor.viscous_nm_s + gear.viscous_nm_s) * motion.mean_rad_s;
-        let own_dry_nm = rotor.coulomb_nm + gear.coulomb_nm;
-        let dry_nm = motion.dry_nm.clamp(-own_dry_nm, own_dry_nm);
+        let share = if dry_nm > 0.0 { 1.0 - output_dry_nm / ratio / dry_nm } else { 0.0 };
+        let dry_nm = motion.dry_nm * share;
         self.gear.output_velocity_rad_s = motion.velocity_rad_s / ratio;
         let torque_nm = ratio * (pending.motor_nm - gained_nm - viscous_nm - dry_nm);
         self.gear.torque_nm = torque_nm;

@@ -12,7 +12,7 @@ use std::str::FromStr;
 
 use serde::Serialize;
 
-use crate::stimulus::{GET, Place, Stimulus, StimulusError, WireFault};
+use crate::stimulus::{BodyStimulus, GET, GET_BODY, Place, Stimulus, StimulusError, WireFault};
 use crate::{Refused, World};
 
 /// One line, understood.
@@ -28,6 +28,10 @@ pub enum Command {
     Get(Place),
     /// `bus corrupt 0.01`: what disturbs the wire.
     Disturb(WireFault),
+    /// `body base get`: where a machine is that several drives move.
+    GetBody(String),
+    /// `body base slope 5`: what the outer world does to it.
+    ApplyToBody(String, BodyStimulus),
     /// `4 power off`: what the outer world does to a node.
     Apply(Place, Stimulus),
 }
@@ -49,6 +53,7 @@ impl FromStr for Command {
                 let words: Vec<&str> = rest.split_whitespace().collect();
                 return Ok(Self::Disturb(WireFault::parse(&words)?));
             }
+            "body" => return body(rest.trim()),
             _ => {}
         }
         let place = parse_place(first)?;
@@ -60,6 +65,12 @@ impl FromStr for Command {
             Some(_) => Ok(Self::Apply(place, rest.parse()?)),
         }
     }
+}
+
+fn body(rest: &str) -> Result<Command, CommandError> {
+    let (name, words) = rest.split_once(char::is_whitespace).ok_or(StimulusError::Usage(GET_BODY))?;
+    let name = name.to_owned();
+    if words.trim() == "get" { Ok(Command::GetBody(name)) } else { Ok(Command::ApplyToBody(name, words.parse()?)) }
 }
 
 fn parse_place(word: &str) -> Result<Place, CommandError> {
@@ -77,7 +88,7 @@ pub enum CommandError {
     #[error("the line is longer than {MAX_LINE_LENGTH} bytes; expected a command, as in: 4 get")]
     TooLong,
     /// The first word is neither a node nor a command.
-    #[error("unknown command {0:?}; expected now, help, quit, bus, or a node number and a command, as in: 4 get")]
+    #[error("unknown command {0:?}; expected now, help, quit, bus, body, or a node number and a command, as in: 4 get")]
     Unknown(String),
     /// The number is no node number.
     #[error("{0:?} is no node number; expected 1 to 127")]
@@ -97,6 +108,14 @@ pub enum CommandError {
         /// The number given.
         number: u8,
         /// The numbers there are, or `none`.
+        present: String,
+    },
+    /// No machine has this name.
+    #[error("no body is called {name:?}; there is {present}")]
+    NoSuchBody {
+        /// The name given.
+        name: String,
+        /// The names there are, or `none`.
         present: String,
     },
     /// The node does not take it.

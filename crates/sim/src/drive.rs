@@ -3,13 +3,15 @@
 //! Units are SI, positions are the drive's own counts, speeds are those of the motor shaft in r/min.
 
 use can::{Bitrate, Instant, Station};
-use canopen::{Mux, NmtState};
+use canopen::NmtState;
 use cia402::{ModeOfOperation, PowerState};
 use devices::{AxisId, Description};
 use drives::RegisterError;
 use plant::FreeRun;
 
 use crate::machine::Realism;
+use crate::mechanics::Mechanics;
+use crate::refused::Refused;
 use crate::stimulus::{Component, Power, Source, Stimulus, SwitchRange, TemperatureSensor};
 
 /// A drive joined to its physics: firmware, motor, load, supply and sensors as one station.
@@ -68,6 +70,17 @@ pub trait VirtualDrive: Station + VirtualDriveClone + Send {
     fn free_run(&self, axis: AxisId) -> Option<FreeRun> {
         let _ = axis;
         None
+    }
+
+    /// What a coupled machine needs of it, of a drive that moves a shaft.
+    fn mechanics(&mut self) -> Option<&mut dyn Mechanics> {
+        None
+    }
+
+    /// Whether the shaft of an axis can be handed over to a coupled machine.
+    fn check_couple(&self, axis: AxisId) -> Result<(), Refused> {
+        let _ = axis;
+        Ok(())
     }
 
     /// Names of the digital inputs, e.g. `X0`, `X1`; an input is addressed by its place in this list.
@@ -199,82 +212,6 @@ impl Clone for Box<dyn VirtualDrive> {
     fn clone(&self) -> Self {
         (**self).clone_box()
     }
-}
-
-/// Why a drive did not take what it was told to.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Refused {
-    /// The model has no such part.
-    #[error("a {model} has no {what}")]
-    Absent {
-        /// The drive's model.
-        model: &'static str,
-        /// What it does not have.
-        what: &'static str,
-    },
-    /// The model has no input of this name.
-    #[error("a {model} has no input {name:?}; it has {present}")]
-    NoSuchInput {
-        /// The drive's model.
-        model: &'static str,
-        /// The name given.
-        name: String,
-        /// The names there are, or `none`.
-        present: String,
-    },
-    /// The model has no such axis.
-    #[error("a {model} has no axis {axis}; it has {axes}")]
-    NoSuchAxis {
-        /// The drive's model.
-        model: &'static str,
-        /// The axis asked for, counted from 1.
-        axis: u16,
-        /// How many there are.
-        axes: u8,
-    },
-    /// The objects are the firmware's.
-    #[error("a {model} sets its objects by itself; write {object} over the bus, as its host does")]
-    OwnObjects {
-        /// The drive's model.
-        model: &'static str,
-        /// The object.
-        object: Mux,
-    },
-    /// The object does not take the value.
-    #[error("object {object} does not take it: {reason}")]
-    BadObject {
-        /// The object.
-        object: Mux,
-        /// Why, and what it would take.
-        reason: String,
-    },
-    /// The value makes no sense for this machine.
-    #[error("{what} must be {expected}, not {value}")]
-    OutOfRange {
-        /// The quantity.
-        what: &'static str,
-        /// What would have been taken.
-        expected: &'static str,
-        /// What was given.
-        value: f64,
-    },
-    /// Spring and stops stand where the load is, which another gear would change.
-    #[error("spring and stops stand where the load is; take them off before the gear is changed")]
-    Placed,
-    /// The shaft stands beyond the stops.
-    #[error("the shaft stands at {position}, beyond these stops; give positions on both sides of it, min or max")]
-    BeyondStops {
-        /// Actual position in the drive's counts.
-        position: i64,
-    },
-    /// The image does not come from this model's memory.
-    #[error("not a memory image of a {model}: {reason}")]
-    BadImage {
-        /// The drive's model.
-        model: &'static str,
-        /// What is wrong with it.
-        reason: &'static str,
-    },
 }
 
 /// State of the holding brake.

@@ -35,22 +35,30 @@
 
 mod block_on;
 pub mod command;
+pub mod coupling;
 mod drive;
 pub mod events;
 pub mod fault;
 pub mod json;
 pub mod machine;
+mod mechanics;
 pub mod pace;
 mod prng;
 pub mod recorder;
+mod refused;
 pub mod stimulus;
 pub mod wire;
 mod world;
 
 pub use block_on::{BlockOnError, block_on, block_on_for};
+pub use coupling::{BodyKind, BodyState, CoupledShaft, Coupling, CouplingError};
 pub use devices::AxisId;
-pub use drive::{Brake, Levels, OutputShaft, Refused, Report, VirtualDrive, VirtualDriveClone};
+pub use drive::{Brake, Levels, OutputShaft, Report, VirtualDrive, VirtualDriveClone};
 pub use drives::RegisterError;
+pub use mechanics::Mechanics;
 pub use prng::Prng;
-pub use stimulus::{Component, LoadPart, Place, PulseTrain, Source, Stimulus, SwitchRange, TemperatureSensor};
+pub use refused::Refused;
+pub use stimulus::{
+    BodyStimulus, Component, LoadPart, Place, PulseTrain, Source, Stimulus, SwitchRange, TemperatureSensor,
+};
 pub use world::{AnyStation, Digest, FrameLog, StationId, StoredImage, World, WorldError};

@@ -9,6 +9,7 @@
 //! # Ok::<(), sim::stimulus::StimulusError>(())
 //! ```
 
+mod body;
 mod bus_fault;
 mod error;
 mod kinds;
@@ -19,6 +20,7 @@ mod print;
 mod range;
 mod words;
 
+pub use body::{BodyStimulus, GET_BODY};
 pub use bus_fault::{BusFault, WireFault};
 pub use error::StimulusError;
 pub use kinds::{Component, ObjectValue, Power, PulseTrain, Source, Stimulus, TemperatureSensor};

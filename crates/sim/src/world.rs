@@ -1,6 +1,8 @@
 //! Drives, stations and the bus between them, moved from event to event in virtual time.
 
 mod access;
+mod bodies;
+mod body;
 mod digest;
 mod due;
 mod ledger;
@@ -24,6 +26,7 @@ use crate::fault::{Corruption, NodeFaults};
 use crate::recorder::Recorder;
 use crate::wire::{Bus, ControllerOptions};
 use crate::{Prng, VirtualDrive};
+use body::CoupledBody;
 use due::DueTimes;
 use ledger::Ledger;
 use member::{Member, Vacant};
@@ -47,6 +50,8 @@ pub struct World {
     /// By station, while stores are guarded.
     ledgers: Vec<Option<Ledger>>,
     watch: Option<Box<Watch>>,
+    /// What several drives move together.
+    bodies: Vec<CoupledBody>,
 }
 
 /// Names one station of one world: what `add_*` returned.
@@ -92,6 +97,7 @@ impl World {
             recorder: None,
             ledgers: Vec::new(),
             watch: None,
+            bodies: Vec::new(),
         }
     }
 

@@ -70,7 +70,7 @@ fn every_machine_coasts_down_by_the_friction_of_its_motor() {
         world.run_for(Duration::from_millis(100));
         // A joint holds its output from power-on on, and without power hardly turns from outside: it gets what its reducer bears.
         let is_joint = model.name.starts_with('m');
-        let torque = if is_joint { 10.0 } else { 0.3 };
+        let torque = if is_joint { 25.0 } else { 0.3 };
         if is_joint {
             done(&mut world, "5 power cut");
         }

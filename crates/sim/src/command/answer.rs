@@ -9,7 +9,7 @@ use super::{Command, CommandError, Service, to_json};
 use plant::FreeRun;
 
 use crate::stimulus::{FORMS, Place, Stimulus};
-use crate::{Brake, OutputShaft, Report, StationId, World};
+use crate::{BodyState, Brake, OutputShaft, Report, StationId, World};
 
 /// Does what `command` says; returns the line of JSON that answers it.
 pub(super) fn answer(world: &mut World, command: &Command, service: Service) -> Result<String, CommandError> {
@@ -20,6 +20,11 @@ pub(super) fn answer(world: &mut World, command: &Command, service: Service) -> 
         Command::Get(place) => get(world, *place, service),
         Command::Disturb(fault) => {
             world.disturb(*fault);
+            Ok(done(world))
+        }
+        Command::GetBody(name) => body(world, name),
+        Command::ApplyToBody(name, stimulus) => {
+            world.apply_to_body(name, stimulus).ok_or_else(|| no_such_body(world, name))??;
             Ok(done(world))
         }
         Command::Apply(place, stimulus) => {
@@ -35,6 +40,25 @@ fn no_such_drive(world: &World, number: u8) -> CommandError {
     let numbers: Vec<String> = world.drive_numbers().map(|number| number.to_string()).collect();
     let present = if numbers.is_empty() { "none".to_string() } else { numbers.join(", ") };
     CommandError::NoSuchDrive { number, present }
+}
+
+fn no_such_body(world: &World, name: &str) -> CommandError {
+    let names: Vec<&str> = world.body_names().collect();
+    let present = if names.is_empty() { "none".to_string() } else { names.join(", ") };
+    CommandError::NoSuchBody { name: name.to_owned(), present }
+}
+
+/// The answer to `body NAME get`.
+#[derive(Serialize)]
+struct GotBody {
+    ok: bool,
+    t: f64,
+    body: BodyState,
+}
+
+fn body(world: &mut World, name: &str) -> Result<String, CommandError> {
+    let body = world.body(name).ok_or_else(|| no_such_body(world, name))?;
+    Ok(to_json(&GotBody { ok: true, t: seconds(world), body }))
 }
 
 #[derive(Serialize)]
@@ -118,6 +142,9 @@ struct Got<'a> {
     output_shaft: Option<Output>,
     #[serde(skip_serializing_if = "Option::is_none")]
     damage: Option<&'a str>,
+    /// The machine that it moves with others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    body: Option<BodyState>,
     motor_c: Option<f64>,
     driver_c: Option<f64>,
     statusword: Option<u16>,
@@ -174,6 +201,7 @@ fn get(world: &mut World, place: Place, service: Service) -> Result<String, Comm
         brake: brake_text(report.brake),
         output_shaft: report.output.map(Output::from),
         damage: report.damage,
+        body: world.body_of(place),
         motor_c: report.motor_c,
         driver_c: report.driver_c,
         statusword: report.statusword,

@@ -57,10 +57,10 @@ fn understands_every_line_of_the_manual_page() {
 #[test]
 fn says_what_it_expected_of_a_malformed_line() {
     for (line, error) in [
-        ("", "unknown command \"\"; expected now, help, quit, bus, or a node number and a command, as in: 4 get"),
+        ("", "unknown command \"\"; expected now, help, quit, bus, body, or a node number and a command, as in: 4 get"),
         (
             "hello",
-            "unknown command \"hello\"; expected now, help, quit, bus, or a node number and a command, as in: 4 get",
+            "unknown command \"hello\"; expected now, help, quit, bus, body, or a node number and a command, as in: 4 get",
         ),
         ("now 4", "expected: now"),
         ("quit now", "expected: quit"),

@@ -6,6 +6,7 @@ use drives::{Firmware, RegisterError};
 use plant::attachment::Attachment;
 use plant::mechanics::RotorData;
 use plant::rig::RigModel;
+use plant::shaft::Motion;
 use plant::{Angle, FreeRun, Rig};
 
 use super::quantity::Quantity;
@@ -141,6 +142,12 @@ pub trait Assembly: Clone + Send + 'static {
 
     /// Joins these things to the output shaft, in place of those before.
     fn attach(&mut self, axis: AxisId, what: Attachment);
+
+    /// From now on the shaft of an axis moves by [`follow`](Self::follow), at the end of each control period.
+    fn couple(&mut self, axis: AxisId);
+
+    /// Ends the control period of a coupled axis.
+    fn follow(&mut self, axis: AxisId, motion: &Motion);
 
     /// What the shaft will do if its load stays as it is; `None` while the drive drives it, or where it cannot be told.
     fn free_run(&self, axis: AxisId) -> Option<FreeRun>;

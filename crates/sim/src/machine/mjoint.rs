@@ -18,6 +18,7 @@ use plant::gear::GearData;
 use plant::mechanics::RotorData;
 use plant::pmsm::Phase;
 use plant::rig::RigModel;
+use plant::shaft::Motion;
 use plant::supply::SupplyData;
 use plant::{Angle, FreeRun, Inverter, JointMotor, JointMotorModel, Rig, joint_motor};
 
@@ -295,6 +296,14 @@ impl Assembly for Joint {
 
     fn attach(&mut self, _axis: AxisId, what: Attachment) {
         self.motor.attach(what);
+    }
+
+    fn couple(&mut self, _axis: AxisId) {
+        self.motor.couple();
+    }
+
+    fn follow(&mut self, _axis: AxisId, motion: &Motion) {
+        self.motor.follow(motion);
     }
 
     fn free_run(&self, _axis: AxisId) -> Option<FreeRun> {

@@ -25,6 +25,7 @@ use can::{Bitrate, Frame, Instant, Station};
 use devices::{AxisId, Description};
 use drives::{Firmware, RegisterError};
 use plant::FreeRun;
+use plant::shaft::{Motion, Push};
 
 pub use assembly::{Assembly, ShaftFacts};
 pub use boxed::Boxed;
@@ -38,6 +39,7 @@ pub use servo::{ServoBench, ServoMachine, servo, without_effect};
 pub use zlac8030l::{HubWheel, Zlac8030lMachine, zlac8030l};
 pub use zlim42c::{Stepper, Zlim42c82Machine, Zlim42cMachine, zlim42c, zlim42c_82};
 
+use crate::mechanics::Mechanics;
 use crate::stimulus::{Power, Stimulus, SwitchRange};
 use crate::{Refused, Report, VirtualDrive};
 use switch::{Inputs, stretch};
@@ -61,6 +63,8 @@ pub struct Machine<A: Assembly> {
     noise: Option<Noise>,
     supply: Supply,
     running: bool,
+    /// Its control periods are run by the machine that it is coupled to.
+    coupled: bool,
     next_tick: Instant,
 }
 
@@ -84,6 +88,7 @@ impl<A: Assembly> Machine<A> {
             noise: None,
             supply: Supply::Off,
             running: false,
+            coupled: false,
             next_tick: Instant::ZERO,
         }
     }
@@ -243,6 +248,32 @@ impl<A: Assembly> Station for Machine<A> {
     }
 }
 
+impl<A: Assembly> Mechanics for Machine<A> {
+    fn couple(&mut self, axis: AxisId) -> Result<f64, Refused> {
+        self.check_couple(axis)?;
+        self.assembly.couple(axis);
+        self.coupled = true;
+        Ok(1.0 / self.assembly.shaft_facts(axis).reducer.unwrap_or(1.0))
+    }
+
+    fn next_period(&self) -> (Instant, u64) {
+        (self.next_tick, A::Firmware::CONTROL_PERIOD_NS)
+    }
+
+    fn run_period(&mut self) {
+        self.tick(self.next_tick);
+        self.next_tick = self.next_tick.plus_nanos(A::Firmware::CONTROL_PERIOD_NS);
+    }
+
+    fn push(&self, axis: AxisId) -> Push {
+        self.assembly.shaft_and_rig(axis).1.push().unwrap_or_default()
+    }
+
+    fn follow(&mut self, axis: AxisId, motion: &Motion) {
+        self.assembly.follow(axis, motion);
+    }
+}
+
 impl<A: Assembly> VirtualDrive for Machine<A> {
     fn model(&self) -> &'static str {
         self.assembly.model()
@@ -293,7 +324,8 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
     }
 
     fn advance(&mut self, now: Instant) {
-        while self.next_tick <= now {
+        // The world has run a coupled machine's periods by now.
+        while self.next_tick <= now && !self.coupled {
             self.tick(self.next_tick);
             self.next_tick = self.next_tick.plus_nanos(A::Firmware::CONTROL_PERIOD_NS);
         }
@@ -324,6 +356,17 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
             ..Report::default()
         };
         self.assembly.report(&self.firmware, axis, common)
+    }
+
+    fn mechanics(&mut self) -> Option<&mut dyn Mechanics> {
+        Some(self)
+    }
+
+    fn check_couple(&self, axis: AxisId) -> Result<(), Refused> {
+        match self.assembly.shaft_and_rig(axis).1.attachment().gear {
+            Some(_) => Err(Refused::GearInTheWay),
+            None => Ok(()),
+        }
     }
 
     fn free_run(&self, axis: AxisId) -> Option<FreeRun> {

@@ -20,6 +20,7 @@ use plant::hub_motor::{self, HubMotor, HubMotorModel, Inverter};
 use plant::mechanics::RotorData;
 use plant::pmsm::Phase;
 use plant::rig::{Rig, RigModel};
+use plant::shaft::Motion;
 use plant::supply::SupplyData;
 
 use super::Machine;
@@ -364,6 +365,14 @@ impl Assembly for ServoBench {
 
     fn attach(&mut self, axis: AxisId, what: Attachment) {
         self.at_mut(axis).attach(what);
+    }
+
+    fn couple(&mut self, axis: AxisId) {
+        self.at_mut(axis).couple();
+    }
+
+    fn follow(&mut self, axis: AxisId, motion: &Motion) {
+        self.at_mut(axis).follow(motion);
     }
 
     fn free_run(&self, axis: AxisId) -> Option<FreeRun> {

@@ -22,6 +22,7 @@ use plant::hub_motor::{self, HubMotor, HubMotorModel, Inverter};
 use plant::mechanics::RotorData;
 use plant::pmsm::Phase;
 use plant::rig::{Rig, RigModel};
+use plant::shaft::Motion;
 use plant::supply::SupplyData;
 
 use super::Machine;
@@ -225,6 +226,14 @@ impl Assembly for HubWheel {
 
     fn attach(&mut self, _axis: AxisId, what: Attachment) {
         self.motor.attach(what);
+    }
+
+    fn couple(&mut self, _axis: AxisId) {
+        self.motor.couple();
+    }
+
+    fn follow(&mut self, _axis: AxisId, motion: &Motion) {
+        self.motor.follow(motion);
     }
 
     fn free_run(&self, _axis: AxisId) -> Option<FreeRun> {

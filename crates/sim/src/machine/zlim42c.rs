@@ -19,6 +19,7 @@ use plant::angle::Angle;
 use plant::attachment::Attachment;
 use plant::mechanics::RotorData;
 use plant::rig::{Rig, RigModel};
+use plant::shaft::Motion;
 use plant::stepper::{Bridges, Phase};
 use plant::stepper_motor::{StepperMotor, StepperMotorModel};
 use plant::supply::SupplyData;
@@ -280,6 +281,14 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
 
     fn attach(&mut self, _axis: AxisId, what: Attachment) {
         self.motor.attach(what);
+    }
+
+    fn couple(&mut self, _axis: AxisId) {
+        self.motor.couple();
+    }
+
+    fn follow(&mut self, _axis: AxisId, motion: &Motion) {
+        self.motor.follow(motion);
     }
 
     fn free_run(&self, _axis: AxisId) -> Option<FreeRun> {

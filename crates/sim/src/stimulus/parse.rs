@@ -4,6 +4,7 @@ use std::str::FromStr;
 
 use canopen::Mux;
 
+use super::body;
 use super::bus_fault::{self, BusFault};
 use super::error::StimulusError;
 use super::kinds::{Component, ObjectValue, Power, PulseTrain, Source, Stimulus, TemperatureSensor};
@@ -89,6 +90,11 @@ pub const FORMS: &[&str] = &[
     bus_fault::CORRUPT,
     SET,
     GET,
+    body::FORMS[0],
+    body::FORMS[1],
+    body::FORMS[2],
+    body::FORMS[3],
+    body::FORMS[4],
     bus_fault::WIRE,
     "now",
     "help",

@@ -19,6 +19,7 @@ impl World {
         operate: impl FnOnce(&mut dyn VirtualDrive, Instant) -> T,
     ) -> Result<T, WorldError> {
         let id = self.drive_id(number).ok_or(WorldError::NoSuchDrive(number))?;
+        self.settle(id.0);
         let Member::Drive { drive, .. } = &mut self.members[id.0] else {
             return Err(WorldError::NoSuchDrive(number));
         };
@@ -114,6 +115,7 @@ impl World {
     /// The number of the drive that answers to a Modbus unit identifier; `None` if none does, or if two would at once
     /// and garble each other's answers.
     pub fn modbus_drive(&mut self, unit: u8) -> Option<u8> {
+        self.settle_all();
         let mut answering = self.members.iter_mut().filter_map(|member| match member {
             Member::Drive { number, drive } => {
                 drive.advance(self.now);
@@ -208,8 +210,9 @@ impl World {
         self.recorder.take()
     }
 
-    /// Hash over all frames with their times and over the present shaft angles.
+    /// Hash over all frames with their times, over the present shaft angles and over where machines are that drives move together.
     pub fn digest(&mut self) -> Digest {
+        self.settle_all();
         let mut digest = self.digest;
         digest.bytes(&self.now.as_nanos().to_le_bytes());
         for member in &mut self.members {
@@ -217,6 +220,9 @@ impl World {
                 drive.advance(self.now);
                 digest.bytes(&drive.report().shaft_angle_rad.to_bits().to_le_bytes());
             }
+        }
+        for bits in self.body_bits() {
+            digest.bytes(&bits.to_le_bytes());
         }
         digest
     }

@@ -2,8 +2,8 @@
 
 use can::Instant;
 
-use super::World;
 use super::member::Member;
+use super::{StationId, World};
 use crate::Report;
 use crate::stimulus::Place;
 use crate::wire::{Delivered, Role};
@@ -60,6 +60,9 @@ impl World {
     /// What can be measured at an axis of a drive, now; `None` without such a drive. Unlike [`report`](Self::report) it does not
     /// touch the drive: the run stays the same run.
     pub fn measure(&mut self, place: Place) -> Option<Report> {
+        if let Some(StationId(i)) = self.drive_id(place.node) {
+            self.settle(i);
+        }
         let now = self.now;
         self.members.iter_mut().find_map(|member| match member {
             Member::Drive { number, drive } if *number == place.node => {
@@ -73,7 +76,11 @@ impl World {
     fn deliver(&mut self, passed: &Delivered) {
         self.digest.frame(&passed.frame, passed.end);
         for i in 0..self.members.len() {
-            match self.bus.conclude(i, passed) {
+            let role = self.bus.conclude(i, passed);
+            if role != Role::Nothing {
+                self.settle(i);
+            }
+            match role {
                 Role::Transmitted(frame) => self.members[i].station().handle_transmitted(&frame, self.now),
                 Role::Received if self.members[i].station().ignores(&passed.frame) => continue,
                 Role::Received => self.members[i].station().handle_frame(&passed.frame, self.now),
@@ -86,6 +93,7 @@ impl World {
 
     fn time_out(&mut self) {
         while let Some((_, i)) = self.due.first().filter(|(at, _)| *at <= self.now) {
+            self.settle(i);
             self.members[i].station().handle_timeout(self.now);
             self.serve(i);
             self.look_at(i);

@@ -1,0 +1,90 @@
+//! Why somebody at a machine is refused.
+
+use canopen::Mux;
+
+/// Why a drive did not take what it was told to.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Refused {
+    /// The model has no such part.
+    #[error("a {model} has no {what}")]
+    Absent {
+        /// The drive's model.
+        model: &'static str,
+        /// What it does not have.
+        what: &'static str,
+    },
+    /// The model has no input of this name.
+    #[error("a {model} has no input {name:?}; it has {present}")]
+    NoSuchInput {
+        /// The drive's model.
+        model: &'static str,
+        /// The name given.
+        name: String,
+        /// The names there are, or `none`.
+        present: String,
+    },
+    /// The model has no such axis.
+    #[error("a {model} has no axis {axis}; it has {axes}")]
+    NoSuchAxis {
+        /// The drive's model.
+        model: &'static str,
+        /// The axis asked for, counted from 1.
+        axis: u16,
+        /// How many there are.
+        axes: u8,
+    },
+    /// The objects are the firmware's.
+    #[error("a {model} sets its objects by itself; write {object} over the bus, as its host does")]
+    OwnObjects {
+        /// The drive's model.
+        model: &'static str,
+        /// The object.
+        object: Mux,
+    },
+    /// The object does not take the value.
+    #[error("object {object} does not take it: {reason}")]
+    BadObject {
+        /// The object.
+        object: Mux,
+        /// Why, and what it would take.
+        reason: String,
+    },
+    /// The value makes no sense for this machine.
+    #[error("{what} must be {expected}, not {value}")]
+    OutOfRange {
+        /// The quantity.
+        what: &'static str,
+        /// What would have been taken.
+        expected: &'static str,
+        /// What was given.
+        value: f64,
+    },
+    /// A machine that several drives move has nothing of this kind.
+    #[error("at the body {name:?} there is no such thing to change; there is {takes}")]
+    NotOfBody {
+        /// The machine's name.
+        name: String,
+        /// What can be changed at it.
+        takes: &'static str,
+    },
+    /// Spring and stops stand where the load is, which another gear would change.
+    #[error("spring and stops stand where the load is; take them off before the gear is changed")]
+    Placed,
+    /// A gear of its own between motor and machine.
+    #[error("its load hangs on a gear; 'load gear off' before it is coupled, and give the turns of the coupling")]
+    GearInTheWay,
+    /// The shaft stands beyond the stops.
+    #[error("the shaft stands at {position}, beyond these stops; give positions on both sides of it, min or max")]
+    BeyondStops {
+        /// Actual position in the drive's counts.
+        position: i64,
+    },
+    /// The image does not come from this model's memory.
+    #[error("not a memory image of a {model}: {reason}")]
+    BadImage {
+        /// The drive's model.
+        model: &'static str,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
+}
