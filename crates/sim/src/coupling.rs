@@ -21,7 +21,7 @@ pub enum Coupling {
     /// Two to seven motors on one shaft.
     CommonShaft(CommonShaftModel),
     /// One to seven joints, the base first.
-    Arm(ArmModel),
+    Arm(Box<ArmModel>),
 }
 
 /// A drive of a machine.
@@ -190,7 +190,7 @@ impl Coupling {
             }
             Self::Arm(model) => {
                 check_arm(model)?;
-                Ok(Body::Arm(*model, model.at_rest()))
+                Ok(Body::Arm(**model, model.at_rest()))
             }
         }
     }

@@ -30,7 +30,7 @@ const BASE: DifferentialDriveModel = DifferentialDriveModel {
 
 fn world(nodes: &[u8]) -> (World, StationId) {
     let mut world = World::new(Bitrate::K500, 1);
-    let host = world.add_tap();
+    let host = world.add_probe();
     for node in nodes {
         world.add_drive(*node, Box::new(zlac8030l(*node, 1))).unwrap();
     }
@@ -248,14 +248,14 @@ fn link(length_m: f64, mass_kg: f64, offset_m: f64) -> Link {
 #[test]
 fn an_arm_of_three_joints_is_held_by_its_drives_and_carries_a_payload() {
     let mut world = World::new(Bitrate::K500, 1);
-    let host = world.add_tap();
+    let host = world.add_probe();
     for (node, model) in [(1, "m8025e25b80"), (2, "m8025e25b50"), (3, "m4230e17b50")] {
         world.add_drive(node, Box::new(mjoint(Model::named(model).unwrap(), node, Bitrate::K500))).unwrap();
     }
     let mut model = ArmModel::new(&[link(0.3, 2.0, 0.0), link(0.3, 1.5, 0.3), link(0.2, 0.5, 0.3)]).unwrap();
     model.tool_m = [0.2, 0.0, 0.0];
     let shafts = [1, 2, 3].map(|node| CoupledShaft::direct(Place::node(node)));
-    world.couple("arm", &Coupling::Arm(model), &shafts).unwrap();
+    world.couple("arm", &Coupling::Arm(Box::new(model)), &shafts).unwrap();
     world.run_for(Duration::from_secs(1));
     let joints = |world: &mut World| match world.body("arm").unwrap().kind {
         BodyKind::Arm { joints_deg, tool_m, .. } => (joints_deg, tool_m),

@@ -15,7 +15,7 @@ const COUNTS_PER_TURN: f64 = 4096.0;
 /// A wheel, a stepper and a joint, none of them enabled.
 fn world() -> World {
     let mut world = World::new(Bitrate::K500, 1);
-    world.add_tap();
+    world.add_probe();
     world.add_drive(4, Box::new(zlac8030l(4, 1))).unwrap();
     world.add_drive(2, Box::new(zlim42c(2, 1))).unwrap();
     world.add_drive(1, Box::new(mjoint(Model::named("m4230e17b50").unwrap(), 1, Bitrate::K500))).unwrap();
@@ -64,7 +64,7 @@ fn a_load_on_a_free_shaft_says_where_it_will_end_and_it_ends_there() {
 fn every_machine_coasts_down_by_the_friction_of_its_motor() {
     for model in sim::machine::models() {
         let mut world = World::new(Bitrate::K500, 1);
-        world.add_tap();
+        world.add_probe();
         let node = NodeId::new(5).unwrap();
         world.add_drive(5, order(model, &Order::new(model, node, Bitrate::K500)).unwrap()).unwrap();
         world.run_for(Duration::from_millis(100));

@@ -8,6 +8,8 @@
 //! (J. Luh, M. Walker, R. Paul, 1980), both in the frame of the base. A step takes them at the pose in its middle. Links and
 //! gears are stiff: what an elastic reducer adds to a joint of its own is left out here.
 
+#![expect(clippy::needless_range_loop, reason = "the indices are those of the equations")]
+
 use super::friction::{MOST, System};
 use super::vector::{NO_TURN, Rotation, Vector, add, cross, dot, scaled, sub, through_inertia, turned, turned_about};
 use crate::attachment::GRAVITY_M_S2;

@@ -14,6 +14,8 @@
 //! Assumed: the centre of mass is above the axle, casters have no friction, wheels do not slip sideways, and the weight does not
 //! shift to the lower wheel.
 
+#![expect(clippy::needless_range_loop, reason = "the indices are those of the equations")]
+
 use super::friction::{MOST, System};
 use crate::attachment::GRAVITY_M_S2;
 use crate::shaft::{Motion, Push};
