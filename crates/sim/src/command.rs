@@ -130,6 +130,7 @@ impl CommandError {
             Self::TooLong => "too_long",
             Self::Unknown(_) | Self::BadNode(_) | Self::NoAction(_) | Self::Stimulus(_) => "usage",
             Self::NoSuchDrive { .. } => "no_such_node",
+            Self::NoSuchBody { .. } => "no_such_body",
             Self::Refused(_) => "refused",
         }
     }
