@@ -1,10 +1,7 @@
-//! Homing as the drives' tables tell it: the moves of one run, and a track of switches on which they can be tried.
+//! Homing as the drives' tables tell it: the moves of one run, and the edge that becomes the origin.
 //!
 //! A move is a direction, a speed and what ends it. Speeds are names (`6099:01`, `origin`), since the tables say which
-//! of the drive's speeds is used, not how fast that is. The track has no dynamics: one count a step, and an overrun
-//! after each move that stands for slowing down.
-
-use std::ops::RangeInclusive;
+//! of the drive's speeds is used, not how fast that is. That each run is possible is asked of the running drives.
 
 use crate::csv::Row;
 
@@ -30,7 +27,7 @@ pub struct Move {
     pub direction: i32,
     /// Which of the drive's homing speeds.
     pub speed: String,
-    /// What ends it: `home_on`, `home_off`, `home_off_back_off`, `never`, or something outside the track.
+    /// What ends it: `home_on`, `home_off`, `home_off_back_off`, `never`, or something from outside.
     pub until: String,
 }
 
@@ -45,37 +42,6 @@ pub struct Latch {
     pub direction: i32,
 }
 
-/// The switches along the axis, each active over a range of positions.
-pub type Track = Vec<(&'static str, RangeInclusive<i32>)>;
-
-/// Further than any track of the tests is long.
-const FAR: i32 = 10_000;
-
-/// How far a motor goes on while it slows down.
-const OVERRUN: i32 = 10;
-
-/// How far a motor leaves a switch that it has to meet again.
-const BACK_OFF: i32 = 30;
-
-impl Latch {
-    /// Where on the track it is: the first position at which the switch has changed.
-    ///
-    /// # Panics
-    ///
-    /// When the track has no such switch.
-    #[must_use]
-    pub fn place(&self, track: &Track) -> i32 {
-        let found = track.iter().find(|(name, _)| *name == self.switch);
-        let (_, range) = found.unwrap_or_else(|| panic!("no {} on the track", self.switch));
-        match (self.rising, self.direction > 0) {
-            (true, true) => *range.start(),
-            (true, false) => *range.end(),
-            (false, true) => *range.end() + 1,
-            (false, false) => *range.start() - 1,
-        }
-    }
-}
-
 /// Reads a row.
 pub(crate) fn homing(row: Row<'_>) -> HomingRow {
     HomingRow {
@@ -84,56 +50,6 @@ pub(crate) fn homing(row: Row<'_>) -> HomingRow {
         moves: row.get("moves").split(" | ").filter(|text| !text.is_empty()).map(one_move).collect(),
         latch: Some(row.get("latch")).filter(|text| !text.is_empty()).map(latch),
         result: row.get("result").to_owned(),
-    }
-}
-
-/// Whether `switch` is active at `position`.
-#[must_use]
-pub fn is_on(track: &Track, switch: &str, position: i32) -> bool {
-    track.iter().any(|(name, range)| *name == switch && range.contains(&position))
-}
-
-/// Makes the moves of `row` from `start`. Gives the position where the last of them ended, before the overrun, or
-/// `None` when a move found no end on the track.
-///
-/// # Panics
-///
-/// When `must_not_meet` gives a switch for the direction of a move and the move meets that switch without ending there.
-#[must_use]
-pub fn run(
-    row: &HomingRow,
-    track: &Track,
-    start: i32,
-    must_not_meet: impl Fn(i32) -> Option<&'static str>,
-) -> Option<i32> {
-    let (mut position, mut ended) = (start, None);
-    for step in &row.moves {
-        let mut steps = 0;
-        while !ends(&step.until, track, position) {
-            if let Some(limit) = must_not_meet(step.direction) {
-                assert!(!is_on(track, limit, position), "{row:?} meets {limit} at {position}");
-            }
-            position += step.direction;
-            steps += 1;
-            if steps > FAR {
-                return None;
-            }
-        }
-        if step.until.ends_with("_back_off") {
-            position += step.direction * BACK_OFF;
-        }
-        ended = Some(position);
-        position += step.direction * OVERRUN;
-    }
-    ended
-}
-
-fn ends(until: &str, track: &Track, position: i32) -> bool {
-    let until = until.trim_end_matches("_back_off");
-    match (until.strip_suffix("_on"), until.strip_suffix("_off")) {
-        (Some(switch), _) => is_on(track, switch, position),
-        (_, Some(switch)) => !is_on(track, switch, position),
-        (None, None) => false,
     }
 }
 

@@ -2,8 +2,8 @@
 //!
 //! `FERRODRIVE_SEED=123 cargo test -p ferrodrive-tests` tries other input; a failure prints the seed that it needs.
 
-/// How many inputs a property test tries.
-const RUNS: u64 = 20_000;
+/// How many inputs a property test tries, unless its law takes long.
+pub const RUNS: u64 = 20_000;
 
 /// A small generator (SplitMix64). Not for secrets.
 #[derive(Debug, Clone)]
@@ -57,13 +57,8 @@ impl Seeded {
     }
 }
 
-/// Calls `law` with input from as many seeds as there are runs, half of it random and half damaged samples.
-pub fn check(samples: &[&[u8]], law: impl Fn(&[u8]) + std::panic::RefUnwindSafe) {
-    check_some(RUNS, samples, law);
-}
-
-/// [`check`] with fewer runs, for a law that takes long.
-pub fn check_some(runs: u64, samples: &[&[u8]], law: impl Fn(&[u8]) + std::panic::RefUnwindSafe) {
+/// Calls `law` with input from as many seeds as there are `runs`, half of it random and half damaged samples.
+pub fn check(runs: u64, samples: &[&[u8]], law: impl Fn(&[u8]) + std::panic::RefUnwindSafe) {
     let first = std::env::var("FERRODRIVE_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(1);
     for seed in first..first + runs {
         let mut seeded = Seeded::new(seed);

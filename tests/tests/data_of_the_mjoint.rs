@@ -2,8 +2,7 @@
 
 use std::collections::HashSet;
 
-use ferrodrive_tests::homing::{Track, run};
-use ferrodrive_tests::mjoint::{HomingStatus, datagrams, figures, homing_runs, objects, situations};
+use ferrodrive_tests::mjoint::{datagrams, figures, objects, situations};
 
 #[test]
 fn the_modbus_registers_lie_side_by_side_without_a_gap() {
@@ -102,27 +101,6 @@ fn the_statusword_mirrors_the_controlword_and_gives_all_five_printed_values() {
 }
 
 #[test]
-fn each_homing_run_is_possible_and_latches_the_edge_of_its_method() {
-    let runs = homing_runs();
-    for method in 17..=22 {
-        assert_eq!(runs.iter().filter(|it| it.row.method == method && it.row.result == "attained").count(), 2);
-    }
-    for HomingStatus { row, running, after } in runs {
-        assert_eq!(running, 0x0014, "{row:?}");
-        let Some((track, start)) = place(row.method, &row.start) else { continue };
-        let end = run(&row, &track, start, |_| None);
-        match row.result.as_str() {
-            "attained" => assert_eq!((end, after), (Some(latched_at(row.method)), 0x1414), "{row:?}"),
-            _ => assert_eq!((end, after), (None, 0x0014), "{row:?}"),
-        }
-        if let (Some(last), Some(latch)) = (row.moves.last(), &row.latch) {
-            assert_eq!(last.until, format!("{}_{}", latch.switch, if latch.rising { "on" } else { "off" }));
-            assert_eq!(last.direction, latch.direction);
-        }
-    }
-}
-
-#[test]
 fn the_models_agree_with_their_own_figures() {
     let figures = figures();
     let value = |group: &str, parameter: &str| {
@@ -137,35 +115,5 @@ fn the_models_agree_with_their_own_figures() {
         assert!(rated[model] < greatest[model]);
         let efficiency = value("reducer", "Output rated torque")[model] / (torque[model] * ratio[model]);
         assert!((0.5..=1.0).contains(&efficiency), "the reducer cannot add power: {efficiency}");
-    }
-}
-
-/// The track of a method and a start on it; `None` for runs that are ended from outside.
-fn place(method: u8, start: &str) -> Option<(Track, i32)> {
-    let (name, range) = match method {
-        17 => ("dir", -2000..=-1000),
-        18 => ("pu", 1000..=2000),
-        19 | 20 => ("dir", 0..=2000),
-        _ => ("dir", -2000..=0),
-    };
-    let towards = if matches!(method, 18..=20) { 1 } else { -1 };
-    let position = match start {
-        "off_switch" => towards * -500,
-        "on_switch" => towards * 1500,
-        "beyond_switch" => towards * 2500,
-        _ => return None,
-    };
-    Some((vec![(name, range)], position))
-}
-
-/// Where the origin lies on that track: the first position beyond the edge.
-fn latched_at(method: u8) -> i32 {
-    match method {
-        17 => -999,
-        18 => 999,
-        19 => -1,
-        20 | 22 => 0,
-        21 => 1,
-        _ => panic!("no method {method}"),
     }
 }

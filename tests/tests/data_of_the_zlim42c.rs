@@ -2,7 +2,6 @@
 
 use std::collections::HashSet;
 
-use ferrodrive_tests::homing::{HomingRow, Track, run};
 use ferrodrive_tests::zlim42c::{
     HomingResult, datagrams, fault_code, figure, figures, homing_runs, homing_runs_by_prose, objects, power_states,
 };
@@ -39,35 +38,6 @@ fn the_motor_is_energised_from_switched_on() {
     for it in &cells {
         let energised = ["switched_on", "operation_enabled", "quick_stop_active"];
         assert_eq!(it.bit_13_after, energised.contains(&it.cell.state_after.as_str()), "{it:?}");
-    }
-}
-
-#[test]
-fn each_homing_run_is_possible_and_latches_the_edge_of_its_method() {
-    let by_label = homing_runs().into_iter().map(|run| (run, fatal_limit as FatalLimit));
-    let by_prose = homing_runs_by_prose().into_iter().map(|run| (run, fatal_limit_by_prose as FatalLimit));
-    for (HomingResult { row, bit_8, bit_10, bit_14 }, fatal_limit) in by_label.chain(by_prose) {
-        let expected = match row.result.as_str() {
-            "attained" => (true, true, false),
-            "running" => (false, false, true),
-            _ => (false, true, false),
-        };
-        assert_eq!((bit_8, bit_10, bit_14), expected, "{row:?}");
-        let Some((track, start)) = place(&row) else { continue };
-        let end = run(&row, &track, start, |direction| fatal_limit(row.method, direction));
-        match row.result.as_str() {
-            "attained" => {
-                let latch = row.latch.as_ref().expect("an attained run has its edge");
-                assert_eq!(end, Some(latch.place(&track)), "{row:?}");
-            }
-            "running" => assert_eq!(end, None, "{row:?}"),
-            "failed" => {
-                let last = row.moves.last().expect("a run that fails on the way has a way");
-                assert!(fatal_limit(row.method, last.direction).is_some_and(|it| last.until == format!("{it}_on")));
-                assert!(end.is_some(), "{row:?}");
-            }
-            other => panic!("{other} ends from outside"),
-        }
     }
 }
 
@@ -125,47 +95,4 @@ fn the_address_switches_are_inverted_binary_and_the_fault_codes_one_hot() {
     }
     let codes: HashSet<_> = figures.iter().filter(|it| it.table == "fault").map(fault_code).collect();
     assert_eq!(codes, HashSet::from([0xFF01, 0xFF02, 0xFF04, 0xFF08, 0xFF10]));
-}
-
-/// A track and a start; `None` for runs that are ended from outside or never begin.
-fn place(row: &HomingRow) -> Option<(Track, i32)> {
-    let usual = || vec![("negative_limit", -2000..=-1000), ("home", -100..=100), ("positive_limit", 1000..=2000)];
-    let without_home = || vec![("negative_limit", -2000..=-1000), ("positive_limit", 1000..=2000)];
-    let everywhere = -5000..=5000;
-    Some(match row.start.as_str() {
-        "below_home" => (usual(), -500),
-        "between" | "above_home" if row.method != 0 => (usual(), 500),
-        "on_home" => (usual(), 0),
-        "on_negative_limit" => (usual(), -1500),
-        "on_positive_limit" => (usual(), 1500),
-        "beyond_negative_limit" => (usual(), -2500),
-        "beyond_positive_limit" => (usual(), 2500),
-        "both_limits_on" => (vec![("negative_limit", everywhere.clone()), ("positive_limit", everywhere)], 0),
-        "above_home_without_home_switch" => (without_home(), 500),
-        "below_home_without_home_switch" => (without_home(), -500),
-        "home_on_at_negative_limit" => (vec![("negative_limit", -2000..=-1000), ("home", -1500..=-900)], -950),
-        "no_input_configured" => (Vec::new(), 0),
-        _ => return None,
-    })
-}
-
-/// The limit that ends homing at once when it is met in `direction` (5.3.6).
-type FatalLimit = fn(u8, i32) -> Option<&'static str>;
-
-/// With the directions of the labels.
-fn fatal_limit(method: u8, direction: i32) -> Option<&'static str> {
-    match (method, direction) {
-        (17 | 29, 1) => Some("positive_limit"),
-        (18 | 24, -1) => Some("negative_limit"),
-        _ => None,
-    }
-}
-
-/// With those of the paragraphs: the other limit for each.
-fn fatal_limit_by_prose(method: u8, direction: i32) -> Option<&'static str> {
-    match (method, direction) {
-        (17 | 29, -1) => Some("negative_limit"),
-        (18 | 24, 1) => Some("positive_limit"),
-        _ => None,
-    }
 }

@@ -1,10 +1,11 @@
 //! Memory images that no drive of this kind has written, at power-on.
 
 use can::{Bitrate, CanId, Frame, Instant};
-use canopen::od::{Slot, Table};
 use canopen::sdo::wire::Reply;
 use drives::engine::storage::{BANK_SIZE, IMAGE_SIZE, StoredImage};
-use drives::{Firmware, mjoint, zlac8030l, zlim42c};
+use drives::{mjoint, zlac8030l, zlim42c};
+
+use super::firmware::Subject;
 
 /// A selector (the drive in its low digits, what the image is above), then bytes for the damage.
 pub(super) const SAMPLES: &[&[u8]] = &[
@@ -92,12 +93,6 @@ fn bank(records: &[u8]) -> [u8; BANK_SIZE] {
     bank
 }
 
-trait Subject: Firmware<Sensors: Default> {
-    fn table() -> &'static Table;
-    fn value(&self, slot: Slot) -> i64;
-    fn is_off(actuation: &Self::Actuation) -> bool;
-}
-
 fn boots<F: Subject>(mut firmware: F, hardware: &F::Hardware) {
     let mut now = Instant::ZERO;
     firmware.power_on(hardware, now);
@@ -134,49 +129,4 @@ fn answers<F: Subject>(firmware: &mut F, mut now: Instant) {
         firmware.handle_timeout(now);
     }
     panic!("node {node} does not answer");
-}
-
-impl Subject for zlac8030l::Zlac8030l {
-    fn table() -> &'static Table {
-        &zlac8030l::objects::TABLE
-    }
-
-    fn value(&self, slot: Slot) -> i64 {
-        self.values().value(slot)
-    }
-
-    /// A shorted motor is what 202F:01 asks for without being enabled.
-    fn is_off(actuation: &Self::Actuation) -> bool {
-        !matches!(actuation.power_stage, zlac8030l::hardware::PowerStage::Modulate { .. })
-    }
-}
-
-impl Subject for zlim42c::Zlim42c {
-    fn table() -> &'static Table {
-        &zlim42c::objects::TABLE
-    }
-
-    fn value(&self, slot: Slot) -> i64 {
-        self.values().value(slot)
-    }
-
-    /// 200Fh locks the shaft at power-on.
-    fn is_off(_: &Self::Actuation) -> bool {
-        true
-    }
-}
-
-impl Subject for mjoint::MJoint {
-    fn table() -> &'static Table {
-        &mjoint::objects::TABLE
-    }
-
-    fn value(&self, slot: Slot) -> i64 {
-        self.values().value(slot)
-    }
-
-    /// Pulse mode enables by itself.
-    fn is_off(_: &Self::Actuation) -> bool {
-        true
-    }
 }

@@ -3,17 +3,17 @@
 //!
 //! Each law is a function of bytes that panics when it is broken. [`ALL`] names them with samples to damage.
 
+mod any_frames;
 mod eds;
 mod eeprom;
+mod firmware;
 mod frame;
 mod master_core;
-mod mjoint;
 mod modbus;
 mod node;
 mod selected_frame;
 mod stream;
 mod world_command;
-mod zl;
 
 /// A law, the name that a fuzz target has for it, and valid inputs to start from.
 #[derive(Debug, Clone, Copy)]
@@ -36,9 +36,9 @@ pub const ALL: &[Law] = &[
     Law { name: "sdo_wire", holds: node::sdo_wire, samples: node::SDO_WIRE_SAMPLES },
     Law { name: "node", holds: node::node, samples: node::NODE_SAMPLES },
     Law { name: "modbus", holds: modbus::modbus, samples: modbus::SAMPLES },
-    Law { name: "mjoint", holds: mjoint::joint, samples: mjoint::SAMPLES },
-    Law { name: "zlac8030l", holds: zl::zlac8030l, samples: zl::ZLAC8030L_SAMPLES },
-    Law { name: "zlim42c", holds: zl::zlim42c, samples: zl::ZLIM42C_SAMPLES },
+    Law { name: "mjoint", holds: any_frames::mjoint, samples: any_frames::MJOINT_SAMPLES },
+    Law { name: "zlac8030l", holds: any_frames::zlac8030l, samples: any_frames::ZLAC8030L_SAMPLES },
+    Law { name: "zlim42c", holds: any_frames::zlim42c, samples: any_frames::ZLIM42C_SAMPLES },
     Law { name: "eds", holds: eds::eds, samples: eds::SAMPLES },
     Law { name: "eeprom", holds: eeprom::eeprom, samples: eeprom::SAMPLES },
     Law { name: "world_command", holds: world_command::world_command, samples: world_command::SAMPLES },

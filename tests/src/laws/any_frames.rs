@@ -1,11 +1,11 @@
-//! The firmwares of the two ZLTECH drives under frames, sensors and gaps in time that nobody sane would give them.
+//! The firmwares under frames, sensors and gaps in time that nobody sane would give them.
 
 use can::{CanId, Frame, Instant};
 use canopen::AbortCode;
-use canopen::od::{Slot, Table};
 use canopen::sdo::wire::Reply;
-use drives::{Firmware, zlac8030l, zlim42c};
+use drives::{mjoint, zlac8030l, zlim42c};
 
+use super::firmware::Subject;
 use super::selected_frame::selected_frame;
 
 /// A chunk is a selector, a length and eight bytes, see [`selected_frame`], one byte for how long it lasts, see [`wait`],
@@ -27,49 +27,50 @@ pub(super) const ZLIM42C_SAMPLES: &[&[u8]] = &[
     b"\0\x08\x2F\x60\x60\0\x06\0\0\0\x20\0\0\0\x08\x2F\x98\x60\0\x11\0\0\0\x20\0\0\0\x08\x2B\x40\x60\0\x1F\0\0\0\xF8\x01\0\0\x08\x2B\x11\x20\0\x01\0\0\0\x10\0\x04",
 ];
 
+/// The same for a joint.
+pub(super) const MJOINT_SAMPLES: &[&[u8]] = &[
+    // 0Fh, mode 3 and 600 r/min by SDO.
+    b"\0\x06\x2B\x40\x60\0\x0F\0\0\0\x10\x10\x40\0\x05\x2F\x60\x60\0\x03\0\0\0\x10\x10\x40\0\x08\x23\xFF\x60\0\x58\x02\0\0\x10\x10\x40",
+    // RPDO1: a move; RPDO4 and SYNC.
+    b"\x01\x07\x2F\0\x01\x50\xC3\0\0\0\x20\x20\x33\x04\x04\x50\xC3\0\0\0\0\0\0\x20\x20\x33\x05\0\0\0\0\0\0\0\0\0\x20\x20\x33",
+    // Homing, the zero-setting sequence, a save.
+    b"\0\x05\x2F\x60\x60\0\x06\0\0\0\x08\x08\x01\0\x06\x2B\x0A\x26\0\x66\xEA\0\0\x08\x08\x01\0\x06\x2B\x0A\x26\0\x70\xEA\0\0\x08\x08\x01\0\x06\x2B\x14\x26\0\x01\0\0\0\x08\x08\x01",
+    // The host's heartbeat, a reset by NMT, the DIR clock.
+    b"\x06\x01\x05\0\0\0\0\0\0\0\x08\x08\x01\x07\x02\x81\x01\0\0\0\0\0\0\x08\x08\x01\0\x06\x2B\x1C\x26\0\xFF\0\0\0\xF8\xF8\x01",
+];
+
 const CHUNK: usize = 13;
 
-/// Both are node 1 by their switches, so that no write can take them out of hearing.
+/// Each is node 1, those with switches by them, so that no write can take them out of hearing.
 const NODE: u8 = 1;
-
-/// What a selector picks: SDO, NMT, SYNC, the four RPDOs, a heartbeat.
-const IDS: [u16; 8] = [0x601, 0x000, 0x080, 0x201, 0x301, 0x401, 0x501, 0x701];
 
 /// Any frames, sensor values and gaps leave a ZLAC8030L lawful: see [`drive`].
 pub(super) fn zlac8030l(data: &[u8]) {
-    let mut firmware = zlac8030l::Zlac8030l::new();
     let hardware = zlac8030l::hardware::Hardware { dip_address: NODE, ..Default::default() };
-    firmware.power_on(&hardware, Instant::ZERO);
-    drive(data, firmware);
+    drive(data, zlac8030l::Zlac8030l::new(), &hardware);
 }
 
-/// Any frames, sensor values and gaps leave a ZLIM42-C lawful: see [`drive`].
+/// The same for a ZLIM42-C.
 pub(super) fn zlim42c(data: &[u8]) {
-    let mut firmware = zlim42c::Zlim42c::new();
     let hardware = zlim42c::hardware::Hardware { dip_address: NODE, ..Default::default() };
-    firmware.power_on(&hardware, Instant::ZERO);
-    drive(data, firmware);
+    drive(data, zlim42c::Zlim42c::new(), &hardware);
 }
 
-/// What differs between the two.
-trait Subject: Firmware {
-    fn table() -> &'static Table;
-    fn value(&self, slot: Slot) -> i64;
-    /// What the sensors read: each bit spoils something.
-    fn sensors(place: u8, bits: u8) -> Self::Sensors;
-    /// The power stage does nothing that hardware cannot do.
-    fn is_possible(actuation: &Self::Actuation) -> bool;
+/// The same for a joint.
+pub(super) fn mjoint(data: &[u8]) {
+    drive(data, mjoint::MJoint::new(&mjoint::Model::M4230E17B50), &mjoint::Hardware::default());
 }
 
 /// Every SDO request gets at most one well-formed answer, every writable object lies within its limits, read-only
 /// communication objects do not change, what the drive tells of itself is finite, and the duty cycles are shares.
-fn drive<F: Subject>(data: &[u8], mut firmware: F) {
+fn drive<F: Subject>(data: &[u8], mut firmware: F, hardware: &F::Hardware) {
     let mut now = Instant::ZERO;
+    firmware.power_on(hardware, now);
     let first = fixed(&firmware);
     let (mut asked, mut answered) = (0, 0);
     for chunk in data.chunks(CHUNK) {
-        let frame = selected_frame(chunk, &IDS);
-        asked += usize::from(frame.id() == CanId::standard(IDS[0]) && !frame.is_remote());
+        let frame = selected_frame(chunk, &F::IDS);
+        asked += usize::from(frame.id() == CanId::standard(F::IDS[0]) && !frame.is_remote());
         firmware.handle_frame(&frame, now);
         answered += drain(&mut firmware, &frame);
         let byte = |at: usize| chunk.get(at).copied().unwrap_or(0);
@@ -123,7 +124,8 @@ fn fixed<F: Subject>(firmware: &F) -> Vec<i64> {
 }
 
 fn judge<F: Subject>(firmware: &F, first: &[i64], frame: &Frame) {
-    for (slot, row) in F::table().iter().filter(|(_, row)| row.access.is_writable()) {
+    let ruled = |index| !F::OWN_RULE.contains(&index);
+    for (slot, row) in F::table().iter().filter(|(_, row)| row.access.is_writable() && ruled(row.index)) {
         let value = firmware.value(slot);
         let fits = match row.resolution.map(|object| F::table().find(object).expect("a row's resolution is an object"))
         {
@@ -133,69 +135,8 @@ fn judge<F: Subject>(firmware: &F, first: &[i64], frame: &Frame) {
         };
         assert_eq!(fits, Ok(()), "{frame} put {value} into {}", row.mux());
     }
+    assert!(firmware.keeps_its_own_rules(), "after {frame}");
     assert_eq!(fixed(firmware), first, "{frame} changed what is fixed");
     let report = firmware.report(devices::AxisId::FIRST);
     assert!(report.velocity_rpm.is_finite() && report.current_a.is_finite(), "{frame}: {report:?}");
-}
-
-impl Subject for zlac8030l::Zlac8030l {
-    fn table() -> &'static Table {
-        &zlac8030l::objects::TABLE
-    }
-
-    fn value(&self, slot: Slot) -> i64 {
-        self.values().value(slot)
-    }
-
-    fn sensors(place: u8, bits: u8) -> zlac8030l::hardware::Sensors {
-        let has = |bit: u8| bits & 1 << bit != 0;
-        zlac8030l::hardware::Sensors {
-            encoder_count: u16::from(place) * 257,
-            encoder_wired: !has(0),
-            hall: if has(1) { place } else { 5 },
-            phase_current_a: if has(2) { [f32::from(place) * 1e3, -1e6] } else { [0.5, 0.25] },
-            bus_v: if has(3) { f32::from(place) } else { 48.0 },
-            motor_c: if has(4) { 300.0 } else { 25.0 },
-            driver_c: if has(4) { -300.0 } else { 25.0 },
-            inputs: [has(5), has(6)],
-            eeprom_ok: !has(7),
-            ..Default::default()
-        }
-    }
-
-    fn is_possible(actuation: &zlac8030l::hardware::Actuation) -> bool {
-        match actuation.power_stage {
-            zlac8030l::hardware::PowerStage::Modulate { duty } => duty.iter().all(|share| (0.0..=1.0).contains(share)),
-            _ => true,
-        }
-    }
-}
-
-impl Subject for zlim42c::Zlim42c {
-    fn table() -> &'static Table {
-        &zlim42c::objects::TABLE
-    }
-
-    fn value(&self, slot: Slot) -> i64 {
-        self.values().value(slot)
-    }
-
-    fn sensors(place: u8, bits: u8) -> zlim42c::hardware::Sensors {
-        let has = |bit: u8| bits & 1 << bit != 0;
-        zlim42c::hardware::Sensors {
-            phase_current_a: if has(2) { [f32::from(place) * 1e3, -1e6] } else { [0.5, 0.25] },
-            bus_v: if has(3) { f32::from(place) } else { 24.0 },
-            bus_current_a: if has(2) { 30.0 } else { 0.5 },
-            reference_v: if has(4) { 0.0 } else { zlim42c::assumptions::REFERENCE_V },
-            inputs: [has(0), has(1), has(5), has(6)],
-            eeprom_ok: !has(7),
-        }
-    }
-
-    fn is_possible(actuation: &zlim42c::hardware::Actuation) -> bool {
-        match actuation.power_stage {
-            zlim42c::hardware::PowerStage::Modulate { duty } => duty.iter().all(|share| share.abs() <= 1.0),
-            zlim42c::hardware::PowerStage::Off => true,
-        }
-    }
 }
