@@ -103,39 +103,29 @@ impl ObjectRow {
 }
 
 impl Datagram {
-    /// Checks an SDO request: it comes from the client of `node`, names one of `objects`, which it returns, and carries
-    /// its size.
-    ///
-    /// # Panics
-    ///
-    /// When that is not so.
-    pub fn check_sdo_request<'a>(&self, objects: &'a [ObjectRow], node: u16) -> &'a ObjectRow {
-        let (cob, data) = self.request.as_ref().expect("an SDO request");
-        let [command, low, high, sub, ..] = data[..] else { panic!("short request {data:02X?}") };
-        let index = u16::from_le_bytes([low, high]);
-        let object = objects.iter().find(|row| (row.index, row.sub) == (index, sub)).expect("a row of the table");
-        let carried = if command == 0x40 { object.size } else { 4 - usize::from(command >> 2 & 3) };
-        assert_eq!((*cob, carried), (0x600 + node, object.size), "{self:?}");
-        object
+    /// The node whose SDO server it asks, if it is an SDO request.
+    #[must_use]
+    pub fn sdo_server(&self) -> Option<u16> {
+        self.request.as_ref().map(|(cob, _)| *cob).filter(|cob| (0x601..=0x67F).contains(cob)).map(|cob| cob - 0x600)
     }
 
-    /// Checks an SDO datagram: its request, and that the printed answer comes from the same node, repeats the multiplexor
-    /// and is the one that CiA 301 demands.
+    /// Checks an SDO datagram: the request names one of `objects` and carries its size; the answer, where one is printed,
+    /// comes from the same node, repeats the multiplexor and is the one that CiA 301 demands.
     ///
     /// # Panics
     ///
     /// When that is not so.
     pub fn check_sdo(&self, objects: &[ObjectRow], node: u16) {
-        let object = self.check_sdo_request(objects, node);
         let request = &self.request.as_ref().expect("an SDO request").1;
-        let (from, printed) = self.response.as_ref().expect("a printed answer");
-        let size_left = u8::try_from(4 - object.size).expect("at most four bytes");
-        let answered = if request[0] == 0x40 { 0x43 | size_left << 2 } else { 0x60 };
-        assert_eq!(
-            (*from, printed.len(), &printed[..4]),
-            (0x580 + node, 8, &[answered, request[1], request[2], request[3]][..]),
-            "{self:?}"
-        );
+        let [command, low, high, sub, ..] = request[..] else { panic!("short request {request:02X?}") };
+        let key = (u16::from_le_bytes([low, high]), sub);
+        let object = objects.iter().find(|row| row.key() == key).expect("a row of the table");
+        let (carried, size_left) = (4 - usize::from(command >> 2 & 3), (4 - object.size) as u8);
+        assert!(command == 0x40 || carried == object.size, "{self:?}");
+        let Some((from, printed)) = &self.response else { return };
+        let answered = if command == 0x40 { 0x43 | size_left << 2 } else { 0x60 };
+        let head = [answered, low, high, sub];
+        assert_eq!((*from, printed.len(), &printed[..4]), (0x580 + node, 8, &head[..]), "{self:?}");
         let agrees = |(byte, known): (&u8, &Option<u8>)| known.is_none_or(|known| known == *byte);
         assert!(self.answer.len() == 8 && printed.iter().zip(&self.answer).all(agrees), "{self:?}");
     }

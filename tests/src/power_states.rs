@@ -19,6 +19,9 @@ pub trait PowerSubject: Subject {
     /// A component whose break is a fault in every state, and which can be mended.
     const BREAKABLE: Component;
 
+    /// The code of that fault (603Fh), and the error register with it (1001h).
+    const BROKEN: (u16, u8);
+
     /// Its `power_state.csv`; with each cell the bits of the statusword above the low byte, of those in [`ABOVE`](Self::ABOVE).
     fn power_states() -> Vec<(PowerCell, u16)>;
 

@@ -17,10 +17,12 @@ pub struct Play<S> {
     pub seeds: u64,
     /// Objects that are not written: they would end the conversation by themselves.
     pub spared: &'static [u16],
-    /// Does something to the machine now and then.
-    pub disturb: fn(&mut Bench<S>, &mut Seeded),
-    /// Whether a statusword is one of the drive's states.
-    pub is_a_state: fn(u16) -> bool,
+    /// What hands do to the machine now and then, as a world command without its node; `> ` begins a frame.
+    pub hands: &'static [&'static str],
+    /// What mends all that they did.
+    pub mended: &'static [&'static str],
+    /// The bits that tell the state, and what they are in each; none where any will do.
+    pub states: (u16, &'static [u16]),
     /// Asserts that the drive, mended and restarted, is as delivered; with the seed, for the message.
     pub recovers: fn(&mut Bench<S>, u64),
 }
@@ -40,17 +42,28 @@ pub fn is_answered_and_breaks_nothing<S: Subject>(play: &Play<S>) {
             let value = any_value(&mut seeded, row);
             // Taken or refused, but answered: `write` panics without an answer.
             let _ = bench.write((row.index, row.sub), value);
-            (play.disturb)(&mut bench, &mut seeded);
+            if seeded.below(5) == 0 {
+                act(&mut bench, play.hands[seeded.below(play.hands.len())]);
+            }
             bench.run_ms(seeded.below(20) as u64);
             let report = bench.report();
             let at =
                 format!("seed {seed}, step {step}, after {:04X}h:{:02X} = {value}: {report:?}", row.index, row.sub);
             let finite = [report.velocity_rpm, report.current_a, report.supply_v, report.shaft_angle_rad];
-            assert!(finite.iter().all(|value| value.is_finite()), "{at}");
-            assert!((play.is_a_state)(report.statusword.unwrap_or_default()), "{at}");
+            assert!(finite.iter().all(|value| value.is_finite()) && report.supply_v < 500.0, "{at}");
+            let state = report.statusword.unwrap_or_default() & play.states.0;
+            assert!(play.states.1.is_empty() || play.states.1.contains(&state), "{at}");
         }
+        play.mended.iter().for_each(|line| act(&mut bench, line));
         (play.recovers)(&mut bench, seed);
     }
+}
+
+fn act<S: Subject>(bench: &mut Bench<S>, line: &str) {
+    match line.strip_prefix("> ") {
+        Some(frame) => bench.send(frame),
+        None => bench.tell(&format!("{} {line}", S::NODE)),
+    };
 }
 
 /// A legal value mostly, sometimes any.

@@ -9,6 +9,7 @@ use ferrodrive_tests::bench::zlac8030l::Zlac8030l;
 use ferrodrive_tests::bench::zlim42c::Zlim42c;
 use ferrodrive_tests::manual::ObjectRow;
 use ferrodrive_tests::power_states::PowerSubject;
+use ferrodrive_tests::{mjoint, zlac8030l, zlim42c};
 
 fn object_tables() -> [&'static [ObjectRow]; 3] {
     [Zlac8030l::rows().all(), Zlim42c::rows().all(), MJoint::rows().all()]
@@ -27,6 +28,21 @@ fn each_object_table_has_the_manuals_rows_and_those_that_it_lost_or_the_standard
 fn defaults_lie_within_their_limits_and_limits_within_their_types() {
     for row in object_tables().concat() {
         row.check();
+    }
+}
+
+#[test]
+fn every_sdo_datagram_names_an_object_carries_its_size_and_is_answered_as_the_standard_demands() {
+    let [servo, stepper, joint] = object_tables();
+    for (datagrams, printed, rows, node) in [
+        (zlac8030l::datagrams(), 98, servo, 4),
+        (zlim42c::datagrams(), 37, stepper, 1),
+        (mjoint::datagrams(), 41, joint, 1),
+    ] {
+        assert_eq!(datagrams.len(), printed);
+        let requests: Vec<_> = datagrams.iter().filter(|it| it.sdo_server() == Some(node)).collect();
+        assert!(requests.len() > printed / 3, "{} requests", requests.len());
+        requests.iter().for_each(|it| it.check_sdo(rows, node));
     }
 }
 

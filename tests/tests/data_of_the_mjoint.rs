@@ -40,16 +40,10 @@ fn every_mapping_names_an_object_and_fills_the_printed_frame() {
 }
 
 #[test]
-fn every_sdo_datagram_is_answered_as_the_standard_demands_and_names_an_object() {
-    let objects: Vec<_> = objects().into_iter().map(|it| it.row).collect();
-    let datagrams = datagrams();
-    assert_eq!(datagrams.len(), 41);
-    for datagram in &datagrams {
-        if let Some((0x601, data)) = &datagram.request {
-            datagram.check_sdo(&objects, 1);
-            let short = if data[0] == 0x40 { 4 } else { 8 - usize::from(data[0] >> 2 & 3) };
-            assert_eq!(data.len(), short, "the manual leaves out what carries nothing: {datagram:?}");
-        }
+fn the_manual_leaves_out_the_bytes_of_a_request_that_carry_nothing() {
+    for (_, data) in datagrams().iter().filter_map(|it| it.request.as_ref()).filter(|(cob, _)| *cob == 0x601) {
+        let short = if data[0] == 0x40 { 4 } else { 8 - usize::from(data[0] >> 2 & 3) };
+        assert_eq!(data.len(), short, "{data:02X?}");
     }
 }
 

@@ -16,6 +16,7 @@ ferrodrive_tests::scenarios! {
     power {
         every_event_in_every_state_leads_where_the_table_says: zlac8030l zlim42c;
         a_drive_says_that_it_has_booted_and_is_in_switch_on_disabled: zlac8030l zlim42c;
+        a_fault_is_told_and_goes_with_a_rising_bit_7_once_its_cause_is_gone: zlac8030l zlim42c;
         the_statusword_of_each_state_in_each_mode_at_rest_is_that_of_the_table: zlac8030l zlim42c;
     }
     network {

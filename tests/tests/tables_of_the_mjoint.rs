@@ -5,7 +5,8 @@ use devices::model;
 use drives::mjoint::objects::TABLE;
 use drives::mjoint::objects::modbus::REGISTERS;
 use drives::mjoint::statusword::{Condition, statusword};
-use ferrodrive_tests::mjoint::{MODELS, Situation, figures, objects, situations};
+use ferrodrive_tests::bench::mjoint::figure;
+use ferrodrive_tests::mjoint::{MODELS, Situation, objects, situations};
 
 #[test]
 fn the_modbus_addresses_are_the_manuals() {
@@ -42,11 +43,7 @@ fn condition(situation: &Situation) -> Condition {
 
 #[test]
 fn the_four_models_have_the_ratio_and_highest_speed_of_the_manual() {
-    use drives::mjoint::Model;
-    let ours = [Model::M4230E17B50, Model::M4230E17B80, Model::M8025E25B50, Model::M8025E25B80];
-    let figure = |parameter: &str| {
-        figures().into_iter().find(|figure| figure.parameter == parameter).expect("a figure of the table").values
-    };
+    let ours = ferrodrive_tests::bench::mjoint::MODELS;
     assert_eq!(ours.map(|model| model.name), MODELS);
     assert_eq!(ours.map(|model| model.ratio), figure("Reduction ratio"));
     assert_eq!(ours.map(|model| model.max_rpm), figure("Maximum rotational speed"));

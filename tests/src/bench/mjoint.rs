@@ -10,12 +10,25 @@ use sim::VirtualDrive;
 use sim::machine::{Joint, MJointMachine, Machine, mjoint};
 
 use super::{Place, Rows, Subject};
-use crate::mjoint::objects;
+use crate::mjoint::{figures, objects};
 
 pub use super::{Abort, head};
 
 /// Counts in one turn of the motor.
 pub const TURN: i64 = 32_768;
+
+/// All models, in the order of the manual's columns.
+pub const MODELS: [&Model; 4] = [&Model::M4230E17B50, &Model::M4230E17B80, &Model::M8025E25B50, &Model::M8025E25B80];
+
+/// A figure of the technical data, for each of the [`MODELS`].
+///
+/// # Panics
+///
+/// When there is no such figure: the test that asks is wrong.
+#[must_use]
+pub fn figure(parameter: &str) -> [f64; 4] {
+    figures().into_iter().find(|figure| figure.parameter == parameter).expect("a figure of the table").values
+}
 
 /// A joint of the smallest model.
 #[derive(Debug)]

@@ -245,6 +245,15 @@ impl<S: Subject> Bench<S> {
     }
 }
 
+/// The boot-up message of a drive that is switched on alone on a bus of this rate, if it can be heard.
+pub fn boot_up_of(drive: impl VirtualDrive + 'static, bitrate: Bitrate) -> Option<String> {
+    let mut world = World::new(bitrate, 1);
+    let host = world.add_probe();
+    world.add_drive(99, Box::new(drive)).expect("a free number");
+    world.run_for(ANSWER_WITHIN);
+    world.poll_received(host).map(|(_, frame)| frame.to_string())
+}
+
 /// The time of so many bits on the subject's bus.
 fn bits<S: Subject>(count: u64) -> Duration {
     Duration::from_nanos(count * S::BITRATE.bit_nanos())

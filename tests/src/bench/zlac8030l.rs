@@ -51,6 +51,7 @@ impl Subject for Zlac8030l {
 
 impl PowerSubject for Zlac8030l {
     const BREAKABLE: Component = Component::Hall;
+    const BROKEN: (u16, u8) = (0x0200, 0x81);
     const ABOVE: u16 = 0;
     const STATUSWORD_AT_REST: &'static str = include_str!("../../data/zlac8030l/statusword_at_rest.csv");
     // As the recorded one shows it.

@@ -51,6 +51,7 @@ impl Subject for Zlim42c {
 
 impl PowerSubject for Zlim42c {
     const BREAKABLE: Component = Component::Reference;
+    const BROKEN: (u16, u8) = (0xFF08, 0x81);
     // The motor is energised.
     const ABOVE: u16 = 1 << 13;
     const STATUSWORD_AT_REST: &'static str = include_str!("../../data/zlim42c/statusword_at_rest.csv");

@@ -2,7 +2,7 @@
 
 use drives::mjoint::Model;
 
-use crate::bench::Bench;
+use crate::bench::{Bench, MODELS};
 
 fn running(bench: &mut Bench) {
     bench.turn(300).run_ms(300);
@@ -54,7 +54,7 @@ fn an_output_that_stays_at_its_limit_raises_14h_and_2601h_resets_it() {
 #[test]
 fn as_delivered_a_locked_output_gives_14h_and_one_that_is_too_heavy_12h() {
     // Interface 3: 12h and 14h are both there to be seen. Locked, the current stays under the 10 A of 261Dh.
-    for model in [&Model::M4230E17B50, &Model::M4230E17B80, &Model::M8025E25B50, &Model::M8025E25B80] {
+    for model in MODELS {
         let mut bench = Bench::of(1, model);
         running(&mut bench);
         bench.tell("1 rotor lock").run_ms(1000);
@@ -151,25 +151,45 @@ fn the_alarm_output_is_normally_open_and_an_odd_ones_digit_of_60fb_makes_it_norm
     }
 }
 
-#[test]
-fn the_leds_tell_of_alarms() {
-    let mut bench = Bench::new();
-    bench.run_ms(1000);
-    assert!(output(&mut bench, "GREEN") && !output(&mut bench, "RED"));
-    bench.tell("1 battery off").run_ms(5);
-    let mut red = 0;
-    let mut green_changes = 0;
-    let mut green = output(&mut bench, "GREEN");
-    for _ in 0..2700 {
-        bench.run_ms(1);
-        red += u32::from(output(&mut bench, "RED"));
-        let now = output(&mut bench, "GREEN");
-        green_changes += u32::from(now != green);
-        green = now;
+/// Lengths of the darknesses and lights of an output, ms, over some time.
+fn blinks(bench: &mut Bench, name: &str, ms: u32) -> Vec<(bool, u32)> {
+    let mut blinks = vec![(output(bench, name), 0)];
+    for _ in 0..ms {
+        let now = output(bench.run_ms(1), name);
+        match blinks.last_mut() {
+            Some((level, length)) if *level == now => *length += 1,
+            _ => blinks.push((now, 1)),
+        }
     }
-    // One long flash in a round of 2.7 s; green flickers at 10 Hz.
-    assert!((880..=920).contains(&red), "{red}");
-    assert!((50..=56).contains(&green_changes), "{green_changes}");
+    blinks
+}
+
+/// Interface 3: as many long flashes as the code has tens, as many short ones as it has ones.
+#[test]
+fn the_red_light_flashes_the_alarms_code_and_the_green_one_flickers_without_the_battery() {
+    for (line, code) in [("battery off", 0x10), ("supply 53", 0x15), ("rotor lock", 0x12), ("rotor lock", 0x14)] {
+        let mut bench = Bench::new();
+        bench.set(0x261D, if code == 0x12 { 2001 } else { 7000 }).set(0x2618, if code == 0x14 { 101 } else { 600 });
+        running(&mut bench);
+        bench.run_ms(700);
+        assert!(output(&mut bench, "GREEN") && !output(&mut bench, "RED"));
+        bench.tell(&format!("1 {line}")).until(3000, |bench| bench.get(0x260E) == code);
+        let seen = blinks(&mut bench, "RED", 20_000);
+        // Rounds begin after the longest darkness.
+        let pause = seen[1..].iter().filter(|(lit, _)| !lit).map(|(_, length)| *length).max().expect("it flashes");
+        let rounds: Vec<String> = seen
+            .split(|(lit, length)| !lit && *length == pause)
+            .map(|round| {
+                round.iter().filter(|(lit, _)| *lit).map(|(_, ms)| if *ms > 500 { 'L' } else { 's' }).collect()
+            })
+            .collect();
+        let expected = "L".repeat(code as usize >> 4) + &"s".repeat(code as usize & 0xF);
+        assert!(rounds.len() >= 4, "{rounds:?}");
+        assert!(rounds[1..rounds.len() - 1].iter().all(|round| *round == expected), "{code:X}h: {rounds:?}");
+        // 10 Hz.
+        let flickers = blinks(&mut bench, "GREEN", 2700).len();
+        assert!(if code == 0x10 { (51..=57).contains(&flickers) } else { flickers == 1 }, "{flickers}");
+    }
 }
 
 #[test]

@@ -201,6 +201,9 @@ fn a_device_address_is_in_the_identifiers_of_pdos_at_once_and_the_node_id_after_
     assert!(bench.heard().iter().all(|frame| !frame.starts_with("181#")), "nobody listens to 201h");
     bench.send("205#0F0001E8030000").run_ms(5);
     assert!(bench.heard().iter().any(|frame| frame.starts_with("185#")));
-    bench.set(0x6040, 0).save().power_cycle();
+    bench.set(0x6040, 0).save().send("000#8101").run_ms(5).reads(0x2615, 5).forget().power_cycle();
     assert!(bench.heard().contains(&"705#00".to_string()), "the node-ID");
+    bench.node = 5;
+    bench.reads((0x1400, 1), 0x205).forget().send("305#0000000000000000");
+    assert!(bench.heard().iter().any(|frame| frame.starts_with("285#")));
 }

@@ -2,9 +2,7 @@
 
 use drives::mjoint::Model;
 
-use crate::bench::{Bench, TURN};
-
-const MODELS: [&Model; 4] = [&Model::M4230E17B50, &Model::M4230E17B80, &Model::M8025E25B50, &Model::M8025E25B80];
+use crate::bench::{Bench, MODELS, TURN};
 
 #[test]
 fn with_2f_each_write_of_the_target_starts_and_with_0f_it_only_waits() {

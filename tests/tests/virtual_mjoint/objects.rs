@@ -42,16 +42,3 @@ fn of_all_that_can_be_written_exactly_the_stored_outlives_a_save_and_a_power_cyc
     }
     assert_eq!(asked, 8 + 8 + 2 + 23, "COB-IDs, inhibit times, heartbeats, and the control objects");
 }
-
-#[test]
-fn a_new_address_counts_after_saving_and_a_power_cycle_and_takes_the_pdos_with_it() {
-    let mut bench = Bench::new();
-    bench.set(0x2615, 9).save();
-    bench.send("000#8101").run_ms(5);
-    assert_eq!(bench.get(0x2615), 9, "NMT reset keeps the node-ID in use");
-    bench.power_cycle();
-    assert!(bench.heard().contains(&"709#00".to_string()));
-    assert_eq!(bench.get_from(9, (0x1400, 1)), 0x209);
-    bench.send("309#0000000000000000");
-    assert!(bench.heard().iter().any(|frame| frame.starts_with("289#")));
-}

@@ -2,16 +2,9 @@
 
 use can::Bitrate;
 use drives::mjoint::Model;
-use ferrodrive_tests::mjoint::figures;
 use sim::machine::mjoint;
 
-use crate::bench::Bench;
-
-const MODELS: [&Model; 4] = [&Model::M4230E17B50, &Model::M4230E17B80, &Model::M8025E25B50, &Model::M8025E25B80];
-
-fn figure(parameter: &str) -> [f64; 4] {
-    figures().into_iter().find(|figure| figure.parameter == parameter).expect("a figure of the table").values
-}
+use crate::bench::{Bench, MODELS, figure};
 
 fn turning(model: &'static Model, rpm: f64) -> Bench {
     let mut bench = Bench::of(1, model);

@@ -1,11 +1,6 @@
 //! What the reducer bears and does, seen from outside ("Parameters", "Reducer parameters").
 
-use drives::mjoint::Model;
-use ferrodrive_tests::mjoint::figures;
-
-use crate::bench::Bench;
-
-const MODELS: [&Model; 4] = [&Model::M4230E17B50, &Model::M4230E17B80, &Model::M8025E25B50, &Model::M8025E25B80];
+use crate::bench::{Bench, MODELS, figure};
 
 fn output(bench: &mut Bench) -> sim::OutputShaft {
     bench.report().output.expect("a joint has a reducer")
@@ -60,8 +55,7 @@ fn the_output_follows_the_motor_but_for_the_reducers_error_and_twist() {
 
 #[test]
 fn a_free_joint_stands_under_a_small_load_and_a_large_one_does_not_run_away() {
-    let rated = figures().into_iter().find(|figure| figure.parameter == "Output torque after deceleration");
-    for (model, rated_nm) in MODELS.into_iter().zip(rated.expect("a figure of the table").values) {
+    for (model, rated_nm) in MODELS.into_iter().zip(figure("Output torque after deceleration")) {
         let mut bench = Bench::of(1, model);
         bench.set(0x6040, 1).tell("1 load torque 2.5").run_ms(2000);
         assert!(bench.report().velocity_rpm.abs() < 1e-9, "{}: {}", model.name, bench.report().velocity_rpm);

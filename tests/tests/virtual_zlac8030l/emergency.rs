@@ -23,52 +23,34 @@ fn gives_way(bench: &mut Bench) -> bool {
     way > 700
 }
 
-/// 5.4.2: enabled at speed 0.
+/// An external stop in each reading: what is chosen, 202F:03, 605Ah, how it stops, the statusword then, and whether the
+/// shaft gives way. The maker's guide of 2024 has 202F:03 = 1: 5 and 6 ramp, 7 does not, then the PWM goes off and the
+/// motor is disabled; 5.4.2 has 0: enabled at speed 0.
 #[test]
-fn an_external_stop_with_202f_03_0_ramps_as_605ah_says_and_locks_the_shaft() {
-    for reading in ["limit", "coast"] {
+fn an_external_stop_ramps_as_605ah_says_and_ends_as_202f_03_and_the_reading_say() {
+    let held = [("L123", "limit"), ("L123", "coast")].map(|reading| (reading, 0, 0x8037, false));
+    let disabled = ["limit", "ramp", "coast"].map(|reading| (("L123", reading), FREE, DISABLED_FROM_OUTSIDE, true));
+    let enabled = [(("L039", "enabled"), FREE, 0x8037, true)];
+    for ((key, reading), released, statusword, way) in held.into_iter().chain(disabled).chain(enabled) {
         for (option, ramp) in [(5, Some(Ramp::Time(0.4))), (6, Some(Ramp::Time(0.1))), (7, None)] {
-            let mut bench = brought_to_speed(Bench::choosing("L123", reading));
-            bench.set(0x605A, option);
+            let mut bench = brought_to_speed(Bench::choosing(key, reading));
+            bench.set(0x605A, option).set((0x202F, 3), released);
             press(&mut bench, true);
             match ramp {
                 Some(ramp) => assert_stops(&mut bench, ramp),
-                // 8 ms at 30 A, and the swing of a step.
-                None => {
-                    bench.run_ms(50).turns_at(-10.0, 10.0);
-                    bench.run_ms(500);
+                None if released == FREE => {
+                    bench.run_ms(2);
+                    assert_eq!(bench.statusword() & 0x80FF, statusword, "at once");
+                    assert_coasts(&mut bench);
                 }
+                // 8 ms at 30 A, and the swing of a step.
+                None => _ = bench.run_ms(50).turns_at(-10.0, 10.0).run_ms(500),
             }
-            assert_eq!(bench.statusword() & 0x80FF, 0x8037, "enabled, stopped from outside");
-            assert!(!gives_way(&mut bench), "605Ah = {option}");
+            let at = format!("{key}={reading}, 202F:03 = {released}, 605Ah = {option}");
+            assert_eq!(bench.statusword() & 0x80FF, statusword, "{at}");
+            assert_eq!(gives_way(&mut bench), way, "{at}");
+            bench.reads(0x603F, 0).reads(0x60FF, 0);
         }
-    }
-}
-
-/// The maker's guide of 2024: 5 and 6 ramp, then the PWM goes off, and the motor is disabled.
-#[test]
-fn an_external_stop_with_202f_03_1_ramps_as_605ah_says_and_ends_disabled() {
-    for (option, ramp) in [(5, Ramp::Time(0.4)), (6, Ramp::Time(0.1))] {
-        let mut bench = turning();
-        bench.set(0x605A, option).set((0x202F, 3), FREE);
-        press(&mut bench, true);
-        assert_stops(&mut bench, ramp);
-        bench.shows(0x80FF, DISABLED_FROM_OUTSIDE);
-        assert!(gives_way(&mut bench), "605Ah = {option}");
-        bench.reads(0x603F, 0).reads(0x60FF, 0);
-    }
-}
-
-/// The same guide: 7 switches the PWM off at once.
-#[test]
-fn an_external_stop_with_202f_03_1_and_605ah_7_lets_the_motor_coast_disabled_in_each_reading_of_605ah() {
-    for reading in ["limit", "ramp", "coast"] {
-        let mut bench = brought_to_speed(Bench::choosing("L123", reading));
-        bench.set(0x605A, 7).set((0x202F, 3), FREE);
-        press(&mut bench, true);
-        bench.run_ms(2);
-        assert_eq!(bench.statusword() & 0x80FF, DISABLED_FROM_OUTSIDE, "at once");
-        assert_coasts(&mut bench);
     }
 }
 
@@ -98,39 +80,28 @@ fn a_stop_that_releases_the_shaft_releases_one_that_a_quick_stop_or_200fh_holds(
     assert!(!gives_way(&mut bench), "200Fh = 1 locks again");
 }
 
+/// Quick stop (4.6) by 605Ah and halt by 605Dh; 605Ah = 7 and 605Dh = 3 in each reading.
 #[test]
-fn with_l039_enabled_a_stop_that_releases_the_shaft_stays_enabled() {
-    for (option, ramp) in [(5, Some(Ramp::Time(0.4))), (7, None)] {
-        let mut bench = brought_to_speed(Bench::choosing("L039", "enabled"));
-        bench.set(0x605A, option).set((0x202F, 3), FREE);
-        press(&mut bench, true);
-        match ramp {
-            Some(ramp) => assert_stops(&mut bench, ramp),
-            None => {
-                bench.run_ms(2);
-                assert_coasts(&mut bench);
-            }
-        }
-        assert_eq!(bench.statusword() & 0x80FF, 0x8037, "605Ah = {option}");
-        assert!(gives_way(&mut bench));
-    }
-}
-
-/// 605Ah = 7 and 605Dh = 3 by the controlword (4.6, and bit 8).
-#[test]
-fn a_commanded_emergency_stop_brakes_at_the_current_limit_or_in_6085h_or_coasts_as_l123_says() {
-    for (object, option, controlword, low_byte) in [(0x605A, 7, 0x02, 0x17), (0x605D, 3, 0x10F, 0x37)] {
-        for (reading, ramp) in [("limit", Some(Ramp::CurrentLimit)), ("ramp", Some(Ramp::Time(0.1))), ("coast", None)] {
+fn a_commanded_stop_ramps_as_its_option_says_holds_the_shaft_unless_it_coasts_and_the_velocity_goes_on() {
+    let (slow, quick) = (Some(Ramp::Time(0.4)), Some(Ramp::Time(0.1)));
+    for (object, first, controlword, low_byte) in [(0x605A, 5, 0x02, 0x17), (0x605D, 1, 0x10F, 0x37)] {
+        for (reading, option, ramp) in [
+            ("limit", first, slow),
+            ("limit", first + 1, quick),
+            ("limit", first + 2, Some(Ramp::CurrentLimit)),
+            ("ramp", first + 2, quick),
+            ("coast", first + 2, None),
+        ] {
             let mut bench = brought_to_speed(Bench::choosing("L123", reading));
             bench.set(object, option).set(0x6040, controlword);
             match ramp {
                 Some(ramp) => assert_stops(&mut bench, ramp),
                 None => assert_coasts(&mut bench),
             }
-            assert_eq!(bench.statusword() & 0xFF, low_byte, "{reading}");
-            assert_eq!(gives_way(&mut bench), ramp.is_none(), "{reading} holds, unless it coasts");
-            bench.set(0x6040, 0x0F).run_ms(800);
-            assert_within("speed afterwards", bench.report().velocity_rpm, 119.0, 121.0);
+            // Standing is reached.
+            assert_eq!(bench.statusword() & 0x04FF, 0x0400 | low_byte, "{object:X}h = {option}, {reading}");
+            assert_eq!(gives_way(&mut bench), ramp.is_none(), "{object:X}h = {option}, {reading}");
+            bench.set(0x6040, 0x0F).run_ms(800).turns_at(119.0, 121.0);
         }
     }
 }

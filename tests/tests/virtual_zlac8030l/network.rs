@@ -1,94 +1,51 @@
 //! More than one drive, a disturbed wire, a wrong bit rate, a cut cable.
 
-use std::time::Duration;
-
-use can::{Bitrate, Frame};
+use can::Bitrate;
+use ferrodrive_tests::bench::boot_up_of;
 use ferrodrive_tests::zlac8030l::objects;
+use sim::VirtualDrive;
 use sim::fault::Corruption;
 use sim::machine::zlac8030l;
-use sim::{StationId, VirtualDrive, World};
 
 use crate::bench::{Bench, NODE, RATE_500K, assert_within};
 
 /// Value of 200Eh for 250 kbit/s.
 const RATE_250K: u16 = 2;
 
-struct Pair {
-    world: World,
-    host: StationId,
+/// Nodes 4 and 5.
+fn two() -> Bench {
+    let drive = |node| -> Box<dyn VirtualDrive> { Box::new(zlac8030l(node, RATE_500K)) };
+    Bench::with(vec![drive(4), drive(5)])
 }
 
-impl Pair {
-    fn new() -> Self {
-        let mut world = World::new(Bitrate::K500, 3);
-        let host = world.add_probe();
-        for node in [2, 5] {
-            world.add_drive(node, Box::new(zlac8030l(node, RATE_500K))).expect("another drive");
-        }
-        world.run_for(Duration::from_millis(10));
-        Self { world, host }
-    }
-
-    /// Sends frames, 5 ms apart, and returns what was heard meanwhile.
-    fn talk(&mut self, frames: &[&str]) -> Vec<String> {
-        for frame in frames {
-            self.world.send(self.host, frame.parse().expect("a frame")).expect("room");
-            self.world.run_for(Duration::from_millis(5));
-        }
-        self.heard().iter().map(ToString::to_string).collect()
-    }
-
-    fn heard(&mut self) -> Vec<Frame> {
-        std::iter::from_fn(|| self.world.poll_received(self.host)).map(|(_, frame)| frame).collect()
-    }
-
-    fn rpm(&mut self, node: u8) -> f64 {
-        self.world.report(node).expect("the drive is there").velocity_rpm
-    }
+fn rpm(bench: &mut Bench, node: u8) -> f64 {
+    bench.world.report(node).expect("the drive is there").velocity_rpm
 }
 
 #[test]
 fn two_drives_boot_as_their_nodes_and_each_obeys_its_own_frames() {
-    let mut pair = Pair::new();
-    assert_eq!(pair.talk(&[]), ["702#00", "705#00"]);
-    let heard = pair.talk(&["602#2B00200000000000", "602#2F60600003000000", "602#23FF60003C000000"]);
-    assert_eq!(heard, ["582#6000200000000000", "582#6060600000000000", "582#60FF600000000000"]);
-    pair.talk(&["602#2B40600006000000", "602#2B40600007000000", "602#2B4060000F000000"]);
-    pair.world.run_for(Duration::from_millis(900));
-    assert_within("node 2", pair.rpm(2), 59.0, 61.0);
-    assert_eq!(pair.rpm(5), 0.0);
-    assert_eq!(pair.talk(&["605#40FF600000000000"]), ["585#43FF600000000000"]);
+    let mut bench = two();
+    bench.hears(&["704#00", "705#00"]).turn(60).turns_at(59.0, 61.0);
+    assert_eq!(rpm(&mut bench, 5), 0.0);
+    bench.node = 5;
+    bench.reads(0x60FF, 0);
 }
 
 #[test]
 fn one_sync_starts_both_drives_at_the_same_instant() {
-    let mut pair = Pair::new();
-    for node in [2, 5] {
-        let setup = [
-            "2B00200000000000",
-            "2F60600003000000",
-            "2F01140201000000",
-            "2F01160000000000",
-            "230116012000FF60",
-            "2F01160001000000",
-            "2B40600006000000",
-            "2B40600007000000",
-            "2B4060000F000000",
-        ];
-        let frames: Vec<_> = setup.iter().map(|data| format!("60{node}#{data}")).collect();
-        pair.talk(&frames.iter().map(String::as_str).collect::<Vec<_>>());
+    let mut bench = two();
+    for node in [4, 5] {
+        bench.node = node;
+        bench.set((0x1401, 2), 1).map(0x1601, &[0x60FF_0020]).enable_in(3);
     }
-    pair.talk(&["000#0100", "302#3C000000"]);
-    pair.world.run_for(Duration::from_millis(200));
-    pair.talk(&["305#3C000000"]);
-    pair.world.run_for(Duration::from_millis(200));
-    assert_eq!((pair.rpm(2), pair.rpm(5)), (0.0, 0.0), "they wait for SYNC");
-    pair.talk(&["080#"]);
+    bench.send("000#0100").send("304#3C000000").run_ms(200).send("305#3C000000").run_ms(200);
+    assert_eq!((rpm(&mut bench, 4), rpm(&mut bench, 5)), (0.0, 0.0), "they wait for SYNC");
+    bench.send("080#");
     for _ in 0..50 {
-        pair.world.run_for(Duration::from_millis(10));
-        assert_eq!(pair.rpm(2), pair.rpm(5));
+        bench.run_ms(10);
+        assert_eq!(rpm(&mut bench, 4), rpm(&mut bench, 5));
     }
-    assert_within("speed", pair.rpm(2), 55.0, 61.0);
+    assert_within("speed", rpm(&mut bench, 4), 55.0, 61.0);
 }
 
 #[test]
@@ -139,23 +96,14 @@ fn a_new_bit_rate_acts_after_a_restart_and_then_only_its_own_bus_hears_the_drive
     let memory = bench.operate(|drive, _| drive.nvm_image());
     let mut machine = zlac8030l(NODE, RATE_500K);
     machine.load_nvm(&memory).expect("its own memory");
-    let mut world = World::new(Bitrate::K250, 1);
-    let host = world.add_probe();
-    world.add_drive(NODE, Box::new(machine)).expect("the first drive");
-    world.run_for(Duration::from_millis(20));
-    assert_eq!(world.poll_received(host).map(|(_, frame)| frame.to_string()).as_deref(), Some("704#00"));
+    assert_eq!(boot_up_of(machine, Bitrate::K250).as_deref(), Some("704#00"));
 }
 
 #[test]
 fn every_bit_rate_of_200eh_is_the_one_that_the_manual_lists() {
-    let listed = [(0, 1_000_000), (1, 500_000), (2, 250_000), (3, 125_000), (4, 100_000)];
-    for (value, bit_s) in listed {
-        let bitrate = Bitrate::new(bit_s).expect("a bit rate");
-        let mut world = World::new(bitrate, 1);
-        let host = world.add_probe();
-        world.add_drive(NODE, Box::new(zlac8030l(NODE, value))).expect("the first drive");
-        world.run_for(Duration::from_millis(20));
-        assert!(world.poll_received(host).is_some(), "200Eh = {value} at {bit_s} bit/s");
+    for (value, bit_s) in [(0, 1_000_000), (1, 500_000), (2, 250_000), (3, 125_000), (4, 100_000)] {
+        let boot_up = boot_up_of(zlac8030l(NODE, value), Bitrate::new(bit_s).expect("a bit rate"));
+        assert_eq!(boot_up.as_deref(), Some("704#00"), "200Eh = {value} at {bit_s} bit/s");
     }
 }
 
@@ -175,20 +123,9 @@ fn a_new_node_id_acts_after_a_restart_and_moves_every_identifier_with_it() {
 
 #[test]
 fn the_dip_switch_goes_before_200dh() {
-    let mut world = World::new(Bitrate::K500, 1);
-    let host = world.add_probe();
-    world.add_drive(3, Box::new(zlac8030l(3, RATE_500K))).expect("the first drive");
-    world.run_for(Duration::from_millis(10));
-    let frames = ["603#400D200000000000", "603#2B0D200009000000"].map(|frame| frame.parse().expect("a frame"));
-    for frame in frames {
-        world.send(host, frame).expect("room");
-        world.run_for(Duration::from_millis(10));
-    }
-    world.cut_power(3).expect("the drive");
-    world.set_power(3, true).expect("the drive");
-    world.run_for(Duration::from_millis(10));
-    let heard: Vec<_> = std::iter::from_fn(|| world.poll_received(host)).map(|(_, frame)| frame.to_string()).collect();
-    assert_eq!(heard, ["703#00", "583#4B0D200004000000", "583#600D200000000000", "703#00"]);
+    let mut bench = Bench::with(vec![Box::new(zlac8030l(3, RATE_500K))]);
+    bench.node = 3;
+    bench.hears(&["703#00"]).reads(0x200D, 4).set(0x200D, 9).let_store().forget().power_cycle().hears(&["703#00"]);
 }
 
 #[test]

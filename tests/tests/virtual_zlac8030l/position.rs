@@ -43,43 +43,49 @@ fn duration_s(distance: f64) -> f64 {
     1.0 + (distance - ramps) / speed
 }
 
+/// A set-point, its bits, the time until the next one, and where it has led by then; `None` where it is on the way.
+type Step = (i64, i64, u64, Option<i64>);
+
 #[test]
-fn the_relative_moves_of_4_2_go_32000_counts_and_come_back() {
+fn set_points_lead_where_they_say_at_the_speed_of_6081h_and_without_overshoot() {
+    let stories: &[(&str, &[Step])] = &[
+        ("4.2", &[(32_000, RELATIVE, 10_000, Some(32_000)), (-32_000, RELATIVE, 10_000, Some(0))]),
+        ("4.3", &[(32_000, 0, 10_000, Some(32_000)), (-32_000, 0, 18_000, Some(-32_000))]),
+        ("bit 5 replaces the one under way", &[(40_000, 0, 1000, None), (8192, IMMEDIATELY, 4000, Some(8192))]),
+        ("in one breath", &[(4096, RELATIVE, 0, None), (4096, RELATIVE, 5000, Some(8192))]),
+        // 60F2h is absent, so its default holds: relative to the preceding target (CiA 402-2).
+        (
+            "a relative one that replaces a move counts from that move's target",
+            &[(8192, RELATIVE, 1000, None), (4096, RELATIVE | IMMEDIATELY, 4000, Some(12_288))],
+        ),
+    ];
+    for (story, steps) in stories {
+        let mut bench = ready();
+        for (target, bits, ms, expected) in *steps {
+            let from = bench.report().position;
+            start(&mut bench, *target, *bits);
+            let to = expected.unwrap_or(from + 40_000);
+            let mut fastest = 0.0_f64;
+            for _ in 0..*ms {
+                let report = bench.run(LOOK).report();
+                fastest = fastest.max(report.velocity_rpm.abs());
+                let off_the_way = report.position < from.min(to) - 10 || report.position > from.max(to) + 10;
+                assert!(!off_the_way, "{story}: {} on the way from {from} to {to}", report.position);
+            }
+            assert!(*ms == 0 || (59.0..61.5).contains(&fastest), "{story}: {fastest} r/min");
+            if let Some(expected) = expected {
+                assert_at(&mut bench, *expected);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_move_takes_the_time_of_its_closed_form() {
     let mut bench = ready();
     start(&mut bench, 32_000, RELATIVE);
     let end = bench.seconds_until(12.0, LOOK, |report| report.position >= 32_000 - 2);
     assert_within("seconds of the move", end, duration_s(32_000.0) - 0.05, duration_s(32_000.0) + 0.05);
-    bench.run_ms(500);
-    assert_at(&mut bench, 32_000);
-    start(&mut bench, -32_000, RELATIVE);
-    bench.run_ms(10_000);
-    assert_at(&mut bench, 0);
-}
-
-#[test]
-fn the_absolute_moves_of_4_3_go_to_32000_and_to_minus_32000() {
-    let mut bench = ready();
-    start(&mut bench, 32_000, 0);
-    bench.run_ms(10_000);
-    assert_at(&mut bench, 32_000);
-    start(&mut bench, -32_000, 0);
-    bench.run_ms(18_000);
-    assert_at(&mut bench, -32_000);
-}
-
-#[test]
-fn a_move_keeps_to_the_speed_of_6081h_and_ends_without_overshoot() {
-    let mut bench = ready();
-    start(&mut bench, 12_000, 0);
-    let (mut fastest, mut farthest) = (0.0_f64, 0);
-    for _ in 0..5000 {
-        bench.run(LOOK);
-        let report = bench.report();
-        fastest = fastest.max(report.velocity_rpm);
-        farthest = farthest.max(report.position);
-    }
-    assert_within("greatest speed", fastest, 59.0, 61.5);
-    assert_within("farthest position", farthest as f64, 11_990.0, 12_010.0);
 }
 
 #[test]
@@ -103,33 +109,6 @@ fn the_acknowledge_bit_rises_with_the_set_point_and_falls_with_bit_4() {
     bench.run_ms(200);
     assert_eq!(bench.statusword() & ACKNOWLEDGED, ACKNOWLEDGED, "bit 4 is still up");
     bench.set(0x6040, 0x0F).shows(ACKNOWLEDGED, 0);
-}
-
-#[test]
-fn with_bit_5_a_set_point_replaces_the_one_under_way() {
-    let mut bench = ready();
-    start(&mut bench, 40_000, 0);
-    bench.run_ms(1000);
-    start(&mut bench, 8192, IMMEDIATELY);
-    let mut farthest = 0;
-    for _ in 0..4000 {
-        bench.run(LOOK);
-        farthest = farthest.max(bench.report().position);
-    }
-    assert_within("farthest position", farthest as f64, 8162.0, 8222.0);
-    assert_at(&mut bench, 8192);
-}
-
-#[test]
-fn relative_moves_add_up_even_when_they_are_told_in_one_breath() {
-    let mut bench = ready();
-    start(&mut bench, 4096, RELATIVE);
-    start(&mut bench, 4096, RELATIVE);
-    bench.run_ms(5000);
-    assert_at(&mut bench, 8192);
-    start(&mut bench, -2048, RELATIVE);
-    bench.run_ms(3000);
-    assert_at(&mut bench, 6144);
 }
 
 #[test]
@@ -169,15 +148,4 @@ fn clearing_with_2006h_moves_the_origin_of_absolute_moves() {
     let turned = bench.report().shaft_angle_rad / core::f64::consts::TAU * COUNTS_PER_TURN;
     assert_within("counts from where it began", turned, 6144.0 - 60.0, 6144.0 + 60.0);
     bench.is_at(2048, 30);
-}
-
-/// 60F2h is absent, so its default holds: relative to the preceding target (CiA 402-2).
-#[test]
-fn a_relative_set_point_that_replaces_a_move_counts_from_that_moves_target() {
-    let mut bench = ready();
-    start(&mut bench, 8192, RELATIVE);
-    bench.run_ms(1000);
-    start(&mut bench, 4096, RELATIVE | IMMEDIATELY);
-    bench.run_ms(4000);
-    assert_at(&mut bench, 12_288);
 }

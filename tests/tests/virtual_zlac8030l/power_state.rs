@@ -1,4 +1,4 @@
-//! Bits of the statusword that belong to the mode, and how a fault ends.
+//! Bits of the statusword that belong to the mode.
 
 use crate::bench::Bench;
 
@@ -56,32 +56,4 @@ fn bit_15_tells_of_the_external_stop_whatever_the_mode() {
         bench.set_input(0, false).run_ms(20);
         assert_eq!(bench.statusword() & 0x8000, 0, "mode {mode}");
     }
-}
-
-#[test]
-fn a_fault_is_cleared_only_by_a_rising_bit_7_and_only_when_its_cause_is_gone() {
-    let mut bench = Bench::in_state("switched_on");
-    bench.break_down(true);
-    assert_eq!((bench.get(0x603F), bench.get(0x1001)), (0x0200, 0x81), "Hall error; generic and manufacturer");
-    bench.set(0x6040, 0x80);
-    assert_eq!(bench.statusword() & 0xFF, 0x98, "the cause is still there");
-    bench.break_down(false).set(0x6040, 0x80);
-    assert_eq!(bench.statusword() & 0xFF, 0x98, "bit 7 did not rise");
-    bench.set(0x6040, 0x00).set(0x6040, 0x80).shows(0xFF, 0x70).reads(0x603F, 0).reads(0x1001, 0);
-}
-
-#[test]
-fn a_fault_and_its_end_are_told_by_emcy() {
-    let mut bench = Bench::in_state("switch_on_disabled");
-    bench.forget().break_down(true).break_down(false).set(0x6040, 0x80);
-    let told: Vec<_> = bench.heard().into_iter().filter(|frame| frame.starts_with("084#")).collect();
-    assert_eq!(told, ["084#0002810000000000", "084#0000000000000000"]);
-}
-
-#[test]
-fn a_slow_wheel_is_a_running_one() {
-    let mut bench = Bench::new();
-    bench.enable_in(3).set(0x60FF, 3).run_ms(2000);
-    assert_eq!(bench.statusword() & (BIT_12 | RUNNING), RUNNING, "3 r/min is not 0 r/min");
-    bench.reads(0x2027, 1);
 }

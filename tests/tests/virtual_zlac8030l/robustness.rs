@@ -4,9 +4,8 @@ use std::time::Duration;
 
 use ferrodrive_tests::bench::zlac8030l::Zlac8030l;
 use ferrodrive_tests::random_host::{self, Play};
-use ferrodrive_tests::seeded::Seeded;
 use ferrodrive_tests::zlac8030l::objects;
-use sim::{Component, TemperatureSensor};
+use sim::TemperatureSensor;
 
 use crate::bench::{Bench, assert_within};
 use crate::wheel;
@@ -20,46 +19,40 @@ fn a_host_that_writes_anything_anywhere_is_answered_and_breaks_nothing() {
     random_host::is_answered_and_breaks_nothing(&Play::<Zlac8030l> {
         seeds: 60,
         spared: &SPARED,
-        disturb,
-        is_a_state,
+        hands: &[
+            "load torque 2",
+            "load torque 1",
+            "load torque -1",
+            "load torque -2",
+            "load inertia 0.2",
+            "load inertia 0",
+            "rotor lock",
+            "rotor free",
+            "fault hall on",
+            "fault hall off",
+            "fault encoder on",
+            "fault encoder off",
+            "fault phase on",
+            "fault phase off",
+            "input X0 1",
+            "input X0 0",
+        ],
+        mended: &[
+            "fault hall off",
+            "fault encoder off",
+            "fault phase off",
+            "rotor free",
+            "load torque 0",
+            "load inertia 0",
+            "input X0 0",
+        ],
+        states: (0x03FF, &[0x0270, 0x0231, 0x0233, 0x0237, 0x0217, 0x0298]),
         recovers,
     });
 }
 
-fn disturb(bench: &mut Bench, seeded: &mut Seeded) {
-    let on = seeded.below(2) == 0;
-    let torque_nm = seeded.below(5) as f64 - 2.0;
-    let choice = seeded.below(40);
-    bench.operate(|drive, now| {
-        let _ = match choice {
-            0 => drive.set_load_torque(torque_nm, now),
-            1 => drive.set_rotor_locked(on, now),
-            2 => drive.set_fault(Component::Hall, on, now),
-            3 => drive.set_fault(Component::Encoder, on, now),
-            4 => drive.set_fault(Component::Phase, on, now),
-            5 => drive.set_input(0, on, now),
-            6 => drive.set_load_inertia(if on { 0.2 } else { 0.0 }, now),
-            _ => Ok(()),
-        };
-    });
-}
-
-fn is_a_state(statusword: u16) -> bool {
-    let patterns = [0x0270, 0x0231, 0x0233, 0x0237, 0x0217, 0x0298];
-    patterns.contains(&(statusword & 0x03FF))
-}
-
-/// Mended, given its factory settings and restarted, the drive is as delivered.
+/// Given its factory settings and restarted, the mended drive is as delivered.
 fn recovers(bench: &mut Bench, seed: u64) {
-    bench.operate(|drive, now| {
-        for component in [Component::Hall, Component::Encoder, Component::Phase] {
-            drive.set_fault(component, false, now).unwrap_or_default();
-        }
-        drive.set_rotor_locked(false, now).unwrap_or_default();
-        drive.set_load_torque(0.0, now).unwrap_or_default();
-        drive.set_load_inertia(0.0, now).unwrap_or_default();
-        drive.set_input(0, false, now).unwrap_or_default();
-    });
     bench.set(0x6040, 0).set(0x200F, 0);
     // A wheel that the load drove fast has charged the bus, and only the electronics discharge it.
     let calm = |report: &sim::Report| report.velocity_rpm.abs() < 1.0 && report.supply_v < 60.0;

@@ -53,31 +53,6 @@ pub(crate) enum Ramp {
 }
 
 #[test]
-fn quick_stop_ramps_as_605ah_says_and_holds_the_shaft() {
-    for (option, ramp) in [(5, Ramp::Time(0.4)), (6, Ramp::Time(0.1)), (7, Ramp::CurrentLimit)] {
-        let mut bench = turning();
-        bench.set(0x605A, option).set(0x6040, 0x02);
-        assert_stops(&mut bench, ramp);
-        assert_eq!(bench.statusword() & 0xFF, 0x17, "the drive stays in quick stop active");
-        let held = bench.report().position;
-        bench.set_load_torque(3.0).run_ms(2000);
-        assert_within("the motor holds", (bench.report().position - held) as f64, -30.0, 30.0);
-    }
-}
-
-#[test]
-fn halt_ramps_as_605dh_says_stays_enabled_and_goes_on_when_it_ends() {
-    for (option, ramp) in [(1, Ramp::Time(0.4)), (2, Ramp::Time(0.1)), (3, Ramp::CurrentLimit)] {
-        let mut bench = turning();
-        bench.set(0x605D, option).set(0x6040, 0x10F);
-        assert_stops(&mut bench, ramp);
-        let statusword = bench.statusword();
-        assert_eq!((statusword & 0xFF, statusword & 0x0400), (0x37, 0x0400), "standing under halt is reached");
-        bench.set(0x6040, 0x0F).run_ms(800).turns_at(RPM - 1.0, RPM + 1.0);
-    }
-}
-
-#[test]
 fn controlword_0_lets_the_motor_coast() {
     let mut bench = turning();
     bench.set(0x6040, 0).shows(0xFF, 0x70);

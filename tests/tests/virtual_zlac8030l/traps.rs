@@ -112,15 +112,3 @@ fn each_broken_part_has_its_fault_code() {
         assert!(found & code != 0, "{component:?}: {found:04X}h");
     }
 }
-
-#[test]
-fn a_quick_stop_in_a_move_ramps_down_and_the_move_is_over() {
-    let mut bench = Bench::new();
-    bench.set(0x605A, 6).set(0x6085, 200).enable_in(1).set(0x607A, 40_000).set(0x6040, 0x1F).run_ms(1500);
-    let before = bench.report();
-    assert_within("speed", before.velocity_rpm, 118.0, 122.0);
-    bench.set(0x6040, 0x02).run_ms(600);
-    // 120 r/min to rest in 200 ms: 0.2 turns.
-    assert_within("counts", (bench.report().position - before.position) as f64, 780.0, 900.0);
-    assert_eq!(bench.statusword() & 0x04FF, 0x0417, "it stands: reached");
-}

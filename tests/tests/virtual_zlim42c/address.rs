@@ -1,20 +1,12 @@
 //! Node-ID and bit rate: switches, 2008h, 2009h, and when they take effect.
 
 use can::Bitrate;
+use ferrodrive_tests::bench::boot_up_of;
 use ferrodrive_tests::zlim42c::{figure, figures};
-use sim::machine::{Zlim42cMachine, zlim42c};
-use sim::{VirtualDrive, World};
+use sim::VirtualDrive;
+use sim::machine::zlim42c;
 
 use crate::bench::{Bench, RATE_500K};
-
-/// The boot-up message of a machine on a bus of 500 kbit/s, if it can be heard.
-fn boots_as(machine: Zlim42cMachine) -> Option<String> {
-    let mut world = World::new(Bitrate::K500, 1);
-    let host = world.add_probe();
-    world.add_drive(99, Box::new(machine)).expect("room");
-    world.run_for(std::time::Duration::from_millis(10));
-    world.poll_received(host).map(|(_, frame)| frame.to_string())
-}
 
 #[test]
 fn the_switches_give_1_to_15_as_the_table_has_it() {
@@ -22,14 +14,18 @@ fn the_switches_give_1_to_15_as_the_table_has_it() {
         // 4.1: SW2 is the lowest; OFF counts.
         let address = row.value.split(' ').enumerate().map(|(n, switch)| u8::from(switch == "OFF") << n).sum::<u8>();
         assert_eq!(address.to_string(), row.row);
-        assert_eq!(boots_as(zlim42c(address, RATE_500K)), Some(format!("{:03X}#00", 0x700 + u16::from(address))));
+        assert_eq!(
+            boot_up_of(zlim42c(address, RATE_500K), Bitrate::K500),
+            Some(format!("{:03X}#00", 0x700 + u16::from(address)))
+        );
     }
 }
 
 #[test]
 fn stored_numbers_from_32_on_are_used_and_others_give_node_1() {
     for (stored, used) in [(32, 32), (100, 100), (127, 127), (16, 1), (31, 1)] {
-        assert_eq!(boots_as(zlim42c(stored, RATE_500K)), Some(format!("{:03X}#00", 0x700 + used)), "2008h = {stored}");
+        let boot_up = boot_up_of(zlim42c(stored, RATE_500K), Bitrate::K500);
+        assert_eq!(boot_up, Some(format!("{:03X}#00", 0x700 + used)), "2008h = {stored}");
     }
 }
 
@@ -41,16 +37,9 @@ fn another_node_number_takes_effect_with_the_next_start_unless_the_switches_deci
     // The bench's drive has its switches at 1: they decide.
     machine.reads(0x2000, 1).reads(0x2008, 42);
 
-    let mut world = World::new(Bitrate::K500, 1);
-    let host = world.add_probe();
-    world.add_drive(32, Box::new(zlim42c(32, RATE_500K))).expect("room");
-    world.run_for(std::time::Duration::from_millis(10));
-    world.send(host, "620#2B08200021000000".parse().expect("a frame")).expect("room");
-    world.run_for(std::time::Duration::from_millis(10));
-    world.send(host, "000#8120".parse().expect("a frame")).expect("room");
-    world.run_for(std::time::Duration::from_millis(10));
-    let heard: Vec<_> = std::iter::from_fn(|| world.poll_received(host)).map(|(_, frame)| frame.to_string()).collect();
-    assert_eq!(heard, ["720#00", "5A0#6008200000000000", "721#00"], "2008h = 33, NMT reset node");
+    let mut bench = Bench::with(vec![Box::new(zlim42c(32, RATE_500K))]);
+    bench.node = 32;
+    bench.set(0x2008, 33).run_ms(10).forget().offer("000#8120").run_ms(10).hears(&["721#00"]);
 }
 
 #[test]
