@@ -5,7 +5,6 @@
 //! recorder is the same run.
 
 use core::time::Duration;
-use std::fmt::Write;
 
 use can::Instant;
 
@@ -223,34 +222,6 @@ impl Recorder {
         self.marks.push((at, text.into()));
     }
 
-    /// A table with a header; `t_s` first, then `4.velocity_rpm` and so on; a missing value is an empty
-    /// field. The last column, `mark`, tells what happened since the line before.
-    pub fn to_csv(&self) -> String {
-        let mut csv = String::from("t_s");
-        for Channel { place, signal } in &self.channels {
-            let _ = write!(csv, ",{place}.{}", signal.name());
-        }
-        csv.push_str(",mark\n");
-        let mut marks = self.marks.iter().peekable();
-        for (at, values) in self.rows() {
-            let _ = write!(csv, "{at}");
-            for value in values {
-                csv.push(',');
-                if !value.is_nan() {
-                    let _ = write!(csv, "{value}");
-                }
-            }
-            let mut texts = Vec::new();
-            while let Some((_, text)) = marks.next_if(|(marked, _)| *marked <= at) {
-                texts.push(text.as_str());
-            }
-            csv.push(',');
-            csv.push_str(&quoted(&texts.join("; ")));
-            csv.push('\n');
-        }
-        csv
-    }
-
     pub(crate) fn start(&mut self, now: Instant) {
         self.next_at.get_or_insert(now);
     }
@@ -274,9 +245,4 @@ impl Recorder {
         }
         self.next_at = Some(at + self.period);
     }
-}
-
-/// A CSV field: quoted where RFC 4180 asks for it.
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_string() }
 }
