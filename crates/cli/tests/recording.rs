@@ -133,3 +133,24 @@ fn a_record_is_asked_for_in_words_that_make_sense() {
     refused(&["--record", csv.to_str().unwrap(), "--record-signals", "5.*"], "no signal '5.*'");
     assert!(!csv.exists());
 }
+
+#[test]
+fn a_scenario_that_is_recorded_is_the_same_run() {
+    let place = scratch("recorded-scenario");
+    let scenario = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/scenarios/brown_out.toml");
+    let plain = done(&["run", scenario, "--json"]).json();
+    for name in ["run.mcap", "run.csv"] {
+        let path = place.join(name);
+        let record = ["run", scenario, "--json", "--record", path.to_str().unwrap(), "--record-period", "500us"];
+        let recording = done(&record).json();
+        assert!(plain["digest"] == recording["digest"] && !plain["digest"].is_null(), "{name}: {plain}");
+        let recorded = recorded(&path);
+        assert!(!recorded.torn && !recorded.series.is_empty(), "{name}");
+        let end = recorded.series[0].points.len() as f64 * 0.0005;
+        assert!((last(&recorded) - end).abs() < 0.001, "{name}: no sample is missing");
+        // The brown-out is among what happened.
+        assert!(recorded.marks.iter().any(|mark| mark.text.contains("under-voltage")), "{name}: {:?}", recorded.marks);
+    }
+    let both = ferrodrive(&["run", scenario, "--seeds", "1..3", "--record", place.join("a.csv").to_str().unwrap()]);
+    assert!(both.status == Some(2) && both.err.contains("a sweep is many runs"), "{}", both.err);
+}

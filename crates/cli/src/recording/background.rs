@@ -73,6 +73,12 @@ impl<B: Send + 'static> Background<B> {
         }
     }
 
+    /// As [`write`](Self::write), but waits for a place: for whoever has time, and wants everything.
+    pub(super) fn write_all(&mut self, batch: B) {
+        // Why the file has ended has been said.
+        let _ = self.batches.send(batch);
+    }
+
     /// How many pieces are missing since the file was last written.
     #[cfg(test)]
     pub(super) fn missing(&self) -> u64 {

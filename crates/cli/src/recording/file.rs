@@ -5,8 +5,9 @@ use std::io;
 use std::time::Duration;
 
 use can::{Frame, Instant};
+use sim::events::Event;
 use sim::recorder::Recorder;
-use testbench::recording::{Column, Kind, Mark, Record, Severity, Subject};
+use testbench::recording::{Column, Kind, Mark, Record};
 
 use super::background::{Background, Words};
 use crate::serve::speaker::Speaker;
@@ -14,12 +15,12 @@ use crate::serve::speaker::Speaker;
 /// What happened since the batch before, each kind in the order of its times.
 #[derive(Default)]
 pub(crate) struct Batch {
-    /// Samples, stimuli and marks.
+    /// Samples.
     pub(crate) recorded: Option<Recorder>,
     /// What the bus carried.
     pub(crate) frames: Vec<(Instant, Frame)>,
-    /// What else happened.
-    pub(crate) marks: Vec<Mark>,
+    /// What happened.
+    pub(crate) events: Vec<Event>,
 }
 
 /// A record that a thread of its own writes.
@@ -42,6 +43,11 @@ impl RecordFile {
         self.0.write(batch, samples as u64);
     }
 
+    /// Takes a batch, and waits while the disk has no time for it.
+    pub(crate) fn write_all(&mut self, batch: Batch) {
+        self.0.write_all(batch);
+    }
+
     /// Waits until everything is written, at most for `patience`.
     pub(crate) fn finish(self, patience: Duration) {
         self.0.finish(patience);
@@ -51,16 +57,11 @@ impl RecordFile {
 /// Writes samples, frames and marks in the order of their times, and hands them to the system.
 fn write(record: &mut Record, batch: Batch) -> io::Result<()> {
     let mut frames = batch.frames.iter().peekable();
-    let note = |at: &Instant, of: String, text: String| Mark { at: *at, of: of.into(), severity: Severity::Note, text };
-    let recorded = batch.recorded.iter();
-    let stimuli = recorded.clone().flat_map(|recorded| recorded.stimuli());
-    let stimuli = stimuli.map(|(at, place, stimulus)| note(at, Subject::Axis(*place).title(), stimulus.to_string()));
-    let noted = recorded.clone().flat_map(|recorded| recorded.marks());
-    let noted = noted.map(|(at, text)| note(at, String::new(), text.clone()));
-    let mut marks: Vec<Mark> = batch.marks.into_iter().chain(stimuli).chain(noted).collect();
+    // A frame's event has the frame's time, which may be before that of an event that was found first.
+    let mut marks: Vec<Mark> = batch.events.iter().map(Mark::from).collect();
     marks.sort_by_key(|mark| mark.at);
     let mut marks = marks.iter().peekable();
-    for (at, values) in recorded.flat_map(Recorder::rows) {
+    for (at, values) in batch.recorded.iter().flat_map(Recorder::rows) {
         while let Some((ended, frame)) = frames.next_if(|(ended, _)| *ended <= at) {
             record.frame(*ended, frame)?;
         }

@@ -76,6 +76,7 @@ impl RecordOptions {
         let file = create(path).and_then(|(kind, file)| RecordFile::start(kind, file, &columns, speaker));
         let file = file.map_err(|error| cannot_write(path, &error))?;
         world.start_recording(Recorder::new(period, channels));
+        world.watch(true);
         Ok(Some(file))
     }
 }

@@ -126,8 +126,8 @@ impl Service {
     fn write_records(&mut self, world: &mut ServedWorld) {
         let frames = world.take_carried();
         if let Some(record) = &mut self.record {
-            let recorded = world.take_recorded();
-            record.write(Batch { recorded, frames: frames.clone(), marks: Vec::new() });
+            let (recorded, events) = (world.take_recorded(), world.take_events());
+            record.write(Batch { recorded, frames: frames.clone(), events });
         }
         if let Some(log) = &mut self.log {
             log.write(frames);

@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use can::{Bitrate, Frame, INTERFRAME_SPACE_BITS, Instant};
 use sim::command::{Answer, Service};
+use sim::events::Event;
 use sim::recorder::Recorder;
 use sim::wire::WireEvent;
 use sim::{StationId, World};
@@ -93,6 +94,11 @@ impl ServedWorld {
     /// What was recorded since the last call, if anything is.
     pub(crate) fn take_recorded(&mut self) -> Option<Recorder> {
         self.world.take_recorded()
+    }
+
+    /// What happened since the last call, if the world is watched.
+    pub(crate) fn take_events(&mut self) -> Vec<Event> {
+        std::iter::from_fn(|| self.world.poll_event()).collect()
     }
 
     /// Frames carried since the last call.

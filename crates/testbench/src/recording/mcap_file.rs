@@ -120,7 +120,8 @@ impl Mcap {
         let nanos = mark.at.as_nanos();
         let timestamp = json!({ "sec": nanos / 1_000_000_000, "nsec": nanos % 1_000_000_000 });
         let message = json!({
-            "timestamp": timestamp, "level": level, "message": mark.text, "name": mark.of, "file": "", "line": 0
+            "timestamp": timestamp, "level": level, "message": mark.text, "name": mark.of, "file": "", "line": 0,
+            "kind": mark.kind
         });
         self.text.clear();
         let _ = write!(self.text, "{message}");
@@ -197,7 +198,8 @@ fn log_schema() -> serde_json::Value {
             "message": { "type": "string" },
             "name": { "type": "string", "description": "to what it happened" },
             "file": { "type": "string" },
-            "line": { "type": "integer" }
+            "line": { "type": "integer" },
+            "kind": { "type": "string", "description": "what kind of thing: fault, state, stimulus, .." }
         }
     })
 }

@@ -11,6 +11,9 @@ use super::read::{Recorded, Series};
 /// What is drawn when nobody says what.
 const USUAL: [&str; 4] = ["position", "velocity", "current", "supply"];
 
+/// Kinds of events that are not marked: the curves show them, or what comes of them.
+const QUIET: [&str; 6] = ["boot", "nmt", "mode", "state", "store_begun", "target_reached"];
+
 /// A picture of `recorded` within `span`, in s. `patterns` are as [`select`] takes them; none asks for the usual signals.
 ///
 /// # Errors
@@ -81,8 +84,10 @@ fn figure(subject: &Subject, series: &[Series], recorded: &Recorded, span: &Rang
         panel(name, &lines)
     });
     let title = subject.title();
-    let about_it = |of: &str| of.is_empty() || of == title;
-    let marks = recorded.marks.iter().filter(|mark| span.contains(&mark.at.as_secs_f64()) && about_it(&mark.of));
+    let marks = recorded.marks.iter().filter(|mark| {
+        let about_it = mark.of.is_empty() || mark.of == title;
+        about_it && !QUIET.contains(&&*mark.kind) && span.contains(&mark.at.as_secs_f64())
+    });
     let events = marks.map(|mark| Event {
         at_s: mark.at.as_secs_f64(),
         label: mark.text.clone(),
@@ -164,10 +169,15 @@ mod tests {
         let mark = Mark {
             at: Instant::from_millis(500),
             of: "node 4".into(),
+            kind: "fault".into(),
             severity: Severity::Fault,
             text: "over-voltage".into(),
         };
-        Recorded { series: names.map(series).into(), marks: vec![mark], torn: false }
+        Recorded {
+            series: names.map(series).into(),
+            marks: vec![Mark { kind: "state".into(), ..mark.clone() }, mark],
+            torn: false,
+        }
     }
 
     fn drawn(patterns: &[&str], span: RangeInclusive<f64>) -> Result<Poster, String> {
@@ -184,7 +194,7 @@ mod tests {
         };
         assert_eq!(panels(0).collect::<Vec<_>>(), ["Position, counts: 1", "Velocity, r/min: 2"]);
         assert_eq!(panels(1).collect::<Vec<_>>(), ["Current, A: 1"]);
-        assert_eq!(poster.rows[0][0].events[0].label, "over-voltage");
+        assert_eq!(poster.rows[0][0].events.iter().map(|event| &*event.label).collect::<Vec<_>>(), ["over-voltage"]);
         assert!(poster.rows[1][0].events.is_empty());
     }
 

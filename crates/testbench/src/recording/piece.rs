@@ -4,6 +4,10 @@ use std::borrow::Cow;
 use std::io::{Seek, Write};
 
 use can::Instant;
+use sim::events::{Event, EventKind};
+use sim::wire::ErrorState;
+
+use super::column::Subject;
 
 /// The kinds of file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,6 +48,8 @@ pub struct Mark {
     pub at: Instant,
     /// To what: `node 4`; empty for the whole.
     pub of: Cow<'static, str>,
+    /// What kind of thing, by the name of [`sim::events::KINDS`]; empty if that is not known.
+    pub kind: Cow<'static, str>,
     /// How much it matters.
     pub severity: Severity,
     /// What, in words.
@@ -54,6 +60,27 @@ impl Mark {
     /// In one line: `node 4: over-voltage`.
     pub(super) fn line(&self) -> Cow<'_, str> {
         if self.of.is_empty() { self.text.as_str().into() } else { format!("{}: {}", self.of, self.text).into() }
+    }
+}
+
+impl From<&Event> for Mark {
+    fn from(event: &Event) -> Self {
+        let of = event.place.map_or_else(String::new, |place| Subject::Axis(place).title());
+        let severity = match &event.kind {
+            EventKind::Fault { .. } | EventKind::Damage(_) | EventKind::BusState { to: ErrorState::BusOff, .. } => {
+                Severity::Fault
+            }
+            EventKind::Emcy { emcy, .. } if emcy.code.0 != 0 => Severity::Warning,
+            EventKind::InternalLimit(true)
+            | EventKind::Cable(true)
+            | EventKind::BusError { .. }
+            | EventKind::BusState { to: ErrorState::ErrorPassive, .. }
+            | EventKind::Behind(_)
+            | EventKind::Missed(_) => Severity::Warning,
+            _ => Severity::Note,
+        };
+        let (kind, text) = (event.kind.name().into(), event.kind.to_string());
+        Self { at: event.at, of: of.into(), kind, severity, text }
     }
 }
 

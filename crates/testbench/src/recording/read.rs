@@ -101,7 +101,7 @@ fn mark_of(at: Instant, fields: &serde_json::Map<String, Value>) -> Mark {
         Some(3) => Severity::Warning,
         Some(_) => Severity::Fault,
     };
-    Mark { at, of: text("name").into(), severity, text: text("message") }
+    Mark { at, of: text("name").into(), kind: text("kind").into(), severity, text: text("message") }
 }
 
 fn read_csv(bytes: &[u8]) -> Result<Recorded, String> {
@@ -140,7 +140,13 @@ fn read_csv(bytes: &[u8]) -> Result<Recorded, String> {
         }
         if !text.is_empty() {
             let at = Instant::from_nanos((at * 1e9) as u64);
-            recorded.marks.push(Mark { at, of: "".into(), severity: Severity::Note, text: text.to_owned() });
+            recorded.marks.push(Mark {
+                at,
+                of: "".into(),
+                kind: "".into(),
+                severity: Severity::Note,
+                text: text.to_owned(),
+            });
         }
     }
     Ok(recorded)
@@ -205,7 +211,8 @@ mod tests {
             record.frame(at(number), &"604#4041600000000000".parse().unwrap()).unwrap();
             if number == 2 {
                 let text = "over-voltage, \"hard\"".to_owned();
-                record.mark(&Mark { at: at(2), of: "node 4".into(), severity: Severity::Fault, text }).unwrap();
+                let (of, kind) = ("node 4".into(), "fault".into());
+                record.mark(&Mark { at: at(2), of, kind, severity: Severity::Fault, text }).unwrap();
             }
             record.flush().unwrap();
         }

@@ -37,6 +37,8 @@ pub struct Runner {
     script: Script,
     next_sample: Instant,
     frames: VecDeque<(Instant, can::Frame)>,
+    /// All frames since the last call of [`Runner::take_carried`], for a record.
+    carried: Option<Vec<(Instant, can::Frame)>>,
     finished: bool,
 }
 
@@ -88,6 +90,7 @@ impl Runner {
             script,
             next_sample: Instant::ZERO,
             frames,
+            carried: None,
             finished: false,
         })
     }
@@ -110,6 +113,16 @@ impl Runner {
     /// The world, to put a recorder into it or to change what no scenario says.
     pub fn world_mut(&mut self) -> &mut World {
         &mut self.world
+    }
+
+    /// From now on all frames are kept for [`take_carried`](Self::take_carried).
+    pub fn keep_carried(&mut self) {
+        self.carried.get_or_insert_default();
+    }
+
+    /// The frames that the bus has carried since the last call, each with the time of its last bit.
+    pub fn take_carried(&mut self) -> Vec<(Instant, can::Frame)> {
+        self.carried.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
     /// Goes to the end.
@@ -244,6 +257,9 @@ impl Runner {
                     self.frames.pop_front();
                 }
                 self.frames.push_back((end, frame));
+                if let Some(carried) = &mut self.carried {
+                    carried.push((end, frame));
+                }
             }
             self.look(Some(&event));
         }

@@ -5,6 +5,7 @@ mod sweeping;
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use testbench::document::reader::Parameters;
 use testbench::scenario::{Runner, Scenario};
@@ -12,6 +13,8 @@ use testbench::scenario::{Runner, Scenario};
 use crate::failure::Failure;
 use crate::output::Format;
 use crate::progress::Progress;
+use crate::recording::{Batch, RecordOptions};
+use crate::serve::speaker::Speaker;
 use crate::session::exit_on_signal;
 use report::RunReport;
 
@@ -42,7 +45,15 @@ pub(crate) struct Run {
     /// Write the result in JUnit's XML too, as build servers read it
     #[arg(long, value_name = "FILE", conflicts_with = "seeds")]
     junit: Option<PathBuf>,
+    #[command(flatten)]
+    recording: RecordOptions,
 }
+
+/// Steps of the world between two batches of a record: 50 ms of a busy bus or more.
+const STEPS_A_BATCH: u32 = 512;
+
+/// How long the end waits for the disk.
+const DISK_PATIENCE: Duration = Duration::from_secs(60);
 
 /// Steps of the world between two looks at the progress.
 const STEPS_A_LOOK: u32 = 4096;
@@ -51,6 +62,10 @@ impl Run {
     /// Runs it.
     pub(crate) fn run(&self, format: Format) -> Result<(), Failure> {
         let scenario = self.scenario()?;
+        if self.seeds.is_some() && self.recording.path().is_some() {
+            return Err(Failure::usage("a sweep is many runs, and --record writes one")
+                .next("the summary says how to repeat a run: give --record with that"));
+        }
         match &self.seeds {
             Some(seeds) => {
                 let jobs = self.jobs.map(usize::from);
@@ -85,13 +100,26 @@ impl Run {
         let mut runner = Runner::new(scenario, self.seed).map_err(|bad| {
             Failure::usage(format!("cannot build the machine of {}", self.file.display())).because(bad)
         })?;
+        let warnings = Speaker::of_warnings();
+        let mut record = self.recording.start(runner.world_mut(), warnings.clone())?;
+        if record.is_some() {
+            runner.keep_carried();
+        }
         let mut steps = 0u32;
         while runner.step() {
             steps = steps.wrapping_add(1);
+            if steps.is_multiple_of(STEPS_A_BATCH) {
+                record.iter_mut().for_each(|record| record.write_all(batch(&mut runner)));
+            }
             if steps.is_multiple_of(STEPS_A_LOOK) {
                 let (now, limit) = (runner.now().as_nanos() as f64 / 1e9, runner.limit().as_nanos() as f64 / 1e9);
                 progress.show(format!("{}: {now:.2} s of virtual time, at most {limit} s", scenario.title));
             }
+        }
+        if let Some(mut record) = record {
+            record.write_all(batch(&mut runner));
+            record.finish(DISK_PATIENCE);
+            warnings.finish(DISK_PATIENCE);
         }
         let outcome = runner.conclude();
         progress.clear();
@@ -107,6 +135,13 @@ impl Run {
             None => Ok(()),
         }
     }
+}
+
+/// What has happened since the batch before.
+fn batch(runner: &mut Runner) -> Batch {
+    let frames = runner.take_carried();
+    let world = runner.world_mut();
+    Batch { recorded: world.take_recorded(), frames, events: std::iter::from_fn(|| world.poll_event()).collect() }
 }
 
 fn write(path: &Path, text: &str) -> Result<(), Failure> {
