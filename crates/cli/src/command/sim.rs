@@ -49,6 +49,7 @@ use testbench::words::drive::{DriveSpec, drive_spec};
     4 load pulley 2 0.05      4 load fan 2 300          (kg on a drum of so many m; N·m at r/min)\n  \
     4 load spring 5           4 load stop -5000 max     (N·m/rad; positions)\n  \
     4 load gear 10 0.5        4 load fan off, load none (ratio, degrees of backlash)\n  \
+    body base get             body base slope 5         (of drives that a [[body]] of --machine joins)\n  \
     4 supply 48               4 temperature motor 95    4 fault hall on\n  \
     4 cable cut|join          4 get                     now, help, quit\n  \
     4 bus corrupt 0.3         4 bus late 5 20           4 bus silent on|off\n  \
@@ -138,6 +139,7 @@ impl Sim {
             let notes = notes(placed.spec.node, placed.spec.model, self.verbose);
             notes.iter().for_each(|note| warnings.say(&plain(note)));
         }
+        machine.join(&mut world).map_err(unusable)?;
         machine.make_real(&mut world);
         let log = self.log.as_deref().map(create_log).transpose().map_err(|error| {
             Failure::new(format!("cannot write the log {}", self.log.clone().unwrap_or_default().display()))
@@ -243,7 +245,6 @@ impl Sim {
 /// Adds a drive with what it remembers and what is around it.
 fn add_drive(world: &mut World, placed: &Placed, eeproms: Option<&Eeproms>, warnings: &Speaker) -> Result<(), Failure> {
     let spec = &placed.spec;
-    let unusable = |bad: BadFile| Failure::usage("cannot use the machine file").because(bad);
     let mut drive = embedded::ordered_drive(spec.model, &spec.order(world.bitrate()))?;
     placed.supply(drive.as_mut()).map_err(unusable)?;
     let number = spec.node.raw();
@@ -259,6 +260,10 @@ fn add_drive(world: &mut World, placed: &Placed, eeproms: Option<&Eeproms>, warn
         note_what_the_image_changes(world, number, &name, warnings);
     }
     placed.furnish(world).map_err(unusable)
+}
+
+fn unusable(bad: BadFile) -> Failure {
+    Failure::usage("cannot use the machine file").because(bad)
 }
 
 /// Says it if a drive is not where the command line puts it, because its EEPROM contents say otherwise.

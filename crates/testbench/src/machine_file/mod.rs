@@ -4,6 +4,7 @@
 //! Everything about a machine becomes a [`Stimulus`] of `ferrodrive sim` and is done by the same code, so that a file can do
 //! what a world command can, and no more. Each key is described in `docs/machine-file.md`.
 
+mod bodies;
 mod surroundings;
 
 use std::path::Path;
@@ -18,6 +19,7 @@ use crate::document::{BadFile, Located, Problem, read_text};
 use crate::models::{Description, resolve_in};
 use crate::words::drive::DriveSpec;
 use crate::words::node::node;
+use bodies::Joined;
 
 const EXAMPLE: &str =
     "[[drive]]\n           model = \"zlac8030l\"\n           node = 4\n           load = { torque_nm = 0.5 }";
@@ -26,7 +28,7 @@ const EXAMPLE: &str =
 pub const SEED: u64 = 1;
 
 /// What a machine file may say of its bus.
-pub const BUS_KEYS: &[&str] = &["bitrate", "seed", "realism", "drive"];
+pub const BUS_KEYS: &[&str] = &["bitrate", "seed", "realism", "drive", "body"];
 
 /// What it may say of a drive.
 pub const DRIVE_KEYS: &[&str] = &[
@@ -55,6 +57,8 @@ pub struct Machine {
     pub realism: Option<Realism>,
     /// The drives, each at a node of its own.
     pub drives: Vec<Placed>,
+    /// What they move together.
+    pub(crate) bodies: Vec<Joined>,
 }
 
 /// One drive of a machine and what is around it.
@@ -121,7 +125,7 @@ impl Machine {
         let seed = file.get("seed").map(|field| field.whole("a whole number from 0 on")).transpose();
         let seed = noted(seed, &mut problems);
         let realism = noted(file.get("realism").map(|field| realism(&field)).transpose(), &mut problems);
-        let mut machine = Self { bitrate, seed, realism, drives: Vec::new() };
+        let mut machine = Self { bitrate, seed, realism, ..Self::default() };
         let expected = "a table of its own for each drive, begun by [[drive]]";
         let tables = file.get("drive").map_or(Ok(Vec::new()), |field| field.list(expected));
         let tables = tables.unwrap_or_else(|problem| {
@@ -140,6 +144,14 @@ impl Machine {
                     problems.push(field.problem(format!("two drives at node {}", drive.spec.node)));
                 }
                 Ok(drive) => machine.drives.push(drive),
+            }
+        }
+        let expected = "a table of its own for each body, begun by [[body]]";
+        let bodies = noted(file.get("body").map_or(Ok(Vec::new()), |field| field.list(expected)), &mut problems);
+        for field in bodies {
+            match Joined::parse(&field) {
+                Ok(joined) => machine.bodies.push(joined),
+                Err(problem) => problems.push(problem),
             }
         }
         if none && problems.is_empty() {
@@ -166,6 +178,14 @@ impl Machine {
         }
     }
 
+    /// Joins the drives of its world, which are there already, to what they move together.
+    ///
+    /// # Errors
+    /// What is in the way, with its place in the file.
+    pub fn join(&self, world: &mut World) -> Result<(), BadFile> {
+        self.bodies.iter().try_for_each(|body| body.couple(world))
+    }
+
     /// Its bus with its drives and what is around them, at time zero.
     ///
     /// # Errors
@@ -182,6 +202,7 @@ impl Machine {
             added.map_err(|error| placed.refused(None, &error.to_string()))?;
             placed.furnish(&mut world)?;
         }
+        self.join(&mut world)?;
         self.make_real(&mut world);
         Ok(world)
     }
@@ -189,7 +210,8 @@ impl Machine {
     /// What of the file counts for a simulated machine only, in words: a master on a real bus does not use it. `None` if there
     /// is nothing.
     pub fn unused_by_a_master(&self) -> Option<String> {
-        let bus = [self.bitrate.map(|_| "bitrate"), self.seed.map(|_| "seed"), self.realism.map(|_| "realism")];
+        let bodies = self.bodies.first().map(|_| "body");
+        let bus = [self.bitrate.map(|_| "bitrate"), self.seed.map(|_| "seed"), self.realism.map(|_| "realism"), bodies];
         let bus = bus.into_iter().flatten().collect::<Vec<_>>().join(", ");
         let of_drive = |placed: &Placed| format!("{} of node {}", placed.keys.join(", "), placed.spec.node);
         let drives = self.drives.iter().filter(|placed| !placed.keys.is_empty()).map(of_drive);

@@ -60,17 +60,75 @@ impl Words {
     }
 }
 
+const A_NUMBER: &str = "a number, e.g. 0.5";
+
+/// What hangs on the shaft. A gear comes first: spring and stops stand where the load is behind it.
 fn load(table: &Table<'_>) -> Result<Vec<Words>, Problem> {
     let Some(load) = table.get("load") else { return Ok(Vec::new()) };
     let load = load.table("a load", "a table, e.g. { torque_nm = 0.5 }")?;
-    load.takes_only(&["torque_nm", "inertia_kg_m2"])?;
+    load.takes_only(&["torque_nm", "inertia_kg_m2", "gear", "friction", "pulley", "spring", "stop", "fan"])?;
     let mut said = Vec::new();
     for (name, word) in [("torque_nm", "torque"), ("inertia_kg_m2", "inertia")] {
         if let Some(field) = load.get(name) {
-            said.push(Words::of(&field, format!("load {word} {}", field.number("a number, e.g. 0.5")?)));
+            said.push(Words::of(&field, format!("load {word} {}", field.number(A_NUMBER)?)));
         }
     }
+    said.extend(part(&load, "gear", &["ratio", "backlash_deg"], &["stiffness_nm_rad"])?);
+    said.extend(friction(&load)?);
+    said.extend(part(&load, "pulley", &["mass_kg", "radius_m"], &[])?);
+    said.extend(part(&load, "spring", &["stiffness_nm_rad"], &["rest_deg"])?);
+    said.extend(stop(&load)?);
+    said.extend(part(&load, "fan", &["torque_nm", "speed_rpm"], &[])?);
     Ok(said)
+}
+
+/// A part of a load whose words are its numbers in this order: those that it needs, and those that may follow.
+fn part(load: &Table<'_>, name: &'static str, needs: &[&str], may: &[&str]) -> Result<Option<Words>, Problem> {
+    let Some(field) = load.get(name) else { return Ok(None) };
+    let table = field.table("a part of a load", &format!("a table of {}", [needs, may].concat().join(", ")))?;
+    table.takes_only(&[needs, may].concat())?;
+    let mut words = format!("load {name}");
+    for key in needs {
+        words += &format!(" {}", table.need(key, A_NUMBER)?.number(A_NUMBER)?);
+    }
+    for key in may {
+        match table.get(key) {
+            Some(number) => words += &format!(" {}", number.number(A_NUMBER)?),
+            None => break,
+        }
+    }
+    Ok(Some(Words::of(&field, words)))
+}
+
+fn friction(load: &Table<'_>) -> Result<Option<Words>, Problem> {
+    let Some(field) = load.get("friction") else { return Ok(None) };
+    let table = field.table("a friction", "a table, e.g. { coulomb_nm = 0.2, viscous_nm_s = 0.01 }")?;
+    table.takes_only(&["coulomb_nm", "viscous_nm_s", "static_nm", "stribeck_rad_s"])?;
+    let coulomb_nm = table.get("coulomb_nm").map_or(Ok(0.0), |number| number.number(A_NUMBER))?;
+    let mut words = format!("load friction {coulomb_nm}");
+    for (key, word) in [("viscous_nm_s", "viscous"), ("static_nm", "static"), ("stribeck_rad_s", "stribeck")] {
+        if let Some(number) = table.get(key) {
+            words += &format!(" {word} {}", number.number(A_NUMBER)?);
+        }
+    }
+    Ok(Some(Words::of(&field, words)))
+}
+
+fn stop(load: &Table<'_>) -> Result<Option<Words>, Problem> {
+    let Some(field) = load.get("stop") else { return Ok(None) };
+    let table = field.table("end stops", "a table, e.g. { range = [-5000, \"max\"], stiffness_nm_rad = 1000 }")?;
+    table.takes_only(&["range", "stiffness_nm_rad", "damping_nm_s_rad"])?;
+    let [low, high] = bounds(&table.need("range", "two bounds, [low, high]")?)?;
+    let mut words = format!("load stop {low} {high}");
+    if table.get("damping_nm_s_rad").is_some() {
+        table.need("stiffness_nm_rad", "the stiffness that goes with the damping")?;
+    }
+    for key in ["stiffness_nm_rad", "damping_nm_s_rad"] {
+        if let Some(number) = table.get(key) {
+            words += &format!(" {}", number.number(A_NUMBER)?);
+        }
+    }
+    Ok(Some(Words::of(&field, words)))
 }
 
 fn inputs(table: &Table<'_>) -> Result<Vec<Words>, Problem> {
