@@ -5,12 +5,14 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a chore talks to a terminal")]
 
 mod cargo_tests;
+mod dist;
 mod examples;
 mod packages;
 mod peers;
 mod pgo;
 mod process;
 mod program;
+mod python;
 mod steps;
 mod tally;
 mod test;
@@ -26,6 +28,8 @@ The project's own chores.
   cargo xtask test --only STEP   one step (may be repeated)
   cargo xtask test --list        the steps
   cargo xtask tidy               the style that a program can check
+  cargo xtask wheel              the Python package, in dist/: the library, the binary, the interface for python-can
+  cargo xtask dist               what is released, in dist/: binary, manual pages, completions, data sheets, licences, wheel
   cargo xtask pgo                the binary to release, optimised by what a training run does
 ";
 
@@ -35,6 +39,8 @@ fn main() -> ExitCode {
     match words.as_slice() {
         ["test", rest @ ..] => test::command(rest),
         ["tidy"] => tidy::command(),
+        ["dist"] => dist::command(),
+        ["wheel"] => python::wheel_command(),
         ["pgo"] => pgo::command(),
         [] | ["help" | "--help" | "-h"] => {
             print!("{USAGE}");

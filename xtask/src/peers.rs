@@ -3,11 +3,10 @@
 //! The Python packages go into a private environment under `target/`, in pinned versions, and stay there for the next
 //! run. A machine without Python or without a network skips this step and says so; it never fails for that.
 
-use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::tally::Tally;
-use crate::{process, program, workspace};
+use crate::{process, program, python, workspace};
 
 /// The pinned packages: one file that people can also give to `pip install -r`.
 const REQUIREMENTS: &str = "tests/peers/requirements.txt";
@@ -18,7 +17,7 @@ pub(crate) fn run() -> Tally {
         Ok(program) => program,
         Err(tally) => return tally,
     };
-    let python = match environment() {
+    let python = match python::environment("peers-venv", REQUIREMENTS) {
         Ok(python) => python,
         Err(reason) => return Tally::skipped(reason),
     };
@@ -40,35 +39,6 @@ pub(crate) fn run() -> Tally {
         }
         Err(error) => Tally::failed(error),
     }
-}
-
-/// The Python of an environment that has the pinned packages, made now if need be; or why there is none.
-fn environment() -> Result<PathBuf, String> {
-    let folder = workspace::target().join("peers-venv");
-    let wanted = std::fs::read_to_string(workspace::root().join(REQUIREMENTS)).map_err(|error| error.to_string())?;
-    let python = folder.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
-    let stamp = folder.join("installed.txt");
-    if std::fs::read_to_string(&stamp).is_ok_and(|installed| installed == wanted) && python.exists() {
-        return Ok(python);
-    }
-    let system = ["python3", "python"].into_iter().find(|name| process::works(name, &["-c", "import venv, ensurepip"]));
-    let system = system.ok_or("no Python 3 with venv on this machine")?;
-    println!("   making a Python environment in {}", folder.display());
-    process::output(Command::new(system).args(["-m", "venv", "--clear"]).arg(&folder))?;
-    install(&python)?;
-    std::fs::write(&stamp, wanted).map_err(|error| error.to_string())?;
-    Ok(python)
-}
-
-fn install(python: &Path) -> Result<(), String> {
-    let mut pip = Command::new(python);
-    pip.current_dir(workspace::root());
-    pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--retries", "1", "--timeout", "20"]);
-    pip.args(["-r", REQUIREMENTS]);
-    process::output(&mut pip).map(|_| ()).map_err(|error| {
-        let reason = error.lines().last().unwrap_or_default().to_owned();
-        format!("pip could not install the peers (no network?): {reason}")
-    })
 }
 
 /// Counts one line of the script: `ok NAME`, `FAILED NAME: why`, `skipped NAME: why`.

@@ -4,7 +4,7 @@
 //! is compiled twice: clippy only checks, and the later steps use what the test step has built.
 
 use crate::tally::Tally;
-use crate::{cargo_tests, examples, packages, peers, process, program, tidy, workspace};
+use crate::{cargo_tests, dist, examples, packages, peers, process, program, python, tidy, workspace};
 
 /// One step: its name for `--only`, what it does for the progress line, and the function that does it.
 pub(crate) struct Step {
@@ -28,6 +28,12 @@ pub(crate) const STEPS: &[Step] = &[
         does: "ferrodrive demo: the manuals' procedures against the virtual drives",
         run: program::demo,
     },
+    Step {
+        name: "python",
+        does: "the Python package: its wheel builds, and its tests pass against the installed wheel",
+        run: python::step,
+    },
+    Step { name: "dist", does: "what is released can be made, and works from an empty folder", run: dist::step },
     Step { name: "peers", does: "canopen-python, python-can and pymodbus against ferrodrive sim", run: peers::run },
 ];
 

@@ -3,7 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    completions, dcf, demo, drive, dump, eds, home, motion, nmt, objects, plot, readings, run, scan, sdo, sim, store,
+    completions, dcf, demo, drive, dump, eds, home, man_pages, motion, nmt, objects, plot, readings, run, scan, sdo,
+    sim, store,
 };
 use crate::global::Global;
 
@@ -48,4 +49,6 @@ pub(crate) enum Command {
     Save(store::Save),
     Restore(store::Restore),
     Completions(completions::Completions),
+    #[command(hide = true)]
+    ManPages(man_pages::ManPages),
 }

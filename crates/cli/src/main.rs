@@ -166,6 +166,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Dcf(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Dump(dump) => dump.run(global, format),
         Command::Completions(completions) => completions.run(&mut Cli::command()),
+        Command::ManPages(pages) => pages.run(Cli::command()),
     }
 }
 

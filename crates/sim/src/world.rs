@@ -177,6 +177,11 @@ impl World {
         }
     }
 
+    /// True if a probe has heard a frame that nobody took yet.
+    pub fn has_received(&self, probe: StationId) -> bool {
+        matches!(&self.members[probe.0], Member::Probe(probe) if probe.has_received())
+    }
+
     /// Cuts a station's cable. It goes on alone.
     pub fn cut(&mut self, id: StationId) {
         self.bus.cut(id.0, self.now);

@@ -3,7 +3,6 @@
 
 mod axes;
 mod bench;
-mod connection;
 mod homing;
 mod limits;
 mod modes;

@@ -20,6 +20,9 @@ pub(super) fn of_crates(path: &str, text: &str, exists: impl Fn(&str) -> bool) -
     let Some(folder) = path.strip_suffix("/Cargo.toml").filter(|folder| folder.starts_with("crates/")) else {
         return Vec::new();
     };
+    if text.lines().any(|line| line == "publish = false") {
+        return Vec::new();
+    }
     let finding =
         |what: String, why, remedy| Finding { path: path.to_owned(), line: 1, rule: "manifests", what, why, remedy };
     let mut found = Vec::new();

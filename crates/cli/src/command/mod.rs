@@ -8,6 +8,7 @@ pub(crate) mod drive;
 pub(crate) mod dump;
 pub(crate) mod eds;
 pub(crate) mod home;
+pub(crate) mod man_pages;
 pub(crate) mod motion;
 pub(crate) mod nmt;
 pub(crate) mod objects;

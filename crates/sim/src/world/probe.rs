@@ -23,6 +23,10 @@ impl Probe {
         Ok(())
     }
 
+    pub(super) fn has_received(&self) -> bool {
+        !self.received.is_empty()
+    }
+
     pub(super) fn poll_received(&mut self) -> Option<(Instant, Frame)> {
         self.received.pop_front()
     }

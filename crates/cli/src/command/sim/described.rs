@@ -5,6 +5,7 @@ use canopen::od::{DefaultValue, Dictionary, Entry};
 use canopen::pdo::{Direction, Mapping, PdoId, PdoNumber};
 use canopen::{Mux, NodeId};
 use devices::Description;
+use drives::servo::MAX_AXES;
 use sim::machine::{Boxed, is_built_in, without_effect};
 
 /// Profile number of drives in the low half of 1000h.
@@ -39,7 +40,8 @@ fn run_as(model: &Description) -> String {
         }
         0 => "a node with its objects".into(),
         1 => "a servo".into(),
-        axes => format!("a servo of {axes} axes"),
+        axes if axes <= MAX_AXES => format!("a servo of {axes} axes"),
+        axes => format!("a servo, of whose {axes} axes the first {MAX_AXES} turn"),
     }
 }
 

@@ -1,0 +1,48 @@
+"""CANopen motor drives, virtual and real.
+
+Virtual drives on a virtual bus, in virtual time::
+
+    import ferrodrive
+
+    world = ferrodrive.World(bitrate=500_000, seed=1)
+    wheel = world.add("zlac8030l", node=4)
+    world.run_for(1.0)
+    wheel.set_load_torque(0.5)
+    print(wheel.supply_v, wheel.velocity_rpm)
+
+The same drives under your own program, unchanged, with python-can or canopen-python::
+
+    bus = can.Bus(interface="ferrodrive", channel=world)
+
+Quantities have their units in their names: ``velocity_rpm``, ``current_a``, ``supply_v``.
+"""
+
+from ._native import __version__, eds, models, stimulus_forms
+from .body import Body
+from .errors import FerrodriveError, MasterError, Refused, SimulatorError, Stalled, TimeInUse
+from .master import AsyncDrive, Drive, Network
+from .simulator import Simulator
+from .virtual_drive import VirtualDrive
+from .turns import virtual_time
+from .world import World
+
+__all__ = [
+    "AsyncDrive",
+    "Body",
+    "Drive",
+    "FerrodriveError",
+    "MasterError",
+    "Network",
+    "Refused",
+    "Simulator",
+    "SimulatorError",
+    "Stalled",
+    "TimeInUse",
+    "VirtualDrive",
+    "World",
+    "__version__",
+    "eds",
+    "models",
+    "stimulus_forms",
+    "virtual_time",
+]

@@ -1,0 +1,349 @@
+"""A drive of a world, as a person beside the machine has it: what can be measured, and what can be done to it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Optional, Union
+
+from .words import Number, number, word
+
+if TYPE_CHECKING:
+    from .world import World
+
+
+class VirtualDrive:
+    """One drive of a :class:`~ferrodrive.World`, or one axis of it.
+
+    Its properties are the truth about the machine at this moment, whatever its firmware says over the bus. Its methods are what
+    the outer world does to it, each one of the world commands of ``ferrodrive sim``. A method that the drive does not take raises
+    :class:`~ferrodrive.Refused` and changes nothing.
+    """
+
+    def __init__(self, world: World, node: int, axis: int = 1) -> None:
+        self._world = world
+        self._node = node
+        self._axis = axis
+        self._place = str(node) if axis == 1 else f"{node}.{axis}"
+
+    def __repr__(self) -> str:
+        return f"<{self.model} at {self._place}>"
+
+    @property
+    def world(self) -> World:
+        """The world it is in."""
+        return self._world
+
+    @property
+    def node(self) -> int:
+        """The number under which it was added, 1 to 127, whatever its node-ID became."""
+        return self._node
+
+    @property
+    def model(self) -> str:
+        """Its model, as in ``zlac8030l``."""
+        return self._world.model_of(self._node)
+
+    @property
+    def inputs(self) -> list[str]:
+        """Names of its digital inputs."""
+        return self._world.inputs_of(self._node)
+
+    @property
+    def axes(self) -> int:
+        """How many motors its one node moves."""
+        return self._world.axes_of(self._node)
+
+    def axis(self, number: int) -> VirtualDrive:
+        """Another axis of the same drive, counted from 1."""
+        if not 1 <= number <= self.axes:
+            raise ValueError(f"a {self.model} has no axis {number}; it has {self.axes}")
+        return VirtualDrive(self._world, self._node, number)
+
+    # What can be measured.
+
+    def report(self) -> dict[str, Any]:
+        """Everything below at once, by the names of the properties."""
+        return self._world.report(self._place)
+
+    @property
+    def node_id(self) -> int:
+        """The node-ID that it uses at present."""
+        return self.report()["node_id"]
+
+    @property
+    def powered(self) -> bool:
+        """True while its supply is switched on."""
+        return self.report()["powered"]
+
+    @property
+    def statusword(self) -> Optional[int]:
+        """Statusword (6041h); None without power."""
+        return self.report()["statusword"]
+
+    @property
+    def error_code(self) -> int:
+        """Code of the present fault in the drive's own numbering; 0 for none."""
+        return self.report()["error_code"]
+
+    @property
+    def position(self) -> int:
+        """Actual position in the drive's own counts."""
+        return self.report()["position"]
+
+    @property
+    def rotor_position(self) -> Optional[int]:
+        """Where the rotor truly is in the drive's counts, of a drive that does not measure it."""
+        return self.report()["rotor_position"]
+
+    @property
+    def position_demand(self) -> Optional[int]:
+        """Position demand in the drive's counts, where a mode has one."""
+        return self.report()["position_demand"]
+
+    @property
+    def velocity_rpm(self) -> float:
+        """True speed of the motor shaft in r/min."""
+        return self.report()["velocity_rpm"]
+
+    @property
+    def velocity_demand_rpm(self) -> Optional[float]:
+        """Velocity demand at the motor shaft in r/min, where a mode has one."""
+        return self.report()["velocity_demand_rpm"]
+
+    @property
+    def current_a(self) -> float:
+        """Signed motor current in A."""
+        return self.report()["current_a"]
+
+    @property
+    def current_demand_a(self) -> Optional[float]:
+        """Current demand in A, where a mode has one."""
+        return self.report()["current_demand_a"]
+
+    @property
+    def supply_v(self) -> float:
+        """Voltage at the supply terminals in V."""
+        return self.report()["supply_v"]
+
+    @property
+    def motor_c(self) -> Optional[float]:
+        """Temperature of the motor in °C, where it has a sensor."""
+        return self.report()["motor_c"]
+
+    @property
+    def driver_c(self) -> Optional[float]:
+        """Temperature of the power stage in °C, where it has a sensor."""
+        return self.report()["driver_c"]
+
+    @property
+    def outputs(self) -> dict[str, bool]:
+        """Levels of the digital outputs by name."""
+        return self.report()["outputs"]
+
+    @property
+    def brake(self) -> Optional[str]:
+        """``released`` or ``engaged``; None where there is no holding brake."""
+        return self.report()["brake"]
+
+    @property
+    def output_shaft(self) -> Optional[dict[str, float]]:
+        """The shaft behind a reducer, where there is one: ``angle_rad``, ``torque_nm``, ``most_nm`` (the most there has been),
+        ``overloads`` and ``jumps`` (how often), ``slip_rad``."""
+        return self.report()["output_shaft"]
+
+    @property
+    def damage(self) -> Optional[str]:
+        """What has been destroyed and what to do about it; None if nothing."""
+        return self.report()["damage"]
+
+    @property
+    def shaft_angle_rad(self) -> float:
+        """True angle of the motor shaft in rad, many turns. Where it begins is the machine's own: compare with an earlier one."""
+        return self.report()["shaft_angle_rad"]
+
+    @property
+    def bus(self) -> str:
+        """``error-active``, ``error-passive``, ``bus-off``, ``cut`` or ``off`` (no power)."""
+        return self.report()["bus"]
+
+    # What the outer world can do. Numbers are written with all their digits, so that they arrive as they are.
+
+    def apply(self, words: str) -> None:
+        """Does what a world command says, without the node: ``apply("load torque 2.5")``."""
+        self._world.apply(f"{self._place} {words}")
+
+    def power_on(self) -> None:
+        """Switches the supply on (``power on``): the firmware boots."""
+        self.apply("power on")
+
+    def power_off(self) -> None:
+        """Switches the supply off (``power off``): the drive lives on until its bus has drained."""
+        self.apply("power off")
+
+    def power_cycle(self) -> None:
+        """Switches off, and on again when the drive has died of it (``power cycle``)."""
+        self.apply("power cycle")
+
+    def power_cut(self) -> None:
+        """The drive is dead at once, in the middle of whatever it does (``power cut``)."""
+        self.apply("power cut")
+
+    def set_input(self, name: str, level: bool) -> None:
+        """Level of a digital input (``input X0 1``). Takes a switch away that is tied to it."""
+        self.apply(f"input {word(name)} {int(bool(level))}")
+
+    def set_switch(self, name: str, low: Optional[int] = None, high: Optional[int] = None) -> None:
+        """Ties an input to the position (``switch X0 -5000 max``): active from ``low`` to ``high``, in the drive's counts; None
+        reaches for ever. The range is fixed in the machine from then on."""
+        bounds = ("min" if low is None else int(low), "max" if high is None else int(high))
+        self.apply(f"switch {word(name)} {bounds[0]} {bounds[1]}")
+
+    def set_load_torque(self, torque_nm: Number) -> None:
+        """Torque at the output shaft in N·m (``load torque 2.5``); positive opposes positive motion, also at standstill."""
+        self.apply(f"load torque {number(torque_nm)}")
+
+    def set_load_inertia(self, inertia_kg_m2: Number) -> None:
+        """Inertia added at the output shaft in kg·m² (``load inertia 0.02``)."""
+        self.apply(f"load inertia {number(inertia_kg_m2)}")
+
+    def set_load_friction(
+        self,
+        coulomb_nm: Optional[Number],
+        viscous_nm_s: Number = 0,
+        static_nm: Optional[Number] = None,
+        stribeck_rad_s: Optional[Number] = None,
+    ) -> None:
+        """Friction beside the motor's own, at the output shaft (``load friction 0.2 viscous 0.01 static 0.3 stribeck 0.5``): dry in
+        N·m, growing with the speed in N·m·s/rad, breaking loose in N·m, and the speed in rad/s from which on it is as in motion.
+        None takes it away (``load friction off``)."""
+        if coulomb_nm is None:
+            self.apply("load friction off")
+            return
+        words = ["load friction", number(coulomb_nm), "viscous", number(viscous_nm_s)]
+        words += [] if static_nm is None else ["static", number(static_nm)]
+        words += [] if stribeck_rad_s is None else ["stribeck", number(stribeck_rad_s)]
+        self.apply(" ".join(words))
+
+    def set_load_pulley(self, mass_kg: Optional[Number], radius_m: Number = 0.05) -> None:
+        """A weight in kg on a drum of this radius in m, lifted by positive motion, lowered with a negative radius
+        (``load pulley 2 0.05``); None takes it away (``load pulley off``)."""
+        self.apply("load pulley off" if mass_kg is None else f"load pulley {number(mass_kg)} {number(radius_m)}")
+
+    def set_load_spring(self, stiffness_nm_rad: Optional[Number], rest_deg: Number = 0) -> None:
+        """A spring in N·m/rad, at rest so many degrees from where the shaft is now (``load spring 5 90``); None takes it away
+        (``load spring off``)."""
+        off = stiffness_nm_rad is None
+        self.apply("load spring off" if off else f"load spring {number(stiffness_nm_rad or 0)} {number(rest_deg)}")
+
+    def set_load_stop(self, low: Optional[int], high: Optional[int]) -> None:
+        """End stops at these actual positions in the drive's counts (``load stop -5000 max``); None is no stop on that side, and
+        two of them take both away (``load stop off``)."""
+        bounds = ("min" if low is None else int(low), "max" if high is None else int(high))
+        self.apply("load stop off" if bounds == ("min", "max") else f"load stop {bounds[0]} {bounds[1]}")
+
+    def set_load_fan(self, torque_nm: Optional[Number], speed_rpm: Number = 1000) -> None:
+        """A fan that takes this torque in N·m at this speed in r/min (``load fan 2 300``); None takes it away (``load fan off``)."""
+        self.apply("load fan off" if torque_nm is None else f"load fan {number(torque_nm)} {number(speed_rpm)}")
+
+    def set_load_gear(self, ratio: Optional[Number], backlash_deg: Number = 0) -> None:
+        """All of these hang behind a gear of this ratio with so many degrees of backlash (``load gear 10 0.5``); None takes it away
+        (``load gear off``)."""
+        self.apply("load gear off" if ratio is None else f"load gear {number(ratio)} {number(backlash_deg)}")
+
+    def clear_loads(self) -> None:
+        """Takes all loads away (``load none``)."""
+        self.apply("load none")
+
+    def lock_rotor(self) -> None:
+        """Holds the rotor (``rotor lock``)."""
+        self.apply("rotor lock")
+
+    def free_rotor(self) -> None:
+        """Lets the rotor go (``rotor free``)."""
+        self.apply("rotor free")
+
+    def set_supply(
+        self,
+        voltage_v: Optional[Number] = None,
+        limit_a: Optional[Number] = None,
+        resistance_ohm: Optional[Number] = None,
+    ) -> None:
+        """The supply (``supply 48 limit 10 resistance 0.2``): open-circuit voltage in V, the most that it gives in A, resistance
+        of source and wires in ohm. None leaves that as it is."""
+        words = [] if voltage_v is None else [number(voltage_v)]
+        words += [] if limit_a is None else ["limit", number(limit_a)]
+        words += [] if resistance_ohm is None else ["resistance", number(resistance_ohm)]
+        if words:
+            self.apply("supply " + " ".join(words))
+
+    def hold_temperature(self, sensor: str, celsius: Optional[Number]) -> None:
+        """Holds a temperature in °C (``temperature motor 95``), or gives it back to the model with None. The sensor is ``motor``
+        or ``driver``."""
+        self.apply(f"temperature {word(sensor)} {'auto' if celsius is None else number(celsius)}")
+
+    def set_fault(self, component: str, broken: bool = True) -> None:
+        """Breaks or mends a component (``fault hall on``): ``hall``, ``encoder``, ``eeprom``, ``reference``, ``phase``, ``short``
+        or ``bridge``."""
+        self.apply(f"fault {word(component)} {'on' if broken else 'off'}")
+
+    def set_battery(self, connected: bool) -> None:
+        """The multi-turn battery of a joint (``battery off``)."""
+        self.apply(f"battery {'on' if connected else 'off'}")
+
+    def send_pulses(self, count: int, hz: Number) -> None:
+        """Pulses with a direction at the pulse inputs (``pulses 8192 10000``): how many, negative with the direction input
+        conducting, and how many a second."""
+        self.apply(f"pulses {int(count)} {number(hz)}")
+
+    def send_quadrature(self, count: int, hz: Number) -> None:
+        """Two channels of an encoder (``quadrature -400 1000``): counts, four a line, negative with the second channel ahead, and
+        counts a second."""
+        self.apply(f"quadrature {int(count)} {number(hz)}")
+
+    def send_duty(self, percent: Number) -> None:
+        """A square wave of this duty cycle in per cent (``duty 40``), for ever."""
+        self.apply(f"duty {number(percent)}")
+
+    def send_clock(self, hz: Number) -> None:
+        """A level on the second input that changes so many times a second (``clock 10000``), for ever."""
+        self.apply(f"clock {number(hz)}")
+
+    def cut_cable(self) -> None:
+        """Cuts its bus cable (``cable cut``). It goes on alone."""
+        self.apply("cable cut")
+
+    def join_cable(self) -> None:
+        """Joins its bus cable (``cable join``)."""
+        self.apply("cable join")
+
+    def set_bus_silent(self, silent: bool) -> None:
+        """It listens to the bus only (``bus silent on``)."""
+        self.apply(f"bus silent {'on' if silent else 'off'}")
+
+    def set_bus_late(self, min_ms: Optional[Number], max_ms: Optional[Number] = None) -> None:
+        """Its frames reach the bus so many ms late (``bus late 5 20``); None ends it (``bus late off``)."""
+        self.apply("bus late off" if min_ms is None else f"bus late {number(min_ms)} {number(min_ms if max_ms is None else max_ms)}")
+
+    def set_bus_babble(self, frame: Optional[str], gap_ms: Number = 1) -> None:
+        """It sends this frame again so many ms after it went out, for ever (``bus babble 080# 1``); None ends it
+        (``bus babble off``)."""
+        self.apply("bus babble off" if frame is None else f"bus babble {word(frame)} {number(gap_ms)}")
+
+    def set_bus_overrun(self, frames: Optional[int], service_ms: Number = 1) -> None:
+        """It holds so many frames and takes so many ms for each; what comes faster is lost (``bus overrun 2 0.5``); None ends it
+        (``bus overrun off``)."""
+        self.apply("bus overrun off" if frames is None else f"bus overrun {int(frames)} {number(service_ms)}")
+
+    def set_bus_corruption(self, probability: Optional[Number]) -> None:
+        """Each attempt to send a frame fails with this probability, 0 to 1 (``bus corrupt 0.3``), as with a bad plug at this node;
+        None ends it (``bus corrupt off``)."""
+        self.apply("bus corrupt off" if probability is None else f"bus corrupt {number(probability)}")
+
+    def set_object(self, index: int, sub_index: int, value: Union[int, float, str]) -> None:
+        """Value of an object of a node whose objects are the outer world's (``set 6000:01 FFh``): what its sensor measured."""
+        if isinstance(value, str):
+            text = '"' + value + '"'
+        elif isinstance(value, float):
+            text = number(value)
+        else:
+            text = str(int(value))
+        self.apply(f"set {index:04X}:{sub_index:02X} {text}")

@@ -1,0 +1,19 @@
+"""Values as words of a world command."""
+
+from __future__ import annotations
+
+from typing import Union
+
+Number = Union[int, float]
+
+
+def number(value: Number) -> str:
+    """The number with all its digits, as a word of a command."""
+    return repr(float(value))
+
+
+def word(text: str) -> str:
+    """The text, if it is one word: a command must not be able to hide in a name."""
+    if not text or text.split() != [text]:
+        raise ValueError(f"{text!r} is no name; expected one word")
+    return text

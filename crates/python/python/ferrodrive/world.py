@@ -1,0 +1,225 @@
+"""A virtual bus with drives on it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import weakref
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any, Optional, Union
+
+from . import _native
+from .body import Body
+from .errors import Refused
+from .virtual_drive import VirtualDrive
+from .turns import taking_part
+from .words import number
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+NANOSECONDS = 1_000_000_000
+
+#: Largest machine file that is read, in characters. A bus has 127 drives, and a drive some lines.
+LARGEST_MACHINE_FILE = 1 << 20
+
+#: Worlds by the channel under which `can.Bus` finds them, while somebody holds them.
+_by_channel: weakref.WeakValueDictionary[str, World] = weakref.WeakValueDictionary()
+
+
+class World(_native.World):
+    """A CAN bus, the drives on it and the physics around them, in virtual time.
+
+    Time moves only when it is told to (:meth:`run_for`, :meth:`run_until`), or as far as a program waits while
+    :func:`~ferrodrive.virtual_time` or ``can.Bus(interface="ferrodrive")`` is in use. The same seed and the same calls give the
+    same frames at the same nanoseconds on every run and every machine.
+
+    A world may be used from several threads; they take turns.
+
+    :param bitrate: bit rate of the bus in bit/s, or as text (``"500k"``)
+    :param seed: decides everything random
+    :param channel: a name under which ``can.Bus(interface="ferrodrive", channel=...)`` finds this world
+    """
+
+    _watched = False
+
+    def __new__(cls, bitrate: Union[int, str] = 500_000, seed: int = 1, *, channel: Optional[str] = None) -> Self:
+        world = super().__new__(cls, str(bitrate), seed)
+        if channel is not None:
+            _by_channel[channel] = world
+        return world
+
+    @classmethod
+    def machine(cls, path: Union[str, os.PathLike[str]], seed: Optional[int] = None) -> World:
+        """The world that a machine file describes: its drives and what is around them.
+
+        :param seed: instead of the file's
+        """
+        with open(path, encoding="utf-8") as file:
+            text = file.read(LARGEST_MACHINE_FILE + 1)
+        if len(text) > LARGEST_MACHINE_FILE:
+            raise ValueError(f"{path} has more than 1 MB; no machine needs that")
+        world = cls()
+        try:
+            world.become_machine(text, seed)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from None
+        return world
+
+    def add(
+        self,
+        model: Optional[str] = None,
+        *,
+        node: int,
+        eds: Optional[Union[str, os.PathLike[str]]] = None,
+        **options: Union[int, str],
+    ) -> VirtualDrive:
+        """Puts a drive onto the bus, factory-fresh but for its node-ID and bit rate, and powers it.
+
+        :param model: as :func:`~ferrodrive.models` lists them
+        :param eds: instead of a model, an EDS or DCF file: a servo with its objects, or, if it describes no drive, a node with them
+        :param node: node-ID at the first start, 1 to 127; the drive keeps this number in the world
+        :param options: what is special about this one, in the words of ``ferrodrive sim --drive``: ``motor="fast"``,
+            ``firmware="2.01"``, ``max_current=100``; an object by its index as ``**{"6060": 3}``
+        """
+        if (model is None) == (eds is None):
+            raise ValueError("a drive is of a model or of a file (eds=...), one of them")
+        described = model if eds is None else os.fspath(eds)
+        self.add_drive(str(described), node, [(key, str(value)) for key, value in options.items()])
+        return VirtualDrive(self, node)
+
+    def __getitem__(self, node: int) -> VirtualDrive:
+        """The drive that was added under this number."""
+        if node not in self.nodes:
+            present = ", ".join(str(node) for node in self.nodes) or "none"
+            raise KeyError(f"no drive was added as node {node}; there is {present}")
+        return VirtualDrive(self, node)
+
+    def __iter__(self) -> Iterator[VirtualDrive]:
+        """The drives in the order in which they were added."""
+        return iter([VirtualDrive(self, node) for node in self.nodes])
+
+    def __repr__(self) -> str:
+        return f"<World at {self.now} s with {len(self.nodes)} drives>"
+
+    def apply(self, line: str) -> dict[str, Any]:
+        """Does what a world command says (``4 load torque 2.5``, ``bus corrupt 0.01``) and returns its answer; what is refused raises
+        :class:`~ferrodrive.Refused`."""
+        answer: dict[str, Any] = json.loads(self.command(line) or "{}")
+        if not answer.get("ok"):
+            error = answer.get("error", "nothing to do is said")
+            raise Refused(error["message"] if isinstance(error, dict) else error)
+        return answer
+
+    def body(self, name: str) -> Body:
+        """A machine that several drives move, by its name."""
+        return Body(self, name)
+
+    @property
+    def now(self) -> float:
+        """Virtual time in s since the world began."""
+        return self.now_ns / NANOSECONDS
+
+    def run_for(self, seconds: float) -> None:
+        """Lets time pass, in s. Threads that take part in the virtual time of this world go on meanwhile."""
+        ns = nanoseconds(seconds)
+        self._let_pass(ns)
+
+    def run_until(self, condition: Callable[[], object], within: float, every: float = 0.001) -> float:
+        """Lets time pass until `condition()` is true; returns the time at which it was, in s.
+
+        :param within: longest time in s that may pass; after that :class:`TimeoutError` is raised
+        :param every: how often the condition is looked at, in s of virtual time
+
+        An exception that the condition raises comes out here; the world stands where it was raised.
+        """
+        end_ns = self.now_ns + nanoseconds(within)
+        step_ns = max(1, nanoseconds(every))
+        while not condition():
+            left_ns = end_ns - self.now_ns
+            if left_ns <= 0:
+                raise TimeoutError(f"not so within {within} s; it is {self.now} s")
+            self._let_pass(min(step_ns, left_ns))
+        return self.now
+
+    def _let_pass(self, ns: int) -> None:
+        if (time := taking_part(self)) is not None:
+            time.sleep_ns(ns)
+        else:
+            self.run_ns(ns)
+
+    def snapshot(self) -> World:
+        """A copy of everything: drives, physics, frames under way. It goes its own way from here, or is come back to with
+        :meth:`restore`."""
+        copy = type(self)(self.bitrate)
+        copy.become_copy_of(self)
+        return copy
+
+    def restore(self, snapshot: World) -> None:
+        """Becomes again what it was when `snapshot` was taken from it. May be done any number of times."""
+        self.become_copy_of(snapshot)
+
+    def events(self) -> Iterator[dict[str, Any]]:
+        """What happened since the last call, oldest first: boots, changes of state, faults with their remedies, EMCY, arrivals,
+        stores, errors of the bus. Each has ``t`` (s), ``t_ns``, ``kind``, ``text`` for people, ``node`` where it is about one,
+        ``remedy`` where there is one. The first call begins the watch, and has nothing to tell."""
+        if not self._watched:
+            self._watched = True
+            self.watch(True)
+        while lines := self.take_events():
+            for line in lines:
+                yield json.loads(line)
+
+    @contextlib.contextmanager
+    def record(self, path: Union[str, os.PathLike[str]], every: float = 0.001) -> Iterator[None]:
+        """Records every signal of every drive while the block runs, to a file ``.mcap`` (for Foxglove, PlotJuggler, Rerun; with the
+        frames) or ``.csv``.
+
+        :param every: time between two samples in s of virtual time
+        """
+        self.begin_record(os.fspath(path), max(1, nanoseconds(every)))
+        try:
+            yield
+        finally:
+            self.end_record()
+
+    def corrupt(self, probability: float) -> None:
+        """From now on each frame is destroyed on the wire with this probability, 0 to 1, and sent again (``bus corrupt 0.01``)."""
+        self.apply(f"bus corrupt {number(probability)}")
+
+    def destroy(self, nth_frame: int, bit: int) -> None:
+        """The n-th frame from here on is destroyed at this bit of it, counted from 1 at start of frame (``bus destroy 3 20``)."""
+        self.apply(f"bus destroy {int(nth_frame)} {int(bit)}")
+
+    @property
+    def bus_load(self) -> float:
+        """Share of the time since the beginning that the wire was busy, from 0 to 1."""
+        return self.statistics()[0]
+
+
+def nanoseconds(seconds: float) -> int:
+    """A length of time as a whole number of nanoseconds."""
+    ns = round(seconds * NANOSECONDS)
+    if ns < 0:
+        raise ValueError(f"time does not go back; {seconds} s is no length of time")
+    return ns
+
+
+def at_channel(channel: object) -> World:
+    """The world that a channel of python-can means: a world, the name of one, or drives to make one of (``zlac8030l@4``)."""
+    if isinstance(channel, World):
+        return channel
+    text = os.fspath(channel) if isinstance(channel, os.PathLike) else str(channel)
+    if (world := _by_channel.get(text)) is not None:
+        return world
+    if "@" in text:
+        world = World(channel=text)
+        for place in text.split():
+            model, _, node = place.rpartition("@")
+            world.add(model, node=int(node))
+        return world
+    raise ValueError(
+        f"{text!r} is no channel; expected a World, the name of one (World(channel={text!r})), or drives, "
+        'as in "zlac8030l@4 m4230e17b50@1"'
+    )

@@ -1,0 +1,31 @@
+//! The native half of the Python package `ferrodrive`.
+//!
+//! Only what must be fast or must know the Rust side is here: a world that moves without the interpreter's lock, and the
+//! master. What users see (classes with units in their docstrings, the stand-in for the clock, the interface for
+//! python-can) is Python, in `python/ferrodrive`, and stands on `ferrodrive._native`.
+//!
+//! A world is behind a lock of its own: two threads may use it in turn. A process that was forked refuses the worlds of its
+//! parent, whose lock another thread may have held.
+
+mod failure;
+mod frames;
+mod live;
+mod master;
+mod sheets;
+mod world;
+
+use pyo3::prelude::*;
+
+/// Native half of the package `ferrodrive`.
+#[pymodule]
+fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<world::World>()?;
+    module.add_class::<master::Network>()?;
+    module.add_class::<master::Job>()?;
+    module.add_function(wrap_pyfunction!(sheets::models, module)?)?;
+    module.add_function(wrap_pyfunction!(sheets::model_name, module)?)?;
+    module.add_function(wrap_pyfunction!(sheets::sheet, module)?)?;
+    module.add_function(wrap_pyfunction!(world::stimulus_forms, module)?)?;
+    Ok(())
+}

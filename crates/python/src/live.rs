@@ -1,0 +1,145 @@
+//! A master on a real bus: a thread that runs it, and the jobs it is given.
+//!
+//! The thread ends with its handle. Before it does, every drive that this program has set in motion is quick-stopped, and
+//! the guards are released, as the command line does.
+
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use master::Network;
+use tokio::sync::{Notify, mpsc};
+use tokio::task::LocalSet;
+use transport::{BusSpec, WallClock, run_station};
+
+use crate::world::Job;
+
+/// How long the last words may take.
+const STOP_PATIENCE: Duration = Duration::from_secs(2);
+
+/// A master that a thread runs.
+pub(crate) struct Live {
+    jobs: Option<mpsc::UnboundedSender<Job>>,
+    thread: Option<JoinHandle<()>>,
+    lost: Arc<Mutex<Option<String>>>,
+}
+
+/// How the opening of a bus went, once that is known.
+type Opened = Arc<(Mutex<Option<Result<(), String>>>, Condvar)>;
+
+impl Live {
+    /// Opens a bus and runs the master on it.
+    ///
+    /// # Errors
+    /// Why the bus does not open.
+    pub(crate) fn open(spec: BusSpec, network: Network) -> Result<Self, String> {
+        let (jobs, incoming) = mpsc::unbounded_channel();
+        let opened = Opened::default();
+        let lost = Arc::new(Mutex::new(None));
+        let (told, noted) = (Arc::clone(&opened), Arc::clone(&lost));
+        let thread = thread::Builder::new().name("ferrodrive master".into());
+        let thread = thread.spawn(move || run(&spec, network, incoming, &told, &noted));
+        let thread = thread.map_err(|error| format!("cannot start a thread: {error}"))?;
+        let mut result = opened.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let result = loop {
+            match result.take() {
+                Some(result) => break result,
+                None => result = opened.1.wait(result).unwrap_or_else(PoisonError::into_inner),
+            }
+        };
+        result.map(|()| Self { jobs: Some(jobs), thread: Some(thread), lost })
+    }
+
+    /// Begins a job.
+    ///
+    /// # Errors
+    /// Why there is no bus any more.
+    pub(crate) fn begin(&self, job: Job) -> Result<(), String> {
+        let refusal = || self.lost().unwrap_or_else(|| "the network is closed".into());
+        self.jobs.as_ref().ok_or_else(refusal)?.send(job).map_err(|_| refusal())
+    }
+
+    /// Why the bus was lost, if it was.
+    pub(crate) fn lost(&self) -> Option<String> {
+        self.lost.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Stops what moves and ends the thread.
+    pub(crate) fn close(&mut self) {
+        self.jobs = None;
+        if let Some(thread) = self.thread.take() {
+            // A thread that panicked has nothing left to say.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Drop for Live {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+/// The thread: opens the bus, says how that went, and runs until the handle is gone or the bus is lost.
+fn run(
+    spec: &BusSpec,
+    network: Network,
+    incoming: mpsc::UnboundedReceiver<Job>,
+    opened: &Opened,
+    lost: &Mutex<Option<String>>,
+) {
+    let tell = |result: Result<(), String>| {
+        *opened.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(result);
+        opened.1.notify_all();
+    };
+    let runtime = match tokio::runtime::Builder::new_current_thread().enable_all().build() {
+        Ok(runtime) => runtime,
+        Err(error) => return tell(Err(format!("cannot start the runtime: {error}"))),
+    };
+    let local = LocalSet::new();
+    runtime.block_on(local.run_until(async {
+        let clock = WallClock::start();
+        let mut bus = match spec.open(&clock).await {
+            Ok(bus) => bus,
+            Err(error) => return tell(Err(with_causes(&error))),
+        };
+        tell(Ok(()));
+        let mut station = network.clone();
+        let wakeup = Arc::new(Notify::new());
+        let work = work_through(network, incoming, Arc::clone(&wakeup));
+        if let Err(error) = run_station(&mut bus, &mut station, &clock, &wakeup, work).await {
+            *lost.lock().unwrap_or_else(PoisonError::into_inner) = Some(with_causes(&error));
+        }
+    }));
+}
+
+/// Does the jobs that come, side by side, until nobody can send more; then stops what moves.
+async fn work_through(network: Network, mut incoming: mpsc::UnboundedReceiver<Job>, wakeup: Arc<Notify>) {
+    let waking = std::task::Waker::from(Arc::new(Wakes(wakeup)));
+    network.on_activity(waking);
+    while let Some(job) = incoming.recv().await {
+        tokio::task::spawn_local(job);
+    }
+    // What cannot be reached any more stops by its guard.
+    let _ = tokio::time::timeout(STOP_PATIENCE, network.stop_all_moved()).await;
+    let _ = tokio::time::timeout(STOP_PATIENCE, network.release_guards()).await;
+}
+
+/// Has the runner look at the master again when a job has asked it for something.
+struct Wakes(Arc<Notify>);
+
+impl std::task::Wake for Wakes {
+    fn wake(self: Arc<Self>) {
+        self.0.notify_one();
+    }
+}
+
+fn with_causes(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut source = error.source();
+    while let Some(cause) = source {
+        text = format!("{text}: {cause}");
+        source = cause.source();
+    }
+    text
+}

@@ -1,0 +1,276 @@
+//! The master for Python: what a drive is asked becomes a job, which a world or the thread of a real bus works through.
+//!
+//! Blocking calls and coroutines are two ways to wait for a job; both are in Python (`ferrodrive/master.py`).
+
+mod job;
+mod runner;
+mod value;
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use canopen::{Mux, NmtCommand, NodeId};
+use master::drive::{Drive, HomingOptions, MotionOptions, SwitchedOff};
+use master::units::{Amperes, Angle, Ramp, Rpm};
+use master::{Error, Network as Core, Node};
+use pyo3::prelude::*;
+use transport::BusSpec;
+
+pub(crate) use job::Job;
+use runner::Runner;
+use value::Value;
+
+use crate::failure::{bad_value, wrong_use};
+use crate::live::Live;
+use crate::sheets::{model_of, node_id};
+use crate::world::World;
+
+/// A CANopen network as its master sees it; `ferrodrive.Network` is what users have.
+#[pyclass(frozen, module = "ferrodrive._native")]
+pub(crate) struct Network {
+    core: Core,
+    runner: Arc<Runner>,
+}
+
+/// What a drive is asked to do, in plain values.
+#[derive(FromPyObject)]
+struct Order {
+    #[pyo3(item)]
+    do_: String,
+    #[pyo3(item, default)]
+    value: Option<f64>,
+    #[pyo3(item, default)]
+    counts: Option<i64>,
+    #[pyo3(item, default)]
+    relative: bool,
+    #[pyo3(item, default)]
+    speed_rpm: Option<f64>,
+    #[pyo3(item, default)]
+    acceleration_rpm_s: Option<f64>,
+    #[pyo3(item, default)]
+    deceleration_rpm_s: Option<f64>,
+    #[pyo3(item, default)]
+    wait: bool,
+    #[pyo3(item, default)]
+    limit_s: Option<f64>,
+}
+
+impl Order {
+    fn motion(&self) -> MotionOptions {
+        MotionOptions {
+            speed: self.speed_rpm.map(Rpm),
+            acceleration: self.acceleration_rpm_s.map(Ramp::RpmPerSecond),
+            deceleration: self.deceleration_rpm_s.map(Ramp::RpmPerSecond),
+            wait: self.wait,
+        }
+    }
+
+    fn value(&self) -> PyResult<f64> {
+        let value = self.value.filter(|value| value.is_finite());
+        value.ok_or_else(|| bad_value(format!("{} needs a number", self.do_)))
+    }
+
+    fn angle(&self) -> PyResult<Angle> {
+        match self.counts {
+            Some(counts) => Ok(Angle::Counts(counts)),
+            None => self.value().map(|degrees| Angle::Turns(degrees / 360.0)),
+        }
+    }
+}
+
+#[pymethods]
+impl Network {
+    /// A master as one more station of a world.
+    #[staticmethod]
+    fn in_world(py: Python<'_>, world: &Bound<'_, World>) -> PyResult<Self> {
+        let (core, shared) = (Core::new(), Arc::clone(world.get().shared()));
+        let mut state = shared.lock(py)?;
+        state.world.add_station(core.clone());
+        state.jobs.note_master();
+        drop(state);
+        Ok(Self { core, runner: Arc::new(Runner::World(shared)) })
+    }
+
+    /// A master on a real bus: `socketcand://HOST:PORT/can0`, `slcan:///dev/ttyACM0?bitrate=500k`.
+    #[staticmethod]
+    fn on_bus(py: Python<'_>, bus: &str) -> PyResult<Self> {
+        let spec: BusSpec = bus.parse().map_err(bad_value)?;
+        let core = Core::new();
+        let live = py.detach(|| Live::open(spec, core.clone()));
+        let live = live.map_err(|reason| wrong_use(format!("bus {bus}: {reason}")))?;
+        Ok(Self { core, runner: Arc::new(Runner::Live(Mutex::new(Some(live)))) })
+    }
+
+    /// Stops what this program has set in motion, and leaves the real bus. A world has to be moved for that by its owner.
+    fn close(&self, py: Python<'_>) {
+        if let Runner::Live(live) = &*self.runner {
+            let open = live.lock().unwrap_or_else(PoisonError::into_inner).take();
+            py.detach(|| drop(open));
+        }
+    }
+
+    /// Quick-stops every drive that this program has set in motion; the result is a list of what did not go well.
+    fn stop_all(&self, py: Python<'_>) -> PyResult<Job> {
+        let core = self.core.clone();
+        self.begin(py, async move {
+            let stopped = core.stop_all_moved().await;
+            let failed = stopped.into_iter().filter_map(|(_, outcome)| outcome.err());
+            Ok(Value::List(failed.map(|error| Value::Text(error.to_string())).collect()))
+        })
+    }
+
+    /// Lets time pass, in seconds.
+    fn sleep(&self, py: Python<'_>, seconds: f64) -> PyResult<Job> {
+        let core = self.core.clone();
+        let duration = duration(seconds)?;
+        self.begin(py, async move {
+            core.sleep(duration).await;
+            Ok(Value::None)
+        })
+    }
+
+    /// Sends an NMT command, to all nodes or to one.
+    fn nmt(&self, command: &str, node: Option<u8>) -> PyResult<()> {
+        let command = nmt_command(command)?;
+        match node {
+            Some(raw) => self.node(raw)?.nmt(command),
+            None => self.core.nmt_all(command),
+        }
+        Ok(())
+    }
+
+    /// Produces SYNC with this period in seconds, or stops.
+    fn sync(&self, period_s: Option<f64>) -> PyResult<()> {
+        self.core.sync(period_s.map(duration).transpose()?);
+        Ok(())
+    }
+
+    /// Nodes that were heard of.
+    fn seen(&self) -> Vec<u16> {
+        NodeId::all().filter(|id| self.core.facts(*id).seen_at.is_some()).map(|id| id.raw().into()).collect()
+    }
+
+    /// Waits until a node has booted or was heard of.
+    fn wait_for(&self, py: Python<'_>, node: u8, within_s: f64) -> PyResult<Job> {
+        let (node, patience) = (self.node(node)?, duration(within_s)?);
+        self.begin(py, async move {
+            let heard = node.wait(|view| view.facts.seen_at, patience).await;
+            Ok(Value::Bool(heard.is_ok()))
+        })
+    }
+
+    /// SDO upload.
+    fn upload(&self, py: Python<'_>, node: u8, index: u16, sub_index: u8) -> PyResult<Job> {
+        let node = self.node(node)?;
+        self.begin(
+            py,
+            async move { Ok(Value::Bytes(node.upload(Mux::new(index, sub_index)).await?.as_bytes().to_vec())) },
+        )
+    }
+
+    /// SDO download.
+    fn download(&self, py: Python<'_>, node: u8, index: u16, sub_index: u8, data: Vec<u8>) -> PyResult<Job> {
+        let node = self.node(node)?;
+        self.begin(py, async move { node.download(Mux::new(index, sub_index), &data).await.map(|()| Value::None) })
+    }
+
+    /// Which model a node is by its identity and objects; its name, or `None` if that is not certain.
+    fn identify(&self, py: Python<'_>, node: u8) -> PyResult<Job> {
+        let node = self.node(node)?;
+        self.begin(py, async move {
+            let knowledge = master::identify::knowledge(&node).await?;
+            let known =
+                knowledge.description().filter(|_| knowledge.guess().is_none_or(|guess| guess.evidence().is_none()));
+            Ok(known.map_or(Value::None, |model| Value::Text(model.name.to_owned())))
+        })
+    }
+
+    /// Does what an order says with a drive of a model.
+    fn drive(&self, py: Python<'_>, node: u8, model: &str, order: Order) -> PyResult<Job> {
+        let drive = Drive::new(self.node(node)?, model_of(model)?);
+        match order.do_.as_str() {
+            "enable" => self.begin(py, async move { drive.enable().await.map(|()| Value::None) }),
+            "disable" => self.begin(py, async move { drive.disable().await.map(|()| Value::None) }),
+            "stop" => self.begin(py, async move { drive.stop().await.map(|()| Value::None) }),
+            "quick_stop" => self.begin(py, async move { drive.quick_stop().await.map(|()| Value::None) }),
+            "reset_fault" => self.begin(py, async move { drive.reset_fault().await.map(|()| Value::None) }),
+            "save" => self.begin(py, async move { drive.save().await.map(|()| Value::None) }),
+            "restore" => self.begin(py, async move { drive.restore().await.map(|()| Value::None) }),
+            "check_identity" => self.begin(py, async move { drive.check_identity().await.map(|()| Value::None) }),
+            "release_guard" => self.begin(py, async move { drive.release_guard().await.map(|()| Value::None) }),
+            "guard" => self.begin(py, async move {
+                let loss = drive.guard(SwitchedOff::Leave).await?;
+                Ok(Value::Text(loss.to_string()))
+            }),
+            "state" => self.begin(py, async move { drive.state().await.map(|state| value::state(&state)) }),
+            "velocity" => {
+                let (speed, options) = (Rpm(order.value()?), order.motion());
+                self.begin(py, async move { drive.velocity(speed, options).await.map(|report| value::motion(&report)) })
+            }
+            "torque" => {
+                let current = Amperes(order.value()?);
+                self.begin(py, async move { drive.torque(current).await.map(|report| value::motion(&report)) })
+            }
+            "move" => {
+                let (to, options, relative) = (order.angle()?, order.motion(), order.relative);
+                self.begin(py, async move {
+                    let moved = if relative {
+                        drive.move_relative(to, options).await
+                    } else {
+                        drive.move_absolute(to, options).await
+                    };
+                    moved.map(|report| value::motion(&report))
+                })
+            }
+            "home" => {
+                let method = order.counts.and_then(|method| i8::try_from(method).ok());
+                let method = method.ok_or_else(|| bad_value("a homing method is a number from -128 to 127"))?;
+                let limit = order.limit_s.map_or(Ok(HomingOptions::default().limit), duration)?;
+                let options = HomingOptions { speed: order.speed_rpm.map(Rpm), limit, wait: order.wait };
+                self.begin(py, async move { drive.home(method, options).await.map(|report| value::motion(&report)) })
+            }
+            other => Err(bad_value(format!("a drive cannot {other:?}"))),
+        }
+    }
+}
+
+impl Network {
+    fn node(&self, raw: u8) -> PyResult<Node> {
+        Ok(self.core.node(node_id(raw)?))
+    }
+
+    /// Begins a job with whoever works through them.
+    fn begin(
+        &self,
+        py: Python<'_>,
+        work: impl Future<Output = Result<Value, Error>> + Send + 'static,
+    ) -> PyResult<Job> {
+        let (job, future) = Job::new(work, &self.runner);
+        match &*self.runner {
+            Runner::World(shared) => job.set_number(shared.lock(py)?.jobs.begin(future)),
+            Runner::Live(live) => {
+                let live = live.lock().unwrap_or_else(PoisonError::into_inner);
+                let open = live.as_ref().ok_or_else(|| wrong_use("the network is closed"))?;
+                open.begin(future).map_err(wrong_use)?;
+            }
+        }
+        Ok(job)
+    }
+}
+
+fn nmt_command(word: &str) -> PyResult<NmtCommand> {
+    match word {
+        "start" => Ok(NmtCommand::Start),
+        "stop" => Ok(NmtCommand::Stop),
+        "pre-operational" => Ok(NmtCommand::EnterPreOperational),
+        "reset" => Ok(NmtCommand::ResetNode),
+        "reset-communication" => Ok(NmtCommand::ResetCommunication),
+        _ => Err(bad_value(format!(
+            "{word:?} is no NMT command; expected start, stop, pre-operational, reset or reset-communication"
+        ))),
+    }
+}
+
+fn duration(seconds: f64) -> PyResult<Duration> {
+    Duration::try_from_secs_f64(seconds).map_err(|error| bad_value(format!("{seconds} s: {error}")))
+}

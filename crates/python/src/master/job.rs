@@ -1,0 +1,180 @@
+//! A piece of the master's work as Python holds it.
+
+use std::future::poll_fn;
+use std::pin::pin;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::task::Poll;
+use std::time::Duration;
+
+use master::Error;
+use pyo3::prelude::*;
+
+use super::runner::Runner;
+use super::value::Value;
+use crate::failure::{master_error, wrong_use};
+use crate::world;
+
+/// How long a waiting thread is deaf to signals (Ctrl-C).
+const NAP: Duration = Duration::from_millis(100);
+
+/// A job: begun, and to be waited for.
+#[pyclass(frozen, module = "ferrodrive._native")]
+pub(crate) struct Job {
+    number: AtomicU64,
+    runner: Arc<Runner>,
+    outcome: Arc<Outcome>,
+}
+
+#[derive(Default)]
+struct Outcome {
+    state: Mutex<State>,
+    ended: Condvar,
+}
+
+#[derive(Default)]
+struct State {
+    result: Option<Result<Value, Error>>,
+    /// Nobody wants the result any more, or nobody will ever give it.
+    given_up: bool,
+    /// Called when it has ended.
+    callback: Option<Py<PyAny>>,
+}
+
+impl Outcome {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Tells the end of a job however it ends: with a result, or dropped with the thread that ran it.
+struct Reporter(Arc<Outcome>);
+
+impl Reporter {
+    fn is_given_up(&self) -> bool {
+        self.0.lock().given_up
+    }
+
+    fn tell(&self, result: Option<Result<Value, Error>>) {
+        let callback = {
+            let mut state = self.0.lock();
+            state.given_up = state.given_up || result.is_none();
+            state.result = result;
+            state.callback.take()
+        };
+        self.0.ended.notify_all();
+        if let Some(callback) = callback {
+            Python::attach(|py| {
+                if let Err(error) = callback.call0(py) {
+                    error.write_unraisable(py, None);
+                }
+            });
+        }
+    }
+}
+
+impl Drop for Reporter {
+    fn drop(&mut self) {
+        let untold = {
+            let state = self.0.lock();
+            state.result.is_none() && !state.given_up
+        };
+        if untold {
+            self.tell(None);
+        }
+    }
+}
+
+impl Job {
+    /// A job, and the future that does it.
+    pub(super) fn new(
+        work: impl Future<Output = Result<Value, Error>> + Send + 'static,
+        runner: &Arc<Runner>,
+    ) -> (Self, world::Job) {
+        let outcome = Arc::new(Outcome::default());
+        let reporter = Reporter(Arc::clone(&outcome));
+        let future = async move {
+            let mut work = pin!(work);
+            // Dropping the work takes back what it asked the network for.
+            let result = poll_fn(|context| match reporter.is_given_up() {
+                true => Poll::Ready(None),
+                false => work.as_mut().poll(context).map(Some),
+            });
+            let result = result.await;
+            reporter.tell(result);
+        };
+        (Self { number: AtomicU64::new(0), runner: Arc::clone(runner), outcome }, Box::pin(future))
+    }
+
+    pub(super) fn set_number(&self, number: u64) {
+        self.number.store(number, Ordering::Relaxed);
+    }
+}
+
+#[pymethods]
+impl Job {
+    /// Its number in its world; 0 on a real bus.
+    #[getter]
+    fn number(&self) -> u64 {
+        self.number.load(Ordering::Relaxed)
+    }
+
+    /// True when it has ended, one way or the other.
+    #[getter]
+    fn ended(&self) -> bool {
+        let state = self.outcome.lock();
+        state.result.is_some() || state.given_up
+    }
+
+    /// Waits for its end on a real bus.
+    fn wait(&self, py: Python<'_>) -> PyResult<()> {
+        while !self.ended() {
+            py.detach(|| {
+                let state = self.outcome.lock();
+                if state.result.is_none() && !state.given_up {
+                    drop(self.outcome.ended.wait_timeout(state, NAP));
+                }
+            });
+            py.check_signals()?;
+        }
+        Ok(())
+    }
+
+    /// Has `callback` called from the thread of the bus when it has ended; at once if it has.
+    fn on_end(&self, py: Python<'_>, callback: Py<PyAny>) -> PyResult<()> {
+        {
+            let mut state = self.outcome.lock();
+            if state.result.is_none() && !state.given_up {
+                state.callback = Some(callback);
+                return Ok(());
+            }
+        }
+        callback.call0(py).map(|_| ())
+    }
+
+    /// Gives it up. What it asked for is taken back; what a drive was told already stays.
+    fn cancel(&self, py: Python<'_>) -> PyResult<()> {
+        self.outcome.lock().given_up = true;
+        if let Runner::World(shared) = &*self.runner {
+            shared.lock(py)?.jobs.cancel(self.number());
+        }
+        Ok(())
+    }
+
+    /// What came of it; raises what went wrong.
+    fn result(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        match self.outcome.lock().result.take() {
+            Some(Ok(value)) => value.into_python(py),
+            Some(Err(error)) => Err(master_error(py, &error)),
+            None => {
+                let lost = match &*self.runner {
+                    Runner::Live(live) => {
+                        live.lock().unwrap_or_else(PoisonError::into_inner).as_ref().and_then(crate::live::Live::lost)
+                    }
+                    Runner::World(_) => None,
+                };
+                Err(wrong_use(lost.unwrap_or_else(|| "it was given up, or the network was closed meanwhile".into())))
+            }
+        }
+    }
+}

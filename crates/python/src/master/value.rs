@@ -1,0 +1,79 @@
+//! What a job gives, as values that are made without the interpreter and become Python's when they are asked for.
+
+use master::drive::{DriveState, MotionReport};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict, PyList};
+
+/// A value on its way to Python.
+pub(crate) enum Value {
+    None,
+    Bool(bool),
+    Integer(i64),
+    Real(f64),
+    Text(String),
+    Bytes(Vec<u8>),
+    List(Vec<Value>),
+    Record(Vec<(&'static str, Value)>),
+}
+
+impl Value {
+    /// Python's value.
+    pub(super) fn into_python(self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        Ok(match self {
+            Self::None => py.None(),
+            Self::Bool(flag) => flag.into_pyobject(py)?.to_owned().into_any().unbind(),
+            Self::Integer(integer) => integer.into_pyobject(py)?.into_any().unbind(),
+            Self::Real(real) => real.into_pyobject(py)?.into_any().unbind(),
+            Self::Text(text) => text.into_pyobject(py)?.into_any().unbind(),
+            Self::Bytes(bytes) => PyBytes::new(py, &bytes).into_any().unbind(),
+            Self::List(values) => {
+                let list = PyList::empty(py);
+                for value in values {
+                    list.append(value.into_python(py)?)?;
+                }
+                list.into_any().unbind()
+            }
+            Self::Record(fields) => {
+                let dict = PyDict::new(py);
+                for (name, value) in fields {
+                    dict.set_item(name, value.into_python(py)?)?;
+                }
+                dict.into_any().unbind()
+            }
+        })
+    }
+}
+
+fn real(value: Option<f64>) -> Value {
+    value.map_or(Value::None, Value::Real)
+}
+
+/// Everything that a drive says of itself, by names with units.
+pub(super) fn state(state: &DriveState) -> Value {
+    let faults = state.faults.iter().map(|fault| {
+        Value::Record(vec![("name", Value::Text(fault.name.into())), ("remedy", Value::Text(fault.remedy.into()))])
+    });
+    Value::Record(vec![
+        ("statusword", Value::Integer(state.statusword.0.into())),
+        ("power", state.power.map_or(Value::None, |power| Value::Text(power.name().to_owned()))),
+        ("mode", state.mode.map_or(Value::None, |mode| Value::Integer(mode.0.into()))),
+        ("fault_code", Value::Integer(state.fault_code.into())),
+        ("faults", Value::List(faults.collect())),
+        ("position", state.position.map_or(Value::None, |position| Value::Integer(position.0))),
+        ("angle_deg", real(state.angle.map(|angle| angle.0))),
+        ("velocity_rpm", real(state.velocity.map(|velocity| velocity.0))),
+        ("current_a", real(state.current.map(|current| current.0))),
+        ("supply_v", real(state.supply.map(|supply| supply.0))),
+        ("motor_c", real(state.motor_temperature.map(|celsius| celsius.0))),
+        ("driver_c", real(state.driver_temperature.map(|celsius| celsius.0))),
+        ("nmt", state.nmt.map_or(Value::None, |nmt| Value::Text(nmt.to_string()))),
+    ])
+}
+
+/// How a motion went.
+pub(super) fn motion(report: &MotionReport) -> Value {
+    Value::Record(vec![
+        ("reached_after_s", real(report.reached_after.map(|after| after.as_secs_f64()))),
+        ("notes", Value::List(report.notes.iter().map(|note| Value::Text(note.to_string())).collect())),
+    ])
+}

@@ -1,0 +1,403 @@
+//! A world that Python holds: drives, adapters and time, behind a lock, and what waits for it.
+
+mod jobs;
+mod record;
+mod report;
+
+use std::path::PathBuf;
+use std::process;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use can::{Bitrate, Instant};
+use pyo3::exceptions::PyOSError;
+use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
+use pyo3::types::PyDict;
+use sim::command;
+use sim::machine::order;
+use sim::stimulus::{FORMS, Place};
+use sim::wire::{Statistics, WireEvent};
+use sim::{StationId, VirtualDrive};
+use testbench::events;
+use testbench::machine_file::Machine;
+use testbench::words::drive::DriveSpec;
+
+use crate::failure::{bad_value, refused, wrong_use};
+use crate::frames::{Plain, frame, plain};
+use crate::sheets::{model_of, node_id};
+pub(crate) use jobs::{Job, Jobs};
+use record::Recording;
+
+/// How far a world is moved in one go before Python's signal handlers get their turn (Ctrl-C). Where it is cut changes
+/// nothing in the run.
+const SLICE: Duration = Duration::from_millis(200);
+
+/// What a stimulus may say, one form a line, as `help` of `ferrodrive sim` lists them.
+#[pyfunction]
+pub(crate) fn stimulus_forms() -> Vec<&'static str> {
+    FORMS.to_vec()
+}
+
+/// A bus with everything on it, in virtual time; `ferrodrive.World` is what users have.
+#[pyclass(frozen, subclass, weakref, module = "ferrodrive._native")]
+pub(crate) struct World {
+    shared: Arc<Shared>,
+}
+
+/// What a world's handles share.
+pub(crate) struct Shared {
+    /// A child of `fork` has the worlds of its parent in its memory, and perhaps the lock of one held for ever.
+    process: u32,
+    state: Mutex<State>,
+}
+
+/// The world and what waits for it.
+pub(crate) struct State {
+    pub(crate) world: sim::World,
+    pub(crate) jobs: Jobs,
+    /// In the order in which Python numbers them.
+    probes: Vec<StationId>,
+    recording: Option<Recording>,
+}
+
+/// Why [`World::advance`] came back.
+enum Came {
+    /// To the end of the time it was given.
+    ToTheEnd,
+    /// Something was heard at the probe of this number.
+    Heard(usize),
+    /// The job of this number has ended.
+    Done(u64),
+    /// Nothing will ever happen any more.
+    Stalled,
+    /// As far as it goes in one go.
+    SomeWay,
+}
+
+impl Shared {
+    /// The state, for this process alone.
+    pub(crate) fn lock(&self, py: Python<'_>) -> PyResult<MutexGuard<'_, State>> {
+        self.check_process()?;
+        Ok(self.state.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner))
+    }
+
+    fn check_process(&self) -> PyResult<()> {
+        if process::id() == self.process {
+            return Ok(());
+        }
+        Err(wrong_use(
+            "this world belongs to the process that made it, and this one was forked from that; make a world of its own in each process",
+        ))
+    }
+
+    /// Works with the state while other Python threads run.
+    fn detached<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut State) -> T + Send) -> PyResult<T> {
+        self.check_process()?;
+        Ok(py.detach(|| work(&mut self.state.lock().unwrap_or_else(PoisonError::into_inner))))
+    }
+}
+
+impl State {
+    fn new(world: sim::World) -> Self {
+        Self { world, jobs: Jobs::default(), probes: Vec::new(), recording: None }
+    }
+
+    fn probe(&self, number: usize) -> PyResult<StationId> {
+        self.probes.get(number).copied().ok_or_else(|| bad_value(format!("there is no adapter {number} at this world")))
+    }
+
+    /// Moves to the first thing that somebody waits for, at most to `until`.
+    fn advance(&mut self, until: Option<Instant>, probes: &[StationId]) -> Came {
+        let came = self.advance_unrecorded(until, probes);
+        self.keep_record();
+        came
+    }
+
+    fn run_for(&mut self, duration: Duration) {
+        self.world.run_for(duration);
+        self.keep_record();
+    }
+
+    fn keep_record(&mut self) {
+        if let Some(recording) = &mut self.recording {
+            recording.keep_up(&mut self.world);
+        }
+    }
+
+    fn advance_unrecorded(&mut self, until: Option<Instant>, probes: &[StationId]) -> Came {
+        let slice_end = self.world.now() + SLICE;
+        let end = until.unwrap_or(Instant::FAR_FUTURE);
+        loop {
+            if let Some(heard) = probes.iter().position(|probe| self.world.has_received(*probe)) {
+                return Came::Heard(heard);
+            }
+            if let Some(done) = self.jobs.poll(&mut self.world) {
+                return Came::Done(done);
+            }
+            match self.world.next_event() {
+                Some(at) if at <= end => {
+                    if at > slice_end {
+                        self.world.run_until(slice_end);
+                        return Came::SomeWay;
+                    }
+                    self.world.step();
+                }
+                None if until.is_none() => return Came::Stalled,
+                _ if end > slice_end => {
+                    self.world.run_until(slice_end);
+                    return Came::SomeWay;
+                }
+                _ => {
+                    self.world.run_until(end);
+                    return Came::ToTheEnd;
+                }
+            }
+        }
+    }
+}
+
+impl World {
+    /// What its handles share.
+    pub(crate) fn shared(&self) -> &Arc<Shared> {
+        &self.shared
+    }
+
+    fn holding(world: sim::World) -> Self {
+        let state = Mutex::new(State::new(world));
+        Self { shared: Arc::new(Shared { process: process::id(), state }) }
+    }
+
+    fn put(&self, py: Python<'_>, number: u8, drive: Box<dyn VirtualDrive>) -> PyResult<()> {
+        let mut state = self.shared.lock(py)?;
+        state.world.add_drive(number, drive).map(|_| ()).map_err(refused)
+    }
+}
+
+#[pymethods]
+impl World {
+    #[new]
+    fn new(bitrate: &str, seed: u64) -> PyResult<Self> {
+        let known: Bitrate = bitrate.parse().map_err(|error| bad_value(format!("{bitrate:?}: {error}")))?;
+        Ok(Self::holding(sim::World::new(known, seed)))
+    }
+
+    /// Bit rate of the bus in bit/s.
+    #[getter]
+    fn bitrate(&self, py: Python<'_>) -> PyResult<u32> {
+        Ok(self.shared.lock(py)?.world.bitrate().bits_per_second())
+    }
+
+    /// The present in ns since the world began.
+    #[getter]
+    fn now_ns(&self, py: Python<'_>) -> PyResult<u64> {
+        Ok(self.shared.lock(py)?.world.now().as_nanos())
+    }
+
+    /// Numbers of the drives, in the order in which they were added.
+    #[getter]
+    fn nodes(&self, py: Python<'_>) -> PyResult<Vec<u16>> {
+        // Bytes would become `bytes`.
+        Ok(self.shared.lock(py)?.world.drive_numbers().map(u16::from).collect())
+    }
+
+    /// Puts a drive of a model (or of a file that describes one) onto the bus, with what is special about it, and powers it.
+    fn add_drive(&self, py: Python<'_>, model: &str, node: u8, options: Vec<(String, String)>) -> PyResult<()> {
+        let mut spec = DriveSpec::new(model_of(model)?, node_id(node)?);
+        for (key, value) in options {
+            spec.set(&key, &value).map_err(bad_value)?;
+        }
+        let bitrate = self.shared.lock(py)?.world.bitrate();
+        self.put(py, node, order(spec.model, &spec.order(bitrate)).map_err(refused)?)
+    }
+
+    /// Becomes the world that the text of a machine file describes.
+    fn become_machine(&self, py: Python<'_>, text: &str, seed: Option<u64>) -> PyResult<()> {
+        let mut machine = Machine::parse(text).map_err(bad_value)?;
+        machine.seed = seed.or(machine.seed);
+        let world = machine.build().map_err(bad_value)?;
+        *self.shared.lock(py)? = State::new(world);
+        Ok(())
+    }
+
+    /// Moves on by `ns`.
+    fn run_ns(&self, py: Python<'_>, ns: u64) -> PyResult<()> {
+        // Slice after slice from here, so that the times of two threads add up.
+        let mut left = Duration::from_nanos(ns);
+        while !left.is_zero() {
+            let slice = left.min(SLICE);
+            self.shared.detached(py, |state| state.run_for(slice))?;
+            left -= slice;
+            py.check_signals()?;
+        }
+        Ok(())
+    }
+
+    /// Moves on to the first thing that is waited for: a frame at one of `probes`, the end of a job, at most to `until_ns`.
+    ///
+    /// Returns `("heard", place in probes)`, `("done", job)`, `("stalled", 0)`, or `None` at `until_ns`.
+    fn advance(
+        &self,
+        py: Python<'_>,
+        until_ns: Option<u64>,
+        probes: Vec<usize>,
+    ) -> PyResult<Option<(&'static str, u64)>> {
+        let until = until_ns.map(Instant::from_nanos);
+        let stations = {
+            let state = self.shared.lock(py)?;
+            probes.into_iter().map(|probe| state.probe(probe)).collect::<PyResult<Vec<_>>>()?
+        };
+        loop {
+            match self.shared.detached(py, |state| state.advance(until, &stations))? {
+                Came::ToTheEnd => return Ok(None),
+                Came::Heard(probe) => return Ok(Some(("heard", probe as u64))),
+                Came::Done(job) => return Ok(Some(("done", job))),
+                Came::Stalled => return Ok(Some(("stalled", 0))),
+                Came::SomeWay => py.check_signals()?,
+            }
+        }
+    }
+
+    /// Has the world tell what happens in it from now on, or no more.
+    fn watch(&self, py: Python<'_>, on: bool) -> PyResult<()> {
+        self.shared.lock(py)?.world.watch(on);
+        Ok(())
+    }
+
+    /// What happened since the last call, one line of JSON each.
+    fn take_events(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        let mut state = self.shared.lock(py)?;
+        Ok(std::iter::from_fn(|| state.world.poll_event()).map(|event| events::json(&event).to_string()).collect())
+    }
+
+    /// Records every signal of every drive to a file `.mcap` or `.csv`, a sample every `period_ns`.
+    fn begin_record(&self, py: Python<'_>, path: PathBuf, period_ns: u64) -> PyResult<()> {
+        let mut state = self.shared.lock(py)?;
+        if state.recording.is_some() {
+            return Err(wrong_use("this world is being recorded already; end_record() first"));
+        }
+        let recording = Recording::begin(&mut state.world, &path, Duration::from_nanos(period_ns));
+        state.recording = Some(recording.map_err(|error| PyOSError::new_err(format!("{}: {error}", path.display())))?);
+        Ok(())
+    }
+
+    /// Ends the record, if there is one.
+    fn end_record(&self, py: Python<'_>) -> PyResult<()> {
+        let state = &mut *self.shared.lock(py)?;
+        match state.recording.take() {
+            Some(recording) => recording.finish(&mut state.world).map_err(PyErr::from),
+            None => Ok(()),
+        }
+    }
+
+    /// Joins an adapter to the bus; returns its number.
+    fn add_probe(&self, py: Python<'_>) -> PyResult<usize> {
+        let mut state = self.shared.lock(py)?;
+        let id = state.world.add_probe();
+        state.probes.push(id);
+        Ok(state.probes.len() - 1)
+    }
+
+    /// Takes an adapter off the bus for good.
+    fn remove_probe(&self, py: Python<'_>, probe: usize) -> PyResult<()> {
+        let mut state = self.shared.lock(py)?;
+        let id = state.probe(probe)?;
+        state.world.remove(id);
+        Ok(())
+    }
+
+    /// Queues a frame at an adapter.
+    fn send(&self, py: Python<'_>, probe: usize, message: Plain) -> PyResult<()> {
+        let frame = frame(message)?;
+        let mut state = self.shared.lock(py)?;
+        let id = state.probe(probe)?;
+        state.world.send(id, frame).map_err(wrong_use)
+    }
+
+    /// The next frame that an adapter heard, with the time of its last bit in ns.
+    fn poll(&self, py: Python<'_>, probe: usize) -> PyResult<Option<(u64, Plain)>> {
+        let mut state = self.shared.lock(py)?;
+        let id = state.probe(probe)?;
+        Ok(state.world.poll_received(id).map(|(at, frame)| (at.as_nanos(), plain(&frame))))
+    }
+
+    /// True if an adapter has heard a frame that nobody took yet.
+    fn has_heard(&self, py: Python<'_>, probe: usize) -> PyResult<bool> {
+        let state = self.shared.lock(py)?;
+        let id = state.probe(probe)?;
+        Ok(state.world.has_received(id))
+    }
+
+    /// Does what a line of world commands says; returns the answer, a line of JSON, or `None` for a comment.
+    fn command(&self, py: Python<'_>, line: &str) -> PyResult<Option<String>> {
+        let mut state = self.shared.lock(py)?;
+        Ok(command::answer(&mut state.world, line).map(|answer| answer.json))
+    }
+
+    /// What can be measured at a place (`4`, or `5.2` for an axis) now.
+    fn report<'py>(&self, py: Python<'py>, place: &str) -> PyResult<Bound<'py, PyDict>> {
+        let place: Place = place.parse().map_err(|()| bad_value(format!("{place:?} is no node; expected 1 to 127")))?;
+        let mut state = self.shared.lock(py)?;
+        report::at(py, &mut state.world, place)
+    }
+
+    /// Model of the drive under a number.
+    fn model_of(&self, py: Python<'_>, number: u8) -> PyResult<&'static str> {
+        self.shared.lock(py)?.world.with_drive(number, |drive, _| drive.model()).map_err(refused)
+    }
+
+    /// Number of axes of the drive under a number.
+    fn axes_of(&self, py: Python<'_>, number: u8) -> PyResult<u8> {
+        self.shared.lock(py)?.world.with_drive(number, |drive, _| drive.axes()).map_err(refused)
+    }
+
+    /// Names of the digital inputs of the drive under a number.
+    fn inputs_of(&self, py: Python<'_>, number: u8) -> PyResult<Vec<&'static str>> {
+        self.shared.lock(py)?.world.with_drive(number, |drive, _| drive.inputs().to_vec()).map_err(refused)
+    }
+
+    /// Hash over all frames with their times and over the present shaft angles.
+    fn digest(&self, py: Python<'_>) -> PyResult<u64> {
+        Ok(self.shared.lock(py)?.world.digest().value())
+    }
+
+    /// Share of the time that the wire was busy, from 0 to 1, and the frames it carried, since the world began.
+    fn statistics(&self, py: Python<'_>) -> PyResult<(f64, u64)> {
+        let statistics = self.shared.lock(py)?.world.statistics();
+        Ok((statistics.load_since(&Statistics::default()), statistics.frames))
+    }
+
+    /// The last frames on the wire, oldest first, one candump line each.
+    fn frames(&self, py: Python<'_>, last: usize) -> PyResult<Vec<String>> {
+        let state = self.shared.lock(py)?;
+        let carried = state.world.log().iter().rev().filter_map(|event| match event {
+            WireEvent::Frame { end, frame, .. } => Some(format!("({:.6}) can0 {frame}", end.as_secs_f64())),
+            _ => None,
+        });
+        let mut lines: Vec<_> = carried.take(last).collect();
+        lines.reverse();
+        Ok(lines)
+    }
+
+    /// Becomes a copy of `other`, which is a copy of this world or has none of its adapters.
+    fn become_copy_of(&self, py: Python<'_>, other: &Bound<'_, World>) -> PyResult<()> {
+        if Arc::ptr_eq(&self.shared, &other.get().shared) {
+            return Ok(());
+        }
+        let (world, probes) = {
+            let state = other.get().shared.lock(py)?;
+            state.jobs.check_copyable()?;
+            (state.world.snapshot(), state.probes.clone())
+        };
+        let mut state = self.shared.lock(py)?;
+        state.jobs.check_copyable()?;
+        if probes.len() < state.probes.len() {
+            return Err(wrong_use(
+                "an adapter was joined to the bus since the snapshot was taken; take the snapshot behind can.Bus(..), \
+                 or restore it before",
+            ));
+        }
+        (state.world, state.probes) = (world, probes);
+        Ok(())
+    }
+}

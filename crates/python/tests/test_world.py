@@ -1,0 +1,288 @@
+"""A world by itself: time, drives, stimuli, snapshots, and what goes wrong."""
+
+import os
+import re
+import threading
+
+import ferrodrive
+import pytest
+
+
+@pytest.fixture
+def world():
+    world = ferrodrive.World(bitrate=500_000, seed=1)
+    world.add("zlac8030l", node=4)
+    return world
+
+
+def test_time_passes_by_what_it_is_told(world):
+    world.run_for(0.25)
+    world.run_for(0)
+    assert (world.now_ns, world.now) == (250_000_000, 0.25)
+    with pytest.raises(ValueError, match="does not go back"):
+        world.run_for(-1)
+
+
+def test_a_drive_boots_with_the_message_of_the_standard(world):
+    """CiA 301, clause 7.2.8.3.3: one byte 00h under 700h + node-ID."""
+    world.add_probe()  # a frame needs somebody who acknowledges it
+    world.run_for(1)
+    assert world.frames(1)[0].endswith("704#00")
+
+
+def test_a_condition_is_waited_for_and_its_time_is_the_answer(world):
+    reached_s = world.run_until(lambda: world.now >= 0.0305, within=1)
+    assert reached_s == 0.031
+    with pytest.raises(TimeoutError, match="0.1 s"):
+        world.run_until(lambda: False, within=0.1)
+    assert world.now == pytest.approx(0.131, abs=1e-9)
+
+
+def test_a_condition_that_raises_leaves_a_world_that_goes_on(world):
+    def raises():
+        if world.now > 0.1:
+            raise KeyError("mine")
+
+    with pytest.raises(KeyError, match="mine"):
+        world.run_until(raises, within=1)
+    before = world.now
+    world.run_for(0.5)
+    assert world.now == before + 0.5
+
+
+def test_the_same_seed_gives_the_same_digest_and_a_load_another():
+    def digest(load_nm):
+        world = ferrodrive.World(seed=3)
+        world.add("zlac8030l", node=4).set_load_torque(load_nm)
+        world.run_for(0.5)
+        return world.digest()
+
+    assert digest(0.0) == digest(0.0) != digest(0.5)
+
+
+def test_a_restored_world_goes_the_same_way_again(world):
+    world.run_for(0.3)
+    before = world.snapshot()
+    world.run_for(0.7)
+    straight = world.digest()
+    for _ in range(2):
+        world.restore(before)
+        assert world.now == 0.3
+        world.run_for(0.7)
+        assert world.digest() == straight
+    before.run_for(0.7)
+    assert before.digest() == straight
+
+
+def test_two_threads_take_turns(world):
+    def run():
+        for _ in range(100):
+            world.run_for(0.001)
+            world[4].supply_v
+
+    threads = [threading.Thread(target=run) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert world.now == 0.4
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+@pytest.mark.filterwarnings("ignore:.*multi-threaded.*:DeprecationWarning")
+def test_a_forked_process_refuses_the_world_of_its_parent(world):
+    child = os.fork()
+    if child == 0:
+        status = 1
+        try:
+            world.run_for(0.1)
+        except RuntimeError as error:
+            status = 42 if "forked" in str(error) else 2
+        os._exit(status)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 42
+    world.run_for(0.1)
+
+
+def test_wrong_orders_say_what_would_be_right(world):
+    for order, words in (
+        (lambda: ferrodrive.World(bitrate="300k"), "300k"),
+        (lambda: world.add("zlac8030", node=5), "zlac8030l"),
+        (lambda: world.add("zlac8030l", node=0), "1 to 127"),
+        (lambda: world.add("zlac8030l", node=4), "already a drive 4"),
+        (lambda: world[4].axis(2), "it has 1"),
+        (lambda: world[4].set_input("X9", True), "it has X0"),
+        (lambda: world[4].set_input("X0 1\n4 power", True), "one word"),
+        (lambda: world[4].set_load_torque(float("nan")), "nan"),
+        (lambda: world[4].set_battery(False), "no"),
+    ):
+        with pytest.raises(ValueError, match=re.escape(words)):
+            order()
+    with pytest.raises(KeyError, match="there is 4"):
+        world[7]
+    with pytest.raises(OverflowError):
+        world.add("zlac8030l", node=300)
+
+
+def test_the_data_sheet_of_a_model_is_an_eds():
+    sheet = ferrodrive.eds("zlac8030l")
+    assert "[FileInfo]" in sheet and "[6041]" in sheet
+    assert set(ferrodrive.models()) >= {"zlac8030l", "zlim42c", "m4230e17b50", "cia402"}
+
+
+def test_events_tell_of_a_fault_and_its_remedy_and_change_nothing(world):
+    def run(watched):
+        world = ferrodrive.World()
+        drive = world.add("zlac8030l", node=4)
+        if watched:
+            assert list(world.events()) == []
+        world.run_for(1)
+        drive.set_fault("hall")
+        world.run_for(0.5)
+        return world
+
+    seen = run(True)
+    events = list(seen.events())
+    assert list(seen.events()) == []
+    assert [event["t_ns"] for event in events] == sorted(event["t_ns"] for event in events)
+    faults = [event for event in events if event["kind"] == "fault"]
+    assert faults and faults[0]["node"] == 4 and faults[0]["t"] >= 1 and faults[0]["remedy"]
+    assert seen.digest() == run(False).digest()
+
+
+def test_a_record_has_a_row_for_each_sample(world, tmp_path):
+    path = tmp_path / "run.csv"
+    with world.record(path, every=0.01):
+        world.run_for(1)
+        with pytest.raises(RuntimeError, match="already"), world.record(tmp_path / "other.csv"):
+            pass
+    header, *rows = path.read_text().splitlines()
+    assert "4.velocity_rpm" in header.split(",") and "4.supply_v" in header.split(",")
+    # From 0 to 1 s every 10 ms, both ends included.
+    assert len(rows) == 101
+    supply = header.split(",").index("4.supply_v")
+    assert float(rows[-1].split(",")[supply]) == pytest.approx(48, abs=0.5)
+    for name in ("run.txt", "no/such/folder.csv"):
+        with pytest.raises(OSError), world.record(tmp_path / name):
+            pass
+
+
+class Told(ferrodrive.VirtualDrive):
+    """Notes the words of each stimulus, and has them understood."""
+
+    said: list
+
+    def apply(self, words):
+        self.said.append(words)
+        try:
+            super().apply(words)
+        except ferrodrive.Refused as refusal:
+            # Understood, and this model does not have it.
+            if "has no" not in str(refusal):
+                raise
+
+
+#: One call of every method that does something to a drive, at a model that takes it.
+STIMULI = {
+    "zlac8030l": [
+        lambda it: it.power_off(),
+        lambda it: it.power_on(),
+        lambda it: it.power_cycle(),
+        lambda it: it.power_cut(),
+        lambda it: it.set_input("X0", True),
+        lambda it: it.set_switch("X1", -5000),
+        lambda it: it.set_load_torque(-2.5),
+        lambda it: it.set_load_inertia(0.02),
+        lambda it: it.lock_rotor(),
+        lambda it: it.free_rotor(),
+        lambda it: it.set_supply(48, limit_a=10, resistance_ohm=0.2),
+        lambda it: it.hold_temperature("motor", 95),
+        lambda it: it.hold_temperature("driver", None),
+        lambda it: it.cut_cable(),
+        lambda it: it.join_cable(),
+        *(lambda it, part=part: it.set_fault(part) for part in ("hall", "encoder", "eeprom", "reference")),
+        *(lambda it, part=part: it.set_fault(part, False) for part in ("phase", "short", "bridge")),
+        lambda it: it.set_load_friction(0.2, 0.01, static_nm=0.3, stribeck_rad_s=0.5),
+        lambda it: it.set_load_friction(None),
+        lambda it: it.set_load_pulley(2, 0.05),
+        lambda it: it.set_load_pulley(None),
+        lambda it: it.set_load_spring(5, 90),
+        lambda it: it.set_load_spring(None),
+        lambda it: it.set_load_stop(-5000, None),
+        lambda it: it.set_load_stop(None, None),
+        lambda it: it.set_load_fan(2, 300),
+        lambda it: it.set_load_fan(None),
+        lambda it: it.set_load_gear(10, 0.5),
+        lambda it: it.set_load_gear(None),
+        lambda it: it.clear_loads(),
+        lambda it: it.set_bus_silent(True),
+        lambda it: it.set_bus_silent(False),
+        lambda it: it.set_bus_late(5, 20),
+        lambda it: it.set_bus_late(None),
+        lambda it: it.set_bus_babble("080#", 1),
+        lambda it: it.set_bus_babble(None),
+        lambda it: it.set_bus_overrun(2, 0.5),
+        lambda it: it.set_bus_overrun(None),
+        lambda it: it.set_bus_corruption(0.3),
+        lambda it: it.set_bus_corruption(None),
+    ],
+    "m4230e17b50": [
+        lambda it: it.set_battery(False),
+        lambda it: it.set_battery(True),
+        lambda it: it.send_pulses(8192, 10_000),
+        lambda it: it.send_quadrature(-400, 1000),
+        lambda it: it.send_duty(40),
+        lambda it: it.send_clock(10_000),
+    ],
+}
+
+
+def test_every_stimulus_has_a_method():
+    said = []
+    for model, calls in STIMULI.items():
+        world = ferrodrive.World(500_000)
+        world.add(model, node=1)
+        drive = Told(world, 1)
+        drive.said = said
+        for call in calls:
+            call(drive)
+    # A node whose objects are the outer world's needs a file; its words are enough here.
+    drive.apply = said.append
+    drive.set_object(0x6000, 1, 255)
+    wire = Wire()
+    wire.said = said
+    wire.corrupt(0.01)
+    wire.destroy(3, 20)
+    body = wire.body("base")
+    body.apply = lambda words: said.append(f"body base {words}")
+    body.set_slope(5, 90)
+    body.set_grip(None)
+    body.set_mass(60)
+    body.set_payload(2)
+    missing = [words for words in every_form() if not any(matches(words, line) for line in said)]
+    assert missing == []
+
+
+class Wire(ferrodrive.World):
+    """Notes what is done to the wire, and has it understood."""
+
+    def apply(self, line):
+        self.said.append(line)
+        super().apply(line)
+
+
+def every_form():
+    """Each verb with each of its alternatives, out of what `help` lists."""
+    for line in ferrodrive.stimulus_forms():
+        for form in re.split(r", or |, ", re.sub(r" \(.*?\)", "", line).replace("[", "").replace("]", "")):
+            words = form.removeprefix("NODE ").split()
+            if words[0] in ("now", "help", "quit") or words[-1] == "get":
+                continue
+            fixed = [word.split("|") for word in words if re.fullmatch(r"[a-z][a-z|]*", word)]
+            for number, alternatives in enumerate(fixed):
+                for word in alternatives:
+                    yield [words[0], word] if number else [word]
+
+
+def matches(words, line):
+    """Whether a line says these words. A command without a node has the same verb."""
+    return line.split()[0] == words[0] and all(word in line.split() for word in words)

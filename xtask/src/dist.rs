@@ -1,0 +1,258 @@
+//! `cargo xtask dist`: what is released, in one folder: the stripped binary with manual pages and completions, the data sheets
+//! of the models, the licences of everything that is in it, the Python wheel, and the checksums of all of it.
+//!
+//! The test makes the same in the profile of the tests, and uses both from an empty folder.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+
+use crate::tally::Tally;
+use crate::{process, python, workspace};
+
+const SHELLS: &[(&str, &str)] = &[("bash", "ferrodrive.bash"), ("zsh", "_ferrodrive"), ("fish", "ferrodrive.fish")];
+
+/// What a file with a licence is called, however its packages spell it.
+const LICENCE_NAMES: &[&str] = &["LICENSE", "LICENCE", "COPYING", "COPYRIGHT", "NOTICE", "UNLICENSE"];
+
+const CHECKSUMS: &str = "SHA256SUMS";
+
+/// Runs `cargo xtask dist`.
+pub(crate) fn command() -> ExitCode {
+    let folder = workspace::root().join("dist");
+    let made = build_binary("release").and_then(|program| make(&program, "release", &folder));
+    match made {
+        Ok(notes) => {
+            notes.iter().for_each(|note| println!("{note}"));
+            println!("{}", folder.display());
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            eprintln!("nothing to release: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The dist step of `cargo xtask test`: the release as the tests' profile makes it, used by somebody who has nothing else.
+pub(crate) fn step() -> Tally {
+    let folder = workspace::target().join("dist-test");
+    let made = build_binary("dev").and_then(|program| make(&program, "dev", &folder.join("dist")));
+    let notes = match made {
+        Ok(notes) => notes,
+        Err(error) => return Tally::failed(error),
+    };
+    let mut tally = Tally::default();
+    for (what, outcome) in try_it(&folder, notes.is_empty()) {
+        println!("   {what}: {}", outcome.as_ref().map_or_else(|error| error.as_str(), |()| "ok"));
+        tally.add(&outcome.map_or_else(|error| Tally::failed(format!("{what}: {error}")), |()| Tally::passed()));
+    }
+    notes.into_iter().for_each(|note| tally.add(&Tally::skipped(note)));
+    tally
+}
+
+fn build_binary(profile: &str) -> Result<PathBuf, String> {
+    let mut cargo = workspace::cargo();
+    cargo.args(["build", "--quiet", "--package", "ferrodrive", "--bin", "ferrodrive", "--profile", profile]);
+    process::output(&mut cargo)?;
+    let folder = if profile == "dev" { "debug" } else { profile };
+    Ok(workspace::target().join(folder).join(format!("ferrodrive{}", std::env::consts::EXE_SUFFIX)))
+}
+
+/// Makes the folder anew; returns what could not be in it, and why.
+fn make(program: &Path, profile: &str, folder: &Path) -> Result<Vec<String>, String> {
+    let _ = fs::remove_dir_all(folder);
+    let mut notes = Vec::new();
+    let binary = folder.join("bin").join(program.file_name().unwrap_or_default());
+    copy(program, &binary)?;
+    // The names of functions are most of a binary; what a panic says needs none.
+    if !process::works("strip", &[&binary.to_string_lossy()]) {
+        notes.push("the binary is not stripped: there is no `strip` here".to_owned());
+    }
+    let run = |words: &[&str]| process::output(Command::new(&binary).args(words));
+    run(&["man-pages", &folder.join("man/man1").to_string_lossy()])?;
+    for (shell, name) in SHELLS {
+        write(&folder.join("completions").join(name), &run(&["completions", shell])?)?;
+    }
+    for model in models(&binary)? {
+        write(&folder.join("eds").join(format!("{model}.eds")), &run(&["eds", &model])?)?;
+    }
+    for name in ["README.md", "CHANGELOG.md", "LICENSE-APACHE", "LICENSE-MIT"] {
+        copy(&workspace::root().join(name), &folder.join(name))?;
+    }
+    licences(&folder.join("licences"))?;
+    match python::environment(python::VENV, python::REQUIREMENTS) {
+        Ok(python) => {
+            python::wheel(&python, profile, &folder.join("python"))?;
+        }
+        Err(reason) => notes.push(format!("no wheel: {reason}")),
+    }
+    write(&folder.join(CHECKSUMS), &checksums(folder)?)?;
+    Ok(notes)
+}
+
+/// The models that the program knows, as its own refusal lists them.
+fn models(program: &Path) -> Result<Vec<String>, String> {
+    let refusal = Command::new(program).args(["eds", "?"]).output().map_err(|error| error.to_string())?;
+    let text = String::from_utf8_lossy(&refusal.stderr).into_owned();
+    let list = text.split("expected one of: ").nth(1).and_then(|rest| rest.split(", or a file").next());
+    let names = list.ok_or_else(|| format!("no list of models in: {text}"))?;
+    Ok(names.split(',').map(|name| name.trim().to_owned()).collect())
+}
+
+/// The licence files of every package in the binary, and a list of them all.
+fn licences(folder: &Path) -> Result<(), String> {
+    let mut list = String::new();
+    for (name, (licence, source)) in foreign_packages()? {
+        list.push_str(&format!("{name}: {licence}\n"));
+        let files = fs::read_dir(&source).map_err(|error| format!("{}: {error}", source.display()))?;
+        for file in files.flatten().map(|file| file.path()).filter(|path| is_licence(path)) {
+            copy(&file, &folder.join(&name).join(file.file_name().unwrap_or_default()))?;
+        }
+    }
+    write(&folder.join("LICENCES.txt"), &list)
+}
+
+fn is_licence(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_uppercase();
+    path.is_file() && LICENCE_NAMES.iter().any(|known| name.starts_with(known))
+}
+
+/// What the binary is made of beside the project's own: name and version, licence, and where its source is.
+fn foreign_packages() -> Result<BTreeMap<String, (String, PathBuf)>, String> {
+    let mut tree = workspace::cargo();
+    tree.args(["tree", "--package", "ferrodrive", "--edges", "normal", "--prefix", "none", "--format", "{p}"]);
+    let tree = process::output(&mut tree)?;
+    let used = |name: &str, version: &str| {
+        let wanted = format!("{name} v{version}");
+        tree.lines().any(|line| line == wanted || line.starts_with(&format!("{wanted} ")))
+    };
+    let text = process::output(workspace::cargo().args(["metadata", "--format-version", "1"]))?;
+    let metadata: Value = serde_json::from_str(&text).map_err(|error| format!("cargo metadata: {error}"))?;
+    let packages = metadata["packages"].as_array().into_iter().flatten();
+    let word = |package: &Value, key: &str| package[key].as_str().unwrap_or_default().to_owned();
+    let foreign = packages.filter(|package| package["source"].is_string()).filter_map(|package| {
+        let (name, version) = (word(package, "name"), word(package, "version"));
+        let source = PathBuf::from(word(package, "manifest_path")).parent()?.to_path_buf();
+        used(&name, &version).then(|| (format!("{name}-{version}"), (word(package, "license"), source)))
+    });
+    Ok(foreign.collect())
+}
+
+/// One line for each file, as `sha256sum --check` takes them.
+fn checksums(folder: &Path) -> Result<String, String> {
+    let mut lines = String::new();
+    for path in files_in(folder) {
+        let bytes = fs::read(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+        let sum: String = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+        let name = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().replace('\\', "/");
+        lines.push_str(&format!("{sum}  {name}\n"));
+    }
+    Ok(lines)
+}
+
+/// Every file below a folder but the checksums, in order.
+fn files_in(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for path in fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()) {
+        if path.is_dir() {
+            found.extend(files_in(&path));
+        } else if path.file_name().is_some_and(|name| name != CHECKSUMS) {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}
+
+/// What somebody does with a release: looks at its sums, runs the program where nothing else is, and installs the wheel.
+fn try_it(folder: &Path, with_wheel: bool) -> Vec<(&'static str, Result<(), String>)> {
+    let (dist, empty) = (folder.join("dist"), folder.join("empty"));
+    let _ = fs::remove_dir_all(&empty);
+    if let Err(error) = fs::create_dir_all(&empty) {
+        return vec![("an empty folder", Err(error.to_string()))];
+    }
+    let mut tried = vec![
+        ("every file is listed, with its sum", sums_agree(&dist)),
+        ("the program moves a virtual drive from an empty folder", program_works(&dist, &empty)),
+        ("manual pages, completions, data sheets and licences have words", parts_have_words(&dist)),
+    ];
+    if with_wheel {
+        tried.push(("the wheel works in a new environment", wheel_works(&dist, &empty)));
+    }
+    tried
+}
+
+fn sums_agree(dist: &Path) -> Result<(), String> {
+    let listed = fs::read_to_string(dist.join(CHECKSUMS)).map_err(|error| error.to_string())?;
+    if checksums(dist)? == listed { Ok(()) } else { Err("the sums are not those of the files".into()) }
+}
+
+fn program_works(dist: &Path, empty: &Path) -> Result<(), String> {
+    let mut program = Command::new(dist.join("bin").join(format!("ferrodrive{}", std::env::consts::EXE_SUFFIX)));
+    program.current_dir(empty).env_clear().args(["--json", "read", "4", "6041h"]);
+    let answer = process::output(&mut program)?;
+    if answer.contains("6041") { Ok(()) } else { Err(format!("it answered {answer}")) }
+}
+
+fn parts_have_words(dist: &Path) -> Result<(), String> {
+    for (path, words) in [
+        ("man/man1/ferrodrive.1", ".TH"),
+        ("man/man1/ferrodrive-sim.1", "\\-\\-drive"),
+        ("completions/ferrodrive.bash", "complete"),
+        ("completions/_ferrodrive", "#compdef"),
+        ("eds/zlac8030l.eds", "[FileInfo]"),
+        ("licences/LICENCES.txt", "clap-"),
+    ] {
+        let text = fs::read_to_string(dist.join(path)).map_err(|error| format!("{path}: {error}"))?;
+        if !text.contains(words) {
+            return Err(format!("{path} has no {words:?}"));
+        }
+    }
+    Ok(())
+}
+
+fn wheel_works(dist: &Path, empty: &Path) -> Result<(), String> {
+    let wheel = files_in(&dist.join("python")).pop().ok_or("there is no wheel")?;
+    let system = python::environment(python::VENV, python::REQUIREMENTS)?;
+    let folder = empty.join("venv");
+    process::output(Command::new(system).args(["-m", "venv"]).arg(&folder))?;
+    let tools = folder.join(if cfg!(windows) { "Scripts" } else { "bin" });
+    let python = tools.join("python");
+    process::output(python::pip(&python).args(["install", "--quiet", "--no-index"]).arg(wheel))?;
+    let script =
+        "import ferrodrive; w = ferrodrive.World(); d = w.add('zlac8030l', node=4); w.run_for(1); assert d.powered";
+    process::output(Command::new(&python).current_dir(empty).args(["-c", script]))?;
+    process::output(Command::new(tools.join("ferrodrive")).current_dir(empty).arg("--version")).map(|_| ())
+}
+
+fn copy(from: &Path, to: &Path) -> Result<(), String> {
+    make_parent(to)?;
+    fs::copy(from, to).map(|_| ()).map_err(|error| format!("{} to {}: {error}", from.display(), to.display()))
+}
+
+fn write(path: &Path, text: &str) -> Result<(), String> {
+    make_parent(path)?;
+    fs::write(path, text).map_err(|error| format!("{}: {error}", path.display()))
+}
+
+fn make_parent(path: &Path) -> Result<(), String> {
+    let parent = path.parent().unwrap_or(path);
+    fs::create_dir_all(parent).map_err(|error| format!("{}: {error}", parent.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn licence_files_are_known_by_their_names() {
+        let root = workspace::root();
+        assert!(is_licence(&root.join("LICENSE-MIT")) && is_licence(&root.join("LICENSE-APACHE")));
+        assert!(!is_licence(&root.join("README.md")) && !is_licence(&root.join("LICENSE-NONE")));
+    }
+}

@@ -1,0 +1,189 @@
+//! The Python package: environments with pinned packages, the wheel, and the tests against the installed wheel.
+//!
+//! Environments stand under `target/` and stay for the next run. A machine without Python or without a network skips what
+//! needs them and says so; it never fails for that.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use crate::tally::Tally;
+use crate::{process, workspace};
+
+/// The pinned packages that the wheel is built and tested with.
+pub(crate) const REQUIREMENTS: &str = "crates/python/tests/requirements.txt";
+
+/// The environment that has them.
+pub(crate) const VENV: &str = "python-venv";
+
+/// The tests, of the package and of what users copy from.
+const TESTS: &[&str] = &["crates/python/tests", "examples/mobile_base_tests", "examples/arm_tests"];
+
+/// The python step of `cargo xtask test`.
+pub(crate) fn step() -> Tally {
+    let python = match environment(VENV, REQUIREMENTS) {
+        Ok(python) => python,
+        Err(reason) => return Tally::skipped(reason),
+    };
+    let folder = workspace::target().join("wheel");
+    if let Err(error) = install(&python, &folder).and_then(|()| lint(&python)) {
+        return Tally::failed(error);
+    }
+    run_tests(&python)
+}
+
+/// `cargo xtask wheel`: the wheel as it is released, in `dist/`.
+pub(crate) fn wheel_command() -> ExitCode {
+    let built =
+        environment(VENV, REQUIREMENTS).and_then(|python| wheel(&python, "release", &workspace::root().join("dist")));
+    match built {
+        Ok(wheel) => {
+            println!("{}", wheel.display());
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            eprintln!("no wheel: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Builds the wheel in a cargo profile into an emptied folder; returns its path.
+pub(crate) fn wheel(python: &Path, profile: &str, folder: &Path) -> Result<PathBuf, String> {
+    for old in wheels_in(folder) {
+        std::fs::remove_file(&old).map_err(|error| format!("{}: {error}", old.display()))?;
+    }
+    println!("   building the wheel ({profile})");
+    let mut pip = pip(python);
+    // The environment has the build's needs, in pinned versions.
+    pip.args(["wheel", "--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir"]).arg(folder).arg(".");
+    pip.env("FERRODRIVE_PROFILE", profile).env("CARGO_TARGET_DIR", workspace::target());
+    // The build finds its tool beside the interpreter.
+    let tools = python.parent().map(Path::to_path_buf).into_iter();
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let path = std::env::join_paths(tools.chain(std::env::split_paths(&path))).map_err(|error| error.to_string())?;
+    process::output(pip.env("PATH", path))?;
+    wheels_in(folder).pop().ok_or_else(|| format!("pip left no wheel in {}", folder.display()))
+}
+
+/// The Python of an environment `target/NAME` that has the packages of a requirements file, made now if need be; or why
+/// there is none.
+pub(crate) fn environment(name: &str, requirements: &str) -> Result<PathBuf, String> {
+    let folder = workspace::target().join(name);
+    let wanted = std::fs::read_to_string(workspace::root().join(requirements)).map_err(|error| error.to_string())?;
+    let python = folder.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
+    let stamp = folder.join("installed.txt");
+    if std::fs::read_to_string(&stamp).is_ok_and(|installed| installed == wanted) && python.exists() {
+        return Ok(python);
+    }
+    let system = ["python3", "python"].into_iter().find(|name| process::works(name, &["-c", "import venv, ensurepip"]));
+    let system = system.ok_or("no Python 3 with venv on this machine")?;
+    println!("   making a Python environment in {}", folder.display());
+    process::output(Command::new(system).args(["-m", "venv", "--clear"]).arg(&folder))?;
+    let installed = process::output(pip(&python).args(["install", "--quiet", "-r", requirements]));
+    installed.map_err(|error| {
+        let reason = error.lines().last().unwrap_or_default().to_owned();
+        format!("pip could not install what {requirements} names (no network?): {reason}")
+    })?;
+    std::fs::write(&stamp, wanted).map_err(|error| error.to_string())?;
+    Ok(python)
+}
+
+/// `python -m pip`, which gives up soon where there is no network.
+pub(crate) fn pip(python: &Path) -> Command {
+    let mut pip = Command::new(python);
+    pip.current_dir(workspace::root()).args(["-m", "pip", "--disable-pip-version-check", "--retries", "1"]);
+    pip.args(["--timeout", "20"]);
+    pip
+}
+
+/// What the workspace's steps do for the other crates, for the one outside of it.
+fn lint(python: &Path) -> Result<(), String> {
+    let manifest = ["--manifest-path", "crates/python/Cargo.toml"];
+    if process::works("cargo", &["fmt", "--version"]) {
+        process::output(workspace::cargo().arg("fmt").args(manifest).args(["--check", "--", "--config-path", "."]))?;
+    }
+    if process::works("cargo", &["clippy", "--version"]) {
+        let mut clippy = workspace::cargo();
+        clippy.arg("clippy").args(manifest).args(["--quiet", "--", "-D", "warnings"]);
+        process::output(clippy.env("CARGO_TARGET_DIR", workspace::target()).env("PYO3_PYTHON", python))?;
+    }
+    let mut mypy = Command::new(python);
+    mypy.current_dir(workspace::root().join("crates/python")).args(["-m", "mypy", "--no-error-summary", "--strict"]);
+    // What a report holds is as dynamic as Python's own JSON.
+    mypy.args(["--no-warn-return-any", "--cache-dir"]).arg(workspace::target().join("mypy")).arg("python/ferrodrive");
+    process::output(&mut mypy).map(|_| ())
+}
+
+/// Builds the wheel in the profile of the tests and installs it.
+fn install(python: &Path, folder: &Path) -> Result<(), String> {
+    let wheel = wheel(python, "dev", folder)?;
+    let mut pip = pip(python);
+    process::output(pip.args(["install", "--quiet", "--no-deps", "--force-reinstall"]).arg(wheel)).map(|_| ())
+}
+
+fn run_tests(python: &Path) -> Tally {
+    let mut pytest = Command::new(python);
+    // From elsewhere, so that the installed package is tested and not the sources.
+    pytest.current_dir(workspace::target()).args([
+        "-m",
+        "pytest",
+        "-p",
+        "no:cacheprovider",
+        "--tb=short",
+        "-rfEs",
+        "-v",
+    ]);
+    pytest.args(TESTS.iter().map(|folder| workspace::root().join(folder)));
+    let mut tally = Tally::default();
+    let ended_well = process::run(&mut pytest, |line| {
+        println!("   {line}");
+        count(line, &mut tally);
+    });
+    match ended_well {
+        Ok(true) if tally == Tally::default() => Tally::failed("pytest ran nothing"),
+        Ok(true) => tally,
+        Ok(false) => {
+            tally.failed = tally.failed.max(1);
+            tally.note = "a test of the Python package failed: read the lines above".to_owned();
+            tally
+        }
+        Err(error) => Tally::failed(error),
+    }
+}
+
+/// Counts one line of `pytest -v`: `FILE::TEST PASSED [ 5%]`.
+fn count(line: &str, tally: &mut Tally) {
+    let Some((_, after)) = line.split_once("::") else { return };
+    // The name of a test may hold blanks.
+    let is = |outcome: &str| after.contains(outcome);
+    if is(" PASSED") {
+        tally.passed += 1;
+    } else if is(" FAILED") || is(" ERROR") {
+        tally.failed += 1;
+    } else if is(" SKIPPED") {
+        tally.skipped += 1;
+    }
+}
+
+fn wheels_in(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    entries.filter(|path| path.extension().is_some_and(|ending| ending == "whl")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_of_pytest_are_counted_by_their_outcome() {
+        let mut tally = Tally::default();
+        let lines = [
+            "tests/test_a.py::test_one PASSED                  [  5%]",
+            "tests/test_a.py::test_two[4-x y] FAILED           [ 10%]",
+            "tests/test_a.py::test_three SKIPPED (no fork)     [ 15%]",
+            "FAILED tests/test_a.py::test_two[4-x y] - assert 1 == 2",
+        ];
+        lines.iter().for_each(|line| count(line, &mut tally));
+        assert_eq!((tally.passed, tally.failed, tally.skipped), (1, 1, 1));
+    }
+}
