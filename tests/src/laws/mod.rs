@@ -11,6 +11,7 @@ mod frame;
 mod master_core;
 mod modbus;
 mod node;
+mod scenario;
 mod selected_frame;
 mod stream;
 mod world_command;
@@ -42,6 +43,7 @@ pub const ALL: &[Law] = &[
     Law { name: "eds", holds: eds::eds, samples: eds::SAMPLES },
     Law { name: "eeprom", holds: eeprom::eeprom, samples: eeprom::SAMPLES },
     Law { name: "world_command", holds: world_command::world_command, samples: world_command::SAMPLES },
+    Law { name: "scenario", holds: scenario::scenario, samples: scenario::SAMPLES },
     Law { name: "master_core", holds: master_core::master_core, samples: master_core::SAMPLES },
 ];
 

@@ -27,6 +27,9 @@ const EXAMPLE: &str =
 /// Decides everything random where no seed is given: runs are repeatable.
 pub const SEED: u64 = 1;
 
+/// Node-IDs that there are.
+const MOST_DRIVES: usize = 127;
+
 /// What a machine file may say of its bus.
 pub const BUS_KEYS: &[&str] = &["bitrate", "seed", "realism", "drive", "body"];
 
@@ -133,6 +136,10 @@ impl Machine {
             Vec::new()
         });
         let none = tables.is_empty();
+        if let Some(beyond) = tables.get(MOST_DRIVES) {
+            problems.push(beyond.problem(format!("a bus has at most {MOST_DRIVES} nodes (CiA 301, 7.2.8)")));
+            return Err(problems);
+        }
         for field in tables {
             match field
                 .table("a drive", expected)

@@ -165,7 +165,7 @@ fn temperatures(table: &Table<'_>) -> Result<Vec<Words>, Problem> {
 
 fn faults(table: &Table<'_>) -> Result<Vec<Words>, Problem> {
     let expected = "a list of components, e.g. [\"hall\"]";
-    let components = table.get("faults").map_or(Ok(Vec::new()), |field| field.list(expected))?;
+    let components = table.get("faults").map_or(Ok(Vec::new()), |field| field.list(expected).and_then(bounded))?;
     let said = components.iter().map(|component| {
         let name = component.text(expected)?;
         Ok(Words::of(component, format!("fault {} on", one_word(component, name)?)))
@@ -194,7 +194,17 @@ fn bounds(switch: &Field<'_>) -> Result<[String; 2], Problem> {
 /// The names and values of the table behind `name`; none if it is not there.
 pub(super) fn fields<'a>(table: &Table<'a>, name: &'static str, expected: &str) -> Result<Vec<Field<'a>>, Problem> {
     let Some(field) = table.get(name) else { return Ok(Vec::new()) };
-    Ok(field.table(name, expected)?.fields().collect())
+    bounded(field.table(name, expected)?.fields().collect())
+}
+
+/// No drive has so many of anything.
+const MOST: usize = 1024;
+
+fn bounded(fields: Vec<Field<'_>>) -> Result<Vec<Field<'_>>, Problem> {
+    match fields.get(MOST) {
+        None => Ok(fields),
+        Some(beyond) => Err(beyond.problem(format!("more than {MOST} entries: no drive has so many of anything"))),
+    }
 }
 
 /// The name of a field as a word of a world command.

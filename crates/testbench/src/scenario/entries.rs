@@ -20,6 +20,9 @@ pub const LINE_KEYS: &[&str] = &["do", "name", "is", "tolerance", "fails", "with
 /// What an expectation may say.
 pub const EXPECT_KEYS: &[&str] = &["name", "that", "always", "never", "at", "from", "after", "until", "within", "why"];
 
+/// Steps, lines and expectations that a scenario may have: each is looked at in each millisecond.
+pub(super) const MOST: usize = 1000;
+
 /// The longest time that anything may take.
 pub(super) const LONGEST: Duration = Duration::from_secs(24 * 3600);
 
@@ -36,6 +39,14 @@ pub(super) fn kept<T>(value: Many<T>, problems: &mut Vec<Problem>) -> Option<T> 
     value.map_err(|wrong| problems.extend(wrong)).ok()
 }
 
+/// A list that is not longer than a scenario may have entries.
+fn bounded_list(fields: Vec<Field<'_>>) -> Result<Vec<Field<'_>>, Problem> {
+    match fields.get(MOST) {
+        None => Ok(fields),
+        Some(beyond) => Err(beyond.problem(format!("'{}' has more than {MOST} entries", beyond.name()))),
+    }
+}
+
 /// The tables of a list, each made into what it describes.
 pub(super) fn entries<T>(
     file: &Table<'_>,
@@ -46,7 +57,7 @@ pub(super) fn entries<T>(
 ) -> Vec<T> {
     const EXPECTED: &str = "tables of their own, each begun by its name in double brackets, as in [[step]]";
     let Some(field) = file.get(name) else { return Vec::new() };
-    let fields = kept(field.list(EXPECTED).map_err(single), problems).unwrap_or_default();
+    let fields = kept(field.list(EXPECTED).and_then(bounded_list).map_err(single), problems).unwrap_or_default();
     let made = fields.iter().enumerate().filter_map(|(n, field)| {
         let table = field.table(what, EXPECTED).map_err(single);
         kept(table.and_then(|table| make(&table, n)), problems)
@@ -96,7 +107,7 @@ fn condition(field: &Field<'_>) -> Result<Condition, Problem> {
 /// A text, or each of a list of texts.
 fn texts<'a>(table: &Table<'a>, expected: &str) -> Result<Vec<Field<'a>>, Problem> {
     let field = table.need("do", expected)?;
-    if field.is_list() { field.list(expected) } else { Ok(vec![field]) }
+    if field.is_list() { field.list(expected).and_then(bounded_list) } else { Ok(vec![field]) }
 }
 
 pub(super) fn step(table: &Table<'_>) -> Many<Step> {

@@ -7,7 +7,7 @@ use sim::Place;
 
 use super::condition::Condition;
 use super::deed::Deed;
-use super::entries::{Many, bounded, entries, expect, figures, host, kept, single, step};
+use super::entries::{MOST, Many, bounded, entries, expect, figures, host, kept, single, step};
 use super::plan::{Act, Base, Expect, Figure, Host, Step};
 use crate::document::reader::{self, Parameters, Table};
 use crate::document::{BadFile, Located, Problem, read_text};
@@ -37,9 +37,6 @@ const LIMIT: Duration = Duration::from_secs(60);
 /// How often values are looked at, if nothing is said; and the least that may be said.
 const SAMPLE: Duration = Duration::from_millis(1);
 const SHORTEST_SAMPLE: Duration = Duration::from_micros(10);
-
-/// Steps, lines and expectations that a scenario may have: each is looked at in each millisecond.
-const MOST: usize = 1000;
 
 /// A machine, what is done to it and by it, and what is expected.
 #[derive(Clone, Debug)]

@@ -1,0 +1,77 @@
+//! The pages about machine files and scenarios name every key and every form, and what they show as an example is taken.
+
+use std::path::{Path, PathBuf};
+
+use testbench::machine_file::{BUS_KEYS, DRIVE_KEYS, Machine};
+use testbench::scenario::entries::{EXPECT_KEYS, HOST_KEYS, LINE_KEYS, STEP_KEYS};
+use testbench::scenario::{Scenario, condition, deed, file};
+
+fn folder(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..").join(name)
+}
+
+fn page(name: &str) -> String {
+    std::fs::read_to_string(folder("docs").join(name)).expect("the page")
+}
+
+/// The blocks of TOML of a page.
+fn blocks(page: &str) -> impl Iterator<Item = &str> {
+    page.split("```toml\n").skip(1).filter_map(|rest| rest.split("```").next())
+}
+
+/// The rows of the table below this heading have these keys in their first column, and no others.
+#[track_caller]
+fn table_has(page: &str, heading: &str, keys: &[&str]) {
+    let rest = page.split(&format!("## {heading}\n")).nth(1).unwrap_or_else(|| panic!("no heading {heading}"));
+    let section = rest.split("\n## ").next().unwrap_or_default();
+    let rows = section.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next());
+    let mut found: Vec<_> = rows.collect();
+    let mut keys = keys.to_vec();
+    found.sort_unstable();
+    keys.sort_unstable();
+    assert_eq!(found, keys, "below {heading}");
+}
+
+#[test]
+fn the_page_of_machine_files_has_every_key_and_its_examples_are_machines() {
+    let page = page("machine-file.md");
+    table_has(&page, "The bus", BUS_KEYS);
+    table_has(&page, "A drive", DRIVE_KEYS);
+    let mut machines = 0;
+    for block in blocks(&page) {
+        let machine = Machine::parse(block).unwrap_or_else(|bad| panic!("{bad}"));
+        machine.build().unwrap_or_else(|bad| panic!("{bad}"));
+        machines += 1;
+    }
+    assert!(machines >= 1);
+}
+
+#[test]
+fn the_page_of_scenarios_has_every_key_and_form_and_its_examples_are_scenarios() {
+    let page = page("scenarios.md");
+    table_has(&page, "The file", file::KEYS);
+    table_has(&page, "Steps", STEP_KEYS);
+    table_has(&page, "Hosts", HOST_KEYS);
+    table_has(&page, "Lines of a host", LINE_KEYS);
+    table_has(&page, "Expectations", EXPECT_KEYS);
+    for form in condition::FORMS.iter().chain(deed::FORMS) {
+        assert!(page.contains(form), "{form} is not on the page");
+    }
+    let mut scenarios = 0;
+    for block in blocks(&page) {
+        Scenario::parse(block, Path::new("")).unwrap_or_else(|bad| panic!("{bad}"));
+        scenarios += 1;
+    }
+    assert!(scenarios >= 1);
+}
+
+#[test]
+fn the_machine_of_the_examples_can_be_built() {
+    let machine =
+        testbench::machine_file::read(&folder("examples/machine.toml")).unwrap_or_else(|reason| panic!("{reason}"));
+    let mut world = machine.build().unwrap_or_else(|bad| panic!("{bad}"));
+    world.run_for(std::time::Duration::from_secs(1));
+    for number in [4, 1, 2] {
+        assert!(world.report(number).is_ok_and(|report| report.powered && report.error_code == 0), "node {number}");
+    }
+}
