@@ -38,4 +38,10 @@ pub trait Station {
     fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
         let _ = (frame, now);
     }
+
+    /// The station's controller is bus-off from `now` on (ISO 11898-1: it neither sends nor hears), or takes part again
+    /// (`off` is false, also when it never was).
+    fn handle_bus_off(&mut self, off: bool, now: Instant) {
+        let _ = (off, now);
+    }
 }

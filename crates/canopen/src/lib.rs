@@ -54,6 +54,7 @@ mod abort;
 mod cob_id;
 pub mod connection_set;
 pub mod emcy;
+pub mod guarding;
 pub mod heartbeat;
 mod mux;
 pub mod nmt;

@@ -51,8 +51,14 @@ error_codes! {
     MOTOR_BLOCKED = 0x7121, "motor blocked";
     /// Sensor: incremental encoder 1.
     ENCODER_1 = 0x7305, "encoder fault";
+    /// Communication.
+    COMMUNICATION = 0x8100, "communication";
     /// Communication: life guard or heartbeat.
     LIFE_GUARD_OR_HEARTBEAT = 0x8130, "life guard or heartbeat lost";
+    /// Communication: recovered from bus-off.
+    RECOVERED_FROM_BUS_OFF = 0x8140, "recovered from bus-off";
+    /// Protocol: an RPDO has stayed away.
+    RPDO_TIMEOUT = 0x8250, "RPDO overdue";
     /// Positioning controller: following error.
     FOLLOWING_ERROR = 0x8611, "following error";
     /// Positioning controller: reference limit.

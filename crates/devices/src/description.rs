@@ -200,6 +200,8 @@ pub struct PdoRules {
     pub inhibit_unit_ns: u64,
     /// Nanoseconds in one count of the event timer.
     pub event_timer_unit_ns: u64,
+    /// The event timer of an RPDO is a deadline for the next one, and missing it an error that is told (CiA 301, 7.5.2.35).
+    pub rpdo_deadline: bool,
     /// Objects in one PDO.
     pub max_objects: u8,
     /// A PDO's records may be changed while the PDO is valid.
@@ -222,6 +224,7 @@ impl PdoRules {
     pub const CIA_301: Self = Self {
         inhibit_unit_ns: 100_000,
         event_timer_unit_ns: 1_000_000,
+        rpdo_deadline: true,
         max_objects: 64,
         remap_while_valid: false,
         fixed_mapping: false,

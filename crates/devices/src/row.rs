@@ -33,6 +33,23 @@ pub const fn rws(index: u16, sub: u8, data_type: DataType, name: &'static str, t
     rw(index, sub, data_type, name, title).stored()
 }
 
+/// Whether a row of a device that follows the profiles is a parameter, which a save of everything stores (CiA 301, 7.5.2.13):
+/// it can be written, and is neither a command nor a set-point.
+pub const fn is_parameter(row: &Entry) -> bool {
+    let command = match row.index {
+        0x1003 | 0x1010 | 0x1011 => true,
+        // Of each axis of a drive (CiA 402-1: blocks of 800h).
+        0x6000..=0x9FFF => matches!(
+            (0x6000 | row.index & 0x7FF, row.sub_index),
+            (0x6040 | 0x6060 | 0x6071 | 0x607A | 0x60B0..=0x60B2 | 0x60B8 | 0x60C1 | 0x60FF, _)
+                | (0x60C4, 4 | 6)
+                | (0x60FE, 1)
+        ),
+        _ => false,
+    };
+    matches!(row.access, Access::ReadWrite) && !command
+}
+
 /// The rows of all `parts`, in order.
 ///
 /// # Panics

@@ -4,7 +4,7 @@
 //! Each model lists its [`Variation`]s as const data; a [`Variant`] is what one drive picked of them, the first choice of each
 //! unless somebody said otherwise. A firmware asks its variant with a [`Pick`] that was looked up at compile time.
 
-use canopen::od::{Dictionary, Entry, Storage, Table};
+use canopen::od::{Dictionary, Entry, Kind, Storage, Table, Value};
 use canopen::{AbortCode, Mux, NodeId};
 
 /// How sure it is that the real drive does this, from most to least.
@@ -124,13 +124,17 @@ impl Preset {
         if !is_kept(row) {
             return Err(PresetError::NotStored);
         }
-        let raw = row.data_type.raw(self.value);
-        if row.data_type.value(raw) != self.value {
-            return Err(PresetError::Refused(AbortCode::INVALID_VALUE));
-        }
-        values.check_write(slot, raw).map_err(PresetError::Refused)?;
-        values.set_raw(slot, raw);
-        Ok(())
+        let refused = |code| PresetError::Refused(code);
+        let value = match (row.data_type.kind(), row.data_type.size()) {
+            (Kind::Signed | Kind::Unsigned, _) => Value::Integer(self.value),
+            (Kind::Real, 4) => Value::Real32(self.value as f32),
+            (Kind::Real, _) => Value::Real64(self.value as f64),
+            (Kind::Time | Kind::Bytes, _) => return Err(refused(AbortCode::INVALID_VALUE)),
+        };
+        let bits = value.to_bits(row.data_type).ok_or(refused(AbortCode::INVALID_VALUE))?.to_le_bytes();
+        let bytes = &bits[..row.data_type.size()];
+        values.check_bytes(slot, bytes).map_err(refused)?;
+        values.set_bytes(slot, bytes).map_err(refused)
     }
 }
 

@@ -11,6 +11,7 @@ pub const fn communication(description: &Description) -> NodeProfile {
         emcy: description.sends_emcy(),
         inhibit_unit_ns: pdo.inhibit_unit_ns,
         event_timer_unit_ns: pdo.event_timer_unit_ns,
+        rpdo_deadline: pdo.rpdo_deadline,
         event_trigger: pdo.event_trigger,
         pdo_changes_while_valid: pdo.remap_while_valid,
         mapping: pdo.mapping,

@@ -41,7 +41,7 @@ pub trait Firmware: Station + Clone {
     /// communication task, which changes the generation by one.
     fn is_storing(&self) -> bool;
 
-    /// How an axis of the drive is, for people; of one that it does not have, how the first is.
+    /// How an axis of the drive is, for people; of one that a drive of several does not have, nothing that moves.
     fn report(&self, axis: AxisId) -> Report;
 }
 

@@ -97,6 +97,11 @@ impl SetPoints {
         slowing_down(Point { position, ..end }, over_s - free_s, following.deceleration)
     }
 
+    /// The last two set-points came in time, one a period.
+    pub const fn is_steady(&self) -> bool {
+        self.steady
+    }
+
     /// Where the path leads to without another set-point, up to the end of its period.
     pub const fn target(&self) -> f64 {
         self.after

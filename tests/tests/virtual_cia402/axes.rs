@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use can::Bitrate;
 use canopen::od::{Access, DataType, Entry, FREE_PLACES, RowFacts, Table};
-use canopen::{Mux, NodeId};
+use canopen::{AbortCode, Mux, NodeId};
 use devices::servo::{CIA402, MODES, axis};
 use devices::{AxisDescription, AxisId, Description, Placement};
 use sim::machine::{Order, order as order_machine};
@@ -24,16 +24,23 @@ fn table(mut rows: Vec<Entry>) -> &'static Table {
     leak(Table::at_run_time(rows, facts, places).expect("no object twice"))
 }
 
-fn described(name: &'static str, dictionary: &'static Table, axes: [AxisDescription; 2]) -> &'static Description {
-    leak(Description { name, dictionary, axes: leak(axes), ..CIA402 })
+fn described(name: &'static str, dictionary: &'static Table, axes: Vec<AxisDescription>) -> &'static Description {
+    leak(Description { name, dictionary, axes: axes.leak(), ..CIA402 })
 }
 
 fn by_offset() -> &'static Description {
+    so_many_by_offset("two-axes-by-offset", 2)
+}
+
+fn so_many_by_offset(name: &'static str, count: u16) -> &'static Description {
     let rows = CIA402.dictionary.rows();
-    let second = rows.iter().filter(|row| row.index >= 0x6000).map(|row| Entry { index: row.index + 0x800, ..*row });
-    let both = rows.iter().copied().chain(second).collect();
-    let axes = [axis(Placement::FIRST, MODES), axis(Placement::IndexOffset(0x800), MODES)];
-    described("two-axes-by-offset", table(both), axes)
+    let further = (1..count).flat_map(|number| {
+        let profile = rows.iter().filter(|row| row.index >= 0x6000);
+        profile.map(move |row| Entry { index: row.index + number * 0x800, ..*row })
+    });
+    let all = rows.iter().copied().chain(further).collect();
+    let axes = (0..count).map(|number| axis(Placement::IndexOffset(number * 0x800), MODES)).collect();
+    described(name, table(all), axes)
 }
 
 /// Each object of sub-index 0 has the first axis at sub-index 1 and the second at 2; records are shared.
@@ -51,7 +58,7 @@ fn by_sub_index() -> &'static Description {
         0x1600..=0x1603 | 0x1A00..=0x1A03 => row.default(0),
         _ => row,
     });
-    described("two-axes-by-sub-index", table(unmapped.collect()), [side(1), side(2)])
+    described("two-axes-by-sub-index", table(unmapped.collect()), vec![side(1), side(2)])
 }
 
 /// Enables both axes in profile velocity and turns them apart.
@@ -94,6 +101,42 @@ fn check(mut bench: Bench) {
 #[test]
 fn two_axes_800h_apart_run_apart() {
     check(Bench::of(by_offset()));
+}
+
+#[test]
+fn eight_axes_run_each_at_its_own_speed_and_refuse_what_their_own_objects_refuse() {
+    let mut bench = Bench::of(so_many_by_offset("eight-axes", 8));
+    for number in 0..8 {
+        let at = |index: u16| index + number * 0x800;
+        bench.set(&[(at(0x6060), 0, 3), (at(0x6040), 0, 6), (at(0x6040), 0, 7), (at(0x6040), 0, 15)]);
+        bench.set(&[(at(0x60FF), 0, (i64::from(number) + 1) * TURN)]);
+        assert_eq!(
+            bench.write(at(0x6060), 0, 2),
+            Err(AbortCode::INVALID_VALUE),
+            "6502h of axis {number} has no mode 2"
+        );
+    }
+    bench.run_ms(500);
+    for number in 0..8 {
+        let shown = bench.machine.report_of(AxisId(number)).velocity_rpm;
+        assert!((shown - 60.0 * (f64::from(number) + 1.0)).abs() < 3.0, "axis {number}: {shown}");
+    }
+    // A fault of one axis is its own.
+    sim::VirtualDrive::apply(
+        &mut bench.machine,
+        AxisId(4),
+        &sim::Stimulus::Fault(sim::Component::Encoder, true),
+        bench.now,
+    )
+    .unwrap();
+    bench.run_ms(50);
+    for number in 0..8 {
+        let at = |index: u16| index + number * 0x800;
+        let status = bench.read(at(0x6041), 0);
+        let expected = if number == 4 { (0x08, 0x7305) } else { (0x07, 0) };
+        assert_eq!((status & 0x4F, bench.read(at(0x603F), 0)), expected, "axis {number}: {status:04X}");
+    }
+    assert_eq!(bench.machine.inputs().len(), 40);
 }
 
 #[test]

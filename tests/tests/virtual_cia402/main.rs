@@ -3,6 +3,7 @@
 
 mod axes;
 mod bench;
+mod connection;
 mod homing;
 mod limits;
 mod modes;

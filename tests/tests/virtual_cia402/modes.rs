@@ -1,6 +1,7 @@
 //! The modes that follow something at all times: torque, interpolated position, and the cyclic synchronous ones.
 
 use crate::bench::{Bench, TURN};
+use canopen::AbortCode;
 use sim::VirtualDrive;
 
 /// Sends a set-point and SYNC every millisecond, and hands each period on.
@@ -211,4 +212,78 @@ fn set_points_that_come_in_bunches_are_caught_up_with() {
     }
     bench.run_ms(100);
     assert!((bench.position() - target).abs() < TURN / 500 && bench.emcy().is_empty(), "{}", bench.position());
+}
+
+/// Into ip with a buffer of so many places and a period of 20 ms, bit 4 not set yet.
+fn buffered(places: i64, organisation: i64) -> Bench {
+    let mut bench = Bench::new();
+    bench.set(&[(0x60C2, 1, 20), (0x60C4, 2, places), (0x60C4, 3, organisation)]);
+    bench.enable(7);
+    bench
+}
+
+#[test]
+fn set_points_wait_in_ip_and_are_taken_one_a_period() {
+    let mut bench = buffered(8, 0);
+    let start = bench.position();
+    for n in 1..=8 {
+        bench.set(&[(0x60C1, 1, start + n * TURN / 50)]);
+    }
+    assert_eq!(bench.read(0x60C4, 4), 8, "how many wait");
+    assert_eq!(bench.write(0x60C1, 1, 0), Err(AbortCode::DEVICE_STATE), "full");
+    bench.set(&[(0x60C4, 4, 0)]);
+    assert_eq!(bench.read(0x60C4, 4), 8, "the position of a first-in-first-out buffer has no influence");
+    bench.run_ms(100);
+    assert!((bench.position() - start).abs() < 100, "bit 4 is not set");
+    bench.control(0x1F);
+    bench.run_ms(85);
+    // Four periods and a bit: the fifth of eight is on its way, one turn a second.
+    let way = (bench.position() - start) as f64 / (TURN as f64 / 50.0);
+    assert!((3.5..4.5).contains(&way), "{way}");
+    assert_eq!(bench.read(0x60C4, 4), 3);
+    assert!((bench.rpm() - 60.0).abs() < 6.0, "{}", bench.rpm());
+    bench.run_ms(400);
+    assert_eq!(bench.read(0x60C4, 4), 0);
+    assert!((bench.position() - start - 8 * TURN / 50).abs() < TURN / 10 && bench.rpm().abs() < 1.0);
+}
+
+#[test]
+fn a_ring_of_set_points_is_gone_round_until_bit_4_falls() {
+    let mut bench = buffered(2, 1);
+    let start = bench.position();
+    for (place, target) in [(0, 0), (1, TURN / 20)] {
+        bench.set(&[(0x60C4, 4, place), (0x60C1, 1, start + target)]);
+    }
+    bench.control(0x1F);
+    let (mut low, mut high, mut turns_round) = (0, 0, 0);
+    let mut upwards = true;
+    for _ in 0..400 {
+        bench.run_ms(1);
+        let at = bench.position() - start;
+        (low, high) = (low.min(at), high.max(at));
+        let turned = if upwards { bench.rpm() < -20.0 } else { bench.rpm() > 20.0 };
+        turns_round += i32::from(turned);
+        upwards ^= turned;
+    }
+    // Ten times up and ten times down in 400 ms.
+    assert!((17..=21).contains(&turns_round), "{turns_round}");
+    assert!(low > -TURN / 20 && high > TURN / 40 && high < TURN / 10, "{low} to {high}");
+    bench.control(0x0F);
+    bench.run_ms(200);
+    assert!(bench.rpm().abs() < 1.0);
+}
+
+#[test]
+fn a_buffer_that_is_cleared_or_changed_forgets_and_one_that_is_closed_takes_nothing() {
+    let mut bench = buffered(4, 0);
+    for change in [(0x60C4, 2, 5), (0x60C4, 3, 0), (0x60C4, 6, 0)] {
+        bench.set(&[(0x60C1, 1, 10)]);
+        assert_eq!(bench.read(0x60C4, 4), 1);
+        bench.set(&[change]);
+        assert_eq!(bench.read(0x60C4, 4), 0, "{change:X?}");
+    }
+    bench.set(&[(0x60C1, 1, 10)]);
+    assert_eq!(bench.read(0x60C4, 4), 0, "60C4h:06 = 0: closed");
+    bench.set(&[(0x60C4, 6, 1), (0x60C1, 1, 10)]);
+    assert_eq!(bench.read(0x60C4, 4), 1);
 }

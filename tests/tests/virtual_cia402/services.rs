@@ -72,10 +72,10 @@ fn cycle(bench: &mut Bench) {
 }
 
 #[test]
-fn reset_communication_leaves_the_motor_and_its_parameters_alone() {
+fn reset_communication_leaves_parameters_alone_and_with_6007h_0_the_motor_too() {
     let mut bench = Bench::new();
     bench.enable(3);
-    bench.set(&[(0x60FF, 0, 5 * crate::bench::TURN), (0x1017, 0, 50), (0x6072, 0, 2000)]);
+    bench.set(&[(0x60FF, 0, 5 * crate::bench::TURN), (0x1017, 0, 50), (0x6072, 0, 2000), (0x6007, 0, 0)]);
     bench.run_ms(300);
     bench.frame("000#8205");
     bench.run_ms(20);

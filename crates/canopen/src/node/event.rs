@@ -40,6 +40,11 @@ pub enum NodeEvent {
     RpdoTooShort(PdoNumber),
     /// An RPDO has the length of its mapping again.
     RpdoFits(PdoNumber),
+    /// An RPDO has stayed away for the time of its event timer (CiA 301, 7.5.2.35). Told once, until
+    /// [`RpdoInTime`](Self::RpdoInTime).
+    RpdoTimedOut(PdoNumber),
+    /// It has come again, or nobody awaits it any more.
+    RpdoInTime(PdoNumber),
     /// The owner did not poll in time: older events than the following ones are lost. The dictionary has the values.
     EventsLost,
 }

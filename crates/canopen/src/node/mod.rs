@@ -53,7 +53,7 @@ use crate::emcy::{self, Emcy, EmcyErrorCode};
 use crate::heartbeat;
 use crate::nmt::Transition;
 use crate::od::{Dictionary, Storage, Table};
-use crate::pdo::{PdoNumber, Tpdo};
+use crate::pdo::{PdoNumber, Rpdo, Tpdo};
 use crate::sdo::Server;
 use crate::{Mux, NmtCommand, NmtState, NodeId};
 use identifiers::Identifiers;
@@ -129,6 +129,7 @@ impl<S: Storage> Node<S> {
         self.events.clear();
         self.last_addressed = None;
         self.pdos.short.clear();
+        self.pdos.rpdos.as_mut().fill(Rpdo::INVALID);
         self.configure_objects();
         self.pending.insert(Source::BootUp);
         self.heartbeat = heartbeat::Producer::from_boot_up(self.heartbeat_period_ms(), now);
@@ -248,6 +249,12 @@ impl<S: Storage> Node<S> {
         self.pdos.rpdos.as_ref().get(number.position())?.standard_id().map(CanId::standard)
     }
 
+    /// The device takes an NMT command of its own, as its error behaviour (1029h) may ask for.
+    pub fn command_itself(&mut self, command: NmtCommand, now: Instant) {
+        self.now = now;
+        self.handle_nmt(command);
+    }
+
     fn handle_nmt(&mut self, command: NmtCommand) {
         match self.state.handle(command) {
             Transition::None => {}
@@ -286,7 +293,7 @@ impl<S: Storage> Node<S> {
     fn stop_pdos(&mut self) {
         self.pdos.latched.clear();
         for rpdo in self.pdos.rpdos.as_mut() {
-            let _ = rpdo.take_latched();
+            rpdo.stop();
         }
         for position in 0..self.pdos.tpdos.as_ref().len() {
             self.pdos.tpdos.as_mut()[position].stop();

@@ -1,5 +1,6 @@
 //! What a write to the communication objects (1000h to 1FFFh) must satisfy, and what it changes at once.
 
+use super::receive::number_at;
 use super::{Node, NodeEvent, Via};
 use crate::heartbeat;
 use crate::od::{Refusal, RowFacts, Slot, Storage, View};
@@ -184,7 +185,11 @@ impl<S: Storage> Node<S> {
         let mapping =
             Mapping::read(&self.dictionary, RPDO_MAPPING + position as u16, Direction::Rpdo, self.profile.mapping);
         // A mapping that does not resolve (a store of another firmware) maps nothing.
-        let rpdo = Rpdo::configure(&parameter, mapping.unwrap_or(None));
+        let timer_unit_ns = if self.profile.rpdo_deadline { self.profile.event_timer_unit_ns } else { 0 };
+        let rpdo = Rpdo::configure(&parameter, mapping.unwrap_or(None), timer_unit_ns);
+        if self.pdos.rpdos.as_ref()[position].is_late() {
+            self.push(NodeEvent::RpdoInTime(number_at(position)));
+        }
         self.received.set_rpdo(position, rpdo.standard_id());
         self.pdos.latched.set(position, false);
         self.pdos.rpdos.as_mut()[position] = rpdo;

@@ -21,6 +21,9 @@ pub struct NodeProfile {
     pub inhibit_unit_ns: u64,
     /// One count of a PDO's event timer (sub-index 05h).
     pub event_timer_unit_ns: u64,
+    /// The event timer of an RPDO is a deadline: [`NodeEvent::RpdoTimedOut`](super::NodeEvent::RpdoTimedOut). CiA 301 leaves
+    /// that to the device.
+    pub rpdo_deadline: bool,
     /// What makes the device send TPDOs of type 254 and 255.
     pub event_trigger: EventTrigger,
     /// COB-ID, inhibit time and mapping of a PDO may be changed while it is valid, and the COB-ID of EMCY.
@@ -52,6 +55,7 @@ impl NodeProfile {
             emcy: true,
             inhibit_unit_ns: 100_000,
             event_timer_unit_ns: 1_000_000,
+            rpdo_deadline: true,
             event_trigger: EventTrigger::Change,
             pdo_changes_while_valid: false,
             mapping: MappingRules::CIA_301,

@@ -144,7 +144,11 @@ impl<S: Storage> Node<S> {
         if !self.state.allows_pdo() {
             return;
         }
-        let reception = self.pdos.rpdos.as_mut()[position].receive(frame);
+        let rpdo = &mut self.pdos.rpdos.as_mut()[position];
+        let (reception, is_timed) = (rpdo.receive(frame), rpdo.is_timed());
+        if is_timed && reception != Reception::TooShort {
+            self.restart_rpdo_timer(position);
+        }
         if !self.pdos.short.is_empty() && reception != Reception::TooShort {
             self.accept_after_short(position);
         }
@@ -156,6 +160,16 @@ impl<S: Storage> Node<S> {
         }
         if self.pdos.tpdos.as_mut().get_mut(position).is_some_and(Tpdo::handle_rpdo) {
             self.offer_tpdo(position);
+        }
+    }
+
+    #[inline(never)]
+    fn restart_rpdo_timer(&mut self, position: usize) {
+        let rpdo = &mut self.pdos.rpdos.as_mut()[position];
+        let was_late = rpdo.restart_timer(self.now);
+        self.deadline = self.deadline.min(rpdo.deadline());
+        if was_late {
+            self.push(NodeEvent::RpdoInTime(number_at(position)));
         }
     }
 
@@ -206,6 +220,6 @@ impl<S: Storage> Node<S> {
 }
 
 /// The PDO at a position that a node has.
-fn number_at(position: usize) -> PdoNumber {
+pub(super) fn number_at(position: usize) -> PdoNumber {
     PdoNumber::at(position).unwrap_or(PdoNumber::FIRST)
 }

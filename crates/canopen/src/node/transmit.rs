@@ -1,12 +1,14 @@
 //! Frames from a node: which service has something to send, which of them is the most urgent, and when to look again.
 
-use can::{CanId, Frame};
+use can::{CanId, Frame, Instant};
 
-use super::Node;
 use super::pending::Source;
+use super::receive::number_at;
+use super::{Node, NodeEvent};
 use crate::connection_set;
 use crate::heartbeat::Heartbeat;
 use crate::od::Storage;
+use crate::pdo::Rpdo;
 
 impl<S: Storage> Node<S> {
     #[inline(never)]
@@ -19,12 +21,18 @@ impl<S: Storage> Node<S> {
         for tpdo in self.pdos.tpdos.as_mut() {
             tpdo.handle_timeout(self.now);
         }
+        for position in 0..self.pdos.rpdos.as_ref().len() {
+            if self.pdos.rpdos.as_mut()[position].handle_timeout(self.now) {
+                self.events.push(NodeEvent::RpdoTimedOut(number_at(position)));
+            }
+        }
         self.reschedule();
     }
 
     /// Finds the earliest deadline of all services, and offers what has become ready.
     pub(super) fn reschedule(&mut self) {
-        self.deadline = self.heartbeat.deadline().min(self.sdo.deadline());
+        let rpdos = self.pdos.rpdos.as_ref().iter().map(Rpdo::deadline);
+        self.deadline = rpdos.fold(self.heartbeat.deadline().min(self.sdo.deadline()), Instant::min);
         self.offer_emcy();
         for position in 0..self.pdos.tpdos.as_ref().len() {
             self.offer_tpdo(position);

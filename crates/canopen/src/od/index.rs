@@ -60,6 +60,12 @@ pub(super) const fn fill(
         return Err(TableError::OtherLength);
     }
     let places = places.as_flattened_mut();
+    // A place that is taken before the first row is in would be searched for ever.
+    let mut place = 0;
+    while place < places.len() {
+        places[place] = FREE;
+        place += 1;
+    }
     let (mut offset, mut staging, mut position) = (0_u32, 0, 0);
     while position < rows.len() {
         let row = &rows[position];

@@ -72,8 +72,17 @@ impl Table {
         Self { rows, facts, places: places.as_flattened(), byte_count: *byte_count, staging: *staging }
     }
 
-    /// A table of rows that are read at run time. `facts` and `places` are as long as the rows;
-    /// [`RowFacts::NONE`] and [`FREE_PLACES`](super::FREE_PLACES) to begin with.
+    /// Whether rows make a table, before they are kept for it. `facts` and `places` are as long as the rows, whatever is in
+    /// them.
+    ///
+    /// # Errors
+    /// [`TableError`].
+    pub fn check(rows: &[Entry], facts: &mut [RowFacts], places: &mut [Places]) -> Result<(), TableError> {
+        fill(rows, facts, places).map(|_| ())
+    }
+
+    /// A table of rows that are read at run time. `facts` and `places` are as long as the rows, whatever is in them:
+    /// [`RowFacts::NONE`] and [`FREE_PLACES`](super::FREE_PLACES), say.
     ///
     /// # Errors
     /// [`TableError`].

@@ -91,7 +91,10 @@ impl<'a> View<'a> {
     }
 
     /// Whether a value of `length` bytes can be stored in a row.
-    pub(crate) fn check_length(&self, slot: Slot, length: usize) -> Result<(), AbortCode> {
+    ///
+    /// # Errors
+    /// [`AbortCode::TOO_LONG`] and [`AbortCode::TOO_SHORT`], and [`AbortCode::READ_ONLY`] for a string that never changes.
+    pub fn check_length(&self, slot: Slot, length: usize) -> Result<(), AbortCode> {
         let row = self.table.row(slot);
         match (row.data_type.kind(), row.stored_bytes()) {
             (Kind::Bytes, 0) => Err(AbortCode::READ_ONLY),

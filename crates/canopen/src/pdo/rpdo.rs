@@ -1,4 +1,4 @@
-use can::Frame;
+use can::{Frame, Instant};
 
 use super::{Mapping, Parameter};
 
@@ -9,6 +9,20 @@ pub struct Rpdo {
     synchronous: bool,
     mapping: Option<Mapping>,
     latched: Option<u64>,
+    deadline: Deadline,
+}
+
+/// Deadline monitoring by the event timer (CiA 301, 7.5.2.35, sub-index 05h): begun by each reception.
+#[derive(Clone, Copy, Debug)]
+struct Deadline {
+    /// 0 is off.
+    time_ns: u64,
+    until: Instant,
+    missed: bool,
+}
+
+impl Deadline {
+    const OFF: Self = Self { time_ns: 0, until: Instant::FAR_FUTURE, missed: false };
 }
 
 /// What becomes of a received RPDO.
@@ -26,15 +40,18 @@ pub enum Reception {
 
 impl Rpdo {
     /// Not valid.
-    pub const INVALID: Self = Self { id: None, synchronous: false, mapping: None, latched: None };
+    pub const INVALID: Self =
+        Self { id: None, synchronous: false, mapping: None, latched: None, deadline: Deadline::OFF };
 
-    /// Takes a changed record; what was latched is dropped.
-    pub fn configure(parameter: &Parameter, mapping: Option<Mapping>) -> Self {
+    /// Takes a changed record; what was latched is dropped. The event timer, in units of `timer_unit_ns`, is a deadline from
+    /// the next reception on; a unit of 0 is a device whose event timers do nothing here.
+    pub fn configure(parameter: &Parameter, mapping: Option<Mapping>, timer_unit_ns: u64) -> Self {
         Self {
             id: parameter.standard_id(),
             synchronous: parameter.transmission_type.is_synchronous(),
             mapping,
             latched: None,
+            deadline: Deadline { time_ns: u64::from(parameter.event_timer) * timer_unit_ns, ..Deadline::OFF },
         }
     }
 
@@ -62,6 +79,43 @@ impl Rpdo {
         } else {
             Reception::Apply(data)
         }
+    }
+
+    /// It has an event timer.
+    #[inline]
+    pub const fn is_timed(&self) -> bool {
+        self.deadline.time_ns != 0
+    }
+
+    /// A frame came at `now` that was long enough: the event timer starts anew. True if the deadline had been missed.
+    pub fn restart_timer(&mut self, now: Instant) -> bool {
+        self.deadline.until = now.plus_nanos(self.deadline.time_ns);
+        core::mem::take(&mut self.deadline.missed)
+    }
+
+    /// Time has reached `now`. True if the deadline was missed by now, which is told once.
+    pub fn handle_timeout(&mut self, now: Instant) -> bool {
+        let missed = now >= self.deadline.until;
+        if missed {
+            self.deadline = Deadline { until: Instant::FAR_FUTURE, missed: true, ..self.deadline };
+        }
+        missed
+    }
+
+    /// When the event timer ends; [`Instant::FAR_FUTURE`] while it does not run.
+    pub const fn deadline(&self) -> Instant {
+        self.deadline.until
+    }
+
+    /// The deadline was missed, and no frame has come since.
+    pub const fn is_late(&self) -> bool {
+        self.deadline.missed
+    }
+
+    /// Operational is left: what was latched is dropped, and nothing is awaited.
+    pub const fn stop(&mut self) {
+        self.latched = None;
+        self.deadline.until = Instant::FAR_FUTURE;
     }
 
     /// At SYNC: the data that waited for it.

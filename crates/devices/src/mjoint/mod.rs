@@ -89,6 +89,7 @@ const STORAGE: ParameterStorage = ParameterStorage {
 const PDO_RULES: PdoRules = PdoRules {
     inhibit_unit_ns: 100_000,
     event_timer_unit_ns: 1_000_000,
+    rpdo_deadline: false,
     max_objects: 3,
     remap_while_valid: true,
     fixed_mapping: true,

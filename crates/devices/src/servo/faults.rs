@@ -6,7 +6,7 @@ use crate::faults::FaultRow;
 use crate::faults::error_register::{COMMUNICATION, CURRENT, GENERIC, PROFILE, TEMPERATURE, VOLTAGE};
 
 /// Number of faults.
-pub const FAULT_COUNT: usize = 10;
+pub const FAULT_COUNT: usize = 13;
 
 /// The place of each fault in [`FAULTS`].
 pub mod row {
@@ -26,10 +26,16 @@ pub mod row {
     pub const STORE: usize = 6;
     /// Encoder.
     pub const ENCODER: usize = 7;
-    /// Heartbeat lost.
+    /// Heartbeat or guarding lost.
     pub const HEARTBEAT: usize = 8;
     /// Following error.
     pub const FOLLOWING_ERROR: usize = 9;
+    /// The controller was bus-off.
+    pub const BUS_OFF: usize = 10;
+    /// The node was stopped, or its communication reset, while the axis was under control.
+    pub const NMT: usize = 11;
+    /// An RPDO has missed its deadline.
+    pub const RPDO_DEADLINE: usize = 12;
 }
 
 /// All faults.
@@ -45,6 +51,9 @@ pub static FAULTS: [FaultRow; FAULT_COUNT] = [
     fault(ErrorCode::ENCODER_1, "Encoder", PROFILE, "Look after the encoder's cable."),
     fault(ErrorCode::LIFE_GUARD_OR_HEARTBEAT, "Heartbeat lost", COMMUNICATION, "Look after the node that is watched (1016h); then reset."),
     fault(ErrorCode::FOLLOWING_ERROR, "Following error", PROFILE, "Ask for less speed or acceleration, or widen 6065h and 6066h."),
+    fault(ErrorCode::RECOVERED_FROM_BUS_OFF, "Bus-off", COMMUNICATION, "Look after cable, termination and bit rates; then reset."),
+    fault(ErrorCode::COMMUNICATION, "Stopped by NMT", COMMUNICATION, "Do not stop or reset the node while it moves, or see 6007h; then reset."),
+    fault(ErrorCode::RPDO_TIMEOUT, "RPDO overdue", COMMUNICATION, "Send the RPDO within its event timer (1400h:05); then reset."),
 ];
 
 const fn fault(code: ErrorCode, name: &'static str, register: u8, remedy: &'static str) -> FaultRow {

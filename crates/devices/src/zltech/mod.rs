@@ -29,6 +29,8 @@ const IDENTITY: Identity = Identity { device_type: 0x0004_0192, vendor_id: 0x100
 const PDO_RULES: PdoRules = PdoRules {
     inhibit_unit_ns: PDO_TIMER_UNIT_NS,
     event_timer_unit_ns: PDO_TIMER_UNIT_NS,
+    // The manuals say nothing of an RPDO's event timer: silence of the host is 2000h's.
+    rpdo_deadline: false,
     max_objects: 4,
     remap_while_valid: true,
     fixed_mapping: false,

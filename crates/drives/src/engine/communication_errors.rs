@@ -6,15 +6,17 @@ use super::faults::error_register::{COMMUNICATION, GENERIC};
 pub(super) struct CommunicationErrors {
     /// Events of the node were lost.
     pub(super) events_lost: bool,
-    /// A heartbeat that is watched has stayed away.
+    /// A heartbeat that is watched, or the guarding of this device, has stayed away.
     pub(super) heartbeat_lost: bool,
+    /// How many RPDOs have missed their deadline.
+    late_rpdos: u16,
     /// How many RPDOs had a last frame that was shorter than their mapping.
     short_rpdos: u16,
 }
 
 impl CommunicationErrors {
     /// No error.
-    pub(super) const NONE: Self = Self { events_lost: false, heartbeat_lost: false, short_rpdos: 0 };
+    pub(super) const NONE: Self = Self { events_lost: false, heartbeat_lost: false, late_rpdos: 0, short_rpdos: 0 };
 
     /// The frames of an RPDO have become too short. Told once, as its end.
     pub(super) const fn begin_short_rpdo(&mut self) {
@@ -26,8 +28,18 @@ impl CommunicationErrors {
         self.short_rpdos = self.short_rpdos.saturating_sub(1);
     }
 
+    /// An RPDO has missed its deadline. Told once, as its end.
+    pub(super) const fn begin_late_rpdo(&mut self) {
+        self.late_rpdos = self.late_rpdos.saturating_add(1);
+    }
+
+    /// It has come again.
+    pub(super) const fn end_late_rpdo(&mut self) {
+        self.late_rpdos = self.late_rpdos.saturating_sub(1);
+    }
+
     pub(super) const fn is_empty(self) -> bool {
-        !self.events_lost && !self.heartbeat_lost && self.short_rpdos == 0
+        !self.events_lost && !self.heartbeat_lost && self.late_rpdos == 0 && self.short_rpdos == 0
     }
 
     /// What they set in the error register.

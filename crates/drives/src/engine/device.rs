@@ -4,13 +4,15 @@
 //! `Application` turns into the drive's own reactions. Nothing here knows what an object means but for the error register
 //! (1001h).
 
+mod errors;
+
 use can::{Bitrate, Frame, Instant, Station};
 use canopen::node::{Node, NodeEvent, NodeProfile, Ticket, Via};
 use canopen::od::{Dictionary, Entry, Slot, Storage};
-use canopen::{AbortCode, EmcyErrorCode, Mux, NodeId};
+use canopen::pdo::PdoNumber;
+use canopen::{AbortCode, Mux, NmtCommand, NmtState, NodeId};
 
 use super::communication_errors::CommunicationErrors;
-use super::faults::{FaultMonitor, FaultSet};
 use super::storage::{Store, StoredImage};
 use devices::variant::Variant;
 
@@ -257,63 +259,10 @@ impl<S: Storage> Device<S> {
         true
     }
 
-    /// Sends an EMCY message for each new fault; the error register shows all that are latched.
-    pub fn report_faults<const F: usize>(&mut self, new: FaultSet, faults: &FaultMonitor<F>, now: Instant) {
-        self.fault_bits = faults.error_register();
-        for row in new.rows() {
-            self.report_error(faults.row(row).emcy, now);
-        }
-    }
-
-    /// After a reset of faults: the error register shows what is left, and EMCY tells when nothing is.
-    pub fn report_reset<const F: usize>(&mut self, faults: &FaultMonitor<F>, now: Instant) {
-        self.fault_bits = faults.error_register();
-        self.communication_errors.events_lost = false;
-        self.report_end_of_error(now);
-    }
-
-    /// An RPDO came too short, or has its length again: an error that the profile may have a code for.
-    fn report_rpdo_length(&mut self, fits: bool, now: Instant) {
-        let Some(code) = self.profile.short_rpdo else { return };
-        if fits {
-            self.communication_errors.end_short_rpdo();
-            self.report_end_of_error(now);
-        } else {
-            self.communication_errors.begin_short_rpdo();
-            self.report_error(code, now);
-        }
-    }
-
-    /// Events of the node were lost: what CiA 301 calls objects lost. It stands until faults are reset, since what was
-    /// lost does not come back.
-    fn report_lost_events(&mut self, now: Instant) {
-        self.communication_errors.events_lost = true;
-        self.report_error(EmcyErrorCode::CAN_OVERRUN, now);
-    }
-
-    /// A heartbeat that is watched has stayed away, or is heard again (CiA 301, 7.2.8.3.2.2).
-    pub fn report_heartbeat(&mut self, heard: bool, now: Instant) {
-        if !heard {
-            self.communication_errors.heartbeat_lost = true;
-            self.report_error(EmcyErrorCode::HEARTBEAT, now);
-        } else if self.communication_errors.heartbeat_lost {
-            self.communication_errors.heartbeat_lost = false;
-            self.report_end_of_error(now);
-        }
-    }
-
-    fn report_error(&mut self, code: EmcyErrorCode, now: Instant) {
-        self.node.raise_emcy(code, self.fault_bits | self.communication_errors.register_bits(), [0; 5], now);
-    }
-
-    /// An error ended: the error register shows what is left, and EMCY tells when nothing is.
-    fn report_end_of_error(&mut self, now: Instant) {
-        let register = self.fault_bits | self.communication_errors.register_bits();
-        if let Some(slot) = self.error_register() {
-            self.node.dictionary_mut().set_raw(slot, u32::from(register));
-        }
-        if register == 0 {
-            self.node.raise_emcy(EmcyErrorCode::NO_ERROR, 0, [0; 5], now);
+    /// The device takes an NMT command of its own: [`Node::command_itself`]. What comes of it is told as events.
+    pub fn command_itself(&mut self, command: NmtCommand, now: Instant) {
+        if self.running {
+            self.node.command_itself(command, now);
         }
     }
 
@@ -385,7 +334,18 @@ pub(crate) trait Application<S: Storage> {
     /// NMT reset node: starts the firmware over with the stored values.
     fn restart(&mut self, now: Instant);
 
-    /// NMT reset communication: the motor goes on.
+    /// A new NMT state was entered. Nothing by default: the motor goes on, and whoever stops it is the drive's own watch.
+    fn nmt_changed(&mut self, state: NmtState, now: Instant) {
+        let _ = (state, now);
+    }
+
+    /// An RPDO has missed the deadline of its event timer, or has come again.
+    fn rpdo_deadline(&mut self, number: PdoNumber, met: bool, now: Instant) {
+        let _ = number;
+        self.device().report_rpdo_deadline(met, now);
+    }
+
+    /// NMT reset communication. By default the motor goes on.
     fn restart_communication(&mut self, now: Instant) {
         self.device().restart_communication(now);
     }
@@ -419,7 +379,10 @@ pub(crate) trait Application<S: Storage> {
             NodeEvent::RpdoTooShort(_) => self.device().report_rpdo_length(false, now),
             NodeEvent::RpdoFits(_) => self.device().report_rpdo_length(true, now),
             NodeEvent::EventsLost => self.device().report_lost_events(now),
-            NodeEvent::Written { .. } | NodeEvent::Sync | NodeEvent::Nmt(_) => {}
+            NodeEvent::RpdoTimedOut(number) => self.rpdo_deadline(number, false, now),
+            NodeEvent::RpdoInTime(number) => self.rpdo_deadline(number, true, now),
+            NodeEvent::Nmt(state) => self.nmt_changed(state, now),
+            NodeEvent::Written { .. } | NodeEvent::Sync => {}
         }
     }
 }
@@ -464,7 +427,7 @@ pub(crate) use station;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::faults::{FaultRow, error_register};
+    use crate::engine::faults::{FaultMonitor, FaultRow, error_register};
     use canopen::od::{Fixed, Index, Object, Table};
     use devices::row::{U8, U16, ro, rws};
 

@@ -1,136 +1,195 @@
-//! The parameter store of a device whose table comes from a description: one record a parameter in a byte image.
+//! The parameter store of a device whose table comes from a description: one record a parameter in a byte image, as large
+//! as the table asks for.
 //!
-//! An image is a header (magic, number of records), one record a value (multiplexor key, value) and a CRC-32 over all of
-//! it, little endian. Values are checked against the table on the way in: an image can never put a value out of range into
-//! a dictionary.
+//! An image is a header (magic, how many bytes of records), the records (multiplexor key, how many bytes, the value as an
+//! SDO carries it) and a CRC-32 over all of it, little endian. Values are checked against the table on the way in: an image
+//! can never put a value out of range into a dictionary.
 
 use canopen::Mux;
-use canopen::od::{Access, Dictionary, Entry, Storage};
+use canopen::od::{Access, Dictionary, Entry, Slot, Storage, Table};
 
 use crate::engine::storage::crc32;
 
-/// Bytes of the image.
-pub const MEMORY_SIZE: usize = 8192;
-
-const MAGIC: [u8; 4] = *b"FDN1";
+const MAGIC: [u8; 4] = *b"FDN2";
+/// Magic and length.
 const HEADER_SIZE: usize = 8;
-const RECORD_SIZE: usize = 8;
+/// Key and length of one value.
+const RECORD_HEADER_SIZE: usize = 8;
 const CRC_SIZE: usize = 4;
 
-/// Most parameters that are stored.
-pub const CAPACITY: usize = (MEMORY_SIZE - HEADER_SIZE - CRC_SIZE) / RECORD_SIZE;
+/// Contents of the memory chip, to be kept over power cycles. `S` has room for the image of the device's table
+/// ([`image_size`]).
+#[derive(Clone)]
+pub struct Memory<S: Storage> {
+    image: S::Bytes,
+    size: usize,
+}
 
-/// Contents of the memory chip, to be kept over power cycles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Memory([u8; MEMORY_SIZE]);
+/// How large it is, and whether it can be read: a whole image is thousands of bytes.
+impl<S: Storage> core::fmt::Debug for Memory<S> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Memory").field("size", &self.size).field("is_sound", &self.is_sound()).finish()
+    }
+}
 
-impl Memory {
+/// Bytes of the image of a device with this table: each value that can be stored has its place, whatever its type.
+pub fn image_size(table: &Table) -> usize {
+    let records = table.rows().iter().filter(|row| is_storable(row)).map(|row| RECORD_HEADER_SIZE + most_bytes(row));
+    HEADER_SIZE + records.sum::<usize>() + CRC_SIZE
+}
+
+impl<S: Storage> Memory<S> {
     /// A chip that holds no values: those of the table are in effect.
-    pub fn empty() -> Self {
-        let mut memory = Self([0; MEMORY_SIZE]);
-        memory.put(&mut core::iter::empty());
+    ///
+    /// # Panics
+    /// If `S` has not enough room.
+    pub fn empty(table: &Table) -> Self {
+        let mut memory = Self::blank(table);
+        Writer::new(&mut memory).finish();
         memory
     }
 
     /// The image in a file's bytes: short files are padded, long ones cut; a checksum tells if it is sound.
-    pub fn from_bytes(bytes: &[u8]) -> Self {
-        let mut image = [0xFF; MEMORY_SIZE];
+    pub fn from_bytes(table: &Table, bytes: &[u8]) -> Self {
+        let mut memory = Self::blank(table);
+        let image = &mut memory.image.as_mut()[..memory.size];
+        image.fill(0xFF);
         image.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
-        Self(image)
+        memory
+    }
+
+    fn blank(table: &Table) -> Self {
+        let size = image_size(table);
+        Self { image: S::bytes(size), size }
     }
 
     /// All bytes.
-    pub const fn bytes(&self) -> &[u8] {
-        &self.0
+    pub fn bytes(&self) -> &[u8] {
+        &self.image.as_ref()[..self.size]
     }
 
     /// The checksum is right.
     pub fn is_sound(&self) -> bool {
-        let end = HEADER_SIZE + self.count() * RECORD_SIZE;
-        self.0.starts_with(&MAGIC) && end + CRC_SIZE <= MEMORY_SIZE && crc32(&self.0[..end]) == word(&self.0, end)
+        self.checked().is_some()
+    }
+
+    /// The records, if the image is sound.
+    fn checked(&self) -> Option<&[u8]> {
+        let bytes = self.bytes();
+        let end = HEADER_SIZE.checked_add(word(bytes, MAGIC.len())? as usize)?;
+        let is_sound = bytes.starts_with(&MAGIC) && crc32(bytes.get(..end)?) == word(bytes, end)?;
+        is_sound.then(|| &bytes[HEADER_SIZE..end])
     }
 
     /// Puts the stored values of the rows that `wanted` names into a dictionary; unknown keys and values that the table
     /// refuses are passed over, an unsound image is left alone.
-    pub fn load<S: Storage>(&self, values: &mut Dictionary<S>, wanted: impl Fn(&Entry) -> bool) {
-        if !self.is_sound() {
-            return;
-        }
-        for (key, raw) in self.records() {
+    pub fn load<V: Storage>(&self, values: &mut Dictionary<V>, wanted: impl Fn(&Entry) -> bool) {
+        for (key, value) in records(self.checked().unwrap_or(&[])) {
             let table = values.table();
             let Ok(slot) = table.find(Mux::from_key(key)) else { continue };
             let row = table.row(slot);
-            if wanted(row) && row.check_value(row.data_type.value(raw)).is_ok() {
-                values.set_raw(slot, raw);
+            if is_storable(row) && wanted(row) && values.check_bytes(slot, value).is_ok() {
+                // It has just been found to fit.
+                let _ = values.set_bytes(slot, value);
             }
         }
     }
 
-    /// Stores the values of the parameters that `wanted` names; the other records stay. What does not fit any more is left
-    /// out.
-    pub fn save<S: Storage>(&mut self, values: &Dictionary<S>, wanted: impl Fn(&Entry) -> bool) {
-        let before = *self;
-        let stored = |key| before.is_sound().then(|| before.records().find(|(known, _)| *known == key)).flatten();
-        let mut records = values.table().iter().filter(|(_, row)| is_parameter(row)).filter_map(|(slot, row)| {
+    /// Stores the values of the rows that `wanted` names; the other records stay.
+    pub fn save<V: Storage>(&mut self, values: &Dictionary<V>, wanted: impl Fn(&Entry) -> bool) {
+        let before = self.clone();
+        // Both are in ascending order: one pass over each.
+        let mut stored = records(before.checked().unwrap_or(&[])).peekable();
+        let mut writer = Writer::new(self);
+        for (slot, row) in values.table().iter().filter(|(_, row)| is_storable(row)) {
             let key = row.mux().key();
-            if wanted(row) { Some((key, values.raw(slot))) } else { stored(key) }
-        });
-        self.put(&mut records);
+            if wanted(row) {
+                writer.put_value(key, values, slot);
+                continue;
+            }
+            while stored.next_if(|(known, _)| *known < key).is_some() {}
+            if let Some((_, value)) = stored.next_if(|(known, value)| *known == key && value.len() <= most_bytes(row)) {
+                writer.put(key, value);
+            }
+        }
+        writer.finish();
     }
 
     /// Forgets the values of the rows that `wanted` names: those of the table are in effect from the next start on.
     pub fn forget(&mut self, wanted: impl Fn(Mux) -> bool) {
-        let before = *self;
-        if before.is_sound() {
-            self.put(&mut before.records().filter(|(key, _)| !wanted(Mux::from_key(*key))));
-        } else {
-            *self = Self::empty();
+        let before = self.clone();
+        let mut writer = Writer::new(self);
+        for (key, value) in records(before.checked().unwrap_or(&[])) {
+            if !wanted(Mux::from_key(key)) {
+                writer.put(key, value);
+            }
         }
-    }
-
-    fn put(&mut self, records: &mut dyn Iterator<Item = (u32, u32)>) {
-        let mut count = 0;
-        for (key, raw) in records.take(CAPACITY) {
-            let at = HEADER_SIZE + count * RECORD_SIZE;
-            put_word(&mut self.0, at, key);
-            put_word(&mut self.0, at + 4, raw);
-            count += 1;
-        }
-        self.0[..MAGIC.len()].copy_from_slice(&MAGIC);
-        put_word(&mut self.0, MAGIC.len(), count as u32);
-        let end = HEADER_SIZE + count * RECORD_SIZE;
-        let crc = crc32(&self.0[..end]);
-        put_word(&mut self.0, end, crc);
-    }
-
-    fn count(&self) -> usize {
-        word(&self.0, MAGIC.len()).min(CAPACITY as u32) as usize
-    }
-
-    fn records(&self) -> impl Iterator<Item = (u32, u32)> {
-        self.0[HEADER_SIZE..]
-            .chunks_exact(RECORD_SIZE)
-            .take(self.count())
-            .map(|record| (word(record, 0), word(record, 4)))
+        writer.finish();
     }
 }
 
-/// Whether a row is a parameter, which 1010h stores: it can be written, and is neither a command nor a target.
-pub fn is_parameter(row: &Entry) -> bool {
-    let profile = if row.index < 0x6800 { row.index } else { 0x6000 | row.index & 0x7FF };
-    let command = matches!(row.index, 0x1003 | 0x1010 | 0x1011)
-        || (row.index >= 0x6000
-            && matches!(
-                profile,
-                0x6040 | 0x6060 | 0x6071 | 0x607A | 0x60B0..=0x60B2 | 0x60B8 | 0x60C1 | 0x60FE | 0x60FF
-            ));
-    row.access == Access::ReadWrite && row.data_type.bits() > 0 && !command
+/// Writes an image from its beginning.
+struct Writer<'a> {
+    image: &'a mut [u8],
+    end: usize,
 }
 
-fn word(bytes: &[u8], at: usize) -> u32 {
-    let mut raw = [0; 4];
-    raw.copy_from_slice(&bytes[at..at + 4]);
-    u32::from_le_bytes(raw)
+impl<'a> Writer<'a> {
+    fn new<S: Storage>(memory: &'a mut Memory<S>) -> Self {
+        let size = memory.size;
+        Self { image: &mut memory.image.as_mut()[..size], end: HEADER_SIZE }
+    }
+
+    fn put(&mut self, key: u32, value: &[u8]) {
+        let at = self.begin(key, value.len());
+        self.image[at..self.end].copy_from_slice(value);
+    }
+
+    fn put_value(&mut self, key: u32, values: &Dictionary<impl Storage>, slot: Slot) {
+        let view = values.view();
+        let at = self.begin(key, view.length(slot));
+        view.copy(slot, &mut self.image[at..self.end]);
+    }
+
+    /// The head of a record; where its value begins. The image has room for each row's longest value once.
+    fn begin(&mut self, key: u32, length: usize) -> usize {
+        put_word(self.image, self.end, key);
+        put_word(self.image, self.end + 4, length as u32);
+        let at = self.end + RECORD_HEADER_SIZE;
+        self.end = at + length;
+        at
+    }
+
+    fn finish(self) {
+        self.image[..MAGIC.len()].copy_from_slice(&MAGIC);
+        put_word(self.image, MAGIC.len(), (self.end - HEADER_SIZE) as u32);
+        let crc = crc32(&self.image[..self.end]);
+        put_word(self.image, self.end, crc);
+        self.image[self.end + CRC_SIZE..].fill(0xFF);
+    }
+}
+
+/// A row whose value can be in the store at all: it can be written, and has bytes.
+pub const fn is_storable(row: &Entry) -> bool {
+    matches!(row.access, Access::ReadWrite) && most_bytes(row) > 0
+}
+
+const fn most_bytes(row: &Entry) -> usize {
+    if row.data_type.fits_cell() { row.data_type.size() } else { row.stored_bytes() as usize }
+}
+
+/// Key and value of each record of an image that is sound.
+fn records(mut left: &[u8]) -> impl Iterator<Item = (u32, &[u8])> {
+    core::iter::from_fn(move || {
+        let (key, length) = (word(left, 0)?, word(left, 4)? as usize);
+        let value = left.get(RECORD_HEADER_SIZE..RECORD_HEADER_SIZE.checked_add(length)?)?;
+        left = &left[RECORD_HEADER_SIZE + length..];
+        Some((key, value))
+    })
+}
+
+fn word(bytes: &[u8], at: usize) -> Option<u32> {
+    Some(u32::from_le_bytes(*bytes.get(at..)?.first_chunk()?))
 }
 
 fn put_word(bytes: &mut [u8], at: usize, value: u32) {
@@ -139,11 +198,15 @@ fn put_word(bytes: &mut [u8], at: usize, value: u32) {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
     use super::*;
     use canopen::NodeId;
+    use canopen::od::{DataType, Fixed, Index};
     use devices::servo::objects::TABLE;
 
-    type Values = Dictionary<canopen::od::Fixed<512, 512, 8, 256>>;
+    type Room = Fixed<512, 16_384, 8, 256>;
+    type Values = Dictionary<Room>;
+    type Store = Memory<Room>;
 
     fn values() -> Values {
         Dictionary::new(&TABLE, NodeId::MIN)
@@ -162,9 +225,9 @@ mod tests {
 
     #[test]
     fn an_empty_memory_is_sound_and_a_blank_one_is_not() {
-        assert!(Memory::empty().is_sound());
-        assert!(!Memory::from_bytes(&[]).is_sound());
-        assert!(!Memory::from_bytes(&[0; MEMORY_SIZE]).is_sound());
+        assert!(Store::empty(&TABLE).is_sound());
+        assert!(!Store::from_bytes(&TABLE, &[]).is_sound());
+        assert!(!Store::from_bytes(&TABLE, &[0; 16_384]).is_sound());
     }
 
     #[test]
@@ -172,7 +235,7 @@ mod tests {
         let mut there = values();
         set(&mut there, TORQUE_LIMIT, 777);
         set(&mut there, HEARTBEAT, 250);
-        let mut memory = Memory::empty();
+        let mut memory = Store::empty(&TABLE);
         memory.save(&there, Entry::is_communication);
         let mut back = values();
         memory.load(&mut back, |_| true);
@@ -186,20 +249,74 @@ mod tests {
         assert_eq!((get(&back, TORQUE_LIMIT), get(&back, HEARTBEAT)), (777, 0));
     }
 
+    const fn row(index: u16, data_type: DataType) -> Entry {
+        Entry::new(index, 0, data_type, Access::ReadWrite, "", "")
+    }
+
+    static ROWS: [Entry; 7] = [
+        row(0x2000, DataType::Real32).range_real(-1.0, 1.0),
+        row(0x2001, DataType::Real64),
+        row(0x2002, DataType::Unsigned64).default_unsigned(u64::MAX),
+        row(0x2003, DataType::VisibleString).text("as delivered").capacity(20),
+        row(0x2004, DataType::TimeOfDay),
+        row(0x2005, DataType::Domain).capacity(300),
+        row(0x2006, DataType::Integer24),
+    ];
+    static INDEX: Index<7> = Index::of(&ROWS);
+    static ANY: Table = Table::new(&ROWS, &INDEX);
+
     #[test]
-    fn commands_are_not_stored_and_a_damaged_image_gives_nothing() {
-        let mut there = values();
-        set(&mut there, Mux::new(0x6040, 0), 0x0F);
-        set(&mut there, TORQUE_LIMIT, 777);
-        let mut memory = Memory::empty();
+    fn values_of_every_type_come_back_byte_for_byte() {
+        let long = [0x5A; 300];
+        let stored: [&[u8]; 7] = [
+            &0.5_f32.to_le_bytes(),
+            &(-1e300_f64).to_le_bytes(),
+            &0x8000_0000_0000_0001_u64.to_le_bytes(),
+            b"another",
+            &[1, 2, 3, 4, 5, 6],
+            &long,
+            &[1, 0, 0x80],
+        ];
+        let mut there = Values::new(&ANY, NodeId::MIN);
+        let slots: std::vec::Vec<_> = ANY.iter().map(|(slot, _)| slot).collect();
+        for (slot, bytes) in slots.iter().zip(stored) {
+            there.set_bytes(*slot, bytes).unwrap();
+        }
+        let mut memory = Store::empty(&ANY);
         memory.save(&there, |_| true);
-        let mut back = values();
+        // The image is as long as the longest values need: with the string shorter than it may be, not all of it is used.
+        assert!(memory.is_sound() && memory.bytes().len() == 12 + 7 * 8 + 4 + 8 + 8 + 20 + 6 + 300 + 3);
+        let mut back = Values::new(&ANY, NodeId::MIN);
+        Store::from_bytes(&ANY, memory.bytes()).load(&mut back, |_| true);
+        for (slot, bytes) in slots.iter().zip(stored) {
+            let mut read = [0; 300];
+            let length = back.view().copy(*slot, &mut read);
+            assert_eq!(&read[..length], bytes, "{}", ANY.row(*slot).mux());
+        }
+    }
+
+    #[test]
+    fn a_real_out_of_its_limits_is_not_loaded_and_a_damaged_image_gives_nothing() {
+        let mut there = Values::new(&ANY, NodeId::MIN);
+        let (slot, _) = ANY.iter().next().unwrap();
+        there.set_bytes(slot, &1.5_f32.to_le_bytes()).unwrap();
+        let mut memory = Store::empty(&ANY);
+        memory.save(&there, |_| true);
+        let mut back = Values::new(&ANY, NodeId::MIN);
         memory.load(&mut back, |_| true);
-        assert_eq!((get(&back, Mux::new(0x6040, 0)), get(&back, TORQUE_LIMIT)), (0, 777));
-        let mut damaged = *memory.bytes().first_chunk::<MEMORY_SIZE>().unwrap();
-        damaged[20] ^= 1;
-        let mut back = values();
-        Memory::from_bytes(&damaged).load(&mut back, |_| true);
-        assert_eq!(get(&back, TORQUE_LIMIT), 3000);
+        assert_eq!(back.raw(slot), 0);
+        there.set_bytes(slot, &0.5_f32.to_le_bytes()).unwrap();
+        memory.save(&there, |_| true);
+        let sound = memory.bytes().to_vec();
+        for at in 0..sound.len() {
+            let mut damaged = sound.clone();
+            damaged[at] ^= 1;
+            let mut back = Values::new(&ANY, NodeId::MIN);
+            let store = Store::from_bytes(&ANY, &damaged);
+            store.load(&mut back, |_| true);
+            let expected = if store.is_sound() { 0.5 } else { 0.0 };
+            assert_eq!(f32::from_bits(back.raw(slot)), expected, "byte {at}");
+        }
+        assert!(!Store::from_bytes(&ANY, &sound[..40]).is_sound());
     }
 }

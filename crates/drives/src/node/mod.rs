@@ -3,35 +3,51 @@
 //! PDOs, limits, heartbeat, EMCY, error history and parameter store work by the objects that are there. What a sensor of
 //! the device would measure is put into its objects from outside ([`DescribedNode::set`]); what a host writes stays there.
 
+pub(crate) mod described;
 mod device;
 mod memory;
 mod services;
 
+pub use described::{DescribedDevice, Loss};
 pub use device::DescribedNode;
-pub use memory::{CAPACITY, MEMORY_SIZE, Memory, is_parameter};
+pub use memory::{Memory, image_size, is_storable};
 pub use services::{Services, conditions};
 
 use canopen::Mux;
+use canopen::od::{Dictionary, Storage};
 
 /// Whether these services do something with an object.
 pub const fn acts_on(mux: Mux) -> bool {
-    matches!(
-        mux.index,
-        0x1000
-            | 0x1001
-            | 0x1003
-            | 0x1005
-            | 0x1008
-            | 0x1009
-            | 0x100A
-            | 0x1010
-            | 0x1011
-            | 0x1014
-            | 0x1015
-            | 0x1016
-            | 0x1017
-            | 0x1018
-            | 0x1200
-            | 0x1400..=0x1BFF
-    )
+    let has_effect = match mux.index {
+        0x1029 => mux.sub_index <= 1,
+        _ => true,
+    };
+    has_effect
+        && matches!(
+            mux.index,
+            0x1000
+                | 0x1001
+                | 0x1003
+                | 0x1005
+                | 0x1008
+                | 0x1009
+                | 0x100A
+                | 0x100C
+                | 0x100D
+                | 0x1010
+                | 0x1011
+                | 0x1014
+                | 0x1015
+                | 0x1016
+                | 0x1017
+                | 0x1018
+                | 0x1029
+                | 0x1200
+                | 0x1400..=0x1BFF
+        )
+}
+
+/// 1029h:01, where the device has it (CiA 301, 7.5.2.32): 0 to pre-operational, 1 no change, 2 stopped.
+fn error_behaviour(values: &Dictionary<impl Storage>) -> Option<i64> {
+    values.view().value(Mux::new(0x1029, 1)).ok()
 }

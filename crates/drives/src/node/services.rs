@@ -1,10 +1,11 @@
 //! Services of CiA 301 that a described device has by its objects, beside those of [`Device`]: the error history (1003h),
-//! consumers of heartbeats (1016h), and the store of parameters (1010h, 1011h).
+//! consumers of heartbeats (1016h), node and life guarding (100Ch, 100Dh), and the store of parameters (1010h, 1011h).
 
 use can::{Frame, Instant};
+use canopen::guarding::Guarding;
 use canopen::heartbeat::{Consumer, ConsumerEvent};
 use canopen::od::{Condition, Dictionary, Entry, Slot, Storage, Table, View};
-use canopen::{AbortCode, Mux};
+use canopen::{AbortCode, Mux, NmtState, NodeId};
 
 use super::memory::Memory;
 use crate::engine::device::Device;
@@ -22,31 +23,49 @@ const HISTORY: u16 = 0x1003;
 const STORE: u16 = 0x1010;
 const RESTORE: u16 = 0x1011;
 const WATCH: u16 = 0x1016;
+const GUARD_TIME: Mux = Mux::new(0x100C, 0);
+const LIFE_TIME_FACTOR: Mux = Mux::new(0x100D, 0);
+const HEARTBEAT_TIME: Mux = Mux::new(0x1017, 0);
 const EMCY_COB_ID: Mux = Mux::new(0x1014, 0);
+/// The error register.
+pub(super) const ERROR_REGISTER: Mux = Mux::new(0x1001, 0);
 
 /// The services of one device.
 #[derive(Clone, Debug)]
-pub struct Services {
+pub struct Services<S: Storage> {
     consumers: [Option<Consumer>; CONSUMERS as usize],
     /// Whose heartbeat has stayed away.
     lost: [bool; CONSUMERS as usize],
-    memory: Memory,
+    /// None of a device without 100Ch and 100Dh, and while heartbeats are produced: a device does one of the two.
+    guarding: Option<Guarding>,
+    /// Whose remote frames guard.
+    node_id: NodeId,
+    answer: Option<Frame>,
+    memory: Memory<S>,
     generation: u32,
 }
 
-impl Services {
+impl<S: Storage> Services<S> {
     /// With what is found in the memory at power-on.
-    pub fn new(memory: Memory) -> Self {
-        Self { consumers: [None; CONSUMERS as usize], lost: [false; CONSUMERS as usize], memory, generation: 0 }
+    pub fn new(memory: Memory<S>) -> Self {
+        Self {
+            consumers: [None; CONSUMERS as usize],
+            lost: [false; CONSUMERS as usize],
+            guarding: None,
+            node_id: NodeId::MIN,
+            answer: None,
+            memory,
+            generation: 0,
+        }
     }
 
     /// The supply is back: the memory is as it was left.
-    pub fn power_on(&mut self, memory: Memory) {
+    pub fn power_on(&mut self, memory: Memory<S>) {
         self.memory = memory;
     }
 
     /// Contents of the memory, and a number that changes with them.
-    pub const fn memory(&self) -> (&Memory, u32) {
+    pub const fn memory(&self) -> (&Memory<S>, u32) {
         (&self.memory, self.generation)
     }
 
@@ -64,6 +83,21 @@ impl Services {
             let entry = values.table().find(Mux::new(WATCH, sub_index));
             *consumer = entry.ok().and_then(|slot| Consumer::from_raw(values.raw(slot)));
         }
+        self.node_id = device.node().node_id();
+        self.answer = None;
+        self.configure_guarding(device);
+    }
+
+    /// 100Ch, 100Dh or 1017h has changed, or communication begins.
+    fn configure_guarding(&mut self, device: &Device<impl Storage>) {
+        let view = device.values().view();
+        let value = |mux| view.value(mux).ok();
+        self.guarding = match (value(GUARD_TIME), value(LIFE_TIME_FACTOR)) {
+            (Some(time_ms), Some(factor)) if value(HEARTBEAT_TIME).unwrap_or(0) == 0 => {
+                Some(Guarding::new(time_ms as u16, factor as u8))
+            }
+            _ => None,
+        };
     }
 
     /// A peer wrote to `slot`; true if it was one of these services.
@@ -75,10 +109,11 @@ impl Services {
                 self.consumers[position] = Consumer::from_raw(raw);
                 self.lost[position] = false;
             }
+            (0x100C | 0x100D | 0x1017, 0) => self.configure_guarding(device),
             (HISTORY, 0) => forget_history(device.values_mut()),
             (STORE, sub_index) => {
                 if raw == SAVE {
-                    self.memory.save(device.values(), |row| is_in_group(row.mux(), sub_index));
+                    self.memory.save(device.values(), |row| row.is_kept() && is_in_group(row.mux(), sub_index));
                     self.generation = self.generation.wrapping_add(1);
                 }
                 restore_default(device, slot);
@@ -95,16 +130,21 @@ impl Services {
         true
     }
 
-    /// The frame is a heartbeat that is watched.
+    /// The frame is a heartbeat that is watched, or the master's guarding.
     #[inline]
     pub fn wants(&self, frame: &Frame) -> bool {
         self.consumers.iter().flatten().any(|consumer| consumer.can_id() == frame.id())
+            || (self.guarding.is_some() && Guarding::is_request(frame, self.node_id))
     }
 
-    /// A frame arrived; true if the heartbeat of a watched node has come again, and no other is missing. A boot-up message is no
-    /// heartbeat yet: the node has lost its state.
-    pub fn handle_frame(&mut self, frame: &Frame, now: Instant) -> bool {
+    /// A frame arrived at a node in this state; true if what is watched has come again, and nothing else is missing. A boot-up
+    /// message is no heartbeat yet: the node has lost its state.
+    pub fn handle_frame(&mut self, frame: &Frame, state: NmtState, now: Instant) -> bool {
         let mut heard = false;
+        if let Some(guarding) = self.guarding.as_mut().filter(|_| Guarding::is_request(frame, self.node_id)) {
+            self.answer = Some(guarding.answer(self.node_id, state, now));
+            heard = guarding.take_return();
+        }
         for (consumer, lost) in self.consumers.iter_mut().zip(&mut self.lost) {
             let event = consumer.as_mut().and_then(|consumer| consumer.handle_frame(frame, now));
             if matches!(event, Some(ConsumerEvent::Heard(_))) {
@@ -112,12 +152,17 @@ impl Services {
                 heard = true;
             }
         }
-        heard && !self.lost.contains(&true)
+        heard && !self.lost.contains(&true) && !self.guarding.is_some_and(|guarding| guarding.is_lost())
     }
 
-    /// Time has reached `now`; true if a heartbeat has stayed away.
+    /// What the master's guarding is answered with.
+    pub const fn take_answer(&mut self) -> Option<Frame> {
+        self.answer.take()
+    }
+
+    /// Time has reached `now`; true if something that is watched has stayed away.
     pub fn handle_timeout(&mut self, now: Instant) -> bool {
-        let mut any = false;
+        let mut any = self.guarding.as_mut().is_some_and(|guarding| guarding.handle_timeout(now));
         for (consumer, lost) in self.consumers.iter_mut().zip(&mut self.lost) {
             let event = consumer.as_mut().and_then(|consumer| consumer.handle_timeout(now));
             if event == Some(ConsumerEvent::Lost) {
@@ -130,7 +175,8 @@ impl Services {
 
     /// When [`handle_timeout`](Self::handle_timeout) should next be called.
     pub fn poll_timeout(&self) -> Option<Instant> {
-        self.consumers.iter().flatten().filter_map(Consumer::poll_timeout).min()
+        let guarding = self.guarding.as_ref().and_then(Guarding::poll_timeout);
+        self.consumers.iter().flatten().filter_map(Consumer::poll_timeout).chain(guarding).min()
     }
 
     /// A frame was handed to the bus: an EMCY message goes into the error history.

@@ -3,70 +3,41 @@
 //! Three rhythms: frames as they come (`handle_frame`), the communication task every 0.5 ms (`handle_timeout`), and the
 //! control period of 50 us ([`Firmware::tick`]), of which every tenth is a supervision period.
 
-mod station;
+mod connection;
+mod faults;
 
-use can::{Bitrate, Instant};
-use canopen::NodeId;
+use can::Instant;
 use canopen::node::NodeProfile;
-use canopen::od::{Dictionary, Entry, Storage};
-use cia402::{AbortConnectionOption, FaultReactionOption, PowerCommand};
-use devices::faults::FaultRow;
-use devices::servo::faults::{FAULT_COUNT, FAULTS, row};
+use canopen::od::{Dictionary, Storage};
+use cia402::{ModeOfOperation, PowerState};
+use devices::servo::faults::row;
 use devices::variant::Variant;
 use devices::{AxisId, Description};
 
+use super::faults::{Faults, NewFaults, no_faults};
 use super::hardware::{Actuation, Hardware, MAX_AXES, Sensors};
 use super::motor::{CONTROL_PERIOD_NS, CONTROL_PERIOD_S, Motor, SUPERVISION_DIVIDER};
-use super::protection::{BLEEDER_OFF, BLEEDER_ON, Protection};
+use super::protection::{Protection, bleeder_limits};
 use super::shaft::Shaft;
-use super::write;
 use crate::engine::actuator::bleeder::{Bleeder, BleederLimits};
-use crate::engine::device::Device;
-use crate::engine::faults::{FaultMonitor, FaultSet};
-use crate::engine::storage::StoredImage;
-use crate::node::{Memory, Services};
+use crate::engine::faults::FaultSet;
+use crate::node::described::DescribedDevice;
 use crate::{Firmware, Report};
 
 const COMMUNICATION_PERIOD_NS: u64 = 500_000;
-
-/// Faults of all axes: those of the first, then those of the second. What the axes share is with the first.
-const ALL_FAULTS: usize = FAULT_COUNT * MAX_AXES;
-
-static AXES_FAULTS: [FaultRow; ALL_FAULTS] = {
-    let mut rows = [FAULTS[0]; ALL_FAULTS];
-    let mut at = 0;
-    while at < ALL_FAULTS {
-        rows[at] = FAULTS[at % FAULT_COUNT];
-        at += 1;
-    }
-    rows
-};
-
-/// How many supervision periods a cause lasts before it counts: disturbances are shorter.
-static DEBOUNCE: [u16; ALL_FAULTS] = [3; ALL_FAULTS];
-
-/// Faults after which the motor cannot be stopped by the power stage.
-const POWERLESS: [usize; 4] = [row::OVER_CURRENT, row::OVER_VOLTAGE, row::UNDER_VOLTAGE, row::ENCODER];
-
-/// Energy that the braking resistor takes at once, in seconds of its rated power.
-const BLEEDER_OVERLOAD_S: f32 = 5.0;
 
 /// The firmware of a described servo.
 #[derive(Clone)]
 pub struct ServoDrive<S: Storage> {
     description: &'static Description,
-    device: Device<S>,
-    services: Services,
+    base: DescribedDevice<S>,
     shafts: [Option<Shaft>; MAX_AXES],
     motors: [Motor; MAX_AXES],
-    node_id: NodeId,
-    bitrate: Bitrate,
-    faults: FaultMonitor<ALL_FAULTS>,
+    /// Of what all axes share.
+    faults: Faults,
     protection: Protection,
     bleeder: Bleeder,
     bleeder_limits: BleederLimits,
-    /// A heartbeat that is watched has stayed away.
-    silent: bool,
     /// The last levels of the touch probes, for a probe that is switched on.
     probes: [[bool; 2]; MAX_AXES],
     periods: u8,
@@ -77,24 +48,20 @@ impl<S: Storage> ServoDrive<S> {
     /// ([`communication`](crate::communication::communication)).
     ///
     /// # Panics
-    /// If the description has more rows than a firmware holds, or no axis.
-    pub fn new(description: &'static Description, profile: &'static NodeProfile, hardware: &Hardware) -> Self {
-        assert!(!description.axes.is_empty(), "a servo has an axis");
+    /// If the description has more rows than a firmware holds, or not one to [`MAX_AXES`] axes.
+    pub fn new(description: &'static Description, profile: &'static NodeProfile, hardware: &Hardware<S>) -> Self {
+        assert!((1..=MAX_AXES).contains(&description.axes.len()), "a servo has one to eight axes");
         let variant = Variant::first_of(description.variations);
-        let device = Device::new(profile, hardware.bitrate, StoredImage::BLANK, COMMUNICATION_PERIOD_NS, variant);
+        let Hardware { node_id, bitrate, motors, memory } = hardware.clone();
         let mut drive = Self {
             description,
-            device,
-            services: Services::new(hardware.memory),
+            base: DescribedDevice::new(profile, node_id, bitrate, memory, COMMUNICATION_PERIOD_NS, variant),
             shafts: [const { None }; MAX_AXES],
-            motors: hardware.motors,
-            node_id: hardware.node_id,
-            bitrate: hardware.bitrate,
-            faults: FaultMonitor::new(&AXES_FAULTS, &DEBOUNCE),
+            motors,
+            faults: no_faults(),
             protection: Protection::default(),
             bleeder: Bleeder::default(),
-            bleeder_limits: bleeder_limits(&hardware.motors[0]),
-            silent: false,
+            bleeder_limits: bleeder_limits(&motors[0]),
             probes: [[false; 2]; MAX_AXES],
             periods: 0,
         };
@@ -109,7 +76,7 @@ impl<S: Storage> ServoDrive<S> {
 
     /// The values of the objects, to look at.
     pub const fn values(&self) -> &Dictionary<S> {
-        self.device.values()
+        self.base.device.values()
     }
 
     /// What the control loops of an axis are asked for, to look at.
@@ -135,126 +102,41 @@ impl<S: Storage> ServoDrive<S> {
     fn make_shafts(&mut self) {
         let table = self.description.dictionary;
         for ((shaft, axis), motor) in self.shafts.iter_mut().zip(self.description.axes).zip(self.motors) {
-            *shaft = Some(Shaft::new(axis, table, motor, self.device.values()));
+            *shaft = Some(Shaft::new(axis, table, motor, self.base.device.values()));
         }
     }
 
-    /// Starts over with the stored values.
+    /// Starts over with the stored values: the power stage is off until a host enables it again.
     fn restart_firmware(&mut self, now: Instant) {
-        self.device.restart(self.node_id, self.bitrate, now);
-        self.services.start(&mut self.device, |_| true);
-        self.faults = FaultMonitor::new(&AXES_FAULTS, &DEBOUNCE);
+        self.base.restart(now);
+        self.faults = no_faults();
         self.protection = Protection::default();
-        self.silent = false;
         self.make_shafts();
-        let values = self.device.values_mut();
+        let values = self.base.device.values_mut();
         for shaft in self.shafts.iter_mut().flatten() {
             shaft.start(values);
             shaft.publish_status(values);
         }
-        self.device.boot(now);
-    }
-
-    fn restart_communication_only(&mut self, now: Instant) {
-        self.device.restart_communication(now);
-        self.services.start(&mut self.device, Entry::is_communication);
-        self.device.boot(now);
+        self.base.device.boot(now);
     }
 
     /// Every supervision period.
     fn supervise(&mut self, sensors: &Sensors, now: Instant) {
-        let values = self.device.values();
+        let values = self.base.device.values();
         let feedbacks = each(&mut self.shafts, sensors, |shaft, sensors| shaft.measure(values, sensors));
-        let latched = self.faults.latched();
-        let rated_v = self.motors[0].bus_v;
-        let mut causes = self.protection.causes(sensors, rated_v, self.services.is_sound(), self.silent, latched);
-        for (at, (shaft, sensors)) in self.shafts.iter_mut().zip(&sensors.axes).enumerate() {
-            let Some(shaft) = shaft else { continue };
-            let own = shaft.causes(sensors, of_axis(latched, at));
-            causes = own.rows().fold(causes, |all, row| all.with(at * FAULT_COUNT + row, true));
-        }
-        let new = self.faults.observe(causes);
-        self.enter_faults(new, now);
-        let values = self.device.values_mut();
+        let store_sound = self.base.services.is_sound();
+        let causes = self.protection.causes(sensors, self.motors[0].bus_v, store_sound, self.faults.latched());
+        let own = each(&mut self.shafts, sensors, Shaft::observe);
+        let new =
+            NewFaults { shared: self.faults.observe(causes), own: own.map(|faults| faults.unwrap_or(FaultSet::NONE)) };
+        self.enter_faults(&new, now);
+        let values = self.base.device.values_mut();
         for ((shaft, sensors_of), feedback) in self.shafts.iter_mut().zip(&sensors.axes).zip(feedbacks) {
             if let (Some(shaft), Some(feedback)) = (shaft, feedback) {
                 shaft.supervise(values, sensors_of, feedback, sensors.bus_v);
             }
         }
     }
-
-    /// New faults stop the axes, and are reported.
-    fn enter_faults(&mut self, new: FaultSet, now: Instant) {
-        if new.is_empty() {
-            return;
-        }
-        for (at, shaft) in self.shafts.iter_mut().enumerate() {
-            let Some(shaft) = shaft else { continue };
-            // What is with the first axis and shared stops every axis.
-            let mut concerns = new.rows().filter(|row| row / FAULT_COUNT == at || is_shared(*row)).peekable();
-            let Some(first) = concerns.peek().copied() else { continue };
-            let powerless = concerns.any(|row| POWERLESS.contains(&(row % FAULT_COUNT)));
-            let reaction = shaft.parameters().fault_reaction;
-            shaft.fault(if powerless { FaultReactionOption::DISABLE } else { reaction });
-            let code = AXES_FAULTS[first].code;
-            let error_code = shaft.slots().error_code;
-            write(self.device.values_mut(), error_code, i64::from(code));
-            shaft.publish_status(self.device.values_mut());
-        }
-        self.device.report_faults(new, &self.faults, now);
-    }
-
-    /// Forgets the faults whose cause is gone; with the last one all axes leave Fault.
-    fn reset_faults(&mut self, now: Instant) {
-        for shaft in self.shafts.iter_mut().flatten() {
-            shaft.forget_causes();
-        }
-        let all_gone = self.faults.reset();
-        self.device.report_reset(&self.faults, now);
-        let values = self.device.values_mut();
-        for shaft in self.shafts.iter_mut().flatten() {
-            if all_gone {
-                write(values, shaft.slots().error_code, 0);
-                shaft.reset_fault();
-            }
-            shaft.publish_status(values);
-        }
-    }
-
-    /// A heartbeat that is watched has stayed away: 6007h says what that does. A fault reports itself.
-    fn lose_connection(&mut self, now: Instant) {
-        let mut fault = false;
-        for shaft in self.shafts.iter_mut().flatten() {
-            match shaft.parameters().abort_connection {
-                AbortConnectionOption::FAULT => fault = true,
-                AbortConnectionOption::DISABLE_VOLTAGE => shaft.command_itself(PowerCommand::DisableVoltage),
-                AbortConnectionOption::QUICK_STOP => shaft.command_itself(PowerCommand::QuickStop),
-                _ => {}
-            }
-        }
-        self.silent = fault;
-        if !fault {
-            self.device.report_heartbeat(false, now);
-        }
-    }
-
-    /// A heartbeat that is watched is there: a fault for its absence can be reset.
-    fn regain_connection(&mut self, now: Instant) {
-        self.silent = false;
-        let _ = self.faults.forget(row::HEARTBEAT);
-        self.device.report_heartbeat(true, now);
-    }
-}
-
-/// A fault of the device, not of one axis.
-const fn is_shared(row: usize) -> bool {
-    matches!(row, row::OVER_VOLTAGE | row::UNDER_VOLTAGE | row::DRIVE_TEMPERATURE | row::STORE | row::HEARTBEAT)
-}
-
-/// The faults of one axis, with the numbers that they have there.
-fn of_axis(faults: FaultSet, axis: usize) -> FaultSet {
-    let own = faults.rows().filter(|row| row / FAULT_COUNT == axis);
-    own.fold(FaultSet::NONE, |set, row| set.with(row % FAULT_COUNT, true))
 }
 
 fn each<T>(
@@ -269,52 +151,39 @@ fn each<T>(
     })
 }
 
-fn bleeder_limits(motor: &Motor) -> BleederLimits {
-    BleederLimits {
-        enabled: motor.braking_w > 0.0 && motor.braking_ohm > 0.0,
-        on_v: motor.bus_v * BLEEDER_ON,
-        off_v: motor.bus_v * BLEEDER_OFF,
-        conductance_s: if motor.braking_ohm > 0.0 { 1.0 / motor.braking_ohm } else { 0.0 },
-        rated_w: motor.braking_w,
-        overload_j: motor.braking_w * BLEEDER_OVERLOAD_S,
-    }
-}
-
 impl<S: Storage> Firmware for ServoDrive<S> {
     type Sensors = Sensors;
     type Actuation = Actuation;
-    type Hardware = Hardware;
+    type Hardware = Hardware<S>;
 
     const CONTROL_PERIOD_NS: u64 = CONTROL_PERIOD_NS;
 
-    fn power_on(&mut self, hardware: &Hardware, now: Instant) {
-        self.node_id = hardware.node_id;
-        self.bitrate = hardware.bitrate;
+    fn power_on(&mut self, hardware: &Hardware<S>, now: Instant) {
+        self.base.node_id = hardware.node_id;
+        self.base.bitrate = hardware.bitrate;
         self.motors = hardware.motors;
-        self.device.power_on(StoredImage::BLANK);
-        self.services.power_on(hardware.memory);
+        self.base.power_on(hardware.memory.clone());
         self.restart_firmware(now);
     }
 
     fn power_off(&mut self, _now: Instant) {
-        self.device.power_off();
+        self.base.device.power_off();
         self.make_shafts();
     }
 
     fn tick(&mut self, sensors: &Sensors, now: Instant) -> Actuation {
-        if !self.device.is_running() {
+        if !self.base.device.is_running() {
             return Actuation::default();
         }
-        let mut shorted = FaultSet::NONE;
+        let mut shorted = NewFaults::default();
         for (at, (shaft, sensors)) in self.shafts.iter_mut().zip(&sensors.axes).enumerate() {
             let Some(shaft) = shaft else { continue };
             self.probes[at] = sensors.probes;
-            let fault = at * FAULT_COUNT + row::OVER_CURRENT;
-            if shaft.sense(sensors) && self.faults.raise(fault) {
-                shorted = shorted.with(fault, true);
+            if shaft.sense(sensors) && shaft.faults_mut().raise(row::OVER_CURRENT) {
+                shorted.own[at] = FaultSet::row(row::OVER_CURRENT);
             }
         }
-        self.enter_faults(shorted, now);
+        self.enter_faults(&shorted, now);
         self.periods += 1;
         if self.periods >= SUPERVISION_DIVIDER {
             self.periods = 0;
@@ -324,7 +193,7 @@ impl<S: Storage> Firmware for ServoDrive<S> {
             bleeder_on: self.bleeder.update(&self.bleeder_limits, sensors.bus_v, CONTROL_PERIOD_S),
             ..Actuation::default()
         };
-        let values = self.device.values();
+        let values = self.base.device.values();
         for ((shaft, sensors_of), out) in self.shafts.iter_mut().zip(&sensors.axes).zip(&mut actuation.axes) {
             if let Some(shaft) = shaft {
                 *out = shaft.actuate(values, sensors_of, sensors.bus_v);
@@ -334,7 +203,7 @@ impl<S: Storage> Firmware for ServoDrive<S> {
     }
 
     fn eeprom(&self) -> (&[u8], u32) {
-        let (memory, generation): (&Memory, u32) = self.services.memory();
+        let (memory, generation) = self.base.services.memory();
         (memory.bytes(), generation)
     }
 
@@ -343,12 +212,22 @@ impl<S: Storage> Firmware for ServoDrive<S> {
     }
 
     fn report(&self, axis: AxisId) -> Report {
-        let shaft = self.shaft(usize::from(axis.0)).or(self.shaft(0)).expect("a servo has an axis");
+        let device = &self.base.device;
+        let of_device = Report {
+            powered: device.is_running(),
+            node_id: device.node().node_id(),
+            bitrate: device.bitrate(),
+            nmt: device.node().state(),
+            state: PowerState::NotReadyToSwitchOn,
+            mode: ModeOfOperation::NONE,
+            fault_code: 0,
+            position_counts: 0,
+            velocity_rpm: 0.0,
+            current_a: 0.0,
+            brake_engaged: true,
+        };
+        let Some(shaft) = self.shaft(usize::from(axis.0)) else { return of_device };
         Report {
-            powered: self.device.is_running(),
-            node_id: self.device.node().node_id(),
-            bitrate: self.device.bitrate(),
-            nmt: self.device.node().state(),
             state: shaft.power().state(),
             mode: shaft.power().mode(),
             fault_code: super::read(self.values(), shaft.slots().error_code, 0) as u16,
@@ -356,6 +235,7 @@ impl<S: Storage> Firmware for ServoDrive<S> {
             velocity_rpm: shaft.velocity_rpm(),
             current_a: shaft.current_a(),
             brake_engaged: *shaft.demand() == crate::engine::axis::Demand::Off,
+            ..of_device
         }
     }
 }

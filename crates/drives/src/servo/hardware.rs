@@ -1,10 +1,12 @@
 //! What the drive's pins read and do: the border between firmware and the physical world.
 
+use canopen::od::Storage;
+
 use super::motor::Motor;
 use crate::node::Memory;
 
-/// Most axes of one device.
-pub const MAX_AXES: usize = 2;
+/// Most axes of one device (CiA 402-1: eight blocks of 800h from 6000h on).
+pub const MAX_AXES: usize = 8;
 
 /// What the drive measures, each control period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -65,8 +67,8 @@ pub struct AxisActuation {
 }
 
 /// What the firmware finds at power-on.
-#[derive(Clone, Copy, Debug)]
-pub struct Hardware {
+#[derive(Clone, Debug)]
+pub struct Hardware<S: Storage> {
     /// Node-ID at the switches.
     pub node_id: canopen::NodeId,
     /// Bit rate at the switches.
@@ -74,5 +76,5 @@ pub struct Hardware {
     /// The motors, as many as there are axes.
     pub motors: [Motor; MAX_AXES],
     /// The parameter store.
-    pub memory: Memory,
+    pub memory: Memory<S>,
 }

@@ -6,6 +6,7 @@
 //! comes with the hardware.
 
 mod drive;
+mod faults;
 mod hardware;
 mod motor;
 mod parameters;
@@ -23,7 +24,7 @@ pub use motor::{CONTROL_PERIOD_NS, Motor};
 use canopen::od::{Condition, Dictionary, Slot, Storage, Table, View};
 use canopen::{AbortCode, Mux};
 use cia402::{ModeOfOperation, SupportedModes};
-use devices::Description;
+use devices::{Description, Placement};
 
 use crate::node;
 
@@ -43,32 +44,58 @@ pub fn acts_on(description: &Description, mux: Mux) -> bool {
 /// What a drive so described refuses beyond its rows: for [`Conditions`](canopen::od::Conditions).
 pub fn conditions(description: &'static Description) -> impl Iterator<Item = (Slot, Condition)> {
     let table = description.dictionary;
-    let modes = description.axes.iter().filter_map(move |axis| {
-        let check: fn(&View<'_>, u32) -> Result<(), AbortCode> = match axis.placement.place(SUPPORTED_MODES).index {
-            0x6D02 => mode_of_second_axis,
-            _ => mode_of_first_axis,
-        };
-        let mode = table.find(axis.placement.place(Mux::new(0x6060, 0))).ok()?;
-        Some((mode, Condition::Check(check)))
-    });
-    modes.chain(node::conditions(table))
+    let of_axis = move |placement: Placement, mux: Mux, checks: &'static [(u16, Check)]| {
+        // The checks know the object by its index; a second sub-index has no room for what belongs to one axis.
+        let placed = placement.place(mux);
+        let is_by_index = matches!(placement, Placement::IndexOffset(_));
+        let check = checks.iter().find(|(index, _)| is_by_index && *index == placed.index)?.1;
+        Some((table.find(placed).ok()?, Condition::Check(check)))
+    };
+    let modes = description.axes.iter().filter_map(move |axis| of_axis(axis.placement, MODE, MODE_CHECKS));
+    let set_points =
+        description.axes.iter().filter_map(move |axis| of_axis(axis.placement, SET_POINT, SET_POINT_CHECKS));
+    modes.chain(set_points).chain(node::conditions(table))
 }
 
-const SUPPORTED_MODES: Mux = Mux::new(0x6502, 0);
+type Check = fn(&View<'_>, u32) -> Result<(), AbortCode>;
 
-fn mode_of_first_axis(values: &View<'_>, raw: u32) -> Result<(), AbortCode> {
-    mode_is_supported(values, SUPPORTED_MODES, raw)
+const MODE: Mux = Mux::new(0x6060, 0);
+const SET_POINT: Mux = Mux::new(0x60C1, 1);
+
+/// By the index of the object: an axis' block of the profile area begins at each 800h (CiA 402-1).
+macro_rules! by_axis {
+    ($check:ident, $index:literal) => {
+        &[
+            ($index, $check::<0x0000>),
+            ($index + 0x0800, $check::<0x0800>),
+            ($index + 0x1000, $check::<0x1000>),
+            ($index + 0x1800, $check::<0x1800>),
+            ($index + 0x2000, $check::<0x2000>),
+            ($index + 0x2800, $check::<0x2800>),
+            ($index + 0x3000, $check::<0x3000>),
+            ($index + 0x3800, $check::<0x3800>),
+        ]
+    };
 }
 
-fn mode_of_second_axis(values: &View<'_>, raw: u32) -> Result<(), AbortCode> {
-    mode_is_supported(values, Mux::new(0x6D02, 0), raw)
-}
+const MODE_CHECKS: &[(u16, Check)] = by_axis!(mode_is_supported, 0x6060);
+const SET_POINT_CHECKS: &[(u16, Check)] = by_axis!(buffer_has_room, 0x60C1);
 
-fn mode_is_supported(values: &View<'_>, declared: Mux, raw: u32) -> Result<(), AbortCode> {
+/// 6060h: a mode that 6502h has, where the axis has 6502h.
+fn mode_is_supported<const OFFSET: u16>(values: &View<'_>, raw: u32) -> Result<(), AbortCode> {
     let mode = ModeOfOperation(raw as i8);
-    let Ok(modes) = values.value(declared) else { return Ok(()) };
+    let Ok(modes) = values.value(Mux::new(0x6502 + OFFSET, 0)) else { return Ok(()) };
     let supported = mode == ModeOfOperation::NONE || SupportedModes(modes as u32).has(mode);
     if supported { Ok(()) } else { Err(AbortCode::INVALID_VALUE) }
+}
+
+/// 60C1h:01 in ip: a first-in-first-out buffer that is full (60C4h:04 counts what waits) takes no more.
+fn buffer_has_room<const OFFSET: u16>(values: &View<'_>, _raw: u32) -> Result<(), AbortCode> {
+    let of_buffer = |sub_index| values.value(Mux::new(0x60C4 + OFFSET, sub_index));
+    let (Ok(size @ 2..), Ok(waiting)) = (of_buffer(2), of_buffer(4)) else { return Ok(()) };
+    let is_ring = of_buffer(3) == Ok(1);
+    let in_ip = values.value(Mux::new(0x6061 + OFFSET, 0)) == Ok(i64::from(ModeOfOperation::INTERPOLATED_POSITION.0));
+    if in_ip && !is_ring && waiting >= size { Err(AbortCode::DEVICE_STATE) } else { Ok(()) }
 }
 
 /// The value of an object that may not be there.

@@ -1,5 +1,6 @@
 //! The objects of one axis in increments and amperes, as the engine wants them. Written anew when one changes.
 
+use canopen::Mux;
 use canopen::od::{Dictionary, Slot, Storage};
 use cia402::{
     AbortConnectionOption, DisableOperationOption, FaultReactionOption, HaltOption, HomingMethod, InterpolationPeriod,
@@ -11,6 +12,7 @@ use motion::travel::{Bounds, Travel};
 use super::motor::Motor;
 use super::read;
 use super::scales::Scales;
+use super::shaft::{FORGIVEN_PERIODS, PATIENCE_S};
 use super::slots::AxisSlots;
 use crate::engine::axis::{Control, HomingParameters, MoveLimits, Ramp, VelocityRamps};
 use crate::engine::cia402::{self as power, DisableOptions, ExternalStop, Tolerances};
@@ -18,8 +20,8 @@ use crate::engine::cia402::{self as power, DisableOptions, ExternalStop, Toleran
 /// Deceleration of a device without any: that of the motor's rated torque on its own inertia would be rough; this stops
 /// from the highest speed in a fifth of a second.
 const STOPS_IN_S: f64 = 0.2;
-/// Periods of the bus that a cyclic set-point may stay away before the motion is brought to rest.
-const FORGIVEN_PERIODS: f64 = 2.0;
+/// Communication cycle period.
+const SYNC_PERIOD: Mux = Mux::new(0x1006, 0);
 /// Windows in increments of a device that has no object for them.
 const POSITION_WINDOW: i64 = 100;
 const WINDOW_TIME_MS: i64 = 10;
@@ -43,6 +45,8 @@ pub(super) struct Parameters {
     pub(super) following_error: Window,
     /// How set-points of ip and csp are followed.
     pub(super) following: Following,
+    /// How long velocities and torques by RPDO may stay away that come in another rhythm.
+    pub(super) set_point_patience_s: f64,
     pub(super) travel: Option<Travel>,
     pub(super) bounds: Bounds,
     /// 607Fh and 6080h, increments/s.
@@ -115,6 +119,7 @@ impl<S: Storage> Reader<'_, S> {
                 time_ms: self.time_ms(slots.following_error_time, 0),
             },
             following: self.following(deceleration),
+            set_point_patience_s: self.set_point_patience_s(),
             travel: self.travel(),
             bounds,
             max_speed,
@@ -194,6 +199,14 @@ impl<S: Storage> Reader<'_, S> {
             period_s: period.nanos().unwrap_or_default() as f64 * 1e-9,
             forgiven: FORGIVEN_PERIODS,
             deceleration,
+        }
+    }
+
+    /// Three periods of SYNC where 1006h says how long one is, in us (CiA 301, 7.5.2.6).
+    fn set_point_patience_s(&self) -> f64 {
+        match self.values.view().value(SYNC_PERIOD) {
+            Ok(period_us @ 1..) => (1.0 + FORGIVEN_PERIODS) * period_us as f64 * 1e-6,
+            _ => PATIENCE_S,
         }
     }
 

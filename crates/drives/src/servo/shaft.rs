@@ -4,6 +4,7 @@
 //! supervision period.
 
 mod commands;
+mod cyclic;
 mod publish;
 mod targets;
 
@@ -11,10 +12,12 @@ use canopen::od::{Dictionary, Storage, Table};
 use cia402::{Dwell, ModeOfOperation, PowerState, SupportedModes};
 use devices::AxisDescription;
 use devices::servo::faults::row;
-use motion::set_points::SetPoints;
 
 pub(super) use commands::Written;
+use cyclic::CyclicSetPoints;
+pub(super) use cyclic::{FORGIVEN_PERIODS, PATIENCE_S};
 
+use super::faults::{Faults, no_faults};
 use super::hardware::{AxisActuation, AxisSensors};
 use super::motor::{Motor, SUPERVISION_PERIOD_S};
 use super::parameters::Parameters;
@@ -62,11 +65,11 @@ pub(super) struct Shaft {
     position_offset: i32,
     /// Where the index pulse came since the last supervision.
     index: Option<i32>,
-    set_points: SetPoints,
-    /// The last set-point was beyond the software limits.
-    set_point_held: bool,
-    /// Since the last set-point, s; `None` before the first one of the mode.
-    set_point_age_s: Option<f64>,
+    set_points: CyclicSetPoints,
+    /// Its own faults; those of the drive are the drive's.
+    faults: Faults,
+    /// How the connection to the host is lost, of what 6007h makes a fault.
+    lost: FaultSet,
     overload: Overload,
     reached: Dwell,
     standing: Dwell,
@@ -106,9 +109,9 @@ impl Shaft {
             targets: Targets::default(),
             position_offset: 0,
             index: None,
-            set_points: SetPoints::resting(0.0),
-            set_point_held: false,
-            set_point_age_s: None,
+            set_points: CyclicSetPoints::none(),
+            faults: no_faults(),
+            lost: FaultSet::NONE,
             overload: Overload::default(),
             reached: Dwell::default(),
             standing: Dwell::default(),
@@ -129,6 +132,14 @@ impl Shaft {
 
     pub(super) const fn parameters(&self) -> &Parameters {
         &self.parameters
+    }
+
+    pub(super) const fn faults(&self) -> &Faults {
+        &self.faults
+    }
+
+    pub(super) const fn faults_mut(&mut self) -> &mut Faults {
+        &mut self.faults
     }
 
     pub(super) const fn demand(&self) -> &Demand {
@@ -179,10 +190,7 @@ impl Shaft {
 
     /// Every supervision period, first: parameters and what is measured.
     pub(super) fn measure(&mut self, values: &Dictionary<impl Storage>, sensors: &AxisSensors) -> Feedback {
-        if self.parameters_changed {
-            self.parameters_changed = false;
-            self.parameters = Parameters::of(values, &self.slots, &self.motor);
-        }
+        self.refresh(values);
         self.servo.measure(&self.model, &self.gains, sensors.phase_current_a);
         let velocity_rad_s = self.servo.velocity_rad_s();
         Feedback {
@@ -193,8 +201,23 @@ impl Shaft {
         }
     }
 
-    /// Then: the causes of faults that are present at this axis.
-    pub(super) fn causes(&mut self, sensors: &AxisSensors, latched: FaultSet) -> FaultSet {
+    /// The parameters as they are written by now.
+    fn refresh(&mut self, values: &Dictionary<impl Storage>) {
+        if self.parameters_changed {
+            self.parameters_changed = false;
+            self.parameters = Parameters::of(values, &self.slots, &self.motor);
+        }
+    }
+
+    /// Then: what has newly become a fault of this axis.
+    pub(super) fn observe(&mut self, sensors: &AxisSensors) -> FaultSet {
+        let causes = self.causes(sensors);
+        self.faults.observe(causes)
+    }
+
+    /// The causes of faults that are present.
+    fn causes(&mut self, sensors: &AxisSensors) -> FaultSet {
+        let latched = self.faults.latched();
         let limits =
             OverloadLimits { rated_a: self.motor.rated_current_a, begins_at: OVERLOAD_FROM, curve: OVERLOAD_CURVE };
         let hot = latched.has(row::MOTOR_TEMPERATURE);
@@ -202,7 +225,7 @@ impl Shaft {
         if misaligned {
             self.servo.realign(&self.model, sensors.tracks, sensors.encoder_count);
         }
-        FaultSet::NONE
+        self.lost
             .with(row::OVERLOAD, self.overload.update(&limits, self.servo.current_a(), SUPERVISION_PERIOD_S))
             .with(
                 row::MOTOR_TEMPERATURE,
@@ -262,7 +285,7 @@ impl Shaft {
     /// What was `by` is 0 from now on.
     fn shift(&mut self, by: i32) {
         self.power.shift_position(by);
-        self.set_points.shift(f64::from(by));
+        self.set_points.shift(by);
         self.position_offset = self.position_offset.wrapping_sub(by);
         if let Demand::Position(point) = &mut self.demand {
             point.position = point.position.wrapping_sub(by);

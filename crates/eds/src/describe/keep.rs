@@ -1,8 +1,9 @@
 //! Descriptions of devices that files describe.
 
-use std::collections::BTreeMap;
+use std::collections::HashMap;
 use std::fmt;
-use std::sync::{Mutex, PoisonError};
+use std::hash::{BuildHasher, RandomState};
+use std::sync::{LazyLock, Mutex, PoisonError};
 
 use can::Bitrate;
 use canopen::od::{DefaultValue, Entry, FREE_PLACES, MAX_ROWS, RowFacts, Table, TableError};
@@ -13,11 +14,28 @@ use devices::{Description, HostWatch, Identity, NmtRules, ParameterStorage, PdoR
 
 use super::axis::axes;
 use super::names;
-use super::rows::{leak, rows};
+use super::rows::{Row, leak, rows};
 use crate::{Eds, write};
 
-/// All descriptions that were made of files, by what the files say: one for each place that such a file came from.
-static KEPT: Mutex<BTreeMap<String, Vec<&'static Description>>> = Mutex::new(BTreeMap::new());
+/// All descriptions that were made of files, by a fingerprint of what the files say: one for each place that such a file
+/// came from.
+static KEPT: LazyLock<Mutex<Kept>> = LazyLock::new(Mutex::default);
+
+#[derive(Default)]
+struct Kept {
+    /// Two keys of this program's run, so that no file can be made to look like another.
+    keys: [RandomState; 2],
+    descriptions: HashMap<Fingerprint, Vec<&'static Description>>,
+}
+
+/// Two hashes of 64 bits, and the length.
+type Fingerprint = ([u64; 2], usize);
+
+impl Kept {
+    fn fingerprint(&self, content: &str) -> Fingerprint {
+        (self.keys.each_ref().map(|key| key.hash_one(content)), content.len())
+    }
+}
 
 /// The description of the device that a file describes, kept for the life of the program: the same file, or another that
 /// says the same, gives the same one. As its document it names the file as the file names itself; [`keep_of`] names it as the
@@ -47,7 +65,8 @@ fn keep_named(eds: &Eds, manual: &str) -> Result<&'static Description, Unkept> {
     let content = write(eds);
     // A panic while it was locked has left the map as it was.
     let mut all = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
-    let kept = all.get(&content).map_or(&[][..], Vec::as_slice);
+    let fingerprint = all.fingerprint(&content);
+    let kept = all.descriptions.get(&fingerprint).map_or(&[][..], Vec::as_slice);
     if let Some(known) = kept.iter().find(|known| known.manual == manual) {
         return Ok(known);
     }
@@ -57,7 +76,7 @@ fn keep_named(eds: &Eds, manual: &str) -> Result<&'static Description, Unkept> {
         None => describe(eds, manual)?,
     };
     let description: &'static Description = Box::leak(Box::new(description));
-    all.entry(content).or_default().push(description);
+    all.descriptions.entry(fingerprint).or_default().push(description);
     Ok(description)
 }
 
@@ -132,10 +151,14 @@ fn describe(eds: &Eds, manual: &str) -> Result<Description, Unkept> {
     })
 }
 
-fn table(rows: Vec<Entry>) -> Result<&'static Table, Unkept> {
-    let facts = vec![RowFacts::NONE; rows.len()].leak();
-    let places = vec![FREE_PLACES; rows.len()].leak();
-    let table = Table::at_run_time(rows.leak(), facts, places).map_err(Unkept::Rows)?;
+/// Nothing is kept of rows that make no table.
+fn table(rows: Vec<Row>) -> Result<&'static Table, Unkept> {
+    let mut facts = vec![RowFacts::NONE; rows.len()];
+    let mut places = vec![FREE_PLACES; rows.len()];
+    let bare: Vec<Entry> = rows.iter().map(|row| row.entry).collect();
+    Table::check(&bare, &mut facts, &mut places).map_err(Unkept::Rows)?;
+    let kept: Vec<Entry> = rows.into_iter().map(Row::keep).collect();
+    let table = Table::at_run_time(kept.leak(), facts.leak(), places.leak()).map_err(Unkept::Rows)?;
     Ok(Box::leak(Box::new(table)))
 }
 

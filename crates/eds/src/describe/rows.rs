@@ -4,6 +4,7 @@ use std::collections::HashSet;
 
 use canopen::Mux;
 use canopen::od::{Access, DataType, DefaultValue, Entry, Kind, PdoMapping, ValueRange};
+use devices::row::is_parameter;
 use devices::servo;
 
 use super::names;
@@ -13,21 +14,66 @@ use crate::{AccessType, Eds, Number, Object, Value, Variable};
 const STRING_CAPACITY: usize = 64;
 const DOMAIN_CAPACITY: usize = 1_024;
 
+/// A row whose texts are not kept yet: of a file that makes no table nothing is.
+pub(super) struct Row {
+    /// With empty texts; limits, sizes and numbers are those of the row.
+    pub(super) entry: Entry,
+    name: String,
+    title: String,
+    bytes: Option<Vec<u8>>,
+}
+
+impl Row {
+    /// The row with its texts, kept for the life of the program.
+    pub(super) fn keep(self) -> Entry {
+        let Self { mut entry, name, title, bytes } = self;
+        (entry.name, entry.title) = (leak(name), leak(title));
+        match bytes.map(String::from_utf8) {
+            None => {}
+            Some(Ok(text)) if entry.data_type == DataType::VisibleString && text.is_ascii() => {
+                entry.default = DefaultValue::Text(leak(text));
+            }
+            Some(Ok(text)) => entry.default = DefaultValue::Bytes(leak(text).as_bytes()),
+            Some(Err(error)) => entry.default = DefaultValue::Bytes(error.into_bytes().leak()),
+        }
+        entry
+    }
+}
+
 /// All rows, ascending. Of a DCF, the values stand in place of the defaults: it is the device as configured.
-pub(super) fn rows(eds: &Eds) -> Vec<Entry> {
-    let stores = eds.variable(0x1010, 1).is_some();
+pub(super) fn rows(eds: &Eds) -> Vec<Row> {
+    let storing = Storing {
+        on_command: eds.variable(0x1010, 1).is_some(),
+        is_drive: eds.variable(0x6040, 0).is_some() && eds.variable(0x6041, 0).is_some(),
+    };
     let mut taken = HashSet::new();
     let mut rows = Vec::new();
     for object in &eds.objects {
         for variable in &object.variables {
             let name = unique(name(object, variable), Mux::new(object.index, variable.sub_index), &mut taken);
-            rows.push(row(object, variable, name, stores));
+            rows.push(row(object, variable, name, storing));
         }
     }
     rows
 }
 
-fn row(object: &Object, variable: &Variable, name: String, stores: bool) -> Entry {
+/// What decides which rows a device stores: a file does not say it of each.
+#[derive(Clone, Copy)]
+struct Storing {
+    /// The device has 1010h.
+    on_command: bool,
+    is_drive: bool,
+}
+
+impl Storing {
+    /// Parameters are stored. What can be mapped and is not a drive's is process data: a drive's speeds and limits can
+    /// be mapped too, and are parameters all the same.
+    const fn stores(self, row: &Entry) -> bool {
+        self.on_command && is_parameter(row) && (self.is_drive || !row.pdo.is_allowed())
+    }
+}
+
+fn row(object: &Object, variable: &Variable, name: String, storing: Storing) -> Row {
     let data_type = DataType::from_code(variable.data_type.0).unwrap_or(DataType::Unsigned32);
     let title = if variable.name.is_empty() { &object.name } else { &variable.name };
     let access = match variable.access {
@@ -36,9 +82,16 @@ fn row(object: &Object, variable: &Variable, name: String, stores: bool) -> Entr
         AccessType::Const => Access::Const,
         AccessType::ReadWrite | AccessType::ReadWriteInput | AccessType::ReadWriteOutput => Access::ReadWrite,
     };
-    let mut row = Entry::new(object.index, variable.sub_index, data_type, access, leak(name), leak(title.clone()));
+    let mut row = Entry::new(object.index, variable.sub_index, data_type, access, "", "");
     let value = variable.value.as_ref().or(variable.default.as_ref());
-    row.default = value.map_or(row.default, |value| default(data_type, value));
+    let bytes = match value {
+        Some(Value::Text(text)) => Some(bytes(data_type, text)),
+        Some(value) => {
+            row.default = number(value);
+            None
+        }
+        None => None,
+    };
     row.limits = limits(data_type, variable);
     row.pdo = match (variable.pdo_mapping, variable.access) {
         (false, _) => PdoMapping::No,
@@ -47,26 +100,19 @@ fn row(object: &Object, variable: &Variable, name: String, stores: bool) -> Entr
         (true, _) => PdoMapping::Yes,
     };
     if data_type.kind() == Kind::Bytes && access.is_writable() {
-        row.capacity = capacity(data_type, row.default);
+        row.capacity = capacity(data_type, bytes.as_ref().map_or(0, Vec::len));
     }
-    // Process data is not what a store command stores.
-    row.saved =
-        stores && access == Access::ReadWrite && !variable.pdo_mapping && !matches!(object.index, 0x1010 | 0x1011);
-    row
+    row.saved = storing.stores(&row);
+    Row { entry: row, name, title: title.clone(), bytes }
 }
 
-fn capacity(data_type: DataType, default: DefaultValue) -> u32 {
-    let length = match default {
-        DefaultValue::Text(text) => text.len(),
-        DefaultValue::Bytes(bytes) => bytes.len(),
-        _ => 0,
-    };
+fn capacity(data_type: DataType, length: usize) -> u32 {
     let least = if data_type == DataType::Domain { DOMAIN_CAPACITY } else { STRING_CAPACITY };
     u32::try_from(length.max(least)).unwrap_or(u32::MAX)
 }
 
-/// A value of a file as a row has it.
-fn default(data_type: DataType, value: &Value) -> DefaultValue {
+/// A value of a file that is no text, as a row has it.
+fn number(value: &Value) -> DefaultValue {
     match value {
         Value::Number(Number { base, plus_node_id: true }) => {
             u32::try_from(*base).map_or(DefaultValue::Value(0), DefaultValue::NodeIdPlus)
@@ -75,8 +121,7 @@ fn default(data_type: DataType, value: &Value) -> DefaultValue {
             .map(DefaultValue::Value)
             .unwrap_or_else(|_| DefaultValue::Unsigned(u64::try_from(*base).unwrap_or(0))),
         Value::Real(real) => DefaultValue::Real(*real),
-        Value::Text(text) if data_type == DataType::VisibleString => DefaultValue::Text(leak(text.clone())),
-        Value::Text(text) => DefaultValue::Bytes(Box::leak(bytes(data_type, text).into_boxed_slice())),
+        Value::Text(_) => DefaultValue::Value(0),
     }
 }
 
@@ -90,8 +135,15 @@ pub(crate) fn bytes(data_type: DataType, text: &str) -> Vec<u8> {
             let (days, milliseconds) = ((days as u16).to_le_bytes(), (milliseconds & 0x0FFF_FFFF).to_le_bytes());
             [&milliseconds[..], &days[..]].concat()
         }
-        _ => hexadecimal(text).unwrap_or_else(|| text.as_bytes().to_vec()),
+        DataType::VisibleString => letters(text),
+        _ => hexadecimal(text).unwrap_or_else(|| letters(text)),
     }
+}
+
+/// One byte a letter, as a file in ISO 8859-1 has them and as they are shown; letters that it does not have as UTF-8.
+fn letters(text: &str) -> Vec<u8> {
+    let latin: Option<Vec<u8>> = text.chars().map(|letter| u8::try_from(letter).ok()).collect();
+    latin.unwrap_or_else(|| text.as_bytes().to_vec())
 }
 
 /// `0123AB` or `01 23 AB`.

@@ -49,7 +49,7 @@ pub trait Assembly: Clone + Send + 'static {
 
     /// The model's name as users type it.
     const MODEL: &'static str;
-    /// Names of the digital inputs.
+    /// Names of the digital inputs, of the largest device of the model.
     const INPUTS: &'static [&'static str];
     /// Length of a control period.
     const PERIOD_S: f64 = <Self::Firmware as Firmware>::CONTROL_PERIOD_NS as f64 * 1e-9;
@@ -78,11 +78,16 @@ pub trait Assembly: Clone + Send + 'static {
         devices::model(assembly.model())
     }
 
+    /// Names of the digital inputs of this one: an input is addressed by its place in this list.
+    fn inputs(&self) -> &'static [&'static str] {
+        Self::INPUTS
+    }
+
     /// What the firmware finds when it wakes.
     fn hardware(&self) -> <Self::Firmware as Firmware>::Hardware;
 
     /// What the sensors read now; bit `n` of `inputs` is the level of input `n`.
-    fn sense(&self, inputs: u32) -> <Self::Firmware as Firmware>::Sensors;
+    fn sense(&self, inputs: u64) -> <Self::Firmware as Firmware>::Sensors;
 
     /// Ideal switches and no cogging, or not.
     fn set_realism(&mut self, realism: Realism);

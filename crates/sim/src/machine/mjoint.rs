@@ -173,7 +173,7 @@ impl Assembly for Joint {
     }
 
     #[inline]
-    fn sense(&self, inputs: u32) -> Sensors {
+    fn sense(&self, inputs: u64) -> Sensors {
         let sensed = self.motor.sense();
         let EncoderReading { angle_count, position_counts } = self.encoder_reading(sensed.position_counts);
         Sensors {

@@ -246,6 +246,13 @@ impl<A: Assembly> Station for Machine<A> {
         self.advance(now);
         self.firmware.handle_transmitted(frame, now);
     }
+
+    fn handle_bus_off(&mut self, off: bool, now: Instant) {
+        self.advance(now);
+        if self.running {
+            self.firmware.handle_bus_off(off, now);
+        }
+    }
 }
 
 impl<A: Assembly> Mechanics for Machine<A> {
@@ -381,7 +388,7 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
     }
 
     fn inputs(&self) -> &'static [&'static str] {
-        A::INPUTS
+        self.assembly.inputs()
     }
 
     fn modbus_unit(&self) -> Option<u8> {

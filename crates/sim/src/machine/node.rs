@@ -2,7 +2,7 @@
 
 use can::{Bitrate, Frame, Instant, Station};
 use canopen::Mux;
-use canopen::od::{DataType, Entry};
+use canopen::od::{DataType, Entry, Kind, Value};
 use devices::{AxisId, Description};
 use drives::node::{DescribedNode, Memory, conditions};
 
@@ -19,7 +19,7 @@ const SUPPLY_V: f64 = 24.0;
 #[derive(Clone)]
 pub struct NodeMachine {
     firmware: DescribedNode<Boxed>,
-    memory: Memory,
+    memory: Memory<Boxed>,
 }
 
 /// A node of this description as ordered, without power.
@@ -37,11 +37,11 @@ impl NodeMachine {
 
     fn switch(&mut self, on: bool, now: Instant) {
         if self.firmware.is_running() {
-            self.memory = *self.firmware.memory().0;
+            self.memory = self.firmware.memory().0.clone();
             self.firmware.power_off();
         }
         if on {
-            self.firmware.power_on(self.memory, now);
+            self.firmware.power_on(self.memory.clone(), now);
         }
     }
 
@@ -52,9 +52,9 @@ impl NodeMachine {
         if !self.firmware.is_running() {
             return Err(bad("the device has no power".to_owned()));
         }
-        let raw = raw(self.firmware.values().table().row(slot), value).map_err(bad)?;
-        self.firmware.set(slot, raw, now);
-        Ok(())
+        let row = self.firmware.values().table().row(slot);
+        let bytes = bytes(row, value).map_err(bad)?;
+        self.firmware.set(slot, &bytes, now).map_err(|_| bad(room(row)))
     }
 
     const fn absent(&self, what: &'static str) -> Refused {
@@ -62,20 +62,44 @@ impl NodeMachine {
     }
 }
 
-/// The cell of an object for a value, or what the object would take.
-fn raw(row: &Entry, value: &ObjectValue) -> Result<u32, String> {
+/// A value as an SDO carries it, or what the object would take.
+fn bytes(row: &Entry, value: &ObjectValue) -> Result<Vec<u8>, String> {
     let (data_type, name) = (row.data_type, row.data_type.name());
-    match (data_type, value) {
-        (DataType::Real32, ObjectValue::Real(real)) => Ok((*real as f32).to_bits()),
-        (DataType::Real32, ObjectValue::Integer(integer)) => Ok((*integer as f32).to_bits()),
-        (DataType::Boolean, ObjectValue::Integer(integer @ 0..=1)) => Ok(u32::from(*integer == 1)),
-        (_, ObjectValue::Integer(integer)) if data_type.fits_cell() && data_type.is_integer() => {
-            let (low, high) = data_type.range();
-            let fits = i64::try_from(*integer).ok().filter(|integer| (low..=high).contains(integer));
-            fits.map(|integer| data_type.raw(integer)).ok_or_else(|| format!("{name} takes {low} to {high}"))
+    let number =
+        |value: Value<'_>| value.to_bits(data_type).map(|bits| bits.to_le_bytes()[..data_type.size()].to_vec());
+    let of_type = || format!("it is of type {name}");
+    match (data_type.kind(), value) {
+        (Kind::Real, ObjectValue::Real(real)) => number(as_real(data_type, *real)).ok_or_else(of_type),
+        (Kind::Real, ObjectValue::Integer(integer)) => number(as_real(data_type, *integer as f64)).ok_or_else(of_type),
+        (Kind::Signed | Kind::Unsigned, ObjectValue::Integer(integer)) => {
+            let value = i64::try_from(*integer).map(Value::Integer).ok();
+            let value = value.or(u64::try_from(*integer).ok().map(Value::Unsigned));
+            let high =
+                if data_type == DataType::Unsigned64 { u64::MAX.into() } else { i128::from(data_type.range().1) };
+            value.and_then(number).ok_or_else(|| format!("{name} takes {} to {high}", data_type.range().0))
         }
-        _ if !data_type.fits_cell() => Err(format!("it is of type {name}, which cannot be set from outside")),
-        _ => Err(format!("it is of type {name}")),
+        (Kind::Bytes, ObjectValue::Text(text)) if data_type == DataType::UnicodeString => {
+            Ok(text.encode_utf16().flat_map(u16::to_le_bytes).collect())
+        }
+        (Kind::Bytes, ObjectValue::Text(text)) => {
+            // One byte a letter, as in a file: ISO 8859-1.
+            let letters: Option<Vec<u8>> = text.chars().map(|letter| u8::try_from(letter).ok()).collect();
+            letters.ok_or_else(|| format!("{name} takes letters of ISO 8859-1, one byte each"))
+        }
+        (Kind::Bytes, _) => Err(format!("{}: a text in quotation marks is meant", of_type())),
+        _ => Err(of_type()),
+    }
+}
+
+fn as_real(data_type: DataType, real: f64) -> Value<'static> {
+    if data_type.size() == 4 { Value::Real32(real as f32) } else { Value::Real64(real) }
+}
+
+/// Why a value of the right type does not fit.
+fn room(row: &Entry) -> String {
+    match row.stored_bytes() {
+        0 => format!("it is a {} that never changes", row.data_type.name()),
+        most => format!("it holds {most} bytes"),
     }
 }
 
@@ -102,6 +126,10 @@ impl Station for NodeMachine {
 
     fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
         self.firmware.handle_transmitted(frame, now);
+    }
+
+    fn handle_bus_off(&mut self, off: bool, now: Instant) {
+        self.firmware.handle_bus_off(off, now);
     }
 }
 
@@ -171,7 +199,7 @@ impl VirtualDrive for NodeMachine {
             let model = self.firmware.description().name;
             return Err(Refused::BadImage { model, reason: "it has another length" });
         }
-        self.memory = Memory::from_bytes(image);
+        self.memory = Memory::from_bytes(self.firmware.description().dictionary, image);
         Ok(())
     }
 }

@@ -1,12 +1,14 @@
 //! Drives as one orders them: a model by its name, with an address, a bit rate, and what is special about this one.
 
+use super::boxed::Boxed;
 use can::Bitrate;
-use canopen::od::{Dictionary, Storage};
+use canopen::od::{Dictionary, Entry, Storage};
 use canopen::{Mux, NodeId};
 use devices::Description;
+use devices::row::is_parameter;
 use devices::variant::{Preset, PresetError, Variant};
 use drives::engine::storage::StoredImage;
-use drives::node::{Memory, is_parameter};
+use drives::node::{Memory, is_storable};
 
 /// What is wanted of a drive beside its model.
 #[derive(Clone, Debug)]
@@ -98,14 +100,15 @@ pub(super) fn baud_rate(model: &Description, object: Mux, bitrate: Bitrate) -> R
 }
 
 /// The memory of a described device as ordered: values that are not the table's.
-pub(super) fn memory(model: &'static Description, order: &Order) -> Result<Memory, OrderError> {
-    let mut memory = Memory::empty();
+pub(super) fn memory(model: &'static Description, order: &Order) -> Result<Memory<Boxed>, OrderError> {
+    let mut memory = Memory::empty(model.dictionary);
     if order.presets.is_empty() {
         return Ok(memory);
     }
-    let mut values = Dictionary::<super::boxed::Boxed>::new(model.dictionary, order.node);
+    let mut values = Dictionary::<Boxed>::new(model.dictionary, order.node);
     for preset in &order.presets {
-        preset.store_if(&mut values, is_parameter).map_err(|error| OrderError::Preset { preset: *preset, error })?;
+        let can_be = |row: &Entry| is_parameter(row) && is_storable(row);
+        preset.store_if(&mut values, can_be).map_err(|error| OrderError::Preset { preset: *preset, error })?;
     }
     memory.save(&values, |row| order.presets.iter().any(|preset| preset.object == row.mux()));
     Ok(memory)

@@ -7,7 +7,7 @@ use canopen::Mux;
 use devices::servo::variations::VARIATIONS;
 use devices::variant::Pick;
 use devices::{AxisId, Description};
-use drives::node::{MEMORY_SIZE, Memory};
+use drives::node::Memory;
 use drives::servo::{
     Actuation, AxisActuation, AxisSensors, Hardware, MAX_AXES, Motor, Sensors, ServoDrive, acts_on, conditions,
 };
@@ -57,8 +57,8 @@ pub fn servo(model: &'static Description, order: &Order) -> Result<ServoMachine,
     let memory = order::memory(model, order)?;
     let hardware = hardware(order, memory);
     let profile = kept::profile(model, conditions(model));
-    let bench = ServoBench::new(model, &kit(order), hardware);
-    Ok(Machine::new(ServoDrive::new(model, profile, &hardware), bench))
+    let firmware = ServoDrive::new(model, profile, &hardware);
+    Ok(Machine::new(firmware, ServoBench::new(model, &kit(order), hardware)))
 }
 
 pub(super) fn ordered(model: &'static Description, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
@@ -104,7 +104,7 @@ fn kit(order: &Order) -> Kit {
     }
 }
 
-fn hardware(order: &Order, memory: Memory) -> Hardware {
+fn hardware(order: &Order, memory: Memory<Boxed>) -> Hardware<Boxed> {
     let Kit { model, rated_torque_nm, rated_current_a_rms, max_current_a_rms, max_rpm, bus_v } = kit(order);
     let amplitude = |rms: f64| (rms * core::f64::consts::SQRT_2) as f32;
     let bleeder = model.rig.supply.bleeder;
@@ -129,11 +129,11 @@ fn hardware(order: &Order, memory: Memory) -> Hardware {
 /// Motors, loads, supply and memory of a described servo.
 #[derive(Clone, Debug)]
 pub struct ServoBench {
-    name: &'static str,
+    model: &'static Description,
     motors: Vec<HubMotor>,
     /// The counter of each motor where its index pulse came in the last period.
     indexes: Vec<Option<u16>>,
-    hardware: Hardware,
+    hardware: Hardware<Boxed>,
     store_broken: bool,
     dead_time: bool,
     last: Actuation,
@@ -141,12 +141,12 @@ pub struct ServoBench {
 
 impl ServoBench {
     /// At rest at ambient temperature, the supply not yet connected.
-    fn new(model: &Description, kit: &Kit, hardware: Hardware) -> Self {
+    fn new(model: &'static Description, kit: &Kit, hardware: Hardware<Boxed>) -> Self {
         let mut motor = HubMotor::new(kit.model, Angle::from_turns(FIRST_TURNS), kit.bus_v, AMBIENT_C);
         motor.rig.supply = SupplyData::switched_off(kit.bus_v);
         let count = model.axes.len().clamp(1, MAX_AXES);
         Self {
-            name: model.name,
+            model,
             motors: vec![motor; count],
             indexes: vec![None; count],
             hardware,
@@ -185,7 +185,7 @@ impl ServoBench {
         self.motors.iter().any(HubMotor::is_power_stage_burnt).then_some(BURNT).or(seized)
     }
 
-    fn sense_axis(&self, axis: usize, inputs: u32) -> AxisSensors {
+    fn sense_axis(&self, axis: usize, inputs: u64) -> AxisSensors {
         let Some(motor) = self.motors.get(axis) else { return AxisSensors::default() };
         let sensed = motor.sense();
         let level = |input: usize| inputs >> (axis * SWITCHES + input) & 1 != 0;
@@ -242,32 +242,48 @@ fn index_count(motor: &HubMotor, before: i64) -> Option<u16> {
     Some(motor.encoder.count.wrapping_sub(beyond as u16))
 }
 
-/// Inputs of one axis.
+/// Inputs of one axis: limit switches, home switch, touch probes.
 const SWITCHES: usize = 5;
+
+/// Those of all axes, one axis after the other; the number of each axis but the first stands behind.
+#[rustfmt::skip]
+const INPUTS: [&str; SWITCHES * MAX_AXES] = [
+    "NEG", "POS", "HOME", "P1", "P2",
+    "NEG2", "POS2", "HOME2", "P1_2", "P2_2",
+    "NEG3", "POS3", "HOME3", "P1_3", "P2_3",
+    "NEG4", "POS4", "HOME4", "P1_4", "P2_4",
+    "NEG5", "POS5", "HOME5", "P1_5", "P2_5",
+    "NEG6", "POS6", "HOME6", "P1_6", "P2_6",
+    "NEG7", "POS7", "HOME7", "P1_7", "P2_7",
+    "NEG8", "POS8", "HOME8", "P1_8", "P2_8",
+];
 
 impl Assembly for ServoBench {
     type Firmware = ServoDrive<Boxed>;
 
     const MODEL: &'static str = "cia402";
-    const INPUTS: &'static [&'static str] =
-        &["NEG", "POS", "HOME", "P1", "P2", "NEG2", "POS2", "HOME2", "P1_2", "P2_2"];
+    const INPUTS: &'static [&'static str] = &INPUTS;
     const STARTS_AT_V: f64 = 24.0;
     const STOPS_BELOW_V: f64 = 18.0;
     const SUPPLY_VOLTAGE: Quantity = Quantity { what: "supply", expected: "0 to 450 V", least: 0.0, greatest: 450.0 };
 
     fn model(&self) -> &'static str {
-        self.name
+        self.model.name
     }
 
     fn description(firmware: &Self::Firmware, _: &Self) -> Option<&'static Description> {
         Some(firmware.description())
     }
 
-    fn hardware(&self) -> Hardware {
-        self.hardware
+    fn inputs(&self) -> &'static [&'static str] {
+        &INPUTS[..self.motors.len() * SWITCHES]
     }
 
-    fn sense(&self, inputs: u32) -> Sensors {
+    fn hardware(&self) -> Hardware<Boxed> {
+        self.hardware.clone()
+    }
+
+    fn sense(&self, inputs: u64) -> Sensors {
         let first = self.first();
         let mut at = 0;
         let axes = [(); MAX_AXES].map(|()| {
@@ -385,7 +401,7 @@ impl Assembly for ServoBench {
     }
 
     fn keep_image(&mut self, image: &[u8]) {
-        self.hardware.memory = Memory::from_bytes(&image[..image.len().min(MEMORY_SIZE)]);
+        self.hardware.memory = Memory::from_bytes(self.model.dictionary, image);
     }
 
     fn set_rotor_locked(&mut self, axis: AxisId, locked: bool) {
@@ -404,7 +420,7 @@ impl Assembly for ServoBench {
             Component::Bridge if broken => motor.burn_power_stage(),
             Component::Bridge => motor.mend_power_stage(),
             Component::Short | Component::Reference => {
-                return Err(Refused::Absent { model: self.name, what: "such component" });
+                return Err(Refused::Absent { model: self.model.name, what: "such component" });
             }
         }
         Ok(())

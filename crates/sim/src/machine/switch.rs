@@ -6,7 +6,7 @@ use crate::SwitchRange;
 /// switches beside the shaft.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Inputs {
-    levels: u32,
+    levels: u64,
     switches: Vec<Switch>,
 }
 
@@ -22,7 +22,7 @@ impl Inputs {
     /// Sets the level at input `n`; removes a switch tied to it.
     pub(super) fn set(&mut self, n: usize, level: bool) {
         self.switches.retain(|switch| switch.input != n);
-        self.levels = self.levels & !(1 << n) | u32::from(level) << n;
+        self.levels = self.levels & !(1 << n) | u64::from(level) << n;
     }
 
     /// Ties input `n` to a switch that is high while the shaft of an axis is in a stretch of its own counts.
@@ -33,8 +33,8 @@ impl Inputs {
 
     /// Bit `n` is the level of input `n` while the shafts are at these counts.
     #[inline]
-    pub(super) fn levels(&self, shaft_counts: impl Fn(AxisId) -> i64) -> u32 {
-        let high = |switch: &Switch| u32::from(switch.range.contains(shaft_counts(switch.axis))) << switch.input;
+    pub(super) fn levels(&self, shaft_counts: impl Fn(AxisId) -> i64) -> u64 {
+        let high = |switch: &Switch| u64::from(switch.range.contains(shaft_counts(switch.axis))) << switch.input;
         self.switches.iter().map(high).fold(self.levels, |levels, level| levels | level)
     }
 }

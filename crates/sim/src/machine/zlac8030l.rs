@@ -130,7 +130,7 @@ impl Assembly for HubWheel {
     }
 
     #[inline]
-    fn sense(&self, inputs: u32) -> Sensors {
+    fn sense(&self, inputs: u64) -> Sensors {
         let sensed = self.motor.sense();
         Sensors {
             encoder_count: sensed.encoder_count,

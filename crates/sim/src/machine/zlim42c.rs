@@ -180,7 +180,7 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
     }
 
     #[inline]
-    fn sense(&self, inputs: u32) -> Sensors {
+    fn sense(&self, inputs: u64) -> Sensors {
         let sensed = self.motor.sense();
         Sensors {
             phase_current_a: sensed.phase_current_a.map(|current_a| current_a as f32),

@@ -6,7 +6,7 @@ use super::member::Member;
 use super::{StationId, World};
 use crate::Report;
 use crate::stimulus::Place;
-use crate::wire::{Delivered, Role};
+use crate::wire::{Delivered, ErrorState, Role, WireEvent};
 
 /// A station that leaves its deadline in the past is asked again after this time: it cannot stop the world.
 const OVERDUE_RETRY_NS: u64 = 1_000;
@@ -128,6 +128,10 @@ impl World {
     pub(super) fn keep_events(&mut self) {
         while let Some(event) = self.bus.poll_event() {
             self.note_wire(&event);
+            if let WireEvent::State { controller, state, .. } = event {
+                self.members[controller].station().handle_bus_off(state == ErrorState::BusOff, self.now);
+                self.serve(controller);
+            }
             self.log.push(event);
         }
     }

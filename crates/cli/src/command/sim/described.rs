@@ -5,7 +5,6 @@ use canopen::od::{DefaultValue, Dictionary, Entry};
 use canopen::pdo::{Direction, Mapping, PdoId, PdoNumber};
 use canopen::{Mux, NodeId};
 use devices::Description;
-use drives::servo::MAX_AXES;
 use sim::machine::{Boxed, is_built_in, without_effect};
 
 /// Profile number of drives in the low half of 1000h.
@@ -40,8 +39,7 @@ fn run_as(model: &Description) -> String {
         }
         0 => "a node with its objects".into(),
         1 => "a servo".into(),
-        axes if axes <= MAX_AXES => format!("a servo of {axes} axes"),
-        axes => format!("a servo, of whose {axes} axes the first {MAX_AXES} turn"),
+        axes => format!("a servo of {axes} axes"),
     }
 }
 

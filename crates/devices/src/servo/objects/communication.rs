@@ -28,13 +28,13 @@ pub(super) static ROWS: [Entry; ROW_COUNT] = join(&[
 ]);
 
 /// Number of rows.
-pub(super) const ROW_COUNT: usize = GENERAL.len() + 4 * (3 + 5 + 2 * 9);
+pub(super) const ROW_COUNT: usize = GENERAL.len() + 4 * (4 + 5 + 2 * 9);
 
 const CONTROLWORD: i64 = 0x6040_0010;
 const STATUSWORD: i64 = 0x6041_0010;
 
 #[rustfmt::skip]
-const GENERAL: [Entry; 42] = [
+const GENERAL: [Entry; 43] = [
     // Bits 0 to 15: profile 402; bits 16 to 23: servo drive.
     ro(0x1000, 0, U32, "device_type", "Device type").default(0x0002_0192),
     ro(0x1001, 0, U8, "error_register", "Error register").mappable(),
@@ -48,11 +48,12 @@ const GENERAL: [Entry; 42] = [
     ro(0x1003, 7, U32, "standard_error_field_7", "Seventh latest error"),
     ro(0x1003, 8, U32, "standard_error_field_8", "Eighth latest error"),
     rw(0x1005, 0, U32, "cob_id_sync", "COB-ID of SYNC").default(0x80).saved(),
+    rw(0x1006, 0, U32, "communication_cycle_period", "Time between two SYNCs that is awaited; 0 for none").unit("us").saved(),
     text(0x1008, "manufacturer_device_name", "Name of the device", "Ferrodrive CiA 402 servo"),
     text(0x1009, "manufacturer_hardware_version", "Version of the hardware", "1"),
     text(0x100A, "manufacturer_software_version", "Version of the firmware", env!("CARGO_PKG_VERSION")),
-    rw(0x100C, 0, U16, "guard_time", "Guard time; 0 is off").unit("ms").range(0, 0),
-    rw(0x100D, 0, U8, "life_time_factor", "Life time factor; 0 is off").range(0, 0),
+    rw(0x100C, 0, U16, "guard_time", "Guard time; 0 is off").unit("ms").saved(),
+    rw(0x100D, 0, U8, "life_time_factor", "Life time factor; 0 is off").saved(),
     ro(0x1010, 0, U8, "store_parameters", "Number of groups that can be stored").default(3),
     rw(0x1010, 1, U32, "save_all_parameters", "Store all: write 'save'").default(1),
     rw(0x1010, 2, U32, "save_communication_parameters", "Store 1000h to 1FFFh: write 'save'").default(1),
@@ -76,7 +77,7 @@ const GENERAL: [Entry; 42] = [
     rw(0x1019, 0, U8, "synchronous_counter_overflow_value", "SYNC counter overflow; 0 is off").range(0, 0),
     ro(0x1029, 0, U8, "error_behaviour", "Number of entries").default(1),
     rw(0x1029, 1, U8, "communication_error", "What a loss of communication does to the NMT state")
-        .values(&[(1, "nothing")]).default(1).saved(),
+        .values(&[(0, "pre-operational"), (1, "nothing"), (2, "stopped")]).default(1).saved(),
     ro(0x1200, 0, U8, "sdo_server_parameter", "Number of entries").default(2),
     ro(0x1200, 1, U32, "sdo_cob_id_client_to_server", "COB-ID client to server").node_id_plus(0x600),
     ro(0x1200, 2, U32, "sdo_cob_id_server_to_client", "COB-ID server to client").node_id_plus(0x580),
@@ -90,9 +91,12 @@ const fn text(index: u16, name: &'static str, title: &'static str, value: &'stat
 macro_rules! rpdo {
     ($index:literal, $name:literal, $cob_id:literal) => {
         [
-            ro($index, 0, U8, concat!($name, "_parameter"), "Highest entry").default(2),
+            ro($index, 0, U8, concat!($name, "_parameter"), "Highest entry").default(5),
             rw($index, 1, U32, concat!($name, "_cob_id"), "COB-ID").node_id_plus($cob_id).saved(),
             rw($index, 2, U8, concat!($name, "_transmission_type"), "Transmission type").default(255).saved(),
+            rw($index, 5, U16, concat!($name, "_event_timer"), "Longest time without one, from the first on; 0 is off")
+                .unit("ms")
+                .saved(),
         ]
     };
 }

@@ -1,10 +1,16 @@
 //! What a host sets in motion at an axis.
 
+use canopen::node::Via;
 use canopen::od::{Dictionary, Slot, Storage};
-use cia402::{Controlword, FaultReactionOption, ModeOfOperation, PowerCommand};
+use cia402::{AbortConnectionOption, Controlword, FaultReactionOption, ModeOfOperation, PowerCommand};
 
 use super::Shaft;
+use super::cyclic::{MOST_WAITING, Organisation};
+use crate::engine::faults::FaultSet;
 use crate::servo::read;
+
+/// 1006h: set-points are awaited in its rhythm.
+const SYNC_PERIOD: u16 = 0x1006;
 
 /// What a write to an axis did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,7 +27,8 @@ pub(in crate::servo) enum Written {
 
 impl Shaft {
     /// The self-test has ended well, and 6060h is in effect.
-    pub(in crate::servo) fn start(&mut self, values: &Dictionary<impl Storage>) {
+    pub(in crate::servo) fn start(&mut self, values: &mut Dictionary<impl Storage>) {
+        self.organise_buffer(values);
         self.select_mode(read(values, self.slots.mode, 0));
         self.power.self_test_done();
     }
@@ -29,8 +36,9 @@ impl Shaft {
     /// A peer wrote to `slot`.
     pub(in crate::servo) fn written(
         &mut self,
-        values: &Dictionary<impl Storage>,
+        values: &mut Dictionary<impl Storage>,
         slot: Slot,
+        via: Via,
         inputs: [bool; 2],
     ) -> Written {
         let written = Some(slot);
@@ -43,25 +51,93 @@ impl Shaft {
             self.select_mode(value);
             return Written::Command;
         }
-        let mode = self.power.mode();
-        if written == slots.target_position {
-            if mode == ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION {
-                self.take_set_point(value, self.position());
-            }
-        } else if written == slots.interpolation_set_point {
-            // 60C4h:06 = 0: the buffer is closed.
-            let open = read(values, slots.interpolation_buffer_clear, 1) != 0;
-            if mode == ModeOfOperation::INTERPOLATED_POSITION && self.is_enabled() && open {
-                self.take_set_point(value, self.position());
-            }
-        } else if written == slots.touch_probe_function {
+        if written == slots.touch_probe_function {
             self.probes.set_function(value as u16, inputs);
+        } else if self.is_set_point(written) {
+            // 60C4h:06 = 0: the buffer is closed.
+            let mode = self.power.mode();
+            let open = mode != ModeOfOperation::INTERPOLATED_POSITION
+                || read(values, slots.interpolation_buffer_clear, 1) != 0;
+            if open {
+                self.take_set_point(values, matches!(via, Via::Rpdo(_)));
+                self.publish_waiting(values);
+            }
+        } else if self.is_of_buffer(written) {
+            self.organise_buffer(values);
+        } else if written == slots.interpolation_buffer_position {
+            self.publish_waiting(values);
         } else if !slots.is_target(slot) {
-            let known = values.table().row(slot).index >= 0x6000;
-            self.parameters_changed |= known;
+            let index = values.table().row(slot).index;
+            let known = index >= 0x6000;
+            self.parameters_changed |= known || index == SYNC_PERIOD;
             return if known { Written::Value } else { Written::Elsewhere };
         }
         Written::Value
+    }
+
+    /// The object that brings the set-points of the mode in effect, if that is given one each cycle.
+    fn is_set_point(&self, written: Option<Slot>) -> bool {
+        let slots = &self.slots;
+        let of_mode = match self.power.mode() {
+            ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION => slots.target_position,
+            ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY => slots.target_velocity,
+            ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE => slots.target_torque,
+            ModeOfOperation::INTERPOLATED_POSITION => slots.interpolation_set_point,
+            _ => None,
+        };
+        of_mode.is_some() && written == of_mode
+    }
+
+    fn is_of_buffer(&self, written: Option<Slot>) -> bool {
+        let slots = &self.slots;
+        [slots.interpolation_buffer_size, slots.interpolation_buffer_organisation, slots.interpolation_buffer_clear]
+            .contains(&written)
+    }
+
+    /// 60C4h: what waits is dropped when the buffer is cleared (sub-index 06h = 0), or gets another size or organisation.
+    pub(super) fn organise_buffer(&mut self, values: &mut Dictionary<impl Storage>) {
+        let slots = &self.slots;
+        let most = read(values, slots.interpolation_most_waiting, 1).clamp(1, MOST_WAITING as i64);
+        let size = read(values, slots.interpolation_buffer_size, 1).clamp(1, most) as u8;
+        let organisation = match read(values, slots.interpolation_buffer_organisation, 0) {
+            1 => Organisation::Ring,
+            _ => Organisation::FirstInFirstOut,
+        };
+        self.set_points.waiting.reorganise(size, organisation);
+        self.publish_waiting(values);
+    }
+
+    /// The connection to the host is lost, in the way that this row is the fault of; 6007h says what that does. True if it is a
+    /// fault, which lasts as long as the loss does, if it lasts at all.
+    pub(in crate::servo) fn lose_connection(
+        &mut self,
+        values: &Dictionary<impl Storage>,
+        row: usize,
+        lasts: bool,
+    ) -> bool {
+        self.refresh(values);
+        match self.parameters.abort_connection {
+            AbortConnectionOption::NONE => false,
+            AbortConnectionOption::DISABLE_VOLTAGE => {
+                self.command_itself(PowerCommand::DisableVoltage);
+                false
+            }
+            AbortConnectionOption::QUICK_STOP => {
+                self.command_itself(PowerCommand::QuickStop);
+                false
+            }
+            // Codes that mean nothing to this firmware count as the standard's default.
+            _ => {
+                self.lost = self.lost.with(row, lasts);
+                true
+            }
+        }
+    }
+
+    /// It is there again in this way: a fault for it can be reset.
+    pub(in crate::servo) fn regain_connection(&mut self, row: usize) {
+        self.lost = FaultSet(self.lost.0 & !FaultSet::row(row).0);
+        let _ = self.faults.forget(row);
     }
 
     /// Whether 6060h accepts a mode.
@@ -98,17 +174,14 @@ impl Shaft {
         let mode = ModeOfOperation(value as i8);
         if self.has_mode(mode) {
             if mode != self.power.mode() {
-                self.set_point_age_s = None;
+                self.set_points.forget();
             }
             self.power.request_mode(mode);
         }
     }
 
     fn command(&mut self, controlword: Controlword, values: &Dictionary<impl Storage>) -> Written {
-        if self.parameters_changed {
-            self.parameters_changed = false;
-            self.parameters = crate::servo::parameters::Parameters::of(values, &self.slots, &self.motor);
-        }
+        self.refresh(values);
         let target = self.parameters.scales.increments(read(values, self.slots.target_position, 0));
         let relative = controlword.has(Controlword::RELATIVE);
         let target = self.held_target(target, relative);

@@ -3,39 +3,41 @@
 use canopen::od::{Dictionary, Storage};
 use cia402::{Controlword, ModeOfOperation};
 use motion::profile::Point;
+use motion::set_points::{Course, Following};
 
 use super::{SUPERVISION_PERIOD_S, Shaft};
 use crate::engine::axis::{Cyclic, Feedback, TrajectoryPoint};
 use crate::engine::cia402::Targets;
-use crate::servo::read;
+use crate::servo::{read, write};
+
+const DT_S: f64 = SUPERVISION_PERIOD_S as f64;
 
 impl Shaft {
     /// Targets from the objects, held to the limits.
-    pub(super) fn read_targets(&mut self, values: &Dictionary<impl Storage>, feedback: &Feedback) {
+    pub(super) fn read_targets(&mut self, values: &mut Dictionary<impl Storage>, feedback: &Feedback) {
         self.limited = false;
         let position = f64::from(feedback.position);
-        let cyclic = match self.power.mode() {
-            mode if !self.is_enabled() => {
+        let mode = self.power.mode();
+        let cyclic = match mode {
+            _ if !self.is_enabled() => {
                 self.follow_nothing(mode);
                 None
             }
             ModeOfOperation::INTERPOLATED_POSITION if !self.power.controlword().has(Controlword::NEW_SET_POINT) => {
-                self.follow_nothing(ModeOfOperation::INTERPOLATED_POSITION);
+                self.follow_nothing(mode);
                 None
             }
-            ModeOfOperation::INTERPOLATED_POSITION | ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION => {
+            ModeOfOperation::INTERPOLATED_POSITION => {
+                self.take_waiting_set_point(values);
                 self.cyclic_position(values)
             }
-            ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY => {
-                let wanted = self.velocity(values) + self.velocity_offset(values);
-                let velocity = self.held_velocity(wanted, position);
-                Some(Cyclic::Velocity(TrajectoryPoint::moving(feedback.position, velocity)))
-            }
-            ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE => Some(Cyclic::Torque(self.torque_a(values))),
+            ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION => self.cyclic_position(values),
+            ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY => self.cyclic_velocity(values, feedback),
+            ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE => self.cyclic_torque(values),
             _ => None,
         };
         let wanted = self.velocity(values);
-        let profile = self.power.mode() == ModeOfOperation::PROFILE_VELOCITY;
+        let profile = mode == ModeOfOperation::PROFILE_VELOCITY;
         self.targets = Targets {
             velocity: if profile { self.held_velocity(wanted, position) } else { 0.0 },
             current_a: self.torque_a(values),
@@ -43,40 +45,99 @@ impl Shaft {
         };
     }
 
-    /// A set-point came: 607Ah in csp, 60C1h in ip.
-    pub(super) fn take_set_point(&mut self, target: i64, feedback_position: i32) {
-        let wanted = f64::from(self.parameters.scales.increments(target));
-        let target = self.parameters.travel.map_or(wanted, |travel| travel.hold(wanted));
-        self.set_point_held = target != wanted;
-        let following = self.parameters.following;
-        if self.set_point_age_s.is_none() {
-            self.set_points = motion::set_points::SetPoints::resting(f64::from(feedback_position));
+    /// A set-point of the mode came: 607Ah in csp, 60FFh in csv, 6071h in cst, 60C1h in ip.
+    pub(super) fn take_set_point(&mut self, values: &Dictionary<impl Storage>, by_rpdo: bool) {
+        match self.power.mode() {
+            ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY => {
+                let from = self.servo.velocity_rad_s() / self.model.rad_per_count();
+                let (target, following) = (self.velocity(values), self.following_straight());
+                self.set_points.take(target, f64::from(from), false, by_rpdo, &following);
+            }
+            ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE => {
+                let from = f64::from(self.servo.current_a());
+                let (target, following) = (f64::from(self.torque_a(values)), self.following_straight());
+                self.set_points.take(target, from, false, by_rpdo, &following);
+            }
+            ModeOfOperation::INTERPOLATED_POSITION => {
+                let target = self.parameters.scales.increments(read(values, self.slots.interpolation_set_point, 0));
+                if self.set_points.waiting.is_used() {
+                    let place = read(values, self.slots.interpolation_buffer_position, 0);
+                    let _ = self.set_points.waiting.put(target, usize::try_from(place).unwrap_or(usize::MAX));
+                } else if self.is_enabled() {
+                    self.take_position(target, by_rpdo);
+                }
+            }
+            _ => {
+                let target = self.parameters.scales.increments(read(values, self.slots.target_position, 0));
+                self.take_position(target, by_rpdo);
+            }
         }
-        let age_s = self.set_point_age_s.unwrap_or(f64::INFINITY);
-        self.set_points.push(target, age_s, &following);
-        self.set_point_age_s = Some(0.0);
+    }
+
+    fn take_position(&mut self, target: i32, by_rpdo: bool) {
+        let wanted = f64::from(target);
+        let target = self.parameters.travel.map_or(wanted, |travel| travel.hold(wanted));
+        let from = f64::from(self.position());
+        self.set_points.take(target, from, target != wanted, by_rpdo, &self.parameters.following);
+    }
+
+    /// In ip with a buffer, once a period: the next one that waits.
+    fn take_waiting_set_point(&mut self, values: &mut Dictionary<impl Storage>) {
+        if let Some(target) = self.set_points.take_waiting(DT_S, &self.parameters.following) {
+            self.take_position(target, false);
+            self.publish_waiting(values);
+        }
+    }
+
+    /// 60C4h:04 of a first-in-first-out buffer: how many set-points wait. That of a ring is the host's.
+    pub(super) fn publish_waiting(&self, values: &mut Dictionary<impl Storage>) {
+        if self.set_points.waiting.is_used() && self.set_points.waiting.is_first_in_first_out() {
+            write(values, self.slots.interpolation_buffer_position, i64::from(self.set_points.waiting.count()));
+        }
     }
 
     fn follow_nothing(&mut self, mode: ModeOfOperation) {
-        // A set-point that came before the axis was enabled still holds in csp: the host has aimed it.
-        if mode != ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION || self.power.is_live() {
-            self.set_point_age_s = None;
+        // A set-point that came before the axis was enabled still holds in the cyclic modes: the host has aimed it.
+        if mode == ModeOfOperation::INTERPOLATED_POSITION || self.power.is_live() {
+            self.set_points.forget();
         }
     }
 
     fn cyclic_position(&mut self, values: &Dictionary<impl Storage>) -> Option<Cyclic> {
-        let age_s = self.set_point_age_s? + f64::from(SUPERVISION_PERIOD_S);
-        self.set_point_age_s = Some(age_s);
-        let point = self.set_points.at(age_s, &self.parameters.following);
+        let point = self.set_points.advance(DT_S, &self.parameters.following)?;
         let offset = self.parameters.scales.increments(read(values, self.slots.position_offset, 0));
         let at = point.position + f64::from(offset);
         let held = self.parameters.travel.map_or(at, |travel| travel.hold(at));
-        self.limited = held != at || self.set_point_held;
+        self.limited = held != at || self.set_points.is_held();
         let velocity = match self.velocity_offset(values) {
             0.0 => point.velocity,
             fed_forward => fed_forward,
         };
         Some(Cyclic::Position(trajectory_point(Point { position: held, velocity, ..point })))
+    }
+
+    fn cyclic_velocity(&mut self, values: &Dictionary<impl Storage>, feedback: &Feedback) -> Option<Cyclic> {
+        let following = self.following_straight();
+        let patience_s = self.parameters.set_point_patience_s;
+        let wanted = self.set_points.advance_while_fed(DT_S, &following, patience_s)? + self.velocity_offset(values);
+        let velocity = self.held_velocity(wanted, f64::from(feedback.position));
+        Some(Cyclic::Velocity(TrajectoryPoint::moving(feedback.position, velocity)))
+    }
+
+    fn cyclic_torque(&mut self, values: &Dictionary<impl Storage>) -> Option<Cyclic> {
+        let following = self.following_straight();
+        let patience_s = self.parameters.set_point_patience_s;
+        let target_a = self.set_points.advance_while_fed(DT_S, &following, patience_s)? as f32;
+        Some(Cyclic::Torque(target_a + self.offset_a(values)))
+    }
+
+    /// How velocities and torques are followed: straight, whatever 60C0h says of positions, and at once without 60C2h.
+    fn following_straight(&self) -> Following {
+        let period_s = match self.slots.interpolation_period_value {
+            Some(_) => self.parameters.following.period_s,
+            None => 0.0,
+        };
+        Following { course: Course::Linear, period_s, ..self.parameters.following }
     }
 
     /// 60FFh, increments/s.
@@ -88,22 +149,24 @@ impl Shaft {
         self.parameters.scales.increments_s(read(values, self.slots.velocity_offset, 0))
     }
 
-    /// 6071h and in the cyclic mode 60B2h, as a current.
+    /// 6071h as a current.
     fn torque_a(&self, values: &Dictionary<impl Storage>) -> f32 {
-        let cyclic = self.power.mode() == ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE;
-        let offset = if cyclic { read(values, self.slots.torque_offset, 0) } else { 0 };
-        let per_mille = read(values, self.slots.target_torque, 0) + offset;
-        self.parameters.current_a(per_mille, &self.motor) * self.parameters.scales.direction() as f32
+        self.parameters.current_a(read(values, self.slots.target_torque, 0), &self.motor) * self.direction()
+    }
+
+    /// 60B2h as a current.
+    fn offset_a(&self, values: &Dictionary<impl Storage>) -> f32 {
+        self.parameters.current_a(read(values, self.slots.torque_offset, 0), &self.motor) * self.direction()
+    }
+
+    fn direction(&self) -> f32 {
+        self.parameters.scales.direction() as f32
     }
 
     /// 60B2h in cyclic position and velocity, as a current: what the host knows to be needed beside the loops.
     pub(super) fn torque_offset_a(&self, values: &Dictionary<impl Storage>) -> f32 {
         let takes = [ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION, ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY];
-        if !self.is_enabled() || !takes.contains(&self.power.mode()) {
-            return 0.0;
-        }
-        let per_mille = read(values, self.slots.torque_offset, 0);
-        self.parameters.current_a(per_mille, &self.motor) * self.parameters.scales.direction() as f32
+        if self.is_enabled() && takes.contains(&self.power.mode()) { self.offset_a(values) } else { 0.0 }
     }
 
     /// A velocity held to the highest speed, and to what can still be stopped before a software limit.

@@ -1,0 +1,238 @@
+//! What every device is that comes from a description: node, services of CiA 301, and what it hears of its connection.
+//!
+//! [`Described`] is the one station of all of them; a firmware says what a lost connection means to it.
+
+use can::{Frame, Instant, Station};
+use canopen::node::NodeProfile;
+use canopen::od::{Entry, Storage};
+use canopen::{NmtCommand, NmtState, NodeId};
+use devices::variant::Variant;
+
+use super::services::Services;
+use super::{Memory, error_behaviour};
+use crate::engine::device::{Application, Device};
+use crate::engine::storage::StoredImage;
+
+/// Device and services over one dictionary.
+#[derive(Clone)]
+pub struct DescribedDevice<S: Storage> {
+    pub(crate) device: Device<S>,
+    pub(crate) services: Services<S>,
+    pub(crate) node_id: NodeId,
+    pub(crate) bitrate: can::Bitrate,
+    stopped: bool,
+    bus_off: bool,
+}
+
+/// How the connection to the host can be lost (CiA 402-2, object 6007h, names all but the last).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Loss {
+    /// A heartbeat that is watched (1016h) has stayed away, or the guarding of this device (100Ch, 100Dh).
+    Silence,
+    /// The controller is bus-off.
+    BusOff,
+    /// NMT stopped.
+    Stopped,
+    /// NMT reset communication: over as soon as it is told.
+    Reset,
+    /// An RPDO has missed the deadline of its event timer (CiA 301, 7.5.2.35).
+    RpdoDeadline,
+}
+
+impl<S: Storage> DescribedDevice<S> {
+    /// A device without supply.
+    pub(crate) fn new(
+        profile: &'static NodeProfile,
+        node_id: NodeId,
+        bitrate: can::Bitrate,
+        memory: Memory<S>,
+        task_period_ns: u64,
+        variant: Variant,
+    ) -> Self {
+        Self {
+            device: Device::new(profile, bitrate, StoredImage::BLANK, task_period_ns, variant),
+            services: Services::new(memory),
+            node_id,
+            bitrate,
+            stopped: false,
+            bus_off: false,
+        }
+    }
+
+    /// Supply voltage arrives, and this is found in the memory. [`restart`](Self::restart) and [`Device::boot`] follow.
+    pub(crate) fn power_on(&mut self, memory: Memory<S>) {
+        self.device.power_on(StoredImage::BLANK);
+        self.services.power_on(memory);
+        self.bus_off = false;
+    }
+
+    /// Starts over with the stored values.
+    pub(crate) fn restart(&mut self, now: Instant) {
+        self.device.restart(self.node_id, self.bitrate, now);
+        self.services.start(&mut self.device, |_| true);
+        self.stopped = false;
+    }
+
+    /// NMT reset communication.
+    pub(crate) fn restart_communication(&mut self, now: Instant) {
+        self.device.restart_communication(now);
+        self.services.start(&mut self.device, Entry::is_communication);
+        self.stopped = false;
+        self.device.boot(now);
+    }
+
+    /// 1029h:01 says what a device that loses its connection does to its own NMT state (CiA 301, 7.5.2.32).
+    fn follow_error_behaviour(&mut self, now: Instant) {
+        let state = self.device.node().state();
+        match error_behaviour(self.device.values()) {
+            Some(0) if state == NmtState::Operational => {
+                self.device.command_itself(NmtCommand::EnterPreOperational, now);
+            }
+            Some(2) => self.device.command_itself(NmtCommand::Stop, now),
+            _ => {}
+        }
+    }
+
+    /// The error that CiA 301 has a code for begins or ends.
+    pub(crate) fn report(&mut self, loss: Loss, lost: bool, now: Instant) {
+        match (loss, lost) {
+            (Loss::Silence, _) => self.device.report_heartbeat(!lost, now),
+            (Loss::RpdoDeadline, _) => self.device.report_rpdo_deadline(!lost, now),
+            (Loss::BusOff, false) => self.device.report_bus_off_recovery(now),
+            (Loss::BusOff, true) | (Loss::Stopped | Loss::Reset, _) => {}
+        }
+    }
+
+    fn poll_transmit(&mut self) -> Option<Frame> {
+        let frame = self.services.take_answer().or_else(|| self.device.poll_transmit())?;
+        self.services.sent(self.device.values_mut(), &frame);
+        Some(frame)
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        let watch = self.services.poll_timeout().filter(|_| self.device.is_running());
+        self.device.poll_timeout().into_iter().chain(watch).min()
+    }
+}
+
+/// A firmware over a described device.
+pub(crate) trait Described<S: Storage>: Application<S> {
+    /// Node and services.
+    fn base(&self) -> &DescribedDevice<S>;
+
+    /// Node and services, to act on.
+    fn base_mut(&mut self) -> &mut DescribedDevice<S>;
+
+    /// The connection to the host is lost in one way, or that way is over. Reports it ([`DescribedDevice::report`]).
+    fn connection(&mut self, loss: Loss, lost: bool, now: Instant) {
+        self.base_mut().report(loss, lost, now);
+    }
+
+    /// A loss, and what CiA 301 has the node do.
+    fn lose(&mut self, loss: Loss, now: Instant) {
+        self.connection(loss, true, now);
+        if matches!(loss, Loss::Silence | Loss::BusOff) {
+            self.base_mut().follow_error_behaviour(now);
+            self.handle_events(now);
+        }
+    }
+
+    /// [`Application::nmt_changed`].
+    fn follow_nmt(&mut self, state: NmtState, now: Instant) {
+        let stopped = state == NmtState::Stopped;
+        if core::mem::replace(&mut self.base_mut().stopped, stopped) != stopped {
+            self.connection(Loss::Stopped, stopped, now);
+        }
+    }
+
+    /// [`Station::ignores`].
+    fn base_ignores(&self, frame: &Frame) -> bool {
+        let base = self.base();
+        base.device.ignores(frame) && !base.services.wants(frame)
+    }
+
+    /// [`Station::handle_frame`].
+    fn take_frame(&mut self, frame: &Frame, now: Instant) {
+        let base = self.base_mut();
+        if base.device.is_running() && base.services.wants(frame) {
+            let state = base.device.node().state();
+            if base.services.handle_frame(frame, state, now) {
+                self.connection(Loss::Silence, false, now);
+            }
+        }
+        self.base_mut().device.handle_frame(frame, now);
+        self.handle_events(now);
+    }
+
+    /// [`Station::handle_timeout`].
+    fn take_timeout(&mut self, now: Instant) {
+        self.base_mut().device.handle_timeout(now);
+        self.handle_events(now);
+        let base = self.base_mut();
+        if base.device.is_running() && base.services.handle_timeout(now) {
+            self.lose(Loss::Silence, now);
+        }
+        if self.base_mut().device.is_task_due(now) {
+            self.communication_task(now);
+        }
+    }
+
+    /// [`Station::handle_bus_off`].
+    fn take_bus_off(&mut self, off: bool, now: Instant) {
+        let base = self.base_mut();
+        if !base.device.is_running() || core::mem::replace(&mut base.bus_off, off) == off {
+            return;
+        }
+        if off {
+            self.lose(Loss::BusOff, now);
+        } else {
+            self.connection(Loss::BusOff, false, now);
+        }
+    }
+
+    /// [`Station::poll_transmit`].
+    fn next_frame(&mut self) -> Option<Frame> {
+        self.base_mut().poll_transmit()
+    }
+
+    /// [`Station::poll_timeout`].
+    fn next_timeout(&self) -> Option<Instant> {
+        self.base().poll_timeout()
+    }
+}
+
+/// [`Station`] for a firmware that is [`Described`].
+macro_rules! described_station {
+    ($firmware:ident) => {
+        impl<S: canopen::od::Storage> can::Station for $firmware<S> {
+            fn ignores(&self, frame: &can::Frame) -> bool {
+                self.base_ignores(frame)
+            }
+
+            fn handle_frame(&mut self, frame: &can::Frame, now: can::Instant) {
+                self.take_frame(frame, now);
+            }
+
+            fn handle_timeout(&mut self, now: can::Instant) {
+                self.take_timeout(now);
+            }
+
+            fn poll_transmit(&mut self) -> Option<can::Frame> {
+                self.next_frame()
+            }
+
+            fn poll_timeout(&self) -> Option<can::Instant> {
+                self.next_timeout()
+            }
+
+            fn handle_transmitted(&mut self, frame: &can::Frame, now: can::Instant) {
+                self.base.device.handle_transmitted(frame, now);
+            }
+
+            fn handle_bus_off(&mut self, off: bool, now: can::Instant) {
+                self.take_bus_off(off, now);
+            }
+        }
+    };
+}
+pub(crate) use described_station;
