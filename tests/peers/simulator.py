@@ -6,8 +6,10 @@ import re
 import subprocess
 import tempfile
 import threading
+import time
 
 READY_TIMEOUT_S = 30
+BOOT_TIMEOUT_S = 30
 ANSWER_TIMEOUT_S = 10
 
 
@@ -15,6 +17,7 @@ class Simulator:
     """Starts the program, waits for its `ready` line and ends it again, whatever happens in between."""
 
     def __init__(self, program, drives, seed=1, extra=()):
+        self.drives = drives
         self.command_line = [program, "sim", "--serve", "socketcand://127.0.0.1:0", "--seed", str(seed), *extra]
         for drive in drives:
             self.command_line += ["--drive", drive]
@@ -35,6 +38,7 @@ class Simulator:
         threading.Thread(target=self._read, daemon=True).start()
         try:
             self._wait_until_ready()
+            self._wait_until_booted()
         except BaseException:
             self.quit()
             raise
@@ -93,6 +97,16 @@ class Simulator:
         if line is None:
             raise AssertionError(f"the simulator ended: {' / '.join(self.stderr())}")
         return line
+
+    def _wait_until_booted(self):
+        """The drives start when the program does, and take about a second: until then they are deaf."""
+        until = time.monotonic() + BOOT_TIMEOUT_S
+        for drive in self.drives:
+            node = re.search(r"@(\d+)", drive).group(1)
+            while self.world(f"{node} get")["power"] != "on":
+                if time.monotonic() > until:
+                    raise AssertionError(f"the drive {drive} has not booted within {BOOT_TIMEOUT_S} s")
+                time.sleep(0.05)
 
     def _wait_until_ready(self):
         while not self.ready.startswith("ready"):

@@ -185,6 +185,19 @@ mod tests {
     }
 
     #[test]
+    fn each_time_of_a_model_stands_on_its_page() {
+        for model in models().filter(|model| model.name != "cia402") {
+            let times: Vec<Reading> = of(model).into_iter().filter(|reading| reading.section == "Times").collect();
+            let spans = model.timing.spans();
+            assert_eq!(times.len(), spans.len(), "{}", model.name);
+            for ((what, span), reading) in spans.iter().zip(&times) {
+                assert!(reading.here.starts_with(&span.to_string()), "{}: {what} {span}: {}", model.name, reading.here);
+                assert!(span.source.starts_with(&reading.sure), "{}: {what}: {}", model.name, reading.sure);
+            }
+        }
+    }
+
+    #[test]
     fn every_row_of_every_page_is_found() {
         // The standard's own servo is read from no manual.
         for model in models().filter(|model| model.name != "cia402") {

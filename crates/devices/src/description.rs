@@ -6,6 +6,7 @@ use canopen::{EmcyErrorCode, Mux, NmtState, NodeId};
 use crate::axis::AxisDescription;
 use crate::faults::{FaultRow, Faults};
 use crate::stated::Stated;
+use crate::timing::Timing;
 use crate::variant::Variation;
 
 /// One model of device: what masters, tools and the firmware itself have to know about it, as const data.
@@ -40,6 +41,8 @@ pub struct Description {
     pub nmt: NmtRules,
     /// PDO rules.
     pub pdo: PdoRules,
+    /// How long it takes to start, to answer and to store.
+    pub timing: Timing,
     /// Where the model departs from the standard in ways that nothing else here shows. All of them:
     /// [`departures`](Self::departures).
     pub stated_departures: &'static [Stated],

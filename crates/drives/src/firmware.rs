@@ -3,6 +3,8 @@ use canopen::{NmtState, NodeId};
 use cia402::{ModeOfOperation, PowerState};
 use devices::AxisId;
 
+use crate::engine::device::ResetTimes;
+
 /// The firmware of a drive: a station on the bus that also owns a power stage.
 ///
 /// # Contract
@@ -30,6 +32,9 @@ pub trait Firmware: Station + Clone {
 
     /// Supply voltage is gone: everything that is not in the EEPROM is forgotten.
     fn power_off(&mut self, now: Instant);
+
+    /// How long the next resets by NMT take, which depends on the microcontroller: none as long as nobody says it.
+    fn set_reset_times(&mut self, times: ResetTimes);
 
     /// One control period.
     fn tick(&mut self, sensors: &Self::Sensors, now: Instant) -> Self::Actuation;

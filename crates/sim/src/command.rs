@@ -6,6 +6,7 @@
 //! Node numbers are those under which drives were added, whatever their node-IDs are by now.
 
 mod answer;
+mod run;
 
 use core::time::Duration;
 use std::str::FromStr;
@@ -13,7 +14,8 @@ use std::str::FromStr;
 use serde::Serialize;
 
 use crate::stimulus::{BodyStimulus, GET, GET_BODY, Place, Stimulus, StimulusError, WireFault};
-use crate::{Refused, World};
+use crate::{Refused, World, json};
+pub use run::{Before, Run};
 
 /// One line, understood.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,6 +26,8 @@ pub enum Command {
     Help,
     /// `quit`: the end.
     Quit,
+    /// `run 20ms`: time passes.
+    Run(Run),
     /// `4 get`: what can be measured at a node.
     Get(Place),
     /// `bus corrupt 0.01`: what disturbs the wire.
@@ -54,6 +58,7 @@ impl FromStr for Command {
                 return Ok(Self::Disturb(WireFault::parse(&words)?));
             }
             "body" => return body(rest.trim()),
+            "run" => return Ok(Self::Run(Run::parse(rest)?)),
             _ => {}
         }
         let place = parse_place(first)?;
@@ -84,11 +89,28 @@ fn parse_place(word: &str) -> Result<Place, CommandError> {
 /// Why a line was not done.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CommandError {
+    /// Time follows a clock.
+    #[error("time follows the clock here; start the simulator with --clock manual to move it by hand")]
+    NotManual,
+    /// More lines than may wait for the end of a run.
+    #[error("{most} lines wait for the end of a run already; wait for its answer before you go on")]
+    TooMany {
+        /// How many may wait.
+        most: usize,
+    },
+    /// Time is moving already.
+    #[error("time is moving already, until {until_s} s")]
+    Running {
+        /// When it has moved, in seconds.
+        until_s: f64,
+    },
     /// The line is longer than [`MAX_LINE_LENGTH`].
     #[error("the line is longer than {MAX_LINE_LENGTH} bytes; expected a command, as in: 4 get")]
     TooLong,
     /// The first word is neither a node nor a command.
-    #[error("unknown command {0:?}; expected now, help, quit, bus, body, or a node number and a command, as in: 4 get")]
+    #[error(
+        "unknown command {0:?}; expected now, help, run, quit, bus, body, or a node number and a command, as in: 4 get"
+    )]
     Unknown(String),
     /// The number is no node number.
     #[error("{0:?} is no node number; expected 1 to 127")]
@@ -131,6 +153,7 @@ impl CommandError {
             Self::Unknown(_) | Self::BadNode(_) | Self::NoAction(_) | Self::Stimulus(_) => "usage",
             Self::NoSuchDrive { .. } => "no_such_node",
             Self::NoSuchBody { .. } => "no_such_body",
+            Self::NotManual | Self::Running { .. } | Self::TooMany { .. } => "clock",
             Self::Refused(_) => "refused",
         }
     }
@@ -200,14 +223,8 @@ struct Refusal {
 }
 
 /// The answer to a line that was not done.
-fn refused(error: &CommandError) -> String {
-    to_json(&Refusal { ok: false, error: error.to_string() })
-}
-
-fn to_json(answer: &impl Serialize) -> String {
-    // Answers are flags, numbers and texts: they always become JSON.
-    crate::json::to_string(answer)
-        .unwrap_or_else(|_| r#"{"ok":false,"error":"an answer cannot be written"}"#.to_owned())
+pub fn refused(error: &CommandError) -> String {
+    json::line(&Refusal { ok: false, error: error.to_string() })
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use devices::{AxisId, Description};
 use drives::RegisterError;
 use plant::FreeRun;
 
-use crate::machine::Realism;
+use crate::machine::{Realism, TimingMode};
 use crate::mechanics::Mechanics;
 use crate::refused::Refused;
 use crate::stimulus::{Component, Power, Source, Stimulus, SwitchRange, TemperatureSensor};
@@ -43,6 +43,12 @@ pub trait VirtualDrive: Station + VirtualDriveClone + Send {
 
     /// What the outer world does to it, all of it or nothing. What is no axis' own is the whole drive's, whatever the axis.
     fn apply(&mut self, axis: AxisId, stimulus: &Stimulus, now: Instant) -> Result<(), Refused>;
+
+    /// Whether it takes the time that such a device takes, to boot, to answer and to store, or none; `seed` decides its
+    /// jitter. Before it has power.
+    fn set_timing(&mut self, mode: TimingMode, seed: u64, now: Instant) {
+        let _ = (mode, seed, now);
+    }
 
     /// Whether it is as it is calculated, or has the noise and the flaws of one on a bench; `seed` decides all of that.
     fn set_realism(&mut self, realism: Realism, seed: u64, now: Instant) {
@@ -214,6 +220,45 @@ impl Clone for Box<dyn VirtualDrive> {
     }
 }
 
+/// What a drive makes of its supply.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum PowerPhase {
+    /// Dead, and nothing brings it back by itself.
+    #[default]
+    Off,
+    /// There is voltage, and the firmware starts: silent and deaf, in the state NOT READY TO SWITCH ON. Also after NMT reset node.
+    Booting,
+    /// The firmware runs.
+    On,
+    /// Switched off; it lives on the charge of its bus.
+    Draining,
+    /// Off for now: the supply comes back when the bus has drained.
+    Cycling,
+}
+
+impl PowerPhase {
+    /// The word for it in answers: `booting`.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Off => "off",
+            Self::Booting => "booting",
+            Self::On => "on",
+            Self::Draining => "draining",
+            Self::Cycling => "cycling",
+        }
+    }
+
+    pub(crate) const fn sentence(self) -> &'static str {
+        match self {
+            Self::Off => "the bus has drained, the firmware is dead",
+            Self::Booting => "power is there, the firmware starts",
+            Self::On => "the firmware runs",
+            Self::Draining => "switched off, the drive lives on the charge of its bus",
+            Self::Cycling => "switched off until the bus has drained",
+        }
+    }
+}
+
 /// State of the holding brake.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Brake {
@@ -268,9 +313,11 @@ pub struct OutputShaft {
 pub struct Report {
     /// The node-ID it uses at present.
     pub node: u8,
-    /// Supply switched on.
+    /// There is enough voltage for the drive's converter.
     pub powered: bool,
-    /// Statusword; `None` without power.
+    /// What it makes of its supply.
+    pub power: PowerPhase,
+    /// Statusword; `None` without power, 0 (NOT READY TO SWITCH ON) while it boots.
     pub statusword: Option<u16>,
     /// NMT state; `None` without power.
     pub nmt: Option<NmtState>,

@@ -21,6 +21,7 @@ use devices::faults::FaultRow;
 
 pub use names::KINDS;
 
+pub use crate::drive::PowerPhase;
 use crate::stimulus::Place;
 use crate::wire::{ErrorCause, ErrorState};
 
@@ -132,15 +133,6 @@ pub enum EventKind {
     },
     /// So many older events were not pulled in time, and are lost.
     Missed(u64),
-}
-
-/// Whether a drive has power.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PowerPhase {
-    /// Its firmware runs.
-    On,
-    /// Its bus has drained, and its firmware is dead.
-    Off,
 }
 
 impl Event {

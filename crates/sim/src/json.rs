@@ -24,6 +24,11 @@ pub fn to_string(value: &(impl Serialize + ?Sized)) -> serde_json::Result<String
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
+/// One line of JSON that answers somebody. Answers are flags, numbers and texts: they always become JSON.
+pub fn line(answer: &impl Serialize) -> String {
+    to_string(answer).unwrap_or_else(|_| r#"{"ok":false,"error":"an answer cannot be written"}"#.to_owned())
+}
+
 /// A number without the digits that come of binary fractions.
 pub fn rounded(value: f64) -> f64 {
     let scaled = value * DECIMALS;

@@ -9,25 +9,28 @@ use can::Instant;
 /// A linear map from wall-clock time to virtual time.
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
+    /// This virtual time belongs to the wall clock's `since`.
     origin: Instant,
+    since: Duration,
     speed: f64,
 }
 
 impl Pace {
     /// Virtual time `origin` belongs to an elapsed time of zero; both run equally fast.
     pub const fn real_time(origin: Instant) -> Self {
-        Self { origin, speed: 1.0 }
+        Self { origin, since: Duration::ZERO, speed: 1.0 }
     }
 
     /// As [`real_time`](Self::real_time), with virtual time `speed` times as fast (2: twice as fast).
     ///
     /// A speed that is negative or not a number counts as 0: virtual time stands still.
     pub fn with_speed(origin: Instant, speed: f64) -> Self {
-        Self { origin, speed: if speed > 0.0 { speed } else { 0.0 } }
+        Self { origin, since: Duration::ZERO, speed: if speed > 0.0 { speed } else { 0.0 } }
     }
 
     /// The instant a world should have reached when `elapsed` has passed on the wall clock.
     pub fn target(&self, elapsed: Duration) -> Instant {
+        let elapsed = elapsed.saturating_sub(self.since);
         if self.speed == 1.0 {
             // Exact: a double holds nanoseconds for 104 days only.
             return self.origin + elapsed;
@@ -45,15 +48,15 @@ impl Pace {
     pub fn elapsed_at(&self, at: Instant) -> Option<Duration> {
         let nanos = at.nanos_since(self.origin);
         if self.speed == 1.0 {
-            return Some(Duration::from_nanos(nanos));
+            return Some(self.since + Duration::from_nanos(nanos));
         }
-        (self.speed > 0.0).then(|| Duration::from_nanos((nanos as f64 / self.speed).ceil() as u64))
+        (self.speed > 0.0).then(|| self.since + Duration::from_nanos((nanos as f64 / self.speed).ceil() as u64))
     }
 
-    /// The pace that goes on from here: for a world that fell behind and shall not hurry to catch up.
+    /// The pace that goes on from here: for a world that fell behind and shall not hurry to catch up, or was ahead and shall
+    /// not wait.
     pub fn rebased(&self, elapsed: Duration, now: Instant) -> Self {
-        let lag = self.target(elapsed).nanos_since(now);
-        Self { origin: Instant::from_nanos(self.origin.as_nanos().saturating_sub(lag)), speed: self.speed }
+        Self { origin: now, since: elapsed, speed: self.speed }
     }
 }
 
@@ -95,5 +98,14 @@ mod tests {
         let rebased = pace.rebased(elapsed, Instant::from_secs(11));
         assert_eq!(rebased.target(elapsed), Instant::from_secs(11));
         assert_eq!(rebased.target(elapsed + Duration::from_secs(1)), Instant::from_secs(12));
+        assert_eq!(rebased.elapsed_at(Instant::from_secs(12)), Some(Duration::from_secs(4)));
+    }
+
+    #[test]
+    fn a_world_that_was_ahead_goes_on_from_where_it_is() {
+        let rebased = Pace::with_speed(Instant::ZERO, 2.0).rebased(Duration::from_secs(3), Instant::from_secs(1000));
+        assert_eq!(rebased.target(Duration::from_secs(3)), Instant::from_secs(1000));
+        assert_eq!(rebased.target(Duration::from_secs(4)), Instant::from_secs(1002));
+        assert_eq!(rebased.elapsed_at(Instant::from_secs(1004)), Some(Duration::from_secs(5)));
     }
 }

@@ -25,7 +25,7 @@ pub use bus_fault::{BusFault, WireFault};
 pub use error::StimulusError;
 pub use kinds::{Component, ObjectValue, Power, PulseTrain, Source, Stimulus, TemperatureSensor};
 pub use load::{Friction, LoadKind, LoadPart};
-pub use parse::{FORMS, GET};
+pub use parse::{FORMS, GET, RUN};
 pub use place::Place;
 pub use range::SwitchRange;
 

@@ -23,6 +23,7 @@ pub use member::AnyStation;
 pub use stores::StoredImage;
 
 use crate::fault::{Corruption, NodeFaults};
+use crate::machine::TimingMode;
 use crate::recorder::Recorder;
 use crate::wire::{Bus, ControllerOptions};
 use crate::{Prng, VirtualDrive};
@@ -33,6 +34,9 @@ use member::{Member, Vacant};
 use probe::Probe;
 use watch::Watch;
 
+/// Tells the seeds of a drive's timing from those of its noise.
+const TIMING_SEED: u64 = 0x7469_6D69_6E67;
+
 /// A bus with everything on it.
 ///
 /// A clone is a snapshot: it goes on with identical results. (A station that shares state with others,
@@ -41,6 +45,7 @@ use watch::Watch;
 pub struct World {
     now: Instant,
     seed: u64,
+    timing: TimingMode,
     bus: Bus,
     members: Vec<Member>,
     due: DueTimes,
@@ -89,6 +94,7 @@ impl World {
         Self {
             now: Instant::ZERO,
             seed,
+            timing: TimingMode::Ideal,
             bus: Bus::new(bitrate, seeds.next_u64()),
             members: Vec::new(),
             due: DueTimes::default(),
@@ -101,14 +107,28 @@ impl World {
         }
     }
 
+    /// Whether drives that are added from now on take the time that such devices take to boot, to answer and to store. In a
+    /// new world they take none. The world's seed decides their jitter.
+    pub fn set_timing(&mut self, timing: TimingMode) {
+        self.timing = timing;
+    }
+
     /// Adds a drive under a number (the one users know it by, whatever its node-ID becomes) and powers it.
-    pub fn add_drive(&mut self, number: u8, drive: Box<dyn VirtualDrive>) -> Result<StationId, WorldError> {
+    pub fn add_drive(&mut self, number: u8, mut drive: Box<dyn VirtualDrive>) -> Result<StationId, WorldError> {
         if self.drive_id(number).is_some() {
             return Err(WorldError::DuplicateDrive(number));
+        }
+        if self.timing == TimingMode::Device {
+            drive.set_timing(self.timing, self.seed_of(number, TIMING_SEED), self.now);
         }
         let id = self.add(Member::Drive { number, drive }, ControllerOptions::MICROCONTROLLER);
         self.set_power(number, true)?;
         Ok(id)
+    }
+
+    /// The seed of what is random about the drive under `number`, one for each `purpose`.
+    fn seed_of(&self, number: u8, purpose: u64) -> u64 {
+        Prng::new(self.seed ^ purpose ^ u64::from(number) << 32).next_u64()
     }
 
     /// Adds a station at the bus's bit rate, with a microcontroller's CAN controller.

@@ -63,7 +63,9 @@ fn get_tells_what_can_be_measured() {
     // Half a turn at 60 r/min.
     let got = answer(&mut world, "4 get").unwrap().json;
     assert!(
-        got.starts_with(r#"{"ok":true,"t":0.5,"node":4,"model":"testdrive","powered":true,"position":2048,"#),
+        got.starts_with(
+            r#"{"ok":true,"t":0.5,"node":4,"model":"testdrive","powered":true,"power":"on","position":2048,"#
+        ),
         "{got}"
     );
     let got: Value = serde_json::from_str(&got).unwrap();
@@ -157,6 +159,19 @@ fn commands_reach_the_machine_under_the_number_given_at_the_start() {
     ask(&mut world, "4 rotor free");
     ask(&mut world, "4 switch X0 2000 max");
     ask(&mut world, "4 fault phase on");
+}
+
+#[test]
+fn time_that_is_moved_by_a_line_comes_to_where_it_says() {
+    let (mut world, tap) = world();
+    assert_eq!(ask(&mut world, "run 20ms")["t"], 0.52);
+    assert_eq!(ask(&mut world, "run 1us")["t"], 0.520_001);
+    assert_eq!(ask(&mut world, "run until 2.5s")["t"], 2.5);
+    assert_eq!(ask(&mut world, "run until 1s")["t"], 2.5);
+    heard(&mut world, tap);
+    world.send(tap, frame("604#4041600000000000")).unwrap();
+    let run = ask(&mut world, "run 5ms");
+    assert_eq!((&run["t"], &run["frames"], &run["changes"]), (&2.505.into(), &2.into(), &serde_json::json!([])));
 }
 
 #[test]

@@ -2,13 +2,13 @@
 
 mod described;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, VecDeque};
 use std::fs::File;
 use std::path::PathBuf;
 
-use can::Bitrate;
-use sim::World;
-use sim::machine::Realism;
+use can::{Bitrate, Instant};
+use sim::machine::{Realism, TimingMode};
+use sim::{VirtualDrive, World};
 use tokio::sync::mpsc;
 use transport::{
     AsyncBus, BusSpec, Hub, HubOptions, ModbusServer, ModbusSpec, Protocol, ServeSpec, SocketcandBus, WallClock,
@@ -23,6 +23,7 @@ use crate::recording::{FrameLog, RecordFile, RecordOptions};
 use crate::serve::eeprom::{EepromError, Eeproms};
 use crate::serve::files::create_log;
 use crate::serve::keeper::{Keeper, file_name};
+use crate::serve::pacer::{Clock, Pacer, Speed};
 use crate::serve::service::{Request, Service, listen_to_signals, read_lines, tick};
 use crate::serve::speaker::Speaker;
 use crate::serve::world::ServedWorld;
@@ -38,7 +39,10 @@ use testbench::words::drive::{DriveSpec, drive_spec};
 /// from standard input, one a line, and answers each with one line of JSON; `quit` ends, the end of input does not. Blank
 /// lines and `# comments` have no answer; `help` lists the commands.
 ///
-/// Time on the bus is that of the clock. Nobody holds it up: answers that nobody reads are dropped when 4 MiB wait, and
+/// The drives start when the simulator does, and take about a second to boot (--timing): until its boot-up message a drive is
+/// deaf, and `get` says "power":"booting".
+///
+/// Time on the bus is that of the clock, unless --speed or --clock says otherwise. Nobody holds it up: answers that nobody reads are dropped when 4 MiB wait, and
 /// counted; clients have the wire in turn, at most 256 at a time, of which idle ones make room. `now` and `get` tell
 /// `behind_ms`, how far the bus is behind the clock; falling behind and catching up are also said on standard error.
 #[derive(clap::Args)]
@@ -54,9 +58,10 @@ use testbench::words::drive::{DriveSpec, drive_spec};
     4 cable cut|join          4 get                     now, help, quit\n  \
     4 bus corrupt 0.3         4 bus late 5 20           4 bus silent on|off\n  \
     4 bus babble 080# 1       4 bus overrun 2 0.5       bus corrupt 0.01\n  \
+    run 20ms, run until 2.5s                (with --clock manual: time passes)\n  \
     4 supply 48 limit 10 resistance 0.2     (what the supply gives at most, in A, and its resistance in ohm)\n\
     Switched off a drive lives on the charge of its bus, and its under-voltage, until it dies; a supply that comes back\n\
-    before that, and a cycle, wait for it. Cut, it is dead at once.\n\
+    before that, and a cycle, wait for it, which `power` in `get` tells. Cut, it is dead at once.\n\
     Of the joints, here node 1:\n  \
     1 battery off|on          1 pulses 8192 10000       1 quadrature -400 1000\n  \
     1 duty 40                 1 clock 10000\n\n\
@@ -98,6 +103,29 @@ pub(crate) struct Sim {
     /// and temperature, dead time, cogging; without it the machine file's, or ideal
     #[arg(long, value_name = "ideal|full")]
     realism: Option<Realism>,
+    /// Whether the drives take the time that such drives take (device), or none (ideal); without it the machine file's, or
+    /// device
+    ///
+    /// A drive boots in about a second, is deaf until its boot-up message, acts on an SDO request after about a millisecond, on
+    /// an RPDO or SYNC after some hundred microseconds, takes some milliseconds for a store and half a second for NMT reset
+    /// node. `ferrodrive readings MODEL times` lists the bounds and where they are from; --seed decides each time between them.
+    /// A drive may have it otherwise: --drive zlac8030l@4,timing=ideal.
+    #[arg(long, value_name = "device|ideal")]
+    timing: Option<TimingMode>,
+    /// How many times as fast as the clock the bus runs, e.g. 10 or 0.1, or max
+    ///
+    /// With max it runs as fast as the machine can while a client is connected, which takes a whole core: 1 ms of the bus's
+    /// time is computed, then clients have their turn; their frames are taken between two such steps. While no client is
+    /// connected it runs with the clock.
+    #[arg(long, value_name = "N|max", conflicts_with = "clock")]
+    speed: Option<Speed>,
+    /// What moves time: the clock, or `run 20ms` and `run until 2.5s` on standard input (manual)
+    ///
+    /// Moved by hand, time stands between two runs: a frame of a client is taken at the time that the bus has, and goes out
+    /// with the next run. Each run is answered, when it is over, with the time reached, how many frames the bus has carried,
+    /// and the drives whose power, statusword or error code has changed. Lines that come before that wait for it.
+    #[arg(long, value_name = "real|manual", value_enum, default_value = "real")]
+    clock: Clock,
     /// Write all frames to this file, in candump format
     ///
     /// It is a new file, or an empty one, or a candump log, which is replaced. Any other file, a symbolic link, a device and
@@ -135,6 +163,7 @@ impl Sim {
         let eeproms = self.state.as_deref().map(Eeproms::open).transpose()?;
         let mut world = machine.world();
         for placed in &machine.drives {
+            world.set_timing(machine.timing_of(placed, TimingMode::Device));
             add_drive(&mut world, placed, eeproms.as_ref(), &warnings)?;
             let notes = notes(placed.spec.node, placed.spec.model, self.verbose);
             notes.iter().for_each(|note| warnings.say(&plain(note)));
@@ -146,7 +175,8 @@ impl Sim {
                 .because(error)
         })?;
         let record = self.recording.start(&mut world, warnings.clone())?;
-        let world = ServedWorld::new(world, log.is_some() || record.is_some(), warnings.clone());
+        let pacer = Pacer::new(self.clock, self.speed.unwrap_or(Speed::Times(1.0)));
+        let world = ServedWorld::new(world, pacer, log.is_some() || record.is_some(), warnings.clone());
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().event_interval(TASKS_A_TURN).build();
         let runtime = runtime.map_err(|error| Failure::new("cannot start the runtime").because(error))?;
         let ended = runtime.block_on(self.serve(world, eeproms, (log, record), warnings, global, bridge));
@@ -161,6 +191,7 @@ impl Sim {
         machine.bitrate = self.bitrate.or(machine.bitrate);
         machine.seed = self.seed.or(machine.seed);
         machine.realism = self.realism.or(machine.realism);
+        machine.timing = self.timing.or(machine.timing);
         machine.drives.extend(self.drives.iter().cloned().map(Placed::from));
         if machine.drives.is_empty() {
             return Err(Failure::usage("no drive to run")
@@ -189,7 +220,8 @@ impl Sim {
         listen_to_signals(requests.clone());
         let answers = Speaker::of_answers(warnings.clone());
         let log = log.map(|file| FrameLog::start(file, clock.unix_zero(), warnings.clone()));
-        let mut service = Service { answers: answers.clone(), warnings: warnings.clone(), log, record };
+        let waiting = VecDeque::new();
+        let mut service = Service { answers: answers.clone(), warnings: warnings.clone(), log, record, waiting };
         let outer = match bridge {
             Some(spec) => Some(spec.open(&clock).await.map_err(|error| bus_failure(global, &error))?),
             None => None,
@@ -210,6 +242,8 @@ impl Sim {
             // A full queue wakes the loop as well.
             world.keep_stores(Keeper::start(eeproms, warnings, move || drop(stored.try_send(Request::Stored))));
         }
+        let over = requests.clone();
+        world.on_run_over(move || over.try_send(Request::RunIsOver).is_ok());
         answers.say(&self.ready(&hub, modbus.as_ref(), bridge));
         if self.places.is_empty() && modbus.is_none() && bridge.is_none() {
             service.warnings.say(NOBODY);
@@ -255,10 +289,10 @@ fn add_drive(world: &mut World, placed: &Placed, eeproms: Option<&Eeproms>, warn
             Failure::new(format!("the EEPROM contents kept for {name} cannot be used")).because(error)
         })?;
     }
-    world.add_drive(number, drive).map_err(|error| Failure::usage(error.to_string()))?;
     if image.is_some() {
-        note_what_the_image_changes(world, number, &name, warnings);
+        note_what_the_image_changes(drive.clone(), world.bitrate(), number, &name, warnings);
     }
+    world.add_drive(number, drive).map_err(|error| Failure::usage(error.to_string()))?;
     placed.furnish(world).map_err(unusable)
 }
 
@@ -267,10 +301,17 @@ fn unusable(bad: BadFile) -> Failure {
 }
 
 /// Says it if a drive is not where the command line puts it, because its EEPROM contents say otherwise.
-fn note_what_the_image_changes(world: &mut World, number: u8, name: &str, warnings: &Speaker) {
-    let found = world.with_drive(number, |drive, _| (drive.bitrate(), drive.report().node));
-    let Ok((bitrate, node)) = found else { return };
-    let of_bus = world.bitrate();
+///
+/// That is seen from one that is switched on beside the bus.
+fn note_what_the_image_changes(
+    mut drive: Box<dyn VirtualDrive>,
+    of_bus: Bitrate,
+    number: u8,
+    name: &str,
+    warnings: &Speaker,
+) {
+    drive.set_power(true, Instant::ZERO);
+    let (bitrate, node) = (drive.bitrate(), drive.report().node);
     if let Some(bitrate) = bitrate.filter(|bitrate| *bitrate != of_bus) {
         warnings.say(&format!(
             "warning: {name} is off the bus: its EEPROM contents say {bitrate}, and the bus has {of_bus}"

@@ -5,6 +5,7 @@ pub(crate) mod files;
 mod input;
 pub(crate) mod keeper;
 mod lag;
+pub(crate) mod pacer;
 mod registers;
 pub(crate) mod service;
 pub(crate) mod speaker;

@@ -1,16 +1,18 @@
 //! What is asked of a running simulation by those who started it: lines of standard input, signals, Modbus clients; and the
 //! records that it keeps. Nothing here waits for whoever reads or writes at the other end.
 
+use std::collections::VecDeque;
 use std::io;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
+use sim::command::CommandError;
 use tokio::sync::mpsc;
 use transport::{ModbusRequest, WallClock};
 
 use super::input::next_line;
 use super::speaker::Speaker;
-use super::world::ServedWorld;
+use super::world::{Commanded, ServedWorld};
 use crate::failure::Failure;
 use crate::recording::{Batch, FrameLog, RecordFile};
 use crate::session::runtime;
@@ -29,10 +31,15 @@ const PARTING_PATIENCE: Duration = Duration::from_millis(500);
 /// How long after a signal the process ends in any case: what stores, log and the last words may take together.
 const END_PATIENCE: Duration = Duration::from_secs(12);
 
+/// Lines that may wait for the end of a run.
+const LINES_WAITING: usize = 1024;
+
 /// Something to be served between two steps of the world.
 pub(crate) enum Request {
     /// A line of standard input.
     Line(String),
+    /// A run has come to its end.
+    RunIsOver,
     /// Time to look for records.
     Keep,
     /// A store is on the disk: answers may go out.
@@ -61,22 +68,17 @@ pub(crate) struct Service {
     pub(crate) log: Option<FrameLog>,
     /// The record, if one is asked for.
     pub(crate) record: Option<RecordFile>,
+    /// Lines that came while a run was under way: each is answered in its turn.
+    pub(crate) waiting: VecDeque<String>,
 }
 
 impl Service {
     /// Serves one request; breaks when it was the last.
     pub(crate) fn serve(&mut self, world: &mut ServedWorld, request: Request) -> ControlFlow<Result<(), Failure>> {
         match request {
-            Request::Line(line) => {
-                let Some(answer) = world.command(&line) else { return ControlFlow::Continue(()) };
-                if answer.quit {
-                    // What was stored is on the disk when the answer is read.
-                    let kept = self.finish(world);
-                    self.answers.say(&answer.json);
-                    return ControlFlow::Break(kept);
-                }
-                self.answers.say(&answer.json);
-            }
+            Request::Line(line) if world.is_running() => self.put_off(line),
+            Request::Line(line) => return self.obey(world, &line),
+            Request::RunIsOver => return self.after_a_run(world),
             Request::Registers(request) => world.serve_registers(request),
             Request::Keep => {
                 world.look_for_stores();
@@ -86,6 +88,41 @@ impl Service {
             Request::Stored => {}
             Request::Ended(signal) => return ControlFlow::Break(Err(Failure::ended_by(signal))),
             Request::BridgeLost(failure) => return ControlFlow::Break(Err(failure)),
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Answers a line.
+    fn obey(&mut self, world: &mut ServedWorld, line: &str) -> ControlFlow<Result<(), Failure>> {
+        let Commanded::Done(answer) = world.command(line) else { return ControlFlow::Continue(()) };
+        if !answer.quit {
+            self.answers.say(&answer.json);
+            return ControlFlow::Continue(());
+        }
+        // What was stored is on the disk when the answer is read.
+        let kept = self.finish(world);
+        self.answers.say(&answer.json);
+        ControlFlow::Break(kept)
+    }
+
+    /// A line that came during a run waits for its end.
+    fn put_off(&mut self, line: String) {
+        if self.waiting.len() < LINES_WAITING {
+            self.waiting.push_back(line);
+        } else {
+            self.answers.say(&sim::command::refused(&CommandError::TooMany { most: LINES_WAITING }));
+        }
+    }
+
+    /// Answers a run that is over, and the lines that waited for it, up to the next run.
+    fn after_a_run(&mut self, world: &mut ServedWorld) -> ControlFlow<Result<(), Failure>> {
+        if let Some(answer) = world.take_run() {
+            self.answers.say(&answer);
+        }
+        while !world.is_running()
+            && let Some(line) = self.waiting.pop_front()
+        {
+            self.obey(world, &line)?;
         }
         ControlFlow::Continue(())
     }

@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use can::{Bitrate, Frame, INTERFRAME_SPACE_BITS, Instant};
-use sim::command::{Answer, Service};
+use sim::command::{Answer, Before, Command, CommandError, Run, Service};
 use sim::events::Event;
 use sim::recorder::Recorder;
 use sim::wire::WireEvent;
@@ -19,6 +19,7 @@ use transport::{ClientId, Heard, LeaveReason, ModbusRequest, RealTimeWorld};
 use super::eeprom::EepromError;
 use super::keeper::Keeper;
 use super::lag::Lag;
+use super::pacer::Pacer;
 use super::registers;
 use super::speaker::Speaker;
 use super::stores::Stores;
@@ -37,16 +38,38 @@ pub(crate) struct ServedWorld {
     /// Frames carried since the last call of [`Self::take_carried`], for a log.
     carried: Option<Vec<(Instant, Frame)>>,
     stores: Option<Stores>,
+    pacer: Pacer,
+    /// The run that is under way where time is moved by hand.
+    run: Option<UnderWay>,
+    /// Tells that a run is over; false if that could not be taken, and is to be told again.
+    run_is_over: Box<dyn Fn() -> bool>,
     lag: Lag,
     frames_lost: u64,
     displaced: u64,
     speaker: Speaker,
 }
 
+/// A run that somebody has asked for.
+struct UnderWay {
+    before: Before,
+    end: Instant,
+    told: bool,
+}
+
+/// What becomes of a world command.
+pub(crate) enum Commanded {
+    /// Nothing is answered: a blank line or a comment.
+    Nothing,
+    /// It is done.
+    Done(Answer),
+    /// It has begun; [`ServedWorld::take_run`] has the answer when it is done.
+    Begun,
+}
+
 impl ServedWorld {
-    /// Adds the adapter to `world`. `logged` keeps carried frames for [`Self::take_carried`]; what is to be said of the
+    /// Adds the adapter to `world`, whose time passes as `pacer` says. `logged` keeps carried frames for [`Self::take_carried`]; what is to be said of the
     /// service goes to `speaker`.
-    pub(crate) fn new(mut world: World, logged: bool, speaker: Speaker) -> Self {
+    pub(crate) fn new(mut world: World, pacer: Pacer, logged: bool, speaker: Speaker) -> Self {
         let adapter = world.add_probe();
         Self {
             world,
@@ -57,6 +80,9 @@ impl ServedWorld {
             heard: VecDeque::new(),
             carried: logged.then(Vec::new),
             stores: None,
+            pacer,
+            run: None,
+            run_is_over: Box::new(|| true),
             lag: Lag::default(),
             frames_lost: 0,
             displaced: 0,
@@ -75,9 +101,43 @@ impl ServedWorld {
     }
 
     /// Does what a world command says.
-    pub(crate) fn command(&mut self, line: &str) -> Option<Answer> {
+    pub(crate) fn command(&mut self, line: &str) -> Commanded {
+        if let Ok(Command::Run(run)) = line.parse() {
+            return self.begin(run);
+        }
         let service = Service { behind: self.lag.now(), frames_lost: self.frames_lost };
-        sim::command::answer_served(&mut self.world, line, service)
+        sim::command::answer_served(&mut self.world, line, service).map_or(Commanded::Nothing, Commanded::Done)
+    }
+
+    /// Time begins to move, where that is done by hand.
+    fn begin(&mut self, run: Run) -> Commanded {
+        let refusal = match &self.run {
+            _ if !self.pacer.is_manual() => CommandError::NotManual,
+            Some(run) => CommandError::Running { until_s: run.end.as_nanos() as f64 / 1e9 },
+            None => {
+                let end = run.end(self.world.now());
+                self.run = Some(UnderWay { before: Before::of(&mut self.world), end, told: false });
+                self.pacer.run_to(end);
+                return Commanded::Begun;
+            }
+        };
+        Commanded::Done(Answer { json: sim::command::refused(&refusal), quit: false })
+    }
+
+    /// Calls `run_is_over` when there is something for [`take_run`](Self::take_run), until it returns true.
+    pub(crate) fn on_run_over(&mut self, run_is_over: impl Fn() -> bool + 'static) {
+        self.run_is_over = Box::new(run_is_over);
+    }
+
+    /// True while a run is under way.
+    pub(crate) fn is_running(&self) -> bool {
+        self.run.is_some()
+    }
+
+    /// The answer to a run that has come to its end.
+    pub(crate) fn take_run(&mut self) -> Option<String> {
+        let run = self.run.take_if(|run| run.end <= self.world.now())?;
+        Some(run.before.answer(&mut self.world))
     }
 
     /// Has a Modbus request answered.
@@ -192,6 +252,14 @@ impl RealTimeWorld for ServedWorld {
         self.world.now()
     }
 
+    fn target(&mut self, clock: Instant) -> Instant {
+        self.pacer.target(clock, self.world.now())
+    }
+
+    fn clock_at(&self, at: Instant) -> Option<Instant> {
+        self.pacer.clock_at(at)
+    }
+
     fn next_deadline(&self) -> Option<Instant> {
         let stores = self.stores.as_ref().and_then(|stores| stores.next_deadline(&self.world));
         [self.world.next_event(), self.next_offer(), stores].into_iter().flatten().min()
@@ -210,6 +278,9 @@ impl RealTimeWorld for ServedWorld {
         if let Some(stores) = &mut self.stores {
             stores.settle(&mut self.world);
         }
+        if let Some(run) = self.run.as_mut().filter(|run| !run.told && run.end <= instant) {
+            run.told = (self.run_is_over)();
+        }
     }
 
     fn inject(&mut self, client: ClientId, frame: &Frame) {
@@ -221,7 +292,12 @@ impl RealTimeWorld for ServedWorld {
         self.heard.pop_front()
     }
 
+    fn joined(&mut self, _: ClientId) {
+        self.pacer.joined();
+    }
+
     fn left(&mut self, client: ClientId, reason: LeaveReason) {
+        self.pacer.left();
         let given_up = self.turns.leave(client);
         self.give_up(given_up);
         if reason == LeaveReason::Displaced {
@@ -233,6 +309,7 @@ impl RealTimeWorld for ServedWorld {
     }
 
     fn set_lag(&mut self, lag: Duration) {
+        let lag = if self.pacer.follows_the_clock() { lag } else { Duration::ZERO };
         if let Some(text) = self.lag.update(lag) {
             self.speaker.say(&text);
         }

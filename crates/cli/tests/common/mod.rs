@@ -28,7 +28,7 @@ impl Ended {
     }
 }
 
-fn command(arguments: &[&str]) -> Command {
+pub(crate) fn command(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_ferrodrive"));
     command.args(arguments).env_remove("FERRODRIVE_BUS").env_remove("FERRODRIVE_MACHINE").env("NO_COLOR", "1");
     command
@@ -86,8 +86,10 @@ impl Simulator {
         Self::start_with(arguments, Stdio::piped(), false)
     }
 
+    /// Drives that take no time, unless the test is about that.
     fn start_with(arguments: &[&str], errors: Stdio, deaf: bool) -> Self {
-        let mut child = command(&[&["sim"], arguments].concat())
+        let timing: &[&str] = if arguments.contains(&"--timing") { &[] } else { &["--timing", "ideal"] };
+        let mut child = command(&[&["sim"], timing, arguments].concat())
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(errors)

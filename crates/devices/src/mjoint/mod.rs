@@ -20,6 +20,7 @@ use crate::axis::{AxisDescription, BitPattern, HomingRules, HomingStart, NewSetP
 use crate::description::{Description, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules, Write};
 use crate::faults::Faults;
 use crate::placement::Placement;
+use crate::timing::Timing;
 use crate::units::{CountsPerTurn, Quantity, Ramps, Scale, Units};
 use alarms::ALARMS;
 use assumptions::{COUNTS_PER_TURN, NO_RAMP_FROM};
@@ -53,6 +54,7 @@ const fn joint(name: &'static str, title: &'static str) -> Description {
         faults: Faults { code: Some(Mux::new(0x260E, 0)), bit_field: false, table: &ALARMS },
         nmt: NmtRules { start_state: NmtState::Operational, heartbeat_tells_alarm: true },
         pdo: PDO_RULES,
+        timing: Timing::GUESSED,
         stated_departures: &[],
         variations: VARIATIONS,
     }

@@ -14,6 +14,7 @@ use crate::axis::{AxisDescription, BitPattern, HomingRules, HomingStart, NewSetP
 use crate::description::{Description, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules};
 use crate::faults::Faults;
 use crate::placement::Placement;
+use crate::timing::Timing;
 use crate::units::{CountsPerTurn, Quantity, Ramps, Scale, Units};
 
 /// A CiA 402 servo as the standard has it.
@@ -35,6 +36,7 @@ pub static CIA402: Description = Description {
     faults: FAULTS,
     nmt: NmtRules::CIA_301,
     pdo: PdoRules { max_objects: 8, ..PdoRules::CIA_301 },
+    timing: Timing::GUESSED,
     stated_departures: &[],
     variations: variations::VARIATIONS,
 };

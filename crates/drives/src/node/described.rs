@@ -167,6 +167,7 @@ pub(crate) trait Described<S: Storage>: Application<S> {
     /// [`Station::handle_timeout`].
     fn take_timeout(&mut self, now: Instant) {
         self.base_mut().device.handle_timeout(now);
+        self.finish_reset(now);
         self.handle_events(now);
         let base = self.base_mut();
         if base.device.is_running() && base.services.handle_timeout(now) {

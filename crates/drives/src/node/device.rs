@@ -9,7 +9,7 @@ use devices::variant::Variant;
 
 use super::described::{Described, DescribedDevice, described_station};
 use super::{Memory, services};
-use crate::engine::device::{Application, Device};
+use crate::engine::device::{Application, Device, ResetTimes};
 
 const COMMUNICATION_PERIOD_NS: u64 = 1_000_000;
 
@@ -72,6 +72,11 @@ impl<S: Storage> DescribedNode<S> {
     pub fn power_on(&mut self, memory: Memory<S>, now: Instant) {
         self.base.power_on(memory);
         self.restart(now);
+    }
+
+    /// How long the next resets by NMT take.
+    pub const fn set_reset_times(&mut self, times: ResetTimes) {
+        self.base.device.set_reset_times(times);
     }
 
     /// Supply voltage is gone.

@@ -20,6 +20,7 @@ use super::motor::{CONTROL_PERIOD_NS, CONTROL_PERIOD_S, Motor, SUPERVISION_DIVID
 use super::protection::{Protection, bleeder_limits};
 use super::shaft::Shaft;
 use crate::engine::actuator::bleeder::{Bleeder, BleederLimits};
+use crate::engine::device::ResetTimes;
 use crate::engine::faults::FaultSet;
 use crate::node::described::DescribedDevice;
 use crate::{Firmware, Report};
@@ -169,6 +170,10 @@ impl<S: Storage> Firmware for ServoDrive<S> {
     fn power_off(&mut self, _now: Instant) {
         self.base.device.power_off();
         self.make_shafts();
+    }
+
+    fn set_reset_times(&mut self, times: ResetTimes) {
+        self.base.device.set_reset_times(times);
     }
 
     fn tick(&mut self, sensors: &Sensors, now: Instant) -> Actuation {

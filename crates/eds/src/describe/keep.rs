@@ -10,7 +10,7 @@ use canopen::od::{DefaultValue, Entry, FREE_PLACES, MAX_ROWS, RowFacts, Table, T
 use canopen::{Mux, NodeId};
 use cia402::ErrorCode;
 use devices::faults::Faults;
-use devices::{Description, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules, servo};
+use devices::{Description, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules, Timing, servo};
 
 use super::axis::axes;
 use super::names;
@@ -146,6 +146,7 @@ fn describe(eds: &Eds, manual: &str) -> Result<Description, Unkept> {
         faults: Faults { code: servo::FAULTS.code.filter(|_| has(0x603F, 0)), ..servo::FAULTS },
         nmt: NmtRules::CIA_301,
         pdo: pdo_rules(table.rows()),
+        timing: Timing::GUESSED,
         stated_departures: &[],
         variations: if axes.is_empty() { &[] } else { servo::variations::VARIATIONS },
     })

@@ -5,18 +5,24 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use super::{Command, CommandError, Service, to_json};
 use plant::FreeRun;
 
+use super::{Before, Command, CommandError, Service};
+use crate::json;
 use crate::stimulus::{FORMS, Place, Stimulus};
-use crate::{BodyState, Brake, OutputShaft, Report, StationId, World};
+use crate::{BodyState, Brake, OutputShaft, PowerPhase, Report, StationId, World};
 
 /// Does what `command` says; returns the line of JSON that answers it.
 pub(super) fn answer(world: &mut World, command: &Command, service: Service) -> Result<String, CommandError> {
     match command {
         Command::Now => Ok(now(world, service)),
-        Command::Help => Ok(to_json(&Help { ok: true, help: FORMS })),
+        Command::Help => Ok(json::line(&Help { ok: true, help: FORMS })),
         Command::Quit => Ok(done(world)),
+        Command::Run(run) => {
+            let before = Before::of(world);
+            world.run_until(run.end(world.now()));
+            Ok(before.answer(world))
+        }
         Command::Get(place) => get(world, *place, service),
         Command::Disturb(fault) => {
             world.disturb(*fault);
@@ -30,8 +36,11 @@ pub(super) fn answer(world: &mut World, command: &Command, service: Service) -> 
         Command::Apply(place, stimulus) => {
             let applied = world.apply(*place, stimulus).map_err(|_| no_such_drive(world, place.node))?;
             applied?;
+            if let Stimulus::Power(_) = stimulus {
+                return Ok(switched(world, place.node));
+            }
             let note = if is_load(stimulus) { outlook(world, *place) } else { None };
-            Ok(to_json(&Done { ok: true, t: seconds(world), note }))
+            Ok(json::line(&Done { ok: true, t: seconds(world), note }))
         }
     }
 }
@@ -58,7 +67,7 @@ struct GotBody {
 
 fn body(world: &mut World, name: &str) -> Result<String, CommandError> {
     let body = world.body(name).ok_or_else(|| no_such_body(world, name))?;
-    Ok(to_json(&GotBody { ok: true, t: seconds(world), body }))
+    Ok(json::line(&GotBody { ok: true, t: seconds(world), body }))
 }
 
 #[derive(Serialize)]
@@ -71,7 +80,20 @@ struct Done {
 }
 
 fn done(world: &World) -> String {
-    to_json(&Done { ok: true, t: seconds(world), note: None })
+    json::line(&Done { ok: true, t: seconds(world), note: None })
+}
+
+/// The answer to a switch of the supply: what the drive makes of it now. A bus drains for a while after it.
+#[derive(Serialize)]
+struct Switched {
+    ok: bool,
+    t: f64,
+    power: &'static str,
+}
+
+fn switched(world: &mut World, node: u8) -> String {
+    let power = world.report(node).map_or(PowerPhase::Off, |report| report.power).word();
+    json::line(&Switched { ok: true, t: seconds(world), power })
 }
 
 const fn is_load(stimulus: &Stimulus) -> bool {
@@ -108,7 +130,7 @@ struct Now {
 
 fn now(world: &World, service: Service) -> String {
     let Service { behind, frames_lost } = service;
-    to_json(&Now { ok: true, t: seconds(world), behind_ms: millis(behind), frames_lost })
+    json::line(&Now { ok: true, t: seconds(world), behind_ms: millis(behind), frames_lost })
 }
 
 /// Whole milliseconds.
@@ -130,6 +152,7 @@ struct Got<'a> {
     node: u8,
     model: &'a str,
     powered: bool,
+    power: &'a str,
     position: i64,
     #[serde(skip_serializing_if = "Option::is_none")]
     rotor_position: Option<i64>,
@@ -186,12 +209,13 @@ fn get(world: &mut World, place: Place, service: Service) -> Result<String, Comm
     let (model, bitrate, report) = measured.map_err(|_| no_such_drive(world, place.node))??;
     let Report { node, powered, position, velocity_rpm, current_a, supply_v, .. } = report;
     let counters = world.counters(id);
-    Ok(to_json(&Got {
+    Ok(json::line(&Got {
         ok: true,
         t: seconds(world),
         node,
         model,
         powered,
+        power: report.power.word(),
         position,
         rotor_position: report.rotor_position,
         velocity_rpm,
@@ -208,7 +232,7 @@ fn get(world: &mut World, place: Place, service: Service) -> Result<String, Comm
         error_code: report.error_code,
         shaft_angle_rad: report.shaft_angle_rad,
         bitrate: bitrate.map(can::Bitrate::bits_per_second),
-        bus: bus_text(world, id, powered),
+        bus: bus_text(world, id, bitrate.is_some()),
         tec: counters.tec(),
         rec: counters.rec(),
         behind_ms: millis(service.behind),
@@ -223,8 +247,8 @@ fn brake_text(brake: Option<Brake>) -> &'static str {
     }
 }
 
-fn bus_text(world: &World, id: StationId, powered: bool) -> &'static str {
-    if !powered {
+fn bus_text(world: &World, id: StationId, takes_part: bool) -> &'static str {
+    if !takes_part {
         return "off";
     }
     if world.is_cut(id) {

@@ -55,12 +55,49 @@ fn understands_every_line_of_the_manual_page() {
 }
 
 #[test]
+fn understands_times_of_every_unit() {
+    use can::Instant;
+    let ms = Duration::from_millis;
+    for (line, run) in [
+        ("run 20ms", Run::For(ms(20))),
+        ("run 20 ms", Run::For(ms(20))),
+        ("run 2.5s", Run::For(ms(2500))),
+        ("run 1min", Run::For(ms(60_000))),
+        ("run 100us", Run::For(Duration::from_micros(100))),
+        ("run 1ns", Run::For(Duration::from_nanos(1))),
+        ("run 0s", Run::For(Duration::ZERO)),
+        ("run until 2.5s", Run::Until(Instant::from_millis(2500))),
+    ] {
+        assert_eq!(line.parse(), Ok(Command::Run(run)), "{line}");
+    }
+    assert_eq!(Run::Until(Instant::from_secs(1)).end(Instant::from_secs(2)), Instant::from_secs(2));
+    for line in [
+        "run",
+        "run until",
+        "run 20",
+        "run -1s",
+        "run nans",
+        "run infs",
+        "run 1e9s",
+        "run ms",
+        "run until dawn",
+        "run 1 h",
+    ] {
+        let error = line.parse::<Command>().expect_err(line).to_string();
+        assert!(error.contains("run 20ms"), "{line}: {error}");
+    }
+}
+
+#[test]
 fn says_what_it_expected_of_a_malformed_line() {
     for (line, error) in [
-        ("", "unknown command \"\"; expected now, help, quit, bus, body, or a node number and a command, as in: 4 get"),
+        (
+            "",
+            "unknown command \"\"; expected now, help, run, quit, bus, body, or a node number and a command, as in: 4 get",
+        ),
         (
             "hello",
-            "unknown command \"hello\"; expected now, help, quit, bus, body, or a node number and a command, as in: 4 get",
+            "unknown command \"hello\"; expected now, help, run, quit, bus, body, or a node number and a command, as in: 4 get",
         ),
         ("now 4", "expected: now"),
         ("quit now", "expected: quit"),

@@ -5,7 +5,7 @@ use std::fmt;
 use cia402::ModeOfOperation;
 use devices::faults::FaultRow;
 
-use super::{Event, EventKind, PowerPhase};
+use super::{Event, EventKind};
 use crate::wire::{ErrorCause, ErrorState};
 
 /// `node 4: fault 0001h, over-voltage`: what happened, without time and remedy.
@@ -67,23 +67,6 @@ impl fmt::Display for Named {
 
 fn mode_name(mode: ModeOfOperation) -> String {
     mode.name().map_or_else(|| mode.0.to_string(), str::to_owned)
-}
-
-impl PowerPhase {
-    /// The word for it: `on`.
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::On => "on",
-            Self::Off => "off",
-        }
-    }
-
-    const fn sentence(self) -> &'static str {
-        match self {
-            Self::On => "power is there, the firmware starts",
-            Self::Off => "the bus has drained, the firmware is dead",
-        }
-    }
 }
 
 impl ErrorState {

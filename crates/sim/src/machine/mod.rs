@@ -7,6 +7,7 @@
 
 mod assembly;
 mod boxed;
+mod chip;
 mod kept;
 mod load;
 mod mjoint;
@@ -18,11 +19,12 @@ mod realism;
 mod registry;
 mod servo;
 mod switch;
+mod timing;
 mod zlac8030l;
 mod zlim42c;
 
 use can::{Bitrate, Frame, Instant, Station};
-use devices::{AxisId, Description};
+use devices::{AxisId, Description, Timing};
 use drives::{Firmware, RegisterError};
 use plant::FreeRun;
 use plant::shaft::{Motion, Push};
@@ -36,13 +38,15 @@ pub use quantity::Quantity;
 pub use realism::{Noise, Realism};
 pub use registry::{is_built_in, models, order};
 pub use servo::{ServoBench, ServoMachine, servo, without_effect};
+pub use timing::TimingMode;
 pub use zlac8030l::{HubWheel, Zlac8030lMachine, zlac8030l};
 pub use zlim42c::{Stepper, Zlim42c82Machine, Zlim42cMachine, zlim42c, zlim42c_82};
 
 use crate::mechanics::Mechanics;
 use crate::stimulus::{Power, Stimulus, SwitchRange};
-use crate::{Refused, Report, VirtualDrive};
+use crate::{PowerPhase, Refused, Report, VirtualDrive};
 use switch::{Inputs, stretch};
+use timing::OwnTime;
 
 /// How often a drive without enough voltage to run looks whether it has come.
 const WAKE_PERIOD_NS: u64 = 1_000_000;
@@ -50,6 +54,9 @@ const WAKE_PERIOD_NS: u64 = 1_000_000;
 /// How long a supply that is to come back waits for the bus to drain. A motor that is driven from outside feeds the bus
 /// for ever: then it is shorted.
 const DRAIN_PATIENCE_NS: u64 = 10_000_000_000;
+
+/// The identifier of NMT commands (CiA 301, 7.3.5).
+const NMT: u16 = 0;
 
 const RPM_PER_RAD_S: f64 = 30.0 / core::f64::consts::PI;
 
@@ -62,10 +69,23 @@ pub struct Machine<A: Assembly> {
     inputs: Inputs,
     noise: Option<Noise>,
     supply: Supply,
-    running: bool,
+    life: Life,
+    /// What it takes between bus and firmware; none if it takes no time.
+    own_time: Option<OwnTime>,
     /// Its control periods are run by the machine that it is coupled to.
     coupled: bool,
     next_tick: Instant,
+}
+
+/// What the drive's converter has made of the supply.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Life {
+    /// Too little voltage.
+    Dead,
+    /// There is voltage; the firmware starts then.
+    Booting(Instant),
+    /// The firmware runs.
+    Running,
 }
 
 /// The switch between the supply and the drive.
@@ -87,7 +107,8 @@ impl<A: Assembly> Machine<A> {
             inputs: Inputs::default(),
             noise: None,
             supply: Supply::Off,
-            running: false,
+            life: Life::Dead,
+            own_time: None,
             coupled: false,
             next_tick: Instant::ZERO,
         }
@@ -112,7 +133,7 @@ impl<A: Assembly> Machine<A> {
     /// One control period that begins at `at`.
     fn tick(&mut self, at: Instant) {
         self.watch_supply(at);
-        if self.running {
+        if self.life == Life::Running {
             let levels = self.inputs.levels(|axis| self.assembly.shaft_counts(axis));
             let mut sensors = self.assembly.sense(levels);
             if let Some(noise) = &mut self.noise {
@@ -126,13 +147,19 @@ impl<A: Assembly> Machine<A> {
         }
     }
 
-    /// Starts the firmware when its voltage comes and stops it when it goes. It lives on whatever charges the bus, but is
+    /// Starts the drive when its voltage comes and stops it when it goes. It lives on whatever charges the bus, but is
     /// started by the supply alone.
     #[inline]
     fn watch_supply(&mut self, at: Instant) {
-        let supplied = self.assembly.supplies_firmware(self.running) && (self.running || self.supply == Supply::On);
-        if supplied != self.running {
-            self.set_running(supplied, at);
+        let lives = self.life != Life::Dead;
+        let supplied = self.assembly.supplies_firmware(lives) && (lives || self.supply == Supply::On);
+        if supplied != lives {
+            if supplied { self.wake(at) } else { self.die(at) }
+        }
+        if let Life::Booting(due) = self.life
+            && due <= at
+        {
+            self.start(at);
         }
         if let Supply::Cycling(patience) = self.supply {
             self.finish_cycle(patience, at);
@@ -142,10 +169,11 @@ impl<A: Assembly> Machine<A> {
     /// Switches on again once the drive has died.
     #[cold]
     fn finish_cycle(&mut self, patience: Instant, at: Instant) {
-        if self.running && at < patience {
+        let lives = self.life != Life::Dead;
+        if lives && at < patience {
             return;
         }
-        if self.running {
+        if lives {
             self.cut_source(at);
         }
         self.switch_on(at);
@@ -165,22 +193,86 @@ impl<A: Assembly> Machine<A> {
         self.watch_supply(at);
     }
 
-    fn set_running(&mut self, running: bool, now: Instant) {
-        self.running = running;
-        self.assembly.set_supplied(running);
-        if running {
-            let hardware = self.assembly.hardware();
-            self.firmware.power_on(&hardware, now);
-        } else {
-            self.firmware.power_off(now);
-            self.assembly.keep_image(self.firmware.eeprom().0);
-            self.actuation = Default::default();
+    /// There is voltage: the firmware follows, at once or when it has booted.
+    fn wake(&mut self, at: Instant) {
+        self.assembly.set_supplied(true);
+        let boot_ns = self.own_time.as_mut().map_or(0, OwnTime::boot_ns);
+        self.life = Life::Booting(at.plus_nanos(boot_ns));
+    }
+
+    fn start(&mut self, at: Instant) {
+        self.life = Life::Running;
+        let hardware = self.assembly.hardware();
+        self.firmware.power_on(&hardware, at);
+        // What a store that was cut short has counted is over.
+        self.note_store(at);
+    }
+
+    fn die(&mut self, at: Instant) {
+        let ran = self.life == Life::Running;
+        self.life = Life::Dead;
+        self.assembly.set_supplied(false);
+        if !ran {
+            return;
+        }
+        let before = self.firmware.eeprom().1;
+        self.firmware.power_off(at);
+        let (image, generation) = self.firmware.eeprom();
+        match &mut self.own_time {
+            None => self.assembly.keep_image(image),
+            Some(own_time) => {
+                own_time.power_off();
+                own_time.chip.advance(at);
+                // With the last of its voltage a firmware may still store.
+                let last = (generation != before).then_some(image);
+                own_time.chip.power_off(last, u64::from(generation));
+                self.assembly.keep_image(own_time.chip.contents());
+            }
+        }
+        self.actuation = Default::default();
+    }
+
+    /// The firmware may have stored something.
+    #[inline]
+    fn note_store(&mut self, now: Instant) {
+        if let Some(own_time) = &mut self.own_time {
+            own_time.chip.advance(now);
+            let (image, generation) = self.firmware.eeprom();
+            own_time.store(image, u64::from(generation), now);
+        }
+    }
+
+    /// Hands a frame to the firmware.
+    fn hand_over(&mut self, frame: &Frame, now: Instant) {
+        if let Some(own_time) = self.own_time.as_mut().filter(|_| frame.standard_data_id() == Some(NMT)) {
+            self.firmware.set_reset_times(own_time.reset_times());
+        }
+        self.firmware.handle_frame(frame, now);
+    }
+
+    /// Hands over the frames whose time has come.
+    #[inline]
+    fn serve_mailboxes(&mut self, now: Instant) {
+        while let Some(frame) = self.own_time.as_mut().and_then(|own_time| own_time.take_out(now)) {
+            self.hand_over(&frame, now);
+        }
+    }
+
+    /// What the drive makes of its supply, for people.
+    fn phase(&self) -> PowerPhase {
+        let runs = self.life == Life::Running && self.firmware.report(AxisId::FIRST).powered;
+        match (self.supply, self.life) {
+            (Supply::Cycling(_), _) => PowerPhase::Cycling,
+            (_, Life::Dead) => PowerPhase::Off,
+            (Supply::Off, _) => PowerPhase::Draining,
+            _ if runs => PowerPhase::On,
+            _ => PowerPhase::Booting,
         }
     }
 
     fn switch_supply(&mut self, power: Power, now: Instant) {
         match power {
-            Power::On if self.running && self.supply != Supply::On => {
+            Power::On if self.life != Life::Dead && self.supply != Supply::On => {
                 self.supply = Supply::Cycling(now.plus_nanos(DRAIN_PATIENCE_NS));
             }
             Power::On => self.switch_on(now),
@@ -198,6 +290,11 @@ impl<A: Assembly> Machine<A> {
         }
     }
 
+    /// The store that an SDO answer given now stands for: the last one, or the one that is due.
+    fn store_needed(&self) -> u64 {
+        u64::from(self.firmware.eeprom().1) + u64::from(self.firmware.is_storing())
+    }
+
     fn tie_switch(&mut self, axis: AxisId, input: usize, range: SwitchRange) {
         let shaft = self.assembly.shaft_counts(axis);
         let scale = self.assembly.shaft_counts_per_count(&self.firmware, axis);
@@ -209,35 +306,59 @@ impl<A: Assembly> Machine<A> {
 
 impl<A: Assembly> Station for Machine<A> {
     fn ignores(&self, frame: &Frame) -> bool {
-        !self.running || self.firmware.ignores(frame)
+        self.life != Life::Running || self.firmware.ignores(frame)
     }
 
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
         self.advance(now);
-        if self.running {
-            self.firmware.handle_frame(frame, now);
+        if self.life != Life::Running {
+            return;
+        }
+        let frame = match &mut self.own_time {
+            None => Some(*frame),
+            Some(own_time) => own_time.take_in(frame, now),
+        };
+        if let Some(frame) = frame {
+            self.hand_over(&frame, now);
+            self.note_store(now);
         }
     }
 
     fn handle_timeout(&mut self, now: Instant) {
         self.advance(now);
-        if self.running {
+        if self.life == Life::Running {
+            self.serve_mailboxes(now);
             self.firmware.handle_timeout(now);
+            self.note_store(now);
         }
     }
 
     fn poll_transmit(&mut self) -> Option<Frame> {
-        if self.running { self.firmware.poll_transmit() } else { None }
+        if self.life != Life::Running {
+            return None;
+        }
+        if self.own_time.is_none() {
+            return self.firmware.poll_transmit();
+        }
+        let needed = self.store_needed();
+        self.own_time.as_mut()?.chip.next_frame(needed, || self.firmware.poll_transmit())
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        match (self.running, self.supply) {
-            (true, Supply::On) => self.firmware.poll_timeout(),
-            (false, Supply::Off) => None,
+        let own = self.own_time.as_ref().and_then(OwnTime::next_due);
+        let firmware = || self.firmware.poll_timeout().into_iter().chain(own).min();
+        match (self.life, self.supply) {
+            (Life::Running, Supply::On) => firmware(),
+            (Life::Dead, Supply::Off) => None,
             // Its life or its supply may change without a frame or a deadline of its own.
-            _ => {
+            (life, _) => {
                 let look = self.next_tick.plus_nanos(WAKE_PERIOD_NS);
-                self.firmware.poll_timeout().filter(|due| self.running && *due < look).or(Some(look))
+                let sooner = match life {
+                    Life::Dead => None,
+                    Life::Booting(due) => Some(due),
+                    Life::Running => firmware(),
+                };
+                Some(sooner.map_or(look, |sooner| sooner.min(look)))
             }
         }
     }
@@ -249,7 +370,7 @@ impl<A: Assembly> Station for Machine<A> {
 
     fn handle_bus_off(&mut self, off: bool, now: Instant) {
         self.advance(now);
-        if self.running {
+        if self.life == Life::Running {
             self.firmware.handle_bus_off(off, now);
         }
     }
@@ -320,6 +441,14 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
         Ok(())
     }
 
+    fn set_timing(&mut self, mode: TimingMode, seed: u64, now: Instant) {
+        self.advance(now);
+        let (image, generation) = (self.nvm_image(), self.nvm_generation());
+        let timing = A::description(&self.firmware, &self.assembly).map_or(Timing::GUESSED, |model| model.timing);
+        self.own_time = (mode == TimingMode::Device).then(|| OwnTime::new(timing, seed, &image, generation));
+        self.firmware.set_reset_times(self.own_time.as_mut().map(OwnTime::reset_times).unwrap_or_default());
+    }
+
     fn set_realism(&mut self, realism: Realism, seed: u64, now: Instant) {
         self.advance(now);
         self.noise = (realism == Realism::Full).then(|| Noise::new(seed));
@@ -327,7 +456,8 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
     }
 
     fn bitrate(&self) -> Option<Bitrate> {
-        self.running.then(|| self.firmware.report(AxisId::FIRST).bitrate)
+        let own = (self.life == Life::Running).then(|| self.firmware.report(AxisId::FIRST));
+        own.filter(|own| own.powered).map(|own| own.bitrate)
     }
 
     fn advance(&mut self, now: Instant) {
@@ -348,10 +478,10 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
         let direction = if self.assembly.counts_reversed(&self.firmware, axis) { -1.0 } else { 1.0 };
         let common = Report {
             node: own.node_id.raw(),
-            powered: self.running,
-            nmt: self.running.then_some(own.nmt),
-            state: self.running.then_some(own.state),
-            mode: self.running.then_some(own.mode),
+            powered: self.life == Life::Running,
+            nmt: (self.life == Life::Running).then_some(own.nmt),
+            state: (self.life == Life::Running).then_some(own.state),
+            mode: (self.life == Life::Running).then_some(own.mode),
             error_code: u32::from(own.fault_code),
             position: i64::from(own.position_counts),
             velocity_rpm: direction * shaft.velocity_rad_s * RPM_PER_RAD_S,
@@ -362,7 +492,11 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
             shaft_angle_rad: shaft.angle.as_rad(),
             ..Report::default()
         };
-        self.assembly.report(&self.firmware, axis, common)
+        let report = self.assembly.report(&self.firmware, axis, common);
+        let power = self.phase();
+        // Before the firmware has booted it is what CiA 402 calls NOT READY TO SWITCH ON.
+        let statusword = if power == PowerPhase::Booting { Some(0) } else { report.statusword };
+        Report { power, powered: self.life != Life::Dead, statusword, ..report }
     }
 
     fn mechanics(&mut self) -> Option<&mut dyn Mechanics> {
@@ -392,7 +526,7 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
     }
 
     fn modbus_unit(&self) -> Option<u8> {
-        if self.running { A::modbus_unit(&self.firmware) } else { None }
+        if self.life == Life::Running { A::modbus_unit(&self.firmware) } else { None }
     }
 
     fn read_registers(&mut self, address: u16, words: &mut [u16], now: Instant) -> Result<(), RegisterError> {
@@ -402,19 +536,26 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
 
     fn write_registers(&mut self, address: u16, words: &[u16], now: Instant) -> Result<(), RegisterError> {
         self.advance(now);
-        A::write_registers(&mut self.firmware, address, words)
+        let written = A::write_registers(&mut self.firmware, address, words);
+        self.note_store(now);
+        written
     }
 
     fn nvm_generation(&self) -> u64 {
-        u64::from(self.firmware.eeprom().1)
+        let own = u64::from(self.firmware.eeprom().1);
+        self.own_time.as_ref().map_or(own, |own_time| own_time.chip.generation())
     }
 
     fn is_storing(&self) -> bool {
-        self.firmware.is_storing()
+        self.firmware.is_storing() || self.own_time.as_ref().is_some_and(|own_time| own_time.chip.is_writing())
     }
 
     fn nvm_image(&self) -> Vec<u8> {
-        if self.running { self.firmware.eeprom().0.to_vec() } else { self.assembly.image().to_vec() }
+        match &self.own_time {
+            Some(own_time) => own_time.chip.contents().to_vec(),
+            None if self.life == Life::Running => self.firmware.eeprom().0.to_vec(),
+            None => self.assembly.image().to_vec(),
+        }
     }
 
     fn load_nvm(&mut self, image: &[u8]) -> Result<(), Refused> {
@@ -422,6 +563,9 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
             return Err(Refused::BadImage { model: self.assembly.model(), reason: "it has another length" });
         }
         self.assembly.keep_image(image);
+        if let Some(own_time) = &mut self.own_time {
+            own_time.chip.replace(image);
+        }
         Ok(())
     }
 }

@@ -6,11 +6,13 @@ use canopen::od::{DataType, Entry, Kind, Value};
 use devices::{AxisId, Description};
 use drives::node::{DescribedNode, Memory, conditions};
 
+use super::NMT;
 use super::boxed::Boxed;
 use super::kept;
 use super::order::{self, Order, OrderError};
+use super::timing::{OwnTime, TimingMode};
 use crate::stimulus::{ObjectValue, Power, Stimulus};
-use crate::{Refused, Report, Source, VirtualDrive};
+use crate::{PowerPhase, Refused, Report, Source, VirtualDrive};
 
 /// Supply that such devices have. Assumed: the 24 V of control cabinets.
 const SUPPLY_V: f64 = 24.0;
@@ -20,13 +22,26 @@ const SUPPLY_V: f64 = 24.0;
 pub struct NodeMachine {
     firmware: DescribedNode<Boxed>,
     memory: Memory<Boxed>,
+    supply: Supply,
+    /// What it takes between bus and firmware; none if it takes no time.
+    own_time: Option<OwnTime>,
+}
+
+/// The switch in front of it. There is no capacitor that would let it live on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Supply {
+    Off,
+    /// The firmware starts then.
+    Booting(Instant),
+    On,
 }
 
 /// A node of this description as ordered, without power.
 pub(super) fn ordered(model: &'static Description, order: &Order) -> Result<Box<dyn VirtualDrive>, OrderError> {
     let memory = order::memory(model, order)?;
     let profile = kept::profile(model, conditions(model.dictionary));
-    Ok(Box::new(NodeMachine { firmware: DescribedNode::new(model, profile, order.node, order.bitrate), memory }))
+    let firmware = DescribedNode::new(model, profile, order.node, order.bitrate);
+    Ok(Box::new(NodeMachine { firmware, memory, supply: Supply::Off, own_time: None }))
 }
 
 impl NodeMachine {
@@ -36,12 +51,54 @@ impl NodeMachine {
     }
 
     fn switch(&mut self, on: bool, now: Instant) {
-        if self.firmware.is_running() {
-            self.memory = self.firmware.memory().0.clone();
+        if self.supply == Supply::On {
+            let (memory, generation) = self.firmware.memory();
+            self.memory = memory.clone();
+            if let Some(own_time) = &mut self.own_time {
+                own_time.power_off();
+                own_time.chip.advance(now);
+                own_time.chip.power_off(None, u64::from(generation));
+                self.memory = Memory::from_bytes(self.firmware.description().dictionary, own_time.chip.contents());
+            }
             self.firmware.power_off();
         }
+        self.supply = Supply::Off;
         if on {
+            let boot_ns = self.own_time.as_mut().map_or(0, OwnTime::boot_ns);
+            self.supply = Supply::Booting(now.plus_nanos(boot_ns));
+            self.boot_if_due(now);
+        }
+    }
+
+    fn boot_if_due(&mut self, now: Instant) {
+        if let Supply::Booting(due) = self.supply
+            && due <= now
+        {
+            self.supply = Supply::On;
             self.firmware.power_on(self.memory.clone(), now);
+        }
+    }
+
+    fn hand_over(&mut self, frame: &Frame, now: Instant) {
+        if let Some(own_time) = self.own_time.as_mut().filter(|_| frame.standard_data_id() == Some(NMT)) {
+            self.firmware.set_reset_times(own_time.reset_times());
+        }
+        self.firmware.handle_frame(frame, now);
+    }
+
+    fn note_store(&mut self, now: Instant) {
+        if let Some(own_time) = &mut self.own_time {
+            own_time.chip.advance(now);
+            let (memory, generation) = self.firmware.memory();
+            own_time.store(memory.bytes(), u64::from(generation), now);
+        }
+    }
+
+    fn phase(&self) -> PowerPhase {
+        match self.supply {
+            Supply::Off => PowerPhase::Off,
+            Supply::On if self.firmware.is_running() => PowerPhase::On,
+            Supply::On | Supply::Booting(_) => PowerPhase::Booting,
         }
     }
 
@@ -50,7 +107,7 @@ impl NodeMachine {
         let bad = |reason: String| Refused::BadObject { object, reason };
         let slot = self.firmware.find(object).ok_or_else(|| bad("the device has no such object".to_owned()))?;
         if !self.firmware.is_running() {
-            return Err(bad("the device has no power".to_owned()));
+            return Err(bad("the device has no power, or has not booted".to_owned()));
         }
         let row = self.firmware.values().table().row(slot);
         let bytes = bytes(row, value).map_err(bad)?;
@@ -109,19 +166,40 @@ impl Station for NodeMachine {
     }
 
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
-        self.firmware.handle_frame(frame, now);
+        let frame = match &mut self.own_time {
+            _ if self.supply != Supply::On => None,
+            None => Some(*frame),
+            Some(own_time) => own_time.take_in(frame, now),
+        };
+        if let Some(frame) = frame {
+            self.hand_over(&frame, now);
+            self.note_store(now);
+        }
     }
 
     fn handle_timeout(&mut self, now: Instant) {
+        self.boot_if_due(now);
+        while let Some(frame) = self.own_time.as_mut().and_then(|own_time| own_time.take_out(now)) {
+            self.hand_over(&frame, now);
+        }
         self.firmware.handle_timeout(now);
+        self.note_store(now);
     }
 
     fn poll_transmit(&mut self) -> Option<Frame> {
-        self.firmware.poll_transmit()
+        let needed = u64::from(self.firmware.memory().1);
+        match &mut self.own_time {
+            None => self.firmware.poll_transmit(),
+            Some(own_time) => own_time.chip.next_frame(needed, || self.firmware.poll_transmit()),
+        }
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        self.firmware.poll_timeout()
+        if let Supply::Booting(due) = self.supply {
+            return Some(due);
+        }
+        let own = self.own_time.as_ref().and_then(OwnTime::next_due);
+        self.firmware.poll_timeout().into_iter().chain(own).min()
     }
 
     fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
@@ -168,6 +246,13 @@ impl VirtualDrive for NodeMachine {
         Ok(())
     }
 
+    fn set_timing(&mut self, mode: TimingMode, seed: u64, _now: Instant) {
+        let (image, generation) = (self.nvm_image(), self.nvm_generation());
+        let timing = self.firmware.description().timing;
+        self.own_time = (mode == TimingMode::Device).then(|| OwnTime::new(timing, seed, &image, generation));
+        self.firmware.set_reset_times(self.own_time.as_mut().map(OwnTime::reset_times).unwrap_or_default());
+    }
+
     fn bitrate(&self) -> Option<Bitrate> {
         self.firmware.is_running().then(|| self.firmware.bitrate())
     }
@@ -175,10 +260,11 @@ impl VirtualDrive for NodeMachine {
     fn advance(&mut self, _now: Instant) {}
 
     fn report(&self) -> Report {
-        let powered = self.firmware.is_running();
+        let powered = self.supply != Supply::Off;
         let supply_v = if powered { SUPPLY_V } else { 0.0 };
-        let nmt = powered.then(|| self.firmware.nmt_state());
-        Report { node: self.firmware.node_id().raw(), powered, nmt, supply_v, ..Report::default() }
+        let nmt = self.firmware.is_running().then(|| self.firmware.nmt_state());
+        let node = self.firmware.node_id().raw();
+        Report { node, powered, power: self.phase(), nmt, supply_v, ..Report::default() }
     }
 
     fn inputs(&self) -> &'static [&'static str] {
@@ -186,12 +272,20 @@ impl VirtualDrive for NodeMachine {
     }
 
     fn nvm_generation(&self) -> u64 {
-        u64::from(self.firmware.memory().1)
+        let own = u64::from(self.firmware.memory().1);
+        self.own_time.as_ref().map_or(own, |own_time| own_time.chip.generation())
+    }
+
+    fn is_storing(&self) -> bool {
+        self.own_time.as_ref().is_some_and(|own_time| own_time.chip.is_writing())
     }
 
     fn nvm_image(&self) -> Vec<u8> {
-        let memory = if self.firmware.is_running() { self.firmware.memory().0 } else { &self.memory };
-        memory.bytes().to_vec()
+        match &self.own_time {
+            Some(own_time) => own_time.chip.contents().to_vec(),
+            None if self.supply == Supply::On => self.firmware.memory().0.bytes().to_vec(),
+            None => self.memory.bytes().to_vec(),
+        }
     }
 
     fn load_nvm(&mut self, image: &[u8]) -> Result<(), Refused> {
@@ -200,6 +294,9 @@ impl VirtualDrive for NodeMachine {
             return Err(Refused::BadImage { model, reason: "it has another length" });
         }
         self.memory = Memory::from_bytes(self.firmware.description().dictionary, image);
+        if let Some(own_time) = &mut self.own_time {
+            own_time.chip.replace(image);
+        }
         Ok(())
     }
 }

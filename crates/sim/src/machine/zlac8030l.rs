@@ -4,10 +4,9 @@
 //! Figures of the motor are those of `plant`; what is assumed of the surroundings is a constant below.
 
 use canopen::Mux;
-use devices::AxisId;
-use devices::Description;
 use devices::variant::Variant;
 use devices::zltech::ZLAC8030L;
+use devices::{AxisId, Description};
 use drives::engine::storage::StoredImage;
 use drives::zlac8030l::assumptions::REFERENCE_V;
 use drives::zlac8030l::hardware::{Actuation, Hardware, PowerStage, Sensors};

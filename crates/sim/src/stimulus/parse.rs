@@ -57,6 +57,8 @@ const DUTY: &str = "NODE duty PERCENT";
 const CLOCK: &str = "NODE clock HZ";
 const CABLE: &str = "NODE cable cut|join";
 const SET: &str = "NODE set OBJECT VALUE";
+/// The form of the line that moves time.
+pub const RUN: &str = "run 20ms, or run until 2.5s (ns, us, ms, s, min)";
 /// The form of the question that every node answers.
 pub const GET: &str = "NODE get";
 
@@ -96,6 +98,7 @@ pub const FORMS: &[&str] = &[
     body::FORMS[3],
     body::FORMS[4],
     bus_fault::WIRE,
+    RUN,
     "now",
     "help",
     "quit",

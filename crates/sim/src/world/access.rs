@@ -9,7 +9,7 @@ use crate::machine::Realism;
 use crate::recorder::Recorder;
 use crate::stimulus::{Place, Stimulus, WireFault};
 use crate::wire::{ControllerOptions, ErrorCounters, Statistics};
-use crate::{Prng, Refused, Report, VirtualDrive};
+use crate::{Refused, Report, VirtualDrive};
 
 impl World {
     /// Operates the drive added under `number`: inputs, loads, faults, power.
@@ -88,7 +88,7 @@ impl World {
 
     /// Makes the drive added under `number` as it is calculated, or as one on a bench. The world's seed decides its noise.
     pub fn set_realism(&mut self, number: u8, realism: Realism) -> Result<(), WorldError> {
-        let seed = Prng::new(self.seed ^ u64::from(number) << 32).next_u64();
+        let seed = self.seed_of(number, 0);
         self.with_drive(number, |drive, now| drive.set_realism(realism, seed, now))
     }
 

@@ -241,9 +241,10 @@ impl Subject<'_> {
     }
 
     fn condition(self, axis: AxisId) -> Condition {
-        let Report { powered, nmt, state, mode, error_code, statusword, damage, .. } = self.drive.report_of(axis);
+        let Report { powered, power, nmt, state, mode, error_code, statusword, damage, .. } =
+            self.drive.report_of(axis);
         Condition {
-            power: if powered { PowerPhase::On } else { PowerPhase::Off },
+            power,
             nmt,
             state,
             mode,

@@ -7,7 +7,7 @@ use std::time::Duration;
 use can::{Bitrate, CanId, Frame, Instant, Station};
 use sim::stimulus::{Component, Power, Source, Stimulus, TemperatureSensor};
 use sim::wire::{ErrorCause, ErrorState, WireEvent};
-use sim::{AxisId, Brake, Levels, Refused, Report, StationId, VirtualDrive, World};
+use sim::{AxisId, Brake, Levels, PowerPhase, Refused, Report, StationId, VirtualDrive, World};
 
 pub fn frame(text: &str) -> Frame {
     text.parse().unwrap()
@@ -227,6 +227,7 @@ impl VirtualDrive for TestDrive {
         Report {
             node: self.node,
             powered: self.powered,
+            power: if self.powered { PowerPhase::On } else { PowerPhase::Off },
             position: self.position,
             velocity_rpm: if self.powered { self.speed_rpm } else { 0.0 },
             current_a: 1.25,

@@ -244,6 +244,9 @@ impl<S: Sink> Client<S> {
                 Command::Quit => Err(ControlError::usage("quit is for who started the simulator")
                     .next("close the connection; the simulator ends with `quit` on its standard input, or a signal")),
                 Command::Help => Ok(help()),
+                Command::Run(_) => {
+                    Err(ControlError::usage("time is moved by the request `run`, not by a world command"))
+                }
                 command => self.command(&command, world, service),
             },
             Request::SubscribeEvents(filter) => self.subscribe(Subscription::Events(filter)),

@@ -11,7 +11,7 @@ use std::path::Path;
 
 use can::{Bitrate, Instant};
 use canopen::NodeId;
-use sim::machine::Realism;
+use sim::machine::{Realism, TimingMode};
 use sim::{Place, Source, Stimulus, VirtualDrive, World};
 
 use crate::document::reader::{self, Field, Parameters, Table};
@@ -31,7 +31,7 @@ pub const SEED: u64 = 1;
 const MOST_DRIVES: usize = 127;
 
 /// What a machine file may say of its bus.
-pub const BUS_KEYS: &[&str] = &["bitrate", "seed", "realism", "drive", "body"];
+pub const BUS_KEYS: &[&str] = &["bitrate", "seed", "realism", "timing", "drive", "body"];
 
 /// What it may say of a drive.
 pub const DRIVE_KEYS: &[&str] = &[
@@ -58,6 +58,8 @@ pub struct Machine {
     pub seed: Option<u64>,
     /// Whether its drives have the noise and the flaws of real ones, where it says so.
     pub realism: Option<Realism>,
+    /// Whether its drives take the time that such drives take, where it says so; a drive may say otherwise.
+    pub timing: Option<TimingMode>,
     /// The drives, each at a node of its own.
     pub drives: Vec<Placed>,
     /// What they move together.
@@ -128,7 +130,8 @@ impl Machine {
         let seed = file.get("seed").map(|field| field.whole("a whole number from 0 on")).transpose();
         let seed = noted(seed, &mut problems);
         let realism = noted(file.get("realism").map(|field| realism(&field)).transpose(), &mut problems);
-        let mut machine = Self { bitrate, seed, realism, ..Self::default() };
+        let timing = noted(file.get("timing").map(|field| timing(&field)).transpose(), &mut problems);
+        let mut machine = Self { bitrate, seed, realism, timing, ..Self::default() };
         let expected = "a table of its own for each drive, begun by [[drive]]";
         let tables = file.get("drive").map_or(Ok(Vec::new()), |field| field.list(expected));
         let tables = tables.unwrap_or_else(|problem| {
@@ -177,6 +180,11 @@ impl Machine {
         World::new(self.bitrate.unwrap_or(Bitrate::K500), self.seed.unwrap_or(SEED))
     }
 
+    /// Whether a drive of it takes its time: as itself says, or the machine, or else `otherwise`.
+    pub fn timing_of(&self, placed: &Placed, otherwise: TimingMode) -> TimingMode {
+        placed.spec.timing.or(self.timing).unwrap_or(otherwise)
+    }
+
     /// Makes the drives of its world, which are there already, as real as it says.
     pub fn make_real(&self, world: &mut World) {
         for placed in &self.drives {
@@ -205,6 +213,7 @@ impl Machine {
             let mut drive =
                 sim::machine::order(spec.model, &order).map_err(|error| placed.refused(None, &error.to_string()))?;
             placed.supply(drive.as_mut())?;
+            world.set_timing(self.timing_of(placed, TimingMode::Ideal));
             let added = world.add_drive(spec.node.raw(), drive);
             added.map_err(|error| placed.refused(None, &error.to_string()))?;
             placed.furnish(&mut world)?;
@@ -218,7 +227,13 @@ impl Machine {
     /// is nothing.
     pub fn unused_by_a_master(&self) -> Option<String> {
         let bodies = self.bodies.first().map(|_| "body");
-        let bus = [self.bitrate.map(|_| "bitrate"), self.seed.map(|_| "seed"), self.realism.map(|_| "realism"), bodies];
+        let bus = [
+            self.bitrate.map(|_| "bitrate"),
+            self.seed.map(|_| "seed"),
+            self.realism.map(|_| "realism"),
+            self.timing.map(|_| "timing"),
+            bodies,
+        ];
         let bus = bus.into_iter().flatten().collect::<Vec<_>>().join(", ");
         let of_drive = |placed: &Placed| format!("{} of node {}", placed.keys.join(", "), placed.spec.node);
         let drives = self.drives.iter().filter(|placed| !placed.keys.is_empty()).map(of_drive);
@@ -249,6 +264,11 @@ fn rate(field: &Field<'_>) -> Result<Bitrate, Problem> {
 
 fn realism(field: &Field<'_>) -> Result<Realism, Problem> {
     let expected = "\"ideal\" or \"full\"";
+    field.text(expected)?.parse().map_err(|_| field.wrong(expected))
+}
+
+fn timing(field: &Field<'_>) -> Result<TimingMode, Problem> {
+    let expected = "\"device\" or \"ideal\"";
     field.text(expected)?.parse().map_err(|_| field.wrong(expected))
 }
 

@@ -3,7 +3,7 @@
 use can::Bitrate;
 use canopen::{Mux, NodeId};
 use devices::variant::{NoSuchChoice, Preset, Variant, VariationKind};
-use sim::machine::Order;
+use sim::machine::{Order, TimingMode};
 
 use super::node::node;
 use super::object;
@@ -17,6 +17,8 @@ pub struct DriveSpec {
     pub model: &'static Description,
     /// Its node-ID at the first start.
     pub node: NodeId,
+    /// Whether it takes the time that such a drive takes, where it says so.
+    pub timing: Option<TimingMode>,
     variant: Variant,
     presets: Vec<Preset>,
 }
@@ -24,7 +26,7 @@ pub struct DriveSpec {
 impl DriveSpec {
     /// A drive as delivered.
     pub fn new(model: &'static Description, node: NodeId) -> Self {
-        Self { model, node, variant: Variant::first_of(model.variations), presets: Vec::new() }
+        Self { model, node, timing: None, variant: Variant::first_of(model.variations), presets: Vec::new() }
     }
 
     /// What to order for a bus of this rate.
@@ -42,13 +44,18 @@ impl DriveSpec {
         &self.presets
     }
 
-    /// Takes one option: a choice of the model's (`firmware=2.01`, `reading=Z050:prose` or `Z050=prose`), or the value that an
-    /// object has at power-on (`6060=3`, `2030:02=9`).
+    /// Takes one option: a choice of the model's (`firmware=2.01`, `reading=Z050:prose` or `Z050=prose`), the value that an
+    /// object has at power-on (`6060=3`, `2030:02=9`), or `timing=ideal`.
     pub fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
         let (key, value) = match key {
             "reading" => value.split_once(':').ok_or_else(|| {
                 format!("'reading={value}' is incomplete; expected reading=PLACE:CHOICE, e.g. {}", self.an_example())
             })?,
+            "timing" => {
+                self.timing =
+                    Some(value.parse().map_err(|reason| format!("timing of a {}: {reason}", self.model.name))?);
+                return Ok(());
+            }
             _ => (key, value),
         };
         match self.variant.choose(key, value) {
@@ -78,7 +85,10 @@ impl DriveSpec {
             VariationKind::Reading => format!("reading={}:CHOICE", variation.key),
             VariationKind::Build => format!("{}=CHOICE", variation.key),
         });
-        let known = keys.chain(["OBJECT=VALUE, e.g. 6060=3".to_owned()]).collect::<Vec<_>>().join("; ");
+        let known = keys
+            .chain(["timing=device or ideal".to_owned(), "OBJECT=VALUE, e.g. 6060=3".to_owned()])
+            .collect::<Vec<_>>()
+            .join("; ");
         let near = near(key, self.model.variations.iter().map(|variation| variation.key));
         format!("a {} takes no '{key}'{}; it takes: {known}", self.model.name, did_you_mean(&near))
     }
@@ -145,12 +155,21 @@ mod tests {
     }
 
     #[test]
+    fn each_drive_may_take_time_or_none() {
+        let timing = |text| drive_spec(text).ok().unwrap().timing;
+        assert_eq!(timing("zlac8030l@4"), None);
+        assert_eq!(timing("zlac8030l@4,timing=ideal,2014=100"), Some(TimingMode::Ideal));
+        assert_eq!(timing("zlac8030l@4,timing=device"), Some(TimingMode::Device));
+    }
+
+    #[test]
     fn an_unknown_option_is_refused_with_those_that_the_model_takes() {
         assert!(refusal("zlac8030l@4,colour=red").contains("a zlac8030l takes no 'colour'"));
         assert!(refusal("zlac8030l@4,colour=red").contains("OBJECT=VALUE"));
         assert!(refusal("zlac8030l@4,fast").contains("KEY=VALUE"));
         assert!(refusal("zlac8030l@4,6060=profile").contains("whole number"));
         assert!(refusal("zlac8030l@4,reading=X9").contains("PLACE:CHOICE"));
+        assert!(refusal("zlac8030l@4,timing=fast").contains("timing of a zlac8030l: expected device or ideal"));
     }
 
     #[test]

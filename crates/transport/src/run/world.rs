@@ -1,4 +1,4 @@
-//! Drives a virtual world at the pace of the wall clock, behind a [`Hub`].
+//! Drives a virtual world behind a [`Hub`], at the pace of the wall clock or one of its own.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -13,10 +13,22 @@ use crate::{ClientId, Hub, HubEvent, LeaveReason, WallClock};
 /// moved to now at once.
 const LONGEST_STEP: Duration = Duration::from_millis(20);
 
-/// A world of stations on a simulated wire whose time somebody else moves. Its time is that of the [`WallClock`].
+/// A world of stations on a simulated wire whose time somebody else moves. Its time is that of the [`WallClock`], unless it
+/// has a pace of its own.
 pub trait RealTimeWorld {
     /// How far the world has come.
     fn now(&self) -> Instant;
+
+    /// How far the world is to have come when the clock shows `clock`; asked once in each turn of the loop. At or before
+    /// [`now`](Self::now): it stands.
+    fn target(&mut self, clock: Instant) -> Instant {
+        clock
+    }
+
+    /// What the clock shows when the world is to have come to `at`; `None` for never.
+    fn clock_at(&self, at: Instant) -> Option<Instant> {
+        Some(at)
+    }
 
     /// When something is next due in it; `None` for never, at or before [`now`](Self::now) for at once.
     fn next_deadline(&self) -> Option<Instant>;
@@ -31,12 +43,17 @@ pub trait RealTimeWorld {
     /// The next thing that became of a frame, in the order of time. Everything injected comes out here once.
     fn take_heard(&mut self) -> Option<Heard>;
 
+    /// A client has come.
+    fn joined(&mut self, client: ClientId) {
+        let _ = client;
+    }
+
     /// A client is gone. Nothing more is injected for it; what was before still counts.
     fn left(&mut self, client: ClientId, reason: LeaveReason) {
         let _ = (client, reason);
     }
 
-    /// How far the world is behind the clock, told at every turn of the loop and before every command: next to nothing
+    /// How far the world is behind its target, in its own time, told at every turn of the loop and before every command: next to nothing
     /// while the machine keeps up.
     fn set_lag(&mut self, lag: Duration) {
         let _ = lag;
@@ -82,7 +99,11 @@ where
         while let Some(event) = hub.try_next_event() {
             take_in(world, event);
         }
-        let deadline = if is_late { Some(Instant::ZERO) } else { world.next_deadline() };
+        let deadline = match world.next_deadline() {
+            _ if is_late => Some(Instant::ZERO),
+            Some(at) => world.clock_at(at),
+            None => None,
+        };
         tokio::select! {
             biased;
             received = commands.recv(), if commands_open => {
@@ -115,14 +136,15 @@ async fn until_due(deadline: Option<Instant>, clock: &WallClock) {
 
 /// Moves the world towards now and tells what was heard; true if now is not reached.
 fn catch_up(world: &mut impl RealTimeWorld, hub: &Hub, clock: &WallClock) -> bool {
-    let now = clock.now().max(world.now());
+    let began = clock.now();
+    let now = world.target(began).max(world.now());
     let target = match world.next_deadline() {
         Some(due) => now.min(due.max(world.now()) + LONGEST_STEP),
         None => now,
     };
     world.advance_to(target);
     // The clock goes on while the world computes, so that a world which takes longer than it gains shows that here.
-    world.set_lag(clock.now() - target);
+    world.set_lag((now - target) + (clock.now() - began));
     tell(world, hub);
     target < now
 }
@@ -140,6 +162,6 @@ fn take_in(world: &mut impl RealTimeWorld, event: HubEvent) {
     match event {
         HubEvent::Frame { client, frame } => world.inject(client, &frame),
         HubEvent::Left { client, reason } => world.left(client, reason),
-        HubEvent::Joined { .. } => {}
+        HubEvent::Joined { client, .. } => world.joined(client),
     }
 }

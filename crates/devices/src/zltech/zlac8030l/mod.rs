@@ -19,6 +19,7 @@ use crate::description::{Description, HostWatch, NmtRules, PdoRules};
 use crate::faults::Faults;
 use crate::placement::Placement;
 use crate::stated::Stated;
+use crate::timing::Timing;
 use crate::units::{CountsPerTurn, Quantity, Units};
 use crate::zltech;
 use faults::FAULTS;
@@ -43,6 +44,7 @@ pub static ZLAC8030L: Description = Description {
     faults: Faults { code: Some(Mux::new(0x603F, 0)), bit_field: true, table: &FAULTS },
     nmt: NmtRules::CIA_301,
     pdo: PDO_RULES,
+    timing: Timing::GUESSED,
     stated_departures: DEPARTURES,
     variations: VARIATIONS,
 };

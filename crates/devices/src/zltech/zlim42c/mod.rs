@@ -20,6 +20,7 @@ use crate::description::{Description, HostWatch, NmtRules};
 use crate::faults::Faults;
 use crate::placement::Placement;
 use crate::stated::Stated;
+use crate::timing::Timing;
 use crate::units::{CountsPerTurn, Quantity, Units};
 use crate::zltech;
 use faults::FAULTS;
@@ -51,6 +52,7 @@ const fn stepper(name: &'static str, title: &'static str) -> Description {
         faults: Faults { code: Some(Mux::new(0x603F, 0)), bit_field: false, table: &FAULTS },
         nmt: NmtRules::CIA_301,
         pdo: zltech::PDO_RULES,
+        timing: Timing::GUESSED,
         stated_departures: DEPARTURES,
         variations: VARIATIONS,
     }

@@ -35,7 +35,7 @@ use super::{Values, storage};
 use crate::communication::communication;
 use crate::engine::actuator::servo::Servo;
 use crate::engine::axis::{Axis, Demand, HomingState};
-use crate::engine::device::{Application, Device};
+use crate::engine::device::{Application, Device, ResetTimes};
 use crate::engine::faults::FaultMonitor;
 use crate::engine::inputs::Inputs;
 use crate::engine::storage::StoredImage;
@@ -295,6 +295,7 @@ impl Station for MJoint {
         let event = self.host.as_mut().and_then(|host| host.handle_timeout(now));
         self.on_heartbeat(event);
         self.device.handle_timeout(now);
+        self.finish_reset(now);
         self.handle_events(now);
         if self.device.is_task_due(now) {
             self.communication_task(now);
@@ -341,6 +342,10 @@ impl Firmware for MJoint {
         self.host = None;
         self.axis = Axis::new();
         self.demand = Demand::Off;
+    }
+
+    fn set_reset_times(&mut self, times: ResetTimes) {
+        self.device.set_reset_times(times);
     }
 
     fn tick(&mut self, sensors: &Sensors, now: Instant) -> Actuation {

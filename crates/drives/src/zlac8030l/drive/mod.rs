@@ -26,7 +26,7 @@ use crate::engine::actuator::bleeder::Bleeder;
 use crate::engine::actuator::servo::Servo;
 use crate::engine::axis::{Demand, Feedback};
 use crate::engine::cia402::Targets;
-use crate::engine::device::{Application, Device};
+use crate::engine::device::{Application, Device, ResetTimes};
 use crate::engine::faults::{FaultMonitor, FaultSet};
 use crate::engine::host_watchdog::HostWatchdog;
 use crate::engine::storage::StoredImage;
@@ -315,6 +315,10 @@ impl Firmware for Zlac8030l {
     fn power_off(&mut self, _now: Instant) {
         self.device.power_off();
         self.shell.power_off();
+    }
+
+    fn set_reset_times(&mut self, times: ResetTimes) {
+        self.device.set_reset_times(times);
     }
 
     fn tick(&mut self, sensors: &Sensors, now: Instant) -> Actuation {

@@ -24,7 +24,7 @@ use crate::communication::communication;
 use crate::engine::actuator::stepper::Stepper;
 use crate::engine::axis::{Demand, Feedback};
 use crate::engine::cia402::Targets;
-use crate::engine::device::{Application, Device};
+use crate::engine::device::{Application, Device, ResetTimes};
 use crate::engine::faults::{FaultMonitor, FaultSet};
 use crate::engine::storage::StoredImage;
 use crate::zltech::Shell;
@@ -309,6 +309,10 @@ impl Firmware for Zlim42c {
         self.device.power_off();
         self.shell.power_off();
         self.energise(Demand::Off);
+    }
+
+    fn set_reset_times(&mut self, times: ResetTimes) {
+        self.device.set_reset_times(times);
     }
 
     fn tick(&mut self, sensors: &Sensors, now: Instant) -> Actuation {

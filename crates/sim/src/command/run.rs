@@ -1,0 +1,108 @@
+//! `run 20ms`, `run until 2.5s`: time that passes because somebody says so, and what happened in it.
+
+use core::time::Duration;
+
+use can::Instant;
+use serde::Serialize;
+
+use crate::World;
+use crate::json;
+use crate::stimulus::{RUN, StimulusError};
+
+/// How far time moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Run {
+    /// So much further.
+    For(Duration),
+    /// To this time of the bus, if that has not come yet.
+    Until(Instant),
+}
+
+/// Longest time that can be asked for, in seconds: a year.
+const LONGEST_S: f64 = 366.0 * 86_400.0;
+
+/// Units and their seconds, the longer names first: `min` ends with no other's name, `ms` with that of `s`.
+const UNITS: [(&str, f64); 5] = [("ns", 1e-9), ("us", 1e-6), ("ms", 1e-3), ("min", 60.0), ("s", 1.0)];
+
+impl Run {
+    /// The words after `run`.
+    pub(super) fn parse(text: &str) -> Result<Self, StimulusError> {
+        let (until, time) = match text.trim().strip_prefix("until") {
+            Some(time) => (true, time.trim()),
+            None => (false, text.trim()),
+        };
+        let wrong = || StimulusError::BadValue { text: time.to_owned(), what: "time of up to a year", usage: RUN };
+        if time.is_empty() {
+            return Err(StimulusError::Usage(RUN));
+        }
+        let unit = UNITS.iter().find_map(|(unit, seconds)| Some((time.strip_suffix(unit)?, seconds)));
+        let (number, unit_s) = unit.ok_or_else(wrong)?;
+        let number: f64 = number.trim().parse().map_err(|_| wrong())?;
+        let seconds = number * unit_s;
+        if !(0.0..=LONGEST_S).contains(&seconds) {
+            return Err(wrong());
+        }
+        let duration = Duration::from_nanos((seconds * 1e9).round() as u64);
+        Ok(if until { Self::Until(Instant::ZERO + duration) } else { Self::For(duration) })
+    }
+
+    /// Where it ends when it begins at `now`.
+    pub fn end(self, now: Instant) -> Instant {
+        match self {
+            Self::For(duration) => now + duration,
+            Self::Until(end) => end.max(now),
+        }
+    }
+}
+
+/// What a world was like at the beginning of a run.
+#[derive(Clone, Debug)]
+pub struct Before {
+    frames: u64,
+    nodes: Vec<Node>,
+}
+
+/// What may change about a drive that a person would be told of.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+struct Node {
+    node: u8,
+    power: &'static str,
+    statusword: Option<u16>,
+    error_code: u32,
+}
+
+#[derive(Serialize)]
+struct Passed {
+    ok: bool,
+    t: f64,
+    frames: u64,
+    changes: Vec<Node>,
+}
+
+impl Before {
+    /// A world as it is now.
+    pub fn of(world: &mut World) -> Self {
+        Self { frames: world.statistics().frames, nodes: nodes(world) }
+    }
+
+    /// What has happened since, as an answer: the time reached, the frames that the wire has carried, and the drives whose power, statusword or
+    /// error code is another.
+    pub fn answer(&self, world: &mut World) -> String {
+        let now = nodes(world);
+        let changes = now.into_iter().filter(|node| !self.nodes.contains(node)).collect();
+        let frames = world.statistics().frames - self.frames;
+        json::line(&Passed { ok: true, t: world.now().as_nanos() as f64 / 1e9, frames, changes })
+    }
+}
+
+fn nodes(world: &mut World) -> Vec<Node> {
+    let numbers: Vec<u8> = world.drive_numbers().collect();
+    let reports = numbers.into_iter().filter_map(|node| Some((node, world.report(node).ok()?)));
+    let seen = reports.map(|(node, report)| Node {
+        node,
+        power: report.power.word(),
+        statusword: report.statusword,
+        error_code: report.error_code,
+    });
+    seen.collect()
+}

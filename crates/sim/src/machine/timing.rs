@@ -1,0 +1,227 @@
+//! The time that a device takes for itself, between the bus and its firmware: to start, to act on a frame, to store.
+//!
+//! A firmware here acts on a frame in the instant in which it comes. A real one is busy: a frame waits in the controller's
+//! mailboxes until the task that looks after it runs. So frames wait here, requests and process data each in their order,
+//! and the answers go out when the firmware has had them. The times are the description's ([`devices::Timing`]), drawn anew
+//! each time from the machine's own seed.
+
+use std::collections::VecDeque;
+
+use can::{Frame, Instant};
+use canopen::connection_set::SDO_REQUEST_BASE;
+use devices::{Span, Timing};
+use drives::engine::device::ResetTimes;
+
+use super::chip::Chip;
+use crate::Prng;
+
+/// Whether devices take the time that such devices take.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TimingMode {
+    /// No time at all: for tests of logic, and for what is compared with figures of the standard.
+    #[default]
+    Ideal,
+    /// The times of the description, each with its seeded jitter.
+    Device,
+}
+
+impl std::str::FromStr for TimingMode {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "ideal" => Ok(Self::Ideal),
+            "device" => Ok(Self::Device),
+            _ => Err(format!("expected device or ideal, not {text:?}")),
+        }
+    }
+}
+
+/// Frames that may wait: the mailboxes of a CAN controller. What comes beyond that is lost, as on a real device.
+const MAILBOXES: usize = 16;
+
+/// Frames on their way to a firmware, and its memory chip.
+#[derive(Clone, Debug)]
+pub(super) struct OwnTime {
+    timing: Timing,
+    prng: Prng,
+    waiting: VecDeque<Waiting>,
+    pub(super) chip: Chip,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Waiting {
+    frame: Frame,
+    kind: Kind,
+    due: Instant,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// To the SDO server.
+    Request,
+    /// RPDO, SYNC, and whatever else is no business of the operating system.
+    Process,
+    /// NMT, heartbeats of others: what the controller's interrupt looks after.
+    Management,
+}
+
+impl OwnTime {
+    /// Nothing waits; the chip holds `image`.
+    pub(super) fn new(timing: Timing, seed: u64, image: &[u8], generation: u64) -> Self {
+        Self { timing, prng: Prng::new(seed), waiting: VecDeque::new(), chip: Chip::new(image, generation) }
+    }
+
+    /// How long this boot takes.
+    pub(super) fn boot_ns(&mut self) -> u64 {
+        let boot = self.timing.boot;
+        self.draw(&boot)
+    }
+
+    /// How long the next resets take.
+    pub(super) fn reset_times(&mut self) -> ResetTimes {
+        let Timing { reset_node, reset_communication, .. } = self.timing;
+        ResetTimes { node_ns: self.draw(&reset_node), communication_ns: self.draw(&reset_communication) }
+    }
+
+    /// How long this store takes.
+    fn store_ns(&mut self) -> u64 {
+        let store = self.timing.store;
+        self.draw(&store)
+    }
+
+    /// A frame has come; the firmware gets it now, or it waits.
+    pub(super) fn take_in(&mut self, frame: &Frame, now: Instant) -> Option<Frame> {
+        let kind = kind(frame);
+        let span = match kind {
+            Kind::Management => return Some(*frame),
+            Kind::Request => self.timing.sdo_answer,
+            Kind::Process => self.timing.pdo_reaction,
+        };
+        let due = now.plus_nanos(self.draw(&span));
+        // What came first is taken first, however the dice fall; and a request when the answer to the one before is out.
+        let pause_ns = if kind == Kind::Request { u64::from(span.least_us) * 1_000 } else { 0 };
+        let before = self.waiting.iter().filter(|other| other.kind == kind).map(|other| other.due).max();
+        let due = before.map_or(due, |before| before.plus_nanos(pause_ns).max(due));
+        if self.waiting.len() < MAILBOXES {
+            self.waiting.push_back(Waiting { frame: *frame, kind, due });
+        }
+        None
+    }
+
+    /// The frame that the firmware gets at `now` or should have had before.
+    pub(super) fn take_out(&mut self, now: Instant) -> Option<Frame> {
+        let next = self.next()?;
+        if next.1 > now {
+            return None;
+        }
+        self.waiting.remove(next.0).map(|waiting| waiting.frame)
+    }
+
+    /// When a frame or the chip is due.
+    pub(super) fn next_due(&self) -> Option<Instant> {
+        let frame = self.next().map(|(_, due)| due);
+        frame.into_iter().chain(self.chip.next_due()).min()
+    }
+
+    /// The firmware has stored: the chip takes its time for it.
+    pub(super) fn store(&mut self, image: &[u8], generation: u64, now: Instant) {
+        if self.chip.is_new(generation) {
+            let takes_ns = self.store_ns();
+            self.chip.write(image, generation, takes_ns, now);
+        }
+    }
+
+    /// The supply is gone, and with it what waited.
+    pub(super) fn power_off(&mut self) {
+        self.waiting.clear();
+    }
+
+    /// The first due, among equals the one that came first.
+    fn next(&self) -> Option<(usize, Instant)> {
+        let dues = self.waiting.iter().enumerate().map(|(place, waiting)| (place, waiting.due));
+        dues.min_by_key(|(place, due)| (*due, *place))
+    }
+
+    fn draw(&mut self, span: &Span) -> u64 {
+        let (least_ns, most_ns) = (u64::from(span.least_us) * 1_000, u64::from(span.most_us) * 1_000);
+        least_ns + self.prng.below(most_ns.saturating_sub(least_ns) + 1)
+    }
+}
+
+/// By the predefined connection set (CiA 301, 7.3.5).
+fn kind(frame: &Frame) -> Kind {
+    let id = frame.id();
+    if id.is_extended() {
+        return Kind::Process;
+    }
+    match id.raw() {
+        0 | 0x700.. => Kind::Management,
+        raw if raw & !0x7F == u32::from(SDO_REQUEST_BASE) => Kind::Request,
+        _ => Kind::Process,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FIXED: Timing = Timing { sdo_answer: Span::new(900, 1_100, ""), ..Timing::GUESSED };
+
+    fn own(seed: u64) -> OwnTime {
+        OwnTime::new(FIXED, seed, &[], 0)
+    }
+
+    fn frame(text: &str) -> Frame {
+        text.parse().unwrap()
+    }
+
+    #[test]
+    fn requests_keep_their_order_and_process_data_overtakes_them() {
+        for seed in 0..100 {
+            let mut own = own(seed);
+            assert_eq!(own.take_in(&frame("000#0104"), Instant::ZERO), Some(frame("000#0104")));
+            for number in 0..4 {
+                let at = Instant::ZERO.plus_nanos(number * 10_000);
+                assert_eq!(own.take_in(&frame(&format!("604#400{number}600000000000")), at), None);
+            }
+            assert_eq!(own.take_in(&frame("204#0F00"), Instant::ZERO.plus_nanos(50_000)), None);
+            let mut order = Vec::new();
+            while let Some(due) = own.next_due() {
+                assert_eq!(own.take_out(Instant::from_nanos(due.as_nanos() - 1)), None);
+                order.push((own.take_out(due).unwrap().to_string(), due.as_nanos()));
+            }
+            let names: Vec<&str> = order.iter().map(|(text, _)| &text[..6]).collect();
+            assert_eq!(names, ["204#0F", "604#40", "604#40", "604#40", "604#40"]);
+            assert!(order.is_sorted_by_key(|(text, due)| (*due, text.clone())), "{order:?}");
+            assert!((150_000..=450_000).contains(&order[0].1), "{order:?}");
+            assert!((900_000..=1_100_000).contains(&order[1].1), "{order:?}");
+            let gaps: Vec<u64> = order[1..].windows(2).map(|pair| pair[1].1 - pair[0].1).collect();
+            assert!(gaps.iter().all(|gap| *gap >= 900_000), "{order:?}");
+        }
+    }
+
+    #[test]
+    fn more_frames_than_there_are_mailboxes_for_are_lost() {
+        let mut own = own(1);
+        (0..1000).for_each(|_| assert_eq!(own.take_in(&frame("604#4000600000000000"), Instant::ZERO), None));
+        assert_eq!(std::iter::from_fn(|| own.take_out(Instant::from_secs(1))).count(), MAILBOXES);
+    }
+
+    #[test]
+    fn a_seed_gives_the_same_times_again_and_another_gives_others() {
+        let times = |seed| {
+            let mut own = own(seed);
+            (own.boot_ns(), own.reset_times(), own.store_ns())
+        };
+        assert_eq!(times(1), times(1));
+        assert_ne!(times(1), times(2));
+        for seed in 0..1000 {
+            let (boot_ns, resets, store_ns) = times(seed);
+            assert!((800_000_000..=1_200_000_000).contains(&boot_ns));
+            assert!((400_000_000..=600_000_000).contains(&resets.node_ns));
+            assert!((10_000_000..=30_000_000).contains(&resets.communication_ns));
+            assert!((5_000_000..=15_000_000).contains(&store_ns));
+        }
+    }
+}
