@@ -1,0 +1,149 @@
+//! A device that is no drive, from a data sheet of our own: what a host on the bus sees of it, and the outer world's hand.
+
+use std::time::Duration;
+
+use can::Bitrate;
+use canopen::NodeId;
+use sim::machine::{Order, order};
+use sim::{StationId, World};
+
+/// Inputs and outputs of CiA 401, values of every length, TPDO1 by event and TPDO2 with SYNC. In Latin-1: the name has a letter
+/// beyond ASCII.
+const SHEET: &[u8] = b"[FileInfo]\nFileName=io.eds\n[DeviceInfo]\nVendorName=Nobody\nProductName=Inputs\n\
+[1000]\nParameterName=Device type\nDataType=7\nAccessType=ro\nDefaultValue=0x00030191\n\
+[1001]\nParameterName=Error register\nDataType=5\nAccessType=ro\n\
+[1003]\nParameterName=Errors\nObjectType=8\nSubNumber=3\n\
+[1003sub0]\nParameterName=n\nDataType=5\nAccessType=rw\nDefaultValue=0\n\
+[1003sub1]\nParameterName=1\nDataType=7\nAccessType=ro\n[1003sub2]\nParameterName=2\nDataType=7\nAccessType=ro\n\
+[1005]\nParameterName=SYNC\nDataType=7\nAccessType=rw\nDefaultValue=0x80\n\
+[1008]\nParameterName=Name\nDataType=9\nAccessType=const\nDefaultValue=Pr\xFCf\n\
+[1010]\nParameterName=Store\nObjectType=8\nSubNumber=2\n[1010sub0]\nParameterName=n\nDataType=5\nAccessType=ro\nDefaultValue=1\n\
+[1010sub1]\nParameterName=All\nDataType=7\nAccessType=rw\nDefaultValue=1\n\
+[1014]\nParameterName=EMCY\nDataType=7\nAccessType=rw\nDefaultValue=$NODEID+0x80\n\
+[1017]\nParameterName=Heartbeat\nDataType=6\nAccessType=rw\nDefaultValue=0\n\
+[1018]\nParameterName=Identity\nObjectType=9\nSubNumber=2\n[1018sub0]\nParameterName=n\nDataType=5\nAccessType=ro\nDefaultValue=1\n\
+[1018sub1]\nParameterName=Vendor\nDataType=7\nAccessType=ro\nDefaultValue=7\n\
+[1800]\nParameterName=T1\nObjectType=9\nSubNumber=3\n[1800sub0]\nParameterName=n\nDataType=5\nAccessType=ro\nDefaultValue=2\n\
+[1800sub1]\nParameterName=COB\nDataType=7\nAccessType=rw\nDefaultValue=$NODEID+0x180\n\
+[1800sub2]\nParameterName=Type\nDataType=5\nAccessType=rw\nDefaultValue=255\n\
+[1801]\nParameterName=T2\nObjectType=9\nSubNumber=3\n[1801sub0]\nParameterName=n\nDataType=5\nAccessType=ro\nDefaultValue=2\n\
+[1801sub1]\nParameterName=COB\nDataType=7\nAccessType=rw\nDefaultValue=$NODEID+0x280\n\
+[1801sub2]\nParameterName=Type\nDataType=5\nAccessType=rw\nDefaultValue=1\n\
+[1A00]\nParameterName=M1\nObjectType=9\nSubNumber=2\n[1A00sub0]\nParameterName=n\nDataType=5\nAccessType=rw\nDefaultValue=1\n\
+[1A00sub1]\nParameterName=1\nDataType=7\nAccessType=rw\nDefaultValue=0x60000108\n\
+[1A01]\nParameterName=M2\nObjectType=9\nSubNumber=2\n[1A01sub0]\nParameterName=n\nDataType=5\nAccessType=rw\nDefaultValue=1\n\
+[1A01sub1]\nParameterName=1\nDataType=7\nAccessType=rw\nDefaultValue=0x60000108\n\
+[2000]\nParameterName=Gain\nDataType=8\nAccessType=rw\nDefaultValue=0.5\nLowLimit=0.0\nHighLimit=2.5\n\
+[2001]\nParameterName=Label\nDataType=9\nAccessType=rw\nDefaultValue=abc\n\
+[2002]\nParameterName=Counter\nDataType=0x1B\nAccessType=ro\nDefaultValue=0\n\
+[2003]\nParameterName=Level\nDataType=5\nAccessType=rw\nDefaultValue=5\nLowLimit=1\nHighLimit=9\n\
+[6000]\nParameterName=Inputs\nObjectType=8\nSubNumber=2\n[6000sub0]\nParameterName=n\nDataType=5\nAccessType=ro\nDefaultValue=1\n\
+[6000sub1]\nParameterName=1\nDataType=5\nAccessType=ro\nPDOMapping=1\nDefaultValue=0\n";
+
+struct Bench {
+    world: World,
+    host: StationId,
+}
+
+impl Bench {
+    /// Node 9, switched on and operational.
+    fn new() -> Self {
+        let eds = eds::Eds::load(SHEET).expect("it is read").eds;
+        let model = eds::keep(&eds).expect("it makes a description");
+        let mut world = World::new(Bitrate::M1, 1);
+        let host = world.add_probe();
+        let node = NodeId::new(9).unwrap();
+        world.add_drive(9, order(model, &Order::new(model, node, Bitrate::M1)).unwrap()).unwrap();
+        world.run_for(Duration::from_millis(100));
+        let mut bench = Self { world, host };
+        assert_eq!(bench.heard(), ["709#00"]);
+        assert_eq!(bench.send("000#0109"), ["189#00"], "an event-driven TPDO is sent once at the start");
+        bench
+    }
+
+    fn heard(&mut self) -> Vec<String> {
+        std::iter::from_fn(|| self.world.poll_received(self.host)).map(|(_, frame)| frame.to_string()).collect()
+    }
+
+    /// A frame from the host; what is heard within 20 ms of it.
+    fn send(&mut self, frame: &str) -> Vec<String> {
+        self.world.send(self.host, frame.parse().unwrap()).unwrap();
+        self.world.run_for(Duration::from_millis(20));
+        self.heard()
+    }
+
+    /// A world command; what is heard within 20 ms of it.
+    fn tell(&mut self, line: &str) -> Vec<String> {
+        let answer = sim::command::answer(&mut self.world, line).unwrap().json;
+        assert!(answer.starts_with("{\"ok\":true"), "{line}: {answer}");
+        self.world.run_for(Duration::from_millis(20));
+        self.heard()
+    }
+}
+
+#[test]
+fn what_the_world_sets_is_sent_by_event_and_with_sync() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.tell("9 set 6000:01 5Ah"), ["189#5A"]);
+    assert!(bench.tell("9 set 6000:01 5Ah").is_empty(), "no change, no event");
+    assert_eq!(bench.send("080#"), ["289#5A"]);
+    bench.send("000#8009");
+    assert!(bench.tell("9 set 6000:01 1").is_empty(), "pre-operational: no PDO");
+}
+
+#[test]
+fn limits_are_kept_for_whole_numbers_and_reals() {
+    let mut bench = Bench::new();
+    // 0609 0031h and 0609 0032h: too high, too low; 2.0 and 3.0 in IEEE 754.
+    assert_eq!(bench.send("609#2F0320000A000000"), ["589#8003200031000906"]);
+    assert_eq!(bench.send("609#2F03200000000000"), ["589#8003200032000906"]);
+    assert_eq!(bench.send("609#2300200000004040"), ["589#8000200031000906"]);
+    assert_eq!(bench.send("609#2300200000000040"), ["589#6000200000000000"]);
+    assert_eq!(bench.send("609#4000200000000000"), ["589#4300200000000040"]);
+}
+
+#[test]
+fn a_default_beyond_ascii_goes_over_the_bus_byte_for_byte() {
+    // "Prüf" in Latin-1: 50h 72h FCh 66h.
+    assert_eq!(Bench::new().send("609#4008100000000000"), ["589#430810005072FC66"]);
+}
+
+#[test]
+fn texts_and_64_bits_are_set_from_outside_and_stored_over_power_cycles() {
+    let mut bench = Bench::new();
+    bench.tell("9 set 2001 \"new\"");
+    assert_eq!(bench.send("609#4001200000000000"), ["589#470120006E657700"]);
+    bench.tell("9 set 2002 18446744073709551615");
+    assert_eq!(bench.send("609#4002200000000000"), ["589#4102200008000000"]);
+    assert_eq!(bench.send("609#6000000000000000"), ["589#00FFFFFFFFFFFFFF"]);
+    assert_eq!(bench.send("609#7000000000000000"), ["589#1DFF000000000000"]);
+    bench.send("609#2300200000000040");
+    assert_eq!(bench.send("609#2310100173617665"), ["589#6010100100000000"], "save");
+    bench.tell("9 power off");
+    bench.tell("9 power on");
+    assert_eq!(bench.send("609#4001200000000000"), ["589#470120006E657700"], "the label");
+    assert_eq!(bench.send("609#4000200000000000"), ["589#4300200000000040"], "the gain");
+    let answer = sim::command::answer(&mut bench.world, "9 set 2001 5").unwrap().json;
+    assert!(answer.contains("a text in quotation marks is meant"), "{answer}");
+    let answer = sim::command::answer(&mut bench.world, "9 set 2002 -1").unwrap().json;
+    assert!(answer.contains("UNSIGNED64 takes 0 to 18446744073709551615"), "{answer}");
+}
+
+#[test]
+fn a_new_error_register_is_told_by_emcy_and_kept_in_the_history() {
+    let mut bench = Bench::new();
+    // Generic and temperature.
+    assert_eq!(bench.tell("9 set 1001 9"), ["089#0010090000000000"]);
+    assert_eq!(bench.send("609#4003100100000000"), ["589#4303100100100000"]);
+    assert_eq!(bench.tell("9 set 1001 0"), ["089#0000000000000000"]);
+    assert_eq!(bench.send("609#4001100000000000"), ["589#4F01100000000000"]);
+}
+
+#[test]
+fn heartbeats_come_in_their_time() {
+    let mut bench = Bench::new();
+    bench.send("609#2B17100064000000");
+    bench.world.run_for(Duration::from_millis(500));
+    let beats = bench.heard();
+    assert!(beats.len() == 5 && beats.iter().all(|frame| frame == "709#05"), "{beats:?}");
+}
