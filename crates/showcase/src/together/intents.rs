@@ -27,6 +27,9 @@ const LIMIT: Duration = Duration::from_secs(60);
 const SPEED: Rpm = Rpm(60.0);
 const RAMP_RPM_S: f64 = 600.0;
 
+/// After so long without a voltage no current is left in a winding: many of its time constants L/R, which are some ms.
+const WINDING_DECAY: Duration = Duration::from_millis(40);
+
 /// How near to a target a shaft comes to rest: the coarsest of the three is in place within 30 of 4096 counts.
 const IN_PLACE_DEG: f64 = 30.0 / 4096.0 * 360.0;
 
@@ -200,6 +203,7 @@ impl Fleet {
 
     fn disable(&self, bench: &mut Bench) {
         self.rows(bench, Intent::Disable, |bench, place, _| {
+            bench.run_silently(WINDING_DECAY);
             let current = report(bench, place).current_a;
             bench.expect("current", Expect::Near(0.0, 0.05), "A", current);
         });
