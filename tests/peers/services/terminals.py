@@ -33,7 +33,7 @@ def emergency_stop(bench):
         bench.write(0x2030, 0, sub=2 + number)
 
 
-@check("a limit switch on the way stops the motor, which can only go away from it", ZLIM42C)
+@check("a limit switch on the way stops the motor, which can only go away from it, and goes on when the switch is moved", ZLIM42C)
 def limit(bench):
     bench.write(0x2030, 2, sub=2)
     bench.world("switch X0 6000 max")
@@ -41,6 +41,9 @@ def limit(bench):
     bench.speed_becomes(0)
     bench.write(0x60FF, -120)
     bench.speed_becomes(-120)
+    bench.world("switch X0 1000000 max")
+    bench.write(0x60FF, 120)
+    eventually(lambda: bench.read(0x6064), lambda at: at > 9000, "6064h beyond where the switch was")
 
 
 #: What tells of a fault at an output: its setting for "on in fault", the setting for the reverse, the output, the cause.
