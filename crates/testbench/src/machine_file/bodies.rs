@@ -58,7 +58,7 @@ impl Joined {
 
     /// Joins the drives, which are in the world already.
     pub(super) fn couple(&self, world: &mut World) -> Result<(), BadFile> {
-        let refused = |error| BadFile::one(self.at.saying(&format!("body {:?}: {error}", self.name)));
+        let refused = |error| BadFile::one(self.at.saying(format!("body {:?}: {error}", self.name)));
         world.couple(&self.name, &self.coupling, &self.shafts).map_err(refused)
     }
 }
