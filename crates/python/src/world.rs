@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
 use sim::command;
-use sim::machine::order;
+use sim::machine::{TimingMode, order};
 use sim::stimulus::{FORMS, Place};
 use sim::wire::{Statistics, WireEvent};
 use sim::{StationId, VirtualDrive};
@@ -209,6 +209,14 @@ impl World {
         }
         let bitrate = self.shared.lock(py)?.world.bitrate();
         self.put(py, node, order(spec.model, &spec.order(bitrate)).map_err(refused)?)
+    }
+
+    /// How long boot, answers and stores take of drives that are added from here on: `ideal`, or `device`.
+    fn set_timing(&self, py: Python<'_>, timing: &str) -> PyResult<()> {
+        let mode: TimingMode =
+            timing.parse().map_err(|_| bad_value(format!("{timing:?} is no timing; expected ideal or device")))?;
+        self.shared.lock(py)?.world.set_timing(mode);
+        Ok(())
     }
 
     /// Becomes the world that the text of a machine file describes.

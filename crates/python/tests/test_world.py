@@ -30,6 +30,18 @@ def test_a_drive_boots_with_the_message_of_the_standard(world):
     assert world.frames(1)[0].endswith("704#00")
 
 
+def test_devices_that_take_their_time_boot_later():
+    def boots_at_s(timing):
+        world = ferrodrive.World(timing=timing)
+        world.add("zlac8030l", node=4)
+        world.add_probe()
+        return world.run_until(lambda: world.frames(1), within=10)
+
+    assert boots_at_s("device") > boots_at_s("ideal") + 0.1
+    with pytest.raises(ValueError, match="ideal or device"):
+        ferrodrive.World(timing="slow")
+
+
 def test_a_condition_is_waited_for_and_its_time_is_the_answer(world):
     reached_s = world.run_until(lambda: world.now >= 0.0305, within=1)
     assert reached_s == 0.031

@@ -34,6 +34,8 @@ class World:
     def nodes(self) -> list[int]:
         """Numbers of the drives, in the order in which they were added."""
     def add_drive(self, model: str, node: int, options: list[tuple[str, str]]) -> None: ...
+    def set_timing(self, timing: str) -> None:
+        """How long boot, answers and stores take from here on: ``ideal``, or ``device``."""
     def become_machine(self, text: str, seed: Optional[int]) -> None: ...
     def run_ns(self, ns: int) -> None:
         """Moves on by so many ns."""

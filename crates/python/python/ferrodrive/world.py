@@ -39,13 +39,15 @@ class World(_native.World):
 
     :param bitrate: bit rate of the bus in bit/s, or as text (``"500k"``)
     :param seed: decides everything random
+    :param timing: ``ideal``: boot, answers and stores take no time beyond the wire; ``device``: what a device of this kind takes
     :param channel: a name under which ``can.Bus(interface="ferrodrive", channel=...)`` finds this world
     """
 
     _watched = False
 
-    def __new__(cls, bitrate: Union[int, str] = 500_000, seed: int = 1, *, channel: Optional[str] = None) -> Self:
+    def __new__(cls, bitrate: Union[int, str] = 500_000, seed: int = 1, timing: str = "ideal", *, channel: Optional[str] = None) -> Self:
         world = super().__new__(cls, str(bitrate), seed)
+        world.set_timing(timing)
         if channel is not None:
             _by_channel[channel] = world
         return world
