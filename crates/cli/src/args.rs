@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    completions, dcf, demo, drive, dump, eds, home, man_pages, motion, nmt, objects, plot, readings, run, scan, sdo,
-    sim, store,
+    completions, dcf, demo, drive, dump, eds, events, home, man_pages, motion, nmt, objects, plot, readings, run, scan,
+    sdo, sim, store, world,
 };
 use crate::global::Global;
 
@@ -26,6 +26,8 @@ pub(crate) enum Command {
     Demo(demo::Demo),
     Sim(sim::Sim),
     Run(run::Run),
+    World(world::World),
+    Events(events::Events),
     Scan(scan::Scan),
     Read(sdo::Read),
     Write(sdo::Write),

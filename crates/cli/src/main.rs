@@ -6,6 +6,7 @@
 mod args;
 mod command;
 mod context;
+mod control_client;
 mod decode;
 mod embedded;
 mod failure;
@@ -164,6 +165,8 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Readings(readings) => print(format, &readings.list()?),
         Command::Eds(eds) => eds.run(format),
         Command::Dcf(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::World(world) => print(format, &world.run()?),
+        Command::Events(events) => events.run(format),
         Command::Dump(dump) => dump.run(global, format),
         Command::Completions(completions) => completions.run(&mut Cli::command()),
         Command::ManPages(pages) => pages.run(Cli::command()),

@@ -27,10 +27,21 @@ impl Format {
         if self.json { self.print_json(report) } else { print_line(&report.text(self.paint)) }
     }
 
-    /// Prints one line of JSON.
+    /// Prints one line of JSON about something that was done.
     pub(crate) fn print_json(self, value: &impl Serialize) -> io::Result<()> {
-        print_line(&sim::json::to_string(value)?)
+        print_line(&json(value)?)
     }
+}
+
+/// An object as one line of JSON that begins with whether all is well (docs/json.md): as its first field says, else it is.
+fn json(value: &impl Serialize) -> io::Result<String> {
+    let line = sim::json::to_string(value)?;
+    if line.starts_with("{\"ok\":") {
+        return Ok(line);
+    }
+    let rest = line.strip_prefix('{').unwrap_or(&line);
+    let comma = if rest == "}" { "" } else { "," };
+    Ok(format!("{{\"ok\":true{comma}{rest}"))
 }
 
 /// One text and a line end on standard output, at once.

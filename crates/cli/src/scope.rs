@@ -25,12 +25,24 @@ const MODEL: &str = "models";
 const MACHINE: &str = "machine";
 const TIMEOUT: &str = "timeout";
 
-const UNHEEDED: [Unheeded; 8] = [
+const UNHEEDED: [Unheeded; 10] = [
     Unheeded {
         command: "run",
         options: &[BUS, MODEL, MACHINE, TIMEOUT],
         why: "a scenario has a machine and a bus of its own",
         next: "leave it away; the scenario's machine may be the path of a machine file",
+    },
+    Unheeded {
+        command: "world",
+        options: &[BUS, MODEL, MACHINE, TIMEOUT],
+        why: "it speaks to a running simulator, not to a bus",
+        next: "leave it away; --control says where the simulator is",
+    },
+    Unheeded {
+        command: "events",
+        options: &[BUS, MODEL, MACHINE, TIMEOUT],
+        why: "it listens to a running simulator, not to a bus",
+        next: "leave it away; --control says where the simulator is",
     },
     Unheeded {
         command: "sim",

@@ -134,20 +134,3 @@ pub enum EventKind {
     /// So many older events were not pulled in time, and are lost.
     Missed(u64),
 }
-
-impl Event {
-    /// What to do about it, where something can be done.
-    pub fn remedy(&self) -> Option<&'static str> {
-        match self.kind {
-            EventKind::Fault { row, .. } | EventKind::Emcy { row, .. } => row.map(|row| row.remedy),
-            EventKind::BusError { cause, .. } => Some(words::remedy_of_error(cause)),
-            EventKind::BusState { to: ErrorState::BusOff, .. } => {
-                Some("look for a node at another bit rate, a broken wire or a missing terminator")
-            }
-            EventKind::Damage(_) => Some("a new drive: this one stays as it is until the simulation ends"),
-            EventKind::Behind(_) => Some("fewer drives or clients, or a slower pace"),
-            EventKind::Missed(_) => Some("pull events more often, or subscribe to fewer"),
-            _ => None,
-        }
-    }
-}

@@ -12,6 +12,7 @@ mod probe;
 mod step;
 mod stores;
 mod watch;
+mod watching;
 
 use core::time::Duration;
 

@@ -12,6 +12,7 @@
 mod address;
 mod answer;
 mod desk;
+mod id;
 mod lines;
 mod outbox;
 mod request;
@@ -20,7 +21,8 @@ mod subscription;
 pub use address::{ControlAddress, NoAddress};
 pub use answer::ControlError;
 pub use desk::{ClientNumber, Control, Outcome, PROTOCOL, Pending, Sink};
+pub use id::Id;
 pub use lines::{LineBuffer, MAX_LINE_LENGTH, ReadLine};
 pub use outbox::{Class, Outbox};
-pub use request::{Goal, Id, Message, REQUESTS, Request};
+pub use request::{Message, REQUESTS, Request};
 pub use subscription::{Channel, Values};

@@ -8,8 +8,8 @@ use std::time::Duration;
 use can::Instant;
 use serde_json::{Value, json};
 use sim::World;
-use sim::command::Service;
-use testbench::control::{Class, Control, Goal, MAX_LINE_LENGTH, Outcome, PROTOCOL, ReadLine, Sink};
+use sim::command::{Run, Service};
+use testbench::control::{Class, Control, MAX_LINE_LENGTH, Outcome, PROTOCOL, ReadLine, Sink};
 use testbench::machine_file::Machine;
 
 #[derive(Clone, Debug, Default)]
@@ -137,6 +137,8 @@ fn what_makes_no_sense_is_refused_with_a_kind_and_changes_nothing() {
         (r#"{"request":"world","node":4,"command":[["supply"]]}"#, "usage"),
         (r#"{"request":"run"}"#, "usage"),
         (r#"{"request":"run","for":"-1s"}"#, "usage"),
+        (r#"{"request":"run","for":"until 5s"}"#, "usage"),
+        ("run fast", "usage"),
         (r#"{"request":"run","for":"1e99s"}"#, "usage"),
         (r#"{"request":"subscribe"}"#, "usage"),
         (r#"{"request":"subscribe","events":{"kinds":["bot"]}}"#, "usage"),
@@ -255,14 +257,15 @@ fn a_request_to_run_is_the_callers_and_is_answered_when_it_is_done() {
     let mut bench = Bench::new(None);
     let inbox = bench.join(1);
     let Outcome::Run(pending) = bench.say(1, r#"{"id":9,"request":"run","for":"20ms"}"#) else { panic!("no run") };
-    assert_eq!(pending.goal, Goal::For(Duration::from_millis(20)));
+    assert_eq!(pending.run, Run::For(Duration::from_millis(20)));
     assert!(inbox.all().is_empty());
     bench.run_for(Duration::from_millis(20));
-    let now = bench.world.now();
-    bench.control.answer_run(&pending, Ok(now));
-    assert_eq!(inbox.only(), json!({ "id": 9, "ok": true, "t": 1.02, "t_ns": 1_020_000_000 }));
+    bench.control.answer_run(&pending, Ok(r#"{"ok":true,"t":1.02}"#));
+    assert_eq!(inbox.only(), json!({ "id": 9, "ok": true, "t": 1.02 }));
     let Outcome::Run(pending) = bench.say(1, r#"{"request":"run","until":"1.5s"}"#) else { panic!("no run") };
-    assert_eq!(pending.goal, Goal::Until(Instant::from_millis(1500)));
+    assert_eq!(pending.run, Run::Until(Instant::from_millis(1500)));
+    let Outcome::Run(pending) = bench.say(1, "run 5us") else { panic!("no run") };
+    assert_eq!(pending.run, Run::For(Duration::from_micros(5)));
 }
 
 #[test]

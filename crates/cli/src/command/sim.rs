@@ -20,6 +20,7 @@ use crate::failure::Failure;
 use crate::global::Global;
 use crate::plain::plain;
 use crate::recording::{FrameLog, RecordFile, RecordOptions};
+use crate::serve::control::ControlServer;
 use crate::serve::eeprom::{EepromError, Eeproms};
 use crate::serve::files::create_log;
 use crate::serve::keeper::{Keeper, file_name};
@@ -29,6 +30,7 @@ use crate::serve::speaker::Speaker;
 use crate::serve::world::ServedWorld;
 use crate::session::{bus_failure, failure_of};
 use described::notes;
+use testbench::control::ControlAddress;
 use testbench::document::BadFile;
 use testbench::machine_file::{Machine, Placed};
 use testbench::words::drive::{DriveSpec, drive_spec};
@@ -87,6 +89,16 @@ pub(crate) struct Sim {
     /// identifier is the joint's address (2615h)
     #[arg(long, value_name = "PLACE")]
     modbus: Option<ModbusSpec>,
+    /// Where other programs give world commands and hear what happens: HOST:PORT, or the path of a Unix socket
+    ///
+    /// Lines of JSON, for `ferrodrive world`, `ferrodrive events` and programs; docs/control.md describes them. On an address
+    /// that other machines can reach a token is asked for.
+    #[arg(long, value_name = "PLACE")]
+    control: Option<ControlAddress>,
+    /// What clients of --control have to say first; without it, on an address that other machines can reach, a random one is
+    /// made and said on standard error
+    #[arg(long, value_name = "TOKEN", env = "FERRODRIVE_CONTROL_TOKEN", hide_env_values = true, requires = "control")]
+    control_token: Option<String>,
     /// Keep EEPROM contents in this directory; without it every start is factory-fresh
     ///
     /// A store is on the disk before the drive acknowledges it: before the SDO answer to a write that is stored, before the
@@ -244,8 +256,9 @@ impl Sim {
         }
         let over = requests.clone();
         world.on_run_over(move || over.try_send(Request::RunIsOver).is_ok());
-        answers.say(&self.ready(&hub, modbus.as_ref(), bridge));
-        if self.places.is_empty() && modbus.is_none() && bridge.is_none() {
+        let control = self.serve_control(&mut world, &requests, &service.warnings).await?;
+        answers.say(&self.ready(&hub, modbus.as_ref(), control.as_ref(), bridge));
+        if self.places.is_empty() && modbus.is_none() && control.is_none() && bridge.is_none() {
             service.warnings.say(NOBODY);
         }
         tokio::spawn(tick(requests.clone(), clock.clone()));
@@ -257,11 +270,42 @@ impl Sim {
     }
 
     /// The line that tells where the bus can be reached.
-    fn ready(&self, hub: &Hub, modbus: Option<&ModbusServer>, bridge: Option<&BusSpec>) -> String {
+    fn ready(
+        &self,
+        hub: &Hub,
+        modbus: Option<&ModbusServer>,
+        control: Option<&ControlServer>,
+        bridge: Option<&BusSpec>,
+    ) -> String {
         let listeners = hub.listeners()[..self.places.len()].iter().map(|listener| format!(" {listener}"));
         let modbus = modbus.map(|server| format!(" {}", server.place()));
+        let control = control.map(|server| format!(" {}", server.place()));
         let bridge = bridge.map(|bus| format!(" {bus}"));
-        ["ready".to_owned()].into_iter().chain(listeners).chain(modbus).chain(bridge).collect()
+        ["ready".to_owned()].into_iter().chain(listeners).chain(modbus).chain(control).chain(bridge).collect()
+    }
+
+    /// The server of `--control`, listening.
+    async fn serve_control(
+        &self,
+        world: &mut ServedWorld,
+        requests: &mpsc::Sender<Request>,
+        warnings: &Speaker,
+    ) -> Result<Option<ControlServer>, Failure> {
+        let Some(address) = &self.control else { return Ok(None) };
+        let token = match &self.control_token {
+            Some(token) if token.is_empty() => {
+                return Err(Failure::usage("the token of --control-token is empty").next("give one, or leave it away"));
+            }
+            Some(token) => Some(token.clone()),
+            None if address.is_local() => None,
+            None => {
+                let token = random_token()?;
+                warnings.say(&format!("note: whoever can reach {address} has to give this token: {token}"));
+                Some(token)
+            }
+        };
+        token.into_iter().for_each(|token| world.ask_for_token(token));
+        ControlServer::bind(address, requests.clone()).await.map(Some)
     }
 
     /// The server of `--modbus`, listening.
@@ -274,6 +318,14 @@ impl Sim {
         let server = ModbusServer::bind(place, requests.clone(), clock).await;
         server.map(Some).map_err(|error| failure_of(&error))
     }
+}
+
+/// 128 random bits in hexadecimal digits.
+fn random_token() -> Result<String, Failure> {
+    let mut bytes = [0; 16];
+    getrandom::fill(&mut bytes)
+        .map_err(|error| Failure::new("cannot make a token").because(error).next("give one with --control-token"))?;
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
 /// Adds a drive with what it remembers and what is around it.

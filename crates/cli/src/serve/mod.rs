@@ -1,5 +1,6 @@
 //! Virtual drives for other programs: a served world, what is said and written about it, EEPROM images on disk.
 
+pub(crate) mod control;
 pub(crate) mod eeprom;
 pub(crate) mod files;
 mod input;

@@ -10,6 +10,7 @@ use sim::command::CommandError;
 use tokio::sync::mpsc;
 use transport::{ModbusRequest, WallClock};
 
+use super::control::ControlMessage;
 use super::input::next_line;
 use super::speaker::Speaker;
 use super::world::{Commanded, ServedWorld};
@@ -46,10 +47,18 @@ pub(crate) enum Request {
     Stored,
     /// A Modbus request.
     Registers(ModbusRequest),
+    /// A client of the control connection comes, speaks or goes.
+    Control(ControlMessage),
     /// A signal asks for the end.
     Ended(Signal),
     /// The bus that was joined is gone.
     BridgeLost(Failure),
+}
+
+impl From<ControlMessage> for Request {
+    fn from(message: ControlMessage) -> Self {
+        Self::Control(message)
+    }
 }
 
 impl From<ModbusRequest> for Request {
@@ -80,6 +89,7 @@ impl Service {
             Request::Line(line) => return self.obey(world, &line),
             Request::RunIsOver => return self.after_a_run(world),
             Request::Registers(request) => world.serve_registers(request),
+            Request::Control(message) => world.serve_control(message),
             Request::Keep => {
                 world.look_for_stores();
                 self.write_records(world);

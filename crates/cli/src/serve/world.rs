@@ -6,19 +6,22 @@
 //! the identifiers are.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 use std::time::Duration;
 
 use can::{Bitrate, Frame, INTERFRAME_SPACE_BITS, Instant};
 use sim::command::{Answer, Before, Command, CommandError, Run, Service};
-use sim::events::Event;
+use sim::events::{Event, EventKind};
 use sim::recorder::Recorder;
 use sim::wire::WireEvent;
 use sim::{StationId, World};
+use testbench::control::{Control, Outcome, Pending};
 use transport::{ClientId, Heard, LeaveReason, ModbusRequest, RealTimeWorld};
 
+use super::control::{ControlMessage, Letters};
 use super::eeprom::EepromError;
 use super::keeper::Keeper;
-use super::lag::Lag;
+use super::lag::{Lag, LagNews};
 use super::pacer::Pacer;
 use super::registers;
 use super::speaker::Speaker;
@@ -38,6 +41,9 @@ pub(crate) struct ServedWorld {
     /// Frames carried since the last call of [`Self::take_carried`], for a log.
     carried: Option<Vec<(Instant, Frame)>>,
     stores: Option<Stores>,
+    control: Control<Letters>,
+    /// Who is behind the lines of standard input, to those who hear of stimuli.
+    own_name: Arc<str>,
     pacer: Pacer,
     /// The run that is under way where time is moved by hand.
     run: Option<UnderWay>,
@@ -54,6 +60,8 @@ struct UnderWay {
     before: Before,
     end: Instant,
     told: bool,
+    /// Whose it is, if a client of the control connection asked.
+    client: Option<Pending>,
 }
 
 /// What becomes of a world command.
@@ -71,6 +79,10 @@ impl ServedWorld {
     /// service goes to `speaker`.
     pub(crate) fn new(mut world: World, pacer: Pacer, logged: bool, speaker: Speaker) -> Self {
         let adapter = world.add_probe();
+        let mut control = Control::new(None);
+        if world.is_watched() {
+            control.keep_events();
+        }
         Self {
             world,
             adapter,
@@ -80,6 +92,8 @@ impl ServedWorld {
             heard: VecDeque::new(),
             carried: logged.then(Vec::new),
             stores: None,
+            control,
+            own_name: "standard input".into(),
             pacer,
             run: None,
             run_is_over: Box::new(|| true),
@@ -95,6 +109,28 @@ impl ServedWorld {
         self.stores = Some(Stores::guard(&mut self.world, keeper, self.speaker.clone()));
     }
 
+    /// Clients of the control connection have to give this token from now on.
+    pub(crate) fn ask_for_token(&mut self, token: String) {
+        self.control.ask_for(token);
+    }
+
+    /// A client of the control connection comes, speaks or goes.
+    pub(crate) fn serve_control(&mut self, message: ControlMessage) {
+        match message {
+            ControlMessage::Joined(number, mailbox) => self.control.join(number, Letters(mailbox)),
+            ControlMessage::Left(number) => drop(self.control.leave(number, &mut self.world)),
+            ControlMessage::Line(number, line) => {
+                let service = self.service();
+                match self.control.handle(number, &line, &mut self.world, service) {
+                    Outcome::Answered => {}
+                    // What it is told is still sent.
+                    Outcome::Close => drop(self.control.leave(number, &mut self.world)),
+                    Outcome::Run(pending) => self.begin_for_client(pending),
+                }
+            }
+        }
+    }
+
     /// The bus's rate.
     pub(crate) fn bitrate(&self) -> Bitrate {
         self.world.bitrate()
@@ -103,25 +139,47 @@ impl ServedWorld {
     /// Does what a world command says.
     pub(crate) fn command(&mut self, line: &str) -> Commanded {
         if let Ok(Command::Run(run)) = line.parse() {
-            return self.begin(run);
+            return match self.begin(run) {
+                Ok(()) => Commanded::Begun,
+                Err(refusal) => Commanded::Done(Answer { json: sim::command::refused(&refusal), quit: false }),
+            };
         }
-        let service = Service { behind: self.lag.now(), frames_lost: self.frames_lost };
-        sim::command::answer_served(&mut self.world, line, service).map_or(Commanded::Nothing, Commanded::Done)
+        let service = self.service();
+        self.world.act_as(Some(self.own_name.clone()));
+        let answer = sim::command::answer_served(&mut self.world, line, service);
+        self.world.act_as(None);
+        self.control.publish(&mut self.world);
+        answer.map_or(Commanded::Nothing, Commanded::Done)
+    }
+
+    fn service(&self) -> Service {
+        Service { behind: self.lag.now(), frames_lost: self.frames_lost }
     }
 
     /// Time begins to move, where that is done by hand.
-    fn begin(&mut self, run: Run) -> Commanded {
-        let refusal = match &self.run {
-            _ if !self.pacer.is_manual() => CommandError::NotManual,
-            Some(run) => CommandError::Running { until_s: run.end.as_nanos() as f64 / 1e9 },
+    fn begin(&mut self, run: Run) -> Result<(), CommandError> {
+        match &self.run {
+            _ if !self.pacer.is_manual() => Err(CommandError::NotManual),
+            Some(run) => Err(CommandError::Running { until_s: run.end.as_nanos() as f64 / 1e9 }),
             None => {
                 let end = run.end(self.world.now());
-                self.run = Some(UnderWay { before: Before::of(&mut self.world), end, told: false });
+                self.run = Some(UnderWay { before: Before::of(&mut self.world), end, told: false, client: None });
                 self.pacer.run_to(end);
-                return Commanded::Begun;
+                Ok(())
             }
-        };
-        Commanded::Done(Answer { json: sim::command::refused(&refusal), quit: false })
+        }
+    }
+
+    /// The same for a client of the control connection, who is answered when it is over.
+    fn begin_for_client(&mut self, pending: Pending) {
+        match self.begin(pending.run) {
+            Ok(()) => {
+                if let Some(run) = &mut self.run {
+                    run.client = Some(pending);
+                }
+            }
+            Err(refusal) => self.control.answer_run(&pending, Err(refusal.into())),
+        }
     }
 
     /// Calls `run_is_over` when there is something for [`take_run`](Self::take_run), until it returns true.
@@ -134,10 +192,17 @@ impl ServedWorld {
         self.run.is_some()
     }
 
-    /// The answer to a run that has come to its end.
+    /// Ends a run that has come to its end; the answer, unless it goes to a client of the control connection.
     pub(crate) fn take_run(&mut self) -> Option<String> {
         let run = self.run.take_if(|run| run.end <= self.world.now())?;
-        Some(run.before.answer(&mut self.world))
+        let answer = run.before.answer(&mut self.world);
+        match run.client {
+            None => Some(answer),
+            Some(pending) => {
+                self.control.answer_run(&pending, Ok(&answer));
+                None
+            }
+        }
     }
 
     /// Has a Modbus request answered.
@@ -158,7 +223,7 @@ impl ServedWorld {
 
     /// What happened since the last call, if the world is watched.
     pub(crate) fn take_events(&mut self) -> Vec<Event> {
-        std::iter::from_fn(|| self.world.poll_event()).collect()
+        self.control.take_events(&mut self.world)
     }
 
     /// Frames carried since the last call.
@@ -219,6 +284,19 @@ impl ServedWorld {
         true
     }
 
+    /// Moves the world to `instant`, with the frames of clients on the way.
+    fn move_to(&mut self, instant: Instant) {
+        loop {
+            let offer = self.next_offer().filter(|at| *at <= instant);
+            let reached = self.run_to(offer.unwrap_or(instant));
+            match offer {
+                Some(_) => self.offer_next(),
+                None if reached => break,
+                None => {}
+            }
+        }
+    }
+
     /// When the adapter takes the frame that waits for it.
     fn next_offer(&self) -> Option<Instant> {
         let waits = self.offered.is_none() && !self.turns.is_empty();
@@ -262,17 +340,17 @@ impl RealTimeWorld for ServedWorld {
 
     fn next_deadline(&self) -> Option<Instant> {
         let stores = self.stores.as_ref().and_then(|stores| stores.next_deadline(&self.world));
-        [self.world.next_event(), self.next_offer(), stores].into_iter().flatten().min()
+        let sample = self.control.next_sample();
+        [self.world.next_event(), self.next_offer(), stores, sample].into_iter().flatten().min()
     }
 
     fn advance_to(&mut self, instant: Instant) {
         loop {
-            let offer = self.next_offer().filter(|at| *at <= instant);
-            let reached = self.run_to(offer.unwrap_or(instant));
-            match offer {
-                Some(_) => self.offer_next(),
-                None if reached => break,
-                None => {}
+            let sample = self.control.next_sample().filter(|at| *at <= instant);
+            self.move_to(sample.unwrap_or(instant));
+            self.control.publish(&mut self.world);
+            if sample.is_none() {
+                break;
             }
         }
         if let Some(stores) = &mut self.stores {
@@ -310,8 +388,14 @@ impl RealTimeWorld for ServedWorld {
 
     fn set_lag(&mut self, lag: Duration) {
         let lag = if self.pacer.follows_the_clock() { lag } else { Duration::ZERO };
-        if let Some(text) = self.lag.update(lag) {
-            self.speaker.say(&text);
+        if let Some(news) = self.lag.update(lag) {
+            self.speaker.say(&news.to_string());
+            let kind = match news {
+                LagNews::Behind(lag) => EventKind::Behind(lag),
+                LagNews::CaughtUp { worst } => EventKind::CaughtUp { worst },
+            };
+            self.world.tell(None, kind);
+            self.control.publish(&mut self.world);
         }
     }
 }

@@ -216,3 +216,9 @@ fn hang_ups_are_passed_over() -> bool {
 pub(crate) fn is_heard(signal: &str) -> bool {
     signal.trim_start_matches('-') != "HUP" || !hang_ups_are_passed_over()
 }
+
+/// A page of `docs`.
+pub(crate) fn page(name: &str) -> String {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../docs").join(name);
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}

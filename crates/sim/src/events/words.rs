@@ -8,6 +8,23 @@ use devices::faults::FaultRow;
 use super::{Event, EventKind};
 use crate::wire::{ErrorCause, ErrorState};
 
+impl Event {
+    /// What to do about it, where something can be done.
+    pub fn remedy(&self) -> Option<&'static str> {
+        match self.kind {
+            EventKind::Fault { row, .. } | EventKind::Emcy { row, .. } => row.map(|row| row.remedy),
+            EventKind::BusError { cause, .. } => Some(remedy_of_error(cause)),
+            EventKind::BusState { to: ErrorState::BusOff, .. } => {
+                Some("look for a node at another bit rate, a broken wire or a missing terminator")
+            }
+            EventKind::Damage(_) => Some("a new drive: this one stays as it is until the simulation ends"),
+            EventKind::Behind(_) => Some("fewer drives or clients, or a slower pace"),
+            EventKind::Missed(_) => Some("pull events more often, or subscribe to fewer"),
+            _ => None,
+        }
+    }
+}
+
 /// `node 4: fault 0001h, over-voltage`: what happened, without time and remedy.
 impl fmt::Display for Event {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -104,7 +121,7 @@ impl ErrorCause {
 }
 
 /// What to do about a frame that does not get through.
-pub(super) const fn remedy_of_error(cause: ErrorCause) -> &'static str {
+const fn remedy_of_error(cause: ErrorCause) -> &'static str {
     match cause {
         ErrorCause::Disturbed => "screen, terminators and contacts of the bus; a single one does no harm",
         ErrorCause::NotAcknowledged => "a second node at the same bit rate: a single one is never acknowledged",

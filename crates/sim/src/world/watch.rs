@@ -1,4 +1,4 @@
-//! Notes what happens in a world that is watched.
+//! What a watched world remembers, and what it notes.
 //!
 //! A drive is looked at after each frame and deadline of it, and after each stimulus, and compared with what it was like
 //! before; the wire tells of itself. Looking changes nothing: [`VirtualDrive::report_of`] reads what is there.
@@ -15,10 +15,9 @@ use cia402::{ModeOfOperation, PowerState, Statusword};
 use devices::faults::FaultRow;
 use devices::{AxisDescription, AxisId, Description, PowerStyle};
 
-use super::World;
 use super::member::Member;
 use crate::events::{Event, EventKind, MAX_WAITING, PowerPhase};
-use crate::stimulus::{Place, Stimulus};
+use crate::stimulus::Place;
 use crate::wire::{ErrorCause, ErrorState, WireEvent};
 use crate::{Report, VirtualDrive};
 
@@ -31,7 +30,7 @@ pub(super) struct Watch {
     controllers: Vec<Controller>,
     waiting: VecDeque<Event>,
     missed: u64,
-    actor: Option<Arc<str>>,
+    pub(super) actor: Option<Arc<str>>,
 }
 
 /// What events tell of one axis.
@@ -67,71 +66,8 @@ struct Subject<'a> {
     drive: &'a dyn VirtualDrive,
 }
 
-impl World {
-    /// Notes events from now on, for [`poll_event`](Self::poll_event), or no longer. What waits to be pulled is dropped when
-    /// watching ends.
-    pub fn watch(&mut self, on: bool) {
-        if !on {
-            self.watch = None;
-        } else if self.watch.is_none() {
-            let mut watch = Watch::default();
-            (0..self.members.len()).for_each(|i| watch.get_to_know(i, &self.members[i]));
-            self.watch = Some(Box::new(watch));
-        }
-    }
-
-    /// The oldest event that has not been pulled.
-    pub fn poll_event(&mut self) -> Option<Event> {
-        self.watch.as_mut()?.pull(self.now)
-    }
-
-    /// Who is behind the stimuli from here on, for those who watch: a client's name, `scenario`; `None` for nobody in
-    /// particular.
-    pub fn act_as(&mut self, who: Option<Arc<str>>) {
-        if let Some(watch) = &mut self.watch {
-            watch.actor = who;
-        }
-    }
-
-    /// Has those who watch told of something that only the caller knows of.
-    pub fn tell(&mut self, place: Option<Place>, kind: EventKind) {
-        let at = self.now;
-        if let Some(watch) = &mut self.watch {
-            watch.push(Event { at, place, kind });
-        }
-    }
-
-    /// Looks at station `i`, if the world is watched and it is a drive.
-    #[inline]
-    pub(super) fn look_at(&mut self, i: usize) {
-        if let Some(watch) = &mut self.watch {
-            watch.look_at(i, &self.members[i], self.now);
-        }
-    }
-
-    /// After a stimulus: notes it, and after it what has come of it.
-    pub(super) fn note_stimulus(&mut self, place: Place, stimulus: &Stimulus) {
-        let Some(watch) = &mut self.watch else { return };
-        let kind = EventKind::Stimulus { words: stimulus.to_string().into(), by: watch.actor.clone() };
-        watch.push(Event { at: self.now, place: Some(place), kind });
-        if let Stimulus::CableCut(cut) = stimulus {
-            watch.push(Event { at: self.now, place: Some(place), kind: EventKind::Cable(*cut) });
-        }
-        if let Some(id) = self.drive_id(place.node) {
-            self.look_at(id.0);
-        }
-    }
-
-    /// Takes over what the wire tells.
-    pub(super) fn note_wire(&mut self, event: &WireEvent) {
-        if let Some(watch) = &mut self.watch {
-            watch.hear(event, &self.members);
-        }
-    }
-}
-
 impl Watch {
-    fn push(&mut self, event: Event) {
+    pub(super) fn push(&mut self, event: Event) {
         if self.waiting.len() >= MAX_WAITING {
             self.waiting.pop_front();
             self.missed += 1;
@@ -139,7 +75,7 @@ impl Watch {
         self.waiting.push_back(event);
     }
 
-    fn pull(&mut self, now: Instant) -> Option<Event> {
+    pub(super) fn pull(&mut self, now: Instant) -> Option<Event> {
         if self.missed > 0 {
             let at = self.waiting.front().map_or(now, |event| event.at);
             let kind = EventKind::Missed(std::mem::take(&mut self.missed));
@@ -161,7 +97,7 @@ impl Watch {
         self.seen[i] = seen;
     }
 
-    fn look_at(&mut self, i: usize, member: &Member, now: Instant) {
+    pub(super) fn look_at(&mut self, i: usize, member: &Member, now: Instant) {
         let Member::Drive { number, drive } = member else { return };
         let subject = Subject { number: *number, drive: &**drive };
         for axis in 0..drive.axes() {
@@ -175,7 +111,7 @@ impl Watch {
         }
     }
 
-    fn hear(&mut self, event: &WireEvent, members: &[Member]) {
+    pub(super) fn hear(&mut self, event: &WireEvent, members: &[Member]) {
         self.controllers.resize(members.len(), Controller::NEW);
         match *event {
             WireEvent::Frame { end, source, frame, .. } => {

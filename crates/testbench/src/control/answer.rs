@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 use sim::command::CommandError;
 
-use super::request::Id;
+use super::id::Id;
 
 /// Why a request was not done, in the form of every error here: what kind, what, about which node, what to do.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -6,15 +6,17 @@ use std::sync::Arc;
 use can::Instant;
 use serde_json::{Value, json};
 use sim::World;
-use sim::command::{Command, CommandError, Service};
+use sim::command::{Command, CommandError, Run, Service};
+use sim::events::MAX_WAITING;
 use sim::stimulus::FORMS;
 
 use super::answer::{ControlError, marked};
+use super::id::Id;
 use super::lines::{MAX_LINE_LENGTH, ReadLine};
 use super::outbox::Class;
-use super::request::{Goal, Id, Message, REQUESTS, Request};
+use super::request::{Message, REQUESTS, Request};
 use super::subscription::{Subscription, Values};
-use crate::events::{self, KINDS};
+use crate::events::{self, Event, EventKind, KINDS};
 
 /// The version of this protocol. It grows by one when something that a client relies on changes; new fields, requests and
 /// kinds of events may come without.
@@ -52,7 +54,7 @@ pub struct Pending {
     /// Whose.
     pub client: ClientNumber,
     /// How far.
-    pub goal: Goal,
+    pub run: Run,
     id: Option<Id>,
 }
 
@@ -61,6 +63,14 @@ pub struct Pending {
 pub struct Control<S> {
     clients: BTreeMap<ClientNumber, Client<S>>,
     token: Option<String>,
+    kept: Option<Kept>,
+}
+
+/// Events for one who takes them as values.
+#[derive(Debug, Default)]
+struct Kept {
+    events: Vec<Event>,
+    missed: u64,
 }
 
 #[derive(Debug)]
@@ -78,7 +88,27 @@ struct Client<S> {
 impl<S: Sink> Control<S> {
     /// With nobody in it. With a `token` each client has to give it first.
     pub fn new(token: Option<String>) -> Self {
-        Self { clients: BTreeMap::new(), token }
+        Self { clients: BTreeMap::new(), token, kept: None }
+    }
+
+    /// Clients that come from now on have to give this token.
+    pub fn ask_for(&mut self, token: String) {
+        self.token = Some(token);
+    }
+
+    /// Keeps every event for [`take_events`](Self::take_events) too, in a world that is watched for somebody else, such as a record.
+    pub fn keep_events(&mut self) {
+        self.kept.get_or_insert_default();
+    }
+
+    /// The events since the last call, if they are kept; at most [`MAX_WAITING`], and then how many are missing.
+    pub fn take_events(&mut self, world: &mut World) -> Vec<Event> {
+        self.publish(world);
+        let Some(Kept { mut events, missed }) = self.kept.as_mut().map(std::mem::take) else { return Vec::new() };
+        if missed > 0 {
+            events.push(Event { at: world.now(), place: None, kind: EventKind::Missed(missed) });
+        }
+        events
     }
 
     /// A client comes under a number of its own.
@@ -122,8 +152,8 @@ impl<S: Sink> Control<S> {
         if let Some(outcome) = client.check_token(id.as_ref(), &request, self.token.as_deref()) {
             return outcome;
         }
-        if let Request::Run(goal) = request {
-            return Outcome::Run(Pending { client: number, goal, id });
+        if let Some(run) = request.run() {
+            return Outcome::Run(Pending { client: number, run, id });
         }
         let answered = client.serve(request, world, service);
         match answered {
@@ -135,14 +165,11 @@ impl<S: Sink> Control<S> {
         Outcome::Answered
     }
 
-    /// Answers a request to move the world, with what has come of it.
-    pub fn answer_run(&mut self, pending: &Pending, done: Result<Instant, ControlError>) {
+    /// Answers a request to move the world, with what has come of it as [`sim::command::Before`] tells it.
+    pub fn answer_run(&mut self, pending: &Pending, done: Result<&str, ControlError>) {
         let Some(client) = self.clients.get_mut(&pending.client) else { return };
         match done {
-            Ok(at) => {
-                let answer = json!({ "ok": true, "t": seconds(at), "t_ns": at.as_nanos() }).to_string();
-                client.sink.put(Class::Answer, marked(pending.id.as_ref(), &answer));
-            }
+            Ok(answer) => client.sink.put(Class::Answer, marked(pending.id.as_ref(), answer)),
             Err(error) => client.refuse(pending.id.as_ref(), &error),
         }
     }
@@ -165,6 +192,11 @@ impl<S: Sink> Control<S> {
                         client.sink.put(Class::Event, line(*number, "event", value));
                     }
                 }
+            }
+            match &mut self.kept {
+                Some(kept) if kept.events.len() < MAX_WAITING => kept.events.push(event),
+                Some(kept) => kept.missed += 1,
+                None => {}
             }
         }
         let now = world.now();
@@ -196,7 +228,8 @@ impl<S: Sink> Control<S> {
     /// The world is watched while somebody wants its events.
     fn update_watch(&self, world: &mut World) {
         let mut all = self.clients.values().flat_map(|client| client.subscriptions.values());
-        world.watch(all.any(|subscription| matches!(subscription, Subscription::Events(_))));
+        let is_wanted = all.any(|subscription| matches!(subscription, Subscription::Events(_)));
+        world.watch(is_wanted || self.kept.is_some());
     }
 }
 
@@ -259,7 +292,7 @@ impl<S: Sink> Client<S> {
                 None => Err(ControlError::usage(format!("there is no subscription {number}"))),
             },
             // The caller has dealt with it.
-            Request::Run(_) => Err(ControlError::new("clock", "the time of this world is not moved by requests")),
+            Request::Run(_) => Err(CommandError::NotManual.into()),
         }
     }
 

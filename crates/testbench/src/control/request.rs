@@ -1,13 +1,14 @@
 //! Requests: from a line of text to what is meant.
 
-use can::Instant;
 use core::time::Duration;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
+use sim::command::{Command, Run};
 use sim::stimulus::Place;
 
 use super::answer::ControlError;
+use super::id::Id;
 use super::subscription::{Channel, Values};
 use crate::events::Filter;
 use crate::words::suggest::{did_you_mean, near};
@@ -19,15 +20,6 @@ pub struct Message {
     pub id: Option<Id>,
     /// What is asked for.
     pub request: Request,
-}
-
-/// A request's mark: a whole number, or a text of at most 128 bytes.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Id {
-    /// A number.
-    Number(i64),
-    /// A text.
-    Text(String),
 }
 
 /// What a client can ask for.
@@ -49,22 +41,13 @@ pub enum Request {
     /// A world command, as a line.
     World(String),
     /// Moves a world whose time nobody else moves.
-    Run(Goal),
+    Run(Run),
     /// Events from now on.
     SubscribeEvents(Filter),
     /// Values from now on.
     SubscribeValues(Values),
     /// Ends a subscription.
     Unsubscribe(u64),
-}
-
-/// How far to move.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Goal {
-    /// By so much.
-    For(Duration),
-    /// To this time.
-    Until(Instant),
 }
 
 /// Each request and its fields, one line each.
@@ -100,7 +83,7 @@ impl Message {
         let mut fields: Map<String, Value> = serde_json::from_str(line).map_err(syntax)?;
         let id = match fields.remove("id") {
             None | Some(Value::Null) => None,
-            Some(value) => Some(Id::of(value).map_err(|error| (None, error))?),
+            Some(value) => Some(mark(value).map_err(|error| (None, error))?),
         };
         match Request::of(fields) {
             Ok(request) => Ok(Self { id, request }),
@@ -109,15 +92,28 @@ impl Message {
     }
 }
 
-impl Id {
-    fn of(value: Value) -> Result<Self, ControlError> {
-        match value {
-            Value::Number(number) if number.is_i64() => Ok(Self::Number(number.as_i64().unwrap_or_default())),
-            Value::String(text) if text.len() <= MAX_NAME_LENGTH => Ok(Self::Text(text)),
-            _ => Err(ControlError::usage(format!(
-                "\"id\" must be a whole number or a text of at most {MAX_NAME_LENGTH} bytes"
-            ))),
+impl Request {
+    /// How far the world is to be moved, if that is asked for.
+    pub(super) fn run(&self) -> Option<Run> {
+        match self {
+            Self::Run(run) => Some(*run),
+            Self::World(line) => match line.parse() {
+                Ok(Command::Run(run)) => Some(run),
+                _ => None,
+            },
+            _ => None,
         }
+    }
+}
+
+/// The mark that a client gave.
+fn mark(value: Value) -> Result<Id, ControlError> {
+    match value {
+        Value::Number(number) if number.is_i64() => Ok(Id::Number(number.as_i64().unwrap_or_default())),
+        Value::String(text) if text.len() <= MAX_NAME_LENGTH => Ok(Id::Text(text)),
+        _ => Err(ControlError::usage(format!(
+            "\"id\" must be a whole number or a text of at most {MAX_NAME_LENGTH} bytes"
+        ))),
     }
 }
 
@@ -260,13 +256,21 @@ fn word(value: &Value) -> Option<String> {
     }
 }
 
-fn run(fields: &RunFields) -> Result<Goal, ControlError> {
-    match fields {
-        RunFields { duration: Some(text), until: None } => duration(text, "for").map(Goal::For),
-        RunFields { duration: None, until: Some(text) } => {
-            duration(text, "until").map(|at| Goal::Until(Instant::ZERO + at))
-        }
-        _ => Err(ControlError::usage("give one of \"for\" and \"until\"").next(REQUESTS[6])),
+/// In the words of the world command, which has the one parser of it.
+fn run(fields: &RunFields) -> Result<Run, ControlError> {
+    let (words, time) = match fields {
+        RunFields { duration: Some(time), until: None } => ("run", time),
+        RunFields { duration: None, until: Some(time) } => ("run until", time),
+        _ => return Err(ControlError::usage("give one of \"for\" and \"until\"").next(REQUESTS[6])),
+    };
+    let refused = |reason: String| ControlError::usage(reason).next(REQUESTS[6]);
+    if !time.starts_with(|first: char| first.is_ascii_digit() || first == '.') {
+        return Err(refused(format!("{time:?} is no time; expected a number and its unit, as in 20ms")));
+    }
+    match format!("{words} {time}").parse() {
+        Ok(Command::Run(run)) => Ok(run),
+        Ok(_) => Err(refused(format!("{time:?} is no time"))),
+        Err(error) => Err(refused(error.to_string())),
     }
 }
 

@@ -1,0 +1,72 @@
+//! `ferrodrive events`: what happens in a running simulator, as it happens.
+
+use serde_json::{Value, json};
+use testbench::events::Filter;
+
+use crate::control_client::ControlArgs;
+use crate::failure::Failure;
+use crate::output::{Format, print_line};
+use crate::plain::plain;
+use crate::session::exit_on_signal;
+
+/// Show what happens in a running simulator: boots, changes of state, faults with what to do, arrivals, bus errors
+///
+/// Runs until the simulator ends, or Ctrl-C. Times are those of the bus.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Kinds: power, boot, nmt, state, mode, fault, fault_reset, emcy, target_reached, internal_limit,\n\
+    store_begun, store_done, damage, bus_error, bus_state, cable, stimulus, behind, caught_up, missed\n\n\
+    Examples:\n  ferrodrive events --control 127.0.0.1:4000\n  \
+    ferrodrive events --control 127.0.0.1:4000 --node 4 --kind fault --kind fault_reset --json"
+)]
+pub(crate) struct Events {
+    #[command(flatten)]
+    control: ControlArgs,
+    /// Only of this node; may be repeated
+    #[arg(long = "node", value_name = "NODE", value_parser = clap::value_parser!(u8).range(1..=127))]
+    nodes: Vec<u8>,
+    /// Only of this kind; may be repeated
+    #[arg(long = "kind", value_name = "KIND")]
+    kinds: Vec<String>,
+    /// End after so many events
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    count: Option<u64>,
+}
+
+impl Events {
+    /// Shows events until there are no more.
+    pub(crate) fn run(&self, format: Format) -> Result<(), Failure> {
+        Filter::new(self.nodes.iter().copied(), &self.kinds).map_err(|error| Failure::usage(error.to_string()))?;
+        exit_on_signal();
+        let mut client = self.control.connect()?;
+        let events = json!({ "nodes": self.nodes, "kinds": self.kinds });
+        client.ask(json!({ "request": "subscribe", "events": events }))?;
+        client.wait_at_most(None)?;
+        let mut shown = 0;
+        while self.count.is_none_or(|count| shown < count)
+            && let Some(line) = client.next()?
+        {
+            let Some(told) = line.get("event").or_else(|| line.get("dropped")) else { continue };
+            let printed = if format.json { format.print_json(told) } else { print_line(&plain(&words(told))) };
+            printed.map_err(|error| Failure::new("cannot write to standard output").because(error))?;
+            shown += 1;
+        }
+        Ok(())
+    }
+}
+
+/// `(  1.234567)  node 4: fault 0001h, over-voltage`, and what to do below.
+fn words(told: &Value) -> String {
+    let Some(t) = told["t"].as_f64() else {
+        return format!("{} events are missing here: they were not read in time", told["events"]);
+    };
+    let place = match (&told["node"], &told["axis"]) {
+        (Value::Null, _) => String::new(),
+        (node, Value::Null) => format!("node {node}: "),
+        (node, axis) => format!("node {node}.{axis}: "),
+    };
+    let text = told["text"].as_str().unwrap_or_default();
+    let by = told["by"].as_str().filter(|by| !text.contains(by)).map(|by| format!(" (by {by})")).unwrap_or_default();
+    let remedy = told["remedy"].as_str().map(|remedy| format!("\n{:14}what to do: {remedy}", "")).unwrap_or_default();
+    format!("({t:11.6}) {place}{text}{by}{remedy}")
+}

@@ -1,0 +1,75 @@
+//! Where the world's loop leaves lines for a client's task.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use testbench::control::{Class, Outbox, Sink};
+use tokio::sync::Notify;
+
+/// Lines for one client, and whether more will come.
+#[derive(Debug, Default)]
+pub(crate) struct Mailbox {
+    content: Mutex<Content>,
+    filled: Notify,
+    emptied: Notify,
+}
+
+#[derive(Debug, Default)]
+struct Content {
+    outbox: Outbox,
+    closed: bool,
+}
+
+/// The world's end of a mailbox. Dropped, it closes it: what is there is still sent.
+#[derive(Debug)]
+pub(crate) struct Letters(pub(crate) Arc<Mailbox>);
+
+impl Sink for Letters {
+    fn put(&mut self, class: Class, line: String) {
+        self.0.content().outbox.put(class, line);
+        self.0.filled.notify_one();
+    }
+}
+
+impl Drop for Letters {
+    fn drop(&mut self) {
+        self.0.content().closed = true;
+        self.0.filled.notify_one();
+    }
+}
+
+impl Mailbox {
+    fn content(&self) -> MutexGuard<'_, Content> {
+        self.content.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Waits while too many answers are unread.
+    pub(super) async fn wait_for_room(&self) {
+        while self.content().outbox.is_full() {
+            self.emptied.notified().await;
+        }
+    }
+
+    /// Waits for lines and puts them into `text`, each with its end, until that has `enough` bytes; false when there are none and
+    /// no more will come.
+    pub(super) async fn fetch(&self, text: &mut String, enough: usize) -> bool {
+        loop {
+            {
+                let mut content = self.content();
+                while text.len() < enough
+                    && let Some(line) = content.outbox.next_line()
+                {
+                    text.push_str(&line);
+                    text.push('\n');
+                }
+                if text.is_empty() && content.closed {
+                    return false;
+                }
+            }
+            if !text.is_empty() {
+                self.emptied.notify_one();
+                return true;
+            }
+            self.filled.notified().await;
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! What every command prints with `--json` is as docs/json.schema.json says, and docs/json.md names it.
+
+mod common;
+
+use common::{Ended, Simulator, ferrodrive, page, scratch};
+use serde_json::{Value, json};
+
+const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/scenarios/homing_stuck_switch.toml");
+
+/// Each command line, and the definition that each line of it is an instance of.
+const COMMANDS: &[(&[&str], &str)] = &[
+    (&["scan"], "scan"),
+    (&["read", "4", "6064"], "value"),
+    (&["read", "4", "1018:01"], "value"),
+    (&["write", "4", "6060", "3"], "value"),
+    (&["state", "1"], "state"),
+    (&["enable", "4"], "state"),
+    (&["disable", "2"], "state"),
+    (&["stop", "4"], "state"),
+    (&["quick-stop", "4"], "state"),
+    (&["reset", "4"], "state"),
+    (&["velocity", "4", "60rpm", "--for", "200ms"], "motion"),
+    (&["move", "4", "90deg"], "motion"),
+    (&["torque", "4", "500mA"], "motion"),
+    (&["nmt", "4", "start"], "nmt"),
+    (&["nmt", "all", "reset"], "nmt"),
+    (&["nmt", "2", "reset"], "nmt"),
+    (&["save", "4"], "store"),
+    (&["restore", "2"], "store"),
+    (&["objects", "zlac8030l"], "objects"),
+    (&["objects", "4", "6081"], "objects"),
+    (&["objects", "zlim42c", "--departures"], "departures"),
+    (&["readings", "m4230e17b50"], "readings"),
+    (&["eds", "zlac8030l"], "eds"),
+    (&["dcf", "4"], "dcf"),
+    (&["dump", "--for", "1s"], "frame"),
+    (&["run", SCENARIO], "run"),
+    (&["run", SCENARIO, "--seeds", "1..2"], "sweep"),
+    (&["read", "9", "6064"], "failure"),
+    (&["write", "4", "6064", "5"], "failure"),
+    (&["home", "4", "--method", "17"], "failure"),
+    (&["eds", "show", "/no/such/file.eds"], "failure"),
+    (&["eds", "lint", "/no/such/file.eds"], "eds_lint"),
+    (&["world", "now"], "failure"),
+    (&["fly"], "failure"),
+];
+
+fn schema() -> Value {
+    serde_json::from_str(&page("json.schema.json")).expect("the schema is JSON")
+}
+
+/// Holds lines of output to a definition, and what they say of success to the exit status.
+#[track_caller]
+fn hold(ended: &Ended, definition: &str, what: &str) -> Vec<Value> {
+    let mut schema = schema();
+    schema["anyOf"] = json!([{ "$ref": format!("#/$defs/{definition}") }]);
+    let validator = jsonschema::validator_for(&schema).expect("the schema is one");
+    assert!(!ended.out.is_empty(), "{what} prints nothing: {}", ended.err);
+    let lines = ended.out.lines().map(|line| {
+        let value: Value = serde_json::from_str(line).unwrap_or_else(|error| panic!("{what}: {error} in {line}"));
+        if let Some(error) = validator.iter_errors(&value).next() {
+            panic!("{what}: {error} at {} in {line}", error.instance_path());
+        }
+        assert!(line.starts_with("{\"ok\":"), "{what}: {line}");
+        assert_eq!(value["ok"] == true, ended.status == Some(0), "{what}: {:?} {line}", ended.status);
+        value
+    });
+    lines.collect()
+}
+
+#[test]
+fn each_command_prints_what_the_schema_says() {
+    for (arguments, definition) in COMMANDS {
+        let ended = ferrodrive(&[arguments, &["--json"][..]].concat());
+        hold(&ended, definition, &format!("{arguments:?}"));
+    }
+}
+
+#[test]
+fn files_and_logs_are_told_of_in_the_same_form() {
+    let directory = scratch("schema");
+    let path = |name: &str| directory.join(name).to_str().expect("UTF-8").to_owned();
+    let (sheet, log, odd) = (path("a.eds"), path("a.log"), path("odd.log"));
+    let made = ferrodrive(&["eds", "zlac8030l", "--json"]).json()["eds"].as_str().expect("a text").to_owned();
+    std::fs::write(&sheet, made).unwrap();
+    for (arguments, definition) in [
+        (&["eds", "lint", &sheet][..], "eds_lint"),
+        (&["eds", "show", &sheet], "eds_show"),
+        (&["eds", "diff", &sheet, "zlim42c"], "eds_diff"),
+        (&["dump", "--for", "1s", "--log", &log], "frame"),
+    ] {
+        hold(&ferrodrive(&[arguments, &["--json"]].concat()), definition, &format!("{arguments:?}"));
+    }
+    let frames = std::fs::read_to_string(&log).unwrap();
+    std::fs::write(&odd, format!("{frames}no frame\n")).unwrap();
+    let bus = format!("log:{odd}");
+    let ended = ferrodrive(&["--bus", &bus, "dump", "--json"]);
+    let (told, last) = ended.out.trim_end().rsplit_once('\n').unwrap();
+    let (frames, skipped) = told.rsplit_once('\n').unwrap();
+    for (out, definition) in [(frames, "frame"), (skipped, "log_line"), (last, "log_summary")] {
+        let part = Ended { status: ended.status, out: out.to_owned(), err: String::new() };
+        hold(&part, definition, definition);
+    }
+    std::fs::remove_dir_all(directory).unwrap();
+}
+
+#[test]
+fn the_commands_of_a_running_simulator_print_the_same_form() {
+    let simulator = Simulator::start(&["--drive", "zlac8030l@4", "--control", "127.0.0.1:0"]);
+    let place = simulator.address("control");
+    for (words, definition) in [
+        (&["4", "get"][..], "world"),
+        (&["now"], "world"),
+        (&["help"], "world"),
+        (&["4", "supply", "30"], "world"),
+        (&["4", "battery", "off"], "failure"),
+        (&["4", "dance"], "failure"),
+    ] {
+        let ended = ferrodrive(&[&["--json", "world", "--control", &place], words].concat());
+        hold(&ended, definition, &format!("{words:?}"));
+    }
+}
+
+#[test]
+fn the_page_names_every_command_and_every_kind_that_tests_meet() {
+    let page = page("json.md");
+    for (arguments, _) in COMMANDS.iter().filter(|(arguments, _)| arguments[0] != "fly") {
+        assert!(page.contains(&format!("`{}", arguments[0])), "docs/json.md does not name {}", arguments[0]);
+    }
+    for kind in
+        ["usage", "no_answer", "aborted", "not_reached", "no_such_mode", "out_of_limits", "bus", "control", "no_log"]
+    {
+        assert!(page.contains(&format!("`{kind}`")), "docs/json.md does not name {kind}");
+    }
+    let printed = page.lines().find(|line| line.starts_with("{\"ok\":false")).expect("an example");
+    let example = Ended { status: Some(1), out: printed.to_owned(), err: String::new() };
+    hold(&example, "failure", "the example of the page");
+}
