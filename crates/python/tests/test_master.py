@@ -137,7 +137,7 @@ def simulator():
         path = ferrodrive.simulator.program()
     except ferrodrive.SimulatorError as error:
         pytest.skip(str(error))
-    with ferrodrive.Simulator(["cia402@5"], path=path) as simulator:
+    with ferrodrive.Simulator(["cia402@5"], extra=["--timing", "ideal"], path=path) as simulator:
         yield simulator
 
 

@@ -53,7 +53,7 @@ def test_the_served_simulator_is_ready(pytester):
         """
         import can, pytest
 
-        @pytest.mark.ferrodrive(drives=["zlac8030l@4"])
+        @pytest.mark.ferrodrive(drives=["zlac8030l@4"], extra=["--timing", "ideal"])
         def test_it(ferrodrive_sim):
             assert ferrodrive_sim.world("4 get")["node"] == 4
             with can.Bus(**ferrodrive_sim.can_arguments()) as bus:

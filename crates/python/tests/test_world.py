@@ -287,7 +287,7 @@ def every_form():
     for line in ferrodrive.stimulus_forms():
         for form in re.split(r", or |, ", re.sub(r" \(.*?\)", "", line).replace("[", "").replace("]", "")):
             words = form.removeprefix("NODE ").split()
-            if words[0] in ("now", "help", "quit") or words[-1] == "get":
+            if words[0] in ("now", "run", "help", "quit") or words[-1] == "get":
                 continue
             fixed = [word.split("|") for word in words if re.fullmatch(r"[a-z][a-z|]*", word)]
             for number, alternatives in enumerate(fixed):
