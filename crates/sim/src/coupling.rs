@@ -130,6 +130,37 @@ pub enum BodyKind {
     },
 }
 
+impl BodyKind {
+    /// Every number of it with a name that ends with its unit: `x_m`, `joint2_deg`. The names of one machine are always the same.
+    pub fn signals(&self) -> Vec<(String, f64)> {
+        let plain =
+            |signals: &[(&str, f64)]| signals.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
+        match self {
+            Self::DifferentialDrive { x_m, y_m, heading_deg, speed_m_s, yaw_rate_deg_s, slip_m, slips: _ } => plain(&[
+                ("x_m", *x_m),
+                ("y_m", *y_m),
+                ("heading_deg", *heading_deg),
+                ("speed_m_s", *speed_m_s),
+                ("yaw_rate_deg_s", *yaw_rate_deg_s),
+                ("slip_left_m", slip_m[0]),
+                ("slip_right_m", slip_m[1]),
+            ]),
+            Self::CommonShaft { angle_deg, speed_rpm } => {
+                plain(&[("angle_deg", *angle_deg), ("speed_rpm", *speed_rpm)])
+            }
+            Self::Arm { joints_deg, joints_deg_s, tool_m } => {
+                let numbered = |unit: &'static str, values: &[f64]| {
+                    let named = values.iter().enumerate().map(|(i, value)| (format!("joint{}_{unit}", i + 1), *value));
+                    named.collect::<Vec<_>>()
+                };
+                let [x, y, z] = *tool_m;
+                let tool: Vec<(String, f64)> = plain(&[("tool_x_m", x), ("tool_y_m", y), ("tool_z_m", z)]);
+                [numbered("deg", joints_deg), numbered("deg_s", joints_deg_s), tool].concat()
+            }
+        }
+    }
+}
+
 const MASS: Quantity = Quantity { what: "mass of a body", expected: "0.01 to 100000 kg", least: 0.01, greatest: 1e5 };
 const YAW_INERTIA: Quantity =
     Quantity { what: "yaw inertia", expected: "1e-6 to 1e6 kg·m²", least: 1e-6, greatest: 1e6 };

@@ -8,6 +8,7 @@ use core::time::Duration;
 
 use can::Instant;
 
+use crate::coupling::BodyState;
 use crate::stimulus::{Place, Stimulus};
 use crate::{Brake, Report};
 
@@ -152,6 +153,8 @@ pub struct Channel {
 #[derive(Clone, Debug)]
 pub struct Recorder {
     channels: Vec<Channel>,
+    /// Machines that drives move, and how many signals each has.
+    bodies: Vec<(String, usize)>,
     period: Duration,
     next_at: Option<Instant>,
     times: Vec<Instant>,
@@ -165,6 +168,7 @@ impl Recorder {
     pub fn new(period: Duration, channels: impl IntoIterator<Item = Channel>) -> Self {
         Self {
             channels: channels.into_iter().collect(),
+            bodies: Vec::new(),
             period: period.max(Duration::from_micros(1)),
             next_at: None,
             times: Vec::new(),
@@ -174,15 +178,27 @@ impl Recorder {
         }
     }
 
+    /// Records these machines too: their [`signals`](crate::coupling::BodyKind::signals) stand behind the channels.
+    pub fn with_bodies(mut self, states: &[BodyState]) -> Self {
+        self.bodies = states.iter().map(|state| (state.name.clone(), state.kind.signals().len())).collect();
+        self
+    }
+
+    /// How many values a row has.
+    fn width(&self) -> usize {
+        self.channels.len() + self.bodies.iter().map(|(_, signals)| signals).sum::<usize>()
+    }
+
     /// Hands out what was recorded so far and goes on without it: a long run is recorded in pieces, in bounded memory.
     pub fn take(&mut self) -> Self {
-        let rest = Self { next_at: self.next_at, ..Self::new(self.period, self.channels.iter().copied()) };
+        let empty = Self::new(self.period, self.channels.iter().copied());
+        let rest = Self { next_at: self.next_at, bodies: self.bodies.clone(), ..empty };
         std::mem::replace(self, rest)
     }
 
-    /// The values of one time after the other, each in the order of [`channels`](Self::channels).
+    /// The values of one time after the other, each in the order of [`channels`](Self::channels), then those of the bodies.
     pub fn rows(&self) -> impl Iterator<Item = (Instant, &[f64])> + '_ {
-        let width = self.channels.len();
+        let width = self.width();
         self.times.iter().enumerate().map(move |(row, at)| (*at, &self.values[row * width..(row + 1) * width]))
     }
 
@@ -198,7 +214,7 @@ impl Recorder {
 
     /// The samples of channel number `channel`, one for each time; empty if there is no such channel.
     pub fn samples(&self, channel: usize) -> impl Iterator<Item = f64> + '_ {
-        let step = self.channels.len().max(1);
+        let step = self.width().max(1);
         let start = if channel < self.channels.len() { channel } else { self.values.len() };
         self.values.iter().skip(start).step_by(step).copied()
     }
@@ -231,17 +247,28 @@ impl Recorder {
         self.next_at.filter(|at| *at <= end)
     }
 
-    /// Takes the samples of `at`. `measure` gives the report of an axis; `None` if there is no such axis.
-    pub(crate) fn sample(&mut self, at: Instant, mut measure: impl FnMut(Place) -> Option<Report>) {
+    /// Takes the samples of `at`. `measure` gives the report of an axis, `look` the state of a body; `None` if there is none.
+    pub(crate) fn sample<W>(
+        &mut self,
+        at: Instant,
+        world: &mut W,
+        measure: impl Fn(&mut W, Place) -> Option<Report>,
+        look: impl Fn(&mut W, &str) -> Option<BodyState>,
+    ) {
         self.times.push(at);
         // Channels of one axis mostly stand together: its report is made once for them.
         let mut measured: Option<(Place, Option<Report>)> = None;
         for Channel { place, signal } in &self.channels {
             if measured.as_ref().is_none_or(|(known, _)| known != place) {
-                measured = Some((*place, measure(*place)));
+                measured = Some((*place, measure(world, *place)));
             }
             let report = measured.as_ref().and_then(|(_, report)| report.as_ref());
             self.values.push(report.map_or(f64::NAN, |report| signal.of(report)));
+        }
+        for (name, signals) in &self.bodies {
+            let state = look(world, name).map(|state| state.kind.signals()).unwrap_or_default();
+            let values = state.into_iter().map(|(_, value)| value).chain(std::iter::repeat(f64::NAN));
+            self.values.extend(values.take(*signals));
         }
         self.next_at = Some(at + self.period);
     }

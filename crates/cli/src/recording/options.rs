@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use devices::AxisId;
+use sim::coupling::BodyState;
 use sim::recorder::{Channel, Recorder, Signal};
 use sim::{Place, World};
 use testbench::recording::{Column, Kind, columns_of_drives, select};
@@ -61,21 +62,27 @@ impl RecordOptions {
             let axes = world.with_drive(node, |drive, _| drive.axes()).unwrap_or(0);
             places.extend((0..axes).map(|axis| Place { node, axis: AxisId(axis) }));
         }
-        let channels: Vec<Channel> =
-            places.iter().flat_map(|place| Signal::ALL.map(|signal| Channel { place: *place, signal })).collect();
-        let mut columns = columns_of_drives(places);
-        let mut chosen: Vec<usize> = (0..columns.len()).collect();
+        let signals = |place: &Place| Signal::ALL.map(|signal| Channel { place: *place, signal });
+        let mut channels: Vec<Channel> = places.iter().flat_map(signals).collect();
+        let names: Vec<String> = world.body_names().map(str::to_owned).collect();
+        let mut bodies: Vec<BodyState> = names.iter().filter_map(|name| world.body(name)).collect();
         if !self.record_signals.is_empty() {
-            let names: Vec<String> = columns.iter().map(Column::name).collect();
-            chosen = select(&names, &self.record_signals)
+            let of_drives = columns_of_drives(places);
+            let all = of_drives.into_iter().chain(bodies.iter().flat_map(Column::of_body));
+            let names: Vec<String> = all.map(|column| column.name()).collect();
+            let chosen = select(&names, &self.record_signals)
                 .map_err(|reason| Failure::usage("cannot record what --record-signals asks for").because(reason))?;
+            let is_chosen = |name: &str| chosen.iter().any(|i| names[*i] == name);
+            channels.retain(|channel| is_chosen(&Column::of_axis(*channel).name()));
+            // A body is recorded as a whole.
+            bodies.retain(|body| Column::of_body(body).iter().any(|column| is_chosen(&column.name())));
         }
-        let channels: Vec<Channel> = chosen.iter().map(|i| channels[*i]).collect();
-        columns = chosen.iter().map(|i| columns[*i].clone()).collect();
+        let of_axes = channels.iter().map(|channel| Column::of_axis(*channel));
+        let columns: Vec<Column> = of_axes.chain(bodies.iter().flat_map(Column::of_body)).collect();
         let period = self.record_period.unwrap_or(Duration::from_millis(1));
         let file = create(path).and_then(|(kind, file)| RecordFile::start(kind, file, &columns, speaker));
         let file = file.map_err(|error| cannot_write(path, &error))?;
-        world.start_recording(Recorder::new(period, channels));
+        world.start_recording(Recorder::new(period, channels).with_bodies(&bodies));
         world.watch(true);
         Ok(Some(file))
     }

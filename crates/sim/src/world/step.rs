@@ -50,7 +50,7 @@ impl World {
         if let Some(mut recorder) = self.recorder.take() {
             while let Some(due) = recorder.due_by(at) {
                 self.now = self.now.max(due);
-                recorder.sample(due, |place| self.measure(place));
+                recorder.sample(due, self, Self::measure, Self::body);
             }
             self.recorder = Some(recorder);
         }

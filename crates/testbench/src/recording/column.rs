@@ -5,6 +5,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use sim::Place;
+use sim::coupling::BodyState;
 use sim::recorder::{Channel, Signal};
 
 use crate::words::suggest::{did_you_mean, near};
@@ -33,6 +34,17 @@ impl Column {
     /// A signal of an axis.
     pub fn of_axis(Channel { place, signal }: Channel) -> Self {
         Self { subject: Subject::Axis(place), signal: signal.name().into(), unit: signal.unit().into() }
+    }
+
+    /// The signals of a machine that drives move.
+    pub fn of_body(body: &BodyState) -> Vec<Self> {
+        let subject = Subject::Body(body.name.clone());
+        let column = |(signal, _): (String, f64)| Self {
+            subject: subject.clone(),
+            unit: unit_of(&signal).into(),
+            signal: signal.into(),
+        };
+        body.kind.signals().into_iter().map(column).collect()
     }
 
     /// Its name in a file, `4.velocity_rpm`, and back: see [`FromStr`].
@@ -104,10 +116,11 @@ impl FromStr for Column {
 
 /// The unit that a name ends with.
 fn unit_of(signal: &str) -> &'static str {
-    const ENDINGS: [(&str, &str); 12] = [
+    const ENDINGS: [(&str, &str); 13] = [
         ("_counts", "counts"),
         ("_rpm", "r/min"),
         ("_rad_s", "rad/s"),
+        ("_deg_s", "°/s"),
         ("_m_s", "m/s"),
         ("_rad", "rad"),
         ("_deg", "°"),

@@ -9,7 +9,7 @@ use super::piece::Severity;
 use super::read::{Recorded, Series};
 
 /// What is drawn when nobody says what.
-const USUAL: [&str; 4] = ["position", "velocity", "current", "supply"];
+const USUAL: [&str; 8] = ["position", "velocity", "current", "supply", "x_m", "y_m", "heading", "joint"];
 
 /// Kinds of events that are not marked: the curves show them, or what comes of them.
 const QUIET: [&str; 6] = ["boot", "nmt", "mode", "state", "store_begun", "target_reached"];
@@ -134,8 +134,8 @@ fn panel(quantity: &str, lines: &[&Series]) -> Panel {
 
 /// `velocity_rpm` in words: `Velocity`.
 fn title(quantity: &str) -> String {
-    const UNITS: [&str; 12] =
-        ["_counts", "_rpm", "_rad_s", "_m_s", "_rad", "_deg", "_nm", "_a", "_v", "_c", "_j", "_m"];
+    const UNITS: [&str; 13] =
+        ["_counts", "_rpm", "_rad_s", "_deg_s", "_m_s", "_rad", "_deg", "_nm", "_a", "_v", "_c", "_j", "_m"];
     let bare = UNITS.iter().find_map(|unit| quantity.strip_suffix(unit)).unwrap_or(quantity).replace('_', " ");
     let mut letters = bare.chars();
     letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
@@ -145,7 +145,7 @@ fn title(quantity: &str) -> String {
 fn look(quantity: &str, unit: &str) -> (Colour, bool) {
     match unit {
         "counts" | "rad" | "m" | "°" => (Colour::Blue, false),
-        "r/min" | "m/s" | "rad/s" => (Colour::Teal, true),
+        "r/min" | "m/s" | "rad/s" | "°/s" => (Colour::Teal, true),
         "A" | "N·m" => (Colour::Orange, true),
         "V" => (Colour::Purple, false),
         "°C" => (Colour::Red, false),
