@@ -154,3 +154,40 @@ fn a_scenario_that_is_recorded_is_the_same_run() {
     let both = ferrodrive(&["run", scenario, "--seeds", "1..3", "--record", place.join("a.csv").to_str().unwrap()]);
     assert!(both.status == Some(2) && both.err.contains("a sweep is many runs"), "{}", both.err);
 }
+
+#[test]
+fn a_body_is_recorded_with_what_it_does() {
+    let place = scratch("recorded-body");
+    let scenario = place.join("base.toml");
+    let text = r#"
+title = "A base that is driven"
+end = "3s"
+
+[[machine.drive]]
+model = "zlac8030l"
+node = 4
+
+[[machine.drive]]
+model = "zlac8030l"
+node = 5
+
+[[machine.body]]
+name = "base"
+kind = "common-shaft"
+drives = [4, 5]
+
+[[step]]
+at = "1s"
+do = "4 load torque -1"
+"#;
+    std::fs::write(&scenario, text).unwrap();
+    let csv = place.join("run.csv");
+    done(&["run", scenario.to_str().unwrap(), "--record", csv.to_str().unwrap(), "--record-signals", "base.*"]);
+    let recorded = recorded(&csv);
+    let names: Vec<String> = recorded.series.iter().map(|series| series.column.name()).collect();
+    assert_eq!(names, ["base.angle_deg", "base.speed_rpm"]);
+    let units: Vec<&str> = recorded.series.iter().map(|series| &*series.column.unit).collect();
+    assert_eq!(units, ["°", "r/min"]);
+    let fastest = recorded.series[1].points.iter().map(|(_, rpm)| *rpm).fold(0.0, f64::max);
+    assert!(fastest > 10.0, "the load turns it: {fastest} r/min");
+}
