@@ -31,6 +31,7 @@ laws_hold! {
     any_memory_image_boots_to_values_within_their_limits: "eeprom";
     // Each run is a world of three drives that turn.
     any_world_command_is_answered_and_leaves_every_measurement_a_number: "world_command" 1_500;
+    any_line_of_a_control_client_is_answered_once_and_every_line_sent_is_an_object: "control" 1_500;
     the_masters_requests_all_end_once_whatever_the_bus_brings: "master_core";
 }
 
