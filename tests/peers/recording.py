@@ -44,4 +44,4 @@ def records(bench):
         frames = [json.loads(message.data) for topic, message in messages if topic == "/can"]
         true(any(frame["text"] == f"{0x700 + node_id:03X}#00" for frame in frames), "the boot-up is among the frames")
         said = [json.loads(message.data) for topic, message in messages if topic == "/events"]
-        true(any(line["message"] == "load torque 0.1" for line in said), f"the world command is among the events: {said}")
+        true(any(line["message"].startswith("load torque 0.1") for line in said), f"the world command is among the events: {said}")

@@ -11,7 +11,7 @@ use common::{Simulator, done};
 const PRINTED_PORT: &str = "29536";
 
 /// What is no command of ours: checked elsewhere, or another program's.
-const OTHERS: &[&str] = &["cargo ", "git ", "#"];
+const OTHERS: &[&str] = &["cargo ", "git ", "pip ", "#"];
 
 fn page(name: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/handbook").join(name);

@@ -81,7 +81,7 @@ fn a_line_that_is_no_frame_is_told_with_its_number_and_passed_over() {
     let rows: Vec<Value> = shown.out.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!((&rows[1]["line"], &rows[1]["skipped"]), (&json!(2), &json!("(1.1) can0 604##1112233")));
     assert!(rows[1]["reason"].as_str().unwrap().contains("FD"), "{}", rows[1]);
-    assert_eq!(rows[5], json!({ "frames": 3, "lines_skipped": 2 }));
+    assert_eq!(rows[5], json!({ "ok": true, "frames": 3, "lines_skipped": 2 }));
     assert_eq!((rows.len(), shown.err.as_str()), (6, ""));
 
     std::fs::write(&log, "no log\n".repeat(1000)).unwrap();

@@ -65,10 +65,8 @@ pub(super) fn control(data: &[u8]) {
         }
     }
     for inbox in [speaker, hearer] {
-        while let Some(line) = {
-            let next = inbox.0.borrow_mut().0.next_line();
-            next
-        } {
+        let next = || inbox.0.borrow_mut().0.next_line();
+        while let Some(line) = next() {
             assert!(!line.contains(['\n', '\r']), "{line}");
             let value: Value = serde_json::from_str(&line).unwrap_or_else(|error| panic!("{error} in {line}"));
             assert!(value.is_object(), "{line}");

@@ -20,8 +20,8 @@ use crate::engine::cia402::{self as power, DisableOptions, ExternalStop, Toleran
 /// Deceleration of a device without any: that of the motor's rated torque on its own inertia would be rough; this stops
 /// from the highest speed in a fifth of a second.
 const STOPS_IN_S: f64 = 0.2;
-/// Communication cycle period.
-const SYNC_PERIOD: Mux = Mux::new(0x1006, 0);
+/// Communication cycle period: set-points of csv and cst are awaited in its rhythm.
+pub(super) const SYNC_PERIOD: Mux = Mux::new(0x1006, 0);
 /// Windows in increments of a device that has no object for them.
 const POSITION_WINDOW: i64 = 100;
 const WINDOW_TIME_MS: i64 = 10;

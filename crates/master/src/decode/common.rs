@@ -51,9 +51,8 @@ fn standard(mux: Mux) -> Option<&'static Standard> {
 
 /// Objects of the standards that none of the models has, ascending. Arrays and records have no type.
 #[rustfmt::skip]
-const STANDARD: [Standard; 15] = [
+const STANDARD: [Standard; 14] = [
     (0x1002, "manufacturer_status_register", Some(U32)),
-    (0x1006, "communication_cycle_period", Some(U32)),
     (0x1007, "synchronous_window_length", Some(U32)),
     (0x1012, "cob_id_time", Some(U32)),
     (0x1013, "high_resolution_time_stamp", Some(U32)),
