@@ -1,7 +1,7 @@
 //! The table of the standard's own servo and the data read from CiA 402-2, laid side by side.
 
 use canopen::Mux;
-use canopen::od::{Access, PdoMapping};
+use canopen::od::PdoMapping;
 use devices::servo::CIA402;
 
 const OBJECTS: &str = include_str!("../data/cia402/objects.csv");
@@ -10,9 +10,8 @@ const OBJECTS: &str = include_str!("../data/cia402/objects.csv");
 fn told(mux: Mux) -> Option<String> {
     let row = CIA402.row(mux)?;
     let kind = format!("{:?}", row.data_type).replace("Unsigned", "U").replace("Integer", "I");
-    let access = if row.access == Access::ReadWrite { "rw" } else { "ro" };
     let mapped = if row.pdo == PdoMapping::No { "no" } else { "yes" };
-    Some(format!("{kind},{access},{mapped}"))
+    Some(format!("{kind},{},{mapped}", row.access.name()))
 }
 
 #[test]

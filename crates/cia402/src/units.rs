@@ -1,10 +1,11 @@
 //! The factor group: user units and the drive's increments. Source: CiA 402-2, clause factor group (IEC 61800-7-201 has the
-//! same objects); 6093h and 6094h as in the first edition (DSP 402 V2.0).
+//! same objects); 6093h to 6095h as in the first edition (DSP 402 V2.0).
 //!
 //! ```text
 //! position [inc]   = position [user]     * 608Fh * 6091h / 6092h
 //! velocity [inc/s] = velocity [user]     * (position factor) / 6096h
 //! accel. [inc/s^2] = acceleration [user] * (velocity factor) / 6097h
+//! velocity [user]  = motor speed [r/min] * 6095h
 //! ```
 //!
 //! Every factor is an exact fraction. A value is multiplied and divided in 128 bits and rounded to the nearest whole, half
@@ -117,6 +118,9 @@ pub struct FactorGroup {
     pub position_factor: Option<[u32; 2]>,
     /// 6094h (first edition): increments per second for a velocity unit. Takes the place of 6096h.
     pub velocity_encoder_factor: Option<[u32; 2]>,
+    /// 6095h (first edition): velocity units for one r/min of the motor, in which 6080h is. Without it the encoder's
+    /// resolution says how fast that is.
+    pub velocity_factor_1: Option<[u32; 2]>,
     /// 6096h: velocity units for a position unit per second.
     pub velocity_factor: Option<[u32; 2]>,
     /// 6097h: acceleration units for a velocity unit per second.
@@ -132,6 +136,8 @@ pub struct Factors {
     pub velocity: Ratio,
     /// Increments per second squared in an acceleration unit.
     pub acceleration: Ratio,
+    /// Increments per second in one r/min of the motor.
+    pub motor_speed: Ratio,
 }
 
 /// Which fraction makes no sense.
@@ -160,9 +166,32 @@ impl FactorGroup {
             Ok(velocity) => velocity,
             Err(error) => return Err(error),
         };
-        match divided(velocity, 0x6097, self.acceleration_factor) {
-            Ok(acceleration) => Ok(Factors { position, velocity, acceleration }),
+        match (divided(velocity, 0x6097, self.acceleration_factor), self.motor_speed(velocity, increments_per_turn)) {
+            (Ok(acceleration), Ok(motor_speed)) => Ok(Factors { position, velocity, acceleration, motor_speed }),
+            (Err(error), _) | (_, Err(error)) => Err(error),
+        }
+    }
+
+    const fn motor_speed(&self, velocity: Ratio, increments_per_turn: u32) -> Result<Ratio, NoFactor> {
+        if self.velocity_factor_1.is_none() {
+            return match self.resolution(increments_per_turn) {
+                Ok(resolution) => divided(resolution, 0x608F, Some([60, 1])),
+                Err(error) => Err(error),
+            };
+        }
+        match ratio(0x6095, self.velocity_factor_1) {
+            Ok(factor) => match velocity.times(factor) {
+                Some(motor_speed) => Ok(motor_speed),
+                None => Err(NoFactor { index: 0x6095 }),
+            },
             Err(error) => Err(error),
+        }
+    }
+
+    const fn resolution(&self, increments_per_turn: u32) -> Result<Ratio, NoFactor> {
+        match self.position_encoder_resolution {
+            None => ratio(0x608F, Some([increments_per_turn, 1])),
+            some => ratio(0x608F, some),
         }
     }
 
@@ -170,11 +199,7 @@ impl FactorGroup {
         if self.position_factor.is_some() {
             return ratio(0x6093, self.position_factor);
         }
-        let resolution = match self.position_encoder_resolution {
-            None => ratio(0x608F, Some([increments_per_turn, 1])),
-            some => ratio(0x608F, some),
-        };
-        let resolution = match resolution {
+        let resolution = match self.resolution(increments_per_turn) {
             Ok(resolution) => resolution,
             Err(error) => return Err(error),
         };
@@ -358,7 +383,11 @@ mod tests {
     #[test]
     fn without_objects_all_units_are_increments() {
         let factors = FactorGroup::default().factors(65_536).unwrap();
-        assert_eq!(factors, Factors { position: Ratio::ONE, velocity: Ratio::ONE, acceleration: Ratio::ONE });
+        let motor_speed = ratio_of(65_536, 60);
+        assert_eq!(
+            factors,
+            Factors { position: Ratio::ONE, velocity: Ratio::ONE, acceleration: Ratio::ONE, motor_speed }
+        );
         // With a gear and no feed the unit is an increment at the driving shaft.
         let geared = FactorGroup { gear_ratio: Some([10, 1]), ..FactorGroup::default() };
         assert_eq!(geared.factors(65_536).unwrap().position, ratio_of(10, 1));
@@ -379,12 +408,36 @@ mod tests {
     }
 
     #[test]
+    fn velocity_factor_1_turns_motor_speeds_into_velocity_units() {
+        // A screw of 10 mm behind a gear of 5:1, velocities in mm/min: one r/min of the motor is 10 / 5 of them.
+        let group = FactorGroup {
+            position_encoder_resolution: Some([4096, 1]),
+            gear_ratio: Some([5, 1]),
+            feed_constant: Some([10, 1]),
+            velocity_factor: Some([60, 1]),
+            ..FactorGroup::default()
+        };
+        let with = FactorGroup { velocity_factor_1: Some([10, 5]), ..group };
+        let [by_encoder, by_object] = [group, with].map(|group| group.factors(1).unwrap());
+        assert_eq!(by_object, by_encoder, "the two ways to say it agree");
+        assert_eq!(by_object.motor_speed.scale(3000), 50 * 4096);
+        // A unit of 6094h for one r/min; 6095h = 1/2.
+        let first = FactorGroup {
+            velocity_encoder_factor: Some([8192, 60]),
+            velocity_factor_1: Some([1, 2]),
+            ..FactorGroup::default()
+        };
+        assert_eq!(first.factors(8192).unwrap().motor_speed.scale(120), 8192);
+    }
+
+    #[test]
     fn a_zero_is_named_by_its_object() {
         let zero = |group: FactorGroup| group.factors(1).unwrap_err().index;
         assert_eq!(zero(FactorGroup { gear_ratio: Some([1, 0]), ..FactorGroup::default() }), 0x6091);
         assert_eq!(zero(FactorGroup { feed_constant: Some([0, 1]), ..FactorGroup::default() }), 0x6092);
         assert_eq!(zero(FactorGroup { position_factor: Some([0, 0]), ..FactorGroup::default() }), 0x6093);
         assert_eq!(zero(FactorGroup { velocity_encoder_factor: Some([1, 0]), ..FactorGroup::default() }), 0x6094);
+        assert_eq!(zero(FactorGroup { velocity_factor_1: Some([1, 0]), ..FactorGroup::default() }), 0x6095);
         assert_eq!(zero(FactorGroup { velocity_factor: Some([0, 1]), ..FactorGroup::default() }), 0x6096);
         assert_eq!(zero(FactorGroup { acceleration_factor: Some([0, 1]), ..FactorGroup::default() }), 0x6097);
         assert_eq!(FactorGroup::default().factors(0).unwrap_err().index, 0x608F);

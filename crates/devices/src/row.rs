@@ -28,6 +28,11 @@ pub const fn rw(index: u16, sub: u8, data_type: DataType, name: &'static str, ti
     Entry::new(index, sub, data_type, Access::ReadWrite, name, title)
 }
 
+/// Attribute WO.
+pub const fn wo(index: u16, sub: u8, data_type: DataType, name: &'static str, title: &'static str) -> Entry {
+    Entry::new(index, sub, data_type, Access::WriteOnly, name, title)
+}
+
 /// Attribute RW/S: kept in the EEPROM.
 pub const fn rws(index: u16, sub: u8, data_type: DataType, name: &'static str, title: &'static str) -> Entry {
     rw(index, sub, data_type, name, title).stored()

@@ -139,6 +139,50 @@ fn eight_axes_run_each_at_its_own_speed_and_refuse_what_their_own_objects_refuse
     assert_eq!(bench.machine.inputs().len(), 40);
 }
 
+/// Two axes of a drive of the profile's first edition, which has velocity factor 1 too: 6095h, as delivered 1/60.
+fn with_velocity_factor_1() -> &'static Description {
+    let rows = by_offset().dictionary.rows().iter().copied();
+    let factor = [0x6095, 0x6895].into_iter().flat_map(|index| {
+        let entry =
+            |sub, data_type, access, default| Entry::new(index, sub, data_type, access, "", "").default(default);
+        [
+            entry(0, DataType::Unsigned8, Access::ReadOnly, 2),
+            entry(1, DataType::Unsigned32, Access::ReadWrite, 1),
+            entry(2, DataType::Unsigned32, Access::ReadWrite, 60),
+        ]
+    });
+    let axes = by_offset().axes.to_vec();
+    described("two-axes-of-the-first-edition", table(rows.chain(factor).collect()), axes)
+}
+
+#[test]
+fn velocity_factor_1_says_how_fast_the_highest_speed_of_the_motor_is() {
+    // DSP 402 V2.0, velocity factor 1: highest velocity [user] = 6080h [r/min] * 6095h. Velocities are in position units of a
+    // TURN a turn, per second.
+    let mut bench = Bench::of(with_velocity_factor_1());
+    for axis in [0, 0x800] {
+        let at = |index: u16| index + axis;
+        for sub in [1, 2] {
+            assert_eq!(bench.write(at(0x6095), sub, 0), Err(AbortCode::VALUE_TOO_LOW), "{:04X}h:{sub:02X}", at(0x6095));
+        }
+        assert_eq!((bench.read(at(0x6095), 1), bench.read(at(0x6095), 2)), (1, 60), "nothing of it was stored");
+        bench.set(&[(at(0x6060), 0, 3), (at(0x6040), 0, 6), (at(0x6040), 0, 7), (at(0x6040), 0, 15)]);
+    }
+    // The first axis has the factor of its encoder, TURN / 60: 6080h is what the motor turns at. The second has half of it.
+    bench.set(&[(0x6095, 1, TURN), (0x6895, 1, TURN), (0x6895, 2, 120), (0x6080, 0, 600), (0x6880, 0, 600)]);
+    bench.set(&[(0x60FF, 0, 20 * TURN), (0x68FF, 0, 20 * TURN)]);
+    bench.run_ms(500);
+    let rpm = |bench: &Bench, axis| bench.machine.report_of(AxisId(axis)).velocity_rpm;
+    assert!((rpm(&bench, 0) - 600.0).abs() < 6.0, "{}", rpm(&bench, 0));
+    assert!((rpm(&bench, 1) - 300.0).abs() < 3.0, "{}", rpm(&bench, 1));
+    // It is stated in velocity units: with 6096h = 4 a unit is a quarter of the speed, and so is the limit.
+    bench.set(&[(0x6096, 1, 4)]);
+    bench.set(&[(0x60FF, 0, 80 * TURN)]);
+    bench.run_ms(500);
+    assert!((rpm(&bench, 0) - 150.0).abs() < 3.0, "{}", rpm(&bench, 0));
+    assert!((rpm(&bench, 1) - 300.0).abs() < 3.0, "the other axis has its own");
+}
+
 #[test]
 fn two_axes_at_two_sub_indexes_run_apart() {
     check(Bench::of(by_sub_index()));

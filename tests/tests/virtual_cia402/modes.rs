@@ -1,7 +1,9 @@
 //! The modes that follow something at all times: torque, interpolated position, and the cyclic synchronous ones.
 
 use crate::bench::{Bench, TURN};
-use canopen::AbortCode;
+use canopen::od::{Access, DefaultValue};
+use canopen::{AbortCode, Mux};
+use devices::servo::CIA402;
 use sim::VirtualDrive;
 
 /// Sends a set-point and SYNC every millisecond, and hands each period on.
@@ -217,7 +219,7 @@ fn set_points_that_come_in_bunches_are_caught_up_with() {
 /// Into ip with a buffer of so many places and a period of 20 ms, bit 4 not set yet.
 fn buffered(places: i64, organisation: i64) -> Bench {
     let mut bench = Bench::new();
-    bench.set(&[(0x60C2, 1, 20), (0x60C4, 2, places), (0x60C4, 3, organisation)]);
+    bench.set(&[(0x60C2, 1, 20), (0x60C4, 2, places), (0x60C4, 3, organisation), (0x60C4, 6, 1)]);
     bench.enable(7);
     bench
 }
@@ -286,4 +288,23 @@ fn a_buffer_that_is_cleared_or_changed_forgets_and_one_that_is_closed_takes_noth
     assert_eq!(bench.read(0x60C4, 4), 0, "60C4h:06 = 0: closed");
     bench.set(&[(0x60C4, 6, 1), (0x60C1, 1, 10)]);
     assert_eq!(bench.read(0x60C4, 4), 1);
+}
+
+#[test]
+fn a_buffer_is_closed_as_delivered_and_its_clear_can_only_be_written() {
+    let mut bench = Bench::new();
+    let clear = CIA402.row(Mux::new(0x60C4, 6)).unwrap();
+    let delivered = clear.default == DefaultValue::Value(0);
+    assert!(clear.access == Access::WriteOnly && delivered, "CiA 402-2, interpolation data configuration");
+    assert_eq!(bench.try_read(0x60C4, 6), Err(AbortCode::WRITE_ONLY));
+    bench.enable(7);
+    bench.set(&[(0x60C4, 2, 4), (0x60C1, 1, 10)]);
+    assert_eq!(bench.read(0x60C4, 4), 0, "closed");
+    bench.set(&[(0x60C4, 6, 1), (0x60C1, 1, 10)]);
+    assert_eq!(bench.read(0x60C4, 4), 1, "open");
+    // Of a single place there is nothing to close: each set-point acts as it comes.
+    let start = bench.position();
+    bench.set(&[(0x60C4, 6, 0), (0x60C4, 2, 1), (0x6040, 0, 0x1F), (0x60C1, 1, start + TURN / 100)]);
+    bench.run_ms(100);
+    assert!((bench.position() - start - TURN / 100).abs() < TURN / 500, "{}", bench.position() - start);
 }

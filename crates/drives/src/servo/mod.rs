@@ -54,13 +54,20 @@ pub fn conditions(description: &'static Description) -> impl Iterator<Item = (Sl
     let modes = description.axes.iter().filter_map(move |axis| of_axis(axis.placement, MODE, MODE_CHECKS));
     let set_points =
         description.axes.iter().filter_map(move |axis| of_axis(axis.placement, SET_POINT, SET_POINT_CHECKS));
-    modes.chain(set_points).chain(node::conditions(table))
+    let factors = table.iter().filter(|(_, row)| {
+        let of_axis = (0x6000..=0x9FFF).contains(&row.index) && row.index % 0x800 == VELOCITY_FACTOR_1 % 0x800;
+        of_axis && matches!(row.sub_index, 1 | 2)
+    });
+    let factors = factors.map(|(slot, _)| (slot, Condition::Check(is_not_zero)));
+    modes.chain(set_points).chain(factors).chain(node::conditions(table))
 }
 
 type Check = fn(&View<'_>, u32) -> Result<(), AbortCode>;
 
 const MODE: Mux = Mux::new(0x6060, 0);
 const SET_POINT: Mux = Mux::new(0x60C1, 1);
+/// Velocity factor 1: numerator at sub-index 1, divisor at 2.
+const VELOCITY_FACTOR_1: u16 = 0x6095;
 
 /// By the index of the object: an axis' block of the profile area begins at each 800h (CiA 402-1).
 macro_rules! by_axis {
@@ -87,6 +94,11 @@ fn mode_is_supported<const OFFSET: u16>(values: &View<'_>, raw: u32) -> Result<(
     let Ok(modes) = values.value(Mux::new(0x6502 + OFFSET, 0)) else { return Ok(()) };
     let supported = mode == ModeOfOperation::NONE || SupportedModes(modes as u32).has(mode);
     if supported { Ok(()) } else { Err(AbortCode::INVALID_VALUE) }
+}
+
+/// A fraction with a 0 in it scales nothing.
+fn is_not_zero(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
+    if raw == 0 { Err(AbortCode::VALUE_TOO_LOW) } else { Ok(()) }
 }
 
 /// 60C1h:01 in ip: a first-in-first-out buffer that is full (60C4h:04 counts what waits) takes no more.

@@ -246,7 +246,7 @@ impl<S: Storage> Reader<'_, S> {
         };
         let motor = match self.magnitude(self.slots.max_motor_speed) {
             0 => f64::INFINITY,
-            rpm => rpm as f64 / 60.0 * f64::from(self.motor.increments_per_turn),
+            rpm => self.scales.motor_speed(rpm),
         };
         profile.min(motor).min(self.fastest())
     }

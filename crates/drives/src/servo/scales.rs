@@ -27,12 +27,15 @@ impl Scales {
             feed_constant: pair(slots.feed, slots.feed_turns),
             position_factor: pair(slots.position_factor_numerator, slots.position_factor_divisor),
             velocity_encoder_factor: pair(slots.velocity_encoder_numerator, slots.velocity_encoder_divisor),
+            // As delivered with a 0 in it, it says nothing; nobody can write one.
+            velocity_factor_1: pair(slots.velocity_factor_1_numerator, slots.velocity_factor_1_divisor)
+                .filter(|factor| !factor.contains(&0)),
             velocity_factor: pair(slots.velocity_factor_numerator, slots.velocity_factor_divisor),
             acceleration_factor: pair(slots.acceleration_factor_numerator, slots.acceleration_factor_divisor),
         };
         let (factors, wrong) = match in_increments(&group, increments_per_turn) {
             Ok(factors) => (factors, None),
-            Err(error) => (INCREMENTS, Some(error)),
+            Err(error) => (increments(increments_per_turn), Some(error)),
         };
         Self { factors, polarity: Polarity(read(values, slots.polarity, 0) as u8), wrong }
     }
@@ -62,6 +65,11 @@ impl Scales {
         user as f64 * self.factors.velocity.as_f64()
     }
 
+    /// A speed of the motor (6080h) in increments per second.
+    pub(super) fn motor_speed(&self, rpm: i64) -> f64 {
+        rpm as f64 * self.factors.motor_speed.as_f64()
+    }
+
     /// A velocity in user units, held to 32 bits.
     pub(super) fn velocity(&self, increments_s: f64) -> i64 {
         let user = increments_s / self.factors.velocity.as_f64() * self.polarity.velocity() as f64;
@@ -79,7 +87,11 @@ impl Scales {
     }
 }
 
-const INCREMENTS: Factors = Factors { position: Ratio::ONE, velocity: Ratio::ONE, acceleration: Ratio::ONE };
+/// Increments in place of all units.
+fn increments(per_turn: u32) -> Factors {
+    let motor_speed = Ratio::new(per_turn, 60).unwrap_or(Ratio::ONE);
+    Factors { position: Ratio::ONE, velocity: Ratio::ONE, acceleration: Ratio::ONE, motor_speed }
+}
 
 /// The factors in increments of the encoder that is there: 608Fh is that of the drive that the table was read from, and
 /// only says what a turn is.
@@ -94,6 +106,7 @@ fn in_increments(group: &FactorGroup, increments_per_turn: u32) -> Result<Factor
         position: scaled(factors.position)?,
         velocity: scaled(factors.velocity)?,
         acceleration: scaled(factors.acceleration)?,
+        motor_speed: scaled(factors.motor_speed)?,
     })
 }
 

@@ -83,6 +83,8 @@ slots! {
         position_factor_divisor: 0x6093 2,
         velocity_encoder_numerator: 0x6094 1,
         velocity_encoder_divisor: 0x6094 2,
+        velocity_factor_1_numerator: 0x6095 1,
+        velocity_factor_1_divisor: 0x6095 2,
         velocity_factor_numerator: 0x6096 1,
         velocity_factor_divisor: 0x6096 2,
         acceleration_factor_numerator: 0x6097 1,

@@ -4,7 +4,7 @@
 use canopen::od::Entry;
 
 use super::values::{ABORT_CONNECTION, FAULT_REACTION, HALT, HOMING_METHODS, MODES, QUICK_STOP, SHUTDOWN};
-use crate::row::{I8, I16, I32, U8, U16, U32, ro, rw};
+use crate::row::{I8, I16, I32, U8, U16, U32, ro, rw, wo};
 
 /// Encoder increments in a turn: the 17 bits of the default motor's encoder.
 pub const INCREMENTS_PER_TURN: i64 = 131_072;
@@ -114,7 +114,7 @@ pub(super) static ROWS: [Entry; ROW_COUNT] = [
     rw(0x60C4, 3, U8, "interpolation_buffer_organisation", "How they wait").values(&[(0, "first in, first out"), (1, "ring")]).saved(),
     rw(0x60C4, 4, U16, "interpolation_buffer_position", "First in, first out: how many wait; ring: the place to fill").range(0, 64),
     ro(0x60C4, 5, U8, "interpolation_data_record_size", "Bytes of a set-point").default(4),
-    rw(0x60C4, 6, U8, "interpolation_buffer_clear", "Whether set-points are taken").values(&[(0, "cleared"), (1, "taken")]).default(1),
+    wo(0x60C4, 6, U8, "interpolation_buffer_clear", "Whether set-points may wait").values(&[(0, "cleared and closed"), (1, "open")]),
     rw(0x60C5, 0, U32, "max_acceleration", "Highest acceleration").default(u32::MAX as i64).unit(INC_S2).mappable().saved(),
     rw(0x60C6, 0, U32, "max_deceleration", "Highest deceleration").default(u32::MAX as i64).unit(INC_S2).mappable().saved(),
     rw(0x60E0, 0, U16, "positive_torque_limit", "Torque limit towards larger positions").default(3000).unit(PER_MILLE).mappable().saved(),

@@ -54,9 +54,10 @@ impl Shaft {
         if written == slots.touch_probe_function {
             self.probes.set_function(value as u16, inputs);
         } else if self.is_set_point(written) {
-            // 60C4h:06 = 0: the buffer is closed.
+            // 60C4h:06 = 0: the buffer is closed. A set-point that waits for nothing needs none.
             let mode = self.power.mode();
             let open = mode != ModeOfOperation::INTERPOLATED_POSITION
+                || !self.set_points.waiting.is_used()
                 || read(values, slots.interpolation_buffer_clear, 1) != 0;
             if open {
                 self.take_set_point(values, matches!(via, Via::Rpdo(_)));
