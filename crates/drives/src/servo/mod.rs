@@ -38,7 +38,7 @@ pub fn acts_on(description: &Description, mux: Mux) -> bool {
         };
         slots::AxisSlots::OBJECTS.iter().any(counts)
     });
-    by_axis || mux == parameters::SYNC_PERIOD || node::acts_on(mux)
+    by_axis || mux == slots::SYNC_PERIOD || node::acts_on(mux)
 }
 
 /// What a drive so described refuses beyond its rows: for [`Conditions`](canopen::od::Conditions).

@@ -1,6 +1,5 @@
 //! The objects of one axis in increments and amperes, as the engine wants them. Written anew when one changes.
 
-use canopen::Mux;
 use canopen::od::{Dictionary, Slot, Storage};
 use cia402::{
     AbortConnectionOption, DisableOperationOption, FaultReactionOption, HaltOption, HomingMethod, InterpolationPeriod,
@@ -13,15 +12,13 @@ use super::motor::Motor;
 use super::read;
 use super::scales::Scales;
 use super::shaft::{FORGIVEN_PERIODS, PATIENCE_S};
-use super::slots::AxisSlots;
+use super::slots::{AxisSlots, SYNC_PERIOD};
 use crate::engine::axis::{Control, HomingParameters, MoveLimits, Ramp, VelocityRamps};
 use crate::engine::cia402::{self as power, DisableOptions, ExternalStop, Tolerances};
 
 /// Deceleration of a device without any: that of the motor's rated torque on its own inertia would be rough; this stops
 /// from the highest speed in a fifth of a second.
 const STOPS_IN_S: f64 = 0.2;
-/// Communication cycle period: set-points of csv and cst are awaited in its rhythm.
-pub(super) const SYNC_PERIOD: Mux = Mux::new(0x1006, 0);
 /// Windows in increments of a device that has no object for them.
 const POSITION_WINDOW: i64 = 100;
 const WINDOW_TIME_MS: i64 = 10;

@@ -8,9 +8,7 @@ use super::Shaft;
 use super::cyclic::{MOST_WAITING, Organisation};
 use crate::engine::faults::FaultSet;
 use crate::servo::read;
-
-/// 1006h: set-points are awaited in its rhythm.
-const SYNC_PERIOD: u16 = 0x1006;
+use crate::servo::slots::SYNC_PERIOD;
 
 /// What a write to an axis did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,7 +68,7 @@ impl Shaft {
         } else if !slots.is_target(slot) {
             let index = values.table().row(slot).index;
             let known = index >= 0x6000;
-            self.parameters_changed |= known || index == SYNC_PERIOD;
+            self.parameters_changed |= known || index == SYNC_PERIOD.index;
             return if known { Written::Value } else { Written::Elsewhere };
         }
         Written::Value
