@@ -17,10 +17,9 @@ pub struct Play<S> {
     pub seeds: u64,
     /// Objects that are not written: they would end the conversation by themselves.
     pub spared: &'static [u16],
-    /// What hands do to the machine now and then, as a world command without its node; `> ` begins a frame.
-    pub hands: &'static [&'static str],
-    /// What mends all that they did.
-    pub mended: &'static [&'static str],
+    /// What hands do to the machine now and then, and what undoes it, as world commands without their node; nothing undoes
+    /// what is over by itself, and `> ` begins a frame.
+    pub hands: &'static [(&'static str, &'static str)],
     /// The bits that tell the state, and what they are in each; none where any will do.
     pub states: (u16, &'static [u16]),
     /// Asserts that the drive, mended and restarted, is as delivered; with the seed, for the message.
@@ -43,7 +42,8 @@ pub fn is_answered_and_breaks_nothing<S: Subject>(play: &Play<S>) {
             // Taken or refused, but answered: `write` panics without an answer.
             let _ = bench.write((row.index, row.sub), value);
             if seeded.below(5) == 0 {
-                act(&mut bench, play.hands[seeded.below(play.hands.len())]);
+                let (done, undone) = play.hands[seeded.below(play.hands.len())];
+                act(&mut bench, if seeded.below(3) == 0 { undone } else { done });
             }
             bench.run_ms(seeded.below(20) as u64);
             let report = bench.report();
@@ -54,7 +54,7 @@ pub fn is_answered_and_breaks_nothing<S: Subject>(play: &Play<S>) {
             let state = report.statusword.unwrap_or_default() & play.states.0;
             assert!(play.states.1.is_empty() || play.states.1.contains(&state), "{at}");
         }
-        play.mended.iter().for_each(|line| act(&mut bench, line));
+        play.hands.iter().for_each(|(_, undone)| act(&mut bench, undone));
         (play.recovers)(&mut bench, seed);
     }
 }
@@ -62,6 +62,7 @@ pub fn is_answered_and_breaks_nothing<S: Subject>(play: &Play<S>) {
 fn act<S: Subject>(bench: &mut Bench<S>, line: &str) {
     match line.strip_prefix("> ") {
         Some(frame) => bench.send(frame),
+        None if line.is_empty() => bench,
         None => bench.tell(&format!("{} {line}", S::NODE)),
     };
 }

@@ -34,11 +34,8 @@ impl<S: Subject> Bench<S> {
     #[track_caller]
     pub fn shows(&mut self, mask: u16, bits: u16) -> &mut Self {
         let (statusword, at) = (self.statusword(), self.seconds());
-        assert_eq!(
-            statusword & mask,
-            bits,
-            "6041h is {statusword:04X}h, expected {bits:04X}h of {mask:04X}h, at {at} s"
-        );
+        let told = format!("6041h is {statusword:04X}h, expected {bits:04X}h of {mask:04X}h, at {at} s");
+        assert_eq!(statusword & mask, bits, "{told}");
         self
     }
 

@@ -25,6 +25,15 @@ impl<S: Subject> Bench<S> {
         self
     }
 
+    /// A torque that grows to this one in so many steps, each some milliseconds long.
+    #[track_caller]
+    pub fn load_up_to(&mut self, torque_nm: f64, steps: u32, ms: u64) -> &mut Self {
+        for step in 1..=steps {
+            self.set_load_torque(torque_nm * f64::from(step) / f64::from(steps)).run_ms(ms);
+        }
+        self
+    }
+
     /// Inertia on the shaft, kg m².
     #[track_caller]
     pub fn set_load_inertia(&mut self, inertia_kg_m2: f64) -> &mut Self {

@@ -12,7 +12,7 @@ use sim::machine::{Joint, MJointMachine, Machine, mjoint};
 use super::{Place, Rows, Subject};
 use crate::mjoint::{figures, objects};
 
-pub use super::{Abort, head};
+pub use super::{Abort, assert_within, head};
 
 /// Counts in one turn of the motor.
 pub const TURN: i64 = 32_768;

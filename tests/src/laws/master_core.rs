@@ -101,11 +101,8 @@ fn settle(core: &mut Core, open: &mut BTreeSet<Ticket>, after: &[u8]) {
     let sent = std::iter::from_fn(|| core.poll_transmit()).take(2 * MOST_QUEUED).count();
     assert!(sent <= MOST_QUEUED, "{sent} frames after {after:02X?}");
     while let Some(finished) = core.poll_finished() {
-        assert!(
-            open.remove(&finished.ticket),
-            "{:?} ended twice, or was not asked, after {after:02X?}",
-            finished.ticket
-        );
+        let ticket = finished.ticket;
+        assert!(open.remove(&ticket), "{ticket:?} ended twice, or was not asked, after {after:02X?}");
     }
     // Half of the time nobody reads events: then the oldest go.
     if after.last().is_some_and(|last| last & 1 == 0) {

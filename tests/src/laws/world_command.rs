@@ -62,24 +62,15 @@ fn world() -> (World, StationId) {
     ];
     assert!(added.iter().all(Result::is_ok), "three numbers");
     world.run_for(Duration::from_millis(2));
-    for (node, data) in [
-        (4, *b"\x2F\x60\x60\0\x03\0\0\0"),
-        (4, *b"\x23\xFF\x60\0\x64\0\0\0"),
-        (4, *b"\x2B\x40\x60\0\x06\0\0\0"),
-        (4, *b"\x2B\x40\x60\0\x07\0\0\0"),
-        (4, *b"\x2B\x40\x60\0\x0F\0\0\0"),
-        (2, *b"\x2F\x60\x60\0\x03\0\0\0"),
-        (2, *b"\x23\xFF\x60\0\x64\0\0\0"),
-        (2, *b"\x2B\x40\x60\0\x06\0\0\0"),
-        (2, *b"\x2B\x40\x60\0\x07\0\0\0"),
-        (2, *b"\x2B\x40\x60\0\x0F\0\0\0"),
-        (1, *b"\x2F\x60\x60\0\x03\0\0\0"),
-        (1, *b"\x23\xFF\x60\0\x64\0\0\0"),
-        (1, *b"\x2B\x40\x60\0\x0F\0\0\0"),
-    ] {
-        let sent = world.send(host, Frame::new(CanId::standard(0x600 + node), &data));
-        assert!(sent.is_ok(), "the adapter has room");
-        world.run_for(Duration::from_millis(1));
+    // Profile velocity, 100 r/min, and the controlwords that enable each.
+    for (node, controlwords) in [(4, &[0x06, 0x07, 0x0F][..]), (2, &[0x06, 0x07, 0x0F]), (1, &[0x0F])] {
+        let target = [*b"\x2F\x60\x60\0\x03\0\0\0", *b"\x23\xFF\x60\0\x64\0\0\0"];
+        let enable = controlwords.iter().map(|word| [0x2B, 0x40, 0x60, 0, *word, 0, 0, 0]);
+        for data in target.into_iter().chain(enable) {
+            let sent = world.send(host, Frame::new(CanId::standard(0x600 + node), &data));
+            assert!(sent.is_ok(), "the adapter has room");
+            world.run_for(Duration::from_millis(1));
+        }
     }
     (world, host)
 }

@@ -31,14 +31,8 @@ pub fn a_reset_leaves_the_node_able_to_speak<S: Subject>() {
     for (command, name) in [("000#810n", "node"), ("000#820n", "communication")] {
         for state in ["000#010n", "000#020n"] {
             let mut bench = Bench::<S>::new();
-            bench
-                .map(0x1601, &[0x60FF_0020])
-                .set(0x1017, 100)
-                .send(state)
-                .run_ms(50)
-                .forget()
-                .send(command)
-                .run_ms(450);
+            bench.map(0x1601, &[0x60FF_0020]).set(0x1017, 100).send(state).run_ms(50);
+            bench.forget().send(command).run_ms(450);
             bench.hears_of("70n#", &["70n#00", "70n#7F", "70n#7F", "70n#7F", "70n#7F"]).reads(0x1000, 0x0004_0192);
             bench.send("000#010n").send("30n#64000000");
             assert_eq!(bench.get(0x60FF), 100, "RPDO1 is stored and works again after a reset of the {name}");
@@ -51,9 +45,8 @@ pub fn a_stopped_node_answers_no_sdo_and_its_motor_goes_on<S: PowerSubject>() {
     let mut bench = Bench::<S>::new();
     bench.set(0x1017, 50).turn(60).send("000#020n").forget().is_silent().run_ms(1000);
     assert_within("r/min", bench.report().velocity_rpm, 60.0 - S::RIPPLE_RPM, 60.0 + S::RIPPLE_RPM);
-    assert!(
-        bench.heard().iter().all(|frame| frame.starts_with("70") && frame.ends_with("#04") || frame.starts_with("60"))
-    );
+    let expected = |frame: &String| frame.starts_with("70") && frame.ends_with("#04") || frame.starts_with("60");
+    assert!(bench.heard().iter().all(expected));
     bench.send("000#800n").reads(0x60FF, 60);
 }
 

@@ -134,12 +134,8 @@ pub fn a_pdo_is_mapped_with_bit_31_as_masters_do_and_without_as_the_manuals_do<S
 pub fn a_switched_off_pdo_is_silent_and_deaf<S: Subject>() {
     let mut bench = with_velocity_rpdo::<S>();
     let node = i64::from(S::NODE);
-    bench
-        .map(0x1A00, &[0x6041_0010])
-        .set((0x1800, 1), 0x8000_0180 + node)
-        .set((0x1401, 1), 0x8000_0300 + node)
-        .forget();
-    bench.send("000#800n").send("000#010n").send("30n#64000000").set(0x6040, 6).run_ms(100);
+    bench.map(0x1A00, &[0x6041_0010]).set((0x1800, 1), 0x8000_0180 + node).set((0x1401, 1), 0x8000_0300 + node);
+    bench.forget().send("000#800n").send("000#010n").send("30n#64000000").set(0x6040, 6).run_ms(100);
     bench.hears_of("18n#", &[]).reads(0x60FF, 0);
 }
 

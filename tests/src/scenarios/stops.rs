@@ -19,7 +19,7 @@ const SLOW_DOWN_S: f64 = 0.3;
 const QUICK_STOP_S: f64 = 0.05;
 
 /// Commanded to turn at 120 r/min in a mode, far from any target or switch.
-fn turning<S: PowerSubject>(mode: i64) -> Bench<S> {
+pub fn turning<S: PowerSubject>(mode: i64) -> Bench<S> {
     let mut bench = Bench::new();
     S::let_home(bench.set(0x6084, 300).set(0x6085, 50));
     bench.enable_in(mode);

@@ -2,10 +2,6 @@
 
 use crate::bench::Bench;
 
-fn turning(bench: &mut Bench, rpm: i64) {
-    bench.turn(rpm).run_ms(400);
-}
-
 #[test]
 fn the_save_flag_never_reads_2_while_the_eeprom_does_not_answer() {
     let mut bench = Bench::new();
@@ -35,7 +31,7 @@ fn an_eeprom_that_could_not_be_read_at_power_on_is_written_anew_by_a_save() {
 #[test]
 fn an_encoder_that_stands_still_looks_like_a_stall() {
     let mut bench = Bench::new();
-    turning(&mut bench, 300);
+    bench.turn(300).run_ms(400);
     let before = bench.position();
     bench.tell("1 fault encoder on").run_ms(1000);
     let stuck = bench.position();
@@ -43,10 +39,8 @@ fn an_encoder_that_stands_still_looks_like_a_stall() {
     let current = bench.report().current_a;
     // 16 % of 36 V / sqrt 3 on a phase of 0.44 ohm, r.m.s.
     let allowed = 0.16 * 36.0 / 3.0_f64.sqrt() / 0.44 / 2.0_f64.sqrt();
-    assert!(
-        (current / allowed - 1.0).abs() < 0.05,
-        "the speed that it does not see is asked for with all output: {current}"
-    );
+    // The speed that it does not see is asked for with all output.
+    assert!((current / allowed - 1.0).abs() < 0.05, "{current} A of {allowed}");
     assert!(bench.report().velocity_rpm.abs() < 1.0, "the field stands, and the shaft with it");
     bench.until(5000, |bench| bench.get(0x260E) == 0x14);
     assert_eq!(bench.position(), stuck);
@@ -57,7 +51,7 @@ fn an_encoder_that_stands_still_looks_like_a_stall() {
 #[test]
 fn a_lost_phase_takes_torque_and_a_heavy_load_locks_the_rotor() {
     let mut bench = Bench::new();
-    turning(&mut bench, 300);
+    bench.turn(300).run_ms(400);
     // 5 A lift half as much again as the printed 34 N·m, two wires on average half of that.
     bench.set(0x261D, 5005).tell("1 load torque 34").run_ms(1000).turns_about(300.0, 10.0);
     bench.tell("1 fault phase on").run_ms(1000);

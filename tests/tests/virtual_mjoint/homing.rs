@@ -116,10 +116,8 @@ fn after_homing_the_position_is_about_zero_whatever_the_ramp_unless_the_edge_is_
             let way = way.min(20_000.0);
             let (position, expected) = (bench.position(), if at_edge { way } else { 0.0 });
             let tolerance = 60.0 + 0.05 * expected + if at_edge { 2.0 * rpm } else { 0.0 };
-            assert!(
-                (position as f64 - expected).abs() <= tolerance,
-                "{acceleration}, {choice}: {position}, not {expected}"
-            );
+            let off = (position as f64 - expected).abs();
+            assert!(off <= tolerance, "{acceleration}, {choice}: {position}, not {expected}");
         }
     }
 }

@@ -9,36 +9,42 @@ use crate::bench::{Bench, TURN};
 
 const CYCLE: Duration = Duration::from_millis(2);
 
+/// Led by points as soon as SYNC comes.
+fn led(bench: &mut Bench, node: u8, synchronised: i64) {
+    for (index, value) in [(0x261C, synchronised), (0x6060, 7), (0x6040, 0x0F)] {
+        bench.write_to(node, index, value).expect("a setting");
+    }
+}
+
 /// With so many microseconds more between the joints' own rhythms, which repeat each 500 µs.
 fn three(synchronised: i64, apart_us: u64) -> Bench {
     let mut bench = Bench::of(3, &Model::M4230E17B50);
-    for node in 1..=3 {
-        for (index, value) in [(0x261C, synchronised), (0x6060, 7), (0x6040, 0x0F)] {
-            bench.write_to(node, index, value).expect("a setting");
-        }
-    }
+    led(&mut bench, 1, synchronised);
     // The joints' own rhythms are apart from each other, as those of real ones are.
     for node in 2..=3_u8 {
         bench.tell(&format!("{node} power cut")).run(Duration::from_micros(1_730 * u64::from(node) + apart_us));
         bench.tell(&format!("{node} power on")).run_ms(20);
-        for (index, value) in [(0x261C, synchronised), (0x6060, 7), (0x6040, 0x0F)] {
-            bench.write_to(node, index, value).expect("a setting");
-        }
+        led(&mut bench, node, synchronised);
     }
     bench.run_ms(20);
     bench
 }
 
+/// Sends a point to each joint.
+fn send_to_each(bench: &mut Bench, target: i32) {
+    for node in 1..=3 {
+        let frame = Frame::new(CanId::standard(0x500 + node), &target.to_le_bytes());
+        bench.world.send(bench.host, frame).expect("room at the host");
+    }
+}
+
 /// Sends a point to each joint and lets SYNC follow.
 fn point(bench: &mut Bench, target: i64) {
     let start = bench.world.now();
-    for node in 1..=3 {
-        let frame = Frame::new(CanId::standard(0x500 + node), &(target as i32).to_le_bytes());
-        bench.world.send(bench.host, frame).expect("room at the host");
-    }
+    send_to_each(bench, target as i32);
     // "The above process needs to be completed within 2 ms": three points and their answers take 0.6 ms at 1 Mbit/s.
     bench.run(Duration::from_micros(1500));
-    bench.world.send(bench.host, Frame::new(CanId::standard(0x080), &[])).expect("room at the host");
+    bench.offer("080#");
     let rest = CYCLE.saturating_sub(Duration::from_secs_f64(bench.world.now().as_secs_f64() - start.as_secs_f64()));
     bench.run(rest);
 }
@@ -60,20 +66,12 @@ fn starts(bench: &mut Bench) -> [f64; 3] {
     starts
 }
 
-fn spread_us(synchronised: i64, apart_us: u64) -> f64 {
-    spread_us_of(&mut three(synchronised, apart_us))
-}
-
-fn spread_us_of(bench: &mut Bench) -> f64 {
-    for node in 1..=3 {
-        let frame = Frame::new(CanId::standard(0x500 + node), &20_000_i32.to_le_bytes());
-        bench.world.send(bench.host, frame).expect("room at the host");
-    }
-    bench.run_ms(2);
-    bench.world.send(bench.host, Frame::new(CanId::standard(0x080), &[])).expect("room at the host");
+/// Microseconds between the first joint that starts and the last.
+fn spread_us(bench: &mut Bench) -> f64 {
+    send_to_each(bench, 20_000);
+    bench.run_ms(2).offer("080#");
     let starts = starts(bench);
-    let (first, last) =
-        (starts.iter().copied().fold(f64::NAN, f64::min), starts.iter().copied().fold(f64::NAN, f64::max));
+    let (first, last) = starts.iter().fold((f64::NAN, f64::NAN), |(first, last), at| (at.min(first), at.max(last)));
     assert!(starts.iter().all(|start| !start.is_nan()), "{starts:?}");
     (last - first) * 1e6
 }
@@ -81,10 +79,10 @@ fn spread_us_of(bench: &mut Bench) -> f64 {
 #[test]
 fn with_261ch_the_axes_start_within_a_control_period_of_each_other_and_without_it_within_2_ms() {
     // Whatever part of its 500 µs each joint is in when SYNC comes.
-    let spreads: Vec<f64> = (0..10).map(|step| spread_us(1, 50 * step)).collect();
+    let spreads: Vec<f64> = (0..10).map(|step| spread_us(&mut three(1, 50 * step))).collect();
     let together = spreads.iter().copied().fold(0.0, f64::max);
     assert!(together <= 50.0, "{spreads:?} us");
-    let apart = spread_us(0, 0);
+    let apart = spread_us(&mut three(0, 0));
     assert!(apart > together && apart <= 2_500.0, "{apart} us");
 }
 
@@ -128,7 +126,7 @@ fn with_255_dir_is_the_clock_of_the_stretch_and_axes_start_together() {
     for node in 1..=3 {
         bench.tell(&format!("{node} clock 10000"));
     }
-    assert!(spread_us_of(&mut bench) <= 50.0);
+    assert!(spread_us(&mut bench) <= 50.0);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use can::Bitrate;
 use drives::mjoint::Model;
 use sim::machine::mjoint;
 
-use crate::bench::{Bench, MODELS, figure};
+use crate::bench::{Bench, MODELS, assert_within, figure};
 
 fn turning(model: &'static Model, rpm: f64) -> Bench {
     let mut bench = Bench::of(1, model);
@@ -58,13 +58,7 @@ fn at_the_rated_current_the_rated_torque_comes_out_and_the_supply_pays_for_it() 
     for (n, model) in MODELS.into_iter().enumerate() {
         let mut bench = Bench::open_with(mjoint(model, 1, Bitrate::M1));
         bench.turn(500);
-        let load =
-            |bench: &mut Bench, torque_nm| bench.machine().assembly_mut().motor_mut().rig.load.torque_nm = torque_nm;
-        for share in 1..=20 {
-            load(&mut bench, torque[n] * f64::from(share) / 20.0);
-            bench.run_ms(50);
-        }
-        bench.run_ms(500);
+        bench.load_up_to(torque[n], 20, 50).run_ms(500);
         let shown_a = bench.get(0x6078) as f64 / 2000.0;
         // Printed at the rated speed, where friction is a little more.
         assert!((0.93..1.02).contains(&(shown_a / rated[n])), "{}: {shown_a} A", model.name);
@@ -84,8 +78,7 @@ fn at_the_rated_current_the_rated_torque_comes_out_and_the_supply_pays_for_it() 
         // With rated current allowed and no more, it still turns; half as much again stops it.
         bench.set(0x261D, (rated[n] * 1000.0) as i64).run_ms(500);
         assert!((bench.get(0x606C) - 5000).abs() < 100, "{}", model.name);
-        load(&mut bench, 1.5 * torque[n]);
-        bench.run_ms(1000);
+        bench.set_load_torque(1.5 * torque[n]).run_ms(1000);
         assert!(bench.get(0x606C) < 2500, "{}", model.name);
     }
 }
@@ -101,18 +94,9 @@ fn as_delivered_each_model_lifts_its_printed_torque_at_its_printed_speed() {
         // The printed range, or the motor's rated speed if that comes first.
         let rpm = (greatest[n] * model.ratio).min(rated[n]);
         let mut bench = turning(model, rpm);
-        bench.run_ms(500);
-        for share in 1..=20 {
-            bench.tell(&format!("1 load torque {}", torque[n] * f64::from(share) / 20.0)).run_ms(50);
-        }
-        bench.run_ms(7000);
+        bench.run_ms(500).load_up_to(torque[n], 20, 50).run_ms(7000);
         let report = bench.report();
-        assert!(
-            (report.velocity_rpm / rpm - 1.0).abs() < 0.02,
-            "{}: {} of {rpm} r/min",
-            model.name,
-            report.velocity_rpm
-        );
+        assert_within(&format!("{}: share of {rpm} r/min", model.name), report.velocity_rpm / rpm, 0.98, 1.02);
         assert_eq!(bench.get(0x260E), 0, "{} at {} A", model.name, report.current_a);
     }
 }
@@ -120,11 +104,7 @@ fn as_delivered_each_model_lifts_its_printed_torque_at_its_printed_speed() {
 /// Turns against a load that grows within a second; the share of the speed that is left a second later.
 fn keeps(model: &'static Model, torque_nm: f64) -> f64 {
     let mut bench = turning(model, 300.0);
-    bench.run_ms(300);
-    for share in 1..=20 {
-        bench.tell(&format!("1 load torque {}", torque_nm * f64::from(share) / 20.0)).run_ms(50);
-    }
-    bench.run_ms(1000);
+    bench.run_ms(300).load_up_to(torque_nm, 20, 50).run_ms(1000);
     bench.report().velocity_rpm / 300.0
 }
 

@@ -67,32 +67,23 @@ fn braking_raises_the_bus_by_what_the_wheel_gives_back() {
 }
 
 #[test]
-fn hard_braking_without_a_bleeder_ends_in_over_voltage() {
-    let mut bench = turning(300.0, 0.1, 600);
-    bench.set(0x6040, 0x02);
-    let highest_v = highest_bus_v(&mut bench, 700);
-    assert_eq!((bench.get(0x603F), bench.get(0x1001)), (OVER_VOLTAGE, 0x05), "generic and voltage");
-    bench.shows(0xFF, 0x98);
-    assert_within("highest bus voltage", highest_v, 75.0, 78.0);
-}
-
-#[test]
-fn hard_braking_with_a_bleeder_stays_between_its_two_voltages() {
-    let mut bench = turning(300.0, 0.1, 600);
-    bench.set((0x202E, 5), 1).set(0x6040, 0x02);
-    let highest_v = highest_bus_v(&mut bench, 700);
-    bench.reads(0x603F, 0).shows(0xFF, 0x17);
-    assert_within("highest bus voltage", highest_v, 69.9, 70.5);
-    let burnt_j = bench.motor().rig.energy.bleeder_j;
-    let kinetic_j = 0.5 * (wheel::inertia_kg_m2() + 0.1) * (300.0 * RAD_S_PER_RPM).powi(2);
-    assert_within("J burnt", burnt_j, 0.3 * kinetic_j, kinetic_j);
-}
-
-#[test]
-fn the_bleeder_switches_at_202e_03_and_202e_04() {
-    let mut bench = turning(300.0, 0.1, 600);
-    bench.set((0x202E, 3), 600).set((0x202E, 4), 550).set((0x202E, 5), 1).set(0x6040, 0x02);
-    assert_within("highest bus voltage", highest_bus_v(&mut bench, 700), 59.9, 60.5);
+fn hard_braking_ends_in_over_voltage_without_a_bleeder_and_stays_between_the_two_voltages_of_one() {
+    // What is set of 202Eh, the highest bus voltage, 603Fh, the state.
+    let settings: [&[(u8, i64)]; 3] = [&[], &[(5, 1)], &[(3, 600), (4, 550), (5, 1)]];
+    let ends = [(75.0, 78.0, OVER_VOLTAGE, 0x98), (69.9, 70.5, 0, 0x17), (59.9, 60.5, 0, 0x17)];
+    for (settings, (low_v, high_v, code, state)) in settings.into_iter().zip(ends) {
+        let mut bench = turning(300.0, 0.1, 600);
+        for (sub, value) in settings {
+            bench.set((0x202E, *sub), *value);
+        }
+        bench.set(0x6040, 0x02);
+        assert_within("highest bus voltage", highest_bus_v(&mut bench, 700), low_v, high_v);
+        bench.reads(0x603F, code).reads(0x1001, if code == 0 { 0 } else { 0x05 }).shows(0xFF, state);
+        let burnt_j = bench.motor().rig.energy.bleeder_j;
+        let kinetic_j = 0.5 * (wheel::inertia_kg_m2() + 0.1) * (300.0 * RAD_S_PER_RPM).powi(2);
+        let share = if settings.is_empty() { (0.0, 0.0) } else { (0.3, 1.0) };
+        assert_within("J burnt", burnt_j, share.0 * kinetic_j, share.1 * kinetic_j);
+    }
 }
 
 /// One body of 2 K/W and 630 J/K: 10 A warm it by 3/2 R i^2.

@@ -8,7 +8,6 @@ use crate::wheel::COUNTS_PER_TURN;
 const LOOK: Duration = Duration::from_millis(1);
 const RELATIVE: i64 = 0x40;
 const IMMEDIATELY: i64 = 0x20;
-const ACKNOWLEDGED: u16 = 1 << 12;
 const REACHED: u16 = 1 << 10;
 const IN_PLACE: u16 = 1 << 13;
 
@@ -98,17 +97,6 @@ fn nothing_moves_without_a_rising_bit_4() {
     // Bit 4 is still up: a new target waits for its next edge.
     bench.set(0x607A, 0).set(0x6040, 0x1F).run_ms(500);
     assert_at(&mut bench, 4096);
-}
-
-#[test]
-fn the_acknowledge_bit_rises_with_the_set_point_and_falls_with_bit_4() {
-    let mut bench = ready();
-    bench.shows(ACKNOWLEDGED, 0);
-    start(&mut bench, 4096, 0);
-    bench.shows(ACKNOWLEDGED, ACKNOWLEDGED);
-    bench.run_ms(200);
-    assert_eq!(bench.statusword() & ACKNOWLEDGED, ACKNOWLEDGED, "bit 4 is still up");
-    bench.set(0x6040, 0x0F).shows(ACKNOWLEDGED, 0);
 }
 
 #[test]

@@ -20,31 +20,16 @@ fn a_host_that_writes_anything_anywhere_is_answered_and_breaks_nothing() {
         seeds: 60,
         spared: &SPARED,
         hands: &[
-            "load torque 2",
-            "load torque 1",
-            "load torque -1",
-            "load torque -2",
-            "load inertia 0.2",
-            "load inertia 0",
-            "rotor lock",
-            "rotor free",
-            "fault hall on",
-            "fault hall off",
-            "fault encoder on",
-            "fault encoder off",
-            "fault phase on",
-            "fault phase off",
-            "input X0 1",
-            "input X0 0",
-        ],
-        mended: &[
-            "fault hall off",
-            "fault encoder off",
-            "fault phase off",
-            "rotor free",
-            "load torque 0",
-            "load inertia 0",
-            "input X0 0",
+            ("load torque 2", "load torque 0"),
+            ("load torque 1", "load torque 0"),
+            ("load torque -1", "load torque 0"),
+            ("load torque -2", "load torque 0"),
+            ("load inertia 0.2", "load inertia 0"),
+            ("rotor lock", "rotor free"),
+            ("fault hall on", "fault hall off"),
+            ("fault encoder on", "fault encoder off"),
+            ("fault phase on", "fault phase off"),
+            ("input X0 1", "input X0 0"),
         ],
         states: (0x03FF, &[0x0270, 0x0231, 0x0233, 0x0237, 0x0217, 0x0298]),
         recovers,
@@ -123,14 +108,15 @@ fn without_a_mode_an_enabled_drive_stands_whatever_its_targets_are() {
 }
 
 #[test]
-fn an_external_stop_that_is_active_lets_nothing_start_in_any_mode() {
+fn an_external_stop_that_is_active_is_told_by_bit_15_and_lets_nothing_start_in_any_mode() {
     for mode in [1, 3, 4] {
         let mut bench = Bench::new();
-        bench.set_input(0, true).run_ms(10);
+        bench.shows(0x8000, 0).set_input(0, true).run_ms(20);
         bench.enable_in(mode).set(0x60FF, 100).set(0x6071, 2000).set(0x607A, 8192).set(0x6040, 0x1F).run_ms(2000);
         assert_within(&format!("counts in mode {mode}"), bench.report().position as f64, -5.0, 5.0);
+        bench.shows(0x8000, 0x8000).reads(0x2003, 1);
         // Nothing starts by itself when it ends.
-        bench.set_input(0, false).run_ms(2000);
+        bench.set_input(0, false).run_ms(20).shows(0x8000, 0).run_ms(2000);
         assert_within(&format!("counts in mode {mode}"), bench.report().position as f64, -10.0, 10.0);
     }
 }

@@ -95,45 +95,27 @@ fn a_silent_host_stops_the_motor_after_2000h_and_leaves_it_enabled_without_a_fau
 
 /// 2000h is the time without the host (chapter 9); which frames are a sign of it is a reading, L083.
 #[test]
-fn data_to_the_node_keeps_the_watch_quiet_and_what_goes_on_without_a_host_does_not() {
-    for (frame, address, kept) in [
-        ("604#4041600000000000", "SDO", true),
-        ("204#0F00", "RPDO", true),
-        ("605#4041600000000000", "SDO of another node", false),
-        ("080#", "SYNC", false),
-        ("000#0104", "NMT start", false),
-        ("77F#05", "heartbeat of a master", false),
+fn data_to_the_node_keeps_the_watch_quiet_until_it_ends_and_what_goes_on_without_a_host_does_not() {
+    for (frame, address, by_sync, kept) in [
+        ("604#4041600000000000", "SDO", false, true),
+        ("204#0F00", "RPDO", false, true),
+        ("605#4041600000000000", "SDO of another node", false, false),
+        ("080#", "SYNC", false, false),
+        ("080#", "SYNC with L083=sync", true, true),
+        ("000#0104", "NMT start", false, false),
+        ("77F#05", "heartbeat of a master", false, false),
     ] {
-        let mut bench = turning();
+        let mut bench = brought_to_speed(if by_sync { Bench::choosing("L083", "sync") } else { Bench::new() });
         bench.send("000#0104").set(0x2000, 300);
         for _ in 0..10 {
-            bench.run_ms(150);
-            bench.send(frame);
+            bench.run_ms(150).send(frame);
         }
         assert_eq!(bench.report().velocity_rpm > RPM - 1.0, kept, "{address}");
+        if kept {
+            bench.run_ms(300);
+            assert_stops(&mut bench, Ramp::Time(0.4));
+        }
     }
-}
-
-#[test]
-fn with_l083_sync_a_sync_keeps_the_watch_quiet_too_and_its_end_stops_the_motor() {
-    let mut bench = brought_to_speed(Bench::choosing("L083", "sync"));
-    bench.set(0x2000, 300);
-    for _ in 0..10 {
-        bench.run_ms(150);
-        bench.send("080#");
-    }
-    bench.turns_at(RPM - 1.0, RPM + 1.0);
-    bench.run_ms(300);
-    assert_stops(&mut bench, Ramp::Time(0.4));
-}
-
-#[test]
-fn the_watch_is_on_as_delivered_with_1000_ms() {
-    let mut bench = Bench::new();
-    bench.set(0x6060, 3).enable().set(0x60FF, 60).run_ms(990);
-    assert!(bench.report().velocity_rpm > 59.0);
-    let stopped = bench.seconds_until(2.0, LOOK, |report| report.velocity_rpm < 1.0);
-    assert_within("seconds to stand, 10 ms and a ramp of 500 ms", stopped, 0.40, 0.55);
 }
 
 #[test]

@@ -50,14 +50,6 @@ fn the_hall_sensors_pass_their_six_states_in_one_electrical_turn_and_read_0_or_7
 }
 
 #[test]
-fn the_motor_status_register_tells_whether_it_turns() {
-    let mut bench = Bench::new();
-    bench.reads(0x2027, 0);
-    bench.enable_in(3).set(0x60FF, 30).run_ms(800).reads(0x2027, 1);
-    bench.set(0x60FF, 0).run_ms(1200).reads(0x2027, 0);
-}
-
-#[test]
 fn two_faults_show_together_and_the_last_one_to_go_ends_the_fault() {
     let mut bench = Bench::new();
     bench.forget();

@@ -9,23 +9,15 @@ use sim::machine::zlim42c;
 use crate::bench::{Bench, RATE_500K};
 
 #[test]
-fn the_switches_give_1_to_15_as_the_table_has_it() {
-    for row in figures().iter().filter(|row| row.table == "address" && row.row != "0") {
+fn the_switches_give_1_to_15_as_the_table_has_it_and_stored_numbers_from_32_on_are_used_and_others_give_node_1() {
+    let table = figures().into_iter().filter(|row| row.table == "address" && row.row != "0").map(|row| {
         // 4.1: SW2 is the lowest; OFF counts.
         let address = row.value.split(' ').enumerate().map(|(n, switch)| u8::from(switch == "OFF") << n).sum::<u8>();
-        assert_eq!(address.to_string(), row.row);
-        assert_eq!(
-            boot_up_of(zlim42c(address, RATE_500K), Bitrate::K500),
-            Some(format!("{:03X}#00", 0x700 + u16::from(address)))
-        );
-    }
-}
-
-#[test]
-fn stored_numbers_from_32_on_are_used_and_others_give_node_1() {
-    for (stored, used) in [(32, 32), (100, 100), (127, 127), (16, 1), (31, 1)] {
-        let boot_up = boot_up_of(zlim42c(stored, RATE_500K), Bitrate::K500);
-        assert_eq!(boot_up, Some(format!("{:03X}#00", 0x700 + used)), "2008h = {stored}");
+        (address, row.row.parse().expect("an address"))
+    });
+    for (set, used) in table.chain([(32, 32), (100, 100), (127, 127), (16, 1), (31, 1)]) {
+        let boot_up = boot_up_of(zlim42c(set, RATE_500K), Bitrate::K500);
+        assert_eq!(boot_up, Some(format!("{:03X}#00", 0x700 + used)), "switches or 2008h = {set}");
     }
 }
 

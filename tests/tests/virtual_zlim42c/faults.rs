@@ -144,11 +144,7 @@ fn the_current_of_hard_work_is_no_bus_over_current() {
     let mut bench = Bench::long();
     bench.set(0x2005, 7).set(0x6083, 2000).enable_in(3);
     for (rpm, most_nm) in [(120, 0.4), (300, 0.35), (600, 0.19)] {
-        bench.set(0x60FF, rpm).run_ms(2100);
-        for part in 1..=10 {
-            let torque_nm = most_nm * f64::from(part) / 10.0;
-            bench.set_load_torque(torque_nm).run_ms(100);
-        }
+        bench.set(0x60FF, rpm).run_ms(2100).load_up_to(most_nm, 10, 100);
         let report = bench.report();
         let lag = report.position - report.rotor_position.expect("known here");
         assert!((0..80).contains(&lag), "it carries the load at {rpm} r/min: {lag} pulses");
@@ -227,11 +223,13 @@ fn a_load_that_drives_the_motor_raises_the_bus_until_over_voltage() {
     // 0.25 N m at 1000 r/min are 26 W, the windings turn 2.2² * 1.85 = 9 W into heat, and the source cannot take the rest.
     for (torque_nm, code) in [(0.25, 0), (-0.05, 0), (-0.25, 0xFF01)] {
         let mut bench = Bench::new();
-        bench.set(0x2005, 7).set(0x6083, 2000).enable_in(3).set(0x60FF, 1000).run_ms(2500);
-        for part in 1..=10 {
-            let torque_nm = torque_nm * f64::from(part) / 10.0;
-            bench.set_load_torque(torque_nm).run_ms(50);
-        }
+        bench
+            .set(0x2005, 7)
+            .set(0x6083, 2000)
+            .enable_in(3)
+            .set(0x60FF, 1000)
+            .run_ms(2500)
+            .load_up_to(torque_nm, 10, 50);
         assert_eq!(bench.get(0x603F), code, "{torque_nm} N m: {:?}", bench.report());
     }
 }

@@ -18,21 +18,21 @@ fn with_switches(stop_mode: i64) -> Bench {
 }
 
 #[test]
-fn a_limit_stops_the_velocity_towards_it_as_200ah_says() {
-    for (mode, expected) in [(0, Some(0.3)), (1, Some(0.05)), (2, None)] {
-        let mut bench = with_switches(mode);
-        bench.enable_in(3).set(0x60FF, 60).run_ms(500);
-        bench.set_input(0, true);
-        match expected {
-            Some(expected) => {
-                let taken = bench.seconds_until(1.0, LOOK, |report| report.velocity_demand_rpm == Some(0.0));
-                // The filter's 10 ms come first.
-                assert_within("seconds", taken - 0.010, expected - 0.002, expected + 0.003);
-            }
-            None => {
-                bench.run_ms(500).reads(0x606C, 60);
-            }
-        }
+fn a_limit_stops_a_velocity_and_a_move_towards_it_as_200ah_says() {
+    for (drive_mode, input, stop_mode, expected) in
+        [(3, 0, 0, Some(0.3)), (3, 0, 1, Some(0.05)), (3, 0, 2, None), (1, 1, 0, Some(0.3)), (1, 1, 1, Some(0.05))]
+    {
+        let mut bench = with_switches(stop_mode);
+        bench.enable_in(drive_mode);
+        _ = if drive_mode == 3 { bench.set(0x60FF, 60) } else { bench.move_by(-100_000) };
+        bench.run_ms(500).set_input(input, true);
+        let Some(expected) = expected else {
+            bench.run_ms(500).reads(0x606C, 60);
+            continue;
+        };
+        let taken = bench.seconds_until(1.0, LOOK, |report| report.velocity_demand_rpm == Some(0.0));
+        // The filter's 10 ms come first.
+        assert_within("seconds", taken - 0.010, expected - 0.002, expected + 0.003);
     }
 }
 
@@ -61,17 +61,6 @@ fn a_velocity_goes_on_when_the_limit_goes_off_and_a_move_does_not() {
 }
 
 #[test]
-fn a_move_is_stopped_by_a_limit_as_200ah_says() {
-    for (mode, seconds) in [(0, 0.3), (1, 0.05)] {
-        let mut bench = with_switches(mode);
-        bench.enable_in(1).move_by(-100_000).run_ms(500);
-        bench.set_input(1, true);
-        let taken = bench.seconds_until(1.0, LOOK, |report| report.velocity_demand_rpm == Some(0.0));
-        assert_within("seconds", taken - 0.010, seconds - 0.002, seconds + 0.003);
-    }
-}
-
-#[test]
 fn a_move_that_meets_a_limit_ends_there_and_does_not_count_as_reached() {
     let mut bench = with_switches(0);
     bench.enable_in(1).move_by(40_000).run_ms(500);
@@ -82,18 +71,6 @@ fn a_move_that_meets_a_limit_ends_there_and_does_not_count_as_reached() {
     assert_eq!(bench.get(0x6064), stopped, "further in: no step");
     bench.set(0x6040, 0x0F).move_by(-1000).run_ms(1000).reads(0x6064, stopped - 1000);
     assert_ne!(bench.statusword() & REACHED, 0);
-}
-
-#[test]
-fn the_emergency_stop_holds_while_it_is_active_and_nothing_starts_by_itself_after_it() {
-    let mut bench = with_switches(0);
-    bench.set(0x605A, 6).enable_in(3).set(0x60FF, 60).run_ms(500);
-    bench.input(2, true).run_ms(60);
-    assert_eq!(bench.get(0x606C), 0, "605Ah = 6: as 6085h");
-    assert!(bench.report().current_a > 0.5, "and holds");
-    bench.set(0x60FF, 60).run_ms(300).reads(0x606C, 0);
-    bench.input(2, false).run_ms(300).reads(0x606C, 0).reads(0x60FF, 0);
-    bench.set(0x60FF, 60).run_ms(500).reads(0x606C, 60);
 }
 
 #[test]

@@ -8,10 +8,6 @@ use crate::bench::{Bench, assert_within};
 /// Pulses of four full steps with 4000 pulses a turn.
 const FOUR_STEPS: i64 = 80;
 
-fn load(bench: &mut Bench, torque_nm: f64) {
-    bench.set_load_torque(torque_nm);
-}
-
 /// Enabled with the highest current, also at standstill.
 fn strong() -> Bench {
     at_the_highest_current(Bench::new())
@@ -55,36 +51,26 @@ fn an_overloaded_rotor_loses_a_multiple_of_four_full_steps_and_a_pushed_one_gain
     for torque_nm in [0.6, -0.6] {
         let losses = [8, 10, 12].map(|ms| {
             lost_in_a_move(|bench| {
-                bench.set_load_inertia(5e-5);
-                load(bench, torque_nm);
-                bench.run_ms(ms);
-                load(bench, 0.0);
+                bench.set_load_inertia(5e-5).set_load_torque(torque_nm).run_ms(ms).set_load_torque(0.0);
             })
         });
         assert!(losses.iter().all(|lost| lost % FOUR_STEPS == 0), "{torque_nm} N m: {losses:?}");
-        assert!(
-            losses.iter().any(|lost| *lost != 0 && (*lost > 0) == (torque_nm > 0.0)),
-            "{torque_nm} N m: {losses:?}"
-        );
+        let its_way = |lost: &i64| *lost != 0 && (*lost > 0) == (torque_nm > 0.0);
+        assert!(losses.iter().any(its_way), "{torque_nm} N m: {losses:?}");
     }
 }
 
-#[test]
-fn the_holding_torque_is_that_of_the_manual() {
-    slips_between_095_and_110_per_cent_of_the_manuals_torque(Bench::new, "zlim42c");
-}
-
 /// 2.1, at the highest current, with a load that grows slowly: below it the rotor stays within its step, above it slips.
-fn slips_between_095_and_110_per_cent_of_the_manuals_torque(new: fn() -> Bench, model: &str) {
-    let holding_nm = figure("model", model, "holding_torque");
-    for (share, holds) in [(0.95, true), (1.1, false)] {
-        let mut bench = at_the_highest_current(new());
-        for part in 1..=40 {
-            load(&mut bench, share * holding_nm * f64::from(part) / 40.0);
-            bench.run_ms(50);
+#[test]
+fn each_length_holds_95_per_cent_of_the_holding_torque_of_the_manual_and_slips_at_110() {
+    for (new, model) in [(Bench::new as fn() -> Bench, "zlim42c"), (Bench::long, "zlim42c-82")] {
+        let holding_nm = figure("model", model, "holding_torque");
+        for (share, holds) in [(0.95, true), (1.1, false)] {
+            let mut bench = at_the_highest_current(new());
+            bench.load_up_to(share * holding_nm, 40, 50);
+            let away = bench.report().rotor_position.expect("known here").abs();
+            assert_eq!(away < FOUR_STEPS / 2, holds, "{model}, {share}: {away} pulses");
         }
-        let away = bench.report().rotor_position.expect("known here").abs();
-        assert_eq!(away < FOUR_STEPS / 2, holds, "{share}: {away} pulses");
     }
 }
 
@@ -94,8 +80,7 @@ fn a_load_below_it_turns_the_rotor_by_the_angle_of_its_sine() {
     let model = StepperMotorModel::ZLIM42_C_70;
     for torque_nm in [0.1, 0.25, -0.35] {
         let mut bench = strong();
-        load(&mut bench, torque_nm);
-        bench.run_ms(3000);
+        bench.set_load_torque(torque_nm).run_ms(3000);
         let report = bench.report();
         let lag = -report.shaft_angle_rad * f64::from(model.stepper.teeth);
         let held_nm = model.stepper.torque_constant_nm_a() * report.current_a * lag.sin()
@@ -105,19 +90,10 @@ fn a_load_below_it_turns_the_rotor_by_the_angle_of_its_sine() {
 }
 
 #[test]
-fn the_longer_motor_holds_what_the_manual_gives_it() {
-    slips_between_095_and_110_per_cent_of_the_manuals_torque(Bench::long, "zlim42c-82");
-}
-
-#[test]
 fn a_rotor_pulled_while_it_is_held_falls_in_again_whole_turns_of_the_field_away() {
     for torque_nm in [0.8, -0.8] {
         let mut bench = strong();
-        bench.set_load_inertia(5e-5);
-        load(&mut bench, torque_nm);
-        bench.run_ms(7);
-        load(&mut bench, 0.0);
-        bench.run_ms(3000);
+        bench.set_load_inertia(5e-5).set_load_torque(torque_nm).run_ms(7).set_load_torque(0.0).run_ms(3000);
         let report = bench.report();
         let pulled = report.rotor_position.expect("known here");
         assert_eq!((pulled % FOUR_STEPS, pulled.signum() as f64), (0, -torque_nm.signum()), "{pulled} pulses");
@@ -140,10 +116,7 @@ fn a_load_that_is_carried_slowly_is_lost_at_speed() {
         let mut bench = strong();
         bench.set(0x6060, 3).set(0x6083, 2000).set(0x60FF, rpm).run_ms(2500);
         assert_within("r/min", bench.report().velocity_rpm, 0.5 * rpm as f64, 1.5 * rpm as f64);
-        load(&mut bench, 0.25);
-        bench.run_ms(load_ms);
-        load(&mut bench, 0.0);
-        bench.run_ms(500);
+        bench.set_load_torque(0.25).run_ms(load_ms).set_load_torque(0.0).run_ms(500);
         let report = bench.report();
         let lost = report.position - report.rotor_position.expect("known here");
         assert_eq!(lost.abs() < FOUR_STEPS, keeps, "{rpm} r/min: {lost} pulses, {report:?}");
@@ -157,14 +130,8 @@ fn a_higher_setting_of_2005h_carries_a_load_that_a_lower_one_loses() {
     for (setting, keeps) in [(2, false), (7, true)] {
         let mut bench = Bench::new();
         bench.set(0x2005, setting).set(0x2007, 1).enable_in(1).run_ms(50);
-        bench.move_by(4000).run_ms(300);
-        for part in 1..=10 {
-            load(&mut bench, 0.03 * f64::from(part));
-            bench.run_ms(10);
-        }
-        bench.run_ms(1500);
-        load(&mut bench, 0.0);
-        bench.run_ms(1500);
+        bench.move_by(4000).run_ms(300).load_up_to(0.3, 10, 10).run_ms(1500);
+        bench.set_load_torque(0.0).run_ms(1500);
         let report = bench.report();
         let lost = report.position - report.rotor_position.expect("known here");
         assert_eq!(lost < FOUR_STEPS / 2, keeps, "2005h = {setting}: {lost} pulses");
@@ -175,8 +142,7 @@ fn a_higher_setting_of_2005h_carries_a_load_that_a_lower_one_loses() {
 fn half_the_current_at_rest_holds_half_the_load() {
     let mut bench = strong();
     bench.set(0x2007, 0).run_ms(50);
-    load(&mut bench, 0.35);
-    bench.run_ms(500);
+    bench.set_load_torque(0.35).run_ms(500);
     let report = bench.report();
     assert!(report.rotor_position.expect("known here").abs() >= FOUR_STEPS, "{report:?}");
 }
@@ -184,7 +150,6 @@ fn half_the_current_at_rest_holds_half_the_load() {
 #[test]
 fn a_free_rotor_turns_under_its_load_and_the_position_stays() {
     let mut bench = Bench::new();
-    load(&mut bench, -0.1);
-    bench.run_ms(200).reads(0x6064, 0);
+    bench.set_load_torque(-0.1).run_ms(200).reads(0x6064, 0);
     assert!(bench.report().shaft_angle_rad > 1.0, "6040h = 0: free but for the detent");
 }

@@ -3,27 +3,13 @@
 
 use std::time::Duration;
 
+use ferrodrive_tests::bench::zlim42c::Zlim42c;
+use ferrodrive_tests::scenarios::stops::turning;
+
 use crate::bench::{Bench, assert_within};
 
 const LOOK: Duration = Duration::from_micros(500);
 const EMERGENCY_STOP: i64 = 9;
-
-/// Turning at 120 r/min in a mode: far from any target or switch.
-fn turning(mode: i64) -> Bench {
-    let mut bench = Bench::new();
-    for (index, value) in [(0x6084, 300), (0x6085, 50), (0x609A, 200), (0x6098, 18)] {
-        bench.set(index, value);
-    }
-    bench.set((0x2030, 4), EMERGENCY_STOP).enable_in(mode);
-    match mode {
-        1 => bench.move_by(100_000),
-        3 => bench.set(0x60FF, 120),
-        _ => bench.set(0x6040, 0x1F),
-    };
-    bench.run_ms(500);
-    assert_eq!(bench.get(0x606C), 120, "mode {mode}");
-    bench
-}
 
 /// Seconds until the commanded velocity is 0.
 #[track_caller]
@@ -33,18 +19,20 @@ fn stops_within(bench: &mut Bench, at: &str, seconds: f64) {
 }
 
 #[test]
-fn an_emergency_stop_input_ends_a_move_and_a_homing_for_good() {
+fn an_emergency_stop_input_ends_a_move_a_velocity_and_a_homing_for_good_and_holds() {
     for mode in [1, 3, 6] {
-        let mut bench = turning(mode);
-        bench.set(0x605A, 6).input(2, true).run_ms(60);
-        assert_eq!(bench.get(0x606C), 0, "mode {mode}");
+        let mut bench = turning::<Zlim42c>(mode);
+        bench.set((0x2030, 4), EMERGENCY_STOP).set(0x605A, 6).input(2, true).run_ms(60);
+        assert_eq!(bench.get(0x606C), 0, "mode {mode}, 605Ah = 6: as 6085h");
+        assert!(bench.report().current_a > 0.5, "mode {mode}: it holds");
         let stopped = bench.get(0x6064);
         // No start while it is active, none by itself after it.
-        bench.set(0x6040, 0x0F).set(0x6040, 0x5F).run_ms(100);
+        bench.set(0x60FF, 60).set(0x6040, 0x0F).set(0x6040, 0x5F).run_ms(300).reads(0x6064, stopped);
         bench.input(2, false).run_ms(300);
         assert_eq!((bench.get(0x6064), bench.get(0x60FF)), (stopped, 0), "mode {mode}");
         assert_eq!(bench.statusword() & (1 << 8), 0, "mode {mode}: homing attained");
         assert_eq!(bench.statusword() & 0x6F, 0x27, "mode {mode}");
+        bench.set(0x6060, 3).run_ms(5).set(0x60FF, 60).run_ms(500).reads(0x606C, 60);
     }
 }
 
