@@ -12,7 +12,7 @@ use drives::mjoint::Model;
 use master::drive::{HostLoss, MotionOptions, SwitchedOff};
 use master::units::{Ramp, Rpm};
 use master::{Drive, Network};
-use sim::machine::{mjoint, zlac8030l, zlim42c};
+use sim::machine::{Order, mjoint, order, zlac8030l, zlim42c};
 use sim::{StationId, World, block_on};
 use support::toy::Toy;
 use support::{Bus, mux, node};
@@ -230,6 +230,26 @@ fn a_watch_that_was_off_is_off_again_when_its_guard_ends_though_the_heartbeat_go
     let network = bench.network.clone();
     bench.run(network.release_guards()).unwrap();
     assert_eq!(bench.run(own.read::<u32>(watch)).unwrap(), 0);
+}
+
+/// CiA 402 has 6007h for it, and a servo is delivered with 1016h:01 = 0: it would watch nobody.
+#[test]
+fn a_servo_that_is_delivered_without_a_watch_is_given_one_and_stops_when_the_program_dies() {
+    const GENERIC: u8 = 5;
+    let mut bench = Bench::new();
+    let description = model("cia402").unwrap();
+    let servo = order(description, &Order::new(description, node(GENERIC), Bitrate::K500)).unwrap();
+    bench.world.add_drive(GENERIC, servo).unwrap();
+    bench.wait(500);
+    let drive = Drive::new(bench.network.node(node(GENERIC)), description);
+    let loss = bench.run(drive.guard(SwitchedOff::SwitchOn)).unwrap();
+    assert_eq!(loss.stops_after(), Some(Duration::from_secs(2)));
+    bench.run(drive.velocity(Rpm(60.0), MotionOptions::default())).unwrap();
+    bench.wait(5_000);
+    assert!(bench.turns(GENERIC), "a program that lives is heard");
+    bench.kill();
+    bench.wait(4_000);
+    assert!(!bench.turns(GENERIC));
 }
 
 /// J112: the next heartbeat lets the joint go on with what it was told.

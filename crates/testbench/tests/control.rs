@@ -147,6 +147,7 @@ fn what_makes_no_sense_is_refused_with_a_kind_and_changes_nothing() {
         (r#"{"request":"subscribe","values":[{"node":4,"signals":["supply_v"]}],"every":"1us"}"#, "usage"),
         (r#"{"request":"subscribe","values":[{"node":4,"signals":["supply_v"]}]}"#, "usage"),
         (r#"{"request":"subscribe","values":[{"node":9,"signals":["supply_v"]}],"every":"1ms"}"#, "no_such_node"),
+        (r#"{"request":"subscribe","values":[{"node":4,"axis":9,"signals":["supply_v"]}],"every":"1ms"}"#, "refused"),
         (r#"{"request":"unsubscribe","subscription":1}"#, "usage"),
         ("5 supply", "usage"),
         ("hello", "usage"),
@@ -162,6 +163,10 @@ fn what_makes_no_sense_is_refused_with_a_kind_and_changes_nothing() {
     bench.say(1, &long);
     assert_eq!(inbox.only()["error"]["kind"], "too_long");
     assert_eq!(bench.world.digest(), digest);
+    // What a browser begins with ends the connection, before the lines that a page chose.
+    let text = ReadLine::Text("POST / HTTP/1.1".into());
+    let outcome = bench.control.handle(1, &text, &mut bench.world, Service::default());
+    assert!(matches!(outcome, Outcome::Close) && inbox.only()["error"]["kind"] == "usage");
     let deep = "[".repeat(50_000);
     bench.say(1, &format!(r#"{{"id":7,"request":"world","command":{deep}"#));
     assert_eq!(inbox.only()["error"]["kind"], "syntax");

@@ -19,7 +19,7 @@ use crate::embedded;
 use crate::failure::Failure;
 use crate::global::Global;
 use crate::plain::plain;
-use crate::recording::{FrameLog, RecordFile, RecordOptions};
+use crate::recording::{FrameLog, Pace, RecordFile, RecordOptions};
 use crate::serve::control::ControlServer;
 use crate::serve::eeprom::{EepromError, Eeproms};
 use crate::serve::files::create_log;
@@ -186,7 +186,9 @@ impl Sim {
             Failure::new(format!("cannot write the log {}", self.log.clone().unwrap_or_default().display()))
                 .because(error)
         })?;
-        let record = self.recording.start(&mut world, warnings.clone())?;
+        let real_time = self.clock == Clock::Real && self.speed.is_none();
+        let pace = if real_time { Pace::RealTime } else { Pace::Free };
+        let record = self.recording.start(&mut world, pace, warnings.clone())?;
         let pacer = Pacer::new(self.clock, self.speed.unwrap_or(Speed::Times(1.0)));
         let world = ServedWorld::new(world, pacer, log.is_some() || record.is_some(), warnings.clone());
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().event_interval(TASKS_A_TURN).build();

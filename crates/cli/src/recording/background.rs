@@ -29,15 +29,16 @@ pub(super) struct Background<B> {
 }
 
 impl<B: Send + 'static> Background<B> {
-    /// Hands batches to `write` until it fails or all are written, then calls `end`. What goes wrong is told to `speaker`.
+    /// Of batches `room` may wait. Hands them to `write` until it fails or all are written, then calls `end`. What goes wrong is told to `speaker`.
     pub(super) fn start<W: Send + 'static>(
         words: Words,
         writer: W,
         write: impl Fn(&mut W, B) -> io::Result<()> + Send + 'static,
         end: impl FnOnce(W) -> io::Result<()> + Send + 'static,
+        room: usize,
         speaker: Speaker,
     ) -> Self {
-        let (batches, incoming) = sync_channel(MAX_BATCHES);
+        let (batches, incoming) = sync_channel(room);
         let (done, written) = channel();
         let told = speaker.clone();
         std::thread::spawn(move || {

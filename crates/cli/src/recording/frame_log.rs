@@ -6,7 +6,7 @@ use std::time::Duration;
 use can::{Frame, Instant};
 use transport::log::LogWriter;
 
-use super::background::{Background, Words};
+use super::background::{Background, MAX_BATCHES, Words};
 use crate::serve::speaker::Speaker;
 
 /// Frames, and when the bus carried them.
@@ -24,7 +24,7 @@ impl FrameLog {
             batch.iter().try_for_each(|(at, frame)| log.write(*at + unix_zero, frame))?;
             log.flush()
         };
-        Self(Background::start(words, log, write, |_| Ok(()), speaker))
+        Self(Background::start(words, log, write, |_| Ok(()), MAX_BATCHES, speaker))
     }
 
     /// Takes frames that were carried.
@@ -43,7 +43,6 @@ impl FrameLog {
 
 #[cfg(test)]
 mod tests {
-    use super::super::background::MAX_BATCHES;
     use super::*;
     use std::io;
     use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};

@@ -5,6 +5,6 @@ mod file;
 mod frame_log;
 mod options;
 
-pub(crate) use file::{Batch, RecordFile};
+pub(crate) use file::{Batch, Pace, RecordFile};
 pub(crate) use frame_log::FrameLog;
 pub(crate) use options::RecordOptions;

@@ -9,7 +9,7 @@ use sim::recorder::{Channel, Recorder, Signal};
 use sim::{Place, World};
 use testbench::recording::{Column, Kind, columns_of_drives, select};
 
-use super::file::RecordFile;
+use super::file::{Pace, RecordFile};
 use crate::failure::Failure;
 use crate::serve::files::create_record;
 use crate::serve::speaker::Speaker;
@@ -54,7 +54,7 @@ impl RecordOptions {
     }
 
     /// Begins to record the drives of `world` as asked for; `None` if it is not.
-    pub(crate) fn start(&self, world: &mut World, speaker: Speaker) -> Result<Option<RecordFile>, Failure> {
+    pub(crate) fn start(&self, world: &mut World, pace: Pace, speaker: Speaker) -> Result<Option<RecordFile>, Failure> {
         let Some(path) = self.path() else { return Ok(None) };
         let mut places = Vec::new();
         let numbers: Vec<u8> = world.drive_numbers().collect();
@@ -80,7 +80,7 @@ impl RecordOptions {
         let of_axes = channels.iter().map(|channel| Column::of_axis(*channel));
         let columns: Vec<Column> = of_axes.chain(bodies.iter().flat_map(Column::of_body)).collect();
         let period = self.record_period.unwrap_or(Duration::from_millis(1));
-        let file = create(path).and_then(|(kind, file)| RecordFile::start(kind, file, &columns, speaker));
+        let file = create(path).and_then(|(kind, file)| RecordFile::start(kind, file, &columns, pace, speaker));
         let file = file.map_err(|error| cannot_write(path, &error))?;
         world.start_recording(Recorder::new(period, channels).with_bodies(&bodies));
         world.watch(true);

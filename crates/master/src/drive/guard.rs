@@ -23,6 +23,12 @@ const SIGNS_IN_TIME: u32 = 4;
 /// The shortest period of a heartbeat (1017h has milliseconds).
 const SHORTEST_PERIOD: Duration = Duration::from_millis(1);
 
+/// Consumer heartbeat time (CiA 301, 7.5.2.19): bits 16 to 23 node-ID, bits 0 to 15 time in ms.
+const HEARTBEAT_CONSUMERS: u16 = 0x1016;
+
+/// What a watch gets that is off as delivered: node 127, which masters mostly take, within 2000 ms, as the M joint has it.
+const OWN_WATCH: i64 = 127 << 16 | 2000;
+
 /// How long a node that this program does not move is waited for, when it is asked whether it watches too.
 const BYSTANDER_TIMEOUT: Duration = Duration::from_millis(100);
 
@@ -83,6 +89,10 @@ impl Drive {
         let switches_on = armed == 0 && switched_off == SwitchedOff::SwitchOn;
         if switches_on && let DefaultValue::Value(factory) = self.row(object, "guard it")?.default {
             armed = factory;
+            // A device that is delivered with its watch off, as most are, would be armed with nothing.
+            if factory == 0 && object.index == HEARTBEAT_CONSUMERS {
+                armed = OWN_WATCH;
+            }
         }
         let loss = self.loss(armed);
         let Some(time) = loss.stops_after() else { return Ok(loss) };

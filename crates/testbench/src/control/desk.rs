@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use can::Instant;
 use serde_json::{Value, json};
+use sim::Place;
 use sim::World;
 use sim::command::{Command, CommandError, Run, Service};
 use sim::events::MAX_WAITING;
@@ -141,6 +142,11 @@ impl<S: Sink> Control<S> {
         };
         if !sim::command::asks_for_an_answer(text) {
             return Outcome::Answered;
+        }
+        // A browser would go on with lines that a page chose.
+        if text.contains(" HTTP/") {
+            client.refuse(None, &ControlError::new("usage", "this is no web server: lines of JSON or world commands"));
+            return Outcome::Close;
         }
         let Message { id, request } = match Message::parse(text) {
             Ok(message) => message,
@@ -284,7 +290,7 @@ impl<S: Sink> Client<S> {
             },
             Request::SubscribeEvents(filter) => self.subscribe(Subscription::Events(filter)),
             Request::SubscribeValues(values) => {
-                check_nodes(&values, world)?;
+                check_places(&values, world)?;
                 self.subscribe(Subscription::Values { values, next: world.now() })
             }
             Request::Unsubscribe(number) => match self.subscriptions.remove(&number) {
@@ -329,11 +335,18 @@ fn next_after(due: Instant, every_ns: u64, now: Instant) -> Instant {
     due.plus_nanos((passed + 1) * every_ns)
 }
 
-fn check_nodes(values: &Values, world: &World) -> Result<(), ControlError> {
+fn check_places(values: &Values, world: &mut World) -> Result<(), ControlError> {
     let there: Vec<u8> = world.drive_numbers().collect();
-    let Some(number) = values.nodes().find(|node| !there.contains(node)) else { return Ok(()) };
-    let present: Vec<String> = there.iter().map(ToString::to_string).collect();
-    Err(CommandError::NoSuchDrive { number, present: present.join(", ") }.into())
+    for Place { node: number, axis } in values.places() {
+        match world.with_drive(number, |drive, _| drive.check_axis(axis)) {
+            Ok(checked) => checked.map_err(CommandError::from)?,
+            Err(_) => {
+                let present: Vec<String> = there.iter().map(ToString::to_string).collect();
+                return Err(CommandError::NoSuchDrive { number, present: present.join(", ") }.into());
+            }
+        }
+    }
+    Ok(())
 }
 
 fn hello(world: &mut World) -> String {

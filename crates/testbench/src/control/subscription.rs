@@ -65,9 +65,9 @@ impl Values {
         Ok(Self { channels, every_ns: every.as_nanos() as u64 })
     }
 
-    /// The nodes that it is about.
-    pub(super) fn nodes(&self) -> impl Iterator<Item = u8> + '_ {
-        self.channels.iter().map(|channel| channel.place.node)
+    /// The axes that it is about.
+    pub(super) fn places(&self) -> impl Iterator<Item = Place> + '_ {
+        self.channels.iter().map(|channel| channel.place)
     }
 
     pub(super) const fn every_ns(&self) -> u64 {

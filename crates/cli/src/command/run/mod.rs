@@ -13,7 +13,7 @@ use testbench::scenario::{Runner, Scenario};
 use crate::failure::Failure;
 use crate::output::Format;
 use crate::progress::Progress;
-use crate::recording::{Batch, RecordOptions};
+use crate::recording::{Batch, Pace, RecordOptions};
 use crate::serve::speaker::Speaker;
 use crate::session::exit_on_signal;
 use report::RunReport;
@@ -101,7 +101,7 @@ impl Run {
             Failure::usage(format!("cannot build the machine of {}", self.file.display())).because(bad)
         })?;
         let warnings = Speaker::of_warnings();
-        let mut record = self.recording.start(runner.world_mut(), warnings.clone())?;
+        let mut record = self.recording.start(runner.world_mut(), Pace::Free, warnings.clone())?;
         if record.is_some() {
             runner.keep_carried();
         }
@@ -109,7 +109,7 @@ impl Run {
         while runner.step() {
             steps = steps.wrapping_add(1);
             if steps.is_multiple_of(STEPS_A_BATCH) {
-                record.iter_mut().for_each(|record| record.write_all(batch(&mut runner)));
+                record.iter_mut().for_each(|record| record.write(batch(&mut runner)));
             }
             if steps.is_multiple_of(STEPS_A_LOOK) {
                 let (now, limit) = (runner.now().as_nanos() as f64 / 1e9, runner.limit().as_nanos() as f64 / 1e9);
@@ -117,7 +117,7 @@ impl Run {
             }
         }
         if let Some(mut record) = record {
-            record.write_all(batch(&mut runner));
+            record.write(batch(&mut runner));
             record.finish(DISK_PATIENCE);
             warnings.finish(DISK_PATIENCE);
         }
