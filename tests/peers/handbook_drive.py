@@ -20,7 +20,9 @@ class Drive:
         self.network = canopen.Network()
         self.network.connect(interface="socketcand", host="127.0.0.1", port=port, channel="can0", tcp_tune=True)
         self.sdo = self.network.add_node(4, canopen.ObjectDictionary()).sdo
-        time.sleep(0.5)  # it boots, and looks at its supply and sensors
+        while self.machine("4 get")["power"] != "on":  # it boots, which takes a drive about a second
+            time.sleep(0.05)
+        time.sleep(0.1)  # it looks at its supply and sensors
         return self
 
     def __exit__(self, *_):

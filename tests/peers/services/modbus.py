@@ -139,7 +139,7 @@ def two_units(bench):
         eventually(lambda: seven.read(SAVE), lambda flag: flag == [2], "the save flag")
         bench.sleep(0.3)
         second.world("power cycle")
-        bench.sleep(0.5)
+        eventually(lambda: second.world("get")["power"], lambda power: power == "on", "node 8 has booted")
         with registers(bench, unit=8) as eight:
             equal((eight.read(ADDRESS), eight.long(SPEED)), ([8], 333), "device location and speed of unit 8")
 
