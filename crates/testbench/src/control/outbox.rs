@@ -53,7 +53,7 @@ impl Queue {
     }
 }
 
-/// See the [module](self).
+/// What waits for one client, within bounds: answers before samples, and of samples the newest.
 #[derive(Clone, Debug, Default)]
 pub struct Outbox {
     answers: Queue,
