@@ -12,7 +12,7 @@
 //! world.run_for(Duration::from_secs(5));
 //! let filter = Filter::new([4], ["power"])?;
 //! let event = std::iter::from_fn(|| world.poll_event()).find(|event| filter.takes(event)).ok_or("no event")?;
-//! assert_eq!((&json(&event)["node"], &json(&event)["to"]), (&4.into(), &"off".into()));
+//! assert_eq!((&json(&event)["node"], &json(&event)["to"]), (&4.into(), &"draining".into()));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
