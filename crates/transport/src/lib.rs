@@ -58,6 +58,7 @@ pub mod modbus;
 mod run;
 pub mod slcan;
 pub mod socketcand;
+mod tcp;
 #[cfg(test)]
 mod testing;
 mod text;

@@ -8,7 +8,7 @@ use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio_serial::{SerialPortBuilderExt, SerialStream};
 
-use crate::{BusError, WallClock};
+use crate::{BusError, WallClock, tcp};
 
 /// How long a TCP connection may take to come about. Shorter than the system's own minutes, longer than a bad network.
 const CONNECT_PATIENCE: Duration = Duration::from_secs(5);
@@ -42,7 +42,7 @@ impl Link {
             () = clock.sleep(CONNECT_PATIENCE) => return Err(failed(std::io::ErrorKind::TimedOut.into())),
         };
         // A frame waits for nobody: CANopen is a conversation of small messages.
-        stream.set_nodelay(true).map_err(failed)?;
+        tcp::send_at_once(&stream).map_err(failed)?;
         Ok(Self::new(address, Box::new(stream)))
     }
 

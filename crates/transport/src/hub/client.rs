@@ -13,8 +13,8 @@ use tokio::sync::{Semaphore, mpsc};
 
 use super::event::{ClientId, HubEvent};
 use super::session::Session;
-use crate::WallClock;
 use crate::link::within;
+use crate::{WallClock, tcp};
 
 /// Read at once, in bytes.
 const READ_SIZE: usize = 2048;
@@ -129,6 +129,7 @@ impl Connection {
                 }
                 read = reader.read_buf(&mut self.input), if wants_input => {
                     self.at_end = read? == 0;
+                    tcp::acknowledge_at_once(reader.as_ref());
                     self.quiet_until = None;
                     self.end.vitals.spoke_at.store(self.end.clock.now().as_nanos(), Ordering::Relaxed);
                 }

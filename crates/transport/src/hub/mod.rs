@@ -25,7 +25,7 @@ use tokio::task::AbortHandle;
 
 use crate::slcan::SlcanSession;
 use crate::socketcand::SocketcandSession;
-use crate::{AsyncBus, BusError, Protocol, ServeSpec, WallClock};
+use crate::{AsyncBus, BusError, Protocol, ServeSpec, WallClock, tcp};
 use client::{Stamped, Vitals};
 pub use event::{ClientId, HubEvent, LeaveReason};
 pub(crate) use session::{MAX_WAITING_REPLIES, Session};
@@ -299,7 +299,7 @@ async fn accept(socket: TcpListener, protocol: Protocol, shared: Arc<Shared>) {
         match socket.accept().await {
             Ok((stream, peer)) => {
                 // Each reply is a segment of its own, and a frame waits for nobody.
-                if stream.set_nodelay(true).is_ok() {
+                if tcp::send_at_once(&stream).is_ok() {
                     shared.admit(stream, peer, protocol);
                 }
             }
