@@ -236,6 +236,15 @@ def test_waits_that_end_early_leave_nothing_behind(world):
         assert len(turns.active()._moments) < 100
 
 
+@pytest.fixture
+def ctrl_c_interrupts():
+    # A shell starts what runs in its background with SIGINT ignored, and Python leaves it so: the signal would be lost.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c_interrupts")
 def test_ctrl_c_comes_through_while_the_world_moves(world):
     world.add("zlac8030l", node=4)
     killer = threading.Timer(0.5, signal.raise_signal, (signal.SIGINT,))
