@@ -18,7 +18,7 @@ use master::drive::{Drive, MotionOptions};
 use master::units::Rpm;
 use master::{Network, Node};
 use sim::World;
-use transport::{BusSpec, WallClock, run_station};
+use transport::{BusSpec, Note, WallClock, run_station};
 
 /// The node-ID a ZLAC8030L is delivered with.
 const NODE: u8 = 4;
@@ -64,7 +64,8 @@ async fn on_a_real_bus(spec: &BusSpec) -> Result<(), Box<dyn Error>> {
     let mut bus = spec.open(&clock).await?;
     let network = Network::new();
     let done = hello(node(&network));
-    run_station(&mut bus, &mut network.clone(), &clock, &tokio::sync::Notify::new(), done).await??;
+    let tell = |_, note: &Note| eprintln!("{note}");
+    run_station(&mut bus, &mut network.clone(), &clock, &tokio::sync::Notify::new(), done, tell).await??;
     Ok(())
 }
 

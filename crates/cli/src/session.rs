@@ -8,8 +8,9 @@ use std::time::Duration;
 use canopen::{Mux, NodeId};
 use master::Network;
 use tokio::sync::Notify;
-use transport::{BusSpec, WallClock, run_station};
+use transport::{BusSpec, Note, WallClock, run_station};
 
+use crate::bus_notes::BusNotes;
 use crate::context::Context;
 use crate::embedded::{self, Embedded};
 use crate::failure::Failure;
@@ -100,7 +101,9 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
         }
     };
     let mut station = network.clone();
-    let ended = run_station(&mut bus, &mut station, &clock, &Notify::new(), until).await;
+    let mut notes = BusNotes::default();
+    let tell = |_, note: &Note| notes.news(note).iter().for_each(|text| context.tell(text));
+    let ended = run_station(&mut bus, &mut station, &clock, &Notify::new(), until, tell).await;
     progress.clear();
     ended.map_err(|error| {
         let failure = bus_failure(global, &error);

@@ -107,7 +107,7 @@ fn run(
         let mut station = network.clone();
         let wakeup = Arc::new(Notify::new());
         let work = work_through(network, incoming, Arc::clone(&wakeup));
-        if let Err(error) = run_station(&mut bus, &mut station, &clock, &wakeup, work).await {
+        if let Err(error) = run_station(&mut bus, &mut station, &clock, &wakeup, work, |_, _| {}).await {
             *lost.lock().unwrap_or_else(PoisonError::into_inner) = Some(with_causes(&error));
         }
     }));

@@ -58,6 +58,9 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
         println!("ready {listener}");
     }
     let wakeup = tokio::sync::Notify::new();
-    run_station(&mut hub, &mut Echo::default(), &clock, &wakeup, tokio::signal::ctrl_c()).await??;
+    run_station(&mut hub, &mut Echo::default(), &clock, &wakeup, tokio::signal::ctrl_c(), |_, note| {
+        eprintln!("{note}")
+    })
+    .await??;
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use can::{Frame, Instant};
 
+use crate::Received;
 use crate::bus::{AsyncBus, BusError};
 use crate::log::LogBus;
 use crate::slcan::SlcanBus;
@@ -38,7 +39,7 @@ impl AsyncBus for AnyBus {
         }
     }
 
-    async fn recv(&mut self) -> Result<(Instant, Frame), BusError> {
+    async fn recv(&mut self) -> Result<(Instant, Received), BusError> {
         match self {
             Self::Socketcand(bus) => bus.recv().await,
             Self::Slcan(bus) => bus.recv().await,

@@ -7,20 +7,38 @@ use std::path::PathBuf;
 use can::{Bitrate, Frame, Instant};
 
 use crate::log::LogError;
-use crate::socketcand;
+use crate::{Received, socketcand};
 
 /// A CAN bus behind a socket, a serial line or a file. Own frames do not come back.
 pub trait AsyncBus {
     /// Hands `frame` to the bus; completes when the connection has taken it, which is before the wire carries it.
     ///
+    /// While the connection is lost (between [`Note::ConnectionLost`](crate::Note::ConnectionLost) and
+    /// [`Note::ConnectionBack`](crate::Note::ConnectionBack)) the frame is lost too, as that of a controller that is off the
+    /// bus: a station goes on and keeps its deadlines.
+    ///
     /// Cancel-safe: a frame goes out whole or not at all.
     fn send(&mut self, frame: &Frame) -> impl Future<Output = Result<(), BusError>> + Send;
 
-    /// The next frame of the others, and when it came: on a live bus by the clock given at opening, from a log its time
-    /// stamp.
+    /// The next frame of the others or note of the bus, and when it came: on a live bus by the clock given at opening,
+    /// from a log its time stamp.
     ///
-    /// Cancel-safe: no frame is lost.
-    fn recv(&mut self) -> impl Future<Output = Result<(Instant, Frame), BusError>> + Send;
+    /// Cancel-safe: nothing is lost.
+    fn recv(&mut self) -> impl Future<Output = Result<(Instant, Received), BusError>> + Send;
+
+    /// The next frame of the others; notes are passed over. Cancel-safe.
+    fn recv_frame(&mut self) -> impl Future<Output = Result<(Instant, Frame), BusError>> + Send
+    where
+        Self: Send,
+    {
+        async {
+            loop {
+                if let (at, Received::Frame(frame)) = self.recv().await? {
+                    return Ok((at, frame));
+                }
+            }
+        }
+    }
 }
 
 /// Why a bus cannot be opened or used any longer.
@@ -108,12 +126,12 @@ pub enum BusError {
         /// What the system said.
         source: io::Error,
     },
-    /// The log file has something else than frames in it.
+    /// The log file cannot be read on.
     #[error("cannot read the log {}", path.display())]
     Log {
         /// The file.
         path: PathBuf,
-        /// Which line and why.
+        /// Where and why.
         source: LogError,
     },
     /// The log is over.

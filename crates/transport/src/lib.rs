@@ -1,6 +1,7 @@
 //! CAN over sockets, serial lines and log files, client and server side, and the loops that run stations on them.
 //!
 //! - [`AsyncBus`] is a bus that is somewhere else; [`BusSpec`] opens one from a text such as `socketcand://HOST:PORT/can0`.
+//! - A bus gives frames and [`Note`]s: the state of its controller, errors on the wire, a connection that went away.
 //! - [`Hub`] serves a bus to other programs over socketcand and slcan.
 //! - [`ModbusServer`] serves registers over Modbus TCP or RTU.
 //! - [`run_station`] drives a passive [`can::Station`] on a bus, [`run_world`] a virtual world behind a hub.
@@ -25,7 +26,7 @@
 //!     let spec: BusSpec = format!("{address}/can0").parse()?;
 //!     let mut bus = spec.open(&clock).await?;
 //!     bus.send(&"000#0100".parse()?).await?;
-//!     let (_at, frame) = bus.recv().await?;
+//!     let (_at, frame) = bus.recv_frame().await?;
 //!     Ok::<Frame, Box<dyn std::error::Error>>(frame)
 //! };
 //!
@@ -55,8 +56,10 @@ mod hub;
 mod link;
 pub mod log;
 pub mod modbus;
+mod note;
 mod run;
 pub mod slcan;
+mod socketcan;
 pub mod socketcand;
 mod tcp;
 #[cfg(test)]
@@ -73,6 +76,7 @@ pub use modbus::{
     ModbusError, ModbusException, ModbusInquiry, ModbusMedium, ModbusRequest, ModbusServer, ModbusSession, ModbusSpec,
     RegisterAccess, RegisterAnswer,
 };
+pub use note::{ControllerState, ErrorCounters, ErrorFrame, ErrorKind, ErrorKinds, Note, Received, TornRecord};
 pub use run::{Heard, RealTimeWorld, run_station, run_world};
 pub use slcan::SlcanBus;
 pub use socketcand::SocketcandBus;

@@ -12,7 +12,8 @@ use can::{CanId, Frame, Instant, Station};
 use common::{Raw, frame, heard, hub, socketcand, socketcand_port, soon};
 use tokio::sync::{Notify, mpsc};
 use transport::{
-    AsyncBus, BusError, BusSpec, ClientId, Heard, LeaveReason, RealTimeWorld, WallClock, run_station, run_world,
+    AsyncBus, BusError, BusSpec, ClientId, Heard, LeaveReason, Note, RealTimeWorld, Received, WallClock, run_station,
+    run_world,
 };
 
 /// Answers each frame with the next identifier, sends what its handles queue, and beats once at a deadline.
@@ -80,7 +81,7 @@ async fn a_station_answers_frames_and_keeps_its_deadlines() {
         }
         "done"
     };
-    let result = soon(&clock, run_station(&mut bus, &mut toy, &clock, &Notify::new(), conversation)).await;
+    let result = soon(&clock, run_station(&mut bus, &mut toy, &clock, &Notify::new(), conversation, |_, _| {})).await;
     assert_eq!(result.unwrap(), "done");
     assert_eq!(transmitted.borrow().len(), 101);
 }
@@ -101,7 +102,7 @@ async fn what_a_handle_queues_goes_out_at_once() {
         assert_eq!(heard(&mut peer, &clock).await, frame("701#05"));
         peer
     };
-    let result = soon(&clock, run_station(&mut bus, &mut toy, &clock, &wakeup, inside)).await;
+    let result = soon(&clock, run_station(&mut bus, &mut toy, &clock, &wakeup, inside, |_, _| {})).await;
     let mut peer = result.unwrap();
     // From outside: another task, which has to notify.
     let outside = async {
@@ -111,7 +112,7 @@ async fn what_a_handle_queues_goes_out_at_once() {
         heard(&mut peer, &clock).await
     };
     let stop = Notify::new();
-    let running = run_station(&mut bus, &mut toy, &clock, &wakeup, stop.notified());
+    let running = run_station(&mut bus, &mut toy, &clock, &wakeup, stop.notified(), |_, _| {});
     let (received, ended) = tokio::join!(
         async {
             let received = outside.await;
@@ -139,7 +140,7 @@ async fn what_was_queued_last_still_goes_out() {
             handle.queue("000#0280");
             handle.queue("601#2B40600006000000");
         };
-        soon(&clock, run_station(&mut bus, &mut toy, &clock, &Notify::new(), command)).await.unwrap();
+        soon(&clock, run_station(&mut bus, &mut toy, &clock, &Notify::new(), command, |_, _| {})).await.unwrap();
         assert_eq!(heard(&mut peer, &clock).await, frame("000#0280"));
         assert_eq!(heard(&mut peer, &clock).await, frame("601#2B40600006000000"));
     }
@@ -153,7 +154,8 @@ async fn a_lost_connection_ends_the_station_with_the_reason() {
     let address = socketcand_port(&hub).to_string();
     drop(hub);
     let never = std::future::pending::<()>();
-    let result = soon(&clock, run_station(&mut bus, &mut Toy::default(), &clock, &Notify::new(), never)).await;
+    let result =
+        soon(&clock, run_station(&mut bus, &mut Toy::default(), &clock, &Notify::new(), never, |_, _| {})).await;
     assert!(result.unwrap_err().to_string().contains(&address));
 }
 
@@ -165,10 +167,11 @@ async fn a_log_is_replayed_and_read_only() {
     let spec: BusSpec = format!("log:{}", path.display()).parse().unwrap();
     let mut bus = spec.open(&clock).await.unwrap();
     std::fs::remove_file(&path).unwrap();
-    assert_eq!(bus.recv().await.unwrap(), (Instant::from_micros(1_000_001), frame("701#05")));
-    let error = bus.recv().await.unwrap_err();
-    assert!(matches!(error, BusError::Log { .. }), "{error}");
-    assert_eq!(bus.recv().await.unwrap(), (Instant::from_secs(3), frame("080#")));
+    assert_eq!(bus.recv().await.unwrap(), (Instant::from_micros(1_000_001), frame("701#05").into()));
+    let (at, torn) = bus.recv().await.unwrap();
+    assert_eq!(at, Instant::from_micros(1_000_001));
+    assert!(matches!(&torn, Received::Note(Note::TornRecord(torn)) if torn.place == 2), "{torn:?}");
+    assert_eq!(bus.recv().await.unwrap(), (Instant::from_secs(3), frame("080#").into()));
     assert!(matches!(bus.send(&frame("000#")).await, Err(BusError::ReadOnly { .. })));
     assert!(matches!(bus.recv().await, Err(BusError::EndOfLog { .. })));
     assert!(matches!(spec.open(&clock).await, Err(BusError::OpenLog { .. })));

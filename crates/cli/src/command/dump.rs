@@ -9,8 +9,8 @@ use can::{Frame, Instant};
 use master::decode::Decoder;
 use serde::Serialize;
 use sim::wire::WireEvent;
-use transport::log::{LogError, LogWriter};
-use transport::{AnyBus, AsyncBus, BusError, BusSpec, WallClock};
+use transport::log::LogWriter;
+use transport::{AnyBus, AsyncBus, BusError, BusSpec, Note, Received, TornRecord, WallClock};
 
 use crate::failure::Failure;
 use crate::global::Global;
@@ -52,6 +52,21 @@ struct Line {
 impl Report for Line {
     fn text(&self, paint: Paint) -> String {
         format!("{} {:<20}  {}", paint.dim(&format!("({:.6})", self.t)), self.frame, self.text)
+    }
+}
+
+/// What the bus says beside frames.
+#[derive(Debug, Serialize)]
+struct Noted {
+    t: f64,
+    /// Its kind.
+    note: &'static str,
+    text: String,
+}
+
+impl Report for Noted {
+    fn text(&self, paint: Paint) -> String {
+        format!("{} {:<20}  {}", paint.dim(&format!("({:.6})", self.t)), "-", paint.bad(&self.text))
     }
 }
 
@@ -140,11 +155,10 @@ impl Dump {
 async fn follow(bus: &mut AnyBus, sink: &mut Sink) -> Result<Option<BusError>, Failure> {
     loop {
         match bus.recv().await {
-            Ok((at, frame)) => sink.take(at, &frame)?,
+            Ok((at, Received::Frame(frame))) => sink.take(at, &frame)?,
+            Ok((_, Received::Note(Note::TornRecord(torn)))) => sink.skip(torn)?,
+            Ok((at, Received::Note(note))) => sink.note(at, &note)?,
             Err(BusError::EndOfLog { .. }) => return Ok(None),
-            Err(BusError::Log { source: LogError::Line { line, text, source }, .. }) => {
-                sink.skip(Skipped { line, skipped: text, reason: source.to_string() })?;
-            }
             Err(error) => return Ok(Some(error)),
         }
     }
@@ -173,18 +187,24 @@ impl Sink {
         self.format.print(&line).map_err(|error| not_printed(&error))
     }
 
+    /// Tells among the frames what the bus says beside them.
+    fn note(&mut self, at: Instant, note: &Note) -> Result<(), Failure> {
+        let line = Noted { t: at.as_secs_f64(), note: note.kind(), text: note.to_string() };
+        self.format.print(&line).map_err(|error| not_printed(&error))
+    }
+
     /// Tells of a line that is passed over: among the frames to programs, beside them to people.
-    fn skip(&mut self, line: Skipped) -> Result<(), Failure> {
+    fn skip(&mut self, torn: TornRecord) -> Result<(), Failure> {
         self.summary.lines_skipped += 1;
         if self.summary.lines_skipped > SKIPPED_SHOWN {
             return Ok(());
         }
         if self.format.json {
+            let line = Skipped { line: torn.place, skipped: torn.text, reason: torn.reason };
             return self.format.print_json(&line).map_err(|error| not_printed(&error));
         }
-        let Skipped { line, skipped, reason } = line;
         // Nobody may be listening any more.
-        let _ = writeln!(io::stderr(), "warning: line {line} passed over, '{skipped}': {reason}");
+        let _ = writeln!(io::stderr(), "warning: {torn}");
         Ok(())
     }
 

@@ -394,7 +394,7 @@ impl From<EepromError> for Failure {
 
 /// Carries frames both ways between another bus and this one, which is served at `inner`.
 async fn join_buses(
-    mut outer: impl AsyncBus,
+    mut outer: impl AsyncBus + Send,
     inner: String,
     clock: WallClock,
     requests: mpsc::Sender<Request>,
@@ -404,8 +404,8 @@ async fn join_buses(
         let mut inner = SocketcandBus::connect(&inner, "can0", &clock).await?;
         loop {
             tokio::select! {
-                received = outer.recv() => inner.send(&received?.1).await?,
-                received = inner.recv() => outer.send(&received?.1).await?,
+                received = outer.recv_frame() => inner.send(&received?.1).await?,
+                received = inner.recv_frame() => outer.send(&received?.1).await?,
             }
         }
     };

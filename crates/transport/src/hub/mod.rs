@@ -25,7 +25,7 @@ use tokio::task::AbortHandle;
 
 use crate::slcan::SlcanSession;
 use crate::socketcand::SocketcandSession;
-use crate::{AsyncBus, BusError, Protocol, ServeSpec, WallClock, tcp};
+use crate::{AsyncBus, BusError, Protocol, Received, ServeSpec, WallClock, tcp};
 use client::{Stamped, Vitals};
 pub use event::{ClientId, HubEvent, LeaveReason};
 pub(crate) use session::{MAX_WAITING_REPLIES, Session};
@@ -191,12 +191,12 @@ impl AsyncBus for Hub {
         Ok(())
     }
 
-    async fn recv(&mut self) -> Result<(Instant, Frame), BusError> {
+    async fn recv(&mut self) -> Result<(Instant, Received), BusError> {
         loop {
             if let HubEvent::Frame { client, frame } = self.next_event().await {
                 let now = self.clock.now();
                 self.broadcast(&frame, now, Some(client));
-                return Ok((now, frame));
+                return Ok((now, frame.into()));
             }
         }
     }

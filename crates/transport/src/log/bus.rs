@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use can::{Frame, Instant};
 
-use super::reader::LogReader;
-use crate::{AsyncBus, BusError};
+use super::reader::{LogError, LogReader};
+use crate::{AsyncBus, BusError, Note, Received, TornRecord};
 
 /// A candump log replayed as fast as it is read, each frame with its logged time; read only.
 ///
@@ -35,11 +35,15 @@ impl AsyncBus for LogBus {
         Err(BusError::ReadOnly { path: self.path.clone() })
     }
 
-    /// [`BusError::EndOfLog`] behind the last frame. After a [`BusError::Log`] the next call goes on with the next line.
-    async fn recv(&mut self) -> Result<(Instant, Frame), BusError> {
+    /// [`BusError::EndOfLog`] behind the last frame. A line that is no frame is a note, at the time of the frame before.
+    async fn recv(&mut self) -> Result<(Instant, Received), BusError> {
         match self.reader.next_frame() {
-            Ok(Some(stamped)) => Ok(stamped),
+            Ok(Some((at, frame))) => Ok((at, frame.into())),
             Ok(None) => Err(BusError::EndOfLog { path: self.path.clone() }),
+            Err(LogError::Line { line, text, source }) => {
+                let torn = TornRecord { place: line, text, reason: source.to_string() };
+                Ok((self.reader.last_time(), Note::TornRecord(torn).into()))
+            }
             Err(source) => Err(BusError::Log { path: self.path.clone(), source }),
         }
     }

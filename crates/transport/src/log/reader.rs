@@ -48,6 +48,11 @@ impl<R: BufRead> LogReader<R> {
         Self { input, line: 0, buffer: Vec::new(), last: Instant::ZERO }
     }
 
+    /// The time stamp of the frame read last; zero before the first.
+    pub fn last_time(&self) -> Instant {
+        self.last
+    }
+
     /// The next frame with its time stamp (that of the frame before, where the line has none); `None` at the end.
     ///
     /// After an error the next call goes on with the next line.

@@ -9,7 +9,7 @@ use can::{Frame, Instant, Station};
 use tokio::sync::Notify;
 
 use crate::link::within;
-use crate::{AsyncBus, BusError, WallClock};
+use crate::{AsyncBus, BusError, Note, Received, WallClock};
 
 /// How long a connection may take for what the station still had to send when the run ended.
 const PARTING_PATIENCE: Duration = Duration::from_secs(1);
@@ -22,6 +22,8 @@ const PARTING_PATIENCE: Duration = Duration::from_secs(1);
 /// task calls `wakeup.notify_one()` behind it. After each such wake-up the station gets a `handle_timeout`, so that its
 /// idea of now is fresh.
 ///
+/// `tell` hears the notes of the bus. A controller that is bus-off is the station's own ([`Station::handle_bus_off`]).
+///
 /// `handle_transmitted` is called when the connection has taken a frame: a socket does not tell when the wire did.
 pub async fn run_station<B, S, U>(
     bus: &mut B,
@@ -29,6 +31,7 @@ pub async fn run_station<B, S, U>(
     clock: &WallClock,
     wakeup: &Notify,
     until: U,
+    mut tell: impl FnMut(Instant, &Note),
 ) -> Result<U::Output, BusError>
 where
     B: AsyncBus,
@@ -54,11 +57,17 @@ where
             event = changed_behind_our_back(station, deadline) => event,
             // A deadline goes before a frame: a babbling bus must not keep a station from its timeouts.
             () = clock.sleep_until_due(deadline) => Event::Woken,
-            received = bus.recv() => Event::Received(received?.1),
+            received = bus.recv() => received?.into(),
             () = wakeup.notified() => Event::Woken,
         };
         match event {
             Event::Received(frame) => station.handle_frame(&frame, clock.now()),
+            Event::Noted(at, note) => {
+                if let Some(takes_part) = note.takes_part() {
+                    station.handle_bus_off(!takes_part, clock.now());
+                }
+                tell(at, &note);
+            }
             Event::Offered(frame) => offered = Some(frame),
             Event::Woken => station.handle_timeout(clock.now()),
         }
@@ -67,9 +76,19 @@ where
 
 enum Event {
     Received(Frame),
+    Noted(Instant, Note),
     /// The station has something to send that it had not when it was last drained.
     Offered(Frame),
     Woken,
+}
+
+impl From<(Instant, Received)> for Event {
+    fn from((at, received): (Instant, Received)) -> Self {
+        match received {
+            Received::Frame(frame) => Self::Received(frame),
+            Received::Note(note) => Self::Noted(at, note),
+        }
+    }
 }
 
 /// Sends `first` and everything that `station` offers.

@@ -6,7 +6,7 @@ use can::{Bitrate, Frame, Instant};
 
 use super::codec::{Answer, Command, Decoder, Line, bitrate_code};
 use crate::link::{Link, within};
-use crate::{AsyncBus, BusError, WallClock};
+use crate::{AsyncBus, BusError, Note, Received, WallClock};
 
 /// How long an adapter may take for an answer. Some firmwares never acknowledge; those cost this much at opening.
 const PATIENCE: Duration = Duration::from_millis(500);
@@ -120,11 +120,14 @@ impl AsyncBus for SlcanBus {
         self.link.send(|out| Command::Transmit(*frame).emit(out)).await
     }
 
-    async fn recv(&mut self) -> Result<(Instant, Frame), BusError> {
+    async fn recv(&mut self) -> Result<(Instant, Received), BusError> {
         loop {
             match self.answer().await? {
-                Answer::Frame { frame, .. } => return Ok((self.clock.now(), frame)),
-                Answer::Refused => self.refused += 1,
+                Answer::Frame { frame, .. } => return Ok((self.clock.now(), frame.into())),
+                Answer::Refused => {
+                    self.refused += 1;
+                    return Ok((self.clock.now(), Note::SendQueueFull.into()));
+                }
                 _ => {}
             }
         }
@@ -157,7 +160,8 @@ mod tests {
         let (told, bus) = tokio::join!(adapter(line, &answers), async {
             let mut bus = SlcanBus::open(Link::over_serial("tty", host), Some(Bitrate::K500), &clock).await.unwrap();
             bus.send(&"601#40".parse().unwrap()).await.unwrap();
-            assert_eq!(bus.recv().await.unwrap().1, "100#1133".parse().unwrap());
+            assert_eq!(bus.recv().await.unwrap().1, Note::SendQueueFull.into());
+            assert_eq!(bus.recv().await.unwrap().1, "100#1133".parse::<Frame>().unwrap().into());
             bus
         });
         assert_eq!(told, "\r\rC\rV\rS6\rO\rt601140\r");

@@ -1,15 +1,20 @@
 //! A connection to a socketcand server.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use can::{Frame, Instant};
 
 use super::codec::{Decoder, Message, Reply, Request};
 use crate::link::{Link, within};
-use crate::{AsyncBus, BusError, WallClock, text};
+use crate::socketcan::notes_of;
+use crate::{AsyncBus, BusError, Note, Received, WallClock, text};
 
 /// How long the server may take for one step of the greeting.
 const PATIENCE: Duration = Duration::from_secs(5);
+
+/// The class of an error message is its identifier without the flags.
+const CLASS_MASK: u32 = 0x1FFF_FFFF;
 
 /// A bus behind a socketcand server, in raw mode.
 #[derive(Debug)]
@@ -17,13 +22,15 @@ pub struct SocketcandBus {
     link: Link,
     decoder: Decoder<Reply>,
     clock: WallClock,
+    /// What one error message said and was not fetched yet: a handful.
+    notes: VecDeque<Note>,
 }
 
 impl SocketcandBus {
     /// Connects to `address` (`HOST:PORT`) and opens `bus` there.
     pub async fn connect(address: &str, bus: &str, clock: &WallClock) -> Result<Self, BusError> {
         let link = Link::connect(address, clock).await?;
-        let mut connection = Self { link, decoder: Decoder::default(), clock: clock.clone() };
+        let mut connection = Self { link, decoder: Decoder::default(), clock: clock.clone(), notes: VecDeque::new() };
         connection.expect(Reply::Hi, "< hi >", "the greeting").await?;
         for request in [Request::Open(bus.to_owned()), Request::RawMode] {
             let shown = if request == Request::RawMode { "rawmode".to_owned() } else { format!("open {bus}") };
@@ -66,25 +73,32 @@ impl AsyncBus for SocketcandBus {
         self.link.send(|out| Request::Send(*frame).emit(out)).await
     }
 
-    async fn recv(&mut self) -> Result<(Instant, Frame), BusError> {
+    async fn recv(&mut self) -> Result<(Instant, Received), BusError> {
         loop {
+            if let Some(note) = self.notes.pop_front() {
+                return Ok((self.clock.now(), note.into()));
+            }
             match self.reply().await? {
-                Reply::Frame { frame, .. } => return Ok((self.clock.now(), frame)),
-                Reply::Error(said) if !is_error_frame(&said) => {
-                    let request = "a frame".to_owned();
-                    return Err(BusError::Refused { address: self.link.address(), request, said });
-                }
-                Reply::Error(_) | Reply::Hi | Reply::Ok | Reply::Echo => {}
+                Reply::Frame { frame, .. } => return Ok((self.clock.now(), frame.into())),
+                Reply::Error(said) => match error_class(&said) {
+                    Some(class) => self.notes.extend(notes_of(class, [0; 8])),
+                    None => {
+                        let request = "a frame".to_owned();
+                        return Err(BusError::Refused { address: self.link.address(), request, said });
+                    }
+                },
+                Reply::Hi | Reply::Ok | Reply::Echo => {}
             }
         }
     }
 }
 
-/// `< error 004 23.424242 >` tells of an error frame on the bus: class and time. It is no answer to a request.
-fn is_error_frame(said: &str) -> bool {
+/// `< error 004 23.424242 >` tells of an error frame on the bus: class (with or without the flag of error messages) and
+/// time. It is no answer to a request.
+fn error_class(said: &str) -> Option<u32> {
     let mut words = said.split_ascii_whitespace();
-    let class = words.next().and_then(|class| text::parse_hex(class, 8));
-    class.is_some() && words.next().is_none_or(|time| text::parse_seconds(time).is_some())
+    let class = text::parse_hex(words.next()?, 8)?;
+    words.next().is_none_or(|time| text::parse_seconds(time).is_some()).then_some(class & CLASS_MASK)
 }
 
 #[cfg(test)]
@@ -93,7 +107,7 @@ mod tests {
 
     #[test]
     fn error_frames_are_told_from_refusals() {
-        assert!(is_error_frame("004 23.424242") && is_error_frame("20000080"));
-        assert!(!is_error_frame("bad request") && !is_error_frame("unknown command") && !is_error_frame(""));
+        assert_eq!([error_class("004 23.424242"), error_class("20000080")], [Some(4), Some(0x80)]);
+        assert_eq!(["bad request", "unknown command", ""].map(error_class), [None; 3]);
     }
 }

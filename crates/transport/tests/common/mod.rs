@@ -8,7 +8,7 @@ use std::time::Duration;
 use can::Frame;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
-use transport::{AsyncBus, Hub, HubOptions, SlcanBus, SocketcandBus, WallClock};
+use transport::{AsyncBus, Hub, HubOptions, Received, SlcanBus, SocketcandBus, WallClock};
 
 pub(crate) const PATIENCE: Duration = Duration::from_secs(30);
 
@@ -48,7 +48,14 @@ pub(crate) async fn slcan(address: SocketAddr, clock: &WallClock) -> SlcanBus {
 
 /// The next frame that `bus` hears.
 pub(crate) async fn heard(bus: &mut impl AsyncBus, clock: &WallClock) -> Frame {
-    soon(clock, bus.recv()).await.unwrap().1
+    soon(clock, async {
+        loop {
+            if let (_, Received::Frame(frame)) = bus.recv().await.unwrap() {
+                return frame;
+            }
+        }
+    })
+    .await
 }
 
 /// A connection of bytes, for what a well-behaved client does not do.
