@@ -18,9 +18,11 @@ mod picture;
 mod piece;
 mod read;
 mod record;
+mod trail;
 
 pub use column::{Column, Subject, columns_of_drives, select};
 pub use picture::picture;
 pub use piece::{Kind, Mark, Severity, Target};
 pub use read::{Recorded, Series, read};
 pub use record::Record;
+pub use trail::Trail;

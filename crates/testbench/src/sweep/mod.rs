@@ -4,6 +4,7 @@
 //! them to a [`Summary`]. The summary does not depend on that order, and its size not on the number of runs.
 
 pub mod file;
+mod report;
 mod summary;
 
 use std::ops::RangeInclusive;
@@ -15,6 +16,7 @@ use crate::document::reader::Parameters;
 use crate::scenario::{Outcome, Runner, Scenario};
 use file::Axis;
 
+pub use report::{SweepReport, Worst};
 pub use summary::{Distribution, Failed, Summary};
 
 /// Runs that a sweep may have: more would take longer than anybody waits.
@@ -72,6 +74,11 @@ impl Sweep {
         }
     }
 
+    /// The scenario's title.
+    pub fn title(&self) -> &str {
+        &self.scenario.title
+    }
+
     /// How many runs there are.
     pub fn runs(&self) -> u64 {
         self.runs
@@ -95,13 +102,21 @@ impl Sweep {
     /// # Errors
     /// That a value of it makes no sense in the scenario.
     pub fn run(&self, number: u64) -> Result<Outcome, BadFile> {
+        self.runner(number).map(Runner::run)
+    }
+
+    /// The run of this number at its begin, for whoever wants to look in between.
+    ///
+    /// # Errors
+    /// That a value of it makes no sense in the scenario.
+    pub fn runner(&self, number: u64) -> Result<Runner, BadFile> {
         let Point { seed, values } = self.point(number);
         if values.is_empty() {
-            return Ok(Runner::new(&self.scenario, Some(seed))?.run());
+            return Runner::new(&self.scenario, Some(seed));
         }
         // What the command line has set stays.
         let mut all = self.scenario.parameters.clone();
         all.extend(values);
-        Ok(Runner::new(&self.scenario.with(&all)?, Some(seed))?.run())
+        Runner::new(&self.scenario.with(&all)?, Some(seed))
     }
 }

@@ -67,23 +67,35 @@ struct Figure {
 impl Summary {
     /// Adds what came of the run of this number.
     pub fn add(&mut self, sweep: &Sweep, number: u64, outcome: &Result<Outcome, BadFile>) {
-        let (asked, seen) = match outcome {
+        match outcome {
             Ok(outcome) => {
-                for (name, value) in &outcome.figures {
-                    if value.is_finite() {
-                        let figure = self.figures.entry(name.clone());
-                        figure.or_insert_with(|| Figure::new(*value, number)).add(*value, number);
-                    }
-                }
-                match outcome.failures().next() {
-                    None => {
-                        self.passed += 1;
-                        return;
-                    }
-                    Some(row) => (row.asked.clone(), row.seen.clone()),
-                }
+                let failure = outcome.failures().next().map(|row| (row.asked.clone(), row.seen.clone()));
+                let figures = outcome.figures.iter().map(|(name, value)| (name.as_str(), *value));
+                self.add_run(sweep, number, figures, failure);
             }
-            Err(bad) => ("the machine and the scenario".into(), bad.to_string()),
+            Err(bad) => {
+                let failure = ("the machine and the scenario".into(), bad.to_string());
+                self.add_run(sweep, number, std::iter::empty(), Some(failure));
+            }
+        }
+    }
+
+    /// Adds a run that was made elsewhere: its figures, and of a failed one what was asked first that was not so, and what was
+    /// seen.
+    pub fn add_run<'a>(
+        &mut self,
+        sweep: &Sweep,
+        number: u64,
+        figures: impl IntoIterator<Item = (&'a str, f64)>,
+        failure: Option<(String, String)>,
+    ) {
+        for (name, value) in figures.into_iter().filter(|(_, value)| value.is_finite()) {
+            let figure = self.figures.entry(name.to_owned());
+            figure.or_insert_with(|| Figure::new(value, number)).add(value, number);
+        }
+        let Some((asked, seen)) = failure else {
+            self.passed += 1;
+            return;
         };
         self.failures += 1;
         self.failed.insert(number, Failed { point: sweep.point(number), asked, seen });

@@ -6,9 +6,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 
 use master::units::Shown;
-use serde::Serialize;
 use testbench::scenario::Scenario;
-use testbench::sweep::{Distribution, Failed, Summary, Sweep};
+use testbench::sweep::{Summary, Sweep, SweepReport, Worst};
 
 use crate::failure::Failure;
 use crate::output::{Format, Report};
@@ -32,7 +31,6 @@ pub(super) fn sweep(
     file: &Path,
     format: Format,
 ) -> Result<(), Failure> {
-    let title = scenario.title.clone();
     let sweep = Sweep::new(scenario, seeds).map_err(|reason| Failure::usage("cannot sweep").because(reason))?;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = jobs.unwrap_or(cores).min(usize::try_from(sweep.runs()).unwrap_or(usize::MAX));
@@ -40,10 +38,10 @@ pub(super) fn sweep(
     let stop = Arc::new(AtomicBool::new(false));
     stop_on_signal(Arc::clone(&signal), Arc::clone(&stop));
     let summary = sum_up(&sweep, jobs, &stop, &Progress::new(format.json));
-    let report = SweepReport::new(title, file, &sweep, &summary);
+    let report = SweepReport::new(file, &sweep, &summary);
     format.print(&report).map_err(|error| Failure::new("cannot write to standard output").because(error))?;
     let ended = *signal.lock().unwrap_or_else(PoisonError::into_inner);
-    match (ended, report.failure()) {
+    match (ended, failure(&report)) {
         (Some(signal), _) => Err(Failure { told: true, ..Failure::ended_by(signal) }),
         (None, Some(failure)) if format.json => Err(Failure { told: true, ..failure }),
         (None, Some(failure)) => Err(failure),
@@ -95,52 +93,12 @@ fn sum_up(sweep: &Sweep, jobs: usize, stop: &AtomicBool, progress: &Progress) ->
     summary
 }
 
-/// What came of a sweep.
-#[derive(Debug, Serialize)]
-struct SweepReport {
-    ok: bool,
-    title: String,
-    file: String,
-    runs: u64,
-    passed: u64,
-    failed: u64,
-    /// All runs were made.
-    complete: bool,
-    figures: Vec<Distribution>,
-    worst: Vec<Worst>,
-}
-
-/// A failed run, and the command that repeats it.
-#[derive(Debug, Serialize)]
-struct Worst {
-    #[serde(flatten)]
-    failed: Failed,
-    again: String,
-}
-
-impl SweepReport {
-    fn new(title: String, file: &Path, sweep: &Sweep, summary: &Summary) -> Self {
-        let (passed, failed) = (summary.passed(), summary.failures());
-        let again = |failed: &Failed| format!("ferrodrive run {} {}", file.display(), failed.point.options());
-        Self {
-            ok: failed == 0,
-            title,
-            file: file.display().to_string(),
-            runs: sweep.runs(),
-            passed,
-            failed,
-            complete: passed + failed == sweep.runs(),
-            figures: summary.distributions(sweep),
-            worst: summary.failed().map(|failed| Worst { failed: failed.clone(), again: again(failed) }).collect(),
-        }
-    }
-
-    fn failure(&self) -> Option<Failure> {
-        let first = self.worst.first()?;
-        let what = format!("{}: {} of {} runs failed", self.title, self.failed, self.passed + self.failed);
-        let because = format!("{}: {}", first.failed.asked, first.failed.seen);
-        Some(Failure::new(what).of_kind("scenario").because(because).next(&first.again))
-    }
+/// That runs failed, and how to repeat the first of them.
+fn failure(report: &SweepReport) -> Option<Failure> {
+    let first = report.worst.first()?;
+    let what = format!("{}: {} of {} runs failed", report.title, report.failed, report.passed + report.failed);
+    let because = format!("{}: {}", first.failed.asked, first.failed.seen);
+    Some(Failure::new(what).of_kind("scenario").because(because).next(&first.again))
 }
 
 impl Report for SweepReport {

@@ -1,0 +1,59 @@
+//! What came of a sweep, as `ferrodrive run --seeds --json` prints it and Python hands it out.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::{Distribution, Failed, Summary, Sweep};
+
+/// What came of a sweep.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SweepReport {
+    /// No run failed.
+    pub ok: bool,
+    /// The scenario's title.
+    pub title: String,
+    /// Its file.
+    pub file: String,
+    /// How many runs the sweep has.
+    pub runs: u64,
+    /// Runs that passed.
+    pub passed: u64,
+    /// Runs that did not.
+    pub failed: u64,
+    /// All runs were made.
+    pub complete: bool,
+    /// How each named figure is distributed.
+    pub figures: Vec<Distribution>,
+    /// The first failed runs.
+    pub worst: Vec<Worst>,
+}
+
+/// A failed run, and the command that repeats it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Worst {
+    /// What failed.
+    #[serde(flatten)]
+    pub failed: Failed,
+    /// The command.
+    pub again: String,
+}
+
+impl SweepReport {
+    /// The report of the runs that were added to `summary` so far; `file` is what the commands in it name.
+    pub fn new(file: &Path, sweep: &Sweep, summary: &Summary) -> Self {
+        let (passed, failed) = (summary.passed(), summary.failures());
+        let again = |failed: &Failed| format!("ferrodrive run {} {}", file.display(), failed.point.options());
+        Self {
+            ok: failed == 0,
+            title: sweep.title().to_owned(),
+            file: file.display().to_string(),
+            runs: sweep.runs(),
+            passed,
+            failed,
+            complete: passed + failed == sweep.runs(),
+            figures: summary.distributions(sweep),
+            worst: summary.failed().map(|failed| Worst { failed: failed.clone(), again: again(failed) }).collect(),
+        }
+    }
+}
