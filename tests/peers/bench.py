@@ -8,9 +8,9 @@ import time
 import can
 import canopen
 from canopen.objectdictionary import ODVariable
+from ferrodrive import Simulator
 
 from checks import eventually
-from simulator import Simulator
 
 
 class Remote:
@@ -179,9 +179,10 @@ class Bench(Remote):
         return [path for path in pathlib.Path(self.folder.name).rglob("*") if path.is_file()]
 
     def start(self):
-        self.simulator = Simulator(self.program, self.drives, extra=self.extra)
+        self.simulator = Simulator(self.drives, extra=self.extra, path=self.program)
         self.simulator.__enter__()
         try:
+            self.simulator.wait_until_booted()
             self.network = canopen.Network()
             # How long disconnecting may wait for the reader thread.
             self.network.NOTIFIER_CYCLE = 0.05

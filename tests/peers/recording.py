@@ -6,11 +6,11 @@ import pathlib
 import tempfile
 import time
 
+from ferrodrive import Simulator
 from mcap.reader import make_reader
 
 from checks import check, equal, true
 from drive import ALL
-from simulator import Simulator
 
 
 @check("The mcap reader takes its record and finds signals with units, frames and events", *ALL)
@@ -19,7 +19,7 @@ def records(bench):
     with tempfile.TemporaryDirectory() as folder:
         path = pathlib.Path(folder) / "run.mcap"
         extra = ("--record", str(path), "--record-period", "2ms")
-        with Simulator(bench.program, [f"{bench.drive.model}@{node_id}"], extra=extra) as simulator:
+        with Simulator([f"{bench.drive.model}@{node_id}"], extra=extra, path=bench.program) as simulator:
             # A drive takes a second or so to boot.
             while simulator.world("now")["t"] < 2.0:
                 time.sleep(0.05)

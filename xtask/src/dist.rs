@@ -1,7 +1,8 @@
 //! `cargo xtask dist`: what is released, in one folder: the stripped binary with manual pages and completions, the data sheets
 //! of the models, the licences of everything that is in it, the Python wheel, and the checksums of all of it.
 //!
-//! The test makes the same in the profile of the tests, and uses both from an empty folder.
+//! The binary is the one of `cargo xtask pgo` where its tools can be had, and the same is in the wheel. The test makes all of it
+//! in the profile of the tests, and uses binary and wheel from an empty folder.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -12,7 +13,7 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 use crate::tally::Tally;
-use crate::{process, python, workspace};
+use crate::{pgo, process, program, python, workspace};
 
 const SHELLS: &[(&str, &str)] = &[("bash", "ferrodrive.bash"), ("zsh", "_ferrodrive"), ("fish", "ferrodrive.fish")];
 
@@ -24,7 +25,10 @@ const CHECKSUMS: &str = "SHA256SUMS";
 /// Runs `cargo xtask dist`.
 pub(crate) fn command() -> ExitCode {
     let folder = workspace::root().join("dist");
-    let made = build_binary("release").and_then(|program| make(&program, "release", &folder));
+    let made = release_binary().and_then(|(program, how)| {
+        println!("{how}");
+        make(&program, "release", &folder)
+    });
     match made {
         Ok(notes) => {
             notes.iter().for_each(|note| println!("{note}"));
@@ -41,7 +45,7 @@ pub(crate) fn command() -> ExitCode {
 /// The dist step of `cargo xtask test`: the release as the tests' profile makes it, used by somebody who has nothing else.
 pub(crate) fn step() -> Tally {
     let folder = workspace::target().join("dist-test");
-    let made = build_binary("dev").and_then(|program| make(&program, "dev", &folder.join("dist")));
+    let made = program::built().and_then(|program| make(&program, "dev", &folder.join("dist")));
     let notes = match made {
         Ok(notes) => notes,
         Err(error) => return Tally::failed(error),
@@ -55,12 +59,19 @@ pub(crate) fn step() -> Tally {
     tally
 }
 
-fn build_binary(profile: &str) -> Result<PathBuf, String> {
-    let mut cargo = workspace::cargo();
-    cargo.args(["build", "--quiet", "--package", "ferrodrive", "--bin", "ferrodrive", "--profile", profile]);
-    process::output(&mut cargo)?;
-    let folder = if profile == "dev" { "debug" } else { profile };
-    Ok(workspace::target().join(folder).join(format!("ferrodrive{}", std::env::consts::EXE_SUFFIX)))
+/// The binary that is released, and how it was built: optimised by a training run where the tools for that can be had.
+fn release_binary() -> Result<(PathBuf, String), String> {
+    match pgo::Tools::find() {
+        Ok(tools) => Ok((pgo::build(&tools)?, "the binary is optimised by its training run (cargo xtask pgo)".into())),
+        Err(reason) => {
+            println!("   building the binary");
+            let mut cargo = workspace::cargo();
+            cargo.args(["build", "--quiet", "--release", "--package", "ferrodrive", "--bin", "ferrodrive"]);
+            process::output(&mut cargo)?;
+            let program = format!("release/ferrodrive{}", std::env::consts::EXE_SUFFIX);
+            Ok((workspace::target().join(program), format!("the binary is not optimised by a training run: {reason}")))
+        }
+    }
 }
 
 /// Makes the folder anew; returns what could not be in it, and why.
@@ -86,8 +97,14 @@ fn make(program: &Path, profile: &str, folder: &Path) -> Result<Vec<String>, Str
     }
     licences(&folder.join("licences"))?;
     match python::environment(python::VENV, python::REQUIREMENTS) {
+        // The tests' own is the same wheel.
+        Ok(_) if profile == "dev" => {
+            let wheel = python::wheel_of_tests()?;
+            copy(&wheel, &folder.join("python").join(wheel.file_name().unwrap_or_default()))?;
+        }
         Ok(python) => {
-            python::wheel(&python, profile, &folder.join("python"))?;
+            fs::create_dir_all(folder.join("python")).map_err(|error| error.to_string())?;
+            python::wheel(&python, profile, Some(&binary), &folder.join("python"))?;
         }
         Err(reason) => notes.push(format!("no wheel: {reason}")),
     }

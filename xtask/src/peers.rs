@@ -1,7 +1,8 @@
 //! Other people's software against ours: canopen-python, python-can and pymodbus talk to `ferrodrive sim`.
 //!
-//! The Python packages go into a private environment under `target/`, in pinned versions, and stay there for the next
-//! run. A machine without Python or without a network skips this step and says so; it never fails for that.
+//! They start it with `ferrodrive.Simulator` of our own Python package. The packages of others go into a private environment
+//! under `target/`, in pinned versions, and stay there for the next run. A machine without Python or without a network skips
+//! this step and says so; it never fails for that.
 
 use std::process::Command;
 
@@ -17,10 +18,16 @@ pub(crate) fn run() -> Tally {
         Ok(program) => program,
         Err(tally) => return tally,
     };
-    let python = match python::environment("peers-venv", REQUIREMENTS) {
+    // The wheel is built in an environment of its own.
+    let environments = python::environment(python::VENV, python::REQUIREMENTS)
+        .and_then(|_| python::environment("peers-venv", REQUIREMENTS));
+    let python = match environments {
         Ok(python) => python,
         Err(reason) => return Tally::skipped(reason),
     };
+    if let Err(error) = python::install_wheel(&python) {
+        return Tally::failed(error);
+    }
     let root = workspace::root();
     let mut command = Command::new(&python);
     command.current_dir(&root).arg("-u").arg(root.join(SCRIPT)).arg("--program").arg(program);

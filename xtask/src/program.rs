@@ -6,19 +6,23 @@ use std::process::Command;
 use crate::tally::Tally;
 use crate::{process, workspace};
 
-/// Builds the binary as the test step built it, in the same profile with the same features, and returns its path;
-/// or what to report when it does not build or does not know `command`.
+/// The binary of the tests, which is built if need be; or what to report when it does not build or does not know `command`.
 pub(crate) fn build(command: &str) -> Result<PathBuf, Tally> {
-    let mut cargo = workspace::cargo();
-    cargo.args(["build", "--workspace", "--bins", "--quiet"]);
-    if !process::run(&mut cargo, |_| ()).map_err(Tally::failed)? {
-        return Err(Tally::failed("ferrodrive does not build"));
-    }
-    let program = workspace::target().join("debug").join(format!("ferrodrive{}", std::env::consts::EXE_SUFFIX));
+    let program = built().map_err(Tally::failed)?;
     if !process::works(&program.to_string_lossy(), &[command, "--help"]) {
         return Err(Tally::failed(format!("this ferrodrive has no command `{command}`")));
     }
     Ok(program)
+}
+
+/// Builds the binary as the test step built it, in the same profile with the same features, and returns its path.
+pub(crate) fn built() -> Result<PathBuf, String> {
+    let mut cargo = workspace::cargo();
+    cargo.args(["build", "--workspace", "--bins", "--quiet"]);
+    if !process::run(&mut cargo, |_| ())? {
+        return Err("ferrodrive does not build".to_owned());
+    }
+    Ok(workspace::target().join("debug").join(format!("ferrodrive{}", std::env::consts::EXE_SUFFIX)))
 }
 
 /// `ferrodrive demo`, which compares every procedure of the manuals with what the drives do.

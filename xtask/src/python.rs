@@ -5,15 +5,19 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
+use std::sync::OnceLock;
 
 use crate::tally::Tally;
-use crate::{process, workspace};
+use crate::{process, program, workspace};
 
 /// The pinned packages that the wheel is built and tested with.
 pub(crate) const REQUIREMENTS: &str = "crates/python/tests/requirements.txt";
 
 /// The environment that has them.
 pub(crate) const VENV: &str = "python-venv";
+
+/// What is needed for some of the tests alone, and is left out where it does not install.
+const FURTHER_REQUIREMENTS: &str = "crates/python/tests/further_requirements.txt";
 
 /// The tests, of the package and of what users copy from.
 const TESTS: &[&str] = &["crates/python/tests", "examples/mobile_base_tests", "examples/arm_tests"];
@@ -24,17 +28,37 @@ pub(crate) fn step() -> Tally {
         Ok(python) => python,
         Err(reason) => return Tally::skipped(reason),
     };
-    let folder = workspace::target().join("wheel");
-    if let Err(error) = install(&python, &folder).and_then(|()| lint(&python)) {
+    if let Err(error) = install_wheel(&python).and_then(|()| lint(&python)) {
         return Tally::failed(error);
+    }
+    if let Err(error) = process::output(pip(&python).args(["install", "--quiet", "-r", FURTHER_REQUIREMENTS])) {
+        let reason = error.lines().last().unwrap_or_default();
+        println!("   without what {FURTHER_REQUIREMENTS} names, which does not install here: {reason}");
     }
     run_tests(&python)
 }
 
+/// Installs the package into an environment, as the profile of the tests builds it.
+pub(crate) fn install_wheel(python: &Path) -> Result<(), String> {
+    let wheel = wheel_of_tests()?;
+    let mut pip = pip(python);
+    process::output(pip.args(["install", "--quiet", "--no-deps", "--force-reinstall"]).arg(wheel)).map(|_| ())
+}
+
+/// The wheel with the binary of the tests, built once in a run of the chores: three steps use it.
+pub(crate) fn wheel_of_tests() -> Result<PathBuf, String> {
+    static BUILT: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    let build = || {
+        let python = environment(VENV, REQUIREMENTS)?;
+        wheel(&python, "dev", Some(&program::built()?), &workspace::target().join("wheel"))
+    };
+    BUILT.get_or_init(build).clone()
+}
+
 /// `cargo xtask wheel`: the wheel as it is released, in `dist/`.
 pub(crate) fn wheel_command() -> ExitCode {
-    let built =
-        environment(VENV, REQUIREMENTS).and_then(|python| wheel(&python, "release", &workspace::root().join("dist")));
+    let built = environment(VENV, REQUIREMENTS)
+        .and_then(|python| wheel(&python, "release", None, &workspace::root().join("dist")));
     match built {
         Ok(wheel) => {
             println!("{}", wheel.display());
@@ -47,8 +71,9 @@ pub(crate) fn wheel_command() -> ExitCode {
     }
 }
 
-/// Builds the wheel in a cargo profile into an emptied folder; returns its path.
-pub(crate) fn wheel(python: &Path, profile: &str, folder: &Path) -> Result<PathBuf, String> {
+/// Builds the wheel in a cargo profile, around a binary that is there already or with one of its own, into an emptied folder;
+/// returns its path.
+pub(crate) fn wheel(python: &Path, profile: &str, program: Option<&Path>, folder: &Path) -> Result<PathBuf, String> {
     for old in wheels_in(folder) {
         std::fs::remove_file(&old).map_err(|error| format!("{}: {error}", old.display()))?;
     }
@@ -57,6 +82,7 @@ pub(crate) fn wheel(python: &Path, profile: &str, folder: &Path) -> Result<PathB
     // The environment has the build's needs, in pinned versions.
     pip.args(["wheel", "--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir"]).arg(folder).arg(".");
     pip.env("FERRODRIVE_PROFILE", profile).env("CARGO_TARGET_DIR", workspace::target());
+    pip.envs(program.map(|program| ("FERRODRIVE_PROGRAM", program)));
     // The build finds its tool beside the interpreter.
     let tools = python.parent().map(Path::to_path_buf).into_iter();
     let path = std::env::var_os("PATH").unwrap_or_default();
@@ -68,8 +94,13 @@ pub(crate) fn wheel(python: &Path, profile: &str, folder: &Path) -> Result<PathB
 /// The Python of an environment `target/NAME` that has the packages of a requirements file, made now if need be; or why
 /// there is none.
 pub(crate) fn environment(name: &str, requirements: &str) -> Result<PathBuf, String> {
+    let file = workspace::root().join(requirements);
+    environment_of(name, &std::fs::read_to_string(file).map_err(|error| format!("{requirements}: {error}"))?)
+}
+
+/// The same, with the packages named here: a line each.
+pub(crate) fn environment_of(name: &str, wanted: &str) -> Result<PathBuf, String> {
     let folder = workspace::target().join(name);
-    let wanted = std::fs::read_to_string(workspace::root().join(requirements)).map_err(|error| error.to_string())?;
     let python = folder.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
     let stamp = folder.join("installed.txt");
     if std::fs::read_to_string(&stamp).is_ok_and(|installed| installed == wanted) && python.exists() {
@@ -79,10 +110,10 @@ pub(crate) fn environment(name: &str, requirements: &str) -> Result<PathBuf, Str
     let system = system.ok_or("no Python 3 with venv on this machine")?;
     println!("   making a Python environment in {}", folder.display());
     process::output(Command::new(system).args(["-m", "venv", "--clear"]).arg(&folder))?;
-    let installed = process::output(pip(&python).args(["install", "--quiet", "-r", requirements]));
-    installed.map_err(|error| {
+    let packages: Vec<&str> = wanted.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    process::output(pip(&python).args(["install", "--quiet"]).args(&packages)).map_err(|error| {
         let reason = error.lines().last().unwrap_or_default().to_owned();
-        format!("pip could not install what {requirements} names (no network?): {reason}")
+        format!("pip could not install {} (no network?): {reason}", packages.join(" "))
     })?;
     std::fs::write(&stamp, wanted).map_err(|error| error.to_string())?;
     Ok(python)
@@ -112,13 +143,6 @@ fn lint(python: &Path) -> Result<(), String> {
     // What a report holds is as dynamic as Python's own JSON.
     mypy.args(["--no-warn-return-any", "--cache-dir"]).arg(workspace::target().join("mypy")).arg("python/ferrodrive");
     process::output(&mut mypy).map(|_| ())
-}
-
-/// Builds the wheel in the profile of the tests and installs it.
-fn install(python: &Path, folder: &Path) -> Result<(), String> {
-    let wheel = wheel(python, "dev", folder)?;
-    let mut pip = pip(python);
-    process::output(pip.args(["install", "--quiet", "--no-deps", "--force-reinstall"]).arg(wheel)).map(|_| ())
 }
 
 fn run_tests(python: &Path) -> Tally {

@@ -4,6 +4,7 @@
 maturin takes the scripts of a wheel from.
 
 `FERRODRIVE_PROFILE` names a cargo profile other than `release`: `dev` builds in a tenth of the time, for tests.
+`FERRODRIVE_PROGRAM` names a binary that is built already, to be taken instead: tests have one, and a release may have a better one.
 """
 
 import os
@@ -55,10 +56,12 @@ def prepare():
     os.environ["CARGO_TARGET_DIR"] = str(target)
     # The module is a workspace of its own; it takes the versions of the project's, and has no others to keep.
     shutil.copyfile(ROOT / "Cargo.lock", ROOT / "crates" / "python" / "Cargo.lock")
-    command = ["cargo", "build", "--locked", "--profile", profile, "--package", "ferrodrive", "--bin", "ferrodrive"]
-    subprocess.run(command, cwd=ROOT, check=True)
+    built = os.environ.get("FERRODRIVE_PROGRAM")
+    if built is None:
+        command = ["cargo", "build", "--locked", "--profile", profile, "--package", "ferrodrive", "--bin", "ferrodrive"]
+        subprocess.run(command, cwd=ROOT, check=True)
+        built = target / ("debug" if profile == "dev" else profile) / PROGRAM
     SCRIPTS.mkdir(parents=True, exist_ok=True)
-    built = target / ("debug" if profile == "dev" else profile) / PROGRAM
     shutil.copy2(built, SCRIPTS / PROGRAM)
     if profile == "dev":
         strip(SCRIPTS / PROGRAM)

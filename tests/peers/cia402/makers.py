@@ -9,10 +9,10 @@ import time
 
 import canopen
 from canopen.profiles.p402 import BaseNode402
+from ferrodrive import Simulator
 
 from checks import Skip, check, eventually, true
 from cia402 import DRIVE
-from simulator import Simulator
 
 #: Bits of 6502h.
 MODES = {"PROFILED POSITION": 0, "PROFILED VELOCITY": 2, "HOMING": 5, "CYCLIC SYNCHRONOUS POSITION": 7}
@@ -42,7 +42,8 @@ def dictionary(path):
 @contextlib.contextmanager
 def servo(program, path):
     """A servo made from a file as node 5, and canopen-python's node from the same file."""
-    with Simulator(program, [f"{path}@5"]) as simulator:
+    with Simulator([f"{path}@5"], path=program) as simulator:
+        simulator.wait_until_booted()
         network = canopen.Network()
         network.NOTIFIER_CYCLE = 0.05
         network.connect(interface="socketcand", host="127.0.0.1", port=simulator.port(), channel="can0")

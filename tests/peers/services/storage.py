@@ -2,6 +2,8 @@
 
 import time
 
+from ferrodrive import SimulatorError
+
 from checks import check, equal, true
 from drive import ALL, MJOINT, ZL, ZLIM42C
 
@@ -92,7 +94,7 @@ def damaged(bench):
         path.write_bytes(data[: len(data) // 2])
     try:
         bench.start()
-    except AssertionError as error:
+    except SimulatorError as error:
         true("ended" in str(error) and bench.simulator.stderr(), f"a reason on stderr: {error}")
         for path in files:
             path.unlink()

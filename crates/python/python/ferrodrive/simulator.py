@@ -11,6 +11,7 @@ import subprocess
 import sysconfig
 import tempfile
 import threading
+import time
 from collections.abc import Iterable
 from types import TracebackType
 from typing import Any, Optional
@@ -18,6 +19,7 @@ from typing import Any, Optional
 from .errors import SimulatorError
 
 READY_TIMEOUT_S = 30
+BOOT_TIMEOUT_S = 30
 ANSWER_TIMEOUT_S = 10
 QUIT_TIMEOUT_S = 5
 
@@ -51,7 +53,8 @@ class Simulator:
     ) -> None:
         serve = ["--serve", "socketcand://127.0.0.1:0", "--seed", str(seed)]
         self.command_line = [path or program(), "sim", *serve, *extra]
-        for drive in drives:
+        self.drives = list(drives)
+        for drive in self.drives:
             self.command_line += ["--drive", drive]
         #: The line that says where it listens.
         self.ready = ""
@@ -80,6 +83,20 @@ class Simulator:
         self, kind: Optional[type[BaseException]], error: Optional[BaseException], traceback: Optional[TracebackType]
     ) -> None:
         self.quit()
+
+    def wait_until_booted(self, within: float = BOOT_TIMEOUT_S) -> None:
+        """Waits until the drives that it was started with have booted. They begin to when the program is ready and take about a
+        second, in which they are deaf, as real ones are.
+
+        :param within: longest time in s; after that :class:`~ferrodrive.SimulatorError` is raised
+        """
+        until = time.monotonic() + within
+        for drive in self.drives:
+            node = re.search(r"@(\d+)[^@]*$", drive)
+            while node is not None and self.world(f"{node.group(1)} get")["power"] != "on":
+                if time.monotonic() > until:
+                    raise SimulatorError(f"the drive {drive} has not booted within {within} s")
+                time.sleep(0.02)
 
     def port(self, protocol: str = "socketcand") -> int:
         """The port of a listener, as the ``ready`` line names it."""
