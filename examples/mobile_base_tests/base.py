@@ -65,7 +65,9 @@ class Base:
                 node.sdo[0x6040].raw = controlword
             if node.sdo[0x6041].raw & 0x6F != 0x27:
                 raise Fault(f"wheel {node_id} is not enabled: statusword {node.sdo[0x6041].raw:04X}h")
-            # A wheel whose host is silent stops: the set-point is repeated.
+        # A wheel whose host is silent stops: the set-points are repeated. Both and the SYNC begin together and go one behind the
+        # other from then on: with a SYNC between the two, one wheel would set off a period before the other.
+        for node in self.wheels.values():
             node.rpdo[1].start(SYNC_PERIOD_S)
         self.network.sync.start(SYNC_PERIOD_S)
 

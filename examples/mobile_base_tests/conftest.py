@@ -1,13 +1,14 @@
-"""What the tests stand on: two wheels on a bus, and the base on the same bus.
+"""What the tests stand on: the machine of `base.toml` on a bus, and its controller on the same bus.
 
 `FERRODRIVE_PACE=1` runs the same suite in real time.
 """
 
 import os
+import pathlib
 
 import ferrodrive
 import pytest
-from base import LEFT, RIGHT, Base
+from base import Base
 
 PACE = os.environ.get("FERRODRIVE_PACE", "virtual")
 #: Each test's name and the digest of its run, for whoever compares runs.
@@ -16,9 +17,7 @@ DIGESTS = os.environ.get("FERRODRIVE_DIGESTS")
 
 @pytest.fixture
 def world(request):
-    world = ferrodrive.World(bitrate=500_000, seed=1)
-    for node in (LEFT, RIGHT):
-        world.add("zlac8030l", node=node)
+    world = ferrodrive.World.machine(pathlib.Path(__file__).with_name("base.toml"), seed=1)
     yield world
     if DIGESTS:
         with open(DIGESTS, "a", encoding="utf-8") as file:
