@@ -1,7 +1,7 @@
 //! The native half of the Python package `ferrodrive`.
 //!
-//! Only what must be fast or must know the Rust side is here: a world that moves without the interpreter's lock, and the
-//! master. What users see (classes with units in their docstrings, the stand-in for the clock, the interface for
+//! Only what must be fast or must know the Rust side is here: a world that moves without the interpreter's lock, scenarios,
+//! and the master. What users see (classes with units in their docstrings, the stand-in for the clock, the interface for
 //! python-can) is Python, in `python/ferrodrive`, and stands on `ferrodrive._native`.
 //!
 //! A world is behind a lock of its own: two threads may use it in turn. A process that was forked refuses the worlds of its
@@ -11,6 +11,7 @@ mod failure;
 mod frames;
 mod live;
 mod master;
+mod scenario;
 mod sheets;
 mod world;
 
@@ -23,6 +24,9 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<world::World>()?;
     module.add_class::<master::Network>()?;
     module.add_class::<master::Job>()?;
+    module.add_class::<scenario::Sweep>()?;
+    module.add_class::<scenario::Summary>()?;
+    module.add_function(wrap_pyfunction!(scenario::run_scenario, module)?)?;
     module.add_function(wrap_pyfunction!(sheets::models, module)?)?;
     module.add_function(wrap_pyfunction!(sheets::model_name, module)?)?;
     module.add_function(wrap_pyfunction!(sheets::sheet, module)?)?;

@@ -27,11 +27,14 @@ use crate::failure::{bad_value, refused, wrong_use};
 use crate::frames::{Plain, frame, plain};
 use crate::sheets::{model_of, node_id};
 pub(crate) use jobs::{Job, Jobs};
-use record::Recording;
+use record::Recordings;
 
 /// How far a world is moved in one go before Python's signal handlers get their turn (Ctrl-C). Where it is cut changes
 /// nothing in the run.
 const SLICE: Duration = Duration::from_millis(200);
+
+/// Samples that are kept of each signal for a picture: it is not wider.
+const MOST_KEPT: u128 = 100_000;
 
 /// What a stimulus may say, one form a line, as `help` of `ferrodrive sim` lists them.
 #[pyfunction]
@@ -58,7 +61,7 @@ pub(crate) struct State {
     pub(crate) jobs: Jobs,
     /// In the order in which Python numbers them.
     probes: Vec<StationId>,
-    recording: Option<Recording>,
+    recordings: Recordings,
 }
 
 /// Why [`World::advance`] came back.
@@ -100,7 +103,7 @@ impl Shared {
 
 impl State {
     fn new(world: sim::World) -> Self {
-        Self { world, jobs: Jobs::default(), probes: Vec::new(), recording: None }
+        Self { world, jobs: Jobs::default(), probes: Vec::new(), recordings: Recordings::default() }
     }
 
     fn probe(&self, number: usize) -> PyResult<StationId> {
@@ -120,9 +123,7 @@ impl State {
     }
 
     fn keep_record(&mut self) {
-        if let Some(recording) = &mut self.recording {
-            recording.keep_up(&mut self.world);
-        }
+        self.recordings.keep_up(&mut self.world);
     }
 
     fn advance_unrecorded(&mut self, until: Option<Instant>, probes: &[StationId]) -> Came {
@@ -169,8 +170,10 @@ impl World {
     }
 
     fn put(&self, py: Python<'_>, number: u8, drive: Box<dyn VirtualDrive>) -> PyResult<()> {
-        let mut state = self.shared.lock(py)?;
-        state.world.add_drive(number, drive).map(|_| ()).map_err(refused)
+        let state = &mut *self.shared.lock(py)?;
+        state.world.add_drive(number, drive).map_err(refused)?;
+        state.recordings.follow(&mut state.world);
+        Ok(())
     }
 }
 
@@ -280,22 +283,37 @@ impl World {
 
     /// Records every signal of every drive to a file `.mcap` or `.csv`, a sample every `period_ns`.
     fn begin_record(&self, py: Python<'_>, path: PathBuf, period_ns: u64) -> PyResult<()> {
-        let mut state = self.shared.lock(py)?;
-        if state.recording.is_some() {
+        let state = &mut *self.shared.lock(py)?;
+        if state.recordings.has_file() {
             return Err(wrong_use("this world is being recorded already; end_record() first"));
         }
-        let recording = Recording::begin(&mut state.world, &path, Duration::from_nanos(period_ns));
-        state.recording = Some(recording.map_err(|error| PyOSError::new_err(format!("{}: {error}", path.display())))?);
-        Ok(())
+        let begun = state.recordings.begin_file(&mut state.world, &path, Duration::from_nanos(period_ns));
+        begun.map_err(|error| PyOSError::new_err(format!("{}: {error}", path.display())))
     }
 
     /// Ends the record, if there is one.
     fn end_record(&self, py: Python<'_>) -> PyResult<()> {
         let state = &mut *self.shared.lock(py)?;
-        match state.recording.take() {
-            Some(recording) => recording.finish(&mut state.world).map_err(PyErr::from),
-            None => Ok(()),
+        state.recordings.end_file(&mut state.world).map_err(PyErr::from)
+    }
+
+    /// Keeps the last `keep_ns` of what moves from now on, with a sample every `period_ns`.
+    fn begin_trail(&self, py: Python<'_>, keep_ns: u64, period_ns: u64) -> PyResult<()> {
+        let state = &mut *self.shared.lock(py)?;
+        let (keep, period) = (Duration::from_nanos(keep_ns), Duration::from_nanos(period_ns.max(1)));
+        if keep.as_nanos() / period.as_nanos() > MOST_KEPT {
+            return Err(bad_value(format!(
+                "more than {MOST_KEPT} samples of each signal; keep less, or sample less often"
+            )));
         }
+        state.recordings.keep_trail(&mut state.world, keep, period);
+        Ok(())
+    }
+
+    /// What was kept, as SVG.
+    fn trail_picture(&self, py: Python<'_>, title: &str) -> PyResult<String> {
+        let state = &mut *self.shared.lock(py)?;
+        state.recordings.picture(&mut state.world, title).map_err(wrong_use)
     }
 
     /// Joins an adapter to the bus; returns its number.
@@ -395,10 +413,18 @@ impl World {
         let (world, probes) = {
             let state = other.get().shared.lock(py)?;
             state.jobs.check_copyable()?;
-            (state.world.snapshot(), state.probes.clone())
+            let mut copy = state.world.snapshot();
+            // What is kept of a world is not part of it.
+            copy.stop_recording();
+            (copy, state.probes.clone())
         };
-        let mut state = self.shared.lock(py)?;
+        let state = &mut *self.shared.lock(py)?;
         state.jobs.check_copyable()?;
+        if state.recordings.has_file() {
+            return Err(wrong_use(
+                "this world is being recorded, and the times of a record do not go back; end_record() first",
+            ));
+        }
         if probes.len() < state.probes.len() {
             return Err(wrong_use(
                 "an adapter was joined to the bus since the snapshot was taken; take the snapshot behind can.Bus(..), \
@@ -406,6 +432,7 @@ impl World {
             ));
         }
         (state.world, state.probes) = (world, probes);
+        state.recordings.follow(&mut state.world);
         Ok(())
     }
 }

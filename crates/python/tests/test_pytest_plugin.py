@@ -1,5 +1,8 @@
 """The fixtures as a suite of somebody else has them."""
 
+import html
+import xml.etree.ElementTree
+
 import ferrodrive
 import pytest
 
@@ -23,6 +26,93 @@ def test_a_failing_test_shows_the_last_frames_and_the_drives(pytester):
     result = pytester.runpytest_subprocess("-p", "no:cacheprovider")
     result.assert_outcomes(failed=1)
     result.stdout.fnmatch_lines(["*last frames on the bus*", "*704#00*", "*zlac8030l at 4*statusword*48.0 V*"])
+
+
+PLOTTED = """
+    import time, ferrodrive, pytest
+
+    @pytest.fixture
+    def world():
+        world = ferrodrive.World()
+        world.add("zlac8030l", node=4)  # the plot has what is added later too
+        yield world
+
+    @pytest.fixture
+    def booted(world):
+        world.run_for(1)
+        world.add("zlim42c", node=5)
+        return world
+
+    def test_over_voltage(booted):
+        booted.run_for(0.5)
+        booted[4].set_supply(85)  # the limit of a ZLAC8030L is 75 V
+        booted.run_for(0.5)
+        assert booted[4].error_code == 0
+
+    def test_empty():
+        pass
+"""
+
+
+def test_a_failing_test_leaves_a_plot_in_a_file_that_the_report_names(pytester):
+    pytester.makepyfile(PLOTTED)
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider")
+    result.assert_outcomes(failed=1, passed=1)
+    named = [line for line in result.outlines if line.endswith("test_over_voltage-world.svg")]
+    assert len(named) == 1, result.outlines
+    figure = xml.etree.ElementTree.parse(named[0])
+    words = " ".join(figure.getroot().itertext())
+    for wanted in ("test_over_voltage", "node 4", "node 5", "Supply", "fault 0001h"):
+        assert wanted in words, words
+
+
+def test_a_plot_goes_into_the_report_of_pytest_html(pytester):
+    pytest.importorskip("pytest_html", reason="pytest-html is not installed here")
+    pytester.makepyfile(PLOTTED)
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "--html=report.html", "--self-contained-html")
+    result.assert_outcomes(failed=1, passed=1)
+    result.stdout.fnmatch_lines(["*in the HTML report*"])
+    report = html.unescape((pytester.path / "report.html").read_text())
+    assert report.count("<svg") >= 1 and "fault 0001h" in report
+
+
+def test_a_trail_changes_nothing_in_a_run_and_has_bounds():
+    def run(follow):
+        world = ferrodrive.World(seed=3)
+        if follow:
+            world.keep_trail(last=0.5, every=0.002)
+        wheel = world.add("zlac8030l", node=4)
+        world.run_for(1)
+        wheel.set_supply(85)
+        before = world.snapshot()
+        world.run_for(1)
+        world.restore(before)
+        world.run_for(1)
+        return world
+
+    assert run(True).digest() == run(False).digest()
+    points = [element.get("points") or element.get("d") for element in xml.etree.ElementTree.fromstring(run(True).picture()).iter()]
+    assert max(len(text) for text in points if text) < 20_000
+    with pytest.raises(RuntimeError, match="nothing of this world was kept"):
+        run(False).picture()
+    with pytest.raises(ValueError, match="more than 100000 samples"):
+        ferrodrive.World().keep_trail(last=1000, every=0.001)
+
+
+def test_a_record_and_a_trail_share_a_world(tmp_path):
+    world = ferrodrive.World()
+    world.keep_trail()
+    world.add("zlac8030l", node=4)
+    world.run_for(1)
+    with world.record(tmp_path / "run.csv", every=0.001):
+        world.run_for(1)
+        with pytest.raises(RuntimeError, match="end_record"):
+            world.restore(world.snapshot())
+    world.run_for(1)
+    lines = (tmp_path / "run.csv").read_text().splitlines()
+    times = [float(line.split(",")[0]) for line in lines[1:] if line[0].isdigit()]
+    assert times[0] == 1 and times[-1] == 2 and len(times) == 1001
+    assert "Supply" in world.picture()
 
 
 def test_a_time_that_a_test_leaves_open_ends_with_its_fixture(pytester):
@@ -53,7 +143,7 @@ def test_the_served_simulator_is_ready(pytester):
         """
         import can, pytest
 
-        @pytest.mark.ferrodrive(drives=["zlac8030l@4"], extra=["--timing", "ideal"])
+        @pytest.mark.ferrodrive(drives=["zlac8030l@4"])
         def test_it(ferrodrive_sim):
             assert ferrodrive_sim.world("4 get")["node"] == 4
             with can.Bus(**ferrodrive_sim.can_arguments()) as bus:

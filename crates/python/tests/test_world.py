@@ -2,6 +2,7 @@
 
 import os
 import re
+import signal
 import threading
 
 import ferrodrive
@@ -113,6 +114,62 @@ def test_a_forked_process_refuses_the_world_of_its_parent(world):
         os._exit(status)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 42
     world.run_for(0.1)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+@pytest.mark.filterwarnings("ignore:.*multi-threaded.*:DeprecationWarning")
+def test_a_process_forked_in_the_middle_of_a_run_is_refused_and_makes_worlds_of_its_own(world):
+    for node in range(10, 40):
+        world.add("zlac8030l", node=node)
+    going = threading.Event()
+
+    def run():
+        going.set()
+        world.run_for(0.5)
+
+    # The other thread has the world's lock for as long as it runs, and in the child nobody ever gives it back.
+    runner = threading.Thread(target=run)
+    runner.start()
+    going.wait()
+    child = os.fork()
+    if child == 0:
+        status = 1
+        try:
+            signal.alarm(60)
+            for use in (lambda: world.run_for(0.1), lambda: world.now, lambda: world.digest(), lambda: world.snapshot()):
+                with pytest.raises(RuntimeError, match="forked"):
+                    use()
+            own = ferrodrive.World()
+            own.add("zlac8030l", node=4)
+            own.run_for(0.1)
+            status = 42 if own.now == 0.1 else 2
+        finally:
+            os._exit(status)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 42
+    runner.join()
+    assert world.now == 0.5
+
+
+def test_an_exception_of_one_thread_leaves_the_world_to_the_other(world):
+    def fails():
+        raise LookupError("mine")
+
+    raised = []
+
+    def wait_for_what_fails():
+        for _ in range(50):
+            try:
+                world.run_until(fails, within=1)
+            except LookupError as error:
+                raised.append(error)
+
+    failing = threading.Thread(target=wait_for_what_fails)
+    failing.start()
+    for _ in range(50):
+        world.run_for(0.001)
+    failing.join(60)
+    assert not failing.is_alive() and len(raised) == 50
+    assert world.now == 0.05
 
 
 def test_wrong_orders_say_what_would_be_right(world):

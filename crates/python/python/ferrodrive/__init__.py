@@ -14,6 +14,11 @@ The same drives under your own program, unchanged, with python-can or canopen-py
 
     bus = can.Bus(interface="ferrodrive", channel=world)
 
+A scenario file, as ``ferrodrive run`` takes it::
+
+    outcome = ferrodrive.run("brown_out.toml", seed=7)
+    assert outcome.passed, outcome
+
 Quantities have their units in their names: ``velocity_rpm``, ``current_a``, ``supply_v``.
 """
 
@@ -21,6 +26,7 @@ from ._native import __version__, eds, models, stimulus_forms
 from .body import Body
 from .errors import FerrodriveError, MasterError, Refused, SimulatorError, Stalled, TimeInUse
 from .master import AsyncDrive, Drive, Network
+from .scenario import Outcome, Row, Sweep, SweepSummary, run
 from .simulator import Simulator
 from .virtual_drive import VirtualDrive
 from .turns import virtual_time
@@ -33,16 +39,21 @@ __all__ = [
     "FerrodriveError",
     "MasterError",
     "Network",
+    "Outcome",
     "Refused",
+    "Row",
     "Simulator",
     "SimulatorError",
     "Stalled",
+    "Sweep",
+    "SweepSummary",
     "TimeInUse",
     "VirtualDrive",
     "World",
     "__version__",
     "eds",
     "models",
+    "run",
     "stimulus_forms",
     "virtual_time",
 ]

@@ -1,16 +1,21 @@
 """Fixtures for pytest, and what a failing test wants to know of the bus.
 
-``ferrodrive_world`` is an empty world whose virtual time is in use; ``ferrodrive_sim`` is the served simulator as a process, ready.
-What they begin with is said by a marker::
+``ferrodrive_world`` is an empty world whose virtual time is in use; ``ferrodrive_sim`` is the served simulator as a process, its
+drives booted. What they begin with is said by a marker::
 
     @pytest.mark.ferrodrive(drives=["zlac8030l@4"], bitrate=500_000, seed=7)
     def test_wheel(ferrodrive_world): ...
+
+A test that fails shows, of each world among its fixtures, the last frames, the state of the drives, and a plot of the last seconds:
+in the report of pytest-html if there is one, else as an SVG file that the report names.
 """
 
 from __future__ import annotations
 
+import pathlib
+import re
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Optional
 
 import pytest
 
@@ -20,6 +25,9 @@ from .world import World
 
 #: Frames that a failing test shows.
 LAST_FRAMES = 40
+
+#: Worlds that fixtures have made, by the fixture's name.
+WORLDS = pytest.StashKey[dict[str, World]]()
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -42,9 +50,12 @@ def ferrodrive_world(request: pytest.FixtureRequest) -> Iterator[World]:
 
 @pytest.fixture
 def ferrodrive_sim(request: pytest.FixtureRequest) -> Iterator[Simulator]:
-    """``ferrodrive sim`` with the drives of the marker as a process of its own, in real time, ready."""
+    """``ferrodrive sim`` with the drives of the marker as a process of its own, in real time, its drives booted."""
     wanted = marked(request)
     with Simulator(wanted.get("drives", ()), wanted.get("seed", 1), wanted.get("extra", ())) as simulator:
+        # A clock that only moves when it is told to boots no drive by waiting.
+        if "manual" not in simulator.command_line:
+            simulator.wait_until_booted()
         yield simulator
 
 
@@ -55,16 +66,69 @@ def marked(request: pytest.FixtureRequest) -> dict[str, Any]:
 
 
 @pytest.hookimpl(hookwrapper=True)
+def pytest_fixture_setup(fixturedef: Any, request: pytest.FixtureRequest) -> Iterator[None]:
+    """Keeps the last seconds of every world that a fixture makes, from there on."""
+    outcome: Any = yield
+    if outcome.excinfo is None and isinstance(world := outcome.get_result(), World):
+        world.keep_trail()
+        request.node.stash.setdefault(WORLDS, {})[fixturedef.argname] = world
+
+
+def pytest_fixture_post_finalizer(fixturedef: Any, request: pytest.FixtureRequest) -> None:
+    """Lets go of a fixture's world."""
+    request.node.stash.get(WORLDS, {}).pop(fixturedef.argname, None)
+
+
+def worlds(item: pytest.Item) -> Iterator[tuple[str, World]]:
+    """The worlds among the fixtures of a test, also of those that it does not name itself; each once."""
+    seen: list[World] = []
+    for node in item.listchain():
+        for name, world in node.stash.get(WORLDS, {}).items():
+            if name in getattr(item, "fixturenames", ()) and not any(world is known for known in seen):
+                seen.append(world)
+                yield name, world
+
+
+@pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Iterator[None]:
-    """Attaches the last frames and the state of the drives to a failing test."""
+    """Attaches the last frames, the state of the drives and a plot to a failing test."""
     outcome: Any = yield
     report = outcome.get_result()
     if call.when != "call" or not report.failed:
         return
-    for world in getattr(item, "funcargs", {}).values():
-        if isinstance(world, World):
-            report.sections.append(("last frames on the bus", "\n".join(world.frames(LAST_FRAMES))))
-            report.sections.append(("drives", f"{world.now} s\n" + "\n".join(state(world))))
+    for name, world in worlds(item):
+        report.sections.append(("last frames on the bus", "\n".join(world.frames(LAST_FRAMES))))
+        report.sections.append(("drives", f"{world.now} s\n" + "\n".join(state(world))))
+        report.sections.append(("plot of the drives", plot(item, report, name, world)))
+
+
+def plot(item: pytest.Item, report: Any, name: str, world: World) -> str:
+    """Draws the last seconds of a world, and says where: in the report of pytest-html, or in a file."""
+    try:
+        svg = world.picture(item.nodeid)
+    except RuntimeError as error:  # a world without drives, or one that has not moved
+        return str(error)
+    if (extras := html_extras(item.config)) is not None:
+        report.extras = [*getattr(report, "extras", []), extras.html(svg)]
+        return "in the HTML report"
+    try:
+        folder: pathlib.Path = item.config._tmp_path_factory.mktemp("ferrodrive")  # type: ignore[attr-defined]
+        path = folder / (re.sub(r"[^A-Za-z0-9_.-]+", "_", f"{item.name}-{name}")[:100] + ".svg")
+        path.write_text(svg, encoding="utf-8")
+    except (AttributeError, OSError) as error:  # pytest runs without its folders for tests, or the disk is full
+        return f"cannot be written: {error}"
+    return str(path)
+
+
+def html_extras(config: pytest.Config) -> Optional[Any]:
+    """pytest-html's kinds of attachments, if it is to write a report."""
+    if not config.getoption("htmlpath", None):
+        return None
+    try:
+        import pytest_html
+    except ImportError:
+        return None
+    return pytest_html.extras
 
 
 def state(world: World) -> Iterator[str]:

@@ -17,3 +17,10 @@ def word(text: str) -> str:
     if not text or text.split() != [text]:
         raise ValueError(f"{text!r} is no name; expected one word")
     return text
+
+
+def setting(name: str, value: Union[int, float, str]) -> str:
+    """The value of a parameter as the words of a file."""
+    if isinstance(value, (int, float, str)):
+        return str(value).lower() if isinstance(value, bool) else str(value)
+    raise TypeError(f"{name} is set to {value!r}; expected a number or a text")

@@ -186,6 +186,19 @@ class World(_native.World):
         finally:
             self.end_record()
 
+    def keep_trail(self, last: float = 20.0, every: float = 0.01) -> None:
+        """Keeps the last seconds of what moves from here on in memory, for :meth:`picture`. Changes nothing in the run.
+
+        :param last: how far back it goes, in s of virtual time
+        :param every: time between two samples in s of virtual time
+        """
+        self.begin_trail(nanoseconds(last), max(1, nanoseconds(every)))
+
+    def picture(self, title: str = "the last of a run") -> str:
+        """What :meth:`keep_trail` has kept, as the text of an SVG: position, velocity, current, supply and faults of each drive, and
+        where bodies were, over time."""
+        return self.trail_picture(title)
+
     def corrupt(self, probability: float) -> None:
         """From now on each frame is destroyed on the wire with this probability, 0 to 1, and sent again (``bus corrupt 0.01``)."""
         self.apply(f"bus corrupt {number(probability)}")

@@ -1,4 +1,5 @@
-//! A recording of a world, written to its file as the world moves.
+//! What is kept of a world as it moves: a record in a file, the last seconds for a picture, or both. The world has one
+//! recorder; while a file is written its signals and its period count, and the picture gets what it needs of them.
 
 use std::fs::File;
 use std::io;
@@ -10,74 +11,144 @@ use devices::AxisId;
 use sim::Place;
 use sim::recorder::{Channel, Recorder, Signal};
 use sim::wire::WireEvent;
-use testbench::recording::{Kind, Record, columns_of_drives};
+use testbench::recording::{Column, Kind, Record, Trail, picture};
 
-/// How much virtual time may pass between two writes: less than fills the world's log of frames.
+/// How much virtual time may pass between two looks at what was sampled: less than fills the world's log of frames.
 const WRITE_PERIOD: Duration = Duration::from_millis(100);
 
-/// A record that is being written.
-pub(super) struct Recording {
-    record: Record,
+/// What is kept of a world.
+#[derive(Default)]
+pub(super) struct Recordings {
+    file: Option<Writing>,
+    trail: Option<Following>,
+    /// What the world's recorder samples, in its order.
+    columns: Vec<Column>,
     next_at: Instant,
+}
+
+/// A file that is being written.
+struct Writing {
+    record: Record,
     /// Time of the last frame that was written.
     frames_until: Instant,
     /// What went wrong with the file; nothing is written after that.
     failed: Option<io::Error>,
 }
 
-impl Recording {
-    /// Begins to record every signal of every drive that is in the world.
+/// A trail, and how often it wants a sample.
+struct Following {
+    trail: Trail,
+    period: Duration,
+}
+
+impl Recordings {
+    /// True while a file is written.
+    pub(super) fn has_file(&self) -> bool {
+        self.file.is_some()
+    }
+
+    /// Begins to record every signal of every drive and body that is in the world.
     ///
     /// # Errors
     /// What the system says of the file; a name that ends in neither `.mcap` nor `.csv`.
-    pub(super) fn begin(world: &mut sim::World, path: &Path, period: Duration) -> io::Result<Self> {
+    pub(super) fn begin_file(&mut self, world: &mut sim::World, path: &Path, period: Duration) -> io::Result<()> {
         let no_kind = || io::Error::new(io::ErrorKind::InvalidInput, "a record is a file .mcap or .csv");
         let kind = Kind::of_name(&path.to_string_lossy()).ok_or_else(no_kind)?;
-        let mut places = Vec::new();
-        let numbers: Vec<u8> = world.drive_numbers().collect();
-        for node in numbers {
-            let axes = world.with_drive(node, |drive, _| drive.axes()).unwrap_or(0);
-            places.extend((0..axes).map(|axis| Place { node, axis: AxisId(axis) }));
-        }
-        let record = Record::begin(kind, Box::new(File::create(path)?), &columns_of_drives(places.iter().copied()))?;
-        let all = |place: Place| Signal::ALL.map(|signal| Channel { place, signal });
-        world.start_recording(Recorder::new(period, places.into_iter().flat_map(all)));
-        let now = world.now();
-        Ok(Self { record, next_at: now + WRITE_PERIOD, frames_until: now, failed: None })
+        let file = File::create(path)?;
+        self.look(world);
+        self.sample(world, &Signal::ALL, period);
+        let record = Record::begin(kind, Box::new(file), &self.columns)?;
+        self.file = Some(Writing { record, frames_until: world.now(), failed: None });
+        Ok(())
     }
 
-    /// Writes what has come, if that is due.
-    pub(super) fn keep_up(&mut self, world: &mut sim::World) {
-        if world.now() >= self.next_at {
-            self.next_at = world.now() + WRITE_PERIOD;
-            self.write(world);
-        }
-    }
-
-    /// Writes the rest and ends the file.
+    /// Writes the rest and ends the file, if there is one.
     ///
     /// # Errors
     /// What the system said of the file at any time.
-    pub(super) fn finish(mut self, world: &mut sim::World) -> io::Result<()> {
-        self.write(world);
+    pub(super) fn end_file(&mut self, world: &mut sim::World) -> io::Result<()> {
+        self.look(world);
         world.stop_recording();
-        match self.failed {
-            Some(error) => Err(error),
-            None => self.record.finish(),
+        let ended = self.file.take();
+        self.follow(world);
+        match ended {
+            Some(Writing { failed: Some(error), .. }) => Err(error),
+            Some(writing) => writing.record.finish(),
+            None => Ok(()),
         }
     }
 
-    fn write(&mut self, world: &mut sim::World) {
-        if self.failed.is_none() {
-            self.failed = self.try_to_write(world).err();
+    /// Keeps the last of what moves from now on; what was kept before is lost.
+    pub(super) fn keep_trail(&mut self, world: &mut sim::World, keep: Duration, period: Duration) {
+        self.trail = Some(Following { trail: Trail::new(keep, period), period });
+        self.follow(world);
+    }
+
+    /// What was kept, as SVG.
+    ///
+    /// # Errors
+    /// A sentence: nothing was kept.
+    pub(super) fn picture(&mut self, world: &mut sim::World, title: &str) -> Result<String, String> {
+        self.look(world);
+        let following = self.trail.as_ref().ok_or("nothing of this world was kept; keep_trail() before it moves")?;
+        let poster = picture(title, &following.trail.recorded(), &[], 0.0..=f64::INFINITY)?;
+        Ok(poster.to_svg())
+    }
+
+    /// The world has other drives now, or was another: its recorder is put in order.
+    pub(super) fn follow(&mut self, world: &mut sim::World) {
+        if self.file.is_some() {
+            return;
+        }
+        if let Some(Following { period, .. }) = self.trail {
+            self.look(world);
+            let signals: Vec<Signal> = Trail::signals().collect();
+            self.sample(world, &signals, period);
         }
     }
 
-    fn try_to_write(&mut self, world: &mut sim::World) -> io::Result<()> {
-        if let Some(recorded) = world.take_recorded() {
-            for (at, values) in recorded.rows() {
-                self.record.row(at, values)?;
-            }
+    /// Takes what has come, if that is due.
+    pub(super) fn keep_up(&mut self, world: &mut sim::World) {
+        if world.now() >= self.next_at {
+            self.look(world);
+        }
+    }
+
+    /// Has the world sample these signals of every drive, and every body.
+    fn sample(&mut self, world: &mut sim::World, signals: &[Signal], period: Duration) {
+        let mut channels = Vec::new();
+        let numbers: Vec<u8> = world.drive_numbers().collect();
+        for node in numbers {
+            let axes = world.with_drive(node, |drive, _| drive.axes()).unwrap_or(0);
+            let places = (0..axes).map(|axis| Place { node, axis: AxisId(axis) });
+            channels
+                .extend(places.flat_map(|place| signals.iter().map(move |signal| Channel { place, signal: *signal })));
+        }
+        let names: Vec<String> = world.body_names().map(str::to_owned).collect();
+        let bodies: Vec<_> = names.iter().filter_map(|name| world.body(name)).collect();
+        self.columns = channels.iter().map(|channel| Column::of_axis(*channel)).collect();
+        self.columns.extend(bodies.iter().flat_map(Column::of_body));
+        self.next_at = world.now() + WRITE_PERIOD;
+        world.start_recording(Recorder::new(period, channels).with_bodies(&bodies));
+    }
+
+    /// Hands on what was sampled and carried since the last look.
+    fn look(&mut self, world: &mut sim::World) {
+        self.next_at = world.now() + WRITE_PERIOD;
+        let Some(recorded) = world.take_recorded() else { return };
+        if let Some(Following { trail, .. }) = &mut self.trail {
+            trail.take(&self.columns, recorded.rows());
+        }
+        if let Some(writing) = self.file.as_mut().filter(|writing| writing.failed.is_none()) {
+            writing.failed = writing.write(world, &recorded).err();
+        }
+    }
+}
+
+impl Writing {
+    fn write(&mut self, world: &sim::World, recorded: &Recorder) -> io::Result<()> {
+        for (at, values) in recorded.rows() {
+            self.record.row(at, values)?;
         }
         let last = self.frames_until;
         for event in world.log().iter() {

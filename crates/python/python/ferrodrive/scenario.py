@@ -1,0 +1,189 @@
+"""Scenarios and sweeps of them: what ``ferrodrive run`` does."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Optional, Union
+
+from . import _native
+from .words import setting
+
+#: The value of a parameter: a number, or a text as the file would have it.
+Value = Union[int, float, str]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One thing that was asked in a run, and what was seen."""
+
+    #: ``step``: what the outer world does; ``host``: what a host does; ``expect``: what is expected.
+    kind: str
+    #: Its name, or that of its host.
+    name: str
+    #: What was asked, in the words of the file.
+    asked: str
+    #: When it was done or decided, in s of virtual time; None if that never came.
+    at: Optional[float]
+    #: What was seen.
+    seen: str
+    #: ``passed``, ``failed``, or ``skipped`` for what was not reached because something before it failed.
+    verdict: str
+    #: Line of the file.
+    line: int
+
+    @property
+    def passed(self) -> bool:
+        """True if it is as asked."""
+        return self.verdict == "passed"
+
+    def __str__(self) -> str:
+        at = "never" if self.at is None else f"{self.at:.4f} s"
+        return f"line {self.line}: {self.kind} {self.asked or self.name}: {self.verdict} ({at}): {self.seen}"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a scenario. As text it is what failed, and the last frames: ``assert outcome.passed, outcome``."""
+
+    title: str
+    #: What decided everything random.
+    seed: int
+    #: The parameters and their values in this run.
+    parameters: Mapping[str, str]
+    #: Virtual time at the end in s.
+    end: float
+    #: What was asked and seen, in the order of time; what never came is last.
+    rows: Sequence[Row]
+    #: The figures that the file names, in its units; not a number where there was nothing to measure.
+    figures: Mapping[str, float]
+    #: Hash over all frames with their times and over the shaft angles: equal digests, equal runs.
+    digest: int
+    #: The last frames on the wire of a run that failed, one candump line each.
+    last_frames: Sequence[str]
+
+    @property
+    def passed(self) -> bool:
+        """True if everything is as asked."""
+        return all(row.passed for row in self.rows)
+
+    @property
+    def expectations(self) -> Sequence[Row]:
+        """The rows of what the file expects."""
+        return tuple(row for row in self.rows if row.kind == "expect")
+
+    @property
+    def failures(self) -> Sequence[Row]:
+        """The rows that are not as asked."""
+        return tuple(row for row in self.rows if not row.passed)
+
+    def __str__(self) -> str:
+        as_asked = len(self.rows) - len(self.failures)
+        head = f"{self.title}: {as_asked} of {len(self.rows)} as expected, seed {self.seed}, digest {self.digest:016x}"
+        return "\n".join([head, *(f"  {row}" for row in self.failures), *(f"  {frame}" for frame in self.last_frames)])
+
+
+def run(
+    path: Union[str, os.PathLike[str]], seed: Optional[int] = None, set: Optional[Mapping[str, Value]] = None
+) -> Outcome:
+    """Runs a scenario in virtual time, as ``ferrodrive run`` does; other threads go on meanwhile.
+
+    :param path: a scenario file (``docs/scenarios.md``)
+    :param seed: decides everything random; without it the scenario's, its machine's, or 1
+    :param set: values of the scenario's parameters, ``{"torque": 1.5}``
+
+    A file that cannot be read raises :class:`OSError`, one that makes no sense :class:`ValueError` with everything that is wrong
+    in it. What is not as the file expects raises nothing: it is in the outcome.
+    """
+    os.stat(path)
+    return outcome(_native.run_scenario(os.fspath(path), seed, settings(set)))
+
+
+class Sweep:
+    """A scenario with many seeds, and with each value of its ``[sweep]``; runs are numbered from 0.
+
+    It makes one run at a time and has no threads: give the numbers to whatever spreads work (``concurrent.futures``, Ray), and
+    what comes of them to a :class:`SweepSummary`. A sweep can be pickled; the other side reads the same file.
+
+    :param path: a scenario file
+    :param seeds: one seed after the other, as ``range(1, 101)``
+    :param set: values of parameters that the sweep does not go through
+    """
+
+    def __init__(
+        self, path: Union[str, os.PathLike[str]], seeds: range = range(1, 2), set: Optional[Mapping[str, Value]] = None
+    ) -> None:
+        if seeds.step != 1 or len(seeds) == 0 or seeds.start < 0:
+            raise ValueError(f"{seeds} is no range of seeds; expected one after the other, as range(1, 101)")
+        os.stat(path)
+        self._made_of = (os.fspath(path), seeds, set)
+        self._native = _native.Sweep(os.fspath(path), seeds.start, seeds.stop - 1, settings(set))
+
+    def __reduce__(self) -> tuple[type[Sweep], tuple[str, range, Optional[Mapping[str, Value]]]]:
+        return Sweep, self._made_of
+
+    def __len__(self) -> int:
+        return self._native.runs
+
+    def point(self, number: int) -> tuple[int, dict[str, str]]:
+        """Seed and values of the run of this number."""
+        seed, values = self._native.point(number)
+        return seed, dict(values)
+
+    def run(self, number: int) -> Outcome:
+        """Makes the run of this number. Values that make no sense together raise :class:`ValueError`."""
+        return outcome(self._native.run(number))
+
+    def summary(self) -> SweepSummary:
+        """A summary to which no run has been added."""
+        return SweepSummary(self._native)
+
+
+class SweepSummary:
+    """What came of the runs of a sweep, in a size that does not grow with them. The order of adding does not matter."""
+
+    def __init__(self, sweep: _native.Sweep) -> None:
+        self._native = _native.Summary(sweep)
+
+    def add(self, number: int, came: Union[Outcome, ValueError]) -> None:
+        """Adds what came of a run, or what it raised: that run has failed."""
+        if isinstance(came, Outcome):
+            failures = came.failures
+            failure = (failures[0].asked, failures[0].seen) if failures else None
+            self._native.add(number, list(came.figures.items()), failure)
+        else:
+            self._native.add(number, [], ("the machine and the scenario", str(came)))
+
+    def report(self) -> dict[str, Any]:
+        """What ``ferrodrive run --seeds --json`` prints: ``runs``, ``passed``, ``failed``, ``complete``; of each figure ``min``,
+        ``median``, ``max`` and the points with the least and the most; the first failed runs with the command that repeats each."""
+        report: dict[str, Any] = json.loads(self._native.report())
+        return report
+
+
+def outcome(text: str) -> Outcome:
+    """What the native half says of a run."""
+    said = json.loads(text)
+    rows = [
+        Row(row["kind"], row["name"], row["asked"], row["t"], row["seen"], row["verdict"], row["line"])
+        for row in said["rows"]
+    ]
+    figures = {name: math.nan if value is None else value for name, value in said["figures"].items()}
+    return Outcome(
+        title=said["title"],
+        seed=said["seed"],
+        parameters=said["parameters"],
+        end=said["end_s"],
+        rows=tuple(rows),
+        figures=figures,
+        digest=int(said["digest"], 16),
+        last_frames=tuple(said["last_frames"]),
+    )
+
+
+def settings(values: Optional[Mapping[str, Value]]) -> list[tuple[str, str]]:
+    """Names and values as words of a file."""
+    return [(name, setting(name, value)) for name, value in (values or {}).items()]

@@ -1,0 +1,138 @@
+//! Scenarios and sweeps of them: what `ferrodrive run` does, for Python.
+//!
+//! A run is made without the interpreter's lock, so that threads run beside it. What comes of it crosses the border as the
+//! JSON that `ferrodrive run --json` prints; `ferrodrive/scenario.py` makes values of it.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use pyo3::exceptions::PyIndexError;
+use pyo3::prelude::*;
+use testbench::document::BadFile;
+use testbench::document::reader::Parameters;
+use testbench::scenario::{Runner, Scenario};
+use testbench::sweep;
+
+use crate::failure::bad_value;
+
+/// Steps of a world between two looks at Python's signal handlers (Ctrl-C): some 10 ms.
+const STEPS_A_LOOK: u32 = 4096;
+
+/// A parameter and its value, in the words that it is put into the file's texts with.
+type Setting = (String, String);
+
+/// Runs the scenario of a file to its end; returns what `ferrodrive run --json` prints.
+#[pyfunction]
+pub(crate) fn run_scenario(py: Python<'_>, path: PathBuf, seed: Option<u64>, set: Vec<Setting>) -> PyResult<String> {
+    let scenario = read(&path, set)?;
+    run(py, || Runner::new(&scenario, seed).map_err(|bad| bad.named(path.display().to_string())))
+}
+
+/// A scenario with seeds and values of its parameters; `ferrodrive.Sweep` is what users have.
+#[pyclass(frozen, module = "ferrodrive._native")]
+pub(crate) struct Sweep {
+    file: PathBuf,
+    sweep: sweep::Sweep,
+}
+
+/// What came of the runs of a sweep so far.
+#[pyclass(frozen, module = "ferrodrive._native")]
+pub(crate) struct Summary {
+    sweep: Py<Sweep>,
+    summary: Mutex<sweep::Summary>,
+}
+
+#[pymethods]
+impl Sweep {
+    /// Every seed from `first` to `last` with every value of the file's `[sweep]`.
+    #[new]
+    fn new(path: PathBuf, first: u64, last: u64, set: Vec<Setting>) -> PyResult<Self> {
+        let scenario = read(&path, set)?;
+        let sweep = sweep::Sweep::new(scenario, first..=last).map_err(bad_value)?;
+        Ok(Self { file: path, sweep })
+    }
+
+    /// How many runs it has.
+    #[getter]
+    fn runs(&self) -> u64 {
+        self.sweep.runs()
+    }
+
+    /// Seed and values of the run of this number.
+    fn point(&self, number: u64) -> PyResult<(u64, Vec<Setting>)> {
+        self.check(number)?;
+        let point = self.sweep.point(number);
+        Ok((point.seed, point.values.into_iter().collect()))
+    }
+
+    /// Makes the run of this number; returns what `ferrodrive run --json` prints.
+    fn run(&self, py: Python<'_>, number: u64) -> PyResult<String> {
+        self.check(number)?;
+        run(py, || self.sweep.runner(number))
+    }
+}
+
+impl Sweep {
+    fn check(&self, number: u64) -> PyResult<()> {
+        if number < self.sweep.runs() {
+            return Ok(());
+        }
+        Err(PyIndexError::new_err(format!(
+            "the sweep has no run {number}; its runs are 0 to {}",
+            self.sweep.runs() - 1
+        )))
+    }
+}
+
+#[pymethods]
+impl Summary {
+    #[new]
+    fn new(sweep: Py<Sweep>) -> Self {
+        Self { sweep, summary: Mutex::default() }
+    }
+
+    /// Adds what came of a run: its figures, and of a failed one what was asked first that was not so, and what was seen.
+    fn add(&self, number: u64, figures: Vec<(String, f64)>, failure: Option<(String, String)>) -> PyResult<()> {
+        let sweep = self.sweep.get();
+        sweep.check(number)?;
+        let figures = figures.iter().map(|(name, value)| (name.as_str(), *value));
+        self.summary.lock().unwrap_or_else(PoisonError::into_inner).add_run(&sweep.sweep, number, figures, failure);
+        Ok(())
+    }
+
+    /// What `ferrodrive run --seeds --json` prints of these runs.
+    fn report(&self) -> PyResult<String> {
+        let sweep = self.sweep.get();
+        let summary = self.summary.lock().unwrap_or_else(PoisonError::into_inner);
+        serde_json::to_string(&sweep::SweepReport::new(&sweep.file, &sweep.sweep, &summary)).map_err(bad_value)
+    }
+}
+
+/// The scenario of a file, with these values of its parameters.
+fn read(path: &Path, set: Vec<Setting>) -> PyResult<Scenario> {
+    let shown = path.display().to_string();
+    // What is wrong in a file has its name already.
+    let named = |reason: String| if reason.starts_with(&shown) { reason } else { format!("{shown}: {reason}") };
+    let scenario = Scenario::read(path).map_err(|reason| bad_value(named(reason)))?;
+    if set.is_empty() {
+        return Ok(scenario);
+    }
+    let mut values: Parameters = scenario.parameters.clone();
+    values.extend(set);
+    scenario.with(&values).map_err(|bad| bad_value(bad.named(shown.as_str())))
+}
+
+/// Goes through a run while other threads of Python go on; a signal whose handler raises (Ctrl-C) ends it.
+fn run(py: Python<'_>, begin: impl Fn() -> Result<Runner, BadFile> + Send + Sync) -> PyResult<String> {
+    py.detach(|| {
+        let mut runner = begin().map_err(bad_value)?;
+        let mut steps = 0u32;
+        while runner.step() {
+            steps = steps.wrapping_add(1);
+            if steps.is_multiple_of(STEPS_A_LOOK) {
+                Python::attach(|py| py.check_signals())?;
+            }
+        }
+        serde_json::to_string(&runner.conclude().to_json()).map_err(bad_value)
+    })
+}
