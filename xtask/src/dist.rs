@@ -95,7 +95,7 @@ fn make(program: &Path, profile: &str, folder: &Path) -> Result<Vec<String>, Str
     for name in ["README.md", "CHANGELOG.md", "LICENSE-APACHE", "LICENSE-MIT"] {
         copy(&workspace::root().join(name), &folder.join(name))?;
     }
-    licences(&folder.join("licences"))?;
+    let mut packages = foreign_packages("Cargo.toml", "ferrodrive")?;
     match python::environment(python::VENV, python::REQUIREMENTS) {
         // The tests' own is the same wheel.
         Ok(_) if profile == "dev" => {
@@ -108,6 +108,11 @@ fn make(program: &Path, profile: &str, folder: &Path) -> Result<Vec<String>, Str
         }
         Err(reason) => notes.push(format!("no wheel: {reason}")),
     }
+    if folder.join("python").is_dir() {
+        // The build of the wheel has put its lock file there.
+        packages.extend(foreign_packages("crates/python/Cargo.toml", "ferrodrive-python")?);
+    }
+    licences(packages, &folder.join("licences"))?;
     write(&folder.join(CHECKSUMS), &checksums(folder)?)?;
     Ok(notes)
 }
@@ -121,10 +126,10 @@ fn models(program: &Path) -> Result<Vec<String>, String> {
     Ok(names.split(',').map(|name| name.trim().to_owned()).collect())
 }
 
-/// The licence files of every package in the binary, and a list of them all.
-fn licences(folder: &Path) -> Result<(), String> {
+/// The licence files of these packages, and a list of them all.
+fn licences(packages: Packages, folder: &Path) -> Result<(), String> {
     let mut list = String::new();
-    for (name, (licence, source)) in foreign_packages()? {
+    for (name, (licence, source)) in packages {
         list.push_str(&format!("{name}: {licence}\n"));
         let files = fs::read_dir(&source).map_err(|error| format!("{}: {error}", source.display()))?;
         for file in files.flatten().map(|file| file.path()).filter(|path| is_licence(path)) {
@@ -139,16 +144,21 @@ fn is_licence(path: &Path) -> bool {
     path.is_file() && LICENCE_NAMES.iter().any(|known| name.starts_with(known))
 }
 
-/// What the binary is made of beside the project's own: name and version, licence, and where its source is.
-fn foreign_packages() -> Result<BTreeMap<String, (String, PathBuf)>, String> {
+/// Packages by name and version: licence, and where the source is.
+type Packages = BTreeMap<String, (String, PathBuf)>;
+
+/// What a package of the project is made of beside the project's own.
+fn foreign_packages(manifest: &str, package: &str) -> Result<Packages, String> {
     let mut tree = workspace::cargo();
-    tree.args(["tree", "--package", "ferrodrive", "--edges", "normal", "--prefix", "none", "--format", "{p}"]);
+    tree.args(["tree", "--manifest-path", manifest, "--package", package, "--edges", "normal"]);
+    tree.args(["--prefix", "none", "--format", "{p}"]);
     let tree = process::output(&mut tree)?;
     let used = |name: &str, version: &str| {
         let wanted = format!("{name} v{version}");
         tree.lines().any(|line| line == wanted || line.starts_with(&format!("{wanted} ")))
     };
-    let text = process::output(workspace::cargo().args(["metadata", "--format-version", "1"]))?;
+    let text =
+        process::output(workspace::cargo().args(["metadata", "--manifest-path", manifest, "--format-version", "1"]))?;
     let metadata: Value = serde_json::from_str(&text).map_err(|error| format!("cargo metadata: {error}"))?;
     let packages = metadata["packages"].as_array().into_iter().flatten();
     let word = |package: &Value, key: &str| package[key].as_str().unwrap_or_default().to_owned();
@@ -235,6 +245,11 @@ fn parts_have_words(dist: &Path) -> Result<(), String> {
 
 fn wheel_works(dist: &Path, empty: &Path) -> Result<(), String> {
     let wheel = files_in(&dist.join("python")).pop().ok_or("there is no wheel")?;
+    // It is made of more than the program is.
+    let licences = fs::read_to_string(dist.join("licences/LICENCES.txt")).map_err(|error| error.to_string())?;
+    if !licences.contains("pyo3-") {
+        return Err("the licences do not name what is in the wheel alone".into());
+    }
     let system = python::environment(python::VENV, python::REQUIREMENTS)?;
     let folder = empty.join("venv");
     process::output(Command::new(system).args(["-m", "venv"]).arg(&folder))?;

@@ -1,10 +1,12 @@
-"""The programs of the package's front page run as they stand, and print what the page says."""
+"""The programs of the front pages, of the package and of the project, run as they stand and do what the pages say."""
 
 import pathlib
 import re
 import subprocess
 import sys
+import time
 
+import ferrodrive
 import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
@@ -33,3 +35,22 @@ def test_a_test_of_the_page_passes(code, tmp_path):
     words = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(path)]
     made = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=120)
     assert made.returncode == 0 and "1 passed" in made.stdout, made.stdout
+
+
+def test_the_client_of_the_project_s_page_turns_a_drive_that_has_just_been_started():
+    page = (ROOT / "README.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    assert "port=29536" in code
+    # As the page starts it, but at a port that is free.
+    with ferrodrive.Simulator(["zlac8030l@4"]) as simulator:
+        code = code.replace("port=29536", f"port={simulator.port()}")
+        made = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+        assert made.returncode == 0, made.stderr
+        # CiA 301, 7.2.4.3.3: 60h answers a download.
+        answers = [line.split()[0] for line in made.stdout.splitlines()]
+        assert answers == ["60"] * 5, made.stdout
+        deadline = time.monotonic() + 30
+        # A ZLAC8030L has 4096 counts in a turn; the watch over its host lets it turn for a second.
+        while simulator.world("4 get")["position"] < 1000:
+            assert time.monotonic() < deadline, "it did not turn"
+            time.sleep(0.05)
