@@ -139,7 +139,13 @@ def test_other_threads_go_on_while_a_scenario_runs(one_fails):
 def test_ctrl_c_ends_a_run(tmp_path):
     path = tmp_path / "long.toml"
     path.write_text(LONG)
-    script = "import sys, ferrodrive\nprint('begins', flush=True)\nferrodrive.run(sys.argv[1])\nprint('went through')"
+    # A shell may have started us with the signal ignored.
+    script = """if True:
+        import signal, sys, ferrodrive
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        print('begins', flush=True)
+        ferrodrive.run(sys.argv[1])
+        print('went through')"""
     process = subprocess.Popen([sys.executable, "-c", script, path], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout.readline() == "begins\n"
     time.sleep(0.5)

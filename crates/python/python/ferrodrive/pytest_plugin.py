@@ -12,6 +12,7 @@ in the report of pytest-html if there is one, else as an SVG file that the repor
 
 from __future__ import annotations
 
+import importlib
 import pathlib
 import re
 from collections.abc import Iterator
@@ -125,10 +126,9 @@ def html_extras(config: pytest.Config) -> Optional[Any]:
     if not config.getoption("htmlpath", None):
         return None
     try:
-        import pytest_html
+        return importlib.import_module("pytest_html").extras
     except ImportError:
         return None
-    return pytest_html.extras
 
 
 def state(world: World) -> Iterator[str]:

@@ -11,12 +11,13 @@ import subprocess
 import sysconfig
 import tempfile
 import threading
-import time
 from collections.abc import Iterable
 from types import TracebackType
 from typing import Any, Optional
 
+from .control import Control
 from .errors import SimulatorError
+from .real_time import REAL
 
 READY_TIMEOUT_S = 30
 BOOT_TIMEOUT_S = 30
@@ -52,6 +53,9 @@ class Simulator:
         self, drives: Iterable[str], seed: int = 1, extra: Iterable[str] = (), path: Optional[str] = None
     ) -> None:
         serve = ["--serve", "socketcand://127.0.0.1:0", "--seed", str(seed)]
+        extra = list(extra)
+        if not any(word.partition("=")[0] == "--control" for word in extra):
+            serve += ["--control", "127.0.0.1:0"]
         self.command_line = [path or program(), "sim", *serve, *extra]
         self.drives = list(drives)
         for drive in self.drives:
@@ -90,13 +94,13 @@ class Simulator:
 
         :param within: longest time in s; after that :class:`~ferrodrive.SimulatorError` is raised
         """
-        until = time.monotonic() + within
+        until = REAL.monotonic() + within
         for drive in self.drives:
             node = re.search(r"@(\d+)[^@]*$", drive)
             while node is not None and self.world(f"{node.group(1)} get")["power"] != "on":
-                if time.monotonic() > until:
+                if REAL.monotonic() > until:
                     raise SimulatorError(f"the drive {drive} has not booted within {within} s")
-                time.sleep(0.02)
+                REAL.sleep(0.02)
 
     def port(self, protocol: str = "socketcand") -> int:
         """The port of a listener, as the ``ready`` line names it."""
@@ -112,6 +116,10 @@ class Simulator:
         """
         place = {"host": "127.0.0.1", "port": self.port()}
         return {"interface": "socketcand", "channel": "can0", "tcp_tune": True, **place}
+
+    def control(self) -> Control:
+        """A control connection: events and values as they come, and requests, beside those of others."""
+        return Control(("127.0.0.1", self.port("control")))
 
     def world(self, command: str) -> dict[str, Any]:
         """Sends one world command and returns its answer; one that is not ok raises :class:`~ferrodrive.SimulatorError`."""
