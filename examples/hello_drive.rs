@@ -6,7 +6,7 @@
 //! # the same code on another bus
 //! cargo run -p ferrodrive-examples --example hello_drive -- --bus socketcand://127.0.0.1:29536/can0
 //! ```
-#![allow(clippy::print_stdout, reason = "an example shows what it does")]
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "an example shows what it does")]
 
 use std::error::Error;
 use std::time::Duration;

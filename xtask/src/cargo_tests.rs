@@ -30,7 +30,7 @@ pub(crate) fn run(command: &mut Command) -> Tally {
 }
 
 /// Adds a line such as `test result: ok. 12 passed; 0 failed; 1 ignored; 0 measured; 0 filtered out`.
-fn count(line: &str, tally: &mut Tally) {
+pub(crate) fn count(line: &str, tally: &mut Tally) {
     let Some(result) = line.strip_prefix("test result: ") else { return };
     for part in result.split(['.', ';']) {
         let mut words = part.split_whitespace();
@@ -46,7 +46,7 @@ fn count(line: &str, tally: &mut Tally) {
     }
 }
 
-fn failed_test(line: &str) -> Option<String> {
+pub(crate) fn failed_test(line: &str) -> Option<String> {
     let name = line.strip_prefix("test ")?.strip_suffix(" ... FAILED")?;
     Some(name.to_owned())
 }

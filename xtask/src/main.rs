@@ -17,6 +17,7 @@ mod steps;
 mod tally;
 mod test;
 mod tidy;
+mod vcan;
 mod workspace;
 
 use std::process::ExitCode;
@@ -27,6 +28,7 @@ The project's own chores.
   cargo xtask test               every test, with a table and a count at the end
   cargo xtask test --only STEP   one step (may be repeated)
   cargo xtask test --list        the steps
+  cargo xtask vcan-test          the tests that need CAN interfaces, in a virtual machine that has them
   cargo xtask tidy               the style that a program can check
   cargo xtask wheel              the Python package, in dist/: the library, the binary, the interface for python-can
   cargo xtask dist               what is released, in dist/: binary, manual pages, completions, data sheets, licences, wheel
@@ -42,6 +44,7 @@ fn main() -> ExitCode {
         ["dist"] => dist::command(),
         ["wheel"] => python::wheel_command(),
         ["pgo"] => pgo::command(),
+        ["vcan-test"] => vcan::command(),
         [] | ["help" | "--help" | "-h"] => {
             print!("{USAGE}");
             ExitCode::SUCCESS

@@ -49,7 +49,7 @@ pub(crate) fn run() -> Tally {
 }
 
 /// Counts one line of the script: `ok NAME`, `FAILED NAME: why`, `skipped NAME: why`.
-fn count(line: &str, tally: &mut Tally) {
+pub(crate) fn count(line: &str, tally: &mut Tally) {
     match line.split_once(' ').map(|(word, _)| word) {
         Some("ok") => tally.passed += 1,
         Some("FAILED") => tally.failed += 1,

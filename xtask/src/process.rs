@@ -35,6 +35,11 @@ pub(crate) fn output(command: &mut Command) -> Result<String, String> {
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
+/// Runs a program whose output nobody needs; its name and last words when it fails.
+pub(crate) fn quietly(command: &mut Command) -> Result<(), String> {
+    output(command).map(|_| ())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,7 +4,7 @@
 //! is compiled twice: clippy only checks, and the later steps use what the test step has built.
 
 use crate::tally::Tally;
-use crate::{cargo_tests, dist, examples, packages, peers, process, program, python, tidy, workspace};
+use crate::{cargo_tests, dist, examples, packages, peers, process, program, python, tidy, vcan, workspace};
 
 /// One step: its name for `--only`, what it does for the progress line, and the function that does it.
 pub(crate) struct Step {
@@ -35,6 +35,7 @@ pub(crate) const STEPS: &[Step] = &[
     },
     Step { name: "dist", does: "what is released can be made, and works from an empty folder", run: dist::step },
     Step { name: "peers", does: "canopen-python, python-can and pymodbus against ferrodrive sim", run: peers::run },
+    Step { name: "vcan", does: "CAN interfaces of Linux, in a virtual machine that has them", run: vcan::step },
 ];
 
 /// The target of the `no_std` step: a Cortex-M4F microcontroller, which has no operating system to lean on.

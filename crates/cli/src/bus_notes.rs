@@ -1,18 +1,51 @@
-//! What a live bus says beside frames, for people: each kind once in a command.
+//! What a live bus says beside frames, for people: each kind once in a command, a connection that comes and goes each time.
 
 use std::collections::BTreeSet;
 
-use transport::Note;
+use transport::{BusSpec, Note};
 
-/// Which kinds have been told.
-#[derive(Debug, Default)]
+/// Which kinds have been told of a bus.
+#[derive(Debug)]
 pub(crate) struct BusNotes {
+    bus: String,
     told: BTreeSet<&'static str>,
 }
 
 impl BusNotes {
-    /// The line to show for `note`, if its kind is new.
+    /// Nothing has been told yet of `bus`.
+    pub(crate) fn of(bus: &BusSpec) -> Self {
+        Self { bus: bus.to_string(), told: BTreeSet::new() }
+    }
+
+    /// The line to show for `note`: what happened and what to do about it, if that is new.
     pub(crate) fn news(&mut self, note: &Note) -> Option<String> {
-        self.told.insert(note.kind()).then(|| format!("bus: {note}"))
+        let comes_and_goes = matches!(note, Note::ConnectionLost { .. } | Note::ConnectionBack);
+        if !self.told.insert(note.kind()) && !comes_and_goes {
+            return None;
+        }
+        // An advice names the interface of which most have only one.
+        let advice = note.advice().map(|advice| format!("; {}", self.named(advice))).unwrap_or_default();
+        Some(format!("bus {}: {note}{advice}", self.bus))
+    }
+
+    fn named(&self, advice: &str) -> String {
+        if self.bus.contains(':') { advice.to_owned() } else { advice.replace("can0", &self.bus) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use transport::ControllerState;
+
+    use super::*;
+
+    #[test]
+    fn a_kind_is_told_once_and_a_connection_each_time() {
+        let mut notes = BusNotes::of(&"can3".parse().unwrap());
+        let off = Note::State(ControllerState::BusOff);
+        let text = notes.news(&off).unwrap();
+        assert!(text.starts_with("bus can3: ") && text.contains("ip link set can3 type can restart"), "{text}");
+        assert_eq!(notes.news(&off), None);
+        assert!(notes.news(&Note::ConnectionBack).is_some() && notes.news(&Note::ConnectionBack).is_some());
     }
 }

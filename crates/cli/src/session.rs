@@ -101,7 +101,7 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
         }
     };
     let mut station = network.clone();
-    let mut notes = BusNotes::default();
+    let mut notes = BusNotes::of(&global.bus);
     let tell = |_, note: &Note| notes.news(note).iter().for_each(|text| context.tell(text));
     let ended = run_station(&mut bus, &mut station, &clock, &Notify::new(), until, tell).await;
     progress.clear();

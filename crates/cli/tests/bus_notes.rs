@@ -6,7 +6,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpListener;
 use std::process::Stdio;
 
-use common::command;
+use common::{command, page};
 use serde_json::{Value, json};
 
 /// A server of socketcand that says `messages` to the first client, and keeps the connection until the client goes.
@@ -55,7 +55,7 @@ fn dump_shows_each_note_among_the_frames() {
 
 #[test]
 fn a_note_is_a_line_of_json_with_its_kind() {
-    let schema: Value = serde_json::from_str(include_str!("../../../docs/json.schema.json")).unwrap();
+    let schema: Value = serde_json::from_str(&page("json.schema.json")).unwrap();
     let mut of_note = schema.clone();
     of_note["$ref"] = json!("#/$defs/bus_note");
     of_note.as_object_mut().unwrap().remove("oneOf");

@@ -5,7 +5,7 @@
 //! cargo run -p ferrodrive-transport --example echo -- socketcand://127.0.0.1:29536 slcan://127.0.0.1:3000
 //! python -c 'import can; bus = can.Bus(interface="socketcand", host="127.0.0.1", port=29536, channel="can0"); print(bus.recv())'
 //! ```
-#![expect(clippy::print_stdout, reason = "an example talks to its user")]
+#![expect(clippy::print_stdout, clippy::print_stderr, reason = "an example talks to its user")]
 
 use std::collections::VecDeque;
 use std::time::Duration;

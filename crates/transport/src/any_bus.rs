@@ -10,11 +10,15 @@ use crate::socketcand::SocketcandBus;
 
 /// Any bus that [`crate::BusSpec::open`] opens.
 #[derive(Debug)]
+#[allow(clippy::large_enum_variant, reason = "a program has one or two of them, and keeps them where they are")]
 pub enum AnyBus {
     /// A socketcand server.
     Socketcand(SocketcandBus),
     /// An slcan adapter or server.
     Slcan(SlcanBus),
+    /// A CAN interface of Linux.
+    #[cfg(target_os = "linux")]
+    SocketCan(crate::SocketCanBus),
     /// A log.
     Log(LogBus),
 }
@@ -26,6 +30,8 @@ impl AnyBus {
         match self {
             Self::Slcan(bus) => bus.close().await,
             Self::Socketcand(_) | Self::Log(_) => Ok(()),
+            #[cfg(target_os = "linux")]
+            Self::SocketCan(_) => Ok(()),
         }
     }
 }
@@ -35,6 +41,8 @@ impl AsyncBus for AnyBus {
         match self {
             Self::Socketcand(bus) => bus.send(frame).await,
             Self::Slcan(bus) => bus.send(frame).await,
+            #[cfg(target_os = "linux")]
+            Self::SocketCan(bus) => bus.send(frame).await,
             Self::Log(bus) => bus.send(frame).await,
         }
     }
@@ -43,6 +51,8 @@ impl AsyncBus for AnyBus {
         match self {
             Self::Socketcand(bus) => bus.recv().await,
             Self::Slcan(bus) => bus.recv().await,
+            #[cfg(target_os = "linux")]
+            Self::SocketCan(bus) => bus.recv().await,
             Self::Log(bus) => bus.recv().await,
         }
     }

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use can::{Bitrate, Frame, Instant};
 
 use crate::log::LogError;
+use crate::socketcan::InterfaceProblem;
 use crate::{Received, socketcand};
 
 /// A CAN bus behind a socket, a serial line or a file. Own frames do not come back.
@@ -146,15 +147,9 @@ pub enum BusError {
         /// The file.
         path: PathBuf,
     },
-    /// A Linux network interface was asked for.
-    #[error(
-        "SocketCAN is not built into this version yet, so '{interface}' cannot be opened; run `socketcand -i {interface}` \
-         on its machine and use socketcand://HOST:29536/{interface}, or use slcan"
-    )]
-    SocketCanNotBuilt {
-        /// The interface.
-        interface: String,
-    },
+    /// A CAN interface of Linux cannot be used.
+    #[error(transparent)]
+    Interface(InterfaceProblem),
     /// A virtual bus is part of the program that asks for it, not of this crate.
     #[error("a simulated bus is not reached through a connection; the program that wants it has to embed it")]
     Simulated,

@@ -41,6 +41,15 @@ impl WallClock {
         self.timer.unix_zero
     }
 
+    /// What this clock showed when the system's clock showed the Unix time `unix`: for the time stamps of the kernel. Now
+    /// for a time to come, as after the system's clock was set back.
+    pub fn at_unix(&self, unix: Duration) -> Instant {
+        let system_now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let age = system_now.saturating_sub(unix).as_nanos();
+        let age = u64::try_from(age).unwrap_or(u64::MAX);
+        Instant::from_nanos(self.now().as_nanos().saturating_sub(age))
+    }
+
     /// Completes when [`now`](Self::now) has reached `deadline`. Dropping the future forgets it.
     pub fn sleep_until(&self, deadline: Instant) -> Sleep {
         Sleep { clock: self.clone(), deadline, ticket: None }
@@ -207,6 +216,21 @@ mod tests {
         };
         tokio::join!(nap(30), nap(10), nap(20), nap(0));
         assert_eq!(*order.lock().unwrap(), [0, 10, 20, 30]);
+    }
+
+    #[test]
+    fn a_stamp_of_the_system_is_as_old_here_as_there() {
+        let clock = WallClock::start();
+        let unix = || SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
+        let before = clock.now();
+        let stamp = unix();
+        let after = clock.now();
+        let at = clock.at_unix(stamp);
+        // The two clocks are read one after the other; a machine that is busy may do something else in between.
+        let slack = clock.now() - before + Duration::from_millis(1);
+        assert!(at + slack >= before && at <= after + slack, "{before:?} {at:?} {after:?}");
+        assert!(clock.at_unix(unix() + Duration::from_secs(3600)) <= clock.now());
+        assert_eq!(clock.at_unix(Duration::ZERO), Instant::ZERO);
     }
 
     #[tokio::test]

@@ -45,8 +45,6 @@
 //! # }
 //! # tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap().block_on(served()).unwrap();
 //! ```
-//!
-//! Linux SocketCAN is deliberately absent so far: it needs a kernel module that few test machines have.
 
 mod any_bus;
 mod bus;
@@ -79,4 +77,7 @@ pub use modbus::{
 pub use note::{ControllerState, ErrorCounters, ErrorFrame, ErrorKind, ErrorKinds, Note, Received, TornRecord};
 pub use run::{Heard, RealTimeWorld, run_station, run_world};
 pub use slcan::SlcanBus;
+pub use socketcan::InterfaceProblem;
+#[cfg(target_os = "linux")]
+pub use socketcan::SocketCanBus;
 pub use socketcand::SocketcandBus;

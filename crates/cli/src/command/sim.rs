@@ -11,10 +11,11 @@ use sim::machine::{Realism, TimingMode};
 use sim::{VirtualDrive, World};
 use tokio::sync::mpsc;
 use transport::{
-    AsyncBus, BusSpec, Hub, HubOptions, ModbusServer, ModbusSpec, Protocol, ServeSpec, SocketcandBus, WallClock,
-    run_world,
+    AsyncBus, BusSpec, Hub, HubOptions, ModbusServer, ModbusSpec, Protocol, Received, ServeSpec, SocketcandBus,
+    WallClock, run_world,
 };
 
+use crate::bus_notes::BusNotes;
 use crate::embedded;
 use crate::failure::Failure;
 use crate::global::Global;
@@ -40,6 +41,10 @@ use testbench::words::drive::{DriveSpec, drive_spec};
 /// Prints one line that begins with `ready` and names every listener once all of them listen. Then reads world commands
 /// from standard input, one a line, and answers each with one line of JSON; `quit` ends, the end of input does not. Blank
 /// lines and `# comments` have no answer; `help` lists the commands.
+///
+/// With --bus BUS before or behind `sim` the drives join somebody's live bus: can0, vcan0, socketcand://HOST:29536/can0 or
+/// slcan. They hear what is said there and answer, as real ones would; --serve may be given beside it. When that bus goes away,
+/// the drives go on and wait for it.
 ///
 /// The drives start when the simulator does, and take about a second to boot (--timing): until its boot-up message a drive is
 /// deaf, and `get` says "power":"booting".
@@ -67,7 +72,7 @@ use testbench::words::drive::{DriveSpec, drive_spec};
     Of the joints, here node 1:\n  \
     1 battery off|on          1 pulses 8192 10000       1 quadrature -400 1000\n  \
     1 duty 40                 1 clock 10000\n\n\
-    Example:\n  ferrodrive sim --drive zlac8030l@4 --serve socketcand://127.0.0.1:29536\n  \
+    Examples:\n  ferrodrive --bus can0 sim --drive zlac8030l@4\n  ferrodrive sim --drive zlac8030l@4 --serve socketcand://127.0.0.1:29536\n  \
     ferrodrive --bus socketcand://127.0.0.1:29536/can0 move 4 90deg")]
 pub(crate) struct Sim {
     /// A drive and its node-ID, e.g. zlac8030l@4; may be repeated, and comes on top of those of --machine FILE.toml
@@ -171,6 +176,13 @@ impl Sim {
                 .because("it makes a virtual bus itself, and joins it to a live one only")
                 .next("leave --bus away, or give e.g. --bus socketcand://HOST:29536/can0"));
         }
+        if bridge.is_some()
+            && (self.clock == Clock::Manual || self.speed.is_some_and(|speed| speed != Speed::Times(1.0)))
+        {
+            return Err(Failure::usage(format!("on {} time passes by itself", global.bus))
+                .because("--speed and --clock manual are for a bus of its own")
+                .next("leave them away, or --bus"));
+        }
         let warnings = Speaker::of_warnings();
         let eeproms = self.state.as_deref().map(Eeproms::open).transpose()?;
         let mut world = machine.world();
@@ -249,7 +261,7 @@ impl Sim {
         let modbus = self.serve_registers(&requests, &clock).await?;
         if let (Some(outer), Some(inner)) = (outer, hub.listeners().last()) {
             let inner = inner.address.to_string();
-            tokio::spawn(join_buses(outer, inner, clock.clone(), requests.clone(), global.clone()));
+            tokio::spawn(join_buses(outer, inner, clock.clone(), requests.clone(), global.clone(), warnings.clone()));
         }
         if let Some(eeproms) = eeproms {
             let stored = requests.clone();
@@ -392,19 +404,25 @@ impl From<EepromError> for Failure {
     }
 }
 
-/// Carries frames both ways between another bus and this one, which is served at `inner`.
+/// Carries frames both ways between another bus and this one, which is served at `inner`. A bus that goes away and comes back
+/// is waited for, and the drives go on meanwhile.
 async fn join_buses(
     mut outer: impl AsyncBus + Send,
     inner: String,
     clock: WallClock,
     requests: mpsc::Sender<Request>,
     global: Global,
+    warnings: Speaker,
 ) {
+    let mut notes = BusNotes::of(&global.bus);
     let carried = async {
         let mut inner = SocketcandBus::connect(&inner, "can0", &clock).await?;
         loop {
             tokio::select! {
-                received = outer.recv_frame() => inner.send(&received?.1).await?,
+                received = outer.recv() => match received?.1 {
+                    Received::Frame(frame) => inner.send(&frame).await?,
+                    Received::Note(note) => notes.news(&note).iter().for_each(|text| warnings.say(&plain(&format!("note: {text}")))),
+                },
                 received = inner.recv_frame() => outer.send(&received?.1).await?,
             }
         }

@@ -4,12 +4,14 @@
 //! whoever listens ([`crate::run_station`]). Terms are those of ISO 11898-1.
 
 mod error_frame;
+mod suspicion;
 
 use std::fmt;
 
 use can::{CanId, Frame};
 
 pub use error_frame::{ErrorCounters, ErrorFrame, ErrorKind, ErrorKinds};
+pub(crate) use suspicion::Suspicions;
 
 /// What comes from a bus: mostly frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,6 +53,10 @@ pub enum Note {
     Restarted,
     /// An error frame was on the wire, or the controller's error counters changed.
     ErrorFrame(ErrorFrame),
+    /// Many bit, stuff, form or CRC errors and no frame: behind them, once.
+    WrongBitRate,
+    /// Several frames of ours were not acknowledged and no frame was heard: behind them, once.
+    NoAcknowledge,
     /// A CAN FD frame was on the bus. CANopen (CiA 301) has none, so that it is passed over.
     FdFrame {
         /// Its identifier.
@@ -86,12 +92,36 @@ impl Note {
             Self::State(ControllerState::BusOff) => "bus_off",
             Self::Restarted => "restarted",
             Self::ErrorFrame(_) => "error_frame",
+            Self::WrongBitRate => "wrong_bit_rate",
+            Self::NoAcknowledge => "no_acknowledge",
             Self::FdFrame { .. } => "fd_frame",
             Self::Overrun { .. } => "overrun",
             Self::SendQueueFull => "send_queue_full",
             Self::ConnectionLost { .. } => "connection_lost",
             Self::ConnectionBack => "connection_back",
             Self::TornRecord(_) => "torn_record",
+        }
+    }
+
+    /// What a person at the bus does about it; `None` where nothing is to be done, or the note itself tells.
+    pub const fn advice(&self) -> Option<&'static str> {
+        match self {
+            Self::WrongBitRate => {
+                Some("is the bit rate right? `ip -details link show can0` tells that of an interface")
+            }
+            Self::NoAcknowledge => {
+                Some("is another node on, is the bus terminated at both ends, has everybody the same bit rate?")
+            }
+            Self::State(ControllerState::BusOff) => Some(
+                "check bit rate, termination and wiring; then `ip link set can0 type can restart`, or `restart-ms 100` for \
+                 good",
+            ),
+            Self::FdFrame { .. } => Some("a controller of classical CAN would destroy it: keep FD nodes off this bus"),
+            Self::Overrun { .. } => Some("this machine is too busy, or the program was stopped for a while"),
+            Self::SendQueueFull => Some(
+                "nobody takes the frames (bus-off, no other node), or there are too many: `ip link set can0 txqueuelen 1000`",
+            ),
+            _ => None,
         }
     }
 
@@ -112,6 +142,8 @@ impl fmt::Display for Note {
             Self::State(state) => write!(f, "the controller is {state}"),
             Self::Restarted => f.write_str("the controller was bus-off and takes part again"),
             Self::ErrorFrame(error) => write!(f, "error frame: {error}"),
+            Self::WrongBitRate => f.write_str("many errors on the wire and no frame"),
+            Self::NoAcknowledge => f.write_str("nobody acknowledges what is sent, and no frame is heard"),
             Self::FdFrame { id, length } => {
                 write!(f, "CAN FD frame {id} with {length} bytes passed over: CANopen has classical frames only")
             }

@@ -7,6 +7,7 @@ use can::{Frame, Instant};
 
 use super::codec::{Decoder, Message, Reply, Request};
 use crate::link::{Link, within};
+use crate::note::Suspicions;
 use crate::socketcan::notes_of;
 use crate::{AsyncBus, BusError, Note, Received, WallClock, text};
 
@@ -24,13 +25,20 @@ pub struct SocketcandBus {
     clock: WallClock,
     /// What one error message said and was not fetched yet: a handful.
     notes: VecDeque<Note>,
+    suspicions: Suspicions,
 }
 
 impl SocketcandBus {
     /// Connects to `address` (`HOST:PORT`) and opens `bus` there.
     pub async fn connect(address: &str, bus: &str, clock: &WallClock) -> Result<Self, BusError> {
         let link = Link::connect(address, clock).await?;
-        let mut connection = Self { link, decoder: Decoder::default(), clock: clock.clone(), notes: VecDeque::new() };
+        let mut connection = Self {
+            link,
+            decoder: Decoder::default(),
+            clock: clock.clone(),
+            notes: VecDeque::new(),
+            suspicions: Suspicions::default(),
+        };
         connection.expect(Reply::Hi, "< hi >", "the greeting").await?;
         for request in [Request::Open(bus.to_owned()), Request::RawMode] {
             let shown = if request == Request::RawMode { "rawmode".to_owned() } else { format!("open {bus}") };
@@ -76,10 +84,16 @@ impl AsyncBus for SocketcandBus {
     async fn recv(&mut self) -> Result<(Instant, Received), BusError> {
         loop {
             if let Some(note) = self.notes.pop_front() {
-                return Ok((self.clock.now(), note.into()));
+                let note = Received::Note(note);
+                self.notes.extend(self.suspicions.after(&note));
+                return Ok((self.clock.now(), note));
             }
             match self.reply().await? {
-                Reply::Frame { frame, .. } => return Ok((self.clock.now(), frame.into())),
+                Reply::Frame { frame, .. } => {
+                    let frame = Received::Frame(frame);
+                    self.notes.extend(self.suspicions.after(&frame));
+                    return Ok((self.clock.now(), frame));
+                }
                 Reply::Error(said) => match error_class(&said) {
                     Some(class) => self.notes.extend(notes_of(class, [0; 8])),
                     None => {

@@ -1,0 +1,153 @@
+//! One run of the guest: QEMU with the host's files, two emulated CAN cards on one bus, and the checks.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use super::image::Image;
+
+/// Longest time until the checks begin. An emulated processor on a busy machine boots in one to two minutes.
+const BOOT_LIMIT: Duration = Duration::from_secs(300);
+
+/// Longest time that the checks may take.
+const CHECKS_LIMIT: Duration = Duration::from_secs(600);
+
+const POLL: Duration = Duration::from_millis(200);
+
+/// What the checks printed, and whether they ended with status 0.
+pub(super) struct Output {
+    pub(super) text: String,
+    pub(super) ended_well: bool,
+}
+
+/// Boots the guest, lets it run the shell script `checks` and waits for its end.
+pub(super) fn run(image: &Image, checks: &str) -> Result<Output, String> {
+    let folder = Folder::make()?;
+    let control = folder.0.join("control");
+    let write = |name: &str, text: &str| {
+        fs::create_dir_all(&control)
+            .and_then(|()| fs::write(control.join(name), text))
+            .map_err(|error| error.to_string())
+    };
+    write("main.sh", include_str!("main.sh"))?;
+    write("checks.sh", checks)?;
+    let console = folder.0.join("console");
+    let mut guest = Guest(start(image, &control, &console)?);
+    let told = |name: &str| fs::read_to_string(control.join(name)).ok().filter(|text| !text.trim().is_empty());
+    let began = Instant::now();
+    let mut limit = began + BOOT_LIMIT;
+    let mut started = false;
+    while guest.0.try_wait().map_err(|error| error.to_string())?.is_none() {
+        if !started && let Some(uptime) = told("started") {
+            println!(
+                "   the guest has started ({} s by its clock, {:.0} s by ours)",
+                uptime.trim(),
+                began.elapsed().as_secs_f64()
+            );
+            (started, limit) = (true, Instant::now() + CHECKS_LIMIT);
+        }
+        if Instant::now() > limit {
+            let text = told("output").unwrap_or_default();
+            return Err(format!(
+                "the guest took too long; it said last: {}{}",
+                last_words(&text),
+                last_words(&read(&console))
+            ));
+        }
+        sleep(POLL);
+    }
+    match told("status") {
+        Some(status) => Ok(Output { text: told("output").unwrap_or_default(), ended_well: status.trim() == "0" }),
+        None => Err(format!("the guest ended without a result; it said last: {}", last_words(&read(&console)))),
+    }
+}
+
+/// A running QEMU, which ends with this.
+struct Guest(Child);
+
+impl Drop for Guest {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A folder of this run alone, which is removed with this.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn make() -> Result<Self, String> {
+        let path = std::env::temp_dir().join(format!("ferrodrive-vcan-{}", std::process::id()));
+        fs::create_dir_all(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+        Ok(Self(path))
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+fn start(image: &Image, control: &Path, console: &Path) -> Result<Child, String> {
+    let share = |id: &str, path: &Path, more: &str| {
+        // A comma separates options, and two of them are one.
+        let path = path.display().to_string().replace(',', ",,");
+        format!("local,id={id},path={path},security_model=none,multidevs=remap{more}")
+    };
+    let mut qemu = Command::new("qemu-system-x86_64");
+    qemu.args([
+        "-nodefaults",
+        "-no-user-config",
+        "-display",
+        "none",
+        "-no-reboot",
+        "-monitor",
+        "none",
+        "-M",
+        "q35",
+        "-m",
+        "2048",
+    ]);
+    if has_kvm() {
+        qemu.args(["-accel", "kvm", "-cpu", "host"]);
+    } else {
+        // Protections that an emulated processor pays for, and that nothing here needs.
+        qemu.args([
+            "-accel",
+            "tcg,thread=multi,tb-size=512",
+            "-cpu",
+            "max,la57=off,smap=off,smep=off,umip=off,pku=off",
+        ]);
+    }
+    qemu.arg("-kernel").arg(&image.kernel).arg("-initrd").arg(&image.initrd);
+    qemu.arg("-append").arg(
+        "console=ttyS0 quiet panic=-1 oops=panic mitigations=off apparmor=0 audit=0 random.trust_cpu=on tsc=reliable \
+         no_timer_check cryptomgr.notests 8250.nr_uarts=1 net.ifnames=0",
+    );
+    qemu.arg("-serial").arg(format!("file:{}", console.display()));
+    for (tag, path, more) in [("root", Path::new("/"), ",readonly=on"), ("control", control, "")] {
+        qemu.arg("-fsdev").arg(share(tag, path, more));
+        qemu.arg("-device").arg(format!("virtio-9p-pci,fsdev={tag},mount_tag={tag}"));
+    }
+    qemu.args(["-object", "can-bus,id=bus", "-device", "kvaser_pci,canbus=bus", "-device", "kvaser_pci,canbus=bus"]);
+    qemu.stdin(Stdio::null()).stdout(Stdio::null()).spawn().map_err(|error| format!("cannot run QEMU: {error}"))
+}
+
+/// Whether this machine lets its processor run a guest. A device file alone does not tell: some clouds show one that cannot.
+fn has_kvm() -> bool {
+    let may = fs::OpenOptions::new().read(true).write(true).open("/dev/kvm").is_ok();
+    let flags = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    may && flags.split_whitespace().any(|flag| matches!(flag, "vmx" | "svm"))
+}
+
+fn read(path: &Path) -> String {
+    fs::read(path).map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).unwrap_or_default()
+}
+
+fn last_words(text: &str) -> String {
+    let lines: Vec<&str> = text.lines().filter(|line| !line.trim().is_empty()).collect();
+    lines[lines.len().saturating_sub(15)..].iter().map(|line| format!("\n     {}", line.trim())).collect()
+}

@@ -1,0 +1,121 @@
+//! `cargo xtask vcan-test`: the tests that need CAN interfaces, inside a small virtual machine whose kernel has them.
+//!
+//! Few machines that build this have CAN in their kernel. So a Debian kernel is booted under QEMU ([`image`], [`guest`]) with
+//! `vcan0`, `vcan1` and two emulated Kvaser cards on one bus, `can0` and `can1`. The guest's files are the host's, read-only,
+//! so that what was built here runs there. A machine without QEMU, or where it cannot be installed, skips this and says so.
+
+mod guest;
+mod image;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use crate::tally::Tally;
+use crate::{cargo_tests, process, python, workspace};
+
+/// The test program that is run inside: that of the command line.
+const TESTS: &str = "socketcan";
+
+/// canopen-python on the same interfaces.
+const PEER: &str = "tests/peers/on_socketcan.py";
+const PEER_REQUIREMENTS: &str = "tests/peers/requirements.txt";
+
+/// `cargo xtask vcan-test`.
+pub(crate) fn command() -> ExitCode {
+    let tally = step();
+    println!("vcan: {} {}\n{}", tally.verdict(), tally.note, tally.summary());
+    if tally.failed > 0 { ExitCode::FAILURE } else { ExitCode::SUCCESS }
+}
+
+/// The step of `cargo xtask test`.
+pub(crate) fn step() -> Tally {
+    let image = match image::prepare(&workspace::target().join("vcan-vm")) {
+        Ok(image) => image,
+        Err(reason) => return Tally::skipped(reason),
+    };
+    let tests = match test_program() {
+        Ok(tests) => tests,
+        Err(error) => return Tally::failed(error),
+    };
+    let peer = python::environment("peers-venv", PEER_REQUIREMENTS);
+    let checks = checks(&tests, peer.as_ref().ok());
+    println!("   booting a guest with CAN interfaces");
+    let output = match guest::run(&image, &checks) {
+        Ok(output) => output,
+        Err(error) => return Tally::failed(error),
+    };
+    let mut tally = read(&output);
+    if let Err(reason) = peer {
+        tally.add(&Tally::skipped(format!("canopen-python: {reason}")));
+    }
+    tally
+}
+
+/// The tests, built as the test step builds them.
+fn test_program() -> Result<PathBuf, String> {
+    let mut cargo = workspace::cargo();
+    // All packages are named, so that nothing is built again with other features than the test step's.
+    cargo.args(["test", "--workspace", "--bins", "--test", TESTS, "--no-run", "--quiet"]);
+    let messages = process::output(cargo.arg("--message-format=json"))?;
+    let programs = messages.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
+    let mut ours = programs.filter(|message| message["target"]["name"] == TESTS && message["profile"]["test"] == true);
+    let program = ours.find_map(|message| message["executable"].as_str().map(PathBuf::from));
+    program.ok_or_else(|| format!("cargo built no test program `{TESTS}`"))
+}
+
+/// What the guest runs, as a shell script. Each line of its output says how a check ended.
+fn checks(tests: &Path, python: Option<&PathBuf>) -> String {
+    let root = workspace::root();
+    let path = std::env::var("PATH").unwrap_or_default();
+    let quoted = |path: &Path| format!("'{}'", path.display().to_string().replace('\'', "'\\''"));
+    let mut script =
+        format!("export PATH={}:/usr/sbin:/sbin HOME=/tmp\ncd {}\n", quoted(Path::new(&path)), quoted(&root));
+    script += &format!("{} --ignored --test-threads=1\nstatus=$?\n", quoted(tests));
+    if let Some(python) = python {
+        let program = workspace::target().join("debug/ferrodrive");
+        script += &format!(
+            "{} -B -u {} --program {} || status=1\n",
+            quoted(python),
+            quoted(&root.join(PEER)),
+            quoted(&program)
+        );
+    }
+    script + "exit $status\n"
+}
+
+/// Counts the lines of both kinds of checks, and shows them.
+fn read(output: &guest::Output) -> Tally {
+    let mut tally = Tally::default();
+    let mut failed = Vec::new();
+    for line in output.text.lines() {
+        println!("   {line}");
+        cargo_tests::count(line, &mut tally);
+        failed.extend(cargo_tests::failed_test(line));
+        crate::peers::count(line, &mut tally);
+    }
+    if !output.ended_well && tally.failed == 0 {
+        tally.failed = 1;
+        failed.push("the checks ended badly: read the lines above".to_owned());
+    }
+    if tally == Tally::default() {
+        return Tally::failed("the guest checked nothing");
+    }
+    tally.note = failed.join(", ");
+    tally
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn checks_of_both_kinds_are_counted() {
+        let text =
+            "test a ... ok\ntest b ... FAILED\ntest result: FAILED. 1 passed; 1 failed; 0 ignored\nok reads 1008h\n";
+        let tally = read(&guest::Output { text: text.to_owned(), ended_well: false });
+        assert_eq!((tally.passed, tally.failed, tally.note.as_str()), (2, 1, "b"));
+        let died = read(&guest::Output { text: "ok one\n".to_owned(), ended_well: false });
+        assert_eq!((died.passed, died.failed), (1, 1));
+        assert_eq!(read(&guest::Output { text: String::new(), ended_well: true }).failed, 1);
+    }
+}
