@@ -1,6 +1,7 @@
 """The fixtures as a suite of somebody else has them."""
 
 import html
+import re
 import xml.etree.ElementTree
 
 import ferrodrive
@@ -34,6 +35,7 @@ PLOTTED = """
     @pytest.fixture
     def world():
         world = ferrodrive.World()
+        world.keep_trail(last=0.75)  # the plugin leaves it so
         world.add("zlac8030l", node=4)  # the plot has what is added later too
         yield world
 
@@ -64,6 +66,8 @@ def test_a_failing_test_leaves_a_plot_in_a_file_that_the_report_names(pytester):
     words = " ".join(figure.getroot().itertext())
     for wanted in ("test_over_voltage", "node 4", "node 5", "Supply", "fault 0001h"):
         assert wanted in words, words
+    times = [float(word) for word in words.replace("time, s", " ").split() if re.fullmatch(r"[12]\.\d", word)]
+    assert min(times) >= 1.2 and max(times) == 2.0, "the last 0.75 s of 2 s"
 
 
 def test_a_plot_goes_into_the_report_of_pytest_html(pytester):

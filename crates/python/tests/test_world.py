@@ -1,12 +1,15 @@
 """A world by itself: time, drives, stimuli, snapshots, and what goes wrong."""
 
 import os
+import pathlib
 import re
 import signal
 import threading
 
 import ferrodrive
 import pytest
+
+EXAMPLES = pathlib.Path(__file__).resolve().parents[3] / "examples"
 
 
 @pytest.fixture
@@ -303,6 +306,24 @@ STIMULI = {
         lambda it: it.send_clock(10_000),
     ],
 }
+
+
+def test_a_record_has_the_pose_of_a_body_that_rolls(tmp_path):
+    world = ferrodrive.World.machine(EXAMPLES / "mobile_base_tests" / "base.toml")
+    with ferrodrive.Network(world) as network:
+        for node in (1, 2):
+            network.wait_for(node)
+        network.sleep(0.5)
+        with world.record(tmp_path / "run.csv", every=0.01):
+            for node in (1, 2):
+                network.drive(node, "zlac8030l").velocity(60)
+            network.sleep(0.5)
+        true = world.body("base").state()
+    head, *lines = (tmp_path / "run.csv").read_text().splitlines()
+    row = dict(zip(head.split(","), lines[-1].split(",")))
+    assert true["x_m"] > 0.1
+    assert float(row["base.x_m"]) == pytest.approx(true["x_m"], abs=0.01)
+    assert float(row["base.heading_deg"]) == pytest.approx(true["heading_deg"], abs=1)
 
 
 def test_every_stimulus_has_a_method():

@@ -71,7 +71,8 @@ def pytest_fixture_setup(fixturedef: Any, request: pytest.FixtureRequest) -> Ite
     """Keeps the last seconds of every world that a fixture makes, from there on."""
     outcome: Any = yield
     if outcome.excinfo is None and isinstance(world := outcome.get_result(), World):
-        world.keep_trail()
+        if not world.keeps_trail:  # a fixture may have wanted another length
+            world.keep_trail()
         request.node.stash.setdefault(WORLDS, {})[fixturedef.argname] = world
 
 

@@ -44,6 +44,7 @@ class World(_native.World):
     """
 
     _watched = False
+    _keeps_trail = False
 
     def __new__(cls, bitrate: Union[int, str] = 500_000, seed: int = 1, timing: str = "ideal", *, channel: Optional[str] = None) -> Self:
         world = super().__new__(cls, str(bitrate), seed)
@@ -175,7 +176,7 @@ class World(_native.World):
 
     @contextlib.contextmanager
     def record(self, path: Union[str, os.PathLike[str]], every: float = 0.001) -> Iterator[None]:
-        """Records every signal of every drive while the block runs, to a file ``.mcap`` (for Foxglove, PlotJuggler, Rerun; with the
+        """Records every signal of every drive and body while the block runs, to a file ``.mcap`` (for Foxglove, PlotJuggler, Rerun; with the
         frames) or ``.csv``.
 
         :param every: time between two samples in s of virtual time
@@ -193,6 +194,12 @@ class World(_native.World):
         :param every: time between two samples in s of virtual time
         """
         self.begin_trail(nanoseconds(last), max(1, nanoseconds(every)))
+        self._keeps_trail = True
+
+    @property
+    def keeps_trail(self) -> bool:
+        """True after :meth:`keep_trail`."""
+        return self._keeps_trail
 
     def picture(self, title: str = "the last of a run") -> str:
         """What :meth:`keep_trail` has kept, as the text of an SVG: position, velocity, current, supply and faults of each drive, and
