@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    completions, dcf, demo, drive, dump, eds, events, home, man_pages, motion, nmt, objects, plot, readings, run, scan,
-    sdo, sim, store, world,
+    completions, dcf, demo, drive, dump, eds, emcy, events, home, man_pages, motion, nmt, objects, pdo, plot, read,
+    readings, run, scan, sdo, send, sim, store, sync, time, watch, world,
 };
 use crate::global::Global;
 
@@ -29,14 +29,20 @@ pub(crate) enum Command {
     World(world::World),
     Events(events::Events),
     Scan(scan::Scan),
-    Read(sdo::Read),
+    Read(read::Read),
     Write(sdo::Write),
     Objects(objects::Objects),
     Plot(plot::Plot),
     Readings(readings::Readings),
     Eds(eds::Eds),
     Dcf(dcf::Dcf),
+    Watch(watch::Watch),
+    Pdo(pdo::Pdo),
+    Emcy(emcy::Emcy),
     Nmt(nmt::Nmt),
+    Sync(sync::SyncCommand),
+    Time(time::Time),
+    Send(send::Send),
     State(drive::State),
     Enable(drive::Enable),
     Disable(drive::Disable),

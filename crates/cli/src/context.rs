@@ -5,11 +5,14 @@ use std::time::Duration;
 
 use canopen::{Mux, NodeId};
 use cia402::{PowerCommand, PowerState, Statusword};
+use master::decode::Decoder;
 use master::drive::Drive;
 use master::identify::Knowledge;
 use master::{Error, Network, Node};
+use transport::BusSpec;
 
 use crate::failure::Failure;
+use crate::frames::tap::Traffic;
 use crate::global::Global;
 use crate::progress::Progress;
 use testbench::machine_file::Machine;
@@ -30,6 +33,9 @@ pub(crate) struct Context {
     pub(crate) network: Network,
     /// Where to show what is going on.
     pub(crate) progress: Progress,
+    /// The frames that pass.
+    pub(crate) traffic: Traffic,
+    bus: BusSpec,
     timeout: Duration,
     models: BTreeMap<NodeId, Told>,
     json: bool,
@@ -61,18 +67,33 @@ impl Context {
         network: Network,
         embedded: Option<&[(NodeId, &'static Description)]>,
         progress: Progress,
+        traffic: Traffic,
     ) -> Self {
         let of_machine = global.machine.iter().filter(|_| embedded.is_none()).flat_map(Machine::models);
         let by_user = of_machine.chain(global.models.iter().copied()).map(|(node, model)| (node, Told::ByUser(model)));
         let by_bus = embedded.unwrap_or_default().iter().map(|(node, model)| (*node, Told::ByBus(model)));
         let models: BTreeMap<_, _> = by_bus.chain(by_user).collect();
         network.set_models(models::with_told(models.values().map(|told| told.description())));
-        Self { network, progress, timeout: global.timeout, models, json: global.json, embedded: embedded.is_some() }
+        Self {
+            network,
+            progress,
+            traffic,
+            bus: global.bus.clone(),
+            timeout: global.timeout,
+            models,
+            json: global.json,
+            embedded: embedded.is_some(),
+        }
     }
 
     /// A node, to be waited for as long as the command line says.
     pub(crate) fn node(&self, id: NodeId) -> Node {
         self.network.node(id).with_timeout(self.timeout)
+    }
+
+    /// The bus as it was named.
+    pub(crate) const fn bus(&self) -> &BusSpec {
+        &self.bus
     }
 
     /// True on a virtual bus of this command alone.
@@ -97,6 +118,32 @@ impl Context {
             None => {}
         }
         Ok(master::identify::knowledge(&self.node(id)).await?)
+    }
+
+    /// A decoder that knows the models that this command was told.
+    pub(crate) fn decoder(&self) -> Decoder {
+        let mut decoder = Decoder::knowing(self.network.models());
+        for (node, told) in &self.models {
+            decoder.set_model(*node, told.description());
+        }
+        decoder
+    }
+
+    /// Listens for this long, or without end, but on an embedded bus for `embedded`: nobody presses Ctrl-C in virtual time.
+    /// `work` ends by itself only with an error.
+    pub(crate) async fn listen_for(
+        &self,
+        duration: Option<Duration>,
+        embedded: Duration,
+        work: impl Future<Output = Result<(), Failure>>,
+    ) -> Result<(), Failure> {
+        match duration.or(self.embedded.then_some(embedded)) {
+            None => work.await,
+            Some(limit) => tokio::select! {
+                result = work => result,
+                () = self.network.sleep(limit) => Ok(()),
+            },
+        }
     }
 
     /// Longest wait for each answer.

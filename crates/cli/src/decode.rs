@@ -101,6 +101,11 @@ impl Decoded {
         self.decimals = (-factor.log10() - 1e-9).ceil().max(0.0) as usize;
     }
 
+    /// How many bytes there are.
+    pub(crate) fn length(&self) -> usize {
+        self.bytes.split_whitespace().count()
+    }
+
     /// One line.
     pub(crate) fn text(&self, paint: Paint) -> String {
         let number = match (self.value, self.quantity, self.unit, &self.string) {

@@ -51,6 +51,12 @@ impl Failure {
         }
     }
 
+    /// Standard output cannot be written.
+    #[allow(clippy::needless_pass_by_value, reason = "for map_err")]
+    pub(crate) fn not_printed(error: std::io::Error) -> Self {
+        Self::new("cannot write to standard output").because(error)
+    }
+
     /// The command line makes no sense, as found out only now.
     pub(crate) fn usage(what: impl Into<String>) -> Self {
         Self { status: Status::Usage, kind: "usage", ..Self::new(what) }

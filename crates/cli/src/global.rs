@@ -35,6 +35,10 @@ pub(crate) struct Global {
     #[arg(long, value_name = "FILE.toml", value_parser = machine_file::machine, env = "FERRODRIVE_MACHINE", global = true)]
     pub(crate) machine: Option<Machine>,
 
+    /// Show every frame that the command sends and hears, in words, on standard error
+    #[arg(long, short = 'v', global = true)]
+    pub(crate) verbose: bool,
+
     /// Longest wait for each answer of a node
     #[arg(long, value_name = "TIME", value_parser = master::units::parse_duration, default_value = "500ms", global = true)]
     pub(crate) timeout: Duration,

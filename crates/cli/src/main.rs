@@ -11,6 +11,7 @@ mod control_client;
 mod decode;
 mod embedded;
 mod failure;
+mod frames;
 mod global;
 mod guard;
 mod output;
@@ -139,7 +140,13 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         }
         Command::Run(run) => run.run(format),
         Command::Scan(command) => on_bus(global, format, async |context| command.run(context).await),
-        Command::Read(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Read(command) => session::run(global, async |context| command.run(context, format).await),
+        Command::Watch(command) => session::run(global, async |context| command.run(context, format).await),
+        Command::Pdo(command) => session::run(global, async |context| command.run(context, format).await),
+        Command::Emcy(command) => session::run(global, async |context| command.run(context, format).await),
+        Command::Sync(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Time(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Send(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Write(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Nmt(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::State(command) => on_bus(global, format, async |context| command.run(context).await),

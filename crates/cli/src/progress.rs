@@ -3,7 +3,7 @@
 use std::io::{self, IsTerminal, Write};
 use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::plain::plain;
 
@@ -38,6 +38,12 @@ impl Progress {
         self.bar.suspend(|| drop(writeln!(io::stderr(), "note: {}", plain(text))));
     }
 
+    /// A line on standard error as it is, terminal or not.
+    pub(crate) fn line(&self, text: &str) {
+        // Nobody may be listening any more.
+        self.bar.suspend(|| drop(writeln!(io::stderr(), "{text}")));
+    }
+
     /// Keeps the line moving while nothing changes.
     pub(crate) fn spin(&self) {
         self.bar.enable_steady_tick(Duration::from_millis(100));
@@ -46,5 +52,35 @@ impl Progress {
     /// Takes the line away.
     pub(crate) fn clear(&self) {
         self.bar.finish_and_clear();
+    }
+}
+
+/// A text on standard output that is written over by the next one; of a terminal only.
+pub(crate) struct Screen {
+    bar: ProgressBar,
+}
+
+impl Screen {
+    /// None if standard output is no terminal.
+    pub(crate) fn on_terminal() -> Option<Self> {
+        if !io::stdout().is_terminal() {
+            return None;
+        }
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stdout());
+        bar.set_style(ProgressStyle::with_template("{msg}").ok()?);
+        Some(Self { bar })
+    }
+
+    /// Shows `text` in place of what was shown before.
+    pub(crate) fn show(&self, text: &str) {
+        self.bar.set_message(text.to_owned());
+        self.bar.tick();
+    }
+}
+
+/// What was shown last stays.
+impl Drop for Screen {
+    fn drop(&mut self) {
+        self.bar.abandon();
     }
 }

@@ -24,23 +24,24 @@ const BUS: &str = "bus";
 const MODEL: &str = "models";
 const MACHINE: &str = "machine";
 const TIMEOUT: &str = "timeout";
+const VERBOSE: &str = "verbose";
 
 const UNHEEDED: [Unheeded; 10] = [
     Unheeded {
         command: "run",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE],
         why: "a scenario has a machine and a bus of its own",
         next: "leave it away; the scenario's machine may be the path of a machine file",
     },
     Unheeded {
         command: "world",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE],
         why: "it speaks to a running simulator, not to a bus",
         next: "leave it away; --control says where the simulator is",
     },
     Unheeded {
         command: "events",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE],
         why: "it listens to a running simulator, not to a bus",
         next: "leave it away; --control says where the simulator is",
     },
@@ -52,13 +53,13 @@ const UNHEEDED: [Unheeded; 10] = [
     },
     Unheeded {
         command: "sim",
-        options: &[TIMEOUT],
+        options: &[TIMEOUT, VERBOSE],
         why: "it asks nobody anything, and waits for no answer",
-        next: "leave it away",
+        next: "leave it away; --record and --log keep the frames, and dump shows them",
     },
     Unheeded {
         command: "demo",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE],
         why: "it shows virtual drives on buses of their own",
         next: "leave it away; --drive MODEL chooses the drive",
     },
@@ -70,19 +71,19 @@ const UNHEEDED: [Unheeded; 10] = [
     },
     Unheeded {
         command: "completions",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE],
         why: "a script for a shell depends on none of them",
         next: "leave it away",
     },
     Unheeded {
         command: "eds",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE],
         why: "it is about files, not about a node of a bus",
         next: "leave it away",
     },
     Unheeded {
         command: "readings",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE],
         why: "it is about a model, not about a node of a bus",
         next: "leave it away",
     },
@@ -90,7 +91,7 @@ const UNHEEDED: [Unheeded; 10] = [
 
 const OBJECTS_OF_A_MODEL: Unheeded = Unheeded {
     command: "objects",
-    options: &[BUS, MODEL, MACHINE, TIMEOUT],
+    options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE],
     why: "the objects of a model are the same on every bus",
     next: "leave it away, or give a node-ID in place of the model",
 };

@@ -14,6 +14,9 @@ use crate::bus_notes::BusNotes;
 use crate::context::Context;
 use crate::embedded::{self, Embedded};
 use crate::failure::Failure;
+use crate::frames::decoder;
+use crate::frames::stamp::Stamps;
+use crate::frames::tap::{Tap, Traffic};
 use crate::global::Global;
 use crate::progress::Progress;
 use crate::signals::asked_to_end;
@@ -69,11 +72,15 @@ fn virtual_bus<R>(
     exit_on_signal();
     let (mut world, drives) = virtual_world(file)?;
     let network = Network::new();
-    world.add_station(network.clone());
     let progress = Progress::new(global.json);
-    let context = Context::new(global, network.clone(), Some(&drives), progress.clone());
+    let traffic = Traffic::default();
+    world.add_station(Tap::new(network.clone(), traffic.clone()));
+    let context = Context::new(global, network.clone(), Some(&drives), progress.clone(), traffic.clone());
     let whole = async {
         embedded::wait_until_booted(&network, &drives).await?;
+        if global.verbose {
+            traffic.show(decoder(global, &drives), Stamps::default(), progress.clone());
+        }
         command(&context).await
     };
     let ended = sim::block_on_for(&mut world, VIRTUAL_LIMIT, whole);
@@ -87,7 +94,11 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     let network = Network::new();
     let progress = Progress::new(global.json);
     progress.spin();
-    let context = Context::new(global, network.clone(), None, progress.clone());
+    let traffic = Traffic::since(clock.unix_zero());
+    if global.verbose {
+        traffic.show(decoder(global, &[]), Stamps::default(), progress.clone());
+    }
+    let context = Context::new(global, network.clone(), None, progress.clone(), traffic.clone());
     if let Some(unused) = global.machine.as_ref().and_then(Machine::unused_by_a_master) {
         context.tell(&format!("of the machine file a command on a real bus does not use: {unused}"));
     }
@@ -100,7 +111,7 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
             signal = asked_to_end() => Err(stop_what_moves(&context, Failure::ended_by(signal)).await),
         }
     };
-    let mut station = network.clone();
+    let mut station = Tap::new(network.clone(), traffic);
     let mut notes = BusNotes::of(&global.bus);
     let tell = |_, note: &Note| notes.news(note).iter().for_each(|text| context.tell(text));
     let ended = run_station(&mut bus, &mut station, &clock, &Notify::new(), until, tell).await;

@@ -227,3 +227,83 @@ fn an_object_that_all_models_name_alike_is_named_without_its_unit_whatever_its_l
         ]
     );
 }
+
+/// Frames laid out by CiA 301, 7.2.4.3.9 to 7.2.4.3.16: "123456789", whose checksum 31C3h the standard gives, in two segments.
+#[test]
+fn block_transfers_are_put_together_and_attributed_to_their_object() {
+    let download = [
+        "604#C608100009000000", // initiate, with checksum and size
+        "584#A40810007F000000",
+        "604#0131323334353637",
+        "604#823839FFFFFFFFFF", // the last of all: five bytes mean nothing
+        "584#A2027F0000000000",
+        "604#D5C3310000000000", // end: n = 5
+        "584#A100000000000000",
+        "604#4008100000000000", // the next request is no part of it
+    ];
+    assert_eq!(
+        lines(&mut Decoder::new(), &download),
+        [
+            "SDO node 4: block transfer of 1008h:00 manufacturer_device_name, 9 bytes",
+            "SDO node 4: agreed: block transfer of 1008h:00 manufacturer_device_name",
+            "SDO node 4: block segment 1 of 1008h:00 manufacturer_device_name, 7 bytes so far",
+            "SDO node 4: block segment 2 of 1008h:00 manufacturer_device_name, 14 bytes so far",
+            "SDO node 4: confirmed up to block segment 2 of 1008h:00 manufacturer_device_name",
+            "SDO node 4: write 1008h:00 manufacturer_device_name = \"123456789\"",
+            "SDO node 4: done: write 1008h:00 manufacturer_device_name",
+            "SDO node 4: read 1008h:00 manufacturer_device_name",
+        ]
+    );
+    let upload = [
+        "604#A408100014000000",
+        "584#C608100009000000",
+        "604#A300000000000000",
+        "584#0131323334353637",
+        "584#823839FFFFFFFFFF",
+        "604#A201140000000000", // the second segment was lost,
+        "584#813839FFFFFFFFFF", // and comes again as the first of the next block
+        "604#A201140000000000",
+        "584#D5C3310000000000",
+        "604#A100000000000000",
+    ];
+    let shown = lines(&mut Decoder::new(), &upload);
+    assert_eq!(shown[8], "SDO node 4: 1008h:00 manufacturer_device_name = \"123456789\"");
+    assert_eq!(shown[6], "SDO node 4: block segment 1 of 1008h:00 manufacturer_device_name, 14 bytes so far");
+}
+
+#[test]
+fn a_block_transfer_that_goes_wrong_is_told_and_forgotten() {
+    let corrupt = ["604#C608100009000000", "584#A40810007F000000", "604#0131323334353637", "604#823838FFFFFFFFFF"];
+    let mut decoder = Decoder::new();
+    lines(&mut decoder, &corrupt);
+    let shown = lines(&mut decoder, &["584#A2027F0000000000", "604#D5C3310000000000", "584#8008100004000405"]);
+    assert!(shown[1].contains("and 31C3h was said"), "{}", shown[1]);
+    assert!(shown[2].contains("the drive aborts 1008h:00 manufacturer_device_name"), "{}", shown[2]);
+    // Segments without a beginning, an abort in the middle, a client that begins anew.
+    let shown = lines(&mut decoder, &["604#0131323334353637", "584#A2027F0000000000"]);
+    assert!(shown.iter().all(|line| line.contains("not seen")), "{shown:?}");
+    lines(&mut decoder, &corrupt[..3]);
+    let shown = lines(&mut decoder, &["604#8008100000000008", "604#4000100000000000"]);
+    assert!(shown[0].contains("the master aborts") && shown[1].ends_with("read 1000h:00 device_type"), "{shown:?}");
+    lines(&mut decoder, &corrupt[..3]);
+    assert!(lines(&mut decoder, &["604#4000100000000000"])[0].ends_with("read 1000h:00 device_type"));
+}
+
+#[test]
+fn frames_tell_their_service_their_node_and_their_objects() {
+    let mut decoder = Decoder::new();
+    let mut about = |text: &str| {
+        let decoded = decoder.decode(&text.parse::<Frame>().unwrap());
+        let objects: Vec<_> = decoded.objects().map(|object| object.to_string()).collect();
+        (decoded.service().word(), decoded.node().map(NodeId::raw), objects.join(" "))
+    };
+    assert_eq!(about("604#2111200109000000"), ("sdo", Some(4), "2011h:01".into()));
+    assert_eq!(about("604#0031323334353637"), ("sdo", Some(4), "2011h:01".into()));
+    assert_eq!(about("704#00"), ("heartbeat", Some(4), String::new()));
+    assert_eq!(about("000#8000"), ("nmt", None, String::new()));
+    assert_eq!(about("184#R4"), ("pdo", Some(4), String::new()));
+    assert_eq!(about("7E5#0400000000000000"), ("lss", None, String::new()));
+    assert_eq!(about("6FF#01"), ("other", None, String::new()));
+    let all = decoder.decode(&"000#8000".parse().unwrap());
+    assert!(all.concerns(NodeId::new(9).unwrap()));
+}

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use can::{Frame, Instant};
+use canopen::NodeId;
 use master::decode::Decoder;
 use serde::Serialize;
 use sim::wire::WireEvent;
@@ -13,13 +14,16 @@ use transport::log::LogWriter;
 use transport::{AnyBus, AsyncBus, BusError, BusSpec, Note, Received, TornRecord, WallClock};
 
 use crate::failure::Failure;
+use crate::frames::counts::Counts;
+use crate::frames::decoder;
+use crate::frames::filter::Filter;
+use crate::frames::stamp::{Stamps, TimeForm};
 use crate::global::Global;
 use crate::output::{Format, Report};
 use crate::paint::Paint;
 use crate::session::{bus_failure, exit_on_signal, runtime, virtual_world};
 use crate::signals::asked_to_end;
 use testbench::machine_file::Machine;
-use testbench::models::with_told;
 
 /// Show the bus decoded: SDO with object names and values, PDOs by their mapping, statuswords in words
 ///
@@ -28,14 +32,21 @@ use testbench::models::with_told;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus socketcand://HOST:29536/can0 --model 4=zlac8030l dump\n  \
     ferrodrive --bus slcan:///dev/ttyACM0?bitrate=500k dump --log trace.log\n  \
-    ferrodrive --bus log:trace.log --model 4=zlac8030l dump")]
+    ferrodrive --bus log:trace.log --model 4=zlac8030l dump\n  \
+    ferrodrive --bus slcan://HOST:3000 dump --node 4 --service sdo,emcy --time delta\n  \
+    ferrodrive --bus slcan://HOST:3000 dump --object 6041,target_velocity --time absolute")]
 pub(crate) struct Dump {
-    /// Also write the frames to this file, in candump format
+    /// Also write the frames to this file, in candump format, those too that are not shown
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
     /// End after this time (default on an embedded virtual bus: 2s)
     #[arg(long = "for", value_name = "TIME", value_parser = master::units::parse_duration)]
     duration: Option<Duration>,
+    /// The time before each line (`t` of --json stays as it is)
+    #[arg(long, value_name = "FORM", value_enum, default_value_t)]
+    time: TimeForm,
+    #[command(flatten)]
+    filter: Filter,
 }
 
 /// Shown of an embedded bus, on which nothing happens after the drives have booted.
@@ -47,11 +58,17 @@ struct Line {
     t: f64,
     frame: String,
     text: String,
+    service: &'static str,
+    node: Option<u8>,
+    /// The objects that it carries, or is part of a transfer of.
+    objects: Vec<String>,
+    #[serde(skip)]
+    stamp: String,
 }
 
 impl Report for Line {
     fn text(&self, paint: Paint) -> String {
-        format!("{} {:<20}  {}", paint.dim(&format!("({:.6})", self.t)), self.frame, self.text)
+        format!("{} {:<20}  {}", paint.dim(&self.stamp), self.frame, self.text)
     }
 }
 
@@ -62,11 +79,13 @@ struct Noted {
     /// Its kind.
     note: &'static str,
     text: String,
+    #[serde(skip)]
+    stamp: String,
 }
 
 impl Report for Noted {
     fn text(&self, paint: Paint) -> String {
-        format!("{} {:<20}  {}", paint.dim(&format!("({:.6})", self.t)), "-", paint.bad(&self.text))
+        format!("{} {:<20}  {}", paint.dim(&self.stamp), "-", paint.bad(&self.text))
     }
 }
 
@@ -93,11 +112,14 @@ const SKIPPED_SHOWN: u64 = 20;
 /// Where decoded lines and logged frames go.
 struct Sink {
     decoder: Decoder,
+    filter: Filter,
+    stamps: Stamps,
+    counts: Counts,
     format: Format,
     log: Option<LogWriter<BufWriter<File>>>,
     path: Option<PathBuf>,
-    /// Frames shown, and lines of a log that were none.
-    summary: Summary,
+    /// Lines of a log that were no frames.
+    lines_skipped: u64,
     /// Unix time of the time axis's zero, for the log; a recorded bus has Unix times already.
     unix_zero: Duration,
 }
@@ -105,7 +127,7 @@ struct Sink {
 impl Dump {
     /// Shows frames until there are no more, the time is over, or Ctrl-C.
     pub(crate) fn run(&self, global: &Global, format: Format) -> Result<(), Failure> {
-        let mut sink = Sink::new(global, format, self.log.as_deref())?;
+        let mut sink = Sink::new(self, global, format)?;
         match &global.bus {
             BusSpec::Sim { file } => self.embedded(file.as_deref(), &mut sink)?,
             _ => runtime()?.block_on(self.listen(global, &mut sink))?,
@@ -136,6 +158,7 @@ impl Dump {
         let mut bus = global.bus.open(&clock).await.map_err(|error| bus_failure(global, &error))?;
         if !matches!(global.bus, BusSpec::Log { .. }) {
             sink.unix_zero = clock.unix_zero();
+            sink.stamps = Stamps::new(self.time, sink.unix_zero);
         }
         let end = self.duration.map(|duration| clock.now() + duration);
         let over = async {
@@ -146,7 +169,12 @@ impl Dump {
         };
         tokio::select! {
             result = follow(&mut bus, sink) => result?.map_or(Ok(()), |error| Err(bus_failure(global, &error))),
-            result = over => sink.flush().and(result),
+            result = over => {
+                if result.is_err() {
+                    sink.tell_counts();
+                }
+                sink.flush().and(result)
+            }
         }
     }
 }
@@ -165,38 +193,61 @@ async fn follow(bus: &mut AnyBus, sink: &mut Sink) -> Result<Option<BusError>, F
 }
 
 impl Sink {
-    fn new(global: &Global, format: Format, path: Option<&Path>) -> Result<Self, Failure> {
-        let mut decoder = Decoder::knowing(with_told(global.models.iter().map(|(_, model)| *model)));
-        let of_machine = global.machine.iter().flat_map(Machine::models);
-        for (node, model) in of_machine.chain(global.models.iter().copied()) {
-            decoder.set_model(node, model);
-        }
+    fn new(dump: &Dump, global: &Global, format: Format) -> Result<Self, Failure> {
+        let path = dump.log.as_deref();
+        let told = global
+            .models
+            .iter()
+            .map(|(_, model)| *model)
+            .chain(global.machine.iter().flat_map(Machine::models).map(|(_, model)| model));
+        dump.filter.check(&devices::all().iter().chain(told).collect::<Vec<_>>())?;
         let log = path.map(File::create).transpose().map_err(|error| log_failure(path, &error))?;
-        let log = log.map(|file| LogWriter::new(BufWriter::new(file), "can0"));
-        let summary = Summary { frames: 0, lines_skipped: 0 };
-        Ok(Self { decoder, format, log, path: path.map(Into::into), summary, unix_zero: Duration::ZERO })
+        Ok(Self {
+            decoder: decoder(global, &[]),
+            filter: dump.filter.clone(),
+            stamps: Stamps::new(dump.time, Duration::ZERO),
+            counts: Counts::default(),
+            format,
+            log: log.map(|file| LogWriter::new(BufWriter::new(file), "can0")),
+            path: path.map(Into::into),
+            lines_skipped: 0,
+            unix_zero: Duration::ZERO,
+        })
     }
 
     fn take(&mut self, at: Instant, frame: &Frame) -> Result<(), Failure> {
         if let Some(log) = &mut self.log {
             log.write(at + self.unix_zero, frame).map_err(|error| log_failure(self.path.as_deref(), &error))?;
         }
-        self.summary.frames += 1;
-        let text = self.decoder.decode(frame).to_string();
-        let line = Line { t: at.as_secs_f64(), frame: frame.to_string(), text };
+        let decoded = self.decoder.decode(frame);
+        let wanted = self.filter.takes(&self.decoder, &decoded);
+        self.counts.note(at, &decoded, wanted);
+        if !wanted {
+            return Ok(());
+        }
+        let line = Line {
+            t: at.as_secs_f64(),
+            frame: frame.to_string(),
+            text: decoded.to_string(),
+            service: decoded.service().word(),
+            node: decoded.node().map(NodeId::raw),
+            objects: decoded.objects().map(|object| object.to_string()).collect(),
+            stamp: self.stamps.text(at),
+        };
         self.format.print(&line).map_err(|error| not_printed(&error))
     }
 
     /// Tells among the frames what the bus says beside them.
     fn note(&mut self, at: Instant, note: &Note) -> Result<(), Failure> {
-        let line = Noted { t: at.as_secs_f64(), note: note.kind(), text: note.to_string() };
+        let stamp = self.stamps.text(at);
+        let line = Noted { t: at.as_secs_f64(), note: note.kind(), text: note.to_string(), stamp };
         self.format.print(&line).map_err(|error| not_printed(&error))
     }
 
     /// Tells of a line that is passed over: among the frames to programs, beside them to people.
     fn skip(&mut self, torn: TornRecord) -> Result<(), Failure> {
-        self.summary.lines_skipped += 1;
-        if self.summary.lines_skipped > SKIPPED_SHOWN {
+        self.lines_skipped += 1;
+        if self.lines_skipped > SKIPPED_SHOWN {
             return Ok(());
         }
         if self.format.json {
@@ -210,7 +261,8 @@ impl Sink {
 
     /// Tells how many lines were passed over, if any were. A log without a single frame is none.
     fn summarise(&self) -> Result<(), Failure> {
-        let Summary { frames, lines_skipped } = self.summary;
+        let (frames, lines_skipped) = (self.counts.frames(), self.lines_skipped);
+        self.tell_counts();
         if lines_skipped == 0 {
             return Ok(());
         }
@@ -220,10 +272,19 @@ impl Sink {
                 .next("candump -L can0 writes one"));
         }
         if self.format.json {
-            return self.format.print_json(&self.summary).map_err(|error| not_printed(&error));
+            let summary = Summary { frames, lines_skipped };
+            return self.format.print_json(&summary).map_err(|error| not_printed(&error));
         }
-        let _ = writeln!(io::stderr(), "warning: {lines_skipped} lines were passed over; {frames} frames shown");
+        let _ = writeln!(io::stderr(), "warning: {lines_skipped} lines were passed over; {frames} frames read");
         Ok(())
+    }
+
+    /// How many frames of what there were, for people. Programs count the lines.
+    fn tell_counts(&self) {
+        if !self.format.json {
+            // Nobody may be listening any more.
+            let _ = writeln!(io::stderr(), "{}", self.counts);
+        }
     }
 
     fn flush(&mut self) -> Result<(), Failure> {

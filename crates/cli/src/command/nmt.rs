@@ -2,8 +2,11 @@
 
 use std::time::Duration;
 
-use canopen::NmtCommand;
+use can::Instant;
+use canopen::{Mux, NmtCommand, NmtState};
 use clap::ValueEnum;
+use master::units::parse_duration;
+use master::{Elapsed, Node, NodeView};
 use serde::Serialize;
 
 use crate::context::Context;
@@ -15,13 +18,19 @@ use testbench::words::node::{Nodes, nodes};
 /// Send a network management command to one node or to all
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus socketcand://HOST:29536/can0 nmt 4 start\n  \
-    ferrodrive --bus slcan:///dev/ttyACM0 nmt all pre-operational")]
+    ferrodrive --bus slcan:///dev/ttyACM0 nmt all pre-operational\n  ferrodrive nmt 4 start --wait\n  \
+    ferrodrive --bus slcan:///dev/ttyACM0 nmt all reset --wait 3s")]
 pub(crate) struct Nmt {
     /// Node-ID, or all
     #[arg(value_name = "NODE|all", value_parser = nodes)]
     nodes: Nodes,
     /// What to do
     command: NmtWord,
+    /// Wait until the node says that it has done so: by its heartbeat, after a reset by its boot-up message
+    ///
+    /// For all nodes this lists what each of them says within the time.
+    #[arg(long, value_name = "TIME", value_parser = parse_duration, num_args = 0..=1, default_missing_value = "5s")]
+    wait: Option<Duration>,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -48,28 +57,137 @@ pub(crate) struct NmtReport {
     command: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     booted: Option<bool>,
+    /// The state that it has said, where that was waited for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    state: Option<String>,
+    /// What each node has said, where all were told and waited for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    nodes: Option<Vec<Said>>,
 }
+
+/// What a node has said.
+#[derive(Debug, Serialize)]
+struct Said {
+    node: u8,
+    state: String,
+    /// Its boot-up message has come.
+    booted: bool,
+}
+
+/// How often a node sends a heartbeat, in ms. Source: CiA 301, 7.5.2.20.
+const PRODUCER_HEARTBEAT_TIME: Mux = Mux::new(0x1017, 0);
 
 impl Nmt {
     /// Sends the command; after a reset of one node waits for its boot-up message.
     pub(crate) async fn run(&self, context: &Context) -> Result<NmtReport, Failure> {
         let (command, name) = self.command.meaning();
+        let done = NmtReport { node: None, command: name, booted: None, state: None, nodes: None };
         let Nodes::One(node) = self.nodes else {
             context.network.nmt_all(command);
-            context.settle().await;
-            return Ok(NmtReport { node: None, command: name, booted: None });
+            let nodes = match self.wait {
+                Some(patience) => Some(said_by_all(context, patience).await),
+                None => {
+                    context.settle().await;
+                    None
+                }
+            };
+            return Ok(NmtReport { nodes, ..done });
         };
         let handle = context.node(node);
         let resets = matches!(command, NmtCommand::ResetNode | NmtCommand::ResetCommunication);
-        let booted = handle.wait_boot_up(BOOT_PATIENCE);
+        let booted = handle.wait_boot_up(self.wait.unwrap_or(BOOT_PATIENCE));
+        let before = context.network.now();
         handle.nmt(command);
+        let mut state = None;
         if resets {
             booted.await?;
+        } else if let Some(patience) = self.wait {
+            state = Some(self.reached(context, &handle, before, patience).await?.to_string());
         } else {
             context.settle().await;
         }
-        Ok(NmtReport { node: Some(node.raw()), command: name, booted: resets.then_some(true) })
+        Ok(NmtReport { node: Some(node.raw()), booted: resets.then_some(true), state, ..done })
     }
+
+    /// Waits until a node's heartbeat tells the state that the command leads to.
+    async fn reached(
+        &self,
+        context: &Context,
+        handle: &Node,
+        before: Instant,
+        patience: Duration,
+    ) -> Result<NmtState, Failure> {
+        let wanted = match self.command {
+            NmtWord::Start => NmtState::Operational,
+            NmtWord::Stop => NmtState::Stopped,
+            _ => NmtState::PreOperational,
+        };
+        let id = handle.id();
+        let model = context.told_model(id);
+        // A heartbeat that was on its way when the command went out tells of the time before it.
+        let said = |node: &NodeView<'_>| {
+            let heard = node.facts.heartbeat_at.filter(|at| *at > before)?;
+            let told = node.facts.nmt_state?;
+            let state = model.map_or(told, |model| model.nmt_state(told));
+            Some((heard, state)).filter(|(_, state)| *state == wanted)
+        };
+        context.progress.show(format!("node {id}: until it says that it is {wanted}"));
+        match handle.wait(said, patience).await {
+            Ok((_, state)) => Ok(state),
+            Err(Elapsed) => Err(self.not_reached(context, handle, wanted, before, patience).await),
+        }
+    }
+
+    async fn not_reached(
+        &self,
+        context: &Context,
+        handle: &Node,
+        wanted: NmtState,
+        before: Instant,
+        patience: Duration,
+    ) -> Failure {
+        let id = handle.id();
+        let failure =
+            Failure::new(format!("node {id} has not said within {} s that it is {wanted}", patience.as_secs_f64()))
+                .of_kind("not_reached")
+                .at_node(id);
+        let facts = handle.facts();
+        let said = facts.nmt_state.filter(|_| facts.heartbeat_at.is_some_and(|at| at > before));
+        if let Some(state) = said {
+            return failure
+                .because(format!("its heartbeat says that it is {state}"))
+                .next(format!("ferrodrive state {id}"));
+        }
+        // Who is stopped answers no SDO.
+        let period = handle.upload(PRODUCER_HEARTBEAT_TIME).await.map(|value| value.raw() & 0xFFFF);
+        match period {
+            Ok(0) => failure
+                .because("it sends no heartbeat (1017h is 0), so that its state cannot be seen")
+                .next(format!("ferrodrive write {id} 1017 100, then once more; or leave --wait away")),
+            Ok(ms) => failure
+                .because(format!("no heartbeat came, though 1017h says {ms} ms"))
+                .next(format!("ferrodrive --bus {} dump --node {id}, or a longer --wait", context.bus())),
+            Err(error) => failure
+                .because(format!("no heartbeat came, and {error}"))
+                .next("ferrodrive scan shows who is on the bus"),
+        }
+    }
+}
+
+/// What every node says within a time.
+async fn said_by_all(context: &Context, patience: Duration) -> Vec<Said> {
+    let before = context.network.now();
+    context.progress.show("listening to what the nodes say");
+    context.network.sleep(patience).await;
+    let said = context.network.seen().iter().filter_map(|node| {
+        let facts = context.network.facts(node);
+        facts.heartbeat_at.filter(|at| *at >= before)?;
+        // The state of an alarm heartbeat is its model's to read.
+        let state = facts.probable_state(context.told_model(node))?;
+        let booted = facts.boot_up.is_some_and(|(at, _)| at >= before);
+        Some(Said { node: node.raw(), state: state.to_string(), booted })
+    });
+    said.collect()
 }
 
 impl NmtWord {
@@ -88,6 +206,15 @@ impl Report for NmtReport {
     fn text(&self, _: Paint) -> String {
         let whom = self.node.map_or_else(|| "all nodes".into(), |node| format!("node {node}"));
         let booted = if self.booted == Some(true) { "; it has booted" } else { "" };
-        format!("{whom}: {} sent{booted}", self.command)
+        let state = self.state.as_ref().map(|state| format!("; it is {state}")).unwrap_or_default();
+        let mut text = format!("{whom}: {} sent{booted}{state}", self.command);
+        for Said { node, state, booted } in self.nodes.iter().flatten() {
+            let booted = if *booted { "has booted, " } else { "" };
+            text.push_str(&format!("\n  node {node}: {booted}{state}"));
+        }
+        if self.nodes.as_ref().is_some_and(Vec::is_empty) {
+            text.push_str("\n  no node has said anything since");
+        }
+        text
     }
 }

@@ -1,8 +1,12 @@
-//! `ferrodrive read` and `ferrodrive write`: one object of a node by SDO (CiA 301, clause 7.2.4).
+//! `ferrodrive write`: an object of a node by SDO download (CiA 301, clause 7.2.4), and objects as they are shown.
+
+use std::fs::File;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
 
 use canopen::od::Entry;
 use canopen::{AbortCode, Mux, NodeId};
-use master::decode::{common_name, common_row, common_type};
+use master::decode::{common_name, common_type};
 use master::drive::Limits;
 use master::{Drive, Error};
 use serde::Serialize;
@@ -14,27 +18,14 @@ use crate::output::Report;
 use crate::paint::Paint;
 use testbench::words::node::node;
 use testbench::words::object::{ObjectArg, object};
-use testbench::words::value::{typed_value, value};
-
-/// Read an object of a node, decoded with unit and meaning
-#[derive(Debug, clap::Args)]
-#[command(
-    after_help = "Objects are hexadecimal indices or names:\n  6064, 0x6064, 6064h, 2026:01, position_actual_value"
-)]
-pub(crate) struct Read {
-    /// Node-ID
-    #[arg(value_parser = node)]
-    node: NodeId,
-    /// Index, index:sub-index or name
-    #[arg(value_parser = object)]
-    object: ObjectArg,
-}
+use testbench::words::value::{Typed, typed_alone, typed_for};
 
 /// Write an object of a node
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Values are decimal, 0x.., have a unit where the object has one, or are one of its words:\n  \
     ferrodrive write 4 60FF 60rpm\n  ferrodrive write 4 6060 'profile velocity'\n  ferrodrive write 4 6040 0x0F\n\
-    An object that is in no known table takes its type with the value: u16:15")]
+    ferrodrive write 5 1008 'left wheel'\n  ferrodrive write 5 1F50:01 --from firmware.bin\n\
+    An object that is in no known table takes its type with the value: u16:15, i32:-100, text:'left wheel', hex:01AAFF")]
 pub(crate) struct Write {
     /// Node-ID
     #[arg(value_parser = node)]
@@ -43,8 +34,11 @@ pub(crate) struct Write {
     #[arg(value_parser = object)]
     object: ObjectArg,
     /// The value
-    #[arg(allow_hyphen_values = true)]
-    value: String,
+    #[arg(allow_hyphen_values = true, required_unless_present = "from")]
+    value: Option<String>,
+    /// Write the bytes of this file, as they are
+    #[arg(long, value_name = "FILE", conflicts_with = "value")]
+    from: Option<PathBuf>,
 }
 
 /// An object and its value.
@@ -61,56 +55,76 @@ pub(crate) struct ObjectReport {
     /// What to know about what was written.
     #[serde(skip_serializing_if = "Option::is_none")]
     note: Option<String>,
+    /// The file that the bytes went into or came from.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) file: Option<String>,
+    /// Why it was not read, where several objects were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) refused: Option<String>,
     #[serde(skip)]
     written: bool,
-}
-
-impl Read {
-    /// Reads and decodes.
-    pub(crate) async fn run(&self, context: &Context) -> Result<ObjectReport, Failure> {
-        // A number is asked for before the model, so that an absent node is blamed for the object that was wanted.
-        let early = match self.object {
-            ObjectArg::Mux(mux) => Some(context.node(self.node).upload(mux).await?),
-            ObjectArg::Name(_) => None,
-        };
-        let drive = context.drive(self.node).await?;
-        let (mux, row) = resolve(&drive, &self.object)?;
-        let payload = match early {
-            Some(payload) => payload,
-            None => drive.node().upload(mux).await?,
-        };
-        let row = if drive.description().is_some() { row } else { common_row(mux) };
-        let limits = moving_limits(&drive, row).await?;
-        Ok(ObjectReport::new(&drive, mux, row, payload.as_bytes(), limits.as_ref(), false))
-    }
 }
 
 impl Write {
     /// Reads what was typed, and writes it.
     pub(crate) async fn run(&self, context: &Context) -> Result<ObjectReport, Failure> {
+        let content = self.from.as_deref().map(content).transpose()?;
         let drive = context.drive_untold(self.node).await?;
         let (mux, row) = resolve(&drive, &self.object)?;
         let limits = moving_limits(&drive, row).await?;
         let wrong = |reason| Failure::usage(reason).at_node(self.node).at_object(mux);
-        let (data_type, number) = match row {
-            Some(row) => (row.data_type, value(row, &self.value, counts_per_unit(limits.as_ref())).map_err(wrong)?),
-            None => typed_value(&self.value).map_err(wrong)?,
+        let typed = self.value.as_deref().unwrap_or_default();
+        let value = match (content, row) {
+            (Some(bytes), _) => Typed::Bytes(bytes),
+            (None, Some(row)) => typed_for(row, typed, counts_per_unit(limits.as_ref())).map_err(wrong)?,
+            (None, None) => typed_alone(typed).map_err(wrong)?,
         };
-        drive.check_write(mux, number)?;
+        // Bytes may be a number that means something else on another model.
+        drive.check_write(mux, value.number().unwrap_or_else(|| low_bytes(&value.bytes())))?;
         context.tell_guess(&drive);
-        let bytes = data_type.raw(number).to_le_bytes();
-        let bytes = &bytes[..data_type.size()];
-        if let Err(error) = drive.node().download(mux, bytes).await {
-            return Err(with_limits(&drive, error, number).await);
+        let bytes = value.bytes();
+        if bytes.len() > LONG {
+            context.progress.show(format!("node {}: writing {} bytes to {mux}", self.node, bytes.len()));
         }
-        let mut report = ObjectReport::new(&drive, mux, row, bytes, limits.as_ref(), true);
-        report.note = note(&drive, mux, number, limits.as_ref());
+        if let Err(error) = drive.node().download(mux, &bytes).await {
+            return Err(with_limits(&drive, error, value.number()).await);
+        }
+        let mut report = ObjectReport::new(&drive, mux, row, &bytes, limits.as_ref(), true);
+        report.note = note(&drive, mux, value.number(), limits.as_ref());
+        report.file = self.from.as_ref().map(|path| path.display().to_string());
         Ok(report)
     }
 }
 
+/// Longest content of a file that is written: what the master reads at most.
+const MOST: u64 = 1 << 20;
+
+/// What takes long enough to say that it goes on.
+const LONG: usize = 1024;
+
+fn content(path: &Path) -> Result<Vec<u8>, Failure> {
+    let unreadable = |error| Failure::new(format!("cannot read {}", path.display())).because(error);
+    let file = File::open(path).map_err(unreadable)?;
+    let mut bytes = Vec::new();
+    file.take(MOST + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.len() as u64 > MOST {
+        return Err(Failure::new(format!("{} is longer than {MOST} bytes", path.display()))
+            .because("an object of more than a megabyte is not written")
+            .next("look whether this is the right file"));
+    }
+    if bytes.is_empty() {
+        return Err(Failure::new(format!("{} is empty", path.display())).next("look whether this is the right file"));
+    }
+    Ok(bytes)
+}
+
+/// The low bytes as an unsigned number.
+fn low_bytes(bytes: &[u8]) -> i64 {
+    bytes.iter().take(4).rev().fold(0, |number, byte| number << 8 | i64::from(*byte))
+}
+
 /// What the object takes now, where other objects have a say in it.
-async fn moving_limits(drive: &Drive, row: Option<&Entry>) -> Result<Option<Limits>, Failure> {
+pub(super) async fn moving_limits(drive: &Drive, row: Option<&Entry>) -> Result<Option<Limits>, Failure> {
     match row.filter(|row| drive.description().is_some() && (row.resolution.is_some() || row.held_to.is_some())) {
         Some(row) => Ok(Some(drive.limits(row.mux()).await?)),
         None => Ok(None),
@@ -122,26 +136,27 @@ fn counts_per_unit(limits: Option<&Limits>) -> i64 {
 }
 
 /// What to know about a value that the drive has taken.
-fn note(drive: &Drive, mux: Mux, number: i64, limits: Option<&Limits>) -> Option<String> {
+fn note(drive: &Drive, mux: Mux, number: Option<i64>, limits: Option<&Limits>) -> Option<String> {
     let storage = drive.description().map(|profile| profile.storage);
     if storage.is_some_and(|storage| storage.effective_after_restart.contains(&mux)) {
         let node = drive.node().id();
         return Some(format!("it takes effect at the next restart, if it is stored by then: ferrodrive save {node}"));
     }
-    let (limits, setting) = limits.and_then(|limits| Some((limits, limits.holding_back(number)?)))?;
+    let (limits, setting) = limits.and_then(|limits| Some((limits, limits.holding_back(number?)?)))?;
     let most = limits.held_to.map_or(0, |(most, _)| most);
     Some(format!("the drive holds it to {most}, by {setting}"))
 }
 
 /// A refusal of a value, with what the object takes now and where that comes from.
-async fn with_limits(drive: &Drive, error: Error, number: i64) -> Failure {
+async fn with_limits(drive: &Drive, error: Error, number: Option<i64>) -> Failure {
     let by_value = [AbortCode::INVALID_VALUE, AbortCode::VALUE_TOO_HIGH, AbortCode::VALUE_TOO_LOW];
     let refused = error.object().filter(|_| error.abort().is_some_and(|code| by_value.contains(&code)));
     let failure = Failure::from(error);
     let Some(mux) = refused else { return failure };
     let Ok(limits) = drive.limits(mux).await else { return failure };
     let failure = failure.next(format!("{mux} {} takes {limits}", limits.name));
-    match limits.resolution.filter(|setting| limits.take(number) && setting.since_restart) {
+    match limits.resolution.filter(|setting| number.is_some_and(|number| limits.take(number)) && setting.since_restart)
+    {
         Some(setting) => failure.next(format!(
             "{} has been written since the drive's last restart: until the next one its value before counts",
             setting.object
@@ -151,13 +166,18 @@ async fn with_limits(drive: &Drive, error: Error, number: i64) -> Failure {
 }
 
 /// The multiplexor, and the row if the node's model is known and has it.
-fn resolve(drive: &Drive, object: &ObjectArg) -> Result<(Mux, Option<&'static Entry>), Failure> {
+pub(super) fn resolve(drive: &Drive, object: &ObjectArg) -> Result<(Mux, Option<&'static Entry>), Failure> {
     let found = object.resolve(drive.description().map(|model| model.dictionary));
     found.map_err(|reason| Failure::usage(reason).at_node(drive.node().id()))
 }
 
 impl ObjectReport {
-    fn new(
+    /// The object's number.
+    pub(super) const fn number(&self) -> Option<i64> {
+        self.value.value
+    }
+
+    pub(super) fn new(
         drive: &Drive,
         mux: Mux,
         row: Option<&'static Entry>,
@@ -175,6 +195,8 @@ impl ObjectReport {
             guess: guessed(drive),
             value: value.at_resolution(counts_per_unit(limits)),
             note: None,
+            file: None,
+            refused: None,
             written,
         }
     }
@@ -188,6 +210,13 @@ pub(super) fn guessed(drive: &Drive) -> Option<&'static str> {
 impl Report for ObjectReport {
     fn text(&self, paint: Paint) -> String {
         let name = self.name.map(|name| format!(" {name}")).unwrap_or_default();
+        if let Some(why) = &self.refused {
+            return format!("node {} {}{name}: refused: {why}", self.node, self.object);
+        }
+        if let Some(file) = &self.file {
+            let (bytes, to) = (self.value.length(), if self.written { "from" } else { "to" });
+            return format!("node {} {}{name}: {bytes} bytes {to} {file}", self.node, self.object);
+        }
         let verb = if self.written { " written:" } else { " =" };
         let note = self.note.as_ref().map(|note| format!("\n  note    {note}")).unwrap_or_default();
         format!("node {} {}{name}{verb} {}{note}", self.node, self.object, self.value.text(paint))

@@ -243,7 +243,7 @@ impl Drive {
         let number = PdoNumber::at(usize::from(self.axis_id().0)).unwrap_or(PdoNumber::FIRST);
         for (direction, map) in [(Direction::Rpdo, command), (Direction::Tpdo, state)] {
             let config = PdoConfig::new(PdoId { direction, number }, map).transmission(TransmissionType::EVERY_SYNC);
-            self.node().configure_pdo(&config, timer_units(description)).await?;
+            self.node().configure_pdo(&config, TimerUnits::of(description)).await?;
         }
         for config in self.adopt_pdos(description).await?.tpdos {
             let number = config.pdo.number;
@@ -257,7 +257,7 @@ impl Drive {
 
     /// Reads every PDO that the model has, and has this master send and receive them as they are set up.
     async fn adopt_pdos(&self, description: &Description) -> Result<Mapped, Error> {
-        let units = timer_units(description);
+        let units = TimerUnits::of(description);
         let mut mapped = Mapped { rpdos: Vec::new(), tpdos: Vec::new() };
         let parameters = description.dictionary.rows().iter().map(|row| row.mux()).filter(|mux| mux.sub_index == 1);
         for (pdo, is_mapping) in parameters.filter_map(|mux| PdoId::of_object(mux.index)) {
@@ -415,13 +415,6 @@ impl Drive {
         let signal = self.signal_near::<T>(near, quantity.object, form, per_count);
         // Mapped with another length it is something else.
         Ok(signal.filter(|signal| signal.field().bits as usize == data_type.size() * 8))
-    }
-}
-
-const fn timer_units(description: &Description) -> TimerUnits {
-    TimerUnits {
-        inhibit: Duration::from_nanos(description.pdo.inhibit_unit_ns),
-        event: Duration::from_nanos(description.pdo.event_timer_unit_ns),
     }
 }
 

@@ -4,10 +4,13 @@
 //! are reassembled; PDOs are split by the mapping that was given, comes from a model's object table, or was seen
 //! being written or read by SDO. The decoder never sends and keeps no time.
 
+mod block;
 mod common;
 mod node_models;
 mod pdo;
 mod sdo;
+mod step;
+mod subject;
 mod value;
 
 use core::fmt;
@@ -19,6 +22,7 @@ use canopen::heartbeat::Heartbeat;
 use canopen::nmt::{NmtRequest, NmtTarget};
 use canopen::pdo::{Direction, PdoId, PdoNumber};
 use canopen::sync::Sync;
+use canopen::time_stamp::TimeOfDay;
 use canopen::{Mux, NmtState, NodeId};
 use devices::Description;
 use devices::faults::FaultRow;
@@ -32,7 +36,9 @@ use sdo::Conversations;
 
 pub use common::{common_name, common_row, common_type};
 pub use pdo::Pdo;
-pub use sdo::{Sdo, SdoStep, Side};
+pub use sdo::Sdo;
+pub use step::{SdoStep, Side};
+pub use subject::ServiceKind;
 pub use value::{Value, statusword_words};
 
 /// What one frame says.
@@ -43,7 +49,7 @@ pub enum Decoded {
     /// SYNC.
     Sync(Sync),
     /// TIME stamp.
-    Time,
+    Time(TimeOfDay),
     /// Emergency message, and the fault of the node's model that it tells of.
     Emcy(NodeId, Emcy, Option<&'static FaultRow>),
     /// Boot-up message.
@@ -107,6 +113,14 @@ impl Decoder {
         }
     }
 
+    /// The name of an object of a node: by its model's table, else by what all models and the standards say.
+    pub fn name(&self, node: NodeId, mux: Mux) -> Option<&'static str> {
+        match self.models.get(node) {
+            Some(model) => model.0.row(mux).map(|row| row.name),
+            None => common_name(mux),
+        }
+    }
+
     /// Takes a PDO's identifier and mapping for granted.
     pub fn set_pdo(&mut self, node: NodeId, pdo: PdoId, id: u16, map: &PdoMap) {
         self.pdos.set(node, pdo, id, map);
@@ -131,7 +145,7 @@ impl Decoder {
         Some(match service {
             Service::Nmt => Decoded::Nmt(NmtRequest::parse(frame).ok()?),
             Service::Sync => Decoded::Sync(Sync::parse(frame)),
-            Service::Time => Decoded::Time,
+            Service::Time => Decoded::Time(TimeOfDay::parse(frame)?),
             Service::Emcy(node) => {
                 let emcy = Emcy::parse(frame)?;
                 let model = self.models.get(node);
@@ -184,7 +198,7 @@ impl fmt::Display for Decoded {
             }
             Self::Sync(Sync { counter: Some(counter) }) => write!(f, "SYNC {counter}"),
             Self::Sync(_) => f.write_str("SYNC"),
-            Self::Time => f.write_str("TIME"),
+            Self::Time(time) => write!(f, "TIME {time}"),
             Self::Emcy(node, emcy, fault) => {
                 match fault {
                     Some(fault) => write!(f, "EMCY node {node}: {:04X}h ({})", emcy.code.0, fault.name)?,

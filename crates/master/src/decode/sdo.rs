@@ -4,20 +4,10 @@ use std::collections::BTreeMap;
 use canopen::sdo::wire::{LENGTH, Payload, Reply, Request, Segment};
 use canopen::{AbortCode, Mux, NodeId};
 
+use super::block::{Block, BlockStep};
+use super::step::{MAX_OBJECT, SdoStep, Side};
 use super::value::{Value, write_name};
 use crate::identify::Model;
-
-/// Longest object that is put together; a longer one is shown without its value.
-const MAX_OBJECT: usize = 64 * 1024;
-
-/// Who sent an SDO frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
-    /// The master.
-    Client,
-    /// The device.
-    Server,
-}
 
 /// One frame of an SDO transfer.
 #[derive(Clone, Debug)]
@@ -31,42 +21,12 @@ pub struct Sdo {
     pub(super) model: Option<Model>,
 }
 
-/// What a frame does in an SDO transfer. Bytes are those of the whole object.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum SdoStep {
-    /// The client asks for an object.
-    Read(Mux),
-    /// The object's value has come, in this frame or with this last segment.
-    ReadDone(Mux, Vec<u8>),
-    /// The client writes an object, or has sent its last segment.
-    Write(Mux, Vec<u8>),
-    /// The device has taken the value.
-    WriteDone(Mux, Vec<u8>),
-    /// A segmented transfer begins; the size is the sender's word.
-    Begin(Mux, Option<u32>),
-    /// A segment within a transfer, or its confirmation; bytes known so far.
-    Segment(Mux, usize),
-    /// One side gave up.
-    Abort(Mux, AbortCode),
-    /// A frame that belongs to no transfer that was seen to begin.
-    Stray,
-    /// Block transfer, or a command specifier that the standard does not define.
-    Other(u8),
-}
-
-impl SdoStep {
-    /// A value that is known to be in the device now.
-    pub(super) fn learned(&self) -> Option<(Mux, &[u8])> {
-        match self {
-            Self::ReadDone(mux, bytes) | Self::WriteDone(mux, bytes) => Some((*mux, bytes)),
-            _ => None,
-        }
-    }
-}
-
 /// The transfers under way, one per node.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Conversations(BTreeMap<u8, Transfer>);
+pub(super) struct Conversations {
+    transfers: BTreeMap<u8, Transfer>,
+    blocks: BTreeMap<u8, Block>,
+}
 
 #[derive(Clone, Debug)]
 struct Transfer {
@@ -78,10 +38,33 @@ struct Transfer {
 
 impl Conversations {
     pub(super) fn step(&mut self, node: NodeId, from: Side, raw: &[u8; LENGTH]) -> SdoStep {
+        if let Some(step) = self.block(node.raw(), from, raw) {
+            return step;
+        }
         match from {
             Side::Client => self.request(node.raw(), Request::parse(raw)),
             Side::Server => self.reply(node.raw(), Reply::parse(raw)),
         }
+    }
+
+    /// What a frame does in a block transfer; `None` if it belongs to none.
+    fn block(&mut self, node: u8, from: Side, raw: &[u8; LENGTH]) -> Option<SdoStep> {
+        // First the transfer under way: the last segment of a block may look as the beginning of another transfer does.
+        match self.blocks.get_mut(&node).map(|block| block.step(from, raw)) {
+            Some(BlockStep::Goes(step)) => return Some(step),
+            Some(BlockStep::Over(step)) => {
+                self.blocks.remove(&node);
+                return Some(step);
+            }
+            // A device may answer a block upload with a plain one (CiA 301, 7.2.4.3.12), and a client may begin anew.
+            Some(BlockStep::NotPart) => drop(self.blocks.remove(&node)),
+            None => {}
+        }
+        let block = Block::begin(from, raw)?;
+        let step = SdoStep::BlockBegin(block.mux(), block.size());
+        self.transfers.remove(&node);
+        self.blocks.insert(node, block);
+        Some(step)
     }
 
     fn request(&mut self, node: u8, request: Request) -> SdoStep {
@@ -92,7 +75,7 @@ impl Conversations {
             }
             Request::InitiateDownload(mux, Payload::Expedited { length, bytes }) => {
                 let bytes = bytes[..usize::from(length.unwrap_or(4)).min(4)].to_vec();
-                self.0.insert(node, Transfer { mux, bytes: bytes.clone(), writes: true, complete: true });
+                self.transfers.insert(node, Transfer { mux, bytes: bytes.clone(), writes: true, complete: true });
                 SdoStep::Write(mux, bytes)
             }
             Request::InitiateDownload(mux, Payload::Segmented { size }) => {
@@ -100,7 +83,7 @@ impl Conversations {
                 SdoStep::Begin(mux, size)
             }
             Request::DownloadSegment(segment) => self.segment(node, true, &segment),
-            Request::UploadSegment { .. } => match self.0.get(&node).filter(|transfer| !transfer.writes) {
+            Request::UploadSegment { .. } => match self.transfers.get(&node).filter(|transfer| !transfer.writes) {
                 Some(transfer) => SdoStep::Segment(transfer.mux, transfer.bytes.len()),
                 None => SdoStep::Stray,
             },
@@ -112,7 +95,7 @@ impl Conversations {
     fn reply(&mut self, node: u8, reply: Reply) -> SdoStep {
         match reply {
             Reply::InitiateUpload(mux, Payload::Expedited { length, bytes }) => {
-                self.0.remove(&node);
+                self.transfers.remove(&node);
                 SdoStep::ReadDone(mux, bytes[..usize::from(length.unwrap_or(4)).min(4)].to_vec())
             }
             Reply::InitiateUpload(mux, Payload::Segmented { size }) => {
@@ -120,12 +103,12 @@ impl Conversations {
                 SdoStep::Begin(mux, size)
             }
             Reply::UploadSegment(segment) => self.segment(node, false, &segment),
-            Reply::InitiateDownload(mux) => match self.0.get(&node).filter(|transfer| transfer.writes) {
+            Reply::InitiateDownload(mux) => match self.transfers.get(&node).filter(|transfer| transfer.writes) {
                 Some(transfer) if transfer.complete && transfer.mux == mux => self.write_done(node),
                 Some(_) => SdoStep::Segment(mux, 0),
                 None => SdoStep::Stray,
             },
-            Reply::DownloadSegment { .. } => match self.0.get(&node).filter(|transfer| transfer.writes) {
+            Reply::DownloadSegment { .. } => match self.transfers.get(&node).filter(|transfer| transfer.writes) {
                 Some(transfer) if transfer.complete => self.write_done(node),
                 Some(transfer) => SdoStep::Segment(transfer.mux, transfer.bytes.len()),
                 None => SdoStep::Stray,
@@ -136,11 +119,11 @@ impl Conversations {
     }
 
     fn begin(&mut self, node: u8, mux: Mux, writes: bool) {
-        self.0.insert(node, Transfer { mux, bytes: Vec::new(), writes, complete: false });
+        self.transfers.insert(node, Transfer { mux, bytes: Vec::new(), writes, complete: false });
     }
 
     fn segment(&mut self, node: u8, writes: bool, segment: &Segment) -> SdoStep {
-        let Some(transfer) = self.0.get_mut(&node).filter(|transfer| transfer.writes == writes) else {
+        let Some(transfer) = self.transfers.get_mut(&node).filter(|transfer| transfer.writes == writes) else {
             return SdoStep::Stray;
         };
         if transfer.bytes.len() < MAX_OBJECT {
@@ -154,16 +137,16 @@ impl Conversations {
         if writes {
             return SdoStep::Write(mux, bytes);
         }
-        self.0.remove(&node);
+        self.transfers.remove(&node);
         SdoStep::ReadDone(mux, bytes)
     }
 
     fn write_done(&mut self, node: u8) -> SdoStep {
-        self.0.remove(&node).map_or(SdoStep::Stray, |transfer| SdoStep::WriteDone(transfer.mux, transfer.bytes))
+        self.transfers.remove(&node).map_or(SdoStep::Stray, |transfer| SdoStep::WriteDone(transfer.mux, transfer.bytes))
     }
 
     fn abort(&mut self, node: u8, mux: Mux, code: AbortCode) -> SdoStep {
-        self.0.remove(&node);
+        self.transfers.remove(&node);
         SdoStep::Abort(mux, code)
     }
 }
@@ -189,7 +172,34 @@ impl fmt::Display for Sdo {
                 named(f, *mux)?;
                 size.map_or(Ok(()), |size| write!(f, ", {size} bytes"))
             }
-            SdoStep::Segment(mux, so_far) => write!(f, "segment of {mux}, {so_far} bytes so far"),
+            SdoStep::Segment(mux, so_far) => {
+                f.write_str("segment of ")?;
+                named(f, *mux)?;
+                write!(f, ", {so_far} bytes so far")
+            }
+            SdoStep::BlockBegin(mux, size) => {
+                f.write_str("block transfer of ")?;
+                named(f, *mux)?;
+                size.map_or(Ok(()), |size| write!(f, ", {size} bytes"))
+            }
+            SdoStep::BlockSegment(mux, number, so_far) => {
+                write!(f, "block segment {number} of ")?;
+                named(f, *mux)?;
+                write!(f, ", {so_far} bytes so far")
+            }
+            SdoStep::BlockConfirmed(mux, number) => {
+                write!(f, "confirmed up to block segment {number} of ")?;
+                named(f, *mux)
+            }
+            SdoStep::BlockAgreed(mux) => {
+                f.write_str("agreed: block transfer of ")?;
+                named(f, *mux)
+            }
+            SdoStep::BadChecksum { mux, said, found } => {
+                f.write_str("block transfer of ")?;
+                named(f, *mux)?;
+                write!(f, ": its checksum is {found:04X}h, and {said:04X}h was said")
+            }
             SdoStep::Abort(mux, code) => {
                 let who = if self.from == Side::Server { "the drive" } else { "the master" };
                 write!(f, "{who} aborts ")?;
@@ -197,7 +207,10 @@ impl fmt::Display for Sdo {
                 write!(f, ": {code}")
             }
             SdoStep::Stray => f.write_str("part of a transfer whose beginning was not seen"),
-            SdoStep::Other(command) => write!(f, "command {command:02X}h (block transfer or undefined)"),
+            SdoStep::Other(command) => write!(
+                f,
+                "command {command:02X}h, which is not defined, or part of a block transfer whose beginning was not seen"
+            ),
         }
     }
 }

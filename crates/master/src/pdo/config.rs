@@ -1,6 +1,7 @@
 use std::time::Duration;
 
 use canopen::Mux;
+use devices::Description;
 
 use crate::core::PdoMap;
 use canopen::pdo::PdoId;
@@ -41,6 +42,14 @@ pub struct TimerUnits {
 impl TimerUnits {
     /// 100 µs and 1 ms. Source: CiA 301, 7.5.2.37.
     pub const STANDARD: Self = Self { inhibit: Duration::from_micros(100), event: Duration::from_millis(1) };
+
+    /// Those of a model.
+    pub const fn of(description: &Description) -> Self {
+        Self {
+            inhibit: Duration::from_nanos(description.pdo.inhibit_unit_ns),
+            event: Duration::from_nanos(description.pdo.event_timer_unit_ns),
+        }
+    }
 }
 
 /// How one PDO of a device is set up.

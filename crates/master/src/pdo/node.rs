@@ -32,6 +32,14 @@ impl Node {
         Ok(config)
     }
 
+    /// Reads how a PDO of the device is set up, with its COB-ID, and changes nothing.
+    ///
+    /// # Errors
+    /// Those of the SDO reads; [`Error::Aborted`] with the code of a missing object where the device has no such PDO.
+    pub async fn pdo_config(&self, pdo: PdoId, units: TimerUnits) -> Result<(PdoConfig, CobId), Error> {
+        read(self, pdo, units).await
+    }
+
     /// Switches a PDO of the device off (bit 31 of its COB-ID), and sends or receives it no longer. A device that does not let
     /// its COB-ID be written goes on with it.
     ///

@@ -5,6 +5,7 @@
 pub mod drive;
 pub mod node;
 pub mod object;
+pub mod selection;
 pub mod suggest;
 pub mod unit;
 pub mod value;

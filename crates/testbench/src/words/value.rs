@@ -1,6 +1,6 @@
 //! Values of objects: decimal, 0x.., with a unit, or one of the object's words.
 
-use canopen::od::{DataType, Entry};
+use canopen::od::{DataType, Entry, Kind};
 
 use super::suggest::{did_you_mean, near};
 use super::unit::{Unit, split_number};
@@ -22,10 +22,96 @@ pub fn value(row: &Entry, text: &str, resolution: i64) -> Result<i64, String> {
     Err(format!("{value} does not fit {} ({}): expected {low} to {high}", row.mux(), row.data_type.name()))
 }
 
-/// Reads a value of an object that no table describes: `type:number`, e.g. `u16:15`.
+/// A value as it was typed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Typed {
+    /// A whole number of a type.
+    Number(DataType, i64),
+    /// A real number, of 32 bits or of 64.
+    Real(DataType, f64),
+    /// Bytes as they go onto the wire.
+    Bytes(Vec<u8>),
+}
+
+impl Typed {
+    /// The whole number.
+    pub const fn number(&self) -> Option<i64> {
+        match self {
+            Self::Number(_, number) => Some(*number),
+            _ => None,
+        }
+    }
+
+    /// The bytes on the wire, little endian.
+    pub fn bytes(&self) -> Vec<u8> {
+        match self {
+            Self::Number(data_type, number) => number.to_le_bytes()[..data_type.size()].to_vec(),
+            Self::Real(DataType::Real32, real) => (*real as f32).to_le_bytes().to_vec(),
+            Self::Real(_, real) => real.to_le_bytes().to_vec(),
+            Self::Bytes(bytes) => bytes.clone(),
+        }
+    }
+}
+
+/// Reads what `row` is to be set to, of any type: a number as [`value`] has it, a real, a text, or `hex:..` for bytes.
+pub fn typed_for(row: &Entry, text: &str, resolution: i64) -> Result<Typed, String> {
+    let data_type = row.data_type;
+    match data_type.kind() {
+        Kind::Signed | Kind::Unsigned => value(row, text, resolution).map(|number| Typed::Number(data_type, number)),
+        Kind::Real => {
+            let real = text.trim().parse::<f64>().ok().filter(|real| real.is_finite());
+            let fits = |real: &f64| data_type != DataType::Real32 || real.abs() <= f64::from(f32::MAX);
+            real.filter(fits).map(|real| Typed::Real(data_type, real)).ok_or_else(|| {
+                format!("'{text}' is no value of {} ({}); expected a number, e.g. 1.5", row.mux(), data_type.name())
+            })
+        }
+        Kind::Bytes | Kind::Time => match text.strip_prefix("hex:") {
+            Some(digits) => hexadecimal(digits).map(Typed::Bytes),
+            None if data_type == DataType::VisibleString => visible(text),
+            None => Err(format!(
+                "{} is of type {}; give its bytes as hex:01AAFF, or --from FILE",
+                row.mux(),
+                data_type.name()
+            )),
+        },
+    }
+}
+
+/// A VISIBLE_STRING. Source: CiA 301, 7.1.6.2.
+fn visible(text: &str) -> Result<Typed, String> {
+    match text.chars().find(|character| !matches!(character, ' '..='~')) {
+        Some(character) => {
+            Err(format!("'{}' has no place in a VISIBLE_STRING: 20h to 7Eh only", character.escape_default()))
+        }
+        None if text.is_empty() => Err("a text needs a character at least".into()),
+        None => Ok(Typed::Bytes(text.as_bytes().to_vec())),
+    }
+}
+
+fn hexadecimal(digits: &str) -> Result<Vec<u8>, String> {
+    let digits: Vec<u8> = digits.bytes().filter(|byte| !matches!(byte, b' ' | b'.' | b'_')).collect();
+    let byte = |pair: &[u8]| u8::from_str_radix(core::str::from_utf8(pair).ok()?, 16).ok();
+    let even = !digits.is_empty() && digits.len().is_multiple_of(2) && digits.iter().all(u8::is_ascii_hexdigit);
+    let bytes = if even { digits.chunks(2).map(byte).collect() } else { None };
+    bytes.ok_or_else(|| "bytes are pairs of hexadecimal digits, e.g. hex:01AAFF".into())
+}
+
+/// Reads a value of an object that no table describes: `type:value`, e.g. `u16:15`, `text:left wheel`, `hex:01AA`.
+pub fn typed_alone(text: &str) -> Result<Typed, String> {
+    match text.split_once(':') {
+        Some(("hex", digits)) => hexadecimal(digits).map(Typed::Bytes),
+        Some(("text", text)) => visible(text),
+        Some(("i64", number)) => {
+            let value = integer(number).ok_or_else(|| format!("'{number}' is no whole number of 64 bits"))?;
+            Ok(Typed::Number(DataType::Integer64, value))
+        }
+        _ => typed_value(text).map(|(data_type, number)| Typed::Number(data_type, number)),
+    }
+}
+
+/// Reads a number of an object that no table describes: `type:number`, e.g. `u16:15`.
 pub fn typed_value(text: &str) -> Result<(DataType, i64), String> {
-    const EXPECTED: &str =
-        "an object that is in no known table needs its type with the value, e.g. u16:15, i32:-100, u8:0x3";
+    const EXPECTED: &str = "an object that is in no known table needs its type with the value, e.g. u16:15, i32:-100, u8:0x3, text:left, hex:01AA";
     let (name, number) = text.split_once(':').ok_or(EXPECTED)?;
     let data_type = match name.to_ascii_lowercase().as_str() {
         "i8" => DataType::Integer8,
@@ -167,6 +253,29 @@ mod tests {
         assert!(value(&WORD, "-1").is_err());
         assert!(value(&SPEED, "99999999999999999999").is_err());
         assert!(value(&WORD, "").is_err());
+    }
+
+    #[test]
+    fn texts_reals_and_bytes_are_read_by_the_objects_type() {
+        let row = |data_type| Entry::new(0x2000, 0, data_type, Access::ReadWrite, "thing", "");
+        let bytes = |data_type, text| typed_for(&row(data_type), text, 1).map(|typed| typed.bytes());
+        assert_eq!(bytes(DataType::VisibleString, "left"), Ok(b"left".to_vec()));
+        assert_eq!(bytes(DataType::Real32, "1.5"), Ok(vec![0, 0, 0xC0, 0x3F]));
+        assert_eq!(bytes(DataType::Domain, "hex:01 aa.FF"), Ok(vec![1, 0xAA, 0xFF]));
+        assert_eq!(bytes(DataType::Integer64, "-2"), Ok(vec![0xFE, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF]));
+        for (data_type, wrong) in [
+            (DataType::VisibleString, "l\u{e4}ngs"),
+            (DataType::VisibleString, ""),
+            (DataType::Real32, "1e39"),
+            (DataType::Real64, "nan"),
+            (DataType::Domain, "01AA"),
+            (DataType::Domain, "hex:1"),
+            (DataType::OctetString, "hex:+1"),
+        ] {
+            assert!(bytes(data_type, wrong).is_err(), "{wrong:?}");
+        }
+        assert_eq!(typed_alone("text:a:b"), Ok(Typed::Bytes(b"a:b".to_vec())));
+        assert_eq!(typed_alone("hex:01"), Ok(Typed::Bytes(vec![1])));
     }
 
     #[test]

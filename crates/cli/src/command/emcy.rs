@@ -1,0 +1,214 @@
+//! `ferrodrive emcy`: emergency messages as they come (CiA 301, clause 7.2.7), and those that a node remembers (1003h).
+
+use std::time::Duration;
+
+use canopen::emcy::{Emcy as Message, EmcyErrorCode};
+use canopen::{AbortCode, Mux, NodeId};
+use devices::Description;
+use devices::faults::FaultRow;
+use master::Error;
+use master::decode::Decoded;
+use master::units::parse_duration;
+use serde::Serialize;
+
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::frames::stamp::{Stamps, TimeForm};
+use crate::output::{Format, Report};
+use crate::paint::Paint;
+use testbench::words::node::{Nodes, node, nodes};
+
+/// Show emergency messages: as they come, or those that a node remembers
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive --bus socketcand://HOST:29536/can0 emcy watch\n  \
+    ferrodrive emcy watch 4 --for 10s\n  ferrodrive emcy show 4")]
+pub(crate) struct Emcy {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    /// Show emergency messages as they come, with fault and remedy
+    Watch(Watch),
+    /// Show the errors that a node remembers (1003h), the newest first
+    Show(Show),
+}
+
+#[derive(Debug, clap::Args)]
+struct Watch {
+    /// Node-ID, or all
+    #[arg(value_name = "NODE|all", value_parser = nodes, default_value = "all")]
+    nodes: Nodes,
+    /// End after this time (default on an embedded virtual bus: 1s)
+    #[arg(long = "for", value_name = "TIME", value_parser = parse_duration)]
+    duration: Option<Duration>,
+    /// The time before each line
+    #[arg(long, value_name = "FORM", value_enum, default_value_t)]
+    time: TimeForm,
+}
+
+#[derive(Debug, clap::Args)]
+struct Show {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+}
+
+/// Nothing happens on an embedded bus by itself.
+const EMBEDDED_DURATION: Duration = Duration::from_secs(1);
+
+/// The pre-defined error field. Source: CiA 301, 7.5.2.3.
+const ERROR_FIELD: u16 = 0x1003;
+
+/// An error, as it was told or is remembered.
+#[derive(Debug, Serialize)]
+struct Told {
+    /// When it came, in s since the command began; `null` of one that is remembered.
+    t: Option<f64>,
+    node: u8,
+    /// The error code.
+    code: u16,
+    /// The error register; `null` of one that is remembered.
+    error_register: Option<u8>,
+    /// The five bytes of the maker, in hexadecimal; of one that is remembered two.
+    manufacturer: String,
+    /// What it means: the model's fault, else the class of CiA 301.
+    name: String,
+    remedy: Option<&'static str>,
+    #[serde(skip)]
+    stamp: String,
+}
+
+/// The errors of a node.
+#[derive(Debug, Serialize)]
+struct Remembered {
+    node: u8,
+    errors: Vec<Told>,
+}
+
+impl Emcy {
+    /// Shows them.
+    pub(crate) async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
+        match &self.what {
+            What::Watch(watch) => watch.run(context, format).await,
+            What::Show(show) => format.print(&show.run(context).await?).map_err(Failure::not_printed),
+        }
+    }
+}
+
+impl Watch {
+    async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
+        let mut decoder = context.decoder();
+        let mut stamps = Stamps::new(self.time, context.traffic.unix_zero());
+        let follow = async {
+            loop {
+                let (at, frame) = context.traffic.next().await;
+                let Decoded::Emcy(node, message, fault) = decoder.decode(&frame) else { continue };
+                if self.nodes == Nodes::All || self.nodes == Nodes::One(node) {
+                    let told = Told::message(at.as_secs_f64(), node, &message, fault, stamps.text(at));
+                    format.print(&told).map_err(Failure::not_printed)?;
+                }
+            }
+        };
+        context.traffic.listen();
+        context.progress.show("listening; Ctrl-C ends it");
+        context.listen_for(self.duration, EMBEDDED_DURATION, follow).await
+    }
+}
+
+impl Show {
+    async fn run(&self, context: &Context) -> Result<Remembered, Failure> {
+        let drive = context.drive(self.node).await?;
+        let count = drive.node().upload(Mux::new(ERROR_FIELD, 0)).await.map_err(|error| self.without_field(error))?;
+        let mut errors = Vec::new();
+        for sub_index in 1..=count.raw().min(254) as u8 {
+            match drive.node().upload(Mux::new(ERROR_FIELD, sub_index)).await {
+                Ok(value) => errors.push(Told::remembered(self.node, value.raw(), drive.description())),
+                // Devices that count their places, and not the errors in them, refuse the empty ones.
+                Err(Error::Aborted { .. }) => break,
+                Err(error) => return Err(error.into()),
+            }
+        }
+        // An empty place holds 0, by some devices.
+        errors.retain(|error| error.code != 0 || error.manufacturer != "00 00");
+        Ok(Remembered { node: self.node.raw(), errors })
+    }
+
+    fn without_field(&self, error: Error) -> Failure {
+        let absent = error.abort() == Some(AbortCode::NO_SUCH_OBJECT);
+        let failure = Failure::from(error);
+        if !absent {
+            return failure;
+        }
+        failure
+            .because("the node remembers no errors (it has no 1003h)")
+            .next(format!("ferrodrive state {} shows the fault that there is now", self.node))
+    }
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" ")
+}
+
+fn meaning(code: EmcyErrorCode, fault: Option<&FaultRow>) -> String {
+    match fault {
+        Some(fault) => fault.name.to_owned(),
+        // `2110h (current, CANopen device input side)`: the words are wanted.
+        None => {
+            let text = code.to_string();
+            text.split_once(" (").map_or(text.clone(), |(_, words)| words.trim_end_matches(')').to_owned())
+        }
+    }
+}
+
+impl Told {
+    fn message(t: f64, node: NodeId, message: &Message, fault: Option<&'static FaultRow>, stamp: String) -> Self {
+        Self {
+            t: Some(t),
+            node: node.raw(),
+            code: message.code.0,
+            error_register: Some(message.error_register),
+            manufacturer: hexadecimal(&message.manufacturer),
+            name: meaning(message.code, fault),
+            remedy: fault.map(|fault| fault.remedy),
+            stamp,
+        }
+    }
+
+    /// The low 16 bits are the error code, the high ones the maker's.
+    fn remembered(node: NodeId, raw: u32, model: Option<&'static Description>) -> Self {
+        let code = EmcyErrorCode(raw as u16);
+        let fault = model.and_then(|model| model.fault_told_by(code));
+        Self {
+            t: None,
+            node: node.raw(),
+            code: code.0,
+            error_register: None,
+            manufacturer: hexadecimal(&((raw >> 16) as u16).to_le_bytes()),
+            name: meaning(code, fault),
+            remedy: fault.map(|fault| fault.remedy),
+            stamp: String::new(),
+        }
+    }
+}
+
+impl Report for Told {
+    fn text(&self, paint: Paint) -> String {
+        let Self { node, code, name, manufacturer, .. } = self;
+        let time = if self.stamp.is_empty() { String::new() } else { format!("{} ", paint.dim(&self.stamp)) };
+        let register = self.error_register.map(|register| format!(", error register {register:02X}h"));
+        let name = paint.bad(&format!("{code:04X}h {name}"));
+        let remedy = self.remedy.map(|remedy| format!("\n  remedy  {remedy}")).unwrap_or_default();
+        format!("{time}node {node}: {name}{}, manufacturer {manufacturer}{remedy}", register.unwrap_or_default())
+    }
+}
+
+impl Report for Remembered {
+    fn text(&self, paint: Paint) -> String {
+        if self.errors.is_empty() {
+            return format!("node {}: no error remembered", self.node);
+        }
+        self.errors.iter().map(|error| error.text(paint)).collect::<Vec<_>>().join("\n")
+    }
+}

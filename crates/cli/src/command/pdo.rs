@@ -1,0 +1,343 @@
+//! `ferrodrive pdo`: how the PDOs of a node are set up (CiA 301, clauses 7.5.2.35 to 7.5.2.38), and what they carry.
+
+use std::time::Duration;
+
+use canopen::pdo::{Direction, PdoId, PdoNumber};
+use canopen::{AbortCode, CobId, NmtState, NodeId};
+use devices::Description;
+use master::decode::{Decoded, Decoder};
+use master::pdo::{PdoConfig, TimerUnits};
+use master::units::parse_duration;
+use master::{Drive, Error};
+use serde::Serialize;
+
+use crate::context::Context;
+use crate::decode::{self, decode};
+use crate::failure::Failure;
+use crate::frames::stamp::{Stamps, TimeForm};
+use crate::output::{Format, Report};
+use crate::paint::Paint;
+use crate::table::Table;
+use testbench::words::node::node;
+
+/// Show how a node's PDOs are set up, or what they carry as they come
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive pdo show 4\n  \
+    ferrodrive --bus socketcand://HOST:29536/can0 pdo watch 4 --time delta\n  \
+    ferrodrive --bus socketcand://HOST:29536/can0 pdo show")]
+pub(crate) struct Pdo {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    /// Show identifier, transmission type, timers and mapping of each PDO
+    Show(Show),
+    /// Show the values in a node's PDOs as they come, by its own mapping
+    Watch(Watch),
+}
+
+#[derive(Debug, clap::Args)]
+struct Show {
+    /// Node-IDs; without any, every node on the bus is asked
+    #[arg(value_parser = node)]
+    nodes: Vec<NodeId>,
+}
+
+#[derive(Debug, clap::Args)]
+struct Watch {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+    /// End after this time (default on an embedded virtual bus: 1s)
+    #[arg(long = "for", value_name = "TIME", value_parser = parse_duration)]
+    duration: Option<Duration>,
+    /// The time before each line
+    #[arg(long, value_name = "FORM", value_enum, default_value_t)]
+    time: TimeForm,
+}
+
+/// Nothing happens on an embedded bus by itself.
+const EMBEDDED_DURATION: Duration = Duration::from_secs(1);
+
+/// The PDOs of a node whose model is not known are asked for up to this one, and on until one is missing.
+const ASKED_IN_ANY_CASE: u16 = 4;
+
+/// How the PDOs of nodes are set up.
+#[derive(Debug, Serialize)]
+struct PdoList {
+    nodes: Vec<OfNode>,
+}
+
+#[derive(Debug, Serialize)]
+struct OfNode {
+    node: u8,
+    pdos: Vec<Row>,
+}
+
+/// How one PDO is set up.
+#[derive(Debug, Serialize)]
+struct Row {
+    /// `TPDO1`, counted from 1 as by CiA 301.
+    pdo: String,
+    /// The identifier.
+    id: u32,
+    /// It is sent, or taken.
+    valid: bool,
+    transmission: u8,
+    /// When it is sent, or takes effect.
+    when: String,
+    inhibit_ms: Option<f64>,
+    event_ms: Option<f64>,
+    objects: Vec<Mapped>,
+}
+
+#[derive(Debug, Serialize)]
+struct Mapped {
+    object: String,
+    name: Option<&'static str>,
+    bits: u8,
+}
+
+/// A PDO that came.
+#[derive(Debug, Serialize)]
+struct Line {
+    t: f64,
+    node: u8,
+    pdo: String,
+    bytes: String,
+    values: Vec<Field>,
+    #[serde(skip)]
+    stamp: String,
+    #[serde(skip)]
+    remark: Option<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct Field {
+    object: String,
+    name: Option<&'static str>,
+    #[serde(flatten)]
+    value: decode::Decoded,
+}
+
+impl Pdo {
+    /// Shows them.
+    pub(crate) async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
+        match &self.what {
+            What::Show(show) => format.print(&show.run(context).await?).map_err(Failure::not_printed),
+            What::Watch(watch) => watch.run(context, format).await,
+        }
+    }
+}
+
+impl Show {
+    async fn run(&self, context: &Context) -> Result<PdoList, Failure> {
+        let mut nodes = self.nodes.clone();
+        if nodes.is_empty() {
+            let asked = |count| context.progress.show(format!("asked {count} of 127"));
+            nodes.extend(context.network.scan(context.timeout(), asked).await.iter().map(|found| found.node));
+        }
+        let mut list = Vec::new();
+        for node in nodes {
+            context.progress.show(format!("node {node}: reading its PDOs"));
+            let drive = context.drive(node).await?;
+            let pdos = all_pdos(&drive).await?;
+            list.push(OfNode {
+                node: node.raw(),
+                pdos: pdos.iter().map(|(config, cob_id)| Row::new(&drive, config, *cob_id)).collect(),
+            });
+        }
+        if list.is_empty() {
+            return Err(Failure::new("nobody is on the bus").of_kind("nobody").next("ferrodrive scan"));
+        }
+        Ok(PdoList { nodes: list })
+    }
+}
+
+fn units(model: Option<&Description>) -> TimerUnits {
+    model.map_or(TimerUnits::STANDARD, TimerUnits::of)
+}
+
+/// How every PDO of a node is set up: those of its model's table, else those that it has.
+async fn all_pdos(drive: &Drive) -> Result<Vec<(PdoConfig, CobId)>, Failure> {
+    let mut pdos = Vec::new();
+    for direction in [Direction::Tpdo, Direction::Rpdo] {
+        for number in (1..=PdoNumber::MAX).filter_map(PdoNumber::new) {
+            let pdo = PdoId { direction, number };
+            let has = |model: &Description| model.row(canopen::Mux::new(pdo.parameter_index(), 1)).is_some();
+            if drive.description().is_some_and(|model| !has(model)) {
+                continue;
+            }
+            match drive.node().pdo_config(pdo, units(drive.description())).await {
+                Ok(config) => pdos.push(config),
+                Err(Error::Aborted { code: AbortCode::NO_SUCH_OBJECT | AbortCode::NO_SUCH_SUB_INDEX, .. }) => {
+                    if drive.description().is_none() && number.number() >= ASKED_IN_ANY_CASE {
+                        break;
+                    }
+                }
+                Err(error) => return Err(error.into()),
+            }
+        }
+    }
+    Ok(pdos)
+}
+
+impl Watch {
+    async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
+        let drive = context.drive(self.node).await?;
+        let mut decoder = context.decoder();
+        if let Some(model) = drive.description() {
+            decoder.set_model(self.node, model);
+        }
+        let mut sends = 0;
+        for (config, cob_id) in all_pdos(&drive).await? {
+            if let Some(id) = cob_id.can_id().as_standard().filter(|_| cob_id.is_valid()) {
+                sends += usize::from(config.pdo.direction == Direction::Tpdo && !config.map.0.is_empty());
+                decoder.set_pdo(self.node, config.pdo, id, &config.map);
+            }
+        }
+        self.tell_why_silent(context, &drive, sends);
+        context.traffic.listen();
+        context.progress.show("listening; Ctrl-C ends it");
+        let mut stamps = Stamps::new(self.time, context.traffic.unix_zero());
+        let follow = async {
+            loop {
+                let (at, frame) = context.traffic.next().await;
+                let Decoded::Pdo(pdo) = decoder.decode(&frame) else { continue };
+                if pdo.node == self.node {
+                    let line = Line::new(&decoder, drive.description(), &pdo, at.as_secs_f64(), stamps.text(at));
+                    format.print(&line).map_err(Failure::not_printed)?;
+                }
+            }
+        };
+        context.listen_for(self.duration, EMBEDDED_DURATION, follow).await
+    }
+
+    /// What keeps its PDOs away, as far as it is known.
+    fn tell_why_silent(&self, context: &Context, drive: &Drive, sends: usize) {
+        let (node, state) = (self.node, context.network.facts(self.node).probable_state(drive.description()));
+        if sends == 0 {
+            context.tell(&format!("node {node} has no valid TPDO with something mapped: ferrodrive pdo show {node}"));
+        }
+        if let Some(state @ (NmtState::PreOperational | NmtState::Stopped)) = state {
+            context.tell(&format!("node {node} is {state} and sends no PDOs: ferrodrive nmt {node} start"));
+        }
+    }
+}
+
+impl Row {
+    fn new(drive: &Drive, config: &PdoConfig, cob_id: CobId) -> Self {
+        let ms = |time: Option<Duration>| time.map(|time| time.as_secs_f64() * 1e3);
+        let mapped = config.map.0.iter().map(|record| Mapped {
+            object: record.mux.to_string(),
+            name: match drive.description() {
+                Some(model) => model.row(record.mux).map(|row| row.name),
+                None => master::decode::common_name(record.mux),
+            },
+            bits: record.bits,
+        });
+        Self {
+            pdo: config.pdo.to_string(),
+            id: cob_id.can_id().raw(),
+            valid: cob_id.is_valid(),
+            transmission: config.transmission.0,
+            when: when(config),
+            inhibit_ms: ms(config.inhibit_time),
+            event_ms: ms(config.event_time),
+            objects: mapped.collect(),
+        }
+    }
+}
+
+/// CiA 301, tables 66 and 71.
+fn when(config: &PdoConfig) -> String {
+    match (config.pdo.direction, config.transmission.0) {
+        (Direction::Tpdo, 0) => "after SYNC, if changed".into(),
+        (Direction::Tpdo, 1) => "after every SYNC".into(),
+        (Direction::Tpdo, every @ 2..=240) => format!("after every {every}. SYNC"),
+        (Direction::Rpdo, 0..=240) => "with the next SYNC".into(),
+        (Direction::Tpdo, 252) => "sampled at SYNC, sent on a remote frame".into(),
+        (Direction::Tpdo, 253) => "on a remote frame".into(),
+        (Direction::Tpdo, 254 | 255) => "on events".into(),
+        (Direction::Rpdo, 254 | 255) => "at once".into(),
+        (_, reserved) => format!("{reserved}, which is reserved"),
+    }
+}
+
+impl Line {
+    fn new(
+        decoder: &Decoder,
+        model: Option<&'static Description>,
+        pdo: &master::decode::Pdo,
+        t: f64,
+        stamp: String,
+    ) -> Self {
+        let values = pdo.fields.iter().map(|(record, raw)| {
+            let bytes = raw.to_le_bytes();
+            let length = usize::from(record.bits).div_ceil(8).min(bytes.len());
+            let row = model.map_or_else(|| master::decode::common_row(record.mux), |model| model.row(record.mux));
+            Field {
+                object: record.mux.to_string(),
+                name: decoder.name(pdo.node, record.mux),
+                value: decode(model, row, &bytes[..length]),
+            }
+        });
+        let mapped = pdo.mapped_bytes;
+        let remark = match mapped {
+            None => Some("mapping not known".into()),
+            Some(mapped) if mapped > pdo.bytes.len() => {
+                Some(format!("too short: {} of {mapped} bytes", pdo.bytes.len()))
+            }
+            Some(_) => None,
+        };
+        Self {
+            t,
+            node: pdo.node.raw(),
+            pdo: pdo.pdo.to_string(),
+            bytes: pdo.bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" "),
+            values: values.collect(),
+            stamp,
+            remark,
+        }
+    }
+}
+
+impl Report for PdoList {
+    fn text(&self, paint: Paint) -> String {
+        let mut table = Table::new(&["node", "pdo", "id", "type", "when", "inhibit", "timer", "carries"]);
+        let ms = |time: Option<f64>| time.map_or_else(|| "-".into(), |time| format!("{time} ms"));
+        for (of_node, row) in self.nodes.iter().flat_map(|of_node| of_node.pdos.iter().map(move |row| (of_node, row))) {
+            let carries = row.objects.iter().map(|mapped| match mapped.name {
+                Some(name) => format!("{} {name} ({})", mapped.object, mapped.bits),
+                None => format!("{} ({})", mapped.object, mapped.bits),
+            });
+            table.row([
+                of_node.node.to_string(),
+                row.pdo.clone(),
+                if row.valid { format!("{:03X}h", row.id) } else { "off".into() },
+                row.transmission.to_string(),
+                row.when.clone(),
+                ms(row.inhibit_ms),
+                ms(row.event_ms),
+                carries.collect::<Vec<_>>().join(", "),
+            ]);
+        }
+        table.plain(paint)
+    }
+}
+
+impl Report for Line {
+    fn text(&self, paint: Paint) -> String {
+        let values = self.values.iter().map(|field| {
+            let name = field.name.unwrap_or(&field.object);
+            format!("{name} = {}", field.value.text(paint))
+        });
+        let what = match &self.remark {
+            Some(remark) => format!("{} ({remark})", self.bytes),
+            None => values.collect::<Vec<_>>().join(", "),
+        };
+        format!("{} {}  {what}", paint.dim(&self.stamp), self.pdo)
+    }
+}

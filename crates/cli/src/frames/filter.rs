@@ -1,0 +1,82 @@
+//! Which frames are shown: by node, by service, by object.
+
+use canopen::{Mux, NodeId};
+use master::decode::{Decoded, Decoder, ServiceKind};
+
+use crate::failure::Failure;
+use testbench::models::Description;
+use testbench::words::node::node;
+use testbench::words::object::{ObjectArg, object};
+use testbench::words::suggest::{did_you_mean, near};
+
+/// What is wanted. Of each kind any that is named will do; all kinds that are given have to fit.
+#[derive(Clone, Debug, Default, clap::Args)]
+#[command(next_help_heading = "Which frames")]
+pub(crate) struct Filter {
+    /// Only what is about these nodes, NMT commands for all nodes included
+    #[arg(long = "node", value_name = "NODE", value_parser = node, value_delimiter = ',')]
+    nodes: Vec<NodeId>,
+    /// Only these services: nmt, sync, time, emcy, pdo, sdo, heartbeat, lss, other
+    #[arg(long = "service", value_name = "SERVICE", value_parser = service, value_delimiter = ',')]
+    services: Vec<ServiceKind>,
+    /// Only SDO and PDO with these objects: 6041, 6041:00 or a name
+    #[arg(long = "object", value_name = "OBJECT", value_parser = wanted, value_delimiter = ',')]
+    objects: Vec<Wanted>,
+}
+
+/// An object, all sub-indices of one, or all of a name.
+#[derive(Clone, Debug)]
+enum Wanted {
+    Index(u16),
+    Mux(Mux),
+    Name(String),
+}
+
+fn service(text: &str) -> Result<ServiceKind, String> {
+    let known = ServiceKind::ALL.map(ServiceKind::word);
+    let typed = text.to_ascii_lowercase();
+    ServiceKind::ALL.into_iter().find(|kind| kind.word() == typed).ok_or_else(|| {
+        format!("'{text}' is no service{}; expected one of {}", did_you_mean(&near(&typed, known)), known.join(", "))
+    })
+}
+
+fn wanted(text: &str) -> Result<Wanted, String> {
+    Ok(match object(text)? {
+        ObjectArg::Mux(mux) if text.contains(':') => Wanted::Mux(mux),
+        ObjectArg::Mux(mux) => Wanted::Index(mux.index),
+        ObjectArg::Name(name) => Wanted::Name(name),
+    })
+}
+
+impl Filter {
+    /// Refuses a name that no model has: nothing would ever be shown.
+    pub(crate) fn check(&self, models: &[&Description]) -> Result<(), Failure> {
+        let names = || models.iter().flat_map(|model| model.dictionary.rows().iter().map(|row| row.name));
+        for wanted in &self.objects {
+            let Wanted::Name(name) = wanted else { continue };
+            if !names().any(|known| known == name) {
+                let mut close = near(name, names());
+                close.dedup();
+                return Err(Failure::usage(format!("no model has an object named '{name}'{}", did_you_mean(&close)))
+                    .next("give its index, e.g. --object 6041, or say which model a node is: --model NODE=MODEL"));
+            }
+        }
+        Ok(())
+    }
+
+    /// True if the frame is wanted.
+    pub(crate) fn takes(&self, decoder: &Decoder, decoded: &Decoded) -> bool {
+        let is_wanted = |mux: Mux| {
+            self.objects.iter().any(|wanted| match wanted {
+                Wanted::Index(index) => mux.index == *index,
+                Wanted::Mux(exactly) => mux == *exactly,
+                Wanted::Name(name) => {
+                    decoded.node().and_then(|node| decoder.name(node, mux)).is_some_and(|known| known == name)
+                }
+            })
+        };
+        (self.nodes.is_empty() || self.nodes.iter().any(|node| decoded.concerns(*node)))
+            && (self.services.is_empty() || self.services.contains(&decoded.service()))
+            && (self.objects.is_empty() || decoded.objects().any(is_wanted))
+    }
+}

@@ -1,0 +1,148 @@
+//! The frames that a command sends and hears: shown as they pass (`--verbose`), or handed to a command that watches.
+
+use std::collections::VecDeque;
+use std::future::poll_fn;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Poll, Waker};
+use std::time::Duration;
+
+use can::{Frame, Instant, Station};
+use master::Network;
+use master::decode::Decoder;
+
+use super::stamp::Stamps;
+use crate::paint::Paint;
+use crate::progress::Progress;
+
+/// Frames kept for a command that does not come to take them; a further one replaces the oldest.
+const KEPT: usize = 1 << 16;
+
+/// A network whose frames are seen by others as they pass.
+#[derive(Clone)]
+pub(crate) struct Tap {
+    network: Network,
+    traffic: Traffic,
+}
+
+/// What passes a [`Tap`].
+#[derive(Clone, Default)]
+pub(crate) struct Traffic(Arc<Mutex<Passing>>);
+
+#[derive(Default)]
+struct Passing {
+    /// Unix time of the bus's zero.
+    unix_zero: Duration,
+    shown: Option<Shown>,
+    heard: Option<Heard>,
+}
+
+/// Where frames are shown.
+struct Shown {
+    decoder: Decoder,
+    stamps: Stamps,
+    progress: Progress,
+}
+
+/// Frames for a command.
+#[derive(Default)]
+struct Heard {
+    frames: VecDeque<(Instant, Frame)>,
+    waker: Option<Waker>,
+}
+
+impl Tap {
+    /// A station that is `network`, and tells `traffic`.
+    pub(crate) fn new(network: Network, traffic: Traffic) -> Self {
+        Self { network, traffic }
+    }
+}
+
+impl Traffic {
+    /// The traffic of a bus whose time began at this Unix time.
+    pub(crate) fn since(unix_zero: Duration) -> Self {
+        Self(Arc::new(Mutex::new(Passing { unix_zero, ..Passing::default() })))
+    }
+
+    /// Unix time of the bus's zero.
+    pub(crate) fn unix_zero(&self) -> Duration {
+        self.lock().unix_zero
+    }
+
+    /// Shows each frame in words on standard error from now on.
+    pub(crate) fn show(&self, decoder: Decoder, stamps: Stamps, progress: Progress) {
+        self.lock().shown = Some(Shown { decoder, stamps, progress });
+    }
+
+    /// Keeps frames for [`next`](Self::next) from now on.
+    pub(crate) fn listen(&self) {
+        self.lock().heard.get_or_insert_default();
+    }
+
+    /// The next frame on the bus, of others or of this command, and when it came.
+    pub(crate) async fn next(&self) -> (Instant, Frame) {
+        poll_fn(|context| {
+            let mut passing = self.lock();
+            let heard = passing.heard.get_or_insert_default();
+            match heard.frames.pop_front() {
+                Some(frame) => Poll::Ready(frame),
+                None => {
+                    heard.waker = Some(context.waker().clone());
+                    Poll::Pending
+                }
+            }
+        })
+        .await
+    }
+
+    fn note(&self, frame: &Frame, now: Instant) {
+        let mut passing = self.lock();
+        if let Some(Shown { decoder, stamps, progress }) = &mut passing.shown {
+            let paint = Paint::for_stream(&std::io::stderr());
+            let text = decoder.decode(frame).to_string();
+            progress.line(&format!("{} {:<20}  {text}", paint.dim(&stamps.text(now)), frame.to_string()));
+        }
+        let Some(heard) = &mut passing.heard else { return };
+        if heard.frames.len() == KEPT {
+            heard.frames.pop_front();
+        }
+        heard.frames.push_back((now, *frame));
+        let waker = heard.waker.take();
+        drop(passing);
+        if let Some(waker) = waker {
+            waker.wake();
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Passing> {
+        // Nothing is half done between two frames, whoever panicked.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Station for Tap {
+    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
+        self.traffic.note(frame, now);
+        self.network.handle_frame(frame, now);
+    }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        self.network.handle_timeout(now);
+    }
+
+    fn poll_transmit(&mut self) -> Option<Frame> {
+        self.network.poll_transmit()
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        self.network.poll_timeout()
+    }
+
+    fn handle_bus_off(&mut self, off: bool, now: Instant) {
+        self.network.handle_bus_off(off, now);
+    }
+
+    fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
+        self.traffic.note(frame, now);
+        self.network.handle_transmitted(frame, now);
+    }
+}
