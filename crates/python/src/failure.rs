@@ -1,5 +1,7 @@
 //! Errors as Python has them.
 
+use std::path::Path;
+
 use master::Error;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -18,6 +20,12 @@ pub(crate) fn refused(error: impl ToString) -> PyErr {
 /// An argument that makes no sense.
 pub(crate) fn bad_value(error: impl ToString) -> PyErr {
     PyValueError::new_err(error.to_string())
+}
+
+/// What is wrong with a file, with its name: what is wrong in it has that already.
+pub(crate) fn named(path: &Path, reason: String) -> String {
+    let shown = path.display().to_string();
+    if reason.starts_with(&shown) { reason } else { format!("{shown}: {reason}") }
 }
 
 /// A use of something whose time is over, or in a process that it does not belong to.

@@ -13,7 +13,7 @@ use testbench::document::reader::Parameters;
 use testbench::scenario::{Runner, Scenario};
 use testbench::sweep;
 
-use crate::failure::bad_value;
+use crate::failure::{bad_value, named};
 
 /// Steps of a world between two looks at Python's signal handlers (Ctrl-C): some 10 ms.
 const STEPS_A_LOOK: u32 = 4096;
@@ -110,16 +110,13 @@ impl Summary {
 
 /// The scenario of a file, with these values of its parameters.
 fn read(path: &Path, set: Vec<Setting>) -> PyResult<Scenario> {
-    let shown = path.display().to_string();
-    // What is wrong in a file has its name already.
-    let named = |reason: String| if reason.starts_with(&shown) { reason } else { format!("{shown}: {reason}") };
-    let scenario = Scenario::read(path).map_err(|reason| bad_value(named(reason)))?;
+    let scenario = Scenario::read(path).map_err(|reason| bad_value(named(path, reason)))?;
     if set.is_empty() {
         return Ok(scenario);
     }
     let mut values: Parameters = scenario.parameters.clone();
     values.extend(set);
-    scenario.with(&values).map_err(|bad| bad_value(bad.named(shown.as_str())))
+    scenario.with(&values).map_err(|bad| bad_value(bad.named(path.display().to_string())))
 }
 
 /// Goes through a run while other threads of Python go on; a signal whose handler raises (Ctrl-C) ends it.

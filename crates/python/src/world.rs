@@ -20,10 +20,10 @@ use sim::stimulus::{FORMS, Place};
 use sim::wire::{Statistics, WireEvent};
 use sim::{StationId, VirtualDrive};
 use testbench::events;
-use testbench::machine_file::Machine;
+use testbench::machine_file;
 use testbench::words::drive::DriveSpec;
 
-use crate::failure::{bad_value, refused, wrong_use};
+use crate::failure::{bad_value, named, refused, wrong_use};
 use crate::frames::{Plain, frame, plain};
 use crate::sheets::{model_of, node_id};
 pub(crate) use jobs::{Job, Jobs};
@@ -222,11 +222,11 @@ impl World {
         Ok(())
     }
 
-    /// Becomes the world that the text of a machine file describes.
-    fn become_machine(&self, py: Python<'_>, text: &str, seed: Option<u64>) -> PyResult<()> {
-        let mut machine = Machine::parse(text).map_err(bad_value)?;
+    /// Becomes the world that a machine file describes; data sheets that it names are looked for beside it.
+    fn become_machine(&self, py: Python<'_>, path: PathBuf, seed: Option<u64>) -> PyResult<()> {
+        let mut machine = machine_file::read(&path).map_err(|reason| bad_value(named(&path, reason)))?;
         machine.seed = seed.or(machine.seed);
-        let world = machine.build().map_err(bad_value)?;
+        let world = machine.build().map_err(|bad| bad_value(bad.named(path.display().to_string())))?;
         *self.shared.lock(py)? = State::new(world);
         Ok(())
     }

@@ -326,6 +326,35 @@ def test_a_record_has_the_pose_of_a_body_that_rolls(tmp_path):
     assert float(row["base.heading_deg"]) == pytest.approx(true["heading_deg"], abs=1)
 
 
+def test_a_machine_file_finds_its_data_sheets_beside_it(tmp_path):
+    (tmp_path / "servo.eds").write_text(ferrodrive.eds("cia402"))
+    path = tmp_path / "machine.toml"
+    path.write_text("seed = 5\n[[drive]]\nmodel = 'servo.eds'\nnode = 3\nsupply_v = 24\n")
+    world = ferrodrive.World.machine(path)
+    world.run_for(1)
+    assert world.nodes == [3]
+    assert world[3].supply_v == pytest.approx(24, abs=0.5)
+
+
+def test_a_machine_file_that_makes_no_sense_is_told_with_its_place(tmp_path):
+    path = tmp_path / "machine.toml"
+    path.write_text("[[drive]]\nmodel = 'zlac8030'\nnode = 2\n[[drive]]\nmodel = 'zlac8030l'\nnode = 200\n")
+    with pytest.raises(ValueError) as refused:
+        ferrodrive.World.machine(path)
+    assert f"{path}:2" in str(refused.value) and "zlac8030l" in str(refused.value)
+    assert f"{path}:6" in str(refused.value) and "127" in str(refused.value)
+    path.write_text("[[drive]]\nmodel = 'absent.eds'\nnode = 2\n")
+    with pytest.raises(ValueError, match=re.escape(f"{path}:2")):
+        ferrodrive.World.machine(path)
+    path.write_text("#" * (1 << 21))
+    with pytest.raises(ValueError, match="more than 1 MB"):
+        ferrodrive.World.machine(path)
+    with pytest.raises(ValueError, match="a directory"):
+        ferrodrive.World.machine(tmp_path)
+    with pytest.raises(FileNotFoundError):
+        ferrodrive.World.machine(tmp_path / "absent.toml")
+
+
 def test_every_stimulus_has_a_method():
     said = []
     for model, calls in STIMULI.items():
