@@ -86,7 +86,8 @@ pub struct DeviceInfo {
     pub tpdos: Option<u16>,
     /// LSS (CiA 305).
     pub lss: bool,
-    /// Which sub-indices of PDO objects exist without being listed; 0 for none. Kept, not acted on.
+    /// Which sub-indices the communication parameters have of PDOs that are counted and not listed, bit 0 for sub-index 1; 0 for
+    /// no such PDOs. They are among the objects.
     pub compact_pdo: u8,
 }
 

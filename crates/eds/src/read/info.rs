@@ -91,7 +91,10 @@ impl Reader {
             "nrofrxpdo" => self.eds.device.rpdos = self.count(section, entry),
             "nroftxpdo" => self.eds.device.tpdos = self.count(section, entry),
             "lss_supported" => self.eds.device.lss = self.flag(section, entry),
-            "compactpdo" => self.eds.device.compact_pdo = self.count(section, entry).unwrap_or(0),
+            "compactpdo" => {
+                self.eds.device.compact_pdo = self.count(section, entry).unwrap_or(0);
+                self.compact_pdo_line = entry.line;
+            }
             _ => return false,
         }
         true

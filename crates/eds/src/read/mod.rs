@@ -2,6 +2,7 @@
 //! it. Nothing of a file is dropped in silence.
 
 mod compact;
+mod compact_pdo;
 mod fields;
 mod info;
 mod lists;
@@ -38,7 +39,7 @@ impl Eds {
     /// Reads a document.
     ///
     /// # Errors
-    /// If there are no sections in it, or if its `CompactSubObj` make more values than are read.
+    /// If there are no sections in it, or if its `CompactSubObj` and `CompactPDO` make more values than are read.
     pub fn read(document: &Document) -> Result<Reading, Refusal> {
         let mut reader = Reader::default();
         reader.strays(document)?;
@@ -49,6 +50,7 @@ impl Eds {
         // Stable: of two sections of one name the first comes first.
         parts.sort_by_key(|part| part.key);
         reader.objects(&parts)?;
+        reader.compact_pdos()?;
         lists::read(document, &mut reader);
         check::all(document, &reader.eds, &mut reader.findings);
         reader.findings.sort();

@@ -69,12 +69,17 @@ impl Reader {
 
     /// Counts values, so that a few lines cannot ask for all memory.
     fn take(&mut self, section: Section<'_>, count: usize) -> Result<(), Refusal> {
+        self.take_values(section.line(), count)
+    }
+
+    /// The same of values that a line asks for.
+    pub(super) fn take_values(&mut self, line: u32, count: usize) -> Result<(), Refusal> {
         self.variables += count;
         if self.variables <= MOST_VARIABLES {
             return Ok(());
         }
         let reason = format!("more than {MOST_VARIABLES} objects and sub-objects");
-        Err(Refusal::new(section.line() as usize, reason, "a device has some thousand: is this the right file?"))
+        Err(Refusal::new(line as usize, reason, "a device has some thousand: is this the right file?"))
     }
 
     /// Counts the text of a section that is repeated in `count` compact sub-objects.

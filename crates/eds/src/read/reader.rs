@@ -11,6 +11,8 @@ pub(super) struct Reader {
     pub(super) findings: Findings,
     pub(super) variables: usize,
     pub(super) repeated: usize,
+    /// Where `CompactPDO` stands.
+    pub(super) compact_pdo_line: u32,
 }
 
 impl Reader {

@@ -138,6 +138,41 @@ fn compact_sub_objects_have_names_and_values_from_the_sections_beside() {
     assert_eq!(short(&reading), [(Severity::Error, "9".into(), Some("nothing".into()))]);
 }
 
+/// A file that counts so many PDOs and lists the second RPDO only.
+fn counting(pdos: u16, compact: u8) -> Result<Reading, crate::Refusal> {
+    let text = format!(
+        "[DeviceInfo]\nNrOfRXPDO={pdos}\nNrOfTXPDO={pdos}\nCompactPDO={compact}\n[OptionalObjects]\nSupportedObjects=1\n1=0x1401\n\
+         [1401]\nParameterName=P\nObjectType=9\nSubNumber=2\n[1401sub0]\nParameterName=n\nDataType=5\nAccessType=ro\nDefaultValue=1\n\
+         [1401sub1]\nParameterName=C\nDataType=7\nAccessType=rw\nDefaultValue=$NODEID+0x300\n"
+    );
+    Eds::load(text.as_bytes())
+}
+
+#[test]
+fn pdos_that_are_counted_and_not_listed_have_the_sub_indices_that_compact_pdo_names() {
+    assert_eq!(counting(3, 0).expect("a small file").eds.objects.len(), 1, "without it there are none");
+    let eds = counting(6, 0b1_0111).expect("a small file").eds;
+    let indices: Vec<u16> = eds.objects.iter().map(|object| object.index).collect();
+    // 1401h is listed without a mapping, which is none of CompactPDO's.
+    let expected = [0x1400..0x1406, 0x1600..0x1601, 0x1602..0x1606, 0x1800..0x1806, 0x1A00..0x1A06];
+    assert_eq!(indices, expected.into_iter().flatten().collect::<Vec<u16>>());
+    let of = |index: u16| eds.object(index).expect("it is there");
+    let subs: Vec<u8> = of(0x1804).variables.iter().map(|variable| variable.sub_index).collect();
+    assert_eq!((subs, of(0x1401).variables.len(), of(0x1A00).variables.len()), (vec![0, 1, 2, 3, 5], 2, 65));
+    let cob_id = |index| of(index).variable(1).and_then(|variable| variable.default.clone());
+    let own = |base| Some(Value::Number(Number { base, plus_node_id: true }));
+    assert_eq!((cob_id(0x1402), cob_id(0x1803)), (own(0x400), own(0x480)));
+    assert_eq!(cob_id(0x1405), plain(0x8000_0000), "no identifier is reserved for RPDO6");
+    // Written out they are listed, and no more are added.
+    assert_eq!(crate::diff(&eds, &Eds::load(crate::write(&eds).as_bytes()).expect("a small file").eds), []);
+}
+
+#[test]
+fn a_line_of_compact_pdo_cannot_ask_for_more_values_than_are_read() {
+    let refused = counting(u16::MAX, 0x3F).expect_err("73,000 values");
+    assert_eq!((refused.line, refused.reason.as_str()), (4, "more than 60000 objects and sub-objects"));
+}
+
 #[test]
 fn a_few_lines_of_compact_sub_objects_cannot_ask_for_all_memory() {
     let mut text = String::new();
