@@ -6,11 +6,12 @@ use std::time::Duration;
 
 use can::{Bitrate, CanId, Frame};
 use drives::mjoint::Model;
+use plant::coupled::DifferentialDriveModel;
 use sim::machine::{mjoint, zlac8030l, zlim42c};
-use sim::{StationId, VirtualDrive, World};
+use sim::{CoupledShaft, Coupling, Place, StationId, VirtualDrive, World};
 
 /// Names of the worlds.
-pub(crate) const WORLDS: [&str; 9] = [
+pub(crate) const WORLDS: [&str; 11] = [
     "1 hub servo turning, silent bus",
     "1 hub servo turning, busy bus",
     "1 hub servo not enabled",
@@ -20,6 +21,8 @@ pub(crate) const WORLDS: [&str; 9] = [
     "3 hub servos turning, silent bus",
     "127 hub servos turning, silent bus",
     "127 hub servos turning, busy bus",
+    "2 hub servos turning, silent bus",
+    "2 hub servos moving a base, silent bus",
 ];
 
 /// Drives by their node-ID.
@@ -41,6 +44,8 @@ pub(crate) fn world(name: &str) -> Option<World> {
         "3 hub servos turning, silent bus" => turning(hub_servos(3)).0,
         "127 hub servos turning, silent bus" => turning(hub_servos(127)).0,
         "127 hub servos turning, busy bus" => busy::many_in_one_cycle(),
+        "2 hub servos turning, silent bus" => turning(hub_servos(2)).0,
+        "2 hub servos moving a base, silent bus" => moving(hub_servos(2), move_a_base).0,
         _ => return None,
     })
 }
@@ -66,14 +71,37 @@ fn not_enabled() -> World {
     world
 }
 
+/// The wheels of a base of 30 kg.
+fn move_a_base(world: &mut World) {
+    let base = DifferentialDriveModel {
+        mass_kg: 30.0,
+        yaw_inertia_kg_m2: 1.5,
+        wheel_base_m: 0.5,
+        wheel_radius_m: 0.0865,
+        rolling: 0.01,
+        grip: Some(0.8),
+        weight_share: 1.0,
+        slope_rad: 0.0,
+        uphill_rad: 0.0,
+    };
+    let shafts = [1, 2].map(|node| CoupledShaft::direct(Place::node(node)));
+    world.couple("base", &Coupling::DifferentialDrive(base), &shafts).expect("two free shafts");
+}
+
 /// A bus of drives that all turn at 100 r/min, with next to no frame on it; and who may speak there.
 fn turning(drives: Drives) -> (World, StationId) {
+    moving(drives, |_| {})
+}
+
+/// The same, what hangs on their shafts being made by `join`.
+fn moving(drives: Drives, join: impl FnOnce(&mut World)) -> (World, StationId) {
     let mut world = World::new(Bitrate::M1, 1);
     let probe = world.add_probe();
     let nodes: Vec<u8> = drives.iter().map(|(node, _)| *node).collect();
     for (node, drive) in drives {
         world.add_drive(node, drive).expect("numbers differ");
     }
+    join(&mut world);
     world.run_for(Duration::from_millis(20));
     while world.poll_received(probe).is_some() {} // boot-up messages
     for node in &nodes {

@@ -132,7 +132,9 @@ impl<A: Assembly> Machine<A> {
 
     /// One control period that begins at `at`.
     fn tick(&mut self, at: Instant) {
-        self.watch_supply(at);
+        if !self.is_settled() {
+            self.watch_supply(at);
+        }
         if self.life == Life::Running {
             let levels = self.inputs.levels(|axis| self.assembly.shaft_counts(axis));
             let mut sensors = self.assembly.sense(levels);
@@ -147,9 +149,17 @@ impl<A: Assembly> Machine<A> {
         }
     }
 
+    /// Its supply changes nothing now: all that most periods have to know of it.
+    #[inline(always)]
+    fn is_settled(&self) -> bool {
+        self.life == Life::Running
+            && !matches!(self.supply, Supply::Cycling(_))
+            && self.assembly.supplies_firmware(true)
+    }
+
     /// Starts the drive when its voltage comes and stops it when it goes. It lives on whatever charges the bus, but is
     /// started by the supply alone.
-    #[inline]
+    #[inline(never)]
     fn watch_supply(&mut self, at: Instant) {
         let lives = self.life != Life::Dead;
         let supplied = self.assembly.supplies_firmware(lives) && (lives || self.supply == Supply::On);
