@@ -5,16 +5,13 @@ use std::fmt::Write;
 use std::path::Path;
 use std::time::Duration;
 
-use can::{Bitrate, Frame};
-use sim::machine::zlac8030l;
-use sim::{StationId, World, command};
+use can::Frame;
+use ferrodrive_tests::bench::zlac8030l::Bench;
+use sim::command;
 
 /// An answer comes within this time.
 const ANSWER_WITHIN: Duration = Duration::from_millis(20);
 const LOOK_EVERY: Duration = Duration::from_micros(100);
-
-/// Value of 200Eh for 500 kbit/s.
-const RATE_500K: u16 = 1;
 
 #[test]
 fn every_conversation_goes_as_it_is_written() {
@@ -106,31 +103,22 @@ fn play(stage: &mut Option<Stage>, line: &str) -> Result<(), String> {
 }
 
 struct Stage {
-    world: World,
-    host: StationId,
+    bench: Bench,
     heard: VecDeque<Frame>,
 }
 
 impl Stage {
     fn from_header(line: &str) -> Result<Self, String> {
-        let words: Vec<_> = line.split_whitespace().collect();
-        let ["drive", "zlac8030l", node] = words[..] else {
-            return Err(format!("expected a header like \"drive zlac8030l 4\", not {line:?}"));
-        };
-        let node = node.parse().map_err(|_| format!("{node:?} is no node"))?;
-        let mut world = World::new(Bitrate::K500, 1);
-        let host = world.add_probe();
-        world.add_drive(node, Box::new(zlac8030l(node, RATE_500K))).map_err(|error| error.to_string())?;
-        world.run_for(Duration::from_millis(10));
-        while world.poll_received(host).is_some() {}
-        Ok(Self { world, host, heard: VecDeque::new() })
+        if line != "drive zlac8030l 4" {
+            return Err(format!("expected the header \"drive zlac8030l 4\", not {line:?}"));
+        }
+        let mut bench = Bench::new();
+        bench.forget();
+        Ok(Self { bench, heard: VecDeque::new() })
     }
 
     fn run(&mut self, duration: Duration) {
-        self.world.run_for(duration);
-        while let Some((_, frame)) = self.world.poll_received(self.host) {
-            self.heard.push_back(frame);
-        }
+        self.heard.extend(self.bench.run(duration).heard_at().into_iter().map(|(_, frame)| frame));
     }
 
     fn expect_silence(&mut self) -> Result<(), String> {
@@ -139,7 +127,7 @@ impl Stage {
 
     fn send(&mut self, text: &str) -> Result<(), String> {
         let frame = first_word(text).parse().map_err(|_| format!("{text:?} is no frame"))?;
-        self.world.send(self.host, frame).map_err(|error| error.to_string())?;
+        self.bench.world.send(self.bench.host, frame).map_err(|error| error.to_string())?;
         // As long as a frame takes, and a little for the drive.
         self.run(Duration::from_micros(300));
         Ok(())
@@ -152,13 +140,13 @@ impl Stage {
     }
 
     fn command(&mut self, text: &str) -> Result<(), String> {
-        let answer = command::answer(&mut self.world, text).ok_or("expected a command")?;
+        let answer = command::answer(&mut self.bench.world, text).ok_or("expected a command")?;
         if answer.json.contains("\"ok\":true") { Ok(()) } else { Err(answer.json) }
     }
 
     fn hear(&mut self, text: &str) -> Result<(), String> {
-        let end = self.world.now() + ANSWER_WITHIN;
-        while self.heard.is_empty() && self.world.now() < end {
+        let end = self.bench.world.now() + ANSWER_WITHIN;
+        while self.heard.is_empty() && self.bench.world.now() < end {
             self.run(LOOK_EVERY);
         }
         let frame = self.heard.pop_front().ok_or("heard nothing")?;

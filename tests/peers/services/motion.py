@@ -1,9 +1,9 @@
-"""What the motor does by SDO: speeds, positions, torque, halt and quick stop, and what the world sees of it."""
+"""What the motor does by SDO: speeds, positions, halt and quick stop, and what the world sees of it."""
 
-from checks import check, equal, eventually, near, table, true
-from drive import ALL, MJOINT, ZL, ZLAC8030L, ZLIM42C
+from checks import check, eventually, near, true
+from drive import ALL, MJOINT
 
-POSITION, VELOCITY, TORQUE = 1, 3, 4
+POSITION = 1
 #: Counts of 6064h in a turn of the motor.
 TURN = {"zlac8030l": 4096, "zlim42c": 4000, "mjoint": 32_768}
 #: What the statusword shows of the power state: enabled, and in quick stop.
@@ -60,57 +60,3 @@ def stops(bench):
         bench.speed_becomes(100)
     bench.write(0x6040, 0x0000)
     eventually(lambda: bench.world("get")["current_a"], lambda current: abs(current) < 0.05, "no current after 0h")
-
-
-@check("a second set-point waits for the first when bit 5 is 0", *ZL)
-def queued(bench):
-    bench.write_all(bench.drive.unwatched)
-    bench.enable(POSITION)
-    bench.write(0x6081, 300)
-    for target in (8000, 2000):
-        bench.write(0x607A, target)
-        bench.write(0x6040, 0x0F)
-        bench.write(0x6040, 0x1F)
-    bench.write(0x6040, 0x0F)
-    furthest = max(bench.read(0x6064) for _ in iter(lambda: bench.statusword() & 0x5400 == 0x0400, True))
-    true(furthest > 7000, f"the first set-point of 8000 was followed, got to {furthest}")
-    bench.becomes(0x6064, 2000, bench.drive.close)
-
-
-@check("profile torque puts 1000 mA and -1000 mA into a locked rotor", ZLAC8030L)
-def torque(bench):
-    bench.world("rotor lock")
-    bench.write(0x6087, 20_000)
-    bench.enable(TORQUE)
-    for milliamperes in (1000, -1000):
-        bench.write(0x6071, milliamperes)
-        bench.becomes(0x6074, milliamperes)
-        bench.becomes(0x6077, milliamperes // 100, 1)
-    bench.status_becomes(1 << 10, 1 << 10, "bit 10 tells that the torque is reached")
-
-
-WATCHES = table("watch rpm", (400, 0), (0, 100))
-
-
-@check("with 2000h = {watch} and a silent host the motor turns at {rpm} r/min and stays enabled", ZLAC8030L, rows=WATCHES)
-def host_watch(bench, row):
-    bench.write(0x2000, row["watch"])
-    bench.turn(100)
-    bench.sleep(1.5)
-    near(bench.world("get")["velocity_rpm"], row["rpm"], 2, "velocity by the world, after silence")
-    bench.status_becomes(0x7F, 0x37, "enabled")
-    equal(bench.read(0x603F), 0, "603Fh")
-
-
-@check("a rotor that is held loses its steps: the drive arrives all the same, and the world knows better", ZLIM42C)
-def lost_steps(bench):
-    bench.enable(POSITION)
-    bench.world("rotor lock")
-    bench.move(4000)
-    equal(bench.read(0x6064), 4000, "6064h")
-    bench.world("rotor free")
-    bench.sleep(0.5)
-    get = bench.world("get")
-    equal(get["position"], 4000, "the position that the drive reports")
-    near(get["rotor_position"], 0, 12, "where the rotor is")
-    bench.status_becomes(0x22FF, 0x2237, "the statusword, without a fault")

@@ -5,7 +5,7 @@ import time
 from ferrodrive import SimulatorError
 
 from checks import check, equal, true
-from drive import ALL, MJOINT, ZL, ZLIM42C
+from drive import ALL, MJOINT, ZLIM42C
 
 #: The contract: on disk within 1.5 s of the drive's store.
 ON_DISK_S = 2.5
@@ -29,32 +29,6 @@ def on_command(bench):
     equal(bench.values(stored), expected(bench.drive), "the objects after a power cycle with saving")
     equal(bench.read(0x6040), 0, "6040h")
     true(bench.drive is MJOINT or bench.read(0x6081) == 120, "6081h, which is not stored")
-
-
-@check("as delivered each write is stored at once, and the command for it brings the factory settings back", *ZL)
-def at_once(bench):
-    delivered = bench.values(bench.drive.stored)
-    bench.write_all(bench.drive.stored)
-    bench.sleep(1.0)
-    bench.power_cycle()
-    equal(bench.values(bench.drive.stored), expected(bench.drive), "the objects")
-    bench.write(bench.drive.save[0], 1)
-    bench.sleep(1.0)
-    bench.power_cycle()
-    equal(bench.values(bench.drive.stored), delivered, "the objects after restoring")
-
-
-@check("a PDO mapping that was stored works after a power cycle", *ZL)
-def mapping(bench):
-    bench.write_all(((0x1A00, 0, 0), (0x1A00, 1, 0x606C0020), (0x1800, 2, 1), (0x1A00, 0, 1)))
-    bench.save()
-    bench.power_cycle()
-    equal(bench.values(((0x1A00, 0, 0), (0x1A00, 1, 0))), [1, 0x606C0020], "1A00h")
-    bench.nmt(0x01)
-    bench.sleep(0.1)
-    mark = bench.trace.mark()
-    bench.network.sync.transmit()
-    equal(bench.trace.wait(0x180 + bench.node_id, mark, 3.0, "a PDO after SYNC").dlc, 4, "bytes of the PDO")
 
 
 @check("--state keeps what was stored when the simulator ends, and when it is killed", *ALL, state=True)

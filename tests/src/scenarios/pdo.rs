@@ -79,7 +79,8 @@ pub fn an_rpdo_of_types_0_to_240_waits_for_the_sync_and_one_of_254_or_255_does_n
 pub fn a_synchronous_tpdo_comes_with_each_nth_sync_and_one_of_type_0_after_a_change<S: Subject>() {
     for (kind, syncs) in [(1, 12), (3, 9), (4, 12), (240, 480), (0, 12)] {
         let mut bench = Bench::<S>::new();
-        bench.map(0x1A02, &[0x6041_0010]).set((0x1802, 2), kind).send("000#010n").run_ms(5).forget();
+        bench.map(0x1A02, &[0x6041_0010]).set((0x1802, 2), kind).send("080#").run_ms(2);
+        bench.send("000#010n").run_ms(5).hears_of("38n#", &[]);
         if kind == 0 {
             (0..3).for_each(|_| sync(&mut bench));
             bench.forget().set(0x6040, 6);

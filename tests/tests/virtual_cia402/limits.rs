@@ -127,6 +127,7 @@ fn a_limit_switch_stops_the_motion_towards_it_and_lets_it_go_back() {
     let mut bench = Bench::new();
     bench.enable(3);
     bench.switch("POS", Some(2 * TURN), None);
+    assert!(!bench.has(0x0800), "bit 11: nothing limits it yet");
     bench.set(&[(0x60FF, 0, 10 * TURN)]);
     bench.run_ms(1000);
     assert!(bench.rpm().abs() < 1.0, "{}", bench.rpm());

@@ -89,10 +89,7 @@ fn with_261ch_the_axes_start_within_a_control_period_of_each_other_and_without_i
 #[test]
 fn a_point_waits_for_sync() {
     let mut bench = three(1, 0);
-    let before = bench.position();
-    bench.send("501#50C30000").run_ms(50);
-    assert_eq!(bench.position(), before);
-    bench.send("080#").run_ms(1).shows(0xFFFF, 0x0037);
+    bench.send("501#50C30000").run_ms(50).is_at(0, 0).send("080#").run_ms(1).shows(0xFFFF, 0x0037);
 }
 
 #[test]

@@ -24,6 +24,7 @@ fn bit_4_acts_on_each_write_and_clears_itself_and_bit_6_counts_from_the_target()
         bench.set(0x6040, 0x5F).reads(0x6040, 0x4F).shows(0xFFFF, 0x0037);
         bench.reaches(2000).is_at(10_000 * turn, 30);
     }
+    bench.set(0x6040, 0x5F).set(0x6040, 0x5F).reaches(2000).is_at(50_000, 30);
 }
 
 #[test]

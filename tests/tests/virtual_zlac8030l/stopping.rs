@@ -52,13 +52,6 @@ pub(crate) enum Ramp {
     CurrentLimit,
 }
 
-#[test]
-fn controlword_0_lets_the_motor_coast() {
-    let mut bench = turning();
-    bench.set(0x6040, 0).shows(0xFF, 0x70);
-    assert_coasts(&mut bench);
-}
-
 #[track_caller]
 pub(crate) fn assert_coasts(bench: &mut Bench) {
     let rad_s = bench.report().velocity_rpm * RAD_S_PER_RPM;
@@ -78,19 +71,6 @@ fn only_an_input_with_function_9_stops_and_2030_01_turns_its_level_over() {
     let mut bench = turning();
     bench.set((0x2030, 1), 1).run_ms(800);
     assert_within("X0 is active low and not connected", bench.report().velocity_rpm, -0.5, 0.5);
-}
-
-#[test]
-fn a_silent_host_stops_the_motor_after_2000h_and_leaves_it_enabled_without_a_fault() {
-    let mut bench = turning();
-    bench.set(0x2000, 500).run_ms(490);
-    assert_within("just before", bench.report().velocity_rpm, RPM - 1.0, RPM + 1.0);
-    bench.run_ms(20);
-    assert_stops(&mut bench, Ramp::Time(0.4));
-    bench.shows(0xFF, 0x37).reads(0x603F, 0).reads(0x60FF, 0);
-    bench.set(0x60FF, 60).run_ms(400);
-    let again = bench.get(0x606C);
-    assert!(again > 100, "a new target is followed: {again}");
 }
 
 /// 2000h is the time without the host (chapter 9); which frames are a sign of it is a reading, L083.
@@ -119,10 +99,13 @@ fn data_to_the_node_keeps_the_watch_quiet_until_it_ends_and_what_goes_on_without
 }
 
 #[test]
-fn a_silent_host_stops_the_motor_with_the_ramp_of_605ah_in_each_mode() {
-    let mut bench = turning();
-    bench.set(0x605A, 6).set(0x2000, 300).run_ms(299);
-    assert_stops(&mut bench, Ramp::Time(0.1));
+fn a_silent_host_stops_the_motor_after_2000h_with_the_ramp_of_605ah_in_each_mode_and_leaves_it_enabled() {
+    for (option, time_s) in [(5, 0.4), (6, 0.1)] {
+        let mut bench = turning();
+        bench.set(0x605A, option).set(0x2000, 500).run_ms(490).turns_about(RPM, 1.0).run_ms(9);
+        assert_stops(&mut bench, Ramp::Time(time_s));
+        bench.shows(0xFF, 0x37).reads(0x603F, 0).reads(0x60FF, 0);
+    }
 
     let mut bench = Bench::new();
     bench.set(0x605A, 6).set(0x6085, 100).enable_in(1).set(0x2000, 1000).set(0x607A, 100_000).set(0x6040, 0x1F);

@@ -32,6 +32,9 @@ fn another_node_number_takes_effect_with_the_next_start_unless_the_switches_deci
     let mut bench = Bench::with(vec![Box::new(zlim42c(32, RATE_500K))]);
     bench.node = 32;
     bench.set(0x2008, 33).run_ms(10).forget().offer("000#8120").run_ms(10).hears(&["721#00"]);
+    // 4.1: 0 to 31 are undefined.
+    bench.node = 33;
+    bench.set(0x2008, 31).run_ms(10).forget().offer("000#8121").run_ms(10).hears(&["701#00"]);
 }
 
 #[test]

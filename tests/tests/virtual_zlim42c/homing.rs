@@ -190,26 +190,7 @@ fn an_output_tells_that_homing_is_done() {
     assert_eq!(bench.get(0x2004), 0, "reversed");
 }
 
-#[test]
-fn a_switch_on_any_input_reversed_too_is_found() {
-    for (input, reversed) in [(0, false), (1, true), (2, false), (3, true)] {
-        let mut bench = Bench::new();
-        // An opener is high everywhere but on its switch.
-        let range = if reversed {
-            SwitchRange { low: None, high: Some(1999) }
-        } else {
-            SwitchRange { low: Some(2000), high: None }
-        };
-        bench.operate(|drive, now| drive.set_switch(input, range, now)).expect("an input");
-        bench.set((0x2030, 1), if reversed { 1 << input } else { 0 }).run_ms(20);
-        bench.set((0x2030, 2 + input as u8), 2).set(0x6098, 18).enable_in(6).set(0x6040, 0x1F).run_ms(4000);
-        assert_eq!(bench.statusword() & BITS, 1 << 8 | 1 << 10, "X{input}");
-        let zero = shaft_pulses(&mut bench) - bench.report().position as f64;
-        assert_within("pulses beyond the edge", zero - 2000.0, *FILTER_WAY.start(), *FILTER_WAY.end());
-    }
-}
-
-/// Home and limits anywhere around the rotor, any microsteps, any of the two speeds: the edge that the method names is
+/// Home and limits anywhere around the rotor, on any inputs of either polarity, any microsteps, any of the two speeds: the edge that the method names is
 /// found, as far beyond it as the filter's 10 ms are at 6099h:02.
 #[test]
 fn any_start_and_any_speed_leads_to_the_edge_of_the_method() {
@@ -227,10 +208,14 @@ fn any_start_and_any_speed_leads_to_the_edge_of_the_method() {
             let track = [(Some(-half), Some(half)), (Some(end), None), (None, Some(-end))];
             bench.set(0x2006, setting);
             for (n, (low, high)) in track.into_iter().enumerate() {
-                let shifted = |edge: Option<i64>| edge.map(|edge| edge - start);
-                let range = SwitchRange { low: shifted(low), high: shifted(high) };
-                bench.operate(|drive, now| drive.set_switch(n, range, now)).expect("an input");
-                bench.set((0x2030, 2 + n as u8), n as i64 + 1);
+                let shifted = |edge: Option<i64>, by: i64| edge.map(|edge| edge - start + by);
+                let (input, opens) = ((n + seed as usize) % 4, n > 0 && seed & 4 != 0);
+                // A limit that opens is high everywhere but on its switch.
+                let (low, high) =
+                    if opens { (shifted(high, 1), shifted(low, -1)) } else { (shifted(low, 0), shifted(high, 0)) };
+                bench.operate(|drive, now| drive.set_switch(input, SwitchRange { low, high }, now)).expect("an input");
+                let polarity = bench.get((0x2030, 1)) | i64::from(opens) << input;
+                bench.set((0x2030, 1), polarity).run_ms(20).set((0x2030, 2 + input as u8), n as i64 + 1);
             }
             for (index, sub, value) in [(0x6099, 1, search_rpm), (0x6099, 2, latch_rpm), (0x607C, 0, offset)] {
                 bench.set((index, sub), value);
