@@ -22,7 +22,7 @@ pub fn objects_are_the_manuals(table: &'static Table, rows: &[ObjectRow]) {
 
 /// Every object agrees with the manual in every column, at this node.
 pub fn columns_are_the_manuals<const N: usize>(table: &'static Table, rows: &[ObjectRow], node: NodeId) {
-    let ours = |row: &ObjectRow| Some(&table.rows()[table.find(Mux::new(row.index, row.sub)).ok()?.position()]);
+    let ours = |row: &ObjectRow| Some(table.row(table.find(Mux::new(row.index, row.sub)).ok()?));
     let pairs: Vec<_> = rows.iter().filter_map(|row| Some((ours(row)?, row))).collect();
     assert!(!pairs.is_empty(), "no object is in both");
     let found = pairs.into_iter().flat_map(|(ours, row)| differences::<N>(table, node, ours, row));

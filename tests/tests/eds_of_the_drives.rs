@@ -5,13 +5,15 @@ use std::time::Duration;
 
 use canopen::od::DataType;
 use canopen::{Mux, NodeId};
+use devices::Description;
+use devices::variant::Variation;
 use eds::{Eds, Sheet, Value, Variable, write};
 use master::{Network, Node};
 use sim::World;
 use sim::machine::{Order, models, order};
 
 /// Asks a fresh drive of the model.
-fn ask<T>(model: &'static devices::Description, order_of: &Order, question: impl AsyncFnOnce(Node) -> T) -> T {
+fn ask<T>(model: &'static Description, order_of: &Order, question: impl AsyncFnOnce(Node) -> T) -> T {
     let mut world = World::new(order_of.bitrate, 1);
     let drive = order(model, order_of).expect("a drive of this model");
     world.add_drive(order_of.node.raw(), drive).expect("a free place");
@@ -52,13 +54,28 @@ async fn differing(eds: Eds, node: Node) -> (usize, Vec<String>) {
     (compared, wrong)
 }
 
+/// Every model as delivered, and with each choice that comes with other objects: the model, its order and its sheet.
+fn delivered() -> impl Iterator<Item = (&'static Description, Order, Eds)> {
+    let choices = |variation: &'static Variation| variation.choices.iter().map(|choice| (variation.key, choice.name));
+    let firmwares = move |model: &'static Description| {
+        let other = model.variations.iter().filter(|variation| variation.key == "firmware").flat_map(choices);
+        let other: Vec<_> = other.skip(1).map(Some).collect();
+        [None].into_iter().chain(other).map(move |firmware| {
+            let node = model.node_id.unwrap_or(NodeId::MIN);
+            let mut wanted = Order::new(model, node, model.bitrate.unwrap_or(can::Bitrate::K500));
+            firmware.into_iter().for_each(|(key, choice)| wanted.variant.choose(key, choice).expect("a choice"));
+            let chosen = model.as_chosen(&wanted.variant);
+            assert_eq!(std::ptr::eq(chosen, model), firmware.is_none(), "{}: {firmware:?}", model.name);
+            (model, wanted, sheet(&Sheet::of(chosen)))
+        })
+    };
+    models().flat_map(firmwares)
+}
+
 #[test]
 fn every_default_of_a_sheet_is_what_a_fresh_drive_answers() {
-    for model in models() {
-        let node = model.node_id.unwrap_or(NodeId::MIN);
-        let as_delivered = Order::new(model, node, model.bitrate.unwrap_or(can::Bitrate::K500));
-        let eds = sheet(&Sheet::of(model));
-        let (compared, wrong) = ask(model, &as_delivered, async |node| differing(eds, node).await);
+    for (model, order, eds) in delivered() {
+        let (compared, wrong) = ask(model, &order, async |node| differing(eds, node).await);
         assert_eq!(wrong, Vec::<String>::new(), "{}", model.name);
         assert!(compared > 60, "{}: {compared} defaults", model.name);
     }
@@ -66,16 +83,14 @@ fn every_default_of_a_sheet_is_what_a_fresh_drive_answers() {
 
 #[test]
 fn every_object_of_a_sheet_is_there_and_no_other() {
-    for model in models() {
-        let node = model.node_id.unwrap_or(NodeId::MIN);
-        let as_delivered = Order::new(model, node, model.bitrate.unwrap_or(can::Bitrate::K500));
-        let eds = sheet(&Sheet::of(model));
+    for (model, order, eds) in delivered() {
         let places: Vec<Mux> = eds.variables().map(|(index, variable)| Mux::new(index, variable.sub_index)).collect();
-        let rows: Vec<Mux> = model.dictionary.rows().iter().map(canopen::od::Entry::mux).collect();
+        let rows: Vec<Mux> =
+            model.as_chosen(&order.variant).dictionary.rows().iter().map(canopen::od::Entry::mux).collect();
         assert_eq!(places, rows, "{}", model.name);
         let readable = eds.variables().filter(|(_, variable)| variable.access.is_readable());
         let readable: Vec<Mux> = readable.map(|(index, variable)| Mux::new(index, variable.sub_index)).collect();
-        let refused = ask(model, &as_delivered, async |node| {
+        let refused = ask(model, &order, async |node| {
             let mut refused = Vec::new();
             for place in readable {
                 if let Err(error) = node.upload(place).await {

@@ -7,7 +7,7 @@ use crate::axis::AxisDescription;
 use crate::faults::{FaultRow, Faults};
 use crate::stated::Stated;
 use crate::timing::Timing;
-use crate::variant::Variation;
+use crate::variant::{Pick, Variant, Variation};
 
 /// One model of device: what masters, tools and the firmware itself have to know about it, as const data.
 #[derive(Clone, Copy)]
@@ -48,12 +48,26 @@ pub struct Description {
     pub stated_departures: &'static [Stated],
     /// At which points devices of this model may differ.
     pub variations: &'static [Variation],
+    /// The choices that come with other objects, and what the model is then.
+    pub editions: &'static [Edition],
 }
 
 impl Description {
     /// The first axis; `None` for a device that is no drive.
     pub const fn first_axis(&self) -> Option<&'static AxisDescription> {
         self.axes.first()
+    }
+
+    /// What a device of this model is that took these choices.
+    pub fn as_chosen(&'static self, variant: &Variant) -> &'static Self {
+        let edition = self.editions.iter().find(|edition| variant.is(edition.pick));
+        edition.map_or(self, |edition| edition.description)
+    }
+
+    /// True if this is `model`, or what it is with another choice.
+    pub fn is_edition_of(&self, model: &Self) -> bool {
+        let same = |other: &Self| core::ptr::eq(self, other);
+        same(model) || model.editions.iter().any(|edition| same(edition.description))
     }
 
     /// The row of an object, if the model has it.
@@ -112,6 +126,16 @@ impl core::fmt::Debug for Description {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(self.name)
     }
+}
+
+/// What a model is when one of its choices was taken that comes with other objects: another firmware, say.
+#[derive(Clone, Copy, Debug)]
+pub struct Edition {
+    /// The choice.
+    pub pick: Pick,
+    /// What the model is then. It has the same name and variations; an object that both have has the same slot in both
+    /// ([`Table::amended`]).
+    pub description: &'static Description,
 }
 
 /// What a device says that it is.

@@ -112,6 +112,35 @@ pub const fn merge<const N: usize>(parts: &[&[Entry]]) -> [Entry; N] {
     rows
 }
 
+/// The rows of another edition of a device, for [`Table::amended`](canopen::od::Table::amended): `base` in its order, each row
+/// replaced by that of `changes` at its place, and behind them the rest of `changes`.
+///
+/// # Panics
+/// If they are not `N` rows, at compile time in a `const`.
+pub const fn amend<const N: usize>(base: &[Entry], changes: &[Entry]) -> [Entry; N] {
+    let mut rows = [ro(0, 0, U8, "", ""); N];
+    let (mut count, mut i) = (base.len(), 0);
+    while i < base.len() {
+        rows[i] = base[i];
+        i += 1;
+    }
+    i = 0;
+    while i < changes.len() {
+        let mut at = 0;
+        while at < base.len() && base[at].mux().key() != changes[i].mux().key() {
+            at += 1;
+        }
+        if at == base.len() {
+            at = count;
+            count += 1;
+        }
+        rows[at] = changes[i];
+        i += 1;
+    }
+    assert!(count == N, "base and changes do not have N rows");
+    rows
+}
+
 /// Rows of a table, and a typed constant for each that is named behind its row (`=> NAME`): each stands once.
 ///
 /// The rows come out as the constant array in the head. The constants come out where the macro in the head is called, beside

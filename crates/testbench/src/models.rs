@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use canopen::NodeId;
+use devices::variant::{NoSuchChoice, Variant};
 use eds::keep_of;
 use master::Models;
 use sim::machine::models;
@@ -12,9 +13,33 @@ use crate::words::suggest::{did_you_mean, near};
 
 pub use devices::Description;
 
-/// What a MODEL argument means: the name of a model, or an EDS or DCF file that describes one.
+/// What a MODEL argument means: the name of a model, with choices that come with other objects behind it
+/// (`zlac8030l,firmware=2.01`), or an EDS or DCF file that describes one.
+///
+/// # Errors
+/// What of it is not known, and what is.
 pub fn resolve(text: &str) -> Result<&'static Description, String> {
-    resolve_in(text, Path::new(""))
+    let Some((name, choices)) = text.split_once(',').filter(|_| !is_file(text)) else {
+        return resolve_in(text, Path::new(""));
+    };
+    let model = resolve_in(name, Path::new(""))?;
+    let mut variant = Variant::first_of(model.variations);
+    for word in choices.split(',') {
+        let (key, choice) = word
+            .split_once('=')
+            .ok_or_else(|| format!("'{word}' is no choice; expected KEY=CHOICE after the comma"))?;
+        variant.choose(key.trim(), choice.trim()).map_err(|unknown| match unknown {
+            NoSuchChoice::Choice(variation) => {
+                let known: Vec<_> = variation.choices.iter().map(|choice| choice.name).collect();
+                format!("{key} of a {name} is no '{choice}'; expected one of: {}", known.join(", "))
+            }
+            NoSuchChoice::Variation => {
+                let known: Vec<_> = model.variations.iter().map(|variation| variation.key).collect();
+                format!("a {name} has no choice of '{key}'; it has: {}", known.join(", "))
+            }
+        })?;
+    }
+    Ok(model.as_chosen(&variant))
 }
 
 /// As [`resolve`], with files looked for in `folder`.
@@ -54,7 +79,7 @@ fn described(path: &Path) -> Result<&'static Description, String> {
 
 /// True for a device that a data sheet describes: what one count of an object is worth, no data sheet says.
 pub fn is_from_file(model: &Description) -> bool {
-    !models().any(|known| core::ptr::eq(known, model))
+    !models().any(|known| model.is_edition_of(known))
 }
 
 /// The models known, and those told that are not among them.
@@ -94,6 +119,19 @@ pub fn how_to_say(node: NodeId, models: &[&str]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_choice_behind_a_model_gives_the_objects_that_come_with_it() {
+        let has = |text: &str, index, sub| resolve(text).unwrap().row(canopen::Mux::new(index, sub)).is_some();
+        assert!(!has("zlac8030l", 0x202F, 6) && has("ZLAC8030L,firmware=2.01", 0x202F, 6));
+        assert!(!has("m8025e25b80", 0x1006, 0) && has("m8025e25b80,firmware=1.66", 0x1006, 0));
+        assert!(std::ptr::eq(resolve("zlac8030l,motor=fast").unwrap(), resolve("zlac8030l").unwrap()));
+        let refusal = |text: &str| resolve(text).unwrap_err();
+        assert!(refusal("zlac8030l,firmware=3").contains("expected one of: 1.00, 2.01"));
+        assert!(refusal("zlac8030l,colour=red").contains("it has: firmware, motor"));
+        assert!(refusal("zlac8030l,firmware").contains("KEY=CHOICE"));
+        assert!(!is_from_file(resolve("zlac8030l,firmware=2.01").unwrap()));
+    }
 
     #[test]
     fn the_embedded_bus_has_one_of_each_kind_at_different_nodes() {

@@ -10,6 +10,7 @@ mod alarms;
 mod communication;
 mod components;
 mod datagrams;
+mod firmware;
 mod homing;
 mod hosts_of_real_joints;
 mod interpolation;

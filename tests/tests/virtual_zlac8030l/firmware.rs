@@ -36,9 +36,15 @@ fn the_fault_of_firmware_2_01_is_reset_once_the_target_is_within_the_maximum() {
 }
 
 #[test]
-fn the_version_is_that_of_the_firmware() {
-    for (firmware, version) in [("1.00", 0x0100), ("2.01", 0x0201)] {
+fn the_version_is_that_of_the_firmware_and_202f_06_is_there_with_2_01_only() {
+    for (firmware, version, count) in [("1.00", 0x0100, 5), ("2.01", 0x0201, 6)] {
         let mut bench = Bench::choosing("firmware", firmware);
-        bench.reads(0x100A, version).reads(0x2025, version);
+        bench.reads(0x100A, version).reads(0x2025, version).reads((0x202F, 0), count);
+        let written = bench.sdo(&[0x2B, 0x2F, 0x20, 6, 7, 0, 0, 0]).expect("an answer");
+        bench.let_store().power_cycle();
+        let read = bench.read((0x202F, 6));
+        let expected = if count == 6 { (0x60, Ok(vec![7, 0])) } else { (0x80, Err(0x0609_0011)) };
+        assert_eq!((written[0], read), expected, "{firmware}");
+        bench.reads((0x202F, 5), 1).reads((0x2030, 0), 16);
     }
 }

@@ -1,6 +1,6 @@
 //! What a download has to pass besides its row: conditions of the firmware, by slot.
 
-use super::{Slot, View};
+use super::{MAX_ROWS, Slot, View};
 use crate::AbortCode;
 
 /// What must hold for a download besides type, access and range: sees all values, refuses with an abort code.
@@ -59,14 +59,14 @@ impl Refusal {
 ///     if raw % 2 == 0 { Ok(()) } else { Err(AbortCode::INVALID_VALUE) }
 /// }
 /// static LIST: [(Slot, Condition); 1] = [(TABLE.slot(0x2000, 0), Condition::Check(even))];
-/// static NUMBERS: [u8; 1] = condition_numbers(&LIST);
+/// static NUMBERS: [u16; 1] = condition_numbers(&LIST);
 /// static CONDITIONS: Conditions = Conditions::new(&LIST, &NUMBERS);
 /// ```
 #[derive(Debug)]
 pub struct Conditions {
     list: &'static [(Slot, Condition)],
     /// By slot: 0 for none, else one more than the place in the list.
-    numbers: &'static [u8],
+    numbers: &'static [u16],
 }
 
 impl Conditions {
@@ -74,19 +74,19 @@ impl Conditions {
     pub const NONE: &'static Self = &Self { list: &[], numbers: &[] };
 
     /// The conditions of `list`, with `numbers` = [`condition_numbers`]`(list)`.
-    pub const fn new(list: &'static [(Slot, Condition)], numbers: &'static [u8]) -> Self {
+    pub const fn new(list: &'static [(Slot, Condition)], numbers: &'static [u16]) -> Self {
         Self { list, numbers }
     }
 
     /// By slot: 0 where there is no condition.
     #[inline(always)]
-    pub(super) const fn numbers(&self) -> &'static [u8] {
+    pub(super) const fn numbers(&self) -> &'static [u16] {
         self.numbers
     }
 
     /// The condition of a number.
     #[inline(always)]
-    pub(super) fn numbered(&self, number: u8) -> Option<Condition> {
+    pub(super) fn numbered(&self, number: u16) -> Option<Condition> {
         self.list.get(usize::from(number).wrapping_sub(1)).map(|(_, condition)| *condition)
     }
 
@@ -102,15 +102,15 @@ impl Conditions {
 /// Where in `list` the condition of each of `N` rows stands; for a `static` beside the list.
 ///
 /// # Panics
-/// At compile time if a row is named twice or the list has more than 255 conditions.
-pub const fn condition_numbers<const N: usize>(list: &[(Slot, Condition)]) -> [u8; N] {
-    assert!(list.len() <= u8::MAX as usize, "more conditions than can be numbered");
+/// At compile time if a row is named twice.
+pub const fn condition_numbers<const N: usize>(list: &[(Slot, Condition)]) -> [u16; N] {
+    const { assert!(N <= MAX_ROWS, "each row may have a condition, and each condition has a number") };
     let mut numbers = [0; N];
     let mut i = 0;
     while i < list.len() {
         let position = list[i].0.position();
         assert!(numbers[position] == 0, "two conditions on one object");
-        numbers[position] = i as u8 + 1;
+        numbers[position] = i as u16 + 1;
         i += 1;
     }
     numbers

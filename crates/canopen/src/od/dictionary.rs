@@ -72,6 +72,13 @@ impl<S: Storage> Dictionary<S> {
         self.cells.as_mut()[object.slot().position()] = value.to_raw();
     }
 
+    /// Stores a whole number in the type that the object's row has here: for an object whose type differs between the
+    /// editions of a device ([`Table::amended`]). The device's own right, and the number must fit.
+    pub fn set_number<T: Scalar + Into<i64>>(&mut self, object: Object<T>, value: T) {
+        let data_type = self.table.row(object.slot()).data_type;
+        self.cells.as_mut()[object.slot().position()] = data_type.raw(value.into());
+    }
+
     /// The value of a typed object of 64 bits.
     pub fn get_long<T: LongScalar>(&self, object: Object<T>) -> T {
         let mut bytes = [0; 8];
@@ -324,7 +331,7 @@ impl<S: Storage> Dictionary<S> {
     }
 
     #[inline(never)]
-    fn ask_condition(&self, number: u8, raw: u32) -> Result<(), Refusal> {
+    fn ask_condition(&self, number: u16, raw: u32) -> Result<(), Refusal> {
         match self.conditions.numbered(number) {
             None => Ok(()),
             Some(Condition::Check(check)) => check(&self.view(), raw).map_err(Refusal::Abort),

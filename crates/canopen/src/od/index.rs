@@ -39,17 +39,29 @@ impl<const N: usize> Index<N> {
     /// # Panics
     /// At compile time if the rows are not strictly ascending by index and sub-index, or are more than [`MAX_ROWS`].
     pub const fn of(rows: &[Entry; N]) -> Self {
+        Self::of_amended(rows, N)
+    }
+
+    /// The index of rows of which those from position `base` on were added behind the others: see
+    /// [`Table::amended`](super::Table::amended).
+    ///
+    /// # Panics
+    /// At compile time if either part is not strictly ascending by index and sub-index, one row is at the place of
+    /// another, or they are more than [`MAX_ROWS`].
+    pub const fn of_amended(rows: &[Entry; N], base: usize) -> Self {
         let (mut facts, mut places) = ([RowFacts::NONE; N], [FREE_PLACES; N]);
-        match fill(rows, &mut facts, &mut places) {
+        match fill(rows, base, &mut facts, &mut places) {
             Ok((byte_count, staging)) => Self { facts, places, byte_count, staging },
             Err(_) => panic!("object rows must ascend by index and sub-index"),
         }
     }
 }
 
-/// Fills `facts` and `places`, which are as long as `rows`. Gives the bytes of all long values, and of the longest.
+/// Fills `facts` and `places`, which are as long as `rows`. Gives the bytes of all long values, and of the longest. The rows
+/// before position `base` ascend, and those from there on.
 pub(super) const fn fill(
     rows: &[Entry],
+    base: usize,
     facts: &mut [RowFacts],
     places: &mut [Places],
 ) -> Result<(u32, u32), TableError> {
@@ -70,7 +82,8 @@ pub(super) const fn fill(
     while position < rows.len() {
         let row = &rows[position];
         let key = row.mux().key();
-        if position > 0 && facts[position - 1].key >= key {
+        let follows = position == 0 || position == base || facts[position - 1].key < key;
+        if !follows || (position >= base && has(facts, places, key)) {
             return Err(TableError::NotAscending { position });
         }
         let summary = Summary::of(row);
@@ -92,6 +105,18 @@ pub(super) const fn fill(
         Some(byte_count) => Ok((byte_count, staging)),
         None => Err(TableError::TooManyBytes),
     }
+}
+
+/// Whether a row with this key is in the directory.
+const fn has(facts: &[RowFacts], places: &[u16], key: u32) -> bool {
+    let mut place = first_place(key, places.len());
+    while places[place] != FREE {
+        if facts[places[place] as usize].key == key {
+            return true;
+        }
+        place = next_place(place, places.len());
+    }
+    false
 }
 
 const fn insert(places: &mut [u16], key: u32, position: u16) {

@@ -4,7 +4,8 @@ use super::index::{FREE, fill, first_place, next_place};
 use super::{Entry, Gate, Held, Index, Places, RowFacts, Slot, Summary, TableError};
 use crate::{AbortCode, Mux};
 
-/// All rows of a device, ascending by index and sub-index, with what makes the search among them fast.
+/// All rows of a device, with what makes the search among them fast. They lie in the order of their [`Slot`]s, which is that of
+/// index and sub-index unless the table was [`amended`](Self::amended).
 ///
 /// Every request of a peer begins with a search, so it is prepared once: a hash directory leads from a key to its row,
 /// most often in one step. Searching 200 sorted keys by halves takes three times as long.
@@ -36,6 +37,8 @@ use crate::{AbortCode, Mux};
 /// ```
 #[derive(Clone, Copy)]
 pub struct Table {
+    by_slot: &'static [Entry],
+    /// The same, ascending by index and sub-index.
     rows: &'static [Entry],
     facts: &'static [RowFacts],
     places: &'static [u16],
@@ -68,8 +71,46 @@ impl<T> Object<T> {
 impl Table {
     /// A table of `rows` with `index` = [`Index::of`]`(rows)`.
     pub const fn new<const N: usize>(rows: &'static [Entry; N], index: &'static Index<N>) -> Self {
+        Self::over(rows, rows, index)
+    }
+
+    /// The table of another edition of a device: `rows` are those of its [`new`](Self::new) table in their order, some of
+    /// them perhaps another type, access or default, and behind them those that only this edition has. So each object that
+    /// both have keeps its slot, and a firmware its typed constants, but for those whose type is another. `index` =
+    /// [`Index::of_amended`]; `ascending` are the same rows by index and sub-index.
+    ///
+    /// # Panics
+    /// At compile time if `ascending` does not ascend, or has another row.
+    pub const fn amended<const N: usize>(
+        rows: &'static [Entry; N],
+        ascending: &'static [Entry; N],
+        index: &'static Index<N>,
+    ) -> Self {
+        let table = Self::over(rows, ascending, index);
+        let mut i = 0;
+        while i < N {
+            let key = ascending[i].mux().key();
+            assert!(i == 0 || ascending[i - 1].mux().key() < key, "the rows do not ascend");
+            table.slot(ascending[i].index, ascending[i].sub_index);
+            i += 1;
+        }
+        table
+    }
+
+    const fn over<const N: usize>(
+        rows: &'static [Entry; N],
+        ascending: &'static [Entry; N],
+        index: &'static Index<N>,
+    ) -> Self {
         let Index { facts, places, byte_count, staging } = index;
-        Self { rows, facts, places: places.as_flattened(), byte_count: *byte_count, staging: *staging }
+        Self {
+            by_slot: rows,
+            rows: ascending,
+            facts,
+            places: places.as_flattened(),
+            byte_count: *byte_count,
+            staging: *staging,
+        }
     }
 
     /// Whether rows make a table, before they are kept for it. `facts` and `places` are as long as the rows, whatever is in
@@ -78,7 +119,7 @@ impl Table {
     /// # Errors
     /// [`TableError`].
     pub fn check(rows: &[Entry], facts: &mut [RowFacts], places: &mut [Places]) -> Result<(), TableError> {
-        fill(rows, facts, places).map(|_| ())
+        fill(rows, rows.len(), facts, places).map(|_| ())
     }
 
     /// A table of rows that are read at run time. `facts` and `places` are as long as the rows, whatever is in them:
@@ -91,18 +132,18 @@ impl Table {
         facts: &'static mut [RowFacts],
         places: &'static mut [Places],
     ) -> Result<Self, TableError> {
-        let (byte_count, staging) = fill(rows, facts, places)?;
-        Ok(Self { rows, facts, places: places.as_flattened(), byte_count, staging })
+        let (byte_count, staging) = fill(rows, rows.len(), facts, places)?;
+        Ok(Self { by_slot: rows, rows, facts, places: places.as_flattened(), byte_count, staging })
     }
 
-    /// All rows, ascending.
+    /// All rows, ascending by index and sub-index. Where a row lies here is not its slot: [`iter`](Self::iter) has both.
     pub const fn rows(&self) -> &'static [Entry] {
         self.rows
     }
 
     /// The row of a slot of this table.
     pub fn row(&self, slot: Slot) -> &'static Entry {
-        &self.rows[slot.position()]
+        &self.by_slot[slot.position()]
     }
 
     /// Bytes that a dictionary of this table needs for values longer than a cell, and to take one of them in.
@@ -127,9 +168,9 @@ impl Table {
         &self.facts[slot.position()].gate
     }
 
-    /// All slots with their rows.
+    /// All slots with their rows, in the order of the slots.
     pub fn iter(&self) -> impl Iterator<Item = (Slot, &'static Entry)> + use<> {
-        self.rows.iter().enumerate().map(|(i, row)| (Slot::at(i), row))
+        self.by_slot.iter().enumerate().map(|(i, row)| (Slot::at(i), row))
     }
 
     /// Finds a row.
@@ -163,9 +204,9 @@ impl Table {
 
     #[cold]
     fn missing(&self, index: u16) -> AbortCode {
-        let first = self.facts.partition_point(|facts| facts.key >> 8 < u32::from(index));
-        match self.facts.get(first) {
-            Some(facts) if facts.key >> 8 == u32::from(index) => AbortCode::NO_SUCH_SUB_INDEX,
+        let first = self.rows.partition_point(|row| row.index < index);
+        match self.rows.get(first) {
+            Some(row) if row.index == index => AbortCode::NO_SUCH_SUB_INDEX,
             _ => AbortCode::NO_SUCH_OBJECT,
         }
     }
@@ -176,17 +217,15 @@ impl Table {
     /// If the table has no such row.
     pub const fn slot(&self, index: u16, sub_index: u8) -> Slot {
         let key = Mux::new(index, sub_index).key();
-        let (mut low, mut high) = (0, self.facts.len());
-        while low < high {
-            let middle = (low + high) / 2;
-            if self.facts[middle].key < key {
-                low = middle + 1;
-            } else {
-                high = middle;
+        let mut place = first_place(key, self.places.len());
+        while self.places[place] != FREE {
+            let position = self.places[place] as usize;
+            if self.facts[position].key == key {
+                return Slot::at(position);
             }
+            place = next_place(place, self.places.len());
         }
-        assert!(low < self.facts.len() && self.facts[low].key == key, "no such object in the table");
-        Slot::at(low)
+        panic!("no such object in the table")
     }
 
     /// A typed object, for a `const` of the device.
@@ -195,7 +234,7 @@ impl Table {
     /// If the table has no such row or its data type is not `T`'s: at compile time in a `const`.
     pub const fn object<T: Held>(&self, index: u16, sub_index: u8) -> Object<T> {
         let slot = self.slot(index, sub_index);
-        let same = self.rows[slot.position()].data_type.code() == T::DATA_TYPE.code();
+        let same = self.by_slot[slot.position()].data_type.code() == T::DATA_TYPE.code();
         assert!(same, "the object has another data type");
         Object { slot, value: PhantomData }
     }

@@ -134,7 +134,7 @@ static INDEX: Index<COUNT> = Index::of(&ROWS);
 pub(crate) static TABLE: Table = Table::new(&ROWS, &INDEX);
 
 static GUARDED: [(Slot, Condition); 1] = [(TABLE.slot(0x2003, 0), Condition::Check(only_while_2001_is_zero))];
-static NUMBERS: [u8; COUNT] = condition_numbers(&GUARDED);
+static NUMBERS: [u16; COUNT] = condition_numbers(&GUARDED);
 static CONDITIONS: Conditions = Conditions::new(&GUARDED, &NUMBERS);
 
 /// As CiA 301 has it.

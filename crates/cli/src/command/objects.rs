@@ -20,7 +20,7 @@ use testbench::words::object::{ObjectArg, object};
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  ferrodrive objects zlac8030l\n  ferrodrive objects 4 velocity\n  ferrodrive objects zlim42c homing\n  \
-        ferrodrive objects zlac8030l --departures"
+        ferrodrive objects zlac8030l,firmware=2.01 202F\n  ferrodrive objects zlac8030l --departures"
 )]
 pub(crate) struct Objects {
     /// Model (e.g. zlac8030l), data sheet (FILE.eds) or node-ID

@@ -17,25 +17,45 @@ use canopen::{Mux, NmtState, NodeId};
 use cia402::{ModeOfOperation, Statusword};
 
 use crate::axis::{AxisDescription, BitPattern, HomingRules, HomingStart, NewSetPoint, PowerStyle};
-use crate::description::{Description, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules, Write};
+use crate::description::{Description, Edition, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules, Write};
 use crate::faults::Faults;
 use crate::placement::Placement;
 use crate::timing::Timing;
 use crate::units::{CountsPerTurn, Quantity, Ramps, Scale, Units};
+use crate::variant::Pick;
 use alarms::ALARMS;
 use assumptions::{COUNTS_PER_TURN, NO_RAMP_FROM};
-use objects::TABLE;
+use objects::{TABLE, TABLE_1_66};
 use statusword::{HOMING_ATTAINED, HOMING_ERROR, LIVE};
 use variations::VARIATIONS;
 
-/// The M4230E17B50.
-pub static M4230E17B50: Description = joint("m4230e17b50", "M4230E17B50 joint motor");
-/// The M4230E17B80.
-pub static M4230E17B80: Description = joint("m4230e17b80", "M4230E17B80 joint motor");
-/// The M8025E25B50.
-pub static M8025E25B50: Description = joint("m8025e25b50", "M8025E25B50 joint motor");
-/// The M8025E25B80.
-pub static M8025E25B80: Description = joint("m8025e25b80", "M8025E25B80 joint motor");
+/// A model, and what it is with firmware 1.66.
+macro_rules! joints {
+    ($($(#[$what:meta])* $joint:ident, $edition:ident = $name:literal, $title:literal;)*) => {$(
+        $(#[$what])*
+        pub static $joint: Description = Description {
+            editions: &[Edition { pick: Pick::of(VARIATIONS, "firmware", "1.66"), description: &$edition }],
+            ..joint($name, $title)
+        };
+        /// The same with firmware 1.66.
+        pub static $edition: Description = Description {
+            dictionary: &TABLE_1_66,
+            pdo: PdoRules { fixed_mapping: false, ..PDO_RULES },
+            ..joint($name, $title)
+        };
+    )*};
+}
+
+joints! {
+    /// The M4230E17B50.
+    M4230E17B50, M4230E17B50_1_66 = "m4230e17b50", "M4230E17B50 joint motor";
+    /// The M4230E17B80.
+    M4230E17B80, M4230E17B80_1_66 = "m4230e17b80", "M4230E17B80 joint motor";
+    /// The M8025E25B50.
+    M8025E25B50, M8025E25B50_1_66 = "m8025e25b50", "M8025E25B50 joint motor";
+    /// The M8025E25B80.
+    M8025E25B80, M8025E25B80_1_66 = "m8025e25b80", "M8025E25B80 joint motor";
+}
 
 const fn joint(name: &'static str, title: &'static str) -> Description {
     Description {
@@ -57,6 +77,7 @@ const fn joint(name: &'static str, title: &'static str) -> Description {
         timing: Timing::GUESSED,
         stated_departures: &[],
         variations: VARIATIONS,
+        editions: &[],
     }
 }
 

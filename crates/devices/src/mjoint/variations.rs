@@ -3,7 +3,23 @@
 use crate::variant::{Choice, Trust, Variation, VariationKind};
 
 /// All of them.
-pub const VARIATIONS: &[Variation] = &[POWER_OFF_POSITION, MODBUS_ENABLE, AMPERES, ORIGIN];
+pub const VARIATIONS: &[Variation] = &[POWER_OFF_POSITION, MODBUS_ENABLE, AMPERES, ORIGIN, FIRMWARE];
+
+const FIRMWARE: Variation = Variation {
+    key: "firmware",
+    kind: VariationKind::Build,
+    section: "5.04, 5.08",
+    about: "its edition",
+    choices: &[
+        Choice::new("manual", "as the manual has it", Trust::Vendor),
+        Choice::new(
+            "1.66",
+            "as the maker's EDS YZ_MOTOR_SN2 and manual 1.66: TPDO1 each 100 ms, 180xh:04 and :05, mappings that can be \
+             written, 606Ch with 32 bits, 1006h, 260Ch and 260Eh read-only",
+            Trust::Vendor,
+        ),
+    ],
+};
 
 const POWER_OFF_POSITION: Variation = Variation {
     key: "J005",

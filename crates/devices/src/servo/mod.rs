@@ -39,6 +39,7 @@ pub static CIA402: Description = Description {
     timing: Timing::GUESSED,
     stated_departures: &[],
     variations: variations::VARIATIONS,
+    editions: &[],
 };
 
 /// How a CiA 402 drive tells its faults: by the codes of the standard.

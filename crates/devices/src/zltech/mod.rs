@@ -16,7 +16,7 @@ use crate::description::{Identity, ParameterStorage, PdoRules, Write};
 use crate::stated::Stated;
 use crate::units::Ramps;
 
-pub use zlac8030l::ZLAC8030L;
+pub use zlac8030l::{ZLAC8030L, ZLAC8030L_2_01};
 pub use zlim42c::{ZLIM42C, ZLIM42C_82};
 
 /// One count of a PDO's inhibit time and event timer (ZLAC8030L, 6.1; the ZLIM42-C's manual gives none).

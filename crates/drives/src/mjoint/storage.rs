@@ -5,11 +5,12 @@ use canopen::od::DefaultValue;
 
 use super::Values;
 use super::assumptions::NO_RECORD;
-use super::objects::{CONDITIONS, DEVICE_ADDRESS, POSITION_ACTUAL_INTERNAL_VALUE, TABLE};
+use super::objects::{CONDITIONS, DEVICE_ADDRESS, POSITION_ACTUAL_INTERNAL_VALUE, TABLE, TABLE_1_66};
 use crate::engine::storage::stored_rows;
 use devices::variant::Variant;
 
 const _: usize = stored_rows(&TABLE);
+const _: usize = stored_rows(&TABLE_1_66);
 
 /// The values as delivered, node-ID 1.
 pub fn delivered(variant: &Variant) -> Values {
@@ -19,7 +20,9 @@ pub fn delivered(variant: &Variant) -> Values {
 /// The values as delivered but for the node-ID (2615h).
 pub fn addressed(variant: &Variant, node_id: u8) -> Values {
     let node = NodeId::new(node_id).unwrap_or(NodeId::MIN);
-    let mut values: Values = variant.delivered(&TABLE, node).with_conditions(&CONDITIONS);
+    // The four models have the same objects.
+    let table = devices::mjoint::M4230E17B50.as_chosen(variant).dictionary;
+    let mut values: Values = variant.delivered(table, node).with_conditions(&CONDITIONS);
     if TABLE.row(DEVICE_ADDRESS.slot()).check_value(i64::from(node_id)).is_ok() {
         values.set(DEVICE_ADDRESS, u16::from(node_id));
     }
@@ -32,7 +35,7 @@ pub fn addressed(variant: &Variant, node_id: u8) -> Values {
 pub(super) fn contents(values: &Values, node_id: NodeId) -> Values {
     let mut contents = values.clone();
     let address = u8::try_from(values.get(DEVICE_ADDRESS)).ok().and_then(NodeId::new).unwrap_or(node_id);
-    for (slot, row) in TABLE.iter() {
+    for (slot, row) in values.table().iter() {
         let own = matches!(row.default, DefaultValue::NodeIdPlus(base) if values.raw(slot) == base + u32::from(node_id.raw()));
         if own {
             contents.restore_default(slot, address);

@@ -6,6 +6,8 @@ use devices::variant::{Pick, Variant};
 /// The first choice of each.
 pub const VARIANT: Variant = Variant::first_of(VARIATIONS);
 
+/// It is of the edition with objects of its own.
+pub(super) const FIRMWARE_1_66: Pick = Pick::of(VARIATIONS, "firmware", "1.66");
 /// The joint stays free at power-on.
 pub(super) const STAYS_FREE: Pick = Pick::of(VARIATIONS, "J005", "free");
 /// 2600h forbids no access.

@@ -11,8 +11,6 @@ use super::slots::AxisSlots;
 pub(super) struct Scales {
     factors: Factors,
     polarity: Polarity,
-    /// The objects make no sense: increments are used in place of all units.
-    pub(super) wrong: Option<NoFactor>,
 }
 
 impl Scales {
@@ -33,11 +31,9 @@ impl Scales {
             velocity_factor: pair(slots.velocity_factor_numerator, slots.velocity_factor_divisor),
             acceleration_factor: pair(slots.acceleration_factor_numerator, slots.acceleration_factor_divisor),
         };
-        let (factors, wrong) = match in_increments(&group, increments_per_turn) {
-            Ok(factors) => (factors, None),
-            Err(error) => (increments(increments_per_turn), Some(error)),
-        };
-        Self { factors, polarity: Polarity(read(values, slots.polarity, 0) as u8), wrong }
+        // Objects that make no sense leave increments in place of all units.
+        let factors = in_increments(&group, increments_per_turn).unwrap_or(increments(increments_per_turn));
+        Self { factors, polarity: Polarity(read(values, slots.polarity, 0) as u8) }
     }
 
     /// A position in increments; positions wrap, as the counter does.

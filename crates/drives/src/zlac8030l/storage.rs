@@ -3,15 +3,16 @@
 use canopen::NodeId;
 
 use super::Values;
-use super::objects::{CAN_BAUD_RATE, CAN_NODE_ID, TABLE};
+use super::objects::{CAN_BAUD_RATE, CAN_NODE_ID, TABLE, TABLE_2_01};
 use crate::engine::storage::stored_rows;
 use devices::variant::Variant;
 
 const _: usize = stored_rows(&TABLE);
+const _: usize = stored_rows(&TABLE_2_01);
 
 /// The values as delivered.
 pub fn delivered(variant: &Variant) -> Values {
-    variant.delivered(&TABLE, NodeId::MIN)
+    variant.delivered(devices::zltech::ZLAC8030L.as_chosen(variant).dictionary, NodeId::MIN)
 }
 
 /// The same of a drive for this node-ID (4 to 127, else 4) and number of a bit rate (200Eh).

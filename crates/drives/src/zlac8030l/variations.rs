@@ -6,8 +6,8 @@ use devices::zltech::zlac8030l::variations::VARIATIONS;
 /// The first choice of each.
 pub const VARIANT: Variant = Variant::first_of(VARIATIONS);
 
-/// A target velocity above 200Ah is a fault.
-pub(super) const SPEED_SETTING_FAULTS: Pick = Pick::of(VARIATIONS, "firmware", "2.01");
+/// It has 202Fh:06, and a target velocity above 200Ah is a fault.
+pub(super) const FIRMWARE_2_01: Pick = Pick::of(VARIATIONS, "firmware", "2.01");
 
 /// The fast winding is wired to it.
 pub const FAST_MOTOR: Pick = Pick::of(VARIATIONS, "motor", "fast");

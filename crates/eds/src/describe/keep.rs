@@ -149,6 +149,7 @@ fn describe(eds: &Eds, manual: &str) -> Result<Description, Unkept> {
         timing: Timing::GUESSED,
         stated_departures: &[],
         variations: if axes.is_empty() { &[] } else { servo::variations::VARIATIONS },
+        editions: &[],
     })
 }
 

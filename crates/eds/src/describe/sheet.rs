@@ -26,7 +26,7 @@ pub enum Flavour {
 /// Which device a sheet is of.
 #[derive(Clone, Copy, Debug)]
 pub struct Sheet<'a> {
-    /// The model.
+    /// The model; with a choice that comes with other objects, what the model is then ([`Description::as_chosen`]).
     pub description: &'a Description,
     /// Its choices.
     pub variant: Variant,

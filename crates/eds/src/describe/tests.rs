@@ -53,8 +53,9 @@ fn nothing_is_wrong_with_the_variant_for_ros2_canopen() {
 }
 
 #[test]
-fn every_model_reads_back_as_itself() {
-    for model in models() {
+fn every_model_reads_back_as_itself_in_each_of_its_editions() {
+    let editions = models().flat_map(|model| model.editions.iter().map(|edition| edition.description));
+    for model in models().chain(editions) {
         let kept = keep(&read(&Sheet::of(model)).eds).expect("no more rows than the model");
         assert_eq!(kept.identity, model.identity, "{}", model.name);
         assert_eq!(kept.axes.len(), model.axes.len(), "{}", model.name);

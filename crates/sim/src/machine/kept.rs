@@ -25,8 +25,8 @@ pub(super) fn profile(
 
 fn keep(list: Vec<(Slot, Condition)>, rows: usize) -> &'static Conditions {
     let mut numbers = vec![0; rows];
-    // Numbers end at 255: a file with more rows of commands than that has the rest of them checked by their limits only.
-    for ((slot, _), number) in list.iter().zip(1..=u8::MAX) {
+    // A table has no more rows than there are numbers.
+    for ((slot, _), number) in list.iter().zip(1..=u16::MAX) {
         numbers[slot.position()] = number;
     }
     Box::leak(Box::new(Conditions::new(list.leak(), numbers.leak())))

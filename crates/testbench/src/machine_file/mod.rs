@@ -172,7 +172,7 @@ impl Machine {
 
     /// Which models are where.
     pub fn models(&self) -> impl Iterator<Item = (NodeId, &'static Description)> {
-        self.drives.iter().map(|drive| (drive.spec.node, drive.spec.model))
+        self.drives.iter().map(|drive| (drive.spec.node, drive.spec.description()))
     }
 
     /// Its bus, still without drives.

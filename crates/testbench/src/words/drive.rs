@@ -39,6 +39,11 @@ impl DriveSpec {
         self.variant
     }
 
+    /// What the drive is with what was chosen: some choices come with other objects.
+    pub fn description(&self) -> &'static Description {
+        self.model.as_chosen(&self.variant)
+    }
+
     /// The values that objects have at power-on besides.
     pub fn presets(&self) -> &[Preset] {
         &self.presets
@@ -65,7 +70,7 @@ impl DriveSpec {
                 Err(format!("{key} of a {} is no '{value}'; expected one of: {}", self.model.name, known.join(", ")))
             }
             Err(NoSuchChoice::Variation) => {
-                let object = object_of(self.model, key).ok_or_else(|| self.unknown(key))?;
+                let object = object_of(self.description(), key).ok_or_else(|| self.unknown(key))?;
                 let number = number(value)
                     .ok_or_else(|| format!("'{value}' is no value for {object}; expected a whole number or 0x.."))?;
                 self.presets.push(Preset { object, value: number });

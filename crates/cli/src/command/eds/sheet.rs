@@ -57,9 +57,9 @@ impl SheetArgs {
             })?;
             spec.set(key.trim(), value.trim()).map_err(Failure::usage)?;
         }
-        check(model, spec.presets())?;
+        check(spec.description(), spec.presets())?;
         let sheet = Sheet {
-            description: model,
+            description: spec.description(),
             variant: spec.variant(),
             presets: spec.presets(),
             node_id: self.node,

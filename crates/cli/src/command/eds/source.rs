@@ -22,7 +22,8 @@ pub(crate) fn reading(path: &Path) -> Result<Reading, Failure> {
 /// A data sheet from a file, or that of a model where no file has this name.
 pub(super) fn sheet(name: &str) -> Result<Eds, Failure> {
     let path = Path::new(name);
-    if path.exists() || path.extension().is_some() {
+    // The point of `zlac8030l,firmware=2.01` is no file's.
+    if path.exists() || (path.extension().is_some() && !name.contains(',')) {
         return reading(path).map(|reading| reading.eds);
     }
     match resolve(name) {

@@ -2,7 +2,7 @@
 //!
 //! 1001h and the sub-indexes 00h of the PDO parameters are not printed: CiA 301 has them.
 
-use canopen::od::Entry;
+use canopen::od::{Access, Entry};
 
 use crate::row::{U8, U16, U32, join, ro, rws};
 
@@ -69,6 +69,44 @@ const TPDO_MAPPINGS: [Entry; 12] = join(&[
     &tpdo_mapping!(0x1A02, "TPDO3", "tpdo3", 0x606C_0020),
     &tpdo_mapping!(0x1A03, "TPDO4", "tpdo4", 0x6064_0020),
 ]);
+
+/// What firmware 1.66 has otherwise: 1006h, TPDOs with an event timer, of which the first runs as delivered, and mappings that can
+/// be written. Of 1006h and 180xh:04 it says no more than that they are there: types are those of CiA 301, and nothing acts
+/// on them. That a mapping is stored is a guess: a PDO's other parameters are.
+pub(super) const CHANGES_OF_1_66: [Entry; 38] = {
+    let mappings: [Entry; 25] = join(&[&RPDO_MAPPINGS, &TPDO_MAPPINGS]);
+    join(&[
+        &[rws(0x1006, 0, U32, "communication_cycle_period", "Communication cycle period").unit("us")],
+        &writable(mappings),
+        &event_timer!(0x1800, "tpdo1", 100),
+        &event_timer!(0x1801, "tpdo2", 0),
+        &event_timer!(0x1802, "tpdo3", 0),
+        &event_timer!(0x1803, "tpdo4", 0),
+    ])
+};
+
+/// These rows, to be written and stored.
+const fn writable<const N: usize>(mut rows: [Entry; N]) -> [Entry; N] {
+    let mut i = 0;
+    while i < N {
+        rows[i].access = Access::ReadWrite;
+        rows[i].stored = true;
+        i += 1;
+    }
+    rows
+}
+
+/// The rows of a TPDO's parameter that come with its event timer.
+macro_rules! event_timer {
+    ($index:literal, $name:literal, $default:literal) => {
+        [
+            ro($index, 0, U8, concat!($name, "_parameter"), "Number of sub-indexes").default(5),
+            rws($index, 4, U8, concat!($name, "_compatibility_entry"), "Reserved"),
+            rws($index, 5, U16, concat!($name, "_event_timer"), "Event timer").default($default).unit("ms"),
+        ]
+    };
+}
+use event_timer;
 
 /// The four rows of one PDO's parameter. The identifier follows the node-ID.
 macro_rules! pdo_parameters {

@@ -12,6 +12,13 @@ use crate::row::{I8, I16, I32, U8, U16, U32, join, ro, rw, rws};
 
 pub(super) const ROWS: [Entry; 36] = join(&[&MANUFACTURER, &PROFILE]);
 
+/// What firmware 1.66 has otherwise. That 606Ch counts 0.1 r/min there too is a guess.
+pub(super) const CHANGES_OF_1_66: [Entry; 3] = [
+    ro(0x260C, 0, I32, "incremental_position", "The incremental position").unit("counts"),
+    ro(0x260E, 0, U16, "alarm_code", "Alarm code"),
+    ro(0x606C, 0, I32, "velocity_actual_value", "Motor actual speed").range(-30000, 30000).unit("0.1 r/min").mappable(),
+];
+
 crate::row::rows! { const MANUFACTURER: [Entry; 17], manufacturer_objects:
     rw(0x2600, 0, U16, "modbus_enable", "Modbus enable").values(OFF_ON) => MODBUS_ENABLE;
     // 1 from power-on: bit 2 of the statusword 0404h that 5.10.1 prints before anything is enabled.

@@ -11,7 +11,7 @@ mod values;
 
 use canopen::od::{Entry, Index, Table};
 
-use crate::row::join;
+use crate::row::{amend, join, merge};
 
 /// Number of rows.
 pub const ROW_COUNT: usize = 104;
@@ -21,6 +21,17 @@ static INDEX: Index<ROW_COUNT> = Index::of(&ROWS);
 
 /// All objects of the drive.
 pub static TABLE: Table = Table::new(&ROWS, &INDEX);
+
+/// Number of rows with firmware 1.66.
+pub const ROW_COUNT_1_66: usize = ROW_COUNT + 9;
+
+static CHANGES_OF_1_66: [Entry; 41] = join(&[&communication::CHANGES_OF_1_66, &control::CHANGES_OF_1_66]);
+static ROWS_1_66: [Entry; ROW_COUNT_1_66] = amend(&ROWS, &CHANGES_OF_1_66);
+static ASCENDING_1_66: [Entry; ROW_COUNT_1_66] = merge(&[&ROWS, &CHANGES_OF_1_66]);
+static INDEX_1_66: Index<ROW_COUNT_1_66> = Index::of_amended(&ROWS_1_66, ROW_COUNT);
+
+/// All objects of the drive with firmware 1.66.
+pub static TABLE_1_66: Table = Table::amended(&ROWS_1_66, &ASCENDING_1_66, &INDEX_1_66);
 
 communication::general_objects!();
 control::manufacturer_objects!();

@@ -10,44 +10,57 @@ pub mod statusword;
 pub mod variations;
 
 use can::Bitrate;
+use canopen::od::Table;
 use canopen::pdo::MappingRules;
 use canopen::{Mux, NodeId};
 use cia402::ModeOfOperation;
 
 use crate::axis::{AxisDescription, NewSetPoint, PowerStyle};
-use crate::description::{Description, HostWatch, NmtRules, PdoRules};
+use crate::description::{Description, Edition, HostWatch, NmtRules, PdoRules};
 use crate::faults::Faults;
 use crate::placement::Placement;
 use crate::stated::Stated;
 use crate::timing::Timing;
 use crate::units::{CountsPerTurn, Quantity, Units};
+use crate::variant::Pick;
 use crate::zltech;
 use faults::FAULTS;
-use objects::TABLE;
+use objects::{TABLE, TABLE_2_01};
 use statusword::{EXTERNAL_STOP, IN_POSITION, RUNNING};
 use variations::VARIATIONS;
 
 /// The ZLAC8030L V2.0.
 pub static ZLAC8030L: Description = Description {
-    name: "zlac8030l",
-    title: "ZLTECH ZLAC8030L V2.0",
-    manual: "ZLAC8030L quick start guide V1.00",
-    identity: zltech::IDENTITY,
-    // The ZLIM42-C, of the same identity, has its bus voltage in 2069h.
-    distinguishing_object: Some(Mux::new(0x2029, 0)),
-    dictionary: &TABLE,
-    node_id: NodeId::new(4),
-    bitrate: Some(Bitrate::K500),
-    axes: &[AXIS],
-    host_watch: HostWatch::Silence { time: Mux::new(0x2000, 0) },
-    storage: zltech::parameter_storage(0x2009, 0x2010, RESTART),
-    faults: Faults { code: Some(Mux::new(0x603F, 0)), bit_field: true, table: &FAULTS },
-    nmt: NmtRules::CIA_301,
-    pdo: PDO_RULES,
-    timing: Timing::GUESSED,
-    stated_departures: DEPARTURES,
-    variations: VARIATIONS,
+    editions: &[Edition { pick: Pick::of(VARIATIONS, "firmware", "2.01"), description: &ZLAC8030L_2_01 }],
+    ..described(&TABLE)
 };
+
+/// The same with firmware 2.01.
+pub static ZLAC8030L_2_01: Description = described(&TABLE_2_01);
+
+const fn described(dictionary: &'static Table) -> Description {
+    Description {
+        name: "zlac8030l",
+        title: "ZLTECH ZLAC8030L V2.0",
+        manual: "ZLAC8030L quick start guide V1.00",
+        identity: zltech::IDENTITY,
+        // The ZLIM42-C, of the same identity, has its bus voltage in 2069h.
+        distinguishing_object: Some(Mux::new(0x2029, 0)),
+        dictionary,
+        node_id: NodeId::new(4),
+        bitrate: Some(Bitrate::K500),
+        axes: &[AXIS],
+        host_watch: HostWatch::Silence { time: Mux::new(0x2000, 0) },
+        storage: zltech::parameter_storage(0x2009, 0x2010, RESTART),
+        faults: Faults { code: Some(Mux::new(0x603F, 0)), bit_field: true, table: &FAULTS },
+        nmt: NmtRules::CIA_301,
+        pdo: PDO_RULES,
+        timing: Timing::GUESSED,
+        stated_departures: DEPARTURES,
+        variations: VARIATIONS,
+        editions: &[],
+    }
+}
 
 const AXIS: AxisDescription = AxisDescription {
     placement: Placement::FIRST,

@@ -11,8 +11,7 @@ pub const VARIATIONS: &[Variation] = &[
         about: "its version",
         choices: &[
             Choice::new("1.00", "as the manual V1.00 of 2023 has it", Trust::Vendor),
-            Choice::new("2.01", "as the guide V2.01 of 2024: a target velocity above 200Ah is fault 2000h", Trust::Vendor)
-                .factory(&[Preset::new(0x100A, 0, 0x0201), Preset::new(0x2025, 0, 0x0201)]),
+            Choice::new("2.01", "as the guide V2.01 of 2024: it has 202Fh:06, and a target velocity above 200Ah is fault 2000h", Trust::Vendor),
         ],
     },
     Variation {

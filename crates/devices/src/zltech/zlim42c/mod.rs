@@ -55,6 +55,7 @@ const fn stepper(name: &'static str, title: &'static str) -> Description {
         timing: Timing::GUESSED,
         stated_departures: DEPARTURES,
         variations: VARIATIONS,
+        editions: &[],
     }
 }
 

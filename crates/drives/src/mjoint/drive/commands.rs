@@ -235,7 +235,7 @@ impl MJoint {
     /// node-ID itself waits for a power cycle.
     fn device_address(&mut self, address: u32) {
         let before = core::mem::replace(&mut self.address, address);
-        for (slot, row) in TABLE.iter() {
+        for (slot, row) in self.values().table().iter() {
             let DefaultValue::NodeIdPlus(base) = row.default else { continue };
             // After an NMT reset of communication they may be those of the node-ID again.
             let raw = self.values().raw(slot);

@@ -50,6 +50,13 @@ pub static NODE_PROFILE: NodeProfile = NodeProfile {
     ..communication(&devices::mjoint::M4230E17B50)
 };
 
+/// The same with firmware 1.66.
+static NODE_PROFILE_1_66: NodeProfile = NodeProfile {
+    conditions: &CONDITIONS,
+    sdo_frame_length: FrameLength::Used,
+    ..communication(&devices::mjoint::M4230E17B50_1_66)
+};
+
 /// State byte of heartbeats while there is an alarm (5.11.1).
 const HEARTBEAT_ALARM: u8 = 0x04;
 
@@ -135,7 +142,8 @@ impl MJoint {
     /// The same of another variant.
     pub fn of(model: &'static Model, variant: Variant) -> Self {
         let image = StoredImage::of(&storage::delivered(&variant));
-        Self::over(model, Device::new(&NODE_PROFILE, Bitrate::M1, image, COMMUNICATION_PERIOD_NS, variant))
+        let profile = if variant.is(variations::FIRMWARE_1_66) { &NODE_PROFILE_1_66 } else { &NODE_PROFILE };
+        Self::over(model, Device::new(profile, Bitrate::M1, image, COMMUNICATION_PERIOD_NS, variant))
     }
 
     /// Motor free, and the values of `device` in effect.

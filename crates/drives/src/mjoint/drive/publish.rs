@@ -25,7 +25,8 @@ impl MJoint {
         let current = round(self.shown_current_a.value.abs() * CURRENT_COUNTS_PER_A).min(LARGEST) as u16;
         let (inputs, pwm) = (self.inputs.levels(), self.output_pwm());
         let values = self.device.values_mut();
-        values.set(VELOCITY_ACTUAL_VALUE, speed);
+        // Another width with firmware 1.66.
+        values.set_number(VELOCITY_ACTUAL_VALUE, speed);
         values.set(CURRENT_ACTUAL_VALUE, current);
         values.set(DC_LINK_CIRCUIT_VOLTAGE, round(sensors.bus_v * VOLTAGE_COUNTS_PER_V).clamp(0.0, LARGEST) as u16);
         values.set(DRIVER_TEMPERATURE, round(sensors.driver_c).clamp(0.0, 100.0) as u16);

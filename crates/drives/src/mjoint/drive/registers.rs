@@ -86,7 +86,7 @@ impl MJoint {
     fn change(&self, address: u16, offset: usize, words: &[u16]) -> Result<Change, RegisterError> {
         let (register, half) = at(address, offset)?;
         let slot = slot(register)?;
-        let row = TABLE.row(slot);
+        let row = self.values().table().row(slot);
         if !row.access.is_writable() {
             return Err(RegisterError::ReadOnly);
         }

@@ -7,7 +7,7 @@ use super::{MODE_SELECTION, ROW_COUNT};
 use crate::mjoint::power_on::Function;
 
 static LIST: [(Slot, Condition); 1] = [(MODE_SELECTION.slot(), Condition::Check(mode_selection))];
-static NUMBERS: [u8; ROW_COUNT] = condition_numbers(&LIST);
+static NUMBERS: [u16; ROW_COUNT] = condition_numbers(&LIST);
 
 /// The conditions of this firmware.
 pub static CONDITIONS: Conditions = Conditions::new(&LIST, &NUMBERS);

@@ -34,7 +34,7 @@ pub enum Effect {
     Parameter,
 }
 
-crate::row::effects! { ROW_COUNT else Parameter:
+crate::row::effects! { ROW_COUNT_1_66 else Parameter:
     CONTROLWORD => Command;
     MODES_OF_OPERATION => SelectMode;
     TARGET_POSITION => Target;

@@ -19,7 +19,7 @@ use super::parameters::Parameters;
 use super::protection::{Protection, Situation, is_over_current};
 use super::statusword::statusword;
 use super::terminals::{self, TERMINALS};
-use super::variations::{SPEED_SETTING_FAULTS, VARIANT};
+use super::variations::{FIRMWARE_2_01, VARIANT};
 use super::{Values, storage};
 use crate::communication::communication;
 use crate::engine::actuator::bleeder::Bleeder;
@@ -38,6 +38,10 @@ use devices::variant::Variant;
 /// How this drive communicates.
 pub static NODE_PROFILE: NodeProfile =
     NodeProfile { conditions: &CONDITIONS, ..communication(&devices::zltech::ZLAC8030L) };
+
+/// The same with firmware 2.01.
+static NODE_PROFILE_2_01: NodeProfile =
+    NodeProfile { conditions: &CONDITIONS, ..communication(&devices::zltech::ZLAC8030L_2_01) };
 
 /// The firmware of a ZLAC8030L V2.0.
 #[derive(Clone)]
@@ -72,7 +76,8 @@ impl Zlac8030l {
     /// The same of another variant.
     pub fn of(variant: Variant) -> Self {
         let image = StoredImage::of(&storage::delivered(&variant));
-        Self::over(Device::new(&NODE_PROFILE, Bitrate::K500, image, COMMUNICATION_PERIOD_NS, variant))
+        let profile = if variant.is(FIRMWARE_2_01) { &NODE_PROFILE_2_01 } else { &NODE_PROFILE };
+        Self::over(Device::new(profile, Bitrate::K500, image, COMMUNICATION_PERIOD_NS, variant))
     }
 
     /// Motor free, position 0, and the values of `device` in effect.
@@ -226,7 +231,7 @@ impl Zlac8030l {
         let max_rpm = self.parameters.max_rpm;
         self.speed_setting_wrong = rpm.abs() > max_rpm
             && self.shell.axis.mode() == ModeOfOperation::PROFILE_VELOCITY
-            && self.device.variant().is(SPEED_SETTING_FAULTS);
+            && self.device.variant().is(FIRMWARE_2_01);
         self.shell.targets = Targets {
             velocity: rpm.clamp(-max_rpm, max_rpm) * self.parameters.counts_s_per_rpm,
             current_a: f32::from(values.get(TARGET_TORQUE)) * 1e-3,

@@ -6,7 +6,7 @@ use canopen::od::{Condition, Conditions, Slot, View, condition_numbers};
 use super::{CONTROLWORD, MODES_OF_OPERATION_DISPLAY, ROW_COUNT, TARGET_POSITION};
 
 static LIST: [(Slot, Condition); 1] = [(CONTROLWORD.slot(), Condition::Check(set_point_in_range))];
-static NUMBERS: [u8; ROW_COUNT] = condition_numbers(&LIST);
+static NUMBERS: [u16; ROW_COUNT] = condition_numbers(&LIST);
 
 /// The conditions of this firmware.
 pub static CONDITIONS: Conditions = Conditions::new(&LIST, &NUMBERS);

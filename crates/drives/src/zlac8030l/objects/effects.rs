@@ -3,7 +3,7 @@
 
 use super::{
     CLEAR_CURRENT_POSITION, CLEAR_FEEDBACK_POSITION, CONTROLWORD, MODES_OF_OPERATION, REGISTER_PARAMETER_SETTING,
-    ROW_COUNT, TARGET_POSITION, TARGET_TORQUE, TARGET_VELOCITY,
+    ROW_COUNT_2_01, TARGET_POSITION, TARGET_TORQUE, TARGET_VELOCITY,
 };
 
 /// The consequence of a write.
@@ -23,7 +23,7 @@ pub enum Effect {
     Parameter,
 }
 
-crate::row::effects! { ROW_COUNT else Parameter:
+crate::row::effects! { ROW_COUNT_2_01 else Parameter:
     CONTROLWORD => Command;
     TARGET_VELOCITY => Target;
     TARGET_POSITION => Target;

@@ -9,7 +9,7 @@ use canopen::od::Entry;
 use super::values::{BAUD_RATES, BRAKE, DIRECTIONS, IO_STOP, OFF_ON, OUTPUT_FUNCTIONS, RS485_BAUD_RATES};
 use crate::row::{I16, U16, join, ro, rw, rws};
 use crate::zltech::values::{CLEAR, LIMIT_STOP, REGISTER_COMMANDS, SAVE_ON_WRITE, SHAFT_LOCK};
-use crate::zltech::zlac8030l::assumptions::SOFTWARE_VERSION;
+use crate::zltech::zlac8030l::assumptions::{SOFTWARE_VERSION, SOFTWARE_VERSION_2_01};
 
 pub(super) const ROWS: [Entry; 71] = join(&[&GENERAL, &LIMITS, &LOOPS, &DEVICE, &POWER, &TERMINALS]);
 
@@ -142,6 +142,13 @@ crate::row::rows! { const POWER: [Entry; 12], power_objects:
     rws(0x202F, 5, U16, "velocity_resolution", "Set speed resolution").range(1, 10).default(1).mappable()
         => VELOCITY_RESOLUTION;
 }
+
+/// What the maker's CANopen guide V2.01 has otherwise. Type, default and store of 202Fh:06 are guesses: those of its neighbours.
+pub(super) const CHANGES_OF_2_01: [Entry; 3] = [
+    ro(0x2025, 0, U16, "firmware_version", "Software version").default(SOFTWARE_VERSION_2_01),
+    ro(0x202F, 0, U16, "processing_methods", "Number of sub-indexes").default(6),
+    rws(0x202F, 6, U16, "speed_offset", "Speed offset").mappable(),
+];
 
 crate::row::rows! { const TERMINALS: [Entry; 10], terminals_objects:
     // 16 as printed: sub-indexes 06 to 0B and 10 do not exist.

@@ -11,8 +11,8 @@ mod values;
 
 use canopen::od::{Entry, Index, Table};
 
-use super::assumptions::{HARDWARE_VERSION, SOFTWARE_VERSION};
-use crate::row::join;
+use super::assumptions::{HARDWARE_VERSION, SOFTWARE_VERSION, SOFTWARE_VERSION_2_01};
+use crate::row::{amend, join, merge};
 use crate::zltech::communication;
 
 /// Number of rows.
@@ -24,6 +24,18 @@ static INDEX: Index<ROW_COUNT> = Index::of(&ROWS);
 
 /// All objects of the drive.
 pub static TABLE: Table = Table::new(&ROWS, &INDEX);
+
+/// Number of rows with firmware 2.01.
+pub const ROW_COUNT_2_01: usize = ROW_COUNT + 1;
+
+static CHANGES_OF_2_01: [Entry; 105] =
+    join(&[&communication::rows(HARDWARE_VERSION, SOFTWARE_VERSION_2_01), &manufacturer::CHANGES_OF_2_01]);
+static ROWS_2_01: [Entry; ROW_COUNT_2_01] = amend(&ROWS, &CHANGES_OF_2_01);
+static ASCENDING_2_01: [Entry; ROW_COUNT_2_01] = merge(&[&ROWS, &CHANGES_OF_2_01]);
+static INDEX_2_01: Index<ROW_COUNT_2_01> = Index::of_amended(&ROWS_2_01, ROW_COUNT);
+
+/// All objects of the drive with firmware 2.01.
+pub static TABLE_2_01: Table = Table::amended(&ROWS_2_01, &ASCENDING_2_01, &INDEX_2_01);
 
 manufacturer::general_objects!();
 manufacturer::limits_objects!();
