@@ -59,7 +59,12 @@ pub(super) fn run(image: &Image, checks: &str) -> Result<Output, String> {
         sleep(POLL);
     }
     match told("status") {
-        Some(status) => Ok(Output { text: told("output").unwrap_or_default(), ended_well: status.trim() == "0" }),
+        Some(status) => {
+            let ended_well = status.trim() == "0";
+            // What programs said beside their results is of interest when something failed.
+            let said = if ended_well { String::new() } else { told("errors").unwrap_or_default() };
+            Ok(Output { text: told("output").unwrap_or_default() + &said, ended_well })
+        }
         None => Err(format!("the guest ended without a result; it said last: {}", last_words(&read(&console)))),
     }
 }

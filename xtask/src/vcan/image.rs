@@ -7,10 +7,11 @@ use std::process::Command;
 use crate::process::{self, quietly};
 
 /// Raised when what is kept has to be made anew.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// Kernel modules of the guest: shared files, an overlay in memory, CAN.
-const MODULES: &[&str] = &["virtio_pci", "9pnet_virtio", "9p", "overlay", "can", "can_raw", "vcan", "kvaser_pci"];
+const MODULES: &[&str] =
+    &["virtio_pci", "9pnet_virtio", "9p", "overlay", "can", "can_raw", "can_bcm", "vcan", "kvaser_pci"];
 
 /// Folders of the kernel's package in which these modules and what they need stand.
 const FOLDERS: &[&str] = &[
@@ -265,15 +266,15 @@ mod tests {
     #[test]
     fn modules_are_loaded_behind_what_they_need() {
         let table = "k/virtio_pci.ko: k/virtio_ring.ko k/virtio.ko\nk/9pnet_virtio.ko: k/9pnet.ko k/virtio_ring.ko k/virtio.ko\n\
-                     k/9p.ko: k/9pnet.ko\nk/overlay.ko:\nk/can.ko:\nk/can-raw.ko: k/can.ko\nk/vcan.ko: k/can-dev.ko\n\
+                     k/9p.ko: k/9pnet.ko\nk/overlay.ko:\nk/can.ko:\nk/can-raw.ko: k/can.ko\nk/can-bcm.ko: k/can.ko\nk/vcan.ko: k/can-dev.ko\n\
                      k/kvaser_pci.ko: k/sja1000.ko k/can-dev.ko\n";
         let order = load_order(table, "").unwrap();
         let at = |name: &str| order.iter().position(|path| path == name).unwrap();
         assert!(at("k/virtio.ko") < at("k/virtio_ring.ko") && at("k/virtio_ring.ko") < at("k/virtio_pci.ko"));
         assert!(at("k/can.ko") < at("k/can-raw.ko") && at("k/can-dev.ko") < at("k/sja1000.ko"));
-        assert_eq!(order.len(), 13, "{order:?}");
+        assert_eq!(order.len(), 14, "{order:?}");
         let built_in = load_order(&table.replace("k/overlay.ko:\n", ""), "k/overlay.ko\n").unwrap();
-        assert_eq!(built_in.len(), 12);
+        assert_eq!(built_in.len(), 13);
         assert!(load_order("", "").unwrap_err().contains("virtio_pci"));
     }
 

@@ -55,7 +55,7 @@ pub(crate) fn step() -> Tally {
 fn test_program() -> Result<PathBuf, String> {
     let mut cargo = workspace::cargo();
     // All packages are named, so that nothing is built again with other features than the test step's.
-    cargo.args(["test", "--workspace", "--bins", "--test", TESTS, "--no-run", "--quiet"]);
+    cargo.args(["test", "--workspace", "--test", TESTS, "--no-run", "--quiet"]);
     let messages = process::output(cargo.arg("--message-format=json"))?;
     let programs = messages.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
     let mut ours = programs.filter(|message| message["target"]["name"] == TESTS && message["profile"]["test"] == true);
