@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    completions, dcf, demo, drive, dump, eds, emcy, events, home, man_pages, motion, nmt, objects, pdo, plot, read,
-    readings, run, scan, sdo, send, sim, store, sync, time, watch, world,
+    completions, dcf, demo, drive, dump, eds, emcy, events, home, latency, man_pages, motion, nmt, objects, pdo, plot,
+    read, readings, run, scan, sdo, send, sim, store, sync, time, watch, world,
 };
 use crate::global::Global;
 
@@ -53,6 +53,7 @@ pub(crate) enum Command {
     Move(motion::Move),
     Torque(motion::Torque),
     Home(home::Home),
+    Latency(latency::Latency),
     Dump(dump::Dump),
     Save(store::Save),
     Restore(store::Restore),

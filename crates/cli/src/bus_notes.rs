@@ -4,28 +4,38 @@ use std::collections::BTreeSet;
 
 use transport::{BusSpec, Note};
 
-/// Which kinds have been told of a bus.
+/// Which kinds have been told of a bus, and whether it is there.
 #[derive(Debug)]
 pub(crate) struct BusNotes {
     bus: String,
     told: BTreeSet<&'static str>,
+    lost: Option<String>,
 }
 
 impl BusNotes {
     /// Nothing has been told yet of `bus`.
     pub(crate) fn of(bus: &BusSpec) -> Self {
-        Self { bus: bus.to_string(), told: BTreeSet::new() }
+        Self { bus: bus.to_string(), told: BTreeSet::new(), lost: None }
     }
 
     /// The line to show for `note`: what happened and what to do about it, if that is new.
     pub(crate) fn news(&mut self, note: &Note) -> Option<String> {
         let comes_and_goes = matches!(note, Note::ConnectionLost { .. } | Note::ConnectionBack);
+        if comes_and_goes {
+            let is_lost = matches!(note, Note::ConnectionLost { .. });
+            self.lost = is_lost.then(|| note.to_string());
+        }
         if !self.told.insert(note.kind()) && !comes_and_goes {
             return None;
         }
         // An advice names the interface of which most have only one.
         let advice = note.advice().map(|advice| format!("; {}", self.named(advice))).unwrap_or_default();
         Some(format!("bus {}: {note}{advice}", self.bus))
+    }
+
+    /// How the connection to the bus was lost, while it is.
+    pub(crate) fn lost(&self) -> Option<&str> {
+        self.lost.as_deref()
     }
 
     fn named(&self, advice: &str) -> String {
@@ -47,5 +57,14 @@ mod tests {
         assert!(text.starts_with("bus can3: ") && text.contains("ip link set can3 type can restart"), "{text}");
         assert_eq!(notes.news(&off), None);
         assert!(notes.news(&Note::ConnectionBack).is_some() && notes.news(&Note::ConnectionBack).is_some());
+    }
+
+    #[test]
+    fn a_loss_lasts_until_the_bus_is_back() {
+        let mut notes = BusNotes::of(&"can3".parse().unwrap());
+        let lost = Note::ConnectionLost { reason: "unplugged".into() };
+        assert!(notes.news(&lost).is_some());
+        assert_eq!(notes.lost().unwrap(), "the connection to the bus is lost: unplugged");
+        assert!(notes.news(&Note::ConnectionBack).is_some() && notes.lost().is_none());
     }
 }

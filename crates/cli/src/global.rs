@@ -14,7 +14,7 @@ use testbench::words::drive::node_model;
 #[command(next_help_heading = "On every command")]
 pub(crate) struct Global {
     /// The bus: sim, sim:FILE.toml, socketcand://HOST:PORT/can0, slcan:///dev/ttyACM0?bitrate=500k,
-    /// slcan://HOST:PORT, log:FILE
+    /// slcan://HOST:PORT, cannelloni://HOST:PORT?local=PORT, udp_multicast://239.74.163.2, log:FILE
     ///
     /// `sim` is a virtual bus of this command alone, with factory-fresh drives, as fast as the machine goes.
     #[arg(long, value_name = "BUS", env = "FERRODRIVE_BUS", default_value = "sim", global = true)]
@@ -38,6 +38,10 @@ pub(crate) struct Global {
     /// Show every frame that the command sends and hears, in words, on standard error
     #[arg(long, short = 'v', global = true)]
     pub(crate) verbose: bool,
+
+    /// Run the bus in real time (Linux: SCHED_FIFO, memory locked), so that other programs do not delay its cycles
+    #[arg(long, global = true)]
+    pub(crate) realtime: bool,
 
     /// Longest wait for each answer of a node
     #[arg(long, value_name = "TIME", value_parser = master::units::parse_duration, default_value = "500ms", global = true)]

@@ -25,23 +25,24 @@ const MODEL: &str = "models";
 const MACHINE: &str = "machine";
 const TIMEOUT: &str = "timeout";
 const VERBOSE: &str = "verbose";
+const REALTIME: &str = "realtime";
 
 const UNHEEDED: [Unheeded; 10] = [
     Unheeded {
         command: "run",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME],
         why: "a scenario has a machine and a bus of its own",
         next: "leave it away; the scenario's machine may be the path of a machine file",
     },
     Unheeded {
         command: "world",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME],
         why: "it speaks to a running simulator, not to a bus",
         next: "leave it away; --control says where the simulator is",
     },
     Unheeded {
         command: "events",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME],
         why: "it listens to a running simulator, not to a bus",
         next: "leave it away; --control says where the simulator is",
     },
@@ -59,7 +60,7 @@ const UNHEEDED: [Unheeded; 10] = [
     },
     Unheeded {
         command: "demo",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME],
         why: "it shows virtual drives on buses of their own",
         next: "leave it away; --drive MODEL chooses the drive",
     },
@@ -71,19 +72,19 @@ const UNHEEDED: [Unheeded; 10] = [
     },
     Unheeded {
         command: "completions",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME],
         why: "a script for a shell depends on none of them",
         next: "leave it away",
     },
     Unheeded {
         command: "eds",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME],
         why: "it is about files, not about a node of a bus",
         next: "leave it away",
     },
     Unheeded {
         command: "readings",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME],
         why: "it is about a model, not about a node of a bus",
         next: "leave it away",
     },
@@ -91,7 +92,7 @@ const UNHEEDED: [Unheeded; 10] = [
 
 const OBJECTS_OF_A_MODEL: Unheeded = Unheeded {
     command: "objects",
-    options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE],
+    options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME],
     why: "the objects of a model are the same on every bus",
     next: "leave it away, or give a node-ID in place of the model",
 };
@@ -116,6 +117,11 @@ pub(crate) fn refuse_unheeded(global: &Global, command: &Command, matches: &ArgM
         return Err(Failure::usage("--machine means nothing on a virtual bus of this command alone")
             .because("such a bus knows its drives")
             .next("give --bus sim:FILE.toml to have the drives of the file on it, or --bus with the bus that it describes"));
+    }
+    if typed(REALTIME) && own_bus && name != "sim" {
+        return Err(Failure::usage("--realtime means nothing on a virtual bus of this command alone")
+            .because("its time is that of the simulation, not of the clock")
+            .next("give --bus with a real bus, or use it with sim"));
     }
     refuse_two_models(global)
 }

@@ -1,6 +1,7 @@
 //! One way for a command to get a network, on any bus: an embedded virtual one driven in virtual time, or a real one
 //! driven by `transport` under tokio. The command is the same async code on both.
 
+use std::cell::RefCell;
 use std::error::Error;
 use std::path::Path;
 use std::time::Duration;
@@ -8,7 +9,7 @@ use std::time::Duration;
 use canopen::{Mux, NodeId};
 use master::Network;
 use tokio::sync::Notify;
-use transport::{BusSpec, Note, WallClock, run_station};
+use transport::{BusSpec, Note, WallClock, realtime, run_station};
 
 use crate::bus_notes::BusNotes;
 use crate::context::Context;
@@ -89,6 +90,7 @@ fn virtual_bus<R>(
 }
 
 async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Result<R, Failure>) -> Result<R, Failure> {
+    enter_real_time(global)?;
     let clock = WallClock::start();
     let mut bus = global.bus.open(&clock).await.map_err(|error| bus_failure(global, &error))?;
     let network = Network::new();
@@ -102,18 +104,21 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     if let Some(unused) = global.machine.as_ref().and_then(Machine::unused_by_a_master) {
         context.tell(&format!("of the machine file a command on a real bus does not use: {unused}"));
     }
+    let notes = RefCell::new(BusNotes::of(&global.bus));
     let until = async {
-        tokio::select! {
+        let failure = tokio::select! {
             result = command(&context) => match result {
-                Ok(done) => Ok(done),
-                Err(failure) => Err(stop_what_moves(&context, failure).await),
+                Ok(done) => return Ok(done),
+                Err(failure) => failure,
             },
-            signal = asked_to_end() => Err(stop_what_moves(&context, Failure::ended_by(signal)).await),
-        }
+            signal = asked_to_end() => Failure::ended_by(signal),
+        };
+        let failure = stop_what_moves(&context, failure).await;
+        let notes = notes.borrow();
+        Err(notes.lost().into_iter().fold(failure, |failure, lost| without_bus(&context, failure.because(lost))))
     };
     let mut station = Tap::new(network.clone(), traffic);
-    let mut notes = BusNotes::of(&global.bus);
-    let tell = |_, note: &Note| notes.news(note).iter().for_each(|text| context.tell(text));
+    let tell = |_, note: &Note| notes.borrow_mut().news(note).iter().for_each(|text| context.tell(text));
     let ended = run_station(&mut bus, &mut station, &clock, &Notify::new(), until, tell).await;
     progress.clear();
     ended.map_err(|error| {
@@ -121,11 +126,28 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
         let moved = network.moved();
         let failure = moved.iter().fold(failure, |failure, node| {
             let failure = failure.because(format!("node {node} was moving, and cannot be reached any more"));
-            without_this_command(&network, node, failure)
-                .next(format!("make sure that it stands still (emergency stop); then: ferrodrive state {node}"))
+            without_this_command(&network, node, failure).next(make_sure(node))
         });
         failure.next(format!("find out why {} went away, and start it again", global.bus))
     })?
+}
+
+/// With `--realtime` this thread, and those that it starts from here on, run in real time.
+pub(crate) fn enter_real_time(global: &Global) -> Result<(), Failure> {
+    if !global.realtime {
+        return Ok(());
+    }
+    realtime::enter().map_err(|error| failure_of(&error).of_kind("realtime").next(error.advice()))
+}
+
+/// Adds what to do where a command ended without its bus: what it moved may move still.
+fn without_bus(context: &Context, failure: Failure) -> Failure {
+    let moved = context.network.moved();
+    moved.iter().fold(failure, |failure, node| failure.next(make_sure(node)))
+}
+
+fn make_sure(node: NodeId) -> String {
+    format!("make sure that it stands still (emergency stop); then: ferrodrive state {node}")
 }
 
 /// Ends the process on Ctrl-C and its like from here on: on an embedded bus there is no motor to stop.

@@ -44,6 +44,7 @@ const COMMANDS: &[(&[&str], &str)] = &[
     (&["readings", "m4230e17b50"], "readings"),
     (&["eds", "zlac8030l"], "eds"),
     (&["dcf", "4"], "dcf"),
+    (&["latency", "4", "--count", "20"], "latency"),
     (&["dump", "--for", "1s"], "frame"),
     (&["run", SCENARIO], "run"),
     (&["run", SCENARIO, "--seeds", "1..2"], "sweep"),

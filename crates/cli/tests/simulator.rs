@@ -2,9 +2,11 @@
 
 mod common;
 
+use std::io::{BufRead, BufReader};
+use std::process::Stdio;
 use std::time::Duration;
 
-use common::{Simulator, done, ferrodrive, scratch};
+use common::{Simulator, command, done, ferrodrive, scratch};
 use serde_json::json;
 
 const DRIVE: [&str; 2] = ["--drive", "zlac8030l@4"];
@@ -142,16 +144,25 @@ fn only_a_live_bus_given_on_the_command_line_is_joined() {
     assert!(ended.err.contains("cannot connect") && !ended.out.contains("ready"), "{}", ended.err);
 }
 
+/// `dump` goes on where the server is back, and a command that waits for an answer ends with what happened.
 #[test]
-fn a_lost_connection_ends_a_command_with_the_reason() {
-    let mut simulator = simulator(&[]);
-    let bus = simulator.bus("socketcand");
-    let waiting = std::thread::spawn(move || ferrodrive(&["--bus", &bus, "dump"]));
-    std::thread::sleep(Duration::from_millis(500));
-    simulator.kill();
-    let ended = waiting.join().unwrap();
-    assert_eq!(ended.status, Some(1));
-    assert!(ended.err.contains("closed the connection") || ended.err.contains("lost the connection"), "{}", ended.err);
+fn a_lost_connection_is_told_and_made_again() {
+    let beating = |drive: &str, place: &str| Simulator::start(&["--drive", drive, "--serve", place]);
+    let mut first = beating("zlac8030l@4,1017=100", "socketcand://127.0.0.1:0");
+    let bus = first.bus("socketcand");
+    let place = bus.trim_end_matches("/can0").to_owned();
+    let mut dump = command(&["--bus", &bus, "dump"]).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    let mut lines = BufReader::new(dump.stdout.take().unwrap()).lines().map(Result::unwrap);
+    let mut until = |part: &str| lines.by_ref().find(|line| line.contains(part)).unwrap_or_default();
+    assert!(until("704#").contains("heartbeat"));
+    first.kill();
+    assert!(until("is lost").contains("the connection to the bus is lost: 127.0.0.1"));
+    let second = beating("zlac8030l@5,1017=100", &place);
+    assert!(until("is back").contains("the connection to the bus is back"));
+    assert!(until("705#").contains("heartbeat"), "frames come again");
+    dump.kill().unwrap();
+    dump.wait().unwrap();
+    drop(second);
 }
 
 #[test]

@@ -93,6 +93,7 @@ pub mod drive;
 mod error;
 mod host_loss;
 pub mod identify;
+pub mod latency;
 mod limits;
 mod models;
 mod network;

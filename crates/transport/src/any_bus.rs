@@ -2,58 +2,96 @@
 
 use can::{Frame, Instant};
 
-use crate::Received;
 use crate::bus::{AsyncBus, BusError};
+use crate::cannelloni::CannelloniBus;
 use crate::log::LogBus;
-use crate::slcan::SlcanBus;
+use crate::reconnect::Reconnecting;
+use crate::slcan::{SlcanBus, SlcanPlace};
 use crate::socketcand::SocketcandBus;
+use crate::udp_multicast::UdpMulticastBus;
+use crate::{BusSpec, Received, WallClock};
 
-/// Any bus that [`crate::BusSpec::open`] opens.
+/// Any bus that [`crate::BusSpec::open`] opens. A connection that is lost is made again.
+#[derive(Debug)]
+pub struct AnyBus(Kind);
+
 #[derive(Debug)]
 #[allow(clippy::large_enum_variant, reason = "a program has one or two of them, and keeps them where they are")]
-pub enum AnyBus {
-    /// A socketcand server.
-    Socketcand(SocketcandBus),
-    /// An slcan adapter or server.
-    Slcan(SlcanBus),
-    /// A CAN interface of Linux.
+enum Kind {
+    Socketcand(Reconnecting<SocketcandBus>),
+    Slcan(Reconnecting<SlcanBus>),
+    Cannelloni(CannelloniBus),
+    UdpMulticast(UdpMulticastBus),
     #[cfg(target_os = "linux")]
     SocketCan(crate::SocketCanBus),
-    /// A log.
     Log(LogBus),
 }
 
 impl AnyBus {
+    pub(crate) async fn open(spec: &BusSpec, clock: &WallClock) -> Result<Self, BusError> {
+        Ok(Self(match spec {
+            BusSpec::Sim { .. } => return Err(BusError::Simulated),
+            #[cfg(target_os = "linux")]
+            BusSpec::SocketCan { interface } => Kind::SocketCan(crate::SocketCanBus::open(interface, clock)?),
+            #[cfg(not(target_os = "linux"))]
+            BusSpec::SocketCan { interface } => {
+                let problem = crate::InterfaceProblem::NotLinux { name: interface.clone() };
+                return Err(BusError::Interface(problem));
+            }
+            BusSpec::Socketcand { address, bus } => {
+                Kind::Socketcand(Reconnecting::open((address.clone(), bus.clone()), clock).await?)
+            }
+            BusSpec::SlcanSerial { path, bitrate, baud } => {
+                let place = SlcanPlace { address: path.clone(), baud: Some(*baud), bitrate: *bitrate };
+                Kind::Slcan(Reconnecting::open(place, clock).await?)
+            }
+            BusSpec::SlcanTcp { address, bitrate } => {
+                let place = SlcanPlace { address: address.clone(), baud: None, bitrate: *bitrate };
+                Kind::Slcan(Reconnecting::open(place, clock).await?)
+            }
+            BusSpec::Cannelloni { address, local_port } => {
+                Kind::Cannelloni(CannelloniBus::open(address, *local_port, clock).await?)
+            }
+            BusSpec::UdpMulticast { group, port, hops } => {
+                Kind::UdpMulticast(UdpMulticastBus::open(*group, *port, *hops, clock)?)
+            }
+            BusSpec::Log { path } => Kind::Log(LogBus::open(path)?),
+        }))
+    }
+
     /// Takes leave: an slcan adapter's channel is closed, so that it stops acknowledging frames on the bus. Dropping does
     /// for the others.
     pub async fn close(self) -> Result<(), BusError> {
-        match self {
-            Self::Slcan(bus) => bus.close().await,
-            Self::Socketcand(_) | Self::Log(_) => Ok(()),
-            #[cfg(target_os = "linux")]
-            Self::SocketCan(_) => Ok(()),
+        let Kind::Slcan(bus) = self.0 else { return Ok(()) };
+        match bus.into_inner() {
+            Some(bus) => bus.close().await,
+            None => Ok(()),
         }
     }
 }
 
 impl AsyncBus for AnyBus {
     async fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        match self {
-            Self::Socketcand(bus) => bus.send(frame).await,
-            Self::Slcan(bus) => bus.send(frame).await,
+        match &mut self.0 {
+            Kind::Socketcand(bus) => bus.send(frame).await,
+            Kind::Slcan(bus) => bus.send(frame).await,
+            Kind::Cannelloni(bus) => bus.send(frame).await,
+            Kind::UdpMulticast(bus) => bus.send(frame).await,
             #[cfg(target_os = "linux")]
-            Self::SocketCan(bus) => bus.send(frame).await,
-            Self::Log(bus) => bus.send(frame).await,
+            Kind::SocketCan(bus) => bus.send(frame).await,
+            Kind::Log(bus) => bus.send(frame).await,
         }
     }
 
     async fn recv(&mut self) -> Result<(Instant, Received), BusError> {
-        match self {
-            Self::Socketcand(bus) => bus.recv().await,
-            Self::Slcan(bus) => bus.recv().await,
+        match &mut self.0 {
+            Kind::Socketcand(bus) => bus.recv().await,
+            Kind::Slcan(bus) => bus.recv().await,
+            Kind::Cannelloni(bus) => bus.recv().await,
+            Kind::UdpMulticast(bus) => bus.recv().await,
             #[cfg(target_os = "linux")]
-            Self::SocketCan(bus) => bus.recv().await,
-            Self::Log(bus) => bus.recv().await,
+            Kind::SocketCan(bus) => bus.recv().await,
+            Kind::Log(bus) => bus.recv().await,
         }
     }
 }

@@ -53,8 +53,16 @@ pub enum BusError {
         /// What the system said.
         source: io::Error,
     },
+    /// No socket to hear others by.
+    #[error("cannot listen at {address}; is the port taken by another program, and is there a network for it?")]
+    Listen {
+        /// The address on this machine, or the multicast group.
+        address: String,
+        /// What the system said.
+        source: io::Error,
+    },
     /// The serial device does not open.
-    #[error("cannot open the serial device {path}; is the adapter plugged in, and may this user access it?")]
+    #[error("cannot open the serial device {path}; {}", serial_advice(source))]
     OpenSerial {
         /// The device.
         path: String,
@@ -113,6 +121,14 @@ pub enum BusError {
         /// What the system said.
         source: io::Error,
     },
+    /// The peer takes nothing any more.
+    #[error(
+        "{address} takes nothing: what was to be sent has waited for 1 s; does the adapter or the server still run?"
+    )]
+    Stuck {
+        /// `HOST:PORT` or the device.
+        address: String,
+    },
     /// slcan names nine bit rates only.
     #[error("slcan cannot select {bitrate}; it knows 10k, 20k, 50k, 100k, 125k, 250k, 500k, 800k and 1M")]
     NoSlcanBitrate {
@@ -153,4 +169,47 @@ pub enum BusError {
     /// A virtual bus is part of the program that asks for it, not of this crate.
     #[error("a simulated bus is not reached through a connection; the program that wants it has to embed it")]
     Simulated,
+}
+
+impl BusError {
+    /// Whether the connection is gone, and a new one may come about.
+    pub(crate) const fn is_loss_of_connection(&self) -> bool {
+        matches!(self, Self::Closed { .. } | Self::Lost { .. } | Self::Stuck { .. })
+    }
+}
+
+/// What to do about a serial device that does not open.
+fn serial_advice(error: &tokio_serial::Error) -> &'static str {
+    use tokio_serial::ErrorKind::{Io, NoDevice};
+    match error.kind() {
+        Io(io::ErrorKind::PermissionDenied) => {
+            "this user may not access it: sudo usermod -aG dialout $USER, then log out and in again"
+        }
+        Io(io::ErrorKind::NotFound) => {
+            "there is none of that name: is the adapter plugged in? ls /dev/ttyACM* /dev/ttyUSB* shows those that are"
+        }
+        NoDevice => "another program has it open: end that first (slcand, minicom, ModemManager)",
+        _ => "is it a serial device, and is the adapter plugged in?",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio_serial::ErrorKind;
+
+    use super::*;
+
+    #[test]
+    fn a_serial_device_that_does_not_open_comes_with_what_to_do() {
+        for (kind, advice) in [
+            (ErrorKind::Io(io::ErrorKind::PermissionDenied), "usermod -aG dialout"),
+            (ErrorKind::Io(io::ErrorKind::NotFound), "is the adapter plugged in?"),
+            (ErrorKind::NoDevice, "another program has it open"),
+            (ErrorKind::Unknown, "is it a serial device"),
+        ] {
+            let source = tokio_serial::Error::new(kind, "what the system says");
+            let error = BusError::OpenSerial { path: "/dev/ttyACM0".into(), source }.to_string();
+            assert!(error.contains("/dev/ttyACM0") && error.contains(advice), "{error}");
+        }
+    }
 }

@@ -1,15 +1,19 @@
 //! The texts behind `--bus` and `--serve`: what was typed, and what it means.
 
 use std::fmt;
+use std::net::IpAddr;
 use std::path::PathBuf;
 use std::str::FromStr;
 
 use can::Bitrate;
 
-use crate::{AnyBus, BusError, LogBus, SlcanBus, SocketcandBus, WallClock, socketcand};
+use crate::{AnyBus, BusError, WallClock, socketcand, udp_multicast};
 
 /// Line speed of a serial adapter unless `?baud=` says otherwise. USB adapters ignore it.
 const DEFAULT_BAUD: u32 = 115_200;
+
+/// How far frames to a multicast group go unless `?hops=` says otherwise: as python-can has it, the own network.
+const DEFAULT_HOPS: u8 = 1;
 
 /// Longest interface name on Linux (IFNAMSIZ without its terminating zero).
 const MAX_INTERFACE_LENGTH: usize = 15;
@@ -50,6 +54,22 @@ pub enum BusSpec {
         /// Bit rate to select; `None` leaves the peer as it is.
         bitrate: Option<Bitrate>,
     },
+    /// `cannelloni://HOST:PORT?local=PORT`: a cannelloni peer, over UDP.
+    Cannelloni {
+        /// `HOST:PORT`.
+        address: String,
+        /// The port of this machine that the peer sends to; without `?local=` the same as the peer's.
+        local_port: u16,
+    },
+    /// `udp_multicast://239.74.163.2:43113?hops=1`: python-can's bus of that name; the port may be left out.
+    UdpMulticast {
+        /// The multicast group.
+        group: IpAddr,
+        /// Its port.
+        port: u16,
+        /// How far frames go: 1 for the own network, 0 for this machine.
+        hops: u8,
+    },
     /// `log:FILE`: a candump log, read only.
     Log {
         /// The file.
@@ -60,23 +80,7 @@ pub enum BusSpec {
 impl BusSpec {
     /// Opens the bus. [`BusSpec::Sim`] is not opened here but embedded by whoever wants it.
     pub async fn open(&self, clock: &WallClock) -> Result<AnyBus, BusError> {
-        match self {
-            Self::Sim { .. } => Err(BusError::Simulated),
-            #[cfg(target_os = "linux")]
-            Self::SocketCan { interface } => crate::SocketCanBus::open(interface, clock).map(AnyBus::SocketCan),
-            #[cfg(not(target_os = "linux"))]
-            Self::SocketCan { interface } => {
-                Err(BusError::Interface(crate::InterfaceProblem::NotLinux { name: interface.clone() }))
-            }
-            Self::Socketcand { address, bus } => {
-                SocketcandBus::connect(address, bus, clock).await.map(AnyBus::Socketcand)
-            }
-            Self::SlcanSerial { path, bitrate, baud } => {
-                SlcanBus::open_serial(path, *baud, *bitrate, clock).await.map(AnyBus::Slcan)
-            }
-            Self::SlcanTcp { address, bitrate } => SlcanBus::connect(address, *bitrate, clock).await.map(AnyBus::Slcan),
-            Self::Log { path } => LogBus::open(path).map(AnyBus::Log),
-        }
+        AnyBus::open(self, clock).await
     }
 }
 
@@ -106,6 +110,8 @@ impl FromStr for BusSpec {
             Some(("log", file)) => path(file).map(|path| Self::Log { path }),
             Some(("socketcand", rest)) => parse_socketcand(rest),
             Some(("slcan", rest)) => parse_slcan(rest),
+            Some(("cannelloni", rest)) => parse_cannelloni(rest),
+            Some(("udp_multicast", rest)) => parse_udp_multicast(rest),
             Some(_) => Err(BUS_FORMS.to_owned()),
         };
         parsed.map_err(|reason| ParseBusError { text: text.to_owned(), what: "bus", reason })
@@ -113,7 +119,7 @@ impl FromStr for BusSpec {
 }
 
 const BUS_FORMS: &str = "expected sim, sim:FILE.toml, can0, socketcand://HOST:PORT/can0, slcan:///dev/ttyACM0?bitrate=500k, \
-                         slcan://HOST:PORT or log:FILE";
+                         slcan://HOST:PORT, cannelloni://HOST:PORT, udp_multicast://239.74.163.2 or log:FILE";
 
 fn path(text: &str) -> Result<PathBuf, String> {
     if text.is_empty() { Err("the file name is missing".to_owned()) } else { Ok(PathBuf::from(text)) }
@@ -169,6 +175,37 @@ fn parse_slcan(rest: &str) -> Result<BusSpec, String> {
     Ok(BusSpec::SlcanTcp { address: parse_address(place, None)?, bitrate })
 }
 
+fn parse_cannelloni(rest: &str) -> Result<BusSpec, String> {
+    let rest = rest.strip_prefix("//").ok_or("expected cannelloni://HOST:PORT?local=PORT")?;
+    let (place, option) = rest.split_once('?').unwrap_or((rest, ""));
+    let address = parse_address(place, None)?;
+    let port = |text: &str| text.parse::<u16>().map_err(|_| format!("'{text}' is no port; a port is 0 to 65535"));
+    let local_port = match option.split_once('=') {
+        None if option.is_empty() => port(address.rsplit(':').next().unwrap_or_default())?,
+        Some(("local", value)) => port(value)?,
+        _ => return Err(format!("unknown option '{option}'; known is local=PORT")),
+    };
+    Ok(BusSpec::Cannelloni { address, local_port })
+}
+
+fn parse_udp_multicast(rest: &str) -> Result<BusSpec, String> {
+    let rest = rest.strip_prefix("//").ok_or("expected udp_multicast://239.74.163.2:43113")?;
+    let (place, option) = rest.split_once('?').unwrap_or((rest, ""));
+    let address = parse_address(place, Some(udp_multicast::DEFAULT_PORT))?;
+    let (host, port) = address.rsplit_once(':').unwrap_or((&address, ""));
+    let bare = host.trim_start_matches('[').trim_end_matches(']');
+    let group = bare.parse::<IpAddr>().ok().filter(IpAddr::is_multicast).ok_or_else(|| {
+        format!("'{bare}' is no multicast group; python-can's are 239.74.163.2 and [ff15:7079:7468:6f6e:6465:6d6f:6d63:6173]")
+    })?;
+    let port = port.parse().map_err(|_| format!("'{port}' is no port"))?;
+    let hops = match option.split_once('=') {
+        None if option.is_empty() => DEFAULT_HOPS,
+        Some(("hops", value)) => value.parse().map_err(|_| format!("'{value}' is no number of hops, 0 to 255"))?,
+        _ => return Err(format!("unknown option '{option}'; known is hops=1 (0 stays in this machine)")),
+    };
+    Ok(BusSpec::UdpMulticast { group, port, hops })
+}
+
 /// `HOST:PORT`, where HOST may be `[::1]`.
 pub(crate) fn parse_address(text: &str, default_port: Option<u16>) -> Result<String, String> {
     let bracketed_alone = text.starts_with('[') && text.ends_with(']');
@@ -200,6 +237,15 @@ impl fmt::Display for BusSpec {
             Self::SlcanSerial { path, bitrate, baud: DEFAULT_BAUD } => write!(f, "slcan://{path}{}", option(bitrate)),
             Self::SlcanSerial { path, bitrate: None, baud } => write!(f, "slcan://{path}?baud={baud}"),
             Self::SlcanSerial { path, bitrate, baud } => write!(f, "slcan://{path}{}&baud={baud}", option(bitrate)),
+            Self::Cannelloni { address, local_port } => {
+                write!(f, "cannelloni://{address}")?;
+                let same = address.rsplit(':').next() == Some(local_port.to_string().as_str());
+                if same { Ok(()) } else { write!(f, "?local={local_port}") }
+            }
+            Self::UdpMulticast { group, port, hops } => {
+                write!(f, "udp_multicast://{}", std::net::SocketAddr::new(*group, *port))?;
+                if *hops == DEFAULT_HOPS { Ok(()) } else { write!(f, "?hops={hops}") }
+            }
             Self::Log { path } => write!(f, "log:{}", path.display()),
         }
     }
@@ -270,6 +316,22 @@ mod tests {
             ("socketcand://localhost:29536/can0", socketcand("localhost:29536", "can0")),
             ("socketcand://[::1]:7/vcan1", socketcand("[::1]:7", "vcan1")),
             ("slcan://10.0.0.1:3000", BusSpec::SlcanTcp { address: "10.0.0.1:3000".into(), bitrate: None }),
+            (
+                "cannelloni://10.0.0.2:20000",
+                BusSpec::Cannelloni { address: "10.0.0.2:20000".into(), local_port: 20_000 },
+            ),
+            (
+                "cannelloni://[::1]:20000?local=20001",
+                BusSpec::Cannelloni { address: "[::1]:20000".into(), local_port: 20_001 },
+            ),
+            (
+                "udp_multicast://239.74.163.2:43113",
+                BusSpec::UdpMulticast { group: [239, 74, 163, 2].into(), port: 43_113, hops: 1 },
+            ),
+            (
+                "udp_multicast://[ff15::1]:5000?hops=0",
+                BusSpec::UdpMulticast { group: [0xFF15, 0, 0, 0, 0, 0, 0, 1].into(), port: 5_000, hops: 0 },
+            ),
             ("log:a/b.log", BusSpec::Log { path: "a/b.log".into() }),
             (
                 "slcan:///dev/ttyACM0?bitrate=500k",
@@ -308,6 +370,13 @@ mod tests {
             ("slcan://host:1?bitrate=2M", "bit rate must be"),
             ("slcan://host:1?baud=9600", "baud is for serial devices"),
             ("slcan:///dev/ttyS0?parity=none", "unknown option 'parity=none'"),
+            ("slcan:///dev/ttyS0?bitrate=fast", "bit rate must be"),
+            ("cannelloni://host", "the port is missing"),
+            ("cannelloni://host:1?local=x", "'x' is no port"),
+            ("cannelloni://host:1?remote=2", "unknown option 'remote=2'"),
+            ("udp_multicast://127.0.0.1", "'127.0.0.1' is no multicast group"),
+            ("udp_multicast://239.1.2.3?hops=256", "'256' is no number of hops"),
+            ("udp_multicast://239.1.2.3?ttl=1", "unknown option 'ttl=1'"),
         ] {
             let error = text.parse::<BusSpec>().unwrap_err().to_string();
             assert!(error.contains(reason) && error.contains(&format!("'{text}'")), "{error}");

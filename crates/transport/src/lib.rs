@@ -5,7 +5,7 @@
 //! - [`Hub`] serves a bus to other programs over socketcand and slcan.
 //! - [`ModbusServer`] serves registers over Modbus TCP or RTU.
 //! - [`run_station`] drives a passive [`can::Station`] on a bus, [`run_world`] a virtual world behind a hub.
-//! - [`socketcand`], [`slcan`] and [`log`] are the wire formats, as pure codecs that any other program may use.
+//! - [`socketcand`], [`slcan`], [`cannelloni`], [`udp_multicast`] and [`log`] are the wire formats, as pure codecs that any other program may use.
 //!
 //! This crate holds the only clock ([`WallClock`]) and the only sockets of the project. Everything else is sans-IO.
 //!
@@ -49,12 +49,17 @@
 mod any_bus;
 mod bus;
 mod bus_spec;
+pub mod cannelloni;
 mod clock;
+mod datagrams;
 mod hub;
 mod link;
 pub mod log;
 pub mod modbus;
 mod note;
+mod raw_id;
+pub mod realtime;
+mod reconnect;
 mod run;
 pub mod slcan;
 mod socketcan;
@@ -63,10 +68,12 @@ mod tcp;
 #[cfg(test)]
 mod testing;
 mod text;
+pub mod udp_multicast;
 
 pub use any_bus::AnyBus;
 pub use bus::{AsyncBus, BusError};
 pub use bus_spec::{BusSpec, ParseBusError, Protocol, ServeSpec};
+pub use cannelloni::CannelloniBus;
 pub use clock::{Sleep, WallClock};
 pub use hub::{ClientId, Hub, HubError, HubEvent, HubOptions, LeaveReason, Listener};
 pub use log::LogBus;
@@ -81,3 +88,4 @@ pub use socketcan::InterfaceProblem;
 #[cfg(target_os = "linux")]
 pub use socketcan::SocketCanBus;
 pub use socketcand::SocketcandBus;
+pub use udp_multicast::UdpMulticastBus;

@@ -6,12 +6,15 @@ use std::time::Duration;
 
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::net::TcpStream;
-use tokio_serial::{SerialPortBuilderExt, SerialStream};
+use tokio_serial::{ClearBuffer, SerialPort, SerialPortBuilderExt, SerialStream};
 
 use crate::{BusError, WallClock, tcp};
 
 /// How long a TCP connection may take to come about. Shorter than the system's own minutes, longer than a bad network.
 const CONNECT_PATIENCE: Duration = Duration::from_secs(5);
+
+/// How long bytes may wait for a peer that takes none. A station is deaf so long; a line of 9600 baud needs 30 ms for a frame.
+const SEND_PATIENCE: Duration = Duration::from_secs(1);
 
 /// Read at once, in bytes: some 30 frames.
 const READ_SIZE: usize = 2048;
@@ -22,11 +25,29 @@ pub(crate) struct Link {
     input: Vec<u8>,
     consumed: usize,
     output: Vec<u8>,
+    clock: WallClock,
 }
 
-trait Stream: AsyncRead + AsyncWrite + Unpin + Send {}
-impl Stream for TcpStream {}
-impl Stream for SerialStream {}
+trait Stream: AsyncRead + AsyncWrite + Unpin + Send {
+    /// Called after each read.
+    fn has_read(&self) {}
+
+    /// Throws away what the system still has to send: closing would wait for it.
+    fn discard_output(&self) {}
+}
+
+impl Stream for TcpStream {
+    fn has_read(&self) {
+        tcp::acknowledge_at_once(self);
+    }
+}
+
+impl Stream for SerialStream {
+    fn discard_output(&self) {
+        // Fails where the device is gone, and with it what was to be sent.
+        let _ = self.clear(ClearBuffer::Output);
+    }
+}
 
 impl fmt::Debug for Link {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -43,21 +64,23 @@ impl Link {
         };
         // A frame waits for nobody: CANopen is a conversation of small messages.
         tcp::send_at_once(&stream).map_err(failed)?;
-        Ok(Self::new(address, Box::new(stream)))
+        tcp::notice_loss(&stream).map_err(failed)?;
+        Ok(Self::new(address, Box::new(stream), clock))
     }
 
-    pub(crate) fn open_serial(path: &str, baud: u32) -> Result<Self, BusError> {
+    pub(crate) fn open_serial(path: &str, baud: u32, clock: &WallClock) -> Result<Self, BusError> {
         let opened = tokio_serial::new(path, baud).open_native_async();
         let stream = opened.map_err(|source| BusError::OpenSerial { path: path.to_owned(), source })?;
-        Ok(Self::over_serial(path, stream))
+        Ok(Self::over_serial(path, stream, clock))
     }
 
-    pub(crate) fn over_serial(path: &str, stream: SerialStream) -> Self {
-        Self::new(path, Box::new(stream))
+    pub(crate) fn over_serial(path: &str, stream: SerialStream, clock: &WallClock) -> Self {
+        Self::new(path, Box::new(stream), clock)
     }
 
-    fn new(address: &str, stream: Box<dyn Stream>) -> Self {
-        Self { address: address.to_owned(), stream, input: Vec::new(), consumed: 0, output: Vec::new() }
+    fn new(address: &str, stream: Box<dyn Stream>, clock: &WallClock) -> Self {
+        let (input, output) = (Vec::new(), Vec::new());
+        Self { address: address.to_owned(), stream, input, consumed: 0, output, clock: clock.clone() }
     }
 
     pub(crate) fn address(&self) -> String {
@@ -79,16 +102,28 @@ impl Link {
         self.input.reserve(READ_SIZE);
         match self.stream.read_buf(&mut self.input).await {
             Ok(0) => Err(BusError::Closed { address: self.address() }),
-            Ok(_) => Ok(()),
+            Ok(_) => {
+                self.stream.has_read();
+                Ok(())
+            }
             Err(source) => Err(self.lost(source)),
         }
     }
 
-    /// Sends what `emit` appends, whole or not at all. Cancel-safe: what is left goes out first next time.
+    /// Sends what `emit` appends, whole or not at all. Cancel-safe: what is left goes out first next time. A peer that takes
+    /// nothing for a second is given up.
     pub(crate) async fn send(&mut self, emit: impl FnOnce(&mut Vec<u8>)) -> Result<(), BusError> {
-        self.flush().await?;
-        emit(&mut self.output);
-        self.flush().await
+        let clock = self.clock.clone();
+        let sent = async {
+            self.flush().await?;
+            emit(&mut self.output);
+            self.flush().await
+        };
+        if let Some(result) = within(&clock, SEND_PATIENCE, sent).await {
+            return result;
+        }
+        self.stream.discard_output();
+        Err(BusError::Stuck { address: self.address() })
     }
 
     async fn flush(&mut self) -> Result<(), BusError> {
@@ -110,6 +145,7 @@ impl Link {
 /// `future`, unless it takes longer than `patience`: then `None`.
 pub(crate) async fn within<T>(clock: &WallClock, patience: Duration, future: impl Future<Output = T>) -> Option<T> {
     tokio::select! {
+        biased;
         result = future => Some(result),
         () = clock.sleep(patience) => None,
     }

@@ -317,5 +317,5 @@ async fn closing_an_slcan_bus_closes_its_channel() {
     };
     let host = async { spec.open(&clock).await.unwrap().close().await.unwrap() };
     let (told, ()) = soon(&clock, async { tokio::join!(adapter, host) }).await;
-    assert_eq!(told, "\r\rC\rV\rS5\rO\rC\r");
+    assert_eq!(told, "\r\rC\rV\rS5\rO\rF\rC\r");
 }

@@ -21,7 +21,7 @@ use crate::frames::stamp::{Stamps, TimeForm};
 use crate::global::Global;
 use crate::output::{Format, Report};
 use crate::paint::Paint;
-use crate::session::{bus_failure, exit_on_signal, runtime, virtual_world};
+use crate::session::{bus_failure, enter_real_time, exit_on_signal, runtime, virtual_world};
 use crate::signals::asked_to_end;
 use testbench::machine_file::Machine;
 
@@ -154,6 +154,7 @@ impl Dump {
     }
 
     async fn listen(&self, global: &Global, sink: &mut Sink) -> Result<(), Failure> {
+        enter_real_time(global)?;
         let clock = WallClock::start();
         let mut bus = global.bus.open(&clock).await.map_err(|error| bus_failure(global, &error))?;
         if !matches!(global.bus, BusSpec::Log { .. }) {

@@ -10,6 +10,7 @@ pub(crate) mod eds;
 pub(crate) mod emcy;
 pub(crate) mod events;
 pub(crate) mod home;
+pub(crate) mod latency;
 pub(crate) mod man_pages;
 pub(crate) mod motion;
 pub(crate) mod nmt;

@@ -29,7 +29,7 @@ use crate::serve::pacer::{Clock, Pacer, Speed};
 use crate::serve::service::{Request, Service, listen_to_signals, read_lines, tick};
 use crate::serve::speaker::Speaker;
 use crate::serve::world::ServedWorld;
-use crate::session::{bus_failure, failure_of};
+use crate::session::{bus_failure, enter_real_time, failure_of};
 use described::notes;
 use testbench::control::ControlAddress;
 use testbench::document::BadFile;
@@ -171,6 +171,10 @@ impl Sim {
     /// `--machine` beside `sim`) come first.
     pub(crate) fn run(&self, global: &Global, bridge: Option<&BusSpec>, file: Option<&Machine>) -> Result<(), Failure> {
         let machine = self.machine(file)?;
+        if global.realtime && (self.clock != Clock::Real || self.speed.is_some()) {
+            return Err(Failure::usage("--realtime has no meaning where the bus does not run with the clock")
+                .next("leave --realtime away, or --speed and --clock"));
+        }
         if let Some(BusSpec::Sim { .. } | BusSpec::Log { .. }) = bridge {
             return Err(Failure::usage(format!("sim cannot join its drives to {}", global.bus))
                 .because("it makes a virtual bus itself, and joins it to a live one only")
@@ -241,6 +245,7 @@ impl Sim {
         global: &Global,
         bridge: Option<&BusSpec>,
     ) -> Result<(), Failure> {
+        enter_real_time(global)?;
         let clock = WallClock::start();
         let (requests, mut incoming) = mpsc::channel(REQUESTS_WAITING);
         listen_to_signals(requests.clone());

@@ -94,6 +94,11 @@ impl Traffic {
         .await
     }
 
+    /// The next frame that has passed, if there is one; as [`next`](Self::next).
+    pub(crate) fn take(&self) -> Option<(Instant, Frame)> {
+        self.lock().heard.as_mut()?.frames.pop_front()
+    }
+
     fn note(&self, frame: &Frame, now: Instant) {
         let mut passing = self.lock();
         if let Some(Shown { decoder, stamps, progress }) = &mut passing.shown {

@@ -69,6 +69,11 @@ pub enum Note {
         /// How many, where that is known.
         lost: Option<u32>,
     },
+    /// Datagrams of a peer did not arrive: UDP says nothing of those, but they are numbered.
+    DatagramsLost {
+        /// How many.
+        count: u8,
+    },
     /// Frames of ours were lost: the queue of the controller or the adapter was full, or it refused them.
     SendQueueFull,
     /// The connection to the bus is lost, and is being made again. Until [`Note::ConnectionBack`] what is sent is lost.
@@ -96,6 +101,7 @@ impl Note {
             Self::NoAcknowledge => "no_acknowledge",
             Self::FdFrame { .. } => "fd_frame",
             Self::Overrun { .. } => "overrun",
+            Self::DatagramsLost { .. } => "datagrams_lost",
             Self::SendQueueFull => "send_queue_full",
             Self::ConnectionLost { .. } => "connection_lost",
             Self::ConnectionBack => "connection_back",
@@ -152,6 +158,12 @@ impl fmt::Display for Note {
                 write!(f, "{lost} received frames were lost: they were not read fast enough")
             }
             Self::Overrun { lost: None } => f.write_str("received frames were lost: they were not read fast enough"),
+            Self::DatagramsLost { count: 1 } => {
+                f.write_str("1 datagram of the peer did not arrive, nor the frames in it")
+            }
+            Self::DatagramsLost { count } => {
+                write!(f, "{count} datagrams of the peer did not arrive, nor the frames in them")
+            }
             Self::SendQueueFull => f.write_str("a frame could not be sent and is lost: the send queue is full"),
             Self::ConnectionLost { reason } => write!(f, "the connection to the bus is lost: {reason}"),
             Self::ConnectionBack => f.write_str("the connection to the bus is back"),

@@ -7,7 +7,9 @@
 mod client;
 mod codec;
 mod session;
+mod status;
 
 pub use client::SlcanBus;
+pub(crate) use client::SlcanPlace;
 pub use codec::{Answer, Command, Decoder, Line, MAX_LINE_LENGTH, Malformed, bitrate_code, bitrate_of_code};
 pub(crate) use session::SlcanSession;

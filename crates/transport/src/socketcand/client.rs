@@ -8,6 +8,7 @@ use can::{Frame, Instant};
 use super::codec::{Decoder, Message, Reply, Request};
 use crate::link::{Link, within};
 use crate::note::Suspicions;
+use crate::reconnect::Reopen;
 use crate::socketcan::notes_of;
 use crate::{AsyncBus, BusError, Note, Received, WallClock, text};
 
@@ -73,6 +74,15 @@ impl SocketcandBus {
                 None => self.link.fill().await?,
             }
         }
+    }
+}
+
+/// Address and bus.
+impl Reopen for SocketcandBus {
+    type Place = (String, String);
+
+    async fn open((address, bus): Self::Place, clock: WallClock) -> Result<Self, BusError> {
+        Self::connect(&address, &bus, &clock).await
     }
 }
 

@@ -1,0 +1,164 @@
+//! `ferrodrive latency`: how long answers take on this bus, and how evenly SYNC comes.
+
+mod measure;
+mod spread;
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use canopen::NodeId;
+use plot::{Colour, Figure, Panel, Poster, Style, Trace};
+use serde::Serialize;
+use testbench::words::node::node;
+
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::output::Report;
+use crate::paint::Paint;
+use crate::table::Table;
+use measure::Measurement;
+use spread::{Bin, Spread};
+
+/// Measure how long answers take on this bus, and how evenly SYNC comes
+///
+/// Times from an SDO request (1000h, read only) to its answer, from a SYNC to each synchronous TPDO of the node, and from one SYNC
+/// to the next; as a table, a histogram and a picture. Where another node produces SYNC, that one is measured. Else this
+/// command produces it, unless the motor of a node on the bus is switched on: SYNC would hand it what its synchronous RPDOs hold.
+/// Nothing is written to any node.
+///
+/// On a real bus a frame's time is that of handing it to the connection, or of getting it from there. On a virtual bus it is the
+/// end of its last bit: what the wire and the device take.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    ferrodrive --bus socketcand://HOST:29536/can0 latency 4\n  \
+    ferrodrive --bus slcan:///dev/ttyACM0?bitrate=500k latency 4 --count 10000 --svg latency.svg\n  \
+    ferrodrive --bus slcan:///dev/ttyACM0?bitrate=500k latency --sync 5ms --for 1min")]
+pub(crate) struct Latency {
+    /// The node to ask; without it only SYNC is measured
+    #[arg(value_parser = node)]
+    node: Option<NodeId>,
+    /// How many requests and how many SYNCs
+    #[arg(long, value_name = "N", default_value = "1000", value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
+    count: u32,
+    /// End each of the two measurements after this time, if it has not reached its count
+    #[arg(long = "for", value_name = "TIME", value_parser = master::units::parse_duration)]
+    duration: Option<Duration>,
+    /// Period of the SYNC that this command produces
+    #[arg(long, value_name = "TIME", value_parser = master::units::parse_duration, default_value = "10ms")]
+    sync: Duration,
+    /// Draw the histograms into this file
+    #[arg(long, value_name = "FILE.svg")]
+    svg: Option<PathBuf>,
+}
+
+/// What was measured. Times in µs.
+#[derive(Debug, Serialize)]
+pub(crate) struct LatencyReport {
+    node: Option<u8>,
+    /// From an SDO request to its answer.
+    sdo: Option<Spread>,
+    /// From a SYNC to a synchronous TPDO.
+    pdo: Option<Spread>,
+    /// From one SYNC to the next.
+    sync: Option<Spread>,
+    /// Who produced SYNC: `this` or `another`.
+    producer: Option<&'static str>,
+    /// What was not measured, and why.
+    notes: Vec<String>,
+    svg: Option<PathBuf>,
+}
+
+impl Latency {
+    /// Measures.
+    pub(crate) async fn run(&self, context: &Context) -> Result<LatencyReport, Failure> {
+        if self.sync < Duration::from_micros(500) {
+            return Err(Failure::usage("--sync is too short").because("a SYNC and its answers need 500us at least"));
+        }
+        let measurement = Measurement::new(context, self.node, self.count, self.duration);
+        let measured = measurement.run(self.sync).await?;
+        let mut report = LatencyReport {
+            node: self.node.map(NodeId::raw),
+            sdo: measured.sdo.spread(),
+            pdo: measured.pdo.spread(),
+            sync: measured.sync.spread(),
+            producer: measured.producer,
+            notes: measured.notes,
+            svg: None,
+        };
+        if report.sdo.is_none() && report.pdo.is_none() && report.sync.is_none() {
+            let failure = report.notes.iter().fold(Failure::new("nothing could be measured"), Failure::because);
+            return Err(failure.next("ferrodrive scan shows who is on the bus"));
+        }
+        if let Some(path) = &self.svg {
+            draw(&report, path)?;
+            report.svg = Some(path.clone());
+        }
+        Ok(report)
+    }
+}
+
+impl LatencyReport {
+    fn spreads(&self) -> impl Iterator<Item = (&'static str, &Spread)> {
+        let named = [("SDO answer", &self.sdo), ("SYNC to TPDO", &self.pdo), ("SYNC period", &self.sync)];
+        named.into_iter().filter_map(|(name, spread)| spread.as_ref().map(|spread| (name, spread)))
+    }
+}
+
+impl Report for LatencyReport {
+    fn text(&self, paint: Paint) -> String {
+        let mut table = Table::new(&["us", "count", "lost", "min", "median", "99 %", "99.9 %", "max"]);
+        for (name, spread) in self.spreads() {
+            let times = [spread.min_us, spread.median_us, spread.p99_us, spread.p999_us, spread.max_us];
+            let times = times.map(|time| format!("{time:.0}"));
+            let counts = [name.to_owned(), spread.count.to_string(), spread.lost.to_string()];
+            table.row(counts.into_iter().chain(times));
+        }
+        let mut lines = vec![table.plain(paint)];
+        for (name, spread) in self.spreads() {
+            lines.push(String::new());
+            lines.push(format!("{} {}", paint.strong(name), paint.dim("us, how many")));
+            lines.extend(spread.histogram.iter().map(|bin| bar(bin, spread.count)));
+        }
+        lines.extend(self.notes.iter().map(|note| format!("note: {note}")));
+        lines.extend(self.svg.iter().map(|path| format!("drawn in {}", path.display())));
+        lines.join("\n")
+    }
+}
+
+/// `   1200 ..   1250    812 ########################`
+fn bar(bin: &Bin, of: u64) -> String {
+    const WIDTH: u64 = 50;
+    // The least that is there is seen.
+    let length = (bin.count * WIDTH).div_ceil(of.max(1)) as usize;
+    format!("{:>8.0} .. {:>8.0}  {:>8} {}", bin.from_us, bin.to_us, bin.count, "#".repeat(length)).trim_end().to_owned()
+}
+
+fn draw(report: &LatencyReport, path: &Path) -> Result<(), Failure> {
+    let figures = report.spreads().zip(Colour::ALL).map(|((name, spread), colour)| {
+        let points = spread.histogram.iter().flat_map(|bin| {
+            let count = bin.count as f64;
+            [(bin.from_us, count), (bin.to_us, count)]
+        });
+        let trace = Trace { label: "".into(), style: Style::Actual(colour), points: points.collect() };
+        let panel = Panel {
+            title: "how many".into(),
+            unit: "1".into(),
+            height: 140.0,
+            traces: vec![trace],
+            ..Panel::default()
+        };
+        let subtitle = format!(
+            "{} measured, {} lost; median {:.0} µs, 99.9 % {:.0} µs, most {:.0} µs",
+            spread.count, spread.lost, spread.median_us, spread.p999_us, spread.max_us
+        );
+        vec![Figure {
+            title: name.into(), subtitle, time: "time, µs".into(), panels: vec![panel], ..Figure::default()
+        }]
+    });
+    let title = report.node.map_or("SYNC".to_owned(), |node| format!("Node {node}: answers and SYNC"));
+    let poster = Poster { title, subtitle: report.notes.join("; "), rows: figures.collect() };
+    let file = crate::serve::files::create_picture(path, b"<svg");
+    let written = file.and_then(|mut file| file.write_all(poster.to_svg().as_bytes()));
+    written.map_err(|error| Failure::new(format!("cannot write the picture {}", path.display())).because(error))
+}

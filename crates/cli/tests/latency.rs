@@ -1,0 +1,82 @@
+//! `ferrodrive latency`: on a virtual bus, where the wire's times are known, and over TCP; `--realtime`.
+
+mod common;
+
+use common::{Simulator, done, ferrodrive, scratch};
+use serde_json::Value;
+
+/// Bits of a frame with 8 bytes and a standard identifier: 111 with its end of frame but without stuff bits, of which there are
+/// at most 24 (ISO 11898-1), and 3 between frames.
+const ANSWER_BITS: std::ops::RangeInclusive<f64> = 111.0..=111.0 + 24.0 + 3.0;
+
+fn figure(report: &Value, what: &str, figure: &str) -> f64 {
+    report[what][figure].as_f64().unwrap_or_else(|| panic!("{what} {figure} in {report}"))
+}
+
+#[test]
+fn on_a_virtual_bus_an_answer_takes_what_its_frame_takes_and_sync_is_even() {
+    let directory = scratch("latency");
+    let file = directory.join("machine.toml");
+    std::fs::write(&file, "bitrate = '500k'\ntiming = 'ideal'\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4\n").unwrap();
+    let (bus, svg) = (format!("sim:{}", file.display()), directory.join("latency.svg"));
+    let arguments = ["--bus", &bus, "--json", "latency", "4", "--count", "40", "--svg", svg.to_str().unwrap()];
+    let report = done(&arguments).json();
+    assert_eq!((figure(&report, "sdo", "count"), figure(&report, "sdo", "lost")), (40.0, 0.0));
+    for which in ["min_us", "median_us", "max_us"] {
+        let bits = figure(&report, "sdo", which) / 2.0;
+        assert!(ANSWER_BITS.contains(&bits), "{which}: {bits} bits");
+    }
+    assert!(figure(&report, "sync", "count") >= 40.0);
+    for which in ["min_us", "max_us"] {
+        assert!((figure(&report, "sync", which) - 10_000.0).abs() <= 10.0, "{report}");
+    }
+    assert_eq!(report["producer"], "this");
+    assert!(std::fs::read_to_string(&svg).unwrap().starts_with("<svg "));
+    std::fs::remove_dir_all(directory).unwrap();
+}
+
+/// 1800h: every SYNC brings the first TPDO of an operational node.
+#[test]
+fn a_synchronous_tpdo_is_measured_over_tcp_and_the_text_has_its_bars() {
+    let drive = "zlac8030l@4,1800:02=1";
+    let simulator = Simulator::start(&["--drive", drive, "--serve", "socketcand://127.0.0.1:0"]);
+    let bus = simulator.bus("socketcand");
+    let on_bus = |arguments: &[&str]| done(&[&["--bus", &bus, "--timeout", "1s"], arguments].concat());
+    done(&["--bus", &bus, "--timeout", "10s", "read", "4", "1000"]);
+    on_bus(&["nmt", "4", "start"]);
+    let report = on_bus(&["--json", "latency", "4", "--count", "30"]).json();
+    assert_eq!(figure(&report, "sdo", "count"), 30.0);
+    assert!(figure(&report, "pdo", "count") >= 25.0, "{report}");
+    let text = on_bus(&["latency", "4", "--count", "30"]).out;
+    assert!(text.contains("SDO answer") && text.contains("SYNC to TPDO") && text.contains('#'), "{text}");
+}
+
+#[test]
+fn a_bus_with_a_motor_switched_on_is_sent_no_sync() {
+    let simulator = Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
+    let bus = simulator.bus("socketcand");
+    let on_bus = |arguments: &[&str]| done(&[&["--bus", &bus, "--timeout", "1s"], arguments].concat());
+    done(&["--bus", &bus, "--timeout", "10s", "read", "4", "1000"]);
+    on_bus(&["--model", "4=zlac8030l", "enable", "4"]);
+    // Not only the node that is asked counts.
+    let report = on_bus(&["--json", "latency", "4", "--count", "10"]).json();
+    assert_eq!(report["producer"], Value::Null, "{report}");
+    assert!(report["notes"][0].as_str().unwrap().contains("the motor of node 4 is switched on"), "{report}");
+}
+
+#[test]
+fn real_time_is_entered_or_refused_with_what_to_do() {
+    let ended = ferrodrive(&["--realtime", "read", "4", "6064"]);
+    assert_eq!(ended.status, Some(2));
+    assert!(ended.err.contains("--realtime means nothing on a virtual bus"), "{}", ended.err);
+    let drive = ["--realtime", "sim", "--drive", "zlac8030l@4"];
+    let ended = ferrodrive(&[&drive[..], &["--speed", "10"]].concat());
+    assert_eq!(ended.status, Some(2), "{}", ended.err);
+    let simulator = Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
+    let bus = simulator.bus("socketcand");
+    let ended = ferrodrive(&["--bus", &bus, "--realtime", "--timeout", "10s", "read", "4", "1000"]);
+    match ended.status {
+        Some(0) => {}
+        _ => assert!(ended.err.contains("may not") && ended.err.contains("limits.conf"), "{}", ended.err),
+    }
+}

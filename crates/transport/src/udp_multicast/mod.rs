@@ -1,0 +1,13 @@
+//! python-can's `udp_multicast`: a bus of all programs of a network that joined the same multicast group.
+//!
+//! Source: `can/interfaces/udp_multicast` of python-can 4.6. There is no arbitration and nobody acknowledges: a frame is heard by who
+//! is there.
+
+mod bus;
+mod codec;
+
+pub use bus::UdpMulticastBus;
+pub use codec::{Item, Malformed, emit, parse};
+
+/// python-can's port.
+pub const DEFAULT_PORT: u16 = 43_113;
