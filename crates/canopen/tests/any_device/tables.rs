@@ -1,6 +1,8 @@
 //! Tables of rows that are read at run time.
 
-use canopen::od::{Access, DataType, Dictionary, Entry, FREE_PLACES, MAX_ROWS, RowFacts, Table, TableError};
+use canopen::od::{
+    Access, DataType, Dictionary, Entry, FREE_PLACES, Index, MAX_ROWS, Object, RowFacts, Table, TableError,
+};
 use canopen::{AbortCode, Mux, NodeId};
 
 use crate::device::{Boxed, Numbers, node, rw, table, upload};
@@ -87,4 +89,43 @@ fn a_dictionary_needs_the_bytes_of_its_long_values_and_once_more_the_longest() {
     values.set_raw(slot, 3);
     assert_eq!(values.value(slot), -1, "a cell is no place for it");
     assert_eq!(values.write(slot, 3), Err(AbortCode::LENGTH_MISMATCH));
+}
+
+static ROWS: [Entry; 2] = [
+    Entry::new(0x2000, 0, DataType::Integer16, Access::ReadOnly, "speed", "Speed"),
+    Entry::new(0x3000, 0, DataType::Unsigned8, Access::ReadWrite, "mode", "Mode"),
+];
+static INDEX: Index<2> = Index::of(&ROWS);
+static TABLE: Table = Table::new(&ROWS, &INDEX);
+const SPEED: Object<i16> = TABLE.object(0x2000, 0);
+
+/// 2000h has another type, and 2800h is there too, with a sub-index.
+const WIDE: Entry = Entry::new(0x2000, 0, DataType::Integer32, Access::ReadOnly, "speed", "Speed");
+const ADDED: Entry = Entry::new(0x2800, 1, DataType::Unsigned16, Access::ReadWrite, "limit", "Limit");
+static AMENDED_ROWS: [Entry; 3] = [WIDE, ROWS[1], ADDED];
+static ASCENDING: [Entry; 3] = [WIDE, ADDED, ROWS[1]];
+static AMENDED_INDEX: Index<3> = Index::of_amended(&AMENDED_ROWS, 2);
+static AMENDED: Table = Table::amended(&AMENDED_ROWS, &ASCENDING, &AMENDED_INDEX);
+
+#[test]
+fn an_amended_table_keeps_its_slots_and_lists_its_rows_in_order() {
+    let found = |table: &Table, index, sub_index| table.find(Mux::new(index, sub_index));
+    assert_eq!(found(&AMENDED, 0x3000, 0), found(&TABLE, 0x3000, 0));
+    assert_eq!(found(&AMENDED, 0x2000, 0), Ok(SPEED.slot()));
+    let added = found(&AMENDED, 0x2800, 1).expect("a row");
+    assert_eq!(AMENDED.row(added).name, "limit");
+    assert_eq!(AMENDED.rows().iter().map(|row| row.index).collect::<Vec<_>>(), [0x2000, 0x2800, 0x3000]);
+    assert!(AMENDED.iter().all(|(slot, row)| AMENDED.row(slot).mux() == row.mux()));
+    assert_eq!(found(&AMENDED, 0x2800, 0), Err(AbortCode::NO_SUCH_SUB_INDEX));
+    assert_eq!(found(&TABLE, 0x2800, 0), Err(AbortCode::NO_SUCH_OBJECT));
+}
+
+#[test]
+fn a_number_is_stored_in_the_width_that_its_row_has() {
+    for (table, bytes) in [(&TABLE, 2), (&AMENDED, 4)] {
+        let mut values = Dictionary::<Boxed>::new(table, NodeId::MIN);
+        values.set_number(SPEED, -600);
+        assert_eq!(values.value(SPEED.slot()), -600, "{bytes} bytes");
+        assert_eq!(table.row(SPEED.slot()).data_type.size(), bytes);
+    }
 }
