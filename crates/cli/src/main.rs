@@ -26,10 +26,13 @@ mod session;
 mod signals;
 mod status;
 mod table;
+mod word_order;
 
 use std::io::{self, Write};
 use std::process::ExitCode;
 
+use clap::builder::StyledStr;
+use clap::error::{ContextKind, ContextValue};
 use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
 
@@ -44,7 +47,7 @@ use crate::paint::Paint;
 use crate::plain::plain;
 
 fn main() -> ExitCode {
-    let parsed = Cli::command().try_get_matches().and_then(|matches| {
+    let parsed = matches().and_then(|matches| {
         let cli = Cli::from_arg_matches(&matches)?;
         Ok((cli, matches))
     });
@@ -61,6 +64,34 @@ fn main() -> ExitCode {
             complain(format, &failure);
             ExitCode::from(failure.status as u8)
         }
+    }
+}
+
+/// The command line as it was typed, or with its words in the order that was meant, where that does no harm.
+fn matches() -> Result<ArgMatches, clap::Error> {
+    let command = Cli::command();
+    let mut error = match command.clone().try_get_matches() {
+        Ok(matches) => return Ok(matches),
+        Err(error) => error,
+    };
+    let Some(words) = std::env::args_os().skip(1).map(|word| word.into_string().ok()).collect::<Option<Vec<_>>>()
+    else {
+        return Err(error);
+    };
+    match word_order::mend(&command, &words, error.kind()) {
+        Some(mended) if mended.is_harmless() => {
+            if !words.iter().any(|word| word == "--json") {
+                // Nobody may be listening any more.
+                let _ = writeln!(io::stderr(), "note: taken for: {}", plain(&mended.text()));
+            }
+            Ok(mended.matches)
+        }
+        Some(mended) => {
+            let hint = StyledStr::from(format!("did you mean: {}", mended.text()));
+            error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![hint]));
+            Err(error)
+        }
+        None => Err(error),
     }
 }
 

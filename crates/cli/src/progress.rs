@@ -26,6 +26,11 @@ impl Progress {
         Self { bar }
     }
 
+    /// True if somebody sees it.
+    pub(crate) fn is_shown(&self) -> bool {
+        !self.bar.is_hidden()
+    }
+
     /// Shows `text`.
     pub(crate) fn show(&self, text: impl Into<String>) {
         self.bar.set_message(text.into());

@@ -189,3 +189,39 @@ fn a_log_is_filtered_by_node_service_and_object() {
     }
     std::fs::remove_dir_all(directory).unwrap();
 }
+
+#[test]
+fn a_motion_that_takes_longer_than_it_may_is_given_up_and_stopped() {
+    let late = ferrodrive(&["--json", "velocity", "4", "60rpm", "--within", "1ms"]);
+    assert_eq!((late.status, &late.json()["error"]["kind"]), (Some(1), &json!("not_reached")));
+    assert_eq!(done(&["--json", "velocity", "4", "60rpm", "--within", "10s"]).json()["reached"], true);
+    let mut simulator = Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
+    let bus = simulator.bus("socketcand");
+    let on = |arguments: &[&str]| {
+        ferrodrive(&[&["--bus", &bus, "--timeout", "10s", "--model", "4=zlac8030l"], arguments].concat())
+    };
+    on(&["nmt", "4", "reset", "--wait", "10s"]);
+    let late = on(&["move", "4", "200turn", "--relative", "--profile-velocity", "60rpm", "--within", "2s"]);
+    assert_eq!(late.status, Some(1), "{}", late.err);
+    assert!(late.err.contains("node 4 was moving and has been quick-stopped"), "{}", late.err);
+    let speed = simulator.ask("4 get")["velocity_rpm"].as_f64().unwrap();
+    assert!(speed.abs() < 20.0, "{speed}");
+}
+
+#[test]
+fn words_in_another_order_are_understood_where_that_does_no_harm() {
+    let read = done(&["4", "read", "6060"]);
+    assert_eq!(read.out, done(&["read", "4", "6060"]).out);
+    assert_eq!(read.err.trim(), "note: taken for: ferrodrive read 4 6060");
+    assert_eq!(done(&["--json", "4", "read", "6060"]).err, "");
+    for (typed, meant) in [
+        (&["4", "velocity", "60rpm"][..], "ferrodrive velocity 4 60rpm"),
+        (&["move", "90deg", "4"], "ferrodrive move 4 90deg"),
+        (&["nmt", "start", "all"], "ferrodrive nmt all start"),
+        (&["write", "6060", "4", "'profile velocity'"], "ferrodrive write 4 6060"),
+    ] {
+        let refused = ferrodrive(typed);
+        assert_eq!((refused.status, refused.out.as_str()), (Some(2), ""), "{typed:?}");
+        assert!(refused.err.contains(&format!("did you mean: {meant}")), "{typed:?}: {}", refused.err);
+    }
+}

@@ -95,6 +95,25 @@ fn a_servo_stops_a_second_after_its_master_was_killed() {
     assert!(took > Duration::from_millis(700), "{took:?}");
 }
 
+/// A servo of CiA 402 is delivered without a watch (1016h is 0, as CiA 301, 7.5.2.19 has it), which is said; `--guard` gives it
+/// one of 2000 ms for the command, and what 6007h makes of its loss ends the motion.
+#[test]
+fn a_described_servo_stops_by_itself_where_it_was_given_a_watch_and_else_it_was_said() {
+    const DESCRIBED: (&str, &str) = ("5", "5=cia402");
+    let simulator = Simulator::start(&["--drive", "cia402@5", "--serve", "socketcand://127.0.0.1:0"]);
+    let bus = simulator.bus("socketcand");
+    std::thread::sleep(BOOT);
+    let mut bench = Bench { simulator, bus };
+    let child = bench.moving(DESCRIBED, &[]);
+    let said = bench.kill(child);
+    assert!(said.contains("node 5: if this command dies") && said.contains("--guard gives it"), "{said}");
+    bench.json(DESCRIBED, &["stop", "5"]);
+    let child = bench.moving(DESCRIBED, &["--guard"]);
+    bench.kill(child);
+    let took = bench.wait("5", false, Duration::from_millis(2000) + SLACK);
+    assert!(took > Duration::from_millis(1300), "{took:?}");
+}
+
 #[test]
 fn a_joint_stops_two_seconds_after_its_master_was_killed_and_the_next_command_begins_at_rest() {
     let mut bench = Bench::new();

@@ -62,6 +62,7 @@ impl Order {
             acceleration: self.acceleration_rpm_s.map(Ramp::RpmPerSecond),
             deceleration: self.deceleration_rpm_s.map(Ramp::RpmPerSecond),
             wait: self.wait,
+            ..MotionOptions::default()
         }
     }
 

@@ -7,7 +7,7 @@ use cia402::ModeOfOperation;
 use master::drive::HomingOptions;
 use master::units::{Rpm, parse_duration};
 
-use super::motion::{MotionOutcome, Then, outcome, speed};
+use super::motion::{MotionOutcome, Then, outcome, shown_while, speed};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::guard::GuardArgs;
@@ -50,10 +50,11 @@ impl Home {
         {
             return Err(self.refusal(model, axis));
         }
-        context.progress.show(format!("node {}: looking for its reference", self.node));
+        let doing = format!("node {}: looking for its reference", self.node);
+        context.progress.show(&doing);
         let options = HomingOptions { speed: self.profile_velocity, limit: self.within, wait: !self.no_wait };
         let guard = self.guard.begin(context, &drive).await?;
-        let motion = drive.home(self.method, options).await?;
+        let motion = shown_while(context, &drive, &doing, drive.home(self.method, options)).await?;
         let then = Then::goes_on_if(motion.reached_after.is_none());
         outcome(context, &drive, ("home with method", &self.method), motion, then, guard).await
     }

@@ -1,6 +1,7 @@
 //! `ferrodrive velocity`, `move` and `torque`: motion in physical units.
 
 use std::fmt;
+use std::pin::pin;
 use std::time::Duration;
 
 use canopen::NodeId;
@@ -94,6 +95,11 @@ struct RampArgs {
     /// Do not wait until the target is reached
     #[arg(long)]
     no_wait: bool,
+    /// Longest time that it may take until the target is reached; beyond it the drive is quick-stopped
+    ///
+    /// Without it half as long again as the ramps and the way are reckoned to take, and 2 s.
+    #[arg(long, value_name = "TIME", value_parser = parse_duration, conflicts_with = "no_wait")]
+    within: Option<Duration>,
     #[command(flatten)]
     guard: GuardArgs,
 }
@@ -166,9 +172,11 @@ impl Velocity {
     /// Turns.
     pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
         let drive = context.known_drive(self.node).await?;
-        context.progress.show(format!("node {}: to {}", self.node, self.speed));
+        let doing = format!("node {}: to {}", self.node, self.speed);
+        context.progress.show(&doing);
         let guard = self.ramps.guard.begin(context, &drive).await?;
-        let motion = drive.velocity(self.speed, self.ramps.options(None)).await?;
+        let turning = drive.velocity(self.speed, self.ramps.options(None));
+        let motion = shown_while(context, &drive, &doing, turning).await?;
         let then = self.duration.map_or(Then::goes_on_if(self.speed.0 != 0.0), Then::StopAfter);
         outcome(context, &drive, ("turn at", &self.speed), motion, then, guard).await
     }
@@ -180,12 +188,13 @@ impl Move {
         let drive = context.known_drive(self.node).await?;
         let options = self.ramps.options(self.profile_velocity);
         let verb = if self.relative { "move by" } else { "move to" };
-        context.progress.show(format!("node {}: {verb} {}", self.node, self.position));
+        let doing = format!("node {}: {verb} {}", self.node, self.position);
+        context.progress.show(&doing);
         let guard = self.ramps.guard.begin(context, &drive).await?;
         let motion = if self.relative {
-            drive.move_relative(self.position, options).await?
+            shown_while(context, &drive, &doing, drive.move_relative(self.position, options)).await?
         } else {
-            drive.move_absolute(self.position, options).await?
+            shown_while(context, &drive, &doing, drive.move_absolute(self.position, options)).await?
         };
         let then = Then::goes_on_if(motion.reached_after.is_none());
         outcome(context, &drive, (verb, &self.position), motion, then, guard).await
@@ -205,7 +214,40 @@ impl Torque {
 
 impl RampArgs {
     fn options(&self, speed: Option<Rpm>) -> MotionOptions {
-        MotionOptions { speed, acceleration: self.acceleration, deceleration: self.deceleration, wait: !self.no_wait }
+        let Self { acceleration, deceleration, within, .. } = *self;
+        MotionOptions { speed, acceleration, deceleration, wait: !self.no_wait, within }
+    }
+}
+
+/// How often a motion that goes on is looked at for somebody who waits at a terminal.
+const PROGRESS_PERIOD: Duration = Duration::from_millis(500);
+
+/// Shows where the shaft is while `motion` goes on, to people at a terminal: the questions cost the bus some frames.
+pub(super) async fn shown_while<T>(
+    context: &Context,
+    drive: &Drive,
+    doing: &str,
+    motion: impl Future<Output = T>,
+) -> T {
+    if !context.progress.is_shown() {
+        return motion.await;
+    }
+    let began = context.network.now();
+    let mut motion = pin!(motion);
+    loop {
+        tokio::select! {
+            done = &mut motion => return done,
+            () = context.network.sleep(PROGRESS_PERIOD) => {}
+        }
+        // The motion goes on while it is asked where it is.
+        let state = tokio::select! {
+            done = &mut motion => return done,
+            state = StateReport::read(drive) => state,
+        };
+        // What keeps it from answering is the motion's to tell.
+        let Ok(state) = state else { continue };
+        let seconds = (context.network.now() - began).as_secs_f64();
+        context.progress.show(format!("{doing}: at {} after {seconds:.1} s", state.motion.text()));
     }
 }
 
@@ -244,8 +286,9 @@ pub(super) async fn outcome(
     let limits = limits(drive).await;
     let mut before_stop = None;
     if let Then::StopAfter(duration) = then {
-        context.progress.show(format!("node {}: {done} for {} s", drive.node().id(), duration.as_secs_f64()));
-        drive.supervise(duration).await?;
+        let doing = format!("node {}: {done} for {} s", drive.node().id(), duration.as_secs_f64());
+        context.progress.show(&doing);
+        shown_while(context, drive, &doing, drive.supervise(duration)).await?;
         before_stop = Some(StateReport::read(drive).await?.motion);
         drive.stop().await?;
     }

@@ -23,11 +23,13 @@ pub struct MotionOptions {
     pub deceleration: Option<Ramp>,
     /// Wait until the target is reached, and watch the drive meanwhile.
     pub wait: bool,
+    /// Longest time that it may take; `None` for half as long again as it is reckoned to take.
+    pub within: Option<Duration>,
 }
 
 impl Default for MotionOptions {
     fn default() -> Self {
-        Self { speed: None, acceleration: None, deceleration: None, wait: true }
+        Self { speed: None, acceleration: None, deceleration: None, wait: true, within: None }
     }
 }
 
@@ -104,7 +106,8 @@ impl Drive {
             return Ok(MotionReport { reached_after: None, commanded, notes });
         }
         let (up, down) = self.ramp_times_s(change).await?;
-        let limit = Duration::from_secs_f64((up.max(down) * LATE_FACTOR + LATE_MARGIN_S).clamp(0.0, 3600.0));
+        let reckoned = || Duration::from_secs_f64((up.max(down) * LATE_FACTOR + LATE_MARGIN_S).clamp(0.0, 3600.0));
+        let limit = options.within.unwrap_or_else(reckoned);
         let band = (target.abs() * REACHED_SHARE).max(REACHED_LEAST_RPM);
         let quantity = self.has(units.actual_velocity, "the actual velocity")?;
         let goal = Goal::Speed { quantity, target_rpm: target, band_rpm: band };

@@ -57,7 +57,10 @@ impl Drive {
         let began_at = self.read_number(self.place(POSITION_ACTUAL)).await?;
         let target = if relative { began_at.saturating_add(counts) } else { counts };
         let turn = self.counts_per_turn().await?.max(1.0);
-        let limit = self.time_for(target.abs_diff(began_at) as f64 / turn, speed).await?;
+        let limit = match options.within {
+            Some(within) => within,
+            None => self.time_for(target.abs_diff(began_at) as f64 / turn, speed).await?,
+        };
         self.give_set_point(INTENT, counts, relative).await?;
         let notes = self.notes(stopped).await;
         if !options.wait {

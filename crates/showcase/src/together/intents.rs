@@ -47,7 +47,8 @@ enum Intent {
 impl Intent {
     async fn of(self, drive: &Drive) -> Result<Option<MotionReport>, Error> {
         let ramp = Some(Ramp::RpmPerSecond(RAMP_RPM_S));
-        let options = MotionOptions { speed: Some(SPEED), acceleration: ramp, deceleration: ramp, wait: true };
+        let options =
+            MotionOptions { speed: Some(SPEED), acceleration: ramp, deceleration: ramp, ..MotionOptions::default() };
         match self {
             Self::Turn(speed) => drive.velocity(speed, MotionOptions { speed: None, ..options }).await.map(Some),
             Self::KeepTurning(time) => drive.supervise(time).await.map(|()| None),
