@@ -7,6 +7,7 @@
 mod cargo_tests;
 mod dist;
 mod examples;
+mod idle;
 mod packages;
 mod peers;
 mod pgo;
@@ -33,6 +34,7 @@ The project's own chores.
   cargo xtask wheel              the Python package, in dist/: the library, the binary, the interface for python-can
   cargo xtask dist               what is released, in dist/: binary, manual pages, completions, data sheets, licences, wheel
   cargo xtask pgo                the binary to release, optimised by what a training run does
+  cargo xtask idle [SECONDS]     what a simulator costs that waits, in per cent of a core
 ";
 
 fn main() -> ExitCode {
@@ -45,6 +47,7 @@ fn main() -> ExitCode {
         ["wheel"] => python::wheel_command(),
         ["pgo"] => pgo::command(),
         ["vcan-test"] => vcan::command(),
+        ["idle", rest @ ..] => idle::command(rest),
         [] | ["help" | "--help" | "-h"] => {
             print!("{USAGE}");
             ExitCode::SUCCESS

@@ -18,14 +18,16 @@ use crate::engine::device::ResetTimes;
 ///   A write that was cut short in the middle leaves the old contents or the new ones.
 pub trait Firmware: Station + Clone {
     /// What the drive can measure.
-    type Sensors;
+    type Sensors: Clone + PartialEq;
     /// What the drive does to the outer world.
-    type Actuation;
+    type Actuation: Clone + PartialEq;
     /// What the drive finds when it wakes: switches and memory.
     type Hardware;
 
     /// Time between two ticks, in nanoseconds.
     const CONTROL_PERIOD_NS: u64;
+    /// Ticks after which all that counts them has come round.
+    const ROUND: u32;
 
     /// Supply voltage arrives: starts from `hardware` and sends the boot-up message.
     fn power_on(&mut self, hardware: &Self::Hardware, now: Instant);
@@ -38,6 +40,14 @@ pub trait Firmware: Station + Clone {
 
     /// One control period.
     fn tick(&mut self, sensors: &Self::Sensors, now: Instant) -> Self::Actuation;
+
+    /// Whether nothing that a tick reads or writes differs from `earlier`, which is this firmware whole [rounds](Self::ROUND) of
+    /// ticks before, and nothing of it depends on the time. Then ticks with the same sensors change nothing any more, nor what
+    /// they return, until a frame is handed in or something is [due](Self::next_event). False when in doubt.
+    fn rests_since(&self, earlier: &Self, now: Instant) -> bool;
+
+    /// [`Station::poll_timeout`] but for the communication task, which does nothing for a firmware that rests.
+    fn next_event(&self) -> Option<Instant>;
 
     /// Contents of the EEPROM, and a number that changes with them.
     fn eeprom(&self) -> (&[u8], u32);

@@ -68,7 +68,8 @@ impl Observer {
     pub fn update(&mut self, gains: &ObserverGains, count: u16) -> f32 {
         let moved = count.wrapping_sub(self.register) as i16;
         self.register = count;
-        self.period = self.period.wrapping_add(1);
+        // A silence beyond that of a standstill says nothing more: the clock stops until the next edge.
+        self.period = self.period.wrapping_add(u32::from(self.silence() < gains.standstill));
         if moved == 0 {
             self.wait(gains);
         } else {
@@ -92,10 +93,15 @@ impl Observer {
         self.position
     }
 
+    /// Periods since the last edge.
+    #[inline]
+    fn silence(&self) -> u32 {
+        self.period.wrapping_sub(self.last.period)
+    }
+
     #[inline]
     fn cross(&mut self, gains: &ObserverGains, edge: Edge) {
-        let silence = edge.period.wrapping_sub(self.last.period);
-        if silence >= gains.standstill {
+        if self.silence() >= gains.standstill {
             // From rest: nothing is known but this edge.
             (self.older, self.newer) = (edge, edge);
             self.velocity = 0.0;
@@ -114,7 +120,7 @@ impl Observer {
         if self.velocity == 0.0 {
             return;
         }
-        let silence = self.period.wrapping_sub(self.last.period);
+        let silence = self.silence();
         if silence >= gains.standstill {
             self.velocity = 0.0;
             return;

@@ -14,8 +14,10 @@ use crate::flows::Flows;
 use crate::hall::{HallFault, HallModel};
 use crate::mechanics::{RotorData, RotorModel};
 use crate::pmsm::{Dq, Phase, PmsmData, PmsmInput, PmsmModel, Terminals};
+use crate::rest::Rest;
 use crate::rig::{Rig, RigModel};
 use crate::shaft::{Motion, Pending, Turned};
+use crate::thermal::reading_c;
 
 /// What never changes about a hub motor and the power stage it is wired to.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,9 +78,9 @@ pub struct Sensors {
     pub phase_current_a: [f64; 3],
     /// Voltage of the bus capacitor.
     pub bus_v: f64,
-    /// Temperature of the winding.
+    /// Temperature of the winding, in the steps of [`reading_c`].
     pub winding_c: f64,
-    /// Temperature of the power stage's heat sink.
+    /// Temperature of the power stage's heat sink, likewise.
     pub heat_sink_c: f64,
 }
 
@@ -328,8 +330,8 @@ impl HubMotor {
             hall: self.model.hall.state(electrical, self.hall_fault),
             phase_current_a: self.model.pmsm.phase_current_a(&self.pmsm, self.axis),
             bus_v: self.rig.supply.bus_v,
-            winding_c: self.rig.winding.temperature_c,
-            heat_sink_c: self.rig.heat_sink.temperature_c,
+            winding_c: reading_c(self.rig.winding.temperature_c),
+            heat_sink_c: reading_c(self.rig.heat_sink.temperature_c),
         }
     }
 
@@ -339,6 +341,36 @@ impl HubMotor {
             + self.model.pmsm.magnetic_energy_j(&self.pmsm)
             + self.model.rig.supply.stored_energy_j(&self.rig.supply)
             + self.cogging.map_or(0.0, |cogging| cogging.energy_j(self.rotor.angle))
+    }
+}
+
+impl Rest for HubMotor {
+    type Pins = Actuation;
+    /// The power stage has melted.
+    type Wear = bool;
+
+    fn step(&mut self, dt_s: f64, pins: &Actuation) {
+        HubMotor::step(self, dt_s, pins);
+    }
+
+    fn rig_and_model(&mut self) -> (&mut Rig, &RigModel) {
+        (&mut self.rig, &self.model.rig)
+    }
+
+    fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    fn bleeds(&self, pins: &Actuation) -> bool {
+        pins.bleeder_on
+    }
+
+    fn step_slow(&mut self) {
+        HubMotor::step_slow(self);
+    }
+
+    fn wear(&self) -> bool {
+        self.power_stage_burnt
     }
 }
 

@@ -15,8 +15,10 @@ use crate::gear::{GearData, GearInput, GearModel};
 use crate::hub_motor::Inverter;
 use crate::mechanics::{Load, RotorData, RotorModel};
 use crate::pmsm::{Phase, PmsmData, PmsmInput, PmsmModel};
+use crate::rest::Rest;
 use crate::rig::{Rig, RigModel};
 use crate::shaft::{Coupled, HELD_NM, Motion, Pending, Push, Turned};
+use crate::thermal::reading_c;
 
 /// Assumed: what a seized bearing holds against, far more than the motor or the load through the gear gives.
 const SEIZED_NM: f64 = 100.0;
@@ -72,9 +74,9 @@ pub struct Sensors {
     pub phase_current_a: [f64; 3],
     /// Voltage of the bus capacitor.
     pub bus_v: f64,
-    /// Temperature of the winding.
+    /// Temperature of the winding, in the steps of [`reading_c`].
     pub winding_c: f64,
-    /// Temperature of the power stage's heat sink.
+    /// Temperature of the power stage's heat sink, likewise.
     pub heat_sink_c: f64,
 }
 
@@ -152,9 +154,8 @@ impl JointMotor {
         let mut flows = motor.flows(0.0, 0.0);
         flows.bus_w += clamp_w;
         flows.arc_j += clamp_w * dt_s;
-        let discharging = self.discharge_from_v.is_some_and(|from_v| self.rig.supply.bus_v > from_v);
         self.torque_nm = motor_nm;
-        let pending = Pending { flows, motor_nm, dt_s, bleeder_on: discharging };
+        let pending = Pending { flows, motor_nm, dt_s, bleeder_on: self.is_discharging() };
         if self.rig.is_joined() {
             self.step_joined(pending, brake_nm);
         } else {
@@ -251,6 +252,12 @@ impl JointMotor {
         self.finish(pending, &turned);
     }
 
+    /// The discharge module conducts.
+    #[inline]
+    fn is_discharging(&self) -> bool {
+        self.discharge_from_v.is_some_and(|from_v| self.rig.supply.bus_v > from_v)
+    }
+
     /// What the bridge does: molten switches join the wires, whatever the drive wants.
     #[inline]
     fn inverter(&self, actuation: &Actuation) -> Inverter {
@@ -312,8 +319,8 @@ impl JointMotor {
             battery: self.model.encoder.battery_state(&self.encoder),
             phase_current_a: self.model.pmsm.phase_current_a(&self.pmsm, self.axis),
             bus_v: self.rig.supply.bus_v,
-            winding_c: self.rig.winding.temperature_c,
-            heat_sink_c: self.rig.heat_sink.temperature_c,
+            winding_c: reading_c(self.rig.winding.temperature_c),
+            heat_sink_c: reading_c(self.rig.heat_sink.temperature_c),
         }
     }
 
@@ -333,5 +340,35 @@ impl JointMotor {
             + pmsm.magnetic_energy_j(&self.pmsm)
             + rig.supply.stored_energy_j(&self.rig.supply)
             + self.cogging.map_or(0.0, |cogging| cogging.energy_j(self.rotor.angle))
+    }
+}
+
+impl Rest for JointMotor {
+    type Pins = Actuation;
+    /// Power stage, turns of the encoder, its battery.
+    type Wear = (bool, bool, BatteryState);
+
+    fn step(&mut self, dt_s: f64, pins: &Actuation) {
+        JointMotor::step(self, dt_s, pins);
+    }
+
+    fn rig_and_model(&mut self) -> (&mut Rig, &RigModel) {
+        (&mut self.rig, &self.model.rig)
+    }
+
+    fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    fn bleeds(&self, _pins: &Actuation) -> bool {
+        self.is_discharging()
+    }
+
+    fn step_slow(&mut self) {
+        JointMotor::step_slow(self);
+    }
+
+    fn wear(&self) -> Self::Wear {
+        (self.power_stage_burnt, self.encoder.turns_lost, self.model.encoder.battery_state(&self.encoder))
     }
 }

@@ -46,6 +46,7 @@ pub mod hub_motor;
 pub mod joint_motor;
 pub mod mechanics;
 pub mod pmsm;
+pub mod rest;
 pub mod rig;
 pub mod shaft;
 pub mod stepper;

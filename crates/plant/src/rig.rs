@@ -13,7 +13,7 @@ use crate::thermal::{BodyData, BodyModel, resistance_at_ohm};
 
 /// Steps between two looks at the slow things: heat, resistance, and the exact direction of the magnets. Bodies are
 /// a million steps slow, and turning the direction on by its series is off by 1e-11 in so many steps.
-const SLOW_EVERY: u32 = 16;
+pub(crate) const SLOW_EVERY: u32 = 16;
 
 /// A bus under this counts as empty, so that its voltage does not fall towards zero for ever.
 const EMPTY_V: f64 = 1e-3;
@@ -159,6 +159,26 @@ impl Rig {
 
         self.slow.steps += 1;
         self.slow.time_s += dt_s;
+        self.slow.steps >= SLOW_EVERY
+    }
+
+    /// Steps up to and with the next one after which [`step_slow`](Self::step_slow) is due.
+    pub(crate) fn steps_to_slow(&self) -> u32 {
+        SLOW_EVERY - self.slow.steps
+    }
+
+    /// So many steps in which no power flows but what the drive itself takes, on a bus that such a step leaves as it is: what
+    /// [`step`](Self::step) does then, without computing it again for each. True when [`step_slow`](Self::step_slow) is due.
+    pub(crate) fn book_rest(&mut self, model: &RigModel, dt_s: f64, bleeder_on: bool, steps: u32) -> bool {
+        let mut supply = self.supply;
+        let bus = model.supply.step(&mut supply, dt_s, 0.0, bleeder_on);
+        for _ in 0..steps {
+            self.energy.source_j += bus.source_j;
+            self.energy.bleeder_j += bus.bleeder_j;
+            self.energy.consumption_j += bus.consumption_j;
+            self.slow.time_s += dt_s;
+        }
+        self.slow.steps += steps;
         self.slow.steps >= SLOW_EVERY
     }
 

@@ -18,9 +18,11 @@ use crate::attachment::Attachment;
 use crate::clamp::ClampModel;
 use crate::flows::Flows;
 use crate::mechanics::{RotorData, RotorModel};
+use crate::rest::Rest;
 use crate::rig::{Rig, RigModel};
 use crate::shaft::{Motion, Pending, Turned};
 use crate::stepper::{Bridges, Phase, StepperData, StepperInput, StepperModel, Turn};
+use crate::thermal::reading_c;
 
 /// Assumed: two wires that touch have 1 ohm with their contact. It is enough to be noticed before the bus collapses.
 const SHORT_OHM: f64 = 1.0;
@@ -58,7 +60,7 @@ pub struct Sensors {
     pub bus_current_a: f64,
     /// Temperature of the windings.
     pub winding_c: f64,
-    /// Temperature of the power stage's heat sink.
+    /// Temperature of the power stage's heat sink, likewise.
     pub heat_sink_c: f64,
 }
 
@@ -286,8 +288,8 @@ impl StepperMotor {
             phase_current_a,
             bus_v: self.rig.supply.bus_v,
             bus_current_a: self.bus_current_a,
-            winding_c: self.rig.winding.temperature_c,
-            heat_sink_c: self.rig.heat_sink.temperature_c,
+            winding_c: reading_c(self.rig.winding.temperature_c),
+            heat_sink_c: reading_c(self.rig.heat_sink.temperature_c),
         }
     }
 
@@ -297,6 +299,36 @@ impl StepperMotor {
             + self.model.stepper.magnetic_energy_j(&self.stepper)
             + self.model.stepper.detent_energy_j(magnet_axis(&self.model, self.rotor.angle))
             + self.model.rig.supply.stored_energy_j(&self.rig.supply)
+    }
+}
+
+impl Rest for StepperMotor {
+    type Pins = Bridges;
+    /// A transistor has broken down.
+    type Wear = bool;
+
+    fn step(&mut self, dt_s: f64, pins: &Bridges) {
+        StepperMotor::step(self, dt_s, pins);
+    }
+
+    fn rig_and_model(&mut self) -> (&mut Rig, &RigModel) {
+        (&mut self.rig, &self.model.rig)
+    }
+
+    fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    fn bleeds(&self, _pins: &Bridges) -> bool {
+        false
+    }
+
+    fn step_slow(&mut self) {
+        StepperMotor::step_slow(self);
+    }
+
+    fn wear(&self) -> bool {
+        self.broken_down
     }
 }
 

@@ -17,6 +17,17 @@ pub fn resistance_at_ohm(stated_ohm: f64, per_k: f64, temperature_c: f64) -> f64
     stated_ohm * (1.0 + per_k * (temperature_c - RESISTANCE_STATED_AT_C))
 }
 
+/// What a converter's steps make of the range of a thermistor: 13 bits over 256 K. Assumed for every drive.
+const READINGS_PER_K: f64 = 32.0;
+
+/// What a thermometer tells of a temperature.
+#[inline]
+pub fn reading_c(temperature_c: f64) -> f64 {
+    // Numbers of this size have no fractions: what is added and taken away again rounds to whole ones.
+    const WHOLE: f64 = 1.5 * (1_u64 << 52) as f64;
+    (temperature_c * READINGS_PER_K + WHOLE - WHOLE) * (1.0 / READINGS_PER_K)
+}
+
 /// What never changes about a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BodyModel {
@@ -77,6 +88,17 @@ mod tests {
             BODY.step(&mut body, 1e-3, 10.0, 25.0);
         }
         assert!((body.temperature_c - 45.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_thermometer_reads_the_nearest_32nd_of_a_kelvin() {
+        for n in -20_000..20_000_i32 {
+            let temperature_c = f64::from(n) * 0.009_77;
+            let reading = reading_c(temperature_c);
+            assert!((reading - temperature_c).abs() <= 1.0 / 64.0, "{temperature_c}: {reading}");
+            assert_eq!((reading * 32.0) % 1.0, 0.0, "{temperature_c}: {reading}");
+        }
+        assert_eq!(reading_c(25.0), 25.0);
     }
 
     #[test]

@@ -13,7 +13,7 @@ use std::str::FromStr;
 
 use serde::Serialize;
 
-use crate::stimulus::{BodyStimulus, GET, GET_BODY, Place, Stimulus, StimulusError, WireFault};
+use crate::stimulus::{BodyStimulus, GET, GET_BODY, Place, Stimulus, StimulusError, WireFault, excerpt};
 use crate::{Refused, World, json};
 pub use run::{Before, Run};
 
@@ -64,7 +64,7 @@ impl FromStr for Command {
         let place = parse_place(first)?;
         let rest = rest.trim();
         match rest.split_whitespace().next() {
-            None => Err(CommandError::NoAction(first.to_owned())),
+            None => Err(CommandError::NoAction(excerpt(first))),
             Some("get") if rest == "get" => Ok(Self::Get(place)),
             Some("get") => Err(StimulusError::Usage(GET).into()),
             Some(_) => Ok(Self::Apply(place, rest.parse()?)),
@@ -81,7 +81,7 @@ fn body(rest: &str) -> Result<Command, CommandError> {
 fn parse_place(word: &str) -> Result<Place, CommandError> {
     let looks_numeric = word.starts_with(|first: char| first.is_ascii_digit() || first == '-' || first == '+');
     word.parse().map_err(|()| {
-        let word = word.to_string();
+        let word = excerpt(word);
         if looks_numeric { CommandError::BadNode(word) } else { CommandError::Unknown(word) }
     })
 }
@@ -146,6 +146,24 @@ pub enum CommandError {
 }
 
 impl CommandError {
+    /// The node that it is about, where there is none such.
+    pub const fn node(&self) -> Option<u8> {
+        match self {
+            Self::NoSuchDrive { number, .. } => Some(*number),
+            _ => None,
+        }
+    }
+
+    /// What to do, where the words do not say it.
+    pub const fn next(&self) -> Option<&'static str> {
+        match self {
+            Self::Unknown(_) | Self::NoAction(_) | Self::Stimulus(_) => Some("help lists what a line may say"),
+            Self::NotManual => Some("start the simulator with --clock manual"),
+            Self::Running { .. } | Self::TooMany { .. } => Some("wait for the answer to the run"),
+            _ => None,
+        }
+    }
+
     /// What kind it is, in a word that programs may rely on.
     pub const fn kind(&self) -> &'static str {
         match self {
@@ -217,14 +235,25 @@ pub fn asks_for_an_answer(line: &str) -> bool {
 }
 
 #[derive(Serialize)]
-struct Refusal {
+struct Refusal<'a> {
     ok: bool,
     error: String,
+    kind: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    node: Option<u8>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    next: Option<&'a str>,
 }
 
-/// The answer to a line that was not done.
+/// The answer to a line that was not done: why in words, and beside it what a program goes by.
 pub fn refused(error: &CommandError) -> String {
-    json::line(&Refusal { ok: false, error: error.to_string() })
+    json::line(&Refusal {
+        ok: false,
+        error: error.to_string(),
+        kind: error.kind(),
+        node: error.node(),
+        next: error.next(),
+    })
 }
 
 #[cfg(test)]

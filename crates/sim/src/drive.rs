@@ -61,6 +61,10 @@ pub trait VirtualDrive: Station + VirtualDriveClone + Send {
     /// Brings control loops and physics up to `now`. Never changes what happens, only when it is computed.
     fn advance(&mut self, now: Instant);
 
+    /// From now on it computes what changes nothing too, control period by control period. It makes no difference but of work:
+    /// this is what tests compare with.
+    fn keep_awake(&mut self) {}
+
     /// What a person standing beside the machine could measure, as of the last [`advance`](Self::advance); of a machine with
     /// several axes, at the first.
     fn report(&self) -> Report;
@@ -355,6 +359,7 @@ pub struct Report {
     pub output: Option<OutputShaft>,
     /// What has been destroyed, and what to do about it.
     pub damage: Option<&'static str>,
-    /// True angle of the motor shaft in rad, many turns, from where it stood at the start.
+    /// True angle of the motor shaft in rad, many turns, from the zero of its disc. That is where most stand at the start; a
+    /// described servo is put together at some other place.
     pub shaft_angle_rad: f64,
 }

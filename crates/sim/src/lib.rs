@@ -42,6 +42,7 @@ pub mod fault;
 pub mod json;
 pub mod machine;
 mod mechanics;
+mod nmt_reset;
 pub mod pace;
 mod prng;
 pub mod recorder;

@@ -50,7 +50,7 @@ pub enum Refused {
         reason: String,
     },
     /// The value makes no sense for this machine.
-    #[error("{what} must be {expected}, not {value}")]
+    #[error("{what} must be {expected}, not {}", shown(*value))]
     OutOfRange {
         /// The quantity.
         what: &'static str,
@@ -87,4 +87,25 @@ pub enum Refused {
         /// What is wrong with it.
         reason: &'static str,
     },
+}
+
+/// A number to be said again in an error: with a power of ten where it would be a long row of digits.
+fn shown(value: f64) -> String {
+    let is_short = value == 0.0 || (1e-6..1e12).contains(&value.abs());
+    if is_short || !value.is_finite() { value.to_string() } else { format!("{value:e}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_far_out_of_range_is_said_in_few_digits() {
+        for (value, text) in
+            [(5000.0, "5000"), (-0.25, "-0.25"), (1e308, "1e308"), (-1.5e-200, "-1.5e-200"), (0.0, "0")]
+        {
+            let refused = Refused::OutOfRange { what: "load torque", expected: "-1000 to 1000 N·m", value };
+            assert_eq!(refused.to_string(), format!("load torque must be -1000 to 1000 N·m, not {text}"));
+        }
+    }
 }

@@ -28,6 +28,7 @@ pub use load::{Friction, LoadKind, LoadPart};
 pub use parse::{FORMS, GET, RUN};
 pub use place::Place;
 pub use range::SwitchRange;
+pub(crate) use words::excerpt;
 
 #[cfg(test)]
 mod tests;

@@ -235,6 +235,25 @@ fn a_store_takes_its_time_its_answer_waits_for_it_and_a_cut_in_it_leaves_the_old
 }
 
 #[test]
+fn an_answer_that_waits_for_its_store_is_not_sent_after_a_reset() {
+    for (name, write, _, _, _) in STORED {
+        let model = devices::model(name).unwrap();
+        for command in ["81", "82"] {
+            let mut bench = Bench::booted(model, 1);
+            bench.send(write);
+            // The firmware has answered, the chip is at work.
+            bench.world.run_for(Duration::from_micros(u64::from(model.timing.sdo_answer.most_us + 1_000)));
+            assert_eq!(bench.heard(), [], "{name}");
+            bench.send(&format!("000#{command}05"));
+            bench.world.run_for(Duration::from_secs(2));
+            let heard: Vec<String> = bench.heard().iter().map(|(_, frame)| frame.to_string()).collect();
+            assert_eq!(heard.first(), Some(&boot_up()), "{name}, {command}");
+            assert!(!heard.iter().any(|frame| frame.starts_with("585#")), "{name}, {command}: {heard:?}");
+        }
+    }
+}
+
+#[test]
 fn a_supply_that_is_switched_off_drains_and_a_cycle_waits_for_that() {
     for name in ["zlac8030l", "zlim42c", "m4230e17b50", "cia402"] {
         let mut bench = Bench::booted(devices::model(name).unwrap(), 1);

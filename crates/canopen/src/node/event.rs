@@ -84,6 +84,10 @@ impl<S: Storage> EventQueue<S> {
         self.taken = self.put;
     }
 
+    pub(super) const fn is_empty(&self) -> bool {
+        self.taken == self.put
+    }
+
     pub(super) fn capacity(&self) -> usize {
         self.events.as_ref().len()
     }

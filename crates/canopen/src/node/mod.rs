@@ -178,6 +178,13 @@ impl<S: Storage> Node<S> {
         self.last_addressed
     }
 
+    /// Whether it has nothing to send and nothing to tell, and its state and its values are those that it had as `earlier`:
+    /// until a frame comes, or its deadline, or another value, it does nothing.
+    pub fn rests_since(&self, earlier: &Self) -> bool {
+        let silent = self.pending.is_empty() && self.events.is_empty();
+        silent && self.state == earlier.state && self.dictionary.has_same_values(&earlier.dictionary)
+    }
+
     /// Queues an EMCY message and sets the error register (1001h).
     pub fn raise_emcy(&mut self, code: EmcyErrorCode, error_register: u8, manufacturer: [u8; 5], now: Instant) {
         self.now = now;

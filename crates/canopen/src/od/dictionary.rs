@@ -54,6 +54,13 @@ impl<S: Storage> Dictionary<S> {
         self
     }
 
+    /// Whether every object has the value that it has in `other`, which is of the same table.
+    pub fn has_same_values(&self, other: &Self) -> bool {
+        self.cells.as_ref() == other.cells.as_ref()
+            && self.bytes.as_ref() == other.bytes.as_ref()
+            && self.resolution == other.resolution
+    }
+
     /// The rows.
     #[inline]
     pub const fn table(&self) -> &'static Table {

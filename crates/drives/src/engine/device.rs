@@ -234,6 +234,24 @@ impl<S: Storage> Device<S> {
         true
     }
 
+    /// Whether nothing about it differs from `earlier` and nothing waits to be stored, so that until a frame comes or
+    /// [something is due](Self::next_event) a run of the communication task changes nothing.
+    pub fn rests_since(&self, earlier: &Self) -> bool {
+        self.running
+            && self.reset.is_none()
+            && !self.store.has_pending()
+            && self.eeprom_ok == earlier.eeprom_ok
+            && self.fault_bits == earlier.fault_bits
+            && self.communication_errors == earlier.communication_errors
+            && self.node.rests_since(&earlier.node)
+    }
+
+    /// [`Station::poll_timeout`] but for the communication task.
+    pub fn next_event(&self) -> Option<Instant> {
+        let node = self.running.then(|| self.node.poll_timeout()).flatten();
+        node.into_iter().chain(self.reset.map(|(_, at)| at)).min()
+    }
+
     /// See [`Node::set_heartbeat_state`].
     pub const fn set_heartbeat_state(&mut self, state: Option<u8>) {
         self.node.set_heartbeat_state(state);

@@ -74,6 +74,15 @@ pub struct FaultMonitor<const N: usize> {
     latched: FaultSet,
 }
 
+/// Alike: the same counted and the same latched, of the same table.
+impl<const N: usize> PartialEq for FaultMonitor<N> {
+    fn eq(&self, other: &Self) -> bool {
+        core::ptr::eq(self.table, other.table)
+            && self.present_for == other.present_for
+            && (self.present, self.latched) == (other.present, other.latched)
+    }
+}
+
 impl<const N: usize> FaultMonitor<N> {
     /// Nothing present, nothing latched. `debounce` is how many supervision periods the cause of each row must last.
     pub const fn new(table: &'static [FaultRow; N], debounce: &'static [u16; N]) -> Self {

@@ -1,7 +1,7 @@
 //! Digital inputs: debounce of `N` lines. What a line does is the drive's table of functions.
 
 /// Debounced levels; bit *n* is input *n*.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inputs<const N: usize> {
     levels: u16,
     differs_for: [u16; N],

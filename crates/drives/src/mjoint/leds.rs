@@ -15,7 +15,7 @@ pub struct Leds {
 }
 
 /// How long both are lit after power-on.
-const LAMP_TEST_MS: u64 = 500;
+pub(super) const LAMP_TEST_MS: u64 = 500;
 const LONG_MS: u64 = 900;
 const SHORT_MS: u64 = 200;
 /// Dark after each flash.

@@ -9,7 +9,7 @@ use crate::engine::actuator::servo::Servo;
 use crate::engine::faults::{FaultSet, exceeds_with_hysteresis};
 
 /// What has to be remembered from one period to the next.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Protection {
     at_current_limit_s: f32,
     at_output_limit_s: f32,

@@ -33,7 +33,7 @@ pub struct PulseParameters {
 }
 
 /// Counts pulses and gears them, without losing a remainder.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pulses {
     seen: Option<(Function, bool, u16)>,
     /// Geared counts that do not make a whole one yet, in units of 1/denominator.

@@ -9,7 +9,7 @@ use super::assumptions::COUNTS_PER_TURN;
 const TURN: i32 = COUNTS_PER_TURN as i32;
 
 /// What the encoder's own counter of turns is corrected by.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Turns {
     recorded: Option<i32>,
     /// Counts from what the encoder tells to the position: whole turns.

@@ -158,6 +158,7 @@ impl<S: Storage> Firmware for ServoDrive<S> {
     type Hardware = Hardware<S>;
 
     const CONTROL_PERIOD_NS: u64 = CONTROL_PERIOD_NS;
+    const ROUND: u32 = SUPERVISION_DIVIDER as u32;
 
     fn power_on(&mut self, hardware: &Hardware<S>, now: Instant) {
         self.base.node_id = hardware.node_id;
@@ -205,6 +206,35 @@ impl<S: Storage> Firmware for ServoDrive<S> {
             }
         }
         actuation
+    }
+
+    fn rests_since(&self, earlier: &Self, _now: Instant) -> bool {
+        // Each by name, so that no new one is forgotten.
+        let Self {
+            description: _,
+            base,
+            shafts,
+            motors: _,
+            faults,
+            protection,
+            bleeder,
+            bleeder_limits: _,
+            probes,
+            periods,
+        } = self;
+        (faults, protection, bleeder) == (&earlier.faults, &earlier.protection, &earlier.bleeder)
+            && (probes, periods) == (&earlier.probes, &earlier.periods)
+            && shafts
+                .iter()
+                .flatten()
+                .zip(earlier.shafts.iter().flatten())
+                .all(|(shaft, before)| shaft.rests_since(before))
+            && base.device.rests_since(&earlier.base.device)
+    }
+
+    fn next_event(&self) -> Option<Instant> {
+        let watch = self.base.services.poll_timeout().filter(|_| self.base.device.is_running());
+        self.base.device.next_event().into_iter().chain(watch).min()
     }
 
     fn eeprom(&self) -> (&[u8], u32) {

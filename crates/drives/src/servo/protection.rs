@@ -22,7 +22,7 @@ const TEMPERATURE_HYSTERESIS_C: f32 = 10.0;
 const SETTLING_PERIODS: u16 = 200;
 
 /// What has to be remembered.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Protection {
     supplied_for: u16,
 }

@@ -316,6 +316,46 @@ impl Shaft {
         }
     }
 
+    /// Nothing that a period reads or writes differs from `earlier`, which is this axis some periods before.
+    pub(super) fn rests_since(&self, earlier: &Self) -> bool {
+        // Each by name, so that no new one is forgotten. The first six follow the values when `parameters_changed`.
+        let Self {
+            slots: _,
+            modes: _,
+            motor: _,
+            model: _,
+            gains: _,
+            parameters: _,
+            parameters_changed,
+            power,
+            servo,
+            awake,
+            demand,
+            targets,
+            position_offset,
+            index,
+            set_points,
+            faults,
+            lost,
+            overload,
+            reached,
+            standing,
+            outside,
+            following_error,
+            limited,
+            probes,
+        } = self;
+        !*parameters_changed
+            && (power, servo, awake) == (&earlier.power, &earlier.servo, &earlier.awake)
+            && (demand, targets) == (&earlier.demand, &earlier.targets)
+            && (position_offset, index) == (&earlier.position_offset, &earlier.index)
+            && *set_points == earlier.set_points
+            && (faults, lost, overload) == (&earlier.faults, &earlier.lost, &earlier.overload)
+            && (reached, standing, outside) == (&earlier.reached, &earlier.standing, &earlier.outside)
+            && (following_error, limited) == (&earlier.following_error, &earlier.limited)
+            && *probes == earlier.probes
+    }
+
     /// Operation enabled, with no fault on its way.
     fn is_enabled(&self) -> bool {
         self.power.state() == PowerState::OperationEnabled

@@ -7,7 +7,7 @@ use super::slots::AxisSlots;
 use super::write;
 
 /// Both channels.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct TouchProbes([TouchProbe; 2]);
 
 impl TouchProbes {

@@ -12,7 +12,7 @@ use crate::engine::axis::Demand;
 use crate::engine::faults::{FaultSet, exceeds, exceeds_with_hysteresis, within};
 
 /// What has to be remembered from one period to the next.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Protection {
     overload: Overload,
     loose_wire_for: u16,

@@ -16,7 +16,7 @@ pub(super) struct Situation {
 }
 
 /// Tells an open phase from one that is not asked for current at present, or cannot be given any.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct PhaseWatch {
     /// Supervision periods in which each phase was asked and carried nothing, since it last carried something. Those in
     /// which it was not asked do not count: a slowly turning vector asks each phase for a part of its turn only.

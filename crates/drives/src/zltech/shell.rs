@@ -14,7 +14,7 @@ use crate::engine::device::Device;
 use crate::engine::inputs::Inputs;
 
 /// State of a drive with so many inputs.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Shell<const INPUTS: usize> {
     pub(crate) axis: PowerDrive,
     /// What the control loops are asked for.

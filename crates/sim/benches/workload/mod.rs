@@ -11,7 +11,7 @@ use sim::machine::{mjoint, zlac8030l, zlim42c};
 use sim::{CoupledShaft, Coupling, Place, StationId, VirtualDrive, World};
 
 /// Names of the worlds.
-pub(crate) const WORLDS: [&str; 11] = [
+pub(crate) const WORLDS: [&str; 15] = [
     "1 hub servo turning, silent bus",
     "1 hub servo turning, busy bus",
     "1 hub servo not enabled",
@@ -23,6 +23,10 @@ pub(crate) const WORLDS: [&str; 11] = [
     "127 hub servos turning, busy bus",
     "2 hub servos turning, silent bus",
     "2 hub servos moving a base, silent bus",
+    "6 hub servos not enabled",
+    "127 hub servos not enabled",
+    "6 hub servos turning, silent bus",
+    "16 hub servos turning, silent bus",
 ];
 
 /// Drives by their node-ID.
@@ -33,7 +37,11 @@ pub(crate) fn world(name: &str) -> Option<World> {
     Some(match name {
         "1 hub servo turning, silent bus" => turning(hub_servos(1)).0,
         "1 hub servo turning, busy bus" => busy::controlled_each_millisecond(),
-        "1 hub servo not enabled" => not_enabled(),
+        "1 hub servo not enabled" => not_enabled(1),
+        "6 hub servos not enabled" => not_enabled(6),
+        "127 hub servos not enabled" => not_enabled(127),
+        "6 hub servos turning, silent bus" => turning(hub_servos(6)).0,
+        "16 hub servos turning, silent bus" => turning(hub_servos(16)).0,
         "1 joint turning, silent bus" => turning(vec![joint(1)]).0,
         "1 stepper turning, silent bus" => turning(vec![stepper(2)]).0,
         "one of each turning, silent bus" => {
@@ -62,11 +70,13 @@ fn stepper(node: u8) -> (u8, Box<dyn VirtualDrive>) {
     (node, Box::new(zlim42c(node, 0)))
 }
 
-fn not_enabled() -> World {
+fn not_enabled(count: u8) -> World {
     let mut world = World::new(Bitrate::M1, 1);
     // Somebody who acknowledges: alone it would repeat its boot-up message for ever.
     world.add_probe();
-    world.add_drive(1, Box::new(zlac8030l(1, 0))).expect("numbers differ");
+    for (node, drive) in hub_servos(count) {
+        world.add_drive(node, drive).expect("numbers differ");
+    }
     world.run_for(Duration::from_secs(1));
     world
 }

@@ -5,6 +5,7 @@ use drives::engine::axis::Demand;
 use drives::{Firmware, RegisterError};
 use plant::attachment::Attachment;
 use plant::mechanics::RotorData;
+use plant::rest::Rested;
 use plant::rig::RigModel;
 use plant::shaft::Motion;
 use plant::{Angle, FreeRun, Rig};
@@ -45,7 +46,7 @@ pub struct ShaftFacts {
 /// Changes take effect from the next control period on.
 pub trait Assembly: Clone + Send + 'static {
     /// The firmware that runs on it.
-    type Firmware: Firmware<Actuation: Default + Clone + Send, Sensors: Send> + Send + 'static;
+    type Firmware: Firmware<Actuation: Default + Send, Sensors: Send> + Send + 'static;
 
     /// The model's name as users type it.
     const MODEL: &'static str;
@@ -97,6 +98,12 @@ pub trait Assembly: Clone + Send + 'static {
 
     /// One control period of physics under `actuation`.
     fn step(&mut self, actuation: &<Self::Firmware as Firmware>::Actuation);
+
+    /// Whether, under this actuation, such periods change nothing but heat.
+    fn can_rest(&self, actuation: &<Self::Firmware as Firmware>::Actuation) -> bool;
+
+    /// So many such periods, or fewer if the sensors read otherwise before.
+    fn rest(&mut self, actuation: &<Self::Firmware as Firmware>::Actuation, periods: u64) -> Rested;
 
     /// How many axes it has.
     fn axes(&self) -> u8 {

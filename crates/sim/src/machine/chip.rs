@@ -4,7 +4,8 @@
 use std::collections::VecDeque;
 
 use can::{Frame, Instant};
-use canopen::connection_set::SDO_REPLY_BASE;
+
+use crate::nmt_reset::is_sdo_answer;
 
 /// Answers that may wait for the chip. With as many waiting, what else the firmware has to send waits in it.
 const MAX_HELD: usize = 8;
@@ -88,6 +89,11 @@ impl Chip {
         *self = Self::new(&std::mem::take(&mut self.contents), generation);
     }
 
+    /// The firmware resets its communication: what it had answered before is never sent.
+    pub(super) fn forget_answers(&mut self) {
+        self.held.clear();
+    }
+
     /// Other contents, put in without power.
     pub(super) fn replace(&mut self, image: &[u8]) {
         self.contents = image.to_vec();
@@ -108,11 +114,6 @@ impl Chip {
         }
         None
     }
-}
-
-fn is_sdo_answer(frame: &Frame) -> bool {
-    let id = frame.id();
-    !id.is_extended() && id.raw() & !0x7F == u32::from(SDO_REPLY_BASE)
 }
 
 #[cfg(test)]

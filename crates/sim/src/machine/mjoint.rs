@@ -4,6 +4,8 @@
 //! In go the firmware's power stage, brake and outputs, out come its sensors and the report for people. Figures of the
 //! motors are those of `plant`; what is assumed of the surroundings is a constant below.
 
+use std::slice::from_mut;
+
 use can::Bitrate;
 use devices::AxisId;
 use devices::Description;
@@ -17,6 +19,7 @@ use plant::attachment::Attachment;
 use plant::gear::GearData;
 use plant::mechanics::RotorData;
 use plant::pmsm::Phase;
+use plant::rest::{Rested, is_at_rest, rest};
 use plant::rig::RigModel;
 use plant::shaft::Motion;
 use plant::supply::SupplyData;
@@ -132,16 +135,33 @@ impl Joint {
         self.last_reading.unwrap_or(EncoderReading { angle_count, position_counts })
     }
 
-    /// Fits a brake as soon as the drive is set for one (2619h = 7 or 8), and moves it.
-    fn is_braked(&mut self, actuation: &Actuation) -> bool {
+    /// Fits a brake as soon as the drive is set for one (2619h = 7 or 8).
+    #[inline]
+    fn fit_brake(&mut self, actuation: &Actuation) {
         if !actuation.running {
-            return self.braked_without_power;
+            return;
         }
         self.braked_without_power = actuation.brake != Brake::Absent;
         if self.braked_without_power && self.motor.model.brake.holding_nm == 0.0 {
             self.motor.model = self.motor.model.with_brake();
         }
-        actuation.brake == Brake::Engaged
+    }
+
+    /// What the power stage and the brake make of the firmware's outputs.
+    #[inline]
+    fn pins(&self, actuation: &Actuation) -> joint_motor::Actuation {
+        let braked = if actuation.running { actuation.brake == Brake::Engaged } else { self.braked_without_power };
+        joint_motor::Actuation {
+            inverter: match actuation.power_stage {
+                PowerStage::Off => Inverter::Open,
+                PowerStage::Modulate { duty } if self.dead_time => {
+                    Inverter::Driven(with_dead_time(duty.map(f64::from), self.motor.sense().phase_current_a))
+                }
+                PowerStage::Modulate { duty } => Inverter::Driven(duty.map(f64::from)),
+            },
+            brake_released: !braked,
+            set_origin: actuation.set_origin,
+        }
     }
 }
 
@@ -213,19 +233,19 @@ impl Assembly for Joint {
     #[inline]
     fn step(&mut self, actuation: &Actuation) {
         self.last = *actuation;
-        let pins = joint_motor::Actuation {
-            inverter: match actuation.power_stage {
-                PowerStage::Off => Inverter::Open,
-                PowerStage::Modulate { duty } if self.dead_time => {
-                    Inverter::Driven(with_dead_time(duty.map(f64::from), self.motor.sense().phase_current_a))
-                }
-                PowerStage::Modulate { duty } => Inverter::Driven(duty.map(f64::from)),
-            },
-            brake_released: !self.is_braked(actuation),
-            set_origin: actuation.set_origin,
-        };
-        self.motor.step(Self::PERIOD_S, &pins);
+        self.fit_brake(actuation);
+        self.motor.step(Self::PERIOD_S, &self.pins(actuation));
         self.pulses.advance(Self::PERIOD_S);
+    }
+
+    fn can_rest(&self, actuation: &Actuation) -> bool {
+        let quiet = self.motor.rotor.velocity_rad_s == 0.0 && !actuation.set_origin && self.pulses.is_idle();
+        quiet && is_at_rest(&self.motor, Self::PERIOD_S, &self.pins(actuation))
+    }
+
+    fn rest(&mut self, actuation: &Actuation, periods: u64) -> Rested {
+        let pins = self.pins(actuation);
+        rest(from_mut(&mut self.motor), Self::PERIOD_S, |_| pins, periods)
     }
 
     fn shaft_and_rig(&self, _axis: AxisId) -> (&RotorData, &Rig) {

@@ -13,10 +13,13 @@ mod load;
 mod mjoint;
 mod node;
 mod order;
+mod power;
 mod pulse_source;
 mod quantity;
 mod realism;
 mod registry;
+mod rest;
+mod resting;
 mod servo;
 mod switch;
 mod timing;
@@ -43,17 +46,14 @@ pub use zlac8030l::{HubWheel, Zlac8030lMachine, zlac8030l};
 pub use zlim42c::{Stepper, Zlim42c82Machine, Zlim42cMachine, zlim42c, zlim42c_82};
 
 use crate::mechanics::Mechanics;
-use crate::stimulus::{Power, Stimulus, SwitchRange};
-use crate::{PowerPhase, Refused, Report, VirtualDrive};
+use crate::stimulus::{Stimulus, SwitchRange};
+use crate::{PowerPhase, Refused, Report, VirtualDrive, nmt_reset};
+use rest::Rest;
 use switch::{Inputs, stretch};
 use timing::OwnTime;
 
 /// How often a drive without enough voltage to run looks whether it has come.
 const WAKE_PERIOD_NS: u64 = 1_000_000;
-
-/// How long a supply that is to come back waits for the bus to drain. A motor that is driven from outside feeds the bus
-/// for ever: then it is shorted.
-const DRAIN_PATIENCE_NS: u64 = 10_000_000_000;
 
 /// The identifier of NMT commands (CiA 301, 7.3.5).
 const NMT: u16 = 0;
@@ -74,6 +74,8 @@ pub struct Machine<A: Assembly> {
     own_time: Option<OwnTime>,
     /// Its control periods are run by the machine that it is coupled to.
     coupled: bool,
+    rest: Rest<A::Firmware>,
+    kept_awake: bool,
     next_tick: Instant,
 }
 
@@ -110,6 +112,8 @@ impl<A: Assembly> Machine<A> {
             life: Life::Dead,
             own_time: None,
             coupled: false,
+            rest: Rest::from(Instant::ZERO),
+            kept_awake: false,
             next_tick: Instant::ZERO,
         }
     }
@@ -127,6 +131,7 @@ impl<A: Assembly> Machine<A> {
     /// Motor, load, supply and sensors, to change what no command reaches. Call
     /// [`advance`](VirtualDrive::advance) first.
     pub fn assembly_mut(&mut self) -> &mut A {
+        self.disturb();
         &mut self.assembly
     }
 
@@ -142,6 +147,9 @@ impl<A: Assembly> Machine<A> {
                 self.assembly.disturb(&mut sensors, noise);
             }
             let next = self.firmware.tick(&sensors, at);
+            if let Rest::Watching(watch) = &mut self.rest {
+                watch.note(&sensors, &next);
+            }
             self.assembly.step(&self.actuation);
             self.actuation = next;
         } else {
@@ -157,91 +165,6 @@ impl<A: Assembly> Machine<A> {
             && self.assembly.supplies_firmware(true)
     }
 
-    /// Starts the drive when its voltage comes and stops it when it goes. It lives on whatever charges the bus, but is
-    /// started by the supply alone.
-    #[inline(never)]
-    fn watch_supply(&mut self, at: Instant) {
-        let lives = self.life != Life::Dead;
-        let supplied = self.assembly.supplies_firmware(lives) && (lives || self.supply == Supply::On);
-        if supplied != lives {
-            if supplied { self.wake(at) } else { self.die(at) }
-        }
-        if let Life::Booting(due) = self.life
-            && due <= at
-        {
-            self.start(at);
-        }
-        if let Supply::Cycling(patience) = self.supply {
-            self.finish_cycle(patience, at);
-        }
-    }
-
-    /// Switches on again once the drive has died.
-    #[cold]
-    fn finish_cycle(&mut self, patience: Instant, at: Instant) {
-        let lives = self.life != Life::Dead;
-        if lives && at < patience {
-            return;
-        }
-        if lives {
-            self.cut_source(at);
-        }
-        self.switch_on(at);
-    }
-
-    fn switch_on(&mut self, at: Instant) {
-        self.supply = Supply::On;
-        let (rig, model) = self.assembly.rig_and_model_mut();
-        rig.switch_source(model, true);
-        self.watch_supply(at);
-    }
-
-    fn cut_source(&mut self, at: Instant) {
-        self.supply = Supply::Off;
-        let (rig, model) = self.assembly.rig_and_model_mut();
-        rig.cut_source(model);
-        self.watch_supply(at);
-    }
-
-    /// There is voltage: the firmware follows, at once or when it has booted.
-    fn wake(&mut self, at: Instant) {
-        self.assembly.set_supplied(true);
-        let boot_ns = self.own_time.as_mut().map_or(0, OwnTime::boot_ns);
-        self.life = Life::Booting(at.plus_nanos(boot_ns));
-    }
-
-    fn start(&mut self, at: Instant) {
-        self.life = Life::Running;
-        let hardware = self.assembly.hardware();
-        self.firmware.power_on(&hardware, at);
-        // What a store that was cut short has counted is over.
-        self.note_store(at);
-    }
-
-    fn die(&mut self, at: Instant) {
-        let ran = self.life == Life::Running;
-        self.life = Life::Dead;
-        self.assembly.set_supplied(false);
-        if !ran {
-            return;
-        }
-        let before = self.firmware.eeprom().1;
-        self.firmware.power_off(at);
-        let (image, generation) = self.firmware.eeprom();
-        match &mut self.own_time {
-            None => self.assembly.keep_image(image),
-            Some(own_time) => {
-                own_time.power_off();
-                own_time.chip.advance(at);
-                // With the last of its voltage a firmware may still store.
-                let last = (generation != before).then_some(image);
-                own_time.chip.power_off(last, u64::from(generation));
-                self.assembly.keep_image(own_time.chip.contents());
-            }
-        }
-        self.actuation = Default::default();
-    }
-
     /// The firmware may have stored something.
     #[inline]
     fn note_store(&mut self, now: Instant) {
@@ -254,8 +177,12 @@ impl<A: Assembly> Machine<A> {
 
     /// Hands a frame to the firmware.
     fn hand_over(&mut self, frame: &Frame, now: Instant) {
+        self.disturb();
         if let Some(own_time) = self.own_time.as_mut().filter(|_| frame.standard_data_id() == Some(NMT)) {
             self.firmware.set_reset_times(own_time.reset_times());
+            if nmt_reset::is_asked_of(frame, || self.firmware.report(AxisId::FIRST).node_id.raw()) {
+                own_time.chip.forget_answers();
+            }
         }
         self.firmware.handle_frame(frame, now);
     }
@@ -265,38 +192,6 @@ impl<A: Assembly> Machine<A> {
     fn serve_mailboxes(&mut self, now: Instant) {
         while let Some(frame) = self.own_time.as_mut().and_then(|own_time| own_time.take_out(now)) {
             self.hand_over(&frame, now);
-        }
-    }
-
-    /// What the drive makes of its supply, for people.
-    fn phase(&self) -> PowerPhase {
-        let runs = self.life == Life::Running && self.firmware.report(AxisId::FIRST).powered;
-        match (self.supply, self.life) {
-            (Supply::Cycling(_), _) => PowerPhase::Cycling,
-            (_, Life::Dead) => PowerPhase::Off,
-            (Supply::Off, _) => PowerPhase::Draining,
-            _ if runs => PowerPhase::On,
-            _ => PowerPhase::Booting,
-        }
-    }
-
-    fn switch_supply(&mut self, power: Power, now: Instant) {
-        match power {
-            Power::On if self.life != Life::Dead && self.supply != Supply::On => {
-                self.supply = Supply::Cycling(now.plus_nanos(DRAIN_PATIENCE_NS));
-            }
-            Power::On => self.switch_on(now),
-            Power::Off => {
-                self.supply = Supply::Off;
-                let (rig, model) = self.assembly.rig_and_model_mut();
-                rig.switch_source(model, false);
-                self.watch_supply(now);
-            }
-            Power::Cycle => {
-                self.switch_supply(Power::Off, now);
-                self.switch_supply(Power::On, now);
-            }
-            Power::Cut => self.cut_source(now),
         }
     }
 
@@ -338,6 +233,7 @@ impl<A: Assembly> Station for Machine<A> {
         self.advance(now);
         if self.life == Life::Running {
             self.serve_mailboxes(now);
+            self.wake_for_own_event(now);
             self.firmware.handle_timeout(now);
             self.note_store(now);
         }
@@ -347,11 +243,14 @@ impl<A: Assembly> Station for Machine<A> {
         if self.life != Life::Running {
             return None;
         }
-        if self.own_time.is_none() {
-            return self.firmware.poll_transmit();
-        }
-        let needed = self.store_needed();
-        self.own_time.as_mut()?.chip.next_frame(needed, || self.firmware.poll_transmit())
+        let frame = if self.own_time.is_none() {
+            self.firmware.poll_transmit()
+        } else {
+            let needed = self.store_needed();
+            self.own_time.as_mut()?.chip.next_frame(needed, || self.firmware.poll_transmit())
+        }?;
+        self.disturb();
+        Some(frame)
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
@@ -375,11 +274,13 @@ impl<A: Assembly> Station for Machine<A> {
 
     fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
         self.advance(now);
+        self.disturb();
         self.firmware.handle_transmitted(frame, now);
     }
 
     fn handle_bus_off(&mut self, off: bool, now: Instant) {
         self.advance(now);
+        self.disturb();
         if self.life == Life::Running {
             self.firmware.handle_bus_off(off, now);
         }
@@ -389,6 +290,7 @@ impl<A: Assembly> Station for Machine<A> {
 impl<A: Assembly> Mechanics for Machine<A> {
     fn couple(&mut self, axis: AxisId) -> Result<f64, Refused> {
         self.check_couple(axis)?;
+        self.disturb();
         self.assembly.couple(axis);
         self.coupled = true;
         Ok(1.0 / self.assembly.shaft_facts(axis).reducer.unwrap_or(1.0))
@@ -428,6 +330,7 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
     fn apply(&mut self, axis: AxisId, stimulus: &Stimulus, now: Instant) -> Result<(), Refused> {
         self.check_axis(axis)?;
         self.advance(now);
+        self.disturb();
         match *stimulus {
             Stimulus::Power(power) => self.switch_supply(power, now),
             Stimulus::Input { ref name, level } => self.inputs.set(self.input_number(name)?, level),
@@ -453,6 +356,7 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
 
     fn set_timing(&mut self, mode: TimingMode, seed: u64, now: Instant) {
         self.advance(now);
+        self.disturb();
         let (image, generation) = (self.nvm_image(), self.nvm_generation());
         let timing = A::description(&self.firmware, &self.assembly).map_or(Timing::GUESSED, |model| model.timing);
         self.own_time = (mode == TimingMode::Device).then(|| OwnTime::new(timing, seed, &image, generation));
@@ -461,6 +365,7 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
 
     fn set_realism(&mut self, realism: Realism, seed: u64, now: Instant) {
         self.advance(now);
+        self.disturb();
         self.noise = (realism == Realism::Full).then(|| Noise::new(seed));
         self.assembly.set_realism(realism);
     }
@@ -473,9 +378,19 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
     fn advance(&mut self, now: Instant) {
         // The world has run a coupled machine's periods by now.
         while self.next_tick <= now && !self.coupled {
+            if self.rest.is_resting() {
+                self.rest_until(now);
+                continue;
+            }
             self.tick(self.next_tick);
             self.next_tick = self.next_tick.plus_nanos(A::Firmware::CONTROL_PERIOD_NS);
+            self.look_for_rest();
         }
+    }
+
+    fn keep_awake(&mut self) {
+        self.disturb();
+        self.kept_awake = true;
     }
 
     fn report(&self) -> Report {
@@ -546,6 +461,7 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
 
     fn write_registers(&mut self, address: u16, words: &[u16], now: Instant) -> Result<(), RegisterError> {
         self.advance(now);
+        self.disturb();
         let written = A::write_registers(&mut self.firmware, address, words);
         self.note_store(now);
         written
@@ -572,6 +488,7 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
         if image.len() != self.assembly.image().len() {
             return Err(Refused::BadImage { model: self.assembly.model(), reason: "it has another length" });
         }
+        self.disturb();
         self.assembly.keep_image(image);
         if let Some(own_time) = &mut self.own_time {
             own_time.chip.replace(image);

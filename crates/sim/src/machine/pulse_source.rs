@@ -55,6 +55,11 @@ impl PulseSource {
         self.input
     }
 
+    /// Nothing is being sent: what the drive reads stays as it is.
+    pub(super) const fn is_idle(&self) -> bool {
+        self.train.is_none()
+    }
+
     /// Level that it gives DIR, if it does.
     pub(super) fn dir(&self) -> Option<bool> {
         self.dir

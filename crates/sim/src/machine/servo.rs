@@ -19,6 +19,7 @@ use plant::hall::HallFault;
 use plant::hub_motor::{self, HubMotor, HubMotorModel, Inverter};
 use plant::mechanics::RotorData;
 use plant::pmsm::Phase;
+use plant::rest::{Rested, is_at_rest, rest};
 use plant::rig::{Rig, RigModel};
 use plant::shaft::Motion;
 use plant::supply::SupplyData;
@@ -215,16 +216,23 @@ impl ServoBench {
         }
     }
 
-    fn step_axis(&mut self, axis: usize, actuation: &AxisActuation, bleeder_on: bool) {
-        let dead_time = self.dead_time;
-        let motor = &mut self.motors[axis];
-        let inverter = match actuation.duty.map(|duty| duty.map(f64::from)) {
+    /// What power stage and brake of an axis make of the firmware's outputs.
+    fn pins(&self, axis: usize, actuation: &Actuation) -> hub_motor::Actuation {
+        let AxisActuation { duty, brake_released, .. } = actuation.axes[axis];
+        let inverter = match duty.map(|duty| duty.map(f64::from)) {
             None => Inverter::Open,
-            Some(duty) if dead_time => Inverter::Driven(with_dead_time(duty, motor.sense().phase_current_a)),
+            Some(duty) if self.dead_time => {
+                Inverter::Driven(with_dead_time(duty, self.motors[axis].sense().phase_current_a))
+            }
             Some(duty) => Inverter::Driven(duty),
         };
+        hub_motor::Actuation { inverter, bleeder_on: actuation.bleeder_on, brake_released }
+    }
+
+    fn step_axis(&mut self, axis: usize, actuation: &Actuation) {
+        let pins = self.pins(axis, actuation);
+        let motor = &mut self.motors[axis];
         let before = motor.rotor.angle.turns();
-        let pins = hub_motor::Actuation { inverter, bleeder_on, brake_released: actuation.brake_released };
         motor.step(Self::PERIOD_S, &pins);
         self.indexes[axis] = index_count(motor, before);
     }
@@ -319,8 +327,21 @@ impl Assembly for ServoBench {
         self.last = *actuation;
         self.share_source();
         for axis in 0..self.motors.len() {
-            self.step_axis(axis, &actuation.axes[axis], actuation.bleeder_on);
+            self.step_axis(axis, actuation);
         }
+    }
+
+    fn can_rest(&self, actuation: &Actuation) -> bool {
+        let stand = self.motors.iter().all(|motor| motor.rotor.velocity_rad_s == 0.0);
+        let rests = |(axis, motor)| is_at_rest(motor, Self::PERIOD_S, &self.pins(axis, actuation));
+        stand && self.indexes.iter().all(Option::is_none) && self.motors.iter().enumerate().all(rests)
+    }
+
+    fn rest(&mut self, actuation: &Actuation, periods: u64) -> Rested {
+        let pins: [_; MAX_AXES] = std::array::from_fn(|axis| {
+            if axis < self.motors.len() { self.pins(axis, actuation) } else { hub_motor::Actuation::default() }
+        });
+        rest(&mut self.motors, Self::PERIOD_S, |axis| pins[axis], periods)
     }
 
     /// Behind a burnt power stage there is no voltage.

@@ -3,6 +3,8 @@
 //! In go the power stage, bleeder, outputs and brake of the firmware, out come its sensors and the report for people.
 //! Figures of the motor are those of `plant`; what is assumed of the surroundings is a constant below.
 
+use std::slice::from_mut;
+
 use canopen::Mux;
 use devices::variant::Variant;
 use devices::zltech::ZLAC8030L;
@@ -20,6 +22,7 @@ use plant::hall::HallFault;
 use plant::hub_motor::{self, HubMotor, HubMotorModel, Inverter};
 use plant::mechanics::RotorData;
 use plant::pmsm::Phase;
+use plant::rest::{Rested, is_at_rest, rest};
 use plant::rig::{Rig, RigModel};
 use plant::shaft::Motion;
 use plant::supply::SupplyData;
@@ -112,6 +115,20 @@ impl HubWheel {
         self.motor.is_power_stage_burnt().then_some(BURNT).or(seized)
     }
 
+    /// What the power stage and the brake make of the firmware's outputs.
+    #[inline]
+    fn pins(&self, actuation: &Actuation) -> hub_motor::Actuation {
+        let inverter = match actuation.power_stage {
+            PowerStage::Off => Inverter::Open,
+            PowerStage::Shorted => Inverter::Shorted,
+            PowerStage::Modulate { duty } if self.dead_time => {
+                Inverter::Driven(with_dead_time(duty.map(f64::from), self.motor.sense().phase_current_a))
+            }
+            PowerStage::Modulate { duty } => Inverter::Driven(duty.map(f64::from)),
+        };
+        hub_motor::Actuation { inverter, bleeder_on: actuation.bleeder_on, brake_released: !actuation.brake_engaged }
+    }
+
     /// The motor and all that is joined to it, to change.
     pub fn motor_mut(&mut self) -> &mut HubMotor {
         &mut self.motor
@@ -162,20 +179,16 @@ impl Assembly for HubWheel {
     #[inline]
     fn step(&mut self, actuation: &Actuation) {
         self.last = *actuation;
-        let inverter = match actuation.power_stage {
-            PowerStage::Off => Inverter::Open,
-            PowerStage::Shorted => Inverter::Shorted,
-            PowerStage::Modulate { duty } if self.dead_time => {
-                Inverter::Driven(with_dead_time(duty.map(f64::from), self.motor.sense().phase_current_a))
-            }
-            PowerStage::Modulate { duty } => Inverter::Driven(duty.map(f64::from)),
-        };
-        let pins = hub_motor::Actuation {
-            inverter,
-            bleeder_on: actuation.bleeder_on,
-            brake_released: !actuation.brake_engaged,
-        };
-        self.motor.step(Self::PERIOD_S, &pins);
+        self.motor.step(Self::PERIOD_S, &self.pins(actuation));
+    }
+
+    fn can_rest(&self, actuation: &Actuation) -> bool {
+        self.motor.rotor.velocity_rad_s == 0.0 && is_at_rest(&self.motor, Self::PERIOD_S, &self.pins(actuation))
+    }
+
+    fn rest(&mut self, actuation: &Actuation, periods: u64) -> Rested {
+        let pins = self.pins(actuation);
+        rest(from_mut(&mut self.motor), Self::PERIOD_S, |_| pins, periods)
     }
 
     /// Behind a burnt power stage there is no voltage.

@@ -4,6 +4,8 @@
 //! know where its rotor is; the report tells both, the commanded position and the rotor's in the same pulses. Figures of
 //! the motors are those of `plant`; what is assumed of the surroundings is a constant below.
 
+use std::slice::from_mut;
+
 use canopen::Mux;
 use devices::AxisId;
 use devices::Description;
@@ -18,6 +20,7 @@ use plant::FreeRun;
 use plant::angle::Angle;
 use plant::attachment::Attachment;
 use plant::mechanics::RotorData;
+use plant::rest::{Rested, is_at_rest, rest};
 use plant::rig::{Rig, RigModel};
 use plant::shaft::Motion;
 use plant::stepper::{Bridges, Phase};
@@ -148,6 +151,18 @@ impl<const LENGTH_MM: u16> Stepper<LENGTH_MM> {
         self.motor.is_overheated().then_some(BURNT).or(seized)
     }
 
+    /// What the bridges make of the firmware's outputs.
+    #[inline]
+    fn pins(&self, actuation: &Actuation) -> Bridges {
+        match actuation.power_stage {
+            PowerStage::Off => Bridges::Open,
+            PowerStage::Modulate { duty } if self.dead_time => {
+                Bridges::Driven(with_dead_time(duty.map(f64::from), self.motor.sense().phase_current_a))
+            }
+            PowerStage::Modulate { duty } => Bridges::Driven(duty.map(f64::from)),
+        }
+    }
+
     /// Electrical turns of the rotor.
     fn rotor_turns(&self) -> f64 {
         self.motor.rotor.angle.as_rad() / core::f64::consts::TAU * f64::from(TEETH)
@@ -209,14 +224,17 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
         if self.zero.is_none() && actuation.led.green {
             self.zero = Some(self.rotor_turns().round());
         }
-        let bridges = match actuation.power_stage {
-            PowerStage::Off => Bridges::Open,
-            PowerStage::Modulate { duty } if self.dead_time => {
-                Bridges::Driven(with_dead_time(duty.map(f64::from), self.motor.sense().phase_current_a))
-            }
-            PowerStage::Modulate { duty } => Bridges::Driven(duty.map(f64::from)),
-        };
-        self.motor.step(Self::PERIOD_S, &bridges);
+        self.motor.step(Self::PERIOD_S, &self.pins(actuation));
+    }
+
+    fn can_rest(&self, actuation: &Actuation) -> bool {
+        let quiet = self.motor.rotor.velocity_rad_s == 0.0 && (self.zero.is_some() || !actuation.led.green);
+        quiet && is_at_rest(&self.motor, Self::PERIOD_S, &self.pins(actuation))
+    }
+
+    fn rest(&mut self, actuation: &Actuation, periods: u64) -> Rested {
+        let pins = self.pins(actuation);
+        rest(from_mut(&mut self.motor), Self::PERIOD_S, |_| pins, periods)
     }
 
     #[inline]

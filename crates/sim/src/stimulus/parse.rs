@@ -9,7 +9,7 @@ use super::bus_fault::{self, BusFault};
 use super::error::StimulusError;
 use super::kinds::{Component, ObjectValue, Power, PulseTrain, Source, Stimulus, TemperatureSensor};
 use super::load::{self, LoadPart};
-use super::words::{number, range};
+use super::words::{excerpt, number, range};
 
 impl FromStr for Stimulus {
     type Err = StimulusError;
@@ -35,7 +35,7 @@ impl FromStr for Stimulus {
             "cable" => Ok(Self::CableCut(choice(arguments, "cut", "join", CABLE)?)),
             "bus" => BusFault::parse(arguments).map(Self::Bus),
             "set" => parse_set(text),
-            _ => Err(StimulusError::Unknown(verb.to_string())),
+            _ => Err(StimulusError::Unknown(excerpt(verb))),
         }
     }
 }

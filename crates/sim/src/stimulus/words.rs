@@ -3,10 +3,21 @@
 use super::error::StimulusError;
 use super::range::SwitchRange;
 
+/// The longest word that is said again in an error.
+const LONGEST_SHOWN: usize = 40;
+
+/// A word to be said again in an error: no more of it than tells which one is meant.
+pub(crate) fn excerpt(text: &str) -> String {
+    match text.char_indices().nth(LONGEST_SHOWN) {
+        None => text.to_owned(),
+        Some((end, _)) => format!("{}...", &text[..end]),
+    }
+}
+
 /// A finite number, not below `least`.
 pub(super) fn number(text: &str, what: &'static str, least: f64, usage: &'static str) -> Result<f64, StimulusError> {
     let value: Option<f64> = text.parse().ok().filter(|value: &f64| value.is_finite() && *value >= least);
-    value.ok_or_else(|| StimulusError::BadValue { text: text.to_string(), what, usage })
+    value.ok_or_else(|| StimulusError::BadValue { text: excerpt(text), what, usage })
 }
 
 /// A finite number, not negative.
@@ -27,7 +38,7 @@ fn bound(text: &str, open: &str, usage: &'static str) -> Result<Option<i64>, Sti
     if text == open {
         return Ok(None);
     }
-    let bad = |_| StimulusError::BadValue { text: text.to_string(), what: "position", usage };
+    let bad = |_| StimulusError::BadValue { text: excerpt(text), what: "position", usage };
     text.parse().map(Some).map_err(bad)
 }
 

@@ -48,11 +48,8 @@ impl ControlError {
 
 impl From<CommandError> for ControlError {
     fn from(error: CommandError) -> Self {
-        let node = match &error {
-            CommandError::NoSuchDrive { number, .. } => Some(*number),
-            _ => None,
-        };
-        Self { node, ..Self::new(error.kind(), error.to_string()) }
+        let (node, next) = (error.node(), error.next().map(str::to_owned));
+        Self { node, next, ..Self::new(error.kind(), error.to_string()) }
     }
 }
 

@@ -18,7 +18,7 @@ pub struct BleederLimits {
 }
 
 /// Whether the switch is closed, and the energy that the resistor has yet to give off.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bleeder {
     on: bool,
     stored_j: f32,

@@ -18,7 +18,7 @@ pub struct TrackingGains {
 }
 
 /// State: what the observer believes.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tracking {
     position: i32,
     fraction: f32,

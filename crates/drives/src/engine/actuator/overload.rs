@@ -16,7 +16,7 @@ pub struct OverloadLimits {
 }
 
 /// How much of the allowed time is used up, 0 to 1.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Overload {
     used: f32,
 }

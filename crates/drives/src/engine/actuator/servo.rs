@@ -62,7 +62,7 @@ pub struct ServoLimits {
 }
 
 /// State of the loops.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Servo {
     commutation: Commutation,
     observer: Observer,

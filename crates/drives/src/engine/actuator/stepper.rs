@@ -69,7 +69,7 @@ pub struct Peaks {
 }
 
 /// State of the vector and its loops.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Stepper {
     energised: bool,
     /// Command at the beginning and the end of the supervision period.

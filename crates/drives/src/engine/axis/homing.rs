@@ -68,7 +68,7 @@ pub enum HomingState {
 }
 
 /// State: the last run.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Homing {
     state: HomingState,
     run: Option<Run>,
@@ -76,7 +76,7 @@ pub(super) struct Homing {
     ended: bool,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Run {
     sequence: HomingSequence,
     phase: Phase,
@@ -84,7 +84,7 @@ struct Run {
     was_on: bool,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
     Search { direction: Direction, turned: bool },
     Leave { direction: Direction, fast: bool, left_at: Option<i32> },

@@ -8,7 +8,7 @@ use motion::interpolate::linear;
 use super::trajectory::TrajectoryPoint;
 
 /// A stretch under way.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Interpolation {
     from: TrajectoryPoint,
     target: i32,
@@ -31,7 +31,9 @@ impl Interpolation {
     }
 
     pub(super) fn advance(&mut self, dt_s: f64) -> TrajectoryPoint {
-        self.elapsed_s += dt_s;
+        if !self.is_resting() {
+            self.elapsed_s += dt_s;
+        }
         self.point()
     }
 

@@ -35,7 +35,7 @@ use stop::Stopping;
 use torque::Torque;
 
 /// One shaft.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
     engaged: bool,
     task: Task,

@@ -3,7 +3,7 @@
 use motion::slew::Slew;
 
 /// The demanded current, on its way to the target.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Torque {
     slew: Slew,
 }

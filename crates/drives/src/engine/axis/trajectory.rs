@@ -8,7 +8,7 @@ use motion::{Profile, scurve, trapezoid};
 use super::ramp::Ramp;
 
 /// A planned motion and how far it has come.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trajectory {
     origin: i32,
     fraction: f64,
@@ -119,7 +119,10 @@ impl Trajectory {
 
     /// One period on; returns the new point.
     pub fn advance(&mut self, dt_s: f64) -> TrajectoryPoint {
-        if self.is_done() && self.profile.end().velocity != 0.0 {
+        if self.is_resting() {
+            return self.point();
+        }
+        if self.is_done() {
             self.re_anchor();
         }
         self.elapsed_s += dt_s;

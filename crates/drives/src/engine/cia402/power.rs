@@ -17,7 +17,7 @@ pub struct DisableOptions {
 }
 
 /// State, last controlword, and a command that waits for the motor to stand.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PowerMachine {
     state: PowerState,
     controlword: Controlword,

@@ -14,7 +14,7 @@ use super::stop::StopCause;
 use crate::engine::axis::{Axis, Control, Demand, Feedback, HomingState, Ramp, StopState, Switches, Task};
 
 /// Power state machine, mode and motion of one axis.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PowerDrive {
     pub(super) power: PowerMachine,
     pub(super) mode: ModeOfOperation,

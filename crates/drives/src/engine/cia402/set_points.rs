@@ -12,7 +12,7 @@ pub struct SetPoint {
 }
 
 /// The set-point under way, the one that waits, and the acknowledge bit.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SetPoints {
     /// The present or last target: relative moves count from here.
     target: i32,

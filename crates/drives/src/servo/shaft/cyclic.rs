@@ -23,7 +23,7 @@ pub(in crate::servo) const PATIENCE_S: f64 = 0.1;
 pub(in crate::servo) const MOST_WAITING: usize = u64::BITS as usize;
 
 /// The present path, and in ip what waits behind it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct CyclicSetPoints {
     path: SetPoints,
     /// Since the last set-point, s; `None` before the first one of the mode.
@@ -114,7 +114,7 @@ pub(in crate::servo) enum Organisation {
 }
 
 /// The buffer of ip (60C4h). Values in increments.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Waiting {
     places: [i32; MOST_WAITING],
     /// Bit n: place n has a set-point.

@@ -310,6 +310,7 @@ impl Firmware for Zlac8030l {
     type Hardware = Hardware;
 
     const CONTROL_PERIOD_NS: u64 = CONTROL_PERIOD_NS;
+    const ROUND: u32 = SUPERVISION_DIVIDER as u32;
 
     fn power_on(&mut self, hardware: &Hardware, now: Instant) {
         self.dip_address = hardware.dip_address;
@@ -346,6 +347,44 @@ impl Firmware for Zlac8030l {
             outputs: self.shell.outputs,
             brake_engaged: terminals::brake_engaged(self.values()),
         }
+    }
+
+    fn rests_since(&self, earlier: &Self, _now: Instant) -> bool {
+        // Each by name, so that no new one is forgotten. The watch over the host goes by the time while it is armed.
+        let Self {
+            device,
+            dip_address: _,
+            parameters: _,
+            shell,
+            servo,
+            awake,
+            speed_setting_wrong,
+            position_offset,
+            faults,
+            protection,
+            bleeder,
+            watchdog: _,
+            last_sync: _,
+            shown_velocity_rpm,
+            shown_current_a,
+        } = self;
+        let watched =
+            shell.axis.state() == PowerState::OperationEnabled && self.values().get(COMMUNICATION_OFFLINE_TIME) != 0;
+        !watched
+            && !shell.parameters_changed
+            && (*awake, *speed_setting_wrong) == (earlier.awake, earlier.speed_setting_wrong)
+            && *position_offset == earlier.position_offset
+            && *shell == earlier.shell
+            && *servo == earlier.servo
+            && *faults == earlier.faults
+            && *protection == earlier.protection
+            && *bleeder == earlier.bleeder
+            && (shown_velocity_rpm, shown_current_a) == (&earlier.shown_velocity_rpm, &earlier.shown_current_a)
+            && device.rests_since(&earlier.device)
+    }
+
+    fn next_event(&self) -> Option<Instant> {
+        self.device.next_event()
     }
 
     fn eeprom(&self) -> (&[u8], u32) {

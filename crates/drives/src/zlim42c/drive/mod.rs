@@ -297,6 +297,7 @@ impl Firmware for Zlim42c {
     type Hardware = Hardware;
 
     const CONTROL_PERIOD_NS: u64 = CONTROL_PERIOD_NS;
+    const ROUND: u32 = SUPERVISION_DIVIDER as u32;
 
     fn power_on(&mut self, hardware: &Hardware, now: Instant) {
         self.dip_address = hardware.dip_address;
@@ -328,6 +329,35 @@ impl Firmware for Zlim42c {
         }
         let flashes = self.shown_fault.map_or(0, |row| FLASHES[row]);
         Actuation { power_stage: self.power_stage(sensors), outputs: self.shell.outputs, led: led::shown(flashes, now) }
+    }
+
+    fn rests_since(&self, earlier: &Self, _now: Instant) -> bool {
+        // Each by name, so that no new one is forgotten. The lights flash a fault by the time.
+        let Self {
+            device,
+            dip_address: _,
+            parameters: _,
+            shell,
+            stepper,
+            controlword,
+            faults,
+            phases,
+            bus_a,
+            shown_fault,
+        } = self;
+        shown_fault.is_none()
+            && !shell.parameters_changed
+            && *shell == earlier.shell
+            && *stepper == earlier.stepper
+            && *controlword == earlier.controlword
+            && *faults == earlier.faults
+            && *phases == earlier.phases
+            && *bus_a == earlier.bus_a
+            && device.rests_since(&earlier.device)
+    }
+
+    fn next_event(&self) -> Option<Instant> {
+        self.device.next_event()
     }
 
     fn eeprom(&self) -> (&[u8], u32) {
