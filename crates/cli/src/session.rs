@@ -102,7 +102,9 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     }
     let context = Context::new(global, network.clone(), None, progress.clone(), traffic.clone());
     if let Some(unused) = global.machine.as_ref().and_then(Machine::unused_by_a_master) {
-        context.tell(&format!("of the machine file a command on a real bus does not use: {unused}"));
+        context.tell(&format!(
+            "of the machine file a command on a real bus does not use: {unused}; `ferrodrive sim --machine FILE` and `ferrodrive run` do"
+        ));
     }
     let notes = RefCell::new(BusNotes::of(&global.bus));
     let until = async {

@@ -56,6 +56,10 @@ impl Joined {
         Ok(Self { name: text.to_owned(), coupling, shafts: shafts(&table)?, at })
     }
 
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
     /// Joins the drives, which are in the world already.
     pub(super) fn couple(&self, world: &mut World) -> Result<(), BadFile> {
         let refused = |error| BadFile::one(self.at.saying(format!("body {:?}: {error}", self.name)));

@@ -223,6 +223,16 @@ impl Machine {
         Ok(world)
     }
 
+    /// The names of the machines that its drives move together.
+    pub(crate) fn body_names(&self) -> impl Iterator<Item = &str> {
+        self.bodies.iter().map(Joined::name)
+    }
+
+    /// Whether one of them has this name.
+    pub(crate) fn has_body(&self, name: &str) -> bool {
+        self.body_names().any(|its| its == name)
+    }
+
     /// What of the file counts for a simulated machine only, in words: a master on a real bus does not use it. `None` if there
     /// is nothing.
     pub fn unused_by_a_master(&self) -> Option<String> {

@@ -162,6 +162,7 @@ fn act(field: &Field<'_>, words: &str) -> Result<Act, Problem> {
     match words.parse::<Command>() {
         Ok(Command::Apply(place, stimulus)) => Ok(Act::World(place, stimulus)),
         Ok(Command::Disturb(fault)) => Ok(Act::Wire(fault)),
+        Ok(Command::ApplyToBody(name, stimulus)) => Ok(Act::Body(name, stimulus)),
         Ok(_) => Err(field.problem(format!("'{words}' does nothing to the machine; [[expect]] looks at it"))),
         Err(error) => Err(field.problem(error.to_string())),
     }

@@ -176,16 +176,23 @@ impl Scenario {
         }
         for step in &self.steps {
             let strange = step.acts.iter().find_map(|act| match act {
-                Act::World(place, _) if !self.has_node(place.node) => Some(*place),
+                Act::World(place, _) if !self.has_node(place.node) => Some(self.no_such(*place)),
+                Act::Body(name, _) if !self.machine.has_body(name) => Some(self.no_such_body(name)),
                 _ => None,
             });
-            problems.extend(strange.map(|place| placed(&step.place, file.text(), self.no_such(place))));
+            problems.extend(strange.map(|reason| placed(&step.place, file.text(), reason)));
         }
         problems
     }
 
     fn has_node(&self, node: u8) -> bool {
         self.machine.drives.iter().any(|drive| drive.spec.node.raw() == node)
+    }
+
+    fn no_such_body(&self, name: &str) -> String {
+        let known: Vec<_> = self.machine.body_names().collect();
+        let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+        format!("the machine has no body {name:?}; it has: {known}")
     }
 
     fn no_such(&self, place: Place) -> String {

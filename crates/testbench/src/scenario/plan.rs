@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use sim::recorder::Signal;
+use sim::stimulus::BodyStimulus;
 use sim::stimulus::WireFault;
 use sim::{Place, Stimulus};
 
@@ -37,6 +38,8 @@ pub(super) enum Base {
 pub(super) enum Act {
     World(Place, Stimulus),
     Wire(WireFault),
+    /// At the machine of this name, which drives move together.
+    Body(String, BodyStimulus),
     /// The host's cable: cut is true.
     HostCable(bool),
     /// The host is gone for good, in the middle of what it does.

@@ -211,6 +211,12 @@ impl Script {
                     }
                 }
                 Act::Wire(fault) => world.disturb(*fault),
+                Act::Body(name, stimulus) => {
+                    // The file has been asked for the name: it is there.
+                    if let Some(Err(refused)) = world.apply_to_body(name, stimulus) {
+                        return Some(format!("'body {name} {stimulus}': {refused}"));
+                    }
+                }
                 Act::HostCable(true) => world.cut(host),
                 Act::HostCable(false) => world.join(host),
                 Act::HostDies => {
