@@ -62,6 +62,20 @@ impl Failure {
         Self { status: Status::Usage, kind: "usage", ..Self::new(what) }
     }
 
+    /// What the command has to say does not get out.
+    pub(crate) fn of_stdout(error: std::io::Error) -> Self {
+        Self::new("cannot write to standard output")
+            .because(error)
+            .next("is the disk full that it goes to, or the program gone that reads it?")
+    }
+
+    /// A file that was asked for cannot be written.
+    pub(crate) fn of_writing(what: &str, path: &std::path::Path, error: &std::io::Error) -> Self {
+        Self::new(format!("cannot write {what} {}", path.display())).of_kind("file").because(error).next(
+            "see that its folder is there, can be written and has room; what is at that path and is no earlier one of its kind is left alone",
+        )
+    }
+
     /// A signal asked the command to end.
     pub(crate) fn ended_by(signal: Signal) -> Self {
         Self { status: signal.status(), kind: "interrupted", ..Self::new(signal.text()) }

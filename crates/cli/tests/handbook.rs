@@ -3,9 +3,9 @@
 
 mod common;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use common::{Simulator, done};
+use common::{Simulator, command};
 
 /// The port that the pages print; here it is a free one.
 const PRINTED_PORT: &str = "29536";
@@ -13,8 +13,12 @@ const PRINTED_PORT: &str = "29536";
 /// What is no command of ours: checked elsewhere, or another program's.
 const OTHERS: &[&str] = &["cargo ", "git ", "pip ", "#"];
 
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
 fn page(name: &str) -> String {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/handbook").join(name);
+    let path = root().join("docs/handbook").join(name);
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
@@ -50,7 +54,9 @@ fn follow(name: &str) -> usize {
                         let port = started.ready.rsplit(':').next().unwrap_or_default().to_owned();
                         *running = Some((started, port));
                     } else {
-                        done(arguments);
+                        // Files that a page names are those of the project.
+                        let ended = command(arguments).current_dir(root()).output().expect("the binary runs");
+                        assert!(ended.status.success(), "{name}: {line}: {}", String::from_utf8_lossy(&ended.stderr));
                     }
                     commands += 1;
                 }
@@ -78,4 +84,5 @@ fn every_command_of_the_other_pages_ends_well() {
     assert_eq!(follow("add-a-drive.md"), 2);
     assert_eq!(follow("adapters.md"), 3);
     assert_eq!(follow("ros2-canopen.md"), 1);
+    assert_eq!(follow("write-a-scenario.md"), 2);
 }

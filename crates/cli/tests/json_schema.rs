@@ -48,6 +48,8 @@ const COMMANDS: &[(&[&str], &str)] = &[
     (&["dump", "--for", "1s"], "frame"),
     (&["run", SCENARIO], "run"),
     (&["run", SCENARIO, "--seeds", "1..2"], "sweep"),
+    (&["run", SCENARIO, SCENARIO], "scenarios"),
+    (&["run", SCENARIO, "/no/such/file.toml"], "scenarios"),
     (&["read", "9", "6064"], "failure"),
     (&["write", "4", "6064", "5"], "failure"),
     (&["home", "4", "--method", "17"], "failure"),
@@ -85,6 +87,30 @@ fn each_command_prints_what_the_schema_says() {
     for (arguments, definition) in COMMANDS {
         let ended = ferrodrive(&[arguments, &["--json"][..]].concat());
         hold(&ended, definition, &format!("{arguments:?}"));
+    }
+}
+
+#[test]
+fn a_failure_says_what_to_do_next() {
+    let nowhere = ["--record", "/no/such/folder/a.csv"];
+    for arguments in [
+        &["plot", "/no/such/record.csv"][..],
+        &["plot", "/no/such/record.txt"],
+        &["plot", "/no/such/record.csv", "--from", "3", "--to", "2"],
+        &["run", SCENARIO, nowhere[0], nowhere[1]],
+        &["run", SCENARIO, nowhere[0], nowhere[1], "--record-signals", "speed_of_light"],
+        &["run", SCENARIO, nowhere[0], "a.txt"],
+        &["run", SCENARIO, "--junit", "/no/such/folder/a.xml"],
+        &["run", SCENARIO, "--seeds", "1..2", nowhere[0], nowhere[1]],
+        &["run", "/no/such/file.toml"],
+        &["sim", "--drive", "zlac8030l@4", nowhere[0], nowhere[1]],
+        &["sim", "--drive", "zlac8030l@4", "--log", "/no/such/folder/a.log"],
+        &["events", "--control", "127.0.0.1:1", "--kind", "falt"],
+        &["world", "now"],
+    ] {
+        let ended = ferrodrive(&[arguments, &["--json"]].concat());
+        let [failure] = hold(&ended, "failure", &format!("{arguments:?}")).try_into().expect("one line");
+        assert!(failure["error"]["next"].as_str().is_some_and(|next| !next.is_empty()), "{arguments:?}: {failure}");
     }
 }
 

@@ -5,6 +5,7 @@ mod common;
 use std::path::PathBuf;
 
 use common::{ferrodrive, scratch};
+use serde_json::Value;
 
 fn scenario(name: &str) -> String {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../examples/scenarios").join(name);
@@ -62,6 +63,68 @@ fn a_sweep_tells_how_many_failed_how_figures_are_spread_and_how_to_repeat_a_run(
     assert!(failed.out.contains(&again) && failed.out.contains("2 of 3 runs passed, 1 failed"), "{}", failed.out);
     let repeated = ferrodrive(&["run", path, "--seed", "5", "--set", "held=333ms"]);
     assert_eq!(repeated.status, Some(1));
+    std::fs::remove_dir_all(directory).unwrap();
+}
+
+#[test]
+fn of_several_scenarios_each_is_a_row_and_a_suite_and_one_that_fails_is_enough() {
+    let directory = scratch("run-several");
+    let path = |name: &str| directory.join(name).to_str().expect("UTF-8").to_owned();
+    let (fine, junit) = (path("fine.toml"), path("all.xml"));
+    let (wrong, broken) = (path("wrong.toml"), path("broken.toml"));
+    let machine =
+        "machine = { drive = [{ model = 'zlac8030l', node = 4 }] }\nlimit = '500ms'\n[parameters]\nlevel = 20\n";
+    std::fs::write(&fine, format!("title = 'Fine'\n{machine}[[expect]]\nthat = '4 supply > {{level}}'\n")).unwrap();
+    std::fs::write(&wrong, format!("title = 'Wrong'\n{machine}[[expect]]\nthat = '4 fault'\n")).unwrap();
+    std::fs::write(&broken, "title = 'Broken'\n").unwrap();
+
+    let passed = ferrodrive(&["run", &fine, &scenario("brown_out.toml"), "--jobs", "2", "--set", "level=21"]);
+    assert_eq!(passed.status, Some(0), "{}{}", passed.out, passed.err);
+    assert!(passed.out.contains("2 of 2 scenarios passed"), "{}", passed.out);
+
+    let failed = ferrodrive(&["run", &fine, &wrong, "--junit", &junit]);
+    assert_eq!(failed.status, Some(1), "{}{}", failed.out, failed.err);
+    let rows: Vec<&str> = failed.out.lines().collect();
+    assert!(rows[1].starts_with("ok ") && rows[1].contains("1 of 1"), "{}", failed.out);
+    assert!(
+        rows[2].starts_with("FAILED ") && rows[2].contains("line 7: 4 fault: not by the end of the run"),
+        "{}",
+        failed.out
+    );
+    assert!(failed.err.contains(&format!("ferrodrive run {wrong} --seed 1")), "{}", failed.err);
+    let xml = std::fs::read_to_string(&junit).unwrap();
+    assert_eq!((xml.matches("<testsuite ").count(), xml.matches("<failure ").count()), (2, 1), "{xml}");
+
+    let broken_too = ferrodrive(&["run", &broken, &fine, &wrong, "--json", "--junit", &junit]);
+    assert_eq!(broken_too.status, Some(2), "{}", broken_too.out);
+    let said = broken_too.json();
+    let counts = [&said["passed"], &said["failed"], &said["unusable"], &said["complete"]];
+    assert_eq!(counts, [&Value::from(1), &1.into(), &1.into(), &true.into()], "{said:#}");
+    assert!(said["scenarios"][0]["error"]["message"].as_str().unwrap().contains("'machine' is missing"), "{said:#}");
+    assert_eq!(std::fs::read_to_string(&junit).unwrap().matches("<error ").count(), 1);
+
+    let nobodys = ferrodrive(&["run", &fine, &wrong, "--set", "levle=1"]);
+    assert_eq!(nobodys.status, Some(2));
+    assert!(nobodys.err.contains("none of the 2 scenarios has a parameter 'levle'"), "{}", nobodys.err);
+    std::fs::remove_dir_all(directory).unwrap();
+}
+
+#[test]
+fn a_sweep_says_when_the_seed_makes_no_difference_and_what_would() {
+    let swept = ferrodrive(&["run", &scenario("brown_out.toml"), "--seeds", "1..2"]);
+    assert_eq!(swept.status, Some(0), "{}{}", swept.out, swept.err);
+    assert!(
+        swept.out.contains("note: all seeds give the same run") && swept.out.contains("realism = \"full\""),
+        "{}",
+        swept.out
+    );
+    let directory = scratch("run-random");
+    let file = directory.join("random.toml");
+    let random = "machine = { realism = 'full', drive = [{ model = 'zlac8030l', node = 4 }] }\nend = '1500ms'\n\
+                  [[host]]\ndo = ['4 velocity 60rpm no-wait']\n";
+    std::fs::write(&file, random).unwrap();
+    let swept = ferrodrive(&["run", file.to_str().unwrap(), "--seeds", "1..2", "--json"]);
+    assert_eq!(swept.json()["seeds_differ"], true, "{}", swept.out);
     std::fs::remove_dir_all(directory).unwrap();
 }
 

@@ -91,12 +91,24 @@ impl Summary {
         Self { sweep, summary: Mutex::default() }
     }
 
-    /// Adds what came of a run: its figures, and of a failed one what was asked first that was not so, and what was seen.
-    fn add(&self, number: u64, figures: Vec<(String, f64)>, failure: Option<(String, String)>) -> PyResult<()> {
+    /// Adds what came of a run: its figures, and of a failed one what was asked first that was not so, and what was seen. The
+    /// digest of a run that was made.
+    #[pyo3(signature = (number, figures, failure, digest=None))]
+    fn add(
+        &self,
+        number: u64,
+        figures: Vec<(String, f64)>,
+        failure: Option<(String, String)>,
+        digest: Option<u64>,
+    ) -> PyResult<()> {
         let sweep = self.sweep.get();
         sweep.check(number)?;
         let figures = figures.iter().map(|(name, value)| (name.as_str(), *value));
-        self.summary.lock().unwrap_or_else(PoisonError::into_inner).add_run(&sweep.sweep, number, figures, failure);
+        let mut summary = self.summary.lock().unwrap_or_else(PoisonError::into_inner);
+        summary.add_run(&sweep.sweep, number, figures, failure);
+        if let Some(digest) = digest {
+            summary.add_digest(&sweep.sweep, number, digest);
+        }
         Ok(())
     }
 

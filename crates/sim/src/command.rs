@@ -104,6 +104,14 @@ pub enum CommandError {
         /// When it has moved, in seconds.
         until_s: f64,
     },
+    /// A run was ended before its time.
+    #[error("the run was ended at {at_s} s: {why}")]
+    Ended {
+        /// How far it has come, in seconds.
+        at_s: f64,
+        /// What ended it.
+        why: &'static str,
+    },
     /// The line is longer than [`MAX_LINE_LENGTH`].
     #[error("the line is longer than {MAX_LINE_LENGTH} bytes; expected a command, as in: 4 get")]
     TooLong,
@@ -171,7 +179,7 @@ impl CommandError {
             Self::Unknown(_) | Self::BadNode(_) | Self::NoAction(_) | Self::Stimulus(_) => "usage",
             Self::NoSuchDrive { .. } => "no_such_node",
             Self::NoSuchBody { .. } => "no_such_body",
-            Self::NotManual | Self::Running { .. } | Self::TooMany { .. } => "clock",
+            Self::NotManual | Self::Running { .. } | Self::Ended { .. } | Self::TooMany { .. } => "clock",
             Self::Refused(_) => "refused",
         }
     }

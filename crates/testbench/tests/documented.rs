@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use testbench::machine_file::{BUS_KEYS, DRIVE_KEYS, Machine};
 use testbench::scenario::entries::{EXPECT_KEYS, HOST_KEYS, LINE_KEYS, STEP_KEYS};
-use testbench::scenario::{Scenario, condition, deed, file};
+use testbench::scenario::{Runner, Scenario, condition, deed, file};
 
 fn folder(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..").join(name)
@@ -57,12 +57,43 @@ fn the_page_of_scenarios_has_every_key_and_form_and_its_examples_are_scenarios()
     for form in condition::FORMS.iter().chain(deed::FORMS) {
         assert!(page.contains(form), "{form} is not on the page");
     }
+    for (kind, _) in testbench::events::KINDS {
+        assert!(page.contains(&format!("`{kind}`")), "the event {kind} is not on the page");
+    }
     let mut scenarios = 0;
     for block in blocks(&page) {
         Scenario::parse(block, Path::new("")).unwrap_or_else(|bad| panic!("{bad}"));
         scenarios += 1;
     }
     assert!(scenarios >= 1);
+}
+
+#[test]
+fn the_scenarios_of_the_handbook_pass_as_it_says_they_do() {
+    let page = page("handbook/write-a-scenario.md");
+    let mut outcomes = blocks(&page).map(|block| {
+        let scenario = Scenario::parse(block, Path::new("")).unwrap_or_else(|bad| panic!("{bad}"));
+        Runner::new(&scenario, None).unwrap_or_else(|bad| panic!("{bad}")).run()
+    });
+    let (first, second) = (outcomes.next().expect("the first version"), outcomes.next().expect("the second one"));
+    assert!(first.passed() && second.passed() && outcomes.next().is_none());
+    // What it prints has a row for each thing that was asked.
+    first.rows.iter().for_each(|row| assert!(page.contains(&format!("{}  ", row.asked)), "{row:?}"));
+    // Of the second: 2000h after the last frame the drive begins to stop, half a second later it stands.
+    let stood_s = second.figures[0].1;
+    assert!((2.4..2.8).contains(&stood_s), "{stood_s}");
+}
+
+#[test]
+fn without_the_cable_the_first_version_of_the_handbook_stops_as_well() {
+    let page = page("handbook/write-a-scenario.md");
+    let block = blocks(&page).next().expect("the first version");
+    let (before, step) = block.split_once("[[step]]").expect("a step");
+    let expect =
+        step.split_once("[[expect]]").expect("an expectation").1.replace("after = \"cable\"", "after = \"host\"");
+    let text = format!("{before}[[expect]]{expect}");
+    let scenario = Scenario::parse(&text, Path::new("")).unwrap_or_else(|bad| panic!("{bad}"));
+    assert!(Runner::new(&scenario, None).unwrap_or_else(|bad| panic!("{bad}")).run().passed());
 }
 
 #[test]

@@ -47,7 +47,7 @@ fn what_does_not_fit_together_is_refused() {
         ("[[step]]\nwithin = '1s'\ndo = '4 rotor lock'", "'within' is about 'when'"),
         ("[[expect]]\nwhy = 'x'", "needs 'that', 'always' or 'never'"),
         ("[[expect]]\nthat = '4 powered'\nnever = '4 fault'", "make another expectation of this"),
-        ("[[expect]]\nalways = '4 boots'", "a frame passes at an instant"),
+        ("[[expect]]\nalways = '4 boots'", "it happens at an instant"),
         ("[[expect]]\nthat = '4 powered'\nat = '1s'\nuntil = '2s'", "'at' is an instant"),
         ("[[expect]]\nthat = '4 powered'\nfrom = '3s'\nuntil = '2s'", "it ends before it begins"),
         ("[[host]]\ndo = [{ do = '4 enable', is = 5 }]", "'is' needs something that is read"),

@@ -22,6 +22,6 @@ impl Completions {
         // The generator panics where it cannot write, so it writes to memory.
         let mut script = Vec::new();
         clap_complete::generate(self.shell, whole, "ferrodrive", &mut script);
-        print(&script).map_err(|error| Failure::new("cannot write to standard output").because(error))
+        print(&script).map_err(Failure::of_stdout)
     }
 }

@@ -45,7 +45,7 @@ impl Demo {
         // A picture of somebody else's stays.
         create_picture(&self.svg, b"<svg")
             .and_then(|mut file| file.write_all(showcase.poster.to_svg().as_bytes()))
-            .map_err(|error| Failure::new(format!("cannot write the picture {}", self.svg.display())).because(error))?;
+            .map_err(|error| Failure::of_writing("the picture", &self.svg, &error))?;
         let (svg, took_s) = (self.svg.display().to_string(), clock.now().as_secs_f64());
         Ok(DemoReport::new(showcase.parts, svg, took_s))
     }

@@ -36,7 +36,8 @@ pub(crate) struct Events {
 impl Events {
     /// Shows events until there are no more.
     pub(crate) fn run(&self, format: Format) -> Result<(), Failure> {
-        Filter::new(self.nodes.iter().copied(), &self.kinds).map_err(|error| Failure::usage(error.to_string()))?;
+        Filter::new(self.nodes.iter().copied(), &self.kinds)
+            .map_err(|error| Failure::usage(error.to_string()).next("leave --kind away to hear of all"))?;
         exit_on_signal();
         let mut client = self.control.connect()?;
         let events = json!({ "nodes": self.nodes, "kinds": self.kinds });
@@ -48,7 +49,7 @@ impl Events {
         {
             let Some(told) = line.get("event").or_else(|| line.get("dropped")) else { continue };
             let printed = if format.json { format.print_json(told) } else { print_line(&plain(&words(told))) };
-            printed.map_err(|error| Failure::new("cannot write to standard output").because(error))?;
+            printed.map_err(Failure::of_stdout)?;
             shown += 1;
         }
         Ok(())

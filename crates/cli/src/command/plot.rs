@@ -65,10 +65,14 @@ impl Plot {
         let title = self.file.file_name().unwrap_or_default().to_string_lossy();
         let span = self.from..=self.to.unwrap_or(f64::INFINITY);
         if span.is_empty() {
-            return Err(Failure::usage("--to is before --from"));
+            return Err(Failure::usage("--to is before --from").next("give --to a later time, or leave it away"));
         }
-        let poster = picture(&title, &recorded, &self.signals, span)
-            .map_err(|reason| Failure::new(format!("cannot draw {}", self.file.display())).because(reason))?;
+        let poster = picture(&title, &recorded, &self.signals, span).map_err(|reason| {
+            Failure::new(format!("cannot draw {}", self.file.display()))
+                .of_kind("record")
+                .because(reason)
+                .next("without --signals, --from and --to all of it is drawn that has a picture")
+        })?;
         let mut files = Vec::new();
         let beside = (self.svg.is_none() && self.html.is_none()).then(|| self.file.with_extension("svg"));
         if let Some(path) = self.svg.clone().or(beside) {
@@ -86,7 +90,11 @@ impl Plot {
     }
 
     fn read(&self) -> Result<Recorded, Failure> {
-        let unreadable = || Failure::new(format!("cannot read the record {}", self.file.display()));
+        let unreadable = || {
+            Failure::new(format!("cannot read the record {}", self.file.display()))
+                .of_kind("record")
+                .next("give a file that --record of this program has written")
+        };
         let kind = Kind::of_name(&self.file.to_string_lossy()).ok_or_else(|| {
             Failure::usage(format!("{} is no record", self.file.display()))
                 .because("a record is called NAME.mcap or NAME.csv")
@@ -104,7 +112,7 @@ impl Plot {
 /// Writes a picture to a new file, or over an earlier picture, and over nothing else.
 fn write(path: &Path, text: &str, begin: &[u8]) -> Result<(), Failure> {
     let written = crate::serve::files::create_picture(path, begin).and_then(|mut file| file.write_all(text.as_bytes()));
-    written.map_err(|error| Failure::new(format!("cannot write the picture {}", path.display())).because(error))
+    written.map_err(|error| Failure::of_writing("the picture", path, &error))
 }
 
 impl Report for Drawn {

@@ -4,7 +4,7 @@ mod described;
 
 use std::collections::{BTreeSet, VecDeque};
 use std::fs::File;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use can::{Bitrate, Instant};
 use sim::machine::{Realism, TimingMode};
@@ -21,17 +21,18 @@ use crate::failure::Failure;
 use crate::global::Global;
 use crate::plain::plain;
 use crate::recording::{FrameLog, Pace, RecordFile, RecordOptions};
-use crate::serve::control::ControlServer;
+use crate::serve::control::{ControlOptions, ControlServer};
 use crate::serve::eeprom::{EepromError, Eeproms};
 use crate::serve::files::create_log;
 use crate::serve::keeper::{Keeper, file_name};
 use crate::serve::pacer::{Clock, Pacer, Speed};
-use crate::serve::service::{Request, Service, listen_to_signals, read_lines, tick};
+use crate::serve::service::{
+    PARTING_PATIENCE, REQUESTS_WAITING, Request, Service, listen_to_signals, read_lines, runtime_of_clients, tick,
+};
 use crate::serve::speaker::Speaker;
 use crate::serve::world::ServedWorld;
 use crate::session::{bus_failure, enter_real_time, failure_of};
 use described::notes;
-use testbench::control::ControlAddress;
 use testbench::document::BadFile;
 use testbench::machine_file::{Machine, Placed};
 use testbench::words::drive::{DriveSpec, drive_spec};
@@ -94,16 +95,8 @@ pub(crate) struct Sim {
     /// identifier is the joint's address (2615h)
     #[arg(long, value_name = "PLACE")]
     modbus: Option<ModbusSpec>,
-    /// Where other programs give world commands and hear what happens: HOST:PORT, or the path of a Unix socket
-    ///
-    /// Lines of JSON, for `ferrodrive world`, `ferrodrive events` and programs; docs/control.md describes them. On an address
-    /// that other machines can reach a token is asked for.
-    #[arg(long, value_name = "PLACE")]
-    control: Option<ControlAddress>,
-    /// What clients of --control have to say first; without it, on an address that other machines can reach, a random one is
-    /// made and said on standard error
-    #[arg(long, value_name = "TOKEN", env = "FERRODRIVE_CONTROL_TOKEN", hide_env_values = true, requires = "control")]
-    control_token: Option<String>,
+    #[command(flatten)]
+    control: ControlOptions,
     /// Keep EEPROM contents in this directory; without it every start is factory-fresh
     ///
     /// A store is on the disk before the drive acknowledges it: before the SDO answer to a write that is stored, before the
@@ -140,7 +133,7 @@ pub(crate) struct Sim {
     ///
     /// Moved by hand, time stands between two runs: a frame of a client is taken at the time that the bus has, and goes out
     /// with the next run. Each run is answered, when it is over, with the time reached, how many frames the bus has carried,
-    /// and the drives whose power, statusword or error code has changed. Lines that come before that wait for it.
+    /// and the drives whose power, statusword or error code has changed. Lines that come before that wait for it; a second `quit` does not.
     #[arg(long, value_name = "real|manual", value_enum, default_value = "real")]
     clock: Clock,
     /// Write all frames to this file, in candump format
@@ -159,12 +152,6 @@ pub(crate) struct Sim {
 /// What a simulator says that nobody can reach.
 const NOBODY: &str = "note: no program can reach these drives: give --serve socketcand://127.0.0.1:29536, or --modbus, or \
                       --bus to join a bus. World commands on standard input are answered all the same";
-
-/// Requests that may wait.
-const REQUESTS_WAITING: usize = 64;
-
-/// Tasks of clients that run before the world has its turn again; see [`Hub`] on how much each does.
-const TASKS_A_TURN: u32 = 16;
 
 impl Sim {
     /// Runs until `quit`, Ctrl-C or a lost `bridge` (the bus given with `--bus` beside `sim`). The drives of `file` (given with
@@ -198,17 +185,16 @@ impl Sim {
         }
         machine.join(&mut world).map_err(unusable)?;
         machine.make_real(&mut world);
-        let log = self.log.as_deref().map(create_log).transpose().map_err(|error| {
-            Failure::new(format!("cannot write the log {}", self.log.clone().unwrap_or_default().display()))
-                .because(error)
-        })?;
+        let log =
+            self.log.as_deref().map(create_log).transpose().map_err(|error| {
+                Failure::of_writing("the log", self.log.as_deref().unwrap_or(Path::new("")), &error)
+            })?;
         let real_time = self.clock == Clock::Real && self.speed.is_none();
         let pace = if real_time { Pace::RealTime } else { Pace::Free };
         let record = self.recording.start(&mut world, pace, warnings.clone())?;
         let pacer = Pacer::new(self.clock, self.speed.unwrap_or(Speed::Times(1.0)));
         let world = ServedWorld::new(world, pacer, log.is_some() || record.is_some(), warnings.clone());
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().event_interval(TASKS_A_TURN).build();
-        let runtime = runtime.map_err(|error| Failure::new("cannot start the runtime").because(error))?;
+        let runtime = runtime_of_clients()?;
         let ended = runtime.block_on(self.serve(world, eeproms, (log, record), warnings, global, bridge));
         // Threads that wait for standard input must not hold up the end.
         runtime.shutdown_background();
@@ -252,7 +238,8 @@ impl Sim {
         let answers = Speaker::of_answers(warnings.clone());
         let log = log.map(|file| FrameLog::start(file, clock.unix_zero(), warnings.clone()));
         let waiting = VecDeque::new();
-        let mut service = Service { answers: answers.clone(), warnings: warnings.clone(), log, record, waiting };
+        let mut service =
+            Service { answers: answers.clone(), warnings: warnings.clone(), log, record, waiting, quit_in: None };
         let outer = match bridge {
             Some(spec) => Some(spec.open(&clock).await.map_err(|error| bus_failure(global, &error))?),
             None => None,
@@ -275,7 +262,7 @@ impl Sim {
         }
         let over = requests.clone();
         world.on_run_over(move || over.try_send(Request::RunIsOver).is_ok());
-        let control = self.serve_control(&mut world, &requests, &service.warnings).await?;
+        let control = self.control.serve(&mut world, &requests, &service.warnings).await?;
         answers.say(&self.ready(&hub, modbus.as_ref(), control.as_ref(), bridge));
         if self.places.is_empty() && modbus.is_none() && control.is_none() && bridge.is_none() {
             service.warnings.say(NOBODY);
@@ -285,7 +272,12 @@ impl Sim {
         let serving =
             run_world(&mut world, &mut hub, &clock, &mut incoming, |world, request| service.serve(world, request));
         let ended = serving.await;
-        service.part(&mut world, ended)
+        let ended = service.part(&mut world, ended);
+        drop(world);
+        if let Some(control) = control {
+            control.part(PARTING_PATIENCE).await;
+        }
+        ended
     }
 
     /// The line that tells where the bus can be reached.
@@ -303,30 +295,6 @@ impl Sim {
         ["ready".to_owned()].into_iter().chain(listeners).chain(modbus).chain(control).chain(bridge).collect()
     }
 
-    /// The server of `--control`, listening.
-    async fn serve_control(
-        &self,
-        world: &mut ServedWorld,
-        requests: &mpsc::Sender<Request>,
-        warnings: &Speaker,
-    ) -> Result<Option<ControlServer>, Failure> {
-        let Some(address) = &self.control else { return Ok(None) };
-        let token = match &self.control_token {
-            Some(token) if token.is_empty() => {
-                return Err(Failure::usage("the token of --control-token is empty").next("give one, or leave it away"));
-            }
-            Some(token) => Some(token.clone()),
-            None if address.is_local() => None,
-            None => {
-                let token = random_token()?;
-                warnings.say(&format!("note: whoever can reach {address} has to give this token: {token}"));
-                Some(token)
-            }
-        };
-        token.into_iter().for_each(|token| world.ask_for_token(token));
-        ControlServer::bind(address, requests.clone()).await.map(Some)
-    }
-
     /// The server of `--modbus`, listening.
     async fn serve_registers(
         &self,
@@ -339,14 +307,6 @@ impl Sim {
     }
 }
 
-/// 128 random bits in hexadecimal digits.
-fn random_token() -> Result<String, Failure> {
-    let mut bytes = [0; 16];
-    getrandom::fill(&mut bytes)
-        .map_err(|error| Failure::new("cannot make a token").because(error).next("give one with --control-token"))?;
-    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
-}
-
 /// Adds a drive with what it remembers and what is around it.
 fn add_drive(world: &mut World, placed: &Placed, eeproms: Option<&Eeproms>, warnings: &Speaker) -> Result<(), Failure> {
     let spec = &placed.spec;
@@ -357,7 +317,9 @@ fn add_drive(world: &mut World, placed: &Placed, eeproms: Option<&Eeproms>, warn
     let image = eeproms.map(|eeproms| eeproms.load(&name, spec.model.name)).transpose()?.flatten();
     if let Some(image) = &image {
         drive.load_nvm(image).map_err(|error| {
-            Failure::new(format!("the EEPROM contents kept for {name} cannot be used")).because(error)
+            Failure::new(format!("the EEPROM contents kept for {name} cannot be used"))
+                .because(error)
+                .next("move the file away to start this drive factory-fresh")
         })?;
     }
     if image.is_some() {
@@ -368,7 +330,7 @@ fn add_drive(world: &mut World, placed: &Placed, eeproms: Option<&Eeproms>, warn
 }
 
 fn unusable(bad: BadFile) -> Failure {
-    Failure::usage("cannot use the machine file").because(bad)
+    Failure::usage("cannot use the machine file").because(bad).next("docs/machine-file.md describes each key")
 }
 
 /// Says it if a drive is not where the command line puts it, because its EEPROM contents say otherwise.

@@ -70,8 +70,11 @@ impl RecordOptions {
             let of_drives = columns_of_drives(places);
             let all = of_drives.into_iter().chain(bodies.iter().flat_map(Column::of_body));
             let names: Vec<String> = all.map(|column| column.name()).collect();
-            let chosen = select(&names, &self.record_signals)
-                .map_err(|reason| Failure::usage("cannot record what --record-signals asks for").because(reason))?;
+            let chosen = select(&names, &self.record_signals).map_err(|reason| {
+                Failure::usage("cannot record what --record-signals asks for")
+                    .because(reason)
+                    .next("name signals as velocity, 4.current_a or 5.*, or leave it away and record all")
+            })?;
             let is_chosen = |name: &str| chosen.iter().any(|i| names[*i] == name);
             channels.retain(|channel| is_chosen(&Column::of_axis(*channel).name()));
             // A body is recorded as a whole.
@@ -95,5 +98,5 @@ fn create(path: &Path) -> std::io::Result<(Kind, std::fs::File)> {
 }
 
 fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::new(format!("cannot write the record {}", path.display())).because(error)
+    Failure::of_writing("the record", path, error)
 }

@@ -59,6 +59,8 @@ pub(crate) struct Pacer {
     moved: Instant,
     /// With a client come or gone the pace begins anew.
     changed: bool,
+    /// Time has not begun: it does with the first client.
+    waits: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,7 +79,19 @@ impl Pacer {
             (Clock::Real, Speed::Times(times)) => (Way::Clock, times),
             (Clock::Real, Speed::Max) => (Way::Max, 1.0),
         };
-        Self { way, pace: Pace::with_speed(Instant::ZERO, times), clients: 0, moved: Instant::ZERO, changed: false }
+        Self {
+            way,
+            pace: Pace::with_speed(Instant::ZERO, times),
+            clients: 0,
+            moved: Instant::ZERO,
+            changed: false,
+            waits: false,
+        }
+    }
+
+    /// Time stands until the first client comes, unless it is moved by hand.
+    pub(crate) fn waiting_for_a_client(self) -> Self {
+        Self { waits: !self.is_manual(), ..self }
     }
 
     /// How far a world at `now` is to come when the clock shows `clock`.
@@ -85,6 +99,7 @@ impl Pacer {
         self.moved = clock;
         match self.way {
             Way::Manual(end) => end,
+            _ if self.waits => now,
             Way::Max if self.clients > 0 => now + STEP,
             Way::Clock | Way::Max => {
                 let elapsed = elapsed(clock);
@@ -100,6 +115,7 @@ impl Pacer {
     pub(crate) fn clock_at(&self, at: Instant) -> Option<Instant> {
         match self.way {
             Way::Manual(end) => (at <= end).then_some(Instant::ZERO),
+            _ if self.waits => None,
             Way::Max if self.clients > 0 => Some(Instant::ZERO),
             Way::Clock | Way::Max => {
                 let due = Instant::ZERO + self.pace.elapsed_at(at)?;
@@ -126,6 +142,7 @@ impl Pacer {
     /// A client has come.
     pub(crate) fn joined(&mut self) {
         self.clients += 1;
+        self.changed |= std::mem::take(&mut self.waits);
     }
 
     /// A client is gone. A world that has hurried goes on from where it is.
@@ -189,6 +206,21 @@ mod tests {
         assert_eq!((pacer.target(at(9000), Instant::ZERO), pacer.clock_at(at(1))), (at(20), Some(Instant::ZERO)));
         assert_eq!(pacer.clock_at(at(21)), None);
         assert!(pacer.is_manual() && !pacer.follows_the_clock());
+    }
+
+    #[test]
+    fn time_that_waits_for_a_client_begins_with_the_first_and_goes_on_without_it() {
+        let mut pacer = Pacer::new(Clock::Real, Speed::Times(2.0)).waiting_for_a_client();
+        assert_eq!((pacer.target(at(900), Instant::ZERO), pacer.clock_at(at(1))), (Instant::ZERO, None));
+        pacer.joined();
+        assert_eq!(
+            (pacer.target(at(1000), Instant::ZERO), pacer.target(at(1010), Instant::ZERO)),
+            (Instant::ZERO, at(20))
+        );
+        pacer.left();
+        assert_eq!(pacer.target(at(1500), at(20)), at(1000));
+        let by_hand = Pacer::new(Clock::Manual, Speed::Times(1.0)).waiting_for_a_client();
+        assert!(!by_hand.waits);
     }
 
     #[test]

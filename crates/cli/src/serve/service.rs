@@ -2,11 +2,11 @@
 //! records that it keeps. Nothing here waits for whoever reads or writes at the other end.
 
 use std::collections::VecDeque;
-use std::io;
+use std::io::{self, IsTerminal};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use sim::command::CommandError;
+use sim::command::{Command, CommandError};
 use tokio::sync::mpsc;
 use transport::{ModbusRequest, WallClock};
 
@@ -27,13 +27,28 @@ const READER_PATIENCE: Duration = Duration::from_secs(1);
 
 /// How long the end waits for the disk, and then for whoever reads the last answers.
 const DISK_PATIENCE: Duration = Duration::from_secs(5);
-const PARTING_PATIENCE: Duration = Duration::from_millis(500);
+pub(crate) const PARTING_PATIENCE: Duration = Duration::from_millis(500);
 
 /// How long after a signal the process ends in any case: what stores, log and the last words may take together.
 const END_PATIENCE: Duration = Duration::from_secs(12);
 
+/// How many times [`KEEPING_INTERVAL`] a `quit` waits for the end of a run: 10 s, in which a drive alone has hours.
+const QUIT_TURNS: u32 = 100;
+
 /// Lines that may wait for the end of a run.
 const LINES_WAITING: usize = 1024;
+
+/// Requests that may wait.
+pub(crate) const REQUESTS_WAITING: usize = 64;
+
+/// Tasks of clients that run before the world has its turn again; see [`transport::Hub`] on how much each does.
+const TASKS_A_TURN: u32 = 16;
+
+/// The runtime of a served world and its clients.
+pub(crate) fn runtime_of_clients() -> Result<tokio::runtime::Runtime, Failure> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().event_interval(TASKS_A_TURN).build();
+    runtime.map_err(|error| Failure::new("cannot start the runtime").because(error))
+}
 
 /// Something to be served between two steps of the world.
 pub(crate) enum Request {
@@ -49,6 +64,8 @@ pub(crate) enum Request {
     Registers(ModbusRequest),
     /// A client of the control connection comes, speaks or goes.
     Control(ControlMessage),
+    /// The scenario has come to its end.
+    ScenarioIsOver,
     /// A signal asks for the end.
     Ended(Signal),
     /// The bus that was joined is gone.
@@ -79,12 +96,17 @@ pub(crate) struct Service {
     pub(crate) record: Option<RecordFile>,
     /// Lines that came while a run was under way: each is answered in its turn.
     pub(crate) waiting: VecDeque<String>,
+    /// Turns of keeping after which a `quit` that waits ends the run.
+    pub(crate) quit_in: Option<u32>,
 }
 
 impl Service {
     /// Serves one request; breaks when it was the last.
     pub(crate) fn serve(&mut self, world: &mut ServedWorld, request: Request) -> ControlFlow<Result<(), Failure>> {
         match request {
+            Request::Line(line) if world.is_running() && asks_to_quit(&line) => {
+                return self.quit_later(world, line);
+            }
             Request::Line(line) if world.is_running() => self.put_off(line),
             Request::Line(line) => return self.obey(world, &line),
             Request::RunIsOver => return self.after_a_run(world),
@@ -93,9 +115,14 @@ impl Service {
             Request::Keep => {
                 world.look_for_stores();
                 self.write_records(world);
+                return self.count_down(world);
             }
             // Whatever woke the loop, answers that may go out do so before it sleeps again.
             Request::Stored => {}
+            Request::ScenarioIsOver => {
+                self.after_a_run(world)?;
+                return ControlFlow::Break(Ok(()));
+            }
             Request::Ended(signal) => return ControlFlow::Break(Err(Failure::ended_by(signal))),
             Request::BridgeLost(failure) => return ControlFlow::Break(Err(failure)),
         }
@@ -121,6 +148,40 @@ impl Service {
             self.waiting.push_back(line);
         } else {
             self.answers.say(&sim::command::refused(&CommandError::TooMany { most: LINES_WAITING }));
+        }
+    }
+
+    /// A `quit` that comes during a run has its turn like other lines, so that lines which a script sends at once mean what they say.
+    /// It does not wait for ever: a second one, one typed at a terminal, and [`QUIT_TURNS`] end the run.
+    fn quit_later(&mut self, world: &mut ServedWorld, quit: String) -> ControlFlow<Result<(), Failure>> {
+        self.put_off(quit);
+        if self.quit_in.is_some() || io::stdin().is_terminal() {
+            return self.quit_in_a_run(world);
+        }
+        self.quit_in = Some(QUIT_TURNS);
+        ControlFlow::Continue(())
+    }
+
+    /// One turn less until a `quit` that waits ends the run.
+    fn count_down(&mut self, world: &mut ServedWorld) -> ControlFlow<Result<(), Failure>> {
+        self.quit_in = self.quit_in.and_then(|turns| turns.checked_sub(1));
+        if self.quit_in == Some(0) { self.quit_in_a_run(world) } else { ControlFlow::Continue(()) }
+    }
+
+    /// Ends the run, and answers the lines that waited for it, up to `quit`; runs among them end where they begin.
+    fn quit_in_a_run(&mut self, world: &mut ServedWorld) -> ControlFlow<Result<(), Failure>> {
+        self.end_run(world, "quit");
+        while let Some(line) = self.waiting.pop_front() {
+            self.obey(world, &line)?;
+            self.end_run(world, "quit");
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Ends a run where it stands; whoever asked for it is told why.
+    fn end_run(&self, world: &mut ServedWorld, why: &'static str) {
+        if let Some(answer) = world.end_run(why) {
+            self.answers.say(&answer);
         }
     }
 
@@ -165,7 +226,8 @@ impl Service {
         match world.finish_stores(DISK_PATIENCE) {
             Some(kept) => kept.map_err(Failure::from),
             None => Err(Failure::new("the last stores are not in --state")
-                .because(format!("the disk has not taken them within {} s", DISK_PATIENCE.as_secs()))),
+                .because(format!("the disk has not taken them within {} s", DISK_PATIENCE.as_secs()))
+                .next("what was acknowledged is there; see what else keeps the disk busy")),
         }
     }
 
@@ -180,6 +242,10 @@ impl Service {
             log.write(frames);
         }
     }
+}
+
+fn asks_to_quit(line: &str) -> bool {
+    line.parse() == Ok(Command::Quit)
 }
 
 /// Hands over the lines of standard input; ends with it. A reader of `answers` that is slow is waited for here.

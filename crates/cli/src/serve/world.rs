@@ -11,11 +11,13 @@ use std::time::Duration;
 
 use can::{Bitrate, Frame, INTERFRAME_SPACE_BITS, Instant};
 use sim::command::{Answer, Before, Command, CommandError, Run, Service};
-use sim::events::{Event, EventKind};
+use sim::events::{Event, EventKind, MAX_WAITING};
 use sim::recorder::Recorder;
 use sim::wire::WireEvent;
 use sim::{StationId, World};
-use testbench::control::{Control, Outcome, Pending};
+use testbench::control::{ClientNumber, Control, Outcome, Pending};
+use testbench::scenario::Course;
+use testbench::scenario::happening::Happening;
 use transport::{ClientId, Heard, LeaveReason, ModbusRequest, RealTimeWorld};
 
 use super::control::{ControlMessage, Letters};
@@ -42,6 +44,10 @@ pub(crate) struct ServedWorld {
     carried: Option<Vec<(Instant, Frame)>>,
     stores: Option<Stores>,
     control: Control<Letters>,
+    /// The scenario that the world goes through, if it does, and its end.
+    course: Option<FollowedCourse>,
+    /// Events that the course has seen and the record has not.
+    events: Vec<Event>,
     /// Who is behind the lines of standard input, to those who hear of stimuli.
     own_name: Arc<str>,
     pacer: Pacer,
@@ -62,6 +68,14 @@ struct UnderWay {
     told: bool,
     /// Whose it is, if a client of the control connection asked.
     client: Option<Pending>,
+}
+
+/// A scenario under way.
+struct FollowedCourse {
+    course: Course,
+    /// Tells that it is over; false if that could not be taken, and is to be told again.
+    is_over: Box<dyn Fn() -> bool>,
+    told: bool,
 }
 
 /// What becomes of a world command.
@@ -93,6 +107,8 @@ impl ServedWorld {
             carried: logged.then(Vec::new),
             stores: None,
             control,
+            course: None,
+            events: Vec::new(),
             own_name: "standard input".into(),
             pacer,
             run: None,
@@ -102,6 +118,21 @@ impl ServedWorld {
             displaced: 0,
             speaker,
         }
+    }
+
+    /// Goes through a scenario with the clients as its host; calls `is_over` at its end, until that returns true. Time then stands.
+    pub(crate) fn follow(&mut self, mut course: Course, is_over: impl Fn() -> bool + 'static) {
+        course.is_served_by(self.adapter, &mut self.world);
+        if self.world.is_watched() {
+            self.control.keep_events();
+        }
+        course.go_on(&mut self.world);
+        self.course = Some(FollowedCourse { course, is_over: Box::new(is_over), told: false });
+    }
+
+    /// The world and its scenario, as they stand.
+    pub(crate) fn into_course(self) -> (World, Option<Course>) {
+        (self.world, self.course.map(|followed| followed.course))
     }
 
     /// From now on what drives store is kept, and acknowledged when it is.
@@ -118,16 +149,24 @@ impl ServedWorld {
     pub(crate) fn serve_control(&mut self, message: ControlMessage) {
         match message {
             ControlMessage::Joined(number, mailbox) => self.control.join(number, Letters(mailbox)),
-            ControlMessage::Left(number) => drop(self.control.leave(number, &mut self.world)),
+            ControlMessage::Left(number) => self.see_off(number),
             ControlMessage::Line(number, line) => {
                 let service = self.service();
                 match self.control.handle(number, &line, &mut self.world, service) {
                     Outcome::Answered => {}
                     // What it is told is still sent.
-                    Outcome::Close => drop(self.control.leave(number, &mut self.world)),
+                    Outcome::Close => self.see_off(number),
                     Outcome::Run(pending) => self.begin_for_client(pending),
                 }
             }
+        }
+    }
+
+    /// A client of the control connection is gone, and with it the run that it has asked for: nobody waits for that.
+    fn see_off(&mut self, number: ClientNumber) {
+        drop(self.control.leave(number, &mut self.world));
+        if self.run.as_ref().and_then(|run| run.client.as_ref()).is_some_and(|pending| pending.client == number) {
+            self.end_run("its client has left");
         }
     }
 
@@ -192,6 +231,21 @@ impl ServedWorld {
         self.run.is_some()
     }
 
+    /// Ends the run that is under way where it stands, if there is one; the answer, unless it goes to a client of the control connection.
+    pub(crate) fn end_run(&mut self, why: &'static str) -> Option<String> {
+        let run = self.run.take()?;
+        let now = self.world.now();
+        self.pacer.run_to(now);
+        let ended = CommandError::Ended { at_s: now.as_nanos() as f64 / 1e9, why };
+        match run.client {
+            None => Some(sim::command::refused(&ended)),
+            Some(pending) => {
+                self.control.answer_run(&pending, Err(ended.into()));
+                None
+            }
+        }
+    }
+
     /// Ends a run that has come to its end; the answer, unless it goes to a client of the control connection.
     pub(crate) fn take_run(&mut self) -> Option<String> {
         let run = self.run.take_if(|run| run.end <= self.world.now())?;
@@ -223,7 +277,9 @@ impl ServedWorld {
 
     /// What happened since the last call, if the world is watched.
     pub(crate) fn take_events(&mut self) -> Vec<Event> {
-        self.control.take_events(&mut self.world)
+        let mut events = std::mem::take(&mut self.events);
+        events.append(&mut self.control.take_events(&mut self.world));
+        events
     }
 
     /// Frames carried since the last call.
@@ -255,24 +311,67 @@ impl ServedWorld {
     /// Sorts out what the wire did, and gives the adapter its next frame.
     fn collect(&mut self) {
         while let Some(event) = self.world.log_mut().pull() {
+            if let Some(FollowedCourse { course, .. }) = &mut self.course {
+                course.hear(&mut self.world, Happening::Wire(&event));
+            }
             let WireEvent::Frame { end, source, frame, .. } = event else { continue };
             let mut from = None;
             if source == self.adapter.index() {
                 from = self.offered.take();
                 self.free_at = end.plus_nanos(u64::from(INTERFRAME_SPACE_BITS) * self.world.bitrate().bit_nanos());
             }
-            self.heard.push_back(Heard::Carried { frame, at: end, from });
+            if from.is_some() || self.hears() {
+                self.heard.push_back(Heard::Carried { frame, at: end, from });
+            }
             if let Some(carried) = &mut self.carried {
                 carried.push((end, frame));
             }
         }
         // What the adapter heard is in the log too.
         while self.world.poll_received(self.adapter).is_some() {}
+        self.follow_course();
+    }
+
+    /// Hands on to the scenario what the world tells of itself, and has it do what it can do now.
+    fn follow_course(&mut self) {
+        let Some(FollowedCourse { course, .. }) = &mut self.course else { return };
+        if self.world.is_watched() {
+            for event in self.control.take_events(&mut self.world) {
+                course.hear(&mut self.world, Happening::Told(&event));
+                if self.carried.is_some() && self.events.len() < MAX_WAITING {
+                    self.events.push(event);
+                }
+            }
+        }
+        course.go_on(&mut self.world);
+    }
+
+    /// The scenario is at its end.
+    fn is_over(&self) -> bool {
+        self.course.as_ref().is_some_and(|followed| followed.course.is_over())
+    }
+
+    /// When the scenario wants to look at values.
+    fn next_look(&self) -> Option<Instant> {
+        self.course.as_ref()?.course.next_time(self.world.now())
+    }
+
+    /// Has the scenario look at values, and at what comes of that.
+    fn look(&mut self) {
+        if let Some(FollowedCourse { course, .. }) = &mut self.course {
+            course.look(&mut self.world);
+            self.collect();
+        }
+    }
+
+    /// The adapter is on the bus: no scenario has cut its cable, or had its host die.
+    fn hears(&self) -> bool {
+        !self.world.is_cut(self.adapter) && !self.world.is_gone(self.adapter)
     }
 
     /// Moves the world to `instant`; false if the adapter has become free on the way, and somebody waits for it.
     fn run_to(&mut self, instant: Instant) -> bool {
-        while self.world.next_event().is_some_and(|at| at <= instant) {
+        while !self.is_over() && self.world.next_event().is_some_and(|at| at <= instant) {
             let was_busy = self.offered.is_some();
             self.world.step();
             self.collect();
@@ -280,7 +379,9 @@ impl ServedWorld {
                 return false;
             }
         }
-        self.world.run_until(instant);
+        if !self.is_over() {
+            self.world.run_until(instant);
+        }
         true
     }
 
@@ -305,6 +406,11 @@ impl ServedWorld {
 
     /// Gives the adapter the next frame, if it takes one now.
     fn offer_next(&mut self) {
+        if self.world.is_gone(self.adapter)
+            && let Some(from) = self.offered.take()
+        {
+            self.heard.push_back(Heard::Lost { from });
+        }
         while self.offered.is_none() && self.free_at <= self.world.now() {
             let Some((client, frame)) = self.turns.pop() else { return };
             match self.world.send(self.adapter, frame) {
@@ -341,17 +447,26 @@ impl RealTimeWorld for ServedWorld {
     fn next_deadline(&self) -> Option<Instant> {
         let stores = self.stores.as_ref().and_then(|stores| stores.next_deadline(&self.world));
         let sample = self.control.next_sample();
-        [self.world.next_event(), self.next_offer(), stores, sample].into_iter().flatten().min()
+        [self.world.next_event(), self.next_offer(), self.next_look(), stores, sample].into_iter().flatten().min()
     }
 
     fn advance_to(&mut self, instant: Instant) {
         loop {
-            let sample = self.control.next_sample().filter(|at| *at <= instant);
-            self.move_to(sample.unwrap_or(instant));
+            let look = self.next_look();
+            let stop = self.control.next_sample().into_iter().chain(look).min().filter(|at| *at <= instant);
+            self.move_to(stop.unwrap_or(instant));
+            if look.is_some_and(|at| at <= self.world.now()) {
+                self.look();
+            }
             self.control.publish(&mut self.world);
-            if sample.is_none() {
+            if stop.is_none() || self.is_over() {
                 break;
             }
+        }
+        if let Some(followed) = self.course.as_mut().filter(|followed| followed.course.is_over()) {
+            // A run of longer ends with it: time goes no further.
+            self.run.iter_mut().for_each(|run| run.end = run.end.min(self.world.now()));
+            followed.told = followed.told || (followed.is_over)();
         }
         if let Some(stores) = &mut self.stores {
             stores.settle(&mut self.world);

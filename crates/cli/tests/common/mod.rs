@@ -86,15 +86,20 @@ impl Simulator {
         Self::start_with(arguments, Stdio::piped(), false)
     }
 
+    /// Starts a scenario that is served, `ferrodrive run`, and waits until it is ready.
+    pub(crate) fn start_scenario(arguments: &[&str]) -> Self {
+        Self::spawn(command(&[&["run"], arguments].concat()), Stdio::piped(), false)
+    }
+
     /// Drives that take no time, unless the test is about that.
     fn start_with(arguments: &[&str], errors: Stdio, deaf: bool) -> Self {
         let timing: &[&str] = if arguments.contains(&"--timing") { &[] } else { &["--timing", "ideal"] };
-        let mut child = command(&[&["sim"], timing, arguments].concat())
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(errors)
-            .spawn()
-            .expect("the binary runs");
+        Self::spawn(command(&[&["sim"], timing, arguments].concat()), errors, deaf)
+    }
+
+    fn spawn(mut command: Command, errors: Stdio, deaf: bool) -> Self {
+        let mut child =
+            command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(errors).spawn().expect("the binary runs");
         let lines = lines_of(child.stdout.take().expect("piped"), deaf);
         let errors = child.stderr.take().map(|stream| lines_of(stream, false));
         let input = child.stdin.take();
@@ -134,6 +139,11 @@ impl Simulator {
     /// The next line that it prints.
     pub(crate) fn line(&self) -> String {
         self.lines.recv_timeout(PATIENCE).expect("a line in time")
+    }
+
+    /// All lines left on the standard output of one that ends.
+    pub(crate) fn lines_left(&self) -> Vec<String> {
+        self.lines.iter().collect()
     }
 
     /// Sends it a line.

@@ -34,7 +34,13 @@ class Sweep:
 
 class Summary:
     def __new__(cls, sweep: Sweep) -> Self: ...
-    def add(self, number: int, figures: list[tuple[str, float]], failure: Optional[tuple[str, str]]) -> None: ...
+    def add(
+        self,
+        number: int,
+        figures: list[tuple[str, float]],
+        failure: Optional[tuple[str, str]],
+        digest: Optional[int] = None,
+    ) -> None: ...
     def report(self) -> str: ...
 
 class World:

@@ -153,13 +153,14 @@ class SweepSummary:
         if isinstance(came, Outcome):
             failures = came.failures
             failure = (failures[0].asked, failures[0].seen) if failures else None
-            self._native.add(number, list(came.figures.items()), failure)
+            self._native.add(number, list(came.figures.items()), failure, came.digest)
         else:
             self._native.add(number, [], ("the machine and the scenario", str(came)))
 
     def report(self) -> dict[str, Any]:
         """What ``ferrodrive run --seeds --json`` prints: ``runs``, ``passed``, ``failed``, ``complete``; of each figure ``min``,
-        ``median``, ``max`` and the points with the least and the most; the first failed runs with the command that repeats each."""
+        ``median``, ``max`` and the points with the least and the most; the first failed runs with the command that repeats each;
+        ``seeds_differ``, and a ``note`` where the seed makes no difference."""
         report: dict[str, Any] = json.loads(self._native.report())
         return report
 

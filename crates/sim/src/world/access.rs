@@ -182,6 +182,11 @@ impl World {
         self.bus.is_cut(id.0)
     }
 
+    /// True if a station was taken off the bus for good.
+    pub fn is_gone(&self, id: StationId) -> bool {
+        matches!(self.members[id.0], Member::Gone(_))
+    }
+
     /// Records with `recorder` from now on; a recorder that was here before is lost.
     pub fn start_recording(&mut self, mut recorder: Recorder) {
         recorder.start(self.now);

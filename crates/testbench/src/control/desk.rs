@@ -29,6 +29,8 @@ const MAX_SUBSCRIPTIONS: usize = 64;
 /// Wrong tokens, or requests without one, before a client is sent away.
 const MAX_STRANGER_REQUESTS: u32 = 3;
 
+const NO_TOKEN: &str = "a token is asked for first";
+
 /// Names a client of a [`Control`].
 pub type ClientNumber = u64;
 
@@ -36,6 +38,9 @@ pub type ClientNumber = u64;
 pub trait Sink {
     /// Takes a line without its end; never waits.
     fn put(&mut self, class: Class, line: String);
+
+    /// The client has given the token, or need not: it stays. Before that it is a stranger, who may be sent away.
+    fn admit(&mut self) {}
 }
 
 /// What else is to be done about a request.
@@ -114,7 +119,7 @@ impl<S: Sink> Control<S> {
 
     /// A client comes under a number of its own.
     pub fn join(&mut self, number: ClientNumber, sink: S) {
-        let client = Client {
+        let mut client = Client {
             name: format!("control client {number}").into(),
             sink,
             admitted: self.token.is_none(),
@@ -122,6 +127,9 @@ impl<S: Sink> Control<S> {
             subscriptions: BTreeMap::new(),
             subscribed: 0,
         };
+        if client.admitted {
+            client.sink.admit();
+        }
         self.clients.insert(number, client);
     }
 
@@ -136,6 +144,9 @@ impl<S: Sink> Control<S> {
     pub fn handle(&mut self, number: ClientNumber, line: &ReadLine, world: &mut World, service: Service) -> Outcome {
         let Some(client) = self.clients.get_mut(&number) else { return Outcome::Close };
         let ReadLine::Text(text) = line else {
+            if !client.admitted {
+                return client.refuse_stranger(None, NO_TOKEN);
+            }
             let reason = format!("the line is longer than {MAX_LINE_LENGTH} bytes, and was thrown away");
             client.refuse(None, &ControlError::new("too_long", reason));
             return Outcome::Answered;
@@ -150,9 +161,10 @@ impl<S: Sink> Control<S> {
         }
         let Message { id, request } = match Message::parse(text) {
             Ok(message) => message,
+            Err((id, _)) if !client.admitted => return client.refuse_stranger(id.as_ref(), NO_TOKEN),
             Err((id, error)) => {
                 client.refuse(id.as_ref(), &error);
-                return if client.admitted { Outcome::Answered } else { client.count_strange() };
+                return Outcome::Answered;
             }
         };
         if let Some(outcome) = client.check_token(id.as_ref(), &request, self.token.as_deref()) {
@@ -254,15 +266,15 @@ impl<S: Sink> Client<S> {
             self.admitted = equal(token.as_bytes(), given.as_bytes());
         }
         if self.admitted {
+            self.sink.admit();
             return None;
         }
-        let reason = if given.is_some() { "this is not the token" } else { "a token is asked for first" };
-        let error = ControlError::new("token", reason).next(REQUESTS[0]);
-        self.refuse(id, &error);
-        Some(self.count_strange())
+        Some(self.refuse_stranger(id, if given.is_some() { "this is not the token" } else { NO_TOKEN }))
     }
 
-    fn count_strange(&mut self) -> Outcome {
+    /// Whoever has not given the token learns nothing but that, and how it is given.
+    fn refuse_stranger(&mut self, id: Option<&Id>, reason: &str) -> Outcome {
+        self.refuse(id, &ControlError::new("token", reason).next(REQUESTS[0]));
         self.strange += 1;
         if self.strange >= MAX_STRANGER_REQUESTS { Outcome::Close } else { Outcome::Answered }
     }

@@ -1,7 +1,7 @@
 //! What a scenario waits for and expects, in words: `4 velocity > 50`, `4 statusword bit 10`, `frame 084#1032`.
 //!
-//! A condition about values holds for some time; one about the wire ([`Condition::is_event`]) holds at the instant at which
-//! the last bit of a frame has passed. Words that are no condition are refused with what may be said.
+//! A condition about values holds for some time; one about what happens ([`Condition::is_event`]: frames, events of the world) holds
+//! at that instant only. Words that are no condition are refused with what may be said.
 
 use std::fmt;
 
@@ -11,6 +11,7 @@ use sim::recorder::Signal;
 use sim::wire::{ErrorState, WireEvent};
 use sim::{Brake, Place, Report, World};
 
+use super::happening::{EventPattern, Happening, code, spelled};
 use crate::words::suggest::{did_you_mean, near};
 
 /// Every form of a condition, for messages and the manual.
@@ -26,12 +27,18 @@ pub const FORMS: &[&str] = &[
     "NODE bus error-active|error-passive|bus-off|cut",
     "NODE boots",
     "NODE emcy [CODE]",
+    "NODE event KIND [WHAT]",
+    "body NAME SIGNAL =|!=|<|<=|>|>= NUMBER [+- TOLERANCE]",
     "frame ID#[DATA] (.. for any byte)",
     "error frame",
+    "event KIND [WHAT]",
     "done NAME",
     "not CONDITION",
     "CONDITION and CONDITION",
 ];
+
+/// So many of them, the first, are about a node.
+const NODE_FORMS: usize = 12;
 
 /// Something that is so or is not.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,10 +61,14 @@ pub enum Condition {
     Output(Place, String),
     /// The state of the node's CAN controller; `None`: its cable is cut.
     Bus(u8, Option<ErrorState>),
+    /// A signal of a body that drives move, by the names of both, compared with a number.
+    Body(String, String, Comparison),
     /// Now a frame like this has passed.
     Frame(Pattern),
     /// Now an attempt to send a frame has failed.
     ErrorFrame,
+    /// Now the world has told of such an event.
+    Event(EventPattern),
     /// The step or the host of this name is done.
     Done(String),
     /// The other is not so.
@@ -148,8 +159,8 @@ impl Pattern {
 pub struct View<'a> {
     /// The world as it is now.
     pub world: &'a mut World,
-    /// What has just happened on the wire, if this is asked because of it.
-    pub event: Option<&'a WireEvent>,
+    /// What has just happened, if this is asked because of it.
+    pub happening: Option<Happening<'a>>,
     /// Whether the step or host of a name is done.
     pub done: &'a dyn Fn(&str) -> bool,
 }
@@ -165,11 +176,20 @@ impl View<'_> {
 }
 
 impl Condition {
-    /// True if it is about the wire, and so holds at instants only.
+    /// True if it is about what happens, and so holds at instants only.
     pub fn is_event(&self) -> bool {
         match self {
-            Self::Frame(_) | Self::ErrorFrame => true,
+            Self::Frame(_) | Self::ErrorFrame | Self::Event(_) => true,
             Self::All(parts) => parts.iter().any(Self::is_event),
+            _ => false,
+        }
+    }
+
+    /// True if it is about events that only a watched world tells of.
+    pub fn needs_events(&self) -> bool {
+        match self {
+            Self::Event(_) => true,
+            Self::All(parts) => parts.iter().any(Self::needs_events),
             _ => false,
         }
     }
@@ -186,10 +206,21 @@ impl Condition {
             | Self::Brake(place, _)
             | Self::Output(place, _) => node(*place),
             Self::Bus(number, _) => node(Place::node(*number)),
-            Self::Frame(_) | Self::ErrorFrame => {}
+            Self::Frame(_) | Self::ErrorFrame | Self::Body(..) => {}
+            Self::Event(pattern) => pattern.place().into_iter().for_each(node),
             Self::Done(it) => name(it),
             Self::Not(part) => part.names(node, name),
             Self::All(parts) => parts.iter().for_each(|part| part.names(node, name)),
+        }
+    }
+
+    /// The bodies and their signals that it speaks of.
+    pub fn bodies<'a>(&'a self, body: &mut dyn FnMut(&'a str, &'a str)) {
+        match self {
+            Self::Body(name, signal, _) => body(name, signal),
+            Self::Not(part) => part.bodies(body),
+            Self::All(parts) => parts.iter().for_each(|part| part.bodies(body)),
+            _ => {}
         }
     }
 
@@ -197,9 +228,13 @@ impl Condition {
     pub fn holds(&self, view: &mut View<'_>) -> bool {
         match self {
             Self::Frame(pattern) => {
-                matches!(view.event, Some(WireEvent::Frame { frame, .. }) if pattern.matches(frame))
+                matches!(view.happening, Some(Happening::Wire(WireEvent::Frame { frame, .. })) if pattern.matches(frame))
             }
-            Self::ErrorFrame => matches!(view.event, Some(WireEvent::Error { .. })),
+            Self::ErrorFrame => matches!(view.happening, Some(Happening::Wire(WireEvent::Error { .. }))),
+            Self::Event(pattern) => matches!(view.happening, Some(Happening::Told(event)) if pattern.matches(event)),
+            Self::Body(name, signal, comparison) => {
+                of_body(view.world, name, signal).is_some_and(|value| comparison.holds(value))
+            }
             Self::Bus(node, state) => view.world.drive_id(*node).is_some_and(|id| match state {
                 None => view.world.is_cut(id),
                 Some(state) => !view.world.is_cut(id) && view.world.counters(id).state() == *state,
@@ -239,10 +274,14 @@ impl Condition {
     /// What is to be seen of it now, for people.
     pub fn seen(&self, view: &mut View<'_>) -> String {
         match self {
-            Self::Frame(_) | Self::ErrorFrame => match view.event {
-                Some(WireEvent::Frame { frame, .. }) => format!("frame {frame}"),
-                Some(WireEvent::Error { frame, cause, .. }) => format!("error frame ({cause:?}, of {frame})"),
-                _ => "no such frame".into(),
+            Self::Frame(_) | Self::ErrorFrame | Self::Event(_) => match (view.happening, self) {
+                (Some(happening), _) => happening.to_string(),
+                (None, Self::Event(_)) => "no such event".into(),
+                (None, _) => "no such frame".into(),
+            },
+            Self::Body(name, signal, _) => match of_body(view.world, name, signal) {
+                Some(value) => format!("{signal} {}", master::units::Shown(value)),
+                None => format!("there is no {signal} of a body {name}"),
             },
             Self::Bus(node, _) => match view.world.drive_id(*node) {
                 Some(id) if view.world.is_cut(id) => format!("node {node}: cable cut"),
@@ -306,6 +345,12 @@ impl Condition {
     }
 }
 
+/// A number of a body that drives move, by its name with the unit: `x_m`.
+pub(super) fn of_body(world: &mut World, name: &str, signal: &str) -> Option<f64> {
+    let signals = world.body(name)?.kind.signals();
+    signals.into_iter().find(|(known, _)| known == signal).map(|(_, value)| value)
+}
+
 /// The name of a signal without its unit: `velocity` of `velocity_rpm`.
 fn short_name(signal: Signal) -> &'static str {
     let name = signal.name();
@@ -321,7 +366,7 @@ pub fn signal(word: &str) -> Result<Signal, String> {
     found.ok_or_else(|| {
         let near = did_you_mean(&near(word, Signal::ALL.into_iter().map(short_name)));
         let known: Vec<_> = Signal::ALL.into_iter().map(short_name).collect();
-        format!("'{word}' is nothing to look at{near}; a node has: {}, and what is said of it: state, fault, powered, damaged, brake, output, bus, boots, emcy", known.join(", "))
+        format!("'{word}' is nothing to look at{near}; a node has: {}, and what is said of it: state, fault, powered, damaged, brake, output, bus, boots, emcy, event", known.join(", "))
     })
 }
 
@@ -345,12 +390,18 @@ fn one(words: &[&str]) -> Result<Condition, String> {
         [] => Err(format!("a condition is missing; one of: {}", FORMS.join("; "))),
         ["not", rest @ ..] => match one(rest)? {
             part if part.is_event() => {
-                Err("a frame passes at an instant: that it does not is said with never = \"frame ..\"".into())
+                Err("what happens, happens at an instant: that it does not is said with never = \"..\"".into())
             }
             part => Ok(Condition::Not(Box::new(part))),
         },
         ["frame", frame] => Ok(Condition::Frame(Pattern::parse(frame)?)),
         ["error", "frame"] => Ok(Condition::ErrorFrame),
+        ["event", rest @ ..] => EventPattern::parse(None, rest).map(Condition::Event),
+        ["body", name, signal, order, rest @ ..] if ORDERS.iter().any(|(word, _)| word == order) => {
+            let comparison = comparison("", order, rest)?;
+            Ok(Condition::Body((*name).to_owned(), (*signal).to_owned(), comparison))
+        }
+        ["body", ..] => Err(wrong("body NAME SIGNAL =|!=|<|<=|>|>= NUMBER [+- TOLERANCE], as in: body base x_m > 1.5")),
         ["done", name @ ..] if !name.is_empty() => Ok(Condition::Done(name.join(" "))),
         [place, rest @ ..] => match place.parse() {
             Ok(place) => of_node(place, rest),
@@ -361,12 +412,8 @@ fn one(words: &[&str]) -> Result<Condition, String> {
 
 fn of_node(place: Place, words: &[&str]) -> Result<Condition, String> {
     let wrong = |form: &str| format!("'{}' is no condition of a node; expected: {form}", words.join(" "));
-    let code = |text: &str| {
-        let digits = text.strip_prefix("0x").or_else(|| text.strip_suffix('h')).unwrap_or(text);
-        u32::from_str_radix(digits, 16)
-            .map_err(|_| format!("'{text}' is no code; expected hexadecimal digits, as in 0x3220"))
-    };
     Ok(match words {
+        ["event", rest @ ..] => Condition::Event(EventPattern::parse(Some(place), rest)?),
         ["powered"] => Condition::Powered(place),
         ["damaged"] => Condition::Damaged(place),
         ["fault"] => Condition::Fault(place, None),
@@ -380,9 +427,8 @@ fn of_node(place: Place, words: &[&str]) -> Result<Condition, String> {
             Condition::Bit(place, bit)
         }
         ["state", state] => {
-            let spelled = |known: PowerState| known.name().to_lowercase().replace(' ', "-");
-            let known = PowerState::ALL.into_iter().find(|known| spelled(*known) == state.to_lowercase());
-            let names = || PowerState::ALL.into_iter().map(spelled).collect::<Vec<_>>().join(", ");
+            let known = PowerState::ALL.into_iter().find(|known| spelled(known.name()) == spelled(state));
+            let names = || PowerState::ALL.map(|known| spelled(known.name())).join(", ");
             Condition::Power(
                 place,
                 known.ok_or_else(|| format!("'{state}' is no state; expected one of: {}", names()))?,
@@ -416,29 +462,28 @@ fn of_node(place: Place, words: &[&str]) -> Result<Condition, String> {
         }
         [name, order, rest @ ..] if ORDERS.iter().any(|(word, _)| word == order) => {
             let signal = signal(name)?;
-            Condition::Signal(place, signal, comparison(signal, order, rest)?)
+            Condition::Signal(place, signal, comparison(signal.unit(), order, rest)?)
         }
         [name, ..] => {
             signal(name)?;
             return Err(wrong(FORMS[0]));
         }
-        [] => return Err(format!("what about node {place}? expected: {}", FORMS[..11].join("; "))),
+        [] => return Err(format!("what about node {place}? expected: {}", FORMS[..NODE_FORMS].join("; "))),
     })
 }
 
-fn comparison(signal: Signal, order: &str, words: &[&str]) -> Result<Comparison, String> {
+fn comparison(unit: &str, order: &str, words: &[&str]) -> Result<Comparison, String> {
     let order = ORDERS.iter().find(|(word, _)| *word == order).map_or(Order::Equal, |(_, order)| *order);
     let (value, tolerance) = match words {
         [value] => (value, &"0"),
         [value, "+-" | "±", tolerance] if matches!(order, Order::Equal | Order::Unequal) => (value, tolerance),
         _ => return Err(format!("expected: {}", FORMS[0])),
     };
-    Ok(Comparison { order, value: number(signal, value)?, tolerance: number(signal, tolerance)? })
+    Ok(Comparison { order, value: number(unit, value)?, tolerance: number(unit, tolerance)? })
 }
 
 /// A number in the signal's unit, which may stand behind it; also `0x1F`.
-fn number(signal: Signal, text: &str) -> Result<f64, String> {
-    let unit = signal.unit();
+fn number(unit: &str, text: &str) -> Result<f64, String> {
     let wrong =
         || format!("'{text}' is no number{}", if unit.is_empty() { String::new() } else { format!(" in {unit}") });
     if let Some(digits) = text.strip_prefix("0x") {
@@ -481,6 +526,10 @@ mod tests {
             "frame 084#..32",
             "1 emcy 3220h",
             "4 boots",
+            "4 event fault 0x0020",
+            "5.2 event target reached",
+            "event bus_state bus-off and 4 powered",
+            "body base x_m = 1.5 +- 0.01 and not body base speed_m_s > 0.1",
         ] {
             assert!(text.parse::<Condition>().is_ok(), "{text}: {}", refusal(text));
         }
@@ -499,6 +548,10 @@ mod tests {
             ("frame 800#", "is no frame"),
             ("frame 084#1", "is no frame"),
             ("not frame 084#", "never ="),
+            ("not 4 event fault", "never ="),
+            ("4 event falt", "did you mean fault"),
+            ("body base", "body NAME SIGNAL"),
+            ("body base x_m > far", "'far' is no number"),
             ("4 powered and", "a condition is missing"),
         ] {
             assert!(refusal(text).contains(said), "{text}: {}", refusal(text));

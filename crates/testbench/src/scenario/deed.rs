@@ -6,8 +6,10 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use can::Frame;
+use canopen::pdo::{Direction, PdoId, PdoNumber};
 use canopen::{NmtCommand, NodeId};
 use master::drive::{HomingOptions, MotionOptions};
+use master::pdo::TransmissionType;
 use master::units::{Amperes, Angle, Ramp, Rpm, parse_duration};
 use sim::Place;
 
@@ -23,6 +25,10 @@ pub const FORMS: &[&str] = &[
     "NODE home METHOD [at SPEED] [within TIME] [no-wait]",
     "NODE read OBJECT",
     "NODE write OBJECT VALUE",
+    "NODE pdo map rpdo|tpdo NUMBER OBJECT.. [type TYPE]",
+    "NODE pdo adopt rpdo|tpdo NUMBER",
+    "NODE pdo write OBJECT VALUE",
+    "NODE pdo read OBJECT",
     "NODE|all nmt start|stop|pre-operational|reset|reset-communication",
     "NODE watch TIME (its heartbeat)",
     "heartbeat NODE TIME (its own, under this node-ID)",
@@ -61,6 +67,8 @@ pub enum Deed {
     Read(NodeId, ObjectArg),
     /// Downloads an object.
     Write(NodeId, ObjectArg, String),
+    /// Something with process data.
+    Pdo(NodeId, PdoDeed),
     /// A network management command to a node, or to all.
     Nmt(Option<NodeId>, NmtCommand),
     /// Watches the heartbeat of a node.
@@ -75,6 +83,19 @@ pub enum Deed {
     Wait(Duration),
     /// Waits until something is so.
     WaitFor(Condition, Duration),
+}
+
+/// What is done with process data.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PdoDeed {
+    /// Sets up a PDO of the device with these objects and this transmission type, and sends or receives it.
+    Map(PdoId, Vec<ObjectArg>, TransmissionType),
+    /// Sends or receives a PDO as the device has it set up.
+    Adopt(PdoId),
+    /// Puts a value into the RPDOs that carry the object.
+    Write(ObjectArg, String),
+    /// What the TPDOs have brought of an object last.
+    Read(ObjectArg),
 }
 
 /// An intent without a value.
@@ -159,6 +180,7 @@ fn of_node(place_word: &str, words: &[&str]) -> Result<Deed, String> {
         ["nmt", command] => Ok(Deed::Nmt(Some(id()?), nmt(command)?)),
         ["watch", period] => Ok(Deed::Watch(id()?, time(period)?)),
         ["read", name] => Ok(Deed::Read(id()?, object(name)?)),
+        ["pdo", ref rest @ ..] => pdo(rest).map(|deed| Ok(Deed::Pdo(id()?, deed)))?,
         ["write", name, ref value @ ..] if !value.is_empty() => Ok(Deed::Write(id()?, object(name)?, value.join(" "))),
         ["velocity", speed, ref rest @ ..] => {
             let Options { motion, speed: None, within: None } = options(rest)? else { return Err(unknown(words)) };
@@ -179,8 +201,48 @@ fn of_node(place_word: &str, words: &[&str]) -> Result<Deed, String> {
     }
 }
 
+/// What stands behind `pdo`.
+fn pdo(words: &[&str]) -> Result<PdoDeed, String> {
+    match *words {
+        ["map", direction, number, ref rest @ ..] if !rest.is_empty() => {
+            let (objects, transmission) = match rest {
+                [objects @ .., "type", kind] => (objects, transmission_type(kind)?),
+                _ => (rest, TransmissionType::EVENT_PROFILE),
+            };
+            let objects = objects.iter().map(|name| object(name)).collect::<Result<_, _>>()?;
+            Ok(PdoDeed::Map(pdo_id(direction, number)?, objects, transmission))
+        }
+        ["adopt", direction, number] => Ok(PdoDeed::Adopt(pdo_id(direction, number)?)),
+        ["write", name, ref value @ ..] if !value.is_empty() => Ok(PdoDeed::Write(object(name)?, value.join(" "))),
+        ["read", name] => Ok(PdoDeed::Read(object(name)?)),
+        _ => {
+            let forms: Vec<_> = FORMS.iter().filter(|form| form.starts_with("NODE pdo")).copied().collect();
+            Err(format!("'pdo {}' is nothing that a host does; expected one of: {}", words.join(" "), forms.join("; ")))
+        }
+    }
+}
+
+fn pdo_id(direction: &str, number: &str) -> Result<PdoId, String> {
+    let direction = match direction {
+        "rpdo" => Direction::Rpdo,
+        "tpdo" => Direction::Tpdo,
+        _ => return Err(format!("'{direction}' is no kind of PDO; expected rpdo (to the device) or tpdo (from it)")),
+    };
+    let number = number.parse().ok().and_then(PdoNumber::new);
+    let number =
+        number.ok_or_else(|| format!("a PDO has a number from 1 to {}, as in: pdo adopt tpdo 1", PdoNumber::MAX))?;
+    Ok(PdoId { direction, number })
+}
+
+fn transmission_type(text: &str) -> Result<TransmissionType, String> {
+    text.parse().map(TransmissionType).map_err(|_| {
+        format!("'{text}' is no transmission type; expected 0 to 255 (CiA 301, tables 64 and 68), as in: type 1 for each SYNC")
+    })
+}
+
 fn unknown(words: &[&str]) -> String {
-    format!("'{}' is nothing that a host does with a node; expected one of: {}", words.join(" "), FORMS[..9].join("; "))
+    let forms: Vec<_> = FORMS.iter().filter(|form| form.starts_with("NODE")).copied().collect();
+    format!("'{}' is nothing that a host does with a node; expected one of: {}", words.join(" "), forms.join("; "))
 }
 
 fn movement(place: Place, to: &str, relative: bool, rest: &[&str]) -> Result<Deed, String> {
@@ -257,6 +319,11 @@ mod tests {
             "2 home 17 at 60rpm within 5s",
             "4 write 6060 profile velocity",
             "4 read position_actual_value",
+            "4 pdo map tpdo 1 6041 position_actual_value type 1",
+            "4 pdo map rpdo 2 controlword",
+            "4 pdo adopt tpdo 4",
+            "4 pdo write 6040 0x0F",
+            "4 pdo read statusword",
             "all nmt start",
             "sync 10ms",
             "sync off",
@@ -275,6 +342,11 @@ mod tests {
             ("4 velocity 60rpm at 5rpm", "nothing that a host does"),
             ("4 move 90deg at", "stands alone"),
             ("4 nmt go", "expected start"),
+            ("4 pdo", "NODE pdo map"),
+            ("4 pdo map tpdo 1", "NODE pdo map"),
+            ("4 pdo map both 1 6041", "expected rpdo"),
+            ("4 pdo adopt tpdo 0", "1 to 512"),
+            ("4 pdo map tpdo 1 6041 type 256", "0 to 255"),
             ("sync 0s", "more than 0"),
             ("sync nans", "does not begin with a number"),
             ("wait -5s", "between 0 and a year"),

@@ -6,7 +6,7 @@ use master::units::parse_duration;
 use sim::command::Command;
 
 use super::condition::{Condition, signal};
-use super::deed::Deed;
+use super::deed::{Deed, PdoDeed};
 use super::plan::{Act, Base, Expect, Figure, Host, HostLine, Law, Measure, Statistic, Step, Until, Wanted};
 use crate::document::Problem;
 use crate::document::reader::{Field, Table};
@@ -197,8 +197,9 @@ fn line(field: &Field<'_>) -> Result<HostLine, Problem> {
     let (asked, deed) = deed(&table.need("do", EXPECTED)?)?;
     let value = table.get("is").map(|field| field.number("a number, which is read")).transpose()?;
     let tolerance = table.get("tolerance").map(|field| field.number("a number, e.g. 5")).transpose()?;
-    if let (Some(is), false) = (table.get("is"), matches!(deed, Deed::Read(..))) {
-        return Err(is.problem("'is' needs something that is read: NODE read OBJECT"));
+    let reads = matches!(deed, Deed::Read(..) | Deed::Pdo(_, PdoDeed::Read(_)));
+    if let (Some(is), false) = (table.get("is"), reads) {
+        return Err(is.problem("'is' needs something that is read: NODE read OBJECT, or NODE pdo read OBJECT"));
     }
     let fails = table.get("fails").map(|field| field.words("a part of the reason as text; \"\" for any reason"));
     let wanted = Wanted {
@@ -235,7 +236,7 @@ fn expectation(table: &Table<'_>, n: usize) -> Result<Expect, Problem> {
     let condition = condition(&field)?;
     let at = optional_time(table, "at")?;
     if condition.is_event() && (at.is_some() || law == Law::Always) {
-        return Err(field.problem("a frame passes at an instant: give that or never, and a stretch of time"));
+        return Err(field.problem("it happens at an instant: give that or never, and a stretch of time"));
     }
     let (from, until) = match (at, table.get("until"), table.get("within")) {
         (Some(at), None, None) if table.get("from").or(table.get("after")).is_none() => (Base::At(at), Until::At(at)),
@@ -271,25 +272,27 @@ pub(super) fn figures(file: &Table<'_>) -> Many<Vec<Figure>> {
 }
 
 fn figure(field: &Field<'_>) -> Result<Figure, Problem> {
-    const EXPECTED: &str =
-        "min, max, mean, peak or last and a signal, e.g. \"max 4 velocity\"; or \"time NAME\" of a step or host";
+    const EXPECTED: &str = "min, max, mean, peak or last and a signal, e.g. \"max 4 velocity\", \"last body base x_m\"; or \"time NAME\" of a step or host";
     let words = field.words(EXPECTED)?;
     let words: Vec<&str> = words.split_whitespace().collect();
     let name = field.name().to_owned();
-    let (statistic, place, what) = match words.as_slice() {
-        ["time", rest @ ..] if !rest.is_empty() => return Ok(Figure { name, of: Measure::Time(rest.join(" ")) }),
-        [statistic, place, what] => (*statistic, *place, *what),
+    let statistic = |word: &str| match word {
+        "min" => Ok(Statistic::Min),
+        "max" => Ok(Statistic::Max),
+        "mean" => Ok(Statistic::Mean),
+        "peak" => Ok(Statistic::Peak),
+        "last" => Ok(Statistic::Last),
+        _ => Err(field.wrong(EXPECTED)),
+    };
+    let of = match words.as_slice() {
+        ["time", rest @ ..] if !rest.is_empty() => Measure::Time(rest.join(" ")),
+        [word, "body", body, what] => Measure::Body(statistic(word)?, (*body).to_owned(), (*what).to_owned()),
+        [word, place, what] => {
+            let statistic = statistic(word)?;
+            let place = place.parse().map_err(|()| field.wrong(EXPECTED))?;
+            Measure::Signal(statistic, place, signal(what).map_err(|reason| field.problem(reason))?)
+        }
         _ => return Err(field.wrong(EXPECTED)),
     };
-    let statistic = match statistic {
-        "min" => Statistic::Min,
-        "max" => Statistic::Max,
-        "mean" => Statistic::Mean,
-        "peak" => Statistic::Peak,
-        "last" => Statistic::Last,
-        _ => return Err(field.wrong(EXPECTED)),
-    };
-    let place = place.parse().map_err(|()| field.wrong(EXPECTED))?;
-    let signal = signal(what).map_err(|reason| field.problem(reason))?;
-    Ok(Figure { name, of: Measure::Signal(statistic, place, signal) })
+    Ok(Figure { name, of, place: field.problem("").locate(field.source_text()) })
 }

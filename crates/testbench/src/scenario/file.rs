@@ -8,7 +8,7 @@ use sim::Place;
 use super::condition::Condition;
 use super::deed::Deed;
 use super::entries::{MOST, Many, bounded, entries, expect, figures, host, kept, single, step};
-use super::plan::{Act, Base, Expect, Figure, Host, Step};
+use super::plan::{Act, Base, Expect, Figure, Host, Measure, Step};
 use crate::document::reader::{self, Parameters, Table};
 use crate::document::{BadFile, Located, Problem, read_text};
 use crate::machine_file::Machine;
@@ -182,7 +182,42 @@ impl Scenario {
             });
             problems.extend(strange.map(|reason| placed(&step.place, file.text(), reason)));
         }
+        if problems.is_empty() {
+            problems = self.check_bodies(file);
+        }
         problems
+    }
+
+    /// Bodies that are not there, and numbers that they do not have. Only a world knows which these are.
+    fn check_bodies(&self, file: &Table<'_>) -> Vec<Problem> {
+        let mut spoken_of = Vec::new();
+        for (condition, at) in self.conditions() {
+            condition.bodies(&mut |name, signal| spoken_of.push((name, signal, at)));
+        }
+        let figures = self.figures.iter().filter_map(|figure| match &figure.of {
+            Measure::Body(_, name, signal) => Some((name.as_str(), signal.as_str(), &figure.place)),
+            _ => None,
+        });
+        spoken_of.extend(figures);
+        // What is wrong with a machine that cannot be built is told by whoever builds it to run.
+        let Some(mut world) = (!spoken_of.is_empty()).then(|| self.machine.build().ok()).flatten() else {
+            return Vec::new();
+        };
+        let problem = |(name, signal, at): (&str, &str, &Located)| {
+            let what = match world.body(name) {
+                None => self.no_such_body(name),
+                Some(body) => {
+                    let known: Vec<_> = body.kind.signals().into_iter().map(|(name, _)| name).collect();
+                    if known.iter().any(|known| known == signal) {
+                        return None;
+                    }
+                    let near = did_you_mean(&near(signal, known.iter().map(String::as_str)));
+                    format!("the body '{name}' has no '{signal}'{near}; it has: {}", known.join(", "))
+                }
+            };
+            Some(placed(at, file.text(), what))
+        };
+        spoken_of.into_iter().filter_map(problem).collect()
     }
 
     fn has_node(&self, node: u8) -> bool {
@@ -208,6 +243,16 @@ impl Scenario {
             _ => None,
         });
         steps.chain(lines).chain(self.expects.iter().map(|expect| (&expect.condition, &expect.place)))
+    }
+
+    /// Whether it waits for events that only a watched world tells of.
+    pub(super) fn needs_events(&self) -> bool {
+        self.conditions().any(|(condition, _)| condition.needs_events())
+    }
+
+    /// Whether it has hosts of its own.
+    pub fn has_hosts(&self) -> bool {
+        !self.hosts.is_empty()
     }
 
     /// The names of steps and hosts, which `after` and `done` may give.

@@ -9,16 +9,18 @@ use std::task::{Poll, Waker};
 use std::time::Duration;
 
 use can::Instant;
-use canopen::od::Entry;
+use canopen::od::{DataType, Entry};
+use canopen::pdo::MappingRecord;
 use canopen::{Mux, NodeId};
 use devices::Description;
+use master::core::PdoMap;
 use master::drive::{MotionReport, SwitchedOff};
+use master::pdo::{PdoConfig, TimerUnits};
 use master::units::Shown;
 use master::{Drive, Network};
 use sim::Place;
 
-use super::deed::{Deed, Intent};
-
+use super::deed::{Deed, Intent, PdoDeed};
 use super::outcome::{Row, RowKind, Verdict};
 use super::plan::{HostLine, Wanted};
 use crate::words::object::ObjectArg;
@@ -156,6 +158,7 @@ impl Post {
             Deed::Home(place, method, options) => moved(self.drive(*place)?.home(*method, *options).await),
             Deed::Read(node, object) => self.read(*node, object).await,
             Deed::Write(node, object, text) => self.write(*node, object, text).await,
+            Deed::Pdo(node, pdo) => self.exchange(*node, pdo).await,
             Deed::Nmt(None, command) => {
                 network.nmt_all(*command);
                 done("sent")
@@ -226,19 +229,60 @@ impl Post {
             return Ok((String::from_utf8_lossy(bytes).into_owned(), None));
         }
         let raw = bytes.iter().rev().fold(0u64, |raw, byte| raw << 8 | u64::from(*byte));
-        // Shifted up and down again the sign is that of the object's length.
-        let unused = 64 - 8 * bytes.len() as u32;
-        let signed = row.is_some_and(|row| row.data_type.is_signed());
-        let number = if signed { i128::from((raw << unused) as i64 >> unused) } else { i128::from(raw) };
-        Ok((format!("{number} ({raw:0width$X}h)", width = 2 * bytes.len()), Some(number as f64)))
+        Ok(number_of(raw, bytes.len(), row))
+    }
+
+    /// Does something with process data.
+    async fn exchange(&self, id: NodeId, deed: &PdoDeed) -> Done {
+        let node = self.network.node(id);
+        let done = |seen: String| Ok((seen, None));
+        match deed {
+            PdoDeed::Map(pdo, objects, transmission) => {
+                let records = objects.iter().map(|object| self.record(id, object)).collect::<Result<_, _>>()?;
+                let config = PdoConfig::new(*pdo, PdoMap(records)).transmission(*transmission);
+                let mapped = node.configure_pdo(&config, TimerUnits::STANDARD).await;
+                mapped.map_err(|error| error.to_string())?;
+                done(format!("{pdo} carries {} bytes", config.map.bytes()))
+            }
+            PdoDeed::Adopt(pdo) => {
+                let adopted = node.adopt_pdo(*pdo, TimerUnits::STANDARD).await.map_err(|error| error.to_string())?;
+                let objects: Vec<_> = adopted.map.0.iter().map(|record| record.mux.to_string()).collect();
+                let objects = if objects.is_empty() { "nothing".into() } else { objects.join(", ") };
+                done(format!("{pdo} carries {objects}"))
+            }
+            PdoDeed::Write(object, text) => {
+                let (mux, row) = self.resolve(id, object)?;
+                let (data_type, number) = typed(row, text)?;
+                if !node.send_by_pdo(mux, data_type.raw(number).into()) {
+                    return Err(format!(
+                        "no RPDO of node {id} carries {mux}; `{id} pdo map rpdo 1 ..` or `pdo adopt` first"
+                    ));
+                }
+                done(format!("{number} put into the process data"))
+            }
+            PdoDeed::Read(object) => {
+                let (mux, row) = self.resolve(id, object)?;
+                let received = self.network.received(id, mux).ok_or_else(|| {
+                    format!("no TPDO of node {id} has brought {mux}; `{id} pdo map tpdo 1 ..` or `pdo adopt` and `nmt start` first")
+                })?;
+                let length = row.map_or(8, |row| row.data_type.size());
+                Ok(number_of(received.raw, length, row))
+            }
+        }
+    }
+
+    /// An object as a PDO maps it.
+    fn record(&self, node: NodeId, object: &ObjectArg) -> Result<MappingRecord, String> {
+        let (mux, row) = self.resolve(node, object)?;
+        let bits = row.map(|row| row.data_type.bits()).filter(|bits| *bits > 0);
+        let bits =
+            bits.ok_or_else(|| format!("how long {mux} of node {node} is, is not known: it cannot be mapped"))?;
+        Ok(MappingRecord { mux, bits })
     }
 
     async fn write(&self, node: NodeId, object: &ObjectArg, text: &str) -> Done {
         let (mux, row) = self.resolve(node, object)?;
-        let (data_type, number) = match row {
-            Some(row) => (row.data_type, value(row, text, 1)?),
-            None => typed_value(text)?,
-        };
+        let (data_type, number) = typed(row, text)?;
         let bytes = data_type.raw(number).to_le_bytes();
         let written = self.network.node(node).download(mux, &bytes[..data_type.size()]).await;
         written.map_err(|error| error.to_string())?;
@@ -269,6 +313,23 @@ impl Post {
             Err(format!("it was not so within {} s", Shown(within.as_secs_f64())))
         }
     }
+}
+
+/// A value in words as the object takes it.
+fn typed(row: Option<&'static Entry>, text: &str) -> Result<(DataType, i64), String> {
+    match row {
+        Some(row) => Ok((row.data_type, value(row, text, 1)?)),
+        None => typed_value(text),
+    }
+}
+
+/// A value of so many bytes, which has a sign if the object has, for people and as a number.
+fn number_of(raw: u64, length: usize, row: Option<&'static Entry>) -> (String, Option<f64>) {
+    // Shifted up and down again the sign is that of the object's length.
+    let unused = 64 - 8 * length.clamp(1, 8) as u32;
+    let signed = row.is_some_and(|row| row.data_type.is_signed());
+    let number = if signed { i128::from((raw << unused) as i64 >> unused) } else { i128::from(raw) };
+    (format!("{number} ({raw:0width$X}h)", width = 2 * length), Some(number as f64))
 }
 
 fn moved(report: Result<MotionReport, master::Error>) -> Done {

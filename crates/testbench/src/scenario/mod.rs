@@ -1,7 +1,8 @@
 //! Scenarios: a machine, what the outer world does to it, what a host does with it, and what is expected, in one file.
 //!
 //! A [`Scenario`] is read from a text, a [`Runner`] goes through it in virtual time, and an [`Outcome`] has a row for each
-//! thing that was asked. The same text and the same seed give the same outcome, to the last frame.
+//! thing that was asked. The same text and the same seed give the same outcome, to the last frame. Who moves a world by other rules
+//! (a served bus) has a [`Course`] go along with it.
 //!
 //! ```
 //! use std::path::Path;
@@ -21,18 +22,24 @@
 //! ```
 //!
 //! Values (signals, states, faults) are looked at every `sample` of virtual time, 1 ms if nothing else is said, and at each time
-//! that an expectation names; what is about frames is decided at the last bit of the frame.
+//! that an expectation names; what is about frames is decided at the last bit of the frame, and what is about events when the world
+//! tells of them.
 
 pub mod condition;
+mod course;
 pub mod deed;
 pub mod entries;
 pub mod file;
+pub mod happening;
 mod host;
+mod junit;
 mod outcome;
 mod plan;
 mod runner;
 mod script;
 
+pub use course::Course;
 pub use file::Scenario;
+pub use junit::junit;
 pub use outcome::{Outcome, OutcomeReport, Row, RowKind, Verdict};
-pub use runner::Runner;
+pub use runner::{Kept, Runner};

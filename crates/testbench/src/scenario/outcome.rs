@@ -1,7 +1,5 @@
 //! What came of a scenario: a row for each step, line and expectation, the named figures, and how the run can be told apart.
 
-use std::fmt::Write;
-
 use can::Instant;
 use serde::Serialize;
 
@@ -105,54 +103,6 @@ impl Outcome {
             last_frames: &self.last_frames,
         }
     }
-
-    /// As a test suite in JUnit's XML, which build servers read: a test case for each row.
-    pub fn to_junit(&self) -> String {
-        let failed = self.rows.iter().filter(|row| row.verdict == Verdict::Failed).count();
-        let skipped = self.rows.iter().filter(|row| row.verdict == Verdict::Skipped).count();
-        let mut xml = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
-        let title = escaped(&self.title);
-        // Writing into a text does not fail.
-        let _ = writeln!(
-            xml,
-            "<testsuites>\n  <testsuite name=\"{title}\" tests=\"{}\" failures=\"{failed}\" skipped=\"{skipped}\" time=\"{}\">",
-            self.rows.len(),
-            self.end
-        );
-        for row in &self.rows {
-            let name = escaped(&format!("line {}: {} {}", row.place, row.kind.word(), row.asked));
-            let time = row.at.unwrap_or(self.end);
-            let _ = write!(xml, "    <testcase classname=\"{title}\" name=\"{name}\" time=\"{time}\"");
-            let seen = escaped(&row.seen);
-            let _ = match row.verdict {
-                Verdict::Passed => writeln!(xml, "/>"),
-                Verdict::Failed => writeln!(xml, "><failure message=\"{seen}\"/></testcase>"),
-                Verdict::Skipped => writeln!(xml, "><skipped message=\"{seen}\"/></testcase>"),
-            };
-        }
-        if !self.last_frames.is_empty() {
-            let _ = writeln!(xml, "    <system-out>{}</system-out>", escaped(&self.last_frames.join("\n")));
-        }
-        xml.push_str("  </testsuite>\n</testsuites>\n");
-        xml
-    }
-}
-
-/// Text as XML takes it: no markup, and none of the letters that XML 1.0 does not have.
-fn escaped(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for letter in text.chars() {
-        match letter {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            '\n' | '\t' => escaped.push(letter),
-            _ if letter.is_control() || matches!(letter, '\u{FFFE}' | '\u{FFFF}') => escaped.push('\u{FFFD}'),
-            _ => escaped.push(letter),
-        }
-    }
-    escaped
 }
 
 /// An outcome in JSON.

@@ -3,8 +3,7 @@
 use std::time::Duration;
 
 use sim::recorder::Signal;
-use sim::stimulus::BodyStimulus;
-use sim::stimulus::WireFault;
+use sim::stimulus::{BodyStimulus, WireFault};
 use sim::{Place, Stimulus};
 
 use super::condition::Condition;
@@ -115,12 +114,15 @@ pub(super) enum Until {
 pub(super) struct Figure {
     pub(super) name: String,
     pub(super) of: Measure,
+    pub(super) place: Located,
 }
 
 /// What is measured.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Measure {
     Signal(Statistic, Place, Signal),
+    /// Of a body that drives move: its name, and that of the number.
+    Body(Statistic, String, String),
     /// When the step or host of this name is done, in s.
     Time(String),
 }

@@ -5,10 +5,10 @@ use std::time::Duration;
 use can::Instant;
 use sim::StationId;
 use sim::World;
-use sim::wire::WireEvent;
 
-use super::condition::View;
+use super::condition::{View, of_body};
 use super::file::Scenario;
+use super::happening::Happening;
 use super::outcome::{Row, RowKind, Verdict};
 use super::plan::{Act, Base, Expect, Figure, Law, Measure, Statistic, Step, Until};
 
@@ -112,7 +112,7 @@ impl Script {
 
     /// True if values have to be looked at again and again.
     pub(super) fn samples(&self, scenario: &Scenario) -> bool {
-        let signals = scenario.figures.iter().any(|figure| matches!(figure.of, Measure::Signal(..)));
+        let signals = scenario.figures.iter().any(|figure| !matches!(figure.of, Measure::Time(_)));
         let steps = scenario.steps.iter().zip(&self.steps).any(|(step, progress)| {
             *progress == Progress::Waiting && step.when.as_ref().is_some_and(|when| !when.is_event())
         });
@@ -138,12 +138,18 @@ impl Script {
         steps.chain(expects).flatten().filter(|at| self.looked.is_none_or(|looked| *at > looked)).min()
     }
 
-    /// Looks at everything: because of an event on the wire, or at values if there is none. Does what is due.
-    pub(super) fn look(&mut self, scenario: &Scenario, world: &mut World, host: StationId, event: Option<&WireEvent>) {
+    /// Looks at everything: because of what has just happened, or at values if that is nothing. Does what is due.
+    pub(super) fn look(
+        &mut self,
+        scenario: &Scenario,
+        world: &mut World,
+        host: StationId,
+        happening: Option<Happening<'_>>,
+    ) {
         // What one step does may be what another waits for, at the same instant.
-        while self.look_at_steps(scenario, world, host, event) {}
-        self.look_at_expectations(scenario, world, event);
-        if event.is_none() {
+        while self.look_at_steps(scenario, world, host, happening) {}
+        self.look_at_expectations(scenario, world, happening);
+        if happening.is_none() {
             self.looked = Some(world.now());
             self.measure(scenario, world);
         }
@@ -154,13 +160,13 @@ impl Script {
         scenario: &Scenario,
         world: &mut World,
         host: StationId,
-        event: Option<&WireEvent>,
+        happening: Option<Happening<'_>>,
     ) -> bool {
         let now = world.now();
         let mut changed = false;
         for (n, step) in scenario.steps.iter().enumerate() {
             if self.steps[n] == Progress::Waiting {
-                self.arm(n, step, world, event);
+                self.arm(n, step, world, happening);
             }
             if matches!(self.steps[n], Progress::Due(at) if at <= now) {
                 self.steps[n] = Progress::Done;
@@ -177,23 +183,23 @@ impl Script {
     }
 
     /// Decides whether a step that waits is due, and when; or that it has waited too long.
-    fn arm(&mut self, n: usize, step: &Step, world: &mut World, event: Option<&WireEvent>) {
+    fn arm(&mut self, n: usize, step: &Step, world: &mut World, happening: Option<Happening<'_>>) {
         let now = world.now();
         let Some(begin) = self.begin(&step.base).filter(|begin| *begin <= now) else { return };
         let Some(when) = &step.when else {
             self.steps[n] = Progress::Due(begin + step.delay);
             return;
         };
-        if when.is_event() == event.is_some() {
+        if when.is_event() == happening.is_some() {
             let done = |name: &str| self.is_done(name);
-            if when.holds(&mut View { world, event, done: &done }) {
+            if when.holds(&mut View { world, happening, done: &done }) {
                 self.steps[n] = Progress::Due(now + step.delay);
                 return;
             }
         }
         if step.within.is_some_and(|within| now >= begin + within) {
             let done = |name: &str| self.is_done(name);
-            let seen = when.seen(&mut View { world, event: None, done: &done });
+            let seen = when.seen(&mut View { world, happening: None, done: &done });
             self.steps[n] = Progress::Done;
             self.row_of_step(step, Some(now), Verdict::Failed, format!("its condition was not so in time: {seen}"));
         }
@@ -233,7 +239,7 @@ impl Script {
         self.rows.push(Row { kind: RowKind::Step, name, asked, at, seen, verdict, place: step.place.line });
     }
 
-    fn look_at_expectations(&mut self, scenario: &Scenario, world: &mut World, event: Option<&WireEvent>) {
+    fn look_at_expectations(&mut self, scenario: &Scenario, world: &mut World, happening: Option<Happening<'_>>) {
         let now = world.now();
         for (n, expect) in scenario.expects.iter().enumerate() {
             let begun = self.begin(&expect.from).is_some_and(|begin| begin <= now);
@@ -242,17 +248,17 @@ impl Script {
             }
             let end = self.end(expect);
             let over = end.is_some_and(|end| now >= end);
-            let asked = expect.condition.is_event() == event.is_some();
+            let asked = expect.condition.is_event() == happening.is_some();
             let done = |name: &str| self.is_done(name);
-            let mut view = View { world, event, done: &done };
+            let mut view = View { world, happening, done: &done };
             let in_time = end.is_none_or(|end| now <= end);
             let holds = asked && in_time && expect.condition.holds(&mut view);
             let verdict = match (expect.law, asked && in_time, holds) {
                 (Law::Once, _, true) => Some(Verdict::Passed),
                 (Law::Always, true, false) | (Law::Never, _, true) => Some(Verdict::Failed),
-                // An event at this very instant may still come: what is about frames ends when values are looked at.
-                (Law::Once, ..) if over && event.is_none() => Some(Verdict::Failed),
-                (Law::Always | Law::Never, ..) if over && event.is_none() => Some(Verdict::Passed),
+                // An event at this very instant may still come: what is about instants ends when values are looked at.
+                (Law::Once, ..) if over && happening.is_none() => Some(Verdict::Failed),
+                (Law::Always | Law::Never, ..) if over && happening.is_none() => Some(Verdict::Passed),
                 _ => None,
             };
             if let Some(verdict) = verdict {
@@ -270,7 +276,14 @@ impl Script {
 
     fn measure(&mut self, scenario: &Scenario, world: &mut World) {
         for (tally, Figure { of, .. }) in self.figures.iter_mut().zip(&scenario.figures) {
-            let Measure::Signal(statistic, place, signal) = of else { continue };
+            let (statistic, place, signal) = match of {
+                Measure::Time(_) => continue,
+                Measure::Body(statistic, name, signal) => {
+                    tally.add(*statistic, of_body(world, name, signal).unwrap_or(f64::NAN));
+                    continue;
+                }
+                Measure::Signal(statistic, place, signal) => (statistic, place, signal),
+            };
             let report = world.with_drive(place.node, |drive, now| {
                 drive.advance(now);
                 drive.report_of(place.axis)
@@ -284,7 +297,7 @@ impl Script {
     /// The figures as they stand.
     pub(super) fn figures(&self, scenario: &Scenario) -> Vec<(String, f64)> {
         let value = |(tally, figure): (&Tally, &Figure)| match &figure.of {
-            Measure::Signal(..) => tally.value,
+            Measure::Signal(..) | Measure::Body(..) => tally.value,
             Measure::Time(name) => self.done_at(name).map_or(f64::NAN, |at| at.as_nanos() as f64 / 1e9),
         };
         let figures = self.figures.iter().zip(&scenario.figures);
@@ -307,7 +320,7 @@ impl Script {
         for (n, step) in scenario.steps.iter().enumerate() {
             if self.steps[n] != Progress::Done {
                 let done = |name: &str| self.is_done(name);
-                let mut view = View { world, event: None, done: &done };
+                let mut view = View { world, happening: None, done: &done };
                 let seen = step.when.as_ref().map(|when| format!(": {}", when.seen(&mut view))).unwrap_or_default();
                 self.row_of_step(step, None, Verdict::Failed, format!("its time never came{seen}"));
             }
@@ -318,7 +331,7 @@ impl Script {
             }
             let begun = self.begin(&expect.from).is_some_and(|begin| begin <= world.now());
             let done = |name: &str| self.is_done(name);
-            let seen = expect.condition.seen(&mut View { world, event: None, done: &done });
+            let seen = expect.condition.seen(&mut View { world, happening: None, done: &done });
             let now = world.now();
             match (begun, expect.law, expect.until) {
                 (false, ..) => self.decide(n, expect, None, Verdict::Failed, "its time never began".into()),

@@ -10,9 +10,11 @@ mod summary;
 use std::ops::RangeInclusive;
 
 use serde::Serialize;
+use sim::machine::{Realism, TimingMode};
 
 use crate::document::BadFile;
 use crate::document::reader::Parameters;
+use crate::machine_file::Machine;
 use crate::scenario::{Outcome, Runner, Scenario};
 use file::Axis;
 
@@ -84,17 +86,34 @@ impl Sweep {
         self.runs
     }
 
+    /// Which setting of the parameters a run has; runs of one setting differ in their seeds alone.
+    fn setting(&self, number: u64) -> u64 {
+        number / self.seeds_of_a_setting()
+    }
+
+    fn seeds_of_a_setting(&self) -> u64 {
+        self.seeds.end() - self.seeds.start() + 1
+    }
+
+    /// What the machine does not have that would make runs of different seeds differ, in the words of its file.
+    fn ways_to_differ(&self) -> String {
+        let Machine { realism, timing, .. } = self.scenario.machine;
+        let realism =
+            (realism.unwrap_or_default() == Realism::Ideal).then_some("realism = \"full\" (noise of sensors)");
+        let timing = (timing != Some(TimingMode::Device)).then_some("timing = \"device\" (jitter of answers)");
+        realism.into_iter().chain(timing).collect::<Vec<_>>().join(" and ")
+    }
+
     /// The run of this number, from 0 on: the seed changes first, then the parameters in the order of the alphabet.
     pub fn point(&self, number: u64) -> Point {
-        let seeds = self.seeds.end() - self.seeds.start() + 1;
-        let mut rest = number / seeds;
+        let mut rest = self.setting(number);
         let values = self.axes.iter().map(|axis| {
             let count = axis.values.len() as u64;
             let value = axis.values[(rest % count) as usize].clone();
             rest /= count;
             (axis.name.clone(), value)
         });
-        Point { values: values.collect(), seed: self.seeds.start() + number % seeds }
+        Point { values: values.collect(), seed: self.seeds.start() + number % self.seeds_of_a_setting() }
     }
 
     /// Makes the run of this number.

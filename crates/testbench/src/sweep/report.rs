@@ -27,6 +27,10 @@ pub struct SweepReport {
     pub figures: Vec<Distribution>,
     /// The first failed runs.
     pub worst: Vec<Worst>,
+    /// Whether runs that differ in their seeds alone differ; `None` if there are no two such runs.
+    pub seeds_differ: Option<bool>,
+    /// Where they do not: why, and what would make them.
+    pub note: Option<String>,
 }
 
 /// A failed run, and the command that repeats it.
@@ -53,6 +57,8 @@ impl SweepReport {
             failed,
             complete: passed + failed == sweep.runs(),
             figures: summary.distributions(sweep),
+            seeds_differ: summary.seeds_differ(),
+            note: summary.note(sweep),
             worst: summary.failed().map(|failed| Worst { failed: failed.clone(), again: again(failed) }).collect(),
         }
     }

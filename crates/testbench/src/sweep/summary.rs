@@ -14,13 +14,26 @@ const MOST_TOLD: usize = 10;
 /// Values of a figure that are kept for its median; of more runs every second, every fourth and so on.
 const MOST_KEPT: usize = 1 << 16;
 
+/// Settings of the parameters whose runs are compared with each other: those with the lowest numbers.
+const MOST_COMPARED: u64 = 1024;
+
 /// What came of the runs so far.
 #[derive(Clone, Debug, Default)]
 pub struct Summary {
+    /// By the setting of the parameters: the digest of a run, and whether another one had another.
+    compared: BTreeMap<u64, Compared>,
     passed: u64,
     failed: BTreeMap<u64, Failed>,
     failures: u64,
     figures: BTreeMap<String, Figure>,
+}
+
+/// The runs of one setting of the parameters, which differ in their seeds alone.
+#[derive(Clone, Copy, Debug)]
+struct Compared {
+    digest: u64,
+    runs: u64,
+    differ: bool,
 }
 
 /// A run that failed.
@@ -69,6 +82,7 @@ impl Summary {
     pub fn add(&mut self, sweep: &Sweep, number: u64, outcome: &Result<Outcome, BadFile>) {
         match outcome {
             Ok(outcome) => {
+                self.add_digest(sweep, number, outcome.digest);
                 let failure = outcome.failures().next().map(|row| (row.asked.clone(), row.seen.clone()));
                 let figures = outcome.figures.iter().map(|(name, value)| (name.as_str(), *value));
                 self.add_run(sweep, number, figures, failure);
@@ -102,6 +116,32 @@ impl Summary {
         if self.failed.len() > MOST_TOLD {
             self.failed.pop_last();
         }
+    }
+
+    /// Adds the digest of a run, which tells whether seeds make a difference.
+    pub fn add_digest(&mut self, sweep: &Sweep, number: u64, digest: u64) {
+        let setting = sweep.setting(number);
+        if setting < MOST_COMPARED {
+            let compared = self.compared.entry(setting).or_insert(Compared { digest, runs: 0, differ: false });
+            compared.runs += 1;
+            compared.differ |= compared.digest != digest;
+        }
+    }
+
+    /// Whether a seed makes a difference to a run; `None` if there are no two runs that differ in their seeds alone.
+    pub fn seeds_differ(&self) -> Option<bool> {
+        let differ = self.compared.values().any(|compared| compared.differ);
+        (differ || self.compared.values().any(|compared| compared.runs > 1)).then_some(differ)
+    }
+
+    /// That a seed makes no difference, why, and what to turn on; `None` if it makes one, or that is not known.
+    pub fn note(&self, sweep: &Sweep) -> Option<String> {
+        const WHAT: &str = "all seeds give the same run: nothing in it is random";
+        const STEP: &str = "a step such as \"bus corrupt 0.01\" makes runs differ";
+        (self.seeds_differ() == Some(false)).then(|| match sweep.ways_to_differ() {
+            ways if ways.is_empty() => format!("{WHAT}; {STEP}"),
+            ways => format!("{WHAT}; {STEP}, and so does in [machine]: {ways}"),
+        })
     }
 
     /// Runs that passed.
@@ -220,6 +260,23 @@ mod tests {
         let found = &forth.distributions(&sweep)[0];
         assert!(found.runs == 200_000 && (found.median - 100_000.0).abs() < 2_000.0, "{found:?}");
         assert!(forth.figures["figure"].kept.len() <= MOST_KEPT);
+    }
+
+    #[test]
+    fn that_no_seed_makes_a_difference_is_told_and_one_that_differs_is_enough() {
+        let sweep = sweep(3);
+        let with_digest = |digest: u64| outcome(1.0).map(|outcome| Outcome { digest, ..outcome });
+        let mut summary = Summary::default();
+        summary.add(&sweep, 0, &with_digest(7));
+        // Another value of a parameter, not another seed.
+        summary.add(&sweep, 3, &with_digest(8));
+        assert_eq!((summary.seeds_differ(), summary.note(&sweep)), (None, None));
+        summary.add(&sweep, 1, &with_digest(7));
+        assert_eq!(summary.seeds_differ(), Some(false));
+        let note = summary.note(&sweep).unwrap_or_default();
+        assert!(note.contains("realism = \"full\"") && note.contains("timing = \"device\""), "{note}");
+        summary.add(&sweep, 5, &with_digest(9));
+        assert_eq!((summary.seeds_differ(), summary.note(&sweep)), (Some(true), None));
     }
 
     #[test]

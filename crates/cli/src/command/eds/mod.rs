@@ -53,5 +53,5 @@ impl Eds {
 }
 
 fn print(format: Format, report: &impl Report) -> Result<(), Failure> {
-    format.print(report).map_err(|error| Failure::new("cannot write to standard output").because(error))
+    format.print(report).map_err(Failure::of_stdout)
 }

@@ -28,7 +28,9 @@ pub(super) fn sheet(name: &str) -> Result<Eds, Failure> {
     }
     match resolve(name) {
         Ok(model) => Ok(Sheet::of(model).eds()),
-        Err(unknown) => Err(Failure::usage(format!("there is no file {name}")).because(unknown)),
+        Err(unknown) => Err(Failure::usage(format!("there is no file {name}"))
+            .because(unknown)
+            .next("give the path of an EDS or DCF file, or a model; `ferrodrive objects` lists them")),
     }
 }
 

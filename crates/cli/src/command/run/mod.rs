@@ -1,14 +1,17 @@
 //! `ferrodrive run`: a scenario in virtual time, once or with many seeds and values.
 
+mod crew;
+mod loaded;
 mod report;
+mod serving;
+mod several;
 mod sweeping;
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use testbench::document::reader::Parameters;
-use testbench::scenario::{Runner, Scenario};
+use testbench::scenario::{Kept, Outcome, Runner, Scenario};
 
 use crate::failure::Failure;
 use crate::output::Format;
@@ -16,37 +19,46 @@ use crate::progress::Progress;
 use crate::recording::{Batch, Pace, RecordOptions};
 use crate::serve::speaker::Speaker;
 use crate::session::exit_on_signal;
+use loaded::{Loaded, unbuildable, write};
 use report::RunReport;
+use serving::ServeOptions;
 
-/// Run a scenario in virtual time, and see whether everything is as it expects
+/// Run scenarios in virtual time, and see whether everything is as they expect
 ///
 /// A scenario is a TOML file: a machine, what happens to it, what a host does with it, what is expected (docs/scenarios.md). The
-/// exit status is 0 if everything is as expected, 1 if not, 2 if the file cannot be used.
+/// exit status is 0 if everything is as expected, 1 if not, 2 if a file cannot be used. Of several files each is a row, and all are
+/// run whatever comes of the others.
+///
+/// With --serve the host is a program outside, and the scenario goes with the clock.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive run examples/scenarios/brown_out.toml\n  \
+    ferrodrive run examples/scenarios/*.toml --junit result.xml\n  \
+    ferrodrive run scenario.toml --serve socketcand://127.0.0.1:29536\n  \
     ferrodrive run scenario.toml --seed 7 --set torque=1.5 --junit result.xml\n  \
     ferrodrive run scenario.toml --seeds 1..1000 --jobs 4")]
 pub(crate) struct Run {
-    /// The scenario
-    #[arg(value_name = "FILE.toml")]
-    file: PathBuf,
+    /// The scenario, or several
+    #[arg(value_name = "FILE.toml", required = true)]
+    files: Vec<PathBuf>,
     /// Decides everything random; without it the scenario's, its machine's, or 1
     #[arg(long, value_name = "N", conflicts_with = "seeds")]
     seed: Option<u64>,
-    /// The value of a parameter of the scenario; may be repeated
+    /// The value of a parameter of the scenario; may be repeated. Of several scenarios, of those that have it
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = parameter)]
     set: Vec<(String, String)>,
     /// Run with each of these seeds, and with each value of the scenario's [sweep]
     #[arg(long, value_name = "FIRST..LAST", value_parser = seeds)]
     seeds: Option<RangeInclusive<u64>>,
-    /// How many runs at once in a sweep; without it one for each core
-    #[arg(long, value_name = "N", requires = "seeds", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    /// How many runs at once, of a sweep or of several files; without it one for each core
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
     /// Write the result in JUnit's XML too, as build servers read it
     #[arg(long, value_name = "FILE", conflicts_with = "seeds")]
     junit: Option<PathBuf>,
     #[command(flatten)]
     recording: RecordOptions,
+    #[command(flatten)]
+    serving: ServeOptions,
 }
 
 /// Steps of the world between two batches of a record: 50 ms of a busy bus or more.
@@ -61,49 +73,74 @@ const STEPS_A_LOOK: u32 = 4096;
 impl Run {
     /// Runs it.
     pub(crate) fn run(&self, format: Format) -> Result<(), Failure> {
-        let scenario = self.scenario()?;
-        if self.seeds.is_some() && self.recording.path().is_some() {
+        let [file] = self.files.as_slice() else {
+            self.refuse_for_several()?;
+            return several::run(&self.files, self.seed, &self.set, self.jobs, self.junit.as_deref(), format);
+        };
+        let scenario = Loaded::read(file, &self.set).and_then(Loaded::with_all)?;
+        let Some(seeds) = &self.seeds else {
+            if self.jobs.is_some() {
+                return Err(Failure::usage("--jobs is about many runs, and this is one")
+                    .next("leave it away, or give --seeds 1..100 or several files"));
+            }
+            return self.once(&scenario, file, format);
+        };
+        if self.recording.path().is_some() {
             return Err(Failure::usage("a sweep is many runs, and --record writes one")
                 .next("the summary says how to repeat a run: give --record with that"));
         }
-        match &self.seeds {
-            Some(seeds) => {
-                let jobs = self.jobs.map(usize::from);
-                sweeping::sweep(scenario, seeds.clone(), jobs, &self.file, format)
+        if self.serving.is_asked_for() {
+            return Err(Failure::usage("a sweep is many runs, and --serve and --control are about one")
+                .next("give --seed in place of --seeds, or leave --serve away"));
+        }
+        sweeping::sweep(scenario, seeds.clone(), self.jobs, file, format)
+    }
+
+    /// What is about one run only is not given with several files.
+    fn refuse_for_several(&self) -> Result<(), Failure> {
+        let given = [
+            (self.seeds.is_some(), "--seeds"),
+            (self.recording.path().is_some(), "--record"),
+            (self.serving.is_asked_for(), "--serve and --control"),
+        ];
+        match given.iter().find(|(is_given, _)| *is_given) {
+            None => Ok(()),
+            Some((_, what)) => {
+                Err(Failure::usage(format!("{what} is about one scenario, and here are {}", self.files.len()))
+                    .next("give one file with it"))
             }
-            None => self.once(&scenario, format),
         }
     }
 
-    fn scenario(&self) -> Result<Scenario, Failure> {
-        let shown = self.file.display();
-        let unusable = |reason: String| {
-            Failure::usage(format!("cannot use the scenario {shown}"))
-                .because(reason)
-                .next("docs/scenarios.md describes each key; examples/scenarios has ten of them")
+    /// One run, with what is written about it.
+    fn once(&self, scenario: &Scenario, file: &Path, format: Format) -> Result<(), Failure> {
+        let (outcome, ended) = if self.serving.is_asked_for() {
+            self.serving.run(scenario, self.seed, &self.recording, file)?
+        } else {
+            (self.in_virtual_time(scenario, file, format)?, Ok(()))
         };
-        let scenario = Scenario::read(&self.file).map_err(unusable)?;
-        let mut values: Parameters = scenario.parameters.clone();
-        let strange = self.set.iter().find(|(name, _)| !values.contains_key(name));
-        if let Some((name, _)) = strange {
-            let known: Vec<_> = values.keys().map(String::as_str).collect();
-            let known = if known.is_empty() { "it has none".into() } else { format!("it has: {}", known.join(", ")) };
-            return Err(unusable(format!("it has no parameter '{name}'; {known}")));
+        if let Some(path) = &self.junit {
+            write(path, &outcome.to_junit())?;
         }
-        values.extend(self.set.iter().cloned());
-        scenario.with(&values).map_err(|bad| unusable(bad.named(shown.to_string()).to_string()))
+        let report = RunReport::new(&outcome, file);
+        format.print(&report).map_err(Failure::of_stdout)?;
+        ended?;
+        match report.failure() {
+            // It stands in the report.
+            Some(failure) if format.json => Err(Failure { told: true, ..failure }),
+            Some(failure) => Err(failure),
+            None => Ok(()),
+        }
     }
 
-    fn once(&self, scenario: &Scenario, format: Format) -> Result<(), Failure> {
+    fn in_virtual_time(&self, scenario: &Scenario, file: &Path, format: Format) -> Result<Outcome, Failure> {
         exit_on_signal();
         let progress = Progress::new(format.json);
-        let mut runner = Runner::new(scenario, self.seed).map_err(|bad| {
-            Failure::usage(format!("cannot build the machine of {}", self.file.display())).because(bad)
-        })?;
+        let mut runner = Runner::new(scenario, self.seed).map_err(|bad| unbuildable(file, bad))?;
         let warnings = Speaker::of_warnings();
         let mut record = self.recording.start(runner.world_mut(), Pace::Free, warnings.clone())?;
         if record.is_some() {
-            runner.keep_carried();
+            runner.keep();
         }
         let mut steps = 0u32;
         while runner.step() {
@@ -121,31 +158,15 @@ impl Run {
             record.finish(DISK_PATIENCE);
             warnings.finish(DISK_PATIENCE);
         }
-        let outcome = runner.conclude();
         progress.clear();
-        if let Some(path) = &self.junit {
-            write(path, &outcome.to_junit())?;
-        }
-        let report = RunReport::new(&outcome, &self.file);
-        format.print(&report).map_err(|error| Failure::new("cannot write to standard output").because(error))?;
-        match report.failure() {
-            // It stands in the report.
-            Some(failure) if format.json => Err(Failure { told: true, ..failure }),
-            Some(failure) => Err(failure),
-            None => Ok(()),
-        }
+        Ok(runner.conclude())
     }
 }
 
 /// What has happened since the batch before.
 fn batch(runner: &mut Runner) -> Batch {
-    let frames = runner.take_carried();
-    let world = runner.world_mut();
-    Batch { recorded: world.take_recorded(), frames, events: std::iter::from_fn(|| world.poll_event()).collect() }
-}
-
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    std::fs::write(path, text).map_err(|error| Failure::new(format!("cannot write {}", path.display())).because(error))
+    let Kept { frames, events } = runner.take_kept();
+    Batch { recorded: runner.world_mut().take_recorded(), frames, events }
 }
 
 /// `torque=1.5`.

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use testbench::control::{Class, Outbox, Sink};
-use tokio::sync::Notify;
+use tokio::sync::{Notify, watch};
 
 /// Lines for one client, and whether more will come.
 #[derive(Debug, Default)]
@@ -11,6 +11,16 @@ pub(crate) struct Mailbox {
     content: Mutex<Content>,
     filled: Notify,
     emptied: Notify,
+    standing: watch::Sender<Standing>,
+}
+
+/// Whether its client may stay.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Standing {
+    #[default]
+    Stranger,
+    Admitted,
+    SentAway,
 }
 
 #[derive(Debug, Default)]
@@ -25,8 +35,11 @@ pub(crate) struct Letters(pub(crate) Arc<Mailbox>);
 
 impl Sink for Letters {
     fn put(&mut self, class: Class, line: String) {
-        self.0.content().outbox.put(class, line);
-        self.0.filled.notify_one();
+        self.0.put(class, line);
+    }
+
+    fn admit(&mut self) {
+        self.0.standing.send_replace(Standing::Admitted);
     }
 }
 
@@ -40,6 +53,29 @@ impl Drop for Letters {
 impl Mailbox {
     fn content(&self) -> MutexGuard<'_, Content> {
         self.content.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Adds a line, without its end.
+    pub(super) fn put(&self, class: Class, line: String) {
+        self.content().outbox.put(class, line);
+        self.filled.notify_one();
+    }
+
+    /// The world has not admitted its client yet.
+    pub(super) fn is_stranger(&self) -> bool {
+        *self.standing.borrow() == Standing::Stranger
+    }
+
+    /// Its client is not to stay.
+    pub(super) fn send_away(&self) {
+        self.standing.send_replace(Standing::SentAway);
+    }
+
+    /// Waits until its client is admitted; false if it is not to stay.
+    pub(super) async fn is_admitted(&self) -> bool {
+        let mut standing = self.standing.subscribe();
+        let decided = standing.wait_for(|standing| *standing != Standing::Stranger).await;
+        decided.is_ok_and(|standing| *standing == Standing::Admitted)
     }
 
     /// Waits while too many answers are unread.

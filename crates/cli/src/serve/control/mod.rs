@@ -1,21 +1,30 @@
 //! The sockets of the control connection: one task a client, which moves lines between its socket and the world's loop.
 //!
 //! What the lines mean is `testbench::control`. Nothing here holds up the world: a client that does not read has its newest events
-//! and values kept and the others counted, and is not listened to while many answers wait for it.
+//! and values kept and the others counted, and is not listened to while many answers wait for it. Where a token is asked for, who has
+//! not given it is a stranger: there are few of them at a time, they come slowly, and they do not stay.
 
 mod mailbox;
+mod options;
+mod rate;
+#[cfg(unix)]
+mod unix;
 
+use std::collections::VecDeque;
 use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
-use testbench::control::{ClientNumber, ControlAddress, LineBuffer, ReadLine};
+use testbench::control::{Class, ClientNumber, ControlAddress, LineBuffer, ReadLine};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, ReadHalf, WriteHalf};
 use tokio::net::TcpListener;
 use tokio::sync::{Semaphore, mpsc};
+use transport::WallClock;
 
 use crate::failure::Failure;
 pub(crate) use mailbox::{Letters, Mailbox};
+pub(crate) use options::ControlOptions;
+use rate::Rate;
 
 /// Clients served at a time.
 const MAX_CLIENTS: usize = 256;
@@ -49,15 +58,48 @@ pub(crate) enum ControlMessage {
     Left(ClientNumber),
 }
 
+/// Clients that have not given the token yet; the one that has been there longest makes room for one more.
+const MAX_STRANGERS: usize = 32;
+
+/// How long a client has for giving the token.
+const TOKEN_PATIENCE: Duration = Duration::from_secs(5);
+
+/// What one is told that has not given it.
+const SENT_AWAY: &str = concat!(
+    r#"{"id":null,"ok":false,"error":{"kind":"token","message":"the token was not given in time","#,
+    r#""node":null,"object":null,"abort":null,"next":"the first request is hello, with the token"}}"#,
+);
+
+/// Connections a second where a token is asked for, and how many may come at once: who guesses tokens does not get far.
+const STRANGERS_A_SECOND: u32 = 20;
+const STRANGERS_AT_ONCE: u32 = 64;
+
+/// Who may come to a server.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Entry {
+    /// Whoever reaches it.
+    Free,
+    /// Who gives the token in good time.
+    ByToken,
+}
+
 /// Listens until it is dropped; a Unix socket is removed then.
 pub(crate) struct ControlServer {
     place: ControlAddress,
     listening: tokio::task::JoinHandle<()>,
+    places: Arc<Semaphore>,
+    /// Goes with it.
+    #[cfg(unix)]
+    _path: Option<unix::OwnPath>,
 }
 
 impl ControlServer {
-    /// Listens at `address`; messages go to `requests`.
-    pub(crate) async fn bind<T>(address: &ControlAddress, requests: mpsc::Sender<T>) -> Result<Self, Failure>
+    /// Listens at `address`; messages go to `requests`. The world says whom it admits.
+    pub(crate) async fn bind<T>(
+        address: &ControlAddress,
+        entry: Entry,
+        requests: mpsc::Sender<T>,
+    ) -> Result<Self, Failure>
     where
         T: From<ControlMessage> + Send + 'static,
     {
@@ -66,58 +108,49 @@ impl ControlServer {
                 "is the port or the path taken by another program, and is the address one of this machine? Port 0 takes a free one",
             )
         };
-        let (listener, place) = match address {
+        let places = Arc::new(Semaphore::new(MAX_CLIENTS));
+        let start = |listener| tokio::spawn(serve(listener, entry, Arc::clone(&places), requests));
+        match address {
             ControlAddress::Tcp(host) => {
                 let listener = TcpListener::bind(host).await.map_err(refused)?;
                 let place = ControlAddress::Tcp(listener.local_addr().map_err(refused)?.to_string());
-                (Listener::Tcp(listener), place)
+                let listening = start(Listener::Tcp(listener));
+                Ok(Self {
+                    place,
+                    listening,
+                    places,
+                    #[cfg(unix)]
+                    _path: None,
+                })
             }
             #[cfg(unix)]
-            ControlAddress::Unix(path) => (Listener::Unix(unix::bind(path).map_err(refused)?), address.clone()),
+            ControlAddress::Unix(path) => {
+                let (listener, path) = unix::bind(path).map_err(refused)?;
+                let listening = start(Listener::Unix(listener));
+                Ok(Self { place: address.clone(), listening, places, _path: Some(path) })
+            }
             #[cfg(not(unix))]
-            ControlAddress::Unix(_) => return Err(refused(io::ErrorKind::Unsupported.into())),
-        };
-        Ok(Self { place, listening: tokio::spawn(serve(listener, requests)) })
+            ControlAddress::Unix(_) => Err(refused(io::ErrorKind::Unsupported.into())),
+        }
     }
 
     /// Where it listens, with the real port.
     pub(crate) const fn place(&self) -> &ControlAddress {
         &self.place
     }
+
+    /// Lets nobody in any more, and waits until those who are there have read what they were told, at most for `patience`. The world
+    /// has let go of them before.
+    pub(crate) async fn part(self, patience: Duration) {
+        self.listening.abort();
+        // Who does not read by then has no use for it.
+        let _ = tokio::time::timeout(patience, self.places.acquire_many(MAX_CLIENTS as u32)).await;
+    }
 }
 
 impl Drop for ControlServer {
     fn drop(&mut self) {
         self.listening.abort();
-        if let ControlAddress::Unix(path) = &self.place {
-            // What is not there need not be removed.
-            let _ = std::fs::remove_file(path);
-        }
-    }
-}
-
-#[cfg(unix)]
-mod unix {
-    use std::io;
-    use std::os::unix::fs::{FileTypeExt, PermissionsExt};
-    use std::path::Path;
-
-    use tokio::net::UnixListener;
-
-    /// A socket that only this user may connect to, in place of one that nobody listens to any more.
-    pub(super) fn bind(path: &Path) -> io::Result<UnixListener> {
-        if let Ok(metadata) = std::fs::symlink_metadata(path) {
-            if !metadata.file_type().is_socket() {
-                return Err(io::Error::new(io::ErrorKind::AlreadyExists, "there is something else at this path"));
-            }
-            if std::os::unix::net::UnixStream::connect(path).is_ok() {
-                return Err(io::Error::new(io::ErrorKind::AddrInUse, "another program listens there"));
-            }
-            std::fs::remove_file(path)?;
-        }
-        let listener = UnixListener::bind(path)?;
-        std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o600))?;
-        Ok(listener)
     }
 }
 
@@ -149,17 +182,26 @@ impl Listener {
 }
 
 /// Serves each client that comes.
-async fn serve<T>(listener: Listener, requests: mpsc::Sender<T>)
+async fn serve<T>(listener: Listener, entry: Entry, places: Arc<Semaphore>, requests: mpsc::Sender<T>)
 where
     T: From<ControlMessage> + Send + 'static,
 {
-    let places = Arc::new(Semaphore::new(MAX_CLIENTS));
+    let clock = WallClock::start();
+    let mut rate = Rate::new(STRANGERS_A_SECOND, STRANGERS_AT_ONCE);
+    let mut strangers: VecDeque<Arc<Mailbox>> = VecDeque::new();
     let mut number = 0;
     loop {
         let Ok(mut stream) = listener.accept().await else {
             tokio::time::sleep(ACCEPT_PAUSE).await;
             continue;
         };
+        if entry == Entry::ByToken {
+            clock.sleep(rate.delay(clock.now())).await;
+            strangers.retain(|stranger| stranger.is_stranger());
+            if strangers.len() >= MAX_STRANGERS {
+                strangers.pop_front().into_iter().for_each(|longest| longest.send_away());
+            }
+        }
         let Ok(place) = Arc::clone(&places).try_acquire_owned() else {
             // Told as far as its socket takes it at once.
             let _ = tokio::time::timeout(ACCEPT_PAUSE, stream.write_all(NO_PLACE.as_bytes())).await;
@@ -167,8 +209,11 @@ where
         };
         number += 1;
         let client = Client { number, requests: requests.clone(), mailbox: Arc::default() };
+        if entry == Entry::ByToken {
+            strangers.push_back(Arc::clone(&client.mailbox));
+        }
         tokio::spawn(async move {
-            client.serve(stream).await;
+            client.serve(stream, entry).await;
             drop(place);
         });
     }
@@ -182,7 +227,7 @@ struct Client<T> {
 }
 
 impl<T: From<ControlMessage>> Client<T> {
-    async fn serve(&self, stream: Box<dyn Socket>) {
+    async fn serve(&self, stream: Box<dyn Socket>, entry: Entry) {
         if !self.tell(ControlMessage::Joined(self.number, Arc::clone(&self.mailbox))).await {
             return;
         }
@@ -197,6 +242,19 @@ impl<T: From<ControlMessage>> Client<T> {
             _ = &mut writing => {
                 self.tell(ControlMessage::Left(self.number)).await;
             }
+            () = self.turned_away(), if entry == Entry::ByToken => {
+                self.mailbox.put(Class::Answer, SENT_AWAY.to_owned());
+                self.tell(ControlMessage::Left(self.number)).await;
+                let _ = tokio::time::timeout(LINGER, writing).await;
+            }
+        }
+        self.mailbox.send_away();
+    }
+
+    /// Returns when the client is not to stay: it has not been admitted in time, or must make room.
+    async fn turned_away(&self) {
+        if let Ok(true) = tokio::time::timeout(TOKEN_PATIENCE, self.mailbox.is_admitted()).await {
+            std::future::pending::<()>().await;
         }
     }
 

@@ -1,0 +1,105 @@
+//! A scenario with a host outside of it: its bus is served, and goes with the clock.
+
+use std::collections::VecDeque;
+use std::path::Path;
+
+use testbench::scenario::{Course, Outcome, Scenario};
+use tokio::sync::mpsc;
+use transport::{Hub, HubOptions, ServeSpec, WallClock, run_world};
+
+use super::loaded::unbuildable;
+use crate::failure::Failure;
+use crate::recording::{Pace, RecordOptions};
+use crate::serve::control::ControlOptions;
+use crate::serve::pacer::{Clock, Pacer, Speed};
+use crate::serve::service::{
+    PARTING_PATIENCE, REQUESTS_WAITING, Request, Service, listen_to_signals, runtime_of_clients, tick,
+};
+use crate::serve::speaker::Speaker;
+use crate::serve::world::ServedWorld;
+use crate::session::failure_of;
+
+/// Where and how fast a scenario is served.
+#[derive(clap::Args, Clone, Debug)]
+pub(crate) struct ServeOptions {
+    /// Serve the scenario's bus to a host outside: socketcand://HOST:PORT or slcan://HOST:PORT; port 0 takes a free one; may be
+    /// repeated
+    ///
+    /// One line that begins with `ready` names every listener. Time begins when the first client has come, and goes with the clock;
+    /// the command ends when the scenario does, with its result and exit status.
+    #[arg(long = "serve", value_name = "URL")]
+    places: Vec<ServeSpec>,
+    /// How many times as fast as the clock a served scenario goes, e.g. 10 or 0.1, or max
+    #[arg(long, value_name = "N|max", conflicts_with = "clock", requires = "places")]
+    speed: Option<Speed>,
+    /// What moves the time of a served scenario: the clock, or `run` on the control connection (manual)
+    #[arg(long, value_name = "real|manual", value_enum, default_value = "real")]
+    clock: Clock,
+    #[command(flatten)]
+    control: ControlOptions,
+}
+
+impl ServeOptions {
+    /// A host outside is asked for.
+    pub(super) fn is_asked_for(&self) -> bool {
+        !self.places.is_empty() || self.control.place().is_some()
+    }
+
+    /// Goes through the scenario with a host outside; what came of it, and what ended it if that was not its own end.
+    ///
+    /// # Errors
+    /// That it cannot be begun or served.
+    pub(super) fn run(
+        &self,
+        scenario: &Scenario,
+        seed: Option<u64>,
+        recording: &RecordOptions,
+        file: &Path,
+    ) -> Result<(Outcome, Result<(), Failure>), Failure> {
+        if self.clock == Clock::Manual && self.control.place().is_none() {
+            return Err(Failure::usage("nobody can move the time of --clock manual")
+                .next("give --control 127.0.0.1:0: its clients move time by `run 20ms`"));
+        }
+        let (mut world, course) = Course::begin(scenario, seed).map_err(|bad| unbuildable(file, bad))?;
+        let warnings = Speaker::of_warnings();
+        let real_time = self.clock == Clock::Real && self.speed.is_none();
+        let pace = if real_time { Pace::RealTime } else { Pace::Free };
+        let record = recording.start(&mut world, pace, warnings.clone())?;
+        let pacer = Pacer::new(self.clock, self.speed.unwrap_or(Speed::Times(1.0))).waiting_for_a_client();
+        let world = ServedWorld::new(world, pacer, record.is_some(), warnings.clone());
+        let answers = Speaker::of_answers(warnings.clone());
+        let service = Service { answers, warnings, log: None, record, waiting: VecDeque::new(), quit_in: None };
+        runtime_of_clients()?.block_on(self.serve(world, course, service))
+    }
+
+    async fn serve(
+        &self,
+        mut world: ServedWorld,
+        course: Course,
+        mut service: Service,
+    ) -> Result<(Outcome, Result<(), Failure>), Failure> {
+        let clock = WallClock::start();
+        let (requests, mut incoming) = mpsc::channel(REQUESTS_WAITING);
+        listen_to_signals(requests.clone());
+        let options = HubOptions { bitrate: Some(world.bitrate()), zero: clock.unix_zero(), ..HubOptions::default() };
+        let mut hub = Hub::bind(&self.places, options, &clock).await.map_err(|error| failure_of(&error))?;
+        let control = self.control.serve(&mut world, &requests, &service.warnings).await?;
+        let (run_is_over, scenario_is_over) = (requests.clone(), requests.clone());
+        world.on_run_over(move || run_is_over.try_send(Request::RunIsOver).is_ok());
+        world.follow(course, move || scenario_is_over.try_send(Request::ScenarioIsOver).is_ok());
+        let listeners = hub.listeners().iter().map(|listener| format!(" {listener}"));
+        let place = control.iter().map(|server| format!(" {}", server.place()));
+        service.answers.say(&["ready".to_owned()].into_iter().chain(listeners).chain(place).collect::<String>());
+        tokio::spawn(tick(requests.clone(), clock.clone()));
+        let serving =
+            run_world(&mut world, &mut hub, &clock, &mut incoming, |world, request| service.serve(world, request));
+        let ended = serving.await;
+        let ended = service.part(&mut world, ended);
+        let (mut world, course) = world.into_course();
+        if let Some(control) = control {
+            control.part(PARTING_PATIENCE).await;
+        }
+        let course = course.ok_or_else(|| Failure::new("the scenario was lost on the way"))?;
+        Ok((course.conclude(&mut world), ended))
+    }
+}
