@@ -27,7 +27,8 @@ fn on_a_virtual_bus_an_answer_takes_what_its_frame_takes_and_sync_is_even() {
         assert!(ANSWER_BITS.contains(&bits), "{which}: {bits} bits");
     }
     assert!(figure(&report, "sync", "count") >= 40.0);
-    for which in ["min_us", "max_us"] {
+    // The first one may wait for a frame that is on the wire.
+    for which in ["median_us", "max_us"] {
         assert!((figure(&report, "sync", which) - 10_000.0).abs() <= 10.0, "{report}");
     }
     assert_eq!(report["producer"], "this");
@@ -35,20 +36,17 @@ fn on_a_virtual_bus_an_answer_takes_what_its_frame_takes_and_sync_is_even() {
     std::fs::remove_dir_all(directory).unwrap();
 }
 
-/// 1800h: every SYNC brings the first TPDO of an operational node.
 #[test]
-fn a_synchronous_tpdo_is_measured_over_tcp_and_the_text_has_its_bars() {
-    let drive = "zlac8030l@4,1800:02=1";
-    let simulator = Simulator::start(&["--drive", drive, "--serve", "socketcand://127.0.0.1:0"]);
+fn answers_and_sync_are_measured_over_tcp_and_the_text_has_its_bars() {
+    let simulator = Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
     let bus = simulator.bus("socketcand");
     let on_bus = |arguments: &[&str]| done(&[&["--bus", &bus, "--timeout", "1s"], arguments].concat());
     done(&["--bus", &bus, "--timeout", "10s", "read", "4", "1000"]);
-    on_bus(&["nmt", "4", "start"]);
     let report = on_bus(&["--json", "latency", "4", "--count", "30"]).json();
     assert_eq!(figure(&report, "sdo", "count"), 30.0);
-    assert!(figure(&report, "pdo", "count") >= 25.0, "{report}");
+    assert!(figure(&report, "sync", "count") >= 30.0, "{report}");
     let text = on_bus(&["latency", "4", "--count", "30"]).out;
-    assert!(text.contains("SDO answer") && text.contains("SYNC to TPDO") && text.contains('#'), "{text}");
+    assert!(text.contains("SDO answer") && text.contains("SYNC period") && text.contains('#'), "{text}");
 }
 
 #[test]
