@@ -2,22 +2,22 @@
 
 use can::{Frame, Instant};
 
+use crate::Received;
 use crate::bus::{AsyncBus, BusError};
 use crate::cannelloni::CannelloniBus;
 use crate::log::LogBus;
 use crate::reconnect::Reconnecting;
-use crate::slcan::{SlcanBus, SlcanPlace};
+use crate::slcan::SlcanBus;
 use crate::socketcand::SocketcandBus;
 use crate::udp_multicast::UdpMulticastBus;
-use crate::{BusSpec, Received, WallClock};
 
 /// Any bus that [`crate::BusSpec::open`] opens. A connection that is lost is made again.
 #[derive(Debug)]
-pub struct AnyBus(Kind);
+pub struct AnyBus(pub(crate) Kind);
 
 #[derive(Debug)]
 #[allow(clippy::large_enum_variant, reason = "a program has one or two of them, and keeps them where they are")]
-enum Kind {
+pub(crate) enum Kind {
     Socketcand(Reconnecting<SocketcandBus>),
     Slcan(Reconnecting<SlcanBus>),
     Cannelloni(CannelloniBus),
@@ -28,37 +28,6 @@ enum Kind {
 }
 
 impl AnyBus {
-    pub(crate) async fn open(spec: &BusSpec, clock: &WallClock) -> Result<Self, BusError> {
-        Ok(Self(match spec {
-            BusSpec::Sim { .. } => return Err(BusError::Simulated),
-            #[cfg(target_os = "linux")]
-            BusSpec::SocketCan { interface } => Kind::SocketCan(crate::SocketCanBus::open(interface, clock)?),
-            #[cfg(not(target_os = "linux"))]
-            BusSpec::SocketCan { interface } => {
-                let problem = crate::InterfaceProblem::NotLinux { name: interface.clone() };
-                return Err(BusError::Interface(problem));
-            }
-            BusSpec::Socketcand { address, bus } => {
-                Kind::Socketcand(Reconnecting::open((address.clone(), bus.clone()), clock).await?)
-            }
-            BusSpec::SlcanSerial { path, bitrate, baud } => {
-                let place = SlcanPlace { address: path.clone(), baud: Some(*baud), bitrate: *bitrate };
-                Kind::Slcan(Reconnecting::open(place, clock).await?)
-            }
-            BusSpec::SlcanTcp { address, bitrate } => {
-                let place = SlcanPlace { address: address.clone(), baud: None, bitrate: *bitrate };
-                Kind::Slcan(Reconnecting::open(place, clock).await?)
-            }
-            BusSpec::Cannelloni { address, local_port } => {
-                Kind::Cannelloni(CannelloniBus::open(address, *local_port, clock).await?)
-            }
-            BusSpec::UdpMulticast { group, port, hops } => {
-                Kind::UdpMulticast(UdpMulticastBus::open(*group, *port, *hops, clock)?)
-            }
-            BusSpec::Log { path } => Kind::Log(LogBus::open(path)?),
-        }))
-    }
-
     /// Takes leave: an slcan adapter's channel is closed, so that it stops acknowledging frames on the bus. Dropping does
     /// for the others.
     pub async fn close(self) -> Result<(), BusError> {

@@ -7,7 +7,10 @@ use std::str::FromStr;
 
 use can::Bitrate;
 
-use crate::{AnyBus, BusError, WallClock, socketcand, udp_multicast};
+use crate::any_bus::{AnyBus, Kind};
+use crate::reconnect::Reconnecting;
+use crate::slcan::SlcanPlace;
+use crate::{BusError, CannelloniBus, LogBus, UdpMulticastBus, WallClock, socketcand, udp_multicast};
 
 /// Line speed of a serial adapter unless `?baud=` says otherwise. USB adapters ignore it.
 const DEFAULT_BAUD: u32 = 115_200;
@@ -80,7 +83,34 @@ pub enum BusSpec {
 impl BusSpec {
     /// Opens the bus. [`BusSpec::Sim`] is not opened here but embedded by whoever wants it.
     pub async fn open(&self, clock: &WallClock) -> Result<AnyBus, BusError> {
-        AnyBus::open(self, clock).await
+        Ok(AnyBus(match self {
+            Self::Sim { .. } => return Err(BusError::Simulated),
+            #[cfg(target_os = "linux")]
+            Self::SocketCan { interface } => Kind::SocketCan(crate::SocketCanBus::open(interface, clock)?),
+            #[cfg(not(target_os = "linux"))]
+            Self::SocketCan { interface } => {
+                let problem = crate::InterfaceProblem::NotLinux { name: interface.clone() };
+                return Err(BusError::Interface(problem));
+            }
+            Self::Socketcand { address, bus } => {
+                Kind::Socketcand(Reconnecting::open((address.clone(), bus.clone()), clock).await?)
+            }
+            Self::SlcanSerial { path, bitrate, baud } => {
+                let place = SlcanPlace { address: path.clone(), baud: Some(*baud), bitrate: *bitrate };
+                Kind::Slcan(Reconnecting::open(place, clock).await?)
+            }
+            Self::SlcanTcp { address, bitrate } => {
+                let place = SlcanPlace { address: address.clone(), baud: None, bitrate: *bitrate };
+                Kind::Slcan(Reconnecting::open(place, clock).await?)
+            }
+            Self::Cannelloni { address, local_port } => {
+                Kind::Cannelloni(CannelloniBus::open(address, *local_port, clock).await?)
+            }
+            Self::UdpMulticast { group, port, hops } => {
+                Kind::UdpMulticast(UdpMulticastBus::open(*group, *port, *hops, clock)?)
+            }
+            Self::Log { path } => Kind::Log(LogBus::open(path)?),
+        }))
     }
 }
 
