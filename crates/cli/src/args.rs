@@ -3,8 +3,9 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    completions, dcf, demo, drive, dump, eds, emcy, events, home, latency, man_pages, motion, nmt, objects, pdo, plot,
-    read, readings, run, scan, sdo, send, sim, store, sync, time, watch, world,
+    completions, convert, dcf, decode, demo, drive, dump, eds, emcy, events, export, gateway, home, latency, man_pages,
+    motion, nmt, objects, pdo, plot, read, readings, record, replay, run, scan, sdo, send, sim, store, sync, time,
+    watch, world,
 };
 use crate::global::Global;
 
@@ -54,7 +55,13 @@ pub(crate) enum Command {
     Torque(motion::Torque),
     Home(home::Home),
     Latency(latency::Latency),
+    Record(record::Record),
+    Export(export::Export),
+    Gateway(gateway::Gateway),
     Dump(dump::Dump),
+    Decode(decode::Decode),
+    Convert(convert::Convert),
+    Replay(replay::Replay),
     Save(store::Save),
     Restore(store::Restore),
     Completions(completions::Completions),

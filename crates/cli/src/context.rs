@@ -15,6 +15,7 @@ use crate::failure::Failure;
 use crate::frames::tap::Traffic;
 use crate::global::Global;
 use crate::progress::Progress;
+use crate::recording::Ears;
 use testbench::machine_file::Machine;
 use testbench::models::{self, Description};
 
@@ -36,6 +37,8 @@ pub(crate) struct Context {
     /// The frames that pass.
     pub(crate) traffic: Traffic,
     bus: BusSpec,
+    /// The frames of others.
+    pub(crate) ears: Ears,
     timeout: Duration,
     models: BTreeMap<NodeId, Told>,
     json: bool,
@@ -74,9 +77,11 @@ impl Context {
         let by_bus = embedded.unwrap_or_default().iter().map(|(node, model)| (*node, Told::ByBus(model)));
         let models: BTreeMap<_, _> = by_bus.chain(by_user).collect();
         network.set_models(models::with_told(models.values().map(|told| told.description())));
+        let ears = Ears::default();
         Self {
             network,
             progress,
+            ears,
             traffic,
             bus: global.bus.clone(),
             timeout: global.timeout,

@@ -5,6 +5,7 @@ use std::time::Duration;
 use canopen::NodeId;
 use transport::BusSpec;
 
+use crate::recording::{LogPath, log_path};
 use testbench::machine_file::{self, Machine};
 use testbench::models::Description;
 use testbench::words::drive::node_model;
@@ -42,6 +43,14 @@ pub(crate) struct Global {
     /// Run the bus in real time (Linux: SCHED_FIFO, memory locked), so that other programs do not delay its cycles
     #[arg(long, global = true)]
     pub(crate) realtime: bool,
+
+    /// Write every frame that the command sends and hears to this file, with its time
+    ///
+    /// The extension tells the form: .log (candump), .asc (Vector), .blf (Vector), .pcapng (Wireshark). It is a new file, or an
+    /// empty one, or a log of that form, which is replaced. Any other file, a symbolic link, a device and a FIFO are
+    /// refused. A command that is killed loses less than a second of it.
+    #[arg(long, value_name = "FILE", value_parser = log_path, global = true)]
+    pub(crate) log: Option<LogPath>,
 
     /// Longest wait for each answer of a node
     #[arg(long, value_name = "TIME", value_parser = master::units::parse_duration, default_value = "500ms", global = true)]

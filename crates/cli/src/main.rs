@@ -208,6 +208,12 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::World(world) => print(format, &world.run()?),
         Command::Events(events) => events.run(format),
         Command::Dump(dump) => dump.run(global, format),
+        Command::Decode(decode) => decode.run(global, format),
+        Command::Convert(convert) => print(format, &convert.run(format.json)?),
+        Command::Record(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Export(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Gateway(command) => session::run(global, async |context| command.run(context, format).await),
+        Command::Replay(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Completions(completions) => completions.run(&mut Cli::command()),
         Command::ManPages(pages) => pages.run(Cli::command()),
     }

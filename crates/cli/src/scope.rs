@@ -26,23 +26,24 @@ const MACHINE: &str = "machine";
 const TIMEOUT: &str = "timeout";
 const VERBOSE: &str = "verbose";
 const REALTIME: &str = "realtime";
+const LOG: &str = "log";
 
-const UNHEEDED: [Unheeded; 10] = [
+const UNHEEDED: [Unheeded; 12] = [
     Unheeded {
         command: "run",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG],
         why: "a scenario has a machine and a bus of its own",
         next: "leave it away; the scenario's machine may be the path of a machine file",
     },
     Unheeded {
         command: "world",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG],
         why: "it speaks to a running simulator, not to a bus",
         next: "leave it away; --control says where the simulator is",
     },
     Unheeded {
         command: "events",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG],
         why: "it listens to a running simulator, not to a bus",
         next: "leave it away; --control says where the simulator is",
     },
@@ -60,7 +61,7 @@ const UNHEEDED: [Unheeded; 10] = [
     },
     Unheeded {
         command: "demo",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG],
         why: "it shows virtual drives on buses of their own",
         next: "leave it away; --drive MODEL chooses the drive",
     },
@@ -71,20 +72,32 @@ const UNHEEDED: [Unheeded; 10] = [
         next: "leave it away; --for TIME says how long it listens",
     },
     Unheeded {
+        command: "decode",
+        options: &[BUS, TIMEOUT],
+        why: "it reads a log, and asks nobody anything",
+        next: "leave it away",
+    },
+    Unheeded {
+        command: "convert",
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, LOG],
+        why: "it reads a log and writes another, and looks at no frame",
+        next: "leave it away; the second file is the log that is written",
+    },
+    Unheeded {
         command: "completions",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG],
         why: "a script for a shell depends on none of them",
         next: "leave it away",
     },
     Unheeded {
         command: "eds",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG],
         why: "it is about files, not about a node of a bus",
         next: "leave it away",
     },
     Unheeded {
         command: "readings",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME],
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG],
         why: "it is about a model, not about a node of a bus",
         next: "leave it away",
     },
@@ -92,7 +105,7 @@ const UNHEEDED: [Unheeded; 10] = [
 
 const OBJECTS_OF_A_MODEL: Unheeded = Unheeded {
     command: "objects",
-    options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME],
+    options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG],
     why: "the objects of a model are the same on every bus",
     next: "leave it away, or give a node-ID in place of the model",
 };

@@ -20,6 +20,7 @@ use crate::frames::stamp::Stamps;
 use crate::frames::tap::{Tap, Traffic};
 use crate::global::Global;
 use crate::progress::Progress;
+use crate::recording::{CommandLog, LogPath, Logged, Pace, interface_of};
 use crate::signals::asked_to_end;
 use testbench::machine_file::{self, Machine};
 
@@ -73,10 +74,13 @@ fn virtual_bus<R>(
     exit_on_signal();
     let (mut world, drives) = virtual_world(file)?;
     let network = Network::new();
+    let log = global.log.as_ref().map(LogPath::create).transpose()?;
+    let (log, writing) = CommandLog::start(log, interface_of(&global.bus), Duration::ZERO, Pace::Free);
     let progress = Progress::new(global.json);
     let traffic = Traffic::default();
-    world.add_station(Tap::new(network.clone(), traffic.clone()));
     let context = Context::new(global, network.clone(), Some(&drives), progress.clone(), traffic.clone());
+    let tapped = Tap::new(network.clone(), traffic.clone());
+    world.add_station(Logged::new(tapped, log, context.ears.clone()));
     let whole = async {
         embedded::wait_until_booted(&network, &drives).await?;
         if global.verbose {
@@ -86,13 +90,16 @@ fn virtual_bus<R>(
     };
     let ended = sim::block_on_for(&mut world, VIRTUAL_LIMIT, whole);
     progress.clear();
+    writing.finish().inspect(|missing| context.tell(missing));
     ended.map_err(|error| Failure::new("the virtual bus came to a halt").because(error))?
 }
 
 async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Result<R, Failure>) -> Result<R, Failure> {
     enter_real_time(global)?;
     let clock = WallClock::start();
+    let log = global.log.as_ref().map(LogPath::create).transpose()?;
     let mut bus = global.bus.open(&clock).await.map_err(|error| bus_failure(global, &error))?;
+    let (log, writing) = CommandLog::start(log, interface_of(&global.bus), clock.unix_zero(), Pace::RealTime);
     let network = Network::new();
     let progress = Progress::new(global.json);
     progress.spin();
@@ -119,10 +126,11 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
         let notes = notes.borrow();
         Err(notes.lost().into_iter().fold(failure, |failure, lost| without_bus(&context, failure.because(lost))))
     };
-    let mut station = Tap::new(network.clone(), traffic);
+    let mut station = Logged::new(Tap::new(network.clone(), traffic), log, context.ears.clone());
     let tell = |_, note: &Note| notes.borrow_mut().news(note).iter().for_each(|text| context.tell(text));
     let ended = run_station(&mut bus, &mut station, &clock, &Notify::new(), until, tell).await;
     progress.clear();
+    writing.finish().inspect(|missing| context.tell(missing));
     ended.map_err(|error| {
         let failure = bus_failure(global, &error);
         let moved = network.moved();

@@ -5,7 +5,7 @@ mod common;
 
 use std::path::{Path, PathBuf};
 
-use common::{Simulator, command};
+use common::{Simulator, command, scratch};
 
 /// The port that the pages print; here it is a free one.
 const PRINTED_PORT: &str = "29536";
@@ -36,6 +36,12 @@ fn blocks(text: &str) -> Vec<(&str, Vec<&str>)> {
 
 /// Does what a page says, from top to bottom; how many commands that were.
 fn follow(name: &str) -> usize {
+    // Files that a page names are those of the project.
+    follow_in(name, &root())
+}
+
+/// The same in a folder, where a page's commands write files.
+fn follow_in(name: &str, folder: &Path) -> usize {
     let text = page(name);
     let mut simulator: Option<(Simulator, String)> = None;
     let mut commands = 0;
@@ -54,8 +60,7 @@ fn follow(name: &str) -> usize {
                         let port = started.ready.rsplit(':').next().unwrap_or_default().to_owned();
                         *running = Some((started, port));
                     } else {
-                        // Files that a page names are those of the project.
-                        let ended = command(arguments).current_dir(root()).output().expect("the binary runs");
+                        let ended = command(arguments).current_dir(folder).output().expect("the binary runs");
                         assert!(ended.status.success(), "{name}: {line}: {}", String::from_utf8_lossy(&ended.stderr));
                     }
                     commands += 1;
@@ -75,6 +80,13 @@ fn follow(name: &str) -> usize {
 #[test]
 fn every_command_of_the_page_on_testing_ends_well() {
     assert_eq!(follow("test-your-software.md"), 10);
+}
+
+#[test]
+fn every_command_of_the_page_on_logs_ends_well() {
+    let folder = scratch("handbook_logs");
+    assert_eq!(follow_in("logs.md", &folder), 10);
+    std::fs::remove_dir_all(folder).unwrap();
 }
 
 #[test]

@@ -46,6 +46,8 @@ const COMMANDS: &[(&[&str], &str)] = &[
     (&["dcf", "4"], "dcf"),
     (&["latency", "4", "--count", "20"], "latency"),
     (&["dump", "--for", "1s"], "frame"),
+    (&["export", "dbc", "4"], "export"),
+    (&["gateway"], "failure"),
     (&["run", SCENARIO], "run"),
     (&["run", SCENARIO, "--seeds", "1..2"], "sweep"),
     (&["run", SCENARIO, SCENARIO], "scenarios"),
@@ -119,6 +121,7 @@ fn files_and_logs_are_told_of_in_the_same_form() {
     let directory = scratch("schema");
     let path = |name: &str| directory.join(name).to_str().expect("UTF-8").to_owned();
     let (sheet, log, odd) = (path("a.eds"), path("a.log"), path("odd.log"));
+    let (blf, csv) = (path("a.blf"), path("a.csv"));
     let made = ferrodrive(&["eds", "zlac8030l", "--json"]).json()["eds"].as_str().expect("a text").to_owned();
     std::fs::write(&sheet, made).unwrap();
     for (arguments, definition) in [
@@ -126,6 +129,10 @@ fn files_and_logs_are_told_of_in_the_same_form() {
         (&["eds", "show", &sheet], "eds_show"),
         (&["eds", "diff", &sheet, "zlim42c"], "eds_diff"),
         (&["dump", "--for", "1s", "--log", &log], "frame"),
+        (&["decode", &log], "frame"),
+        (&["convert", &log, &blf], "convert"),
+        (&["replay", &log, "--skip-motion"], "replay"),
+        (&["record", "4", "606C", "--out", &csv, "--for", "100ms"], "record"),
     ] {
         hold(&ferrodrive(&[arguments, &["--json"]].concat()), definition, &format!("{arguments:?}"));
     }

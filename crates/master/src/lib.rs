@@ -91,6 +91,7 @@ pub mod cyclic;
 pub mod decode;
 pub mod drive;
 mod error;
+pub mod gateway;
 mod host_loss;
 pub mod identify;
 pub mod latency;

@@ -19,6 +19,7 @@
 
 pub mod control;
 pub mod data_sheet;
+pub mod dbc;
 pub mod document;
 pub mod events;
 pub mod machine_file;

@@ -6,7 +6,6 @@ use std::path::PathBuf;
 
 use can::{Bitrate, Frame, Instant};
 
-use crate::log::LogError;
 use crate::socketcan::InterfaceProblem;
 use crate::{Received, socketcand};
 
@@ -148,8 +147,8 @@ pub enum BusError {
     Log {
         /// The file.
         path: PathBuf,
-        /// Where and why.
-        source: LogError,
+        /// What the system said.
+        source: io::Error,
     },
     /// The log is over.
     #[error("the log {} ends here", path.display())]

@@ -7,7 +7,8 @@ use std::net::SocketAddr;
 use can::Instant;
 use tokio::net::UdpSocket;
 
-use crate::note::{Note, TornRecord};
+use crate::log::{Finding, Place};
+use crate::note::Note;
 use crate::{BusError, Received, WallClock};
 
 /// Longest datagram of UDP.
@@ -58,7 +59,7 @@ impl Datagrams {
     pub(crate) fn push_malformed(&mut self, reason: String) {
         let shown = &self.datagram()[..self.received.min(SHOWN_LENGTH)];
         let text = shown.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ");
-        self.push(Note::TornRecord(TornRecord { place: 1, text, reason }));
+        self.push(Note::TornRecord(Finding { place: Place::Line(1), text, reason }));
     }
 
     /// The last datagram.

@@ -11,6 +11,7 @@ use std::time::Duration;
 use can::{CanId, Frame, Instant, Station};
 use common::{Raw, frame, heard, hub, socketcand, socketcand_port, soon};
 use tokio::sync::{Notify, mpsc};
+use transport::log::Place;
 use transport::{
     AsyncBus, BusError, BusSpec, ClientId, Heard, LeaveReason, Note, RealTimeWorld, Received, WallClock, run_station,
     run_world,
@@ -170,7 +171,7 @@ async fn a_log_is_replayed_and_read_only() {
     assert_eq!(bus.recv().await.unwrap(), (Instant::from_micros(1_000_001), frame("701#05").into()));
     let (at, torn) = bus.recv().await.unwrap();
     assert_eq!(at, Instant::from_micros(1_000_001));
-    assert!(matches!(&torn, Received::Note(Note::TornRecord(torn)) if torn.place == 2), "{torn:?}");
+    assert!(matches!(&torn, Received::Note(Note::TornRecord(torn)) if torn.place == Place::Line(2)), "{torn:?}");
     assert_eq!(bus.recv().await.unwrap(), (Instant::from_secs(3), frame("080#").into()));
     assert!(matches!(bus.send(&frame("000#")).await, Err(BusError::ReadOnly { .. })));
     assert!(matches!(bus.recv().await, Err(BusError::EndOfLog { .. })));

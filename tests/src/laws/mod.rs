@@ -9,6 +9,7 @@ mod eds;
 mod eeprom;
 mod firmware;
 mod frame;
+mod logs;
 mod master_core;
 mod modbus;
 mod node;
@@ -33,6 +34,11 @@ pub const ALL: &[Law] = &[
     Law { name: "frame_text", holds: frame::text, samples: frame::TEXT_SAMPLES },
     Law { name: "frame_length", holds: frame::length, samples: frame::LENGTH_SAMPLES },
     Law { name: "candump_line", holds: stream::candump_line, samples: stream::CANDUMP_SAMPLES },
+    Law { name: "log_asc", holds: logs::asc, samples: logs::ASC_SAMPLES },
+    Law { name: "log_trc", holds: logs::trc, samples: logs::TRC_SAMPLES },
+    Law { name: "log_blf", holds: logs::blf, samples: logs::BLF_SAMPLES },
+    Law { name: "log_pcap", holds: logs::pcap, samples: logs::PCAP_SAMPLES },
+    Law { name: "log_pcapng", holds: logs::pcapng, samples: logs::PCAPNG_SAMPLES },
     Law { name: "socketcand", holds: stream::socketcand, samples: stream::SOCKETCAND_SAMPLES },
     Law { name: "slcan", holds: stream::slcan, samples: stream::SLCAN_SAMPLES },
     Law { name: "sdo_wire", holds: node::sdo_wire, samples: node::SDO_WIRE_SAMPLES },

@@ -1,8 +1,7 @@
-//! `ferrodrive dump`: the bus in words, line by line, and into a candump log.
+//! `ferrodrive dump` and `ferrodrive decode`: a bus or a log in words, line by line.
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::io::{self, Write};
+use std::path::Path;
 use std::time::Duration;
 
 use can::{Frame, Instant};
@@ -10,8 +9,8 @@ use canopen::NodeId;
 use master::decode::Decoder;
 use serde::Serialize;
 use sim::wire::WireEvent;
-use transport::log::LogWriter;
-use transport::{AnyBus, AsyncBus, BusError, BusSpec, Note, Received, TornRecord, WallClock};
+use transport::log::{AnyLogReader, Content, Direction, Entry, Finding, Format as LogFormat, Place, Record};
+use transport::{AnyBus, AsyncBus, BusError, BusSpec, Note, Received, WallClock};
 
 use crate::failure::Failure;
 use crate::frames::counts::Counts;
@@ -21,6 +20,8 @@ use crate::frames::stamp::{Stamps, TimeForm};
 use crate::global::Global;
 use crate::output::{Format, Report};
 use crate::paint::Paint;
+use crate::plain::plain;
+use crate::recording::{CommandLog, LogPath, Pace, interface_of};
 use crate::session::{bus_failure, enter_real_time, exit_on_signal, runtime, virtual_world};
 use crate::signals::asked_to_end;
 use testbench::machine_file::Machine;
@@ -36,10 +37,7 @@ use testbench::machine_file::Machine;
     ferrodrive --bus slcan://HOST:3000 dump --node 4 --service sdo,emcy --time delta\n  \
     ferrodrive --bus slcan://HOST:3000 dump --object 6041,target_velocity --time absolute")]
 pub(crate) struct Dump {
-    /// Also write the frames to this file, in candump format, those too that are not shown
-    #[arg(long, value_name = "FILE")]
-    log: Option<PathBuf>,
-    /// End after this time (default on an embedded virtual bus: 2s)
+    /// End after this time, of a log after this time of the log (default on an embedded virtual bus: 2s)
     #[arg(long = "for", value_name = "TIME", value_parser = master::units::parse_duration)]
     duration: Option<Duration>,
     /// The time before each line (`t` of --json stays as it is)
@@ -64,6 +62,12 @@ struct Line {
     objects: Vec<String>,
     #[serde(skip)]
     stamp: String,
+    /// On which bus, in a log that tells.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    interface: Option<String>,
+    /// Whether whoever wrote the log sent it, in a log that tells.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sent: Option<bool>,
 }
 
 impl Report for Line {
@@ -89,24 +93,29 @@ impl Report for Noted {
     }
 }
 
-/// A line of a log that is no frame, and was passed over.
+/// A part of a log that is not read, and was passed over.
 #[derive(Debug, Serialize)]
 struct Skipped {
-    /// Counted from 1.
-    line: usize,
-    /// The line, shortened.
+    /// Of a text, counted from 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    line: Option<u64>,
+    /// Of a binary file, counted from 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    byte: Option<u64>,
+    /// What stands there, shortened.
     skipped: String,
     reason: String,
 }
 
-/// What came of a log with lines that are no frames.
+/// What came of a log with parts that are not read.
 #[derive(Debug, Serialize)]
 struct Summary {
     frames: u64,
     lines_skipped: u64,
+    fd_frames: u64,
 }
 
-/// Lines that are no frames are shown one by one up to this many, then only counted: a file that is no log has thousands.
+/// What is not read is shown one by one up to this many, then only counted: a file that is no log has thousands.
 const SKIPPED_SHOWN: u64 = 20;
 
 /// Where decoded lines and logged frames go.
@@ -116,23 +125,60 @@ struct Sink {
     stamps: Stamps,
     counts: Counts,
     format: Format,
-    log: Option<LogWriter<BufWriter<File>>>,
-    path: Option<PathBuf>,
-    /// Lines of a log that were no frames.
+    /// Where `--log` goes.
+    log: CommandLog,
+    /// Places of a log that were not read.
     lines_skipped: u64,
-    /// Unix time of the time axis's zero, for the log; a recorded bus has Unix times already.
-    unix_zero: Duration,
+    fd_frames: u64,
+    /// The form of the log that is shown, if it is one.
+    of: Option<LogFormat>,
 }
 
 impl Dump {
     /// Shows frames until there are no more, the time is over, or Ctrl-C.
     pub(crate) fn run(&self, global: &Global, format: Format) -> Result<(), Failure> {
-        let mut sink = Sink::new(self, global, format)?;
-        match &global.bus {
-            BusSpec::Sim { file } => self.embedded(file.as_deref(), &mut sink)?,
-            _ => runtime()?.block_on(self.listen(global, &mut sink))?,
+        let file = global.log.as_ref().map(LogPath::create).transpose()?;
+        // A log has Unix times already, and a virtual bus begins with time.
+        let (zero, pace) = match &global.bus {
+            BusSpec::Sim { .. } | BusSpec::Log { .. } => (None, Pace::Free),
+            _ => (Some(WallClock::start()), Pace::RealTime),
+        };
+        let unix_zero = zero.as_ref().map_or(Duration::ZERO, WallClock::unix_zero);
+        let (log, writing) = CommandLog::start(file, interface_of(&global.bus), unix_zero, pace);
+        let mut sink = Sink::new(self, global, format, log)?;
+        let shown = match (&global.bus, &zero) {
+            (BusSpec::Sim { file }, _) => self.embedded(file.as_deref(), &mut sink),
+            (BusSpec::Log { path }, _) => self.of_log(path, &mut sink),
+            (_, Some(clock)) => runtime()?.block_on(self.listen(global, clock, &mut sink)),
+            (_, None) => Ok(()),
+        };
+        let summarised = shown.and_then(|()| sink.summarise());
+        match writing.finish() {
+            Some(missing) => summarised.and(Err(Failure::new(missing))),
+            None => summarised,
         }
-        sink.finish()
+    }
+
+    /// Shows what a log has, as fast as it can be read.
+    fn of_log(&self, path: &Path, sink: &mut Sink) -> Result<(), Failure> {
+        exit_on_signal();
+        let mut reader = open_log(path)?;
+        sink.of = Some(reader.format());
+        let mut first = None;
+        while let Some(entry) = reader.next_entry().map_err(|error| unreadable(path, &error))? {
+            match entry {
+                Entry::Record(record) => {
+                    let at = record.at.unwrap_or(Instant::ZERO);
+                    let began = *first.get_or_insert(at);
+                    if self.duration.is_some_and(|duration| at > began + duration) {
+                        return Ok(());
+                    }
+                    sink.record(record)?;
+                }
+                Entry::Finding(finding) => sink.skip(finding)?,
+            }
+        }
+        Ok(())
     }
 
     fn embedded(&self, file: Option<&Path>, sink: &mut Sink) -> Result<(), Failure> {
@@ -153,14 +199,10 @@ impl Dump {
         Ok(())
     }
 
-    async fn listen(&self, global: &Global, sink: &mut Sink) -> Result<(), Failure> {
+    async fn listen(&self, global: &Global, clock: &WallClock, sink: &mut Sink) -> Result<(), Failure> {
         enter_real_time(global)?;
-        let clock = WallClock::start();
-        let mut bus = global.bus.open(&clock).await.map_err(|error| bus_failure(global, &error))?;
-        if !matches!(global.bus, BusSpec::Log { .. }) {
-            sink.unix_zero = clock.unix_zero();
-            sink.stamps = Stamps::new(self.time, sink.unix_zero);
-        }
+        let mut bus = global.bus.open(clock).await.map_err(|error| bus_failure(global, &error))?;
+        sink.stamps = Stamps::new(self.time, clock.unix_zero());
         let end = self.duration.map(|duration| clock.now() + duration);
         let over = async {
             tokio::select! {
@@ -174,7 +216,7 @@ impl Dump {
                 if result.is_err() {
                     sink.tell_counts();
                 }
-                sink.flush().and(result)
+                result
             }
         }
     }
@@ -185,7 +227,6 @@ async fn follow(bus: &mut AnyBus, sink: &mut Sink) -> Result<Option<BusError>, F
     loop {
         match bus.recv().await {
             Ok((at, Received::Frame(frame))) => sink.take(at, &frame)?,
-            Ok((_, Received::Note(Note::TornRecord(torn)))) => sink.skip(torn)?,
             Ok((at, Received::Note(note))) => sink.note(at, &note)?,
             Err(BusError::EndOfLog { .. }) => return Ok(None),
             Err(error) => return Ok(Some(error)),
@@ -194,32 +235,56 @@ async fn follow(bus: &mut AnyBus, sink: &mut Sink) -> Result<Option<BusError>, F
 }
 
 impl Sink {
-    fn new(dump: &Dump, global: &Global, format: Format) -> Result<Self, Failure> {
-        let path = dump.log.as_deref();
+    fn new(dump: &Dump, global: &Global, format: Format, log: CommandLog) -> Result<Self, Failure> {
         let told = global
             .models
             .iter()
             .map(|(_, model)| *model)
             .chain(global.machine.iter().flat_map(Machine::models).map(|(_, model)| model));
         dump.filter.check(&devices::all().iter().chain(told).collect::<Vec<_>>())?;
-        let log = path.map(File::create).transpose().map_err(|error| log_failure(path, &error))?;
         Ok(Self {
             decoder: decoder(global, &[]),
             filter: dump.filter.clone(),
             stamps: Stamps::new(dump.time, Duration::ZERO),
             counts: Counts::default(),
             format,
-            log: log.map(|file| LogWriter::new(BufWriter::new(file), "can0")),
-            path: path.map(Into::into),
+            log,
             lines_skipped: 0,
-            unix_zero: Duration::ZERO,
+            fd_frames: 0,
+            of: None,
         })
     }
 
-    fn take(&mut self, at: Instant, frame: &Frame) -> Result<(), Failure> {
-        if let Some(log) = &mut self.log {
-            log.write(at + self.unix_zero, frame).map_err(|error| log_failure(self.path.as_deref(), &error))?;
+    /// Shows what stands in a log at one moment, and keeps it as it is in the log of `--log`.
+    fn record(&mut self, record: Record) -> Result<(), Failure> {
+        self.log.record(&record);
+        let at = record.at.unwrap_or(Instant::ZERO);
+        match &record.content {
+            Content::Frame(frame) => {
+                let interface = Some(record.interface.to_string());
+                let sent = record.direction.map(|direction| direction == Direction::Transmitted);
+                self.show(at, frame, interface, sent)
+            }
+            Content::Error(error) => error.notes().try_for_each(|note| self.note(at, &note)),
+            Content::FdFrame { id, length } => {
+                self.fd_frames += 1;
+                self.note(at, &Note::FdFrame { id: *id, length: *length })
+            }
         }
+    }
+
+    fn take(&mut self, at: Instant, frame: &Frame) -> Result<(), Failure> {
+        self.log.frame(frame, at, Direction::Received);
+        self.show(at, frame, None, None)
+    }
+
+    fn show(
+        &mut self,
+        at: Instant,
+        frame: &Frame,
+        interface: Option<String>,
+        sent: Option<bool>,
+    ) -> Result<(), Failure> {
         let decoded = self.decoder.decode(frame);
         let wanted = self.filter.takes(&self.decoder, &decoded);
         self.counts.note(at, &decoded, wanted);
@@ -234,49 +299,63 @@ impl Sink {
             node: decoded.node().map(NodeId::raw),
             objects: decoded.objects().map(|object| object.to_string()).collect(),
             stamp: self.stamps.text(at),
+            interface,
+            sent,
         };
-        self.format.print(&line).map_err(|error| not_printed(&error))
+        self.print(&line)
     }
 
     /// Tells among the frames what the bus says beside them.
     fn note(&mut self, at: Instant, note: &Note) -> Result<(), Failure> {
         let stamp = self.stamps.text(at);
-        let line = Noted { t: at.as_secs_f64(), note: note.kind(), text: note.to_string(), stamp };
-        self.format.print(&line).map_err(|error| not_printed(&error))
+        self.print(&Noted { t: at.as_secs_f64(), note: note.kind(), text: note.to_string(), stamp })
     }
 
-    /// Tells of a line that is passed over: among the frames to programs, beside them to people.
-    fn skip(&mut self, torn: TornRecord) -> Result<(), Failure> {
+    fn print(&self, line: &impl Report) -> Result<(), Failure> {
+        self.format.print(line).map_err(|error| not_printed(&error))
+    }
+
+    /// Tells of what is passed over: among the frames to programs, beside them to people.
+    fn skip(&mut self, finding: Finding) -> Result<(), Failure> {
         self.lines_skipped += 1;
         if self.lines_skipped > SKIPPED_SHOWN {
             return Ok(());
         }
         if self.format.json {
-            let line = Skipped { line: torn.place, skipped: torn.text, reason: torn.reason };
-            return self.format.print_json(&line).map_err(|error| not_printed(&error));
+            let (line, byte) = match finding.place {
+                Place::Line(line) => (Some(line), None),
+                Place::Byte(byte) => (None, Some(byte)),
+            };
+            let skipped = Skipped { line, byte, skipped: finding.text, reason: finding.reason };
+            return self.format.print_json(&skipped).map_err(|error| not_printed(&error));
         }
         // Nobody may be listening any more.
-        let _ = writeln!(io::stderr(), "warning: {torn}");
+        let _ = writeln!(io::stderr(), "warning: {}", plain(&finding.to_string()));
         Ok(())
     }
 
-    /// Tells how many lines were passed over, if any were. A log without a single frame is none.
+    /// Tells how much was passed over, if anything was. A log without a single frame is none.
     fn summarise(&self) -> Result<(), Failure> {
-        let (frames, lines_skipped) = (self.counts.frames(), self.lines_skipped);
+        let (frames, lines_skipped, fd_frames) = (self.counts.frames(), self.lines_skipped, self.fd_frames);
         self.tell_counts();
-        if lines_skipped == 0 {
+        if lines_skipped == 0 && fd_frames == 0 {
             return Ok(());
         }
-        if frames == 0 {
-            return Err(Failure::new(format!("no frame in {lines_skipped} lines: this is no candump log"))
+        if frames == 0 && fd_frames == 0 {
+            let form = self.of.map_or("candump", LogFormat::name);
+            return Err(Failure::new(format!("no frame, and {lines_skipped} findings: this is no {form} log"))
                 .of_kind("no_log")
+                .next("logs are told apart by their first bytes, then by their extension: .log (candump), .asc, .blf, .trc, .pcap, .pcapng")
                 .next("candump -L can0 writes one"));
         }
         if self.format.json {
-            let summary = Summary { frames, lines_skipped };
+            let summary = Summary { frames, lines_skipped, fd_frames };
             return self.format.print_json(&summary).map_err(|error| not_printed(&error));
         }
-        let _ = writeln!(io::stderr(), "warning: {lines_skipped} lines were passed over; {frames} frames read");
+        let _ = writeln!(
+            io::stderr(),
+            "warning: {frames} frames read; {lines_skipped} places were passed over, and {fd_frames} CAN FD frames seen"
+        );
         Ok(())
     }
 
@@ -287,22 +366,19 @@ impl Sink {
             let _ = writeln!(io::stderr(), "{}", self.counts);
         }
     }
+}
 
-    fn flush(&mut self) -> Result<(), Failure> {
-        let Some(log) = &mut self.log else { return Ok(()) };
-        log.flush().map_err(|error| log_failure(self.path.as_deref(), &error))
-    }
+/// Opens a log to be read.
+pub(crate) fn open_log(path: &Path) -> Result<AnyLogReader, Failure> {
+    AnyLogReader::open(path)
+        .map_err(|error| Failure::new(format!("cannot open the log {}", path.display())).of_kind("bus").because(error))
+}
 
-    fn finish(mut self) -> Result<(), Failure> {
-        self.flush()?;
-        self.summarise()
-    }
+/// A log that cannot be read on.
+pub(crate) fn unreadable(path: &Path, error: &io::Error) -> Failure {
+    Failure::new(format!("cannot read the log {} on", path.display())).of_kind("bus").because(error)
 }
 
 fn not_printed(error: &io::Error) -> Failure {
     Failure::new("cannot write to standard output").because(error)
-}
-
-fn log_failure(path: Option<&Path>, error: &std::io::Error) -> Failure {
-    Failure::new(format!("cannot write the log {}", path.unwrap_or(Path::new("")).display())).because(error)
 }

@@ -1,7 +1,9 @@
 //! The commands, one file each (commands that share everything but a word share a file).
 
 pub(crate) mod completions;
+pub(crate) mod convert;
 pub(crate) mod dcf;
+pub(crate) mod decode;
 pub(crate) mod demo;
 pub(crate) mod departures;
 pub(crate) mod drive;
@@ -9,6 +11,8 @@ pub(crate) mod dump;
 pub(crate) mod eds;
 pub(crate) mod emcy;
 pub(crate) mod events;
+pub(crate) mod export;
+pub(crate) mod gateway;
 pub(crate) mod home;
 pub(crate) mod latency;
 pub(crate) mod man_pages;
@@ -19,7 +23,9 @@ pub(crate) mod pdo;
 pub(crate) mod plot;
 pub(crate) mod read;
 pub(crate) mod readings;
+pub(crate) mod record;
 pub(crate) mod repeat;
+pub(crate) mod replay;
 pub(crate) mod run;
 pub(crate) mod scan;
 pub(crate) mod sdo;

@@ -3,8 +3,7 @@
 mod described;
 
 use std::collections::{BTreeSet, VecDeque};
-use std::fs::File;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use can::{Bitrate, Instant};
 use sim::machine::{Realism, TimingMode};
@@ -20,10 +19,9 @@ use crate::embedded;
 use crate::failure::Failure;
 use crate::global::Global;
 use crate::plain::plain;
-use crate::recording::{FrameLog, Pace, RecordFile, RecordOptions};
+use crate::recording::{FrameLog, LogPath, NewLog, Pace, RecordFile, RecordOptions};
 use crate::serve::control::{ControlOptions, ControlServer};
 use crate::serve::eeprom::{EepromError, Eeproms};
-use crate::serve::files::create_log;
 use crate::serve::keeper::{Keeper, file_name};
 use crate::serve::pacer::{Clock, Pacer, Speed};
 use crate::serve::service::{
@@ -136,12 +134,6 @@ pub(crate) struct Sim {
     /// and the drives whose power, statusword or error code has changed. Lines that come before that wait for it; a second `quit` does not.
     #[arg(long, value_name = "real|manual", value_enum, default_value = "real")]
     clock: Clock,
-    /// Write all frames to this file, in candump format
-    ///
-    /// It is a new file, or an empty one, or a candump log, which is replaced. Any other file, a symbolic link, a device and
-    /// a FIFO are refused. When the disk is too slow frames are left out, which is said on standard error.
-    #[arg(long, value_name = "FILE")]
-    log: Option<PathBuf>,
     #[command(flatten)]
     recording: RecordOptions,
     /// Name what is else only counted at the start: the objects of a file that have no effect
@@ -185,10 +177,7 @@ impl Sim {
         }
         machine.join(&mut world).map_err(unusable)?;
         machine.make_real(&mut world);
-        let log =
-            self.log.as_deref().map(create_log).transpose().map_err(|error| {
-                Failure::of_writing("the log", self.log.as_deref().unwrap_or(Path::new("")), &error)
-            })?;
+        let log = global.log.as_ref().map(LogPath::create).transpose()?;
         let real_time = self.clock == Clock::Real && self.speed.is_none();
         let pace = if real_time { Pace::RealTime } else { Pace::Free };
         let record = self.recording.start(&mut world, pace, warnings.clone())?;
@@ -226,7 +215,7 @@ impl Sim {
         &self,
         mut world: ServedWorld,
         eeproms: Option<Eeproms>,
-        (log, record): (Option<File>, Option<RecordFile>),
+        (log, record): (Option<NewLog>, Option<RecordFile>),
         warnings: Speaker,
         global: &Global,
         bridge: Option<&BusSpec>,

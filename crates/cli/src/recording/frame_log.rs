@@ -1,10 +1,10 @@
-//! The log of `--log`: the frames of the bus in candump form.
+//! The log of `sim --log`: the frames of the bus.
 
-use std::io::{BufWriter, Write};
+use std::io::{Seek, Write};
 use std::time::Duration;
 
 use can::{Frame, Instant};
-use transport::log::LogWriter;
+use transport::log::{LogWriter, Record};
 
 use super::background::{Background, MAX_BATCHES, Words};
 use crate::serve::speaker::Speaker;
@@ -16,15 +16,19 @@ type Batch = Vec<(Instant, Frame)>;
 pub(crate) struct FrameLog(Background<Batch>);
 
 impl FrameLog {
-    /// Writes to `file` from now on, with times counted from `unix_zero`. What goes wrong is told to `speaker`.
-    pub(crate) fn start(file: impl Write + Send + 'static, unix_zero: Duration, speaker: Speaker) -> Self {
+    /// Writes to `log` from now on, with times counted from `unix_zero`. What goes wrong is told to `speaker`.
+    pub(crate) fn start<W: Write + Seek + Send + 'static>(
+        log: LogWriter<W>,
+        unix_zero: Duration,
+        speaker: Speaker,
+    ) -> Self {
         let words = Words { file: "the log", pieces: "frames" };
-        let log = LogWriter::new(BufWriter::new(file), "can0");
-        let write = move |log: &mut LogWriter<_>, batch: Batch| {
-            batch.iter().try_for_each(|(at, frame)| log.write(*at + unix_zero, frame))?;
+        let write = move |log: &mut LogWriter<W>, batch: Batch| {
+            batch.iter().try_for_each(|(at, frame)| log.write(&Record::of_frame(*at + unix_zero, *frame)))?;
             log.flush()
         };
-        Self(Background::start(words, log, write, |_| Ok(()), MAX_BATCHES, speaker))
+        let end = |log: LogWriter<W>| log.finish().map(drop);
+        Self(Background::start(words, log, write, end, MAX_BATCHES, speaker))
     }
 
     /// Takes frames that were carried.
@@ -46,6 +50,7 @@ mod tests {
     use super::*;
     use std::io;
     use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
+    use transport::log::Format;
 
     const SOON: Duration = Duration::from_secs(20);
 
@@ -64,6 +69,17 @@ mod tests {
         }
     }
 
+    impl Seek for Disk {
+        fn seek(&mut self, _: io::SeekFrom) -> io::Result<u64> {
+            Err(io::ErrorKind::Unsupported.into())
+        }
+    }
+
+    /// A candump log on such a disk.
+    fn log(disk: Disk) -> LogWriter<io::BufWriter<Disk>> {
+        LogWriter::new(io::BufWriter::new(disk), Format::Candump).unwrap()
+    }
+
     fn batch(second: usize) -> Batch {
         vec![(Instant::from_secs(second as u64), "701#05".parse().expect("a frame"))]
     }
@@ -72,7 +88,7 @@ mod tests {
     fn a_disk_that_stands_still_holds_up_nobody_and_costs_the_newest_frames() {
         let (allow, allowed) = channel();
         let (taken, disk) = sync_channel(1000);
-        let mut log = FrameLog::start(Disk(allowed, taken), Duration::ZERO, Speaker::of_warnings());
+        let mut log = FrameLog::start(log(Disk(allowed, taken)), Duration::ZERO, Speaker::of_warnings());
         for second in 0..MAX_BATCHES + 50 {
             log.write(batch(second));
         }
@@ -92,7 +108,7 @@ mod tests {
         let (allow, allowed) = channel();
         let (taken, disk) = sync_channel(0);
         drop((allow, disk));
-        let mut log = FrameLog::start(Disk(allowed, taken), Duration::ZERO, Speaker::of_warnings());
+        let mut log = FrameLog::start(log(Disk(allowed, taken)), Duration::ZERO, Speaker::of_warnings());
         for second in 0..3 * MAX_BATCHES {
             log.write(batch(second));
         }

@@ -1,10 +1,16 @@
-//! What is written about a run while it runs: the frames as a candump log, the signals as a record.
+//! What is written about a run while it runs: the frames as a log, the signals as a record.
 
 mod background;
+mod command_log;
 mod file;
 mod frame_log;
+mod log_options;
+mod object_record;
 mod options;
 
+pub(crate) use command_log::{CommandLog, Ears, Logged};
 pub(crate) use file::{Batch, Pace, RecordFile};
 pub(crate) use frame_log::FrameLog;
+pub(crate) use log_options::{LogPath, NewLog, interface_of, log_path};
+pub(crate) use object_record::{ObjectBatch, ObjectRecord};
 pub(crate) use options::RecordOptions;

@@ -8,6 +8,7 @@ use std::io::{self, Read};
 use std::path::Path;
 
 use testbench::recording::Kind;
+use transport::log::Format;
 
 /// What a path names, without following a last symbolic link.
 ///
@@ -58,10 +59,10 @@ pub(crate) fn create_new(path: &Path) -> io::Result<File> {
     OpenOptions::new().write(true).create_new(true).open(path)
 }
 
-/// An empty file to write a log to: a new one, or one that is empty or begins as a candump log does, with `(`. Any other
+/// An empty file to write a log to: a new one, or one that is empty or begins as a log of that format does. Any other
 /// file is somebody's, and stays as it is.
-pub(crate) fn create_log(path: &Path) -> io::Result<File> {
-    create_or_replace(path, b"(", "candump log")
+pub(crate) fn create_log(path: &Path, format: Format) -> io::Result<File> {
+    create_or_replace(path, format.written_begin().unwrap_or_default(), &format!("{format} log"))
 }
 
 /// An empty file to write a record to: a new one, or one that is empty or a record already.
@@ -117,14 +118,14 @@ mod tests {
     fn a_log_replaces_a_log_and_nothing_else() {
         let place = scratch("logs");
         let (log, letter) = (place.join("log"), place.join("letter"));
-        drop(create_log(&log).unwrap());
+        drop(create_log(&log, Format::Candump).unwrap());
         fs::write(&log, "(1.0) can0 701#05\n").unwrap();
-        drop(create_log(&log).unwrap());
+        drop(create_log(&log, Format::Candump).unwrap());
         assert_eq!(fs::read(&log).unwrap(), b"");
         fs::write(&letter, "Dear reader").unwrap();
-        assert!(create_log(&letter).unwrap_err().to_string().contains("no candump log"));
+        assert!(create_log(&letter, Format::Candump).unwrap_err().to_string().contains("no candump log"));
         assert_eq!(fs::read(&letter).unwrap(), b"Dear reader");
-        assert!(create_log(&place).unwrap_err().to_string().contains("directory"));
+        assert!(create_log(&place, Format::Candump).unwrap_err().to_string().contains("directory"));
         fs::remove_dir_all(place).unwrap();
     }
 
@@ -152,12 +153,12 @@ mod tests {
         let (target, link) = (place.join("target"), place.join("link"));
         fs::write(&target, "(mine").unwrap();
         std::os::unix::fs::symlink(&target, &link).unwrap();
-        assert!(create_log(&link).unwrap_err().to_string().contains("symbolic link"));
+        assert!(create_log(&link, Format::Candump).unwrap_err().to_string().contains("symbolic link"));
         assert!(read_bounded(&link, 100).unwrap_err().to_string().contains("symbolic link"));
         assert_eq!(fs::read(&target).unwrap(), b"(mine");
         // One that leads nowhere is no free name either.
         fs::remove_file(&target).unwrap();
-        assert!(create_log(&link).is_err() && create_new(&link).is_err() && !target.exists());
+        assert!(create_log(&link, Format::Candump).is_err() && create_new(&link).is_err() && !target.exists());
         fs::remove_dir_all(place).unwrap();
     }
 

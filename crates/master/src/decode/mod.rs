@@ -6,6 +6,7 @@
 
 mod block;
 mod common;
+mod motion;
 mod node_models;
 mod pdo;
 mod sdo;
@@ -35,6 +36,7 @@ use pdo::PdoBook;
 use sdo::Conversations;
 
 pub use common::{common_name, common_row, common_type};
+pub(crate) use motion::object_may_move;
 pub use pdo::Pdo;
 pub use sdo::Sdo;
 pub use step::{SdoStep, Side};

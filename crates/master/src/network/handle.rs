@@ -174,7 +174,7 @@ impl Network {
     }
 
     /// Notes that this program has set the axis with this controlword in motion.
-    pub(crate) fn note_moved(&self, node: NodeId, controlword: Mux) {
+    pub fn note_moved(&self, node: NodeId, controlword: Mux) {
         self.lock().moved.insert(node, controlword);
     }
 

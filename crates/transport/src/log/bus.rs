@@ -1,29 +1,31 @@
 //! A log as a bus that only tells.
 
-use std::fs::File;
-use std::io::BufReader;
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
 use can::{Frame, Instant};
 
-use super::reader::{LogError, LogReader};
-use crate::{AsyncBus, BusError, Note, Received, TornRecord};
+use super::reader::AnyLogReader;
+use super::record::Entry;
+use crate::{AsyncBus, BusError, Note, Received};
 
-/// A candump log replayed as fast as it is read, each frame with its logged time; read only.
+/// A log replayed as fast as it is read, each frame with its logged time; read only.
 ///
-/// Lines are read with blocking calls: a file does not keep a reader waiting as a socket does.
+/// It is read with blocking calls: a file does not keep a reader waiting as a socket does.
 #[derive(Debug)]
 pub struct LogBus {
     path: PathBuf,
-    reader: LogReader<BufReader<File>>,
+    reader: AnyLogReader,
+    /// What the record that was read last says and has not been given.
+    more: VecDeque<Received>,
 }
 
 impl LogBus {
-    /// Opens the log `path`.
+    /// Opens the log `path`, of any form that is known; `-` is standard input.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, BusError> {
         let path = path.as_ref().to_owned();
-        match File::open(&path) {
-            Ok(file) => Ok(Self { reader: LogReader::new(BufReader::new(file)), path }),
+        match AnyLogReader::open(&path) {
+            Ok(reader) => Ok(Self { reader, path, more: VecDeque::new() }),
             Err(source) => Err(BusError::OpenLog { path, source }),
         }
     }
@@ -35,16 +37,18 @@ impl AsyncBus for LogBus {
         Err(BusError::ReadOnly { path: self.path.clone() })
     }
 
-    /// [`BusError::EndOfLog`] behind the last frame. A line that is no frame is a note, at the time of the frame before.
+    /// [`BusError::EndOfLog`] behind the last frame. What is no frame is a note; what is torn, at the time of the frame before.
     async fn recv(&mut self) -> Result<(Instant, Received), BusError> {
-        match self.reader.next_frame() {
-            Ok(Some((at, frame))) => Ok((at, frame.into())),
-            Ok(None) => Err(BusError::EndOfLog { path: self.path.clone() }),
-            Err(LogError::Line { line, text, source }) => {
-                let torn = TornRecord { place: line, text, reason: source.to_string() };
-                Ok((self.reader.last_time(), Note::TornRecord(torn).into()))
+        loop {
+            if let Some(received) = self.more.pop_front() {
+                return Ok((self.reader.last_time(), received));
             }
-            Err(source) => Err(BusError::Log { path: self.path.clone(), source }),
+            match self.reader.next_entry() {
+                Ok(Some(Entry::Record(record))) => self.more.extend(record.content.received()),
+                Ok(Some(Entry::Finding(finding))) => self.more.push_back(Note::TornRecord(finding).into()),
+                Ok(None) => return Err(BusError::EndOfLog { path: self.path.clone() }),
+                Err(source) => return Err(BusError::Log { path: self.path.clone(), source }),
+            }
         }
     }
 }

@@ -1,162 +1,142 @@
-//! Log files line by line: a reader that says which line is wrong, and a writer.
+//! Reads a log of any known form, one entry at a time.
 
-use std::io::{self, BufRead, Read, Write};
+use std::fmt;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read};
+use std::path::Path;
 
-use can::{Frame, Instant};
+use can::Instant;
 
-use super::record::{ParseRecordError, emit_line, parse_line};
+use super::blf::BlfReader;
+use super::finding::{Finding, Place};
+use super::format::{ENOUGH_TO_TELL, Format};
+use super::lines::Lines;
+use super::pcap::PcapReader;
+use super::pcapng::PcapngReader;
+use super::record::Entry;
+use super::{asc, candump, trc};
 use crate::text;
 
-/// Longest line that is read, in bytes; candump's own stay below 120.
-const MAX_LINE_LENGTH: u64 = 1024;
-
-/// Why a log cannot be read on.
-#[derive(Debug, thiserror::Error)]
-pub enum LogError {
-    /// The file itself.
-    #[error("reading line {line}")]
-    Io {
-        /// Counted from 1.
-        line: usize,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// A line that is no frame.
-    #[error("line {line}, '{text}'")]
-    Line {
-        /// Counted from 1.
-        line: usize,
-        /// The line, shortened.
-        text: String,
-        /// What is wrong with it.
-        source: ParseRecordError,
-    },
-}
-
-/// Reads a candump log.
-#[derive(Debug)]
+/// Reads a log: records, and findings where something is passed over. After a finding reading goes on; memory is bounded
+/// whatever the file says.
 pub struct LogReader<R> {
-    input: R,
-    line: usize,
-    buffer: Vec<u8>,
+    form: Form<R>,
+    format: Format,
     last: Instant,
 }
 
+impl<R> fmt::Debug for LogReader<R> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("LogReader").field("format", &self.format).finish_non_exhaustive()
+    }
+}
+
+enum Form<R> {
+    Candump(Lines<R>),
+    Asc(Lines<R>, asc::Parser),
+    Trc(Lines<R>, trc::Parser),
+    Blf(BlfReader<R>),
+    Pcap(PcapReader<R>),
+    Pcapng(PcapngReader<R>),
+}
+
+/// A log of any place.
+pub type AnyLogReader = LogReader<Box<dyn BufRead + Send>>;
+
+impl AnyLogReader {
+    /// The log `path`, or standard input for `-`. Its form is that of its first bytes, where they tell one, else that of its
+    /// extension, else candump's.
+    ///
+    /// # Errors
+    /// That of opening the file, or of reading its first bytes.
+    pub fn open(path: &Path) -> io::Result<Self> {
+        let mut input: Box<dyn BufRead + Send> = match path.to_str() {
+            Some("-") => Box::new(BufReader::new(io::stdin())),
+            _ => Box::new(BufReader::with_capacity(1 << 16, File::open(path)?)),
+        };
+        let begin = input.fill_buf()?;
+        let begin = &begin[..begin.len().min(ENOUGH_TO_TELL)];
+        let format = Format::of_content(begin).or_else(|| Format::of_name(path)).unwrap_or(Format::Candump);
+        Ok(Self::new(input, format))
+    }
+}
+
 impl<R: BufRead> LogReader<R> {
-    /// A reader over `input`.
-    pub fn new(input: R) -> Self {
-        Self { input, line: 0, buffer: Vec::new(), last: Instant::ZERO }
+    /// A reader of `input`, which has this form.
+    pub fn new(input: R, format: Format) -> Self {
+        let form = match format {
+            Format::Candump => Form::Candump(Lines::new(input)),
+            Format::Asc => Form::Asc(Lines::new(input), asc::Parser::default()),
+            Format::Trc => Form::Trc(Lines::new(input), trc::Parser::default()),
+            Format::Blf => Form::Blf(BlfReader::new(input)),
+            Format::Pcap => Form::Pcap(PcapReader::new(input)),
+            Format::Pcapng => Form::Pcapng(PcapngReader::new(input)),
+        };
+        Self { form, format, last: Instant::ZERO }
     }
 
-    /// The time stamp of the frame read last; zero before the first.
-    pub fn last_time(&self) -> Instant {
+    /// The form that is read.
+    pub const fn format(&self) -> Format {
+        self.format
+    }
+
+    /// The time of the record read last; zero before the first.
+    pub const fn last_time(&self) -> Instant {
         self.last
     }
 
-    /// The next frame with its time stamp (that of the frame before, where the line has none); `None` at the end.
+    /// What comes next; `None` at the end. A record without a time gets that of the record before.
     ///
-    /// After an error the next call goes on with the next line.
-    pub fn next_frame(&mut self) -> Result<Option<(Instant, Frame)>, LogError> {
-        loop {
-            self.line += 1;
-            self.buffer.clear();
-            let mut limited = (&mut self.input).take(MAX_LINE_LENGTH);
-            let read = limited.read_until(b'\n', &mut self.buffer);
-            if read.map_err(|source| LogError::Io { line: self.line, source })? == 0 {
-                return Ok(None);
+    /// # Errors
+    /// That of reading the file.
+    pub fn next_entry(&mut self) -> io::Result<Option<Entry>> {
+        let entry = match &mut self.form {
+            Form::Candump(lines) => {
+                next_of_lines(lines, |line| candump::parse_line(line).map_err(|error| error.to_string()))
             }
-            if !self.buffer.ends_with(b"\n") {
-                // What is beyond the longest line belongs to this one.
-                self.input.skip_until(b'\n').map_err(|source| LogError::Io { line: self.line, source })?;
-            }
-            let text = String::from_utf8_lossy(&self.buffer);
-            let record = parse_line(&text).map_err(|source| LogError::Line {
-                line: self.line,
-                text: text::shown(&text),
-                source,
-            })?;
-            if let Some(record) = record {
-                self.last = record.at.unwrap_or(self.last);
-                return Ok(Some((self.last, record.frame)));
+            Form::Asc(lines, parser) => next_of_lines(lines, |line| parser.line(line).map_err(str::to_owned)),
+            Form::Trc(lines, parser) => next_of_lines(lines, |line| parser.line(line).map_err(str::to_owned)),
+            Form::Blf(reader) => reader.next_entry(),
+            Form::Pcap(reader) => reader.next_entry(),
+            Form::Pcapng(reader) => reader.next_entry(),
+        };
+        let mut entry = entry?;
+        if let Some(Entry::Record(record)) = &mut entry {
+            self.last = *record.at.get_or_insert(self.last);
+        }
+        Ok(entry)
+    }
+}
+
+impl<R: BufRead> Iterator for LogReader<R> {
+    type Item = io::Result<Entry>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.next_entry().transpose()
+    }
+}
+
+fn next_of_lines<R: BufRead>(
+    lines: &mut Lines<R>,
+    mut parse: impl FnMut(&str) -> Result<Option<super::Record>, String>,
+) -> io::Result<Option<Entry>> {
+    while let Some((line, text)) = lines.next()? {
+        match parse(&text) {
+            Ok(None) => {}
+            Ok(Some(record)) => return Ok(Some(Entry::Record(record))),
+            Err(reason) => {
+                let finding = Finding { place: Place::Line(line), text: text::shown(&text), reason };
+                return Ok(Some(Entry::Finding(finding)));
             }
         }
     }
+    Ok(None)
 }
 
-/// Writes a candump log.
-#[derive(Debug)]
-pub struct LogWriter<W> {
-    output: W,
-    interface: String,
-    buffer: Vec<u8>,
-}
-
-impl<W: Write> LogWriter<W> {
-    /// A writer that names `interface` on every line.
-    pub fn new(output: W, interface: impl Into<String>) -> Self {
-        Self { output, interface: interface.into(), buffer: Vec::new() }
-    }
-
-    /// Writes one line. `at` is what the log shall say, usually Unix time.
-    pub fn write(&mut self, at: Instant, frame: &Frame) -> io::Result<()> {
-        self.buffer.clear();
-        emit_line(at, &self.interface, frame, &mut self.buffer);
-        self.output.write_all(&self.buffer)
-    }
-
-    /// Passes everything written on to the system.
-    pub fn flush(&mut self) -> io::Result<()> {
-        self.output.flush()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::error::Error;
-
-    use super::*;
-
-    #[test]
-    fn an_error_names_its_line_and_reading_goes_on() {
-        let log = "(1.0) can0 701#00\n\n(1.5) can0 701#0\n can0  702  [1]  05\n(1.7) can0 703#";
-        let mut reader = LogReader::new(log.as_bytes());
-        assert_eq!(reader.next_frame().unwrap(), Some((Instant::from_secs(1), "701#00".parse().unwrap())));
-        let error = reader.next_frame().unwrap_err();
-        assert_eq!(error.to_string(), "line 3, '(1.5) can0 701#0'");
-        assert!(error.source().unwrap().to_string().contains("pairs of hexadecimal digits"));
-        assert_eq!(reader.next_frame().unwrap(), Some((Instant::from_secs(1), "702#05".parse().unwrap())));
-        assert_eq!(reader.next_frame().unwrap(), Some((Instant::from_millis(1700), "703#".parse().unwrap())));
-        assert!(reader.next_frame().unwrap().is_none());
-    }
-
-    #[test]
-    fn a_line_that_is_too_long_is_one_line() {
-        let log = format!("(1.0) can0 701#{}\n(1.5) can0 702#05\n", "0".repeat(5000));
-        let mut reader = LogReader::new(log.as_bytes());
-        assert!(matches!(reader.next_frame(), Err(LogError::Line { line: 1, .. })));
-        assert_eq!(reader.next_frame().unwrap(), Some((Instant::from_millis(1500), "702#05".parse().unwrap())));
-        assert!(reader.next_frame().unwrap().is_none());
-    }
-
-    #[test]
-    fn a_file_without_line_feeds_is_not_read_into_memory() {
-        let mut reader = LogReader::new(io::repeat(b'x').take(1 << 20).into_buf());
-        assert!(matches!(reader.next_frame(), Err(LogError::Line { line: 1, .. })));
-        assert!(reader.buffer.capacity() <= 4 * MAX_LINE_LENGTH as usize);
-    }
-
-    trait IntoBuf: Read + Sized {
-        fn into_buf(self) -> io::BufReader<Self> {
-            io::BufReader::new(self)
-        }
-    }
-    impl<R: Read> IntoBuf for R {}
-
-    #[test]
-    fn the_writer_writes_the_log_form() {
-        let mut writer = LogWriter::new(Vec::new(), "can0");
-        writer.write(Instant::from_micros(1_700_000_000_123_456), &"604#40".parse().unwrap()).unwrap();
-        writer.write(Instant::from_millis(1500), &"123#R4".parse().unwrap()).unwrap();
-        assert_eq!(writer.output, b"(1700000000.123456) can0 604#40\n(0000000001.500000) can0 123#R4\n");
+/// Bytes that are read for what they are: see [`LogReader`].
+impl<R: Read> LogReader<BufReader<R>> {
+    /// [`new`](Self::new) over a reader without a buffer.
+    pub fn buffered(input: R, format: Format) -> Self {
+        Self::new(BufReader::new(input), format)
     }
 }

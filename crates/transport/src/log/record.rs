@@ -1,218 +1,180 @@
-//! One line of a candump log.
-//!
-//! Read are the log form of `candump -l` and `-L` (`(1700000000.123456) can0 604#4041600000000000`, with or without a
-//! direction behind it) and the screen form of plain `candump`, `-ta` and `-td`
-//! (`(1700000000.123456)  can0  604   [8]  40 41 60 00 00 00 00 00`). Written is the log form. Calendar times (`-tA`) are
-//! refused: they need a time zone that the log does not tell.
+//! What a log holds, whatever its form: frames with their time, interface and direction, and what stands between them.
 
-use can::{CanId, Frame, Instant, MAX_DATA_LENGTH, ParseFrameError};
+use std::fmt;
 
-use crate::text::{self, push_hex, push_hex_id, push_padded};
+use can::{CanId, Frame, Instant};
 
-/// A frame in a log.
+use super::finding::Finding;
+use crate::{Note, Received, socketcan};
+
+/// What stands in a log at one moment.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Record {
-    /// The time stamp, for `-l`, `-L` and `-ta` Unix time; `None` where the line has none.
+    /// When: Unix time, or time since the log's begin where the log has no calendar. `None` where it has no time at all.
     pub at: Option<Instant>,
-    /// The interface, such as `can0`.
-    pub interface: String,
-    /// The frame.
-    pub frame: Frame,
+    /// On which bus.
+    pub interface: Interface,
+    /// Whether the logging program sent it; `None` where the log does not tell.
+    pub direction: Option<Direction>,
+    /// What was on the bus.
+    pub content: Content,
 }
 
 impl Record {
-    /// Appends the line in log form, line feed included.
-    pub fn emit(&self, out: &mut Vec<u8>) {
-        emit_line(self.at.unwrap_or(Instant::ZERO), &self.interface, &self.frame, out);
+    /// A frame of the bus called `can0`, of nobody in particular.
+    pub fn of_frame(at: Instant, frame: Frame) -> Self {
+        let content = Content::Frame(frame);
+        Self { at: Some(at), interface: Interface::default(), direction: None, content }
     }
-}
 
-/// Appends a line in log form: `(1700000000.123456) can0 604#4041600000000000`.
-pub(super) fn emit_line(at: Instant, interface: &str, frame: &Frame, out: &mut Vec<u8>) {
-    out.push(b'(');
-    push_padded(out, at.as_nanos() / 1_000_000_000, 10);
-    out.push(b'.');
-    push_padded(out, at.as_nanos() % 1_000_000_000 / 1_000, 6);
-    out.extend_from_slice(b") ");
-    out.extend_from_slice(interface.as_bytes());
-    out.push(b' ');
-    push_hex_id(out, frame.id());
-    out.push(b'#');
-    if frame.is_remote() {
-        out.extend_from_slice(&[b'R', b'0' + frame.dlc()]);
-    }
-    for byte in frame.data() {
-        push_hex(out, u32::from(*byte), 2);
-    }
-    out.push(b'\n');
-}
-
-/// Why a line of a log is no frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum ParseRecordError {
-    /// The parenthesis is not closed, or what stands in it is no number of seconds.
-    #[error("the time stamp must be seconds in parentheses, such as (1700000000.123456); log with candump -L or -ta")]
-    TimeStamp,
-    /// Nothing behind the time stamp.
-    #[error("no interface name; expected e.g. (1700000000.123456) can0 604#4041600000000000")]
-    Interface,
-    /// Nothing behind the interface.
-    #[error("no frame; expected e.g. (1700000000.123456) can0 604#4041600000000000")]
-    Missing,
-    /// The log form's frame.
-    #[error(transparent)]
-    Frame(#[from] ParseFrameError),
-    /// The screen form's frame.
-    #[error("expected an identifier of 3 or 8 hexadecimal digits, a length from [0] to [8] and as many bytes")]
-    Screen,
-}
-
-/// Reads a line; `None` for an empty line, a comment (`#`) and an error frame, which say nothing about traffic.
-pub fn parse_line(line: &str) -> Result<Option<Record>, ParseRecordError> {
-    let line = line.trim();
-    if line.is_empty() || line.starts_with('#') {
-        return Ok(None);
-    }
-    let (at, rest) = match line.strip_prefix('(') {
-        Some(rest) => {
-            let (stamp, rest) = rest.split_once(')').ok_or(ParseRecordError::TimeStamp)?;
-            (Some(text::parse_seconds(stamp.trim()).ok_or(ParseRecordError::TimeStamp)?), rest)
+    /// The frame, if it is one of classical CAN.
+    pub const fn frame(&self) -> Option<&Frame> {
+        match &self.content {
+            Content::Frame(frame) => Some(frame),
+            Content::Error(_) | Content::FdFrame { .. } => None,
         }
-        None => (None, line),
-    };
-    let mut words = rest.split_ascii_whitespace();
-    let interface = words.next().ok_or(ParseRecordError::Interface)?;
-    let words: Vec<&str> = words.collect();
-    let frame = match words.first() {
-        None => return Err(ParseRecordError::Missing),
-        Some(word) if word.contains('#') => parse_log_form(word)?,
-        Some(_) => parse_screen_form(&words).ok_or(ParseRecordError::Screen)?,
-    };
-    Ok(frame.map(|frame| Record { at, interface: interface.to_owned(), frame }))
+    }
 }
 
-fn parse_log_form(word: &str) -> Result<Option<Frame>, ParseFrameError> {
-    let id = word.split('#').next().unwrap_or_default();
-    if is_error_frame(id) { Ok(None) } else { word.parse().map(Some) }
+/// What was on the bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Content {
+    /// A frame of classical CAN.
+    Frame(Frame),
+    /// An error frame, as Linux tells of one.
+    Error(RawErrorFrame),
+    /// A CAN FD frame, which CANopen (CiA 301) has not; its data is passed over.
+    FdFrame {
+        /// Its identifier.
+        id: CanId,
+        /// Bytes of data, 0 to 64.
+        length: u8,
+    },
 }
 
-/// `604 [8] 40 41 ..`, `123 [4] remote request`; `-x` puts `TX - -` or `RX - -` first, `-a` the text last. The outer `None`
-/// is a malformed line, the inner one an error frame.
-fn parse_screen_form(words: &[&str]) -> Option<Option<Frame>> {
-    let words = match words {
-        ["RX" | "TX", flags @ ..] => {
-            &flags[flags.iter().take_while(|flag| matches!(**flag, "-" | "B" | "E")).count()..]
+/// An error frame in the form of Linux (`linux/can/error.h`), which the forms of logs share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RawErrorFrame {
+    /// Error classes, bits 0 to 28 of the identifier.
+    pub class: u32,
+    /// What the classes say in detail.
+    pub data: [u8; 8],
+}
+
+impl RawErrorFrame {
+    /// What a log means that says "error frame" and no more: class `CAN_ERR_BUSERROR`.
+    pub const UNTOLD: Self = Self { class: 0x80, data: [0; 8] };
+
+    /// What it says.
+    pub fn notes(self) -> impl Iterator<Item = Note> {
+        socketcan::notes_of(self.class, self.data)
+    }
+}
+
+impl Content {
+    /// What a bus would have given at that moment: mostly one thing, of an error frame all that it says.
+    pub fn received(self) -> impl Iterator<Item = Received> {
+        let (one, error) = match self {
+            Self::Frame(frame) => (Some(frame.into()), None),
+            Self::FdFrame { id, length } => (Some(Note::FdFrame { id, length }.into()), None),
+            Self::Error(error) => (None, Some(error)),
+        };
+        one.into_iter().chain(error.into_iter().flat_map(RawErrorFrame::notes).map(Received::from))
+    }
+}
+
+/// Which way a frame went, seen from the program that wrote the log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// It came from the bus.
+    Received,
+    /// The program sent it.
+    Transmitted,
+}
+
+/// Longest name of an interface on Linux (IFNAMSIZ without its terminating zero).
+const MAX_NAME_LENGTH: usize = 15;
+
+/// Name of a bus, such as `can0`, at most 15 characters without white space. Formats that number their buses from 1 on mean
+/// `can0` by the first.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct Interface {
+    name: [u8; MAX_NAME_LENGTH],
+    length: u8,
+}
+
+impl Interface {
+    /// `name`, with everything that is no printable ASCII replaced, and cut where it is too long.
+    pub fn named(name: &str) -> Self {
+        let mut interface = Self { name: [0; MAX_NAME_LENGTH], length: 0 };
+        for char in name.chars().take(MAX_NAME_LENGTH) {
+            interface.name[usize::from(interface.length)] = if char.is_ascii_graphic() { char as u8 } else { b'_' };
+            interface.length += 1;
         }
-        _ => words,
-    };
-    let [id, length, rest @ ..] = words else { return None };
-    if is_error_frame(id) {
-        return Some(None);
+        if interface.length == 0 { Self::default() } else { interface }
     }
-    let id = parse_id(id)?;
-    let length = match length.as_bytes() {
-        [b'[', digit @ b'0'..=b'8', b']'] => usize::from(digit - b'0'),
-        _ => return None,
-    };
-    if let ["remote", "request", ..] = rest {
-        return Some(Some(Frame::remote(id, length as u8)));
+
+    /// The bus that a format numbers so, from 1 on.
+    pub fn numbered(number: u16) -> Self {
+        Self::named(&format!("can{}", number.saturating_sub(1)))
     }
-    let mut data = [0; MAX_DATA_LENGTH];
-    for (byte, word) in data[..length].iter_mut().zip(rest.get(..length)?) {
-        *byte = text::parse_hex(word, 2).filter(|_| word.len() == 2)? as u8;
+
+    /// The name.
+    pub fn name(&self) -> &str {
+        str::from_utf8(&self.name[..usize::from(self.length)]).unwrap_or("can0")
     }
-    match rest.get(length) {
-        Some(more) if !more.starts_with('\'') => None,
-        _ => Some(Some(Frame::new(id, &data[..length]))),
+
+    /// The number for formats without names: one more than the digits at the name's end, 1 without digits.
+    pub fn number(&self) -> u16 {
+        let name = self.name();
+        let digits = name.len() - name.trim_end_matches(|char: char| char.is_ascii_digit()).len();
+        let number: Option<u16> = name[name.len() - digits..].parse().ok();
+        number.and_then(|number| number.checked_add(1)).unwrap_or(1)
     }
 }
 
-fn parse_id(word: &str) -> Option<CanId> {
-    let raw = text::parse_hex(word, 8)?;
-    match word.len() {
-        3 if raw <= u32::from(CanId::MAX_STANDARD) => Some(CanId::standard(raw as u16)),
-        8 if raw <= CanId::MAX_EXTENDED => Some(CanId::extended(raw)),
-        _ => None,
+impl Default for Interface {
+    fn default() -> Self {
+        Self::named("can0")
     }
 }
 
-/// SocketCAN writes error frames with bit 29 of the identifier set (CAN_ERR_FLAG).
-fn is_error_frame(id: &str) -> bool {
-    id.len() == 8 && text::parse_hex(id, 8).is_some_and(|raw| raw & 0x2000_0000 != 0)
+impl fmt::Debug for Interface {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl fmt::Display for Interface {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// The next thing in a log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Entry {
+    /// What was on a bus.
+    Record(Record),
+    /// Something that is not read, and was passed over.
+    Finding(Finding),
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::Random;
-
-    fn record(nanos: u64, frame: &str) -> Record {
-        Record { at: Some(Instant::from_nanos(nanos)), interface: "can0".into(), frame: frame.parse().unwrap() }
-    }
 
     #[test]
-    fn reads_every_form_that_candump_writes() {
-        const T: u64 = 1_700_000_000_123_456_000;
-        for (line, expected) in [
-            ("(1700000000.123456) can0 604#4041600000000000", record(T, "604#4041600000000000")),
-            ("(1700000000.123456) can0 604#4041 R", record(T, "604#4041")),
-            ("(1700000000.123456) can0 00000604#R4\r", record(T, "00000604#R4")),
-            (" (1700000000.123456)  can0  604   [8]  40 41 60 00 00 00 00 00", record(T, "604#4041600000000000")),
-            (" (1700000000.123456)  can0  080   [0] ", record(T, "080#")),
-            (" (000.000100)  can0  123   [4]  remote request", record(100_000, "123#R4")),
-            (" (0.000100)  can0  TX - -  123   [2]  41 42", record(100_000, "123#4142")),
-            (" (0.000100)  can0  RX B E  123   [2]  41 42   'AB'", record(100_000, "123#4142")),
-            ("  can0  00000604   [1]  07", Record { at: None, ..record(0, "00000604#07") }),
-        ] {
-            assert_eq!(parse_line(line), Ok(Some(expected)), "{line}");
-        }
-        for line in
-            ["", "  ", "# comment", "(1.0) can0 20000080#0000000000000000", " can0  20000004   [8]  00 04 ERRORFRAME"]
+    fn an_interface_has_a_name_and_a_number() {
+        for (name, shown, number) in
+            [("can0", "can0", 1), ("vcan12", "vcan12", 13), ("pcan", "pcan", 1), ("", "can0", 1), ("a b", "a_b", 1)]
         {
-            assert_eq!(parse_line(line), Ok(None), "{line}");
+            let interface = Interface::named(name);
+            assert_eq!((interface.name(), interface.number()), (shown, number));
         }
-    }
-
-    #[test]
-    fn says_what_is_wrong_with_a_line() {
-        use ParseRecordError::*;
-        for (line, error) in [
-            ("(2023-11-14 22:13:20.123456) can0 604#", TimeStamp),
-            ("(1.5 can0 604#", TimeStamp),
-            ("(1.5)", Interface),
-            ("(1.5) can0", Missing),
-            ("(1.5) can0 604##1", Frame(ParseFrameError::CanFd)),
-            ("(1.5) can0 604#4", Frame(ParseFrameError::BadData)),
-            ("(1.5) can0 604 [9] 1", Screen),
-            ("(1.5) can0 604 [2] 11", Screen),
-            ("(1.5) can0 604 [1] 11 22", Screen),
-            ("(1.5) can0 60 [0]", Screen),
-            ("(1.5) can0 TX", Screen),
-            ("hello", Missing),
-        ] {
-            assert_eq!(parse_line(line), Err(error), "{line}");
-        }
-    }
-
-    #[test]
-    fn reads_what_it_writes() {
-        let mut random = Random::new(0x5EED_0005);
-        for _ in 0..2_000 {
-            let at = Some(Instant::from_micros(random.next() >> 12));
-            let record = Record { at, interface: "vcan0".into(), frame: random.frame() };
-            let mut out = Vec::new();
-            record.emit(&mut out);
-            assert_eq!(parse_line(std::str::from_utf8(&out).unwrap()), Ok(Some(record)));
-        }
-    }
-
-    #[test]
-    fn random_lines_never_panic() {
-        let words =
-            [&b"("[..], b")", b"1.5", b" ", b"can0", b"604", b"#", b"11", b"[2]", b"R", b"RX", b"-", b"20000000", b"'"];
-        let mut random = Random::new(0x5EED_0006);
-        for _ in 0..5_000 {
-            let _ = parse_line(&String::from_utf8_lossy(&random.salad(&words, 12)));
-        }
+        assert_eq!(Interface::numbered(3).name(), "can2");
+        assert_eq!(Interface::numbered(0).name(), "can0");
+        assert_eq!(Interface::named("a-name-that-is-too-long").name(), "a-name-that-is-");
+        assert_eq!(Interface::named("x99999").number(), 1);
     }
 }

@@ -10,6 +10,8 @@ use std::fmt;
 
 use can::{CanId, Frame};
 
+use crate::log::Finding;
+
 pub use error_frame::{ErrorCounters, ErrorFrame, ErrorKind, ErrorKinds};
 pub(crate) use suspicion::Suspicions;
 
@@ -84,7 +86,7 @@ pub enum Note {
     /// The connection is there again.
     ConnectionBack,
     /// A part of a log that is no frame, and was passed over.
-    TornRecord(TornRecord),
+    TornRecord(Finding),
 }
 
 impl Note {
@@ -193,24 +195,6 @@ impl fmt::Display for ControllerState {
             Self::ErrorPassive => "error-passive",
             Self::BusOff => "bus-off",
         })
-    }
-}
-
-/// A part of a log that is no frame.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct TornRecord {
-    /// Where it is in the file: the line, or the record of a format without lines; counted from 1.
-    pub place: usize,
-    /// What stands there, shortened.
-    pub text: String,
-    /// What is wrong with it.
-    pub reason: String,
-}
-
-impl fmt::Display for TornRecord {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { place, text, reason } = self;
-        write!(f, "line {place} passed over, '{text}': {reason}")
     }
 }
 

@@ -8,7 +8,8 @@ use can::{Bitrate, Frame, Instant};
 use super::codec::{Answer, Command, Decoder, Line, Malformed, bitrate_code};
 use super::status;
 use crate::link::{Link, within};
-use crate::note::{ControllerState, Note, TornRecord};
+use crate::log::{Finding, Place};
+use crate::note::{ControllerState, Note};
 use crate::reconnect::Reopen;
 use crate::{AsyncBus, BusError, Received, WallClock};
 
@@ -213,7 +214,7 @@ impl SlcanBus {
             Malformed::TooLong => (String::new(), malformed.to_string()),
             Malformed::Syntax { text, expected } => (text.clone(), format!("expected {expected}")),
         };
-        self.notes.push_back(Note::TornRecord(TornRecord { place: self.lines, text, reason }));
+        self.notes.push_back(Note::TornRecord(Finding { place: Place::Line(self.lines as u64), text, reason }));
     }
 }
 

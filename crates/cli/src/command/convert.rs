@@ -1,0 +1,113 @@
+//! `ferrodrive convert`: a log in another form.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use serde::Serialize;
+use transport::log::{Content, Entry};
+
+use crate::command::dump::{open_log, unreadable};
+use crate::failure::Failure;
+use crate::output::Report;
+use crate::paint::Paint;
+use crate::plain::plain;
+use crate::recording::{LogPath, log_path};
+
+/// Write a log file in another form
+///
+/// Read are candump, ASC, BLF, TRC, pcap and pcapng, told apart by their first bytes, then by their extension; - is standard
+/// input. Written is what OUT's extension says: .log (candump), .asc (Vector), .blf (Vector), .pcapng (Wireshark). Time,
+/// direction, bus, remote frames and error frames are kept as far as the form has them; CAN FD frames are counted and left out.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive convert trace.blf trace.pcapng     # for Wireshark\n  \
+    ferrodrive convert trace.trc trace.log        # for can-utils")]
+pub(crate) struct Convert {
+    /// The log to read, or - for standard input
+    #[arg(value_name = "IN")]
+    from: PathBuf,
+    /// The log to write: a new file, or an empty one, or a log of that form, which is replaced
+    #[arg(value_name = "OUT", value_parser = log_path)]
+    to: LogPath,
+}
+
+/// Findings told one by one; the rest are counted.
+const TOLD: u64 = 20;
+
+/// What was converted.
+#[derive(Debug, Default, Serialize)]
+pub(crate) struct ConvertReport {
+    from: String,
+    to: String,
+    /// Frames written.
+    frames: u64,
+    error_frames: u64,
+    /// CAN FD frames, which are left out.
+    fd_frames: u64,
+    /// Places of the log that could not be read.
+    passed_over: u64,
+    #[serde(skip)]
+    form: &'static str,
+}
+
+impl Convert {
+    /// Reads one and writes the other, to the end.
+    pub(crate) fn run(&self, quiet: bool) -> Result<ConvertReport, Failure> {
+        let mut reader = open_log(&self.from)?;
+        if same_file(&self.from, self.to.path()) {
+            return Err(Failure::usage(format!("{} would be written while it is read", self.from.display()))
+                .next("give the new log another name"));
+        }
+        let mut writer = self.to.create()?;
+        let not_written = |error: io::Error| {
+            Failure::new(format!("cannot write the log {}", self.to.path().display())).because(error)
+        };
+        let (from, to) = (self.from.display().to_string(), self.to.path().display().to_string());
+        let mut report = ConvertReport { from, to, form: reader.format().name(), ..ConvertReport::default() };
+        while let Some(entry) = reader.next_entry().map_err(|error| unreadable(&self.from, &error))? {
+            match entry {
+                Entry::Record(record) => {
+                    match record.content {
+                        Content::Frame(_) => report.frames += 1,
+                        Content::Error(_) => report.error_frames += 1,
+                        Content::FdFrame { .. } => report.fd_frames += 1,
+                    }
+                    writer.write(&record).map_err(not_written)?;
+                }
+                Entry::Finding(finding) => {
+                    report.passed_over += 1;
+                    if !quiet && report.passed_over <= TOLD {
+                        // Nobody may be listening any more.
+                        let _ = writeln!(io::stderr(), "warning: {}", plain(&finding.to_string()));
+                    }
+                }
+            }
+        }
+        writer.finish().map_err(not_written)?;
+        if report.frames + report.error_frames + report.fd_frames == 0 && report.passed_over > 0 {
+            return Err(
+                Failure::new(format!("no frame in {}: this is no {} log", report.from, report.form)).of_kind("no_log")
+            );
+        }
+        Ok(report)
+    }
+}
+
+/// Whether two paths name one file that is there.
+fn same_file(one: &std::path::Path, other: &std::path::Path) -> bool {
+    matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other)
+}
+
+impl Report for ConvertReport {
+    fn text(&self, paint: Paint) -> String {
+        let Self { from, to, frames, error_frames, fd_frames, passed_over, form } = self;
+        let mut text = format!("{} ({form}) written as {}: {frames} frames", from, paint.strong(to));
+        for (count, what) in
+            [(error_frames, "error frames"), (fd_frames, "CAN FD frames left out"), (passed_over, "places passed over")]
+        {
+            if *count > 0 {
+                text.push_str(&format!(", {count} {what}"));
+            }
+        }
+        text
+    }
+}

@@ -1,0 +1,142 @@
+//! `ferrodrive gateway`: the ASCII protocol of CiA 309-3 over TCP.
+
+mod client;
+mod wish;
+
+use std::collections::BTreeMap;
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use canopen::NodeId;
+use master::Drive;
+use master::core::Event;
+use master::drive::SwitchedOff;
+use serde::Serialize;
+use tokio::net::TcpListener;
+use tokio::sync::{broadcast, mpsc};
+
+use wish::Wish;
+
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::output::{Format, Report};
+use crate::paint::Paint;
+
+/// Let other programs reach the bus as text over TCP (CiA 309-3)
+///
+/// Several clients may be connected. A client whose connection ends has the drives that it may have set in motion
+/// quick-stopped; a drive with a watch over its host is guarded before it is moved, so that it stops when the gateway dies. There is
+/// no password: whoever reaches the port can move the drives. docs/handbook/gateway.md has the commands.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive --bus can0 gateway --listen 127.0.0.1:7000\n  \
+    printf '[1] 4 r 0x1018 1 x32\\n' | nc 127.0.0.1 7000")]
+pub(crate) struct Gateway {
+    /// Where to listen; port 0 takes a free one, which the first line of output names
+    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:7000")]
+    listen: String,
+}
+
+/// Clients at once; a further one is turned away.
+const MAX_CLIENTS: usize = 32;
+
+/// How often what the network has noticed is looked for.
+const EVENT_INTERVAL: Duration = Duration::from_millis(20);
+
+/// Requests of clients that may wait.
+const REQUESTS: usize = 64;
+
+/// Events that may wait for a client; a slower one misses the oldest.
+const EVENTS: usize = 256;
+
+/// Where the gateway listens.
+#[derive(Debug, Serialize)]
+struct Ready {
+    listen: SocketAddr,
+}
+
+impl Report for Ready {
+    fn text(&self, _: Paint) -> String {
+        format!("ready gateway {}", self.listen)
+    }
+}
+
+impl Gateway {
+    /// Serves until a signal ends it.
+    pub(crate) async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
+        if context.is_embedded() {
+            return Err(Failure::usage("a gateway to a virtual bus of this command alone serves nobody")
+                .because("such a bus has virtual time")
+                .next("ferrodrive sim --drive MODEL@NODE --serve socketcand://127.0.0.1:29536, then --bus socketcand://127.0.0.1:29536/can0"));
+        }
+        let cannot = |error: std::io::Error| {
+            Failure::new(format!("cannot listen at {}", self.listen))
+                .because(error)
+                .next("give --listen HOST:PORT of this machine, with a port that is free; port 0 takes any")
+        };
+        let listener = TcpListener::bind(&self.listen).await.map_err(cannot)?;
+        let address = listener.local_addr().map_err(cannot)?;
+        if !address.ip().is_loopback() {
+            context.tell(&format!("everybody who reaches {address} can move the drives: there is no password"));
+        }
+        format.print(&Ready { listen: address }).map_err(|error| Failure::new("cannot write").because(error))?;
+        let (wishes, mut wished) = mpsc::channel(REQUESTS);
+        let (events, _) = broadcast::channel::<Event>(EVENTS);
+        let mut guards = BTreeMap::new();
+        loop {
+            tokio::select! {
+                accepted = listener.accept() => {
+                    // A client that has gone before it was taken in is no matter.
+                    let Ok((stream, _)) = accepted else { continue };
+                    if events.receiver_count() < MAX_CLIENTS {
+                        let heard = (context.ears.listen(), events.subscribe());
+                        tokio::spawn(client::serve(stream, context.network.clone(), heard, wishes.clone()));
+                    }
+                }
+                Some(wish) = wished.recv() => grant(context, wish, &mut guards).await,
+                () = context.network.sleep(EVENT_INTERVAL) => {
+                    while let Some((_, event)) = context.network.poll_event() {
+                        // Nobody may be connected.
+                        let _ = events.send(event);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Guards what is about to be moved; stops what was moved by who has gone.
+async fn grant(context: &Context, wish: Wish, guards: &mut BTreeMap<NodeId, Drive>) {
+    match wish {
+        Wish::Guard(nodes, done) => {
+            for node in nodes.iter().filter(|node| !guards.contains_key(node)).collect::<Vec<_>>() {
+                match guard(context, node).await {
+                    Ok(drive) => drop(guards.insert(node, drive)),
+                    Err(why) => context.tell(&format!("node {node}: nothing stops it when this gateway dies: {why}")),
+                }
+            }
+            // The client may have gone.
+            let _ = done.send(());
+        }
+        Wish::Gone(nodes) => {
+            for node in nodes.iter() {
+                match context.quick_stop(node).await {
+                    Ok(()) => context.tell(&format!("node {node}: its client has gone; it has been quick-stopped")),
+                    Err(error) => {
+                        context.tell(&format!("node {node}: its client has gone, and it may be moving: {error}"))
+                    }
+                }
+                if let Some(drive) = guards.remove(&node) {
+                    // What has a watch and cannot be told otherwise stops by itself.
+                    let _ = drive.release_guard().await;
+                }
+            }
+        }
+    }
+}
+
+/// Sees to it that the drive stops without this program, or says why nothing does.
+async fn guard(context: &Context, node: NodeId) -> Result<Drive, String> {
+    let drive = context.drive_to_stop(node).await.map_err(|failure| failure.what)?;
+    let loss = drive.guard(SwitchedOff::Leave).await.map_err(|error| error.to_string())?;
+    if loss.stops_after().is_none() { Err(loss.to_string()) } else { Ok(drive) }
+}

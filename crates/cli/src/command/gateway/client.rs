@@ -1,0 +1,135 @@
+//! One client of the gateway: lines in, lines out.
+
+use std::io;
+use std::time::Duration;
+
+use can::{Frame, Instant};
+use master::Network;
+use master::core::Event;
+use master::gateway::{MAX_LINE, Session};
+use tokio::io::{AsyncBufRead, AsyncBufReadExt, AsyncWriteExt, BufReader};
+use tokio::net::TcpStream;
+use tokio::net::tcp::OwnedWriteHalf;
+use tokio::sync::broadcast::error::RecvError;
+use tokio::sync::{broadcast, mpsc, oneshot};
+
+use super::wish::Wish;
+
+/// How long a client may take to read what it is sent; one that never reads is let go.
+const READER_PATIENCE: Duration = Duration::from_secs(10);
+
+/// Serves a client until its connection ends, then has stopped what it moved.
+pub(super) async fn serve(
+    stream: TcpStream,
+    network: Network,
+    heard: (broadcast::Receiver<(Instant, Frame)>, broadcast::Receiver<Event>),
+    wishes: mpsc::Sender<Wish>,
+) {
+    let mut session = Session::new(network);
+    // Whatever ended it, what it moved is stopped.
+    let _ = converse(stream, &mut session, heard, &wishes).await;
+    if !session.moved().is_empty() {
+        let _ = wishes.send(Wish::Gone(session.moved())).await;
+    }
+}
+
+async fn converse(
+    stream: TcpStream,
+    session: &mut Session,
+    (mut frames, mut events): (broadcast::Receiver<(Instant, Frame)>, broadcast::Receiver<Event>),
+    wishes: &mpsc::Sender<Wish>,
+) -> io::Result<()> {
+    // Answers are small and waited for.
+    stream.set_nodelay(true)?;
+    let (input, mut output) = stream.into_split();
+    let mut input = BufReader::new(input);
+    let mut line = Line::default();
+    loop {
+        let said = tokio::select! {
+            read = line.read(&mut input) => match read? {
+                Read::End => return Ok(()),
+                Read::Unreadable => Some(Session::unreadable()),
+                Read::Line(text) => {
+                    guard(session, &text, wishes).await;
+                    session.answer(&text).await
+                }
+            },
+            frame = frames.recv() => match frame {
+                Ok((_, frame)) => session.told_frame(&frame),
+                Err(RecvError::Lagged(_)) => None,
+                Err(RecvError::Closed) => return Ok(()),
+            },
+            event = events.recv() => match event {
+                Ok(event) => session.told_event(&event),
+                Err(RecvError::Lagged(_)) => None,
+                Err(RecvError::Closed) => return Ok(()),
+            },
+        };
+        if let Some(said) = said {
+            say(&mut output, &said).await?;
+        }
+    }
+}
+
+/// Has what a line is about to move guarded first.
+async fn guard(session: &Session, line: &str, wishes: &mpsc::Sender<Wish>) {
+    let nodes = session.about_to_move(line);
+    let known = session.moved();
+    if nodes.iter().all(|node| known.contains(node)) {
+        return;
+    }
+    let (done, guarded) = oneshot::channel();
+    if wishes.send(Wish::Guard(nodes, done)).await.is_ok() {
+        let _ = guarded.await;
+    }
+}
+
+async fn say(output: &mut OwnedWriteHalf, text: &str) -> io::Result<()> {
+    let written = tokio::time::timeout(READER_PATIENCE, output.write_all(text.as_bytes())).await;
+    written.unwrap_or_else(|_| Err(io::ErrorKind::TimedOut.into()))
+}
+
+/// A line as far as it has come.
+#[derive(Default)]
+struct Line {
+    bytes: Vec<u8>,
+    /// It was too long, and its rest is passed over.
+    too_long: bool,
+}
+
+enum Read {
+    Line(String),
+    /// Too long, or no text.
+    Unreadable,
+    End,
+}
+
+impl Line {
+    /// The next line. Cancel-safe: what has come is kept.
+    async fn read(&mut self, input: &mut (impl AsyncBufRead + Unpin)) -> io::Result<Read> {
+        loop {
+            let come = input.fill_buf().await?;
+            if come.is_empty() {
+                // A line without its end may be half a command.
+                return Ok(Read::End);
+            }
+            let end = come.iter().position(|byte| *byte == b'\n');
+            let taken = end.map_or(come.len(), |end| end + 1);
+            if self.bytes.len() + taken > MAX_LINE {
+                self.too_long = true;
+                self.bytes.clear();
+            } else if !self.too_long {
+                self.bytes.extend_from_slice(&come[..taken]);
+            }
+            input.consume(taken);
+            if end.is_some() {
+                let bytes = std::mem::take(&mut self.bytes);
+                let too_long = std::mem::take(&mut self.too_long);
+                return Ok(match String::from_utf8(bytes) {
+                    Ok(text) if !too_long => Read::Line(text),
+                    _ => Read::Unreadable,
+                });
+            }
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! `--log FILE`: which file, and in which form.
+
+use std::path::{Path, PathBuf};
+
+use transport::BusSpec;
+use transport::log::{Format, Interface, LogWriter};
+
+use crate::failure::Failure;
+use crate::serve::files::create_log;
+
+/// A log that is to be written.
+#[derive(Clone, Debug)]
+pub(crate) struct LogPath {
+    path: PathBuf,
+    format: Format,
+}
+
+/// A log that has just been begun.
+pub(crate) type NewLog = LogWriter<std::io::BufWriter<std::fs::File>>;
+
+/// Reads the name of a log to be written: its extension tells the form, candump where it tells none.
+pub(crate) fn log_path(text: &str) -> Result<LogPath, String> {
+    let path = PathBuf::from(text);
+    let format = Format::of_name(&path).unwrap_or(Format::Candump);
+    if text.is_empty() || !format.is_written() {
+        return Err(format!("a {format} file is only read; a log is written as {}", Format::written_extensions()));
+    }
+    Ok(LogPath { path, format })
+}
+
+impl LogPath {
+    /// Where it is.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Begins the file: a new one, or one that is empty or a log of the same form already.
+    pub(crate) fn create(&self) -> Result<NewLog, Failure> {
+        let cannot = |error: &dyn std::fmt::Display| {
+            Failure::new(format!("cannot write the log {}", self.path.display())).because(error)
+        };
+        let file = create_log(&self.path, self.format).map_err(|error| cannot(&error))?;
+        LogWriter::new(std::io::BufWriter::new(file), self.format).map_err(|error| cannot(&error))
+    }
+}
+
+/// What a bus is called in a log.
+pub(crate) fn interface_of(bus: &BusSpec) -> Interface {
+    match bus {
+        BusSpec::SocketCan { interface } => Interface::named(interface),
+        BusSpec::Socketcand { bus, .. } => Interface::named(bus),
+        _ => Interface::default(),
+    }
+}
