@@ -77,7 +77,7 @@ fn a_bus_that_is_not_there_and_a_log_that_cannot_be_written_are_failures_of_the_
     let directory = scratch("nowhere");
     let picture = directory.join("no such folder").join("demo.svg");
     let error = failed(&["demo", "--drive", "zlim42c", "--svg", picture.to_str().unwrap()], 1);
-    is(&error, "failed", None, None, None);
+    is(&error, "file", None, None, None);
     let error = failed(&["sim", "--drive", "zlac8030l@4", "--log", picture.to_str().unwrap()], 1);
     assert!(error["message"].as_str().unwrap().contains("cannot write the log"), "{error}");
     std::fs::remove_dir_all(directory).unwrap();

@@ -136,7 +136,7 @@ fn a_replay_does_to_a_drive_what_was_done_when_the_log_was_written() {
     let log = log.to_str().unwrap();
     let start = || Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
     let first = start();
-    done(&["--bus", &first.bus("socketcand"), "--model", "4=zlac8030l", "enable", "4", "--no-guard", "--log", log]);
+    done(&["--bus", &first.bus("socketcand"), "--model", "4=zlac8030l", "enable", "4", "--log", log]);
     drop(first);
     let second = start();
     let bus = second.bus("socketcand");

@@ -100,7 +100,10 @@ fn of_several_scenarios_each_is_a_row_and_a_suite_and_one_that_fails_is_enough()
     let said = broken_too.json();
     let counts = [&said["passed"], &said["failed"], &said["unusable"], &said["complete"]];
     assert_eq!(counts, [&Value::from(1), &1.into(), &1.into(), &true.into()], "{said:#}");
-    assert!(said["scenarios"][0]["error"]["message"].as_str().unwrap().contains("a scenario needs 'machine'"), "{said:#}");
+    assert!(
+        said["scenarios"][0]["error"]["message"].as_str().unwrap().contains("a scenario needs 'machine'"),
+        "{said:#}"
+    );
     assert_eq!(std::fs::read_to_string(&junit).unwrap().matches("<error ").count(), 1);
 
     let nobodys = ferrodrive(&["run", &fine, &wrong, "--set", "levle=1"]);

@@ -68,6 +68,7 @@ pub fn enter() -> Result<(), RealTimeError> {
 }
 
 #[cfg(all(test, target_os = "linux"))]
+#[allow(clippy::print_stderr, reason = "a test that is skipped says why")]
 mod tests {
     use super::*;
     use crate::WallClock;

@@ -15,7 +15,8 @@ fn records(count: u32) -> Vec<Record> {
     let record = |i: u32| {
         let data = u64::from(i).wrapping_mul(0x9E37_79B9_7F4A_7C15).to_le_bytes();
         let length = (i % 9) as usize;
-        let id = if i % 3 == 0 { CanId::extended(i.wrapping_mul(0x0101_0101)) } else { CanId::standard(i as u16) };
+        let id =
+            if i.is_multiple_of(3) { CanId::extended(i.wrapping_mul(0x0101_0101)) } else { CanId::standard(i as u16) };
         let content = match i % 7 {
             0 => Content::Frame(Frame::remote(id, length as u8)),
             1 => Content::Error(RawErrorFrame { class: 0x88, data }),
@@ -24,7 +25,7 @@ fn records(count: u32) -> Vec<Record> {
         Record {
             at: Some(Instant::from_nanos(BEGIN.as_nanos() + u64::from(i) * 130_000)),
             interface: Interface::numbered((i % 3 + 1) as u16),
-            direction: Some(if i % 2 == 0 { Direction::Received } else { Direction::Transmitted }),
+            direction: Some(if i.is_multiple_of(2) { Direction::Received } else { Direction::Transmitted }),
             content,
         }
     };

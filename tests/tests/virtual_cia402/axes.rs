@@ -241,7 +241,10 @@ fn the_outer_world_reaches_each_axis_by_its_number() {
     tell(&mut world, "5.2 rotor lock");
     world.run_for(Duration::from_millis(10));
     assert_eq!(report(&mut world, 1).velocity_rpm, 0.0);
-    assert_eq!(tell(&mut world, "5.3 get"), r#"{"ok":false,"error":"a two-axes-by-offset has no axis 3; it has 2"}"#);
+    assert_eq!(
+        tell(&mut world, "5.3 get"),
+        r#"{"ok":false,"error":"a two-axes-by-offset has no axis 3; it has 2","kind":"refused"}"#
+    );
     let recorder = world.stop_recording().unwrap();
     let names: Vec<String> = recorder.channels().iter().map(|channel| channel.place.to_string()).collect();
     assert_eq!(names, ["5", "5.2"]);
@@ -280,6 +283,6 @@ fn the_objects_of_a_node_that_is_no_drive_are_the_outer_worlds() {
         ("9 input X0 1", "a inputs has no input \\\"X0\\\"; it has none"),
     ] {
         let answer = tell(&mut world, &line.replace("\\\"", "\""));
-        assert_eq!(answer, format!("{{\"ok\":false,\"error\":\"{error}\"}}"), "{line}");
+        assert_eq!(answer, format!("{{\"ok\":false,\"error\":\"{error}\",\"kind\":\"refused\"}}"), "{line}");
     }
 }

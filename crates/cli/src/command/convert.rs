@@ -58,9 +58,7 @@ impl Convert {
                 .next("give the new log another name"));
         }
         let mut writer = self.to.create()?;
-        let not_written = |error: io::Error| {
-            Failure::new(format!("cannot write the log {}", self.to.path().display())).because(error)
-        };
+        let not_written = |error: io::Error| Failure::of_writing("the log", self.to.path(), &error);
         let (from, to) = (self.from.display().to_string(), self.to.path().display().to_string());
         let mut report = ConvertReport { from, to, form: reader.format().name(), ..ConvertReport::default() };
         while let Some(entry) = reader.next_entry().map_err(|error| unreadable(&self.from, &error))? {

@@ -36,10 +36,11 @@ impl LogPath {
 
     /// Begins the file: a new one, or one that is empty or a log of the same form already.
     pub(crate) fn create(&self) -> Result<NewLog, Failure> {
+        let file =
+            create_log(&self.path, self.format).map_err(|error| Failure::of_writing("the log", &self.path, &error))?;
         let cannot = |error: &dyn std::fmt::Display| {
             Failure::new(format!("cannot write the log {}", self.path.display())).because(error)
         };
-        let file = create_log(&self.path, self.format).map_err(|error| cannot(&error))?;
         LogWriter::new(std::io::BufWriter::new(file), self.format).map_err(|error| cannot(&error))
     }
 }

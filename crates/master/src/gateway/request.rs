@@ -189,7 +189,7 @@ fn command(words: &[String]) -> Option<GatewayCommand> {
                 [one] => first.starts_with(one),
                 row => lower.starts_with(row),
             };
-            return NOT_SUPPORTED.iter().any(|row| known(&row)).then_some(GatewayCommand::NotSupported);
+            return NOT_SUPPORTED.iter().any(known).then_some(GatewayCommand::NotSupported);
         }
         [] => return None,
     })

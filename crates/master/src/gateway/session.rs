@@ -127,6 +127,8 @@ impl Session {
                 }
                 node.download(mux, &bytes).await.map_err(|error| Refusal::from(&error))?;
             }
+            // Whatever its numbers mean there: guarding takes a node, for one.
+            Do::NotSupported => return Err(Refusal::NOT_SUPPORTED),
             Do::Start => self.nmt(place, NmtCommand::Start)?,
             Do::Stop => self.nmt(place, NmtCommand::Stop)?,
             Do::PreOperational => self.nmt(place, NmtCommand::EnterPreOperational)?,

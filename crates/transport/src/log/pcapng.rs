@@ -124,7 +124,7 @@ impl<R: Read> PcapngReader<R> {
         }
         let kind = if is_section { SECTION } else { self.number(&head, 0) };
         let length = self.number(&head, 4);
-        if length < 12 || length % 4 != 0 || (is_section && length < 28) {
+        if length < 12 || !length.is_multiple_of(4) || (is_section && length < 28) {
             return fatal(&format!(
                 "a block declares {length} bytes, which no block has; nothing behind it can be found"
             ));
