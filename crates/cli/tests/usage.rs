@@ -183,7 +183,7 @@ fn models_and_shells_are_checked() {
 
 #[test]
 fn a_bus_that_cannot_be_opened_says_what_to_do() {
-    refused(&["--bus", "bus!", "scan"], &["expected sim, sim:FILE.toml, socketcand://"]);
+    refused(&["--bus", "bus!", "scan"], &["expected sim, sim:FILE.toml, can0, socketcand://"]);
     let said = ferrodrive(&["--bus", "nocan9", "scan"]).err;
     assert!(said.contains("bus nocan9") && (said.contains("modprobe") || said.contains("ip link")), "{said}");
 }
