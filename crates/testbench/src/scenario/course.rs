@@ -1,7 +1,5 @@
 //! A scenario under way in a world that somebody else moves: what it does, looks at and waits for, without a clock of its own.
-//!
-//! Whoever moves the world goes no further than [`Course::next_time`] and calls [`Course::look`] there, hands on what happens with
-//! [`Course::hear`], and calls [`Course::go_on`] after each of these. [`Runner`](super::Runner) does that in virtual time.
+//! [`Runner`](super::Runner) moves the world in virtual time.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -30,7 +28,10 @@ use crate::models::with_told;
 /// Frames that the outcome of a failed run tells.
 const FRAMES_TOLD: usize = 24;
 
-/// See the [module](self).
+/// A scenario that goes along with a world which somebody else moves.
+///
+/// Whoever moves the world goes no further than [`Course::next_time`] and calls [`Course::look`] there, hands on what happens with
+/// [`Course::hear`], and calls [`Course::go_on`] after each of these.
 pub struct Course {
     scenario: Scenario,
     seed: u64,
