@@ -6,6 +6,7 @@
 //! package and by the fuzz targets, with the same meaning.
 
 pub mod bench;
+pub mod cia402;
 pub mod csv;
 pub mod homing;
 pub mod laws;

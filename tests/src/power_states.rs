@@ -11,9 +11,6 @@ use crate::manual::PowerCell;
 
 const UNSEEN: [&str; 2] = ["not_ready_to_switch_on", "fault_reaction_active"];
 
-/// The low byte of the statusword in the state Fault, with the bus voltage present.
-const FAULT: u16 = 0x98;
-
 /// A drive with the power state machine of CiA 402.
 pub trait PowerSubject: Subject {
     /// A component whose break is a fault in every state, and which can be mended.
@@ -34,14 +31,14 @@ pub trait PowerSubject: Subject {
     /// The statusword of a drive that has just booted.
     const BOOTED: u16;
 
-    /// Objects that clear the position.
-    const CLEARS_POSITION: &'static [u16];
+    /// The low byte of the statusword in the state Fault, with the bus voltage present. CiA 402-2 has 18h; bit 7 is a warning.
+    const FAULT: u16 = 0x98;
+
+    /// The bit of the statusword that tells that the motor turns; none where the maker has not added one.
+    const RUNNING: u16 = 1 << 14;
 
     /// Modes in which it moves, but for torque.
     const MOVING_MODES: &'static [i64];
-
-    /// The object with the speed that a motion from rest begins with, r/min.
-    const START_SPEED: u16;
 
     /// How far 6064h may be from a target that is reached.
     const IN_POSITION: i64;
@@ -58,17 +55,22 @@ pub trait PowerSubject: Subject {
     /// A torque that turns a free shaft and not one that is held, N m.
     const HAND_NM: f64;
 
-    /// How many digital inputs it has.
-    const INPUTS: usize;
-
-    /// Sub-indexes of 2030h that hold the functions of Y0 and Y1.
-    const OUTPUT_FUNCTIONS: [u8; 2];
+    /// 6064h counts so many in 1/4096 of a turn, in which the scenarios measure moves.
+    const COUNTS: i64 = 1;
 
     /// 606Ch counts so many in 1 r/min.
     const COUNTS_PER_RPM: i64;
 
     /// How far the speed of a motor that turns steadily may be from what is asked for, r/min.
     const RIPPLE_RPM: f64;
+
+    /// Sets a ramp object so that 120 r/min take this time. Here: it is the time.
+    fn set_ramp(bench: &mut Bench<Self>, object: u16, ms: i64)
+    where
+        Self: Sized,
+    {
+        bench.set(object, ms);
+    }
 
     /// What homing needs besides its mode, so that it searches at 120 r/min.
     fn let_home(_bench: &mut Bench<Self>)
@@ -83,6 +85,21 @@ pub trait PowerSubject: Subject {
         Self: Sized,
     {
     }
+}
+
+/// What only the two ZLTECH drives have, and alike.
+pub trait ZltechSubject: PowerSubject {
+    /// Objects that clear the position.
+    const CLEARS_POSITION: &'static [u16];
+
+    /// The object with the speed that a motion from rest begins with, r/min.
+    const START_SPEED: u16;
+
+    /// How many digital inputs it has.
+    const INPUTS: usize;
+
+    /// Sub-indexes of 2030h that hold the functions of Y0 and Y1.
+    const OUTPUT_FUNCTIONS: [u8; 2];
 }
 
 impl<S: PowerSubject> Bench<S> {
@@ -142,10 +159,10 @@ impl<S: PowerSubject> Bench<S> {
         self.turns_at(rpm as f64 - S::RIPPLE_RPM, rpm as f64 + S::RIPPLE_RPM)
     }
 
-    /// Relative move of profile position.
+    /// Relative move of profile position, by so many 4096ths of a turn.
     #[track_caller]
     pub fn move_by(&mut self, counts: i64) -> &mut Self {
-        self.set(0x607A, counts).set(0x6040, 0x4F).set(0x6040, 0x5F)
+        self.set(0x607A, counts * S::COUNTS).set(0x6040, 0x4F).set(0x6040, 0x5F)
     }
 
     /// Breaks the component whose break is a fault, or mends it, and lets the drive notice.
@@ -178,7 +195,7 @@ fn difference<S: PowerSubject>(cell: &PowerCell, above: u16, mask: u16) -> Optio
     let statusword = bench.statusword() & (mask | 0xFF);
     let low_byte = match &*cell.state_after {
         // Seen one transition later: Fault.
-        "fault_reaction_active" => FAULT,
+        "fault_reaction_active" => S::FAULT,
         _ => u16::from(cell.low_byte_after),
     };
     let expected = low_byte | above;

@@ -4,6 +4,7 @@
 use std::collections::HashSet;
 
 use ferrodrive_tests::bench::Subject;
+use ferrodrive_tests::bench::cia402::Cia402;
 use ferrodrive_tests::bench::mjoint::MJoint;
 use ferrodrive_tests::bench::zlac8030l::Zlac8030l;
 use ferrodrive_tests::bench::zlim42c::Zlim42c;
@@ -54,7 +55,7 @@ fn what_is_stored_can_be_written_but_for_the_joints_position_that_is_recorded_at
 
 #[test]
 fn each_power_state_table_is_full_and_only_fault_reset_leaves_fault() {
-    for cells in [Zlac8030l::power_states(), Zlim42c::power_states()] {
+    for cells in [Zlac8030l::power_states(), Zlim42c::power_states(), Cia402::power_states()] {
         let states: HashSet<_> = cells.iter().map(|(cell, _)| cell.state.as_str()).collect();
         let events: HashSet<_> = cells.iter().map(|(cell, _)| cell.event.as_str()).collect();
         assert_eq!((states.len(), events.len(), cells.len()), (8, 11, 88));
@@ -66,8 +67,8 @@ fn each_power_state_table_is_full_and_only_fault_reset_leaves_fault() {
 
 #[test]
 fn the_low_nibble_of_the_statusword_is_the_one_that_the_manuals_print_after_each_command() {
-    // ZLAC8030L, 7.1, and ZLIM42-C, 5.3.2: 6040h = 0, 6, 7, Fh give the low nibbles 0, 1, 3, 7.
-    for cells in [Zlac8030l::power_states(), Zlim42c::power_states()] {
+    // ZLAC8030L, 7.1, ZLIM42-C, 5.3.2, and CiA 402-2, 8.4.2: 6040h = 0, 6, 7, Fh give the low nibbles 0, 1, 3, 7.
+    for cells in [Zlac8030l::power_states(), Zlim42c::power_states(), Cia402::power_states()] {
         let mut state = "switch_on_disabled";
         for (controlword, nibble) in [(0x0, 0x0), (0x6, 0x1), (0x7, 0x3), (0xF, 0x7)] {
             let found = cells.iter().find(|(cell, _)| cell.state == state && cell.controlword == Some(controlword));

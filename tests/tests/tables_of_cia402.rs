@@ -3,6 +3,7 @@
 use canopen::Mux;
 use canopen::od::PdoMapping;
 use devices::servo::CIA402;
+use ferrodrive_tests::csv::Table;
 
 const OBJECTS: &str = include_str!("../data/cia402/objects.csv");
 
@@ -17,14 +18,13 @@ fn told(mux: Mux) -> Option<String> {
 #[test]
 fn every_object_of_the_profile_is_as_the_standard_has_it() {
     let mut objects = Vec::new();
-    for line in OBJECTS.lines().skip(1) {
-        let [index, sub, kind, access, mapped, _, note] = line.splitn(7, ',').collect::<Vec<_>>()[..] else {
-            panic!("{line}")
-        };
+    for line in Table::parse(OBJECTS).unwrap().rows() {
+        let (index, sub) = (line.get("index"), line.get("sub"));
         let mux = Mux::new(u16::from_str_radix(index, 16).unwrap(), u8::from_str_radix(sub, 16).unwrap());
         // What the note says is otherwise here, and why.
-        let access = note.get(..2).unwrap_or(access);
-        assert_eq!(told(mux), Some(format!("{kind},{access},{mapped}")), "{line}");
+        let access = line.get("note").get(..2).unwrap_or(line.get("access"));
+        let expected = format!("{},{access},{}", line.get("type"), line.get("pdo_mappable"));
+        assert_eq!(told(mux), Some(expected), "{line:?}");
         objects.push(mux);
     }
     let rows = CIA402.dictionary.rows().iter().filter(|row| row.index >= 0x6000).map(|row| row.mux());

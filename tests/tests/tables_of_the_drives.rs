@@ -3,6 +3,7 @@
 use canopen::NodeId;
 use drives::{mjoint, zlac8030l, zlim42c};
 use ferrodrive_tests::bench::Subject;
+use ferrodrive_tests::bench::cia402::Cia402;
 use ferrodrive_tests::bench::mjoint::MJoint;
 use ferrodrive_tests::bench::zlac8030l::Zlac8030l;
 use ferrodrive_tests::bench::zlim42c::Zlim42c;
@@ -38,8 +39,9 @@ fn every_object_agrees_with_the_manual_in_every_column() {
     );
 }
 
-fn power_tables() -> [Vec<PowerCell>; 2] {
-    [Zlac8030l::power_states(), Zlim42c::power_states()].map(|cells| cells.into_iter().map(|(cell, _)| cell).collect())
+fn power_tables() -> [Vec<PowerCell>; 3] {
+    [Zlac8030l::power_states(), Zlim42c::power_states(), Cia402::power_states()]
+        .map(|cells| cells.into_iter().map(|(cell, _)| cell).collect())
 }
 
 #[test]

@@ -97,12 +97,13 @@ impl<S: Subject> Bench<S> {
         self.operate(|drive, now| drive.cut_power(now));
         self.run_ms(100);
         self.operate(|drive, now| drive.set_power(true, now));
-        self.run_ms(10)
+        self.run_ms(S::BOOT_MS)
     }
 
-    /// Time for the EEPROM to take what was written.
+    /// What was written is kept over a power cycle.
     pub fn let_store(&mut self) -> &mut Self {
-        self.run_ms(5)
+        S::store(self);
+        self
     }
 
     /// The machine of an [`open`](Self::open) bench, as it is now.

@@ -3,6 +3,7 @@
 //! The host speaks CANopen by the bytes, with the widths and signs of the manual's object table, so that nothing of the
 //! drive's own tables judges the drive. A [`Subject`] says which drive it is; `bench::DRIVE` has that drive's own handles.
 
+pub mod cia402;
 mod expectations;
 mod hands;
 pub mod mjoint;
@@ -56,6 +57,18 @@ pub trait Subject: 'static {
     const REFUSED: &'static str;
     /// Its `at_rest.csv`.
     const AT_REST: &'static str;
+    /// Whether a PDO is mapped while it is valid, as makers do; CiA 301, 7.5.2.36 wants bit 31 of its COB-ID set first.
+    const REMAPS_WHILE_VALID: bool = true;
+    /// How long it takes from power on until it has booted and is ready, at the most.
+    const BOOT_MS: u64 = 10;
+
+    /// Has what was written kept over a power cycle. Here: time for the EEPROM to take it.
+    fn store(bench: &mut Bench<Self>)
+    where
+        Self: Sized,
+    {
+        bench.run_ms(5);
+    }
 }
 
 /// A manual's object table with an index.
@@ -159,7 +172,7 @@ impl<S: Subject> Bench<S> {
 
     fn booted(world: World, host: StationId, drive: StationId, bare: bool) -> Self {
         let mut bench = Self { world, host, node: S::NODE, drive, bare, heard: Vec::new(), subject: PhantomData };
-        bench.run_ms(10);
+        bench.run_ms(S::BOOT_MS);
         bench
     }
 
@@ -204,7 +217,7 @@ impl<S: Subject> Bench<S> {
     }
 
     /// A frame's text in which `n` stands for the last digit of the node-ID.
-    fn named(&self, text: &str) -> String {
+    pub(crate) fn named(&self, text: &str) -> String {
         text.replace('n', &format!("{:X}", self.node & 0xF))
     }
 

@@ -4,6 +4,9 @@ use can::{CanId, Frame};
 
 use super::{Bench, Subject};
 
+/// Bit 31 of a PDO's COB-ID: it is off.
+const INVALID: i64 = 1 << 31;
+
 /// An abort code that a drive answered.
 pub type Abort = u32;
 
@@ -78,11 +81,17 @@ impl<S: Subject> Bench<S> {
     /// Maps objects into a PDO, as CiA 301 wants it: none, then each, then how many. `record` is 1600h or 1A00h and on.
     #[track_caller]
     pub fn map(&mut self, record: u16, objects: &[i64]) -> &mut Self {
+        let parameter = (record - 0x200, 1);
+        let cob_id = if S::REMAPS_WHILE_VALID { 0 } else { self.get(parameter) };
+        if !S::REMAPS_WHILE_VALID {
+            self.set(parameter, cob_id | INVALID);
+        }
         self.set(record, 0);
         for (sub, object) in (1..).zip(objects) {
             self.set((record, sub), *object);
         }
-        self.set(record, objects.len() as i64)
+        self.set(record, objects.len() as i64);
+        if S::REMAPS_WHILE_VALID { self } else { self.set(parameter, cob_id) }
     }
 
     /// 6041h.

@@ -9,7 +9,7 @@ use sim::machine::{Zlac8030lMachine, zlac8030l};
 
 use super::{Rows, Subject};
 use crate::object_rows::{KeepingSubject, Memory};
-use crate::power_states::PowerSubject;
+use crate::power_states::{PowerSubject, ZltechSubject};
 use crate::zlac8030l::{PowerCell, objects, power_states};
 
 pub use super::{Abort, assert_within};
@@ -56,9 +56,7 @@ impl PowerSubject for Zlac8030l {
     const STATUSWORD_AT_REST: &'static str = include_str!("../../data/zlac8030l/statusword_at_rest.csv");
     // As the recorded one shows it.
     const BOOTED: u16 = 0x0670;
-    const CLEARS_POSITION: &'static [u16] = &[0x2005, 0x2006];
     const MOVING_MODES: &'static [i64] = &[1, 3];
-    const START_SPEED: u16 = 0x2008;
     // 2002h as delivered.
     const IN_POSITION: i64 = 30;
     // At the current limit, L123.
@@ -66,8 +64,6 @@ impl PowerSubject for Zlac8030l {
     const HOMING_RAMP_S: f64 = 0.0;
     const STANDS_AFTER_MS: u64 = 600;
     const HAND_NM: f64 = 0.5;
-    const INPUTS: usize = 2;
-    const OUTPUT_FUNCTIONS: [u8; 2] = [0x0D, 0x0F];
     const COUNTS_PER_RPM: i64 = 10;
     const RIPPLE_RPM: f64 = 1.0;
 
@@ -79,6 +75,13 @@ impl PowerSubject for Zlac8030l {
         // The watch over the host.
         bench.set(0x2000, 0);
     }
+}
+
+impl ZltechSubject for Zlac8030l {
+    const CLEARS_POSITION: &'static [u16] = &[0x2005, 0x2006];
+    const START_SPEED: u16 = 0x2008;
+    const INPUTS: usize = 2;
+    const OUTPUT_FUNCTIONS: [u8; 2] = [0x0D, 0x0F];
 }
 
 impl KeepingSubject for Zlac8030l {

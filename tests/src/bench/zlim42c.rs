@@ -9,7 +9,7 @@ use sim::machine::{Zlim42cMachine, zlim42c, zlim42c_82};
 use super::{Rows, Subject};
 use crate::manual::PowerCell;
 use crate::object_rows::{KeepingSubject, Memory};
-use crate::power_states::PowerSubject;
+use crate::power_states::{PowerSubject, ZltechSubject};
 use crate::zlim42c::{objects, power_states};
 
 pub use super::{Abort, assert_within};
@@ -56,17 +56,13 @@ impl PowerSubject for Zlim42c {
     const ABOVE: u16 = 1 << 13;
     const STATUSWORD_AT_REST: &'static str = include_str!("../../data/zlim42c/statusword_at_rest.csv");
     const BOOTED: u16 = 0x0270;
-    const CLEARS_POSITION: &'static [u16] = &[0x2012];
     const MOVING_MODES: &'static [i64] = &[1, 3, 6];
-    const START_SPEED: u16 = 0x200E;
     const IN_POSITION: i64 = 0;
     // 5.4 has one word for 605Ah = 7, 605Dh = 3, 200Ah = 1 and 6085h (Z092).
     const EMERGENCY_STOP_S: f64 = 0.05;
     const HOMING_RAMP_S: f64 = 0.2;
     const STANDS_AFTER_MS: u64 = 2;
     const HAND_NM: f64 = 0.05;
-    const INPUTS: usize = 4;
-    const OUTPUT_FUNCTIONS: [u8; 2] = [0x0D, 0x0E];
     const COUNTS_PER_RPM: i64 = 1;
     // A fifth at 60 r/min: full steps excite the rotor.
     const RIPPLE_RPM: f64 = 12.0;
@@ -78,6 +74,13 @@ impl PowerSubject for Zlim42c {
     fn let_home(bench: &mut Bench) {
         bench.set(0x609A, 200).set(0x6098, 18);
     }
+}
+
+impl ZltechSubject for Zlim42c {
+    const CLEARS_POSITION: &'static [u16] = &[0x2012];
+    const START_SPEED: u16 = 0x200E;
+    const INPUTS: usize = 4;
+    const OUTPUT_FUNCTIONS: [u8; 2] = [0x0D, 0x0E];
 }
 
 impl KeepingSubject for Zlim42c {

@@ -3,12 +3,12 @@
 use std::time::Duration;
 
 use crate::bench::{Bench, assert_within};
-use crate::power_states::PowerSubject;
+use crate::power_states::{PowerSubject, ZltechSubject};
 
 const LOOK: Duration = Duration::from_micros(500);
 
 /// An object that clears the position reads 0 again, and the shaft stays where it is. 0 is invalid.
-pub fn clearing_the_position_reads_zero_again_and_zeroes_the_position<S: PowerSubject>() {
+pub fn clearing_the_position_reads_zero_again_and_zeroes_the_position<S: ZltechSubject>() {
     for index in S::CLEARS_POSITION {
         let mut bench = Bench::<S>::new();
         bench.turn(60).set(0x60FF, 0).run_ms(1000).set(*index, 0);
@@ -35,23 +35,23 @@ pub fn a_second_set_point_waits_for_the_first_and_a_third_is_not_taken<S: PowerS
     let mut bench = Bench::<S>::new();
     bench.enable_in(1);
     for target in [4000, 1000] {
-        bench.set(0x607A, target).set(0x6040, 0x0F).set(0x6040, 0x1F);
+        bench.set(0x607A, target * S::COUNTS).set(0x6040, 0x0F).set(0x6040, 0x1F);
     }
     bench.set(0x6040, 0x0F);
     assert_ne!(bench.statusword() & ACKNOWLEDGED, 0, "the queue is full");
-    bench.set(0x607A, 9000).set(0x6040, 0x1F).set(0x6040, 0x0F);
+    bench.set(0x607A, 9000 * S::COUNTS).set(0x6040, 0x1F).set(0x6040, 0x0F);
     let mut highest = 0;
     for _ in 0..4000 {
         highest = highest.max(bench.run_ms(1).report().position);
     }
     // A look each millisecond may miss the last count.
-    assert!((highest - 4000).abs() <= S::IN_POSITION.max(2), "{highest}");
-    bench.is_at(1000, S::IN_POSITION).shows(ACKNOWLEDGED, 0);
+    assert!((highest - 4000 * S::COUNTS).abs() <= S::IN_POSITION.max(2), "{highest}");
+    bench.is_at(1000 * S::COUNTS, S::IN_POSITION).shows(ACKNOWLEDGED, 0);
 }
 
 /// The speed that a motion from rest begins with has an object of its own; 6082h is the one that a move ends from. An S of
 /// 80 r/min in 0.5 s moves by 0.1 r/min in its first 10 ms.
-pub fn a_motion_begins_at_its_start_speed_and_a_move_ends_from_6082h<S: PowerSubject>() {
+pub fn a_motion_begins_at_its_start_speed_and_a_move_ends_from_6082h<S: ZltechSubject>() {
     let mut bench = Bench::<S>::new();
     bench.set(S::START_SPEED, 40).set(0x6082, 30).set(0x6081, 120).set(0x6083, 500).set(0x6084, 500);
     bench.enable_in(1).move_by(12_000);
@@ -71,10 +71,12 @@ pub fn a_motion_begins_at_its_start_speed_and_a_move_ends_from_6082h<S: PowerSub
 /// The way through 0 is two ramps. The answer to the write takes 0.5 ms of the first.
 pub fn a_reversal_ramps_down_by_6084h_and_up_by_6083h<S: PowerSubject>() {
     let mut bench = Bench::<S>::new();
-    bench.set(0x6083, 200).set(0x6084, 400).turn(100).set(0x60FF, -100);
+    S::set_ramp(&mut bench, 0x6083, 240);
+    S::set_ramp(&mut bench, 0x6084, 480);
+    bench.turn(120).set(0x60FF, -120);
     let down = bench.seconds_until(1.0, LOOK, |report| report.velocity_demand_rpm.is_some_and(|rpm| rpm <= 0.0));
-    let up = bench.seconds_until(1.0, LOOK, |report| report.velocity_demand_rpm == Some(-100.0));
-    assert_within("seconds down", down, 0.397, 0.402);
-    assert_within("seconds up", up, 0.197, 0.202);
-    bench.run_ms(100).goes_at(-100);
+    let up = bench.seconds_until(1.0, LOOK, |report| report.velocity_demand_rpm.is_some_and(|rpm| rpm < -120.0 + 1e-6));
+    assert_within("seconds down", down, 0.477, 0.482);
+    assert_within("seconds up", up, 0.237, 0.242);
+    bench.run_ms(100).goes_at(-120);
 }

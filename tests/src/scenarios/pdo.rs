@@ -30,13 +30,13 @@ pub fn an_rpdo_acts_in_operational_only<S: Subject>() {
     bench.send("30n#64000000").reads(0x60FF, 100);
 }
 
-/// Two objects in each: 6083h/6084h, 6081h/6082h, 60FFh/6085h, 607Ah/6060h.
+/// Two objects in each: 6083h/6084h, 6081h/6040h, 60FFh/6085h, 607Ah/6060h.
 pub fn each_of_the_four_rpdos_sets_the_objects_it_maps<S: Subject>() {
     let mut bench = Bench::<S>::new();
-    bench.map(0x1600, &[0x6083_0020, 0x6084_0020]).map(0x1601, &[0x6081_0020, 0x6082_0020]);
+    bench.map(0x1600, &[0x6083_0020, 0x6084_0020]).map(0x1601, &[0x6081_0020, 0x6040_0010]);
     bench.map(0x1602, &[0x60FF_0020, 0x6085_0020]).map(0x1603, &[0x607A_0020, 0x6060_0008]).send("000#010n");
-    bench.send("20n#2C010000C8000000").send("30n#58020000E8030000").send("40n#9CFFFFFF05000000").send("50n#80C1FFFF03");
-    bench.reads(0x6083, 300).reads(0x6084, 200).reads(0x6081, 600).reads(0x6082, 1000);
+    bench.send("20n#2C010000C8000000").send("30n#580200000600").send("40n#9CFFFFFF05000000").send("50n#80C1FFFF03");
+    bench.reads(0x6083, 300).reads(0x6084, 200).reads(0x6081, 600).reads(0x6040, 6);
     bench.reads(0x60FF, -100).reads(0x6085, 5).reads(0x607A, -16_000).reads(0x6060, 3);
 }
 
@@ -46,7 +46,7 @@ pub fn each_of_the_four_tpdos_tells_the_objects_it_maps<S: PowerSubject>() {
     let maps: [&[i64]; 4] = [
         &[0x6041_0010, 0x6061_0008, 0x6060_0008],
         &[0x607A_0020, 0x6083_0020],
-        &[0x2003_0010, 0x2004_0010, 0x603F_0010, 0x6040_0010],
+        &[0x6040_0010, 0x603F_0010, 0x6084_0020],
         &[0x6081_0020, 0x60FF_0020],
     ];
     for (number, objects) in (0..).zip(maps) {
@@ -61,7 +61,7 @@ pub fn each_of_the_four_tpdos_tells_the_objects_it_maps<S: PowerSubject>() {
         let data: String = objects.iter().flat_map(read).map(|byte| format!("{byte:02X}")).collect();
         assert_eq!(*frame, format!("{number}8{:X}#{data}", S::NODE));
     }
-    bench.shows(0x6F, 0x27).reads(0x6061, 1).reads(0x607A, 400).reads(0x60FF, -2);
+    bench.shows(0x6F, 0x27).reads(0x6061, 1).reads(0x607A, 400 * S::COUNTS).reads(0x60FF, -2);
 }
 
 /// Table 72.
@@ -97,8 +97,11 @@ pub fn a_synchronous_tpdo_comes_with_each_nth_sync_and_one_of_type_0_after_a_cha
 pub fn each_asynchronous_tpdo_is_sent_once_on_entering_operational<S: PowerSubject>() {
     let mut bench = Bench::<S>::new();
     bench.map(0x1A01, &[0x6041_0010]).map(0x1A02, &[0x6064_0020]).set((0x1802, 2), 254).forget();
-    let statusword = format!("{:04X}", S::BOOTED.swap_bytes());
-    bench.send("000#010n").run_ms(500).hears(&[&format!("28n#{statusword}"), "38n#00000000"]);
+    let statusword = format!("28n#{:04X}", S::BOOTED.swap_bytes());
+    let expected = [bench.named(&statusword), bench.named("38n#00000000")];
+    let mut heard = bench.send("000#010n").run_ms(500).heard();
+    heard.retain(|frame| frame.starts_with("28") || frame.starts_with("38"));
+    assert_eq!(heard, expected);
 }
 
 /// Both count half milliseconds in these drives (chapter 9 of the ZLAC8030L's manual, 5.4 of the ZLIM42-C's).
@@ -209,7 +212,7 @@ pub fn a_stored_mapping_works_after_a_power_cycle<S: PowerSubject>() {
     bench.map(0x1A03, &[0x6064_0020, 0x6041_0010]).set((0x1803, 2), 1).let_store().power_cycle();
     bench.send("000#010n").run_ms(5).forget();
     sync(&mut bench);
-    bench.hears(&[&format!("48n#00000000{:04X}", S::BOOTED.swap_bytes())]);
+    bench.hears_of("48n#", &[&format!("48n#00000000{:04X}", S::BOOTED.swap_bytes())]);
 }
 
 /// Table 77: 241 to 253 are reserved or for remote frames.

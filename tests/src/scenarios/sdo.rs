@@ -16,7 +16,7 @@ pub fn malformed_requests_are_survived_and_change_nothing<S: PowerSubject>() {
     bench.send("60n#R8").run_ms(5).reads(0x6060, 0).reads(0x6040, 0).shows(0xFFFF, S::BOOTED);
 }
 
-/// No manual has block transfers.
+/// No manual has block transfers, and CiA 301 leaves them open.
 pub fn a_block_transfer_is_refused_and_an_abort_in_its_place_is_ignored<S: Subject>() {
     let mut bench = Bench::<S>::new();
     let device_type = bench.get(0x1000);

@@ -11,7 +11,6 @@ use crate::power_states::PowerSubject;
 
 const LOOK: Duration = Duration::from_micros(500);
 const REACHED: u16 = 1 << 10;
-const RUNNING: u16 = 1 << 14;
 
 const SLOW_DOWN: i64 = 1;
 const QUICK_STOP: i64 = 2;
@@ -21,7 +20,9 @@ const QUICK_STOP_S: f64 = 0.05;
 /// Commanded to turn at 120 r/min in a mode, far from any target or switch.
 pub fn turning<S: PowerSubject>(mode: i64) -> Bench<S> {
     let mut bench = Bench::new();
-    S::let_home(bench.set(0x6084, 300).set(0x6085, 50));
+    S::set_ramp(&mut bench, 0x6084, 300);
+    S::set_ramp(&mut bench, 0x6085, 50);
+    S::let_home(&mut bench);
     bench.enable_in(mode);
     match mode {
         1 => bench.move_by(100_000),
@@ -61,11 +62,11 @@ pub fn halt_takes_the_ramp_of_605dh_in_every_mode_and_stays_enabled<S: PowerSubj
         let controlword = if mode == 3 { 0x10F } else { 0x15F };
         bench.set(0x605D, option).set(0x6040, controlword);
         if option == SLOW_DOWN {
-            assert_eq!(bench.statusword() & (REACHED | RUNNING), RUNNING, "{at}: it slows down");
+            assert_eq!(bench.statusword() & (REACHED | S::RUNNING), S::RUNNING, "{at}: it slows down");
         }
         // The SDO answer takes 0.5 ms of it, the look at the statusword 1 ms more.
         stops(&mut bench, &at, mode, option, if option == SLOW_DOWN { 0.0015 } else { 0.0 });
-        assert_eq!(bench.statusword() & (0x6F | REACHED | RUNNING), 0x27 | REACHED, "{at}: enabled, and it stands");
+        assert_eq!(bench.statusword() & (0x6F | REACHED | S::RUNNING), 0x27 | REACHED, "{at}: enabled, and it stands");
         bench.set(0x6040, controlword & 0xFF).run_ms(800);
         goes_on(&mut bench, &at);
     }
@@ -95,7 +96,7 @@ pub fn shutdown_and_disable_operation_ramp_down_before_they_act_or_act_at_once<S
         for (object, controlword, state) in [(0x605B, 0x06, 0x21), (0x605C, 0x07, 0x23)] {
             let at = format!("mode {mode}, 6040h = {controlword:02X}h");
             let mut bench = turning::<S>(*mode);
-            bench.set(0x6040, controlword);
+            bench.set(object, 1).set(0x6040, controlword);
             assert_eq!(bench.statusword() & 0x6F, 0x27, "{at}: enabled on the ramp");
             stops(&mut bench, &at, *mode, SLOW_DOWN, 0.0015);
             assert_eq!(bench.statusword() & 0x6F, state, "{at}");
@@ -125,9 +126,9 @@ pub fn a_halted_move_goes_on_to_its_target<S: PowerSubject>() {
         let mut bench = Bench::<S>::new();
         bench.set(0x605D, option).enable_in(1).move_by(10_000).run_ms(800).set(0x6040, 0x15F).run_ms(1000);
         let halted = bench.get(0x6064);
-        assert!((1000..9000).contains(&halted), "605Dh = {option}: {halted}");
-        bench.shows(REACHED | RUNNING, REACHED).run_ms(500).is_at(halted, 5);
-        bench.set(0x6040, 0x5F).run_ms(3000).is_at(10_000, S::IN_POSITION);
+        assert!((1000 * S::COUNTS..9000 * S::COUNTS).contains(&halted), "605Dh = {option}: {halted}");
+        bench.shows(REACHED | S::RUNNING, REACHED).run_ms(500).is_at(halted, 5 * S::COUNTS);
+        bench.set(0x6040, 0x5F).run_ms(3000).is_at(10_000 * S::COUNTS, S::IN_POSITION);
     }
 }
 
@@ -139,9 +140,14 @@ pub fn a_set_point_given_under_halt_waits_for_its_end<S: PowerSubject>() {
         if on_the_way {
             bench.move_by(100_000).run_ms(800);
         }
-        bench.set(0x6040, 0x10F).set(0x607A, 3000).set(0x6040, 0x13F).run_ms(1000).shows(1 << 12, 1 << 12);
+        bench.set(0x6040, 0x10F).set(0x607A, 3000 * S::COUNTS).set(0x6040, 0x13F).run_ms(1000).shows(1 << 12, 1 << 12);
         let halted = bench.get(0x6064);
-        assert!(on_the_way || halted.abs() <= 5, "{halted}");
-        bench.run_ms(500).is_at(halted, 5).set(0x6040, 0x0F).run_ms(4000).is_at(3000, S::IN_POSITION);
+        assert!(on_the_way || halted.abs() <= 5 * S::COUNTS, "{halted}");
+        bench
+            .run_ms(500)
+            .is_at(halted, 5 * S::COUNTS)
+            .set(0x6040, 0x0F)
+            .run_ms(4000)
+            .is_at(3000 * S::COUNTS, S::IN_POSITION);
     }
 }

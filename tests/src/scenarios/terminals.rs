@@ -1,7 +1,7 @@
 //! Digital inputs and outputs: 2003h, 2004h and 2030h of both ZLTECH drives (ZLAC8030L, 5.4 and 5.5; ZLIM42-C, 3.2 and 5.4).
 
 use crate::bench::Bench;
-use crate::power_states::PowerSubject;
+use crate::power_states::ZltechSubject;
 
 /// Functions of an output.
 const ALARM: i64 = 1;
@@ -10,14 +10,14 @@ const IN_POSITION: i64 = 4;
 
 /// What the drive says of Y0 and Y1 (2004h), which is what a meter at them shows.
 #[track_caller]
-fn outputs<S: PowerSubject>(bench: &mut Bench<S>) -> i64 {
+fn outputs<S: ZltechSubject>(bench: &mut Bench<S>) -> i64 {
     let told = bench.run_ms(5).get(0x2004) & 3;
     assert_eq!(i64::from(bench.report().outputs.bits & 3), told);
     told
 }
 
 /// 0 is no function, and 3 is not connected or tells of a homing that has not been.
-pub fn an_output_tells_what_its_function_names_in_either_polarity<S: PowerSubject>() {
+pub fn an_output_tells_what_its_function_names_in_either_polarity<S: ZltechSubject>() {
     for (sub, mask) in S::OUTPUT_FUNCTIONS.iter().zip([1, 2]) {
         for reversed in [false, true] {
             let mut bench = Bench::<S>::new();
@@ -52,7 +52,7 @@ pub fn an_output_tells_what_its_function_names_in_either_polarity<S: PowerSubjec
 }
 
 /// 2004h and the terminals themselves.
-pub fn a_drive_without_power_has_its_outputs_off<S: PowerSubject>() {
+pub fn a_drive_without_power_has_its_outputs_off<S: ZltechSubject>() {
     let mut bench = Bench::<S>::new();
     assert_eq!(outputs(bench.set((0x2030, 0x0C), 3)), 3);
     bench.operate(|drive, now| drive.cut_power(now));
@@ -61,7 +61,7 @@ pub fn a_drive_without_power_has_its_outputs_off<S: PowerSubject>() {
 }
 
 /// 2003h.
-pub fn input_status_shows_the_levels_whatever_the_polarity_and_the_functions<S: PowerSubject>() {
+pub fn input_status_shows_the_levels_whatever_the_polarity_and_the_functions<S: ZltechSubject>() {
     let mut bench = Bench::<S>::new();
     bench.set((0x2030, 1), 0b0101);
     for input in 0..S::INPUTS {

@@ -98,7 +98,7 @@ fn errors_are_kept_latest_first_and_forgotten_by_0() {
     }
     assert_eq!(bench.emcy(), [0x8130, 0, 0x8130, 0]);
     assert_eq!((bench.read(0x1003, 0), bench.read(0x1003, 1), bench.read(0x1003, 2)), (2, 0x8130, 0x8130));
-    assert_eq!(bench.write(0x1003, 0, 1), Err(AbortCode::VALUE_TOO_HIGH));
+    assert_eq!(bench.write(0x1003, 0, 1), Err(AbortCode::INVALID_VALUE));
     bench.set(&[(0x1003, 0, 0)]);
     assert_eq!((bench.read(0x1003, 0), bench.read(0x1003, 1)), (0, 0));
 }

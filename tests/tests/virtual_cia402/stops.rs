@@ -1,5 +1,7 @@
 //! How the motor is stopped: every option code against `tests/data/cia402/option_codes.csv`.
 
+use sim::VirtualDrive;
+
 use crate::bench::{Bench, TURN};
 
 const ROWS: &str = include_str!("../../data/cia402/option_codes.csv");
@@ -94,6 +96,34 @@ fn every_code_stops_along_its_ramp_and_ends_in_its_state() {
     }
     objects.dedup();
     assert_eq!(objects, ["605A", "605B", "605C", "605D", "605E"]);
+}
+
+/// CiA 402-2, 10.3 and 8.4.6: a halt with the slow down ramp interrupts a move, which goes on to its target. So the demand
+/// stays on the way of the move: v^2 / 2a from where it was, and a load that comes meanwhile does not shift it. A quick stop
+/// gives up the way.
+#[test]
+fn a_halted_move_stops_on_its_way_whatever_load_comes_meanwhile() {
+    let stopped = |load_nm: f64| {
+        let mut bench = Bench::new();
+        bench.set(&[(0x6065, 0, 0xFFFF_FFFF), (0x6081, 0, SPEED * TURN), (0x6083, 0, 1000 * TURN)]);
+        bench.set(&[(0x6084, 0, SLOW * TURN), (0x605D, 0, 1), (0x607A, 0, 1000 * TURN)]);
+        bench.enable(1);
+        bench.control(0x1F);
+        bench.run_ms(500);
+        let from = bench.read(0x6062, 0);
+        bench.control(0x11F);
+        bench.run_ms(100);
+        bench.machine.set_load_torque(load_nm, bench.now).unwrap();
+        bench.run_ms(1000);
+        assert!(bench.has(0x0427), "{:04X}", bench.status());
+        (bench.position() - from) as f64 / TURN as f64
+    };
+    let way = (SPEED * SPEED) as f64 / (2.0 * SLOW as f64);
+    // A supervision and a control period of the way at full speed, and the position window as delivered.
+    let tolerance = SPEED as f64 * 1.5e-3 + 1e-3;
+    let (alone, loaded) = (stopped(0.0), stopped(1.0));
+    assert!((alone - way).abs() < tolerance, "{alone} turns, expected {way}");
+    assert!((alone - loaded).abs() < 1e-3, "{alone} turns, with a load {loaded}");
 }
 
 #[test]

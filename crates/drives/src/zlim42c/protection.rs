@@ -66,3 +66,34 @@ pub(super) fn is_over_current(sensors: &Sensors) -> bool {
 fn over_voltage(bus_v: f32, now: &Situation) -> bool {
     exceeds_with_hysteresis(bus_v, OVER_VOLTAGE_V, VOLTAGE_HYSTERESIS_V, now.latched.has(row::OVER_VOLTAGE))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The watch's verdict after so many periods in which both phases of a vector of 1 A are asked for 0.7 A.
+    fn judged(current_a: [f32; 2], speed_rpm: f64, periods: u16) -> bool {
+        let mut watch = PhaseWatch::default();
+        let peaks = Peaks { current_a, reference_a: [0.7; 2] };
+        (0..periods).any(|_| watch.observe(&peaks, 1.0, speed_rpm))
+    }
+
+    #[test]
+    fn two_empty_phases_are_lost_at_low_speed_and_held_down_by_the_motors_own_voltage_at_high_speed() {
+        let long = 10 * PHASE_LOSS_DEBOUNCE_PERIODS;
+        assert!(judged([0.0; 2], 0.5 * PHASE_COMPARED_RPM, PHASE_LOSS_DEBOUNCE_PERIODS));
+        assert!(!judged([0.0; 2], 2.0 * PHASE_COMPARED_RPM, long));
+        assert!(!judged([0.0; 2], -2.0 * PHASE_COMPARED_RPM, long));
+    }
+
+    #[test]
+    fn an_empty_phase_beside_one_that_carries_is_lost_at_any_speed() {
+        for speed_rpm in [0.0, 0.5 * PHASE_COMPARED_RPM, 2.0 * PHASE_COMPARED_RPM] {
+            for current_a in [[0.0, 0.7], [0.7, 0.0]] {
+                assert!(!judged(current_a, speed_rpm, PHASE_LOSS_DEBOUNCE_PERIODS - 1), "{speed_rpm} r/min");
+                assert!(judged(current_a, speed_rpm, PHASE_LOSS_DEBOUNCE_PERIODS), "{speed_rpm} r/min");
+            }
+            assert!(!judged([0.7; 2], speed_rpm, 10 * PHASE_LOSS_DEBOUNCE_PERIODS), "{speed_rpm} r/min");
+        }
+    }
+}

@@ -70,13 +70,20 @@ impl DriveSpec {
                 Err(format!("{key} of a {} is no '{value}'; expected one of: {}", self.model.name, known.join(", ")))
             }
             Err(NoSuchChoice::Variation) => {
-                let object = object_of(self.description(), key).ok_or_else(|| self.unknown(key))?;
+                let object = self.object(key).ok_or_else(|| self.unknown(key))?;
                 let number = number(value)
                     .ok_or_else(|| format!("'{value}' is no value for {object}; expected a whole number or 0x.."))?;
                 self.presets.push(Preset { object, value: number });
                 Ok(())
             }
         }
+    }
+
+    /// An object of the model by its name or number. The choice that brings it may come behind it, so that every edition of
+    /// the model is asked; whether what is chosen in the end has the object is known when it is ordered.
+    fn object(&self, text: &str) -> Option<Mux> {
+        let others = self.model.editions.iter().map(|edition| edition.description);
+        [self.description(), self.model].into_iter().chain(others).find_map(|model| object_of(model, text))
     }
 
     fn an_example(&self) -> String {
@@ -157,6 +164,19 @@ mod tests {
         let values: Vec<_> =
             spec.order(Bitrate::K500).presets.iter().map(|preset| (preset.object, preset.value)).collect();
         assert_eq!(values, [(Mux::new(0x2014, 0), 100), (Mux::new(0x2015, 0), 100)]);
+    }
+
+    #[test]
+    fn a_name_that_only_a_choice_brings_may_stand_before_the_choice() {
+        for text in [
+            "m4230e17b50@2,communication_cycle_period=5,firmware=1.66",
+            "m4230e17b50@2,firmware=1.66,communication_cycle_period=5",
+        ] {
+            let spec = drive_spec(text).ok().unwrap();
+            assert_eq!(spec.presets()[0].object, Mux::new(0x1006, 0), "{text}");
+            assert!(spec.description().has_index(0x1006), "{text}");
+        }
+        assert!(!drive_spec("m4230e17b50@2").ok().unwrap().description().has_index(0x1006));
     }
 
     #[test]

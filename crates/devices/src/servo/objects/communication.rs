@@ -38,7 +38,7 @@ const GENERAL: [Entry; 43] = [
     // Bits 0 to 15: profile 402; bits 16 to 23: servo drive.
     ro(0x1000, 0, U32, "device_type", "Device type").default(0x0002_0192),
     ro(0x1001, 0, U8, "error_register", "Error register").mappable(),
-    rw(0x1003, 0, U8, "pre_defined_error_field", "Number of errors kept; 0 forgets them").range(0, 0),
+    rw(0x1003, 0, U8, "pre_defined_error_field", "Number of errors kept").values(&[(0, "forgets them")]),
     ro(0x1003, 1, U32, "standard_error_field_1", "Latest error"),
     ro(0x1003, 2, U32, "standard_error_field_2", "Second latest error"),
     ro(0x1003, 3, U32, "standard_error_field_3", "Third latest error"),
