@@ -284,7 +284,9 @@ fn time_axis(svg: &mut Svg, layout: &Layout<'_>, name: &str) {
             svg.line((x + shift - 2.5, y + 6.0), (x + shift + 2.5, y - 6.0), &format!(r#"stroke="{CUT}""#));
         }
     }
-    svg.text((layout.right + 8.0, y + 20.0), Anchor::Start, AXIS, name);
+    // The last tick may stand at the right border, with half of its label beyond it.
+    let name_left = (layout.right + 8.0).max(free_from + 4.0);
+    svg.text((name_left, y + 20.0), Anchor::Start, AXIS, name);
 }
 
 /// A line that holds each value until the next.
@@ -458,6 +460,22 @@ mod tests {
         let at = [0.0, 2.0, 3.0, 4.0, 6.5, 8.0, 10.0].map(|time| layout.x(time));
         assert_eq!(at, [0.0, 200.0, 200.0, 200.0, 400.0, 500.0, 700.0]);
         assert!(layout.is_cut(3.0) && !layout.is_cut(4.0) && !layout.is_cut(1.0));
+    }
+
+    #[test]
+    fn the_name_of_the_time_axis_stands_clear_of_the_last_tick() {
+        let points = vec![(0.0, 0.0), (20_000.0, 1.0)];
+        let trace = Trace { label: "actual".into(), style: Style::Demand, points };
+        let panel = Panel { height: 100.0, traces: vec![trace], ..Panel::default() };
+        let figure = Figure { time: "time, s".into(), panels: vec![panel], ..Figure::default() };
+        let svg = Poster { rows: vec![vec![figure]], ..Poster::default() }.to_svg();
+        let left_of = |text: &str| {
+            let (before, _) = svg.split_once(&format!(">{text}<")).expect("it is written");
+            let (_, element) = before.rsplit_once("<text x=\"").expect("an element");
+            element.split('"').next().and_then(|x| x.parse::<f64>().ok()).expect("a number")
+        };
+        let last = "20\u{2009}000";
+        assert!(left_of("time, s") > left_of(last) + AXIS.width(last) / 2.0, "{svg}");
     }
 
     #[test]

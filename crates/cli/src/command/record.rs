@@ -277,8 +277,10 @@ fn mark(at: Instant, event: &Event) -> Option<Mark> {
         Event::HeartbeatLost(node, _) => (node, Severity::Fault),
         _ => return None,
     };
-    let of = format!("node {node}").into();
-    Some(Mark { at, of, kind: "".into(), severity, text: event.to_string() })
+    let (of, text) = (format!("node {node}"), event.to_string());
+    // A mark says of whom it tells by itself.
+    let text = text.strip_prefix(&of).map_or(&*text, |rest| rest.trim_start_matches([':', ' '])).to_owned();
+    Some(Mark { at, of: of.into(), kind: "".into(), severity, text })
 }
 
 impl Report for RecordReport {
