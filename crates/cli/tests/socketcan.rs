@@ -7,7 +7,7 @@
 
 mod common;
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
@@ -261,6 +261,55 @@ fn frames_that_are_not_read_in_time_are_counted() {
     run("cansend", &["vcan0", "333#"]);
     let note = dump.note("overrun");
     assert!(note["text"].as_str().unwrap().contains("received frames were lost"), "{note}");
+}
+
+/// One frame of node 5 for each of node 4, and what becomes of the identifier of a PDO that is moved while it is heard:
+/// objects 1A00h and 1800h, CiA 301, 7.5.2.35 and 7.5.2.37.
+#[test]
+#[ignore = "needs the interfaces of cargo xtask vcan-test"]
+fn a_dump_of_one_node_has_the_kernel_keep_back_the_others() {
+    let dump = Listener::start(command(&["--bus", "vcan0", "dump", "--node", "4"]).stderr(Stdio::piped()));
+    // Until it listens; a boot-up message is heard by it and no answer to anything.
+    while dump.lines.recv_timeout(Duration::from_millis(100)).is_err() {
+        run("cansend", &["vcan0", "704#00"]);
+    }
+    let moved = ["604#23001801BB020000", "584#6000180100000000", "604#2F001A0001000000", "584#60001A0000000000"];
+    let mapped = ["604#23001A0110004160", "584#60001A0100000000"];
+    for frame in moved.iter().chain(&mapped) {
+        run("cansend", &["vcan0", "605#4041600000000000"]);
+        run("cansend", &["vcan0", frame]);
+    }
+    // Its new identifier is no node's by the predefined connection set.
+    let shown = loop {
+        run("cansend", &["vcan0", "2BB#3706"]);
+        if let Ok(line) = dump.lines.recv_timeout(Duration::from_millis(200))
+            && line.contains("2BB#3706")
+        {
+            break line;
+        }
+    };
+    assert!(shown.contains("TPDO1 node 4: ") && shown.contains("statusword"), "{shown}");
+    dump.signal("-INT");
+    let mut dump = dump;
+    let mut said = String::new();
+    dump.child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+    assert!(said.contains("kept back all but the identifiers of these nodes"), "{said}");
+    assert!(!said.contains("5: ") && !said.contains("of them shown"), "a frame of node 5 came through: {said}");
+}
+
+/// A queueing discipline that holds each frame for a minute and has room for two stands in for a controller that gets no
+/// frame out: the emulated one has no bus that could be stuck.
+#[test]
+#[ignore = "needs the interfaces of cargo xtask vcan-test"]
+fn a_send_queue_that_nobody_empties_is_said_once() {
+    run("tc", &["qdisc", "add", "dev", "vcan1", "root", "netem", "limit", "2", "delay", "60s"]);
+    let refused = ferrodrive(&["--bus", "vcan1", "--timeout", "300ms", "scan"]);
+    run("tc", &["qdisc", "del", "dev", "vcan1", "root"]);
+    assert_eq!(refused.err.matches("the send queue is full").count(), 1, "{}", refused.err);
+    assert!(refused.err.contains("txqueuelen"), "{}", refused.err);
+    // The bus is as good as before.
+    let _simulator = Simulator::start(&["--drive", "zlac8030l@4", "--bus", "vcan1"]);
+    on("vcan1", &["read", "4", "1000"]);
 }
 
 #[test]

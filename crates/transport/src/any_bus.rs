@@ -1,6 +1,6 @@
 //! A bus of any of the kinds that this crate knows.
 
-use can::{Frame, Instant};
+use can::{CanId, Frame, Instant};
 
 use crate::Received;
 use crate::bus::{AsyncBus, BusError};
@@ -28,6 +28,20 @@ pub(crate) enum Kind {
 }
 
 impl AnyBus {
+    /// Asks for frames with these identifiers only, from here on and over every new connection; of none for all again.
+    /// True if the bus has a filter of its own and does so: a CAN interface of Linux, up to 512 identifiers. Any other bus gives
+    /// all frames as before. Frames that waited already still come, and notes always.
+    ///
+    /// For who listens to little of a busy bus. A master needs all frames: nodes that it does not know yet, and PDOs whose
+    /// identifiers anybody may change.
+    pub fn hear_only(&mut self, ids: &[CanId]) -> Result<bool, BusError> {
+        match &mut self.0 {
+            #[cfg(target_os = "linux")]
+            Kind::SocketCan(bus) => bus.hear_only(ids),
+            _ => Ok(false),
+        }
+    }
+
     /// Takes leave: an slcan adapter's channel is closed, so that it stops acknowledging frames on the bus. Dropping does
     /// for the others.
     pub async fn close(self) -> Result<(), BusError> {

@@ -7,11 +7,11 @@ use std::process::Command;
 use crate::process::{self, quietly};
 
 /// Raised when what is kept has to be made anew.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 
-/// Kernel modules of the guest: shared files, an overlay in memory, CAN.
+/// Kernel modules of the guest: shared files, an overlay in memory, CAN, a queue that can be stuck.
 const MODULES: &[&str] =
-    &["virtio_pci", "9pnet_virtio", "9p", "overlay", "can", "can_raw", "can_bcm", "vcan", "kvaser_pci"];
+    &["virtio_pci", "9pnet_virtio", "9p", "overlay", "can", "can_raw", "can_bcm", "vcan", "kvaser_pci", "sch_netem"];
 
 /// Folders of the kernel's package in which these modules and what they need stand.
 const FOLDERS: &[&str] = &[

@@ -4,9 +4,9 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::time::Duration;
 
-use can::{Frame, Instant};
+use can::{CanId, Frame, Instant};
 use canopen::NodeId;
-use master::decode::Decoder;
+use master::decode::{Decoder, ServiceKind};
 use serde::Serialize;
 use sim::wire::WireEvent;
 use transport::log::{AnyLogReader, Content, Direction, Entry, Finding, Format as LogFormat, Place, Record};
@@ -132,6 +132,12 @@ struct Sink {
     fd_frames: u64,
     /// The form of the log that is shown, if it is one.
     of: Option<LogFormat>,
+    /// Every frame is kept, shown or not.
+    keeps_all: bool,
+    /// An SDO transfer may have told a further identifier of a node that is shown.
+    may_have_learned: bool,
+    /// The bus passes on the frames of some identifiers only.
+    is_filtered: bool,
 }
 
 impl Dump {
@@ -224,7 +230,15 @@ impl Dump {
 
 /// Shows what comes; ends with the bus, with the reason unless it was a log that is over.
 async fn follow(bus: &mut AnyBus, sink: &mut Sink) -> Result<Option<BusError>, Failure> {
+    let mut asked = Vec::new();
     loop {
+        if let Some(wanted) = sink.take_wanted().filter(|wanted| *wanted != asked) {
+            match bus.hear_only(&wanted) {
+                Ok(filtered) => sink.is_filtered = filtered,
+                Err(error) => return Ok(Some(error)),
+            }
+            asked = wanted;
+        }
         match bus.recv().await {
             Ok((at, Received::Frame(frame))) => sink.take(at, &frame)?,
             Ok((at, Received::Note(note))) => sink.note(at, &note)?,
@@ -252,7 +266,16 @@ impl Sink {
             lines_skipped: 0,
             fd_frames: 0,
             of: None,
+            keeps_all: global.log.is_some(),
+            may_have_learned: true,
+            is_filtered: false,
         })
+    }
+
+    /// The identifiers to ask the bus for, when they may have changed since the last call; none for all.
+    fn take_wanted(&mut self) -> Option<Vec<CanId>> {
+        let asks = std::mem::take(&mut self.may_have_learned) && !self.keeps_all;
+        asks.then(|| self.filter.ids(&self.decoder))
     }
 
     /// Shows what stands in a log at one moment, and keeps it as it is in the log of `--log`.
@@ -286,6 +309,7 @@ impl Sink {
         sent: Option<bool>,
     ) -> Result<(), Failure> {
         let decoded = self.decoder.decode(frame);
+        self.may_have_learned |= decoded.service() == ServiceKind::Sdo;
         let wanted = self.filter.takes(&self.decoder, &decoded);
         self.counts.note(at, &decoded, wanted);
         if !wanted {
@@ -363,7 +387,8 @@ impl Sink {
     fn tell_counts(&self) {
         if !self.format.json {
             // Nobody may be listening any more.
-            let _ = writeln!(io::stderr(), "{}", self.counts);
+            let whose = if self.is_filtered { "; the kernel kept back all but the identifiers of these nodes" } else { "" };
+            let _ = writeln!(io::stderr(), "{}{whose}", self.counts);
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Which frames are shown: by node, by service, by object.
 
+use can::CanId;
 use canopen::{Mux, NodeId};
 use master::decode::{Decoded, Decoder, ServiceKind};
 
@@ -62,6 +63,14 @@ impl Filter {
             }
         }
         Ok(())
+    }
+
+    /// The identifiers of all frames that may be wanted, each once and in order; none where that is every identifier.
+    pub(crate) fn ids(&self, decoder: &Decoder) -> Vec<CanId> {
+        let mut ids: Vec<CanId> = self.nodes.iter().flat_map(|node| decoder.ids_of(*node)).collect();
+        ids.sort_unstable_by_key(|id| id.raw());
+        ids.dedup();
+        ids
     }
 
     /// True if the frame is wanted.

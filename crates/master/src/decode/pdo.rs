@@ -143,6 +143,12 @@ impl PdoBook {
         }
     }
 
+    /// Identifiers of the PDOs of a node whose mapping is known.
+    pub(super) fn ids_of(&self, node: NodeId) -> impl Iterator<Item = u16> + '_ {
+        let of_node = self.by_id.iter().filter(move |(_, ((owner, _), _))| *owner == node.raw());
+        of_node.map(|(id, _)| *id)
+    }
+
     pub(super) fn decode(&self, frame: &Frame, models: &NodeModels) -> Option<Pdo> {
         let ((node, pdo), map) = self.by_id.get(&frame.standard_data_id()?)?;
         let node = NodeId::new(*node)?;

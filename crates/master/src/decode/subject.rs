@@ -2,11 +2,13 @@
 
 use core::fmt;
 
-use canopen::connection_set::Service;
+use can::CanId;
+use canopen::connection_set::{self, Service};
 use canopen::nmt::NmtTarget;
+use canopen::pdo::PdoNumber;
 use canopen::{Mux, NodeId};
 
-use super::Decoded;
+use super::{Decoded, Decoder};
 
 /// The services of CiA 301 and CiA 305, as people choose among them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -131,5 +133,24 @@ impl Decoded {
             _ => (None, &[][..]),
         };
         sdo.into_iter().chain(fields.iter().map(|(record, _)| record.mux))
+    }
+}
+
+impl Decoder {
+    /// The identifiers of all frames that concern a node, as far as is known now: those of the predefined connection set
+    /// (CiA 301, 7.3.3), and those of its PDOs that were given or seen being configured. NMT commands are among them.
+    pub fn ids_of(&self, node: NodeId) -> impl Iterator<Item = CanId> + '_ {
+        let services = [
+            connection_set::NMT,
+            connection_set::emcy(node),
+            connection_set::sdo_request(node),
+            connection_set::sdo_reply(node),
+            connection_set::heartbeat(node),
+        ];
+        let pdos = (1..=4).filter_map(PdoNumber::new);
+        let predefined = pdos.flat_map(move |number| {
+            [connection_set::tpdo(number, node), connection_set::rpdo(number, node)].into_iter().flatten()
+        });
+        services.into_iter().chain(predefined).chain(self.pdos.ids_of(node).map(CanId::standard))
     }
 }

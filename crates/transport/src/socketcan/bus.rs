@@ -5,7 +5,7 @@ use std::io;
 use std::path::Path;
 use std::time::Duration;
 
-use can::{Frame, Instant};
+use can::{CanId, Frame, Instant};
 use nix::errno::Errno;
 
 use super::error_class::notes_of;
@@ -25,6 +25,9 @@ const QUEUE_PATIENCE: Duration = Duration::from_millis(200);
 /// Pause between two attempts to put a frame into a full send queue: two frames at 250 kbit/s.
 const QUEUE_PAUSE: Duration = Duration::from_millis(1);
 
+/// Most filters that the kernel takes for a socket (`CAN_RAW_FILTER_MAX` in `include/uapi/linux/can/raw.h`).
+const MOST_FILTERS: usize = 512;
+
 /// A bus behind a CAN interface of Linux.
 ///
 /// When the interface goes down or its adapter is unplugged, this says so ([`Note::ConnectionLost`]) and waits until it is up
@@ -35,6 +38,8 @@ pub struct SocketCanBus {
     interface: String,
     clock: WallClock,
     connection: Connection,
+    /// Identifiers that are asked for; none for all.
+    wanted: Vec<CanId>,
     /// What is to be told next: what one message said, and what sending met.
     waiting: VecDeque<(Instant, Received)>,
     suspicions: Suspicions,
@@ -60,6 +65,7 @@ impl SocketCanBus {
             interface: interface.to_owned(),
             clock: clock.clone(),
             connection: Connection::Up(socket),
+            wanted: Vec::new(),
             waiting: VecDeque::new(),
             suspicions: Suspicions::default(),
             last: clock.now(),
@@ -68,6 +74,18 @@ impl SocketCanBus {
         };
         bus.tell_state(has_carrier);
         Ok(bus)
+    }
+
+    /// See [`crate::AnyBus::hear_only`].
+    pub fn hear_only(&mut self, ids: &[CanId]) -> Result<bool, BusError> {
+        let ids = if ids.len() > MOST_FILTERS { &[] } else { ids };
+        self.wanted = ids.to_vec();
+        if let Connection::Up(socket) = &self.connection
+            && let Err(error) = socket.set_filter(ids)
+        {
+            self.lose(error)?;
+        }
+        Ok(!ids.is_empty())
     }
 
     /// An interface that is up and has no carrier belongs to a controller that is bus-off, which tells that only once.
@@ -114,7 +132,11 @@ impl SocketCanBus {
 
     /// Looks whether the interface is back.
     fn look_again(&mut self) {
-        match connect(&self.interface) {
+        let connected = connect(&self.interface);
+        match connected.and_then(|(socket, has_carrier)| {
+            let filtered = socket.set_filter(&self.wanted);
+            filtered.map(|()| (socket, has_carrier)).map_err(|error| InterfaceProblem::of(&self.interface, error))
+        }) {
             Ok((socket, has_carrier)) => {
                 self.connection = Connection::Up(socket);
                 (self.lost, self.is_stuck) = (0, false);

@@ -4,7 +4,7 @@ use std::io::{self, IoSliceMut};
 use std::os::fd::AsRawFd;
 use std::time::Duration;
 
-use can::Frame;
+use can::{CanId, Frame};
 use nix::sys::socket::{ControlMessageOwned, MsgFlags, recvmsg, setsockopt, sockopt};
 use nix::sys::time::TimeSpec;
 use socketcan::{CanFdSocket, Socket as _, SocketOptions as _};
@@ -47,6 +47,17 @@ impl Socket {
         #[allow(deprecated, reason = "the sound form needs an unsafe block, which the project forbids")]
         let inner = AsyncFd::with_interest(socket, HEARS | Interest::WRITABLE)?;
         Ok(Self { inner, control: nix::cmsg_space!(TimeSpec, u32) })
+    }
+
+    /// Lets only frames with these identifiers through; of none all. Error messages come in any case: they have a filter of
+    /// their own.
+    pub(super) fn set_filter(&self, ids: &[CanId]) -> io::Result<()> {
+        let socket = self.inner.get_ref();
+        if ids.is_empty() {
+            return socket.set_filter_accept_all();
+        }
+        let filters: Vec<(u32, u32)> = ids.iter().map(|id| wire::filter(*id)).collect();
+        socket.set_filters(&filters)
     }
 
     /// Whether this program may open sockets of CAN at all.

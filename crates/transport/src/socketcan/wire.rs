@@ -64,6 +64,14 @@ pub(super) fn emit(frame: &Frame) -> [u8; CLASSIC_LENGTH] {
     bytes
 }
 
+/// Identifier and mask (`struct can_filter`) of a filter for `id`: data and remote frames, of its form alone.
+pub(super) fn filter(id: CanId) -> (u32, u32) {
+    match id.as_standard() {
+        Some(raw) => (u32::from(raw), EXTENDED | STANDARD_MASK),
+        None => (id.raw() | EXTENDED, EXTENDED | EXTENDED_MASK),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -99,6 +107,21 @@ mod tests {
         fd[..4].copy_from_slice(&0x123_u32.to_ne_bytes());
         fd[4] = 64;
         assert_eq!(parse(&fd), Some(Message::Fd { id: CanId::standard(0x123), length: 64 }));
+    }
+
+    /// As `Documentation/networking/can.rst`, 4.1.1, has it: a frame fits where `received & mask == filter & mask`.
+    #[test]
+    fn a_filter_fits_the_frames_of_its_identifier_and_form_alone() {
+        let fits = |id: CanId, frame: &str| {
+            let (value, mask) = filter(id);
+            let received = u32::from_ne_bytes(*emit(&frame.parse().unwrap()).first_chunk().unwrap());
+            received & mask == value & mask
+        };
+        let (standard, extended) = (CanId::standard(0x604), CanId::extended(0x604));
+        assert!(fits(standard, "604#40") && fits(standard, "604#R"));
+        assert!(!fits(standard, "605#40") && !fits(standard, "00000604#40"));
+        assert!(fits(extended, "00000604#40") && fits(extended, "00000604#R"));
+        assert!(!fits(extended, "604#40") && !fits(extended, "00000605#"));
     }
 
     #[test]
