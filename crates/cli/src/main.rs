@@ -4,7 +4,6 @@
 //! on any bus; what a command returns is printed as text or JSON; what goes wrong is a [`failure::Failure`].
 
 mod args;
-mod bus_notes;
 mod command;
 mod context;
 mod control_client;

@@ -9,9 +9,8 @@ use std::time::Duration;
 use canopen::{Mux, NodeId};
 use master::Network;
 use tokio::sync::Notify;
-use transport::{BusSpec, Note, WallClock, realtime, run_station};
+use transport::{BusNotes, BusSpec, Note, WallClock, realtime, run_station};
 
-use crate::bus_notes::BusNotes;
 use crate::context::Context;
 use crate::embedded::{self, Embedded};
 use crate::failure::Failure;

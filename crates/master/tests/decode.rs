@@ -125,6 +125,27 @@ fn pdos_are_split_by_the_mapping_that_went_over_the_bus() {
     );
 }
 
+/// CiA 301, 7.3.3: the identifiers of node 4 by their function codes; and that of a PDO once it has been moved.
+#[test]
+fn the_identifiers_of_a_node_are_the_predefined_ones_and_those_of_its_moved_pdos() {
+    let mut decoder = Decoder::new();
+    let node = NodeId::new(4).unwrap();
+    let ids = |decoder: &Decoder| {
+        let mut ids: Vec<u32> = decoder.ids_of(node).map(can::CanId::raw).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        ids
+    };
+    let predefined = [0, 0x84, 0x184, 0x204, 0x284, 0x304, 0x384, 0x404, 0x484, 0x504, 0x584, 0x604, 0x704];
+    assert_eq!(ids(&decoder), predefined);
+    lines(
+        &mut decoder,
+        &["604#23001801BB020000", "584#6000180100000000", "604#2F001A0000000000", "584#60001A0000000000"],
+    );
+    let more: Vec<u32> = ids(&decoder).into_iter().filter(|id| !predefined.contains(id)).collect();
+    assert_eq!(more, [0x2BB]);
+}
+
 #[test]
 fn a_joint_is_put_into_its_own_words() {
     let mut decoder = Decoder::new();

@@ -33,9 +33,10 @@ pub(crate) fn wrong_use(error: impl ToString) -> PyErr {
     PyRuntimeError::new_err(error.to_string())
 }
 
-/// Why the master did not get there: its words, and the abort code for programs.
-pub(crate) fn master_error(py: Python<'_>, error: &Error) -> PyErr {
-    let raised = classes::MasterError::new_err(error.to_string());
+/// Why the master did not get there: its words, what is wrong with the bus, and the abort code for programs.
+pub(crate) fn master_error(py: Python<'_>, error: &Error, bus: Option<String>) -> PyErr {
+    let bus = bus.map(|bus| format!("; {bus}")).unwrap_or_default();
+    let raised = classes::MasterError::new_err(format!("{error}{bus}"));
     if let Error::Aborted { node, mux, code, .. } = error {
         let value = raised.value(py);
         let set = value

@@ -3,25 +3,59 @@
 //! The thread ends with its handle. Before it does, every drive that this program has set in motion is quick-stopped, and
 //! the guards are released, as the command line does.
 
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::collections::VecDeque;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use master::Network;
 use tokio::sync::{Notify, mpsc};
 use tokio::task::LocalSet;
-use transport::{BusSpec, WallClock, run_station};
+use transport::{BusNotes, BusSpec, Note, WallClock, run_station};
 
 use crate::world::Job;
 
 /// How long the last words may take.
 const STOP_PATIENCE: Duration = Duration::from_secs(2);
 
+/// What the bus says that may wait for a program: each kind comes once, only a connection may come and go for ever.
+const MOST_WAITING: usize = 64;
+
 /// A master that a thread runs.
 pub(crate) struct Live {
     jobs: Option<mpsc::UnboundedSender<Job>>,
     thread: Option<JoinHandle<()>>,
-    lost: Arc<Mutex<Option<String>>>,
+    said: Arc<Said>,
+}
+
+/// What the thread tells of its bus.
+struct Said(Mutex<Words>);
+
+struct Words {
+    notes: BusNotes,
+    /// What no program has taken yet.
+    waiting: VecDeque<String>,
+    /// Why there is no bus any more.
+    ended: Option<String>,
+}
+
+impl Said {
+    fn of(spec: &BusSpec) -> Self {
+        Self(Mutex::new(Words { notes: BusNotes::of(spec), waiting: VecDeque::new(), ended: None }))
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Words> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn note(&self, note: &Note) {
+        let mut words = self.lock();
+        let Some(text) = words.notes.news(note) else { return };
+        if words.waiting.len() == MOST_WAITING {
+            words.waiting.pop_front();
+        }
+        words.waiting.push_back(text);
+    }
 }
 
 /// How the opening of a bus went, once that is known.
@@ -35,8 +69,8 @@ impl Live {
     pub(crate) fn open(spec: BusSpec, network: Network) -> Result<Self, String> {
         let (jobs, incoming) = mpsc::unbounded_channel();
         let opened = Opened::default();
-        let lost = Arc::new(Mutex::new(None));
-        let (told, noted) = (Arc::clone(&opened), Arc::clone(&lost));
+        let said = Arc::new(Said::of(&spec));
+        let (told, noted) = (Arc::clone(&opened), Arc::clone(&said));
         let thread = thread::Builder::new().name("ferrodrive master".into());
         let thread = thread.spawn(move || run(&spec, network, incoming, &told, &noted));
         let thread = thread.map_err(|error| format!("cannot start a thread: {error}"))?;
@@ -47,7 +81,7 @@ impl Live {
                 None => result = opened.1.wait(result).unwrap_or_else(PoisonError::into_inner),
             }
         };
-        result.map(|()| Self { jobs: Some(jobs), thread: Some(thread), lost })
+        result.map(|()| Self { jobs: Some(jobs), thread: Some(thread), said })
     }
 
     /// Begins a job.
@@ -59,9 +93,15 @@ impl Live {
         self.jobs.as_ref().ok_or_else(refusal)?.send(job).map_err(|_| refusal())
     }
 
-    /// Why the bus was lost, if it was.
+    /// Why there is no bus: it was given up, or its connection is being made again.
     pub(crate) fn lost(&self) -> Option<String> {
-        self.lost.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        let words = self.said.lock();
+        words.ended.clone().or_else(|| words.notes.lost().map(str::to_owned))
+    }
+
+    /// What the bus has said beside frames since the last call, with what to do about it.
+    pub(crate) fn take_notes(&self) -> Vec<String> {
+        self.said.lock().waiting.drain(..).collect()
     }
 
     /// Stops what moves and ends the thread.
@@ -86,7 +126,7 @@ fn run(
     network: Network,
     incoming: mpsc::UnboundedReceiver<Job>,
     opened: &Opened,
-    lost: &Mutex<Option<String>>,
+    said: &Said,
 ) {
     let tell = |result: Result<(), String>| {
         *opened.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(result);
@@ -107,8 +147,9 @@ fn run(
         let mut station = network.clone();
         let wakeup = Arc::new(Notify::new());
         let work = work_through(network, incoming, Arc::clone(&wakeup));
-        if let Err(error) = run_station(&mut bus, &mut station, &clock, &wakeup, work, |_, _| {}).await {
-            *lost.lock().unwrap_or_else(PoisonError::into_inner) = Some(with_causes(&error));
+        let ended = run_station(&mut bus, &mut station, &clock, &wakeup, work, |_, note| said.note(note));
+        if let Err(error) = ended.await {
+            said.lock().ended = Some(with_causes(&error));
         }
     }));
 }

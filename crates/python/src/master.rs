@@ -110,6 +110,11 @@ impl Network {
         }
     }
 
+    /// What a real bus has said beside frames since the last call, a line each.
+    fn take_notes(&self) -> Vec<String> {
+        self.runner.with_live(Live::take_notes).unwrap_or_default()
+    }
+
     /// Quick-stops every drive that this program has set in motion; the result is a list of what did not go well.
     fn stop_all(&self, py: Python<'_>) -> PyResult<Job> {
         let core = self.core.clone();

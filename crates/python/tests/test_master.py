@@ -168,6 +168,28 @@ def test_the_same_over_a_connection(simulator):
         network.upload(5, 0x1000)
 
 
+def test_a_connection_that_goes_and_comes_is_a_warning_and_the_cause_of_what_fails(simulator):
+    port = simulator.port()
+    with ferrodrive.Network(f"socketcand://127.0.0.1:{port}/can0") as network:
+        assert len(network.upload(5, 0x1000)) == 4
+        simulator.quit()
+        with pytest.warns(ferrodrive.BusWarning, match="the connection to the bus is lost"):
+            with pytest.raises(ferrodrive.MasterError, match="node 5.*the connection to the bus is lost"):
+                for _ in range(100):
+                    network.upload(5, 0x1000)
+        again = ferrodrive.Simulator(
+            ["cia402@5"], extra=["--timing", "ideal", "--serve", f"socketcand://127.0.0.1:{port}"], path=simulator.command_line[0]
+        )
+        with again, pytest.warns(ferrodrive.BusWarning, match="the connection to the bus is back"):
+            deadline = time.monotonic() + 30
+            while True:
+                try:
+                    assert len(network.upload(5, 0x1000)) == 4
+                    break
+                except ferrodrive.MasterError:
+                    assert time.monotonic() < deadline, "the bus did not come back"
+
+
 def test_a_simulator_that_ends_is_an_error_not_a_hang(simulator):
     with ferrodrive.Network(f"socketcand://127.0.0.1:{simulator.port()}/can0") as network:
         assert len(network.upload(5, 0x1000)) == 4

@@ -128,6 +128,11 @@ pub enum BusError {
         /// `HOST:PORT` or the device.
         address: String,
     },
+    /// A bus that was joined to another, and is slower.
+    #[error(
+        "it takes frames more slowly than they come: more than 16384 wait for it; is its bit rate lower, is it disturbed?"
+    )]
+    TooSlow,
     /// slcan names nine bit rates only.
     #[error("slcan cannot select {bitrate}; it knows 10k, 20k, 50k, 100k, 125k, 250k, 500k, 800k and 1M")]
     NoSlcanBitrate {

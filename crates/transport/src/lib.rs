@@ -81,7 +81,7 @@ pub use modbus::{
     ModbusError, ModbusException, ModbusInquiry, ModbusMedium, ModbusRequest, ModbusServer, ModbusSession, ModbusSpec,
     RegisterAccess, RegisterAnswer,
 };
-pub use note::{ControllerState, ErrorCounters, ErrorFrame, ErrorKind, ErrorKinds, Note, Received};
+pub use note::{BusNotes, ControllerState, ErrorCounters, ErrorFrame, ErrorKind, ErrorKinds, Note, Received};
 pub use run::{Heard, RealTimeWorld, run_station, run_world};
 pub use slcan::SlcanBus;
 pub use socketcan::InterfaceProblem;

@@ -9,8 +9,8 @@ use common::{PATIENCE, Raw, frame, heard, hub, slcan, slcan_port, socketcand, so
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpSocket, TcpStream};
 use transport::{
-    AsyncBus, BusError, BusSpec, ClientId, Hub, HubError, HubEvent, HubOptions, LeaveReason, ServeSpec, SlcanBus,
-    SocketcandBus, WallClock,
+    AsyncBus, BusError, BusSpec, ClientId, Hub, HubError, HubEvent, HubOptions, LeaveReason, Note, Received, ServeSpec,
+    SlcanBus, SocketcandBus, WallClock,
 };
 
 /// Runs the hub as a bus without arbitration, in the background of the test's runtime.
@@ -318,4 +318,103 @@ async fn closing_an_slcan_bus_closes_its_channel() {
     let host = async { spec.open(&clock).await.unwrap().close().await.unwrap() };
     let (told, ()) = soon(&clock, async { tokio::join!(adapter, host) }).await;
     assert_eq!(told, "\r\rC\rV\rS5\rO\rF\rC\r");
+}
+
+/// What another bus says, and what it was given, in the hands of a test.
+struct Other {
+    heard: tokio::sync::mpsc::Receiver<Result<Received, BusError>>,
+    sent: tokio::sync::mpsc::UnboundedSender<Frame>,
+}
+
+impl AsyncBus for Other {
+    async fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        let _ = self.sent.send(*frame);
+        Ok(())
+    }
+
+    async fn recv(&mut self) -> Result<(Instant, Received), BusError> {
+        match self.heard.recv().await {
+            Some(received) => Ok((Instant::ZERO, received?)),
+            None => std::future::pending().await,
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_bus_that_is_joined_is_a_client_until_it_ends() {
+    let clock = WallClock::start();
+    let mut hub = hub(&clock).await;
+    let (say, heard_there) = tokio::sync::mpsc::channel(1);
+    let (sent, mut sent_there) = tokio::sync::mpsc::unbounded_channel();
+    let (told, mut notes) = tokio::sync::mpsc::unbounded_channel();
+    let ended = hub.join(Other { heard: heard_there, sent }, move |note| drop(told.send(note.clone())));
+    assert_eq!(hub.client_count(), 1);
+    say.send(Ok(frame("604#40").into())).await.unwrap();
+    let (client, from_there) = next_frame(&mut hub, &clock).await;
+    assert_eq!(from_there, frame("604#40"));
+    // It does not hear its own frame, but that of another.
+    hub.broadcast(&from_there, clock.now(), Some(client));
+    hub.broadcast(&frame("584#43"), clock.now(), None);
+    assert_eq!(soon(&clock, sent_there.recv()).await, Some(frame("584#43")));
+    say.send(Ok(Note::Restarted.into())).await.unwrap();
+    assert_eq!(soon(&clock, notes.recv()).await, Some(Note::Restarted));
+    say.send(Err(BusError::Closed { address: "there".into() })).await.unwrap();
+    assert_eq!(soon(&clock, ended).await.to_string(), "there closed the connection");
+    assert_eq!(left(&mut hub, &clock).await, LeaveReason::Broken);
+    assert_eq!(hub.client_count(), 0);
+}
+
+/// A bus takes 64 frames at a time from another one, and the rest when the wire has carried those.
+#[tokio::test]
+async fn a_bus_that_is_joined_is_read_no_faster_than_the_wire_carries() {
+    let clock = WallClock::start();
+    let mut hub = hub(&clock).await;
+    let (say, heard_there) = tokio::sync::mpsc::channel(1);
+    let (sent, _sent_there) = tokio::sync::mpsc::unbounded_channel();
+    let _ended = hub.join(Other { heard: heard_there, sent }, |_| {});
+    let talker = tokio::spawn(async move {
+        for _ in 0..200 {
+            say.send(Ok(frame("080#").into())).await.unwrap();
+        }
+    });
+    let mut frames = Vec::new();
+    for _ in 0..64 {
+        frames.push(next_frame(&mut hub, &clock).await);
+    }
+    for _ in 0..100 {
+        tokio::task::yield_now().await;
+    }
+    assert!(hub.try_next_event().is_none(), "a 65th frame came before the wire had carried one");
+    for carried in 0..200 {
+        let (client, frame) = frames[carried];
+        hub.broadcast(&frame, clock.now(), Some(client));
+        if frames.len() < 200 {
+            frames.push(next_frame(&mut hub, &clock).await);
+        }
+    }
+    talker.await.unwrap();
+}
+
+/// One that takes nothing is given up when more frames wait for it than for any other client.
+#[tokio::test]
+async fn a_bus_that_is_joined_and_takes_nothing_is_given_up() {
+    struct Stuck;
+    impl AsyncBus for Stuck {
+        async fn send(&mut self, _frame: &Frame) -> Result<(), BusError> {
+            std::future::pending().await
+        }
+
+        async fn recv(&mut self) -> Result<(Instant, Received), BusError> {
+            std::future::pending().await
+        }
+    }
+    let clock = WallClock::start();
+    let mut hub = hub(&clock).await;
+    let ended = hub.join(Stuck, |_| {});
+    for _ in 0..20_000 {
+        hub.broadcast(&frame("080#"), clock.now(), None);
+    }
+    let error = soon(&clock, ended).await;
+    assert!(error.to_string().contains("more slowly than they come"), "{error}");
+    assert_eq!(left(&mut hub, &clock).await, LeaveReason::TooSlow);
 }

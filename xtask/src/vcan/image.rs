@@ -267,14 +267,14 @@ mod tests {
     fn modules_are_loaded_behind_what_they_need() {
         let table = "k/virtio_pci.ko: k/virtio_ring.ko k/virtio.ko\nk/9pnet_virtio.ko: k/9pnet.ko k/virtio_ring.ko k/virtio.ko\n\
                      k/9p.ko: k/9pnet.ko\nk/overlay.ko:\nk/can.ko:\nk/can-raw.ko: k/can.ko\nk/can-bcm.ko: k/can.ko\nk/vcan.ko: k/can-dev.ko\n\
-                     k/kvaser_pci.ko: k/sja1000.ko k/can-dev.ko\n";
+                     k/kvaser_pci.ko: k/sja1000.ko k/can-dev.ko\nk/sch_netem.ko:\n";
         let order = load_order(table, "").unwrap();
         let at = |name: &str| order.iter().position(|path| path == name).unwrap();
         assert!(at("k/virtio.ko") < at("k/virtio_ring.ko") && at("k/virtio_ring.ko") < at("k/virtio_pci.ko"));
         assert!(at("k/can.ko") < at("k/can-raw.ko") && at("k/can-dev.ko") < at("k/sja1000.ko"));
-        assert_eq!(order.len(), 14, "{order:?}");
+        assert_eq!(order.len(), 15, "{order:?}");
         let built_in = load_order(&table.replace("k/overlay.ko:\n", ""), "k/overlay.ko\n").unwrap();
-        assert_eq!(built_in.len(), 13);
+        assert_eq!(built_in.len(), 14);
         assert!(load_order("", "").unwrap_err().contains("virtio_pci"));
     }
 

@@ -387,7 +387,8 @@ impl Sink {
     fn tell_counts(&self) {
         if !self.format.json {
             // Nobody may be listening any more.
-            let whose = if self.is_filtered { "; the kernel kept back all but the identifiers of these nodes" } else { "" };
+            let whose =
+                if self.is_filtered { "; the kernel kept back all but the identifiers of these nodes" } else { "" };
             let _ = writeln!(io::stderr(), "{}{whose}", self.counts);
         }
     }

@@ -10,11 +10,10 @@ use sim::machine::{Realism, TimingMode};
 use sim::{VirtualDrive, World};
 use tokio::sync::mpsc;
 use transport::{
-    AsyncBus, BusSpec, Hub, HubOptions, ModbusServer, ModbusSpec, Protocol, Received, ServeSpec, SocketcandBus,
-    WallClock, run_world,
+    AsyncBus, BusNotes, BusSpec, Hub, HubOptions, ModbusServer, ModbusSpec, Protocol, Received, ServeSpec,
+    SocketcandBus, WallClock, run_world,
 };
 
-use crate::bus_notes::BusNotes;
 use crate::embedded;
 use crate::failure::Failure;
 use crate::global::Global;
@@ -233,16 +232,11 @@ impl Sim {
             Some(spec) => Some(spec.open(&clock).await.map_err(|error| bus_failure(global, &error))?),
             None => None,
         };
-        let mut places = self.places.clone();
-        if outer.is_some() {
-            places.push(ServeSpec { protocol: Protocol::Socketcand, address: "127.0.0.1:0".into() });
-        }
         let options = HubOptions { bitrate: Some(world.bitrate()), zero: clock.unix_zero(), ..HubOptions::default() };
-        let mut hub = Hub::bind(&places, options, &clock).await.map_err(|error| failure_of(&error))?;
+        let mut hub = Hub::bind(&self.places, options, &clock).await.map_err(|error| failure_of(&error))?;
         let modbus = self.serve_registers(&requests, &clock).await?;
-        if let (Some(outer), Some(inner)) = (outer, hub.listeners().last()) {
-            let inner = inner.address.to_string();
-            tokio::spawn(join_buses(outer, inner, clock.clone(), requests.clone(), global.clone(), warnings.clone()));
+        if let Some(outer) = outer {
+            join(&hub, outer, requests.clone(), global.clone(), warnings.clone());
         }
         if let Some(eeproms) = eeproms {
             let stored = requests.clone();
@@ -277,7 +271,7 @@ impl Sim {
         control: Option<&ControlServer>,
         bridge: Option<&BusSpec>,
     ) -> String {
-        let listeners = hub.listeners()[..self.places.len()].iter().map(|listener| format!(" {listener}"));
+        let listeners = hub.listeners().iter().map(|listener| format!(" {listener}"));
         let modbus = modbus.map(|server| format!(" {}", server.place()));
         let control = control.map(|server| format!(" {}", server.place()));
         let bridge = bridge.map(|bus| format!(" {bus}"));
@@ -360,30 +354,15 @@ impl From<EepromError> for Failure {
     }
 }
 
-/// Carries frames both ways between another bus and this one, which is served at `inner`. A bus that goes away and comes back
-/// is waited for, and the drives go on meanwhile.
-async fn join_buses(
-    mut outer: impl AsyncBus + Send,
-    inner: String,
-    clock: WallClock,
-    requests: mpsc::Sender<Request>,
-    global: Global,
-    warnings: Speaker,
-) {
+/// Joins another bus to this one. A bus that goes away and comes back is waited for, and the drives go on meanwhile; its end
+/// ends the simulator.
+fn join(hub: &Hub, outer: AnyBus, requests: mpsc::Sender<Request>, global: Global, warnings: Speaker) {
     let mut notes = BusNotes::of(&global.bus);
-    let carried = async {
-        let mut inner = SocketcandBus::connect(&inner, "can0", &clock).await?;
-        loop {
-            tokio::select! {
-                received = outer.recv() => match received?.1 {
-                    Received::Frame(frame) => inner.send(&frame).await?,
-                    Received::Note(note) => notes.news(&note).iter().for_each(|text| warnings.say(&plain(&format!("note: {text}")))),
-                },
-                received = inner.recv_frame() => outer.send(&received?.1).await?,
-            }
-        }
-    };
-    let lost: Result<std::convert::Infallible, transport::BusError> = carried.await;
-    let Err(error) = lost;
-    let _ = requests.send(Request::BridgeLost(bus_failure(&global, &error))).await;
+    let joined = hub.join(outer, move |note| {
+        notes.news(note).iter().for_each(|text| warnings.say(&plain(&format!("note: {text}"))));
+    });
+    tokio::spawn(async move {
+        let error = joined.await;
+        let _ = requests.send(Request::BridgeLost(bus_failure(&global, &error))).await;
+    });
 }

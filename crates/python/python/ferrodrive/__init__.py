@@ -25,7 +25,7 @@ Quantities have their units in their names: ``velocity_rpm``, ``current_a``, ``s
 from ._native import __version__, eds, models, stimulus_forms
 from .body import Body
 from .control import Control
-from .errors import FerrodriveError, MasterError, Refused, SimulatorError, Stalled, TimeInUse
+from .errors import BusWarning, FerrodriveError, MasterError, Refused, SimulatorError, Stalled, TimeInUse
 from .master import AsyncDrive, Drive, Network
 from .scenario import Outcome, Row, Sweep, SweepSummary, run
 from .simulator import Simulator
@@ -36,6 +36,7 @@ from .world import World
 __all__ = [
     "AsyncDrive",
     "Body",
+    "BusWarning",
     "Control",
     "Drive",
     "FerrodriveError",

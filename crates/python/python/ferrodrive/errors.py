@@ -37,3 +37,11 @@ class MasterError(FerrodriveError, RuntimeError):
 
 class SimulatorError(FerrodriveError, RuntimeError):
     """The program `ferrodrive sim` did not start, ended, or refused a world command."""
+
+
+class BusWarning(UserWarning):
+    """What a real bus says beside frames: a connection that is lost or back, errors on the wire, a controller that is bus-off.
+
+    Each kind is told once for each network, a connection each time. ``warnings.simplefilter("error", ferrodrive.BusWarning)`` makes
+    an exception of it.
+    """

@@ -10,19 +10,23 @@
 
 While a call waits, other Python threads run. On a virtual bus time passes as far as the call takes. A network that is closed, or whose
 program ends, quick-stops what this program has set in motion.
+
+What a real bus says beside frames (the connection is lost, the controller is bus-off) comes as a :class:`~ferrodrive.BusWarning` with
+the next call that waits; a call that fails while the connection is lost says so.
 """
 
 from __future__ import annotations
 
 import asyncio
 import atexit
+import warnings
 import weakref
 from types import TracebackType
 from typing import Any, Optional, Union
 
 from ._native import Job, model_name
 from ._native import Network as NativeNetwork
-from .errors import MasterError, Stalled
+from .errors import BusWarning, MasterError, Stalled
 from .turns import taking_part
 from .world import World
 
@@ -72,6 +76,12 @@ class Network:
         except BaseException:
             job.cancel()
             raise
+        return self._result(job)
+
+    def _result(self, job: Job) -> Any:
+        """The result of a job that has ended, with what the bus said meanwhile as warnings."""
+        for note in self._native.take_notes():
+            warnings.warn(note, BusWarning, stacklevel=4)
         return job.result()
 
     @staticmethod
@@ -105,7 +115,7 @@ class Network:
         except BaseException:
             job.cancel()
             raise
-        return job.result()
+        return self._result(job)
 
     # What a network does.
 

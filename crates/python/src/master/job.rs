@@ -13,6 +13,7 @@ use pyo3::prelude::*;
 use super::runner::Runner;
 use super::value::Value;
 use crate::failure::{master_error, wrong_use};
+use crate::live::Live;
 use crate::world;
 
 /// How long a waiting thread is deaf to signals (Ctrl-C).
@@ -163,17 +164,12 @@ impl Job {
 
     /// What came of it; raises what went wrong.
     fn result(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let lost = || self.runner.with_live(Live::lost).flatten();
         match self.outcome.lock().result.take() {
             Some(Ok(value)) => value.into_python(py),
-            Some(Err(error)) => Err(master_error(py, &error)),
+            Some(Err(error)) => Err(master_error(py, &error, lost())),
             None => {
-                let lost = match &*self.runner {
-                    Runner::Live(live) => {
-                        live.lock().unwrap_or_else(PoisonError::into_inner).as_ref().and_then(crate::live::Live::lost)
-                    }
-                    Runner::World(_) => None,
-                };
-                Err(wrong_use(lost.unwrap_or_else(|| "it was given up, or the network was closed meanwhile".into())))
+                Err(wrong_use(lost().unwrap_or_else(|| "it was given up, or the network was closed meanwhile".into())))
             }
         }
     }

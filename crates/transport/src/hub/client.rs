@@ -50,6 +50,11 @@ impl Vitals {
         Self { listening: AtomicBool::new(false), spoke_at: AtomicU64::new(now.as_nanos()) }
     }
 
+    /// Of one that hears everything and never makes room for another.
+    pub(super) fn of_a_bus() -> Self {
+        Self { listening: AtomicBool::new(true), spoke_at: AtomicU64::new(u64::MAX) }
+    }
+
     /// It wants to hear frames.
     pub(super) fn is_listening(&self) -> bool {
         self.listening.load(Ordering::Relaxed)

@@ -24,10 +24,8 @@ pub enum HubEvent {
     Joined {
         /// Who.
         client: ClientId,
-        /// The protocol it came by.
-        protocol: Protocol,
-        /// Where from.
-        peer: SocketAddr,
+        /// The protocol that it came by, and where from; `None` for a bus that was joined ([`Hub::join`](super::Hub::join)).
+        peer: Option<(Protocol, SocketAddr)>,
     },
     /// A client sends a frame. Answer it with [`Hub::broadcast`](super::Hub::broadcast) or [`Hub::discard`](super::Hub::discard), now or later.
     Frame {

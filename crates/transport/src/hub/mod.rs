@@ -10,6 +10,7 @@
 
 mod client;
 mod event;
+mod joined;
 mod session;
 
 use std::fmt;
@@ -20,12 +21,12 @@ use std::time::Duration;
 
 use can::{Bitrate, Frame, Instant};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{Semaphore, mpsc};
+use tokio::sync::{Semaphore, mpsc, oneshot};
 use tokio::task::AbortHandle;
 
 use crate::slcan::SlcanSession;
 use crate::socketcand::SocketcandSession;
-use crate::{AsyncBus, BusError, Protocol, Received, ServeSpec, WallClock, tcp};
+use crate::{AsyncBus, BusError, Note, Protocol, Received, ServeSpec, WallClock, tcp};
 use client::{Stamped, Vitals};
 pub use event::{ClientId, HubEvent, LeaveReason};
 pub(crate) use session::{MAX_WAITING_REPLIES, Session};
@@ -125,6 +126,31 @@ impl Hub {
     /// The listeners in the order asked for, with their real ports.
     pub fn listeners(&self) -> &[Listener] {
         &self.listeners
+    }
+
+    /// Makes `bus` a client like any other: its frames come as [`HubEvent::Frame`], and what is broadcast goes onto it. `tell`
+    /// hears its notes. Completes, with the reason, when that bus ends or takes frames more slowly than they come; the frames
+    /// are carried from now on by a task of the current tokio runtime, also while nobody waits for this.
+    pub fn join<B, T>(&self, bus: B, tell: T) -> impl Future<Output = BusError> + Send + use<B, T>
+    where
+        B: AsyncBus + Send + 'static,
+        T: FnMut(&Note) + Send + 'static,
+    {
+        let (ended, end) = oneshot::channel();
+        let shared = Arc::downgrade(&self.shared);
+        let mut clients = self.shared.lock();
+        let entry = self.shared.enter(&mut clients, Vitals::of_a_bus(), None, |end| async move {
+            let client = end.client;
+            let error = joined::serve(bus, end, tell).await;
+            if let Some(shared) = shared.upgrade() {
+                shared.forget(client, LeaveReason::Broken);
+            }
+            // Nobody may wait for it.
+            let _ = ended.send(error);
+        });
+        clients.list.push(entry);
+        // A task that was ended from outside had too many frames waiting.
+        async move { end.await.unwrap_or(BusError::TooSlow) }
     }
 
     /// Clients connected now.
@@ -249,31 +275,47 @@ impl Shared {
         if clients.list.len() >= MAX_CLIENTS {
             self.displace_one(&mut clients);
         }
+        let vitals = Vitals::new(self.clock.now());
+        let shared = Arc::downgrade(self);
+        let entry = self.enter(&mut clients, vitals, Some((protocol, peer)), |end| async move {
+            let client = end.client;
+            let reason = match client::serve(stream, session, end).await {
+                Ok(()) => LeaveReason::Closed,
+                Err(_) => LeaveReason::Broken,
+            };
+            if let Some(shared) = shared.upgrade() {
+                shared.forget(client, reason);
+            }
+        });
+        clients.list.push(entry);
+    }
+
+    /// A further client, and the task that serves it.
+    fn enter<T>(
+        &self,
+        clients: &mut Clients,
+        vitals: Vitals,
+        peer: Option<(Protocol, SocketAddr)>,
+        serve: impl FnOnce(client::End) -> T,
+    ) -> Client
+    where
+        T: Future<Output = ()> + Send + 'static,
+    {
         clients.last_id += 1;
         let id = ClientId(clients.last_id);
         let (outgoing, frames) = mpsc::channel(MAX_FRAMES_WAITING);
-        let vitals = Arc::new(Vitals::new(self.clock.now()));
+        let vitals = Arc::new(vitals);
         let credits = Arc::new(Semaphore::new(MAX_FRAMES_IN_FLIGHT));
-        self.tell(HubEvent::Joined { client: id, protocol, peer });
-        let end = client::End {
+        self.tell(HubEvent::Joined { client: id, peer });
+        let task = tokio::spawn(serve(client::End {
             client: id,
             vitals: Arc::clone(&vitals),
             credits: Arc::clone(&credits),
             frames,
             inbox: self.inbox.clone(),
             clock: self.clock.clone(),
-        };
-        let shared = Arc::downgrade(self);
-        let task = tokio::spawn(async move {
-            let reason = match client::serve(stream, session, end).await {
-                Ok(()) => LeaveReason::Closed,
-                Err(_) => LeaveReason::Broken,
-            };
-            if let Some(shared) = shared.upgrade() {
-                shared.forget(id, reason);
-            }
-        });
-        clients.list.push(Client { id, vitals, credits, outgoing, task: task.abort_handle() });
+        }));
+        Client { id, vitals, credits, outgoing, task: task.abort_handle() }
     }
 
     fn displace_one(&self, clients: &mut Clients) {

@@ -5,6 +5,7 @@
 
 mod error_frame;
 mod suspicion;
+mod told;
 
 use std::fmt;
 
@@ -14,6 +15,7 @@ use crate::log::Finding;
 
 pub use error_frame::{ErrorCounters, ErrorFrame, ErrorKind, ErrorKinds};
 pub(crate) use suspicion::Suspicions;
+pub use told::BusNotes;
 
 /// What comes from a bus: mostly frames.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -2,11 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use transport::{BusSpec, Note};
+use super::Note;
+use crate::BusSpec;
 
 /// Which kinds have been told of a bus, and whether it is there.
-#[derive(Debug)]
-pub(crate) struct BusNotes {
+#[derive(Clone, Debug)]
+pub struct BusNotes {
     bus: String,
     told: BTreeSet<&'static str>,
     lost: Option<String>,
@@ -14,12 +15,12 @@ pub(crate) struct BusNotes {
 
 impl BusNotes {
     /// Nothing has been told yet of `bus`.
-    pub(crate) fn of(bus: &BusSpec) -> Self {
+    pub fn of(bus: &BusSpec) -> Self {
         Self { bus: bus.to_string(), told: BTreeSet::new(), lost: None }
     }
 
     /// The line to show for `note`: what happened and what to do about it, if that is new.
-    pub(crate) fn news(&mut self, note: &Note) -> Option<String> {
+    pub fn news(&mut self, note: &Note) -> Option<String> {
         let comes_and_goes = matches!(note, Note::ConnectionLost { .. } | Note::ConnectionBack);
         if comes_and_goes {
             let is_lost = matches!(note, Note::ConnectionLost { .. });
@@ -34,7 +35,7 @@ impl BusNotes {
     }
 
     /// How the connection to the bus was lost, while it is.
-    pub(crate) fn lost(&self) -> Option<&str> {
+    pub fn lost(&self) -> Option<&str> {
         self.lost.as_deref()
     }
 
@@ -45,9 +46,8 @@ impl BusNotes {
 
 #[cfg(test)]
 mod tests {
-    use transport::ControllerState;
-
     use super::*;
+    use crate::ControllerState;
 
     #[test]
     fn a_kind_is_told_once_and_a_connection_each_time() {
