@@ -10,8 +10,7 @@ use sim::machine::{Realism, TimingMode};
 use sim::{VirtualDrive, World};
 use tokio::sync::mpsc;
 use transport::{
-    AsyncBus, BusNotes, BusSpec, Hub, HubOptions, ModbusServer, ModbusSpec, Protocol, Received, ServeSpec,
-    SocketcandBus, WallClock, run_world,
+    AnyBus, BusNotes, BusSpec, Hub, HubOptions, ModbusServer, ModbusSpec, ServeSpec, WallClock, run_world,
 };
 
 use crate::embedded;
