@@ -51,6 +51,20 @@ impl Dwell {
         self.held && self.held_ms + ROUNDING_MS >= f64::from(time_ms)
     }
 
+    /// Nothing about it has changed since `earlier` but the time that it counts, and for a window of `time_ms` that decides nothing
+    /// any more.
+    pub fn is_as_decided_as(&self, earlier: &Self, time_ms: u16) -> bool {
+        self.held == earlier.held && (!self.held || earlier.has_lasted(time_ms))
+    }
+
+    /// The condition has been for `looks` more times, `dt_ms` apart, as it was at the last one. The same as so many
+    /// [updates](Self::update), to the last bit, if so many times `dt_ms` are a sum without rounding.
+    pub fn last_on(&mut self, looks: u64, dt_ms: f64) {
+        if self.held {
+            self.held_ms = (self.held_ms + looks as f64 * dt_ms).min(LONGEST_MS);
+        }
+    }
+
     /// Starts over.
     pub fn restart(&mut self) {
         *self = Self::default();
@@ -97,6 +111,27 @@ mod tests {
             let looks = (0..100 * parts).find(|_| dwell.update(true, 50, dt_ms)).unwrap();
             assert_eq!(looks, 50 * parts, "{parts} a millisecond");
         }
+    }
+
+    #[test]
+    fn looks_that_are_left_out_count_as_those_that_are_made() {
+        for (held, looks) in [(true, 0), (true, 1), (true, 999), (true, 1_000_000), (false, 7)] {
+            let mut one_by_one = Dwell::default();
+            one_by_one.update(held, 10, 0.5);
+            let mut left_out = one_by_one;
+            (0..looks).for_each(|_| _ = one_by_one.update(held, 10, 0.5));
+            left_out.last_on(looks, 0.5);
+            assert_eq!(left_out, one_by_one, "{held}, {looks}");
+        }
+        let mut dwell = Dwell::default();
+        (0..=19).for_each(|_| _ = dwell.update(true, 10, 0.5));
+        let before = dwell;
+        dwell.update(true, 10, 0.5);
+        assert!(!dwell.is_as_decided_as(&before, 10), "9.5 ms went over into 10");
+        let before = dwell;
+        dwell.update(true, 10, 0.5);
+        assert!(dwell.is_as_decided_as(&before, 10) && !dwell.is_as_decided_as(&Dwell::default(), 10));
+        assert!(Dwell::default().is_as_decided_as(&Dwell::default(), 10));
     }
 
     #[test]

@@ -49,6 +49,18 @@ pub trait Firmware: Station + Clone {
     /// [`Station::poll_timeout`] but for the communication task, which does nothing for a firmware that rests.
     fn next_event(&self) -> Option<Instant>;
 
+    /// When the communication task runs for the first time at or after `at`, if nothing disturbs it; `None` for never.
+    fn task_from(&self, at: Instant) -> Option<Instant>;
+
+    /// The runs of the communication task before `now` have been left out, of a firmware that rests: they would have done nothing.
+    fn leave_out_tasks(&mut self, now: Instant);
+
+    /// So many whole [rounds](Self::ROUND) of ticks have been left out, of a firmware that rests: what only counts them, and decides
+    /// nothing any more, goes on.
+    fn leave_out_rounds(&mut self, rounds: u64) {
+        let _ = rounds;
+    }
+
     /// Contents of the EEPROM, and a number that changes with them.
     fn eeprom(&self) -> (&[u8], u32);
 

@@ -234,6 +234,19 @@ impl<S: Storage> Device<S> {
         true
     }
 
+    /// See [`Firmware::task_from`](crate::Firmware::task_from).
+    pub fn task_from(&self, at: Instant) -> Option<Instant> {
+        let runs = at.nanos_since(self.next_task).div_ceil(self.task_period_ns);
+        self.running.then(|| self.next_task.plus_nanos(runs * self.task_period_ns))
+    }
+
+    /// See [`Firmware::leave_out_tasks`](crate::Firmware::leave_out_tasks).
+    pub fn leave_out_tasks(&mut self, now: Instant) {
+        if let Some(next) = self.task_from(now) {
+            self.next_task = next;
+        }
+    }
+
     /// Whether nothing about it differs from `earlier` and nothing waits to be stored, so that until a frame comes or
     /// [something is due](Self::next_event) a run of the communication task changes nothing.
     pub fn rests_since(&self, earlier: &Self) -> bool {

@@ -237,6 +237,19 @@ impl<S: Storage> Firmware for ServoDrive<S> {
         self.base.device.next_event().into_iter().chain(watch).min()
     }
 
+    fn task_from(&self, at: Instant) -> Option<Instant> {
+        self.base.device.task_from(at)
+    }
+
+    fn leave_out_tasks(&mut self, now: Instant) {
+        self.base.device.leave_out_tasks(now);
+    }
+
+    fn leave_out_rounds(&mut self, rounds: u64) {
+        // A round has one supervision.
+        self.shafts.iter_mut().flatten().for_each(|shaft| shaft.leave_out_supervisions(rounds));
+    }
+
     fn eeprom(&self) -> (&[u8], u32) {
         let (memory, generation) = self.base.services.memory();
         (memory.bytes(), generation)

@@ -31,7 +31,7 @@ impl Protection {
     /// The causes that are present now.
     pub(super) fn causes(&mut self, sensors: &Sensors, rated_v: f32, store_sound: bool, latched: FaultSet) -> FaultSet {
         let settled = self.supplied_for >= SETTLING_PERIODS;
-        self.supplied_for = self.supplied_for.saturating_add(1);
+        self.supplied_for = SETTLING_PERIODS.min(self.supplied_for + 1);
         let recovered = if latched.has(row::UNDER_VOLTAGE) { VOLTAGE_HYSTERESIS } else { 0.0 };
         let share = sensors.bus_v / rated_v;
         let over = exceeds_with_hysteresis(share, OVER_VOLTAGE, VOLTAGE_HYSTERESIS, latched.has(row::OVER_VOLTAGE));

@@ -19,7 +19,7 @@ pub(super) use cyclic::{FORGIVEN_PERIODS, PATIENCE_S};
 
 use super::faults::{Faults, no_faults};
 use super::hardware::{AxisActuation, AxisSensors};
-use super::motor::{Motor, SUPERVISION_PERIOD_S};
+use super::motor::{CONTROL_PERIOD_NS, Motor, SUPERVISION_DIVIDER, SUPERVISION_PERIOD_S};
 use super::parameters::Parameters;
 use super::read;
 use super::slots::AxisSlots;
@@ -42,7 +42,7 @@ const TEMPERATURE_HYSTERESIS_C: f32 = 10.0;
 const DISAGREEMENT_TURNS: f32 = 0.2;
 /// A shaft slower than this share of its highest speed stands, for the engine's stops.
 const STANDING_SHARE: f32 = 0.001;
-const SUPERVISION_MS: f64 = SUPERVISION_PERIOD_S as f64 * 1e3;
+const SUPERVISION_MS: f64 = (CONTROL_PERIOD_NS * SUPERVISION_DIVIDER as u64) as f64 / 1e6;
 
 /// One axis of the drive.
 #[derive(Clone)]
@@ -295,17 +295,28 @@ impl Shaft {
     /// Windows with their times.
     fn judge(&mut self, feedback: &Feedback) {
         let status = self.power.status(&self.targets, &self.parameters.power);
-        let time_ms = match self.power.mode() {
-            ModeOfOperation::PROFILE_POSITION => self.parameters.position_window.time_ms,
-            ModeOfOperation::PROFILE_VELOCITY => self.parameters.velocity_window.1,
-            _ => 0,
-        };
-        let _ = self.reached.update(status.target_reached, time_ms, SUPERVISION_MS);
+        let _ = self.reached.update(status.target_reached, self.reached_time_ms(), SUPERVISION_MS);
         let (threshold, time_ms) = self.parameters.velocity_threshold;
         let _ = self.standing.update(feedback.velocity.abs() <= threshold, time_ms, SUPERVISION_MS);
         let window = self.parameters.following_error;
         let outside = self.error().is_some_and(|error| !window.holds(error));
         self.following_error = self.outside.update(outside, window.time_ms, SUPERVISION_MS);
+    }
+
+    /// How long a target has to be reached to count, in the mode that is in effect.
+    const fn reached_time_ms(&self) -> u16 {
+        match self.power.mode() {
+            ModeOfOperation::PROFILE_POSITION => self.parameters.position_window.time_ms,
+            ModeOfOperation::PROFILE_VELOCITY => self.parameters.velocity_window.1,
+            _ => 0,
+        }
+    }
+
+    /// So many supervisions of a shaft that [rests](Self::rests_since) have been left out.
+    pub(super) fn leave_out_supervisions(&mut self, supervisions: u64) {
+        for dwell in [&mut self.reached, &mut self.standing, &mut self.outside] {
+            dwell.last_on(supervisions, SUPERVISION_MS);
+        }
     }
 
     /// Following error in increments, while a position is followed.
@@ -345,13 +356,19 @@ impl Shaft {
             limited,
             probes,
         } = self;
+        // The windows go on counting, which changes nothing once their times have passed.
+        let windows = [
+            (reached, &earlier.reached, self.reached_time_ms()),
+            (standing, &earlier.standing, self.parameters.velocity_threshold.1),
+            (outside, &earlier.outside, self.parameters.following_error.time_ms),
+        ];
         !*parameters_changed
+            && windows.iter().all(|(dwell, before, time_ms)| dwell.is_as_decided_as(before, *time_ms))
             && (power, servo, awake) == (&earlier.power, &earlier.servo, &earlier.awake)
             && (demand, targets) == (&earlier.demand, &earlier.targets)
             && (position_offset, index) == (&earlier.position_offset, &earlier.index)
             && *set_points == earlier.set_points
             && (faults, lost, overload) == (&earlier.faults, &earlier.lost, &earlier.overload)
-            && (reached, standing, outside) == (&earlier.reached, &earlier.standing, &earlier.outside)
             && (following_error, limited) == (&earlier.following_error, &earlier.limited)
             && *probes == earlier.probes
     }

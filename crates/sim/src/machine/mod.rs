@@ -236,6 +236,7 @@ impl<A: Assembly> Station for Machine<A> {
             self.wake_for_own_event(now);
             self.firmware.handle_timeout(now);
             self.note_store(now);
+            self.foretell(now);
         }
     }
 
@@ -255,7 +256,7 @@ impl<A: Assembly> Station for Machine<A> {
 
     fn poll_timeout(&self) -> Option<Instant> {
         let own = self.own_time.as_ref().and_then(OwnTime::next_due);
-        let firmware = || self.firmware.poll_timeout().into_iter().chain(own).min();
+        let firmware = || self.firmware_timeout().into_iter().chain(own).min();
         match (self.life, self.supply) {
             (Life::Running, Supply::On) => firmware(),
             (Life::Dead, Supply::Off) => None,
@@ -377,6 +378,9 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
 
     fn advance(&mut self, now: Instant) {
         // The world has run a coupled machine's periods by now.
+        if self.rest.is_resting() {
+            self.firmware.leave_out_tasks(now);
+        }
         while self.next_tick <= now && !self.coupled {
             if self.rest.is_resting() {
                 self.rest_until(now);

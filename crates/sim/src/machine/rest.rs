@@ -10,8 +10,19 @@ pub(super) enum Rest<F: Firmware> {
     Awake { look_at: Instant },
     /// They are, for a whole round, while nothing may change.
     Watching(Box<Watch<F>>),
-    /// They are not. So many have been left out, modulo a round, since the firmware's last one, with these sensors.
-    Resting { sensors: Option<F::Sensors>, left_out: u32 },
+    /// They are not, until somebody disturbs the machine.
+    Resting(Resting<F>),
+}
+
+/// Control periods that are left out.
+#[derive(Clone)]
+pub(super) struct Resting<F: Firmware> {
+    /// What the firmware would read in each; `None` if it has no power, and reads nothing.
+    pub(super) sensors: Option<F::Sensors>,
+    /// So many since its last one.
+    pub(super) left_out: u64,
+    /// When the sensors may read otherwise: nothing is foretold of what comes then.
+    pub(super) foretold_to: Instant,
 }
 
 /// A round under way.
@@ -32,7 +43,15 @@ impl<F: Firmware> Rest<F> {
     }
 
     pub(super) const fn is_resting(&self) -> bool {
-        matches!(self, Self::Resting { .. })
+        matches!(self, Self::Resting(_))
+    }
+
+    /// While they are left out of a firmware that runs: when its sensors may read otherwise.
+    pub(super) const fn foretold_to(&self) -> Option<Instant> {
+        match self {
+            Self::Resting(Resting { sensors: Some(_), foretold_to, .. }) => Some(*foretold_to),
+            _ => None,
+        }
     }
 }
 

@@ -360,6 +360,14 @@ impl Firmware for Zlim42c {
         self.device.next_event()
     }
 
+    fn task_from(&self, at: Instant) -> Option<Instant> {
+        self.device.task_from(at)
+    }
+
+    fn leave_out_tasks(&mut self, now: Instant) {
+        self.device.leave_out_tasks(now);
+    }
+
     fn eeprom(&self) -> (&[u8], u32) {
         self.device.eeprom()
     }
