@@ -49,6 +49,15 @@ impl Keeper {
         Self { desk, outcome }
     }
 
+    /// One whose disk is whoever holds the other value: it calls that with what is kept, by drive number and store.
+    #[cfg(test)]
+    pub(crate) fn by_hand() -> (Self, impl Fn(u8, u64)) {
+        let desk = Arc::new(Desk::default());
+        let (_, outcome) = channel();
+        let held = Arc::clone(&desk);
+        (Self { desk, outcome }, move |number, generation| held.lock().settled.push((number, generation)))
+    }
+
     /// Has an image brought to the disk.
     pub(crate) fn hand_over(&self, image: StoredImage) {
         self.desk.lock().waiting.insert(image.number, image);

@@ -52,6 +52,12 @@ impl Speaker {
         Self::start(io::stderr(), |dropped| format!("warning: {dropped} messages are missing here"), None)
     }
 
+    /// To nobody.
+    #[cfg(test)]
+    pub(crate) fn silent() -> Self {
+        Self::start(io::sink(), |_| String::new(), None)
+    }
+
     fn start(stream: impl Write + Send + 'static, gap: fn(u64) -> String, warned: Option<Self>) -> Self {
         let desk = Arc::new(Desk { queue: Mutex::default(), changed: Condvar::new(), gap, warned });
         let served = Arc::clone(&desk);

@@ -1,9 +1,10 @@
 //! The order of a store: into the drive's memory, onto the disk, and only then the answer that acknowledges it.
 //!
 //! The world holds SDO answers back until a store is confirmed; Modbus answers are held here. A disk that takes longer than
-//! clients wait for an answer is not waited for: the answer goes out, and that is said.
+//! clients wait for an answer is not waited for: the answer goes out, and that is said. How long that is, the wall clock says,
+//! however fast the time of the bus passes.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 use can::Instant;
@@ -22,6 +23,8 @@ const DISK_PATIENCE: Duration = Duration::from_millis(250);
 pub(crate) struct Stores {
     keeper: Keeper,
     held: VecDeque<HeldAnswer>,
+    /// What is waited for, by drive and store, and what the clock showed when that began.
+    since: BTreeMap<(u8, u64), Instant>,
     /// The disk was slow at the last store: said once.
     slow: bool,
     speaker: Speaker,
@@ -31,7 +34,6 @@ pub(crate) struct Stores {
 struct HeldAnswer {
     number: u8,
     needs: u64,
-    since: Instant,
     request: ModbusRequest,
     answer: RegisterAnswer,
 }
@@ -40,32 +42,35 @@ impl Stores {
     /// Begins with the drives of `world` as kept.
     pub(crate) fn guard(world: &mut World, keeper: Keeper, speaker: Speaker) -> Self {
         world.guard_stores();
-        Self { keeper, held: VecDeque::new(), slow: false, speaker }
+        Self { keeper, held: VecDeque::new(), since: BTreeMap::new(), slow: false, speaker }
     }
 
-    /// Has a Modbus request answered, at once or when the store that the answer stands for is on the disk.
-    pub(crate) fn answer(&mut self, world: &mut World, request: ModbusRequest) {
+    /// Has a Modbus request answered, at once or when the store that the answer stands for is on the disk; the clock shows
+    /// `clock`.
+    pub(crate) fn answer(&mut self, world: &mut World, request: ModbusRequest, clock: Instant) {
         let (answer, number) = registers::answer(world, &request);
         let store = number.and_then(|number| Some((number, world.unconfirmed_store(number)?)));
         match store {
             Some((number, needs)) => {
-                self.held.push_back(HeldAnswer { number, needs, since: world.now(), request, answer });
-                self.settle(world);
+                self.held.push_back(HeldAnswer { number, needs, request, answer });
+                self.settle(world, clock);
             }
             None => request.answer(answer),
         }
     }
 
-    /// Hands new contents to the disk, and lets out the answers that need wait no longer.
-    pub(crate) fn settle(&mut self, world: &mut World) {
+    /// Hands new contents to the disk, and lets out the answers that need wait no longer; the clock shows `clock`.
+    pub(crate) fn settle(&mut self, world: &mut World, clock: Instant) {
         while let Some(image) = world.poll_store() {
             self.keeper.hand_over(image);
         }
         for (number, generation) in self.keeper.take_settled() {
             world.confirm_store(number, generation);
-            self.slow &= self.longest_held(world).is_some();
+            self.slow &= self.is_waiting(world);
         }
-        while let Some((number, needs, _)) = self.longest_held(world).filter(|held| overdue_at(held) <= world.now()) {
+        self.release(world);
+        self.note_what_waits(world, clock);
+        while let Some((number, needs)) = self.overdue(clock) {
             if !self.slow {
                 self.speaker.say(&format!(
                     "warning: the disk of --state is slow: drive {number} acknowledges a store that has not reached it \
@@ -76,24 +81,39 @@ impl Stores {
             self.slow = true;
             world.confirm_store(number, needs);
             self.release(world);
+            self.note_what_waits(world, clock);
         }
-        self.release(world);
     }
 
-    /// When [`settle`](Self::settle) has to be called at the latest.
-    pub(crate) fn next_deadline(&self, world: &World) -> Option<Instant> {
-        self.longest_held(world).map(|held| overdue_at(&held))
+    /// What the clock shows when [`settle`](Self::settle) has to be called at the latest.
+    pub(crate) fn wakes_at(&self) -> Option<Instant> {
+        self.since.values().min().map(|since| *since + DISK_PATIENCE)
+    }
+
+    /// An answer waits for the disk.
+    pub(crate) fn is_waiting(&self, world: &World) -> bool {
+        !self.held.is_empty() || world.held_answers().next().is_some()
     }
 
     /// Returns when everything is on the disk, at most after `patience`; see [`Keeper::finish`].
-    pub(crate) fn finish(mut self, world: &mut World, patience: Duration) -> Option<Result<(), EepromError>> {
-        self.settle(world);
+    pub(crate) fn finish(self, world: &mut World, patience: Duration) -> Option<Result<(), EepromError>> {
+        while let Some(image) = world.poll_store() {
+            self.keeper.hand_over(image);
+        }
         self.keeper.finish(patience)
     }
 
-    fn longest_held(&self, world: &World) -> Option<(u8, u64, Instant)> {
-        let register = self.held.front().map(|held| (held.number, held.needs, held.since));
-        world.longest_held().into_iter().chain(register).min_by_key(|(_, _, since)| *since)
+    /// What has begun to wait does so since now; what waits no longer is forgotten.
+    fn note_what_waits(&mut self, world: &World, clock: Instant) {
+        let registers = self.held.iter().map(|held| (held.number, held.needs));
+        let before = std::mem::take(&mut self.since);
+        let waiting = world.held_answers().chain(registers);
+        self.since = waiting.map(|store| (store, before.get(&store).copied().unwrap_or(clock))).collect();
+    }
+
+    /// What has waited for longer than clients do.
+    fn overdue(&self, clock: Instant) -> Option<(u8, u64)> {
+        self.since.iter().find(|(_, since)| **since + DISK_PATIENCE <= clock).map(|(store, _)| *store)
     }
 
     fn release(&mut self, world: &World) {
@@ -108,6 +128,56 @@ impl Stores {
     }
 }
 
-fn overdue_at((_, _, since): &(u8, u64, Instant)) -> Instant {
-    *since + DISK_PATIENCE
+#[cfg(test)]
+mod tests {
+    use can::Bitrate;
+    use sim::machine::zlac8030l;
+
+    use super::*;
+
+    /// 2000h, which is stored with each write, becomes 700.
+    const WRITE_700: &str = "604#2B002000BC020000";
+
+    /// A world in which a drive's answer waits for the disk.
+    fn waiting() -> (World, sim::StationId) {
+        let mut world = World::new(Bitrate::K500, 1);
+        let probe = world.add_probe();
+        world.add_drive(4, Box::new(zlac8030l(4, 1))).unwrap();
+        world.run_for(Duration::from_millis(500));
+        (world, probe)
+    }
+
+    fn answers(world: &mut World, probe: sim::StationId) -> usize {
+        world.run_for(Duration::from_millis(2));
+        std::iter::from_fn(|| world.poll_received(probe)).filter(|(_, frame)| frame.id().raw() == 0x584).count()
+    }
+
+    #[test]
+    fn a_disk_has_its_time_by_the_clock_however_fast_the_bus_goes() {
+        let at = Instant::from_millis;
+        let (mut world, probe) = waiting();
+        let (keeper, kept) = Keeper::by_hand();
+        let mut stores = Stores::guard(&mut world, keeper, Speaker::silent());
+        let write = |world: &mut World| world.send(probe, WRITE_700.parse().unwrap()).unwrap();
+        write(&mut world);
+        world.run_for(Duration::from_millis(5));
+        stores.settle(&mut world, at(1000));
+        assert!(stores.is_waiting(&world));
+        assert_eq!(stores.wakes_at(), Some(at(1250)));
+        // Ten seconds of the bus are 249 ms of the disk's.
+        world.run_for(Duration::from_secs(10));
+        stores.settle(&mut world, at(1249));
+        assert!(stores.is_waiting(&world) && answers(&mut world, probe) == 0);
+        stores.settle(&mut world, at(1250));
+        assert!(!stores.is_waiting(&world) && stores.wakes_at().is_none());
+        assert_eq!(answers(&mut world, probe), 1);
+        // One that is kept goes out at once.
+        write(&mut world);
+        world.run_for(Duration::from_millis(5));
+        stores.settle(&mut world, at(2000));
+        let (number, generation) = world.held_answers().next().unwrap();
+        kept(number, generation);
+        stores.settle(&mut world, at(2001));
+        assert_eq!((answers(&mut world, probe), stores.wakes_at()), (1, None));
+    }
 }

@@ -51,6 +51,8 @@ pub(crate) struct ServedWorld {
     /// Who is behind the lines of standard input, to those who hear of stimuli.
     own_name: Arc<str>,
     pacer: Pacer,
+    /// What the clock showed last.
+    clock: Instant,
     /// The run that is under way where time is moved by hand.
     run: Option<UnderWay>,
     /// Tells that a run is over; false if that could not be taken, and is to be told again.
@@ -111,6 +113,7 @@ impl ServedWorld {
             events: Vec::new(),
             own_name: "standard input".into(),
             pacer,
+            clock: Instant::ZERO,
             run: None,
             run_is_over: Box::new(|| true),
             lag: Lag::default(),
@@ -262,7 +265,7 @@ impl ServedWorld {
     /// Has a Modbus request answered.
     pub(crate) fn serve_registers(&mut self, request: ModbusRequest) {
         match &mut self.stores {
-            Some(stores) => stores.answer(&mut self.world, request),
+            Some(stores) => stores.answer(&mut self.world, request, self.clock),
             None => {
                 let (answer, _) = registers::answer(&mut self.world, &request);
                 request.answer(answer);
@@ -295,7 +298,7 @@ impl ServedWorld {
             // Only an unknown number is an error.
             let _ = self.world.with_drive(number, |drive, now| drive.advance(now));
         }
-        stores.settle(&mut self.world);
+        stores.settle(&mut self.world, self.clock);
     }
 
     /// Returns when all stores are on the disk, at most after `patience`; `None` if nothing is known by then. Stores of
@@ -369,12 +372,23 @@ impl ServedWorld {
         !self.world.is_cut(self.adapter) && !self.world.is_gone(self.adapter)
     }
 
-    /// Moves the world to `instant`; false if the adapter has become free on the way, and somebody waits for it.
+    /// Time stands because an answer waits for the disk: where it follows no clock, a disk that is slow is not to show in it, and a
+    /// run by hand does the same on each machine. Where it follows the clock, it passes.
+    fn stands_for_a_store(&self) -> bool {
+        let waits = self.stores.as_ref().is_some_and(|stores| stores.is_waiting(&self.world));
+        waits && !self.pacer.follows_the_clock()
+    }
+
+    /// Moves the world to `instant`; false if it stopped before: the adapter has become free and somebody waits for it, or an answer
+    /// waits for the disk.
     fn run_to(&mut self, instant: Instant) -> bool {
         while !self.is_over() && self.world.next_event().is_some_and(|at| at <= instant) {
             let was_busy = self.offered.is_some();
             self.world.step();
             self.collect();
+            if self.stands_for_a_store() {
+                return false;
+            }
             if was_busy && self.next_offer().is_some() {
                 return false;
             }
@@ -390,6 +404,9 @@ impl ServedWorld {
         loop {
             let offer = self.next_offer().filter(|at| *at <= instant);
             let reached = self.run_to(offer.unwrap_or(instant));
+            if self.stands_for_a_store() {
+                break;
+            }
             match offer {
                 Some(_) => self.offer_next(),
                 None if reached => break,
@@ -437,17 +454,23 @@ impl RealTimeWorld for ServedWorld {
     }
 
     fn target(&mut self, clock: Instant) -> Instant {
-        self.pacer.target(clock, self.world.now())
+        self.clock = clock;
+        let target = self.pacer.target(clock, self.world.now());
+        if self.stands_for_a_store() { self.world.now() } else { target }
     }
 
     fn clock_at(&self, at: Instant) -> Option<Instant> {
-        self.pacer.clock_at(at)
+        // What is waited for says when it is there.
+        if self.stands_for_a_store() { None } else { self.pacer.clock_at(at) }
+    }
+
+    fn wakes_at(&self) -> Option<Instant> {
+        self.stores.as_ref().and_then(Stores::wakes_at)
     }
 
     fn next_deadline(&self) -> Option<Instant> {
-        let stores = self.stores.as_ref().and_then(|stores| stores.next_deadline(&self.world));
         let sample = self.control.next_sample();
-        [self.world.next_event(), self.next_offer(), self.next_look(), stores, sample].into_iter().flatten().min()
+        [self.world.next_event(), self.next_offer(), self.next_look(), sample].into_iter().flatten().min()
     }
 
     fn advance_to(&mut self, instant: Instant) {
@@ -459,7 +482,7 @@ impl RealTimeWorld for ServedWorld {
                 self.look();
             }
             self.control.publish(&mut self.world);
-            if stop.is_none() || self.is_over() {
+            if stop.is_none() || self.is_over() || self.stands_for_a_store() {
                 break;
             }
         }
@@ -469,9 +492,10 @@ impl RealTimeWorld for ServedWorld {
             followed.told = followed.told || (followed.is_over)();
         }
         if let Some(stores) = &mut self.stores {
-            stores.settle(&mut self.world);
+            stores.settle(&mut self.world, self.clock);
         }
-        if let Some(run) = self.run.as_mut().filter(|run| !run.told && run.end <= instant) {
+        let reached = self.world.now();
+        if let Some(run) = self.run.as_mut().filter(|run| !run.told && run.end <= reached) {
             run.told = (self.run_is_over)();
         }
     }
@@ -512,5 +536,55 @@ impl RealTimeWorld for ServedWorld {
             self.world.tell(None, kind);
             self.control.publish(&mut self.world);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sim::machine::zlac8030l;
+
+    use super::super::pacer::{Clock, Speed};
+    use super::*;
+
+    /// 2000h, which is stored with each write, becomes 700.
+    const WRITE_700: &str = "604#2B002000BC020000";
+
+    #[test]
+    fn moved_by_hand_time_stands_while_an_answer_waits_for_the_disk_so_that_none_shows_in_it() {
+        let mut ends = Vec::new();
+        for disk_ms in [0, 30, 200] {
+            let mut world = World::new(Bitrate::K500, 1);
+            let host = world.add_probe();
+            world.add_drive(4, Box::new(zlac8030l(4, 1))).expect("the first");
+            let pacer = Pacer::new(Clock::Manual, Speed::Times(1.0));
+            let mut served = ServedWorld::new(world, pacer, false, Speaker::silent());
+            let (keeper, kept) = Keeper::by_hand();
+            served.keep_stores(keeper);
+            let turn = |served: &mut ServedWorld, clock_ms: u64| {
+                let target = served.target(Instant::from_millis(clock_ms)).max(served.now());
+                served.advance_to(target);
+            };
+            assert!(matches!(served.command("run 500ms"), Commanded::Begun));
+            turn(&mut served, 1);
+            served.take_run().expect("it is over");
+            served.world.send(host, WRITE_700.parse().expect("a frame")).expect("a probe");
+            assert!(matches!(served.command("run 1s"), Commanded::Begun));
+            turn(&mut served, 2);
+            let stood = served.now();
+            assert!(stood < Instant::from_millis(1500), "{stood:?}: it waits for the disk");
+            assert!(served.clock_at(stood).is_none() && served.wakes_at() == Some(Instant::from_millis(252)));
+            turn(&mut served, 2 + disk_ms);
+            assert_eq!((served.now(), served.take_run()), (stood, None));
+            let (number, generation) = served.world.held_answers().next().expect("an answer waits");
+            kept(number, generation);
+            // One turn to take that in, one to go on.
+            turn(&mut served, 3 + disk_ms);
+            turn(&mut served, 3 + disk_ms);
+            assert!(served.take_run().is_some_and(|answer| answer.contains("1.5")), "the run ends where it was to");
+            let heard = std::iter::from_fn(|| served.take_heard());
+            ends.push(heard.map(|heard| format!("{heard:?}")).collect::<Vec<_>>());
+        }
+        assert!(ends.iter().all(|end| *end == ends[0]), "the same frames at the same times: {ends:#?}");
+        assert!(ends[0].iter().any(|heard| heard.contains("584")), "{:?}", ends[0]);
     }
 }

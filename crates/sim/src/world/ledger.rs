@@ -2,11 +2,11 @@
 
 use std::collections::VecDeque;
 
-use can::{Frame, Instant};
-use canopen::connection_set::SDO_REPLY_BASE;
+use can::Frame;
 
 use super::member::Member;
 use crate::VirtualDrive;
+use crate::nmt_reset::is_sdo_answer;
 
 /// Answers of one drive that may wait here. With as many waiting, what else it sends waits in the drive, by its own rules.
 const MAX_HELD: usize = 8;
@@ -24,7 +24,6 @@ pub(super) struct Ledger {
 pub(super) struct Held {
     pub(super) frame: Frame,
     pub(super) needs: u64,
-    pub(super) since: Instant,
 }
 
 impl Ledger {
@@ -35,7 +34,7 @@ impl Ledger {
 
     /// The next frame that may go to the wire. `limit` is the last store that the drive has made or is about to make: an
     /// answer cannot wait for one that will not come.
-    pub(super) fn next_frame(&mut self, drive: &mut dyn VirtualDrive, now: Instant) -> Option<Frame> {
+    pub(super) fn next_frame(&mut self, drive: &mut dyn VirtualDrive) -> Option<Frame> {
         let limit = Self::needed(drive);
         if self.held.front().is_some_and(|held| held.needs.min(limit) <= self.confirmed) {
             return self.held.pop_front().map(|held| held.frame);
@@ -46,7 +45,7 @@ impl Ledger {
             if !is_sdo_answer(&frame) || needs <= self.confirmed {
                 return Some(frame);
             }
-            self.held.push_back(Held { frame, needs, since: now });
+            self.held.push_back(Held { frame, needs });
         }
         None
     }
@@ -60,10 +59,4 @@ impl Ledger {
             _ => None,
         }
     }
-}
-
-/// The SDO answers of the predefined connection set (CiA 301, 7.3.5); no drive here moves them.
-fn is_sdo_answer(frame: &Frame) -> bool {
-    let id = frame.id();
-    !id.is_extended() && id.raw() & !0x7F == u32::from(SDO_REPLY_BASE)
 }

@@ -83,7 +83,10 @@ impl World {
             match role {
                 Role::Transmitted(frame) => self.members[i].station().handle_transmitted(&frame, self.now),
                 Role::Received if self.members[i].station().ignores(&passed.frame) => continue,
-                Role::Received => self.members[i].station().handle_frame(&passed.frame, self.now),
+                Role::Received => {
+                    self.forget_held_on_reset(i, &passed.frame);
+                    self.members[i].station().handle_frame(&passed.frame, self.now);
+                }
                 Role::Nothing => continue,
             }
             self.serve(i);

@@ -5,11 +5,12 @@
 //! that a drive gives after a store, or while one is due, stays off the wire until [`World::confirm_store`]. Nothing else
 //! waits: process data and heartbeats acknowledge nothing.
 
-use can::{Frame, Instant};
+use can::Frame;
 
 use super::ledger::Ledger;
 use super::member::Member;
 use super::{StationId, World};
+use crate::nmt_reset;
 
 /// A new content of a drive's non-volatile memory.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -69,22 +70,33 @@ impl World {
         })
     }
 
-    /// The answer that has waited for the longest: the drive's number, the store it waits for, and since when.
-    pub fn longest_held(&self) -> Option<(u8, u64, Instant)> {
-        let held = self.ledgers.iter().zip(&self.members).filter_map(|(ledger, member)| match (ledger, member) {
+    /// The first answer of each drive that waits: the drive's number, and the store that it waits for.
+    pub fn held_answers(&self) -> impl Iterator<Item = (u8, u64)> + '_ {
+        self.ledgers.iter().zip(&self.members).filter_map(|(ledger, member)| match (ledger, member) {
             (Some(ledger), Member::Drive { number, .. }) => {
-                ledger.held.front().map(|held| (*number, held.needs, held.since))
+                let needs = ledger.held.front()?.needs;
+                (needs > ledger.confirmed).then_some((*number, needs))
             }
             _ => None,
-        });
-        held.min_by_key(|(_, _, since)| *since)
+        })
     }
 
     /// The next frame that station `i` has for the wire.
     pub(super) fn next_frame(&mut self, i: usize) -> Option<Frame> {
         match (self.ledgers.get_mut(i), &mut self.members[i]) {
-            (Some(Some(ledger)), Member::Drive { drive, .. }) => ledger.next_frame(&mut **drive, self.now),
+            (Some(Some(ledger)), Member::Drive { drive, .. }) => ledger.next_frame(&mut **drive),
             (_, member) => member.station().poll_transmit(),
+        }
+    }
+
+    /// Station `i` is about to take a frame that may tell it to reset.
+    #[inline]
+    pub(super) fn forget_held_on_reset(&mut self, i: usize, frame: &Frame) {
+        let (Some(Some(ledger)), Member::Drive { drive, .. }) = (self.ledgers.get_mut(i), &self.members[i]) else {
+            return;
+        };
+        if !ledger.held.is_empty() && nmt_reset::is_asked_of(frame, || drive.report().node) {
+            ledger.held.clear();
         }
     }
 

@@ -30,10 +30,17 @@ pub trait RealTimeWorld {
         Some(at)
     }
 
+    /// What the clock shows when [`advance_to`](Self::advance_to) is to be called in any case, for what is waited for outside of the
+    /// world; `None` for nothing.
+    fn wakes_at(&self) -> Option<Instant> {
+        None
+    }
+
     /// When something is next due in it; `None` for never, at or before [`now`](Self::now) for at once.
     fn next_deadline(&self) -> Option<Instant>;
 
-    /// Moves the world to `instant`, which is never earlier than `now`, serving everything due on the way at its own time.
+    /// Moves the world to `instant`, which is never earlier than `now`, serving everything due on the way at its own time. A world
+    /// that has to wait for somebody outside may stop before.
     fn advance_to(&mut self, instant: Instant);
 
     /// A client offers `frame` at the world's now: it takes part in arbitration from here on. At most 64 frames of one
@@ -104,6 +111,7 @@ where
             Some(at) => world.clock_at(at),
             None => None,
         };
+        let deadline = deadline.into_iter().chain(world.wakes_at()).min();
         tokio::select! {
             biased;
             received = commands.recv(), if commands_open => {
