@@ -19,7 +19,8 @@
 //! # Ok::<(), eds::Refusal>(())
 //! ```
 //!
-//! It does not look into modules (CiA 306-1, clause 4.7): their sections are kept as they are. XML device descriptions
+//! It does not look into modules (CiA 306-1, clause 4.7): their sections are kept as they are, with a finding, and a
+//! description says that it is one of the device without them. XML device descriptions
 //! (CiA 311) are not read.
 
 mod check;

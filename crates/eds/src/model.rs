@@ -1,5 +1,6 @@
 //! What a file says, typed. Source: CiA 306-1, clauses 4.3 to 4.6 (EDS) and 5 (DCF).
 
+use crate::read::is_about_modules;
 use crate::{TypeCode, Value};
 
 /// An electronic data sheet, or a device configuration file, which has [`commissioning`](Self::commissioning) and values
@@ -20,7 +21,8 @@ pub struct Eds {
     pub commissioning: Option<Commissioning>,
     /// `[DynamicChannels]`: where programs of a programmable device keep their variables.
     pub dynamic_channels: Vec<DynamicChannel>,
-    /// Sections about modules, and sections that CiA 306 does not know: kept as they are, not interpreted.
+    /// Sections about modules (see [`has_modules`](Self::has_modules)), and sections that CiA 306 does not know: kept as they
+    /// are, not interpreted.
     pub kept: Vec<KeptSection>,
 }
 
@@ -362,6 +364,12 @@ impl AccessType {
 }
 
 impl Eds {
+    /// True for a modular device, or with sections about its modules (CiA 306-1, clause 4.7). Their objects are not among
+    /// [`objects`](Self::objects).
+    pub fn has_modules(&self) -> bool {
+        self.kept.iter().any(|section| is_about_modules(&section.name))
+    }
+
     /// An object.
     pub fn object(&self, index: u16) -> Option<&Object> {
         self.objects.binary_search_by_key(&index, |object| object.index).ok().map(|at| &self.objects[at])

@@ -289,7 +289,11 @@ mod tests {
         let written = write(&load(DCF));
         let reading = Eds::load(written.as_bytes()).expect("a small file");
         let whats: Vec<_> = reading.findings.iter().map(|finding| finding.what.as_str()).collect();
-        assert_eq!(whats, ["modules are kept, not interpreted"], "{written}");
+        assert_eq!(
+            whats,
+            ["objects of modules are not read: write those that are plugged in as objects of the device"],
+            "{written}"
+        );
     }
 
     #[test]

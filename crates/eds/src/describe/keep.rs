@@ -61,7 +61,8 @@ pub fn keep_of(eds: &Eds, file: &str) -> Result<&'static Description, Unkept> {
     keep_named(eds, &format!("the file {file}"))
 }
 
-fn keep_named(eds: &Eds, manual: &str) -> Result<&'static Description, Unkept> {
+fn keep_named(eds: &Eds, file: &str) -> Result<&'static Description, Unkept> {
+    let manual = &if eds.has_modules() { format!("{file}, without its modules") } else { file.to_owned() };
     let content = write(eds);
     // A panic while it was locked has left the map as it was.
     let mut all = KEPT.lock().unwrap_or_else(PoisonError::into_inner);

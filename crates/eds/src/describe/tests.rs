@@ -119,6 +119,14 @@ fn the_same_content_is_kept_once() {
 }
 
 #[test]
+fn a_description_says_that_it_is_without_the_modules_of_its_file() {
+    let written = write(&Sheet::of(devices::model("cia402").expect("a model")).eds());
+    let text = format!("{written}[SupportedModules]\nNrOfEntries=1\n[M1ModuleInfo]\nProductName=DI8\n");
+    let modular = Eds::load(text.as_bytes()).expect("a small file").eds;
+    assert_eq!(keep_of(&modular, "coupler.eds").expect("it fits").manual, "the file coupler.eds, without its modules");
+}
+
+#[test]
 fn choices_presets_and_a_node_change_the_sheet() {
     let model = devices::model("zlac8030l").expect("a model");
     let mut sheet = Sheet::of(model);

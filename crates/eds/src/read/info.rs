@@ -1,12 +1,15 @@
 //! The sections that are about the file and the device as a whole.
 
-use super::places::Info;
+use super::places::{Info, is_about_modules};
 use super::reader::{Reader, shortened};
 use crate::document::{Entry, Section};
 use crate::{BIT_RATES, DynamicChannel, KeptSection, TypeCode};
 
 /// Dynamic channels that are read: CiA 302 networks have a handful.
 const MOST_CHANNELS: usize = 256;
+
+/// The finding at each section about modules.
+const MODULES: &str = "objects of modules are not read: write those that are plugged in as objects of the device";
 
 impl Reader {
     pub(super) fn info(&mut self, which: Info, section: Section<'_>) {
@@ -30,9 +33,12 @@ impl Reader {
 
     /// Sections about modules, and sections of somebody's own.
     pub(super) fn keep(&mut self, section: Section<'_>) {
-        let of_module = super::places::place(section.name()) == super::places::Place::Module;
-        let what = if of_module { "modules are kept, not interpreted" } else { "CiA 306 has no such section" };
-        self.warn_section(section, what, Some("nothing; it is kept as it is".into()));
+        let (what, taken) = if is_about_modules(section.name()) {
+            (MODULES, "the device without modules; the section is kept as it is")
+        } else {
+            ("CiA 306 has no such section", "nothing; it is kept as it is")
+        };
+        self.warn_section(section, what, Some(taken.into()));
         let entries = section.entries().map(|entry| (entry.key.to_owned(), entry.value.to_owned())).collect();
         self.eds.kept.push(KeptSection { line: section.line(), name: section.name().to_owned(), entries });
     }

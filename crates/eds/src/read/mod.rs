@@ -14,6 +14,8 @@ mod values;
 use crate::document::Document;
 use crate::{Eds, Findings, Refusal, check};
 
+pub(crate) use places::is_about_modules;
+
 use places::Part;
 use reader::Reader;
 

@@ -75,6 +75,11 @@ pub(super) fn place(name: &str) -> Place {
     named.map_or_else(|| if is_of_module(name) { Place::Module } else { Place::Unknown }, |(_, place)| *place)
 }
 
+/// True for the sections of a modular device and its modules (CiA 306-1, clause 4.7).
+pub(crate) fn is_about_modules(name: &str) -> bool {
+    place(name) == Place::Module
+}
+
 /// `1018`, `1018sub1`, `1018Value`.
 fn part(name: &str) -> Option<Key> {
     let (digits, rest) = name.split_at_checked(4)?;

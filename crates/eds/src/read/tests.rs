@@ -288,6 +288,8 @@ fn modules_and_sections_of_somebodys_own_are_kept() {
     let entry = |key: &str, value: &str| vec![(key.to_owned(), value.to_owned())];
     assert_eq!(kept, [("M1ModuleInfo", entry("ProductName", "DI8")), ("Extra", entry("A", "b"))]);
     assert_eq!(reading.findings.count(Severity::Warning), 2);
+    assert!(reading.eds.has_modules());
+    assert!(!self::reading(&[], "[Extra]\nA=b\n").eds.has_modules());
 }
 
 #[test]
