@@ -1,6 +1,6 @@
 //! Exact length of a classical CAN frame on the wire, stuff bits included (ISO 11898-1, 8.4 and 8.5).
 
-use crate::Frame;
+use crate::{Frame, MAX_DATA_LENGTH};
 
 /// Intermission between frames, in bits.
 pub const INTERFRAME_SPACE_BITS: u32 = 3;
@@ -40,6 +40,25 @@ pub fn frame_bits(frame: &Frame) -> u32 {
     let crc = u32::from(wire.crc);
     wire.field(crc, CRC_BITS);
     wire.bits + TAIL_BITS
+}
+
+/// The most bits that a data frame of `data_length` bytes can have, whatever its contents: a stuff bit after each four of those
+/// that are stuffed, but for the first. Without interframe space, as [`frame_bits`].
+///
+/// Source: ISO 11898-1, 8.4 and 8.5; the count is that of Davis, Burns, Bril and Lukkien, "Controller Area Network (CAN)
+/// schedulability analysis: Refuted, revisited and revised", 2007.
+pub const fn most_frame_bits(extended: bool, data_length: u8) -> u32 {
+    let data = 8 * if data_length as usize > MAX_DATA_LENGTH { MAX_DATA_LENGTH as u32 } else { data_length as u32 };
+    let head = if extended { 39 } else { 19 };
+    let stuffed = head + data + CRC_BITS;
+    stuffed + (stuffed - 1) / 4 + TAIL_BITS
+}
+
+/// The fewest bits that a data frame of `data_length` bytes can have: none of them a stuff bit.
+pub const fn fewest_frame_bits(extended: bool, data_length: u8) -> u32 {
+    let data = 8 * if data_length as usize > MAX_DATA_LENGTH { MAX_DATA_LENGTH as u32 } else { data_length as u32 };
+    let head = if extended { 39 } else { 19 };
+    head + data + CRC_BITS + TAIL_BITS
 }
 
 /// Counts bits as a transmitter puts them out.
@@ -152,11 +171,21 @@ mod tests {
     #[test]
     fn stays_within_the_standard_bounds() {
         // Unstuffed: 44 + 8n bits without interframe space. Stuff bits: at most (34 + 8n - 1) / 4.
-        for n in 0..=8u32 {
-            for fill in [0x00, 0xFF, 0x55, 0x3C] {
-                let bits = frame_bits(&Frame::new(CanId::standard(0x2AA), &[fill; 8][..n as usize]));
-                assert!(bits >= 44 + 8 * n && bits <= 44 + 8 * n + (34 + 8 * n - 1) / 4);
+        for n in 0..=8u8 {
+            for fill in [0x00, 0xFF, 0x55, 0x3C, 0x0F, 0x1E, 0x87, 0xC3] {
+                for (extended, id) in [(false, CanId::standard(0x2AA)), (true, CanId::extended(0x0F0F_0F0F))] {
+                    let bits = frame_bits(&Frame::new(id, &[fill; 8][..usize::from(n)]));
+                    assert!(bits >= fewest_frame_bits(extended, n) && bits <= most_frame_bits(extended, n));
+                }
             }
+            let n = u32::from(n);
+            assert_eq!(fewest_frame_bits(false, n as u8), 44 + 8 * n);
+            assert_eq!(most_frame_bits(false, n as u8), 44 + 8 * n + (34 + 8 * n - 1) / 4);
+        }
+        // The paper's: (55 + 10 s) and (80 + 10 s) bit times with three of interframe space.
+        for n in 0..=8u8 {
+            assert_eq!(most_frame_bits(false, n) + INTERFRAME_SPACE_BITS, 55 + 10 * u32::from(n));
+            assert_eq!(most_frame_bits(true, n) + INTERFRAME_SPACE_BITS, 80 + 10 * u32::from(n));
         }
         // Runs of equal bits must be broken.
         assert!(frame_bits(&Frame::full(CanId::standard(0), [0; 8])) > 108);

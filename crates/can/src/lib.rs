@@ -57,5 +57,5 @@ pub use bitrate::Bitrate;
 pub use frame::{Frame, FrameKind, MAX_DATA_LENGTH, ParseFrameError};
 pub use id::CanId;
 pub use instant::Instant;
-pub use length::{ERROR_FRAME_BITS, INTERFRAME_SPACE_BITS, frame_bits};
+pub use length::{ERROR_FRAME_BITS, INTERFRAME_SPACE_BITS, fewest_frame_bits, frame_bits, most_frame_bits};
 pub use station::Station;

@@ -4,8 +4,8 @@ use clap::{Parser, Subcommand};
 
 use crate::command::{
     completions, convert, dcf, decode, demo, drive, dump, eds, emcy, events, export, gateway, home, latency, man_pages,
-    motion, nmt, objects, pdo, plot, read, readings, record, replay, run, scan, sdo, send, sim, store, sync, time,
-    watch, world,
+    motion, nmt, objects, pdo, plan, plot, read, readings, record, replay, run, scan, sdo, send, sim, store, sync,
+    time, watch, world,
 };
 use crate::global::Global;
 
@@ -39,6 +39,7 @@ pub(crate) enum Command {
     Dcf(dcf::Dcf),
     Watch(watch::Watch),
     Pdo(pdo::Pdo),
+    Plan(plan::Plan),
     Emcy(emcy::Emcy),
     Nmt(nmt::Nmt),
     Sync(sync::SyncCommand),

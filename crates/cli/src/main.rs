@@ -200,6 +200,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
             Whose::Node(node) => on_bus(global, format, async |context| objects.of_node(context, node).await),
         },
         Command::Latency(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Plan(plan) => plan.run(global, format),
         Command::Plot(plot) => print(format, &plot.draw()?),
         Command::Readings(readings) => print(format, &readings.list()?),
         Command::Eds(eds) => eds.run(format),

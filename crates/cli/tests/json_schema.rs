@@ -45,6 +45,7 @@ const COMMANDS: &[(&[&str], &str)] = &[
     (&["eds", "zlac8030l"], "eds"),
     (&["dcf", "4"], "dcf"),
     (&["latency", "4", "--count", "20"], "latency"),
+    (&["plan", "--mode", "4=pv"], "plan"),
     (&["dump", "--for", "1s"], "frame"),
     (&["export", "dbc", "4"], "export"),
     (&["gateway"], "failure"),

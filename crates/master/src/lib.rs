@@ -99,6 +99,7 @@ mod limits;
 mod models;
 mod network;
 pub mod pdo;
+pub mod plan;
 pub mod units;
 
 pub use drive::{Drive, MotionOptions};

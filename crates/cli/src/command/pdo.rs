@@ -161,7 +161,7 @@ fn units(model: Option<&Description>) -> TimerUnits {
 }
 
 /// How every PDO of a node is set up: those of its model's table, else those that it has.
-async fn all_pdos(drive: &Drive) -> Result<Vec<(PdoConfig, CobId)>, Failure> {
+pub(super) async fn all_pdos(drive: &Drive) -> Result<Vec<(PdoConfig, CobId)>, Failure> {
     let mut pdos = Vec::new();
     for direction in [Direction::Tpdo, Direction::Rpdo] {
         for number in (1..=PdoNumber::MAX).filter_map(PdoNumber::new) {

@@ -1,4 +1,5 @@
 use can::Instant;
+use canopen::pdo::PdoNumber;
 use canopen::{Mux, NodeId};
 use cia402::{Controlword, ModeOfOperation, PowerState, Statusword};
 use devices::PowerStyle;
@@ -24,6 +25,8 @@ const REPEAT_AFTER: core::time::Duration = core::time::Duration::from_millis(100
 #[derive(Clone, Debug)]
 pub struct CyclicDrive {
     pub(super) node: NodeId,
+    /// The RPDO with the set-point.
+    pub(super) rpdo: PdoNumber,
     /// Where its controlword is: which axis of the node it is.
     pub(super) place: Mux,
     pub(super) mode: ModeOfOperation,
@@ -66,6 +69,11 @@ impl CyclicDrive {
     /// Its node.
     pub const fn node(&self) -> NodeId {
         self.node
+    }
+
+    /// The RPDO that carries its set-point: what is sent to it in each cycle.
+    pub const fn rpdo(&self) -> PdoNumber {
+        self.rpdo
     }
 
     /// The mode in which it is moved.

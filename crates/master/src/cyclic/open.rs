@@ -154,6 +154,7 @@ impl Drive {
         let host_loss = self.begin_cyclic(description, mode, options).await?;
         Ok(CyclicDrive {
             node: self.node().id(),
+            rpdo: number,
             place,
             mode,
             style: axis.power,

@@ -11,6 +11,7 @@ use sim::Place;
 use sim::events::{Event, EventKind, KINDS, PowerPhase};
 use sim::wire::{ErrorCause, ErrorState, WireEvent};
 
+use crate::words::mode::mode;
 use crate::words::suggest::{did_you_mean, near};
 
 /// Something that has just happened.
@@ -136,16 +137,6 @@ fn detail(kind: &'static str, words: &[&str]) -> Result<Detail, String> {
         }
         true => Err(format!("nothing stands behind 'event {kind}', and not '{said}'")),
     }
-}
-
-/// A mode of operation by its number or its name: `3`, `profile velocity`.
-fn mode(text: &str) -> Result<ModeOfOperation, String> {
-    let named = || (i8::MIN..=i8::MAX).map(ModeOfOperation).filter_map(|mode| Some((mode, spelled(mode.name()?))));
-    let by_name = || named().find(|(_, name)| *name == spelled(text)).map(|(mode, _)| mode);
-    text.parse().ok().map(ModeOfOperation).or_else(by_name).ok_or_else(|| {
-        let names: Vec<_> = named().map(|(_, name)| name).collect();
-        format!("'{text}' is no mode of operation; expected its number (6060h), or one of: {}", names.join(", "))
-    })
 }
 
 /// The byte of 6060h.
