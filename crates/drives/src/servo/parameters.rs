@@ -11,11 +11,15 @@ use motion::travel::{Bounds, Travel};
 use super::motor::Motor;
 use super::read;
 use super::scales::Scales;
-use super::shaft::{FORGIVEN_PERIODS, PATIENCE_S};
 use super::slots::{AxisSlots, SYNC_PERIOD};
 use crate::engine::axis::{Control, HomingParameters, MoveLimits, Ramp, VelocityRamps};
 use crate::engine::cia402::{self as power, DisableOptions, ExternalStop, Tolerances};
 
+/// Periods of the bus that a cyclic set-point may stay away before the motion is brought to rest.
+pub(super) const FORGIVEN_PERIODS: f64 = 2.0;
+/// How long velocities and torques by RPDO may stay away where nothing says how often they come. Guess: ten periods of
+/// 10 ms, a slow cycle.
+pub(super) const PATIENCE_S: f64 = 0.1;
 /// Deceleration of a device without any: that of the motor's rated torque on its own inertia would be rough; this stops
 /// from the highest speed in a fifth of a second.
 const STOPS_IN_S: f64 = 0.2;

@@ -15,7 +15,6 @@ use devices::servo::faults::row;
 
 pub(super) use commands::Written;
 use cyclic::CyclicSetPoints;
-pub(super) use cyclic::{FORGIVEN_PERIODS, PATIENCE_S};
 
 use super::faults::{Faults, no_faults};
 use super::hardware::{AxisActuation, AxisSensors};

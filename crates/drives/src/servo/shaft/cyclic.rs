@@ -5,7 +5,8 @@
 //! - Positions (ip, csp) go on for [`FORGIVEN_PERIODS`] and slow down to rest: [`motion::set_points`].
 //! - Velocities and torques that came once a period do not: the axis is brought to rest after the same time, and held.
 //! - Those that came by RPDO in another rhythm: after three periods of SYNC, if 1006h says how long one is, else after
-//!   [`PATIENCE_S`]. The standard leaves it to makers; a motor that turns on for ever is what nobody wants.
+//!   [`PATIENCE_S`](crate::servo::parameters::PATIENCE_S). The standard leaves it to makers; a motor that turns on for
+//!   ever is what nobody wants.
 //! - Those that a host wrote by SDO stay: that is no cycle. Such a host is watched by its heartbeat (1016h).
 //!
 //! An RPDO's own deadline (its event timer) and 6007h are the drive's: `drive/connection.rs`.
@@ -13,11 +14,7 @@
 use motion::profile::Point;
 use motion::set_points::{Following, SetPoints};
 
-/// Periods of the bus that a cyclic set-point may stay away before the motion is brought to rest.
-pub(in crate::servo) const FORGIVEN_PERIODS: f64 = 2.0;
-/// How long velocities and torques by RPDO may stay away where nothing says how often they come. Guess: ten periods of
-/// 10 ms, a slow cycle.
-pub(in crate::servo) const PATIENCE_S: f64 = 0.1;
+use crate::servo::parameters::FORGIVEN_PERIODS;
 
 /// Most set-points that wait in ip (60C4h:01): as many as bits tell which places are filled.
 pub(in crate::servo) const MOST_WAITING: usize = u64::BITS as usize;
@@ -186,6 +183,7 @@ impl Waiting {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::servo::parameters::PATIENCE_S;
     use motion::set_points::Course;
 
     const MS: f64 = 1e-3;
