@@ -164,6 +164,24 @@ impl Attachment {
         load.coulomb_nm + excess_nm * libm::exp(-relative * relative)
     }
 
+    /// Torque of all that does more than rub at an angle and a velocity of the load: active torques, spring, stops and fan.
+    /// Positive against positive motion.
+    pub fn torque_nm(&self, load: &Load, angle: Angle, velocity_rad_s: f64) -> f64 {
+        let at = Deflection::new(self, angle);
+        let spring_nm = self.spring.map_or(0.0, |spring| spring.stiffness_nm_rad * at.spring_rad);
+        let stops_nm = self.stops.map_or(0.0, |stops| {
+            let pressed_rad = at.pressed_rad(0.0);
+            let torque_nm = stops.stiffness_nm_rad * pressed_rad + stops.damping_nm_s_rad * velocity_rad_s;
+            // A stop that is left behind does not pull.
+            if torque_nm * pressed_rad <= 0.0 { 0.0 } else { torque_nm }
+        });
+        let fan_nm = self.fan.map_or(0.0, |fan| {
+            let relative = velocity_rad_s / fan.velocity_rad_s;
+            fan.torque_nm * relative * relative.abs()
+        });
+        self.active_nm(load) + spring_nm + stops_nm + fan_nm
+    }
+
     /// Energy in spring and stops at an angle of the load.
     pub fn energy_j(&self, angle: Angle) -> f64 {
         Deflection::new(self, angle).energy_j(self, 0.0)

@@ -45,6 +45,7 @@ pub mod hall;
 pub mod hub_motor;
 pub mod joint_motor;
 pub mod mechanics;
+pub mod physics;
 pub mod pmsm;
 pub mod rest;
 pub mod rig;

@@ -92,6 +92,11 @@ impl Attached {
         self.gear.as_ref().map_or(shaft, |(model, data)| model.output_angle(data, shaft))
     }
 
+    /// The load's velocity while the shaft has one.
+    pub fn load_velocity_rad_s(&self, shaft_rad_s: f64) -> f64 {
+        self.gear.as_ref().map_or(shaft_rad_s, |(_, data)| data.output_velocity_rad_s)
+    }
+
     /// The same with other things joined; what is in the gear stays as it is, if the gear does.
     pub(crate) fn changed(&self, what: Attachment, rotor: &RotorModel, angle: Angle) -> Self {
         let fresh = Self::new(what, rotor, angle);

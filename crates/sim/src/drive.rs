@@ -8,6 +8,7 @@ use cia402::{ModeOfOperation, PowerState};
 use devices::{AxisId, Description};
 use drives::RegisterError;
 use plant::FreeRun;
+use plant::physics::Physics;
 
 use crate::machine::{Realism, TimingMode};
 use crate::mechanics::Mechanics;
@@ -362,4 +363,7 @@ pub struct Report {
     /// True angle of the motor shaft in rad, many turns, from the zero of its disc. That is where most stand at the start; a
     /// described servo is put together at some other place.
     pub shaft_angle_rad: f64,
+    /// What no drive measures: torques, energies, true temperatures; of a drive with a motor. The motor's torque has the sign of
+    /// [`velocity_rpm`](Self::velocity_rpm), the load's that of [`Stimulus::LoadTorque`].
+    pub physics: Option<Physics>,
 }

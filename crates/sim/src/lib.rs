@@ -57,6 +57,7 @@ pub use devices::AxisId;
 pub use drive::{Brake, Levels, OutputShaft, PowerPhase, Report, VirtualDrive, VirtualDriveClone};
 pub use drives::RegisterError;
 pub use mechanics::Mechanics;
+pub use plant::physics::Physics;
 pub use prng::Prng;
 pub use refused::Refused;
 pub use stimulus::{

@@ -5,6 +5,7 @@ use drives::engine::axis::Demand;
 use drives::{Firmware, RegisterError};
 use plant::attachment::Attachment;
 use plant::mechanics::RotorData;
+use plant::physics::Physics;
 use plant::rest::Rested;
 use plant::rig::RigModel;
 use plant::shaft::Motion;
@@ -112,6 +113,9 @@ pub trait Assembly: Clone + Send + 'static {
 
     /// The shaft of an axis, and load, supply, temperatures and energies around it.
     fn shaft_and_rig(&self, axis: AxisId) -> (&RotorData, &Rig);
+
+    /// What the motor of an axis does, and what it does it with.
+    fn physics(&self, axis: AxisId) -> Physics;
 
     /// Load, supply, temperatures and energies, to change.
     fn rig_mut(&mut self, axis: AxisId) -> &mut Rig;

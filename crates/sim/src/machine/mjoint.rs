@@ -18,6 +18,7 @@ use plant::absolute_encoder::BatteryState;
 use plant::attachment::Attachment;
 use plant::gear::GearData;
 use plant::mechanics::RotorData;
+use plant::physics::Physics;
 use plant::pmsm::Phase;
 use plant::rest::{Rested, is_at_rest, rest};
 use plant::rig::RigModel;
@@ -250,6 +251,10 @@ impl Assembly for Joint {
 
     fn shaft_and_rig(&self, _axis: AxisId) -> (&RotorData, &Rig) {
         (&self.motor.rotor, &self.motor.rig)
+    }
+
+    fn physics(&self, _axis: AxisId) -> Physics {
+        self.motor.physics()
     }
 
     fn rig_mut(&mut self, _axis: AxisId) -> &mut Rig {

@@ -405,6 +405,8 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
         let own = self.firmware.report(axis);
         let (shaft, rig) = self.assembly.shaft_and_rig(axis);
         let direction = if self.assembly.counts_reversed(&self.firmware, axis) { -1.0 } else { 1.0 };
+        let mut physics = self.assembly.physics(axis);
+        physics.motor_torque_nm *= direction;
         let common = Report {
             node: own.node_id.raw(),
             powered: self.life == Life::Running,
@@ -419,6 +421,7 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
             motor_c: Some(rig.winding.temperature_c),
             driver_c: Some(rig.heat_sink.temperature_c),
             shaft_angle_rad: shaft.angle.as_rad(),
+            physics: Some(physics),
             ..Report::default()
         };
         let report = self.assembly.report(&self.firmware, axis, common);

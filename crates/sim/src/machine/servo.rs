@@ -18,6 +18,7 @@ use plant::encoder::EncoderFault;
 use plant::hall::HallFault;
 use plant::hub_motor::{self, HubMotor, HubMotorModel, Inverter};
 use plant::mechanics::RotorData;
+use plant::physics::Physics;
 use plant::pmsm::Phase;
 use plant::rest::{Rested, is_at_rest, rest};
 use plant::rig::{Rig, RigModel};
@@ -357,6 +358,10 @@ impl Assembly for ServoBench {
     fn shaft_and_rig(&self, axis: AxisId) -> (&RotorData, &Rig) {
         let motor = self.at(axis);
         (&motor.rotor, &motor.rig)
+    }
+
+    fn physics(&self, axis: AxisId) -> Physics {
+        self.at(axis).physics()
     }
 
     fn rig_mut(&mut self, axis: AxisId) -> &mut Rig {

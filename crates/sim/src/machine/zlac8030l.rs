@@ -21,6 +21,7 @@ use plant::encoder::EncoderFault;
 use plant::hall::HallFault;
 use plant::hub_motor::{self, HubMotor, HubMotorModel, Inverter};
 use plant::mechanics::RotorData;
+use plant::physics::Physics;
 use plant::pmsm::Phase;
 use plant::rest::{Rested, is_at_rest, rest};
 use plant::rig::{Rig, RigModel};
@@ -200,6 +201,10 @@ impl Assembly for HubWheel {
 
     fn shaft_and_rig(&self, _axis: AxisId) -> (&RotorData, &Rig) {
         (&self.motor.rotor, &self.motor.rig)
+    }
+
+    fn physics(&self, _axis: AxisId) -> Physics {
+        self.motor.physics()
     }
 
     fn rig_mut(&mut self, _axis: AxisId) -> &mut Rig {

@@ -20,6 +20,7 @@ use plant::FreeRun;
 use plant::angle::Angle;
 use plant::attachment::Attachment;
 use plant::mechanics::RotorData;
+use plant::physics::Physics;
 use plant::rest::{Rested, is_at_rest, rest};
 use plant::rig::{Rig, RigModel};
 use plant::shaft::Motion;
@@ -247,6 +248,10 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
 
     fn shaft_and_rig(&self, _axis: AxisId) -> (&RotorData, &Rig) {
         (&self.motor.rotor, &self.motor.rig)
+    }
+
+    fn physics(&self, _axis: AxisId) -> Physics {
+        self.motor.physics()
     }
 
     fn rig_mut(&mut self, _axis: AxisId) -> &mut Rig {

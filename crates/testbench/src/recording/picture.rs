@@ -149,6 +149,7 @@ fn look(quantity: &str, unit: &str) -> (Colour, bool) {
         "A" | "N·m" => (Colour::Orange, true),
         "V" => (Colour::Purple, false),
         "°C" => (Colour::Red, false),
+        "J" => (Colour::Red, true),
         _ => (Colour::Grey, quantity != "statusword"),
     }
 }
