@@ -5,6 +5,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a chore talks to a terminal")]
 
 mod cargo_tests;
+mod debian;
 mod dist;
 mod examples;
 mod idle;

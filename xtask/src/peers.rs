@@ -1,4 +1,5 @@
-//! Other people's software against ours: canopen-python, python-can and pymodbus talk to `ferrodrive sim`.
+//! Other people's software against ours: canopen-python, python-can and pymodbus talk to `ferrodrive sim`;
+//! cantools, mcap, tshark and can-utils read what it writes.
 //!
 //! They start it with `ferrodrive.Simulator` of our own Python package. The packages of others go into a private environment
 //! under `target/`, in pinned versions, and stay there for the next run. A machine without Python or without a network skips
@@ -7,11 +8,14 @@
 use std::process::Command;
 
 use crate::tally::Tally;
-use crate::{process, program, python, workspace};
+use crate::{debian, process, program, python, workspace};
 
 /// The pinned packages: one file that people can also give to `pip install -r`.
 const REQUIREMENTS: &str = "tests/peers/requirements.txt";
 const SCRIPT: &str = "tests/peers/run.py";
+
+/// Programs of Debian packages that read log files. Checks that miss theirs are skipped.
+const PROGRAMS: &[(&str, &str)] = &[("tshark", "tshark"), ("editcap", "wireshark-common"), ("asc2log", "can-utils")];
 
 pub(crate) fn run() -> Tally {
     let program = match program::build("sim") {
@@ -27,6 +31,9 @@ pub(crate) fn run() -> Tally {
     };
     if let Err(error) = python::install_wheel(&python) {
         return Tally::failed(error);
+    }
+    if let Err(reason) = debian::install(PROGRAMS) {
+        println!("   without {reason}");
     }
     let root = workspace::root();
     let mut command = Command::new(&python);

@@ -140,7 +140,8 @@ impl DbcNode {
 
     fn messages(&self, out: &mut String, tail: &mut Tail) {
         let name = self.name();
-        for pdo in &self.pdos {
+        // One that carries nothing is not sent (CiA 301, 7.5.2.36: its mapping is deactivated).
+        for pdo in self.pdos.iter().filter(|pdo| pdo.map.bytes() > 0) {
             let (sender, receiver) = match pdo.pdo.direction {
                 Direction::Tpdo => (&*name, MASTER),
                 Direction::Rpdo => (MASTER, &*name),
@@ -307,6 +308,11 @@ mod tests {
             assert!(text.lines().any(|found| found == line), "{line:?} in {text}");
         }
         assert!(text.is_ascii());
+        let empty = print(&[node(&[])]);
+        assert!(
+            empty.contains("BO_ 132 EMCY_4") && !empty.contains("TPDO"),
+            "what carries nothing is not sent: {empty}"
+        );
     }
 
     #[test]

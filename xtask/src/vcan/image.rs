@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::debian;
 use crate::process::{self, quietly};
 
 /// Raised when what is kept has to be made anew.
@@ -39,7 +40,7 @@ pub(super) fn prepare(folder: &Path) -> Result<Image, String> {
     if std::env::consts::OS != "linux" || std::env::consts::ARCH != "x86_64" {
         return Err("the guest is for an x86-64 machine with Linux".to_owned());
     }
-    install_programs()?;
+    debian::install(PROGRAMS)?;
     let folder = folder.join(format!("v{FORMAT}"));
     let image = Image { kernel: folder.join("kernel"), initrd: folder.join("initrd") };
     if image.initrd.exists() {
@@ -55,45 +56,9 @@ pub(super) fn prepare(folder: &Path) -> Result<Image, String> {
     Ok(image)
 }
 
-/// Installs what is missing, if this user may.
-fn install_programs() -> Result<(), String> {
-    let needed =
-        [("qemu-system-x86_64", "qemu-system-x86"), ("xz", "xz-utils"), ("cansend", "can-utils"), ("ip", "iproute2")];
-    let missing: Vec<&str> =
-        needed.into_iter().filter(|(program, _)| !there(program)).map(|(_, package)| package).collect();
-    if missing.is_empty() {
-        return Ok(());
-    }
-    let names = missing.join(" ");
-    let install = || {
-        let mut apt = apt();
-        quietly(apt.args(["install", "--no-install-recommends"]).args(&missing))
-    };
-    if !process::works("apt-get", &["--version"]) {
-        return Err(format!("not installed, and no apt-get: {names}"));
-    }
-    println!("   installing {names}");
-    let installed = install().or_else(|_| quietly(apt().arg("update")).and_then(|()| install()));
-    installed.map_err(|error| format!("cannot be installed ({names}): {}", last_line(&error)))
-}
-
-fn there(program: &str) -> bool {
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    let more = ["/usr/sbin", "/sbin"].map(PathBuf::from);
-    std::env::split_paths(&path).chain(more).any(|folder| folder.join(program).is_file())
-}
-
-fn apt() -> Command {
-    let mut apt = Command::new("apt-get");
-    // Downloads are made by this user, who owns the folder that they go to.
-    apt.args(["-q", "-y", "-o", "APT::Sandbox::User=root", "-o", "DPkg::Lock::Timeout=60"]);
-    apt.env("DEBIAN_FRONTEND", "noninteractive");
-    apt
-}
-
-fn last_line(text: &str) -> &str {
-    text.lines().last().unwrap_or_default()
-}
+/// Programs of Debian packages that the guest is made and run with.
+const PROGRAMS: &[(&str, &str)] =
+    &[("qemu-system-x86_64", "qemu-system-x86"), ("xz", "xz-utils"), ("cansend", "can-utils"), ("ip", "iproute2")];
 
 fn make(work: &Path) -> Result<(), String> {
     let packages = work.join("packages");
@@ -133,10 +98,10 @@ fn download(folder: &Path) -> Result<(), String> {
             line.trim().strip_prefix("Depends: ").filter(|name| name.starts_with("linux-image-")).map(str::to_owned)
         });
         let kernel = kernel.ok_or("apt knows no linux-image-amd64")?;
-        quietly(apt().args(["download", &kernel, "busybox-static"]).current_dir(folder))
+        quietly(debian::apt().args(["download", &kernel, "busybox-static"]).current_dir(folder))
     };
-    let fetched = fetch().or_else(|_| quietly(apt().arg("update")).and_then(|()| fetch()));
-    fetched.map_err(|error| format!("the guest's kernel cannot be downloaded: {}", last_line(&error)))
+    let fetched = fetch().or_else(|_| quietly(debian::apt().arg("update")).and_then(|()| fetch()));
+    fetched.map_err(|error| format!("the guest's kernel cannot be downloaded: {}", debian::last_line(&error)))
 }
 
 fn list(folder: &Path) -> Result<Vec<PathBuf>, String> {
