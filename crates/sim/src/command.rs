@@ -165,9 +165,12 @@ impl CommandError {
     /// What to do, where the words do not say it.
     pub const fn next(&self) -> Option<&'static str> {
         match self {
-            Self::Unknown(_) | Self::NoAction(_) | Self::Stimulus(_) => Some("help lists what a line may say"),
+            Self::Unknown(_) | Self::BadNode(_) | Self::NoAction(_) | Self::Stimulus(_) => {
+                Some("help lists what a line may say")
+            }
             Self::NotManual => Some("start the simulator with --clock manual"),
             Self::Running { .. } | Self::TooMany { .. } => Some("wait for the answer to the run"),
+            Self::Ended { .. } => Some("now tells how far time has come; run goes on from there"),
             _ => None,
         }
     }

@@ -289,6 +289,65 @@ fn an_arm_of_three_joints_is_held_by_its_drives_and_carries_a_payload() {
     assert!(fallen[0] < moved[0] - 5.0, "{fallen:?}");
 }
 
+/// What may be said to a body and to the drives that move it, up to the ends of the ranges and beyond.
+const EXTREMES: [&str; 28] = [
+    "body b slope 80 360",
+    "body b slope -80 -360",
+    "body b slope 1e-300",
+    "body b slope 0",
+    "body b slope 1e308",
+    "body b grip 0.001",
+    "body b grip 10",
+    "body b grip off",
+    "body b mass 0.01",
+    "body b mass 100000",
+    "body b mass 0",
+    "body b payload 100000",
+    "body b payload 1e-300",
+    "body b payload 0",
+    "1 load torque 1000",
+    "1 load torque -1000",
+    "2 load torque 1000",
+    "2 load inertia 1000",
+    "2 load inertia 0",
+    "1 load friction 1000 static 1000 stribeck 1e-4",
+    "1 load none",
+    "1 load pulley 10000 -10",
+    "2 rotor lock",
+    "2 rotor free",
+    "1 power cut",
+    "1 power on",
+    "2 supply 100 limit 1000 resistance 0.001",
+    "2 supply 0",
+];
+
+#[test]
+fn whatever_is_done_to_what_drives_move_together_stays_a_number() {
+    let base = Coupling::DifferentialDrive(BASE);
+    let light = DifferentialDriveModel { mass_kg: 0.01, yaw_inertia_kg_m2: 1e-6, wheel_radius_m: 1e-3, ..BASE };
+    let shaft = Coupling::CommonShaft(CommonShaftModel::default());
+    let arm = ArmModel::new(&[link(0.3, 1e5, 0.0), link(100.0, 0.0, 100.0)]).unwrap();
+    let couplings = [base, Coupling::DifferentialDrive(light), shaft, Coupling::Arm(Box::new(arm))];
+    for seed in 0..24 {
+        let mut prng = sim::Prng::new(seed);
+        let (mut world, host) = world(&[1, 2]);
+        let shafts = [1, 2].map(|node| CoupledShaft::direct(Place::node(node)));
+        world.couple("b", &couplings[seed as usize % couplings.len()], &shafts).unwrap();
+        world.run_for(Duration::from_millis(20));
+        for node in [1, 2] {
+            enable(&mut world, host, node, 3);
+            write(&mut world, host, node, 0x60FF, 4, 3000);
+        }
+        for _ in 0..30 {
+            let line = EXTREMES[prng.below(EXTREMES.len() as u64) as usize];
+            assert!(answer(&mut world, line).unwrap().json.starts_with(r#"{"ok":"#), "{line}");
+            world.run_for(Duration::from_nanos(prng.below(30_000_000)));
+            let state = format!("{:?} {:?} {:?}", world.body("b"), world.report(1), world.report(2));
+            assert!(!state.contains("NaN") && !state.contains("inf"), "seed {seed}, after {line}: {state}");
+        }
+    }
+}
+
 #[test]
 fn what_cannot_be_coupled_is_refused_with_the_reason() {
     let (mut world, _) = world(&[LEFT, RIGHT]);

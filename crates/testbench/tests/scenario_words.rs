@@ -90,3 +90,36 @@ fn a_body_that_drives_move_is_a_machine_that_steps_act_on() {
     let outcome = Runner::new(&scenario, None).unwrap_or_else(|bad| panic!("{bad}")).run();
     assert!(outcome.passed(), "{:#?}", outcome.rows);
 }
+
+/// Two free wheels under a base: m g (sin - rolling cos) less the dry friction of both wheels moves its mass and the wheels'.
+#[test]
+fn a_step_that_tilts_the_ground_rolls_a_base_down_and_one_that_levels_it_lets_it_slow_down() {
+    const RADIUS_M: f64 = 0.0865;
+    // The hub motor's rotor inertia in kg·m² and its friction, N·m and as much again at 27.4 rad/s (no-load current of its data sheet).
+    let (weight_n, dry_n, viscous_n_s) =
+        (30.0 * 9.806_65, 2.0 * 0.099 / RADIUS_M, 2.0 * 0.099 / 27.4 / (RADIUS_M * RADIUS_M));
+    let mass_kg = 30.0 + 2.0 * 0.014 / (RADIUS_M * RADIUS_M);
+    // m v' = force - viscous v.
+    let speed = |force_n: f64, from: f64, time_s: f64| {
+        let end = force_n / viscous_n_s;
+        end + (from - end) * (-viscous_n_s / mass_kg * time_s).exp()
+    };
+    let slope = 10_f64.to_radians();
+    let rolled = -speed(weight_n * (slope.sin() - 0.01 * slope.cos()) - dry_n, 0.0, 0.5);
+    let slowed = -speed(-weight_n * 0.01 - dry_n, -rolled, 1.0);
+    let text = format!(
+        "[machine]\ndrive = [{{ model = 'zlac8030l', node = 4 }}, {{ model = 'zlac8030l', node = 5 }}]\n\
+         [[machine.body]]\nname = 'base'\nkind = 'differential-drive'\ndrives = [4, 5]\nturns = [1, -1]\nmass_kg = 30\n\
+         yaw_inertia_kg_m2 = 1.5\nwheel_base_m = 0.5\nwheel_radius_m = {RADIUS_M}\nrolling = 0.01\n\
+         [[step]]\nname = 'tilted'\nat = '1s'\ndo = 'body base slope 10'\n\
+         [[step]]\nat = '1500001us'\ndo = 'body base slope 0'\n\
+         [[expect]]\nat = '999ms'\nthat = 'body base x_m = 0'\n\
+         [[expect]]\nat = '1500ms'\nthat = 'body base speed_m_s = {rolled} +- 0.007'\n\
+         [[expect]]\nat = '2500ms'\nthat = 'body base speed_m_s = {slowed} +- 0.007'\n"
+    );
+    let scenario = Scenario::parse(&text, Path::new("")).unwrap_or_else(|bad| panic!("{bad}"));
+    let outcome = Runner::new(&scenario, None).unwrap_or_else(|bad| panic!("{bad}")).run();
+    assert!(outcome.passed(), "{:#?}", outcome.rows);
+    let refused = Scenario::parse(&text.replace("slope 0", "slop 0"), Path::new("")).err().map(|bad| bad.to_string());
+    assert!(refused.is_some_and(|said| said.contains("body NAME slope|grip|mass|payload VALUE")));
+}

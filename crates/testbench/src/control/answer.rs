@@ -15,15 +15,18 @@ pub struct ControlError {
     next: Option<String>,
 }
 
+/// The request that tells of all requests.
+pub(super) const HELP: &str = r#"{"request":"help"}"#;
+
 impl ControlError {
     /// Of a kind that programs may rely on.
     pub fn new(kind: &'static str, message: impl Into<String>) -> Self {
         Self { kind, message: message.into(), node: None, next: None }
     }
 
-    /// The request makes no sense.
+    /// The request makes no sense; unless something better is [said](Self::next), `help` tells what does.
     pub fn usage(message: impl Into<String>) -> Self {
-        Self::new("usage", message)
+        Self::new("usage", message).next(HELP)
     }
 
     /// Says what to do.

@@ -296,7 +296,8 @@ impl<S: Sink> Client<S> {
                     .next("close the connection; the simulator ends with `quit` on its standard input, or a signal")),
                 Command::Help => Ok(help()),
                 Command::Run(_) => {
-                    Err(ControlError::usage("time is moved by the request `run`, not by a world command"))
+                    Err(ControlError::usage("time is moved by the request `run`, not by a world command")
+                        .next(REQUESTS[6]))
                 }
                 command => self.command(&command, world, service),
             },
@@ -307,7 +308,8 @@ impl<S: Sink> Client<S> {
             }
             Request::Unsubscribe(number) => match self.subscriptions.remove(&number) {
                 Some(_) => Ok(json!({ "ok": true, "subscription": number }).to_string()),
-                None => Err(ControlError::usage(format!("there is no subscription {number}"))),
+                None => Err(ControlError::usage(format!("there is no subscription {number}"))
+                    .next("the answer to subscribe has its number; one that is ended has none")),
             },
             // The caller has dealt with it.
             Request::Run(_) => Err(CommandError::NotManual.into()),

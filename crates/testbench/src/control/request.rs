@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 use sim::command::{Command, Run};
 use sim::stimulus::Place;
 
-use super::answer::ControlError;
+use super::answer::{ControlError, HELP};
 use super::id::Id;
 use super::subscription::{Channel, Values};
 use crate::events::Filter;
@@ -53,7 +53,7 @@ pub enum Request {
 /// Each request and its fields, one line each.
 pub const REQUESTS: [&str; 9] = [
     r#"{"request":"hello","token":"..","name":".."}"#,
-    r#"{"request":"help"}"#,
+    HELP,
     r#"{"request":"now"}"#,
     r#"{"request":"get","node":4,"axis":1}"#,
     r#"{"request":"world","line":"4 supply 90"}"#,
@@ -78,8 +78,9 @@ impl Message {
         if !line.starts_with('{') {
             return Ok(Self { id: None, request: Request::World(line.to_owned()) });
         }
-        let syntax =
-            |error: serde_json::Error| (None, ControlError::new("syntax", format!("this is no JSON: {error}")));
+        let syntax = |error: serde_json::Error| {
+            (None, ControlError::new("syntax", format!("this is no JSON: {error}")).next(HELP))
+        };
         let mut fields: Map<String, Value> = serde_json::from_str(line).map_err(syntax)?;
         let id = match fields.remove("id") {
             None | Some(Value::Null) => None,

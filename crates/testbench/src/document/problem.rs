@@ -99,6 +99,15 @@ impl BadFile {
         Self { name: None, problems: vec![problem] }
     }
 
+    /// Several things that are wrong, whose places are known already; nothing, if there is none.
+    ///
+    /// # Errors
+    /// These.
+    pub fn none_or(mut problems: Vec<Located>) -> Result<(), Self> {
+        problems.sort_by_key(|problem| (problem.line, problem.column));
+        if problems.is_empty() { Ok(()) } else { Err(Self { name: None, problems }) }
+    }
+
     /// The same of a file with this name.
     pub fn named(self, name: impl Into<String>) -> Self {
         Self { name: Some(name.into()), ..self }

@@ -207,17 +207,21 @@ impl Machine {
     /// What a drive does not take, with its place in the file.
     pub fn build(&self) -> Result<World, BadFile> {
         let mut world = self.world();
+        let mut problems = Vec::new();
         for placed in &self.drives {
             let spec = &placed.spec;
             let order = spec.order(world.bitrate());
             let mut drive =
                 sim::machine::order(spec.model, &order).map_err(|error| placed.refused(None, &error.to_string()))?;
-            placed.supply(drive.as_mut())?;
+            let supplied = placed.supply(drive.as_mut());
             world.set_timing(self.timing_of(placed, TimingMode::Ideal));
             let added = world.add_drive(spec.node.raw(), drive);
             added.map_err(|error| placed.refused(None, &error.to_string()))?;
-            placed.furnish(&mut world)?;
+            for refused in [supplied, placed.furnish(&mut world)] {
+                problems.extend(refused.err().into_iter().flat_map(|bad| bad.problems));
+            }
         }
+        BadFile::none_or(problems)?;
         self.join(&mut world)?;
         self.make_real(&mut world);
         Ok(world)
@@ -297,16 +301,15 @@ impl Placed {
     /// Puts into the world what is around the drive, which is there already.
     ///
     /// # Errors
-    /// What the drive does not take.
+    /// All that the drive does not take.
     pub fn furnish(&self, world: &mut World) -> Result<(), BadFile> {
         let place = Place::node(self.spec.node.raw());
-        for (stimulus, at) in &self.around {
+        let refused = self.around.iter().filter_map(|(stimulus, at)| {
             let applied = world.apply(place, stimulus).map_err(|error| error.to_string());
-            let refused = applied.and_then(|applied| applied.map_err(|refused| refused.to_string()));
-            refused
-                .map_err(|reason| self.refused(Some(at), &format!("'{place} {stimulus}' cannot be done: {reason}")))?;
-        }
-        Ok(())
+            let reason = applied.and_then(|applied| applied.map_err(|refused| refused.to_string())).err()?;
+            Some(at.saying(format!("'{place} {stimulus}' cannot be done: {reason}")))
+        });
+        BadFile::none_or(refused.collect())
     }
 
     /// A refusal, at a place of the file if it has one.
@@ -316,15 +319,18 @@ impl Placed {
     }
 
     fn parse(table: &Table<'_>, folder: &Path) -> Result<Self, Vec<Problem>> {
-        let one = |problem| vec![problem];
         let mut problems = table.strangers(DRIVE_KEYS);
-        let expected = "the drive's model as text, e.g. \"zlac8030l\", or a data sheet, \"FILE.eds\"";
-        let model = table.need("model", expected).map_err(one)?;
-        let number = table.need("node", NODE).map_err(one)?;
-        let id = number.whole::<u8>(NODE).map_err(one)?;
-        let id = node(&id.to_string()).map_err(|reason| one(number.problem(reason)))?;
-        let described = model.words(expected).map_err(one)?;
-        let described = resolve_in(&described, folder).map_err(|reason| one(model.problem(reason)))?;
+        let source = surroundings::source(table, &mut problems);
+        let source_at = ["supply", "supply_v"].into_iter().find_map(|name| table.get(name));
+        let source_at = source_at.map(|field| field.problem("").locate(table.text()));
+        let around = surroundings::around(table, &mut problems);
+        let (described, id) = match (model(table, folder), node_id(table)) {
+            (Ok(described), Ok(id)) => (described, id),
+            (described, id) => {
+                problems.extend(described.err().into_iter().chain(id.err()));
+                return Err(problems);
+            }
+        };
         let mut spec = DriveSpec::new(described, id);
         for option in
             noted(surroundings::fields(table, "options", "a table of options, e.g. { 6060 = 3 }"), &mut problems)
@@ -335,10 +341,6 @@ impl Placed {
             });
             noted(set, &mut problems);
         }
-        let source = noted(surroundings::source(table), &mut problems);
-        let source_at = ["supply", "supply_v"].into_iter().find_map(|name| table.get(name));
-        let source_at = source_at.map(|field| field.problem("").locate(table.text()));
-        let around = surroundings::around(table, &mut problems);
         let keys =
             DRIVE_KEYS.iter().copied().filter(|key| !matches!(*key, "model" | "node") && table.get(key).is_some());
         if problems.is_empty() {
@@ -350,6 +352,18 @@ impl Placed {
 }
 
 const NODE: &str = "a node-ID from 1 to 127, e.g. 4";
+
+fn node_id(table: &Table<'_>) -> Result<NodeId, Problem> {
+    let number = table.need("node", NODE)?;
+    let id = number.whole::<u8>(NODE)?;
+    node(&id.to_string()).map_err(|reason| number.problem(reason))
+}
+
+fn model(table: &Table<'_>, folder: &Path) -> Result<&'static Description, Problem> {
+    let expected = "the drive's model as text, e.g. \"zlac8030l\", or a data sheet, \"FILE.eds\"";
+    let model = table.need("model", expected)?;
+    resolve_in(&model.words(expected)?, folder).map_err(|reason| model.problem(reason))
+}
 
 #[cfg(test)]
 mod tests {
@@ -452,6 +466,28 @@ mod tests {
         let bad = Machine::parse("colour = 1\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nload = { torque_nm = 'much' }\nfaults = ['gear']\n[[drive]]\nmodel = 'x'\nnode = 5\n").err();
         let lines: Vec<_> = bad.iter().flat_map(|bad| &bad.problems).map(|problem| problem.line).collect();
         assert_eq!(lines, [1, 5, 6, 8]);
+    }
+
+    fn lines_told(text: &str) -> Vec<usize> {
+        let bad = Machine::parse(text).and_then(|machine| machine.build()).err();
+        bad.iter().flat_map(|bad| &bad.problems).map(|problem| problem.line).collect()
+    }
+
+    #[test]
+    fn one_drives_table_tells_all_that_is_wrong_with_it() {
+        // In what it says: each number of a part, each entry of a list, a model and a node that there are not.
+        let said = "[[drive]]\nmodel = 'x'\nnode = 200\nsupply_v = 'a'\nbattery = 1\nrotor_locked = 2\n[drive.load]\ntorque_nm = 'b'\n\
+                    inertia_kg_m2 = 'c'\nmass = 1\n[drive.load.gear]\nratio = 'd'\nbacklash_deg = 'e'\n[drive.load.stop]\nrange = 1\n\
+                    damping_nm_s_rad = 3\n[drive.inputs]\nX0 = 1\nX1 = 2\n[drive.temperatures_c]\nmotor = 'hot'\ndriver = 'cold'\n";
+        assert_eq!(lines_told(said), [2, 3, 4, 5, 6, 8, 9, 10, 12, 13, 14, 15, 18, 19, 21, 22]);
+        // In what the drives refuse, in both of two tables.
+        let drive = |node| format!("[[drive]]\nmodel = 'zlac8030l'\nnode = {node}\nsupply_v = 300\nbattery = false\n");
+        let refused = format!(
+            "{}{}[drive.load]\ntorque_nm = 1e9\npulley = {{ mass_kg = 1e9, radius_m = 1 }}\n",
+            drive(4),
+            drive(5)
+        );
+        assert_eq!(lines_told(&refused), [4, 5, 9, 10, 12, 13]);
     }
 
     #[test]
