@@ -9,6 +9,7 @@ use canopen::{CobId, NodeId, connection_set};
 use devices::Timing;
 
 use super::response_time::{Bound, ErrorRate, Queued, Trigger, load, response_times};
+use crate::network::DEFAULT_TIMEOUT;
 use crate::pdo::{PdoConfig, TransmissionType};
 
 /// Data bytes of the frames of fixed length.
@@ -16,6 +17,9 @@ const SDO_BYTES: u8 = 8;
 const EMCY_BYTES: u8 = 8;
 const HEARTBEAT_BYTES: u8 = 1;
 const NMT_BYTES: u8 = 2;
+
+/// Nobody's motion waits for an SDO answer; whoever asked does, for so long.
+const SDO_PATIENCE: Duration = DEFAULT_TIMEOUT;
 
 /// One node: what it sends by itself, and how fast it is.
 #[derive(Clone, Debug)]
@@ -130,7 +134,8 @@ pub struct PlannedFrame {
     pub node: Option<NodeId>,
     /// As it is queued.
     pub frame: Queued,
-    /// Until when it has to be there, from the beginning of its period (of its SYNC's): the next one.
+    /// Until when it has to be there, from the beginning of its period (of its SYNC's): the next one; for SDO, as long as one waits
+    /// for an answer.
     pub deadline: Duration,
     /// When it is there.
     pub bound: Bound,
@@ -299,7 +304,7 @@ fn of_host(nodes: &[NodeTraffic], settings: &Settings) -> Vec<Draft> {
     {
         // To whichever node: the least urgent of their identifiers.
         let frame = queued(connection_set::sdo_request(last), SDO_BYTES, period);
-        drafts.push(draft(Purpose::SdoRequest, None, frame));
+        drafts.push(Draft { deadline: SDO_PATIENCE, ..draft(Purpose::SdoRequest, None, frame) });
     }
     if let Some((host, period)) = settings.host_heartbeat {
         let frame = queued(connection_set::heartbeat(host), HEARTBEAT_BYTES, period);
@@ -375,7 +380,7 @@ fn sdo_answer(nodes: &[NodeTraffic], settings: &Settings, by: usize) -> Option<D
     let most_us = spans().map(|span| span.most_us).max()?;
     let trigger = Some(answer(by, devices::Span::new(least_us, most_us, "")));
     let frame = Queued { trigger, ..queued(connection_set::sdo_reply(last), SDO_BYTES, period) };
-    Some(Draft { purpose: Purpose::SdoAnswer, node: None, frame, deadline: period, by_host: false })
+    Some(Draft { purpose: Purpose::SdoAnswer, node: None, frame, deadline: SDO_PATIENCE, by_host: false })
 }
 
 fn answer(by: usize, span: devices::Span) -> Trigger {
