@@ -13,7 +13,7 @@ use crate::global::Global;
 #[derive(Parser)]
 #[command(name = "ferrodrive", version, propagate_version = true, max_term_width = 100, arg_required_else_help = true)]
 #[command(after_help = "Without --bus everything happens on a virtual bus of its own, in virtual time:\n  \
-    ferrodrive demo\n  ferrodrive move 4 90deg\n  ferrodrive --bus socketcand://HOST:29536/can0 state 4")]
+    ferrodrive demo\n  ferrodrive move 4 90deg\n  ferrodrive --bus can0 state 4")]
 pub(crate) struct Cli {
     #[command(flatten)]
     pub(crate) global: Global,

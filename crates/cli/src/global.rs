@@ -14,7 +14,7 @@ use testbench::words::drive::node_model;
 #[derive(Clone, clap::Args)]
 #[command(next_help_heading = "On every command")]
 pub(crate) struct Global {
-    /// The bus: sim, sim:FILE.toml, socketcand://HOST:PORT/can0, slcan:///dev/ttyACM0?bitrate=500k,
+    /// The bus: sim, sim:FILE.toml, can0, socketcand://HOST:PORT/can0, slcan:///dev/ttyACM0?bitrate=500k,
     /// slcan://HOST:PORT, cannelloni://HOST:PORT?local=PORT, udp_multicast://239.74.163.2, log:FILE
     ///
     /// `sim` is a virtual bus of this command alone, with factory-fresh drives, as fast as the machine goes.
