@@ -145,7 +145,7 @@ class Bench(Remote):
 
     def __init__(self, program, drive, drives=(), extra=(), state=False, absent=False):
         self.drives = drives or drive.arguments(program)
-        super().__init__(self, drive, int(self.drives[0].partition("@")[2]))
+        super().__init__(self, drive, int(self.drives[0].partition("@")[2].partition(",")[0]))
         self.others = {}
         self.program, self.extra, self.absent = program, list(extra), absent
         self.folder = tempfile.TemporaryDirectory() if state else None

@@ -56,6 +56,7 @@ pub mod connection_set;
 pub mod emcy;
 pub mod guarding;
 pub mod heartbeat;
+pub mod lss;
 mod mux;
 pub mod nmt;
 pub mod node;

@@ -3,9 +3,9 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    completions, convert, dcf, decode, demo, drive, dump, eds, emcy, events, export, gateway, home, latency, man_pages,
-    motion, nmt, objects, pdo, plan, plot, read, readings, record, replay, run, scan, sdo, send, sim, store, sync,
-    time, watch, world,
+    completions, convert, dcf, decode, demo, drive, dump, eds, emcy, events, export, gateway, home, latency, lss,
+    man_pages, motion, nmt, objects, pdo, plan, plot, read, readings, record, replay, run, scan, sdo, send, sim, store,
+    sync, time, watch, world,
 };
 use crate::global::Global;
 
@@ -42,6 +42,7 @@ pub(crate) enum Command {
     Plan(plan::Plan),
     Emcy(emcy::Emcy),
     Nmt(nmt::Nmt),
+    Lss(lss::Lss),
     Sync(sync::SyncCommand),
     Time(time::Time),
     Send(send::Send),

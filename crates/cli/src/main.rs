@@ -178,6 +178,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Time(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Send(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Write(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Lss(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Nmt(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::State(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Enable(command) => on_bus(global, format, async |context| command.run(context).await),

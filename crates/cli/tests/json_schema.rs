@@ -28,6 +28,7 @@ const COMMANDS: &[(&[&str], &str)] = &[
     (&["nmt", "1", "start", "--wait"], "nmt"),
     (&["nmt", "all", "reset", "--wait", "2s"], "nmt"),
     (&["nmt", "4", "start", "--wait", "1s"], "failure"),
+    (&["lss", "scan"], "failure"),
     (&["watch", "4", "6064", "statusword", "1018:01", "--count", "2"], "watch"),
     (&["read", "4", "1018:*", "1000..100A"], "value"),
     (&["read", "4", "9000..9FFF"], "failure"),

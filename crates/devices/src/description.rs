@@ -39,6 +39,8 @@ pub struct Description {
     pub faults: Faults,
     /// What its NMT states and heartbeats mean.
     pub nmt: NmtRules,
+    /// Whether it is an LSS slave (CiA 305): node-ID and bit rate by its identity and serial number.
+    pub lss: bool,
     /// PDO rules.
     pub pdo: PdoRules,
     /// How long it takes to start, to answer and to store.

@@ -155,6 +155,12 @@ impl<S: Storage> Node<S> {
         }
     }
 
+    /// Another node-ID, by LSS or a switch. It takes effect with [`boot`](Self::boot), and for the defaults of objects with
+    /// [`restore_communication_defaults`](Self::restore_communication_defaults).
+    pub const fn set_node_id(&mut self, node_id: NodeId) {
+        self.node_id = node_id;
+    }
+
     /// Falls silent and deaf until the next [`boot`](Self::boot): the supply is gone.
     pub fn power_off(&mut self) {
         self.state = NmtState::Initialising;

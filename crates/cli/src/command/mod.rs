@@ -15,6 +15,7 @@ pub(crate) mod export;
 pub(crate) mod gateway;
 pub(crate) mod home;
 pub(crate) mod latency;
+pub(crate) mod lss;
 pub(crate) mod man_pages;
 pub(crate) mod motion;
 pub(crate) mod nmt;

@@ -73,6 +73,7 @@ const fn joint(name: &'static str, title: &'static str) -> Description {
         storage: STORAGE,
         faults: Faults { code: Some(Mux::new(0x260E, 0)), bit_field: false, table: &ALARMS },
         nmt: NmtRules { start_state: NmtState::Operational, heartbeat_tells_alarm: true },
+        lss: false,
         pdo: PDO_RULES,
         timing: Timing::GUESSED,
         stated_departures: &[],

@@ -35,6 +35,7 @@ pub static CIA402: Description = Description {
     storage: ParameterStorage::CIA_301,
     faults: FAULTS,
     nmt: NmtRules::CIA_301,
+    lss: true,
     pdo: PdoRules { max_objects: 8, ..PdoRules::CIA_301 },
     timing: Timing::GUESSED,
     stated_departures: &[],

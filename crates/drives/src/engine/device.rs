@@ -130,6 +130,21 @@ impl<S: Storage> Device<S> {
         self.eeprom_ok = true;
     }
 
+    /// Another node-ID from the next [`restart_communication`](Self::restart_communication) on.
+    pub const fn set_node_id(&mut self, node_id: NodeId) {
+        self.node.set_node_id(node_id);
+    }
+
+    /// Another bit rate from now on.
+    pub const fn set_bitrate(&mut self, bitrate: Bitrate) {
+        self.bitrate = bitrate;
+    }
+
+    /// Silent and deaf until the next [`boot`](Self::boot), though the firmware runs: it has no node-ID any more.
+    pub fn leave_bus(&mut self) {
+        self.node.power_off();
+    }
+
     /// Supply voltage is gone.
     pub fn power_off(&mut self) {
         self.running = false;

@@ -8,9 +8,10 @@ use canopen::od::{Entry, Storage};
 use canopen::{NmtCommand, NmtState, NodeId};
 use devices::variant::Variant;
 
+use super::lss::{Lss, Wanted};
 use super::services::Services;
 use super::{Memory, error_behaviour};
-use crate::engine::device::{Application, Device};
+use crate::engine::device::{Application, Device, Reset};
 use crate::engine::storage::StoredImage;
 
 /// Device and services over one dictionary.
@@ -18,6 +19,10 @@ use crate::engine::storage::StoredImage;
 pub struct DescribedDevice<S: Storage> {
     pub(crate) device: Device<S>,
     pub(crate) services: Services<S>,
+    /// Layer setting services, of a device that has them and is started.
+    lss: Option<Lss>,
+    has_lss: bool,
+    /// As delivered: LSS may have given it another one, or taken it away.
     pub(crate) node_id: NodeId,
     pub(crate) bitrate: can::Bitrate,
     stopped: bool,
@@ -48,10 +53,13 @@ impl<S: Storage> DescribedDevice<S> {
         memory: Memory<S>,
         task_period_ns: u64,
         variant: Variant,
+        has_lss: bool,
     ) -> Self {
         Self {
             device: Device::new(profile, bitrate, StoredImage::BLANK, task_period_ns, variant),
             services: Services::new(memory),
+            lss: None,
+            has_lss,
             node_id,
             bitrate,
             stopped: false,
@@ -66,19 +74,67 @@ impl<S: Storage> DescribedDevice<S> {
         self.bus_off = false;
     }
 
-    /// Starts over with the stored values.
+    /// Starts over with the stored values. [`boot`](Self::boot) follows.
     pub(crate) fn restart(&mut self, now: Instant) {
         self.device.restart(self.node_id, self.bitrate, now);
+        if self.has_lss {
+            let lss = Lss::start(self.device.values(), self.services.memory().0, self.node_id);
+            let bitrate = lss.bitrate().unwrap_or(self.bitrate);
+            self.device.restart(lss.node_id().unwrap_or(self.node_id), bitrate, now);
+            self.lss = Some(lss);
+        }
         self.services.start(&mut self.device, |_| true);
         self.stopped = false;
     }
 
+    /// Communication begins, unless it has no node-ID: such a device waits for LSS, and nobody sees it on the bus.
+    pub(crate) fn boot(&mut self, now: Instant) {
+        if self.is_node() {
+            self.device.boot(now);
+        }
+    }
+
+    /// It has a node-ID.
+    fn is_node(&self) -> bool {
+        self.lss.as_ref().is_none_or(|lss| lss.node_id().is_some())
+    }
+
     /// NMT reset communication.
     pub(crate) fn restart_communication(&mut self, now: Instant) {
+        match self.lss.as_mut().map(Lss::take_node_id) {
+            Some(None) => return self.device.leave_bus(),
+            Some(Some(node_id)) => self.device.set_node_id(node_id),
+            None => {}
+        }
         self.device.restart_communication(now);
         self.services.start(&mut self.device, Entry::is_communication);
         self.stopped = false;
         self.device.boot(now);
+    }
+
+    /// A request of an LSS master; true if the device is to start its communication over.
+    fn handle_lss(&mut self, frame: &Frame, now: Instant) -> bool {
+        let running = self.device.is_running();
+        let Some(lss) = self.lss.as_mut().filter(|lss| running && !lss.is_silent()) else { return false };
+        match lss.handle_frame(frame, now) {
+            Wanted::Nothing => false,
+            Wanted::ResetCommunication => true,
+            Wanted::Store(stored) => {
+                self.services.store_lss(stored);
+                false
+            }
+        }
+    }
+
+    /// It changes its bit rate, and is silent and deaf before and after.
+    fn is_silent(&self) -> bool {
+        self.lss.as_ref().is_some_and(Lss::is_silent)
+    }
+
+    /// When it hears, sends or changes something without a frame, but for the communication task.
+    pub(crate) fn next_watch(&self) -> Option<Instant> {
+        let lss = self.lss.as_ref().and_then(Lss::poll_timeout);
+        self.services.poll_timeout().into_iter().chain(lss).min().filter(|_| self.device.is_running())
     }
 
     /// 1029h:01 says what a device that loses its connection does to its own NMT state (CiA 301, 7.5.2.32).
@@ -104,14 +160,19 @@ impl<S: Storage> DescribedDevice<S> {
     }
 
     fn poll_transmit(&mut self) -> Option<Frame> {
+        if self.is_silent() {
+            return None;
+        }
+        if let Some(answer) = self.lss.as_mut().and_then(Lss::take_answer) {
+            return Some(answer);
+        }
         let frame = self.services.take_answer().or_else(|| self.device.poll_transmit())?;
         self.services.sent(self.device.values_mut(), &frame);
         Some(frame)
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        let watch = self.services.poll_timeout().filter(|_| self.device.is_running());
-        self.device.poll_timeout().into_iter().chain(watch).min()
+        self.device.poll_timeout().into_iter().chain(self.next_watch()).min()
     }
 }
 
@@ -148,12 +209,22 @@ pub(crate) trait Described<S: Storage>: Application<S> {
     /// [`Station::ignores`].
     fn base_ignores(&self, frame: &Frame) -> bool {
         let base = self.base();
-        base.device.ignores(frame) && !base.services.wants(frame)
+        base.device.ignores(frame) && !base.services.wants(frame) && !(base.lss.is_some() && Lss::wants(frame))
     }
 
     /// [`Station::handle_frame`].
     fn take_frame(&mut self, frame: &Frame, now: Instant) {
+        if Lss::wants(frame) {
+            if self.base_mut().handle_lss(frame, now) {
+                self.reset(Reset::Communication, now);
+                self.handle_events(now);
+            }
+            return;
+        }
         let base = self.base_mut();
+        if !base.is_node() || base.is_silent() {
+            return;
+        }
         if base.device.is_running() && base.services.wants(frame) {
             let state = base.device.node().state();
             if base.services.handle_frame(frame, state, now) {
@@ -166,7 +237,11 @@ pub(crate) trait Described<S: Storage>: Application<S> {
 
     /// [`Station::handle_timeout`].
     fn take_timeout(&mut self, now: Instant) {
-        self.base_mut().device.handle_timeout(now);
+        let base = self.base_mut();
+        if let Some(bitrate) = base.lss.as_mut().and_then(|lss| lss.handle_timeout(now)) {
+            base.device.set_bitrate(bitrate);
+        }
+        base.device.handle_timeout(now);
         self.finish_reset(now);
         self.handle_events(now);
         let base = self.base_mut();
@@ -181,7 +256,7 @@ pub(crate) trait Described<S: Storage>: Application<S> {
     /// [`Station::handle_bus_off`].
     fn take_bus_off(&mut self, off: bool, now: Instant) {
         let base = self.base_mut();
-        if !base.device.is_running() || core::mem::replace(&mut base.bus_off, off) == off {
+        if !base.device.is_running() || !base.is_node() || core::mem::replace(&mut base.bus_off, off) == off {
             return;
         }
         if off {

@@ -34,7 +34,8 @@ impl<S: Storage> DescribedNode<S> {
     ) -> Self {
         let variant = Variant::first_of(description.variations);
         let memory = Memory::empty(description.dictionary);
-        let base = DescribedDevice::new(profile, node_id, bitrate, memory, COMMUNICATION_PERIOD_NS, variant);
+        let base =
+            DescribedDevice::new(profile, node_id, bitrate, memory, COMMUNICATION_PERIOD_NS, variant, description.lss);
         Self { description, base }
     }
 
@@ -48,9 +49,9 @@ impl<S: Storage> DescribedNode<S> {
         self.base.device.values()
     }
 
-    /// Its node-ID.
+    /// Its node-ID: the latest one, where LSS has taken it away.
     pub const fn node_id(&self) -> NodeId {
-        self.base.node_id
+        self.base.device.node().node_id()
     }
 
     /// Bit rate in use.
@@ -132,7 +133,7 @@ impl<S: Storage> Application<S> for DescribedNode<S> {
 
     fn restart(&mut self, now: Instant) {
         self.base.restart(now);
-        self.base.device.boot(now);
+        self.base.boot(now);
     }
 
     fn restart_communication(&mut self, now: Instant) {

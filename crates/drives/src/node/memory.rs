@@ -16,6 +16,10 @@ const HEADER_SIZE: usize = 8;
 /// Key and length of one value.
 const RECORD_HEADER_SIZE: usize = 8;
 const CRC_SIZE: usize = 4;
+/// The record that LSS keeps, behind those of the objects: no multiplexor has this key.
+const LSS_KEY: u32 = u32::MAX;
+/// Node-ID and index of the bit rate.
+const LSS_SIZE: usize = 2;
 
 /// Contents of the memory chip, to be kept over power cycles. `S` has room for the image of the device's table
 /// ([`image_size`]).
@@ -32,10 +36,11 @@ impl<S: Storage> core::fmt::Debug for Memory<S> {
     }
 }
 
-/// Bytes of the image of a device with this table: each value that can be stored has its place, whatever its type.
+/// Bytes of the image of a device with this table: each value that can be stored has its place, whatever its type, and so
+/// has what LSS stores.
 pub fn image_size(table: &Table) -> usize {
     let records = table.rows().iter().filter(|row| is_storable(row)).map(|row| RECORD_HEADER_SIZE + most_bytes(row));
-    HEADER_SIZE + records.sum::<usize>() + CRC_SIZE
+    HEADER_SIZE + records.sum::<usize>() + RECORD_HEADER_SIZE + LSS_SIZE + CRC_SIZE
 }
 
 impl<S: Storage> Memory<S> {
@@ -73,6 +78,24 @@ impl<S: Storage> Memory<S> {
         self.checked().is_some()
     }
 
+    /// What LSS has stored: the node-ID, 255 for none, and the index of the bit rate in the table of CiA 305, 255 for as
+    /// delivered. `None` if it has stored nothing.
+    pub fn lss(&self) -> Option<[u8; LSS_SIZE]> {
+        let (_, stored) = records(self.checked()?).find(|(key, _)| *key == LSS_KEY)?;
+        stored.try_into().ok()
+    }
+
+    /// Stores node-ID and bit rate for LSS; the objects' values stay.
+    pub fn store_lss(&mut self, stored: [u8; LSS_SIZE]) {
+        let before = self.clone();
+        let mut writer = Writer::new(self);
+        for (key, value) in records(before.checked().unwrap_or(&[])).filter(|(key, _)| *key != LSS_KEY) {
+            writer.put(key, value);
+        }
+        writer.put(LSS_KEY, &stored);
+        writer.finish();
+    }
+
     /// The records, if the image is sound.
     fn checked(&self) -> Option<&[u8]> {
         let bytes = self.bytes();
@@ -86,6 +109,9 @@ impl<S: Storage> Memory<S> {
     pub fn load<V: Storage>(&self, values: &mut Dictionary<V>, wanted: impl Fn(&Entry) -> bool) {
         for (key, value) in records(self.checked().unwrap_or(&[])) {
             let table = values.table();
+            if key == LSS_KEY {
+                continue;
+            }
             let Ok(slot) = table.find(Mux::from_key(key)) else { continue };
             let row = table.row(slot);
             if is_storable(row) && wanted(row) && values.check_bytes(slot, value).is_ok() {
@@ -112,6 +138,9 @@ impl<S: Storage> Memory<S> {
                 writer.put(key, value);
             }
         }
+        if let Some(lss) = before.lss() {
+            writer.put(LSS_KEY, &lss);
+        }
         writer.finish();
     }
 
@@ -120,7 +149,7 @@ impl<S: Storage> Memory<S> {
         let before = self.clone();
         let mut writer = Writer::new(self);
         for (key, value) in records(before.checked().unwrap_or(&[])) {
-            if !wanted(Mux::from_key(key)) {
+            if key == LSS_KEY || !wanted(Mux::from_key(key)) {
                 writer.put(key, value);
             }
         }
@@ -249,6 +278,22 @@ mod tests {
         assert_eq!((get(&back, TORQUE_LIMIT), get(&back, HEARTBEAT)), (777, 0));
     }
 
+    #[test]
+    fn what_lss_stores_stays_when_parameters_are_stored_and_forgotten() {
+        let mut there = values();
+        set(&mut there, HEARTBEAT, 250);
+        let mut memory = Store::empty(&TABLE);
+        assert_eq!(memory.lss(), None);
+        memory.store_lss([5, 3]);
+        memory.save(&there, |_| true);
+        memory.store_lss([255, 255]);
+        assert_eq!(Store::from_bytes(&TABLE, memory.bytes()).lss(), Some([255, 255]));
+        memory.forget(|_| true);
+        let mut back = values();
+        memory.load(&mut back, |_| true);
+        assert_eq!((get(&back, HEARTBEAT), memory.lss()), (0, Some([255, 255])));
+    }
+
     const fn row(index: u16, data_type: DataType) -> Entry {
         Entry::new(index, 0, data_type, Access::ReadWrite, "", "")
     }
@@ -285,7 +330,7 @@ mod tests {
         let mut memory = Store::empty(&ANY);
         memory.save(&there, |_| true);
         // The image is as long as the longest values need: with the string shorter than it may be, not all of it is used.
-        assert!(memory.is_sound() && memory.bytes().len() == 12 + 7 * 8 + 4 + 8 + 8 + 20 + 6 + 300 + 3);
+        assert!(memory.is_sound() && memory.bytes().len() == 12 + 7 * 8 + 4 + 8 + 8 + 20 + 6 + 300 + 3 + 10);
         let mut back = Values::new(&ANY, NodeId::MIN);
         Store::from_bytes(&ANY, memory.bytes()).load(&mut back, |_| true);
         for (slot, bytes) in slots.iter().zip(stored) {

@@ -5,6 +5,7 @@
 
 pub(crate) mod described;
 mod device;
+mod lss;
 mod memory;
 mod services;
 

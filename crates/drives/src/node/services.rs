@@ -69,6 +69,12 @@ impl<S: Storage> Services<S> {
         (&self.memory, self.generation)
     }
 
+    /// What LSS keeps, beside the parameters.
+    pub fn store_lss(&mut self, stored: [u8; 2]) {
+        self.memory.store_lss(stored);
+        self.generation = self.generation.wrapping_add(1);
+    }
+
     /// The memory can be read.
     pub fn is_sound(&self) -> bool {
         self.memory.is_sound()

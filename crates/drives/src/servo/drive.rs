@@ -56,7 +56,15 @@ impl<S: Storage> ServoDrive<S> {
         let Hardware { node_id, bitrate, motors, memory } = hardware.clone();
         let mut drive = Self {
             description,
-            base: DescribedDevice::new(profile, node_id, bitrate, memory, COMMUNICATION_PERIOD_NS, variant),
+            base: DescribedDevice::new(
+                profile,
+                node_id,
+                bitrate,
+                memory,
+                COMMUNICATION_PERIOD_NS,
+                variant,
+                description.lss,
+            ),
             shafts: [const { None }; MAX_AXES],
             motors,
             faults: no_faults(),
@@ -118,7 +126,7 @@ impl<S: Storage> ServoDrive<S> {
             shaft.start(values);
             shaft.publish_status(values);
         }
-        self.base.device.boot(now);
+        self.base.boot(now);
     }
 
     /// Every supervision period.
@@ -233,8 +241,7 @@ impl<S: Storage> Firmware for ServoDrive<S> {
     }
 
     fn next_event(&self) -> Option<Instant> {
-        let watch = self.base.services.poll_timeout().filter(|_| self.base.device.is_running());
-        self.base.device.next_event().into_iter().chain(watch).min()
+        self.base.device.next_event().into_iter().chain(self.base.next_watch()).min()
     }
 
     fn task_from(&self, at: Instant) -> Option<Instant> {

@@ -146,6 +146,7 @@ fn describe(eds: &Eds, manual: &str) -> Result<Description, Unkept> {
         },
         faults: Faults { code: servo::FAULTS.code.filter(|_| has(0x603F, 0)), ..servo::FAULTS },
         nmt: NmtRules::CIA_301,
+        lss: eds.device.lss,
         pdo: pdo_rules(table.rows()),
         timing: Timing::GUESSED,
         stated_departures: &[],

@@ -110,6 +110,7 @@ impl<'a> Sheet<'a> {
             order_code: of.name.to_owned(),
             bit_rates: bit_rates(of),
             simple_boot_up_slave: true,
+            lss: of.lss,
             granularity: if of.pdo.fixed_mapping { 0 } else { 8 },
             rpdos: count(0x1400..=0x15FF),
             tpdos: count(0x1800..=0x19FF),

@@ -2,6 +2,7 @@
 
 use super::boxed::Boxed;
 use can::Bitrate;
+use canopen::lss::UNCONFIGURED;
 use canopen::od::{Dictionary, Entry, Storage};
 use canopen::{Mux, NodeId};
 use devices::Description;
@@ -21,12 +22,15 @@ pub struct Order {
     pub variant: Variant,
     /// Values in its parameter store that are not the factory's.
     pub presets: Vec<Preset>,
+    /// It has no node-ID until LSS (CiA 305) gives it one; `node` is what the world calls it until then. Only of models
+    /// that have LSS.
+    pub unconfigured: bool,
 }
 
 impl Order {
     /// A drive of `model` as delivered, but for its address and bit rate.
     pub fn new(model: &Description, node: NodeId, bitrate: Bitrate) -> Self {
-        Self { node, bitrate, variant: Variant::first_of(model.variations), presets: Vec::new() }
+        Self { node, bitrate, variant: Variant::first_of(model.variations), presets: Vec::new(), unconfigured: false }
     }
 
     /// The parameter store of this drive, from the values of one as delivered.
@@ -102,6 +106,10 @@ pub(super) fn baud_rate(model: &Description, object: Mux, bitrate: Bitrate) -> R
 /// The memory of a described device as ordered: values that are not the table's.
 pub(super) fn memory(model: &'static Description, order: &Order) -> Result<Memory<Boxed>, OrderError> {
     let mut memory = Memory::empty(model.dictionary);
+    if order.unconfigured {
+        // The bit rate stays as ordered.
+        memory.store_lss([UNCONFIGURED, u8::MAX]);
+    }
     if order.presets.is_empty() {
         return Ok(memory);
     }

@@ -172,7 +172,8 @@ impl Machine {
 
     /// Which models are where.
     pub fn models(&self) -> impl Iterator<Item = (NodeId, &'static Description)> {
-        self.drives.iter().map(|drive| (drive.spec.node, drive.spec.description()))
+        let nodes = self.drives.iter().filter(|drive| !drive.spec.unconfigured);
+        nodes.map(|drive| (drive.spec.node, drive.spec.description()))
     }
 
     /// Its bus, still without drives.

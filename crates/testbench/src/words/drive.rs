@@ -19,6 +19,8 @@ pub struct DriveSpec {
     pub node: NodeId,
     /// Whether it takes the time that such a drive takes, where it says so.
     pub timing: Option<TimingMode>,
+    /// Whether it waits for LSS (CiA 305) to give it a node-ID; `node` is what the world calls it until then.
+    pub unconfigured: bool,
     variant: Variant,
     presets: Vec<Preset>,
 }
@@ -26,12 +28,14 @@ pub struct DriveSpec {
 impl DriveSpec {
     /// A drive as delivered.
     pub fn new(model: &'static Description, node: NodeId) -> Self {
-        Self { model, node, timing: None, variant: Variant::first_of(model.variations), presets: Vec::new() }
+        let variant = Variant::first_of(model.variations);
+        Self { model, node, timing: None, unconfigured: false, variant, presets: Vec::new() }
     }
 
     /// What to order for a bus of this rate.
     pub fn order(&self, bitrate: Bitrate) -> Order {
-        Order { node: self.node, bitrate, variant: self.variant, presets: self.presets.clone() }
+        let Self { node, variant, unconfigured, .. } = *self;
+        Order { node, bitrate, variant, presets: self.presets.clone(), unconfigured }
     }
 
     /// What was chosen for it.
@@ -50,7 +54,7 @@ impl DriveSpec {
     }
 
     /// Takes one option: a choice of the model's (`firmware=2.01`, `reading=Z050:prose` or `Z050=prose`), the value that an
-    /// object has at power-on (`6060=3`, `2030:02=9`), or `timing=ideal`.
+    /// object has at power-on (`6060=3`, `2030:02=9`), `timing=ideal`, or `node-id=none`.
     pub fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
         let (key, value) = match key {
             "reading" => value.split_once(':').ok_or_else(|| {
@@ -59,6 +63,21 @@ impl DriveSpec {
             "timing" => {
                 self.timing =
                     Some(value.parse().map_err(|reason| format!("timing of a {}: {reason}", self.model.name))?);
+                return Ok(());
+            }
+            "node-id" if value != "none" => {
+                return Err(format!(
+                    "'node-id={value}': its node-ID stands behind the @; node-id=none is a device that waits for LSS"
+                ));
+            }
+            "node-id" if !self.model.lss => {
+                let name = self.model.name;
+                return Err(format!(
+                    "a {name} has no LSS (CiA 305) by its manual or its file, so nobody could give it a node-ID"
+                ));
+            }
+            "node-id" => {
+                self.unconfigured = true;
                 return Ok(());
             }
             _ => (key, value),
@@ -98,7 +117,9 @@ impl DriveSpec {
             VariationKind::Build => format!("{}=CHOICE", variation.key),
         });
         let known = keys
-            .chain(["timing=device or ideal".to_owned(), "OBJECT=VALUE, e.g. 6060=3".to_owned()])
+            .chain(["timing=device or ideal".to_owned()])
+            .chain(self.model.lss.then(|| "node-id=none".to_owned()))
+            .chain(["OBJECT=VALUE, e.g. 6060=3".to_owned()])
             .collect::<Vec<_>>()
             .join("; ");
         let near = near(key, self.model.variations.iter().map(|variation| variation.key));

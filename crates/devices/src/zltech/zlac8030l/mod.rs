@@ -54,6 +54,7 @@ const fn described(dictionary: &'static Table) -> Description {
         storage: zltech::parameter_storage(0x2009, 0x2010, RESTART),
         faults: Faults { code: Some(Mux::new(0x603F, 0)), bit_field: true, table: &FAULTS },
         nmt: NmtRules::CIA_301,
+        lss: false,
         pdo: PDO_RULES,
         timing: Timing::GUESSED,
         stated_departures: DEPARTURES,

@@ -51,6 +51,7 @@ const fn stepper(name: &'static str, title: &'static str) -> Description {
         storage: zltech::parameter_storage(0x2010, 0x200C, RESTART),
         faults: Faults { code: Some(Mux::new(0x603F, 0)), bit_field: false, table: &FAULTS },
         nmt: NmtRules::CIA_301,
+        lss: false,
         pdo: zltech::PDO_RULES,
         timing: Timing::GUESSED,
         stated_departures: DEPARTURES,

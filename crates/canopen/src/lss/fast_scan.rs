@@ -1,0 +1,81 @@
+//! LSS fastscan (CiA 305, 6.5.3): which question comes next, and what the answers say.
+
+use super::wire::{Address, Request};
+
+/// Asks whether anybody without a node-ID is there. Source: CiA 305, 6.5.3.
+const ANYBODY: u8 = 128;
+const HIGHEST_BIT: u8 = 31;
+
+/// The search for one device of which nothing is known, bit by bit (CiA 305, 6.5.3): the smallest address that is there.
+///
+/// Ask [`next`](Self::next), wait for [`Reply::Identified`](super::Reply::Identified), and tell with [`note`](Self::note) whether it came.
+#[derive(Clone, Debug)]
+pub struct FastScan {
+    address: Address,
+    step: Step,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Step {
+    Anybody,
+    Bit {
+        part: u8,
+        bit: u8,
+    },
+    /// All bits of a number are known, and whoever fits goes on to the next.
+    Confirm {
+        part: u8,
+    },
+    Found,
+    /// Nobody is there, or somebody went away.
+    Nobody,
+}
+
+impl Default for FastScan {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl FastScan {
+    /// A search that begins.
+    pub const fn new() -> Self {
+        Self { address: Address { numbers: [0; 4] }, step: Step::Anybody }
+    }
+
+    /// The next question; `None` once it is over.
+    pub fn next(&self) -> Option<Request> {
+        let number = |part: u8| self.address.numbers[usize::from(part & 3)];
+        match self.step {
+            Step::Anybody => Some(Request::FastScan { number: 0, bit: ANYBODY, part: 0, next: 0 }),
+            Step::Bit { part, bit } => Some(Request::FastScan { number: number(part), bit, part, next: part }),
+            Step::Confirm { part } => {
+                Some(Request::FastScan { number: number(part), bit: 0, part, next: (part + 1) & 3 })
+            }
+            Step::Found | Step::Nobody => None,
+        }
+    }
+
+    /// Whether somebody has said yes.
+    pub fn note(&mut self, identified: bool) {
+        self.step = match self.step {
+            Step::Anybody if identified => Step::Bit { part: 0, bit: HIGHEST_BIT },
+            Step::Bit { part, bit } => {
+                if !identified {
+                    // Nobody has 0 there, so whoever is there has 1.
+                    self.address.numbers[usize::from(part & 3)] |= 1 << bit;
+                }
+                if bit > 0 { Step::Bit { part, bit: bit - 1 } } else { Step::Confirm { part } }
+            }
+            Step::Confirm { part: 3 } if identified => Step::Found,
+            Step::Confirm { part } if identified => Step::Bit { part: part + 1, bit: HIGHEST_BIT },
+            Step::Anybody | Step::Confirm { .. } | Step::Nobody => Step::Nobody,
+            Step::Found => Step::Found,
+        };
+    }
+
+    /// The address, once it is found. That device lets itself be configured from then on.
+    pub fn found(&self) -> Option<Address> {
+        (self.step == Step::Found).then_some(self.address)
+    }
+}

@@ -1,0 +1,15 @@
+//! Layer setting services (CiA 305): node-ID and bit rate of devices that are found by their LSS address, not by a node-ID.
+//!
+//! [`Request`] goes from the master to all slaves on 7E5h, [`Reply`] back on 7E4h. [`Client`] asks one thing at a time,
+//! [`FastScan`] finds a device of which nothing is known, [`Server`] is a device's part. Deliberately not here: when a device
+//! takes its new node-ID or bit rate, which is its owner's.
+
+mod client;
+mod fast_scan;
+mod server;
+mod wire;
+
+pub use client::{Client, TIMEOUT};
+pub use fast_scan::FastScan;
+pub use server::{Action, Server};
+pub use wire::{Address, BIT_RATES_KBIT, Outcome, Part, Reply, Request, UNCONFIGURED};

@@ -1,0 +1,427 @@
+//! `ferrodrive lss`: layer setting services (CiA 305): devices without a node-ID, and with one that is to change.
+
+use std::fmt;
+use std::time::Duration;
+
+use can::Bitrate;
+use canopen::lss::{Address, BIT_RATES_KBIT, Client, FastScan, Outcome, Part, Reply, Request, UNCONFIGURED};
+use canopen::{NmtCommand, NodeId};
+use master::units::parse_duration;
+use serde::Serialize;
+
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::output::Report;
+use crate::paint::Paint;
+use crate::table::Table;
+use testbench::words::node::node;
+
+/// Find devices by their LSS address, and set their node-ID and bit rate (CiA 305)
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive --bus slcan:///dev/ttyACM0 lss scan\n  \
+    ferrodrive --bus slcan:///dev/ttyACM0 lss inquire only\n  \
+    ferrodrive --bus slcan:///dev/ttyACM0 lss set 100:1:0:2A --node-id 5 --store\n  \
+    ferrodrive --bus slcan:///dev/ttyACM0 lss set only --bitrate 250k --store --activate 500ms")]
+pub(crate) struct Lss {
+    #[command(subcommand)]
+    what: What,
+    /// Longest wait for each answer
+    #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "50ms", global = true)]
+    within: Duration,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    /// Find every device that has no node-ID (fastscan): some seconds for each
+    Scan,
+    /// Ask a device for its address and its node-ID
+    Inquire {
+        #[command(flatten)]
+        device: DeviceArg,
+    },
+    /// Set a device's node-ID or bit rate
+    Set(Set),
+}
+
+#[derive(Debug, clap::Args)]
+struct DeviceArg {
+    /// VENDOR:PRODUCT:REVISION:SERIAL (1018h:01 to 04) in hexadecimal, or only: the one device on the bus
+    #[arg(value_name = "ADDRESS|only", value_parser = device)]
+    device: Device,
+}
+
+#[derive(Debug, clap::Args)]
+struct Set {
+    #[command(flatten)]
+    device: DeviceArg,
+    /// Its node-ID from the next NMT reset communication on; none takes it away
+    #[arg(long, value_name = "NODE|none", value_parser = node_or_none, required_unless_present_any = ["bitrate", "store"])]
+    node_id: Option<Wanted>,
+    /// Its bit rate: 10k, 20k, 50k, 125k, 250k, 500k, 800k, 1M
+    #[arg(long, value_name = "RATE", value_parser = bit_rate)]
+    bitrate: Option<u8>,
+    /// Have it keep both
+    #[arg(long)]
+    store: bool,
+    /// Then NMT reset communication, with which a node that has a node-ID takes the new one
+    #[arg(long, requires = "node_id")]
+    reset: bool,
+    /// Change to the new bit rate now, silent for this long before and after; this bus has to change too
+    #[arg(long, value_name = "TIME", value_parser = silence, requires = "bitrate")]
+    activate: Option<Duration>,
+}
+
+/// The device that is meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Device {
+    At(Address),
+    Only,
+}
+
+/// A node-ID that is to be set, 255 for none.
+#[derive(Clone, Copy, Debug)]
+struct Wanted(u8);
+
+/// Devices found on one bus at the most.
+const MOST: usize = 127;
+
+/// How long a device may take to boot with its new node-ID, as `nmt` waits.
+const BOOT_PATIENCE: Duration = Duration::from_secs(5);
+
+fn device(text: &str) -> Result<Device, String> {
+    if text.eq_ignore_ascii_case("only") {
+        return Ok(Device::Only);
+    }
+    let numbers = text.split(':').map(|part| {
+        let digits = part.trim_end_matches(['h', 'H']);
+        u32::from_str_radix(digits.strip_prefix("0x").unwrap_or(digits), 16).ok()
+    });
+    let numbers: Option<Vec<u32>> = numbers.collect();
+    let numbers: Option<[u32; 4]> = numbers.and_then(|numbers| numbers.try_into().ok());
+    numbers.map(|numbers| Device::At(Address { numbers })).ok_or_else(|| {
+        format!(
+            "'{text}' is no LSS address; expected vendor, product code, revision and serial number in hexadecimal, e.g. \
+             100:1:0:2A, or the word only"
+        )
+    })
+}
+
+fn node_or_none(text: &str) -> Result<Wanted, String> {
+    if text.eq_ignore_ascii_case("none") {
+        return Ok(Wanted(UNCONFIGURED));
+    }
+    node(text).map(|node| Wanted(node.raw())).map_err(|error| format!("{error}, or the word none"))
+}
+
+/// The index in the table of CiA 305.
+fn bit_rate(text: &str) -> Result<u8, String> {
+    let wanted = text.parse::<Bitrate>().ok().map(|rate| rate.bits_per_second() / 1000);
+    let index = BIT_RATES_KBIT.iter().position(|rate| rate.is_some() && rate.map(u32::from) == wanted);
+    index.map(|index| index as u8).ok_or_else(|| {
+        format!("'{text}' is no bit rate of CiA 305; expected 10k, 20k, 50k, 125k, 250k, 500k, 800k or 1M")
+    })
+}
+
+fn silence(text: &str) -> Result<Duration, String> {
+    let time = parse_duration(text).map_err(|error| error.to_string())?;
+    if time.as_millis() <= u128::from(u16::MAX) { Ok(time) } else { Err("at most 65535ms can be said".into()) }
+}
+
+/// What was found or done.
+#[derive(Debug, Serialize)]
+pub(crate) struct LssReport {
+    devices: Vec<Found>,
+    /// What was set, in words.
+    done: Vec<String>,
+    /// When it takes effect, and how, where it has not yet.
+    pending: Option<String>,
+    /// The node-ID that a node still has, and the one that it has from NMT reset communication on.
+    #[serde(skip)]
+    change: Option<(NodeId, Option<NodeId>)>,
+}
+
+/// A device, as far as it is known.
+#[derive(Debug, Serialize)]
+struct Found {
+    /// As `lss set` takes it.
+    address: String,
+    vendor_id: u32,
+    product_code: u32,
+    revision_number: u32,
+    serial_number: u32,
+    /// `null` for none.
+    node_id: Option<u8>,
+}
+
+/// The master of LSS, for the length of a command.
+struct LssMaster<'a> {
+    context: &'a Context,
+    client: Client,
+}
+
+impl Lss {
+    /// Does it. All devices wait again afterwards.
+    pub(crate) async fn run(&self, context: &Context) -> Result<LssReport, Failure> {
+        context.traffic.listen();
+        let mut master = LssMaster { context, client: Client::new(self.within) };
+        let done = match &self.what {
+            What::Scan => master.scan().await,
+            What::Inquire { device } => master.inquire(device.device).await,
+            What::Set(set) => master.set(set).await,
+        };
+        master.ask(Request::SwitchGlobal(false)).await;
+        context.settle().await;
+        let mut done = done?;
+        if let (What::Set(set), Some((old, new))) = (&self.what, done.change) {
+            done.pending = set.take_effect(context, old, new).await?;
+        }
+        Ok(done)
+    }
+}
+
+impl Set {
+    /// NMT reset communication, if it is wanted; else how to do it.
+    async fn take_effect(
+        &self,
+        context: &Context,
+        old: NodeId,
+        new: Option<NodeId>,
+    ) -> Result<Option<String>, Failure> {
+        if !self.reset {
+            let reset = NmtCommand::ResetCommunication.code();
+            return Ok(Some(format!(
+                "node {old} keeps its node-ID until NMT reset communication: ferrodrive send 000#{reset:02X}{:02X} (or --reset)",
+                old.raw()
+            )));
+        }
+        let nodes = new.map(|new| context.node(new));
+        let booted = nodes.as_ref().map(|node| node.wait_boot_up(BOOT_PATIENCE));
+        context.node(old).nmt(NmtCommand::ResetCommunication);
+        match booted {
+            Some(booted) => booted.await?,
+            None => context.settle().await,
+        }
+        Ok(None)
+    }
+}
+
+impl LssMaster<'_> {
+    /// Asks, and waits for the answer; `None` if there is none, or is to be none.
+    async fn ask(&mut self, request: Request) -> Option<Reply> {
+        let network = &self.context.network;
+        self.client.ask(request, network.now());
+        if let Some(frame) = self.client.poll_transmit() {
+            network.transmit(frame);
+        }
+        while let Some(due) = self.client.poll_timeout() {
+            let now = network.now();
+            let left = if due > now { due - now } else { Duration::ZERO };
+            tokio::select! {
+                (_, frame) = self.context.traffic.next() => {
+                    if let Some(reply) = self.client.handle_frame(&frame) {
+                        return Some(reply);
+                    }
+                }
+                () = network.sleep(left) => {
+                    if self.client.handle_timeout(network.now()) {
+                        return None;
+                    }
+                }
+            }
+        }
+        None
+    }
+
+    async fn scan(&mut self) -> Result<LssReport, Failure> {
+        let mut devices = Vec::new();
+        self.ask(Request::SwitchGlobal(false)).await;
+        while devices.len() < MOST {
+            let (mut scan, mut asked) = (FastScan::new(), 0);
+            while let Some(request) = scan.next() {
+                let answer = self.ask(request).await;
+                scan.note(answer == Some(Reply::Identified));
+                asked += 1;
+                self.context.progress.show(format!("found {}; question {asked} of 133", devices.len()));
+            }
+            match scan.found() {
+                Some(address) => devices.push(Found::new(address, None)),
+                None if asked > 1 => {
+                    return Err(Failure::new("a device stopped answering in the middle of the scan")
+                        .next("give it more time: --within 200ms"));
+                }
+                None => break,
+            }
+        }
+        if devices.is_empty() {
+            return Err(Failure::new("no device without a node-ID answers")
+                .of_kind("nobody")
+                .because(
+                    "a fastscan finds devices without a node-ID alone (CiA 305, 6.5.3), and not every device has LSS",
+                )
+                .next(
+                    "ferrodrive scan finds those with a node-ID; `lss inquire only` asks the one device on the bus",
+                ));
+        }
+        Ok(LssReport { devices, done: Vec::new(), pending: None, change: None })
+    }
+
+    /// Lets the device that is meant be configured, and no other.
+    async fn select(&mut self, device: Device) -> Result<(), Failure> {
+        self.ask(Request::SwitchGlobal(false)).await;
+        let Device::At(address) = device else {
+            self.ask(Request::SwitchGlobal(true)).await;
+            return Ok(());
+        };
+        let mut selected = None;
+        for (part, number) in Part::ALL.into_iter().zip(address.numbers) {
+            selected = self.ask(Request::SwitchSelective(part, number)).await;
+        }
+        match selected {
+            Some(_) => Ok(()),
+            None => Err(no_answer(&format!("the device {}", Written(address)))),
+        }
+    }
+
+    async fn number(&mut self, part: Part) -> Result<u32, Failure> {
+        match self.ask(Request::Inquire(part)).await {
+            Some(Reply::Number(_, number)) => Ok(number),
+            _ => Err(no_answer("the device")),
+        }
+    }
+
+    async fn inquire(&mut self, device: Device) -> Result<LssReport, Failure> {
+        self.select(device).await?;
+        let mut address = Address::default();
+        for (part, number) in Part::ALL.into_iter().zip(&mut address.numbers) {
+            *number = self.number(part).await?;
+        }
+        let Some(Reply::NodeId(node)) = self.ask(Request::InquireNodeId).await else {
+            return Err(no_answer("the device"));
+        };
+        Ok(LssReport {
+            devices: vec![Found::new(address, NodeId::new(node))],
+            done: Vec::new(),
+            pending: None,
+            change: None,
+        })
+    }
+
+    async fn set(&mut self, set: &Set) -> Result<LssReport, Failure> {
+        self.select(set.device.device).await?;
+        let mut done = Vec::new();
+        // Optional for a device: without it nothing is said of when the new one takes effect.
+        let before = match self.ask(Request::InquireNodeId).await {
+            Some(Reply::NodeId(node)) => Some(NodeId::new(node)),
+            _ => None,
+        };
+        if let Some(Wanted(node)) = set.node_id {
+            let what = if node == UNCONFIGURED { "no node-ID".to_owned() } else { format!("node-ID {node}") };
+            let answer = self.ask(Request::ConfigureNodeId(node)).await;
+            done.push(checked(&what, answer, "the device does not take it")?);
+        }
+        if let Some(index) = set.bitrate {
+            let rate = BIT_RATES_KBIT[usize::from(index)].unwrap_or_default();
+            let answer = self.ask(Request::ConfigureBitRate { table: 0, index }).await;
+            done.push(checked(&format!("{rate} kbit/s"), answer, "the device has no such bit rate")?);
+        }
+        if set.store {
+            let answer = self.ask(Request::Store).await;
+            done.push(checked("stored", answer, "the device has no store for it, or cannot reach it")?);
+        }
+        if let Some(silence) = set.activate {
+            self.ask(Request::ActivateBitRate(silence.as_millis() as u16)).await;
+            done.push(format!("new bit rate from {} ms on", silence.as_millis()));
+        }
+        let wanted = set.node_id.map(|Wanted(node)| NodeId::new(node));
+        let change = before.flatten().zip(wanted).filter(|(old, new)| Some(*old) != *new);
+        Ok(LssReport { devices: Vec::new(), done, pending: None, change })
+    }
+}
+
+fn no_answer(who: &str) -> Failure {
+    Failure::new(format!("{who} does not answer LSS"))
+        .of_kind("no_answer")
+        .because(format!("it is not there, has another address, or has no LSS (CiA 305): {}", without_lss()))
+        .next("ferrodrive scan shows who has a node-ID, `ferrodrive read NODE 1018:*` its address; give it more time: --within 200ms")
+}
+
+/// The models that have no LSS, in words.
+fn without_lss() -> String {
+    let without: Vec<_> = devices::all().iter().filter(|model| !model.lss).map(|model| model.name).collect();
+    format!("by their manuals {} have none", without.join(", "))
+}
+
+/// What was set, or why not.
+fn checked(what: &str, answer: Option<Reply>, refused: &str) -> Result<String, Failure> {
+    match answer {
+        Some(Reply::NodeIdConfigured(outcome) | Reply::BitRateConfigured(outcome) | Reply::Stored(outcome)) => {
+            match outcome {
+                Outcome::DONE => Ok(what.to_owned()),
+                Outcome { code: 255, specific } => Err(Failure::new(format!("the device refused: {what}"))
+                    .because(format!("the maker's error {specific}"))),
+                Outcome { code, .. } => {
+                    Err(Failure::new(format!("the device refused: {what}"))
+                        .because(format!("{refused} (error {code})")))
+                }
+            }
+        }
+        _ => Err(no_answer("the device")),
+    }
+}
+
+/// `100:1:0:2A`.
+struct Written(Address);
+
+impl fmt::Display for Written {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [vendor, product, revision, serial] = self.0.numbers;
+        write!(f, "{vendor:X}:{product:X}:{revision:X}:{serial:X}")
+    }
+}
+
+impl Found {
+    fn new(address: Address, node_id: Option<NodeId>) -> Self {
+        let [vendor_id, product_code, revision_number, serial_number] = address.numbers;
+        Self {
+            address: Written(address).to_string(),
+            vendor_id,
+            product_code,
+            revision_number,
+            serial_number,
+            node_id: node_id.map(NodeId::raw),
+        }
+    }
+}
+
+impl Report for LssReport {
+    fn text(&self, paint: Paint) -> String {
+        if self.devices.is_empty() {
+            let pending = self.pending.as_ref().map(|pending| format!("\n{pending}")).unwrap_or_default();
+            return format!("set: {}{pending}", self.done.join(", "));
+        }
+        let mut table = Table::new(&["address", "node-ID"]);
+        for found in &self.devices {
+            table.row([found.address.clone(), found.node_id.map_or_else(|| "none".into(), |node| node.to_string())]);
+        }
+        table.plain(paint)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_are_four_hexadecimal_numbers() {
+        let at = |numbers| Ok(Device::At(Address { numbers }));
+        assert_eq!(device("100:1:0:2A"), at([0x100, 1, 0, 0x2A]));
+        assert_eq!(device("0x100:1h:0:FFFFFFFF"), at([0x100, 1, 0, u32::MAX]));
+        assert_eq!(device("only"), Ok(Device::Only));
+        for wrong in ["", "100", "100:1:0", "100:1:0:2A:1", "100:1:0:x", "100000000:1:0:1"] {
+            assert!(device(wrong).unwrap_err().contains("e.g. 100:1:0:2A"), "{wrong}");
+        }
+        // CiA 305, table 1.
+        assert_eq!((bit_rate("1M"), bit_rate("500k"), bit_rate("10k")), (Ok(0), Ok(2), Ok(8)));
+        assert!(bit_rate("100k").is_err());
+    }
+}
