@@ -26,7 +26,7 @@ pub trait Rest: Clone + PartialEq {
     /// A resistor is across the bus, as long as the bus is where it is.
     fn bleeds(&self, pins: &Self::Pins) -> bool;
 
-    /// The slow things after [`SLOW_EVERY`] steps.
+    /// The slow things, which are looked at once in so many steps.
     fn step_slow(&mut self);
 
     /// What these may have done.
