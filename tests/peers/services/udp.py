@@ -104,11 +104,14 @@ def multicast_frames(bench):
         finally:
             dump.kill()
             dump.communicate()
+        # python-can hears what it sent itself, as its socket is one of those that joined the group.
+        while bus.recv(0.2):
+            pass
         for message in MESSAGES:
             subprocess.run([bench.program, "--bus", place, "send", text(message)], check=True, timeout=60, capture_output=True)
             received = bus.recv(PATIENCE_S)
-            # What python-can sent itself does not come back to it; what the command sends has the same fields.
-            true(received is not None and received.equals(message, timestamp_delta=None, check_channel=False, check_direction=False), f"{message} came as {received}")
+            same = {"timestamp_delta": None, "check_channel": False, "check_direction": False}
+            true(received is not None and received.equals(message, **same), f"{message} came as {received}")
         equal(bus.recv(0.2), None, "a further frame")
 
 
