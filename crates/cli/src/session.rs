@@ -4,12 +4,16 @@
 use std::cell::RefCell;
 use std::error::Error;
 use std::path::Path;
+use std::sync::Arc;
+use std::task::{Wake, Waker};
 use std::time::Duration;
 
+use can::{Instant, Station};
 use canopen::{Mux, NodeId};
 use master::Network;
 use tokio::sync::Notify;
-use transport::{BusNotes, BusSpec, Note, WallClock, realtime, run_station};
+use transport::realtime::{self, RealTimeError};
+use transport::{AnyBus, BusError, BusNotes, BusSpec, BusThread, BusThreadError, Note, WallClock, run_station};
 
 use crate::context::Context;
 use crate::embedded::{self, Embedded};
@@ -93,11 +97,61 @@ fn virtual_bus<R>(
     ended.map_err(|error| Failure::new("the virtual bus came to a halt").because(error))?
 }
 
+/// Where the master of a command runs.
+#[allow(clippy::large_enum_variant, reason = "there is one, for as long as the command takes")]
+enum Runner {
+    /// In the thread of the command.
+    Here(AnyBus),
+    /// In a thread of its own, in real time.
+    Thread(BusThread),
+}
+
+impl Runner {
+    async fn open(global: &Global) -> Result<(Self, WallClock), Failure> {
+        if global.realtime {
+            let opened = BusThread::open(global.bus.clone()).await;
+            return opened.map(|(thread, clock)| (Self::Thread(thread), clock)).map_err(|error| match error {
+                BusThreadError::RealTime(error) => no_real_time(&error),
+                error => bus_failure(global, &error),
+            });
+        }
+        let clock = WallClock::start();
+        let bus = global.bus.open(&clock).await.map_err(|error| bus_failure(global, &error))?;
+        Ok((Self::Here(bus), clock))
+    }
+
+    /// Runs `station`, which is `network`, until `until` completes.
+    async fn run<U: Future>(
+        self,
+        network: &Network,
+        mut station: impl Station + Send + 'static,
+        clock: &WallClock,
+        until: U,
+        tell: impl FnMut(Instant, &Note),
+    ) -> Result<U::Output, BusError> {
+        let wakeup = Arc::new(Notify::new());
+        match self {
+            Self::Here(mut bus) => run_station(&mut bus, &mut station, clock, &wakeup, until, tell).await,
+            Self::Thread(thread) => {
+                network.on_activity(Waker::from(Arc::new(Wakes(Arc::clone(&wakeup)))));
+                thread.run(station, wakeup, until, tell).await
+            }
+        }
+    }
+}
+
+/// Has the thread of the bus look at the master when a command has asked it for something.
+struct Wakes(Arc<Notify>);
+
+impl Wake for Wakes {
+    fn wake(self: Arc<Self>) {
+        self.0.notify_one();
+    }
+}
+
 async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Result<R, Failure>) -> Result<R, Failure> {
-    enter_real_time(global)?;
-    let clock = WallClock::start();
     let log = global.log.as_ref().map(LogPath::create).transpose()?;
-    let mut bus = global.bus.open(&clock).await.map_err(|error| bus_failure(global, &error))?;
+    let (runner, clock) = Runner::open(global).await?;
     let (log, writing) = CommandLog::start(log, interface_of(&global.bus), clock.unix_zero(), Pace::RealTime);
     let network = Network::new();
     let progress = Progress::new(global.json);
@@ -125,9 +179,9 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
         let notes = notes.borrow();
         Err(notes.lost().into_iter().fold(failure, |failure, lost| without_bus(&context, failure.because(lost))))
     };
-    let mut station = Logged::new(Tap::new(network.clone(), traffic), log, context.ears.clone());
+    let station = Logged::new(Tap::new(network.clone(), traffic), log, context.ears.clone());
     let tell = |_, note: &Note| notes.borrow_mut().news(note).iter().for_each(|text| context.tell(text));
-    let ended = run_station(&mut bus, &mut station, &clock, &Notify::new(), until, tell).await;
+    let ended = runner.run(&network, station, &clock, until, tell).await;
     progress.clear();
     writing.finish().inspect(|missing| context.tell(missing));
     ended.map_err(|error| {
@@ -141,12 +195,24 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     })?
 }
 
+/// A clock, with `--realtime` one that wakes in real time.
+pub(crate) fn start_clock(global: &Global) -> Result<WallClock, Failure> {
+    if !global.realtime {
+        return Ok(WallClock::start());
+    }
+    WallClock::start_in_real_time().map_err(|error| no_real_time(&error))
+}
+
 /// With `--realtime` this thread, and those that it starts from here on, run in real time.
 pub(crate) fn enter_real_time(global: &Global) -> Result<(), Failure> {
     if !global.realtime {
         return Ok(());
     }
-    realtime::enter().map_err(|error| failure_of(&error).of_kind("realtime").next(error.advice()))
+    realtime::enter().map_err(|error| no_real_time(&error))
+}
+
+fn no_real_time(error: &RealTimeError) -> Failure {
+    failure_of(error).of_kind("realtime").next(error.advice())
 }
 
 /// Adds what to do where a command ended without its bus: what it moved may move still.

@@ -133,6 +133,9 @@ pub enum BusError {
         "it takes frames more slowly than they come: more than 16384 wait for it; is its bit rate lower, is it disturbed?"
     )]
     TooSlow,
+    /// The thread of the bus is gone.
+    #[error("the thread of the bus has ended before its time: a defect of this program")]
+    ThreadEnded,
     /// slcan names nine bit rates only.
     #[error("slcan cannot select {bitrate}; it knows 10k, 20k, 50k, 100k, 125k, 250k, 500k, 800k and 1M")]
     NoSlcanBitrate {

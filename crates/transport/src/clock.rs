@@ -2,16 +2,21 @@
 //!
 //! A [`WallClock`] counts nanoseconds since it was made, as the [`Instant`]s that stations take, and sleeps until one.
 //! tokio's own timer counts whole milliseconds, which is ten CAN frames at 1 Mbit/s; so sleeping is done by a thread of
-//! its own that waits on a condition variable (some 60 µs late on Linux) and ends with the last copy of the clock.
+//! its own that waits for an [`Alarm`] at an absolute time and ends with the last copy of the clock.
+
+mod alarm;
 
 use std::collections::BTreeMap;
 use std::future::Future;
 use std::pin::Pin;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use can::Instant;
+
+use crate::realtime::{self, RealTimeError};
+use alarm::Alarm;
 
 /// Time since this clock was made. Copies share its zero and its timer thread.
 #[derive(Clone, Debug)]
@@ -26,9 +31,23 @@ impl WallClock {
     /// # Panics
     /// If the system has no thread left for the timer.
     pub fn start() -> Self {
-        let face = Face { zero: std::time::Instant::now() };
+        let face = Face::new();
         let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        Self { face, timer: Timer::start(face, since_epoch) }
+        Self { face, timer: Timer::start(face, since_epoch, || {}) }
+    }
+
+    /// The same, with the timer's thread in real time ([`realtime`]); or why that is not allowed.
+    ///
+    /// # Panics
+    /// If the system has no thread left for the timer.
+    pub fn start_in_real_time() -> Result<Self, RealTimeError> {
+        let (told, entered) = std::sync::mpsc::channel();
+        let face = Face::new();
+        let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let timer = Timer::start(face, since_epoch, move || drop(told.send(realtime::enter())));
+        // A thread that tells nothing has not entered anything.
+        entered.recv().unwrap_or(Err(RealTimeError::NotHere))?;
+        Ok(Self { face, timer })
     }
 
     /// Now. Never goes back.
@@ -99,14 +118,53 @@ impl Drop for Sleep {
     }
 }
 
+/// Nanoseconds of the system's monotonic clock at which this one began.
+#[cfg(target_os = "linux")]
+#[derive(Clone, Copy, Debug)]
+struct Face {
+    zero: Duration,
+}
+
+#[cfg(target_os = "linux")]
+impl Face {
+    fn new() -> Self {
+        Self { zero: Self::monotonic() }
+    }
+
+    fn now(self) -> Instant {
+        Instant::ZERO + (Self::monotonic() - self.zero)
+    }
+
+    /// When `at` is, by CLOCK_MONOTONIC.
+    fn absolute(self, at: Instant) -> Duration {
+        self.zero + (at - Instant::ZERO)
+    }
+
+    fn monotonic() -> Duration {
+        let now = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
+        Duration::new(now.tv_sec.unsigned_abs(), now.tv_nsec.unsigned_abs() as u32)
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
 #[derive(Clone, Copy, Debug)]
 struct Face {
     zero: std::time::Instant,
 }
 
+#[cfg(not(target_os = "linux"))]
 impl Face {
+    fn new() -> Self {
+        Self { zero: std::time::Instant::now() }
+    }
+
     fn now(self) -> Instant {
         Instant::ZERO + self.zero.elapsed()
+    }
+
+    /// When `at` is, by the standard library's clock.
+    fn absolute(self, at: Instant) -> std::time::Instant {
+        self.zero + (at - Instant::ZERO)
     }
 }
 
@@ -118,10 +176,11 @@ struct Timer {
 }
 
 /// Wakers are woken and dropped with the lock released: either may end a task, and with it other sleeps.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Queue {
     sleepers: Mutex<Sleepers>,
-    changed: Condvar,
+    alarm: Alarm,
+    face: Face,
 }
 
 #[derive(Debug, Default)]
@@ -132,10 +191,13 @@ struct Sleepers {
 }
 
 impl Timer {
-    fn start(face: Face, unix_zero: Duration) -> Arc<Self> {
-        let queue = Arc::new(Queue::default());
+    fn start(face: Face, unix_zero: Duration, first: impl FnOnce() + Send + 'static) -> Arc<Self> {
+        let queue = Arc::new(Queue { sleepers: Mutex::default(), alarm: Alarm::new(), face });
         let served = Arc::clone(&queue);
-        std::thread::spawn(move || served.serve(face));
+        std::thread::spawn(move || {
+            first();
+            served.serve();
+        });
         Arc::new(Self { unix_zero, queue })
     }
 
@@ -147,7 +209,7 @@ impl Timer {
         });
         let replaced = sleepers.wakers.insert((deadline, ticket), waker.clone());
         if sleepers.wakers.first_key_value().is_some_and(|(key, _)| *key == (deadline, ticket)) {
-            self.queue.changed.notify_one();
+            self.queue.alarm.set(Some(self.queue.face.absolute(deadline)));
         }
         drop(sleepers);
         drop(replaced);
@@ -164,8 +226,9 @@ impl Timer {
 
 impl Drop for Timer {
     fn drop(&mut self) {
-        self.queue.lock().closed = true;
-        self.queue.changed.notify_one();
+        let mut sleepers = self.queue.lock();
+        sleepers.closed = true;
+        self.queue.alarm.set(Some(self.queue.face.absolute(Instant::ZERO)));
     }
 }
 
@@ -174,27 +237,27 @@ impl Queue {
         self.sleepers.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The timer thread: wakes who is due, then waits for the next deadline or a change.
-    fn serve(&self, face: Face) {
+    /// The timer thread: wakes who is due, then waits for the next deadline or a change. The alarm is set with the lock held,
+    /// so that the last one to set it is the one who saw the sleepers last.
+    fn serve(&self) {
         let mut sleepers = self.lock();
         while !sleepers.closed {
-            let now = face.now();
             let next = sleepers.wakers.first_key_value().map(|((deadline, _), _)| *deadline);
-            sleepers = match next {
-                Some(deadline) if deadline <= now => {
+            match next {
+                Some(deadline) if deadline <= self.face.now() => {
                     let due = sleepers.wakers.pop_first();
                     drop(sleepers);
                     if let Some((_, waker)) = due {
                         waker.wake();
                     }
-                    self.lock()
                 }
-                Some(deadline) => {
-                    let waited = self.changed.wait_timeout(sleepers, deadline - now);
-                    waited.unwrap_or_else(PoisonError::into_inner).0
+                next => {
+                    self.alarm.set(next.map(|deadline| self.face.absolute(deadline)));
+                    drop(sleepers);
+                    self.alarm.wait();
                 }
-                None => self.changed.wait(sleepers).unwrap_or_else(PoisonError::into_inner),
-            };
+            }
+            sleepers = self.lock();
         }
     }
 }
@@ -242,6 +305,21 @@ mod tests {
             () = clock.sleep(Duration::from_millis(1)) => {}
         }
         assert!(clock.timer.queue.lock().wakers.is_empty());
+    }
+
+    #[tokio::test]
+    async fn an_earlier_sleep_comes_before_one_that_the_timer_already_waits_for() {
+        let clock = WallClock::start();
+        let late = clock.clone();
+        let (woken, mut order) = tokio::sync::mpsc::unbounded_channel();
+        let far = tokio::spawn(async move { late.sleep(Duration::from_secs(3600)).await });
+        // By then the timer waits for the far one.
+        tokio::time::sleep(Duration::from_millis(20)).await;
+        clock.sleep(Duration::from_millis(1)).await;
+        woken.send(()).unwrap();
+        assert_eq!(order.recv().await, Some(()));
+        assert!(!far.is_finished());
+        far.abort();
     }
 
     #[tokio::test]

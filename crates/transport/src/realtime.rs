@@ -1,7 +1,7 @@
 //! Real time for the thread that runs a bus (Linux): SCHED_FIFO (sched(7)) and memory that stays (mlockall(2)).
 //!
-//! To be entered before [`crate::WallClock::start`]: the clock's thread inherits the scheduling of the one that starts it. Its
-//! deadlines are absolute already: the standard library waits on a futex until an instant of CLOCK_MONOTONIC.
+//! What runs so is the thread of the bus ([`crate::BusThread`]) and that of its clock ([`crate::WallClock::start_in_real_time`]), which
+//! waits for absolute times by a timer of the kernel. A thread that one of these starts inherits its scheduling.
 
 /// Above everything that is not real time, and below the kernel's interrupt threads (50).
 const PRIORITY: u8 = 40;
@@ -99,7 +99,7 @@ mod tests {
                 assert!(said.contains("may not") && said.contains("limits.conf"), "{said}");
                 return eprintln!("skipped: {error}");
             }
-            let _clock = WallClock::start();
+            let _clock = WallClock::start_in_real_time().unwrap();
             let fifo = scheduling().into_iter().filter(|task| *task == (1, u32::from(PRIORITY))).count();
             assert!(fifo >= 2, "{:?}", scheduling());
             let status = std::fs::read_to_string("/proc/self/status").unwrap();

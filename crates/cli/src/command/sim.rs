@@ -27,7 +27,7 @@ use crate::serve::service::{
 };
 use crate::serve::speaker::Speaker;
 use crate::serve::world::ServedWorld;
-use crate::session::{bus_failure, enter_real_time, failure_of};
+use crate::session::{bus_failure, enter_real_time, failure_of, start_clock};
 use described::notes;
 use testbench::document::BadFile;
 use testbench::machine_file::{Machine, Placed};
@@ -218,8 +218,7 @@ impl Sim {
         global: &Global,
         bridge: Option<&BusSpec>,
     ) -> Result<(), Failure> {
-        enter_real_time(global)?;
-        let clock = WallClock::start();
+        let clock = start_clock(global)?;
         let (requests, mut incoming) = mpsc::channel(REQUESTS_WAITING);
         listen_to_signals(requests.clone());
         let answers = Speaker::of_answers(warnings.clone());
@@ -251,6 +250,8 @@ impl Sim {
         }
         tokio::spawn(tick(requests.clone(), clock.clone()));
         std::thread::spawn(move || read_lines(&requests, &answers));
+        // Behind all threads that it starts: a disk or a terminal is no matter of real time.
+        enter_real_time(global)?;
         let serving =
             run_world(&mut world, &mut hub, &clock, &mut incoming, |world, request| service.serve(world, request));
         let ended = serving.await;
