@@ -121,13 +121,7 @@ impl Drop for Live {
 }
 
 /// The thread: opens the bus, says how that went, and runs until the handle is gone or the bus is lost.
-fn run(
-    spec: &BusSpec,
-    network: Network,
-    incoming: mpsc::UnboundedReceiver<Job>,
-    opened: &Opened,
-    said: &Said,
-) {
+fn run(spec: &BusSpec, network: Network, incoming: mpsc::UnboundedReceiver<Job>, opened: &Opened, said: &Said) {
     let tell = |result: Result<(), String>| {
         *opened.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(result);
         opened.1.notify_all();
