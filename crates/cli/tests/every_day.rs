@@ -225,3 +225,50 @@ fn words_in_another_order_are_understood_where_that_does_no_harm() {
         assert!(refused.err.contains(&format!("did you mean: {meant}")), "{typed:?}: {}", refused.err);
     }
 }
+
+/// A servo of the standard behind a simulator, which has booted.
+fn served_servo() -> (Simulator, String) {
+    let simulator = Simulator::start(&["--drive", "cia402@5", "--serve", "socketcand://127.0.0.1:0"]);
+    let bus = simulator.bus("socketcand");
+    done(&["--bus", &bus, "--timeout", "10s", "nmt", "5", "reset", "--wait", "10s"]);
+    (simulator, bus)
+}
+
+#[test]
+fn errors_that_a_node_remembers_are_shown_with_their_meaning() {
+    let (_simulator, bus) = served_servo();
+    let on = |arguments: &[&str]| done(&[&["--bus", &bus, "--timeout", "10s", "--json"], arguments].concat()).json();
+    assert_eq!(on(&["emcy", "show", "5"])["errors"], json!([]));
+    // CiA 301, 7.5.2.19: node 7Fh within 100 ms. One heartbeat begins the watch, and none follows.
+    on(&["write", "5", "1016:01", "0x7F0064"]);
+    on(&["send", "77F#05"]);
+    let begin = std::time::Instant::now();
+    let errors = loop {
+        let shown = on(&["emcy", "show", "5"]);
+        if shown["errors"] != json!([]) {
+            break shown["errors"].clone();
+        }
+        assert!(begin.elapsed() < std::time::Duration::from_secs(20), "no error is remembered");
+    };
+    // CiA 301, table 26: 8130h is the life guard or heartbeat error.
+    assert_eq!((&errors[0]["code"], &errors[0]["node"]), (&json!(0x8130), &json!(5)), "{errors}");
+    let text = done(&["--bus", &bus, "--timeout", "10s", "emcy", "show", "5"]).out;
+    assert!(text.starts_with("node 5: 8130h ") && text.to_lowercase().contains("heartbeat"), "{text}");
+}
+
+#[test]
+fn pdos_that_come_are_shown_with_their_objects() {
+    let (_simulator, bus) = served_servo();
+    let bus = ["--bus", &bus, "--timeout", "10s"];
+    // CiA 301, 7.5.2.37: an event timer of 50 ms.
+    done(&[&bus[..], &["write", "5", "1800:05", "50"]].concat());
+    done(&[&bus[..], &["nmt", "5", "start"]].concat());
+    let watched = lines(&done(&[&bus[..], &["--json", "pdo", "watch", "5", "--for", "2s"]].concat()).out);
+    let first = watched.first().expect("no PDO came");
+    assert_eq!((&first["pdo"], &first["node"]), (&json!("TPDO1"), &json!(5)));
+    assert_eq!(first["values"][0]["object"], json!("6041h:00"));
+    // CiA 402-2, table 30: Switch on disabled is x1xx 0000 in the low byte.
+    let bytes = first["bytes"].as_str().unwrap();
+    let low = u8::from_str_radix(&bytes[..2], 16).unwrap();
+    assert_eq!(low & 0x4F, 0x40, "{bytes}");
+}

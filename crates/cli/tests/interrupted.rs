@@ -4,13 +4,17 @@
 mod common;
 
 use std::io::{BufRead, BufReader};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use common::{Simulator, done, is_heard};
 
-const DRIVES: [(&str, &str, &str); 3] =
-    [("4", "zlac8030l", "4=zlac8030l"), ("2", "zlim42c", "2=zlim42c"), ("1", "m4230e17b50", "1=m4230e17b50")];
+const DRIVES: [(&str, &str, &str); 4] = [
+    ("4", "zlac8030l", "4=zlac8030l"),
+    ("2", "zlim42c", "2=zlim42c"),
+    ("1", "m4230e17b50", "1=m4230e17b50"),
+    ("5", "cia402", "5=cia402"),
+];
 
 fn bench() -> Simulator {
     let specs = DRIVES.map(|(node, model, _)| format!("{model}@{node}"));
@@ -27,11 +31,6 @@ fn start(bus: &str, model: &str, arguments: &[&str]) -> Child {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap()
-}
-
-fn interrupt(child: Child) -> Output {
-    send("INT", &child);
-    child.wait_with_output().unwrap()
 }
 
 fn send(signal: &str, child: &Child) {
@@ -54,23 +53,42 @@ fn wait_until_it_turns(simulator: &mut Simulator, node: &str) {
     }
 }
 
+/// The commands that move a drive until they are ended: velocity and position on each model; torque where the model has it,
+/// home where it looks for a switch that is not there.
+fn motions(node: &str) -> [Vec<&str>; 3] {
+    let velocity = vec!["velocity", node, "100rpm", "--for", "60s"];
+    let position = vec!["move", node, "200turn", "--relative", "--profile-velocity", "100rpm"];
+    let last = match node {
+        "4" => vec!["torque", node, "1A", "--for", "60s"],
+        "5" => vec!["torque", node, "100mA", "--for", "60s"],
+        _ => vec!["home", node, "--method", "17"],
+    };
+    [velocity, position, last]
+}
+
 #[test]
 fn ctrl_c_stops_every_drive_before_it_ends_with_130() {
+    every_motion_is_stopped_by("INT", 130);
+}
+
+#[test]
+fn a_termination_stops_every_drive_before_it_ends_with_143() {
+    every_motion_is_stopped_by("TERM", 143);
+}
+
+#[track_caller]
+fn every_motion_is_stopped_by(signal: &str, status: i32) {
     let mut simulator = bench();
     let bus = simulator.bus("socketcand");
     for (node, _, model) in DRIVES {
-        let velocity = ["velocity", node, "100rpm", "--for", "60s"];
-        let position = ["move", node, "200turn", "--relative", "--profile-velocity", "100rpm"];
-        let home = ["home", node, "--method", "17"];
-        let torque = ["torque", node, "1A", "--for", "60s"];
-        let last = if node == "4" { &torque[..] } else { &home[..] };
-        for motion in [&velocity[..], &position, last] {
-            let moving = start(&bus, model, motion);
+        for motion in motions(node) {
+            let moving = start(&bus, model, &motion);
             wait_until_it_turns(&mut simulator, node);
-            let ended = interrupt(moving);
+            send(signal, &moving);
+            let ended = moving.wait_with_output().unwrap();
             let speed = speed(&mut simulator, node);
             assert!(speed.abs() < 20.0, "{motion:?}: still at {speed} r/min");
-            assert_eq!(ended.status.code(), Some(130), "{motion:?}");
+            assert_eq!(ended.status.code(), Some(status), "{motion:?}");
             let said = String::from_utf8(ended.stderr).unwrap();
             assert!(said.contains(&format!("node {node} was moving and has been quick-stopped")), "{motion:?}: {said}");
             done(&["--bus", &bus, "--model", model, "disable", node]);

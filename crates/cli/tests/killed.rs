@@ -51,9 +51,15 @@ impl Bench {
     }
 
     /// A command that moves a drive, once the drive turns.
-    fn moving(&mut self, (node, model): (&str, &str), options: &[&str]) -> Child {
+    fn moving(&mut self, drive: (&str, &str), options: &[&str]) -> Child {
+        let (node, _) = drive;
+        self.moving_by(drive, &["velocity", node, "60rpm", "--for", "60s"], options)
+    }
+
+    fn moving_by(&mut self, (node, model): (&str, &str), motion: &[&str], options: &[&str]) -> Child {
         let child = Command::new(env!("CARGO_BIN_EXE_ferrodrive"))
-            .args(["--bus", &self.bus, "--model", model, "velocity", node, "60rpm", "--for", "60s"])
+            .args(["--bus", &self.bus, "--model", model])
+            .args(motion)
             .args(options)
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
@@ -93,6 +99,27 @@ fn a_servo_stops_a_second_after_its_master_was_killed() {
     assert_eq!(bench.kill(child), "");
     let took = bench.wait("4", false, Duration::from_millis(1000) + SLACK);
     assert!(took > Duration::from_millis(700), "{took:?}");
+}
+
+/// Whatever it was doing: the watch is the drive's, not a mode's.
+#[test]
+fn a_drive_with_a_watch_ends_every_kind_of_motion_by_itself() {
+    let mut bench = Bench::new();
+    let longest = Duration::from_millis(2000) + SLACK;
+    for (drive, motion) in [
+        (SERVO, &["move", "4", "200turn", "--relative", "--profile-velocity", "60rpm"][..]),
+        (SERVO, &["torque", "4", "1A", "--for", "60s"]),
+        (JOINT, &["move", "1", "200turn", "--relative", "--profile-velocity", "60rpm"]),
+        (JOINT, &["home", "1", "--method", "17"]),
+    ] {
+        let child = bench.moving_by(drive, motion, &[]);
+        bench.kill(child);
+        let took = bench.wait(drive.0, false, longest);
+        // The shorter of the two watches, less what the command was silent before.
+        assert!(took > Duration::from_millis(300), "{motion:?}: {took:?}");
+        bench.json(drive, &["reset", drive.0]);
+        bench.json(drive, &["disable", drive.0]);
+    }
 }
 
 /// A servo of CiA 402 is delivered without a watch (1016h is 0, as CiA 301, 7.5.2.19 has it), which is said; `--guard` gives it

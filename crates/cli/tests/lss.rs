@@ -52,7 +52,11 @@ fn a_device_without_a_node_id_is_found_and_becomes_a_node() {
     let inquired = &bus.done(&["lss", "--within", "5s", "inquire", "only"])["devices"];
     assert_eq!((&inquired[0]["address"], &inquired[0]["node_id"]), (&json!(ADDRESS), &json!(9)));
     // It has a node-ID now, and the ZLAC8030L has no LSS.
-    assert!(bus.refused(&["lss", "scan"]).out.contains("no device without a node-ID"));
+    let nobody = bus.refused(&["lss", "scan"]).out;
+    assert!(
+        nobody.contains("no device without a node-ID") && nobody.contains("by their manuals zlac8030l"),
+        "{nobody}"
+    );
 }
 
 #[test]

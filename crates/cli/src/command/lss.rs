@@ -255,9 +255,10 @@ impl LssMaster<'_> {
         if devices.is_empty() {
             return Err(Failure::new("no device without a node-ID answers")
                 .of_kind("nobody")
-                .because(
-                    "a fastscan finds devices without a node-ID alone (CiA 305, 6.5.3), and not every device has LSS",
-                )
+                .because(format!(
+                    "a fastscan finds devices without a node-ID alone (CiA 305, 6.5.3), and not every device has LSS: {}",
+                    without_lss()
+                ))
                 .next(
                     "ferrodrive scan finds those with a node-ID; `lss inquire only` asks the one device on the bus",
                 ));

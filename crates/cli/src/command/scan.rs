@@ -1,21 +1,25 @@
 //! `ferrodrive scan`: who is on the bus, what is known of each node, and what cannot be known.
 
+mod heard;
+
 use canopen::NmtState;
 use master::identify::{Found, Knowledge};
 use serde::Serialize;
+use tokio::sync::broadcast::error::RecvError;
 
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
 use crate::paint::Paint;
 use crate::table::Table;
+use heard::{Counted, Heard};
 use testbench::models::{Description, how_to_say};
 
 /// Show who is on the bus
 ///
 /// Asks all 127 node-IDs for their device type and identity. Several models may answer the same: say which a node is with
 /// --model NODE=MODEL, or in a machine file (--machine FILE.toml). A node in the state stopped answers no SDO; it is listed
-/// if it sends a heartbeat.
+/// if it sends a heartbeat. What others sent meanwhile is told too: boot-ups, errors, PDOs, SYNC, another master's requests.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Scan {}
 
@@ -23,6 +27,8 @@ pub(crate) struct Scan {}
 #[derive(Debug, Serialize)]
 pub(crate) struct ScanReport {
     nodes: Vec<Node>,
+    /// What others sent meanwhile, beside answers to the scan and the heartbeats of the nodes above.
+    heard: Vec<Heard>,
 }
 
 #[derive(Debug, Serialize)]
@@ -52,14 +58,34 @@ impl Scan {
     /// Asks everybody.
     pub(crate) async fn run(&self, context: &Context) -> Result<ScanReport, Failure> {
         let asked = |count| context.progress.show(format!("asked {count} of 127"));
-        let found = context.network.scan(context.timeout(), asked).await;
-        if found.is_empty() {
-            return Err(Failure::new("nobody is on the bus")
-                .of_kind("nobody")
-                .because("no node answered SDO and no boot-up or heartbeat message was heard")
-                .next("check supply, cable, termination (60 ohm between CAN_H and CAN_L) and the bit rate"));
+        let (mut counted, mut decoder) = (Counted::default(), context.decoder());
+        let mut others = context.ears.listen();
+        let mut scanning = std::pin::pin!(context.network.scan(context.timeout(), asked));
+        let found = loop {
+            tokio::select! {
+                found = &mut scanning => break found,
+                passed = others.recv() => match passed {
+                    Ok((_, frame)) => counted.note(&mut decoder, &frame),
+                    // A busy bus is faster than this: what was missed is of the kinds that come again.
+                    Err(RecvError::Lagged(_)) => {}
+                    Err(RecvError::Closed) => break scanning.await,
+                },
+            }
+        };
+        while let Ok((_, frame)) = others.try_recv() {
+            counted.note(&mut decoder, &frame);
         }
-        Ok(ScanReport { nodes: found.iter().map(|found| Node::new(context, found)).collect() })
+        let heard = counted.told(|node| found.iter().any(|found| found.node == node));
+        if found.is_empty() {
+            let failure = Failure::new("nobody is on the bus")
+                .of_kind("nobody")
+                .because("no node answered SDO and no boot-up or heartbeat message was heard");
+            let failure = heard.iter().fold(failure, |failure, heard| failure.because(heard.line()));
+            return Err(
+                failure.next("check supply, cable, termination (60 ohm between CAN_H and CAN_L) and the bit rate")
+            );
+        }
+        Ok(ScanReport { nodes: found.iter().map(|found| Node::new(context, found)).collect(), heard })
     }
 }
 
@@ -143,6 +169,7 @@ impl Report for ScanReport {
         }
         let remarks =
             self.nodes.iter().filter_map(|node| Some(format!("\nnode {}: {}", node.node, node.remark.as_ref()?)));
-        format!("{}{}", table.plain(paint), remarks.collect::<String>())
+        let heard = self.heard.iter().map(|heard| format!("\n{}", heard.line()));
+        format!("{}{}", table.plain(paint), remarks.chain(heard).collect::<String>())
     }
 }
