@@ -191,3 +191,115 @@ do = "4 load torque -1"
     let fastest = recorded.series[1].points.iter().map(|(_, rpm)| *rpm).fold(0.0, f64::max);
     assert!(fastest > 10.0, "the load turns it: {fastest} r/min");
 }
+
+#[test]
+fn the_energies_of_a_driven_shaft_fit_together() {
+    let place = scratch("recorded-energies");
+    // Model, node-ID, load, how it is turned, gear.
+    let drives = [
+        ("zlac8030l", 4, "1.5", "4 velocity 60rpm", 1.0),
+        ("zlim42c", 2, "0.1", "2 velocity 120rpm", 1.0),
+        ("m4230e17b50", 1, "5", "1 velocity 600rpm", 50.0),
+    ];
+    for (model, node, load, turn, ratio) in drives {
+        let scenario = place.join(format!("{model}.toml"));
+        let text = format!(
+            "title = \"A load that is driven\"\nend = \"3s\"\n[machine]\ndrive = [{{ model = \"{model}\", node = {node} }}]\n\
+             [[host]]\ndo = [\"{turn}\", \"wait 1s\"]\n[[step]]\nat = \"1200ms\"\ndo = \"{node} load torque {load}\"\n"
+        );
+        std::fs::write(&scenario, text).unwrap();
+        let path = place.join(format!("{model}.mcap"));
+        done(&["run", scenario.to_str().unwrap(), "--record", path.to_str().unwrap()]);
+        let recorded = recorded(&path);
+        let of = |signal: &str| -> Vec<(f64, f64)> {
+            let name = format!("{node}.{signal}");
+            let found = recorded.series.iter().find(|series| series.column.name() == name);
+            found.unwrap_or_else(|| panic!("{name}")).points.clone()
+        };
+        let out = [
+            "electronics_energy_j",
+            "winding_heat_j",
+            "switches_heat_j",
+            "bleeder_heat_j",
+            "friction_heat_j",
+            "load_work_j",
+        ];
+        let mut rest = of("source_energy_j");
+        for signal in out.into_iter().chain(["stored_energy_j"]) {
+            rest.iter_mut().zip(of(signal)).for_each(|(rest, (_, joules))| rest.1 -= joules);
+        }
+        let through = of("source_energy_j").last().unwrap().1;
+        let worst = rest.iter().map(|(_, missing)| (missing - rest[0].1).abs()).fold(0.0, f64::max);
+        assert!(through > 5.0 && worst < 1e-3 * through, "{model}: {worst} J missing of {through} J");
+        // From when the load pulls until the end, whatever the drive does meanwhile: work is torque times way.
+        let under_load = |signal: &str| -> f64 {
+            let values: Vec<f64> = of(signal).iter().filter(|(at, _)| *at >= 1.25).map(|(_, value)| *value).collect();
+            values.last().unwrap() - values[0]
+        };
+        let load_nm: f64 = load.parse().unwrap();
+        let (of_load, done_j) = (load_nm * under_load("load_angle_rad"), under_load("load_work_j"));
+        assert!(
+            of_load > 0.1 && (done_j - of_load).abs() < 1e-3 * of_load,
+            "{model}: {of_load} J, {done_j} J recorded"
+        );
+        let way_rad = under_load("shaft_angle_rad");
+        assert!((under_load("load_angle_rad") * ratio - way_rad).abs() < 0.02 * way_rad.abs(), "{model}: the gear");
+    }
+}
+
+#[test]
+fn the_page_tells_of_every_signal_with_its_unit() {
+    let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/recording.md")).unwrap();
+    for signal in sim::recorder::Signal::ALL {
+        let unit = if signal.unit().is_empty() { String::new() } else { format!(" {}", signal.unit()) };
+        let row = format!("| `{}` |{unit} | ", signal.name());
+        assert!(page.contains(&row), "{row}");
+    }
+}
+
+#[test]
+fn the_master_records_objects_by_sdo_and_by_the_pdos_that_carry_them() {
+    let place = scratch("master-record");
+    for name in ["run.mcap", "run.csv"] {
+        let path = place.join(name);
+        let mut simulator = Simulator::start_heard(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
+        let bus = simulator.bus("socketcand");
+        let master = |words: &[&str]| done(&[&["--bus", &bus, "--model", "4=zlac8030l"], words].concat());
+        let report = |time: &str| {
+            let record = ["record", "4", "statusword", "position_actual_value", "--for", time, "--json", "--out"];
+            master(&[&record[..], &[path.to_str().unwrap()]].concat()).json()
+        };
+        // As it comes from the factory its TPDOs carry nothing.
+        let by_sdo = report("200ms");
+        let values = 2 * by_sdo["samples"].as_u64().unwrap();
+        assert_eq!((&by_sdo["by_sdo"], &by_sdo["by_pdo"], &by_sdo["missing"]), (&values.into(), &0.into(), &0.into()));
+        let found = recorded(&path);
+        let of = |found: &Recorded, name: &str| -> Vec<f64> {
+            let series = found.series.iter().find(|series| series.column.name() == name);
+            series.unwrap_or_else(|| panic!("{name}")).points.iter().map(|(_, value)| *value).collect()
+        };
+        let told = master(&["read", "4", "statusword", "--json"]).json();
+        assert_eq!(told["value"].as_f64(), of(&found, "4.statusword").last().copied(), "{name}: {told}");
+        assert_eq!(found.series.len(), 2, "{name}");
+        // CiA 301, 7.5.2.36: PDO off, mapping off, entries, how many, PDO on.
+        for (object, value) in [
+            ("1800:1", "0x80000184"),
+            ("1A00:0", "0"),
+            ("1A00:1", "0x60640020"),
+            ("1A00:2", "0x60410010"),
+            ("1A00:0", "2"),
+            ("1800:1", "0x184"),
+        ] {
+            master(&["write", "4", object, value]);
+        }
+        master(&["nmt", "4", "start"]);
+        // Nobody drives the wheel: its load turns it, and the TPDO comes with each change.
+        assert_eq!(simulator.ask("4 load torque -1")["ok"], true);
+        let by_pdo = report("2s");
+        assert!(by_pdo["by_pdo"].as_u64() > Some(0) && by_pdo["missing"] == 0, "{name}: {by_pdo}");
+        let positions = of(&recorded(&path), "4.position_actual_value_counts");
+        assert!(positions.is_sorted() && positions.last() > positions.first(), "{name}: {positions:?}");
+        assert_eq!(simulator.ask("quit")["ok"], true);
+        assert_eq!(simulator.wait(), Some(0));
+    }
+}
