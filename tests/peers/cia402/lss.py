@@ -4,13 +4,22 @@ from canopen.lss import LssError
 
 from checks import check, equal, true
 
-from cia402 import DRIVE
+from cia402 import TURN, FileDrive
 
 #: 1018h of `cia402`: vendor, product, revision, serial number.
 ADDRESS = (0, 402, 0x10000, 1)
 UNCONFIGURED = 255
 WAITING, CONFIGURATION = 0, 1
-DELIVERED = ["cia402@4,node-id=none"]
+
+
+class DeliveredDrive(FileDrive):
+    """Without a node-ID: its EDS says that it has LSS."""
+
+    def arguments(self, program):
+        return tuple(f"{drive},node-id=none" for drive in super().arguments(program))
+
+
+DRIVE = DeliveredDrive("cia402", model="cia402", node_id=5, device_type=0x00020192, per_rpm=TURN / 60)
 
 
 def node_id(lss):
@@ -18,7 +27,7 @@ def node_id(lss):
     return lss.inquire_node_id()
 
 
-@check("canopen-python finds a device without a node-ID by fastscan, and gives it one", DRIVE, drives=DELIVERED, absent=True)
+@check("canopen-python finds a device without a node-ID by fastscan, and gives it one", DRIVE, absent=True)
 def fast_scan(bench):
     lss = bench.network.lss
     lss.RESPONSE_TIMEOUT = 2.0
@@ -40,7 +49,7 @@ def fast_scan(bench):
     equal(node_id(lss), 9, "node-ID")
 
 
-@check("canopen-python selects a device by its address, and no other address", DRIVE, drives=DELIVERED, absent=True)
+@check("canopen-python selects a device by its address, and no other address", DRIVE, absent=True)
 def selective(bench):
     lss = bench.network.lss
     lss.RESPONSE_TIMEOUT = 2.0
