@@ -116,7 +116,7 @@ def multicast_frames(bench):
 
 
 class Cannelloni:
-    """The other end of a cannelloni, by the table "frame format" of its README: version 2, operation code 0 (data), sequence
+    """The other end of a cannelloni, in the layout of its datagrams: version 2, operation code 0 (data), sequence
     number, count of frames (two bytes, the most significant first); then for each frame the identifier with the flags of
     `linux/can.h` (four bytes, the most significant first), the length, and the data, which a remote frame has none of."""
 
