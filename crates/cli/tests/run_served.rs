@@ -44,7 +44,7 @@ fn a_host_outside_meets_what_the_scenario_does_to_its_drive_and_the_end_is_that_
         "served",
         "limit = '60s'\n[[step]]\nname = 'brown-out'\nwhen = '4 event target reached'\ndo = '4 supply 12'\n\
          [[expect]]\nthat = '4 event fault 0x0002'\nafter = 'brown-out'\nwithin = '200ms'\n\
-         [[expect]]\nthat = '4 velocity = 60 +- 5'\n",
+         [[expect]]\nthat = '4 velocity = 60 +- 15'\n",
     );
     let served = start(&file, &[&SERVE[..], &["--json"]].concat());
     assert!(served.ready.starts_with("ready socketcand://127.0.0.1:"), "{}", served.ready);

@@ -164,6 +164,8 @@ impl Sim {
                 .because("--speed and --clock manual are for a bus of its own")
                 .next("leave them away, or --bus"));
         }
+        // All that its drives do not take is told at once, before any of them is made.
+        file.map(Machine::build).transpose().map_err(unusable)?;
         let warnings = Speaker::of_warnings();
         let eeproms = self.state.as_deref().map(Eeproms::open).transpose()?;
         let mut world = machine.world();

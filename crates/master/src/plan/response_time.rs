@@ -355,6 +355,15 @@ mod tests {
     }
 
     #[test]
+    fn a_frame_that_is_late_may_come_twice_in_a_short_time() {
+        // Every 1000 us, up to 900 late: one at the end of its lateness, the next one 100 us after it.
+        let mut frames = [frame(0x100, 8, 1_000), frame(0x101, 8, 10_000)];
+        assert_eq!(worst_us(&frames, Bitrate::M1), [Some(2 * 135), Some(2 * 135)]);
+        frames[0].jitter = Duration::from_micros(900);
+        assert_eq!(worst_us(&frames, Bitrate::M1), [Some(900 + 2 * 135), Some(3 * 135)]);
+    }
+
+    #[test]
     fn an_error_costs_its_frame_again() {
         let frames = [frame(0x80, 0, 10_000), frame(0x181, 8, 10_000)];
         let bounds = response_times(&frames, Bitrate::M1, Some(ErrorRate(Duration::from_millis(5))));
