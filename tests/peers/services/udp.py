@@ -103,7 +103,9 @@ def multicast_frames(bench):
             equal(others(), expected, "the frames as they were sent")
         finally:
             dump.kill()
-            dump.communicate()
+            dump.wait()
+            # Not communicate(): it takes a pipe that does not block for one that has ended.
+            dump.stdout.close()
         # python-can hears what it sent itself, as its socket is one of those that joined the group.
         while bus.recv(0.2):
             pass
