@@ -253,14 +253,20 @@ fn wait_for(what: &str, mut reached: impl FnMut() -> bool) {
     }
 }
 
-#[test]
-fn a_client_that_goes_has_what_it_moved_stopped() {
+/// A drive that a client of a gateway has turn.
+fn turning() -> (Simulator, Gateway, Client) {
     let arguments = [&DRIVES[..], &["--serve", "socketcand://127.0.0.1:0", "--control", "127.0.0.1:0"]].concat();
     let simulator = Simulator::start(&arguments);
-    let mut gateway = Gateway::start(&simulator.bus("socketcand"), &MODELS);
+    let gateway = Gateway::start(&simulator.bus("socketcand"), &MODELS);
     let mut client = gateway.client();
     turn(&mut client);
     wait_for("the drive turns", || speed_of(&simulator) > 50.0);
+    (simulator, gateway, client)
+}
+
+#[test]
+fn a_client_that_goes_has_what_it_moved_stopped() {
+    let (simulator, mut gateway, mut client) = turning();
     // Another client that has moved nothing comes and goes: the drive goes on.
     let mut looker = gateway.client();
     assert!(looker.ask("[1] 4 r 0x606C 0 i32").starts_with("[1] "));
@@ -275,12 +281,7 @@ fn a_client_that_goes_has_what_it_moved_stopped() {
 
 #[test]
 fn a_gateway_that_is_asked_to_end_stops_what_its_clients_moved() {
-    let arguments = [&DRIVES[..], &["--serve", "socketcand://127.0.0.1:0", "--control", "127.0.0.1:0"]].concat();
-    let simulator = Simulator::start(&arguments);
-    let mut gateway = Gateway::start(&simulator.bus("socketcand"), &MODELS);
-    let mut client = gateway.client();
-    turn(&mut client);
-    wait_for("the drive turns", || speed_of(&simulator) > 50.0);
+    let (simulator, mut gateway, mut client) = turning();
     let ended = std::process::Command::new("kill").args(["-TERM", &gateway.child.id().to_string()]).status();
     assert!(ended.is_ok_and(|status| status.success()));
     assert_eq!(gateway.child.wait().unwrap().code(), Some(143));

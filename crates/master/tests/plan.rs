@@ -22,7 +22,7 @@ struct Sender {
     random: Prng,
     /// It hands over one frame after the other in the order in which they came, else the most urgent first.
     in_order: bool,
-    /// All frames come with the first, at the beginning of each period.
+    /// What waits to be handed over, by its place in `frames`.
     queue: Vec<usize>,
 }
 

@@ -1,14 +1,12 @@
 //! `ferrodrive export`: what is on a bus, in other programs' forms.
 
-use canopen::pdo::{Direction, MappingRecord, PdoId, PdoNumber};
-use canopen::{CobId, Mux, NodeId};
-use master::core::PdoMap;
-use master::{Error, Node};
+use canopen::NodeId;
+use master::Drive;
 use serde::Serialize;
 use testbench::dbc::{self, DbcNode, DbcPdo};
-use testbench::models::Description;
 use testbench::words::node::node;
 
+use super::pdo::all_pdos;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
@@ -55,9 +53,6 @@ impl Report for ExportReport {
     }
 }
 
-/// PDOs that are looked for on a node whose model is not known: those of the predefined connection set.
-const PREDEFINED: u16 = 4;
-
 impl Export {
     /// Reads what there is.
     pub(crate) async fn run(&self, context: &Context) -> Result<ExportReport, Failure> {
@@ -74,48 +69,21 @@ impl Export {
         ids.dedup();
         let mut nodes = Vec::new();
         for id in ids {
-            let model = context.drive(id).await?.description();
-            nodes.push(DbcNode { id, model, pdos: read_pdos(&context.node(id), model).await? });
+            let drive = context.drive(id).await?;
+            nodes.push(DbcNode { id, model: drive.description(), pdos: pdos_of(&drive).await? });
         }
         let pdos = nodes.iter().map(|node| node.pdos.len()).sum();
         Ok(ExportReport { dbc: dbc::print(&nodes), nodes: nodes.iter().map(|node| node.id.raw()).collect(), pdos })
     }
 }
 
-/// The PDOs of a node that are switched on, with what they carry.
-async fn read_pdos(node: &Node, model: Option<&'static Description>) -> Result<Vec<DbcPdo>, Failure> {
-    let mut pdos = Vec::new();
-    for direction in [Direction::Rpdo, Direction::Tpdo] {
-        for number in (1..=512).filter_map(PdoNumber::new) {
-            let pdo = PdoId { direction, number };
-            let exists = match model {
-                Some(model) => model.row(Mux::new(pdo.parameter_index(), 1)).is_some(),
-                None => number.position() < usize::from(PREDEFINED),
-            };
-            if exists && let Some(read) = read_pdo(node, pdo).await? {
-                pdos.push(read);
-            }
-        }
-    }
-    Ok(pdos)
-}
-
-/// `None` for a PDO that is switched off, that there is not, or whose identifier has 29 bits.
-async fn read_pdo(node: &Node, pdo: PdoId) -> Result<Option<DbcPdo>, Failure> {
-    let cob_id = match node.read::<u32>(Mux::new(pdo.parameter_index(), 1)).await {
-        Ok(raw) => CobId(raw),
-        Err(Error::Aborted { .. }) => return Ok(None),
-        Err(error) => return Err(error.into()),
-    };
-    let Some(id) = cob_id.can_id().as_standard().filter(|_| cob_id.is_valid()) else { return Ok(None) };
-    let count: u8 = match node.read(Mux::new(pdo.mapping_index(), 0)).await {
-        Ok(count) => count,
-        Err(Error::Aborted { .. }) => return Ok(None),
-        Err(error) => return Err(error.into()),
-    };
-    let mut records = Vec::new();
-    for sub in 1..=count.min(canopen::pdo::MAX_OBJECTS as u8) {
-        records.push(MappingRecord::from_raw(node.read(Mux::new(pdo.mapping_index(), sub)).await?));
-    }
-    Ok(Some(DbcPdo { pdo, id, map: PdoMap(records) }))
+/// The PDOs of a node that are switched on, with what they carry: RPDOs, then TPDOs. Those with identifiers of 29 bits are left out.
+async fn pdos_of(drive: &Drive) -> Result<Vec<DbcPdo>, Failure> {
+    let mut all = all_pdos(drive).await?;
+    all.sort_by_key(|(config, _)| config.pdo);
+    let pdos = all.into_iter().filter_map(|(config, cob_id)| {
+        let id = cob_id.can_id().as_standard().filter(|_| cob_id.is_valid())?;
+        Some(DbcPdo { pdo: config.pdo, id, map: config.map })
+    });
+    Ok(pdos.collect())
 }
