@@ -185,9 +185,14 @@ fn a_bus_lost_in_a_move_is_told_with_what_was_moving_and_what_to_do() {
     let ended = moving.wait_with_output().unwrap();
     assert_eq!(ended.status.code(), Some(1));
     let said = String::from_utf8(ended.stderr).unwrap();
-    for part in
-        ["node 4 may still be moving", "the connection to the bus is lost: 127.0.0.1", "next:", "ferrodrive state 4"]
-    {
+    // What is told of the connection depends on the moment: that it was reset, or that it is refused when it is tried again.
+    for part in [
+        "node 4 may still be moving",
+        "the connection to the bus is lost: ",
+        "127.0.0.1:",
+        "next:",
+        "ferrodrive state 4",
+    ] {
         assert!(said.contains(part), "{part:?} in {said}");
     }
 }
