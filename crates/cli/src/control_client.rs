@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use canopen::NodeId;
 use serde_json::{Value, json};
-use testbench::control::ControlAddress;
+use testbench::control::{ControlAddress, ERROR_KINDS};
 
 use crate::failure::Failure;
 use crate::status::Status;
@@ -109,9 +109,8 @@ impl ControlClient {
 
 /// What the simulator refuses, as a failure of this command.
 fn refusal(error: &Value) -> Failure {
-    const KINDS: [&str; 8] = ["syntax", "usage", "no_such_node", "refused", "token", "too_long", "limit", "clock"];
     let text = |field: &str| error[field].as_str().unwrap_or_default().to_owned();
-    let kind = KINDS.into_iter().find(|kind| error["kind"] == *kind).unwrap_or("refused");
+    let kind = ERROR_KINDS.into_iter().find(|kind| error["kind"] == *kind).unwrap_or("refused");
     let mut failure = Failure::new(text("message")).of_kind(kind);
     if kind == "usage" {
         failure.status = Status::Usage;

@@ -171,7 +171,8 @@ impl CommandError {
             Self::NotManual => Some("start the simulator with --clock manual"),
             Self::Running { .. } | Self::TooMany { .. } => Some("wait for the answer to the run"),
             Self::Ended { .. } => Some("now tells how far time has come; run goes on from there"),
-            _ => None,
+            Self::TooLong => Some("give each command a line of its own"),
+            Self::NoSuchDrive { .. } | Self::NoSuchBody { .. } | Self::Refused(_) => None,
         }
     }
 

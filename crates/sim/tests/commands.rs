@@ -179,7 +179,8 @@ fn power_and_cable_take_a_drive_off_the_bus() {
     let (mut world, probe) = world();
     heard(&mut world, probe);
     ask(&mut world, "4 power off");
-    assert_eq!(ask(&mut world, "4 get")["bus"], "off");
+    let got = ask(&mut world, "4 get");
+    assert_eq!((&got["bus"], &got["node"]), (&Value::from("off"), &Value::from(4)));
     world.send(probe, frame("604#4041600000000000")).unwrap();
     world.run_for(std::time::Duration::from_millis(2));
     assert_eq!(heard(&mut world, probe), [""; 0]);

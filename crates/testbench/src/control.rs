@@ -19,7 +19,7 @@ mod request;
 mod subscription;
 
 pub use address::{ControlAddress, NoAddress};
-pub use answer::ControlError;
+pub use answer::{ControlError, ERROR_KINDS};
 pub use desk::{ClientNumber, Control, Outcome, PROTOCOL, Pending, Sink};
 pub use id::Id;
 pub use lines::{LineBuffer, MAX_LINE_LENGTH, ReadLine};

@@ -150,23 +150,31 @@ fn what_makes_no_sense_is_refused_with_a_kind_and_changes_nothing() {
         (r#"{"request":"subscribe","values":[{"node":4,"axis":9,"signals":["supply_v"]}],"every":"1ms"}"#, "refused"),
         (r#"{"request":"unsubscribe","subscription":1}"#, "usage"),
         ("5 supply", "usage"),
+        ("body base slope 5", "no_such_body"),
         ("hello", "usage"),
     ] {
         bench.say(1, line);
         let answer = inbox.only();
         assert_eq!((&answer["ok"], &answer["error"]["kind"]), (&json!(false), &json!(kind)), "{line}: {answer}");
         assert!(!answer["error"]["message"].as_str().unwrap().is_empty());
+        // What was asked of a drive or a body is answered by naming those there are, or what this one takes.
+        if !["no_such_node", "no_such_body", "refused"].contains(&kind) {
+            assert!(answer["error"]["next"].is_string(), "{line}: {answer} does not say what to do");
+        }
     }
     bench.control.handle(1, &ReadLine::TooLong, &mut bench.world, Service::default());
-    assert_eq!(inbox.only()["error"]["kind"], "too_long");
-    let long = format!(r#"{{"request":"world","line":"{}"}}"#, "x".repeat(MAX_LINE_LENGTH - 100));
-    bench.say(1, &long);
-    assert_eq!(inbox.only()["error"]["kind"], "too_long");
+    let long = inbox.only();
+    assert!(long["error"]["kind"] == "too_long" && long["error"]["next"].is_string(), "{long}");
+    bench.say(1, &format!(r#"{{"request":"world","line":"{}"}}"#, "x".repeat(MAX_LINE_LENGTH - 100)));
+    let long = inbox.only();
+    assert!(long["error"]["kind"] == "too_long" && long["error"]["next"].is_string(), "{long}");
     assert_eq!(bench.world.digest(), digest);
     // What a browser begins with ends the connection, before the lines that a page chose.
     let text = ReadLine::Text("POST / HTTP/1.1".into());
     let outcome = bench.control.handle(1, &text, &mut bench.world, Service::default());
-    assert!(matches!(outcome, Outcome::Close) && inbox.only()["error"]["kind"] == "usage");
+    let refused = inbox.only();
+    assert!(matches!(outcome, Outcome::Close) && refused["error"]["kind"] == "usage", "{refused}");
+    assert!(refused["error"]["next"].is_string(), "{refused}");
     let deep = "[".repeat(50_000);
     bench.say(1, &format!(r#"{{"id":7,"request":"world","command":{deep}"#));
     assert_eq!(inbox.only()["error"]["kind"], "syntax");

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use testbench::control::ERROR_KINDS;
 use testbench::machine_file::{BUS_KEYS, DRIVE_KEYS, Machine};
 use testbench::scenario::entries::{EXPECT_KEYS, HOST_KEYS, LINE_KEYS, STEP_KEYS};
 use testbench::scenario::{Runner, Scenario, condition, deed, file};
@@ -23,13 +24,24 @@ fn blocks(page: &str) -> impl Iterator<Item = &str> {
 #[track_caller]
 fn table_has(page: &str, heading: &str, keys: &[&str]) {
     let rest = page.split(&format!("## {heading}\n")).nth(1).unwrap_or_else(|| panic!("no heading {heading}"));
-    let section = rest.split("\n## ").next().unwrap_or_default();
+    rows_are(rest.split("\n## ").next().unwrap_or_default(), heading, keys);
+}
+
+/// The rows of the table with this head have these keys in their first column, and no others.
+#[track_caller]
+fn table_follows(page: &str, head: &str, keys: &[&str]) {
+    let rest = page.split(head).nth(1).unwrap_or_else(|| panic!("no table {head}"));
+    rows_are(rest.split("\n\n").next().unwrap_or_default(), head, keys);
+}
+
+#[track_caller]
+fn rows_are(section: &str, place: &str, keys: &[&str]) {
     let rows = section.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next());
     let mut found: Vec<_> = rows.collect();
     let mut keys = keys.to_vec();
     found.sort_unstable();
     keys.sort_unstable();
-    assert_eq!(found, keys, "below {heading}");
+    assert_eq!(found, keys, "below {place}");
 }
 
 #[test]
@@ -66,6 +78,29 @@ fn the_page_of_scenarios_has_every_key_and_form_and_its_examples_are_scenarios()
         scenarios += 1;
     }
     assert!(scenarios >= 1);
+}
+
+#[test]
+fn the_page_of_control_and_its_schema_have_every_kind_of_error() {
+    table_follows(&page("control.md"), "| `kind` of an error | means |\n", &ERROR_KINDS);
+    let schema: serde_json::Value = serde_json::from_str(&page("control.schema.json")).expect("JSON");
+    let mut kinds = Vec::new();
+    enums_with("syntax", &schema, &mut kinds);
+    assert_eq!(kinds, [ERROR_KINDS.to_vec()]);
+}
+
+/// The lists of `enum` that have this value.
+fn enums_with<'a>(value: &str, schema: &'a serde_json::Value, found: &mut Vec<Vec<&'a str>>) {
+    if let Some(list) = schema["enum"].as_array() {
+        let words: Vec<&str> = list.iter().filter_map(|word| word.as_str()).collect();
+        found.extend(words.contains(&value).then_some(words));
+    }
+    let inner: Vec<&serde_json::Value> = match schema {
+        serde_json::Value::Object(fields) => fields.values().collect(),
+        serde_json::Value::Array(items) => items.iter().collect(),
+        _ => Vec::new(),
+    };
+    inner.into_iter().for_each(|part| enums_with(value, part, found));
 }
 
 #[test]

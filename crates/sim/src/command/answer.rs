@@ -212,7 +212,8 @@ fn get(world: &mut World, place: Place, service: Service) -> Result<String, Comm
     Ok(json::line(&Got {
         ok: true,
         t: seconds(world),
-        node,
+        // What takes no part in the bus has no node-ID yet: it goes by the number it was started under.
+        node: if bitrate.is_some() { node } else { place.node },
         model,
         powered,
         power: report.power.word(),

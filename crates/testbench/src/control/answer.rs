@@ -5,6 +5,10 @@ use sim::command::CommandError;
 
 use super::id::Id;
 
+/// The kinds of [`ControlError`], which programs may rely on.
+pub const ERROR_KINDS: [&str; 9] =
+    ["syntax", "usage", "no_such_node", "no_such_body", "refused", "clock", "token", "too_long", "limit"];
+
 /// Why a request was not done, in the form of every error here: what kind, what, about which node, what to do.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{message}")]
@@ -19,7 +23,7 @@ pub struct ControlError {
 pub(super) const HELP: &str = r#"{"request":"help"}"#;
 
 impl ControlError {
-    /// Of a kind that programs may rely on.
+    /// Of one of [`ERROR_KINDS`].
     pub fn new(kind: &'static str, message: impl Into<String>) -> Self {
         Self { kind, message: message.into(), node: None, next: None }
     }

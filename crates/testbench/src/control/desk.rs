@@ -148,7 +148,7 @@ impl<S: Sink> Control<S> {
                 return client.refuse_stranger(None, NO_TOKEN);
             }
             let reason = format!("the line is longer than {MAX_LINE_LENGTH} bytes, and was thrown away");
-            client.refuse(None, &ControlError::new("too_long", reason));
+            client.refuse(None, &ControlError::new("too_long", reason).next("give each request a line of its own"));
             return Outcome::Answered;
         };
         if !sim::command::asks_for_an_answer(text) {
@@ -156,7 +156,7 @@ impl<S: Sink> Control<S> {
         }
         // A browser would go on with lines that a page chose.
         if text.contains(" HTTP/") {
-            client.refuse(None, &ControlError::new("usage", "this is no web server: lines of JSON or world commands"));
+            client.refuse(None, &ControlError::usage("this is no web server: lines of JSON or world commands"));
             return Outcome::Close;
         }
         let Message { id, request } = match Message::parse(text) {
