@@ -83,6 +83,38 @@ fn what_is_on_the_disk_of_a_killed_simulator_is_a_record() {
     }
 }
 
+/// The most memory that a process ever had, in bytes (`proc_pid_status(5)`).
+#[cfg(target_os = "linux")]
+fn most_memory(process: u32) -> u64 {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).expect("a line VmHWM");
+    line.trim().trim_end_matches(" kB").parse::<u64>().unwrap() * 1024
+}
+
+/// All signals of three drives each millisecond: the file grows with time, the simulator does not.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_long_record_takes_no_more_memory_than_a_short_one() {
+    let place = scratch("long-record");
+    for name in ["run.mcap", "run.csv"] {
+        let path = place.join(name);
+        let mut simulator =
+            simulator(&path, &["--drive", "zlim42c@2", "--drive", "m4230e17b50@1", "--clock", "manual"]);
+        let mut run = |time: &str| {
+            assert_eq!(simulator.ask(&format!("run {time}"))["ok"], true);
+            (most_memory(simulator.id()), std::fs::metadata(&path).unwrap().len())
+        };
+        let (early, small) = run("10s");
+        let (late, large) = run("60s");
+        assert!(large > small + (20 << 20), "{name}: {small} bytes, then {large}");
+        assert!(
+            late < early + (4 << 20),
+            "{name}: {early} bytes of memory, then {late}; the file grew by {}",
+            large - small
+        );
+    }
+}
+
 #[test]
 fn a_picture_is_written_over_a_picture_and_nothing_else() {
     let place = scratch("plots");

@@ -178,9 +178,7 @@ impl Sim {
         machine.join(&mut world).map_err(unusable)?;
         machine.make_real(&mut world);
         let log = global.log.as_ref().map(LogPath::create).transpose()?;
-        let real_time = self.clock == Clock::Real && self.speed.is_none();
-        let pace = if real_time { Pace::RealTime } else { Pace::Free };
-        let record = self.recording.start(&mut world, pace, warnings.clone())?;
+        let record = self.recording.start(&mut world, self.pace(), warnings.clone())?;
         let pacer = Pacer::new(self.clock, self.speed.unwrap_or(Speed::Times(1.0)));
         let world = ServedWorld::new(world, pacer, log.is_some() || record.is_some(), warnings.clone());
         let runtime = runtime_of_clients()?;
@@ -188,6 +186,11 @@ impl Sim {
         // Threads that wait for standard input must not hold up the end.
         runtime.shutdown_background();
         ended
+    }
+
+    /// Whether log and record have to keep up with the clock.
+    fn pace(&self) -> Pace {
+        if self.clock == Clock::Real && self.speed.is_none() { Pace::RealTime } else { Pace::Free }
     }
 
     /// The machine of the file, if there is one, with what the command line says beside it.
@@ -224,7 +227,7 @@ impl Sim {
         let (requests, mut incoming) = mpsc::channel(REQUESTS_WAITING);
         listen_to_signals(requests.clone());
         let answers = Speaker::of_answers(warnings.clone());
-        let log = log.map(|file| FrameLog::start(file, clock.unix_zero(), warnings.clone()));
+        let log = log.map(|file| FrameLog::start(file, clock.unix_zero(), self.pace(), warnings.clone()));
         let waiting = VecDeque::new();
         let mut service =
             Service { answers: answers.clone(), warnings: warnings.clone(), log, record, waiting, quit_in: None };
@@ -245,6 +248,8 @@ impl Sim {
         }
         let over = requests.clone();
         world.on_run_over(move || over.try_send(Request::RunIsOver).is_ok());
+        let full = requests.clone();
+        world.on_full_piece(move || full.try_send(Request::PieceIsFull).is_ok());
         let control = self.control.serve(&mut world, &requests, &service.warnings).await?;
         answers.say(&self.ready(&hub, modbus.as_ref(), control.as_ref(), bridge));
         if self.places.is_empty() && modbus.is_none() && control.is_none() && bridge.is_none() {

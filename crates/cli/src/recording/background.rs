@@ -6,8 +6,25 @@ use std::time::Duration;
 
 use crate::serve::speaker::Speaker;
 
-/// Batches that may wait for the disk: some 10 s of the bus.
-pub(super) const MAX_BATCHES: usize = 100;
+/// Whether somebody's time passes while a batch waits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Pace {
+    /// The bus goes with the clock: what the disk has no time for is left out.
+    RealTime,
+    /// The bus waits for the disk: everything is written, and little waits.
+    Free,
+}
+
+impl Pace {
+    /// Batches that may wait for the disk: some 10 s of a bus that goes with the clock; where the bus waits too, one is written while
+    /// the next is filled.
+    pub(super) const fn room(self) -> usize {
+        match self {
+            Self::RealTime => 100,
+            Self::Free => 2,
+        }
+    }
+}
 
 /// What the file is called in messages, and what it is made of.
 #[derive(Clone, Copy)]
@@ -24,21 +41,22 @@ pub(super) struct Background<B> {
     /// Ends when everything is written.
     written: Receiver<()>,
     words: Words,
+    pace: Pace,
     missing: u64,
     speaker: Speaker,
 }
 
 impl<B: Send + 'static> Background<B> {
-    /// Of batches `room` may wait. Hands them to `write` until it fails or all are written, then calls `end`. What goes wrong is told to `speaker`.
+    /// Hands batches to `write` until it fails or all are written, then calls `end`. What goes wrong is told to `speaker`.
     pub(super) fn start<W: Send + 'static>(
         words: Words,
         writer: W,
         write: impl Fn(&mut W, B) -> io::Result<()> + Send + 'static,
         end: impl FnOnce(W) -> io::Result<()> + Send + 'static,
-        room: usize,
+        pace: Pace,
         speaker: Speaker,
     ) -> Self {
-        let (batches, incoming) = sync_channel(room);
+        let (batches, incoming) = sync_channel(pace.room());
         let (done, written) = channel();
         let told = speaker.clone();
         std::thread::spawn(move || {
@@ -50,11 +68,16 @@ impl<B: Send + 'static> Background<B> {
             }
             drop((incoming, done));
         });
-        Self { batches, written, words, missing: 0, speaker }
+        Self { batches, written, words, pace, missing: 0, speaker }
     }
 
-    /// Takes a batch of so many pieces.
+    /// Takes a batch of so many pieces; one that the disk has no time for is left out, and that is said, or waited for: as the pace is.
     pub(super) fn write(&mut self, batch: B, pieces: u64) {
+        if self.pace == Pace::Free {
+            // Why the file has ended has been said.
+            let _ = self.batches.send(batch);
+            return;
+        }
         let Words { file, pieces: what } = self.words;
         match self.batches.try_send(batch) {
             Ok(()) if self.missing > 0 => {
@@ -72,12 +95,6 @@ impl<B: Send + 'static> Background<B> {
                 self.missing += pieces;
             }
         }
-    }
-
-    /// As [`write`](Self::write), but waits for a place: for whoever has time, and wants everything.
-    pub(super) fn write_all(&mut self, batch: B) {
-        // Why the file has ended has been said.
-        let _ = self.batches.send(batch);
     }
 
     /// How many pieces are missing since the file was last written.

@@ -12,7 +12,7 @@ use can::{Frame, Instant, Station};
 use tokio::sync::broadcast;
 use transport::log::{Content, Direction, Interface, Record};
 
-use super::file::Pace;
+use super::background::Pace;
 use super::log_options::NewLog;
 
 /// How long frames may wait in memory.

@@ -9,7 +9,7 @@ use sim::events::Event;
 use sim::recorder::Recorder;
 use testbench::recording::{Column, Kind, Mark, Record};
 
-use super::background::{Background, MAX_BATCHES, Words};
+use super::background::{Background, Pace, Words};
 use crate::serve::speaker::Speaker;
 
 /// What happened since the batch before, each kind in the order of its times.
@@ -24,22 +24,7 @@ pub(crate) struct Batch {
 }
 
 /// A record that a thread of its own writes.
-pub(crate) struct RecordFile {
-    file: Background<Batch>,
-    pace: Pace,
-}
-
-/// Whether somebody's time passes while a batch waits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Pace {
-    /// The bus goes with the clock: what the disk has no time for is left out.
-    RealTime,
-    /// The bus waits for the disk: everything is written, and little waits.
-    Free,
-}
-
-/// Batches that may wait where the bus waits too: one is written while the next is filled.
-const FREE_ROOM: usize = 2;
+pub(crate) struct RecordFile(Background<Batch>);
 
 impl RecordFile {
     /// Writes to `file` from now on. What goes wrong later is told to `speaker`.
@@ -49,22 +34,18 @@ impl RecordFile {
     pub(crate) fn start(kind: Kind, file: File, columns: &[Column], pace: Pace, speaker: Speaker) -> io::Result<Self> {
         let words = Words { file: "the record", pieces: "samples" };
         let record = Record::begin(kind, Box::new(file), columns)?;
-        let room = if pace == Pace::RealTime { MAX_BATCHES } else { FREE_ROOM };
-        Ok(Self { file: Background::start(words, record, write, Record::finish, room, speaker), pace })
+        Ok(Self(Background::start(words, record, write, Record::finish, pace, speaker)))
     }
 
-    /// Takes a batch; one that the disk has no time for is left out, and that is said, or waited for: as its pace is.
+    /// Takes a batch.
     pub(crate) fn write(&mut self, batch: Batch) {
         let samples = batch.recorded.as_ref().map_or(0, |recorded| recorded.times().len());
-        match self.pace {
-            Pace::RealTime => self.file.write(batch, samples as u64),
-            Pace::Free => self.file.write_all(batch),
-        }
+        self.0.write(batch, samples as u64);
     }
 
     /// Waits until everything is written, at most for `patience`.
     pub(crate) fn finish(self, patience: Duration) {
-        self.file.finish(patience);
+        self.0.finish(patience);
     }
 }
 

@@ -6,7 +6,7 @@ use std::time::Duration;
 use can::{Frame, Instant};
 use transport::log::{LogWriter, Record};
 
-use super::background::{Background, MAX_BATCHES, Words};
+use super::background::{Background, Pace, Words};
 use crate::serve::speaker::Speaker;
 
 /// Frames, and when the bus carried them.
@@ -20,6 +20,7 @@ impl FrameLog {
     pub(crate) fn start<W: Write + Seek + Send + 'static>(
         log: LogWriter<W>,
         unix_zero: Duration,
+        pace: Pace,
         speaker: Speaker,
     ) -> Self {
         let words = Words { file: "the log", pieces: "frames" };
@@ -28,7 +29,7 @@ impl FrameLog {
             log.flush()
         };
         let end = |log: LogWriter<W>| log.finish().map(drop);
-        Self(Background::start(words, log, write, end, MAX_BATCHES, speaker))
+        Self(Background::start(words, log, write, end, pace, speaker))
     }
 
     /// Takes frames that were carried.
@@ -53,6 +54,7 @@ mod tests {
     use transport::log::Format;
 
     const SOON: Duration = Duration::from_secs(20);
+    const ROOM: usize = Pace::RealTime.room();
 
     /// A disk that takes nothing until it is allowed to, and hands out what it has taken.
     struct Disk(Receiver<()>, SyncSender<Vec<u8>>);
@@ -88,8 +90,9 @@ mod tests {
     fn a_disk_that_stands_still_holds_up_nobody_and_costs_the_newest_frames() {
         let (allow, allowed) = channel();
         let (taken, disk) = sync_channel(1000);
-        let mut log = FrameLog::start(log(Disk(allowed, taken)), Duration::ZERO, Speaker::of_warnings());
-        for second in 0..MAX_BATCHES + 50 {
+        let mut log =
+            FrameLog::start(log(Disk(allowed, taken)), Duration::ZERO, Pace::RealTime, Speaker::of_warnings());
+        for second in 0..ROOM + 50 {
             log.write(batch(second));
         }
         // One batch may have been taken out of the queue.
@@ -99,8 +102,31 @@ mod tests {
         log.finish(SOON);
         let text = String::from_utf8(disk.try_iter().flatten().collect()).unwrap();
         let lines: Vec<&str> = text.lines().collect();
-        assert_eq!(lines.len(), MAX_BATCHES + 50 - missing);
+        assert_eq!(lines.len(), ROOM + 50 - missing);
         assert_eq!(lines[lines.len() - 1], format!("({:010}.000000) can0 701#05", lines.len() - 1));
+    }
+
+    #[test]
+    fn a_bus_that_can_wait_does_and_nothing_is_left_out() {
+        let (allow, allowed) = channel();
+        let (taken, disk) = sync_channel(1000);
+        let mut log = FrameLog::start(log(Disk(allowed, taken)), Duration::ZERO, Pace::Free, Speaker::of_warnings());
+        let batches = 3 * ROOM;
+        // The disk takes a piece when the bus has had to wait for it, or a little later.
+        let slow = std::thread::spawn(move || {
+            for _ in 0..batches {
+                std::thread::sleep(Duration::from_micros(200));
+                if allow.send(()).is_err() {
+                    return;
+                }
+            }
+        });
+        (0..batches).for_each(|second| log.write(batch(second)));
+        assert_eq!(log.0.missing(), 0);
+        slow.join().unwrap();
+        log.finish(SOON);
+        let text = String::from_utf8(disk.try_iter().flatten().collect()).unwrap();
+        assert_eq!(text.lines().count(), batches);
     }
 
     #[test]
@@ -108,8 +134,9 @@ mod tests {
         let (allow, allowed) = channel();
         let (taken, disk) = sync_channel(0);
         drop((allow, disk));
-        let mut log = FrameLog::start(log(Disk(allowed, taken)), Duration::ZERO, Speaker::of_warnings());
-        for second in 0..3 * MAX_BATCHES {
+        let mut log =
+            FrameLog::start(log(Disk(allowed, taken)), Duration::ZERO, Pace::RealTime, Speaker::of_warnings());
+        for second in 0..3 * ROOM {
             log.write(batch(second));
         }
         log.finish(SOON);

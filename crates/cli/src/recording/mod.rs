@@ -8,8 +8,9 @@ mod log_options;
 mod object_record;
 mod options;
 
+pub(crate) use background::Pace;
 pub(crate) use command_log::{CommandLog, Ears, Logged};
-pub(crate) use file::{Batch, Pace, RecordFile};
+pub(crate) use file::{Batch, RecordFile};
 pub(crate) use frame_log::FrameLog;
 pub(crate) use log_options::{LogPath, NewLog, interface_of, log_path};
 pub(crate) use object_record::{ObjectBatch, ObjectRecord};

@@ -7,7 +7,7 @@ use std::time::Duration;
 use can::{Frame, Instant};
 use testbench::recording::{Column, Kind, Mark, Record};
 
-use super::background::{Background, MAX_BATCHES, Words};
+use super::background::{Background, Pace, Words};
 use crate::serve::speaker::Speaker;
 
 /// What came since the batch before, each kind in the order of its times.
@@ -32,7 +32,7 @@ impl ObjectRecord {
     pub(crate) fn start(kind: Kind, file: File, columns: &[Column], speaker: Speaker) -> io::Result<Self> {
         let words = Words { file: "the record", pieces: "samples" };
         let record = Record::begin(kind, Box::new(file), columns)?;
-        Ok(Self(Background::start(words, record, write, Record::finish, MAX_BATCHES, speaker)))
+        Ok(Self(Background::start(words, record, write, Record::finish, Pace::RealTime, speaker)))
     }
 
     /// Takes a batch; one that the disk has no time for is left out, and that is said.

@@ -9,7 +9,8 @@ use sim::recorder::{Channel, Recorder, Signal};
 use sim::{Place, World};
 use testbench::recording::{Column, Kind, columns_of_drives, select};
 
-use super::file::{Pace, RecordFile};
+use super::background::Pace;
+use super::file::RecordFile;
 use crate::failure::Failure;
 use crate::serve::files::create_record;
 use crate::serve::speaker::Speaker;

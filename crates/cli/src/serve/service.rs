@@ -58,6 +58,8 @@ pub(crate) enum Request {
     RunIsOver,
     /// Time to look for records.
     Keep,
+    /// What is kept for the records has to be written before time goes on.
+    PieceIsFull,
     /// A store is on the disk: answers may go out.
     Stored,
     /// A Modbus request.
@@ -117,6 +119,7 @@ impl Service {
                 self.write_records(world);
                 return self.count_down(world);
             }
+            Request::PieceIsFull => self.write_records(world),
             // Whatever woke the loop, answers that may go out do so before it sleeps again.
             Request::Stored => {}
             Request::ScenarioIsOver => {

@@ -30,6 +30,10 @@ use super::speaker::Speaker;
 use super::stores::Stores;
 use super::turns::Turns;
 
+/// Bus time after which what is kept for a log or a record is handed on before time goes on: what waits in memory is that much,
+/// however far time goes in one turn.
+const LONGEST_PIECE: Duration = Duration::from_secs(1);
+
 /// See the [module](self).
 pub(crate) struct ServedWorld {
     world: World,
@@ -42,6 +46,11 @@ pub(crate) struct ServedWorld {
     heard: VecDeque<Heard>,
     /// Frames carried since the last call of [`Self::take_carried`], for a log.
     carried: Option<Vec<(Instant, Frame)>>,
+    /// The time of that call.
+    carried_since: Instant,
+    /// Asks for that call; false if that could not be taken, and is to be told again.
+    piece_is_full: Box<dyn Fn() -> bool>,
+    full_told: bool,
     stores: Option<Stores>,
     control: Control<Letters>,
     /// The scenario that the world goes through, if it does, and its end.
@@ -107,6 +116,9 @@ impl ServedWorld {
             free_at: Instant::ZERO,
             heard: VecDeque::new(),
             carried: logged.then(Vec::new),
+            carried_since: Instant::ZERO,
+            piece_is_full: Box::new(|| true),
+            full_told: false,
             stores: None,
             control,
             course: None,
@@ -229,6 +241,11 @@ impl ServedWorld {
         self.run_is_over = Box::new(run_is_over);
     }
 
+    /// Calls `piece_is_full` when what is kept has to be [taken](Self::take_carried) before time goes on, until it returns true.
+    pub(crate) fn on_full_piece(&mut self, piece_is_full: impl Fn() -> bool + 'static) {
+        self.piece_is_full = Box::new(piece_is_full);
+    }
+
     /// True while a run is under way.
     pub(crate) fn is_running(&self) -> bool {
         self.run.is_some()
@@ -287,6 +304,7 @@ impl ServedWorld {
 
     /// Frames carried since the last call.
     pub(crate) fn take_carried(&mut self) -> Vec<(Instant, Frame)> {
+        (self.carried_since, self.full_told) = (self.world.now(), false);
         self.carried.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
@@ -474,6 +492,8 @@ impl RealTimeWorld for ServedWorld {
     }
 
     fn advance_to(&mut self, instant: Instant) {
+        let full_at = self.carried.is_some().then(|| self.carried_since + LONGEST_PIECE);
+        let instant = instant.min(full_at.unwrap_or(instant)).max(self.world.now());
         loop {
             let look = self.next_look();
             let stop = self.control.next_sample().into_iter().chain(look).min().filter(|at| *at <= instant);
@@ -495,6 +515,9 @@ impl RealTimeWorld for ServedWorld {
             stores.settle(&mut self.world, self.clock);
         }
         let reached = self.world.now();
+        if full_at.is_some_and(|at| at <= reached) {
+            self.full_told = self.full_told || (self.piece_is_full)();
+        }
         if let Some(run) = self.run.as_mut().filter(|run| !run.told && run.end <= reached) {
             run.told = (self.run_is_over)();
         }

@@ -84,8 +84,9 @@ impl ServeOptions {
         let options = HubOptions { bitrate: Some(world.bitrate()), zero: clock.unix_zero(), ..HubOptions::default() };
         let mut hub = Hub::bind(&self.places, options, &clock).await.map_err(|error| failure_of(&error))?;
         let control = self.control.serve(&mut world, &requests, &service.warnings).await?;
-        let (run_is_over, scenario_is_over) = (requests.clone(), requests.clone());
+        let (run_is_over, scenario_is_over, full) = (requests.clone(), requests.clone(), requests.clone());
         world.on_run_over(move || run_is_over.try_send(Request::RunIsOver).is_ok());
+        world.on_full_piece(move || full.try_send(Request::PieceIsFull).is_ok());
         world.follow(course, move || scenario_is_over.try_send(Request::ScenarioIsOver).is_ok());
         let listeners = hub.listeners().iter().map(|listener| format!(" {listener}"));
         let place = control.iter().map(|server| format!(" {}", server.place()));
