@@ -5,6 +5,7 @@ pub(crate) mod eeprom;
 pub(crate) mod files;
 mod input;
 pub(crate) mod keeper;
+mod kept;
 mod lag;
 pub(crate) mod pacer;
 mod registers;

@@ -23,16 +23,13 @@ use transport::{ClientId, Heard, LeaveReason, ModbusRequest, RealTimeWorld};
 use super::control::{ControlMessage, Letters};
 use super::eeprom::EepromError;
 use super::keeper::Keeper;
+use super::kept::Kept;
 use super::lag::{Lag, LagNews};
 use super::pacer::Pacer;
 use super::registers;
 use super::speaker::Speaker;
 use super::stores::Stores;
 use super::turns::Turns;
-
-/// Bus time after which what is kept for a log or a record is handed on before time goes on: what waits in memory is that much,
-/// however far time goes in one turn.
-const LONGEST_PIECE: Duration = Duration::from_secs(1);
 
 /// See the [module](self).
 pub(crate) struct ServedWorld {
@@ -44,13 +41,8 @@ pub(crate) struct ServedWorld {
     /// When the adapter takes another.
     free_at: Instant,
     heard: VecDeque<Heard>,
-    /// Frames carried since the last call of [`Self::take_carried`], for a log.
-    carried: Option<Vec<(Instant, Frame)>>,
-    /// The time of that call.
-    carried_since: Instant,
-    /// Asks for that call; false if that could not be taken, and is to be told again.
-    piece_is_full: Box<dyn Fn() -> bool>,
-    full_told: bool,
+    /// What a log or a record has not been given yet.
+    kept: Option<Kept>,
     stores: Option<Stores>,
     control: Control<Letters>,
     /// The scenario that the world goes through, if it does, and its end.
@@ -115,10 +107,7 @@ impl ServedWorld {
             offered: None,
             free_at: Instant::ZERO,
             heard: VecDeque::new(),
-            carried: logged.then(Vec::new),
-            carried_since: Instant::ZERO,
-            piece_is_full: Box::new(|| true),
-            full_told: false,
+            kept: logged.then(Kept::new),
             stores: None,
             control,
             course: None,
@@ -241,9 +230,11 @@ impl ServedWorld {
         self.run_is_over = Box::new(run_is_over);
     }
 
-    /// Calls `piece_is_full` when what is kept has to be [taken](Self::take_carried) before time goes on, until it returns true.
-    pub(crate) fn on_full_piece(&mut self, piece_is_full: impl Fn() -> bool + 'static) {
-        self.piece_is_full = Box::new(piece_is_full);
+    /// Calls `is_full` when what is kept has to be [taken](Self::take_carried) before time goes on, until it returns true.
+    pub(crate) fn on_full_piece(&mut self, is_full: impl Fn() -> bool + 'static) {
+        if let Some(kept) = &mut self.kept {
+            kept.on_full(is_full);
+        }
     }
 
     /// True while a run is under way.
@@ -304,8 +295,8 @@ impl ServedWorld {
 
     /// Frames carried since the last call.
     pub(crate) fn take_carried(&mut self) -> Vec<(Instant, Frame)> {
-        (self.carried_since, self.full_told) = (self.world.now(), false);
-        self.carried.as_mut().map(std::mem::take).unwrap_or_default()
+        let now = self.world.now();
+        self.kept.as_mut().map(|kept| kept.take(now)).unwrap_or_default()
     }
 
     /// Finds stores that no frame goes with: a joint notes its position when its supply falls.
@@ -344,9 +335,7 @@ impl ServedWorld {
             if from.is_some() || self.hears() {
                 self.heard.push_back(Heard::Carried { frame, at: end, from });
             }
-            if let Some(carried) = &mut self.carried {
-                carried.push((end, frame));
-            }
+            self.kept.iter_mut().for_each(|kept| kept.push(end, frame));
         }
         // What the adapter heard is in the log too.
         while self.world.poll_received(self.adapter).is_some() {}
@@ -359,7 +348,7 @@ impl ServedWorld {
         if self.world.is_watched() {
             for event in self.control.take_events(&mut self.world) {
                 course.hear(&mut self.world, Happening::Told(&event));
-                if self.carried.is_some() && self.events.len() < MAX_WAITING {
+                if self.kept.is_some() && self.events.len() < MAX_WAITING {
                     self.events.push(event);
                 }
             }
@@ -492,8 +481,7 @@ impl RealTimeWorld for ServedWorld {
     }
 
     fn advance_to(&mut self, instant: Instant) {
-        let full_at = self.carried.is_some().then(|| self.carried_since + LONGEST_PIECE);
-        let instant = instant.min(full_at.unwrap_or(instant)).max(self.world.now());
+        let instant = instant.min(self.kept.as_ref().map_or(instant, Kept::full_at)).max(self.world.now());
         loop {
             let look = self.next_look();
             let stop = self.control.next_sample().into_iter().chain(look).min().filter(|at| *at <= instant);
@@ -515,9 +503,7 @@ impl RealTimeWorld for ServedWorld {
             stores.settle(&mut self.world, self.clock);
         }
         let reached = self.world.now();
-        if full_at.is_some_and(|at| at <= reached) {
-            self.full_told = self.full_told || (self.piece_is_full)();
-        }
+        self.kept.iter_mut().for_each(|kept| kept.reached(reached));
         if let Some(run) = self.run.as_mut().filter(|run| !run.told && run.end <= reached) {
             run.told = (self.run_is_over)();
         }
