@@ -32,6 +32,7 @@ laws_hold! {
     a_zlac8030l_under_any_frames_and_sensors_keeps_its_objects_lawful: "zlac8030l";
     a_zlim42c_under_any_frames_and_sensors_keeps_its_objects_lawful: "zlim42c";
     any_bytes_are_kept_as_they_are_and_what_they_say_can_be_written_and_read_again: "eds";
+    a_concise_dcf_is_refused_at_its_place_or_is_written_again_as_read: "concise_dcf";
     any_scenario_is_taken_and_can_be_begun_or_is_refused_at_a_place_that_it_has: "scenario";
     any_memory_image_boots_to_values_within_their_limits: "eeprom";
     // Each run is a world of three drives that turn.

@@ -52,6 +52,7 @@
 
 mod abort;
 mod cob_id;
+pub mod concise;
 pub mod connection_set;
 pub mod emcy;
 pub mod guarding;

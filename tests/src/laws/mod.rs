@@ -4,6 +4,7 @@
 //! Each law is a function of bytes that panics when it is broken. [`ALL`] names them with samples to damage.
 
 mod any_frames;
+mod concise;
 mod control;
 mod eds;
 mod eeprom;
@@ -48,6 +49,7 @@ pub const ALL: &[Law] = &[
     Law { name: "zlac8030l", holds: any_frames::zlac8030l, samples: any_frames::ZLAC8030L_SAMPLES },
     Law { name: "zlim42c", holds: any_frames::zlim42c, samples: any_frames::ZLIM42C_SAMPLES },
     Law { name: "eds", holds: eds::eds, samples: eds::SAMPLES },
+    Law { name: "concise_dcf", holds: concise::concise_dcf, samples: concise::SAMPLES },
     Law { name: "eeprom", holds: eeprom::eeprom, samples: eeprom::SAMPLES },
     Law { name: "world_command", holds: world_command::world_command, samples: world_command::SAMPLES },
     Law { name: "scenario", holds: scenario::scenario, samples: scenario::SAMPLES },
