@@ -13,7 +13,7 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 use crate::tally::Tally;
-use crate::{pgo, process, program, python, workspace};
+use crate::{manylinux, pgo, process, program, python, workspace};
 
 const SHELLS: &[(&str, &str)] = &[("bash", "ferrodrive.bash"), ("zsh", "_ferrodrive"), ("fish", "ferrodrive.fish")];
 
@@ -51,7 +51,7 @@ pub(crate) fn step() -> Tally {
         Err(error) => return Tally::failed(error),
     };
     let mut tally = Tally::default();
-    for (what, outcome) in try_it(&folder, notes.is_empty()) {
+    for (what, outcome) in try_it(&folder) {
         println!("   {what}: {}", outcome.as_ref().map_or_else(|error| error.as_str(), |()| "ok"));
         tally.add(&outcome.map_or_else(|error| Tally::failed(format!("{what}: {error}")), |()| Tally::passed()));
     }
@@ -97,14 +97,11 @@ fn make(program: &Path, profile: &str, folder: &Path) -> Result<Vec<String>, Str
     }
     let mut packages = foreign_packages("Cargo.toml", "ferrodrive")?;
     match python::environment(python::VENV, python::REQUIREMENTS) {
-        // The tests' own is the same wheel.
-        Ok(_) if profile == "dev" => {
-            let wheel = python::wheel_of_tests()?;
-            copy(&wheel, &folder.join("python").join(wheel.file_name().unwrap_or_default()))?;
-        }
         Ok(python) => {
-            fs::create_dir_all(folder.join("python")).map_err(|error| error.to_string())?;
-            python::wheel(&python, profile, Some(&binary), &folder.join("python"))?;
+            let wheel = add_wheel(&python, profile, &binary, &folder.join("python"))?;
+            notes.extend(
+                manylinux::tag(&wheel).err().map(|reason| format!("the wheel is for machines like this one: {reason}")),
+            );
         }
         Err(reason) => notes.push(format!("no wheel: {reason}")),
     }
@@ -115,6 +112,18 @@ fn make(program: &Path, profile: &str, folder: &Path) -> Result<Vec<String>, Str
     licences(packages, &folder.join("licences"))?;
     write(&folder.join(CHECKSUMS), &checksums(folder)?)?;
     Ok(notes)
+}
+
+/// The wheel around this binary, in `folder`.
+fn add_wheel(python: &Path, profile: &str, binary: &Path, folder: &Path) -> Result<PathBuf, String> {
+    if profile != "dev" {
+        fs::create_dir_all(folder).map_err(|error| error.to_string())?;
+        return python::wheel(python, profile, Some(binary), folder);
+    }
+    // The tests' own is the same wheel.
+    let wheel = python::wheel_of_tests()?;
+    let copied = folder.join(wheel.file_name().unwrap_or_default());
+    copy(&wheel, &copied).map(|()| copied)
 }
 
 /// The models that the program knows, as its own refusal lists them.
@@ -197,7 +206,7 @@ fn files_in(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// What somebody does with a release: looks at its sums, runs the program where nothing else is, and installs the wheel.
-fn try_it(folder: &Path, with_wheel: bool) -> Vec<(&'static str, Result<(), String>)> {
+fn try_it(folder: &Path) -> Vec<(&'static str, Result<(), String>)> {
     let (dist, empty) = (folder.join("dist"), folder.join("empty"));
     let _ = fs::remove_dir_all(&empty);
     if let Err(error) = fs::create_dir_all(&empty) {
@@ -208,7 +217,7 @@ fn try_it(folder: &Path, with_wheel: bool) -> Vec<(&'static str, Result<(), Stri
         ("the program moves a virtual drive from an empty folder", program_works(&dist, &empty)),
         ("manual pages, completions, data sheets and licences have words", parts_have_words(&dist)),
     ];
-    if with_wheel {
+    if dist.join("python").is_dir() {
         tried.push(("the wheel works in a new environment", wheel_works(&dist, &empty)));
     }
     tried

@@ -9,6 +9,7 @@ mod debian;
 mod dist;
 mod examples;
 mod idle;
+mod manylinux;
 mod packages;
 mod peers;
 mod pgo;

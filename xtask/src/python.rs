@@ -3,12 +3,13 @@
 //! Environments stand under `target/` and stay for the next run. A machine without Python or without a network skips what
 //! needs them and says so; it never fails for that.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 use std::sync::OnceLock;
 
 use crate::tally::Tally;
-use crate::{process, program, workspace};
+use crate::{manylinux, process, program, workspace};
 
 /// The pinned packages that the wheel is built and tested with.
 pub(crate) const REQUIREMENTS: &str = "crates/python/tests/requirements.txt";
@@ -61,6 +62,10 @@ pub(crate) fn wheel_command() -> ExitCode {
         .and_then(|python| wheel(&python, "release", None, &workspace::root().join("dist")));
     match built {
         Ok(wheel) => {
+            let wheel = manylinux::tag(&wheel).unwrap_or_else(|reason| {
+                eprintln!("it is for machines like this one: {reason}");
+                wheel
+            });
             println!("{}", wheel.display());
             ExitCode::SUCCESS
         }
@@ -83,12 +88,15 @@ pub(crate) fn wheel(python: &Path, profile: &str, program: Option<&Path>, folder
     pip.args(["wheel", "--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir"]).arg(folder).arg(".");
     pip.env("FERRODRIVE_PROFILE", profile).env("CARGO_TARGET_DIR", workspace::target());
     pip.envs(program.map(|program| ("FERRODRIVE_PROGRAM", program)));
-    // The build finds its tool beside the interpreter.
+    process::output(pip.env("PATH", with_tools_of(python)?))?;
+    wheels_in(folder).pop().ok_or_else(|| format!("pip left no wheel in {}", folder.display()))
+}
+
+/// `PATH` for a tool that looks for others beside the interpreter.
+pub(crate) fn with_tools_of(python: &Path) -> Result<OsString, String> {
     let tools = python.parent().map(Path::to_path_buf).into_iter();
     let path = std::env::var_os("PATH").unwrap_or_default();
-    let path = std::env::join_paths(tools.chain(std::env::split_paths(&path))).map_err(|error| error.to_string())?;
-    process::output(pip.env("PATH", path))?;
-    wheels_in(folder).pop().ok_or_else(|| format!("pip left no wheel in {}", folder.display()))
+    std::env::join_paths(tools.chain(std::env::split_paths(&path))).map_err(|error| error.to_string())
 }
 
 /// The Python of an environment `target/NAME` that has the packages of a requirements file, made now if need be; or why
@@ -189,7 +197,7 @@ fn count(line: &str, tally: &mut Tally) {
     }
 }
 
-fn wheels_in(folder: &Path) -> Vec<PathBuf> {
+pub(crate) fn wheels_in(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     entries.filter(|path| path.extension().is_some_and(|ending| ending == "whl")).collect()
 }
