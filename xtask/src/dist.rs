@@ -13,7 +13,7 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 use crate::tally::Tally;
-use crate::{manylinux, pgo, process, program, python, workspace};
+use crate::{pgo, process, program, python, wheel, workspace};
 
 const SHELLS: &[(&str, &str)] = &[("bash", "ferrodrive.bash"), ("zsh", "_ferrodrive"), ("fish", "ferrodrive.fish")];
 
@@ -100,7 +100,7 @@ fn make(program: &Path, profile: &str, folder: &Path) -> Result<Vec<String>, Str
         Ok(python) => {
             let wheel = add_wheel(&python, profile, &binary, &folder.join("python"))?;
             notes.extend(
-                manylinux::tag(&wheel).err().map(|reason| format!("the wheel is for machines like this one: {reason}")),
+                wheel::tag(&wheel).err().map(|reason| format!("the wheel is for machines like this one: {reason}")),
             );
         }
         Err(reason) => notes.push(format!("no wheel: {reason}")),

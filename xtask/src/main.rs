@@ -9,7 +9,7 @@ mod debian;
 mod dist;
 mod examples;
 mod idle;
-mod manylinux;
+
 mod packages;
 mod peers;
 mod pgo;
@@ -21,6 +21,7 @@ mod tally;
 mod test;
 mod tidy;
 mod vcan;
+mod wheel;
 mod workspace;
 
 use std::process::ExitCode;
@@ -46,7 +47,7 @@ fn main() -> ExitCode {
         ["test", rest @ ..] => test::command(rest),
         ["tidy"] => tidy::command(),
         ["dist"] => dist::command(),
-        ["wheel"] => python::wheel_command(),
+        ["wheel"] => wheel::command(),
         ["pgo"] => pgo::command(),
         ["vcan-test"] => vcan::command(),
         ["idle", rest @ ..] => idle::command(rest),

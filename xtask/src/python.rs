@@ -5,11 +5,11 @@
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+use std::process::Command;
 use std::sync::OnceLock;
 
 use crate::tally::Tally;
-use crate::{manylinux, process, program, workspace};
+use crate::{process, program, workspace};
 
 /// The pinned packages that the wheel is built and tested with.
 pub(crate) const REQUIREMENTS: &str = "crates/python/tests/requirements.txt";
@@ -54,26 +54,6 @@ pub(crate) fn wheel_of_tests() -> Result<PathBuf, String> {
         wheel(&python, "dev", Some(&program::built()?), &workspace::target().join("wheel"))
     };
     BUILT.get_or_init(build).clone()
-}
-
-/// `cargo xtask wheel`: the wheel as it is released, in `dist/`.
-pub(crate) fn wheel_command() -> ExitCode {
-    let built = environment(VENV, REQUIREMENTS)
-        .and_then(|python| wheel(&python, "release", None, &workspace::root().join("dist")));
-    match built {
-        Ok(wheel) => {
-            let wheel = manylinux::tag(&wheel).unwrap_or_else(|reason| {
-                eprintln!("it is for machines like this one: {reason}");
-                wheel
-            });
-            println!("{}", wheel.display());
-            ExitCode::SUCCESS
-        }
-        Err(error) => {
-            eprintln!("no wheel: {error}");
-            ExitCode::FAILURE
-        }
-    }
 }
 
 /// Builds the wheel in a cargo profile, around a binary that is there already or with one of its own, into an emptied folder;

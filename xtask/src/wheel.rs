@@ -2,13 +2,33 @@
 //! (PEP 600). An index of packages takes no wheel that says `linux` alone.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, ExitCode};
 
-use crate::{process, python};
+use crate::{process, python, workspace};
 
 /// The environment of the tool, which reads the versions of the symbols that program and module want.
 const VENV: &str = "auditwheel-venv";
 const PACKAGES: &str = "auditwheel==6.8.2\npatchelf==0.19.3.0\n";
+
+/// `cargo xtask wheel`: the wheel as it is released, in `dist/`.
+pub(crate) fn command() -> ExitCode {
+    let built = python::environment(python::VENV, python::REQUIREMENTS)
+        .and_then(|python| python::wheel(&python, "release", None, &workspace::root().join("dist")));
+    match built {
+        Ok(wheel) => {
+            let wheel = tag(&wheel).unwrap_or_else(|reason| {
+                eprintln!("it is for machines like this one: {reason}");
+                wheel
+            });
+            println!("{}", wheel.display());
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            eprintln!("no wheel: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
 
 /// Gives the wheel the tag of what it needs; returns its new path, or why it keeps the old one.
 pub(crate) fn tag(wheel: &Path) -> Result<PathBuf, String> {
