@@ -1,5 +1,6 @@
 //! What a command has in its hands: the network, what is known of its nodes, and how long to wait.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -16,6 +17,7 @@ use crate::frames::tap::Traffic;
 use crate::global::Global;
 use crate::progress::Progress;
 use crate::recording::Ears;
+use crate::remembered::Remembered;
 use testbench::machine_file::Machine;
 use testbench::models::{self, Description};
 
@@ -43,6 +45,7 @@ pub(crate) struct Context {
     models: BTreeMap<NodeId, Told>,
     json: bool,
     embedded: bool,
+    remembered: RefCell<Remembered>,
 }
 
 /// A model that need not be found out.
@@ -88,6 +91,8 @@ impl Context {
             models,
             json: global.json,
             embedded: embedded.is_some(),
+            // On a bus of its own everything is known, and nothing of it lasts.
+            remembered: RefCell::new(if embedded.is_some() { Remembered::default() } else { Remembered::by_people() }),
         }
     }
 
@@ -186,8 +191,19 @@ impl Context {
         let Some(guess) = drive.guess().filter(|guess| guess.evidence().is_some() && !self.json) else { return };
         let id = drive.node().id();
         let fitting: Vec<_> = guess.fitting().map(|model| model.name).collect();
+        let key = format!("{} node {id} taken for {}", self.bus, guess.description().name);
+        if !self.remembered.borrow_mut().is_new(&key) {
+            return;
+        }
         let how = models::how_to_say(id, &fitting);
         self.progress.note(&format!("node {id}: cannot tell its model: {guess}. Taken for that; to be sure: {how}"));
+    }
+
+    /// Keeps for completion which nodes were heard, and which models they are as far as that was said.
+    pub(crate) fn remember_nodes(&self) {
+        let heard = self.network.seen();
+        let nodes = heard.iter().map(|node| (node, self.told_model(node).map(|model| model.name)));
+        self.remembered.borrow_mut().heard(&self.bus.to_string(), nodes);
     }
 
     /// Warns people of what may happen to a motor. On an embedded bus there is none; programs read the report.

@@ -5,6 +5,7 @@
 
 mod args;
 mod command;
+mod completion;
 mod context;
 mod control_client;
 mod decode;
@@ -19,6 +20,7 @@ mod plain;
 mod progress;
 mod readings;
 mod recording;
+mod remembered;
 mod scope;
 mod serve;
 mod session;
@@ -34,8 +36,10 @@ use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue};
 use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
+use clap_complete::env::CompleteEnv;
 
 use crate::args::{Cli, Command};
+use crate::command::completions::ASKED_BY;
 use crate::command::departures::DepartureList;
 use crate::command::objects::Whose;
 use crate::context::Context;
@@ -46,6 +50,8 @@ use crate::paint::Paint;
 use crate::plain::plain;
 
 fn main() -> ExitCode {
+    // A shell asks for what a line may go on with: answered here, and nothing else is done.
+    CompleteEnv::with_factory(|| completion::with_values(Cli::command())).var(ASKED_BY).complete();
     let parsed = matches().and_then(|matches| {
         let cli = Cli::from_arg_matches(&matches)?;
         Ok((cli, matches))
@@ -215,7 +221,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Export(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Gateway(command) => session::run(global, async |context| command.run(context, format).await),
         Command::Replay(command) => on_bus(global, format, async |context| command.run(context).await),
-        Command::Completions(completions) => completions.run(&mut Cli::command()),
+        Command::Completions(completions) => completions.run(),
         Command::ManPages(pages) => pages.run(Cli::command()),
     }
 }

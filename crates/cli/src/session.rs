@@ -183,6 +183,7 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     let tell = |_, note: &Note| notes.borrow_mut().news(note).iter().for_each(|text| context.tell(text));
     let ended = runner.run(&network, station, &clock, until, tell).await;
     progress.clear();
+    context.remember_nodes();
     writing.finish().inspect(|missing| context.tell(missing));
     ended.map_err(|error| {
         let failure = bus_failure(global, &error);

@@ -84,8 +84,8 @@ pub use modbus::{
 pub use note::{BusNotes, ControllerState, ErrorCounters, ErrorFrame, ErrorKind, ErrorKinds, Note, Received};
 pub use run::{BusThread, BusThreadError, Heard, RealTimeWorld, run_station, run_world};
 pub use slcan::SlcanBus;
-pub use socketcan::InterfaceProblem;
 #[cfg(target_os = "linux")]
 pub use socketcan::SocketCanBus;
+pub use socketcan::{InterfaceProblem, can_interfaces};
 pub use socketcand::SocketcandBus;
 pub use udp_multicast::UdpMulticastBus;

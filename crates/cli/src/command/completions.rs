@@ -1,14 +1,19 @@
 //! `ferrodrive completions`: completion scripts for shells.
 
-use clap_complete::Shell;
+use clap::ValueEnum;
+use clap_complete::env::Shells;
 
 use crate::failure::Failure;
 use crate::output::print;
 
 /// Print a completion script for a shell
+///
+/// The shell then asks this program what a line may go on with: commands and options, and the nodes that were heard on the bus, the
+/// objects of their models, models, modes and buses. What was heard is kept in $XDG_CACHE_HOME/ferrodrive by commands at a terminal.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  ferrodrive completions bash > ~/.local/share/bash-completion/completions/ferrodrive\n  \
+    ferrodrive completions zsh > ~/.zfunc/_ferrodrive        # a folder of $fpath\n  \
     ferrodrive completions fish > ~/.config/fish/completions/ferrodrive.fish"
 )]
 pub(crate) struct Completions {
@@ -16,12 +21,39 @@ pub(crate) struct Completions {
     shell: Shell,
 }
 
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Shell {
+    Bash,
+    Elvish,
+    Fish,
+    Powershell,
+    Zsh,
+}
+
+impl Shell {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Bash => "bash",
+            Self::Elvish => "elvish",
+            Self::Fish => "fish",
+            Self::Powershell => "powershell",
+            Self::Zsh => "zsh",
+        }
+    }
+}
+
 impl Completions {
     /// Writes the script for a command line to standard output.
-    pub(crate) fn run(&self, whole: &mut clap::Command) -> Result<(), Failure> {
-        // The generator panics where it cannot write, so it writes to memory.
+    pub(crate) fn run(&self) -> Result<(), Failure> {
+        let name = self.shell.name();
+        let known = Shells::builtins();
+        let shell = known.completer(name).ok_or_else(|| Failure::new(format!("there is no script for {name}")))?;
         let mut script = Vec::new();
-        clap_complete::generate(self.shell, whole, "ferrodrive", &mut script);
+        let written = shell.write_registration(ASKED_BY, "ferrodrive", "ferrodrive", "ferrodrive", &mut script);
+        written.map_err(|error| Failure::new("cannot make the script").because(error))?;
         print(&script).map_err(Failure::of_stdout)
     }
 }
+
+/// The variable by which the script asks.
+pub(crate) const ASKED_BY: &str = "FERRODRIVE_COMPLETE";

@@ -3,7 +3,7 @@
 use cia402::ModeOfOperation;
 
 /// The abbreviations of CiA 402-2.
-const ABBREVIATIONS: [(&str, ModeOfOperation); 9] = [
+pub const ABBREVIATIONS: [(&str, ModeOfOperation); 9] = [
     ("pp", ModeOfOperation::PROFILE_POSITION),
     ("vl", ModeOfOperation::VELOCITY),
     ("pv", ModeOfOperation::PROFILE_VELOCITY),

@@ -130,7 +130,12 @@ pub(super) fn look(system: &Path, name: &str) -> Result<bool, InterfaceProblem> 
     Ok(number("carrier") != Some(0))
 }
 
-/// The CAN interfaces of this machine, by name.
+/// The CAN interfaces of this machine, by name; none where the system is not Linux.
+pub fn can_interfaces() -> Vec<String> {
+    existing(Path::new(SYSTEM))
+}
+
+/// The CAN interfaces of a system, by name.
 pub(super) fn existing(system: &Path) -> Vec<String> {
     let entries = fs::read_dir(system).into_iter().flatten().flatten();
     let of_can = entries.filter(|entry| {

@@ -15,4 +15,4 @@ mod wire;
 #[cfg(target_os = "linux")]
 pub use bus::SocketCanBus;
 pub(crate) use error_class::notes_of;
-pub use interface::InterfaceProblem;
+pub use interface::{InterfaceProblem, can_interfaces};

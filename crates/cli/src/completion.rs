@@ -1,0 +1,170 @@
+//! What a shell completes beside commands and options: buses, nodes, models, objects and modes. The script of `ferrodrive completions`
+//! has the shell ask this program, with the line as it stands.
+
+use std::ffi::OsStr;
+use std::path::Path;
+
+use canopen::NodeId;
+use canopen::od::Entry;
+use clap::{Arg, Command};
+use clap_complete::engine::{ArgValueCompleter, CompletionCandidate};
+use testbench::machine_file;
+use testbench::models::{self, Description};
+use testbench::words::drive::node_model;
+use testbench::words::mode::ABBREVIATIONS;
+
+use crate::remembered::Remembered;
+
+type Completer = fn(&Line, &str) -> Vec<CompletionCandidate>;
+
+/// By the names that help gives to values.
+const COMPLETERS: [(&str, Completer); 12] = [
+    ("BUS", buses),
+    ("NODE", nodes),
+    ("NODES", nodes),
+    ("NODE|all", nodes),
+    ("NODE=MODEL", models_of_nodes),
+    ("MODEL", models),
+    ("FILE|MODEL", models),
+    ("MODEL|FILE.eds|NODE", models_and_nodes),
+    ("MODEL@NODE[,KEY=VALUE..]", models),
+    ("OBJECT", objects),
+    ("OBJECTS", objects),
+    ("[NODE=]MODE", modes),
+];
+
+/// The command line with what completes its values.
+pub(crate) fn with_values(command: Command) -> Command {
+    command.mut_args(with_completer).mut_subcommands(with_values)
+}
+
+fn with_completer(arg: Arg) -> Arg {
+    let name = arg.get_value_names().and_then(|names| names.first()).map(|name| name.to_string()).unwrap_or_default();
+    match COMPLETERS.iter().find(|(known, _)| *known == name) {
+        Some((_, completer)) => {
+            let complete = |current: &OsStr| {
+                let current = current.to_string_lossy();
+                let all = completer(&Line::typed(), &current);
+                all.into_iter().filter(|one| one.get_value().to_string_lossy().starts_with(&*current)).collect()
+            };
+            arg.add(ArgValueCompleter::new(complete))
+        }
+        None => arg,
+    }
+}
+
+/// The line that is being typed.
+struct Line {
+    words: Vec<String>,
+}
+
+impl Line {
+    /// The engine hands the words to this program behind `--`; the first is its name.
+    fn typed() -> Self {
+        let words = std::env::args_os().map(|word| word.to_string_lossy().into_owned());
+        Self { words: words.skip_while(|word| word != "--").skip(2).collect() }
+    }
+
+    /// The values of an option, in either spelling.
+    fn values<'a>(&'a self, option: &'a str) -> impl Iterator<Item = &'a str> {
+        self.words.iter().enumerate().filter_map(move |(place, word)| match word.strip_prefix(option)? {
+            "" => self.words.get(place + 1).map(String::as_str),
+            rest => rest.strip_prefix('='),
+        })
+    }
+
+    fn bus(&self) -> String {
+        let given = self.values("--bus").last().map(str::to_owned);
+        given.or_else(|| std::env::var("FERRODRIVE_BUS").ok()).unwrap_or_else(|| "sim".to_owned())
+    }
+
+    /// The node that the command is about: the first number that can be one.
+    fn node(&self) -> Option<NodeId> {
+        self.words.iter().find_map(|word| NodeId::new(word.parse().ok()?))
+    }
+
+    /// What is known of the nodes: as it was told, of the machine, of an own bus, or from earlier calls.
+    fn nodes(&self) -> Vec<(u8, Option<&'static Description>)> {
+        let bus = self.bus();
+        let told = self.values("--model").filter_map(|text| node_model(text).ok());
+        let machine =
+            self.values("--machine").last().map(str::to_owned).or_else(|| std::env::var("FERRODRIVE_MACHINE").ok());
+        let machine = bus.strip_prefix("sim:").map(str::to_owned).or(machine.filter(|_| bus != "sim"));
+        let of_machine = machine.and_then(|path| machine_file::machine(&path).ok());
+        let of_machine = of_machine.iter().flat_map(machine_file::Machine::models);
+        let own = models::embedded().into_iter().filter(|_| bus == "sim");
+        let told = told.chain(of_machine).chain(own).map(|(node, model)| (node.raw(), Some(model)));
+        let remembered = Remembered::for_completion();
+        let earlier = remembered.nodes(&bus).map(|(node, model)| (node, model.and_then(named)));
+        let mut all: Vec<_> = told.chain(earlier).collect();
+        all.sort_by_key(|(node, model)| (*node, model.is_none()));
+        all.dedup_by_key(|(node, _)| *node);
+        all
+    }
+}
+
+/// A model that is not in a file.
+fn named(name: &str) -> Option<&'static Description> {
+    models::resolve_in(name, Path::new("/")).ok()
+}
+
+fn all_models() -> impl Iterator<Item = &'static Description> {
+    models::names().split(", ").filter_map(named).collect::<Vec<_>>().into_iter()
+}
+
+fn candidate(value: impl Into<String>, help: impl Into<String>) -> CompletionCandidate {
+    CompletionCandidate::new(value.into()).help(Some(help.into().into()))
+}
+
+fn buses(_: &Line, _: &str) -> Vec<CompletionCandidate> {
+    let of_machine =
+        transport::can_interfaces().into_iter().map(|name| candidate(name, "CAN interface of this machine"));
+    let remembered = Remembered::for_completion();
+    let used = remembered.buses().map(|bus| candidate(bus, "used before"));
+    let mut all: Vec<_> = of_machine.chain(used).collect();
+    all.push(candidate("sim", "a virtual bus of this command alone"));
+    let mut seen = std::collections::BTreeSet::new();
+    all.retain(|one| seen.insert(one.get_value().to_owned()));
+    all
+}
+
+fn nodes(line: &Line, _: &str) -> Vec<CompletionCandidate> {
+    let title = |model: Option<&Description>| model.map_or("heard before", |model| model.name).to_owned();
+    line.nodes().into_iter().map(|(node, model)| candidate(node.to_string(), title(model))).collect()
+}
+
+fn models(_: &Line, _: &str) -> Vec<CompletionCandidate> {
+    all_models().map(|model| candidate(model.name, model.title)).collect()
+}
+
+fn models_and_nodes(line: &Line, current: &str) -> Vec<CompletionCandidate> {
+    models(line, current).into_iter().chain(nodes(line, current)).collect()
+}
+
+fn models_of_nodes(line: &Line, _: &str) -> Vec<CompletionCandidate> {
+    let of_node = |node: u8| all_models().map(move |model| candidate(format!("{node}={}", model.name), model.title));
+    line.nodes().into_iter().flat_map(|(node, _)| of_node(node)).collect()
+}
+
+/// Names; indices where a digit is typed.
+fn objects(line: &Line, current: &str) -> Vec<CompletionCandidate> {
+    let node = line.node().map(NodeId::raw);
+    let model = line.nodes().into_iter().find(|(known, _)| Some(*known) == node).and_then(|(_, model)| model);
+    // A node of which nothing is known may have what CiA 301 and 402 have.
+    let Some(model) = model.or_else(|| named("cia402")) else { return Vec::new() };
+    let by_number = current.starts_with(|first: char| first.is_ascii_digit());
+    let one = |row: &Entry| {
+        let mux = row.mux();
+        let (index, sub_index) = (mux.index, mux.sub_index);
+        match by_number {
+            true if sub_index == 0 => candidate(format!("{index:04X}"), row.name),
+            true => candidate(format!("{index:04X}:{sub_index:02X}"), row.name),
+            false => candidate(row.name, format!("{index:04X}h:{sub_index:02X}")),
+        }
+    };
+    model.dictionary.rows().iter().map(one).collect()
+}
+
+fn modes(_: &Line, _: &str) -> Vec<CompletionCandidate> {
+    ABBREVIATIONS.iter().map(|(short, mode)| candidate(*short, mode.name().unwrap_or_default())).collect()
+}
