@@ -2,6 +2,7 @@
 what it says is what the drive answers."""
 
 import fcntl
+import json
 import logging
 import pathlib
 import subprocess
@@ -133,3 +134,9 @@ def generates(bench):
             concise = (pathlib.Path(folder) / "drive.bin").read_bytes()
             true(int.from_bytes(concise[:4], "little") >= 1, "the concise DCF writes something")
             true(b"\x17\x10" in concise, "1017h is in the concise DCF")
+            (pathlib.Path(folder) / "none.bin").write_bytes(bytes(4))
+            command = [bench.program, "params", "diff", "drive.bin", "none.bin", "--json"]
+            done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60, check=False)
+            equal(done.returncode, 0, f"our reading of it: {done.stdout}{done.stderr}")
+            values = {row["object"]: row["first"]["bytes"] for row in json.loads(done.stdout)["differences"]}
+            equal(values.get("1017h:00"), "C8 00", "the heartbeat of 200 ms that was asked for")

@@ -4,8 +4,8 @@ use clap::{Parser, Subcommand};
 
 use crate::command::{
     completions, convert, dcf, decode, demo, drive, dump, eds, emcy, events, export, gateway, home, latency, lss,
-    man_pages, motion, nmt, objects, pdo, plan, plot, read, readings, record, replay, run, scan, sdo, send, sim, store,
-    sync, time, watch, world,
+    man_pages, motion, nmt, objects, params, pdo, plan, plot, read, readings, record, replay, run, scan, sdo, send,
+    sim, store, sync, time, watch, world,
 };
 use crate::global::Global;
 
@@ -38,6 +38,7 @@ pub(crate) enum Command {
     Eds(eds::Eds),
     Dcf(dcf::Dcf),
     Watch(watch::Watch),
+    Params(params::Params),
     Pdo(pdo::Pdo),
     Plan(plan::Plan),
     Emcy(emcy::Emcy),

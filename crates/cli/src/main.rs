@@ -178,6 +178,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Scan(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Read(command) => session::run(global, async |context| command.run(context, format).await),
         Command::Watch(command) => session::run(global, async |context| command.run(context, format).await),
+        Command::Params(command) => session::run(global, async |context| command.run(context, format).await),
         Command::Pdo(command) => session::run(global, async |context| command.run(context, format).await),
         Command::Emcy(command) => session::run(global, async |context| command.run(context, format).await),
         Command::Sync(command) => on_bus(global, format, async |context| command.run(context).await),

@@ -90,6 +90,13 @@ fn every_command_of_the_page_on_logs_ends_well() {
 }
 
 #[test]
+fn every_command_of_the_page_on_parameters_ends_well() {
+    let folder = scratch("handbook_params");
+    assert_eq!(follow_in("configure-a-drive.md", &folder), 7);
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
 fn every_command_of_the_other_pages_ends_well() {
     assert_eq!(follow("two-axes-from-a-test.md"), 0);
     assert_eq!(follow("add-an-object.md"), 0);

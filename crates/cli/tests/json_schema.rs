@@ -45,6 +45,9 @@ const COMMANDS: &[(&[&str], &str)] = &[
     (&["readings", "m4230e17b50"], "readings"),
     (&["eds", "zlac8030l"], "eds"),
     (&["dcf", "4"], "dcf"),
+    (&["params", "backup", "4"], "params_backup"),
+    (&["params", "rollback", "4"], "failure"),
+    (&["params", "apply", "4", "/no/such/file.toml"], "failure"),
     (&["latency", "4", "--count", "20"], "latency"),
     (&["plan", "--mode", "4=pv"], "plan"),
     (&["dump", "--for", "1s"], "frame"),
@@ -123,11 +126,16 @@ fn files_and_logs_are_told_of_in_the_same_form() {
     let directory = scratch("schema");
     let path = |name: &str| directory.join(name).to_str().expect("UTF-8").to_owned();
     let (sheet, log, odd) = (path("a.eds"), path("a.log"), path("odd.log"));
-    let (blf, csv) = (path("a.blf"), path("a.csv"));
+    let (blf, csv, values) = (path("a.blf"), path("a.csv"), path("a.toml"));
+    std::fs::write(&values, "[values]\n1017 = 200\n6040 = 6\n").unwrap();
     let made = ferrodrive(&["eds", "zlac8030l", "--json"]).json()["eds"].as_str().expect("a text").to_owned();
     std::fs::write(&sheet, made).unwrap();
     for (arguments, definition) in [
         (&["eds", "lint", &sheet][..], "eds_lint"),
+        (&["params", "diff", "4", &values], "params_diff"),
+        (&["params", "plan", "4", &values], "params_plan"),
+        (&["params", "verify", "4", &values], "params_verify"),
+        (&["params", "apply", "4", &values, "--save", "--prove"], "params_apply"),
         (&["eds", "show", &sheet], "eds_show"),
         (&["eds", "diff", &sheet, "zlim42c"], "eds_diff"),
         (&["dump", "--for", "1s", "--log", &log], "frame"),

@@ -199,11 +199,14 @@ pub struct ParameterStorage {
     pub save_on_write: Option<(Write, bool)>,
     /// Objects that take effect after a restart only.
     pub effective_after_restart: &'static [Mux],
+    /// Objects that choose its node-ID and bit rate: who writes them has to look for the device elsewhere afterwards.
+    pub address: &'static [Mux],
 }
 
 impl ParameterStorage {
     /// None: nothing is kept without supply.
-    pub const NONE: Self = Self { save: None, restore: None, save_on_write: None, effective_after_restart: &[] };
+    pub const NONE: Self =
+        Self { save: None, restore: None, save_on_write: None, effective_after_restart: &[], address: &[] };
 
     /// 1010h:01 and 1011h:01 with their signatures "save" and "load" (CiA 301, 7.5.2.13 and 7.5.2.14).
     pub const CIA_301: Self = Self {

@@ -30,6 +30,7 @@ mod describe;
 mod diff;
 mod finding;
 mod model;
+mod parameter_values;
 mod read;
 mod value;
 mod write;
@@ -45,6 +46,7 @@ pub use model::{
     AccessType, Commissioning, DeviceInfo, DynamicChannel, Eds, FileInfo, KeptSection, List, Object, ObjectType,
     Variable,
 };
+pub use parameter_values::{NotHeld, parameter_values};
 pub use read::Reading;
 pub use value::{Number, Value};
 pub use write::write;

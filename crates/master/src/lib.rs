@@ -98,6 +98,7 @@ pub mod latency;
 mod limits;
 mod models;
 mod network;
+pub mod parameters;
 pub mod pdo;
 pub mod plan;
 pub mod units;

@@ -24,6 +24,7 @@ pub mod document;
 pub mod events;
 pub mod machine_file;
 pub mod models;
+pub mod parameters;
 pub mod recording;
 pub mod scenario;
 pub mod sweep;

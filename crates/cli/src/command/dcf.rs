@@ -186,14 +186,14 @@ async fn bit_rate(node: &Node, model: &Description) -> Option<u16> {
     row.meaning(value.into())?.strip_suffix(" kbit/s")?.parse().ok()
 }
 
-fn exists(path: &Path) -> Failure {
+pub(super) fn exists(path: &Path) -> Failure {
     Failure::new(format!("{} is there already", path.display()))
         .of_kind("file_exists")
         .next("--force writes over it, or give another --output")
 }
 
 /// Writes the file at once or not at all: beside its place, then to it.
-fn keep(path: &Path, bytes: &[u8], force: bool) -> Result<(), Failure> {
+pub(super) fn keep(path: &Path, bytes: &[u8], force: bool) -> Result<(), Failure> {
     let cannot = |error: std::io::Error| Failure::new(format!("cannot write {}", path.display())).because(error);
     if !force {
         // Made only if nobody was faster.

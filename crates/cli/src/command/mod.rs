@@ -20,6 +20,7 @@ pub(crate) mod man_pages;
 pub(crate) mod motion;
 pub(crate) mod nmt;
 pub(crate) mod objects;
+pub(crate) mod params;
 pub(crate) mod pdo;
 pub(crate) mod plan;
 pub(crate) mod plot;

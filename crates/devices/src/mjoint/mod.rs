@@ -107,6 +107,7 @@ const STORAGE: ParameterStorage = ParameterStorage {
     restore: None,
     save_on_write: None,
     effective_after_restart: &[Mux::new(0x2615, 0), Mux::new(0x2619, 0)],
+    address: &[Mux::new(0x2615, 0)],
 };
 
 /// The mapping is fixed; an identifier may be changed at any time, since no bit of it makes a PDO invalid (5.08).

@@ -61,12 +61,14 @@ const fn parameter_storage(
     register: u16,
     save_on_write: u16,
     effective_after_restart: &'static [Mux],
+    address: &'static [Mux],
 ) -> ParameterStorage {
     ParameterStorage {
         save: Some(Write { object: Mux::new(register, 0), value: SAVE }),
         restore: Some(Write { object: Mux::new(register, 0), value: RESTORE }),
         save_on_write: Some((Write { object: Mux::new(save_on_write, 0), value: 0 }, true)),
         effective_after_restart,
+        address,
     }
 }
 

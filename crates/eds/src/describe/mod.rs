@@ -13,6 +13,7 @@ mod sheet;
 mod sheet_values;
 
 pub use keep::{Unkept, keep, keep_of};
+pub(crate) use rows::bytes as bytes_of_text;
 pub use sheet::{Flavour, Sheet};
 pub(crate) use sheet_values::of_bytes as value_of_bytes;
 

@@ -148,7 +148,7 @@ impl Drive {
     }
 
     /// The power state that a statusword of this model shows.
-    pub(super) fn power_state(&self, statusword: Statusword) -> Option<PowerState> {
+    pub(crate) fn power_state(&self, statusword: Statusword) -> Option<PowerState> {
         self.power_style().state(statusword)
     }
 

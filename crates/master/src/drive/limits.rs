@@ -50,7 +50,7 @@ impl Drive {
 
     /// Checks a value against the object's limits, and gives its row. The drive is only asked about limits that move where
     /// the value is beyond those that hold in any case.
-    pub(super) async fn check_number(&self, mux: Mux, value: i64) -> Result<&'static Entry, Error> {
+    pub(crate) async fn check_number(&self, mux: Mux, value: i64) -> Result<&'static Entry, Error> {
         let row = self.row(mux, "write an object by its model's table")?;
         let (low, high) = row.limits_at(1);
         let listed = row.values.is_empty() || row.meaning(value).is_some();

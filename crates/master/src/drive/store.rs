@@ -10,17 +10,30 @@ const STORE_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// The drive's own parameter memory, by the model's own commands.
 impl Drive {
+    /// Checks that [`save`](Self::save) can be asked of it, and asks for nothing else than its identity.
+    ///
+    /// # Errors
+    /// As `save`.
+    pub async fn check_save(&self) -> Result<(), Error> {
+        self.save_write().await.map(|_| ())
+    }
+
     /// Stores all parameters.
     ///
     /// # Errors
     /// [`Error::NoParameterStore`]; [`Error::UnknownModel`], [`Error::GuessedModel`], [`Error::WrongModel`], [`Error::OtherModel`], and nothing is
     /// written: what means "save" to one model may be anything to another of the same identity. Those of the SDO write.
     pub async fn save(&self) -> Result<(), Error> {
+        let save = self.save_write().await?;
+        self.command(save).await
+    }
+
+    async fn save_write(&self) -> Result<Write, Error> {
         let description = self.named("save its parameters")?;
         let model = description.title;
         let save = description.storage.save.ok_or(Error::NoParameterStore { node: self.node.id(), model })?;
         self.check_identity().await?;
-        self.command(save).await
+        Ok(save)
     }
 
     /// Puts all parameters back to their factory values. Some take effect after a restart only.

@@ -66,7 +66,7 @@ pub fn typed_for(row: &Entry, text: &str, resolution: i64) -> Result<Typed, Stri
             })
         }
         Kind::Bytes | Kind::Time => match text.strip_prefix("hex:") {
-            Some(digits) => hexadecimal(digits).map(Typed::Bytes),
+            Some(digits) => bytes_in_hexadecimal(digits).map(Typed::Bytes),
             None if data_type == DataType::VisibleString => visible(text),
             None => Err(format!(
                 "{} is of type {}; give its bytes as hex:01AAFF, or --from FILE",
@@ -88,7 +88,8 @@ fn visible(text: &str) -> Result<Typed, String> {
     }
 }
 
-fn hexadecimal(digits: &str) -> Result<Vec<u8>, String> {
+/// Bytes as pairs of hexadecimal digits, with blanks, dots or underscores between them or not.
+pub fn bytes_in_hexadecimal(digits: &str) -> Result<Vec<u8>, String> {
     let digits: Vec<u8> = digits.bytes().filter(|byte| !matches!(byte, b' ' | b'.' | b'_')).collect();
     let byte = |pair: &[u8]| u8::from_str_radix(core::str::from_utf8(pair).ok()?, 16).ok();
     let even = !digits.is_empty() && digits.len().is_multiple_of(2) && digits.iter().all(u8::is_ascii_hexdigit);
@@ -99,7 +100,7 @@ fn hexadecimal(digits: &str) -> Result<Vec<u8>, String> {
 /// Reads a value of an object that no table describes: `type:value`, e.g. `u16:15`, `text:left wheel`, `hex:01AA`.
 pub fn typed_alone(text: &str) -> Result<Typed, String> {
     match text.split_once(':') {
-        Some(("hex", digits)) => hexadecimal(digits).map(Typed::Bytes),
+        Some(("hex", digits)) => bytes_in_hexadecimal(digits).map(Typed::Bytes),
         Some(("text", text)) => visible(text),
         Some(("i64", number)) => {
             let value = integer(number).ok_or_else(|| format!("'{number}' is no whole number of 64 bits"))?;

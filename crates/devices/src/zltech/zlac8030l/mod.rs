@@ -51,7 +51,7 @@ const fn described(dictionary: &'static Table) -> Description {
         bitrate: Some(Bitrate::K500),
         axes: &[AXIS],
         host_watch: HostWatch::Silence { time: Mux::new(0x2000, 0) },
-        storage: zltech::parameter_storage(0x2009, 0x2010, RESTART),
+        storage: zltech::parameter_storage(0x2009, 0x2010, RESTART, ADDRESS),
         faults: Faults { code: Some(Mux::new(0x603F, 0)), bit_field: true, table: &FAULTS },
         nmt: NmtRules::CIA_301,
         lss: false,
@@ -90,6 +90,9 @@ const PDO_RULES: PdoRules = PdoRules {
     mapping: MappingRules { longer_entries: true, empty_entries: true, dummy_entries: 0, tpdo_forms: &[] },
     ..zltech::PDO_RULES
 };
+
+/// CAN node number and bit rate.
+const ADDRESS: &[Mux] = &[Mux::new(0x200D, 0), Mux::new(0x200E, 0)];
 
 const RESTART: &[Mux] = &[Mux::new(0x200D, 0), Mux::new(0x200E, 0), Mux::new(0x202F, 5)];
 

@@ -48,7 +48,7 @@ const fn stepper(name: &'static str, title: &'static str) -> Description {
         bitrate: Some(Bitrate::K500),
         axes: &[AXIS],
         host_watch: HostWatch::None,
-        storage: zltech::parameter_storage(0x2010, 0x200C, RESTART),
+        storage: zltech::parameter_storage(0x2010, 0x200C, RESTART, ADDRESS),
         faults: Faults { code: Some(Mux::new(0x603F, 0)), bit_field: false, table: &FAULTS },
         nmt: NmtRules::CIA_301,
         lss: false,
@@ -103,7 +103,10 @@ const UNITS: Units = Units {
     driver_temperature: None,
 };
 
-const RESTART: &[Mux] = &[Mux::new(0x2008, 0), Mux::new(0x2009, 0)];
+/// Node number and bit rate.
+const ADDRESS: &[Mux] = &[Mux::new(0x2008, 0), Mux::new(0x2009, 0)];
+
+const RESTART: &[Mux] = ADDRESS;
 
 const DEPARTURES: &[Stated] = &[
     zltech::WARNING_IN_FAULT,

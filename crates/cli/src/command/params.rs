@@ -1,0 +1,171 @@
+//! `ferrodrive params`: a node's configuration as one thing: kept in a file, compared, written as a transaction, checked.
+
+mod apply;
+mod backup;
+mod compare;
+mod journal;
+mod plan;
+mod shown;
+mod source;
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use canopen::NodeId;
+use master::units::parse_duration;
+use testbench::words::node::node;
+
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::output::Format;
+
+/// Keep a node's parameters in a file, compare them, write them all or not at all, go back
+///
+/// Files: .dcf (CiA 306), .toml (objects by number or name, values with units), .bin (concise DCF, CiA 302-3). Commands and
+/// set-points are never among the parameters, nothing here moves a drive, and a drive in operation enabled is refused.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive params backup 4 -o wheel.toml\n  \
+    ferrodrive --bus can0 params plan 4 wheel.toml\n  ferrodrive --bus can0 params apply 4 wheel.toml --save --prove\n  \
+    ferrodrive --bus can0 params verify 4 wheel.toml\n  ferrodrive params diff 4 wheel.toml\n  \
+    ferrodrive --bus can0 params rollback 4")]
+pub(crate) struct Params {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    Backup(Backup),
+    Diff(Diff),
+    Plan(PlanArguments),
+    Apply(Apply),
+    Verify(Verify),
+    Rollback(Rollback),
+}
+
+/// Read all parameters of a node's model into a file
+#[derive(Debug, clap::Args)]
+struct Backup {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+    /// Write the file here, .toml, .dcf or .bin; without it TOML goes to standard output
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Write over a file that is there
+    #[arg(long, requires = "output")]
+    force: bool,
+}
+
+/// Show in what a node and a file, or two files, differ
+#[derive(Debug, clap::Args)]
+struct Diff {
+    /// Node-ID or file
+    #[arg(value_name = "NODE|FILE")]
+    first: String,
+    /// File
+    #[arg(value_name = "FILE")]
+    second: PathBuf,
+}
+
+/// Show what `apply` would write, in its order; nothing is written
+#[derive(Debug, clap::Args)]
+struct PlanArguments {
+    #[command(flatten)]
+    wanted: Wanted,
+    /// Node-ID and bit rate too, as the last
+    #[arg(long)]
+    address: bool,
+}
+
+/// Write a file's parameters to a node, all or none
+///
+/// Everything that can be checked is checked before the first write; each value is read back; on the first refusal what was
+/// written is put back in reverse order. A journal is kept meanwhile: after a kill or a power failure `rollback` goes back.
+#[derive(Debug, clap::Args)]
+struct Apply {
+    #[command(flatten)]
+    wanted: Wanted,
+    /// Node-ID and bit rate too, as the last
+    #[arg(long, conflicts_with = "prove")]
+    address: bool,
+    /// Store the parameters in the drive's memory afterwards
+    #[arg(long)]
+    save: bool,
+    /// Start the drive anew afterwards, and read everything once more
+    ///
+    /// `power-cycle` waits until somebody has switched the drive off and on; `reset` sends NMT reset node, with which a device
+    /// takes its stored values up (CiA 301, 7.3.2.2.1). Without HOW: a reset on a virtual bus of this command, else a power cycle.
+    #[arg(long, value_name = "HOW", num_args = 0..=1, require_equals = true, default_missing_value = "auto", requires = "save")]
+    prove: Option<Prove>,
+    /// Longest wait for the drive to come back
+    #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "2min", requires = "prove")]
+    within: Duration,
+    /// Where the journal is kept meanwhile
+    #[arg(long, value_name = "FILE")]
+    journal: Option<PathBuf>,
+}
+
+/// Check that a node has a file's parameters; status 1 if not
+#[derive(Debug, clap::Args)]
+struct Verify {
+    #[command(flatten)]
+    wanted: Wanted,
+}
+
+/// Go back to how a node was before an `apply` that was broken off
+#[derive(Debug, clap::Args)]
+struct Rollback {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+    /// The journal (default: that of this node in the current folder)
+    #[arg(value_name = "JOURNAL")]
+    journal: Option<PathBuf>,
+}
+
+/// Which node shall have what.
+#[derive(Debug, clap::Args)]
+struct Wanted {
+    /// Node-ID
+    #[arg(value_parser = node)]
+    node: NodeId,
+    /// The parameters: .toml, .dcf or .bin
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+}
+
+/// How a drive starts anew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Prove {
+    /// As fits the bus.
+    #[value(hide = true)]
+    Auto,
+    /// Somebody switches its supply off and on.
+    PowerCycle,
+    /// NMT reset node.
+    Reset,
+}
+
+impl Params {
+    /// Does what was asked for, and prints it.
+    pub(crate) async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
+        let printed = match &self.what {
+            What::Backup(backup) => format.print(&backup.run(context).await?),
+            What::Diff(diff) => format.print(&diff.run(context).await?),
+            What::Plan(plan) => format.print(&plan.run(context).await?),
+            What::Apply(apply) => format.print(&apply.run(context).await?),
+            What::Rollback(rollback) => format.print(&rollback.run(context).await?),
+            What::Verify(verify) => {
+                let report = verify.run(context).await?;
+                let printed = format.print(&report);
+                if let Some(failure) = report.failure().filter(|_| printed.is_ok()) {
+                    // For programs the report has it.
+                    return Err(if format.json { Failure { told: true, ..failure } } else { failure });
+                }
+                printed
+            }
+        };
+        printed.map_err(Failure::not_printed)
+    }
+}

@@ -1,0 +1,284 @@
+//! `ferrodrive params` over buses of its own and served ones: files of every form, refusals before and during the writes, a
+//! kill in between, and the way back.
+
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Stdio};
+use std::time::{Duration, Instant};
+
+use common::{Ended, Simulator, command, done, ferrodrive, scratch};
+
+/// A busy machine may take this long for anything.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        Self(scratch(name))
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.join(name).to_str().expect("UTF-8").to_owned()
+    }
+
+    fn write(&self, name: &str, text: &str) -> String {
+        let path = self.path(name);
+        std::fs::write(&path, text).expect("a file");
+        path
+    }
+
+    /// Values for node 4, a ZLAC8030L.
+    fn values(&self, name: &str, values: &str) -> String {
+        self.write(name, &format!("[values]\n{values}"))
+    }
+}
+
+#[test]
+fn a_backup_in_any_form_is_what_the_node_has() {
+    let folder = Folder::new("params_backup");
+    for extension in ["toml", "dcf", "bin"] {
+        let file = folder.path(&format!("wheel.{extension}"));
+        let report = done(&["params", "backup", "4", "-o", &file, "--json"]).json();
+        assert!(report["values"].as_u64().is_some_and(|values| values > 100), "{report}");
+        let verified = done(&["params", "verify", "4", &file, "--json"]).json();
+        assert_eq!(verified["deviations"], serde_json::json!([]), "{extension}");
+        assert_eq!(done(&["params", "plan", "4", &file, "--json"]).json()["steps"], serde_json::json!([]));
+        // A file that is there is not written over unasked.
+        let again = ferrodrive(&["params", "backup", "4", "-o", &file]);
+        assert!(again.status == Some(1) && again.err.contains("is there already"), "{}", again.err);
+    }
+    // One without an extension that says what it is, before anybody is asked.
+    let ended = ferrodrive(&["params", "backup", "4", "-o", &folder.path("wheel.txt")]);
+    assert!(ended.status == Some(2) && ended.err.contains(".toml"), "{}", ended.err);
+}
+
+#[test]
+fn what_is_written_is_read_back_stored_and_there_after_a_start() {
+    let folder = Folder::new("params_apply");
+    let file = folder.values("wheel.toml", "1017 = 200\n\"1800:02\" = 1\nprofile_acceleration = 150\n");
+    let ended = done(&["params", "apply", "4", &file, "--save", "--prove"]);
+    assert!(ended.out.contains("stored in the drive's memory"), "{}", ended.out);
+    assert!(ended.out.contains("after an NMT reset everything that is kept reads as written"), "{}", ended.out);
+    // The manual has no S at 6083h (RW, not RW/S).
+    assert!(ended.out.contains("6083h:00 profile_acceleration is not kept"), "{}", ended.out);
+    // Nothing of it is there on another bus, so that verify fails and says what differs.
+    let ended = ferrodrive(&["params", "verify", "4", &file]);
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.out.contains("producer_heartbeat_time") && ended.err.contains("params apply 4"), "{}", ended.err);
+}
+
+#[test]
+fn what_cannot_be_written_is_told_with_its_place_and_nothing_is_written() {
+    let folder = Folder::new("params_refused");
+    let refused = |file: &str| {
+        let ended = ferrodrive(&["params", "apply", "4", file]);
+        assert_eq!(ended.status, Some(1), "{}{}", ended.out, ended.err);
+        ended.err
+    };
+    let said = refused(&folder.values("word.toml", "profile_acceleratoin = 1\n"));
+    assert!(said.contains("did you mean profile_acceleration") && said.contains("word.toml:2:"), "{said}");
+    let said = refused(&folder.values("limit.toml", "profile_acceleration = 99999999\n"));
+    assert!(said.contains("6083h:00 profile_acceleration: 99999999 is not taken"), "{said}");
+    // Half a file of each kind.
+    let whole = folder.path("whole.dcf");
+    done(&["params", "backup", "4", "-o", &whole]);
+    let dcf = std::fs::read(&whole).expect("a DCF");
+    std::fs::write(folder.path("half.dcf"), &dcf[..dcf.len() / 2]).expect("half of it");
+    let said = refused(&folder.path("half.dcf"));
+    assert!(said.contains("not whole") && said.contains("eds lint"), "{said}");
+    let said = refused(&folder.values("half.toml", "profile_acceleration = \"1"));
+    assert!(said.contains("half.toml:2:"), "{said}");
+    std::fs::write(folder.path("half.bin"), [2, 0, 0, 0, 0x17, 0x10, 0, 2, 0, 0, 0, 200, 0]).expect("half a stream");
+    let said = refused(&folder.path("half.bin"));
+    assert!(said.contains("entry 2 of 2, at byte 13"), "{said}");
+    // Parameters of another model, by what both say of themselves.
+    let joint = folder.path("joint.dcf");
+    done(&["params", "backup", "1", "-o", &joint]);
+    let ended = ferrodrive(&["params", "apply", "4", &joint]);
+    assert!(ended.status == Some(1) && ended.err.contains("another device"), "{}", ended.err);
+    assert_eq!(ended.err.matches("vendor").count(), 2, "{}", ended.err);
+    // Of one that says the same of itself the file's model tells.
+    let stepper = folder.path("stepper.toml");
+    done(&["params", "backup", "2", "-o", &stepper]);
+    let said = refused(&stepper);
+    assert!(said.contains("these are parameters of a zlim42c, and the node is a zlac8030l"), "{said}");
+    let said = refused(&folder.path("nowhere.toml"));
+    assert!(said.contains("nothing was written"), "{said}");
+}
+
+struct Served {
+    simulator: Simulator,
+    bus: String,
+    folder: Folder,
+}
+
+impl Served {
+    fn new(name: &str, options: &[&str]) -> Self {
+        let simulator = Simulator::start(&[options, &["--serve", "socketcand://127.0.0.1:0"]].concat());
+        let bus = simulator.bus("socketcand");
+        let served = Self { simulator, bus, folder: Folder::new(name) };
+        let begin = Instant::now();
+        while served.run(&["read", served.node(), "1000"]).status != Some(0) {
+            assert!(begin.elapsed() < PATIENCE, "the drive does not boot");
+        }
+        served
+    }
+
+    fn zlac8030l(name: &str) -> Self {
+        Self::new(name, &["--drive", "zlac8030l@4"])
+    }
+
+    fn node(&self) -> &'static str {
+        "4"
+    }
+
+    fn command(&self, arguments: &[&str]) -> std::process::Command {
+        let mut command = command(&[&["--bus", &self.bus, "--timeout", "10s"], arguments].concat());
+        // Where journals are kept.
+        command.current_dir(&self.folder.0).stdin(Stdio::null());
+        command
+    }
+
+    fn run(&self, arguments: &[&str]) -> Ended {
+        let output = self.command(arguments).output().expect("the binary runs");
+        let text = |bytes| String::from_utf8(bytes).expect("UTF-8");
+        Ended { status: output.status.code(), out: text(output.stdout), err: text(output.stderr) }
+    }
+
+    #[track_caller]
+    fn done(&self, arguments: &[&str]) -> Ended {
+        let ended = self.run(arguments);
+        assert_eq!(ended.status, Some(0), "{arguments:?}: {}{}", ended.out, ended.err);
+        ended
+    }
+
+    fn journal(&self) -> PathBuf {
+        self.folder.0.join("ferrodrive-node4.journal")
+    }
+}
+
+#[test]
+fn a_refusal_at_the_third_value_puts_the_first_two_back() {
+    let served = Served::zlac8030l("params_rollback");
+    served.done(&["params", "backup", "4", "-o", "before.toml"]);
+    // 6060h may be mapped into an RPDO, 1017h into nothing: only the drive knows by its refusal.
+    let wanted = "1017 = 200\nprofile_acceleration = 150\n\"1A00:00\" = 1\n\"1A00:01\" = 0x10170010\n";
+    let file = served.folder.values("wanted.toml", wanted);
+    let ended = served.run(&["params", "apply", "4", &file, "--json"]);
+    let failure = ended.json();
+    assert_eq!((ended.status, failure["error"]["kind"].as_str()), (Some(1), Some("rolled_back")), "{failure}");
+    assert_eq!(failure["error"]["abort"], 0x0604_0041);
+    assert!(failure["error"]["object"].as_str().is_some_and(|object| object.starts_with("1A00h")), "{failure}");
+    assert!(failure["error"]["message"].as_str().is_some_and(|text| text.contains("read as before")), "{failure}");
+    served.done(&["params", "verify", "4", "before.toml"]);
+    assert!(!served.journal().exists(), "nothing is left to go back to");
+}
+
+#[test]
+fn a_drive_at_work_is_left_alone_and_the_way_out_is_said() {
+    let served = Served::zlac8030l("params_at_work");
+    let file = served.folder.values("wanted.toml", "1017 = 200\n");
+    served.done(&["enable", "4"]);
+    let ended = served.run(&["params", "apply", "4", &file]);
+    assert!(ended.status == Some(1) && ended.err.contains("Operation enabled"), "{}", ended.err);
+    assert!(ended.err.contains("ferrodrive disable 4"), "{}", ended.err);
+    served.done(&["disable", "4"]);
+    served.done(&["params", "apply", "4", &file]);
+    served.done(&["params", "verify", "4", &file]);
+}
+
+#[test]
+fn a_power_cycle_proves_what_was_stored() {
+    let mut served = Served::zlac8030l("params_prove");
+    let file = served.folder.values("wanted.toml", "1017 = 200\n");
+    let ended = served.run(&["params", "apply", "4", &file, "--save"]);
+    assert!(ended.status == Some(1) && ended.err.contains("--model 4=zlac8030l"), "{}", ended.err);
+    assert!(ended.err.contains("Nothing was sent"), "before the first write: {}", ended.err);
+    let child = served
+        .command(&["--model", "4=zlac8030l", "params", "apply", "4", &file, "--save", "--prove", "--within", "60s"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the binary runs");
+    // Power fails again and again until somebody has waited for it: when that is, only the command knows.
+    let mut child = Some(child);
+    let begin = Instant::now();
+    while child.as_mut().is_some_and(|child| child.try_wait().expect("a child").is_none()) {
+        assert!(begin.elapsed() < PATIENCE, "it waits for a boot-up that has come");
+        std::thread::sleep(Duration::from_secs(3));
+        served.simulator.send("4 power cycle");
+    }
+    let output = child.take().expect("a child").wait_with_output().expect("it has ended");
+    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    // A cut in the middle of the writes is told as such, and is no proof.
+    assert!(
+        said.contains("after a power cycle everything that is kept reads as written") || !output.status.success(),
+        "{said}"
+    );
+    assert!(said.contains("power cycle") || said.contains("did not answer"), "{said}");
+}
+
+/// Far more writes than fit into the time until a look at the folder: at 10 kbit/s each takes 50 ms and more.
+fn many_values(begin: i64) -> String {
+    let ramps =
+        (0x6081..=0x6085).filter(|index| *index != 0x6082).map(|index| format!("{index:X} = {}\n", begin + index));
+    let windows =
+        [0x6065, 0x6066, 0x6067, 0x6068, 0x606D, 0x606E, 0x606F, 0x6070].map(|index| format!("{index:X} = {begin}\n"));
+    let communication = [0x1006, 0x1015, 0x1017, 0x100C].map(|index| format!("{index:X} = {begin}\n"));
+    ramps.chain(windows).chain(communication).collect()
+}
+
+fn wait_for(path: &Path, child: &mut Child) {
+    let begin = Instant::now();
+    while !path.exists() {
+        assert!(begin.elapsed() < PATIENCE, "no journal {}", path.display());
+        if let Some(status) = child.try_wait().expect("a child") {
+            panic!("it has ended: {status}");
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn after_a_kill_between_two_writes_the_journal_leads_back() {
+    let served = Served::new("params_killed", &["--drive", "cia402@4", "--bitrate", "10k"]);
+    let model = ["--model", "4=cia402"];
+    let run = |arguments: &[&str]| served.run(&[&model[..], arguments].concat());
+    let before = served.folder.values("before.toml", &many_values(50));
+    assert_eq!(run(&["params", "apply", "4", &before]).status, Some(0));
+    let wanted = served.folder.values("wanted.toml", &many_values(60));
+    let arguments = [&model[..], &["params", "apply", "4", &wanted]].concat();
+    let mut child = served.command(&arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("it runs");
+    wait_for(&served.journal(), &mut child);
+    child.kill().expect("it was running");
+    child.wait().expect("it has ended");
+    // The answer to its last request is still on its way, and would be one to the wrong question.
+    std::thread::sleep(Duration::from_secs(1));
+    assert!(served.journal().exists(), "it was killed while it wrote");
+    // Nobody begins another one over it.
+    let ended = run(&["params", "apply", "4", &wanted]);
+    assert!(ended.status == Some(1) && ended.err.contains("params rollback 4"), "{}{}", ended.out, ended.err);
+    let back = run(&["params", "rollback", "4"]);
+    assert!(back.status == Some(0) && back.out.contains("read as before"), "{}{}", back.out, back.err);
+    let verified = run(&["params", "verify", "4", &before]);
+    assert_eq!(verified.status, Some(0), "{}{}", verified.out, verified.err);
+    let again = run(&["params", "rollback", "4"]);
+    assert!(again.status == Some(1) && again.err.contains("there is no journal"), "{}", again.err);
+}
+
+#[test]
+fn a_journal_of_another_device_or_half_a_one_is_refused() {
+    let served = Served::zlac8030l("params_journal");
+    let journal = "node = 4\nvendor_id = 0x100\nproduct_code = 0xABC\nundo = [\n  [\"1017:00\", \"0000\"],\n]\n";
+    served.folder.write("ferrodrive-node4.journal", journal);
+    let ended = served.run(&["params", "rollback", "4"]);
+    assert!(ended.status == Some(1) && ended.err.contains("not written to its end"), "{}", ended.err);
+    served.folder.write("ferrodrive-node4.journal", &format!("{journal}whole = true\n"));
+    let ended = served.run(&["params", "rollback", "4"]);
+    assert!(ended.status == Some(1) && ended.err.contains("product ABCh"), "{}", ended.err);
+    let ended = served.run(&["params", "rollback", "5", "ferrodrive-node4.journal"]);
+    assert!(ended.status == Some(2) && ended.err.contains("is of node 4"), "{}", ended.err);
+}
