@@ -51,6 +51,28 @@ fn answers_and_sync_are_measured_over_tcp_and_the_text_has_its_bars() {
 }
 
 #[test]
+fn a_tpdo_that_follows_sync_is_measured_and_is_no_faster_than_its_wire() {
+    let simulator = Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
+    let bus = simulator.bus("socketcand");
+    let on_bus = |arguments: &[&str]| done(&[&["--bus", &bus, "--timeout", "10s"], arguments].concat());
+    on_bus(&["read", "4", "1000"]);
+    // TPDO1 with 6041h behind each SYNC (1800h:02 = 1).
+    for (object, value) in [("1A00:01", "0x60410010"), ("1A00:00", "1"), ("1800:02", "1")] {
+        on_bus(&["--model", "4=zlac8030l", "write", "4", object, value]);
+    }
+    // Without NMT start nothing comes, and that is said.
+    let measured =
+        |count: &str| done(&["--bus", &bus, "--timeout", "500ms", "--json", "latency", "4", "--count", count]).json();
+    let silent = measured("3");
+    assert!(silent["notes"].to_string().contains("operational"), "{silent}");
+    on_bus(&["nmt", "4", "start"]);
+    let report = measured("30");
+    assert!(figure(&report, "pdo", "count") >= 10.0, "{report}");
+    // 44 bits and two bytes, without stuff bits, at 500 kbit/s: 120 us.
+    assert!(figure(&report, "pdo", "min_us") >= 120.0, "{report}");
+}
+
+#[test]
 fn a_bus_with_a_motor_switched_on_is_sent_no_sync() {
     let simulator = Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
     let bus = simulator.bus("socketcand");
