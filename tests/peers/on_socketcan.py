@@ -17,8 +17,11 @@ import tempfile
 import time
 
 import canopen
+import round_trips
 
 NODE = 4
+#: Round trips for the figures: no check depends on them.
+ROUND_TRIPS = 300
 #: Longest wait for an answer: a guest without hardware support is slow.
 PATIENCE_S = 20
 
@@ -102,15 +105,20 @@ def on(program, sheet, of_drive, ours):
                 except Exception as error:  # any error of a check or a library is this check's failure
                     failed += 1
                     print(f"FAILED {name}: {type(error).__name__}: {error}", flush=True)
+            print(f"canopen-python on {ours}: {round_trips.summary(node, ROUND_TRIPS)}", flush=True)
         finally:
             network.disconnect()
+        ask = [program, "--bus", ours, "--timeout", f"{PATIENCE_S}s", "latency", str(NODE), "--count", str(ROUND_TRIPS)]
+        latency = subprocess.run(ask, capture_output=True, text=True)
+        figures = (latency.stdout or latency.stderr).split("\n\n")[0]
+        print(f"ferrodrive latency on {ours}:\n{figures}", flush=True)
     return failed
 
 
 @contextlib.contextmanager
 def simulator(program, bus):
     """A drive that has joined `bus` and has booted."""
-    command = [program, "--bus", bus, "sim", "--drive", f"zlac8030l@{NODE}"]
+    command = [program, "--bus", bus, "sim", "--drive", f"zlac8030l@{NODE},timing=ideal"]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
     try:
         ready = process.stdout.readline().strip()

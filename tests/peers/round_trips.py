@@ -25,11 +25,16 @@ def main():
         node = network.add_node(arguments.node, canopen.ObjectDictionary())
         node.sdo.RESPONSE_TIMEOUT = 2.0
         node.sdo.upload(0x1000, 0)
-        times = sorted(timed(node) for _ in range(arguments.count))
+        print(summary(node, arguments.count))
     finally:
         network.disconnect()
+
+
+def summary(node, count):
+    """`count` round trips to the node, in words."""
+    times = sorted(timed(node) for _ in range(count))
     quantile = lambda part: times[min(len(times) - 1, int(part * len(times)))]
-    print(
+    return (
         f"{len(times)} round trips in us: least {times[0]:.0f}, median {quantile(0.5):.0f}, 99 % {quantile(0.99):.0f}, "
         f"99.9 % {quantile(0.999):.0f}, most {times[-1]:.0f}"
     )
@@ -42,4 +47,5 @@ def timed(node):
     return (time.perf_counter() - began) * 1e6
 
 
-main()
+if __name__ == "__main__":
+    main()
