@@ -177,6 +177,8 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
         };
         let failure = stop_what_moves(&context, failure).await;
         let notes = notes.borrow();
+        // People have read them when they came; programs have only what is said now.
+        let failure = notes.troubles().filter(|_| global.json).fold(failure, Failure::because);
         Err(notes.lost().into_iter().fold(failure, |failure, lost| without_bus(&context, failure.because(lost))))
     };
     let station = Logged::new(Tap::new(network.clone(), traffic), log, context.ears.clone());

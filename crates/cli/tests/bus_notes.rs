@@ -6,7 +6,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpListener;
 use std::process::Stdio;
 
-use common::{command, page};
+use common::{command, ferrodrive, page};
 use serde_json::{Value, json};
 
 /// A server of socketcand that says `messages` to the first client, and keeps the connection until the client goes.
@@ -68,4 +68,14 @@ fn a_note_is_a_line_of_json_with_its_kind() {
     for value in values.iter().filter(|value| !value["note"].is_null()) {
         validator.validate(value).unwrap_or_else(|error| panic!("{error} in {value}"));
     }
+}
+
+#[test]
+fn a_failure_names_what_the_bus_said_to_programs_too() {
+    let bus = server(&["< error 020 1.000001 >", "< error 040 1.000002 >"]);
+    let ended = ferrodrive(&["--bus", &bus, "--timeout", "300ms", "--json", "read", "4", "1000"]);
+    let report: Value = serde_json::from_str(&ended.out).unwrap();
+    let message = report["error"]["message"].as_str().unwrap();
+    assert!(message.contains("did not answer") && message.contains("bus-off"), "{message}");
+    assert_eq!(ended.err, "");
 }

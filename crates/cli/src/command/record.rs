@@ -31,7 +31,8 @@ use crate::serve::speaker::Speaker;
 ///
 /// Reads each object again and again, by the TPDOs that carry it where the node sends some, else by SDO, and writes the values in
 /// their units to a file that ferrodrive plot draws: .mcap (for Foxglove, PlotJuggler, Rerun; with the frames of others) or
-/// .csv. Nothing is written to the node. Ends after --for, or with Ctrl-C; what is older than a second is on the disk by then.
+/// .csv. Nothing is written to the node. By SDO no other program may ask the same node meanwhile: CiA 301 gives each node one channel,
+/// and each would take the other's answers. Ends after --for, or with Ctrl-C; what is older than a second is on the disk by then.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive --bus can0 --model 4=zlac8030l record 4 velocity_actual_value position_actual_value --out run.mcap --for 10s\n  \

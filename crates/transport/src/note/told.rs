@@ -11,12 +11,13 @@ pub struct BusNotes {
     bus: String,
     told: BTreeSet<&'static str>,
     lost: Option<String>,
+    troubles: Vec<String>,
 }
 
 impl BusNotes {
     /// Nothing has been told yet of `bus`.
     pub fn of(bus: &BusSpec) -> Self {
-        Self { bus: bus.to_string(), told: BTreeSet::new(), lost: None }
+        Self { bus: bus.to_string(), told: BTreeSet::new(), lost: None, troubles: Vec::new() }
     }
 
     /// The line to show for `note`: what happened and what to do about it, if that is new.
@@ -31,12 +32,20 @@ impl BusNotes {
         }
         // An advice names the interface of which most have only one.
         let advice = note.advice().map(|advice| format!("; {}", self.named(advice))).unwrap_or_default();
+        if !advice.is_empty() && !comes_and_goes {
+            self.troubles.push(format!("{note}{advice}"));
+        }
         Some(format!("bus {}: {note}{advice}", self.bus))
     }
 
     /// How the connection to the bus was lost, while it is.
     pub fn lost(&self) -> Option<&str> {
         self.lost.as_deref()
+    }
+
+    /// What was told of the bus that somebody has to do something about, each kind once: a likely cause of what fails there.
+    pub fn troubles(&self) -> impl Iterator<Item = &str> {
+        self.troubles.iter().map(String::as_str)
     }
 
     fn named(&self, advice: &str) -> String {
@@ -56,6 +65,8 @@ mod tests {
         let text = notes.news(&off).unwrap();
         assert!(text.starts_with("bus can3: ") && text.contains("ip link set can3 type can restart"), "{text}");
         assert_eq!(notes.news(&off), None);
+        let troubles: Vec<_> = notes.troubles().collect();
+        assert!(troubles.len() == 1 && text.ends_with(troubles[0]), "{troubles:?}");
         assert!(notes.news(&Note::ConnectionBack).is_some() && notes.news(&Note::ConnectionBack).is_some());
     }
 
