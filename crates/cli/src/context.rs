@@ -18,7 +18,7 @@ use crate::global::Global;
 use crate::progress::Progress;
 use crate::recording::Ears;
 use crate::remembered::Remembered;
-use testbench::machine_file::Machine;
+use testbench::machine_file::{self, Machine};
 use testbench::models::{self, Description};
 
 /// Time for a frame without an answer (NMT) to get onto the bus before a command ends.
@@ -39,6 +39,8 @@ pub(crate) struct Context {
     /// The frames that pass.
     pub(crate) traffic: Traffic,
     bus: BusSpec,
+    /// The machine, where a file describes it.
+    pub(crate) machine: Option<Machine>,
     /// The frames of others.
     pub(crate) ears: Ears,
     timeout: Duration,
@@ -81,7 +83,13 @@ impl Context {
         let models: BTreeMap<_, _> = by_bus.chain(by_user).collect();
         network.set_models(models::with_told(models.values().map(|told| told.description())));
         let ears = Ears::default();
+        // The file of an embedded bus has been read once, to make the bus.
+        let of_bus = match &global.bus {
+            BusSpec::Sim { file: Some(path) } => machine_file::read(path).ok(),
+            _ => None,
+        };
         Self {
+            machine: of_bus.or_else(|| global.machine.clone()),
             network,
             progress,
             ears,

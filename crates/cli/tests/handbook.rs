@@ -92,7 +92,9 @@ fn every_command_of_the_page_on_logs_ends_well() {
 #[test]
 fn every_command_of_the_page_on_parameters_ends_well() {
     let folder = scratch("handbook_params");
-    assert_eq!(follow_in("configure-a-drive.md", &folder), 7);
+    std::fs::create_dir(folder.join("examples")).unwrap();
+    std::fs::copy(root().join("examples/machine.toml"), folder.join("examples/machine.toml")).unwrap();
+    assert_eq!(follow_in("configure-a-drive.md", &folder), 9);
     std::fs::remove_dir_all(folder).unwrap();
 }
 

@@ -27,7 +27,7 @@ use crate::output::Format;
 #[command(after_help = "Examples:\n  ferrodrive params backup 4 -o wheel.toml\n  \
     ferrodrive --bus can0 params plan 4 wheel.toml\n  ferrodrive --bus can0 params apply 4 wheel.toml --save --prove\n  \
     ferrodrive --bus can0 params verify 4 wheel.toml\n  ferrodrive params diff 4 wheel.toml\n  \
-    ferrodrive --bus can0 params rollback 4")]
+    ferrodrive --bus can0 params rollback 4\n  ferrodrive --bus can0 --machine machine.toml params apply 4")]
 pub(crate) struct Params {
     #[command(subcommand)]
     what: What,
@@ -130,9 +130,9 @@ struct Wanted {
     /// Node-ID
     #[arg(value_parser = node)]
     node: NodeId,
-    /// The parameters: .toml, .dcf or .bin
+    /// The parameters: .toml, .dcf or .bin (default: what the machine file says of the node)
     #[arg(value_name = "FILE")]
-    file: PathBuf,
+    file: Option<PathBuf>,
 }
 
 /// How a drive starts anew.

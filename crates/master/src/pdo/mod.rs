@@ -10,6 +10,8 @@ mod error;
 mod node;
 mod signal;
 mod transaction;
+mod values;
 
 pub use config::{PdoConfig, TimerUnits, TransmissionType};
 pub use error::{PdoError, SignalError};
+pub use values::{PdoUnfit, record_of, values_off};

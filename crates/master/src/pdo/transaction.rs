@@ -100,7 +100,7 @@ fn plan(node: &Node, config: &PdoConfig, units: TimerUnits) -> Result<Vec<Write>
 }
 
 /// A time in counts of the device's timer, rounded to the nearest; a time that is not zero never becomes zero.
-fn counts(time: Duration, unit: Duration) -> Option<u16> {
+pub(super) fn counts(time: Duration, unit: Duration) -> Option<u16> {
     let unit_ns = unit.as_nanos().max(1);
     let counts = (time.as_nanos() + unit_ns / 2) / unit_ns;
     u16::try_from(if time.is_zero() { 0 } else { counts.max(1) }).ok()

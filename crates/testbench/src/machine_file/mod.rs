@@ -5,21 +5,26 @@
 //! what a world command can, and no more. Each key is described in `docs/machine-file.md`.
 
 mod bodies;
+mod configuration;
 mod surroundings;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use can::{Bitrate, Instant};
-use canopen::NodeId;
+use canopen::{Mux, NodeId};
+use master::identify::Identity;
+use master::parameters::{Parameters, from_any_state};
 use sim::machine::{Realism, TimingMode};
 use sim::{Place, Source, Stimulus, VirtualDrive, World};
 
-use crate::document::reader::{self, Field, Parameters, Table};
+use crate::document::reader::{self, Field, Parameters as Placeholders, Table};
 use crate::document::{BadFile, Located, Problem, read_text};
 use crate::models::{Description, resolve_in};
 use crate::words::drive::DriveSpec;
 use crate::words::node::node;
 use bodies::Joined;
+pub use configuration::{mapped, pdo_id};
 
 const EXAMPLE: &str =
     "[[drive]]\n           model = \"zlac8030l\"\n           node = 4\n           load = { torque_nm = 0.5 }";
@@ -47,6 +52,10 @@ pub const DRIVE_KEYS: &[&str] = &[
     "temperatures_c",
     "faults",
     "battery",
+    "pdos",
+    "limits",
+    "heartbeat",
+    "start_up",
 ];
 
 /// A machine as its file describes it.
@@ -76,8 +85,10 @@ pub struct Placed {
     source_at: Option<Located>,
     /// What is around it, and where the file says so.
     around: Vec<(Stimulus, Located)>,
-    /// The keys that the file has of it, `model` and `node` left out.
+    /// The keys that the file has of it for a simulated machine.
     keys: Vec<&'static str>,
+    /// What a master writes to it at its start.
+    start_up: BTreeMap<Mux, Vec<u8>>,
 }
 
 /// The machine that the file at `path` describes. Data sheets that it names are looked for beside it.
@@ -116,7 +127,7 @@ impl Machine {
     /// # Errors
     /// The same.
     pub fn parse_in(text: &str, folder: &Path) -> Result<Self, BadFile> {
-        reader::read(text, &Parameters::new(), "a machine file", |file| Self::from_table(file, folder))
+        reader::read(text, &Placeholders::new(), "a machine file", |file| Self::from_table(file, folder))
             .map_err(|problems| BadFile::new(text, problems))
     }
 
@@ -174,6 +185,28 @@ impl Machine {
     pub fn models(&self) -> impl Iterator<Item = (NodeId, &'static Description)> {
         let nodes = self.drives.iter().filter(|drive| !drive.spec.unconfigured);
         nodes.map(|drive| (drive.spec.node, drive.spec.description()))
+    }
+
+    /// What a master shall have a node be set to: `pdos`, `limits`, `heartbeat` and `start_up` of its drive, and the identity of its
+    /// model. `None` for a node that is not in the file.
+    pub fn parameters(&self, node: NodeId) -> Option<Parameters> {
+        let placed = self.drives.iter().find(|drive| drive.spec.node == node)?;
+        let model = placed.spec.description().identity;
+        let known = |number: u32| Some(number).filter(|number| *number != 0);
+        let identity = Identity {
+            device_type: None,
+            vendor_id: known(model.vendor_id),
+            product_code: known(model.product_code),
+            revision_number: known(model.revision_number),
+        };
+        Some(Parameters { identity, node: Some(node), values: placed.start_up.clone() })
+    }
+
+    /// The writes that set a node up so, whatever it has, in the order of CiA 301; none for a node that is not in the file, or
+    /// of which it says nothing.
+    pub fn configuration(&self, node: NodeId) -> Vec<(Mux, Vec<u8>)> {
+        let Some(placed) = self.drives.iter().find(|drive| drive.spec.node == node) else { return Vec::new() };
+        from_any_state(Some(placed.spec.description()), node, &placed.start_up)
     }
 
     /// Its bus, still without drives.
@@ -260,7 +293,14 @@ impl Machine {
 /// A drive with nothing around it.
 impl From<DriveSpec> for Placed {
     fn from(spec: DriveSpec) -> Self {
-        Self { spec, source: Source::default(), source_at: None, around: Vec::new(), keys: Vec::new() }
+        Self {
+            spec,
+            source: Source::default(),
+            source_at: None,
+            around: Vec::new(),
+            keys: Vec::new(),
+            start_up: BTreeMap::new(),
+        }
     }
 }
 
@@ -342,10 +382,11 @@ impl Placed {
             });
             noted(set, &mut problems);
         }
-        let keys =
-            DRIVE_KEYS.iter().copied().filter(|key| !matches!(*key, "model" | "node") && table.get(key).is_some());
+        let start_up = configuration::values(table, spec.description(), id, &mut problems);
+        let of_simulator = |key: &&str| !matches!(*key, "model" | "node") && !configuration::KEYS.contains(key);
+        let keys = DRIVE_KEYS.iter().copied().filter(|key| of_simulator(key) && table.get(key).is_some());
         if problems.is_empty() {
-            Ok(Self { spec, source, source_at, around, keys: keys.collect() })
+            Ok(Self { spec, source, source_at, around, keys: keys.collect(), start_up })
         } else {
             Err(problems)
         }

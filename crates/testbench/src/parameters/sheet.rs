@@ -137,6 +137,18 @@ fn resolve(field: &Field<'_>, model: Option<&'static Description>) -> Result<(Mu
     found.map_err(|reason| field.problem(reason))
 }
 
+/// The value of a field for an object of a model, as delivered in what decides about its unit.
+///
+/// # Errors
+/// That it is none.
+pub fn value_of(field: &Field<'_>, row: &'static Entry, model: &'static Description) -> Result<Vec<u8>, Problem> {
+    let resolution = row.resolution.and_then(|place| match model.row(place)?.default {
+        DefaultValue::Value(value) => Some(value),
+        _ => None,
+    });
+    bytes_of(field, Some(row), resolution.unwrap_or(1).max(1))
+}
+
 fn bytes_of(field: &Field<'_>, row: Option<&'static Entry>, resolution: i64) -> Result<Vec<u8>, Problem> {
     let text = match field.number(VALUE) {
         Ok(number) if number.fract() != 0.0 => number.to_string(),

@@ -57,7 +57,7 @@ impl super::Apply {
         }
         context.tell_guess(&drive);
         let model = drive.description();
-        let wanted = source::read(&self.wanted.file, model, Some(id))?;
+        let (wanted, file) = source::wanted(context, &self.wanted, model)?;
         drive.check_at_rest().await.map_err(source::refused)?;
         context.progress.show(format!("node {id}: reading {} objects", wanted.values.len()));
         let options = PlanOptions { address: self.address };
@@ -65,7 +65,7 @@ impl super::Apply {
         let applied = self.write(context, &drive, &plan).await?;
         let mut report = ApplyReport {
             node: id.raw(),
-            file: self.wanted.file.display().to_string(),
+            file,
             writes: applied.writes,
             rounded: rounded(&applied, model),
             left: LeftOut::of(model, &plan),

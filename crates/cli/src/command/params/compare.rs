@@ -125,7 +125,7 @@ impl super::Verify {
     pub(super) async fn run(&self, context: &Context) -> Result<VerifyReport, Failure> {
         let drive = context.drive(self.wanted.node).await?;
         let model = drive.description();
-        let wanted = source::read(&self.wanted.file, model, Some(self.wanted.node))?;
+        let (wanted, file) = source::wanted(context, &self.wanted, model)?;
         // A plan tells another device, and what of the file is no parameter; what does not fit is a deviation here.
         let left = match drive.plan_parameters(&wanted, PlanOptions { address: true }).await {
             Ok(plan) => plan.left,
@@ -149,7 +149,7 @@ impl super::Verify {
         Ok(VerifyReport {
             ok: deviations.is_empty(),
             node: self.wanted.node.raw(),
-            file: self.wanted.file.display().to_string(),
+            file,
             compared: compared.len(),
             deviations,
         })

@@ -76,8 +76,9 @@ pub(super) fn notes(plan: &Plan, model: Option<&'static Description>) -> Vec<Str
         .filter(|object| plan.steps.iter().any(|step| step.object == **object))
         .map(ToString::to_string)
         .collect();
-    let written = plan.wanted.keys().filter(|object| plan.steps.iter().any(|step| step.object == **object));
-    for object in written.filter(|object| !is_kept(Some(model), **object)) {
+    let changed =
+        plan.wanted.iter().filter(|(object, value)| plan.current.get(object).is_some_and(|now| now != *value));
+    for object in changed.map(|(object, _)| object).filter(|object| !is_kept(Some(model), **object)) {
         let name = name(Some(model), *object).unwrap_or_default();
         notes.push(format!("{object} {name} is not kept in the drive's memory: it is gone with its supply"));
     }
@@ -97,7 +98,7 @@ impl super::PlanArguments {
         let id = self.wanted.node;
         let drive = context.drive(id).await?;
         let model = drive.description();
-        let wanted = source::read(&self.wanted.file, model, Some(id))?;
+        let (wanted, file) = source::wanted(context, &self.wanted, model)?;
         context.progress.show(format!("node {id}: reading {} objects", wanted.values.len()));
         let options = PlanOptions { address: self.address };
         let plan = drive.plan_parameters(&wanted, options).await.map_err(source::refused)?;
@@ -115,7 +116,7 @@ impl super::PlanArguments {
         }
         Ok(PlanReport {
             node: id.raw(),
-            file: self.wanted.file.display().to_string(),
+            file,
             same: plan.wanted.len() - changed,
             steps: steps.collect(),
             left: LeftOut::of(model, &plan),

@@ -6,6 +6,7 @@ use canopen::NodeId;
 use devices::Description;
 use master::parameters::{Deviation, Parameters, PlanError, Unfit};
 
+use crate::context::Context;
 use crate::failure::Failure;
 
 /// Reads a file for a node. What the file has of another node of the same model follows this one's node-ID.
@@ -26,6 +27,29 @@ pub(super) fn read(
         Some(node) => parameters.for_node(node, model),
         None => parameters,
     })
+}
+
+/// What a node is to have, and where that is said: in the file that was named, or in the machine file.
+pub(super) fn wanted(
+    context: &Context,
+    wanted: &super::Wanted,
+    model: Option<&'static Description>,
+) -> Result<(Parameters, String), Failure> {
+    if let Some(path) = &wanted.file {
+        return Ok((read(path, model, Some(wanted.node))?, path.display().to_string()));
+    }
+    let Some(machine) = &context.machine else {
+        return Err(
+            Failure::usage("which parameters?").next("name their file, or a machine file with --machine FILE.toml")
+        );
+    };
+    let node = wanted.node;
+    let found = machine.parameters(node).filter(|parameters| !parameters.values.is_empty());
+    let found = found.ok_or_else(|| {
+        Failure::usage(format!("the machine file says nothing of what node {node} is to be set to"))
+            .next("give its [[drive]] pdos, limits, heartbeat or start_up (docs/machine-file.md), or name a file of parameters")
+    })?;
+    Ok((found, "the machine file".to_owned()))
 }
 
 /// A refusal before anything was written.
