@@ -92,6 +92,7 @@ pub mod decode;
 pub mod drive;
 mod error;
 pub mod gateway;
+pub mod group;
 mod host_loss;
 pub mod identify;
 pub mod latency;

@@ -77,6 +77,12 @@ impl From<Degrees> for Angle {
     }
 }
 
+impl From<Degrees> for Turns {
+    fn from(angle: Degrees) -> Self {
+        Self(angle.0 / 360.0)
+    }
+}
+
 impl From<Turns> for Angle {
     fn from(angle: Turns) -> Self {
         Self::Turns(angle.0)

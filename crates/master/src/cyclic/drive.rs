@@ -4,7 +4,7 @@ use canopen::{Mux, NodeId};
 use cia402::{Controlword, ModeOfOperation, PowerState, Statusword};
 use devices::PowerStyle;
 
-use super::demand::{CyclicState, Demand, Refusal};
+use super::demand::{Bound, CyclicState, Demand, Refusal};
 use super::sequence::controlword;
 use super::target::{Kind, Target};
 use crate::core::{Cadence, SetPoint, Signal, WatchId};
@@ -79,6 +79,33 @@ impl CyclicDrive {
     /// The mode in which it is moved.
     pub const fn mode(&self) -> ModeOfOperation {
         self.mode
+    }
+
+    /// The highest speed that set-points may ask for, by the drive's own objects; `None` in a mode for torque.
+    pub fn highest_speed(&self) -> Option<(Rpm, Bound)> {
+        match self.target.kind {
+            Kind::Position { counts_per_turn, counts_per_s, speed, .. } => {
+                Some((Rpm(counts_per_s / counts_per_turn * 60.0), speed))
+            }
+            Kind::Velocity { per_count } => {
+                let bound = Bound::from(self.target.limits);
+                Some((Rpm(bound.high as f64 * per_count), bound))
+            }
+            Kind::Current { .. } => None,
+        }
+    }
+
+    /// The position that was sent last, in a mode that takes positions.
+    pub fn set_point(&self) -> Option<Turns> {
+        match self.target.kind {
+            Kind::Position { counts_per_turn, .. } => Some(Turns(self.target.last_sent as f64 / counts_per_turn)),
+            Kind::Velocity { .. } | Kind::Current { .. } => None,
+        }
+    }
+
+    /// True if the drive's position comes by TPDO.
+    pub const fn shows_position(&self) -> bool {
+        self.position.is_some()
     }
 
     /// What the drive does when this program dies in the middle of a motion.

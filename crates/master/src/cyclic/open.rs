@@ -209,6 +209,19 @@ impl Drive {
     /// # Errors
     /// [`CyclicError`].
     pub async fn configure_cyclic(&self, mode: ModeOfOperation) -> Result<(), CyclicError> {
+        self.configure_cyclic_with(mode, false).await
+    }
+
+    /// As [`configure_cyclic`](Self::configure_cyclic), and in every mode the TPDO shows the position: for a program that
+    /// counts where the shaft came to while it gives speeds.
+    ///
+    /// # Errors
+    /// [`CyclicError`].
+    pub async fn configure_cyclic_with_position(&self, mode: ModeOfOperation) -> Result<(), CyclicError> {
+        self.configure_cyclic_with(mode, true).await
+    }
+
+    async fn configure_cyclic_with(&self, mode: ModeOfOperation, position: bool) -> Result<(), CyclicError> {
         let (description, axis) = (self.known(INTENT)?, self.motion(INTENT)?);
         let node = self.node().id();
         let target = match set_point_of(description, axis, mode) {
@@ -237,6 +250,8 @@ impl Drive {
         let statusword = Some(axis.object(STATUSWORD));
         let state = match set_point_of(description, axis, mode) {
             Some(SetPointKind::Position(_)) => map(&[statusword, Some(axis.object(POSITION_ACTUAL))]),
+            // What does not fit any more is left out.
+            _ if position => map(&[statusword, Some(axis.object(POSITION_ACTUAL)), velocity, current]),
             _ => map(&[statusword, velocity, current]),
         };
         let command = map(&[Some(axis.object(CONTROLWORD)), Some(target)]);

@@ -201,6 +201,18 @@ impl Drive {
         Ok(sent)
     }
 
+    /// Sets ramps that follow a new speed in every cycle: drives with times take this period for each change, drives with rates
+    /// twice the acceleration that the speeds have. The program makes the ramps then; a stop of the drive's own by its
+    /// profile deceleration (6084h) becomes as hard as its current allows.
+    pub(crate) async fn write_ramps_of_a_cycle(&self, period: Duration, rpm_per_s: f64) -> Result<(), Error> {
+        let ramp = match self.ramps("follow a speed in each cycle")? {
+            Ramps::Times { .. } => Ramp::Time(period),
+            Ramps::Rates { .. } => Ramp::RpmPerSecond(2.0 * rpm_per_s),
+        };
+        // The change does not matter to either, but for being one.
+        self.write_ramps(Some(ramp), Some(ramp), 1.0).await.map(|_| ())
+    }
+
     /// The speed from which a ramp to a new target begins: the one that is kept, without the noise of what is measured; where
     /// the shaft does not follow its target, as it turns.
     pub(super) async fn ramp_start_rpm(&self) -> Result<f64, Error> {

@@ -1,4 +1,4 @@
-use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::Duration;
@@ -43,6 +43,8 @@ pub(super) struct Shared {
     models: Models,
     /// What watches this program, by node.
     guards: BTreeMap<NodeId, Guard>,
+    /// Axes that belong to a group or a base, by the place of their controlword.
+    pub(super) claims: BTreeSet<(NodeId, Mux)>,
 }
 
 /// Commands that wait for a runner. Requests and timers are bounded by the futures that wait for them; the rest by
@@ -191,6 +193,11 @@ impl Network {
     /// The controlwords of the axes that this program has set in motion and not stopped again.
     pub(crate) fn moved_axes(&self) -> Vec<(NodeId, Mux)> {
         self.lock().moved.axes()
+    }
+
+    /// True if both are handles of one network.
+    pub(crate) fn is_same_as(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.shared, &other.shared)
     }
 
     /// The guards of this program, to look at or to change.

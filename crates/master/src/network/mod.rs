@@ -5,6 +5,7 @@
 //! sleeping is a deadline in the core. Nothing here knows the time: what is asked for is queued and carried out at
 //! the runner's next call, for which [`poll_timeout`](Station::poll_timeout) asks at once.
 
+mod claim;
 mod cycle;
 mod future;
 mod handle;
@@ -12,6 +13,7 @@ mod join;
 mod moved;
 mod node;
 
+pub(crate) use claim::Claim;
 pub use cycle::{Exchange, NextSync, NoCycle};
 pub use future::{Elapsed, NodeView, Sleep, Wait};
 pub use handle::Network;

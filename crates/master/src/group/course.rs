@@ -1,0 +1,233 @@
+//! What a group does in one cycle: the state machine between its intents and its drives.
+
+use can::Instant;
+
+use super::axis::Axis;
+use super::limits::{AxisLimits, PathPoint};
+use super::state::{GroupState, Phase, StopCause};
+use super::stream::{Due, Stream};
+use super::trajectory::Trajectory;
+use crate::core::Cycle;
+use crate::cyclic::{CyclicState, Demand, Refusal};
+use crate::network::Exchange;
+
+/// What the axes are on.
+#[derive(Debug)]
+pub(super) enum Course {
+    Off,
+    Enabling,
+    Holding,
+    Moving {
+        path: Trajectory,
+        time_s: f64,
+    },
+    Streaming(Stream),
+    Stopping {
+        path: Trajectory,
+        time_s: f64,
+    },
+    /// No path to rest was found: each drive by its own quick stop (605Ah).
+    QuickStop,
+}
+
+/// The axes of a group and their path, stepped once in each cycle of SYNC.
+#[derive(Debug)]
+pub(super) struct Runner {
+    pub(super) axes: Vec<Axis>,
+    pub(super) limits: Vec<AxisLimits>,
+    /// Where each axis is on its path.
+    pub(super) points: Vec<PathPoint>,
+    pub(super) states: Vec<CyclicState>,
+    pub(super) course: Course,
+    pub(super) cause: Option<StopCause>,
+    pub(super) period_s: f64,
+    seen: Option<Cycle>,
+    missed_cycles: u64,
+    /// When the last move or stream sent its first set-points.
+    pub(super) began: Option<Instant>,
+}
+
+const UNSEEN: CyclicState = CyclicState {
+    statusword: None,
+    power: None,
+    follows: false,
+    position: None,
+    velocity: None,
+    current: None,
+    age: None,
+    refused: None,
+};
+
+impl Runner {
+    pub(super) fn new(axes: Vec<Axis>, limits: Vec<AxisLimits>, period_s: f64) -> Self {
+        let count = axes.len();
+        Self {
+            axes,
+            limits,
+            points: vec![PathPoint::default(); count],
+            states: vec![UNSEEN; count],
+            course: Course::Off,
+            cause: None,
+            period_s,
+            seen: None,
+            missed_cycles: 0,
+            began: None,
+        }
+    }
+
+    pub(super) const fn phase(&self) -> Phase {
+        match self.course {
+            Course::Off => Phase::Off,
+            Course::Enabling => Phase::Enabling,
+            Course::Holding => Phase::Holding,
+            Course::Moving { .. } => Phase::Moving,
+            Course::Streaming(_) => Phase::Streaming,
+            Course::Stopping { .. } | Course::QuickStop => Phase::Stopping,
+        }
+    }
+
+    pub(super) const fn state(&self) -> GroupState {
+        GroupState { phase: self.phase(), cause: self.cause, missed_cycles: self.missed_cycles }
+    }
+
+    /// One cycle. Allocates nothing, but for a stop.
+    pub(super) fn step(&mut self, io: &mut Exchange<'_>) -> GroupState {
+        if let Some(cycle) = io.cycle() {
+            self.missed_cycles += self.seen.map_or(0, |before| cycle.missed_since(&before));
+            self.seen = Some(cycle);
+        }
+        self.advance(io.now());
+        self.drive(io);
+        if let Some(cause) = self.find_trouble() {
+            self.stop(cause);
+        }
+        if matches!(self.course, Course::Enabling) && self.states.iter().all(|state| state.follows) {
+            self.begin();
+        }
+        self.state()
+    }
+
+    /// The points of this cycle. A path goes on by one period a step: cycles that the program missed delay it, since to make
+    /// up for them would take a leap.
+    fn advance(&mut self, now: Instant) {
+        let period_s = self.period_s;
+        match &mut self.course {
+            Course::Off | Course::Enabling | Course::Holding | Course::QuickStop => {}
+            Course::Moving { path, time_s } | Course::Stopping { path, time_s } => {
+                if *time_s == 0.0 {
+                    self.began = Some(now);
+                }
+                *time_s += period_s;
+                path.at(*time_s, &mut self.points);
+                if *time_s >= path.duration_s() {
+                    self.course = Course::Holding;
+                }
+            }
+            Course::Streaming(stream) => match stream.take(&mut self.points) {
+                Due::Point | Due::Late | Due::Wait => {}
+                Due::Underrun => {
+                    let cycles = stream.grace();
+                    self.stop(StopCause::Underrun { cycles });
+                    self.advance(now);
+                }
+                Due::End => {
+                    self.come_to_rest();
+                    self.advance(now);
+                }
+            },
+        }
+        if matches!(self.course, Course::Holding) {
+            for point in &mut self.points {
+                *point = PathPoint { position_turns: point.position_turns, ..PathPoint::default() };
+            }
+        }
+        self.keep_in_range();
+    }
+
+    /// The way to rest of a stop, or the way on of a stream that is late, may lead over a software limit. There the limit
+    /// counts more than a smooth stop. An axis that began outside is let come back.
+    fn keep_in_range(&mut self) {
+        if !matches!(self.course, Course::Streaming(_) | Course::Stopping { .. }) {
+            return;
+        }
+        for (point, limits) in self.points.iter_mut().zip(&self.limits) {
+            let Some(range) = &limits.range_turns else { continue };
+            let outward = (point.position_turns > *range.end() && point.velocity_turns_s > 0.0)
+                || (point.position_turns < *range.start() && point.velocity_turns_s < 0.0);
+            if outward {
+                let position_turns = point.position_turns.clamp(*range.start(), *range.end());
+                *point = PathPoint { position_turns, ..PathPoint::default() };
+            }
+        }
+    }
+
+    fn drive(&mut self, io: &mut Exchange<'_>) {
+        let demand = match self.course {
+            Course::Off => Some(Demand::Off),
+            Course::Enabling => Some(Demand::Hold),
+            Course::QuickStop => Some(Demand::QuickStop),
+            _ => None,
+        };
+        let axes = self.axes.iter_mut().zip(&self.points).zip(&self.limits);
+        for (((axis, point), limits), state) in axes.zip(&mut self.states) {
+            *state = match demand {
+                Some(demand) => axis.drive.step(io, demand),
+                None => axis.follow(io, *point, limits, state),
+            };
+        }
+    }
+
+    /// What stops the whole group.
+    fn find_trouble(&self) -> Option<StopCause> {
+        if self.cause.is_some() || matches!(self.course, Course::Off | Course::QuickStop) {
+            return None;
+        }
+        let enabling = matches!(self.course, Course::Enabling);
+        for ((number, axis), (state, limits)) in (1..).zip(&self.axes).zip(self.states.iter().zip(&self.limits)) {
+            let node = axis.drive.node();
+            match state.refused {
+                // Its first TPDO is on its way.
+                Some(Refusal::NotHeard | Refusal::NoCycle) if enabling => {}
+                Some(refusal) => return Some(StopCause::Axis { axis: number, node, refusal }),
+                None => {}
+            }
+            let limit_turns = limits.following_error_turns;
+            if let Some(error_turns) = axis.error_turns.filter(|error| !enabling && *error > limit_turns) {
+                return Some(StopCause::FollowingError { axis: number, node, error_turns, limit_turns });
+            }
+        }
+        None
+    }
+
+    /// All axes follow: their path begins where they are held.
+    fn begin(&mut self) {
+        let begun = self.axes.iter_mut().zip(&self.states).zip(&mut self.points);
+        let mut known = true;
+        for ((axis, state), point) in begun {
+            match axis.begin(state) {
+                Some(at) => *point = at,
+                None => known = false,
+            }
+        }
+        if known {
+            self.course = Course::Holding;
+        }
+    }
+
+    /// Brings all axes to rest, for this reason.
+    pub(super) fn stop(&mut self, cause: StopCause) {
+        self.cause.get_or_insert(cause);
+        match self.course {
+            Course::Enabling => self.course = Course::Off,
+            Course::Moving { .. } | Course::Streaming(_) => self.come_to_rest(),
+            Course::Off | Course::Holding | Course::Stopping { .. } | Course::QuickStop => {}
+        }
+    }
+
+    fn come_to_rest(&mut self) {
+        self.course = match Trajectory::to_rest(&self.points, &self.limits) {
+            Ok(path) => Course::Stopping { path, time_s: 0.0 },
+            Err(_) => Course::QuickStop,
+        };
+    }
+}

@@ -1,0 +1,118 @@
+//! Why a group cannot be made, or did not do what it should.
+
+use core::time::Duration;
+
+use canopen::{Mux, NodeId};
+use cia402::ModeOfOperation;
+
+use super::limits::PathError;
+use super::state::{Phase, StopCause};
+use crate::cyclic::{Bound, CyclicError};
+use crate::error::Error;
+use crate::network::NoCycle;
+use crate::units::Shown;
+
+/// Periods that are taken: below, no bus carries a drive's frames; above, drives that interpolate do not wait so long.
+pub(super) const PERIODS: core::ops::RangeInclusive<Duration> = Duration::from_micros(500)..=Duration::from_millis(100);
+
+/// Why a group cannot be made, or did not do what it should.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum GroupError {
+    /// A group of nobody.
+    #[error("a group needs at least one axis")]
+    NoAxis,
+    /// The drives are on several networks, which no SYNC joins.
+    #[error("the axes of a group have to be on one network: node {node} is on another than the first axis")]
+    OtherNetwork {
+        /// The node.
+        node: NodeId,
+    },
+    /// Another group or base has the axis.
+    #[error(
+        "node {node} ({controlword}) already belongs to a group: an axis follows one at a time. Close the other one first"
+    )]
+    Taken {
+        /// The node.
+        node: NodeId,
+        /// Its controlword: which axis it is.
+        controlword: Mux,
+    },
+    /// A period that cannot be held.
+    #[error("a period of {} ms is outside of {} to {} ms", ms(*given), ms(*PERIODS.start()), ms(*PERIODS.end()))]
+    Period {
+        /// What was given.
+        given: Duration,
+    },
+    /// The limit is more than the drive does.
+    #[error(
+        "axis {axis}, node {node}: a velocity of {} r/min was stated as its limit, and the drive does {} r/min at most, by \
+         {bound}. State less", Shown(*stated_rpm), Shown(*most_rpm)
+    )]
+    BeyondDrive {
+        /// Which axis, from 1.
+        axis: usize,
+        /// Its node.
+        node: NodeId,
+        /// What was stated.
+        stated_rpm: f64,
+        /// What the drive does.
+        most_rpm: f64,
+        /// Where that stands.
+        bound: Bound,
+    },
+    /// The mode has no position or speed as its set-point, or the drive does not show where it is.
+    #[error(
+        "axis {axis}, node {node}, cannot follow a path in mode {mode}: choose one for positions or speed, and map the \
+         position actual value to a TPDO that comes each cycle"
+    )]
+    NoPosition {
+        /// Which axis, from 1.
+        axis: usize,
+        /// Its node.
+        node: NodeId,
+        /// The mode.
+        mode: ModeOfOperation,
+    },
+    /// A path or a limit is wrong.
+    #[error(transparent)]
+    Path(#[from] PathError),
+    /// The group was stopped.
+    #[error("{0}")]
+    Stopped(StopCause),
+    /// It has to be in another phase.
+    #[error("the group is {phase}: {remedy}")]
+    Phase {
+        /// What it is doing.
+        phase: Phase,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// The stream has no room.
+    #[error("the stream has no room for a further point: wait for the next cycle, or give it a larger capacity")]
+    StreamFull,
+    /// The drives were not enabled in time.
+    #[error("axis {axis}, node {node}, was not enabled within {} s: {shows}. Drive::explain_refusal asks it why", limit.as_secs())]
+    NotEnabled {
+        /// Which axis, from 1.
+        axis: usize,
+        /// Its node.
+        node: NodeId,
+        /// How long it was waited for.
+        limit: Duration,
+        /// What it shows.
+        shows: String,
+    },
+    /// A drive cannot be moved cycle by cycle.
+    #[error(transparent)]
+    Cyclic(#[from] CyclicError),
+    /// A request failed.
+    #[error(transparent)]
+    Drive(#[from] Error),
+    /// There is no next cycle.
+    #[error(transparent)]
+    NoCycle(#[from] NoCycle),
+}
+
+fn ms(time: Duration) -> f64 {
+    time.as_secs_f64() * 1e3
+}

@@ -1,0 +1,273 @@
+//! A group as its program holds it: intents, and the cycle that carries them out.
+
+use core::fmt;
+use core::time::Duration;
+
+use can::Instant;
+use cia402::PowerState;
+
+use super::course::{Course, Runner};
+use super::error::GroupError;
+use super::limits::PathPoint;
+use super::state::{GroupState, Phase, StopCause};
+use super::stream::{Stream, StreamOptions};
+use super::trajectory::Trajectory;
+use crate::cyclic::CyclicState;
+use crate::drive::Drive;
+use crate::network::{Exchange, Network, join_all};
+use crate::units::Turns;
+
+/// How long drives may take to be enabled, and to be without power again.
+const POWER_LIMIT: Duration = Duration::from_secs(5);
+
+/// The most points that a stream keeps: a minute at 1 ms.
+const MOST_POINTS: usize = 60_000;
+
+/// Several axes that move as one. See the [module](super).
+pub struct Group {
+    pub(super) network: Network,
+    pub(super) drives: Vec<Drive>,
+    pub(super) runner: Runner,
+}
+
+impl Group {
+    /// One cycle: looks at all drives and gives each its next set-point. To be called once after each SYNC, in
+    /// [`Network::exchange`]; [`cycle`](Self::cycle) waits and does both.
+    pub fn step(&mut self, io: &mut Exchange<'_>) -> GroupState {
+        self.runner.step(io)
+    }
+
+    /// Waits for the next SYNC and does one cycle.
+    ///
+    /// # Errors
+    /// [`GroupError::NoCycle`]: the master has stopped the drives.
+    pub async fn cycle(&mut self) -> Result<GroupState, GroupError> {
+        self.network.next_sync().await?;
+        let runner = &mut self.runner;
+        Ok(self.network.exchange(|io| runner.step(io)))
+    }
+
+    /// What the group is doing.
+    pub const fn state(&self) -> GroupState {
+        self.runner.state()
+    }
+
+    /// What each drive showed in the last cycle, in the order of the group.
+    pub fn axes(&self) -> &[CyclicState] {
+        &self.runner.states
+    }
+
+    /// Where each axis is on its path: its newest set-points.
+    pub fn points(&self) -> &[PathPoint] {
+        &self.runner.points
+    }
+
+    /// How far each shaft was from its set-point in the last cycle, in turns; `None` where its position did not come.
+    pub fn following_errors(&self) -> impl Iterator<Item = Option<f64>> {
+        self.runner.axes.iter().map(|axis| axis.error_turns)
+    }
+
+    /// When the last move gave its first set-points: all of them in one exchange, for one SYNC.
+    pub const fn began(&self) -> Option<Instant> {
+        self.runner.began
+    }
+
+    /// Has all drives enabled from the next cycle on.
+    pub fn start_enabling(&mut self) {
+        if matches!(self.runner.course, Course::Off) {
+            self.runner.cause = None;
+            self.runner.course = Course::Enabling;
+        }
+    }
+
+    /// Enables all drives and holds them.
+    ///
+    /// # Errors
+    /// [`GroupError::Stopped`] when a drive is at fault, [`GroupError::NotEnabled`] when one takes too long, those of
+    /// [`cycle`](Self::cycle). The drives are then without power.
+    pub async fn enable(&mut self) -> Result<(), GroupError> {
+        if !matches!(self.runner.course, Course::Off) {
+            return self.check_going();
+        }
+        // A cycle without power ends what an earlier stop has left behind.
+        self.cycle().await?;
+        self.start_enabling();
+        for _ in 0..self.cycles(POWER_LIMIT) {
+            match self.cycle().await? {
+                GroupState { cause: Some(cause), .. } => return Err(GroupError::Stopped(cause)),
+                GroupState { phase: Phase::Holding, .. } => return Ok(()),
+                _ => {}
+            }
+        }
+        let late = self.runner.states.iter().position(|state| !state.follows).unwrap_or(0);
+        let (node, shows) = (self.runner.axes[late].drive.node(), self.runner.states[late].to_string());
+        self.runner.course = Course::Off;
+        self.cycle().await?;
+        Err(GroupError::NotEnabled { axis: late + 1, node, limit: POWER_LIMIT, shows })
+    }
+
+    /// Plans a move of all axes to these positions, at rest there, and begins it with the next cycle. All axes begin with one
+    /// SYNC and end together; `within` gives the time, else it is the shortest within the limits. A group that is moving is
+    /// led over smoothly.
+    ///
+    /// # Errors
+    /// [`GroupError::Path`], [`GroupError::Stopped`], [`GroupError::Phase`]; then nothing changes.
+    pub fn start_move(&mut self, to: &[Turns], within: Option<Duration>) -> Result<Duration, GroupError> {
+        self.check_going()?;
+        if !matches!(self.runner.course, Course::Holding | Course::Moving { .. }) {
+            return Err(self.not_now());
+        }
+        let to: Vec<_> = to.iter().map(|Turns(turns)| *turns).collect();
+        let path = Trajectory::to_rest_at(&self.runner.points, &to, &self.runner.limits, within)?;
+        let time = Duration::from_secs_f64(path.duration_s());
+        self.runner.course = Course::Moving { path, time_s: 0.0 };
+        Ok(time)
+    }
+
+    /// [`start_move`](Self::start_move), until all axes have their last set-point.
+    ///
+    /// # Errors
+    /// As [`start_move`](Self::start_move) and [`cycle`](Self::cycle); [`GroupError::Stopped`], once all axes rest.
+    pub async fn move_to(&mut self, to: &[Turns], within: Option<Duration>) -> Result<(), GroupError> {
+        self.start_move(to, within)?;
+        self.rest().await
+    }
+
+    /// Cycles until the group rests.
+    ///
+    /// # Errors
+    /// As [`cycle`](Self::cycle); [`GroupError::Stopped`], once all axes rest.
+    pub async fn rest(&mut self) -> Result<(), GroupError> {
+        while matches!(self.state().phase, Phase::Moving | Phase::Streaming | Phase::Stopping) {
+            // A quick stop has no end that the group plans: its drives stand when they say so.
+            if matches!(self.runner.course, Course::QuickStop) {
+                return self.check_going();
+            }
+            self.cycle().await?;
+        }
+        self.check_going()
+    }
+
+    /// Begins to take points: one for each cycle.
+    ///
+    /// # Errors
+    /// [`GroupError::Stopped`], [`GroupError::Phase`] for a group that does not hold.
+    pub fn start_stream(&mut self, options: StreamOptions) -> Result<(), GroupError> {
+        self.check_going()?;
+        if !matches!(self.runner.course, Course::Holding) {
+            return Err(self.not_now());
+        }
+        let options = StreamOptions { capacity: options.capacity.clamp(1, MOST_POINTS), ..options };
+        self.runner.course = Course::Streaming(Stream::new(&self.runner.points, self.runner.period_s, options));
+        Ok(())
+    }
+
+    /// The stream, while there is one: how many points wait, for how many there is room.
+    pub const fn stream(&self) -> Option<&Stream> {
+        if let Course::Streaming(stream) = &self.runner.course { Some(stream) } else { None }
+    }
+
+    /// Gives a stream its next point.
+    ///
+    /// # Errors
+    /// [`GroupError::Path`] for a point that breaks a limit, [`GroupError::StreamFull`]: then the stream stays as it was.
+    /// [`GroupError::Stopped`], [`GroupError::Phase`].
+    pub fn push(&mut self, point: &[Turns]) -> Result<(), GroupError> {
+        self.check_going()?;
+        let Course::Streaming(stream) = &mut self.runner.course else { return Err(self.not_now()) };
+        stream.push(point, &self.runner.limits)?.map_err(|_| GroupError::StreamFull)
+    }
+
+    /// Says that no further points come. The group comes to rest after the last one, within its limits.
+    pub const fn end_stream(&mut self) {
+        if let Course::Streaming(stream) = &mut self.runner.course {
+            stream.end();
+        }
+    }
+
+    /// Has all axes come to rest within their limits, from the next cycle on.
+    pub fn start_stop(&mut self) {
+        if matches!(self.runner.course, Course::Moving { .. } | Course::Streaming(_)) {
+            self.runner.stop(StopCause::Asked);
+        }
+    }
+
+    /// Brings all axes to rest and leaves them powered. The group can be moved again.
+    ///
+    /// # Errors
+    /// As [`cycle`](Self::cycle); [`GroupError::Stopped`] by another cause.
+    pub async fn stop(&mut self) -> Result<(), GroupError> {
+        self.start_stop();
+        match self.rest().await {
+            Err(GroupError::Stopped(StopCause::Asked)) => {
+                self.runner.cause = None;
+                Ok(())
+            }
+            other => other,
+        }
+    }
+
+    /// Brings all axes to rest and takes their power. The group can be enabled again.
+    ///
+    /// # Errors
+    /// As [`cycle`](Self::cycle).
+    pub async fn disable(&mut self) -> Result<(), GroupError> {
+        self.start_stop();
+        match self.rest().await {
+            Ok(()) | Err(GroupError::Stopped(_)) => {}
+            Err(error) => return Err(error),
+        }
+        self.runner.course = Course::Off;
+        for _ in 0..self.cycles(POWER_LIMIT) {
+            self.cycle().await?;
+            if !self.runner.states.iter().any(has_power) {
+                break;
+            }
+        }
+        self.runner.cause = None;
+        Ok(())
+    }
+
+    /// [`disable`](Self::disable), and ends what the group began: SYNC, and the guards of its drives.
+    ///
+    /// # Errors
+    /// As [`disable`](Self::disable), and those of the requests.
+    pub async fn close(mut self) -> Result<(), GroupError> {
+        let disabled = self.disable().await;
+        self.network.sync(None);
+        let released = join_all(self.drives.iter().map(Drive::release_guard)).await;
+        disabled?;
+        released.into_iter().collect::<Result<(), _>>()?;
+        Ok(())
+    }
+
+    fn check_going(&self) -> Result<(), GroupError> {
+        self.runner.cause.map_or(Ok(()), |cause| Err(GroupError::Stopped(cause)))
+    }
+
+    fn not_now(&self) -> GroupError {
+        let phase = self.state().phase;
+        let remedy = match phase {
+            Phase::Off => "enable it first",
+            Phase::Holding => "begin a stream first",
+            _ => "wait until it holds",
+        };
+        GroupError::Phase { phase, remedy }
+    }
+
+    fn cycles(&self, time: Duration) -> u64 {
+        (time.as_secs_f64() / self.runner.period_s).ceil() as u64
+    }
+}
+
+/// The states in which the power stage is on (CiA 402-2, figure 5).
+const fn has_power(state: &CyclicState) -> bool {
+    use PowerState::{FaultReactionActive, OperationEnabled, QuickStopActive};
+    matches!(state.power, Some(OperationEnabled | QuickStopActive | FaultReactionActive))
+}
+
+impl fmt::Debug for Group {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Group").field("state", &self.state()).field("drives", &self.drives).finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,26 @@
+//! Who moves an axis: one group, or one base, at a time. Two that wrote the same RPDO would pull the shaft to and fro.
+
+use canopen::{Mux, NodeId};
+
+use super::handle::Network;
+
+/// An axis that nobody else may claim until this is dropped.
+#[derive(Debug)]
+pub(crate) struct Claim {
+    network: Network,
+    axis: (NodeId, Mux),
+}
+
+impl Network {
+    /// Claims the axis with this controlword; `None` where somebody has it.
+    pub(crate) fn claim(&self, node: NodeId, controlword: Mux) -> Option<Claim> {
+        let axis = (node, controlword);
+        self.lock().claims.insert(axis).then(|| Claim { network: self.clone(), axis })
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        self.network.lock().claims.remove(&self.axis);
+    }
+}
