@@ -1,9 +1,15 @@
 //! Every example runs to its end, as `cargo run --example` would run it.
 
+#[path = "../arm_group.rs"]
+mod arm_group;
+#[path = "../base_square.rs"]
+mod base_square;
 #[path = "../embed_in_your_test.rs"]
 mod embed_in_your_test;
 #[path = "../hello_drive.rs"]
 mod hello_drive;
+#[path = "../stepper_axis.rs"]
+mod stepper_axis;
 #[path = "../stream_positions.rs"]
 mod stream_positions;
 #[path = "../two_drives.rs"]
@@ -27,4 +33,19 @@ fn two_drives_runs() {
 #[test]
 fn stream_positions_runs() {
     stream_positions::main().unwrap();
+}
+
+#[test]
+fn arm_group_runs() {
+    arm_group::main().unwrap();
+}
+
+#[test]
+fn base_square_runs() {
+    base_square::main().unwrap();
+}
+
+#[test]
+fn stepper_axis_runs() {
+    stepper_axis::main().unwrap();
 }

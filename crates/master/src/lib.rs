@@ -86,6 +86,7 @@
 //! heartbeat that this master then produces), and tells what it has not. While its runner runs, a guarded drive is kept
 //! content, whatever the tasks wait for.
 
+pub mod base;
 pub mod core;
 pub mod cyclic;
 pub mod decode;

@@ -278,14 +278,23 @@ fn a_stop_leaves_the_group_ready() {
 }
 
 #[test]
-fn drives_that_have_power_keep_it_and_do_not_jump() {
+fn drives_that_have_power_already_are_taken_over_without_a_jump() {
     let mut bench = Bench::servos(2);
     for setup in &bench.setups {
         block_on(&mut bench.world, setup.drive.enable()).unwrap().unwrap();
     }
-    let group = bench.open();
-    let at = places(&group);
-    assert!(at.iter().all(|at| at.abs() < 0.001), "{at:?}");
+    let before = [1, 2].map(|number| bench.world.report(number).unwrap().shaft_angle_rad);
+    let mut group = bench.open();
+    assert_eq!((group.state().phase, group.state().cause), (Phase::Holding, None));
+    let after = [1, 2].map(|number| bench.world.report(number).unwrap().shaft_angle_rad);
+    assert!(before.iter().zip(after).all(|(before, after)| (before - after).abs() < 0.01), "{before:?} {after:?}");
+    // Off and on again.
+    block_on(&mut bench.world, async {
+        group.disable().await?;
+        group.enable().await
+    })
+    .unwrap()
+    .unwrap();
 }
 
 #[test]

@@ -159,6 +159,14 @@ pub struct CyclicState {
     pub refused: Option<Refusal>,
 }
 
+impl CyclicState {
+    /// True in the states in which the power stage is on (CiA 402-2, figure 5).
+    pub const fn has_power(&self) -> bool {
+        use PowerState::{FaultReactionActive, OperationEnabled, QuickStopActive};
+        matches!(self.power, Some(OperationEnabled | QuickStopActive | FaultReactionActive))
+    }
+}
+
 /// `Operation enabled, at 12.5 turns, 60 r/min`.
 impl fmt::Display for CyclicState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -102,6 +102,16 @@ pub enum GroupError {
         /// What it shows.
         shows: String,
     },
+    /// An axis did not find its reference. Those that searched beside it were stopped.
+    #[error("axis {axis}, node {node}, did not find its reference: {source}")]
+    Homing {
+        /// Which axis, from 1.
+        axis: usize,
+        /// Its node.
+        node: NodeId,
+        /// What its drive says.
+        source: Error,
+    },
     /// A drive cannot be moved cycle by cycle.
     #[error(transparent)]
     Cyclic(#[from] CyclicError),

@@ -4,7 +4,6 @@ use core::fmt;
 use core::time::Duration;
 
 use can::Instant;
-use cia402::PowerState;
 
 use super::course::{Course, Runner};
 use super::error::GroupError;
@@ -89,8 +88,9 @@ impl Group {
         if !matches!(self.runner.course, Course::Off) {
             return self.check_going();
         }
-        // A cycle without power ends what an earlier stop has left behind.
-        self.cycle().await?;
+        // What an earlier stop has left behind ends without power. One that has power and is not heard yet is told to switch off
+        // by its first controlword anyway, and would seem to lose its power later.
+        self.switch_off().await?;
         self.start_enabling();
         for _ in 0..self.cycles(POWER_LIMIT) {
             match self.cycle().await? {
@@ -217,14 +217,20 @@ impl Group {
             Ok(()) | Err(GroupError::Stopped(_)) => {}
             Err(error) => return Err(error),
         }
+        self.switch_off().await?;
+        self.runner.cause = None;
+        Ok(())
+    }
+
+    /// Cycles until every drive shows that it has no power, or the limit has passed.
+    async fn switch_off(&mut self) -> Result<(), GroupError> {
         self.runner.course = Course::Off;
         for _ in 0..self.cycles(POWER_LIMIT) {
             self.cycle().await?;
-            if !self.runner.states.iter().any(has_power) {
+            if self.runner.states.iter().all(|state| state.statusword.is_some() && !state.has_power()) {
                 break;
             }
         }
-        self.runner.cause = None;
         Ok(())
     }
 
@@ -258,12 +264,6 @@ impl Group {
     fn cycles(&self, time: Duration) -> u64 {
         (time.as_secs_f64() / self.runner.period_s).ceil() as u64
     }
-}
-
-/// The states in which the power stage is on (CiA 402-2, figure 5).
-const fn has_power(state: &CyclicState) -> bool {
-    use PowerState::{FaultReactionActive, OperationEnabled, QuickStopActive};
-    matches!(state.power, Some(OperationEnabled | QuickStopActive | FaultReactionActive))
 }
 
 impl fmt::Debug for Group {

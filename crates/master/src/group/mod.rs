@@ -12,6 +12,7 @@ mod axis;
 mod course;
 mod error;
 mod handle;
+mod home;
 mod limits;
 mod open;
 mod state;
@@ -20,6 +21,7 @@ mod trajectory;
 
 pub use error::GroupError;
 pub use handle::Group;
+pub use home::{AxisHoming, HomingOrder, home};
 pub use limits::{AxisLimits, PathError, PathPoint, Quantity};
 pub use open::AxisSetup;
 pub use state::{GroupState, Phase, StopCause};

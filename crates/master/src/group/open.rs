@@ -35,7 +35,7 @@ pub struct AxisSetup {
 impl Group {
     /// Makes a group of these axes and has this master produce SYNC with this period. Each drive gets the mapping of
     /// [`Drive::configure_cyclic`] and, where it has the object, the period as its interpolation time (60C2h). Drives that
-    /// already have power keep it and are held where they are. Nothing moves.
+    /// already have power are switched off by [`enable`](Group::enable) and on again, all together. Nothing moves.
     ///
     /// # Errors
     /// [`GroupError`], before any drive was written to where the limits are wrong or an axis is taken.

@@ -1,0 +1,367 @@
+//! A base as its program holds it: a twist in, wheels and a pose out, once in each cycle of SYNC.
+
+use core::fmt;
+use core::time::Duration;
+
+use can::Instant;
+use cia402::ModeOfOperation;
+
+use super::kinematics::{Geometry, Pose, Twist, Wheels};
+use super::limits::{BaseError, BaseLimits};
+use super::state::StopCause;
+use crate::cyclic::{CyclicDrive, CyclicOptions, CyclicState, Demand, Refusal};
+use crate::drive::{CONTROLWORD, Drive};
+use crate::network::{Claim, Exchange, Network, join_all};
+use crate::units::{Rpm, Turns};
+
+/// How long drives may take to be enabled, and to be without power again.
+const POWER_LIMIT: Duration = Duration::from_secs(5);
+
+/// One wheel, and how its motor sits.
+#[derive(Clone, Debug)]
+pub struct WheelSetup {
+    /// The drive.
+    pub drive: Drive,
+    /// A mode for speed: profile velocity or cyclic synchronous velocity.
+    pub mode: ModeOfOperation,
+    /// Turns of the drive's output shaft for a turn of the wheel forward; negative for a motor that sits the other way round, as
+    /// the right one of two hub motors does.
+    pub turns: f64,
+}
+
+/// What a base shows after a cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BaseState {
+    /// Both wheels have power and follow.
+    pub follows: bool,
+    /// Why it is being stopped, or stands.
+    pub cause: Option<StopCause>,
+    /// The twist that the wheels were told in this cycle, within the limits.
+    pub commanded: Twist,
+    /// Where it came to, by the positions of its wheels. `Pose::after` of every cycle.
+    pub pose: Pose,
+    /// Cycles in which a wheel's position did not come. What it went meanwhile is counted when it comes again.
+    pub unseen_cycles: u64,
+}
+
+/// A base on two wheels. See the [module](super).
+pub struct Base {
+    network: Network,
+    drives: [Drive; 2],
+    wheels: [Wheel; 2],
+    geometry: Geometry,
+    limits: BaseLimits,
+    period: Duration,
+    power: Power,
+    wanted: Twist,
+    /// When the newest twist came; `None` before the first.
+    wanted_at: Option<Instant>,
+    /// What the wheels were told, m/s over the ground.
+    told: Wheels,
+    state: BaseState,
+    now: Instant,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Power {
+    Off,
+    On,
+}
+
+struct Wheel {
+    drive: CyclicDrive,
+    /// Turns of the drive's shaft for a turn of the wheel.
+    turns: f64,
+    /// Where the shaft was when the pose was counted last, in turns.
+    counted_turns: Option<f64>,
+    shows: Option<CyclicState>,
+    _claim: Claim,
+}
+
+impl Base {
+    /// Makes a base of a left and a right wheel and has this master produce SYNC with this period. Nothing moves.
+    ///
+    /// The wheels' ramps are made here, by `wheel_m_s2`: those of the drives (6083h, 6084h) are set to follow each cycle, so that a
+    /// stop of their own by them is a hard one.
+    ///
+    /// # Errors
+    /// [`BaseError`].
+    pub async fn open(
+        [left, right]: [&WheelSetup; 2],
+        geometry: Geometry,
+        limits: BaseLimits,
+        period: Duration,
+        options: CyclicOptions,
+    ) -> Result<Self, BaseError> {
+        geometry.check()?;
+        limits.check()?;
+        let network = left.drive.node().network().clone();
+        if !network.is_same_as(right.drive.node().network()) {
+            return Err(BaseError::OtherNetwork);
+        }
+        // Both, before either drive is written to.
+        let (left_claim, right_claim) = (left.claim()?, right.claim()?);
+        let wheels = [
+            left.open(&geometry, &limits, period, options, left_claim).await?,
+            right.open(&geometry, &limits, period, options, right_claim).await?,
+        ];
+        network.sync(Some(period));
+        Ok(Self {
+            now: network.now(),
+            network,
+            drives: [left.drive.clone(), right.drive.clone()],
+            wheels,
+            geometry,
+            limits,
+            period,
+            power: Power::Off,
+            wanted: Twist::default(),
+            wanted_at: None,
+            told: Wheels::default(),
+            state: BaseState {
+                follows: false,
+                cause: None,
+                commanded: Twist::default(),
+                pose: Pose::default(),
+                unseen_cycles: 0,
+            },
+        })
+    }
+
+    /// What the base is to do from the next cycle on, until another twist comes or the watchdog's time has passed. One beyond the
+    /// limits is followed as fast as they allow, on its circle ([`Geometry::saturate`]).
+    ///
+    /// # Errors
+    /// [`BaseError::BadTwist`], and [`BaseError::Stopped`] by a wheel; the last twist counts on then.
+    pub fn command(&mut self, twist: Twist) -> Result<(), BaseError> {
+        let Twist { linear_m_s, angular_rad_s } = twist;
+        if !linear_m_s.is_finite() || !angular_rad_s.is_finite() {
+            return Err(BaseError::BadTwist { linear_m_s, angular_rad_s });
+        }
+        match self.state.cause {
+            Some(cause @ StopCause::Wheel { .. }) => return Err(BaseError::Stopped(cause)),
+            _ => self.state.cause = None,
+        }
+        self.wanted = self.geometry.saturate(twist, &self.limits);
+        self.wanted_at = Some(self.network.now());
+        Ok(())
+    }
+
+    /// One cycle: reads both wheels, counts the pose on, and gives both their speeds. To be called once after each SYNC, in
+    /// [`Network::exchange`]; [`cycle`](Self::cycle) waits and does both. Allocates nothing.
+    pub fn step(&mut self, io: &mut Exchange<'_>) -> BaseState {
+        self.now = io.now();
+        self.ramp();
+        let told = [self.told.left, self.told.right];
+        let turns_per_m = self.geometry.turns_per_m();
+        for (wheel, m_s) in self.wheels.iter_mut().zip(told) {
+            let demand = match self.power {
+                Power::Off => Demand::Off,
+                Power::On => Demand::Velocity(Rpm(m_s * turns_per_m * wheel.turns * 60.0)),
+            };
+            wheel.shows = Some(wheel.drive.step(io, demand));
+        }
+        self.count();
+        self.state.follows = self.wheels.iter().all(|wheel| wheel.shows.is_some_and(|shown| shown.follows));
+        if self.power == Power::On {
+            self.find_trouble();
+        }
+        self.state.commanded = self.geometry.twist(self.told);
+        self.state
+    }
+
+    /// The speeds of this cycle: nearer to the wanted ones by what the limits allow, both wheels by one share, so that the base
+    /// goes from one circle to the next evenly.
+    fn ramp(&mut self) {
+        let Some(wanted_at) = self.wanted_at else { return };
+        let watchdog = self.limits.watchdog;
+        if self.state.cause.is_none() && self.now - wanted_at > watchdog && self.wanted != Twist::default() {
+            self.state.cause = Some(StopCause::Watchdog { after: watchdog });
+        }
+        let goal = if self.state.cause.is_some() || self.power == Power::Off || !self.state.follows {
+            Wheels::default()
+        } else {
+            self.geometry.wheels_m_s(self.wanted)
+        };
+        let (left, right) = (goal.left - self.told.left, goal.right - self.told.right);
+        let most = self.limits.wheel_m_s2 * self.period.as_secs_f64();
+        let share = (most / left.abs().max(right.abs())).min(1.0);
+        // The same goal again: nothing over nothing.
+        if share.is_finite() {
+            self.told = Wheels { left: self.told.left + share * left, right: self.told.right + share * right };
+        }
+    }
+
+    /// Counts on from the last positions of both wheels that were seen together.
+    fn count(&mut self) {
+        let seen = self.wheels.each_ref().map(|wheel| wheel.shows.and_then(|shown| shown.position));
+        let [Some(Turns(left)), Some(Turns(right))] = seen else {
+            self.state.unseen_cycles += 1;
+            return;
+        };
+        let m_per_turn = 1.0 / self.geometry.turns_per_m();
+        let mut ways = [0.0; 2];
+        for ((wheel, now), way) in self.wheels.iter_mut().zip([left, right]).zip(&mut ways) {
+            let before = wheel.counted_turns.replace(now).unwrap_or(now);
+            *way = (now - before) / wheel.turns * m_per_turn;
+        }
+        let [left, right] = ways;
+        self.state.pose = self.state.pose.after(Wheels { left, right }, &self.geometry);
+    }
+
+    fn find_trouble(&mut self) {
+        if matches!(self.state.cause, Some(StopCause::Wheel { .. })) {
+            return;
+        }
+        for wheel in &self.wheels {
+            match wheel.shows.and_then(|shown| shown.refused) {
+                // Before it follows, its first TPDO may be on its way.
+                None | Some(Refusal::NoCycle | Refusal::NotHeard) if !self.state.follows => {}
+                None => {}
+                Some(refusal) => {
+                    self.state.cause = Some(StopCause::Wheel { node: wheel.drive.node(), refusal });
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Waits for the next SYNC and does one cycle.
+    ///
+    /// # Errors
+    /// [`BaseError::NoCycle`]: the master has stopped the drives.
+    pub async fn cycle(&mut self) -> Result<BaseState, BaseError> {
+        let network = self.network.clone();
+        network.next_sync().await?;
+        Ok(network.exchange(|io| self.step(io)))
+    }
+
+    /// What the last cycle showed.
+    pub const fn state(&self) -> BaseState {
+        self.state
+    }
+
+    /// Begins to count from this pose.
+    pub const fn set_pose(&mut self, pose: Pose) {
+        self.state.pose = pose;
+    }
+
+    /// Enables both wheels and holds them at no speed.
+    ///
+    /// # Errors
+    /// [`BaseError::Stopped`] when a drive is at fault, [`BaseError::NotEnabled`] when one takes too long, those of
+    /// [`cycle`](Self::cycle).
+    pub async fn enable(&mut self) -> Result<(), BaseError> {
+        (self.state.cause, self.wanted, self.told) = (None, Twist::default(), Wheels::default());
+        // What an earlier stop has left behind ends without power.
+        self.switch_off().await?;
+        self.power = Power::On;
+        for _ in 0..self.cycles(POWER_LIMIT) {
+            match self.cycle().await? {
+                BaseState { cause: Some(cause), .. } => {
+                    self.power = Power::Off;
+                    return Err(BaseError::Stopped(cause));
+                }
+                BaseState { follows: true, .. } => return Ok(()),
+                _ => {}
+            }
+        }
+        self.power = Power::Off;
+        self.cycle().await?;
+        let [left, right] =
+            self.wheels.each_ref().map(|wheel| wheel.shows.map_or_else(String::new, |shown| shown.to_string()));
+        Err(BaseError::NotEnabled { limit: POWER_LIMIT, left, right })
+    }
+
+    /// Brings the base to rest within its limits; it stays powered.
+    ///
+    /// # Errors
+    /// As [`cycle`](Self::cycle).
+    pub async fn stop(&mut self) -> Result<(), BaseError> {
+        self.wanted = Twist::default();
+        // From the highest speed, and some cycles.
+        let time = Duration::from_secs_f64((self.limits.wheel_m_s / self.limits.wheel_m_s2).min(3600.0));
+        for _ in 0..self.cycles(time) + 4 {
+            if self.cycle().await?.commanded == Twist::default() {
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    /// Brings the base to rest, takes the wheels' power and ends what was begun: SYNC, and the guards of the drives.
+    ///
+    /// # Errors
+    /// As [`cycle`](Self::cycle), and those of the requests.
+    pub async fn close(mut self) -> Result<(), BaseError> {
+        let stopped = self.stop().await;
+        // Without SYNC there are no cycles, and the master has stopped the drives.
+        let off = if stopped.is_ok() { self.switch_off().await } else { Ok(()) };
+        self.network.sync(None);
+        let released = join_all(self.drives.iter().map(Drive::release_guard)).await;
+        stopped.and(off)?;
+        released.into_iter().collect::<Result<(), _>>()?;
+        Ok(())
+    }
+
+    /// Cycles until both drives show that they have no power, or the limit has passed.
+    async fn switch_off(&mut self) -> Result<(), BaseError> {
+        self.power = Power::Off;
+        for _ in 0..self.cycles(POWER_LIMIT) {
+            self.cycle().await?;
+            if self
+                .wheels
+                .iter()
+                .all(|wheel| wheel.shows.is_some_and(|shown| shown.statusword.is_some() && !shown.has_power()))
+            {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn cycles(&self, time: Duration) -> u64 {
+        (time.as_secs_f64() / self.period.as_secs_f64()).ceil() as u64
+    }
+}
+
+impl WheelSetup {
+    fn claim(&self) -> Result<Claim, BaseError> {
+        let (node, controlword) = (self.drive.node().id(), self.drive.place(CONTROLWORD));
+        self.drive.node().network().claim(node, controlword).ok_or(BaseError::Taken { node, controlword })
+    }
+
+    async fn open(
+        &self,
+        geometry: &Geometry,
+        limits: &BaseLimits,
+        period: Duration,
+        options: CyclicOptions,
+        claim: Claim,
+    ) -> Result<Wheel, BaseError> {
+        let node = self.drive.node().id();
+        if !self.turns.is_finite() || self.turns == 0.0 {
+            return Err(BaseError::BadLimit { what: "turns of the drive for a turn of the wheel", value: self.turns });
+        }
+        self.drive.configure_cyclic_with_position(self.mode).await?;
+        let drive = self.drive.cyclic(self.mode, options).await?;
+        let rpm_of = |m: f64| m * geometry.turns_per_m() * self.turns.abs() * 60.0;
+        let needed_rpm = rpm_of(limits.wheel_m_s);
+        match drive.highest_speed() {
+            Some((Rpm(most_rpm), bound)) if needed_rpm > most_rpm => {
+                Err(BaseError::BeyondDrive { node, needed_rpm, most_rpm, bound })
+            }
+            Some(_) if drive.shows_position() && drive.set_point().is_none() => {
+                self.drive.write_ramps_of_a_cycle(period, rpm_of(limits.wheel_m_s2)).await?;
+                Ok(Wheel { drive, turns: self.turns, counted_turns: None, shows: None, _claim: claim })
+            }
+            _ => Err(BaseError::NoWheel { node }),
+        }
+    }
+}
+
+impl fmt::Debug for Base {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Base").field("state", &self.state).field("drives", &self.drives).finish_non_exhaustive()
+    }
+}

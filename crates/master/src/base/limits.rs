@@ -1,0 +1,135 @@
+//! What a base may do, and what is wrong with what it was asked.
+
+use core::time::Duration;
+
+use canopen::{Mux, NodeId};
+
+use super::state::StopCause;
+use crate::cyclic::{Bound, CyclicError};
+use crate::error::Error;
+use crate::network::NoCycle;
+use crate::units::Shown;
+
+/// What a base may do. All of it has to be stated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BaseLimits {
+    /// Highest speed along the heading, m/s.
+    pub linear_m_s: f64,
+    /// Highest rate of the heading, rad/s.
+    pub angular_rad_s: f64,
+    /// Highest speed of a wheel over the ground, m/s.
+    pub wheel_m_s: f64,
+    /// How fast the speed of a wheel over the ground may change, m/s^2: also when the base is stopped.
+    pub wheel_m_s2: f64,
+    /// How long a twist counts. Without a new one the base stops.
+    pub watchdog: Duration,
+}
+
+impl BaseLimits {
+    pub(super) fn check(&self) -> Result<(), BaseError> {
+        let values = [
+            ("linear_m_s", self.linear_m_s),
+            ("angular_rad_s", self.angular_rad_s),
+            ("wheel_m_s", self.wheel_m_s),
+            ("wheel_m_s2", self.wheel_m_s2),
+            ("watchdog in seconds", self.watchdog.as_secs_f64()),
+        ];
+        match values.into_iter().find(|(_, value)| !value.is_finite() || *value <= 0.0) {
+            Some((what, value)) => Err(BaseError::BadLimit { what, value }),
+            None => Ok(()),
+        }
+    }
+
+    #[cfg(test)]
+    pub(super) fn of_test() -> Self {
+        let watchdog = Duration::from_millis(500);
+        Self { linear_m_s: 1.0, angular_rad_s: 1.0, wheel_m_s: 1.0, wheel_m_s2: 1.0, watchdog }
+    }
+}
+
+/// Why a base cannot be made, or did not do what it should.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum BaseError {
+    /// No length.
+    #[error("{what} is {value}: state a finite length above 0, in metres")]
+    BadLength {
+        /// Which.
+        what: &'static str,
+        /// What was given.
+        value: f64,
+    },
+    /// A limit that allows nothing or that bounds nothing.
+    #[error("the limit {what} is {value}: state a finite number above 0")]
+    BadLimit {
+        /// Which.
+        what: &'static str,
+        /// What was given.
+        value: f64,
+    },
+    /// A twist that is infinite or no number.
+    #[error(
+        "a twist of {linear_m_s} m/s and {angular_rad_s} rad/s: both have to be finite numbers. The last one counts on"
+    )]
+    BadTwist {
+        /// What was given.
+        linear_m_s: f64,
+        /// What was given.
+        angular_rad_s: f64,
+    },
+    /// Two networks.
+    #[error("both wheels have to be on one network, which one SYNC joins")]
+    OtherNetwork,
+    /// Another base or group has the wheel.
+    #[error("node {node} ({controlword}) already belongs to a group or a base: close that first")]
+    Taken {
+        /// The node.
+        node: NodeId,
+        /// Its controlword: which axis it is.
+        controlword: Mux,
+    },
+    /// The limit is more than the drive does.
+    #[error(
+        "node {node}: wheel_m_s needs {} r/min, and the drive does {} r/min at most, by {bound}. State less",
+        Shown(*needed_rpm), Shown(*most_rpm)
+    )]
+    BeyondDrive {
+        /// The node.
+        node: NodeId,
+        /// What the limit needs.
+        needed_rpm: f64,
+        /// What the drive does.
+        most_rpm: f64,
+        /// Where that stands.
+        bound: Bound,
+    },
+    /// The drive takes no speeds in its mode, or does not show where it is.
+    #[error(
+        "node {node} cannot be a wheel: its mode takes no speeds, or its position is in no TPDO that comes each cycle"
+    )]
+    NoWheel {
+        /// The node.
+        node: NodeId,
+    },
+    /// The base was stopped.
+    #[error("{0}")]
+    Stopped(StopCause),
+    /// The wheels were not enabled in time.
+    #[error("the wheels were not enabled within {} s: {left}; {right}. Drive::explain_refusal asks why", limit.as_secs())]
+    NotEnabled {
+        /// How long it was waited for.
+        limit: Duration,
+        /// What the left drive shows.
+        left: String,
+        /// What the right drive shows.
+        right: String,
+    },
+    /// A drive cannot be moved cycle by cycle.
+    #[error(transparent)]
+    Cyclic(#[from] CyclicError),
+    /// A request failed.
+    #[error(transparent)]
+    Drive(#[from] Error),
+    /// There is no next cycle.
+    #[error(transparent)]
+    NoCycle(#[from] NoCycle),
+}
