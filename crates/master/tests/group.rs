@@ -10,11 +10,14 @@ use cia402::ModeOfOperation;
 use devices::Description;
 use devices::servo::CIA402;
 use master::cyclic::{CyclicOptions, Refusal};
-use master::group::{AxisLimits, AxisSetup, Group, GroupError, PathError, Phase, StopCause, StreamOptions};
+use master::drive::HomingOptions;
+use master::group::{
+    AxisHoming, AxisLimits, AxisSetup, Group, GroupError, HomingOrder, PathError, Phase, StopCause, StreamOptions, home,
+};
 use master::units::Turns;
 use master::{Drive, Network};
 use sim::machine::{Order, order};
-use sim::{Place, Stimulus, World, block_on};
+use sim::{Place, Stimulus, SwitchRange, World, block_on};
 use support::node;
 
 const CSP: ModeOfOperation = ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION;
@@ -336,4 +339,47 @@ fn bad_input_is_refused_before_anything_moves() {
     bench.setups.clear();
     assert!(matches!(bench.try_open(), Err(GroupError::NoAxis)));
     assert!(bench.network.cycle().is_some());
+}
+
+#[test]
+fn axes_home_together_or_in_sequence_and_one_that_fails_stops_the_others() {
+    let stepper = devices::model("zlim42c").unwrap();
+    let mut bench = Bench::new(&[(stepper, PV), (stepper, PV)]);
+    // X0 is the negative limit (ZLIM42-C user manual V1.03, 5.4), half a turn below for one, a whole turn for the other.
+    for (number, low) in [(1, -2000), (2, -4000)] {
+        let drive = bench.setups[usize::from(number) - 1].drive.clone();
+        block_on(&mut bench.world, drive.node().write(support::mux(0x2030, 2), 3_u16)).unwrap().unwrap();
+        let range = SwitchRange { low: None, high: Some(low) };
+        let switch = Stimulus::Switch { name: "X0".to_owned(), range };
+        bench.world.apply(Place::node(number), &switch).unwrap().unwrap();
+    }
+    let options = HomingOptions { limit: Duration::from_secs(5), ..HomingOptions::default() };
+    let search = |setup: &AxisSetup| AxisHoming { drive: setup.drive.clone(), method: 17, options };
+    let searches: Vec<_> = bench.setups.iter().map(search).collect();
+    let began = bench.world.now();
+    let reports = block_on(&mut bench.world, home(&searches, HomingOrder::Together)).unwrap().unwrap();
+    let together = bench.world.now() - began;
+    let times: Vec<_> = reports.iter().map(|report| report.reached_after.unwrap()).collect();
+    // Both began at once: the longer way ends the search.
+    assert!(times[1] > times[0] && together < times[0] + times[1], "{times:?} {together:?}");
+    block_on(&mut bench.world, home(&searches, HomingOrder::InSequence)).unwrap().unwrap();
+
+    // The first one's switch never comes: the second is stopped on its way, wherever it is.
+    let never = Stimulus::Input { name: "X0".to_owned(), level: false };
+    for number in [1, 2] {
+        bench.world.apply(Place::node(number), &never).unwrap().unwrap();
+    }
+    let mut hopeless = searches.clone();
+    hopeless[0].options.limit = Duration::from_secs(1);
+    let error = block_on(&mut bench.world, home(&hopeless, HomingOrder::Together)).unwrap().unwrap_err();
+    assert!(matches!(error, GroupError::Homing { axis: 1, .. }), "{error}");
+    assert!(error.to_string().starts_with("axis 1, node 1, did not find its reference: "), "{error}");
+    bench.world.run_for(Duration::from_secs(1));
+    assert!(bench.rpm(1).abs() < 2.0 && bench.rpm(2).abs() < 2.0, "{} {}", bench.rpm(1), bench.rpm(2));
+
+    // Axes of an open group are not homed behind its back.
+    let group = bench.try_open().unwrap();
+    let taken = block_on(&mut bench.world, home(&searches, HomingOrder::Together)).unwrap().unwrap_err();
+    assert!(matches!(taken, GroupError::Taken { .. }), "{taken}");
+    drop(group);
 }
