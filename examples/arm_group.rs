@@ -110,7 +110,7 @@ async fn run(drives: &[Drive]) -> Result<(), Box<dyn Error>> {
     group.enable().await?;
     let error = follow(&mut group, recorded()?.into_iter()).await?;
     println!("4 s of the recorded path at 10 ms: at most {:.3} degrees from the set-points", error * 360.0);
-    if error > 0.005 {
+    if error > 0.005 || group.state().missed_cycles > 0 {
         return Err("the recorded path was not followed".into());
     }
     group.close().await?;
