@@ -94,7 +94,7 @@ fn every_command_of_the_page_on_parameters_ends_well() {
     let folder = scratch("handbook_params");
     std::fs::create_dir(folder.join("examples")).unwrap();
     std::fs::copy(root().join("examples/machine.toml"), folder.join("examples/machine.toml")).unwrap();
-    assert_eq!(follow_in("configure-a-drive.md", &folder), 9);
+    assert_eq!(follow_in("configure-a-drive.md", &folder), 12);
     std::fs::remove_dir_all(folder).unwrap();
 }
 

@@ -282,3 +282,57 @@ fn a_journal_of_another_device_or_half_a_one_is_refused() {
     let ended = served.run(&["params", "rollback", "5", "ferrodrive-node4.journal"]);
     assert!(ended.status == Some(2) && ended.err.contains("is of node 4"), "{}", ended.err);
 }
+
+#[test]
+fn pdos_in_words_are_planned_with_their_bits_and_the_load() {
+    let asked = ["tpdo1=statusword,position_actual_value", "rpdo1=controlword,target_velocity", "--type", "1"];
+    let plan = done(&[&["pdo", "plan", "4"][..], &asked, &["--json"]].concat()).json();
+    let bits: Vec<_> = plan["pdos"].as_array().expect("a list").iter().map(|pdo| pdo["bits"].as_u64()).collect();
+    assert_eq!(bits, [Some(48), Some(48)], "{plan}");
+    let places: Vec<_> = plan["steps"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(|step| step["object"].as_str().unwrap_or_default())
+        .collect();
+    // Off, empty, fill, count, type, on (CiA 301, 7.5.2.36 and 7.5.2.38).
+    let (off, emptied) =
+        (places.iter().position(|place| *place == "1800h:01"), places.iter().position(|place| *place == "1A00h:01"));
+    assert!(off < emptied && places.last() == Some(&"1800h:01"), "{places:?}");
+    // SYNC is 0 bytes and each PDO 6: 47 + 10 stuff bits and 95 + 19 + 3 with what is between, every 10 ms at 500 kbit/s.
+    let load = |key: &str| plan[key].as_f64().expect("a number");
+    assert!(load("load_after") > load("load_before") && (0.03..0.08).contains(&load("load_after")), "{plan}");
+}
+
+#[test]
+fn what_a_pdo_cannot_carry_is_said_before_anything_is_written() {
+    for (asked, said) in [
+        (&["tpdo1=statusword,6064,606C"][..], "TPDO1 would have 80 bits"),
+        (&["tpdo1=1017"], "1017h:00 producer_heartbeat_time cannot be in TPDO1"),
+        (&["tpdo1=statuswort"], "did you mean statusword"),
+        (&["tpdo9=statusword"], "has no TPDO9; it has TPDO1, TPDO2, TPDO3, TPDO4"),
+        (&["rpdo1=statusword"], "cannot be in RPDO1: it can only be read"),
+        (&["tpdo1=statusword", "--inhibit", "100s"], "is not taken for the inhibit time"),
+        (&["tpdo1=statusword", "--id", "0x601"], "another service"),
+        (&["tpdo1=statusword", "tpdo2=6064", "--id", "0x185"], "--id is of one PDO"),
+        (&["tpdo1"], "expected a PDO and its objects"),
+        (&["pdo1=statusword"], "is no PDO; expected tpdo1"),
+        (&[], "which PDOs?"),
+    ] {
+        let ended = ferrodrive(&[&["pdo", "apply", "4"], asked].concat());
+        assert!(ended.status == Some(2) && ended.err.contains(said), "{asked:?}: {:?} {}", ended.status, ended.err);
+    }
+    let ended = ferrodrive(&["pdo", "apply", "1", "tpdo1=statusword"]);
+    assert!(ended.err.contains("mapping of a m4230e17b50 is fixed"), "{}", ended.err);
+}
+
+#[test]
+fn what_keeps_a_pdo_away_is_said_below_the_table() {
+    let served = Served::zlac8030l("params_pdo");
+    let shown = |part: &str| {
+        let ended = served.done(&["pdo", "show", "4"]);
+        assert!(ended.out.contains(part), "{part}: {}", ended.out);
+    };
+    shown("node 4 TPDO1, TPDO2, TPDO3, TPDO4, RPDO2, RPDO3, RPDO4: nothing is mapped into it");
+    shown("node 4 RPDO1: nobody was heard sending it");
+}

@@ -6,7 +6,6 @@ use serde::Serialize;
 use testbench::dbc::{self, DbcNode, DbcPdo};
 use testbench::words::node::node;
 
-use super::pdo::all_pdos;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
@@ -79,7 +78,7 @@ impl Export {
 
 /// The PDOs of a node that are switched on, with what they carry: RPDOs, then TPDOs. Those with identifiers of 29 bits are left out.
 async fn pdos_of(drive: &Drive) -> Result<Vec<DbcPdo>, Failure> {
-    let mut all = all_pdos(drive).await?;
+    let mut all = drive.pdos().await?;
     all.sort_by_key(|(config, _)| config.pdo);
     let pdos = all.into_iter().filter_map(|(config, cob_id)| {
         let id = cob_id.can_id().as_standard().filter(|_| cob_id.is_valid())?;

@@ -19,6 +19,8 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Format;
 
+pub(super) use plan::{PlanReport, plan_of};
+
 /// Keep a node's parameters in a file, compare them, write them all or not at all, go back
 ///
 /// Files: .dcf (CiA 306), .toml (objects by number or name, values with units), .bin (concise DCF, CiA 302-3). Commands and
@@ -89,21 +91,8 @@ struct Apply {
     /// Node-ID and bit rate too, as the last
     #[arg(long, conflicts_with = "prove")]
     address: bool,
-    /// Store the parameters in the drive's memory afterwards
-    #[arg(long)]
-    save: bool,
-    /// Start the drive anew afterwards, and read everything once more
-    ///
-    /// `power-cycle` waits until somebody has switched the drive off and on; `reset` sends NMT reset node, with which a device
-    /// takes its stored values up (CiA 301, 7.3.2.2.1). Without HOW: a reset on a virtual bus of this command, else a power cycle.
-    #[arg(long, value_name = "HOW", num_args = 0..=1, require_equals = true, default_missing_value = "auto", requires = "save")]
-    prove: Option<Prove>,
-    /// Longest wait for the drive to come back
-    #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "2min", requires = "prove")]
-    within: Duration,
-    /// Where the journal is kept meanwhile
-    #[arg(long, value_name = "FILE")]
-    journal: Option<PathBuf>,
+    #[command(flatten)]
+    how: Transaction,
 }
 
 /// Check that a node has a file's parameters; status 1 if not
@@ -121,6 +110,26 @@ struct Rollback {
     node: NodeId,
     /// The journal (default: that of this node in the current folder)
     #[arg(value_name = "JOURNAL")]
+    journal: Option<PathBuf>,
+}
+
+/// What is done around the writes.
+#[derive(Debug, clap::Args)]
+pub(super) struct Transaction {
+    /// Store the parameters in the drive's memory afterwards
+    #[arg(long)]
+    save: bool,
+    /// Start the drive anew afterwards, and read everything once more
+    ///
+    /// `power-cycle` waits until somebody has switched the drive off and on; `reset` sends NMT reset node, with which a device
+    /// takes its stored values up (CiA 301, 7.3.2.2.1). Without HOW: a reset on a virtual bus of this command, else a power cycle.
+    #[arg(long, value_name = "HOW", num_args = 0..=1, require_equals = true, default_missing_value = "auto", requires = "save")]
+    prove: Option<Prove>,
+    /// Longest wait for the drive to come back
+    #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "2min", requires = "prove")]
+    within: Duration,
+    /// Where the journal is kept meanwhile
+    #[arg(long, value_name = "FILE")]
     journal: Option<PathBuf>,
 }
 

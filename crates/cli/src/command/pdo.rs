@@ -1,14 +1,18 @@
 //! `ferrodrive pdo`: how the PDOs of a node are set up (CiA 301, clauses 7.5.2.35 to 7.5.2.38), and what they carry.
 
+mod setup;
+mod silent;
+mod when;
+
 use std::time::Duration;
 
-use canopen::pdo::{Direction, PdoId, PdoNumber};
-use canopen::{AbortCode, CobId, NmtState, NodeId};
+use canopen::pdo::Direction;
+use canopen::{CobId, NmtState, NodeId};
 use devices::Description;
+use master::Drive;
 use master::decode::{Decoded, Decoder};
-use master::pdo::{PdoConfig, TimerUnits};
+use master::pdo::{PdoConfig, Silence};
 use master::units::parse_duration;
-use master::{Drive, Error};
 use serde::Serialize;
 
 use crate::context::Context;
@@ -19,12 +23,15 @@ use crate::output::{Format, Report};
 use crate::paint::Paint;
 use crate::table::Table;
 use testbench::words::node::node;
+use when::when;
 
-/// Show how a node's PDOs are set up, or what they carry as they come
+/// Show how a node's PDOs are set up and why one stays away, what they carry as they come, or set them up
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive pdo show 4\n  \
     ferrodrive --bus socketcand://HOST:29536/can0 pdo watch 4 --time delta\n  \
-    ferrodrive --bus socketcand://HOST:29536/can0 pdo show")]
+    ferrodrive --bus socketcand://HOST:29536/can0 pdo show\n  \
+    ferrodrive pdo plan 4 tpdo1=statusword,position_actual_value --type 1\n  \
+    ferrodrive pdo apply 4 tpdo1=statusword,6064 tpdo2=off --type 1 --save")]
 pub(crate) struct Pdo {
     #[command(subcommand)]
     what: What,
@@ -36,6 +43,8 @@ enum What {
     Show(Show),
     /// Show the values in a node's PDOs as they come, by its own mapping
     Watch(Watch),
+    Plan(setup::PlanPdos),
+    Apply(setup::ApplyPdos),
 }
 
 #[derive(Debug, clap::Args)]
@@ -60,9 +69,6 @@ struct Watch {
 
 /// Nothing happens on an embedded bus by itself.
 const EMBEDDED_DURATION: Duration = Duration::from_secs(1);
-
-/// The PDOs of a node whose model is not known are asked for up to this one, and on until one is missing.
-const ASKED_IN_ANY_CASE: u16 = 4;
 
 /// How the PDOs of nodes are set up.
 #[derive(Debug, Serialize)]
@@ -91,6 +97,8 @@ struct Row {
     inhibit_ms: Option<f64>,
     event_ms: Option<f64>,
     objects: Vec<Mapped>,
+    /// What keeps it away, as far as that is known.
+    silent: Vec<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -128,6 +136,8 @@ impl Pdo {
         match &self.what {
             What::Show(show) => format.print(&show.run(context).await?).map_err(Failure::not_printed),
             What::Watch(watch) => watch.run(context, format).await,
+            What::Plan(plan) => format.print(&plan.run(context).await?).map_err(Failure::not_printed),
+            What::Apply(apply) => format.print(&apply.run(context).await?).map_err(Failure::not_printed),
         }
     }
 }
@@ -140,48 +150,23 @@ impl Show {
             nodes.extend(context.network.scan(context.timeout(), asked).await.iter().map(|found| found.node));
         }
         let mut list = Vec::new();
+        let mut heard = silent::Heard::listen(context);
+        heard.long_enough(context).await;
         for node in nodes {
             context.progress.show(format!("node {node}: reading its PDOs"));
             let drive = context.drive(node).await?;
-            let pdos = all_pdos(&drive).await?;
-            list.push(OfNode {
-                node: node.raw(),
-                pdos: pdos.iter().map(|(config, cob_id)| Row::new(&drive, config, *cob_id)).collect(),
-            });
+            let pdos = drive.pdos().await?;
+            heard.take();
+            let row = |(config, cob_id): &(PdoConfig, CobId)| {
+                Row::new(&drive, config, *cob_id, heard.why(context, &drive, config, *cob_id))
+            };
+            list.push(OfNode { node: node.raw(), pdos: pdos.iter().map(row).collect() });
         }
         if list.is_empty() {
             return Err(Failure::new("nobody is on the bus").of_kind("nobody").next("ferrodrive scan"));
         }
         Ok(PdoList { nodes: list })
     }
-}
-
-fn units(model: Option<&Description>) -> TimerUnits {
-    model.map_or(TimerUnits::STANDARD, TimerUnits::of)
-}
-
-/// How every PDO of a node is set up: those of its model's table, else those that it has.
-pub(super) async fn all_pdos(drive: &Drive) -> Result<Vec<(PdoConfig, CobId)>, Failure> {
-    let mut pdos = Vec::new();
-    for direction in [Direction::Tpdo, Direction::Rpdo] {
-        for number in (1..=PdoNumber::MAX).filter_map(PdoNumber::new) {
-            let pdo = PdoId { direction, number };
-            let has = |model: &Description| model.row(canopen::Mux::new(pdo.parameter_index(), 1)).is_some();
-            if drive.description().is_some_and(|model| !has(model)) {
-                continue;
-            }
-            match drive.node().pdo_config(pdo, units(drive.description())).await {
-                Ok(config) => pdos.push(config),
-                Err(Error::Aborted { code: AbortCode::NO_SUCH_OBJECT | AbortCode::NO_SUCH_SUB_INDEX, .. }) => {
-                    if drive.description().is_none() && number.number() >= ASKED_IN_ANY_CASE {
-                        break;
-                    }
-                }
-                Err(error) => return Err(error.into()),
-            }
-        }
-    }
-    Ok(pdos)
 }
 
 impl Watch {
@@ -192,7 +177,7 @@ impl Watch {
             decoder.set_model(self.node, model);
         }
         let mut sends = 0;
-        for (config, cob_id) in all_pdos(&drive).await? {
+        for (config, cob_id) in drive.pdos().await? {
             if let Some(id) = cob_id.can_id().as_standard().filter(|_| cob_id.is_valid()) {
                 sends += usize::from(config.pdo.direction == Direction::Tpdo && !config.map.0.is_empty());
                 decoder.set_pdo(self.node, config.pdo, id, &config.map);
@@ -228,7 +213,7 @@ impl Watch {
 }
 
 impl Row {
-    fn new(drive: &Drive, config: &PdoConfig, cob_id: CobId) -> Self {
+    fn new(drive: &Drive, config: &PdoConfig, cob_id: CobId, silent: Vec<Silence>) -> Self {
         let ms = |time: Option<Duration>| time.map(|time| time.as_secs_f64() * 1e3);
         let mapped = config.map.0.iter().map(|record| Mapped {
             object: record.mux.to_string(),
@@ -247,22 +232,8 @@ impl Row {
             inhibit_ms: ms(config.inhibit_time),
             event_ms: ms(config.event_time),
             objects: mapped.collect(),
+            silent: silent.iter().map(ToString::to_string).collect(),
         }
-    }
-}
-
-/// CiA 301, tables 66 and 71.
-fn when(config: &PdoConfig) -> String {
-    match (config.pdo.direction, config.transmission.0) {
-        (Direction::Tpdo, 0) => "after SYNC, if changed".into(),
-        (Direction::Tpdo, 1) => "after every SYNC".into(),
-        (Direction::Tpdo, every @ 2..=240) => format!("after every {every}. SYNC"),
-        (Direction::Rpdo, 0..=240) => "with the next SYNC".into(),
-        (Direction::Tpdo, 252) => "sampled at SYNC, sent on a remote frame".into(),
-        (Direction::Tpdo, 253) => "on a remote frame".into(),
-        (Direction::Tpdo, 254 | 255) => "on events".into(),
-        (Direction::Rpdo, 254 | 255) => "at once".into(),
-        (_, reserved) => format!("{reserved}, which is reserved"),
     }
 }
 
@@ -324,7 +295,26 @@ impl Report for PdoList {
                 carries.collect::<Vec<_>>().join(", "),
             ]);
         }
-        table.plain(paint)
+        let mut lines = vec![table.plain(paint)];
+        lines.extend(self.nodes.iter().flat_map(OfNode::why_silent));
+        lines.join("\n")
+    }
+}
+
+impl OfNode {
+    /// Each reason once, with the PDOs that it keeps away.
+    fn why_silent(&self) -> Vec<String> {
+        let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+        for row in &self.pdos {
+            for reason in &row.silent {
+                match reasons.iter_mut().find(|(known, _)| known == reason) {
+                    Some((_, pdos)) => pdos.push(&row.pdo),
+                    None => reasons.push((reason, vec![&row.pdo])),
+                }
+            }
+        }
+        let line = |(reason, pdos): (&str, Vec<&str>)| format!("node {} {}: {reason}", self.node, pdos.join(", "));
+        reasons.into_iter().map(line).collect()
     }
 }
 

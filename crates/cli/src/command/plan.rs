@@ -17,7 +17,6 @@ use testbench::words::mode::mode;
 use testbench::words::node::node;
 use transport::BusSpec;
 
-use super::pdo::all_pdos;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::global::Global;
@@ -230,7 +229,7 @@ async fn traffic_of(drive: &Drive) -> Result<NodeTraffic, Failure> {
     };
     let timing = drive.description().map_or(Timing::GUESSED, |model| model.timing);
     let event_trigger = drive.description().map_or(EventTrigger::Change, |model| model.pdo.event_trigger);
-    let pdos = all_pdos(drive).await?;
+    let pdos = drive.pdos().await?;
     Ok(NodeTraffic { node: drive.node().id(), pdos, in_cycle: None, event_trigger, heartbeat, timing })
 }
 

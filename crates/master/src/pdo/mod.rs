@@ -5,13 +5,16 @@
 //! back, and on any failure the PDO is put back as it was. The master then sends or receives it by the new mapping.
 //! Saving to the device's memory is deliberately not part of it: see [`crate::drive`].
 
+mod all;
 mod config;
 mod error;
 mod node;
 mod signal;
+mod silence;
 mod transaction;
 mod values;
 
 pub use config::{PdoConfig, TimerUnits, TransmissionType};
 pub use error::{PdoError, SignalError};
+pub use silence::{Silence, Situation, why_silent};
 pub use values::{PdoUnfit, record_of, values_off};

@@ -6,7 +6,7 @@ use std::time::Duration;
 use canopen::AbortCode;
 use devices::Description;
 use master::Drive;
-use master::parameters::{Applied, ApplyError, Plan, PlanOptions, verify};
+use master::parameters::{Applied, ApplyError, Parameters, Plan, PlanOptions, verify};
 use serde::Serialize;
 use testbench::parameters::journal::Journal;
 
@@ -25,7 +25,7 @@ const SETTLED: Duration = Duration::from_millis(100);
 
 /// What was done.
 #[derive(Debug, Serialize)]
-pub(super) struct ApplyReport {
+pub(in crate::command) struct ApplyReport {
     node: u8,
     file: String,
     writes: usize,
@@ -48,21 +48,50 @@ struct Rounded {
 
 impl super::Apply {
     pub(super) async fn run(&self, context: &Context) -> Result<ApplyReport, Failure> {
-        let id = self.wanted.node;
-        let prove = self.prove.map(|prove| self.how(prove, context)).transpose()?;
-        let drive = context.drive_untold(id).await?;
+        let drive = context.drive_untold(self.wanted.node).await?;
+        self.how.check(context, &drive).await?;
+        context.tell_guess(&drive);
+        let (wanted, file) = source::wanted(context, &self.wanted, drive.description())?;
+        self.how.write_all(context, &drive, &wanted, file, self.address).await
+    }
+}
+
+impl super::Transaction {
+    /// Writes these values, which `file` has, to a drive: all or none.
+    pub(in crate::command) async fn run(
+        &self,
+        context: &Context,
+        drive: &Drive,
+        wanted: &Parameters,
+        file: String,
+    ) -> Result<ApplyReport, Failure> {
+        self.check(context, drive).await?;
+        self.write_all(context, drive, wanted, file, false).await
+    }
+
+    /// What would fail after the writes, before them.
+    async fn check(&self, context: &Context, drive: &Drive) -> Result<(), Failure> {
+        self.prove.map(|prove| how(prove, context)).transpose()?;
         if self.save {
-            // Before the first write: parameters that nobody can store were not asked for.
+            // Parameters that nobody can store were not asked for.
             drive.check_save().await?;
         }
-        context.tell_guess(&drive);
-        let model = drive.description();
-        let (wanted, file) = source::wanted(context, &self.wanted, model)?;
+        Ok(())
+    }
+
+    async fn write_all(
+        &self,
+        context: &Context,
+        drive: &Drive,
+        wanted: &Parameters,
+        file: String,
+        address: bool,
+    ) -> Result<ApplyReport, Failure> {
+        let (id, model) = (drive.node().id(), drive.description());
         drive.check_at_rest().await.map_err(source::refused)?;
         context.progress.show(format!("node {id}: reading {} objects", wanted.values.len()));
-        let options = PlanOptions { address: self.address };
-        let plan = drive.plan_parameters(&wanted, options).await.map_err(source::refused)?;
-        let applied = self.write(context, &drive, &plan).await?;
+        let plan = drive.plan_parameters(wanted, PlanOptions { address }).await.map_err(source::refused)?;
+        let applied = self.write(context, drive, &plan).await?;
         let mut report = ApplyReport {
             node: id.raw(),
             file,
@@ -86,8 +115,8 @@ impl super::Apply {
             drive.save().await.map_err(|error| unsaved(error, &report))?;
             report.saved = true;
         }
-        if let Some(prove) = prove {
-            report.proved = Some(self.proved(context, &drive, &plan, prove).await?);
+        if let Some(prove) = self.prove {
+            report.proved = Some(self.proved(context, drive, &plan, how(prove, context)?).await?);
         }
         Ok(report)
     }
@@ -123,18 +152,6 @@ impl super::Apply {
                 done(kept)?;
                 Err(source::refused(error))
             }
-        }
-    }
-
-    fn how(&self, prove: Prove, context: &Context) -> Result<Prove, Failure> {
-        match (prove, context.is_embedded()) {
-            (Prove::Auto, true) => Ok(Prove::Reset),
-            (Prove::Auto, false) => Ok(Prove::PowerCycle),
-            (Prove::PowerCycle, true) => {
-                Err(Failure::usage("nobody can switch a drive off that is on a virtual bus of this command alone")
-                    .next("--prove=reset, or serve the drive: ferrodrive sim, and ferrodrive world NODE power cycle"))
-            }
-            (prove, _) => Ok(prove),
         }
     }
 
@@ -180,6 +197,19 @@ impl super::Apply {
         Err(failure.next(
             "the drive does not store these: write them after each start (boot by a machine file, or params apply)",
         ))
+    }
+}
+
+/// How a drive is started anew on this bus.
+fn how(prove: Prove, context: &Context) -> Result<Prove, Failure> {
+    match (prove, context.is_embedded()) {
+        (Prove::Auto, true) => Ok(Prove::Reset),
+        (Prove::Auto, false) => Ok(Prove::PowerCycle),
+        (Prove::PowerCycle, true) => {
+            Err(Failure::usage("nobody can switch a drive off that is on a virtual bus of this command alone")
+                .next("--prove=reset, or serve the drive: ferrodrive sim, and ferrodrive world NODE power cycle"))
+        }
+        (prove, _) => Ok(prove),
     }
 }
 

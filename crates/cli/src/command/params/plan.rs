@@ -2,7 +2,8 @@
 
 use canopen::Mux;
 use devices::Description;
-use master::parameters::{Plan, PlanOptions};
+use master::Drive;
+use master::parameters::{Parameters, Plan, PlanOptions};
 use serde::Serialize;
 
 use super::shown::{Shown, name};
@@ -16,7 +17,7 @@ use crate::table::Table;
 
 /// What would be written.
 #[derive(Debug, Serialize)]
-pub(super) struct PlanReport {
+pub(in crate::command) struct PlanReport {
     node: u8,
     file: String,
     /// Values of the file that the node has already.
@@ -95,34 +96,37 @@ pub(super) fn is_kept(model: Option<&'static Description>, object: Mux) -> bool 
 
 impl super::PlanArguments {
     pub(super) async fn run(&self, context: &Context) -> Result<PlanReport, Failure> {
-        let id = self.wanted.node;
-        let drive = context.drive(id).await?;
-        let model = drive.description();
-        let (wanted, file) = source::wanted(context, &self.wanted, model)?;
-        context.progress.show(format!("node {id}: reading {} objects", wanted.values.len()));
-        let options = PlanOptions { address: self.address };
-        let plan = drive.plan_parameters(&wanted, options).await.map_err(source::refused)?;
-        let steps = plan.steps.iter().map(|step| Step {
-            object: step.object.to_string(),
-            name: name(model, step.object),
-            before: step.before.as_deref().map(|bytes| Shown::new(model, step.object, bytes)),
-            value: Shown::new(model, step.object, &step.value),
-            purpose: step.purpose.to_string(),
-        });
-        let changed = plan.wanted.keys().filter(|object| plan.steps.iter().any(|step| step.object == **object)).count();
-        let mut notes = notes(&plan, model);
-        if drive.check_at_rest().await.is_err() {
-            notes.push(format!("the drive is at work: apply will refuse it until ferrodrive disable {id}"));
-        }
-        Ok(PlanReport {
-            node: id.raw(),
-            file,
-            same: plan.wanted.len() - changed,
-            steps: steps.collect(),
-            left: LeftOut::of(model, &plan),
-            notes,
-        })
+        let drive = context.drive(self.wanted.node).await?;
+        let (wanted, file) = source::wanted(context, &self.wanted, drive.description())?;
+        plan_of(context, &drive, &wanted, file, self.address).await
     }
+}
+
+/// What would be written to give a drive these values, which `file` has.
+pub(in crate::command) async fn plan_of(
+    context: &Context,
+    drive: &Drive,
+    wanted: &Parameters,
+    file: String,
+    address: bool,
+) -> Result<PlanReport, Failure> {
+    let (id, model) = (drive.node().id(), drive.description());
+    context.progress.show(format!("node {id}: reading {} objects", wanted.values.len()));
+    let plan = drive.plan_parameters(wanted, PlanOptions { address }).await.map_err(source::refused)?;
+    let steps = plan.steps.iter().map(|step| Step {
+        object: step.object.to_string(),
+        name: name(model, step.object),
+        before: step.before.as_deref().map(|bytes| Shown::new(model, step.object, bytes)),
+        value: Shown::new(model, step.object, &step.value),
+        purpose: step.purpose.to_string(),
+    });
+    let changed = plan.wanted.keys().filter(|object| plan.steps.iter().any(|step| step.object == **object)).count();
+    let mut notes = notes(&plan, model);
+    if drive.check_at_rest().await.is_err() {
+        notes.push(format!("the drive is at work: apply will refuse it until ferrodrive disable {id}"));
+    }
+    let (same, left) = (plan.wanted.len() - changed, LeftOut::of(model, &plan));
+    Ok(PlanReport { node: id.raw(), file, same, steps: steps.collect(), left, notes })
 }
 
 impl Report for PlanReport {
