@@ -92,6 +92,7 @@ pub mod cyclic;
 pub mod decode;
 pub mod drive;
 mod error;
+pub mod explain;
 pub mod gateway;
 pub mod group;
 mod host_loss;

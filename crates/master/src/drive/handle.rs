@@ -152,7 +152,7 @@ impl Drive {
         self.power_style().state(statusword)
     }
 
-    pub(super) fn power_style(&self) -> PowerStyle {
+    pub(crate) fn power_style(&self) -> PowerStyle {
         self.axis_description().map_or(PowerStyle::Cia402, |axis| axis.power)
     }
 

@@ -258,7 +258,7 @@ impl Drive {
     }
 
     /// The objects of its ramps that are 0 although they are rates: by them no speed would ever change.
-    pub(super) async fn rates_of_zero(&self) -> Vec<Mux> {
+    pub(crate) async fn rates_of_zero(&self) -> Vec<Mux> {
         let Ok(Ramps::Rates { acceleration, deceleration, .. }) = self.ramps("read its ramps") else {
             return Vec::new();
         };

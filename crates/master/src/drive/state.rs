@@ -91,7 +91,7 @@ impl Drive {
     }
 
     /// Where the present fault code is.
-    pub(super) fn fault_code(&self) -> Mux {
+    pub(crate) fn fault_code(&self) -> Mux {
         self.place(self.description.and_then(|description| description.faults.code).unwrap_or(ERROR_CODE))
     }
 

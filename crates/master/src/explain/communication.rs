@@ -1,0 +1,154 @@
+//! Does it answer, does it live, who else speaks to it, and whom does it watch?
+
+use std::time::Duration;
+
+use canopen::NmtState;
+use canopen::pdo::Direction;
+use devices::HostWatch;
+
+use super::observed::HEARTBEAT_TIME;
+use super::{Finding, Observed, Topic, cause, warning};
+
+const TOPIC: Topic = Topic::Communication;
+
+pub(super) fn look(seen: &Observed, findings: &mut Vec<Finding>) {
+    findings.extend(silent(seen));
+    if seen.silence.is_none() {
+        findings.extend(heartbeat(seen));
+        findings.extend(other_master(seen));
+        findings.extend(nmt_by_other(seen));
+        findings.extend(host_watch(seen));
+    }
+}
+
+/// Nothing else can be told of a node that does not answer.
+fn silent(seen: &Observed) -> Option<Finding> {
+    let (node, error) = (seen.node, seen.silence.as_ref()?);
+    let heartbeats = seen.heard.heartbeats(node).map_or(0, |heard| heard.count);
+    let (follows, remedy) = match (seen.nmt, heartbeats) {
+        (Some(NmtState::Stopped), _) => (
+            "A stopped node answers no SDO and takes no PDO (CiA 301, 7.3.2.2.4)".to_owned(),
+            format!("Start it: ferrodrive nmt {node} start"),
+        ),
+        (_, 1..) => (
+            format!("The node lives ({heartbeats} heartbeats heard) and its SDO server does not answer"),
+            "Look whether another program has an SDO transfer open with it; reset the node's communication \
+             (ferrodrive nmt reset-communication), or switch it off and on"
+                .to_owned(),
+        ),
+        _ => (
+            "Nobody is there, or its bit rate, node-ID or cable is wrong".to_owned(),
+            "Look at its supply and cable, at the termination (120 ohm at both ends), and who is there: ferrodrive scan"
+                .to_owned(),
+        ),
+    };
+    let expected = "It answers SDO requests".to_owned();
+    Some(cause(TOPIC, "no_answer", [expected, error.to_string(), follows, remedy]))
+}
+
+/// 1017h says how often one should come.
+fn heartbeat(seen: &Observed) -> Option<Finding> {
+    let period_ms = seen.value(HEARTBEAT_TIME).filter(|time| *time > 0)? as u64;
+    let (period, listened) = (Duration::from_millis(period_ms), seen.heard.listened());
+    let heard = seen.heard.heartbeats(seen.node).map_or(0, |heard| heard.count);
+    let most = listened.as_millis() as u64 / period_ms + 2;
+    let expected = format!("A heartbeat every {period_ms} ms (1017h:00)");
+    let found = format!("{heard} in {} ms", listened.as_millis());
+    if heard == 0 && listened >= 2 * period {
+        return Some(warning(TOPIC, "heartbeat_missing", [
+            expected,
+            found,
+            "Masters that watch it take it for lost, and stop their motion".to_owned(),
+            "Look for a crowded bus (ferrodrive dump) and for errors of the bus; reset the node".to_owned(),
+        ]));
+    }
+    // Twice what one device sends: two answer to one number.
+    (heard > 2 * most).then(|| {
+        warning(TOPIC, "node_twice", [
+            expected,
+            found,
+            format!("Two devices send as node {}: both act on what either is told", seen.node),
+            "Switch one off and give the other a node-ID of its own: ferrodrive lss scan, or its switches".to_owned(),
+        ])
+    })
+}
+
+/// Two clients at one SDO server take each other's answers (CiA 301, 7.2.4.3.1: one client for each channel).
+fn other_master(seen: &Observed) -> Option<Finding> {
+    let requests = seen.heard.requests(seen.node)?;
+    Some(warning(TOPIC, "other_master", [
+        "One SDO client for each node".to_owned(),
+        format!("{} SDO requests of another program in {} ms", requests.count, seen.heard.listened().as_millis()),
+        "That program and this one take each other's answers, and what one writes the other may overwrite".to_owned(),
+        "Let one of them do the work; while the other runs, look with commands that only listen: ferrodrive dump"
+            .to_owned(),
+    ]))
+}
+
+/// CiA 301, 7.2.8.3.1: the command, then the node (0 for all).
+fn nmt_by_other(seen: &Observed) -> Option<Finding> {
+    let last = seen.heard.nmt()?;
+    let [command, to, ..] = last.bits.to_le_bytes();
+    let name = match command {
+        1 => "start",
+        2 => "stop",
+        128 => "enter pre-operational",
+        129 => "reset node",
+        130 => "reset communication",
+        _ => "an unknown command",
+    };
+    let quiet = command == 1 || (to != 0 && to != seen.node.raw());
+    (!quiet).then(|| {
+        warning(TOPIC, "nmt_by_other", [
+            "The NMT state changes when the one master wants it".to_owned(),
+            format!("{} NMT commands of another program; the last one was {name} to {}", last.count, all_or(to)),
+            "PDOs end, or the node starts anew, in the middle of a motion".to_owned(),
+            "Find the other NMT master (ferrodrive dump --service nmt) and let one of the two do it".to_owned(),
+        ])
+    })
+}
+
+fn all_or(node: u8) -> String {
+    if node == 0 { "all nodes".to_owned() } else { format!("node {node}") }
+}
+
+/// A drive that watches its host stops when that falls silent.
+fn host_watch(seen: &Observed) -> Option<Finding> {
+    let listened = seen.heard.listened();
+    match seen.description?.host_watch {
+        HostWatch::Silence { time } => {
+            let limit = Duration::from_millis(u64::try_from(seen.value(time)?).ok()?);
+            let rpdos = seen.pdos.iter().filter(|(config, _)| config.pdo.direction == Direction::Rpdo);
+            let ids = rpdos.filter_map(|(_, cob_id)| cob_id.can_id().as_standard());
+            let silence = seen.heard.longest_silence(ids.chain([0x600 + u16::from(seen.node.raw())]));
+            let fed = seen.talked_to.is_some_and(|ago| ago < limit);
+            (seen.is_enabled() && !limit.is_zero() && silence >= limit && !fed).then(|| {
+                cause(TOPIC, "host_silent", [
+                    format!("A frame for it at least every {} ms ({})", limit.as_millis(), seen.named(time)),
+                    format!("None for {} of the {} ms listened", silence.as_millis(), listened.as_millis()),
+                    "It takes its host for dead and stops by itself".to_owned(),
+                    "Send it something more often (an RPDO, a read of its statusword); what moves it with ferrodrive does \
+                     so by itself"
+                        .to_owned(),
+                ])
+            })
+        }
+        HostWatch::Heartbeat { consumer, fault } => {
+            let entry = seen.value(consumer)?;
+            let (host, limit_ms) = (canopen::NodeId::new((entry >> 16) as u8)?, entry & 0xFFFF);
+            let stopped = seen.fault.as_ref().is_some_and(|(code, _)| code & fault != 0);
+            (stopped && limit_ms > 0).then(|| {
+                let heard = seen.heard.heartbeats(host).map_or(0, |heard| heard.count);
+                cause(TOPIC, "host_heartbeat_missing", [
+                    format!("A heartbeat of node {host} at least every {limit_ms} ms ({})", seen.named(consumer)),
+                    format!("{heard} of them in {} ms, and the fault of that watch", listened.as_millis()),
+                    "It takes its host for dead and has stopped; with the next heartbeat it goes on with what it was told \
+                     before"
+                        .to_owned(),
+                    format!("Set its target to zero, then have node {host} send its heartbeat again"),
+                ])
+            })
+        }
+        HostWatch::None => None,
+    }
+}

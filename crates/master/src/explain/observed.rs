@@ -1,0 +1,257 @@
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use canopen::od::Entry;
+use canopen::{CobId, Mux, NmtState, NodeId};
+use cia402::{Controlword, ModeOfOperation, PowerState, Statusword};
+use devices::faults::FaultRow;
+use devices::{AxisDescription, Description, HostWatch, PowerStyle, Quantity};
+
+use super::overheard::Overheard;
+use crate::decode::common_row;
+use crate::drive::{Drive, faults_in};
+use crate::error::Error;
+use crate::pdo::PdoConfig;
+
+/// Objects of an axis that rules ask for (CiA 402-2); those that a drive does not have are passed over.
+const OF_AXIS: [Mux; 17] = [
+    CONTROLWORD,
+    Mux::new(0x6060, 0),
+    POSITION_ACTUAL,
+    TARGET_POSITION,
+    TARGET_TORQUE,
+    MAX_TORQUE,
+    MAX_CURRENT,
+    POSITION_LIMIT_LOW,
+    POSITION_LIMIT_HIGH,
+    MAX_PROFILE_VELOCITY,
+    MAX_MOTOR_SPEED,
+    PROFILE_VELOCITY,
+    TARGET_VELOCITY,
+    POSITION_WINDOW,
+    PROFILE_ACCELERATION,
+    POSITIVE_TORQUE_LIMIT,
+    NEGATIVE_TORQUE_LIMIT,
+];
+
+pub(super) const CONTROLWORD: Mux = Mux::new(0x6040, 0);
+pub(super) const POSITION_ACTUAL: Mux = Mux::new(0x6064, 0);
+pub(super) const POSITION_WINDOW: Mux = Mux::new(0x6067, 0);
+pub(super) const TARGET_TORQUE: Mux = Mux::new(0x6071, 0);
+pub(super) const MAX_TORQUE: Mux = Mux::new(0x6072, 0);
+pub(super) const MAX_CURRENT: Mux = Mux::new(0x6073, 0);
+pub(super) const TARGET_POSITION: Mux = Mux::new(0x607A, 0);
+pub(super) const POSITION_LIMIT_LOW: Mux = Mux::new(0x607D, 1);
+pub(super) const POSITION_LIMIT_HIGH: Mux = Mux::new(0x607D, 2);
+pub(super) const MAX_PROFILE_VELOCITY: Mux = Mux::new(0x607F, 0);
+pub(super) const MAX_MOTOR_SPEED: Mux = Mux::new(0x6080, 0);
+pub(super) const PROFILE_VELOCITY: Mux = Mux::new(0x6081, 0);
+pub(super) const PROFILE_ACCELERATION: Mux = Mux::new(0x6083, 0);
+pub(super) const POSITIVE_TORQUE_LIMIT: Mux = Mux::new(0x60E0, 0);
+pub(super) const NEGATIVE_TORQUE_LIMIT: Mux = Mux::new(0x60E1, 0);
+pub(super) const TARGET_VELOCITY: Mux = Mux::new(0x60FF, 0);
+
+/// Producer heartbeat time in ms (CiA 301, 7.5.2.17).
+pub(super) const HEARTBEAT_TIME: Mux = Mux::new(0x1017, 0);
+
+/// Between the two looks at the speed: a shaft that starts has moved on, one that is held has not.
+const BETWEEN_LOOKS: Duration = Duration::from_millis(100);
+
+/// Everything that the rules look at.
+#[derive(Clone, Debug)]
+pub struct Observed {
+    /// The node.
+    pub node: NodeId,
+    /// Its model, if known.
+    pub description: Option<&'static Description>,
+    /// The axis of it.
+    pub axis: Option<&'static AxisDescription>,
+    /// Why nothing could be read.
+    pub silence: Option<Error>,
+    /// Its NMT state, as far as that was heard.
+    pub nmt: Option<NmtState>,
+    /// The statusword.
+    pub statusword: Option<Statusword>,
+    /// The state that it shows.
+    pub power: Option<PowerState>,
+    /// How the drive is enabled.
+    pub style: PowerStyle,
+    /// The mode that it shows.
+    pub mode: Option<ModeOfOperation>,
+    /// Its fault code (0 for none), and what it stands for.
+    pub fault: Option<(u16, Vec<&'static FaultRow>)>,
+    /// Speed in r/min, the larger of two looks.
+    pub speed_rpm: Option<f64>,
+    /// The speed that it is told, in r/min.
+    pub target_rpm: Option<f64>,
+    /// Motor current in A.
+    pub current_a: Option<f64>,
+    /// Supply voltage in V.
+    pub supply_v: Option<f64>,
+    /// Objects that say how fast its speed may change, and are 0.
+    pub rates_of_zero: Vec<Mux>,
+    /// How its PDOs are set up.
+    pub pdos: Vec<(PdoConfig, CobId)>,
+    /// This master said something to it within this time before it was looked at.
+    pub talked_to: Option<Duration>,
+    /// What others sent.
+    pub heard: Overheard,
+    values: BTreeMap<Mux, i64>,
+}
+
+impl Observed {
+    /// Reads what the rules want to know. A refused object is left out; silence ends the reading and is told.
+    pub async fn of(drive: &Drive, heard: &Overheard) -> Self {
+        let (facts, now) = (drive.node().facts(), drive.node().network().now());
+        let mut seen = Self {
+            node: drive.node().id(),
+            description: drive.description(),
+            axis: drive.axis_description(),
+            silence: None,
+            nmt: facts.probable_state(drive.description()),
+            statusword: None,
+            power: None,
+            style: drive.power_style(),
+            mode: None,
+            fault: None,
+            speed_rpm: None,
+            target_rpm: None,
+            current_a: None,
+            supply_v: None,
+            rates_of_zero: Vec::new(),
+            pdos: Vec::new(),
+            talked_to: facts.talked_to_at.map(|at| now - at),
+            heard: heard.clone(),
+            values: BTreeMap::new(),
+        };
+        seen.silence = seen.read(drive).await.err();
+        seen
+    }
+
+    async fn read(&mut self, drive: &Drive) -> Result<(), Error> {
+        let units = self.axis.map(|axis| &axis.units);
+        // Everything answers this one: whether there is anybody is told by the first question.
+        answered(drive.node().upload(Mux::new(0x1000, 0)).await)?;
+        if let Some(statusword) = answered(drive.statusword().await)? {
+            (self.statusword, self.power) = (Some(statusword), drive.power_state(statusword));
+        }
+        let speed = units.and_then(|units| units.actual_velocity);
+        let first = measure(drive, speed).await?;
+        for mux in self.wanted() {
+            self.read_value(drive, mux).await?;
+        }
+        self.mode = self.axis_value(self.mode_object()).and_then(|raw| i8::try_from(raw).ok()).map(ModeOfOperation);
+        let code = answered(drive.node().upload(drive.fault_code()).await)?.map(|payload| payload.raw() as u16);
+        self.fault =
+            code.map(|code| (code, self.description.map(|model| faults_in(model, code)).unwrap_or_default()));
+        self.target_rpm = measure(drive, units.and_then(|units| units.target_velocity)).await?;
+        self.current_a = measure(drive, units.and_then(|units| units.actual_current)).await?;
+        self.supply_v = measure(drive, units.and_then(|units| units.bus_voltage)).await?;
+        self.rates_of_zero = drive.rates_of_zero().await;
+        self.pdos = drive.pdos().await?;
+        drive.node().network().sleep(BETWEEN_LOOKS).await;
+        let second = measure(drive, speed).await?;
+        self.speed_rpm = first.into_iter().chain(second).max_by(|a, b| a.abs().total_cmp(&b.abs()));
+        Ok(())
+    }
+
+    /// The objects to read, those that the model's units and limits name among them.
+    fn wanted(&self) -> Vec<Mux> {
+        let mut wanted: Vec<Mux> = OF_AXIS.iter().map(|mux| self.place(*mux)).collect();
+        wanted.extend([HEARTBEAT_TIME, self.mode_object()]);
+        if let Some(units) = self.axis.map(|axis| &axis.units) {
+            let quantities = [units.target_velocity, units.profile_velocity, units.target_current];
+            wanted.extend(quantities.into_iter().flatten().map(|quantity| quantity.object));
+        }
+        wanted.extend(match self.description.map(|description| description.host_watch) {
+            Some(HostWatch::Silence { time }) => Some(time),
+            Some(HostWatch::Heartbeat { consumer, .. }) => Some(consumer),
+            _ => None,
+        });
+        let held_to: Vec<_> = wanted.iter().filter_map(|mux| self.row(*mux)?.held_to).map(|held| held.object).collect();
+        wanted.extend(held_to);
+        wanted.sort();
+        wanted.dedup();
+        wanted
+    }
+
+    async fn read_value(&mut self, drive: &Drive, mux: Mux) -> Result<(), Error> {
+        let Some(row) = self.row(mux) else { return Ok(()) };
+        if let Some(payload) = answered(drive.node().upload(mux).await)?
+            && payload.as_bytes().len() == row.data_type.size()
+        {
+            self.values.insert(mux, row.data_type.value(payload.raw()));
+        }
+        Ok(())
+    }
+
+    /// The model's row of an object, or the one on which all models agree.
+    pub(super) fn row(&self, mux: Mux) -> Option<&'static Entry> {
+        self.description.map_or_else(|| common_row(mux), |description| description.row(mux))
+    }
+
+    /// Where the axis has an object of the standard.
+    pub(super) fn place(&self, mux: Mux) -> Mux {
+        self.axis.map_or(mux, |axis| axis.object(mux))
+    }
+
+    /// Where the mode is shown.
+    pub(super) fn mode_object(&self) -> Mux {
+        self.axis.map_or(Mux::new(0x6061, 0), |axis| axis.mode_display)
+    }
+
+    /// What an object has, where it is the drive's.
+    pub(super) fn value(&self, mux: Mux) -> Option<i64> {
+        self.values.get(&mux).copied()
+    }
+
+    /// What an object of the standard has, of this axis.
+    pub(super) fn axis_value(&self, mux: Mux) -> Option<i64> {
+        self.value(self.place(mux))
+    }
+
+    /// The controlword that the drive has.
+    pub(super) fn controlword(&self) -> Option<Controlword> {
+        self.axis_value(CONTROLWORD).map(|raw| Controlword(raw as u16))
+    }
+
+    /// True in Operation enabled.
+    pub(super) fn is_enabled(&self) -> bool {
+        self.power == Some(PowerState::OperationEnabled)
+    }
+
+    /// True if the shaft was seen to turn.
+    pub(super) fn turns(&self) -> bool {
+        self.speed_rpm.is_some_and(|speed| speed.abs() > STANDSTILL_RPM)
+    }
+
+    /// True if the statusword has this bit, and the model gives it no meaning of its own.
+    pub(super) fn has_standard_bit(&self, mask: u16) -> bool {
+        let own = self.axis.is_some_and(|axis| axis.statusword_bits.iter().any(|(bits, _)| bits & mask != 0));
+        !own && self.style == PowerStyle::Cia402 && self.statusword.is_some_and(|word| word.has(mask))
+    }
+
+    /// `60FFh:00 target_velocity`.
+    pub(super) fn named(&self, mux: Mux) -> String {
+        self.row(mux).map_or_else(|| mux.to_string(), |row| format!("{mux} {}", row.name))
+    }
+}
+
+/// Speed below which a shaft counts as standing still: the rounding of the coarsest velocity object.
+const STANDSTILL_RPM: f64 = 1.0;
+
+async fn measure(drive: &Drive, quantity: Option<Quantity>) -> Result<Option<f64>, Error> {
+    match quantity {
+        Some(quantity) => answered(drive.read_quantity(quantity).await),
+        None => Ok(None),
+    }
+}
+
+/// What is refused, or comes in another form, says nothing; silence is handed on.
+fn answered<T>(result: Result<T, Error>) -> Result<Option<T>, Error> {
+    match result {
+        Ok(value) => Ok(Some(value)),
+        Err(error @ Error::NoAnswer { .. }) => Err(error),
+        Err(_) => Ok(None),
+    }
+}

@@ -1,0 +1,191 @@
+//! What an enabled drive that stands still is told to do (CiA 402-2, the clauses of its modes).
+
+use canopen::Mux;
+use cia402::{Controlword, ModeOfOperation, Statusword};
+use devices::{HomingStart, NewSetPoint};
+
+use super::observed::{
+    MAX_CURRENT, MAX_MOTOR_SPEED, MAX_PROFILE_VELOCITY, MAX_TORQUE, NEGATIVE_TORQUE_LIMIT, POSITION_ACTUAL,
+    POSITION_LIMIT_HIGH, POSITION_LIMIT_LOW, POSITION_WINDOW, POSITIVE_TORQUE_LIMIT, PROFILE_ACCELERATION,
+    PROFILE_VELOCITY, TARGET_POSITION, TARGET_TORQUE, TARGET_VELOCITY,
+};
+use super::{Finding, Observed, Topic, cause};
+
+const TOPIC: Topic = Topic::SetPoint;
+
+pub(super) fn look(seen: &Observed, findings: &mut Vec<Finding>) {
+    let Some(mode) = seen.mode.filter(|_| seen.is_enabled() && !seen.turns()) else { return };
+    findings.extend(halt(seen, mode));
+    match mode {
+        ModeOfOperation::PROFILE_VELOCITY | ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY => {
+            findings.extend(zero(seen, "target_zero", target_velocity(seen), "A speed to turn at"));
+        }
+        ModeOfOperation::PROFILE_TORQUE | ModeOfOperation::CYCLIC_SYNCHRONOUS_TORQUE => {
+            findings.extend(zero(seen, "target_zero", target_torque(seen), "A torque"));
+        }
+        ModeOfOperation::PROFILE_POSITION => {
+            findings.extend(position(seen));
+            let own = seen.axis.and_then(|axis| axis.units.profile_velocity).map(|quantity| quantity.object);
+            let object = own.unwrap_or_else(|| seen.place(PROFILE_VELOCITY));
+            findings.extend(zero(seen, "profile_velocity_zero", object, "A speed for the way to the target"));
+        }
+        ModeOfOperation::HOMING => findings.extend(homing(seen)),
+        _ => {}
+    }
+    if matches!(mode, ModeOfOperation::PROFILE_POSITION | ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION) {
+        findings.extend(software_limit(seen));
+    }
+    limits(seen, mode, findings);
+    ramps(seen, mode, findings);
+}
+
+/// Where the speed to turn at is.
+pub(super) fn target_velocity(seen: &Observed) -> Mux {
+    let own = seen.axis.and_then(|axis| axis.units.target_velocity).map(|quantity| quantity.object);
+    own.unwrap_or_else(|| seen.place(TARGET_VELOCITY))
+}
+
+fn target_torque(seen: &Observed) -> Mux {
+    let own = seen.axis.and_then(|axis| axis.units.target_current).map(|quantity| quantity.object);
+    own.unwrap_or_else(|| seen.place(TARGET_TORQUE))
+}
+
+/// An object that has to be something else than 0.
+fn zero(seen: &Observed, rule: &'static str, object: Mux, expected: &str) -> Option<Finding> {
+    (seen.value(object)? == 0).then(|| {
+        cause(TOPIC, rule, [
+            format!("{expected} in {}", seen.named(object)),
+            "It is 0".to_owned(),
+            "The drive stands because it is told to".to_owned(),
+            format!("Write {object}, by SDO or in the RPDO that carries it"),
+        ])
+    })
+}
+
+/// Controlword bit 8, in the modes that have it (CiA 402-2, 8.4.1).
+fn halt(seen: &Observed, mode: ModeOfOperation) -> Option<Finding> {
+    let controlword = seen.controlword()?;
+    let heeds = matches!(mode.0, 1 | 3 | 4 | 6) && seen.style == devices::PowerStyle::Cia402;
+    (heeds && controlword.has(Controlword::HALT)).then(|| {
+        cause(TOPIC, "halt", [
+            "Controlword bit 8 (halt) is 0".to_owned(),
+            format!("Controlword {controlword}"),
+            "The axis is halted and stays so until the bit is cleared".to_owned(),
+            "Write the controlword without bit 8".to_owned(),
+        ])
+    })
+}
+
+/// Profile position: is there a way to go, and was the drive told to go it?
+fn position(seen: &Observed) -> Option<Finding> {
+    let (target, at) = (seen.axis_value(TARGET_POSITION)?, seen.axis_value(POSITION_ACTUAL)?);
+    let (controlword, statusword) = (seen.controlword()?, seen.statusword?);
+    let relative = controlword.has(Controlword::RELATIVE);
+    let window = seen.axis_value(POSITION_WINDOW).filter(|window| *window < i64::from(u32::MAX)).unwrap_or(0).max(1);
+    let object = seen.named(seen.place(TARGET_POSITION));
+    if !relative && target.abs_diff(at) <= window as u64 {
+        return Some(cause(TOPIC, "at_target", [
+            format!("A target elsewhere in {object}"),
+            format!("Target {target}, position {at} counts"),
+            "The drive is where it is told to be".to_owned(),
+            "Write another target, then start it with controlword bit 4".to_owned(),
+        ]));
+    }
+    let handshake = seen.axis.is_none_or(|axis| axis.new_set_point == NewSetPoint::Handshake);
+    let asked = controlword.has(Controlword::NEW_SET_POINT);
+    let found = format!("Target {target}, position {at} counts, controlword {controlword}, statusword {statusword}");
+    if handshake && asked && statusword.has(Statusword::SET_POINT_ACKNOWLEDGE) {
+        return Some(cause(TOPIC, "start_bit_left_set", [
+            "Controlword bit 4 rises for each new target (CiA 402-2, 10.1)".to_owned(),
+            found,
+            "Bit 4 still stands from the target before: the one in 607Ah was never taken".to_owned(),
+            "Clear bit 4, wait until statusword bit 12 is 0, then set it again".to_owned(),
+        ]));
+    }
+    (!asked && statusword.has(Statusword::TARGET_REACHED)).then(|| {
+        cause(TOPIC, "set_point_not_started", [
+            "A 1 in controlword bit 4 after the target was written".to_owned(),
+            found,
+            "The target stands in 607Ah and the drive was not told to go there".to_owned(),
+            format!("Write the controlword with bit 4: 1Fh, or 5Fh for a relative move; or: ferrodrive move {}", seen.node),
+        ])
+    })
+}
+
+/// 607Dh (CiA 402-2, 10.4). No limits where the lower one is not below the upper one.
+fn software_limit(seen: &Observed) -> Option<Finding> {
+    let (low, high) = (seen.axis_value(POSITION_LIMIT_LOW)?, seen.axis_value(POSITION_LIMIT_HIGH)?);
+    let target = seen.axis_value(TARGET_POSITION)?;
+    (low < high && !(low..=high).contains(&target)).then(|| {
+        cause(TOPIC, "software_limit", [
+            format!("A target from {low} to {high} counts (607Dh)"),
+            format!("Target {target}"),
+            "The drive stops at the limit, or does not start".to_owned(),
+            "Choose a target within the limits, or write 607Dh when the machine allows more".to_owned(),
+        ])
+    })
+}
+
+/// Mode 6, by the model's own bits.
+fn homing(seen: &Observed) -> Option<Finding> {
+    let (rules, statusword) = (seen.axis?.homing?, seen.statusword?);
+    let method = seen.value(rules.method).map_or_else(String::new, |method| format!(", method {method}"));
+    if rules.failed.matches(statusword) {
+        return Some(cause(TOPIC, "homing_failed", [
+            "The reference is found".to_owned(),
+            format!("Statusword {statusword}: homing has failed{method}"),
+            "The drive does not know where it is".to_owned(),
+            "Check the switch of the method, its wiring and its input's function, and the direction of the search"
+                .to_owned(),
+        ]));
+    }
+    let controlword = seen.controlword()?;
+    let by_bit = rules.start == HomingStart::ControlwordBit4;
+    let waits = by_bit && !controlword.has(Controlword::NEW_SET_POINT) && !rules.attained.matches(statusword);
+    waits.then(|| {
+        cause(TOPIC, "homing_not_started", [
+            "Controlword bit 4 rises in mode 6 (CiA 402-2, 11.1)".to_owned(),
+            format!("Controlword {controlword}{method}"),
+            "The drive is ready to look for its reference and was not told to".to_owned(),
+            format!("Write the controlword with bit 4: 1Fh; or: ferrodrive home {} --method N", seen.node),
+        ])
+    })
+}
+
+/// Limits of 0, by the model's rows where it is known ([`canopen::od::Entry::held_to`]), else by the standard.
+fn limits(seen: &Observed, mode: ModeOfOperation, findings: &mut Vec<Finding>) {
+    let held_to = seen.row(target_velocity(seen)).and_then(|row| row.held_to).map(|held| held.object);
+    let speed = [MAX_PROFILE_VELOCITY, MAX_MOTOR_SPEED].map(|mux| seen.place(mux));
+    let torque = [MAX_TORQUE, MAX_CURRENT, POSITIVE_TORQUE_LIMIT, NEGATIVE_TORQUE_LIMIT].map(|mux| seen.place(mux));
+    let by_speed = matches!(mode.0, 1 | 3 | 9);
+    let rows = speed.into_iter().chain(held_to).filter(|_| by_speed).map(|object| ("speed_limit_zero", object));
+    let mut told = Vec::new();
+    for (rule, object) in rows.chain(torque.map(|object| ("torque_limit_zero", object))) {
+        if seen.value(object) == Some(0) && !told.contains(&object) {
+            told.push(object);
+            findings.push(cause(TOPIC, rule, [
+                format!("A limit above 0 in {}", seen.named(object)),
+                "It is 0".to_owned(),
+                "The limit holds every set-point at 0".to_owned(),
+                format!("Write {object}: what the motor and the machine bear"),
+            ]));
+        }
+    }
+}
+
+/// A speed that may not change stays 0.
+fn ramps(seen: &Observed, mode: ModeOfOperation, findings: &mut Vec<Finding>) {
+    if !matches!(mode.0, 1 | 3) {
+        return;
+    }
+    let standard = seen.place(PROFILE_ACCELERATION);
+    let unknown = (seen.axis.is_none() && seen.value(standard) == Some(0)).then_some(standard);
+    for object in seen.rates_of_zero.iter().copied().chain(unknown) {
+        findings.push(cause(TOPIC, "ramp_zero", [
+            format!("A rate above 0 in {}", seen.named(object)),
+            "It is 0".to_owned(),
+            "The speed may not change: many drives do not move so".to_owned(),
+            format!("Write how fast its speed may change to {object}"),
+        ]));
+    }
+}
