@@ -3,9 +3,9 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    completions, convert, dcf, decode, demo, drive, dump, eds, emcy, events, export, gateway, home, latency, lss,
-    man_pages, motion, nmt, objects, params, pdo, plan, plot, read, readings, record, replay, run, scan, sdo, send,
-    sim, store, sync, time, watch, world,
+    completions, convert, dcf, decode, demo, drive, dump, eds, emcy, events, explain, export, gateway, home, latency,
+    lss, man_pages, motion, nmt, objects, params, pdo, plan, plot, read, readings, record, replay, run, scan, sdo,
+    send, sim, store, sync, time, watch, world,
 };
 use crate::global::Global;
 
@@ -48,6 +48,7 @@ pub(crate) enum Command {
     Time(time::Time),
     Send(send::Send),
     State(drive::State),
+    Explain(explain::Explain),
     Enable(drive::Enable),
     Disable(drive::Disable),
     Stop(drive::Stop),

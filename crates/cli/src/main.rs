@@ -188,6 +188,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Lss(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Nmt(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::State(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Explain(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Enable(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Disable(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Stop(command) => on_bus(global, format, async |context| command.run(context).await),

@@ -11,6 +11,7 @@ pub(crate) mod dump;
 pub(crate) mod eds;
 pub(crate) mod emcy;
 pub(crate) mod events;
+pub(crate) mod explain;
 pub(crate) mod export;
 pub(crate) mod gateway;
 pub(crate) mod home;

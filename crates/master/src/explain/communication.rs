@@ -55,34 +55,48 @@ fn heartbeat(seen: &Observed) -> Option<Finding> {
     let expected = format!("A heartbeat every {period_ms} ms (1017h:00)");
     let found = format!("{heard} in {} ms", listened.as_millis());
     if heard == 0 && listened >= 2 * period {
-        return Some(warning(TOPIC, "heartbeat_missing", [
-            expected,
-            found,
-            "Masters that watch it take it for lost, and stop their motion".to_owned(),
-            "Look for a crowded bus (ferrodrive dump) and for errors of the bus; reset the node".to_owned(),
-        ]));
+        return Some(warning(
+            TOPIC,
+            "heartbeat_missing",
+            [
+                expected,
+                found,
+                "Masters that watch it take it for lost, and stop their motion".to_owned(),
+                "Look for a crowded bus (ferrodrive dump) and for errors of the bus; reset the node".to_owned(),
+            ],
+        ));
     }
     // Twice what one device sends: two answer to one number.
     (heard > 2 * most).then(|| {
-        warning(TOPIC, "node_twice", [
-            expected,
-            found,
-            format!("Two devices send as node {}: both act on what either is told", seen.node),
-            "Switch one off and give the other a node-ID of its own: ferrodrive lss scan, or its switches".to_owned(),
-        ])
+        warning(
+            TOPIC,
+            "node_twice",
+            [
+                expected,
+                found,
+                format!("Two devices send as node {}: both act on what either is told", seen.node),
+                "Switch one off and give the other a node-ID of its own: ferrodrive lss scan, or its switches"
+                    .to_owned(),
+            ],
+        )
     })
 }
 
 /// Two clients at one SDO server take each other's answers (CiA 301, 7.2.4.3.1: one client for each channel).
 fn other_master(seen: &Observed) -> Option<Finding> {
     let requests = seen.heard.requests(seen.node)?;
-    Some(warning(TOPIC, "other_master", [
-        "One SDO client for each node".to_owned(),
-        format!("{} SDO requests of another program in {} ms", requests.count, seen.heard.listened().as_millis()),
-        "That program and this one take each other's answers, and what one writes the other may overwrite".to_owned(),
-        "Let one of them do the work; while the other runs, look with commands that only listen: ferrodrive dump"
-            .to_owned(),
-    ]))
+    Some(warning(
+        TOPIC,
+        "other_master",
+        [
+            "One SDO client for each node".to_owned(),
+            format!("{} SDO requests of another program in {} ms", requests.count, seen.heard.listened().as_millis()),
+            "That program and this one take each other's answers, and what one writes the other may overwrite"
+                .to_owned(),
+            "Let one of them do the work; while the other runs, look with commands that only listen: ferrodrive dump"
+                .to_owned(),
+        ],
+    ))
 }
 
 /// CiA 301, 7.2.8.3.1: the command, then the node (0 for all).
@@ -99,12 +113,16 @@ fn nmt_by_other(seen: &Observed) -> Option<Finding> {
     };
     let quiet = command == 1 || (to != 0 && to != seen.node.raw());
     (!quiet).then(|| {
-        warning(TOPIC, "nmt_by_other", [
-            "The NMT state changes when the one master wants it".to_owned(),
-            format!("{} NMT commands of another program; the last one was {name} to {}", last.count, all_or(to)),
-            "PDOs end, or the node starts anew, in the middle of a motion".to_owned(),
-            "Find the other NMT master (ferrodrive dump --service nmt) and let one of the two do it".to_owned(),
-        ])
+        warning(
+            TOPIC,
+            "nmt_by_other",
+            [
+                "The NMT state changes when the one master wants it".to_owned(),
+                format!("{} NMT commands of another program; the last one was {name} to {}", last.count, all_or(to)),
+                "PDOs end, or the node starts anew, in the middle of a motion".to_owned(),
+                "Find the other NMT master (ferrodrive dump --service nmt) and let one of the two do it".to_owned(),
+            ],
+        )
     })
 }
 

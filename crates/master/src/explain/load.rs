@@ -24,28 +24,37 @@ pub(super) fn look(seen: &Observed, findings: &mut Vec<Finding>) {
 
 /// Bit 13 in the position modes (CiA 402-2, 10.1 and 14.1).
 fn following_error(seen: &Observed) -> Option<Finding> {
-    let by_position = matches!(
-        seen.mode?,
-        ModeOfOperation::PROFILE_POSITION | ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION
-    );
+    let by_position =
+        matches!(seen.mode?, ModeOfOperation::PROFILE_POSITION | ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION);
     (by_position && seen.has_standard_bit(Statusword::FOLLOWING_ERROR)).then(|| {
-        cause(TOPIC, "following_error", [
-            "Statusword bit 13 (following error) is 0".to_owned(),
-            format!("Bit 13 is 1{}", current(seen)),
-            "The shaft does not keep up with the demand: 6065h and 6066h say how much and how long is allowed".to_owned(),
-            "Look for a blocked or heavy load; make the ramps gentler; then the window, if it is too narrow".to_owned(),
-        ])
+        cause(
+            TOPIC,
+            "following_error",
+            [
+                "Statusword bit 13 (following error) is 0".to_owned(),
+                format!("Bit 13 is 1{}", current(seen)),
+                "The shaft does not keep up with the demand: 6065h and 6066h say how much and how long is allowed"
+                    .to_owned(),
+                "Look for a blocked or heavy load; make the ramps gentler; then the window, if it is too narrow"
+                    .to_owned(),
+            ],
+        )
     })
 }
 
 fn internal_limit(seen: &Observed) -> Option<Finding> {
     seen.has_standard_bit(Statusword::INTERNAL_LIMIT_ACTIVE).then(|| {
-        warning(TOPIC, "internal_limit", [
-            "Statusword bit 11 (internal limit active) is 0".to_owned(),
-            format!("Bit 11 is 1{}", current(seen)),
-            "A limit of the drive holds its set-point back: position, speed, torque or current".to_owned(),
-            "Compare target and limits (607Dh, 607Fh, 6080h, 6072h, 60E0h, 60E1h), and look for a heavy load".to_owned(),
-        ])
+        warning(
+            TOPIC,
+            "internal_limit",
+            [
+                "Statusword bit 11 (internal limit active) is 0".to_owned(),
+                format!("Bit 11 is 1{}", current(seen)),
+                "A limit of the drive holds its set-point back: position, speed, torque or current".to_owned(),
+                "Compare target and limits (607Dh, 607Fh, 6080h, 6072h, 60E0h, 60E1h), and look for a heavy load"
+                    .to_owned(),
+            ],
+        )
     })
 }
 
@@ -56,12 +65,16 @@ fn held(seen: &Observed) -> Option<Finding> {
     let (target, speed) = (seen.target_rpm.filter(|_| by_speed)?, seen.speed_rpm?);
     let least = (target.abs() * HELD_SHARE).max(LEAST_RPM);
     (target.abs() > LEAST_RPM && speed.abs() < least).then(|| {
-        cause(TOPIC, "shaft_held", [
-            format!("A speed near {target:.1} r/min"),
-            format!("{speed:.1} r/min{}", current(seen)),
-            "Nothing that the drive tells keeps it: its shaft is held, or its current does not suffice".to_owned(),
-            "Look at the load, the brake, the motor's wires and the current limit".to_owned(),
-        ])
+        cause(
+            TOPIC,
+            "shaft_held",
+            [
+                format!("A speed near {target:.1} r/min"),
+                format!("{speed:.1} r/min{}", current(seen)),
+                "Nothing that the drive tells keeps it: its shaft is held, or its current does not suffice".to_owned(),
+                "Look at the load, the brake, the motor's wires and the current limit".to_owned(),
+            ],
+        )
     })
 }
 

@@ -123,8 +123,7 @@ pub struct Explained {
 type Rule = fn(&Observed, &mut Vec<Finding>);
 
 /// In the order of the findings. The load comes last of what concerns motion: it looks at what the others leave unexplained.
-const RULES: [Rule; 6] =
-    [communication::look, power::look, mode::look, set_point::look, load::look, pdos::look];
+const RULES: [Rule; 6] = [communication::look, power::look, mode::look, set_point::look, load::look, pdos::look];
 
 impl Drive {
     /// Looks for what keeps this drive from moving and its PDOs from being exchanged. Reads some thirty objects and writes

@@ -142,8 +142,7 @@ impl Observed {
         }
         self.mode = self.axis_value(self.mode_object()).and_then(|raw| i8::try_from(raw).ok()).map(ModeOfOperation);
         let code = answered(drive.node().upload(drive.fault_code()).await)?.map(|payload| payload.raw() as u16);
-        self.fault =
-            code.map(|code| (code, self.description.map(|model| faults_in(model, code)).unwrap_or_default()));
+        self.fault = code.map(|code| (code, self.description.map(|model| faults_in(model, code)).unwrap_or_default()));
         self.target_rpm = measure(drive, units.and_then(|units| units.target_velocity)).await?;
         self.current_a = measure(drive, units.and_then(|units| units.actual_current)).await?;
         self.supply_v = measure(drive, units.and_then(|units| units.bus_voltage)).await?;

@@ -49,7 +49,8 @@ impl Overheard {
         self.until(at);
         let Some(id) = frame.standard_data_id() else { return };
         let (length, bits) = (frame.dlc(), u64::from_le_bytes(*frame.padded()));
-        let new = HeardFrames { count: 0, first: at, last: at, longest_gap: Duration::ZERO, shortest: length, bits, length };
+        let new =
+            HeardFrames { count: 0, first: at, last: at, longest_gap: Duration::ZERO, shortest: length, bits, length };
         let heard = self.by_id.entry(id).or_insert(new);
         heard.longest_gap = heard.longest_gap.max(at - heard.last);
         heard.count = heard.count.saturating_add(1);

@@ -47,15 +47,20 @@ pub(super) fn seen(seen: &Observed) -> Vec<PdoSeen> {
     .collect()
 }
 
+/// One finding for each rule, with all PDOs that it is about: one missing SYNC silences several.
 pub(super) fn look(seen: &Observed, findings: &mut Vec<Finding>) {
+    let first = findings.len();
     for (config, cob_id) in &seen.pdos {
         let Some(reason) = reason(seen, config, *cob_id).filter(|reason| reason.is_finding) else { continue };
-        let expected = match config.pdo.direction {
-            Direction::Tpdo => format!("{} ({:03X}h) is sent", config.pdo, cob_id.can_id().raw()),
-            Direction::Rpdo => format!("{} ({:03X}h) is received and acted on", config.pdo, cob_id.can_id().raw()),
-        };
         let count = heard(seen, *cob_id).map_or(0, |heard| heard.count);
-        let found = format!("{count} frames in {} ms", seen.heard.listened().as_millis());
+        let name = format!("{} ({:03X}h): {count}", config.pdo, cob_id.can_id().raw());
+        if let Some(known) = findings[first..].iter_mut().find(|finding| finding.rule == reason.rule) {
+            known.found.push_str(", ");
+            known.found.push_str(&name);
+            continue;
+        }
+        let expected = "The PDO is exchanged, and acted on".to_owned();
+        let found = format!("Frames in {} ms: {name}", seen.heard.listened().as_millis());
         findings.push(warning(TOPIC, reason.rule, [expected, found, reason.why, reason.remedy]));
     }
 }
@@ -73,15 +78,14 @@ fn reason(seen: &Observed, config: &PdoConfig, cob_id: CobId) -> Option<Reason> 
         return as_set_up(format!("It is switched off: bit 31 of {:04X}h:01 is 1", config.pdo.parameter_index()));
     }
     if config.map.0.is_empty() {
-        let why = format!("It is switched on and carries nothing: {:04X}h:00 is 0", config.pdo.mapping_index());
-        return finding("pdo_empty", why, "Map what it shall carry, or switch it off".to_owned());
+        return as_set_up(format!("It carries nothing: {:04X}h:00 is 0", config.pdo.mapping_index()));
     }
     if let Some(state @ (NmtState::PreOperational | NmtState::Stopped)) = seen.nmt {
         let why = format!("The node is {state}: PDOs are exchanged in operational only");
         return finding("pdo_not_operational", why, format!("ferrodrive nmt {node} start"));
     }
     if config.transmission.is_synchronous() && seen.heard.sync().is_none() {
-        let why = format!("Its type is {}: it waits for SYNC, and none was heard", config.transmission.0);
+        let why = "Its type (0 to 240) makes it wait for SYNC, and none was heard".to_owned();
         let remedy = "Have the master send SYNC (ferrodrive sync --every 10ms), or set its type to 255".to_owned();
         return finding("pdo_without_sync", why, remedy);
     }
@@ -98,7 +102,11 @@ fn reason(seen: &Observed, config: &PdoConfig, cob_id: CobId) -> Option<Reason> 
         (Direction::Rpdo, None) => as_set_up("Nobody sends it".to_owned()),
         (Direction::Rpdo, Some(heard)) if usize::from(heard.shortest) < config.map.bytes() => finding(
             "pdo_too_short",
-            format!("A frame of {} bytes came where {} are mapped: it has no effect", heard.shortest, config.map.bytes()),
+            format!(
+                "A frame of {} bytes came where {} are mapped: it has no effect",
+                heard.shortest,
+                config.map.bytes()
+            ),
             "Let its sender map the same objects as the node".to_owned(),
         ),
         (Direction::Rpdo, Some(_)) => None,
@@ -119,7 +127,9 @@ fn unsent(config: &PdoConfig, listened: Duration) -> Option<String> {
             (_, Some(inhibit)) if inhibit >= listened => {
                 Some(format!("Its inhibit time of {} ms is longer than was listened", ms(inhibit)))
             }
-            (None, _) => Some("It is sent on a change of its values, and has no event timer: nothing has changed".to_owned()),
+            (None, _) => {
+                Some("It is sent on a change of its values, and has no event timer: nothing has changed".to_owned())
+            }
             (Some(event), _) if event >= listened => {
                 Some(format!("Its event timer of {} ms is longer than was listened", ms(event)))
             }

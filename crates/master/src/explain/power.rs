@@ -28,12 +28,16 @@ pub(super) fn look(seen: &Observed, findings: &mut Vec<Finding>) {
 }
 
 fn no_state(statusword: Statusword) -> Finding {
-    cause(TOPIC, "no_power_state", [
-        "A statusword with one of the states of CiA 402".to_owned(),
-        statusword.to_string(),
-        "What it is told by 6040h may mean something else to it".to_owned(),
-        "Check which device the node is: ferrodrive scan, ferrodrive read NODE 1000 1018:*".to_owned(),
-    ])
+    cause(
+        TOPIC,
+        "no_power_state",
+        [
+            "A statusword with one of the states of CiA 402".to_owned(),
+            statusword.to_string(),
+            "What it is told by 6040h may mean something else to it".to_owned(),
+            "Check which device the node is: ferrodrive scan, ferrodrive read NODE 1000 1018:*".to_owned(),
+        ],
+    )
 }
 
 fn fault(seen: &Observed) -> Finding {
@@ -49,12 +53,16 @@ fn fault(seen: &Observed) -> Finding {
     } else {
         join(|row| row.remedy)
     };
-    cause(TOPIC, "fault", [
-        "No fault".to_owned(),
-        found,
-        "The motor has no power until the fault is reset, which takes its cause to be gone first".to_owned(),
-        format!("{remedy} Then: ferrodrive reset {}", seen.node),
-    ])
+    cause(
+        TOPIC,
+        "fault",
+        [
+            "No fault".to_owned(),
+            found,
+            "The motor has no power until the fault is reset, which takes its cause to be gone first".to_owned(),
+            format!("{remedy} Then: ferrodrive reset {}", seen.node),
+        ],
+    )
 }
 
 /// The controlwords that lead on from here, `06h, 07h, 0Fh`.
@@ -97,21 +105,25 @@ fn by_rpdo(seen: &Observed, state: PowerState) -> Option<Finding> {
     let bits = config.map.find(controlword)?;
     let sent = Controlword((heard.bits >> bits.start) as u16);
     (sent.command() != PowerCommand::EnableOperation).then(|| {
-        cause(TOPIC, "controlword_by_rpdo", [
-            format!("Operation enabled: from here the controlwords {}", path(seen.style, state)),
-            format!(
-                "{}. Others send {} ({id:03X}h) with the controlword {sent}; the last of {}; {}",
-                state.name(),
-                config.pdo,
-                heard.count,
-                missing_bits(sent)
-            ),
-            "Each of these frames overwrites what is written to 6040h by SDO".to_owned(),
-            format!(
-                "Have the program that sends {} enable the drive, or end it, or take 6040h out of the mapping",
-                config.pdo
-            ),
-        ])
+        cause(
+            TOPIC,
+            "controlword_by_rpdo",
+            [
+                format!("Operation enabled: from here the controlwords {}", path(seen.style, state)),
+                format!(
+                    "{}. Others send {} ({id:03X}h) with the controlword {sent}; the last of {}; {}",
+                    state.name(),
+                    config.pdo,
+                    heard.count,
+                    missing_bits(sent)
+                ),
+                "Each of these frames overwrites what is written to 6040h by SDO".to_owned(),
+                format!(
+                    "Have the program that sends {} enable the drive, or end it, or take 6040h out of the mapping",
+                    config.pdo
+                ),
+            ],
+        )
     })
 }
 
@@ -144,11 +156,15 @@ fn not_enabled(seen: &Observed, state: PowerState, statusword: Statusword) -> Op
             "A quick stop came from elsewhere: an emergency stop input, a limit switch, or a lost connection (6007h)",
             format!("Release the input; then: {enable}"),
         ),
-        PowerState::SwitchOnDisabled if command == PowerCommand::EnableOperation && seen.style == PowerStyle::Cia402 => (
-            "enabled_without_steps",
-            "From Switch on disabled only shutdown (06h) leads on: 0Fh alone does nothing (CiA 402-2, transition 2)",
-            format!("Write the steps one after the other, each when the statusword shows the one before: {enable}"),
-        ),
+        PowerState::SwitchOnDisabled
+            if command == PowerCommand::EnableOperation && seen.style == PowerStyle::Cia402 =>
+        {
+            (
+                "enabled_without_steps",
+                "From Switch on disabled only shutdown (06h) leads on: 0Fh alone does nothing (CiA 402-2, transition 2)",
+                format!("Write the steps one after the other, each when the statusword shows the one before: {enable}"),
+            )
+        }
         _ if leads_on || command == PowerCommand::EnableOperation => (
             "controlword_ignored",
             "The controlword leads on from here and the drive has not followed it",
@@ -168,12 +184,16 @@ fn suspects(style: PowerStyle, statusword: Statusword) -> &'static str {
 }
 
 fn reset_bit_left_set(seen: &Observed, controlword: Controlword) -> Finding {
-    cause(TOPIC, "reset_bit_left_set", [
-        "A rising edge of controlword bit 7 (CiA 402-2, transition 15)".to_owned(),
-        format!("Controlword {controlword}, in which bit 7 stands at 1"),
-        "A bit that stays set resets nothing: the next edge needs a 0 first".to_owned(),
-        format!("Write 0, then 80h; or: ferrodrive reset {}", seen.node),
-    ])
+    cause(
+        TOPIC,
+        "reset_bit_left_set",
+        [
+            "A rising edge of controlword bit 7 (CiA 402-2, transition 15)".to_owned(),
+            format!("Controlword {controlword}, in which bit 7 stands at 1"),
+            "A bit that stays set resets nothing: the next edge needs a 0 first".to_owned(),
+            format!("Write 0, then 80h; or: ferrodrive reset {}", seen.node),
+        ],
+    )
 }
 
 /// Statusword bit 4 (CiA 402-2, 8.4.2).
@@ -182,12 +202,16 @@ fn no_voltage(seen: &Observed, state: PowerState, statusword: Statusword) -> Opt
     let missing = seen.style == PowerStyle::Cia402 && powered && !statusword.has(Statusword::VOLTAGE_ENABLED);
     missing.then(|| {
         let measured = seen.supply_v.map_or_else(String::new, |volts| format!(", {volts:.1} V measured"));
-        warning(TOPIC, "no_voltage", [
-            "Statusword bit 4 (voltage enabled) is 1".to_owned(),
-            format!("Bit 4 is 0{measured}"),
-            "The power stage has no supply: the motor gets no current".to_owned(),
-            "Look at the motor supply, its fuse and contactor, and at safe torque off".to_owned(),
-        ])
+        warning(
+            TOPIC,
+            "no_voltage",
+            [
+                "Statusword bit 4 (voltage enabled) is 1".to_owned(),
+                format!("Bit 4 is 0{measured}"),
+                "The power stage has no supply: the motor gets no current".to_owned(),
+                "Look at the motor supply, its fuse and contactor, and at safe torque off".to_owned(),
+            ],
+        )
     })
 }
 

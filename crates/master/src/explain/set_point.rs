@@ -53,12 +53,16 @@ fn target_torque(seen: &Observed) -> Mux {
 /// An object that has to be something else than 0.
 fn zero(seen: &Observed, rule: &'static str, object: Mux, expected: &str) -> Option<Finding> {
     (seen.value(object)? == 0).then(|| {
-        cause(TOPIC, rule, [
-            format!("{expected} in {}", seen.named(object)),
-            "It is 0".to_owned(),
-            "The drive stands because it is told to".to_owned(),
-            format!("Write {object}, by SDO or in the RPDO that carries it"),
-        ])
+        cause(
+            TOPIC,
+            rule,
+            [
+                format!("{expected} in {}", seen.named(object)),
+                "It is 0".to_owned(),
+                "The drive stands because it is told to".to_owned(),
+                format!("Write {object}, by SDO or in the RPDO that carries it"),
+            ],
+        )
     })
 }
 
@@ -67,12 +71,16 @@ fn halt(seen: &Observed, mode: ModeOfOperation) -> Option<Finding> {
     let controlword = seen.controlword()?;
     let heeds = matches!(mode.0, 1 | 3 | 4 | 6) && seen.style == devices::PowerStyle::Cia402;
     (heeds && controlword.has(Controlword::HALT)).then(|| {
-        cause(TOPIC, "halt", [
-            "Controlword bit 8 (halt) is 0".to_owned(),
-            format!("Controlword {controlword}"),
-            "The axis is halted and stays so until the bit is cleared".to_owned(),
-            "Write the controlword without bit 8".to_owned(),
-        ])
+        cause(
+            TOPIC,
+            "halt",
+            [
+                "Controlword bit 8 (halt) is 0".to_owned(),
+                format!("Controlword {controlword}"),
+                "The axis is halted and stays so until the bit is cleared".to_owned(),
+                "Write the controlword without bit 8".to_owned(),
+            ],
+        )
     })
 }
 
@@ -84,31 +92,46 @@ fn position(seen: &Observed) -> Option<Finding> {
     let window = seen.axis_value(POSITION_WINDOW).filter(|window| *window < i64::from(u32::MAX)).unwrap_or(0).max(1);
     let object = seen.named(seen.place(TARGET_POSITION));
     if !relative && target.abs_diff(at) <= window as u64 {
-        return Some(cause(TOPIC, "at_target", [
-            format!("A target elsewhere in {object}"),
-            format!("Target {target}, position {at} counts"),
-            "The drive is where it is told to be".to_owned(),
-            "Write another target, then start it with controlword bit 4".to_owned(),
-        ]));
+        return Some(cause(
+            TOPIC,
+            "at_target",
+            [
+                format!("A target elsewhere in {object}"),
+                format!("Target {target}, position {at} counts"),
+                "The drive is where it is told to be".to_owned(),
+                "Write another target, then start it with controlword bit 4".to_owned(),
+            ],
+        ));
     }
     let handshake = seen.axis.is_none_or(|axis| axis.new_set_point == NewSetPoint::Handshake);
     let asked = controlword.has(Controlword::NEW_SET_POINT);
     let found = format!("Target {target}, position {at} counts, controlword {controlword}, statusword {statusword}");
     if handshake && asked && statusword.has(Statusword::SET_POINT_ACKNOWLEDGE) {
-        return Some(cause(TOPIC, "start_bit_left_set", [
-            "Controlword bit 4 rises for each new target (CiA 402-2, 10.1)".to_owned(),
-            found,
-            "Bit 4 still stands from the target before: the one in 607Ah was never taken".to_owned(),
-            "Clear bit 4, wait until statusword bit 12 is 0, then set it again".to_owned(),
-        ]));
+        return Some(cause(
+            TOPIC,
+            "start_bit_left_set",
+            [
+                "Controlword bit 4 rises for each new target (CiA 402-2, 10.1)".to_owned(),
+                found,
+                "Bit 4 still stands from the target before: the one in 607Ah was never taken".to_owned(),
+                "Clear bit 4, wait until statusword bit 12 is 0, then set it again".to_owned(),
+            ],
+        ));
     }
     (!asked && statusword.has(Statusword::TARGET_REACHED)).then(|| {
-        cause(TOPIC, "set_point_not_started", [
-            "A 1 in controlword bit 4 after the target was written".to_owned(),
-            found,
-            "The target stands in 607Ah and the drive was not told to go there".to_owned(),
-            format!("Write the controlword with bit 4: 1Fh, or 5Fh for a relative move; or: ferrodrive move {}", seen.node),
-        ])
+        cause(
+            TOPIC,
+            "set_point_not_started",
+            [
+                "A 1 in controlword bit 4 after the target was written".to_owned(),
+                found,
+                "The target stands in 607Ah and the drive was not told to go there".to_owned(),
+                format!(
+                    "Write the controlword with bit 4: 1Fh, or 5Fh for a relative move; or: ferrodrive move {}",
+                    seen.node
+                ),
+            ],
+        )
     })
 }
 
@@ -117,12 +140,16 @@ fn software_limit(seen: &Observed) -> Option<Finding> {
     let (low, high) = (seen.axis_value(POSITION_LIMIT_LOW)?, seen.axis_value(POSITION_LIMIT_HIGH)?);
     let target = seen.axis_value(TARGET_POSITION)?;
     (low < high && !(low..=high).contains(&target)).then(|| {
-        cause(TOPIC, "software_limit", [
-            format!("A target from {low} to {high} counts (607Dh)"),
-            format!("Target {target}"),
-            "The drive stops at the limit, or does not start".to_owned(),
-            "Choose a target within the limits, or write 607Dh when the machine allows more".to_owned(),
-        ])
+        cause(
+            TOPIC,
+            "software_limit",
+            [
+                format!("A target from {low} to {high} counts (607Dh)"),
+                format!("Target {target}"),
+                "The drive stops at the limit, or does not start".to_owned(),
+                "Choose a target within the limits, or write 607Dh when the machine allows more".to_owned(),
+            ],
+        )
     })
 }
 
@@ -131,24 +158,32 @@ fn homing(seen: &Observed) -> Option<Finding> {
     let (rules, statusword) = (seen.axis?.homing?, seen.statusword?);
     let method = seen.value(rules.method).map_or_else(String::new, |method| format!(", method {method}"));
     if rules.failed.matches(statusword) {
-        return Some(cause(TOPIC, "homing_failed", [
-            "The reference is found".to_owned(),
-            format!("Statusword {statusword}: homing has failed{method}"),
-            "The drive does not know where it is".to_owned(),
-            "Check the switch of the method, its wiring and its input's function, and the direction of the search"
-                .to_owned(),
-        ]));
+        return Some(cause(
+            TOPIC,
+            "homing_failed",
+            [
+                "The reference is found".to_owned(),
+                format!("Statusword {statusword}: homing has failed{method}"),
+                "The drive does not know where it is".to_owned(),
+                "Check the switch of the method, its wiring and its input's function, and the direction of the search"
+                    .to_owned(),
+            ],
+        ));
     }
     let controlword = seen.controlword()?;
     let by_bit = rules.start == HomingStart::ControlwordBit4;
     let waits = by_bit && !controlword.has(Controlword::NEW_SET_POINT) && !rules.attained.matches(statusword);
     waits.then(|| {
-        cause(TOPIC, "homing_not_started", [
-            "Controlword bit 4 rises in mode 6 (CiA 402-2, 11.1)".to_owned(),
-            format!("Controlword {controlword}{method}"),
-            "The drive is ready to look for its reference and was not told to".to_owned(),
-            format!("Write the controlword with bit 4: 1Fh; or: ferrodrive home {} --method N", seen.node),
-        ])
+        cause(
+            TOPIC,
+            "homing_not_started",
+            [
+                "Controlword bit 4 rises in mode 6 (CiA 402-2, 11.1)".to_owned(),
+                format!("Controlword {controlword}{method}"),
+                "The drive is ready to look for its reference and was not told to".to_owned(),
+                format!("Write the controlword with bit 4: 1Fh; or: ferrodrive home {} --method N", seen.node),
+            ],
+        )
     })
 }
 
@@ -163,12 +198,16 @@ fn limits(seen: &Observed, mode: ModeOfOperation, findings: &mut Vec<Finding>) {
     for (rule, object) in rows.chain(torque.map(|object| ("torque_limit_zero", object))) {
         if seen.value(object) == Some(0) && !told.contains(&object) {
             told.push(object);
-            findings.push(cause(TOPIC, rule, [
-                format!("A limit above 0 in {}", seen.named(object)),
-                "It is 0".to_owned(),
-                "The limit holds every set-point at 0".to_owned(),
-                format!("Write {object}: what the motor and the machine bear"),
-            ]));
+            findings.push(cause(
+                TOPIC,
+                rule,
+                [
+                    format!("A limit above 0 in {}", seen.named(object)),
+                    "It is 0".to_owned(),
+                    "The limit holds every set-point at 0".to_owned(),
+                    format!("Write {object}: what the motor and the machine bear"),
+                ],
+            ));
         }
     }
 }
@@ -181,11 +220,15 @@ fn ramps(seen: &Observed, mode: ModeOfOperation, findings: &mut Vec<Finding>) {
     let standard = seen.place(PROFILE_ACCELERATION);
     let unknown = (seen.axis.is_none() && seen.value(standard) == Some(0)).then_some(standard);
     for object in seen.rates_of_zero.iter().copied().chain(unknown) {
-        findings.push(cause(TOPIC, "ramp_zero", [
-            format!("A rate above 0 in {}", seen.named(object)),
-            "It is 0".to_owned(),
-            "The speed may not change: many drives do not move so".to_owned(),
-            format!("Write how fast its speed may change to {object}"),
-        ]));
+        findings.push(cause(
+            TOPIC,
+            "ramp_zero",
+            [
+                format!("A rate above 0 in {}", seen.named(object)),
+                "It is 0".to_owned(),
+                "The speed may not change: many drives do not move so".to_owned(),
+                format!("Write how fast its speed may change to {object}"),
+            ],
+        ));
     }
 }
