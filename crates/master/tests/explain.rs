@@ -284,7 +284,7 @@ fn map_controlword(bench: &mut Bench) -> u16 {
 
 #[test]
 fn a_controlword_that_others_send_by_rpdo_is_told_with_its_value() {
-    for name in ["zlac8030l", "m4230e17b50", "cia402"] {
+    for name in ["zlac8030l", "zlim42c", "cia402"] {
         let mut bench = Bench::new(name);
         let id = map_controlword(&mut bench);
         bench.nmt(NmtCommand::Start);
@@ -301,7 +301,7 @@ fn a_controlword_that_others_send_by_rpdo_is_told_with_its_value() {
 
 #[test]
 fn each_pdo_says_why_it_is_silent() {
-    for name in ["zlac8030l", "m4230e17b50", "cia402"] {
+    for name in ["zlac8030l", "zlim42c", "cia402"] {
         let mut bench = Bench::new(name);
         let drive = bench.drive.clone();
         map_controlword(&mut bench);
