@@ -311,7 +311,7 @@ fn each_pdo_says_why_it_is_silent() {
         assert!(rpdo.silent.as_deref().is_some_and(|why| why.contains("operational only")), "{name}: {rpdo:?}");
         bench.nmt(NmtCommand::Start);
         let rpdo = bench.explain().pdos.into_iter().find(|seen| seen.pdo == pdo(Direction::Rpdo)).unwrap();
-        assert_eq!((rpdo.silent.as_deref(), rpdo.heard), (Some("Nobody sends it"), 0), "{name}");
+        assert_eq!((rpdo.silent.as_deref(), rpdo.heard), (Some("nobody was heard sending it"), 0), "{name}");
         let map = PdoMap(vec![MappingRecord { mux: mux(0x6041, 0), bits: 16 }]);
         let config = PdoConfig::new(pdo(Direction::Tpdo), map).transmission(TransmissionType::EVERY_SYNC);
         let units = TimerUnits::of(drive.description().unwrap());

@@ -1,13 +1,13 @@
-//! PDOs one by one: why one is silent (CiA 301, 7.5.2.35 to 7.5.2.38).
+//! PDOs one by one: why one is silent, by [`why_silent`], and which of that is a finding.
 
 use std::time::Duration;
 
-use canopen::pdo::{Direction, PdoId};
-use canopen::{CobId, NmtState};
+use canopen::CobId;
+use canopen::pdo::{Direction, EventTrigger, PdoId};
 
 use super::overheard::HeardFrames;
 use super::{Finding, Observed, Topic, warning};
-use crate::pdo::{PdoConfig, TransmissionType};
+use crate::pdo::{PdoConfig, Silence, Situation, why_silent};
 
 const TOPIC: Topic = Topic::Pdo;
 
@@ -70,72 +70,57 @@ fn heard(seen: &Observed, cob_id: CobId) -> Option<&HeardFrames> {
 }
 
 fn reason(seen: &Observed, config: &PdoConfig, cob_id: CobId) -> Option<Reason> {
-    let node = seen.node;
     let heard = heard(seen, cob_id);
-    let as_set_up = |why: String| Some(Reason { rule: "", is_finding: false, why, remedy: String::new() });
-    let finding = |rule, why: String, remedy: String| Some(Reason { rule, is_finding: true, why, remedy });
-    if !cob_id.is_valid() {
-        return as_set_up(format!("It is switched off: bit 31 of {:04X}h:01 is 1", config.pdo.parameter_index()));
+    let is_tpdo = config.pdo.direction == Direction::Tpdo;
+    if is_tpdo && heard.is_some() {
+        return None;
     }
-    if config.map.0.is_empty() {
-        return as_set_up(format!("It carries nothing: {:04X}h:00 is 0", config.pdo.mapping_index()));
-    }
-    if let Some(state @ (NmtState::PreOperational | NmtState::Stopped)) = seen.nmt {
-        let why = format!("The node is {state}: PDOs are exchanged in operational only");
-        return finding("pdo_not_operational", why, format!("ferrodrive nmt {node} start"));
-    }
-    if config.transmission.is_synchronous() && seen.heard.sync().is_none() {
-        let why = "Its type (0 to 240) makes it wait for SYNC, and none was heard".to_owned();
-        let remedy = "Have the master send SYNC (ferrodrive sync --every 10ms), or set its type to 255".to_owned();
-        return finding("pdo_without_sync", why, remedy);
-    }
-    match (config.pdo.direction, heard) {
-        (Direction::Tpdo, Some(_)) => None,
-        (Direction::Tpdo, None) => unsent(config, seen.heard.listened()).map_or_else(
-            || {
-                let why = "It should have come in this time".to_owned();
-                let remedy = "Look at the NMT state and the errors of the bus: ferrodrive dump".to_owned();
-                finding("pdo_missing", why, remedy)
-            },
-            as_set_up,
-        ),
-        (Direction::Rpdo, None) => as_set_up("Nobody sends it".to_owned()),
-        (Direction::Rpdo, Some(heard)) if usize::from(heard.shortest) < config.map.bytes() => finding(
-            "pdo_too_short",
-            format!(
-                "A frame of {} bytes came where {} are mapped: it has no effect",
-                heard.shortest,
-                config.map.bytes()
+    let situation = Situation {
+        nmt: seen.nmt,
+        event_trigger: seen.description.map_or(EventTrigger::Change, |description| description.pdo.event_trigger),
+        sync_heard: Some(seen.heard.sync().is_some()),
+        heard: Some(heard.is_some()),
+    };
+    if let Some(silence) = why_silent(config, cob_id, &situation).first() {
+        let (rule, remedy) = match silence {
+            Silence::Nmt(_) => ("pdo_not_operational", format!("ferrodrive nmt {} start", seen.node)),
+            Silence::NoSync => (
+                "pdo_without_sync",
+                "Have the master send SYNC (ferrodrive sync --every 10ms), or set its type to 255".to_owned(),
             ),
-            "Let its sender map the same objects as the node".to_owned(),
-        ),
-        (Direction::Rpdo, Some(_)) => None,
+            // What it was set up to be.
+            _ => ("", String::new()),
+        };
+        return Some(Reason { rule, is_finding: !rule.is_empty(), why: silence.to_string(), remedy });
     }
+    if is_tpdo {
+        return Some(unsent(config, seen.heard.listened()));
+    }
+    let (shortest, mapped) = (usize::from(heard?.shortest), config.map.bytes());
+    (shortest < mapped).then(|| Reason {
+        rule: "pdo_too_short",
+        is_finding: true,
+        why: format!("a frame of {shortest} bytes came where {mapped} are mapped: it has no effect"),
+        remedy: "Let its sender map the same objects as the node".to_owned(),
+    })
 }
 
-/// Why a TPDO that could be sent was not; `None` if it had to come.
-fn unsent(config: &PdoConfig, listened: Duration) -> Option<String> {
-    let ms = |time: Duration| time.as_millis();
-    let event = config.event_time.filter(|time| !time.is_zero());
-    match config.transmission {
-        TransmissionType(0) => Some("Its type is 0: after SYNC, and only when its values have changed".to_owned()),
-        TransmissionType(every @ 2..=240) => Some(format!("Its type is {every}: only after every {every}. SYNC")),
-        TransmissionType::SYNC_RTR | TransmissionType::EVENT_RTR => {
-            Some("It waits for a remote frame, and nobody asks".to_owned())
+/// Why a TPDO that nothing keeps away was not heard: listening was shorter than its period, or it had to come.
+fn unsent(config: &PdoConfig, listened: Duration) -> Reason {
+    let as_set_up = |why: String| Reason { rule: "", is_finding: false, why, remedy: String::new() };
+    match (config.transmission.0, config.event_time, config.inhibit_time) {
+        (every @ 2..=240, ..) => as_set_up(format!("it comes only after every {every}. SYNC")),
+        (_, Some(event), _) if event >= listened => {
+            as_set_up(format!("its event timer of {} ms is longer than was listened", event.as_millis()))
         }
-        kind if kind.0 >= 254 => match (event, config.inhibit_time) {
-            (_, Some(inhibit)) if inhibit >= listened => {
-                Some(format!("Its inhibit time of {} ms is longer than was listened", ms(inhibit)))
-            }
-            (None, _) => {
-                Some("It is sent on a change of its values, and has no event timer: nothing has changed".to_owned())
-            }
-            (Some(event), _) if event >= listened => {
-                Some(format!("Its event timer of {} ms is longer than was listened", ms(event)))
-            }
-            _ => None,
+        (.., Some(inhibit)) if inhibit >= listened => {
+            as_set_up(format!("its inhibit time of {} ms is longer than was listened", inhibit.as_millis()))
+        }
+        _ => Reason {
+            rule: "pdo_missing",
+            is_finding: true,
+            why: "it should have come in this time".to_owned(),
+            remedy: "Look at the NMT state and the errors of the bus: ferrodrive dump".to_owned(),
         },
-        TransmissionType(1) => None,
-        TransmissionType(reserved) => Some(format!("Its type {reserved} is reserved")),
     }
 }
