@@ -6,8 +6,9 @@ use canopen::NmtState;
 use canopen::pdo::Direction;
 use devices::HostWatch;
 
+use super::finding::{Finding, Topic, cause, warning};
 use super::observed::HEARTBEAT_TIME;
-use super::{Finding, Observed, Topic, cause, warning};
+use super::observed::Observed;
 
 const TOPIC: Topic = Topic::Communication;
 

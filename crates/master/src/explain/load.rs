@@ -2,7 +2,8 @@
 
 use cia402::{ModeOfOperation, Statusword};
 
-use super::{Finding, Observed, Topic, Weight, cause, warning};
+use super::finding::{Finding, Topic, Weight, cause, warning};
+use super::observed::Observed;
 
 const TOPIC: Topic = Topic::Load;
 

@@ -5,9 +5,10 @@
 //! its set-point, its load, its PDOs one by one. Only listens and reads: nothing is written, so that a running machine may be
 //! looked at. What differs between models comes from their descriptions; without one the standard's objects are looked at.
 //!
-//! The rules are pure functions of what was [observed](Observed): one file for each topic, and [`RULES`] their order.
+//! The rules are pure functions of what was [observed](Observed): one file for each topic.
 
 mod communication;
+mod finding;
 mod load;
 mod mode;
 mod observed;
@@ -21,78 +22,10 @@ use cia402::{ModeOfOperation, PowerState};
 use std::time::Duration;
 
 use crate::drive::Drive;
+pub use finding::{Finding, Topic, Weight};
 pub use observed::Observed;
 pub use overheard::{HeardFrames, Overheard};
 pub use pdos::PdoSeen;
-
-/// What a finding is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Topic {
-    /// Whether it answers, its NMT state, heartbeats, other masters, its watch over a host.
-    Communication,
-    /// The power state machine: the way to Operation enabled, and faults.
-    Power,
-    /// 6060h and 6061h.
-    Mode,
-    /// Targets, ramps, limits, start bits.
-    SetPoint,
-    /// What the shaft does with all that.
-    Load,
-    /// A PDO.
-    Pdo,
-}
-
-impl Topic {
-    /// In one word.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Communication => "communication",
-            Self::Power => "power",
-            Self::Mode => "mode",
-            Self::SetPoint => "set-point",
-            Self::Load => "load",
-            Self::Pdo => "pdo",
-        }
-    }
-}
-
-/// What a finding weighs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Weight {
-    /// With this the drive does not move.
-    Cause,
-    /// It may move with this, and somebody will wonder sooner or later.
-    Warning,
-}
-
-impl Weight {
-    /// In one word.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Cause => "cause",
-            Self::Warning => "warning",
-        }
-    }
-}
-
-/// Something that is not as a moving drive has it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Finding {
-    /// Its rule, for programs: `target_zero`.
-    pub rule: &'static str,
-    /// What it is about.
-    pub topic: Topic,
-    /// What it weighs.
-    pub weight: Weight,
-    /// What a moving drive has.
-    pub expected: String,
-    /// What this one has.
-    pub found: String,
-    /// What comes of it.
-    pub follows: String,
-    /// What to do.
-    pub remedy: String,
-}
 
 /// What became of looking at a drive.
 #[derive(Clone, Debug)]
@@ -154,14 +87,4 @@ impl Observed {
             pdos: pdos::seen(self),
         }
     }
-}
-
-/// A finding that keeps the drive from moving.
-fn cause(topic: Topic, rule: &'static str, [expected, found, follows, remedy]: [String; 4]) -> Finding {
-    Finding { rule, topic, weight: Weight::Cause, expected, found, follows, remedy }
-}
-
-/// A finding that does not.
-fn warning(topic: Topic, rule: &'static str, texts: [String; 4]) -> Finding {
-    Finding { weight: Weight::Warning, ..cause(topic, rule, texts) }
 }

@@ -3,7 +3,8 @@
 use canopen::Mux;
 use cia402::ModeOfOperation;
 
-use super::{Finding, Observed, Topic, cause};
+use super::finding::{Finding, Topic, cause};
+use super::observed::Observed;
 
 const TOPIC: Topic = Topic::Mode;
 const MODE: Mux = Mux::new(0x6060, 0);

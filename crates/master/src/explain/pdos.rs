@@ -5,8 +5,9 @@ use std::time::Duration;
 use canopen::CobId;
 use canopen::pdo::{Direction, EventTrigger, PdoId};
 
+use super::finding::{Finding, Topic, warning};
+use super::observed::Observed;
 use super::overheard::HeardFrames;
-use super::{Finding, Observed, Topic, warning};
 use crate::pdo::{PdoConfig, Silence, Situation, why_silent};
 
 const TOPIC: Topic = Topic::Pdo;

@@ -5,8 +5,9 @@ use cia402::{Controlword, PowerCommand, PowerEvent, PowerState, Statusword, next
 use devices::PowerStyle;
 use devices::faults::FaultRow;
 
+use super::finding::{Finding, Topic, cause, warning};
 use super::observed::CONTROLWORD;
-use super::{Finding, Observed, Topic, cause, warning};
+use super::observed::Observed;
 
 const TOPIC: Topic = Topic::Power;
 

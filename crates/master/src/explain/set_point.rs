@@ -4,12 +4,13 @@ use canopen::Mux;
 use cia402::{Controlword, ModeOfOperation, Statusword};
 use devices::{HomingStart, NewSetPoint};
 
+use super::finding::{Finding, Topic, cause};
+use super::observed::Observed;
 use super::observed::{
     MAX_CURRENT, MAX_MOTOR_SPEED, MAX_PROFILE_VELOCITY, MAX_TORQUE, NEGATIVE_TORQUE_LIMIT, POSITION_ACTUAL,
     POSITION_LIMIT_HIGH, POSITION_LIMIT_LOW, POSITION_WINDOW, POSITIVE_TORQUE_LIMIT, PROFILE_ACCELERATION,
     PROFILE_VELOCITY, TARGET_POSITION, TARGET_TORQUE, TARGET_VELOCITY,
 };
-use super::{Finding, Observed, Topic, cause};
 
 const TOPIC: Topic = Topic::SetPoint;
 
