@@ -3,9 +3,9 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    completions, convert, dcf, decode, demo, drive, dump, eds, emcy, events, explain, export, gateway, home, latency,
-    lss, man_pages, motion, nmt, objects, params, pdo, plan, plot, read, readings, record, replay, run, scan, sdo,
-    send, sim, store, sync, time, watch, world,
+    boot, check, completions, convert, dcf, decode, demo, drive, dump, eds, emcy, events, explain, export, gateway,
+    home, latency, lss, man_pages, motion, nmt, objects, params, pdo, plan, plot, read, readings, record, replay, run,
+    scan, sdo, send, sim, store, sync, time, watch, world,
 };
 use crate::global::Global;
 
@@ -30,6 +30,7 @@ pub(crate) enum Command {
     World(world::World),
     Events(events::Events),
     Scan(scan::Scan),
+    Boot(boot::Boot),
     Read(read::Read),
     Write(sdo::Write),
     Objects(objects::Objects),
@@ -41,6 +42,7 @@ pub(crate) enum Command {
     Params(params::Params),
     Pdo(pdo::Pdo),
     Plan(plan::Plan),
+    Check(check::Check),
     Emcy(emcy::Emcy),
     Nmt(nmt::Nmt),
     Lss(lss::Lss),

@@ -209,7 +209,18 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
             Whose::Node(node) => on_bus(global, format, async |context| objects.of_node(context, node).await),
         },
         Command::Latency(command) => on_bus(global, format, async |context| command.run(context).await),
+        Command::Boot(boot) => boot.run(global, format),
         Command::Plan(plan) => plan.run(global, format),
+        Command::Check(check) => {
+            let report = check.run()?;
+            print(format, &report)?;
+            match report.failure(check.strict()) {
+                // For programs the report has it.
+                Some(failure) if format.json => Err(Failure { told: true, ..failure }),
+                Some(failure) => Err(failure),
+                None => Ok(()),
+            }
+        }
         Command::Plot(plot) => print(format, &plot.draw()?),
         Command::Readings(readings) => print(format, &readings.list()?),
         Command::Eds(eds) => eds.run(format),

@@ -28,7 +28,7 @@ const VERBOSE: &str = "verbose";
 const REALTIME: &str = "realtime";
 const LOG: &str = "log";
 
-const UNHEEDED: [Unheeded; 12] = [
+const UNHEEDED: [Unheeded; 13] = [
     Unheeded {
         command: "run",
         options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG],
@@ -94,6 +94,12 @@ const UNHEEDED: [Unheeded; 12] = [
         options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG],
         why: "it is about files, not about a node of a bus",
         next: "leave it away",
+    },
+    Unheeded {
+        command: "check",
+        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG],
+        why: "it reads files, and sends nothing",
+        next: "leave it away; the file that is checked says everything",
     },
     Unheeded {
         command: "readings",

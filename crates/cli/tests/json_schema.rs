@@ -55,6 +55,8 @@ const COMMANDS: &[(&[&str], &str)] = &[
     (&["params", "rollback", "4"], "failure"),
     (&["params", "apply", "4", "/no/such/file.toml"], "failure"),
     (&["latency", "4", "--count", "20"], "latency"),
+    (&["boot"], "boot"),
+    (&["boot", "--node", "9"], "boot"),
     (&["plan", "--mode", "4=pv"], "plan"),
     (&["dump", "--for", "1s"], "frame"),
     (&["export", "dbc", "4"], "export"),
@@ -68,6 +70,8 @@ const COMMANDS: &[(&[&str], &str)] = &[
     (&["home", "4", "--method", "17"], "failure"),
     (&["eds", "show", "/no/such/file.eds"], "failure"),
     (&["eds", "lint", "/no/such/file.eds"], "eds_lint"),
+    (&["check", concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.toml")], "check"),
+    (&["check", "/no/such/bus.yml"], "failure"),
     (&["world", "now"], "failure"),
     (&["fly"], "failure"),
 ];
@@ -136,8 +140,13 @@ fn files_and_logs_are_told_of_in_the_same_form() {
     std::fs::write(&values, "[values]\n1017 = 200\n6040 = 6\n").unwrap();
     let made = ferrodrive(&["eds", "zlac8030l", "--json"]).json()["eds"].as_str().expect("a text").to_owned();
     std::fs::write(&sheet, made).unwrap();
+    // A heartbeat that is too slow is a warning, a node-ID that is none an error.
+    let bus = path("bus.yml");
+    let text = "master: {node_id: 127, heartbeat_producer: 100}\nwheel: {node_id: 4, dcf: a.eds, heartbeat_producer: 1000}\nx: {node_id: 0}\n";
+    std::fs::write(&bus, text).unwrap();
     for (arguments, definition) in [
         (&["eds", "lint", &sheet][..], "eds_lint"),
+        (&["check", &bus], "check"),
         (&["params", "diff", "4", &values], "params_diff"),
         (&["params", "plan", "4", &values], "params_plan"),
         (&["params", "verify", "4", &values], "params_verify"),

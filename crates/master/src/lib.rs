@@ -87,6 +87,7 @@
 //! content, whatever the tasks wait for.
 
 pub mod base;
+pub mod boot;
 pub mod core;
 pub mod cyclic;
 pub mod decode;

@@ -1,5 +1,7 @@
 //! The commands, one file each (commands that share everything but a word share a file).
 
+pub(crate) mod boot;
+pub(crate) mod check;
 pub(crate) mod completions;
 pub(crate) mod convert;
 pub(crate) mod dcf;

@@ -34,34 +34,43 @@ pub struct Hints {
     pub others: bool,
 }
 
+impl Hints {
+    /// What to do.
+    pub const fn check(&self) -> &'static str {
+        match (self.unsent, self.nmt_state, self.silent_for) {
+            (true, ..) => {
+                "check that the CAN interface is up and that another node acknowledges frames (cable, bit rate, termination)"
+            }
+            (_, Some(NmtState::Stopped), _) => {
+                "send NMT pre-operational or start. Some drives' heartbeats say so in an alarm: then check supply and cable"
+            }
+            (_, _, Some(_)) => "check whether it has lost its supply or its cable, or is too busy to answer in time",
+            (_, _, None) if self.others => {
+                "check its node-ID and its supply (a scan shows who is there); if it is in the NMT state stopped, it answers \
+                 after NMT start"
+            }
+            (_, _, None) => {
+                "check supply, cable, termination and bit rate; if the node is in the NMT state stopped, it answers after NMT \
+                 start"
+            }
+        }
+    }
+}
+
 impl fmt::Display for Hints {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.unsent, self.nmt_state, self.silent_for) {
-            (true, ..) => f.write_str(
-                "The request never left this computer: check that the CAN interface is up and that another node \
-                 acknowledges frames (cable, bit rate, termination)",
-            ),
+            (true, ..) => f.write_str("The request never left this computer")?,
             (_, Some(NmtState::Stopped), _) => f.write_str(
-                "By its last heartbeat, or the last NMT command to it, it is stopped, where SDO does not exist: send NMT \
-                 pre-operational or start. Some drives' heartbeats say so in an alarm: then check supply and cable",
-            ),
-            (_, _, Some(age)) => write!(
-                f,
-                "It was last heard {} ms ago: check whether it has lost its supply or its cable, or is too busy to \
-                 answer in time",
-                age.as_millis()
-            ),
-            (_, _, None) if self.others => f.write_str(
-                "Other nodes are on the bus but this one has never been heard: check its node-ID and its supply \
-                 (a scan shows who is there); if it is in the NMT state stopped, it answers after NMT start",
-            ),
-            (_, _, None) => {
-                f.write_str(
-                "Nothing at all has been heard on the bus: check supply, cable, termination and bit rate; if the node is \
-                 in the NMT state stopped, it answers after NMT start",
-            )
+                "By its last heartbeat, or the last NMT command to it, it is stopped, where SDO does not exist",
+            )?,
+            (_, _, Some(age)) => write!(f, "It was last heard {} ms ago", age.as_millis())?,
+            (_, _, None) if self.others => {
+                f.write_str("Other nodes are on the bus but this one has never been heard")?;
             }
+            (_, _, None) => f.write_str("Nothing at all has been heard on the bus")?,
         }
+        write!(f, ": {}", self.check())
     }
 }
 
