@@ -159,17 +159,17 @@ impl Typed {
     }
 }
 
+/// Prints a report, and fails as it says; for programs that stands in the report.
+fn judged(format: Format, report: &impl Report, failure: Option<Failure>) -> Result<(), Failure> {
+    print(format, report)?;
+    failure.map_or(Ok(()), |failure| Err(Failure { told: format.json || failure.told, ..failure }))
+}
+
 fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Result<(), Failure> {
     match command {
         Command::Demo(demo) => {
             let report = demo.run(global)?;
-            print(format, &report)?;
-            match report.failure() {
-                // For programs the report has it.
-                Some(failure) if format.json => Err(Failure { told: true, ..failure }),
-                Some(failure) => Err(failure),
-                None => Ok(()),
-            }
+            judged(format, &report, report.failure())
         }
         Command::Sim(sim) => {
             sim.run(global, typed.bus.then_some(&global.bus), global.machine.as_ref().filter(|_| typed.machine))
@@ -213,13 +213,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Plan(plan) => plan.run(global, format),
         Command::Check(check) => {
             let report = check.run()?;
-            print(format, &report)?;
-            match report.failure(check.strict()) {
-                // For programs the report has it.
-                Some(failure) if format.json => Err(Failure { told: true, ..failure }),
-                Some(failure) => Err(failure),
-                None => Ok(()),
-            }
+            judged(format, &report, report.failure(check.strict()))
         }
         Command::Plot(plot) => print(format, &plot.draw()?),
         Command::Readings(readings) => print(format, &readings.list()?),

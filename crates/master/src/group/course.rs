@@ -123,11 +123,15 @@ impl Runner {
                     self.course = Course::Holding;
                 }
             }
-            Course::Streaming(stream) => match stream.take(&mut self.points) {
+            Course::Streaming(stream) => match stream.take(&mut self.points, &self.limits) {
                 Due::Point | Due::Late | Due::Wait => {}
                 Due::Underrun => {
                     let cycles = stream.grace();
                     self.stop(StopCause::Underrun { cycles });
+                    self.advance(now);
+                }
+                Due::OutOfReach { cycles } => {
+                    self.stop(StopCause::OutOfReach { cycles });
                     self.advance(now);
                 }
                 Due::End => {

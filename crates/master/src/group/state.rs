@@ -65,6 +65,11 @@ pub enum StopCause {
         /// For how many cycles it was waited for.
         cycles: u32,
     },
+    /// The producer of a stream was late, and its path could not be joined again within the limits.
+    OutOfReach {
+        /// Cycles without a point.
+        cycles: u32,
+    },
     /// Somebody asked for it.
     Asked,
 }
@@ -86,6 +91,11 @@ impl fmt::Display for StopCause {
                 f,
                 "the group was stopped: no point of its path came for {cycles} cycles. Give points earlier, or more \
                  of them before the start (prefill)"
+            ),
+            Self::OutOfReach { cycles } => write!(
+                f,
+                "the group was stopped: the points of its path came {cycles} cycles late, and to join it again would pass the \
+                 limits of speed or acceleration. Give points earlier, or more of them before the start (prefill)"
             ),
             Self::Asked => f.write_str("the group was told to stop"),
         }

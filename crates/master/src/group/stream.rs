@@ -2,7 +2,8 @@
 //!
 //! In: a point of all axes for each cycle, checked against the limits when it is given. Out: the point of a cycle. A producer
 //! that is late finds the group going on at its last speed for some cycles, and then brought to rest within its limits. The
-//! points of cycles that have passed are left out, so that the path keeps its time.
+//! points of cycles that have passed are left out, so that the path keeps its time; a path that cannot be joined again within the
+//! limits is not.
 
 use std::collections::VecDeque;
 
@@ -63,6 +64,8 @@ pub(super) enum Due {
     Late,
     /// None was there for too long.
     Underrun,
+    /// Points have come again after so many cycles, and the path cannot be joined again within its limits.
+    OutOfReach { cycles: u32 },
     /// The last point has been sent.
     End,
 }
@@ -141,7 +144,7 @@ impl Stream {
     }
 
     /// The point of this cycle; `points` are those of the cycle before.
-    pub(super) fn take(&mut self, points: &mut [PathPoint]) -> Due {
+    pub(super) fn take(&mut self, points: &mut [PathPoint], limits: &[AxisLimits]) -> Due {
         if !self.begun {
             // A short path may have fewer points than are waited for.
             if self.queued() < self.options.prefill.clamp(1, self.options.capacity.max(1)) && !self.ended {
@@ -157,6 +160,9 @@ impl Stream {
         if self.queue.is_empty() {
             return self.miss(points);
         }
+        if self.late > 0 && !self.is_in_reach(points, limits) {
+            return Due::OutOfReach { cycles: self.late };
+        }
         self.late = 0;
         for (point, at_turns) in points.iter_mut().zip(self.queue.drain(..self.axes)) {
             let velocity_turns_s = (at_turns - point.position_turns) / self.period_s;
@@ -164,6 +170,23 @@ impl Stream {
             *point = PathPoint { position_turns: at_turns, velocity_turns_s, acceleration_turns_s2 };
         }
         Due::Point
+    }
+
+    /// Whether the step to the first point that waits, and the one behind it, are within the limits. The points were held to
+    /// each other when they were given, and not to where the group has gone meanwhile.
+    fn is_in_reach(&self, points: &[PathPoint], limits: &[AxisLimits]) -> bool {
+        let within = |needed: f64, limit: f64| needed.abs() <= limit * (1.0 + 1e-6);
+        points.iter().zip(limits).enumerate().all(|(axis, (point, limits))| {
+            let at_turns = self.queue[axis];
+            let velocity = (at_turns - point.position_turns) / self.period_s;
+            let after = match self.queue.get(self.axes + axis) {
+                Some(next) => (next - at_turns) / self.period_s,
+                None => self.last[axis].velocity_turns_s,
+            };
+            within(velocity, limits.velocity_turns_s)
+                && within((velocity - point.velocity_turns_s) / self.period_s, limits.acceleration_turns_s2)
+                && within((after - velocity) / self.period_s, limits.acceleration_turns_s2)
+        })
     }
 
     fn miss(&mut self, points: &mut [PathPoint]) -> Due {
@@ -212,10 +235,10 @@ mod tests {
     fn points_come_out_as_they_went_in_once_enough_are_there() {
         let (mut stream, mut points) = stream(2);
         push(&mut stream, 0.001).unwrap().unwrap();
-        assert_eq!(stream.take(&mut points), Due::Wait);
+        assert_eq!(stream.take(&mut points, &[limits()]), Due::Wait);
         push(&mut stream, 0.002).unwrap().unwrap();
         for expected in [0.001, 0.002] {
-            assert_eq!(stream.take(&mut points), Due::Point);
+            assert_eq!(stream.take(&mut points, &[limits()]), Due::Point);
             assert_eq!(points[0].position_turns, expected);
             assert!((points[0].velocity_turns_s - 1.0).abs() < 1e-9);
         }
@@ -233,7 +256,7 @@ mod tests {
                     push(&mut stream, at).unwrap().unwrap();
                 }
             }
-            seen.push((stream.take(&mut points), (points[0].position_turns * 1e6).round()));
+            seen.push((stream.take(&mut points, &[limits()]), (points[0].position_turns * 1e6).round()));
         }
         use Due::{Late, Point};
         let expected = [(Point, 1e3), (Late, 2e3), (Late, 3e3), (Point, 4e3), (Point, 5e3), (Late, 6e3)];
@@ -245,10 +268,10 @@ mod tests {
     fn a_producer_that_stays_away_is_an_underrun_and_one_that_ends_is_not() {
         let (mut stream, mut points) = stream(1);
         push(&mut stream, 0.001).unwrap().unwrap();
-        let dues: Vec<_> = (0..4).map(|_| stream.take(&mut points)).collect();
+        let dues: Vec<_> = (0..4).map(|_| stream.take(&mut points, &[limits()])).collect();
         assert_eq!(dues, [Due::Point, Due::Late, Due::Late, Due::Underrun]);
         stream.end();
-        assert_eq!(stream.take(&mut points), Due::End);
+        assert_eq!(stream.take(&mut points, &[limits()]), Due::End);
     }
 
     #[test]
@@ -271,5 +294,38 @@ mod tests {
             push(&mut stream, at).unwrap().unwrap();
         }
         assert_eq!(push(&mut stream, 0.005), Ok(Err(Full)));
+    }
+
+    #[test]
+    fn a_path_that_was_left_while_it_braked_is_not_joined_beyond_the_limits() {
+        let (mut stream, mut points) = stream(1);
+        // 1 turn/s, then braking by 0.5 turns/s in each millisecond: 500 turns/s2, half of the limit.
+        push(&mut stream, 0.001).unwrap().unwrap();
+        assert_eq!(stream.take(&mut points, &[limits()]), Due::Point);
+        for _ in 0..2 {
+            assert_eq!(stream.take(&mut points, &[limits()]), Due::Late);
+        }
+        for at in [0.0015, 0.0015, 0.0015] {
+            push(&mut stream, at).unwrap().unwrap();
+        }
+        // From 3 mm of way at 1 turn/s back to 1.5 in a cycle: 2500 turns/s2.
+        let before = points;
+        assert_eq!(stream.take(&mut points, &[limits()]), Due::OutOfReach { cycles: 2 });
+        assert_eq!(points, before, "nothing of it is sent");
+    }
+
+    #[test]
+    fn a_path_that_has_bent_little_meanwhile_is_joined_again() {
+        let (mut stream, mut points) = stream(1);
+        push(&mut stream, 0.001).unwrap().unwrap();
+        assert_eq!(stream.take(&mut points, &[limits()]), Due::Point);
+        assert_eq!(stream.take(&mut points, &[limits()]), Due::Late);
+        // 100 turns/s2 in two cycles: 0.1 turns/s a cycle; it would be at 0.0029, 0.0037.
+        for at in [0.0019, 0.0027, 0.0035] {
+            push(&mut stream, at).unwrap().unwrap();
+        }
+        assert_eq!(stream.take(&mut points, &[limits()]), Due::Point);
+        assert_eq!(points[0].position_turns, 0.0027);
+        assert!(points[0].acceleration_turns_s2.abs() <= 1000.0, "{points:?}");
     }
 }

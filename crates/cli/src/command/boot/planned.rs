@@ -63,7 +63,10 @@ impl Planned {
     pub(crate) async fn plan(&self, context: &Context, only: &[NodeId]) -> Result<BootPlan, Failure> {
         let mut plan = match self {
             Self::Machine(_, machine) => {
-                let chosen = |(node, model)| (node, Expectation::of(context.told_model(node).unwrap_or(model)));
+                let chosen = |(node, model)| {
+                    let expectation = Expectation::of(context.told_model(node).unwrap_or(model));
+                    (node, Expectation { configuration: machine.configuration(node), ..expectation })
+                };
                 BootPlan::new(machine.models().map(chosen))
             }
             Self::Manager(values) => {
