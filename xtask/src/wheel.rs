@@ -1,4 +1,4 @@
-//! What a wheel asks of the machine that it is installed on, as its tag says it: `manylinux_2_34` for a C library of 2.34 or later
+//! The wheel that is released, and what it asks of the machine that it is installed on, as its tag says it: `manylinux_2_34` for a C library of 2.34 or later
 //! (PEP 600). An index of packages takes no wheel that says `linux` alone.
 
 use std::path::{Path, PathBuf};

@@ -2,12 +2,12 @@
 //! has the shell ask this program, with the line as it stands.
 
 use std::ffi::OsStr;
-use std::path::Path;
 
 use canopen::NodeId;
 use canopen::od::Entry;
 use clap::{Arg, Command};
 use clap_complete::engine::{ArgValueCompleter, CompletionCandidate};
+use sim::machine::models as all_models;
 use testbench::machine_file;
 use testbench::models::{self, Description};
 use testbench::words::drive::node_model;
@@ -105,11 +105,7 @@ impl Line {
 
 /// A model that is not in a file.
 fn named(name: &str) -> Option<&'static Description> {
-    models::resolve_in(name, Path::new("/")).ok()
-}
-
-fn all_models() -> impl Iterator<Item = &'static Description> {
-    models::names().split(", ").filter_map(named).collect::<Vec<_>>().into_iter()
+    all_models().find(|model| model.name == name)
 }
 
 fn candidate(value: impl Into<String>, help: impl Into<String>) -> CompletionCandidate {

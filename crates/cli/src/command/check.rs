@@ -41,24 +41,11 @@ pub(crate) struct CheckReport {
     #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<FailureBody>,
     file: String,
-    nodes: Vec<Row>,
+    nodes: Vec<CheckedNode>,
     errors: usize,
     warnings: usize,
     notes: usize,
     findings: Vec<Finding>,
-}
-
-#[derive(Debug, Serialize)]
-struct Row {
-    name: String,
-    node: Option<u8>,
-    device: Option<String>,
-}
-
-impl From<CheckedNode> for Row {
-    fn from(node: CheckedNode) -> Self {
-        Self { name: node.name, node: node.node, device: node.device }
-    }
 }
 
 impl Check {
@@ -89,7 +76,7 @@ impl Check {
         self.strict
     }
 
-    fn bus_yml(&self, file: &str) -> Result<(Vec<Row>, Vec<Finding>), Failure> {
+    fn bus_yml(&self, file: &str) -> Result<(Vec<CheckedNode>, Vec<Finding>), Failure> {
         let unread = |reason| Failure::new(format!("cannot read {}", plain(file))).of_kind("file").because(reason);
         let text = read_text(&self.file).map_err(unread)?;
         let folder = self.file.parent().unwrap_or(Path::new(""));
@@ -98,11 +85,11 @@ impl Check {
                 .because(plain(&bad.named(file).to_string()))
                 .next("docs/handbook/ros2-canopen.md has a bus.yml that boots")
         })?;
-        Ok((checked.nodes.into_iter().map(Row::from).collect(), checked.findings))
+        Ok((checked.nodes, checked.findings))
     }
 
     /// The drives of a machine file, which are built and thrown away.
-    fn machine(&self, file: &str) -> Result<Vec<Row>, Failure> {
+    fn machine(&self, file: &str) -> Result<Vec<CheckedNode>, Failure> {
         let unusable = |reason: String| {
             Failure::usage(format!("cannot use {}", plain(file)))
                 .because(plain(&reason))
@@ -110,7 +97,7 @@ impl Check {
         };
         let machine = machine_file::machine(&self.file.to_string_lossy()).map_err(unusable)?;
         machine.build().map_err(|bad| unusable(bad.to_string()))?;
-        let row = |(node, model): (canopen::NodeId, &devices::Description)| Row {
+        let row = |(node, model): (canopen::NodeId, &devices::Description)| CheckedNode {
             name: model.name.to_owned(),
             node: Some(node.raw()),
             device: Some(model.title.to_owned()),

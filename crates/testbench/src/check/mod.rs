@@ -10,6 +10,8 @@ mod yaml;
 
 use std::path::Path;
 
+use serde::Serialize;
+
 pub use finding::{Finding, Findings, Place, Severity};
 
 use crate::document::BadFile;
@@ -17,7 +19,7 @@ use finding::Reporter;
 use traps::Case;
 
 /// A node of the bus, as it was understood.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct CheckedNode {
     /// Its name in the file.
     pub name: String,

@@ -260,33 +260,24 @@ fn fixed_mapping(case: &Case<'_>, report: &mut Reporter<'_>) {
 /// Targets that a drive follows while it is enabled (CiA 402-2: 607Ah, 60C1h, 60FFh, 6071h).
 const SET_POINTS: [u16; 4] = [0x607A, 0x60C1, 0x60FF, 0x6071];
 
-/// A generated master sends each RPDO that is valid in the sheet, with zeros until it is told otherwise.
+/// A generated master sends each RPDO that is valid in the sheet, with zeros until it is told otherwise. Whoever names an RPDO in
+/// the file means to use it, or switches it off.
 fn set_point_by_sync(case: &Case<'_>, report: &mut Reporter<'_>) {
     let syncs = case.bus.master.sync_period_us.as_ref().is_some_and(|period| period.value > 0);
     for number in (1..=512).take_while(|_| syncs) {
-        let own = case.slave.pdo(false, number);
         let at_index = |base: u16| base + number - 1;
         let Some(id) = case.value(at_index(0x1400), 1) else { break };
-        let enabled = own.and_then(|pdo| pdo.enabled).unwrap_or(id & 0x8000_0000 == 0);
-        let transmission =
-            own.and_then(|pdo| pdo.transmission.map(i128::from)).or_else(|| case.value(at_index(0x1400), 2));
-        let by_sync = transmission.is_some_and(|transmission| transmission <= 240);
-        let own_mapping = own.and_then(|pdo| pdo.mapping.clone());
-        let carried = own_mapping.unwrap_or_else(|| {
-            let entries = (1..=8).filter_map(|entry| case.value(at_index(0x1600), entry));
-            entries.map(|entry| ((entry >> 16) as u16, (entry >> 8) as u8)).collect()
-        });
-        let Some((target, _)) = carried.iter().find(|(index, _)| SET_POINTS.contains(index)) else { continue };
-        if enabled && by_sync && own.is_none() {
+        let by_sync = case.value(at_index(0x1400), 2).is_some_and(|transmission| transmission <= 240);
+        if id & 0x8000_0000 != 0 || !by_sync || case.slave.pdo(false, number).is_some() {
+            continue;
+        }
+        let carried = (1..=8).filter_map(|entry| Some((case.value(at_index(0x1600), entry)? >> 16) as u16));
+        if let Some(target) = carried.into_iter().find(|index| SET_POINTS.contains(index)) {
             let what = format!(
                 "its RPDO{number} carries {target:04X}h, is on as delivered and goes out with each SYNC: the master sends 0 until it is told otherwise, and an enabled drive goes there"
             );
-            report.say(
-                Severity::Error,
-                case.slave.at,
-                what,
-                format!("add `rpdo: {{{number}: {{enabled: false}}}}` unless you use it"),
-            );
+            let next = format!("add `rpdo: {{{number}: {{enabled: false}}}}` unless you use it");
+            report.say(Severity::Error, case.slave.at, what, next);
         }
     }
 }
