@@ -16,6 +16,7 @@ import sys
 import tempfile
 import time
 
+import boot_up
 import canopen
 import round_trips
 
@@ -46,8 +47,7 @@ def value_is_written_and_read_back(node):
 
 def reset_is_followed_by_boot_up(node):
     """CiA 301, 7.3.2.3: a node that has restarted says so."""
-    node.nmt.state = "RESET"
-    node.nmt.wait_for_bootup(PATIENCE_S)
+    assert boot_up.after_reset(node, PATIENCE_S), "no boot-up"
 
 
 def sync_is_answered_by_a_pdo(node):

@@ -11,6 +11,7 @@ import struct
 import subprocess
 import time
 
+import boot_up
 import can
 import canopen
 from ferrodrive import Simulator
@@ -67,8 +68,7 @@ def multicast_drive(bench):
             equal(node.sdo.upload(0x1000, 0), bench.drive.device_type.to_bytes(4, "little"), "1000h")
             node.sdo.download(0x6083, 0, struct.pack("<I", 250))
             equal(node.sdo.upload(0x6083, 0), struct.pack("<I", 250), "6083h after it was written")
-            node.nmt.state = "RESET"
-            node.nmt.wait_for_bootup(PATIENCE_S)
+            true(boot_up.after_reset(node, PATIENCE_S), "boot-up after the reset")
         finally:
             network.disconnect()
 
