@@ -2,6 +2,7 @@ use canopen::Mux;
 use cia402::{ModeOfOperation, PowerState, Statusword};
 
 use crate::placement::Placement;
+use crate::terminals::Terminals;
 use crate::units::{Quantity, Units};
 
 /// One axis of a drive: where its objects are, and what they mean.
@@ -24,6 +25,8 @@ pub struct AxisDescription {
     pub statusword_bits: &'static [(u16, &'static str)],
     /// How it finds its reference position, where it does.
     pub homing: Option<HomingRules>,
+    /// Its inputs and its brake, as a drive of one axis has them: [`object`](Self::object) says where this axis has them.
+    pub terminals: Terminals,
     /// What raw values are worth.
     pub units: Units,
 }

@@ -64,12 +64,21 @@ struct Bench {
 
 impl Bench {
     fn new(name: &str) -> Self {
+        Self::with(name, &[])
+    }
+
+    /// A model with these choices of its variations.
+    fn with(name: &str, choices: &[(&str, &str)]) -> Self {
         let (mut world, network, other) = (World::new(Bitrate::K500, 5), Network::new(), Network::new());
         let heard = Arc::<Mutex<Overheard>>::default();
         world.add_station(Ear { network: network.clone(), heard: heard.clone() });
         world.add_station(other.clone());
         let model = model(name).unwrap();
-        world.add_drive(NODE, order(model, &Order::new(model, node(NODE), Bitrate::K500)).unwrap()).unwrap();
+        let mut ordered = Order::new(model, node(NODE), Bitrate::K500);
+        for (key, value) in choices {
+            ordered.variant.choose(key, value).unwrap();
+        }
+        world.add_drive(NODE, order(model, &ordered).unwrap()).unwrap();
         world.run_until(Instant::from_secs(2));
         Self { world, other, heard, drive: Drive::new(network.node(node(NODE)), model) }
     }
@@ -189,6 +198,79 @@ fn command(bench: &mut Bench, mode: i64, controlword: i64) {
     bench.write(CONTROLWORD, controlword);
 }
 
+/// A turning motor keeps its mode (the manuals of both ZLTECH drives; CiA 402-2, 8.5 leaves it to the maker).
+fn change_mode_while_turning(bench: &mut Bench) {
+    let drive = bench.drive.clone();
+    bench.done(drive.guard(SwitchedOff::Leave));
+    bench.done(drive.velocity(Rpm(40.0), MotionOptions::default()));
+    bench.world.run_for(Duration::from_secs(1));
+    bench.write(mux(0x6060, 0), 1);
+}
+
+/// A way to go, and no speed to go it at.
+fn no_profile_velocity(bench: &mut Bench) {
+    bench.enable(1);
+    bench.write(mux(0x6081, 0), 0);
+    bench.write(TARGET, 200_000);
+    bench.write(CONTROLWORD, 0x1F);
+}
+
+/// CiA 402-2, 11.1: bit 4 falls while the drive looks for its home switch, which ends the search.
+fn interrupt_homing(bench: &mut Bench) {
+    bench.enable(6);
+    bench.write(mux(0x6098, 0), 24);
+    bench.write(CONTROLWORD, 0x1F);
+    bench.world.run_for(Duration::from_millis(500));
+    bench.write(CONTROLWORD, 0x0F);
+    bench.world.run_for(Duration::from_secs(2));
+}
+
+/// X0 is the emergency stop: as delivered (ZLAC8030L, 2030h:02), or chosen (ZLIM42-C, 5.4).
+fn press_emergency_stop(bench: &mut Bench) {
+    bench.enable(3);
+    bench.write(mux(0x2030, 2), 9);
+    bench.stimulus("input X0 1");
+    bench.write(mux(0x60FF, 0), 20);
+}
+
+/// ZLAC8030L, 202Fh:03 = 1: the stop takes the power off the motor, and its state is Switch on disabled.
+fn be_released_by_emergency_stop(bench: &mut Bench) {
+    bench.write(mux(0x202F, 3), 1);
+    press_emergency_stop(bench);
+    bench.world.run_for(Duration::from_secs(1));
+    bench.write(CONTROLWORD, 0x0F);
+}
+
+/// X1 as positive limit (ZLIM42-C, 5.4: function 2), its wire reversed by 2030h:01.
+fn meet_limit_with_reversed_input(bench: &mut Bench) {
+    bench.write(mux(0x2030, 3), 2);
+    bench.write(mux(0x2030, 1), 0b10);
+    bench.enable(3);
+    bench.write(mux(0x60FF, 0), 20);
+}
+
+/// CiA 402-2, 60FDh: bit 1 is the positive limit switch.
+fn meet_limit(bench: &mut Bench) {
+    bench.stimulus("input POS 1");
+    bench.enable(3);
+    bench.write(mux(0x60FF, 0), 131_072);
+}
+
+/// ZLAC8030L, 2030h:0E = 1 closes the brake at B0, and the drive does not open it by itself.
+fn leave_brake_closed(bench: &mut Bench) {
+    bench.enable(3);
+    bench.write(mux(0x2030, 0x0E), 1);
+    bench.write(mux(0x60FF, 0), 5);
+}
+
+/// A target beyond the highest speed (CiA 402-2, 10.3: 607Fh).
+fn ask_too_much(bench: &mut Bench) {
+    bench.enable(3);
+    bench.write(mux(0x607F, 0), 131_072);
+    bench.write(mux(0x60FF, 0), 1_310_720);
+    bench.world.run_for(Duration::from_secs(1));
+}
+
 /// Conditions that last by themselves.
 const CONDITIONS: &[Row] = &[
     Row("no_answer", &ALL, |bench| bench.world.cut_power(NODE).unwrap()),
@@ -225,7 +307,19 @@ const CONDITIONS: &[Row] = &[
     Row("software_limit", &["cia402"], soft_limits),
     Row("homing_not_started", &["zlim42c", "cia402"], |bench| bench.enable(6)),
     Row("shaft_held", &["m4230e17b50"], |bench| hold_shaft(bench, 50)),
+    Row("mode_not_taken", &["zlac8030l", "zlim42c", "cia402"], change_mode_while_turning),
+    Row("profile_velocity_zero", &["cia402"], no_profile_velocity),
+    Row("homing_failed", &["zlim42c", "cia402"], interrupt_homing),
+    Row("emergency_stop", &["zlac8030l", "zlim42c"], press_emergency_stop),
+    Row("emergency_stop", &["zlac8030l"], be_released_by_emergency_stop),
+    Row("limit_switch", &["zlim42c"], meet_limit_with_reversed_input),
+    Row("limit_switch", &["cia402"], meet_limit),
+    Row("brake_set", &["zlac8030l"], leave_brake_closed),
+    Row("internal_limit", &["cia402"], ask_too_much),
 ];
+
+/// With these a drive may move all the same.
+const WARNINGS: [&str; 3] = ["pdo_not_operational", "pdo_without_sync", "internal_limit"];
 
 #[test]
 fn each_condition_is_named_with_what_to_do() {
@@ -239,8 +333,75 @@ fn each_condition_is_named_with_what_to_do() {
             let texts = [&told.expected, &told.found, &told.follows, &told.remedy];
             assert!(texts.iter().all(|text| !text.is_empty()), "{name}: {told:?}");
             let is_cause = told.weight == Weight::Cause;
-            assert_eq!(is_cause, !rule.starts_with("pdo_"), "{name}: {told:?}");
+            assert_eq!(is_cause, !WARNINGS.contains(rule), "{name}: {told:?}");
         }
+    }
+}
+
+#[test]
+fn an_input_is_told_by_its_name_and_object_of_the_manual_and_is_gone_when_released() {
+    let mut bench = Bench::new("zlac8030l");
+    press_emergency_stop(&mut bench);
+    let explained = bench.explain();
+    let told = explained.findings.iter().find(|finding| finding.rule == "emergency_stop").unwrap();
+    assert!(told.expected.contains("X0 (emergency stop)"), "{told:?}");
+    assert!(told.found.contains("2003h:00") && told.found.contains("2030h:02"), "{told:?}");
+    bench.stimulus("input X0 0");
+    bench.world.run_for(Duration::from_millis(100));
+    let explained = bench.explain();
+    assert!(!rules(&explained).contains(&"emergency_stop"), "{explained:#?}");
+}
+
+/// Of a switch at the other end only a warning is made.
+#[test]
+fn a_limit_switch_is_a_cause_only_where_the_shaft_is_to_go() {
+    for (target, weight) in [(131_072, Weight::Cause), (0, Weight::Warning)] {
+        let mut bench = Bench::new("cia402");
+        meet_limit(&mut bench);
+        bench.write(mux(0x60FF, 0), target);
+        let explained = bench.explain();
+        let told = explained.findings.iter().find(|finding| finding.rule == "limit_switch");
+        assert_eq!(told.map(|finding| finding.weight), Some(weight), "{explained:#?}");
+    }
+}
+
+/// The standard's servo with a motor that has a brake, which 60FEh sets (bit 0) where the mask gives it to the host.
+#[test]
+fn a_brake_that_the_host_has_set_is_named() {
+    let mut bench = Bench::with("cia402", &[("motor", "sgmah-04a-brake")]);
+    bench.enable(3);
+    bench.write(mux(0x60FE, 1), 1);
+    bench.write(mux(0x60FF, 0), 20_000);
+    let explained = bench.explain();
+    assert!(!rules(&explained).contains(&"brake_set"), "without the mask the drive moves its brake: {explained:#?}");
+    bench.write(mux(0x60FE, 2), 1);
+    let explained = bench.explain();
+    assert!(rules(&explained).contains(&"brake_set"), "{explained:#?}");
+}
+
+/// A plug without contact while the bus was listened to: nothing came, and the drive answers now.
+#[test]
+fn what_should_have_come_and_did_not_is_named() {
+    for name in ["zlac8030l", "zlim42c", "cia402"] {
+        let mut bench = Bench::new(name);
+        let drive = bench.drive.clone();
+        bench.write(mux(0x1017, 0), 200);
+        let map = PdoMap(vec![MappingRecord { mux: mux(0x6041, 0), bits: 16 }]);
+        let config = PdoConfig::new(pdo(Direction::Tpdo), map)
+            .transmission(TransmissionType::EVENT_PROFILE)
+            .event_time(Duration::from_millis(100));
+        let units = TimerUnits::of(drive.description().unwrap());
+        block_on(&mut bench.world, drive.node().configure_pdo(&config, units)).unwrap().unwrap();
+        bench.nmt(NmtCommand::Start);
+        let missing = ["heartbeat_missing", "pdo_missing"];
+        let explained = bench.explain();
+        assert!(!rules(&explained).iter().any(|rule| missing.contains(rule)), "{name}: {explained:#?}");
+        bench.stimulus("bus silent on");
+        let heard = bench.listen(|_| ());
+        bench.stimulus("bus silent off");
+        bench.world.run_for(Duration::from_millis(100));
+        let explained = block_on(&mut bench.world, drive.explain(&heard)).unwrap();
+        assert!(missing.iter().all(|rule| rules(&explained).contains(rule)), "{name}: {explained:#?}");
     }
 }
 

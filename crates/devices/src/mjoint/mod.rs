@@ -20,6 +20,7 @@ use crate::axis::{AxisDescription, BitPattern, HomingRules, HomingStart, NewSetP
 use crate::description::{Description, Edition, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules, Write};
 use crate::faults::Faults;
 use crate::placement::Placement;
+use crate::terminals::Terminals;
 use crate::timing::Timing;
 use crate::units::{CountsPerTurn, Quantity, Ramps, Scale, Units};
 use crate::variant::Pick;
@@ -99,6 +100,7 @@ const AXIS: AxisDescription = AxisDescription {
     new_set_point: NewSetPoint::ClearsItself,
     statusword_bits: STATUSWORD_BITS,
     homing: Some(HOMING),
+    terminals: Terminals::NONE,
     units: UNITS,
 };
 

@@ -14,6 +14,7 @@ use crate::axis::{AxisDescription, BitPattern, HomingRules, HomingStart, NewSetP
 use crate::description::{Description, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules};
 use crate::faults::Faults;
 use crate::placement::Placement;
+use crate::terminals::Terminals;
 use crate::timing::Timing;
 use crate::units::{CountsPerTurn, Quantity, Ramps, Scale, Units};
 
@@ -68,6 +69,7 @@ pub const fn axis(placement: Placement, modes: &'static [ModeOfOperation]) -> Ax
         new_set_point: NewSetPoint::Handshake,
         statusword_bits: &[],
         homing: Some(HOMING),
+        terminals: Terminals::CIA402,
         units: UNITS,
     }
     .placed(placement)

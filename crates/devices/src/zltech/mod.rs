@@ -14,6 +14,7 @@ use canopen::{EmcyErrorCode, Mux};
 
 use crate::description::{Identity, ParameterStorage, PdoRules, Write};
 use crate::stated::Stated;
+use crate::terminals::{Input, InputSignal, Meaning};
 use crate::units::Ramps;
 
 pub use zlac8030l::{ZLAC8030L, ZLAC8030L_2_01};
@@ -54,6 +55,11 @@ pub const RESTORE: u32 = 1;
 
 /// Value of the register parameter setting that saves all stored parameters.
 pub const SAVE: u32 = 2;
+
+/// The digital input of this bit: 2030h says what it is for, X0 at sub-index 02.
+const fn input(name: &'static str, bit: u8, signals: &'static [(i64, InputSignal)]) -> Input {
+    Input { name, bit, meaning: Meaning::Chosen { function: Mux::new(0x2030, 2 + bit), signals } }
+}
 
 /// How parameters are stored: by the object `register` as a whole, each with its write while the object `save_on_write` is
 /// 0, as delivered.

@@ -5,6 +5,8 @@
 pub enum Topic {
     /// Whether it answers, its NMT state, heartbeats, other masters, its watch over a host.
     Communication,
+    /// Digital inputs that stop a motor, and the brake.
+    Terminals,
     /// The power state machine: the way to Operation enabled, and faults.
     Power,
     /// 6060h and 6061h.
@@ -22,6 +24,7 @@ impl Topic {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Communication => "communication",
+            Self::Terminals => "terminals",
             Self::Power => "power",
             Self::Mode => "mode",
             Self::SetPoint => "set-point",

@@ -1,7 +1,7 @@
 //! Why a drive does not move, why a PDO is silent, and what is missing to reach Operation enabled.
 //!
 //! In: the frames that others send ([`Overheard`]) and what the drive's objects say, read by SDO. Out: [`Finding`]s in the
-//! order in which a person would look: does it answer, what is its NMT state, who else commands it, its power state, its mode,
+//! order in which a person would look: does it answer, what is its NMT state, who else commands it, its inputs and its brake, its power state, its mode,
 //! its set-point, its load, its PDOs one by one. Only listens and reads: nothing is written, so that a running machine may be
 //! looked at. What differs between models comes from their descriptions; without one the standard's objects are looked at.
 //!
@@ -16,6 +16,7 @@ mod overheard;
 mod pdos;
 mod power;
 mod set_point;
+mod terminals;
 
 use canopen::{NmtState, NodeId};
 use cia402::{ModeOfOperation, PowerState};
@@ -56,7 +57,8 @@ pub struct Explained {
 type Rule = fn(&Observed, &mut Vec<Finding>);
 
 /// In the order of the findings. The load comes last of what concerns motion: it looks at what the others leave unexplained.
-const RULES: [Rule; 6] = [communication::look, power::look, mode::look, set_point::look, load::look, pdos::look];
+const RULES: [Rule; 7] =
+    [communication::look, terminals::look, power::look, mode::look, set_point::look, load::look, pdos::look];
 
 impl Drive {
     /// Looks for what keeps this drive from moving and its PDOs from being exchanged. Reads some thirty objects and writes

@@ -5,7 +5,7 @@ use canopen::od::Entry;
 use canopen::{CobId, Mux, NmtState, NodeId};
 use cia402::{Controlword, ModeOfOperation, PowerState, Statusword};
 use devices::faults::FaultRow;
-use devices::{AxisDescription, Description, HostWatch, PowerStyle, Quantity};
+use devices::{AxisDescription, Description, HostWatch, Meaning, PowerStyle, Quantity, Terminals};
 
 use super::overheard::Overheard;
 use crate::decode::common_row;
@@ -167,11 +167,25 @@ impl Observed {
             Some(HostWatch::Heartbeat { consumer, .. }) => Some(consumer),
             _ => None,
         });
+        wanted.extend(self.of_terminals());
         let held_to: Vec<_> = wanted.iter().filter_map(|mux| self.row(*mux)?.held_to).map(|held| held.object).collect();
         wanted.extend(held_to);
         wanted.sort();
         wanted.dedup();
         wanted
+    }
+
+    /// The objects that show its inputs and its brake.
+    fn of_terminals(&self) -> Vec<Mux> {
+        let Some(Terminals { levels, polarity, inputs, brake }) = self.axis.map(|axis| axis.terminals) else {
+            return Vec::new();
+        };
+        let functions = inputs.iter().filter_map(|input| match input.meaning {
+            Meaning::Chosen { function, .. } => Some(function),
+            Meaning::Fixed(_) => None,
+        });
+        let brake = brake.into_iter().flat_map(|brake| [Some(brake.object), brake.mask]).flatten();
+        levels.into_iter().chain(polarity).chain(functions).chain(brake).map(|mux| self.place(mux)).collect()
     }
 
     async fn read_value(&mut self, drive: &Drive, mux: Mux) -> Result<(), Error> {

@@ -20,6 +20,7 @@ use crate::description::{Description, Edition, HostWatch, NmtRules, PdoRules};
 use crate::faults::Faults;
 use crate::placement::Placement;
 use crate::stated::Stated;
+use crate::terminals::{BrakeOutput, Input, InputSignal, Terminals};
 use crate::timing::Timing;
 use crate::units::{CountsPerTurn, Quantity, Units};
 use crate::variant::Pick;
@@ -71,6 +72,7 @@ const AXIS: AxisDescription = AxisDescription {
     new_set_point: NewSetPoint::Handshake,
     statusword_bits: &[(IN_POSITION, "in position"), (RUNNING, "running"), (EXTERNAL_STOP, "external stop")],
     homing: None,
+    terminals: TERMINALS,
     units: Units {
         counts_per_turn: CountsPerTurn::Object { object: Mux::new(0x200B, 0), factor: 4 },
         target_velocity: Some(Quantity::new(0x60FF, 0, 1.0)),
@@ -84,6 +86,18 @@ const AXIS: AxisDescription = AxisDescription {
         driver_temperature: Some(Quantity::new(0x2026, 2, 0.1)),
     },
 };
+
+/// Chapter 5 and 2030h: of the functions of X0 and X1 only 9 stops the motor; B0 holds it with 1.
+const TERMINALS: Terminals = Terminals {
+    levels: Some(Mux::new(0x2003, 0)),
+    polarity: Some(Mux::new(0x2030, 1)),
+    inputs: &[input("X0", 0), input("X1", 1)],
+    brake: Some(BrakeOutput { name: "B0", object: Mux::new(0x2030, 0x0E), bit: 0, mask: None }),
+};
+
+const fn input(name: &'static str, bit: u8) -> Input {
+    zltech::input(name, bit, &[(9, InputSignal::EmergencyStop)])
+}
 
 /// Working robots map 6077h with 32 bits; the maker's EDS counts empty entries in.
 const PDO_RULES: PdoRules = PdoRules {

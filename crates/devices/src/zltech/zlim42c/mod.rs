@@ -20,6 +20,7 @@ use crate::description::{Description, HostWatch, NmtRules};
 use crate::faults::Faults;
 use crate::placement::Placement;
 use crate::stated::Stated;
+use crate::terminals::{Input, InputSignal, Terminals};
 use crate::timing::Timing;
 use crate::units::{CountsPerTurn, Quantity, Units};
 use crate::zltech;
@@ -68,8 +69,25 @@ const AXIS: AxisDescription = AxisDescription {
     new_set_point: NewSetPoint::Handshake,
     statusword_bits: STATUSWORD_BITS,
     homing: Some(HOMING),
+    terminals: TERMINALS,
     units: UNITS,
 };
+
+/// 3.2 and 2030h: each input may be any of these; the drive has no brake.
+const TERMINALS: Terminals = Terminals {
+    levels: Some(Mux::new(0x2003, 0)),
+    polarity: Some(Mux::new(0x2030, 1)),
+    inputs: &[input("X0", 0), input("X1", 1), input("X2", 2), input("X3", 3)],
+    brake: None,
+};
+
+const fn input(name: &'static str, bit: u8) -> Input {
+    zltech::input(
+        name,
+        bit,
+        &[(2, InputSignal::PositiveLimit), (3, InputSignal::NegativeLimit), (9, InputSignal::EmergencyStop)],
+    )
+}
 
 const STATUSWORD_BITS: &[(u16, &str)] = &[
     (HOMING_ATTAINED, "homing attained"),
