@@ -13,7 +13,8 @@ use master::{Drive, Network};
 use plant::coupled::DifferentialDriveModel;
 use sim::coupling::{BodyKind, CoupledShaft, Coupling};
 use sim::machine::{Order, order};
-use sim::{Place, World, block_on};
+use sim::stimulus::BusFault;
+use sim::{Place, Stimulus, World, block_on};
 use support::node;
 
 const LEFT: u8 = 1;
@@ -191,6 +192,51 @@ fn a_wheel_that_goes_stops_the_other() {
     assert!(matches!(base.command(Twist::default()), Err(BaseError::Stopped(_))));
     // The left wheel has no power or no speed; the right one has none to hold.
     assert!(bench.world.report(LEFT).unwrap().velocity_rpm.abs() < 2.0);
+}
+
+#[test]
+fn a_wheel_that_is_not_heard_for_a_while_ends_the_motion_with_a_cause() {
+    let mut bench = Bench::new();
+    let mut base = bench.open();
+    bench.drive(&mut base, 0.4, 0.0, 2.0);
+    let silent = |on| Stimulus::Bus(BusFault::Silent(on));
+    bench.world.apply(Place::node(RIGHT), &silent(true)).unwrap().unwrap();
+    let twist = Twist { linear_m_s: 0.4, angular_rad_s: 0.0 };
+    // The limit of the cyclic drives is three cycles: this is an interruption, not an end.
+    for cycle in 0..8 {
+        let _ = base.command(twist);
+        bench.cycle(&mut base);
+        let state = base.state();
+        assert!(state.follows || state.cause.is_some(), "cycle {cycle}: {state:?}");
+    }
+    bench.world.apply(Place::node(RIGHT), &silent(false)).unwrap().unwrap();
+    // It comes back, and the program goes on to give its twist.
+    for _ in 0..200 {
+        let _ = base.command(twist);
+        bench.cycle(&mut base);
+    }
+    let cause = base.state().cause;
+    assert!(matches!(cause, Some(StopCause::Wheel { node, .. }) if node.raw() == RIGHT), "{cause:?}");
+    assert!(bench.truth().1.abs() < 0.01, "it drives on by itself: {} m/s", bench.truth().1);
+    // A stop does not say that all is well; enabled again, it drives.
+    let stopped = block_on(&mut bench.world, base.stop()).unwrap();
+    assert!(matches!(stopped, Err(BaseError::Stopped(StopCause::Wheel { .. }))), "{stopped:?}");
+    block_on(&mut bench.world, base.enable()).unwrap().unwrap();
+    bench.drive(&mut base, 0.4, 0.0, 2.0);
+    assert!(bench.truth().1 > 0.38);
+}
+
+#[test]
+fn a_wheel_that_is_lost_while_the_base_stops_is_told() {
+    let mut bench = Bench::new();
+    let mut base = bench.open();
+    bench.drive(&mut base, 0.8, 0.0, 2.0);
+    bench.world.cut_power(LEFT).unwrap();
+    let stopped = block_on(&mut bench.world, base.stop()).unwrap();
+    assert!(
+        matches!(stopped, Err(BaseError::Stopped(StopCause::Wheel { node, .. })) if node.raw() == LEFT),
+        "{stopped:?}"
+    );
 }
 
 #[test]

@@ -281,6 +281,39 @@ fn a_stop_leaves_the_group_ready() {
 }
 
 #[test]
+fn an_axis_that_is_lost_while_the_group_stops_by_request_is_told() {
+    for disabled in [false, true] {
+        let mut bench = Bench::servos(2);
+        let mut group = bench.open();
+        let to: Vec<_> = places(&group).iter().map(|from| from + 2.0).collect();
+        group.start_move(&turns(&to), None).unwrap();
+        for _ in 0..800 {
+            bench.cycle(&mut group);
+        }
+        group.start_stop();
+        bench.cycle(&mut group);
+        assert_eq!(group.state().cause, Some(StopCause::Asked));
+        bench.world.cut_power(2).unwrap();
+        let stopped =
+            block_on(&mut bench.world, async { if disabled { group.disable().await } else { group.stop().await } });
+        let error = stopped.unwrap().unwrap_err();
+        assert!(matches!(error, GroupError::Stopped(StopCause::Axis { axis: 2, .. })), "{error}");
+        // It is on its way to rest, along its path, whatever became of the other one.
+        assert!(bench.rpm(1).abs() < 2.0);
+    }
+}
+
+#[test]
+fn options_of_a_stream_that_bound_nothing_are_refused_and_the_group_holds() {
+    let mut bench = Bench::servos(1);
+    let mut group = bench.open();
+    let endless = StreamOptions { grace: u32::MAX, ..StreamOptions::default() };
+    let error = group.start_stream(endless).unwrap_err();
+    assert!(matches!(error, GroupError::StreamOption { option: "grace", most: 100, .. }), "{error}");
+    assert_eq!(bench.cycle(&mut group), Phase::Holding);
+}
+
+#[test]
 fn drives_that_have_power_already_are_taken_over_without_a_jump() {
     let mut bench = Bench::servos(2);
     for setup in &bench.setups {

@@ -65,6 +65,9 @@ pub struct Base {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Power {
     Off,
+    /// Wanted; the wheels do not follow yet.
+    Enabling,
+    /// Both wheels have followed: whatever keeps one from it is trouble.
     On,
 }
 
@@ -157,14 +160,17 @@ impl Base {
         for (wheel, m_s) in self.wheels.iter_mut().zip(told) {
             let demand = match self.power {
                 Power::Off => Demand::Off,
-                Power::On => Demand::Velocity(Rpm(m_s * turns_per_m * wheel.turns * 60.0)),
+                Power::Enabling | Power::On => Demand::Velocity(Rpm(m_s * turns_per_m * wheel.turns * 60.0)),
             };
             wheel.shows = Some(wheel.drive.step(io, demand));
         }
         self.count();
         self.state.follows = self.wheels.iter().all(|wheel| wheel.shows.is_some_and(|shown| shown.follows));
-        if self.power == Power::On {
+        if self.power != Power::Off {
             self.find_trouble();
+        }
+        if self.power == Power::Enabling && self.state.follows {
+            self.power = Power::On;
         }
         self.state.commanded = self.geometry.twist(self.told);
         self.state
@@ -178,7 +184,7 @@ impl Base {
         if self.state.cause.is_none() && self.now - wanted_at > watchdog && self.wanted != Twist::default() {
             self.state.cause = Some(StopCause::Watchdog { after: watchdog });
         }
-        let goal = if self.state.cause.is_some() || self.power == Power::Off || !self.state.follows {
+        let goal = if self.state.cause.is_some() || self.power != Power::On || !self.state.follows {
             Wheels::default()
         } else {
             self.geometry.wheels_m_s(self.wanted)
@@ -210,14 +216,15 @@ impl Base {
     }
 
     fn find_trouble(&mut self) {
-        if matches!(self.state.cause, Some(StopCause::Wheel { .. })) {
+        if self.lost_wheel().is_some() {
             return;
         }
         for wheel in &self.wheels {
             match wheel.shows.and_then(|shown| shown.refused) {
-                // Before it follows, its first TPDO may be on its way.
-                None | Some(Refusal::NoCycle | Refusal::NotHeard) if !self.state.follows => {}
                 None => {}
+                // Its first TPDO may be on its way. Later on, one that stays away ends the motion: the base does not drive on by
+                // itself when it comes back.
+                Some(Refusal::NoCycle | Refusal::NotHeard) if self.power == Power::Enabling => {}
                 Some(refusal) => {
                     self.state.cause = Some(StopCause::Wheel { node: wheel.drive.node(), refusal });
                     return;
@@ -255,7 +262,7 @@ impl Base {
         (self.state.cause, self.wanted, self.told) = (None, Twist::default(), Wheels::default());
         // What an earlier stop has left behind ends without power.
         self.switch_off().await?;
-        self.power = Power::On;
+        self.power = Power::Enabling;
         for _ in 0..self.cycles(POWER_LIMIT) {
             match self.cycle().await? {
                 BaseState { cause: Some(cause), .. } => {
@@ -276,27 +283,36 @@ impl Base {
     /// Brings the base to rest within its limits; it stays powered.
     ///
     /// # Errors
-    /// As [`cycle`](Self::cycle).
+    /// As [`cycle`](Self::cycle); [`BaseError::Stopped`], once it has been told no speed, where a wheel was lost before or on the
+    /// way to rest.
     pub async fn stop(&mut self) -> Result<(), BaseError> {
         self.wanted = Twist::default();
         // From the highest speed, and some cycles.
         let time = Duration::from_secs_f64((self.limits.wheel_m_s / self.limits.wheel_m_s2).min(3600.0));
         for _ in 0..self.cycles(time) + 4 {
             if self.cycle().await?.commanded == Twist::default() {
-                return Ok(());
+                break;
             }
         }
-        Ok(())
+        self.lost_wheel().map_or(Ok(()), |cause| Err(BaseError::Stopped(cause)))
+    }
+
+    fn lost_wheel(&self) -> Option<StopCause> {
+        self.state.cause.filter(|cause| matches!(cause, StopCause::Wheel { .. }))
     }
 
     /// Brings the base to rest, takes the wheels' power and ends what was begun: SYNC, and the guards of the drives.
     ///
     /// # Errors
-    /// As [`cycle`](Self::cycle), and those of the requests.
+    /// As [`cycle`](Self::cycle), and those of the requests; [`BaseError::Stopped`] for a wheel that was lost on the way to rest.
     pub async fn close(mut self) -> Result<(), BaseError> {
-        let stopped = self.stop().await;
+        let known = self.lost_wheel().is_some();
+        let stopped = match self.stop().await {
+            Err(BaseError::Stopped(_)) if known => Ok(()),
+            stopped => stopped,
+        };
         // Without SYNC there are no cycles, and the master has stopped the drives.
-        let off = if stopped.is_ok() { self.switch_off().await } else { Ok(()) };
+        let off = if matches!(stopped, Err(BaseError::NoCycle(_))) { Ok(()) } else { self.switch_off().await };
         self.network.sync(None);
         let released = join_all(self.drives.iter().map(Drive::release_guard)).await;
         stopped.and(off)?;
@@ -309,11 +325,7 @@ impl Base {
         self.power = Power::Off;
         for _ in 0..self.cycles(POWER_LIMIT) {
             self.cycle().await?;
-            if self
-                .wheels
-                .iter()
-                .all(|wheel| wheel.shows.is_some_and(|shown| shown.statusword.is_some() && !shown.has_power()))
-            {
+            if self.wheels.iter().all(|wheel| wheel.shows.is_some_and(|shown| shown.is_without_power())) {
                 break;
             }
         }

@@ -165,6 +165,11 @@ impl CyclicState {
         use PowerState::{FaultReactionActive, OperationEnabled, QuickStopActive};
         matches!(self.power, Some(OperationEnabled | QuickStopActive | FaultReactionActive))
     }
+
+    /// True if the drive is heard, and shows that its power stage is off.
+    pub const fn is_without_power(&self) -> bool {
+        self.statusword.is_some() && !self.has_power()
+    }
 }
 
 /// `Operation enabled, at 12.5 turns, 60 r/min`.

@@ -39,6 +39,8 @@ pub struct CyclicDrive {
     pub(super) current: Option<Signal<Amperes>>,
     /// How often the TPDO with the statusword comes.
     pub(super) cadence: Cadence,
+    /// That TPDO comes only as the answer to an RPDO.
+    pub(super) answers: bool,
     /// Cycles in a row that may be missed.
     pub(super) tolerance: u32,
     pub(super) host_loss: HostLoss,
@@ -58,6 +60,8 @@ pub(super) enum ControlwordPath {
 /// What one step leaves for the next.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Progress {
+    /// The drive has been heard since it was opened, or was told something that does not want power.
+    spoken: bool,
     /// The drive followed set-points.
     followed: bool,
     /// What keeps the drive from its demand until it is switched off.
@@ -115,9 +119,16 @@ impl CyclicDrive {
 
     /// Looks at the drive and has it do what is wanted in this cycle. A demand that is refused stops the drive as
     /// [`Demand::Hold`] does, for as long as it is refused, and the state says why. Allocates nothing.
+    ///
+    /// A demand for power says nothing to a drive that has not been heard yet: one that somebody else has enabled keeps its
+    /// power and is taken over where it stands, and none gets power before its state is known.
     pub fn step(&mut self, io: &mut Exchange<'_>, demand: Demand) -> CyclicState {
         self.progress.odd_step ^= true;
         let mut seen = self.look(io);
+        if demand.wants_power() && seen.statusword.is_none() && !self.progress.spoken {
+            return self.await_drive(io, seen);
+        }
+        self.progress.spoken = true;
         if matches!(demand, Demand::Off | Demand::ResetFault) {
             self.progress.latched = None;
             self.progress.followed = false;
@@ -129,6 +140,13 @@ impl CyclicDrive {
             self.progress.latched = self.find_trouble(&seen);
         }
         let enabled = demand.wants_power() && seen.power == Some(PowerState::OperationEnabled);
+        if enabled
+            && !self.progress.followed
+            && let Some(actual) = self.actual(io)
+        {
+            // It may have been moved since its position was read: what it is given first is where it stands.
+            self.target.last_sent = actual;
+        }
         let wish = if enabled && self.progress.latched.is_none() {
             self.follow(io, demand)
         } else {
@@ -158,6 +176,16 @@ impl CyclicDrive {
         let unheard = (demand.wants_power() && seen.statusword.is_none()).then_some(Refusal::NotHeard);
         seen.refused = self.progress.latched.or(wish.err()).or(unheard);
         seen
+    }
+
+    /// One cycle of a drive that has not been heard since it was opened.
+    fn await_drive(&mut self, io: &mut Exchange<'_>, seen: CyclicState) -> CyclicState {
+        // Where only an RPDO brings a TPDO, this is one: with the controlword that the device had when it was opened.
+        if self.answers {
+            io.write(self.target.set_point, self.target.hold());
+        }
+        io.note_resting(self.watch);
+        CyclicState { refused: Some(Refusal::NotHeard), ..seen }
     }
 
     /// For how many cycles a value counts as the drive's present one.

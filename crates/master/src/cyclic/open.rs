@@ -165,6 +165,7 @@ impl Drive {
             current,
             target,
             cadence,
+            answers: description.pdo.event_trigger == EventTrigger::AnswersRpdo && statusword_in == number,
             tolerance: options.tolerance,
             host_loss,
             watch: self.node().network().with_core(|core| core.watch_cycles(rules)),

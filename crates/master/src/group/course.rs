@@ -1,6 +1,7 @@
 //! What a group does in one cycle: the state machine between its intents and its drives.
 
 use can::Instant;
+use cia402::{PowerState, Statusword};
 
 use super::axis::Axis;
 use super::limits::{AxisLimits, PathPoint};
@@ -26,8 +27,10 @@ pub(super) enum Course {
         path: Trajectory,
         time_s: f64,
     },
-    /// No path to rest was found: each drive by its own quick stop (605Ah).
-    QuickStop,
+    /// No path to rest was found: each drive by its own quick stop (605Ah), for so many cycles now.
+    QuickStop {
+        cycles: u64,
+    },
 }
 
 /// The axes of a group and their path, stepped once in each cycle of SYNC.
@@ -82,7 +85,7 @@ impl Runner {
             Course::Holding => Phase::Holding,
             Course::Moving { .. } => Phase::Moving,
             Course::Streaming(_) => Phase::Streaming,
-            Course::Stopping { .. } | Course::QuickStop => Phase::Stopping,
+            Course::Stopping { .. } | Course::QuickStop { .. } => Phase::Stopping,
         }
     }
 
@@ -104,6 +107,10 @@ impl Runner {
         if matches!(self.course, Course::Enabling) && self.states.iter().all(|state| state.follows) {
             self.begin();
         }
+        // Drives that a quick stop has left without power can be enabled again; those that it holds stay in it.
+        if matches!(self.course, Course::QuickStop { .. }) && self.states.iter().all(CyclicState::is_without_power) {
+            self.course = Course::Off;
+        }
         self.state()
     }
 
@@ -112,7 +119,8 @@ impl Runner {
     fn advance(&mut self, now: Instant) {
         let period_s = self.period_s;
         match &mut self.course {
-            Course::Off | Course::Enabling | Course::Holding | Course::QuickStop => {}
+            Course::Off | Course::Enabling | Course::Holding => {}
+            Course::QuickStop { cycles } => *cycles += 1,
             Course::Moving { path, time_s } | Course::Stopping { path, time_s } => {
                 if *time_s == 0.0 {
                     self.began = Some(now);
@@ -169,7 +177,7 @@ impl Runner {
         let demand = match self.course {
             Course::Off => Some(Demand::Off),
             Course::Enabling => Some(Demand::Hold),
-            Course::QuickStop => Some(Demand::QuickStop),
+            Course::QuickStop { .. } => Some(Demand::QuickStop),
             _ => None,
         };
         let axes = self.axes.iter_mut().zip(&self.points).zip(&self.limits);
@@ -183,7 +191,9 @@ impl Runner {
 
     /// What stops the whole group.
     fn find_trouble(&self) -> Option<StopCause> {
-        if self.cause.is_some() || matches!(self.course, Course::Off | Course::QuickStop) {
+        // What went wrong first is told; a stop that was asked for is nothing wrong.
+        let is_told = self.cause.is_some_and(|cause| cause != StopCause::Asked);
+        if is_told || matches!(self.course, Course::Off | Course::QuickStop { .. }) {
             return None;
         }
         let enabling = matches!(self.course, Course::Enabling);
@@ -220,18 +230,74 @@ impl Runner {
 
     /// Brings all axes to rest, for this reason.
     pub(super) fn stop(&mut self, cause: StopCause) {
-        self.cause.get_or_insert(cause);
+        self.note(cause);
         match self.course {
             Course::Enabling => self.course = Course::Off,
             Course::Moving { .. } | Course::Streaming(_) => self.come_to_rest(),
-            Course::Off | Course::Holding | Course::Stopping { .. } | Course::QuickStop => {}
+            Course::Off | Course::Holding | Course::Stopping { .. } | Course::QuickStop { .. } => {}
         }
+    }
+
+    /// The first cause stays, but for a stop that was merely asked for.
+    fn note(&mut self, cause: StopCause) {
+        if matches!(self.cause, None | Some(StopCause::Asked)) {
+            self.cause = Some(cause);
+        }
+    }
+
+    /// True once the quick stop has ended at all drives: they have no power, or are held where they came to rest
+    /// (605Ah of 5 to 8: target reached, CiA 402-2, 8.4.2).
+    pub(super) fn has_quick_stopped(&self) -> bool {
+        self.states.iter().all(|state| {
+            let held = state.power == Some(PowerState::QuickStopActive)
+                && state.statusword.is_some_and(|word| word.has(Statusword::TARGET_REACHED));
+            held || state.is_without_power()
+        })
     }
 
     fn come_to_rest(&mut self) {
         self.course = match Trajectory::to_rest(&self.points, &self.limits) {
             Ok(path) => Course::Stopping { path, time_s: 0.0 },
-            Err(_) => Course::QuickStop,
+            Err(_) => {
+                self.note(StopCause::NoPathToRest);
+                Course::QuickStop { cycles: 0 }
+            }
         };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A group without axes, for which the planner finds no path.
+    fn runner(course: Course) -> Runner {
+        Runner { course, ..Runner::new(Vec::new(), Vec::new(), 0.001) }
+    }
+
+    fn stream() -> Course {
+        Course::Streaming(Stream::new(&[], 0.001, super::super::stream::StreamOptions::default()))
+    }
+
+    #[test]
+    fn a_quick_stop_has_a_cause_also_where_somebody_asked_for_a_stop() {
+        let mut asked = runner(stream());
+        asked.stop(StopCause::Asked);
+        assert!(matches!(asked.course, Course::QuickStop { .. }), "{:?}", asked.course);
+        assert_eq!(asked.state().cause, Some(StopCause::NoPathToRest));
+        // At the end of a stream nobody asked.
+        let mut ended = runner(stream());
+        ended.come_to_rest();
+        assert_eq!(ended.state().cause, Some(StopCause::NoPathToRest));
+        let text = StopCause::NoPathToRest.to_string();
+        assert!(text.contains("quick stop (605Ah)") && text.contains("Switch it off"), "{text}");
+    }
+
+    #[test]
+    fn what_made_the_stop_necessary_stays_its_cause() {
+        let mut late = runner(stream());
+        late.stop(StopCause::Underrun { cycles: 2 });
+        late.stop(StopCause::Asked);
+        assert_eq!(late.state().cause, Some(StopCause::Underrun { cycles: 2 }));
     }
 }

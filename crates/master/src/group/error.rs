@@ -87,6 +87,21 @@ pub enum GroupError {
         /// What to do.
         remedy: &'static str,
     },
+    /// An option of a stream that bounds nothing, or that cannot be met.
+    #[error(
+        "a stream's {option} of {given} is outside of {least} to {most}: nothing is moved. Cycles without a point are bounded by \
+         100 ms, and points that are waited for by the capacity"
+    )]
+    StreamOption {
+        /// Which.
+        option: &'static str,
+        /// What was given.
+        given: usize,
+        /// The smallest that is taken.
+        least: usize,
+        /// The largest that is taken.
+        most: usize,
+    },
     /// The stream has no room.
     #[error("the stream has no room for a further point: wait for the next cycle, or give it a larger capacity")]
     StreamFull,

@@ -19,9 +19,6 @@ use crate::units::Turns;
 /// How long drives may take to be enabled, and to be without power again.
 const POWER_LIMIT: Duration = Duration::from_secs(5);
 
-/// The most points that a stream keeps: a minute at 1 ms.
-const MOST_POINTS: usize = 60_000;
-
 /// Several axes that move as one. See the [module](super).
 pub struct Group {
     pub(super) network: Network,
@@ -88,8 +85,7 @@ impl Group {
         if !matches!(self.runner.course, Course::Off) {
             return self.check_going();
         }
-        // What an earlier stop has left behind ends without power. One that has power and is not heard yet is told to switch off
-        // by its first controlword anyway, and would seem to lose its power later.
+        // What an earlier stop has left behind ends without power, and all axes get theirs together.
         self.switch_off().await?;
         self.start_enabling();
         for _ in 0..self.cycles(POWER_LIMIT) {
@@ -139,11 +135,13 @@ impl Group {
     /// As [`cycle`](Self::cycle); [`GroupError::Stopped`], once all axes rest.
     pub async fn rest(&mut self) -> Result<(), GroupError> {
         while matches!(self.state().phase, Phase::Moving | Phase::Streaming | Phase::Stopping) {
-            // A quick stop has no end that the group plans: its drives stand when they say so.
-            if matches!(self.runner.course, Course::QuickStop) {
-                return self.check_going();
-            }
             self.cycle().await?;
+            // A quick stop has no end that the group plans: its drives stand when they say so, and are not waited for for ever.
+            if let Course::QuickStop { cycles } = self.runner.course
+                && (self.runner.has_quick_stopped() || cycles > self.cycles(POWER_LIMIT))
+            {
+                break;
+            }
         }
         self.check_going()
     }
@@ -151,13 +149,13 @@ impl Group {
     /// Begins to take points: one for each cycle.
     ///
     /// # Errors
-    /// [`GroupError::Stopped`], [`GroupError::Phase`] for a group that does not hold.
+    /// [`GroupError::Stopped`], [`GroupError::Phase`] for a group that does not hold, [`GroupError::StreamOption`].
     pub fn start_stream(&mut self, options: StreamOptions) -> Result<(), GroupError> {
         self.check_going()?;
         if !matches!(self.runner.course, Course::Holding) {
             return Err(self.not_now());
         }
-        let options = StreamOptions { capacity: options.capacity.clamp(1, MOST_POINTS), ..options };
+        options.check(self.runner.period_s)?;
         self.runner.course = Course::Streaming(Stream::new(&self.runner.points, self.runner.period_s, options));
         Ok(())
     }
@@ -210,16 +208,20 @@ impl Group {
     /// Brings all axes to rest and takes their power. The group can be enabled again.
     ///
     /// # Errors
-    /// As [`cycle`](Self::cycle).
+    /// As [`cycle`](Self::cycle). [`GroupError::Stopped`] for what went wrong on the way to rest; the power is taken nevertheless.
+    /// What had stopped the group before is no error here.
     pub async fn disable(&mut self) -> Result<(), GroupError> {
+        let known = self.runner.cause.is_some_and(|cause| cause != StopCause::Asked);
         self.start_stop();
         match self.rest().await {
             Ok(()) | Err(GroupError::Stopped(_)) => {}
             Err(error) => return Err(error),
         }
         self.switch_off().await?;
-        self.runner.cause = None;
-        Ok(())
+        match self.runner.cause.take() {
+            Some(cause) if !known && cause != StopCause::Asked => Err(GroupError::Stopped(cause)),
+            _ => Ok(()),
+        }
     }
 
     /// Cycles until every drive shows that it has no power, or the limit has passed.
@@ -227,7 +229,7 @@ impl Group {
         self.runner.course = Course::Off;
         for _ in 0..self.cycles(POWER_LIMIT) {
             self.cycle().await?;
-            if self.runner.states.iter().all(|state| state.statusword.is_some() && !state.has_power()) {
+            if self.runner.states.iter().all(CyclicState::is_without_power) {
                 break;
             }
         }

@@ -70,6 +70,8 @@ pub enum StopCause {
         /// Cycles without a point.
         cycles: u32,
     },
+    /// No path to rest was found from where the axes were: each drive was stopped by its own quick stop.
+    NoPathToRest,
     /// Somebody asked for it.
     Asked,
 }
@@ -96,6 +98,10 @@ impl fmt::Display for StopCause {
                 f,
                 "the group was stopped: the points of its path came {cycles} cycles late, and to join it again would pass the \
                  limits of speed or acceleration. Give points earlier, or more of them before the start (prefill)"
+            ),
+            Self::NoPathToRest => f.write_str(
+                "the group was stopped by the quick stop (605Ah) of each of its drives, not along a path, since none to rest was \
+                 found within its limits. Switch it off, look where its axes are, and enable it again",
             ),
             Self::Asked => f.write_str("the group was told to stop"),
         }

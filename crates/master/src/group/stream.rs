@@ -7,17 +7,19 @@
 
 use std::collections::VecDeque;
 
+use super::error::GroupError;
 use super::limits::{AxisLimits, PathError, PathPoint, Quantity};
 use crate::units::Turns;
 
 /// How a stream is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StreamOptions {
-    /// Points that are kept at most.
+    /// Points that are kept at most, 1 to 60000.
     pub capacity: usize,
-    /// Points that have to be there before the first one is sent: what a producer may be late later on.
+    /// Points that have to be there before the first one is sent: what a producer may be late later on. At most the capacity.
     pub prefill: usize,
-    /// Cycles in a row without a point through which the group goes on at its last speed, before it is stopped.
+    /// Cycles in a row without a point through which the group goes on at its last speed, before it is stopped. It knows
+    /// nothing of its path meanwhile: as many as there are in 100 ms at most, or one.
     pub grace: u32,
 }
 
@@ -25,6 +27,28 @@ impl Default for StreamOptions {
     /// A quarter of a second at 1 ms, sent once 10 points are there; two cycles of grace.
     fn default() -> Self {
         Self { capacity: 250, prefill: 10, grace: 2 }
+    }
+}
+
+/// The most points that a stream keeps: a minute at 1 ms.
+const MOST_POINTS: usize = 60_000;
+
+/// The longest time for which a group may go on without being told where, in seconds; one cycle in any case.
+const LONGEST_GRACE_S: f64 = 0.1;
+
+impl StreamOptions {
+    /// That they bound what they are to bound, for cycles of this length.
+    pub(super) fn check(&self, period_s: f64) -> Result<(), GroupError> {
+        let longest_grace = ((LONGEST_GRACE_S / period_s).round() as usize).max(1);
+        let options = [
+            ("capacity", self.capacity, 1, MOST_POINTS),
+            ("prefill", self.prefill, 0, self.capacity),
+            ("grace", self.grace as usize, 0, longest_grace),
+        ];
+        match options.into_iter().find(|(_, given, least, most)| !(least..=most).contains(&given)) {
+            Some((option, given, least, most)) => Err(GroupError::StreamOption { option, given, least, most }),
+            None => Ok(()),
+        }
     }
 }
 
@@ -147,7 +171,7 @@ impl Stream {
     pub(super) fn take(&mut self, points: &mut [PathPoint], limits: &[AxisLimits]) -> Due {
         if !self.begun {
             // A short path may have fewer points than are waited for.
-            if self.queued() < self.options.prefill.clamp(1, self.options.capacity.max(1)) && !self.ended {
+            if self.queued() < self.options.prefill.max(1) && !self.ended {
                 return Due::Wait;
             }
             self.begun = true;
@@ -242,6 +266,24 @@ mod tests {
             assert_eq!(points[0].position_turns, expected);
             assert!((points[0].velocity_turns_s - 1.0).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn options_that_bound_nothing_are_refused() {
+        let refused = |options: StreamOptions| options.check(PERIOD_S).unwrap_err().to_string();
+        let good = StreamOptions::default();
+        good.check(PERIOD_S).unwrap();
+        assert_eq!(
+            refused(StreamOptions { grace: 101, ..good }),
+            "a stream's grace of 101 is outside of 0 to 100: nothing is moved. Cycles without a point are bounded by 100 ms, and \
+             points that are waited for by the capacity"
+        );
+        assert!(refused(StreamOptions { capacity: 0, ..good }).contains("capacity of 0 is outside of 1 to 60000"));
+        // More than there is room for would never be there.
+        assert!(refused(StreamOptions { prefill: 251, ..good }).contains("prefill of 251 is outside of 0 to 250"));
+        // A cycle of grace at any period.
+        StreamOptions { grace: 1, ..good }.check(0.1).unwrap();
+        assert!(StreamOptions { grace: 2, ..good }.check(0.1).is_err());
     }
 
     #[test]
