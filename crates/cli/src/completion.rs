@@ -5,7 +5,7 @@ use std::ffi::OsStr;
 
 use canopen::NodeId;
 use canopen::od::Entry;
-use clap::{Arg, Command};
+use clap::{Arg, ArgMatches, Command, CommandFactory};
 use clap_complete::engine::{ArgValueCompleter, CompletionCandidate};
 use sim::machine::models as all_models;
 use testbench::machine_file;
@@ -13,6 +13,7 @@ use testbench::models::{self, Description};
 use testbench::words::drive::node_model;
 use testbench::words::mode::ABBREVIATIONS;
 
+use crate::args::Cli;
 use crate::remembered::Remembered;
 
 type Completer = fn(&Line, &str) -> Vec<CompletionCandidate>;
@@ -78,9 +79,11 @@ impl Line {
         given.or_else(|| std::env::var("FERRODRIVE_BUS").ok()).unwrap_or_else(|| "sim".to_owned())
     }
 
-    /// The node that the command is about: the first number that can be one.
+    /// The node that the command is about, as far as the line says it yet.
     fn node(&self) -> Option<NodeId> {
-        self.words.iter().find_map(|word| NodeId::new(word.parse().ok()?))
+        let command = Cli::command().ignore_errors(true);
+        let words = std::iter::once("ferrodrive").chain(self.words.iter().map(String::as_str));
+        node_of(&command, &command.clone().try_get_matches_from(words).ok()?)
     }
 
     /// What is known of the nodes: as it was told, of the machine, of an own bus, or from earlier calls.
@@ -101,6 +104,19 @@ impl Line {
         all.dedup_by_key(|(node, _)| *node);
         all
     }
+}
+
+/// The first number among the values that help calls a node, of this command or the one below it.
+fn node_of(command: &Command, matches: &ArgMatches) -> Option<NodeId> {
+    if let Some((name, below)) = matches.subcommand() {
+        return node_of(command.find_subcommand(name)?, below);
+    }
+    let is_node =
+        |arg: &&Arg| arg.get_value_names().is_some_and(|names| names.iter().any(|name| name.starts_with("NODE")));
+    let values =
+        command.get_arguments().filter(is_node).filter_map(|arg| matches.try_get_raw(arg.get_id().as_str()).ok()?);
+    let number = |value: &OsStr| NodeId::new(value.to_str()?.parse().ok()?);
+    values.flatten().find_map(number)
 }
 
 /// A model that is not in a file.

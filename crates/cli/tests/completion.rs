@@ -4,26 +4,34 @@
 
 mod common;
 
+use std::io::{Read, Write};
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use common::{Simulator, done, scratch};
 
-/// What bash offers for the last of these words, with this cache.
+/// What bash offers for the last of these words, with this cache. The words are those of bash, which splits a line at `:` and `=`.
 fn offered(cache: &Path, words: &[&str]) -> Vec<String> {
-    let script = done(&["completions", "bash"]).out;
-    let program = Path::new(env!("CARGO_BIN_EXE_ferrodrive"));
-    let path = format!("{}:{}", program.parent().unwrap().display(), std::env::var("PATH").unwrap());
     let ask = r#"
-        COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); COMP_TYPE=9
-        _clap_complete_ferrodrive ferrodrive "${COMP_WORDS[COMP_CWORD]}" "${COMP_WORDS[COMP_CWORD-1]}"
+        COMP_LINE=$1; shift; COMP_POINT=${#COMP_LINE}; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); COMP_TYPE=9
+        _ferrodrive ferrodrive "${COMP_WORDS[COMP_CWORD]}" "${COMP_WORDS[COMP_CWORD-1]}"
         printf '%s\n' "${COMPREPLY[@]}""#;
-    let mut bash = Command::new("bash");
-    bash.args(["--norc", "--noprofile", "-c", &format!("{script}\n{ask}"), "bash", "ferrodrive"]).args(words);
-    bash.env("PATH", path).env("XDG_CACHE_HOME", cache).env_remove("FERRODRIVE_BUS").env_remove("FERRODRIVE_MACHINE");
+    let script = done(&["completions", "bash"]).out;
+    let line = format!("ferrodrive {}", words.join(" "));
+    let mut bash = with_the_program("bash", cache);
+    bash.args(["--norc", "--noprofile", "-c", &format!("{script}\n{ask}"), "bash", &line, "ferrodrive"]).args(words);
     let ended = bash.output().unwrap();
     assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
     String::from_utf8(ended.stdout).unwrap().lines().filter(|line| !line.is_empty()).map(str::to_owned).collect()
+}
+
+/// A shell that finds `ferrodrive` and this cache, and no bus of ours.
+fn with_the_program(shell: &str, cache: &Path) -> Command {
+    let program = Path::new(env!("CARGO_BIN_EXE_ferrodrive"));
+    let path = format!("{}:{}", program.parent().unwrap().display(), std::env::var("PATH").unwrap());
+    let mut shell = Command::new(shell);
+    shell.env("PATH", path).env("XDG_CACHE_HOME", cache).env_remove("FERRODRIVE_BUS").env_remove("FERRODRIVE_MACHINE");
+    shell
 }
 
 fn is_there(program: &str) -> bool {
@@ -54,11 +62,84 @@ fn bash_completes_nodes_objects_models_and_modes() {
     assert!(of(&["read", "4", "201"]).contains(&"2014".to_owned()));
     assert!(!of(&["read", "1", "201"]).contains(&"2014".to_owned()));
     assert!(of(&["--bus", "can7", "--model", "9=zlac8030l", "watch", "9", "201"]).contains(&"2014".to_owned()));
+    // The number of an option is no node.
+    assert!(of(&["watch", "--count", "1", "4", "201"]).contains(&"2014".to_owned()));
     assert_eq!(of(&["objects", "zla"]), ["zlac8030l"]);
     assert!(of(&["sim", "--drive", "m42"]).len() >= 2);
     assert_eq!(of(&["plan", "machine.toml", "--mode", "cs"]), ["csp", "csv", "cst"]);
     // What makes no sense is completed by nothing, and is no error.
     assert!(of(&["read", "4", "no_such_obj"]).is_empty());
+}
+
+/// The words that a line has in an interactive bash after a press of the Tab key at its end.
+fn after_tab(cache: &Path, lines: &[&str]) -> Vec<String> {
+    const PROMPT: &str = "[ready]";
+    let file = cache.join("completion.bash");
+    std::fs::write(&file, format!("{}\nstty cols 500\nPS1='{PROMPT}'\n", done(&["completions", "bash"]).out)).unwrap();
+    // A line that does not fit is drawn anew, with its prompt.
+    // With an end to it: a prompt that never comes is an error of this test, not a wait for ever.
+    let mut script = with_the_program("timeout", cache);
+    let bash = format!("bash --noprofile --rcfile {} -i", file.display());
+    script.args(["60", "script", "-q", "-c", &bash, "/dev/null"]).env("TERM", "dumb");
+    let mut script = script.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    let (mut keys, mut screen) = (script.stdin.take().unwrap(), script.stdout.take().unwrap());
+    // A prompt is waited for before anything is typed: keys that come earlier are not for the line editor.
+    let mut until = |end: &str| {
+        let mut shown = Vec::new();
+        let mut byte = [0];
+        while !shown.ends_with(end.as_bytes()) {
+            assert_eq!(screen.read(&mut byte).unwrap(), 1, "{}", String::from_utf8_lossy(&shown));
+            shown.push(byte[0]);
+        }
+        String::from_utf8_lossy(&shown).into_owned()
+    };
+    until(PROMPT);
+    let mut typed = |text: &str| {
+        keys.write_all(text.as_bytes()).unwrap();
+        // The last printed word and the next prompt: the editor writes a prompt when it draws a line anew, too.
+        until(&format!(">{PROMPT}"))
+    };
+    // Tab; Ctrl-A goes to the begin of the line, which is then one that prints its words.
+    let words = lines.iter().map(|line| typed(&format!("{line}\t\x01printf '<%s>' \n"))).collect::<Vec<_>>();
+    drop(keys);
+    script.kill().unwrap();
+    script.wait().unwrap();
+    let of = |shown: String| shown.lines().rfind(|line| line.starts_with('<')).unwrap_or(&shown).replace(PROMPT, "");
+    words.into_iter().map(of).collect()
+}
+
+/// Bash takes an address apart at its colons and an option at its `=`.
+#[test]
+fn an_interactive_bash_completes_behind_colons_and_equals_signs() {
+    if !is_there("script") || !is_there("bash") {
+        return eprintln!("skipped: there is no `script` or no `bash` here");
+    }
+    let cache = scratch("tab");
+    let bus = "socketcand://127.0.0.1:29536/can0";
+    let remembered = format!(r#"{{"buses":[{{"name":"{bus}","nodes":{{"93":"zlac8030l"}}}}],"said":[]}}"#);
+    std::fs::create_dir_all(cache.join("ferrodrive")).unwrap();
+    std::fs::write(cache.join("ferrodrive/remembered.json"), remembered).unwrap();
+    let lines = [
+        "ferrodrive --bus socketcand://127.0.0.1:29536/can0 --model 9=zlac8030l read 9 position_act",
+        "ferrodrive --bus=socketcand://127.0.0.1:29536/can0 velo",
+        "ferrodrive --bus socketcand://127.0.0.1:2",
+        "ferrodrive --bus=socketcand:",
+        "ferrodrive --bus socketcand://127.0.0.1:29536/can0 state 9",
+        "ferrodrive --model 4=zlac",
+        "ferrodrive --bus 'socketcand://127.0.0.1:29536/can0' read 93 position_act",
+    ];
+    let expected = [
+        "<ferrodrive><--bus><socketcand://127.0.0.1:29536/can0><--model><9=zlac8030l><read><9><position_actual_value>",
+        "<ferrodrive><--bus=socketcand://127.0.0.1:29536/can0><velocity>",
+        "<ferrodrive><--bus><socketcand://127.0.0.1:29536/can0>",
+        "<ferrodrive><--bus=socketcand://127.0.0.1:29536/can0>",
+        "<ferrodrive><--bus><socketcand://127.0.0.1:29536/can0><state><93>",
+        "<ferrodrive><--model><4=zlac8030l>",
+        "<ferrodrive><--bus><socketcand://127.0.0.1:29536/can0><read><93><position_actual_value>",
+    ];
+    for (line, (got, expected)) in lines.iter().zip(after_tab(&cache, &lines).iter().zip(expected)) {
+        assert_eq!(got, expected, "after {line}");
+    }
 }
 
 /// `script` (util-linux) gives a command a terminal; without it this is not tried.
@@ -74,7 +155,7 @@ fn at_a_terminal_a_guess_is_said_once_and_the_nodes_are_remembered() {
     let read = || {
         let mut script = Command::new("script");
         script.args(["-q", "-e", "-c", &line, "/dev/null"]).env("XDG_CACHE_HOME", &cache);
-        let ended = script.stdin(std::process::Stdio::null()).output().unwrap();
+        let ended = script.stdin(Stdio::null()).output().unwrap();
         assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stdout));
         String::from_utf8(ended.stdout).unwrap()
     };

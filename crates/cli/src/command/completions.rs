@@ -46,14 +46,21 @@ impl Completions {
     /// Writes the script for a command line to standard output.
     pub(crate) fn run(&self) -> Result<(), Failure> {
         let name = self.shell.name();
-        let known = Shells::builtins();
-        let shell = known.completer(name).ok_or_else(|| Failure::new(format!("there is no script for {name}")))?;
         let mut script = Vec::new();
-        let written = shell.write_registration(ASKED_BY, "ferrodrive", "ferrodrive", "ferrodrive", &mut script);
-        written.map_err(|error| Failure::new("cannot make the script").because(error))?;
+        if matches!(self.shell, Shell::Bash) {
+            script.extend_from_slice(BASH.as_bytes());
+        } else {
+            let known = Shells::builtins();
+            let shell = known.completer(name).ok_or_else(|| Failure::new(format!("there is no script for {name}")))?;
+            let written = shell.write_registration(ASKED_BY, "ferrodrive", "ferrodrive", "ferrodrive", &mut script);
+            written.map_err(|error| Failure::new("cannot make the script").because(error))?;
+        }
         print(&script).map_err(Failure::of_stdout)
     }
 }
 
-/// The variable by which the script asks.
+/// The script for bash; the other shells have that of `clap_complete`, whose protocol it speaks.
+const BASH: &str = include_str!("completions.bash");
+
+/// The variable by which a script asks, that of bash too.
 pub(crate) const ASKED_BY: &str = "FERRODRIVE_COMPLETE";
