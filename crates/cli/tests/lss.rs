@@ -95,6 +95,34 @@ fn what_is_no_node_id_or_bit_rate_is_refused_and_a_stranger_is_not_configured() 
 }
 
 #[test]
+fn a_device_is_found_by_its_make_and_a_listener_reads_it_in_words() {
+    let bus = Bus::of(&["cia402@4,1018:04=0xDEADBEEF"]);
+    let found = &bus.done(&["lss", "--within", "500ms", "identify", "0:192:10000"])["devices"];
+    assert_eq!((found.as_array().map(Vec::len), &found[0]["node_id"]), (Some(1), &json!(4)), "{found}");
+    assert_eq!(found[0]["address"], json!("0:192:10000:DEADBEEF"));
+    assert_eq!(bus.done(&["read", "4", "1018:04"])["value"], json!(0xDEAD_BEEF_u32));
+    let nobody = bus.refused(&["lss", "identify", "0:193"]);
+    assert!(nobody.out.contains("a device of make 0:193 does not answer LSS"), "{}", nobody.out);
+    let told = ferrodrive(&bus.arguments(&["-v", "lss", "--within", "5s", "inquire", "only"])).err;
+    for words in
+        ["LSS switch state global: configuration", "LSS inquire serial number", "LSS reply: serial number DEADBEEFh"]
+    {
+        assert!(told.contains(words), "{words}: {told}");
+    }
+}
+
+#[test]
+fn a_serial_number_is_one_of_a_device_that_has_it() {
+    for (drive, told) in
+        [("cia402@4,1018:04=4294967296", "1018h:04 cannot be 4294967296"), ("zlac8030l@4,1018:04=7", "1018h:04")]
+    {
+        let refused = ferrodrive(&["sim", "--drive", drive]);
+        assert_ne!(refused.status, Some(0), "{drive}");
+        assert!(refused.err.contains(told), "{}", refused.err);
+    }
+}
+
+#[test]
 fn a_model_without_lss_does_not_begin_without_a_node_id() {
     let refused = ferrodrive(&["sim", "--drive", "zlac8030l@4,node-id=none"]);
     assert_eq!(refused.status, Some(2));

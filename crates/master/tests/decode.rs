@@ -324,6 +324,7 @@ fn frames_tell_their_service_their_node_and_their_objects() {
     assert_eq!(about("000#8000"), ("nmt", None, String::new()));
     assert_eq!(about("184#R4"), ("pdo", Some(4), String::new()));
     assert_eq!(about("7E5#0400000000000000"), ("lss", None, String::new()));
+    assert_eq!(about("7E4#4F00000000000000"), ("lss", None, String::new()));
     assert_eq!(about("6FF#01"), ("other", None, String::new()));
     let all = decoder.decode(&"000#8000".parse().unwrap());
     assert!(all.concerns(NodeId::new(9).unwrap()));

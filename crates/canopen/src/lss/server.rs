@@ -1,6 +1,6 @@
 //! A device's side of LSS: its two states, and what a request makes of it (CiA 305, clause 6).
 
-use super::wire::{Address, BIT_RATES_KBIT, Outcome, Part, Reply, Request, UNCONFIGURED};
+use super::wire::{Address, BIT_RATES_KBIT, Bound, Outcome, Part, Reply, Request, UNCONFIGURED};
 use crate::NodeId;
 
 /// A device's side (CiA 305, clause 6): it waits, or lets itself be configured.
@@ -14,6 +14,8 @@ pub struct Server {
     configuring: bool,
     /// How many numbers of a selective switch have fitted so far.
     fitted: usize,
+    /// How many bounds of a question who is there have fitted so far.
+    within: usize,
     /// Which number a fastscan is at.
     scanned: u8,
 }
@@ -34,7 +36,7 @@ pub enum Action {
 impl Server {
     /// A device with this address and node-ID, waiting.
     pub const fn new(address: Address, node_id: Option<NodeId>) -> Self {
-        Self { address, node_id, pending: node_id, configuring: false, fitted: 0, scanned: 0 }
+        Self { address, node_id, pending: node_id, configuring: false, fitted: 0, within: 0, scanned: 0 }
     }
 
     /// NMT reset communication: the node-ID that was configured takes effect. `None`: the device stays silent but for LSS.
@@ -70,6 +72,7 @@ impl Server {
             }
             Request::SwitchSelective(part, number) => (self.switch_selective(part, number), None),
             Request::IdentifyNonConfigured => (self.is_unconfigured().then_some(Reply::NonConfigured), None),
+            Request::Identify(bound, number) => (self.identify(bound, number), None),
             Request::FastScan { number, bit, part, next } => (self.fast_scan(number, bit, part, next), None),
             _ if !self.configuring => (None, None),
             Request::ConfigureNodeId(node) => {
@@ -112,6 +115,26 @@ impl Server {
         self.fitted = 0;
         self.configuring = true;
         Some(Reply::Selected)
+    }
+
+    /// Six frames in their order, and every number within: whatever its state and node-ID.
+    fn identify(&mut self, bound: Bound, number: u32) -> Option<Reply> {
+        let fits = match bound {
+            Bound::VendorId => self.number(Part::VendorId) == number,
+            Bound::ProductCode => self.number(Part::ProductCode) == number,
+            Bound::LowestRevision => self.number(Part::RevisionNumber) >= number,
+            Bound::HighestRevision => self.number(Part::RevisionNumber) <= number,
+            Bound::LowestSerial => self.number(Part::SerialNumber) >= number,
+            Bound::HighestSerial => self.number(Part::SerialNumber) <= number,
+        };
+        let place = bound as usize;
+        // The first frame begins anew, whatever came before.
+        let expected = fits && (place == 0 || place == self.within);
+        self.within = if expected { place + 1 } else { 0 };
+        (self.within == Bound::ALL.len()).then(|| {
+            self.within = 0;
+            Reply::Identified
+        })
     }
 
     /// Only who has no node-ID and waits takes part.

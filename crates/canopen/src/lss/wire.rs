@@ -35,6 +35,35 @@ impl Part {
     pub const ALL: [Self; 4] = [Self::VendorId, Self::ProductCode, Self::RevisionNumber, Self::SerialNumber];
 }
 
+/// What devices are to be like that answer [`Request::Identify`]. Clause 6.5.1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bound {
+    /// 1018h:01 is this.
+    VendorId,
+    /// 1018h:02 is this.
+    ProductCode,
+    /// 1018h:03 is this or higher.
+    LowestRevision,
+    /// 1018h:03 is this or lower.
+    HighestRevision,
+    /// 1018h:04 is this or higher.
+    LowestSerial,
+    /// 1018h:04 is this or lower.
+    HighestSerial,
+}
+
+impl Bound {
+    /// In their order on the wire.
+    pub const ALL: [Self; 6] = [
+        Self::VendorId,
+        Self::ProductCode,
+        Self::LowestRevision,
+        Self::HighestRevision,
+        Self::LowestSerial,
+        Self::HighestSerial,
+    ];
+}
+
 /// The bit rates of CiA 305, table 1, in kbit/s, by their index; 5 is reserved, and 9 is that which the device finds out.
 pub const BIT_RATES_KBIT: [Option<u16>; 9] =
     [Some(1000), Some(800), Some(500), Some(250), Some(125), None, Some(50), Some(20), Some(10)];
@@ -65,6 +94,8 @@ pub enum Request {
     InquireNodeId,
     /// Is anybody without a node-ID? Clause 6.5.2.
     IdentifyNonConfigured,
+    /// Is anybody there within all six bounds, with a node-ID or without? The sixth is answered. Clause 6.5.1.
+    Identify(Bound, u32),
     /// Is anybody whose number has these bits, above `bit`? Clause 6.5.3.
     FastScan {
         /// What is compared.
@@ -127,6 +158,8 @@ const STORE: u8 = 23;
 /// Four specifiers, one for each part; the answer to the fourth is the one behind.
 const SWITCH_SELECTIVE: u8 = 64;
 const SELECTED: u8 = 68;
+/// Six specifiers, one for each bound.
+const IDENTIFY: u8 = 70;
 const IDENTIFY_NON_CONFIGURED: u8 = 76;
 const IDENTIFIED: u8 = 79;
 const NON_CONFIGURED: u8 = 80;
@@ -137,6 +170,10 @@ const INQUIRE_NODE_ID: u8 = 94;
 
 fn part(specifier: u8, first: u8) -> Option<Part> {
     Part::ALL.get(usize::from(specifier.checked_sub(first)?)).copied()
+}
+
+fn bound(specifier: u8) -> Option<Bound> {
+    Bound::ALL.get(usize::from(specifier.checked_sub(IDENTIFY)?)).copied()
 }
 
 fn number(raw: &[u8; LENGTH]) -> u32 {
@@ -161,9 +198,10 @@ impl Request {
             INQUIRE_NODE_ID => Self::InquireNodeId,
             IDENTIFY_NON_CONFIGURED => Self::IdentifyNonConfigured,
             FAST_SCAN => Self::FastScan { number: number(raw), bit: raw[5], part: raw[6], next: raw[7] },
-            specifier => match (part(specifier, SWITCH_SELECTIVE), part(specifier, INQUIRE)) {
-                (Some(part), _) => Self::SwitchSelective(part, number(raw)),
-                (_, Some(part)) => Self::Inquire(part),
+            specifier => match (part(specifier, SWITCH_SELECTIVE), bound(specifier), part(specifier, INQUIRE)) {
+                (Some(part), ..) => Self::SwitchSelective(part, number(raw)),
+                (_, Some(bound), _) => Self::Identify(bound, number(raw)),
+                (.., Some(part)) => Self::Inquire(part),
                 _ => Self::Unknown(specifier),
             },
         })
@@ -182,6 +220,7 @@ impl Request {
             Self::Inquire(part) => short(INQUIRE + part as u8, 0, 0),
             Self::InquireNodeId => short(INQUIRE_NODE_ID, 0, 0),
             Self::IdentifyNonConfigured => short(IDENTIFY_NON_CONFIGURED, 0, 0),
+            Self::Identify(bound, number) => with_number(IDENTIFY + bound as u8, number),
             Self::FastScan { number, bit, part, next } => {
                 let mut raw = with_number(FAST_SCAN, number);
                 raw[5..].copy_from_slice(&[bit, part, next]);
@@ -201,7 +240,7 @@ impl Request {
             | (Self::Store, Reply::Stored(_))
             | (Self::InquireNodeId, Reply::NodeId(_))
             | (Self::IdentifyNonConfigured, Reply::NonConfigured)
-            | (Self::FastScan { .. }, Reply::Identified) => true,
+            | (Self::FastScan { .. } | Self::Identify(Bound::HighestSerial, _), Reply::Identified) => true,
             (Self::Inquire(asked), Reply::Number(answered, _)) => *asked as u8 == *answered as u8,
             _ => false,
         }
@@ -209,12 +248,13 @@ impl Request {
 
     /// True if somebody may answer it.
     pub const fn is_answered(&self) -> bool {
-        !matches!(
-            self,
-            Self::SwitchGlobal(_)
-                | Self::ActivateBitRate(_)
-                | Self::SwitchSelective(Part::VendorId | Part::ProductCode | Part::RevisionNumber, _)
-        )
+        match self {
+            Self::SwitchGlobal(_) | Self::ActivateBitRate(_) => false,
+            // Of the frames of one question the last is answered.
+            Self::SwitchSelective(part, _) => matches!(part, Part::SerialNumber),
+            Self::Identify(bound, _) => matches!(bound, Bound::HighestSerial),
+            _ => true,
+        }
     }
 }
 
@@ -279,7 +319,8 @@ mod tests {
             Request::Unknown(200),
         ];
         let of_parts = Part::ALL.map(|part| [Request::SwitchSelective(part, 7), Request::Inquire(part)]);
-        for request in requests.into_iter().chain(of_parts.into_iter().flatten()) {
+        let of_bounds = Bound::ALL.map(|bound| Request::Identify(bound, 0xDEAD_BEEF));
+        for request in requests.into_iter().chain(of_parts.into_iter().flatten()).chain(of_bounds) {
             assert_eq!(Request::parse(&request.emit()), Some(request));
         }
         let replies = [
@@ -305,6 +346,9 @@ mod tests {
         assert_eq!(text(Request::SwitchSelective(Part::SerialNumber, 0).emit()), 0x43);
         assert_eq!((text(Reply::Selected.emit()), text(Request::ConfigureNodeId(1).emit())), (0x44, 0x11));
         assert_eq!((text(Request::Inquire(Part::VendorId).emit()), text(Request::InquireNodeId.emit())), (0x5A, 0x5E));
+        // Identify remote slave 46h to 4Bh.
+        assert_eq!(text(Request::Identify(Bound::VendorId, 0).emit()), 0x46);
+        assert_eq!(text(Request::Identify(Bound::HighestSerial, 0).emit()), 0x4B);
         let scan = Request::FastScan { number: 0x1234_5678, bit: 128, part: 0, next: 0 }.emit();
         assert_eq!(scan, "7E5#5178563412800000".parse().unwrap());
         assert_eq!(text(Reply::Identified.emit()), 0x4F);

@@ -1,10 +1,11 @@
 //! `ferrodrive lss`: layer setting services (CiA 305): devices without a node-ID, and with one that is to change.
 
-use std::fmt;
 use std::time::Duration;
 
 use can::Bitrate;
-use canopen::lss::{Address, BIT_RATES_KBIT, Client, FastScan, Outcome, Part, Reply, Request, UNCONFIGURED};
+use canopen::lss::{
+    Address, BIT_RATES_KBIT, Bound, Client, FastScan, Outcome, Part, Reply, Request, Search, UNCONFIGURED,
+};
 use canopen::{NmtCommand, NodeId};
 use master::units::parse_duration;
 use serde::Serialize;
@@ -19,6 +20,7 @@ use testbench::words::node::node;
 /// Find devices by their LSS address, and set their node-ID and bit rate (CiA 305)
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus slcan:///dev/ttyACM0 lss scan\n  \
+    ferrodrive --bus slcan:///dev/ttyACM0 lss identify 100:1\n  \
     ferrodrive --bus slcan:///dev/ttyACM0 lss inquire only\n  \
     ferrodrive --bus slcan:///dev/ttyACM0 lss set 100:1:0:2A --node-id 5 --store\n  \
     ferrodrive --bus slcan:///dev/ttyACM0 lss set only --bitrate 250k --store --activate 500ms")]
@@ -34,6 +36,14 @@ pub(crate) struct Lss {
 enum What {
     /// Find every device that has no node-ID (fastscan): some seconds for each
     Scan,
+    /// Find every device of a make, with a node-ID or without (identify remote slave): some seconds for each
+    ///
+    /// Revision and serial numbers are asked for in ranges, which are halved where somebody answers. It asks alone: nothing is changed.
+    Identify {
+        /// VENDOR:PRODUCT[:REVISION] (1018h:01 to 03) in hexadecimal; with the revision it takes half the time
+        #[arg(value_name = "VENDOR:PRODUCT", value_parser = make)]
+        make: Make,
+    },
     /// Ask a device for its address and its node-ID
     Inquire {
         #[command(flatten)]
@@ -78,6 +88,14 @@ enum Device {
     Only,
 }
 
+/// Devices of one make.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Make {
+    vendor_id: u32,
+    product_code: u32,
+    revision: Option<u32>,
+}
+
 /// A node-ID that is to be set, 255 for none.
 #[derive(Clone, Copy, Debug)]
 struct Wanted(u8);
@@ -92,18 +110,35 @@ fn device(text: &str) -> Result<Device, String> {
     if text.eq_ignore_ascii_case("only") {
         return Ok(Device::Only);
     }
-    let numbers = text.split(':').map(|part| {
-        let digits = part.trim_end_matches(['h', 'H']);
-        u32::from_str_radix(digits.strip_prefix("0x").unwrap_or(digits), 16).ok()
-    });
-    let numbers: Option<Vec<u32>> = numbers.collect();
-    let numbers: Option<[u32; 4]> = numbers.and_then(|numbers| numbers.try_into().ok());
+    let numbers: Option<[u32; 4]> = hexadecimals(text);
     numbers.map(|numbers| Device::At(Address { numbers })).ok_or_else(|| {
         format!(
             "'{text}' is no LSS address; expected vendor, product code, revision and serial number in hexadecimal, e.g. \
              100:1:0:2A, or the word only"
         )
     })
+}
+
+fn make(text: &str) -> Result<Make, String> {
+    let short = hexadecimals(text).map(|[vendor_id, product_code]| Make { vendor_id, product_code, revision: None });
+    let long = hexadecimals(text).map(|[vendor_id, product_code, revision]| Make {
+        vendor_id,
+        product_code,
+        revision: Some(revision),
+    });
+    short.or(long).ok_or_else(|| {
+        format!("'{text}' is no make; expected vendor-ID and product code, and the revision if known, in hexadecimal, e.g. 100:1")
+    })
+}
+
+/// So many hexadecimal numbers, between colons.
+fn hexadecimals<const N: usize>(text: &str) -> Option<[u32; N]> {
+    let number = |part: &str| {
+        let digits = part.trim_end_matches(['h', 'H']);
+        u32::from_str_radix(digits.strip_prefix("0x").unwrap_or(digits), 16).ok()
+    };
+    let numbers: Option<Vec<u32>> = text.split(':').map(number).collect();
+    numbers?.try_into().ok()
 }
 
 fn node_or_none(text: &str) -> Result<Wanted, String> {
@@ -166,6 +201,7 @@ impl Lss {
         let mut master = LssMaster { context, client: Client::new(self.within) };
         let done = match &self.what {
             What::Scan => master.scan().await,
+            What::Identify { make } => master.identify(*make).await,
             What::Inquire { device } => master.inquire(device.device).await,
             What::Set(set) => master.set(set).await,
         };
@@ -246,8 +282,7 @@ impl LssMaster<'_> {
             match scan.found() {
                 Some(address) => devices.push(Found::new(address, None)),
                 None if asked > 1 => {
-                    return Err(Failure::new("a device stopped answering in the middle of the scan")
-                        .next("give it more time: --within 200ms"));
+                    return Err(went_away());
                 }
                 None => break,
             }
@@ -266,6 +301,42 @@ impl LssMaster<'_> {
         Ok(LssReport { devices, done: Vec::new(), pending: None, change: None })
     }
 
+    async fn identify(&mut self, make: Make) -> Result<LssReport, Failure> {
+        let Make { vendor_id, product_code, revision } = make;
+        let mut search = Search::new(vendor_id, product_code, revision);
+        let (mut addresses, mut asked) = (Vec::new(), 0);
+        while let Some(request) = search.next() {
+            let answer = self.ask(request).await;
+            if matches!(request, Request::Identify(Bound::HighestSerial, _)) {
+                addresses.extend(search.note(answer == Some(Reply::Identified)));
+                asked += 1;
+                self.context.progress.show(format!("found {}; question {asked}", addresses.len()));
+            }
+            if addresses.len() == MOST {
+                break;
+            }
+        }
+        if addresses.is_empty() {
+            let only_first = asked == 1;
+            return Err(if only_first {
+                no_answer(&format!("a device of make {vendor_id:X}:{product_code:X}"))
+            } else {
+                went_away()
+            });
+        }
+        let mut devices = Vec::new();
+        for address in addresses {
+            self.select(Device::At(address)).await?;
+            // Optional for a device.
+            let node = match self.ask(Request::InquireNodeId).await {
+                Some(Reply::NodeId(node)) => NodeId::new(node),
+                _ => None,
+            };
+            devices.push(Found::new(address, node));
+        }
+        Ok(LssReport { devices, done: Vec::new(), pending: None, change: None })
+    }
+
     /// Lets the device that is meant be configured, and no other.
     async fn select(&mut self, device: Device) -> Result<(), Failure> {
         self.ask(Request::SwitchGlobal(false)).await;
@@ -279,7 +350,7 @@ impl LssMaster<'_> {
         }
         match selected {
             Some(_) => Ok(()),
-            None => Err(no_answer(&format!("the device {}", Written(address)))),
+            None => Err(no_answer(&format!("the device {}", address))),
         }
     }
 
@@ -339,6 +410,10 @@ impl LssMaster<'_> {
     }
 }
 
+fn went_away() -> Failure {
+    Failure::new("a device stopped answering in the middle of the scan").next("give it more time: --within 200ms")
+}
+
 fn no_answer(who: &str) -> Failure {
     Failure::new(format!("{who} does not answer LSS"))
         .of_kind("no_answer")
@@ -370,21 +445,11 @@ fn checked(what: &str, answer: Option<Reply>, refused: &str) -> Result<String, F
     }
 }
 
-/// `100:1:0:2A`.
-struct Written(Address);
-
-impl fmt::Display for Written {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [vendor, product, revision, serial] = self.0.numbers;
-        write!(f, "{vendor:X}:{product:X}:{revision:X}:{serial:X}")
-    }
-}
-
 impl Found {
     fn new(address: Address, node_id: Option<NodeId>) -> Self {
         let [vendor_id, product_code, revision_number, serial_number] = address.numbers;
         Self {
-            address: Written(address).to_string(),
+            address: address.to_string(),
             vendor_id,
             product_code,
             revision_number,
@@ -418,6 +483,9 @@ mod tests {
         assert_eq!(device("100:1:0:2A"), at([0x100, 1, 0, 0x2A]));
         assert_eq!(device("0x100:1h:0:FFFFFFFF"), at([0x100, 1, 0, u32::MAX]));
         assert_eq!(device("only"), Ok(Device::Only));
+        assert_eq!(make("100:1"), Ok(Make { vendor_id: 0x100, product_code: 1, revision: None }));
+        assert_eq!(make("100:1:FFFFFFFF").map(|make| make.revision), Ok(Some(u32::MAX)));
+        assert!(make("100").is_err() && make("100:1:2:3").is_err() && make("").is_err());
         for wrong in ["", "100", "100:1:0", "100:1:0:2A:1", "100:1:0:x", "100000000:1:0:1"] {
             assert!(device(wrong).unwrap_err().contains("e.g. 100:1:0:2A"), "{wrong}");
         }

@@ -10,7 +10,7 @@ use devices::variant::Variant;
 
 use super::lss::{Lss, Wanted};
 use super::services::Services;
-use super::{Memory, error_behaviour};
+use super::{Memory, SERIAL_NUMBER, error_behaviour};
 use crate::engine::device::{Application, Device, Reset};
 use crate::engine::storage::StoredImage;
 
@@ -76,15 +76,25 @@ impl<S: Storage> DescribedDevice<S> {
 
     /// Starts over with the stored values. [`boot`](Self::boot) follows.
     pub(crate) fn restart(&mut self, now: Instant) {
-        self.device.restart(self.node_id, self.bitrate, now);
+        self.restart_as(self.node_id, self.bitrate, now);
         if self.has_lss {
             let lss = Lss::start(self.device.values(), self.services.memory().0, self.node_id);
             let bitrate = lss.bitrate().unwrap_or(self.bitrate);
-            self.device.restart(lss.node_id().unwrap_or(self.node_id), bitrate, now);
+            self.restart_as(lss.node_id().unwrap_or(self.node_id), bitrate, now);
             self.lss = Some(lss);
         }
         self.services.start(&mut self.device, |_| true);
         self.stopped = false;
+    }
+
+    /// With the table's values, and the serial number that its maker has given it.
+    fn restart_as(&mut self, node_id: NodeId, bitrate: can::Bitrate, now: Instant) {
+        self.device.restart(node_id, bitrate, now);
+        let values = self.device.values_mut();
+        let slot = values.table().find(SERIAL_NUMBER).ok();
+        if let Some((slot, number)) = slot.zip(self.services.memory().0.serial_number()) {
+            values.set_raw(slot, number);
+        }
     }
 
     /// Communication begins, unless it has no node-ID: such a device waits for LSS, and nobody sees it on the bus.

@@ -18,6 +18,9 @@ const RECORD_HEADER_SIZE: usize = 8;
 const CRC_SIZE: usize = 4;
 /// The record that LSS keeps, behind those of the objects: no multiplexor has this key.
 const LSS_KEY: u32 = u32::MAX;
+/// The record with the serial number of this one, which its maker has written: nothing on the bus changes it.
+const SERIAL_KEY: u32 = u32::MAX - 1;
+const SERIAL_SIZE: usize = 4;
 /// Node-ID and index of the bit rate.
 const LSS_SIZE: usize = 2;
 
@@ -37,10 +40,11 @@ impl<S: Storage> core::fmt::Debug for Memory<S> {
 }
 
 /// Bytes of the image of a device with this table: each value that can be stored has its place, whatever its type, and so
-/// has what LSS stores.
+/// have what LSS stores and the serial number.
 pub fn image_size(table: &Table) -> usize {
     let records = table.rows().iter().filter(|row| is_storable(row)).map(|row| RECORD_HEADER_SIZE + most_bytes(row));
-    HEADER_SIZE + records.sum::<usize>() + RECORD_HEADER_SIZE + LSS_SIZE + CRC_SIZE
+    let no_object = 2 * RECORD_HEADER_SIZE + LSS_SIZE + SERIAL_SIZE;
+    HEADER_SIZE + records.sum::<usize>() + no_object + CRC_SIZE
 }
 
 impl<S: Storage> Memory<S> {
@@ -81,18 +85,37 @@ impl<S: Storage> Memory<S> {
     /// What LSS has stored: the node-ID, 255 for none, and the index of the bit rate in the table of CiA 305, 255 for as
     /// delivered. `None` if it has stored nothing.
     pub fn lss(&self) -> Option<[u8; LSS_SIZE]> {
-        let (_, stored) = records(self.checked()?).find(|(key, _)| *key == LSS_KEY)?;
-        stored.try_into().ok()
+        self.record(LSS_KEY)
     }
 
     /// Stores node-ID and bit rate for LSS; the objects' values stay.
     pub fn store_lss(&mut self, stored: [u8; LSS_SIZE]) {
+        self.store_record(LSS_KEY, &stored);
+    }
+
+    /// The serial number of this one, 1018h:04; `None` where it is the table's.
+    pub fn serial_number(&self) -> Option<u32> {
+        self.record(SERIAL_KEY).map(u32::from_le_bytes)
+    }
+
+    /// Writes the serial number of this one, as its maker does; the objects' values stay.
+    pub fn store_serial_number(&mut self, number: u32) {
+        self.store_record(SERIAL_KEY, &number.to_le_bytes());
+    }
+
+    /// The record of no object that has this key.
+    fn record<const N: usize>(&self, wanted: u32) -> Option<[u8; N]> {
+        let (_, stored) = records(self.checked()?).find(|(key, _)| *key == wanted)?;
+        stored.try_into().ok()
+    }
+
+    fn store_record(&mut self, wanted: u32, value: &[u8]) {
         let before = self.clone();
         let mut writer = Writer::new(self);
-        for (key, value) in records(before.checked().unwrap_or(&[])).filter(|(key, _)| *key != LSS_KEY) {
+        for (key, value) in records(before.checked().unwrap_or(&[])).filter(|(key, _)| *key != wanted) {
             writer.put(key, value);
         }
-        writer.put(LSS_KEY, &stored);
+        writer.put(wanted, value);
         writer.finish();
     }
 
@@ -109,7 +132,7 @@ impl<S: Storage> Memory<S> {
     pub fn load<V: Storage>(&self, values: &mut Dictionary<V>, wanted: impl Fn(&Entry) -> bool) {
         for (key, value) in records(self.checked().unwrap_or(&[])) {
             let table = values.table();
-            if key == LSS_KEY {
+            if is_no_object(key) {
                 continue;
             }
             let Ok(slot) = table.find(Mux::from_key(key)) else { continue };
@@ -138,8 +161,8 @@ impl<S: Storage> Memory<S> {
                 writer.put(key, value);
             }
         }
-        if let Some(lss) = before.lss() {
-            writer.put(LSS_KEY, &lss);
+        for (key, value) in stored.filter(|(key, _)| is_no_object(*key)) {
+            writer.put(key, value);
         }
         writer.finish();
     }
@@ -149,7 +172,7 @@ impl<S: Storage> Memory<S> {
         let before = self.clone();
         let mut writer = Writer::new(self);
         for (key, value) in records(before.checked().unwrap_or(&[])) {
-            if key == LSS_KEY || !wanted(Mux::from_key(key)) {
+            if is_no_object(key) || !wanted(Mux::from_key(key)) {
                 writer.put(key, value);
             }
         }
@@ -201,6 +224,11 @@ impl<'a> Writer<'a> {
 /// A row whose value can be in the store at all: it can be written, and has bytes.
 pub const fn is_storable(row: &Entry) -> bool {
     matches!(row.access, Access::ReadWrite) && most_bytes(row) > 0
+}
+
+/// The key of a record that is no object's.
+const fn is_no_object(key: u32) -> bool {
+    key >= SERIAL_KEY
 }
 
 const fn most_bytes(row: &Entry) -> usize {
@@ -292,6 +320,18 @@ mod tests {
         let mut back = values();
         memory.load(&mut back, |_| true);
         assert_eq!((get(&back, HEARTBEAT), memory.lss()), (0, Some([255, 255])));
+    }
+
+    #[test]
+    fn the_serial_number_stays_whatever_is_stored_and_forgotten() {
+        let mut memory = Store::empty(&TABLE);
+        memory.store_lss([5, 3]);
+        memory.store_serial_number(0xDEAD_BEEF);
+        memory.save(&values(), |_| true);
+        memory.store_lss([6, 2]);
+        memory.forget(|_| true);
+        let memory = Store::from_bytes(&TABLE, memory.bytes());
+        assert_eq!((memory.serial_number(), memory.lss()), (Some(0xDEAD_BEEF), Some([6, 2])));
     }
 
     const fn row(index: u16, data_type: DataType) -> Entry {

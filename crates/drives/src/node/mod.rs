@@ -17,6 +17,9 @@ pub use services::{Services, conditions};
 use canopen::Mux;
 use canopen::od::{Dictionary, Storage};
 
+/// The serial number of a device: what tells it from all others of its make. Source: CiA 301, 7.5.2.19.
+pub const SERIAL_NUMBER: Mux = Mux::new(0x1018, 4);
+
 /// Whether these services do something with an object.
 pub const fn acts_on(mux: Mux) -> bool {
     let has_effect = match mux.index {

@@ -20,6 +20,7 @@ use can::Frame;
 use canopen::connection_set::Service;
 use canopen::emcy::Emcy;
 use canopen::heartbeat::Heartbeat;
+use canopen::lss::{Reply, Request};
 use canopen::nmt::{NmtRequest, NmtTarget};
 use canopen::pdo::{Direction, PdoId, PdoNumber};
 use canopen::sync::Sync;
@@ -64,8 +65,10 @@ pub enum Decoded {
     Sdo(Sdo),
     /// Process data.
     Pdo(Pdo),
-    /// Layer setting services.
-    Lss,
+    /// Layer setting services: what an LSS master asks (CiA 305).
+    LssRequest(Request),
+    /// Layer setting services: what an LSS slave answers.
+    LssReply(Reply),
     /// A remote frame, which asks for the frame with its identifier.
     Remote(Option<Service>),
     /// A frame whose contents break the rules of its service.
@@ -164,7 +167,8 @@ impl Decoder {
             Service::SdoReply(node) => Decoded::Sdo(self.decode_sdo(node, Side::Server, frame)?),
             Service::Tpdo(number, node) => self.unmapped(node, Direction::Tpdo, number, frame),
             Service::Rpdo(number, node) => self.unmapped(node, Direction::Rpdo, number, frame),
-            Service::LssSlave | Service::LssMaster => Decoded::Lss,
+            Service::LssMaster => Decoded::LssRequest(Request::parse(frame)?),
+            Service::LssSlave => Decoded::LssReply(Reply::parse(frame)?),
         })
     }
 
@@ -218,7 +222,8 @@ impl fmt::Display for Decoded {
             Self::AlarmHeartbeat(node) => write!(f, "heartbeat node {node}: in alarm (04h; it does not mean stopped)"),
             Self::Sdo(sdo) => sdo.fmt(f),
             Self::Pdo(pdo) => pdo.fmt(f),
-            Self::Lss => f.write_str("LSS"),
+            Self::LssRequest(request) => request.fmt(f),
+            Self::LssReply(reply) => reply.fmt(f),
             Self::Remote(Some(service)) => write!(f, "remote request for {}", service_name(*service)),
             Self::Remote(None) => f.write_str("remote request"),
             Self::Malformed(service) => write!(f, "malformed {}", service_name(*service)),

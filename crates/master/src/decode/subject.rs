@@ -96,7 +96,7 @@ impl Decoded {
             Self::BootUp(_) | Self::Heartbeat(..) | Self::AlarmHeartbeat(_) => ServiceKind::Heartbeat,
             Self::Sdo(_) => ServiceKind::Sdo,
             Self::Pdo(_) => ServiceKind::Pdo,
-            Self::Lss => ServiceKind::Lss,
+            Self::LssRequest(_) | Self::LssReply(_) => ServiceKind::Lss,
             Self::Remote(Some(service)) | Self::Malformed(service) => ServiceKind::of(*service),
             Self::Remote(None) | Self::Unknown => ServiceKind::Other,
         }

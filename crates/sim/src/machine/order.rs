@@ -4,12 +4,12 @@ use super::boxed::Boxed;
 use can::Bitrate;
 use canopen::lss::UNCONFIGURED;
 use canopen::od::{Dictionary, Entry, Storage};
-use canopen::{Mux, NodeId};
+use canopen::{AbortCode, Mux, NodeId};
 use devices::Description;
 use devices::row::is_parameter;
 use devices::variant::{Preset, PresetError, Variant};
 use drives::engine::storage::StoredImage;
-use drives::node::{Memory, is_storable};
+use drives::node::{Memory, SERIAL_NUMBER, is_storable};
 
 /// What is wanted of a drive beside its model.
 #[derive(Clone, Debug)]
@@ -114,10 +114,22 @@ pub(super) fn memory(model: &'static Description, order: &Order) -> Result<Memor
         return Ok(memory);
     }
     let mut values = Dictionary::<Boxed>::new(model.dictionary, order.node);
-    for preset in &order.presets {
+    let (marks, presets): (Vec<&Preset>, Vec<&Preset>) =
+        order.presets.iter().partition(|preset| preset.object == SERIAL_NUMBER);
+    for preset in presets {
         let can_be = |row: &Entry| is_parameter(row) && is_storable(row);
         preset.store_if(&mut values, can_be).map_err(|error| OrderError::Preset { preset: *preset, error })?;
     }
     memory.save(&values, |row| order.presets.iter().any(|preset| preset.object == row.mux()));
+    // Not of the store: the maker's mark on this one, by which LSS tells it from others of its make.
+    for preset in marks {
+        let refused = |error| OrderError::Preset { preset: *preset, error };
+        if model.row(SERIAL_NUMBER).is_none() {
+            return Err(refused(PresetError::NoSuchObject));
+        }
+        let number = u32::try_from(preset.value);
+        let too_wide = |_| refused(PresetError::Refused(AbortCode::INVALID_VALUE));
+        memory.store_serial_number(number.map_err(too_wide)?);
+    }
     Ok(memory)
 }
