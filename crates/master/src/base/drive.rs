@@ -11,6 +11,7 @@ use super::limits::{BaseError, BaseLimits};
 use super::state::StopCause;
 use crate::cyclic::{CyclicDrive, CyclicOptions, CyclicState, Demand, Refusal};
 use crate::drive::{CONTROLWORD, Drive};
+use crate::error::Error;
 use crate::network::{Claim, Exchange, Network, join_all};
 use crate::units::{Rpm, Turns};
 
@@ -295,6 +296,19 @@ impl Base {
             }
         }
         self.lost_wheel().map_or(Ok(()), |cause| Err(BaseError::Stopped(cause)))
+    }
+
+    /// Asks the wheel that stopped the base what is the matter with it: its fault with its text, or what it is missing. The
+    /// cycles go on meanwhile. `None` where no wheel was the cause, or it has nothing to say.
+    pub async fn explain_stop(&mut self) -> Option<Error> {
+        let StopCause::Wheel { node, refusal } = self.state.cause? else { return None };
+        let [left, right] = self.drives.clone();
+        let drive = if left.node().id() == node { left } else { right };
+        let network = self.network.clone();
+        let step = |io: &mut Exchange<'_>| {
+            self.step(io);
+        };
+        network.ask_beside_cycles(drive.explain_refusal(refusal), step).await
     }
 
     fn lost_wheel(&self) -> Option<StopCause> {

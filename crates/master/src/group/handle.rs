@@ -13,6 +13,7 @@ use super::stream::{Stream, StreamOptions};
 use super::trajectory::Trajectory;
 use crate::cyclic::CyclicState;
 use crate::drive::Drive;
+use crate::error::Error;
 use crate::network::{Exchange, Network, join_all};
 use crate::units::Turns;
 
@@ -247,6 +248,18 @@ impl Group {
         disabled?;
         released.into_iter().collect::<Result<(), _>>()?;
         Ok(())
+    }
+
+    /// Asks the drive that stopped the group what is the matter with it: its fault with its text, or what it is missing. The
+    /// cycles go on meanwhile. `None` where no drive was the cause, or it has nothing to say.
+    pub async fn explain_stop(&mut self) -> Option<Error> {
+        let StopCause::Axis { axis, refusal, .. } = self.runner.cause? else { return None };
+        let drive = self.drives.get(axis.checked_sub(1)?)?;
+        let runner = &mut self.runner;
+        let step = |io: &mut Exchange<'_>| {
+            runner.step(io);
+        };
+        self.network.ask_beside_cycles(drive.explain_refusal(refusal), step).await
     }
 
     fn check_going(&self) -> Result<(), GroupError> {

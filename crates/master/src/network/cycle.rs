@@ -1,8 +1,8 @@
 //! Cycles of SYNC for programs: waiting for the next one, and the exchange of process data in it.
 
 use core::fmt;
-use core::future::Future;
-use core::pin::Pin;
+use core::future::{Future, poll_fn};
+use core::pin::{Pin, pin};
 use core::task::{Context, Poll};
 use std::time::Duration;
 
@@ -46,6 +46,28 @@ impl Network {
     /// The newest cycle; `None` before the first.
     pub fn cycle(&self) -> Option<Cycle> {
         self.lock().core.cycle()
+    }
+
+    /// Awaits `question` while the cycles go on: `step` is called in each that begins meanwhile.
+    pub(crate) async fn ask_beside_cycles<T>(
+        &self,
+        question: impl Future<Output = T>,
+        mut step: impl FnMut(&mut Exchange<'_>),
+    ) -> T {
+        let mut question = pin!(question);
+        loop {
+            let mut cycle = pin!(self.next_sync());
+            let answer_or_cycle = poll_fn(|context| match question.as_mut().poll(context) {
+                Poll::Ready(answer) => Poll::Ready(Ok(answer)),
+                Poll::Pending => cycle.as_mut().poll(context).map(Err),
+            });
+            match answer_or_cycle.await {
+                Ok(answer) => return answer,
+                Err(Ok(_)) => self.exchange(&mut step),
+                // There are no cycles, and so none to miss.
+                Err(Err(_)) => return question.await,
+            }
+        }
     }
 
     /// Reads and writes process data in one go: no frame comes in between, and every RPDO that was written leaves at once,
