@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use canopen::NodeId;
 use eds::Sheet;
-use testbench::check::{Checked, Finding, Severity, of_bus_yml};
+use testbench::check::{Checked, Finding, Place, Severity, of_bus_yml, of_machine};
 use testbench::models;
 
 /// A folder with the data sheets of these models.
@@ -159,4 +159,187 @@ fn hostile_files_are_refused_and_cost_little() {
     if let Ok(checked) = of_bus_yml(&nested, &folder) {
         assert!(rules(&checked).contains(&("shape", Severity::Error)));
     }
+}
+
+const J: &str = "m4230e17b50";
+const Z: &str = "zlac8030l";
+
+/// Rule, severity, line.
+fn placed(checked: &Checked) -> Vec<(&str, Severity, usize)> {
+    checked.findings.iter().map(|finding| (finding.rule, finding.severity, finding.at.line)).collect()
+}
+
+#[test]
+fn the_bus_of_the_handbook_boots_in_virtual_time() {
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/handbook/ros2-canopen.md");
+    let page = std::fs::read_to_string(page).unwrap();
+    let yaml = page.split("```yaml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    let mut checked = of_bus_yml(yaml, &sheets("boots", &[Z])).unwrap();
+    let predicted = checked.predict().unwrap();
+    let wheel = &predicted.nodes[0];
+    assert_eq!((wheel.node, wheel.letter, wheel.state.as_deref()), (4, None, Some("operational")));
+    // 1017h is the one value of the file that the sheet does not have already.
+    assert_eq!(wheel.writes, 1);
+    assert!(!rules(&checked).iter().any(|(_, severity)| *severity == Severity::Error), "{:#?}", checked.findings);
+    let sent = |frame: &str| predicted.frames.iter().find(|row| row.frame == frame).map(|row| row.every_us);
+    assert_eq!((sent("SYNC"), sent("TPDO1")), (Some(20_000.0), None), "as delivered it sends no TPDO");
+    let beats: Vec<_> = predicted.frames.iter().filter(|row| row.frame == "heartbeat").collect();
+    assert_eq!(
+        beats.iter().map(|row| (row.node, row.every_us)).collect::<Vec<_>>(),
+        [(Some(4), 200_000.0), (Some(127), 100_000.0)]
+    );
+}
+
+/// What `dcfgen` of Lely core 2.3 writes for such a node: its manual's order, off, parameters, mapping, on; 1016h before all.
+#[test]
+fn what_the_generator_writes_is_foretold_in_its_order() {
+    let lines = [
+        BEATS,
+        CONSUMES,
+        "tpdo: {1: {enabled: true, cob_id: auto, transmission: 1, mapping: [{index: 0x6041}, {index: 0x6064}]}, 2: {enabled: false}}",
+        "rpdo: {1: {cob_id: 0x234, mapping: [{index: 0x6040}]}}",
+        "sdo: [{index: 0x2000, value: 500}]",
+    ];
+    let checked = of_bus_yml(&bus("cia402", &lines), &sheets("writes", &["cia402"])).unwrap();
+    let intended = checked.intended.as_ref().unwrap();
+    let node = intended.nodes.values().next().unwrap();
+    let wrote: Vec<(String, Vec<u8>)> =
+        node.writes.iter().map(|write| (write.object.to_string(), write.bytes.clone())).collect();
+    let u32s = |value: u32| value.to_le_bytes().to_vec();
+    let expected: Vec<(&str, Vec<u8>)> = vec![
+        // Node 127, three heartbeats of 100 ms.
+        ("1016h:01", u32s(127 << 16 | 300)),
+        ("1017h:00", vec![200, 0]),
+        ("1400h:01", u32s(0x8000_0234)),
+        ("1600h:00", vec![0]),
+        ("1600h:01", u32s(0x6040_0010)),
+        ("1600h:00", vec![1]),
+        ("1400h:01", u32s(0x234)),
+        ("1800h:01", u32s(0x8000_0184)),
+        ("1800h:02", vec![1]),
+        ("1A00h:00", vec![0]),
+        ("1A00h:01", u32s(0x6041_0010)),
+        ("1A00h:02", u32s(0x6064_0020)),
+        ("1A00h:00", vec![2]),
+        ("1800h:01", u32s(0x184)),
+        ("1801h:01", u32s(0x8000_0284)),
+    ];
+    let wrote: Vec<(&str, Vec<u8>)> = wrote.iter().map(|(object, bytes)| (object.as_str(), bytes.clone())).collect();
+    assert_eq!(wrote, expected, "2000h, which the sheet does not have, is left out");
+    assert_eq!(node.writes[3].at, Place { line: 11, column: 10 });
+    // Mandatory is off, boot and reset are on, in the generator as here.
+    let assignment = intended.plan.nodes.values().next().unwrap().assignment;
+    assert_eq!(assignment.0, 0x05);
+}
+
+#[test]
+fn what_a_drive_will_refuse_is_told_at_its_line_with_the_letter() {
+    let folder = sheets("refused", &[J, Z]);
+    let joint = [BEATS, CONSUMES, NO_RPDO4];
+    // 2614h is the joint's save command, which takes 1 alone (its manual, 5.04).
+    let refused = [joint.as_slice(), &["sdo: [{index: 0x2614, value: 99}]"]].concat();
+    for (lines, boots) in [(refused.as_slice(), false), (&joint, true)] {
+        let mut checked = of_bus_yml(&bus(J, lines), &folder).unwrap();
+        let predicted = checked.predict().unwrap();
+        let told = checked.findings.iter().find(|finding| finding.rule == "boot");
+        assert_eq!(told.is_none(), boots, "{:#?}", checked.findings);
+        // A joint starts by itself: L is how its boot-up ends.
+        assert_eq!(predicted.nodes[0].letter, Some(if boots { 'L' } else { 'J' }));
+        if let Some(told) = told {
+            assert_eq!((told.at.line, told.severity, told.node), (11, Severity::Error, Some(4)));
+            assert!(told.what.contains("2614h:00") && told.what.contains("letter J"), "{told:?}");
+        }
+    }
+    // Another revision than the device says: N.
+    let mut checked =
+        of_bus_yml(&bus("cia402", &[BEATS, "revision_number: 7"]), &sheets("revision", &["cia402"])).unwrap();
+    assert_eq!(checked.predict().unwrap().nodes[0].letter, Some('N'));
+    assert!(placed(&checked).contains(&("boot", Severity::Error, 5)), "{:#?}", checked.findings);
+}
+
+#[test]
+fn a_bus_that_is_too_full_or_has_no_sync_is_told() {
+    let folder = sheets("full", &[Z]);
+    let tpdo = "tpdo: {1: {cob_id: auto, transmission: 1, mapping: [{index: 0x6041}, {index: 0x6064}]}}";
+    let full = |period: &str, rate: &str| {
+        let text =
+            bus(Z, &[BEATS, tpdo]).replace("sync_period: 20000", &format!("sync_period: {period}\n  baudrate: {rate}"));
+        let mut checked = of_bus_yml(&text, &folder).unwrap();
+        let predicted = checked.predict().unwrap();
+        (checked, predicted)
+    };
+    let (fine, predicted) = full("20000", "500");
+    assert!(predicted.fits && predicted.load < 0.2, "{predicted:?}");
+    assert!(!rules(&fine).iter().any(|(rule, _)| ["bus-load", "no-sync"].contains(rule)), "{:#?}", fine.findings);
+    // SYNC, a TPDO of 6 bytes and one RPDO each ms are more than 150 bits at 125 kbit/s: 125 bits fit.
+    let (crowded, predicted) = full("1000", "125");
+    assert!(!predicted.fits && predicted.load > 1.0, "{}", predicted.load);
+    assert!(placed(&crowded).contains(&("bus-load", Severity::Error, 3)), "{:#?}", crowded.findings);
+    let (silent, _) = full("0", "500");
+    assert!(placed(&silent).contains(&("no-sync", Severity::Warning, 10)), "{:#?}", silent.findings);
+}
+
+#[test]
+fn two_pdos_of_one_identifier_are_told() {
+    let node = |name: &str, id: u8| {
+        format!(
+            "{name}:\n  node_id: {id}\n  dcf: {Z}.eds\n  {BEATS}\n  tpdo: {{1: {{cob_id: 0x184, mapping: [{{index: 0x6041}}]}}}}\n"
+        )
+    };
+    let text = format!(
+        "master: {{node_id: 127, sync_period: 20000, heartbeat_producer: 100}}\n{}{}",
+        node("a", 4),
+        node("b", 5)
+    );
+    let mut checked = of_bus_yml(&text, &sheets("shared", &[Z])).unwrap();
+    checked.predict().unwrap();
+    assert!(placed(&checked).contains(&("shared-cob-id", Severity::Error, 11)), "{:#?}", checked.findings);
+}
+
+#[test]
+fn what_cannot_be_foretold_says_why() {
+    let mut checked = of_bus_yml(&bus("nothing", &[BEATS]), &sheets("none", &[])).unwrap();
+    assert!(checked.predict().is_none());
+    let told = checked.findings.iter().find(|finding| finding.rule == "prediction").unwrap();
+    assert!(told.what.contains("no data sheet"), "{told:?}");
+}
+
+const DRIVE: &str = "[[drive]]\nmodel = \"zlac8030l\"\nnode = 4\n";
+
+#[test]
+fn a_machine_file_is_foretold_with_its_own_writes() {
+    let text =
+        format!("{DRIVE}heartbeat = \"200ms\"\npdos = {{ tpdo1 = {{ objects = [\"statusword\"], type = 1 }} }}\n");
+    let mut checked = of_machine(&text, &PathBuf::new()).unwrap();
+    let predicted = checked.predict().unwrap();
+    assert_eq!((predicted.nodes[0].letter, predicted.nodes[0].state.as_deref()), (None, Some("operational")));
+    let tpdo = predicted.frames.iter().find(|row| row.frame == "TPDO1").unwrap();
+    assert_eq!(
+        (tpdo.id.as_str(), tpdo.bytes, tpdo.carries.as_slice()),
+        ("184", 2, ["statusword".to_owned()].as_slice())
+    );
+    assert!(checked.findings.is_empty(), "{:#?}", checked.findings);
+}
+
+#[test]
+fn each_trap_of_a_machine_file_is_at_its_line() {
+    for (line, rule, severity, at) in [
+        ("heartbeat = \"0ms\"", "heartbeat", Severity::Warning, 4),
+        ("start_up = { 2000 = 0 }", "host-watch", Severity::Warning, 4),
+        ("pdos = { tpdo1 = { objects = [\"606C\"], type = 255, inhibit = \"0ms\" } }", "unbounded", Severity::Note, 4),
+    ] {
+        let mut right = of_machine(DRIVE, &PathBuf::new()).unwrap();
+        right.predict().unwrap();
+        assert!(!rules(&right).contains(&(rule, severity)), "{:#?}", right.findings);
+        let mut wrong = of_machine(&format!("{DRIVE}{line}\n"), &PathBuf::new()).unwrap();
+        wrong.predict().unwrap();
+        assert!(placed(&wrong).contains(&(rule, severity, at)), "{line}: {:#?}", wrong.findings);
+    }
+    let of = |text: &str| of_machine(text, &PathBuf::new()).unwrap();
+    assert!(placed(&of("[[drive]]\nmodel = 'zlim42c'\nnode = 127\n")).contains(&("node-id", Severity::Warning, 3)));
+    assert!(placed(&of("[[drive]]\nmodel = 'zlim42c'\nnode = 2\n")).contains(&("host-watch", Severity::Note, 3)));
+    let servo = "[[drive]]\nmodel = 'cia402'\nnode = 2\n";
+    assert!(placed(&of(servo)).contains(&("limits", Severity::Note, 3)));
+    let limited = format!("{servo}limits = {{ position = [-5000, 5000] }}\n");
+    assert!(!placed(&of(&limited)).iter().any(|found| found.0 == "limits"), "{:#?}", of(&limited).findings);
 }

@@ -3,9 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use testbench::check::{self, CheckedNode, Finding, Severity};
-use testbench::document::read_text;
-use testbench::machine_file;
+use testbench::check::{self, Checked, CheckedNode, Finding, Prediction, Severity};
+use testbench::document::{BadFile, read_text};
 
 use crate::failure::{Failure, FailureBody};
 use crate::output::Report;
@@ -16,8 +15,9 @@ use crate::table::Table;
 /// Check the description of a bus: a bus.yml of ros2_canopen with its data sheets, or a machine file
 ///
 /// Nothing is sent. A bus.yml (also what Lely's dcfgen reads) is held against its EDS files and against what is known of the drives that
-/// they describe: node-IDs, heartbeats, boot times, PDOs, drivers. A machine file is read and its machine built. Ends with status 1 if
-/// there is an error, with --strict also for a warning.
+/// they describe: node-IDs, heartbeats, boot times, PDOs, drivers. A machine file is read and its machine built. Then the bus that the
+/// file means is booted in virtual time: each node with the letter of CiA 302-2 with which its boot-up ends, and the frames that are sent
+/// afterwards with the load of the bus. Ends with status 1 if there is an error, with --strict also for a warning.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive check config/bus.yml\n  \
@@ -46,6 +46,8 @@ pub(crate) struct CheckReport {
     warnings: usize,
     notes: usize,
     findings: Vec<Finding>,
+    /// How the bus boots and what is sent then; `null` if the file does not say enough for that.
+    predicted: Option<Prediction>,
 }
 
 impl Check {
@@ -53,18 +55,23 @@ impl Check {
     pub(crate) fn run(&self) -> Result<CheckReport, Failure> {
         let file = self.file.display().to_string();
         let ending = self.file.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
-        let (nodes, findings) = match ending {
-            "yml" | "yaml" => self.bus_yml(&file)?,
-            "toml" => (self.machine(&file)?, Vec::new()),
+        let mut checked = match ending {
+            "yml" | "yaml" => {
+                self.read(&file, check::of_bus_yml, "docs/handbook/ros2-canopen.md has a bus.yml that boots")?
+            }
+            "toml" => self.read(&file, check::of_machine, "docs/machine-file.md describes each key")?,
             _ => {
                 return Err(Failure::usage(format!("'{}' is neither NAME.yml nor NAME.toml", plain(&file)))
                     .because("the ending tells what it is: a bus.yml of ros2_canopen, or a machine file")
                     .next("ferrodrive eds lint FILE checks a data sheet"));
             }
         };
+        let predicted = checked.predict();
+        let Checked { nodes, findings, .. } = checked;
         let count = |severity| findings.iter().filter(|finding: &&Finding| finding.severity == severity).count();
         let (errors, warnings, notes) = (count(Severity::Error), count(Severity::Warning), count(Severity::Note));
-        let mut report = CheckReport { ok: true, error: None, file, nodes, errors, warnings, notes, findings };
+        let mut report =
+            CheckReport { ok: true, error: None, file, nodes, errors, warnings, notes, findings, predicted };
         let failure = report.failure(self.strict);
         report.ok = failure.is_none();
         report.error = failure.as_ref().map(FailureBody::from);
@@ -76,33 +83,19 @@ impl Check {
         self.strict
     }
 
-    fn bus_yml(&self, file: &str) -> Result<(Vec<CheckedNode>, Vec<Finding>), Failure> {
+    fn read(
+        &self,
+        file: &str,
+        of: fn(&str, &Path) -> Result<Checked, BadFile>,
+        next: &'static str,
+    ) -> Result<Checked, Failure> {
         let unread = |reason| Failure::new(format!("cannot read {}", plain(file))).of_kind("file").because(reason);
         let text = read_text(&self.file).map_err(unread)?;
         let folder = self.file.parent().unwrap_or(Path::new(""));
-        let checked = check::of_bus_yml(&text, folder).map_err(|bad| {
-            Failure::usage(format!("cannot use {}", plain(file)))
-                .because(plain(&bad.named(file).to_string()))
-                .next("docs/handbook/ros2-canopen.md has a bus.yml that boots")
-        })?;
-        Ok((checked.nodes, checked.findings))
-    }
-
-    /// The drives of a machine file, which are built and thrown away.
-    fn machine(&self, file: &str) -> Result<Vec<CheckedNode>, Failure> {
-        let unusable = |reason: String| {
-            Failure::usage(format!("cannot use {}", plain(file)))
-                .because(plain(&reason))
-                .next("docs/machine-file.md describes each key")
-        };
-        let machine = machine_file::machine(&self.file.to_string_lossy()).map_err(unusable)?;
-        machine.build().map_err(|bad| unusable(bad.to_string()))?;
-        let row = |(node, model): (canopen::NodeId, &devices::Description)| CheckedNode {
-            name: model.name.to_owned(),
-            node: Some(node.raw()),
-            device: Some(model.title.to_owned()),
-        };
-        Ok(machine.models().map(row).collect())
+        of(&text, folder).map_err(|bad| {
+            let what = format!("cannot use {}", plain(file));
+            Failure::usage(what).because(plain(&bad.named(file).to_string())).next(next)
+        })
     }
 }
 
@@ -140,8 +133,39 @@ impl Report for CheckReport {
                 finding.rule
             );
         }
+        if let Some(predicted) = &self.predicted {
+            text += &foretold(predicted, paint);
+        }
         let counts = format!("{} errors, {} warnings, {} notes", self.errors, self.warnings, self.notes);
         let counts = if self.errors > 0 { paint.bad(&counts) } else { paint.good(&counts) };
         format!("{text}\n{counts}")
     }
+}
+
+/// How the bus boots, and what is sent then.
+fn foretold(predicted: &Prediction, paint: Paint) -> String {
+    let mut text = format!("\n\n{}", paint.strong("boot-up, foretold in virtual time"));
+    for node in &predicted.nodes {
+        let outcome = match (node.letter, node.meaning) {
+            (Some('L'), Some(meaning)) => format!("L: {meaning}"),
+            (Some(letter), Some(meaning)) => format!("{}: {meaning}", paint.bad(&letter.to_string())),
+            _ => paint.good("boots"),
+        };
+        let state = node.state.as_ref().map(|state| format!("; it is {state}")).unwrap_or_default();
+        text += &format!("\nnode {} ({}): {outcome}{state}; {} writes", node.node, plain(&node.name), node.writes);
+    }
+    let mut frames = Table::new(&["frame", "node", "id", "bytes", "every", "at most", "carries"]);
+    let time = |us: f64| if us >= 10_000.0 { format!("{:.1} ms", us / 1e3) } else { format!("{us:.0} us") };
+    for row in &predicted.frames {
+        let node = row.node.map_or_else(String::new, |node| node.to_string());
+        let worst = row.worst_us.map_or_else(|| "no bound".to_owned(), time);
+        let worst = if row.in_time { worst } else { format!("{worst}, late") };
+        let (every, carries) = (time(row.every_us), plain(&row.carries.join(", ")));
+        frames.row([row.frame.clone(), node, format!("{}h", row.id), row.bytes.to_string(), every, worst, carries]);
+    }
+    let (rate, cycle) = (predicted.bitrate / 1000, time(predicted.cycle_us as f64));
+    let load = 100.0 * predicted.load;
+    text +=
+        &format!("\n\n{}\nbus load {load:.1} % of {rate} kbit/s at most, at a cycle of {cycle}\n", frames.plain(paint));
+    text
 }

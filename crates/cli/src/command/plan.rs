@@ -4,10 +4,9 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use can::Bitrate;
-use canopen::pdo::{EventTrigger, PdoNumber};
-use canopen::{Mux, NodeId};
+use canopen::NodeId;
+use canopen::pdo::PdoNumber;
 use cia402::ModeOfOperation;
-use devices::Timing;
 use master::Drive;
 use master::cyclic::{CyclicError, CyclicOptions};
 use master::plan::{ErrorRate, HostQueue, NodeTraffic, Plan as BusPlan, PlannedFrame, Settings, most_nodes, plan};
@@ -72,9 +71,6 @@ pub(crate) struct Plan {
 
 /// A cycle that is shorter holds no two frames at 1 Mbit/s.
 const SHORTEST_CYCLE: Duration = Duration::from_micros(250);
-
-/// The producer heartbeat time of CiA 301, in ms.
-const PRODUCER_HEARTBEAT_TIME: Mux = Mux::new(0x1017, 0);
 
 fn node_mode(text: &str) -> Result<(Option<NodeId>, ModeOfOperation), String> {
     match text.split_once('=') {
@@ -206,7 +202,7 @@ impl Plan {
                     rpdo_of_cycle(&drive, *mode).await.map_err(|error| Failure::new(error.to_string()).at_node(id))?,
                 );
             }
-            nodes.push(NodeTraffic { in_cycle, ..traffic_of(&drive).await? });
+            nodes.push(NodeTraffic { in_cycle, ..NodeTraffic::of(&drive).await? });
         }
         if nodes.is_empty() {
             return Err(Failure::new("nobody is on the bus").of_kind("nobody").next("ferrodrive scan says more"));
@@ -219,18 +215,6 @@ impl Plan {
 async fn rpdo_of_cycle(drive: &Drive, mode: ModeOfOperation) -> Result<PdoNumber, CyclicError> {
     drive.configure_cyclic(mode).await?;
     Ok(drive.cyclic(mode, CyclicOptions { guard: None, ..CyclicOptions::default() }).await?.rpdo())
-}
-
-async fn traffic_of(drive: &Drive) -> Result<NodeTraffic, Failure> {
-    let heartbeat = match drive.node().read::<u16>(PRODUCER_HEARTBEAT_TIME).await {
-        Ok(ms) => Some(Duration::from_millis(ms.into())).filter(|time| !time.is_zero()),
-        Err(master::Error::Aborted { .. }) => None,
-        Err(error) => return Err(error.into()),
-    };
-    let timing = drive.description().map_or(Timing::GUESSED, |model| model.timing);
-    let event_trigger = drive.description().map_or(EventTrigger::Change, |model| model.pdo.event_trigger);
-    let pdos = drive.pdos().await?;
-    Ok(NodeTraffic { node: drive.node().id(), pdos, in_cycle: None, event_trigger, heartbeat, timing })
 }
 
 impl Row {

@@ -24,6 +24,7 @@
 //! assert_eq!(worst.collect::<Vec<_>>(), [2_000, 3_000, 3_500].map(|us| Some(Duration::from_micros(us))));
 //! ```
 
+mod read;
 mod response_time;
 mod traffic;
 

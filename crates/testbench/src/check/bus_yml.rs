@@ -6,6 +6,7 @@
 use std::path::{Path, PathBuf};
 
 use canopen::NodeId;
+use master::boot::{Assignment, Startup};
 
 use super::finding::{Place, Reporter, Severity};
 use super::yaml::{Entry, Node};
@@ -42,7 +43,7 @@ const MASTER_KEYS: [&str; 26] = [
 ];
 
 /// The same of a node.
-const NODE_KEYS: [&str; 42] = [
+const NODE_KEYS: [&str; 45] = [
     "node_id",
     "dcf",
     "dcf_path",
@@ -60,6 +61,9 @@ const NODE_KEYS: [&str; 42] = [
     "software_file",
     "software_version",
     "configuration_file",
+    "time_cob_id",
+    "guard_time",
+    "life_time_factor",
     "restore_configuration",
     "retry_factor",
     "sdo",
@@ -108,6 +112,14 @@ pub(super) struct Master {
     pub(super) sync_period_us: Option<At<i64>>,
     pub(super) heartbeat_producer_ms: Option<At<i64>>,
     pub(super) boot_timeout_ms: Option<At<i64>>,
+    /// Bit rate in kbit/s.
+    pub(super) baudrate: Option<i64>,
+    /// How many of its heartbeats a node waits for (`options` and `master`; 3).
+    pub(super) heartbeat_multiplier: f64,
+    /// The bits of 1F80h that it says, by the names of their keys.
+    pub(super) startup: Startup,
+    /// 1F89h, in ms; 0 for none.
+    pub(super) boot_time_ms: i64,
 }
 
 /// A node. What it does not say itself is that of `defaults`.
@@ -123,7 +135,27 @@ pub(super) struct Slave {
     pub(super) boot_timeout_ms: Option<At<i64>>,
     pub(super) polling: Option<At<bool>>,
     pub(super) pdos: Vec<Pdo>,
-    pub(super) sdo: Vec<At<(u16, u8)>>,
+    pub(super) sdo: Vec<Write>,
+    /// 1F81h of the master, by the names of its keys.
+    pub(super) assignment: Assignment,
+    /// How many of its heartbeats the master waits for.
+    pub(super) heartbeat_multiplier: f64,
+    pub(super) revision_number: Option<i64>,
+    pub(super) serial_number: Option<i64>,
+    pub(super) software_version: Option<i64>,
+    /// The sub-index of 1011h that restores it; 0 for none.
+    pub(super) restore_configuration: i64,
+    /// 100Ch, which begins node guarding.
+    pub(super) guard_time: Option<At<i64>>,
+}
+
+/// A value that is written to an object.
+#[derive(Clone, Debug)]
+pub(super) struct Write {
+    pub(super) index: u16,
+    pub(super) sub_index: u8,
+    pub(super) value: i64,
+    pub(super) at: Place,
 }
 
 /// What is said of one PDO.
@@ -135,8 +167,20 @@ pub(super) struct Pdo {
     pub(super) enabled: Option<bool>,
     pub(super) transmission: Option<i64>,
     pub(super) inhibit_time: Option<i64>,
+    pub(super) event_timer: Option<i64>,
+    pub(super) sync_start: Option<i64>,
+    pub(super) cob_id: Option<PdoId>,
     /// Index and sub-index of what it carries, if that is said.
     pub(super) mapping: Option<Vec<(u16, u8)>>,
+}
+
+/// What `cob_id` of a PDO says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum PdoId {
+    /// `auto`: that of the predefined connection set, or from PDO 5 on the next one that is free.
+    Auto,
+    /// This value of 1400h:01 or 1800h:01.
+    Value(i64),
 }
 
 impl Slave {
@@ -161,13 +205,16 @@ pub(super) fn read(document: &Node<'_>, folder: &Path, report: &mut Reporter<'_>
         return None;
     };
     let defaults = entries.iter().find(|entry| entry.key == "defaults");
+    let options = entries.iter().find(|entry| entry.key == "options");
+    let multiplier = options.and_then(|options| value(&options.value, None, "heartbeat_multiplier")?.real());
+    let multiplier = multiplier.unwrap_or(HEARTBEAT_MULTIPLIER);
     let nested = entries.iter().find(|entry| entry.key == "nodes").map(|entry| entry.value.entries());
     let is_node = |entry: &&Entry<'_>| !["master", "defaults", "options", "nodes"].contains(&entry.key.as_str());
     let mut nodes = Vec::new();
     for entry in entries.iter().filter(is_node).chain(nested.iter().flatten()) {
         if entry.value.is_mapping() {
             let default = defaults.map(|entry| &entry.value);
-            nodes.push(slave(entry, default, folder, report));
+            nodes.push(slave(entry, default, (folder, multiplier), report));
         } else {
             let what = format!("'{}' is no node: it has no keys", entry.key);
             report.say(
@@ -189,11 +236,26 @@ pub(super) fn read(document: &Node<'_>, folder: &Path, report: &mut Reporter<'_>
             "add a name with `node_id` and `dcf`",
         );
     }
-    Some(Bus { master: of_master(master, report), nodes })
+    Some(Bus { master: of_master(master, multiplier, report), nodes })
 }
 
-fn of_master(entry: &Entry<'_>, report: &mut Reporter<'_>) -> Master {
+/// Of `dcfgen`, where `options` says none.
+const HEARTBEAT_MULTIPLIER: f64 = 3.0;
+
+fn of_master(entry: &Entry<'_>, multiplier: f64, report: &mut Reporter<'_>) -> Master {
     unknown_keys(&entry.value, &MASTER_KEYS, report);
+    // Each bit with what its key has to say for it to be set.
+    let bits = [
+        ("start_all_nodes", Startup::START_ALL, true),
+        ("start_nodes", Startup::STARTS_NONE, false),
+        ("reset_all_nodes", Startup::RESET_ALL, true),
+        ("stop_all_nodes", Startup::STOP_ALL, true),
+    ];
+    let startup = bits.into_iter().fold(0, |all, (key, bit, sets)| {
+        let said = truth(&entry.value, None, key, report).map(|said| said.value);
+        if said == Some(sets) { all | bit } else { all }
+    });
+    let heartbeat_multiplier = value(&entry.value, None, "heartbeat_multiplier").and_then(|node| node.real());
     let number = |key: &str, report: &mut Reporter<'_>| number(&entry.value, None, key, report);
     Master {
         at: entry.at,
@@ -201,10 +263,19 @@ fn of_master(entry: &Entry<'_>, report: &mut Reporter<'_>) -> Master {
         sync_period_us: number("sync_period", report),
         heartbeat_producer_ms: number("heartbeat_producer", report),
         boot_timeout_ms: number("boot_timeout_ms", report),
+        baudrate: number("baudrate", report).map(|said| said.value),
+        heartbeat_multiplier: heartbeat_multiplier.unwrap_or(multiplier),
+        startup: Startup(startup),
+        boot_time_ms: number("boot_time", report).map_or(0, |said| said.value),
     }
 }
 
-fn slave(entry: &Entry<'_>, defaults: Option<&Node<'_>>, folder: &Path, report: &mut Reporter<'_>) -> Slave {
+fn slave(
+    entry: &Entry<'_>,
+    defaults: Option<&Node<'_>>,
+    (folder, multiplier): (&Path, f64),
+    report: &mut Reporter<'_>,
+) -> Slave {
     unknown_keys(&entry.value, &NODE_KEYS, report);
     let own = &entry.value;
     let number_of = |key: &str, report: &mut Reporter<'_>| number(own, defaults, key, report);
@@ -218,8 +289,26 @@ fn slave(entry: &Entry<'_>, defaults: Option<&Node<'_>>, folder: &Path, report: 
     let mut all = pdos("rpdo", false, report);
     all.extend(pdos("tpdo", true, report));
     let sdo = value(own, defaults, "sdo").map(|node| node.items()).unwrap_or_default();
+    // Each bit with what its key has to say for it to be set.
+    let bits = [
+        ("boot", Assignment::BOOT, true),
+        ("mandatory", Assignment::MANDATORY, true),
+        ("reset_communication", Assignment::KEEP_ALIVE, false),
+    ];
+    let assignment = bits.into_iter().fold(Assignment::SLAVE | Assignment::BOOT, |all, (key, bit, sets)| {
+        let Some(said) = truth_of(key, report) else { return all };
+        if said.value == sets { all | bit } else { all & !bit }
+    });
+    let multiple = value(own, defaults, "heartbeat_multiplier").and_then(|node| node.real()).unwrap_or(multiplier);
     Slave {
         name: entry.key.clone(),
+        assignment: Assignment(assignment),
+        heartbeat_multiplier: multiple,
+        revision_number: number_of("revision_number", report).map(|said| said.value),
+        serial_number: number_of("serial_number", report).map(|said| said.value),
+        software_version: number_of("software_version", report).map(|said| said.value),
+        restore_configuration: number_of("restore_configuration", report).map_or(0, |said| said.value),
+        guard_time: number_of("guard_time", report),
         at: entry.at,
         node_id: number_of("node_id", report),
         dcf: text_of("dcf").map(|dcf| At { value: folder.join(&dcf.value), at: dcf.at }),
@@ -229,7 +318,7 @@ fn slave(entry: &Entry<'_>, defaults: Option<&Node<'_>>, folder: &Path, report: 
         boot_timeout_ms: number_of("boot_timeout_ms", report),
         polling: truth_of("polling", report),
         pdos: all,
-        sdo: sdo.iter().filter_map(|item| Some(At { value: object(item)?, at: item.at() })).collect(),
+        sdo: sdo.iter().filter_map(write).collect(),
     }
 }
 
@@ -287,8 +376,20 @@ fn pdo(entry: &Entry<'_>, is_transmit: bool, report: &mut Reporter<'_>) -> Optio
         enabled: of("enabled").and_then(|node| node.truth()),
         transmission: of("transmission").and_then(|node| node.number()),
         inhibit_time: of("inhibit_time").and_then(|node| node.number()),
+        event_timer: of("event_timer").and_then(|node| node.number()),
+        sync_start: of("sync_start").and_then(|node| node.number()),
+        cob_id: of("cob_id").and_then(|node| match node.number() {
+            Some(number) => Some(PdoId::Value(number)),
+            None => node.text().filter(|text| text == "auto").map(|_| PdoId::Auto),
+        }),
         mapping,
     })
+}
+
+fn write(node: &Node<'_>) -> Option<Write> {
+    let (index, sub_index) = object(node)?;
+    let value = value(node, None, "value").map_or(Some(0), |value| value.number())?;
+    Some(Write { index, sub_index, value, at: node.at() })
 }
 
 fn object(node: &Node<'_>) -> Option<(u16, u8)> {

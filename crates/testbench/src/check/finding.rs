@@ -60,6 +60,11 @@ pub struct Findings(Vec<Finding>);
 const MOST: usize = 500;
 
 impl Findings {
+    /// Those that were found before, to be gone on with.
+    pub(super) const fn of(found: Vec<Finding>) -> Self {
+        Self(found)
+    }
+
     /// Adds one.
     pub(super) fn push(&mut self, finding: Finding) {
         if self.0.len() < MOST {

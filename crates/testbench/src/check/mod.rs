@@ -1,20 +1,31 @@
 //! A description of a bus, held against what its data sheets and the known models say, before anything is started.
 //!
-//! [`of_bus_yml`] reads the `bus.yml` of ros2_canopen; what goes wrong with such a bus is a table of rules.
+//! [`of_bus_yml`] reads the `bus.yml` of ros2_canopen; what goes wrong with such a bus is a table of rules. [`of_machine`]
+//! takes a machine file. [`Checked::predict`] then boots the bus that is meant, with virtual drives of its models in virtual time.
 
 mod bus_yml;
 mod device;
 mod finding;
+mod generated;
+mod intended;
+mod machine;
+mod predict;
 mod traps;
 mod yaml;
 
 use std::path::Path;
 
 use serde::Serialize;
+use sim::World;
 
 pub use finding::{Finding, Findings, Place, Severity};
+pub use generated::Planned;
+pub use intended::{Intended, IntendedNode};
+pub use machine::of_machine;
+pub use predict::{PredictedFrame, PredictedNode, Prediction};
 
 use crate::document::BadFile;
+use crate::machine_file::Machine;
 use finding::Reporter;
 use traps::Case;
 
@@ -36,12 +47,47 @@ pub struct Checked {
     pub nodes: Vec<CheckedNode>,
     /// What was found, by line.
     pub findings: Vec<Finding>,
+    /// The bus that is meant, or why none can be made of the file.
+    pub intended: Result<Intended, String>,
+    /// The machine, where the file is one of it: with what is around its drives.
+    machine: Option<Machine>,
 }
 
 impl Checked {
     /// How many findings are that bad.
     pub fn count(&self, severity: Severity) -> usize {
         self.findings.iter().filter(|finding| finding.severity == severity).count()
+    }
+
+    /// Boots the bus that is meant, in virtual time, and adds what goes wrong to the findings; `None` where none can be made of the
+    /// file, or its drives cannot be had, which is a finding too.
+    pub fn predict(&mut self) -> Option<Prediction> {
+        let mut found = Findings::of(std::mem::take(&mut self.findings));
+        let mut report = Reporter { found: &mut found, rule: "prediction", node: None };
+        let predicted = match &self.intended {
+            Ok(intended) => self
+                .world(intended)
+                .and_then(|world| predict::predict(intended, world, &mut report))
+                .map_err(|why| (intended.at, why)),
+            Err(why) => Err((Place { line: 1, column: 1 }, why.clone())),
+        };
+        if let Err((at, why)) = &predicted {
+            report.rule = "prediction";
+            let next = "mend what is told above; then the boot-up is foretold";
+            report.say(Severity::Note, *at, format!("how this bus boots cannot be told: {why}"), next);
+        }
+        self.findings = found.into_sorted();
+        predicted.ok()
+    }
+}
+
+impl Checked {
+    /// The bus that is meant, without its master.
+    fn world(&self, intended: &Intended) -> Result<World, String> {
+        match &self.machine {
+            Some(machine) => machine.build().map_err(|bad| bad.to_string()),
+            None => predict::world(intended),
+        }
     }
 }
 
@@ -54,8 +100,10 @@ pub fn of_bus_yml(text: &str, folder: &Path) -> Result<Checked, BadFile> {
         let mut found = Findings::default();
         let mut report = Reporter { found: &mut found, rule: "shape", node: None };
         let mut nodes = Vec::new();
+        let mut intended = Err("it describes no bus".to_owned());
         if let Some(bus) = bus_yml::read(&document, folder, &mut report) {
             traps::of_bus(&bus, &mut report);
+            let mut devices = Vec::new();
             for slave in &bus.nodes {
                 report.node = slave.node();
                 let sheet = slave.dcf.as_ref();
@@ -66,9 +114,12 @@ pub fn of_bus_yml(text: &str, folder: &Path) -> Result<Checked, BadFile> {
                     check(&case, &mut report);
                 }
                 let node = slave.node().map(canopen::NodeId::raw);
-                nodes.push(CheckedNode { name: slave.name.clone(), node, device: device.map(|device| device.title()) });
+                let title = device.as_ref().map(device::Device::title);
+                nodes.push(CheckedNode { name: slave.name.clone(), node, device: title });
+                devices.push(device);
             }
+            intended = intended::of_bus_yml(&bus, &devices);
         }
-        Checked { nodes, findings: found.into_sorted() }
+        Checked { nodes, findings: found.into_sorted(), intended, machine: None }
     })
 }

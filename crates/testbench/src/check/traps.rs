@@ -183,7 +183,7 @@ fn host_silence(case: &Case<'_>, report: &mut Reporter<'_>) {
     let ms = case.value(time.index, time.sub_index).unwrap_or(0);
     if ms > 0 && !polls {
         let what = format!(
-            "it stops {ms} ms after the last frame for it ({time}): neither SYNC nor the master's heartbeat is one"
+            "it stops {ms} ms after the last frame for it ({time}); that neither SYNC nor the master's heartbeat is one is a guess, on which its manual is silent"
         );
         report.say(
             Severity::Note,
@@ -203,10 +203,12 @@ fn host_silence(case: &Case<'_>, report: &mut Reporter<'_>) {
 }
 
 fn node_guarding(case: &Case<'_>, report: &mut Reporter<'_>) {
-    for object in case.slave.sdo.iter().filter(|object| matches!(object.value.0, 0x100C | 0x100D)) {
-        if case.device.is_some_and(|device| !device.has(object.value.0)) {
+    let written = case.slave.sdo.iter().filter(|write| matches!(write.index, 0x100C | 0x100D)).map(|write| write.at);
+    let said = case.slave.guard_time.iter().filter(|time| time.value > 0).map(|time| time.at);
+    if case.device.is_some_and(|device| !device.has(0x100C)) {
+        for at in written.chain(said) {
             let what = "it does not answer node guarding: the master resets it again and again";
-            report.say(Severity::Error, object.at, what, "take heartbeats: `heartbeat_producer`");
+            report.say(Severity::Error, at, what, "take heartbeats: `heartbeat_producer`");
         }
     }
 }

@@ -103,6 +103,16 @@ impl<'a> Node<'a> {
         }
     }
 
+    /// A number that need not be whole.
+    pub(super) fn real(&self) -> Option<f64> {
+        match self.scalar()? {
+            Scalar::Integer(number) => Some(*number as f64),
+            Scalar::FloatingPoint(number) => Some(number.into_inner()),
+            _ => None,
+        }
+        .filter(|number| number.is_finite())
+    }
+
     /// `true` and `false`; also `yes`, `no` and the rest of YAML 1.1, which the readers of this field take.
     pub(super) fn truth(&self) -> Option<bool> {
         match self.scalar()? {
