@@ -90,7 +90,7 @@ impl Bench {
     fn search(&mut self) -> Vec<Address> {
         let mut search = Search::new(MAKE[0], MAKE[1], None);
         let mut found = Vec::new();
-        while let Some(request) = search.next() {
+        while let Some(request) = search.poll_request() {
             let answer = self.ask(request);
             if matches!(request, Request::Identify(Bound::HighestSerial, _)) {
                 found.extend(search.note(answer == Some(Reply::Identified)));

@@ -10,8 +10,8 @@ const DEPTH: usize = 65;
 /// Every number of 32 bits.
 const ALL: Range = Range { lowest: 0, highest: u32::MAX };
 
-/// The search. Ask every [`next`](Self::next); to the sixth wait for [`Reply::Identified`](super::Reply::Identified), and tell with
-/// [`note`](Self::note) whether it came, until there is no next one.
+/// The search. Ask every [`poll_request`](Self::poll_request); to the sixth wait for [`Reply::Identified`](super::Reply::Identified), and tell with
+/// [`note`](Self::note) whether it came, until there is none.
 #[derive(Clone, Debug)]
 pub struct Search {
     vendor_id: u32,
@@ -71,7 +71,7 @@ impl Search {
     }
 
     /// The next frame; `None` once every device is found. The sixth of a question is the one that is answered.
-    pub fn next(&mut self) -> Option<Request> {
+    pub fn poll_request(&mut self) -> Option<Request> {
         let Devices { revision, serial } = *self.left.last()?;
         let bound = *Bound::ALL.get(self.sent)?;
         self.sent += 1;
@@ -118,7 +118,7 @@ mod tests {
     fn found(devices: &mut [Server], revision: Option<u32>) -> (std::vec::Vec<[u32; 4]>, usize) {
         let mut search = Search::new(0x100, 7, revision);
         let (mut found, mut questions) = (std::vec::Vec::new(), 0);
-        while let Some(request) = search.next() {
+        while let Some(request) = search.poll_request() {
             let answers = devices.iter_mut().map(|device| device.handle(request).0);
             let identified = answers.fold(false, |any, answer| any | (answer == Some(Reply::Identified)));
             if matches!(request, Request::Identify(Bound::HighestSerial, _)) {

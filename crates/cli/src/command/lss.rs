@@ -305,7 +305,7 @@ impl LssMaster<'_> {
         let Make { vendor_id, product_code, revision } = make;
         let mut search = Search::new(vendor_id, product_code, revision);
         let (mut addresses, mut asked) = (Vec::new(), 0);
-        while let Some(request) = search.next() {
+        while let Some(request) = search.poll_request() {
             let answer = self.ask(request).await;
             if matches!(request, Request::Identify(Bound::HighestSerial, _)) {
                 addresses.extend(search.note(answer == Some(Reply::Identified)));
