@@ -16,7 +16,6 @@ use crate::failure::Failure;
 use crate::frames::tap::Traffic;
 use crate::global::Global;
 use crate::progress::Progress;
-use crate::recording::Ears;
 use crate::remembered::Remembered;
 use testbench::machine_file::{self, Machine};
 use testbench::models::{self, Description};
@@ -41,8 +40,6 @@ pub(crate) struct Context {
     bus: BusSpec,
     /// The machine, where a file describes it.
     pub(crate) machine: Option<Machine>,
-    /// The frames of others.
-    pub(crate) ears: Ears,
     timeout: Duration,
     models: BTreeMap<NodeId, Told>,
     json: bool,
@@ -82,7 +79,6 @@ impl Context {
         let by_bus = embedded.unwrap_or_default().iter().map(|(node, model)| (*node, Told::ByBus(model)));
         let models: BTreeMap<_, _> = by_bus.chain(by_user).collect();
         network.set_models(models::with_told(models.values().map(|told| told.description())));
-        let ears = Ears::default();
         // The file of an embedded bus has been read once, to make the bus.
         let of_bus = match &global.bus {
             BusSpec::Sim { file: Some(path) } => machine_file::read(path).ok(),
@@ -92,7 +88,6 @@ impl Context {
             machine: of_bus.or_else(|| global.machine.clone()),
             network,
             progress,
-            ears,
             traffic,
             bus: global.bus.clone(),
             timeout: global.timeout,

@@ -83,7 +83,7 @@ fn virtual_bus<R>(
     let traffic = Traffic::default();
     let context = Context::new(global, network.clone(), Some(&drives), progress.clone(), traffic.clone());
     let tapped = Tap::new(network.clone(), traffic.clone());
-    world.add_station(Logged::new(tapped, log, context.ears.clone()));
+    world.add_station(Logged::new(tapped, log));
     let whole = async {
         embedded::wait_until_booted(&network, &drives).await?;
         if global.verbose {
@@ -181,7 +181,7 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
         let failure = notes.troubles().filter(|_| global.json).fold(failure, Failure::because);
         Err(notes.lost().into_iter().fold(failure, |failure, lost| without_bus(&context, failure.because(lost))))
     };
-    let station = Logged::new(Tap::new(network.clone(), traffic), log, context.ears.clone());
+    let station = Logged::new(Tap::new(network.clone(), traffic), log);
     let tell = |_, note: &Note| notes.borrow_mut().news(note).iter().for_each(|text| context.tell(text));
     let ended = runner.run(&network, station, &clock, until, tell).await;
     progress.clear();

@@ -88,7 +88,7 @@ impl Gateway {
                     // A client that has gone before it was taken in is no matter.
                     let Ok((stream, _)) = accepted else { continue };
                     if events.receiver_count() < MAX_CLIENTS {
-                        let heard = (context.ears.listen(), events.subscribe());
+                        let heard = (context.traffic.of_others(), events.subscribe());
                         tokio::spawn(client::serve(stream, context.network.clone(), heard, wishes.clone()));
                     }
                 }

@@ -156,7 +156,7 @@ impl Record {
         let network = &context.network;
         let begin = network.now();
         let end = self.duration.or(context.is_embedded().then_some(EMBEDDED_DURATION)).map(|time| begin + time);
-        let mut heard = context.ears.listen();
+        let mut heard = context.traffic.of_others();
         let mut batch = ObjectBatch::default();
         let (mut due, mut handed) = (begin, begin);
         while end.is_none_or(|end| due < end) {

@@ -59,7 +59,7 @@ impl Scan {
     pub(crate) async fn run(&self, context: &Context) -> Result<ScanReport, Failure> {
         let asked = |count| context.progress.show(format!("asked {count} of 127"));
         let (mut counted, mut decoder) = (Counted::default(), context.decoder());
-        let mut others = context.ears.listen();
+        let mut others = context.traffic.of_others();
         let mut scanning = std::pin::pin!(context.network.scan(context.timeout(), asked));
         let found = loop {
             tokio::select! {

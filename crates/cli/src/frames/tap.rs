@@ -1,4 +1,5 @@
-//! The frames that a command sends and hears: shown as they pass (`--verbose`), or handed to a command that watches.
+//! The frames that a command sends and hears: shown as they pass (`--verbose`), handed to a command that watches, and those of
+//! others alone to any part of a command that listens.
 
 use std::collections::VecDeque;
 use std::future::poll_fn;
@@ -9,6 +10,7 @@ use std::time::Duration;
 use can::{Frame, Instant, Station};
 use master::Network;
 use master::decode::Decoder;
+use tokio::sync::broadcast;
 
 use super::stamp::Stamps;
 use crate::paint::Paint;
@@ -16,6 +18,8 @@ use crate::progress::Progress;
 
 /// Frames kept for a command that does not come to take them; a further one replaces the oldest.
 const KEPT: usize = 1 << 16;
+/// Frames of others that wait for a listener; one that is slower misses the oldest.
+const HEARD: usize = 1024;
 
 /// A network whose frames are seen by others as they pass.
 #[derive(Clone)]
@@ -25,8 +29,11 @@ pub(crate) struct Tap {
 }
 
 /// What passes a [`Tap`].
-#[derive(Clone, Default)]
-pub(crate) struct Traffic(Arc<Mutex<Passing>>);
+#[derive(Clone)]
+pub(crate) struct Traffic {
+    passing: Arc<Mutex<Passing>>,
+    others: broadcast::Sender<(Instant, Frame)>,
+}
 
 #[derive(Default)]
 struct Passing {
@@ -57,10 +64,18 @@ impl Tap {
     }
 }
 
+impl Default for Traffic {
+    /// The traffic of a bus whose time begins at zero.
+    fn default() -> Self {
+        Self::since(Duration::ZERO)
+    }
+}
+
 impl Traffic {
     /// The traffic of a bus whose time began at this Unix time.
     pub(crate) fn since(unix_zero: Duration) -> Self {
-        Self(Arc::new(Mutex::new(Passing { unix_zero, ..Passing::default() })))
+        let passing = Arc::new(Mutex::new(Passing { unix_zero, ..Passing::default() }));
+        Self { passing, others: broadcast::channel(HEARD).0 }
     }
 
     /// Unix time of the bus's zero.
@@ -71,6 +86,11 @@ impl Traffic {
     /// Shows each frame in words on standard error from now on.
     pub(crate) fn show(&self, decoder: Decoder, stamps: Stamps, progress: Progress) {
         self.lock().shown = Some(Shown { decoder, stamps, progress });
+    }
+
+    /// The frames that others send from now on, with their times.
+    pub(crate) fn of_others(&self) -> broadcast::Receiver<(Instant, Frame)> {
+        self.others.subscribe()
     }
 
     /// Keeps frames for [`next`](Self::next) from now on.
@@ -120,13 +140,17 @@ impl Traffic {
 
     fn lock(&self) -> MutexGuard<'_, Passing> {
         // Nothing is half done between two frames, whoever panicked.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.passing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Station for Tap {
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
         self.traffic.note(frame, now);
+        if self.traffic.others.receiver_count() > 0 {
+            // Nobody may listen any more.
+            let _ = self.traffic.others.send((now, *frame));
+        }
         self.network.handle_frame(frame, now);
     }
 

@@ -9,7 +9,6 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use can::{Frame, Instant, Station};
-use tokio::sync::broadcast;
 use transport::log::{Content, Direction, Interface, Record};
 
 use super::background::Pace;
@@ -144,48 +143,23 @@ impl Writing {
     }
 }
 
-/// Whoever listens to the frames that others send.
-#[derive(Clone)]
-pub(crate) struct Ears(broadcast::Sender<(Instant, Frame)>);
-
-/// Frames that wait for a listener; one that is slower misses the oldest.
-const HEARD: usize = 1024;
-
-impl Default for Ears {
-    fn default() -> Self {
-        Self(broadcast::channel(HEARD).0)
-    }
-}
-
-impl Ears {
-    /// The frames from now on, with their times.
-    pub(crate) fn listen(&self) -> broadcast::Receiver<(Instant, Frame)> {
-        self.0.subscribe()
-    }
-}
-
-/// A station whose frames are logged as they pass, and told to whoever listens.
+/// A station whose frames are logged as they pass.
 #[derive(Clone)]
 pub(crate) struct Logged<S> {
     station: S,
     log: CommandLog,
-    ears: Ears,
 }
 
 impl<S> Logged<S> {
-    /// `station`, whose frames go to `log`, and those of others to `ears`.
-    pub(crate) const fn new(station: S, log: CommandLog, ears: Ears) -> Self {
-        Self { station, log, ears }
+    /// `station`, whose frames go to `log`.
+    pub(crate) const fn new(station: S, log: CommandLog) -> Self {
+        Self { station, log }
     }
 }
 
 impl<S: Station> Station for Logged<S> {
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
         self.log.frame(frame, now, Direction::Received);
-        if self.ears.0.receiver_count() > 0 {
-            // Nobody may listen any more.
-            let _ = self.ears.0.send((now, *frame));
-        }
         self.station.handle_frame(frame, now);
     }
 

@@ -27,7 +27,7 @@ pub(super) struct Heard {
 impl Heard {
     /// Listens from now on.
     pub(super) fn listen(context: &Context) -> Self {
-        Self { frames: context.ears.listen(), ids: BTreeSet::new() }
+        Self { frames: context.traffic.of_others(), ids: BTreeSet::new() }
     }
 
     /// Listens for so long that a cycle would have been heard.
