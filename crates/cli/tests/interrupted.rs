@@ -7,7 +7,7 @@ use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use common::{Simulator, done, is_heard};
+use common::{Simulator, done, ferrodrive, is_heard};
 
 const DRIVES: [(&str, &str, &str); 4] = [
     ("4", "zlac8030l", "4=zlac8030l"),
@@ -173,6 +173,40 @@ fn simulator_ends(signal: &str, status: i32) {
     let ended = child.wait_with_output().unwrap();
     assert_eq!(ended.status.code(), Some(status), "{signal}");
     assert_eq!(String::from_utf8(ended.stderr).unwrap(), "", "{signal}");
+}
+
+/// Its drives leave somebody else's bus as if their cable was cut; the bus and what drives it stay.
+#[test]
+fn a_simulator_on_somebody_elses_bus_leaves_it_when_it_is_asked_to_end() {
+    let owner = Simulator::start(&["--drive", "cia402@5", "--serve", "socketcand://127.0.0.1:0"]);
+    let bus = owner.bus("socketcand");
+    for (signal, status) in [("INT", 130), ("TERM", 143)] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_ferrodrive"))
+            .args(["sim", "--drive", "zlac8030l@4", "--bus", &bus])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut ready = String::new();
+        BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut ready).unwrap();
+        let read = |node: &str| ferrodrive(&["--bus", &bus, "--timeout", "2s", "read", node, "1000"]);
+        let begin = Instant::now();
+        while read("4").status != Some(0) {
+            assert!(begin.elapsed() < Duration::from_secs(20), "node 4 never answers: {ready}");
+        }
+        let moving = start(&bus, "4=zlac8030l", &["velocity", "4", "100rpm", "--for", "60s"]);
+        std::thread::sleep(Duration::from_secs(1));
+        send(signal, &child);
+        let ended = child.wait_with_output().unwrap();
+        assert_eq!(ended.status.code(), Some(status), "{signal}: {}", String::from_utf8_lossy(&ended.stderr));
+        // Whoever drove it is told that it is gone; the owner's drive still answers.
+        let told = moving.wait_with_output().unwrap();
+        assert_eq!(told.status.code(), Some(1), "{}", String::from_utf8_lossy(&told.stderr));
+        let told = String::from_utf8(told.stderr).unwrap();
+        assert!(told.contains("node 4"), "{told}");
+        done(&["--bus", &bus, "--timeout", "10s", "read", "5", "1000"]);
+    }
 }
 
 #[test]

@@ -141,6 +141,28 @@ fn a_described_servo_stops_by_itself_where_it_was_given_a_watch_and_else_it_was_
     assert!(took > Duration::from_millis(1300), "{took:?}");
 }
 
+/// The watch is the node's, not a mode's.
+#[test]
+fn a_described_servo_with_a_watch_ends_every_kind_of_motion_by_itself() {
+    const DESCRIBED: (&str, &str) = ("5", "5=cia402");
+    let simulator = Simulator::start(&["--drive", "cia402@5", "--serve", "socketcand://127.0.0.1:0"]);
+    let bus = simulator.bus("socketcand");
+    std::thread::sleep(BOOT);
+    let mut bench = Bench { simulator, bus };
+    for motion in [
+        &["move", "5", "200turn", "--relative", "--profile-velocity", "60rpm"][..],
+        &["torque", "5", "100mA", "--for", "60s"],
+        &["home", "5", "--method", "17"],
+    ] {
+        let child = bench.moving_by(DESCRIBED, motion, &["--guard"]);
+        bench.kill(child);
+        let took = bench.wait("5", false, Duration::from_millis(2000) + SLACK);
+        assert!(took > Duration::from_millis(300), "{motion:?}: {took:?}");
+        bench.json(DESCRIBED, &["reset", "5"]);
+        bench.json(DESCRIBED, &["disable", "5"]);
+    }
+}
+
 #[test]
 fn a_joint_stops_two_seconds_after_its_master_was_killed_and_the_next_command_begins_at_rest() {
     let mut bench = Bench::new();
@@ -166,6 +188,35 @@ fn a_stepper_turns_on_after_its_master_was_killed_as_was_said_before() {
     }
     std::thread::sleep(Duration::from_secs(4));
     assert!(bench.turns("2"));
+}
+
+/// It has no watch (ZLIM42-C user manual, 5.4): a position move ends where it was to end, a search for a switch that is not there
+/// goes on.
+#[test]
+fn a_stepper_finishes_its_move_and_goes_on_with_its_homing_after_its_master_was_killed() {
+    /// 4 turns of 60 r/min and the ramps take 5 s; what `get` counts is 4000 steps a turn at the least.
+    const TURNS: &str = "4turn";
+    let mut bench = Bench::new();
+    let whole = |bench: &mut Bench| {
+        let said = bench.json(STEPPER, &["move", "2", TURNS, "--relative", "--profile-velocity", "60rpm"]);
+        assert_eq!(said["reached"], json!(true));
+        bench.position("2")
+    };
+    let before = bench.position("2");
+    let of_a_move = whole(&mut bench) - before;
+    let before = bench.position("2");
+    let child = bench.moving_by(STEPPER, &["move", "2", TURNS, "--relative", "--profile-velocity", "60rpm"], &[]);
+    let said = bench.kill(child);
+    assert!(said.contains("node 2: if this command dies"), "{said}");
+    bench.wait("2", false, Duration::from_secs(5) + SLACK);
+    let moved = bench.position("2") - before;
+    // An open-loop rotor stands within a fraction of a step of its field.
+    assert!(moved.abs_diff(of_a_move) <= of_a_move.unsigned_abs() / 100, "{moved} instead of {of_a_move}");
+    let child = bench.moving_by(STEPPER, &["home", "2", "--method", "17"], &[]);
+    bench.kill(child);
+    std::thread::sleep(Duration::from_secs(3));
+    assert!(bench.turns("2"));
+    bench.json(STEPPER, &["disable", "2"]);
 }
 
 #[test]

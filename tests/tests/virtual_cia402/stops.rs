@@ -139,6 +139,29 @@ fn after_a_quick_stop_that_stays_operation_goes_on_with_0f() {
     assert!((bench.rpm() - 60.0 * SPEED as f64).abs() < 12.0, "{}", bench.rpm());
 }
 
+/// Who is no longer watched cannot be missed: else only the lost host itself could ever end the fault. A watch that is written anew
+/// waits for a first heartbeat (CiA 301, 7.2.8.3.2).
+#[test]
+fn a_fault_of_a_lost_heartbeat_can_be_reset_once_the_watch_is_written() {
+    for watch in [0, 0x0001_0064] {
+        let mut bench = turning(true);
+        bench.set(&[(0x6007, 0, 1)]);
+        bench.run_ms(1500);
+        assert_eq!(state(&mut bench), "fault");
+        bench.control(0x80);
+        bench.run_ms(20);
+        assert_eq!(state(&mut bench), "fault", "its cause is there");
+        bench.control(0);
+        bench.set(&[(0x1016, 1, watch)]);
+        bench.control(0x80);
+        bench.run_ms(20);
+        assert_eq!(state(&mut bench), "switch_on_disabled", "1016h:01 = {watch:X}h");
+        assert_eq!((bench.read(0x1001, 0), bench.emcy().last()), (0, Some(&0)));
+        bench.run_ms(1000);
+        assert_eq!((state(&mut bench), bench.rpm().abs() < 1.0), ("switch_on_disabled", true));
+    }
+}
+
 #[test]
 fn a_lost_heartbeat_does_what_6007h_says() {
     for (code, after) in [(0, "operation_enabled"), (1, "fault"), (2, "switch_on_disabled"), (3, "switch_on_disabled")]

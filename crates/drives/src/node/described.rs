@@ -4,12 +4,12 @@
 
 use can::{Frame, Instant, Station};
 use canopen::node::NodeProfile;
-use canopen::od::{Entry, Storage};
+use canopen::od::{Entry, Slot, Storage};
 use canopen::{NmtCommand, NmtState, NodeId};
 use devices::variant::Variant;
 
 use super::lss::{Lss, Wanted};
-use super::services::Services;
+use super::services::{Services, Written};
 use super::{Memory, SERIAL_NUMBER, error_behaviour};
 use crate::engine::device::{Application, Device, Reset};
 use crate::engine::storage::StoredImage;
@@ -206,6 +206,17 @@ pub(crate) trait Described<S: Storage>: Application<S> {
             self.base_mut().follow_error_behaviour(now);
             self.handle_events(now);
         }
+    }
+
+    /// A peer wrote to `slot`; true if it was an object of the services.
+    fn service_written(&mut self, slot: Slot, raw: u32, now: Instant) -> bool {
+        let base = self.base_mut();
+        match base.services.written(&mut base.device, slot, raw) {
+            Written::Elsewhere => return false,
+            Written::Service => {}
+            Written::WatchEnded => self.connection(Loss::Silence, false, now),
+        }
+        true
     }
 
     /// [`Application::nmt_changed`].

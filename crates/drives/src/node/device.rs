@@ -120,8 +120,8 @@ impl<S: Storage> Application<S> for DescribedNode<S> {
         &mut self.base.device
     }
 
-    fn written(&mut self, slot: Slot, raw: u32, _via: Via, _now: Instant) -> bool {
-        let _ = self.base.services.written(&mut self.base.device, slot, raw);
+    fn written(&mut self, slot: Slot, raw: u32, _via: Via, now: Instant) -> bool {
+        self.service_written(slot, raw, now);
         false
     }
 

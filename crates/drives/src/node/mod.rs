@@ -12,7 +12,7 @@ mod services;
 pub use described::{DescribedDevice, Loss};
 pub use device::DescribedNode;
 pub use memory::{Memory, image_size, is_storable};
-pub use services::{Services, conditions};
+pub use services::{Services, Written, conditions};
 
 use canopen::Mux;
 use canopen::od::{Dictionary, Storage};

@@ -45,6 +45,18 @@ pub struct Services<S: Storage> {
     generation: u32,
 }
 
+/// What a peer's write was to these services.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Written {
+    /// Nothing of theirs.
+    Elsewhere,
+    /// An object of theirs.
+    Service,
+    /// The watch over the last one that was missed (1016h): nobody is missed any more, and a first heartbeat is waited for where one
+    /// still is to come (CiA 301, 7.2.8.3.2).
+    WatchEnded,
+}
+
 impl<S: Storage> Services<S> {
     /// With what is found in the memory at power-on.
     pub fn new(memory: Memory<S>) -> Self {
@@ -106,14 +118,16 @@ impl<S: Storage> Services<S> {
         };
     }
 
-    /// A peer wrote to `slot`; true if it was one of these services.
-    pub fn written(&mut self, device: &mut Device<impl Storage>, slot: Slot, raw: u32) -> bool {
+    /// A peer wrote to `slot`.
+    pub fn written(&mut self, device: &mut Device<impl Storage>, slot: Slot, raw: u32) -> Written {
         let mux = device.values().table().row(slot).mux();
         match (mux.index, mux.sub_index) {
             (WATCH, sub_index @ 1..=CONSUMERS) => {
                 let position = usize::from(sub_index) - 1;
                 self.consumers[position] = Consumer::from_raw(raw);
-                self.lost[position] = false;
+                if core::mem::replace(&mut self.lost[position], false) && !self.misses_anybody() {
+                    return Written::WatchEnded;
+                }
             }
             (0x100C | 0x100D | 0x1017, 0) => self.configure_guarding(device),
             (HISTORY, 0) => forget_history(device.values_mut()),
@@ -131,9 +145,14 @@ impl<S: Storage> Services<S> {
                 }
                 restore_default(device, slot);
             }
-            _ => return false,
+            _ => return Written::Elsewhere,
         }
-        true
+        Written::Service
+    }
+
+    /// Somebody who is watched has stayed away.
+    fn misses_anybody(&self) -> bool {
+        self.lost.contains(&true) || self.guarding.is_some_and(|guarding| guarding.is_lost())
     }
 
     /// The frame is a heartbeat that is watched, or the master's guarding.
@@ -158,7 +177,7 @@ impl<S: Storage> Services<S> {
                 heard = true;
             }
         }
-        heard && !self.lost.contains(&true) && !self.guarding.is_some_and(|guarding| guarding.is_lost())
+        heard && !self.misses_anybody()
     }
 
     /// What the master's guarding is answered with.

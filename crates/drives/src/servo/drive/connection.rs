@@ -26,7 +26,7 @@ impl<S: Storage> Application<S> for ServoDrive<S> {
     }
 
     fn written(&mut self, slot: Slot, raw: u32, via: Via, now: Instant) -> bool {
-        if self.base.services.written(&mut self.base.device, slot, raw) {
+        if self.service_written(slot, raw, now) {
             return false;
         }
         let mut reset = false;
