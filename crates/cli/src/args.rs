@@ -5,7 +5,7 @@ use clap::{Parser, Subcommand};
 use crate::command::{
     boot, check, completions, convert, dcf, decode, demo, drive, dump, eds, emcy, events, explain, export, gateway,
     home, latency, lss, man_pages, motion, nmt, objects, params, pdo, plan, plot, read, readings, record, replay, run,
-    scan, sdo, send, sim, store, sync, time, watch, world,
+    scan, sdo, send, sim, store, studio, sync, time, watch, world,
 };
 use crate::global::Global;
 
@@ -64,6 +64,7 @@ pub(crate) enum Command {
     Record(record::Record),
     Export(export::Export),
     Gateway(gateway::Gateway),
+    Studio(studio::Studio),
     Dump(dump::Dump),
     Decode(decode::Decode),
     Convert(convert::Convert),

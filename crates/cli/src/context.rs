@@ -133,6 +133,11 @@ impl Context {
         Ok(master::identify::knowledge(&self.node(id)).await?)
     }
 
+    /// All models that need not be found out.
+    pub(crate) fn told_models(&self) -> BTreeMap<NodeId, &'static Description> {
+        self.models.iter().map(|(node, told)| (*node, told.description())).collect()
+    }
+
     /// A decoder that knows the models that this command was told.
     pub(crate) fn decoder(&self) -> Decoder {
         let mut decoder = Decoder::knowing(self.network.models());

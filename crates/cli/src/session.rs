@@ -16,7 +16,7 @@ use transport::realtime::{self, RealTimeError};
 use transport::{AnyBus, BusError, BusNotes, BusSpec, BusThread, BusThreadError, Note, WallClock, run_station};
 
 use crate::context::Context;
-use crate::embedded::{self, Embedded};
+use crate::embedded::{self, Embedded, EmbeddedDrives};
 use crate::failure::Failure;
 use crate::frames::decoder;
 use crate::frames::stamp::Stamps;
@@ -25,6 +25,7 @@ use crate::global::Global;
 use crate::progress::Progress;
 use crate::recording::{CommandLog, LogPath, Logged, Pace, interface_of};
 use crate::signals::asked_to_end;
+use crate::world_bus::WorldBus;
 use testbench::machine_file::{self, Machine};
 
 /// Longest virtual time that a command may take; none comes near, and a hang would otherwise never end.
@@ -47,6 +48,17 @@ pub(crate) fn run<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
         BusSpec::Log { path } => Err(Failure::usage(format!("{} is a log: nobody there can answer", path.display()))
             .next(format!("ferrodrive --bus log:{} dump", path.display()))),
         _ => runtime()?.block_on(real_bus(global, command)),
+    }
+}
+
+/// As [`run`], with an embedded bus whose time passes with the clock: for a command that serves people or programs.
+pub(crate) fn run_live<R>(
+    global: &Global,
+    command: impl AsyncFnOnce(&Context) -> Result<R, Failure>,
+) -> Result<R, Failure> {
+    match &global.bus {
+        BusSpec::Sim { .. } => runtime()?.block_on(real_bus(global, command)),
+        _ => run(global, command),
     }
 }
 
@@ -104,10 +116,23 @@ enum Runner {
     Here(AnyBus),
     /// In a thread of its own, in real time.
     Thread(BusThread),
+    /// In the thread of the command, on a world of its own.
+    World(WorldBus),
 }
 
 impl Runner {
-    async fn open(global: &Global) -> Result<(Self, WallClock), Failure> {
+    /// The bus of the command line, and which drives are on it where that is known.
+    async fn open(global: &Global) -> Result<(Self, WallClock, Option<EmbeddedDrives>), Failure> {
+        if let BusSpec::Sim { file } = &global.bus {
+            let (world, drives) = virtual_world(file.as_deref())?;
+            let clock = start_clock(global)?;
+            return Ok((Self::World(WorldBus::new(world, &clock)), clock, Some(drives)));
+        }
+        let (runner, clock) = Self::open_real(global).await?;
+        Ok((runner, clock, None))
+    }
+
+    async fn open_real(global: &Global) -> Result<(Self, WallClock), Failure> {
         if global.realtime {
             let opened = BusThread::open(global.bus.clone()).await;
             return opened.map(|(thread, clock)| (Self::Thread(thread), clock)).map_err(|error| match error {
@@ -132,6 +157,7 @@ impl Runner {
         let wakeup = Arc::new(Notify::new());
         match self {
             Self::Here(mut bus) => run_station(&mut bus, &mut station, clock, &wakeup, until, tell).await,
+            Self::World(mut bus) => run_station(&mut bus, &mut station, clock, &wakeup, until, tell).await,
             Self::Thread(thread) => {
                 network.on_activity(Waker::from(Arc::new(Wakes(Arc::clone(&wakeup)))));
                 thread.run(station, wakeup, until, tell).await
@@ -151,7 +177,7 @@ impl Wake for Wakes {
 
 async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Result<R, Failure>) -> Result<R, Failure> {
     let log = global.log.as_ref().map(LogPath::create).transpose()?;
-    let (runner, clock) = Runner::open(global).await?;
+    let (runner, clock, embedded) = Runner::open(global).await?;
     let (log, writing) = CommandLog::start(log, interface_of(&global.bus), clock.unix_zero(), Pace::RealTime);
     let network = Network::new();
     let progress = Progress::new(global.json);
@@ -160,7 +186,7 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     if global.verbose {
         traffic.show(decoder(global, &[]), Stamps::default(), progress.clone());
     }
-    let context = Context::new(global, network.clone(), None, progress.clone(), traffic.clone());
+    let context = Context::new(global, network.clone(), embedded.as_deref(), progress.clone(), traffic.clone());
     if let Some(unused) = global.machine.as_ref().and_then(Machine::unused_by_a_master) {
         context.tell(&format!(
             "of the machine file a command on a real bus does not use: {unused}; `ferrodrive sim --machine FILE` and `ferrodrive run` do"
@@ -169,7 +195,10 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     let notes = RefCell::new(BusNotes::of(&global.bus));
     let until = async {
         let failure = tokio::select! {
-            result = command(&context) => match result {
+            result = async {
+                embedded::wait_until_booted(&context.network, embedded.as_deref().unwrap_or_default()).await?;
+                command(&context).await
+            } => match result {
                 Ok(done) => return Ok(done),
                 Err(failure) => failure,
             },

@@ -61,6 +61,7 @@ const COMMANDS: &[(&[&str], &str)] = &[
     (&["dump", "--for", "1s"], "frame"),
     (&["export", "dbc", "4"], "export"),
     (&["gateway"], "failure"),
+    (&["studio", "--listen", "0.0.0.0:0"], "failure"),
     (&["run", SCENARIO], "run"),
     (&["run", SCENARIO, "--seeds", "1..2"], "sweep"),
     (&["run", SCENARIO, SCENARIO], "scenarios"),

@@ -22,6 +22,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("master", &["can", "canopen", "cia402", "devices"]),
     ("transport", &["can"]),
     ("plot", &[]),
+    ("studio", &["can", "canopen", "cia402", "devices", "master"]),
     (
         "showcase",
         &[
@@ -59,6 +60,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "transport",
             "plot",
             "showcase",
+            "studio",
             "testbench",
         ],
     ),

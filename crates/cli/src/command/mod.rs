@@ -38,6 +38,7 @@ pub(crate) mod sdo;
 pub(crate) mod send;
 pub(crate) mod sim;
 pub(crate) mod store;
+pub(crate) mod studio;
 pub(crate) mod sync;
 pub(crate) mod time;
 pub(crate) mod watch;

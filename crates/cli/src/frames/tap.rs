@@ -53,8 +53,17 @@ struct Shown {
 /// Frames for a command.
 #[derive(Default)]
 struct Heard {
-    frames: VecDeque<(Instant, Frame)>,
+    frames: VecDeque<Passed>,
     waker: Option<Waker>,
+}
+
+/// A frame that has passed.
+#[derive(Clone, Copy)]
+pub(crate) struct Passed {
+    pub(crate) at: Instant,
+    pub(crate) frame: Frame,
+    /// This command has sent it.
+    pub(crate) own: bool,
 }
 
 impl Tap {
@@ -104,7 +113,7 @@ impl Traffic {
             let mut passing = self.lock();
             let heard = passing.heard.get_or_insert_default();
             match heard.frames.pop_front() {
-                Some(frame) => Poll::Ready(frame),
+                Some(passed) => Poll::Ready((passed.at, passed.frame)),
                 None => {
                     heard.waker = Some(context.waker().clone());
                     Poll::Pending
@@ -116,10 +125,15 @@ impl Traffic {
 
     /// The next frame that has passed, if there is one; as [`next`](Self::next).
     pub(crate) fn take(&self) -> Option<(Instant, Frame)> {
+        self.take_passed().map(|passed| (passed.at, passed.frame))
+    }
+
+    /// As [`take`](Self::take), with whose it was.
+    pub(crate) fn take_passed(&self) -> Option<Passed> {
         self.lock().heard.as_mut()?.frames.pop_front()
     }
 
-    fn note(&self, frame: &Frame, now: Instant) {
+    fn note(&self, frame: &Frame, now: Instant, own: bool) {
         let mut passing = self.lock();
         if let Some(Shown { decoder, stamps, progress }) = &mut passing.shown {
             let paint = Paint::for_stream(&std::io::stderr());
@@ -130,7 +144,7 @@ impl Traffic {
         if heard.frames.len() == KEPT {
             heard.frames.pop_front();
         }
-        heard.frames.push_back((now, *frame));
+        heard.frames.push_back(Passed { at: now, frame: *frame, own });
         let waker = heard.waker.take();
         drop(passing);
         if let Some(waker) = waker {
@@ -146,7 +160,7 @@ impl Traffic {
 
 impl Station for Tap {
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
-        self.traffic.note(frame, now);
+        self.traffic.note(frame, now, false);
         if self.traffic.others.receiver_count() > 0 {
             // Nobody may listen any more.
             let _ = self.traffic.others.send((now, *frame));
@@ -171,7 +185,7 @@ impl Station for Tap {
     }
 
     fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
-        self.traffic.note(frame, now);
+        self.traffic.note(frame, now, true);
         self.network.handle_transmitted(frame, now);
     }
 }

@@ -1,0 +1,144 @@
+//! `ferrodrive studio`: the upper computer in the browser.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+
+use can::Bitrate;
+use serde::Serialize;
+use studio::{Access, AccessError, Host, Password, Setting};
+use tokio::net::TcpListener;
+use transport::BusSpec;
+
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::output::{Format, Report};
+use crate::paint::Paint;
+
+/// Show and move drives in the browser
+///
+/// Serves a page at the address that the first line of output names. Any number of pages may look; one has control, and hands
+/// it over. What a page moves stops when the page goes, or says nothing: a jog within 200 ms. Stop is open to all. Without
+/// --bus it is a virtual machine whose time passes with the clock.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive studio --open\n  ferrodrive --bus can0 studio\n  \
+    ferrodrive --bus can0 studio --listen 0.0.0.0:8402 --password-file studio.password")]
+pub(crate) struct Studio {
+    /// Where to listen; port 0 takes a free one. Elsewhere than on this machine (127.0.0.1, [::1]) takes a password
+    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:8402")]
+    listen: String,
+    /// File whose first line is the password for other machines, 12 characters or more
+    ///
+    /// Neither it nor anything else is encrypted on its way: whoever can listen on the network between can read the password,
+    /// and whoever has it can move the drives.
+    #[arg(long, value_name = "FILE")]
+    password_file: Option<PathBuf>,
+    /// Open the page in the browser of this machine
+    #[arg(long)]
+    open: bool,
+}
+
+/// Where the studio is.
+#[derive(Debug, Serialize)]
+struct Ready {
+    /// The address, with the token of this launch.
+    studio: String,
+}
+
+impl Report for Ready {
+    fn text(&self, _: Paint) -> String {
+        format!("studio {}", self.studio)
+    }
+}
+
+impl Studio {
+    /// Serves until a signal ends it.
+    pub(crate) async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
+        let password = self.password_file.as_deref().map(read_password).transpose()?;
+        let cannot = |error: std::io::Error| {
+            Failure::new(format!("cannot listen at {}", self.listen))
+                .because(error)
+                .next("give --listen HOST:PORT of this machine, with a port that is free; port 0 takes any")
+        };
+        let listener = TcpListener::bind(&self.listen).await.map_err(cannot)?;
+        let address = listener.local_addr().map_err(cannot)?;
+        let access = Arc::new(Access::new(address, password).map_err(|error| refused(&error))?);
+        if !address.ip().is_loopback() {
+            context.tell(&format!(
+                "everybody who reaches {address} and has the password can move the drives, and nothing is encrypted on its way: \
+                 keep it to a network of the machine's own"
+            ));
+        }
+        let url = access.url();
+        format.print(&Ready { studio: url.clone() }).map_err(Failure::of_stdout)?;
+        if self.open {
+            open(context, &url);
+        }
+        context.traffic.listen();
+        let setting = Setting {
+            bus: context.bus().to_string(),
+            bitrate: bitrate(context),
+            timeout: context.timeout(),
+            models: context.told_models(),
+        };
+        let (host, desk) = Host::new(context.network.clone(), setting);
+        let app = studio::app(desk, access);
+        let passed = || {
+            let passed = context.traffic.take_passed()?;
+            Some(studio::Passed { at: passed.at, frame: passed.frame, own: passed.own })
+        };
+        tokio::select! {
+            served = axum::serve(listener, app) => served.map_err(cannot),
+            // Not before the router is gone, which holds the desk.
+            () = host.run(passed) => Ok(()),
+        }
+    }
+}
+
+/// The bit rate, where the bus or the machine tells it: a CAN interface of Linux does not.
+fn bitrate(context: &Context) -> Option<Bitrate> {
+    match context.bus() {
+        BusSpec::SlcanSerial { bitrate, .. } | BusSpec::SlcanTcp { bitrate, .. } => *bitrate,
+        bus => {
+            let said = context.machine.as_ref().and_then(|machine| machine.bitrate);
+            // An embedded world has this one where its file says none.
+            said.or(matches!(bus, BusSpec::Sim { .. }).then_some(Bitrate::K500))
+        }
+    }
+}
+
+fn read_password(path: &Path) -> Result<Password, Failure> {
+    let text = std::fs::read_to_string(path).map_err(|error| {
+        Failure::new(format!("cannot read the password from {}", path.display()))
+            .because(error)
+            .next("give --password-file a file that you can read, with the password as its first line")
+    })?;
+    Password::new(text.lines().next().unwrap_or_default()).map_err(|error| refused(&error))
+}
+
+fn refused(error: &AccessError) -> Failure {
+    let failure = Failure::usage(error.to_string());
+    match error {
+        AccessError::NoPassword(_) => failure
+            .because("whoever reaches a studio from elsewhere can move the drives, and sees all that passes")
+            .next("give --password-file FILE too, or --listen 127.0.0.1:8402 and reach it through `ssh -L 8402:127.0.0.1:8402`"),
+        AccessError::ShortPassword(_) => failure.next("choose a longer one, e.g. four words that do not belong together"),
+        AccessError::NoRandom(_) => Failure::new(error.to_string()),
+    }
+}
+
+/// Opens the page as the desktop does; where there is none, the address has been printed.
+fn open(context: &Context, url: &str) {
+    let program = if cfg!(target_os = "macos") {
+        "open"
+    } else if cfg!(windows) {
+        "explorer"
+    } else {
+        "xdg-open"
+    };
+    let started =
+        Command::new(program).arg(url).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    if let Err(error) = started {
+        context.tell(&format!("cannot open a browser ({program}: {error}): open the address yourself"));
+    }
+}

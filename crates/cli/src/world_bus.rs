@@ -1,0 +1,74 @@
+//! The embedded world as a bus that passes with the clock, for a command that serves people: they live in its time.
+//!
+//! The world is moved whenever its bus is used, and at least once in [`STEP`]. One that falls far behind (the machine slept)
+//! does not hurry after: the time between is left out.
+
+use std::time::Duration;
+
+use can::{Frame, Instant};
+use sim::pace::Pace;
+use sim::{StationId, World, WorldError};
+use transport::{AsyncBus, BusError, Received, WallClock};
+
+/// How finely the world follows the clock: the joints' answers come within some milliseconds.
+const STEP: Duration = Duration::from_millis(1);
+
+/// How far it may fall behind and still catch up.
+const MOST_BEHIND: Duration = Duration::from_millis(250);
+
+/// See the [module](self).
+pub(crate) struct WorldBus {
+    world: World,
+    probe: StationId,
+    clock: WallClock,
+    pace: Pace,
+}
+
+impl WorldBus {
+    /// A bus of this world, whose time begins now.
+    pub(crate) fn new(mut world: World, clock: &WallClock) -> Self {
+        let probe = world.add_probe();
+        let pace = Pace::real_time(world.now()).rebased(elapsed(clock), world.now());
+        Self { world, probe, clock: clock.clone(), pace }
+    }
+
+    /// Moves the world to now.
+    fn catch_up(&mut self) {
+        let elapsed = elapsed(&self.clock);
+        if self.pace.behind(elapsed, self.world.now()) > MOST_BEHIND {
+            self.pace = self.pace.rebased(elapsed, self.world.now());
+        }
+        let target = self.pace.target(elapsed);
+        if target > self.world.now() {
+            self.world.run_until(target);
+        }
+    }
+}
+
+impl AsyncBus for WorldBus {
+    async fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        loop {
+            self.catch_up();
+            match self.world.send(self.probe, *frame) {
+                // As many frames wait as a controller has room for: this one waits in the program.
+                Err(WorldError::ProbeFull) => self.clock.sleep(STEP).await,
+                // Nothing else can be wrong with a probe of this very world.
+                _ => return Ok(()),
+            }
+        }
+    }
+
+    async fn recv(&mut self) -> Result<(Instant, Received), BusError> {
+        loop {
+            self.catch_up();
+            if let Some((_, frame)) = self.world.poll_received(self.probe) {
+                return Ok((self.clock.now(), frame.into()));
+            }
+            self.clock.sleep(STEP).await;
+        }
+    }
+}
+
+fn elapsed(clock: &WallClock) -> Duration {
+    clock.now() - Instant::ZERO
+}

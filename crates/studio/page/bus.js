@@ -1,0 +1,59 @@
+// The Bus view: who is there.
+
+import { ask } from "./link.js";
+import { h, hex, number, say } from "./dom.js";
+
+const COLUMNS = ["Node", "Model", "NMT state", "Heartbeat", "Power state", "Position", "Speed", "Fault", "Identity (1018h)"];
+
+export function busView(shared, open) {
+  const scan = h("button", { type: "button", id: "scan", onclick: () => ask({ do: "scan" }) }, "Scan");
+  const rows = h("tbody");
+  const empty = h("p", { class: "quiet" });
+  const root = h(
+    "section",
+    { class: "bus" },
+    h("div", { class: "bar" }, h("h2", {}, "Bus"), scan),
+    h("table", {}, h("thead", {}, h("tr", {}, ...COLUMNS.map((title) => h("th", { scope: "col" }, title)))), rows),
+    empty,
+  );
+
+  function row(node) {
+    const look = () => {
+      shared.node = node;
+      open();
+    };
+    const name = h("button", { type: "button", class: "plain", onclick: look });
+    const cells = COLUMNS.map((_, at) => h("td", { "data-label": COLUMNS[at] }));
+    cells[0].append(name);
+    return h("tr", { "data-node": String(node), onclick: look }, ...cells);
+  }
+
+  function update(state) {
+    scan.disabled = state.scanning;
+    say(scan, state.scanning ? "Scanning …" : "Scan");
+    const nodes = state.nodes.map((node) => String(node.node));
+    if ([...rows.children].map((tr) => tr.dataset.node).join() !== nodes.join()) {
+      rows.replaceChildren(...state.nodes.map((node) => row(node.node)));
+    }
+    state.nodes.forEach((node, at) => {
+      const cells = rows.children[at].children;
+      const drive = node.drive;
+      say(cells[0].firstChild, String(node.node));
+      say(cells[1], node.title ?? "not known");
+      cells[1].title = node.remark ?? "";
+      say(cells[2], node.nmt ?? "–");
+      say(cells[3], node.heartbeat_age_ms === null ? "none heard" : `${number(node.heartbeat_age_ms / 1000, 1)} s ago`);
+      say(cells[4], node.trouble ? "no answer" : (drive?.state ?? "–"));
+      cells[4].className = drive?.state === "Operation enabled" ? "good" : "";
+      say(cells[5], drive?.angle_degrees === null || !drive ? "–" : `${number(drive.angle_degrees, 1)}°`);
+      say(cells[6], drive?.velocity_rpm === null || !drive ? "–" : `${number(drive.velocity_rpm, 1)} r/min`);
+      const fault = drive && drive.fault_code !== 0 ? `${hex(drive.fault_code, 4)} ${drive.faults.map((row) => row.name).join(", ")}` : "none";
+      say(cells[7], node.trouble ? node.trouble : drive ? fault : "–");
+      cells[7].className = node.trouble || (drive && drive.fault_code !== 0) ? "bad" : "";
+      say(cells[8], [node.vendor_id, node.product_code, node.revision_number].map((part) => hex(part, 1)).join(" : "));
+    });
+    say(empty, state.nodes.length ? "" : state.scanning ? "Asking all 127 node-IDs …" : "Nobody answers. Check supply, cable, termination (60 Ω between CAN_H and CAN_L) and the bit rate, then scan.");
+  }
+
+  return { root, update };
+}

@@ -1,0 +1,39 @@
+// Small helpers for building the page. Text is always set as text, never as markup.
+
+const SVG = "http://www.w3.org/2000/svg";
+
+function fill(element, properties, children) {
+  for (const [name, value] of Object.entries(properties)) {
+    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+    else if (name === "class") element.setAttribute("class", value);
+    else if (typeof value === "boolean") element.toggleAttribute(name, value);
+    else element.setAttribute(name, value);
+  }
+  element.append(...children.filter((child) => child !== null));
+  return element;
+}
+
+/** An element with attributes; `onclick` and the like add listeners. */
+export const h = (tag, properties = {}, ...children) => fill(document.createElement(tag), properties, children);
+
+/** The same for SVG. */
+export const s = (tag, properties = {}, ...children) => fill(document.createElementNS(SVG, tag), properties, children);
+
+/** Sets a text, and touches the document only if it differs: what is selected or read aloud stays so. */
+export function say(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+/** Puts children in place of those that are there, unless `key` says that nothing changed. */
+export function renew(element, key, make) {
+  if (element.dataset.key === key) return;
+  element.dataset.key = key;
+  element.replaceChildren(...make());
+}
+
+/** A number with a fixed count of decimals, or a dash. */
+export const number = (value, decimals) => (value === null || value === undefined ? "–" : value.toFixed(decimals));
+
+/** `6041h`. */
+export const hex = (value, digits) =>
+  value === null || value === undefined ? "–" : `${value.toString(16).toUpperCase().padStart(digits, "0")}h`;

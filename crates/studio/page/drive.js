@@ -1,0 +1,135 @@
+// The Drive view: what one drive says of itself, and why it does not move yet.
+
+import { ask } from "./link.js";
+import { h, hex, number, renew, say } from "./dom.js";
+import { powerMachine } from "./machine.js";
+
+/** Label, field, decimals, unit. */
+export const VALUES = [
+  ["Position", "angle_degrees", 1, "°"],
+  ["Counts", "position_counts", 0, ""],
+  ["Speed", "velocity_rpm", 1, "r/min"],
+  ["Current", "current_a", 2, "A"],
+  ["Supply", "supply_v", 1, "V"],
+  ["Motor", "motor_celsius", 0, "°C"],
+  ["Power stage", "driver_celsius", 0, "°C"],
+];
+
+/** Buttons to choose a drive by. */
+export function chooser(shared) {
+  const root = h("div", { class: "chooser", role: "group", "aria-label": "Drive" });
+  const update = (state) => {
+    const drives = state.nodes.filter((node) => node.drive || node.trouble);
+    const key = `${shared.node} ${drives.map((node) => `${node.node}${node.model}`).join()}`;
+    renew(root, key, () =>
+      drives.map((node) =>
+        h("button", { type: "button", "aria-pressed": String(node.node === shared.node), onclick: () => (shared.node = node.node) }, `${node.node} ${node.model ?? ""}`)));
+  };
+  return { root, update };
+}
+
+/** Large numbers. */
+export function tiles(values) {
+  const of = values.map(([label, field, decimals, unit]) => {
+    const value = h("b");
+    return { field, decimals, value, tile: h("div", { class: "tile" }, h("span", {}, label), h("div", {}, value, ` ${unit}`)) };
+  });
+  const root = h("div", { class: "tiles" }, ...of.map(({ tile }) => tile));
+  const update = (drive) =>
+    of.forEach(({ field, decimals, value, tile }) => {
+      const known = drive?.[field] ?? null;
+      tile.hidden = drive !== null && known === null;
+      say(value, number(known, decimals));
+    });
+  return { root, update };
+}
+
+export function driveView(shared) {
+  const choose = chooser(shared);
+  const large = tiles(VALUES);
+  const title = h("h2");
+  const remark = h("p", { class: "quiet" });
+  const trouble = h("p", { class: "bad", role: "status" });
+  const way = h("p");
+  const faults = h("ul", { class: "faults" });
+  const words = h("dl", { class: "words" });
+  const picture = h("div", { class: "picture" });
+  const findings = h("div", { class: "findings" });
+  const why = h("button", { type: "button", id: "why", onclick: explain }, "Why does it not move?");
+  let machine = null;
+  fetch("/api/power-states")
+    .then((answer) => answer.json())
+    .then((table) => {
+      machine = powerMachine(table);
+      picture.append(machine.root);
+    })
+    .catch(() => picture.append("The state machine could not be fetched."));
+  const root = h(
+    "section",
+    { class: "drive" },
+    h("div", { class: "bar" }, title, choose.root),
+    remark,
+    trouble,
+    large.root,
+    h("div", { class: "columns" }, h("div", {}, h("h3", {}, "Power state"), picture, way), h("div", {}, h("h3", {}, "Fault"), faults, h("h3", {}, "Bits"), words, h("h3", {}, "Why"), why, findings)),
+  );
+
+  let explained = null;
+  async function explain() {
+    const node = shared.node;
+    explained = node;
+    why.disabled = true;
+    findings.replaceChildren(h("p", { class: "quiet" }, "Listening to the bus, then reading what the drive says …"));
+    const answer = await ask({ do: "explain", node });
+    why.disabled = false;
+    if (explained !== node) return;
+    if (!answer.ok) findings.replaceChildren(h("p", { class: "bad" }, answer.error.message));
+    else if (!answer.result.findings.some((finding) => finding.cause)) {
+      findings.replaceChildren(h("p", { class: "good" }, `Node ${node}: nothing was found that keeps it from moving.`), ...answer.result.findings.map(shown));
+    } else findings.replaceChildren(...answer.result.findings.map(shown));
+  }
+
+  const shown = (finding) =>
+    h(
+      "details",
+      { class: finding.cause ? "cause" : "warning", open: finding.cause },
+      h("summary", {}, `${finding.cause ? "Cause" : "Warning"} (${finding.topic}): ${finding.found}`),
+      h("dl", {}, h("dt", {}, "Expected"), h("dd", {}, finding.expected), h("dt", {}, "Follows"), h("dd", {}, finding.follows), h("dt", {}, "Do"), h("dd", {}, finding.remedy)),
+    );
+
+  function update(state) {
+    choose.update(state);
+    const node = state.nodes.find((node) => node.node === shared.node);
+    const drive = node?.drive ?? null;
+    if (explained !== null && explained !== shared.node) {
+      explained = null;
+      findings.replaceChildren();
+    }
+    say(title, node ? `Node ${node.node}: ${node.title ?? "model not known"}` : "No drive");
+    say(remark, node?.remark ?? "");
+    say(trouble, node?.trouble ?? (node && !drive ? "It is no drive, or has not been read yet." : ""));
+    large.update(drive);
+    machine?.update(drive?.state ?? null, drive?.way ?? []);
+    const steps = drive?.way.map((step) => `${hex(step.controlword, 2)} → ${step.to}`).join(", then ");
+    say(way, !drive ? "" : drive.state === "Operation enabled" ? "It follows set-points." : steps ? `To Operation enabled: ${steps}.` : "It has to act first.");
+    renew(faults, drive ? `${drive.fault_code} ${drive.faults.length}` : "", () => {
+      if (!drive) return [];
+      if (drive.fault_code === 0) return [h("li", { class: "good" }, "None")];
+      const rows = drive.faults.map((row) => h("li", { class: "bad" }, h("b", {}, row.name), h("p", {}, row.remedy)));
+      return rows.length ? rows : [h("li", { class: "bad" }, `${hex(drive.fault_code, 4)}: no table here explains it`)];
+    });
+    renew(words, drive ? `${drive.statusword} ${drive.controlword} ${drive.mode}` : "", () =>
+      !drive
+        ? []
+        : [
+            h("dt", {}, `Statusword ${hex(drive.statusword, 4)}`),
+            h("dd", {}, drive.status_bits.join(", ") || "no bit is set"),
+            h("dt", {}, `Controlword ${hex(drive.controlword, 4)}`),
+            h("dd", {}, drive.control_bits.join(", ") || (drive.controlword === null ? "the drive does not tell it" : "no bit is set")),
+            h("dt", {}, "Mode"),
+            h("dd", {}, drive.mode === null ? "–" : `${drive.mode}${drive.mode_name ? ` (${drive.mode_name})` : ""}`),
+          ]);
+  }
+
+  return { root, update };
+}

@@ -1,0 +1,18 @@
+// Exchanges the password for a cookie. The server looks at one a second.
+const trouble = document.getElementById("trouble");
+
+document.getElementById("form").addEventListener("submit", async (event) => {
+  event.preventDefault();
+  trouble.textContent = "";
+  const password = document.getElementById("password").value;
+  try {
+    const answer = await fetch("/api/login", { method: "POST", body: JSON.stringify({ password }) });
+    if (answer.ok) {
+      location.replace("/");
+      return;
+    }
+    trouble.textContent = (await answer.json()).error.message;
+  } catch {
+    trouble.textContent = "The server does not answer.";
+  }
+});

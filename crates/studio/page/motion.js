@@ -1,0 +1,174 @@
+// The Motion view: everything that moves a drive. A jog lasts as long as it is held.
+
+import { ask, inControl, link } from "./link.js";
+import { h, say } from "./dom.js";
+import { VALUES, chooser, tiles } from "./drive.js";
+
+// Three within the 200 ms after which the studio stops what is not held.
+const HOLD_MS = 60;
+
+/** Hold to run: turns while held, stops when it is let go by any way there is. */
+function jogger(shared, speed, report) {
+  let held = null;
+
+  async function begin(direction) {
+    if (held || !inControl()) return;
+    const node = shared.node;
+    const jog = { node, timer: setInterval(() => hold(jog), HOLD_MS) };
+    held = jog;
+    const answer = await ask({ do: "jog", node, rpm: direction * speed() });
+    // A press of stop, or another deed, has its own words.
+    if (!answer.ok && answer.error.kind !== "stopped" && answer.error.kind !== "replaced") {
+      report("Jog", answer);
+      if (held === jog) drop();
+    }
+  }
+
+  async function hold(jog) {
+    const answer = await ask({ do: "jog_hold", node: jog.node });
+    // Stopped, or let go too late: it does not begin anew by itself.
+    if (!answer.ok && held === jog) drop();
+  }
+
+  function drop() {
+    if (!held) return null;
+    clearInterval(held.timer);
+    const { node } = held;
+    held = null;
+    return node;
+  }
+
+  function end() {
+    const node = drop();
+    if (node !== null) ask({ do: "jog_end", node });
+  }
+
+  function button(text, direction, title) {
+    const element = h("button", { type: "button", class: "jog", title }, text);
+    element.addEventListener("pointerdown", (event) => {
+      element.setPointerCapture(event.pointerId);
+      begin(direction);
+    });
+    for (const gone of ["pointerup", "pointercancel", "lostpointercapture"]) element.addEventListener(gone, end);
+    element.addEventListener("contextmenu", (event) => event.preventDefault());
+    return element;
+  }
+
+  addEventListener("blur", end);
+  addEventListener("pagehide", end);
+  document.addEventListener("visibilitychange", () => document.hidden && end());
+  addEventListener("keyup", (event) => (event.key === "ArrowLeft" || event.key === "ArrowRight") && end());
+  return { begin, end, button, isHeld: () => held !== null };
+}
+
+export function motionView(shared, report) {
+  const choose = chooser(shared);
+  const large = tiles(VALUES.slice(0, 4));
+  const title = h("h2");
+  const status = h("p", { class: "status", role: "status" });
+  const without = h("p", { class: "quiet" });
+
+  const field = (id, label, unit, value, optional = false) => {
+    const input = h("input", { id, type: "number", step: "any", value, placeholder: optional ? "as set" : "", inputmode: "decimal" });
+    return { input, row: h("label", { for: id }, `${label} `, input, ` ${unit}`) };
+  };
+  const read = ({ input }) => (input.value.trim() === "" ? null : Number(input.value));
+  const required = (of) => {
+    const value = read(of);
+    if (value === null || !Number.isFinite(value)) {
+      of.input.focus();
+      return null;
+    }
+    return value;
+  };
+
+  const send = async (name, deed) => {
+    if (deed) report(`Node ${deed.node}: ${name}`, await ask(deed));
+  };
+  const act = (name, make) => (event) => {
+    event.preventDefault();
+    const deed = make();
+    if (deed) send(name, { ...deed, node: shared.node });
+  };
+  const form = (name, make, ...fields) =>
+    h("form", { onsubmit: act(name, make), "aria-label": name }, h("h3", {}, name), ...fields, h("button", { type: "submit" }, name));
+
+  const jogSpeed = field("jog-speed", "Speed", "r/min", "60");
+  const jog = jogger(shared, () => Math.abs(required(jogSpeed) ?? 0), report);
+  const speed = field("velocity-rpm", "Speed", "r/min", "60");
+  const ramp = field("velocity-ramp", "Ramp", "r/min/s", "", true);
+  const angle = field("move-degrees", "Angle", "°", "90");
+  const moveSpeed = field("move-rpm", "at", "r/min", "", true);
+  const relative = h("input", { id: "move-relative", type: "checkbox", checked: true });
+  const amperes = field("torque-amperes", "Current", "A", "0.5");
+  const method = field("home-method", "Method", "", "35");
+  const homeSpeed = field("home-rpm", "at", "r/min", "", true);
+
+  const power = (id, name, what, key) =>
+    h("button", { type: "button", id, title: `${name} (key ${key})`, onclick: () => send(name, { do: what, node: shared.node }) }, name);
+
+  const controls = h(
+    "fieldset",
+    {},
+    h(
+      "div",
+      { class: "bar" },
+      power("enable", "Enable", "enable", "e"),
+      power("disable", "Disable", "disable", "d"),
+      power("reset-fault", "Reset fault", "reset_fault", "r"),
+      power("gentle-stop", "Stop by ramp", "stop", "s"),
+    ),
+    h(
+      "div",
+      { class: "forms" },
+      h(
+        "div",
+        { class: "form" },
+        h("h3", {}, "Jog (hold to run)"),
+        jogSpeed.row,
+        h("div", { class: "bar" }, jog.button("◀", -1, "Hold to turn backwards (left arrow)"), jog.button("▶", 1, "Hold to turn forwards (right arrow)")),
+      ),
+      form("Turn", () => {
+        const rpm = required(speed);
+        return rpm === null ? null : { do: "velocity", rpm, rpm_per_s: read(ramp) };
+      }, speed.row, ramp.row),
+      form("Move", () => {
+        const degrees = required(angle);
+        return degrees === null ? null : { do: "move", degrees, relative: relative.checked, rpm: read(moveSpeed) };
+      }, angle.row, moveSpeed.row, h("label", { for: "move-relative" }, relative, " relative, from the last target")),
+      form("Push", () => {
+        const value = required(amperes);
+        return value === null ? null : { do: "torque", amperes: value };
+      }, amperes.row, h("p", { class: "quiet" }, "The speed that comes of it is up to the load.")),
+      form("Home", () => {
+        const value = required(method);
+        return value === null ? null : { do: "home", method: Math.trunc(value), rpm: read(homeSpeed) };
+      }, method.row, homeSpeed.row, h("p", { class: "quiet" }, "Methods of CiA 402-2, clause 11; 35 takes the present position.")),
+    ),
+  );
+  const root = h("section", { class: "motion" }, h("div", { class: "bar" }, title, choose.root), large.root, status, without, controls);
+
+  function update(state) {
+    choose.update(state);
+    const node = state.nodes.find((node) => node.node === shared.node);
+    say(title, node ? `Node ${node.node}: ${node.title ?? "model not known"}` : "No drive");
+    large.update(node?.drive ?? null);
+    const parts = [node?.trouble ?? node?.drive?.state ?? "–", node?.doing, node?.moving ? "in motion by this studio" : null];
+    say(status, parts.filter(Boolean).join(" · "));
+    say(without, node?.without_us ? `If the studio dies, ${node.without_us}.` : "");
+    controls.disabled = !inControl() || !node?.drive;
+    controls.title = inControl() ? "" : "Take control first";
+  }
+
+  function key(event) {
+    if (event.repeat || controls.disabled) return;
+    const pressed = { e: "enable", d: "disable", r: "reset-fault", s: "gentle-stop" }[event.key];
+    if (pressed) document.getElementById(pressed).click();
+    else if (event.key === "ArrowLeft" || event.key === "ArrowRight") {
+      event.preventDefault();
+      jog.begin(event.key === "ArrowLeft" ? -1 : 1);
+    }
+  }
+
+  return { root, update, key, hide: jog.end };
+}

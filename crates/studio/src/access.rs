@@ -1,0 +1,191 @@
+//! Who is let in: a token of each launch, a cookie in its place, the page's own origin, and elsewhere a password.
+//!
+//! A page of another site can have a browser send requests to this server, with the cookie too. It cannot lie about its
+//! origin: every request that does something has to come from the page that this server gave out. A name of another site
+//! that leads here (DNS rebinding) is refused by its Host.
+
+use std::net::SocketAddr;
+
+use axum::http::HeaderMap;
+use axum::http::header::{AUTHORIZATION, COOKIE, HOST, HeaderName, ORIGIN};
+use subtle::ConstantTimeEq;
+
+/// Bytes of a secret: more than anybody guesses.
+const SECRET_BYTES: usize = 16;
+
+/// The shortest password that is taken.
+const SHORTEST_PASSWORD: usize = 12;
+
+/// Why a studio cannot be opened to others.
+#[derive(Debug, thiserror::Error)]
+pub enum AccessError {
+    /// Others could move the drives.
+    #[error("{0} can be reached from other machines, and there is no password")]
+    NoPassword(SocketAddr),
+    /// It is soon guessed.
+    #[error("the password has {0} characters: at least {SHORTEST_PASSWORD} are wanted")]
+    ShortPassword(usize),
+    /// The system gives no random numbers.
+    #[error("the system gives no random numbers for a token: {0}")]
+    NoRandom(getrandom::Error),
+}
+
+/// What people type who come from another machine.
+#[derive(Clone)]
+pub struct Password(String);
+
+impl core::fmt::Debug for Password {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("Password(..)")
+    }
+}
+
+impl Password {
+    /// Takes a password.
+    ///
+    /// # Errors
+    /// [`AccessError::ShortPassword`].
+    pub fn new(text: impl Into<String>) -> Result<Self, AccessError> {
+        let text = text.into();
+        match text.chars().count() {
+            short if short < SHORTEST_PASSWORD => Err(AccessError::ShortPassword(short)),
+            _ => Ok(Self(text)),
+        }
+    }
+}
+
+/// Who is let in: a token of each launch, a cookie in its place, the page's own origin, and elsewhere a password.
+pub struct Access {
+    address: SocketAddr,
+    /// In the address that is printed.
+    token: String,
+    /// In the cookie that it is exchanged for.
+    pass: String,
+    password: Option<Password>,
+}
+
+impl core::fmt::Debug for Access {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Access").field("address", &self.address).finish_non_exhaustive()
+    }
+}
+
+impl Access {
+    /// New secrets for a server that listens at `address`.
+    ///
+    /// # Errors
+    /// [`AccessError::NoPassword`] where others than this machine reach it; [`AccessError::NoRandom`].
+    pub fn new(address: SocketAddr, password: Option<Password>) -> Result<Self, AccessError> {
+        if !address.ip().is_loopback() && password.is_none() {
+            return Err(AccessError::NoPassword(address));
+        }
+        Ok(Self { address, token: secret()?, pass: secret()?, password })
+    }
+
+    /// The address to open, with the token of this launch.
+    pub fn url(&self) -> String {
+        format!("http://{}/?token={}", self.address, self.token)
+    }
+
+    /// True if somebody may come in by a password.
+    pub(crate) const fn has_password(&self) -> bool {
+        self.password.is_some()
+    }
+
+    pub(crate) fn is_token(&self, text: &str) -> bool {
+        is_same(text, &self.token)
+    }
+
+    pub(crate) fn is_password(&self, text: &str) -> bool {
+        self.password.as_ref().is_some_and(|password| is_same(text, &password.0))
+    }
+
+    /// The cookie that lets in. It stays with this browser until that is closed, goes to no other site's requests, and no
+    /// script reads it. Cookies know no ports: its name does.
+    pub(crate) fn cookie(&self) -> String {
+        format!("{}={}; Path=/; HttpOnly; SameSite=Strict", self.cookie_name(), self.pass)
+    }
+
+    /// True if a request shows the cookie, or the token as a program does.
+    pub(crate) fn lets_in(&self, headers: &HeaderMap) -> bool {
+        let name = self.cookie_name();
+        let cookies = headers.get_all(COOKIE).iter().filter_map(|value| value.to_str().ok());
+        let mut cookies = cookies.flat_map(|value| value.split(';')).filter_map(|cookie| cookie.trim().split_once('='));
+        let by_cookie = cookies.any(|(of, value)| of == name && is_same(value, &self.pass));
+        let bearer = text(headers, AUTHORIZATION).and_then(|value| value.strip_prefix("Bearer "));
+        by_cookie || bearer.is_some_and(|token| self.is_token(token))
+    }
+
+    /// True if a request is meant for this server, by the name that it calls it.
+    pub(crate) fn is_for_us(&self, headers: &HeaderMap) -> bool {
+        let Some(host) = text(headers, HOST) else { return false };
+        // Where others are let in, so is any name for this machine: a foreign one brings no cookie of ours.
+        !self.address.ip().is_loopback() || self.own_hosts().iter().any(|own| own == host)
+    }
+
+    /// True if a request comes from a page of this very server.
+    pub(crate) fn is_from_us(&self, headers: &HeaderMap) -> bool {
+        match (text(headers, ORIGIN), text(headers, HOST)) {
+            (Some(origin), Some(host)) => origin.strip_prefix("http://") == Some(host) && self.is_for_us(headers),
+            _ => false,
+        }
+    }
+
+    fn own_hosts(&self) -> [String; 4] {
+        let port = self.address.port();
+        let named = ["127.0.0.1", "[::1]", "localhost"].map(|host| format!("{host}:{port}"));
+        let [v4, v6, name] = named;
+        [v4, v6, name, self.address.to_string()]
+    }
+
+    fn cookie_name(&self) -> String {
+        format!("ferrodrive_studio_{}", self.address.port())
+    }
+}
+
+/// Random, in hexadecimal digits.
+///
+/// # Errors
+/// [`AccessError::NoRandom`].
+pub(crate) fn secret() -> Result<String, AccessError> {
+    let mut bytes = [0; SECRET_BYTES];
+    getrandom::fill(&mut bytes).map_err(AccessError::NoRandom)?;
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+/// Compares in a time that does not tell how much of it is right.
+pub(crate) fn is_same(a: &str, b: &str) -> bool {
+    a.as_bytes().ct_eq(b.as_bytes()).into()
+}
+
+fn text(headers: &HeaderMap, name: HeaderName) -> Option<&str> {
+    headers.get(name)?.to_str().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn elsewhere_takes_a_password_that_is_not_short() {
+        let elsewhere: SocketAddr = "0.0.0.0:8402".parse().expect("an address");
+        assert!(matches!(Access::new(elsewhere, None), Err(AccessError::NoPassword(_))));
+        assert!(matches!(Password::new("hunter2"), Err(AccessError::ShortPassword(7))));
+        let password = Password::new("correct horse battery").expect("long enough");
+        assert!(!format!("{password:?}").contains("horse"), "no secret in a log");
+        let access = Access::new(elsewhere, Some(password)).expect("with a password");
+        assert!(access.is_password("correct horse battery") && !access.is_password("correct horse batterz"));
+        let here = Access::new("127.0.0.1:1".parse().expect("an address"), None).expect("loopback");
+        assert!(!here.is_password(""), "where there is none, none is right");
+    }
+
+    #[test]
+    fn each_launch_has_a_token_of_its_own() {
+        let address: SocketAddr = "127.0.0.1:8402".parse().expect("an address");
+        let [first, second] = [(); 2].map(|()| Access::new(address, None).expect("loopback"));
+        assert_ne!(first.token, second.token);
+        assert_ne!(first.token, first.pass);
+        assert_eq!(first.url(), format!("http://127.0.0.1:8402/?token={}", first.token));
+        assert_eq!(first.token.len(), 2 * SECRET_BYTES);
+    }
+}

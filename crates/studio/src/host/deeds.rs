@@ -1,0 +1,309 @@
+//! What a page asks for, one by one: who may, what it means for the drive, and what is answered.
+
+use can::Instant;
+use canopen::NodeId;
+use master::drive::{HomingOptions, SwitchedOff};
+use master::explain::{Finding, Overheard, Weight};
+use master::units::{Amperes, Angle, Ramp, Rpm};
+use master::{Drive, Error, MotionOptions};
+use serde_json::json;
+use tokio::sync::oneshot;
+
+use super::state::{Host, JOG_SPAN, PRESENCE_SPAN};
+use super::work::{Asked, Done, LISTENING_TIME, Listening, Running, say};
+use crate::authority::{Refusal, SessionId};
+use crate::dead_man::DeadMan;
+use crate::message::{Answer, Deed};
+
+/// Questions for an explanation that may be under way.
+const MOST_LISTENING: usize = 32;
+
+/// What a motion tells when it is done.
+type Outcome = Result<Vec<String>, Error>;
+
+impl Host {
+    /// Does what a session asks for, or begins it.
+    pub(super) fn take_deed(&mut self, session: SessionId, seq: u64, deed: Deed, answer: oneshot::Sender<Answer>) {
+        if deed.needs_control()
+            && let Err(refusal) = self.authority.may_move(session)
+        {
+            return say(answer, refused(seq, refusal));
+        }
+        let asked = (seq, answer);
+        match deed {
+            // The stop itself went another way, past whatever waits here.
+            Deed::Alive {} | Deed::StopAll {} => done(asked),
+            Deed::TakeControl {} => {
+                let taken = self.authority.take(session);
+                self.change_control(asked, taken);
+            }
+            Deed::AskControl {} => settle(asked, self.authority.ask(session)),
+            Deed::HandOver { to } => {
+                let handed = self.authority.hand_over(session, SessionId(to));
+                self.change_control(asked, handed);
+            }
+            Deed::ReleaseControl {} => {
+                let released = self.authority.release(session).then_some(()).ok_or(Refusal::NothingToGive);
+                self.change_control(asked, released);
+            }
+            Deed::Scan {} => self.begin_scan(Some(asked)),
+            Deed::Explain { node } => self.listen_for(node, asked),
+            Deed::QuickStop { node } => {
+                self.quick_stop_one(node, "stopped by a quick stop", Some(asked));
+            }
+            Deed::JogHold { node } => {
+                let now = self.network.now();
+                match self.jogs.get_mut(&node).is_some_and(|held| held.renew(now)) {
+                    true => done(asked),
+                    false => not_held(asked, node),
+                }
+            }
+            Deed::JogEnd { node } => self.end_jog(node, asked),
+            _ => self.take_motion(deed, asked),
+        }
+    }
+
+    /// Begins what a drive is asked to do.
+    fn take_motion(&mut self, deed: Deed, asked: Asked) {
+        let Some((id, drive)) = subject(&deed).and_then(|id| Some((id, self.nodes.get(&id)?.drive.clone()?))) else {
+            let (seq, answer) = asked;
+            let text = "no drive is known at this node: scan the bus, and see whether it has power";
+            return say(answer, Answer::failed(Some(seq), "no_such_drive", text));
+        };
+        if let Deed::Jog { .. } = deed {
+            // Held from its beginning: what is let go while the drive is being enabled never turns.
+            self.jogs.insert(id, DeadMan::new(JOG_SPAN, self.network.now()));
+        } else {
+            self.jogs.remove(&id);
+        }
+        let asked = Some(asked);
+        match deed {
+            Deed::Enable { .. } => self.begin(id, "enabling", true, asked, enable(drive)),
+            Deed::Disable { .. } => {
+                self.begin(id, "disabling", true, asked, async move { drive.disable().await.map(|()| Vec::new()) });
+            }
+            Deed::ResetFault { .. } => {
+                self.begin(
+                    id,
+                    "resetting",
+                    false,
+                    asked,
+                    async move { drive.reset_fault().await.map(|()| Vec::new()) },
+                );
+            }
+            Deed::Stop { .. } => self.begin(id, "stopping", true, asked, stop(drive)),
+            Deed::Jog { rpm, .. } => {
+                let options = MotionOptions { wait: false, ..MotionOptions::default() };
+                self.begin(id, "jogging", true, asked, turn(drive, rpm, options));
+            }
+            Deed::Velocity { rpm, rpm_per_s, .. } => {
+                let ramp = rpm_per_s.map(Ramp::RpmPerSecond);
+                let options = MotionOptions { acceleration: ramp, deceleration: ramp, ..MotionOptions::default() };
+                self.begin(id, "turning", true, asked, turn(drive, rpm, options));
+            }
+            Deed::Move { degrees, relative, rpm, .. } => {
+                self.begin(id, "moving", true, asked, position(drive, degrees, relative, rpm));
+            }
+            Deed::Torque { amperes, .. } => {
+                self.begin(id, "pushing", true, asked, async move {
+                    drive.guard(SwitchedOff::Leave).await?;
+                    Ok(told(&drive.torque(Amperes(amperes)).await?))
+                });
+            }
+            Deed::Home { method, rpm, .. } => {
+                self.begin(id, "homing", true, asked, home(drive, method, rpm));
+            }
+            // The others concern no drive, or have been done.
+            _ => {}
+        }
+    }
+
+    /// Begins a deed on a node, in place of the one that is under way there.
+    pub(super) fn begin(
+        &mut self,
+        node: NodeId,
+        what: &'static str,
+        moves: bool,
+        asked: Option<Asked>,
+        deed: impl Future<Output = Outcome> + 'static,
+    ) {
+        self.generation += 1;
+        let (running, future) = Running::new(node, self.generation, what, moves, asked, deed);
+        if let Some(before) = self.running.insert(node, running) {
+            before.cut_short("replaced", "something else was asked of the drive before this was done");
+        }
+        self.work.push(future);
+    }
+
+    fn end_jog(&mut self, node: NodeId, asked: Asked) {
+        let drive = self.nodes.get(&node).and_then(|node| node.drive.clone());
+        match drive.filter(|_| self.jogs.remove(&node).is_some()) {
+            Some(drive) => self.begin(node, "stopping", true, Some(asked), stop(drive)),
+            None => not_held(asked, node),
+        }
+    }
+
+    /// Control goes over to another, or to nobody: what the one before has moved stops.
+    fn change_control(&mut self, asked: Asked, change: Result<(), Refusal>) {
+        if change.is_ok() {
+            let controller = self.authority.controller();
+            if controller != self.held_by {
+                self.stop_moved("control changed hands");
+                self.held_by = controller;
+            }
+            self.presence = controller.map(|_| DeadMan::new(PRESENCE_SPAN, self.network.now()));
+        }
+        settle(asked, change);
+    }
+
+    fn listen_for(&mut self, node: NodeId, (seq, answer): Asked) {
+        if self.listening.len() == MOST_LISTENING {
+            return say(answer, Answer::failed(Some(seq), "busy", "others are being explained something: try again"));
+        }
+        let now = self.network.now();
+        let heard = Overheard::from(now);
+        self.listening.push(Listening { node, until: now + LISTENING_TIME, heard, seq, answer });
+    }
+
+    /// Looks closely at drives of which enough was heard.
+    pub(super) fn explain_what_was_heard(&mut self, now: Instant) {
+        for listening in self.listening.extract_if(.., |listening| listening.until <= now) {
+            let Listening { node, mut heard, seq, answer, .. } = listening;
+            heard.until(now);
+            let known = self.nodes.get(&node).and_then(|node| node.drive.clone());
+            let unknown = || Drive::of_unknown_model(self.network.node(node).with_timeout(self.setting.timeout));
+            let drive = known.unwrap_or_else(unknown);
+            self.work.push(Box::pin(async move {
+                let explained = drive.explain(&heard).await;
+                Done::Explained(seq, answer, Box::new(explained))
+            }));
+        }
+    }
+
+    /// Takes in what has come to its end.
+    pub(super) fn finish(&mut self, done: Done) {
+        match done {
+            Done::Read(node, read) => self.take_in(node, read),
+            Done::Scanned(found, asked) => {
+                self.take_scan(found);
+                asked.into_iter().for_each(self::done);
+            }
+            Done::Deed(node, generation, outcome) => self.conclude(node, generation, outcome),
+            Done::Told(told) => {
+                for (node, outcome) in told {
+                    if let Err(error) = outcome {
+                        self.say_news(Some(node), &format!("it may still be moving: {error}"));
+                    }
+                }
+            }
+            Done::Explained(seq, answer, explained) => {
+                let findings: Vec<_> = explained.findings.iter().map(shown).collect();
+                say(answer, Answer::known(seq, json!({ "node": explained.node.raw(), "findings": findings })));
+            }
+        }
+    }
+
+    fn conclude(&mut self, node: NodeId, generation: u64, outcome: Option<Outcome>) {
+        if self.running.get(&node).is_none_or(|running| running.generation != generation) {
+            // Something else is being done with the drive since.
+            return;
+        }
+        let Some(running) = self.running.remove(&node) else { return };
+        match outcome {
+            Some(Ok(notes)) => running.tell(|seq| Answer::done(seq, notes)),
+            Some(Err(error)) => {
+                let text = error.to_string();
+                self.say_news(Some(node), &text);
+                let moves = running.moves;
+                running.tell(|seq| Answer::failed(Some(seq), error.kind(), text));
+                // What went wrong on the way may have left it turning.
+                if moves && (self.jogs.contains_key(&node) || self.network.moved().contains(node)) {
+                    self.quick_stop_one(node, "", None);
+                }
+            }
+            None => {}
+        }
+    }
+}
+
+/// The node that a deed is about.
+const fn subject(deed: &Deed) -> Option<NodeId> {
+    match deed {
+        Deed::Enable { node }
+        | Deed::Disable { node }
+        | Deed::ResetFault { node }
+        | Deed::Stop { node }
+        | Deed::Jog { node, .. }
+        | Deed::Velocity { node, .. }
+        | Deed::Move { node, .. }
+        | Deed::Torque { node, .. }
+        | Deed::Home { node, .. } => Some(*node),
+        _ => None,
+    }
+}
+
+async fn enable(drive: Drive) -> Outcome {
+    drive.enable().await.map(|()| Vec::new())
+}
+
+async fn stop(drive: Drive) -> Outcome {
+    drive.stop().await.map(|()| Vec::new())
+}
+
+/// Every motion is guarded first: where the drive can, it stops by itself if this program dies.
+async fn turn(drive: Drive, rpm: f64, options: MotionOptions) -> Outcome {
+    drive.guard(SwitchedOff::Leave).await?;
+    Ok(told(&drive.velocity(Rpm(rpm), options).await?))
+}
+
+async fn position(drive: Drive, degrees: f64, relative: bool, rpm: Option<f64>) -> Outcome {
+    drive.guard(SwitchedOff::Leave).await?;
+    let options = MotionOptions { speed: rpm.map(Rpm), ..MotionOptions::default() };
+    let angle = Angle::Turns(degrees / 360.0);
+    let report = match relative {
+        true => drive.move_relative(angle, options).await?,
+        false => drive.move_absolute(angle, options).await?,
+    };
+    Ok(told(&report))
+}
+
+async fn home(drive: Drive, method: i8, rpm: Option<f64>) -> Outcome {
+    drive.guard(SwitchedOff::Leave).await?;
+    let options = HomingOptions { speed: rpm.map(Rpm), ..HomingOptions::default() };
+    Ok(told(&drive.home(method, options).await?))
+}
+
+/// What there is to know of a motion: values that had to be rounded, and what the drive does without this program.
+fn told(report: &master::drive::MotionReport) -> Vec<String> {
+    let rounded = report.commanded.iter().filter(|commanded| commanded.is_rounded()).map(ToString::to_string);
+    rounded.chain(report.notes.iter().map(ToString::to_string)).collect()
+}
+
+fn shown(finding: &Finding) -> serde_json::Value {
+    json!({
+        "rule": finding.rule,
+        "topic": finding.topic.name(),
+        "cause": finding.weight == Weight::Cause,
+        "expected": finding.expected,
+        "found": finding.found,
+        "follows": finding.follows,
+        "remedy": finding.remedy,
+    })
+}
+
+fn refused(seq: u64, refusal: Refusal) -> Answer {
+    Answer::failed(Some(seq), refusal.kind(), refusal.to_string())
+}
+
+fn done((seq, answer): Asked) {
+    say(answer, Answer::done(seq, Vec::new()));
+}
+
+fn settle((seq, answer): Asked, outcome: Result<(), Refusal>) {
+    say(answer, outcome.map_or_else(|refusal| refused(seq, refusal), |()| Answer::done(seq, Vec::new())));
+}
+
+fn not_held((seq, answer): Asked, node: NodeId) {
+    let text = format!("node {node} is not being jogged by this page: begin anew");
+    say(answer, Answer::failed(Some(seq), "not_held", text));
+}

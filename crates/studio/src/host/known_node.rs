@@ -1,0 +1,41 @@
+//! A node that was found, and what it last said.
+
+use cia402::PowerState;
+use master::Drive;
+use master::identify::Identity;
+
+use crate::snapshot::DriveView;
+
+/// A node that was found.
+#[derive(Debug)]
+pub(super) struct KnownNode {
+    pub(super) identity: Option<Identity>,
+    /// What cannot be told of its model.
+    pub(super) remark: Option<String>,
+    /// How it is moved, if it is a drive.
+    pub(super) drive: Option<Drive>,
+    /// Somebody is looking at it already.
+    pub(super) is_looked_at: bool,
+    pub(super) view: Option<Box<DriveView>>,
+    /// Why nothing is known of it now.
+    pub(super) trouble: Option<String>,
+}
+
+impl KnownNode {
+    /// True unless it has said that its motor has no power.
+    pub(super) fn may_move(&self) -> bool {
+        self.drive.is_some() && self.view.as_ref().is_none_or(|view| has_power(view.state))
+    }
+}
+
+/// True in the states in which the power stage is on or may be.
+fn has_power(state: Option<&'static str>) -> bool {
+    let powerless = [
+        PowerState::NotReadyToSwitchOn,
+        PowerState::SwitchOnDisabled,
+        PowerState::ReadyToSwitchOn,
+        PowerState::SwitchedOn,
+        PowerState::Fault,
+    ];
+    !state.is_some_and(|state| powerless.iter().any(|power| power.name() == state))
+}

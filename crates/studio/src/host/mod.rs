@@ -1,0 +1,17 @@
+//! The one task that owns the network: it takes wishes, moves drives, stops them, and publishes what it knows.
+//!
+//! Time is that of the bus, told by the master's core. Nothing here waits: work is a set of futures that are polled together,
+//! so that a stop is never behind something slow. What comes first in each round is what stops.
+
+mod deeds;
+mod known_node;
+mod meter;
+mod nodes;
+mod run;
+mod state;
+mod stopping;
+#[cfg(test)]
+mod tests;
+mod work;
+
+pub use state::{Host, JOG_SPAN, PRESENCE_SPAN, Passed, Setting};

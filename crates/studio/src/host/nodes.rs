@@ -1,0 +1,179 @@
+//! Who is on the bus: found by a scan, looked at again and again, and shown.
+
+use std::time::Duration;
+
+use can::Instant;
+use canopen::{Mux, NodeId};
+use master::core::Event;
+use master::identify::Found;
+use master::{Drive, Error};
+use serde_json::json;
+
+use super::known_node::KnownNode;
+use super::state::Host;
+use super::work::{Asked, Done, say};
+use crate::message::Answer;
+use crate::snapshot::{DriveView, NodeView};
+
+const CONTROLWORD: Mux = Mux::new(0x6040, 0);
+
+/// The device profile of a drive in the low half of 1000h (CiA 402-1).
+const DRIVE_PROFILE: u32 = 402;
+
+/// How often a drive is looked at: about nine objects, which are 4 % of a 500 kbit/s bus.
+const LOOK_INTERVAL: Duration = Duration::from_millis(100);
+
+/// By how much longer each further drive makes that: so that many drives take no more of the bus than a few.
+const LOOK_INTERVAL_OF_EACH: Duration = Duration::from_millis(25);
+
+/// How often one is asked that does not answer.
+const SILENT_INTERVAL: Duration = Duration::from_secs(1);
+
+impl Host {
+    /// Asks all node-IDs who they are, unless that is being done.
+    pub(super) fn begin_scan(&mut self, asked: Option<Asked>) {
+        if self.scanning {
+            if let Some((seq, answer)) = asked {
+                say(answer, Answer::failed(Some(seq), "busy", "a scan is under way"));
+            }
+            return;
+        }
+        self.scanning = true;
+        let (network, timeout) = (self.network.clone(), self.setting.timeout);
+        self.work.push(Box::pin(async move { Done::Scanned(network.scan(timeout, |_| {}).await, asked) }));
+    }
+
+    /// Takes in who was found. A node that did not answer this time stays, with what is known of it.
+    pub(super) fn take_scan(&mut self, found: Vec<Found>) {
+        self.scanning = false;
+        for found in found {
+            let (id, known) = (found.node, self.known(&found));
+            let before = self.nodes.remove(&id);
+            let is_looked_at = before.as_ref().is_some_and(|before| before.is_looked_at);
+            let is_drive = known.drive.is_some();
+            self.nodes.insert(id, KnownNode { is_looked_at, view: before.and_then(|before| before.view), ..known });
+            if is_drive && !is_looked_at {
+                self.look_at(id, Duration::ZERO);
+            }
+        }
+    }
+
+    fn known(&self, found: &Found) -> KnownNode {
+        let node = self.network.node(found.node).with_timeout(self.setting.timeout);
+        let told = self.setting.models.get(&found.node).copied();
+        let fits =
+            |told: &&devices::Description| found.identity.is_none_or(|identity| identity.matches(&told.identity));
+        let contradiction = told
+            .filter(|told| !fits(told))
+            .map(|told| format!("it is said to be a {}, but its identity is another one", told.name));
+        let is_drive = found
+            .identity
+            .and_then(|identity| identity.device_type)
+            .is_some_and(|device_type| device_type & 0xFFFF == DRIVE_PROFILE);
+        let drive = match told.filter(fits) {
+            Some(model) => Drive::new(node, model),
+            None => Drive::known_as(node, found.knowledge.clone()),
+        };
+        let is_drive = is_drive || drive.axis_description().is_some();
+        let doubt = || found.doubt().filter(|_| told.is_none());
+        KnownNode {
+            identity: found.identity,
+            remark: contradiction.or_else(doubt),
+            drive: Some(drive).filter(|_| is_drive),
+            is_looked_at: false,
+            view: None,
+            trouble: None,
+        }
+    }
+
+    /// Looks at a drive after a time.
+    fn look_at(&mut self, id: NodeId, after: Duration) {
+        let Some(node) = self.nodes.get_mut(&id) else { return };
+        let Some(drive) = node.drive.clone() else { return };
+        node.is_looked_at = true;
+        self.work.push(Box::pin(async move {
+            drive.node().network().sleep(after).await;
+            Done::Read(id, read(&drive).await.map(Box::new))
+        }));
+    }
+
+    /// Takes in what a drive said, and looks at it again.
+    pub(super) fn take_in(&mut self, id: NodeId, read: Result<Box<DriveView>, Error>) {
+        let drives = self.nodes.values().filter(|node| node.drive.is_some()).count() as u32;
+        let Some(node) = self.nodes.get_mut(&id) else { return };
+        node.is_looked_at = false;
+        let interval = match read {
+            Ok(view) => {
+                (node.view, node.trouble) = (Some(view), None);
+                LOOK_INTERVAL.max(LOOK_INTERVAL_OF_EACH * drives)
+            }
+            Err(error) => {
+                (node.view, node.trouble) = (None, Some(error.to_string()));
+                SILENT_INTERVAL
+            }
+        };
+        self.look_at(id, interval);
+    }
+
+    /// A node as it is shown.
+    pub(super) fn view<'a>(&self, id: NodeId, node: &'a KnownNode, now: Instant) -> NodeView<'a> {
+        let facts = self.network.facts(id);
+        let description = node.drive.as_ref().and_then(Drive::description);
+        let identity = node.identity.unwrap_or_default();
+        NodeView {
+            node: id.raw(),
+            model: description.map(|description| description.name),
+            title: description.map(|description| description.title),
+            remark: node.remark.as_deref(),
+            device_type: identity.device_type,
+            vendor_id: identity.vendor_id,
+            product_code: identity.product_code,
+            revision_number: identity.revision_number,
+            nmt: facts.probable_state(description).map(|state| state.to_string()),
+            heartbeat_age_ms: facts.heartbeat_age(now).map(|age| age.as_millis() as u64),
+            trouble: node.trouble.as_deref(),
+            doing: self.running.get(&id).map(|running| running.what),
+            moving: self.network.moved().contains(id),
+            without_us: self.network.guarded(id).map(|loss| loss.to_string()),
+            drive: node.view.as_deref(),
+        }
+    }
+
+    /// Passes on what the network has noticed. A node that nobody knew has come: look who it is.
+    pub(super) fn hear_events(&mut self) {
+        while let Some((_, event)) = self.network.poll_event() {
+            let node = match event {
+                Event::BootUp(node) => {
+                    if !self.nodes.contains_key(&node) {
+                        self.begin_scan(None);
+                    }
+                    Some(node)
+                }
+                Event::NmtState(node, _)
+                | Event::HeartbeatLost(node, _)
+                | Event::HeartbeatBack(node)
+                | Event::Emcy(node, _) => Some(node),
+                // What an answer says to whoever asked is no news to the others.
+                Event::NoAnswer(..) | Event::Aborted(..) => continue,
+                _ => None,
+            };
+            self.say_news(node, &event.to_string());
+        }
+    }
+
+    /// Tells every page something.
+    pub(super) fn say_news(&self, node: Option<NodeId>, text: &str) {
+        let time_s = (self.network.now() - Instant::ZERO).as_secs_f64();
+        let news = json!({ "type": "news", "time_s": time_s, "node": node.map(NodeId::raw), "text": text });
+        // Nobody may listen.
+        let _ = self.counter.news.send(news.to_string().into());
+    }
+}
+
+async fn read(drive: &Drive) -> Result<DriveView, Error> {
+    let state = drive.state().await?;
+    let object = drive.axis_description().map_or(CONTROLWORD, |axis| axis.object(CONTROLWORD));
+    // Some drives do not tell it.
+    let controlword = drive.node().read::<u16>(object).await.ok();
+    Ok(DriveView::new(&state, controlword))
+}

@@ -1,0 +1,127 @@
+//! The loop: what came in, what is due, what has ended, and a picture of it all.
+
+use std::time::Duration;
+
+use can::{Bitrate, Instant};
+use futures_util::StreamExt;
+
+use super::state::{Host, PRESENCE_SPAN, Passed, TICK};
+use super::work::say;
+use crate::authority::SessionId;
+use crate::dead_man::DeadMan;
+use crate::desk::{Picture, Wish};
+use crate::message::Answer;
+use crate::snapshot::{BusView, Snapshot};
+
+/// How often a picture is made while somebody looks, and while nobody does.
+const PICTURE_INTERVAL: Duration = Duration::from_millis(50);
+const UNSEEN_INTERVAL: Duration = Duration::from_millis(500);
+
+/// Sessions at once; a further one is turned away.
+const MAX_SESSIONS: usize = 256;
+
+impl Host {
+    /// Serves until every desk is gone. `passed` gives the frames that have passed since it was last asked.
+    pub async fn run(mut self, mut passed: impl FnMut() -> Option<Passed>) {
+        self.begin_scan(None);
+        let mut tick = self.network.sleep(TICK);
+        loop {
+            tokio::select! {
+                biased;
+                stop = self.counter.stops.changed() => match stop {
+                    Ok(()) => self.stop_everything("stopped by a press of stop"),
+                    Err(_) => return,
+                },
+                Some(session) = self.lifelines.next(), if !self.lifelines.is_empty() => self.leave(session),
+                // Before wishes: whoever floods the desk keeps no dead man from being noticed.
+                () = &mut tick => {
+                    tick = self.network.sleep(TICK);
+                    self.tick(&mut passed);
+                }
+                wish = self.counter.wishes.recv() => match wish {
+                    Some(wish) => self.take(wish),
+                    None => return,
+                },
+                Some(done) = self.work.next(), if !self.work.is_empty() => self.finish(done),
+            }
+        }
+    }
+
+    fn tick(&mut self, passed: &mut impl FnMut() -> Option<Passed>) {
+        let now = self.network.now();
+        self.stop_what_is_not_held(now);
+        while let Some(passed) = passed() {
+            self.meter.note(&passed.frame);
+            if !passed.own {
+                self.listening.iter_mut().for_each(|listening| listening.heard.note(&passed.frame, passed.at));
+            }
+        }
+        self.meter.look(now);
+        self.explain_what_was_heard(now);
+        self.hear_events();
+        let interval = if self.authority.sessions() > 0 { PICTURE_INTERVAL } else { UNSEEN_INTERVAL };
+        if now - self.shown_at >= interval {
+            self.shown_at = now;
+            self.show(now);
+        }
+    }
+
+    fn take(&mut self, wish: Wish) {
+        match wish {
+            Wish::Join { lifeline, welcome } => {
+                if self.authority.sessions() == MAX_SESSIONS {
+                    return;
+                }
+                let session = self.authority.join();
+                // A session that has gone before it was welcomed ends at once.
+                let _ = welcome.send(session);
+                self.lifelines.push(Box::pin(async move {
+                    let _ = lifeline.await;
+                    session
+                }));
+            }
+            Wish::Do { session, seq, deed, answer } => {
+                if let Err(refusal) = self.authority.accept(session, seq) {
+                    say(answer, Answer::failed(Some(seq), refusal.kind(), refusal.to_string()));
+                    return;
+                }
+                if self.authority.controller() == Some(session) {
+                    self.presence = Some(DeadMan::new(PRESENCE_SPAN, self.network.now()));
+                }
+                self.take_deed(session, seq, deed, answer);
+            }
+        }
+    }
+
+    fn leave(&mut self, session: SessionId) {
+        if self.authority.leave(session) {
+            (self.presence, self.held_by) = (None, None);
+            self.stop_moved("the page that moved it has gone");
+        }
+    }
+
+    /// Makes a picture of everything.
+    fn show(&mut self, now: Instant) {
+        self.pictures += 1;
+        let snapshot = Snapshot {
+            kind: "state",
+            number: self.pictures,
+            time_s: (now - Instant::ZERO).as_secs_f64(),
+            bus: BusView {
+                name: &self.setting.bus,
+                bitrate: self.setting.bitrate.map(Bitrate::bits_per_second),
+                frames_per_s: self.meter.frames_per_s(),
+                load_percent: self.meter.load_percent(),
+            },
+            scanning: self.scanning,
+            sessions: self.authority.sessions(),
+            controller: self.authority.controller(),
+            asking: self.authority.asking(),
+            nodes: self.nodes.iter().map(|(id, node)| self.view(*id, node, now)).collect(),
+        };
+        // Names, numbers and lists alone: there is nothing in it that JSON cannot say.
+        let json = serde_json::to_string(&snapshot).unwrap_or_default();
+        // Somebody may look or nobody.
+        let _ = self.counter.pictures.send(Picture { number: self.pictures, json: json.into() });
+    }
+}

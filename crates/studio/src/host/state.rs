@@ -1,0 +1,112 @@
+//! The host: what it holds, and what it is told at its start. What it does stands in the files beside this one.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use can::{Bitrate, Frame, Instant};
+use canopen::NodeId;
+use devices::Description;
+use futures_util::stream::FuturesUnordered;
+use master::Network;
+
+use super::known_node::KnownNode;
+use super::meter::Meter;
+use super::work::{Listening, Running, Work};
+use crate::authority::{Authority, SessionId};
+use crate::dead_man::DeadMan;
+use crate::desk::{Counter, Desk, desk};
+
+/// How long a jog goes on without being renewed. Looked at every 10 ms: a drive is told to stop within 200 ms.
+pub const JOG_SPAN: Duration = Duration::from_millis(190);
+
+/// How long any other motion goes on without a sign of the session that commands it. A browser calls the timers of a tab in
+/// the background once a second.
+pub const PRESENCE_SPAN: Duration = Duration::from_secs(3);
+
+/// How often the clock is looked at.
+pub(super) const TICK: Duration = Duration::from_millis(10);
+
+/// What a host is told at its start.
+#[derive(Clone, Debug)]
+pub struct Setting {
+    /// The bus as it was named.
+    pub bus: String,
+    /// Its bit rate, where it is known.
+    pub bitrate: Option<Bitrate>,
+    /// Longest wait for each answer of a node.
+    pub timeout: Duration,
+    /// Models that need not be found out.
+    pub models: BTreeMap<NodeId, &'static Description>,
+}
+
+/// The one task that owns the network. See the [crate](crate).
+pub struct Host {
+    pub(super) network: Network,
+    pub(super) setting: Setting,
+    pub(super) counter: Counter,
+    pub(super) authority: Authority,
+    /// Whose motions these are.
+    pub(super) held_by: Option<SessionId>,
+    /// The session that has control is there.
+    pub(super) presence: Option<DeadMan>,
+    pub(super) nodes: BTreeMap<NodeId, KnownNode>,
+    pub(super) scanning: bool,
+    pub(super) running: BTreeMap<NodeId, Running>,
+    pub(super) jogs: BTreeMap<NodeId, DeadMan>,
+    pub(super) listening: Vec<Listening>,
+    /// Numbers what runs, so that the end of something that was replaced is told from the end of what replaced it.
+    pub(super) generation: u64,
+    pub(super) work: Work,
+    pub(super) lifelines: FuturesUnordered<Lifeline>,
+    pub(super) meter: Meter,
+    pub(super) pictures: u64,
+    pub(super) shown_at: Instant,
+}
+
+impl core::fmt::Debug for Host {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Host").field("setting", &self.setting).finish_non_exhaustive()
+    }
+}
+
+/// Ends with its session.
+pub(super) type Lifeline = futures_util::future::BoxFuture<'static, SessionId>;
+
+/// A frame that passed.
+#[derive(Clone, Copy, Debug)]
+pub struct Passed {
+    /// When.
+    pub at: Instant,
+    /// Which.
+    pub frame: Frame,
+    /// This program sent it.
+    pub own: bool,
+}
+
+impl Host {
+    /// A host on a network that somebody runs, and the desk at which it is asked.
+    pub fn new(network: Network, setting: Setting) -> (Self, Desk) {
+        let (desk, counter) = desk();
+        let now = network.now();
+        let host = Self {
+            meter: Meter::new(now, setting.bitrate),
+            network,
+            setting,
+            counter,
+            authority: Authority::default(),
+            held_by: None,
+            presence: None,
+            nodes: BTreeMap::new(),
+            scanning: false,
+            running: BTreeMap::new(),
+            jogs: BTreeMap::new(),
+            listening: Vec::new(),
+            generation: 0,
+            work: Work::new(),
+            lifelines: FuturesUnordered::new(),
+            pictures: 0,
+            shown_at: now,
+        };
+        (host, desk)
+    }
+}

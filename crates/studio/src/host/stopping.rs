@@ -1,0 +1,82 @@
+//! What stops drives: a press of stop, a dead man, a session that has gone.
+
+use std::collections::BTreeSet;
+
+use can::Instant;
+use canopen::{Mux, NodeId};
+use cia402::PowerCommand;
+
+use super::state::Host;
+use super::work::{Asked, Done};
+
+const CONTROLWORD: Mux = Mux::new(0x6040, 0);
+
+impl Host {
+    /// Quick-stops every drive of the bus that may move, whoever moves it.
+    pub(super) fn stop_everything(&mut self, why: &'static str) {
+        let enabled = self.nodes.iter().filter(|(_, node)| node.may_move()).map(|(id, _)| *id);
+        let nodes: BTreeSet<_> = enabled.chain(self.in_motion()).collect();
+        self.quick_stop(nodes, why);
+    }
+
+    /// Quick-stops what this studio has set in motion.
+    pub(super) fn stop_moved(&mut self, why: &'static str) {
+        let nodes = self.in_motion();
+        self.quick_stop(nodes, why);
+    }
+
+    /// Quick-stops whatever nobody holds any more.
+    pub(super) fn stop_what_is_not_held(&mut self, now: Instant) {
+        let let_go = self.jogs.iter().filter(|(_, held)| held.has_lapsed(now)).map(|(node, _)| *node);
+        let let_go: BTreeSet<_> = let_go.collect();
+        if !let_go.is_empty() {
+            self.quick_stop(let_go, "the jog was not renewed in time");
+        }
+        if self.presence.is_some_and(|presence| presence.has_lapsed(now)) {
+            self.presence = None;
+            self.stop_moved("nothing was heard of the page that moved it");
+        }
+        if self.presence.is_none() {
+            // A stop that failed, of a drive that did not answer, is tried again for as long as nobody has it in hand.
+            let left = self.network.moved().iter().filter(|node| !self.running.contains_key(node)).collect::<Vec<_>>();
+            left.into_iter().for_each(|node| self.quick_stop_one(node, "", None));
+        }
+    }
+
+    /// Quick-stops these nodes. What was asked of them before is not gone on with.
+    pub(super) fn quick_stop(&mut self, nodes: BTreeSet<NodeId>, why: &'static str) {
+        // Where all that moves is to stop, it is told so first, in one go and without a question before.
+        let moved = self.network.moved();
+        if !moved.is_empty() && moved.iter().all(|node| nodes.contains(&node)) {
+            let network = self.network.clone();
+            self.work.push(Box::pin(async move { Done::Told(network.stop_all_moved().await) }));
+        }
+        for id in nodes {
+            self.say_news(Some(id), why);
+            self.quick_stop_one(id, why, None);
+        }
+    }
+
+    /// Quick-stops a node, and answers whoever asked for it when it stands still.
+    pub(super) fn quick_stop_one(&mut self, id: NodeId, why: &str, answer: Option<Asked>) {
+        self.jogs.remove(&id);
+        if let Some(before) = self.running.remove(&id) {
+            before.cut_short("stopped", why);
+        }
+        let node = self.network.node(id).with_timeout(self.setting.timeout);
+        let drive = self.nodes.get(&id).and_then(|node| node.drive.clone());
+        self.begin(id, "stopping", false, answer, async move {
+            match drive {
+                Some(drive) => drive.quick_stop().await?,
+                None => node.write(CONTROLWORD, PowerCommand::QuickStop.controlword().0).await?,
+            }
+            Ok(Vec::new())
+        });
+    }
+
+    /// The nodes that this studio has set in motion, or is about to.
+    fn in_motion(&self) -> BTreeSet<NodeId> {
+        let begun = self.running.iter().filter(|(_, running)| running.moves).map(|(node, _)| *node);
+        self.network.moved().iter().chain(begun).chain(self.jogs.keys().copied()).collect()
+    }
+}

@@ -1,0 +1,353 @@
+//! The host against virtual drives, in virtual time: who may move, and what stops.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use can::{Bitrate, Instant};
+use canopen::{Mux, NodeId};
+use master::Network;
+use serde_json::Value;
+use sim::World;
+use sim::machine::{zlac8030l, zlim42c};
+
+use super::state::TICK;
+use super::{Host, JOG_SPAN, PRESENCE_SPAN, Setting};
+use crate::desk::{Desk, Session};
+use crate::message::{Answer, Deed};
+
+const WHEEL: NodeId = node(4);
+const ARM: NodeId = node(2);
+
+/// How long the quick stop ramp of a drive as delivered may take from 60 r/min, and be seen to have ended.
+const STOPPED_WITHIN: Duration = Duration::from_millis(600);
+
+const fn node(raw: u8) -> NodeId {
+    match NodeId::new(raw) {
+        Some(node) => node,
+        None => panic!("a node-ID"),
+    }
+}
+
+/// Pages before a studio on a bus with two drives.
+struct Stage {
+    network: Network,
+    desk: Desk,
+}
+
+/// A page that numbers its messages.
+struct Page {
+    session: Session,
+    seq: u64,
+}
+
+impl Page {
+    async fn ask(&mut self, deed: Deed) -> Answer {
+        self.seq += 1;
+        let answered = self.session.ask(self.seq, deed).expect("there is room");
+        answered.await.expect("every message is answered")
+    }
+
+    async fn must(&mut self, deed: Deed) {
+        let answer = self.ask(deed.clone()).await;
+        assert!(answer.is_ok(), "{deed:?}: {}", answer.json());
+    }
+}
+
+impl Stage {
+    async fn page(&self) -> Page {
+        Page { session: self.desk.join().await.expect("there is room"), seq: 0 }
+    }
+
+    async fn sleep(&self, ms: u64) {
+        self.network.sleep(Duration::from_millis(ms)).await;
+    }
+
+    fn state(&self) -> Value {
+        serde_json::from_str(&self.desk.pictures().borrow().json).expect("JSON")
+    }
+
+    /// The speed of a shaft by its 606Ch, in r/min of the motor.
+    async fn speed(&self, id: NodeId) -> f64 {
+        let model = if id == WHEEL { "zlac8030l" } else { "zlim42c" };
+        let drive = master::Drive::new(self.network.node(id), devices::model(model).expect("a model"));
+        drive.state().await.expect("it answers").velocity.expect("it has one").0.abs()
+    }
+
+    /// Waits until a shaft turns at about this speed.
+    async fn turns(&self, id: NodeId, rpm: f64) {
+        for _ in 0..200 {
+            if (self.speed(id).await - rpm).abs() < rpm * 0.2 {
+                return;
+            }
+            self.sleep(10).await;
+        }
+        panic!("node {id} turns at {} r/min, not {rpm}", self.speed(id).await);
+    }
+
+    /// Waits until a shaft rests, and tells how long that took from now on.
+    async fn rests(&self, id: NodeId) -> Duration {
+        let from = self.network.now();
+        while self.speed(id).await > 2.0 {
+            assert!(self.network.now() - from < Duration::from_secs(5), "node {id} still turns");
+            self.sleep(5).await;
+        }
+        self.network.now() - from
+    }
+
+    /// Whether the drive has been told to turn still (60FFh): what a stop ends at once, whatever the ramp takes.
+    async fn power_state(&self, id: NodeId) -> cia402::PowerState {
+        let word: u16 = self.network.node(id).read(Mux::new(0x6041, 0)).await.expect("it answers");
+        cia402::Statusword(word).state().expect("a state of CiA 402")
+    }
+
+    async fn scanned(&self) {
+        while self.state()["nodes"].as_array().is_none_or(|nodes| nodes.len() < 2) || self.state()["scanning"] == true {
+            self.sleep(50).await;
+        }
+    }
+}
+
+/// Plays a scene before a studio that runs.
+fn play(scene: impl AsyncFnOnce(&Stage)) {
+    let network = Network::new();
+    let mut world = World::new(Bitrate::K500, 1);
+    world.add_station(network.clone());
+    world.add_drive(4, Box::new(zlac8030l(4, 1))).expect("the first");
+    world.add_drive(2, Box::new(zlim42c(2, 1))).expect("the second");
+    world.run_for(Duration::from_secs(1));
+    let models = [(WHEEL, "zlac8030l"), (ARM, "zlim42c")];
+    let models: BTreeMap<_, _> =
+        models.into_iter().map(|(node, name)| (node, devices::model(name).expect("a model"))).collect();
+    let timeout = Duration::from_millis(100);
+    let setting = Setting { bus: "sim".into(), bitrate: Some(Bitrate::K500), timeout, models };
+    let (host, desk) = Host::new(network.clone(), setting);
+    let stage = Stage { network, desk };
+    let playing = async {
+        tokio::select! {
+            () = host.run(|| None) => panic!("a host runs as long as there is a desk"),
+            () = async { stage.scanned().await; scene(&stage).await } => {}
+        }
+    };
+    sim::block_on_for(&mut world, Duration::from_secs(120), playing).expect("the scene ends");
+}
+
+fn jog(rpm: f64) -> Deed {
+    Deed::Jog { node: WHEEL, rpm }
+}
+
+#[test]
+fn who_has_no_control_moves_nothing_and_stops_everything() {
+    play(async |stage| {
+        let (mut first, mut second) = (stage.page().await, stage.page().await);
+        assert_eq!(first.ask(jog(60.0)).await.error_kind(), "not_in_control");
+        first.must(Deed::TakeControl {}).await;
+        assert_eq!(second.ask(Deed::TakeControl {}).await.error_kind(), "not_in_control");
+        assert_eq!(second.ask(Deed::Enable { node: WHEEL }).await.error_kind(), "not_in_control");
+        first.must(Deed::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
+        stage.turns(WHEEL, 60.0).await;
+        second.must(Deed::StopAll {}).await;
+        assert!(stage.rests(WHEEL).await < STOPPED_WITHIN);
+        assert_ne!(stage.power_state(WHEEL).await, cia402::PowerState::OperationEnabled);
+    });
+}
+
+#[test]
+fn a_jog_that_is_held_goes_on_and_one_that_is_not_stops() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        page.must(jog(60.0)).await;
+        for _ in 0..30 {
+            stage.sleep(100).await;
+            page.must(Deed::JogHold { node: WHEEL }).await;
+        }
+        assert!((stage.speed(WHEEL).await - 60.0).abs() < 5.0, "held for 3 s it turns");
+        let let_go = stage.network.now();
+        while stage.power_state(WHEEL).await == cia402::PowerState::OperationEnabled {
+            stage.sleep(1).await;
+        }
+        let told = stage.network.now() - let_go;
+        let limit = Duration::from_millis(200);
+        assert!(told > JOG_SPAN - TICK && told < limit + Duration::from_millis(5), "quick stop after {told:?}");
+        stage.rests(WHEEL).await;
+        assert_eq!(page.ask(Deed::JogHold { node: WHEEL }).await.error_kind(), "not_held", "too late");
+        stage.sleep(500).await;
+        assert!(stage.speed(WHEEL).await < 2.0, "what comes too late moves nothing");
+    });
+}
+
+#[test]
+fn a_jog_that_is_let_go_stops_by_its_ramp_and_stays_enabled() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        page.must(jog(-60.0)).await;
+        for _ in 0..10 {
+            stage.sleep(60).await;
+            page.must(Deed::JogHold { node: WHEEL }).await;
+        }
+        page.must(Deed::JogEnd { node: WHEEL }).await;
+        assert!(stage.speed(WHEEL).await < 2.0, "answered at standstill");
+        assert_eq!(stage.power_state(WHEEL).await, cia402::PowerState::OperationEnabled);
+        assert_eq!(page.ask(Deed::JogEnd { node: WHEEL }).await.error_kind(), "not_held");
+    });
+}
+
+#[test]
+fn a_page_that_goes_stops_all_that_it_moved_and_gives_control_up() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        page.must(Deed::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
+        page.must(Deed::Velocity { node: ARM, rpm: 30.0, rpm_per_s: None }).await;
+        stage.turns(ARM, 30.0).await;
+        drop(page);
+        assert!(stage.rests(WHEEL).await < STOPPED_WITHIN);
+        assert!(stage.rests(ARM).await < STOPPED_WITHIN);
+        stage.page().await.must(Deed::TakeControl {}).await;
+    });
+}
+
+#[test]
+fn a_page_that_falls_silent_stops_what_it_moved() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        page.must(Deed::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
+        for _ in 0..8 {
+            stage.sleep(500).await;
+            page.must(Deed::Alive {}).await;
+        }
+        stage.turns(WHEEL, 60.0).await;
+        stage.sleep((PRESENCE_SPAN + STOPPED_WITHIN).as_millis() as u64).await;
+        assert!(stage.speed(WHEEL).await < 2.0);
+    });
+}
+
+#[test]
+fn control_that_is_handed_over_takes_no_motion_along() {
+    play(async |stage| {
+        let (mut first, mut second) = (stage.page().await, stage.page().await);
+        first.must(Deed::TakeControl {}).await;
+        first.must(Deed::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
+        second.must(Deed::AskControl {}).await;
+        first.must(Deed::HandOver { to: second.session.id().0 }).await;
+        stage.rests(WHEEL).await;
+        assert_eq!(first.ask(jog(60.0)).await.error_kind(), "not_in_control");
+        second.must(Deed::Move { node: WHEEL, degrees: 90.0, relative: true, rpm: None }).await;
+    });
+}
+
+#[test]
+fn a_message_that_is_sent_again_moves_nothing() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        page.must(Deed::Move { node: WHEEL, degrees: 90.0, relative: true, rpm: None }).await;
+        let before: i32 = stage.network.node(WHEEL).read(Mux::new(0x6064, 0)).await.expect("it answers");
+        page.seq -= 1;
+        let again = page.ask(Deed::Move { node: WHEEL, degrees: 90.0, relative: true, rpm: None }).await;
+        assert_eq!(again.error_kind(), "replayed");
+        stage.sleep(1000).await;
+        let after: i32 = stage.network.node(WHEEL).read(Mux::new(0x6064, 0)).await.expect("it answers");
+        // 4096 counts are a turn (ZLAC8030L).
+        assert!(after.abs_diff(before) < 20 && before.abs_diff(1024) < 40, "{before} {after}");
+    });
+}
+
+#[test]
+fn a_stop_during_the_start_of_a_motion_keeps_it_from_beginning() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        // At any time between the first request and the target written.
+        for delay_ms in [0, 5, 10, 20, 30, 40, 60, 80] {
+            page.seq += 1;
+            let begun = page.session.ask(page.seq, jog(60.0)).expect("there is room");
+            stage.sleep(delay_ms).await;
+            page.must(Deed::StopAll {}).await;
+            begun.await.expect("answered");
+            stage.sleep(700).await;
+            assert!(stage.speed(WHEEL).await < 2.0, "stopped {delay_ms} ms after the start");
+            page.must(Deed::Alive {}).await;
+        }
+    });
+}
+
+#[test]
+fn every_drive_that_has_power_is_stopped_whoever_moves_it() {
+    play(async |stage| {
+        // As another program on the bus does it: this studio knows of no motion of its own.
+        let arm = stage.network.node(ARM);
+        arm.write(Mux::new(0x6060, 0), 3_i8).await.expect("profile velocity");
+        for controlword in [0x06_u16, 0x07, 0x0F] {
+            arm.write(Mux::new(0x6040, 0), controlword).await.expect("it follows");
+            stage.sleep(50).await;
+        }
+        arm.write(Mux::new(0x60FF, 0), 30_i32).await.expect("r/min");
+        stage.turns(ARM, 30.0).await;
+        assert!(stage.network.moved().is_empty());
+        let mut page = stage.page().await;
+        page.must(Deed::StopAll {}).await;
+        assert!(stage.rests(ARM).await < STOPPED_WITHIN);
+    });
+}
+
+#[test]
+fn what_is_shown_is_what_the_drive_says() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        page.must(Deed::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
+        stage.sleep(300).await;
+        let state = stage.state();
+        let shown = &state["nodes"].as_array().expect("nodes")[1];
+        assert_eq!((&shown["node"], &shown["model"]), (&4.into(), &"zlac8030l".into()), "{shown}");
+        assert_eq!(shown["drive"]["state"], "Operation enabled");
+        assert_eq!(shown["drive"]["mode"], 3);
+        assert_eq!(shown["moving"], true);
+        let speed = shown["drive"]["velocity_rpm"].as_f64().expect("a speed");
+        assert!((speed - 60.0).abs() < 5.0, "{speed}");
+        assert_eq!((&state["controller"], &state["sessions"]), (&page.session.id().0.into(), &1.into()));
+        assert_eq!(shown["drive"]["way"], serde_json::json!([]));
+    });
+}
+
+#[test]
+fn a_drive_that_does_not_move_is_explained() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        let before = stage.network.now();
+        let answer: Value = serde_json::from_str(&page.ask(Deed::Explain { node: WHEEL }).await.json()).expect("JSON");
+        assert!(stage.network.now() - before >= Duration::from_millis(1500), "others are listened to first");
+        let findings = answer["result"]["findings"].as_array().expect("findings");
+        let not_enabled = findings.iter().find(|finding| finding["rule"] == "not_enabled").expect("it is not enabled");
+        assert_eq!((&not_enabled["cause"], &not_enabled["topic"]), (&true.into(), &"power".into()));
+    });
+}
+
+#[test]
+fn a_drive_that_loses_power_is_told_and_one_that_comes_back_too() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        let mut news = stage.desk.news();
+        assert_eq!(page.ask(Deed::Enable { node: ARM }).await.error_kind(), "not_in_control");
+        page.must(Deed::TakeControl {}).await;
+        assert_eq!(page.ask(Deed::Enable { node: node(9) }).await.error_kind(), "no_such_drive");
+        stage.network.node(ARM).nmt(canopen::NmtCommand::ResetNode);
+        stage.sleep(1500).await;
+        let heard: Vec<String> = std::iter::from_fn(|| news.try_recv().ok()).map(|news| news.to_string()).collect();
+        assert!(heard.iter().any(|news| news.contains("node 2 booted")), "{heard:?}");
+    });
+}
+
+#[test]
+fn time_is_that_of_the_bus() {
+    play(async |stage| {
+        let _page = stage.page().await;
+        stage.sleep(1000).await;
+        let shown = stage.state()["time_s"].as_f64().expect("a time");
+        let now = (stage.network.now() - Instant::ZERO).as_secs_f64();
+        assert!((0.0..0.1).contains(&(now - shown)), "{shown} of {now}");
+    });
+}

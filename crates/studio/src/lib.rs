@@ -1,0 +1,27 @@
+//! The upper computer in the browser: who is on the bus, what each drive says of itself, and moving it, by any number of
+//! people who look and one who moves.
+//!
+//! [`Host`] owns the master's [`Network`](master::Network) and everything that moves: it takes wishes from a bounded channel,
+//! carries them out, and publishes what it knows. It has no clock, no thread and no socket: its time is that of the bus, so
+//! that the same host runs in virtual time in a test. [`app`] is the web part, an [`axum::Router`] that can be called
+//! without a socket; its handlers hold no knowledge of motion.
+//!
+//! Every motion hangs on somebody who holds it: a jog on a message every 100 ms ([`JOG_SPAN`]), any other on a page that
+//! shows that it is there ([`PRESENCE_SPAN`]), and both on its connection. What is not held is quick-stopped.
+//!
+//! Not done here: opening a bus and a port, and running the two (`ferrodrive studio`).
+
+mod access;
+mod authority;
+mod dead_man;
+mod desk;
+mod host;
+mod message;
+mod snapshot;
+mod web;
+
+pub use access::{Access, AccessError, Password};
+pub use dead_man::DeadMan;
+pub use desk::Desk;
+pub use host::{Host, JOG_SPAN, PRESENCE_SPAN, Passed, Setting};
+pub use web::app;

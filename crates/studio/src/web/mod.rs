@@ -1,0 +1,172 @@
+//! The web part: files of the page, a few requests, and the socket that carries the rest.
+//!
+//! Who is let in is decided before anything else, in one place ([`guard`]). No handler knows a drive.
+
+mod answer;
+mod openapi;
+mod page;
+mod socket;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Router;
+use axum::extract::ws::WebSocketUpgrade;
+use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
+use axum::http::header::{
+    CACHE_CONTROL, CONTENT_SECURITY_POLICY, LOCATION, REFERRER_POLICY, SET_COOKIE, X_CONTENT_TYPE_OPTIONS,
+    X_FRAME_OPTIONS,
+};
+use axum::http::{HeaderName, HeaderValue, Method, StatusCode};
+use axum::middleware::{self, Next};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{MethodRouter, get, post};
+use serde::Deserialize;
+use serde_json::json;
+use tokio::sync::Semaphore;
+
+use crate::access::Access;
+use crate::desk::Desk;
+use answer::{json_text, trouble};
+use openapi::{Operation, ROUTES};
+
+/// The largest message or body that is read.
+pub(crate) const LARGEST_MESSAGE: usize = 64 << 10;
+
+/// What a wrong password costs. One is looked at at a time.
+const PENALTY: Duration = Duration::from_secs(1);
+
+/// What every answer says to the browser: nothing but this server's own files runs in the page, nobody frames it, and it
+/// tells nobody where it was.
+const HEADERS: [(HeaderName, &str); 5] = [
+    (
+        CONTENT_SECURITY_POLICY,
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; \
+         form-action 'none'; base-uri 'none'; frame-ancestors 'none'",
+    ),
+    (X_CONTENT_TYPE_OPTIONS, "nosniff"),
+    (X_FRAME_OPTIONS, "DENY"),
+    (REFERRER_POLICY, "no-referrer"),
+    (CACHE_CONTROL, "no-store"),
+];
+
+/// What the handlers share.
+#[derive(Clone)]
+struct Web {
+    desk: Desk,
+    access: Arc<Access>,
+    /// One password at a time.
+    door: Arc<Semaphore>,
+}
+
+/// The server of a studio: everything under one router, which needs no socket to be called.
+pub fn app(desk: Desk, access: Arc<Access>) -> Router {
+    let web = Web { desk, access, door: Arc::new(Semaphore::new(1)) };
+    let api = ROUTES.iter().fold(Router::new(), |router, route| router.route(route.path, handler(route.operation)));
+    api.route("/", get(async || page::file("index.html")))
+        .route("/page/{file}", get(async |Path(file): Path<String>| page::file(&file)))
+        .route("/login", get(async || page::file("login.html")))
+        .fallback(async || trouble(StatusCode::NOT_FOUND, "not_found", "there is nothing at this path"))
+        .layer(DefaultBodyLimit::max(LARGEST_MESSAGE))
+        .layer(middleware::from_fn_with_state(web.clone(), guard))
+        .with_state(web)
+}
+
+fn handler(operation: Operation) -> MethodRouter<Web> {
+    match operation {
+        Operation::State => get(state),
+        Operation::PowerStates => get(async || json_text(page::power_states())),
+        Operation::OpenApi => get(async || json_text(openapi::document().to_string())),
+        Operation::Stop => post(stop),
+        Operation::Login => post(login),
+        Operation::Socket => get(socket),
+    }
+}
+
+/// Who is let in, and with what every answer goes out.
+async fn guard(State(web): State<Web>, request: Request, next: Next) -> Response {
+    let mut response = match refuse(&web.access, &request) {
+        Some(refusal) => refusal,
+        None => next.run(request).await,
+    };
+    for (name, value) in HEADERS {
+        response.headers_mut().insert(name, HeaderValue::from_static(value));
+    }
+    response
+}
+
+#[derive(Deserialize)]
+struct Asked {
+    token: Option<String>,
+}
+
+fn refuse(access: &Access, request: &Request) -> Option<Response> {
+    let (headers, path) = (request.headers(), request.uri().path());
+    if !access.is_for_us(headers) {
+        return Some(trouble(StatusCode::FORBIDDEN, "foreign_host", "this server is called by another name"));
+    }
+    let changes = request.method() != Method::GET && request.method() != Method::HEAD;
+    if (changes || path == "/ws") && !access.is_from_us(headers) {
+        let text = "this is for pages of this server: the Origin has to be http:// and the Host";
+        return Some(trouble(StatusCode::FORBIDDEN, "foreign_origin", text));
+    }
+    let token = Query::<Asked>::try_from_uri(request.uri()).ok().and_then(|Query(asked)| asked.token);
+    if path == "/" && token.is_some_and(|token| access.is_token(&token)) {
+        // The token leaves the address bar, and with it the history.
+        return Some(([(SET_COOKIE, access.cookie()), (LOCATION, "/".into())], StatusCode::SEE_OTHER).into_response());
+    }
+    if access.lets_in(headers) {
+        return None;
+    }
+    // What is needed to ask for a password.
+    let open = ["/login", "/api/login", "/page/login.js", "/page/style.css"];
+    if access.has_password() && open.contains(&path) {
+        return None;
+    }
+    if access.has_password() && path == "/" {
+        return Some(([(LOCATION, "/login")], StatusCode::SEE_OTHER).into_response());
+    }
+    let text = "open the address that `ferrodrive studio` printed: it has the token of this launch";
+    Some(trouble(StatusCode::UNAUTHORIZED, "no_token", text))
+}
+
+async fn state(State(web): State<Web>) -> Response {
+    let json = web.desk.pictures().borrow().json.to_string();
+    json_text(json)
+}
+
+/// Needs no control, as the button of the page does not.
+async fn stop(State(web): State<Web>) -> Response {
+    if web.desk.stop_all() {
+        (StatusCode::ACCEPTED, json_text(json!({ "ok": true }).to_string())).into_response()
+    } else {
+        trouble(StatusCode::SERVICE_UNAVAILABLE, "over", "the studio is ending: use the emergency stop")
+    }
+}
+
+#[derive(Deserialize)]
+struct Credentials {
+    password: String,
+}
+
+async fn login(State(web): State<Web>, body: String) -> Response {
+    let Ok(Credentials { password }) = serde_json::from_str(&body) else {
+        return trouble(StatusCode::BAD_REQUEST, "malformed", r#"expected {"password":".."}"#);
+    };
+    let Ok(_at_the_door) = web.door.try_acquire() else {
+        return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "another password is being looked at: try again");
+    };
+    if web.access.is_password(&password) {
+        return ([(SET_COOKIE, web.access.cookie())], json_text(json!({ "ok": true }).to_string())).into_response();
+    }
+    tokio::time::sleep(PENALTY).await;
+    trouble(StatusCode::UNAUTHORIZED, "wrong_password", "this is not the password")
+}
+
+async fn socket(State(web): State<Web>, upgrade: WebSocketUpgrade) -> Response {
+    let desk = web.desk;
+    let upgrade = upgrade.max_message_size(LARGEST_MESSAGE).max_frame_size(LARGEST_MESSAGE);
+    upgrade.on_upgrade(async move |socket| socket::serve(socket, desk).await)
+}

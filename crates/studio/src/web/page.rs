@@ -1,0 +1,56 @@
+//! The files of the page, which are in the program, and the tables that it draws.
+
+use axum::http::StatusCode;
+use axum::http::header::CONTENT_TYPE;
+use axum::response::{IntoResponse, Response};
+use cia402::{PowerEvent, PowerState, TRANSITIONS};
+use serde_json::{Value, json};
+
+use super::answer::trouble;
+
+const HTML: &str = "text/html; charset=utf-8";
+const CSS: &str = "text/css; charset=utf-8";
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+
+/// Name, type and content of each.
+const FILES: &[(&str, &str, &str)] = &[
+    ("index.html", HTML, include_str!("../../page/index.html")),
+    ("login.html", HTML, include_str!("../../page/login.html")),
+    ("style.css", CSS, include_str!("../../page/style.css")),
+    ("login.js", SCRIPT, include_str!("../../page/login.js")),
+    ("main.js", SCRIPT, include_str!("../../page/main.js")),
+    ("link.js", SCRIPT, include_str!("../../page/link.js")),
+    ("dom.js", SCRIPT, include_str!("../../page/dom.js")),
+    ("bus.js", SCRIPT, include_str!("../../page/bus.js")),
+    ("drive.js", SCRIPT, include_str!("../../page/drive.js")),
+    ("machine.js", SCRIPT, include_str!("../../page/machine.js")),
+    ("motion.js", SCRIPT, include_str!("../../page/motion.js")),
+];
+
+/// A file of the page.
+pub(super) fn file(name: &str) -> Response {
+    match FILES.iter().find(|(of, _, _)| *of == name) {
+        Some((_, kind, content)) => ([(CONTENT_TYPE, *kind)], *content).into_response(),
+        None => trouble(StatusCode::NOT_FOUND, "not_found", "the page has no such file"),
+    }
+}
+
+/// The power drive state machine as the page draws it. Transitions 0 (start) and 13 (a fault, from everywhere) are no rows of
+/// the table.
+pub(super) fn power_states() -> String {
+    let states: Vec<_> = PowerState::ALL.iter().map(|state| state.name()).collect();
+    let transitions: Vec<Value> = TRANSITIONS
+        .iter()
+        .map(|row| {
+            let event = match row.event {
+                PowerEvent::Command(command) => command.name(),
+                PowerEvent::SelfTestDone => "self-test done",
+                PowerEvent::FaultOccurred => "fault",
+                PowerEvent::FaultReactionDone => "fault reaction done",
+                PowerEvent::QuickStopDone => "quick stop done",
+            };
+            json!({ "number": row.number, "from": row.from.name(), "to": row.to.name(), "event": event })
+        })
+        .collect();
+    json!({ "states": states, "transitions": transitions }).to_string()
+}

@@ -1,0 +1,324 @@
+//! Who is let in, and what a socket bears. Behind the desk stands a test in place of the host.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Router;
+use axum::body::Body;
+use axum::http::{Request, StatusCode};
+use axum::response::Response;
+use futures_util::{SinkExt, StreamExt};
+use serde_json::Value;
+use tokio::net::{TcpListener, TcpStream};
+use tokio_tungstenite::tungstenite::client::IntoClientRequest;
+use tokio_tungstenite::tungstenite::{Error as SocketError, Message};
+use tokio_tungstenite::{MaybeTlsStream, WebSocketStream};
+use tower::ServiceExt;
+
+use super::{LARGEST_MESSAGE, ROUTES, app, openapi};
+use crate::access::{Access, Password};
+use crate::authority::Authority;
+use crate::desk::{Counter, Desk, Picture, Wish, desk};
+use crate::message::Answer;
+
+/// What a busy machine may take for anything here.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+const ADDRESS: &str = "127.0.0.1:8402";
+
+type Socket = WebSocketStream<MaybeTlsStream<TcpStream>>;
+
+fn server(password: Option<&str>) -> (Router, Arc<Access>, Counter) {
+    let password = password.map(|text| Password::new(text).expect("long enough"));
+    let access = Arc::new(Access::new(ADDRESS.parse().expect("an address"), password).expect("loopback"));
+    let (desk, counter) = desk();
+    (app(desk, Arc::clone(&access)), access, counter)
+}
+
+fn token(access: &Access) -> String {
+    access.url().split_once("token=").expect("it has one").1.to_owned()
+}
+
+/// A request with these headers beside Host.
+async fn ask(app: &Router, method: &str, path: &str, headers: &[(&str, &str)], body: &str) -> Response {
+    let request = Request::builder().method(method).uri(path);
+    let host = headers.iter().all(|(name, _)| *name != "host").then_some(("host", ADDRESS));
+    let request =
+        headers.iter().copied().chain(host).fold(request, |request, (name, value)| request.header(name, value));
+    let request = request.body(Body::from(body.to_owned())).expect("a request");
+    app.clone().oneshot(request).await.expect("it answers")
+}
+
+async fn text(response: Response) -> String {
+    let bytes = axum::body::to_bytes(response.into_body(), 1 << 20).await.expect("it ends");
+    String::from_utf8(bytes.to_vec()).expect("text")
+}
+
+#[tokio::test]
+async fn nothing_but_the_token_of_this_launch_opens_the_page() {
+    let (app, access, _counter) = server(None);
+    for path in ["/", "/api/state", "/api/openapi.json", "/page/main.js", "/ws", "/login"] {
+        let response = ask(&app, "GET", path, &[("origin", "http://127.0.0.1:8402")], "").await;
+        assert_eq!(response.status(), StatusCode::UNAUTHORIZED, "{path}");
+    }
+    let wrong = ask(&app, "GET", "/?token=00000000000000000000000000000000", &[], "").await;
+    assert_eq!(wrong.status(), StatusCode::UNAUTHORIZED);
+    let opened = ask(&app, "GET", &format!("/?token={}", token(&access)), &[], "").await;
+    assert_eq!((opened.status(), &opened.headers()["location"]), (StatusCode::SEE_OTHER, &"/".parse().expect("text")));
+    let cookie = opened.headers()["set-cookie"].to_str().expect("text").to_owned();
+    assert!(cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict"), "{cookie}");
+    assert!(!cookie.contains(&token(&access)), "the token is not the cookie");
+    let cookie = cookie.split(';').next().expect("its value");
+    let page = ask(&app, "GET", "/", &[("cookie", cookie)], "").await;
+    assert_eq!(page.status(), StatusCode::OK);
+    assert!(page.headers()["content-security-policy"].to_str().expect("text").contains("script-src 'self'"));
+    assert!(text(page).await.contains("/page/main.js"));
+    let bearer = format!("Bearer {}", token(&access));
+    assert_eq!(ask(&app, "GET", "/api/state", &[("authorization", &bearer)], "").await.status(), StatusCode::OK);
+    let other = [("cookie", "ferrodrive_studio_8402=00000000000000000000000000000000")];
+    assert_eq!(ask(&app, "GET", "/api/state", &other, "").await.status(), StatusCode::UNAUTHORIZED);
+}
+
+#[tokio::test]
+async fn a_page_of_another_site_changes_nothing_even_with_the_cookie() {
+    let (app, access, mut counter) = server(None);
+    let bearer = format!("Bearer {}", token(&access));
+    let of = |origin: &'static str| [("authorization", bearer.clone()), ("origin", origin.to_owned())];
+    for origin in [
+        "http://evil.example",
+        "http://127.0.0.1:8403",
+        "https://127.0.0.1:8402",
+        "http://127.0.0.1:8402.evil.example",
+        "http://localhost:8402",
+        "null",
+        "",
+    ] {
+        let headers = of(origin);
+        let headers: Vec<_> = headers.iter().map(|(name, value)| (*name, value.as_str())).collect();
+        for (method, path) in [("POST", "/api/stop"), ("GET", "/ws")] {
+            let response = ask(&app, method, path, &headers, "").await;
+            assert_eq!(response.status(), StatusCode::FORBIDDEN, "{origin} {path}");
+        }
+    }
+    let without = ask(&app, "POST", "/api/stop", &[("authorization", &bearer)], "").await;
+    assert_eq!(without.status(), StatusCode::FORBIDDEN, "no Origin at all");
+    assert!(!counter.stops.has_changed().expect("there is a desk"), "nothing was stopped");
+    let own = of("http://127.0.0.1:8402");
+    let own: Vec<_> = own.iter().map(|(name, value)| (*name, value.as_str())).collect();
+    assert_eq!(ask(&app, "POST", "/api/stop", &own, "").await.status(), StatusCode::ACCEPTED);
+    assert!(counter.stops.has_changed().expect("there is a desk"));
+    counter.stops.mark_unchanged();
+    let renamed = [("authorization", bearer.as_str()), ("host", "evil.example:8402")];
+    assert_eq!(ask(&app, "GET", "/api/state", &renamed, "").await.status(), StatusCode::FORBIDDEN);
+}
+
+#[tokio::test]
+async fn a_get_moves_and_stops_nothing() {
+    let (app, access, counter) = server(None);
+    let bearer = format!("Bearer {}", token(&access));
+    let headers = [("authorization", bearer.as_str()), ("origin", "http://127.0.0.1:8402")];
+    let stop = ask(&app, "GET", "/api/stop", &headers, "").await;
+    assert_eq!(stop.status(), StatusCode::METHOD_NOT_ALLOWED);
+    assert!(!counter.stops.has_changed().expect("there is a desk"));
+}
+
+#[tokio::test]
+async fn the_document_tells_of_every_request_and_of_no_other() {
+    let (app, access, _counter) = server(None);
+    let bearer = format!("Bearer {}", token(&access));
+    let headers = [("authorization", bearer.as_str()), ("origin", "http://127.0.0.1:8402")];
+    let document = text(ask(&app, "GET", "/api/openapi.json", &headers, "").await).await;
+    let document: Value = serde_json::from_str(&document).expect("JSON");
+    assert_eq!(document, openapi::document());
+    let paths = document["paths"].as_object().expect("paths");
+    assert_eq!(paths.len(), ROUTES.len());
+    for (path, operations) in paths {
+        for (method, operation) in operations.as_object().expect("operations") {
+            let response = ask(&app, &method.to_uppercase(), path, &headers, "").await;
+            let status = response.status();
+            assert!(status != StatusCode::NOT_FOUND && status != StatusCode::METHOD_NOT_ALLOWED, "{method} {path}");
+            let told = operation["responses"].as_object().expect("responses");
+            // A plain request cannot become a socket.
+            assert!(path == "/ws" || told.contains_key(status.as_str()), "{method} {path}: {status}");
+        }
+        let other = ask(&app, "PUT", path, &headers, "").await;
+        assert_eq!(other.status(), StatusCode::METHOD_NOT_ALLOWED, "{path}");
+    }
+    assert_eq!(ask(&app, "GET", "/api/move", &headers, "").await.status(), StatusCode::NOT_FOUND);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_password_opens_and_a_wrong_one_costs_time() {
+    let (app, _access, _counter) = server(Some("correct horse battery"));
+    let origin = [("origin", "http://127.0.0.1:8402")];
+    let page = ask(&app, "GET", "/", &[], "").await;
+    assert_eq!((page.status(), &page.headers()["location"]), (StatusCode::SEE_OTHER, &"/login".parse().expect("text")));
+    assert_eq!(ask(&app, "GET", "/login", &[], "").await.status(), StatusCode::OK);
+    let guess = ask(&app, "POST", "/api/login", &origin, r#"{"password":"correct horse"}"#);
+    let mut guess = std::pin::pin!(guess);
+    let at_once = tokio::time::timeout(Duration::from_millis(500), guess.as_mut()).await;
+    assert!(at_once.is_err(), "so that nobody guesses fast");
+    let meanwhile = ask(&app, "POST", "/api/login", &origin, r#"{"password":"correct horse battery"}"#).await;
+    assert_eq!(guess.await.status(), StatusCode::UNAUTHORIZED);
+    assert_eq!(meanwhile.status(), StatusCode::TOO_MANY_REQUESTS, "nor many at a time");
+    assert_eq!(ask(&app, "POST", "/api/login", &origin, "password=x").await.status(), StatusCode::BAD_REQUEST);
+    let foreign = [("origin", "http://evil.example")];
+    let body = r#"{"password":"correct horse battery"}"#;
+    assert_eq!(ask(&app, "POST", "/api/login", &foreign, body).await.status(), StatusCode::FORBIDDEN);
+    let right = ask(&app, "POST", "/api/login", &origin, body).await;
+    assert_eq!(right.status(), StatusCode::OK);
+    let cookie = right.headers()["set-cookie"].to_str().expect("text").split(';').next().expect("a value").to_owned();
+    assert_eq!(ask(&app, "GET", "/api/state", &[("cookie", &cookie)], "").await.status(), StatusCode::OK);
+    let large = "x".repeat(LARGEST_MESSAGE + 1);
+    assert_eq!(ask(&app, "POST", "/api/login", &origin, &large).await.status(), StatusCode::PAYLOAD_TOO_LARGE);
+}
+
+/// A server at a port of its own, whose host answers that everything is done.
+async fn listening() -> (Arc<Access>, Desk, tokio::sync::watch::Sender<Picture>) {
+    let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
+    let access = Arc::new(Access::new(listener.local_addr().expect("bound"), None).expect("loopback"));
+    let (desk, counter) = desk();
+    let Counter { mut wishes, pictures, .. } = counter;
+    let served = app(desk.clone(), Arc::clone(&access));
+    tokio::spawn(async move { axum::serve(listener, served).await });
+    tokio::spawn(async move {
+        let mut authority = Authority::default();
+        while let Some(wish) = wishes.recv().await {
+            match wish {
+                Wish::Join { lifeline, welcome } => {
+                    let _ = welcome.send(authority.join());
+                    drop(lifeline);
+                }
+                Wish::Do { session, seq, answer, .. } => {
+                    let _ = answer.send(match authority.accept(session, seq) {
+                        Ok(()) => Answer::done(seq, Vec::new()),
+                        Err(refusal) => Answer::failed(Some(seq), refusal.kind(), refusal.to_string()),
+                    });
+                }
+            }
+        }
+    });
+    (access, desk, pictures)
+}
+
+fn host_of(access: &Access) -> String {
+    access.url().trim_start_matches("http://").split('/').next().expect("a host").to_owned()
+}
+
+async fn open(access: &Access, origin: &str) -> Result<Socket, SocketError> {
+    let mut request = format!("ws://{}/ws", host_of(access)).into_client_request().expect("an address");
+    let bearer = format!("Bearer {}", token(access));
+    request.headers_mut().insert("authorization", bearer.parse().expect("text"));
+    request.headers_mut().insert("origin", origin.parse().expect("text"));
+    let opened = tokio::time::timeout(PATIENCE, tokio_tungstenite::connect_async(request)).await;
+    opened.expect("it answers").map(|(socket, _)| socket)
+}
+
+async fn page(access: &Access) -> (Socket, Value) {
+    let mut socket = open(access, &format!("http://{}", host_of(access))).await.expect("it is let in");
+    let welcome = next(&mut socket).await.expect("a welcome");
+    assert_eq!(welcome["type"], "welcome");
+    (socket, welcome)
+}
+
+/// The next message; `None` at the end of the connection.
+async fn next(socket: &mut Socket) -> Option<Value> {
+    loop {
+        match tokio::time::timeout(PATIENCE, socket.next()).await.expect("something comes")? {
+            Ok(Message::Text(text)) => return Some(serde_json::from_str(&text).expect("JSON")),
+            Ok(Message::Close(_)) | Err(_) => return None,
+            Ok(_) => {}
+        }
+    }
+}
+
+async fn tell(socket: &mut Socket, text: String) -> Option<Value> {
+    socket.send(Message::Text(text.into())).await.ok()?;
+    next(socket).await
+}
+
+#[tokio::test]
+async fn a_socket_is_for_pages_of_this_server() {
+    let (access, _desk, _pictures) = listening().await;
+    for origin in ["http://evil.example", "http://127.0.0.1", "null"] {
+        let Err(SocketError::Http(response)) = open(&access, origin).await else { panic!("{origin} came in") };
+        assert_eq!(response.status(), StatusCode::FORBIDDEN, "{origin}");
+    }
+}
+
+#[tokio::test]
+async fn messages_that_make_no_sense_are_answered_and_the_next_one_is_heard() {
+    let (access, _desk, _pictures) = listening().await;
+    let (mut socket, welcome) = page(&access).await;
+    let (_, elsewhere) = page(&access).await;
+    let message = |seq: u64, word: &Value| format!(r#"{{"seq":{seq},"session":{word},"do":"alive"}}"#);
+    for (text, kind) in [
+        (String::new(), "malformed"),
+        ("\u{0}".into(), "malformed"),
+        ("[".repeat(5000), "malformed"),
+        (message(1, &"x".into()), "foreign_session"),
+        (message(1, &elsewhere["word"]), "foreign_session"),
+    ] {
+        let answer = tell(&mut socket, text).await.expect("it is answered");
+        assert_eq!((&answer["ok"], &answer["error"]["kind"]), (&false.into(), &kind.into()));
+    }
+    let heard = tell(&mut socket, message(1, &welcome["word"])).await.expect("it is answered");
+    assert_eq!((&heard["ok"], &heard["seq"]), (&true.into(), &1.into()));
+    let again = tell(&mut socket, message(1, &welcome["word"])).await.expect("it is answered");
+    assert_eq!(again["error"]["kind"], "replayed");
+    socket.send(Message::Binary(vec![0; 9].into())).await.expect("sent");
+    assert_eq!(next(&mut socket).await.expect("answered")["error"]["kind"], "malformed");
+}
+
+#[tokio::test]
+async fn a_message_that_is_too_large_ends_its_connection() {
+    let (access, _desk, _pictures) = listening().await;
+    let (mut socket, _) = page(&access).await;
+    assert_eq!(tell(&mut socket, " ".repeat(LARGEST_MESSAGE + 1)).await, None);
+}
+
+#[tokio::test]
+async fn two_hundred_pages_are_all_shown_the_newest_picture() {
+    let (access, _desk, pictures) = listening().await;
+    let mut pages = Vec::new();
+    for _ in 0..200 {
+        pages.push(page(&access).await.0);
+    }
+    pictures.send_replace(Picture { number: 7, json: r#"{"type":"state","number":7}"#.into() });
+    for socket in &mut pages {
+        // What came before the page did is no loss of its.
+        let told = next(socket).await.expect("a picture");
+        let shown = if told["type"] == "dropped" { next(socket).await.expect("a picture") } else { told };
+        assert_eq!(shown["number"], 7);
+    }
+}
+
+#[tokio::test]
+async fn a_page_that_reads_slowly_is_told_how_much_it_missed_and_costs_no_more_memory() {
+    let (access, desk, pictures) = listening().await;
+    let (mut socket, _) = page(&access).await;
+    // More than what lies in the buffers of two sockets, by far.
+    let filling = "x".repeat(256 << 10);
+    let count = 200;
+    for number in 1..=count {
+        let json = format!(r#"{{"type":"state","number":{number},"filling":"{filling}"}}"#);
+        pictures.send_replace(Picture { number, json: json.into() });
+        tokio::task::yield_now().await;
+    }
+    assert_eq!(desk.pictures().borrow().number, count, "nobody waited for the page");
+    let (mut shown, mut missed) = (0, 0);
+    loop {
+        let told = next(&mut socket).await.expect("a picture, or how many were missed");
+        match told["type"].as_str() {
+            Some("dropped") => missed += told["count"].as_u64().expect("a number"),
+            _ => {
+                shown += 1;
+                if told["number"] == count {
+                    break;
+                }
+            }
+        }
+    }
+    assert_eq!(shown + missed, count, "each is shown or counted");
+    assert!(missed > 0, "a picture has no room for all of them to wait");
+}
