@@ -213,7 +213,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Boot(boot) => boot.run(global, format),
         Command::Plan(plan) => plan.run(global, format),
         Command::Check(check) => {
-            let report = check.run()?;
+            let report = check.run(global)?;
             judged(format, &report, report.failure(check.strict()))
         }
         Command::Plot(plot) => print(format, &plot.draw()?),

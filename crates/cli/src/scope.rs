@@ -97,9 +97,9 @@ const UNHEEDED: [Unheeded; 13] = [
     },
     Unheeded {
         command: "check",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG],
-        why: "it reads files, and sends nothing",
-        next: "leave it away; the file that is checked says everything",
+        options: &[MODEL, MACHINE],
+        why: "the file that is checked says which models are where",
+        next: "leave it away",
     },
     Unheeded {
         command: "readings",
@@ -116,6 +116,13 @@ const OBJECTS_OF_A_MODEL: Unheeded = Unheeded {
     next: "leave it away, or give a node-ID in place of the model",
 };
 
+const CHECK_OF_A_FILE: Unheeded = Unheeded {
+    command: "check",
+    options: &[TIMEOUT, VERBOSE, REALTIME, LOG],
+    why: "without a bus it reads files, and sends nothing",
+    next: "leave it away, or give --bus to have the drives asked that are there",
+};
+
 /// Refuses typed options that the command does not heed, and options that contradict each other.
 pub(crate) fn refuse_unheeded(global: &Global, command: &Command, matches: &ArgMatches) -> Result<(), Failure> {
     let typed = |option: &str| matches.value_source(option) == Some(ValueSource::CommandLine);
@@ -124,7 +131,9 @@ pub(crate) fn refuse_unheeded(global: &Global, command: &Command, matches: &ArgM
     let given = |option: &&&str| typed(option) && (**option != BUS || global.bus != BusSpec::Sim { file: None });
     let of_model = matches!(command, Command::Objects(objects) if matches!(objects.whose, Whose::Model(_)));
     let name = matches.subcommand_name().unwrap_or_default();
-    let rows = UNHEEDED.iter().filter(|row| row.command == name).chain(of_model.then_some(&OBJECTS_OF_A_MODEL));
+    let of_file = matches!(command, Command::Check(_)) && global.bus == BusSpec::Sim { file: None };
+    let special = of_model.then_some(&OBJECTS_OF_A_MODEL).into_iter().chain(of_file.then_some(&CHECK_OF_A_FILE));
+    let rows = UNHEEDED.iter().filter(|row| row.command == name).chain(special);
     for row in rows {
         if let Some(option) = row.options.iter().find(given) {
             return Err(Failure::usage(format!("--{} means nothing to {name}", spelled(option)))

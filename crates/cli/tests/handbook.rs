@@ -113,7 +113,7 @@ fn every_command_of_the_other_pages_ends_well() {
     assert_eq!(follow("add-an-object.md"), 0);
     assert_eq!(follow("add-a-drive.md"), 2);
     assert_eq!(follow("adapters.md"), 3);
-    assert_eq!(follow("ros2-canopen.md"), 2);
+    assert_eq!(follow("ros2-canopen.md"), 3);
     assert_eq!(follow("write-a-scenario.md"), 2);
     assert_eq!(follow("plan-a-bus.md"), 1);
     assert_eq!(follow("why-it-does-not-move.md"), 3);

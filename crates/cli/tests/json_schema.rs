@@ -142,12 +142,15 @@ fn files_and_logs_are_told_of_in_the_same_form() {
     let made = ferrodrive(&["eds", "zlac8030l", "--json"]).json()["eds"].as_str().expect("a text").to_owned();
     std::fs::write(&sheet, made).unwrap();
     // A heartbeat that is too slow is a warning, a node-ID that is none an error.
+    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.toml");
+    let sim = format!("sim:{example}");
     let bus = path("bus.yml");
     let text = "master: {node_id: 127, heartbeat_producer: 100}\nwheel: {node_id: 4, dcf: a.eds, heartbeat_producer: 1000}\nx: {node_id: 0}\n";
     std::fs::write(&bus, text).unwrap();
     for (arguments, definition) in [
         (&["eds", "lint", &sheet][..], "eds_lint"),
         (&["check", &bus], "check"),
+        (&["--bus", &sim, "check", example], "check"),
         (&["params", "diff", "4", &values], "params_diff"),
         (&["params", "plan", "4", &values], "params_plan"),
         (&["params", "verify", "4", &values], "params_verify"),

@@ -3,9 +3,16 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use canopen::NodeId;
+use std::time::Duration;
+
+use can::Bitrate;
+use canopen::{Mux, NodeId};
 use eds::Sheet;
-use testbench::check::{Checked, Finding, Place, Severity, of_bus_yml, of_machine};
+use master::Network;
+use sim::machine::{Order, order};
+use sim::wire::WireEvent;
+use sim::{World, block_on};
+use testbench::check::{Checked, Finding, LiveNode, Place, Severity, of_bus_yml, of_machine};
 use testbench::models;
 
 /// A folder with the data sheets of these models.
@@ -302,6 +309,81 @@ fn what_cannot_be_foretold_says_why() {
     assert!(checked.predict().is_none());
     let told = checked.findings.iter().find(|finding| finding.rule == "prediction").unwrap();
     assert!(told.what.contains("no data sheet"), "{told:?}");
+}
+
+/// A live bus: these models at these nodes, switched on for a second. What `during` does is done to it before it is asked.
+fn asked(
+    checked: &mut Checked,
+    drives: &[(&str, u8)],
+    during: impl AsyncFnOnce(&Network),
+) -> (Vec<LiveNode>, Vec<String>) {
+    let (mut world, network) = (World::new(Bitrate::K500, 3), Network::new());
+    world.add_station(network.clone());
+    for (model, node) in drives {
+        let (model, id) = (models::resolve(model).unwrap(), NodeId::new(*node).unwrap());
+        world.add_drive(*node, order(model, &Order::new(model, id, Bitrate::K500)).unwrap()).unwrap();
+    }
+    world.run_for(Duration::from_secs(1));
+    block_on(&mut world, during(&network)).unwrap();
+    while world.log_mut().pull().is_some() {}
+    let live = block_on(&mut world, checked.ask(&network, |node| network.node(node))).unwrap();
+    let frames = std::iter::from_fn(|| world.log_mut().pull());
+    let sent = frames.filter_map(|event| match event {
+        WireEvent::Frame { frame, .. } => Some(frame.to_string()),
+        _ => None,
+    });
+    (live, sent.collect())
+}
+
+#[test]
+fn live_drives_are_only_read() {
+    let lines = [BEATS, "sdo: [{index: 0x6083, value: 150}]"];
+    let mut checked = of_bus_yml(&bus(Z, &lines), &sheets("reads", &[Z])).unwrap();
+    let (live, frames) = asked(&mut checked, &[(Z, 4)], async |_| ());
+    assert!(live[0].answers && live[0].compared > 10, "{live:?}");
+    // The identity of both ZLTECH drives (their manuals, 1018h).
+    assert_eq!(
+        (live[0].vendor_id, live[0].product_code, live[0].device_type),
+        (Some(0x100), Some(1), Some(0x0004_0192))
+    );
+    let asked: Vec<_> = frames.iter().filter(|frame| frame.starts_with("604#")).collect();
+    // CiA 301, 7.2.4.3.5: an initiate upload, or a segment of one (60h, 70h); nothing else but answers and heartbeats.
+    let reads = |frame: &&String| ["604#40", "604#60", "604#70"].iter().any(|read| frame.starts_with(read));
+    assert!(asked.len() > 20 && asked.iter().all(|frame| reads(frame)), "{asked:?}");
+    assert!(frames.iter().all(|frame| ["604#", "584#", "704#"].iter().any(|id| frame.starts_with(id))), "{frames:?}");
+    // 6083h is 100 ms as delivered, and the heartbeat 0 or other than 200: the file writes both.
+    let differ: Vec<_> = live[0].deviations.iter().map(|deviation| deviation.object.as_str()).collect();
+    assert_eq!(differ, ["1017h:00", "6083h:00"]);
+    assert!(placed(&checked).contains(&("live-value", Severity::Note, 9)), "{:#?}", checked.findings);
+    assert!(!rules(&checked).iter().any(|(rule, _)| *rule == "live-sheet"), "{:#?}", checked.findings);
+    // A note is no warning: the boot-up writes what differs.
+    assert_eq!(checked.count(Severity::Error), 0, "{:#?}", checked.findings);
+}
+
+#[test]
+fn drives_that_are_not_as_the_file_means_are_told() {
+    let clean = |name: &str| of_bus_yml(&bus(Z, &[BEATS]), &sheets(name, &[Z])).unwrap();
+    // Nobody there, and somebody whom the file does not have.
+    let mut checked = clean("nobody");
+    let (live, _) = asked(&mut checked, &[(J, 9)], async |_| ());
+    assert!(!live[0].answers);
+    assert!(placed(&checked).contains(&("live-silent", Severity::Error, 5)), "{:#?}", checked.findings);
+    assert!(rules(&checked).contains(&("live-stranger", Severity::Warning)), "{:#?}", checked.findings);
+    // Another device at the node.
+    let mut checked = clean("other");
+    let (live, _) = asked(&mut checked, &[("cia402", 4)], async |_| ());
+    assert_eq!(live[0].product_code, Some(402));
+    let told = checked.findings.iter().find(|finding| finding.rule == "live-identity").unwrap();
+    assert!(told.severity == Severity::Error && told.what.contains("to be 40192h"), "{told:?}");
+    // A PDO that is not as the sheet says: the generator would leave it so.
+    let mut checked = clean("sheet");
+    let change = async |network: &Network| {
+        let node = network.node(NodeId::new(4).unwrap());
+        node.write(Mux::new(0x1800, 2), 7_u8).await.unwrap();
+    };
+    asked(&mut checked, &[(Z, 4)], change);
+    let told = checked.findings.iter().find(|finding| finding.rule == "live-sheet").unwrap();
+    assert!(told.severity == Severity::Warning && told.what.contains("1800h:02 has 7h"), "{told:?}");
 }
 
 const DRIVE: &str = "[[drive]]\nmodel = \"zlac8030l\"\nnode = 4\n";

@@ -3,25 +3,30 @@
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use testbench::check::{self, Checked, CheckedNode, Finding, Prediction, Severity};
+use testbench::check::{self, Checked, CheckedNode, Finding, LiveNode, Prediction, Severity};
 use testbench::document::{BadFile, read_text};
 
 use crate::failure::{Failure, FailureBody};
+use crate::global::Global;
 use crate::output::Report;
 use crate::paint::Paint;
 use crate::plain::plain;
+use crate::session;
 use crate::table::Table;
+use transport::BusSpec;
 
 /// Check the description of a bus: a bus.yml of ros2_canopen with its data sheets, or a machine file
 ///
-/// Nothing is sent. A bus.yml (also what Lely's dcfgen reads) is held against its EDS files and against what is known of the drives that
+/// A bus.yml (also what Lely's dcfgen reads) is held against its EDS files and against what is known of the drives that
 /// they describe: node-IDs, heartbeats, boot times, PDOs, drivers. A machine file is read and its machine built. Then the bus that the
 /// file means is booted in virtual time: each node with the letter of CiA 302-2 with which its boot-up ends, and the frames that are sent
-/// afterwards with the load of the bus. Ends with status 1 if there is an error, with --strict also for a warning.
+/// afterwards with the load of the bus. Nothing is sent, unless a bus is named: with --bus the drives that are there are asked who they
+/// are and what they have, by reads alone. Ends with status 1 if there is an error, with --strict also for a warning.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     ferrodrive check config/bus.yml\n  \
     ferrodrive check machine.toml\n  \
+    ferrodrive --bus can0 check config/bus.yml          # and the drives that are there\n  \
     ferrodrive --json check bus.yml")]
 pub(crate) struct Check {
     /// NAME.yml, NAME.yaml or NAME.toml
@@ -48,11 +53,13 @@ pub(crate) struct CheckReport {
     findings: Vec<Finding>,
     /// How the bus boots and what is sent then; `null` if the file does not say enough for that.
     predicted: Option<Prediction>,
+    /// The drives that were asked; `null` if no bus was named.
+    live: Option<Vec<LiveNode>>,
 }
 
 impl Check {
-    /// Looks into the file.
-    pub(crate) fn run(&self) -> Result<CheckReport, Failure> {
+    /// Looks into the file, and where a bus is named at its drives.
+    pub(crate) fn run(&self, global: &Global) -> Result<CheckReport, Failure> {
         let file = self.file.display().to_string();
         let ending = self.file.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
         let mut checked = match ending {
@@ -67,11 +74,20 @@ impl Check {
             }
         };
         let predicted = checked.predict();
+        // The bus of this command alone has nobody that the file means.
+        let live = match global.bus {
+            BusSpec::Sim { file: None } => None,
+            _ => Some(session::run(global, async |context| {
+                let asked = checked.ask(&context.network, |node| context.node(node)).await;
+                context.settle().await;
+                Ok(asked)
+            })?),
+        };
         let Checked { nodes, findings, .. } = checked;
         let count = |severity| findings.iter().filter(|finding: &&Finding| finding.severity == severity).count();
         let (errors, warnings, notes) = (count(Severity::Error), count(Severity::Warning), count(Severity::Note));
         let mut report =
-            CheckReport { ok: true, error: None, file, nodes, errors, warnings, notes, findings, predicted };
+            CheckReport { ok: true, error: None, file, nodes, errors, warnings, notes, findings, predicted, live };
         let failure = report.failure(self.strict);
         report.ok = failure.is_none();
         report.error = failure.as_ref().map(FailureBody::from);
@@ -136,6 +152,9 @@ impl Report for CheckReport {
         if let Some(predicted) = &self.predicted {
             text += &foretold(predicted, paint);
         }
+        if let Some(live) = &self.live {
+            text += &asked(live, paint);
+        }
         let counts = format!("{} errors, {} warnings, {} notes", self.errors, self.warnings, self.notes);
         let counts = if self.errors > 0 { paint.bad(&counts) } else { paint.good(&counts) };
         format!("{text}\n{counts}")
@@ -168,4 +187,35 @@ fn foretold(predicted: &Prediction, paint: Paint) -> String {
     text +=
         &format!("\n\n{}\nbus load {load:.1} % of {rate} kbit/s at most, at a cycle of {cycle}\n", frames.plain(paint));
     text
+}
+
+/// Who is on the bus.
+fn asked(live: &[LiveNode], paint: Paint) -> String {
+    let mut table = Table::new(&[
+        "node",
+        "name",
+        "type",
+        "vendor",
+        "product",
+        "revision",
+        "software",
+        "heartbeat",
+        "as in the file",
+    ]);
+    let hex = |number: Option<u32>| number.map_or_else(|| "-".to_owned(), |number| format!("{number:X}h"));
+    for node in live {
+        let same = format!("{} of {}", node.compared - node.deviations.len().min(node.compared), node.compared);
+        table.row([
+            node.node.to_string(),
+            plain(&node.name),
+            hex(node.device_type),
+            hex(node.vendor_id),
+            hex(node.product_code),
+            hex(node.revision_number),
+            node.software.as_deref().map_or_else(|| "-".to_owned(), plain),
+            node.heartbeat_ms.map_or_else(|| "-".to_owned(), |ms| format!("{ms} ms")),
+            if node.answers { same } else { paint.bad("no answer") },
+        ]);
+    }
+    format!("\n\n{}\n{}\n", paint.strong("on the bus"), table.plain(paint))
 }

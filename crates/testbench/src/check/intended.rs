@@ -42,6 +42,8 @@ pub struct IntendedNode {
     pub description: &'static Description,
     /// What is written to it.
     pub writes: Vec<Planned>,
+    /// What else of its communication is taken from its data sheet, and is not written because it stands there: heartbeats and PDOs.
+    pub of_sheet: BTreeMap<Mux, Vec<u8>>,
 }
 
 impl IntendedNode {
@@ -85,7 +87,13 @@ pub(super) fn of_bus_yml(bus: &Bus, devices: &[Option<Device>]) -> Result<Intend
         if slave.assignment.has(Assignment::BOOT) {
             plan.nodes.insert(node, expectation(slave, device, &writes, description));
         }
-        let intended = IntendedNode { name: slave.name.clone(), at: slave.at, description, writes };
+        let intended = IntendedNode {
+            name: slave.name.clone(),
+            at: slave.at,
+            description,
+            of_sheet: of_sheet(device, node, &writes),
+            writes,
+        };
         if node == own || nodes.insert(node, intended).is_some() {
             return Err(format!("node-ID {node} is there twice"));
         }
@@ -104,6 +112,19 @@ pub(super) fn of_bus_yml(bus: &Bus, devices: &[Option<Device>]) -> Result<Intend
         host_heartbeat: beat.map(|period| (own, period)),
         at: bus.master.sync_period_us.as_ref().map_or(bus.master.at, |period| period.at),
     })
+}
+
+/// The heartbeats and PDOs of a sheet that are not written.
+fn of_sheet(device: &Device, node: NodeId, writes: &[Planned]) -> BTreeMap<Mux, Vec<u8>> {
+    let is_taken = |index: u16| matches!(index, 0x1016 | 0x1017 | 0x1400..=0x1BFF);
+    let variables =
+        device.eds.variables().filter(|(index, variable)| is_taken(*index) && variable.access.is_readable());
+    let values = variables.filter_map(|(index, variable)| {
+        let object = Mux::new(index, variable.sub_index);
+        let size = usize::from(variable.data_type.bits()?.div_ceil(8)).min(16);
+        Some((object, device.value(object, Some(node))?.to_le_bytes()[..size].to_vec()))
+    });
+    values.filter(|(object, _)| !writes.iter().any(|write| write.object == *object)).collect()
 }
 
 /// More than this is no patience but a slip in a unit.

@@ -110,7 +110,8 @@ fn intended(machine: &Machine, places: &BTreeMap<u8, Places>) -> Intended {
         };
         let writes = configuration.iter().map(write).collect();
         plan.nodes.insert(node, Expectation { configuration: configuration.clone(), ..Expectation::of(model) });
-        nodes.insert(node, IntendedNode { name: model.name.to_owned(), at, description: model, writes });
+        let (name, of_sheet) = (model.name.to_owned(), BTreeMap::new());
+        nodes.insert(node, IntendedNode { name, at, description: model, writes, of_sheet });
     }
     Intended {
         plan,

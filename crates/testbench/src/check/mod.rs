@@ -1,13 +1,15 @@
 //! A description of a bus, held against what its data sheets and the known models say, before anything is started.
 //!
 //! [`of_bus_yml`] reads the `bus.yml` of ros2_canopen; what goes wrong with such a bus is a table of rules. [`of_machine`]
-//! takes a machine file. [`Checked::predict`] then boots the bus that is meant, with virtual drives of its models in virtual time.
+//! takes a machine file. [`Checked::predict`] then boots the bus that is meant, with virtual drives of its models in virtual time, and
+//! [`Checked::ask`] holds it against the drives of a live one.
 
 mod bus_yml;
 mod device;
 mod finding;
 mod generated;
 mod intended;
+mod live;
 mod machine;
 mod predict;
 mod traps;
@@ -15,12 +17,15 @@ mod yaml;
 
 use std::path::Path;
 
+use canopen::NodeId;
+use master::{Network, Node};
 use serde::Serialize;
 use sim::World;
 
 pub use finding::{Finding, Findings, Place, Severity};
 pub use generated::Planned;
 pub use intended::{Intended, IntendedNode};
+pub use live::{LiveDeviation, LiveNode};
 pub use machine::of_machine;
 pub use predict::{PredictedFrame, PredictedNode, Prediction};
 
@@ -82,6 +87,17 @@ impl Checked {
 }
 
 impl Checked {
+    /// Asks the drives of a live bus who they are and what they have, and adds what differs to the findings. Reads only. `node_of`
+    /// gives a node with the caller's patience for answers. Nothing where no bus can be made of the file.
+    pub async fn ask(&mut self, network: &Network, node_of: impl Fn(NodeId) -> Node) -> Vec<LiveNode> {
+        let Ok(intended) = &self.intended else { return Vec::new() };
+        let mut found = Findings::of(std::mem::take(&mut self.findings));
+        let mut report = Reporter { found: &mut found, rule: "live", node: None };
+        let live = live::ask(intended, network, node_of, &mut report).await;
+        self.findings = found.into_sorted();
+        live
+    }
+
     /// The bus that is meant, without its master.
     fn world(&self, intended: &Intended) -> Result<World, String> {
         match &self.machine {
