@@ -3,9 +3,9 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    boot, check, completions, convert, dcf, decode, demo, drive, dump, eds, emcy, events, explain, export, gateway,
-    home, latency, lss, man_pages, motion, nmt, objects, params, pdo, plan, plot, read, readings, record, replay, run,
-    scan, sdo, send, sim, store, studio, sync, time, watch, world,
+    boot, check, completions, convert, dcf, decode, demo, drive, drive_base, dump, eds, emcy, events, explain, export,
+    gateway, group, home, latency, lss, man_pages, motion, nmt, objects, params, pdo, plan, plot, read, readings,
+    record, replay, run, scan, sdo, send, sim, store, studio, sync, time, watch, world,
 };
 use crate::global::Global;
 
@@ -60,6 +60,8 @@ pub(crate) enum Command {
     Move(motion::Move),
     Torque(motion::Torque),
     Home(home::Home),
+    Group(group::GroupCommand),
+    DriveBase(drive_base::DriveBase),
     Latency(latency::Latency),
     Record(record::Record),
     Export(export::Export),

@@ -1,5 +1,6 @@
 //! What every command takes from the command line.
 
+use std::path::Path;
 use std::time::Duration;
 
 use canopen::NodeId;
@@ -55,4 +56,18 @@ pub(crate) struct Global {
     /// Longest wait for each answer of a node
     #[arg(long, value_name = "TIME", value_parser = master::units::parse_duration, default_value = "500ms", global = true)]
     pub(crate) timeout: Duration,
+}
+
+impl Global {
+    /// The command line with a machine file that a command names itself: on the virtual bus of a command's own, its drives are
+    /// there.
+    pub(crate) fn on_machine(&self, path: &Path, machine: &Machine) -> Self {
+        let mut global = self.clone();
+        if matches!(global.bus, BusSpec::Sim { file: None }) {
+            global.bus = BusSpec::Sim { file: Some(path.to_owned()) };
+        } else {
+            global.machine = Some(machine.clone());
+        }
+        global
+    }
 }

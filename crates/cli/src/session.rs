@@ -71,14 +71,20 @@ pub(crate) fn runtime() -> Result<tokio::runtime::Runtime, Failure> {
 /// The world that `--bus sim` or `--bus sim:FILE.toml` means, and which drives are in it.
 pub(crate) fn virtual_world(file: Option<&Path>) -> Result<Embedded, Failure> {
     let Some(path) = file else { return embedded::world() };
-    let unusable = |reason: String| {
-        Failure::usage(format!("cannot use the machine file {}", path.display()))
-            .because(reason)
-            .next(machine_file::example())
-    };
-    let machine = machine_file::read(path).map_err(unusable)?;
-    let world = machine.build().map_err(|bad| unusable(bad.named(path.display().to_string()).to_string()))?;
+    let machine = read_machine(path)?;
+    let world = machine.build().map_err(|bad| unusable(path, bad.named(path.display().to_string()).to_string()))?;
     Ok((world, machine.models().collect()))
+}
+
+/// The machine file that a command names.
+pub(crate) fn read_machine(path: &Path) -> Result<Machine, Failure> {
+    machine_file::read(path).map_err(|reason| unusable(path, reason))
+}
+
+fn unusable(path: &Path, reason: String) -> Failure {
+    Failure::usage(format!("cannot use the machine file {}", path.display()))
+        .because(reason)
+        .next(machine_file::example())
 }
 
 fn virtual_bus<R>(

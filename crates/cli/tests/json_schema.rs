@@ -7,6 +7,8 @@ use serde_json::{Value, json};
 
 const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/scenarios/homing_stuck_switch.toml");
 
+const BASE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/base.toml");
+
 /// Each command line, and the definition that each line of it is an instance of.
 const COMMANDS: &[(&[&str], &str)] = &[
     (&["scan"], "scan"),
@@ -55,6 +57,10 @@ const COMMANDS: &[(&[&str], &str)] = &[
     (&["params", "rollback", "4"], "failure"),
     (&["params", "apply", "4", "/no/such/file.toml"], "failure"),
     (&["latency", "4", "--count", "20"], "latency"),
+    (&["group", "move", "1=10deg", "4=10deg"], "group_move"),
+    (&["group", "move", "1=10deg", "--within", "1ms"], "failure"),
+    (&["drive-base", BASE, "--linear", "0.2", "--for", "500ms"], "drive_base"),
+    (&["drive-base"], "failure"),
     (&["boot"], "boot"),
     (&["boot", "--node", "9"], "boot"),
     (&["plan", "--mode", "4=pv"], "plan"),

@@ -26,7 +26,11 @@ pub struct BaseLimits {
 }
 
 impl BaseLimits {
-    pub(super) fn check(&self) -> Result<(), BaseError> {
+    /// That each value is one that a base can have.
+    ///
+    /// # Errors
+    /// [`BaseError::BadLimit`].
+    pub fn check(&self) -> Result<(), BaseError> {
         let values = [
             ("linear_m_s", self.linear_m_s),
             ("angular_rad_s", self.angular_rad_s),

@@ -6,6 +6,7 @@
 
 mod bodies;
 mod configuration;
+mod motion;
 mod surroundings;
 
 use std::collections::BTreeMap;
@@ -25,6 +26,7 @@ use crate::words::drive::DriveSpec;
 use crate::words::node::node;
 use bodies::Joined;
 pub use configuration::{mapped, pdo_id};
+pub use motion::{AxisPlan, BasePlan, GroupPlan, WATCHDOG};
 
 const EXAMPLE: &str =
     "[[drive]]\n           model = \"zlac8030l\"\n           node = 4\n           load = { torque_nm = 0.5 }";
@@ -36,7 +38,7 @@ pub const SEED: u64 = 1;
 const MOST_DRIVES: usize = 127;
 
 /// What a machine file may say of its bus.
-pub const BUS_KEYS: &[&str] = &["bitrate", "seed", "realism", "timing", "drive", "body"];
+pub const BUS_KEYS: &[&str] = &["bitrate", "seed", "realism", "timing", "drive", "body", "group", "base"];
 
 /// What it may say of a drive.
 pub const DRIVE_KEYS: &[&str] = &[
@@ -71,6 +73,10 @@ pub struct Machine {
     pub timing: Option<TimingMode>,
     /// The drives, each at a node of its own.
     pub drives: Vec<Placed>,
+    /// Those that a master moves as one.
+    pub groups: Vec<GroupPlan>,
+    /// The base that a master drives.
+    pub base: Option<BasePlan>,
     /// What they move together.
     pub(crate) bodies: Vec<Joined>,
 }
@@ -175,6 +181,8 @@ impl Machine {
                 Err(problem) => problems.push(problem),
             }
         }
+        let nodes: Vec<_> = machine.drives.iter().map(|drive| drive.spec.node).collect();
+        (machine.groups, machine.base) = motion::read(file, &nodes, &mut problems);
         if none && problems.is_empty() {
             problems.push(Problem::new(file.place(), "it has no [[drive]]"));
         }

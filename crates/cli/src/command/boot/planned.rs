@@ -6,18 +6,18 @@ use std::path::{Path, PathBuf};
 use canopen::{Mux, NodeId};
 use eds::{Eds, Value};
 use master::boot::{BootPlan, Expectation};
-use testbench::machine_file::{self, Machine};
-use transport::BusSpec;
+use testbench::machine_file::Machine;
 
 use crate::command::eds::source;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::global::Global;
+use crate::session;
 
 /// A file, as far as it can be read without the bus.
 pub(crate) enum Planned {
     /// A machine file.
-    Machine(PathBuf, Machine),
+    Machine(PathBuf, Box<Machine>),
     /// A manager's dictionary: the values that its DCF gives, as SDO carries them.
     Manager(BTreeMap<Mux, Vec<u8>>),
     /// None: what the command line and the bus say.
@@ -32,14 +32,7 @@ impl Planned {
         let Some(path) = file else { return Ok(Self::Bus) };
         let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
         match ending.as_deref().and_then(|ending| ending.to_str()) {
-            Some("toml") => {
-                let machine = machine_file::read(path).map_err(|reason| {
-                    Failure::usage(format!("cannot use the machine file {}", path.display()))
-                        .because(reason)
-                        .next(machine_file::example())
-                })?;
-                Ok(Self::Machine(path.to_owned(), machine))
-            }
+            Some("toml") => Ok(Self::Machine(path.to_owned(), Box::new(session::read_machine(path)?))),
             Some("dcf" | "eds") => Ok(Self::Manager(values(path)?)),
             _ => Err(Failure::usage(format!("what kind of file is {}?", path.display()))
                 .next("expected a machine file, FILE.toml, or the DCF of a CANopen manager, FILE.dcf")),
@@ -48,15 +41,10 @@ impl Planned {
 
     /// The command line with what the file says: on the virtual bus of a command's own, its drives are there.
     pub(crate) fn global(&self, global: &Global) -> Global {
-        let mut global = global.clone();
-        if let Self::Machine(path, machine) = self {
-            if matches!(global.bus, BusSpec::Sim { file: None }) {
-                global.bus = BusSpec::Sim { file: Some(path.clone()) };
-            } else {
-                global.machine = Some(machine.clone());
-            }
+        match self {
+            Self::Machine(path, machine) => global.on_machine(path, machine),
+            Self::Manager(_) | Self::Bus => global.clone(),
         }
-        global
     }
 
     /// The plan, for these nodes alone if there are any.

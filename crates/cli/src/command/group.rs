@@ -1,0 +1,492 @@
+//! `ferrodrive group`: several axes as one motion.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use canopen::NodeId;
+use cia402::ModeOfOperation;
+use master::Drive;
+use master::cyclic::CyclicOptions;
+use master::group::{AxisLimits, AxisSetup, Group, GroupError, Phase};
+use master::units::{Angle, Ramp, Rpm, Shown, Turns, parse_duration};
+use serde::Serialize;
+use testbench::machine_file::GroupPlan;
+use testbench::words::mode::mode;
+use testbench::words::node::node;
+
+use super::motion::speed;
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::global::Global;
+use crate::guard::{Guard, GuardArgs, GuardReport};
+use crate::output::{Format, Report};
+use crate::paint::Paint;
+use crate::session;
+use crate::table::Table;
+
+/// What counts where neither the file nor the command line says it.
+const PERIOD: Duration = Duration::from_millis(5);
+const VELOCITY_TURNS_S: f64 = 0.5;
+const ACCELERATION_TURNS_S2: f64 = 1.0;
+const FOLLOWING_ERROR_TURNS: f64 = 0.2;
+/// Jerk is an acceleration in this time.
+const ROUNDING: Duration = Duration::from_millis(100);
+
+/// How long the shafts may take to come to their last set-points before it is looked where they are.
+const SETTLING: Duration = Duration::from_millis(500);
+
+/// How often a person is shown how far the move has come.
+const PROGRESS_PERIOD: Duration = Duration::from_millis(200);
+
+/// Modes in which an axis takes a set-point each cycle, the best first: positions, then speeds with the position loop here.
+const MODES: [ModeOfOperation; 4] = [
+    ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION,
+    ModeOfOperation::INTERPOLATED_POSITION,
+    ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY,
+    ModeOfOperation::PROFILE_VELOCITY,
+];
+
+/// Move several axes as one
+///
+/// All begin with one SYNC and end together, on paths that are limited in speed, acceleration and jerk. When one drive faults, is lost
+/// or lags, all come to rest. Afterwards the drives have no power.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    ferrodrive group move 1=90deg 4=0.5turn --within 3s            # what it may do: see group move --help\n  \
+    ferrodrive group move examples/machine.toml 1=90deg 2=-45deg   # limits, modes and period by its [[group]]\n  \
+    ferrodrive --bus can0 group move machine.toml --relative 1=10deg 2=10deg")]
+pub(crate) struct GroupCommand {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    Move(Move),
+}
+
+/// Move axes to positions, together
+///
+/// With a machine file that has a [[group]], the axes that are not named stay where they are. Where nothing is said an axis may do 30 r/min
+/// and 60 (r/min)/s, within 100 ms of it, and lag by 0.2 turns. A drive that takes no positions in cycles is moved by speeds.
+#[derive(Debug, clap::Args)]
+struct Move {
+    /// Machine file, and the positions of the nodes: 1=90deg 4=0.5turn 2=-3000 (counts)
+    #[arg(value_name = "FILE.toml|NODE=POSITION", required = true, value_parser = word)]
+    words: Vec<Word>,
+    /// Which [[group]] of the file (default: the one that has the nodes)
+    #[arg(long, value_name = "NAME")]
+    group: Option<String>,
+    /// Turn by this much from where each axis is, instead of to it
+    #[arg(long)]
+    relative: bool,
+    /// Take this long, instead of the shortest time within the limits
+    #[arg(long, value_name = "TIME", value_parser = parse_duration)]
+    within: Option<Duration>,
+    /// Highest speed of each axis
+    #[arg(long, value_name = "SPEED", value_parser = speed)]
+    velocity: Option<Rpm>,
+    /// Highest acceleration of each axis: 120rpm/s, 12.6rad/s2
+    #[arg(long, value_name = "RATE", value_parser = rate)]
+    acceleration: Option<f64>,
+    /// How long the acceleration takes to reach its highest value, which limits the jerk
+    #[arg(long, value_name = "TIME", value_parser = parse_duration)]
+    rounding: Option<Duration>,
+    /// How far a shaft may be from its set-point before all are stopped
+    #[arg(long, value_name = "ANGLE")]
+    following_error: Option<Angle>,
+    /// From one SYNC to the next (default: the file's, or 5ms)
+    #[arg(long, value_name = "TIME", value_parser = parse_duration)]
+    period: Option<Duration>,
+    /// Mode of operation of each axis (default: the file's, or the first of csp, ip, csv, pv that its model has)
+    #[arg(long, value_name = "MODE", value_parser = mode)]
+    mode: Option<ModeOfOperation>,
+    #[command(flatten)]
+    cycles: CycleArgs,
+    #[command(flatten)]
+    guard: GuardArgs,
+}
+
+/// How late a host may be.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub(super) struct CycleArgs {
+    /// Cycles in a row that this command may be late for, or a drive's TPDO, before all are stopped
+    #[arg(long, value_name = "CYCLES", default_value_t = 2, value_parser = clap::value_parser!(u32).range(0..=100))]
+    tolerance: u32,
+}
+
+impl CycleArgs {
+    /// Drives that are guarded already, as the command line has it.
+    pub(super) const fn options(self) -> CyclicOptions {
+        CyclicOptions { guard: None, tolerance: self.tolerance }
+    }
+}
+
+/// A machine file, or where an axis is to go.
+#[derive(Clone, Debug)]
+enum Word {
+    File(PathBuf),
+    Target(NodeId, Angle),
+}
+
+fn word(text: &str) -> Result<Word, String> {
+    match text.split_once('=') {
+        Some((number, angle)) => {
+            let angle = angle.parse().map_err(|error| format!("{error}"))?;
+            Ok(Word::Target(node(number)?, angle))
+        }
+        None if Path::new(text).extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) => {
+            Ok(Word::File(text.into()))
+        }
+        None => Err("expected a machine file, FILE.toml, or NODE=POSITION, e.g. 1=90deg".into()),
+    }
+}
+
+/// A rate in turns/s^2.
+fn rate(text: &str) -> Result<f64, String> {
+    match text.parse::<Ramp>() {
+        Ok(Ramp::RpmPerSecond(rate)) if rate > 0.0 => Ok(rate / 60.0),
+        Ok(_) => Err("expected a rate above 0, e.g. 120rpm/s: the way to a speed that changes has no one time".into()),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// What came of a move.
+#[derive(Debug, Serialize)]
+pub(crate) struct GroupMoved {
+    /// How long the path takes.
+    time_s: f64,
+    period_ms: f64,
+    /// Cycles that the path was late for.
+    missed_cycles: u64,
+    axes: Vec<AxisMoved>,
+}
+
+#[derive(Debug, Serialize)]
+struct AxisMoved {
+    node: u8,
+    mode: String,
+    from_deg: f64,
+    to_deg: f64,
+    at_deg: f64,
+    /// On the way.
+    largest_following_error_deg: f64,
+    limits: Limits,
+    guard: GuardReport,
+}
+
+#[derive(Debug, Serialize)]
+struct Limits {
+    /// `null` for an axis without software limits.
+    range_deg: Option<[f64; 2]>,
+    velocity_rpm: f64,
+    acceleration_rpm_s: f64,
+    jerk_rpm_s2: f64,
+    following_error_deg: f64,
+}
+
+impl From<&AxisLimits> for Limits {
+    fn from(limits: &AxisLimits) -> Self {
+        Self {
+            range_deg: limits.range_turns.as_ref().map(|range| [range.start() * 360.0, range.end() * 360.0]),
+            velocity_rpm: limits.velocity_turns_s * 60.0,
+            acceleration_rpm_s: limits.acceleration_turns_s2 * 60.0,
+            jerk_rpm_s2: limits.jerk_turns_s3 * 60.0,
+            following_error_deg: limits.following_error_turns * 360.0,
+        }
+    }
+}
+
+/// The axes, and where each is to go; `None` for one that stays.
+struct Planned {
+    axes: Vec<AxisSetup>,
+    targets: Vec<Option<Turns>>,
+    period: Duration,
+}
+
+/// What was seen on the way.
+struct Seen {
+    time: Duration,
+    from: Vec<f64>,
+    to: Vec<f64>,
+    at: Vec<f64>,
+    largest_turns: Vec<f64>,
+    missed_cycles: u64,
+}
+
+impl GroupCommand {
+    /// Does what is asked for, and prints it.
+    pub(crate) fn run(&self, global: &Global, format: Format) -> Result<(), Failure> {
+        let What::Move(command) = &self.what;
+        let report = session::run(&command.global(global)?, async |context| command.run(context).await)?;
+        format.print(&report).map_err(Failure::of_stdout)
+    }
+}
+
+impl Move {
+    fn global(&self, global: &Global) -> Result<Global, Failure> {
+        let mut files =
+            self.words.iter().filter_map(|word| if let Word::File(path) = word { Some(path) } else { None });
+        let Some(path) = files.next() else { return Ok(global.clone()) };
+        if let Some(other) = files.next() {
+            return Err(Failure::usage(format!("two machine files: {} and {}", path.display(), other.display())));
+        }
+        Ok(global.on_machine(path, &session::read_machine(path)?))
+    }
+
+    fn targets(&self) -> impl Iterator<Item = (NodeId, Angle)> {
+        self.words
+            .iter()
+            .filter_map(|word| if let Word::Target(node, angle) = word { Some((*node, *angle)) } else { None })
+    }
+
+    async fn run(&self, context: &Context) -> Result<GroupMoved, Failure> {
+        let planned = self.plan(context).await?;
+        let mut guards = Vec::new();
+        for axis in &planned.axes {
+            guards.push(self.guard.begin(context, &axis.drive).await?);
+        }
+        let opened = Group::open(&planned.axes, planned.period, self.cycles.options()).await;
+        let moved = match opened {
+            Ok(mut group) => {
+                let moved = self.carry_out(context, &mut group, &planned).await;
+                let closed = group.close().await.map_err(failure);
+                moved.and_then(|seen| closed.map(|()| seen))
+            }
+            Err(error) => Err(failure(error)),
+        };
+        let guards = end_guards(context, guards, planned.axes.iter().map(|axis| &axis.drive)).await;
+        Ok(GroupMoved::new(&planned, moved?, guards?))
+    }
+
+    /// Which axes, how far each may go, and where to: all of it before anything moves.
+    async fn plan(&self, context: &Context) -> Result<Planned, Failure> {
+        let targets: Vec<_> = self.targets().collect();
+        if targets.is_empty() {
+            return Err(Failure::usage("no axis is named").next("say where each is to go: 1=90deg 4=0.5turn"));
+        }
+        for (position, (node, _)) in targets.iter().enumerate() {
+            if targets[..position].iter().any(|(other, _)| other == node) {
+                return Err(Failure::usage(format!("node {node} gets two positions")).at_node(*node));
+            }
+        }
+        let plan = self.of_file(context, &targets)?;
+        let nodes: Vec<_> = match plan {
+            Some(plan) => plan.axes.iter().map(|axis| axis.node).collect(),
+            None => targets.iter().map(|(node, _)| *node).collect(),
+        };
+        let period = self.period.or(plan.and_then(|plan| plan.period)).unwrap_or(PERIOD);
+        let mut planned = Planned { axes: Vec::new(), targets: Vec::new(), period };
+        for (index, node) in nodes.into_iter().enumerate() {
+            let drive = context.known_drive(node).await?;
+            let said = plan.map(|plan| &plan.axes[index]);
+            let mode = self.mode.or(said.and_then(|axis| axis.mode));
+            let mode = mode.map_or_else(|| best_mode(&drive), Ok)?;
+            let limits = self.limits(&drive, said.map(|axis| &axis.limits)).await?;
+            let target = targets.iter().find(|(other, _)| *other == node);
+            planned.targets.push(match target {
+                Some((_, angle)) => Some(turns_of(&drive, *angle).await?),
+                None => None,
+            });
+            planned.axes.push(AxisSetup { drive, mode, limits });
+        }
+        Ok(planned)
+    }
+
+    /// The group of the machine file, if there is a file with groups.
+    fn of_file<'a>(&self, context: &'a Context, targets: &[(NodeId, Angle)]) -> Result<Option<&'a GroupPlan>, Failure> {
+        let groups = context.machine.as_ref().map_or(&[][..], |machine| &machine.groups);
+        let names = || groups.iter().map(|group| group.name.as_str()).collect::<Vec<_>>().join(", ");
+        let has = |group: &&GroupPlan, node: NodeId| group.axes.iter().any(|axis| axis.node == node);
+        let Some(name) = &self.group else {
+            let found = groups.iter().find(|group| targets.iter().all(|(node, _)| has(group, *node)));
+            // Limits that the file has for an axis are not passed over because of its neighbour.
+            let parted = groups.iter().any(|group| targets.iter().any(|(node, _)| has(&group, *node)));
+            if found.is_none() && parted {
+                return Err(Failure::usage("these nodes are not in one [[group]] of the machine file")
+                    .next(format!("move those of one group together; its groups: {}", names())));
+            }
+            return Ok(found);
+        };
+        let Some(group) = groups.iter().find(|group| group.name == *name) else {
+            let failure = Failure::usage(format!("there is no group '{name}'"));
+            return Err(match groups {
+                [] => failure.next("a group is a [[group]] of a machine file (docs/machine-file.md); give that file"),
+                _ => failure.next(format!("the machine file has: {}", names())),
+            });
+        };
+        match targets.iter().find(|(node, _)| !has(&group, *node)) {
+            Some((node, _)) => {
+                Err(Failure::usage(format!("node {node} is no axis of the group '{name}'")).at_node(*node))
+            }
+            None => Ok(Some(group)),
+        }
+    }
+
+    /// What an axis may do: as the command line says, else the file, else as a careful person would begin.
+    async fn limits(&self, drive: &Drive, said: Option<&AxisLimits>) -> Result<AxisLimits, Failure> {
+        let velocity_turns_s = self.velocity.map(|Rpm(rpm)| rpm / 60.0);
+        let following = match self.following_error {
+            Some(angle) => Some(turns_of(drive, angle).await?.0),
+            None => None,
+        };
+        let acceleration = self.acceleration.or(said.map(|limits| limits.acceleration_turns_s2));
+        let acceleration_turns_s2 = acceleration.unwrap_or(ACCELERATION_TURNS_S2);
+        let by_rounding = |time: Duration| acceleration_turns_s2 / time.as_secs_f64();
+        let jerk = self.rounding.map(by_rounding).or(said.map(|limits| limits.jerk_turns_s3));
+        Ok(AxisLimits {
+            range_turns: said.and_then(|limits| limits.range_turns.clone()),
+            velocity_turns_s: velocity_turns_s
+                .or(said.map(|limits| limits.velocity_turns_s))
+                .unwrap_or(VELOCITY_TURNS_S),
+            acceleration_turns_s2,
+            jerk_turns_s3: jerk.unwrap_or_else(|| by_rounding(ROUNDING)),
+            following_error_turns: following
+                .or(said.map(|limits| limits.following_error_turns))
+                .unwrap_or(FOLLOWING_ERROR_TURNS),
+        })
+    }
+
+    /// Enables, moves and lets the shafts settle. What stops it is told in the words of its drive.
+    async fn carry_out(&self, context: &Context, group: &mut Group, planned: &Planned) -> Result<Seen, Failure> {
+        match self.follow(context, group, planned).await {
+            Ok(seen) => Ok(seen),
+            Err(error) => {
+                let stopped = matches!(error, GroupError::Stopped(_));
+                let failure = failure(error);
+                let reason = if stopped { group.explain_stop().await } else { None };
+                Err(reason.into_iter().fold(failure, Failure::because))
+            }
+        }
+    }
+
+    async fn follow(&self, context: &Context, group: &mut Group, planned: &Planned) -> Result<Seen, GroupError> {
+        context.progress.show(format!("enabling {} axes", planned.axes.len()));
+        group.enable().await?;
+        let from: Vec<_> = group.points().iter().map(|point| point.position_turns).collect();
+        let goal = |(from, target): (&f64, &Option<Turns>)| match target {
+            Some(Turns(by)) if self.relative => from + by,
+            Some(Turns(to)) => *to,
+            None => *from,
+        };
+        let to: Vec<_> = from.iter().zip(&planned.targets).map(goal).collect();
+        let goals: Vec<_> = to.iter().copied().map(Turns).collect();
+        let time = group.start_move(&goals, self.within)?;
+        let mut largest_turns = vec![0.0_f64; from.len()];
+        let began = context.network.now();
+        let mut shown = began;
+        loop {
+            let phase = group.cycle().await?.phase;
+            let errors = group.following_errors().map(Option::unwrap_or_default);
+            largest_turns.iter_mut().zip(errors).for_each(|(largest, error)| *largest = largest.max(error));
+            if phase != Phase::Moving {
+                break;
+            }
+            let now = context.network.now();
+            if now - shown >= PROGRESS_PERIOD {
+                shown = now;
+                let (gone, whole) = ((now - began).as_secs_f64(), time.as_secs_f64());
+                context.progress.show(format!("moving {} axes: {gone:.1} of {whole:.1} s", from.len()));
+            }
+        }
+        group.rest().await?;
+        let settled = context.network.now() + SETTLING;
+        while context.network.now() < settled {
+            group.cycle().await?;
+        }
+        group.rest().await?;
+        let at = group.axes().iter().zip(&to).map(|(state, to)| state.position.map_or(*to, |Turns(at)| at)).collect();
+        Ok(Seen { time, from, to, at, largest_turns, missed_cycles: group.state().missed_cycles })
+    }
+}
+
+/// Releases what was guarded, whatever became of the motion.
+pub(super) async fn end_guards<'a>(
+    context: &Context,
+    guards: Vec<Guard>,
+    drives: impl Iterator<Item = &'a Drive>,
+) -> Result<Vec<GuardReport>, Failure> {
+    let mut reports = Vec::new();
+    for (guard, drive) in guards.into_iter().zip(drives) {
+        reports.push(guard.end(context, drive, false).await?.0);
+    }
+    Ok(reports)
+}
+
+async fn turns_of(drive: &Drive, angle: Angle) -> Result<Turns, Failure> {
+    match angle {
+        Angle::Turns(turns) => Ok(Turns(turns)),
+        Angle::Counts(counts) => Ok(Turns(counts as f64 / drive.counts_per_turn().await?)),
+    }
+}
+
+fn best_mode(drive: &Drive) -> Result<ModeOfOperation, Failure> {
+    let modes = drive.axis_description().map(|axis| axis.modes);
+    let best = MODES.into_iter().find(|mode| modes.is_some_and(|modes| modes.contains(mode)));
+    let node = drive.node().id();
+    best.ok_or_else(|| {
+        Failure::new(format!("node {node} has no mode in which it could be an axis of a group: csp, ip, csv or pv"))
+            .at_node(node)
+    })
+}
+
+/// What a group has to say, for people and programs.
+fn failure(error: GroupError) -> Failure {
+    match error {
+        GroupError::Drive(error) => error.into(),
+        GroupError::Path(_) | GroupError::Period { .. } | GroupError::BeyondDrive { .. } => {
+            Failure::usage(error.to_string())
+        }
+        error => Failure::new(error.to_string()).of_kind("group"),
+    }
+}
+
+impl GroupMoved {
+    fn new(planned: &Planned, seen: Seen, guards: Vec<GuardReport>) -> Self {
+        let axes = planned.axes.iter().zip(guards).enumerate().map(|(index, (axis, guard))| AxisMoved {
+            node: axis.drive.node().id().raw(),
+            mode: axis.mode.name().unwrap_or("of its maker").to_owned(),
+            from_deg: seen.from[index] * 360.0,
+            to_deg: seen.to[index] * 360.0,
+            at_deg: seen.at[index] * 360.0,
+            largest_following_error_deg: seen.largest_turns[index] * 360.0,
+            limits: (&axis.limits).into(),
+            guard,
+        });
+        Self {
+            time_s: seen.time.as_secs_f64(),
+            period_ms: planned.period.as_secs_f64() * 1e3,
+            missed_cycles: seen.missed_cycles,
+            axes: axes.collect(),
+        }
+    }
+}
+
+impl Report for GroupMoved {
+    fn text(&self, paint: Paint) -> String {
+        let moved = match self.axes.len() {
+            1 => format!("the axis moved in {:.3} s", self.time_s),
+            axes => format!("{axes} axes moved together in {:.3} s", self.time_s),
+        };
+        let missed = match self.missed_cycles {
+            0 => String::new(),
+            missed => format!(", later by {missed} missed cycles"),
+        };
+        let head = format!("{}{missed}; no power now", paint.good(&moved));
+        let mut table = Table::new(&["node", "mode", "from", "to", "at", "largest lag", "limits"]);
+        for axis in &self.axes {
+            let deg = |value: f64| format!("{} deg", Shown(value));
+            let Limits { range_deg, velocity_rpm, acceleration_rpm_s, .. } = axis.limits;
+            let range =
+                range_deg.map_or(String::new(), |[low, high]| format!(", {} to {} deg", Shown(low), Shown(high)));
+            let limits = format!("{} r/min, {} (r/min)/s{range}", Shown(velocity_rpm), Shown(acceleration_rpm_s));
+            let cells = [axis.from_deg, axis.to_deg, axis.at_deg, axis.largest_following_error_deg].map(deg);
+            let [from, to, at, lag] = cells;
+            table.row([axis.node.to_string(), axis.mode.clone(), from, to, at, lag, limits]);
+        }
+        let guards = self.axes.iter().map(|axis| format!("  guard   node {}: {}", axis.node, axis.guard.text));
+        let mut lines = vec![head, table.plain(paint)];
+        lines.extend(guards);
+        lines.join("\n")
+    }
+}
