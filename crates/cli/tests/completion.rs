@@ -142,6 +142,24 @@ fn an_interactive_bash_completes_behind_colons_and_equals_signs() {
     }
 }
 
+#[test]
+fn fish_completes_behind_an_address() {
+    if !is_there("fish") {
+        return eprintln!("skipped: there is no fish here");
+    }
+    let cache = scratch("fish");
+    let file = cache.join("ferrodrive.fish");
+    std::fs::create_dir_all(&cache).unwrap();
+    std::fs::write(&file, done(&["completions", "fish"]).out).unwrap();
+    let line = "ferrodrive --bus socketcand://127.0.0.1:29536/can0 --model 4=zlac8030l read 4 position_actual_v";
+    let mut fish = with_the_program("fish", &cache);
+    fish.args(["--no-config", "-c", &format!("source {}; complete -C '{line}'", file.display())]).env("HOME", &cache);
+    let ended = fish.output().unwrap();
+    // An offer and its help, with a tab between.
+    let said = String::from_utf8(ended.stdout).unwrap();
+    assert_eq!(said.split('\t').next(), Some("position_actual_value"), "{said}{}", String::from_utf8_lossy(&ended.stderr));
+}
+
 /// `script` (util-linux) gives a command a terminal; without it this is not tried.
 #[test]
 fn at_a_terminal_a_guess_is_said_once_and_the_nodes_are_remembered() {

@@ -55,12 +55,19 @@ impl Completions {
             let written = shell.write_registration(ASKED_BY, "ferrodrive", "ferrodrive", "ferrodrive", &mut script);
             written.map_err(|error| Failure::new("cannot make the script").because(error))?;
         }
+        if matches!(self.shell, Shell::Zsh) {
+            script.extend_from_slice(ZSH_AUTOLOAD.as_bytes());
+        }
         print(&script).map_err(Failure::of_stdout)
     }
 }
 
 /// The script for bash; the other shells have that of `clap_complete`, whose protocol it speaks.
 const BASH: &str = include_str!("completions.bash");
+
+/// A file of $fpath is read when it is first asked: it has to answer that press of the Tab key too.
+const ZSH_AUTOLOAD: &str =
+    "if [[ $funcstack[1] == _ferrodrive ]]; then\n    _clap_dynamic_completer_ferrodrive \"$@\"\nfi\n";
 
 /// The variable by which a script asks, that of bash too.
 pub(crate) const ASKED_BY: &str = "FERRODRIVE_COMPLETE";
