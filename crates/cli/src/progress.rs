@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use terminal_size::Width;
+
 use crate::plain::plain;
 
 /// One line on standard error that says what is being waited for; nothing if that is no terminal.
@@ -74,6 +76,11 @@ impl Screen {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stdout());
         bar.set_style(ProgressStyle::with_template("{msg}").ok()?);
         Some(Self { bar })
+    }
+
+    /// How many characters a line has; it may change at any time.
+    pub(crate) fn width() -> usize {
+        terminal_size::terminal_size().map_or(80, |(Width(width), _)| width.into())
     }
 
     /// Shows `text` in place of what was shown before.

@@ -41,6 +41,26 @@ impl Table {
         self.text(paint, |_, _, _| None)
     }
 
+    /// The same for a screen of so many columns: the last columns are left out while more than `least` are there, then the last one
+    /// that stays is cut.
+    pub(crate) fn narrowed(mut self, screen: usize, least: usize) -> Self {
+        let whole = |widths: &[usize]| widths.iter().map(|width| width + 2).sum::<usize>() - 2;
+        while self.headings.len() > least && whole(&self.widths()) > screen {
+            self.headings.pop();
+            let columns = self.headings.len();
+            self.rows.iter_mut().for_each(|row| row.truncate(columns));
+        }
+        let widths = self.widths();
+        let (Some(last), too_many) = (widths.last(), whole(&widths).saturating_sub(screen)) else { return self };
+        let (room, column) = (last.saturating_sub(too_many).max(1), widths.len() - 1);
+        for cell in self.rows.iter_mut().filter_map(|row| row.get_mut(column)) {
+            if cell.chars().count() > room {
+                *cell = cell.chars().take(room - 1).chain(['…']).collect();
+            }
+        }
+        self
+    }
+
     fn widths(&self) -> Vec<usize> {
         let widest = |column: usize| {
             let cells = self.rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count());
@@ -71,5 +91,16 @@ mod tests {
         table.row(["4", "a drive"]);
         table.row(["127", "°C"]);
         assert_eq!(table.plain(Paint::OFF), "node  is\n4     a drive\n127   °C");
+    }
+
+    #[test]
+    fn a_narrow_screen_has_the_first_columns_whole_and_the_last_one_cut() {
+        let mut table = Table::new(&["node", "is", "seen"]);
+        table.row(["4", "a drive", "never"]);
+        let at = |width, least| table.clone().narrowed(width, least).plain(Paint::OFF);
+        assert_eq!(at(20, 1), "node  is       seen\n4     a drive  never");
+        assert_eq!(at(19, 1), "node  is\n4     a drive");
+        assert_eq!(at(10, 2), "node  is\n4     a d…");
+        assert_eq!(at(3, 1), "node\n4");
     }
 }

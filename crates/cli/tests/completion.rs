@@ -157,7 +157,12 @@ fn fish_completes_behind_an_address() {
     let ended = fish.output().unwrap();
     // An offer and its help, with a tab between.
     let said = String::from_utf8(ended.stdout).unwrap();
-    assert_eq!(said.split('\t').next(), Some("position_actual_value"), "{said}{}", String::from_utf8_lossy(&ended.stderr));
+    assert_eq!(
+        said.split('\t').next(),
+        Some("position_actual_value"),
+        "{said}{}",
+        String::from_utf8_lossy(&ended.stderr)
+    );
 }
 
 /// `script` (util-linux) gives a command a terminal; without it this is not tried.

@@ -87,6 +87,10 @@ impl Watch {
         let repeat = Repeat { every: Some(self.every), count: self.count };
         let times = if self.duration.is_some() { None } else { repeat.times(context)? };
         let mut screen = (!format.json).then(Screen::on_terminal).flatten();
+        if screen.is_some() {
+            // One of the two draws on the terminal.
+            context.progress.clear();
+        }
         let looks = async {
             let mut pace = Pace::new(&context.network, self.every);
             let mut looks = 0;
@@ -198,6 +202,8 @@ fn table(watched: &[Watched], look: &Look, paint: Paint) -> String {
         ]);
     }
     let heading = format!("node {} at {:.1} s; Ctrl-C ends it", look.node, look.t);
+    // The values stay; the extremes are on a wide screen alone.
+    let table = table.narrowed(Screen::width(), 3);
     format!("{}\n{}", paint.dim(&heading), table.plain(paint))
 }
 
