@@ -34,6 +34,8 @@ laws_hold! {
     any_bytes_are_kept_as_they_are_and_what_they_say_can_be_written_and_read_again: "eds";
     a_concise_dcf_is_refused_at_its_place_or_is_written_again_as_read: "concise_dcf";
     any_scenario_is_taken_and_can_be_begun_or_is_refused_at_a_place_that_it_has: "scenario";
+    // A run that is whole boots a bus.
+    any_bus_yml_is_taken_or_refused_and_what_is_found_says_where_and_what_to_do: "bus_yml" 1_500;
     any_memory_image_boots_to_values_within_their_limits: "eeprom";
     // Each run is a world of three drives that turn.
     any_world_command_is_answered_and_leaves_every_measurement_a_number: "world_command" 1_500;

@@ -64,7 +64,7 @@ fn each_trap_is_found_at_its_line_and_is_gone_without_it() {
     const L: &str = "zlim42c";
     let folder = sheets("traps", &[J, Z, L]);
     // Model, the lines that are right, the line that is not, the line of the finding, and its rule.
-    let traps: [(&str, &[&str], &str, &str, Severity); 12] = [
+    let traps: [(&str, &[&str], &str, &str, Severity); 17] = [
         (Z, &[], "heartbeat_producer: 1000", "heartbeat", Severity::Warning),
         (Z, &[], "heartbeat_producer: 0", "heartbeat", Severity::Warning),
         (Z, &[BEATS], "boot_timeout_ms: 1000", "boot-timeout", Severity::Error),
@@ -89,6 +89,11 @@ fn each_trap_is_found_at_its_line_and_is_gone_without_it() {
         (Z, &[BEATS], "sdo: [{index: 0x100C, sub_index: 0, value: 100}]", "node-guarding", Severity::Error),
         (Z, &[BEATS], "tpdo: {9: {enabled: true}}", "pdo-number", Severity::Error),
         (Z, &[BEATS], "heartbeat_multiplyer: 3", "shape", Severity::Warning),
+        (Z, &[BEATS], "guard_time: 100", "node-guarding", Severity::Error),
+        (Z, &[BEATS], "sdo: [{index: 0x2999, value: 1}]", "sdo-object", Severity::Error),
+        (Z, &[BEATS], "sdo: [{index: 0x6041, value: 1}]", "sdo-object", Severity::Error),
+        (Z, &[BEATS], "sdo: [{index: 0x6083, value: 0x100000000}]", "sdo-object", Severity::Error),
+        (Z, &[BEATS], "sdo: [{index: 0x6083, value: -1}]", "sdo-object", Severity::Error),
     ];
     for (model, right, wrong, rule, severity) in traps {
         // Where a line that is missing is wrong too, the right one stands in its place.
@@ -262,6 +267,21 @@ fn what_a_drive_will_refuse_is_told_at_its_line_with_the_letter() {
         of_bus_yml(&bus("cia402", &[BEATS, "revision_number: 7"]), &sheets("revision", &["cia402"])).unwrap();
     assert_eq!(checked.predict().unwrap().nodes[0].letter, Some('N'));
     assert!(placed(&checked).contains(&("boot", Severity::Error, 5)), "{:#?}", checked.findings);
+}
+
+/// `examples/ros2_canopen`, as a user has it who follows its README.
+#[test]
+fn the_buses_of_the_examples_pass_and_boot() {
+    let folder = sheets("examples", &[Z, "cia402"]);
+    for (file, nodes) in [("base.yml", &[4, 5][..]), ("servo.yml", &[3])] {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/ros2_canopen/").to_owned() + file;
+        let mut checked = of_bus_yml(&std::fs::read_to_string(path).unwrap(), &folder).unwrap();
+        let predicted = checked.predict().unwrap();
+        let bad = checked.findings.iter().filter(|finding| finding.severity != Severity::Note);
+        assert_eq!(bad.collect::<Vec<_>>(), [] as [&Finding; 0], "{file}");
+        assert_eq!(predicted.nodes.iter().map(|node| node.node).collect::<Vec<_>>(), nodes, "{file}");
+        assert!(predicted.nodes.iter().all(|node| node.letter.is_none()) && predicted.fits, "{file}: {predicted:#?}");
+    }
 }
 
 #[test]

@@ -4,6 +4,7 @@
 //! Each law is a function of bytes that panics when it is broken. [`ALL`] names them with samples to damage.
 
 mod any_frames;
+mod bus_yml;
 mod concise;
 mod control;
 mod eds;
@@ -52,6 +53,7 @@ pub const ALL: &[Law] = &[
     Law { name: "concise_dcf", holds: concise::concise_dcf, samples: concise::SAMPLES },
     Law { name: "eeprom", holds: eeprom::eeprom, samples: eeprom::SAMPLES },
     Law { name: "world_command", holds: world_command::world_command, samples: world_command::SAMPLES },
+    Law { name: "bus_yml", holds: bus_yml::bus_yml, samples: bus_yml::SAMPLES },
     Law { name: "scenario", holds: scenario::scenario, samples: scenario::SAMPLES },
     Law { name: "control", holds: control::control, samples: control::SAMPLES },
     Law { name: "master_core", holds: master_core::master_core, samples: master_core::SAMPLES },

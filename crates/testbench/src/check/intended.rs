@@ -98,17 +98,17 @@ pub(super) fn of_bus_yml(bus: &Bus, devices: &[Option<Device>]) -> Result<Intend
             return Err(format!("node-ID {node} is there twice"));
         }
     }
-    let ms = |ms: i64| u64::try_from(ms).ok().filter(|ms| *ms > 0).map(Duration::from_millis);
+    let ms = |ms: i64| u32::try_from(ms).ok().filter(|ms| *ms > 0).map(|ms| Duration::from_millis(ms.into()));
     let said = bus.nodes.iter().filter_map(|slave| slave.boot_timeout_ms.as_ref()).chain(&bus.master.boot_timeout_ms);
     let longest = said.filter_map(|time| ms(time.value)).max().unwrap_or(BOOT_TIMEOUT);
     plan.boot_time = ms(bus.master.boot_time_ms).unwrap_or(longest).min(LONGEST_BOOT);
-    let cycle = bus.master.sync_period_us.as_ref().and_then(|period| u64::try_from(period.value).ok());
-    let beat = bus.master.heartbeat_producer_ms.as_ref().and_then(|time| ms(time.value));
+    let cycle = bus.master.sync_period_us.as_ref().and_then(|period| u32::try_from(period.value).ok());
+    let beat = bus.master.heartbeat_producer_ms.as_ref().and_then(|time| ms(time.value.min(i64::from(u16::MAX))));
     Ok(Intended {
         plan,
         bitrate: bitrate(bus, &nodes),
         nodes,
-        cycle: cycle.filter(|us| *us > 0).map(Duration::from_micros),
+        cycle: cycle.filter(|us| *us > 0).map(|us| Duration::from_micros(us.into())),
         host_heartbeat: beat.map(|period| (own, period)),
         at: bus.master.sync_period_us.as_ref().map_or(bus.master.at, |period| period.at),
     })

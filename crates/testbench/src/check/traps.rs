@@ -20,7 +20,7 @@ pub(super) struct Case<'a> {
 type Rule = fn(&Case<'_>, &mut Reporter<'_>);
 
 /// The rules of a node, by name.
-pub(super) const RULES: [(&str, Rule); 15] = [
+pub(super) const RULES: [(&str, Rule); 16] = [
     ("node-id", node_id),
     ("no-data-sheet", no_data_sheet),
     ("heartbeat", heartbeat),
@@ -34,6 +34,7 @@ pub(super) const RULES: [(&str, Rule); 15] = [
     ("set-point-by-sync", set_point_by_sync),
     ("flood", flood),
     ("pdo-number", pdo_number),
+    ("sdo-object", sdo_object),
     ("starts-by-itself", starts_by_itself),
     ("alarm-as-state", alarm_as_state),
 ];
@@ -83,6 +84,16 @@ pub(super) fn of_bus(bus: &Bus, report: &mut Reporter<'_>) {
                 format!("{node} is the node-ID of {other} too: both answer each request, and the bus has errors");
             report.say(Severity::Error, at, what, "give each a node-ID of its own; a master is best off with 127");
             report.node = None;
+        }
+    }
+    report.rule = "shape";
+    for (said, most, key, unit) in [
+        (&bus.master.sync_period_us, i64::from(u32::MAX), "sync_period", "us"),
+        (&bus.master.heartbeat_producer_ms, i64::from(u16::MAX), "heartbeat_producer", "ms"),
+    ] {
+        if let Some(said) = said.as_ref().filter(|said| !(0..=most).contains(&said.value)) {
+            let what = format!("`{key}` is {}", said.value);
+            report.say(Severity::Error, said.at, what, format!("expected 0 to {most} ({unit})"));
         }
     }
     report.rule = "master-heartbeat";
@@ -328,6 +339,44 @@ fn pdo_number(case: &Case<'_>, report: &mut Reporter<'_>) {
                 }
                 _ => {}
             }
+        }
+    }
+}
+
+/// What is written by SDO is in the sheet, may be written, and fits its type.
+fn sdo_object(case: &Case<'_>, report: &mut Reporter<'_>) {
+    let Some(device) = case.device else { return };
+    for write in &case.slave.sdo {
+        let object = Mux::new(write.index, write.sub_index);
+        let Some(variable) = device.eds.variable(write.index, write.sub_index) else {
+            let what = format!("its data sheet has no {object}: dcfgen refuses the file");
+            report.say(
+                Severity::Error,
+                write.at,
+                what,
+                "write an object that it has; `ferrodrive eds show` lists them",
+            );
+            continue;
+        };
+        if !variable.access.is_writable() {
+            let what = format!("{object} cannot be written, as its data sheet says: the node does not boot (error J)");
+            report.say(Severity::Error, write.at, what, "leave it away");
+        }
+        match variable.data_type.range() {
+            Some((low, high)) if !(low..=high).contains(&i128::from(write.value)) => {
+                let what = format!("{} does not fit {object}, which goes from {low} to {high}", write.value);
+                report.say(Severity::Error, write.at, what, "give a value within that");
+            }
+            _ => {}
+        }
+    }
+    for (said, most, key) in [
+        (&case.slave.heartbeat_producer_ms, i64::from(u16::MAX), "heartbeat_producer"),
+        (&case.slave.boot_timeout_ms, i64::from(u32::MAX), "boot_timeout_ms"),
+    ] {
+        if let Some(said) = said.as_ref().filter(|said| !(0..=most).contains(&said.value)) {
+            let what = format!("`{key}` is {}", said.value);
+            report.say(Severity::Error, said.at, what, format!("expected 0 to {most} (ms)"));
         }
     }
 }
