@@ -49,3 +49,9 @@ pub(crate) fn master_error(py: Python<'_>, error: &Error, bus: Option<String>) -
     }
     raised
 }
+
+/// What a group or a base says, and what is wrong with the bus.
+pub(crate) fn said(text: &str, bus: Option<String>) -> PyErr {
+    let bus = bus.map(|bus| format!("; {bus}")).unwrap_or_default();
+    classes::MasterError::new_err(format!("{text}{bus}"))
+}

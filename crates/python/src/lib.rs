@@ -24,6 +24,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<world::World>()?;
     module.add_class::<master::Network>()?;
     module.add_class::<master::Job>()?;
+    module.add_class::<master::axes::Group>()?;
+    module.add_class::<master::axes::Base>()?;
     module.add_class::<scenario::Sweep>()?;
     module.add_class::<scenario::Summary>()?;
     module.add_function(wrap_pyfunction!(scenario::run_scenario, module)?)?;

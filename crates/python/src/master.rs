@@ -2,6 +2,7 @@
 //!
 //! Blocking calls and coroutines are two ways to wait for a job; both are in Python (`ferrodrive/master.py`).
 
+pub(crate) mod axes;
 mod job;
 mod runner;
 mod value;
@@ -17,6 +18,7 @@ use pyo3::prelude::*;
 use transport::BusSpec;
 
 pub(crate) use job::Job;
+use job::Trouble;
 use runner::Runner;
 use value::Value;
 
@@ -250,6 +252,15 @@ impl Network {
         &self,
         py: Python<'_>,
         work: impl Future<Output = Result<Value, Error>> + Send + 'static,
+    ) -> PyResult<Job> {
+        self.begin_said(py, async move { work.await.map_err(Trouble::from) })
+    }
+
+    /// As [`begin`](Self::begin), of work that may say more than a drive does.
+    fn begin_said(
+        &self,
+        py: Python<'_>,
+        work: impl Future<Output = Result<Value, Trouble>> + Send + 'static,
     ) -> PyResult<Job> {
         let (job, future) = Job::new(work, &self.runner);
         match &*self.runner {

@@ -23,6 +23,7 @@ Quantities have their units in their names: ``velocity_rpm``, ``current_a``, ``s
 """
 
 from ._native import __version__, eds, models, stimulus_forms
+from .axes import Axis, Base, Group
 from .body import Body
 from .control import Control
 from .errors import BusWarning, FerrodriveError, MasterError, Refused, SimulatorError, Stalled, TimeInUse
@@ -35,11 +36,14 @@ from .world import World
 
 __all__ = [
     "AsyncDrive",
+    "Axis",
+    "Base",
     "Body",
     "BusWarning",
     "Control",
     "Drive",
     "FerrodriveError",
+    "Group",
     "MasterError",
     "Network",
     "Outcome",

@@ -21,11 +21,13 @@ import asyncio
 import atexit
 import warnings
 import weakref
+from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, Optional, Union
 
 from ._native import Job, model_name
 from ._native import Network as NativeNetwork
+from .axes import Axis, Base, Group
 from .errors import BusWarning, MasterError, Stalled
 from .turns import taking_part
 from .world import World
@@ -133,6 +135,51 @@ class Network:
     def async_drive(self, node: int, model: str) -> AsyncDrive:
         """The same with coroutines."""
         return AsyncDrive(self, node, model)
+
+    def group(self, axes: Sequence[Axis], *, period: float = 0.005, tolerance: int = 2) -> Group:
+        """Opens a group of axes that move as one, and enables its drives; nothing moves. Close it, or use it with ``with``.
+
+        :param period: from one SYNC to the next in s, 0.0005 to 0.1
+        :param tolerance: cycles in a row that this program may be late for, or a drive's TPDO, before the drives are stopped
+        """
+        return Group(self, axes, period, tolerance)
+
+    def base(
+        self,
+        left: tuple[int, str],
+        right: tuple[int, str],
+        *,
+        wheel_base_m: float,
+        wheel_radius_m: float,
+        linear_m_s: float,
+        angular_rad_s: float,
+        wheel_m_s: float,
+        wheel_m_s2: float,
+        turns: tuple[float, float] = (1.0, -1.0),
+        mode: str = "pv",
+        watchdog: float = 0.3,
+        period: float = 0.01,
+        tolerance: int = 2,
+    ) -> Base:
+        """Opens a base on two wheels, each a node and its model, and enables both; nothing moves. Close it, or use it with ``with``.
+
+        :param linear_m_s: highest speed along the heading; ``angular_rad_s`` that of the heading, ``wheel_m_s`` that of a wheel over
+            the ground, ``wheel_m_s2`` how fast that may change
+        :param turns: turns of each drive for a turn of its wheel forward; the right one of two hub motors sits the other way round
+        :param watchdog: how long a twist counts, in s
+        """
+        order = {
+            "wheels": ((*left, turns[0]), (*right, turns[1])),
+            "mode": mode,
+            "wheel_base_m": wheel_base_m,
+            "wheel_radius_m": wheel_radius_m,
+            "linear_m_s": linear_m_s,
+            "angular_rad_s": angular_rad_s,
+            "wheel_m_s": wheel_m_s,
+            "wheel_m_s2": wheel_m_s2,
+            "watchdog_s": watchdog,
+        }
+        return Base(self, order, period, tolerance)
 
     def sleep(self, seconds: float) -> None:
         """Lets time pass on the bus, in s."""

@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 
 use super::runner::Runner;
 use super::value::Value;
-use crate::failure::{master_error, wrong_use};
+use crate::failure::{master_error, said, wrong_use};
 use crate::live::Live;
 use crate::world;
 
@@ -27,6 +27,30 @@ pub(crate) struct Job {
     outcome: Arc<Outcome>,
 }
 
+/// Why a job did not do what it should.
+pub(super) enum Trouble {
+    /// What a drive, or the way to it, says.
+    Drive(Error),
+    /// What a group or a base says.
+    Said(String),
+}
+
+impl From<Error> for Trouble {
+    fn from(error: Error) -> Self {
+        Self::Drive(error)
+    }
+}
+
+impl Trouble {
+    /// As Python raises it, with what is wrong with the bus.
+    pub(super) fn raised(&self, py: Python<'_>, bus: Option<String>) -> PyErr {
+        match self {
+            Self::Drive(error) => master_error(py, error, bus),
+            Self::Said(text) => said(text, bus),
+        }
+    }
+}
+
 #[derive(Default)]
 struct Outcome {
     state: Mutex<State>,
@@ -35,7 +59,7 @@ struct Outcome {
 
 #[derive(Default)]
 struct State {
-    result: Option<Result<Value, Error>>,
+    result: Option<Result<Value, Trouble>>,
     /// Nobody wants the result any more, or nobody will ever give it.
     given_up: bool,
     /// Called when it has ended.
@@ -56,7 +80,7 @@ impl Reporter {
         self.0.lock().given_up
     }
 
-    fn tell(&self, result: Option<Result<Value, Error>>) {
+    fn tell(&self, result: Option<Result<Value, Trouble>>) {
         let callback = {
             let mut state = self.0.lock();
             state.given_up = state.given_up || result.is_none();
@@ -89,7 +113,7 @@ impl Drop for Reporter {
 impl Job {
     /// A job, and the future that does it.
     pub(super) fn new(
-        work: impl Future<Output = Result<Value, Error>> + Send + 'static,
+        work: impl Future<Output = Result<Value, Trouble>> + Send + 'static,
         runner: &Arc<Runner>,
     ) -> (Self, world::Job) {
         let outcome = Arc::new(Outcome::default());
@@ -167,7 +191,7 @@ impl Job {
         let lost = || self.runner.with_live(Live::lost).flatten();
         match self.outcome.lock().result.take() {
             Some(Ok(value)) => value.into_python(py),
-            Some(Err(error)) => Err(master_error(py, &error, lost())),
+            Some(Err(trouble)) => Err(trouble.raised(py, lost())),
             None => {
                 Err(wrong_use(lost().unwrap_or_else(|| "it was given up, or the network was closed meanwhile".into())))
             }

@@ -1,0 +1,458 @@
+//! Groups and bases for Python: opened and enabled by one job, stepped in each cycle of SYNC by another one for as long as they are
+//! there, so that the drives are kept while the program does something else, and told where to go by further ones.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use master::base::{Base as MasterBase, BaseError, BaseLimits, BaseState, Geometry, StopCause, Twist, WheelSetup};
+use master::cyclic::CyclicOptions;
+use master::drive::Drive;
+use master::group::{AxisLimits, AxisSetup, Group as MasterGroup, GroupError, Phase, StreamOptions};
+use master::units::Turns;
+use master::{Exchange, Network as Core};
+use pyo3::prelude::*;
+use testbench::words::mode::mode;
+
+use super::job::Trouble;
+use super::value::Value;
+use super::{Job, Network, duration};
+use crate::failure::bad_value;
+use crate::sheets::model_of;
+
+/// Points of a path that are given at once: a tenth of a second at 1 ms.
+const AHEAD: usize = 100;
+
+/// An axis of a group, in plain values.
+#[derive(FromPyObject)]
+pub(crate) struct AxisOrder {
+    #[pyo3(item)]
+    node: u8,
+    #[pyo3(item)]
+    model: String,
+    #[pyo3(item)]
+    mode: String,
+    #[pyo3(item)]
+    range_deg: Option<(f64, f64)>,
+    #[pyo3(item)]
+    velocity_rpm: f64,
+    #[pyo3(item)]
+    acceleration_rpm_s: f64,
+    #[pyo3(item)]
+    jerk_rpm_s2: f64,
+    #[pyo3(item)]
+    following_error_deg: f64,
+}
+
+/// A base, in plain values.
+#[derive(FromPyObject)]
+pub(crate) struct BaseOrder {
+    /// Node, model, and turns of the drive for a turn of the wheel forward; the left one first.
+    #[pyo3(item)]
+    wheels: [(u8, String, f64); 2],
+    #[pyo3(item)]
+    mode: String,
+    #[pyo3(item)]
+    wheel_base_m: f64,
+    #[pyo3(item)]
+    wheel_radius_m: f64,
+    #[pyo3(item)]
+    linear_m_s: f64,
+    #[pyo3(item)]
+    angular_rad_s: f64,
+    #[pyo3(item)]
+    wheel_m_s: f64,
+    #[pyo3(item)]
+    wheel_m_s2: f64,
+    #[pyo3(item)]
+    watchdog_s: f64,
+}
+
+/// What is stepped in each cycle.
+trait Stepped: Send + 'static {
+    fn step_once(&mut self, io: &mut Exchange<'_>);
+}
+
+impl Stepped for MasterGroup {
+    fn step_once(&mut self, io: &mut Exchange<'_>) {
+        self.step(io);
+    }
+}
+
+impl Stepped for MasterBase {
+    fn step_once(&mut self, io: &mut Exchange<'_>) {
+        self.step(io);
+    }
+}
+
+/// A group or a base, as the jobs share it.
+struct Slot<T> {
+    inner: Arc<Inner<T>>,
+}
+
+struct Inner<T> {
+    /// Empty before it was opened, and while a job has it.
+    open: Mutex<Option<T>>,
+    closed: AtomicBool,
+}
+
+impl<T> Clone for Slot<T> {
+    fn clone(&self) -> Self {
+        Self { inner: Arc::clone(&self.inner) }
+    }
+}
+
+impl<T: Stepped> Slot<T> {
+    fn empty() -> Self {
+        Self { inner: Arc::new(Inner { open: Mutex::new(None), closed: AtomicBool::new(false) }) }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Option<T>> {
+        self.inner.open.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Does something with what is open.
+    fn with<R>(&self, ask: impl FnOnce(&mut T) -> Result<R, Trouble>) -> Result<R, Trouble> {
+        self.lock().as_mut().map_or_else(|| Err(Trouble::Said("it is not open: it was closed".into())), ask)
+    }
+
+    fn close(&self) -> Option<T> {
+        self.inner.closed.store(true, Ordering::Relaxed);
+        self.lock().take()
+    }
+
+    /// One cycle after the other, until it is closed or SYNC ends: then the master has stopped the drives.
+    async fn keep(self, core: Core) -> Result<Value, Trouble> {
+        while core.next_sync().await.is_ok() && !self.inner.closed.load(Ordering::Relaxed) {
+            if let Some(open) = self.lock().as_mut() {
+                core.exchange(|io| open.step_once(io));
+            }
+        }
+        Ok(Value::None)
+    }
+}
+
+/// Several axes that move as one; `ferrodrive.Group` is what users have.
+#[pyclass(frozen, module = "ferrodrive._native")]
+pub(crate) struct Group {
+    network: Py<Network>,
+    core: Core,
+    slot: Slot<MasterGroup>,
+}
+
+impl From<GroupError> for Trouble {
+    fn from(error: GroupError) -> Self {
+        match error {
+            GroupError::Drive(error) => Self::Drive(error),
+            error => Self::Said(error.to_string()),
+        }
+    }
+}
+
+impl From<BaseError> for Trouble {
+    fn from(error: BaseError) -> Self {
+        match error {
+            BaseError::Drive(error) => Self::Drive(error),
+            error => Self::Said(error.to_string()),
+        }
+    }
+}
+
+#[pymethods]
+impl Group {
+    /// Several axes that move as one in a network, still to be opened.
+    #[new]
+    fn new(network: Py<Network>) -> Self {
+        let core = network.get().core.clone();
+        Self { network, core, slot: Slot::empty() }
+    }
+
+    /// Opens it and enables its drives; nothing moves.
+    fn open(&self, py: Python<'_>, axes: Vec<AxisOrder>, period_s: f64, tolerance: u32) -> PyResult<Job> {
+        let network = self.network.get();
+        let axes = axes.iter().map(|axis| axis.setup(network)).collect::<PyResult<Vec<_>>>()?;
+        let (period, slot) = (duration(period_s)?, self.slot.clone());
+        let options = CyclicOptions { tolerance, ..CyclicOptions::default() };
+        network.begin_said(py, async move {
+            let mut group = MasterGroup::open(&axes, period, options).await?;
+            if let Err(error) = group.enable().await {
+                let reason = group.explain_stop().await.map(|reason| format!(". {reason}")).unwrap_or_default();
+                let _ = group.close().await;
+                return Err(Trouble::Said(format!("{error}{reason}")));
+            }
+            *slot.lock() = Some(group);
+            Ok(Value::None)
+        })
+    }
+
+    /// Steps it in each cycle for as long as it is open; nobody waits for this.
+    fn keep(&self, py: Python<'_>) -> PyResult<Job> {
+        self.network.get().begin_said(py, self.slot.clone().keep(self.core.clone()))
+    }
+
+    /// All axes to these positions in degrees, at rest there; the time of the path in s.
+    fn move_to(&self, py: Python<'_>, to_deg: Vec<f64>, within_s: Option<f64>) -> PyResult<Job> {
+        let (slot, core) = (self.slot.clone(), self.core.clone());
+        let within = within_s.map(duration).transpose()?;
+        self.network.get().begin_said(py, async move {
+            let time = slot.with(|group| Ok(group.start_move(&turns(&to_deg), within)?))?;
+            rest(&core, &slot, |_| Ok(())).await?;
+            Ok(Value::Real(time.as_secs_f64()))
+        })
+    }
+
+    /// Along these points, one for each cycle, in degrees.
+    fn follow(&self, py: Python<'_>, points_deg: Vec<Vec<f64>>) -> PyResult<Job> {
+        let (slot, core) = (self.slot.clone(), self.core.clone());
+        self.network.get().begin_said(py, async move {
+            let options =
+                StreamOptions { capacity: 2 * AHEAD, prefill: AHEAD.min(points_deg.len()), ..StreamOptions::default() };
+            slot.with(|group| Ok(group.start_stream(options)?))?;
+            let mut left = points_deg.iter();
+            rest(&core, &slot, |group| {
+                while group.stream().is_some_and(|stream| stream.room() > 0) {
+                    match left.next() {
+                        // A point that breaks a limit ends the path: what was given before it is moved, and the group rests.
+                        Some(point) => group.push(&turns(point)).inspect_err(|_| group.end_stream())?,
+                        None => {
+                            group.end_stream();
+                            break;
+                        }
+                    }
+                }
+                Ok(())
+            })
+            .await
+        })
+    }
+
+    /// All axes to rest within their limits; they keep their power.
+    fn stop(&self, py: Python<'_>) -> PyResult<Job> {
+        let (slot, core) = (self.slot.clone(), self.core.clone());
+        self.network.get().begin_said(py, async move {
+            slot.with(|group| {
+                group.start_stop();
+                Ok(())
+            })?;
+            rest(&core, &slot, |_| Ok(())).await
+        })
+    }
+
+    /// To rest, and without power; the group is gone then.
+    fn close(&self, py: Python<'_>) -> PyResult<Job> {
+        let slot = self.slot.clone();
+        self.network.get().begin_said(py, async move {
+            match slot.close() {
+                Some(group) => Ok(group.close().await.map(|()| Value::None)?),
+                None => Ok(Value::None),
+            }
+        })
+    }
+
+    /// What the last cycle showed.
+    fn state(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let value = self.slot.with(|group| {
+            let state = group.state();
+            let axes = group.axes().iter().zip(group.points()).map(|(axis, point)| {
+                let angle = axis.position.map_or(Value::None, |Turns(turns)| Value::Real(turns * 360.0));
+                Value::Record(vec![
+                    ("angle_deg", angle),
+                    ("set_point_deg", Value::Real(point.position_turns * 360.0)),
+                    ("power", axis.power.map_or(Value::None, |power| Value::Text(power.name().to_owned()))),
+                ])
+            });
+            Ok(Value::Record(vec![
+                ("phase", Value::Text(state.phase.to_string())),
+                ("cause", state.cause.map_or(Value::None, |cause| Value::Text(cause.to_string()))),
+                ("missed_cycles", Value::Integer(i64::try_from(state.missed_cycles).unwrap_or(i64::MAX))),
+                ("axes", Value::List(axes.collect())),
+            ]))
+        });
+        value.map_err(|trouble| trouble.raised(py, None))?.into_python(py)
+    }
+}
+
+impl AxisOrder {
+    fn setup(&self, network: &Network) -> PyResult<AxisSetup> {
+        let range_turns = self.range_deg.map(|(low, high)| low / 360.0..=high / 360.0);
+        let limits = AxisLimits {
+            range_turns,
+            velocity_turns_s: self.velocity_rpm / 60.0,
+            acceleration_turns_s2: self.acceleration_rpm_s / 60.0,
+            jerk_turns_s3: self.jerk_rpm_s2 / 60.0,
+            following_error_turns: self.following_error_deg / 360.0,
+        };
+        let drive = Drive::new(network.node(self.node)?, model_of(&self.model)?);
+        Ok(AxisSetup { drive, mode: mode(&self.mode).map_err(bad_value)?, limits })
+    }
+}
+
+/// Cycles until the group has come to rest; what stopped it, in the words of its drive.
+async fn rest(
+    core: &Core,
+    slot: &Slot<MasterGroup>,
+    mut each: impl FnMut(&mut MasterGroup) -> Result<(), Trouble>,
+) -> Result<Value, Trouble> {
+    loop {
+        let state = slot.with(|group| {
+            each(group)?;
+            Ok(group.state())
+        })?;
+        let moves = matches!(state.phase, Phase::Moving | Phase::Streaming | Phase::Stopping);
+        match state.cause {
+            Some(master::group::StopCause::Asked) if !moves => return Ok(Value::None),
+            Some(cause) if !moves => return Err(explained(slot, cause.to_string()).await),
+            None if !moves => return Ok(Value::None),
+            _ => {}
+        }
+        next(core).await?;
+    }
+}
+
+/// What stopped the group, and what the drive says of it. The group is stepped by the question meanwhile.
+async fn explained(slot: &Slot<MasterGroup>, cause: String) -> Trouble {
+    let Some(mut group) = slot.lock().take() else { return Trouble::Said(cause) };
+    let reason = group.explain_stop().await;
+    *slot.lock() = Some(group);
+    Trouble::Said(match reason {
+        Some(reason) => format!("{cause}. {reason}"),
+        None => cause,
+    })
+}
+
+fn turns(degrees: &[f64]) -> Vec<Turns> {
+    degrees.iter().map(|degrees| Turns(degrees / 360.0)).collect()
+}
+
+/// A base on two wheels; `ferrodrive.Base` is what users have.
+#[pyclass(frozen, module = "ferrodrive._native")]
+pub(crate) struct Base {
+    network: Py<Network>,
+    core: Core,
+    slot: Slot<MasterBase>,
+}
+
+#[pymethods]
+impl Base {
+    /// A base on two wheels in a network, still to be opened.
+    #[new]
+    fn new(network: Py<Network>) -> Self {
+        let core = network.get().core.clone();
+        Self { network, core, slot: Slot::empty() }
+    }
+
+    /// Opens it and enables its wheels; nothing moves.
+    fn open(&self, py: Python<'_>, order: BaseOrder, period_s: f64, tolerance: u32) -> PyResult<Job> {
+        let network = self.network.get();
+        let wheels = order.setups(network)?;
+        let geometry = Geometry { wheel_base_m: order.wheel_base_m, wheel_radius_m: order.wheel_radius_m };
+        let limits = BaseLimits {
+            linear_m_s: order.linear_m_s,
+            angular_rad_s: order.angular_rad_s,
+            wheel_m_s: order.wheel_m_s,
+            wheel_m_s2: order.wheel_m_s2,
+            watchdog: duration(order.watchdog_s)?,
+        };
+        let (period, slot) = (duration(period_s)?, self.slot.clone());
+        let options = CyclicOptions { tolerance, ..CyclicOptions::default() };
+        network.begin_said(py, async move {
+            let [left, right] = &wheels;
+            let mut base = MasterBase::open([left, right], geometry, limits, period, options).await?;
+            if let Err(error) = base.enable().await {
+                let _ = base.close().await;
+                return Err(error.into());
+            }
+            *slot.lock() = Some(base);
+            Ok(Value::None)
+        })
+    }
+
+    /// Steps it in each cycle for as long as it is open; nobody waits for this.
+    fn keep(&self, py: Python<'_>) -> PyResult<Job> {
+        self.network.get().begin_said(py, self.slot.clone().keep(self.core.clone()))
+    }
+
+    /// The twist from the next cycle on, for as long as the watchdog lets it count.
+    fn command(&self, py: Python<'_>, linear_m_s: f64, angular_rad_s: f64) -> PyResult<()> {
+        let told = self.slot.with(|base| Ok(base.command(Twist { linear_m_s, angular_rad_s })?));
+        told.map_err(|trouble| trouble.raised(py, None))
+    }
+
+    /// The twist for this long, and then to rest.
+    fn drive(&self, py: Python<'_>, linear_m_s: f64, angular_rad_s: f64, seconds: f64) -> PyResult<Job> {
+        let (slot, core, time) = (self.slot.clone(), self.core.clone(), duration(seconds)?);
+        self.network.get().begin_said(py, async move {
+            let began = core.now();
+            while core.now() - began < time {
+                slot.with(|base| Ok(base.command(Twist { linear_m_s, angular_rad_s })?))?;
+                next(&core).await?;
+            }
+            stand(&core, &slot).await
+        })
+    }
+
+    /// To rest within its limits; it stays powered.
+    fn stop(&self, py: Python<'_>) -> PyResult<Job> {
+        let (slot, core) = (self.slot.clone(), self.core.clone());
+        self.network.get().begin_said(py, async move { stand(&core, &slot).await })
+    }
+
+    /// To rest, and without power; the base is gone then.
+    fn close(&self, py: Python<'_>) -> PyResult<Job> {
+        let slot = self.slot.clone();
+        self.network.get().begin_said(py, async move {
+            match slot.close() {
+                Some(base) => Ok(base.close().await.map(|()| Value::None)?),
+                None => Ok(Value::None),
+            }
+        })
+    }
+
+    /// What the last cycle showed.
+    fn state(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let state = self.slot.with(|base| Ok(base.state())).map_err(|trouble| trouble.raised(py, None))?;
+        let BaseState { cause, commanded, pose, .. } = state;
+        let record = vec![
+            ("x_m", Value::Real(pose.x_m)),
+            ("y_m", Value::Real(pose.y_m)),
+            ("heading_deg", Value::Real(pose.heading_rad.to_degrees())),
+            ("linear_m_s", Value::Real(commanded.linear_m_s)),
+            ("angular_rad_s", Value::Real(commanded.angular_rad_s)),
+            ("cause", cause.map_or(Value::None, |cause| Value::Text(cause.to_string()))),
+        ];
+        Value::Record(record).into_python(py)
+    }
+}
+
+impl BaseOrder {
+    fn setups(&self, network: &Network) -> PyResult<[WheelSetup; 2]> {
+        let mode = mode(&self.mode).map_err(bad_value)?;
+        let wheel = |(node, model, turns): &(u8, String, f64)| {
+            let drive = Drive::new(network.node(*node)?, model_of(model)?);
+            Ok::<_, PyErr>(WheelSetup { drive, mode, turns: *turns })
+        };
+        Ok([wheel(&self.wheels[0])?, wheel(&self.wheels[1])?])
+    }
+}
+
+async fn next(core: &Core) -> Result<(), Trouble> {
+    core.next_sync().await.map(drop).map_err(|error| Trouble::Said(error.to_string()))
+}
+
+/// Until the wheels are told no speed; a wheel that was lost before or meanwhile is told.
+async fn stand(core: &Core, slot: &Slot<MasterBase>) -> Result<Value, Trouble> {
+    loop {
+        let state = slot.with(|base| {
+            if !matches!(base.state().cause, Some(StopCause::Wheel { .. })) {
+                base.command(Twist::default())?;
+            }
+            Ok(base.state())
+        })?;
+        if state.commanded == Twist::default() {
+            return match state.cause {
+                Some(cause @ StopCause::Wheel { .. }) => Err(Trouble::Said(cause.to_string())),
+                _ => Ok(Value::None),
+            };
+        }
+        next(core).await?;
+    }
+}

@@ -1,0 +1,114 @@
+"""Groups of axes and bases from Python, on a virtual bus; what is true is asked of the simulated shafts."""
+
+import math
+
+import ferrodrive
+import pytest
+
+SERVO = {"mode": "csp", "velocity_rpm": 60, "acceleration_rpm_s": 300, "jerk_rpm_s2": 3000, "following_error_deg": 10}
+
+
+@pytest.fixture
+def world():
+    world = ferrodrive.World(bitrate=1_000_000)
+    world.add("cia402", node=1)
+    world.add("cia402", node=2)
+    return world
+
+
+@pytest.fixture
+def network(world):
+    with ferrodrive.Network(world) as network:
+        network.wait_for(1)
+        network.wait_for(2)
+        network.sleep(0.5)
+        yield network
+
+
+def servos(**limits):
+    return [ferrodrive.Axis(node, "cia402", **{**SERVO, **limits}) for node in (1, 2)]
+
+
+def test_axes_begin_and_end_together_where_they_were_sent(world, network):
+    before = [world[node].shaft_angle_rad for node in (1, 2)]
+    with network.group(servos(), period=0.001) as group:
+        # 1 turn at 1 turn/s, 5 turns/s^2 and 50 turns/s^3: L/v + v/a + a/j.
+        assert group.move([360, -90]) == pytest.approx(1.3, abs=1e-6)
+        network.sleep(0.2)
+        turned = [math.degrees(world[node].shaft_angle_rad - angle) for node, angle in zip((1, 2), before)]
+        assert turned == pytest.approx([360, -90], abs=1)
+        assert group.move([0, 0], within=3) == pytest.approx(3)
+        state = group.state()
+        assert (state["phase"], state["cause"], state["missed_cycles"]) == ("holding", None, 0)
+        assert [axis["set_point_deg"] for axis in state["axes"]] == pytest.approx([0, 0], abs=1e-6)
+        assert state["axes"][0]["power"] == "Operation enabled"
+    assert network.drive(1, "cia402").state()["power"] != "Operation enabled"
+
+
+def test_a_path_of_points_is_followed(world, network):
+    # A cycloid of 45 degrees in half a second: from rest and to rest, its acceleration too.
+    shares = [cycle / 500 for cycle in range(1, 501)]
+    path = [45 * (share - math.sin(math.tau * share) / math.tau) for share in shares]
+    before = world[1].shaft_angle_rad
+    with network.group(servos(), period=0.001) as group:
+        begin = world.now
+        group.follow([[angle, -angle] for angle in path])
+        assert world.now - begin == pytest.approx(0.5, abs=0.05)
+        network.sleep(0.2)
+        assert math.degrees(world[1].shaft_angle_rad - before) == pytest.approx(45, abs=1)
+        with pytest.raises(ferrodrive.MasterError, match="axis 1 would need a velocity"):
+            group.follow([[0, 0]])
+
+
+def test_what_breaks_a_limit_moves_nothing(world, network):
+    with network.group(servos(range_deg=(-180, 180)), period=0.001) as group:
+        for wrong, said in [([181, 0], "outside its software limits"), ([0], "2 axes"), ([math.nan, 0], "finite number")]:
+            with pytest.raises(ferrodrive.MasterError, match=said):
+                group.move(wrong)
+        with pytest.raises(ferrodrive.MasterError, match="give more time"):
+            group.move([180, 0], within=0.1)
+        group.move([90, 0])
+    with pytest.raises(ferrodrive.MasterError, match="it was closed"):
+        group.move([0, 0])
+    with pytest.raises(ferrodrive.MasterError, match="state a finite number above 0"):
+        network.group(servos(velocity_rpm=0))
+    with pytest.raises(ValueError, match="no mode of operation"):
+        network.group(servos(mode="fast"))
+
+
+def test_a_blocked_shaft_stops_the_others_and_is_named(world, network):
+    with network.group(servos(), period=0.001) as group:
+        world[2].lock_rotor()
+        with pytest.raises(ferrodrive.MasterError, match="axis 2, node 2, is .* turns from its set-point"):
+            group.move([360, 360])
+        assert "axis 2" in group.state()["cause"]
+        network.sleep(0.5)
+        assert abs(world[1].velocity_rpm) < 1
+
+
+def test_a_base_goes_the_way_of_its_twist_and_stops_without_one():
+    world = ferrodrive.World()
+    world.add("zlac8030l", node=4)
+    world.add("zlac8030l", node=5)
+    with ferrodrive.Network(world) as network:
+        network.wait_for(4)
+        network.wait_for(5)
+        network.sleep(1)
+        limits = {"linear_m_s": 0.8, "angular_rad_s": 2, "wheel_m_s": 0.8, "wheel_m_s2": 0.8}
+        sides = (4, "zlac8030l"), (5, "zlac8030l")
+        with network.base(*sides, wheel_base_m=0.4, wheel_radius_m=0.084, **limits) as base:
+            base.drive(0.3, 0.2, 3)
+            network.sleep(0.5)
+            state = base.state()
+            # 0.6 rad on a circle of 1.5 m: the ramps up and down are alike.
+            assert state["heading_deg"] == pytest.approx(math.degrees(0.6), abs=1.5)
+            assert state["x_m"] == pytest.approx(1.5 * math.sin(0.6), abs=0.02)
+            base.command(0.3, 0)
+            network.sleep(0.2)
+            assert base.state()["linear_m_s"] > 0.1
+            # The watchdog's 0.3 s, and the ramp's.
+            network.sleep(1)
+            state = base.state()
+            assert state["linear_m_s"] == 0 and "no new twist came for 300 ms" in state["cause"]
+            with pytest.raises(ferrodrive.MasterError, match="finite numbers"):
+                base.command(math.inf, 0)
