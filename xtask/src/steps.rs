@@ -4,7 +4,7 @@
 //! is compiled twice: clippy only checks, and the later steps use what the test step has built.
 
 use crate::tally::Tally;
-use crate::{cargo_tests, dist, examples, packages, peers, process, program, python, tidy, vcan, workspace};
+use crate::{browser, cargo_tests, dist, examples, packages, peers, process, program, python, tidy, vcan, workspace};
 
 /// One step: its name for `--only`, what it does for the progress line, and the function that does it.
 pub(crate) struct Step {
@@ -35,6 +35,11 @@ pub(crate) const STEPS: &[Step] = &[
     },
     Step { name: "dist", does: "what is released can be made, and works from an empty folder", run: dist::step },
     Step { name: "peers", does: "canopen-python, python-can and pymodbus against ferrodrive sim", run: peers::run },
+    Step {
+        name: "studio",
+        does: "the studio's page in a real browser: enable, move, jog, close the tab",
+        run: browser::step,
+    },
     Step { name: "vcan", does: "CAN interfaces of Linux, in a virtual machine that has them", run: vcan::step },
 ];
 

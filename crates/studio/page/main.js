@@ -5,6 +5,7 @@ import { h, number, renew, say } from "./dom.js";
 import { busView } from "./bus.js";
 import { driveView } from "./drive.js";
 import { motionView } from "./motion.js";
+import { scopeView } from "./scope.js";
 
 const byId = (id) => document.getElementById(id);
 const NEWS_KEPT = 200;
@@ -16,6 +17,7 @@ const views = [
   { name: "bus", title: "Bus", view: busView(shared, () => show("drive")) },
   { name: "drive", title: "Drive", view: driveView(shared) },
   { name: "motion", title: "Motion", view: motionView(shared, report) },
+  { name: "scope", title: "Scope", view: scopeView(shared) },
 ];
 let shown = null;
 

@@ -69,6 +69,8 @@ pub(crate) struct NodeView<'a> {
 /// A drive.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct DriveView {
+    /// When it was read, in the time of the bus.
+    pub(crate) at_s: f64,
     pub(crate) state: Option<&'static str>,
     pub(crate) statusword: u16,
     /// Its bits that are set, in words.
@@ -116,10 +118,11 @@ const CONTROL_BITS: [(u16, &str); 6] = [
 
 impl DriveView {
     /// What a drive said, with its controlword if it tells that.
-    pub(crate) fn new(state: &DriveState, controlword: Option<u16>) -> Self {
+    pub(crate) fn new(state: &DriveState, controlword: Option<u16>, at_s: f64) -> Self {
         let faults = state.faults.iter().map(|FaultRow { name, remedy, .. }| FaultView { name, remedy });
         let control_bits = CONTROL_BITS.iter().filter(|(mask, _)| controlword.is_some_and(|word| word & mask != 0));
         Self {
+            at_s,
             state: state.power.map(PowerState::name),
             statusword: state.statusword.0,
             status_bits: state.statusword_words(),

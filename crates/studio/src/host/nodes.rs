@@ -175,5 +175,6 @@ async fn read(drive: &Drive) -> Result<DriveView, Error> {
     let object = drive.axis_description().map_or(CONTROLWORD, |axis| axis.object(CONTROLWORD));
     // Some drives do not tell it.
     let controlword = drive.node().read::<u16>(object).await.ok();
-    Ok(DriveView::new(&state, controlword))
+    let at_s = (drive.node().network().now() - Instant::ZERO).as_secs_f64();
+    Ok(DriveView::new(&state, controlword, at_s))
 }

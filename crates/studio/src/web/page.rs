@@ -25,6 +25,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("drive.js", SCRIPT, include_str!("../../page/drive.js")),
     ("machine.js", SCRIPT, include_str!("../../page/machine.js")),
     ("motion.js", SCRIPT, include_str!("../../page/motion.js")),
+    ("scope.js", SCRIPT, include_str!("../../page/scope.js")),
 ];
 
 /// A file of the page.

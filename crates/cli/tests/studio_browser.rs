@@ -1,0 +1,257 @@
+//! The page of the studio in a real browser: Chromium, moved by its WebDriver.
+//!
+//! `cargo xtask test --only studio` installs both where it can, and runs this. A screenshot of each view is left in
+//! `target/studio` for somebody to look at.
+
+mod common;
+#[path = "common/studio.rs"]
+mod studio;
+
+use std::io::{BufRead, BufReader};
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+
+use fantoccini::actions::{InputSource, KeyAction, KeyActions, MOUSE_BUTTON_LEFT, MouseActions, PointerAction};
+use fantoccini::elements::Element;
+use fantoccini::key::Key;
+use fantoccini::{Client, ClientBuilder, Locator};
+use serde_json::{Value, json};
+use studio::{PATIENCE, Studio};
+
+const WHEEL: usize = 2;
+
+/// A studio with a browser before it; both end with this.
+struct Stage {
+    studio: Studio,
+    driver: Child,
+    client: Client,
+    profile: PathBuf,
+}
+
+impl Stage {
+    async fn open(name: &str) -> Self {
+        let studio = Studio::start(&[]);
+        studio.scanned();
+        let mut driver = Command::new("chromedriver");
+        let mut driver =
+            driver.arg("--port=0").stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("chromedriver is there");
+        let mut said = BufReader::new(driver.stdout.take().expect("piped")).lines();
+        let port = said.find_map(|line| {
+            let line = line.expect("text");
+            Some(line.split_once("successfully on port ")?.1.trim_end_matches('.').to_owned())
+        });
+        // It goes on talking, and nobody has to listen.
+        std::thread::spawn(move || said.for_each(drop));
+        let profile = common::scratch(&format!("studio_{name}"));
+        let arguments = [
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--disable-quic",
+            "--no-first-run",
+            "--disable-background-networking",
+            "--disable-component-update",
+            "--disable-sync",
+            "--disable-dev-shm-usage",
+            "--window-size=1280,900",
+            &format!("--user-data-dir={}", profile.display()),
+        ];
+        let mut capabilities = serde_json::Map::new();
+        let keeping = json!({ "download.default_directory": profile, "download.prompt_for_download": false });
+        capabilities.insert("goog:chromeOptions".into(), json!({ "args": arguments, "prefs": keeping }));
+        let place = format!("http://127.0.0.1:{}", port.expect("it says its port"));
+        let client = ClientBuilder::new(hyper_util::client::legacy::connect::HttpConnector::new())
+            .capabilities(capabilities)
+            .connect(&place)
+            .await
+            .expect("a browser starts");
+        let stage = Self { studio, driver, client, profile };
+        stage.load().await;
+        stage
+    }
+
+    async fn load(&self) {
+        let url = format!("http://{}/?token={}", self.studio.address, self.studio.token);
+        self.client.goto(&url).await.expect("the page loads");
+        self.find("#view table tbody tr:nth-child(3)").await;
+    }
+
+    async fn find(&self, css: &str) -> Element {
+        self.client
+            .wait()
+            .at_most(PATIENCE)
+            .for_element(Locator::Css(css))
+            .await
+            .unwrap_or_else(|error| panic!("{css}: {error}"))
+    }
+
+    async fn click(&self, css: &str) {
+        self.find(css).await.click().await.unwrap_or_else(|error| panic!("{css}: {error}"));
+    }
+
+    /// Takes control and shows what moves the wheel.
+    async fn take_the_wheel(&self) {
+        self.click("#take").await;
+        self.find("#release").await;
+        self.click("#tabs [data-name=motion]").await;
+        self.click(".motion .chooser button:nth-child(3)").await;
+        self.find(".motion fieldset:not([disabled])").await;
+    }
+
+    fn wheel(&self, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {
+        self.studio.wait(what, |state| wanted(&state["nodes"][WHEEL]))
+    }
+
+    fn turns(&self) {
+        self.wheel("a wheel that turns", |wheel| speed(wheel) > 50.0);
+    }
+
+    fn rests(&self) {
+        self.wheel("a wheel that rests", |wheel| speed(wheel) < 2.0);
+    }
+
+    async fn shoot(&self, name: &str) {
+        let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("../studio");
+        std::fs::create_dir_all(&folder).expect("a folder");
+        let picture = self.client.screenshot().await.expect("a picture");
+        assert!(picture.starts_with(b"\x89PNG"), "{name}");
+        std::fs::write(folder.join(format!("{name}.png")), picture).expect("it is written");
+    }
+
+    async fn close(mut self) {
+        // The window may be gone already.
+        let _ = self.client.clone().close().await;
+        let _ = self.driver.kill();
+        let _ = self.driver.wait();
+        let _ = std::fs::remove_dir_all(&self.profile);
+    }
+}
+
+impl Drop for Stage {
+    fn drop(&mut self) {
+        let _ = self.driver.kill();
+        let _ = self.driver.wait();
+    }
+}
+
+fn speed(wheel: &Value) -> f64 {
+    wheel["drive"]["velocity_rpm"].as_f64().expect("a speed").abs()
+}
+
+fn press(key: char) -> KeyActions {
+    KeyActions::new("keys".into()).then(KeyAction::Down { value: key })
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn a_drive_is_found_enabled_moved_and_stopped() {
+    let stage = Stage::open("moved").await;
+    stage.shoot("bus").await;
+    stage.take_the_wheel().await;
+    stage.click("#enable").await;
+    stage.wheel("an enabled drive", |wheel| wheel["drive"]["state"] == "Operation enabled");
+    stage.click("form[aria-label=Move] button").await;
+    let angle = |wheel: &Value| wheel["drive"]["angle_degrees"].as_f64().expect("an angle");
+    stage.wheel("a quarter of a turn", |wheel| (angle(wheel) - 90.0).abs() < 2.0);
+    stage.click("form[aria-label=Turn] button").await;
+    stage.turns();
+    stage.shoot("motion").await;
+    stage.client.perform_actions(press(' ')).await.expect("a key");
+    stage.rests();
+    stage.wheel("a quick stop", |wheel| wheel["drive"]["state"] != "Operation enabled");
+    stage.click("#tabs [data-name=drive]").await;
+    stage.click("#why").await;
+    stage.find(".findings details.cause").await;
+    stage.shoot("drive").await;
+    stage.click("#theme").await;
+    stage.shoot("drive_other_theme").await;
+    stage.close().await;
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn a_jog_ends_with_the_button_the_key_and_the_tab() {
+    let stage = Stage::open("jogged").await;
+    stage.take_the_wheel().await;
+    let button = stage.find("button.jog:last-child").await;
+    let down = MouseActions::new("mouse".into())
+        .then(PointerAction::MoveToElement { element: button, duration: None, x: 0.0, y: 0.0 })
+        .then(PointerAction::Down { button: MOUSE_BUTTON_LEFT });
+    stage.client.perform_actions(down.clone()).await.expect("a press");
+    stage.turns();
+    stage.client.release_actions().await.expect("a release");
+    stage.rests();
+    stage.wheel("a ramp, not a quick stop", |wheel| wheel["drive"]["state"] == "Operation enabled");
+    stage.client.perform_actions(press(Key::Right.into())).await.expect("a press");
+    stage.turns();
+    stage.client.release_actions().await.expect("a release");
+    stage.rests();
+    stage.client.perform_actions(down).await.expect("a press");
+    stage.turns();
+    stage.client.close_window().await.expect("it closes");
+    stage.rests();
+    stage.wheel("a quick stop", |wheel| wheel["drive"]["state"] != "Operation enabled");
+    stage.studio.wait("nobody in control", |state| state["controller"].is_null());
+    stage.close().await;
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn the_scope_keeps_what_the_drive_said_and_saves_it() {
+    let stage = Stage::open("scope").await;
+    stage.take_the_wheel().await;
+    stage.click("form[aria-label=Move] button").await;
+    let angle = |wheel: &Value| wheel["drive"]["angle_degrees"].as_f64().expect("an angle");
+    stage.wheel("a quarter of a turn", |wheel| (angle(wheel) - 90.0).abs() < 2.0);
+    stage.rests();
+    stage.client.perform_actions(press('4')).await.expect("a key");
+    stage.click("#scope-window option:first-child").await;
+    // Longer than the half of what is shown, so that there is a reading under the cursor.
+    tokio::time::sleep(std::time::Duration::from_secs(3)).await;
+    stage.click("#scope-pause").await;
+    stage.find("#scope-pause[aria-pressed=true]").await;
+    stage.click("canvas").await;
+    stage
+        .client
+        .wait()
+        .at_most(PATIENCE)
+        .for_element(Locator::XPath("//p[starts-with(., 'A at') and contains(., 'Position')]"))
+        .await
+        .expect("a cursor");
+    stage.shoot("scope").await;
+    stage.click("#scope-save").await;
+    let file = stage.profile.join("node4.csv");
+    let until = std::time::Instant::now() + PATIENCE;
+    while !file.exists() {
+        assert!(std::time::Instant::now() < until, "no file is saved");
+        tokio::time::sleep(std::time::Duration::from_millis(50)).await;
+    }
+    let saved = std::fs::read_to_string(file).expect("text");
+    let mut lines = saved.lines();
+    assert_eq!(lines.next(), Some("at_s,velocity_rpm,angle_degrees,current_a,supply_v,position_counts,statusword"));
+    let samples: Vec<Vec<f64>> =
+        lines.map(|line| line.split(',').map(|value| value.parse().expect("a number")).collect()).collect();
+    assert!(samples.len() > 5 && samples.is_sorted_by(|a, b| a[0] < b[0]), "each reading once: {saved}");
+    let (first, last) = (&samples[0], &samples[samples.len() - 1]);
+    assert!(first[2].abs() < 2.0 && (last[2] - 90.0).abs() < 2.0, "{saved}");
+    assert!(samples.iter().any(|sample| sample[1] > 20.0), "it was seen turning: {saved}");
+    stage.close().await;
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn who_only_looks_can_stop() {
+    let stage = Stage::open("watched").await;
+    stage.take_the_wheel().await;
+    stage.click("form[aria-label=Turn] button").await;
+    stage.turns();
+    let other = stage.client.new_window(false).await.expect("a second window");
+    stage.client.switch_to_window(other.handle).await.expect("it is there");
+    stage.load().await;
+    stage.find("#ask").await;
+    stage.click("#tabs [data-name=motion]").await;
+    stage.find(".motion fieldset[disabled]").await;
+    stage.click("#stop").await;
+    stage.rests();
+    stage.close().await;
+}
