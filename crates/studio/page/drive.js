@@ -111,7 +111,8 @@ export function driveView(shared) {
     large.update(drive);
     machine?.update(drive?.state ?? null, drive?.way ?? []);
     const steps = drive?.way.map((step) => `${hex(step.controlword, 2)} → ${step.to}`).join(", then ");
-    say(way, !drive ? "" : drive.state === "Operation enabled" ? "It follows set-points." : steps ? `To Operation enabled: ${steps}.` : "It has to act first.");
+    const without = drive && !drive.has_state_machine ? " This model has no power state machine: its statusword echoes the controlword, and the state shown is the one that comes closest." : "";
+    say(way, !drive ? "" : drive.state === "Operation enabled" ? `It follows set-points.${without}` : (steps ? `To Operation enabled: ${steps}.` : "It has to act first.") + without);
     renew(faults, drive ? `${drive.fault_code} ${drive.faults.length}` : "", () => {
       if (!drive) return [];
       if (drive.fault_code === 0) return [h("li", { class: "good" }, "None")];

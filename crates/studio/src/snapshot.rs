@@ -72,6 +72,8 @@ pub(crate) struct DriveView {
     /// When it was read, in the time of the bus.
     pub(crate) at_s: f64,
     pub(crate) state: Option<&'static str>,
+    /// It has the power state machine of CiA 402; else its state is the one that comes closest.
+    pub(crate) has_state_machine: bool,
     pub(crate) statusword: u16,
     /// Its bits that are set, in words.
     pub(crate) status_bits: Vec<&'static str>,
@@ -124,6 +126,7 @@ impl DriveView {
         Self {
             at_s,
             state: state.power.map(PowerState::name),
+            has_state_machine: state.style == PowerStyle::Cia402,
             statusword: state.statusword.0,
             status_bits: state.statusword_words(),
             controlword,

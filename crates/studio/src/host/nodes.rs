@@ -56,6 +56,9 @@ impl Host {
                 self.look_at(id, Duration::ZERO);
             }
         }
+        if core::mem::take(&mut self.scans_again) {
+            self.begin_scan(None);
+        }
     }
 
     fn known(&self, found: &Found) -> KnownNode {
@@ -144,7 +147,9 @@ impl Host {
         while let Some((_, event)) = self.network.poll_event() {
             let node = match event {
                 Event::BootUp(node) => {
-                    if !self.nodes.contains_key(&node) {
+                    // Neither is one known that was heard and did not answer.
+                    if self.nodes.get(&node).is_none_or(|known| known.identity.is_none()) {
+                        self.scans_again = self.scanning;
                         self.begin_scan(None);
                     }
                     Some(node)

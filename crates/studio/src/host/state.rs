@@ -51,6 +51,8 @@ pub struct Host {
     pub(super) presence: Option<DeadMan>,
     pub(super) nodes: BTreeMap<NodeId, KnownNode>,
     pub(super) scanning: bool,
+    /// Somebody came while that was going on, and may have been missed.
+    pub(super) scans_again: bool,
     pub(super) running: BTreeMap<NodeId, Running>,
     pub(super) jogs: BTreeMap<NodeId, DeadMan>,
     pub(super) listening: Vec<Listening>,
@@ -98,6 +100,7 @@ impl Host {
             presence: None,
             nodes: BTreeMap::new(),
             scanning: false,
+            scans_again: false,
             running: BTreeMap::new(),
             jogs: BTreeMap::new(),
             listening: Vec::new(),

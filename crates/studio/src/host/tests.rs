@@ -8,7 +8,7 @@ use canopen::{Mux, NodeId};
 use master::Network;
 use serde_json::Value;
 use sim::World;
-use sim::machine::{zlac8030l, zlim42c};
+use sim::machine::{TimingMode, zlac8030l, zlim42c};
 
 use super::state::TICK;
 use super::{Host, JOG_SPAN, PRESENCE_SPAN, Setting};
@@ -339,6 +339,35 @@ fn a_drive_that_loses_power_is_told_and_one_that_comes_back_too() {
         let heard: Vec<String> = std::iter::from_fn(|| news.try_recv().ok()).map(|news| news.to_string()).collect();
         assert!(heard.iter().any(|news| news.contains("node 2 booted")), "{heard:?}");
     });
+}
+
+#[test]
+fn who_boots_while_others_are_asked_is_found() {
+    let network = Network::new();
+    let mut world = World::new(Bitrate::K500, 1);
+    world.add_station(network.clone());
+    // One is there, so that frames are acknowledged; the other gets its power now, and boots in the middle of the scan.
+    world.add_drive(2, Box::new(zlim42c(2, 1))).expect("the first");
+    world.run_for(Duration::from_secs(1));
+    // As long as the real one takes: later than it is asked, sooner than all have been.
+    world.set_timing(TimingMode::Device);
+    world.add_drive(4, Box::new(zlac8030l(4, 1))).expect("the second");
+    let timeout = Duration::from_millis(300);
+    let setting = Setting { bus: "sim".into(), bitrate: None, timeout, models: BTreeMap::new() };
+    let (host, desk) = Host::new(network.clone(), setting);
+    let stage = Stage { network, desk };
+    let playing = async {
+        tokio::select! {
+            () = host.run(|| None) => panic!("a host runs as long as there is a desk"),
+            () = async {
+                while stage.state()["nodes"][1]["drive"].is_null() {
+                    stage.sleep(100).await;
+                }
+            } => {}
+        }
+    };
+    sim::block_on_for(&mut world, Duration::from_secs(30), playing).expect("it is found");
+    assert_eq!(stage.state()["nodes"][1]["node"], 4);
 }
 
 #[test]
