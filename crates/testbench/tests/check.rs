@@ -329,6 +329,10 @@ fn what_cannot_be_foretold_says_why() {
     assert!(checked.predict().is_none());
     let told = checked.findings.iter().find(|finding| finding.rule == "prediction").unwrap();
     assert!(told.what.contains("no data sheet"), "{told:?}");
+    // Of a file that is something else one complaint is enough.
+    let mut other = of_bus_yml("services:\n  web:\n    image: a\n", &sheets("none", &[])).unwrap();
+    assert!(other.predict().is_none());
+    assert_eq!(rules(&other), [("shape", Severity::Error)]);
 }
 
 /// A live bus: these models at these nodes, switched on for a second. What `during` does is done to it before it is asked.
@@ -369,7 +373,7 @@ fn live_drives_are_only_read() {
     let asked: Vec<_> = frames.iter().filter(|frame| frame.starts_with("604#")).collect();
     // CiA 301, 7.2.4.3.5: an initiate upload, or a segment of one (60h, 70h); nothing else but answers and heartbeats.
     let reads = |frame: &&String| ["604#40", "604#60", "604#70"].iter().any(|read| frame.starts_with(read));
-    assert!(asked.len() > 20 && asked.iter().all(|frame| reads(frame)), "{asked:?}");
+    assert!(asked.len() > 20 && asked.iter().all(reads), "{asked:?}");
     assert!(frames.iter().all(|frame| ["604#", "584#", "704#"].iter().any(|id| frame.starts_with(id))), "{frames:?}");
     // 6083h is 100 ms as delivered, and the heartbeat 0 or other than 200: the file writes both.
     let differ: Vec<_> = live[0].deviations.iter().map(|deviation| deviation.object.as_str()).collect();

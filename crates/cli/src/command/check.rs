@@ -131,7 +131,7 @@ impl Report for CheckReport {
             let node = row.node.map_or_else(|| "-".to_owned(), |node| node.to_string());
             nodes.row([node, plain(&row.name), row.device.as_deref().map_or_else(|| "-".to_owned(), plain)]);
         }
-        let mut text = nodes.plain(paint);
+        let mut text = if self.nodes.is_empty() { "no nodes".to_owned() } else { nodes.plain(paint) };
         for finding in &self.findings {
             let word = finding.severity.word();
             let word = match finding.severity {

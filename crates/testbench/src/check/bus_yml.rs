@@ -201,7 +201,12 @@ pub(super) fn read(document: &Node<'_>, folder: &Path, report: &mut Reporter<'_>
     let entries = document.entries();
     let Some(master) = entries.iter().find(|entry| entry.key == "master") else {
         let next = "describe the master: `master:` with `node_id: 127`";
-        report.say(Severity::Error, document.at(), "there is no `master`", next);
+        report.say(
+            Severity::Error,
+            document.at(),
+            "there is no `master`: this is no bus.yml, or not a whole one",
+            next,
+        );
         return None;
     };
     let defaults = entries.iter().find(|entry| entry.key == "defaults");

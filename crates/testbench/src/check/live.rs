@@ -124,8 +124,7 @@ async fn look(
     live.deviations = deviations.iter().map(shown).collect();
     // What the generator takes from the data sheet it does not write: there the sheet has to be right.
     report.rule = "live-sheet";
-    let taken = place.of_sheet.iter().map(|(object, bytes)| (object, bytes));
-    for deviation in verify(node, taken).await? {
+    for deviation in verify(node, &place.of_sheet).await? {
         let LiveDeviation { object, expected, found } = shown(&deviation);
         let what = format!(
             "on the bus: {object} has {found}, its data sheet says {expected}, and the generator writes only what differs from the sheet"
@@ -152,7 +151,7 @@ fn strangers(intended: &Intended, network: &Network, report: &mut Reporter<'_>) 
 async fn number(node: &Node, object: Mux) -> Result<Option<u32>, Error> {
     Ok(answered(node.upload(object).await)?
         .filter(|payload| payload.as_bytes().len() <= 4)
-        .map(|payload| payload.raw() as u32))
+        .map(|payload| payload.raw()))
 }
 
 async fn text(node: &Node, object: Mux) -> Result<Option<String>, Error> {
