@@ -5,7 +5,7 @@ use clap::{Parser, Subcommand};
 use crate::command::{
     boot, check, completions, convert, dcf, decode, demo, drive, drive_base, dump, eds, emcy, events, explain, export,
     gateway, group, home, latency, lss, man_pages, motion, nmt, objects, params, pdo, plan, plot, read, readings,
-    record, replay, run, scan, sdo, send, sim, store, studio, sync, time, watch, world,
+    record, replay, run, scan, sdo, send, sim, store, studio, supervise, sync, time, watch, world,
 };
 use crate::global::Global;
 
@@ -31,6 +31,7 @@ pub(crate) enum Command {
     Events(events::Events),
     Scan(scan::Scan),
     Boot(boot::Boot),
+    Supervise(supervise::Supervise),
     Read(read::Read),
     Write(sdo::Write),
     Objects(objects::Objects),

@@ -211,6 +211,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         },
         Command::Latency(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Boot(boot) => boot.run(global, format),
+        Command::Supervise(command) => command.run(global, format),
         Command::Group(group) => group.run(global, format),
         Command::DriveBase(base) => base.run(global, format),
         Command::Plan(plan) => plan.run(global, format),

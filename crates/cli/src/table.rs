@@ -55,7 +55,7 @@ impl Table {
         let (room, column) = (last.saturating_sub(too_many).max(1), widths.len() - 1);
         for cell in self.rows.iter_mut().filter_map(|row| row.get_mut(column)) {
             if cell.chars().count() > room {
-                *cell = cell.chars().take(room - 1).chain(['…']).collect();
+                *cell = cell.chars().take(room.saturating_sub(2)).chain("..".chars().take(room)).collect();
             }
         }
         self
@@ -100,7 +100,7 @@ mod tests {
         let at = |width, least| table.clone().narrowed(width, least).plain(Paint::OFF);
         assert_eq!(at(20, 1), "node  is       seen\n4     a drive  never");
         assert_eq!(at(19, 1), "node  is\n4     a drive");
-        assert_eq!(at(10, 2), "node  is\n4     a d…");
+        assert_eq!(at(10, 2), "node  is\n4     a ..");
         assert_eq!(at(3, 1), "node\n4");
     }
 }

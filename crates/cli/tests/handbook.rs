@@ -117,5 +117,6 @@ fn every_command_of_the_other_pages_ends_well() {
     assert_eq!(follow("write-a-scenario.md"), 2);
     assert_eq!(follow("plan-a-bus.md"), 1);
     assert_eq!(follow("why-it-does-not-move.md"), 3);
+    assert_eq!(follow("start-up.md"), 2);
     assert_eq!(follow("several-axes.md"), 4);
 }

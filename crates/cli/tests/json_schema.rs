@@ -63,6 +63,7 @@ const COMMANDS: &[(&[&str], &str)] = &[
     (&["drive-base"], "failure"),
     (&["boot"], "boot"),
     (&["boot", "--node", "9"], "boot"),
+    (&["supervise", "--for", "2s"], "supervise"),
     (&["plan", "--mode", "4=pv"], "plan"),
     (&["dump", "--for", "1s"], "frame"),
     (&["export", "dbc", "4"], "export"),

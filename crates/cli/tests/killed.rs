@@ -6,7 +6,7 @@
 
 mod common;
 
-use std::io::Read;
+use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -281,4 +281,48 @@ fn a_watch_that_is_switched_off_is_told_and_switched_on_if_asked_for() {
     let child = bench.moving(SERVO, &["--guard", "on"]);
     bench.kill(child);
     bench.wait("4", false, Duration::from_millis(1000) + SLACK);
+}
+
+/// Whoever moves the drives: `supervise` keeps them content, and they stop when it dies. The ZLIM42-C has nothing for that, which it
+/// says.
+#[test]
+fn drives_that_another_program_moves_stop_when_their_supervisor_is_killed() {
+    const DESCRIBED: (&str, &str) = ("5", "5=cia402");
+    let drives = ["--drive", "m4230e17b50@1", "--drive", "zlim42c@2", "--drive", "zlac8030l@4", "--drive", "cia402@5"];
+    let simulator = Simulator::start(&[&drives[..], &["--serve", "socketcand://127.0.0.1:0"]].concat());
+    let bus = simulator.bus("socketcand");
+    std::thread::sleep(BOOT);
+    let mut bench = Bench { simulator, bus };
+    let models = [JOINT, STEPPER, SERVO, DESCRIBED].map(|(_, model)| ["--model", model]);
+    let mut supervisor = Command::new(env!("CARGO_BIN_EXE_ferrodrive"))
+        .args(["--json", "--timeout", "5s", "--bus", &bench.bus])
+        .args(models.concat())
+        .arg("supervise")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut booted = String::new();
+    BufReader::new(supervisor.stdout.as_mut().unwrap()).read_line(&mut booted).unwrap();
+    let booted: Value = serde_json::from_str(&booted).unwrap();
+    let watch = |node: u64| {
+        let of_node = booted["nodes"].as_array().unwrap().iter().find(|one| one["node"] == node).unwrap();
+        let step = of_node["steps"].as_array().unwrap().iter().find(|step| step["step"] == "host watch").unwrap();
+        (step["verdict"].clone(), step["found"].as_str().unwrap().to_owned())
+    };
+    assert!([1, 4, 5].iter().all(|node| watch(*node).0 == "passed"), "{booted}");
+    assert!(watch(2).0 == "noted" && watch(2).1.contains("no watch over its host"), "{booted}");
+    for drive in [JOINT, SERVO, DESCRIBED] {
+        bench.json(drive, &["velocity", drive.0, "60rpm", "--no-wait", "--no-guard"]);
+    }
+    // Beyond every watch: somebody keeps them content, and it is not who moves them.
+    std::thread::sleep(Duration::from_secs(4));
+    for (node, _) in [JOINT, SERVO, DESCRIBED] {
+        assert!(bench.turns(node), "node {node}");
+    }
+    supervisor.kill().unwrap();
+    supervisor.wait().unwrap();
+    for (node, _) in [JOINT, SERVO, DESCRIBED] {
+        bench.wait(node, false, Duration::from_millis(2000) + SLACK);
+    }
 }

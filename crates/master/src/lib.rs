@@ -105,6 +105,7 @@ mod network;
 pub mod parameters;
 pub mod pdo;
 pub mod plan;
+pub mod supervise;
 pub mod units;
 
 pub use drive::{Drive, MotionOptions};

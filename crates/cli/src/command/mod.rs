@@ -41,6 +41,7 @@ pub(crate) mod send;
 pub(crate) mod sim;
 pub(crate) mod store;
 pub(crate) mod studio;
+pub(crate) mod supervise;
 pub(crate) mod sync;
 pub(crate) mod time;
 pub(crate) mod watch;

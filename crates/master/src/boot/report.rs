@@ -39,6 +39,11 @@ impl BootReport {
 }
 
 impl NodeReport {
+    /// Of a node with which nothing was done.
+    pub(crate) const fn of_nothing(node: NodeId) -> Self {
+        Self { node, mandatory: false, steps: Vec::new(), status: None, state: None }
+    }
+
     /// True if its boot-up ended before its end.
     pub fn has_failed(&self) -> bool {
         self.status.is_some_and(ErrorStatus::is_failure)

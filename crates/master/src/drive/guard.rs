@@ -230,6 +230,30 @@ impl Network {
         join_all(disarmed).await;
     }
 
+    /// Ceases to send the heartbeats that guarded drives watch, or sends them again. The guards stay.
+    pub(crate) fn hold_heartbeats(&self, hold: bool) {
+        let hosts: NodeSet = self.with_guards(|guards| {
+            let host = |guard: &Guard| match guard.loss {
+                HostLoss::StopsWithoutHeartbeat { host, .. } => Some(host),
+                _ => None,
+            };
+            guards.values().filter_map(host).collect()
+        });
+        for host in hosts.iter() {
+            let period = self.with_guards(|guards| heartbeat_period(guards.values(), host));
+            self.heartbeat(host, period.filter(|_| !hold));
+        }
+    }
+
+    /// A guarded drive has started anew, and what was armed on it is gone.
+    pub(crate) fn forget_guard(&self, node: NodeId) {
+        if let Some(guard) = self.with_guards(|guards| guards.remove(&node))
+            && matches!(guard.loss, HostLoss::StopsInSilence { .. })
+        {
+            self.show_presence(node, guard.loss, None);
+        }
+    }
+
     /// Starts, changes or ends what keeps a drive content.
     fn show_presence(&self, node: NodeId, loss: HostLoss, period: Option<Duration>) {
         match loss {

@@ -14,7 +14,7 @@ use crate::failure::Failure;
 use crate::global::Global;
 use crate::output::Format;
 use crate::session;
-use planned::Planned;
+pub(crate) use planned::Planned;
 pub(crate) use report::BootReport;
 
 /// Boot the nodes of a network: check who they are, configure and start them

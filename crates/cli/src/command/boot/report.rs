@@ -80,7 +80,7 @@ impl Row {
 
 impl Report for BootReport {
     fn text(&self, paint: Paint) -> String {
-        let mut table = Table::new(&["node", "step", "object", "expected", "got", ""]);
+        let mut table = Table::new(&["node", "step", "object", "expected", "got", "verdict"]);
         for node in &self.nodes {
             for step in &node.steps {
                 let object = step.object.as_deref().unwrap_or("");

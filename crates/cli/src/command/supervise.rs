@@ -1,0 +1,155 @@
+//! `ferrodrive supervise`: boots a network, then watches it, and boots again what comes back.
+
+use std::io::{self, BufRead, IsTerminal};
+use std::path::PathBuf;
+use std::time::Duration;
+
+use can::Instant;
+use canopen::NodeId;
+use master::supervise::{EmcyRecord, Happening, Supervisor};
+use master::units::parse_duration;
+use serde::Serialize;
+use testbench::words::node::node;
+use tokio::sync::mpsc::{Receiver, channel};
+
+use super::boot::{BootReport, Planned};
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::global::Global;
+use crate::output::{Format, Report};
+use crate::paint::Paint;
+use crate::session;
+
+/// Boot the nodes of a network, then watch them: heartbeats, errors, and who comes back
+///
+/// Boots as `ferrodrive boot` does, and has each drive stop by itself when this command dies, where its model has something for
+/// that; where not, it says so. Then it tells what happens: lost heartbeats, states, emergency messages with fault and remedy,
+/// another master. A node whose supply or cable was away is stopped, identified and configured again; the word `resume NODE` on
+/// standard input starts it (NMT). While a drive that watches this command's heartbeat is out of reach, the heartbeat is held
+/// back, so that nothing goes on by itself: that stops every drive that watches it. It never moves a motor. Ctrl-C ends it, and the
+/// drives no longer watch it then.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    ferrodrive supervise examples/machine.toml --for 2s\n  \
+    ferrodrive --bus can0 supervise machine.toml\n  \
+    ferrodrive --bus can0 supervise master.dcf --own-node 1")]
+pub(crate) struct Supervise {
+    /// Machine file, or DCF of a CANopen manager (default: --machine, --model, or who is on the bus)
+    #[arg(value_name = "FILE.toml|MASTER.dcf")]
+    file: Option<PathBuf>,
+    /// Only this node; may be repeated
+    #[arg(long = "node", value_name = "NODE", value_parser = node)]
+    nodes: Vec<NodeId>,
+    /// The node-ID of this master, for drives whose watch over a heartbeat (1016h) is off as yet
+    #[arg(long, value_name = "NODE", value_parser = node, default_value = "127")]
+    own_node: NodeId,
+    /// End after this time (default on an embedded virtual bus: 1s)
+    #[arg(long = "for", value_name = "TIME", value_parser = parse_duration)]
+    duration: Option<Duration>,
+}
+
+/// Nothing happens on an embedded bus by itself.
+const EMBEDDED_DURATION: Duration = Duration::from_secs(1);
+
+/// Words that wait until a node is booted.
+const WORDS: usize = 16;
+
+/// Something that happened.
+#[derive(Debug, Serialize)]
+struct Told {
+    /// In s since the command began.
+    t: f64,
+    kind: &'static str,
+    node: Option<u8>,
+    /// Of an emergency message: its error code.
+    code: Option<u16>,
+    text: String,
+}
+
+impl Supervise {
+    /// Boots and watches, until it is told to end.
+    pub(crate) fn run(&self, global: &Global, format: Format) -> Result<(), Failure> {
+        let planned = Planned::read(self.file.as_deref())?;
+        let global = planned.global(global);
+        session::run(&global, async |context| self.supervise(context, &planned, format).await)
+    }
+
+    async fn supervise(&self, context: &Context, planned: &Planned, format: Format) -> Result<(), Failure> {
+        let mut plan = planned.plan(context, &self.nodes).await?;
+        plan.own = self.own_node;
+        context.progress.show(format!("booting {} nodes", plan.nodes.len()));
+        let mut others = context.traffic.of_others();
+        let report = context.network.boot(&plan).await;
+        format.print(&BootReport::new(&plan, &report)).map_err(Failure::not_printed)?;
+        while context.network.poll_event().is_some() {}
+        let mut supervisor = Supervisor::new(context.network.clone(), plan);
+        context.progress.show("watching; Ctrl-C ends it");
+        let mut words = words();
+        let end = self.duration.or(context.is_embedded().then_some(EMBEDDED_DURATION));
+        let end = end.map(|duration| context.network.now() + duration);
+        while end.is_none_or(|end| context.network.now() < end) {
+            while let Ok((at, frame)) = others.try_recv() {
+                supervisor.hear(at, &frame);
+            }
+            while let Ok(word) = words.try_recv() {
+                obey(&mut supervisor, context, &word).await;
+            }
+            // To its end, whatever else happens: it may be stopping a motor.
+            if let Some((at, happening)) = supervisor.next().await {
+                format.print(&Told::new(at, &happening)).map_err(Failure::not_printed)?;
+            }
+        }
+        let open = supervisor.emcys().records().filter(|record| record.gone.is_none());
+        open.for_each(|record: &EmcyRecord| context.tell(&format!("not gone: {record}")));
+        Ok(context.network.release_guards().await?)
+    }
+}
+
+/// The lines of standard input; none once it ends. The thread ends with the program.
+fn words() -> Receiver<String> {
+    let (send, words) = channel(WORDS);
+    std::thread::spawn(move || {
+        for line in io::stdin().lock().lines() {
+            let Ok(line) = line else { break };
+            if !line.trim().is_empty() && send.blocking_send(line).is_err() {
+                break;
+            }
+        }
+    });
+    words
+}
+
+/// `resume 4`. What is wrong with it is said, and nothing is done.
+async fn obey(supervisor: &mut Supervisor, context: &Context, line: &str) {
+    let wanted = line.trim().strip_prefix("resume ").map(|rest| node(rest.trim()));
+    match wanted {
+        Some(Ok(node)) => match supervisor.resume(node).await {
+            Ok(()) => context.tell(&format!("node {node}: told to take part again (NMT start)")),
+            Err(error) => context.tell(&format!("node {node} is not resumed: {error}")),
+        },
+        Some(Err(reason)) => context.tell(&reason),
+        None => {
+            let how = if io::stdin().is_terminal() { "; Ctrl-C ends it" } else { "" };
+            context.tell(&format!("'{}' is no word here; expected resume NODE{how}", line.trim()));
+        }
+    }
+}
+
+impl Told {
+    fn new(at: Instant, happening: &Happening) -> Self {
+        let code = if let Happening::Emcy(record) = happening { Some(record.emcy.code.0) } else { None };
+        Self {
+            t: at.as_secs_f64(),
+            kind: happening.kind(),
+            node: happening.node().map(NodeId::raw),
+            code,
+            text: happening.to_string(),
+        }
+    }
+}
+
+impl Report for Told {
+    fn text(&self, paint: Paint) -> String {
+        format!("{} {}", paint.dim(&format!("({:.3})", self.t)), self.text)
+    }
+}
