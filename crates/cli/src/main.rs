@@ -42,7 +42,7 @@ use clap_complete::env::CompleteEnv;
 use crate::args::{Cli, Command};
 use crate::command::completions::ASKED_BY;
 use crate::command::departures::DepartureList;
-use crate::command::objects::Whose;
+use crate::command::objects::{Objects, Whose};
 use crate::context::Context;
 use crate::failure::{Failure, FailureReport};
 use crate::global::Global;
@@ -201,14 +201,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Save(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Restore(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Home(command) => on_bus(global, format, async |context| command.run(context).await),
-        Command::Objects(objects) => match objects.whose {
-            Whose::Model(model) if objects.departures => print(format, &DepartureList::of(model, None)),
-            Whose::Node(node) if objects.departures => {
-                on_bus(global, format, async |context| objects.departures_of_node(context, node).await)
-            }
-            Whose::Model(model) => print(format, &objects.list(model)?),
-            Whose::Node(node) => on_bus(global, format, async |context| objects.of_node(context, node).await),
-        },
+        Command::Objects(objects) => list_objects(global, format, objects),
         Command::Latency(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Boot(boot) => boot.run(global, format),
         Command::Supervise(command) => command.run(global, format),
@@ -235,6 +228,17 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Replay(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Completions(completions) => completions.run(),
         Command::ManPages(pages) => pages.run(Cli::command()),
+    }
+}
+
+fn list_objects(global: &Global, format: Format, objects: &Objects) -> Result<(), Failure> {
+    match objects.whose {
+        Whose::Model(model) if objects.departures => print(format, &DepartureList::of(model, None)),
+        Whose::Node(node) if objects.departures => {
+            on_bus(global, format, async |context| objects.departures_of_node(context, node).await)
+        }
+        Whose::Model(model) => print(format, &objects.list(model)?),
+        Whose::Node(node) => on_bus(global, format, async |context| objects.of_node(context, node).await),
     }
 }
 
