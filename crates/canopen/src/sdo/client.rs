@@ -113,7 +113,12 @@ pub struct Client {
     state: State,
     deadline: Instant,
     request: Option<[u8; LENGTH]>,
+    /// What was asked for before, the newest first: a server that is slow answers to that still, and some answer twice.
+    earlier: [Option<Mux>; REMEMBERED],
 }
+
+/// How many questions ago a late answer may belong to.
+const REMEMBERED: usize = 4;
 
 #[derive(Clone, Copy, Debug)]
 enum State {
@@ -152,6 +157,7 @@ impl Client {
             state: State::Idle,
             deadline: Instant::FAR_FUTURE,
             request: None,
+            earlier: [None; REMEMBERED],
         }
     }
 
@@ -194,13 +200,17 @@ impl Client {
     }
 
     /// A frame arrived. `buffer` is the data of a download, or the room for an upload. Frames that are not this
-    /// server's replies do nothing, nor does a reply without a transfer.
+    /// server's replies do nothing, nor does a reply without a transfer, nor one to an earlier question: the answer to this one
+    /// may still come.
     pub fn handle_frame(&mut self, frame: &Frame, buffer: &mut [u8], now: Instant) -> Option<Result<Outcome, Failure>> {
         if frame.id() != self.reply_id || frame.is_remote() {
             return None;
         }
         let mux = self.mux()?;
         let reply = Reply::parse(frame.padded());
+        if self.is_late(mux, &reply) {
+            return None;
+        }
         match self.advance(mux, reply, buffer, now) {
             Ok(None) => None,
             Ok(Some(outcome)) => {
@@ -320,9 +330,24 @@ impl Client {
         self.ask(Request::DownloadSegment(segment), State::DownloadSegments { mux, sent, toggle }, now);
     }
 
+    /// The reply begins or ends a transfer of an object that was asked for before, and is not asked for now.
+    fn is_late(&self, asked: Mux, reply: &Reply) -> bool {
+        let (Reply::InitiateUpload(received, _) | Reply::InitiateDownload(received) | Reply::Abort(received, _)) =
+            reply
+        else {
+            return false;
+        };
+        *received != asked && self.earlier.contains(&Some(*received))
+    }
+
     fn ask(&mut self, request: Request, state: State, now: Instant) {
         self.request = Some(request.emit());
         self.state = state;
+        let asked = self.mux();
+        if self.earlier[0] != asked {
+            self.earlier.rotate_right(1);
+            self.earlier[0] = asked;
+        }
         self.deadline = now + self.timeout;
     }
 

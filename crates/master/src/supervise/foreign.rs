@@ -82,7 +82,7 @@ mod tests {
         assert!(told("77F#05").is_some_and(|text| text.contains("as node 127, which is this master")));
         // What devices send, SYNC too (CiA 301, 7.2.5: any device may produce it), and what asks.
         assert_eq!(
-            (told("704#05"), told("584#4300100000000000"), told("080"), told("77F#R")),
+            (told("704#05"), told("584#4300100000000000"), told("080#"), told("77F#R")),
             (None, None, None, None)
         );
     }

@@ -1,6 +1,7 @@
 //! A CANopen node in a few lines, written from CiA 301 by hand and not with the crate under test.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
 
 use can::{CanId, Frame, Instant, Station};
 
@@ -23,12 +24,17 @@ pub(crate) struct Toy {
     pub(crate) requests: Vec<[u8; 8]>,
     pub(crate) aborted_by_client: Vec<u32>,
     pub(crate) state: u8,
+    /// How long after a request it answers.
+    pub(crate) late: Duration,
+    /// Each SDO answer comes twice.
+    pub(crate) repeats: bool,
     /// What makes it a drive.
     pub(crate) drive: Option<ToyDrive>,
     upload: Option<(Vec<u8>, usize)>,
     download: Option<((u16, u8), Vec<u8>)>,
     now: Instant,
-    out: VecDeque<Frame>,
+    out: VecDeque<(Instant, Frame)>,
+    clock: Instant,
 }
 
 impl Toy {
@@ -54,7 +60,8 @@ impl Toy {
     }
 
     pub(crate) fn send(&mut self, base: u16, bytes: &[u8]) {
-        self.out.push_back(Frame::new(CanId::standard(base + u16::from(self.id)), bytes));
+        let due = self.clock.plus_nanos(self.late.as_nanos() as u64);
+        self.out.push_back((due, Frame::new(CanId::standard(base + u16::from(self.id)), bytes)));
     }
 
     fn answer(&mut self, bytes: [u8; 8]) {
@@ -64,6 +71,9 @@ impl Toy {
             None => {}
         }
         self.send(0x580, &bytes);
+        if self.repeats {
+            self.send(0x580, &bytes);
+        }
     }
 
     fn sdo(&mut self, request: [u8; 8]) {
@@ -158,6 +168,7 @@ impl Toy {
 
 impl Station for Toy {
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
+        self.clock = now;
         let Some(id) = frame.standard_data_id() else { return };
         if id == 0x600 + u16::from(self.id) {
             if let Some(drive) = &mut self.drive
@@ -183,13 +194,16 @@ impl Station for Toy {
         }
     }
 
-    fn handle_timeout(&mut self, _: Instant) {}
+    fn handle_timeout(&mut self, now: Instant) {
+        self.clock = now;
+    }
 
     fn poll_transmit(&mut self) -> Option<Frame> {
-        self.out.pop_front()
+        let (due, _) = self.out.front()?;
+        if *due > self.clock { None } else { self.out.pop_front().map(|(_, frame)| frame) }
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        None
+        self.out.front().map(|(due, _)| *due)
     }
 }
