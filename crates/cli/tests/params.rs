@@ -327,7 +327,7 @@ fn what_a_pdo_cannot_carry_is_said_before_anything_is_written() {
 }
 
 #[test]
-fn what_keeps_a_pdo_away_is_said_below_the_table() {
+fn a_pdo_that_was_set_up_comes_and_before_it_was_said_why_not() {
     let served = Served::zlac8030l("params_pdo");
     let shown = |part: &str| {
         let ended = served.done(&["pdo", "show", "4"]);
@@ -335,4 +335,23 @@ fn what_keeps_a_pdo_away_is_said_below_the_table() {
     };
     shown("node 4 TPDO1, TPDO2, TPDO3, TPDO4, RPDO2, RPDO3, RPDO4: nothing is mapped into it");
     shown("node 4 RPDO1: nobody was heard sending it");
+    served.done(&["pdo", "apply", "4", "tpdo1=statusword,position_actual_value", "tpdo2=off", "--type", "1"]);
+    shown("TPDO2: off: bit 31 of its COB-ID is set");
+    shown("TPDO1: it waits for SYNC, and none was heard");
+    served.done(&["nmt", "4", "start"]);
+    let mut sync = served.command(&["sync", "--every", "20ms"]).stdout(Stdio::null()).spawn().expect("it runs");
+    let begin = Instant::now();
+    let comes = loop {
+        let shown = served.done(&["pdo", "show", "4", "--json"]).json();
+        let tpdo = &shown["nodes"][0]["pdos"][0];
+        if tpdo["pdo"] == "TPDO1" && tpdo["silent"] == serde_json::json!([]) {
+            break true;
+        }
+        if begin.elapsed() > PATIENCE {
+            break false;
+        }
+    };
+    sync.kill().expect("it was running");
+    sync.wait().expect("it has ended");
+    assert!(comes, "SYNC is heard, and nothing keeps it away");
 }
