@@ -16,8 +16,8 @@ import sys
 import tempfile
 import time
 
-import boot_up
 import canopen
+import ears
 import round_trips
 
 NODE = 4
@@ -47,7 +47,7 @@ def value_is_written_and_read_back(node):
 
 def reset_is_followed_by_boot_up(node):
     """CiA 301, 7.3.2.3: a node that has restarted says so."""
-    assert boot_up.after_reset(node, PATIENCE_S), "no boot-up"
+    assert ears.boot_up_after_reset(node, PATIENCE_S), "no boot-up"
 
 
 def sync_is_answered_by_a_pdo(node):

@@ -1,6 +1,7 @@
 """How long canopen-python takes for an SDO round trip on a bus, beside `ferrodrive latency` on the same. A figure, not a check.
 
     python tests/peers/round_trips.py --interface socketcand --host 127.0.0.1 --port 29536 --channel can0 --node 4 [--count 1000]
+    python tests/peers/round_trips.py --interface slcan --channel socket://127.0.0.1:3000
 """
 
 import argparse

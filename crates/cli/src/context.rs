@@ -200,11 +200,8 @@ impl Context {
         let id = drive.node().id();
         let fitting: Vec<_> = guess.fitting().map(|model| model.name).collect();
         let key = format!("{} node {id} taken for {}", self.bus, guess.description().name);
-        if !self.remembered.borrow_mut().is_new(&key) {
-            return;
-        }
         let how = models::how_to_say(id, &fitting);
-        self.progress.note(&format!("node {id}: cannot tell its model: {guess}. Taken for that; to be sure: {how}"));
+        self.tell_once(&key, &format!("node {id}: cannot tell its model: {guess}. Taken for that; to be sure: {how}"));
     }
 
     /// Keeps for completion which nodes were heard, and which models they are as far as that was said.
@@ -218,6 +215,13 @@ impl Context {
     pub(crate) fn warn(&self, text: &str) {
         if !self.json && !self.embedded {
             self.progress.note(text);
+        }
+    }
+
+    /// Tells people what would be the same with every call: a person at a terminal once, whoever collects the text each time.
+    pub(crate) fn tell_once(&self, key: &str, text: &str) {
+        if !self.json && self.remembered.borrow_mut().is_new(key) {
+            self.tell(text);
         }
     }
 

@@ -194,9 +194,10 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     }
     let context = Context::new(global, network.clone(), embedded.as_deref(), progress.clone(), traffic.clone());
     if let Some(unused) = global.machine.as_ref().and_then(Machine::unused_by_a_master) {
-        context.tell(&format!(
+        let text = format!(
             "of the machine file a command on a real bus does not use: {unused}; `ferrodrive sim --machine FILE` and `ferrodrive run` do"
-        ));
+        );
+        context.tell_once(&format!("{} {text}", global.bus), &text);
     }
     let notes = RefCell::new(BusNotes::of(&global.bus));
     let until = async {

@@ -52,7 +52,7 @@ pub const fn is_parameter(row: &Entry) -> bool {
         ),
         _ => false,
     };
-    matches!(row.access, Access::ReadWrite) && !command
+    matches!(row.access, Access::ReadWrite) && !command && !row.command
 }
 
 /// The rows of all `parts`, in order.

@@ -1,6 +1,10 @@
 """Groups of axes and bases from Python, on a virtual bus; what is true is asked of the simulated shafts."""
 
+import ast
 import math
+import pathlib
+import subprocess
+import sys
 
 import ferrodrive
 import pytest
@@ -112,3 +116,13 @@ def test_a_base_goes_the_way_of_its_twist_and_stops_without_one():
             assert state["linear_m_s"] == 0 and "no new twist came for 300 ms" in state["cause"]
             with pytest.raises(ferrodrive.MasterError, match="finite numbers"):
                 base.command(math.inf, 0)
+
+
+def test_the_example_of_the_handbook_ends_where_it_was_sent():
+    example = pathlib.Path(__file__).resolve().parents[3] / "examples" / "group_of_two.py"
+    ended = subprocess.run([sys.executable, example], capture_output=True, text=True, timeout=120)
+    assert ended.returncode == 0, ended.stderr
+    joint, stepper = ast.literal_eval(ended.stdout)
+    # The joint by cyclic positions, the stepper by speeds, which are steps of 1 r/min.
+    assert joint["angle_deg"] == pytest.approx(90, abs=0.5)
+    assert stepper["angle_deg"] == pytest.approx(-45, abs=2)

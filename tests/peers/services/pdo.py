@@ -5,6 +5,7 @@ import statistics
 import struct
 import time
 
+import ears
 from checks import check, equal, near, table, true
 from drive import MJOINT, ZL
 from services.network import START, gaps
@@ -96,6 +97,7 @@ def times(bench):
 @check("canopen-python commands a speed by PDO, in operational and at SYNC, and reads speed and position from another", *ZL)
 def by_library(bench):
     target, actual = bench.node.rpdo[2], bench.node.tpdo[2]
+    sync = bench.network.sync.transmit
     set_up(bench, target, (0x60FF,), trans_type=1)
     set_up(bench, actual, (0x606C, 0x6064), trans_type=1)
     bench.enable(3)
@@ -109,14 +111,12 @@ def by_library(bench):
         bench.sleep(0.05)
     bench.network.sync.transmit()
     bench.speed_becomes(60)
-    bench.network.sync.transmit()
-    true(actual.wait_for_reception(timeout=3), "a PDO after SYNC")
+    true(ears.pdo_after(sync, actual, 3), "a PDO after SYNC")
     near(actual[0x606C].raw, 60 * bench.drive.per_rpm, 5 * bench.drive.per_rpm, "606Ch in the PDO")
     bench.write(0x60FF, 0)
     bench.speed_becomes(0)
     bench.sleep(0.5)
-    bench.network.sync.transmit()
-    true(actual.wait_for_reception(timeout=3), "a PDO after SYNC")
+    true(ears.pdo_after(sync, actual, 3), "a PDO after SYNC")
     near(actual[0x6064].raw, bench.read(0x6064), 3, "6064h in the PDO, at standstill")
 
 

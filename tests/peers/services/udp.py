@@ -11,9 +11,9 @@ import struct
 import subprocess
 import time
 
-import boot_up
 import can
 import canopen
+import ears
 from ferrodrive import Simulator
 
 from checks import Skip, check, equal, eventually, true
@@ -68,7 +68,7 @@ def multicast_drive(bench):
             equal(node.sdo.upload(0x1000, 0), bench.drive.device_type.to_bytes(4, "little"), "1000h")
             node.sdo.download(0x6083, 0, struct.pack("<I", 250))
             equal(node.sdo.upload(0x6083, 0), struct.pack("<I", 250), "6083h after it was written")
-            true(boot_up.after_reset(node, PATIENCE_S), "boot-up after the reset")
+            true(ears.boot_up_after_reset(node, PATIENCE_S), "boot-up after the reset")
         finally:
             network.disconnect()
 

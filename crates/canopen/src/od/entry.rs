@@ -117,6 +117,8 @@ pub struct Entry {
     pub stored: bool,
     /// Kept there as well, but only by a save of everything: not with each write.
     pub saved: bool,
+    /// Writing it does something, and what is written is no setting.
+    pub command: bool,
     /// May be mapped into PDOs.
     pub pdo: PdoMapping,
     /// Most bytes of a string or DOMAIN; 0 for one that never changes.
@@ -148,6 +150,7 @@ impl Entry {
             held_to: None,
             stored: false,
             saved: false,
+            command: false,
             pdo: PdoMapping::No,
             capacity: 0,
         }
@@ -247,6 +250,12 @@ impl Entry {
     /// Kept in the parameter store by a save of everything only.
     pub const fn saved(mut self) -> Self {
         self.saved = true;
+        self
+    }
+
+    /// Writing it does something.
+    pub const fn command(mut self) -> Self {
+        self.command = true;
         self
     }
 

@@ -22,6 +22,7 @@ use testbench::models::resolve;
 /// Prints what was asked, what answered and what moved, beside what the manuals let expect, and draws the motion.
 /// Exit status 1 if anything differs.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive demo\n  ferrodrive demo --drive zlim42c --svg stepper.svg")]
 pub(crate) struct Demo {
     /// Where to draw the motion
     #[arg(long, value_name = "FILE", default_value = "demo.svg")]

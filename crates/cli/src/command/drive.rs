@@ -14,7 +14,12 @@ use crate::paint::Paint;
 use testbench::words::node::node;
 
 /// Show what a drive says of itself: power state, fault with remedy, position, speed, current, temperatures, supply
+///
+/// Reads only. What a drive has no object for is left out. `explain` says why it does not move, `watch` shows objects as they change.
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  ferrodrive state 4\n  ferrodrive --bus can0 --machine machine.toml state 4 --json"
+)]
 pub(crate) struct State {
     /// Node-ID
     #[arg(value_parser = node)]
@@ -22,7 +27,13 @@ pub(crate) struct State {
 }
 
 /// Enable a drive: power on the motor, holding still
+///
+/// Goes the way of CiA 402 to operation enabled, whatever state the drive is in; a fault is not reset. The drive stays enabled when the
+/// command has ended.
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  ferrodrive --bus can0 enable 4\n  ferrodrive --bus can0 enable 4 -v      # each frame of it"
+)]
 pub(crate) struct Enable {
     /// Node-ID
     #[arg(value_parser = node)]
@@ -30,7 +41,10 @@ pub(crate) struct Enable {
 }
 
 /// Disable a drive: stop, then take the power off the motor
+///
+/// A load that pulls (an arm, a slope) moves a motor without power, unless a brake holds it.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  ferrodrive --bus can0 disable 4")]
 pub(crate) struct Disable {
     /// Node-ID
     #[arg(value_parser = node)]
@@ -38,7 +52,10 @@ pub(crate) struct Disable {
 }
 
 /// Stop a drive by its deceleration ramp; it stays enabled
+///
+/// Returns when it stands.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  ferrodrive --bus can0 stop 4")]
 pub(crate) struct Stop {
     /// Node-ID
     #[arg(value_parser = node)]
@@ -46,7 +63,10 @@ pub(crate) struct Stop {
 }
 
 /// Stop a drive as fast as it is set to (605Ah)
+///
+/// By the quick stop of its model, whatever it does; what the drive is in then is said.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  ferrodrive --bus can0 quick-stop 4")]
 pub(crate) struct QuickStop {
     /// Node-ID
     #[arg(value_parser = node)]
@@ -54,7 +74,12 @@ pub(crate) struct QuickStop {
 }
 
 /// Reset a drive's fault, once its cause is gone
+///
+/// A fault that stays is told with its cause and remedy. The drive is not enabled.
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  ferrodrive --bus can0 reset 4\n  ferrodrive --bus can0 state 4          # the fault, and what to do about it"
+)]
 pub(crate) struct Reset {
     /// Node-ID
     #[arg(value_parser = node)]

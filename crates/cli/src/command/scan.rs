@@ -21,6 +21,9 @@ use testbench::models::{Description, how_to_say};
 /// --model NODE=MODEL, or in a machine file (--machine FILE.toml). A node in the state stopped answers no SDO; it is listed
 /// if it sends a heartbeat. What others sent meanwhile is told too: boot-ups, errors, PDOs, SYNC, another master's requests.
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  ferrodrive --bus can0 scan\n  ferrodrive --bus can0 scan --model 4=zlac8030l --json"
+)]
 pub(crate) struct Scan {}
 
 /// Everybody found.

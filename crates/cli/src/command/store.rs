@@ -12,7 +12,13 @@ use crate::paint::Paint;
 use testbench::words::node::node;
 
 /// Store a drive's parameters in its own memory
+///
+/// Says which object the model has for it, and which values count only after the next start. What a model stores without being asked is on
+/// its page of the handbook.
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  ferrodrive --bus can0 save 4\n  ferrodrive --bus can0 params backup 4 -o wheel.toml    # a copy in a file"
+)]
 pub(crate) struct Save {
     /// Node-ID
     #[arg(value_parser = node)]
@@ -20,7 +26,12 @@ pub(crate) struct Save {
 }
 
 /// Put a drive's parameters back to their factory values
+///
+/// Everything that was set is lost, perhaps node-ID and bit rate too: keep a copy first.
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  ferrodrive --bus can0 params backup 4 -o before.toml\n  ferrodrive --bus can0 restore 4"
+)]
 pub(crate) struct Restore {
     /// Node-ID
     #[arg(value_parser = node)]

@@ -60,7 +60,7 @@ impl Drive {
         let mut left = Vec::new();
         let (mut current, mut unfit, mut usable) = (BTreeMap::new(), Vec::new(), BTreeMap::new());
         for (object, value) in &wanted.values {
-            if is_command(*object) {
+            if is_command(*object, model) {
                 left.push((*object, Left::Command));
                 continue;
             }

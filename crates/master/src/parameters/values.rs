@@ -127,9 +127,9 @@ pub fn wanted_of(model: &Description) -> Vec<Mux> {
 }
 
 /// True for an object that nobody writes to configure a device: a command, a set-point.
-pub(super) fn is_command(object: Mux) -> bool {
-    let row = Entry::new(object.index, object.sub_index, DataType::Unsigned32, Access::ReadWrite, "", "");
-    !is_parameter(&row)
+pub(super) fn is_command(object: Mux, model: Option<&Description>) -> bool {
+    let by_standard = Entry::new(object.index, object.sub_index, DataType::Unsigned32, Access::ReadWrite, "", "");
+    !is_parameter(&by_standard) || model.and_then(|model| model.row(object)).is_some_and(|row| row.command)
 }
 
 /// The value that an object of this row is delivered with, as an SDO carries it; `None` for what has no number.

@@ -74,7 +74,8 @@ class Simulator:
             text=True,
             bufsize=1,
         )
-        threading.Thread(target=self._read, daemon=True).start()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
         try:
             while not self.ready.startswith("ready"):
                 self.ready = self._line(READY_TIMEOUT_S, "no line that begins with `ready`")
@@ -146,10 +147,18 @@ class Simulator:
 
     def quit(self) -> int:
         """Asks the program to quit, and ends the very process that was started if it does not. Returns its exit status."""
+        assert self.process.stdin is not None and self.process.stdout is not None
         try:
-            self.process.communicate("quit\n", timeout=QUIT_TIMEOUT_S)
+            if self.process.poll() is None:
+                self.process.stdin.write("quit\n")
+            self.process.stdin.close()
+            self.process.wait(timeout=QUIT_TIMEOUT_S)
         except (subprocess.TimeoutExpired, OSError, ValueError):
             self.kill()
+        # Its output ends with it; not before that is it closed under the thread that reads it.
+        self._reader.join(timeout=QUIT_TIMEOUT_S)
+        if not self._reader.is_alive():
+            self.process.stdout.close()
         return self.process.returncode
 
     def kill(self) -> None:

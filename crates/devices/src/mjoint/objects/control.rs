@@ -22,7 +22,7 @@ pub(super) const CHANGES_OF_1_66: [Entry; 3] = [
 crate::row::rows! { const MANUFACTURER: [Entry; 17], manufacturer_objects:
     rw(0x2600, 0, U16, "modbus_enable", "Modbus enable").values(OFF_ON) => MODBUS_ENABLE;
     // 1 from power-on: bit 2 of the statusword 0404h that 5.10.1 prints before anything is enabled.
-    rw(0x2601, 0, U16, "output_enabled", "Drive output enabled").values(OFF_ON).default(1) => OUTPUT_ENABLED;
+    rw(0x2601, 0, U16, "output_enabled", "Drive output enabled").values(OFF_ON).default(1).command() => OUTPUT_ENABLED;
     // Printed 0 to 306 r/min; the AIM servos' manual has 0 to 200 and tenths of a degree.
     rws(0x2604, 0, U16, "weak_magnetic_angle", "Weak magnetic Angle")
         .range(0, 200).default(WEAK_MAGNETIC_ANGLE).unit("0.1 deg") => WEAK_MAGNETIC;
@@ -30,12 +30,12 @@ crate::row::rows! { const MANUFACTURER: [Entry; 17], manufacturer_objects:
     rws(0x260A, 0, U16, "electronic_gear_numerator", "Electronic gear molecule").default(32768) => GEAR_NUMERATOR;
     rws(0x260B, 0, U16, "electronic_gear_denominator", "Electronic gear denominator")
         .range(1, 65535).default(8192) => GEAR_DENOMINATOR;
-    rw(0x260C, 0, I32, "incremental_position", "The incremental position").unit("counts") => INCREMENTAL_POSITION;
-    rw(0x260E, 0, U16, "alarm_code", "Alarm code") => ALARM_CODE;
+    rw(0x260C, 0, I32, "incremental_position", "The incremental position").unit("counts").command() => INCREMENTAL_POSITION;
+    rw(0x260E, 0, U16, "alarm_code", "Alarm code").command() => ALARM_CODE;
     ro(0x2612, 0, U16, "driver_temperature", "System temperature").range(0, 100).unit("1 degC") => DRIVER_TEMPERATURE;
     ro(0x2613, 0, I16, "output_pwm", "PWM of system output").unit("100/32768 %") => OUTPUT_PWM;
     // Reads 2 when all is stored, which is outside the printed range.
-    rw(0x2614, 0, U16, "data_save_flag", "Data save flag").range(0, 1) => DATA_SAVE_FLAG;
+    rw(0x2614, 0, U16, "data_save_flag", "Data save flag").range(0, 1).command() => DATA_SAVE_FLAG;
     // Printed 0 to 255; node-IDs are 1 to 127.
     rws(0x2615, 0, U16, "device_address", "Device location").range(1, 127).default(1) => DEVICE_ADDRESS;
     rws(0x2618, 0, U16, "stationary_max_output", "Stationary maximum allowable output")

@@ -22,15 +22,15 @@ crate::row::rows! { const GENERAL: [Entry; 18], general_objects:
         .range(1, 65535).default(30).unit("counts").mappable() => IN_POSITION_THRESHOLD;
     ro(0x2003, 0, U16, "input_status", "Input signal status").mappable() => INPUT_STATUS;
     ro(0x2004, 0, U16, "output_status", "Output signal status").mappable() => OUTPUT_STATUS;
-    rw(0x2005, 0, U16, "clear_feedback_position", "Clear feedback position").values(CLEAR).mappable()
+    rw(0x2005, 0, U16, "clear_feedback_position", "Clear feedback position").values(CLEAR).command().mappable()
         => CLEAR_FEEDBACK_POSITION;
     rw(0x2006, 0, U16, "clear_current_position", "In absolute position mode, clear the current position")
-        .values(CLEAR).mappable() => CLEAR_CURRENT_POSITION;
+        .values(CLEAR).command().mappable() => CLEAR_CURRENT_POSITION;
     rws(0x2007, 0, U16, "limit_stop_mode", "Limit stop mode").values(LIMIT_STOP).mappable();
     rws(0x2008, 0, U16, "initial_speed", "Initial speed").range(1, 300).default(1).unit("r/min").mappable()
         => INITIAL_SPEED;
     rw(0x2009, 0, U16, "register_parameter_setting", "Register parameter setting")
-        .values(REGISTER_COMMANDS).mappable() => REGISTER_PARAMETER_SETTING;
+        .values(REGISTER_COMMANDS).command().mappable() => REGISTER_PARAMETER_SETTING;
     rws(0x200A, 0, U16, "max_motor_speed", "Maximum speed of motor")
         .range(1, 1000).default(1000).unit("r/min").mappable() => MAX_MOTOR_SPEED;
     // Printed 0 to 4096; no encoder has 0 lines.

@@ -34,9 +34,9 @@ crate::row::rows! { const GENERAL: [Entry; 17], general_objects:
     // U32 in 5.3.4; U16 in 5.3.5, here, and in its address 200E0010h. Not stored, as printed.
     rw(0x200E, 0, U16, "start_speed", "Start speed").range(2, 300).default(5).unit("r/min").mappable() => START_SPEED;
     rw(0x2010, 0, U16, "register_parameter_setting", "Register parameter setting")
-        .values(REGISTER_COMMANDS).mappable() => REGISTER_PARAMETER_SETTING;
-    rw(0x2011, 0, U16, "fault_reset", "Fault reset command").values(RESET).mappable() => FAULT_RESET;
-    rw(0x2012, 0, U16, "clear_current_position", "Clear current position").values(CLEAR).mappable()
+        .values(REGISTER_COMMANDS).command().mappable() => REGISTER_PARAMETER_SETTING;
+    rw(0x2011, 0, U16, "fault_reset", "Fault reset command").values(RESET).command().mappable() => FAULT_RESET;
+    rw(0x2012, 0, U16, "clear_current_position", "Clear current position").values(CLEAR).command().mappable()
         => CLEAR_CURRENT_POSITION;
 }
 
