@@ -118,6 +118,28 @@ impl Stage {
         std::fs::write(folder.join(format!("{name}.png")), picture).expect("it is written");
     }
 
+    /// Waits for a line of the trace.
+    async fn line(&self, text: &str) {
+        let path = format!("//*[contains(@class, 'trace-row') and contains(., '{text}')]");
+        self.client
+            .wait()
+            .at_most(PATIENCE)
+            .for_element(Locator::XPath(&path))
+            .await
+            .unwrap_or_else(|error| panic!("{text}: {error}"));
+    }
+
+    /// Waits for a file that the browser saves; it has another name until it is whole.
+    async fn saved(&self, name: &str) -> PathBuf {
+        let file = self.profile.join(name);
+        let until = std::time::Instant::now() + PATIENCE;
+        while !file.exists() {
+            assert!(std::time::Instant::now() < until, "no file is saved");
+            tokio::time::sleep(std::time::Duration::from_millis(50)).await;
+        }
+        file
+    }
+
     async fn close(mut self) {
         // The window may be gone already.
         let _ = self.client.clone().close().await;
@@ -220,13 +242,7 @@ async fn the_scope_keeps_what_the_drive_said_and_saves_it() {
         .expect("a cursor");
     stage.shoot("scope").await;
     stage.click("#scope-save").await;
-    let file = stage.profile.join("node4.csv");
-    let until = std::time::Instant::now() + PATIENCE;
-    while !file.exists() {
-        assert!(std::time::Instant::now() < until, "no file is saved");
-        tokio::time::sleep(std::time::Duration::from_millis(50)).await;
-    }
-    let saved = std::fs::read_to_string(file).expect("text");
+    let saved = std::fs::read_to_string(stage.saved("node4.csv").await).expect("text");
     let mut lines = saved.lines();
     assert_eq!(lines.next(), Some("at_s,velocity_rpm,angle_degrees,current_a,supply_v,position_counts,statusword"));
     let samples: Vec<Vec<f64>> =
@@ -235,6 +251,40 @@ async fn the_scope_keeps_what_the_drive_said_and_saves_it() {
     let (first, last) = (&samples[0], &samples[samples.len() - 1]);
     assert!(first[2].abs() < 2.0 && (last[2] - 90.0).abs() < 2.0, "{saved}");
     assert!(samples.iter().any(|sample| sample[1] > 20.0), "it was seen turning: {saved}");
+    stage.close().await;
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn the_trace_says_what_passes_and_a_filter_hides_the_rest() {
+    let stage = Stage::open("trace").await;
+    stage.take_the_wheel().await;
+    stage.click("form[aria-label=Move] button").await;
+    let angle = |wheel: &Value| wheel["drive"]["angle_degrees"].as_f64().expect("an angle");
+    stage.wheel("a quarter of a turn", |wheel| (angle(wheel) - 90.0).abs() < 2.0);
+    stage.click("#tabs [data-name=trace]").await;
+    stage.line("SDO node 4: read 6041h:00 statusword = ").await;
+    stage.shoot("trace").await;
+    stage.find("#trace-nodes").await.send_keys("4").await.expect("typed");
+    stage.find("#trace-text").await.send_keys("target_position").await.expect("typed");
+    // 90 degrees of 4096 counts a turn (ZLAC8030L).
+    stage.line("SDO node 4: wrote 607Ah:00 target_position = 1024").await;
+    let words = stage.client.find_all(Locator::Css(".trace-list .trace-row")).await.expect("lines");
+    assert!(!words.is_empty());
+    for line in words {
+        let text = line.text().await.expect("text");
+        assert!(text.contains("target_position") && text.contains("node 4"), "the filter let through: {text}");
+    }
+    stage.click("#trace-pause").await;
+    stage.find("#trace-pause[aria-pressed=true]").await;
+    stage.click("#theme").await;
+    stage.shoot("trace_filtered_other_theme").await;
+    stage.click("#trace-save").await;
+    let saved = stage.saved("trace.log").await;
+    let decoded = common::ferrodrive(&["--bus", &format!("log:{}", saved.display()), "--model", "4=zlac8030l", "dump"]);
+    assert_eq!(decoded.status, Some(0), "{}", decoded.err);
+    assert!(decoded.out.contains("write 607Ah:00 target_position = 1024"), "{}", decoded.out);
+    assert!(!decoded.out.contains("node 2"), "of node 4 alone");
     stage.close().await;
 }
 

@@ -6,6 +6,7 @@ import { busView } from "./bus.js";
 import { driveView } from "./drive.js";
 import { motionView } from "./motion.js";
 import { scopeView } from "./scope.js";
+import { traceView } from "./trace.js";
 
 const byId = (id) => document.getElementById(id);
 const NEWS_KEPT = 200;
@@ -18,6 +19,7 @@ const views = [
   { name: "drive", title: "Drive", view: driveView(shared) },
   { name: "motion", title: "Motion", view: motionView(shared, report) },
   { name: "scope", title: "Scope", view: scopeView(shared) },
+  { name: "trace", title: "Trace", view: traceView() },
 ];
 let shown = null;
 

@@ -10,6 +10,7 @@ use tokio::sync::{broadcast, mpsc, oneshot, watch};
 
 use crate::authority::SessionId;
 use crate::message::{Answer, Deed};
+use crate::trace::Trace;
 
 /// Wishes that may wait for the host, of all sessions together: it takes them far faster than they come.
 const WISHES: usize = 256;
@@ -24,6 +25,7 @@ pub struct Desk {
     stops: Arc<watch::Sender<u64>>,
     pictures: watch::Receiver<Picture>,
     news: broadcast::Sender<Arc<str>>,
+    trace: Arc<Trace>,
 }
 
 /// What the host has in its hands.
@@ -32,6 +34,7 @@ pub(crate) struct Counter {
     pub(crate) stops: watch::Receiver<u64>,
     pub(crate) pictures: watch::Sender<Picture>,
     pub(crate) news: broadcast::Sender<Arc<str>>,
+    pub(crate) trace: Arc<Trace>,
 }
 
 /// The state of everything, as JSON.
@@ -56,14 +59,15 @@ pub(crate) enum Wish {
     Do { session: SessionId, seq: u64, deed: Deed, answer: oneshot::Sender<Answer> },
 }
 
-/// Both ends.
-pub(crate) fn desk() -> (Desk, Counter) {
+/// Both ends, with the trace between them.
+pub(crate) fn desk(trace: Trace) -> (Desk, Counter) {
+    let trace = Arc::new(trace);
     let (wishes, wished) = mpsc::channel(WISHES);
     let (stops, stopped) = watch::channel(0);
     let (shown, pictures) = watch::channel(Picture { number: 0, json: "{}".into() });
     let (news, _) = broadcast::channel(NEWS);
-    let desk = Desk { wishes, stops: Arc::new(stops), pictures, news: news.clone() };
-    (desk, Counter { wishes: wished, stops: stopped, pictures: shown, news })
+    let desk = Desk { wishes, stops: Arc::new(stops), pictures, news: news.clone(), trace: Arc::clone(&trace) };
+    (desk, Counter { wishes: wished, stops: stopped, pictures: shown, news, trace })
 }
 
 /// A session at the desk. The host stops what it moved when this is dropped.
@@ -93,6 +97,11 @@ impl Desk {
     /// The pictures from now on.
     pub(crate) fn pictures(&self) -> watch::Receiver<Picture> {
         self.pictures.clone()
+    }
+
+    /// The frames that have passed.
+    pub(crate) fn trace(&self) -> &Trace {
+        &self.trace
     }
 
     /// The news from now on.

@@ -18,10 +18,12 @@ mod desk;
 mod host;
 mod message;
 mod snapshot;
+mod trace;
 mod web;
 
 pub use access::{Access, AccessError, Password};
 pub use dead_man::DeadMan;
 pub use desk::Desk;
-pub use host::{Host, JOG_SPAN, PRESENCE_SPAN, Passed, Setting};
+pub use host::{Host, JOG_SPAN, PRESENCE_SPAN, Setting};
+pub use trace::Passed;
 pub use web::app;

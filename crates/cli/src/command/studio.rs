@@ -14,6 +14,7 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::{Format, Report};
 use crate::paint::Paint;
+use crate::recording::interface_of;
 
 /// Show and move drives in the browser
 ///
@@ -80,6 +81,8 @@ impl Studio {
             bitrate: bitrate(context),
             timeout: context.timeout(),
             models: context.told_models(),
+            interface: interface_of(context.bus()).name().to_owned(),
+            unix_zero: context.traffic.unix_zero(),
         };
         let (host, desk) = Host::new(context.network.clone(), setting);
         let app = studio::app(desk, access);

@@ -146,6 +146,14 @@ impl Decoder {
         }
     }
 
+    /// Takes in what a frame teaches of those behind it, for somebody who does not want it in words: mappings, models and
+    /// transfers under way. Only SDO frames do.
+    pub fn pass(&mut self, frame: &Frame) {
+        if let Some(Service::SdoRequest(_) | Service::SdoReply(_)) = Service::of(frame.id()) {
+            self.decode(frame);
+        }
+    }
+
     fn decode_service(&mut self, service: Service, frame: &Frame) -> Option<Decoded> {
         Some(match service {
             Service::Nmt => Decoded::Nmt(NmtRequest::parse(frame).ok()?),

@@ -151,6 +151,20 @@ impl Conversations {
     }
 }
 
+impl Sdo {
+    /// The whole transfer in words, from the frame that ends it: what was read or written, or why not. `None` before.
+    pub fn transfer(&self) -> Option<String> {
+        let Self { node, step, .. } = self;
+        let value = |mux, bytes| Value::new(mux, bytes, self.model.map(|model| model.0));
+        match step {
+            SdoStep::ReadDone(mux, bytes) => Some(format!("SDO node {node}: read {}", value(*mux, bytes))),
+            SdoStep::WriteDone(mux, bytes) => Some(format!("SDO node {node}: wrote {}", value(*mux, bytes))),
+            SdoStep::Abort(..) | SdoStep::BadChecksum { .. } => Some(self.to_string()),
+            _ => None,
+        }
+    }
+}
+
 impl fmt::Display for Sdo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let model = self.model.map(|model| model.0);

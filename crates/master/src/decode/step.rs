@@ -74,6 +74,11 @@ impl SdoStep {
         }
     }
 
+    /// True if the transfer is over with it, one way or the other.
+    pub const fn is_end(&self) -> bool {
+        matches!(self, Self::ReadDone(..) | Self::WriteDone(..) | Self::Abort(..) | Self::BadChecksum { .. })
+    }
+
     /// A value that is known to be in the device now.
     pub(super) fn learned(&self) -> Option<(Mux, &[u8])> {
         match self {

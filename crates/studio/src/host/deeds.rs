@@ -188,6 +188,7 @@ impl Host {
                 self.take_scan(found);
                 asked.into_iter().for_each(self::done);
             }
+            Done::Learned(node) => drop(self.learning.remove(&node)),
             Done::Deed(node, generation, outcome) => self.conclude(node, generation, outcome),
             Done::Told(told) => {
                 for (node, outcome) in told {

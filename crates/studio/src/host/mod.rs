@@ -12,6 +12,7 @@ mod state;
 mod stopping;
 #[cfg(test)]
 mod tests;
+mod trace;
 mod work;
 
-pub use state::{Host, JOG_SPAN, PRESENCE_SPAN, Passed, Setting};
+pub use state::{Host, JOG_SPAN, PRESENCE_SPAN, Setting};

@@ -52,6 +52,7 @@ impl Host {
             let is_looked_at = before.as_ref().is_some_and(|before| before.is_looked_at);
             let is_drive = known.drive.is_some();
             self.nodes.insert(id, KnownNode { is_looked_at, view: before.and_then(|before| before.view), ..known });
+            self.learn_pdos(id);
             if is_drive && !is_looked_at {
                 self.look_at(id, Duration::ZERO);
             }
@@ -152,6 +153,8 @@ impl Host {
                         self.scans_again = self.scanning;
                         self.begin_scan(None);
                     }
+                    // What was not stored is as it was before.
+                    self.learn_pdos(node);
                     Some(node)
                 }
                 Event::NmtState(node, _)

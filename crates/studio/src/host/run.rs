@@ -5,13 +5,14 @@ use std::time::Duration;
 use can::{Bitrate, Instant};
 use futures_util::StreamExt;
 
-use super::state::{Host, PRESENCE_SPAN, Passed, TICK};
+use super::state::{Host, PRESENCE_SPAN, TICK};
 use super::work::say;
 use crate::authority::SessionId;
 use crate::dead_man::DeadMan;
 use crate::desk::{Picture, Wish};
 use crate::message::Answer;
 use crate::snapshot::{BusView, Snapshot};
+use crate::trace::Passed;
 
 /// How often a picture is made while somebody looks, and while nobody does.
 const PICTURE_INTERVAL: Duration = Duration::from_millis(50);
@@ -52,6 +53,7 @@ impl Host {
         self.stop_what_is_not_held(now);
         while let Some(passed) = passed() {
             self.meter.note(&passed.frame);
+            self.counter.trace.append(passed);
             if !passed.own {
                 self.listening.iter_mut().for_each(|listening| listening.heard.note(&passed.frame, passed.at));
             }

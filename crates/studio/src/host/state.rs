@@ -1,9 +1,9 @@
 //! The host: what it holds, and what it is told at its start. What it does stands in the files beside this one.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use can::{Bitrate, Frame, Instant};
+use can::{Bitrate, Instant};
 use canopen::NodeId;
 use devices::Description;
 use futures_util::stream::FuturesUnordered;
@@ -15,6 +15,7 @@ use super::work::{Listening, Running, Work};
 use crate::authority::{Authority, SessionId};
 use crate::dead_man::DeadMan;
 use crate::desk::{Counter, Desk, desk};
+use crate::trace::{Origin, Trace};
 
 /// How long a jog goes on without being renewed. Looked at every 10 ms: a drive is told to stop within 200 ms.
 pub const JOG_SPAN: Duration = Duration::from_millis(190);
@@ -37,6 +38,10 @@ pub struct Setting {
     pub timeout: Duration,
     /// Models that need not be found out.
     pub models: BTreeMap<NodeId, &'static Description>,
+    /// Name of the bus in a log: that of its CAN interface, or `can0`.
+    pub interface: String,
+    /// Unix time of the bus's zero, for a log.
+    pub unix_zero: Duration,
 }
 
 /// The one task that owns the network. See the [crate](crate).
@@ -60,6 +65,8 @@ pub struct Host {
     pub(super) generation: u64,
     pub(super) work: Work,
     pub(super) lifelines: FuturesUnordered<Lifeline>,
+    /// Nodes whose PDO mappings are being read.
+    pub(super) learning: BTreeSet<NodeId>,
     pub(super) meter: Meter,
     pub(super) pictures: u64,
     pub(super) shown_at: Instant,
@@ -74,21 +81,11 @@ impl core::fmt::Debug for Host {
 /// Ends with its session.
 pub(super) type Lifeline = futures_util::future::BoxFuture<'static, SessionId>;
 
-/// A frame that passed.
-#[derive(Clone, Copy, Debug)]
-pub struct Passed {
-    /// When.
-    pub at: Instant,
-    /// Which.
-    pub frame: Frame,
-    /// This program sent it.
-    pub own: bool,
-}
-
 impl Host {
     /// A host on a network that somebody runs, and the desk at which it is asked.
     pub fn new(network: Network, setting: Setting) -> (Self, Desk) {
-        let (desk, counter) = desk();
+        let origin = Origin { interface: setting.interface.clone(), unix_zero: setting.unix_zero };
+        let (desk, counter) = desk(Trace::new(network.models(), origin));
         let now = network.now();
         let host = Self {
             meter: Meter::new(now, setting.bitrate),
@@ -104,6 +101,7 @@ impl Host {
             running: BTreeMap::new(),
             jogs: BTreeMap::new(),
             listening: Vec::new(),
+            learning: BTreeSet::new(),
             generation: 0,
             work: Work::new(),
             lifelines: FuturesUnordered::new(),

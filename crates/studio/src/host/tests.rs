@@ -1,9 +1,12 @@
 //! The host against virtual drives, in virtual time: who may move, and what stops.
 
-use std::collections::BTreeMap;
+mod trace;
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use can::{Bitrate, Instant};
+use can::{Bitrate, Frame, Instant, Station};
 use canopen::{Mux, NodeId};
 use master::Network;
 use serde_json::Value;
@@ -14,6 +17,7 @@ use super::state::TICK;
 use super::{Host, JOG_SPAN, PRESENCE_SPAN, Setting};
 use crate::desk::{Desk, Session};
 use crate::message::{Answer, Deed};
+use crate::trace::Passed;
 
 const WHEEL: NodeId = node(4);
 const ARM: NodeId = node(2);
@@ -107,11 +111,64 @@ impl Stage {
     }
 }
 
+/// A network whose frames are seen as they pass.
+#[derive(Clone)]
+struct Tap {
+    network: Network,
+    passed: Arc<Mutex<VecDeque<Passed>>>,
+}
+
+impl Tap {
+    fn take(&self) -> Option<Passed> {
+        self.passed.lock().expect("nobody panicked").pop_front()
+    }
+
+    fn note(&self, frame: &Frame, at: Instant, own: bool) {
+        self.passed.lock().expect("nobody panicked").push_back(Passed { at, frame: *frame, own });
+    }
+}
+
+impl Station for Tap {
+    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
+        self.note(frame, now, false);
+        self.network.handle_frame(frame, now);
+    }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        self.network.handle_timeout(now);
+    }
+
+    fn poll_transmit(&mut self) -> Option<Frame> {
+        self.network.poll_transmit()
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        self.network.poll_timeout()
+    }
+
+    fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
+        self.note(frame, now, true);
+        self.network.handle_transmitted(frame, now);
+    }
+}
+
+fn setting() -> Setting {
+    Setting {
+        bus: "sim".into(),
+        bitrate: None,
+        timeout: Duration::from_millis(100),
+        models: BTreeMap::new(),
+        interface: "can0".into(),
+        unix_zero: Duration::from_secs(1_700_000_000),
+    }
+}
+
 /// Plays a scene before a studio that runs.
 fn play(scene: impl AsyncFnOnce(&Stage)) {
     let network = Network::new();
+    let tap = Tap { network: network.clone(), passed: Arc::default() };
     let mut world = World::new(Bitrate::K500, 1);
-    world.add_station(network.clone());
+    world.add_station(tap.clone());
     world.add_drive(4, Box::new(zlac8030l(4, 1))).expect("the first");
     world.add_drive(2, Box::new(zlim42c(2, 1))).expect("the second");
     world.run_for(Duration::from_secs(1));
@@ -119,12 +176,12 @@ fn play(scene: impl AsyncFnOnce(&Stage)) {
     let models: BTreeMap<_, _> =
         models.into_iter().map(|(node, name)| (node, devices::model(name).expect("a model"))).collect();
     let timeout = Duration::from_millis(100);
-    let setting = Setting { bus: "sim".into(), bitrate: Some(Bitrate::K500), timeout, models };
+    let setting = Setting { bus: "sim".into(), bitrate: Some(Bitrate::K500), timeout, models, ..setting() };
     let (host, desk) = Host::new(network.clone(), setting);
     let stage = Stage { network, desk };
     let playing = async {
         tokio::select! {
-            () = host.run(|| None) => panic!("a host runs as long as there is a desk"),
+            () = host.run(|| tap.take()) => panic!("a host runs as long as there is a desk"),
             () = async { stage.scanned().await; scene(&stage).await } => {}
         }
     };
@@ -353,7 +410,7 @@ fn who_boots_while_others_are_asked_is_found() {
     world.set_timing(TimingMode::Device);
     world.add_drive(4, Box::new(zlac8030l(4, 1))).expect("the second");
     let timeout = Duration::from_millis(300);
-    let setting = Setting { bus: "sim".into(), bitrate: None, timeout, models: BTreeMap::new() };
+    let setting = Setting { timeout, ..setting() };
     let (host, desk) = Host::new(network.clone(), setting);
     let stage = Stage { network, desk };
     let playing = async {

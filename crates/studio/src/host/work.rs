@@ -30,6 +30,8 @@ pub(super) enum Done {
     Deed(NodeId, u64, Option<Result<Vec<String>, Error>>),
     /// What was moved has been told to stop.
     Told(Vec<(NodeId, Result<(), Error>)>),
+    /// The PDO mappings of a node were read.
+    Learned(NodeId),
     /// A drive was looked at closely.
     Explained(u64, oneshot::Sender<Answer>, Box<Explained>),
 }

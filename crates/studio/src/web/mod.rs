@@ -8,6 +8,7 @@ mod page;
 mod socket;
 #[cfg(test)]
 mod tests;
+mod trace;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -59,11 +60,12 @@ struct Web {
     access: Arc<Access>,
     /// One password at a time.
     door: Arc<Semaphore>,
+    doors: trace::Doors,
 }
 
 /// The server of a studio: everything under one router, which needs no socket to be called.
 pub fn app(desk: Desk, access: Arc<Access>) -> Router {
-    let web = Web { desk, access, door: Arc::new(Semaphore::new(1)) };
+    let web = Web { desk, access, door: Arc::new(Semaphore::new(1)), doors: trace::Doors::default() };
     let api = ROUTES.iter().fold(Router::new(), |router, route| router.route(route.path, handler(route.operation)));
     api.route("/", get(async || page::file("index.html")))
         .route("/page/{file}", get(async |Path(file): Path<String>| page::file(&file)))
@@ -82,6 +84,8 @@ fn handler(operation: Operation) -> MethodRouter<Web> {
         Operation::Stop => post(stop),
         Operation::Login => post(login),
         Operation::Socket => get(socket),
+        Operation::Trace => get(async |State(web): State<Web>, asked| trace::lines(web.desk, web.doors, asked).await),
+        Operation::TraceLog => get(async |State(web): State<Web>, asked| trace::log(web.desk, &web.doors, asked)),
     }
 }
 

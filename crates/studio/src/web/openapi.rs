@@ -11,6 +11,8 @@ pub(super) enum Operation {
     Stop,
     Login,
     Socket,
+    Trace,
+    TraceLog,
 }
 
 /// One request.
@@ -24,10 +26,12 @@ pub(super) struct Route {
 }
 
 const LET_IN: (&str, &str) = ("401", "Neither cookie nor token");
+const MALFORMED: (&str, &str) = ("400", "A parameter makes no sense");
+const OVER: (&str, &str) = ("503", "The studio is ending");
 const FOREIGN: (&str, &str) = ("403", "The Origin or the Host is not this server's");
 
 /// All of them. None that is a GET changes anything; none moves a drive: motion goes through the socket, where it is held.
-pub(super) const ROUTES: [Route; 6] = [
+pub(super) const ROUTES: [Route; 8] = [
     Route {
         path: "/api/state",
         method: "get",
@@ -54,7 +58,7 @@ pub(super) const ROUTES: [Route; 6] = [
         method: "post",
         operation: Operation::Stop,
         summary: "Quick-stop every drive; needs no control",
-        answers: &[("202", "The drives are being stopped"), LET_IN, FOREIGN, ("503", "The studio is ending")],
+        answers: &[("202", "The drives are being stopped"), LET_IN, FOREIGN, OVER],
     },
     Route {
         path: "/api/login",
@@ -76,7 +80,44 @@ pub(super) const ROUTES: [Route; 6] = [
         summary: "A WebSocket: pictures and news out, what a page asks for in, one JSON object a message",
         answers: &[("101", "Welcome"), LET_IN, FOREIGN],
     },
+    Route {
+        path: "/api/trace",
+        method: "get",
+        operation: Operation::Trace,
+        summary: "The newest frames of those that are kept, in words",
+        answers: &[("200", "Lines, oldest first, and of which frames they are all"), MALFORMED, LET_IN, OVER],
+    },
+    Route {
+        path: "/api/trace.log",
+        method: "get",
+        operation: Operation::TraceLog,
+        summary: "All frames that are kept, in the form of candump; text, transfers and quiet do not count here",
+        answers: &[("200", "One frame a line"), MALFORMED, LET_IN, ("429", "Others are fetching it"), OVER],
+    },
 ];
+
+/// What may stand behind the `?` of a request: name, JSON type, meaning.
+const fn parameters(operation: Operation) -> &'static [(&'static str, &'static str, &'static str)] {
+    match operation {
+        Operation::Trace | Operation::TraceLog => &[
+            ("after", "integer", "Only frames from this number on"),
+            ("before", "integer", "Only frames below this number"),
+            ("from_s", "number", "Only frames from this time of the bus on"),
+            ("until_s", "number", "Only frames before this time of the bus"),
+            ("count", "integer", "Lines at most, 1 to 2000; 500 if nothing is said"),
+            ("node", "string", "Only what is about these node-IDs, separated by commas"),
+            (
+                "kind",
+                "string",
+                "Only nmt, sync, time, emcy, pdo, sdo, heartbeat, lss, other; several separated by commas",
+            ),
+            ("text", "string", "Only lines that have all these words, separated by commas"),
+            ("transfers", "boolean", "One line for each SDO transfer, not for each of its frames"),
+            ("quiet", "boolean", "Without the SDO transfers by which the studio reads"),
+        ],
+        _ => &[],
+    }
+}
 
 /// The document.
 pub(super) fn document() -> Value {
@@ -84,9 +125,11 @@ pub(super) fn document() -> Value {
     for route in &ROUTES {
         let answers: Map<String, Value> =
             route.answers.iter().map(|(status, text)| ((*status).to_owned(), json!({ "description": text }))).collect();
+        let parameter = |(name, kind, text): &(&str, &str, &str)| json!({ "name": name, "in": "query", "description": text, "schema": { "type": kind } });
         let operation = json!({
             "operationId": format!("{:?}", route.operation),
             "summary": route.summary,
+            "parameters": parameters(route.operation).iter().map(parameter).collect::<Vec<_>>(),
             "responses": answers,
         });
         let path = paths.entry(route.path).or_insert_with(|| json!({}));

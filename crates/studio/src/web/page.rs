@@ -26,6 +26,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("machine.js", SCRIPT, include_str!("../../page/machine.js")),
     ("motion.js", SCRIPT, include_str!("../../page/motion.js")),
     ("scope.js", SCRIPT, include_str!("../../page/scope.js")),
+    ("trace.js", SCRIPT, include_str!("../../page/trace.js")),
 ];
 
 /// A file of the page.

@@ -20,6 +20,7 @@ use crate::access::{Access, Password};
 use crate::authority::Authority;
 use crate::desk::{Counter, Desk, Picture, Wish, desk};
 use crate::message::Answer;
+use crate::trace::{Origin, Passed, Trace};
 
 /// What a busy machine may take for anything here.
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -31,7 +32,7 @@ type Socket = WebSocketStream<MaybeTlsStream<TcpStream>>;
 fn server(password: Option<&str>) -> (Router, Arc<Access>, Counter) {
     let password = password.map(|text| Password::new(text).expect("long enough"));
     let access = Arc::new(Access::new(ADDRESS.parse().expect("an address"), password).expect("loopback"));
-    let (desk, counter) = desk();
+    let (desk, counter) = desk(Trace::new(master::Models::default(), Origin::default()));
     (app(desk, Arc::clone(&access)), access, counter)
 }
 
@@ -173,11 +174,46 @@ async fn a_password_opens_and_a_wrong_one_costs_time() {
     assert_eq!(ask(&app, "POST", "/api/login", &origin, &large).await.status(), StatusCode::PAYLOAD_TOO_LARGE);
 }
 
+#[tokio::test]
+async fn the_trace_is_asked_for_in_parts_and_saved_by_few_at_a_time() {
+    let (app, access, counter) = server(None);
+    let bearer = format!("Bearer {}", token(&access));
+    let headers = [("authorization", bearer.as_str())];
+    let frames = 10_000;
+    for number in 0..frames {
+        let at = can::Instant::from_millis(number);
+        counter.trace.append(Passed { at, frame: "704#05".parse().expect("a frame"), own: false });
+    }
+    let part = text(ask(&app, "GET", "/api/trace?after=9990&node=4&kind=heartbeat", &headers, "").await).await;
+    let part: Value = serde_json::from_str(&part).expect("JSON");
+    assert_eq!((&part["from"], &part["to"], &part["skipped"]), (&9990.into(), &frames.into(), &0.into()));
+    assert_eq!(part["lines"].as_array().expect("lines").len(), 10);
+    for wrong in ["after=x", "node=0", "kind=heartbeats", "nodes=4", "from_s=NaN"] {
+        let refused = ask(&app, "GET", &format!("/api/trace?{wrong}"), &headers, "").await;
+        assert_eq!(refused.status(), StatusCode::BAD_REQUEST, "{wrong}");
+    }
+    let mut saving = Vec::new();
+    while saving.len() < 100 {
+        let log = ask(&app, "GET", "/api/trace.log", &headers, "").await;
+        if log.status() == StatusCode::TOO_MANY_REQUESTS {
+            break;
+        }
+        saving.push(log);
+    }
+    assert!((1..100).contains(&saving.len()), "who saves holds frames that are not kept any more");
+    for log in saving {
+        let log = text(log).await;
+        assert_eq!(log.lines().count() as u64, frames);
+        assert_eq!(log.lines().last(), Some("(0000000009.999000) can0 704#05 R"));
+    }
+    assert_eq!(ask(&app, "GET", "/api/trace.log", &headers, "").await.status(), StatusCode::OK, "there is room again");
+}
+
 /// A server at a port of its own, whose host answers that everything is done.
 async fn listening() -> (Arc<Access>, Desk, tokio::sync::watch::Sender<Picture>) {
     let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
     let access = Arc::new(Access::new(listener.local_addr().expect("bound"), None).expect("loopback"));
-    let (desk, counter) = desk();
+    let (desk, counter) = desk(Trace::new(master::Models::default(), Origin::default()));
     let Counter { mut wishes, pictures, .. } = counter;
     let served = app(desk.clone(), Arc::clone(&access));
     tokio::spawn(async move { axum::serve(listener, served).await });

@@ -1,0 +1,190 @@
+// The Trace view: what passes on the bus, in words. The frames are kept in the studio; this page has a part of their lines,
+// asks for what is new while it is looked at, and for what is older when somebody scrolls there.
+
+import { h, number, say } from "./dom.js";
+
+const ASK_MS = 100;
+const PART = 500;
+/** Lines that the page has at most; older ones are fetched again from the studio. */
+const LINES_KEPT = 20_000;
+const ROW_PX = 24;
+const KINDS = ["nmt", "sync", "time", "emcy", "pdo", "sdo", "heartbeat", "lss", "other"];
+const COLUMNS = ["Time (s)", "From", "COB-ID", "What", "Bytes", "Took", "In words"];
+
+export function traceView() {
+  const nodes = h("input", { id: "trace-nodes", size: "8", placeholder: "all nodes", "aria-label": "Node-IDs, separated by commas", oninput: again });
+  const words = h("input", { id: "trace-text", size: "24", placeholder: "words, separated by commas", "aria-label": "Words that a line has to have, separated by commas", oninput: again });
+  const kinds = h("div", { class: "chooser", role: "group", "aria-label": "Kinds of frames; none for all" }, ...KINDS.map((kind) => h("button", { type: "button", "data-kind": kind, "aria-pressed": "false", onclick: choose }, kind)));
+  const whole = h("input", { type: "checkbox", id: "trace-transfers", checked: true, onchange: again });
+  const quiet = h("input", { type: "checkbox", id: "trace-quiet", onchange: again });
+  const pause = h("button", { type: "button", id: "trace-pause", "aria-pressed": "false", onclick: toggle }, "Pause");
+  const save = h("a", { id: "trace-save", class: "button", download: "trace.log", title: "All frames that are kept of these nodes and kinds, in the form of candump" }, "Save candump");
+  const room = h("div", { class: "room" });
+  const list = h("div", { class: "trace-list", tabindex: "0", role: "log", "aria-label": "Frames", onscroll: draw }, room);
+  const status = h("p", { class: "quiet", role: "status" });
+  const root = h(
+    "section",
+    { class: "trace" },
+    h("div", { class: "bar" }, h("label", {}, "Nodes ", nodes), h("label", {}, "Text ", words), h("label", {}, whole, " whole SDO transfers"), h("label", {}, quiet, " without the studio's readings"), pause, save),
+    h("div", { class: "bar" }, kinds),
+    h("div", { class: "trace-row head" }, ...COLUMNS.map((title) => h("span", {}, title))),
+    list,
+    status,
+  );
+
+  let shown = false;
+  let paused = false;
+  let timer = null;
+  /** Counts the filters: an answer to an older one is of no use. */
+  let generation = 0;
+  let lines = [];
+  /** The numbers of the frames that the lines are of: from, and below to. */
+  let [from, to] = [null, null];
+  let oldest = 0;
+  let next = 0;
+  let skipped = 0;
+  let trouble = null;
+  let fetching = false;
+  /** The newest line is kept in view. */
+  let follows = true;
+
+  function filter() {
+    const chosen = [...kinds.children].filter((button) => button.getAttribute("aria-pressed") === "true").map((button) => button.dataset.kind);
+    const asked = new URLSearchParams();
+    if (nodes.value.trim()) asked.set("node", nodes.value);
+    if (chosen.length) asked.set("kind", chosen.join());
+    return asked;
+  }
+
+  function choose(event) {
+    const button = event.currentTarget;
+    button.setAttribute("aria-pressed", String(button.getAttribute("aria-pressed") !== "true"));
+    again();
+  }
+
+  /** Begins anew, with the newest lines of another filter. */
+  function again() {
+    generation += 1;
+    [lines, from, to, skipped, follows] = [[], null, null, 0, true];
+    save.href = `/api/trace.log?${filter()}`;
+    fetching = false;
+    draw();
+    ask();
+  }
+
+  async function part(more) {
+    const asked = filter();
+    asked.set("count", String(PART));
+    if (words.value.trim()) asked.set("text", words.value);
+    if (whole.checked) asked.set("transfers", "true");
+    if (quiet.checked) asked.set("quiet", "true");
+    for (const [name, value] of Object.entries(more)) asked.set(name, String(value));
+    const mine = generation;
+    fetching = true;
+    let told = null;
+    try {
+      const answer = await fetch(`/api/trace?${asked}`);
+      told = await answer.json();
+      if (!answer.ok) throw new Error(told.error.message);
+    } catch (error) {
+      if (mine === generation) [trouble, fetching] = [error.message, false];
+      return null;
+    }
+    // The filter is another one since.
+    if (mine !== generation) return null;
+    [trouble, fetching, oldest, next] = [null, false, told.oldest, told.next];
+    return told;
+  }
+
+  async function ask() {
+    clearTimeout(timer);
+    if (!shown) return;
+    const mine = generation;
+    // The first lines of a filter are shown even while nothing new is wanted, and nobody looks at a hidden tab.
+    if ((!paused || to === null) && !document.hidden && !fetching) {
+      const told = await part(to === null ? {} : { after: to });
+      if (told) {
+        if (to === null) from = told.from;
+        skipped += told.skipped;
+        to = told.to;
+        for (const line of told.lines) lines.push(line);
+        if (follows && lines.length > LINES_KEPT) {
+          lines = lines.slice(-LINES_KEPT);
+          from = lines[0].number;
+        }
+      }
+      if (mine === generation) draw();
+    }
+    if (mine === generation) {
+      clearTimeout(timer);
+      timer = setTimeout(ask, ASK_MS);
+    }
+  }
+
+  /** Fetches what lies before the first line. */
+  async function askOlder() {
+    if (fetching || from === null || from <= oldest || lines.length > LINES_KEPT) return;
+    const told = await part({ before: from });
+    if (!told) return;
+    from = told.from;
+    lines = told.lines.concat(lines);
+    // What was in view stays there.
+    const top = list.scrollTop + told.lines.length * ROW_PX;
+    room.style.height = `${lines.length * ROW_PX}px`;
+    list.scrollTop = top;
+    draw();
+  }
+
+  function toggle() {
+    paused = !paused;
+    pause.setAttribute("aria-pressed", String(paused));
+    say(pause, paused ? "Go on" : "Pause");
+    if (!paused) follows = true;
+    draw();
+  }
+
+  const row = (line, at) => {
+    const took = line.took_ms === undefined ? "" : `${number(line.took_ms, 1)} ms`;
+    const cells = [number(line.at_s, 6), line.from, line.id, line.kind, line.data, took, line.text];
+    const element = h("div", { class: `trace-row ${line.kind}`, "data-number": String(line.number), title: line.text }, ...cells.map((cell) => h("span", {}, cell)));
+    element.style.top = `${at * ROW_PX}px`;
+    return element;
+  };
+
+  /** Draws the lines that are in view, and no others. */
+  function draw(event) {
+    if (event) follows = list.scrollTop + list.clientHeight >= list.scrollHeight - ROW_PX;
+    room.style.height = `${lines.length * ROW_PX}px`;
+    if (follows && !event) list.scrollTop = list.scrollHeight;
+    const first = Math.max(0, Math.floor(list.scrollTop / ROW_PX) - 2);
+    const last = Math.min(lines.length, first + Math.ceil(list.clientHeight / ROW_PX) + 4);
+    room.replaceChildren(...lines.slice(first, last).map((line, at) => row(line, first + at)));
+    if (event && list.scrollTop < ROW_PX) askOlder();
+    // A filter that lets little through: what fills the view lies further back.
+    else if (lines.length * ROW_PX < list.clientHeight) askOlder();
+    const missed = skipped ? ` ${skipped} frames were too many for this page and are not shown.` : "";
+    const kept = next - oldest;
+    const searched = from === null ? 0 : next - from;
+    say(status, trouble ?? `${lines.length} ${lines.length === 1 ? "line" : "lines"} of the last ${searched} frames; the studio keeps ${kept}.${missed}${paused ? " Paused: the studio goes on keeping." : ""}`);
+    status.classList.toggle("bad", trouble !== null);
+  }
+
+  function update() {
+    if (shown) return;
+    shown = true;
+    // What passed while nobody looked is fetched by its end, not frame by frame.
+    if (paused) ask();
+    else again();
+  }
+
+  function hide() {
+    shown = false;
+    clearTimeout(timer);
+  }
+
+  function key(event) {
+    if (event.key === "p") toggle();
+  }
+
+  return { root, update, key, hide };
+}

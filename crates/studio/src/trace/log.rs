@@ -1,0 +1,32 @@
+//! What is kept as a log in the form of candump, which `ferrodrive dump` and can-utils read.
+
+use super::passed::Origin;
+use super::query::Query;
+use super::ring::{CHUNK, Held};
+
+/// Some frames of a log, and where the next ones begin.
+#[derive(Debug)]
+pub(crate) struct Part {
+    pub(crate) text: String,
+    pub(crate) next: u64,
+}
+
+impl Query {
+    /// The next lines of the log, of frames from this number on; `None` at its end. Nodes and services are chosen as for the view;
+    /// words are not, since a transfer without some of its frames says nothing.
+    pub(crate) fn log_part(&self, held: &Held, origin: &Origin, from: u64) -> Option<Part> {
+        let (floor, ceiling) = self.bounds(held);
+        let from = from.max(floor);
+        let next = ceiling.min(from + CHUNK as u64);
+        if from >= next {
+            return None;
+        }
+        let mut text = String::new();
+        held.decode(from, next, |_, passed, decoded| {
+            if self.chooses(decoded) {
+                origin.push_line(&mut text, passed);
+            }
+        });
+        Some(Part { text, next })
+    }
+}

@@ -1,0 +1,16 @@
+//! The last frames of the bus, raw, and their words for whoever asks.
+//!
+//! In: every frame that passes. Out: parts of what is kept, decoded then ([`Query`]), or as a log ([`Origin`]). The memory is
+//! bounded, and nobody who reads keeps the host waiting: the lock is held for a push, or for the copy of some pointers.
+
+mod line;
+mod log;
+mod passed;
+mod query;
+mod ring;
+
+pub use passed::Passed;
+
+pub(crate) use passed::Origin;
+pub(crate) use query::{Asked, Query};
+pub(crate) use ring::{Held, Trace};

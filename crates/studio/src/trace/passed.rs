@@ -1,0 +1,43 @@
+//! A frame that passed, and how it stands in a log.
+
+use core::fmt::Write;
+use std::time::Duration;
+
+use can::{Frame, Instant};
+
+/// A frame that passed.
+#[derive(Clone, Copy, Debug)]
+pub struct Passed {
+    /// When, in the time of the bus.
+    pub at: Instant,
+    /// Which.
+    pub frame: Frame,
+    /// This program sent it.
+    pub own: bool,
+}
+
+/// What a log says beside the frames.
+#[derive(Clone, Debug)]
+pub(crate) struct Origin {
+    /// Name of the bus's interface, a single word.
+    pub(crate) interface: String,
+    /// Unix time of the bus's zero.
+    pub(crate) unix_zero: Duration,
+}
+
+impl Default for Origin {
+    fn default() -> Self {
+        Self { interface: "can0".into(), unix_zero: Duration::ZERO }
+    }
+}
+
+impl Origin {
+    /// `(1700000000.123456) can0 604#4041600000000000 T`.
+    pub(super) fn push_line(&self, out: &mut String, passed: &Passed) {
+        let at = passed.at + self.unix_zero;
+        let (seconds, micros) = (at.as_nanos() / 1_000_000_000, at.as_nanos() % 1_000_000_000 / 1_000);
+        let direction = if passed.own { 'T' } else { 'R' };
+        // A string takes everything.
+        let _ = writeln!(out, "({seconds:010}.{micros:06}) {} {} {direction}", self.interface, passed.frame);
+    }
+}

@@ -1,0 +1,235 @@
+//! The ring, and what a reader holds of it.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use can::Instant;
+use canopen::NodeId;
+use devices::Description;
+use master::Models;
+use master::decode::{Decoded, Decoder};
+
+use super::passed::{Origin, Passed};
+
+/// Frames that are kept at least: some seven minutes of a bus with three drives, half a minute of a full one at 1 Mbit/s.
+pub(super) const KEPT: usize = 200_000;
+
+/// Frames of a chunk: so few that those before a wanted one are passed over at once, so many that a decoder for each
+/// chunk is little beside them.
+pub(super) const CHUNK: usize = 4_000;
+
+/// A model that is found begins a chunk of its own. There are not more than this, however often that happens.
+const MOST_CHUNKS: usize = 2 * KEPT / CHUNK;
+
+/// The frames of a bus, numbered from 0 in their order.
+#[derive(Debug)]
+pub(crate) struct Trace {
+    ring: Mutex<Ring>,
+    origin: Origin,
+}
+
+#[derive(Debug)]
+struct Ring {
+    chunks: VecDeque<Chunk>,
+    held: usize,
+    next: u64,
+    /// Knows what the frames so far have taught.
+    decoder: Decoder,
+    models: BTreeMap<NodeId, &'static Description>,
+}
+
+/// Frames in a row.
+#[derive(Clone, Debug)]
+pub(super) struct Chunk {
+    /// Number of the first one.
+    first: u64,
+    /// As it was before the first one.
+    before: Arc<Decoder>,
+    frames: Arc<Vec<Passed>>,
+}
+
+impl Trace {
+    /// A trace that looks for nodes among these models.
+    pub(crate) fn new(models: Models, origin: Origin) -> Self {
+        let decoder = Decoder::knowing(models);
+        let ring = Ring { chunks: VecDeque::new(), held: 0, next: 0, decoder, models: BTreeMap::new() };
+        Self { ring: Mutex::new(ring), origin }
+    }
+
+    /// Takes a frame; times must not go back.
+    pub(crate) fn append(&self, passed: Passed) {
+        self.lock().append(passed);
+    }
+
+    /// Puts what this node says in its model's words, from the next frame on.
+    pub(crate) fn set_model(&self, node: NodeId, model: &'static Description) {
+        let mut ring = self.lock();
+        // Said again it would set the mappings that were learned back to those of the factory.
+        if ring.models.get(&node).is_some_and(|known| core::ptr::eq(*known, model)) {
+            return;
+        }
+        ring.models.insert(node, model);
+        ring.decoder.set_model(node, model);
+        ring.begin_chunk();
+    }
+
+    /// What is kept now. It stays as it is while more comes.
+    pub(crate) fn held(&self) -> Held {
+        let ring = self.lock();
+        Held { chunks: ring.chunks.iter().cloned().collect(), next: ring.next }
+    }
+
+    /// What a log says beside the frames.
+    pub(crate) const fn origin(&self) -> &Origin {
+        &self.origin
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Ring> {
+        // Nothing is half done between two frames, whoever panicked.
+        self.ring.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Ring {
+    fn append(&mut self, passed: Passed) {
+        if self.chunks.back().is_none_or(|chunk| chunk.frames.len() == CHUNK) {
+            self.begin_chunk();
+        }
+        self.decoder.pass(&passed.frame);
+        if let Some(chunk) = self.chunks.back_mut() {
+            // Copied only if somebody reads it just now.
+            Arc::make_mut(&mut chunk.frames).push(passed);
+            self.held += 1;
+            self.next += 1;
+        }
+    }
+
+    fn begin_chunk(&mut self) {
+        // Only the newest is ever empty.
+        if self.chunks.back().is_some_and(|newest| newest.frames.is_empty()) {
+            self.chunks.pop_back();
+        }
+        while let Some(oldest) = self.chunks.front()
+            && (self.held - oldest.frames.len() >= KEPT || self.chunks.len() == MOST_CHUNKS)
+        {
+            self.held -= oldest.frames.len();
+            self.chunks.pop_front();
+        }
+        let before = Arc::new(self.decoder.clone());
+        self.chunks.push_back(Chunk { first: self.next, before, frames: Arc::default() });
+    }
+}
+
+/// What was kept at one moment.
+#[derive(Clone, Debug)]
+pub(crate) struct Held {
+    chunks: Vec<Chunk>,
+    next: u64,
+}
+
+impl Held {
+    /// Number of the oldest frame; that of the next one if there is none.
+    pub(crate) fn oldest(&self) -> u64 {
+        self.chunks.first().map_or(self.next, |chunk| chunk.first)
+    }
+
+    /// Number of the frame that comes next.
+    pub(crate) const fn next(&self) -> u64 {
+        self.next
+    }
+
+    /// Number of the first frame at or after a time.
+    pub(super) fn number_at(&self, at: Instant) -> u64 {
+        let chunk = self.chunks.partition_point(|chunk| chunk.frames.first().is_some_and(|passed| passed.at < at));
+        // It may be in the one before, behind its first frame.
+        let Some(before) = chunk.checked_sub(1).map(|place| &self.chunks[place]) else { return self.oldest() };
+        before.first + before.frames.partition_point(|passed| passed.at < at) as u64
+    }
+
+    /// Number of the frame with which the chunk of this one begins.
+    pub(super) fn chunk_start(&self, number: u64) -> u64 {
+        self.overlapping(number, number + 1).next().map_or(number, |chunk| chunk.first)
+    }
+
+    /// Gives each frame with a number from `from` to below `to`, in words.
+    pub(super) fn decode(&self, from: u64, to: u64, mut each: impl FnMut(u64, &Passed, &Decoded)) {
+        for chunk in self.overlapping(from, to) {
+            let mut decoder = (*chunk.before).clone();
+            for (number, passed) in (chunk.first..to).zip(chunk.frames.iter()) {
+                if number < from {
+                    decoder.pass(&passed.frame);
+                } else {
+                    each(number, passed, &decoder.decode(&passed.frame));
+                }
+            }
+        }
+    }
+
+    fn overlapping(&self, from: u64, to: u64) -> impl Iterator<Item = &Chunk> {
+        self.chunks.iter().filter(move |chunk| chunk.first < to && from < chunk.first + chunk.frames.len() as u64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    const SPACING: Duration = Duration::from_micros(500);
+
+    fn trace_of(count: u64) -> Trace {
+        let trace = Trace::new(Models::default(), Origin::default());
+        for number in 0..count {
+            let at = Instant::ZERO + SPACING * number as u32;
+            trace.append(Passed { at, frame: "080#".parse().expect("a frame"), own: false });
+        }
+        trace
+    }
+
+    #[test]
+    fn two_hundred_thousand_frames_are_kept_and_less_than_a_chunk_more() {
+        let count = 3 * KEPT as u64 + 17;
+        let held = trace_of(count).held();
+        let kept = (held.next() - held.oldest()) as usize;
+        assert_eq!(held.next(), count);
+        assert!((KEPT..KEPT + CHUNK).contains(&kept), "{kept}");
+        assert!(size_of::<Passed>() * (KEPT + CHUNK) <= 10 << 20, "{} bytes a frame", size_of::<Passed>());
+        let mut numbers = Vec::new();
+        held.decode(held.oldest(), held.next(), |number, _, _| numbers.push(number));
+        assert!(numbers.len() == kept && numbers.is_sorted(), "each once, in order");
+    }
+
+    #[test]
+    fn a_frame_is_found_by_its_time() {
+        let held = trace_of(3 * CHUNK as u64).held();
+        for number in [0, 1, CHUNK as u64 - 1, CHUNK as u64, CHUNK as u64 + 1, 3 * CHUNK as u64 - 1] {
+            let at = Instant::ZERO + SPACING * number as u32;
+            assert_eq!(held.number_at(at), number);
+            assert_eq!(held.number_at(at + Duration::from_nanos(1)), number + 1, "behind frame {number}");
+        }
+        assert_eq!(trace_of(0).held().number_at(Instant::ZERO), 0);
+    }
+
+    #[test]
+    fn what_is_held_stays_while_more_comes() {
+        let trace = trace_of(10);
+        let held = trace.held();
+        trace.append(Passed { at: Instant::from_secs(9), frame: "704#05".parse().expect("a frame"), own: false });
+        let mut count = 0;
+        held.decode(0, u64::MAX, |_, _, _| count += 1);
+        assert_eq!((count, held.next(), trace.held().next()), (10, 10, 11));
+    }
+
+    #[test]
+    fn a_model_that_is_found_again_and_again_costs_no_more_memory() {
+        let trace = trace_of(10);
+        let node = NodeId::new(4).expect("a node-ID");
+        let models = ["zlac8030l", "zlim42c"].map(|name| devices::model(name).expect("a model"));
+        for round in 0..3 * MOST_CHUNKS {
+            trace.set_model(node, models[round % 2]);
+            trace.append(Passed { at: Instant::from_secs(9), frame: "704#05".parse().expect("a frame"), own: false });
+        }
+        assert!(trace.held().chunks.len() <= MOST_CHUNKS);
+    }
+}

@@ -1,0 +1,94 @@
+//! The trace: lines of it as JSON, and all of it as a log. Decoding is done beside the task that moves drives.
+
+use std::sync::Arc;
+
+use axum::body::Body;
+use axum::extract::Query as InAddress;
+use axum::extract::rejection::QueryRejection;
+use axum::http::StatusCode;
+use axum::http::header::{CONTENT_DISPOSITION, CONTENT_TYPE};
+use axum::response::{IntoResponse, Response};
+use futures_util::stream;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+
+use super::answer::{json_text, trouble};
+use crate::desk::Desk;
+use crate::trace::{Asked, Held, Query};
+
+/// Readers whose lines are decoded at the same time; others wait for their turn.
+const DECODING: usize = 2;
+
+/// Logs that are fetched at the same time. Each may hold the frames of its beginning for as long as it is read.
+const SAVING: usize = 4;
+
+/// How many may come in at a time.
+#[derive(Clone)]
+pub(super) struct Doors {
+    decoding: Arc<Semaphore>,
+    saving: Arc<Semaphore>,
+}
+
+impl Default for Doors {
+    fn default() -> Self {
+        Self { decoding: Arc::new(Semaphore::new(DECODING)), saving: Arc::new(Semaphore::new(SAVING)) }
+    }
+}
+
+/// The parameters of a request.
+pub(super) type InQuery = Result<InAddress<Asked>, QueryRejection>;
+
+/// The newest lines that are wanted.
+pub(super) async fn lines(desk: Desk, doors: Doors, asked: InQuery) -> Response {
+    let query = match understand(asked) {
+        Ok(query) => query,
+        Err(refusal) => return *refusal,
+    };
+    let Ok(_decoding) = doors.decoding.acquire().await else { return over() };
+    let held = desk.trace().held();
+    let selected = tokio::task::spawn_blocking(move || serde_json::to_string(&query.select(&held))).await;
+    match selected {
+        Ok(Ok(json)) => json_text(json),
+        _ => over(),
+    }
+}
+
+/// All frames of the nodes and kinds that are wanted, in the form of candump.
+pub(super) fn log(desk: Desk, doors: &Doors, asked: InQuery) -> Response {
+    let query = match understand(asked) {
+        Ok(query) => query,
+        Err(refusal) => return *refusal,
+    };
+    let Ok(door) = Arc::clone(&doors.saving).try_acquire_owned() else {
+        return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "others are saving the trace: try again");
+    };
+    let held = Arc::new(desk.trace().held());
+    let saving = Saving { desk, held, query: Arc::new(query), next: 0, _door: door };
+    let parts = stream::unfold(saving, async |saving| {
+        let Saving { desk, held, query, next, .. } = &saving;
+        let (desk, held, query, next) = (desk.clone(), Arc::clone(held), Arc::clone(query), *next);
+        let work = tokio::task::spawn_blocking(move || query.log_part(&held, desk.trace().origin(), next));
+        let part = work.await.ok()??;
+        Some((Ok::<_, std::convert::Infallible>(part.text), Saving { next: part.next, ..saving }))
+    });
+    let headers =
+        [(CONTENT_TYPE, "text/plain; charset=utf-8"), (CONTENT_DISPOSITION, "attachment; filename=\"trace.log\"")];
+    (headers, Body::from_stream(parts)).into_response()
+}
+
+/// A log on its way.
+struct Saving {
+    desk: Desk,
+    held: Arc<Held>,
+    query: Arc<Query>,
+    next: u64,
+    _door: OwnedSemaphorePermit,
+}
+
+fn understand(asked: InQuery) -> Result<Query, Box<Response>> {
+    let asked = asked.map_err(|rejection| rejection.body_text()).and_then(|InAddress(asked)| asked.understand());
+    asked.map_err(|why| Box::new(trouble(StatusCode::BAD_REQUEST, "malformed", &why)))
+}
+
+fn over() -> Response {
+    trouble(StatusCode::SERVICE_UNAVAILABLE, "over", "the studio is ending")
+}
