@@ -98,6 +98,19 @@ impl Stage {
         self.find(".motion fieldset:not([disabled])").await;
     }
 
+    /// Waits until an element says this, and gives all that it says.
+    async fn says(&self, css: &str, part: &str) -> String {
+        let until = std::time::Instant::now() + PATIENCE;
+        loop {
+            let text = self.find(css).await.text().await.expect("text");
+            if text.contains(part) {
+                return text;
+            }
+            assert!(std::time::Instant::now() < until, "{css} says {text:?}, not {part:?}");
+            tokio::time::sleep(std::time::Duration::from_millis(50)).await;
+        }
+    }
+
     fn wheel(&self, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {
         self.studio.wait(what, |state| wanted(&state["nodes"][WHEEL]))
     }
@@ -285,6 +298,102 @@ async fn the_trace_says_what_passes_and_a_filter_hides_the_rest() {
     assert_eq!(decoded.status, Some(0), "{}", decoded.err);
     assert!(decoded.out.contains("write 607Ah:00 target_position = 1024"), "{}", decoded.out);
     assert!(!decoded.out.contains("node 2"), "of node 4 alone");
+    stage.close().await;
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn the_scope_waits_for_its_trigger_and_measures_the_step() {
+    let stage = Stage::open("trigger").await;
+    stage.take_the_wheel().await;
+    stage.click("#tabs [data-name=scope]").await;
+    for (select, chosen) in [("#scope-window", 4), ("#trigger-mode", 2)] {
+        stage.click(&format!("{select} option:nth-child({chosen})")).await;
+    }
+    stage.says("#trigger-status", "waits").await;
+    stage.click("#tabs [data-name=motion]").await;
+    stage.click("form[aria-label=Turn] button").await;
+    stage.turns();
+    stage.click("#tabs [data-name=scope]").await;
+    stage.says("#trigger-status", "came at").await;
+    // The part after it, 80 % of 10 s: while the wheel goes on turning.
+    stage.find("#scope-pause[aria-pressed=true]").await;
+    stage.click("#scope-step").await;
+    // The form's 60 r/min: from rest to that.
+    let told = stage.says(".readout", "Step of Speed").await;
+    let speed = told
+        .split("Step of Speed: ")
+        .nth(1)
+        .and_then(|told| told.split(" to ").nth(1)?.split(' ').next()?.parse::<f64>().ok());
+    assert!(speed.is_some_and(|rpm| (rpm - 60.0).abs() < 2.0), "{told}");
+    stage.shoot("scope_step").await;
+    stage.click("#scope-svg").await;
+    let drawing = std::fs::read_to_string(stage.saved("node4.svg").await).expect("text");
+    assert!(
+        drawing.starts_with("<svg ") && drawing.ends_with("</svg>\n") && drawing.contains(">Speed</text>"),
+        "{drawing}"
+    );
+    stage.click("#scope-fft").await;
+    stage.shoot("scope_spectrum").await;
+    stage.close().await;
+}
+
+/// Held to closed forms: a lag of first order, one of second order, and two sines on a slope.
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn what_the_scope_computes_is_what_the_formulas_say() {
+    let stage = Stage::open("analysis").await;
+    let computed = stage.client.execute_async(
+        r"const done = arguments[arguments.length - 1];
+        Promise.all([import('/page/series.js'), import('/page/analysis.js')]).then(([{ Series }, { stepResponse, spectrum, crossing }]) => {
+            const of = (value, count) => {
+                const series = new Series(60);
+                for (let at = 0; at < count; at += 1) series.push(at * 1e-3, value(at * 1e-3));
+                return series;
+            };
+            const after = (time_s, value) => (now_s) => (now_s < time_s ? 0 : value(now_s - time_s));
+            const first = of(after(0.5, (t) => -8 * (1 - Math.exp(-t / 0.05))), 5000);
+            const [w, z] = [20, 0.3];
+            const d = w * Math.sqrt(1 - z * z);
+            const second = of(after(0.5, (t) => 2 * (1 - Math.exp(-z * w * t) * (Math.cos(d * t) + ((z * w) / d) * Math.sin(d * t)))), 5000);
+            const sines = of((t) => 3 + 0.1 * t + 0.7 * Math.sin(2 * Math.PI * 31.25 * t) + 0.2 * Math.cos(2 * Math.PI * 125 * t), 4096);
+            const { hertz, amplitude } = spectrum(sines, 0, 5);
+            const long = of((t) => t, 200000);
+            done({
+                first: stepResponse(first, 0, 5), second: stepResponse(second, 0, 5), none: stepResponse(of(() => 4, 1000), 0, 1),
+                ramp: stepResponse(of((t) => t, 1000), 0, 1),
+                lines: [31.25, 125].map((wanted) => amplitude[hertz.indexOf(wanted)]),
+                else: Math.max(...amplitude.filter((_, at) => Math.abs(hertz[at] - 31.25) > 1 && Math.abs(hertz[at] - 125) > 1)),
+                few: spectrum(of((t) => t, 15), 0, 1),
+                crossing: crossing(first, -4, 'falling'), rising: crossing(first, -4, 'rising'),
+                kept: [long.length, long.first_s(), long.last_s(), long.value(150.0005), long.value(1)],
+            });
+        });",
+        Vec::new(),
+    );
+    let computed = computed.await.expect("it computes");
+    let near = |path: &str, expected: f64, tolerance: f64| {
+        let found = computed.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path}: {computed}"));
+        assert!((found - expected).abs() <= tolerance, "{path}: {found}, not {expected}");
+    };
+    // 1 - exp(-t/T): from 10 to 90 % in T ln 9, within 2 % after T ln 50, which is counted from T ln(10/9).
+    near("/first/rise_s", 0.05 * 9_f64.ln(), 2e-4);
+    near("/first/settling_s", 0.05 * 45_f64.ln(), 1e-3);
+    near("/first/overshoot", 0.0, 1e-6);
+    near("/first/to", -8.0, 1e-6);
+    near("/second/overshoot", (-core::f64::consts::PI * 0.3 / (1.0 - 0.09_f64).sqrt()).exp(), 1e-4);
+    assert!(computed["none"].is_null() && computed["ramp"].is_null() && computed["few"].is_null(), "{computed}");
+    near("/lines/0", 0.7, 1e-3);
+    near("/lines/1", 0.2, 1e-3);
+    // What the line of the slope takes of the sines.
+    near("/else", 0.0, 5e-3);
+    near("/crossing", 0.5 + 0.05 * 2_f64.ln(), 1e-5);
+    assert!(computed["rising"].is_null(), "it never rises");
+    // A minute of 1 kHz, both ends in it; before it nothing is known.
+    near("/kept/0", 60_001.0, 1.0);
+    near("/kept/2", 199.999, 1e-9);
+    near("/kept/3", 150.0, 1e-9);
+    assert!(computed["kept"][4].is_null(), "{computed}");
     stage.close().await;
 }
 

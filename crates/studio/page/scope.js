@@ -1,214 +1,252 @@
-// The Scope view: what the drives said in the last 60 s, over time.
+// The Scope view: what the drives said in the last 60 s, over time or over frequency.
 //
-// Every drive is kept, also while another view is shown. A sample is one reading of a drive, with the time at which it was
-// read; between two readings a line is drawn and nothing is made up.
+// A sample is one reading of a drive, with the time at which it was read; between two readings a line is drawn and nothing is made up.
 
-import { on } from "./link.js";
 import { h, number, say } from "./dom.js";
 import { chooser } from "./drive.js";
+import { QUANTITIES, everything, markers, newest_s, series } from "./kept.js";
+import { frame, overFrequency, overTime } from "./scope_picture.js";
+import { crossing, spectrum, stepResponse } from "./analysis.js";
+import { SvgPen } from "./svg_pen.js";
+import { trigger } from "./scope_trigger.js";
 
-const KEPT_S = 60;
+const SPANS_S = [1, 2, 5, 10, 30, 60];
+const LONGEST_MARK = 40;
 
-/** Field, label, unit, decimals; one pane each. */
-const SIGNALS = [
-  ["velocity_rpm", "Speed", "r/min", 1],
-  ["angle_degrees", "Position", "°", 1],
-  ["current_a", "Current", "A", 2],
-  ["supply_v", "Supply", "V", 1],
-];
-
-/** Readings of each node, oldest first. */
-const kept = new Map();
-
-on("state", (state) => {
-  for (const { node, drive } of state.nodes) {
-    if (!drive) continue;
-    const samples = kept.get(node) ?? [];
-    kept.set(node, samples);
-    // The time of the bus begins anew with a studio that was started anew.
-    if (samples.length && drive.at_s < samples.at(-1).at_s) samples.length = 0;
-    if (samples.length && drive.at_s === samples.at(-1).at_s) continue;
-    samples.push(drive);
-    while (samples[0].at_s < drive.at_s - KEPT_S) samples.shift();
-  }
-});
-
-/** The reading at or before a time. */
-const before = (samples, at_s) => samples.findLast((sample) => sample.at_s <= at_s) ?? null;
-
-/** Bounds that leave some room, and are never equal. */
-function bounds(values) {
-  const low = Math.min(...values);
-  const high = Math.max(...values);
-  const room = Math.max((high - low) * 0.1, Math.abs(high) * 0.01, 0.5);
-  return [low - room, high + room];
-}
-
-/** A step of 1, 2 or 5 times a power of ten that makes at most `count` steps. */
-function step(span, count) {
-  const rough = span / count;
-  const power = 10 ** Math.floor(Math.log10(rough));
-  return [1, 2, 5, 10].map((times) => times * power).find((size) => size >= rough);
-}
+const cut = (text) => (text.length > LONGEST_MARK ? `${text.slice(0, LONGEST_MARK - 1)}…` : text);
 
 export function scopeView(shared) {
   const choose = chooser(shared);
-  const canvas = h("canvas", { tabindex: "0", "aria-label": "Values over time. Click sets cursor A, Shift and click cursor B." });
+  const canvas = h("canvas", { tabindex: "0", "aria-label": "Values over time. Click sets cursor A, Shift and click cursor B; the wheel zooms while paused." });
   const readout = h("p", { class: "readout", role: "status" });
-  const seconds = h("select", { id: "scope-window", "aria-label": "Time shown" }, ...[5, 10, 30, 60].map((span) => h("option", { value: String(span), selected: span === 10 }, `${span} s`)));
-  const pause = h("button", { type: "button", id: "scope-pause", "aria-pressed": "false", onclick: toggle }, "Pause");
-  const clear = h("button", { type: "button", onclick: () => setCursors(null, null) }, "Clear cursors");
-  const save = h("button", { type: "button", id: "scope-save", onclick: saveCsv }, "Save CSV");
+  const seconds = h("select", { id: "scope-window", "aria-label": "Time shown" }, ...SPANS_S.map((span) => h("option", { value: String(span), selected: span === 10 }, `${span} s`)));
+  const button = (id, text, onclick, title = "") => h("button", { type: "button", id, title, onclick }, text);
+  const toggled = (id, text, onclick, title) => h("button", { type: "button", id, title, "aria-pressed": "false", onclick }, text);
+  const pause = toggled("scope-pause", "Pause", pauseOrGoOn, "Key p");
+  const steps = toggled("scope-step", "Step response", () => press(steps), "Rise time, overshoot and settling time of what is shown, or between the cursors");
+  const frequencies = toggled("scope-fft", "Spectrum", () => press(frequencies), "What is shown, over frequency");
+  const panes = h("span", { class: "chooser", role: "group", "aria-label": "Values shown" });
+  const others = h("span", { class: "chooser", role: "group", "aria-label": "Drives shown beside the chosen one" });
+  const trip = trigger(QUANTITIES, thaw);
   const root = h(
     "section",
     { class: "scope" },
-    h("div", { class: "bar" }, choose.root, seconds, pause, clear, save),
+    h("div", { class: "bar" }, choose.root, others),
+    h("div", { class: "bar" }, seconds, pause, panes, steps, frequencies, button("scope-clear", "Clear cursors", () => (cursors = [null, null])), button("scope-save", "Save CSV", saveCsv), button("scope-svg", "Save SVG", saveSvg)),
+    h("div", { class: "bar" }, trip.root),
     canvas,
     readout,
-    h("p", { class: "quiet" }, "Each point is one reading by SDO, about ten a second and fewer with many drives. Click: cursor A; Shift and click: cursor B; key p: pause."),
+    h("p", { class: "quiet" }, "Each point is one reading by SDO, about ten a second and fewer with many drives. Click: cursor A; Shift and click: cursor B; key p: pause; paused, the wheel zooms and a drag moves."),
   );
+  /** While paused: which series, and until when. */
   let frozen = null;
   let cursors = [null, null];
   let shown = false;
   let extent = null;
+  const hidden = new Set(["supply_v"]);
+  const beside = new Set();
 
-  /** The readings that are drawn, and when the picture ends. */
-  function source() {
-    if (frozen) return frozen;
-    const samples = kept.get(shared.node) ?? [];
-    return { node: shared.node, samples, end_s: samples.at(-1)?.at_s ?? 0 };
+  for (const { field, label } of QUANTITIES) {
+    const pressed = h("button", { type: "button", "data-field": field, "aria-pressed": String(!hidden.has(field)) }, label);
+    pressed.addEventListener("click", () => {
+      if (!hidden.delete(field)) hidden.add(field);
+      pressed.setAttribute("aria-pressed", String(!hidden.has(field)));
+    });
+    panes.append(pressed);
   }
 
-  function toggle() {
-    const now = source();
-    frozen = frozen ? null : { ...now, samples: [...now.samples] };
-    pause.setAttribute("aria-pressed", String(frozen !== null));
-    say(pause, frozen ? "Go on" : "Pause");
+  const press = (one) => one.setAttribute("aria-pressed", String(one.getAttribute("aria-pressed") !== "true"));
+  const isPressed = (one) => one.getAttribute("aria-pressed") === "true";
+
+  /** The drives that are drawn, the chosen one first. */
+  const nodes = () => [shared.node, ...[...beside].filter((node) => node !== shared.node)].filter((node) => node !== null);
+
+  /** Keeps the picture as it is, or as it was when it ended at a time; `byTrigger` until that comes again. */
+  function freeze(end_s = newest_s(shared.node), byTrigger = false) {
+    const copies = new Map(everything(nodes()).map(([node, field, one]) => [`${node} ${field}`, one.cut(one.first_s(), end_s + Number(seconds.value))]));
+    frozen = { copies, end_s, span_s: Number(seconds.value), marks: [...markers], byTrigger };
+    pause.setAttribute("aria-pressed", "true");
+    say(pause, "Go on");
   }
 
-  function setCursors(a, b) {
-    cursors = [a, b];
+  function thaw() {
+    frozen = null;
+    pause.setAttribute("aria-pressed", "false");
+    say(pause, "Pause");
   }
 
-  canvas.addEventListener("click", (event) => {
-    if (!extent) return;
-    const { left, right, from_s, span_s } = extent;
-    const at_s = from_s + ((event.offsetX - left) / (right - left)) * span_s;
-    if (at_s >= from_s && at_s <= from_s + span_s) setCursors(event.shiftKey ? cursors[0] : at_s, event.shiftKey ? at_s : cursors[1]);
-  });
+  function pauseOrGoOn() {
+    if (!frozen) return freeze();
+    thaw();
+    trip.rearm(newest_s(shared.node));
+  }
+
+  const ofSource = (node, field) => frozen?.copies.get(`${node} ${field}`) ?? series(node, field);
+
+  /** What is drawn now. */
+  function content() {
+    const end_s = frozen ? frozen.end_s : newest_s(shared.node);
+    const from_s = end_s - (frozen ? frozen.span_s : Number(seconds.value));
+    const drawn = QUANTITIES.filter(({ field }) => !hidden.has(field))
+      .map((quantity) => ({
+        ...quantity,
+        level: trip.isOn() && trip.field() === quantity.field ? trip.level() : undefined,
+        lines: nodes()
+          .map((node) => ({ name: `node ${node}`, series: ofSource(node, quantity.field) }))
+          .filter((line) => line.series.length > 0),
+      }))
+      .filter(({ lines }) => lines.length > 0);
+    const marks = (frozen ? frozen.marks : markers)
+      .filter(({ node }) => node === null || nodes().includes(node))
+      .map(({ time_s, text }) => ({ time_s, text: cut(text) }));
+    return { panes: drawn, from_s, to_s: end_s, cursors, markers: marks };
+  }
+
+  function colours() {
+    const style = getComputedStyle(document.documentElement);
+    const of = (name) => style.getPropertyValue(name).trim();
+    return { card: of("--card"), line: of("--line"), quiet: of("--quiet"), text: of("--text"), warn: of("--warn"), lines: ["--accent", "--bad", "--good", "--warn"].map(of) };
+  }
+
+  function paint(pen, width, height) {
+    const now = content();
+    pen.font = "12px system-ui, sans-serif";
+    if (isPressed(frequencies)) {
+      const panes = now.panes.map((one) => ({ ...one, lines: one.lines.map(({ name, series: of }) => ({ name, spectrum: spectrum(of, now.from_s, now.to_s) })) }));
+      overFrequency(pen, width, height, colours(), panes);
+    } else {
+      overTime(pen, width, height, colours(), now);
+    }
+    return now;
+  }
 
   function draw() {
     if (!shown) return;
     requestAnimationFrame(draw);
-    const { samples, end_s } = source();
+    watchTrigger();
     const scale = devicePixelRatio || 1;
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
     if (canvas.width !== Math.round(width * scale) || canvas.height !== Math.round(height * scale)) {
       canvas.width = Math.round(width * scale);
       canvas.height = Math.round(height * scale);
     }
-    const style = getComputedStyle(document.documentElement);
-    const colour = (name) => style.getPropertyValue(name).trim();
     const pen = canvas.getContext("2d");
     pen.setTransform(scale, 0, 0, scale, 0, 0);
     pen.clearRect(0, 0, width, height);
-    pen.font = "12px system-ui, sans-serif";
-    const span_s = Number(seconds.value);
-    const from_s = end_s - span_s;
-    const [left, right] = [72, width - 12];
-    extent = { left, right, from_s, span_s };
-    const x = (at_s) => left + ((at_s - from_s) / span_s) * (right - left);
-    // One reading before the picture's edge, so that the line reaches it.
-    const first = Math.max(samples.findIndex((sample) => sample.at_s >= from_s) - 1, 0);
-    const visible = samples.slice(first);
-    const panes = SIGNALS.filter(([field]) => visible.some((sample) => sample[field] !== null));
-    const pane = (height - 24) / Math.max(panes.length, 1);
-    panes.forEach(([field, label, unit, decimals], at) => {
-      const [top, bottom] = [at * pane + 6, (at + 1) * pane - 8];
-      const values = visible.map((sample) => sample[field]).filter((value) => value !== null);
-      const [low, high] = bounds(values);
-      const y = (value) => bottom - ((value - low) / (high - low)) * (bottom - top);
-      pen.strokeStyle = colour("--line");
-      pen.fillStyle = colour("--quiet");
-      pen.lineWidth = 1;
-      pen.strokeRect(left, top, right - left, bottom - top);
-      pen.textAlign = "right";
-      pen.textBaseline = "middle";
-      const size = step(high - low, Math.max(4, Math.floor((bottom - top) / 30)));
-      for (let line = Math.ceil(low / size) * size; line <= high; line += size) {
-        pen.beginPath();
-        pen.moveTo(left, y(line));
-        pen.lineTo(right, y(line));
-        pen.stroke();
-        pen.fillText(number(line, size < 1 ? Math.min(3, Math.ceil(-Math.log10(size))) : 0), left - 6, y(line));
-      }
-      pen.textAlign = "left";
-      pen.fillStyle = colour("--text");
-      pen.fillText(`${label} ${number(values.at(-1), decimals)} ${unit}`, left + 8, top + 12);
-      pen.save();
-      pen.beginPath();
-      pen.rect(left, top, right - left, bottom - top);
-      pen.clip();
-      pen.strokeStyle = colour("--accent");
-      pen.lineWidth = 1.6;
-      pen.beginPath();
-      let drawn = false;
-      for (const sample of visible) {
-        if (sample[field] === null) drawn = false;
-        else if (drawn) pen.lineTo(x(sample.at_s), y(sample[field]));
-        else {
-          pen.moveTo(x(sample.at_s), y(sample[field]));
-          drawn = true;
-        }
-      }
-      pen.stroke();
-      pen.restore();
-    });
-    pen.fillStyle = colour("--quiet");
-    pen.textAlign = "center";
-    const tick = step(span_s, 10);
-    for (let at_s = Math.ceil(from_s / tick) * tick; at_s <= end_s; at_s += tick) pen.fillText(`${number(at_s, tick < 1 ? 1 : 0)} s`, x(at_s), height - 9);
-    cursors.forEach((at_s, which) => {
-      if (at_s === null || at_s < from_s || at_s > end_s) return;
-      pen.strokeStyle = colour("--warn");
-      pen.beginPath();
-      pen.moveTo(x(at_s), 6);
-      pen.lineTo(x(at_s), height - 24);
-      pen.stroke();
-      pen.fillStyle = colour("--warn");
-      pen.fillText("AB"[which], x(at_s) + 8, 12);
-    });
-    say(readout, measured(samples, panes));
+    const now = paint(pen, width, height);
+    extent = { ...frame(width), from_s: now.from_s, span_s: now.to_s - now.from_s };
+    say(readout, measured(now));
   }
 
-  /** What stands at the cursors, and what lies between. */
-  function measured(samples, panes) {
-    const [a, b] = cursors.map((at_s) => (at_s === null ? null : before(samples, at_s)));
-    const of = (sample) => panes.map(([field, label, unit, decimals]) => `${label} ${number(sample[field], decimals)} ${unit}`).join(", ");
+  /** Holds the picture once the trigger has come, with the part before it that was asked for. */
+  function watchTrigger() {
+    if (frozen && !(frozen.byTrigger && trip.comesAgain())) return;
+    const end_s = trip.look(series(shared.node, trip.field()), Number(seconds.value), crossing);
+    if (end_s !== null) freeze(end_s, true);
+  }
+
+  /** What stands at the cursors, what lies between, and what a step made of each line. */
+  function measured({ panes: drawn, from_s, to_s }) {
+    const all = drawn.flatMap(({ lines, ...quantity }) => lines.map((one) => ({ ...quantity, ...one, label: lines.length > 1 ? `${quantity.label} of ${one.name}` : quantity.label })));
     const lines = [];
-    [a, b].forEach((sample, which) => {
-      if (sample) lines.push(`${"AB"[which]} at ${number(sample.at_s, 2)} s: ${of(sample)}`);
-      else if (cursors[which] !== null) lines.push(`${"AB"[which]} at ${number(cursors[which], 2)} s: no reading so early`);
+    const [a, b] = cursors.map((at_s) => (at_s === null ? null : all.map((one) => one.series.value(at_s))));
+    const told = (values) => all.map(({ label, unit, decimals }, at) => `${label} ${number(values[at], decimals)} ${unit}`).join(", ");
+    [a, b].forEach((values, which) => {
+      if (values?.some((value) => value !== null)) lines.push(`${"AB"[which]} at ${number(cursors[which], 3)} s: ${told(values)}`);
+      else if (values) lines.push(`${"AB"[which]} at ${number(cursors[which], 3)} s: no reading so early`);
     });
     if (a && b) {
-      const difference = Object.fromEntries(panes.map(([field]) => [field, a[field] === null || b[field] === null ? null : b[field] - a[field]]));
-      lines.push(`B − A: ${number(b.at_s - a.at_s, 2)} s, ${of(difference)}`);
+      const differences = all.map((_, at) => (a[at] === null || b[at] === null ? null : b[at] - a[at]));
+      lines.push(`B − A: ${number(cursors[1] - cursors[0], 3)} s, ${told(differences)}`);
+    }
+    if (isPressed(steps)) {
+      const [from, to] = a && b ? [Math.min(...cursors), Math.max(...cursors)] : [from_s, to_s];
+      for (const { label, unit, decimals, series: of } of all) {
+        const step = stepResponse(of, from, to);
+        if (!step) continue;
+        const settling = step.settling_s === null ? "not settled to 2 %" : `settled to 2 % in ${number(step.settling_s, 3)} s`;
+        lines.push(`Step of ${label}: ${number(step.from, decimals)} to ${number(step.to, decimals)} ${unit}, rise time (10 to 90 %) ${number(step.rise_s, 3)} s, overshoot ${number(100 * step.overshoot, 1)} %, ${settling}`);
+      }
+      if (!lines.some((line) => line.startsWith("Step"))) lines.push("No step in what is shown: a value has to stand, change and stand again.");
     }
     return lines.join("\n");
   }
 
+  const timeAt = (x) => extent.from_s + ((x - extent.left) / (extent.right - extent.left)) * extent.span_s;
+  let dragged = null;
+
+  canvas.addEventListener("pointerdown", (event) => (dragged = frozen && { x: event.offsetX, end_s: frozen.end_s, far: false }));
+  canvas.addEventListener("pointermove", (event) => {
+    if (!dragged || !frozen) return;
+    dragged.far ||= Math.abs(event.offsetX - dragged.x) > 4;
+    if (dragged.far) frozen.end_s = dragged.end_s - ((event.offsetX - dragged.x) / (extent.right - extent.left)) * frozen.span_s;
+  });
+  canvas.addEventListener("click", (event) => {
+    const moved = dragged?.far;
+    dragged = null;
+    if (!extent || moved || isPressed(frequencies)) return;
+    const at_s = timeAt(event.offsetX);
+    if (at_s < extent.from_s || at_s > extent.from_s + extent.span_s) return;
+    cursors = event.shiftKey ? [cursors[0], at_s] : [at_s, cursors[1]];
+  });
+  canvas.addEventListener("pointerleave", () => (dragged = null));
+  canvas.addEventListener("wheel", (event) => {
+    if (!frozen || isPressed(frequencies)) return;
+    event.preventDefault();
+    // Around the pointer: what is under it stays there.
+    const around_s = timeAt(event.offsetX);
+    const span_s = Math.min(60, Math.max(0.01, frozen.span_s * (event.deltaY > 0 ? 1.25 : 0.8)));
+    frozen.end_s = around_s + ((frozen.end_s - around_s) * span_s) / frozen.span_s;
+    frozen.span_s = span_s;
+  });
+  seconds.addEventListener("change", () => {
+    if (frozen) frozen.span_s = Number(seconds.value);
+  });
+
+  /** A row for each time at which something was read; what was not read then stays empty. */
   function saveCsv() {
-    const { node, samples } = source();
-    const fields = ["at_s", ...SIGNALS.map(([field]) => field), "position_counts", "statusword"];
-    const rows = samples.map((sample) => fields.map((field) => sample[field] ?? "").join(","));
-    const file = new Blob([[fields.join(","), ...rows, ""].join("\n")], { type: "text/csv" });
-    const address = URL.createObjectURL(file);
-    h("a", { href: address, download: `node${node}.csv` }).click();
+    const columns = everything(nodes())
+      .map(([node, field]) => [`${nodes().length > 1 ? `node${node}_` : ""}${field}`, ofSource(node, field)])
+      .filter(([, one]) => one.length > 0);
+    const rows = new Map();
+    columns.forEach(([, { times, values, start, end }], column) => {
+      for (let at = start; at < end; at += 1) {
+        if (!rows.has(times[at])) rows.set(times[at], Array(columns.length).fill(""));
+        rows.get(times[at])[column] = values[at];
+      }
+    });
+    const lines = [...rows].sort(([a], [b]) => a - b).map(([time_s, row]) => [time_s, ...row].join(","));
+    save([["at_s", ...columns.map(([name]) => name)].join(","), ...lines, ""].join("\n"), "text/csv", "csv");
+  }
+
+  function saveSvg() {
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+    const pen = new SvgPen(width, height, colours().card);
+    paint(pen, width, height);
+    save(pen.text(), "image/svg+xml", "svg");
+  }
+
+  function save(text, type, ending) {
+    const address = URL.createObjectURL(new Blob([text], { type }));
+    h("a", { href: address, download: `node${shared.node}.${ending}` }).click();
     URL.revokeObjectURL(address);
   }
 
   function update(state) {
     choose.update(state);
+    const drives = state.nodes.filter((node) => node.drive && node.node !== shared.node).map((node) => node.node);
+    const key = drives.join(" ");
+    if (others.dataset.key !== key) {
+      others.dataset.key = key;
+      others.replaceChildren(...drives.map((node) => {
+        const pressed = h("button", { type: "button", "data-beside": String(node), "aria-pressed": String(beside.has(node)), title: `Draw node ${node} too` }, `+ ${node}`);
+        pressed.addEventListener("click", () => {
+          if (!beside.delete(node)) beside.add(node);
+          pressed.setAttribute("aria-pressed", String(beside.has(node)));
+        });
+        return pressed;
+      }));
+    }
     if (!shown) {
       shown = true;
       requestAnimationFrame(draw);
@@ -216,7 +254,7 @@ export function scopeView(shared) {
   }
 
   function key(event) {
-    if (event.key === "p") toggle();
+    if (event.key === "p") pauseOrGoOn();
   }
 
   return { root, update, key, hide: () => (shown = false) };

@@ -26,6 +26,12 @@ const FILES: &[(&str, &str, &str)] = &[
     ("machine.js", SCRIPT, include_str!("../../page/machine.js")),
     ("motion.js", SCRIPT, include_str!("../../page/motion.js")),
     ("scope.js", SCRIPT, include_str!("../../page/scope.js")),
+    ("scope_picture.js", SCRIPT, include_str!("../../page/scope_picture.js")),
+    ("scope_trigger.js", SCRIPT, include_str!("../../page/scope_trigger.js")),
+    ("kept.js", SCRIPT, include_str!("../../page/kept.js")),
+    ("series.js", SCRIPT, include_str!("../../page/series.js")),
+    ("analysis.js", SCRIPT, include_str!("../../page/analysis.js")),
+    ("svg_pen.js", SCRIPT, include_str!("../../page/svg_pen.js")),
     ("trace.js", SCRIPT, include_str!("../../page/trace.js")),
 ];
 

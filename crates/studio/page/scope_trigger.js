@@ -1,0 +1,48 @@
+// The trigger of the scope: which value has to cross which level, and how much is shown of what was before.
+
+import { h, say } from "./dom.js";
+
+/** `release` is called when a held picture is to go. */
+export function trigger(quantities, release) {
+  const choice = (id, label, options) => h("select", { id, "aria-label": label }, ...options.map(([value, text]) => h("option", { value }, text)));
+  const mode = choice("trigger-mode", "Trigger", [["off", "off"], ["once", "once"], ["again", "again and again"]]);
+  const field = choice("trigger-field", "Value", quantities.map(({ field, label, unit }) => [field, `${label} (${unit})`]));
+  const edge = choice("trigger-edge", "Edge", [["rising", "rising through"], ["falling", "falling through"], ["either", "through"]]);
+  const level = h("input", { id: "trigger-level", type: "number", value: "10", step: "any", "aria-label": "Level", size: "7" });
+  const before = h("input", { id: "trigger-before", type: "number", value: "20", min: "0", max: "100", "aria-label": "Per cent shown before", size: "4" });
+  const status = h("span", { id: "trigger-status", class: "quiet", role: "status" });
+  const root = h("span", { class: "trigger bar" }, h("span", { class: "quiet" }, "Trigger"), mode, field, edge, level, h("span", { class: "quiet" }, "with"), before, h("span", { class: "quiet" }, "% before it"), status);
+  /** What comes after this time counts; null until something was read. */
+  let armed_s = null;
+  let came_s = null;
+
+  function arm() {
+    [armed_s, came_s] = [null, null];
+    release();
+  }
+  for (const one of [mode, field, edge, level, before]) one.addEventListener("change", arm);
+
+  /** The end of the picture that is to be held, or null. `crossing` says when a series crosses a level after a time. */
+  function look(series, span_s, crossing) {
+    if (mode.value === "off" || !series.length) {
+      say(status, "");
+      return null;
+    }
+    armed_s ??= series.last_s();
+    came_s ??= crossing(series, Number(level.value), edge.value, armed_s);
+    say(status, came_s === null ? "waits" : `came at ${came_s.toFixed(3)} s`);
+    const after_s = span_s * (1 - Math.min(100, Math.max(0, Number(before.value))) / 100);
+    if (came_s === null || series.last_s() < came_s + after_s) return null;
+    const end_s = came_s + after_s;
+    [armed_s, came_s] = [end_s, null];
+    return end_s;
+  }
+
+  /** Waits for the next one, if it is to come again; else it is off. */
+  function rearm(from_s) {
+    if (mode.value === "once") mode.value = "off";
+    [armed_s, came_s] = [from_s, null];
+  }
+
+  return { root, look, rearm, isOn: () => mode.value !== "off", comesAgain: () => mode.value === "again", field: () => field.value, level: () => Number(level.value) };
+}
