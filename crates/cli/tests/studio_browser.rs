@@ -11,6 +11,7 @@ use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 
+use common::Simulator;
 use fantoccini::actions::{InputSource, KeyAction, KeyActions, MOUSE_BUTTON_LEFT, MouseActions, PointerAction};
 use fantoccini::elements::Element;
 use fantoccini::key::Key;
@@ -30,7 +31,12 @@ struct Stage {
 
 impl Stage {
     async fn open(name: &str) -> Self {
-        let studio = Studio::start(&[]);
+        Self::open_on(name, &[]).await
+    }
+
+    /// The same on a bus that `arguments` name.
+    async fn open_on(name: &str, arguments: &[&str]) -> Self {
+        let studio = Studio::start(arguments);
         studio.scanned();
         let mut driver = Command::new("chromedriver");
         let mut driver =
@@ -298,6 +304,42 @@ async fn the_trace_says_what_passes_and_a_filter_hides_the_rest() {
     assert_eq!(decoded.status, Some(0), "{}", decoded.err);
     assert!(decoded.out.contains("write 607Ah:00 target_position = 1024"), "{}", decoded.out);
     assert!(!decoded.out.contains("node 2"), "of node 4 alone");
+    stage.close().await;
+}
+
+/// ZLAC8030L quick start guide V1.00, chapters 8 and 9: 0001h is over-voltage.
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn a_fault_is_shown_with_its_remedy_and_the_frames_around() {
+    let drives = ["zlac8030l@4", "m4230e17b50@1", "zlim42c@2"].map(|drive| ["--drive", drive]).concat();
+    let mut simulator = Simulator::start(&[&drives[..], &["--serve", "socketcand://127.0.0.1:0"]].concat());
+    let bus = simulator.bus("socketcand");
+    let stage = Stage::open_on("faults", &["--bus", &bus, "--model", "4=zlac8030l", "--model", "2=zlim42c"]).await;
+    let ok = simulator.ask("4 supply 80");
+    assert_eq!(ok["ok"], true, "{ok}");
+    stage.wheel("a fault", |wheel| wheel["drive"]["fault_code"] == 1);
+    // The page is opened anew: what happened before is there.
+    stage.load().await;
+    stage.click("#tabs [data-name=faults]").await;
+    stage.click(".happening.emcy.lasts").await;
+    let remedy = stage.find("#remedy").await.text().await.expect("text");
+    assert!(remedy.contains("bleeder resistor"), "{remedy}");
+    let source = stage.find("#fault-source").await.text().await.expect("text");
+    assert_eq!(source, "ZLAC8030L quick start guide V1.00, chapters 8 and 9");
+    let marked = stage.find(".around .marked").await.text().await.expect("text");
+    assert!(marked.contains("EMCY node 4: 0001h (over-voltage)"), "{marked}");
+    stage.shoot("faults").await;
+    simulator.ask("4 supply 48");
+    stage.click("#take").await;
+    stage.find("#release").await;
+    stage.click("#tabs [data-name=motion]").await;
+    stage.click(".motion .chooser button:nth-child(3)").await;
+    stage.click("#reset-fault").await;
+    stage.wheel("no fault", |wheel| wheel["drive"]["fault_code"] == 0);
+    stage.click("#tabs [data-name=faults]").await;
+    stage.find(".happening.emcy:not(.lasts)").await;
+    stage.click("#theme").await;
+    stage.shoot("faults_other_theme").await;
     stage.close().await;
 }
 

@@ -11,6 +11,8 @@ pub struct Faults {
     pub bit_field: bool,
     /// All faults.
     pub table: &'static [FaultRow],
+    /// Where the manual ([`crate::Description::manual`]) lists them, by its own numbers or headings.
+    pub section: &'static str,
 }
 
 /// One fault of a drive.

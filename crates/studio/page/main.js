@@ -6,6 +6,7 @@ import { busView } from "./bus.js";
 import { driveView } from "./drive.js";
 import { motionView } from "./motion.js";
 import { scopeView } from "./scope.js";
+import { faultsView } from "./faults.js";
 import { traceView } from "./trace.js";
 
 const byId = (id) => document.getElementById(id);
@@ -20,6 +21,7 @@ const views = [
   { name: "motion", title: "Motion", view: motionView(shared, report) },
   { name: "scope", title: "Scope", view: scopeView(shared) },
   { name: "trace", title: "Trace", view: traceView() },
+  { name: "faults", title: "Faults", view: faultsView() },
 ];
 let shown = null;
 
@@ -29,6 +31,7 @@ function show(name) {
   shown?.view.hide?.();
   shown = next;
   byId("view").replaceChildren(next.view.root);
+  scrollTo(0, 0);
   for (const tab of byId("tabs").children) tab.setAttribute("aria-current", tab.dataset.name === next.name ? "page" : "false");
   if (location.hash !== `#${next.name}`) location.hash = next.name;
   if (link.state) next.view.update(link.state);
@@ -124,7 +127,7 @@ async function control(deed, to) {
 
 on("state", (state) => {
   const load = state.bus.load_percent === null ? "" : ` · load ${number(state.bus.load_percent, 1)} %`;
-  say(byId("bus-line"), `${state.bus.name} · ${state.bus.frames_per_s} frames/s${load}`);
+  say(byId("bus-line"), `${state.bus.frames_per_s} frames/s${load} · ${state.bus.name}`);
   updateControl(state);
   if (shared.node === null || !state.nodes.some((node) => node.node === shared.node)) {
     shared.node = state.nodes.find((node) => node.drive)?.node ?? state.nodes[0]?.node ?? null;

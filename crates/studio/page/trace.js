@@ -11,6 +11,16 @@ const ROW_PX = 24;
 const KINDS = ["nmt", "sync", "time", "emcy", "pdo", "sdo", "heartbeat", "lss", "other"];
 const COLUMNS = ["Time (s)", "From", "COB-ID", "What", "Bytes", "Took", "In words"];
 
+/** The titles over lines. */
+export const headRow = () => h("div", { class: "trace-row head" }, ...COLUMNS.map((title) => h("span", {}, title)));
+
+/** A line of the trace. */
+export function lineRow(line) {
+  const took = line.took_ms === undefined ? "" : `${number(line.took_ms, 1)} ms`;
+  const cells = [number(line.at_s, 6), line.from, line.id, line.kind, line.data, took, line.text];
+  return h("div", { class: `trace-row ${line.kind}`, "data-number": String(line.number), title: line.text }, ...cells.map((cell) => h("span", {}, cell)));
+}
+
 export function traceView() {
   const nodes = h("input", { id: "trace-nodes", size: "8", placeholder: "all nodes", "aria-label": "Node-IDs, separated by commas", oninput: again });
   const words = h("input", { id: "trace-text", size: "24", placeholder: "words, separated by commas", "aria-label": "Words that a line has to have, separated by commas", oninput: again });
@@ -27,7 +37,7 @@ export function traceView() {
     { class: "trace" },
     h("div", { class: "bar" }, h("label", {}, "Nodes ", nodes), h("label", {}, "Text ", words), h("label", {}, whole, " whole SDO transfers"), h("label", {}, quiet, " without the studio's readings"), pause, save),
     h("div", { class: "bar" }, kinds),
-    h("div", { class: "trace-row head" }, ...COLUMNS.map((title) => h("span", {}, title))),
+    headRow(),
     list,
     status,
   );
@@ -144,9 +154,7 @@ export function traceView() {
   }
 
   const row = (line, at) => {
-    const took = line.took_ms === undefined ? "" : `${number(line.took_ms, 1)} ms`;
-    const cells = [number(line.at_s, 6), line.from, line.id, line.kind, line.data, took, line.text];
-    const element = h("div", { class: `trace-row ${line.kind}`, "data-number": String(line.number), title: line.text }, ...cells.map((cell) => h("span", {}, cell)));
+    const element = lineRow(line);
     element.style.top = `${at * ROW_PX}px`;
     return element;
   };

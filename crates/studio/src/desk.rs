@@ -10,6 +10,7 @@ use tokio::sync::{broadcast, mpsc, oneshot, watch};
 
 use crate::authority::SessionId;
 use crate::message::{Answer, Deed};
+use crate::timeline::Timeline;
 use crate::trace::Trace;
 
 /// Wishes that may wait for the host, of all sessions together: it takes them far faster than they come.
@@ -26,6 +27,7 @@ pub struct Desk {
     pictures: watch::Receiver<Picture>,
     news: broadcast::Sender<Arc<str>>,
     trace: Arc<Trace>,
+    timeline: Arc<Timeline>,
 }
 
 /// What the host has in its hands.
@@ -35,6 +37,7 @@ pub(crate) struct Counter {
     pub(crate) pictures: watch::Sender<Picture>,
     pub(crate) news: broadcast::Sender<Arc<str>>,
     pub(crate) trace: Arc<Trace>,
+    pub(crate) timeline: Arc<Timeline>,
 }
 
 /// The state of everything, as JSON.
@@ -59,15 +62,22 @@ pub(crate) enum Wish {
     Do { session: SessionId, seq: u64, deed: Deed, answer: oneshot::Sender<Answer> },
 }
 
-/// Both ends, with the trace between them.
+/// Both ends, with the trace and the timeline between them.
 pub(crate) fn desk(trace: Trace) -> (Desk, Counter) {
-    let trace = Arc::new(trace);
+    let (trace, timeline) = (Arc::new(trace), Arc::<Timeline>::default());
     let (wishes, wished) = mpsc::channel(WISHES);
     let (stops, stopped) = watch::channel(0);
     let (shown, pictures) = watch::channel(Picture { number: 0, json: "{}".into() });
     let (news, _) = broadcast::channel(NEWS);
-    let desk = Desk { wishes, stops: Arc::new(stops), pictures, news: news.clone(), trace: Arc::clone(&trace) };
-    (desk, Counter { wishes: wished, stops: stopped, pictures: shown, news, trace })
+    let desk = Desk {
+        wishes,
+        stops: Arc::new(stops),
+        pictures,
+        news: news.clone(),
+        trace: Arc::clone(&trace),
+        timeline: Arc::clone(&timeline),
+    };
+    (desk, Counter { wishes: wished, stops: stopped, pictures: shown, news, trace, timeline })
 }
 
 /// A session at the desk. The host stops what it moved when this is dropped.
@@ -102,6 +112,11 @@ impl Desk {
     /// The frames that have passed.
     pub(crate) fn trace(&self) -> &Trace {
         &self.trace
+    }
+
+    /// What has happened.
+    pub(crate) fn timeline(&self) -> &Timeline {
+        &self.timeline
     }
 
     /// The news from now on.

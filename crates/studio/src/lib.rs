@@ -18,6 +18,7 @@ mod desk;
 mod host;
 mod message;
 mod snapshot;
+mod timeline;
 mod trace;
 mod web;
 

@@ -27,6 +27,8 @@ pub(crate) struct Snapshot<'a> {
     pub(crate) controller: Option<SessionId>,
     /// Who asked for that last.
     pub(crate) asking: Option<SessionId>,
+    /// Rises when there is something new at `/api/faults`.
+    pub(crate) happenings: u64,
     pub(crate) nodes: Vec<NodeView<'a>>,
 }
 

@@ -72,7 +72,12 @@ const fn joint(name: &'static str, title: &'static str) -> Description {
         axes: &[AXIS],
         host_watch: HostWatch::Heartbeat { consumer: Mux::new(0x1016, 1), fault: 0x20 },
         storage: STORAGE,
-        faults: Faults { code: Some(Mux::new(0x260E, 0)), bit_field: false, table: &ALARMS },
+        faults: Faults {
+            code: Some(Mux::new(0x260E, 0)),
+            bit_field: false,
+            table: &ALARMS,
+            section: "Status indication and alarm",
+        },
         nmt: NmtRules { start_state: NmtState::Operational, heartbeat_tells_alarm: true },
         lss: false,
         pdo: PDO_RULES,

@@ -45,7 +45,12 @@ pub static CIA402: Description = Description {
 };
 
 /// How a CiA 402 drive tells its faults: by the codes of the standard.
-pub const FAULTS: Faults = Faults { code: Some(Mux::new(0x603F, 0)), bit_field: false, table: &faults::FAULTS };
+pub const FAULTS: Faults = Faults {
+    code: Some(Mux::new(0x603F, 0)),
+    bit_field: false,
+    table: &faults::FAULTS,
+    section: "error codes of 603Fh",
+};
 
 /// All modes of the standard but velocity mode (frequency converters).
 pub const MODES: &[ModeOfOperation] = &[

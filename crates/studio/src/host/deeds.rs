@@ -49,6 +49,7 @@ impl Host {
             Deed::Scan {} => self.begin_scan(Some(asked)),
             Deed::Explain { node } => self.listen_for(node, asked),
             Deed::QuickStop { node } => {
+                self.note_stop(node, "stopped by a quick stop");
                 self.quick_stop_one(node, "stopped by a quick stop", Some(asked));
             }
             Deed::JogHold { node } => {

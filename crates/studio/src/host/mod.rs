@@ -4,6 +4,7 @@
 //! so that a stop is never behind something slow. What comes first in each round is what stops.
 
 mod deeds;
+mod faults;
 mod known_node;
 mod meter;
 mod nodes;

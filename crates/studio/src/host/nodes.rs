@@ -103,6 +103,10 @@ impl Host {
 
     /// Takes in what a drive said, and looks at it again.
     pub(super) fn take_in(&mut self, id: NodeId, read: Result<Box<DriveView>, Error>) {
+        match &read {
+            Ok(view) => self.note_look(id, view),
+            Err(error) => self.note_silence(id, error),
+        }
         let drives = self.nodes.values().filter(|node| node.drive.is_some()).count() as u32;
         let Some(node) = self.nodes.get_mut(&id) else { return };
         node.is_looked_at = false;
@@ -145,7 +149,8 @@ impl Host {
 
     /// Passes on what the network has noticed. A node that nobody knew has come: look who it is.
     pub(super) fn hear_events(&mut self) {
-        while let Some((_, event)) = self.network.poll_event() {
+        while let Some((at, event)) = self.network.poll_event() {
+            self.note_event(at, &event);
             let node = match event {
                 Event::BootUp(node) => {
                     // Neither is one known that was heard and did not answer.

@@ -119,6 +119,7 @@ impl Host {
             sessions: self.authority.sessions(),
             controller: self.authority.controller(),
             asking: self.authority.asking(),
+            happenings: self.counter.timeline.revision(),
             nodes: self.nodes.iter().map(|(id, node)| self.view(*id, node, now)).collect(),
         };
         // Names, numbers and lists alone: there is nothing in it that JSON cannot say.

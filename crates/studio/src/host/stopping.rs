@@ -53,6 +53,7 @@ impl Host {
         }
         for id in nodes {
             self.say_news(Some(id), why);
+            self.note_stop(id, why);
             self.quick_stop_one(id, why, None);
         }
     }

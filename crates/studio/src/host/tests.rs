@@ -1,8 +1,10 @@
 //! The host against virtual drives, in virtual time: who may move, and what stops.
 
+mod faults;
 mod trace;
 
 use std::collections::{BTreeMap, VecDeque};
+use std::pin::{Pin, pin};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -165,6 +167,17 @@ fn setting() -> Setting {
 
 /// Plays a scene before a studio that runs.
 fn play(scene: impl AsyncFnOnce(&Stage)) {
+    play_acts(scene, |_| {}, async |_| {}, |_| {}, async |_| {});
+}
+
+/// Plays three scenes before a studio that runs on; between them the world changes.
+fn play_acts(
+    first: impl AsyncFnOnce(&Stage),
+    then: impl FnOnce(&mut World),
+    second: impl AsyncFnOnce(&Stage),
+    at_last: impl FnOnce(&mut World),
+    third: impl AsyncFnOnce(&Stage),
+) {
     let network = Network::new();
     let tap = Tap { network: network.clone(), passed: Arc::default() };
     let mut world = World::new(Bitrate::K500, 1);
@@ -175,17 +188,28 @@ fn play(scene: impl AsyncFnOnce(&Stage)) {
     let models = [(WHEEL, "zlac8030l"), (ARM, "zlim42c")];
     let models: BTreeMap<_, _> =
         models.into_iter().map(|(node, name)| (node, devices::model(name).expect("a model"))).collect();
-    let timeout = Duration::from_millis(100);
-    let setting = Setting { bus: "sim".into(), bitrate: Some(Bitrate::K500), timeout, models, ..setting() };
+    let setting = Setting { bitrate: Some(Bitrate::K500), models, ..setting() };
     let (host, desk) = Host::new(network.clone(), setting);
     let stage = Stage { network, desk };
+    let mut serving = pin!(host.run(|| tap.take()));
+    act(&mut world, serving.as_mut(), async {
+        stage.scanned().await;
+        first(&stage).await;
+    });
+    then(&mut world);
+    act(&mut world, serving.as_mut(), second(&stage));
+    at_last(&mut world);
+    act(&mut world, serving.as_mut(), third(&stage));
+}
+
+fn act(world: &mut World, serving: Pin<&mut impl Future<Output = ()>>, scene: impl Future<Output = ()>) {
     let playing = async {
         tokio::select! {
-            () = host.run(|| tap.take()) => panic!("a host runs as long as there is a desk"),
-            () = async { stage.scanned().await; scene(&stage).await } => {}
+            () = serving => panic!("a host runs as long as there is a desk"),
+            () = scene => {}
         }
     };
-    sim::block_on_for(&mut world, Duration::from_secs(120), playing).expect("the scene ends");
+    sim::block_on_for(world, Duration::from_secs(120), playing).expect("the scene ends");
 }
 
 fn jog(rpm: f64) -> Deed {

@@ -14,6 +14,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use axum::Router;
+use axum::extract::rejection::QueryRejection;
 use axum::extract::ws::WebSocketUpgrade;
 use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
 use axum::http::header::{
@@ -84,6 +85,7 @@ fn handler(operation: Operation) -> MethodRouter<Web> {
         Operation::Stop => post(stop),
         Operation::Login => post(login),
         Operation::Socket => get(socket),
+        Operation::Faults => get(faults),
         Operation::Trace => get(async |State(web): State<Web>, asked| trace::lines(web.desk, web.doors, asked).await),
         Operation::TraceLog => get(async |State(web): State<Web>, asked| trace::log(web.desk, &web.doors, asked)),
     }
@@ -139,6 +141,24 @@ fn refuse(access: &Access, request: &Request) -> Option<Response> {
 async fn state(State(web): State<Web>) -> Response {
     let json = web.desk.pictures().borrow().json.to_string();
     json_text(json)
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Since {
+    #[serde(default)]
+    since: u64,
+}
+
+/// What has happened to the drives.
+async fn faults(State(web): State<Web>, asked: Result<Query<Since>, QueryRejection>) -> Response {
+    match asked {
+        // Numbers and texts alone: there is nothing in it that JSON cannot say.
+        Ok(Query(Since { since })) => {
+            json_text(serde_json::to_string(&web.desk.timeline().since(since)).unwrap_or_default())
+        }
+        Err(rejection) => trouble(StatusCode::BAD_REQUEST, "malformed", &rejection.body_text()),
+    }
 }
 
 /// Needs no control, as the button of the page does not.

@@ -11,6 +11,7 @@ pub(super) enum Operation {
     Stop,
     Login,
     Socket,
+    Faults,
     Trace,
     TraceLog,
 }
@@ -31,7 +32,7 @@ const OVER: (&str, &str) = ("503", "The studio is ending");
 const FOREIGN: (&str, &str) = ("403", "The Origin or the Host is not this server's");
 
 /// All of them. None that is a GET changes anything; none moves a drive: motion goes through the socket, where it is held.
-pub(super) const ROUTES: [Route; 8] = [
+pub(super) const ROUTES: [Route; 9] = [
     Route {
         path: "/api/state",
         method: "get",
@@ -81,6 +82,13 @@ pub(super) const ROUTES: [Route; 8] = [
         answers: &[("101", "Welcome"), LET_IN, FOREIGN],
     },
     Route {
+        path: "/api/faults",
+        method: "get",
+        operation: Operation::Faults,
+        summary: "What has happened to the drives: emergency messages, faults with remedies, states",
+        answers: &[("200", "What is new or has changed since a revision, oldest first"), MALFORMED, LET_IN],
+    },
+    Route {
         path: "/api/trace",
         method: "get",
         operation: Operation::Trace,
@@ -115,6 +123,7 @@ const fn parameters(operation: Operation) -> &'static [(&'static str, &'static s
             ("transfers", "boolean", "One line for each SDO transfer, not for each of its frames"),
             ("quiet", "boolean", "Without the SDO transfers by which the studio reads"),
         ],
+        Operation::Faults => &[("since", "integer", "The revision that was told before; 0 for everything")],
         _ => &[],
     }
 }

@@ -32,6 +32,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("series.js", SCRIPT, include_str!("../../page/series.js")),
     ("analysis.js", SCRIPT, include_str!("../../page/analysis.js")),
     ("svg_pen.js", SCRIPT, include_str!("../../page/svg_pen.js")),
+    ("faults.js", SCRIPT, include_str!("../../page/faults.js")),
     ("trace.js", SCRIPT, include_str!("../../page/trace.js")),
 ];
 

@@ -53,7 +53,12 @@ const fn described(dictionary: &'static Table) -> Description {
         axes: &[AXIS],
         host_watch: HostWatch::Silence { time: Mux::new(0x2000, 0) },
         storage: zltech::parameter_storage(0x2009, 0x2010, RESTART, ADDRESS),
-        faults: Faults { code: Some(Mux::new(0x603F, 0)), bit_field: true, table: &FAULTS },
+        faults: Faults {
+            code: Some(Mux::new(0x603F, 0)),
+            bit_field: true,
+            table: &FAULTS,
+            section: "chapters 8 and 9",
+        },
         nmt: NmtRules::CIA_301,
         lss: false,
         pdo: PDO_RULES,

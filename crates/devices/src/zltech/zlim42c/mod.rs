@@ -50,7 +50,7 @@ const fn stepper(name: &'static str, title: &'static str) -> Description {
         axes: &[AXIS],
         host_watch: HostWatch::None,
         storage: zltech::parameter_storage(0x2010, 0x200C, RESTART, ADDRESS),
-        faults: Faults { code: Some(Mux::new(0x603F, 0)), bit_field: false, table: &FAULTS },
+        faults: Faults { code: Some(Mux::new(0x603F, 0)), bit_field: false, table: &FAULTS, section: "3.4 and 5.4" },
         nmt: NmtRules::CIA_301,
         lss: false,
         pdo: zltech::PDO_RULES,

@@ -15,7 +15,7 @@ impl Stage {
         serde_json::to_value(query.select(&self.desk.trace().held())).expect("JSON")
     }
 
-    fn lines(&self, asked: Value) -> Vec<Value> {
+    pub(super) fn lines(&self, asked: Value) -> Vec<Value> {
         self.trace(asked)["lines"].as_array().expect("lines").clone()
     }
 

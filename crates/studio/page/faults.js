@@ -1,0 +1,130 @@
+// The Faults view: what has happened to the drives, what to do about it, and the frames around. The studio keeps it, so that
+// what happened before this page was opened is there too.
+
+import { h, hex, number, renew, say } from "./dom.js";
+import { headRow, lineRow } from "./trace.js";
+
+/** How often it is asked for at most. */
+const ASK_MS = 250;
+/** Frames before and behind a happening, in seconds. */
+const AROUND_S = 0.05;
+const COLUMNS = ["Time (s)", "Node", "What", "Code", "In words", "Over"];
+const KINDS = { emcy: "EMCY", fault: "fault", silent: "silent", state: "power state", nmt: "NMT", stop: "stop" };
+/** Those that last until they are over. */
+const LASTING = ["emcy", "fault", "silent"];
+
+export function faultsView() {
+  const only = h("input", { type: "checkbox", id: "faults-only", onchange: draw });
+  const here = h("span", { class: "quiet", role: "status" });
+  const list = h("div", { class: "timeline", tabindex: "0", role: "log", "aria-label": "What happened, newest first" });
+  const detail = h("div", { class: "told" });
+  const frames = h("div", { class: "around", hidden: true });
+  const root = h(
+    "section",
+    { class: "faults-view" },
+    h("div", { class: "bar" }, h("label", {}, only, " faults only"), here),
+    h("div", { class: "happening head" }, ...COLUMNS.map((title) => h("span", {}, title))),
+    list,
+    detail,
+    frames,
+  );
+
+  const entries = new Map();
+  let revision = 0;
+  let oldest = 0;
+  let asking = false;
+  let asked_at = 0;
+  let chosen = null;
+  let trouble = null;
+
+  async function ask() {
+    asking = true;
+    asked_at = performance.now();
+    try {
+      const answer = await fetch(`/api/faults?since=${revision}`);
+      const news = await answer.json();
+      if (!answer.ok) throw new Error(news.error.message);
+      [revision, oldest, trouble] = [news.revision, news.oldest, null];
+      for (const entry of news.entries) entries.set(entry.number, entry);
+      for (const known of entries.keys()) if (known < oldest) entries.delete(known);
+    } catch (error) {
+      trouble = error.message;
+    }
+    asking = false;
+    draw();
+  }
+
+  const over = (entry) => {
+    if (!LASTING.includes(entry.kind)) return "";
+    const times = entry.count > 1 ? `${entry.count} times, ` : "";
+    return `${times}${entry.gone_s === null ? "goes on" : `after ${number(entry.gone_s - entry.at_s, 2)} s`}`;
+  };
+
+  function row(entry) {
+    const lasts = LASTING.includes(entry.kind) && entry.gone_s === null;
+    const cells = [number(entry.at_s, 3), String(entry.node), KINDS[entry.kind], entry.code === null ? "" : hex(entry.code, 4), entry.what, over(entry)];
+    const look = () => choose(entry.number);
+    const state = { type: "button", class: `happening ${entry.kind}${lasts ? " lasts" : ""}`, "data-number": String(entry.number), "aria-pressed": String(entry.number === chosen), onclick: look };
+    return h("button", state, ...cells.map((cell) => h("span", {}, cell)));
+  }
+
+  function draw() {
+    const shown = [...entries.values()].filter((entry) => !only.checked || LASTING.includes(entry.kind)).sort((a, b) => b.number - a.number);
+    const open = shown.filter((entry) => LASTING.includes(entry.kind) && entry.gone_s === null).length;
+    const older = oldest > 0 ? ` The first ${oldest} are not kept any more.` : "";
+    say(here, trouble ?? `${shown.length} shown, ${open} of them ${open === 1 ? "goes" : "go"} on.${older}`);
+    const top = list.scrollTop;
+    renew(list, `${revision} ${only.checked} ${chosen}`, () => shown.map(row));
+    list.scrollTop = top;
+    explain();
+  }
+
+  function explain() {
+    const entry = entries.get(chosen);
+    if (!entry) return;
+    renew(detail, JSON.stringify(entry), () => {
+      const code = entry.code === null ? "" : ` ${hex(entry.code, 4)}`;
+      const rows = [h("dt", {}, "Cause and remedy"), h("dd", { id: "remedy" }, entry.remedy ?? (LASTING.includes(entry.kind) ? "No table here explains it: see the drive's manual." : "Nothing is wrong with it."))];
+      if (entry.source) rows.push(h("dt", {}, "Written in"), h("dd", { id: "fault-source" }, entry.source));
+      return [h("h2", {}, `Node ${entry.node}: ${KINDS[entry.kind]}${code}, ${entry.what}`), h("dl", {}, ...rows)];
+    });
+  }
+
+  async function choose(number_) {
+    chosen = number_;
+    const entry = entries.get(chosen);
+    draw();
+    frames.hidden = false;
+    frames.replaceChildren(h("p", { class: "quiet" }, "Fetching the frames around …"));
+    // The frames of the second half may still be on their way.
+    await new Promise((resolve) => setTimeout(resolve, 2 * AROUND_S * 1000));
+    const asked = new URLSearchParams({ from_s: Math.max(0, entry.at_s - AROUND_S).toFixed(6), until_s: (entry.at_s + AROUND_S).toFixed(6), count: "2000" });
+    let lines = [];
+    try {
+      const answer = await fetch(`/api/trace?${asked}`);
+      const told = await answer.json();
+      if (!answer.ok) throw new Error(told.error.message);
+      lines = told.lines;
+    } catch (error) {
+      frames.replaceChildren(h("p", { class: "bad" }, error.message));
+      return;
+    }
+    if (chosen !== number_) return;
+    if (lines.length === 0) {
+      frames.replaceChildren(h("p", { class: "quiet" }, "There are no frames of that time, or they are not kept any more."));
+      return;
+    }
+    const rows = lines.map(lineRow);
+    // The frame that told of it: the last one of the node up to then.
+    const at = lines.findLastIndex((line) => line.node === entry.node && line.at_s <= entry.at_s + 1e-6);
+    rows[at]?.classList.add("marked");
+    frames.replaceChildren(h("p", { class: "quiet" }, `The frames from ${AROUND_S * 1000} ms before to ${AROUND_S * 1000} ms after, as they are kept`), headRow(), ...rows);
+    rows[at]?.scrollIntoView({ block: "nearest" });
+  }
+
+  function update(state) {
+    if (state.happenings !== revision && !asking && performance.now() - asked_at >= ASK_MS) ask();
+  }
+
+  return { root, update };
+}

@@ -1,0 +1,114 @@
+//! What the timeline is told: emergency messages, faults and states that drives show, and what stopped them.
+
+use can::Instant;
+use canopen::emcy::{Emcy, EmcyErrorCode};
+use canopen::{NmtState, NodeId};
+use devices::Description;
+use devices::faults::FaultRow;
+use master::core::Event;
+use master::{Drive, Error};
+
+use super::state::Host;
+use crate::snapshot::DriveView;
+use crate::timeline::{Happening, Kind};
+
+const CHECK_SUPPLY: &str =
+    "Check its supply and its cable; it may also have restarted with another node-ID or bit rate.";
+
+impl Host {
+    /// Something that the network noticed.
+    pub(super) fn note_event(&self, at: Instant, event: &Event) {
+        match event {
+            Event::Emcy(node, emcy) => self.note_emcy(at, *node, *emcy),
+            Event::BootUp(node) => {
+                // A device begins without errors (CiA 301, 7.2.7.1).
+                self.counter.timeline.end_but(at, *node, Kind::Emcy, &[]);
+                self.tell(Happening::new(at, *node, Kind::Nmt, "booted"));
+            }
+            Event::NmtState(node, state) => self.note_nmt(at, *node, *state),
+            Event::HeartbeatLost(node, time) => {
+                let what = format!("no heartbeat for {} ms", time.as_millis());
+                self.tell(Happening { remedy: Some(CHECK_SUPPLY), ..Happening::new(at, *node, Kind::Silent, what) });
+            }
+            Event::HeartbeatBack(node) => self.counter.timeline.end_but(at, *node, Kind::Silent, &[]),
+            _ => {}
+        }
+    }
+
+    fn note_emcy(&self, at: Instant, node: NodeId, emcy: Emcy) {
+        if emcy.code == EmcyErrorCode::NO_ERROR {
+            return self.counter.timeline.end_but(at, node, Kind::Emcy, &[]);
+        }
+        let model = self.description(node);
+        let row = model.and_then(|model| model.fault_told_by(emcy.code));
+        let name = row.map_or_else(|| emcy.code.to_string(), |row| row.name.to_owned());
+        let what = format!("{name}, error register {:02X}h", emcy.error_register);
+        let happening = Happening { code: Some(emcy.code.0), ..Happening::new(at, node, Kind::Emcy, what) };
+        self.tell(explained(happening, model, row));
+    }
+
+    fn note_nmt(&self, at: Instant, node: NodeId, state: NmtState) {
+        let tells_alarm = self.description(node).is_some_and(|model| model.tells_alarm(state));
+        let what = match tells_alarm {
+            true => "its heartbeat tells an alarm".to_owned(),
+            false => format!("NMT state {state}"),
+        };
+        self.tell(Happening::new(at, node, Kind::Nmt, what));
+    }
+
+    /// A drive was looked at: what has changed since the last look.
+    pub(super) fn note_look(&self, id: NodeId, view: &DriveView) {
+        let at = Instant::from_nanos((view.at_s * 1e9) as u64);
+        let model = self.description(id);
+        self.counter.timeline.end_but(at, id, Kind::Silent, &[]);
+        let before = self.nodes.get(&id).and_then(|node| node.view.as_ref());
+        if let Some(before) = before.and_then(|before| before.state)
+            && let Some(now) = view.state
+            && before != now
+        {
+            self.tell(Happening::new(at, id, Kind::State, format!("{before} → {now}")));
+        }
+        let rows: Vec<_> = model.map(|model| rows(model, view)).unwrap_or_default();
+        let codes: Vec<_> = match rows.as_slice() {
+            // A code that no table here explains is one too.
+            [] => Some(view.fault_code).filter(|code| *code != 0).into_iter().map(Some).collect(),
+            rows => rows.iter().map(|row| Some(row.code)).collect(),
+        };
+        self.counter.timeline.end_but(at, id, Kind::Fault, &codes);
+        for code in codes {
+            let row = rows.iter().copied().find(|row| Some(row.code) == code);
+            let what = row.map_or("a fault that no table here explains", |row| row.name);
+            self.tell(explained(Happening { code, ..Happening::new(at, id, Kind::Fault, what) }, model, row));
+        }
+    }
+
+    /// A drive does not answer.
+    pub(super) fn note_silence(&self, id: NodeId, error: &Error) {
+        let happening = Happening::new(self.network.now(), id, Kind::Silent, error.to_string());
+        self.tell(Happening { remedy: Some(CHECK_SUPPLY), ..happening });
+    }
+
+    /// This studio stops a drive.
+    pub(super) fn note_stop(&self, id: NodeId, why: &str) {
+        self.tell(Happening::new(self.network.now(), id, Kind::Stop, why));
+    }
+
+    fn tell(&self, happening: Happening) {
+        self.counter.timeline.push(happening);
+    }
+
+    fn description(&self, id: NodeId) -> Option<&'static Description> {
+        self.nodes.get(&id).and_then(|node| node.drive.as_ref()).and_then(Drive::description)
+    }
+}
+
+/// The faults that a look showed.
+fn rows(model: &'static Description, view: &DriveView) -> Vec<&'static FaultRow> {
+    let shown = |row: &&FaultRow| view.faults.iter().any(|fault| fault.name == row.name);
+    model.faults.table.iter().filter(shown).collect()
+}
+
+fn explained(happening: Happening, model: Option<&Description>, row: Option<&'static FaultRow>) -> Happening {
+    let source = model.filter(|_| row.is_some()).map(|model| format!("{}, {}", model.manual, model.faults.section));
+    Happening { remedy: row.map(|row| row.remedy), source, ..happening }
+}

@@ -1,0 +1,107 @@
+//! What happens to virtual drives, as the timeline tells it.
+
+use canopen::NmtCommand;
+use serde_json::Value;
+use sim::{Place, World};
+
+use super::{ARM, Stage, WHEEL, play, play_acts};
+use crate::message::Deed;
+
+impl Stage {
+    /// Everything that has happened, oldest first.
+    fn happened(&self) -> Vec<Value> {
+        let news = serde_json::to_value(self.desk.timeline().since(0)).expect("JSON");
+        news["entries"].as_array().expect("entries").clone()
+    }
+
+    fn find(&self, node: canopen::NodeId, kind: &str) -> Value {
+        let all = self.happened();
+        let found = all.iter().rfind(|entry| entry["node"] == node.raw() && entry["kind"] == kind);
+        found.unwrap_or_else(|| panic!("no {kind} of node {node}: {all:?}")).clone()
+    }
+}
+
+fn change(world: &mut World, node: canopen::NodeId, words: &str) {
+    let stimulus = words.parse().expect("a stimulus");
+    world.apply(Place::node(node.raw()), &stimulus).expect("it is there").expect("it has that");
+}
+
+/// ZLAC8030L quick start guide V1.00, chapters 8 and 9: 0001h is over-voltage.
+#[test]
+fn a_fault_is_told_with_its_remedy_and_where_that_is_written_until_it_is_over() {
+    play_acts(
+        async |stage| stage.sleep(200).await,
+        |world| change(world, WHEEL, "supply 80"),
+        async |stage| {
+            stage.sleep(1000).await;
+            for kind in ["emcy", "fault"] {
+                let told = stage.find(WHEEL, kind);
+                assert_eq!((&told["code"], &told["gone_s"]), (&1.into(), &Value::Null), "{told}");
+                assert!(told["what"].as_str().expect("text").starts_with("over-voltage"), "{told}");
+                assert!(told["remedy"].as_str().expect("text").contains("bleeder"), "{told}");
+                assert_eq!(told["source"], "ZLAC8030L quick start guide V1.00, chapters 8 and 9");
+            }
+            assert_eq!(stage.find(WHEEL, "state")["what"], "Switch on disabled → Fault");
+            let emcy = stage.find(WHEEL, "emcy");
+            let at_s = emcy["at_s"].as_f64().expect("a time");
+            let around = serde_json::json!({ "from_s": at_s - 0.05, "until_s": at_s + 0.05, "kind": "emcy" });
+            let lines = stage.lines(around);
+            assert!(lines[0]["text"].as_str().expect("text").contains("0001h (over-voltage)"), "{lines:?}");
+        },
+        |world| change(world, WHEEL, "supply 48"),
+        async |stage| {
+            stage.sleep(500).await;
+            let mut page = stage.page().await;
+            page.must(Deed::TakeControl {}).await;
+            page.must(Deed::ResetFault { node: WHEEL }).await;
+            stage.sleep(500).await;
+            for kind in ["emcy", "fault"] {
+                let told = stage.find(WHEEL, kind);
+                assert!(told["gone_s"].as_f64().expect("it is over") > told["at_s"].as_f64().expect("a time"));
+            }
+            assert_eq!(stage.find(WHEEL, "state")["what"], "Fault → Switch on disabled");
+        },
+    );
+}
+
+#[test]
+fn a_drive_that_is_cut_off_is_silent_until_it_answers_again() {
+    play_acts(
+        async |stage| stage.sleep(200).await,
+        |world| change(world, ARM, "cable cut"),
+        async |stage| {
+            stage.sleep(2000).await;
+            let told = stage.find(ARM, "silent");
+            assert_eq!(told["gone_s"], Value::Null);
+            assert!(told["remedy"].as_str().expect("text").contains("cable"), "{told}");
+            let silent = stage.happened().into_iter().filter(|entry| entry["kind"] == "silent").count();
+            assert_eq!(silent, 1, "told once, however often it is asked");
+        },
+        |world| change(world, ARM, "cable join"),
+        async |stage| {
+            stage.sleep(2500).await;
+            assert!(stage.find(ARM, "silent")["gone_s"].is_f64());
+        },
+    );
+}
+
+#[test]
+fn what_was_there_before_a_page_came_is_known_and_so_are_stops_and_boot_ups() {
+    play(async |stage| {
+        stage.network.node(ARM).nmt(NmtCommand::ResetNode);
+        stage.sleep(1500).await;
+        let before = stage.state()["happenings"].as_u64().expect("a number");
+        let mut page = stage.page().await;
+        assert!(stage.happened().iter().any(|entry| entry["node"] == 2 && entry["what"] == "booted"));
+        page.must(Deed::TakeControl {}).await;
+        page.must(Deed::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
+        page.must(Deed::StopAll {}).await;
+        stage.rests(WHEEL).await;
+        assert_eq!(stage.find(WHEEL, "stop")["what"], "stopped by a press of stop");
+        stage.sleep(500).await;
+        assert!(
+            stage.state()["happenings"].as_u64().expect("a number") > before,
+            "pages are told that there is something"
+        );
+    });
+}

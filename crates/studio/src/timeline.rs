@@ -1,0 +1,245 @@
+//! What has happened to the drives, with what it means and what to do about it. Kept whether a page is open or not.
+//!
+//! Bounded: the newest are kept, and the same emergency message that comes again and again is one of them with a count.
+
+use std::collections::VecDeque;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use can::Instant;
+use canopen::NodeId;
+use serde::Serialize;
+
+/// How many are kept.
+const KEPT: usize = 1_000;
+
+/// What kind of thing happened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Kind {
+    /// An emergency message (CiA 301, 7.2.7).
+    Emcy,
+    /// The drive's fault object (603Fh, of some 260Eh) has a fault.
+    Fault,
+    /// A node is not heard any more: its heartbeat or its answers stay away.
+    Silent,
+    /// Another power state (CiA 402-2, 8.2).
+    State,
+    /// A boot-up, or another NMT state.
+    Nmt,
+    /// This studio stopped it.
+    Stop,
+}
+
+impl Kind {
+    /// It lasts until something says that it is over.
+    const fn lasts(self) -> bool {
+        matches!(self, Self::Emcy | Self::Fault | Self::Silent)
+    }
+}
+
+/// Something that happened.
+#[derive(Clone, Debug)]
+pub(crate) struct Happening {
+    pub(crate) at: Instant,
+    pub(crate) node: NodeId,
+    pub(crate) kind: Kind,
+    /// In words.
+    pub(crate) what: String,
+    /// As the drive tells it.
+    pub(crate) code: Option<u16>,
+    /// What may cause it and what to do about it.
+    pub(crate) remedy: Option<&'static str>,
+    /// Where that is written: document and section.
+    pub(crate) source: Option<String>,
+}
+
+impl Happening {
+    /// Something that explains itself.
+    pub(crate) fn new(at: Instant, node: NodeId, kind: Kind, what: impl Into<String>) -> Self {
+        Self { at, node, kind, what: what.into(), code: None, remedy: None, source: None }
+    }
+}
+
+/// A happening as it is shown.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct Entry {
+    /// Numbers them from 0.
+    number: u64,
+    #[serde(skip)]
+    revision: u64,
+    /// In the time of the bus: when it came, when it came last, and when it was over.
+    at_s: f64,
+    last_s: f64,
+    gone_s: Option<f64>,
+    /// How often it came.
+    count: u32,
+    node: u8,
+    kind: Kind,
+    what: String,
+    code: Option<u16>,
+    remedy: Option<&'static str>,
+    source: Option<String>,
+}
+
+/// The happenings so far. A cheap look, made by any thread.
+#[derive(Debug, Default)]
+pub(crate) struct Timeline {
+    kept: Mutex<Kept>,
+}
+
+#[derive(Debug, Default)]
+struct Kept {
+    entries: VecDeque<Entry>,
+    next: u64,
+    revision: u64,
+}
+
+/// What is new since a revision.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct News {
+    /// To ask on from.
+    revision: u64,
+    /// Number of the oldest that is kept: those before it are gone.
+    oldest: u64,
+    /// New or changed, oldest first.
+    entries: Vec<Entry>,
+}
+
+impl Timeline {
+    /// Something happens. What goes on already is not told again; an emergency message is counted.
+    pub(crate) fn push(&self, happening: Happening) {
+        self.lock().push(happening);
+    }
+
+    /// Things of this kind are over on a node, but for those with these codes.
+    pub(crate) fn end_but(&self, at: Instant, node: NodeId, kind: Kind, codes: &[Option<u16>]) {
+        self.lock().end_but(seconds(at), node, kind, codes);
+    }
+
+    /// Rises with each change.
+    pub(crate) fn revision(&self) -> u64 {
+        self.lock().revision
+    }
+
+    /// What has come or changed since a revision; everything since 0.
+    pub(crate) fn since(&self, revision: u64) -> News {
+        let kept = self.lock();
+        let entries = kept.entries.iter().filter(|entry| entry.revision > revision).cloned().collect();
+        let oldest = kept.entries.front().map_or(kept.next, |entry| entry.number);
+        News { revision: kept.revision, oldest, entries }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Kept> {
+        // Nothing is half done between two happenings, whoever panicked.
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Kept {
+    fn push(&mut self, happening: Happening) {
+        let Happening { at, node, kind, what, code, remedy, source } = happening;
+        let at_s = seconds(at);
+        let mut open = self.entries.iter_mut().rev().filter(|entry| entry.goes_on(node, kind));
+        if let Some(known) = open.find(|entry| entry.code == code) {
+            if kind == Kind::Emcy {
+                self.revision += 1;
+                known.count = known.count.saturating_add(1);
+                (known.last_s, known.revision) = (at_s, self.revision);
+            }
+            return;
+        }
+        if self.entries.len() == KEPT {
+            self.entries.pop_front();
+        }
+        self.revision += 1;
+        let (number, revision, node) = (self.next, self.revision, node.raw());
+        let entry = Entry {
+            number,
+            revision,
+            at_s,
+            last_s: at_s,
+            gone_s: None,
+            count: 1,
+            node,
+            kind,
+            what,
+            code,
+            remedy,
+            source,
+        };
+        self.entries.push_back(entry);
+        self.next += 1;
+    }
+
+    fn end_but(&mut self, at_s: f64, node: NodeId, kind: Kind, codes: &[Option<u16>]) {
+        let open = self.entries.iter_mut().filter(|entry| entry.goes_on(node, kind));
+        for entry in open.filter(|entry| !codes.contains(&entry.code)) {
+            self.revision += 1;
+            (entry.gone_s, entry.revision) = (Some(at_s), self.revision);
+        }
+    }
+}
+
+impl Entry {
+    fn goes_on(&self, node: NodeId, kind: Kind) -> bool {
+        kind.lasts() && self.kind == kind && self.node == node.raw() && self.gone_s.is_none()
+    }
+}
+
+fn seconds(at: Instant) -> f64 {
+    (at - Instant::ZERO).as_secs_f64()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn emcy(at_s: u64, node: u8, code: u16) -> Happening {
+        let node = NodeId::new(node).expect("a node-ID");
+        Happening { code: Some(code), ..Happening::new(Instant::from_secs(at_s), node, Kind::Emcy, "over-voltage") }
+    }
+
+    #[test]
+    fn an_emergency_message_that_comes_again_is_counted_until_it_is_over() {
+        let timeline = Timeline::default();
+        for at_s in 1..=3 {
+            timeline.push(emcy(at_s, 4, 1));
+        }
+        timeline.push(emcy(3, 2, 1));
+        timeline.push(emcy(4, 4, 2));
+        let node = NodeId::new(4).expect("a node-ID");
+        timeline.end_but(Instant::from_secs(5), node, Kind::Emcy, &[Some(2)]);
+        timeline.push(emcy(6, 4, 1));
+        let told: Vec<_> =
+            timeline.since(0).entries.iter().map(|entry| (entry.node, entry.code, entry.count, entry.gone_s)).collect();
+        let expected =
+            [(4, Some(1), 3, Some(5.0)), (2, Some(1), 1, None), (4, Some(2), 1, None), (4, Some(1), 1, None)];
+        assert_eq!(told, expected);
+    }
+
+    #[test]
+    fn who_asks_on_is_told_what_is_new_and_what_has_changed() {
+        let timeline = Timeline::default();
+        timeline.push(emcy(1, 4, 1));
+        timeline.push(emcy(1, 4, 2));
+        let first = timeline.since(0);
+        assert_eq!(timeline.since(first.revision).entries, []);
+        let node = NodeId::new(4).expect("a node-ID");
+        timeline.end_but(Instant::from_secs(2), node, Kind::Emcy, &[Some(2)]);
+        let changed = timeline.since(first.revision);
+        assert_eq!(changed.entries.len(), 1);
+        assert_eq!((changed.entries[0].number, changed.entries[0].gone_s), (0, Some(2.0)));
+        assert_eq!(changed.revision, timeline.revision());
+    }
+
+    #[test]
+    fn the_newest_are_kept() {
+        let timeline = Timeline::default();
+        for round in 0..3 * KEPT as u64 {
+            let node = NodeId::new(4).expect("a node-ID");
+            timeline.push(Happening::new(Instant::from_secs(round), node, Kind::State, "to Fault"));
+        }
+        let news = timeline.since(0);
+        assert_eq!((news.entries.len(), news.oldest), (KEPT, 2 * KEPT as u64));
+    }
+}
