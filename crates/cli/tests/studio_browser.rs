@@ -148,6 +148,15 @@ impl Stage {
             .unwrap_or_else(|error| panic!("{text}: {error}"));
     }
 
+    /// Waits until something is so.
+    async fn until(&self, what: &str, is_so: impl AsyncFn() -> bool) {
+        let until = std::time::Instant::now() + PATIENCE;
+        while !is_so().await {
+            assert!(std::time::Instant::now() < until, "waited for {what}");
+            tokio::time::sleep(std::time::Duration::from_millis(50)).await;
+        }
+    }
+
     /// Waits for a file that the browser saves; it has another name until it is whole.
     async fn saved(&self, name: &str) -> PathBuf {
         let file = self.profile.join(name);
@@ -304,6 +313,32 @@ async fn the_trace_says_what_passes_and_a_filter_hides_the_rest() {
     assert_eq!(decoded.status, Some(0), "{}", decoded.err);
     assert!(decoded.out.contains("write 607Ah:00 target_position = 1024"), "{}", decoded.out);
     assert!(!decoded.out.contains("node 2"), "of node 4 alone");
+    stage.close().await;
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn the_trace_draws_what_is_in_view_and_fetches_what_is_older() {
+    let stage = Stage::open("trace_scrolled").await;
+    let kept = |script: &'static str| async {
+        stage.client.execute(script, vec![]).await.expect("it runs").as_u64().expect("a number")
+    };
+    const FIRST: &str = "return Number(document.querySelector('.trace-list .trace-row').dataset.number)";
+    const DRAWN: &str = "return document.querySelectorAll('.trace-list .trace-row').length";
+    const TALL: &str = "return document.querySelector('.trace-list').scrollHeight / 24";
+    stage.click("#tabs [data-name=trace]").await;
+    stage.click("#trace-transfers").await;
+    stage.until("lines that do not fit into the view", async || kept(TALL).await > 500).await;
+    assert!(kept(DRAWN).await < 60, "only what is in view is drawn");
+    let newest = kept(FIRST).await;
+    stage.until("new lines, of which the newest are in view", async || kept(FIRST).await > newest).await;
+    stage.click("#trace-pause").await;
+    stage.find("#trace-pause[aria-pressed=true]").await;
+    // Each time it comes to the top there is more above, until the first frame of all.
+    let up = "const list = document.querySelector('.trace-list'); list.scrollTop = 0; \
+              return Number(document.querySelector('.trace-list .trace-row').dataset.number)";
+    stage.until("the first frame of all", async || kept(up).await == 0).await;
+    assert!(kept(DRAWN).await < 60, "only what is in view is drawn");
     stage.close().await;
 }
 

@@ -5,8 +5,10 @@ import { h, number, say } from "./dom.js";
 
 const ASK_MS = 100;
 const PART = 500;
-/** Lines that the page has at most; older ones are fetched again from the studio. */
+/** Lines that the page has while it shows the newest; older ones are fetched again from the studio. */
 const LINES_KEPT = 20_000;
+/** Lines that it has at most: what the studio keeps. Somebody who looks at old ones that long is shown nothing new meanwhile. */
+const MOST_LINES = 200_000;
 const ROW_PX = 24;
 const KINDS = ["nmt", "sync", "time", "emcy", "pdo", "sdo", "heartbeat", "lss", "other"];
 const COLUMNS = ["Time (s)", "From", "COB-ID", "What", "Bytes", "Took", "In words"];
@@ -106,12 +108,14 @@ export function traceView() {
     return told;
   }
 
+  const wantsNew = () => to === null || (!paused && (follows || lines.length < MOST_LINES));
+
   async function ask() {
     clearTimeout(timer);
     if (!shown) return;
     const mine = generation;
     // The first lines of a filter are shown even while nothing new is wanted, and nobody looks at a hidden tab.
-    if ((!paused || to === null) && !document.hidden && !fetching) {
+    if (wantsNew() && !document.hidden && !fetching) {
       const told = await part(to === null ? {} : { after: to });
       if (told) {
         if (to === null) from = told.from;
@@ -133,7 +137,7 @@ export function traceView() {
 
   /** Fetches what lies before the first line. */
   async function askOlder() {
-    if (fetching || from === null || from <= oldest || lines.length > LINES_KEPT) return;
+    if (fetching || from === null || from <= oldest || lines.length >= MOST_LINES) return;
     const told = await part({ before: from });
     if (!told) return;
     from = told.from;

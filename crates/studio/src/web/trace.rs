@@ -15,8 +15,9 @@ use super::answer::{json_text, trouble};
 use crate::desk::Desk;
 use crate::trace::{Asked, Held, Query};
 
-/// Readers whose lines are decoded at the same time; others wait for their turn.
-const DECODING: usize = 2;
+/// Readers whose lines are decoded at the same time; others wait for their turn. However many read, a second core is left to
+/// what moves drives.
+const DECODING: usize = 1;
 
 /// Logs that are fetched at the same time. Each may hold the frames of its beginning for as long as it is read.
 const SAVING: usize = 4;
