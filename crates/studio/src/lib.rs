@@ -9,6 +9,9 @@
 //! Every motion hangs on somebody who holds it: a jog on a message every 100 ms ([`JOG_SPAN`]), any other on a page that
 //! shows that it is there ([`PRESENCE_SPAN`]), and both on its connection. What is not held is quick-stopped.
 //!
+//! Beside the host stand what it only adds to and any page reads: the last frames of the bus, raw and put into words when asked
+//! for, and a timeline of what has happened to the drives.
+//!
 //! Not done here: opening a bus and a port, and running the two (`ferrodrive studio`).
 
 mod access;

@@ -174,6 +174,9 @@ impl Held {
 mod tests {
     use std::time::Duration;
 
+    use can::{CanId, Frame};
+    use sim::Prng;
+
     use super::*;
 
     const SPACING: Duration = Duration::from_micros(500);
@@ -219,6 +222,50 @@ mod tests {
         let mut count = 0;
         held.decode(0, u64::MAX, |_, _, _| count += 1);
         assert_eq!((count, held.next(), trace.held().next()), (10, 10, 11));
+    }
+
+    /// Frames of two nodes: SDO transfers whole and broken off, among them such as set up PDOs, and PDOs.
+    fn random_frame(random: &mut Prng) -> Frame {
+        let pick = |random: &mut Prng, of: &[u8]| of[random.below(of.len() as u64) as usize];
+        let base = [0x180_u16, 0x200, 0x280, 0x580, 0x600, 0x600, 0x580, 0x700][random.below(8) as usize];
+        let node = pick(random, &[2, 4]);
+        // Command specifiers of CiA 301, 7.2.4.3, segmented and in blocks too.
+        let command =
+            pick(random, &[0x40, 0x43, 0x4F, 0x41, 0x2F, 0x23, 0x21, 0x60, 0x70, 0x80, 0x00, 0x0B, 0xA0, 0xC2, 0xC6]);
+        let [low, high] = [0x1800_u16, 0x1A00, 0x1400, 0x1600, 0x6041, 0x1000][random.below(6) as usize].to_le_bytes();
+        let sub_index = pick(random, &[0, 1, 2]);
+        let value = [0x184_u32, 0x8000_0184, 0x604, 0x6041_0010, 0x606C_0020, 1, 2, 0][random.below(8) as usize];
+        let [a, b, c, d] = value.to_le_bytes();
+        Frame::new(CanId::standard(base + u16::from(node)), &[command, low, high, sub_index, a, b, c, d])
+    }
+
+    /// What is read in parts, from anywhere, is what a decoder says that has seen all.
+    #[test]
+    fn every_part_reads_as_if_all_before_it_had_been_read() {
+        let mut random = Prng::new(7);
+        let trace = trace_of(0);
+        let mut whole = Decoder::new();
+        let mut told = Vec::new();
+        let model = devices::model("zlac8030l").expect("a model");
+        for number in 0..3 * CHUNK {
+            if number == CHUNK + CHUNK / 2 {
+                let node = NodeId::new(4).expect("a node-ID");
+                trace.set_model(node, model);
+                whole.set_model(node, model);
+            }
+            let frame = random_frame(&mut random);
+            trace.append(Passed { at: Instant::from_millis(number as u64), frame, own: false });
+            told.push(whole.decode(&frame).to_string());
+        }
+        let held = trace.held();
+        assert!(told.iter().any(|text| text.contains("velocity_actual_value")), "PDOs were mapped");
+        for _ in 0..50 {
+            let from = random.below(told.len() as u64);
+            let to = (from + random.below(200)).min(told.len() as u64);
+            let mut part = Vec::new();
+            held.decode(from, to, |_, _, decoded| part.push(decoded.to_string()));
+            assert_eq!(part, told[from as usize..to as usize], "from {from}");
+        }
     }
 
     #[test]
