@@ -364,6 +364,16 @@ async fn a_fault_is_shown_with_its_remedy_and_the_frames_around() {
     let marked = stage.find(".around .marked").await.text().await.expect("text");
     assert!(marked.contains("EMCY node 4: 0001h (over-voltage)"), "{marked}");
     stage.shoot("faults").await;
+    stage.click(".around a").await;
+    let saved = stage.saved("node4_fault.log").await;
+    let saved = std::fs::read_to_string(saved).expect("text");
+    assert!(saved.contains(" 084#0100") && saved.lines().count() > 3, "{saved}");
+    stage.click(".happening.emcy").await;
+    // Above stands what came next: the keys go through the list.
+    stage.client.perform_actions(press(Key::Up.into())).await.expect("a key");
+    stage.client.release_actions().await.expect("a release");
+    stage.find(".happening.emcy:not([aria-pressed=true])").await;
+    stage.find(".happening:not(.emcy)[aria-pressed=true]:focus").await;
     simulator.ask("4 supply 48");
     stage.click("#take").await;
     stage.find("#release").await;

@@ -64,7 +64,7 @@ export function faultsView() {
     const lasts = LASTING.includes(entry.kind) && entry.gone_s === null;
     const cells = [number(entry.at_s, 3), String(entry.node), KINDS[entry.kind], entry.code === null ? "" : hex(entry.code, 4), entry.what, over(entry)];
     const look = () => choose(entry.number);
-    const state = { type: "button", class: `happening ${entry.kind}${lasts ? " lasts" : ""}`, "data-number": String(entry.number), "aria-pressed": String(entry.number === chosen), onclick: look };
+    const state = { type: "button", class: `happening ${entry.kind}${lasts ? " lasts" : ""}`, "data-number": String(entry.number), onclick: look };
     return h("button", state, ...cells.map((cell) => h("span", {}, cell)));
   }
 
@@ -74,8 +74,14 @@ export function faultsView() {
     const older = oldest > 0 ? ` The first ${oldest} are not kept any more.` : "";
     say(here, trouble ?? `${shown.length} shown, ${open} of them ${open === 1 ? "goes" : "go"} on.${older}`);
     const top = list.scrollTop;
-    renew(list, `${revision} ${only.checked} ${chosen}`, () => shown.map(row));
+    const focused = list.contains(document.activeElement) ? document.activeElement.dataset.number : undefined;
+    renew(list, `${revision} ${only.checked}`, () => shown.map(row));
     list.scrollTop = top;
+    for (const element of list.children) {
+      element.setAttribute("aria-pressed", String(element.dataset.number === String(chosen)));
+      // Rows that are made anew take no key away from whoever goes through them.
+      if (element.dataset.number === focused) element.focus({ preventScroll: true });
+    }
     explain();
   }
 
@@ -89,6 +95,15 @@ export function faultsView() {
       return [h("h2", {}, `Node ${entry.node}: ${KINDS[entry.kind]}${code}, ${entry.what}`), h("dl", {}, ...rows)];
     });
   }
+
+  list.addEventListener("keydown", (event) => {
+    const way = { ArrowDown: "nextElementSibling", ArrowUp: "previousElementSibling" }[event.key];
+    const next = way ? event.target.closest(".happening")?.[way] : null;
+    if (!next) return;
+    event.preventDefault();
+    next.focus();
+    choose(Number(next.dataset.number));
+  });
 
   async function choose(number_) {
     chosen = number_;
@@ -118,7 +133,9 @@ export function faultsView() {
     // The frame that told of it: the last one of the node up to then.
     const at = lines.findLastIndex((line) => line.node === entry.node && line.at_s <= entry.at_s + 1e-6);
     rows[at]?.classList.add("marked");
-    frames.replaceChildren(h("p", { class: "quiet" }, `The frames from ${AROUND_S * 1000} ms before to ${AROUND_S * 1000} ms after, as they are kept`), headRow(), ...rows);
+    asked.delete("count");
+    const save = h("a", { class: "button", href: `/api/trace.log?${asked}`, download: `node${entry.node}_fault.log` }, "Save candump");
+    frames.replaceChildren(h("p", { class: "quiet" }, `The frames from ${AROUND_S * 1000} ms before to ${AROUND_S * 1000} ms after, as they are kept `, save), headRow(), ...rows);
     rows[at]?.scrollIntoView({ block: "nearest" });
   }
 

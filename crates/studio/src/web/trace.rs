@@ -71,8 +71,8 @@ pub(super) fn log(desk: Desk, doors: &Doors, asked: InQuery) -> Response {
         let part = work.await.ok()??;
         Some((Ok::<_, std::convert::Infallible>(part.text), Saving { next: part.next, ..saving }))
     });
-    let headers =
-        [(CONTENT_TYPE, "text/plain; charset=utf-8"), (CONTENT_DISPOSITION, "attachment; filename=\"trace.log\"")];
+    // Its name is that of the address, or the one that the page gives it.
+    let headers = [(CONTENT_TYPE, "text/plain; charset=utf-8"), (CONTENT_DISPOSITION, "attachment")];
     (headers, Body::from_stream(parts)).into_response()
 }
 
