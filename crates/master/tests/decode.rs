@@ -329,3 +329,22 @@ fn frames_tell_their_service_their_node_and_their_objects() {
     let all = decoder.decode(&"000#8000".parse().unwrap());
     assert!(all.concerns(NodeId::new(9).unwrap()));
 }
+
+/// ZLAC8030L quick start guide V1.00: 606Ch is an INTEGER32 in 0.1 r/min.
+#[test]
+fn numbers_are_those_of_pdos_and_of_transfers_that_are_done() {
+    let mut decoder = Decoder::new();
+    decoder.set_model(NodeId::new(4).unwrap(), model("zlac8030l").unwrap());
+    let map = PdoMap(vec![MappingRecord::from_raw(0x6041_0010), MappingRecord::from_raw(0x606C_0020)]);
+    decoder.set_pdo(NodeId::new(4).unwrap(), TPDO1, 0x184, &map);
+    let mut numbers = |frame: &str| -> Vec<_> {
+        let decoded = decoder.decode(&frame.parse::<Frame>().unwrap());
+        decoded.numbers().iter().map(|number| (number.mux.index, number.value, number.unit)).collect()
+    };
+    assert_eq!(numbers("184#3702A8FDFFFF"), [(0x6041, 0x0237, ""), (0x606C, -600, "0.1 r/min")]);
+    assert_eq!(numbers("604#406C600000000000"), [], "it is only asked for");
+    assert_eq!(numbers("584#436C6000A8FDFFFF"), [(0x606C, -600, "0.1 r/min")]);
+    assert_eq!(numbers("604#23FF60003C000000"), [], "it may be refused");
+    assert_eq!(numbers("584#60FF600000000000"), [(0x60FF, 60, "r/min")]);
+    assert_eq!(numbers("704#05"), []);
+}

@@ -4,6 +4,7 @@
 
 import { h, number, say } from "./dom.js";
 import { chooser } from "./drive.js";
+import { heard, heardChooser } from "./heard.js";
 import { QUANTITIES, everything, markers, newest_s, series } from "./kept.js";
 import { frame, overFrequency, overTime } from "./scope_picture.js";
 import { crossing, spectrum, stepResponse } from "./analysis.js";
@@ -33,10 +34,10 @@ export function scopeView(shared) {
     { class: "scope" },
     h("div", { class: "bar" }, choose.root, others),
     h("div", { class: "bar" }, seconds, pause, panes, steps, frequencies, button("scope-clear", "Clear cursors", () => (cursors = [null, null])), button("scope-save", "Save CSV", saveCsv), button("scope-svg", "Save SVG", saveSvg)),
-    h("div", { class: "bar" }, trip.root),
+    h("div", { class: "bar" }, trip.root, heardChooser().root),
     canvas,
     readout,
-    h("p", { class: "quiet" }, "Each point is one reading by SDO, about ten a second and fewer with many drives. Click: cursor A; Shift and click: cursor B; key p: pause; paused, the wheel zooms and a drag moves."),
+    h("p", { class: "quiet" }, "Each point is one reading by SDO, about ten a second and fewer with many drives; of an added object each frame that carries it. Click: cursor A; Shift and click: cursor B; key p: pause; paused, the wheel zooms and a drag moves."),
   );
   /** While paused: which series, and until when. */
   let frozen = null;
@@ -63,7 +64,7 @@ export function scopeView(shared) {
 
   /** Keeps the picture as it is, or as it was when it ended at a time; `byTrigger` until that comes again. */
   function freeze(end_s = newest_s(shared.node), byTrigger = false) {
-    const copies = new Map(everything(nodes()).map(([node, field, one]) => [`${node} ${field}`, one.cut(one.first_s(), end_s + Number(seconds.value))]));
+    const copies = new Map(all().map(([node, field, one]) => [`${node} ${field}`, one.cut(one.first_s(), end_s + Number(seconds.value))]));
     frozen = { copies, end_s, span_s: Number(seconds.value), marks: [...markers], byTrigger };
     pause.setAttribute("aria-pressed", "true");
     say(pause, "Go on");
@@ -81,7 +82,10 @@ export function scopeView(shared) {
     trip.rearm(newest_s(shared.node));
   }
 
-  const ofSource = (node, field) => frozen?.copies.get(`${node} ${field}`) ?? series(node, field);
+  const ofSource = (node, field) => frozen?.copies.get(`${node} ${field}`) ?? heard().find((one) => one.field === field)?.series ?? series(node, field);
+
+  /** Every series of the drives that are drawn, and of the objects that were added: `[node, field, series]`. */
+  const all = () => [...everything(nodes()), ...heard().map((one) => [one.node, one.field, one.series])];
 
   /** What is drawn now. */
   function content() {
@@ -96,6 +100,10 @@ export function scopeView(shared) {
           .filter((line) => line.series.length > 0),
       }))
       .filter(({ lines }) => lines.length > 0);
+    for (const one of heard()) {
+      const lines = [{ name: `node ${one.node}`, series: ofSource(one.node, one.field) }].filter((line) => line.series.length > 0);
+      if (lines.length > 0) drawn.push({ ...one, level: undefined, lines });
+    }
     const marks = (frozen ? frozen.marks : markers)
       .filter(({ node }) => node === null || nodes().includes(node))
       .map(({ time_s, text }) => ({ time_s, text: cut(text) }));
@@ -205,8 +213,10 @@ export function scopeView(shared) {
 
   /** A row for each time at which something was read; what was not read then stays empty. */
   function saveCsv() {
-    const columns = everything(nodes())
-      .map(([node, field]) => [`${nodes().length > 1 ? `node${node}_` : ""}${field}`, ofSource(node, field)])
+    // An object has its node in its name.
+    const title = (node, field) => (nodes().length > 1 && !field.includes(":") ? `node${node}_${field}` : field);
+    const columns = all()
+      .map(([node, field]) => [title(node, field), ofSource(node, field)])
       .filter(([, one]) => one.length > 0);
     const rows = new Map();
     columns.forEach(([, { times, values, start, end }], column) => {

@@ -8,6 +8,7 @@ mod block;
 mod common;
 mod motion;
 mod node_models;
+mod number;
 mod pdo;
 mod sdo;
 mod step;
@@ -38,6 +39,7 @@ use sdo::Conversations;
 
 pub use common::{common_name, common_row, common_type};
 pub(crate) use motion::object_may_move;
+pub use number::Number;
 pub use pdo::Pdo;
 pub use sdo::Sdo;
 pub use step::{SdoStep, Side};

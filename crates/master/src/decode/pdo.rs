@@ -27,7 +27,7 @@ pub struct Pdo {
     pub bytes: Vec<u8>,
     /// Bytes that the mapping asks for; `None` if the mapping is not known.
     pub mapped_bytes: Option<usize>,
-    model: Option<Model>,
+    pub(super) model: Option<Model>,
 }
 
 impl Pdo {

@@ -43,6 +43,16 @@ impl<'a> Value<'a> {
         data_type.is_integer().then(|| data_type.value(raw))
     }
 
+    /// What one of [`number`](Self::number) is, by the table; empty if nothing is known.
+    pub fn unit(&self) -> &'static str {
+        self.entry.map_or("", |entry| self.form(entry).1)
+    }
+
+    /// The object's name, if known.
+    pub fn name(&self) -> Option<&'static str> {
+        object_name(self.mux, self.model)
+    }
+
     /// Type and unit of the bytes: an object may have another form in TPDOs, which its length tells.
     fn form(&self, entry: &Entry) -> (DataType, &'static str) {
         let form = self.model.and_then(|model| model.pdo.mapping.tpdo_form(self.mux));
@@ -77,10 +87,14 @@ impl fmt::Display for Value<'_> {
 
 /// An object's multiplexor and its name, if known.
 pub(super) fn write_name(f: &mut fmt::Formatter<'_>, mux: Mux, model: Option<&'static Description>) -> fmt::Result {
-    match model.map_or_else(|| common_name(mux), |model| model.row(mux).map(|row| row.name)) {
+    match object_name(mux, model) {
         Some(name) => write!(f, "{mux} {name}"),
         None => write!(f, "{mux}"),
     }
+}
+
+fn object_name(mux: Mux, model: Option<&'static Description>) -> Option<&'static str> {
+    model.map_or_else(|| common_name(mux), |model| model.row(mux).map(|row| row.name))
 }
 
 fn find(model: Option<&'static Description>, mux: Mux) -> Option<&'static Entry> {

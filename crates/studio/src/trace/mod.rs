@@ -8,9 +8,11 @@ mod log;
 mod passed;
 mod query;
 mod ring;
+mod series;
 
 pub use passed::Passed;
 
 pub(crate) use passed::Origin;
 pub(crate) use query::{Asked, Query};
 pub(crate) use ring::{Held, Trace};
+pub(crate) use series::AskedSeries;

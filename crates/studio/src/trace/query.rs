@@ -15,7 +15,7 @@ const COUNT: usize = 500;
 const MOST: usize = 2_000;
 
 /// Frames that are looked through for one answer: some 50 ms of work.
-const MOST_SEARCHED: u64 = 20_000;
+pub(super) const MOST_SEARCHED: u64 = 20_000;
 
 /// Frames before the first wanted one in which the beginning of an SDO transfer is looked for that ends behind it.
 const LOOK_BACK: u64 = 1_000;
@@ -105,7 +105,7 @@ fn parts(list: &str) -> impl Iterator<Item = &str> {
     list.split(',').map(str::trim).filter(|part| !part.is_empty())
 }
 
-fn node(text: &str) -> Result<NodeId, String> {
+pub(super) fn node(text: &str) -> Result<NodeId, String> {
     let raw = text.parse().ok().and_then(NodeId::new);
     raw.ok_or_else(|| format!("'{text}' is no node-ID; expected 1 to 127, several separated by commas"))
 }

@@ -87,6 +87,7 @@ fn handler(operation: Operation) -> MethodRouter<Web> {
         Operation::Socket => get(socket),
         Operation::Faults => get(faults),
         Operation::Trace => get(async |State(web): State<Web>, asked| trace::lines(web.desk, web.doors, asked).await),
+        Operation::Series => get(async |State(web): State<Web>, asked| trace::series(web.desk, web.doors, asked).await),
         Operation::TraceLog => get(async |State(web): State<Web>, asked| trace::log(web.desk, &web.doors, asked)),
     }
 }

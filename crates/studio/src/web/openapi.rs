@@ -12,6 +12,7 @@ pub(super) enum Operation {
     Login,
     Socket,
     Faults,
+    Series,
     Trace,
     TraceLog,
 }
@@ -32,7 +33,7 @@ const OVER: (&str, &str) = ("503", "The studio is ending");
 const FOREIGN: (&str, &str) = ("403", "The Origin or the Host is not this server's");
 
 /// All of them. None that is a GET changes anything; none moves a drive: motion goes through the socket, where it is held.
-pub(super) const ROUTES: [Route; 9] = [
+pub(super) const ROUTES: [Route; 10] = [
     Route {
         path: "/api/state",
         method: "get",
@@ -89,6 +90,18 @@ pub(super) const ROUTES: [Route; 9] = [
         answers: &[("200", "What is new or has changed since a revision, oldest first"), MALFORMED, LET_IN],
     },
     Route {
+        path: "/api/series",
+        method: "get",
+        operation: Operation::Series,
+        summary: "Values of objects over time, from the PDOs and SDO transfers that are kept; without objects, which there are",
+        answers: &[
+            ("200", "Times of the bus in s, and values in the unit of the object's row"),
+            MALFORMED,
+            LET_IN,
+            OVER,
+        ],
+    },
+    Route {
         path: "/api/trace",
         method: "get",
         operation: Operation::Trace,
@@ -122,6 +135,10 @@ const fn parameters(operation: Operation) -> &'static [(&'static str, &'static s
             ("text", "string", "Only lines that have all these words, separated by commas"),
             ("transfers", "boolean", "One line for each SDO transfer, not for each of its frames"),
             ("quiet", "boolean", "Without the SDO transfers by which the studio reads"),
+        ],
+        Operation::Series => &[
+            ("objects", "string", "Which, as NODE:INDEX:SUB in hexadecimal, separated by commas: 4:606C:00,4:6064:00"),
+            ("after", "integer", "Only frames from this number on"),
         ],
         Operation::Faults => &[("since", "integer", "The revision that was told before; 0 for everything")],
         _ => &[],

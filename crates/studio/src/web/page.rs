@@ -33,6 +33,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("analysis.js", SCRIPT, include_str!("../../page/analysis.js")),
     ("svg_pen.js", SCRIPT, include_str!("../../page/svg_pen.js")),
     ("faults.js", SCRIPT, include_str!("../../page/faults.js")),
+    ("heard.js", SCRIPT, include_str!("../../page/heard.js")),
     ("trace.js", SCRIPT, include_str!("../../page/trace.js")),
 ];
 

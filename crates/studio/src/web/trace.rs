@@ -13,7 +13,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use super::answer::{json_text, trouble};
 use crate::desk::Desk;
-use crate::trace::{Asked, Held, Query};
+use crate::trace::{Asked, AskedSeries, Held, Query};
 
 /// Readers whose lines are decoded at the same time; others wait for their turn. However many read, a second core is left to
 /// what moves drives.
@@ -48,6 +48,25 @@ pub(super) async fn lines(desk: Desk, doors: Doors, asked: InQuery) -> Response 
     let held = desk.trace().held();
     let selected = tokio::task::spawn_blocking(move || serde_json::to_string(&query.select(&held))).await;
     match selected {
+        Ok(Ok(json)) => json_text(json),
+        _ => over(),
+    }
+}
+
+/// The values of objects over time.
+pub(super) async fn series(
+    desk: Desk,
+    doors: Doors,
+    asked: Result<InAddress<AskedSeries>, QueryRejection>,
+) -> Response {
+    let asked = asked.map_err(|rejection| rejection.body_text()).and_then(|InAddress(asked)| asked.understand());
+    let query = match asked {
+        Ok(query) => query,
+        Err(why) => return trouble(StatusCode::BAD_REQUEST, "malformed", &why),
+    };
+    let Ok(_decoding) = doors.decoding.acquire().await else { return over() };
+    let held = desk.trace().held();
+    match tokio::task::spawn_blocking(move || serde_json::to_string(&query.values(&held))).await {
         Ok(Ok(json)) => json_text(json),
         _ => over(),
     }
