@@ -6,6 +6,7 @@ import { busView } from "./bus.js";
 import { driveView } from "./drive.js";
 import { motionView } from "./motion.js";
 import { scopeView } from "./scope.js";
+import { parametersView } from "./parameters.js";
 import { faultsView } from "./faults.js";
 import { traceView } from "./trace.js";
 
@@ -20,6 +21,7 @@ const views = [
   { name: "drive", title: "Drive", view: driveView(shared) },
   { name: "motion", title: "Motion", view: motionView(shared, report) },
   { name: "scope", title: "Scope", view: scopeView(shared) },
+  { name: "parameters", title: "Parameters", view: parametersView(shared, report) },
   { name: "trace", title: "Trace", view: traceView() },
   { name: "faults", title: "Faults", view: faultsView() },
 ];
@@ -50,11 +52,18 @@ byId("stop").addEventListener("click", (event) => {
   if (event.detail === 0) stopAll();
 });
 
+/** A space is a space in a text field, as long as nothing is moved and the studio can be asked whether that is so. */
+const isText = (target) =>
+  target.matches("textarea, input:not([type]), input[type=text], input[type=search]") &&
+  link.welcome !== null &&
+  link.state !== null &&
+  !link.state.nodes.some((node) => node.moving || node.doing);
+
 addEventListener(
   "keydown",
   (event) => {
-    if (event.key === "Escape" || event.key === " ") {
-      // Wherever the focus is: no field of this page needs a space, and no button is pressed with one.
+    if (event.key === "Escape" || (event.key === " " && !isText(event.target))) {
+      // Wherever the focus is: no button is pressed with a space.
       event.preventDefault();
       event.stopPropagation();
       if (!event.repeat) stopAll();

@@ -114,6 +114,57 @@ pub(crate) enum Deed {
         method: i8,
         rpm: Option<f64>,
     },
+    /// What the description says of each object of a drive.
+    Objects {
+        #[serde(deserialize_with = "node")]
+        node: NodeId,
+    },
+    /// The values that objects have now.
+    ReadObjects {
+        #[serde(deserialize_with = "node")]
+        node: NodeId,
+        objects: Vec<String>,
+    },
+    /// What would be written, with nothing written: of values, or of a file.
+    PlanParameters {
+        #[serde(deserialize_with = "node")]
+        node: NodeId,
+        #[serde(default)]
+        values: Vec<NewValue>,
+        file: Option<String>,
+    },
+    /// The objects of a file: as delivered, in the file, in the drive.
+    CompareParameters {
+        #[serde(deserialize_with = "node")]
+        node: NodeId,
+        file: String,
+    },
+    /// Writes values or a file, all or nothing.
+    WriteParameters {
+        #[serde(deserialize_with = "node")]
+        node: NodeId,
+        #[serde(default)]
+        values: Vec<NewValue>,
+        file: Option<String>,
+    },
+    /// Puts back what the last write changed.
+    RollBack {
+        #[serde(deserialize_with = "node")]
+        node: NodeId,
+    },
+    /// All parameters of a drive, as a file.
+    BackUp {
+        #[serde(deserialize_with = "node")]
+        node: NodeId,
+    },
+}
+
+/// What an object is to be set to, as people type it: `{"object":"6083","value":"600"}`.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct NewValue {
+    pub(crate) object: String,
+    pub(crate) value: String,
 }
 
 impl Deed {
@@ -130,6 +181,11 @@ impl Deed {
                 | Self::Scan {}
                 | Self::Explain { .. }
                 | Self::QuickStop { .. }
+                | Self::Objects { .. }
+                | Self::ReadObjects { .. }
+                | Self::PlanParameters { .. }
+                | Self::CompareParameters { .. }
+                | Self::BackUp { .. }
         )
     }
 }

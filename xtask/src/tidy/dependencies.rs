@@ -22,7 +22,6 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("master", &["can", "canopen", "cia402", "devices"]),
     ("transport", &["can"]),
     ("plot", &[]),
-    ("studio", &["can", "canopen", "cia402", "devices", "master"]),
     (
         "showcase",
         &[
@@ -44,6 +43,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "testbench",
         &["can", "canopen", "cia402", "motion", "plant", "devices", "eds", "drives", "sim", "master", "plot"],
     ),
+    ("studio", &["can", "canopen", "cia402", "devices", "master", "testbench"]),
     (
         "cli",
         &[

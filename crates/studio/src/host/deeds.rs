@@ -60,6 +60,13 @@ impl Host {
                 }
             }
             Deed::JogEnd { node } => self.end_jog(node, asked),
+            Deed::Objects { .. }
+            | Deed::ReadObjects { .. }
+            | Deed::PlanParameters { .. }
+            | Deed::CompareParameters { .. }
+            | Deed::WriteParameters { .. }
+            | Deed::RollBack { .. }
+            | Deed::BackUp { .. } => self.take_parameters(deed, asked),
             _ => self.take_motion(deed, asked),
         }
     }
@@ -71,6 +78,12 @@ impl Host {
             let text = "no drive is known at this node: scan the bus, and see whether it has power";
             return say(answer, Answer::failed(Some(seq), "no_such_drive", text));
         };
+        if self.parameters.is_writing(id) {
+            // Half a set of parameters moves nothing.
+            let (seq, answer) = asked;
+            let text = "its parameters are being written: try again when that is done";
+            return say(answer, Answer::failed(Some(seq), "busy", text));
+        }
         if let Deed::Jog { .. } = deed {
             // Held from its beginning: what is let go while the drive is being enabled never turns.
             self.jogs.insert(id, DeadMan::new(JOG_SPAN, self.network.now()));
@@ -189,6 +202,8 @@ impl Host {
                 self.take_scan(found);
                 asked.into_iter().for_each(self::done);
             }
+            Done::Looked(asked, outcome) => self.conclude_looking(asked, outcome),
+            Done::Written(asked, written) => self.conclude_writing(asked, *written),
             Done::Learned(node) => drop(self.learning.remove(&node)),
             Done::Deed(node, generation, outcome) => self.conclude(node, generation, outcome),
             Done::Told(told) => {

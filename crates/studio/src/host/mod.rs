@@ -8,12 +8,15 @@ mod faults;
 mod known_node;
 mod meter;
 mod nodes;
+mod object_rows;
+mod parameters;
 mod run;
 mod state;
 mod stopping;
 #[cfg(test)]
 mod tests;
 mod trace;
+mod transactions;
 mod work;
 
 pub use state::{Host, JOG_SPAN, PRESENCE_SPAN, Setting};

@@ -11,6 +11,7 @@ use master::Network;
 
 use super::known_node::KnownNode;
 use super::meter::Meter;
+use super::transactions::Transactions;
 use super::work::{Listening, Running, Work};
 use crate::authority::{Authority, SessionId};
 use crate::dead_man::DeadMan;
@@ -61,6 +62,7 @@ pub struct Host {
     pub(super) running: BTreeMap<NodeId, Running>,
     pub(super) jogs: BTreeMap<NodeId, DeadMan>,
     pub(super) listening: Vec<Listening>,
+    pub(super) parameters: Transactions,
     /// Numbers what runs, so that the end of something that was replaced is told from the end of what replaced it.
     pub(super) generation: u64,
     pub(super) work: Work,
@@ -101,6 +103,7 @@ impl Host {
             running: BTreeMap::new(),
             jogs: BTreeMap::new(),
             listening: Vec::new(),
+            parameters: Transactions::default(),
             learning: BTreeSet::new(),
             generation: 0,
             work: Work::new(),

@@ -1,6 +1,7 @@
 //! The host against virtual drives, in virtual time: who may move, and what stops.
 
 mod faults;
+mod parameters;
 mod series;
 mod trace;
 

@@ -11,6 +11,7 @@ use master::explain::{Explained, Overheard};
 use master::identify::Found;
 use tokio::sync::oneshot;
 
+use super::transactions::{Refusal, Written};
 use crate::message::Answer;
 use crate::snapshot::DriveView;
 
@@ -32,6 +33,10 @@ pub(super) enum Done {
     Told(Vec<(NodeId, Result<(), Error>)>),
     /// The PDO mappings of a node were read.
     Learned(NodeId),
+    /// Objects were looked at.
+    Looked(Asked, Result<serde_json::Value, Refusal>),
+    /// Parameters were written, or not.
+    Written(Asked, Box<Written>),
     /// A drive was looked at closely.
     Explained(u64, oneshot::Sender<Answer>, Box<Explained>),
 }

@@ -32,6 +32,8 @@ const FILES: &[(&str, &str, &str)] = &[
     ("series.js", SCRIPT, include_str!("../../page/series.js")),
     ("analysis.js", SCRIPT, include_str!("../../page/analysis.js")),
     ("svg_pen.js", SCRIPT, include_str!("../../page/svg_pen.js")),
+    ("parameters.js", SCRIPT, include_str!("../../page/parameters.js")),
+    ("parameter_file.js", SCRIPT, include_str!("../../page/parameter_file.js")),
     ("faults.js", SCRIPT, include_str!("../../page/faults.js")),
     ("heard.js", SCRIPT, include_str!("../../page/heard.js")),
     ("trace.js", SCRIPT, include_str!("../../page/trace.js")),

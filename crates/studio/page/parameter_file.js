@@ -1,0 +1,122 @@
+// Files of parameters in the Parameters view: backup, the three-way comparison, and applying one after its dry run.
+
+import { ask, inControl } from "./link.js";
+import { h, say } from "./dom.js";
+
+/** A message may have 64 KiB, and a character of the file may take two of it. */
+const LARGEST = 30000;
+
+const table = (heads, rows) =>
+  h(
+    "table",
+    {},
+    h("thead", {}, h("tr", {}, ...heads.map((head) => h("th", {}, head)))),
+    h("tbody", {}, ...rows.map(({ cells, kind }) => h("tr", { class: kind ?? "" }, ...cells.map((cell, at) => h("td", { "data-label": heads[at] }, cell))))),
+  );
+
+/** `node` gives the drive that is looked at, `mark` hears what a file has, `written` when something was written. */
+export function parameterFile({ node, report, mark, written }) {
+  const backup = h("button", { type: "button", id: "parameters-backup", onclick: save }, "Back up");
+  const input = h("input", { type: "file", id: "parameters-file", accept: ".toml", "aria-label": "File of parameters", onchange: load });
+  const dry = h("button", { type: "button", id: "parameters-plan", onclick: plan, disabled: true }, "What would be written");
+  const apply = h("button", { type: "button", id: "parameters-apply", class: "primary", onclick: write, hidden: true }, "Write all of it");
+  const told = h("p", { role: "status", id: "parameters-told" });
+  const shown = h("div", { class: "parameters-diff" });
+  const root = h("div", {}, h("div", { class: "bar" }, backup, h("label", {}, "File ", input), dry, apply), told, shown);
+  let text = null;
+
+  const fail = (message) => {
+    told.className = "bad";
+    say(told, message);
+  };
+  const tell = (message) => {
+    told.className = "quiet";
+    say(told, message);
+  };
+
+  async function save() {
+    const of = node();
+    backup.disabled = true;
+    tell("Reading all parameters …");
+    const answer = await ask({ do: "back_up", node: of });
+    backup.disabled = false;
+    if (!answer.ok) return fail(answer.error.message);
+    const url = URL.createObjectURL(new Blob([answer.result.file], { type: "text/plain" }));
+    h("a", { href: url, download: `node${of}.toml` }).click();
+    setTimeout(() => URL.revokeObjectURL(url), 1000);
+    const refused = answer.result.refused.map((why) => ` Not in it: ${why}.`).join("");
+    tell(`node${of}.toml: ${answer.result.values} values.${refused}`);
+  }
+
+  function forget() {
+    text = null;
+    dry.disabled = true;
+    apply.hidden = true;
+    shown.replaceChildren();
+    mark(new Map());
+  }
+
+  async function load() {
+    forget();
+    const [chosen] = input.files;
+    if (!chosen) return;
+    if (chosen.size > LARGEST) return fail(`${chosen.name} has ${chosen.size} bytes; a file of parameters has ${LARGEST} at most: ferrodrive params apply takes larger ones.`);
+    const of = node();
+    const read = await chosen.text();
+    tell(`Comparing ${chosen.name} with the drive …`);
+    const answer = await ask({ do: "compare_parameters", node: of, file: read });
+    if (of !== node()) return;
+    if (!answer.ok) return fail(`${chosen.name}: ${answer.error.message}`);
+    text = read;
+    dry.disabled = false;
+    const { objects } = answer.result;
+    mark(new Map(objects.map((row) => [row.object, row.file_bytes])));
+    const differ = objects.filter((row) => !row.drive_is_file || row.file_is_default === false);
+    tell(`${chosen.name}: ${objects.length} values; ${objects.filter((row) => !row.drive_is_file).length} are others in the drive.`);
+    const cells = (row) => [row.object, row.name ?? "", row.default ?? "–", row.file, row.drive];
+    shown.replaceChildren(
+      differ.length
+        ? table(["Object", "Name", "Default", "File", "Drive"], differ.map((row) => ({ cells: cells(row), kind: row.drive_is_file ? "" : "other" })))
+        : h("p", { class: "good" }, "The drive has what the file says, and all of it is as delivered."),
+    );
+  }
+
+  async function plan() {
+    const answer = await ask({ do: "plan_parameters", node: node(), file: text });
+    if (!answer.ok) return fail(answer.error.message);
+    const { steps, left } = answer.result;
+    apply.hidden = steps.length === 0;
+    tell(steps.length ? `${steps.length} writes, in this order. Nothing has been written.` : "Nothing is to be written.");
+    shown.replaceChildren(
+      table(["Object", "Name", "Has", "Gets", "What for"], steps.map((step) => ({ cells: [step.object, step.name ?? "", step.before ?? "?", step.after, step.purpose] }))),
+      ...left.map((of) => h("p", { class: "quiet" }, `${of.object} ${of.name ?? ""} is left out: ${of.why}`)),
+    );
+  }
+
+  async function write() {
+    apply.disabled = true;
+    tell("Writing …");
+    const answer = await ask({ do: "write_parameters", node: node(), file: text });
+    apply.disabled = false;
+    if (!answer.ok) fail(answer.error.message);
+    else {
+      apply.hidden = true;
+      tell(`${answer.result.steps.length} writes done and read back. They act now; a drive that does not store by itself has to be told to save.`);
+      report("Parameters", { ok: true, notes: answer.result.rounded.map((found) => `${found.object}: the drive made ${found.found} of ${found.asked}`) });
+    }
+    written();
+  }
+
+  function update() {
+    apply.disabled = !inControl();
+    apply.title = inControl() ? "" : "Take control first";
+  }
+
+  function clear() {
+    forget();
+    input.value = "";
+    say(told, "");
+  }
+
+  return { root, update, clear };
+}

@@ -1,0 +1,239 @@
+// The Parameters view: every object of the drive's description, read when it is looked at; changed, compared with a file,
+// kept and put back as a transaction of the studio.
+
+import { ask, inControl } from "./link.js";
+import { h, say } from "./dom.js";
+import { chooser } from "./drive.js";
+import { parameterFile } from "./parameter_file.js";
+
+/** How often an open group is read again. */
+const REFRESH_MS = 2000;
+/** Objects in one request. */
+const AT_ONCE = 32;
+/** Rows that a search shows at most. */
+const MOST_FOUND = 100;
+
+export function parametersView(shared, report) {
+  const choose = chooser(shared);
+  const search = h("input", { type: "search", id: "parameters-search", placeholder: "Index, name or words", "aria-label": "Search objects", oninput: draw });
+  const changed = h("input", { type: "checkbox", id: "parameters-changed", onchange: draw });
+  const all = h("button", { type: "button", id: "parameters-read", onclick: readAll }, "Read all");
+  const back = h("button", { type: "button", id: "parameters-back", onclick: rollBack }, "Roll back");
+  const progress = h("progress", { hidden: true, max: 1, value: 0 });
+  const about = h("p", { class: "quiet", role: "status" });
+  const list = h("div", { class: "parameters-list" });
+  const file = parameterFile({ node: () => node, report, mark: (bytes) => ((fileBytes = bytes), draw()), written: refreshAll });
+  const root = h(
+    "section",
+    { class: "parameters" },
+    h("div", { class: "bar" }, choose.root, search, h("label", {}, changed, " changed only"), all, progress, back),
+    about,
+    file.root,
+    list,
+  );
+
+  let node = null;
+  let model = null;
+  let objects = [];
+  let values = new Map();
+  let fileBytes = new Map();
+  let open = new Set();
+  let chosen = null;
+  let reading = false;
+  let asked_at = 0;
+  let shownRows = [];
+
+  async function fetchObjects(of, name) {
+    [node, model, objects, values, fileBytes, open, chosen] = [of, name, [], new Map(), new Map(), new Set(), null];
+    file.clear();
+    say(about, "Asking for the description …");
+    draw();
+    const answer = await ask({ do: "objects", node: of });
+    if (node !== of || model !== name) return;
+    if (answer.ok) {
+      objects = answer.result.objects;
+      say(about, `${objects.length} objects of the ${answer.result.model}, by: ${answer.result.manual}. Values are read when a group is open.`);
+    } else say(about, answer.error.message);
+    draw();
+  }
+
+  /** Reads these, some at a time; true if all were read. */
+  async function read(rows, step = () => {}) {
+    const [of, wanted] = [node, rows.filter((row) => row.readable)];
+    for (let from = 0; from < wanted.length; from += AT_ONCE) {
+      const some = wanted.slice(from, from + AT_ONCE);
+      const answer = await ask({ do: "read_objects", node: of, objects: some.map((row) => row.object) });
+      if (node !== of) return false;
+      if (!answer.ok) {
+        say(about, answer.error.message);
+        return false;
+      }
+      for (const value of answer.result.values) values.set(value.object, value);
+      for (const row of some) row.show?.();
+      step((from + some.length) / wanted.length);
+    }
+    return true;
+  }
+
+  async function readAll() {
+    all.disabled = true;
+    progress.hidden = false;
+    await read(objects, (part) => (progress.value = part));
+    all.disabled = false;
+    progress.hidden = true;
+    draw();
+  }
+
+  async function refresh() {
+    if (reading) return;
+    reading = true;
+    asked_at = performance.now();
+    await read(shownRows);
+    reading = false;
+  }
+
+  async function refreshAll() {
+    await read(objects.filter((row) => values.has(row.object)));
+    draw();
+  }
+
+  async function rollBack() {
+    const of = node;
+    const answer = report("Roll back", await ask({ do: "roll_back", node: of }));
+    if (answer.ok) report("Roll back", { ok: true, notes: [`node ${of}: ${answer.result.steps.length} writes undone`] });
+    if (node === of) refreshAll();
+  }
+
+  const isChanged = (row) => row.parameter && values.get(row.object)?.is_default === false;
+  const isOther = (row) => {
+    const bytes = fileBytes.get(row.object);
+    return bytes !== undefined && values.get(row.object)?.bytes !== undefined && values.get(row.object).bytes !== bytes;
+  };
+  const words = (row) => `${row.object} ${row.name} ${row.title} ${row.meanings.map(([, text]) => text).join(" ")}`.toLowerCase();
+
+  function draw() {
+    const sought = search.value.trim().toLowerCase().split(/\s+/).filter(Boolean);
+    const filtered = objects.filter((row) => sought.every((word) => words(row).includes(word)) && (!changed.checked || isChanged(row)));
+    shownRows = [];
+    if (sought.length || changed.checked) {
+      const some = filtered.slice(0, MOST_FOUND);
+      const more = filtered.length > some.length ? `, the first ${some.length}` : "";
+      const unread = changed.checked ? " Only what was read can be told to be changed: Read all." : "";
+      list.replaceChildren(h("p", { class: "quiet" }, `${filtered.length} objects${more}.${unread}`), table(some));
+    } else {
+      const groups = [...new Set(objects.map((row) => row.group))];
+      list.replaceChildren(...groups.map((group) => groupOf(group, objects.filter((row) => row.group === group))));
+    }
+    asked_at = 0;
+  }
+
+  function groupOf(name, rows) {
+    const body = h("div");
+    const many = rows.filter(isChanged).length;
+    const details = h("details", { class: "group", open: open.has(name) }, h("summary", {}, `${name} (${rows.length})${many ? ` · ${many} changed` : ""}`), body);
+    if (open.has(name)) body.append(table(rows));
+    details.addEventListener("toggle", () => {
+      if (details.open === open.has(name)) return;
+      if (details.open) open.add(name);
+      else open.delete(name);
+      draw();
+    });
+    return details;
+  }
+
+  function table(rows) {
+    const body = h("tbody");
+    for (const row of rows) {
+      shownRows.push(row);
+      body.append(line(row));
+      if (chosen === row.object) body.append(h("tr", { class: "chosen" }, h("td", { colspan: 6 }, detail(row))));
+    }
+    const heads = ["Object", "Name", "Value", "Default", "Range", "Access"];
+    return h("table", {}, h("thead", {}, h("tr", {}, ...heads.map((head) => h("th", {}, head)))), body);
+  }
+
+  function line(row) {
+    const value = h("td", { "data-label": "Value" });
+    const range = row.range ? `${row.range}${row.range_times ? ` × ${row.range_times}` : ""}` : "";
+    const of = h(
+      "tr",
+      { tabindex: "0", "data-object": row.object, onclick: () => choose_row(row), onkeydown: (event) => event.key === "Enter" && choose_row(row) },
+      h("td", { "data-label": "Object" }, row.object),
+      h("td", { "data-label": "Name" }, row.name),
+      value,
+      h("td", { "data-label": "Default" }, row.default ?? "–"),
+      h("td", { "data-label": "Range" }, range),
+      h("td", { "data-label": "Access" }, `${row.access}${row.kept ? ", kept" : ""}`),
+    );
+    row.show = () => {
+      const known = values.get(row.object);
+      say(value, known ? (known.text ?? `refused: ${known.refused}`) : row.readable ? "…" : "–");
+      of.classList.toggle("changed", isChanged(row));
+      of.classList.toggle("other", isOther(row));
+      of.title = `${isChanged(row) ? "Not as delivered. " : ""}${isOther(row) ? "Not as in the file." : ""}`;
+    };
+    row.show();
+    return of;
+  }
+
+  function choose_row(row) {
+    chosen = chosen === row.object ? null : row.object;
+    draw();
+    list.querySelector("tr.chosen input")?.focus();
+  }
+
+  /** What the description says of an object, and the form that changes it. */
+  function detail(row) {
+    const terms = [
+      ["In the manual's words", row.title],
+      ["Type", row.type],
+      ["Unit of one count", row.unit || "none"],
+      ["Values", row.meanings.map(([value, text]) => `${value}: ${text}`).join("; ")],
+      ["Bytes on the wire", values.get(row.object)?.bytes ?? ""],
+    ].filter(([, text]) => text);
+    const facts = h("dl", {}, ...terms.flatMap(([term, text]) => [h("dt", {}, term), h("dd", {}, text)]));
+    return h("div", {}, facts, row.parameter ? form(row) : h("p", { class: "quiet" }, refusal(row)));
+  }
+
+  const refusal = (row) =>
+    row.access === "ro" || row.access === "const"
+      ? "It can only be read."
+      : "A command or a set-point: it is not written here. What moves the drive is in the Motion view.";
+
+  function form(row) {
+    const input = h("input", { id: "parameter-value", autocomplete: "off", "aria-label": `New value of ${row.name}`, placeholder: row.unit ? `number, or with its unit (${row.unit})` : "number" });
+    const told = h("span", { role: "status", id: "parameter-told" });
+    const write = h("button", { type: "submit", id: "parameter-write", class: "primary", title: inControl() ? "" : "Take control first" }, "Write");
+    const submit = async (event) => {
+      event.preventDefault();
+      const of = node;
+      write.disabled = true;
+      const answer = await ask({ do: "write_parameters", node: of, values: [{ object: row.object, value: input.value.trim() }] });
+      write.disabled = false;
+      if (node !== of) return;
+      await read([row]);
+      told.className = answer.ok ? "good" : "bad";
+      say(told, answer.ok ? outcome(answer.result) : answer.error.message);
+    };
+    return h("form", { class: "bar", onsubmit: submit }, input, write, told);
+  }
+
+  function outcome(result) {
+    if (!result.steps.length) return "It has this value already: nothing was written.";
+    const rounded = result.rounded.map((found) => ` The drive made ${found.found} of ${found.asked}.`).join("");
+    return `Written and read back.${rounded} It acts now; a drive that does not store by itself has to be told to save.`;
+  }
+
+  function update(state) {
+    choose.update(state);
+    const found = state.nodes.find((known) => known.node === shared.node);
+    const name = found?.model ?? null;
+    if (shared.node !== node || name !== model) fetchObjects(shared.node, name);
+    back.disabled = !inControl();
+    back.title = inControl() ? "Puts back what the last write changed" : "Take control first";
+    file.update();
+    if (shownRows.length && performance.now() - asked_at > REFRESH_MS) refresh();
+  }
+
+  return { root, update };
+}

@@ -1,0 +1,389 @@
+//! Parameters of a drive: its dictionary, values on demand, and the transactions of [`master::parameters`].
+//!
+//! Reading needs no control. What is written is planned first, written to a drive at rest only, all or nothing, and can be
+//! rolled back as long as the studio runs. A transaction goes on to its end when its page goes: half of it is worse than all
+//! of it. Commands and set-points are refused: what moves a motor has its dead man in the Motion view.
+
+use std::collections::BTreeMap;
+
+use canopen::od::Entry;
+use canopen::{Mux, NodeId};
+use devices::Description;
+use devices::row::is_parameter;
+use master::Drive;
+use master::parameters::{ApplyError, Parameters, Plan, PlanError, PlanOptions, default_of, diff};
+use serde_json::{Value, json};
+use testbench::parameters::sheet;
+use testbench::words::object::object;
+use testbench::words::value::typed_for;
+
+use super::object_rows::{bytes_text, row_json, value_text};
+use super::state::Host;
+use super::transactions::{MOST_KEPT, Refusal, Written};
+use super::work::{Asked, Done, say};
+use crate::message::{Answer, Deed, NewValue};
+
+/// Requests for objects that may be under way, of all pages together.
+const MOST_UNDER_WAY: usize = 32;
+
+/// Objects that one request may read.
+const MOST_READ: usize = 64;
+
+impl Host {
+    /// Does what is asked about the parameters of a drive, or begins it.
+    pub(super) fn take_parameters(&mut self, deed: Deed, asked: Asked) {
+        let Some(node) = node_of(&deed) else { return };
+        let known = self.nodes.get(&node).and_then(|known| known.drive.clone());
+        let Some((drive, model)) = known.and_then(|drive| drive.description().map(|model| (drive.clone(), model)))
+        else {
+            let text =
+                format!("the model of node {node} is not known: scan the bus, or name it with --model {node}=MODEL");
+            return refuse(asked, ("no_such_drive", text));
+        };
+        match deed {
+            Deed::Objects { .. } => answer(asked, Ok(dictionary(node, model))),
+            Deed::WriteParameters { values, file, .. } => self.begin_writing(&drive, model, values, file, asked),
+            Deed::RollBack { .. } => self.begin_rolling_back(&drive, model, asked),
+            _ if self.parameters.reading == MOST_UNDER_WAY => refuse(asked, busy("others are reading objects")),
+            reading => {
+                self.parameters.reading += 1;
+                self.work.push(Box::pin(async move {
+                    let outcome = match reading {
+                        Deed::ReadObjects { objects, .. } => read(&drive, model, &objects).await,
+                        Deed::PlanParameters { values, file, .. } => match wanted(&drive, model, values, file).await {
+                            Ok(wanted) => plan(&drive, model, &wanted).await.map(|plan| plan_json(&plan, model)),
+                            Err(refusal) => Err(refusal),
+                        },
+                        Deed::CompareParameters { file, .. } => compare(&drive, model, &file).await,
+                        _ => back_up(&drive, model).await,
+                    };
+                    Done::Looked(asked, outcome)
+                }));
+            }
+        }
+    }
+
+    /// Objects were read, or could not be.
+    pub(super) fn conclude_looking(&mut self, asked: Asked, outcome: Result<Value, Refusal>) {
+        self.parameters.reading = self.parameters.reading.saturating_sub(1);
+        answer(asked, outcome);
+    }
+
+    fn begin_writing(
+        &mut self,
+        drive: &Drive,
+        model: &'static Description,
+        values: Vec<NewValue>,
+        file: Option<String>,
+        asked: Asked,
+    ) {
+        let drive = drive.clone();
+        self.begin_transaction(drive.node().id(), false, asked, async move {
+            let wanted = wanted(&drive, model, values, file).await.map_err(|refusal| (refusal, None))?;
+            write(&drive, model, &wanted).await
+        });
+    }
+
+    fn begin_rolling_back(&mut self, drive: &Drive, model: &'static Description, asked: Asked) {
+        let (drive, node) = (drive.clone(), drive.node().id());
+        let Some(wanted) = self.parameters.before.get(&node).and_then(|before| before.last()).cloned() else {
+            let text = format!("nothing was written to the parameters of node {node} since the studio began");
+            return refuse(asked, ("nothing_to_roll_back", text));
+        };
+        self.begin_transaction(node, true, asked, async move { write(&drive, model, &wanted).await });
+    }
+
+    fn begin_transaction(
+        &mut self,
+        node: NodeId,
+        is_back: bool,
+        asked: Asked,
+        writing: impl Future<Output = Result<(Value, Option<Parameters>), (Refusal, Option<Parameters>)>> + 'static,
+    ) {
+        if self.running.contains_key(&node) || !self.parameters.writing.insert(node) {
+            return refuse(asked, busy("something else is being done with the drive"));
+        }
+        self.work.push(Box::pin(async move {
+            let (outcome, before) = match writing.await {
+                Ok((done, before)) => (Ok(done), before),
+                Err((refusal, before)) => (Err(refusal), before),
+            };
+            Done::Written(asked, Box::new(Written { node, outcome, before, is_back }))
+        }));
+    }
+
+    /// A transaction has ended, one way or the other.
+    pub(super) fn conclude_writing(&mut self, asked: Asked, written: Written) {
+        let Written { node, outcome, before, is_back } = written;
+        self.parameters.writing.remove(&node);
+        let kept = self.parameters.before.entry(node).or_default();
+        match (&outcome, before) {
+            // The way back has been gone: it is no step to go back from.
+            (Ok(_), _) if is_back => drop(kept.pop()),
+            (_, Some(before)) if !is_back => {
+                if kept.len() == MOST_KEPT {
+                    kept.remove(0);
+                }
+                kept.push(before);
+            }
+            _ => {}
+        }
+        let left = kept.len();
+        if let Err((_, text)) = &outcome {
+            self.say_news(Some(node), text);
+        }
+        // A mapping may be another one now.
+        self.learn_pdos(node);
+        answer(
+            asked,
+            outcome.map(|mut done| {
+                done["can_roll_back"] = json!(left);
+                done
+            }),
+        );
+    }
+}
+
+/// The node whose parameters a deed is about.
+const fn node_of(deed: &Deed) -> Option<NodeId> {
+    match deed {
+        Deed::Objects { node }
+        | Deed::ReadObjects { node, .. }
+        | Deed::PlanParameters { node, .. }
+        | Deed::CompareParameters { node, .. }
+        | Deed::WriteParameters { node, .. }
+        | Deed::RollBack { node }
+        | Deed::BackUp { node } => Some(*node),
+        _ => None,
+    }
+}
+
+fn dictionary(node: NodeId, model: &Description) -> Value {
+    let rows: Vec<Value> = model.dictionary.rows().iter().map(|row| row_json(row, node)).collect();
+    json!({ "node": node.raw(), "model": model.name, "manual": model.manual, "objects": rows })
+}
+
+async fn read(drive: &Drive, model: &'static Description, objects: &[String]) -> Result<Value, Refusal> {
+    if objects.len() > MOST_READ {
+        return Err(("malformed", format!("expected at most {MOST_READ} objects at once, not {}", objects.len())));
+    }
+    let mut read = Vec::new();
+    for text in objects {
+        let mux = row(model, text)?.mux();
+        read.push(match drive.node().upload(mux).await {
+            Ok(payload) => value_json(drive, model, mux, payload.as_bytes()),
+            Err(error) => match error.abort() {
+                Some(code) => json!({ "object": mux.to_string(), "refused": code.to_string() }),
+                None => return Err((error.kind(), error.to_string())),
+            },
+        });
+    }
+    Ok(json!({ "values": read }))
+}
+
+fn value_json(drive: &Drive, model: &'static Description, mux: Mux, bytes: &[u8]) -> Value {
+    let default = default_of_object(drive, model, mux);
+    json!({
+        "object": mux.to_string(),
+        "text": value_text(model, mux, bytes),
+        "bytes": bytes_text(bytes),
+        "is_default": default.map(|default| is_same(mux, &default, bytes)),
+    })
+}
+
+fn default_of_object(drive: &Drive, model: &Description, mux: Mux) -> Option<Vec<u8>> {
+    default_of(model.row(mux)?, drive.node().id())
+}
+
+/// As the transaction compares: bit 30 of a TPDO's COB-ID does not count.
+fn is_same(mux: Mux, first: &[u8], second: &[u8]) -> bool {
+    let one = |bytes: &[u8]| BTreeMap::from([(mux, bytes.to_vec())]);
+    diff(&one(first), &one(second)).is_empty()
+}
+
+/// An object of the description by what a page calls it.
+fn row(model: &'static Description, text: &str) -> Result<&'static Entry, Refusal> {
+    let found = object(text).and_then(|object| object.resolve(Some(model.dictionary)));
+    let (mux, row) = found.map_err(|why| ("unknown_object", why))?;
+    row.ok_or_else(|| ("unknown_object", format!("{mux} is not in the description of the {}", model.name)))
+}
+
+/// What was typed, or what stands in a file, as values.
+async fn wanted(
+    drive: &Drive,
+    model: &'static Description,
+    values: Vec<NewValue>,
+    file: Option<String>,
+) -> Result<Parameters, Refusal> {
+    match (file, values.is_empty()) {
+        (Some(file), true) => of_file(drive, model, &file),
+        (None, false) => typed(drive, model, &values).await,
+        _ => Err(("malformed", "expected either values or a file".into())),
+    }
+}
+
+fn of_file(drive: &Drive, model: &'static Description, file: &str) -> Result<Parameters, Refusal> {
+    let parameters = sheet::parse(file, Some(model)).map_err(|bad| ("bad_parameters", bad.to_string()))?;
+    Ok(parameters.for_node(drive.node().id(), Some(model)))
+}
+
+async fn typed(drive: &Drive, model: &'static Description, values: &[NewValue]) -> Result<Parameters, Refusal> {
+    let mut parameters = Parameters { node: Some(drive.node().id()), ..Parameters::default() };
+    for NewValue { object, value } in values {
+        let row = row(model, object)?;
+        let mux = row.mux();
+        if row.access.is_writable() && !is_parameter(row) {
+            let text = format!(
+                "{mux} {} is a command or a set-point, not a parameter: it is not written here. What moves the drive is in the \
+                 Motion view",
+                row.name
+            );
+            return Err(("not_a_parameter", text));
+        }
+        if model.storage.address.contains(&mux) {
+            let text = format!(
+                "{mux} {} chooses node-ID or bit rate: the drive would be gone after its restart. ferrodrive write does it",
+                row.name
+            );
+            return Err(("address", text));
+        }
+        let resolution = match row.resolution {
+            Some(_) => {
+                let limits = drive.limits(mux).await.map_err(|error| (error.kind(), error.to_string()))?;
+                limits.counts_per_unit()
+            }
+            None => 1,
+        };
+        let bytes = typed_for(row, value, resolution).map_err(|why| ("bad_value", why))?.bytes();
+        parameters.values.insert(mux, bytes);
+    }
+    Ok(parameters)
+}
+
+async fn plan(drive: &Drive, model: &'static Description, wanted: &Parameters) -> Result<Plan, Refusal> {
+    drive.check_at_rest().await.map_err(|error| refusal_of(&error, model))?;
+    drive.plan_parameters(wanted, PlanOptions::default()).await.map_err(|error| refusal_of(&error, model))
+}
+
+/// Writes all or nothing. Gives what the objects had before, if they may have something else now.
+async fn write(
+    drive: &Drive,
+    model: &'static Description,
+    wanted: &Parameters,
+) -> Result<(Value, Option<Parameters>), (Refusal, Option<Parameters>)> {
+    let plan = plan(drive, model, wanted).await.map_err(|refusal| (refusal, None))?;
+    let before = (!plan.steps.is_empty()).then(|| Parameters {
+        identity: plan.identity,
+        node: Some(plan.node),
+        values: plan.current.clone(),
+    });
+    match drive.apply_parameters(&plan, |_, _| {}).await {
+        Ok(Ok(applied)) => {
+            let mut done = plan_json(&plan, model);
+            let rounded = applied.rounded.iter().map(|rounded| {
+                json!({
+                    "object": rounded.object.to_string(),
+                    "asked": value_text(model, rounded.object, &rounded.asked),
+                    "found": value_text(model, rounded.object, &rounded.found),
+                })
+            });
+            done["rounded"] = rounded.collect();
+            done["displaced"] = applied.displaced.iter().map(|found| json!(found.object.to_string())).collect();
+            Ok((done, before))
+        }
+        Ok(Err(error)) => {
+            let is_back = error.undone.not_put_back.is_empty();
+            let kind = if is_back { "rolled_back" } else { "not_put_back" };
+            Err(((kind, refused_write(&error, model)), before.filter(|_| !is_back)))
+        }
+        // Before the first write, or silence when everything had been written.
+        Err(error) => Err((refusal_of(&error, model), before)),
+    }
+}
+
+fn refused_write(error: &ApplyError, model: &Description) -> String {
+    let name = model.row(error.object).map_or("", |row| row.name);
+    let limits = error.limits.as_ref().map_or_else(String::new, |limits| format!(" It takes {limits}."));
+    format!("{} {name} was not written: {}.{limits} {}", error.object, error.why, error.undone)
+}
+
+fn refusal_of(error: &PlanError, model: &Description) -> Refusal {
+    match error {
+        PlanError::Node(error) => (error.kind(), error.to_string()),
+        PlanError::OtherDevice { .. } => ("other_device", format!("{error}. Nothing was written")),
+        PlanError::AtWork { .. } => ("at_work", format!("{error}: disable the {} first", model.name)),
+        PlanError::Unfit { .. } => ("unfit_parameters", format!("{error}. Nothing was written")),
+    }
+}
+
+/// What is or was to be written, in its order.
+fn plan_json(plan: &Plan, model: &'static Description) -> Value {
+    let text = |mux: Mux, bytes: &[u8]| value_text(model, mux, bytes);
+    let steps = plan.steps.iter().map(|step| {
+        json!({
+            "object": step.object.to_string(),
+            "name": model.row(step.object).map(|row| row.name),
+            "before": step.before.as_ref().map(|bytes| text(step.object, bytes)),
+            "after": text(step.object, &step.value),
+            "purpose": step.purpose.to_string(),
+        })
+    });
+    let left = plan.left.iter().map(|(object, why)| {
+        json!({ "object": object.to_string(), "name": model.row(*object).map(|row| row.name), "why": why.to_string() })
+    });
+    json!({ "steps": steps.collect::<Vec<_>>(), "left": left.collect::<Vec<_>>() })
+}
+
+/// Each object of a file in which default, file and drive are not all the same.
+async fn compare(drive: &Drive, model: &'static Description, file: &str) -> Result<Value, Refusal> {
+    let parameters = of_file(drive, model, file)?;
+    let mut rows = Vec::new();
+    for (mux, wanted) in &parameters.values {
+        let found = match drive.node().upload(*mux).await {
+            Ok(payload) => Ok(payload.as_bytes().to_vec()),
+            Err(error) => match error.abort() {
+                Some(code) => Err(code.to_string()),
+                None => return Err((error.kind(), error.to_string())),
+            },
+        };
+        let default = default_of_object(drive, model, *mux);
+        let text = |bytes: &[u8]| value_text(model, *mux, bytes);
+        rows.push(json!({
+            "object": mux.to_string(),
+            "name": model.row(*mux).map(|row| row.name),
+            "default": default.as_deref().map(text),
+            "file": text(wanted),
+            "file_bytes": bytes_text(wanted),
+            "drive": found.as_deref().map_or_else(Clone::clone, text),
+            "file_is_default": default.as_deref().map(|default| is_same(*mux, default, wanted)),
+            "drive_is_file": found.as_deref().is_ok_and(|found| is_same(*mux, wanted, found)),
+        }));
+    }
+    Ok(json!({ "objects": rows }))
+}
+
+/// The file that `ferrodrive params backup` writes.
+async fn back_up(drive: &Drive, model: &'static Description) -> Result<Value, Refusal> {
+    let backup = drive.back_up(|_, _, _| {}).await.map_err(|error| (error.kind(), error.to_string()))?;
+    let refused: Vec<String> = backup.refused.iter().map(|(object, error)| format!("{object}: {error}")).collect();
+    let file = sheet::print(&backup.parameters, Some(model));
+    Ok(json!({ "file": file, "values": backup.parameters.values.len(), "refused": refused }))
+}
+
+fn busy(what: &str) -> Refusal {
+    ("busy", format!("{what}: try again when that is done"))
+}
+
+fn refuse(asked: Asked, refusal: Refusal) {
+    answer(asked, Err(refusal));
+}
+
+fn answer((seq, answer): Asked, outcome: Result<Value, Refusal>) {
+    say(
+        answer,
+        match outcome {
+            Ok(known) => Answer::known(seq, known),
+            Err((kind, text)) => Answer::failed(Some(seq), kind, text),
+        },
+    );
+}

@@ -1,0 +1,151 @@
+//! Parameters of virtual drives: what is read, written, refused and put back.
+//!
+//! Figures: ZLAC8030L quick start guide V1.00, chapter 9: 6081h is 120 r/min as delivered and takes 1 to 1000, 6083h is
+//! 500 ms and takes 0 to 32767, 2008h is 1 r/min and is stored, 2009h restores or stores.
+
+use canopen::Mux;
+use serde_json::Value;
+
+use super::{Page, Stage, WHEEL, play};
+use crate::message::{Deed, NewValue};
+
+const MAX_SPEED: Mux = Mux::new(0x6081, 0);
+const ACCELERATION: Mux = Mux::new(0x6083, 0);
+
+fn setting(object: &str, value: &str) -> Deed {
+    let values = vec![NewValue { object: object.into(), value: value.into() }];
+    Deed::WriteParameters { node: WHEEL, values, file: None }
+}
+
+impl Stage {
+    async fn initial_speed(&self) -> u16 {
+        self.network.node(WHEEL).read(Mux::new(0x2008, 0)).await.expect("it answers")
+    }
+
+    async fn has(&self, object: Mux) -> u32 {
+        self.network.node(WHEEL).read(object).await.expect("it answers")
+    }
+}
+
+impl Page {
+    async fn told(&mut self, deed: Deed) -> Value {
+        serde_json::from_str(&self.ask(deed).await.json()).expect("JSON")
+    }
+
+    /// The result of what has to be done.
+    async fn knows(&mut self, deed: Deed) -> Value {
+        let told = self.told(deed).await;
+        assert_eq!(told["ok"], true, "{told}");
+        told["result"].clone()
+    }
+
+    /// The kind and the words of a refusal.
+    async fn refused(&mut self, deed: Deed) -> (String, String) {
+        let told = self.told(deed).await;
+        assert_eq!(told["ok"], false, "{told}");
+        let text = |name: &str| told["error"][name].as_str().expect("text").to_owned();
+        (text("kind"), text("message"))
+    }
+}
+
+#[test]
+fn a_parameter_is_changed_read_back_and_rolled_back() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        let read = |objects: &[&str]| Deed::ReadObjects {
+            node: WHEEL,
+            objects: objects.iter().map(|&object| object.to_owned()).collect(),
+        };
+        let (kind, _) = page.refused(setting("6081h:00", "60rpm")).await;
+        assert_eq!((kind.as_str(), stage.has(MAX_SPEED).await), ("not_in_control", 120));
+        page.must(Deed::TakeControl {}).await;
+        let done = page.knows(setting("6081h:00", "60rpm")).await;
+        assert_eq!((&done["steps"][0]["object"], stage.has(MAX_SPEED).await), (&"6081h:00".into(), 60));
+        page.knows(setting("6083", "700")).await;
+        let values = page.knows(read(&["6081h:00", "6083h:00", "1000h:00"])).await;
+        let is_default = |at: usize| values["values"][at]["is_default"].clone();
+        assert_eq!(
+            [is_default(0), is_default(1), is_default(2)].map(|told| told.as_bool()),
+            [Some(false), Some(false), Some(true)],
+            "{values}"
+        );
+        assert_eq!(page.knows(Deed::RollBack { node: WHEEL }).await["can_roll_back"], 1);
+        assert_eq!((stage.has(MAX_SPEED).await, stage.has(ACCELERATION).await), (60, 500));
+        page.knows(Deed::RollBack { node: WHEEL }).await;
+        assert_eq!(stage.has(MAX_SPEED).await, 120);
+        assert_eq!(page.refused(Deed::RollBack { node: WHEEL }).await.0, "nothing_to_roll_back");
+    });
+}
+
+#[test]
+fn what_a_drive_cannot_have_and_what_would_move_it_is_not_written() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        for (object, value, kind, words) in [
+            ("6081", "1001", "unfit_parameters", "1 to 1000"),
+            ("6081", "-1", "bad_value", "does not fit"),
+            ("6081", "fast", "bad_value", "fast"),
+            ("6041", "1", "unfit_parameters", "only be read"),
+            ("60FF", "60", "not_a_parameter", "Motion"),
+            ("6040", "15", "not_a_parameter", "Motion"),
+            ("6060", "3", "not_a_parameter", "Motion"),
+            ("2009", "1", "not_a_parameter", "Motion"),
+            ("5FFF", "1", "unknown_object", "not in the description"),
+        ] {
+            let (found, text) = page.refused(setting(object, value)).await;
+            assert!(found == kind && text.contains(words), "{object}: {found}: {text}");
+        }
+        assert_eq!(stage.has(MAX_SPEED).await, 120);
+        let neither = Deed::WriteParameters { node: WHEEL, values: Vec::new(), file: None };
+        assert_eq!(page.refused(neither).await.0, "malformed");
+        page.must(Deed::Enable { node: WHEEL }).await;
+        assert_eq!(page.refused(setting("6081", "60")).await.0, "at_work");
+        assert_eq!(stage.has(MAX_SPEED).await, 120);
+        page.must(Deed::Disable { node: WHEEL }).await;
+        page.knows(setting("6081", "60")).await;
+    });
+}
+
+#[test]
+fn a_file_is_kept_compared_shown_before_and_applied_as_a_whole() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        let file = page.knows(Deed::BackUp { node: WHEEL }).await["file"].as_str().expect("text").to_owned();
+        page.must(Deed::TakeControl {}).await;
+        page.knows(setting("2008", "60rpm")).await;
+        let compared = page.knows(Deed::CompareParameters { node: WHEEL, file: file.clone() }).await;
+        let others: Vec<_> =
+            compared["objects"].as_array().expect("rows").iter().filter(|row| row["drive_is_file"] == false).collect();
+        assert_eq!((others.len(), &others[0]["object"]), (1, &"2008h:00".into()), "{others:?}");
+        let plan = Deed::PlanParameters { node: WHEEL, values: Vec::new(), file: Some(file.clone()) };
+        let plan = page.knows(plan).await;
+        assert_eq!((plan["steps"].as_array().map(Vec::len), stage.initial_speed().await), (Some(1), 60), "{plan}");
+        page.knows(Deed::WriteParameters { node: WHEEL, values: Vec::new(), file: Some(file) }).await;
+        assert_eq!(stage.initial_speed().await, 1);
+        let broken = |file: &str| Deed::CompareParameters { node: WHEEL, file: file.into() };
+        assert_eq!(page.refused(broken("[values]\nno_such_object = 1")).await.0, "bad_parameters");
+        // One value of two is beyond its limits: neither is written.
+        let file = "[values]\n\"6083\" = 700\n\"6081\" = 5000".to_owned();
+        let both = Deed::WriteParameters { node: WHEEL, values: Vec::new(), file: Some(file) };
+        assert_eq!(page.refused(both).await.0, "bad_parameters");
+        assert_eq!((stage.has(MAX_SPEED).await, stage.has(ACCELERATION).await), (120, 500));
+    });
+}
+
+#[test]
+fn a_transaction_goes_on_without_its_page_and_the_drive_is_not_enabled_meanwhile() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        let file = "[values]\n\"6083\" = 700\n\"6084\" = 700\n\"6081\" = 60".to_owned();
+        let write = Deed::WriteParameters { node: WHEEL, values: Vec::new(), file: Some(file) };
+        page.seq += 1;
+        let unheard = page.session.ask(page.seq, write).expect("there is room");
+        assert_eq!(page.refused(Deed::Enable { node: WHEEL }).await.0, "busy");
+        assert_eq!(page.refused(setting("6081", "70")).await.0, "busy");
+        drop((unheard, page));
+        stage.sleep(2000).await;
+        assert_eq!((stage.has(MAX_SPEED).await, stage.has(ACCELERATION).await), (60, 700));
+    });
+}
