@@ -168,6 +168,24 @@ fn two_requests_in_one_time_are_answered_in_their_order_and_a_flood_has_an_end()
     }
 }
 
+/// A CAN controller filters what its node does not listen to: a scan of all other nodes takes no place and no time of it.
+#[test]
+fn frames_for_others_neither_fill_its_mailboxes_nor_delay_it() {
+    for model in models() {
+        let mut bench = Bench::booted(model, 1);
+        for _ in 0..3 {
+            for other in (0x601..=0x67F).filter(|id| *id != 0x600 + u32::from(NODE)) {
+                bench.send(&format!("{other:X}#8000100000000405"));
+            }
+            bench.send("605#4018100100000000");
+            // 126 frames and an answer are 32 ms at 500 kbit/s.
+            bench.world.run_for(Duration::from_millis(60));
+            let answers = bench.heard().into_iter().filter(|(_, frame)| frame.to_string().starts_with("585#43181001"));
+            assert_eq!(answers.count(), 1, "{}", model.name);
+        }
+    }
+}
+
 #[test]
 fn resets_by_nmt_take_their_time_in_which_the_drive_is_silent_and_deaf() {
     for model in models() {

@@ -367,7 +367,7 @@ impl Sink {
         }
         if frames == 0 && fd_frames == 0 {
             let form = self.of.map_or("candump", LogFormat::name);
-            return Err(Failure::new(format!("no frame, and {lines_skipped} findings: this is no {form} log"))
+            return Err(Failure::new(format!("no frame, and {lines_skipped} passed over: this is no {form} log"))
                 .of_kind("no_log")
                 .next("logs are told apart by their first bytes, then by their extension: .log (candump), .asc, .blf, .trc, .pcap, .pcapng")
                 .next("candump -L can0 writes one"));

@@ -292,6 +292,10 @@ impl MJoint {
 
 /// As the others' but for the heartbeat of the host, which the joint listens to by itself.
 impl Station for MJoint {
+    fn ignores(&self, frame: &Frame) -> bool {
+        self.device.ignores(frame) && self.host.is_none_or(|host| frame.id() != host.can_id())
+    }
+
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
         let event = self.host.as_mut().and_then(|host| host.handle_frame(frame, now));
         self.on_heartbeat(event);
