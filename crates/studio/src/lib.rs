@@ -28,6 +28,6 @@ mod web;
 pub use access::{Access, AccessError, Password};
 pub use dead_man::DeadMan;
 pub use desk::Desk;
-pub use host::{Host, JOG_SPAN, PRESENCE_SPAN, Setting};
+pub use host::{Host, JOG_SPAN, Journals, PRESENCE_SPAN, Setting};
 pub use trace::Passed;
 pub use web::app;

@@ -3,7 +3,7 @@
 mod apply;
 mod backup;
 mod compare;
-mod journal;
+pub(super) mod journal;
 mod plan;
 mod shown;
 mod source;

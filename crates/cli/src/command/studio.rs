@@ -1,15 +1,19 @@
 //! `ferrodrive studio`: the upper computer in the browser.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use can::Bitrate;
+use canopen::NodeId;
 use serde::Serialize;
-use studio::{Access, AccessError, Host, Password, Setting};
+use studio::{Access, AccessError, Host, Journals, Password, Setting};
+use testbench::parameters::journal::Journal;
 use tokio::net::TcpListener;
 use transport::BusSpec;
 
+use super::params::journal::{Kept, default_path};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::{Format, Report};
@@ -82,6 +86,7 @@ impl Studio {
             timeout: context.timeout(),
             models: context.told_models(),
             interface: interface_of(context.bus()).name().to_owned(),
+            journals: journals(context),
             unix_zero: context.traffic.unix_zero(),
         };
         let (host, desk) = Host::new(context.network.clone(), setting);
@@ -95,6 +100,28 @@ impl Studio {
             // Not before the router is gone, which holds the desk.
             () = host.run(passed) => Ok(()),
         }
+    }
+}
+
+/// Journals in the working folder, as `params apply` keeps them. A virtual bus of this command ends with it.
+fn journals(context: &Context) -> Option<Arc<dyn Journals>> {
+    if context.is_embedded() { None } else { Some(Arc::new(InFolder::default())) }
+}
+
+/// The journals of the transactions that are under way.
+#[derive(Debug, Default)]
+struct InFolder(Mutex<BTreeMap<NodeId, Kept>>);
+
+impl Journals for InFolder {
+    fn begin(&self, journal: &Journal) -> Result<(), String> {
+        let kept = Kept::create(&default_path(journal.node), journal).map_err(|failure| failure.to_string())?;
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(journal.node, kept);
+        Ok(())
+    }
+
+    fn end(&self, node: NodeId) -> Result<(), String> {
+        let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner).remove(&node);
+        kept.map_or(Ok(()), Kept::remove).map_err(|failure| failure.to_string())
     }
 }
 

@@ -5,6 +5,7 @@
 
 mod deeds;
 mod faults;
+mod journals;
 mod known_node;
 mod meter;
 mod nodes;
@@ -19,4 +20,5 @@ mod trace;
 mod transactions;
 mod work;
 
+pub use journals::Journals;
 pub use state::{Host, JOG_SPAN, PRESENCE_SPAN, Setting};

@@ -13,10 +13,12 @@ use devices::row::is_parameter;
 use master::Drive;
 use master::parameters::{ApplyError, Parameters, Plan, PlanError, PlanOptions, default_of, diff};
 use serde_json::{Value, json};
+use testbench::parameters::journal::Journal;
 use testbench::parameters::sheet;
 use testbench::words::object::object;
 use testbench::words::value::typed_for;
 
+use super::journals::Journals;
 use super::object_rows::{bytes_text, row_json, value_text};
 use super::state::Host;
 use super::transactions::{MOST_KEPT, Refusal, Written};
@@ -77,20 +79,25 @@ impl Host {
         file: Option<String>,
         asked: Asked,
     ) {
-        let drive = drive.clone();
+        let (drive, journals) = (drive.clone(), self.setting.journals.clone());
         self.begin_transaction(drive.node().id(), false, asked, async move {
             let wanted = wanted(&drive, model, values, file).await.map_err(|refusal| (refusal, None))?;
-            write(&drive, model, &wanted).await
+            write(&drive, model, &wanted, journals.as_deref()).await
         });
     }
 
     fn begin_rolling_back(&mut self, drive: &Drive, model: &'static Description, asked: Asked) {
-        let (drive, node) = (drive.clone(), drive.node().id());
+        let (drive, node, journals) = (drive.clone(), drive.node().id(), self.setting.journals.clone());
         let Some(wanted) = self.parameters.before.get(&node).and_then(|before| before.last()).cloned() else {
             let text = format!("nothing was written to the parameters of node {node} since the studio began");
             return refuse(asked, ("nothing_to_roll_back", text));
         };
-        self.begin_transaction(node, true, asked, async move { write(&drive, model, &wanted).await });
+        self.begin_transaction(
+            node,
+            true,
+            asked,
+            async move { write(&drive, model, &wanted, journals.as_deref()).await },
+        );
     }
 
     fn begin_transaction(
@@ -265,13 +272,25 @@ async fn plan(drive: &Drive, model: &'static Description, wanted: &Parameters) -
     drive.plan_parameters(wanted, PlanOptions::default()).await.map_err(|error| refusal_of(&error, model))
 }
 
-/// Writes all or nothing. Gives what the objects had before, if they may have something else now.
+/// Writes all or nothing, with what leads back kept until that is done. Gives what the objects had before, if they may have
+/// something else now.
 async fn write(
     drive: &Drive,
     model: &'static Description,
     wanted: &Parameters,
+    journals: Option<&dyn Journals>,
 ) -> Result<(Value, Option<Parameters>), (Refusal, Option<Parameters>)> {
     let plan = plan(drive, model, wanted).await.map_err(|refusal| (refusal, None))?;
+    let journals = journals.filter(|_| !plan.steps.is_empty());
+    if let Some(journals) = journals {
+        let journal = Journal { node: plan.node, identity: plan.identity, undo: plan.undo() };
+        journals.begin(&journal).map_err(|why| (("journal", format!("nothing was written: {why}")), None))?;
+    }
+    // One that is not ended leads back later: ferrodrive params rollback.
+    let end = || match journals.map_or(Ok(()), |journals| journals.end(plan.node)) {
+        Ok(()) => String::new(),
+        Err(why) => format!(". {why}"),
+    };
     let before = (!plan.steps.is_empty()).then(|| Parameters {
         identity: plan.identity,
         node: Some(plan.node),
@@ -288,16 +307,22 @@ async fn write(
                 })
             });
             done["rounded"] = rounded.collect();
+            done["journal"] = json!(end());
             done["displaced"] = applied.displaced.iter().map(|found| json!(found.object.to_string())).collect();
             Ok((done, before))
         }
         Ok(Err(error)) => {
             let is_back = error.undone.not_put_back.is_empty();
             let kind = if is_back { "rolled_back" } else { "not_put_back" };
-            Err(((kind, refused_write(&error, model)), before.filter(|_| !is_back)))
+            let then = if is_back { end() } else { String::new() };
+            Err(((kind, refused_write(&error, model) + &then), before.filter(|_| !is_back)))
         }
-        // Before the first write, or silence when everything had been written.
-        Err(error) => Err((refusal_of(&error, model), before)),
+        // Silence when everything had been written, which leaves the journal; the others are before the first write.
+        Err(error @ PlanError::Node(_)) => Err((refusal_of(&error, model), before)),
+        Err(error) => {
+            let (kind, text) = refusal_of(&error, model);
+            Err(((kind, text + &end()), before))
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! The host: what it holds, and what it is told at its start. What it does stands in the files beside this one.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 use std::time::Duration;
 
 use can::{Bitrate, Instant};
@@ -9,6 +10,7 @@ use devices::Description;
 use futures_util::stream::FuturesUnordered;
 use master::Network;
 
+use super::journals::Journals;
 use super::known_node::KnownNode;
 use super::meter::Meter;
 use super::transactions::Transactions;
@@ -43,6 +45,8 @@ pub struct Setting {
     pub interface: String,
     /// Unix time of the bus's zero, for a log.
     pub unix_zero: Duration,
+    /// Where what leads back from a transaction is kept meanwhile; nowhere on a bus that ends with this program.
+    pub journals: Option<Arc<dyn Journals>>,
 }
 
 /// The one task that owns the network. See the [crate](crate).

@@ -18,7 +18,7 @@ use sim::World;
 use sim::machine::{TimingMode, zlac8030l, zlim42c};
 
 use super::state::TICK;
-use super::{Host, JOG_SPAN, PRESENCE_SPAN, Setting};
+use super::{Host, JOG_SPAN, Journals, PRESENCE_SPAN, Setting};
 use crate::desk::{Desk, Session};
 use crate::message::{Answer, Deed};
 use crate::trace::Passed;
@@ -164,6 +164,7 @@ fn setting() -> Setting {
         models: BTreeMap::new(),
         interface: "can0".into(),
         unix_zero: Duration::from_secs(1_700_000_000),
+        journals: None,
     }
 }
 
@@ -172,8 +173,25 @@ fn play(scene: impl AsyncFnOnce(&Stage)) {
     play_acts(scene, |_| {}, async |_| {}, |_| {}, async |_| {});
 }
 
+/// The same with journals.
+fn play_with(journals: Arc<dyn Journals>, scene: impl AsyncFnOnce(&Stage)) {
+    let setting = Setting { journals: Some(journals), ..setting() };
+    play_in(setting, scene, |_| {}, async |_| {}, |_| {}, async |_| {});
+}
+
 /// Plays three scenes before a studio that runs on; between them the world changes.
 fn play_acts(
+    first: impl AsyncFnOnce(&Stage),
+    then: impl FnOnce(&mut World),
+    second: impl AsyncFnOnce(&Stage),
+    at_last: impl FnOnce(&mut World),
+    third: impl AsyncFnOnce(&Stage),
+) {
+    play_in(setting(), first, then, second, at_last, third);
+}
+
+fn play_in(
+    setting: Setting,
     first: impl AsyncFnOnce(&Stage),
     then: impl FnOnce(&mut World),
     second: impl AsyncFnOnce(&Stage),
@@ -190,7 +208,7 @@ fn play_acts(
     let models = [(WHEEL, "zlac8030l"), (ARM, "zlim42c")];
     let models: BTreeMap<_, _> =
         models.into_iter().map(|(node, name)| (node, devices::model(name).expect("a model"))).collect();
-    let setting = Setting { bitrate: Some(Bitrate::K500), models, ..setting() };
+    let setting = Setting { bitrate: Some(Bitrate::K500), models, ..setting };
     let (host, desk) = Host::new(network.clone(), setting);
     let stage = Stage { network, desk };
     let mut serving = pin!(host.run(|| tap.take()));

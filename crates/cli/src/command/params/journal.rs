@@ -18,12 +18,13 @@ use crate::paint::Paint;
 use crate::plain::plain;
 
 /// Where the journal of a node is, if nobody says another place.
-pub(super) fn default_path(node: NodeId) -> PathBuf {
+pub(in crate::command) fn default_path(node: NodeId) -> PathBuf {
     PathBuf::from(format!("ferrodrive-node{node}.journal"))
 }
 
 /// A journal on the disk. One that is dropped stays there, and is told of.
-pub(super) struct Kept {
+#[derive(Debug)]
+pub(in crate::command) struct Kept {
     path: PathBuf,
     node: NodeId,
     is_done: bool,
@@ -31,7 +32,7 @@ pub(super) struct Kept {
 
 impl Kept {
     /// Writes it, whole and onto the disk itself, before anything is written to the node.
-    pub(super) fn create(path: &Path, journal: &Journal) -> Result<Self, Failure> {
+    pub(in crate::command) fn create(path: &Path, journal: &Journal) -> Result<Self, Failure> {
         let file = OpenOptions::new().write(true).create_new(true).open(path);
         let mut file = match file {
             Ok(file) => file,
@@ -51,7 +52,7 @@ impl Kept {
     }
 
     /// Deletes it: the node is as it should be, or as it was.
-    pub(super) fn remove(mut self) -> Result<(), Failure> {
+    pub(in crate::command) fn remove(mut self) -> Result<(), Failure> {
         self.is_done = true;
         remove(&self.path)
     }

@@ -3,10 +3,14 @@
 //! Figures: ZLAC8030L quick start guide V1.00, chapter 9: 6081h is 120 r/min as delivered and takes 1 to 1000, 6083h is
 //! 500 ms and takes 0 to 32767, 2008h is 1 r/min and is stored, 2009h restores or stores.
 
-use canopen::Mux;
-use serde_json::Value;
+use std::sync::{Arc, Mutex};
 
-use super::{Page, Stage, WHEEL, play};
+use canopen::{Mux, NodeId};
+use serde_json::Value;
+use testbench::parameters::journal::Journal;
+
+use super::{Page, Stage, WHEEL, play, play_with};
+use crate::host::Journals;
 use crate::message::{Deed, NewValue};
 
 const MAX_SPEED: Mux = Mux::new(0x6081, 0);
@@ -147,5 +151,50 @@ fn a_transaction_goes_on_without_its_page_and_the_drive_is_not_enabled_meanwhile
         drop((unheard, page));
         stage.sleep(2000).await;
         assert_eq!((stage.has(MAX_SPEED).await, stage.has(ACCELERATION).await), (60, 700));
+    });
+}
+
+/// What is told to the keeper of journals, in order; one with a full disk keeps none.
+#[derive(Debug, Default)]
+struct Keeper {
+    told: Mutex<Vec<String>>,
+    is_full: bool,
+}
+
+impl Journals for Keeper {
+    fn begin(&self, journal: &Journal) -> Result<(), String> {
+        if self.is_full {
+            return Err("the disk is full".into());
+        }
+        self.told.lock().expect("whole").push(format!("{} leads back by {}", journal.node, journal.undo.len()));
+        Ok(())
+    }
+
+    fn end(&self, node: NodeId) -> Result<(), String> {
+        self.told.lock().expect("whole").push(format!("{node} is done"));
+        Ok(())
+    }
+}
+
+#[test]
+fn what_leads_back_is_kept_from_the_first_write_to_the_last_and_without_it_nothing_is_written() {
+    let keeper = Arc::new(Keeper::default());
+    play_with(keeper.clone(), async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        page.knows(setting("6081h:00", "60rpm")).await;
+        // Nothing to write, and nothing that may be written.
+        page.knows(setting("6081h:00", "60rpm")).await;
+        page.refused(setting("6081h:00", "5000")).await;
+        page.knows(Deed::RollBack { node: WHEEL }).await;
+    });
+    let told = keeper.told.lock().expect("whole").clone();
+    assert_eq!(told, ["4 leads back by 1", "4 is done", "4 leads back by 1", "4 is done"]);
+    play_with(Arc::new(Keeper { is_full: true, ..Keeper::default() }), async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        let (kind, text) = page.refused(setting("6081h:00", "60rpm")).await;
+        assert_eq!((kind.as_str(), text.as_str()), ("journal", "nothing was written: the disk is full"));
+        assert_eq!(stage.has(MAX_SPEED).await, 120);
     });
 }
