@@ -553,11 +553,12 @@ async fn a_parameter_is_found_changed_and_rolled_back() {
     stage.says("#parameter-told", "Written and read back").await;
     stage.says(row, "60 [r/min]").await;
     stage.find(".parameters tr.changed[data-object='2008h:00']").await;
+    stage.says(".parameters tr.chosen", "3C 00").await;
     stage.click("#theme").await;
     stage.shoot("parameters_other_theme").await;
     stage.click("#parameters-backup").await;
     let kept = std::fs::read_to_string(stage.saved("node4.toml").await).expect("text");
-    assert!(kept.contains("\"2008\" = 60"), "{kept}");
+    assert!(kept.contains("\"2008:00\" = 60"), "{kept}");
     stage.click("#parameters-back").await;
     stage.says(row, "1 [r/min]").await;
     let file = stage.profile.join("node4.toml");

@@ -119,7 +119,7 @@ export function parametersView(shared, report) {
       const some = filtered.slice(0, MOST_FOUND);
       const more = filtered.length > some.length ? `, the first ${some.length}` : "";
       const unread = changed.checked ? " Only what was read can be told to be changed: Read all." : "";
-      list.replaceChildren(h("p", { class: "quiet" }, `${filtered.length} objects${more}.${unread}`), table(some));
+      list.replaceChildren(h("p", { class: "quiet" }, `${filtered.length} ${filtered.length === 1 ? "object" : "objects"}${more}.${unread}`), table(some));
     } else {
       const groups = [...new Set(objects.map((row) => row.group))];
       list.replaceChildren(...groups.map((group) => groupOf(group, objects.filter((row) => row.group === group))));
@@ -189,9 +189,15 @@ export function parametersView(shared, report) {
       ["Type", row.type],
       ["Unit of one count", row.unit || "none"],
       ["Values", row.meanings.map(([value, text]) => `${value}: ${text}`).join("; ")],
-      ["Bytes on the wire", values.get(row.object)?.bytes ?? ""],
     ].filter(([, text]) => text);
-    const facts = h("dl", {}, ...terms.flatMap(([term, text]) => [h("dt", {}, term), h("dd", {}, text)]));
+    const bytes = h("dd");
+    const facts = h("dl", {}, ...terms.flatMap(([term, text]) => [h("dt", {}, term), h("dd", {}, text)]), h("dt", {}, "Bytes on the wire"), bytes);
+    const show_line = row.show;
+    row.show = () => {
+      show_line();
+      say(bytes, values.get(row.object)?.bytes ?? "–");
+    };
+    row.show();
     return h("div", {}, facts, row.parameter ? form(row) : h("p", { class: "quiet" }, refusal(row)));
   }
 
