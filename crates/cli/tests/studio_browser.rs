@@ -566,6 +566,7 @@ async fn a_parameter_is_found_changed_and_rolled_back() {
     stage.says("#parameters-told", "1 are others in the drive").await;
     stage.find(".parameters-diff tr.other").await;
     stage.click("#parameters-plan").await;
+    stage.says("#parameters-told", "1 writes, in this order").await;
     stage.says(".parameters-diff", "60 [r/min]").await;
     stage.shoot("parameters_file").await;
     stage.click("#parameters-apply").await;
