@@ -144,7 +144,10 @@ on("state", (state) => {
   shown?.view.update(state);
 });
 
-on("news", (news) => addNews(news.time_s, news.node === null || news.node === undefined ? news.text : `node ${news.node}: ${news.text}`, ""));
+/** A text about no node, or that begins with it. */
+const isNamed = ({ node, text }) => node === null || node === undefined || text.toLowerCase().startsWith(`node ${node}`);
+
+on("news", (news) => addNews(news.time_s, isNamed(news) ? news.text : `node ${news.node}: ${news.text}`, ""));
 
 on("change", (connected) => {
   const banner = byId("banner");
