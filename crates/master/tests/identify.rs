@@ -2,6 +2,8 @@
 
 mod support;
 
+use std::future::poll_fn;
+use std::pin::pin;
 use std::time::Duration;
 
 use can::{Bitrate, Instant};
@@ -206,4 +208,38 @@ fn a_joint_in_alarm_is_operational_though_its_heartbeat_says_04h() {
     let state = block_on(&mut world, drive.state()).unwrap().unwrap();
     assert_eq!(state.nmt, Some(NmtState::Operational), "{state:?}");
     assert_ne!(state.fault_code, 0);
+}
+
+/// CiA 301, 7.2.4.3: one SDO channel has one client. Where somebody has two masters all the same, the answers to both mix.
+#[test]
+fn another_master_that_asks_too_keeps_nobody_from_being_found() {
+    let (mut alone, first) = bench();
+    let expected = scan(&mut alone, &first);
+    for seed in 0..8 {
+        let (mut world, network) = bench();
+        let other = Network::new();
+        world.add_station(other.clone());
+        let asking = async {
+            let mut random = sim::Prng::new(seed);
+            loop {
+                for id in [JOINT, STEPPER, LARGE_STEPPER, SERVO] {
+                    let _ = other.node(node(id)).read::<u16>(mux(0x6041, 0)).await;
+                    other.sleep(Duration::from_micros(random.below(3_000))).await;
+                }
+            }
+        };
+        let scanning = network.scan(Duration::from_millis(100), |_| {});
+        let (mut asking, mut scanning) = (pin!(asking), pin!(scanning));
+        let both = poll_fn(|context| {
+            assert!(asking.as_mut().poll(context).is_pending(), "it never ends");
+            scanning.as_mut().poll(context)
+        });
+        let found = block_on(&mut world, both).unwrap();
+        assert_eq!(found.len(), expected.len(), "seed {seed}: {found:?}");
+        for (found, expected) in found.iter().zip(&expected) {
+            assert_eq!(found.identity, expected.identity, "seed {seed}, node {}", found.node);
+            assert_eq!(names(found.models.clone()), names(expected.models.clone()), "seed {seed}, node {}", found.node);
+            assert_eq!(found.doubt(), expected.doubt(), "seed {seed}, node {}", found.node);
+        }
+    }
 }

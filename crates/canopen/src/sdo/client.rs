@@ -115,6 +115,8 @@ pub struct Client {
     request: Option<[u8; LENGTH]>,
     /// What was asked for before, the newest first: a server that is slow answers to that still, and some answer twice.
     earlier: [Option<Mux>; REMEMBERED],
+    /// What somebody else asked for, as a reply that came meanwhile says.
+    foreign: Option<Mux>,
 }
 
 /// How many questions ago a late answer may belong to.
@@ -158,6 +160,7 @@ impl Client {
             deadline: Instant::FAR_FUTURE,
             request: None,
             earlier: [None; REMEMBERED],
+            foreign: None,
         }
     }
 
@@ -200,15 +203,18 @@ impl Client {
     }
 
     /// A frame arrived. `buffer` is the data of a download, or the room for an upload. Frames that are not this
-    /// server's replies do nothing, nor does a reply without a transfer, nor one to an earlier question: the answer to this one
-    /// may still come.
+    /// server's replies do nothing, nor does a reply without a transfer, nor one to an earlier question or to another client's that
+    /// asks the same server against CiA 301, 7.2.4.3: the answer to this one may still come.
     pub fn handle_frame(&mut self, frame: &Frame, buffer: &mut [u8], now: Instant) -> Option<Result<Outcome, Failure>> {
         if frame.id() != self.reply_id || frame.is_remote() {
             return None;
         }
         let mux = self.mux()?;
         let reply = Reply::parse(frame.padded());
-        if self.is_late(mux, &reply) {
+        if let Some(received) = self.of_another(mux, &reply) {
+            if !self.earlier.contains(&Some(received)) {
+                self.foreign = Some(received);
+            }
             return None;
         }
         match self.advance(mux, reply, buffer, now) {
@@ -231,7 +237,10 @@ impl Client {
     pub fn handle_timeout(&mut self, now: Instant) -> Option<Failure> {
         let mux = self.mux().filter(|_| now >= self.deadline)?;
         self.give_up(mux, AbortCode::TIMED_OUT);
-        Some(Failure::TimedOut { mux })
+        Some(match self.foreign {
+            Some(received) => Failure::WrongMux { expected: mux, received },
+            None => Failure::TimedOut { mux },
+        })
     }
 
     /// The next frame to send.
@@ -330,14 +339,18 @@ impl Client {
         self.ask(Request::DownloadSegment(segment), State::DownloadSegments { mux, sent, toggle }, now);
     }
 
-    /// The reply begins or ends a transfer of an object that was asked for before, and is not asked for now.
-    fn is_late(&self, asked: Mux, reply: &Reply) -> bool {
+    /// The other object that the reply begins or ends a transfer of. In the middle of a transfer only one that was asked for
+    /// before is passed over: another client's has ended this one in the server.
+    fn of_another(&self, asked: Mux, reply: &Reply) -> Option<Mux> {
         let (Reply::InitiateUpload(received, _) | Reply::InitiateDownload(received) | Reply::Abort(received, _)) =
-            reply
+            *reply
         else {
-            return false;
+            return None;
         };
-        *received != asked && self.earlier.contains(&Some(*received))
+        let unnamed = matches!(reply, Reply::Abort(..)) && received.key() == 0;
+        let begins = matches!(self.state, State::Upload { .. } | State::Download { .. });
+        let passed_over = begins || self.earlier.contains(&Some(received));
+        Some(received).filter(|received| *received != asked && !unnamed && passed_over)
     }
 
     fn ask(&mut self, request: Request, state: State, now: Instant) {
@@ -348,6 +361,7 @@ impl Client {
             self.earlier.rotate_right(1);
             self.earlier[0] = asked;
         }
+        self.foreign = None;
         self.deadline = now + self.timeout;
     }
 

@@ -107,13 +107,27 @@ fn a_refusal_is_told_with_its_code() {
     );
 }
 
+/// CiA 301, 7.2.4.3: one client for each channel. Where there are two all the same, each sees the other's replies.
 #[test]
-fn a_reply_for_another_entry_is_reported_as_such() {
+fn a_reply_for_another_entry_is_passed_over_and_told_when_none_comes() {
     let expected = Mux::new(0x6041, 0);
-    let (result, mut client) = replies(uploading(expected), &mut [0; 8], &["584#4B40600000000000"]);
-    assert_eq!(result, Some(Err(Failure::WrongMux { expected, received: Mux::new(0x6040, 0) })));
-    assert!(!client.is_busy());
-    assert_eq!(client.poll_transmit(), Some("604#8041600000000008".parse().unwrap()));
+    let foreign = ["584#4B40600000000000", "584#6040600000000000", "584#8040600000000206"];
+    for frame in foreign {
+        let (result, mut client) = replies(uploading(expected), &mut [0; 8], &[frame]);
+        assert!(result.is_none() && client.is_busy(), "{frame}");
+        // Its own comes after all.
+        let own = client.handle_frame(&"584#4B41600037020000".parse().unwrap(), &mut [0; 8], Instant::from_millis(1));
+        assert_eq!(own, Some(Ok(Outcome::Uploaded { mux: expected, length: 2 })), "{frame}");
+        // Or does not.
+        let (_, mut client) = replies(uploading(expected), &mut [0; 8], &[frame]);
+        let failure = client.handle_timeout(Instant::from_millis(50));
+        assert_eq!(failure, Some(Failure::WrongMux { expected, received: Mux::new(0x6040, 0) }), "{frame}");
+        assert!(!client.is_busy());
+        assert_eq!(client.poll_transmit(), Some("604#8041600000000405".parse().unwrap()));
+        // What is asked next has nothing to do with it.
+        client.upload(expected, Instant::from_millis(60));
+        assert_eq!(client.handle_timeout(Instant::from_millis(110)), Some(Failure::TimedOut { mux: expected }));
+    }
 }
 
 #[test]

@@ -5,6 +5,7 @@ use canopen::{AbortCode, Mux, NmtState, NodeId};
 use devices::Description;
 
 use super::knowledge::{Guess, Identity, Knowledge, names};
+use crate::core::Payload;
 use crate::error::Error;
 use crate::models::Models;
 use crate::network::{Network, Node, join_all};
@@ -15,6 +16,9 @@ const WINDOW: usize = 32;
 /// How long a node is given to answer: drives answer within a few milliseconds, a window of requests takes 8 more
 /// at 500 kbit/s and 40 more at 100 kbit/s.
 pub const SCAN_TIMEOUT: Duration = Duration::from_millis(100);
+
+/// How often an object is asked for at most, beside another master.
+const TRIES: usize = 4;
 
 /// 1017h, in ms, 16 bits. Source: CiA 301, 7.5.2.20.
 const PRODUCER_HEARTBEAT_TIME: Mux = Mux::new(0x1017, 0);
@@ -73,8 +77,27 @@ pub async fn identity(node: &Node) -> Result<Identity, Error> {
     })
 }
 
+/// Reads an object. Where another master asks the node too, the answers to the two mix, and one may push the other's request
+/// aside (CiA 301, 7.2.4.3: one SDO channel has one client): what got no answer of its own is asked again. A node that was never
+/// heard is not there, and is asked once.
+async fn upload(node: &Node, mux: Mux) -> Result<Payload, Error> {
+    let mut answer = node.upload(mux).await;
+    for _ in 1..TRIES {
+        match answer {
+            Err(Error::Aborted { code: AbortCode::NO_SUCH_OBJECT | AbortCode::NO_SUCH_SUB_INDEX, .. }) => {
+                return answer;
+            }
+            Err(Error::BadAnswer { .. } | Error::Aborted { .. }) => {}
+            Err(Error::NoAnswer { .. }) if node.facts().seen_at.is_some() => {}
+            answer => return answer,
+        }
+        answer = node.upload(mux).await;
+    }
+    answer
+}
+
 async fn optional(node: &Node, mux: Mux) -> Result<Option<u32>, Error> {
-    match node.upload(mux).await {
+    match upload(node, mux).await {
         Ok(payload) => Ok(Some(payload.raw())),
         Err(Error::NoAnswer { .. }) => Err(node_silent(node, mux)),
         Err(_) => Ok(None),
@@ -127,7 +150,7 @@ async fn told_apart(node: &Node, known: &Models, models: &[&'static Description]
 /// # Errors
 /// [`Error::NoAnswer`] when it is silent; what keeps the question from being asked.
 pub(crate) async fn has(node: &Node, mux: Mux) -> Result<bool, Error> {
-    match node.upload(mux).await {
+    match upload(node, mux).await {
         Ok(_) => Ok(true),
         Err(Error::Aborted { code: AbortCode::NO_SUCH_OBJECT | AbortCode::NO_SUCH_SUB_INDEX, .. }) => Ok(false),
         // It is there, and cannot be read now.
