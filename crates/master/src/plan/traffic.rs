@@ -151,7 +151,8 @@ impl PlannedFrame {
 /// What somebody who plans should know of a PDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Remark {
-    /// Event-driven, without inhibit time: nothing bounds how often it comes. It was taken once in a cycle.
+    /// Event-driven, without inhibit time: nothing bounds how often it comes. It was taken once in a cycle, or as often as its event
+    /// timer brings it where that is more.
     Unbounded(NodeId, PdoId),
     /// Sent only when a remote frame asks for it: left out.
     OnRequest(NodeId, PdoId),
@@ -165,7 +166,7 @@ impl fmt::Display for Remark {
             Self::Unbounded(node, pdo) => write!(
                 f,
                 "node {node} {pdo}: event-driven without inhibit time, so that nothing bounds how often it comes; taken once a \
-                 cycle. Set {:04X}h:03, or a synchronous transmission type",
+                 cycle, or as often as its event timer brings it. Set {:04X}h:03, or a synchronous transmission type",
                 pdo.parameter_index()
             ),
             Self::OnRequest(node, pdo) => write!(f, "node {node} {pdo}: sent on remote request only; left out"),
@@ -357,10 +358,21 @@ fn of_node(
                 let Some(by) = rpdos.iter().find(|(number, _)| *number == config.pdo.number) else { continue };
                 frame.trigger = Some(answer(by.1, node.timing.pdo_reaction));
             }
-            _ => match config.inhibit_time.filter(|time| !time.is_zero()) {
-                Some(inhibit) => frame.period = inhibit,
-                None => remarks.push(Remark::Unbounded(id, config.pdo)),
-            },
+            transmission => {
+                let inhibit = config.inhibit_time.filter(|time| !time.is_zero());
+                let timer = config.event_time.filter(|time| !time.is_zero());
+                let by_timer_alone = transmission == TransmissionType::EVENT_PROFILE
+                    && node.event_trigger == EventTrigger::ChangeOr255ByTimer;
+                frame.period = match (inhibit, timer) {
+                    (inhibit, Some(timer)) if by_timer_alone => timer.max(inhibit.unwrap_or_default()),
+                    (Some(inhibit), _) => inhibit,
+                    // Changes may bring it at any time; the timer brings it at the latest.
+                    (None, timer) => {
+                        remarks.push(Remark::Unbounded(id, config.pdo));
+                        timer.map_or(settings.cycle, |timer| timer.min(settings.cycle))
+                    }
+                };
+            }
         }
         // A synchronous one is of its cycle, however seldom it comes.
         let deadline = if frame.trigger.is_some() { settings.cycle } else { frame.period };
@@ -408,5 +420,64 @@ fn stand_in_line(drafts: &mut [Draft]) {
             cyclic.iter().copied().chain(others).collect()
         };
         drafts[number].frame.ahead = before;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use canopen::Mux;
+    use canopen::pdo::MappingRecord;
+
+    use super::*;
+    use crate::core::PdoMap;
+
+    const MS: Duration = Duration::from_millis(1);
+    const TPDO1: PdoId = PdoId { direction: Direction::Tpdo, number: PdoNumber::FIRST };
+
+    /// Load of a bus at 500 kbit/s with SYNC each 10 ms and one TPDO of 8 bytes, and whether something was said of it.
+    fn with_tpdo(event_trigger: EventTrigger, set: impl Fn(PdoConfig) -> PdoConfig) -> (f64, bool) {
+        let map = [0x6064, 0x606C].map(|index| MappingRecord { mux: Mux::new(index, 0), bits: 32 });
+        let config = set(PdoConfig::new(TPDO1, PdoMap(map.to_vec())));
+        let timing = devices::model("zlac8030l").expect("a model").timing;
+        let (node, pdos) = (NodeId::new(4).expect("a node"), vec![(config, CobId(0x184))]);
+        let node = NodeTraffic { node, pdos, in_cycle: None, event_trigger, heartbeat: None, timing };
+        let plan = plan(&[node], &Settings::new(10 * MS).cycle_alone(), Bitrate::K500);
+        (plan.load, !plan.remarks.is_empty())
+    }
+
+    /// Longest frames have 55 + 10 s bits for s data bytes (Davis et al., equation 1): SYNC 55, this TPDO 135.
+    fn load_of_one_each(period: Duration) -> f64 {
+        (55.0 / 10e-3 + 135.0 / period.as_secs_f64()) / 500e3
+    }
+
+    #[test]
+    fn an_event_timer_brings_a_tpdo_oftener_than_the_cycle() {
+        use EventTrigger::{Change, ChangeOr255ByTimer};
+        let by_timer = |config: PdoConfig| config.event_time(MS);
+        let cases = [
+            ("nothing bounds it", with_tpdo(Change, |config| config), 10 * MS, true),
+            ("changes, and a timer", with_tpdo(Change, by_timer), MS, true),
+            ("a slower timer", with_tpdo(Change, |config| config.event_time(50 * MS)), 10 * MS, true),
+            ("the timer alone", with_tpdo(ChangeOr255ByTimer, by_timer), MS, false),
+            (
+                "the timer alone, slow",
+                with_tpdo(ChangeOr255ByTimer, |config| config.event_time(50 * MS)),
+                50 * MS,
+                false,
+            ),
+            ("held back", with_tpdo(Change, |config| by_timer(config).inhibit_time(2 * MS)), 2 * MS, false),
+            (
+                "changes of type 254",
+                with_tpdo(ChangeOr255ByTimer, |config| {
+                    by_timer(config).transmission(TransmissionType::EVENT_MANUFACTURER)
+                }),
+                MS,
+                true,
+            ),
+        ];
+        for (what, (load, said), period, says) in cases {
+            assert!((load - load_of_one_each(period)).abs() < 1e-9, "{what}: {load}");
+            assert_eq!(said, says, "{what}");
+        }
     }
 }
