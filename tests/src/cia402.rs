@@ -39,5 +39,7 @@ fn object(row: Row<'_>, note: &str) -> Option<ObjectRow> {
         default: integer(row.get("default")),
         limits: integer(row.get("min")).zip(integer(row.get("max"))),
         live: flag(row.get("live"), "yes", "no"),
+        // The list has none.
+        section: String::new(),
     })
 }

@@ -31,6 +31,8 @@ pub struct ObjectRow {
     pub limits: Option<(i64, i64)>,
     /// A measurement or a state: what it reads after power-on is not its default.
     pub live: bool,
+    /// The section that has it, `5.4`; a standard, where the manual does not print it.
+    pub section: String,
 }
 
 /// A datagram that the manual prints.
@@ -152,6 +154,7 @@ pub(crate) fn object(row: Row<'_>) -> ObjectRow {
         default: integer(row.get("default")),
         limits: integer(row.get("min")).zip(integer(row.get("max"))),
         live: flag(row.get("live"), "yes", "no"),
+        section: row.get("source").to_owned(),
     }
 }
 

@@ -5,6 +5,7 @@
 use canopen::od::{Access, DefaultValue, Dictionary, Entry, Fixed, Table};
 use canopen::{Mux, NodeId};
 use cia402::{Controlword, PowerEvent, PowerState, Statusword, transition};
+use devices::Description;
 
 use crate::manual::{ObjectRow, PowerCell};
 
@@ -28,6 +29,14 @@ pub fn columns_are_the_manuals<const N: usize>(table: &'static Table, rows: &[Ob
     let found = pairs.into_iter().flat_map(|(ours, row)| differences::<N>(table, node, ours, row));
     let differences: Vec<String> = found.collect();
     assert!(differences.is_empty(), "{} differences:\n{}", differences.len(), differences.join("\n"));
+}
+
+/// Each object is said to stand in the section of the manual that has it.
+pub fn sections_are_the_manuals(model: &Description, rows: &[ObjectRow]) {
+    let found =
+        |row: &ObjectRow| model.section(row.index).map(|section| section.trim_start_matches("chapter ").to_owned());
+    let differs: Vec<_> = rows.iter().filter(|row| found(row).as_ref() != Some(&row.section)).collect();
+    assert!(!rows.is_empty() && differs.is_empty(), "{}: {differs:#?}", model.name);
 }
 
 fn differences<const N: usize>(table: &'static Table, node: NodeId, ours: &Entry, row: &ObjectRow) -> Vec<String> {

@@ -39,6 +39,14 @@ fn every_object_agrees_with_the_manual_in_every_column() {
     );
 }
 
+#[test]
+fn every_object_is_said_to_stand_where_the_manual_has_it() {
+    let of = |name: &str| devices::model(name).expect("a model");
+    side_by_side::sections_are_the_manuals(of("zlac8030l"), Zlac8030l::rows().all());
+    side_by_side::sections_are_the_manuals(of("zlim42c"), Zlim42c::rows().all());
+    side_by_side::sections_are_the_manuals(of("m4230e17b50"), MJoint::rows().all());
+}
+
 fn power_tables() -> [Vec<PowerCell>; 3] {
     [Zlac8030l::power_states(), Zlim42c::power_states(), Cia402::power_states()]
         .map(|cells| cells.into_iter().map(|(cell, _)| cell).collect())

@@ -48,7 +48,7 @@ fn the_save_bytes_of_the_zlac8030l_set_250_kbit_s_on_the_zlim42_c_and_those_of_t
 #[test]
 fn the_units_of_speed_and_position_are_the_drives_own() {
     let scales = axes().map(|axis| axis.units.actual_velocity.map(|velocity| velocity.scale));
-    assert_eq!(scales, [Some(Scale::PerCount(0.1)), Some(Scale::PerCount(1.0))]);
+    assert_eq!(scales, [Some(Scale::Shaft(0.1)), Some(Scale::Shaft(1.0))]);
     let [servo, stepper] = axes().map(|axis| axis.units.counts_per_turn);
     assert!(!matches!(servo, CountsPerTurn::Table { .. }) && matches!(stepper, CountsPerTurn::Table { .. }));
 }

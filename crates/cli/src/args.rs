@@ -5,7 +5,7 @@ use clap::{Parser, Subcommand};
 use crate::command::{
     boot, check, completions, convert, dcf, decode, demo, drive, drive_base, dump, eds, emcy, events, explain, export,
     gateway, group, home, latency, lss, man_pages, motion, nmt, objects, params, pdo, plan, plot, read, readings,
-    record, replay, run, scan, sdo, send, sim, store, studio, supervise, sync, time, watch, world,
+    record, replay, run, scan, sdo, send, sim, store, studio, supervise, sync, time, top, watch, world,
 };
 use crate::global::Global;
 
@@ -68,6 +68,7 @@ pub(crate) enum Command {
     Export(export::Export),
     Gateway(gateway::Gateway),
     Studio(studio::Studio),
+    Top(top::Top),
     Dump(dump::Dump),
     Decode(decode::Decode),
     Convert(convert::Convert),

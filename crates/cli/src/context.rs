@@ -9,7 +9,7 @@ use cia402::{PowerCommand, PowerState, Statusword};
 use master::decode::Decoder;
 use master::drive::Drive;
 use master::identify::Knowledge;
-use master::{Error, Network, Node};
+use master::{Error, Gear, Network, Node};
 use transport::BusSpec;
 
 use crate::failure::Failure;
@@ -17,6 +17,7 @@ use crate::frames::tap::Traffic;
 use crate::global::Global;
 use crate::progress::Progress;
 use crate::remembered::Remembered;
+use studio::{Wire, WorldDoor};
 use testbench::machine_file::{self, Machine};
 use testbench::models::{self, Description};
 
@@ -40,6 +41,10 @@ pub(crate) struct Context {
     bus: BusSpec,
     /// The machine, where a file describes it.
     pub(crate) machine: Option<Machine>,
+    /// The world around the drives, where they are virtual ones whose time passes with the clock.
+    pub(crate) world: Option<WorldDoor>,
+    /// What the bus says beside frames.
+    pub(crate) wire: Wire,
     timeout: Duration,
     models: BTreeMap<NodeId, Told>,
     json: bool,
@@ -86,6 +91,8 @@ impl Context {
         };
         Self {
             machine: of_bus.or_else(|| global.machine.clone()),
+            world: None,
+            wire: Wire::default(),
             network,
             progress,
             traffic,
@@ -164,6 +171,17 @@ impl Context {
         }
     }
 
+    /// What stands behind the shaft of a drive, as the machine file says.
+    fn gear(&self, id: NodeId) -> Gear {
+        self.machine.as_ref().map_or(Gear::DIRECT, |machine| machine.gear(id))
+    }
+
+    /// What stands behind the shafts of all drives of the machine file.
+    pub(crate) fn gears(&self) -> BTreeMap<NodeId, Gear> {
+        let nodes = self.machine.iter().flat_map(Machine::models).map(|(node, _)| node);
+        nodes.map(|node| (node, self.gear(node))).collect()
+    }
+
     /// Longest wait for each answer.
     pub(crate) fn timeout(&self) -> Duration {
         self.timeout
@@ -191,7 +209,7 @@ impl Context {
 
     /// A drive, for commands that may refuse to work with a guess, which is then told with the refusal.
     pub(crate) async fn drive_untold(&self, id: NodeId) -> Result<Drive, Failure> {
-        Ok(Drive::known_as(self.node(id), self.knowledge_of(id).await?))
+        Ok(Drive::known_as(self.node(id), self.knowledge_of(id).await?).behind(self.gear(id)))
     }
 
     /// Tells the user if what follows rests on a guess. Where all models that answer so have the same objects, it does not.
@@ -235,7 +253,7 @@ impl Context {
     /// A drive that is to be stopped: as what the user takes it for, be that right or wrong.
     pub(crate) async fn drive_to_stop(&self, id: NodeId) -> Result<Drive, Failure> {
         match self.told_model(id) {
-            Some(model) => Ok(Drive::new(self.node(id), model)),
+            Some(model) => Ok(Drive::new(self.node(id), model).behind(self.gear(id))),
             None => self.drive(id).await,
         }
     }

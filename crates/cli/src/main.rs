@@ -27,6 +27,7 @@ mod session;
 mod signals;
 mod status;
 mod table;
+mod wire;
 mod word_order;
 mod world_bus;
 
@@ -224,6 +225,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Record(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Export(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Gateway(command) => session::run(global, async |context| command.run(context, format).await),
+        Command::Top(command) => session::run_live(global, async |context| command.run(context, format).await),
         Command::Studio(command) => session::run_live(global, async |context| command.run(context, format).await),
         Command::Replay(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Completions(completions) => completions.run(),

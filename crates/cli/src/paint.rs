@@ -19,6 +19,11 @@ impl Paint {
         Self { on: stream.is_terminal() && !forbidden }
     }
 
+    /// Whether it colours.
+    pub(crate) const fn is_on(self) -> bool {
+        self.on
+    }
+
     /// Something that went well.
     pub(crate) fn good(self, text: &str) -> String {
         self.coloured("32", text)

@@ -11,6 +11,7 @@ use std::time::Duration;
 use can::{Instant, Station};
 use canopen::{Mux, NodeId};
 use master::Network;
+use studio::{Wire, WorldDoor};
 use tokio::sync::Notify;
 use transport::realtime::{self, RealTimeError};
 use transport::{AnyBus, BusError, BusNotes, BusSpec, BusThread, BusThreadError, Note, WallClock, run_station};
@@ -25,6 +26,7 @@ use crate::global::Global;
 use crate::progress::Progress;
 use crate::recording::{CommandLog, LogPath, Logged, Pace, interface_of};
 use crate::signals::asked_to_end;
+use crate::wire;
 use crate::world_bus::WorldBus;
 use testbench::machine_file::{self, Machine};
 
@@ -127,12 +129,16 @@ enum Runner {
 }
 
 impl Runner {
-    /// The bus of the command line, and which drives are on it where that is known.
-    async fn open(global: &Global) -> Result<(Self, WallClock, Option<EmbeddedDrives>), Failure> {
+    /// The bus of the command line; of an embedded one which drives are on it, and where their world can be asked.
+    async fn open(
+        global: &Global,
+        wire: Wire,
+    ) -> Result<(Self, WallClock, Option<(EmbeddedDrives, WorldDoor)>), Failure> {
         if let BusSpec::Sim { file } = &global.bus {
             let (world, drives) = virtual_world(file.as_deref())?;
             let clock = start_clock(global)?;
-            return Ok((Self::World(WorldBus::new(world, &clock)), clock, Some(drives)));
+            let (bus, door) = WorldBus::new(world, &clock, wire);
+            return Ok((Self::World(bus), clock, Some((drives, door))));
         }
         let (runner, clock) = Self::open_real(global).await?;
         Ok((runner, clock, None))
@@ -183,7 +189,9 @@ impl Wake for Wakes {
 
 async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Result<R, Failure>) -> Result<R, Failure> {
     let log = global.log.as_ref().map(LogPath::create).transpose()?;
-    let (runner, clock, embedded) = Runner::open(global).await?;
+    let health = Wire::default();
+    let (runner, clock, embedded) = Runner::open(global, health.clone()).await?;
+    let (embedded, world) = embedded.unzip();
     let (log, writing) = CommandLog::start(log, interface_of(&global.bus), clock.unix_zero(), Pace::RealTime);
     let network = Network::new();
     let progress = Progress::new(global.json);
@@ -192,7 +200,8 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     if global.verbose {
         traffic.show(decoder(global, &[]), Stamps::default(), progress.clone());
     }
-    let context = Context::new(global, network.clone(), embedded.as_deref(), progress.clone(), traffic.clone());
+    let mut context = Context::new(global, network.clone(), embedded.as_deref(), progress.clone(), traffic.clone());
+    (context.world, context.wire) = (world, health);
     if let Some(unused) = global.machine.as_ref().and_then(Machine::unused_by_a_master) {
         let text = format!(
             "of the machine file a command on a real bus does not use: {unused}; `ferrodrive sim --machine FILE` and `ferrodrive run` do"
@@ -218,7 +227,14 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
         Err(notes.lost().into_iter().fold(failure, |failure, lost| without_bus(&context, failure.because(lost))))
     };
     let station = Logged::new(Tap::new(network.clone(), traffic), log);
-    let tell = |_, note: &Note| notes.borrow_mut().news(note).iter().for_each(|text| context.tell(text));
+    let tell = |_, note: &Note| {
+        wire::put_down(&context.wire, note);
+        let news = notes.borrow_mut().news(note);
+        if let Some(text) = news {
+            context.tell(&text);
+            context.wire.tell(&text);
+        }
+    };
     let ended = runner.run(&network, station, &clock, until, tell).await;
     progress.clear();
     context.remember_nodes();

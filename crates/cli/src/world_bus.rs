@@ -8,6 +8,8 @@ use std::time::Duration;
 use can::{Frame, Instant};
 use sim::pace::Pace;
 use sim::{StationId, World, WorldError};
+use studio::{Around, Changed, Wire, WorldAsks, WorldDoor};
+use testbench::around;
 use transport::{AsyncBus, BusError, Received, WallClock};
 
 /// How finely the world follows the clock: the joints' answers come within some milliseconds.
@@ -22,14 +24,17 @@ pub(crate) struct WorldBus {
     probe: StationId,
     clock: WallClock,
     pace: Pace,
+    asks: WorldAsks,
+    wire: Wire,
 }
 
 impl WorldBus {
-    /// A bus of this world, whose time begins now.
-    pub(crate) fn new(mut world: World, clock: &WallClock) -> Self {
+    /// A bus of this world, whose time begins now, and where the world can be asked.
+    pub(crate) fn new(mut world: World, clock: &WallClock, wire: Wire) -> (Self, WorldDoor) {
         let probe = world.add_probe();
         let pace = Pace::real_time(world.now()).rebased(elapsed(clock), world.now());
-        Self { world, probe, clock: clock.clone(), pace }
+        let (door, asks) = studio::world_door();
+        (Self { world, probe, clock: clock.clone(), pace, asks, wire }, door)
     }
 
     /// Moves the world to now.
@@ -42,6 +47,13 @@ impl WorldBus {
         if target > self.world.now() {
             self.world.run_until(target);
         }
+        self.asks.answer(&mut Outside(&mut self.world));
+        let counters = self.world.counters(self.probe);
+        self.wire.update(|health| {
+            health.state = Some(counters.state().word());
+            (health.transmit_errors, health.receive_errors) = (Some(counters.tec()), Some(counters.rec()));
+            health.error_frames = self.world.statistics().errors;
+        });
     }
 }
 
@@ -71,4 +83,22 @@ impl AsyncBus for WorldBus {
 
 fn elapsed(clock: &WallClock) -> Duration {
     clock.now() - Instant::ZERO
+}
+
+/// The world for a host that is asked about it.
+struct Outside<'a>(&'a mut World);
+
+impl Around for Outside<'_> {
+    fn forms(&self) -> Vec<&'static str> {
+        around::forms()
+    }
+
+    fn look(&mut self) -> serde_json::Value {
+        around::look(self.0)
+    }
+
+    fn change(&mut self, line: &str) -> Result<Changed, (&'static str, String)> {
+        let around::Changed { node, line, back, note } = around::change(self.0, line)?;
+        Ok(Changed { node, line, back, note })
+    }
 }

@@ -120,7 +120,6 @@ fn a_unix_socket_serves_the_same_is_private_and_goes_with_the_simulator() {
     std::fs::write(&path, "precious").unwrap();
     assert_eq!(ferrodrive(&[&["sim"], &arguments[..]].concat()).status, Some(1));
     assert_eq!(std::fs::read(&path).unwrap(), b"precious");
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]

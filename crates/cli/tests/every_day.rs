@@ -90,7 +90,6 @@ fn bytes_go_to_a_file_and_come_from_one() {
         let refused = ferrodrive(&["write", "4", "6060", "--from", &path]);
         assert!(refused.status == Some(1) && refused.err.contains(said), "{}", refused.err);
     }
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -187,7 +186,6 @@ fn a_log_is_filtered_by_node_service_and_object() {
         let refused = ferrodrive(&[&["--bus", &bus, "dump"], wrong].concat());
         assert_eq!(refused.status, Some(2), "{wrong:?}: {}", refused.err);
     }
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]

@@ -90,7 +90,6 @@ fn every_command_of_the_page_on_testing_ends_well() {
 fn every_command_of_the_page_on_logs_ends_well() {
     let folder = scratch("handbook_logs");
     assert_eq!(follow_in("logs.md", &folder), 10);
-    std::fs::remove_dir_all(folder).unwrap();
 }
 
 #[test]
@@ -99,7 +98,6 @@ fn every_command_of_the_page_on_parameters_ends_well() {
     std::fs::create_dir(folder.join("examples")).unwrap();
     std::fs::copy(root().join("examples/machine.toml"), folder.join("examples/machine.toml")).unwrap();
     assert_eq!(follow_in("configure-a-drive.md", &folder), 12);
-    std::fs::remove_dir_all(folder).unwrap();
 }
 
 #[test]

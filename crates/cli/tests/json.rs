@@ -80,7 +80,6 @@ fn a_bus_that_is_not_there_and_a_log_that_cannot_be_written_are_failures_of_the_
     is(&error, "file", None, None, None);
     let error = failed(&["sim", "--drive", "zlac8030l@4", "--log", picture.to_str().unwrap()], 1);
     assert!(error["message"].as_str().unwrap().contains("cannot write the log"), "{error}");
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -110,7 +109,6 @@ fn three_tenths_are_three_tenths() {
     let bus = format!("sim:{}", file.display());
     let read = done(&["--bus", &bus, "--json", "read", "4", "2026:01"]).out;
     assert!(read.contains("\"value\":303,\"quantity\":30.3,"), "{read}");
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]

@@ -182,7 +182,6 @@ fn files_and_logs_are_told_of_in_the_same_form() {
         let part = Ended { status: ended.status, out: out.to_owned(), err: String::new() };
         hold(&part, definition, definition);
     }
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]

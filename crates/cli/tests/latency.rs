@@ -34,7 +34,6 @@ fn on_a_virtual_bus_an_answer_takes_what_its_frame_takes_and_sync_is_even() {
     }
     assert_eq!(report["producer"], "this");
     assert!(std::fs::read_to_string(&svg).unwrap().starts_with("<svg "));
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]

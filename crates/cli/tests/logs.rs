@@ -34,7 +34,6 @@ fn a_command_logs_what_it_sends_and_hears_in_every_form() {
         logs.push(frames);
     }
     assert!(logs.iter().all(|log| *log == logs[0]), "the same command is the same log in every form");
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -61,7 +60,6 @@ fn a_log_goes_through_every_form_and_comes_out_as_it_was() {
     std::fs::write(path("letter.blf"), "Dear Sir").unwrap();
     let letter = ferrodrive(&["convert", &from, &path("letter.blf")]);
     assert!(letter.status == Some(1) && letter.err.contains("it exists and is no BLF log"), "{}", letter.err);
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -102,7 +100,6 @@ fn a_log_that_is_torn_is_told_and_read_as_far_as_it_goes() {
         "{}",
         missing.err
     );
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -126,7 +123,6 @@ fn a_replay_says_what_may_move_a_drive_before_it_sends_anything() {
     assert_eq!(count(&["--only", "received"], "sent"), 1, "what is not chosen needs no leave");
     assert_eq!(count(&["--only", "604", "--skip-motion"], "not_chosen"), 2);
     assert_eq!(count(&["--allow-motion", "--only", "sent"], "motion_sent"), 2);
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -144,7 +140,6 @@ fn a_replay_does_to_a_drive_what_was_done_when_the_log_was_written() {
     assert_ne!(state(), "Operation enabled");
     done(&["--bus", &bus, "replay", log, "--only", "sent", "--allow-motion"]);
     assert_eq!(state(), "Operation enabled");
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -163,5 +158,4 @@ fn a_log_of_a_killed_simulator_can_be_read_in_every_form() {
         let frames = frames(&log);
         assert!(frames.iter().any(|(frame, _)| frame.starts_with("584#43181001")), "{extension}: {frames:?}");
     }
-    std::fs::remove_dir_all(directory).unwrap();
 }

@@ -160,7 +160,6 @@ fn a_machine_file_says_which_models_are_where_on_any_bus() {
     let ended = bench.run(&["--machine", path, "scan"]);
     assert_eq!(ended.status, Some(2));
     assert!(ended.err.contains("did you mean zlac8030l?"), "{}", ended.err);
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]

@@ -172,7 +172,6 @@ fn a_joint_homes_on_the_switch_of_its_machine_file() {
     let homed = done(&["--bus", &bus, "--json", "home", "1", "--method", "17"]).json();
     assert_eq!(homed["reached"], true);
     assert!(homed["bits"].as_array().unwrap().contains(&json!("homing attained")), "{homed}");
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -232,7 +231,6 @@ fn the_dump_is_a_log_that_dump_reads() {
     let lines = again.out.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
     let line = lines.into_iter().find(|line| line["frame"] == "704#00").unwrap();
     assert_eq!(line["text"], "boot-up node 4");
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -248,7 +246,6 @@ fn a_machine_file_describes_the_bus() {
     let state = done(&["--bus", &bus, "--json", "state", "3"]).json();
     assert_eq!(state["fault_code"], 0x200);
     assert!(state["faults"][0]["remedy"].as_str().unwrap().contains("Hall"));
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -275,7 +272,6 @@ fn the_demo_of_one_drive_is_only_of_that_drive() {
     assert_eq!((&demo["ok"], demo["drives"].as_array().unwrap().len()), (&true.into(), 1));
     assert!(demo["rows"].as_array().unwrap().iter().all(|row| row["drive"] == "ZLTECH ZLIM42-C (70 mm)"));
     assert_eq!(ferrodrive(&["demo", "--drive", "toaster"]).status, Some(2));
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -302,5 +298,4 @@ fn the_demo_passes_and_draws() {
             assert!(sections.contains(&step), "{step:?} in {sections:?}");
         }
     }
-    std::fs::remove_dir_all(directory).unwrap();
 }

@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
-use common::{Ended, Simulator, command, done, ferrodrive, scratch};
+use common::{Ended, Scratch, Simulator, command, done, ferrodrive, scratch};
 
 /// A busy machine may take this long for anything.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-struct Folder(PathBuf);
+struct Folder(Scratch);
 
 impl Folder {
     fn new(name: &str) -> Self {
@@ -262,9 +262,10 @@ fn many_values(begin: i64) -> String {
     ramps.chain(windows).chain(communication).collect()
 }
 
+/// Waits for a journal that is whole: before its last line nothing is written to the node.
 fn wait_for(path: &Path, child: &mut Child) {
     let begin = Instant::now();
-    while !path.exists() {
+    while !std::fs::read_to_string(path).is_ok_and(|text| text.contains("whole = true")) {
         assert!(begin.elapsed() < PATIENCE, "no journal {}", path.display());
         if let Some(status) = child.try_wait().expect("a child") {
             panic!("it has ended: {status}");
@@ -344,6 +345,8 @@ fn what_a_pdo_cannot_carry_is_said_before_anything_is_written() {
         (&["tpdo1=statuswort"], "did you mean statusword"),
         (&["tpdo9=statusword"], "has no TPDO9; it has TPDO1, TPDO2, TPDO3, TPDO4"),
         (&["rpdo1=statusword"], "cannot be in RPDO1: it can only be read"),
+        // A dummy entry (CiA 301, 7.4.7.1), of which this drive takes none.
+        (&["rpdo1=0005,controlword"], "a zlac8030l has no object 0005h:00"),
         (&["tpdo1=statusword", "--inhibit", "100s"], "is not taken for the inhibit time"),
         (&["tpdo1=statusword", "--id", "0x601"], "another service"),
         (&["tpdo1=statusword", "tpdo2=6064", "--id", "0x185"], "--id is of one PDO"),

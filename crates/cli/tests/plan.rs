@@ -55,7 +55,6 @@ fn the_frames_of_a_cycle_have_the_times_that_are_counted_by_hand() {
     }
     let text = done(&["plan", file, "--cycle", "5ms", "--mode", "pv"]).out;
     assert!(text.contains("everything is there in time") && text.contains("here are 2"), "{text}");
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]

@@ -37,7 +37,6 @@ fn a_scenario_that_passes_ends_with_0_and_one_with_a_false_expectation_with_1_an
     assert_eq!(said["ok"], false);
     let rows = said["rows"].as_array().unwrap();
     assert!(rows.iter().any(|row| row["verdict"] == "failed" && row["seen"] == "fault 0002h"), "{said}");
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -63,7 +62,6 @@ fn a_sweep_tells_how_many_failed_how_figures_are_spread_and_how_to_repeat_a_run(
     assert!(failed.out.contains(&again) && failed.out.contains("2 of 3 runs passed, 1 failed"), "{}", failed.out);
     let repeated = ferrodrive(&["run", path, "--seed", "5", "--set", "held=333ms"]);
     assert_eq!(repeated.status, Some(1));
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -109,7 +107,6 @@ fn of_several_scenarios_each_is_a_row_and_a_suite_and_one_that_fails_is_enough()
     let nobodys = ferrodrive(&["run", &fine, &wrong, "--set", "levle=1"]);
     assert_eq!(nobodys.status, Some(2));
     assert!(nobodys.err.contains("none of the 2 scenarios has a parameter 'levle'"), "{}", nobodys.err);
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -128,7 +125,6 @@ fn a_sweep_says_when_the_seed_makes_no_difference_and_what_would() {
     std::fs::write(&file, random).unwrap();
     let swept = ferrodrive(&["run", file.to_str().unwrap(), "--seeds", "1..2", "--json"]);
     assert_eq!(swept.json()["seeds_differ"], true, "{}", swept.out);
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -152,5 +148,4 @@ fn what_cannot_be_run_is_refused_with_its_place() {
     refused(&["run", "/nowhere.toml"], "cannot use the scenario /nowhere.toml");
     refused(&["run", path, "--seeds", "9..1"], "FIRST..LAST");
     refused(&["--timeout", "1s", "run", path], "--timeout means nothing to run");
-    std::fs::remove_dir_all(directory).unwrap();
 }

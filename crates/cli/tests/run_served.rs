@@ -5,16 +5,17 @@ mod common;
 use std::path::{Path, PathBuf};
 
 use common::raw_bus::RawBus;
-use common::{Simulator, done, ferrodrive, scratch};
+use common::{Scratch, Simulator, done, ferrodrive, scratch};
 use serde_json::Value;
 
 const SERVE: [&str; 2] = ["--serve", "socketcand://127.0.0.1:0"];
 
 /// A scenario of a ZLAC8030L at node 4 in a directory of the test's own.
-fn scenario(name: &str, rest: &str) -> PathBuf {
-    let file = scratch(name).join("scenario.toml");
+fn scenario(name: &str, rest: &str) -> (Scratch, PathBuf) {
+    let folder = scratch(name);
+    let file = folder.join("scenario.toml");
     std::fs::write(&file, format!("machine = {{ drive = [{{ model = 'zlac8030l', node = 4 }}] }}\n{rest}")).unwrap();
-    file
+    (folder, file)
 }
 
 fn start(file: &Path, options: &[&str]) -> Simulator {
@@ -40,7 +41,7 @@ fn rows(report: &Value) -> Vec<(&str, &str, &str)> {
 
 #[test]
 fn a_host_outside_meets_what_the_scenario_does_to_its_drive_and_the_end_is_that_of_the_scenario() {
-    let file = scenario(
+    let (_folder, file) = scenario(
         "served",
         "limit = '60s'\n[[step]]\nname = 'brown-out'\nwhen = '4 event target reached'\ndo = '4 supply 12'\n\
          [[expect]]\nthat = '4 event fault 0x0002'\nafter = 'brown-out'\nwithin = '200ms'\n\
@@ -60,12 +61,11 @@ fn a_host_outside_meets_what_the_scenario_does_to_its_drive_and_the_end_is_that_
         }),
         "{seen:?}"
     );
-    std::fs::remove_dir_all(file.parent().unwrap()).unwrap();
 }
 
 #[test]
 fn time_begins_with_the_first_client_and_what_is_open_at_the_limit_has_failed() {
-    let file = scenario("served-idle", "limit = '300ms'\n[[expect]]\nthat = '4 velocity > 5'\n");
+    let (_folder, file) = scenario("served-idle", "limit = '300ms'\n[[expect]]\nthat = '4 velocity > 5'\n");
     let mut served = start(&file, &[&SERVE[..], &["--json"]].concat());
     std::thread::sleep(std::time::Duration::from_millis(500));
     assert!(served.is_running(), "time stands until somebody is there");
@@ -74,12 +74,11 @@ fn time_begins_with_the_first_client_and_what_is_open_at_the_limit_has_failed() 
     drop(client);
     assert_eq!((status, &report["ok"], &report["end_s"]), (Some(1), &false.into(), &0.3.into()), "{report:#}");
     assert_eq!(rows(&report)[0].2, "not by the end of the run: 0 r/min");
-    std::fs::remove_dir_all(file.parent().unwrap()).unwrap();
 }
 
 #[test]
 fn the_adapter_of_a_host_outside_can_be_cut_and_joined() {
-    let file = scenario(
+    let (_folder, file) = scenario(
         "served-cut",
         "end = '3s'\n[[step]]\nname = 'cut'\nat = '1s'\ndo = 'host cut'\n[[step]]\nname = 'join'\nat = '2s'\ndo = 'host join'\n\
          [[expect]]\nnever = 'frame 604#'\nafter = 'cut'\nuntil = '2s'\n[[expect]]\nthat = 'frame 584#'\nafter = 'join'\n",
@@ -99,12 +98,11 @@ fn the_adapter_of_a_host_outside_can_be_cut_and_joined() {
     let (status, report) = end(served);
     assert_eq!(status, Some(0), "{report:#}");
     assert_eq!(report["end_s"], 3.0);
-    std::fs::remove_dir_all(file.parent().unwrap()).unwrap();
 }
 
 #[test]
 fn moved_by_hand_two_runs_are_the_same_to_the_last_frame() {
-    let file = scenario("served-manual", "end = '1s'\n[[step]]\nat = '500ms'\ndo = '4 supply 12'\n");
+    let (_folder, file) = scenario("served-manual", "end = '1s'\n[[step]]\nat = '500ms'\ndo = '4 supply 12'\n");
     let digest = || {
         let served = start(&file, &["--control", "127.0.0.1:0", "--clock", "manual", "--json"]);
         done(&["world", "--control", &served.address("control"), "run", "5s"]);
@@ -113,24 +111,22 @@ fn moved_by_hand_two_runs_are_the_same_to_the_last_frame() {
         report["digest"].clone()
     };
     assert_eq!(digest(), digest());
-    std::fs::remove_dir_all(file.parent().unwrap()).unwrap();
 }
 
 #[cfg(unix)]
 #[test]
 fn a_signal_ends_it_with_what_was_seen_until_then() {
-    let file = scenario("served-signal", "limit = '60min'\n[[expect]]\nthat = '4 velocity > 5'\n");
+    let (_folder, file) = scenario("served-signal", "limit = '60min'\n[[expect]]\nthat = '4 velocity > 5'\n");
     let mut served = start(&file, &SERVE);
     served.signal("-TERM");
     assert_eq!(served.wait(), Some(143));
     let text = served.lines_left().join("\n");
     assert!(text.contains("4 velocity > 5") && text.contains("0 of 1 as expected"), "{text}");
-    std::fs::remove_dir_all(file.parent().unwrap()).unwrap();
 }
 
 #[test]
 fn what_makes_no_sense_together_is_refused() {
-    let file = scenario("served-refused", "end = '1s'\n");
+    let (_folder, file) = scenario("served-refused", "end = '1s'\n");
     let file = file.to_str().unwrap();
     for (options, said) in [
         (&["--serve", "socketcand://127.0.0.1:0", "--seeds", "1..3"][..], "a sweep is many runs"),
@@ -145,5 +141,4 @@ fn what_makes_no_sense_together_is_refused() {
         assert_eq!(ended.status, Some(2), "{options:?}: {}", ended.err);
         assert!(ended.err.contains(said), "{options:?}: {}", ended.err);
     }
-    std::fs::remove_dir_all(Path::new(file).parent().unwrap()).unwrap();
 }

@@ -62,7 +62,6 @@ fn objects_that_all_models_name_alike_are_named_without_a_model_and_have_no_unit
     }
     let known = dump(&log, &["--model", "4=zlac8030l"]).out;
     assert!(known.contains("606Ch:00 velocity_actual_value = -60 [0.1 r/min]"), "{known}");
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -93,5 +92,4 @@ fn a_line_that_is_no_frame_is_told_with_its_number_and_passed_over() {
     let shown = dump(&log, &[]);
     assert_eq!(shown.status, Some(1));
     assert!(shown.err.contains("no frame, and 1000 passed over") && shown.err.lines().count() < 30, "{}", shown.err);
-    std::fs::remove_dir_all(directory).unwrap();
 }

@@ -36,7 +36,6 @@ fn a_machine_file_and_the_command_line_put_drives_on_one_bus() {
     let mut alone = Simulator::start(&[&["--machine", path, "--bitrate", "500k"][..], &serve].concat());
     assert_eq!(read(&alone.bus("socketcand"), "4", "200E")["meaning"], "500 kbit/s");
     assert_eq!(alone.ask("1 get")["ok"], false);
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -190,7 +189,6 @@ fn what_was_saved_is_there_after_quit_and_only_then() {
     let fresh = simulator(&[]);
     let bus = fresh.bus("socketcand");
     assert_eq!(done(&["--bus", &bus, "--json", "read", "4", "200A"]).json()["value"], 1000);
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -209,7 +207,6 @@ fn a_kill_at_any_moment_leaves_an_old_or_a_new_image() {
         std::thread::sleep(Duration::from_millis(23 * round as u64));
         simulator.kill();
     }
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -225,7 +222,6 @@ fn an_image_is_on_the_disk_within_a_second_and_a_half() {
     let bus = second.bus("socketcand");
     assert_eq!(done(&["--bus", &bus, "--json", "read", "4", "200A"]).json()["value"], 700);
     drop(second);
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -236,7 +232,6 @@ fn a_corrupt_image_is_reported_and_not_used() {
     assert_eq!(ended.status, Some(1));
     assert!(ended.err.contains("corrupt") && ended.err.contains("zlac8030l@4.eeprom"), "{}", ended.err);
     assert!(!ended.out.contains("ready"));
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -252,7 +247,6 @@ fn every_frame_is_in_the_log() {
     for frame in ["can0 704#00", "can0 604#400B200000000000", "can0 584#4B0B200000040000"] {
         assert!(text.contains(frame), "{frame} in {text}");
     }
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]
@@ -287,5 +281,4 @@ fn everything_that_the_drives_of_a_machine_file_do_not_take_is_told_at_once() {
     for expected in ["line 4", "has no battery", "line 8", "X0, X1, X2, X3"] {
         assert!(ended.err.contains(expected), "{expected}: {}", ended.err);
     }
-    std::fs::remove_dir_all(place).unwrap();
 }

@@ -77,7 +77,6 @@ fn a_store_is_there_after_every_end_that_came_with_its_acknowledgement() {
         assert_eq!(simulator.wait(), status, "{end}");
         assert_eq!(found(&state), value, "after {end}");
     }
-    std::fs::remove_dir_all(state).unwrap();
 }
 
 #[test]
@@ -116,7 +115,6 @@ fn a_kill_in_a_stream_of_stores_loses_none_that_was_acknowledged() {
     }
     let _ = writeln!(std::io::stderr(), "{kills} kills, {stores} acknowledged stores, none lost");
     assert!(stores > 0);
-    std::fs::remove_dir_all(state).unwrap();
 }
 
 #[test]
@@ -135,7 +133,6 @@ fn what_a_joint_says_to_have_saved_survives_a_kill() {
         let answer = bus.upload(1, SAVED, 0).unwrap();
         assert!(answer.starts_with(&format!("4B042600{value:02X}")), "{answer} after {value}");
     }
-    std::fs::remove_dir_all(state).unwrap();
 }
 
 /// One Modbus request of the joint, of function, address and a count or value; the answer after its function code.
@@ -164,5 +161,4 @@ fn what_a_joint_says_over_modbus_to_have_saved_survives_a_kill() {
         let mut line = TcpStream::connect(again.address("modbus")).unwrap();
         assert_eq!(register(&mut line, 3, SAVED_REGISTER, 1), [2, 0, value]);
     }
-    std::fs::remove_dir_all(state).unwrap();
 }

@@ -134,7 +134,6 @@ fn machine_files_are_checked() {
         refused(&["sim", "--machine", pipe], &["it is no file but a directory, a pipe or a device"]);
         refused(&["--bus", &format!("sim:{pipe}"), "scan"], &["it is no file"]);
     }
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 /// A terminal obeys ESC (1Bh) and CSI (9Bh): ECMA-48, 5.3 and 5.4.
@@ -171,7 +170,6 @@ fn control_characters_of_others_are_not_echoed() {
         assert_eq!(ended.status, Some(2), "{said:?}");
         assert!(!said.contains(|c: char| c.is_control() && c != '\n'), "{said:?}");
     }
-    std::fs::remove_dir_all(directory).unwrap();
 }
 
 #[test]

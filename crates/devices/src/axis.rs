@@ -1,5 +1,5 @@
 use canopen::Mux;
-use cia402::{ModeOfOperation, PowerState, Statusword};
+use cia402::{HomingMethod, HomingRow, HomingSequence, ModeOfOperation, PowerState, Statusword};
 
 use crate::placement::Placement;
 use crate::terminals::Terminals;
@@ -122,9 +122,24 @@ pub struct HomingRules {
     pub attained: BitPattern,
     /// How the statusword tells that it was not.
     pub failed: BitPattern,
+    /// What its methods do, where they are not those of CiA 402-2, clause 11; empty where they are.
+    pub own_methods: &'static [HomingRow],
+    /// The inputs that it takes for switches while it looks, as a drive of one axis has them.
+    pub switches: Terminals,
+    /// What to know of the methods, in a sentence; empty if nothing.
+    pub remark: &'static str,
 }
 
 impl HomingRules {
+    /// What a method does on this drive; `None` for a number that neither it nor the standard defines.
+    pub fn sequence(&self, method: HomingMethod) -> Option<HomingSequence> {
+        if self.own_methods.is_empty() {
+            return method.sequence();
+        }
+        let row = self.own_methods.iter().find(|row| row.method == method)?;
+        Some(HomingSequence { switch: Some(row), index: None })
+    }
+
     const fn placed(self, placement: Placement) -> Self {
         Self {
             method: placement.place(self.method),

@@ -20,6 +20,8 @@ pub struct Description {
     pub manual: &'static str,
     /// What 1000h and 1018h answer.
     pub identity: Identity,
+    /// Where that says what of its objects, by indexes; none for a file, which is read as a whole.
+    pub sections: &'static [Section],
     /// An object that, by their manuals, no model of the same identity and other objects has. That it is there speaks for
     /// the model and proves nothing: the next firmware of the other may have it too.
     pub distinguishing_object: Option<Mux>,
@@ -54,7 +56,30 @@ pub struct Description {
     pub editions: &'static [Edition],
 }
 
+/// A part of a manual, and the objects that it is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Section {
+    /// The first index.
+    pub from: u16,
+    /// The last one.
+    pub to: u16,
+    /// By the manual's own numbers or headings.
+    pub section: &'static str,
+}
+
+impl Section {
+    /// The objects of these indexes, ends included.
+    pub const fn of(from: u16, to: u16, section: &'static str) -> Self {
+        Self { from, to, section }
+    }
+}
+
 impl Description {
+    /// Where the [`manual`](Self::manual) tells of the objects of an index; `None` where that is not known.
+    pub fn section(&self, index: u16) -> Option<&'static str> {
+        self.sections.iter().find(|part| (part.from..=part.to).contains(&index)).map(|part| part.section)
+    }
+
     /// The first axis; `None` for a device that is no drive.
     pub const fn first_axis(&self) -> Option<&'static AxisDescription> {
         self.axes.first()

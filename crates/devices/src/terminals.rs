@@ -19,13 +19,14 @@ impl Terminals {
     /// No object shows any.
     pub const NONE: Self = Self { levels: None, polarity: None, inputs: &[], brake: None };
 
-    /// CiA 402-2, 60FDh and 60FEh: limit switches, and the brake by bit 0 where the mask of 60FEh:02 lets the host have it.
+    /// CiA 402-2, 60FDh and 60FEh: limit switches, home switch, and the brake by bit 0 where the mask of 60FEh:02 lets the host have it.
     pub const CIA402: Self = Self {
         levels: Some(Mux::new(0x60FD, 0)),
         polarity: None,
         inputs: &[
             Input { name: "negative limit switch", bit: 0, meaning: Meaning::Fixed(InputSignal::NegativeLimit) },
             Input { name: "positive limit switch", bit: 1, meaning: Meaning::Fixed(InputSignal::PositiveLimit) },
+            Input { name: "home switch", bit: 2, meaning: Meaning::Fixed(InputSignal::Home) },
         ],
         brake: Some(BrakeOutput {
             name: "set brake",
@@ -34,6 +35,12 @@ impl Terminals {
             mask: Some(Mux::new(0x60FE, 2)),
         }),
     };
+
+    /// Whether an input is active, from the values of [`levels`](Self::levels) and [`polarity`](Self::polarity) (0 where there
+    /// is none).
+    pub const fn is_active(input: &Input, levels: i64, polarity: i64) -> bool {
+        (levels ^ polarity) >> input.bit & 1 == 1
+    }
 }
 
 /// A digital input.
@@ -73,7 +80,7 @@ impl Meaning {
     }
 }
 
-/// What an active input says that keeps a motor from moving.
+/// What an active input says of where the shaft is, or that the motor is to stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InputSignal {
     /// The motor is to stop.
@@ -82,6 +89,8 @@ pub enum InputSignal {
     NegativeLimit,
     /// The shaft is at the positive end.
     PositiveLimit,
+    /// The shaft is at the home switch.
+    Home,
 }
 
 impl InputSignal {
@@ -91,6 +100,7 @@ impl InputSignal {
             Self::EmergencyStop => "emergency stop",
             Self::NegativeLimit => "negative limit",
             Self::PositiveLimit => "positive limit",
+            Self::Home => "home switch",
         }
     }
 }

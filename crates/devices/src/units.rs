@@ -5,7 +5,7 @@ use crate::placement::Placement;
 /// What raw values are worth. A field is `None` where the axis has no such object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Units {
-    /// Counts of position in one turn of the motor's shaft.
+    /// Counts of position in one turn of the drive's shaft.
     pub counts_per_turn: CountsPerTurn,
     /// Target velocity, in r/min.
     pub target_velocity: Option<Quantity>,
@@ -77,6 +77,11 @@ impl Quantity {
         Self { object: Mux::new(index, sub_index), scale: Scale::PerCount(per_count) }
     }
 
+    /// An object that holds a speed of the drive's shaft, and how many r/min one count is.
+    pub const fn speed(index: u16, sub_index: u8, rpm: f64) -> Self {
+        Self { object: Mux::new(index, sub_index), scale: Scale::Shaft(rpm) }
+    }
+
     pub(crate) const fn placed(self, placement: Placement) -> Self {
         Self { object: placement.place(self.object), scale: self.scale.placed(placement) }
     }
@@ -87,6 +92,8 @@ impl Quantity {
 pub enum Scale {
     /// This many physical units.
     PerCount(f64),
+    /// This many r/min of the drive's shaft, or (r/min)/s. What it is of the machine depends on the gear behind the shaft.
+    Shaft(f64),
     /// This many counts of position, for each second or each second squared: velocities and accelerations as CiA 402-2 has
     /// them in the absence of other units. Its physical unit is r/min, or (r/min)/s.
     Positions(f64),

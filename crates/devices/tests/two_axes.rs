@@ -14,8 +14,8 @@ const AXIS: AxisDescription = AxisDescription {
     homing: None,
     units: Units {
         counts_per_turn: CountsPerTurn::Fixed(4096),
-        target_velocity: Some(Quantity::new(0x60FF, 0, 1.0)),
-        actual_velocity: Some(Quantity::new(0x606C, 0, 0.1)),
+        target_velocity: Some(Quantity::speed(0x60FF, 0, 1.0)),
+        actual_velocity: Some(Quantity::speed(0x606C, 0, 0.1)),
         profile_velocity: None,
         ramps: Some(Ramps::Times {
             acceleration: Mux::new(0x6083, 0),

@@ -95,6 +95,7 @@ pub mod drive;
 mod error;
 pub mod explain;
 pub mod gateway;
+mod gear;
 pub mod group;
 mod host_loss;
 pub mod identify;
@@ -110,6 +111,7 @@ pub mod units;
 
 pub use drive::{Drive, MotionOptions};
 pub use error::{Access, Error, Hints};
+pub use gear::{Gear, GearError};
 pub use models::Models;
 pub use network::{
     DEFAULT_TIMEOUT, Elapsed, Exchange, Network, NextSync, NoCycle, Node, NodeView, Sleep, Wait, join_all,

@@ -143,8 +143,7 @@ impl GearModel {
 
     /// Twist beyond the backlash: what the spring feels.
     pub fn windup_rad(&self, twist_rad: f64) -> f64 {
-        let half = 0.5 * self.backlash_rad;
-        twist_rad - twist_rad.max(-half).min(half)
+        self.contact(twist_rad).windup_rad
     }
 
     /// Energy in the spring.
@@ -181,7 +180,7 @@ impl GearModel {
         if load.locked {
             data.output_velocity_rad_s = 0.0;
         }
-        let windup_rad = self.windup_rad(data.twist_rad);
+        let Contact { windup_rad, side } = self.contact(data.twist_rad);
         // The ratio of the moment, in the middle of the step as far as it can be known.
         let lead = if self.kinematic_error_rad == 0.0 {
             0.0
@@ -189,8 +188,7 @@ impl GearModel {
             let half_way = dt_s * (motor.velocity_rad_s + 0.5 * motor.velocity_change_rad_s);
             2.0 * self.kinematic_error_rad * data.error_axis.turned_by(Axis::at_small_rad(half_way)).cos
         };
-        let masses = Masses::new(self, data, rotor, motor, lead, dt_s, input);
-        let side = self.side(data.twist_rad);
+        let masses = Masses::new(self, data, rotor, motor, (lead, side), dt_s, input);
         let (spring_nm, coupling) = if side == 0.0 {
             (0.0, 0.0)
         } else {
@@ -200,7 +198,7 @@ impl GearModel {
         if self.backlash_rad != 0.0 {
             // Teeth push, they do not pull.
             let pulls = moved.torque_nm * side < 0.0;
-            if pulls || self.side(data.twist_rad + dt_s * moved.twist_rate) != side {
+            if pulls || self.contact(data.twist_rad + dt_s * moved.twist_rate).side != side {
                 moved = self.solve_crossing(&masses, data.twist_rad, dt_s, moved);
             }
         }
@@ -264,16 +262,18 @@ impl GearModel {
         }
     }
 
-    /// Which flanks touch at a twist: 1 or -1, 0 for none. Without backlash it is all one.
+    /// How the teeth touch at a twist.
     #[inline]
-    fn side(&self, twist_rad: f64) -> f64 {
+    fn contact(&self, twist_rad: f64) -> Contact {
         let half = 0.5 * self.backlash_rad;
-        if half == 0.0 || twist_rad > half {
-            1.0
+        if twist_rad > half {
+            Contact { windup_rad: twist_rad - half, side: 1.0 }
+        } else if half == 0.0 {
+            Contact { windup_rad: twist_rad, side: 1.0 }
         } else if twist_rad < -half {
-            -1.0
+            Contact { windup_rad: twist_rad + half, side: -1.0 }
         } else {
-            0.0
+            Contact { windup_rad: 0.0, side: 0.0 }
         }
     }
 
@@ -297,6 +297,15 @@ impl GearModel {
         let (before, after) = (self.windup_rad(twist_rad), self.windup_rad(twist_rad + way_rad));
         mean_spring_torque(self.stiffness_nm_rad, before, after, way_rad)
     }
+}
+
+/// How the teeth of a gear touch.
+#[derive(Debug, Clone, Copy)]
+struct Contact {
+    /// Twist beyond the backlash: what the spring feels.
+    windup_rad: f64,
+    /// Which flanks touch: 1 or -1, 0 for none. Without backlash it is all one.
+    side: f64,
 }
 
 /// Mean torque of a one-sided spring that is wound up from `before` to `after` while its end moves by `way_rad`, and its slope
@@ -342,7 +351,7 @@ impl Masses {
         data: &GearData,
         rotor: &RotorModel,
         shaft: &RotorData,
-        lead: f64,
+        (lead, side): (f64, f64),
         dt_s: f64,
         input: &GearInput<'_>,
     ) -> Self {
@@ -353,8 +362,7 @@ impl Masses {
         let output = (gear.output_inertia_kg_m2 + load.inertia_kg_m2) * twice_rate;
         let viscous = [rotor.viscous_nm_s + gear.viscous_nm_s, load.viscous_nm_s];
         // Of the torque a step ago; none of that of an impact whose teeth have parted since.
-        let touching = gear.side(data.twist_rad) != 0.0;
-        let mesh_nm = if touching { gear.mesh_loss * data.torque_nm.abs() * inverse_ratio } else { 0.0 };
+        let mesh_nm = if side != 0.0 { gear.mesh_loss * data.torque_nm.abs() * inverse_ratio } else { 0.0 };
         Masses {
             before: [shaft.velocity_rad_s, data.output_velocity_rad_s],
             sum: [motor + viscous[0], output + viscous[1]],

@@ -13,7 +13,7 @@ use std::time::Duration;
 use canopen::{Mux, NmtCommand, NodeId};
 use master::drive::{Drive, HomingOptions, MotionOptions, SwitchedOff};
 use master::units::{Amperes, Angle, Ramp, Rpm};
-use master::{Error, Network as Core, Node};
+use master::{Error, Gear, Network as Core, Node};
 use pyo3::prelude::*;
 use transport::BusSpec;
 
@@ -55,6 +55,13 @@ struct Order {
     wait: bool,
     #[pyo3(item, default)]
     limit_s: Option<f64>,
+    #[pyo3(item, default)]
+    gear_ratio: Option<f64>,
+}
+
+/// What stands behind a shaft.
+fn gear(ratio: Option<f64>) -> PyResult<Gear> {
+    ratio.map_or(Ok(Gear::DIRECT), |ratio| Gear::new(ratio).map_err(|error| bad_value(error.to_string())))
 }
 
 impl Order {
@@ -195,7 +202,7 @@ impl Network {
 
     /// Does what an order says with a drive of a model.
     fn drive(&self, py: Python<'_>, node: u8, model: &str, order: Order) -> PyResult<Job> {
-        let drive = Drive::new(self.node(node)?, model_of(model)?);
+        let drive = Drive::new(self.node(node)?, model_of(model)?).behind(gear(order.gear_ratio)?);
         match order.do_.as_str() {
             "enable" => self.begin(py, async move { drive.enable().await.map(|()| Value::None) }),
             "disable" => self.begin(py, async move { drive.disable().await.map(|()| Value::None) }),

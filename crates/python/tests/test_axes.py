@@ -49,6 +49,17 @@ def test_axes_begin_and_end_together_where_they_were_sent(world, network):
     assert network.drive(1, "cia402").state()["power"] != "Operation enabled"
 
 
+def test_axes_behind_gears_are_moved_by_what_the_outputs_do(world, network):
+    before = [world[node].shaft_angle_rad for node in (1, 2)]
+    geared = {**SERVO, "velocity_rpm": SERVO["velocity_rpm"] / 10, "acceleration_rpm_s": SERVO["acceleration_rpm_s"] / 10}
+    axes = [ferrodrive.Axis(1, "cia402", gear_ratio=10, **geared), ferrodrive.Axis(2, "cia402", **SERVO)]
+    with network.group(axes, period=0.001) as group:
+        group.move([36, -90])
+        network.sleep(0.2)
+        turned = [math.degrees(world[node].shaft_angle_rad - angle) for node, angle in zip((1, 2), before)]
+        assert turned == pytest.approx([360, -90], abs=1)
+
+
 def test_a_path_of_points_is_followed(world, network):
     # A cycloid of 45 degrees in half a second: from rest and to rest, its acceleration too.
     shares = [cycle / 500 for cycle in range(1, 501)]

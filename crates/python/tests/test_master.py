@@ -32,6 +32,21 @@ def test_a_move_by_an_angle_turns_the_shaft_by_it(world):
         assert state["fault_code"] == 0 and state["angle_deg"] == pytest.approx(90, abs=0.5)
 
 
+def test_behind_a_gear_an_angle_is_the_outputs(world):
+    with ferrodrive.Network(world) as network:
+        network.wait_for(5)
+        before = world[5].shaft_angle_rad
+        drive = network.drive(5, "cia402", gear_ratio=20)
+        report = drive.move(18, relative=True, speed_rpm=2)
+        network.sleep(0.5)
+        assert math.degrees(world[5].shaft_angle_rad - before) == pytest.approx(360, abs=0.5)
+        # A twentieth of a turn at 2 r/min takes 1.5 s.
+        assert 1.4 <= report["reached_after_s"] < 6
+        assert drive.state()["angle_deg"] == pytest.approx(18, abs=0.05)
+        with pytest.raises(ValueError, match="gear ratio of -2"):
+            network.drive(5, "cia402", gear_ratio=-2).stop()
+
+
 def test_sdo_carries_bytes_and_refusals_say_why(world):
     with ferrodrive.Network(world) as network:
         network.wait_for(5)

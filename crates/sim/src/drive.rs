@@ -97,6 +97,11 @@ pub trait VirtualDrive: Station + VirtualDriveClone + Send {
     /// Names of the digital inputs, e.g. `X0`, `X1`; an input is addressed by its place in this list.
     fn inputs(&self) -> &'static [&'static str];
 
+    /// The levels at the digital inputs now.
+    fn input_levels(&self) -> Levels {
+        Levels::default()
+    }
+
     /// [`Power::On`] or [`Power::Off`]: no drive refuses them.
     fn set_power(&mut self, on: bool, now: Instant) {
         let _ = self.apply(AxisId::FIRST, &Stimulus::Power(if on { Power::On } else { Power::Off }), now);
@@ -279,13 +284,13 @@ pub struct Levels {
     /// One name for each level.
     pub names: &'static [&'static str],
     /// Bit `n` is the level of `names[n]`.
-    pub bits: u32,
+    pub bits: u64,
 }
 
 impl Levels {
     /// Levels and their names, in the same order.
     pub fn new(names: &'static [&'static str], levels: &[bool]) -> Self {
-        let bits = levels.iter().enumerate().fold(0, |bits, (n, level)| bits | u32::from(*level) << n);
+        let bits = levels.iter().enumerate().fold(0, |bits, (n, level)| bits | u64::from(*level) << n);
         Levels { names, bits }
     }
 

@@ -18,6 +18,7 @@ mod parse;
 mod place;
 mod print;
 mod range;
+mod way_back;
 mod words;
 
 pub use body::{BodyStimulus, GET_BODY};

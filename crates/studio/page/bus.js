@@ -2,6 +2,7 @@
 
 import { ask } from "./link.js";
 import { h, hex, number, say } from "./dom.js";
+import { pointed } from "./help.js";
 
 const COLUMNS = ["Node", "Model", "NMT state", "Heartbeat", "Power state", "Position", "Speed", "Fault", "Identity (1018h)"];
 
@@ -9,10 +10,12 @@ export function busView(shared, open) {
   const scan = h("button", { type: "button", id: "scan", onclick: () => ask({ do: "scan" }) }, "Scan");
   const rows = h("tbody");
   const empty = h("p", { class: "quiet" });
+  const wire = h("p", { id: "wire", role: "status" });
   const root = h(
     "section",
     { class: "bus" },
     h("div", { class: "bar" }, h("h2", {}, "Bus"), scan),
+    wire,
     h("table", {}, h("thead", {}, h("tr", {}, ...COLUMNS.map((title) => h("th", { scope: "col" }, title)))), rows),
     empty,
   );
@@ -28,7 +31,20 @@ export function busView(shared, open) {
     return h("tr", { "data-node": String(node), onclick: look }, ...cells);
   }
 
+  /** Load, and what the controller and the connection tell of errors. */
+  function tellWire({ frames_per_s, load_percent, bitrate, health }) {
+    const rate = bitrate === null ? "bit rate not known" : `${bitrate / 1000} kbit/s`;
+    const load = load_percent === null ? "" : `, load ${number(load_percent, 1)} %`;
+    const count = (value, what) => (value === null ? [] : [`${what} ${value}`]);
+    const counters = [...count(health.transmit_errors, "transmit error counter"), ...count(health.receive_errors, "receive error counter")];
+    const lost = health.frames_lost ? [`${health.frames_lost} frames lost`] : [];
+    const errors = health.state === null && !counters.length && !health.error_frames ? ["the bus has told of no errors"] : [health.state ?? "controller", ...counters, `${health.error_frames} error frames`];
+    say(wire, `${rate}, ${frames_per_s} frames/s${load} · ${[...errors, ...lost].join(", ")}`);
+    wire.className = ["bus-off", "error-passive", "connection lost"].includes(health.state) || lost.length ? "bad" : "quiet";
+  }
+
   function update(state) {
+    tellWire(state.bus);
     scan.disabled = state.scanning;
     say(scan, state.scanning ? "Scanning …" : "Scan");
     const nodes = state.nodes.map((node) => String(node.node));
@@ -45,6 +61,9 @@ export function busView(shared, open) {
       say(cells[3], node.heartbeat_age_ms === null ? "none heard" : `${number(node.heartbeat_age_ms / 1000, 1)} s ago`);
       say(cells[4], node.trouble ? "no answer" : (drive?.state ?? "–"));
       cells[4].className = drive?.state === "Operation enabled" ? "good" : "";
+      pointed(cells[2], "nmt", node.nmt ?? "–", node.node);
+      pointed(cells[4], "state", drive?.state ?? "–", node.node);
+      pointed(cells[7], "fault", drive?.faults[0]?.name ?? "none", node.node);
       say(cells[5], drive?.angle_degrees === null || !drive ? "–" : `${number(drive.angle_degrees, 1)}°`);
       say(cells[6], drive?.velocity_rpm === null || !drive ? "–" : `${number(drive.velocity_rpm, 1)} r/min`);
       const fault = drive && drive.fault_code !== 0 ? `${hex(drive.fault_code, 4)} ${drive.faults.map((row) => row.name).join(", ")}` : "none";

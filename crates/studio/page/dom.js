@@ -34,6 +34,9 @@ export function renew(element, key, make) {
 /** A number with a fixed count of decimals, or a dash. */
 export const number = (value, decimals) => (value === null || value === undefined ? "–" : value.toFixed(decimals));
 
+/** `1 write`, `2 writes`. */
+export const count = (many, one) => `${many} ${one}${many === 1 ? "" : "s"}`;
+
 /** `6041h`. */
 export const hex = (value, digits) =>
   value === null || value === undefined ? "–" : `${value.toString(16).toUpperCase().padStart(digits, "0")}h`;

@@ -2,6 +2,7 @@
 
 import { ask } from "./link.js";
 import { h, hex, number, renew, say } from "./dom.js";
+import { term, terms } from "./help.js";
 import { powerMachine } from "./machine.js";
 
 /** Label, field, decimals, unit. */
@@ -113,22 +114,22 @@ export function driveView(shared) {
     const steps = drive?.way.map((step) => `${hex(step.controlword, 2)} → ${step.to}`).join(", then ");
     const without = drive && !drive.has_state_machine ? " This model has no power state machine: its statusword echoes the controlword, and the state shown is the one that comes closest." : "";
     say(way, !drive ? "" : drive.state === "Operation enabled" ? `It follows set-points.${without}` : (steps ? `To Operation enabled: ${steps}.` : "It has to act first.") + without);
-    renew(faults, drive ? `${drive.fault_code} ${drive.faults.length}` : "", () => {
+    renew(faults, drive ? `${node.node} ${drive.fault_code} ${drive.faults.length}` : "", () => {
       if (!drive) return [];
       if (drive.fault_code === 0) return [h("li", { class: "good" }, "None")];
-      const rows = drive.faults.map((row) => h("li", { class: "bad" }, h("b", {}, row.name), h("p", {}, row.remedy)));
+      const rows = drive.faults.map((row) => h("li", { class: "bad" }, term("fault", row.name, node.node), h("p", {}, row.remedy)));
       return rows.length ? rows : [h("li", { class: "bad" }, `${hex(drive.fault_code, 4)}: no table here explains it`)];
     });
-    renew(words, drive ? `${drive.statusword} ${drive.controlword} ${drive.mode}` : "", () =>
+    renew(words, drive ? `${node.node} ${drive.statusword} ${drive.controlword} ${drive.mode}` : "", () =>
       !drive
         ? []
         : [
             h("dt", {}, `Statusword ${hex(drive.statusword, 4)}`),
-            h("dd", {}, drive.status_bits.join(", ") || "no bit is set"),
+            h("dd", {}, ...(drive.status_bits.length ? terms("status_bit", drive.status_bits, node.node) : ["no bit is set"])),
             h("dt", {}, `Controlword ${hex(drive.controlword, 4)}`),
-            h("dd", {}, drive.control_bits.join(", ") || (drive.controlword === null ? "the drive does not tell it" : "no bit is set")),
+            h("dd", {}, ...(drive.control_bits.length ? terms("control_bit", drive.control_bits, node.node) : [drive.controlword === null ? "the drive does not tell it" : "no bit is set"])),
             h("dt", {}, "Mode"),
-            h("dd", {}, drive.mode === null ? "–" : `${drive.mode}${drive.mode_name ? ` (${drive.mode_name})` : ""}`),
+            h("dd", {}, drive.mode === null ? "–" : `${drive.mode} `, drive.mode_name ? term("mode", drive.mode_name, node.node) : ""),
           ]);
   }
 

@@ -2,6 +2,7 @@
 // what happened before this page was opened is there too.
 
 import { h, hex, number, renew, say } from "./dom.js";
+import { pointed, told } from "./help.js";
 import { headRow, lineRow } from "./trace.js";
 
 /** How often it is asked for at most. */
@@ -65,7 +66,16 @@ export function faultsView() {
     const cells = [number(entry.at_s, 3), String(entry.node), KINDS[entry.kind], entry.code === null ? "" : hex(entry.code, 4), entry.what, over(entry)];
     const look = () => choose(entry.number);
     const state = { type: "button", class: `happening ${entry.kind}${lasts ? " lasts" : ""}`, "data-number": String(entry.number), onclick: look };
-    return h("button", state, ...cells.map((cell) => h("span", {}, cell)));
+    return explained(h("button", state, ...cells.map((cell) => h("span", {}, cell))), entry);
+  }
+
+  /** What `?` tells of a row: its own remedy where a description has one, or what such a thing is. */
+  function explained(row, { node, kind, code, what, remedy, source }) {
+    if (remedy) return told(row, { title: `${KINDS[kind]}${code === null ? "" : ` ${hex(code, 4)}`}: ${what}`, text: remedy, source });
+    if (kind === "state") return pointed(row, "state", what.split(" → ").at(-1), node);
+    if (kind !== "nmt") return pointed(row, "service", kind, node);
+    const state = /^NMT state (.*)$/.exec(what)?.[1];
+    return state ? pointed(row, "nmt", state, node) : pointed(row, "service", what === "booted" ? "booted" : "alarm", node);
   }
 
   function draw() {

@@ -2,6 +2,7 @@
 // drawn is decided here, as in the standard's figure: enabled at the bottom, faults at the right.
 
 import { s } from "./dom.js";
+import { helped } from "./help.js";
 
 const WIDTH = 190;
 const HEIGHT = 40;
@@ -61,6 +62,7 @@ export function powerMachine(table) {
       s("rect", { x: String(x - WIDTH / 2), y: String(y - HEIGHT / 2), width: String(WIDTH), height: String(HEIGHT), rx: "6" }),
       s("text", { x: String(x), y: String(y + 5) }, name),
     );
+    helped(box, "state", name);
     boxes.set(name, box);
     root.append(box);
   }

@@ -5,10 +5,14 @@ import { h, number, renew, say } from "./dom.js";
 import { busView } from "./bus.js";
 import { driveView } from "./drive.js";
 import { motionView } from "./motion.js";
+import { helpPanel } from "./help.js";
 import { scopeView } from "./scope.js";
 import { parametersView } from "./parameters.js";
+import { pdoView } from "./pdo.js";
 import { faultsView } from "./faults.js";
+import { tourBar } from "./tour.js";
 import { traceView } from "./trace.js";
+import { worldView } from "./world.js";
 
 const byId = (id) => document.getElementById(id);
 const NEWS_KEPT = 200;
@@ -16,16 +20,25 @@ const NEWS_KEPT = 200;
 /** What the views share: which node is looked at. */
 const shared = { node: null };
 
+const help = helpPanel(shared);
+document.body.append(help.root);
+byId("what").addEventListener("click", help.overview);
+
 const views = [
   { name: "bus", title: "Bus", view: busView(shared, () => show("drive")) },
   { name: "drive", title: "Drive", view: driveView(shared) },
   { name: "motion", title: "Motion", view: motionView(shared, report) },
   { name: "scope", title: "Scope", view: scopeView(shared) },
   { name: "parameters", title: "Parameters", view: parametersView(shared, report) },
+  { name: "pdo", title: "PDO", view: pdoView(shared, report) },
   { name: "trace", title: "Trace", view: traceView() },
   { name: "faults", title: "Faults", view: faultsView() },
+  { name: "world", title: "World", view: worldView(shared, report) },
 ];
 let shown = null;
+const tour = tourBar(() => shown?.name ?? null, show);
+byId("view").before(tour.root);
+help.offer("The tour", tour.isOffered, tour.resume);
 
 function show(name) {
   const next = views.find((view) => view.name === name) ?? views[0];
@@ -52,12 +65,15 @@ byId("stop").addEventListener("click", (event) => {
   if (event.detail === 0) stopAll();
 });
 
-/** A space is a space in a text field, as long as nothing is moved and the studio can be asked whether that is so. */
+/**
+ * A space is a space in a text field, as long as nothing is moved and the studio can be asked whether that is so; and in the
+ * commands to a virtual world, where no real motor turns.
+ */
 const isText = (target) =>
   target.matches("textarea, input:not([type]), input[type=text], input[type=search]") &&
   link.welcome !== null &&
   link.state !== null &&
-  !link.state.nodes.some((node) => node.moving || node.doing);
+  (target.closest(".world") !== null || !link.state.nodes.some((node) => node.moving || node.doing));
 
 addEventListener(
   "keydown",
@@ -67,12 +83,14 @@ addEventListener(
       event.preventDefault();
       event.stopPropagation();
       if (!event.repeat) stopAll();
+      if (event.key === "Escape") help.hide();
       return;
     }
     const typing = event.target.matches("input, select, textarea");
     if (typing || event.ctrlKey || event.altKey || event.metaKey) return;
     const view = views[Number(event.key) - 1];
-    if (view) show(view.name);
+    if (event.key === "?") help.key();
+    else if (view) show(view.name);
     else shown?.view.key?.(event);
   },
   true,
@@ -136,12 +154,15 @@ async function control(deed, to) {
 
 on("state", (state) => {
   const load = state.bus.load_percent === null ? "" : ` · load ${number(state.bus.load_percent, 1)} %`;
-  say(byId("bus-line"), `${state.bus.frames_per_s} frames/s${load} · ${state.bus.name}`);
+  const bus = `${state.bus.frames_per_s} frames/s${load} · ${state.bus.name}`;
+  say(byId("bus-line"), bus);
+  byId("bus-line").title = bus;
   updateControl(state);
   if (shared.node === null || !state.nodes.some((node) => node.node === shared.node)) {
     shared.node = state.nodes.find((node) => node.drive)?.node ?? state.nodes[0]?.node ?? null;
   }
   shown?.view.update(state);
+  tour.update(state);
 });
 
 /** A text about no node, or that begins with it. */

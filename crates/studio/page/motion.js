@@ -3,6 +3,8 @@
 import { ask, inControl, link } from "./link.js";
 import { h, say } from "./dom.js";
 import { VALUES, chooser, tiles } from "./drive.js";
+import { groupMotion } from "./group.js";
+import { homingWizard } from "./homing.js";
 
 // Three within the 200 ms after which the studio stops what is not held.
 const HOLD_MS = 60;
@@ -101,8 +103,8 @@ export function motionView(shared, report) {
   const moveSpeed = field("move-rpm", "at", "r/min", "", true);
   const relative = h("input", { id: "move-relative", type: "checkbox", checked: true });
   const amperes = field("torque-amperes", "Current", "A", "0.5");
-  const method = field("home-method", "Method", "", "35");
-  const homeSpeed = field("home-rpm", "at", "r/min", "", true);
+  const homing = homingWizard(shared, report);
+  const group = groupMotion(report);
 
   const power = (id, name, what, key) =>
     h("button", { type: "button", id, title: `${name} (key ${key})`, onclick: () => send(name, { do: what, node: shared.node }) }, name);
@@ -140,11 +142,9 @@ export function motionView(shared, report) {
         const value = required(amperes);
         return value === null ? null : { do: "torque", amperes: value };
       }, amperes.row, h("p", { class: "quiet" }, "The speed that comes of it is up to the load.")),
-      form("Home", () => {
-        const value = required(method);
-        return value === null ? null : { do: "home", method: Math.trunc(value), rpm: read(homeSpeed) };
-      }, method.row, homeSpeed.row, h("p", { class: "quiet" }, "Methods of CiA 402-2, clause 11; 35 takes the present position.")),
     ),
+    homing.root,
+    group.root,
   );
   const root = h("section", { class: "motion" }, h("div", { class: "bar" }, title, choose.root), large.root, status, without, controls);
 
@@ -156,8 +156,15 @@ export function motionView(shared, report) {
     const parts = [node?.trouble ?? node?.drive?.state ?? "–", node?.doing, node?.moving ? "in motion by this studio" : null];
     say(status, parts.filter(Boolean).join(" · "));
     say(without, node?.without_us ? `If the studio dies, ${node.without_us}.` : "");
+    homing.update(state);
+    group.update(state);
     controls.disabled = !inControl() || !node?.drive;
     controls.title = inControl() ? "" : "Take control first";
+  }
+
+  function hide() {
+    jog.end();
+    group.hide();
   }
 
   function key(event) {
@@ -170,5 +177,5 @@ export function motionView(shared, report) {
     }
   }
 
-  return { root, update, key, hide: jog.end };
+  return { root, update, key, hide };
 }

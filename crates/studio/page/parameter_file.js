@@ -1,7 +1,7 @@
 // Files of parameters in the Parameters view: backup, the three-way comparison, and applying one after its dry run.
 
 import { ask, inControl } from "./link.js";
-import { h, say } from "./dom.js";
+import { count, h, say } from "./dom.js";
 
 /** A message may have 64 KiB, and a character of the file may take two of it. */
 const LARGEST = 30000;
@@ -86,7 +86,7 @@ export function parameterFile({ node, report, mark, written }) {
     if (!answer.ok) return fail(answer.error.message);
     const { steps, left } = answer.result;
     apply.hidden = steps.length === 0;
-    tell(steps.length ? `${steps.length} writes, in this order. Nothing has been written.` : "Nothing is to be written.");
+    tell(steps.length ? `${count(steps.length, "write")}, in this order. Nothing has been written.` : "Nothing is to be written.");
     shown.replaceChildren(
       table(["Object", "Name", "Has", "Gets", "What for"], steps.map((step) => ({ cells: [step.object, step.name ?? "", step.before ?? "?", step.after, step.purpose] }))),
       ...left.map((of) => h("p", { class: "quiet" }, `${of.object} ${of.name ?? ""} is left out: ${of.why}`)),
@@ -101,7 +101,7 @@ export function parameterFile({ node, report, mark, written }) {
     if (!answer.ok) fail(answer.error.message);
     else {
       apply.hidden = true;
-      tell(`${answer.result.steps.length} writes done and read back. They act now; a drive that does not store by itself has to be told to save.`);
+      tell(`${count(answer.result.steps.length, "write")} done and read back. It acts now; a drive that does not store by itself has to be told to save.`);
       report("Parameters", { ok: true, notes: answer.result.rounded.map((found) => `${found.object}: the drive made ${found.found} of ${found.asked}`) });
     }
     written();

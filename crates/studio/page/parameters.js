@@ -2,8 +2,9 @@
 // kept and put back as a transaction of the studio.
 
 import { ask, inControl } from "./link.js";
-import { h, say } from "./dom.js";
+import { count, h, say } from "./dom.js";
 import { chooser } from "./drive.js";
+import { helped } from "./help.js";
 import { parameterFile } from "./parameter_file.js";
 
 /** How often an open group is read again. */
@@ -18,6 +19,7 @@ export function parametersView(shared, report) {
   const search = h("input", { type: "search", id: "parameters-search", placeholder: "Index, name or words", "aria-label": "Search objects", oninput: draw });
   const changed = h("input", { type: "checkbox", id: "parameters-changed", onchange: draw });
   const all = h("button", { type: "button", id: "parameters-read", onclick: readAll }, "Read all");
+  const store = h("button", { type: "button", id: "parameters-store", title: "The drive keeps its parameters after a restart", onclick: () => keep() }, "Store in the drive");
   const back = h("button", { type: "button", id: "parameters-back", onclick: rollBack }, "Roll back");
   const progress = h("progress", { hidden: true, max: 1, value: 0 });
   const about = h("p", { class: "quiet", role: "status" });
@@ -26,7 +28,7 @@ export function parametersView(shared, report) {
   const root = h(
     "section",
     { class: "parameters" },
-    h("div", { class: "bar" }, choose.root, search, h("label", {}, changed, " changed only"), all, progress, back),
+    h("div", { class: "bar" }, choose.root, search, h("label", {}, changed, " changed only"), all, progress, back, store),
     about,
     file.root,
     list,
@@ -97,10 +99,16 @@ export function parametersView(shared, report) {
     draw();
   }
 
+  async function keep() {
+    const of = node;
+    const answer = report(`Node ${of}: Store`, await ask({ do: "store", node: of }));
+    if (answer.ok) report("Store", { ok: true, notes: [`node ${of} has stored its parameters`] });
+  }
+
   async function rollBack() {
     const of = node;
     const answer = report("Roll back", await ask({ do: "roll_back", node: of }));
-    if (answer.ok) report("Roll back", { ok: true, notes: [`node ${of}: ${answer.result.steps.length} writes undone`] });
+    if (answer.ok) report("Roll back", { ok: true, notes: [`node ${of}: ${count(answer.result.steps.length, "write")} undone`] });
     if (node === of) refreshAll();
   }
 
@@ -165,6 +173,7 @@ export function parametersView(shared, report) {
       h("td", { "data-label": "Range" }, range),
       h("td", { "data-label": "Access" }, `${row.access}${row.kept ? ", kept" : ""}`),
     );
+    helped(of, "object", row.object, node);
     row.show = () => {
       const known = values.get(row.object);
       say(value, known ? (known.text ?? `refused: ${known.refused}`) : row.readable ? "…" : "–");
@@ -235,7 +244,7 @@ export function parametersView(shared, report) {
     const found = state.nodes.find((known) => known.node === shared.node);
     const name = found?.model ?? null;
     if (shared.node !== node || name !== model) fetchObjects(shared.node, name);
-    back.disabled = !inControl();
+    back.disabled = store.disabled = !inControl();
     back.title = inControl() ? "Puts back what the last write changed" : "Take control first";
     file.update();
     if (shownRows.length && performance.now() - asked_at > REFRESH_MS) refresh();

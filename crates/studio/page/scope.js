@@ -13,6 +13,8 @@ import { trigger } from "./scope_trigger.js";
 
 const SPANS_S = [1, 2, 5, 10, 30, 60];
 const LONGEST_MARK = 40;
+/** A pane that is lower cannot be read; the picture grows with its panes. */
+const LOWEST_PANE = 76;
 
 const cut = (text) => (text.length > LONGEST_MARK ? `${text.slice(0, LONGEST_MARK - 1)}…` : text);
 
@@ -28,13 +30,15 @@ export function scopeView(shared) {
   const frequencies = toggled("scope-fft", "Spectrum", () => press(frequencies), "What is shown, over frequency");
   const panes = h("span", { class: "chooser", role: "group", "aria-label": "Values shown" });
   const others = h("span", { class: "chooser", role: "group", "aria-label": "Drives shown beside the chosen one" });
-  const trip = trigger(QUANTITIES, thaw);
+  const trip = trigger(thaw);
+  const saved = h("p", { class: "bad", role: "status" });
   const root = h(
     "section",
     { class: "scope" },
     h("div", { class: "bar" }, choose.root, others),
-    h("div", { class: "bar" }, seconds, pause, panes, steps, frequencies, button("scope-clear", "Clear cursors", () => (cursors = [null, null])), button("scope-save", "Save CSV", saveCsv), button("scope-svg", "Save SVG", saveSvg)),
+    h("div", { class: "bar" }, seconds, pause, panes, steps, frequencies, button("scope-clear", "Clear cursors", () => (cursors = [null, null])), button("scope-save", "Save CSV", saveCsv), button("scope-mcap", "Save MCAP", saveMcap, "For Foxglove, PlotJuggler, Rerun and ferrodrive plot"), button("scope-svg", "Save SVG", saveSvg)),
     h("div", { class: "bar" }, trip.root, heardChooser().root),
+    saved,
     canvas,
     readout,
     h("p", { class: "quiet" }, "Each point is one reading by SDO, about ten a second and fewer with many drives; of an added object each frame that carries it. Click: cursor A; Shift and click: cursor B; key p: pause; paused, the wheel zooms and a drag moves."),
@@ -44,6 +48,8 @@ export function scopeView(shared) {
   let cursors = [null, null];
   let shown = false;
   let extent = null;
+  /** What the picture on the canvas depends on. */
+  let picture = null;
   const hidden = new Set(["supply_v"]);
   const beside = new Set();
 
@@ -84,6 +90,9 @@ export function scopeView(shared) {
 
   const ofSource = (node, field) => frozen?.copies.get(`${node} ${field}`) ?? heard().find((one) => one.field === field)?.series ?? series(node, field);
 
+  /** What the trigger looks at: a value of the chosen drive, or an object that was added. */
+  const live = (field) => heard().find((one) => one.field === field)?.series ?? series(shared.node, field);
+
   /** Every series of the drives that are drawn, and of the objects that were added: `[node, field, series]`. */
   const all = () => [...everything(nodes()), ...heard().map((one) => [one.node, one.field, one.series])];
 
@@ -102,7 +111,7 @@ export function scopeView(shared) {
       .filter(({ lines }) => lines.length > 0);
     for (const one of heard()) {
       const lines = [{ name: `node ${one.node}`, series: ofSource(one.node, one.field) }].filter((line) => line.series.length > 0);
-      if (lines.length > 0) drawn.push({ ...one, level: undefined, lines });
+      if (lines.length > 0) drawn.push({ ...one, level: trip.isOn() && trip.field() === one.field ? trip.level() : undefined, lines });
     }
     const marks = (frozen ? frozen.marks : markers)
       .filter(({ node }) => node === null || nodes().includes(node))
@@ -116,8 +125,7 @@ export function scopeView(shared) {
     return { card: of("--card"), line: of("--line"), quiet: of("--quiet"), text: of("--text"), warn: of("--warn"), lines: ["--accent", "--bad", "--good", "--warn"].map(of) };
   }
 
-  function paint(pen, width, height) {
-    const now = content();
+  function paint(pen, width, height, now) {
     pen.font = "12px system-ui, sans-serif";
     if (isPressed(frequencies)) {
       const panes = now.panes.map((one) => ({ ...one, lines: one.lines.map(({ name, series: of }) => ({ name, spectrum: spectrum(of, now.from_s, now.to_s) })) }));
@@ -125,15 +133,26 @@ export function scopeView(shared) {
     } else {
       overTime(pen, width, height, colours(), now);
     }
-    return now;
+  }
+
+  /** What the picture depends on: the same picture is not drawn a second time. */
+  function keyOf({ panes: all, from_s, to_s, markers: marks }, width, height, scale) {
+    const lines = all.flatMap(({ field, level, lines: of }) => [field, level, ...of.map(({ name, series: one }) => `${name} ${one.first_s()} ${one.last_s()}`)]);
+    const newest = marks.at(-1);
+    return JSON.stringify([width, height, scale, colours(), isPressed(frequencies), isPressed(steps), from_s, to_s, cursors, marks.length, newest?.time_s, lines]);
   }
 
   function draw() {
     if (!shown) return;
     requestAnimationFrame(draw);
+    trip.offer([...QUANTITIES, ...heard()]);
     watchTrigger();
     const scale = devicePixelRatio || 1;
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+    const now = content();
+    const key = keyOf(now, width, height, scale);
+    if (key === picture) return;
+    picture = key;
     if (canvas.width !== Math.round(width * scale) || canvas.height !== Math.round(height * scale)) {
       canvas.width = Math.round(width * scale);
       canvas.height = Math.round(height * scale);
@@ -141,7 +160,9 @@ export function scopeView(shared) {
     const pen = canvas.getContext("2d");
     pen.setTransform(scale, 0, 0, scale, 0, 0);
     pen.clearRect(0, 0, width, height);
-    const now = paint(pen, width, height);
+    paint(pen, width, height, now);
+    const least = `${now.panes.length * LOWEST_PANE}px`;
+    if (canvas.style.minHeight !== least) canvas.style.minHeight = least;
     extent = { ...frame(width), from_s: now.from_s, span_s: now.to_s - now.from_s };
     say(readout, measured(now));
   }
@@ -149,7 +170,7 @@ export function scopeView(shared) {
   /** Holds the picture once the trigger has come, with the part before it that was asked for. */
   function watchTrigger() {
     if (frozen && !(frozen.byTrigger && trip.comesAgain())) return;
-    const end_s = trip.look(series(shared.node, trip.field()), Number(seconds.value), crossing);
+    const end_s = trip.look(live(trip.field()), Number(seconds.value), crossing);
     if (end_s !== null) freeze(end_s, true);
   }
 
@@ -211,10 +232,31 @@ export function scopeView(shared) {
     if (frozen) frozen.span_s = Number(seconds.value);
   });
 
-  /** A row for each time at which something was read; what was not read then stays empty. */
   function saveCsv() {
     // An object has its node in its name.
     const title = (node, field) => (nodes().length > 1 && !field.includes(":") ? `node${node}_${field}` : field);
+    const [columns, rows] = table(title);
+    const lines = rows.map(([time_s, row]) => [time_s, ...row].join(","));
+    save([["at_s", ...columns].join(","), ...lines, ""].join("\n"), "text/csv", "csv");
+  }
+
+  /** As a file of the recorder, with what happened meanwhile: the studio makes it of a table in the recorder's form. */
+  async function saveMcap() {
+    const title = (node, field) => `${node}.${field.includes(":") ? field.split(":").slice(1).join("_") : field}`;
+    const [columns, rows] = table(title);
+    const marks = (frozen ? frozen.marks : markers).filter(({ node }) => node === null || nodes().includes(node));
+    const first_s = rows[0]?.[0] ?? Infinity;
+    const told = marks.filter(({ time_s }) => time_s >= first_s).map(({ time_s, text }) => [time_s, Array(columns.length).fill(""), `"${text.replaceAll('"', '""').replaceAll("\n", " ")}"`]);
+    const lines = [...rows, ...told].sort(([a], [b]) => a - b).map(([time_s, row, mark = ""]) => [time_s, ...row, mark].join(","));
+    const body = [["t_s", ...columns, "mark"].join(","), ...lines, ""].join("\n");
+    const answer = await fetch("/api/recording.mcap", { method: "POST", body }).catch(() => null);
+    if (answer?.ok) return save(await answer.blob(), "application/octet-stream", "mcap");
+    const why = answer ? (await answer.json().catch(() => null))?.error?.message ?? `status ${answer.status}` : "the studio cannot be reached";
+    say(saved, `No MCAP was saved: ${why}`);
+  }
+
+  /** Titles of columns, and a row for each time at which something was read; what was not read then stays empty. */
+  function table(title) {
     const columns = all()
       .map(([node, field]) => [title(node, field), ofSource(node, field)])
       .filter(([, one]) => one.length > 0);
@@ -225,18 +267,18 @@ export function scopeView(shared) {
         rows.get(times[at])[column] = values[at];
       }
     });
-    const lines = [...rows].sort(([a], [b]) => a - b).map(([time_s, row]) => [time_s, ...row].join(","));
-    save([["at_s", ...columns.map(([name]) => name)].join(","), ...lines, ""].join("\n"), "text/csv", "csv");
+    return [columns.map(([name]) => name), [...rows].sort(([a], [b]) => a - b)];
   }
 
   function saveSvg() {
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
     const pen = new SvgPen(width, height, colours().card);
-    paint(pen, width, height);
+    paint(pen, width, height, content());
     save(pen.text(), "image/svg+xml", "svg");
   }
 
   function save(text, type, ending) {
+    say(saved, "");
     const address = URL.createObjectURL(new Blob([text], { type }));
     h("a", { href: address, download: `node${shared.node}.${ending}` }).click();
     URL.revokeObjectURL(address);

@@ -38,22 +38,26 @@ function line(pen, xs, ys, from, to, x, y, pixels) {
       else pen.lineTo(x(xs[at]), y(ys[at]));
     }
   } else {
-    let at = from;
-    let begun = false;
-    while (at < to) {
-      const column = Math.round(x(xs[at]));
-      let [low, high, last] = [ys[at], ys[at], ys[at]];
-      for (; at < to && Math.round(x(xs[at])) === column; at += 1) {
-        last = ys[at];
-        low = Math.min(low, last);
-        high = Math.max(high, last);
-      }
-      if (begun) pen.lineTo(column, y(low));
-      else pen.moveTo(column, y(low));
-      pen.lineTo(column, y(high));
-      pen.lineTo(column, y(last));
-      begun = true;
+    let column = Math.round(x(xs[from]));
+    let [low, high, last] = [ys[from], ys[from], ys[from]];
+    const drawn = () => {
+      pen.lineTo(column, y(low));
+      if (high !== low) pen.lineTo(column, y(high));
+      if (last !== high) pen.lineTo(column, y(last));
+    };
+    pen.moveTo(column, y(low));
+    for (let at = from + 1; at < to; at += 1) {
+      const next = Math.round(x(xs[at]));
+      const value = ys[at];
+      if (next !== column) {
+        drawn();
+        column = next;
+        low = high = value;
+      } else if (value < low) low = value;
+      else if (value > high) high = value;
+      last = value;
     }
+    drawn();
   }
   pen.stroke();
 }
@@ -64,8 +68,9 @@ function pane(pen, colours, { label, unit, decimals, level, tellsNewest = true }
   let [least, most] = [Infinity, -Infinity];
   for (const { ys, from, to } of lines) {
     for (let at = from; at < to; at += 1) {
-      least = Math.min(least, ys[at]);
-      most = Math.max(most, ys[at]);
+      const value = ys[at];
+      if (value < least) least = value;
+      if (value > most) most = value;
     }
   }
   if (least > most) [least, most] = [0, 0];

@@ -2,11 +2,11 @@
 
 import { h, say } from "./dom.js";
 
-/** `release` is called when a held picture is to go. */
-export function trigger(quantities, release) {
+/** `release` is called when a held picture is to go. What it may look at is offered by `offer`. */
+export function trigger(release) {
   const choice = (id, label, options) => h("select", { id, "aria-label": label }, ...options.map(([value, text]) => h("option", { value }, text)));
   const mode = choice("trigger-mode", "Trigger", [["off", "off"], ["once", "once"], ["again", "again and again"]]);
-  const field = choice("trigger-field", "Value", quantities.map(({ field, label, unit }) => [field, `${label} (${unit})`]));
+  const field = choice("trigger-field", "Value", []);
   const edge = choice("trigger-edge", "Edge", [["rising", "rising through"], ["falling", "falling through"], ["either", "through"]]);
   const level = h("input", { id: "trigger-level", type: "number", value: "10", step: "any", "aria-label": "Level", size: "7" });
   const before = h("input", { id: "trigger-before", type: "number", value: "20", min: "0", max: "100", "aria-label": "Per cent shown before", size: "4" });
@@ -44,5 +44,19 @@ export function trigger(quantities, release) {
     [armed_s, came_s] = [from_s, null];
   }
 
-  return { root, look, rearm, isOn: () => mode.value !== "off", comesAgain: () => mode.value === "again", field: () => field.value, level: () => Number(level.value) };
+  /** The values that it may look at: `{ field, label, unit }`. One that is not there any more ends it. */
+  function offer(quantities) {
+    const key = quantities.map(({ field }) => field).join(" ");
+    if (field.dataset.key === key) return;
+    const before = field.value;
+    field.dataset.key = key;
+    field.replaceChildren(...quantities.map(({ field, label, unit }) => h("option", { value: field }, unit ? `${label} (${unit.replace(/^\[(.*)\]$/, "$1")})` : label)));
+    if (quantities.some((one) => one.field === before)) field.value = before;
+    else if (before) {
+      mode.value = "off";
+      arm();
+    }
+  }
+
+  return { root, look, rearm, offer, isOn: () => mode.value !== "off", comesAgain: () => mode.value === "again", field: () => field.value, level: () => Number(level.value) };
 }

@@ -2,6 +2,7 @@
 // asks for what is new while it is looked at, and for what is older when somebody scrolls there.
 
 import { h, number, say } from "./dom.js";
+import { pointed } from "./help.js";
 
 const ASK_MS = 100;
 const PART = 500;
@@ -11,6 +12,8 @@ const LINES_KEPT = 20_000;
 const MOST_LINES = 200_000;
 const ROW_PX = 24;
 const KINDS = ["nmt", "sync", "time", "emcy", "pdo", "sdo", "heartbeat", "lss", "other"];
+/** An object as lines have it. */
+const OBJECT = /[0-9A-F]{4}h:[0-9A-F]{2}/;
 const COLUMNS = ["Time (s)", "From", "COB-ID", "What", "Bytes", "Took", "In words"];
 
 /** The titles over lines. */
@@ -20,7 +23,12 @@ export const headRow = () => h("div", { class: "trace-row head" }, ...COLUMNS.ma
 export function lineRow(line) {
   const took = line.took_ms === undefined ? "" : `${number(line.took_ms, 1)} ms`;
   const cells = [number(line.at_s, 6), line.from, line.id, line.kind, line.data, took, line.text];
-  return h("div", { class: `trace-row ${line.kind}`, "data-number": String(line.number), title: line.text }, ...cells.map((cell) => h("span", {}, cell)));
+  const spans = cells.map((cell) => h("span", {}, cell));
+  const row = h("div", { class: `trace-row ${line.kind}`, "data-number": String(line.number), title: line.text }, ...spans);
+  // `?` on the words tells of the object that they name, elsewhere in the line of the service.
+  const object = OBJECT.exec(line.text)?.[0];
+  if (object) pointed(spans.at(-1), "object", object, line.node ?? null);
+  return pointed(row, "service", line.kind);
 }
 
 export function traceView() {

@@ -4,6 +4,7 @@
 //! again, or to another session, is refused. Units stand in the names: `rpm`, `degrees`, `amperes`, `rpm_per_s`.
 
 use canopen::NodeId;
+use master::base::Twist;
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 
@@ -39,6 +40,12 @@ pub(crate) enum Deed {
     StopAll {},
     /// Looks who is on the bus.
     Scan {},
+    /// What can be done to the world around virtual drives.
+    WorldForms {},
+    /// How everything around virtual drives truly is, and what was done after the change of this number.
+    LookAround { after: Option<u64> },
+    /// Does something to the world around virtual drives, in the words of `ferrodrive sim`.
+    ChangeWorld { line: String },
     /// Says what keeps a drive from moving.
     Explain {
         #[serde(deserialize_with = "node")]
@@ -114,6 +121,25 @@ pub(crate) enum Deed {
         method: i8,
         rpm: Option<f64>,
     },
+    /// What something means that the page shows.
+    Help { node: Option<u8>, topic: Topic, name: String },
+    /// Turns several drives to positions, or by angles, together.
+    GroupMove(GroupMove),
+    /// Turns several drives together as long as they are held.
+    GroupJog { axes: Vec<AxisSpeed>, rpm_per_s: Option<f64> },
+    /// Drives two wheels as a base as long as they are held.
+    BaseJog(BaseJog),
+    /// Holds a base, with another twist.
+    BaseTwist { linear_m_s: f64, angular_rad_s: f64 },
+    /// Holds a group; at least every 100 ms.
+    GroupHold {},
+    /// Lets a group go: it comes to rest within its limits.
+    GroupEnd {},
+    /// Which homing methods a drive has and what each does, how it is set, what its switches are now.
+    Homing {
+        #[serde(deserialize_with = "node")]
+        node: NodeId,
+    },
     /// What the description says of each object of a drive.
     Objects {
         #[serde(deserialize_with = "node")]
@@ -152,6 +178,38 @@ pub(crate) enum Deed {
         #[serde(deserialize_with = "node")]
         node: NodeId,
     },
+    /// Has a drive store its parameters.
+    Store {
+        #[serde(deserialize_with = "node")]
+        node: NodeId,
+    },
+    /// How the PDOs of a node are set up, what may be changed, and what keeps one away.
+    Pdos {
+        #[serde(deserialize_with = "node")]
+        node: NodeId,
+    },
+    /// What setting PDOs up would write and do to the bus, with nothing written.
+    PlanPdos {
+        #[serde(deserialize_with = "node")]
+        node: NodeId,
+        pdos: Vec<NewPdo>,
+        /// Period of SYNC that the load is told for.
+        cycle_ms: f64,
+        /// In bit/s, where the studio does not know it.
+        bitrate: Option<u32>,
+    },
+    /// Sets PDOs up, all or nothing.
+    WritePdos {
+        #[serde(deserialize_with = "node")]
+        node: NodeId,
+        pdos: Vec<NewPdo>,
+    },
+    /// Starts a node, or takes it out of operational: PDOs exist there alone (CiA 301, 7.3.2.2).
+    Nmt {
+        #[serde(deserialize_with = "node")]
+        node: NodeId,
+        command: NmtWish,
+    },
     /// All parameters of a drive, as a file.
     BackUp {
         #[serde(deserialize_with = "node")]
@@ -167,6 +225,118 @@ pub(crate) struct NewValue {
     pub(crate) value: String,
 }
 
+/// How a PDO is to be set up; what is not named stays as it is:
+/// `{"pdo":"TPDO1","valid":true,"objects":[{"object":"6041h:00","bits":16}],"transmission":255,"event_ms":100}`.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct NewPdo {
+    pub(crate) pdo: String,
+    pub(crate) valid: bool,
+    pub(crate) objects: Option<Vec<NewEntry>>,
+    pub(crate) transmission: Option<u8>,
+    pub(crate) inhibit_ms: Option<f64>,
+    pub(crate) event_ms: Option<f64>,
+    /// Its identifier.
+    pub(crate) id: Option<u16>,
+}
+
+/// An object in a PDO.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct NewEntry {
+    pub(crate) object: String,
+    pub(crate) bits: u8,
+}
+
+/// The NMT commands that a page may give.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum NmtWish {
+    /// Start remote node.
+    Start,
+    /// Enter pre-operational.
+    PreOperational,
+}
+
+/// What something is that a page asks the meaning of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Topic {
+    /// An object, `6040h:00`.
+    Object,
+    /// A state of the power state machine.
+    State,
+    /// A bit of the statusword.
+    StatusBit,
+    /// A bit of the controlword.
+    ControlBit,
+    /// A mode of operation.
+    Mode,
+    /// An NMT state.
+    Nmt,
+    /// What a frame belongs to, or what kind of thing has happened.
+    Service,
+    /// A fault or an alarm, by its name.
+    Fault,
+}
+
+/// Where several drives are to go.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct GroupMove {
+    pub(crate) axes: Vec<AxisTarget>,
+    #[serde(default)]
+    pub(crate) relative: bool,
+    /// The highest speed of each.
+    pub(crate) rpm: Option<f64>,
+    pub(crate) rpm_per_s: Option<f64>,
+    /// How long it is to take, instead of the shortest time.
+    pub(crate) within_s: Option<f64>,
+}
+
+/// Where a drive of a group is to go.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct AxisTarget {
+    #[serde(deserialize_with = "node")]
+    pub(crate) node: NodeId,
+    pub(crate) degrees: f64,
+}
+
+/// How fast a drive of a group is to turn.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct AxisSpeed {
+    #[serde(deserialize_with = "node")]
+    pub(crate) node: NodeId,
+    pub(crate) rpm: f64,
+}
+
+/// A base on two wheels and how it is to move.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct BaseJog {
+    /// The left one and the right one.
+    #[serde(deserialize_with = "nodes")]
+    pub(crate) wheels: [NodeId; 2],
+    /// Turns of each drive for a turn of its wheel forward.
+    pub(crate) turns: [f64; 2],
+    pub(crate) wheel_base_m: f64,
+    pub(crate) wheel_radius_m: f64,
+    /// The highest speed of a wheel over the ground, and how fast it may change.
+    pub(crate) most_m_s: f64,
+    pub(crate) m_per_s2: f64,
+    pub(crate) linear_m_s: f64,
+    pub(crate) angular_rad_s: f64,
+}
+
+impl BaseJog {
+    /// How it is to move.
+    pub(crate) const fn twist(&self) -> Twist {
+        Twist { linear_m_s: self.linear_m_s, angular_rad_s: self.angular_rad_s }
+    }
+}
+
 impl Deed {
     /// Whether only the session that has control may ask for it.
     pub(crate) const fn needs_control(&self) -> bool {
@@ -179,13 +349,19 @@ impl Deed {
                 | Self::ReleaseControl {}
                 | Self::StopAll {}
                 | Self::Scan {}
+                | Self::WorldForms {}
+                | Self::LookAround { .. }
                 | Self::Explain { .. }
+                | Self::Homing { .. }
+                | Self::Help { .. }
                 | Self::QuickStop { .. }
                 | Self::Objects { .. }
                 | Self::ReadObjects { .. }
                 | Self::PlanParameters { .. }
                 | Self::CompareParameters { .. }
                 | Self::BackUp { .. }
+                | Self::Pdos { .. }
+                | Self::PlanPdos { .. }
         )
     }
 }
@@ -224,6 +400,14 @@ impl Message {
 fn node<'de, D: Deserializer<'de>>(deserializer: D) -> Result<NodeId, D::Error> {
     let raw = u8::deserialize(deserializer)?;
     NodeId::new(raw).ok_or_else(|| serde::de::Error::custom(format!("expected a node-ID from 1 to 127, not {raw}")))
+}
+
+fn nodes<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[NodeId; 2], D::Error> {
+    let raw = <[u8; 2]>::deserialize(deserializer)?;
+    let known = |raw: u8| {
+        NodeId::new(raw).ok_or_else(|| serde::de::Error::custom(format!("expected node-IDs from 1 to 127, not {raw}")))
+    };
+    Ok([known(raw[0])?, known(raw[1])?])
 }
 
 /// The answer to one message.
@@ -323,6 +507,18 @@ mod tests {
             (r#"{"seq":1,"session":"w","do":"jog","node":4,"rpm":"fast"}"#, Some(1), "f64"),
             (r#"{"seq":1,"session":"w","do":"jog","node":4,"rpm":1e999}"#, None, "out of range"),
             (r#"{"seq":1,"session":"w","do":"jog","node":4,"rpm":1,"for":9}"#, Some(1), "for"),
+            (r#"{"seq":1,"session":"w","do":"write_pdos","node":4,"pdos":[{"pdo":"TPDO1"}]}"#, Some(1), "valid"),
+            (
+                r#"{"seq":1,"session":"w","do":"write_pdos","node":4,"pdos":[{"pdo":"TPDO1","valid":true,"transmission":256}]}"#,
+                Some(1),
+                "u8",
+            ),
+            (
+                r#"{"seq":1,"session":"w","do":"write_pdos","node":4,"pdos":[{"pdo":"TPDO1","valid":true,"kind":1}]}"#,
+                Some(1),
+                "kind",
+            ),
+            (r#"{"seq":1,"session":"w","do":"nmt","node":4,"command":"reset"}"#, Some(1), "pre_operational"),
         ] {
             let malformed = Message::parse(text).expect_err(text);
             assert_eq!(malformed.seq, seq, "{text}");

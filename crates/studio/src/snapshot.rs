@@ -8,6 +8,8 @@ use devices::faults::FaultRow;
 use master::drive::DriveState;
 use serde::Serialize;
 
+use crate::wire::Health;
+
 use crate::authority::SessionId;
 
 /// The state of everything at one time.
@@ -29,6 +31,10 @@ pub(crate) struct Snapshot<'a> {
     pub(crate) asking: Option<SessionId>,
     /// Rises when there is something new at `/api/faults`.
     pub(crate) happenings: u64,
+    /// How often the trace was saved since the studio began.
+    pub(crate) logs_saved: u64,
+    /// How much was done to the world around virtual drives.
+    pub(crate) changes: u64,
     pub(crate) nodes: Vec<NodeView<'a>>,
 }
 
@@ -40,6 +46,8 @@ pub(crate) struct BusView<'a> {
     pub(crate) frames_per_s: u32,
     /// Part of the time that frames take; `null` where the bit rate is not known.
     pub(crate) load_percent: Option<f64>,
+    /// What the controller and the connection say.
+    pub(crate) health: Health,
 }
 
 /// A node.
@@ -62,6 +70,12 @@ pub(crate) struct NodeView<'a> {
     pub(crate) doing: Option<&'static str>,
     /// This studio has set it in motion.
     pub(crate) moving: bool,
+    /// Writes of parameters that can be put back.
+    pub(crate) can_roll_back: usize,
+    /// How often it has stored its parameters since the studio began.
+    pub(crate) stored: u32,
+    /// How often its PDOs were set up since the studio began.
+    pub(crate) mapped: u32,
     /// What it does when this program dies, once that has been seen to.
     pub(crate) without_us: Option<String>,
     /// Of a drive.
@@ -111,7 +125,7 @@ pub(crate) struct FaultView {
 }
 
 /// Bits of the controlword that mean the same in all modes (CiA 402-2, 8.4.1).
-const CONTROL_BITS: [(u16, &str); 6] = [
+pub(crate) const CONTROL_BITS: [(u16, &str); 6] = [
     (Controlword::SWITCH_ON, "switch on"),
     (Controlword::ENABLE_VOLTAGE, "enable voltage"),
     (Controlword::QUICK_STOP, "no quick stop"),

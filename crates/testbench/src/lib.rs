@@ -17,6 +17,7 @@
 //! Deliberately absent: clocks, threads and sockets. Files are read where a name of one is the only thing that a user gives,
 //! and only regular ones of bounded size.
 
+pub mod around;
 pub mod check;
 pub mod control;
 pub mod data_sheet;

@@ -12,7 +12,7 @@ const IN_POSITION: i64 = 4;
 #[track_caller]
 fn outputs<S: ZltechSubject>(bench: &mut Bench<S>) -> i64 {
     let told = bench.run_ms(5).get(0x2004) & 3;
-    assert_eq!(i64::from(bench.report().outputs.bits & 3), told);
+    assert_eq!((bench.report().outputs.bits & 3) as i64, told);
     told
 }
 

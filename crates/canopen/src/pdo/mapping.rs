@@ -34,7 +34,7 @@ impl MappingRules {
     }
 
     /// The type that an entry for this place stands in for, if RPDOs take it.
-    fn dummy(&self, mux: Mux) -> Option<DataType> {
+    pub fn dummy(&self, mux: Mux) -> Option<DataType> {
         let taken = mux.index < 8 && self.dummy_entries >> mux.index & 1 == 1 && mux.sub_index == 0;
         if taken { DataType::from_code(mux.index) } else { None }
     }

@@ -3,6 +3,7 @@
 
 use canopen::{NmtState, NodeId};
 use cia402::ModeOfOperation;
+use master::Gear;
 use master::drive::{Drive, DriveState};
 use serde::Serialize;
 
@@ -108,6 +109,18 @@ pub(crate) struct StateReport {
     motor_c: Option<f64>,
     driver_c: Option<f64>,
     nmt_state: Option<String>,
+    /// What stands behind the shaft, where something does: angles and speeds are those of its output.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gear: Option<GearReport>,
+}
+
+/// What stands behind a shaft, as the machine file says.
+#[derive(Debug, Serialize)]
+struct GearReport {
+    ratio: f64,
+    feed_constant_mm: Option<f64>,
+    #[serde(skip)]
+    text: String,
 }
 
 /// Where a shaft is and what it does; what is not known is left out of the text.
@@ -117,6 +130,13 @@ pub(crate) struct Motion {
     angle_deg: Option<f64>,
     velocity_rpm: Option<f64>,
     current_a: Option<f64>,
+    /// The same along the way, behind a gear with a feed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    position_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    velocity_mm_s: Option<f64>,
+    #[serde(skip)]
+    is_geared: bool,
 }
 
 #[derive(Debug, Serialize)]
@@ -184,6 +204,8 @@ impl StateReport {
     pub(crate) async fn read(drive: &Drive) -> Result<Self, Failure> {
         let state: DriveState = drive.state().await?;
         let bits = state.statusword_words();
+        let gear = drive.gear();
+        let mm = |turns: Option<f64>| Some(turns? * gear.feed_m()? * 1e3);
         let faults = state.faults.iter().map(|row| FaultReport { code: row.code, name: row.name, remedy: row.remedy });
         Ok(Self {
             node: drive.node().id().raw(),
@@ -201,12 +223,20 @@ impl StateReport {
                 angle_deg: state.angle.map(|angle| angle.0),
                 velocity_rpm: state.velocity.map(|speed| speed.0),
                 current_a: state.current.map(|current| current.0),
+                position_mm: mm(state.angle.map(|angle| angle.0 / 360.0)),
+                velocity_mm_s: mm(state.velocity.map(|speed| speed.0 / 60.0)),
+                is_geared: gear != Gear::DIRECT,
             },
             supply_v: state.supply.map(|supply| supply.0),
             motor_c: state.motor_temperature.map(|temperature| temperature.0),
             driver_c: state.driver_temperature.map(|temperature| temperature.0),
             // A boot-up message says only that the node has just left the state it names.
             nmt_state: state.nmt.filter(|nmt| *nmt != NmtState::Initialising).map(|nmt| nmt.to_string()),
+            gear: (gear != Gear::DIRECT).then(|| GearReport {
+                ratio: gear.ratio(),
+                feed_constant_mm: gear.feed_m().map(|metres| metres * 1e3),
+                text: gear.to_string(),
+            }),
         })
     }
 
@@ -235,10 +265,14 @@ impl StateReport {
 impl Motion {
     /// In one line.
     pub(crate) fn text(&self) -> String {
+        // A tenth of an r/min of the output may be many of a shaft behind a gear.
+        let decimals = if self.is_geared { 3 } else { 1 };
         let parts = [
             self.position.map(|counts| format!("{counts} counts")),
             self.angle_deg.map(|angle| format!("{angle:.2}°")),
-            self.velocity_rpm.map(|speed| format!("{speed:.1} r/min")),
+            self.position_mm.map(|mm| format!("{mm:.3} mm")),
+            self.velocity_rpm.map(|speed| format!("{speed:.decimals$} r/min")),
+            self.velocity_mm_s.map(|speed| format!("{speed:.2} mm/s")),
             self.current_a.map(|current| format!("{current:.1} A")),
         ];
         parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
@@ -256,6 +290,9 @@ impl Report for StateReport {
             lines.push("  fault       none".into());
         }
         lines.push(format!("  motion      {}", self.motion.text()));
+        if let Some(gear) = &self.gear {
+            lines.push(format!("  behind      {}: angles and speeds are those of its output", gear.text));
+        }
         lines.push(format!("  power       {}", self.power()));
         if let Some(nmt) = &self.nmt_state {
             lines.push(format!("  nmt         {nmt}"));

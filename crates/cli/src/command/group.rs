@@ -8,7 +8,7 @@ use cia402::ModeOfOperation;
 use master::Drive;
 use master::cyclic::CyclicOptions;
 use master::group::{AxisLimits, AxisSetup, Group, GroupError, Phase};
-use master::units::{Angle, Ramp, Rpm, Shown, Turns, parse_duration};
+use master::units::{Along, Angle, Ramp, Rpm, Shown, Turns, parse_duration};
 use serde::Serialize;
 use testbench::machine_file::GroupPlan;
 use testbench::words::mode::mode;
@@ -26,25 +26,12 @@ use crate::table::Table;
 
 /// What counts where neither the file nor the command line says it.
 const PERIOD: Duration = Duration::from_millis(5);
-const VELOCITY_TURNS_S: f64 = 0.5;
-const ACCELERATION_TURNS_S2: f64 = 1.0;
-const FOLLOWING_ERROR_TURNS: f64 = 0.2;
-/// Jerk is an acceleration in this time.
-const ROUNDING: Duration = Duration::from_millis(100);
 
 /// How long the shafts may take to come to their last set-points before it is looked where they are.
 const SETTLING: Duration = Duration::from_millis(500);
 
 /// How often a person is shown how far the move has come.
 const PROGRESS_PERIOD: Duration = Duration::from_millis(200);
-
-/// Modes in which an axis takes a set-point each cycle, the best first: positions, then speeds with the position loop here.
-const MODES: [ModeOfOperation; 4] = [
-    ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION,
-    ModeOfOperation::INTERPOLATED_POSITION,
-    ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY,
-    ModeOfOperation::PROFILE_VELOCITY,
-];
 
 /// Move several axes as one
 ///
@@ -84,7 +71,7 @@ struct Move {
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     within: Option<Duration>,
     /// Highest speed of each axis
-    #[arg(long, value_name = "SPEED", value_parser = speed)]
+    #[arg(long, value_name = "SPEED", value_parser = turning)]
     velocity: Option<Rpm>,
     /// Highest acceleration of each axis: 120rpm/s, 12.6rad/s2
     #[arg(long, value_name = "RATE", value_parser = rate)]
@@ -139,6 +126,16 @@ fn word(text: &str) -> Result<Word, String> {
             Ok(Word::File(text.into()))
         }
         None => Err("expected a machine file, FILE.toml, or NODE=POSITION, e.g. 1=90deg".into()),
+    }
+}
+
+/// A speed of the shaft: a group plans in turns.
+fn turning(text: &str) -> Result<Rpm, String> {
+    match speed(text)? {
+        Along::Turning(rpm) => Ok(rpm),
+        Along::Metres(_) => {
+            Err("expected a speed of rotation, e.g. 60rpm: the axes of a group are moved in turns".into())
+        }
     }
 }
 
@@ -281,7 +278,7 @@ impl Move {
             let drive = context.known_drive(node).await?;
             let said = plan.map(|plan| &plan.axes[index]);
             let mode = self.mode.or(said.and_then(|axis| axis.mode));
-            let mode = mode.map_or_else(|| best_mode(&drive), Ok)?;
+            let mode = mode.map_or_else(|| AxisSetup::best_mode(&drive).map_err(failure), Ok)?;
             let limits = self.limits(&drive, said.map(|axis| &axis.limits)).await?;
             let target = targets.iter().find(|(other, _)| *other == node);
             planned.targets.push(match target {
@@ -330,20 +327,22 @@ impl Move {
             Some(angle) => Some(turns_of(drive, angle).await?.0),
             None => None,
         };
-        let acceleration = self.acceleration.or(said.map(|limits| limits.acceleration_turns_s2));
-        let acceleration_turns_s2 = acceleration.unwrap_or(ACCELERATION_TURNS_S2);
-        let by_rounding = |time: Duration| acceleration_turns_s2 / time.as_secs_f64();
-        let jerk = self.rounding.map(by_rounding).or(said.map(|limits| limits.jerk_turns_s3));
+        let (is_said, careful) = (said.is_some(), AxisLimits::careful());
+        let said = said.unwrap_or(&careful);
+        let acceleration_turns_s2 = self.acceleration.unwrap_or(said.acceleration_turns_s2);
+        // A jerk that nobody states goes with the acceleration.
+        let rounding_s = careful.acceleration_turns_s2 / careful.jerk_turns_s3;
+        let jerk = self.rounding.map(|time| acceleration_turns_s2 / time.as_secs_f64());
         Ok(AxisLimits {
-            range_turns: said.and_then(|limits| limits.range_turns.clone()),
-            velocity_turns_s: velocity_turns_s
-                .or(said.map(|limits| limits.velocity_turns_s))
-                .unwrap_or(VELOCITY_TURNS_S),
+            range_turns: said.range_turns.clone(),
+            velocity_turns_s: velocity_turns_s.unwrap_or(said.velocity_turns_s),
             acceleration_turns_s2,
-            jerk_turns_s3: jerk.unwrap_or_else(|| by_rounding(ROUNDING)),
-            following_error_turns: following
-                .or(said.map(|limits| limits.following_error_turns))
-                .unwrap_or(FOLLOWING_ERROR_TURNS),
+            jerk_turns_s3: jerk.unwrap_or(if is_said {
+                said.jerk_turns_s3
+            } else {
+                acceleration_turns_s2 / rounding_s
+            }),
+            following_error_turns: following.unwrap_or(said.following_error_turns),
         })
     }
 
@@ -420,20 +419,11 @@ async fn turns_of(drive: &Drive, angle: Angle) -> Result<Turns, Failure> {
     }
 }
 
-fn best_mode(drive: &Drive) -> Result<ModeOfOperation, Failure> {
-    let modes = drive.axis_description().map(|axis| axis.modes);
-    let best = MODES.into_iter().find(|mode| modes.is_some_and(|modes| modes.contains(mode)));
-    let node = drive.node().id();
-    best.ok_or_else(|| {
-        Failure::new(format!("node {node} has no mode in which it could be an axis of a group: csp, ip, csv or pv"))
-            .at_node(node)
-    })
-}
-
 /// What a group has to say, for people and programs.
 fn failure(error: GroupError) -> Failure {
     match error {
         GroupError::Drive(error) => error.into(),
+        GroupError::NoMode { node } => Failure::new(error.to_string()).at_node(node),
         GroupError::Path(_) | GroupError::Period { .. } | GroupError::BeyondDrive { .. } => {
             Failure::usage(error.to_string())
         }

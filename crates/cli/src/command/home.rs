@@ -5,7 +5,7 @@ use std::time::Duration;
 use canopen::NodeId;
 use cia402::ModeOfOperation;
 use master::drive::HomingOptions;
-use master::units::{Rpm, parse_duration};
+use master::units::{Along, Rpm, parse_duration};
 
 use super::motion::{MotionOutcome, Then, outcome, shown_while, speed};
 use crate::context::Context;
@@ -30,7 +30,7 @@ pub(crate) struct Home {
     method: i8,
     /// Speed of the search, where the drive has an object for it
     #[arg(long, value_name = "SPEED", value_parser = speed)]
-    profile_velocity: Option<Rpm>,
+    profile_velocity: Option<Along<Rpm>>,
     /// Longest time that it may take
     #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "60s")]
     within: Duration,
@@ -52,7 +52,8 @@ impl Home {
         }
         let doing = format!("node {}: looking for its reference", self.node);
         context.progress.show(&doing);
-        let options = HomingOptions { speed: self.profile_velocity, limit: self.within, wait: !self.no_wait };
+        let speed = self.profile_velocity.map(|speed| drive.turning(speed)).transpose()?;
+        let options = HomingOptions { speed, limit: self.within, wait: !self.no_wait };
         let guard = self.guard.begin(context, &drive).await?;
         let motion = shown_while(context, &drive, &doing, drive.home(self.method, options)).await?;
         let then = Then::goes_on_if(motion.reached_after.is_none());

@@ -44,5 +44,6 @@ pub(crate) mod studio;
 pub(crate) mod supervise;
 pub(crate) mod sync;
 pub(crate) mod time;
+pub(crate) mod top;
 pub(crate) mod watch;
 pub(crate) mod world;

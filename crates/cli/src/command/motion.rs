@@ -7,7 +7,7 @@ use std::time::Duration;
 use canopen::NodeId;
 use devices::{Quantity, Ramps, Scale};
 use master::drive::{Commanded, Drive, MotionOptions, MotionReport, Note};
-use master::units::{Amperes, Angle, Ramp, Rpm, Shown, parse_duration};
+use master::units::{Along, Amperes, Angle, Ramp, Rpm, Shown, parse_duration};
 use serde::Serialize;
 
 use super::drive::{Motion, StateReport};
@@ -30,9 +30,9 @@ pub(crate) struct Velocity {
     /// Node-ID
     #[arg(value_parser = node)]
     node: NodeId,
-    /// Speed: 60 (r/min), 60rpm, 6.28rad/s, 360deg/s, 1r/s
+    /// Speed: 60 (r/min), 60rpm, 6.28rad/s, 360deg/s, 1r/s; 200mm/s where the machine file has a feed constant
     #[arg(allow_hyphen_values = true)]
-    speed: Rpm,
+    speed: Along<Rpm>,
     #[command(flatten)]
     ramps: RampArgs,
     /// Go on turning for this long, then stop
@@ -48,15 +48,15 @@ pub(crate) struct Move {
     /// Node-ID
     #[arg(value_parser = node)]
     node: NodeId,
-    /// Position: 32000 (counts), 90deg, 0.5turn, 1.57rad
+    /// Position: 32000 (counts), 90deg, 0.5turn, 1.57rad; 40mm where the machine file has a feed constant
     #[arg(allow_hyphen_values = true)]
-    position: Angle,
+    position: Along<Angle>,
     /// Turn by this much from the last target, instead of to it
     #[arg(long)]
     relative: bool,
     /// Largest speed on the way
     #[arg(long, value_name = "SPEED", value_parser = speed)]
-    profile_velocity: Option<Rpm>,
+    profile_velocity: Option<Along<Rpm>>,
     #[command(flatten)]
     ramps: RampArgs,
 }
@@ -86,12 +86,12 @@ pub(crate) struct Torque {
 /// How a motion is to be made, where the drive's own settings are not wanted.
 #[derive(Debug, clap::Args)]
 struct RampArgs {
-    /// How fast the speed may rise: 500ms, 120rpm/s, 12.6rad/s2
+    /// How fast the speed may rise: 500ms, 120rpm/s, 12.6rad/s2; 500mm/s2 with a feed constant
     #[arg(long, value_name = "RAMP")]
-    acceleration: Option<Ramp>,
+    acceleration: Option<Along<Ramp>>,
     /// How fast the speed may fall
     #[arg(long, value_name = "RAMP")]
-    deceleration: Option<Ramp>,
+    deceleration: Option<Along<Ramp>>,
     /// Do not wait until the target is reached
     #[arg(long)]
     no_wait: bool,
@@ -104,9 +104,9 @@ struct RampArgs {
     guard: GuardArgs,
 }
 
-pub(super) fn speed(text: &str) -> Result<Rpm, String> {
-    match text.parse::<Rpm>() {
-        Ok(Rpm(rpm)) if rpm > 0.0 => Ok(Rpm(rpm)),
+pub(super) fn speed(text: &str) -> Result<Along<Rpm>, String> {
+    match text.parse() {
+        Ok(speed @ (Along::Turning(Rpm(value)) | Along::Metres(value))) if value > 0.0 => Ok(speed),
         Ok(_) => Err("a profile velocity is more than zero, e.g. 60rpm; the target gives the direction".into()),
         Err(error) => Err(error.to_string()),
     }
@@ -175,9 +175,10 @@ impl Velocity {
         let doing = format!("node {}: to {}", self.node, self.speed);
         context.progress.show(&doing);
         let guard = self.ramps.guard.begin(context, &drive).await?;
-        let turning = drive.velocity(self.speed, self.ramps.options(None));
+        let speed = drive.turning(self.speed)?;
+        let turning = drive.velocity(speed, self.ramps.options(&drive, None)?);
         let motion = shown_while(context, &drive, &doing, turning).await?;
-        let then = self.duration.map_or(Then::goes_on_if(self.speed.0 != 0.0), Then::StopAfter);
+        let then = self.duration.map_or(Then::goes_on_if(speed.0 != 0.0), Then::StopAfter);
         outcome(context, &drive, ("turn at", &self.speed), motion, then, guard).await
     }
 }
@@ -186,15 +187,16 @@ impl Move {
     /// Moves.
     pub(crate) async fn run(&self, context: &Context) -> Result<MotionOutcome, Failure> {
         let drive = context.known_drive(self.node).await?;
-        let options = self.ramps.options(self.profile_velocity);
+        let options = self.ramps.options(&drive, self.profile_velocity)?;
+        let position = drive.turning(self.position)?;
         let verb = if self.relative { "move by" } else { "move to" };
         let doing = format!("node {}: {verb} {}", self.node, self.position);
         context.progress.show(&doing);
         let guard = self.ramps.guard.begin(context, &drive).await?;
         let motion = if self.relative {
-            shown_while(context, &drive, &doing, drive.move_relative(self.position, options)).await?
+            shown_while(context, &drive, &doing, drive.move_relative(position, options)).await?
         } else {
-            shown_while(context, &drive, &doing, drive.move_absolute(self.position, options)).await?
+            shown_while(context, &drive, &doing, drive.move_absolute(position, options)).await?
         };
         let then = Then::goes_on_if(motion.reached_after.is_none());
         outcome(context, &drive, (verb, &self.position), motion, then, guard).await
@@ -213,9 +215,15 @@ impl Torque {
 }
 
 impl RampArgs {
-    fn options(&self, speed: Option<Rpm>) -> MotionOptions {
-        let Self { acceleration, deceleration, within, .. } = *self;
-        MotionOptions { speed, acceleration, deceleration, wait: !self.no_wait, within }
+    fn options(&self, drive: &Drive, speed: Option<Along<Rpm>>) -> Result<MotionOptions, Failure> {
+        let ramp = |wish: Option<Along<Ramp>>| wish.map(|wish| drive.turning(wish)).transpose();
+        Ok(MotionOptions {
+            speed: speed.map(|wish| drive.turning(wish)).transpose()?,
+            acceleration: ramp(self.acceleration)?,
+            deceleration: ramp(self.deceleration)?,
+            wait: !self.no_wait,
+            within: self.within,
+        })
     }
 }
 
@@ -341,11 +349,11 @@ async fn limits(drive: &Drive) -> Limits {
 impl Limits {
     fn text(&self) -> String {
         let parts = [
-            self.profile_velocity_rpm.map(|rpm| format!("profile velocity {rpm:.0} r/min")),
+            self.profile_velocity_rpm.map(|rpm| format!("profile velocity {} r/min", Shown(rpm))),
             self.acceleration_ms.map(|ms| format!("acceleration {ms:.0} ms")),
             self.deceleration_ms.map(|ms| format!("deceleration {ms:.0} ms")),
             self.quick_stop_ms.map(|ms| format!("quick stop {ms:.0} ms")),
-            self.acceleration_rpm_s.map(|rate| format!("acceleration {rate:.0} (r/min)/s")),
+            self.acceleration_rpm_s.map(|rate| format!("acceleration {} (r/min)/s", Shown(rate))),
         ];
         parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
     }

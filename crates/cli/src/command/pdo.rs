@@ -2,7 +2,6 @@
 
 mod setup;
 mod silent;
-mod when;
 
 use std::time::Duration;
 
@@ -23,7 +22,6 @@ use crate::output::{Format, Report};
 use crate::paint::Paint;
 use crate::table::Table;
 use testbench::words::node::node;
-use when::when;
 
 /// Show how a node's PDOs are set up and why one stays away, what they carry as they come, or set them up
 #[derive(Debug, clap::Args)]
@@ -228,7 +226,7 @@ impl Row {
             id: cob_id.can_id().raw(),
             valid: cob_id.is_valid(),
             transmission: config.transmission.0,
-            when: when(config),
+            when: config.when(),
             inhibit_ms: ms(config.inhibit_time),
             event_ms: ms(config.event_time),
             objects: mapped.collect(),

@@ -1,6 +1,7 @@
 //! `ferrodrive studio`: the upper computer in the browser.
 
 use std::collections::BTreeMap;
+use std::convert::Infallible;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -76,31 +77,46 @@ impl Studio {
         }
         let url = access.url();
         format.print(&Ready { studio: url.clone() }).map_err(Failure::of_stdout)?;
-        if self.open {
-            open(context, &url);
-        }
         context.traffic.listen();
-        let setting = Setting {
-            bus: context.bus().to_string(),
-            bitrate: bitrate(context),
-            timeout: context.timeout(),
-            models: context.told_models(),
-            interface: interface_of(context.bus()).name().to_owned(),
-            journals: journals(context),
-            unix_zero: context.traffic.unix_zero(),
-        };
-        let (host, desk) = Host::new(context.network.clone(), setting);
+        let (host, desk) = Host::new(context.network.clone(), setting(context));
         let app = studio::app(desk, access);
-        let passed = || {
-            let passed = context.traffic.take_passed()?;
-            Some(studio::Passed { at: passed.at, frame: passed.frame, own: passed.own })
-        };
         tokio::select! {
             served = axum::serve(listener, app) => served.map_err(cannot),
             // Not before the router is gone, which holds the desk.
-            () = host.run(passed) => Ok(()),
+            () = host.run(|| passed(context)) => Ok(()),
+            never = self.keep_open(context, &url) => match never {},
         }
     }
+
+    /// Opens the page where that is wanted. Serving goes on, whatever comes of it.
+    async fn keep_open(&self, context: &Context, url: &str) -> Infallible {
+        if self.open {
+            open(context, url).await;
+        }
+        std::future::pending().await
+    }
+}
+
+/// What the host of a command is told at its start.
+pub(super) fn setting(context: &Context) -> Setting {
+    Setting {
+        bus: context.bus().to_string(),
+        bitrate: bitrate(context),
+        timeout: context.timeout(),
+        models: context.told_models(),
+        gears: context.gears(),
+        interface: interface_of(context.bus()).name().to_owned(),
+        journals: journals(context),
+        unix_zero: context.traffic.unix_zero(),
+        world: context.world.clone(),
+        wire: context.wire.clone(),
+    }
+}
+
+/// The next frame that has passed, for the host.
+pub(super) fn passed(context: &Context) -> Option<studio::Passed> {
+    let passed = context.traffic.take_passed()?;
+    Some(studio::Passed { at: passed.at, frame: passed.frame, own: passed.own })
 }
 
 /// Journals in the working folder, as `params apply` keeps them. A virtual bus of this command ends with it.
@@ -157,8 +173,8 @@ fn refused(error: &AccessError) -> Failure {
     }
 }
 
-/// Opens the page as the desktop does; where there is none, the address has been printed.
-fn open(context: &Context, url: &str) {
+/// Opens the page as the desktop does; where that fails, the address has been printed.
+async fn open(context: &Context, url: &str) {
     let program = if cfg!(target_os = "macos") {
         "open"
     } else if cfg!(windows) {
@@ -166,9 +182,18 @@ fn open(context: &Context, url: &str) {
     } else {
         "xdg-open"
     };
-    let started =
-        Command::new(program).arg(url).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
-    if let Err(error) = started {
-        context.tell(&format!("cannot open a browser ({program}: {error}): open the address yourself"));
-    }
+    let mut command = Command::new(program);
+    command.arg(url).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    // A browser that it starts may keep it until the last window is closed.
+    let (ended, end) = tokio::sync::oneshot::channel();
+    std::thread::spawn(move || ended.send(command.status()));
+    let why = match end.await {
+        // The status of `explorer` says nothing.
+        Ok(Ok(status)) if status.success() || cfg!(windows) => return,
+        // `xdg-open` is there, and finds no browser: 3 or 4.
+        Ok(Ok(status)) => status.to_string(),
+        Ok(Err(error)) => error.to_string(),
+        Err(_) => return,
+    };
+    context.tell(&format!("cannot open a browser ({program}: {why}): open the address yourself"));
 }

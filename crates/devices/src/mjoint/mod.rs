@@ -17,10 +17,12 @@ use canopen::{Mux, NmtState, NodeId};
 use cia402::{ModeOfOperation, Statusword};
 
 use crate::axis::{AxisDescription, BitPattern, HomingRules, HomingStart, NewSetPoint, PowerStyle};
-use crate::description::{Description, Edition, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules, Write};
+use crate::description::{
+    Description, Edition, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules, Section, Write,
+};
 use crate::faults::Faults;
 use crate::placement::Placement;
-use crate::terminals::Terminals;
+use crate::terminals::{Input, InputSignal, Meaning, Terminals};
 use crate::timing::Timing;
 use crate::units::{CountsPerTurn, Quantity, Ramps, Scale, Units};
 use crate::variant::Pick;
@@ -63,6 +65,7 @@ const fn joint(name: &'static str, title: &'static str) -> Description {
         name,
         title,
         manual: "M Robot Joint Motor CanOpen Manual",
+        sections: SECTIONS,
         identity: Identity { device_type: 0x0002_0192, vendor_id: 0x331, product_code: 1, revision_number: 0x100 },
         // The four models of the identity have the same objects.
         distinguishing_object: None,
@@ -132,6 +135,18 @@ const PDO_RULES: PdoRules = PdoRules {
     short_rpdo: None,
 };
 
+/// The lists of 5.04 and 5.08. 1001h is not printed; CiA 301 has it.
+const SECTIONS: &[Section] = &[
+    Section::of(0x1000, 0x1000, "5.04 device"),
+    Section::of(0x1001, 0x1001, "CiA 301"),
+    Section::of(0x1005, 0x1005, "5.04 device"),
+    Section::of(0x1016, 0x1017, "5.04 heartbeat"),
+    Section::of(0x1018, 0x1018, "5.04 device"),
+    Section::of(0x1400, 0x1603, "5.08.2"),
+    Section::of(0x1800, 0x1A03, "5.08.3"),
+    Section::of(0x2600, 0x60FF, "5.04 control"),
+];
+
 /// Bits of 5.04 as the examples show them.
 const STATUSWORD_BITS: &[(u16, &str)] = &[
     (0b11, "follows its host"),
@@ -144,24 +159,53 @@ const STATUSWORD_BITS: &[(u16, &str)] = &[
     (HOMING_ERROR, "homing error"),
 ];
 
+const HOMING_METHOD: Mux = Mux::new(0x6098, 0);
+
 const HOMING: HomingRules = HomingRules {
-    method: Mux::new(0x6098, 0),
+    method: HOMING_METHOD,
     search_speed: None,
     start: HomingStart::ModeWrite,
     attained: BitPattern { mask: HOMING_ATTAINED | HOMING_ERROR, value: HOMING_ATTAINED },
     failed: BitPattern { mask: HOMING_ATTAINED | HOMING_ERROR, value: HOMING_ERROR },
+    own_methods: &[],
+    switches: SWITCHES,
+    remark: "It has one speed for the whole run, and the manual does not say where that is set (5.09).",
 };
+
+/// PU and DIR are switches to homing alone, each to the methods that look for it (5.09). Their bits in 60FDh are a guess.
+const SWITCHES: Terminals = Terminals {
+    levels: Some(Mux::new(0x60FD, 0)),
+    inputs: &[
+        Input { name: "PU", bit: 0, meaning: by_method(&[(18, InputSignal::PositiveLimit)]) },
+        Input {
+            name: "DIR",
+            bit: 1,
+            meaning: by_method(&[
+                (17, InputSignal::NegativeLimit),
+                (19, InputSignal::Home),
+                (20, InputSignal::Home),
+                (21, InputSignal::Home),
+                (22, InputSignal::Home),
+            ]),
+        },
+    ],
+    ..Terminals::NONE
+};
+
+const fn by_method(signals: &'static [(i64, InputSignal)]) -> Meaning {
+    Meaning::Chosen { function: HOMING_METHOD, signals }
+}
 
 const UNITS: Units = Units {
     counts_per_turn: CountsPerTurn::Fixed(COUNTS_PER_TURN),
-    target_velocity: Some(Quantity::new(0x60FF, 0, 1.0)),
-    actual_velocity: Some(Quantity::new(0x606C, 0, 0.1)),
-    profile_velocity: Some(Quantity::new(0x6081, 0, 1.0)),
+    target_velocity: Some(Quantity::speed(0x60FF, 0, 1.0)),
+    actual_velocity: Some(Quantity::speed(0x606C, 0, 0.1)),
+    profile_velocity: Some(Quantity::speed(0x6081, 0, 1.0)),
     ramps: Some(Ramps::Rates {
         acceleration: Mux::new(0x6083, 0),
         deceleration: Mux::new(0x6083, 0),
         quick_stop: None,
-        scale: Scale::PerCount(1.0),
+        scale: Scale::Shaft(1.0),
         none_from: Some(NO_RAMP_FROM),
     }),
     target_current: None,

@@ -11,7 +11,7 @@ use canopen::Mux;
 use cia402::{ModeOfOperation, Statusword};
 
 use crate::axis::{AxisDescription, BitPattern, HomingRules, HomingStart, NewSetPoint, PowerStyle};
-use crate::description::{Description, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules};
+use crate::description::{Description, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules, Section};
 use crate::faults::Faults;
 use crate::placement::Placement;
 use crate::terminals::Terminals;
@@ -23,6 +23,7 @@ pub static CIA402: Description = Description {
     name: "cia402",
     title: "CiA 402 servo",
     manual: "CiA 301 V4.2.0, CiA 402-2 V4.0",
+    sections: SECTIONS,
     identity: Identity { device_type: 0x0002_0192, vendor_id: 0, product_code: 402, revision_number: 0x0001_0000 },
     distinguishing_object: None,
     dictionary: &objects::TABLE,
@@ -80,6 +81,9 @@ pub const fn axis(placement: Placement, modes: &'static [ModeOfOperation]) -> Ax
     .placed(placement)
 }
 
+const SECTIONS: &[Section] =
+    &[Section::of(0x1000, 0x1FFF, "CiA 301, 7.5.2"), Section::of(0x6000, 0x9FFF, "CiA 402-2, clauses 8 to 18")];
+
 const HOMING_BITS: u16 = Statusword::HOMING_ATTAINED | Statusword::HOMING_ERROR | Statusword::TARGET_REACHED;
 
 const HOMING: HomingRules = HomingRules {
@@ -88,6 +92,9 @@ const HOMING: HomingRules = HomingRules {
     start: HomingStart::ControlwordBit4,
     attained: BitPattern { mask: HOMING_BITS, value: Statusword::HOMING_ATTAINED | Statusword::TARGET_REACHED },
     failed: BitPattern { mask: HOMING_BITS & !Statusword::TARGET_REACHED, value: Statusword::HOMING_ERROR },
+    own_methods: &[],
+    switches: Terminals::CIA402,
+    remark: "",
 };
 
 const UNITS: Units = Units {

@@ -1,48 +1,14 @@
-//! The homing methods of 5.3.6, as rows for the engine.
-//!
-//! Its paragraphs and its labels name opposite directions for all four methods. Method 17 and 18 are not those of CiA 402-2:
-//! the limit switch is left, and met again slowly from inside, and the motor stops on it.
+//! The homing methods of 5.3.6 for the engine: the rows of [`devices::zltech::zlim42c::homing`] that the variant has chosen.
 
-use cia402::Direction::{Negative, Positive};
-use cia402::HomingSwitch::{Home, NegativeLimit, PositiveLimit};
-use cia402::{Direction, HomingMethod, HomingRow, HomingSequence, HomingSwitch, SwitchEdge};
+use cia402::{HomingMethod, HomingSequence};
+use devices::variant::Variant;
+use devices::zltech::zlim42c::homing::{BY_LABEL, BY_PROSE};
 
 use super::variations::HOMING_BY_PROSE;
-use devices::variant::Variant;
-
-/// The directions of the labels: 24 and 29 with the edge of CiA 402-2, which is the negative one of the home switch for both.
-#[rustfmt::skip]
-pub const BY_LABEL: [HomingRow; 4] = [
-    row(17, NegativeLimit, Negative, false, Negative),
-    row(18, PositiveLimit, Positive, false, Positive),
-    row(24, Home,          Positive, true,  Positive),
-    row(29, Home,          Negative, true,  Positive),
-];
-
-/// The directions of the paragraphs: 24 meets the home switch slowly in negative direction, at its positive edge.
-#[rustfmt::skip]
-pub const BY_PROSE: [HomingRow; 4] = [
-    row(17, PositiveLimit, Positive, false, Positive),
-    row(18, NegativeLimit, Negative, false, Negative),
-    row(24, Home,          Negative, true,  Negative),
-    row(29, Home,          Positive, true,  Positive),
-];
-
-const fn row(
-    method: i8,
-    switch: HomingSwitch,
-    search: Direction,
-    reverses_at_limit: bool,
-    crossing: Direction,
-) -> HomingRow {
-    let (method, edge) = (HomingMethod(method), SwitchEdge::Rising);
-    HomingRow { method, switch, search, reverses_at_limit, edge, crossing }
-}
 
 /// What 6098h asks for; `None` for 0, no method.
 pub(super) fn sequence(value: u8, variant: &Variant) -> Option<HomingSequence> {
-    static TABLES: [[HomingRow; 4]; 2] = [BY_LABEL, BY_PROSE];
-    let table = &TABLES[usize::from(variant.is(HOMING_BY_PROSE))];
-    let row = table.iter().find(|row| row.method.0 == value as i8)?;
-    Some(HomingSequence { switch: Some(row), index: None })
+    let table = if variant.is(HOMING_BY_PROSE) { &BY_PROSE } else { &BY_LABEL };
+    let method = HomingMethod(i8::try_from(value).ok()?);
+    table.iter().find(|row| row.method == method).map(|row| HomingSequence { switch: Some(row), index: None })
 }

@@ -8,7 +8,7 @@ pub mod assumptions;
 mod drive;
 pub mod faults;
 pub mod hardware;
-pub mod homing;
+mod homing;
 pub mod led;
 pub mod objects;
 mod parameters;

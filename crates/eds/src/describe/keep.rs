@@ -73,7 +73,7 @@ fn keep_named(eds: &Eds, file: &str) -> Result<&'static Description, Unkept> {
     }
     let description = match kept.first() {
         // All but the name is shared.
-        Some(known) => Description { manual: leak(manual.to_owned()), ..**known },
+        Some(known) => Description { manual: leak(manual.to_owned()), sections: &[], ..**known },
         None => describe(eds, manual)?,
     };
     let description: &'static Description = Box::leak(Box::new(description));
@@ -128,6 +128,7 @@ fn describe(eds: &Eds, manual: &str) -> Result<Description, Unkept> {
         name: leak(name(eds)),
         title: leak(title(eds)),
         manual: leak(manual.to_owned()),
+        sections: &[],
         identity,
         distinguishing_object: None,
         dictionary: table,

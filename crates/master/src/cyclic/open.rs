@@ -330,7 +330,7 @@ impl Drive {
         let step = self.step_of(velocity).await?;
         let own = Bound::from(self.limits(velocity.object).await?);
         let mut least = (own.high as f64 * step, own);
-        for (object, step) in [(MAX_PROFILE_VELOCITY, step), (MAX_MOTOR_SPEED, 1.0)] {
+        for (object, step) in [(MAX_PROFILE_VELOCITY, step), (MAX_MOTOR_SPEED, self.gear().at_output(1.0))] {
             let object = axis.object(object);
             if self.known(INTENT)?.row(object).is_none() {
                 continue;

@@ -98,7 +98,8 @@ impl Drive {
         let mut waited = Duration::ZERO;
         while waited < SETTLE_TIME {
             self.still_enabled(intent).await?;
-            if self.answered(intent, self.read_quantity(velocity).await).await?.abs() < STANDSTILL_RPM {
+            let speed = self.answered(intent, self.read_quantity(velocity).await).await?;
+            if speed.abs() < self.gear.at_output(STANDSTILL_RPM) {
                 break;
             }
             self.wait_poll(&mut waited).await;

@@ -8,6 +8,7 @@ use cia402::{Controlword, ModeOfOperation, PowerState, Statusword};
 use devices::{AxisDescription, AxisId, Description, HostWatch, PowerStyle, Quantity};
 
 use crate::error::{Access, Error};
+use crate::gear::Gear;
 use crate::identify::{Guess, Knowledge};
 use crate::network::Node;
 
@@ -38,6 +39,8 @@ pub struct Drive {
     pub(super) description: Option<&'static Description>,
     /// Set where the description is no more than that.
     pub(super) guess: Option<Guess>,
+    /// What is between its shaft and what is moved.
+    pub(super) gear: Gear,
 }
 
 impl core::fmt::Debug for Drive {
@@ -56,17 +59,18 @@ impl core::fmt::Debug for Drive {
 impl Drive {
     /// A drive of a known model.
     pub const fn new(node: Node, description: &'static Description) -> Self {
-        Self { node, axis: AxisId::FIRST, description: Some(description), guess: None }
+        Self { node, axis: AxisId::FIRST, description: Some(description), guess: None, gear: Gear::DIRECT }
     }
 
     /// A drive of a model that is known this well. One that is guessed can be moved, and its parameters not be stored.
     pub fn known_as(node: Node, knowledge: Knowledge) -> Self {
-        Self { node, axis: AxisId::FIRST, description: knowledge.description(), guess: knowledge.guess() }
+        let (description, guess) = (knowledge.description(), knowledge.guess());
+        Self { node, axis: AxisId::FIRST, description, guess, gear: Gear::DIRECT }
     }
 
     /// A CiA 402 drive of unknown model: it can be enabled, disabled, quick-stopped and reset, not moved or stored.
     pub const fn of_unknown_model(node: Node) -> Self {
-        Self { node, axis: AxisId::FIRST, description: None, guess: None }
+        Self { node, axis: AxisId::FIRST, description: None, guess: None, gear: Gear::DIRECT }
     }
 
     /// Another axis of the same drive. What concerns the whole device (its parameter store, the watch over its host) is the
@@ -77,6 +81,18 @@ impl Drive {
     pub fn axis(&self, axis: AxisId) -> Result<Self, Error> {
         let other = Self { axis, ..self.clone() };
         other.motion("move another axis").map(|_| other)
+    }
+
+    /// The same behind a gear: all its angles, speeds and accelerations are those of the gear's output from here on. What an
+    /// object holds, and what is told of objects ([`limits`](Self::limits), [`explain`](crate::explain)), stays the drive's.
+    #[must_use]
+    pub fn behind(self, gear: Gear) -> Self {
+        Self { gear, ..self }
+    }
+
+    /// What is between its shaft and what is moved.
+    pub const fn gear(&self) -> Gear {
+        self.gear
     }
 
     /// Which axis this is.

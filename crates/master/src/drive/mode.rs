@@ -38,7 +38,7 @@ impl Drive {
 
     async fn stop_if_turning(&self, axis: &AxisDescription) -> Result<bool, Error> {
         let Some(velocity) = axis.units.actual_velocity else { return Ok(false) };
-        let turning = self.read_quantity(velocity).await?.abs() >= STANDSTILL_RPM;
+        let turning = self.read_quantity(velocity).await?.abs() >= self.gear.at_output(STANDSTILL_RPM);
         let follows = self.power_state(self.statusword().await?) == Some(PowerState::OperationEnabled);
         if turning && follows {
             self.stop().await?;

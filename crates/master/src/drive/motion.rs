@@ -108,7 +108,7 @@ impl Drive {
         let (up, down) = self.ramp_times_s(change).await?;
         let reckoned = || Duration::from_secs_f64((up.max(down) * LATE_FACTOR + LATE_MARGIN_S).clamp(0.0, 3600.0));
         let limit = options.within.unwrap_or_else(reckoned);
-        let band = (target.abs() * REACHED_SHARE).max(REACHED_LEAST_RPM);
+        let band = (target.abs() * REACHED_SHARE).max(self.gear.at_output(REACHED_LEAST_RPM));
         let quantity = self.has(units.actual_velocity, "the actual velocity")?;
         let goal = Goal::Speed { quantity, target_rpm: target, band_rpm: band };
         let reached = self.watch(INTENT, goal, limit).await?;

@@ -16,7 +16,7 @@ use crate::units::{Angle, Rpm};
 
 const ENABLED: u16 = 0x0F;
 
-/// How near to the target bit 10 (target reached) is believed although it was never seen clear, in turns.
+/// How near to the target bit 10 (target reached) is believed although it was never seen clear, in turns of the shaft.
 const REACHED_TURNS: f64 = 0.01;
 
 /// Profile position moves with the set-point handshake. Source: CiA 402-2, clause 10.
@@ -56,10 +56,11 @@ impl Drive {
         self.enable().await?;
         let began_at = self.read_number(self.place(POSITION_ACTUAL)).await?;
         let target = if relative { began_at.saturating_add(counts) } else { counts };
-        let turn = self.counts_per_turn().await?.max(1.0);
+        let turn = self.counts_per_shaft_turn().await?.max(1.0);
+        let of_output = turn * self.gear.ratio();
         let limit = match options.within {
             Some(within) => within,
-            None => self.time_for(target.abs_diff(began_at) as f64 / turn, speed).await?,
+            None => self.time_for(target.abs_diff(began_at) as f64 / of_output, speed).await?,
         };
         self.give_set_point(INTENT, counts, relative).await?;
         let notes = self.notes(stopped).await;

@@ -158,7 +158,7 @@ impl Drive {
         let (mut waited, mut looks) = (Duration::ZERO, 0);
         loop {
             let speed = self.answered(intent, self.read_quantity(velocity).await).await?;
-            looks = if speed.abs() < STANDSTILL_RPM { looks + 1 } else { 0 };
+            looks = if speed.abs() < self.gear.at_output(STANDSTILL_RPM) { looks + 1 } else { 0 };
             if looks == STANDSTILL_LOOKS {
                 return Ok(());
             }
@@ -199,9 +199,10 @@ impl Drive {
 
     /// How long a stop from full speed may take: twice the drive's slowest ramp, and a step.
     pub(super) async fn stop_time(&self) -> Duration {
+        let fastest = self.gear.at_output(FASTEST_RPM);
         let turns = match self.axis_description().and_then(|axis| axis.units.actual_velocity) {
-            Some(velocity) => self.read_quantity(velocity).await.map_or(FASTEST_RPM, f64::abs),
-            None => FASTEST_RPM,
+            Some(velocity) => self.read_quantity(velocity).await.map_or(fastest, f64::abs),
+            None => fastest,
         };
         let ramp = match (self.ramp_times_s(turns).await, self.quick_stop_time_s(turns).await) {
             (Ok((_, down)), Ok(quick)) => down.max(quick),

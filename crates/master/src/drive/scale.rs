@@ -7,10 +7,10 @@ use devices::{CountsPerTurn, Quantity, Ramps, Scale};
 
 use super::handle::{Drive, TARGET_POSITION};
 use crate::error::Error;
-use crate::units::{Angle, Ramp, Shown};
+use crate::units::{Along, Angle, Ramp, Shown, Turning};
 
-/// The least band within which a speed counts as reached: the resolution that drives of this kind show when they run
-/// smoothly.
+/// The least band within which a speed of the shaft counts as reached: the resolution that drives of this kind show when
+/// they run smoothly.
 pub(super) const REACHED_LEAST_RPM: f64 = 2.0;
 
 /// A physical value as it was asked for, and as the drive was told it: an object holds whole counts.
@@ -55,11 +55,16 @@ impl fmt::Display for Commanded {
 
 /// Conversion between physical units and what this drive's objects hold, read from the drive where it is set there.
 impl Drive {
-    /// Counts of position in one turn.
+    /// Counts of position in one turn of the output.
     ///
     /// # Errors
     /// [`Error::UnknownModel`]; those of the SDO read.
     pub async fn counts_per_turn(&self) -> Result<f64, Error> {
+        Ok(self.counts_per_shaft_turn().await? * self.gear.ratio())
+    }
+
+    /// Counts of position in one turn of the drive's shaft.
+    pub(super) async fn counts_per_shaft_turn(&self) -> Result<f64, Error> {
         match self.motion("convert positions")?.units.counts_per_turn {
             CountsPerTurn::Fixed(counts) => Ok(f64::from(counts)),
             CountsPerTurn::Object { object, factor } => Ok(self.read_number(object).await? as f64 * f64::from(factor)),
@@ -70,6 +75,18 @@ impl Drive {
                 Ok(known.copied().map_or(1.0, f64::from))
             }
             CountsPerTurn::Ratio { times, over } => Ok(self.product(times).await? / self.product(over).await?),
+        }
+    }
+
+    /// A quantity of rotation of the output, out of one that may be along the way of what it moves.
+    ///
+    /// # Errors
+    /// [`Error::NoFeed`] for a way, where the [gear](Self::gear) has no feed.
+    pub fn turning<T: Turning>(&self, wish: Along<T>) -> Result<T, Error> {
+        match (wish, self.gear.feed_m()) {
+            (Along::Turning(turning), _) => Ok(turning),
+            (Along::Metres(metres), Some(feed)) => Ok(T::of_turns(metres / feed)),
+            (Along::Metres(_), None) => Err(Error::NoFeed { node: self.node.id() }),
         }
     }
 
@@ -145,6 +162,7 @@ impl Drive {
     async fn worth(&self, scale: Scale) -> Result<f64, Error> {
         Ok(match scale {
             Scale::PerCount(worth) => worth,
+            Scale::Shaft(rpm) => self.gear.at_output(rpm),
             // Counts of position in a second, as turns in a minute.
             Scale::Positions(counts) => counts * 60.0 / self.counts_per_turn().await?,
             Scale::Rated { rated, per_count } => per_count * self.read_number(rated).await? as f64,
@@ -169,7 +187,7 @@ impl Drive {
         let change_rpm = change_rpm.abs();
         let wishes = [("acceleration", acceleration), ("deceleration", deceleration)];
         let wishes = wishes.into_iter().filter_map(|(what, ramp)| Some((what, ramp?)));
-        if change_rpm < LEAST_CHANGE_RPM {
+        if change_rpm < self.gear.at_output(LEAST_CHANGE_RPM) {
             return Ok(Vec::new());
         }
         let mut sent = Vec::new();
@@ -210,7 +228,7 @@ impl Drive {
             Ramps::Rates { .. } => Ramp::RpmPerSecond(2.0 * rpm_per_s),
         };
         // The change does not matter to either, but for being one.
-        self.write_ramps(Some(ramp), Some(ramp), 1.0).await.map(|_| ())
+        self.write_ramps(Some(ramp), Some(ramp), self.gear.at_output(1.0)).await.map(|_| ())
     }
 
     /// The speed from which a ramp to a new target begins: the one that is kept, without the noise of what is measured; where
@@ -219,7 +237,8 @@ impl Drive {
         let units = self.motion("set its ramps")?.units;
         let actual = self.read_quantity(self.has(units.actual_velocity, "the actual velocity")?).await?;
         let target = self.read_quantity(self.has(units.target_velocity, "a target velocity")?).await?;
-        Ok(if (actual - target).abs() <= REACHED_LEAST_RPM { target } else { actual })
+        let same = (actual - target).abs() <= self.gear.at_output(REACHED_LEAST_RPM);
+        Ok(if same { target } else { actual })
     }
 
     /// A ramp of `raw` counts that takes `time_s` for the change, in the words in which it was asked for.
@@ -292,9 +311,9 @@ impl Drive {
         let (low, high) = row.limits_at(1);
         let span = (high - low) as f64;
         Ok(match target.scale {
-            Scale::PerCount(rpm) => span * rpm,
+            Scale::Shaft(rpm) => span * self.gear.at_output(rpm),
             // The limits of the object are those of its type: what is to be changed counts.
-            Scale::Positions(_) | Scale::Rated { .. } => change_rpm.abs(),
+            Scale::PerCount(_) | Scale::Positions(_) | Scale::Rated { .. } => change_rpm.abs(),
         })
     }
 
@@ -308,7 +327,7 @@ impl Drive {
     }
 }
 
-/// A change of speed below this is none: half a count of the speed objects.
+/// A change of the shaft's speed below this is none: half a count of the speed objects.
 const LEAST_CHANGE_RPM: f64 = 0.5;
 
 /// A ramp as an acceleration in counts that are `worth` (r/min)/s each; a change without a ramp is `none_from`. A time that is

@@ -166,6 +166,15 @@ pub enum Error {
         /// What it is, as in "no object for the actual velocity".
         what: &'static str,
     },
+    /// A way was asked for, of a drive that is not known to move something along.
+    #[error(
+        "node {node}: nobody has said how far one turn of it moves something: say it in the machine file, units = \
+         {{ feed_constant = \"10mm\" }}, or give an angle"
+    )]
+    NoFeed {
+        /// The node.
+        node: NodeId,
+    },
     /// The model has no parameter store.
     #[error("node {node}: the {model} stores no parameters: write them after each start")]
     NoParameterStore {
@@ -245,6 +254,7 @@ impl Error {
             Self::OtherModel { .. } => "other_model",
             Self::NoSuchAxis { .. } => "no_such_axis",
             Self::NoSuchQuantity { .. } => "no_such_quantity",
+            Self::NoFeed { .. } => "no_feed",
             Self::NoParameterStore { .. } => "no_parameter_store",
             Self::NoFactorySettings { .. } => "no_factory_settings",
             Self::NoSuchMode { .. } => "no_such_mode",
@@ -268,6 +278,7 @@ impl Error {
             | Self::OtherModel { node, .. }
             | Self::NoSuchAxis { node, .. }
             | Self::NoSuchQuantity { node, .. }
+            | Self::NoFeed { node }
             | Self::NoParameterStore { node, .. }
             | Self::NoFactorySettings { node, .. }
             | Self::NoSuchMode { node, .. }

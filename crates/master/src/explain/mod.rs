@@ -23,6 +23,7 @@ use cia402::{ModeOfOperation, PowerState};
 use std::time::Duration;
 
 use crate::drive::Drive;
+use crate::gear::Gear;
 pub use finding::{Finding, Topic, Weight};
 pub use observed::Observed;
 pub use overheard::{HeardFrames, Overheard};
@@ -64,7 +65,8 @@ impl Drive {
     /// Looks for what keeps this drive from moving and its PDOs from being exchanged. Reads some thirty objects and writes
     /// none; `heard` is what others sent in the time before.
     pub async fn explain(&self, heard: &Overheard) -> Explained {
-        let seen = Observed::of(self, heard).await;
+        // What the rules compare are objects, whatever stands behind the shaft.
+        let seen = Observed::of(&self.clone().behind(Gear::DIRECT), heard).await;
         seen.explained()
     }
 }

@@ -1,7 +1,7 @@
 //! What stops a motor from outside the bus, where objects show it: an emergency stop, limit switches, a brake that is set.
 //! The description says which input that is, by its name in the manual.
 
-use devices::{BrakeOutput, Input, InputSignal, Meaning};
+use devices::{BrakeOutput, Input, InputSignal, Meaning, Terminals};
 
 use super::finding::{Finding, Topic, Weight, cause, warning};
 use super::observed::{Observed, POSITION_ACTUAL, TARGET_POSITION};
@@ -16,7 +16,8 @@ pub(super) fn look(seen: &Observed, findings: &mut Vec<Finding>) {
             Some(InputSignal::EmergencyStop) => findings.push(emergency_stop(seen, input)),
             Some(InputSignal::PositiveLimit) => findings.extend(limit_switch(seen, input, true)),
             Some(InputSignal::NegativeLimit) => findings.extend(limit_switch(seen, input, false)),
-            None => {}
+            // It keeps nothing from moving.
+            Some(InputSignal::Home) | None => {}
         }
     }
     findings.extend(terminals.brake.as_ref().and_then(|brake| brake_set(seen, brake)));
@@ -27,7 +28,7 @@ fn signal(seen: &Observed, input: &Input) -> Option<InputSignal> {
     let terminals = seen.axis?.terminals;
     let levels = seen.axis_value(terminals.levels?)?;
     let reversed = terminals.polarity.and_then(|polarity| seen.axis_value(polarity)).unwrap_or(0);
-    let is_active = (levels ^ reversed) >> input.bit & 1 == 1;
+    let is_active = Terminals::is_active(input, levels, reversed);
     let function = match input.meaning {
         Meaning::Chosen { function, .. } => seen.axis_value(function),
         Meaning::Fixed(_) => None,

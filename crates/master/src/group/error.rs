@@ -37,6 +37,12 @@ pub enum GroupError {
         /// Its controlword: which axis it is.
         controlword: Mux,
     },
+    /// The drive takes no set-point in each cycle.
+    #[error("node {node} has no mode in which it could be an axis of a group: csp, ip, csv or pv")]
+    NoMode {
+        /// The node.
+        node: NodeId,
+    },
     /// A period that cannot be held.
     #[error("a period of {} ms is outside of {} to {} ms", ms(*given), ms(*PERIODS.start()), ms(*PERIODS.end()))]
     Period {

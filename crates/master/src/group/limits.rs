@@ -161,6 +161,18 @@ impl fmt::Display for Quantity {
 const MOST: f64 = 1e9;
 
 impl AxisLimits {
+    /// What a careful person begins with where nothing is said: 30 r/min, 60 (r/min)/s reached within 100 ms, a lag of 0.2
+    /// turns, no software limits.
+    pub const fn careful() -> Self {
+        Self {
+            range_turns: None,
+            velocity_turns_s: 0.5,
+            acceleration_turns_s2: 1.0,
+            jerk_turns_s3: 10.0,
+            following_error_turns: 0.2,
+        }
+    }
+
     /// That each limit is one. The axis is for the message and counts from 1.
     ///
     /// # Errors

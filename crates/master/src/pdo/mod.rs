@@ -8,13 +8,15 @@
 mod all;
 mod config;
 mod error;
+mod foreseen;
 mod node;
 mod signal;
 mod silence;
 mod transaction;
 mod values;
+mod when;
 
 pub use config::{PdoConfig, TimerUnits, TransmissionType};
 pub use error::{PdoError, SignalError};
 pub use silence::{Silence, Situation, why_silent};
-pub use values::{PdoUnfit, record_of, values_off};
+pub use values::{PdoUnfit, most_objects, record_of, values_off};

@@ -86,11 +86,16 @@ pub enum PdoUnfit {
     },
 }
 
-/// The entry that maps an object as a whole into PDOs of a direction.
+/// The entry that maps an object as a whole into PDOs of a direction; of a data type (0001h to 0007h) the dummy entry that skips
+/// its bits in an RPDO, where the model takes one (CiA 301, 7.4.7.1).
 ///
 /// # Errors
 /// [`PdoUnfit::NoSuchObject`], [`PdoUnfit::NotMappable`].
 pub fn record_of(model: &Description, pdo: PdoId, object: Mux) -> Result<MappingRecord, PdoUnfit> {
+    let dummy = model.pdo.mapping.dummy(object).filter(|_| pdo.direction == Direction::Rpdo);
+    if let Some(data_type) = dummy {
+        return Ok(MappingRecord { mux: object, bits: data_type.bits() });
+    }
     let row = model.row(object).ok_or(PdoUnfit::NoSuchObject { model: model.name, object })?;
     let refused = |why| PdoUnfit::NotMappable { pdo, object, name: row.name, why };
     match (pdo.direction, row.pdo) {
@@ -104,6 +109,12 @@ pub fn record_of(model: &Description, pdo: PdoId, object: Mux) -> Result<Mapping
     let form = model.pdo.mapping.tpdo_form(object).filter(|_| pdo.direction == Direction::Tpdo);
     let bits = form.map_or(row.data_type, |form| form.data_type).bits();
     if bits == 0 { Err(refused("it has no fixed length")) } else { Ok(MappingRecord { mux: object, bits }) }
+}
+
+/// Most objects in a PDO of a model: entries of its mapping record, and the model's own limit.
+pub fn most_objects(model: &Description, pdo: PdoId) -> usize {
+    let entries = (1..=64).take_while(|entry| model.row(Mux::new(pdo.mapping_index(), *entry)).is_some()).count();
+    entries.min(model.pdo.max_objects.into())
 }
 
 impl PdoConfig {
@@ -159,8 +170,7 @@ impl PdoConfig {
             let objects = records.iter().map(|record| format!("{} ({})", name(record.mux), record.bits));
             return Err(PdoUnfit::TooLong { pdo, bits, objects: objects.collect::<Vec<_>>().join(", ") });
         }
-        let entries = (1..=64).take_while(|entry| model.row(self.mapping(*entry)).is_some()).count();
-        let most = entries.min(model.pdo.max_objects.into());
+        let most = most_objects(model, pdo);
         if records.len() > most {
             return Err(PdoUnfit::TooMany { model: model.name, pdo, objects: records.len(), most });
         }
@@ -266,6 +276,20 @@ mod tests {
             (Mux::new(0x1800, 1), 0x184_u32.to_le_bytes().to_vec()),
         ];
         assert_eq!(values, expected);
+    }
+
+    #[test]
+    fn a_data_type_skips_its_bits_in_an_rpdo_of_a_model_that_takes_it() {
+        let rpdo = PdoId { direction: Direction::Rpdo, ..TPDO1 };
+        let servo = devices::model("cia402").expect("a model");
+        // UNSIGNED8 and INTEGER32 (CiA 301, table 44).
+        for (code, bits) in [(0x0005, 8), (0x0004, 32)] {
+            assert_eq!(record_of(servo, rpdo, Mux::new(code, 0)).map(|record| record.bits), Ok(bits), "{code:04X}h");
+        }
+        let map = [0x0005, 0x6040].map(|index| record_of(servo, rpdo, Mux::new(index, 0)).expect("it is taken"));
+        assert!(PdoConfig::new(rpdo, PdoMap(map.into())).values(servo, node()).is_ok());
+        assert!(record_of(servo, TPDO1, Mux::new(0x0005, 0)).is_err(), "a TPDO has nothing to skip");
+        assert!(record_of(model(), rpdo, Mux::new(0x0005, 0)).is_err(), "this model takes none");
     }
 
     #[test]

@@ -121,20 +121,21 @@ class Network:
 
     # What a network does.
 
-    def drive(self, node: int, model: Optional[str] = None) -> Drive:
+    def drive(self, node: int, model: Optional[str] = None, *, gear_ratio: float = 1.0) -> Drive:
         """A drive, to be moved in physical units.
 
         :param model: as :func:`~ferrodrive.models` lists them, or a file that describes it (``FILE.eds``); without it the drive is
             asked, and one that cannot be told is an error
+        :param gear_ratio: turns of its shaft for one turn of the output behind a gear: angles and speeds are the output's, counts the drive's
         """
         model = model or self._finish(self._native.identify(node))
         if model is None:
             raise MasterError(f"the model of node {node} is not certain from its identity and objects; say which: drive({node}, MODEL)")
-        return Drive(self, node, model)
+        return Drive(self, node, model, gear_ratio)
 
-    def async_drive(self, node: int, model: str) -> AsyncDrive:
+    def async_drive(self, node: int, model: str, *, gear_ratio: float = 1.0) -> AsyncDrive:
         """The same with coroutines."""
-        return AsyncDrive(self, node, model)
+        return AsyncDrive(self, node, model, gear_ratio)
 
     def group(self, axes: Sequence[Axis], *, period: float = 0.005, tolerance: int = 2) -> Group:
         """Opens a group of axes that move as one, and enables its drives; nothing moves. Close it, or use it with ``with``.
@@ -228,20 +229,22 @@ class Network:
 class _Orders:
     """What can be asked of a drive, as jobs. Both kinds of drive wait for these."""
 
-    def __init__(self, network: Network, node: int, model: str) -> None:
+    def __init__(self, network: Network, node: int, model: str, gear_ratio: float = 1.0) -> None:
         model_name(model)
         self.network = network
         #: Its node-ID, 1 to 127.
         self.node = node
         #: Its model.
         self.model = model
+        #: Turns of its shaft for one turn of the output.
+        self.gear_ratio = gear_ratio
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.model} at {self.node}>"
 
     def _begin(self, do_: str, **order: Any) -> Job:
         given = {name: value for name, value in order.items() if value is not None}
-        return self.network._native.drive(self.node, self.model, {"do_": do_, **given})
+        return self.network._native.drive(self.node, self.model, {"do_": do_, "gear_ratio": self.gear_ratio, **given})
 
 
 def _angle(degrees: Optional[float], counts: Optional[int]) -> dict[str, Any]:

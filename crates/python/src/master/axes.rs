@@ -15,7 +15,7 @@ use testbench::words::mode::mode;
 
 use super::job::Trouble;
 use super::value::Value;
-use super::{Job, Network, duration};
+use super::{Job, Network, duration, gear};
 use crate::failure::bad_value;
 use crate::sheets::model_of;
 
@@ -41,6 +41,8 @@ pub(crate) struct AxisOrder {
     jerk_rpm_s2: f64,
     #[pyo3(item)]
     following_error_deg: f64,
+    #[pyo3(item)]
+    gear_ratio: f64,
 }
 
 /// A base, in plain values.
@@ -281,7 +283,7 @@ impl AxisOrder {
             jerk_turns_s3: self.jerk_rpm_s2 / 60.0,
             following_error_turns: self.following_error_deg / 360.0,
         };
-        let drive = Drive::new(network.node(self.node)?, model_of(&self.model)?);
+        let drive = Drive::new(network.node(self.node)?, model_of(&self.model)?).behind(gear(Some(self.gear_ratio))?);
         Ok(AxisSetup { drive, mode: mode(&self.mode).map_err(bad_value)?, limits })
     }
 }

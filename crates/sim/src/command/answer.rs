@@ -10,7 +10,7 @@ use plant::FreeRun;
 use super::{Before, Command, CommandError, Service};
 use crate::json;
 use crate::stimulus::{FORMS, Place, Stimulus};
-use crate::{BodyState, Brake, OutputShaft, PowerPhase, Report, StationId, World};
+use crate::{BodyState, Brake, Levels, OutputShaft, PowerPhase, Report, StationId, World};
 
 /// Does what `command` says; returns the line of JSON that answers it.
 pub(super) fn answer(world: &mut World, command: &Command, service: Service) -> Result<String, CommandError> {
@@ -159,6 +159,7 @@ struct Got<'a> {
     velocity_rpm: f64,
     current_a: f64,
     supply_v: f64,
+    inputs: BTreeMap<&'a str, u8>,
     outputs: BTreeMap<&'a str, u8>,
     brake: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -173,6 +174,12 @@ struct Got<'a> {
     statusword: Option<u16>,
     error_code: u32,
     shaft_angle_rad: f64,
+    /// What the load gives at its own shaft, positive against positive motion; of a drive with a motor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    load_torque_nm: Option<f64>,
+    /// The true temperature of the winding.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    winding_c: Option<f64>,
     bitrate: Option<u32>,
     bus: &'a str,
     tec: u16,
@@ -204,9 +211,9 @@ fn get(world: &mut World, place: Place, service: Service) -> Result<String, Comm
     let measured = world.with_drive(place.node, |drive, now| {
         drive.advance(now);
         drive.check_axis(place.axis)?;
-        Ok::<_, CommandError>((drive.model(), drive.bitrate(), drive.report_of(place.axis)))
+        Ok::<_, CommandError>((drive.model(), drive.bitrate(), drive.report_of(place.axis), drive.input_levels()))
     });
-    let (model, bitrate, report) = measured.map_err(|_| no_such_drive(world, place.node))??;
+    let (model, bitrate, report, inputs) = measured.map_err(|_| no_such_drive(world, place.node))??;
     let Report { node, powered, position, velocity_rpm, current_a, supply_v, .. } = report;
     let counters = world.counters(id);
     Ok(json::line(&Got {
@@ -222,7 +229,8 @@ fn get(world: &mut World, place: Place, service: Service) -> Result<String, Comm
         velocity_rpm,
         current_a,
         supply_v,
-        outputs: report.outputs.iter().map(|(name, level)| (name, u8::from(level))).collect(),
+        inputs: levels(inputs),
+        outputs: levels(report.outputs),
         brake: brake_text(report.brake),
         output_shaft: report.output.map(Output::from),
         damage: report.damage,
@@ -232,12 +240,18 @@ fn get(world: &mut World, place: Place, service: Service) -> Result<String, Comm
         statusword: report.statusword,
         error_code: report.error_code,
         shaft_angle_rad: report.shaft_angle_rad,
+        load_torque_nm: report.physics.map(|physics| physics.load_torque_nm),
+        winding_c: report.physics.map(|physics| physics.winding_c),
         bitrate: bitrate.map(can::Bitrate::bits_per_second),
         bus: bus_text(world, id, bitrate.is_some()),
         tec: counters.tec(),
         rec: counters.rec(),
         behind_ms: millis(service.behind),
     }))
+}
+
+fn levels(levels: Levels) -> BTreeMap<&'static str, u8> {
+    levels.iter().map(|(name, level)| (name, u8::from(level))).collect()
 }
 
 /// A drive without a brake has nothing that holds its shaft: clients may rely on one of the two words.

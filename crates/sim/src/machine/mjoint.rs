@@ -231,7 +231,8 @@ impl Assembly for Joint {
         sensors.driver_c = noise.flicker(sensors.driver_c, TEMPERATURE_STEP_C);
     }
 
-    #[inline]
+    // Inlined by force: it has a second caller, in periods without firmware.
+    #[inline(always)]
     fn step(&mut self, actuation: &Actuation) {
         self.last = *actuation;
         self.fit_brake(actuation);

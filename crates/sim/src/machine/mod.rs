@@ -47,7 +47,7 @@ pub use zlim42c::{Stepper, Zlim42c82Machine, Zlim42cMachine, zlim42c, zlim42c_82
 
 use crate::mechanics::Mechanics;
 use crate::stimulus::{Stimulus, SwitchRange};
-use crate::{PowerPhase, Refused, Report, VirtualDrive, nmt_reset};
+use crate::{Levels, PowerPhase, Refused, Report, VirtualDrive, nmt_reset};
 use rest::Rest;
 use switch::{Inputs, stretch};
 use timing::OwnTime;
@@ -142,10 +142,8 @@ impl<A: Assembly> Machine<A> {
         }
         if self.life == Life::Running {
             let levels = self.inputs.levels(|axis| self.assembly.shaft_counts(axis));
-            let mut sensors = self.assembly.sense(levels);
-            if let Some(noise) = &mut self.noise {
-                self.assembly.disturb(&mut sensors, noise);
-            }
+            let sensors =
+                if self.noise.is_none() { self.assembly.sense(levels) } else { self.sense_with_noise(levels) };
             let next = self.firmware.tick(&sensors, at);
             if let Rest::Watching(watch) = &mut self.rest {
                 watch.note(&sensors, &next);
@@ -153,8 +151,26 @@ impl<A: Assembly> Machine<A> {
             self.assembly.step(&self.actuation);
             self.actuation = next;
         } else {
-            self.assembly.step(&self.actuation);
+            self.step_without_firmware();
         }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn sense_with_noise(&mut self, levels: u64) -> <A::Firmware as Firmware>::Sensors {
+        let mut sensors = self.assembly.sense(levels);
+        if let Some(noise) = &mut self.noise {
+            self.assembly.disturb(&mut sensors, noise);
+        }
+        sensors
+    }
+
+    /// A control period while the firmware does not run.
+    // Apart, so that the frequent caller has the step inlined.
+    #[cold]
+    #[inline(never)]
+    fn step_without_firmware(&mut self) {
+        self.assembly.step(&self.actuation);
     }
 
     /// Its supply changes nothing now: all that most periods have to know of it.
@@ -455,6 +471,11 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
 
     fn inputs(&self) -> &'static [&'static str] {
         self.assembly.inputs()
+    }
+
+    fn input_levels(&self) -> Levels {
+        let levels = self.inputs.levels(|axis| self.assembly.shaft_counts(axis));
+        Levels { names: self.assembly.inputs(), bits: levels }
     }
 
     fn modbus_unit(&self) -> Option<u8> {

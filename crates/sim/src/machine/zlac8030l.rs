@@ -177,7 +177,8 @@ impl Assembly for HubWheel {
         sensors.driver_c = noise.flicker(sensors.driver_c, TEMPERATURE_STEP_C);
     }
 
-    #[inline]
+    // Inlined by force: it has a second caller, in periods without firmware.
+    #[inline(always)]
     fn step(&mut self, actuation: &Actuation) {
         self.last = *actuation;
         self.motor.step(Self::PERIOD_S, &self.pins(actuation));

@@ -218,7 +218,8 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
         sensors.bus_v = noise.flicker(sensors.bus_v, VOLTAGE_STEP_V);
     }
 
-    #[inline]
+    // Inlined by force: it has a second caller, in periods without firmware.
+    #[inline(always)]
     fn step(&mut self, actuation: &Actuation) {
         self.last = *actuation;
         // The green light: the firmware runs.

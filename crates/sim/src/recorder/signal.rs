@@ -115,7 +115,7 @@ const ROWS: [Row; 38] = [
     row(Signal::ErrorCode, "error_code", "", |report| Some(f64::from(report.error_code))),
     row(Signal::Powered, "powered", "", |report| Some(number(report.powered))),
     row(Signal::RotorPosition, "rotor_position_counts", "counts", |report| report.rotor_position.map(|position| position as f64)),
-    row(Signal::Outputs, "outputs", "", |report| (!report.outputs.names.is_empty()).then(|| f64::from(report.outputs.bits))),
+    row(Signal::Outputs, "outputs", "", |report| (!report.outputs.names.is_empty()).then_some(report.outputs.bits as f64)),
     row(Signal::Brake, "brake", "", |report| report.brake.map(|brake| number(brake == Brake::Engaged))),
     row(Signal::OutputAngle, "output_angle_rad", "rad", |report| report.output.map(|shaft| shaft.angle_rad)),
     row(Signal::OutputTorque, "output_torque_nm", "N·m", |report| report.output.map(|shaft| shaft.torque_nm)),

@@ -9,8 +9,10 @@ use master::{Drive, Error, MotionOptions};
 use serde_json::json;
 use tokio::sync::oneshot;
 
+use super::parameters::STORING;
 use super::state::{Host, JOG_SPAN, PRESENCE_SPAN};
 use super::work::{Asked, Done, LISTENING_TIME, Listening, Running, say};
+use super::world::conclude_looking_around;
 use crate::authority::{Refusal, SessionId};
 use crate::dead_man::DeadMan;
 use crate::message::{Answer, Deed};
@@ -47,7 +49,18 @@ impl Host {
                 self.change_control(asked, released);
             }
             Deed::Scan {} => self.begin_scan(Some(asked)),
+            Deed::WorldForms {} => self.tell_world_forms(asked),
+            Deed::LookAround { after } => self.look_around(after, asked),
+            Deed::ChangeWorld { line } => self.change_world(line, asked),
             Deed::Explain { node } => self.listen_for(node, asked),
+            Deed::GroupMove(_)
+            | Deed::GroupJog { .. }
+            | Deed::BaseJog(_)
+            | Deed::BaseTwist { .. }
+            | Deed::GroupHold {}
+            | Deed::GroupEnd {} => self.take_group(deed, asked),
+            Deed::Help { node, topic, name } => self.help(node.and_then(NodeId::new), topic, &name, asked),
+            Deed::Homing { node } => self.look_at_homing(node, asked),
             Deed::QuickStop { node } => {
                 self.note_stop(node, "stopped by a quick stop");
                 self.quick_stop_one(node, "stopped by a quick stop", Some(asked));
@@ -66,7 +79,11 @@ impl Host {
             | Deed::CompareParameters { .. }
             | Deed::WriteParameters { .. }
             | Deed::RollBack { .. }
+            | Deed::Store { .. }
             | Deed::BackUp { .. } => self.take_parameters(deed, asked),
+            Deed::Pdos { .. } | Deed::PlanPdos { .. } | Deed::WritePdos { .. } | Deed::Nmt { .. } => {
+                self.take_pdos(deed, asked);
+            }
             _ => self.take_motion(deed, asked),
         }
     }
@@ -84,11 +101,18 @@ impl Host {
             let text = "its parameters are being written: try again when that is done";
             return say(answer, Answer::failed(Some(seq), "busy", text));
         }
-        if let Deed::Jog { .. } = deed {
+        let stops = matches!(deed, Deed::Stop { .. } | Deed::Disable { .. });
+        if !stops && self.is_in_group(id) {
+            let (seq, answer) = asked;
+            let text = "it belongs to a group that is under way: stop that first";
+            return say(answer, Answer::failed(Some(seq), "busy", text));
+        }
+        match deed {
             // Held from its beginning: what is let go while the drive is being enabled never turns.
-            self.jogs.insert(id, DeadMan::new(JOG_SPAN, self.network.now()));
-        } else {
-            self.jogs.remove(&id);
+            Deed::Jog { .. } => drop(self.jogs.insert(id, DeadMan::new(JOG_SPAN, self.network.now()))),
+            // These change nothing of how it turns: a jog goes on, and so does its dead man.
+            Deed::Enable { .. } | Deed::ResetFault { .. } => {}
+            _ => drop(self.jogs.remove(&id)),
         }
         let asked = Some(asked);
         match deed {
@@ -141,12 +165,17 @@ impl Host {
         asked: Option<Asked>,
         deed: impl Future<Output = Outcome> + 'static,
     ) {
+        // Who goes on alone leaves the others of its group without their set-points.
+        let others = self.leave_group(node);
         self.generation += 1;
         let (running, future) = Running::new(node, self.generation, what, moves, asked, deed);
         if let Some(before) = self.running.insert(node, running) {
             before.cut_short("replaced", "something else was asked of the drive before this was done");
         }
         self.work.push(future);
+        for other in others {
+            self.quick_stop_one(other, "another drive of its group was told something else", None);
+        }
     }
 
     fn end_jog(&mut self, node: NodeId, asked: Asked) {
@@ -181,12 +210,11 @@ impl Host {
 
     /// Looks closely at drives of which enough was heard.
     pub(super) fn explain_what_was_heard(&mut self, now: Instant) {
-        for listening in self.listening.extract_if(.., |listening| listening.until <= now) {
+        let ready: Vec<Listening> = self.listening.extract_if(.., |listening| listening.until <= now).collect();
+        for listening in ready {
             let Listening { node, mut heard, seq, answer, .. } = listening;
             heard.until(now);
-            let known = self.nodes.get(&node).and_then(|node| node.drive.clone());
-            let unknown = || Drive::of_unknown_model(self.network.node(node).with_timeout(self.setting.timeout));
-            let drive = known.unwrap_or_else(unknown);
+            let drive = self.drive_or_unknown(node);
             self.work.push(Box::pin(async move {
                 let explained = drive.explain(&heard).await;
                 Done::Explained(seq, answer, Box::new(explained))
@@ -204,8 +232,13 @@ impl Host {
             }
             Done::Looked(asked, outcome) => self.conclude_looking(asked, outcome),
             Done::Written(asked, written) => self.conclude_writing(asked, *written),
-            Done::Learned(node) => drop(self.learning.remove(&node)),
+            Done::Learned(node, traffic) => self.conclude_learning(node, traffic),
+            Done::PdosRead(asked, node, read) => self.conclude_reading_pdos(asked, node, *read),
+            Done::PdosPlanned(asked, planned) => self.conclude_planning_pdos(asked, *planned),
+            Done::LookedAround(asked, seen) => conclude_looking_around(asked, seen),
+            Done::WorldChanged(asked, done) => self.conclude_change(asked, done),
             Done::Deed(node, generation, outcome) => self.conclude(node, generation, outcome),
+            Done::Group(generation, outcome) => self.conclude_group(generation, outcome),
             Done::Told(told) => {
                 for (node, outcome) in told {
                     if let Err(error) = outcome {
@@ -227,6 +260,10 @@ impl Host {
         }
         let Some(running) = self.running.remove(&node) else { return };
         match outcome {
+            Some(Ok(notes)) if running.what == STORING => {
+                self.parameters.note_stored(node);
+                running.tell(|seq| Answer::done(seq, notes));
+            }
             Some(Ok(notes)) => running.tell(|seq| Answer::done(seq, notes)),
             Some(Err(error)) => {
                 let text = error.to_string();

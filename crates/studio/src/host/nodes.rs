@@ -78,6 +78,7 @@ impl Host {
             Some(model) => Drive::new(node, model),
             None => Drive::known_as(node, found.knowledge.clone()),
         };
+        let drive = drive.behind(self.setting.gears.get(&found.node).copied().unwrap_or_default());
         let is_drive = is_drive || drive.axis_description().is_some();
         let doubt = || found.doubt().filter(|_| told.is_none());
         KnownNode {
@@ -142,6 +143,9 @@ impl Host {
             trouble: node.trouble.as_deref(),
             doing: self.running.get(&id).map(|running| running.what),
             moving: self.network.moved().contains(id),
+            can_roll_back: self.parameters.can_roll_back(id),
+            stored: self.parameters.stored(id),
+            mapped: self.parameters.mapped(id),
             without_us: self.network.guarded(id).map(|loss| loss.to_string()),
             drive: node.view.as_deref(),
         }

@@ -1,10 +1,12 @@
 //! Rows of a description and values of objects as a page is shown them.
 
 use canopen::od::{Entry, ValueRange};
+use canopen::pdo::{Direction, PdoId, PdoNumber};
 use canopen::{Mux, NodeId};
 use devices::Description;
 use devices::row::is_parameter;
 use master::parameters::default_of;
+use master::pdo::{PdoUnfit, record_of};
 use serde_json::{Value, json};
 
 /// The areas of an object dictionary (CiA 301, table 37), its PDOs apart (CiA 301, 7.5.2.35 to 7.5.2.38).
@@ -45,7 +47,7 @@ fn group_of(index: u16) -> &'static str {
 }
 
 /// What the description says of an object.
-pub(super) fn row_json(row: &Entry, node: NodeId) -> Value {
+pub(super) fn row_json(model: &Description, row: &Entry, node: NodeId) -> Value {
     let range = row.limits.map(|limits| match limits {
         ValueRange::Integer(low, high) => format!("{low} to {high}"),
         ValueRange::Unsigned(low, high) => format!("{low} to {high}"),
@@ -62,12 +64,23 @@ pub(super) fn row_json(row: &Entry, node: NodeId) -> Value {
         "readable": row.access.is_readable(),
         "parameter": is_parameter(row),
         "kept": row.is_kept(),
+        "rpdo": in_pdo(model, row, Direction::Rpdo),
+        "tpdo": in_pdo(model, row, Direction::Tpdo),
         "unit": row.unit,
         "range": range,
         "range_times": row.resolution.map(|object| object.to_string()),
         "default": default_of(row, node).filter(|bytes| !bytes.is_empty()).map(|bytes| plain_value(row, &bytes)),
         "meanings": meanings.collect::<Vec<_>>(),
     })
+}
+
+/// The bits that it takes in PDOs of a direction, or why it cannot be there.
+fn in_pdo(model: &Description, row: &Entry, direction: Direction) -> Value {
+    match record_of(model, PdoId { direction, number: PdoNumber::FIRST }, row.mux()) {
+        Ok(record) => json!(record.bits),
+        Err(PdoUnfit::NotMappable { why, .. }) => json!(why),
+        Err(error) => json!(error.to_string()),
+    }
 }
 
 /// A number as it is typed, a text, or bytes.
@@ -81,9 +94,14 @@ fn plain_value(row: &Entry, bytes: &[u8]) -> String {
 
 /// A value in words, with its unit where it has one.
 pub(super) fn value_text(model: &'static Description, mux: Mux, bytes: &[u8]) -> String {
-    let told = master::decode::Value::new(mux, bytes, Some(model)).to_string();
+    let value = master::decode::Value::new(mux, bytes, Some(model));
+    let told = value.to_string();
     // The object and its name stand before.
-    told.split_once(" = ").map_or(told.clone(), |(_, value)| value.to_owned())
+    let text = told.split_once(" = ").map_or(told.as_str(), |(_, text)| text);
+    // A log says [0.1 A] for the unit of one count.
+    let unit = value.unit();
+    let times = if unit.starts_with(|first: char| first.is_ascii_digit()) { "× " } else { "" };
+    text.replacen(&format!("[{unit}]"), &format!("{times}{unit}"), 1)
 }
 
 /// Bytes in the order of the wire.
@@ -94,6 +112,20 @@ pub(super) fn bytes_text(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// ZLAC8030L quick start guide V1.00, chapter 9: 606Ch counts 0.1 r/min, 6081h 1 r/min, 2000h ms.
+    #[test]
+    fn a_value_has_its_unit_behind_it() {
+        let model = devices::model("zlac8030l").expect("a model");
+        for (object, bytes, text) in [
+            (Mux::new(0x606C, 0), &600_i32.to_le_bytes()[..], "600 × 0.1 r/min"),
+            (Mux::new(0x6081, 0), &60_u32.to_le_bytes()[..], "60 r/min"),
+            (Mux::new(0x2000, 0), &1000_u16.to_le_bytes()[..], "1000 ms"),
+            (Mux::new(0x1A00, 0), &[2], "2"),
+        ] {
+            assert_eq!(value_text(model, object, bytes), text);
+        }
+    }
 
     #[test]
     fn objects_stand_where_the_profiles_describe_them() {

@@ -21,34 +21,31 @@ use testbench::words::value::typed_for;
 use super::journals::Journals;
 use super::object_rows::{bytes_text, row_json, value_text};
 use super::state::Host;
-use super::transactions::{MOST_KEPT, Refusal, Written};
+use super::transactions::{Change, MOST_KEPT, Refusal, Written};
 use super::work::{Asked, Done, say};
 use crate::message::{Answer, Deed, NewValue};
 
-/// Requests for objects that may be under way, of all pages together.
-const MOST_UNDER_WAY: usize = 32;
-
 /// Objects that one request may read.
 const MOST_READ: usize = 64;
+
+/// What is being done while a drive stores its parameters.
+pub(super) const STORING: &str = "storing";
 
 impl Host {
     /// Does what is asked about the parameters of a drive, or begins it.
     pub(super) fn take_parameters(&mut self, deed: Deed, asked: Asked) {
         let Some(node) = node_of(&deed) else { return };
-        let known = self.nodes.get(&node).and_then(|known| known.drive.clone());
-        let Some((drive, model)) = known.and_then(|drive| drive.description().map(|model| (drive.clone(), model)))
-        else {
-            let text =
-                format!("the model of node {node} is not known: scan the bus, or name it with --model {node}=MODEL");
-            return refuse(asked, ("no_such_drive", text));
+        let (drive, model) = match self.known_model(node) {
+            Ok(known) => known,
+            Err(refusal) => return refuse(asked, refusal),
         };
         match deed {
             Deed::Objects { .. } => answer(asked, Ok(dictionary(node, model))),
             Deed::WriteParameters { values, file, .. } => self.begin_writing(&drive, model, values, file, asked),
+            Deed::Store { .. } => self.begin_storing(drive, asked),
             Deed::RollBack { .. } => self.begin_rolling_back(&drive, model, asked),
-            _ if self.parameters.reading == MOST_UNDER_WAY => refuse(asked, busy("others are reading objects")),
+            _ if !self.parameters.begin_reading() => refuse(asked, busy("others are reading objects")),
             reading => {
-                self.parameters.reading += 1;
                 self.work.push(Box::pin(async move {
                     let outcome = match reading {
                         Deed::ReadObjects { objects, .. } => read(&drive, model, &objects).await,
@@ -63,6 +60,16 @@ impl Host {
                 }));
             }
         }
+    }
+
+    /// A drive whose description is known.
+    pub(super) fn known_model(&self, node: NodeId) -> Result<(Drive, &'static Description), Refusal> {
+        let known = self.nodes.get(&node).and_then(|known| known.drive.clone());
+        known.and_then(|drive| drive.description().map(|model| (drive.clone(), model))).ok_or_else(|| {
+            let text =
+                format!("the model of node {node} is not known: scan the bus, or name it with --model {node}=MODEL");
+            ("no_such_drive", text)
+        })
     }
 
     /// Objects were read, or could not be.
@@ -80,10 +87,23 @@ impl Host {
         asked: Asked,
     ) {
         let (drive, journals) = (drive.clone(), self.setting.journals.clone());
-        self.begin_transaction(drive.node().id(), false, asked, async move {
+        self.begin_transaction(drive.node().id(), Change::Values, asked, async move {
             let wanted = wanted(&drive, model, values, file).await.map_err(|refusal| (refusal, None))?;
             write(&drive, model, &wanted, journals.as_deref()).await
         });
+    }
+
+    /// A drive that is doing something is left at it: some stand still while they write their memory.
+    fn begin_storing(&mut self, drive: Drive, asked: Asked) {
+        let node = drive.node().id();
+        let is_busy = self.running.contains_key(&node)
+            || self.jogs.contains_key(&node)
+            || self.network.moved().contains(node)
+            || self.parameters.is_writing(node);
+        if is_busy {
+            return refuse(asked, busy("something else is being done with the drive"));
+        }
+        self.begin(node, STORING, false, Some(asked), async move { drive.save().await.map(|()| Vec::new()) });
     }
 
     fn begin_rolling_back(&mut self, drive: &Drive, model: &'static Description, asked: Asked) {
@@ -92,18 +112,15 @@ impl Host {
             let text = format!("nothing was written to the parameters of node {node} since the studio began");
             return refuse(asked, ("nothing_to_roll_back", text));
         };
-        self.begin_transaction(
-            node,
-            true,
-            asked,
-            async move { write(&drive, model, &wanted, journals.as_deref()).await },
-        );
+        self.begin_transaction(node, Change::Back, asked, async move {
+            write(&drive, model, &wanted, journals.as_deref()).await
+        });
     }
 
-    fn begin_transaction(
+    pub(super) fn begin_transaction(
         &mut self,
         node: NodeId,
-        is_back: bool,
+        change: Change,
         asked: Asked,
         writing: impl Future<Output = Result<(Value, Option<Parameters>), (Refusal, Option<Parameters>)>> + 'static,
     ) {
@@ -115,19 +132,19 @@ impl Host {
                 Ok((done, before)) => (Ok(done), before),
                 Err((refusal, before)) => (Err(refusal), before),
             };
-            Done::Written(asked, Box::new(Written { node, outcome, before, is_back }))
+            Done::Written(asked, Box::new(Written { node, outcome, before, change }))
         }));
     }
 
     /// A transaction has ended, one way or the other.
     pub(super) fn conclude_writing(&mut self, asked: Asked, written: Written) {
-        let Written { node, outcome, before, is_back } = written;
+        let Written { node, outcome, before, change } = written;
         self.parameters.writing.remove(&node);
         let kept = self.parameters.before.entry(node).or_default();
         match (&outcome, before) {
             // The way back has been gone: it is no step to go back from.
-            (Ok(_), _) if is_back => drop(kept.pop()),
-            (_, Some(before)) if !is_back => {
+            (Ok(_), _) if change == Change::Back => drop(kept.pop()),
+            (_, Some(before)) if change != Change::Back => {
                 if kept.len() == MOST_KEPT {
                     kept.remove(0);
                 }
@@ -136,8 +153,17 @@ impl Host {
             _ => {}
         }
         let left = kept.len();
-        if let Err((_, text)) = &outcome {
-            self.say_news(Some(node), text);
+        match &outcome {
+            Err((_, text)) => self.say_news(Some(node), text),
+            Ok(done) => {
+                if change == Change::Pdos {
+                    self.parameters.note_mapped(node);
+                }
+                // What leads back is still there: whoever takes it for the way back from another write undoes this one.
+                if let Some(why) = done["journal"].as_str().filter(|why| !why.is_empty()) {
+                    self.say_news(Some(node), why);
+                }
+            }
         }
         // A mapping may be another one now.
         self.learn_pdos(node);
@@ -160,13 +186,14 @@ const fn node_of(deed: &Deed) -> Option<NodeId> {
         | Deed::CompareParameters { node, .. }
         | Deed::WriteParameters { node, .. }
         | Deed::RollBack { node }
+        | Deed::Store { node }
         | Deed::BackUp { node } => Some(*node),
         _ => None,
     }
 }
 
 fn dictionary(node: NodeId, model: &Description) -> Value {
-    let rows: Vec<Value> = model.dictionary.rows().iter().map(|row| row_json(row, node)).collect();
+    let rows: Vec<Value> = model.dictionary.rows().iter().map(|row| row_json(model, row, node)).collect();
     json!({ "node": node.raw(), "model": model.name, "manual": model.manual, "objects": rows })
 }
 
@@ -209,7 +236,7 @@ fn is_same(mux: Mux, first: &[u8], second: &[u8]) -> bool {
 }
 
 /// An object of the description by what a page calls it.
-fn row(model: &'static Description, text: &str) -> Result<&'static Entry, Refusal> {
+pub(super) fn row(model: &'static Description, text: &str) -> Result<&'static Entry, Refusal> {
     let found = object(text).and_then(|object| object.resolve(Some(model.dictionary)));
     let (mux, row) = found.map_err(|why| ("unknown_object", why))?;
     row.ok_or_else(|| ("unknown_object", format!("{mux} is not in the description of the {}", model.name)))
@@ -267,14 +294,14 @@ async fn typed(drive: &Drive, model: &'static Description, values: &[NewValue]) 
     Ok(parameters)
 }
 
-async fn plan(drive: &Drive, model: &'static Description, wanted: &Parameters) -> Result<Plan, Refusal> {
+pub(super) async fn plan(drive: &Drive, model: &'static Description, wanted: &Parameters) -> Result<Plan, Refusal> {
     drive.check_at_rest().await.map_err(|error| refusal_of(&error, model))?;
     drive.plan_parameters(wanted, PlanOptions::default()).await.map_err(|error| refusal_of(&error, model))
 }
 
 /// Writes all or nothing, with what leads back kept until that is done. Gives what the objects had before, if they may have
 /// something else now.
-async fn write(
+pub(super) async fn write(
     drive: &Drive,
     model: &'static Description,
     wanted: &Parameters,
@@ -307,7 +334,7 @@ async fn write(
                 })
             });
             done["rounded"] = rounded.collect();
-            done["journal"] = json!(end());
+            done["journal"] = json!(end().trim_start_matches(". "));
             done["displaced"] = applied.displaced.iter().map(|found| json!(found.object.to_string())).collect();
             Ok((done, before))
         }
@@ -342,7 +369,7 @@ fn refusal_of(error: &PlanError, model: &Description) -> Refusal {
 }
 
 /// What is or was to be written, in its order.
-fn plan_json(plan: &Plan, model: &'static Description) -> Value {
+pub(super) fn plan_json(plan: &Plan, model: &'static Description) -> Value {
     let text = |mux: Mux, bytes: &[u8]| value_text(model, mux, bytes);
     let steps = plan.steps.iter().map(|step| {
         json!({
@@ -395,15 +422,15 @@ async fn back_up(drive: &Drive, model: &'static Description) -> Result<Value, Re
     Ok(json!({ "file": file, "values": backup.parameters.values.len(), "refused": refused }))
 }
 
-fn busy(what: &str) -> Refusal {
+pub(super) fn busy(what: &str) -> Refusal {
     ("busy", format!("{what}: try again when that is done"))
 }
 
-fn refuse(asked: Asked, refusal: Refusal) {
+pub(super) fn refuse(asked: Asked, refusal: Refusal) {
     answer(asked, Err(refusal));
 }
 
-fn answer((seq, answer): Asked, outcome: Result<Value, Refusal>) {
+pub(super) fn answer((seq, answer): Asked, outcome: Result<Value, Refusal>) {
     say(
         answer,
         match outcome {

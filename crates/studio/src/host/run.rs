@@ -53,6 +53,7 @@ impl Host {
         self.stop_what_is_not_held(now);
         while let Some(passed) = passed() {
             self.meter.note(&passed.frame);
+            self.heard_ids.note(&passed.frame, passed.at);
             self.counter.trace.append(passed);
             if !passed.own {
                 self.listening.iter_mut().for_each(|listening| listening.heard.note(&passed.frame, passed.at));
@@ -61,6 +62,9 @@ impl Host {
         self.meter.look(now);
         self.explain_what_was_heard(now);
         self.hear_events();
+        while let Some(text) = self.setting.wire.take_news() {
+            self.say_news(None, &text);
+        }
         let interval = if self.authority.sessions() > 0 { PICTURE_INTERVAL } else { UNSEEN_INTERVAL };
         if now - self.shown_at >= interval {
             self.shown_at = now;
@@ -114,12 +118,15 @@ impl Host {
                 bitrate: self.setting.bitrate.map(Bitrate::bits_per_second),
                 frames_per_s: self.meter.frames_per_s(),
                 load_percent: self.meter.load_percent(),
+                health: self.setting.wire.health(),
             },
             scanning: self.scanning,
             sessions: self.authority.sessions(),
             controller: self.authority.controller(),
             asking: self.authority.asking(),
             happenings: self.counter.timeline.revision(),
+            logs_saved: self.counter.trace.logs_saved(),
+            changes: self.changes.count(),
             nodes: self.nodes.iter().map(|(id, node)| self.view(*id, node, now)).collect(),
         };
         // Names, numbers and lists alone: there is nothing in it that JSON cannot say.

@@ -1,6 +1,6 @@
 //! The host: what it holds, and what it is told at its start. What it does stands in the files beside this one.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -8,8 +8,12 @@ use can::{Bitrate, Instant};
 use canopen::NodeId;
 use devices::Description;
 use futures_util::stream::FuturesUnordered;
-use master::Network;
+use master::plan::NodeTraffic;
+use master::{Gear, Network};
 
+use super::changes::Changes;
+use super::group_run::GroupRun;
+use super::heard_ids::HeardIds;
 use super::journals::Journals;
 use super::known_node::KnownNode;
 use super::meter::Meter;
@@ -19,6 +23,8 @@ use crate::authority::{Authority, SessionId};
 use crate::dead_man::DeadMan;
 use crate::desk::{Counter, Desk, desk};
 use crate::trace::{Origin, Trace};
+use crate::wire::Wire;
+use crate::world::WorldDoor;
 
 /// How long a jog goes on without being renewed. Looked at every 10 ms: a drive is told to stop within 200 ms.
 pub const JOG_SPAN: Duration = Duration::from_millis(190);
@@ -41,12 +47,18 @@ pub struct Setting {
     pub timeout: Duration,
     /// Models that need not be found out.
     pub models: BTreeMap<NodeId, &'static Description>,
+    /// What stands behind the drives' shafts, where anything does.
+    pub gears: BTreeMap<NodeId, Gear>,
     /// Name of the bus in a log: that of its CAN interface, or `can0`.
     pub interface: String,
     /// Unix time of the bus's zero, for a log.
     pub unix_zero: Duration,
     /// Where what leads back from a transaction is kept meanwhile; nowhere on a bus that ends with this program.
     pub journals: Option<Arc<dyn Journals>>,
+    /// The world around the drives, where they are virtual ones of this program.
+    pub world: Option<WorldDoor>,
+    /// What the bus says beside frames.
+    pub wire: Wire,
 }
 
 /// The one task that owns the network. See the [crate](crate).
@@ -65,14 +77,21 @@ pub struct Host {
     pub(super) scans_again: bool,
     pub(super) running: BTreeMap<NodeId, Running>,
     pub(super) jogs: BTreeMap<NodeId, DeadMan>,
+    /// Several drives as one motion.
+    pub(super) group: Option<GroupRun>,
     pub(super) listening: Vec<Listening>,
     pub(super) parameters: Transactions,
+    /// What was done to the world.
+    pub(super) changes: Changes,
     /// Numbers what runs, so that the end of something that was replaced is told from the end of what replaced it.
     pub(super) generation: u64,
     pub(super) work: Work,
     pub(super) lifelines: FuturesUnordered<Lifeline>,
-    /// Nodes whose PDO mappings are being read.
-    pub(super) learning: BTreeSet<NodeId>,
+    /// Nodes whose PDO mappings are being read, and whether they have to be read again after that.
+    pub(super) learning: BTreeMap<NodeId, bool>,
+    /// What each node sends, as it was last read.
+    pub(super) traffic: BTreeMap<NodeId, NodeTraffic>,
+    pub(super) heard_ids: HeardIds,
     pub(super) meter: Meter,
     pub(super) pictures: u64,
     pub(super) shown_at: Instant,
@@ -106,9 +125,13 @@ impl Host {
             scans_again: false,
             running: BTreeMap::new(),
             jogs: BTreeMap::new(),
+            group: None,
             listening: Vec::new(),
             parameters: Transactions::default(),
-            learning: BTreeSet::new(),
+            changes: Changes::default(),
+            learning: BTreeMap::new(),
+            traffic: BTreeMap::new(),
+            heard_ids: HeardIds::from(now),
             generation: 0,
             work: Work::new(),
             lifelines: FuturesUnordered::new(),

@@ -32,6 +32,10 @@ impl Host {
         if !let_go.is_empty() {
             self.quick_stop(let_go, "the jog was not renewed in time");
         }
+        let group = self.let_go_group(now);
+        if !group.is_empty() {
+            self.quick_stop(group.into_iter().collect(), "the group was not held in time");
+        }
         if self.presence.is_some_and(|presence| presence.has_lapsed(now)) {
             self.presence = None;
             self.stop_moved("nothing was heard of the page that moved it");
@@ -63,6 +67,9 @@ impl Host {
         self.jogs.remove(&id);
         if let Some(before) = self.running.remove(&id) {
             before.cut_short("stopped", why);
+        }
+        for other in self.leave_group(id) {
+            self.quick_stop_one(other, why, None);
         }
         let node = self.network.node(id).with_timeout(self.setting.timeout);
         let drive = self.nodes.get(&id).and_then(|node| node.drive.clone());

@@ -1,9 +1,13 @@
 //! The host against virtual drives, in virtual time: who may move, and what stops.
 
 mod faults;
+mod group;
+mod homing;
 mod parameters;
+mod pdo;
 mod series;
 mod trace;
+mod world;
 
 use std::collections::{BTreeMap, VecDeque};
 use std::pin::{Pin, pin};
@@ -22,6 +26,7 @@ use super::{Host, JOG_SPAN, Journals, PRESENCE_SPAN, Setting};
 use crate::desk::{Desk, Session};
 use crate::message::{Answer, Deed};
 use crate::trace::Passed;
+use crate::wire::Wire;
 
 const WHEEL: NodeId = node(4);
 const ARM: NodeId = node(2);
@@ -162,9 +167,12 @@ fn setting() -> Setting {
         bitrate: None,
         timeout: Duration::from_millis(100),
         models: BTreeMap::new(),
+        gears: BTreeMap::new(),
         interface: "can0".into(),
         unix_zero: Duration::from_secs(1_700_000_000),
         journals: None,
+        world: None,
+        wire: Wire::default(),
     }
 }
 
@@ -274,6 +282,27 @@ fn a_jog_that_is_held_goes_on_and_one_that_is_not_stops() {
         assert_eq!(page.ask(Deed::JogHold { node: WHEEL }).await.error_kind(), "not_held", "too late");
         stage.sleep(500).await;
         assert!(stage.speed(WHEEL).await < 2.0, "what comes too late moves nothing");
+    });
+}
+
+/// As a person does who presses `e` with the arrow key held: the dead man stays.
+#[test]
+fn a_jog_stays_held_whatever_else_is_asked_of_the_drive() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        for other in [Deed::Enable { node: WHEEL }, Deed::ResetFault { node: WHEEL }] {
+            page.must(jog(60.0)).await;
+            for _ in 0..10 {
+                stage.sleep(60).await;
+                page.must(Deed::JogHold { node: WHEEL }).await;
+            }
+            assert!(stage.speed(WHEEL).await > 50.0);
+            // An answer that a fault was reset where there is none is not what this is about.
+            page.ask(other).await;
+            stage.sleep(200).await;
+            assert!(stage.rests(WHEEL).await < STOPPED_WITHIN);
+        }
     });
 }
 

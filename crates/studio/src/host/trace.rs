@@ -2,27 +2,45 @@
 
 use canopen::NodeId;
 use master::Drive;
+use master::plan::NodeTraffic;
 
 use super::state::Host;
 use super::work::Done;
 
 impl Host {
-    /// Puts what a node that was found says in its model's words, and reads how its PDOs are set up. Nothing is done with the
-    /// answers: the trace learns from them as they pass, as it does when others ask.
+    /// Puts what a node that was found says in its model's words, and reads how its PDOs are set up. The trace learns from the
+    /// answers as they pass, as it does when others ask; the analysis of the bus is made of them.
     pub(super) fn learn_pdos(&mut self, id: NodeId) {
         let Some(node) = self.nodes.get(&id) else { return };
         if let Some(model) = node.drive.as_ref().and_then(Drive::description) {
             self.counter.trace.set_model(id, model);
         }
-        if !self.learning.insert(id) {
+        // What changes while it is being read has to be read once more.
+        if let Some(again) = self.learning.get_mut(&id) {
+            *again = true;
             return;
         }
-        let unknown = || Drive::of_unknown_model(self.network.node(id).with_timeout(self.setting.timeout));
-        let drive = node.drive.clone().unwrap_or_else(unknown);
+        self.learning.insert(id, false);
+        let drive = self.drive_or_unknown(id);
         self.work.push(Box::pin(async move {
             // A node without PDOs, or that is gone by now, has none to tell.
-            let _ = drive.pdos().await;
-            Done::Learned(id)
+            Done::Learned(id, NodeTraffic::of(&drive).await.ok().map(Box::new))
         }));
+    }
+
+    /// They were read.
+    pub(super) fn conclude_learning(&mut self, id: NodeId, traffic: Option<Box<NodeTraffic>>) {
+        if let Some(traffic) = traffic {
+            self.traffic.insert(id, *traffic);
+        }
+        if self.learning.remove(&id) == Some(true) {
+            self.learn_pdos(id);
+        }
+    }
+
+    /// A node that was found, as far as it is known.
+    pub(super) fn drive_or_unknown(&self, id: NodeId) -> Drive {
+        let known = self.nodes.get(&id).and_then(|node| node.drive.clone());
+        known.unwrap_or_else(|| Drive::of_unknown_model(self.network.node(id).with_timeout(self.setting.timeout)))
     }
 }

@@ -9,11 +9,15 @@ use futures_util::stream::FuturesUnordered;
 use master::Error;
 use master::explain::{Explained, Overheard};
 use master::identify::Found;
+use master::plan::NodeTraffic;
 use tokio::sync::oneshot;
 
+use super::group_run::GroupOutcome;
+use super::pdo_load::PlannedPdos;
 use super::transactions::{Refusal, Written};
 use crate::message::Answer;
 use crate::snapshot::DriveView;
+use crate::world::{Changed, NoAnswer};
 
 /// Everything under way.
 pub(super) type Work = FuturesUnordered<LocalBoxFuture<'static, Done>>;
@@ -29,14 +33,24 @@ pub(super) enum Done {
     Scanned(Vec<Found>, Option<Asked>),
     /// A deed on a drive has ended; `None` if it was cut short.
     Deed(NodeId, u64, Option<Result<Vec<String>, Error>>),
+    /// A motion of several drives has ended; `None` if it was cut short.
+    Group(u64, Option<GroupOutcome>),
     /// What was moved has been told to stop.
     Told(Vec<(NodeId, Result<(), Error>)>),
-    /// The PDO mappings of a node were read.
-    Learned(NodeId),
+    /// The PDO mappings of a node were read; `None` if it did not answer.
+    Learned(NodeId, Option<Box<NodeTraffic>>),
+    /// They were read for a page.
+    PdosRead(Asked, NodeId, Box<Result<NodeTraffic, Refusal>>),
+    /// A change of PDOs was planned.
+    PdosPlanned(Asked, Box<Result<PlannedPdos, Refusal>>),
     /// Objects were looked at.
     Looked(Asked, Result<serde_json::Value, Refusal>),
     /// Parameters were written, or not.
     Written(Asked, Box<Written>),
+    /// The world was looked at.
+    LookedAround(Asked, Result<serde_json::Value, NoAnswer>),
+    /// Something was done to the world, or not.
+    WorldChanged(Asked, Result<Result<Changed, (&'static str, String)>, NoAnswer>),
     /// A drive was looked at closely.
     Explained(u64, oneshot::Sender<Answer>, Box<Explained>),
 }
@@ -77,6 +91,21 @@ impl Running {
         let (deed, abort) = abortable(deed);
         let future = Box::pin(async move { Done::Deed(node, generation, deed.await.ok()) });
         (Self { generation, what, moves, abort, answer }, future)
+    }
+
+    /// A motion of several drives: one for each, and the future of all. The first answers.
+    pub(super) fn of_group(
+        nodes: &[NodeId],
+        generation: u64,
+        what: &'static str,
+        answer: Asked,
+        motion: impl Future<Output = GroupOutcome> + 'static,
+    ) -> (Vec<Self>, LocalBoxFuture<'static, Done>) {
+        let (motion, abort) = abortable(motion);
+        let future = Box::pin(async move { Done::Group(generation, motion.await.ok()) });
+        let mut answer = Some(answer);
+        let one = |_| Self { generation, what, moves: true, abort: abort.clone(), answer: answer.take() };
+        (nodes.iter().map(one).collect(), future)
     }
 
     /// Ends it before its time: it asks nothing further of the drive from here on.

@@ -1,6 +1,7 @@
 //! The ring, and what a reader holds of it.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use can::Instant;
@@ -26,6 +27,7 @@ const MOST_CHUNKS: usize = 2 * KEPT / CHUNK;
 pub(crate) struct Trace {
     ring: Mutex<Ring>,
     origin: Origin,
+    logs_saved: AtomicU64,
 }
 
 #[derive(Debug)]
@@ -49,11 +51,21 @@ pub(super) struct Chunk {
 }
 
 impl Trace {
+    /// Somebody saves it.
+    pub(crate) fn note_saved(&self) {
+        self.logs_saved.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// How often it was saved.
+    pub(crate) fn logs_saved(&self) -> u64 {
+        self.logs_saved.load(Ordering::Relaxed)
+    }
+
     /// A trace that looks for nodes among these models.
     pub(crate) fn new(models: Models, origin: Origin) -> Self {
         let decoder = Decoder::knowing(models);
         let ring = Ring { chunks: VecDeque::new(), held: 0, next: 0, decoder, models: BTreeMap::new() };
-        Self { ring: Mutex::new(ring), origin }
+        Self { ring: Mutex::new(ring), origin, logs_saved: AtomicU64::new(0) }
     }
 
     /// Takes a frame; times must not go back.

@@ -5,6 +5,7 @@
 mod answer;
 mod openapi;
 mod page;
+mod recording;
 mod socket;
 #[cfg(test)]
 mod tests;
@@ -62,11 +63,14 @@ struct Web {
     /// One password at a time.
     door: Arc<Semaphore>,
     doors: trace::Doors,
+    /// One record at a time: each takes memory.
+    records: Arc<Semaphore>,
 }
 
 /// The server of a studio: everything under one router, which needs no socket to be called.
 pub fn app(desk: Desk, access: Arc<Access>) -> Router {
-    let web = Web { desk, access, door: Arc::new(Semaphore::new(1)), doors: trace::Doors::default() };
+    let one = || Arc::new(Semaphore::new(1));
+    let web = Web { desk, access, door: one(), doors: trace::Doors::default(), records: one() };
     let api = ROUTES.iter().fold(Router::new(), |router, route| router.route(route.path, handler(route.operation)));
     api.route("/", get(async || page::file("index.html")))
         .route("/page/{file}", get(async |Path(file): Path<String>| page::file(&file)))
@@ -89,6 +93,10 @@ fn handler(operation: Operation) -> MethodRouter<Web> {
         Operation::Trace => get(async |State(web): State<Web>, asked| trace::lines(web.desk, web.doors, asked).await),
         Operation::Series => get(async |State(web): State<Web>, asked| trace::series(web.desk, web.doors, asked).await),
         Operation::TraceLog => get(async |State(web): State<Web>, asked| trace::log(web.desk, &web.doors, asked)),
+        Operation::RecordingMcap => {
+            post(async |State(web): State<Web>, body: axum::body::Bytes| recording::mcap(web.records, body).await)
+                .layer(DefaultBodyLimit::max(recording::LARGEST))
+        }
     }
 }
 

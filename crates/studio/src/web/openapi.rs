@@ -15,6 +15,7 @@ pub(super) enum Operation {
     Series,
     Trace,
     TraceLog,
+    RecordingMcap,
 }
 
 /// One request.
@@ -33,7 +34,7 @@ const OVER: (&str, &str) = ("503", "The studio is ending");
 const FOREIGN: (&str, &str) = ("403", "The Origin or the Host is not this server's");
 
 /// All of them. None that is a GET changes anything; none moves a drive: motion goes through the socket, where it is held.
-pub(super) const ROUTES: [Route; 10] = [
+pub(super) const ROUTES: [Route; 11] = [
     Route {
         path: "/api/state",
         method: "get",
@@ -114,6 +115,21 @@ pub(super) const ROUTES: [Route; 10] = [
         operation: Operation::TraceLog,
         summary: "All frames that are kept, in the form of candump; text, transfers and quiet do not count here",
         answers: &[("200", "One frame a line"), MALFORMED, LET_IN, ("429", "Others are fetching it"), OVER],
+    },
+    Route {
+        path: "/api/recording.mcap",
+        method: "post",
+        operation: Operation::RecordingMcap,
+        summary: "A record as MCAP; the body is one as CSV: t_s, a column for each signal such as 4.velocity_rpm, mark",
+        answers: &[
+            ("200", "MCAP"),
+            ("400", "The body is no such CSV"),
+            LET_IN,
+            FOREIGN,
+            ("413", "More than 32 MB"),
+            ("429", "Another record is being made"),
+            OVER,
+        ],
     },
 ];
 

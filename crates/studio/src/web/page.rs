@@ -34,9 +34,20 @@ const FILES: &[(&str, &str, &str)] = &[
     ("svg_pen.js", SCRIPT, include_str!("../../page/svg_pen.js")),
     ("parameters.js", SCRIPT, include_str!("../../page/parameters.js")),
     ("parameter_file.js", SCRIPT, include_str!("../../page/parameter_file.js")),
+    ("pdo.js", SCRIPT, include_str!("../../page/pdo.js")),
+    ("pdo_editor.js", SCRIPT, include_str!("../../page/pdo_editor.js")),
+    ("pdo_plan.js", SCRIPT, include_str!("../../page/pdo_plan.js")),
     ("faults.js", SCRIPT, include_str!("../../page/faults.js")),
+    ("group.js", SCRIPT, include_str!("../../page/group.js")),
+    ("help.js", SCRIPT, include_str!("../../page/help.js")),
+    ("homing.js", SCRIPT, include_str!("../../page/homing.js")),
+    ("homing_picture.js", SCRIPT, include_str!("../../page/homing_picture.js")),
+    ("tour.js", SCRIPT, include_str!("../../page/tour.js")),
     ("heard.js", SCRIPT, include_str!("../../page/heard.js")),
     ("trace.js", SCRIPT, include_str!("../../page/trace.js")),
+    ("world.js", SCRIPT, include_str!("../../page/world.js")),
+    ("world_form.js", SCRIPT, include_str!("../../page/world_form.js")),
+    ("world_picture.js", SCRIPT, include_str!("../../page/world_picture.js")),
 ];
 
 /// A file of the page.

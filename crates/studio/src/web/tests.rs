@@ -358,3 +358,58 @@ async fn a_page_that_reads_slowly_is_told_how_much_it_missed_and_costs_no_more_m
     assert_eq!(shown + missed, count, "each is shown or counted");
     assert!(missed > 0, "a picture has no room for all of them to wait");
 }
+
+/// One that never reads keeps its place from nobody; what it has of it ends.
+#[tokio::test(start_paused = true)]
+async fn who_takes_nothing_of_a_log_loses_its_place() {
+    let (app, access, counter) = server(None);
+    let bearer = format!("Bearer {}", token(&access));
+    let headers = [("authorization", bearer.as_str())];
+    for number in 0..10_000 {
+        let at = can::Instant::from_millis(number);
+        counter.trace.append(Passed { at, frame: "704#05".parse().expect("a frame"), own: false });
+    }
+    let mut idle = Vec::new();
+    loop {
+        let log = ask(&app, "GET", "/api/trace.log", &headers, "").await;
+        if log.status() == StatusCode::TOO_MANY_REQUESTS {
+            break;
+        }
+        assert!(idle.len() < 100, "places are few");
+        idle.push(log);
+    }
+    tokio::time::sleep(std::time::Duration::from_secs(25)).await;
+    let log = ask(&app, "GET", "/api/trace.log", &headers, "").await;
+    assert_eq!(text(log).await.lines().count(), 10_000);
+    for log in idle {
+        assert_eq!(text(log).await, "", "it has ended");
+    }
+}
+
+#[tokio::test]
+async fn what_a_page_has_kept_becomes_mcap() {
+    let (app, access, _counter) = server(None);
+    let bearer = format!("Bearer {}", token(&access));
+    let headers = [("authorization", bearer.as_str()), ("origin", "http://127.0.0.1:8402")];
+    let csv = "t_s,4.velocity_rpm,4.606C_00,mark\n0.5,60,,\n0.625,,600,world: 4 cable cut\n";
+    let made = ask(&app, "POST", "/api/recording.mcap", &headers, csv).await;
+    assert_eq!(made.status(), StatusCode::OK);
+    let file = axum::body::to_bytes(made.into_body(), usize::MAX).await.expect("bytes");
+    let recorded = testbench::recording::read(testbench::recording::Kind::Mcap, &file).expect("MCAP");
+    let points = |signal: &str| {
+        let series = recorded.series.iter().find(|series| series.column.signal == signal).expect("a series");
+        series.points.iter().copied().filter(|(_, value)| !value.is_nan()).collect::<Vec<_>>()
+    };
+    assert_eq!((points("velocity_rpm"), points("606C_00")), (vec![(0.5, 60.0)], vec![(0.625, 600.0)]));
+    assert_eq!(recorded.marks[0].text, "world: 4 cable cut");
+    let wrong = ask(&app, "POST", "/api/recording.mcap", &headers, "speed\n60\n").await;
+    assert_eq!(wrong.status(), StatusCode::BAD_REQUEST);
+    assert!(text(wrong).await.contains("t_s"));
+    let foreign = [("authorization", bearer.as_str()), ("origin", "http://evil.example")];
+    assert_eq!(ask(&app, "POST", "/api/recording.mcap", &foreign, csv).await.status(), StatusCode::FORBIDDEN);
+    let large = "1".repeat((32 << 20) + 1);
+    assert_eq!(
+        ask(&app, "POST", "/api/recording.mcap", &headers, &large).await.status(),
+        StatusCode::PAYLOAD_TOO_LARGE
+    );
+}

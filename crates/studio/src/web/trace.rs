@@ -1,6 +1,8 @@
 //! The trace: lines of it as JSON, and all of it as a log. Decoding is done beside the task that moves drives.
 
-use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::time::Duration;
 
 use axum::body::Body;
 use axum::extract::Query as InAddress;
@@ -21,6 +23,9 @@ const DECODING: usize = 1;
 
 /// Logs that are fetched at the same time. Each may hold the frames of its beginning for as long as it is read.
 const SAVING: usize = 4;
+
+/// A client that takes nothing of its log for this long, and at most twice as long, has its place no more.
+const SAVING_PATIENCE: Duration = Duration::from_secs(10);
 
 /// How many may come in at a time.
 #[derive(Clone)]
@@ -81,11 +86,14 @@ pub(super) fn log(desk: Desk, doors: &Doors, asked: InQuery) -> Response {
     let Ok(door) = Arc::clone(&doors.saving).try_acquire_owned() else {
         return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "others are saving the trace: try again");
     };
+    desk.trace().note_saved();
     let held = Arc::new(desk.trace().held());
-    let saving = Saving { desk, held, query: Arc::new(query), next: 0, _door: door };
+    let place = Arc::new(Place { kept: Mutex::new(Some((held, door))), asked: AtomicU64::new(0) });
+    tokio::spawn(give_up_idle(Arc::downgrade(&place)));
+    let saving = Saving { desk, place, query: Arc::new(query), next: 0 };
     let parts = stream::unfold(saving, async |saving| {
-        let Saving { desk, held, query, next, .. } = &saving;
-        let (desk, held, query, next) = (desk.clone(), Arc::clone(held), Arc::clone(query), *next);
+        let Saving { desk, place, query, next } = &saving;
+        let (desk, held, query, next) = (desk.clone(), place.held()?, Arc::clone(query), *next);
         let work = tokio::task::spawn_blocking(move || query.log_part(&held, desk.trace().origin(), next));
         let part = work.await.ok()??;
         Some((Ok::<_, std::convert::Infallible>(part.text), Saving { next: part.next, ..saving }))
@@ -98,10 +106,40 @@ pub(super) fn log(desk: Desk, doors: &Doors, asked: InQuery) -> Response {
 /// A log on its way.
 struct Saving {
     desk: Desk,
-    held: Arc<Held>,
+    place: Arc<Place>,
     query: Arc<Query>,
     next: u64,
-    _door: OwnedSemaphorePermit,
+}
+
+/// One of the places for those who save: the frames that it holds, for as long as its client goes on taking them.
+struct Place {
+    kept: Mutex<Option<(Arc<Held>, OwnedSemaphorePermit)>>,
+    /// How often something was taken.
+    asked: AtomicU64,
+}
+
+impl Place {
+    /// The frames; `None` after they were given up, which ends the log.
+    fn held(&self) -> Option<Arc<Held>> {
+        self.asked.fetch_add(1, Ordering::Relaxed);
+        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.as_ref().map(|(held, _)| Arc::clone(held))
+    }
+}
+
+/// Gives a place to others when its client takes nothing.
+async fn give_up_idle(place: Weak<Place>) {
+    let mut before = None;
+    loop {
+        tokio::time::sleep(SAVING_PATIENCE).await;
+        let Some(place) = place.upgrade() else { return };
+        let asked = Some(place.asked.load(Ordering::Relaxed));
+        if asked == before {
+            place.kept.lock().unwrap_or_else(PoisonError::into_inner).take();
+            return;
+        }
+        before = asked;
+    }
 }
 
 fn understand(asked: InQuery) -> Result<Query, Box<Response>> {

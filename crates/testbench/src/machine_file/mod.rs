@@ -8,12 +8,14 @@ mod bodies;
 mod configuration;
 mod motion;
 mod surroundings;
+mod units;
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use can::{Bitrate, Instant};
 use canopen::{Mux, NodeId};
+use master::Gear;
 use master::identify::Identity;
 use master::parameters::{Parameters, from_any_state};
 use sim::machine::{Realism, TimingMode};
@@ -54,6 +56,7 @@ pub const DRIVE_KEYS: &[&str] = &[
     "temperatures_c",
     "faults",
     "battery",
+    "units",
     "pdos",
     "limits",
     "heartbeat",
@@ -95,6 +98,8 @@ pub struct Placed {
     keys: Vec<&'static str>,
     /// What a master writes to it at its start.
     start_up: BTreeMap<Mux, Vec<u8>>,
+    /// What stands behind its shaft.
+    gear: Gear,
 }
 
 /// The machine that the file at `path` describes. Data sheets that it names are looked for beside it.
@@ -210,6 +215,11 @@ impl Machine {
         Some(Parameters { identity, node: Some(node), values: placed.start_up.clone() })
     }
 
+    /// What stands behind the shaft of a drive: `units`. [`Gear::DIRECT`] for a node that is not in the file.
+    pub fn gear(&self, node: NodeId) -> Gear {
+        self.drives.iter().find(|drive| drive.spec.node == node).map_or(Gear::DIRECT, |drive| drive.gear)
+    }
+
     /// The writes that set a node up so, whatever it has, in the order of CiA 301; none for a node that is not in the file, or
     /// of which it says nothing.
     pub fn configuration(&self, node: NodeId) -> Vec<(Mux, Vec<u8>)> {
@@ -308,6 +318,7 @@ impl From<DriveSpec> for Placed {
             around: Vec::new(),
             keys: Vec::new(),
             start_up: BTreeMap::new(),
+            gear: Gear::DIRECT,
         }
     }
 }
@@ -391,10 +402,12 @@ impl Placed {
             noted(set, &mut problems);
         }
         let start_up = configuration::values(table, spec.description(), id, &mut problems);
-        let of_simulator = |key: &&str| !matches!(*key, "model" | "node") && !configuration::KEYS.contains(key);
+        let gear = noted(units::gear(table), &mut problems);
+        let of_master = |key: &str| key == units::KEY || configuration::KEYS.contains(&key);
+        let of_simulator = |key: &&str| !matches!(*key, "model" | "node") && !of_master(key);
         let keys = DRIVE_KEYS.iter().copied().filter(|key| of_simulator(key) && table.get(key).is_some());
         if problems.is_empty() {
-            Ok(Self { spec, source, source_at, around, keys: keys.collect(), start_up })
+            Ok(Self { spec, source, source_at, around, keys: keys.collect(), start_up, gear })
         } else {
             Err(problems)
         }

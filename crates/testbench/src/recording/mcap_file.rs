@@ -72,25 +72,37 @@ impl Mcap {
     }
 
     pub(super) fn row(&mut self, at: Instant, values: &[f64]) -> io::Result<()> {
+        (0..self.topics.len()).try_for_each(|place| self.row_of(place, at, values))
+    }
+
+    /// The subjects of which there is a value.
+    pub(super) fn sparse_row(&mut self, at: Instant, values: &[f64]) -> io::Result<()> {
         for place in 0..self.topics.len() {
-            let topic = &self.topics[place];
-            self.text.clear();
-            self.text.push('{');
-            for (column, name) in &topic.fields {
-                let value = values.get(*column).copied().unwrap_or(f64::NAN);
-                let comma = if self.text.len() > 1 { "," } else { "" };
-                // JSON has no number for what is none.
-                let _ = if value.is_finite() {
-                    write!(self.text, "{comma}{name}:{value}")
-                } else {
-                    write!(self.text, "{comma}{name}:null")
-                };
+            let is_told = |(column, _): &(usize, String)| values.get(*column).is_some_and(|value| value.is_finite());
+            if self.topics[place].fields.iter().any(is_told) {
+                self.row_of(place, at, values)?;
             }
-            self.text.push('}');
-            let channel = topic.channel;
-            self.message(channel, at)?;
         }
         Ok(())
+    }
+
+    fn row_of(&mut self, place: usize, at: Instant, values: &[f64]) -> io::Result<()> {
+        let topic = &self.topics[place];
+        self.text.clear();
+        self.text.push('{');
+        for (column, name) in &topic.fields {
+            let value = values.get(*column).copied().unwrap_or(f64::NAN);
+            let comma = if self.text.len() > 1 { "," } else { "" };
+            // JSON has no number for what is none.
+            let _ = if value.is_finite() {
+                write!(self.text, "{comma}{name}:{value}")
+            } else {
+                write!(self.text, "{comma}{name}:null")
+            };
+        }
+        self.text.push('}');
+        let channel = topic.channel;
+        self.message(channel, at)
     }
 
     pub(super) fn frame(&mut self, at: Instant, frame: &Frame) -> io::Result<()> {

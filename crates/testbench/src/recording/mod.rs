@@ -12,6 +12,7 @@
 //! Times are seconds, in MCAP nanoseconds, from the begin of the world or of the connection.
 
 mod column;
+mod convert;
 mod csv;
 mod mcap_file;
 mod picture;
@@ -21,6 +22,7 @@ mod record;
 mod trail;
 
 pub use column::{Column, Subject, columns_of_drives, select};
+pub use convert::mcap_of_csv;
 pub use picture::picture;
 pub use piece::{Kind, Mark, Severity, Target};
 pub use read::{Recorded, Series, read};

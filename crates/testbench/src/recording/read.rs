@@ -105,51 +105,85 @@ fn mark_of(at: Instant, fields: &serde_json::Map<String, Value>) -> Mark {
 }
 
 fn read_csv(bytes: &[u8]) -> Result<Recorded, String> {
-    // The line in which a writer was killed is none; no field holds the end of a line.
-    let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
-    let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(&bytes[..whole]);
-    let header = reader.headers().map_err(|error| format!("it is no CSV file: {error}"))?.clone();
-    if header.get(0) != Some("t_s") {
-        return Err("its first column is not t_s, the time in s".into());
+    let mut lines = CsvLines::of(bytes)?;
+    let series = lines.columns.iter().map(|column| Series { column: column.clone(), points: Vec::new() });
+    let mut recorded = Recorded { torn: lines.torn, series: series.collect(), marks: Vec::new() };
+    while let Some((at, values, text)) = lines.next()? {
+        // A line that has nothing but marks is no sample.
+        if text.is_empty() || values.iter().any(|value| !value.is_nan()) {
+            recorded.series.iter_mut().zip(values).for_each(|(series, value)| series.points.push((at, *value)));
+        }
+        recorded.marks.extend(note(at, text));
     }
-    let mut recorded = Recorded { torn: whole < bytes.len(), ..Recorded::default() };
-    let marks_at = header.iter().position(|name| name == "mark");
-    let mut places = Vec::new();
-    for (place, name) in header.iter().enumerate().skip(1).filter(|(place, _)| Some(*place) != marks_at) {
-        let column = name.parse().map_err(|reason| format!("column {}: {reason}", place + 1))?;
-        recorded.series.push(Series { column, points: Vec::new() });
-        places.push(place);
+    Ok(recorded)
+}
+
+/// What a line of CSV says beside its values; nothing of an empty text.
+pub(super) fn note(at_s: f64, text: &str) -> Option<Mark> {
+    let at = Instant::from_nanos((at_s * 1e9) as u64);
+    let (of, kind, severity) = ("".into(), "".into(), Severity::Note);
+    (!text.is_empty()).then(|| Mark { at, of, kind, severity, text: text.to_owned() })
+}
+
+/// A line of a CSV file: its time in s, its values, not a number where there is none, and what happened.
+pub(super) type CsvLine<'a> = (f64, &'a [f64], &'a str);
+
+/// The lines of a CSV file, one after the other.
+pub(super) struct CsvLines<'a> {
+    reader: csv::Reader<&'a [u8]>,
+    pub(super) columns: Vec<Column>,
+    /// The file ends in the middle of a line.
+    torn: bool,
+    places: Vec<usize>,
+    marks_at: Option<usize>,
+    width: usize,
+    line: csv::StringRecord,
+    values: Vec<f64>,
+}
+
+impl<'a> CsvLines<'a> {
+    /// Reads the first line.
+    pub(super) fn of(bytes: &'a [u8]) -> Result<Self, String> {
+        // The line in which a writer was killed is none; no field holds the end of a line.
+        let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
+        let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(&bytes[..whole]);
+        let header = reader.headers().map_err(|error| format!("it is no CSV file: {error}"))?.clone();
+        if header.get(0) != Some("t_s") {
+            return Err("its first column is not t_s, the time in s".into());
+        }
+        let marks_at = header.iter().position(|name| name == "mark");
+        let (mut columns, mut places) = (Vec::new(), Vec::new());
+        for (place, name) in header.iter().enumerate().skip(1).filter(|(place, _)| Some(*place) != marks_at) {
+            columns.push(name.parse().map_err(|reason| format!("column {}: {reason}", place + 1))?);
+            places.push(place);
+        }
+        let (line, values) = (csv::StringRecord::new(), Vec::new());
+        Ok(Self { reader, columns, torn: whole < bytes.len(), places, marks_at, width: header.len(), line, values })
     }
-    let mut line = csv::StringRecord::new();
-    while reader.read_record(&mut line).map_err(|error| format!("it is no CSV file: {error}"))? {
+
+    /// The next line.
+    pub(super) fn next(&mut self) -> Result<Option<CsvLine<'_>>, String> {
+        if !self.reader.read_record(&mut self.line).map_err(|error| format!("it is no CSV file: {error}"))? {
+            return Ok(None);
+        }
+        let line = &self.line;
         let row = line.position().map_or(0, csv::Position::line);
         let number = |place: usize| match line.get(place) {
             Some("") => Ok(f64::NAN),
             Some(text) => text.parse().map_err(|_| format!("line {row}, column {}: '{text}' is no number", place + 1)),
-            None => Err(format!("line {row} has {} fields; the first line has {}", line.len(), header.len())),
+            None => Err(format!("line {row} has {} fields; the first line has {}", line.len(), self.width)),
         };
         let at: f64 = number(0)?;
         if !at.is_finite() || at < 0.0 {
             return Err(format!("line {row}: a time of {at} s"));
         }
-        let text = marks_at.and_then(|place| line.get(place)).unwrap_or_default();
-        let values = places.iter().map(|place| number(*place)).collect::<Result<Vec<f64>, String>>()?;
-        // A line that has nothing but marks is no sample.
-        if text.is_empty() || values.iter().any(|value| !value.is_nan()) {
-            recorded.series.iter_mut().zip(&values).for_each(|(series, value)| series.points.push((at, *value)));
+        self.values.clear();
+        for place in &self.places {
+            self.values.push(number(*place)?);
         }
-        if !text.is_empty() {
-            let at = Instant::from_nanos((at * 1e9) as u64);
-            recorded.marks.push(Mark {
-                at,
-                of: "".into(),
-                kind: "".into(),
-                severity: Severity::Note,
-                text: text.to_owned(),
-            });
-        }
+        let text = self.marks_at.and_then(|place| line.get(place)).unwrap_or_default();
+        Ok(Some((at, &self.values, text)))
     }
-    Ok(recorded)
 }
 
 #[cfg(test)]

@@ -46,6 +46,17 @@ impl Record {
         }
     }
 
+    /// As [`row`](Self::row), but in MCAP a subject of which no value is a number has no message.
+    ///
+    /// # Errors
+    /// What the target says.
+    pub fn sparse_row(&mut self, at: Instant, values: &[f64]) -> io::Result<()> {
+        match &mut self.writer {
+            Writer::Mcap(file) => file.sparse_row(at, values),
+            Writer::Csv(file) => file.row(at, values),
+        }
+    }
+
     /// A frame that the bus carried, with the time of its last bit; CSV has no place for it.
     ///
     /// # Errors

@@ -17,7 +17,6 @@ use serde::Serialize;
 use testbench::machine_file::{mapped, pdo_id};
 use testbench::words::node::node;
 
-use super::when::when;
 use crate::command::params::{PlanReport, Transaction, plan_of};
 use crate::context::Context;
 use crate::failure::Failure;
@@ -171,14 +170,15 @@ impl PlanPdos {
         let model = drive.description().ok_or_else(|| Failure::new("the model is not known"))?;
         let (wanted, from) = self.wanted.parameters(context, model)?;
         let before = drive.pdos().await?;
-        let after = before.iter().map(|pdo| with(pdo, &wanted.values, model)).collect::<Vec<_>>();
+        let after = before.iter().map(|(config, cob_id)| config.with_values(*cob_id, &wanted.values, model));
+        let after = after.collect::<Vec<_>>();
         let touched = |pdo: PdoId| {
             wanted.values.keys().any(|object| PdoId::of_object(object.index).map(|(id, _)| id) == Some(pdo))
         };
         let budgets = after.iter().filter(|(config, _)| touched(config.pdo)).map(|(config, cob_id)| Budget {
             pdo: config.pdo.to_string(),
             bits: config.map.bits(),
-            when: if cob_id.is_valid() { when(config) } else { "off".to_owned() },
+            when: if cob_id.is_valid() { config.when() } else { "off".to_owned() },
             objects: config.map.0.iter().map(|record| named(model, record.mux)).collect(),
         });
         let pdos = budgets.collect();
@@ -211,30 +211,6 @@ impl ApplyPdos {
 
 fn named(model: &'static Description, object: Mux) -> String {
     model.row(object).map_or_else(|| object.to_string(), |row| row.name.to_owned())
-}
-
-/// A PDO with the values that it gets.
-fn with(pdo: &(PdoConfig, CobId), values: &BTreeMap<Mux, Vec<u8>>, model: &Description) -> (PdoConfig, CobId) {
-    let (mut config, mut cob_id) = pdo.clone();
-    let (parameter, mapping) = (config.pdo.parameter_index(), config.pdo.mapping_index());
-    let number = |object: Mux| {
-        values.get(&object).map(|bytes| bytes.iter().take(4).rev().fold(0, |raw, byte| raw << 8 | u32::from(*byte)))
-    };
-    if let Some(raw) = number(Mux::new(parameter, 1)) {
-        cob_id = CobId(raw);
-    }
-    if let Some(raw) = number(Mux::new(parameter, 2)) {
-        config.transmission = TransmissionType(raw as u8);
-    }
-    let unit = Duration::from_nanos(model.pdo.inhibit_unit_ns);
-    config.inhibit_time = number(Mux::new(parameter, 3)).map(|raw| unit * raw).or(config.inhibit_time);
-    let unit = Duration::from_nanos(model.pdo.event_timer_unit_ns);
-    config.event_time = number(Mux::new(parameter, 5)).map(|raw| unit * raw).or(config.event_time);
-    if let Some(count) = number(Mux::new(mapping, 0)) {
-        let entries = (1..=count.min(64) as u8).filter_map(|entry| number(Mux::new(mapping, entry)));
-        config.map = PdoMap(entries.map(canopen::pdo::MappingRecord::from_raw).collect());
-    }
-    (config, cob_id)
 }
 
 impl Report for PdoPlanReport {

@@ -16,7 +16,7 @@ use canopen::{Mux, NodeId};
 use cia402::ModeOfOperation;
 
 use crate::axis::{AxisDescription, NewSetPoint, PowerStyle};
-use crate::description::{Description, Edition, HostWatch, NmtRules, PdoRules};
+use crate::description::{Description, Edition, HostWatch, NmtRules, PdoRules, Section};
 use crate::faults::Faults;
 use crate::placement::Placement;
 use crate::stated::Stated;
@@ -44,6 +44,7 @@ const fn described(dictionary: &'static Table) -> Description {
         name: "zlac8030l",
         title: "ZLTECH ZLAC8030L V2.0",
         manual: "ZLAC8030L quick start guide V1.00",
+        sections: SECTIONS,
         identity: zltech::IDENTITY,
         // The ZLIM42-C, of the same identity, has its bus voltage in 2069h.
         distinguishing_object: Some(Mux::new(0x2029, 0)),
@@ -80,9 +81,9 @@ const AXIS: AxisDescription = AxisDescription {
     terminals: TERMINALS,
     units: Units {
         counts_per_turn: CountsPerTurn::Object { object: Mux::new(0x200B, 0), factor: 4 },
-        target_velocity: Some(Quantity::new(0x60FF, 0, 1.0)),
-        actual_velocity: Some(Quantity::new(0x606C, 0, 0.1)),
-        profile_velocity: Some(Quantity::new(0x6081, 0, 1.0)),
+        target_velocity: Some(Quantity::speed(0x60FF, 0, 1.0)),
+        actual_velocity: Some(Quantity::speed(0x606C, 0, 0.1)),
+        profile_velocity: Some(Quantity::speed(0x6081, 0, 1.0)),
         ramps: Some(zltech::RAMPS),
         target_current: Some(Quantity::new(0x6071, 0, 1e-3)),
         actual_current: Some(Quantity::new(0x6077, 0, 0.1)),
@@ -91,6 +92,9 @@ const AXIS: AxisDescription = AxisDescription {
         driver_temperature: Some(Quantity::new(0x2026, 2, 0.1)),
     },
 };
+
+/// All objects are in one list.
+const SECTIONS: &[Section] = &[Section::of(0x1000, 0x6FFF, "chapter 9")];
 
 /// Chapter 5 and 2030h: of the functions of X0 and X1 only 9 stops the motor; B0 holds it with 1.
 const TERMINALS: Terminals = Terminals {

@@ -6,6 +6,7 @@
 
 pub mod assumptions;
 pub mod faults;
+pub mod homing;
 pub mod objects;
 pub mod statusword;
 pub mod tables;
@@ -16,7 +17,7 @@ use canopen::{Mux, NodeId};
 use cia402::{ModeOfOperation, Statusword};
 
 use crate::axis::{AxisDescription, BitPattern, HomingRules, HomingStart, NewSetPoint, PowerStyle};
-use crate::description::{Description, HostWatch, NmtRules};
+use crate::description::{Description, HostWatch, NmtRules, Section};
 use crate::faults::Faults;
 use crate::placement::Placement;
 use crate::stated::Stated;
@@ -41,6 +42,7 @@ const fn stepper(name: &'static str, title: &'static str) -> Description {
         name,
         title,
         manual: "ZLIM42-C user manual V1.03",
+        sections: SECTIONS,
         identity: zltech::IDENTITY,
         // The ZLAC8030L has its bus voltage in 2029h.
         distinguishing_object: Some(Mux::new(0x2069, 0)),
@@ -73,6 +75,9 @@ const AXIS: AxisDescription = AxisDescription {
     units: UNITS,
 };
 
+/// All objects are in one list.
+const SECTIONS: &[Section] = &[Section::of(0x1000, 0x6FFF, "5.4")];
+
 /// 3.2 and 2030h: each input may be any of these; the drive has no brake.
 const TERMINALS: Terminals = Terminals {
     levels: Some(Mux::new(0x2003, 0)),
@@ -85,7 +90,12 @@ const fn input(name: &'static str, bit: u8) -> Input {
     zltech::input(
         name,
         bit,
-        &[(2, InputSignal::PositiveLimit), (3, InputSignal::NegativeLimit), (9, InputSignal::EmergencyStop)],
+        &[
+            (1, InputSignal::Home),
+            (2, InputSignal::PositiveLimit),
+            (3, InputSignal::NegativeLimit),
+            (9, InputSignal::EmergencyStop),
+        ],
     )
 }
 
@@ -102,17 +112,20 @@ const AT_THE_END: u16 = HOMING_ATTAINED | Statusword::TARGET_REACHED | RUNNING;
 
 const HOMING: HomingRules = HomingRules {
     method: Mux::new(0x6098, 0),
-    search_speed: Some(Quantity::new(0x6099, 1, 1.0)),
+    search_speed: Some(Quantity::speed(0x6099, 1, 1.0)),
     start: HomingStart::ControlwordBit4,
     attained: BitPattern { mask: AT_THE_END, value: HOMING_ATTAINED | Statusword::TARGET_REACHED },
     failed: BitPattern { mask: AT_THE_END, value: Statusword::TARGET_REACHED },
+    own_methods: &homing::BY_LABEL,
+    switches: TERMINALS,
+    remark: "The manual's labels and its paragraphs (5.3.6) name opposite directions; this is by the labels.",
 };
 
 const UNITS: Units = Units {
     counts_per_turn: CountsPerTurn::Table { object: Mux::new(0x2006, 0), counts: &PULSES_PER_TURN, default: 10 },
-    target_velocity: Some(Quantity::new(0x60FF, 0, 1.0)),
-    actual_velocity: Some(Quantity::new(0x606C, 0, 1.0)),
-    profile_velocity: Some(Quantity::new(0x6081, 0, 1.0)),
+    target_velocity: Some(Quantity::speed(0x60FF, 0, 1.0)),
+    actual_velocity: Some(Quantity::speed(0x606C, 0, 1.0)),
+    profile_velocity: Some(Quantity::speed(0x6081, 0, 1.0)),
     ramps: Some(zltech::RAMPS),
     target_current: None,
     actual_current: None,

@@ -361,6 +361,8 @@ impl Firmware for MJoint {
         self.device.set_reset_times(times);
     }
 
+    // Inlined by force: a run of a machine that wakes up calls it too, and the frequent caller would not get it.
+    #[inline(always)]
     fn tick(&mut self, sensors: &Sensors, now: Instant) -> Actuation {
         if !self.device.is_running() {
             return Actuation::default();

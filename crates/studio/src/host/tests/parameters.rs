@@ -37,14 +37,14 @@ impl Page {
     }
 
     /// The result of what has to be done.
-    async fn knows(&mut self, deed: Deed) -> Value {
+    pub(super) async fn knows(&mut self, deed: Deed) -> Value {
         let told = self.told(deed).await;
         assert_eq!(told["ok"], true, "{told}");
         told["result"].clone()
     }
 
     /// The kind and the words of a refusal.
-    async fn refused(&mut self, deed: Deed) -> (String, String) {
+    pub(super) async fn refused(&mut self, deed: Deed) -> (String, String) {
         let told = self.told(deed).await;
         assert_eq!(told["ok"], false, "{told}");
         let text = |name: &str| told["error"][name].as_str().expect("text").to_owned();
@@ -159,6 +159,7 @@ fn a_transaction_goes_on_without_its_page_and_the_drive_is_not_enabled_meanwhile
 struct Keeper {
     told: Mutex<Vec<String>>,
     is_full: bool,
+    keeps_all: bool,
 }
 
 impl Journals for Keeper {
@@ -172,7 +173,7 @@ impl Journals for Keeper {
 
     fn end(&self, node: NodeId) -> Result<(), String> {
         self.told.lock().expect("whole").push(format!("{node} is done"));
-        Ok(())
+        if self.keeps_all { Err("the journal could not be deleted".into()) } else { Ok(()) }
     }
 }
 
@@ -196,5 +197,44 @@ fn what_leads_back_is_kept_from_the_first_write_to_the_last_and_without_it_nothi
         let (kind, text) = page.refused(setting("6081h:00", "60rpm")).await;
         assert_eq!((kind.as_str(), text.as_str()), ("journal", "nothing was written: the disk is full"));
         assert_eq!(stage.has(MAX_SPEED).await, 120);
+    });
+}
+
+#[test]
+fn a_journal_that_stays_behind_is_news_for_every_page_and_the_write_holds() {
+    play_with(Arc::new(Keeper { keeps_all: true, ..Keeper::default() }), async |stage| {
+        let (mut page, mut news) = (stage.page().await, stage.desk.news());
+        page.must(Deed::TakeControl {}).await;
+        let done = page.knows(setting("6081h:00", "60rpm")).await;
+        assert_eq!((&done["journal"], stage.has(MAX_SPEED).await), (&"the journal could not be deleted".into(), 60));
+        let heard: Vec<String> = std::iter::from_fn(|| news.try_recv().ok()).map(|news| news.to_string()).collect();
+        assert!(heard.iter().any(|news| news.contains("could not be deleted")), "{heard:?}");
+    });
+}
+
+/// Step by step what the tour asks for: a parameter that makes a fault, its way back, and the store. ZLAC8030L quick start
+/// guide V1.00, chapters 8 and 9: 2013h:01 is the motor's temperature threshold in 0.1 degC, fault 0800h.
+#[test]
+fn what_the_tour_asks_for_happens_and_is_told_in_the_state() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        let shown = |stage: &Stage, field: &str| stage.state()["nodes"][1][field].clone();
+        let threshold = NewValue { object: "2013:01".into(), value: "100".into() };
+        page.must(Deed::WriteParameters { node: WHEEL, values: vec![threshold], file: None }).await;
+        stage.sleep(500).await;
+        assert_eq!(shown(stage, "can_roll_back"), 1);
+        assert_ne!(shown(stage, "drive")["fault_code"], 0, "the motor is warmer than 10 degC");
+        page.must(Deed::RollBack { node: WHEEL }).await;
+        page.must(Deed::ResetFault { node: WHEEL }).await;
+        stage.sleep(500).await;
+        assert_eq!((shown(stage, "can_roll_back"), &shown(stage, "drive")["fault_code"]), (0.into(), &0.into()));
+        page.must(Deed::Velocity { node: WHEEL, rpm: 30.0, rpm_per_s: None }).await;
+        assert_eq!(page.ask(Deed::Store { node: WHEEL }).await.error_kind(), "busy", "it turns");
+        page.must(Deed::Disable { node: WHEEL }).await;
+        assert_eq!(shown(stage, "stored"), 0);
+        page.must(Deed::Store { node: WHEEL }).await;
+        stage.sleep(500).await;
+        assert_eq!(shown(stage, "stored"), 1);
     });
 }

@@ -4,6 +4,10 @@
 //! A drive's own raw units are not known here: its description has them. Source of the SI symbols: BIPM
 //! brochure; `r/min` and `rpm` are one unit.
 
+mod along;
+
+pub use along::{Along, Turning, parse_length};
+
 use core::f64::consts::TAU;
 use core::fmt;
 use core::str::FromStr;
@@ -158,6 +162,8 @@ const SPEED: &str = "a speed such as 60rpm, 6.28rad/s, 360deg/s or 1turn/s (a ba
 const ANGLE: &str = "an angle such as 90deg, 0.5turn, 1.57rad or 32000 (a bare number is counts)";
 const CURRENT: &str = "a current such as 1.5A or 1500mA";
 const RAMP: &str = "a ramp such as 500ms, 0.5s, 120rpm/s or 12.6rad/s2";
+const NO_SIGN: &str = "a ramp has no sign";
+const NO_RATE: &str = "at a rate of zero no speed is ever reached; without a ramp it is 0ms";
 const TIME: &str = "a time such as 500ms or 2s";
 
 impl FromStr for Rpm {
@@ -215,13 +221,11 @@ impl FromStr for Ramp {
     fn from_str(text: &str) -> Result<Self, ParseUnitError> {
         let (number, unit) = split(text, RAMP)?;
         if number < 0.0 {
-            return Err(out_of_range(text, "a ramp has no sign"));
+            return Err(out_of_range(text, NO_SIGN));
         }
         match unit {
             "ms" | "s" => parse_duration(text).map(Self::Time),
-            "rpm/s" | "r/min/s" | "rad/s2" | "rad/s²" | "rad/s^2" if number == 0.0 => {
-                Err(out_of_range(text, "at a rate of zero no speed is ever reached; without a ramp it is 0ms"))
-            }
+            "rpm/s" | "r/min/s" | "rad/s2" | "rad/s²" | "rad/s^2" if number == 0.0 => Err(out_of_range(text, NO_RATE)),
             "rpm/s" | "r/min/s" => Ok(Self::RpmPerSecond(number)),
             "rad/s2" | "rad/s²" | "rad/s^2" => Ok(Self::RpmPerSecond(Rpm::from(RadiansPerSecond(number)).0)),
             "" => Err(ParseUnitError::NoUnit { text: text.to_owned(), expected: RAMP }),

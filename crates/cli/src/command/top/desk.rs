@@ -1,0 +1,248 @@
+//! What is on the screen, and what each key does to it. Without a terminal, a clock or a bus: keys, states and times go in, messages
+//! to the host come out.
+
+use can::Instant;
+use crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use serde_json::{Value, json};
+
+use super::hold::{Act, Hold};
+use super::samples::Past;
+use super::seen::{News, Node, State};
+
+/// Speeds to jog at, r/min.
+const JOG_RPM: [f64; 10] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0];
+
+/// The one that is chosen at the start: slow.
+const FIRST_JOG: usize = 3;
+
+/// News that are kept.
+const MOST_NEWS: usize = 50;
+
+/// What is shown and chosen.
+#[derive(Debug)]
+pub(super) struct Desk {
+    /// The host's number for this terminal.
+    number: u64,
+    pub(super) state: State,
+    pub(super) past: Past,
+    /// Newest last.
+    pub(super) news: Vec<News>,
+    pub(super) chosen: Option<u8>,
+    pub(super) help: bool,
+    jog_step: usize,
+    hold: Hold,
+    /// Which key is or was held: to which side.
+    side: f64,
+    /// The node that is being jogged, whatever is chosen since.
+    jogged: Option<u8>,
+}
+
+/// What a key leads to.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Wish {
+    /// To be said to the host.
+    Say(Value),
+    /// The end.
+    Quit,
+}
+
+impl Desk {
+    pub(super) fn new(number: u64) -> Self {
+        Self {
+            number,
+            state: State::default(),
+            past: Past::default(),
+            news: Vec::new(),
+            chosen: None,
+            help: false,
+            jog_step: FIRST_JOG,
+            hold: Hold::default(),
+            side: 1.0,
+            jogged: None,
+        }
+    }
+
+    /// The host has shown something newer.
+    pub(super) fn take(&mut self, state: State) {
+        self.past.note(&state);
+        self.state = state;
+        let is_there = self.chosen.is_some_and(|node| self.state.node(node).is_some());
+        if !is_there {
+            // The first drive, or whoever is there.
+            let first = self.state.nodes.iter().find(|node| node.drive.is_some()).or(self.state.nodes.first());
+            self.chosen = first.map(|node| node.node);
+        }
+    }
+
+    /// Something has happened.
+    pub(super) fn note(&mut self, news: News) {
+        if self.news.len() == MOST_NEWS {
+            self.news.remove(0);
+        }
+        self.news.push(news);
+    }
+
+    /// Something to tell that the bus has not said.
+    pub(super) fn tell(&mut self, node: Option<u8>, text: impl Into<String>) {
+        self.note(News { time_s: self.state.time_s, node, text: text.into() });
+    }
+
+    /// What became of a message; true if there is something new to show. What was done shows itself.
+    pub(super) fn answered(&mut self, node: Option<u64>, answer: &Value) -> bool {
+        let node = node.and_then(|node| u8::try_from(node).ok());
+        let before = self.news.len();
+        if let Some(error) = answer["error"].as_object() {
+            let kind = error.get("kind").and_then(Value::as_str).unwrap_or_default();
+            // The bus has told it already, or the key was let go.
+            if !matches!(kind, "stopped" | "replaced" | "not_held") {
+                self.tell(node, error.get("message").and_then(Value::as_str).unwrap_or("it was refused"));
+            }
+        }
+        for note in answer["notes"].as_array().into_iter().flatten().filter_map(Value::as_str) {
+            self.tell(node, note);
+        }
+        if let Some(findings) = answer["result"]["findings"].as_array() {
+            let text = |finding: &Value, part: &str| finding[part].as_str().unwrap_or_default().to_owned();
+            let causes: Vec<_> = findings.iter().filter(|finding| finding["cause"] == true).collect();
+            for finding in &causes {
+                self.tell(node, format!("{}. {}", text(finding, "follows"), text(finding, "remedy")));
+            }
+            if causes.is_empty() {
+                self.tell(node, "nothing is found that keeps it from moving");
+            }
+        }
+        self.news.len() != before || self.news.len() == MOST_NEWS
+    }
+
+    /// The node that keys are about.
+    pub(super) fn node(&self) -> Option<&Node> {
+        self.state.node(self.chosen?)
+    }
+
+    /// What a jog turns at.
+    pub(super) const fn jog_rpm(&self) -> f64 {
+        JOG_RPM[self.jog_step]
+    }
+
+    /// A jog goes on.
+    pub(super) const fn is_jogging(&self) -> bool {
+        self.hold.is_held()
+    }
+
+    /// Whether this terminal may move drives.
+    pub(super) fn has_control(&self) -> bool {
+        self.state.controller == Some(self.number)
+    }
+
+    /// A key.
+    pub(super) fn key(&mut self, key: KeyEvent, now: Instant) -> Vec<Wish> {
+        let side = match key.code {
+            KeyCode::Left | KeyCode::Char('h') => Some(-1.0),
+            KeyCode::Right | KeyCode::Char('l') => Some(1.0),
+            _ => None,
+        };
+        if key.kind == KeyEventKind::Release {
+            let act = side.filter(|side| *side == self.side).and_then(|_| self.hold.release());
+            return self.jog(act);
+        }
+        let mut wishes = Vec::new();
+        // Any other key lets go of what was held.
+        if side != Some(self.side) {
+            let given_up = self.hold.give_up(now);
+            wishes.extend(self.jog(given_up));
+            if side.is_some() {
+                self.hold = Hold::Free;
+            }
+        }
+        if let Some(side) = side {
+            self.side = side;
+            if !self.help {
+                let act = self.hold.press(now);
+                wishes.extend(self.jog(act));
+            }
+            return wishes;
+        }
+        wishes.extend(self.other_key(key));
+        wishes
+    }
+
+    fn other_key(&mut self, key: KeyEvent) -> Vec<Wish> {
+        let control = key.modifiers.contains(KeyModifiers::CONTROL);
+        match key.code {
+            // What stops comes first, whatever is on the screen.
+            KeyCode::Esc | KeyCode::Char(' ') => vec![Wish::Say(json!({ "do": "stop_all" }))],
+            KeyCode::Char('c') if control => vec![Wish::Quit],
+            KeyCode::Char('q') => vec![Wish::Quit],
+            KeyCode::Char('?') => {
+                self.help = !self.help;
+                Vec::new()
+            }
+            _ if self.help => {
+                self.help = false;
+                Vec::new()
+            }
+            KeyCode::Up | KeyCode::Char('k') => self.choose(-1),
+            KeyCode::Down | KeyCode::Char('j') => self.choose(1),
+            KeyCode::Char('+' | '=') => self.faster(1),
+            KeyCode::Char('-') => self.faster(-1),
+            KeyCode::Char('e') => self.say("enable"),
+            KeyCode::Char('d') => self.say("disable"),
+            KeyCode::Char('s') => self.say("stop"),
+            KeyCode::Char('r') => self.say("reset_fault"),
+            KeyCode::Char('x') => self.say("explain"),
+            KeyCode::Char('n') => vec![Wish::Say(json!({ "do": "scan" }))],
+            KeyCode::Char('t') => vec![Wish::Say(json!({ "do": "take_control" }))],
+            _ => {
+                self.tell(None, "this key does nothing here; ? shows those that do");
+                Vec::new()
+            }
+        }
+    }
+
+    /// Time has passed.
+    pub(super) fn look(&mut self, now: Instant) -> Vec<Wish> {
+        let act = self.hold.look(now);
+        self.jog(act)
+    }
+
+    /// The terminal has lost the keyboard.
+    pub(super) fn lose_focus(&mut self, now: Instant) -> Vec<Wish> {
+        let act = self.hold.give_up(now);
+        self.jog(act)
+    }
+
+    fn jog(&mut self, act: Option<Act>) -> Vec<Wish> {
+        let Some(act) = act else { return Vec::new() };
+        if act == Act::Begin {
+            self.jogged = self.chosen;
+        }
+        let Some(node) = self.jogged else { return Vec::new() };
+        let message = match act {
+            Act::Begin => json!({ "do": "jog", "node": node, "rpm": self.side * self.jog_rpm() }),
+            Act::Renew => json!({ "do": "jog_hold", "node": node }),
+            Act::End => json!({ "do": "jog_end", "node": node }),
+        };
+        vec![Wish::Say(message)]
+    }
+
+    fn say(&mut self, deed: &str) -> Vec<Wish> {
+        let Some(node) = self.chosen else {
+            self.tell(None, "no node has been heard: n scans the bus");
+            return Vec::new();
+        };
+        vec![Wish::Say(json!({ "do": deed, "node": node }))]
+    }
+
+    fn choose(&mut self, by: isize) -> Vec<Wish> {
+        let at = self.state.nodes.iter().position(|node| Some(node.node) == self.chosen).unwrap_or(0);
+        let last = self.state.nodes.len().saturating_sub(1);
+        let to = at.saturating_add_signed(by).min(last);
+        self.chosen = self.state.nodes.get(to).map(|node| node.node);
+        Vec::new()
+    }
+
+    fn faster(&mut self, by: isize) -> Vec<Wish> {
+        self.jog_step = self.jog_step.saturating_add_signed(by).min(JOG_RPM.len() - 1);
+        Vec::new()
+    }
+}

@@ -1,0 +1,202 @@
+//! `ferrodrive top`: drives in a terminal, for whoever sits on the robot's SSH session.
+//!
+//! It is a page of the studio without a browser: the same [`Host`] owns the bus and everything that moves, and this terminal is one of
+//! its sessions. [`hold`] tells a key that is held, [`desk`] what keys mean, [`screen`] draws; this file joins them to a terminal.
+
+mod desk;
+mod hold;
+mod samples;
+mod screen;
+mod seen;
+#[cfg(test)]
+mod tests;
+
+use std::io::{IsTerminal, stdin, stdout};
+use std::pin::pin;
+use std::time::Duration;
+
+use crossterm::event::{
+    DisableFocusChange, EnableFocusChange, Event, KeyboardEnhancementFlags, PopKeyboardEnhancementFlags,
+    PushKeyboardEnhancementFlags,
+};
+use crossterm::{execute, terminal};
+use ratatui::DefaultTerminal;
+use serde_json::Value;
+use studio::{Host, Seat, Shown};
+use tokio::sync::mpsc;
+use tokio::task::JoinSet;
+
+use super::studio::{passed, setting};
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::output::Format;
+use desk::{Desk, Wish};
+use screen::Look;
+
+/// Show and move drives in this terminal: states, plots, faults, and keys to enable, jog and stop
+///
+/// Works over SSH in 80 columns and 24 lines. A drive is jogged only while its key is held, which the terminal tells by the key's
+/// repeats: a press alone moves nothing. What was moved from here stops when this ends, however it ends. Without --bus it is a virtual
+/// machine whose time passes with the clock.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  ferrodrive top\n  ferrodrive --bus can0 --machine machine.toml top\n\n\
+    Keys: ? shows them. SPACE and Esc stop every drive.")]
+pub(crate) struct Top {}
+
+/// How often time is looked at: what is no longer held ends so much later at most.
+const TICK: Duration = Duration::from_millis(10);
+
+/// How often the host is told that this terminal is there. It waits for 3 s.
+const ALIVE: Duration = Duration::from_millis(500);
+
+/// Keys that may wait. People type no faster; what finds no room was held up on its way.
+const KEYS: usize = 64;
+
+/// How often the terminal's thread looks whether it is still wanted.
+const KEY_POLL: Duration = Duration::from_millis(100);
+
+impl Top {
+    /// Shows until `q`, or until the terminal or the bus is gone.
+    pub(crate) async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
+        if format.json || !stdin().is_terminal() || !stdout().is_terminal() {
+            let failure = Failure::usage("this is no terminal to draw on");
+            let failure =
+                if format.json { failure.because("--json is for programs, and this is for people") } else { failure };
+            return Err(failure
+                .next("ferrodrive watch NODE OBJECT .. --json prints what changes, a line each")
+                .next("ferrodrive studio serves the same as a page and as /api/state"));
+        }
+        context.progress.clear();
+        context.traffic.listen();
+        let (host, desk) = Host::new(context.network.clone(), setting(context));
+        let mut host = pin!(host.run(|| passed(context)));
+        tokio::select! {
+            ended = show(context, desk, format) => ended?,
+            () = &mut host => {}
+        }
+        stop(context).await
+    }
+}
+
+/// Stops what was moved from here, before the bus is left.
+async fn stop(context: &Context) -> Result<(), Failure> {
+    for (node, stopped) in context.network.stop_all_moved().await {
+        stopped.map_err(|error| Failure::from(error).because(format!("node {node} was moving, and may still be")))?;
+    }
+    context.network.release_guards().await?;
+    Ok(())
+}
+
+/// The terminal, given back as it was when this is dropped.
+struct Screen {
+    terminal: DefaultTerminal,
+    tells_releases: bool,
+}
+
+impl Screen {
+    fn take() -> std::io::Result<Self> {
+        let terminal = ratatui::try_init()?;
+        let tells_releases = terminal::supports_keyboard_enhancement().unwrap_or(false);
+        let _ = execute!(stdout(), EnableFocusChange);
+        if tells_releases {
+            let _ = execute!(stdout(), PushKeyboardEnhancementFlags(KeyboardEnhancementFlags::REPORT_EVENT_TYPES));
+        }
+        Ok(Self { terminal, tells_releases })
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        if self.tells_releases {
+            let _ = execute!(stdout(), PopKeyboardEnhancementFlags);
+        }
+        let _ = execute!(stdout(), DisableFocusChange);
+        ratatui::restore();
+    }
+}
+
+/// What the terminal says, from a thread that waits for it. It ends when nobody listens; so does the channel with the terminal.
+fn listen() -> mpsc::Receiver<Event> {
+    let (sender, receiver) = mpsc::channel(KEYS);
+    std::thread::spawn(move || {
+        while !sender.is_closed() {
+            match crossterm::event::poll(KEY_POLL) {
+                Ok(false) => {}
+                Ok(true) => match crossterm::event::read() {
+                    // A key that finds no room has been held up: it says nothing of now.
+                    Ok(event) => drop(sender.try_send(event)),
+                    Err(_) => return,
+                },
+                Err(_) => return,
+            }
+        }
+    });
+    receiver
+}
+
+async fn show(context: &Context, desk_of_host: studio::Desk, format: Format) -> Result<(), Failure> {
+    let gone = || Failure::new("the host of the drives has ended");
+    let mut seat = Seat::take(&desk_of_host).await.ok_or_else(gone)?;
+    let cannot = |error: std::io::Error| Failure::new("cannot draw on this terminal").because(error);
+    let mut screen = Screen::take().map_err(cannot)?;
+    let look = Look { colour: format.paint.is_on() };
+    let mut events = listen();
+    let mut desk = Desk::new(seat.number());
+    let mut answers = JoinSet::new();
+    let say = |seat: &mut Seat, answers: &mut JoinSet<(Option<u64>, Value)>, message: Value| {
+        let node = message["node"].as_u64();
+        let answer = seat.say(message);
+        answers.spawn(async move { (node, answer.await) });
+    };
+    say(&mut seat, &mut answers, serde_json::json!({ "do": "take_control" }));
+    let (mut tick, mut alive) = (tokio::time::interval(TICK), tokio::time::interval(ALIVE));
+    let mut is_new = true;
+    loop {
+        if is_new {
+            screen.terminal.draw(|frame| screen::draw(frame, &desk, look)).map_err(cannot)?;
+            is_new = false;
+        }
+        let now = context.network.now();
+        let wishes = tokio::select! {
+            biased;
+            event = events.recv() => {
+                is_new = true;
+                match event {
+                    Some(Event::Key(key)) => desk.key(key, now),
+                    Some(Event::FocusLost) => desk.lose_focus(now),
+                    Some(_) => Vec::new(),
+                    // The terminal has gone: what is held by it stops with the session.
+                    None => return Ok(()),
+                }
+            }
+            _ = tick.tick() => desk.look(context.network.now()),
+            _ = alive.tick() => vec![Wish::Say(serde_json::json!({ "do": "alive" }))],
+            shown = seat.shown() => {
+                is_new = true;
+                match shown {
+                    Shown::State(state) => match serde_json::from_str(&state) {
+                        Ok(state) => desk.take(state),
+                        Err(error) => desk.tell(None, format!("the host says what cannot be read: {error}")),
+                    },
+                    Shown::News(news) => match serde_json::from_str(&news) {
+                        Ok(news) => desk.note(news),
+                        Err(error) => desk.tell(None, format!("the host says what cannot be read: {error}")),
+                    },
+                    Shown::Missed(missed) => desk.tell(None, format!("{missed} news came too fast to be shown")),
+                    Shown::Over => return Err(gone()),
+                }
+                Vec::new()
+            }
+            Some(Ok((node, answer))) = answers.join_next() => {
+                is_new |= desk.answered(node, &answer);
+                Vec::new()
+            }
+        };
+        for wish in wishes {
+            match wish {
+                Wish::Quit => return Ok(()),
+                Wish::Say(message) => say(&mut seat, &mut answers, message),
+            }
+        }
+    }
+}

@@ -1,0 +1,233 @@
+//! The picture: nodes, plots of the chosen one, what it has to say, what has happened, keys. Made for 80 columns and 24 lines; more
+//! room goes to the plots. Nothing is told by colour alone.
+
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::style::{Color, Modifier, Style};
+use ratatui::symbols::Marker;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Axis, Block, Borders, Chart, Clear, Dataset, GraphType, Paragraph, Wrap};
+
+use super::desk::Desk;
+use super::samples::{SIGNALS, SPAN_S, bounds};
+use super::seen::{Node, State};
+
+/// What everything fits in.
+pub(super) const LEAST: (u16, u16) = (80, 24);
+
+/// Nodes that are listed at most; further ones are scrolled to.
+const MOST_NODES: u16 = 6;
+
+/// Lines of news.
+const NEWS: u16 = 3;
+
+const KEYS: &str = "e enable  d disable  left/right jog  s stop  r reset  SPACE stop  ? help  q quit";
+
+const HELP: [&str; 17] = [
+    "SPACE, Esc       quick stop of every drive",
+    "left, right      jog the chosen drive while held (h and l too). It",
+    "                 begins with the second repeat of the key and ends 0.2 s",
+    "                 after the last: a press alone moves nothing",
+    "+, -             speed to jog at",
+    "up, down         choose a node (k and j too)",
+    "e                enable: to Operation enabled, holding still",
+    "d                disable: stop, then no current",
+    "s                stop by the deceleration ramp; it stays enabled",
+    "r                reset its fault, once the cause is gone",
+    "x                explain why it does not move",
+    "n                scan the bus",
+    "t                take control, where nobody has it",
+    "q, Ctrl-C        quit: what was moved from here stops",
+    "",
+    "What this terminal moves stops too when it closes, when its connection",
+    "is lost or when this program ends.",
+];
+
+/// How it is painted.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Look {
+    /// With colours.
+    pub(super) colour: bool,
+}
+
+impl Look {
+    fn in_colour(self, colour: Color) -> Style {
+        if self.colour { Style::new().fg(colour) } else { Style::new() }
+    }
+
+    fn bad(self) -> Style {
+        self.in_colour(Color::Red).add_modifier(Modifier::BOLD)
+    }
+}
+
+/// Draws everything.
+pub(super) fn draw(frame: &mut Frame<'_>, desk: &Desk, look: Look) {
+    let area = frame.area();
+    if area.width < LEAST.0 || area.height < LEAST.1 {
+        let text = format!(
+            "too small: {} x {}, and {} x {} are needed. q quits, SPACE stops all",
+            area.width, area.height, LEAST.0, LEAST.1
+        );
+        return frame.render_widget(Paragraph::new(text).wrap(Wrap { trim: true }), area);
+    }
+    let listed = (desk.state.nodes.len() as u16).clamp(1, MOST_NODES);
+    let rows = [1, listed + 1, 0, 4, NEWS + 1, 1];
+    let rows = rows.map(|rows| if rows == 0 { Constraint::Min(7) } else { Constraint::Length(rows) });
+    let [title, nodes, plots, chosen, news, keys] = Layout::vertical(rows).areas(area);
+    frame.render_widget(title_line(desk, look), title);
+    draw_nodes(frame, nodes, desk, look);
+    draw_plots(frame, plots, desk, look);
+    frame.render_widget(chosen_lines(desk, look), chosen);
+    draw_news(frame, news, desk);
+    frame.render_widget(Line::from(KEYS).style(Style::new().add_modifier(Modifier::DIM)), keys);
+    if desk.help {
+        draw_help(frame, area);
+    }
+}
+
+fn title_line<'a>(desk: &'a Desk, look: Look) -> Line<'a> {
+    let State { bus, scanning, .. } = &desk.state;
+    let rate = bus.bitrate.map_or_else(String::new, |rate| format!("  {} kbit/s", rate / 1000));
+    let load = bus.load_percent.map_or_else(String::new, |load| format!("  load {load:.1} %"));
+    let mut line = vec![
+        Span::from("ferrodrive top").style(Style::new().add_modifier(Modifier::BOLD)),
+        Span::from(format!("  {}{rate}{load}  {} frames/s", bus.name, bus.frames_per_s)),
+    ];
+    if *scanning {
+        line.push(Span::from("  scanning"));
+    }
+    if !desk.has_control() && desk.state.controller.is_some() {
+        line.push(Span::from("  another session has control").style(look.bad()));
+    }
+    line.into()
+}
+
+/// Columns of the list: name and width.
+const COLUMNS: [(&str, usize); 8] =
+    [("  node", 7), ("model", 12), ("NMT", 16), ("heard", 8), ("state", 19), ("speed", 8), ("A", 6), ("V", 4)];
+
+fn draw_nodes(frame: &mut Frame<'_>, area: Rect, desk: &Desk, look: Look) {
+    let head: String = COLUMNS.iter().map(|(name, width)| format!("{name:width$}")).collect();
+    let mut lines = vec![Line::from(head).style(Style::new().add_modifier(Modifier::DIM))];
+    let room = usize::from(area.height.saturating_sub(1));
+    let at = desk.state.nodes.iter().position(|node| Some(node.node) == desk.chosen).unwrap_or(0);
+    let first = (at + 1).saturating_sub(room);
+    for node in desk.state.nodes.iter().skip(first).take(room) {
+        lines.push(node_line(node, Some(node.node) == desk.chosen, look));
+    }
+    if desk.state.nodes.is_empty() {
+        lines.push(Line::from("  nobody has been heard: is there power, is the bit rate right? n scans the bus"));
+    }
+    frame.render_widget(Paragraph::new(lines), area);
+}
+
+fn node_line(node: &Node, is_chosen: bool, look: Look) -> Line<'static> {
+    let drive = node.drive.as_ref();
+    let number = |value: Option<f64>, decimals: usize| {
+        value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
+    };
+    let faulted = drive.is_some_and(|drive| drive.fault_code != 0);
+    let state = match (drive, &node.trouble) {
+        (_, Some(_)) => "no answer".to_owned(),
+        (Some(drive), _) if faulted => format!("! fault {:04X}h", drive.fault_code),
+        (Some(drive), _) => node.doing.clone().or_else(|| drive.state.clone()).unwrap_or_else(|| "-".to_owned()),
+        (None, _) => "-".to_owned(),
+    };
+    let heard = node.heartbeat_age_ms.map_or_else(
+        || "-".to_owned(),
+        |ms| match ms {
+            0..10_000 => format!("{ms} ms"),
+            _ => format!("{} s", ms / 1000),
+        },
+    );
+    let texts = [
+        format!("{} {}", if is_chosen { '>' } else { ' ' }, node.node),
+        node.model.clone().unwrap_or_else(|| "?".to_owned()),
+        node.nmt.clone().unwrap_or_else(|| "-".to_owned()),
+        heard,
+        state,
+        number(drive.and_then(|drive| drive.velocity_rpm), 1),
+        number(drive.and_then(|drive| drive.current_a), 1),
+        number(drive.and_then(|drive| drive.supply_v), 0),
+    ];
+    let cells: String = texts.iter().zip(COLUMNS).map(|(text, (_, width))| fitted(text, width)).collect();
+    let style = if faulted || node.trouble.is_some() { look.bad() } else { Style::new() };
+    Line::from(cells).style(if is_chosen { style.add_modifier(Modifier::BOLD) } else { style })
+}
+
+/// A text in a column, with a blank behind it.
+fn fitted(text: &str, width: usize) -> String {
+    let cut: String = text.chars().take(width - 1).collect();
+    format!("{cut:width$}")
+}
+
+fn draw_plots(frame: &mut Frame<'_>, area: Rect, desk: &Desk, look: Look) {
+    let Some(node) = desk.chosen else { return };
+    let areas = Layout::horizontal([Constraint::Ratio(1, 3); 3]).spacing(1).areas::<3>(area);
+    for (signal, area) in areas.into_iter().enumerate() {
+        let values = desk.past.of(node, signal, desk.state.time_s);
+        let [low, high] = bounds(&values);
+        let line = Dataset::default()
+            .marker(Marker::Braille)
+            .graph_type(GraphType::Line)
+            .style(look.in_colour([Color::Cyan, Color::Yellow, Color::Green][signal]))
+            .data(&values);
+        let title = format!("{} of {node}", SIGNALS[signal]);
+        let chart = Chart::new(vec![line])
+            .block(Block::new().borders(Borders::TOP).title(title))
+            .x_axis(Axis::default().bounds([-SPAN_S, 0.0]).labels(["-60 s", "now"]))
+            .y_axis(Axis::default().bounds([low, high]).labels([shown(low), shown(high)]));
+        frame.render_widget(chart, area);
+    }
+}
+
+/// The bound of an axis, which is a round number.
+fn shown(bound: f64) -> String {
+    let text = format!("{bound:.3}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+fn chosen_lines<'a>(desk: &'a Desk, look: Look) -> Paragraph<'a> {
+    let Some(node) = desk.node() else { return Paragraph::new("") };
+    let mut lines = Vec::new();
+    if let Some(drive) = &node.drive {
+        let parts = [
+            drive.mode_name.clone(),
+            drive.angle_degrees.map(|angle| format!("{angle:.1} deg")),
+            drive.motor_celsius.map(|celsius| format!("motor {celsius:.0} C")),
+            drive.driver_celsius.map(|celsius| format!("driver {celsius:.0} C")),
+        ];
+        let parts = parts.into_iter().flatten().collect::<Vec<_>>().join(", ");
+        lines.push(Line::from(format!("node {}: {parts}", node.node)));
+        for fault in drive.faults.iter().take(1) {
+            lines.push(Line::from(format!("! {}: {}", fault.name, fault.remedy)).style(look.bad()));
+        }
+    }
+    if let Some(trouble) = node.trouble.as_ref().or(node.remark.as_ref()) {
+        lines.push(Line::from(format!("! {trouble}")).style(look.bad()));
+    }
+    let jog = if desk.is_jogging() { "jogging" } else { "jog" };
+    let without =
+        node.without_us.as_deref().map_or_else(String::new, |without| format!("; without this program {without}"));
+    lines.push(Line::from(format!("{jog} at {} r/min, + and - change that{without}", desk.jog_rpm())));
+    Paragraph::new(lines).wrap(Wrap { trim: true }).block(Block::new().borders(Borders::TOP))
+}
+
+fn draw_news(frame: &mut Frame<'_>, area: Rect, desk: &Desk) {
+    let news = desk.news.iter().rev().take(usize::from(NEWS)).rev();
+    let lines = news.map(|news| {
+        let node = news.node.map(|node| format!("node {node}")).filter(|node| !news.text.starts_with(node));
+        let node = node.map_or_else(String::new, |node| format!("{node}: "));
+        Line::from(format!("{:8.1} s  {node}{}", news.time_s, news.text))
+    });
+    frame.render_widget(Paragraph::new(lines.collect::<Vec<_>>()).block(Block::new().borders(Borders::TOP)), area);
+}
+
+fn draw_help(frame: &mut Frame<'_>, area: Rect) {
+    let (width, height) = (LEAST.0 - 4, HELP.len() as u16 + 2);
+    let within = Rect { x: area.x + (area.width - width) / 2, y: area.y + (area.height - height) / 2, width, height };
+    frame.render_widget(Clear, within);
+    let text = HELP.map(Line::from).to_vec();
+    frame.render_widget(Paragraph::new(text).block(Block::bordered().title(" keys; any key goes back ")), within);
+}

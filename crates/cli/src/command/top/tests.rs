@@ -1,0 +1,232 @@
+//! What is drawn for a state, as text, and what keys lead to.
+
+use can::Instant;
+use crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use serde_json::{Value, json};
+
+use super::desk::{Desk, Wish};
+use super::screen::{Look, draw};
+use super::seen::{News, State};
+
+const NUMBER: u64 = 1;
+
+/// Two drives, as the host shows them: one that turns, one with a fault.
+fn state() -> State {
+    serde_json::from_value(json!({
+        "time_s": 12.5, "scanning": false, "controller": NUMBER, "sessions": 1,
+        "bus": { "name": "can0", "bitrate": 500_000, "frames_per_s": 842, "load_percent": 12.34 },
+        "nodes": [
+            { "node": 1, "model": "m4230e17b50", "nmt": "operational", "heartbeat_age_ms": 318, "without_us":
+              "it stops by itself 2000 ms after the last heartbeat",
+              "drive": { "at_s": 12.5, "state": "Operation enabled", "mode_name": "profile velocity", "fault_code": 0, "faults": [],
+                "angle_degrees": 268.61, "velocity_rpm": -10.04, "current_a": 0.16, "supply_v": 36.2, "driver_celsius": 31.4 } },
+            { "node": 4, "model": "zlac8030l", "nmt": "pre-operational", "heartbeat_age_ms": 35_315,
+              "drive": { "at_s": 12.5, "state": "Fault", "fault_code": 1, "faults": [{ "name": "over-voltage",
+                "remedy": "Lower the supply." }], "velocity_rpm": 0.0, "supply_v": 71.0 } },
+            { "node": 9, "trouble": "no answer within 200 ms" }
+        ],
+    }))
+    .expect("a state as the host shows it")
+}
+
+fn desk() -> Desk {
+    let mut desk = Desk::new(NUMBER);
+    desk.take(state());
+    desk
+}
+
+/// The lines of the screen, without what is blank behind them.
+fn drawn(desk: &Desk, width: u16, height: u16) -> Vec<String> {
+    let mut terminal = Terminal::new(TestBackend::new(width, height)).expect("a screen");
+    terminal.draw(|frame| draw(frame, desk, Look { colour: false })).expect("drawn");
+    let cells = terminal.backend().buffer().content();
+    let lines = cells.chunks(usize::from(width));
+    lines.map(|line| line.iter().map(|cell| cell.symbol()).collect::<String>().trim_end().to_owned()).collect()
+}
+
+#[test]
+fn eighty_columns_and_24_lines_show_everything() {
+    let mut desk = desk();
+    desk.note(News { time_s: 1.0, node: Some(4), text: "node 4 booted".into() });
+    desk.note(News { time_s: 11.25, node: Some(4), text: "over-voltage".into() });
+    let lines = drawn(&desk, 80, 24);
+    assert_eq!(lines[0], "ferrodrive top  can0  500 kbit/s  load 12.3 %  842 frames/s");
+    assert_eq!(
+        lines[1..5],
+        [
+            "  node model       NMT             heard   state              speed   A     V",
+            "> 1    m4230e17b50 operational     318 ms  Operation enabled  -10.0   0.2   36",
+            "  4    zlac8030l   pre-operational 35 s    ! fault 0001h      0.0     -     71",
+            "  9    ?           -               -       no answer          -       -     -",
+        ]
+    );
+    assert!(lines[5].starts_with("speed r/min of 1──") && lines[5].contains(" current A of 1──"), "{}", lines[5]);
+    assert!(lines[5].contains(" angle deg of 1──"));
+    assert_eq!(lines[16], "node 1: profile velocity, 268.6 deg, driver 31 C");
+    assert_eq!(lines[17], "jog at 10 r/min, + and - change that; without this program it stops by itself");
+    assert_eq!(lines[18], "2000 ms after the last heartbeat");
+    // A node is not named twice.
+    assert_eq!(lines[20..22], ["     1.0 s  node 4 booted", "    11.2 s  node 4: over-voltage"]);
+    assert_eq!(lines[23], "e enable  d disable  left/right jog  s stop  r reset  SPACE stop  ? help  q quit");
+    assert_eq!(lines.len(), 24);
+}
+
+#[test]
+fn the_chosen_drive_says_its_fault_and_what_to_do() {
+    let mut desk = desk();
+    assert_eq!(desk.key(key(KeyCode::Down), at(0)), []);
+    let lines = drawn(&desk, 80, 24);
+    assert!(lines[3].starts_with("> 4"), "{}", lines[3]);
+    assert!(lines.iter().any(|line| line == "! over-voltage: Lower the supply."), "{lines:#?}");
+    desk.key(key(KeyCode::Char('j')), at(0));
+    let lines = drawn(&desk, 80, 24);
+    assert!(lines.iter().any(|line| line == "! no answer within 200 ms"), "{lines:#?}");
+    // No further than the last, and back to the first.
+    for code in [KeyCode::Down, KeyCode::Down, KeyCode::Up, KeyCode::Char('k'), KeyCode::Up] {
+        desk.key(key(code), at(0));
+    }
+    assert_eq!(desk.chosen, Some(1));
+}
+
+#[test]
+fn more_room_goes_to_the_plots_and_more_nodes_than_lines_are_scrolled_to() {
+    let mut desk = desk();
+    let mut many = state();
+    many.nodes = (1..=20).map(|node| super::seen::Node { node, ..Default::default() }).collect();
+    desk.take(many);
+    let lines = drawn(&desk, 120, 40);
+    assert_eq!(lines.len(), 40);
+    let listed = |lines: &[String]| lines[2..8].iter().map(|line| line[2..4].trim().to_owned()).collect::<Vec<_>>();
+    assert_eq!(listed(&lines), ["1", "2", "3", "4", "5", "6"]);
+    for _ in 0..11 {
+        desk.key(key(KeyCode::Down), at(0));
+    }
+    assert_eq!(listed(&drawn(&desk, 120, 40)), ["7", "8", "9", "10", "11", "12"]);
+}
+
+/// A ramp from 0 to 100 r/min within the last minute is a line from the lower left to the upper right.
+#[test]
+fn a_plot_shows_the_last_minute() {
+    let mut desk = Desk::new(NUMBER);
+    for step in 0..=60 {
+        let mut state = state();
+        state.time_s = f64::from(step);
+        let drive = state.nodes[0].drive.as_mut().expect("a drive");
+        (drive.at_s, drive.velocity_rpm) = (f64::from(step), Some(f64::from(step) / 60.0 * 100.0));
+        desk.take(state);
+    }
+    let lines = drawn(&desk, 80, 24);
+    let plot: Vec<Vec<char>> = lines[6..13].iter().map(|line| line.chars().take(26).collect()).collect();
+    assert!(plot[0].iter().collect::<String>().starts_with("120"), "{lines:#?}");
+    assert!(plot[6].iter().collect::<String>().starts_with('0'), "{lines:#?}");
+    let is_dot = |symbol: &char| ('\u{2801}'..='\u{28FF}').contains(symbol);
+    let firsts: Vec<_> = plot.iter().filter_map(|line| line.iter().position(is_dot)).collect();
+    assert!(firsts.len() >= 5 && firsts.windows(2).all(|pair| pair[0] > pair[1]), "rises to the right: {lines:#?}");
+}
+
+#[test]
+fn a_window_that_is_too_small_says_so_and_an_empty_bus_what_to_do() {
+    let text = drawn(&desk(), 60, 10).join(" ");
+    assert!(text.contains("too small: 60 x 10, and 80 x 24 are needed") && text.contains("SPACE stops all"), "{text}");
+    for (width, height) in [(1, 1), (80, 23), (79, 24), (2, 200)] {
+        drawn(&desk(), width, height);
+    }
+    let empty = Desk::new(NUMBER);
+    assert!(drawn(&empty, 80, 24).iter().any(|line| line.contains("nobody has been heard")));
+}
+
+#[test]
+fn help_is_over_everything_and_stops_all_the_same() {
+    let mut desk = desk();
+    desk.key(key(KeyCode::Char('?')), at(0));
+    let lines = drawn(&desk, 80, 24);
+    assert!(lines.iter().any(|line| line.contains("SPACE, Esc       quick stop of every drive")), "{lines:#?}");
+    assert!(lines.iter().all(|line| line.chars().count() <= 80));
+    // No key does something that is not seen to be about, but for the stop.
+    assert_eq!(desk.key(key(KeyCode::Char(' ')), at(0)), [say(json!({ "do": "stop_all" }))]);
+    assert_eq!(desk.key(key(KeyCode::Char('e')), at(0)), []);
+    assert!(!desk.help, "it goes back");
+}
+
+#[test]
+fn each_key_says_what_it_is_for() {
+    let mut desk = desk();
+    let node = 1;
+    for (code, message) in [
+        (KeyCode::Char('e'), json!({ "do": "enable", "node": node })),
+        (KeyCode::Char('d'), json!({ "do": "disable", "node": node })),
+        (KeyCode::Char('s'), json!({ "do": "stop", "node": node })),
+        (KeyCode::Char('r'), json!({ "do": "reset_fault", "node": node })),
+        (KeyCode::Char('x'), json!({ "do": "explain", "node": node })),
+        (KeyCode::Char('n'), json!({ "do": "scan" })),
+        (KeyCode::Char('t'), json!({ "do": "take_control" })),
+        (KeyCode::Char(' '), json!({ "do": "stop_all" })),
+        (KeyCode::Esc, json!({ "do": "stop_all" })),
+    ] {
+        assert_eq!(desk.key(key(code), at(0)), [say(message)], "{code:?}");
+    }
+    assert_eq!(desk.key(key(KeyCode::Char('q')), at(0)), [Wish::Quit]);
+    let interrupt = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
+    assert_eq!(desk.key(interrupt, at(0)), [Wish::Quit]);
+    assert_eq!(desk.key(key(KeyCode::Char('z')), at(0)), []);
+    assert!(desk.news.last().is_some_and(|news| news.text.contains("? shows those that do")));
+}
+
+#[test]
+fn a_held_key_jogs_and_every_other_ends_it_first() {
+    let mut desk = desk();
+    let jog = |rpm: f64| say(json!({ "do": "jog", "node": 1, "rpm": rpm }));
+    let end = || say(json!({ "do": "jog_end", "node": 1 }));
+    desk.key(key(KeyCode::Char('+')), at(0));
+    assert_eq!([0, 500, 533].map(|ms| desk.key(key(KeyCode::Left), at(ms))), [vec![], vec![], vec![jog(-20.0)]]);
+    assert_eq!(desk.key(key(KeyCode::Left), at(566)), [say(json!({ "do": "jog_hold", "node": 1 }))]);
+    // Another node is chosen: what is told is the one that turns.
+    assert_eq!(desk.key(key(KeyCode::Down), at(580)), [end()]);
+    assert_eq!(desk.chosen, Some(4));
+    desk.key(key(KeyCode::Up), at(590));
+    // To the other side.
+    assert_eq!([2000, 2500, 2533].map(|ms| desk.key(key(KeyCode::Right), at(ms))), [vec![], vec![], vec![jog(20.0)]]);
+    assert_eq!(desk.key(key(KeyCode::Left), at(2540)), [end()]);
+    assert_eq!([3000, 3033].map(|ms| desk.key(key(KeyCode::Left), at(ms))), [vec![], vec![jog(-20.0)]]);
+    assert_eq!(desk.key(key(KeyCode::Char(' ')), at(3040)), [end(), say(json!({ "do": "stop_all" }))]);
+    // Let go: told at the next look, within the 190 ms of the host.
+    assert_eq!([6000, 6500, 6533].map(|ms| desk.key(key(KeyCode::Right), at(ms))).concat(), [jog(20.0)]);
+    assert_eq!((desk.look(at(6682)), desk.look(at(6683))), (vec![], vec![end()]));
+    // A terminal that tells releases, and one that loses the keyboard.
+    assert_eq!([8000, 8500, 8533].map(|ms| desk.key(key(KeyCode::Right), at(ms))).concat(), [jog(20.0)]);
+    let release = KeyEvent { kind: KeyEventKind::Release, ..key(KeyCode::Right) };
+    assert_eq!(desk.key(release, at(8540)), [end()]);
+    assert_eq!([8600, 9100, 9133].map(|ms| desk.key(key(KeyCode::Right), at(ms))).concat(), [jog(20.0)]);
+    assert_eq!(desk.lose_focus(at(9140)), [end()]);
+}
+
+#[test]
+fn answers_are_told_where_they_say_something() {
+    let mut desk = desk();
+    let refused = json!({ "ok": false, "error": { "kind": "no_control", "message": "session 2 has control" } });
+    assert!(desk.answered(Some(4), &refused));
+    assert_eq!(desk.news.last().map(|news| (news.node, news.text.as_str())), Some((Some(4), "session 2 has control")));
+    for kind in ["stopped", "replaced", "not_held"] {
+        assert!(!desk.answered(Some(4), &json!({ "ok": false, "error": { "kind": kind, "message": "." } })));
+    }
+    assert!(!desk.answered(None, &json!({ "ok": true })));
+    let finding = json!({ "cause": true, "follows": "It waits for its enable", "remedy": "Enable it" });
+    assert!(desk.answered(Some(1), &json!({ "ok": true, "result": { "findings": [finding] } })));
+    assert_eq!(desk.news.last().map(|news| news.text.as_str()), Some("It waits for its enable. Enable it"));
+    assert!(desk.answered(Some(1), &json!({ "ok": true, "result": { "findings": [] } })));
+    assert!(desk.news.last().is_some_and(|news| news.text.contains("nothing is found")));
+}
+
+fn key(code: KeyCode) -> KeyEvent {
+    KeyEvent::new(code, KeyModifiers::NONE)
+}
+
+fn at(ms: u64) -> Instant {
+    Instant::from_millis(ms)
+}
+
+fn say(message: Value) -> Wish {
+    Wish::Say(message)
+}

@@ -1,0 +1,52 @@
+//! Several drives as one motion, in a real browser.
+
+use fantoccini::actions::{InputSource, MOUSE_BUTTON_LEFT, MouseActions, PointerAction};
+use fantoccini::key::Key;
+use serde_json::Value;
+
+use super::{Stage, press, speed};
+
+/// The stepper and the wheel of the embedded bus, by their places.
+const BOTH: [usize; 2] = [1, 2];
+
+fn angle(node: &Value) -> f64 {
+    node["drive"]["angle_degrees"].as_f64().expect("an angle")
+}
+
+fn all(state: &Value, wanted: impl Fn(&Value) -> bool) -> bool {
+    BOTH.iter().all(|at| state["nodes"][*at]["drive"].is_object() && wanted(&state["nodes"][*at]))
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn two_drives_move_together_turn_while_held_and_stop_together() {
+    let stage = Stage::open("grouped").await;
+    stage.take_the_wheel().await;
+    stage.click("#group summary").await;
+    stage.click("#group-move").await;
+    stage.says("#group-told", "Choose two drives or more").await;
+    stage.click("#group-in-2").await;
+    stage.click("#group-in-4").await;
+    stage.click("#group-move").await;
+    stage.says("#group-told", "2 drives moved together in").await;
+    stage.studio.wait("a quarter of a turn of both", |state| all(state, |node| (angle(node) - 90.0).abs() < 3.0));
+    stage.shoot("group").await;
+    let button = stage.find("#group-forward").await;
+    let down = MouseActions::new("mouse".into())
+        .then(PointerAction::MoveToElement { element: button, duration: None, x: 0.0, y: 0.0 })
+        .then(PointerAction::Down { button: MOUSE_BUTTON_LEFT });
+    stage.client.perform_actions(down.clone()).await.expect("a press");
+    stage.studio.wait("both turn", |state| all(state, |node| speed(node) > 20.0));
+    stage.client.release_actions().await.expect("a release");
+    stage.studio.wait("both rest", |state| all(state, |node| speed(node) < 2.0));
+    stage.says("#group-told", "at rest, without power").await;
+    stage.client.perform_actions(down).await.expect("a press");
+    stage.studio.wait("both turn", |state| all(state, |node| speed(node) > 20.0));
+    stage.client.perform_actions(press(Key::Escape.into())).await.expect("a press");
+    stage.studio.wait("both rest", |state| all(state, |node| speed(node) < 2.0));
+    stage.says("#group-told", "stop").await;
+    stage.client.release_actions().await.expect("a release");
+    stage.click("#theme").await;
+    stage.shoot("group_other_theme").await;
+    stage.close().await;
+}

@@ -1,0 +1,36 @@
+//! The homing wizard in a real browser.
+
+use fantoccini::key::Key;
+
+use super::{Stage, press, speed};
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn homing_is_chosen_by_its_picture_and_ends_with_a_stop() {
+    let stage = Stage::open("homed").await;
+    stage.take_the_wheel().await;
+    stage.click(".motion .chooser button:nth-child(2)").await;
+    stage.click("#homing summary").await;
+    stage.find("#home-method option[value='24']").await;
+    stage.find("#home-method").await.select_by_value("24").await.expect("it is there");
+    // ZLIM42-C user manual V1.03, 5.3.6; 2030h gives no input a meaning as delivered.
+    stage.says("#home-described", "looks for the home switch in positive direction, and turns round at a limit").await;
+    stage.says("#home-missing", "No input of this drive is set to be its home switch").await;
+    stage.find(".homing-picture circle.home").await;
+    stage.shoot("homing").await;
+    stage.find("#home-method").await.select_by_value("17").await.expect("it is there");
+    stage.says("#home-described", "negative limit goes on").await;
+    let field = stage.find(".settings input[data-object='6099h:01']").await;
+    field.clear().await.expect("cleared");
+    field.send_keys("60rpm").await.expect("typed");
+    stage.click("#home-write").await;
+    stage.says("#home-told", "Written and read back").await;
+    stage.click("#home-start").await;
+    stage.says("#home-progress", "moving negatively").await;
+    stage.click("#theme").await;
+    stage.shoot("homing_other_theme").await;
+    stage.client.perform_actions(press(Key::Escape.into())).await.expect("a press");
+    stage.says("#home-progress", "Not found").await;
+    stage.studio.wait("a stepper that rests", |state| speed(&state["nodes"][1]) < 2.0);
+    stage.close().await;
+}

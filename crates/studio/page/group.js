@@ -1,0 +1,196 @@
+// Several drives as one motion, in the Motion view: to positions together, at speeds together, or as the two wheels of a base.
+// The paths are the studio's; held motions last as long as their button is held.
+
+import { ask, inControl, link } from "./link.js";
+import { h, number, renew, say } from "./dom.js";
+
+// Three within the 200 ms after which the studio stops what is not held.
+const HOLD_MS = 60;
+
+/** Hold to run, for a group: begins with `make`, goes on with `hold`, ends with `group_end`. */
+function holder(report) {
+  let held = null;
+
+  async function begin(name, make, hold) {
+    if (held || !inControl()) return;
+    const deed = make();
+    if (!deed) return;
+    const mine = { timer: setInterval(() => renewed(mine, hold), HOLD_MS) };
+    held = mine;
+    const answer = await ask(deed);
+    // The answer comes at the end.
+    report(name, answer);
+    if (held === mine) drop();
+  }
+
+  async function renewed(mine, hold) {
+    const answer = await ask(hold());
+    // Stopped, or let go too late: it does not begin anew by itself.
+    if (!answer.ok && held === mine) drop();
+  }
+
+  function drop() {
+    if (!held) return false;
+    clearInterval(held.timer);
+    held = null;
+    return true;
+  }
+
+  function end() {
+    if (drop()) ask({ do: "group_end" });
+  }
+
+  function button(id, text, title, begun) {
+    const element = h("button", { type: "button", class: "jog", id, title }, text);
+    element.addEventListener("pointerdown", (event) => {
+      element.setPointerCapture(event.pointerId);
+      begun();
+    });
+    for (const gone of ["pointerup", "pointercancel", "lostpointercapture"]) element.addEventListener(gone, end);
+    element.addEventListener("contextmenu", (event) => event.preventDefault());
+    return element;
+  }
+
+  addEventListener("blur", end);
+  addEventListener("pagehide", end);
+  document.addEventListener("visibilitychange", () => document.hidden && end());
+  return { begin, end, button };
+}
+
+const input = (id, value, extra = {}) => h("input", { id, type: "number", step: "any", value, inputmode: "decimal", ...extra });
+const row = (label, field, unit) => h("label", { for: field.id }, `${label} `, field, ` ${unit}`);
+const read = (field) => (field.value.trim() === "" ? null : Number(field.value));
+
+export function groupMotion(report) {
+  /** Node to the fields of its line, in the order of the bus. */
+  const lines = new Map();
+  const body = h("tbody");
+  const heads = ["Node", "In the group", "Angle", "Speed", "Now", "Counts", "Does"];
+  const table = h("table", {}, h("thead", {}, h("tr", {}, ...heads.map((head) => h("th", {}, head)))), body);
+  const relative = h("input", { id: "group-relative", type: "checkbox", checked: true });
+  const rpm = input("group-rpm", "", { placeholder: "30" });
+  const ramp = input("group-ramp", "", { placeholder: "60" });
+  const within = input("group-within", "", { placeholder: "shortest" });
+  const told = h("p", { role: "status", id: "group-told", class: "quiet" });
+  const held = holder((name, answer) => tell(name, answer));
+
+  const tell = (name, answer) => {
+    told.className = answer.ok ? "good" : "bad";
+    say(told, answer.ok ? (answer.notes ?? []).join(" ") || `${name}: at rest, without power.` : answer.error.message);
+    // A press of stop, or another deed, has its own news.
+    if (answer.ok || (answer.error.kind !== "stopped" && answer.error.kind !== "replaced")) report(name, answer);
+  };
+
+  const chosen = () => [...lines].filter(([, line]) => line.in.checked);
+  /** The axes of a deed with one value each; null, with the focus where it is missing. */
+  function axes(name, of) {
+    const found = chosen().map(([node, line]) => ({ node, [name]: read(line[of]) }));
+    if (found.length < 2) {
+      told.className = "bad";
+      say(told, "Choose two drives or more.");
+      return null;
+    }
+    const bad = found.find((axis) => axis[name] === null || !Number.isFinite(axis[name]));
+    if (bad) {
+      lines.get(bad.node)[of].focus();
+      return null;
+    }
+    return found;
+  }
+
+  async function move(event) {
+    event.preventDefault();
+    const to = axes("degrees", "angle");
+    if (!to) return;
+    told.className = "quiet";
+    say(told, "Moving …");
+    tell("Group", await ask({ do: "group_move", axes: to, relative: relative.checked, rpm: read(rpm), rpm_per_s: read(ramp), within_s: read(within) }));
+  }
+
+  const turn = (sign) => () => {
+    const at = axes("rpm", "speed");
+    return at && { do: "group_jog", axes: at.map(({ node, rpm }) => ({ node, rpm: sign * rpm })), rpm_per_s: read(ramp) };
+  };
+  const hold = () => ({ do: "group_hold" });
+  const spin = (id, text, sign, title) => held.button(id, text, title, () => held.begin("Group", turn(sign), hold));
+
+  // The base: which drives are its wheels, how it is built, and how fast.
+  const wheel = (id) => h("select", { id });
+  const [left, right] = [wheel("base-left"), wheel("base-right")];
+  const [turns_left, turns_right] = [input("base-turns-left", "1"), input("base-turns-right", "-1")];
+  const [base_m, radius_m] = [input("base-wheel-base", "0.5"), input("base-wheel-radius", "0.08")];
+  const [speed, most, ramp_m] = [input("base-speed", "0.1"), input("base-most", "0.3"), input("base-ramp", "0.5")];
+  const twist = (forward, round) => {
+    const [v, b] = [Math.abs(read(speed) ?? 0), read(base_m)];
+    // To turn on the spot its wheels go as fast as they do straight on.
+    return { linear_m_s: forward * v, angular_rad_s: round * (b ? (2 * v) / b : 0) * (forward === 0 ? 1 : 0.5) };
+  };
+  let wanted = null;
+  const drive = (forward, round) => () => {
+    wanted = twist(forward, round);
+    const wheels = [Number(left.value), Number(right.value)];
+    const begin = () => ({ do: "base_jog", wheels, turns: [read(turns_left) ?? 1, read(turns_right) ?? -1], wheel_base_m: read(base_m) ?? 0, wheel_radius_m: read(radius_m) ?? 0, most_m_s: read(most) ?? 0, m_per_s2: read(ramp_m) ?? 0, ...wanted });
+    held.begin("Base", begin, () => ({ do: "base_twist", ...wanted }));
+  };
+  const go = (id, text, title, forward, round) => held.button(id, text, title, drive(forward, round));
+
+  const fields = h(
+    "div",
+    {},
+    table,
+    h(
+      "div",
+      { class: "forms" },
+      h("form", { "aria-label": "Move together", onsubmit: move }, h("h3", {}, "Move together"), h("label", { for: "group-relative" }, relative, " relative, from where each is"), row("Speed", rpm, "r/min at most"), row("Ramp", ramp, "r/min/s at most"), row("Within", within, "s"), h("button", { type: "submit", id: "group-move" }, "Move together")),
+      h("div", { class: "form" }, h("h3", {}, "Turn together (hold to run)"), h("p", { class: "quiet" }, "Each at its own speed of the table; they gather it together."), h("div", { class: "bar" }, spin("group-back", "◀", -1, "Hold to turn all backwards"), spin("group-forward", "▶", 1, "Hold to turn all forwards"))),
+      h(
+        "div",
+        { class: "form base" },
+        h("h3", {}, "Base on two wheels (hold to run)"),
+        h("label", { for: "base-left" }, "Left wheel ", left, " turns ", turns_left),
+        h("label", { for: "base-right" }, "Right wheel ", right, " turns ", turns_right),
+        row("Wheel base", base_m, "m"),
+        row("Wheel radius", radius_m, "m"),
+        row("Speed", speed, "m/s"),
+        row("At most", most, "m/s of a wheel"),
+        row("Ramp", ramp_m, "m/s²"),
+        h("div", { class: "bar" }, go("base-left-turn", "↺", "Hold to turn left on the spot", 0, 1), go("base-forward", "▲", "Hold to drive forward", 1, 0), go("base-back", "▼", "Hold to drive back", -1, 0), go("base-right-turn", "↻", "Hold to turn right on the spot", 0, -1)),
+      ),
+    ),
+    told,
+  );
+  const details = h("details", { class: "homing", id: "group" }, h("summary", {}, "Groups: several drives as one motion"), h("p", { class: "quiet" }, "All begin with one SYNC and end together. When one faults, is lost or lags, all come to rest. Afterwards they have no power. Their PDO mapping is set anew for it."), fields);
+
+  function line(node) {
+    const fields = { in: h("input", { type: "checkbox", id: `group-in-${node}`, "aria-label": `Node ${node} is in the group` }), angle: input(`group-angle-${node}`, "90"), speed: input(`group-speed-${node}`, "30"), now: h("td"), counts: h("td"), does: h("td") };
+    lines.set(node, fields);
+    return fields;
+  }
+
+  function update(state) {
+    if (!details.open) return;
+    const drives = state.nodes.filter((node) => node.drive || node.trouble);
+    renew(body, drives.map(({ node, model }) => `${node}${model}`).join(), () => {
+      const before = new Map(lines);
+      lines.clear();
+      const options = (of) => drives.map(({ node }) => h("option", { value: String(node), selected: of === node }, `node ${node}`));
+      left.replaceChildren(...options(drives[0]?.node));
+      right.replaceChildren(...options(drives[1]?.node));
+      return drives.map(({ node, model }) => {
+        const of = before.get(node) ?? line(node);
+        lines.set(node, of);
+        const cells = [`${node} ${model ?? ""}`, of.in, h("span", {}, of.angle, " °"), h("span", {}, of.speed, " r/min")];
+        return h("tr", { "data-node": String(node) }, ...cells.map((cell, at) => h("td", { "data-label": heads[at] }, cell)), of.now, of.counts, of.does);
+      });
+    });
+    for (const { node, drive, doing, trouble } of drives) {
+      const of = lines.get(node);
+      say(of.now, `${number(drive?.angle_degrees, 1)}° ${number(drive?.velocity_rpm, 1)} r/min`);
+      say(of.counts, number(drive?.position_counts, 0));
+      say(of.does, trouble ?? doing ?? drive?.state ?? "–");
+    }
+  }
+
+  details.addEventListener("toggle", () => details.open && link.state && update(link.state));
+  return { root: details, update, hide: held.end };
+}

@@ -1,0 +1,102 @@
+// What something means: the `?` key on the thing that has the focus or the pointer, or a press on a word that has a dotted line.
+// Every text is the studio's: the description of the drive with the section of its manual, or the standard's clause.
+
+import { ask } from "./link.js";
+import { h } from "./dom.js";
+
+/** Marks an element as something that can be pointed at and asked about; `node` where the answer is the model's. */
+export function pointed(element, topic, name, node = null) {
+  element.dataset.help = topic;
+  element.dataset.name = name;
+  if (node !== null) element.dataset.of = String(node);
+  return element;
+}
+
+/** The same, and it can have the focus. */
+export function helped(element, topic, name, node = null) {
+  if (element.tabIndex < 0) element.setAttribute("tabindex", "0");
+  return pointed(element, topic, name, node);
+}
+
+/** What is told with an element already, and needs no question. */
+const texts = new WeakMap();
+
+/** Marks an element whose meaning the studio has told with it: `{ title, text, source }`. */
+export function told(element, meaning) {
+  texts.set(element, meaning);
+  return pointed(element, "told", meaning.title);
+}
+
+/** A word that tells what it means when it is pressed. */
+export const term = (topic, name, node = null) => helped(h("button", { type: "button", class: "term", title: "What is this? (?)" }, name), topic, name, node);
+
+/** Words with commas between them. */
+export const terms = (topic, names, node) => names.flatMap((name, at) => [...(at ? [", "] : []), term(topic, name, node)]);
+
+export function helpPanel(shared) {
+  const title = h("h3");
+  const body = h("div");
+  const close = h("button", { type: "button", id: "help-close", onclick: () => hide() }, "Close");
+  const root = h("aside", { id: "help", role: "dialog", "aria-label": "What it means", hidden: true }, h("div", { class: "bar" }, title, close), body);
+  let before = null;
+  /** What else is offered: its name, whether it is there now, and what to call. */
+  const offers = [];
+
+  function hide() {
+    if (root.hidden) return;
+    root.hidden = true;
+    if (before?.isConnected) before.focus();
+  }
+
+  function open(heading, ...children) {
+    if (root.hidden) before = document.activeElement;
+    title.textContent = heading;
+    body.replaceChildren(...children);
+    root.hidden = false;
+  }
+
+  async function about(element) {
+    const known = texts.get(element);
+    if (known) return open(known.title, h("p", {}, known.text), ...(known.source ? [h("p", { class: "quiet" }, `Source: ${known.source}`)] : []));
+    const { help, name, of: node } = element.dataset;
+    const answer = await ask({ do: "help", node: node ? Number(node) : shared.node, topic: help, name });
+    if (!answer.ok) return open(name, h("p", {}, answer.error.message));
+    const told = answer.result;
+    const facts = [
+      ["Values", (told.meanings ?? []).map(([value, text]) => `${value}: ${text}`).join("; ")],
+      ["Takes", told.range],
+      ["Unit of one count", told.unit],
+      ["As delivered", told.default],
+      ["Access", told.access],
+    ].filter(([, text]) => text);
+    const list = facts.flatMap(([what, text]) => [h("dt", {}, what), h("dd", {}, text)]);
+    open(told.title, h("p", {}, told.text), ...(list.length ? [h("dl", {}, ...list)] : []), h("p", { class: "quiet" }, `Source: ${told.source}`));
+  }
+
+  /** Without anything that has the focus or the pointer: what can be asked about here. */
+  function overview() {
+    const seen = new Set();
+    const all = [...document.querySelectorAll("#view [data-help]")].filter((element) => {
+      const key = `${element.dataset.help} ${element.dataset.name}`;
+      return element.getClientRects().length && !seen.has(key) && seen.add(key);
+    });
+    const some = all.slice(0, 40).map((element) => h("li", {}, h("button", { type: "button", class: "term", onclick: () => about(element) }, element.dataset.name)));
+    open("What can be asked about here", h("p", {}, "Press ? on a thing that has the focus or the pointer, or press a word."), h("ul", { class: "plain-list" }, ...some), ...offers.filter(([, is_there]) => is_there()).map(([name, , take]) => h("button", { type: "button", class: "offer", onclick: () => (hide(), take()) }, name)));
+  }
+
+  function key() {
+    const focused = document.activeElement?.closest?.("[data-help]");
+    const under = [...document.querySelectorAll("[data-help]:hover")].at(-1);
+    const element = focused ?? under;
+    if (element) about(element);
+    else if (root.hidden) overview();
+    else hide();
+  }
+
+  document.addEventListener("click", (event) => {
+    const pressed = event.target.closest?.("button.term[data-help]");
+    if (pressed) about(pressed);
+  });
+  const offer = (name, is_there, take) => offers.push([name, is_there, take]);
+  return { root, key, hide, offer, overview: () => (root.hidden ? overview() : hide()) };
+}

@@ -1,0 +1,387 @@
+//! Several drives as one motion: to positions together, at speeds together, or as the two wheels of a base.
+//!
+//! The motion is the master's ([`Group`], [`Base`]): set-points in each cycle of SYNC, limited in jerk or acceleration, and a
+//! fault of one drive stops all. Held like any other motion: speeds and twists by a dead man, all of them by the presence of
+//! their page. There is one group at a time, since SYNC is the bus's. It is made for each motion, and its drives have no power
+//! afterwards.
+
+use std::cell::Cell;
+use std::rc::Rc;
+use std::time::Duration;
+
+use can::Instant;
+use canopen::NodeId;
+use cia402::ModeOfOperation;
+use master::Drive;
+use master::base::{Base, BaseError, BaseLimits, Geometry, StopCause, Twist, WheelSetup};
+use master::cyclic::CyclicOptions;
+use master::group::{AxisLimits, AxisSetup, Group, GroupError, Phase, StreamOptions};
+use master::units::Turns;
+
+use super::group_run::{GroupOutcome, GroupRun, Wanted};
+use super::state::{Host, JOG_SPAN};
+use super::transactions::Refusal;
+use super::work::{Asked, Running, say};
+use crate::dead_man::DeadMan;
+use crate::message::{Answer, AxisSpeed, AxisTarget, BaseJog, Deed, GroupMove};
+
+/// From one SYNC to the next: at 500 kbit/s eight drives take half of it.
+const PERIOD: Duration = Duration::from_millis(10);
+
+/// Cycles in a row for which this program may be late, or a drive's TPDO: less than the dead man's time. A desktop is late.
+const TOLERANCE: u32 = 15;
+
+/// Axes of a group: what a bus of 500 kbit/s carries in one period beside what the studio reads.
+const MOST_AXES: usize = 8;
+
+/// How long shafts may take to come to their last set-points.
+const SETTLING: Duration = Duration::from_millis(300);
+
+/// Cycles in a row for which a stream goes on at its last speed: the most that it may be.
+const GRACE: u32 = 10;
+
+/// Points of a path that are sent before the first counts, and kept ready.
+const READY: usize = 2;
+
+impl Host {
+    /// Begins a motion of several drives, or holds one.
+    pub(super) fn take_group(&mut self, deed: Deed, asked: Asked) {
+        match deed {
+            Deed::GroupHold {} => self.hold_group(asked, |_| {}),
+            Deed::BaseTwist { linear_m_s, angular_rad_s } => {
+                self.hold_group(asked, |wanted| wanted.twist = Twist { linear_m_s, angular_rad_s });
+            }
+            Deed::GroupEnd {} => self.hold_group(asked, |wanted| wanted.let_go = true),
+            Deed::GroupMove(asked_for) => {
+                let nodes: Vec<_> = asked_for.axes.iter().map(|axis| axis.node).collect();
+                self.begin_group(&nodes, "moving together", false, asked, move |drives, _| {
+                    Box::pin(move_together(drives, asked_for))
+                });
+            }
+            Deed::GroupJog { axes, rpm_per_s } => {
+                let nodes: Vec<_> = axes.iter().map(|axis| axis.node).collect();
+                self.begin_group(&nodes, "turning together", true, asked, move |drives, wanted| {
+                    Box::pin(turn_together(drives, axes, rpm_per_s, wanted))
+                });
+            }
+            Deed::BaseJog(asked_for) => {
+                self.begin_group(&asked_for.wheels.clone(), "driving", true, asked, move |drives, wanted| {
+                    wanted.set(Wanted { twist: asked_for.twist(), let_go: false });
+                    Box::pin(drive_base(drives, asked_for, wanted))
+                });
+            }
+            // The others are no motions of several drives.
+            _ => {}
+        }
+    }
+
+    fn begin_group(
+        &mut self,
+        nodes: &[NodeId],
+        what: &'static str,
+        held: bool,
+        (seq, answer): Asked,
+        motion: impl FnOnce(Vec<Drive>, Rc<Cell<Wanted>>) -> core::pin::Pin<Box<dyn Future<Output = GroupOutcome>>>,
+    ) {
+        let drives = match self.drives_of(nodes) {
+            Ok(drives) => drives,
+            Err((kind, text)) => return say(answer, Answer::failed(Some(seq), kind, text)),
+        };
+        self.generation += 1;
+        let wanted = Rc::<Cell<Wanted>>::default();
+        let (running, future) =
+            Running::of_group(nodes, self.generation, what, (seq, answer), motion(drives, Rc::clone(&wanted)));
+        for (node, running) in nodes.iter().zip(running) {
+            self.jogs.remove(node);
+            if let Some(before) = self.running.insert(*node, running) {
+                before.cut_short("replaced", "something else was asked of the drive before this was done");
+            }
+        }
+        let held = held.then(|| DeadMan::new(JOG_SPAN, self.network.now()));
+        self.group = Some(GroupRun { generation: self.generation, nodes: nodes.to_vec(), held, wanted });
+        self.work.push(future);
+    }
+
+    /// The drives of a group to be, if all of them can be moved now.
+    fn drives_of(&self, nodes: &[NodeId]) -> Result<Vec<Drive>, Refusal> {
+        if self.group.is_some() {
+            return Err(("busy", "a group is under way: there is one at a time. Stop it first".into()));
+        }
+        if nodes.len() < 2 || nodes.len() > MOST_AXES {
+            return Err(("malformed", format!("expected 2 to {MOST_AXES} drives, not {}", nodes.len())));
+        }
+        let mut drives = Vec::new();
+        for (at, node) in nodes.iter().enumerate() {
+            if nodes[..at].contains(node) {
+                return Err(("malformed", format!("node {node} is named twice")));
+            }
+            if self.parameters.is_writing(*node) {
+                let text = format!("the parameters of node {node} are being written: try again when that is done");
+                return Err(("busy", text));
+            }
+            let drive = self.nodes.get(node).and_then(|known| known.drive.clone()).ok_or_else(|| {
+                let text = format!("no drive is known at node {node}: scan the bus, and see whether it has power");
+                ("no_such_drive", text)
+            })?;
+            drives.push(drive);
+        }
+        Ok(drives)
+    }
+
+    fn hold_group(&mut self, (seq, answer): Asked, change: impl FnOnce(&mut Wanted)) {
+        let now = self.network.now();
+        let held = self.group.as_mut().and_then(|group| {
+            let renewed = group.held.as_mut()?.renew(now);
+            renewed.then_some(group)
+        });
+        let Some(group) = held else {
+            let text = "no group is being held by this page: begin anew";
+            return say(answer, Answer::failed(Some(seq), "not_held", text));
+        };
+        let mut wanted = group.wanted.get();
+        change(&mut wanted);
+        group.wanted.set(wanted);
+        if wanted.let_go {
+            // It comes to rest by itself now, as any motion does that is not held.
+            group.held = None;
+        }
+        say(answer, Answer::done(seq, Vec::new()));
+    }
+
+    /// True of a node that is moved as one with others.
+    pub(super) fn is_in_group(&self, node: NodeId) -> bool {
+        self.group.as_ref().is_some_and(|group| group.nodes.contains(&node))
+    }
+
+    /// The nodes of a group whose dead man has lapsed.
+    pub(super) fn let_go_group(&self, now: Instant) -> Vec<NodeId> {
+        let lapsed = self.group.as_ref().filter(|group| group.held.is_some_and(|held| held.has_lapsed(now)));
+        lapsed.map_or_else(Vec::new, |group| group.nodes.clone())
+    }
+
+    /// The others of the group to which a node belongs: who is stopped with it. The group has ended with that.
+    pub(super) fn leave_group(&mut self, node: NodeId) -> Vec<NodeId> {
+        let Some(group) = self.group.take_if(|group| group.nodes.contains(&node)) else { return Vec::new() };
+        self.network.sync(None);
+        group.nodes.into_iter().filter(|other| *other != node).collect()
+    }
+
+    /// A group has come to its end by itself.
+    pub(super) fn conclude_group(&mut self, generation: u64, outcome: Option<GroupOutcome>) {
+        let Some(group) = self.group.take_if(|group| group.generation == generation) else { return };
+        let mut asked = Vec::new();
+        for node in &group.nodes {
+            if let Some(running) = self.running.remove(node) {
+                asked.push(running);
+            }
+            // Its mapping is that of the group now.
+            self.learn_pdos(*node);
+        }
+        match outcome {
+            Some(Ok(notes)) => {
+                asked.into_iter().for_each(|running| running.tell(|seq| Answer::done(seq, notes.clone())));
+            }
+            Some(Err((kind, text))) => {
+                self.say_news(None, &text);
+                asked.into_iter().for_each(|running| running.tell(|seq| Answer::failed(Some(seq), kind, text.clone())));
+                self.network.sync(None);
+                // What went wrong on the way may have left one turning.
+                let left: Vec<_> = group.nodes.iter().filter(|node| self.network.moved().contains(**node)).collect();
+                left.into_iter().for_each(|node| self.quick_stop_one(*node, "", None));
+            }
+            None => {}
+        }
+    }
+}
+
+/// A group of these drives, each with these limits.
+async fn open(drives: &[Drive], limits: impl Fn(usize) -> AxisLimits) -> Result<Group, GroupError> {
+    let mut axes = Vec::new();
+    for (at, drive) in drives.iter().enumerate() {
+        let mode = AxisSetup::best_mode(drive)?;
+        axes.push(AxisSetup { drive: drive.clone(), mode, limits: limits(at) });
+    }
+    let options = CyclicOptions { tolerance: TOLERANCE, ..CyclicOptions::default() };
+    Group::open(&axes, PERIOD, options).await
+}
+
+/// Closes a group, and tells what became of its motion: the drive that stopped it in its own words.
+async fn close(mut group: Group, moved: Result<Vec<String>, GroupError>) -> GroupOutcome {
+    let reason = match &moved {
+        Err(GroupError::Stopped(_)) => group.explain_stop().await,
+        _ => None,
+    };
+    let closed = group.close().await;
+    let notes = moved.map_err(|error| {
+        let reason = reason.map_or_else(String::new, |reason| format!(". {reason}"));
+        ("group", format!("{error}{reason}"))
+    })?;
+    closed.map_err(refusal)?;
+    Ok(notes)
+}
+
+fn refusal(error: GroupError) -> Refusal {
+    match error {
+        GroupError::Drive(error) => (error.kind(), error.to_string()),
+        error => ("group", error.to_string()),
+    }
+}
+
+/// The limits of an axis: the careful ones, but for what was asked for.
+fn limits(rpm: Option<f64>, rpm_per_s: Option<f64>) -> AxisLimits {
+    let careful = AxisLimits::careful();
+    let acceleration_turns_s2 = rpm_per_s.map_or(careful.acceleration_turns_s2, |rate| rate / 60.0);
+    let rounding_s = careful.acceleration_turns_s2 / careful.jerk_turns_s3;
+    AxisLimits {
+        velocity_turns_s: rpm.map_or(careful.velocity_turns_s, |rpm| rpm / 60.0),
+        acceleration_turns_s2,
+        jerk_turns_s3: acceleration_turns_s2 / rounding_s,
+        ..careful
+    }
+}
+
+async fn move_together(drives: Vec<Drive>, asked: GroupMove) -> GroupOutcome {
+    let GroupMove { axes, relative, rpm, rpm_per_s, within_s } = asked;
+    let within = match within_s.map(Duration::try_from_secs_f64).transpose() {
+        Ok(within) => within,
+        Err(_) => return Err(("malformed", "expected a time above 0 in seconds".into())),
+    };
+    let mut group = open(&drives, |_| limits(rpm, rpm_per_s)).await.map_err(refusal)?;
+    let moved = carry_out(&mut group, &axes, relative, within).await;
+    close(group, moved).await
+}
+
+async fn carry_out(
+    group: &mut Group,
+    axes: &[AxisTarget],
+    relative: bool,
+    within: Option<Duration>,
+) -> Result<Vec<String>, GroupError> {
+    group.enable().await?;
+    let from = group.points().iter().map(|point| if relative { point.position_turns } else { 0.0 });
+    let to: Vec<_> = from.zip(axes).map(|(from, axis)| Turns(from + axis.degrees / 360.0)).collect();
+    let time = group.start_move(&to, within)?;
+    let mut largest_turns = vec![0.0_f64; axes.len()];
+    while group.cycle().await?.phase == Phase::Moving {
+        let errors = group.following_errors().map(Option::unwrap_or_default);
+        largest_turns.iter_mut().zip(errors).for_each(|(largest, error)| *largest = largest.max(error));
+    }
+    group.rest().await?;
+    for _ in 0..SETTLING.as_millis() / PERIOD.as_millis() {
+        group.cycle().await?;
+    }
+    group.rest().await?;
+    let lags = axes.iter().zip(&largest_turns);
+    let lags: Vec<_> = lags.map(|(axis, turns)| format!("node {} {:.1} deg", axis.node, turns * 360.0)).collect();
+    let time = format!("{} drives moved together in {:.3} s", axes.len(), time.as_secs_f64());
+    Ok(vec![format!("{time}; largest lag: {}. They have no power now", lags.join(", "))])
+}
+
+async fn turn_together(
+    drives: Vec<Drive>,
+    axes: Vec<AxisSpeed>,
+    rpm_per_s: Option<f64>,
+    wanted: Rc<Cell<Wanted>>,
+) -> GroupOutcome {
+    if let Some(axis) = axes.iter().find(|axis| !axis.rpm.is_finite()) {
+        return Err(("malformed", format!("expected a finite speed of node {}", axis.node)));
+    }
+    // A drive that is to stand has limits too.
+    let least_rpm = AxisLimits::careful().velocity_turns_s * 60.0;
+    let of_axis = |at: usize| limits(Some(axes[at].rpm.abs().max(least_rpm) * ROOM), rpm_per_s);
+    let mut group = open(&drives, of_axis).await.map_err(refusal)?;
+    let turned = stream_speeds(&mut group, &axes, of_axis(0).acceleration_turns_s2, &wanted).await;
+    close(group, turned).await
+}
+
+/// By how much the limits of a stream are wider than what it is given: its points are rounded.
+const ROOM: f64 = 1.01;
+
+/// Points of shafts that gather speed together, until they are let go. The share of the speeds rises as 3x^2 - 2x^3, whose
+/// steepest slope is 1.5.
+async fn stream_speeds(
+    group: &mut Group,
+    axes: &[AxisSpeed],
+    acceleration_turns_s2: f64,
+    wanted: &Cell<Wanted>,
+) -> Result<Vec<String>, GroupError> {
+    group.enable().await?;
+    let period_s = PERIOD.as_secs_f64();
+    let fastest_turns_s = axes.iter().map(|axis| axis.rpm.abs() / 60.0).fold(0.0, f64::max);
+    let ramp_s = (1.5 * ROOM * fastest_turns_s / acceleration_turns_s2).max(period_s);
+    let mut points: Vec<_> = group.points().iter().map(|point| Turns(point.position_turns)).collect();
+    group.start_stream(StreamOptions { capacity: 8, prefill: READY, grace: GRACE })?;
+    let mut time_s = 0.0;
+    while !wanted.get().let_go {
+        while group.stream().is_some_and(|stream| stream.queued() < READY) {
+            time_s += period_s;
+            let x = (time_s / ramp_s).min(1.0);
+            let share = x * x * (3.0 - 2.0 * x);
+            for (Turns(at), axis) in points.iter_mut().zip(axes) {
+                *at += axis.rpm / 60.0 * share * period_s;
+            }
+            group.push(&points)?;
+        }
+        if group.cycle().await?.cause.is_some() {
+            break;
+        }
+    }
+    group.end_stream();
+    group.rest().await?;
+    Ok(Vec::new())
+}
+
+async fn drive_base(drives: Vec<Drive>, asked: BaseJog, wanted: Rc<Cell<Wanted>>) -> GroupOutcome {
+    let refused = |error: BaseError| match error {
+        BaseError::Drive(error) => (error.kind(), error.to_string()),
+        error => ("group", error.to_string()),
+    };
+    let wheel =
+        |at: usize| WheelSetup { mode: speed_mode(&drives[at]), drive: drives[at].clone(), turns: asked.turns[at] };
+    let geometry = Geometry { wheel_base_m: asked.wheel_base_m, wheel_radius_m: asked.wheel_radius_m };
+    let limits = BaseLimits {
+        linear_m_s: asked.most_m_s,
+        angular_rad_s: 2.0 * asked.most_m_s / asked.wheel_base_m,
+        wheel_m_s: asked.most_m_s,
+        wheel_m_s2: asked.m_per_s2,
+        // Held by the page's dead man; this is for a host that is late.
+        watchdog: JOG_SPAN,
+    };
+    let options = CyclicOptions { tolerance: TOLERANCE, ..CyclicOptions::default() };
+    let base = Base::open([&wheel(0), &wheel(1)], geometry, limits, PERIOD, options).await;
+    let mut base = base.map_err(refused)?;
+    let driven = follow_twists(&mut base, &wanted).await;
+    let reason = match &driven {
+        Err(BaseError::Stopped(_)) => base.explain_stop().await,
+        _ => None,
+    };
+    let pose = base.state().pose;
+    let closed = base.close().await;
+    driven.map_err(|error| {
+        let (kind, text) = refused(error);
+        (kind, reason.map_or(text.clone(), |reason| format!("{text}. {reason}")))
+    })?;
+    closed.map_err(refused)?;
+    let heading = pose.heading_rad.to_degrees();
+    Ok(vec![format!("it came {:.3} m along, {:.3} m to the left and {heading:.1} deg round", pose.x_m, pose.y_m)])
+}
+
+async fn follow_twists(base: &mut Base, wanted: &Cell<Wanted>) -> Result<(), BaseError> {
+    base.enable().await?;
+    while !wanted.get().let_go {
+        base.command(wanted.get().twist)?;
+        if let Some(cause @ StopCause::Wheel { .. }) = base.cycle().await?.cause {
+            // Both wheels come to rest before it is told.
+            base.stop().await?;
+            return Err(BaseError::Stopped(cause));
+        }
+    }
+    base.stop().await
+}
+
+/// Cyclic synchronous velocity where the model has it.
+fn speed_mode(drive: &Drive) -> ModeOfOperation {
+    let csv = ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY;
+    let has = drive.axis_description().is_some_and(|axis| axis.modes.contains(&csv));
+    if has { csv } else { ModeOfOperation::PROFILE_VELOCITY }
+}

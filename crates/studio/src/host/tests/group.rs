@@ -1,0 +1,289 @@
+//! Several virtual drives as one motion: together to their ends, and stopped together by whatever stops one.
+
+use std::time::Duration;
+
+use can::Instant;
+use serde_json::Value;
+use sim::{Place, World};
+
+use super::{ARM, Page, STOPPED_WITHIN, Stage, TICK, WHEEL, node, play, play_acts};
+use crate::message::{Answer, AxisSpeed, AxisTarget, BaseJog, Deed, GroupMove};
+
+fn to(wheel: f64, arm: f64) -> Deed {
+    let axes = vec![AxisTarget { node: WHEEL, degrees: wheel }, AxisTarget { node: ARM, degrees: arm }];
+    Deed::GroupMove(GroupMove { axes, relative: false, rpm: None, rpm_per_s: None, within_s: None })
+}
+
+fn jog(wheel: f64, arm: f64) -> Deed {
+    let axes = vec![AxisSpeed { node: WHEEL, rpm: wheel }, AxisSpeed { node: ARM, rpm: arm }];
+    Deed::GroupJog { axes, rpm_per_s: Some(120.0) }
+}
+
+fn base() -> BaseJog {
+    BaseJog {
+        wheels: [WHEEL, ARM],
+        turns: [1.0, -1.0],
+        wheel_base_m: 0.5,
+        wheel_radius_m: 0.1,
+        most_m_s: 0.5,
+        m_per_s2: 1.0,
+        linear_m_s: 0.2,
+        angular_rad_s: 0.0,
+    }
+}
+
+type Answered = tokio::sync::oneshot::Receiver<Answer>;
+
+impl Page {
+    /// Asks, and does not wait for the answer.
+    fn begin(&mut self, deed: Deed) -> Answered {
+        self.seq += 1;
+        self.session.ask(self.seq, deed).expect("there is room")
+    }
+
+    /// Holds a group with a deed every 100 ms.
+    async fn hold(&mut self, stage: &Stage, deed: &Deed, times: u32) {
+        for _ in 0..times {
+            stage.sleep(100).await;
+            self.must(deed.clone()).await;
+        }
+    }
+}
+
+impl Stage {
+    fn velocity(&self, of: canopen::NodeId) -> f64 {
+        let state = self.state();
+        let nodes = state["nodes"].as_array().expect("nodes");
+        let node = nodes.iter().find(|node| node["node"] == of.raw()).expect("it is there");
+        node["drive"]["velocity_rpm"].as_f64().expect("a speed")
+    }
+
+    fn angle(&self, of: canopen::NodeId) -> f64 {
+        let state = self.state();
+        let nodes = state["nodes"].as_array().expect("nodes");
+        let node = nodes.iter().find(|node| node["node"] == of.raw()).expect("it is there");
+        node["drive"]["angle_degrees"].as_f64().expect("an angle")
+    }
+}
+
+#[test]
+fn drives_move_together_to_their_positions_and_have_no_power_then() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        assert_eq!(page.ask(to(90.0, -45.0)).await.error_kind(), "not_in_control");
+        page.must(Deed::TakeControl {}).await;
+        let mut moved = page.begin(to(180.0, -90.0));
+        // 30 r/min are 180 degrees a second: the wheel takes more than a second, and the arm, with half the way, as long.
+        stage.sleep(800).await;
+        let (wheel, arm) = (stage.velocity(WHEEL), stage.velocity(ARM));
+        assert!(wheel > 5.0 && (wheel / 2.0 + arm).abs() < 4.0, "half as fast: {wheel} and {arm}");
+        let answer = loop {
+            tokio::select! {
+                answer = &mut moved => break answer.expect("answered"),
+                () = stage.network.sleep(Duration::from_millis(500)) => page.must(Deed::Alive {}).await,
+            }
+        };
+        assert!(answer.is_ok() && answer.json().contains("2 drives moved together in"), "{}", answer.json());
+        stage.sleep(300).await;
+        assert!((stage.angle(WHEEL) - 180.0).abs() < 3.0, "{}", stage.angle(WHEEL));
+        assert!((stage.angle(ARM) + 90.0).abs() < 3.0, "{}", stage.angle(ARM));
+        for id in [WHEEL, ARM] {
+            assert_ne!(stage.power_state(id).await, cia402::PowerState::OperationEnabled);
+        }
+        assert_eq!(stage.state()["nodes"][0]["doing"], Value::Null);
+        // And alone again.
+        page.must(Deed::Move { node: WHEEL, degrees: 10.0, relative: true, rpm: None }).await;
+    });
+}
+
+#[test]
+fn what_is_no_group_is_refused() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        let of = |nodes: &[u8]| {
+            let axes = nodes.iter().map(|raw| AxisTarget { node: node(*raw), degrees: 1.0 }).collect();
+            Deed::GroupMove(GroupMove { axes, relative: true, rpm: None, rpm_per_s: None, within_s: None })
+        };
+        for (nodes, kind) in
+            [(&[][..], "malformed"), (&[4], "malformed"), (&[4, 4], "malformed"), (&[4, 9], "no_such_drive")]
+        {
+            assert_eq!(page.ask(of(nodes)).await.error_kind(), kind, "{nodes:?}");
+        }
+        let mut fast = base();
+        fast.wheel_radius_m = 0.0;
+        assert_eq!(page.ask(Deed::BaseJog(fast)).await.error_kind(), "group");
+        assert_eq!(page.ask(Deed::GroupHold {}).await.error_kind(), "not_held");
+        let Deed::GroupMove(mut soon) = to(3600.0, 0.0) else { unreachable!("it is one") };
+        soon.within_s = Some(-1.0);
+        assert_eq!(page.ask(Deed::GroupMove(soon.clone())).await.error_kind(), "malformed");
+        soon.within_s = Some(0.5);
+        let answer = page.ask(Deed::GroupMove(soon)).await;
+        assert!(answer.json().contains("were given: give more time"), "{}", answer.json());
+        page.must(to(5.0, 5.0)).await;
+    });
+}
+
+#[test]
+fn speeds_that_are_held_go_on_together_and_end_by_their_ramps() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        let turned = page.begin(jog(60.0, -30.0));
+        page.hold(stage, &Deed::GroupHold {}, 30).await;
+        let (wheel, arm) = (stage.velocity(WHEEL), stage.velocity(ARM));
+        assert!((wheel - 60.0).abs() < 5.0 && (arm + 30.0).abs() < 3.0, "{wheel} and {arm}");
+        page.must(Deed::GroupEnd {}).await;
+        let answer = turned.await.expect("answered");
+        assert!(answer.is_ok(), "{}", answer.json());
+        assert!(stage.speed(WHEEL).await < 2.0 && stage.speed(ARM).await < 2.0);
+    });
+}
+
+/// The dead man as for one drive: 200 ms, and all axes.
+#[test]
+fn a_group_that_is_not_held_stops_within_200_ms() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        for deed in [jog(60.0, 30.0), Deed::BaseJog(base())] {
+            let begun = page.begin(deed);
+            page.hold(stage, &Deed::GroupHold {}, 30).await;
+            assert!(stage.velocity(WHEEL).abs() > 15.0 && stage.velocity(ARM).abs() > 15.0);
+            let told = stop_of_both(stage, stage.network.now()).await;
+            assert!(told < Duration::from_millis(200) + TICK, "told after {told:?}");
+            assert_eq!(begun.await.expect("answered").error_kind(), "stopped");
+            assert_eq!(page.ask(Deed::GroupHold {}).await.error_kind(), "not_held", "too late");
+        }
+    });
+}
+
+/// Until neither is in Operation enabled, and then at rest.
+async fn stop_of_both(stage: &Stage, from: Instant) -> Duration {
+    let mut told = Duration::ZERO;
+    for id in [WHEEL, ARM] {
+        while stage.power_state(id).await == cia402::PowerState::OperationEnabled {
+            stage.sleep(1).await;
+        }
+        told = stage.network.now() - from;
+    }
+    for id in [WHEEL, ARM] {
+        assert!(stage.rests(id).await < STOPPED_WITHIN, "node {id}");
+    }
+    told
+}
+
+#[test]
+fn a_page_that_goes_and_a_press_of_stop_end_a_group() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        let _begun = page.begin(to(3600.0, 3600.0));
+        stage.sleep(1500).await;
+        assert!(stage.velocity(WHEEL) > 20.0 && stage.velocity(ARM) > 20.0);
+        drop(page);
+        let told = stop_of_both(stage, stage.network.now()).await;
+        assert!(told < Duration::from_millis(200), "{told:?}");
+
+        let (mut page, mut other) = (stage.page().await, stage.page().await);
+        page.must(Deed::TakeControl {}).await;
+        let begun = page.begin(to(-3600.0, -3600.0));
+        stage.sleep(1500).await;
+        assert!(stage.velocity(WHEEL) < -20.0);
+        other.must(Deed::StopAll {}).await;
+        stop_of_both(stage, stage.network.now()).await;
+        assert_eq!(begun.await.expect("answered").error_kind(), "stopped");
+    });
+}
+
+#[test]
+fn who_stops_one_of_a_group_stops_all_of_it() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        for deed in [Deed::QuickStop { node: ARM }, Deed::Disable { node: ARM }] {
+            let begun = page.begin(to(7200.0, 7200.0));
+            stage.sleep(1500).await;
+            assert!(stage.velocity(WHEEL) > 20.0);
+            page.must(deed).await;
+            stop_of_both(stage, stage.network.now()).await;
+            assert!(!begun.await.expect("answered").is_ok());
+        }
+    });
+}
+
+#[test]
+fn a_drive_of_a_group_does_nothing_else_meanwhile() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        let _begun = page.begin(to(7200.0, 7200.0));
+        stage.sleep(1500).await;
+        for deed in [
+            Deed::Enable { node: ARM },
+            Deed::Jog { node: ARM, rpm: 10.0 },
+            Deed::Velocity { node: WHEEL, rpm: 10.0, rpm_per_s: None },
+        ] {
+            assert_eq!(page.ask(deed).await.error_kind(), "busy");
+        }
+        assert_eq!(page.ask(to(1.0, 1.0)).await.error_kind(), "busy", "there is one group at a time");
+        stage.sleep(500).await;
+        assert!(stage.velocity(WHEEL) > 20.0 && stage.velocity(ARM) > 20.0, "it goes on");
+    });
+}
+
+#[test]
+fn a_fault_of_one_stops_the_others_and_says_which() {
+    fn change(world: &mut World, words: &str) {
+        let stimulus = words.parse().expect("a stimulus");
+        world.apply(Place::node(WHEEL.raw()), &stimulus).expect("it is there").expect("it has that");
+    }
+    let begun = std::rc::Rc::new(std::cell::RefCell::new(None::<(Page, Answered)>));
+    play_acts(
+        async |stage| {
+            let mut page = stage.page().await;
+            page.must(Deed::TakeControl {}).await;
+            let answered = page.begin(to(3600.0, 3600.0));
+            stage.sleep(1500).await;
+            *begun.borrow_mut() = Some((page, answered));
+        },
+        |world| change(world, "supply 80"),
+        async |stage| {
+            let (_page, answered) = begun.borrow_mut().take().expect("it was begun");
+            let answer = answered.await.expect("answered");
+            assert_eq!(answer.error_kind(), "group");
+            // ZLAC8030L quick start guide V1.00, chapter 8: 0001h is over-voltage.
+            assert!(
+                answer.json().contains("axis 1, node 4") && answer.json().contains("over-voltage"),
+                "{}",
+                answer.json()
+            );
+            assert!(stage.rests(ARM).await < STOPPED_WITHIN);
+        },
+        |_| {},
+        async |_| {},
+    );
+}
+
+/// On a base the right motor sits the other way round: forward is negative.
+#[test]
+fn a_base_is_driven_by_its_twist() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        let driven = page.begin(Deed::BaseJog(base()));
+        page.hold(stage, &Deed::GroupHold {}, 20).await;
+        // 0.2 m/s on a wheel of 0.1 m: 0.2 / (2 pi 0.1) turns a second.
+        let rpm = 0.2 / (core::f64::consts::TAU * 0.1) * 60.0;
+        let (wheel, arm) = (stage.velocity(WHEEL), stage.velocity(ARM));
+        assert!((wheel - rpm).abs() < 2.0 && (arm + rpm).abs() < 2.0, "{wheel} and {arm}, not {rpm}");
+        page.hold(stage, &Deed::BaseTwist { linear_m_s: 0.0, angular_rad_s: 0.8 }, 20).await;
+        // To the left: the left wheel goes back.
+        let (wheel, arm) = (stage.velocity(WHEEL), stage.velocity(ARM));
+        assert!((wheel + rpm).abs() < 2.0 && (arm + rpm).abs() < 2.0, "{wheel} and {arm}, not {rpm}");
+        page.must(Deed::GroupEnd {}).await;
+        let answer = driven.await.expect("answered");
+        assert!(answer.is_ok() && answer.json().contains("m along"), "{}", answer.json());
+        assert!(stage.speed(WHEEL).await < 2.0);
+    });
+}

@@ -1,0 +1,255 @@
+//! PDOs of virtual drives: what is shown, planned, written, refused half way and undone.
+//!
+//! The ZLAC8030L counts PDOs from 0, in 0.5 ms, and comes with nothing in its TPDOs (quick start guide V1.00, chapters 6 and 9).
+
+use canopen::{Mux, NmtState};
+use serde_json::{Value, json};
+
+use super::{Stage, WHEEL, play};
+use crate::message::{Deed, NewEntry, NewPdo, NmtWish};
+
+const COUNT: Mux = Mux::new(0x1A00, 0);
+const FIRST: Mux = Mux::new(0x1A00, 1);
+const COB_ID: Mux = Mux::new(0x1800, 1);
+
+fn pdo(name: &str, objects: &[(&str, u8)]) -> NewPdo {
+    let entry = |(object, bits): &(&str, u8)| NewEntry { object: (*object).to_owned(), bits: *bits };
+    NewPdo {
+        pdo: name.into(),
+        valid: true,
+        objects: Some(objects.iter().map(entry).collect()),
+        transmission: Some(1),
+        inhibit_ms: None,
+        event_ms: None,
+        id: None,
+    }
+}
+
+fn state_and_position() -> NewPdo {
+    pdo("TPDO1", &[("6041h:00", 16), ("6064h:00", 32)])
+}
+
+fn planned(pdos: Vec<NewPdo>) -> Deed {
+    Deed::PlanPdos { node: WHEEL, pdos, cycle_ms: 10.0, bitrate: None }
+}
+
+fn written(pdos: Vec<NewPdo>) -> Deed {
+    Deed::WritePdos { node: WHEEL, pdos }
+}
+
+impl Stage {
+    /// An object of the wheel, of whatever length.
+    async fn cell(&self, object: Mux) -> u32 {
+        self.network.node(WHEEL).upload(object).await.expect("it answers").raw()
+    }
+}
+
+fn named<'a>(told: &'a Value, name: &str) -> &'a Value {
+    let pdos = told["pdos"].as_array().expect("a list");
+    pdos.iter().find(|pdo| pdo["pdo"] == name).unwrap_or_else(|| panic!("{name} in {told}"))
+}
+
+#[test]
+fn every_pdo_is_told_with_what_keeps_it_away_and_what_may_be_changed() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        stage.sleep(1100).await;
+        let told = page.knows(Deed::Pdos { node: WHEEL }).await;
+        let names: Vec<&str> =
+            told["pdos"].as_array().expect("a list").iter().filter_map(|pdo| pdo["pdo"].as_str()).collect();
+        assert_eq!(names, ["TPDO1", "TPDO2", "TPDO3", "TPDO4", "RPDO1", "RPDO2", "RPDO3", "RPDO4"]);
+        let tpdo = named(&told, "TPDO1");
+        assert_eq!((&tpdo["manual"], &tpdo["id"], &tpdo["valid"]), (&json!("TPDO0"), &json!(0x184), &json!(true)));
+        assert_eq!((&tpdo["when"], &tpdo["silent"]), (&json!("on events"), &json!(["nothing is mapped into it"])));
+        let rpdo = named(&told, "RPDO1");
+        assert_eq!(rpdo["objects"], json!([{ "object": "6040h:00", "name": "controlword", "bits": 16 }]));
+        let silent = json!([
+            "the node is pre-operational, and PDOs are sent and taken in operational only",
+            "nobody was heard sending it"
+        ]);
+        assert_eq!(rpdo["silent"], silent);
+        let takes = &tpdo["takes"];
+        assert_eq!((&takes["objects"], &takes["mapping"], &takes["id"]), (&json!(4), &Value::Null, &Value::Null));
+        assert_eq!((&takes["event"]["step_ms"], &takes["event"]["most_ms"]), (&json!(0.5), &json!(32767.5)));
+        assert_eq!((&told["can_undo"], &told["sync_heard"]), (&json!(false), &json!(false)));
+    });
+}
+
+#[test]
+fn a_change_is_told_before_with_its_writes_and_what_it_does_to_the_bus() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        let told = page.knows(planned(vec![state_and_position()])).await;
+        let steps: Vec<_> =
+            told["steps"].as_array().expect("a list").iter().map(|step| (&step["object"], &step["purpose"])).collect();
+        let expected = [
+            ("1800h:01", "off while it is changed"),
+            ("1A00h:01", "map an object"),
+            ("1A00h:02", "map an object"),
+            ("1A00h:00", "number of mapped objects"),
+            ("1800h:02", "value"),
+            ("1800h:01", "identifier"),
+        ];
+        let expected: Vec<(Value, Value)> = expected.map(|(object, purpose)| (json!(object), json!(purpose))).into();
+        assert_eq!(
+            steps,
+            expected.iter().map(|(object, purpose)| (object, purpose)).collect::<Vec<_>>(),
+            "CiA 301, 7.5.2.38"
+        );
+        let tpdo = named(&told, "TPDO1");
+        assert_eq!((&tpdo["bits"], &tpdo["when"]), (&json!(48), &json!("after every SYNC")));
+        // The longest frame of 6 bytes has 55 + 10 * 6 bits (Davis et al., equation 1): 115 of 5000 in 10 ms at 500 kbit/s.
+        let load = |when: &str| told["bus"]["cycle_load_percent"][when].as_f64().expect("a number");
+        assert!((load("after") - load("before") - 2.3).abs() < 0.02, "{}", told["bus"]);
+        let frames = told["bus"]["frames"].as_array().expect("a list");
+        let of =
+            |name: &str| frames.iter().find(|frame| frame["frame"] == name && frame["node"] == 4).expect("it is there");
+        assert_eq!((&of("TPDO1")["before"], &of("TPDO1")["after"]["bytes"]), (&Value::Null, &json!(6)));
+        assert!(of("TPDO1")["after"]["worst_ms"].as_f64().expect("a bound") > 0.0);
+        // What is less urgent waits for it too: each of its frames has the bus first.
+        let answer = frames.iter().find(|frame| frame["frame"] == "SDO answer").expect("it is there");
+        let worst = |when: &str| answer[when]["worst_ms"].as_f64().expect("a bound");
+        assert!(worst("after") > worst("before"), "{answer}");
+        assert_eq!(stage.cell(COUNT).await, 0, "nothing was written");
+    });
+}
+
+#[test]
+fn a_mapping_is_written_seen_in_the_trace_by_name_and_undone() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        assert_eq!(page.refused(written(vec![state_and_position()])).await.0, "not_in_control");
+        page.must(Deed::TakeControl {}).await;
+        page.knows(written(vec![state_and_position()])).await;
+        assert_eq!((stage.cell(COUNT).await, stage.cell(FIRST).await), (2, 0x6041_0010));
+        assert_eq!(stage.cell(COB_ID).await & 0xBFFF_FFFF, 0x184);
+        page.must(Deed::Nmt { node: WHEEL, command: NmtWish::Start }).await;
+        stage.sleep(600).await;
+        assert_eq!(stage.network.facts(WHEEL).probable_state(devices::model("zlac8030l")), Some(NmtState::Operational));
+        stage.network.transmit(can::Frame::new(canopen::connection_set::SYNC, &[]));
+        stage.sleep(300).await;
+        let lines = stage.lines(json!({ "kind": "pdo", "text": "position_actual_value" }));
+        let text = lines.last().and_then(|line| line["text"].as_str()).unwrap_or_default();
+        assert!(text.contains("TPDO1") && text.contains("statusword"), "{lines:?}");
+        let told = page.knows(Deed::Pdos { node: WHEEL }).await;
+        assert_eq!((&told["can_undo"], &named(&told, "TPDO1")["silent"]), (&json!(true), &json!([])));
+        assert_eq!(stage.state()["nodes"][1]["mapped"], 1);
+        page.knows(Deed::RollBack { node: WHEEL }).await;
+        assert_eq!((stage.cell(COUNT).await, stage.cell(FIRST).await), (0, 0));
+        assert_eq!(page.knows(Deed::Pdos { node: WHEEL }).await["can_undo"], false);
+    });
+}
+
+#[test]
+fn a_write_that_is_refused_half_way_leaves_every_pdo_as_it_was() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        let before = page.knows(Deed::Pdos { node: WHEEL }).await["pdos"].clone();
+        // Entries longer than their object are taken by this drive; that a shorter one is not, it alone says.
+        let half = pdo("TPDO2", &[("6064h:00", 16)]);
+        let (kind, text) = page.refused(written(vec![state_and_position(), half])).await;
+        assert!(kind == "rolled_back" && text.contains("1A01h:01"), "{kind}: {text}");
+        assert_eq!(page.knows(Deed::Pdos { node: WHEEL }).await["pdos"], before);
+        assert_eq!(stage.cell(COUNT).await, 0);
+        assert_eq!(stage.state()["nodes"][1]["mapped"], 0);
+    });
+}
+
+#[test]
+fn what_a_pdo_cannot_be_is_refused_with_the_reason_and_writes_nothing() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        let id = |id| NewPdo { id: Some(id), ..state_and_position() };
+        let cases = [
+            (pdo("TPDO9", &[]), "unfit_pdo", "has no TPDO9; it has TPDO1"),
+            (pdo("PDO1", &[]), "malformed", "expected tpdo1"),
+            (pdo("TPDO1", &[("6041", 16), ("6064", 32), ("606C", 32)]), "unfit_pdo", "80 bits"),
+            (pdo("TPDO1", &[("1017", 16)]), "unfit_pdo", "does not let it be mapped"),
+            (pdo("TPDO1", &[("5FFF", 16)]), "unknown_object", "not in the description"),
+            (pdo("RPDO1", &[("6041", 16)]), "unfit_pdo", "only be read"),
+            (id(0x601), "bad_value", "another service"),
+            (id(0x801), "bad_value", "11 bits"),
+            (NewPdo { event_ms: Some(-1.0), ..state_and_position() }, "bad_value", "0 or more"),
+            (NewPdo { event_ms: Some(40_000.0), ..state_and_position() }, "unfit_pdo", "32.7675s"),
+        ];
+        for (new, kind, words) in cases {
+            let (found, text) = page.refused(written(vec![new.clone()])).await;
+            assert!(found == kind && text.contains(words), "{new:?}: {found}: {text}");
+        }
+        for (pdos, cycle_ms, bitrate, words) in [
+            (vec![], 10.0, None, "1 to 64"),
+            (vec![state_and_position(), state_and_position()], 10.0, None, "named twice"),
+            (vec![state_and_position()], 0.0, None, "0.25 to 60000"),
+            (vec![state_and_position()], f64::NAN, None, "0.25 to 60000"),
+            (vec![state_and_position()], 10.0, Some(0), "bit rate"),
+        ] {
+            let (kind, text) = page.refused(Deed::PlanPdos { node: WHEEL, pdos, cycle_ms, bitrate }).await;
+            assert!(kind == "malformed" && text.contains(words), "{kind}: {text}");
+        }
+        page.must(Deed::Enable { node: WHEEL }).await;
+        assert_eq!(page.refused(written(vec![state_and_position()])).await.0, "at_work");
+        page.must(Deed::Disable { node: WHEEL }).await;
+        assert_eq!(stage.cell(COUNT).await, 0);
+    });
+}
+
+/// As many bits in half of the time are twice the load, and at twice the bit rate half of it.
+#[test]
+fn the_load_is_told_for_the_cycle_and_the_bit_rate_that_were_asked_for() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        let mut load = async |cycle_ms, bitrate| {
+            let pdos = vec![state_and_position()];
+            let told = page.knows(Deed::PlanPdos { node: WHEEL, pdos, cycle_ms, bitrate }).await["bus"].clone();
+            told["cycle_load_percent"]["after"].as_f64().expect("a number")
+        };
+        let (usual, twice, half) = (load(10.0, None).await, load(5.0, None).await, load(10.0, Some(1_000_000)).await);
+        // Nothing is here but the cycle: no heartbeat as delivered (1017h is 0). Told to the hundredth.
+        assert!((twice - 2.0 * usual).abs() < 0.02 && (half - usual / 2.0).abs() < 0.02, "{usual} {twice} {half}");
+    });
+}
+
+#[test]
+fn a_node_goes_to_operational_and_back_and_not_while_it_turns() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        let nmt = |command| Deed::Nmt { node: WHEEL, command };
+        assert_eq!(page.refused(nmt(NmtWish::Start)).await.0, "not_in_control");
+        page.must(Deed::TakeControl {}).await;
+        let is = async || {
+            stage.sleep(100).await;
+            stage.network.facts(WHEEL).probable_state(devices::model("zlac8030l"))
+        };
+        page.must(nmt(NmtWish::Start)).await;
+        assert_eq!(is().await, Some(NmtState::Operational));
+        page.must(Deed::Velocity { node: WHEEL, rpm: 30.0, rpm_per_s: None }).await;
+        assert_eq!(page.refused(nmt(NmtWish::PreOperational)).await.0, "busy");
+        page.must(Deed::Disable { node: WHEEL }).await;
+        page.must(nmt(NmtWish::PreOperational)).await;
+        assert_eq!(is().await, Some(NmtState::PreOperational));
+        let nobody = Deed::Nmt { node: super::node(9), command: NmtWish::Start };
+        assert_eq!(page.refused(nobody).await.0, "no_such_drive");
+        assert_eq!(page.refused(Deed::Pdos { node: super::node(9) }).await.0, "no_such_drive");
+    });
+}
+
+#[test]
+fn a_pdo_is_switched_off_and_what_is_not_said_stays() {
+    play(async |stage| {
+        let mut page = stage.page().await;
+        page.must(Deed::TakeControl {}).await;
+        page.knows(written(vec![NewPdo { event_ms: Some(250.0), ..state_and_position() }])).await;
+        // The event timer counts 0.5 ms (6.1).
+        assert_eq!(stage.cell(Mux::new(0x1800, 5)).await, 500);
+        let off = NewPdo { valid: false, objects: None, transmission: None, ..state_and_position() };
+        page.knows(written(vec![off])).await;
+        assert_eq!(stage.cell(COB_ID).await & 0xBFFF_FFFF, 0x8000_0184);
+        assert_eq!((stage.cell(COUNT).await, stage.cell(Mux::new(0x1800, 2)).await), (2, 1));
+        let moved = NewPdo { id: Some(0x1A4), objects: None, transmission: None, ..state_and_position() };
+        page.knows(written(vec![moved])).await;
+        assert_eq!(stage.cell(COB_ID).await & 0xBFFF_FFFF, 0x1A4);
+        stage.sleep(200).await;
+    });
+}

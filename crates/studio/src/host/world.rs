@@ -1,0 +1,86 @@
+//! The World view: what the outer world does to virtual drives, what was done and what takes it back, and how everything truly is.
+
+use can::Instant;
+use canopen::NodeId;
+use serde_json::{Value, json};
+
+use super::state::Host;
+use super::work::{Asked, Done, say};
+use crate::message::Answer;
+use crate::world::{Changed, NoAnswer};
+
+/// Longest line: many times the longest that makes sense.
+const LONGEST_LINE: usize = 400;
+
+impl Host {
+    /// What may be done.
+    pub(super) fn tell_world_forms(&mut self, asked: Asked) {
+        let Some(world) = &self.setting.world else {
+            let (seq, answer) = asked;
+            return say(answer, Answer::known(seq, json!({ "is_virtual": false, "forms": [] })));
+        };
+        let forms = world.forms();
+        self.work.push(Box::pin(async move {
+            let forms = forms.await.map(|forms| json!({ "is_virtual": true, "forms": forms }));
+            Done::LookedAround(asked, forms)
+        }));
+    }
+
+    /// How everything truly is, and what was done after the change of this number.
+    pub(super) fn look_around(&mut self, after: Option<u64>, asked: Asked) {
+        let Some(world) = &self.setting.world else { return no_world(asked) };
+        let looked = world.look();
+        let changes: Value = self.changes.after(after).map(|change| json!(change)).collect();
+        self.work.push(Box::pin(async move {
+            let seen = looked.await.map(|mut seen| {
+                seen["changes"] = changes;
+                seen
+            });
+            Done::LookedAround(asked, seen)
+        }));
+    }
+
+    /// Does what a line says.
+    pub(super) fn change_world(&mut self, line: String, asked: Asked) {
+        let Some(world) = &self.setting.world else { return no_world(asked) };
+        if line.len() > LONGEST_LINE {
+            let (seq, answer) = asked;
+            let text = format!("the line is longer than {LONGEST_LINE} bytes; expected a command such as 4 supply 30");
+            return say(answer, Answer::failed(Some(seq), "usage", text));
+        }
+        let done = world.change(line);
+        self.work.push(Box::pin(async move { Done::WorldChanged(asked, done.await) }));
+    }
+
+    pub(super) fn conclude_change(
+        &mut self,
+        (seq, answer): Asked,
+        done: Result<Result<Changed, (&'static str, String)>, NoAnswer>,
+    ) {
+        let changed = match done {
+            Ok(Ok(changed)) => changed,
+            Ok(Err((kind, why))) => return say(answer, Answer::failed(Some(seq), kind, why)),
+            Err(NoAnswer) => return say(answer, busy(seq)),
+        };
+        let time_s = (self.network.now() - Instant::ZERO).as_secs_f64();
+        self.say_news(changed.node.and_then(NodeId::new), &format!("world: {}", changed.line));
+        let notes = changed.note.iter().cloned().collect();
+        self.changes.add(time_s, changed);
+        say(answer, Answer::done(seq, notes));
+    }
+}
+
+/// What was seen, for whoever asked.
+pub(super) fn conclude_looking_around((seq, answer): Asked, seen: Result<Value, NoAnswer>) {
+    say(answer, seen.map_or_else(|NoAnswer| busy(seq), |seen| Answer::known(seq, seen)));
+}
+
+fn no_world((seq, answer): Asked) {
+    let text =
+        "the world around these drives is the real one, or another program's: `ferrodrive world` speaks to a simulator";
+    say(answer, Answer::failed(Some(seq), "no_world", text));
+}
+
+fn busy(seq: u64) -> Answer {
+    Answer::failed(Some(seq), "busy", "the world is busy, or there is none any more: try again")
+}

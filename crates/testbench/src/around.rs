@@ -1,0 +1,70 @@
+//! A world as one looks at it and changes it while time passes by itself: in the words of the world commands, without those
+//! that move time.
+
+use serde_json::{Value, json};
+use sim::World;
+use sim::command::{Command, CommandError, Service, perform};
+use sim::stimulus::{FORMS, GET, GET_BODY, RUN};
+
+/// Every form of a line that changes something.
+pub fn forms() -> Vec<&'static str> {
+    let left_out = [RUN, GET, GET_BODY, "now", "help", "quit"];
+    FORMS.iter().copied().filter(|form| !left_out.contains(form)).collect()
+}
+
+/// The answers of all drives to `get` in `nodes`, each with its `place`: the number under which it was added, as a word of a line.
+/// In `bodies` the names of the machines that several of them move, in `t` the time in s.
+pub fn look(world: &mut World) -> Value {
+    let places: Vec<String> = world.drive_numbers().map(|number| number.to_string()).collect();
+    let nodes: Vec<Value> = places
+        .into_iter()
+        .filter_map(|place| {
+            let get = format!("{place} get").parse::<Command>().ok()?;
+            let mut got = value(&perform(world, &get, Service::default()).ok()?);
+            got["place"] = place.into();
+            Some(got)
+        })
+        .collect();
+    let bodies: Vec<&str> = world.body_names().collect();
+    json!({ "t": world.now().as_nanos() as f64 / 1e9, "nodes": nodes, "bodies": bodies })
+}
+
+/// What a line has done.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Changed {
+    /// The node that it is about.
+    pub node: Option<u8>,
+    /// The line as it was understood.
+    pub line: String,
+    /// What takes it back, where that does not depend on what was before.
+    pub back: Option<String>,
+    /// What will come of it, where a person may not expect it.
+    pub note: Option<String>,
+}
+
+/// Does what a line says.
+///
+/// # Errors
+/// Why not, in a word that programs may rely on, and in words; nothing is changed then.
+pub fn change(world: &mut World, line: &str) -> Result<Changed, (&'static str, String)> {
+    let failed = |error: CommandError| (error.kind(), error.to_string());
+    let command: Command = line.parse().map_err(failed)?;
+    let (node, line, back) = match &command {
+        Command::Apply(place, stimulus) => {
+            let back = stimulus.way_back().map(|back| format!("{place} {back}"));
+            (Some(place.node), format!("{place} {stimulus}"), back)
+        }
+        Command::Disturb(fault) => (None, fault.to_string(), fault.way_back().map(|back| back.to_string())),
+        Command::ApplyToBody(name, stimulus) => (None, format!("body {name} {stimulus}"), None),
+        Command::Now | Command::Help | Command::Quit | Command::Run(_) | Command::Get(_) | Command::GetBody(_) => {
+            return Err(("usage", "that changes nothing of the world: time passes by itself here".to_owned()));
+        }
+    };
+    let told = value(&perform(world, &command, Service::default()).map_err(failed)?);
+    Ok(Changed { node, line, back, note: told["note"].as_str().map(str::to_owned) })
+}
+
+/// A line that a world answered with.
+fn value(line: &str) -> Value {
+    serde_json::from_str(line).unwrap_or_default()
+}
