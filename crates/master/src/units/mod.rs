@@ -164,7 +164,7 @@ const CURRENT: &str = "a current such as 1.5A or 1500mA";
 const RAMP: &str = "a ramp such as 500ms, 0.5s, 120rpm/s or 12.6rad/s2";
 const NO_SIGN: &str = "a ramp has no sign";
 const NO_RATE: &str = "at a rate of zero no speed is ever reached; without a ramp it is 0ms";
-const TIME: &str = "a time such as 500ms or 2s";
+const TIME: &str = "a time such as 500ms, 2s, 5min or 1h";
 
 impl FromStr for Rpm {
     type Err = ParseUnitError;
@@ -241,10 +241,12 @@ impl FromStr for Ramp {
 pub fn parse_duration(text: &str) -> Result<Duration, ParseUnitError> {
     let (number, unit) = split(text, TIME)?;
     let seconds = match unit {
+        "ns" => number * 1e-9,
         "us" | "µs" => number * 1e-6,
         "ms" => number * 1e-3,
         "s" => number,
         "min" => number * 60.0,
+        "h" => number * 3600.0,
         "" => return Err(ParseUnitError::NoUnit { text: text.to_owned(), expected: TIME }),
         _ => return Err(wrong_unit(text, unit, TIME)),
     };
@@ -380,6 +382,18 @@ mod tests {
         assert_eq!("0.5s".parse(), Ok(Ramp::Time(Duration::from_millis(500))));
         assert_eq!("120rpm/s".parse(), Ok(Ramp::RpmPerSecond(120.0)));
         assert!("-120rpm/s".parse::<Ramp>().is_err());
+    }
+
+    #[test]
+    fn times_have_their_unit() {
+        for (text, ns) in [("7ns", 7), ("7us", 7_000), ("7 µs", 7_000), ("7ms", 7_000_000), ("7s", 7_000_000_000)] {
+            assert_eq!(parse_duration(text), Ok(Duration::from_nanos(ns)), "{text}");
+        }
+        assert_eq!(parse_duration("1.5min"), Ok(Duration::from_secs(90)));
+        assert_eq!(parse_duration("2h"), Ok(Duration::from_secs(7200)));
+        for wrong in ["2", "-1s", "9000h", "2d", "h"] {
+            assert!(parse_duration(wrong).is_err(), "{wrong}");
+        }
     }
 
     #[test]

@@ -22,7 +22,7 @@ pub enum Run {
 const LONGEST_S: f64 = 366.0 * 86_400.0;
 
 /// Units and their seconds, the longer names first: `min` ends with no other's name, `ms` with that of `s`.
-const UNITS: [(&str, f64); 5] = [("ns", 1e-9), ("us", 1e-6), ("ms", 1e-3), ("min", 60.0), ("s", 1.0)];
+const UNITS: [(&str, f64); 6] = [("ns", 1e-9), ("us", 1e-6), ("ms", 1e-3), ("min", 60.0), ("s", 1.0), ("h", 3600.0)];
 
 impl Run {
     /// The words after `run`.

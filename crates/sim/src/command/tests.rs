@@ -63,6 +63,7 @@ fn understands_times_of_every_unit() {
         ("run 20 ms", Run::For(ms(20))),
         ("run 2.5s", Run::For(ms(2500))),
         ("run 1min", Run::For(ms(60_000))),
+        ("run 2h", Run::For(Duration::from_secs(7200))),
         ("run 100us", Run::For(Duration::from_micros(100))),
         ("run 1ns", Run::For(Duration::from_nanos(1))),
         ("run 0s", Run::For(Duration::ZERO)),
@@ -81,7 +82,7 @@ fn understands_times_of_every_unit() {
         "run 1e9s",
         "run ms",
         "run until dawn",
-        "run 1 h",
+        "run 1 d",
     ] {
         let error = line.parse::<Command>().expect_err(line).to_string();
         assert!(error.contains("run 20ms"), "{line}: {error}");

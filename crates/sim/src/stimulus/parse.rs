@@ -58,7 +58,7 @@ const CLOCK: &str = "NODE clock HZ";
 const CABLE: &str = "NODE cable cut|join";
 const SET: &str = "NODE set OBJECT VALUE";
 /// The form of the line that moves time.
-pub const RUN: &str = "run 20ms, or run until 2.5s (ns, us, ms, s, min)";
+pub const RUN: &str = "run 20ms, or run until 2.5s (ns, us, ms, s, min, h)";
 /// The form of the question that every node answers.
 pub const GET: &str = "NODE get";
 

@@ -280,7 +280,8 @@ mod tests {
         assert!(refusal("pdos = { pdo1 = 'off' }").contains("'pdo1' is no PDO"));
         assert!(refusal("pdos = { tpdo1 = 'on' }").contains("expected \"off\", or a table"));
         assert!(refusal("heartbeat = 200").contains("expected a time as text"));
-        assert!(refusal("heartbeat = '2h'").contains("expected"));
+        assert!(refusal("heartbeat = '2d'").contains("expected"));
+        assert!(refusal("heartbeat = '2h'").contains("up to 65535"));
         assert!(refusal("limits = { position = [5, 1] }").contains("is not below the upper"));
         assert!(refusal("limits = { pace = 5 }").contains("has no 'pace'"));
         assert!(refusal("start_up = { 1017 = 5 }\nheartbeat = '5ms'").contains("1017h:00 gets a value twice"));

@@ -62,6 +62,7 @@ const UNITS: &[(Dimension, f64, &[&str])] = &[
     (Time, 1e-3, &["ms"]),
     (Time, 1e-6, &["us", "µs"]),
     (Time, 60.0, &["min"]),
+    (Time, 3600.0, &["h"]),
     (Temperature, 1.0, &["°C", "degC", "C"]),
     (Power, 1.0, &["W"]),
     (Resistance, 1.0, &["ohm", "Ω", "Ohm"]),
