@@ -8,6 +8,7 @@ import { heard, heardChooser } from "./heard.js";
 import { QUANTITIES, everything, markers, newest_s, series } from "./kept.js";
 import { frame, overFrequency, overTime } from "./scope_picture.js";
 import { crossing, spectrum, stepResponse } from "./analysis.js";
+import { edge } from "./scope_edge.js";
 import { SvgPen } from "./svg_pen.js";
 import { trigger } from "./scope_trigger.js";
 
@@ -50,6 +51,7 @@ export function scopeView(shared) {
   let extent = null;
   /** What the picture on the canvas depends on. */
   let picture = null;
+  const liveEdge = edge();
   const hidden = new Set(["supply_v"]);
   const beside = new Set();
 
@@ -69,7 +71,7 @@ export function scopeView(shared) {
   const nodes = () => [shared.node, ...[...beside].filter((node) => node !== shared.node)].filter((node) => node !== null);
 
   /** Keeps the picture as it is, or as it was when it ended at a time; `byTrigger` until that comes again. */
-  function freeze(end_s = newest_s(shared.node), byTrigger = false) {
+  function freeze(end_s = end(), byTrigger = false) {
     const copies = new Map(all().map(([node, field, one]) => [`${node} ${field}`, one.cut(one.first_s(), end_s + Number(seconds.value))]));
     frozen = { copies, end_s, span_s: Number(seconds.value), marks: [...markers], byTrigger };
     pause.setAttribute("aria-pressed", "true");
@@ -93,12 +95,16 @@ export function scopeView(shared) {
   /** What the trigger looks at: a value of the chosen drive, or an object that was added. */
   const live = (field) => heard().find((one) => one.field === field)?.series ?? series(shared.node, field);
 
+  /** When the newest of what may be drawn was read, and where the picture that runs ends. */
+  const newest = () => Math.max(newest_s(shared.node), ...heard().map((one) => one.series.last_s()));
+  const end = () => liveEdge(newest(), performance.now() / 1e3);
+
   /** Every series of the drives that are drawn, and of the objects that were added: `[node, field, series]`. */
   const all = () => [...everything(nodes()), ...heard().map((one) => [one.node, one.field, one.series])];
 
   /** What is drawn now. */
   function content() {
-    const end_s = frozen ? frozen.end_s : newest_s(shared.node);
+    const end_s = frozen ? frozen.end_s : end();
     const from_s = end_s - (frozen ? frozen.span_s : Number(seconds.value));
     const drawn = QUANTITIES.filter(({ field }) => !hidden.has(field))
       .map((quantity) => ({

@@ -28,36 +28,70 @@ const decimalsOf = (size) => (size < 1 ? Math.min(6, Math.ceil(-Math.log10(size)
 /** Where the panes lie: the same for the picture and for a pointer over it. */
 export const frame = (width) => ({ left: LEFT, right: width - RIGHT });
 
-/** One line: as it is where samples are few; where many share a pixel, from the least to the greatest of them. */
-function line(pen, xs, ys, from, to, x, y, pixels) {
-  pen.beginPath();
-  const points = to - from;
-  if (points <= 2 * pixels) {
+/**
+ * What is drawn of a line, in pixels across and values: each sample where they are few; where many share a pixel, from the least to the
+ * greatest of them and to the last. With it the least and the most of all.
+ */
+function thinned({ xs, ys, from, to }, x, pixels) {
+  const [across, values] = [[], []];
+  let [least, most] = [Infinity, -Infinity];
+  const put = (column, value) => {
+    across.push(column);
+    values.push(value);
+  };
+  if (to - from <= 2 * pixels) {
     for (let at = from; at < to; at += 1) {
-      if (at === from) pen.moveTo(x(xs[at]), y(ys[at]));
-      else pen.lineTo(x(xs[at]), y(ys[at]));
-    }
-  } else {
-    let column = Math.round(x(xs[from]));
-    let [low, high, last] = [ys[from], ys[from], ys[from]];
-    const drawn = () => {
-      pen.lineTo(column, y(low));
-      if (high !== low) pen.lineTo(column, y(high));
-      if (last !== high) pen.lineTo(column, y(last));
-    };
-    pen.moveTo(column, y(low));
-    for (let at = from + 1; at < to; at += 1) {
-      const next = Math.round(x(xs[at]));
       const value = ys[at];
-      if (next !== column) {
-        drawn();
-        column = next;
-        low = high = value;
-      } else if (value < low) low = value;
-      else if (value > high) high = value;
-      last = value;
+      if (value < least) least = value;
+      if (value > most) most = value;
+      put(x(xs[at]), value);
     }
-    drawn();
+    return { across, values, least, most };
+  }
+  // The way of `x`, without a call for each sample: of a minute there are many.
+  const first = xs[from];
+  const begin = x(first) + 0.5;
+  const per = (x(xs[to - 1]) + 0.5 - begin) / (xs[to - 1] - first);
+  let column = Math.floor(begin);
+  let low = ys[from];
+  let [high, last] = [low, low];
+  // A line that stays level is put down where it ends: at this column, once it does.
+  let [level, reached] = [NaN, null];
+  const leave = () => {
+    if (low < least) least = low;
+    if (high > most) most = high;
+    if (low === high && high === level) {
+      reached = column;
+      return;
+    }
+    if (reached !== null) put(reached, level);
+    reached = null;
+    if (high !== low) put(column, last === low ? high : low);
+    put(column, last === low ? low : high);
+    if (last !== low && last !== high) put(column, last);
+    level = last;
+  };
+  for (let at = from + 1; at < to; at += 1) {
+    const next = Math.floor(begin + (xs[at] - first) * per);
+    const value = ys[at];
+    if (next !== column) {
+      leave();
+      column = next;
+      low = high = value;
+    } else if (value < low) low = value;
+    else if (value > high) high = value;
+    last = value;
+  }
+  leave();
+  if (reached !== null) put(reached, level);
+  return { across, values, least, most };
+}
+
+function line(pen, { across, values }, y) {
+  pen.beginPath();
+  for (let at = 0; at < across.length; at += 1) {
+    if (at === 0) pen.moveTo(across[at], y(values[at]));
+    else pen.lineTo(across[at], y(values[at]));
   }
   pen.stroke();
 }
@@ -65,14 +99,9 @@ function line(pen, xs, ys, from, to, x, y, pixels) {
 /** A pane with its scale, and its lines: `{ name, xs, ys, from, to }` each. */
 function pane(pen, colours, { label, unit, decimals, level, tellsNewest = true }, lines, area, x) {
   const { left, right, top, bottom } = area;
-  let [least, most] = [Infinity, -Infinity];
-  for (const { ys, from, to } of lines) {
-    for (let at = from; at < to; at += 1) {
-      const value = ys[at];
-      if (value < least) least = value;
-      if (value > most) most = value;
-    }
-  }
+  const drawn = lines.map((one) => thinned(one, x, right - left));
+  let least = Math.min(...drawn.map((one) => one.least));
+  let most = Math.max(...drawn.map((one) => one.most));
   if (least > most) [least, most] = [0, 0];
   const [low, high] = bounds(least, most);
   const y = (value) => bottom - ((value - low) / (high - low)) * (bottom - top - TITLE);
@@ -95,11 +124,12 @@ function pane(pen, colours, { label, unit, decimals, level, tellsNewest = true }
   pen.beginPath();
   pen.rect(left, top, right - left, bottom - top);
   pen.clip();
-  lines.forEach(({ xs, ys, from, to }, which) => {
+  drawn.forEach((one, which) => {
     pen.strokeStyle = colours.lines[which % colours.lines.length];
-    pen.lineWidth = 1.6;
+    // A line of one pixel or less takes a processor without a graphics unit a third of the time of a wider one.
+    pen.lineWidth = one.across.length > right - left ? 1 : 1.6;
     pen.setLineDash(PATTERNS[which % PATTERNS.length]);
-    line(pen, xs, ys, from, to, x, y, right - left);
+    line(pen, one, y);
   });
   pen.setLineDash([4, 4]);
   if (level !== undefined && level >= low && level <= high) {

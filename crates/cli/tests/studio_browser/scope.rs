@@ -96,3 +96,46 @@ async fn the_scope_draws_any_object_that_passes() {
     stage.shoot("scope_triggered").await;
     stage.close().await;
 }
+
+/// Ten readings a second that come with 0 and 40 ms of delay in turn, and a picture 60 times a second.
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn the_edge_of_the_scope_moves_evenly_and_stands_where_the_bus_does() {
+    let stage = Stage::open("scope_edge").await;
+    let moved = stage.client.execute_async(
+        r"const done = arguments[arguments.length - 1];
+        import('/page/scope_edge.js').then(({ edge }) => {
+            const at = edge();
+            const [steps, behind] = [[], []];
+            let last;
+            for (let picture = 0; picture < 1200; picture += 1) {
+                const now_s = picture / 60;
+                let reading = Math.floor(now_s * 10 + 1e-9);
+                if (reading % 2 === 1 && now_s < reading / 10 + 0.04) reading -= 1;
+                // The bus has a clock of its own.
+                const end_s = at(1000 + reading / 10, now_s);
+                if (picture > 600) {
+                    steps.push(end_s - last);
+                    behind.push(end_s - 1000 - now_s);
+                }
+                last = end_s;
+            }
+            const stood = at(1000 + 199 / 10, 60);
+            const anew = at(0.1, 61);
+            done({ steps: [Math.min(...steps), Math.max(...steps)], behind: [Math.min(...behind), Math.max(...behind)], stood, anew });
+        });",
+        Vec::new(),
+    );
+    let moved = moved.await.expect("it computes");
+    let bounds = |what: &str| (moved[what][0].as_f64().expect("a number"), moved[what][1].as_f64().expect("a number"));
+    // A tenth of what the delays differ by is the most that a step differs from 1/60 s; the pictures themselves tell times in 1/60 s.
+    let (least, most) = bounds("steps");
+    let jitter_s = 0.1 * (0.04 + 1.0 / 60.0);
+    assert!(least > 1.0 / 60.0 - jitter_s && most < 1.0 / 60.0 + jitter_s, "{moved}");
+    // Between the earliest and the latest reading.
+    let (least, most) = bounds("behind");
+    assert!(least > -0.04 - 1.0 / 60.0 && most < 1e-3, "{moved}");
+    assert!((moved["stood"].as_f64().expect("a number") - 1020.4).abs() < 1e-9, "{moved}");
+    assert!((moved["anew"].as_f64().expect("a number") - 0.1).abs() < 1e-9, "{moved}");
+    stage.close().await;
+}

@@ -27,6 +27,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("motion.js", SCRIPT, include_str!("../../page/motion.js")),
     ("scope.js", SCRIPT, include_str!("../../page/scope.js")),
     ("scope_picture.js", SCRIPT, include_str!("../../page/scope_picture.js")),
+    ("scope_edge.js", SCRIPT, include_str!("../../page/scope_edge.js")),
     ("scope_trigger.js", SCRIPT, include_str!("../../page/scope_trigger.js")),
     ("kept.js", SCRIPT, include_str!("../../page/kept.js")),
     ("series.js", SCRIPT, include_str!("../../page/series.js")),
