@@ -526,8 +526,13 @@ async fn a_parameter_is_found_changed_and_rolled_back() {
     stage.click("#parameters-backup").await;
     let kept = std::fs::read_to_string(stage.saved("node4.toml").await).expect("text");
     assert!(kept.contains("\"2008:00\" = 60"), "{kept}");
+    stage.click("#parameters-backup-dcf").await;
+    let kept = stage.saved("node4.dcf").await;
     stage.click("#parameters-back").await;
     stage.says(row, "1 r/min").await;
+    stage.find("#parameters-file").await.send_keys(&kept.to_string_lossy()).await.expect("chosen");
+    stage.says("#parameters-told", "node4.dcf").await;
+    stage.says("#parameters-told", "1 are others in the drive").await;
     let file = stage.profile.join("node4.toml");
     stage.find("#parameters-file").await.send_keys(&file.to_string_lossy()).await.expect("chosen");
     stage.says("#parameters-told", "1 are others in the drive").await;

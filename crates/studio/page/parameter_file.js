@@ -5,6 +5,8 @@ import { count, h, say } from "./dom.js";
 
 /** A message may have 64 KiB, and a character of the file may take two of it. */
 const LARGEST = 30000;
+/** What is read at all, in bytes. */
+const LARGEST_FILE = 2 ** 20;
 
 const table = (heads, rows) =>
   h(
@@ -16,13 +18,15 @@ const table = (heads, rows) =>
 
 /** `node` gives the drive that is looked at, `mark` hears what a file has, `written` when something was written. */
 export function parameterFile({ node, report, mark, written }) {
-  const backup = h("button", { type: "button", id: "parameters-backup", onclick: save }, "Back up");
-  const input = h("input", { type: "file", id: "parameters-file", accept: ".toml", "aria-label": "File of parameters", onchange: load });
+  const backups = ["toml", "dcf"].map((form) =>
+    h("button", { type: "button", id: form === "toml" ? "parameters-backup" : "parameters-backup-dcf", onclick: () => save(form) }, form === "toml" ? "Back up" : "Back up as DCF"),
+  );
+  const input = h("input", { type: "file", id: "parameters-file", accept: ".toml,.dcf", "aria-label": "File of parameters", onchange: load });
   const dry = h("button", { type: "button", id: "parameters-plan", onclick: plan, disabled: true }, "What would be written");
   const apply = h("button", { type: "button", id: "parameters-apply", class: "primary", onclick: write, hidden: true }, "Write all of it");
   const told = h("p", { role: "status", id: "parameters-told" });
   const shown = h("div", { class: "parameters-diff" });
-  const root = h("div", {}, h("div", { class: "bar" }, backup, h("label", {}, "File ", input), dry, apply), told, shown);
+  const root = h("div", {}, h("div", { class: "bar" }, ...backups, h("label", {}, "File ", input), dry, apply), told, shown);
   let text = null;
 
   const fail = (message) => {
@@ -34,18 +38,26 @@ export function parameterFile({ node, report, mark, written }) {
     say(told, message);
   };
 
-  async function save() {
+  async function save(form) {
     const of = node();
-    backup.disabled = true;
+    for (const one of backups) one.disabled = true;
     tell("Reading all parameters …");
-    const answer = await ask({ do: "back_up", node: of });
-    backup.disabled = false;
+    const answer = await ask({ do: "back_up", node: of, form });
+    for (const one of backups) one.disabled = false;
     if (!answer.ok) return fail(answer.error.message);
+    const name = `node${of}.${form}`;
     const url = URL.createObjectURL(new Blob([answer.result.file], { type: "text/plain" }));
-    h("a", { href: url, download: `node${of}.toml` }).click();
+    h("a", { href: url, download: name }).click();
     setTimeout(() => URL.revokeObjectURL(url), 1000);
     const refused = answer.result.refused.map((why) => ` Not in it: ${why}.`).join("");
-    tell(`node${of}.toml: ${answer.result.values} values.${refused}`);
+    tell(`${name}: ${answer.result.values} values.${refused}`);
+  }
+
+  /** A DCF, which is larger than a message may be, as the TOML of the same values. */
+  async function ofDcf(file) {
+    const answer = await fetch(`/api/parameters.toml?node=${node()}`, { method: "POST", body: file }).catch(() => null);
+    if (answer?.ok) return answer.text();
+    throw new Error(answer ? ((await answer.json().catch(() => null))?.error?.message ?? `status ${answer.status}`) : "the studio cannot be reached");
   }
 
   function forget() {
@@ -60,9 +72,16 @@ export function parameterFile({ node, report, mark, written }) {
     forget();
     const [chosen] = input.files;
     if (!chosen) return;
-    if (chosen.size > LARGEST) return fail(`${chosen.name} has ${chosen.size} bytes; a file of parameters has ${LARGEST} at most: ferrodrive params apply takes larger ones.`);
+    if (chosen.size > LARGEST_FILE) return fail(`${chosen.name} has ${chosen.size} bytes; a file of parameters has ${LARGEST_FILE} at most.`);
     const of = node();
-    const read = await chosen.text();
+    let read;
+    try {
+      read = await (/\.(dcf|eds)$/i.test(chosen.name) ? ofDcf(chosen) : chosen.text());
+    } catch (error) {
+      return fail(`${chosen.name}: ${error.message}`);
+    }
+    if (of !== node()) return;
+    if (read.length > LARGEST) return fail(`${chosen.name} has ${read.length} characters; a file of parameters has ${LARGEST} at most: ferrodrive params apply takes larger ones.`);
     tell(`Comparing ${chosen.name} with the drive …`);
     const answer = await ask({ do: "compare_parameters", node: of, file: read });
     if (of !== node()) return;

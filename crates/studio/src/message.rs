@@ -214,7 +214,20 @@ pub(crate) enum Deed {
     BackUp {
         #[serde(deserialize_with = "node")]
         node: NodeId,
+        #[serde(default)]
+        form: FileForm,
     },
+}
+
+/// What a file of parameters is written as.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum FileForm {
+    /// For people.
+    #[default]
+    Toml,
+    /// For other tools (CiA 306-1).
+    Dcf,
 }
 
 /// What an object is to be set to, as people type it: `{"object":"6083","value":"600"}`.

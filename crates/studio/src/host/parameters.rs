@@ -14,7 +14,7 @@ use master::Drive;
 use master::parameters::{ApplyError, Parameters, Plan, PlanError, PlanOptions, default_of, diff};
 use serde_json::{Value, json};
 use testbench::parameters::journal::Journal;
-use testbench::parameters::sheet;
+use testbench::parameters::{sheet, to_dcf};
 use testbench::words::object::object;
 use testbench::words::value::typed_for;
 
@@ -23,7 +23,7 @@ use super::object_rows::{bytes_text, row_json, value_text};
 use super::state::Host;
 use super::transactions::{Change, MOST_KEPT, Refusal, Written};
 use super::work::{Asked, Done, say};
-use crate::message::{Answer, Deed, NewValue};
+use crate::message::{Answer, Deed, FileForm, NewValue};
 
 /// Objects that one request may read.
 const MOST_READ: usize = 64;
@@ -54,7 +54,8 @@ impl Host {
                             Err(refusal) => Err(refusal),
                         },
                         Deed::CompareParameters { file, .. } => compare(&drive, model, &file).await,
-                        _ => back_up(&drive, model).await,
+                        Deed::BackUp { form, .. } => back_up(&drive, model, form).await,
+                        _ => Err(("malformed", "this reads nothing".into())),
                     };
                     Done::Looked(asked, outcome)
                 }));
@@ -187,7 +188,7 @@ const fn node_of(deed: &Deed) -> Option<NodeId> {
         | Deed::WriteParameters { node, .. }
         | Deed::RollBack { node }
         | Deed::Store { node }
-        | Deed::BackUp { node } => Some(*node),
+        | Deed::BackUp { node, .. } => Some(*node),
         _ => None,
     }
 }
@@ -415,10 +416,17 @@ async fn compare(drive: &Drive, model: &'static Description, file: &str) -> Resu
 }
 
 /// The file that `ferrodrive params backup` writes.
-async fn back_up(drive: &Drive, model: &'static Description) -> Result<Value, Refusal> {
+async fn back_up(drive: &Drive, model: &'static Description, form: FileForm) -> Result<Value, Refusal> {
     let backup = drive.back_up(|_, _, _| {}).await.map_err(|error| (error.kind(), error.to_string()))?;
     let refused: Vec<String> = backup.refused.iter().map(|(object, error)| format!("{object}: {error}")).collect();
-    let file = sheet::print(&backup.parameters, Some(model));
+    let file = match form {
+        FileForm::Toml => sheet::print(&backup.parameters, Some(model)),
+        FileForm::Dcf => {
+            let bytes = to_dcf(&backup.parameters, model, &format!("node{}.dcf", drive.node().id()));
+            // The sheets that we write are ASCII.
+            String::from_utf8_lossy(&bytes.map_err(|why| ("bad_parameters", why))?).into_owned()
+        }
+    };
     Ok(json!({ "file": file, "values": backup.parameters.values.len(), "refused": refused }))
 }
 

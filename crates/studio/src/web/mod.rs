@@ -5,6 +5,7 @@
 mod answer;
 mod openapi;
 mod page;
+mod parameters;
 mod recording;
 mod socket;
 #[cfg(test)]
@@ -63,7 +64,7 @@ struct Web {
     /// One password at a time.
     door: Arc<Semaphore>,
     doors: trace::Doors,
-    /// One record at a time: each takes memory.
+    /// One record or file at a time: each takes memory.
     records: Arc<Semaphore>,
 }
 
@@ -97,6 +98,10 @@ fn handler(operation: Operation) -> MethodRouter<Web> {
             post(async |State(web): State<Web>, body: axum::body::Bytes| recording::mcap(web.records, body).await)
                 .layer(DefaultBodyLimit::max(recording::LARGEST))
         }
+        Operation::ParametersToml => post(async |State(web): State<Web>, asked, body: axum::body::Bytes| {
+            parameters::toml(web.records, asked, body).await
+        })
+        .layer(DefaultBodyLimit::max(parameters::LARGEST)),
     }
 }
 

@@ -16,6 +16,7 @@ pub(super) enum Operation {
     Trace,
     TraceLog,
     RecordingMcap,
+    ParametersToml,
 }
 
 /// One request.
@@ -34,7 +35,7 @@ const OVER: (&str, &str) = ("503", "The studio is ending");
 const FOREIGN: (&str, &str) = ("403", "The Origin or the Host is not this server's");
 
 /// All of them. None that is a GET changes anything; none moves a drive: motion goes through the socket, where it is held.
-pub(super) const ROUTES: [Route; 11] = [
+pub(super) const ROUTES: [Route; 12] = [
     Route {
         path: "/api/state",
         method: "get",
@@ -131,6 +132,21 @@ pub(super) const ROUTES: [Route; 11] = [
             OVER,
         ],
     },
+    Route {
+        path: "/api/parameters.toml",
+        method: "post",
+        operation: Operation::ParametersToml,
+        summary: "The parameters in a DCF (CiA 306-1), which is the body, as the TOML of `ferrodrive params`",
+        answers: &[
+            ("200", "TOML"),
+            ("400", "The body is no DCF, or not whole"),
+            LET_IN,
+            FOREIGN,
+            ("413", "More than 1 MB"),
+            ("429", "Another file is being read"),
+            OVER,
+        ],
+    },
 ];
 
 /// What may stand behind the `?` of a request: name, JSON type, meaning.
@@ -156,6 +172,9 @@ const fn parameters(operation: Operation) -> &'static [(&'static str, &'static s
             ("objects", "string", "Which, as NODE:INDEX:SUB in hexadecimal, separated by commas: 4:606C:00,4:6064:00"),
             ("after", "integer", "Only frames from this number on"),
         ],
+        Operation::ParametersToml => {
+            &[("node", "integer", "The node-ID that it is read for where it names none, 1 to 127")]
+        }
         Operation::Faults => &[("since", "integer", "The revision that was told before; 0 for everything")],
         _ => &[],
     }

@@ -17,7 +17,7 @@ pub(super) const LARGEST: usize = 32 << 20;
 /// An MCAP file of what is given as CSV. It is made beside the task that moves drives.
 pub(super) async fn mcap(records: Arc<Semaphore>, csv: Bytes) -> Response {
     let Ok(_permit) = records.try_acquire() else {
-        return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "another record is being made: try again");
+        return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "another file is being made: try again");
     };
     match tokio::task::spawn_blocking(move || mcap_of_csv(&csv)).await {
         Ok(Ok(file)) => ([(CONTENT_TYPE, "application/octet-stream")], file).into_response(),

@@ -413,3 +413,43 @@ async fn what_a_page_has_kept_becomes_mcap() {
         StatusCode::PAYLOAD_TOO_LARGE
     );
 }
+
+#[tokio::test]
+async fn a_dcf_that_a_page_has_chosen_becomes_toml() {
+    let (app, access, _counter) = server(None);
+    let bearer = format!("Bearer {}", token(&access));
+    let headers = [("authorization", bearer.as_str()), ("origin", "http://127.0.0.1:8402")];
+    // CiA 306-1, 4.6.2 and 4.9: $NODEID in a value, and the node-ID of the DCF.
+    let dcf = |node: &str| {
+        format!(
+            "[FileInfo]\nFileName=a.dcf\n[DeviceInfo]\nVendorNumber=0\n[DeviceComissioning]\n{node}\n\
+             [MandatoryObjects]\nSupportedObjects=1\n1=0x1000\n[OptionalObjects]\nSupportedObjects=1\n1=0x2008\n\
+             [1000]\nParameterName=Type\nObjectType=7\nDataType=7\nAccessType=ro\nPDOMapping=0\n\
+             [2008]\nParameterName=Start\nObjectType=7\nDataType=6\nAccessType=rw\nPDOMapping=0\nParameterValue=$NODEID+0x20\n"
+        )
+    };
+    let post = async |path: &str, body: &str| {
+        let answer = ask(&app, "POST", path, &headers, body).await;
+        (answer.status(), text(answer).await)
+    };
+    for (path, node, value) in [
+        ("/api/parameters.toml?node=4", "NodeID=5", "hex:2500"),
+        ("/api/parameters.toml?node=4", "NetNumber=1", "hex:2400"),
+    ] {
+        let (status, toml) = post(path, &dcf(node)).await;
+        assert_eq!(status, StatusCode::OK, "{toml}");
+        assert!(toml.contains(&format!("\"2008:00\" = \"{value}\"")), "{toml}");
+    }
+    for (path, body, why) in [
+        ("/api/parameters.toml?node=128", dcf("NodeID=5"), "1 to 127"),
+        ("/api/parameters.toml?nodes=4", dcf("NodeID=5"), "nodes"),
+        ("/api/parameters.toml", "[values]\n\"2008\" = 1\n".to_owned(), "data sheet"),
+        ("/api/parameters.toml", dcf("NodeID=5").replace("$NODEID+0x20", "70000"), "line"),
+    ] {
+        let (status, said) = post(path, &body).await;
+        assert_eq!(status, StatusCode::BAD_REQUEST, "{said}");
+        assert!(said.contains(why), "{said}");
+    }
+    let (status, _) = post("/api/parameters.toml", &";".repeat((1 << 20) + 1)).await;
+    assert_eq!(status, StatusCode::PAYLOAD_TOO_LARGE);
+}

@@ -1,9 +1,10 @@
-//! Parameters of a node in files: a DCF (CiA 306-1), TOML for people ([`sheet`]), a concise DCF (CiA 302-3), and the journal
+//! Parameters of a node in files: a DCF (CiA 306-1, [`of_dcf`]), TOML for people ([`sheet`]), a concise DCF (CiA 302-3), and the journal
 //! of a transaction ([`journal`]).
 //!
 //! In: a file, and where names are to be looked up the model. Out: [`Parameters`], or everything that is wrong with the file.
 //! Nothing of a file that is not whole is given out.
 
+mod dcf;
 pub mod journal;
 pub mod sheet;
 
@@ -12,12 +13,12 @@ use std::path::Path;
 use canopen::NodeId;
 use canopen::concise::{Concise, Entry, emit};
 use devices::Description;
-use eds::{Severity, parameter_values};
-use master::identify::Identity;
 use master::parameters::Parameters;
 
 use crate::data_sheet::{self, Unread};
 use crate::document::{LARGEST, read_text};
+
+pub use dcf::{of_dcf, to_dcf};
 
 /// The forms that parameters are kept in, by the file's extension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,50 +71,9 @@ pub fn read(path: &Path, model: Option<&'static Description>, node: NodeId) -> R
 fn dcf(path: &Path, node: NodeId) -> Result<Parameters, String> {
     let reading = data_sheet::reading(path).map_err(|unread| match unread {
         Unread::File(error) => error.to_string(),
-        Unread::Refused(refusal) if refusal.line > 0 => format!("line {}: {}", refusal.line, refusal.reason),
-        Unread::Refused(refusal) => refusal.reason,
+        Unread::Refused(refusal) => dcf::refused(&refusal),
     })?;
-    // What the reader had to guess or to leave out of values and of lists of objects: the file is not whole.
-    let is_broken = |finding: &&eds::Finding| {
-        finding.severity == Severity::Error
-            && (finding.key.as_deref().is_some_and(|key| key.eq_ignore_ascii_case("ParameterValue"))
-                || finding.section.ends_with("Value")
-                || finding.section.ends_with("Objects"))
-    };
-    if let Some(first) = reading.findings.iter().find(is_broken) {
-        let all = reading.findings.iter().filter(is_broken).count();
-        return Err(format!(
-            "it is not whole: line {first}{}. `ferrodrive eds lint {}` shows all",
-            if all > 1 { format!(", and {} more", all - 1) } else { String::new() },
-            path.display()
-        ));
-    }
-    let eds = reading.eds;
-    let of_file = eds.commissioning.as_ref().and_then(|device| NodeId::new(device.node_id?));
-    let mut parameters = Parameters { node: of_file, ..Parameters::default() };
-    let mut wrong = Vec::new();
-    for value in parameter_values(&eds, of_file.unwrap_or(node).raw()) {
-        match value {
-            Ok((object, bytes)) => {
-                parameters.values.insert(object, bytes);
-            }
-            Err(refusal) => wrong.push(format!("line {}: {refusal}", refusal.line)),
-        }
-    }
-    if !wrong.is_empty() {
-        return Err(wrong.join("; "));
-    }
-    if parameters.values.is_empty() && !eds.is_dcf() {
-        return Err("it is a data sheet without values (no ParameterValue in it): a DCF has some".into());
-    }
-    let known = |number: Option<u32>| number.filter(|number| *number != 0);
-    parameters.identity = Identity {
-        device_type: None,
-        vendor_id: known(eds.device.vendor_number),
-        product_code: known(eds.device.product_number),
-        revision_number: known(eds.device.revision_number),
-    };
-    Ok(parameters)
+    dcf::of_reading(reading, node, &path.display().to_string())
 }
 
 fn concise(path: &Path, node: NodeId) -> Result<Parameters, String> {

@@ -1,13 +1,8 @@
 //! `ferrodrive params backup`.
 
-use std::path::Path;
-
-use devices::Description;
-use eds::document::Document;
-use eds::{Commissioning, Configuration, Sheet};
-use master::parameters::{Parameters, from_any_state};
+use master::parameters::from_any_state;
 use serde::Serialize;
-use testbench::parameters::{Form, sheet, to_concise};
+use testbench::parameters::{Form, sheet, to_concise, to_dcf};
 
 use super::shown::name;
 use crate::command::dcf::{exists, keep};
@@ -69,28 +64,16 @@ impl super::Backup {
         };
         let bytes = match form {
             Form::Toml => sheet::print(&backup.parameters, Some(model)).into_bytes(),
-            Form::Dcf => dcf(&backup.parameters, model, path)?,
+            Form::Dcf => {
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                to_dcf(&backup.parameters, model, &name).map_err(Failure::usage)?
+            }
             Form::Concise => to_concise(&from_any_state(Some(model), self.node, &backup.parameters.values)),
         };
         keep(path, &bytes, self.force)?;
         report.file = Some(path.display().to_string());
         Ok(report)
     }
-}
-
-/// The model's data sheet with every value.
-fn dcf(parameters: &Parameters, model: &'static Description, path: &Path) -> Result<Vec<u8>, Failure> {
-    let sheet = Document::parse(eds::write(&Sheet::of(model).eds()).as_bytes());
-    let sheet = sheet.map_err(|refusal| Failure::new(refusal.to_string()))?;
-    let node = parameters.node.map_or(0, canopen::NodeId::raw);
-    let mut made = Configuration::new(sheet, node).map_err(|refusal| Failure::new(refusal.to_string()))?;
-    for (object, bytes) in &parameters.values {
-        made.set(*object, bytes, true).map_err(|error| Failure::new(format!("{object}: {error}")))?;
-    }
-    let device = Commissioning { node_id: Some(node), net_number: Some(1), ..Commissioning::default() };
-    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    made.commission(&device, &name).map_err(|error| Failure::usage(error.to_string()))?;
-    Ok(made.into_document().to_bytes())
 }
 
 impl Report for BackupReport {

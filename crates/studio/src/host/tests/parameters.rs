@@ -11,7 +11,7 @@ use testbench::parameters::journal::Journal;
 
 use super::{Page, Stage, WHEEL, play, play_with};
 use crate::host::Journals;
-use crate::message::{Deed, NewValue};
+use crate::message::{Deed, FileForm, NewValue};
 
 const MAX_SPEED: Mux = Mux::new(0x6081, 0);
 const ACCELERATION: Mux = Mux::new(0x6083, 0);
@@ -115,7 +115,15 @@ fn what_a_drive_cannot_have_and_what_would_move_it_is_not_written() {
 fn a_file_is_kept_compared_shown_before_and_applied_as_a_whole() {
     play(async |stage| {
         let mut page = stage.page().await;
-        let file = page.knows(Deed::BackUp { node: WHEEL }).await["file"].as_str().expect("text").to_owned();
+        let mut backed_up = async |form| {
+            let answer = page.knows(Deed::BackUp { node: WHEEL, form }).await;
+            answer["file"].as_str().expect("text").to_owned()
+        };
+        let file = backed_up(FileForm::Toml).await;
+        // The same values, in a form that other tools read.
+        let other = testbench::parameters::of_dcf(backed_up(FileForm::Dcf).await.as_bytes(), WHEEL).expect("a DCF");
+        let model = &devices::zltech::zlac8030l::ZLAC8030L;
+        assert_eq!(other.values, testbench::parameters::sheet::parse(&file, Some(model)).expect("parameters").values);
         page.must(Deed::TakeControl {}).await;
         page.knows(setting("2008", "60rpm")).await;
         let compared = page.knows(Deed::CompareParameters { node: WHEEL, file: file.clone() }).await;

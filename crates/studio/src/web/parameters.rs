@@ -1,0 +1,43 @@
+//! Files of parameters that a page has chosen, in the form that its requests carry.
+
+use std::sync::Arc;
+
+use axum::body::Bytes;
+use axum::extract::Query;
+use axum::extract::rejection::QueryRejection;
+use axum::http::StatusCode;
+use axum::http::header::CONTENT_TYPE;
+use axum::response::{IntoResponse, Response};
+use canopen::NodeId;
+use serde::Deserialize;
+use testbench::parameters::{of_dcf, sheet};
+use tokio::sync::Semaphore;
+
+use super::answer::trouble;
+
+/// The largest DCF that is taken, in bytes: one of 500 objects has a fifth of it.
+pub(super) const LARGEST: usize = 1 << 20;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Asked {
+    node: Option<u8>,
+}
+
+/// The TOML of a DCF. It is read beside the task that moves drives.
+pub(super) async fn toml(files: Arc<Semaphore>, asked: Result<Query<Asked>, QueryRejection>, dcf: Bytes) -> Response {
+    let malformed = |why: &str| trouble(StatusCode::BAD_REQUEST, "malformed", why);
+    let node = match asked {
+        Ok(Query(asked)) => NodeId::new(asked.node.unwrap_or(1)),
+        Err(rejection) => return malformed(&rejection.body_text()),
+    };
+    let Some(node) = node else { return malformed("a node-ID is 1 to 127") };
+    let Ok(_permit) = files.try_acquire() else {
+        return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "another file is being read: try again");
+    };
+    match tokio::task::spawn_blocking(move || of_dcf(&dcf, node)).await {
+        Ok(Ok(parameters)) => ([(CONTENT_TYPE, "application/toml")], sheet::print(&parameters, None)).into_response(),
+        Ok(Err(why)) => malformed(&why),
+        Err(_) => trouble(StatusCode::SERVICE_UNAVAILABLE, "over", "the studio is ending"),
+    }
+}
