@@ -11,6 +11,6 @@ pub(crate) fn step() -> Tally {
         return Tally::skipped(reason);
     }
     // One browser at a time: each takes some hundred megabytes and a core.
-    let words = ["test", "--package", "ferrodrive", "--test", "studio_browser", "--", "--ignored", "--test-threads=1"];
+    let words = ["test", "--workspace", "--test", "studio_browser", "--", "--ignored", "--test-threads=1"];
     cargo_tests::run(workspace::cargo().args(words))
 }
