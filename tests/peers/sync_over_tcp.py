@@ -1,6 +1,6 @@
 """How evenly a client's SYNC arrives over TCP: intervals as the virtual wire saw them. A figure, not a check.
 
-    python tests/peers/sync_over_tcp.py target/release/ferrodrive [--tcp-tune] [--period 0.02] [--for 12]
+    python tests/peers/sync_over_tcp.py target/dist/ferrodrive [--tcp-tune] [--period 0.02] [--for 12]
 
 Without --tcp-tune the client is python-can as it comes, with Nagle's algorithm on.
 """

@@ -1,7 +1,8 @@
 //! The page of the studio in a real browser: Chromium, moved by its WebDriver.
 
+use crate::debian;
 use crate::tally::Tally;
-use crate::{cargo_tests, debian, workspace};
+use crate::test_programs::{self, How, SCHEMA_AND_BROWSER};
 
 /// The browser and what moves it, with the packages of Debian that they are in.
 const PROGRAMS: &[(&str, &str)] = &[("chromium", "chromium"), ("chromedriver", "chromium-driver")];
@@ -11,6 +12,6 @@ pub(crate) fn step() -> Tally {
         return Tally::skipped(reason);
     }
     // One browser at a time: each takes some hundred megabytes and a core.
-    let words = ["test", "--workspace", "--test", "studio_browser", "--", "--ignored", "--test-threads=1"];
-    cargo_tests::run(workspace::cargo().args(words))
+    let how = How { programs: 1, threads: 1, arguments: &["--ignored", "studio_browser::"] };
+    test_programs::build(SCHEMA_AND_BROWSER).map_or_else(Tally::failed, |programs| test_programs::run(programs, how))
 }

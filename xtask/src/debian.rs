@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::process::Command;
 
 use crate::process::{self, quietly};
+use crate::say::say;
 
 /// Installs those of these programs that are missing: each with the package that it is in.
 ///
@@ -23,7 +24,7 @@ pub(crate) fn install(programs: &[(&str, &str)]) -> Result<(), String> {
     if !process::works("apt-get", &["--version"]) {
         return Err(format!("not installed, and no apt-get: {names}"));
     }
-    println!("   installing {names}");
+    say(format_args!("installing {names}"));
     let installed = install().or_else(|_| quietly(apt().arg("update")).and_then(|()| install()));
     installed.map_err(|error| format!("cannot be installed ({names}): {}", last_line(&error)))
 }

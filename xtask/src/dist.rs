@@ -12,6 +12,7 @@ use std::process::{Command, ExitCode};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
+use crate::say::say;
 use crate::tally::Tally;
 use crate::{pgo, process, program, python, wheel, workspace};
 
@@ -27,7 +28,7 @@ pub(crate) fn command() -> ExitCode {
     let folder = workspace::root().join("dist");
     let made = release_binary().and_then(|(program, how)| {
         println!("{how}");
-        make(&program, "release", &folder)
+        make(&program, "dist", &folder)
     });
     match made {
         Ok(notes) => {
@@ -52,7 +53,7 @@ pub(crate) fn step() -> Tally {
     };
     let mut tally = Tally::default();
     for (what, outcome) in try_it(&folder) {
-        println!("   {what}: {}", outcome.as_ref().map_or_else(|error| error.as_str(), |()| "ok"));
+        say(format_args!("{what}: {}", outcome.as_ref().map_or_else(|error| error.as_str(), |()| "ok")));
         tally.add(&outcome.map_or_else(|error| Tally::failed(format!("{what}: {error}")), |()| Tally::passed()));
     }
     notes.into_iter().for_each(|note| tally.add(&Tally::skipped(note)));
@@ -63,14 +64,7 @@ pub(crate) fn step() -> Tally {
 fn release_binary() -> Result<(PathBuf, String), String> {
     match pgo::Tools::find() {
         Ok(tools) => Ok((pgo::build(&tools)?, "the binary is optimised by its training run (cargo xtask pgo)".into())),
-        Err(reason) => {
-            println!("   building the binary");
-            let mut cargo = workspace::cargo();
-            cargo.args(["build", "--quiet", "--release", "--package", "ferrodrive", "--bin", "ferrodrive"]);
-            process::output(&mut cargo)?;
-            let program = format!("release/ferrodrive{}", std::env::consts::EXE_SUFFIX);
-            Ok((workspace::target().join(program), format!("the binary is not optimised by a training run: {reason}")))
-        }
+        Err(reason) => Ok((program::of_dist()?, format!("the binary is not optimised by a training run: {reason}"))),
     }
 }
 
@@ -106,7 +100,6 @@ fn make(program: &Path, profile: &str, folder: &Path) -> Result<Vec<String>, Str
         Err(reason) => notes.push(format!("no wheel: {reason}")),
     }
     if folder.join("python").is_dir() {
-        // The build of the wheel has put its lock file there.
         packages.extend(foreign_packages("crates/python/Cargo.toml", "ferrodrive-python")?);
     }
     licences(packages, &folder.join("licences"))?;

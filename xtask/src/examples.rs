@@ -8,6 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
+use crate::say::say;
 use crate::tally::Tally;
 use crate::{process, workspace};
 
@@ -42,7 +43,7 @@ pub(crate) fn run() -> Tally {
     let folder = workspace::target().join("debug").join("examples");
     let mut tally = Tally::default();
     for name in names {
-        println!("   {name}");
+        say(&name);
         tally.add(&run_one(&name, &folder.join(format!("{name}{}", std::env::consts::EXE_SUFFIX))));
     }
     tally
@@ -58,7 +59,7 @@ fn run_one(name: &str, program: &Path) -> Tally {
     if matches!(ending, Ending::Success | Ending::Ready) {
         return Tally::passed();
     }
-    output.iter().for_each(|line| println!("   {line}"));
+    output.iter().for_each(say);
     let what = if ending == Ending::TooLate { "did not end and did not say ready" } else { "ended badly" };
     Tally::failed(format!("example {name} {what}"))
 }

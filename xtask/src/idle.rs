@@ -2,10 +2,11 @@
 //! uses; the processor time that each takes, in per cent of a core, from `/proc/PID/stat`.
 
 use std::io::{BufRead, BufReader};
+use std::path::Path;
 use std::process::{Child, Command, ExitCode, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::{process, workspace};
+use crate::{process, program};
 
 /// How long each is watched if nobody says otherwise.
 const SECONDS: u64 = 60;
@@ -42,15 +43,13 @@ fn measure(seconds: u64) -> Result<(), String> {
     if !cfg!(target_os = "linux") {
         return Err("processor time is read from /proc, which Linux has".into());
     }
-    let mut build = workspace::cargo();
-    build.args(["build", "--release", "-p", "ferrodrive", "--bin", "ferrodrive"]);
-    process::run(&mut build, |_| ()).and_then(|built| if built { Ok(()) } else { Err("the build failed".into()) })?;
+    let program = program::of_dist()?;
     // Ticks of /proc: what `getconf` says.
     let ticks = process::output(Command::new("getconf").arg("CLK_TCK"))?;
     let per_s: f64 = ticks.trim().parse().map_err(|_| format!("getconf CLK_TCK says {ticks:?}"))?;
     println!("{seconds} s each, in per cent of a core");
     for (name, drives) in BUSES {
-        let simulator = Simulator::start(drives)?;
+        let simulator = Simulator::start(&program, drives)?;
         std::thread::sleep(SETTLING);
         let (began, before) = (Instant::now(), simulator.ticks()?);
         std::thread::sleep(Duration::from_secs(seconds));
@@ -65,8 +64,8 @@ struct Simulator(Child);
 
 impl Simulator {
     /// Starts it and waits until it is ready.
-    fn start(drives: &[&str]) -> Result<Self, String> {
-        let mut command = Command::new(workspace::target().join("release/ferrodrive"));
+    fn start(program: &Path, drives: &[&str]) -> Result<Self, String> {
+        let mut command = Command::new(program);
         command.args(["sim", "--serve", "socketcand://127.0.0.1:0"]);
         drives.iter().for_each(|drive| _ = command.args(["--drive", drive]));
         // Its standard input stays open: at its end nobody could quit it.

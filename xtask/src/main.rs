@@ -1,25 +1,28 @@
 //! The project's own chores, in Rust, so that they run wherever the project builds.
 //!
-//! `cargo xtask test` runs everything that can fail; `cargo xtask tidy` checks what a program can check of the house
+//! `cargo xtask test` runs what can fail; `cargo xtask tidy` checks what a program can check of the house
 //! style. Nothing here is part of what users get.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a chore talks to a terminal")]
 
 mod browser;
-mod cargo_tests;
 mod debian;
 mod dist;
 mod examples;
 mod idle;
-
+mod libtest;
 mod packages;
 mod peers;
 mod pgo;
 mod process;
 mod program;
 mod python;
+mod say;
+mod since;
 mod steps;
+mod table;
 mod tally;
 mod test;
+mod test_programs;
 mod tidy;
 mod vcan;
 mod wheel;
@@ -30,9 +33,12 @@ use std::process::ExitCode;
 const USAGE: &str = "\
 The project's own chores.
 
-  cargo xtask test               every test, with a table and a count at the end
+  cargo xtask test               the quick list: every test in virtual time, with a table and a count at the end
+  cargo xtask test --all         everything: also lints, real processes, Python, other people's programs, a browser
   cargo xtask test --only STEP   one step (may be repeated)
   cargo xtask test --list        the steps
+  cargo xtask test --quick-since REVISION    the tests nearest to what differs from a revision of git
+  cargo xtask test .. --timings  the slowest tests, too
   cargo xtask vcan-test          the tests that need CAN interfaces, in a virtual machine that has them
   cargo xtask tidy               the style that a program can check
   cargo xtask wheel              the Python package, in dist/: the library, the binary, the interface for python-can

@@ -1,5 +1,6 @@
 //! The step that packs each crate as `cargo publish` would: what a package is, without what only this folder has.
 
+use crate::say::say;
 use crate::tally::Tally;
 use crate::workspace;
 
@@ -21,6 +22,6 @@ pub(crate) fn run() -> Tally {
     };
     // A warning here is a manifest that says too little, or a file that will be missing.
     let said = String::from_utf8_lossy(&output.stderr);
-    said.lines().for_each(|line| println!("{line}"));
+    said.lines().for_each(say);
     Tally::of_check(output.status.success() && !said.contains("warning"), "a crate does not pack: read the lines above")
 }

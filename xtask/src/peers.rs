@@ -7,6 +7,7 @@
 
 use std::process::Command;
 
+use crate::say::say;
 use crate::tally::Tally;
 use crate::{debian, process, program, python, workspace};
 
@@ -33,14 +34,14 @@ pub(crate) fn run() -> Tally {
         return Tally::failed(error);
     }
     if let Err(reason) = debian::install(PROGRAMS) {
-        println!("   without {reason}");
+        say(format_args!("without {reason}"));
     }
     let root = workspace::root();
     let mut command = Command::new(&python);
     command.current_dir(&root).arg("-u").arg(root.join(SCRIPT)).arg("--program").arg(program);
     let mut tally = Tally::default();
     let ended_well = process::run(&mut command, |line| {
-        println!("   {line}");
+        say(line);
         count(line, &mut tally);
     });
     match ended_well {

@@ -152,13 +152,13 @@ impl Build {
     fn new(rustc: &Rustc, target: PathBuf, flag: &str) -> Result<Self, String> {
         let flags = std::env::var("RUSTFLAGS").unwrap_or_default();
         let mut cargo = workspace::cargo();
-        cargo.args(["build", "--release", "--quiet", "--target", &rustc.host, "--target-dir"]).arg(&target);
-        cargo.args(["-p", "ferrodrive", "-p", "ferrodrive-sim", "--bin", "ferrodrive", "--example", "run_world"]);
+        cargo.args(["build", "--profile", "dist", "--quiet", "--target", &rustc.host, "--target-dir"]).arg(&target);
+        cargo.args(["-p", "ferrodrive", "-p", "ferrodrive-benches", "--bin", "ferrodrive", "--example", "run_world"]);
         cargo.env("RUSTFLAGS", format!("{flags} {flag}"));
         if !process::run(&mut cargo, |line| println!("{line}"))? {
             return Err(format!("it does not build with {flag}"));
         }
-        Ok(Self { folder: target.join(&rustc.host).join("release") })
+        Ok(Self { folder: target.join(&rustc.host).join("dist") })
     }
 
     fn program(&self) -> PathBuf {

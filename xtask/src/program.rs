@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::process::Command;
 
+use crate::say::say;
 use crate::tally::Tally;
 use crate::{process, workspace};
 
@@ -17,32 +18,47 @@ pub(crate) fn build(command: &str) -> Result<PathBuf, Tally> {
 
 /// Builds the binary as the test step built it, in the same profile with the same features, and returns its path.
 pub(crate) fn built() -> Result<PathBuf, String> {
-    let mut cargo = workspace::cargo();
-    cargo.args(["build", "--workspace", "--bins", "--quiet"]);
-    if !process::run(&mut cargo, |_| ())? {
-        return Err("ferrodrive does not build".to_owned());
-    }
-    Ok(workspace::target().join("debug").join(format!("ferrodrive{}", std::env::consts::EXE_SUFFIX)))
+    build_bin("ferrodrive")
 }
 
-/// `ferrodrive demo`, which compares every procedure of the manuals with what the drives do.
+/// Builds the binary in the profile of what is released.
+pub(crate) fn of_dist() -> Result<PathBuf, String> {
+    say("building the binary (dist)");
+    let words = ["build", "--quiet", "--profile", "dist", "--package", "ferrodrive", "--bin", "ferrodrive"];
+    process::output(workspace::cargo().args(words))?;
+    Ok(workspace::target().join("dist").join(format!("ferrodrive{}", std::env::consts::EXE_SUFFIX)))
+}
+
+fn build_bin(name: &str) -> Result<PathBuf, String> {
+    if !process::run(workspace::cargo().args(["build", "--quiet", "--bin", name]), |line| say(line))? {
+        return Err(format!("{name} does not build"));
+    }
+    Ok(workspace::target().join("debug").join(format!("{name}{}", std::env::consts::EXE_SUFFIX)))
+}
+
+/// The demo, which compares every procedure of the manuals with what the drives do.
 pub(crate) fn demo() -> Tally {
-    let program = match build("demo") {
+    let program = match build_bin("demo") {
         Ok(program) => program,
-        Err(tally) => return tally,
+        Err(error) => return Tally::failed(error),
     };
     let folder = workspace::target().join("demo");
     if let Err(error) = std::fs::create_dir_all(&folder) {
         return Tally::failed(format!("{}: {error}", folder.display()));
     }
-    let mut lines = 0;
-    let ended_well = process::run(Command::new(program).arg("demo").current_dir(folder), |line| {
-        lines += 1;
-        println!("   {line}");
+    let mut last = String::new();
+    let ended_well = process::run(Command::new(program).current_dir(folder), |line| {
+        if line.contains("DIFFERS") {
+            say(line);
+        }
+        last = line.to_owned();
     });
     match ended_well {
-        Ok(_) if lines == 0 => Tally::failed("the demo showed nothing"),
-        Ok(ended_well) => Tally::of_check(ended_well, "a drive differs from its manual"),
+        Ok(_) if last.is_empty() => Tally::failed("the demo showed nothing"),
+        Ok(ended_well) => {
+            say(&last);
+            Tally::of_check(ended_well, "a drive differs from its manual")
+        }
         Err(error) => Tally::failed(error),
     }
 }

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
+use crate::say::say;
 use crate::tally::Tally;
 use crate::{process, program, workspace};
 
@@ -34,7 +35,7 @@ pub(crate) fn step() -> Tally {
     }
     if let Err(error) = process::output(pip(&python).args(["install", "--quiet", "-r", FURTHER_REQUIREMENTS])) {
         let reason = error.lines().last().unwrap_or_default();
-        println!("   without what {FURTHER_REQUIREMENTS} names, which does not install here: {reason}");
+        say(format_args!("without what {FURTHER_REQUIREMENTS} names, which does not install here: {reason}"));
     }
     run_tests(&python)
 }
@@ -62,7 +63,7 @@ pub(crate) fn wheel(python: &Path, profile: &str, program: Option<&Path>, folder
     for old in wheels_in(folder) {
         std::fs::remove_file(&old).map_err(|error| format!("{}: {error}", old.display()))?;
     }
-    println!("   building the wheel ({profile})");
+    say(format_args!("building the wheel ({profile})"));
     let mut pip = pip(python);
     // The environment has the build's needs, in pinned versions.
     pip.args(["wheel", "--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir"]).arg(folder).arg(".");
@@ -96,7 +97,7 @@ pub(crate) fn environment_of(name: &str, wanted: &str) -> Result<PathBuf, String
     }
     let system = ["python3", "python"].into_iter().find(|name| process::works(name, &["-c", "import venv, ensurepip"]));
     let system = system.ok_or("no Python 3 with venv on this machine")?;
-    println!("   making a Python environment in {}", folder.display());
+    say(format_args!("making a Python environment in {}", folder.display()));
     process::output(Command::new(system).args(["-m", "venv", "--clear"]).arg(&folder))?;
     let packages: Vec<&str> = wanted.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
     process::output(pip(&python).args(["install", "--quiet"]).args(&packages)).map_err(|error| {
@@ -115,16 +116,12 @@ pub(crate) fn pip(python: &Path) -> Command {
     pip
 }
 
-/// What the workspace's steps do for the other crates, for the one outside of it.
+/// What the steps of the other crates do, which need no interpreter, for this one.
 fn lint(python: &Path) -> Result<(), String> {
-    let manifest = ["--manifest-path", "crates/python/Cargo.toml"];
-    if process::works("cargo", &["fmt", "--version"]) {
-        process::output(workspace::cargo().arg("fmt").args(manifest).args(["--check", "--", "--config-path", "."]))?;
-    }
     if process::works("cargo", &["clippy", "--version"]) {
         let mut clippy = workspace::cargo();
-        clippy.arg("clippy").args(manifest).args(["--quiet", "--", "-D", "warnings"]);
-        process::output(clippy.env("CARGO_TARGET_DIR", workspace::target()).env("PYO3_PYTHON", python))?;
+        clippy.args(["clippy", "--package", "ferrodrive-python", "--quiet", "--", "-D", "warnings"]);
+        process::output(clippy.env("PYO3_PYTHON", python))?;
     }
     let mut mypy = Command::new(python);
     mypy.current_dir(workspace::root().join("crates/python")).args(["-m", "mypy", "--no-error-summary", "--strict"]);
@@ -148,7 +145,7 @@ fn run_tests(python: &Path) -> Tally {
     pytest.args(TESTS.iter().map(|folder| workspace::root().join(folder)));
     let mut tally = Tally::default();
     let ended_well = process::run(&mut pytest, |line| {
-        println!("   {line}");
+        say(line);
         count(line, &mut tally);
     });
     match ended_well {

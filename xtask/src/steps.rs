@@ -1,47 +1,110 @@
-//! The steps of `cargo xtask test`, cheapest first, as one table.
+//! The steps of `cargo xtask test`, as one table: first the quick list, then what `--all` adds.
 //!
-//! Everything is built in one profile (dev) and with the features that the whole workspace asks for, so that nothing
-//! is compiled twice: clippy only checks, and the later steps use what the test step has built.
+//! Everything is built in one profile (dev) and with the features of the same packages ([`workspace`]'s default members), so that
+//! nothing is compiled twice.
 
+use crate::say::say;
 use crate::tally::Tally;
-use crate::{browser, cargo_tests, dist, examples, packages, peers, process, program, python, tidy, vcan, workspace};
+use crate::test_programs::{self, How, REAL_TIME, SCHEMA_AND_BROWSER};
+use crate::{browser, dist, examples, libtest, packages, peers, process, program, python, tidy, vcan, workspace};
 
-/// One step: its name for `--only`, what it does for the progress line, and the function that does it.
+/// One step: its name for `--only`, what it does for the progress line, when it runs, and the function that does it.
 pub(crate) struct Step {
     pub(crate) name: &'static str,
     pub(crate) does: &'static str,
+    pub(crate) when: When,
     pub(crate) run: fn() -> Tally,
 }
 
+/// When a step runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum When {
+    /// In the quick list, one after the other.
+    Quick,
+    /// With `--all`, after the quick list: steps that keep the processor busy, one after the other,
+    Busy,
+    /// and, beside them, steps that mostly wait for time to pass, for a browser, for a virtual machine.
+    Waiting,
+}
+
 pub(crate) const STEPS: &[Step] = &[
-    Step { name: "fmt", does: "is every file formatted as cargo fmt would", run: fmt },
-    Step { name: "tidy", does: "the house rules that a program can check", run: tidy::step },
-    Step { name: "clippy", does: "lints of every target, warnings are errors", run: clippy },
-    Step { name: "tests", does: "unit, property and integration tests of every crate", run: tests },
-    Step { name: "doctests", does: "the code in the documentation", run: doctests },
-    Step { name: "docs", does: "the documentation builds and its links lead somewhere", run: docs },
-    Step { name: "packages", does: "every crate packs, as cargo publish would", run: packages::run },
-    Step { name: "no_std", does: "the core crates build for a Cortex-M4", run: no_std },
-    Step { name: "examples", does: "every example runs, to its end or until it is ready to serve", run: examples::run },
+    Step { name: "fmt", does: "is every file formatted as cargo fmt would", when: When::Quick, run: fmt },
+    Step { name: "tidy", does: "the house rules that a program can check", when: When::Quick, run: tidy::step },
+    Step {
+        name: "tests",
+        does: "unit, property and integration tests of every crate, in virtual time",
+        when: When::Quick,
+        run: tests,
+    },
+    Step { name: "doctests", does: "the code in the documentation", when: When::Quick, run: doctests },
     Step {
         name: "demo",
-        does: "ferrodrive demo: the manuals' procedures against the virtual drives",
+        does: "every procedure of the manuals against the virtual drives",
+        when: When::Quick,
         run: program::demo,
     },
+    Step { name: "clippy", does: "lints of every target, warnings are errors", when: When::Busy, run: clippy },
+    Step { name: "docs", does: "the documentation builds and its links work", when: When::Busy, run: docs },
+    Step { name: "packages", does: "every crate packs, as cargo publish would", when: When::Busy, run: packages::run },
+    Step { name: "no_std", does: "the core crates build for a Cortex-M4", when: When::Busy, run: no_std },
     Step {
         name: "python",
         does: "the Python package: its wheel builds, and its tests pass against the installed wheel",
+        when: When::Busy,
         run: python::step,
     },
-    Step { name: "dist", does: "what is released can be made, and works from an empty folder", run: dist::step },
-    Step { name: "peers", does: "canopen-python, python-can and pymodbus against ferrodrive sim", run: peers::run },
+    Step {
+        name: "dist",
+        does: "what is released can be made, and works from an empty folder",
+        when: When::Busy,
+        run: dist::step,
+    },
+    Step {
+        name: "examples",
+        does: "every example runs, to its end or until it is ready to serve",
+        when: When::Busy,
+        run: examples::run,
+    },
+    Step {
+        name: "real_time",
+        does: "processes in real time: servers, signals, sockets, terminals",
+        when: When::Waiting,
+        run: real_time,
+    },
+    Step {
+        name: "schema",
+        does: "JSON of every command, and control connections, by their schemas",
+        when: When::Waiting,
+        run: schema,
+    },
     Step {
         name: "studio",
         does: "the studio's page in a real browser: enable, move, jog, close the tab",
+        when: When::Waiting,
         run: browser::step,
     },
-    Step { name: "vcan", does: "CAN interfaces of Linux, in a virtual machine that has them", run: vcan::step },
+    Step {
+        name: "peers",
+        does: "canopen-python, python-can and pymodbus against ferrodrive sim",
+        when: When::Waiting,
+        run: peers::run,
+    },
+    Step {
+        name: "vcan",
+        does: "CAN interfaces of Linux, in a virtual machine that has them",
+        when: When::Waiting,
+        run: vcan::step,
+    },
 ];
+
+/// What needs a Python interpreter to build.
+const EXCEPT_PYTHON: [&str; 2] = ["--exclude", "ferrodrive-python"];
+
+/// Tests that compute: a few more than a small machine has cores, so that starts and ends overlap.
+const COMPUTING: How<'_> = How { programs: 2, threads: 2, arguments: &[] };
+
+/// Tests that wait.
+const WAITING: How<'_> = How { programs: 1, threads: 6, arguments: &[] };
 
 /// The target of the `no_std` step: a Cortex-M4F microcontroller, which has no operating system to lean on.
 const BARE_TARGET: &str = "thumbv7em-none-eabihf";
@@ -57,22 +120,39 @@ fn clippy() -> Tally {
     if !process::works("cargo", &["clippy", "--version"]) {
         return Tally::skipped("clippy is not installed: rustup component add clippy");
     }
-    let words = ["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"];
-    cargo(&words, &[], "clippy has something to say: read the lines above")
+    let words = [&["clippy", "--workspace"], &EXCEPT_PYTHON[..], &["--all-targets", "--quiet", "--", "-D", "warnings"]];
+    cargo(&words.concat(), &[], "clippy has something to say: read the lines above")
 }
 
 fn tests() -> Tally {
-    let words = ["test", "--workspace", "--lib", "--bins", "--tests", "--examples", "--no-fail-fast"];
-    cargo_tests::run(workspace::cargo().args(words))
+    tests_of(&["--lib", "--bins", "--tests"])
+}
+
+/// The tests that `cargo test` selects by these words, in virtual time.
+pub(crate) fn tests_of(words: &[&str]) -> Tally {
+    test_programs::build(words).map_or_else(Tally::failed, |programs| test_programs::run(programs, COMPUTING))
+}
+
+fn real_time() -> Tally {
+    // The program that they start.
+    if let Err(error) = program::built() {
+        return Tally::failed(error);
+    }
+    test_programs::build(REAL_TIME).map_or_else(Tally::failed, |programs| test_programs::run(programs, WAITING))
+}
+
+fn schema() -> Tally {
+    test_programs::build(SCHEMA_AND_BROWSER)
+        .map_or_else(Tally::failed, |programs| test_programs::run(programs, WAITING))
 }
 
 fn doctests() -> Tally {
-    cargo_tests::run(workspace::cargo().args(["test", "--workspace", "--doc", "--no-fail-fast"]))
+    libtest::run(workspace::cargo().args(["test", "--doc", "--no-fail-fast"]))
 }
 
 fn docs() -> Tally {
-    let words = ["doc", "--workspace", "--no-deps", "--quiet"];
-    cargo(&words, &[("RUSTDOCFLAGS", "-D warnings")], "a documentation link or example is broken")
+    let words = [&["doc", "--workspace"], &EXCEPT_PYTHON[..], &["--no-deps", "--quiet"]];
+    cargo(&words.concat(), &[("RUSTDOCFLAGS", "-D warnings")], "a documentation link or example is broken")
 }
 
 fn no_std() -> Tally {
@@ -94,7 +174,7 @@ fn no_std() -> Tally {
 fn cargo(words: &[&str], environment: &[(&str, &str)], note_when_failed: &str) -> Tally {
     let mut cargo = workspace::cargo();
     cargo.args(words).envs(environment.iter().copied());
-    match process::run(&mut cargo, |line| println!("{line}")) {
+    match process::run(&mut cargo, |line| say(line)) {
         Ok(ended_well) => Tally::of_check(ended_well, note_when_failed),
         Err(error) => Tally::failed(error),
     }

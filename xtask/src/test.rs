@@ -1,19 +1,24 @@
-//! `cargo xtask test`: runs the steps in order, prints a table and a count, and fails when anything failed.
+//! `cargo xtask test`: runs steps, prints a table and a count, and fails when anything failed.
 
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
+use std::sync::Mutex;
+use std::time::Instant;
 
-use crate::steps::{STEPS, Step};
-use crate::tally::Tally;
+use crate::since;
+use crate::steps::{STEPS, Step, When};
+use crate::table::{Row, conclude, seconds, sum};
+use crate::{libtest, say};
 
 /// Runs `cargo xtask test` with the words that follow it.
 pub(crate) fn command(words: &[&str]) -> ExitCode {
     match choose(words) {
         Ok(Choice::List) => {
-            STEPS.iter().for_each(|step| println!("{:10} {}", step.name, step.does));
+            let quick = |step: &Step| if step.when == When::Quick { "quick" } else { "--all" };
+            STEPS.iter().for_each(|step| println!("{:10} {}  {}", step.name, quick(step), step.does));
             ExitCode::SUCCESS
         }
         Ok(Choice::Run(steps)) => run(&steps),
+        Ok(Choice::Since(revision)) => since::command(&revision),
         Err(message) => {
             eprintln!("{message}");
             ExitCode::from(2)
@@ -24,74 +29,107 @@ pub(crate) fn command(words: &[&str]) -> ExitCode {
 enum Choice {
     List,
     Run(Vec<&'static Step>),
+    Since(String),
 }
 
 fn choose(words: &[&str]) -> Result<Choice, String> {
     let mut steps = Vec::new();
+    let mut all = false;
     let mut words = words.iter();
     while let Some(&word) = words.next() {
         match word {
             "--list" => return Ok(Choice::List),
+            "--all" => all = true,
+            "--timings" => libtest::time_all(),
+            "--quick-since" => {
+                let revision = words.next().ok_or("--quick-since needs a revision of git, such as HEAD")?;
+                return Ok(Choice::Since((*revision).to_owned()));
+            }
             "--only" => {
                 let name = words.next().ok_or("--only needs the name of a step: see cargo xtask test --list")?;
                 let step = STEPS.iter().find(|step| step.name == *name);
                 steps.push(step.ok_or(format!("no step is called {name}: see cargo xtask test --list"))?);
             }
-            other => return Err(format!("unknown option {other}: --only STEP and --list are the ones there are")),
+            other => {
+                let known = "--all, --only STEP, --quick-since REVISION, --timings and --list are the ones there are";
+                return Err(format!("unknown option {other}: {known}"));
+            }
         }
     }
-    Ok(Choice::Run(if steps.is_empty() { STEPS.iter().collect() } else { steps }))
+    if steps.is_empty() {
+        steps = STEPS.iter().filter(|step| all || step.when == When::Quick).collect();
+    }
+    Ok(Choice::Run(steps))
 }
 
-fn run(steps: &[&Step]) -> ExitCode {
-    let mut rows = Vec::new();
-    for (number, step) in steps.iter().enumerate() {
-        println!("[{}/{}] {}: {}", number + 1, steps.len(), step.name, step.does);
-        let start = Instant::now();
-        let tally = (step.run)();
-        let took = start.elapsed();
-        println!("        {} in {}", tally.verdict(), seconds(took));
+fn run(steps: &[&'static Step]) -> ExitCode {
+    let start = Instant::now();
+    let of = |when: When| steps.iter().copied().filter(move |step| step.when == when);
+    let rows = Mutex::new(Vec::new());
+    of(When::Quick).for_each(|step| run_one(step, false, &rows));
+    let (busy, waiting): (Vec<_>, Vec<_>) = (of(When::Busy).collect(), of(When::Waiting).collect());
+    let beside = !busy.is_empty() && !waiting.is_empty();
+    std::thread::scope(|scope| {
+        scope.spawn(|| waiting.iter().for_each(|step| run_one(step, beside, &rows)));
+        busy.iter().for_each(|step| run_one(step, beside, &rows));
+    });
+    let rows = rows.into_inner().unwrap_or_default();
+    let ended = conclude(&rows, start.elapsed());
+    let left_out: Vec<&str> = STEPS.iter().map(|step| step.name).filter(|name| !ran(&rows, name)).collect();
+    if !left_out.is_empty() {
+        println!("left out: {} (cargo xtask test --all runs everything)", left_out.join(", "));
+    }
+    // The count is the last line.
+    println!("{}", sum(&rows).summary());
+    ended
+}
+
+fn ran(rows: &[Row], name: &str) -> bool {
+    rows.iter().any(|(ran, ..)| *ran == name)
+}
+
+/// Runs a step; `beside` others, each of its lines begins with its name.
+fn run_one(step: &'static Step, beside: bool, rows: &Mutex<Vec<Row>>) {
+    println!("[{}] {}", step.name, step.does);
+    say::work_for(beside.then_some(step.name));
+    let start = Instant::now();
+    let tally = (step.run)();
+    let took = start.elapsed();
+    println!("[{}] {} in {}", step.name, tally.verdict(), seconds(took));
+    if let Ok(mut rows) = rows.lock() {
         rows.push((step.name, took, tally));
     }
-    print_table(&rows);
-    let mut sum = Tally::default();
-    rows.iter().for_each(|(_, _, tally)| sum.add(tally));
-    println!("{}", sum.summary());
-    if sum.failed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
-}
-
-fn print_table(rows: &[(&str, Duration, Tally)]) {
-    println!("\n{:10} {:8} {:>8} {:>7} {:>7} {:>8}  note", "step", "result", "time", "passed", "failed", "skipped");
-    for (name, took, tally) in rows {
-        let Tally { passed, failed, skipped, note } = tally;
-        println!("{name:10} {:8} {:>8} {passed:>7} {failed:>7} {skipped:>8}  {note}", tally.verdict(), seconds(*took));
-    }
-    println!();
-}
-
-fn seconds(duration: Duration) -> String {
-    format!("{:.1} s", duration.as_secs_f64())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn names(words: &[&str]) -> Vec<&'static str> {
+        let Ok(Choice::Run(steps)) = choose(words) else { panic!("expected steps") };
+        steps.iter().map(|step| step.name).collect()
+    }
+
+    fn refusal(words: &[&str]) -> String {
+        choose(words).err().expect("it is refused")
+    }
+
     #[test]
-    fn without_options_every_step_runs() {
-        let Ok(Choice::Run(steps)) = choose(&[]) else { panic!("expected steps") };
-        assert_eq!(steps.len(), STEPS.len());
+    fn without_options_the_quick_list_runs_and_with_all_every_step() {
+        assert_eq!(names(&[]), ["fmt", "tidy", "tests", "doctests", "demo"]);
+        assert_eq!(names(&["--all"]).len(), STEPS.len());
     }
 
     #[test]
     fn only_the_named_steps_run_in_the_order_given() {
-        let Ok(Choice::Run(steps)) = choose(&["--only", "tidy", "--only", "fmt"]) else { panic!("expected steps") };
-        assert_eq!(steps.iter().map(|step| step.name).collect::<Vec<_>>(), ["tidy", "fmt"]);
+        assert_eq!(names(&["--only", "tidy", "--only", "fmt"]), ["tidy", "fmt"]);
     }
 
     #[test]
-    fn a_step_that_does_not_exist_is_refused_with_the_way_to_find_them() {
-        let Err(message) = choose(&["--only", "tidyy"]) else { panic!("expected a refusal") };
+    fn what_does_not_exist_is_refused_with_the_way_to_find_it() {
+        let message = refusal(&["--only", "tidyy"]);
         assert!(message.contains("tidyy") && message.contains("--list"), "{message}");
+        let message = refusal(&["--fast"]);
+        assert!(message.contains("--fast") && message.contains("--all"), "{message}");
     }
 }

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
-use crate::{process, python, workspace};
+use crate::{process, program, python, workspace};
 
 /// The environment of the tool, which reads the versions of the symbols that program and module want.
 const VENV: &str = "auditwheel-venv";
@@ -12,8 +12,10 @@ const PACKAGES: &str = "auditwheel==6.8.2\npatchelf==0.19.3.0\n";
 
 /// `cargo xtask wheel`: the wheel as it is released, in `dist/`.
 pub(crate) fn command() -> ExitCode {
-    let built = python::environment(python::VENV, python::REQUIREMENTS)
-        .and_then(|python| python::wheel(&python, "release", None, &workspace::root().join("dist")));
+    let built = program::of_dist().and_then(|program| {
+        let python = python::environment(python::VENV, python::REQUIREMENTS)?;
+        python::wheel(&python, "dist", Some(&program), &workspace::root().join("dist"))
+    });
     match built {
         Ok(wheel) => {
             let wheel = tag(&wheel).unwrap_or_else(|reason| {

@@ -5,7 +5,7 @@ use cia402::{Controlword, Statusword};
 use master::decode::statusword_words;
 use serde::Serialize;
 
-use crate::paint::Paint;
+use plot::Paint;
 use testbench::models::Description;
 use testbench::words::unit::split_factor;
 

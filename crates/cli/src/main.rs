@@ -15,7 +15,6 @@ mod frames;
 mod global;
 mod guard;
 mod output;
-mod paint;
 mod plain;
 mod progress;
 mod readings;
@@ -26,7 +25,6 @@ mod serve;
 mod session;
 mod signals;
 mod status;
-mod table;
 mod wire;
 mod word_order;
 mod world_bus;
@@ -48,8 +46,8 @@ use crate::context::Context;
 use crate::failure::{Failure, FailureReport};
 use crate::global::Global;
 use crate::output::{Format, Report};
-use crate::paint::Paint;
 use crate::plain::plain;
+use plot::Paint;
 
 fn main() -> ExitCode {
     // A shell asks for what a line may go on with: answered here, and nothing else is done.

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 
-use crate::paint::Paint;
+use plot::Paint;
 
 /// A value that a command prints.
 pub(crate) trait Report: Serialize {

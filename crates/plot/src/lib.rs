@@ -1,4 +1,5 @@
-//! Time plots as SVG: a poster of figures, each with stacked panels over one time axis, named sections and marked events.
+//! What a person looks at: time plots as SVG (a poster of figures, each with stacked panels over one time axis, named
+//! sections and marked events), and tables with columns and colours for a terminal ([`Table`], [`Paint`]).
 //!
 //! A [`Poster`] is plain data in; [`Poster::to_svg`] is text out. It has its own light background, so that it
 //! reads the same on a white page and in a dark one, and holds no script and no fonts. Long traces are thinned to
@@ -18,12 +19,16 @@
 mod draw;
 mod lanes;
 mod page;
+mod paint;
 mod poster;
 mod svg;
+mod table;
 mod thin;
 mod ticks;
 
+pub use paint::Paint;
 pub use poster::{Colour, Event, EventKind, Figure, Panel, Poster, Section, Style, Trace};
+pub use table::Table;
 
 impl Poster {
     /// The picture, as the text of an SVG file.

@@ -1,7 +1,7 @@
 """How many lines of news a control connection carries: values of one drive every 100 us of the bus's time, taken with --clock manual, so
 that nothing is dropped; lines a second of the wall clock, and how fast the bus went meanwhile.
 
-    python crates/python/benches/control_news.py target/release/ferrodrive
+    python crates/python/benches/control_news.py target/dist/ferrodrive
 """
 
 import json

@@ -1,10 +1,11 @@
-"""The build backend (PEP 517): maturin's, and the command line in the wheel beside the Python package.
+"""The build backend (PEP 517): maturin's, with cargo's profile chosen here.
 
-`pip install .` in a clone comes here. The binary is built first, by the same cargo and in the same profile, and put where
-maturin takes the scripts of a wheel from.
+`pip install .` in a clone builds the Python module alone, in the profile of the tests (`dev`: what computes is optimised, the rest is
+not), which takes about a minute. The command line is one that is there: `cargo install --path crates/cli`, or that of a release,
+whose wheel has it.
 
-`FERRODRIVE_PROFILE` names a cargo profile other than `release`: `dev` builds in a tenth of the time, for tests.
-`FERRODRIVE_PROGRAM` names a binary that is built already, to be taken instead: tests have one, and a release may have a better one.
+`FERRODRIVE_PROFILE` names another profile of cargo: `release`, or `dist` for what is released.
+`FERRODRIVE_PROGRAM` names a built command line that goes into the wheel.
 """
 
 import os
@@ -49,22 +50,15 @@ def build_sdist(sdist_directory, config_settings=None):
 
 
 def prepare():
-    """Builds the command line and puts it among the scripts. Returns the cargo profile."""
-    profile = os.environ.get("FERRODRIVE_PROFILE", "release")
-    target = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-    # Both builds share what they can: the crates below the Python module are the same.
-    os.environ["CARGO_TARGET_DIR"] = str(target)
-    # The module is a workspace of its own; it takes the versions of the project's, and has no others to keep.
-    shutil.copyfile(ROOT / "Cargo.lock", ROOT / "crates" / "python" / "Cargo.lock")
-    built = os.environ.get("FERRODRIVE_PROGRAM")
-    if built is None:
-        command = ["cargo", "build", "--locked", "--profile", profile, "--package", "ferrodrive", "--bin", "ferrodrive"]
-        subprocess.run(command, cwd=ROOT, check=True)
-        built = target / ("debug" if profile == "dev" else profile) / PROGRAM
-    SCRIPTS.mkdir(parents=True, exist_ok=True)
-    shutil.copy2(built, SCRIPTS / PROGRAM)
-    if profile == "dev":
-        strip(SCRIPTS / PROGRAM)
+    """Puts the command line among the scripts of the wheel, if one is named. Returns the cargo profile."""
+    profile = os.environ.get("FERRODRIVE_PROFILE", "dev")
+    os.environ.setdefault("CARGO_TARGET_DIR", str(ROOT / "target"))
+    shutil.rmtree(SCRIPTS, ignore_errors=True)
+    SCRIPTS.mkdir(parents=True)
+    if built := os.environ.get("FERRODRIVE_PROGRAM"):
+        shutil.copy2(built, SCRIPTS / PROGRAM)
+        if profile == "dev":
+            strip(SCRIPTS / PROGRAM)
     return profile
 
 
@@ -75,7 +69,7 @@ def strip(program):
 
 
 def with_profile(config_settings, profile):
-    """The settings with `--profile` in maturin's words, unless the caller gave arguments of his own."""
+    """The settings with profile and lock file in maturin's words, unless the caller gave arguments of his own."""
     settings = dict(config_settings or {})
-    settings.setdefault("build-args", f"--profile {profile}")
+    settings.setdefault("build-args", f"--profile {profile} --locked")
     return settings

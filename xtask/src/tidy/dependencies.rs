@@ -44,6 +44,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &["can", "canopen", "cia402", "motion", "plant", "devices", "eds", "drives", "sim", "master", "plot"],
     ),
     ("studio", &["can", "canopen", "cia402", "devices", "master", "testbench"]),
+    ("python", &["can", "canopen", "cia402", "devices", "eds", "master", "sim", "testbench", "transport"]),
     (
         "cli",
         &[

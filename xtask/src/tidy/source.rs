@@ -30,10 +30,10 @@ impl Source {
         }
     }
 
-    /// The crate's folder name if this is a file of `crates/NAME/src`.
+    /// The crate's folder name if this is a file of `crates/NAME/src`, and not the program of a crate that is a library else.
     pub(crate) fn library(&self) -> Option<&str> {
         let (name, rest) = self.path.strip_prefix("crates/")?.split_once('/')?;
-        rest.starts_with("src/").then_some(name)
+        (rest.starts_with("src/") && (name == "cli" || rest != "src/main.rs")).then_some(name)
     }
 
     /// The 1-based line of a byte offset.

@@ -6,6 +6,8 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use crate::say::say;
+
 use super::image::Image;
 
 /// Longest time until the checks begin. An emulated processor on a busy machine boots in one to two minutes.
@@ -41,11 +43,11 @@ pub(super) fn run(image: &Image, checks: &str) -> Result<Output, String> {
     let mut started = false;
     while guest.0.try_wait().map_err(|error| error.to_string())?.is_none() {
         if !started && let Some(uptime) = told("started") {
-            println!(
-                "   the guest has started ({} s by its clock, {:.0} s by ours)",
+            say(format_args!(
+                "the guest has started ({} s by its clock, {:.0} s by ours)",
                 uptime.trim(),
                 began.elapsed().as_secs_f64()
-            );
+            ));
             (started, limit) = (true, Instant::now() + CHECKS_LIMIT);
         }
         if Instant::now() > limit {

@@ -6,6 +6,7 @@ use std::process::Command;
 
 use crate::debian;
 use crate::process::{self, quietly};
+use crate::say::say;
 
 /// Raised when what is kept has to be made anew.
 const FORMAT: u32 = 3;
@@ -46,7 +47,7 @@ pub(super) fn prepare(folder: &Path) -> Result<Image, String> {
     if image.initrd.exists() {
         return Ok(image);
     }
-    println!("   fetching the guest's kernel (once, some 70 MB)");
+    say("fetching the guest's kernel (once, some 70 MB)");
     let work = folder.with_extension("making");
     let _ = fs::remove_dir_all(&work);
     let made = fs::create_dir_all(work.join("packages")).map_err(|error| format!("{}: {error}", work.display()));

@@ -10,11 +10,12 @@ mod image;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use crate::say::say;
 use crate::tally::Tally;
-use crate::{cargo_tests, process, python, workspace};
+use crate::{libtest, python, test_programs, workspace};
 
-/// The test program that is run inside: that of the command line.
-const TESTS: &str = "socketcan";
+/// The tests that are run inside.
+const TESTS: &str = "socketcan::";
 
 /// canopen-python on the same interfaces.
 const PEER: &str = "tests/peers/on_socketcan.py";
@@ -39,7 +40,7 @@ pub(crate) fn step() -> Tally {
     };
     let peer = python::environment("peers-venv", PEER_REQUIREMENTS);
     let checks = checks(&tests, peer.as_ref().ok());
-    println!("   booting a guest with CAN interfaces");
+    say("booting a guest with CAN interfaces");
     let output = match guest::run(&image, &checks) {
         Ok(output) => output,
         Err(error) => return Tally::failed(error),
@@ -51,16 +52,10 @@ pub(crate) fn step() -> Tally {
     tally
 }
 
-/// The tests, built as the test step builds them.
+/// The program with the tests of processes, one of which are those that are run inside.
 fn test_program() -> Result<PathBuf, String> {
-    let mut cargo = workspace::cargo();
-    // All packages are named, so that nothing is built again with other features than the test step's.
-    cargo.args(["test", "--workspace", "--test", TESTS, "--no-run", "--quiet"]);
-    let messages = process::output(cargo.arg("--message-format=json"))?;
-    let programs = messages.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
-    let mut ours = programs.filter(|message| message["target"]["name"] == TESTS && message["profile"]["test"] == true);
-    let program = ours.find_map(|message| message["executable"].as_str().map(PathBuf::from));
-    program.ok_or_else(|| format!("cargo built no test program `{TESTS}`"))
+    let mut programs = test_programs::build(test_programs::REAL_TIME)?;
+    programs.pop().map(|program| program.path).ok_or_else(|| "cargo built no tests of processes".to_owned())
 }
 
 /// What the guest runs, as a shell script. Each line of its output says how a check ended.
@@ -70,7 +65,7 @@ fn checks(tests: &Path, python: Option<&PathBuf>) -> String {
     let quoted = |path: &Path| format!("'{}'", path.display().to_string().replace('\'', "'\\''"));
     let mut script =
         format!("export PATH={}:/usr/sbin:/sbin HOME=/tmp\ncd {}\n", quoted(Path::new(&path)), quoted(&root));
-    script += &format!("{} --ignored --test-threads=1\nstatus=$?\n", quoted(tests));
+    script += &format!("{} {TESTS} --ignored --test-threads=1\nstatus=$?\n", quoted(tests));
     if let Some(python) = python {
         let program = workspace::target().join("debug/ferrodrive");
         script += &format!(
@@ -88,9 +83,9 @@ fn read(output: &guest::Output) -> Tally {
     let mut tally = Tally::default();
     let mut failed = Vec::new();
     for line in output.text.lines() {
-        println!("   {line}");
-        cargo_tests::count(line, &mut tally);
-        failed.extend(cargo_tests::failed_test(line));
+        say(line);
+        libtest::count(line, &mut tally);
+        failed.extend(libtest::failed_test(line));
         crate::peers::count(line, &mut tally);
     }
     if !output.ended_well && tally.failed == 0 {

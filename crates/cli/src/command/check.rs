@@ -9,10 +9,10 @@ use testbench::document::{BadFile, read_text};
 use crate::failure::{Failure, FailureBody};
 use crate::global::Global;
 use crate::output::Report;
-use crate::paint::Paint;
 use crate::plain::plain;
 use crate::session;
-use crate::table::Table;
+use plot::Paint;
+use plot::Table;
 use transport::BusSpec;
 
 /// Check the description of a bus: a bus.yml of ros2_canopen with its data sheets, or a machine file

@@ -9,9 +9,9 @@ use transport::log::{Content, Entry};
 use crate::command::dump::{open_log, unreadable};
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
 use crate::plain::plain;
 use crate::recording::{LogPath, log_path};
+use plot::Paint;
 
 /// Write a log file in another form
 ///

@@ -14,9 +14,9 @@ use super::eds::source;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
 use crate::plain::plain;
-use crate::table::Table;
+use plot::Paint;
+use plot::Table;
 use testbench::models::Description;
 use testbench::words::node::node;
 

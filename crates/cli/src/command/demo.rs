@@ -1,20 +1,20 @@
 //! `ferrodrive demo`: every procedure of the manuals against the virtual drives.
 
-mod report;
-
 use std::io::Write;
 use std::path::PathBuf;
 
 use clap::builder::PossibleValuesParser;
+use plot::Paint;
+use serde::Serialize;
 use sim::machine::models;
 use transport::WallClock;
 
-use crate::failure::Failure;
+use crate::failure::{Failure, FailureBody};
 use crate::global::Global;
+use crate::output::Report;
 use crate::progress::Progress;
 use crate::serve::files::create_picture;
 use crate::session::exit_on_signal;
-use report::DemoReport;
 use testbench::models::resolve;
 
 /// Show the whole thing on an embedded virtual bus: every procedure of the three manuals against the three drives
@@ -48,6 +48,40 @@ impl Demo {
             .and_then(|mut file| file.write_all(showcase.poster.to_svg().as_bytes()))
             .map_err(|error| Failure::of_writing("the picture", &self.svg, &error))?;
         let (svg, took_s) = (self.svg.display().to_string(), clock.now().as_secs_f64());
-        Ok(DemoReport::new(showcase.parts, svg, took_s))
+        Ok(DemoReport::from(showcase::Report::new(showcase.parts, svg, took_s)))
     }
+}
+
+/// What the demo found, and why it failed if it did.
+#[derive(Debug, Serialize)]
+pub(crate) struct DemoReport {
+    #[serde(flatten)]
+    found: showcase::Report,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<FailureBody>,
+}
+
+impl From<showcase::Report> for DemoReport {
+    fn from(found: showcase::Report) -> Self {
+        let error = (!found.ok).then(|| (&differs()).into());
+        Self { found, error }
+    }
+}
+
+impl DemoReport {
+    /// Why the demo failed, if it did.
+    pub(crate) fn failure(&self) -> Option<Failure> {
+        (!self.found.ok).then(differs)
+    }
+}
+
+impl Report for DemoReport {
+    fn text(&self, paint: Paint) -> String {
+        self.found.text(paint)
+    }
+}
+
+fn differs() -> Failure {
+    let failure = Failure::new("the drives did not do everything as their manuals say");
+    Failure { kind: "differs", ..failure.next("look for DIFFERS in the table, or for \"ok\":false in the rows") }
 }

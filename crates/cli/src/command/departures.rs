@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use crate::output::Report;
-use crate::paint::Paint;
-use crate::table::Table;
+use plot::Paint;
+use plot::Table;
 use testbench::models::Description;
 
 /// All departures of a model.

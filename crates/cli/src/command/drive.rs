@@ -11,7 +11,7 @@ use super::sdo::guessed;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
+use plot::Paint;
 use testbench::words::node::node;
 
 /// Show what a drive says of itself: power state, fault with remedy, position, speed, current, temperatures, supply

@@ -19,8 +19,8 @@ use crate::failure::Failure;
 use crate::global::Global;
 use crate::guard::{GuardArgs, GuardReport};
 use crate::output::{Format, Report};
-use crate::paint::Paint;
 use crate::session;
+use plot::Paint;
 
 /// From one SYNC to the next where neither the file nor the command line says it.
 const PERIOD: Duration = Duration::from_millis(10);

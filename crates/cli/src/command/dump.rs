@@ -19,11 +19,11 @@ use crate::frames::filter::Filter;
 use crate::frames::stamp::{Stamps, TimeForm};
 use crate::global::Global;
 use crate::output::{Format, Report};
-use crate::paint::Paint;
 use crate::plain::plain;
 use crate::recording::{CommandLog, LogPath, Pace, interface_of};
 use crate::session::{bus_failure, enter_real_time, exit_on_signal, runtime, virtual_world};
 use crate::signals::asked_to_end;
+use plot::Paint;
 use testbench::machine_file::Machine;
 
 /// Show the bus decoded: SDO with object names and values, PDOs by their mapping, statuswords in words

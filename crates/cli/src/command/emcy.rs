@@ -15,7 +15,7 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::frames::stamp::{Stamps, TimeForm};
 use crate::output::{Format, Report};
-use crate::paint::Paint;
+use plot::Paint;
 use testbench::words::node::{Nodes, node, nodes};
 
 /// Show emergency messages: as they come, or those that a node remembers

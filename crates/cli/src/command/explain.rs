@@ -11,8 +11,8 @@ use serde::Serialize;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
-use crate::table::Table;
+use plot::Paint;
+use plot::Table;
 use testbench::words::node::node;
 
 /// Explain why a drive does not move, and why its PDOs are silent

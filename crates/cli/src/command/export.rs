@@ -9,7 +9,7 @@ use testbench::words::node::node;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
+use plot::Paint;
 
 /// Write what is on the bus in another program's form
 #[derive(Debug, clap::Args)]

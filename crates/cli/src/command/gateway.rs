@@ -20,7 +20,7 @@ use wish::Wish;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::{Format, Report};
-use crate::paint::Paint;
+use plot::Paint;
 
 /// Let other programs reach the bus as text over TCP (CiA 309-3)
 ///

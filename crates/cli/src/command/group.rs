@@ -20,9 +20,9 @@ use crate::failure::Failure;
 use crate::global::Global;
 use crate::guard::{Guard, GuardArgs, GuardReport};
 use crate::output::{Format, Report};
-use crate::paint::Paint;
 use crate::session;
-use crate::table::Table;
+use plot::Paint;
+use plot::Table;
 
 /// What counts where neither the file nor the command line says it.
 const PERIOD: Duration = Duration::from_millis(5);

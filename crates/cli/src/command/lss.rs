@@ -13,8 +13,8 @@ use serde::Serialize;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
-use crate::table::Table;
+use plot::Paint;
+use plot::Table;
 use testbench::words::node::node;
 
 /// Find devices by their LSS address, and set their node-ID and bit rate (CiA 305)

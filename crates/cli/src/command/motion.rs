@@ -15,7 +15,7 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::guard::{Guard, GuardArgs, GuardReport};
 use crate::output::Report;
-use crate::paint::Paint;
+use plot::Paint;
 use testbench::models::is_from_file;
 use testbench::words::node::node;
 

@@ -12,7 +12,7 @@ use serde::Serialize;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
+use plot::Paint;
 use testbench::words::node::{Nodes, nodes};
 
 /// Send a network management command to one node or to all

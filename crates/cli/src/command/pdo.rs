@@ -19,8 +19,8 @@ use crate::decode::{self, decode};
 use crate::failure::Failure;
 use crate::frames::stamp::{Stamps, TimeForm};
 use crate::output::{Format, Report};
-use crate::paint::Paint;
-use crate::table::Table;
+use plot::Paint;
+use plot::Table;
 use testbench::words::node::node;
 
 /// Show how a node's PDOs are set up and why one stays away, what they carry as they come, or set them up

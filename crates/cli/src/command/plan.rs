@@ -20,9 +20,9 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::global::Global;
 use crate::output::{Format, Report};
-use crate::paint::Paint;
 use crate::session;
-use crate::table::Table;
+use plot::Paint;
+use plot::Table;
 
 /// Plan a bus: its load, the longest time of every frame, and how many such drives it carries
 ///

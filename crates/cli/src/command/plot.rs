@@ -8,7 +8,7 @@ use testbench::recording::{Kind, Recorded, picture, read};
 
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
+use plot::Paint;
 
 /// Draw a record of --record: a figure for each node, a panel for each quantity
 ///

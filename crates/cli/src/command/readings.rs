@@ -5,8 +5,8 @@ use serde::Serialize;
 
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
 use crate::readings::{self, Reading};
+use plot::Paint;
 use testbench::models::{Description, resolve};
 
 /// List where a model's manual is silent or contradicts itself, what is done there, and what can be chosen

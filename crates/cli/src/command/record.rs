@@ -22,10 +22,10 @@ use testbench::words::unit::split_factor;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
 use crate::recording::{ObjectBatch, ObjectRecord};
 use crate::serve::files::create_record;
 use crate::serve::speaker::Speaker;
+use plot::Paint;
 
 /// Record objects of a node over time
 ///

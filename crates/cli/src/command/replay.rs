@@ -17,7 +17,7 @@ use crate::command::dump::{open_log, unreadable};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
+use plot::Paint;
 
 /// Send the frames of a log again, at the distance in time that they had
 ///

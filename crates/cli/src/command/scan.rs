@@ -10,9 +10,9 @@ use tokio::sync::broadcast::error::RecvError;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
-use crate::table::Table;
 use heard::{Counted, Heard};
+use plot::Paint;
+use plot::Table;
 use testbench::models::{Description, how_to_say};
 
 /// Show who is on the bus

@@ -15,7 +15,7 @@ use crate::context::Context;
 use crate::decode::{Decoded, decode};
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
+use plot::Paint;
 use testbench::words::node::node;
 use testbench::words::object::{ObjectArg, object};
 use testbench::words::value::{Typed, typed_alone, typed_for};

@@ -7,7 +7,7 @@ use super::repeat::{Pace, Repeat};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
+use plot::Paint;
 
 /// Send frames as they are
 ///

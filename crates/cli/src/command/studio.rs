@@ -18,8 +18,8 @@ use super::params::journal::{Kept, default_path};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::{Format, Report};
-use crate::paint::Paint;
 use crate::recording::interface_of;
+use plot::Paint;
 
 /// Show and move drives in the browser
 ///

@@ -17,8 +17,8 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::global::Global;
 use crate::output::{Format, Report};
-use crate::paint::Paint;
 use crate::session;
+use plot::Paint;
 
 /// Boot the nodes of a network, then watch them: heartbeats, errors, and who comes back
 ///

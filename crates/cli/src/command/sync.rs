@@ -9,7 +9,7 @@ use super::repeat::{Pace, Repeat};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
+use plot::Paint;
 
 /// Send SYNC, once or at a rate
 ///

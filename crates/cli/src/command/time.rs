@@ -12,7 +12,7 @@ use super::sync::identifier;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
+use plot::Paint;
 
 /// Send the time of day to every device that consumes it (1012h)
 #[derive(Debug, clap::Args)]

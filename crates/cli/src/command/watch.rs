@@ -14,9 +14,9 @@ use crate::context::Context;
 use crate::decode::{Decoded, decode};
 use crate::failure::Failure;
 use crate::output::{Format, Report};
-use crate::paint::Paint;
 use crate::progress::Screen;
-use crate::table::Table;
+use plot::Paint;
+use plot::Table;
 use testbench::words::node::node;
 use testbench::words::object::{ObjectArg, object};
 

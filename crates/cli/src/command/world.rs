@@ -7,8 +7,8 @@ use sim::command::Command;
 use crate::control_client::ControlArgs;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
 use crate::session::exit_on_signal;
+use plot::Paint;
 
 /// Say to a running simulator what happens to its drives: supply, load, switches, faults, cables
 ///

@@ -13,8 +13,8 @@ use master::decode::Decoder;
 use tokio::sync::broadcast;
 
 use super::stamp::Stamps;
-use crate::paint::Paint;
 use crate::progress::Progress;
+use plot::Paint;
 
 /// Frames kept for a command that does not come to take them; a further one replaces the oldest.
 const KEPT: usize = 1 << 16;

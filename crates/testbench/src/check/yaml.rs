@@ -15,11 +15,19 @@ pub(super) struct Entry<'a> {
     pub(super) value: Node<'a>,
 }
 
+/// Most columns before the first key or value of a line. Each level of a block takes one at least, and the reader of YAML, which
+/// bounds the depth of lists in brackets by itself, takes a piece of the stack for each.
+const MOST_INDENTED: usize = 200;
+
 /// Reads a file and hands its one document to `look`.
 ///
 /// # Errors
-/// It is no YAML, or not one document.
+/// It is not YAML, nested too deep, or not one document.
 pub(super) fn with_document<T>(text: &str, look: impl FnOnce(Node<'_>) -> T) -> Result<T, BadFile> {
+    if let Some(line) = text.lines().position(|line| indentation(line) > MOST_INDENTED) {
+        let what = format!("indented by more than {MOST_INDENTED} columns; expected the few levels of a bus");
+        return Err(bad(text, line + 1, MOST_INDENTED, what));
+    }
     let documents = MarkedYaml::load_from_str(text).map_err(|error| {
         let at = error.marker();
         bad(text, at.line(), at.col(), format!("this is no YAML: {}", error.info()))
@@ -37,6 +45,11 @@ pub(super) fn with_document<T>(text: &str, look: impl FnOnce(Node<'_>) -> T) -> 
             Err(bad(text, at.line(), at.col(), "a second document begins here; a bus is one document"))
         }
     }
+}
+
+/// The columns that open blocks: blanks, and the marks of items (`- - a` are two levels) and of keys.
+fn indentation(line: &str) -> usize {
+    line.bytes().take_while(|byte| b" -?:".contains(byte)).count()
 }
 
 fn bad(text: &str, line: usize, column: usize, what: impl Into<String>) -> BadFile {

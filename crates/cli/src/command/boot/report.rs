@@ -4,8 +4,8 @@ use master::boot::{self, BootPlan, ErrorStatus, Step, Verdict};
 use serde::Serialize;
 
 use crate::output::Report;
-use crate::paint::Paint;
-use crate::table::Table;
+use plot::Paint;
+use plot::Table;
 
 /// What came of a boot-up.
 #[derive(Debug, Serialize)]

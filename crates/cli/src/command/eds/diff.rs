@@ -7,9 +7,9 @@ use serde::Serialize;
 use super::source;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
 use crate::plain::plain;
-use crate::table::Table;
+use plot::Paint;
+use plot::Table;
 
 /// Compare two EDS or DCF files, or one with a model: objects, types, access, defaults, limits, PDOs
 ///

@@ -8,9 +8,9 @@ use serde::Serialize;
 use super::source;
 use crate::failure::{Failure, FailureBody};
 use crate::output::Report;
-use crate::paint::Paint;
 use crate::plain::plain;
-use crate::table::Table;
+use plot::Paint;
+use plot::Table;
 
 /// Say what is wrong with EDS and DCF files, with lines, and what is taken instead
 ///

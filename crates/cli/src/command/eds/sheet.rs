@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
+use plot::Paint;
 use testbench::models::{Description, resolve};
 use testbench::words::drive::DriveSpec;
 use testbench::words::node::node;

@@ -7,9 +7,9 @@ use serde::Serialize;
 use super::source;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
 use crate::plain::plain;
-use crate::table::Table;
+use plot::Paint;
+use plot::Table;
 use testbench::words::object::{ObjectArg, object};
 
 /// Show the device and the objects of an EDS or DCF file

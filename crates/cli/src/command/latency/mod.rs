@@ -15,9 +15,9 @@ use testbench::words::node::node;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
-use crate::table::Table;
 use measure::Measurement;
+use plot::Paint;
+use plot::Table;
 use spread::{Bin, Spread};
 
 /// Measure how long answers take on this bus, and how evenly SYNC comes

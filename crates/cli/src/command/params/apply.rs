@@ -17,8 +17,8 @@ use super::{Prove, source};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
 use crate::plain::plain;
+use plot::Paint;
 
 /// How long after its boot-up message a drive is left alone.
 const SETTLED: Duration = Duration::from_millis(100);

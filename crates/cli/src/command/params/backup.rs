@@ -9,8 +9,8 @@ use crate::command::dcf::{exists, keep};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
 use crate::plain::plain;
+use plot::Paint;
 
 /// What was read.
 #[derive(Debug, Serialize)]

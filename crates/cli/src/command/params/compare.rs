@@ -13,9 +13,9 @@ use super::source;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
 use crate::plain::plain;
-use crate::table::Table;
+use plot::Paint;
+use plot::Table;
 use testbench::words::node::node;
 
 /// In what two sets of parameters differ.

@@ -14,8 +14,8 @@ use super::source;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
 use crate::plain::plain;
+use plot::Paint;
 
 /// Where the journal of a node is, if nobody says another place.
 pub(in crate::command) fn default_path(node: NodeId) -> PathBuf {

@@ -11,9 +11,9 @@ use super::source;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
 use crate::plain::plain;
-use crate::table::Table;
+use plot::Paint;
+use plot::Table;
 
 /// What would be written.
 #[derive(Debug, Serialize)]

@@ -6,7 +6,7 @@ use devices::Description;
 use serde::Serialize;
 
 use crate::decode::decode;
-use crate::paint::Paint;
+use plot::Paint;
 
 /// A value as it is printed: the bytes of the wire, and what they mean.
 #[derive(Clone, Debug, Serialize)]

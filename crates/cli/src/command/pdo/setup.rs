@@ -21,8 +21,8 @@ use crate::command::params::{PlanReport, Transaction, plan_of};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
-use crate::table::Table;
+use plot::Paint;
+use plot::Table;
 
 /// What is to be set up.
 #[derive(Debug, clap::Args)]

@@ -8,8 +8,8 @@ use testbench::scenario::{Outcome, OutcomeReport, Verdict};
 
 use crate::failure::Failure;
 use crate::output::Report;
-use crate::paint::Paint;
-use crate::table::Table;
+use plot::Paint;
+use plot::Table;
 
 /// An outcome and the file that it came from.
 pub(super) struct RunReport<'a> {

@@ -10,9 +10,9 @@ use super::loaded::{Loaded, unbuildable, write};
 use super::report::RunReport;
 use crate::failure::{Failure, FailureBody};
 use crate::output::{Format, Report};
-use crate::paint::Paint;
 use crate::progress::Progress;
-use crate::table::Table;
+use plot::Paint;
+use plot::Table;
 
 /// What came of one file; `None` while nothing has.
 type Ended = Option<Result<Outcome, Failure>>;

@@ -10,9 +10,9 @@ use testbench::sweep::{Summary, Sweep, SweepReport, Worst};
 use super::crew::Crew;
 use crate::failure::Failure;
 use crate::output::{Format, Report};
-use crate::paint::Paint;
 use crate::progress::Progress;
-use crate::table::Table;
+use plot::Paint;
+use plot::Table;
 
 /// Runs between two changes of the line that tells the progress.
 const RUNS_A_LOOK: u64 = 16;

@@ -1,0 +1,193 @@
+//! Data sheets on the command line: written, checked, shown, compared; and a device's values as a DCF.
+
+use std::path::PathBuf;
+
+use processes::{done, ferrodrive};
+
+/// A folder of its own for a test's files.
+fn folder(name: &str) -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("eds").join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("a folder for files");
+    folder
+}
+
+fn file(folder: &std::path::Path, name: &str, text: impl AsRef<[u8]>) -> String {
+    let path = folder.join(name);
+    std::fs::write(&path, text).expect("a file");
+    path.to_str().expect("a name of letters").to_owned()
+}
+
+const SMALL: &str = "[FileInfo]\nFileName=a.eds\n[MandatoryObjects]\nSupportedObjects=3\n1=0x1000\n2=0x1001\n3=0x1018\n\
+    [1000]\nParameterName=Device type\nDataType=7\nAccessType=ro\nDefaultValue=0x20192\n\
+    [1001]\nParameterName=Error register\nDataType=5\nAccessType=ro\n\
+    [1018]\nParameterName=Identity\nObjectType=9\nSubNumber=1\n[1018sub0]\nParameterName=Count\nDataType=5\nAccessType=ro\nDefaultValue=0\n";
+
+#[test]
+fn a_models_sheet_is_written_and_has_nothing_wrong_with_it() {
+    let folder = folder("written");
+    let sheet = done(&["eds", "zlim42c"]).out;
+    assert!(sheet.contains("[1014]\nParameterName=COB-ID emergency message\n") && sheet.ends_with('\n'));
+    assert!(sheet.contains("DefaultValue=$NODEID+0x80\n"));
+    let path = file(&folder, "zlim42c.eds", &sheet);
+    let report = done(&["eds", "lint", "--json", &path]).json();
+    assert_eq!(report["files"][0]["errors"], 0);
+    assert_eq!(done(&["eds", "diff", &path, "zlim42c"]).out, format!("{path} and zlim42c say the same\n"));
+}
+
+#[test]
+fn a_sheet_is_for_one_node_with_choices_and_for_ros2_canopen() {
+    let of_node = done(&["eds", "zlac8030l", "defaults=eds", "6060=3", "--node", "4"]).out;
+    assert!(of_node.contains("DefaultValue=0x84\n") && !of_node.contains("$NODEID"));
+    let object = |text: &str, section: &str| {
+        text.split(&format!("[{section}]\n"))
+            .nth(1)
+            .map(|rest| rest.split("\n\n").next().unwrap_or_default().to_owned())
+    };
+    assert!(object(&of_node, "2014").is_some_and(|lines| lines.contains("DefaultValue=300")));
+    assert!(object(&of_node, "6060").is_some_and(|lines| lines.contains("DefaultValue=3")));
+    let variant = done(&["eds", "zlac8030l", "--variant", "ros2_canopen"]).out;
+    assert!(object(&variant, "6502").is_some_and(|lines| lines.contains("DefaultValue=13")));
+    let report = done(&["eds", "zlac8030l", "--json"]).json();
+    assert_eq!((report["model"].as_str(), report["file_name"].as_str()), (Some("zlac8030l"), Some("zlac8030l.eds")));
+}
+
+#[test]
+fn a_file_is_called_as_the_user_calls_it_and_not_as_it_calls_itself() {
+    let folder = folder("called");
+    let path = file(&folder, "wheel.eds", SMALL);
+    let objects = done(&["objects", &path]).out;
+    assert!(objects.contains(&format!("object dictionary of \"the file {path}\"")), "{objects}");
+}
+
+#[test]
+fn what_makes_no_sheet_is_a_usage_error() {
+    for (words, why) in [
+        (&["eds", "zlac8030"][..], "did you mean zlac8030l?"),
+        (&["eds", "zlac8030l", "colour=red"], "takes no 'colour'"),
+        (&["eds", "zlac8030l", "fast"], "KEY=VALUE"),
+        (&["eds", "zlac8030l", "2014=99999"], "2014h:00 of a zlac8030l cannot be 99999"),
+        (&["eds", "--bus", "can0", "zlac8030l"], "--bus means nothing to eds"),
+        (&["eds", "diff", "zlac8030l", "nothing"], "there is no file nothing"),
+    ] {
+        let ended = ferrodrive(words);
+        assert_eq!(ended.status, Some(2), "{words:?}: {}{}", ended.out, ended.err);
+        assert!(ended.err.contains(why), "{words:?}: {}", ended.err);
+    }
+}
+
+#[test]
+fn lint_fails_for_errors_and_with_strict_for_warnings_too() {
+    let folder = folder("lint");
+    let clean = file(&folder, "clean.eds", SMALL);
+    let warned = file(&folder, "warned.eds", SMALL.replace("SupportedObjects=3", "SupportedObjects=0x3"));
+    let wrong = file(&folder, "wrong.eds", SMALL.replace("DataType=5", "DataType=0x99"));
+    let refused = file(&folder, "refused.eds", "no sections");
+    assert_eq!(ferrodrive(&["eds", "lint", &clean, &warned]).status, Some(0));
+    assert_eq!(ferrodrive(&["eds", "lint", "--strict", &clean]).status, Some(0));
+    let ended = ferrodrive(&["eds", "lint", "--strict", &warned]);
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.out.contains("a count is decimal"), "{}", ended.out);
+    let ended = ferrodrive(&["eds", "lint", &clean, &wrong, &refused, "/nowhere.eds"]);
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.err.contains("3 of 4 files with errors"), "{}", ended.err);
+    assert!(
+        ended.out.contains("type 0099h is no data type of a value") && ended.out.contains("UNSIGNED32"),
+        "{}",
+        ended.out
+    );
+    assert!(ended.out.contains("the file has no sections"), "{}", ended.out);
+    let ended = ferrodrive(&["eds", "lint", "--json", &wrong]);
+    let finding = ended.json()["files"][0]["findings"][0].clone();
+    assert_eq!(
+        (ended.status, finding["line"].as_u64(), finding["severity"].as_str()),
+        (Some(1), Some(15), Some("error"))
+    );
+    assert_eq!(ended.err, "", "programs have it in the report");
+}
+
+#[test]
+fn show_finds_objects_by_index_and_word_and_says_the_device() {
+    let folder = folder("show");
+    let path = file(&folder, "small.eds", SMALL);
+    let shown = done(&["eds", "show", &path, "1000"]).out;
+    assert!(shown.contains("1000h:00  Device type  UNSIGNED32  ro      0x20192"), "{shown}");
+    assert!(!shown.contains("1001h"));
+    let report = done(&["eds", "show", "--json", "zlac8030l", "control", "word"]).json();
+    assert_eq!(
+        (report["vendor"].as_str(), report["objects"][0]["object"].as_str()),
+        (Some("ZLTECH"), Some("6040h:00"))
+    );
+    let ended = ferrodrive(&["eds", "show", &path, "zebra"]);
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.err.contains("lists all 3"), "{}", ended.err);
+}
+
+#[test]
+fn a_files_letters_do_not_steer_the_terminal() {
+    let folder = folder("letters");
+    let path = file(&folder, "escape.eds", SMALL.replace("Device type", "Device\u{1b}[31m"));
+    let shown = done(&["eds", "show", &path]).out;
+    assert!(!shown.contains('\u{1b}') && shown.contains("Device\\u{1b}[31m"), "{shown}");
+}
+
+#[test]
+fn a_bomb_is_refused_at_its_line() {
+    let folder = folder("bomb");
+    let path = file(&folder, "bomb.eds", "[1]\n".repeat(1_000_000));
+    let ended = ferrodrive(&["eds", "show", &path]);
+    assert_eq!(ended.status, Some(1));
+    assert!(
+        ended.err.contains("line 40001 is not read as an EDS") && ended.err.contains("more than 40000 sections"),
+        "{}",
+        ended.err
+    );
+}
+
+#[test]
+fn a_devices_values_make_a_dcf_that_is_not_written_over_unasked() {
+    let folder = folder("dcf");
+    let path = folder.join("wheel.dcf").to_str().expect("a name of letters").to_owned();
+    let report = done(&["dcf", "4", "--output", &path, "--name", "left", "--json"]).json();
+    assert_eq!(
+        (report["node"].as_u64(), report["values"].as_u64()),
+        (Some(4), Some(0)),
+        "a fresh drive is as its sheet says"
+    );
+    assert!(report["read"].as_u64().is_some_and(|read| read > 100), "{report}");
+    assert!(report["left_out"].as_array().is_some_and(|objects| objects.iter().any(|object| object == "6040h:00")));
+    let written = std::fs::read_to_string(&path).expect("the file");
+    assert!(written.contains("[DeviceComissioning]\nNodeID=4\nNodeName=left\nBaudrate=500\n"), "{written}");
+    assert!(written.contains("FileName=wheel.dcf\n") && written.contains("LastEDS=zlac8030l.eds\n"));
+
+    let ended = ferrodrive(&["dcf", "4", "--output", &path]);
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.err.contains("is there already") && ended.err.contains("--force"), "{}", ended.err);
+    let forced = done(&["dcf", "4", "--output", &path, "--force", "--all"]).out;
+    assert!(forced.contains("152 objects read, 152 values in the file"), "{forced}");
+    assert!(std::fs::read_to_string(&path).expect("the file").contains("ParameterValue="));
+}
+
+#[test]
+fn values_that_differ_from_a_makers_sheet_are_in_the_dcf_and_what_the_device_refuses_is_told() {
+    let folder = folder("dcf_eds");
+    let sheet = "; kept\n[FileInfo]\nFileName=v.eds\n\
+        [2014]\nParameterName=Rated current\nDataType=6\nAccessType=rw\nDefaultValue=300\n\
+        [2015]\nParameterName=Maximum current\nDataType=6\nAccessType=rw\nDefaultValue=300\n\
+        [2FFF]\nParameterName=Not there\nDataType=6\nAccessType=rw\n\
+        [6060]\nParameterName=Mode\nDataType=6\nAccessType=rw\n";
+    let sheet_path = file(&folder, "v.eds", sheet);
+    let ended = done(&["dcf", "4", "--eds", &sheet_path]);
+    let expected = sheet.replace("DefaultValue=300\n[2015]", "DefaultValue=300\nParameterValue=150\n[2015]");
+    let expected = expected.replace("FileName=v.eds\n", "FileName=node4.dcf\nLastEDS=v.eds\n");
+    assert!(ended.out.starts_with(&expected), "{}", ended.out);
+    assert!(ended.err.contains("2FFFh:00") && ended.err.contains("0602 0000h"), "{}", ended.err);
+    assert!(
+        ended.err.contains("6060h:00") && ended.err.contains("1 bytes, by the data sheet there are 2"),
+        "{}",
+        ended.err
+    );
+    let report = done(&["dcf", "4", "--eds", &sheet_path, "--json"]).json();
+    assert_eq!((report["values"].as_u64(), report["refused"][0]["abort"].as_u64()), (Some(1), Some(0x0602_0000)));
+    assert!(report["dcf"].as_str().is_some_and(|dcf| dcf.starts_with("; kept\n")));
+}

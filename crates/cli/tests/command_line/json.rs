@@ -1,0 +1,125 @@
+//! What programs read: failures as one line of JSON on standard output, numbers with the digits that were meant, and values
+//! apart from their names.
+
+use processes::{Ended, Simulator, done, ferrodrive, scratch};
+use serde_json::{Value, json};
+
+/// Ends with `status`, and with exactly one line of JSON on standard output and nothing else; its `error`.
+#[track_caller]
+fn failed(arguments: &[&str], status: i32) -> Value {
+    let ended: Ended = ferrodrive(&[arguments, &["--json"]].concat());
+    assert_eq!(ended.status, Some(status), "{arguments:?}: {}{}", ended.out, ended.err);
+    assert_eq!(ended.err, "", "{arguments:?}");
+    assert_eq!(ended.out.lines().count(), 1, "{arguments:?}: {}", ended.out);
+    let said = ended.json();
+    assert_eq!(said["ok"], false, "{arguments:?}");
+    let keys: Vec<_> = said["error"].as_object().unwrap().keys().cloned().collect();
+    assert_eq!(keys, ["abort", "kind", "message", "next", "node", "object"], "{arguments:?}");
+    said["error"].clone()
+}
+
+#[track_caller]
+fn is(error: &Value, kind: &str, node: Option<u8>, object: Option<&str>, abort: Option<u32>) {
+    let place = (&error["kind"], &error["node"], &error["object"], &error["abort"]);
+    assert_eq!(place, (&json!(kind), &json!(node), &json!(object), &json!(abort)), "{error}");
+    assert!(!error["message"].as_str().unwrap().is_empty());
+}
+
+#[test]
+fn what_a_drive_refuses_is_told_with_node_object_and_abort_code() {
+    // CiA 301, table 22: attempt to write a read-only object; object does not exist.
+    is(&failed(&["write", "4", "6064", "5"], 1), "aborted", Some(4), Some("6064h:00"), Some(0x0601_0002));
+    is(&failed(&["read", "4", "6502"], 1), "aborted", Some(4), Some("6502h:00"), Some(0x0602_0000));
+}
+
+#[test]
+fn silence_a_missing_mode_and_a_motion_that_fails_have_their_kinds() {
+    let silent = failed(&["read", "9", "6064"], 1);
+    is(&silent, "no_answer", Some(9), Some("6064h:00"), None);
+    assert!(silent["next"].as_str().unwrap().contains("node-ID"), "{silent}");
+    is(&failed(&["torque", "2", "500mA"], 1), "no_such_mode", Some(2), None, None);
+    is(&failed(&["home", "4", "--method", "17"], 1), "no_such_mode", Some(4), None, None);
+    let late = failed(&["home", "2", "--method", "17", "--within", "1s"], 1);
+    is(&late, "not_reached", Some(2), None, None);
+    assert!(late["message"].as_str().unwrap().contains("seen: statusword"), "{late}");
+    assert!(late["next"].as_str().unwrap().contains("switch"), "{late}");
+}
+
+#[test]
+fn a_command_line_that_makes_no_sense_is_told_in_json_too() {
+    for arguments in [
+        &["velocity", "4", "fast"][..],
+        &["reed", "4"],
+        &["scan", "--jsn"],
+        &[],
+        &["move", "4", "1.5"],
+        &["--bus", "log:trace.log", "scan"],
+        &["sim"],
+        &["sim", "--drive", "zlac8030@4"],
+        &["sim", "--drive", "zlac8030l@4", "--drive", "zlac8030l@4"],
+        &["demo", "--drive", "toaster"],
+        &["write", "4", "6060", "profile_velocty"],
+    ] {
+        let error = failed(arguments, 2);
+        assert_eq!(error["kind"], "usage", "{arguments:?}: {error}");
+        assert!(!error["message"].as_str().unwrap().contains('\n'), "{error}");
+    }
+    let error = failed(&["write", "4", "6060", "profile_velocty"], 2);
+    assert_eq!((&error["node"], &error["object"]), (&json!(4), &json!("6060h:00")));
+    assert!(ferrodrive(&["--json", "--help"]).out.contains("Usage:"), "help stays help");
+}
+
+#[test]
+fn a_bus_that_is_not_there_and_a_log_that_cannot_be_written_are_failures_of_the_same_form() {
+    is(&failed(&["--bus", "socketcand://127.0.0.1:1/can0", "scan"], 1), "bus", None, None, None);
+    let directory = scratch("nowhere");
+    let picture = directory.join("no such folder").join("demo.svg");
+    let error = failed(&["demo", "--drive", "zlim42c", "--svg", picture.to_str().unwrap()], 1);
+    is(&error, "file", None, None, None);
+    let error = failed(&["sim", "--drive", "zlac8030l@4", "--log", picture.to_str().unwrap()], 1);
+    assert!(error["message"].as_str().unwrap().contains("cannot write the log"), "{error}");
+}
+
+#[test]
+fn a_mode_is_a_number_with_its_name_beside_it() {
+    let state = done(&["--json", "velocity", "4", "60rpm"]).json();
+    assert_eq!((&state["mode"], &state["mode_name"]), (&json!(3), &json!("profile velocity")));
+    assert!(done(&["state", "4"]).out.contains("0 (no mode)"));
+}
+
+#[test]
+fn a_factory_value_is_a_number_and_what_the_node_id_is_added_to_is_said_apart() {
+    let default = |object| done(&["--json", "objects", "zlac8030l", object]).json()["objects"][0]["default"].clone();
+    // "ZLAC8030L quick start guide V1.00", chapter 9.
+    assert_eq!(default("6081"), 120);
+    assert_eq!(default("1400:01"), json!({ "plus_node_id": 0x200 }));
+    let saved = done(&["--json", "save", "4"]).json();
+    let after = saved["effective_after_restart"].as_array().unwrap();
+    assert!(after.contains(&json!({ "object": "200Dh:00", "name": "can_node_id" })), "{saved}");
+}
+
+#[test]
+fn three_tenths_are_three_tenths() {
+    // 6077h, and 606Ch, count tenths: 0.1 is no binary fraction.
+    let directory = scratch("tenths");
+    let file = directory.join("warm.toml");
+    std::fs::write(&file, "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\ntemperatures_c = { motor = 30.3 }\n").unwrap();
+    let bus = format!("sim:{}", file.display());
+    let read = done(&["--bus", &bus, "--json", "read", "4", "2026:01"]).out;
+    assert!(read.contains("\"value\":303,\"quantity\":30.3,"), "{read}");
+}
+
+#[test]
+fn no_number_of_a_report_or_of_the_simulator_has_more_digits_than_a_millionth() {
+    let mut simulator = Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
+    simulator.send("4 get");
+    let got = simulator.line();
+    let moved = done(&["--json", "velocity", "4", "61rpm", "--for", "300ms"]).out;
+    for text in [got, moved] {
+        let numbers = text.split(|c: char| !matches!(c, '0'..='9' | '.' | '-' | 'e' | 'E'));
+        for number in numbers.filter(|number| number.parse::<f64>().is_ok()) {
+            let decimals = number.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+            assert!(decimals <= 6 && !number.contains('e'), "{number} in {text}");
+        }
+    }
+}

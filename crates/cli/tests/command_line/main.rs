@@ -1,0 +1,12 @@
+//! The command line on drives of its own: commands that end by themselves, in virtual time. One program: a file each.
+
+mod broken_pipe;
+mod completion;
+mod eds;
+mod handbook;
+mod json;
+mod on_sim;
+mod plan;
+mod run;
+mod units;
+mod usage;

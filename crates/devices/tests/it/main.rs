@@ -1,0 +1,3 @@
+//! Descriptions from outside the crate. One program: a file each.
+
+mod two_axes;

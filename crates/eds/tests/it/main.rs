@@ -1,0 +1,3 @@
+//! Data sheets of makers. One program: a file each.
+
+mod vendor_files;

@@ -1,0 +1,29 @@
+//! The master against toy drives and against whole virtual ones, in virtual time. One program: a file each.
+
+mod asked_and_sent;
+mod base;
+mod boot;
+mod boot_paths;
+mod cyclic;
+mod cyclic_servo;
+mod cyclic_unheard;
+mod decode;
+mod drive;
+mod explain;
+mod explain_states;
+mod gear;
+mod group;
+mod group_trouble;
+mod guard;
+mod identify;
+mod parameters;
+mod pdo;
+mod plan;
+mod process_data;
+mod random;
+mod sdo;
+mod supervise;
+mod support;
+mod three_drives;
+mod world;
+mod zlac8030l;

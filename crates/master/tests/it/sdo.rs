@@ -1,0 +1,305 @@
+//! SDO over several nodes, through the async face, against toy nodes.
+
+use std::future::Future;
+use std::time::Duration;
+
+use crate::support::toy::Toy;
+use crate::support::{Bus, mux, node};
+use can::Instant;
+use canopen::AbortCode;
+use master::{Error, join_all};
+
+const DEVICE_TYPE: canopen::Mux = mux(0x1000, 0);
+const NAME: canopen::Mux = mux(0x1008, 0);
+
+#[test]
+fn three_nodes_are_asked_at_the_same_time() {
+    let toys = [1, 2, 4].map(|id| Toy::new(id).u32(0x1000, 0, 0x0004_0192 + u32::from(id)));
+    let mut bus = Bus::new(toys.into());
+    let network = bus.network.clone();
+    let nodes = [1, 2, 4].map(|id| network.node(node(id)));
+    let read = bus.block_on(join_all(nodes.iter().map(|node| node.read::<u32>(DEVICE_TYPE))));
+    let values: Vec<u32> = read.into_iter().map(Result::unwrap).collect();
+    assert_eq!(values, [0x0004_0193, 0x0004_0194, 0x0004_0196]);
+    // All three requests were on the wire before the first answer.
+    let frames = bus.frames();
+    assert!(frames[..3].iter().all(|frame| frame.ends_with("#4000100000000000")), "{frames:?}");
+}
+
+#[test]
+fn requests_to_one_node_are_queued_and_sent_one_by_one() {
+    let mut bus = Bus::new(vec![Toy::new(4).u16(0x6041, 0, 0x0237).u8(0x1001, 0, 0)]);
+    let network = bus.network.clone();
+    let node = network.node(node(4));
+    let reads = [mux(0x6041, 0), mux(0x1001, 0), mux(0x6041, 0)].map(|mux| node.upload(mux));
+    let read = bus.block_on(join_all(reads));
+    assert_eq!(read[1].as_ref().unwrap().as_bytes(), [0]);
+    assert_eq!(read[2].as_ref().unwrap().as_bytes(), [0x37, 0x02]);
+    let frames = bus.frames();
+    assert_eq!(
+        frames,
+        [
+            "604#4041600000000000",
+            "584#4B41600037020000",
+            "604#4001100000000000",
+            "584#4F01100000000000",
+            "604#4041600000000000",
+            "584#4B41600037020000",
+        ]
+    );
+}
+
+#[test]
+fn segmented_transfers_carry_any_length() {
+    for length in [5, 7, 8, 14, 15, 100] {
+        let text: Vec<u8> = (0..length).collect();
+        let mut bus = Bus::new(vec![Toy::new(9).with(0x1008, 0, &text).with(0x2000, 0, b"")]);
+        let network = bus.network.clone();
+        let node = network.node(node(9));
+        let read = bus.block_on(node.upload(NAME)).unwrap();
+        assert_eq!(read.as_bytes(), text);
+        bus.block_on(node.download(mux(0x2000, 0), &text)).unwrap();
+        assert_eq!(bus.toys[0].objects[&(0x2000, 0)], text);
+    }
+}
+
+#[test]
+fn a_silent_node_times_out_exactly_at_its_deadline() {
+    let mut bus = Bus::new(vec![]);
+    let network = bus.network.clone();
+    let node = network.node(node(4)).with_timeout(Duration::from_millis(200));
+    let error = bus.block_on(node.read::<u32>(DEVICE_TYPE)).unwrap_err();
+    assert!(matches!(error, Error::NoAnswer { waited, .. } if waited == Duration::from_millis(200)), "{error}");
+    // The abort that tells the server goes out one frame after the deadline; the time was 5 s when it began.
+    let (at, abort) = bus.log.last().unwrap();
+    assert_eq!(abort.to_string(), "604#8000100000000405");
+    assert_eq!(*at - Instant::from_secs(5), Duration::from_micros(200_256));
+    assert!(error.to_string().contains("Nothing at all has been heard on the bus"), "{error}");
+}
+
+#[test]
+fn a_node_that_falls_silent_within_a_segmented_transfer_is_reported() {
+    let mut toy = Toy::new(4).with(0x1008, 0, &[b'x'; 50]);
+    toy.answers_left = Some(3);
+    let mut bus = Bus::new(vec![toy]);
+    let network = bus.network.clone();
+    let error = bus.block_on(network.node(node(4)).upload(NAME)).unwrap_err();
+    let text = error.to_string();
+    assert!(text.starts_with("node 4 did not answer within 500 ms when asked to read 1008h:00"), "{text}");
+    assert!(text.contains("last heard 500 ms ago"), "{text}");
+    assert_eq!(bus.toys[0].aborted_by_client, [AbortCode::TIMED_OUT.0]);
+    // The channel is free again.
+    bus.toys[0].answers_left = None;
+    let network = bus.network.clone();
+    assert_eq!(bus.block_on(network.node(node(4)).upload(NAME)).unwrap().as_bytes(), [b'x'; 50]);
+}
+
+#[test]
+fn an_abort_code_is_handed_on_with_what_to_do() {
+    let mut toy = Toy::new(4).u8(0x6060, 0, 0);
+    toy.aborts.insert((0x6060, 0), AbortCode::INVALID_VALUE.0);
+    let mut bus = Bus::new(vec![toy]);
+    let network = bus.network.clone();
+    let node = network.node(node(4));
+    let error = bus.block_on(node.write(mux(0x6060, 0), 6_i8)).unwrap_err();
+    assert!(matches!(error, Error::Aborted { code: AbortCode::INVALID_VALUE, .. }));
+    assert_eq!(
+        error.to_string(),
+        "node 4 refused to write 6060h:00: 0609 0030h (invalid value for parameter). \
+         Give a value within the limits of its object dictionary"
+    );
+    let error = bus.block_on(node.read::<u32>(mux(0x6502, 0))).unwrap_err();
+    assert!(matches!(error, Error::Aborted { code: AbortCode::NO_SUCH_OBJECT, .. }));
+}
+
+#[test]
+fn an_object_of_another_length_is_an_error_and_not_a_number() {
+    let mut bus = Bus::new(vec![Toy::new(4).u16(0x606C, 0, 100)]);
+    let network = bus.network.clone();
+    let error = bus.block_on(network.node(node(4)).read::<i32>(mux(0x606C, 0))).unwrap_err();
+    assert!(matches!(error, Error::WrongLength { expected: 4, received: 2, .. }), "{error}");
+}
+
+#[test]
+fn dropping_a_future_aborts_the_transfer_and_frees_the_channel() {
+    let mut toy = Toy::new(4).with(0x1008, 0, &[b'x'; 50]).u16(0x6041, 0, 0x0237);
+    toy.answers_left = Some(2);
+    let mut bus = Bus::new(vec![toy]);
+    let network = bus.network.clone();
+    let node = network.node(node(4));
+    bus.block_on(async {
+        let nap = network.sleep(Duration::from_millis(50));
+        let upload = node.upload(NAME);
+        // The upload hangs; the nap ends first and the upload is dropped.
+        assert!(crate::support::first(nap, upload).await.is_none());
+    });
+    assert_eq!(bus.toys[0].aborted_by_client.len(), 1);
+    bus.toys[0].answers_left = None;
+    assert_eq!(bus.block_on(node.read::<u16>(mux(0x6041, 0))).unwrap(), 0x0237);
+}
+
+#[test]
+fn a_future_that_was_dropped_before_its_turn_never_reaches_the_wire() {
+    let mut toy = Toy::new(4).u16(0x6041, 0, 0x0237);
+    toy.answers_left = Some(0);
+    let mut bus = Bus::new(vec![toy]);
+    let network = bus.network.clone();
+    let node = network.node(node(4));
+    bus.block_on(async {
+        let first = node.upload(mux(0x6041, 0));
+        let second = node.upload(mux(0x1001, 0));
+        let nap = network.sleep(Duration::from_millis(50));
+        let both = join_all([first, second]);
+        assert!(crate::support::first(nap, both).await.is_none());
+    });
+    assert!(!bus.frames().iter().any(|frame| frame.starts_with("604#40011000")), "{:?}", bus.frames());
+}
+
+#[test]
+fn an_answer_about_another_object_is_not_taken_for_the_asked_one() {
+    let mut toy = Toy::new(4).u32(0x1000, 0, 7);
+    toy.wrong_index = 1;
+    let mut bus = Bus::new(vec![toy]);
+    let network = bus.network.clone();
+    let error = bus.block_on(network.node(node(4)).read::<u32>(DEVICE_TYPE)).unwrap_err();
+    assert!(matches!(error, Error::NoAnswer { .. } | Error::BadAnswer { .. }), "{error}");
+}
+
+#[test]
+fn noise_does_not_disturb_a_transfer() {
+    let mut bus = Bus::new(vec![Toy::new(4).with(0x1008, 0, &[b'y'; 200])]);
+    let start = bus.now;
+    for (n, text) in ["583#4300100001020304", "584#", "584#R8", "00000584#60", "704#", "704#99", "084#01", "184#1122"]
+        .iter()
+        .cycle()
+        .take(64)
+        .enumerate()
+    {
+        bus.noise.push((start + Duration::from_micros(700 * n as u64), text.parse().unwrap()));
+    }
+    // An empty SDO answer is a broken answer: only the rest is noise to this transfer.
+    bus.noise.retain(|(_, frame)| frame.to_string() != "584#");
+    let network = bus.network.clone();
+    assert_eq!(bus.block_on(network.node(node(4)).upload(NAME)).unwrap().as_bytes(), [b'y'; 200]);
+}
+
+#[test]
+fn more_requests_than_the_queue_holds_are_refused_at_once() {
+    let mut bus = Bus::new(vec![Toy::new(4).u8(0x1001, 0, 0)]);
+    let network = bus.network.clone();
+    let node = network.node(node(4));
+    let outcomes = bus.block_on(join_all((0..200).map(|_| node.upload(mux(0x1001, 0)))));
+    let full = outcomes.iter().filter(|outcome| matches!(outcome, Err(Error::QueueFull { .. }))).count();
+    assert!(full > 0 && full < 200, "{full}");
+    assert!(outcomes.iter().filter(|outcome| outcome.is_ok()).count() + full == 200);
+}
+
+#[test]
+fn reset_waits_for_the_boot_up_message_and_a_dead_node_is_explained() {
+    let mut bus = Bus::new(vec![Toy::new(4)]);
+    let network = bus.network.clone();
+    bus.block_on(network.node(node(4)).reset(Duration::from_secs(1))).unwrap();
+    let error = bus.block_on(network.node(node(5)).reset(Duration::from_secs(1))).unwrap_err();
+    assert!(
+        error.to_string().starts_with(
+            "node 5 did not boot within 1000 ms. Other nodes are on the bus but this one has never been heard"
+        ),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_stopped_node_is_told_as_such() {
+    let mut toy = Toy::new(4);
+    toy.answers_left = Some(0);
+    toy.send(0x700, &[4]);
+    let mut bus = Bus::new(vec![toy]);
+    let network = bus.network.clone();
+    let error = bus.block_on(network.node(node(4)).read::<u32>(DEVICE_TYPE)).unwrap_err();
+    assert!(error.to_string().contains("it is stopped, where SDO does not exist"), "{error}");
+}
+
+#[test]
+fn a_lost_heartbeat_is_seen_by_who_waits_for_it() {
+    let mut toy = Toy::new(4);
+    toy.send(0x700, &[5]);
+    let mut bus = Bus::new(vec![toy]);
+    let network = bus.network.clone();
+    let node = network.node(node(4));
+    node.watch_heartbeat(Some(Duration::from_millis(300)));
+    let lost =
+        node.wait(|node| node.facts.heartbeat_watch.filter(|watch| watch.lost).map(|_| ()), Duration::from_secs(2));
+    assert_eq!(bus.block_on(lost), Ok(()));
+    // 300 ms after the heartbeat, which took one frame time from 5 s.
+    assert_eq!(bus.now, Instant::from_secs(5) + Duration::from_micros(300_256));
+}
+
+#[test]
+fn a_node_that_this_master_stopped_is_told_as_such_without_a_heartbeat() {
+    let mut toy = Toy::new(4);
+    toy.answers_left = Some(0);
+    let mut bus = Bus::new(vec![toy]);
+    let network = bus.network.clone();
+    let node = network.node(node(4));
+    node.nmt(canopen::NmtCommand::Stop);
+    let error = bus.block_on(node.read::<u32>(DEVICE_TYPE)).unwrap_err();
+    assert!(error.to_string().contains("it is stopped, where SDO does not exist"), "{error}");
+}
+
+#[test]
+fn a_request_that_nobody_takes_from_the_master_is_told_as_such() {
+    // No runner takes frames: an interface that is down.
+    let mut network = master::Network::new();
+    let node = network.node(node(4)).with_timeout(Duration::from_millis(100));
+    let mut read = std::pin::pin!(node.read::<u32>(DEVICE_TYPE));
+    let mut context = std::task::Context::from_waker(std::task::Waker::noop());
+    assert!(read.as_mut().poll(&mut context).is_pending());
+    for ms in [0, 100] {
+        can::Station::handle_timeout(&mut network, Instant::from_millis(ms));
+    }
+    let std::task::Poll::Ready(Err(error)) = read.as_mut().poll(&mut context) else { panic!("not ready") };
+    assert!(error.to_string().contains("never left this computer"), "{error}");
+}
+
+#[test]
+fn a_runner_that_sleeps_is_woken_when_something_is_asked_for() {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicU32, Ordering};
+    struct Count(AtomicU32);
+    impl std::task::Wake for Count {
+        fn wake(self: Arc<Self>) {
+            self.0.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+    let count = Arc::new(Count(AtomicU32::new(0)));
+    let waker = std::task::Waker::from(count.clone());
+    let mut context = std::task::Context::from_waker(&waker);
+    let mut network = master::Network::new();
+    assert!(network.poll_activity(&mut context).is_pending());
+    network.nmt_all(canopen::NmtCommand::Start);
+    assert_eq!(count.0.load(Ordering::Relaxed), 1);
+    assert!(network.poll_activity(&mut context).is_ready());
+    // Ready once; the command goes out at the runner's next call, for which the deadline asks at once.
+    assert!(network.poll_activity(&mut context).is_pending());
+    assert_eq!(can::Station::poll_timeout(&network), Some(Instant::ZERO));
+    can::Station::handle_timeout(&mut network, Instant::from_secs(1));
+    assert_eq!(can::Station::poll_transmit(&mut network).unwrap().to_string(), "000#0100");
+    network.on_activity(waker.clone());
+    network.sync(None);
+    network.sync(None);
+    assert_eq!(count.0.load(Ordering::Relaxed), 4, "once for the poll, twice for the lasting waker");
+}
+
+#[test]
+fn what_is_dropped_before_the_runner_comes_leaves_no_trace() {
+    let mut network = master::Network::new();
+    let node = network.node(node(4));
+    for _ in 0..10_000 {
+        let mut read = Box::pin(node.read::<u32>(DEVICE_TYPE));
+        let mut context = std::task::Context::from_waker(std::task::Waker::noop());
+        assert!(read.as_mut().poll(&mut context).is_pending());
+    }
+    can::Station::handle_timeout(&mut network, Instant::from_secs(1));
+    assert_eq!(can::Station::poll_transmit(&mut network), None);
+    assert_eq!(can::Station::poll_timeout(&network), None);
+}

@@ -1,0 +1,6 @@
+//! Planners and control loops. One program: a file each.
+
+mod closed_loop;
+mod control;
+mod planners;
+mod rig;

@@ -1,0 +1,14 @@
+//! Physics against closed forms. One program: a file each.
+
+mod attachment;
+mod coupled;
+mod driven_stepper;
+mod free_run;
+mod gear;
+mod hub_motor;
+mod joint_motor;
+mod mechanics;
+mod pmsm;
+mod servo_motor;
+mod stepper;
+mod stepper_motor;

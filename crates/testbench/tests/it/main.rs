@@ -1,0 +1,8 @@
+//! Machine files, scenarios and records. One program: a file each.
+
+mod check;
+mod control;
+mod documented;
+mod hostile_files;
+mod scenario_words;
+mod worked_scenarios;

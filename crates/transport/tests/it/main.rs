@@ -1,0 +1,3 @@
+//! Files of logs, in every form.
+
+mod log_formats;

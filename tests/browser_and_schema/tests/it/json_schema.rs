@@ -1,0 +1,216 @@
+//! What every command prints with `--json` is as docs/json.schema.json says, and docs/json.md names it.
+
+use processes::{Ended, Simulator, ferrodrive, page, scratch};
+use serde_json::{Value, json};
+
+const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/scenarios/homing_stuck_switch.toml");
+
+const BASE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/base.toml");
+
+/// Each command line, and the definition that each line of it is an instance of.
+const COMMANDS: &[(&[&str], &str)] = &[
+    (&["scan"], "scan"),
+    (&["read", "4", "6064"], "value"),
+    (&["read", "4", "1018:01"], "value"),
+    (&["write", "4", "6060", "3"], "value"),
+    (&["state", "1"], "state"),
+    (&["explain", "4"], "explain"),
+    (&["explain", "1", "--watch", "100ms"], "explain"),
+    (&["explain", "9", "--watch", "100ms"], "explain"),
+    (&["enable", "4"], "state"),
+    (&["disable", "2"], "state"),
+    (&["stop", "4"], "state"),
+    (&["quick-stop", "4"], "state"),
+    (&["reset", "4"], "state"),
+    (&["velocity", "4", "60rpm", "--for", "200ms"], "motion"),
+    (&["move", "4", "90deg"], "motion"),
+    (&["torque", "4", "500mA"], "motion"),
+    (&["nmt", "4", "start"], "nmt"),
+    (&["nmt", "all", "reset"], "nmt"),
+    (&["nmt", "2", "reset"], "nmt"),
+    (&["nmt", "1", "start", "--wait"], "nmt"),
+    (&["nmt", "all", "reset", "--wait", "2s"], "nmt"),
+    (&["nmt", "4", "start", "--wait", "1s"], "failure"),
+    (&["lss", "scan"], "failure"),
+    (&["watch", "4", "6064", "statusword", "1018:01", "--count", "2"], "watch"),
+    (&["read", "4", "1018:*", "1000..100A"], "value"),
+    (&["read", "4", "9000..9FFF"], "failure"),
+    (&["pdo", "show", "1", "4"], "pdo_show"),
+    (&["pdo", "plan", "4", "tpdo1=statusword,6064", "--type", "1"], "pdo_plan"),
+    (&["pdo", "apply", "4", "tpdo1=statusword,6064", "--type", "1"], "params_apply"),
+    (&["pdo", "plan", "4"], "failure"),
+    (&["emcy", "show", "4"], "failure"),
+    (&["sync", "--every", "10ms", "--count", "3"], "sync"),
+    (&["time"], "time"),
+    (&["send", "604#4041600000000000", "123#R"], "send"),
+    (&["save", "4"], "store"),
+    (&["restore", "2"], "store"),
+    (&["objects", "zlac8030l"], "objects"),
+    (&["objects", "4", "6081"], "objects"),
+    (&["objects", "zlim42c", "--departures"], "departures"),
+    (&["readings", "m4230e17b50"], "readings"),
+    (&["eds", "zlac8030l"], "eds"),
+    (&["dcf", "4"], "dcf"),
+    (&["params", "backup", "4"], "params_backup"),
+    (&["params", "rollback", "4"], "failure"),
+    (&["params", "apply", "4", "/no/such/file.toml"], "failure"),
+    (&["latency", "4", "--count", "20"], "latency"),
+    (&["group", "move", "1=10deg", "4=10deg"], "group_move"),
+    (&["group", "move", "1=10deg", "--within", "1ms"], "failure"),
+    (&["drive-base", BASE, "--linear", "0.2", "--for", "500ms"], "drive_base"),
+    (&["drive-base"], "failure"),
+    (&["boot"], "boot"),
+    (&["boot", "--node", "9"], "boot"),
+    (&["supervise", "--for", "2s"], "supervise"),
+    (&["plan", "--mode", "4=pv"], "plan"),
+    (&["dump", "--for", "1s"], "frame"),
+    (&["export", "dbc", "4"], "export"),
+    (&["gateway"], "failure"),
+    (&["studio", "--listen", "0.0.0.0:0"], "failure"),
+    (&["run", SCENARIO], "run"),
+    (&["run", SCENARIO, "--seeds", "1..2"], "sweep"),
+    (&["run", SCENARIO, SCENARIO], "scenarios"),
+    (&["run", SCENARIO, "/no/such/file.toml"], "scenarios"),
+    (&["read", "9", "6064"], "failure"),
+    (&["write", "4", "6064", "5"], "failure"),
+    (&["home", "4", "--method", "17"], "failure"),
+    (&["eds", "show", "/no/such/file.eds"], "failure"),
+    (&["eds", "lint", "/no/such/file.eds"], "eds_lint"),
+    (&["check", concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.toml")], "check"),
+    (&["check", "/no/such/bus.yml"], "failure"),
+    (&["world", "now"], "failure"),
+    (&["fly"], "failure"),
+];
+
+fn schema() -> Value {
+    serde_json::from_str(&page("json.schema.json")).expect("the schema is JSON")
+}
+
+/// Holds lines of output to a definition, and what they say of success to the exit status.
+#[track_caller]
+fn hold(ended: &Ended, definition: &str, what: &str) -> Vec<Value> {
+    let mut schema = schema();
+    schema["anyOf"] = json!([{ "$ref": format!("#/$defs/{definition}") }]);
+    let validator = jsonschema::validator_for(&schema).expect("the schema is one");
+    assert!(!ended.out.is_empty(), "{what} prints nothing: {}", ended.err);
+    let lines = ended.out.lines().map(|line| {
+        let value: Value = serde_json::from_str(line).unwrap_or_else(|error| panic!("{what}: {error} in {line}"));
+        if let Some(error) = validator.iter_errors(&value).next() {
+            panic!("{what}: {error} at {} in {line}", error.instance_path());
+        }
+        assert!(line.starts_with("{\"ok\":"), "{what}: {line}");
+        assert_eq!(value["ok"] == true, ended.status == Some(0), "{what}: {:?} {line}", ended.status);
+        value
+    });
+    lines.collect()
+}
+
+#[test]
+fn each_command_prints_what_the_schema_says() {
+    for (arguments, definition) in COMMANDS {
+        let ended = ferrodrive(&[arguments, &["--json"][..]].concat());
+        hold(&ended, definition, &format!("{arguments:?}"));
+    }
+}
+
+#[test]
+fn a_failure_says_what_to_do_next() {
+    let nowhere = ["--record", "/no/such/folder/a.csv"];
+    for arguments in [
+        &["plot", "/no/such/record.csv"][..],
+        &["plot", "/no/such/record.txt"],
+        &["plot", "/no/such/record.csv", "--from", "3", "--to", "2"],
+        &["run", SCENARIO, nowhere[0], nowhere[1]],
+        &["run", SCENARIO, nowhere[0], nowhere[1], "--record-signals", "speed_of_light"],
+        &["run", SCENARIO, nowhere[0], "a.txt"],
+        &["run", SCENARIO, "--junit", "/no/such/folder/a.xml"],
+        &["run", SCENARIO, "--seeds", "1..2", nowhere[0], nowhere[1]],
+        &["run", "/no/such/file.toml"],
+        &["sim", "--drive", "zlac8030l@4", nowhere[0], nowhere[1]],
+        &["sim", "--drive", "zlac8030l@4", "--log", "/no/such/folder/a.log"],
+        &["events", "--control", "127.0.0.1:1", "--kind", "falt"],
+        &["world", "now"],
+    ] {
+        let ended = ferrodrive(&[arguments, &["--json"]].concat());
+        let [failure] = hold(&ended, "failure", &format!("{arguments:?}")).try_into().expect("one line");
+        assert!(failure["error"]["next"].as_str().is_some_and(|next| !next.is_empty()), "{arguments:?}: {failure}");
+    }
+}
+
+#[test]
+fn files_and_logs_are_told_of_in_the_same_form() {
+    let directory = scratch("schema");
+    let path = |name: &str| directory.join(name).to_str().expect("UTF-8").to_owned();
+    let (sheet, log, odd) = (path("a.eds"), path("a.log"), path("odd.log"));
+    let (blf, csv, values) = (path("a.blf"), path("a.csv"), path("a.toml"));
+    std::fs::write(&values, "[values]\n1017 = 200\n6040 = 6\n").unwrap();
+    let made = ferrodrive(&["eds", "zlac8030l", "--json"]).json()["eds"].as_str().expect("a text").to_owned();
+    std::fs::write(&sheet, made).unwrap();
+    // A heartbeat that is too slow is a warning, a node-ID that is none an error.
+    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.toml");
+    let sim = format!("sim:{example}");
+    let bus = path("bus.yml");
+    let text = "master: {node_id: 127, heartbeat_producer: 100}\nwheel: {node_id: 4, dcf: a.eds, heartbeat_producer: 1000}\nx: {node_id: 0}\n";
+    std::fs::write(&bus, text).unwrap();
+    for (arguments, definition) in [
+        (&["eds", "lint", &sheet][..], "eds_lint"),
+        (&["check", &bus], "check"),
+        (&["--bus", &sim, "check", example], "check"),
+        (&["params", "diff", "4", &values], "params_diff"),
+        (&["params", "plan", "4", &values], "params_plan"),
+        (&["params", "verify", "4", &values], "params_verify"),
+        (&["params", "apply", "4", &values, "--save", "--prove"], "params_apply"),
+        (&["eds", "show", &sheet], "eds_show"),
+        (&["eds", "diff", &sheet, "zlim42c"], "eds_diff"),
+        (&["dump", "--for", "1s", "--log", &log], "frame"),
+        (&["decode", &log], "frame"),
+        (&["convert", &log, &blf], "convert"),
+        (&["replay", &log, "--skip-motion"], "replay"),
+        (&["record", "4", "606C", "--out", &csv, "--for", "100ms"], "record"),
+    ] {
+        hold(&ferrodrive(&[arguments, &["--json"]].concat()), definition, &format!("{arguments:?}"));
+    }
+    let frames = std::fs::read_to_string(&log).unwrap();
+    std::fs::write(&odd, format!("{frames}no frame\n")).unwrap();
+    let bus = format!("log:{odd}");
+    let ended = ferrodrive(&["--bus", &bus, "dump", "--json"]);
+    let (told, last) = ended.out.trim_end().rsplit_once('\n').unwrap();
+    let (frames, skipped) = told.rsplit_once('\n').unwrap();
+    for (out, definition) in [(frames, "frame"), (skipped, "log_line"), (last, "log_summary")] {
+        let part = Ended { status: ended.status, out: out.to_owned(), err: String::new() };
+        hold(&part, definition, definition);
+    }
+}
+
+#[test]
+fn the_commands_of_a_running_simulator_print_the_same_form() {
+    let simulator = Simulator::start(&["--drive", "zlac8030l@4", "--control", "127.0.0.1:0"]);
+    let place = simulator.address("control");
+    for (words, definition) in [
+        (&["4", "get"][..], "world"),
+        (&["now"], "world"),
+        (&["help"], "world"),
+        (&["4", "supply", "30"], "world"),
+        (&["4", "battery", "off"], "failure"),
+        (&["4", "dance"], "failure"),
+    ] {
+        let ended = ferrodrive(&[&["--json", "world", "--control", &place], words].concat());
+        hold(&ended, definition, &format!("{words:?}"));
+    }
+}
+
+#[test]
+fn the_page_names_every_command_and_every_kind_that_tests_meet() {
+    let page = page("json.md");
+    for (arguments, _) in COMMANDS.iter().filter(|(arguments, _)| arguments[0] != "fly") {
+        assert!(page.contains(&format!("`{}", arguments[0])), "docs/json.md does not name {}", arguments[0]);
+    }
+    for kind in
+        ["usage", "no_answer", "aborted", "not_reached", "no_such_mode", "out_of_limits", "bus", "control", "no_log"]
+    {
+        assert!(page.contains(&format!("`{kind}`")), "docs/json.md does not name {kind}");
+    }
+    let printed = page.lines().find(|line| line.starts_with("{\"ok\":false")).expect("an example");
+    let example = Ended { status: Some(1), out: printed.to_owned(), err: String::new() };
+    hold(&example, "failure", "the example of the page");
+}

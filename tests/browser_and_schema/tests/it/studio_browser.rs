@@ -1,0 +1,537 @@
+//! The page of the studio in a real browser: Chromium, moved by its WebDriver.
+//!
+//! `cargo xtask test --only studio` installs both where it can, and runs this. A screenshot of each view is left in
+//! `target/studio` for somebody to look at.
+
+mod figures;
+mod group;
+mod help;
+mod homing;
+mod pdo;
+mod scope;
+mod tour;
+mod watch;
+mod world;
+
+use std::io::{BufRead, BufReader};
+use std::os::unix::process::CommandExt;
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+
+use fantoccini::actions::{InputSource, KeyAction, KeyActions, MOUSE_BUTTON_LEFT, MouseActions, PointerAction};
+use fantoccini::elements::Element;
+use fantoccini::error::{CmdError, ErrorStatus};
+use fantoccini::key::Key;
+use fantoccini::{Client, ClientBuilder, Locator};
+use processes::Simulator;
+use processes::studio::{PATIENCE, Studio};
+use serde_json::{Value, json};
+
+const WHEEL: usize = 2;
+
+/// A studio with a browser before it; both end with this.
+struct Stage {
+    studio: Studio,
+    driver: Child,
+    client: Client,
+    profile: processes::Scratch,
+}
+
+/// The page has drawn the element anew since it was found.
+fn is_replaced(error: &CmdError) -> bool {
+    matches!(error, CmdError::Standard(error) if error.error == ErrorStatus::StaleElementReference)
+}
+
+impl Stage {
+    async fn open(name: &str) -> Self {
+        Self::open_on(name, &[]).await
+    }
+
+    /// The same on a bus that `arguments` name.
+    async fn open_on(name: &str, arguments: &[&str]) -> Self {
+        let studio = Studio::start(arguments);
+        studio.scanned();
+        let mut driver = Command::new("chromedriver");
+        // With its browser a group of processes, which ends as one.
+        driver.process_group(0);
+        let mut driver =
+            driver.arg("--port=0").stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("chromedriver is there");
+        let mut said = BufReader::new(driver.stdout.take().expect("piped")).lines();
+        let port = said.find_map(|line| {
+            let line = line.expect("text");
+            Some(line.split_once("successfully on port ")?.1.trim_end_matches('.').to_owned())
+        });
+        // It goes on talking, and nobody has to listen.
+        std::thread::spawn(move || said.for_each(drop));
+        let profile = processes::scratch(&format!("studio_{name}"));
+        let arguments = [
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--disable-quic",
+            "--no-first-run",
+            "--disable-background-networking",
+            "--disable-component-update",
+            "--disable-sync",
+            "--disable-dev-shm-usage",
+            "--window-size=1280,900",
+            &format!("--user-data-dir={}", profile.display()),
+        ];
+        let mut capabilities = serde_json::Map::new();
+        let keeping = json!({ "download.default_directory": &*profile, "download.prompt_for_download": false });
+        capabilities.insert("goog:chromeOptions".into(), json!({ "args": arguments, "prefs": keeping }));
+        let place = format!("http://127.0.0.1:{}", port.expect("it says its port"));
+        let client = ClientBuilder::new(hyper_util::client::legacy::connect::HttpConnector::new())
+            .capabilities(capabilities)
+            .connect(&place)
+            .await
+            .expect("a browser starts");
+        let stage = Self { studio, driver, client, profile };
+        stage.load().await;
+        stage
+    }
+
+    async fn load(&self) {
+        let url = format!("http://{}/?token={}", self.studio.address, self.studio.token);
+        self.client.goto(&url).await.expect("the page loads");
+        self.find("#view table tbody tr:nth-child(3)").await;
+    }
+
+    async fn find(&self, css: &str) -> Element {
+        self.client
+            .wait()
+            .at_most(PATIENCE)
+            .for_element(Locator::Css(css))
+            .await
+            .unwrap_or_else(|error| panic!("{css}: {error}"))
+    }
+
+    /// Clicks. What the page draws anew between finding and clicking it is looked for again.
+    async fn click(&self, css: &str) {
+        let until = std::time::Instant::now() + PATIENCE;
+        loop {
+            match self.find(css).await.click().await {
+                Ok(()) => return,
+                Err(error) if is_replaced(&error) && std::time::Instant::now() < until => {}
+                Err(error) => panic!("{css}: {error}"),
+            }
+        }
+    }
+
+    /// Clicks until something comes of it: what the page moves between looking and clicking is missed, as a person may miss it.
+    async fn click_for(&self, css: &str, wanted: &str) {
+        let until = std::time::Instant::now() + PATIENCE;
+        loop {
+            self.click(css).await;
+            let found = self.client.wait().at_most(PATIENCE / 6).for_element(Locator::Css(wanted)).await;
+            match found {
+                Ok(_) => return,
+                Err(error) => assert!(std::time::Instant::now() < until, "{wanted} after {css}: {error}"),
+            }
+        }
+    }
+
+    /// Takes control and shows what moves the wheel.
+    async fn take_the_wheel(&self) {
+        self.click("#take").await;
+        self.find("#release").await;
+        self.click("#tabs [data-name=motion]").await;
+        self.click(".motion .chooser button:nth-child(3)").await;
+        self.find(".motion fieldset:not([disabled])").await;
+    }
+
+    /// Waits until an element says this, and gives all that it says.
+    async fn says(&self, css: &str, part: &str) -> String {
+        let until = std::time::Instant::now() + PATIENCE;
+        loop {
+            let text = match self.find(css).await.text().await {
+                Err(error) if is_replaced(&error) => continue,
+                text => text.unwrap_or_else(|error| panic!("{css}: {error}")),
+            };
+            if text.contains(part) {
+                return text;
+            }
+            assert!(std::time::Instant::now() < until, "{css} says {text:?}, not {part:?}");
+            tokio::time::sleep(std::time::Duration::from_millis(50)).await;
+        }
+    }
+
+    fn wheel(&self, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {
+        self.studio.wait(what, |state| wanted(&state["nodes"][WHEEL]))
+    }
+
+    fn turns(&self) {
+        self.wheel("a wheel that turns", |wheel| speed(wheel) > 50.0);
+    }
+
+    fn rests(&self) {
+        self.wheel("a wheel that rests", |wheel| speed(wheel) < 2.0);
+    }
+
+    async fn shoot(&self, name: &str) {
+        let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("../studio");
+        std::fs::create_dir_all(&folder).expect("a folder");
+        let picture = self.client.screenshot().await.expect("a picture");
+        assert!(picture.starts_with(b"\x89PNG"), "{name}");
+        std::fs::write(folder.join(format!("{name}.png")), picture).expect("it is written");
+    }
+
+    /// Waits for a line of the trace.
+    async fn line(&self, text: &str) {
+        let path = format!("//*[contains(@class, 'trace-row') and contains(., '{text}')]");
+        self.client
+            .wait()
+            .at_most(PATIENCE)
+            .for_element(Locator::XPath(&path))
+            .await
+            .unwrap_or_else(|error| panic!("{text}: {error}"));
+    }
+
+    /// Waits until something is so.
+    async fn until(&self, what: &str, is_so: impl AsyncFn() -> bool) {
+        let until = std::time::Instant::now() + PATIENCE;
+        while !is_so().await {
+            assert!(std::time::Instant::now() < until, "waited for {what}");
+            tokio::time::sleep(std::time::Duration::from_millis(50)).await;
+        }
+    }
+
+    /// Waits for a file that the browser saves; it has another name until it is whole.
+    async fn saved(&self, name: &str) -> PathBuf {
+        let file = self.profile.join(name);
+        let until = std::time::Instant::now() + PATIENCE;
+        while !file.exists() {
+            assert!(std::time::Instant::now() < until, "no file is saved");
+            tokio::time::sleep(std::time::Duration::from_millis(50)).await;
+        }
+        file
+    }
+
+    async fn close(self) {
+        // The window may be gone already.
+        let _ = self.client.clone().close().await;
+    }
+}
+
+impl Drop for Stage {
+    fn drop(&mut self) {
+        // A browser does not end with the driver that is killed.
+        let _ = Command::new("kill").args(["-KILL", "--", &format!("-{}", self.driver.id())]).status();
+        let _ = self.driver.kill();
+        let _ = self.driver.wait();
+    }
+}
+
+fn speed(wheel: &Value) -> f64 {
+    wheel["drive"]["velocity_rpm"].as_f64().expect("a speed").abs()
+}
+
+fn press(key: char) -> KeyActions {
+    KeyActions::new("keys".into()).then(KeyAction::Down { value: key })
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn a_drive_is_found_enabled_moved_and_stopped() {
+    let stage = Stage::open("moved").await;
+    stage.shoot("bus").await;
+    stage.take_the_wheel().await;
+    stage.click("#enable").await;
+    stage.wheel("an enabled drive", |wheel| wheel["drive"]["state"] == "Operation enabled");
+    stage.click("form[aria-label=Move] button").await;
+    let angle = |wheel: &Value| wheel["drive"]["angle_degrees"].as_f64().expect("an angle");
+    stage.wheel("a quarter of a turn", |wheel| (angle(wheel) - 90.0).abs() < 2.0);
+    stage.click("form[aria-label=Turn] button").await;
+    stage.turns();
+    stage.shoot("motion").await;
+    stage.client.perform_actions(press(' ')).await.expect("a key");
+    stage.rests();
+    stage.wheel("a quick stop", |wheel| wheel["drive"]["state"] != "Operation enabled");
+    stage.click("#tabs [data-name=drive]").await;
+    stage.click_for("#why:not([disabled])", ".findings details.cause").await;
+    stage.shoot("drive").await;
+    stage.click("#theme").await;
+    stage.shoot("drive_other_theme").await;
+    stage.close().await;
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn a_jog_ends_with_the_button_the_key_and_the_tab() {
+    let stage = Stage::open("jogged").await;
+    stage.take_the_wheel().await;
+    let button = stage.find("button.jog:last-child").await;
+    let down = MouseActions::new("mouse".into())
+        .then(PointerAction::MoveToElement { element: button, duration: None, x: 0.0, y: 0.0 })
+        .then(PointerAction::Down { button: MOUSE_BUTTON_LEFT });
+    stage.client.perform_actions(down.clone()).await.expect("a press");
+    stage.turns();
+    stage.client.release_actions().await.expect("a release");
+    stage.rests();
+    stage.wheel("a ramp, not a quick stop", |wheel| wheel["drive"]["state"] == "Operation enabled");
+    stage.client.perform_actions(press(Key::Right.into())).await.expect("a press");
+    stage.turns();
+    stage.client.release_actions().await.expect("a release");
+    stage.rests();
+    stage.client.perform_actions(down).await.expect("a press");
+    stage.turns();
+    stage.client.close_window().await.expect("it closes");
+    stage.rests();
+    stage.wheel("a quick stop", |wheel| wheel["drive"]["state"] != "Operation enabled");
+    stage.studio.wait("nobody in control", |state| state["controller"].is_null());
+    stage.close().await;
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn the_trace_says_what_passes_and_a_filter_hides_the_rest() {
+    let stage = Stage::open("trace").await;
+    stage.take_the_wheel().await;
+    stage.click("form[aria-label=Move] button").await;
+    let angle = |wheel: &Value| wheel["drive"]["angle_degrees"].as_f64().expect("an angle");
+    stage.wheel("a quarter of a turn", |wheel| (angle(wheel) - 90.0).abs() < 2.0);
+    stage.click("#tabs [data-name=trace]").await;
+    stage.line("SDO node 4: read 6041h:00 statusword = ").await;
+    stage.shoot("trace").await;
+    stage.find("#trace-nodes").await.send_keys("4").await.expect("typed");
+    stage.find("#trace-text").await.send_keys("target_position").await.expect("typed");
+    // 90 degrees of 4096 counts a turn (ZLAC8030L).
+    stage.line("SDO node 4: wrote 607Ah:00 target_position = 1024").await;
+    // The list stands still while it is read.
+    stage.click("#trace-pause").await;
+    stage.find("#trace-pause[aria-pressed=true]").await;
+    let words = stage.client.find_all(Locator::Css(".trace-list .trace-row")).await.expect("lines");
+    assert!(!words.is_empty());
+    for line in words {
+        let text = line.text().await.expect("text");
+        assert!(text.contains("target_position") && text.contains("node 4"), "the filter let through: {text}");
+    }
+    stage.click("#theme").await;
+    stage.shoot("trace_filtered_other_theme").await;
+    stage.click("#trace-save").await;
+    let saved = stage.saved("trace.log").await;
+    let decoded =
+        processes::ferrodrive(&["--bus", &format!("log:{}", saved.display()), "--model", "4=zlac8030l", "dump"]);
+    assert_eq!(decoded.status, Some(0), "{}", decoded.err);
+    assert!(decoded.out.contains("write 607Ah:00 target_position = 1024"), "{}", decoded.out);
+    assert!(!decoded.out.contains("node 2"), "of node 4 alone");
+    stage.close().await;
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn the_trace_draws_what_is_in_view_and_fetches_what_is_older() {
+    let stage = Stage::open("trace_scrolled").await;
+    let kept = |script: &'static str| async {
+        // A list that is not full is as tall as its view, which is no whole number of lines.
+        stage.client.execute(script, vec![]).await.expect("it runs").as_f64().expect("a number") as u64
+    };
+    const FIRST: &str = "return Number(document.querySelector('.trace-list .trace-row').dataset.number)";
+    const DRAWN: &str = "return document.querySelectorAll('.trace-list .trace-row').length";
+    const TALL: &str = "return document.querySelector('.trace-list').scrollHeight / 24";
+    stage.click("#tabs [data-name=trace]").await;
+    stage.click("#trace-transfers").await;
+    stage.until("lines that do not fit into the view", async || kept(TALL).await > 500).await;
+    assert!(kept(DRAWN).await < 60, "only what is in view is drawn");
+    let newest = kept(FIRST).await;
+    stage.until("new lines, of which the newest are in view", async || kept(FIRST).await > newest).await;
+    stage.click("#trace-pause").await;
+    stage.find("#trace-pause[aria-pressed=true]").await;
+    // Each time it comes to the top there is more above, until the first frame of all.
+    let up = "const list = document.querySelector('.trace-list'); list.scrollTop = 0; \
+              return Number(document.querySelector('.trace-list .trace-row').dataset.number)";
+    stage.until("the first frame of all", async || kept(up).await == 0).await;
+    assert!(kept(DRAWN).await < 60, "only what is in view is drawn");
+    stage.close().await;
+}
+
+/// ZLAC8030L quick start guide V1.00, chapters 8 and 9: 0001h is over-voltage.
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn a_fault_is_shown_with_its_remedy_and_the_frames_around() {
+    let drives = ["zlac8030l@4", "m4230e17b50@1", "zlim42c@2"].map(|drive| ["--drive", drive]).concat();
+    let mut simulator = Simulator::start(&[&drives[..], &["--serve", "socketcand://127.0.0.1:0"]].concat());
+    let bus = simulator.bus("socketcand");
+    let stage = Stage::open_on("faults", &["--bus", &bus, "--model", "4=zlac8030l", "--model", "2=zlim42c"]).await;
+    let ok = simulator.ask("4 supply 80");
+    assert_eq!(ok["ok"], true, "{ok}");
+    stage.wheel("a fault", |wheel| wheel["drive"]["fault_code"] == 1);
+    // The page is opened anew: what happened before is there.
+    stage.load().await;
+    stage.click("#tabs [data-name=faults]").await;
+    stage.click(".happening.emcy.lasts").await;
+    stage.says("#remedy", "bleeder resistor").await;
+    stage.says("#fault-source", "ZLAC8030L quick start guide V1.00, chapters 8 and 9").await;
+    stage.says(".around .marked", "EMCY node 4: 0001h (over-voltage)").await;
+    stage.shoot("faults").await;
+    stage.click(".around a").await;
+    let saved = stage.saved("node4_fault.log").await;
+    let saved = std::fs::read_to_string(saved).expect("text");
+    assert!(saved.contains(" 084#0100") && saved.lines().count() > 3, "{saved}");
+    stage.click(".happening.emcy").await;
+    // Above stands what came next: the keys go through the list.
+    stage.client.perform_actions(press(Key::Up.into())).await.expect("a key");
+    stage.client.release_actions().await.expect("a release");
+    stage.find(".happening.emcy:not([aria-pressed=true])").await;
+    stage.find(".happening:not(.emcy)[aria-pressed=true]:focus").await;
+    simulator.ask("4 supply 48");
+    stage.click("#take").await;
+    stage.find("#release").await;
+    stage.click("#tabs [data-name=motion]").await;
+    stage.click(".motion .chooser button:nth-child(3)").await;
+    stage.click("#reset-fault").await;
+    stage.wheel("no fault", |wheel| wheel["drive"]["fault_code"] == 0);
+    stage.click("#tabs [data-name=faults]").await;
+    stage.find(".happening.emcy:not(.lasts)").await;
+    stage.click("#theme").await;
+    stage.shoot("faults_other_theme").await;
+    stage.close().await;
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn the_scope_waits_for_its_trigger_and_measures_the_step() {
+    let stage = Stage::open("trigger").await;
+    stage.take_the_wheel().await;
+    stage.click("#tabs [data-name=scope]").await;
+    for (select, chosen) in [("#scope-window", 4), ("#trigger-mode", 2)] {
+        stage.click(&format!("{select} option:nth-child({chosen})")).await;
+    }
+    stage.says("#trigger-status", "waits").await;
+    stage.click("#tabs [data-name=motion]").await;
+    stage.click("form[aria-label=Turn] button").await;
+    stage.turns();
+    stage.click("#tabs [data-name=scope]").await;
+    stage.says("#trigger-status", "came at").await;
+    // The part after it, 80 % of 10 s: while the wheel goes on turning.
+    stage.find("#scope-pause[aria-pressed=true]").await;
+    stage.click("#scope-step").await;
+    // The form's 60 r/min: from rest to that.
+    let told = stage.says(".readout", "Step of Speed").await;
+    let speed = told
+        .split("Step of Speed: ")
+        .nth(1)
+        .and_then(|told| told.split(" to ").nth(1)?.split(' ').next()?.parse::<f64>().ok());
+    assert!(speed.is_some_and(|rpm| (rpm - 60.0).abs() < 2.0), "{told}");
+    stage.shoot("scope_step").await;
+    stage.click("#scope-svg").await;
+    let drawing = std::fs::read_to_string(stage.saved("node4.svg").await).expect("text");
+    assert!(
+        drawing.starts_with("<svg ") && drawing.ends_with("</svg>\n") && drawing.contains(">Speed</text>"),
+        "{drawing}"
+    );
+    stage.click("#scope-fft").await;
+    stage.shoot("scope_spectrum").await;
+    stage.close().await;
+}
+
+/// Held to closed forms: a lag of first order, one of second order, and two sines on a slope.
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn what_the_scope_computes_is_what_the_formulas_say() {
+    let stage = Stage::open("analysis").await;
+    let computed = stage.client.execute_async(
+        r"const done = arguments[arguments.length - 1];
+        Promise.all([import('/page/series.js'), import('/page/analysis.js')]).then(([{ Series }, { stepResponse, spectrum, crossing }]) => {
+            const of = (value, count) => {
+                const series = new Series(60);
+                for (let at = 0; at < count; at += 1) series.push(at * 1e-3, value(at * 1e-3));
+                return series;
+            };
+            const after = (time_s, value) => (now_s) => (now_s < time_s ? 0 : value(now_s - time_s));
+            const first = of(after(0.5, (t) => -8 * (1 - Math.exp(-t / 0.05))), 5000);
+            const [w, z] = [20, 0.3];
+            const d = w * Math.sqrt(1 - z * z);
+            const second = of(after(0.5, (t) => 2 * (1 - Math.exp(-z * w * t) * (Math.cos(d * t) + ((z * w) / d) * Math.sin(d * t)))), 5000);
+            const sines = of((t) => 3 + 0.1 * t + 0.7 * Math.sin(2 * Math.PI * 31.25 * t) + 0.2 * Math.cos(2 * Math.PI * 125 * t), 4096);
+            const { hertz, amplitude } = spectrum(sines, 0, 5);
+            const long = of((t) => t, 200000);
+            done({
+                first: stepResponse(first, 0, 5), second: stepResponse(second, 0, 5), none: stepResponse(of(() => 4, 1000), 0, 1),
+                ramp: stepResponse(of((t) => t, 1000), 0, 1),
+                lines: [31.25, 125].map((wanted) => amplitude[hertz.indexOf(wanted)]),
+                else: Math.max(...amplitude.filter((_, at) => Math.abs(hertz[at] - 31.25) > 1 && Math.abs(hertz[at] - 125) > 1)),
+                few: spectrum(of((t) => t, 15), 0, 1),
+                crossing: crossing(first, -4, 'falling'), rising: crossing(first, -4, 'rising'),
+                kept: [long.length, long.first_s(), long.last_s(), long.value(150.0005), long.value(1)],
+            });
+        });",
+        Vec::new(),
+    );
+    let computed = computed.await.expect("it computes");
+    let near = |path: &str, expected: f64, tolerance: f64| {
+        let found = computed.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path}: {computed}"));
+        assert!((found - expected).abs() <= tolerance, "{path}: {found}, not {expected}");
+    };
+    // 1 - exp(-t/T): from 10 to 90 % in T ln 9, within 2 % after T ln 50, which is counted from T ln(10/9).
+    near("/first/rise_s", 0.05 * 9_f64.ln(), 2e-4);
+    near("/first/settling_s", 0.05 * 45_f64.ln(), 1e-3);
+    near("/first/overshoot", 0.0, 1e-6);
+    near("/first/to", -8.0, 1e-6);
+    near("/second/overshoot", (-core::f64::consts::PI * 0.3 / (1.0 - 0.09_f64).sqrt()).exp(), 1e-4);
+    assert!(computed["none"].is_null() && computed["ramp"].is_null() && computed["few"].is_null(), "{computed}");
+    near("/lines/0", 0.7, 1e-3);
+    near("/lines/1", 0.2, 1e-3);
+    // What the line of the slope takes of the sines.
+    near("/else", 0.0, 5e-3);
+    near("/crossing", 0.5 + 0.05 * 2_f64.ln(), 1e-5);
+    assert!(computed["rising"].is_null(), "it never rises");
+    // A minute of 1 kHz, both ends in it; before it nothing is known.
+    near("/kept/0", 60_001.0, 1.0);
+    near("/kept/2", 199.999, 1e-9);
+    near("/kept/3", 150.0, 1e-9);
+    assert!(computed["kept"][4].is_null(), "{computed}");
+    stage.close().await;
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn a_parameter_is_found_changed_and_rolled_back() {
+    let stage = Stage::open("parameters").await;
+    stage.take_the_wheel().await;
+    stage.click("#tabs [data-name=parameters]").await;
+    stage.click(".parameters details.group:nth-of-type(1) summary").await;
+    stage.find(".parameters details[open] tbody tr:nth-child(2)").await;
+    stage.shoot("parameters").await;
+    // A space in a text field is one, as long as nothing moves.
+    stage.find("#parameters-search").await.send_keys("2008 speed").await.expect("typed");
+    let row = ".parameters tr[data-object='2008h:00']";
+    // ZLAC8030L quick start guide V1.00, chapter 9: 1 r/min as delivered, 1 to 300.
+    stage.says(row, "1 r/min").await;
+    stage.click(row).await;
+    stage.find("#parameter-value").await.send_keys("500").await.expect("typed");
+    stage.click("#parameter-write").await;
+    stage.says("#parameter-told", "1 to 300").await;
+    let field = stage.find("#parameter-value").await;
+    field.clear().await.expect("cleared");
+    field.send_keys("60rpm").await.expect("typed");
+    stage.click("#parameter-write").await;
+    stage.says("#parameter-told", "Written and read back").await;
+    stage.says(row, "60 r/min").await;
+    stage.find(".parameters tr.changed[data-object='2008h:00']").await;
+    stage.says(".parameters tr.chosen", "3C 00").await;
+    stage.click("#theme").await;
+    stage.shoot("parameters_other_theme").await;
+    stage.click("#parameters-backup").await;
+    let kept = std::fs::read_to_string(stage.saved("node4.toml").await).expect("text");
+    assert!(kept.contains("\"2008:00\" = 60"), "{kept}");
+    stage.click("#parameters-backup-dcf").await;
+    let kept = stage.saved("node4.dcf").await;
+    stage.click("#parameters-back").await;
+    stage.says(row, "1 r/min").await;
+    stage.find("#parameters-file").await.send_keys(&kept.to_string_lossy()).await.expect("chosen");
+    stage.says("#parameters-told", "node4.dcf").await;
+    stage.says("#parameters-told", "1 are others in the drive").await;
+    let file = stage.profile.join("node4.toml");
+    stage.find("#parameters-file").await.send_keys(&file.to_string_lossy()).await.expect("chosen");
+    stage.says("#parameters-told", "1 are others in the drive").await;
+    stage.find(".parameters-diff tr.other").await;
+    stage.click("#parameters-plan").await;
+    stage.says("#parameters-told", "1 write, in this order").await;
+    stage.says(".parameters-diff", "60 r/min").await;
+    stage.shoot("parameters_file").await;
+    stage.click("#parameters-apply").await;
+    stage.says("#parameters-told", "1 write done and read back").await;
+    stage.says(row, "60 r/min").await;
+    stage.close().await;
+}

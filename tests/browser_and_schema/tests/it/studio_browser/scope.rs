@@ -1,0 +1,141 @@
+//! The scope in a real browser: what it keeps, saves and triggers on.
+
+use serde_json::Value;
+
+use super::{Locator, PATIENCE, Stage, press};
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn the_scope_keeps_what_the_drive_said_and_saves_it() {
+    let stage = Stage::open("scope").await;
+    stage.take_the_wheel().await;
+    stage.click("form[aria-label=Move] button").await;
+    let angle = |wheel: &Value| wheel["drive"]["angle_degrees"].as_f64().expect("an angle");
+    stage.wheel("a quarter of a turn", |wheel| (angle(wheel) - 90.0).abs() < 2.0);
+    stage.rests();
+    stage.client.perform_actions(press('4')).await.expect("a key");
+    stage.click("#scope-window option:first-child").await;
+    // Longer than the half of what is shown, so that there is a reading under the cursor.
+    tokio::time::sleep(std::time::Duration::from_secs(3)).await;
+    stage.click("#scope-pause").await;
+    stage.find("#scope-pause[aria-pressed=true]").await;
+    stage.click("canvas").await;
+    stage
+        .client
+        .wait()
+        .at_most(PATIENCE)
+        .for_element(Locator::XPath("//p[starts-with(., 'A at') and contains(., 'Position')]"))
+        .await
+        .expect("a cursor");
+    stage.shoot("scope").await;
+    stage.click("#scope-save").await;
+    let saved = std::fs::read_to_string(stage.saved("node4.csv").await).expect("text");
+    let mut lines = saved.lines();
+    assert_eq!(lines.next(), Some("at_s,velocity_rpm,angle_degrees,current_a,supply_v,position_counts,statusword"));
+    let samples: Vec<Vec<f64>> =
+        lines.map(|line| line.split(',').map(|value| value.parse().expect("a number")).collect()).collect();
+    assert!(samples.len() > 5 && samples.is_sorted_by(|a, b| a[0] < b[0]), "each reading once: {saved}");
+    let (first, last) = (&samples[0], &samples[samples.len() - 1]);
+    assert!(first[2].abs() < 2.0 && (last[2] - 90.0).abs() < 2.0, "{saved}");
+    assert!(samples.iter().any(|sample| sample[1] > 20.0), "it was seen turning: {saved}");
+    stage.close().await;
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn the_scope_draws_any_object_that_passes() {
+    let stage = Stage::open("scope_object").await;
+    stage.click("#tabs [data-name=scope]").await;
+    stage.click(".scope .chooser button:nth-child(3)").await;
+    let list = stage.find("#scope-object").await;
+    list.click().await.expect("it opens");
+    // ZLAC8030L: 2029h is the bus voltage in 0.01 V, which the studio reads; 48 V is the supply as delivered.
+    stage.find("#scope-object option[value='4:2029:00']").await;
+    list.select_by_value("4:2029:00").await.expect("it is there");
+    stage.find("[data-object='4:2029:00']").await;
+    tokio::time::sleep(std::time::Duration::from_secs(2)).await;
+    stage.click("#scope-pause").await;
+    stage.find("#scope-pause[aria-pressed=true]").await;
+    stage.shoot("scope_object").await;
+    stage.click("#scope-save").await;
+    let saved = std::fs::read_to_string(stage.saved("node4.csv").await).expect("text");
+    let mut lines = saved.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let title = lines.next().expect("titles");
+    let column = title.iter().position(|name| *name == "4:2029:00").unwrap_or_else(|| panic!("{title:?}"));
+    let volts: Vec<f64> = lines.filter_map(|line| line[column].parse().ok()).collect();
+    assert!(volts.len() > 5 && volts.iter().all(|volts| (volts - 4800.0).abs() < 100.0), "{volts:?}");
+    // The same as MCAP, which `ferrodrive plot` and others read. (That the values are the same is held by the tests of the studio.)
+    stage.click("#scope-mcap").await;
+    let record = stage.saved("node4.mcap").await;
+    let picture = record.with_extension("svg");
+    let (record, svg) = (record.to_str().expect("UTF-8"), picture.to_str().expect("UTF-8"));
+    processes::done(&["plot", record, "--signals", "4.2029_00,4.velocity_rpm", "--svg", svg]);
+    let drawn = std::fs::read_to_string(&picture).expect("a picture");
+    assert!(drawn.contains("2029") && drawn.contains("r/min"), "{drawn}");
+    // A trigger on what was added: the supply falls through 30 V, and the picture is held.
+    stage.click("#scope-pause").await;
+    stage.find("#scope-pause[aria-pressed=false]").await;
+    stage.find("#trigger-field").await.select_by_value("4:2029:00").await.expect("it is offered");
+    stage.find("#trigger-edge").await.select_by_value("falling").await.expect("an edge");
+    let level = stage.find("#trigger-level").await;
+    level.clear().await.expect("cleared");
+    level.send_keys("3000").await.expect("typed");
+    stage.find("#scope-window").await.select_by_value("1").await.expect("a second");
+    stage.find("#trigger-mode").await.select_by_value("once").await.expect("a mode");
+    stage.says("#trigger-status", "waits").await;
+    stage.click("#take").await;
+    stage.find("#release").await;
+    stage.click("#tabs [data-name=world]").await;
+    stage.find("[data-place='4']").await;
+    stage.find("#world-line").await.send_keys("4 supply 24").await.expect("typed");
+    stage.click("#world-do").await;
+    stage.says(".world-changes li:first-child b", "4 supply 24").await;
+    stage.click("#tabs [data-name=scope]").await;
+    stage.says("#trigger-status", "came at").await;
+    stage.find("#scope-pause[aria-pressed=true]").await;
+    stage.shoot("scope_triggered").await;
+    stage.close().await;
+}
+
+/// Ten readings a second that come with 0 and 40 ms of delay in turn, and a picture 60 times a second.
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn the_edge_of_the_scope_moves_evenly_and_stands_where_the_bus_does() {
+    let stage = Stage::open("scope_edge").await;
+    let moved = stage.client.execute_async(
+        r"const done = arguments[arguments.length - 1];
+        import('/page/scope_edge.js').then(({ edge }) => {
+            const at = edge();
+            const [steps, behind] = [[], []];
+            let last;
+            for (let picture = 0; picture < 1200; picture += 1) {
+                const now_s = picture / 60;
+                let reading = Math.floor(now_s * 10 + 1e-9);
+                if (reading % 2 === 1 && now_s < reading / 10 + 0.04) reading -= 1;
+                // The bus has a clock of its own.
+                const end_s = at(1000 + reading / 10, now_s);
+                if (picture > 600) {
+                    steps.push(end_s - last);
+                    behind.push(end_s - 1000 - now_s);
+                }
+                last = end_s;
+            }
+            const stood = at(1000 + 199 / 10, 60);
+            const anew = at(0.1, 61);
+            done({ steps: [Math.min(...steps), Math.max(...steps)], behind: [Math.min(...behind), Math.max(...behind)], stood, anew });
+        });",
+        Vec::new(),
+    );
+    let moved = moved.await.expect("it computes");
+    let bounds = |what: &str| (moved[what][0].as_f64().expect("a number"), moved[what][1].as_f64().expect("a number"));
+    // A tenth of what the delays differ by is the most that a step differs from 1/60 s; the pictures themselves tell times in 1/60 s.
+    let (least, most) = bounds("steps");
+    let jitter_s = 0.1 * (0.04 + 1.0 / 60.0);
+    assert!(least > 1.0 / 60.0 - jitter_s && most < 1.0 / 60.0 + jitter_s, "{moved}");
+    // Between the earliest and the latest reading.
+    let (least, most) = bounds("behind");
+    assert!(least > -0.04 - 1.0 / 60.0 && most < 1e-3, "{moved}");
+    assert!((moved["stood"].as_f64().expect("a number") - 1020.4).abs() < 1e-9, "{moved}");
+    assert!((moved["anew"].as_f64().expect("a number") - 0.1).abs() < 1e-9, "{moved}");
+    stage.close().await;
+}

@@ -1,0 +1,335 @@
+//! `--record` and `plot`: what is written while drives are served, and what is left of it when the simulator dies.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use processes::{Simulator, done, ferrodrive, scratch};
+use testbench::recording::{Kind, Recorded, read};
+
+/// Longest wait for something to be on the disk.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+fn recorded(path: &Path) -> Recorded {
+    let kind = Kind::of_name(path.to_str().unwrap()).unwrap();
+    read(kind, &std::fs::read(path).unwrap()).unwrap()
+}
+
+/// The time of the last sample.
+fn last(recorded: &Recorded) -> f64 {
+    recorded.series.first().and_then(|series| series.points.last()).map_or(0.0, |(at, _)| *at)
+}
+
+fn simulator(record: &Path, more: &[&str]) -> Simulator {
+    let drives =
+        ["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0", "--record", record.to_str().unwrap()];
+    Simulator::start_heard(&[&drives[..], more].concat())
+}
+
+#[test]
+fn a_record_tells_how_a_drive_turned_and_what_was_done_to_it() {
+    let place = scratch("record");
+    for name in ["run.mcap", "run.csv"] {
+        let path = place.join(name);
+        let mut simulator = simulator(&path, &[]);
+        let bus = simulator.bus("socketcand");
+        done(&["--bus", &bus, "--model", "4=zlac8030l", "move", "4", "360deg", "--profile-velocity", "60rpm"]);
+        let told = simulator.ask("4 get")["position"].as_f64().unwrap();
+        let done_at = simulator.ask("4 load torque 0.5")["t"].as_f64().unwrap();
+        assert_eq!(simulator.ask("quit")["ok"], true);
+        assert_eq!(simulator.wait(), Some(0));
+        let recorded = recorded(&path);
+        assert!(!recorded.torn, "{name}");
+        let of = |wanted: &str| {
+            let found = recorded.series.iter().find(|series| series.column.name() == wanted);
+            &found.unwrap_or_else(|| panic!("{wanted} in {name}")).points
+        };
+        // A turn has 4096 counts, and the drive measures within a count of where it is.
+        let (_, position) = of("4.position_counts").iter().rev().find(|(at, _)| *at <= done_at).unwrap();
+        assert!((position - told).abs() <= 2.0 && (position - 4096.0).abs() < 8.0, "{name}: {position}, {told}");
+        let fastest = of("4.velocity_rpm").iter().map(|(_, rpm)| *rpm).fold(0.0, f64::max);
+        assert!((50.0..70.0).contains(&fastest), "{name}: {fastest} r/min");
+        // A sample each millisecond, none missing, none twice.
+        let steps = of("4.supply_v").windows(2).map(|pair| ((pair[1].0 - pair[0].0) * 1e6).round() as i64);
+        assert!(steps.into_iter().all(|micros| micros == 1000), "{name}");
+        let mark = recorded.marks.iter().find(|mark| mark.text.contains("load torque 0.5")).expect(name);
+        assert!((mark.at.as_secs_f64() - done_at).abs() < 0.002, "{name}: {mark:?}");
+    }
+}
+
+#[test]
+fn what_is_on_the_disk_of_a_killed_simulator_is_a_record() {
+    let place = scratch("killed-record");
+    for name in ["run.mcap", "run.csv"] {
+        let path = place.join(name);
+        let mut simulator = simulator(&path, &["--record-period", "5ms", "--record-signals", "supply,4.position*"]);
+        let since = Instant::now();
+        let before = loop {
+            let found = std::fs::read(&path).ok().and_then(|bytes| read(Kind::of_name(name)?, &bytes).ok());
+            match found.map(|recorded| last(&recorded)) {
+                Some(at) if at > 0.5 => break at,
+                _ => assert!(since.elapsed() < PATIENCE, "{name}: nothing is written"),
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        simulator.kill();
+        let left = recorded(&path);
+        assert!(last(&left) >= before && left.series.len() == 3, "{name}: {} of {before}", last(&left));
+        // And it can be drawn.
+        let svg = place.join("run.svg");
+        let drawn = done(&["plot", path.to_str().unwrap(), "--signals", "supply", "--svg", svg.to_str().unwrap()]);
+        assert!(std::fs::read_to_string(&svg).unwrap().contains("Supply"), "{}", drawn.out);
+    }
+}
+
+/// The most memory that a process ever had, in bytes (`proc_pid_status(5)`).
+#[cfg(target_os = "linux")]
+fn most_memory(process: u32) -> u64 {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).expect("a line VmHWM");
+    line.trim().trim_end_matches(" kB").parse::<u64>().unwrap() * 1024
+}
+
+/// All signals of three drives each millisecond: the file grows with time, the simulator does not.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_long_record_takes_no_more_memory_than_a_short_one() {
+    let place = scratch("long-record");
+    for name in ["run.mcap", "run.csv"] {
+        let path = place.join(name);
+        let mut simulator =
+            simulator(&path, &["--drive", "zlim42c@2", "--drive", "m4230e17b50@1", "--clock", "manual"]);
+        let mut run = |time: &str| {
+            assert_eq!(simulator.ask(&format!("run {time}"))["ok"], true);
+            (most_memory(simulator.id()), std::fs::metadata(&path).unwrap().len())
+        };
+        let (early, small) = run("10s");
+        let (late, large) = run("60s");
+        assert!(large > small + (20 << 20), "{name}: {small} bytes, then {large}");
+        assert!(
+            late < early + (4 << 20),
+            "{name}: {early} bytes of memory, then {late}; the file grew by {}",
+            large - small
+        );
+    }
+}
+
+#[test]
+fn a_picture_is_written_over_a_picture_and_nothing_else() {
+    let place = scratch("plots");
+    let csv = place.join("run.csv");
+    let text = "t_s,4.velocity_rpm,4.velocity_demand_rpm,5.current_a,mark\n0,0,0,1,\n1,60,60,1.5,node 4: started\n";
+    std::fs::write(&csv, text).unwrap();
+    let csv = csv.to_str().unwrap();
+    for _ in 0..2 {
+        let html = place.join("run.html");
+        let drawn = done(&["plot", csv, "--html", html.to_str().unwrap(), "--json"]).json();
+        assert_eq!((&drawn["signals"], &drawn["marks"]), (&3.into(), &1.into()), "{drawn}");
+        let page = std::fs::read_to_string(html).unwrap();
+        assert!(page.contains("Velocity") && page.contains("started") && page.ends_with("</html>\n"));
+    }
+    let letter = place.join("letter.svg");
+    std::fs::write(&letter, "Dear reader").unwrap();
+    let refused = |arguments: &[&str], parts: &[&str]| {
+        let ended = ferrodrive(arguments);
+        assert!(ended.status != Some(0), "{arguments:?}");
+        for part in parts {
+            assert!(ended.err.contains(part), "{arguments:?}: {part:?} in {}", ended.err);
+        }
+    };
+    refused(&["plot", csv, "--svg", letter.to_str().unwrap()], &["cannot write the picture", "choose another name"]);
+    assert_eq!(std::fs::read(&letter).unwrap(), b"Dear reader");
+    refused(&["plot", csv, "--signals", "velocty_rpm"], &["did you mean velocity_rpm"]);
+    refused(&["plot", csv, "--from", "5"], &["recorded from 0.000 s to 1.000 s"]);
+    refused(&["plot", csv, "--from", "1", "--to", "0.5"], &["--to is before --from"]);
+    refused(&["plot", letter.to_str().unwrap()], &["NAME.mcap or NAME.csv"]);
+    refused(&["plot", "/nowhere/run.mcap"], &["cannot read the record"]);
+    let wrong = place.join("wrong.mcap");
+    std::fs::write(&wrong, text).unwrap();
+    refused(&["plot", wrong.to_str().unwrap()], &["no MCAP file"]);
+}
+
+#[test]
+fn a_record_is_asked_for_in_words_that_make_sense() {
+    let refused = |arguments: &[&str], part: &str| {
+        let ended = ferrodrive(&[&["sim", "--drive", "zlac8030l@4"], arguments].concat());
+        assert_eq!(ended.status, Some(2), "{arguments:?}");
+        assert!(ended.err.contains(part), "{arguments:?}: {part:?} in {}", ended.err);
+    };
+    refused(&["--record", "run.txt"], "NAME.mcap or NAME.csv");
+    refused(&["--record", "run.csv", "--record-period", "1us"], "a control period is 50us");
+    refused(&["--record-period", "1ms"], "--record <FILE>");
+    let place = scratch("refused-record");
+    let csv = place.join("run.csv");
+    refused(&["--record", csv.to_str().unwrap(), "--record-signals", "5.*"], "no signal '5.*'");
+    assert!(!csv.exists());
+}
+
+#[test]
+fn a_scenario_that_is_recorded_is_the_same_run() {
+    let place = scratch("recorded-scenario");
+    let scenario = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/scenarios/brown_out.toml");
+    let plain = done(&["run", scenario, "--json"]).json();
+    for name in ["run.mcap", "run.csv"] {
+        let path = place.join(name);
+        let record = ["run", scenario, "--json", "--record", path.to_str().unwrap(), "--record-period", "500us"];
+        let recording = done(&record).json();
+        assert!(plain["digest"] == recording["digest"] && !plain["digest"].is_null(), "{name}: {plain}");
+        let recorded = recorded(&path);
+        assert!(!recorded.torn && !recorded.series.is_empty(), "{name}");
+        let end = recorded.series[0].points.len() as f64 * 0.0005;
+        assert!((last(&recorded) - end).abs() < 0.001, "{name}: no sample is missing");
+        // The brown-out is among what happened.
+        assert!(recorded.marks.iter().any(|mark| mark.text.contains("under-voltage")), "{name}: {:?}", recorded.marks);
+    }
+    let both = ferrodrive(&["run", scenario, "--seeds", "1..3", "--record", place.join("a.csv").to_str().unwrap()]);
+    assert!(both.status == Some(2) && both.err.contains("a sweep is many runs"), "{}", both.err);
+}
+
+#[test]
+fn a_body_is_recorded_with_what_it_does() {
+    let place = scratch("recorded-body");
+    let scenario = place.join("base.toml");
+    let text = r#"
+title = "A base that is driven"
+end = "3s"
+
+[[machine.drive]]
+model = "zlac8030l"
+node = 4
+
+[[machine.drive]]
+model = "zlac8030l"
+node = 5
+
+[[machine.body]]
+name = "base"
+kind = "common-shaft"
+drives = [4, 5]
+
+[[step]]
+at = "1s"
+do = "4 load torque -1"
+"#;
+    std::fs::write(&scenario, text).unwrap();
+    let csv = place.join("run.csv");
+    done(&["run", scenario.to_str().unwrap(), "--record", csv.to_str().unwrap(), "--record-signals", "base.*"]);
+    let recorded = recorded(&csv);
+    let names: Vec<String> = recorded.series.iter().map(|series| series.column.name()).collect();
+    assert_eq!(names, ["base.angle_deg", "base.speed_rpm"]);
+    let units: Vec<&str> = recorded.series.iter().map(|series| &*series.column.unit).collect();
+    assert_eq!(units, ["°", "r/min"]);
+    let fastest = recorded.series[1].points.iter().map(|(_, rpm)| *rpm).fold(0.0, f64::max);
+    assert!(fastest > 10.0, "the load turns it: {fastest} r/min");
+}
+
+#[test]
+fn the_energies_of_a_driven_shaft_fit_together() {
+    let place = scratch("recorded-energies");
+    // Model, node-ID, load, how it is turned, gear.
+    let drives = [
+        ("zlac8030l", 4, "1.5", "4 velocity 60rpm", 1.0),
+        ("zlim42c", 2, "0.1", "2 velocity 120rpm", 1.0),
+        ("m4230e17b50", 1, "5", "1 velocity 600rpm", 50.0),
+    ];
+    for (model, node, load, turn, ratio) in drives {
+        let scenario = place.join(format!("{model}.toml"));
+        let text = format!(
+            "title = \"A load that is driven\"\nend = \"3s\"\n[machine]\ndrive = [{{ model = \"{model}\", node = {node} }}]\n\
+             [[host]]\ndo = [\"{turn}\", \"wait 1s\"]\n[[step]]\nat = \"1200ms\"\ndo = \"{node} load torque {load}\"\n"
+        );
+        std::fs::write(&scenario, text).unwrap();
+        let path = place.join(format!("{model}.mcap"));
+        done(&["run", scenario.to_str().unwrap(), "--record", path.to_str().unwrap()]);
+        let recorded = recorded(&path);
+        let of = |signal: &str| -> Vec<(f64, f64)> {
+            let name = format!("{node}.{signal}");
+            let found = recorded.series.iter().find(|series| series.column.name() == name);
+            found.unwrap_or_else(|| panic!("{name}")).points.clone()
+        };
+        let out = [
+            "electronics_energy_j",
+            "winding_heat_j",
+            "switches_heat_j",
+            "bleeder_heat_j",
+            "friction_heat_j",
+            "load_work_j",
+        ];
+        let mut rest = of("source_energy_j");
+        for signal in out.into_iter().chain(["stored_energy_j"]) {
+            rest.iter_mut().zip(of(signal)).for_each(|(rest, (_, joules))| rest.1 -= joules);
+        }
+        let through = of("source_energy_j").last().unwrap().1;
+        let worst = rest.iter().map(|(_, missing)| (missing - rest[0].1).abs()).fold(0.0, f64::max);
+        assert!(through > 5.0 && worst < 1e-3 * through, "{model}: {worst} J missing of {through} J");
+        // From when the load pulls until the end, whatever the drive does meanwhile: work is torque times way.
+        let under_load = |signal: &str| -> f64 {
+            let values: Vec<f64> = of(signal).iter().filter(|(at, _)| *at >= 1.25).map(|(_, value)| *value).collect();
+            values.last().unwrap() - values[0]
+        };
+        let load_nm: f64 = load.parse().unwrap();
+        let (of_load, done_j) = (load_nm * under_load("load_angle_rad"), under_load("load_work_j"));
+        assert!(
+            of_load > 0.1 && (done_j - of_load).abs() < 1e-3 * of_load,
+            "{model}: {of_load} J, {done_j} J recorded"
+        );
+        let way_rad = under_load("shaft_angle_rad");
+        assert!((under_load("load_angle_rad") * ratio - way_rad).abs() < 0.02 * way_rad.abs(), "{model}: the gear");
+    }
+}
+
+#[test]
+fn the_page_tells_of_every_signal_with_its_unit() {
+    let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/recording.md")).unwrap();
+    for signal in sim::recorder::Signal::ALL {
+        let unit = if signal.unit().is_empty() { String::new() } else { format!(" {}", signal.unit()) };
+        let row = format!("| `{}` |{unit} | ", signal.name());
+        assert!(page.contains(&row), "{row}");
+    }
+}
+
+#[test]
+fn the_master_records_objects_by_sdo_and_by_the_pdos_that_carry_them() {
+    let place = scratch("master-record");
+    for name in ["run.mcap", "run.csv"] {
+        let path = place.join(name);
+        let mut simulator = Simulator::start_heard(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
+        let bus = simulator.bus("socketcand");
+        let master = |words: &[&str]| done(&[&["--bus", &bus, "--model", "4=zlac8030l"], words].concat());
+        let report = |time: &str| {
+            let record = ["record", "4", "statusword", "position_actual_value", "--for", time, "--json", "--out"];
+            master(&[&record[..], &[path.to_str().unwrap()]].concat()).json()
+        };
+        // As it comes from the factory its TPDOs carry nothing.
+        let by_sdo = report("200ms");
+        let values = 2 * by_sdo["samples"].as_u64().unwrap();
+        assert_eq!((&by_sdo["by_sdo"], &by_sdo["by_pdo"], &by_sdo["missing"]), (&values.into(), &0.into(), &0.into()));
+        let found = recorded(&path);
+        let of = |found: &Recorded, name: &str| -> Vec<f64> {
+            let series = found.series.iter().find(|series| series.column.name() == name);
+            series.unwrap_or_else(|| panic!("{name}")).points.iter().map(|(_, value)| *value).collect()
+        };
+        let told = master(&["read", "4", "statusword", "--json"]).json();
+        assert_eq!(told["value"].as_f64(), of(&found, "4.statusword").last().copied(), "{name}: {told}");
+        assert_eq!(found.series.len(), 2, "{name}");
+        // CiA 301, 7.5.2.36: PDO off, mapping off, entries, how many, PDO on.
+        for (object, value) in [
+            ("1800:1", "0x80000184"),
+            ("1A00:0", "0"),
+            ("1A00:1", "0x60640020"),
+            ("1A00:2", "0x60410010"),
+            ("1A00:0", "2"),
+            ("1800:1", "0x184"),
+        ] {
+            master(&["write", "4", object, value]);
+        }
+        master(&["nmt", "4", "start"]);
+        // Nobody drives the wheel: its load turns it, and the TPDO comes with each change.
+        assert_eq!(simulator.ask("4 load torque -1")["ok"], true);
+        let by_pdo = report("2s");
+        assert!(by_pdo["by_pdo"].as_u64() > Some(0) && by_pdo["missing"] == 0, "{name}: {by_pdo}");
+        let positions = of(&recorded(&path), "4.position_actual_value_counts");
+        assert!(positions.is_sorted() && positions.last() > positions.first(), "{name}: {positions:?}");
+        assert_eq!(simulator.ask("quit")["ok"], true);
+        assert_eq!(simulator.wait(), Some(0));
+    }
+}

@@ -1,0 +1,282 @@
+//! `ferrodrive sim`: drives for other programs, over socketcand and slcan, with EEPROM contents that outlive it.
+
+use std::io::{BufRead, BufReader};
+use std::process::Stdio;
+use std::time::Duration;
+
+use processes::{Simulator, command, done, ferrodrive, scratch};
+use serde_json::json;
+
+const DRIVE: [&str; 2] = ["--drive", "zlac8030l@4"];
+const SERVE: [&str; 4] = ["--serve", "socketcand://127.0.0.1:0", "--serve", "slcan://127.0.0.1:0"];
+
+fn simulator(more: &[&str]) -> Simulator {
+    Simulator::start(&[&DRIVE[..], &SERVE[..], more].concat())
+}
+
+#[test]
+fn a_machine_file_and_the_command_line_put_drives_on_one_bus() {
+    let directory = scratch("served-machine");
+    let file = directory.join("machine.toml");
+    let text = "bitrate = '250k'\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nsupply_v = 30\n\
+                [[drive]]\nmodel = 'zlim42c'\nnode = 2\nswitches = { X0 = ['min', 'max'] }\n";
+    std::fs::write(&file, text).unwrap();
+    let path = file.to_str().unwrap();
+    let serve = ["--serve", "socketcand://127.0.0.1:0"];
+    let mut simulator = Simulator::start(&[&["--machine", path, "--drive", "m4230e17b50@1"][..], &serve].concat());
+    let bus = simulator.bus("socketcand");
+    let read = |bus: &str, node: &str, object: &str| done(&["--bus", bus, "--json", "read", node, object]).json();
+    let supplies = ["4", "2", "1"].map(|node| simulator.ask(&format!("{node} get"))["supply_v"].as_f64().unwrap());
+    assert!((supplies[0] - 30.0).abs() < 0.5 && supplies[1] < 25.0 && supplies[2] > 35.0, "{supplies:?}");
+    assert_eq!(read(&bus, "4", "200E")["meaning"], "250 kbit/s");
+    assert_eq!(read(&bus, "1", "1000")["value"], 0x2_0192);
+    // Without --drive, and at the command line's own rate.
+    let mut alone = Simulator::start(&[&["--machine", path, "--bitrate", "500k"][..], &serve].concat());
+    assert_eq!(read(&alone.bus("socketcand"), "4", "200E")["meaning"], "500 kbit/s");
+    assert_eq!(alone.ask("1 get")["ok"], false);
+}
+
+#[test]
+fn the_ready_line_names_every_listener_with_its_port() {
+    let simulator = simulator(&[]);
+    assert!(simulator.ready.starts_with("ready "), "{:?}", simulator.ready);
+    for protocol in ["socketcand", "slcan"] {
+        let address = simulator.address(protocol);
+        let port: u16 = address.rsplit_once(':').unwrap().1.parse().unwrap();
+        assert_ne!(port, 0);
+    }
+}
+
+#[test]
+fn world_commands_are_answered_line_by_line() {
+    let mut simulator = simulator(&[]);
+    let get = simulator.ask("4 get");
+    assert_eq!((&get["ok"], &get["node"]), (&json!(true), &json!(4)));
+    for field in ["t", "position", "velocity_rpm", "current_a", "supply_v"] {
+        assert!(get[field].is_number(), "{field} in {get}");
+    }
+    assert!(get["outputs"]["Y0"].is_number() && get["outputs"]["Y1"].is_number(), "{get}");
+    assert_eq!(get["brake"], "released");
+    assert_eq!(simulator.ask("4 supply 36")["ok"], true);
+    for wrong in ["fly", "5 get", "4 supply", "4 input X9 1", "4 fault wing on", "128 get"] {
+        let answer = simulator.ask(wrong);
+        assert_eq!(answer["ok"], false, "{wrong}");
+        assert!(answer["error"].as_str().is_some_and(|error| !error.is_empty()), "{answer}");
+    }
+    // Blank lines have no answer: the next one belongs to the next command.
+    simulator.send("");
+    simulator.send("   ");
+    assert_eq!(simulator.ask("now")["ok"], true);
+    assert_eq!(simulator.ask("quit")["ok"], true);
+    assert_eq!(simulator.wait(), Some(0));
+}
+
+#[test]
+fn every_drive_tells_the_same_fields_of_itself() {
+    let mut simulator = simulator(&["--drive", "m4230e17b50@1", "--drive", "zlim42c@2"]);
+    for node in [1, 2, 4] {
+        let got = simulator.ask(&format!("{node} get"));
+        assert_eq!((&got["ok"], &got["node"]), (&json!(true), &json!(node)));
+        for field in ["t", "position", "velocity_rpm", "current_a", "supply_v"] {
+            assert!(got[field].is_number(), "{field} in {got}");
+        }
+        assert_eq!(got["brake"], "released", "also where there is none: nothing holds the shaft");
+        assert!(got["outputs"].is_object(), "{got}");
+    }
+}
+
+#[test]
+fn the_end_of_input_leaves_it_running() {
+    let mut simulator = simulator(&[]);
+    simulator.close_input();
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(simulator.is_running());
+    let bus = simulator.bus("socketcand");
+    assert_eq!(done(&["--bus", &bus, "--json", "read", "4", "200B"]).json()["value"], 1024);
+}
+
+#[test]
+fn commands_reach_it_over_socketcand_and_slcan() {
+    let mut simulator = simulator(&[]);
+    for protocol in ["socketcand", "slcan"] {
+        let bus = simulator.bus(protocol);
+        let on = |arguments: &[&str]| {
+            done(&[&["--bus", &bus, "--model", "4=zlac8030l", "--json"], arguments].concat()).json()
+        };
+        assert_eq!(on(&["scan"])["nodes"][0]["node"], 4);
+        assert_eq!(on(&["write", "4", "2002", "50"])["value"], 50);
+        assert_eq!(on(&["read", "4", "in_position_threshold"])["value"], 50);
+        assert_eq!(on(&["velocity", "4", "30rpm", "--for", "500ms"])["reached"], true);
+        let moved = on(&["move", "4", "--relative", "45deg", "--profile-velocity", "60rpm"]);
+        assert_eq!(moved["reached"], true);
+        // What the drive says of its position is where the machine is.
+        let position = simulator.ask("4 get")["position"].as_i64().unwrap();
+        assert!((position - moved["position"].as_i64().unwrap()).abs() <= 5, "{position} and {moved}");
+    }
+}
+
+#[test]
+fn two_simulators_joined_by_a_bus_hear_each_other() {
+    let first = simulator(&[]);
+    let bus = first.bus("socketcand");
+    let second = Simulator::start(&["--drive", "zlac8030l@5", "--bus", &bus]);
+    assert_eq!(second.ready, format!("ready {bus}"));
+    let found = done(&["--bus", &bus, "--json", "scan"]).json();
+    let nodes: Vec<_> = found["nodes"].as_array().unwrap().iter().map(|node| node["node"].as_u64().unwrap()).collect();
+    assert_eq!(nodes, [4, 5]);
+    assert_eq!(
+        done(&["--bus", &bus, "--model", "5=zlac8030l", "--json", "velocity", "5", "60rpm", "--for", "300ms"]).json()["reached"],
+        true
+    );
+}
+
+#[test]
+fn only_a_live_bus_given_on_the_command_line_is_joined() {
+    let drive = ["sim", "--drive", "zlac8030l@4", "--bus"];
+    let ended = ferrodrive(&[&drive[..], &["sim"]].concat());
+    assert_eq!(ended.status, Some(2));
+    assert!(ended.err.contains("a live one only"), "{}", ended.err);
+    let ended = ferrodrive(&[&drive[..], &["socketcand://127.0.0.1:1/can0"]].concat());
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.err.contains("cannot connect") && !ended.out.contains("ready"), "{}", ended.err);
+}
+
+/// `dump` goes on where the server is back, and a command that waits for an answer ends with what happened.
+#[test]
+fn a_lost_connection_is_told_and_made_again() {
+    let beating = |drive: &str, place: &str| Simulator::start(&["--drive", drive, "--serve", place]);
+    let mut first = beating("zlac8030l@4,1017=100", "socketcand://127.0.0.1:0");
+    let bus = first.bus("socketcand");
+    let place = bus.trim_end_matches("/can0").to_owned();
+    let mut dump = command(&["--bus", &bus, "dump"]).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    let mut lines = BufReader::new(dump.stdout.take().unwrap()).lines().map(Result::unwrap);
+    let mut until = |part: &str| lines.by_ref().find(|line| line.contains(part)).unwrap_or_default();
+    assert!(until("704#").contains("heartbeat"));
+    first.kill();
+    // What is told of it depends on the moment: that it was reset, or that it is refused when it is tried again.
+    let lost = until("is lost");
+    assert!(lost.contains("the connection to the bus is lost: ") && lost.contains("127.0.0.1:"), "{lost}");
+    let second = beating("zlac8030l@5,1017=100", &place);
+    assert!(until("is back").contains("the connection to the bus is back"));
+    assert!(until("705#").contains("heartbeat"), "frames come again");
+    dump.kill().unwrap();
+    dump.wait().unwrap();
+    drop(second);
+}
+
+#[test]
+fn a_bus_that_is_not_there_is_a_failure_with_the_reason() {
+    let ended = ferrodrive(&["--bus", "socketcand://127.0.0.1:1/can0", "scan"]);
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.err.contains("cannot connect"), "{}", ended.err);
+}
+
+#[test]
+fn what_was_saved_is_there_after_quit_and_only_then() {
+    let directory = scratch("state");
+    let state = ["--state", directory.to_str().unwrap()];
+    let mut first = simulator(&state);
+    let bus = first.bus("socketcand");
+    done(&["--bus", &bus, "--model", "4=zlac8030l", "write", "4", "200A", "500"]);
+    assert_eq!(first.ask("quit")["ok"], true);
+    assert_eq!(first.wait(), Some(0));
+    let second = simulator(&state);
+    let bus = second.bus("socketcand");
+    assert_eq!(done(&["--bus", &bus, "--json", "read", "4", "200A"]).json()["value"], 500);
+    drop(second);
+    let fresh = simulator(&[]);
+    let bus = fresh.bus("socketcand");
+    assert_eq!(done(&["--bus", &bus, "--json", "read", "4", "200A"]).json()["value"], 1000);
+}
+
+#[test]
+fn a_kill_at_any_moment_leaves_an_old_or_a_new_image() {
+    let directory = scratch("kill");
+    let state = ["--state", directory.to_str().unwrap()];
+    let mut before = 1000;
+    for round in 0..6 {
+        let mut simulator = simulator(&state);
+        let bus = simulator.bus("socketcand");
+        let found = done(&["--bus", &bus, "--json", "read", "4", "200A"]).json()["value"].as_i64().unwrap();
+        assert!(found == before || found == 900 + round - 1, "round {round}: {found} is neither {before} nor newer");
+        before = found;
+        done(&["--bus", &bus, "--model", "4=zlac8030l", "write", "4", "200A", &(900 + round).to_string()]);
+        // The image reaches the disk within 1.5 s; the process dies somewhere on the way.
+        std::thread::sleep(Duration::from_millis(23 * round as u64));
+        simulator.kill();
+    }
+}
+
+#[test]
+fn an_image_is_on_the_disk_within_a_second_and_a_half() {
+    let directory = scratch("soon");
+    let state = ["--state", directory.to_str().unwrap()];
+    let mut first = simulator(&state);
+    let bus = first.bus("socketcand");
+    done(&["--bus", &bus, "--model", "4=zlac8030l", "write", "4", "200A", "700"]);
+    std::thread::sleep(Duration::from_millis(1500));
+    first.kill();
+    let second = simulator(&state);
+    let bus = second.bus("socketcand");
+    assert_eq!(done(&["--bus", &bus, "--json", "read", "4", "200A"]).json()["value"], 700);
+    drop(second);
+}
+
+#[test]
+fn a_corrupt_image_is_reported_and_not_used() {
+    let directory = scratch("corrupt");
+    std::fs::write(directory.join("zlac8030l@4.eeprom"), "ferrodrive eeprom 1 zlac8030l 5\nwrong").unwrap();
+    let ended = ferrodrive(&[&["sim"], &DRIVE[..], &["--state", directory.to_str().unwrap()]].concat());
+    assert_eq!(ended.status, Some(1));
+    assert!(ended.err.contains("corrupt") && ended.err.contains("zlac8030l@4.eeprom"), "{}", ended.err);
+    assert!(!ended.out.contains("ready"));
+}
+
+#[test]
+fn every_frame_is_in_the_log() {
+    let directory = scratch("log");
+    let log = directory.join("bus.log");
+    let mut simulator = simulator(&["--log", log.to_str().unwrap()]);
+    let bus = simulator.bus("slcan");
+    done(&["--bus", &bus, "read", "4", "200B"]);
+    simulator.ask("quit");
+    assert_eq!(simulator.wait(), Some(0));
+    let text = std::fs::read_to_string(&log).unwrap();
+    for frame in ["can0 704#00", "can0 604#400B200000000000", "can0 584#4B0B200000040000"] {
+        assert!(text.contains(frame), "{frame} in {text}");
+    }
+}
+
+#[test]
+fn every_model_can_be_simulated_and_a_scan_from_outside_says_what_it_cannot_tell() {
+    let drives = ["zlac8030l@4", "zlim42c@2", "zlim42c-82@3", "m4230e17b50@10", "m4230e17b80@11", "m8025e25b50@12"];
+    let mut arguments: Vec<&str> = drives.iter().flat_map(|drive| ["--drive", drive]).collect();
+    arguments.extend(["--drive", "m8025e25b80@13", "--serve", "socketcand://127.0.0.1:0"]);
+    let mut simulator = Simulator::start(&arguments);
+    for node in [4, 2, 3, 10, 11, 12, 13] {
+        assert_eq!(simulator.ask(&format!("{node} get"))["node"], node);
+    }
+    let bus = simulator.bus("socketcand");
+    let found = done(&["--bus", &bus, "--json", "--model", "4=zlac8030l", "scan"]).json();
+    let node = |id: u64| found["nodes"].as_array().unwrap().iter().find(|node| node["node"] == id).unwrap();
+    assert_eq!((&node(4)["model"], &node(4)["remark"]), (&"zlac8030l".into(), &serde_json::Value::Null));
+    assert!(node(2)["model"].is_null() && node(12)["model"].is_null());
+    assert!(node(2)["remark"].as_str().unwrap().contains("--model 2=zlim42c"), "{found}");
+    // The 82 mm stepper is told apart from the ZLAC8030L and not from the one of 70 mm.
+    assert!(node(3)["remark"].as_str().unwrap().contains("--model 3=zlim42c (or zlim42c-82)"), "{found}");
+    simulator.ask("quit");
+    assert_eq!(simulator.wait(), Some(0));
+}
+
+#[test]
+fn everything_that_the_drives_of_a_machine_file_do_not_take_is_told_at_once() {
+    let place = scratch("sim-machine-problems");
+    let file = place.join("two.toml");
+    let drives = "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\nbattery = true\n[[drive]]\nmodel = 'zlim42c'\nnode = 2\n";
+    std::fs::write(&file, format!("{drives}inputs = {{ Y9 = true }}\n")).unwrap();
+    let ended = ferrodrive(&["sim", "--machine", file.to_str().unwrap(), "--serve", "socketcand://127.0.0.1:0"]);
+    assert_eq!(ended.status, Some(2), "{}", ended.err);
+    for expected in ["line 4", "has no battery", "line 8", "X0, X1, X2, X3"] {
+        assert!(ended.err.contains(expected), "{expected}: {}", ended.err);
+    }
+}

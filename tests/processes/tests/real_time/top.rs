@@ -1,0 +1,190 @@
+//! `ferrodrive top` in a terminal that `script` (util-linux) makes: what is held moves a drive, and what is let go, or loses its
+//! terminal, stops.
+#![cfg(unix)]
+#![allow(clippy::print_stderr, reason = "a test that is skipped says why")]
+
+use std::io::{Read, Write};
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use processes::{Simulator, ferrodrive};
+
+/// Far more than anything takes.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A terminal of 80 columns and 24 lines with the program in it; killed when dropped.
+struct Terminal {
+    script: Child,
+    keys: ChildStdin,
+    written: Arc<Mutex<String>>,
+    /// Where the program keeps what it remembers, for as long as it runs.
+    _cache: processes::Scratch,
+}
+
+impl Terminal {
+    /// `None` where no terminal can be made.
+    fn open(bus: &str) -> Option<Self> {
+        if Command::new("script").arg("--version").output().is_err() {
+            eprintln!("skipped: there is no `script` here, which gives a command a terminal");
+            return None;
+        }
+        let program = processes::program();
+        let line = format!("stty cols 80 rows 24; exec {program} --bus {bus} top");
+        let mut script = Command::new("script");
+        script.args(["-q", "-f", "-e", "-c", &line, "/dev/null"]).env("TERM", "xterm").env("NO_COLOR", "1");
+        let cache = processes::scratch("top-cache");
+        script.env("XDG_CACHE_HOME", &*cache);
+        let mut script = script.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+        let (keys, mut screen) = (script.stdin.take().unwrap(), script.stdout.take().unwrap());
+        let written = Arc::new(Mutex::new(String::new()));
+        let shared = Arc::clone(&written);
+        std::thread::spawn(move || {
+            let mut bytes = [0; 4096];
+            while let Ok(count) = screen.read(&mut bytes) {
+                if count == 0 {
+                    return;
+                }
+                shared.lock().unwrap().push_str(&String::from_utf8_lossy(&bytes[..count]));
+            }
+        });
+        Some(Self { script, keys, written, _cache: cache })
+    }
+
+    fn press(&mut self, key: &str) {
+        self.keys.write_all(key.as_bytes()).unwrap();
+        self.keys.flush().unwrap();
+    }
+
+    /// Waits for a word: what is between words may be a movement of the cursor.
+    fn wait_for(&self, word: &str) {
+        let until = Instant::now() + PATIENCE;
+        while !self.written.lock().unwrap().contains(word) {
+            assert!(Instant::now() < until, "{word:?} is nowhere on the screen; it began with {:?}", self.beginning());
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// Waits for a drive. One that boots while the bus is scanned may be missed: then it is scanned again.
+    fn wait_for_drive(&mut self, model: &str) {
+        for _ in 0..5 {
+            let until = Instant::now() + PATIENCE / 5;
+            while Instant::now() < until {
+                if self.written.lock().unwrap().contains(model) {
+                    return;
+                }
+                std::thread::sleep(Duration::from_millis(20));
+            }
+            self.press("n");
+        }
+        self.wait_for(model);
+    }
+
+    fn beginning(&self) -> String {
+        self.written.lock().unwrap().chars().take(2_000).collect()
+    }
+
+    /// Holds a key as a keyboard does until this is true. A machine that is busy may hold repeats up, which ends the hold: then
+    /// it is let go, and held again.
+    fn hold_until(&mut self, key: &str, mut done: impl FnMut() -> bool) {
+        let until = Instant::now() + PATIENCE;
+        while Instant::now() < until {
+            self.press(key);
+            std::thread::sleep(Duration::from_millis(400));
+            for repeat in 1..=60 {
+                self.press(key);
+                std::thread::sleep(Duration::from_millis(30));
+                if repeat % 10 == 0 && done() {
+                    return;
+                }
+            }
+            std::thread::sleep(Duration::from_millis(1_300));
+        }
+        panic!("holding {key:?} does nothing");
+    }
+}
+
+impl Drop for Terminal {
+    fn drop(&mut self) {
+        let _ = self.script.kill();
+        let _ = self.script.wait();
+    }
+}
+
+fn bench() -> (Simulator, String) {
+    let simulator = Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
+    let bus = simulator.bus("socketcand");
+    (simulator, bus)
+}
+
+fn position(simulator: &mut Simulator) -> i64 {
+    simulator.ask("4 get")["position"].as_i64().unwrap()
+}
+
+/// It stands: a tenth of a turn a second is far more than a shaft at rest is moved by.
+fn wait_until_it_stands(simulator: &mut Simulator) {
+    let until = Instant::now() + PATIENCE;
+    loop {
+        let before = position(simulator);
+        std::thread::sleep(Duration::from_millis(300));
+        if position(simulator).abs_diff(before) < 20 {
+            return;
+        }
+        assert!(Instant::now() < until, "it goes on turning");
+    }
+}
+
+#[test]
+fn a_key_that_is_held_jogs_and_let_go_stops() {
+    let (mut simulator, bus) = bench();
+    let Some(mut terminal) = Terminal::open(&bus) else { return };
+    terminal.wait_for_drive("zlac8030l");
+    let before = position(&mut simulator);
+    // A press alone.
+    terminal.press("l");
+    std::thread::sleep(Duration::from_millis(1_500));
+    assert!(position(&mut simulator).abs_diff(before) < 20, "a press moves nothing");
+    // A turn is 4096 counts; to jog at 10 r/min for a tenth of it.
+    terminal.hold_until("l", || position(&mut simulator) - before > 400);
+    wait_until_it_stands(&mut simulator);
+    let there = position(&mut simulator);
+    terminal.hold_until("h", || position(&mut simulator) < there - 400);
+    terminal.press(" ");
+    wait_until_it_stands(&mut simulator);
+    // "stopped by a press of stop"
+    terminal.wait_for("press");
+    terminal.press("q");
+    let until = Instant::now() + PATIENCE;
+    let status = loop {
+        if let Some(status) = terminal.script.try_wait().unwrap() {
+            break status;
+        }
+        assert!(Instant::now() < until, "q ends it");
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    assert!(status.success(), "{status}");
+    // The screen is given back.
+    assert!(terminal.written.lock().unwrap().contains("\u{1b}[?1049l"));
+}
+
+#[test]
+fn a_terminal_that_is_lost_stops_what_it_moves() {
+    let (mut simulator, bus) = bench();
+    let Some(mut terminal) = Terminal::open(&bus) else { return };
+    terminal.wait_for_drive("zlac8030l");
+    let before = position(&mut simulator);
+    terminal.hold_until("l", || position(&mut simulator) - before > 200);
+    // The window closes: its processes are hung up.
+    drop(terminal);
+    wait_until_it_stands(&mut simulator);
+}
+
+#[test]
+fn what_is_no_terminal_is_told_what_to_use() {
+    let ended = ferrodrive(&["top"]);
+    assert_eq!(ended.status, Some(2));
+    assert!(ended.err.contains("no terminal") && ended.err.contains("ferrodrive watch"), "{}", ended.err);
+    let json = ferrodrive(&["--json", "top"]);
+    assert_eq!(json.status, Some(2));
+    assert!(format!("{}{}", json.out, json.err).contains("for programs"), "{}{}", json.out, json.err);
+}

@@ -1,0 +1,23 @@
+//! The whole of Ferrodrive from outside: the manuals' data, conversations and laws. One program: a file each.
+
+mod any_data_sheet_runs;
+mod conversations;
+mod data_of_the_drives;
+mod data_of_the_mjoint;
+mod data_of_the_zlim42c;
+mod departures_of_the_drives;
+mod described_node;
+mod eds_of_the_drives;
+mod every_drive;
+mod files_of_makers;
+mod laws_hold_for_seeded_input;
+mod lss;
+mod realism;
+mod tables_of_cia402;
+mod tables_of_the_drives;
+mod tables_of_the_mjoint;
+mod traps_between_the_drives;
+mod virtual_cia402;
+mod virtual_mjoint;
+mod virtual_zlac8030l;
+mod virtual_zlim42c;

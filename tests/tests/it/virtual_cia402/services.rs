@@ -1,0 +1,162 @@
+//! The services of CiA 301 over the objects of the description.
+
+use canopen::od::{Access, DefaultValue};
+use canopen::{AbortCode, Mux};
+use devices::servo::CIA402;
+use sim::VirtualDrive;
+
+use crate::virtual_cia402::bench::Bench;
+
+const SAVE: i64 = 0x6576_6173;
+const LOAD: i64 = 0x6461_6F6C;
+
+/// What a running drive measures, or what a service shows instead of a value as delivered.
+fn is_live(mux: Mux) -> bool {
+    matches!(mux.index, 0x6041 | 0x6061..=0x6064 | 0x606B | 0x606C | 0x6074 | 0x6077..=0x6079 | 0x60F4 | 0x60FC | 0x60FD)
+}
+
+#[test]
+fn every_object_answers_as_it_is_delivered() {
+    let mut bench = Bench::new();
+    let mut read = 0;
+    for row in CIA402.dictionary.rows() {
+        let mux = row.mux();
+        if row.data_type.bits() == 0 || is_live(mux) {
+            continue;
+        }
+        let expected = match row.default {
+            DefaultValue::Value(value) => value,
+            DefaultValue::NodeIdPlus(base) => i64::from(base) + 5,
+            _ => continue,
+        };
+        let answer = if row.access == Access::WriteOnly { Err(AbortCode::WRITE_ONLY) } else { Ok(expected) };
+        assert_eq!(bench.try_read(mux.index, mux.sub_index), answer, "{mux} {}", row.name);
+        let same = bench.write(mux.index, mux.sub_index, expected);
+        let writable = !matches!(mux.index, 0x1010 | 0x1011 | 0x1400..=0x1BFF);
+        if matches!(row.access, Access::ReadOnly | Access::Const) {
+            assert_eq!(same, Err(AbortCode::READ_ONLY), "{mux}");
+        } else if writable {
+            assert_eq!(same, Ok(()), "{mux} {}", row.name);
+        }
+        read += 1;
+    }
+    assert!(read > 200, "{read}");
+}
+
+#[test]
+fn parameters_are_stored_by_group_and_come_back() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.read(0x1010, 1), 1, "stores on command");
+    bench.set(&[(0x6072, 0, 1500), (0x1017, 0, 100)]);
+    assert_eq!(bench.write(0x1010, 1, 0x1234), Err(AbortCode::CANNOT_TRANSFER));
+    let before = bench.machine.nvm_generation();
+    bench.set(&[(0x1010, 3, SAVE)]);
+    assert_eq!(bench.machine.nvm_generation(), before + 1);
+    cycle(&mut bench);
+    assert_eq!((bench.read(0x6072, 0), bench.read(0x1017, 0)), (1500, 0), "only the profile's group");
+    bench.set(&[(0x1017, 0, 100), (0x1010, 1, SAVE)]);
+    cycle(&mut bench);
+    assert_eq!((bench.read(0x6072, 0), bench.read(0x1017, 0)), (1500, 100));
+    bench.set(&[(0x1011, 1, LOAD)]);
+    assert_eq!(bench.read(0x6072, 0), 1500, "from the next reset on");
+    bench.frame("000#8105");
+    bench.run_ms(5);
+    assert_eq!((bench.read(0x6072, 0), bench.read(0x1017, 0)), (3000, 0));
+}
+
+/// The supply off and on.
+fn cycle(bench: &mut Bench) {
+    bench.machine.cut_power(bench.now);
+    bench.run_ms(100);
+    bench.machine.set_power(true, bench.now);
+    bench.run_ms(300);
+}
+
+#[test]
+fn reset_communication_leaves_parameters_alone_and_with_6007h_0_the_motor_too() {
+    let mut bench = Bench::new();
+    bench.enable(3);
+    bench.set(&[
+        (0x60FF, 0, 5 * crate::virtual_cia402::bench::TURN),
+        (0x1017, 0, 50),
+        (0x6072, 0, 2000),
+        (0x6007, 0, 0),
+    ]);
+    bench.run_ms(300);
+    bench.frame("000#8205");
+    bench.run_ms(20);
+    assert!((bench.rpm() - 300.0).abs() < 6.0, "{}", bench.rpm());
+    assert_eq!((bench.read(0x1017, 0), bench.read(0x6072, 0)), (0, 2000));
+}
+
+#[test]
+fn errors_are_kept_latest_first_and_forgotten_by_0() {
+    let mut bench = Bench::new();
+    bench.set(&[(0x1016, 1, 0x0001_0032)]);
+    for _ in 0..2 {
+        bench.frame("701#05");
+        bench.run_ms(100);
+        bench.frame("701#05");
+        bench.control(0x00);
+        bench.control(0x80);
+        bench.run_ms(10);
+    }
+    assert_eq!(bench.emcy(), [0x8130, 0, 0x8130, 0]);
+    assert_eq!((bench.read(0x1003, 0), bench.read(0x1003, 1), bench.read(0x1003, 2)), (2, 0x8130, 0x8130));
+    assert_eq!(bench.write(0x1003, 0, 1), Err(AbortCode::INVALID_VALUE));
+    bench.set(&[(0x1003, 0, 0)]);
+    assert_eq!((bench.read(0x1003, 0), bench.read(0x1003, 1)), (0, 0));
+}
+
+#[test]
+fn pdos_are_mapped_as_the_standard_has_them() {
+    let mut bench = Bench::new();
+    bench.sent.clear();
+    bench.frame("205#0600");
+    bench.run_ms(2);
+    let told: Vec<_> = bench.sent.iter().map(ToString::to_string).collect();
+    // TPDO1: statusword; TPDO2: statusword and mode.
+    assert!(told.contains(&"185#3106".to_string()) && told.contains(&"285#310600".to_string()), "{told:?}");
+    bench.sent.clear();
+    bench.sync();
+    bench.run_ms(2);
+    let told: Vec<_> = bench.sent.iter().map(ToString::to_string).collect();
+    assert!(told.iter().any(|frame| frame.starts_with("385#3106") && frame.len() == 4 + 12), "{told:?}");
+    assert!(told.iter().any(|frame| frame.starts_with("485#3106") && frame.len() == 4 + 12), "{told:?}");
+    bench.frame("305#060003");
+    bench.run_ms(2);
+    assert_eq!(bench.read(0x6061, 0), 3, "RPDO2 carries the mode");
+    bench.frame("505#060000000200");
+    assert_eq!(bench.read(0x60FF, 0), 0x0002_0000, "RPDO4 the target velocity");
+}
+
+#[test]
+fn an_rpdo_that_is_too_short_is_told() {
+    let mut bench = Bench::new();
+    bench.frame("405#0600");
+    bench.run_ms(2);
+    assert_eq!(bench.emcy(), [0x8210]);
+    assert_eq!(bench.read(0x1003, 1), 0x8210);
+}
+
+#[test]
+fn what_is_mounted_wrong_or_missing_is_a_fault_with_its_code() {
+    for (component, code) in [(sim::Component::Encoder, 0x7305), (sim::Component::Eeprom, 0x5530)] {
+        let mut bench = Bench::new();
+        bench.machine.set_fault(component, true, bench.now).unwrap();
+        bench.run_ms(50);
+        assert_eq!((bench.read(0x603F, 0), bench.status() & 0x4F), (code, 0x08));
+    }
+    for (supply_v, code) in [(100.0, 0x3220), (420.0, 0x3210)] {
+        let mut bench = Bench::new();
+        bench.machine.set_supply(supply_v, bench.now).unwrap();
+        bench.run_ms(2000);
+        assert_eq!(bench.read(0x603F, 0), code, "{supply_v} V, {} mV", bench.read(0x6079, 0));
+    }
+    for (sensor, code) in [(sim::TemperatureSensor::Motor, 0x4310), (sim::TemperatureSensor::Driver, 0x4210)] {
+        let mut bench = Bench::new();
+        bench.machine.hold_temperature(sensor, Some(140.0), bench.now).unwrap();
+        bench.run_ms(50);
+        assert_eq!(bench.read(0x603F, 0), code);
+    }
+}

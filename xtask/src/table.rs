@@ -1,0 +1,32 @@
+//! The table at the end of a run of steps.
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use crate::tally::Tally;
+
+/// A step that has run: its name, how long it took, what it found.
+pub(crate) type Row = (&'static str, Duration, Tally);
+
+/// Prints the table; success if nothing failed.
+pub(crate) fn conclude(rows: &[Row], took: Duration) -> ExitCode {
+    println!("\n{:10} {:8} {:>8} {:>7} {:>7} {:>8}  note", "step", "result", "time", "passed", "failed", "skipped");
+    for (name, took, tally) in rows {
+        let Tally { passed, failed, skipped, note } = tally;
+        println!("{name:10} {:8} {:>8} {passed:>7} {failed:>7} {skipped:>8}  {note}", tally.verdict(), seconds(*took));
+    }
+    println!("{:10} {:8} {:>8}\n", "all", sum(rows).verdict(), seconds(took));
+    if sum(rows).failed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// What all steps found together.
+pub(crate) fn sum(rows: &[Row]) -> Tally {
+    let mut sum = Tally::default();
+    rows.iter().for_each(|(_, _, tally)| sum.add(tally));
+    sum
+}
+
+/// A time as the table shows it.
+pub(crate) fn seconds(duration: Duration) -> String {
+    format!("{:.1} s", duration.as_secs_f64())
+}

@@ -1,0 +1,107 @@
+//! The programs that `cargo test` builds, run side by side.
+//!
+//! cargo runs one after the other, so that a test that waits lets every core wait. Here some programs run at a time. What each
+//! prints is kept until it ends.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Mutex;
+
+use serde_json::Value;
+
+use crate::libtest::{self, Timed};
+use crate::say;
+use crate::tally::Tally;
+use crate::{process, workspace};
+
+/// The tests that need processes and the clock, as `cargo test` selects them: beside packages whose features are those of the
+/// default members, so that what is built is shared.
+pub(crate) const REAL_TIME: &[&str] =
+    &["-p", "ferrodrive", "-p", "ferrodrive-tests", "-p", "ferrodrive-processes", "--test", "real_time"];
+
+/// The tests with large libraries of others.
+pub(crate) const SCHEMA_AND_BROWSER: &[&str] = &["-p", "ferrodrive-browser-and-schema"];
+
+/// A program with tests in it.
+#[derive(Debug)]
+pub(crate) struct Program {
+    pub(crate) path: PathBuf,
+    /// The folder of its package, in which its tests begin.
+    folder: PathBuf,
+}
+
+/// How they are run.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct How<'a> {
+    /// Programs at a time.
+    pub(crate) programs: usize,
+    /// Tests of one program at a time. More than there are cores, where tests wait.
+    pub(crate) threads: usize,
+    /// What else they are told.
+    pub(crate) arguments: &'a [&'a str],
+}
+
+/// Builds tests, as `cargo test` with these words selects them.
+///
+/// # Errors
+/// A sentence; what the compiler says goes to standard error.
+pub(crate) fn build(words: &[&str]) -> Result<Vec<Program>, String> {
+    let mut cargo = workspace::cargo();
+    cargo.args(["test", "--quiet", "--no-run", "--message-format=json-render-diagnostics"]).args(words);
+    let mut programs = Vec::new();
+    let built = process::run(&mut cargo, |line| programs.extend(serde_json::from_str(line).ok().and_then(program_of)))?;
+    if !built {
+        return Err("the tests do not build: read the lines above".to_owned());
+    }
+    // The largest have most tests, and are begun first.
+    let size = |program: &Program| std::fs::metadata(&program.path).map_or(0, |file| file.len());
+    programs.sort_by_key(|program| std::cmp::Reverse(size(program)));
+    Ok(programs)
+}
+
+fn program_of(message: Value) -> Option<Program> {
+    let folder = Path::new(message["manifest_path"].as_str()?).parent()?.to_path_buf();
+    let path = message["executable"].as_str().map(PathBuf::from)?;
+    (message["profile"]["test"] == true).then_some(Program { path, folder })
+}
+
+/// Runs them all, whatever fails; shows what failed, and the slowest tests if that is asked for.
+pub(crate) fn run(programs: Vec<Program>, how: How<'_>) -> Tally {
+    if programs.is_empty() {
+        return Tally::failed("cargo built no tests");
+    }
+    let queue = Mutex::new(programs.into_iter());
+    let found = Mutex::new((Tally::default(), Vec::new()));
+    let step = say::step();
+    std::thread::scope(|scope| {
+        for _ in 0..how.programs {
+            scope.spawn(|| {
+                say::work_for(step);
+                loop {
+                    // The lock is held while one is taken, not while it runs.
+                    let next = queue.lock().ok().and_then(|mut queue| queue.next());
+                    let Some(program) = next else { break };
+                    let (tally, timed) = run_one(&program, how);
+                    if let Ok(mut found) = found.lock() {
+                        found.0.add(&tally);
+                        found.1.extend(timed);
+                    }
+                }
+            });
+        }
+    });
+    let (tally, timed) = found.into_inner().unwrap_or_default();
+    libtest::show_slowest(timed);
+    tally
+}
+
+fn run_one(program: &Program, how: How<'_>) -> (Tally, Vec<Timed>) {
+    let name = program.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut command = Command::new(&program.path);
+    command.current_dir(&program.folder).env("CARGO_MANIFEST_DIR", &program.folder);
+    command.arg(format!("--test-threads={}", how.threads)).args(how.arguments);
+    let mut read = libtest::Reader::default();
+    libtest::tell_times(&mut command);
+    let ended = process::run(&mut command, |line| read.line(line));
+    read.end(&name, ended)
+}
