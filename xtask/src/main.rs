@@ -24,6 +24,7 @@ mod tally;
 mod test;
 mod test_programs;
 mod tidy;
+mod times;
 mod vcan;
 mod wheel;
 mod workspace;
@@ -44,6 +45,7 @@ The project's own chores.
   cargo xtask wheel              the Python package, in dist/: the library, the binary, the interface for python-can
   cargo xtask dist               what is released, in dist/: binary, manual pages, completions, data sheets, licences, wheel
   cargo xtask pgo                the binary to release, optimised by what a training run does
+  cargo xtask times [ROW..]      how long the first commands, the tests and pip take, each from a fresh clone
   cargo xtask idle [SECONDS]     what a simulator costs that waits, in per cent of a core
 ";
 
@@ -58,6 +60,7 @@ fn main() -> ExitCode {
         ["pgo"] => pgo::command(),
         ["vcan-test"] => vcan::command(),
         ["idle", rest @ ..] => idle::command(rest),
+        ["times", rest @ ..] => times::command(rest),
         [] | ["help" | "--help" | "-h"] => {
             print!("{USAGE}");
             ExitCode::SUCCESS

@@ -177,6 +177,25 @@ impl Simulator {
         serde_json::from_str(&answer).unwrap_or_else(|error| panic!("{error} in {answer:?}"))
     }
 
+    /// The time of its drives.
+    pub fn time(&mut self) -> Duration {
+        let answer = self.ask("now");
+        Duration::from_secs_f64(answer["t"].as_f64().unwrap_or_else(|| panic!("no time in {answer}")))
+    }
+
+    /// Waits until so much time has passed for its drives, which on a busy machine takes longer than that.
+    pub fn pass(&mut self, time: Duration) {
+        let end = self.time() + time;
+        loop {
+            let now = self.time();
+            if now >= end {
+                return;
+            }
+            // In real time, since a served bus follows the clock; never longer than what is left.
+            std::thread::sleep(end - now);
+        }
+    }
+
     /// Ends its standard input.
     pub fn close_input(&mut self) {
         self.input = None;

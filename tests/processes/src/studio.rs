@@ -61,6 +61,7 @@ impl Studio {
                 return state;
             }
             assert!(Instant::now() < until, "waited for {what}: {state}");
+            // Looked at again and again.
             std::thread::sleep(Duration::from_millis(20));
         }
     }

@@ -30,7 +30,10 @@ def program() -> str:
     beside = pathlib.Path(sysconfig.get_path("scripts")) / "ferrodrive"
     found = shutil.which(str(beside)) or shutil.which("ferrodrive")
     if found is None:
-        raise SimulatorError("there is no program `ferrodrive`: neither beside this Python nor on PATH; install the wheel anew")
+        raise SimulatorError(
+            "there is no program `ferrodrive`: neither beside this Python nor on PATH; "
+            "`cargo install --path crates/cli` in a clone installs it, and so does the wheel of a release"
+        )
     return found
 
 

@@ -138,6 +138,7 @@ fn garbage_endless_lines_and_half_lines_do_no_harm() {
     let mut text = String::new();
     cut.read_to_string(&mut text).unwrap();
     assert_eq!(text.lines().count(), 1, "{text}");
+    // The supply comes to its new voltage.
     std::thread::sleep(Duration::from_millis(50));
     let volts = simulator.ask("4 get")["supply_v"].as_f64().unwrap();
     assert!((volts - 33.0).abs() < 10.0, "{volts}");

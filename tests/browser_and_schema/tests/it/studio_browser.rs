@@ -140,6 +140,16 @@ impl Stage {
         self.find(".motion fieldset:not([disabled])").await;
     }
 
+    /// Chooses from a list, also one that the page puts anew meanwhile.
+    async fn choose(&self, css: &str, value: &str) {
+        loop {
+            match self.find(css).await.select_by_value(value).await {
+                Err(error) if is_replaced(&error) => {}
+                chosen => return chosen.unwrap_or_else(|error| panic!("{css} {value}: {error}")),
+            }
+        }
+    }
+
     /// Waits until an element says this, and gives all that it says.
     async fn says(&self, css: &str, part: &str) -> String {
         let until = std::time::Instant::now() + PATIENCE;
@@ -152,6 +162,7 @@ impl Stage {
                 return text;
             }
             assert!(std::time::Instant::now() < until, "{css} says {text:?}, not {part:?}");
+            // Looked at again and again.
             tokio::time::sleep(std::time::Duration::from_millis(50)).await;
         }
     }
@@ -192,6 +203,7 @@ impl Stage {
         let until = std::time::Instant::now() + PATIENCE;
         while !is_so().await {
             assert!(std::time::Instant::now() < until, "waited for {what}");
+            // Looked at again and again.
             tokio::time::sleep(std::time::Duration::from_millis(50)).await;
         }
     }
@@ -202,6 +214,7 @@ impl Stage {
         let until = std::time::Instant::now() + PATIENCE;
         while !file.exists() {
             assert!(std::time::Instant::now() < until, "no file is saved");
+            // Looked at again and again.
             tokio::time::sleep(std::time::Duration::from_millis(50)).await;
         }
         file

@@ -135,6 +135,7 @@ fn what_is_on_a_bus_is_shown_as_it_comes() {
     let watch = std::thread::scope(|scope| {
         let watching = scope.spawn(|| on(&["--json", "emcy", "watch", "--for", "5s"]).out);
         for _ in 0..20 {
+            // Written by another thread, once the command listens; nothing says when it does.
             std::thread::sleep(std::time::Duration::from_millis(200));
             on(&["send", "089#1023020000000000"]);
             if watching.is_finished() {

@@ -247,6 +247,7 @@ fn wait_for(what: &str, mut reached: impl FnMut() -> bool) {
     let began = std::time::Instant::now();
     while !reached() {
         assert!(began.elapsed() < PATIENCE, "{what}");
+        // Looked at again and again.
         std::thread::sleep(Duration::from_millis(100));
     }
 }

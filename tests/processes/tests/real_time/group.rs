@@ -169,6 +169,7 @@ impl Bench {
         let begin = Instant::now();
         while self.turns(4) != turning || self.turns(5) != turning {
             assert!(begin.elapsed() < PATIENCE, "both turn: {}", !turning);
+            // Looked at again and again.
             std::thread::sleep(Duration::from_millis(20));
         }
     }
@@ -208,6 +209,7 @@ fn a_base_stops_when_no_line_comes_and_drives_on_with_the_next() {
     while !(bench.turns(4) && bench.turns(5)) {
         assert!(begin.elapsed() < PATIENCE, "it does not drive");
         writeln!(lines, "0.5 0").unwrap();
+        // As often as a program gives lines.
         std::thread::sleep(Duration::from_millis(50));
     }
     // The program that gives the lines hangs; its pipe is open.
@@ -216,6 +218,7 @@ fn a_base_stops_when_no_line_comes_and_drives_on_with_the_next() {
     while !(bench.turns(4) && bench.turns(5)) {
         assert!(begin.elapsed() < PATIENCE, "it does not drive on");
         writeln!(lines, "0.5 0").unwrap();
+        // As often as a program gives lines.
         std::thread::sleep(Duration::from_millis(50));
     }
     drop(lines);

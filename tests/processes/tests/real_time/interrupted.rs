@@ -47,6 +47,7 @@ fn wait_until_it_turns(simulator: &mut Simulator, node: &str) {
     while turning < 3 {
         turning = if speed(simulator, node).abs() < 50.0 { 0 } else { turning + 1 };
         assert!(begin.elapsed() < Duration::from_secs(20), "node {node} does not turn");
+        // Looked at again and again.
         std::thread::sleep(Duration::from_millis(20));
     }
 }
@@ -194,6 +195,7 @@ fn a_simulator_on_somebody_elses_bus_leaves_it_when_it_is_asked_to_end() {
             assert!(begin.elapsed() < Duration::from_secs(20), "node 4 never answers: {ready}");
         }
         let moving = start(&bus, "4=zlac8030l", &["velocity", "4", "100rpm", "--for", "60s"]);
+        // It drives for a while.
         std::thread::sleep(Duration::from_secs(1));
         send(signal, &child);
         let ended = child.wait_with_output().unwrap();

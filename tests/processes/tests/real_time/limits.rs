@@ -90,6 +90,7 @@ fn limits_follow_what_is_written_to_the_objects_that_move_them() {
     let error = on_bus(&["write", "4", "60FF", "1001"]).err;
     assert!(error.contains("202Fh:05 has been written since the drive's last restart"), "{error}");
     assert_eq!(on_bus(&["save", "4"]).status, Some(0));
+    // The store takes its time, and a reset would cut it short.
     std::thread::sleep(std::time::Duration::from_millis(300));
     assert_eq!(on_bus(&["nmt", "4", "reset"]).status, Some(0));
     let written = on_bus(&["--json", "write", "4", "60FF", "2.7rpm"]).json();

@@ -60,6 +60,7 @@ async fn until(what: &str, range: std::ops::RangeInclusive<i32>, mut value: impl
             return;
         }
         assert!(start.elapsed() < PATIENCE, "{what} is {now}, not in {range:?}");
+        // Looked at again and again.
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
 }

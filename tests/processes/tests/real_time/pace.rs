@@ -14,9 +14,11 @@ fn simulator(arguments: &[&str]) -> Simulator {
 #[test]
 fn moved_by_hand_time_stands_until_a_run_and_comes_to_where_it_says() {
     let mut simulator = simulator(&[]);
+    // Time of the clock in which that of the drives stands.
     std::thread::sleep(Duration::from_millis(50));
     assert_eq!(simulator.ask("now")["t"], 0.0);
     assert_eq!(simulator.ask("run 20ms")["t"], 0.02);
+    // Time of the clock in which that of the drives stands.
     std::thread::sleep(Duration::from_millis(50));
     assert_eq!(simulator.ask("run 5us")["t"], 0.020_005);
     assert_eq!(simulator.ask("run until 1.5s")["t"], 1.5);
@@ -60,6 +62,7 @@ fn a_clients_frames_are_taken_while_time_stands_and_go_out_with_the_next_run() {
             assert!(frames >= 2, "a request and its answer");
             return;
         }
+        // Looked at again and again.
         std::thread::sleep(Duration::from_millis(5));
     }
     let _ = client.kill();
@@ -95,6 +98,7 @@ fn ten_times_as_fast_the_bus_is_ten_times_as_far() {
     let outer = Instant::now();
     let first = simulator.ask("now");
     let inner = Instant::now();
+    // Time of the clock that the two paces are compared over.
     std::thread::sleep(Duration::from_millis(300));
     let inner_s = inner.elapsed().as_secs_f64();
     let second = simulator.ask("now");

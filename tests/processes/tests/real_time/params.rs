@@ -237,6 +237,7 @@ fn a_power_cycle_proves_what_was_stored() {
     let begin = Instant::now();
     while child.as_mut().is_some_and(|child| child.try_wait().expect("a child").is_none()) {
         assert!(begin.elapsed() < PATIENCE, "it waits for a boot-up that has come");
+        // Between two failures of the supply: longer than a boot.
         std::thread::sleep(Duration::from_secs(3));
         served.simulator.send("4 power cycle");
     }
@@ -268,6 +269,7 @@ fn wait_for(path: &Path, child: &mut Child) {
         if let Some(status) = child.try_wait().expect("a child") {
             panic!("it has ended: {status}");
         }
+        // Looked at again and again.
         std::thread::sleep(Duration::from_millis(1));
     }
 }

@@ -69,6 +69,7 @@ fn what_is_on_the_disk_of_a_killed_simulator_is_a_record() {
                 Some(at) if at > 0.5 => break at,
                 _ => assert!(since.elapsed() < PATIENCE, "{name}: nothing is written"),
             }
+            // Looked at again and again.
             std::thread::sleep(Duration::from_millis(20));
         };
         simulator.kill();

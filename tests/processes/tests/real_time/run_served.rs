@@ -65,6 +65,7 @@ fn a_host_outside_meets_what_the_scenario_does_to_its_drive_and_the_end_is_that_
 fn time_begins_with_the_first_client_and_what_is_open_at_the_limit_has_failed() {
     let (_folder, file) = scenario("served-idle", "limit = '300ms'\n[[expect]]\nthat = '4 velocity > 5'\n");
     let mut served = start(&file, &[&SERVE[..], &["--json"]].concat());
+    // Time in which nothing may happen: no client has come.
     std::thread::sleep(std::time::Duration::from_millis(500));
     assert!(served.is_running(), "time stands until somebody is there");
     let client = RawBus::connect(&served.address("socketcand"));

@@ -89,6 +89,7 @@ fn every_drive_tells_the_same_fields_of_itself() {
 fn the_end_of_input_leaves_it_running() {
     let mut simulator = simulator(&[]);
     simulator.close_input();
+    // Time in which it would end, if it ended.
     std::thread::sleep(Duration::from_millis(300));
     assert!(simulator.is_running());
     let bus = simulator.bus("socketcand");
@@ -214,6 +215,7 @@ fn an_image_is_on_the_disk_within_a_second_and_a_half() {
     let mut first = simulator(&state);
     let bus = first.bus("socketcand");
     done(&["--bus", &bus, "--model", "4=zlac8030l", "write", "4", "200A", "700"]);
+    // What the help promises.
     std::thread::sleep(Duration::from_millis(1500));
     first.kill();
     let second = simulator(&state);

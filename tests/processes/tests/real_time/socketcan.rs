@@ -132,6 +132,7 @@ fn virtual_drives_on_vcan0_are_scanned_enabled_and_moved() {
     on("vcan0", &["--model", "4=zlac8030l", "disable", "4"]);
     simulator.send("quit");
     while simulator.is_running() {
+        // Looked at again and again.
         std::thread::sleep(Duration::from_millis(20));
     }
     assert_eq!(simulator.wait(), Some(0));
@@ -238,6 +239,7 @@ fn times_are_those_of_the_kernel_however_late_a_frame_is_read() {
     let dump = Listener::dump("vcan0");
     dump.signal("-STOP");
     run("cansend", &["vcan0", "101#"]);
+    // The frame waits in the socket: it is read late.
     std::thread::sleep(Duration::from_millis(400));
     run("cansend", &["vcan0", "102#"]);
     dump.signal("-CONT");

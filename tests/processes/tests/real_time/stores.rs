@@ -90,6 +90,7 @@ fn a_kill_in_a_stream_of_stores_loses_none_that_was_acknowledged() {
         // 0 to 120 ms later, spread evenly over the rounds (golden ratio).
         let delay = Duration::from_micros(round * 74_164 % 120_000);
         let killing = std::thread::spawn(move || {
+            // The moment of the kill is what is varied.
             std::thread::sleep(delay);
             assert!(Command::new("kill").args(["-KILL", &killer]).status().unwrap().success());
         });

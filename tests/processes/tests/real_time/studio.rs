@@ -55,6 +55,7 @@ fn opened_with(path: &std::path::Path, what: &str, wanted: impl Fn() -> bool) ->
         .unwrap();
     let until = std::time::Instant::now() + processes::studio::PATIENCE;
     while !wanted() && std::time::Instant::now() < until {
+        // Looked at again and again.
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
     // It serves on, whether a browser was found or not.

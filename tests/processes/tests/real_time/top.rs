@@ -4,6 +4,7 @@
 #![allow(clippy::print_stderr, reason = "a test that is skipped says why")]
 
 use std::io::{Read, Write};
+use std::num::NonZero;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -13,11 +14,15 @@ use processes::{Simulator, ferrodrive};
 /// Far more than anything takes.
 const PATIENCE: Duration = Duration::from_secs(60);
 
+const LINES: NonZero<u16> = NonZero::new(24).expect("it is not 0");
+const COLUMNS: NonZero<u16> = NonZero::new(80).expect("it is not 0");
+
 /// A terminal of 80 columns and 24 lines with the program in it; killed when dropped.
 struct Terminal {
     script: Child,
     keys: ChildStdin,
-    written: Arc<Mutex<String>>,
+    /// What a person sees.
+    screen: Arc<Mutex<vt100::Parser>>,
     /// Where the program keeps what it remembers, for as long as it runs.
     _cache: processes::Scratch,
 }
@@ -36,19 +41,19 @@ impl Terminal {
         let cache = processes::scratch("top-cache");
         script.env("XDG_CACHE_HOME", &*cache);
         let mut script = script.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
-        let (keys, mut screen) = (script.stdin.take().unwrap(), script.stdout.take().unwrap());
-        let written = Arc::new(Mutex::new(String::new()));
-        let shared = Arc::clone(&written);
+        let (keys, mut output) = (script.stdin.take().unwrap(), script.stdout.take().unwrap());
+        let screen = Arc::new(Mutex::new(vt100::Parser::new(LINES, COLUMNS, 0)));
+        let shared = Arc::clone(&screen);
         std::thread::spawn(move || {
             let mut bytes = [0; 4096];
-            while let Ok(count) = screen.read(&mut bytes) {
+            while let Ok(count) = output.read(&mut bytes) {
                 if count == 0 {
                     return;
                 }
-                shared.lock().unwrap().push_str(&String::from_utf8_lossy(&bytes[..count]));
+                shared.lock().unwrap().process(&bytes[..count]);
             }
         });
-        Some(Self { script, keys, written, _cache: cache })
+        Some(Self { script, keys, screen, _cache: cache })
     }
 
     fn press(&mut self, key: &str) {
@@ -56,11 +61,18 @@ impl Terminal {
         self.keys.flush().unwrap();
     }
 
-    /// Waits for a word: what is between words may be a movement of the cursor.
-    fn wait_for(&self, word: &str) {
+    /// Whether something is on the screen now.
+    fn shows(&self, text: &str) -> bool {
+        self.screen.lock().unwrap().screen().contents().contains(text)
+    }
+
+    /// Waits until something is on the screen.
+    fn wait_for(&self, text: &str) {
         let until = Instant::now() + PATIENCE;
-        while !self.written.lock().unwrap().contains(word) {
-            assert!(Instant::now() < until, "{word:?} is nowhere on the screen; it began with {:?}", self.beginning());
+        while !self.shows(text) {
+            let seen = self.screen.lock().unwrap().screen().contents();
+            assert!(Instant::now() < until, "{text:?} is not on the screen:\n{seen}");
+            // Looked at again and again.
             std::thread::sleep(Duration::from_millis(20));
         }
     }
@@ -70,18 +82,15 @@ impl Terminal {
         for _ in 0..5 {
             let until = Instant::now() + PATIENCE / 5;
             while Instant::now() < until {
-                if self.written.lock().unwrap().contains(model) {
+                if self.shows(model) {
                     return;
                 }
+                // Looked at again and again.
                 std::thread::sleep(Duration::from_millis(20));
             }
             self.press("n");
         }
         self.wait_for(model);
-    }
-
-    fn beginning(&self) -> String {
-        self.written.lock().unwrap().chars().take(2_000).collect()
     }
 
     /// Holds a key as a keyboard does until this is true. A machine that is busy may hold repeats up, which ends the hold: then
@@ -90,14 +99,17 @@ impl Terminal {
         let until = Instant::now() + PATIENCE;
         while Instant::now() < until {
             self.press(key);
+            // A keyboard waits so long before it repeats.
             std::thread::sleep(Duration::from_millis(400));
             for repeat in 1..=60 {
                 self.press(key);
+                // And so long between repeats.
                 std::thread::sleep(Duration::from_millis(30));
                 if repeat % 10 == 0 && done() {
                     return;
                 }
             }
+            // Longer than a hold is kept without repeats.
             std::thread::sleep(Duration::from_millis(1_300));
         }
         panic!("holding {key:?} does nothing");
@@ -126,6 +138,7 @@ fn wait_until_it_stands(simulator: &mut Simulator) {
     let until = Instant::now() + PATIENCE;
     loop {
         let before = position(simulator);
+        // Between two looks at the position.
         std::thread::sleep(Duration::from_millis(300));
         if position(simulator).abs_diff(before) < 20 {
             return;
@@ -142,6 +155,7 @@ fn a_key_that_is_held_jogs_and_let_go_stops() {
     let before = position(&mut simulator);
     // A press alone.
     terminal.press("l");
+    // Longer than a press alone could count as a hold.
     std::thread::sleep(Duration::from_millis(1_500));
     assert!(position(&mut simulator).abs_diff(before) < 20, "a press moves nothing");
     // A turn is 4096 counts; to jog at 10 r/min for a tenth of it.
@@ -151,8 +165,7 @@ fn a_key_that_is_held_jogs_and_let_go_stops() {
     terminal.hold_until("h", || position(&mut simulator) < there - 400);
     terminal.press(" ");
     wait_until_it_stands(&mut simulator);
-    // "stopped by a press of stop"
-    terminal.wait_for("press");
+    terminal.wait_for("stopped by a press of stop");
     terminal.press("q");
     let until = Instant::now() + PATIENCE;
     let status = loop {
@@ -160,11 +173,12 @@ fn a_key_that_is_held_jogs_and_let_go_stops() {
             break status;
         }
         assert!(Instant::now() < until, "q ends it");
+        // Looked at again and again.
         std::thread::sleep(Duration::from_millis(20));
     };
     assert!(status.success(), "{status}");
     // The screen is given back.
-    assert!(terminal.written.lock().unwrap().contains("\u{1b}[?1049l"));
+    assert!(!terminal.screen.lock().unwrap().screen().alternate_screen());
 }
 
 #[test]

@@ -70,6 +70,7 @@ fn busy_bus() -> Bus {
         let until = Instant::now() + PATIENCE;
         while !is_turning(&mut simulator) {
             assert!(Instant::now() < until, "node {node} does not turn");
+            // Looked at again and again.
             std::thread::sleep(Duration::from_millis(20));
         }
     }
@@ -132,7 +133,7 @@ async fn figures_of_twelve_objects_a_thousand_times_a_second() {
         for object in OBJECTS.map(|object| format!("{node}:{object}")) {
             list.click().await.expect("it opens");
             stage.find(&format!("#scope-object option[value='{object}']")).await;
-            list.select_by_value(&object).await.expect("it is there");
+            stage.choose("#scope-object", &object).await;
             stage.find(&format!("[data-object='{object}']")).await;
         }
     }
@@ -144,6 +145,7 @@ async fn figures_of_twelve_objects_a_thousand_times_a_second() {
     let mut before = (0.0, taken(studio).0, taken(browser).0, counted().await);
     let mut pictures_per_s = 0.0;
     while began.elapsed() < length {
+        // A measurement over time.
         tokio::time::sleep((length - began.elapsed()).min(Duration::from_mins(1))).await;
         let (of_studio, of_browser) = (taken(studio), taken(browser));
         let now = (began.elapsed().as_secs_f64(), of_studio.0, of_browser.0, counted().await);

@@ -12,13 +12,13 @@ async fn homing_is_chosen_by_its_picture_and_ends_with_a_stop() {
     stage.click(".motion .chooser button:nth-child(2)").await;
     stage.click("#homing summary").await;
     stage.find("#home-method option[value='24']").await;
-    stage.find("#home-method").await.select_by_value("24").await.expect("it is there");
+    stage.choose("#home-method", "24").await;
     // ZLIM42-C user manual V1.03, 5.3.6; 2030h gives no input a meaning as delivered.
     stage.says("#home-described", "looks for the home switch in positive direction, and turns round at a limit").await;
     stage.says("#home-missing", "No input of this drive is set to be its home switch").await;
     stage.find(".homing-picture circle.home").await;
     stage.shoot("homing").await;
-    stage.find("#home-method").await.select_by_value("17").await.expect("it is there");
+    stage.choose("#home-method", "17").await;
     stage.says("#home-described", "negative limit goes on").await;
     let field = stage.find(".settings input[data-object='6099h:01']").await;
     field.clear().await.expect("cleared");

@@ -51,8 +51,9 @@ async fn the_scope_draws_any_object_that_passes() {
     list.click().await.expect("it opens");
     // ZLAC8030L: 2029h is the bus voltage in 0.01 V, which the studio reads; 48 V is the supply as delivered.
     stage.find("#scope-object option[value='4:2029:00']").await;
-    list.select_by_value("4:2029:00").await.expect("it is there");
+    stage.choose("#scope-object", "4:2029:00").await;
     stage.find("[data-object='4:2029:00']").await;
+    // A picture of so long a time.
     tokio::time::sleep(std::time::Duration::from_secs(2)).await;
     stage.click("#scope-pause").await;
     stage.find("#scope-pause[aria-pressed=true]").await;
@@ -75,13 +76,13 @@ async fn the_scope_draws_any_object_that_passes() {
     // A trigger on what was added: the supply falls through 30 V, and the picture is held.
     stage.click("#scope-pause").await;
     stage.find("#scope-pause[aria-pressed=false]").await;
-    stage.find("#trigger-field").await.select_by_value("4:2029:00").await.expect("it is offered");
-    stage.find("#trigger-edge").await.select_by_value("falling").await.expect("an edge");
+    stage.choose("#trigger-field", "4:2029:00").await;
+    stage.choose("#trigger-edge", "falling").await;
     let level = stage.find("#trigger-level").await;
     level.clear().await.expect("cleared");
     level.send_keys("3000").await.expect("typed");
-    stage.find("#scope-window").await.select_by_value("1").await.expect("a second");
-    stage.find("#trigger-mode").await.select_by_value("once").await.expect("a mode");
+    stage.choose("#scope-window", "1").await;
+    stage.choose("#trigger-mode", "once").await;
     stage.says("#trigger-status", "waits").await;
     stage.click("#take").await;
     stage.find("#release").await;

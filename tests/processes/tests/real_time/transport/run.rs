@@ -297,6 +297,7 @@ async fn run_late(world: &mut Wire) -> Instant {
     let clock = WallClock::start();
     let mut hub = hub(&clock).await;
     let (orders, mut commands) = mpsc::channel(1);
+    // A thread that gets no processor time.
     std::thread::sleep(Duration::from_millis(200));
     let later = async {
         clock.sleep(Duration::from_millis(200)).await;
