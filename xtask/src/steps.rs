@@ -66,6 +66,12 @@ pub(crate) const STEPS: &[Step] = &[
         run: examples::run,
     },
     Step {
+        name: "peers",
+        does: "canopen-python, python-can and pymodbus against ferrodrive sim",
+        when: When::Busy,
+        run: peers::run,
+    },
+    Step {
         name: "real_time",
         does: "processes in real time: servers, signals, sockets, terminals",
         when: When::Waiting,
@@ -82,12 +88,6 @@ pub(crate) const STEPS: &[Step] = &[
         does: "the studio's page in a real browser: enable, move, jog, close the tab",
         when: When::Waiting,
         run: browser::step,
-    },
-    Step {
-        name: "peers",
-        does: "canopen-python, python-can and pymodbus against ferrodrive sim",
-        when: When::Waiting,
-        run: peers::run,
     },
     Step {
         name: "vcan",
