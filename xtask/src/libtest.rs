@@ -21,8 +21,8 @@ pub(crate) fn time_all() {
     TIMED.store(true, Ordering::Relaxed);
 }
 
-/// Lets a program tell how long its tests take, if that is asked for. On a stable compiler its harness has to be told that
-/// it may.
+/// Has a program report how long its tests take, if that is asked for. The harness of a stable compiler does so only with this
+/// variable set.
 pub(crate) fn tell_times(program: &mut Command) {
     if TIMED.load(Ordering::Relaxed) {
         program.env("RUSTC_BOOTSTRAP", "1").args(["-Z", "unstable-options", "--report-time"]);

@@ -15,7 +15,7 @@ pub(crate) fn say(line: impl Display) {
     }
 }
 
-/// The step that this thread works for, if its lines are to be told from others'.
+/// The step that this thread works for, if its lines are shown with its name.
 pub(crate) fn step() -> Option<&'static str> {
     STEP.get()
 }

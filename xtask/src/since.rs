@@ -60,7 +60,7 @@ fn changed(revision: &str) -> Result<Vec<String>, String> {
     Ok(differing.lines().chain(new.lines()).map(str::to_owned).collect())
 }
 
-/// What `cargo test` is told for these files. A file that is in no package may matter to all of them.
+/// The arguments of `cargo test` for these files. A file that is in no package may matter to all of them.
 fn selection(files: &[String], packages: &[Package]) -> Vec<String> {
     let of = |file: &String| {
         let holds = |package: &&Package| file.starts_with(&format!("{}/", package.folder));

@@ -7,7 +7,7 @@
 //!
 //! [`run`] is plain values out: the rows of each part, and a [`Poster`] of the motion that becomes SVG. [`Report`]
 //! is its table. Where they are shown is not decided here: `ferrodrive demo` does, and the program `demo` of this crate, which
-//! is built in a tenth of the time.
+//! is built in a quarter of the time.
 //!
 //! ```
 //! let stepper = devices::model("zlim42c").expect("the model is known");

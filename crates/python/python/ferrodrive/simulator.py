@@ -31,7 +31,7 @@ def program() -> str:
     found = shutil.which(str(beside)) or shutil.which("ferrodrive")
     if found is None:
         raise SimulatorError(
-            "there is no program `ferrodrive`: neither beside this Python nor on PATH; "
+            "the program `ferrodrive` was not found: neither beside this Python nor on PATH; "
             "`cargo install --path crates/cli` in a clone installs it, and so does the wheel of a release"
         )
     return found
