@@ -9,8 +9,9 @@ use std::task::{Wake, Waker};
 use std::time::Duration;
 
 use can::{Instant, Station};
-use canopen::{Mux, NodeId};
+use canopen::NodeId;
 use master::Network;
+use master::drive::{HostLoss, Stopped};
 use studio::{Wire, WorldDoor};
 use tokio::sync::Notify;
 use transport::realtime::{self, RealTimeError};
@@ -32,16 +33,6 @@ use testbench::machine_file::{self, Machine};
 
 /// Longest virtual time that a command may take; none comes near, and a hang would otherwise never end.
 const VIRTUAL_LIMIT: Duration = Duration::from_secs(24 * 3600);
-
-/// How long stopping may take after a signal.
-const STOP_PATIENCE: Duration = Duration::from_secs(2);
-
-/// How often the position is looked at until the shaft stands, and what it may vary by, in counts: an encoder of 32768
-/// counts a turn has 11 of them in this time at 1 r/min.
-const STANDSTILL_POLL: Duration = Duration::from_millis(20);
-const STANDSTILL_COUNTS: u32 = 11;
-
-const POSITION_ACTUAL: Mux = Mux::new(0x6064, 0);
 
 /// Runs `command` on the bus of the command line.
 pub(crate) fn run<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Result<R, Failure>) -> Result<R, Failure> {
@@ -244,7 +235,7 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
         let moved = network.moved();
         let failure = moved.iter().fold(failure, |failure, node| {
             let failure = failure.because(format!("node {node} was moving, and cannot be reached any more"));
-            without_this_command(&network, node, failure).next(make_sure(node))
+            without_this_command(network.guarded(node), failure).next(make_sure(node))
         });
         failure.next(format!("find out why {} went away, and start it again", global.bus))
     })?
@@ -290,46 +281,31 @@ pub(crate) fn exit_on_signal() {
     });
 }
 
-/// Quick stop to every node that this command has set in motion; the failure then says so.
+/// Stops every node that this command has set in motion; the failure then says what was seen of that.
 async fn stop_what_moves(context: &Context, mut failure: Failure) -> Failure {
-    let stopping = tokio::time::timeout(STOP_PATIENCE, context.network.stop_all_moved());
-    for (node, stopped) in stopping.await.unwrap_or_default() {
-        failure = match stopped {
-            Ok(()) => {
-                let _ = tokio::time::timeout(STOP_PATIENCE, standstill(context, node)).await;
-                failure.because(format!("node {node} was moving and has been quick-stopped"))
-            }
+    let guarded = context.network.moved().iter().map(|node| (node, context.network.guarded(node))).collect::<Vec<_>>();
+    for Stopped { node, outcome, .. } in context.network.stop_and_release().await {
+        failure = match outcome {
+            Ok(after) => failure.because(format!(
+                "node {node} was moving and has been quick-stopped: it was seen to stand after {:.2} s",
+                after.as_secs_f64()
+            )),
             Err(error) => {
-                let failure = failure.because(format!("node {node} may still be moving: {error}"));
-                without_this_command(&context.network, node, failure)
+                let failure =
+                    failure.because(format!("node {node} may still be moving: {error}")).next(make_sure(node));
+                let loss = guarded.iter().find(|(other, _)| *other == node).and_then(|(_, loss)| *loss);
+                without_this_command(loss, failure)
             }
         };
-    }
-    // What still moves had better miss this command, and stop by itself.
-    if context.network.moved().is_empty() {
-        let _ = tokio::time::timeout(STOP_PATIENCE, context.network.release_guards()).await;
     }
     failure
 }
 
 /// Adds what a drive that cannot be reached any more does by itself.
-fn without_this_command(network: &Network, node: NodeId, failure: Failure) -> Failure {
-    match network.guarded(node) {
+fn without_this_command(loss: Option<HostLoss>, failure: Failure) -> Failure {
+    match loss {
         Some(loss) => failure.because(format!("without this command {loss}")),
         None => failure,
-    }
-}
-
-/// Waits until the position of a node rests, or it does not tell it.
-async fn standstill(context: &Context, node: NodeId) {
-    let handle = context.node(node);
-    let mut before = None;
-    while let Ok(position) = handle.read::<i32>(POSITION_ACTUAL).await {
-        if before.is_some_and(|before: i32| position.abs_diff(before) <= STANDSTILL_COUNTS) {
-            return;
-        }
-        before = Some(position);
-        context.network.sleep(STANDSTILL_POLL).await;
     }
 }
 

@@ -10,7 +10,7 @@ use std::time::Duration;
 use canopen::NodeId;
 use master::Drive;
 use master::core::Event;
-use master::drive::SwitchedOff;
+use master::drive::{Stopped, SwitchedOff};
 use serde::Serialize;
 use tokio::net::TcpListener;
 use tokio::sync::{broadcast, mpsc};
@@ -118,18 +118,16 @@ async fn grant(context: &Context, wish: Wish, guards: &mut BTreeMap<NodeId, Driv
             let _ = done.send(());
         }
         Wish::Gone(nodes) => {
-            for node in nodes.iter() {
-                match context.quick_stop(node).await {
-                    Ok(()) => context.tell(&format!("node {node}: its client has gone; it has been quick-stopped")),
-                    Err(error) => {
-                        context.tell(&format!("node {node}: its client has gone, and it may be moving: {error}"))
-                    }
-                }
-                if let Some(drive) = guards.remove(&node) {
-                    // What has a watch and cannot be told otherwise stops by itself.
-                    let _ = drive.release_guard().await;
-                }
+            for Stopped { node, outcome, .. } in context.network.stop_moved(nodes).await {
+                let text = match outcome {
+                    Ok(_) => format!("node {node}: its client has gone; it has been quick-stopped and stands"),
+                    Err(error) => format!("node {node}: its client has gone, and it may still be moving: {error}"),
+                };
+                context.tell(&text);
             }
+            nodes.iter().for_each(|node| drop(guards.remove(&node)));
+            // What has a watch and was not seen to stand is left to it.
+            let _ = context.network.release_guards(nodes).await;
         }
     }
 }

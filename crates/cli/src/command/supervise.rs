@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use can::Instant;
 use canopen::NodeId;
+use master::core::NodeSet;
 use master::supervise::{EmcyRecord, Happening, Supervisor};
 use master::units::parse_duration;
 use serde::Serialize;
@@ -101,7 +102,7 @@ impl Supervise {
         }
         let open = supervisor.emcys().records().filter(|record| record.gone.is_none());
         open.for_each(|record: &EmcyRecord| context.tell(&format!("not gone: {record}")));
-        Ok(context.network.release_guards().await?)
+        Ok(context.network.release_guards(NodeSet::ALL).await?)
     }
 }
 

@@ -9,14 +9,18 @@ use cia402::ModeOfOperation;
 use super::kinematics::{Geometry, Pose, Twist, Wheels};
 use super::limits::{BaseError, BaseLimits};
 use super::state::StopCause;
+use crate::core::NodeSet;
 use crate::cyclic::{CyclicDrive, CyclicOptions, CyclicState, Demand, Refusal};
 use crate::drive::{CONTROLWORD, Drive};
 use crate::error::Error;
-use crate::network::{Claim, Exchange, Network, join_all};
+use crate::network::{Claim, Exchange, Network};
 use crate::units::{Rpm, Turns};
 
 /// How long drives may take to be enabled, and to be without power again.
 const POWER_LIMIT: Duration = Duration::from_secs(5);
+
+/// Cycles after which a drive that is not heard is not waited for.
+const UNHEARD: u64 = 10;
 
 /// One wheel, and how its motor sits.
 #[derive(Clone, Debug)]
@@ -315,7 +319,8 @@ impl Base {
         self.state.cause.filter(|cause| matches!(cause, StopCause::Wheel { .. }))
     }
 
-    /// Brings the base to rest, takes the wheels' power and ends what was begun: SYNC, and the guards of the drives.
+    /// Brings the base to rest, takes the wheels' power and ends what was begun: SYNC, and the guards of the drives that were seen
+    /// to stand without power. One that was not stays among [`Network::moved`] and is left to its own watch.
     ///
     /// # Errors
     /// As [`cycle`](Self::cycle), and those of the requests; [`BaseError::Stopped`] for a wheel that was lost on the way to rest.
@@ -328,18 +333,24 @@ impl Base {
         // Without SYNC there are no cycles, and the master has stopped the drives.
         let off = if matches!(stopped, Err(BaseError::NoCycle(_))) { Ok(()) } else { self.switch_off().await };
         self.network.sync(None);
-        let released = join_all(self.drives.iter().map(Drive::release_guard)).await;
+        let nodes: NodeSet = self.drives.iter().map(|drive| drive.node().id()).collect();
+        let heard = self.wheels.iter().filter(|wheel| wheel.shows.is_some_and(|shown| shown.statusword.is_some()));
+        let coasting = self.network.stop_moved(heard.map(|wheel| wheel.drive.node()).collect()).await;
+        let released = self.network.release_guards(nodes).await;
         stopped.and(off)?;
-        released.into_iter().collect::<Result<(), _>>()?;
-        Ok(())
+        coasting.into_iter().try_for_each(|stopped| stopped.outcome.map(drop))?;
+        Ok(released?)
     }
 
     /// Cycles until both drives show that they have no power, or the limit has passed.
     async fn switch_off(&mut self) -> Result<(), BaseError> {
         self.power = Power::Off;
-        for _ in 0..self.cycles(POWER_LIMIT) {
+        for cycle in 0..self.cycles(POWER_LIMIT) {
             self.cycle().await?;
-            if self.wheels.iter().all(|wheel| wheel.shows.is_some_and(|shown| shown.is_without_power())) {
+            // One that is not heard is not waited for: nothing is known of it, and nothing it does can be seen.
+            let settled =
+                |shown: CyclicState| shown.stands_without_power() || cycle > UNHEARD && shown.statusword.is_none();
+            if self.wheels.iter().all(|wheel| wheel.shows.is_some_and(settled)) {
                 break;
             }
         }

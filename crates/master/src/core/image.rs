@@ -74,6 +74,8 @@ struct Rpdo {
     trigger: RpdoTrigger,
     data: u64,
     state: SendState,
+    /// A value was written to it: the device may hold one of its frames back until the next SYNC.
+    in_use: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -134,7 +136,8 @@ impl ProcessImage {
         let bytes = map.bytes().min(MAX_DATA_LENGTH);
         let before = self.rpdos.iter().position(|pdo| (pdo.node, pdo.number) == (node, number));
         let generation = before.map_or(0, |position| self.rpdos[position].generation);
-        let new = Rpdo { node, number, generation, id, map, bytes, trigger, data: 0, state: SendState::Idle };
+        let new =
+            Rpdo { node, number, generation, id, map, bytes, trigger, data: 0, state: SendState::Idle, in_use: false };
         match before {
             Some(position) => self.rpdos[position] = new,
             None => {
@@ -210,6 +213,25 @@ impl ProcessImage {
         found
     }
 
+    /// Puts a controlword into every RPDO of the node that carries it and has been written to, and sends these at once: a device
+    /// that holds the one before back until the next SYNC (CiA 301, 7.2.2.2, synchronous) takes this one instead.
+    pub(super) fn overrule(&mut self, node: NodeId, controlword: Mux, raw: u16) {
+        for position in 0..self.rpdos.len() {
+            let pdo = &self.rpdos[position];
+            let Some(bits) = pdo.map.find(controlword).filter(|_| pdo.node == node && pdo.in_use) else { continue };
+            let place = Self::place(position, pdo.generation, &bits);
+            self.put(place, raw.into());
+        }
+        self.release_waiting();
+    }
+
+    /// Nothing is sent any more, whatever was written.
+    pub(super) fn fall_silent(&mut self) {
+        self.pending.clear();
+        self.waiting.clear();
+        self.rpdos.iter_mut().for_each(|pdo| (pdo.state, pdo.in_use) = (SendState::Idle, false));
+    }
+
     /// Where a node's TPDOs have an object, in the order in which they were set up.
     pub(crate) fn find_signals(&self, node: NodeId, mux: Mux) -> impl Iterator<Item = (PdoNumber, Place)> {
         let tpdos = self.tpdos.iter().enumerate().filter(move |(_, pdo)| pdo.node == node);
@@ -267,6 +289,7 @@ impl ProcessImage {
             return false;
         }
         pdo.data = place.put(pdo.data, raw);
+        pdo.in_use = true;
         match (pdo.state, pdo.trigger) {
             (SendState::Idle, RpdoTrigger::Sync) => {
                 pdo.state = SendState::Waiting;

@@ -92,6 +92,8 @@ pub struct Core {
     finished: VecDeque<Finished>,
     events: Events,
     next_ticket: u64,
+    /// This master has left the bus.
+    silent: bool,
 }
 
 /// One node as the master sees it.
@@ -131,6 +133,7 @@ impl Core {
             finished: VecDeque::new(),
             events: Events::default(),
             next_ticket: 0,
+            silent: false,
         }
     }
 
@@ -161,6 +164,12 @@ impl Core {
     pub fn execute(&mut self, command: Command, now: Instant) {
         self.advance(now);
         match command {
+            // Requests and timers end all the same, for whoever waits for them.
+            Command::Request(..) | Command::Timer(..) | Command::Cancel(_) => {}
+            _ if self.silent => return,
+            _ => {}
+        }
+        match command {
             Command::Request(ticket, request) => self.start_request(ticket, request),
             Command::Timer(ticket, after) => self.timers.arm(self.now + after, ticket),
             Command::Cancel(ticket) => self.cancel(ticket),
@@ -168,11 +177,11 @@ impl Core {
             Command::Sync(period) => self.produce_sync(period),
             Command::FollowSync(period) => self.follow_sync(period),
             Command::WatchHeartbeat(node, time) => self.watch_heartbeat(node, time),
-            Command::Heartbeat(node, period) => {
-                self.presence.set_heartbeat(node, period, self.now);
+            Command::Heartbeat(node, period, allowed) => {
+                self.presence.set_heartbeat(node, period, allowed, self.now);
                 self.show_presence();
             }
-            Command::KeepFed(node, period) => self.presence.set_feed(node, period, self.now),
+            Command::KeepFed(node, period, allowed) => self.presence.set_feed(node, period, allowed, self.now),
             Command::Transmit(frame) => self.push_frame(frame),
         }
         self.find_due();
@@ -216,6 +225,10 @@ impl Core {
     fn start_request(&mut self, ticket: Ticket, request: Request) {
         let node = request.node;
         let now = self.now;
+        if self.silent {
+            let failure = Failure::NoAnswer { waited: Duration::ZERO, unsent: true };
+            return self.finished.push_back(Finished { ticket, outcome: Err(failure) });
+        }
         match self.member_mut(node).channel.push(ticket, request, now) {
             Ok(()) => self.settle(node),
             Err(failure) => self.finished.push_back(Finished { ticket, outcome: Err(failure) }),
@@ -272,6 +285,23 @@ impl Core {
         }
         let others = [self.timers.next(), self.sync.next(), self.presence.next()];
         self.due = others.into_iter().flatten().fold(due, Instant::min);
+    }
+
+    /// This master sends nothing from now on, whatever it is asked.
+    pub(crate) fn fall_silent(&mut self) {
+        self.silent = true;
+        self.sync.produce(None, self.now);
+        self.cycle_changed = true;
+        self.presence = Presence::default();
+        self.image.fall_silent();
+        self.outbox.clear();
+        self.find_due();
+    }
+
+    /// How long this master was held up (its program was frozen, its machine asleep) beyond what the watch of this node allows
+    /// its host: the drive has stopped for want of it, and is sent no sign of life that would have it go on.
+    pub(crate) fn lapse(&self, node: NodeId) -> Option<Duration> {
+        self.presence.lapse(node)
     }
 
     fn push_frame(&mut self, frame: Frame) {
@@ -363,6 +393,9 @@ impl Station for Core {
 
     /// NMT and other single frames, then SYNC, heartbeats, RPDOs, SDO.
     fn poll_transmit(&mut self) -> Option<Frame> {
+        if self.silent {
+            return None;
+        }
         self.outbox
             .pop_front()
             .or_else(|| self.sync.poll_transmit())

@@ -15,6 +15,13 @@ impl NodeSet {
         self.0 |= 1 << node.raw();
     }
 
+    /// The same set with this node in it.
+    #[must_use]
+    pub const fn with(mut self, node: NodeId) -> Self {
+        self.insert(node);
+        self
+    }
+
     /// Takes a node out.
     pub const fn remove(&mut self, node: NodeId) {
         self.0 &= !(1 << node.raw());

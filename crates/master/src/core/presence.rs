@@ -15,11 +15,11 @@ const SHORTEST_FEED: Duration = Duration::from_millis(1);
 /// How drives notice that this master lives: by its heartbeat, or by being asked something before they lose patience.
 ///
 /// Heartbeats lie on a grid, as SYNC does. A node that is kept fed is asked only after a time in which nothing else was
-/// sent to it.
+/// sent to it. A sign of life that comes later than a drive allows (the program was frozen) would have a drive that has stopped
+/// go on by itself: it is not sent, and none after it until it is asked for anew.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Presence {
-    /// By the node-ID that they are sent under.
-    producers: Vec<(NodeId, Producer)>,
+    producers: Vec<Own>,
     /// Whose heartbeat is to go out.
     pending: NodeSet,
     feeds: Vec<Feed>,
@@ -27,31 +27,74 @@ pub(super) struct Presence {
     fed: NodeSet,
 }
 
+/// A heartbeat of this master.
+#[derive(Clone, Debug)]
+struct Own {
+    /// The node-ID that it is sent under.
+    node: NodeId,
+    /// `None` once it came too late.
+    producer: Option<Producer>,
+    patience: Patience,
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Feed {
     node: NodeId,
     period: Duration,
     due: Instant,
+    patience: Patience,
+}
+
+/// How long whoever watches this master can wait for a sign of life.
+#[derive(Clone, Copy, Debug)]
+struct Patience {
+    /// `None`: nobody says.
+    allowed: Option<Duration>,
+    last: Instant,
+    /// How long it was left without one.
+    lapse: Option<Duration>,
+}
+
+impl Patience {
+    const fn begin(allowed: Option<Duration>, now: Instant) -> Self {
+        Self { allowed, last: now, lapse: None }
+    }
+
+    /// False if a sign of life at `now` is too late.
+    fn is_in_time(&mut self, now: Instant) -> bool {
+        let waited = now - self.last;
+        if self.lapse.is_none() && self.allowed.is_some_and(|allowed| waited >= allowed) {
+            self.lapse = Some(waited);
+        }
+        self.lapse.is_none()
+    }
 }
 
 impl Presence {
     /// Starts with a first heartbeat due at once, or stops (`None` or a period below 1 ms).
-    pub(super) fn set_heartbeat(&mut self, node: NodeId, period: Option<Duration>, now: Instant) {
-        self.producers.retain(|(own, _)| *own != node);
+    pub(super) fn set_heartbeat(
+        &mut self,
+        node: NodeId,
+        period: Option<Duration>,
+        allowed: Option<Duration>,
+        now: Instant,
+    ) {
+        self.producers.retain(|own| own.node != node);
         self.pending.remove(node);
         let period_ms = period.map_or(0, |period| period.as_millis().min(LONGEST_PERIOD_MS) as u16);
         if period_ms > 0 {
-            self.producers.push((node, Producer::from_write(period_ms, now)));
+            let producer = Some(Producer::from_write(period_ms, now));
+            self.producers.push(Own { node, producer, patience: Patience::begin(allowed, now) });
         }
     }
 
     /// Starts to feed a node, or stops.
-    pub(super) fn set_feed(&mut self, node: NodeId, period: Option<Duration>, now: Instant) {
+    pub(super) fn set_feed(&mut self, node: NodeId, period: Option<Duration>, allowed: Option<Duration>, now: Instant) {
         self.feeds.retain(|feed| feed.node != node);
         self.fed.remove(node);
         if let Some(period) = period.filter(|period| !period.is_zero()) {
             let period = period.max(SHORTEST_FEED);
-            self.feeds.push(Feed { node, period, due: now + period });
+            self.feeds.push(Feed { node, period, due: now + period, patience: Patience::begin(allowed, now) });
             self.fed.insert(node);
         }
     }
@@ -60,24 +103,44 @@ impl Presence {
     #[inline]
     pub(super) fn note_sent(&mut self, node: NodeId, now: Instant) {
         if self.fed.contains(node) {
-            self.feeds.iter_mut().filter(|feed| feed.node == node).for_each(|feed| feed.due = now + feed.period);
+            self.feeds.iter_mut().filter(|feed| feed.node == node).for_each(|feed| {
+                if feed.patience.is_in_time(now) {
+                    feed.due = now + feed.period;
+                    feed.patience.last = now;
+                }
+            });
         }
     }
 
     /// Heartbeats that are due wait to be sent; the nodes that want to be asked something, with how long they can wait.
     pub(super) fn handle_timeout(&mut self, now: Instant) -> Vec<(NodeId, Duration)> {
-        for (node, producer) in &mut self.producers {
-            if producer.handle_timeout(now) {
-                self.pending.insert(*node);
+        for own in &mut self.producers {
+            let Some(producer) = &mut own.producer else { continue };
+            if !producer.handle_timeout(now) {
+                continue;
+            }
+            if own.patience.is_in_time(now) {
+                own.patience.last = now;
+                self.pending.insert(own.node);
+            } else {
+                own.producer = None;
             }
         }
         let hungry = self.feeds.iter_mut().filter(|feed| feed.due <= now);
         hungry
-            .map(|feed| {
-                feed.due = now + feed.period;
-                (feed.node, feed.period)
+            .filter_map(|feed| {
+                let in_time = feed.patience.is_in_time(now);
+                feed.due = if in_time { now + feed.period } else { Instant::FAR_FUTURE };
+                in_time.then_some((feed.node, feed.period))
             })
             .collect()
+    }
+
+    /// How long whoever watches the heartbeat of this node-ID, or is fed at it, was left without a sign of life, if that was too
+    /// long.
+    pub(super) fn lapse(&self, node: NodeId) -> Option<Duration> {
+        let heartbeats = self.producers.iter().filter(|own| own.node == node).find_map(|own| own.patience.lapse);
+        heartbeats.or_else(|| self.feeds.iter().filter(|feed| feed.node == node).find_map(|feed| feed.patience.lapse))
     }
 
     pub(super) fn poll_transmit(&mut self) -> Option<Frame> {
@@ -87,7 +150,7 @@ impl Presence {
     }
 
     pub(super) fn next(&self) -> Option<Instant> {
-        let heartbeats = self.producers.iter().map(|(_, producer)| producer.deadline());
+        let heartbeats = self.producers.iter().filter_map(|own| own.producer.as_ref()).map(Producer::deadline);
         heartbeats.chain(self.feeds.iter().map(|feed| feed.due)).min()
     }
 }
@@ -105,7 +168,7 @@ mod tests {
     #[test]
     fn a_heartbeat_goes_out_at_once_and_then_on_its_grid() {
         let mut presence = Presence::default();
-        presence.set_heartbeat(HOST, Some(Duration::from_millis(500)), ms(100));
+        presence.set_heartbeat(HOST, Some(Duration::from_millis(500)), None, ms(100));
         assert_eq!(presence.next(), Some(ms(100)));
         presence.handle_timeout(ms(100));
         // CiA 301, 7.2.8.3.2.1: 700h + node-ID, operational is 05h.
@@ -114,20 +177,48 @@ mod tests {
         presence.handle_timeout(ms(1750));
         assert!(presence.poll_transmit().is_some() && presence.poll_transmit().is_none());
         assert_eq!(presence.next(), Some(ms(2100)));
-        presence.set_heartbeat(HOST, None, ms(1760));
+        presence.set_heartbeat(HOST, None, None, ms(1760));
         assert_eq!((presence.next(), presence.poll_transmit()), (None, None));
     }
 
     #[test]
     fn a_node_is_fed_only_when_nothing_else_was_sent_to_it() {
         let mut presence = Presence::default();
-        presence.set_feed(HOST, Some(Duration::from_millis(300)), ms(0));
+        presence.set_feed(HOST, Some(Duration::from_millis(300)), None, ms(0));
         presence.note_sent(HOST, ms(200));
         assert_eq!(presence.next(), Some(ms(500)));
         assert_eq!(presence.handle_timeout(ms(499)), []);
         assert_eq!(presence.handle_timeout(ms(500)), [(HOST, Duration::from_millis(300))]);
         assert_eq!(presence.next(), Some(ms(800)));
-        presence.set_feed(HOST, None, ms(600));
+        presence.set_feed(HOST, None, None, ms(600));
         assert_eq!(presence.next(), None);
+    }
+
+    #[test]
+    fn a_sign_of_life_that_a_drive_no_longer_waits_for_is_not_sent() {
+        const DRIVE: NodeId = NodeId::MIN;
+        let allowed = Some(Duration::from_millis(2000));
+        let mut presence = Presence::default();
+        presence.set_heartbeat(HOST, Some(Duration::from_millis(500)), allowed, ms(0));
+        presence.set_feed(DRIVE, Some(Duration::from_millis(500)), allowed, ms(0));
+        presence.handle_timeout(ms(0));
+        assert!(presence.poll_transmit().is_some());
+        // As late as it may just be.
+        assert_eq!(presence.handle_timeout(ms(1999)), [(DRIVE, Duration::from_millis(500))]);
+        assert!(presence.poll_transmit().is_some());
+        presence.note_sent(DRIVE, ms(1999));
+        assert_eq!((presence.lapse(HOST), presence.lapse(DRIVE)), (None, None));
+        // The program was frozen for 4 s.
+        assert_eq!(presence.handle_timeout(ms(5999)), []);
+        assert_eq!(presence.poll_transmit(), None);
+        let lapse = Some(Duration::from_millis(4000));
+        assert_eq!((presence.lapse(HOST), presence.lapse(DRIVE)), (lapse, lapse));
+        presence.note_sent(DRIVE, ms(6000));
+        assert_eq!((presence.handle_timeout(ms(9000)), presence.poll_transmit()), (Vec::new(), None));
+        // Asked for anew, it begins anew.
+        presence.set_heartbeat(HOST, Some(Duration::from_millis(500)), allowed, ms(9000));
+        presence.handle_timeout(ms(9000));
+        assert!(presence.poll_transmit().is_some());
+        assert_eq!(presence.lapse(HOST), None);
     }
 }

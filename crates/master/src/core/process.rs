@@ -110,9 +110,14 @@ impl Core {
         self.supervision.loss(id)
     }
 
-    /// All drives that are moved cycle by cycle are being stopped: no step moves them on.
-    pub(crate) fn stop_cyclic(&mut self) {
-        self.supervision.stop_all();
+    /// An axis is being stopped: no step moves it on.
+    pub(crate) fn stop_cyclic(&mut self, node: NodeId, controlword: Mux) {
+        self.supervision.stop(node, controlword);
+    }
+
+    /// Sends this controlword in every RPDO of the node that carries it and has been written to.
+    pub(crate) fn overrule_rpdos(&mut self, node: NodeId, controlword: Mux, word: u16) {
+        self.image.overrule(node, controlword, word);
     }
 
     /// Writes an object by SDO; nobody waits for the answer.

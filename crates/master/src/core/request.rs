@@ -50,10 +50,12 @@ pub enum Command {
     FollowSync(Option<Duration>),
     /// Expect a heartbeat of the node at least this often, or stop watching.
     WatchHeartbeat(NodeId, Option<Duration>),
-    /// Produce this master's heartbeat under a node-ID with this period in whole ms, or stop. Source: CiA 301, 7.2.8.3.2.1.
-    Heartbeat(NodeId, Option<Duration>),
-    /// Ask the node for its statusword (6041h) whenever nothing else was sent to it for this long, or stop.
-    KeepFed(NodeId, Option<Duration>),
+    /// Produce this master's heartbeat under a node-ID with this period in whole ms, or stop. One that would come later than the
+    /// last time allows, if there is one, is not sent, nor any after it. Source: CiA 301, 7.2.8.3.2.1.
+    Heartbeat(NodeId, Option<Duration>, Option<Duration>),
+    /// Ask the node for its statusword (6041h) whenever nothing else was sent to it for this long, or stop; not after it was left
+    /// without a frame for the last time, if there is one.
+    KeepFed(NodeId, Option<Duration>, Option<Duration>),
     /// Send a frame as it is.
     Transmit(Frame),
 }

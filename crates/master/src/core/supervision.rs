@@ -170,10 +170,10 @@ impl Supervision {
         })
     }
 
-    /// All drives in motion are being stopped by other means.
-    pub(super) fn stop_all(&mut self) {
-        let moving = self.watches.iter_mut().filter(|watch| matches!(watch.state, WatchState::Moving(_)));
-        moving.for_each(|watch| watch.state = WatchState::Stopped(CycleLoss::Told));
+    /// An axis is being stopped by other means, whether it has been given a set-point or is about to be.
+    pub(super) fn stop(&mut self, node: NodeId, controlword: Mux) {
+        let same = |watch: &&mut Watch| (watch.rules.node, watch.rules.controlword) == (node, controlword);
+        self.watches.iter_mut().filter(same).for_each(|watch| watch.state = WatchState::Stopped(CycleLoss::Told));
     }
 
     /// The drives to stop now that nobody counts the cycles any more.

@@ -10,7 +10,7 @@ use super::target::{Kind, Target};
 use crate::core::{Cadence, SetPoint, Signal, WatchId};
 use crate::drive::STOP;
 use crate::host_loss::HostLoss;
-use crate::network::Exchange;
+use crate::network::{Exchange, MovedAxis};
 use crate::units::{Amperes, Rpm, Turns};
 
 /// How often a controlword that goes by SDO is sent again while the drive does not show what it asks for.
@@ -27,8 +27,8 @@ pub struct CyclicDrive {
     pub(super) node: NodeId,
     /// The RPDO with the set-point.
     pub(super) rpdo: PdoNumber,
-    /// Where its controlword is: which axis of the node it is.
-    pub(super) place: Mux,
+    /// Which axis of the node it is.
+    pub(super) axis: MovedAxis,
     pub(super) mode: ModeOfOperation,
     pub(super) style: PowerStyle,
     pub(super) statusword: Signal<u16>,
@@ -132,7 +132,10 @@ impl CyclicDrive {
         if matches!(demand, Demand::Off | Demand::ResetFault) {
             self.progress.latched = None;
             self.progress.followed = false;
-            io.note_off((self.node, self.place), self.watch);
+            io.forget_loss(self.watch);
+            if seen.stands_without_power() {
+                io.note_stands(&self.axis);
+            }
         } else if let Some(loss) = io.cycle_loss(self.watch) {
             self.progress.latched = Some(Refusal::Stopped(loss));
         }
@@ -168,7 +171,7 @@ impl CyclicDrive {
         let follows = enabled && self.progress.latched.is_none();
         self.progress.followed = follows;
         if follows {
-            io.note_moving((self.node, self.place), self.watch);
+            io.note_moving(self.axis, self.watch);
         } else {
             io.note_resting(self.watch);
         }
@@ -238,7 +241,7 @@ impl CyclicDrive {
                 return;
             }
             // The RPDO got another mapping. The drive has to be stopped nevertheless.
-            self.controlword = ControlwordPath::Sdo { object: self.place, sent: None };
+            self.controlword = ControlwordPath::Sdo { object: self.axis.controlword, sent: None };
         }
         if let ControlwordPath::Sdo { object, sent } = &mut self.controlword {
             let shown = shows(word, power);

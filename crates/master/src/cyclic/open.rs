@@ -155,7 +155,7 @@ impl Drive {
         Ok(CyclicDrive {
             node: self.node().id(),
             rpdo: number,
-            place,
+            axis: self.as_moved(),
             mode,
             style: axis.power,
             statusword,

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use canopen::Mux;
 use cia402::{ModeOfOperation, PowerCommand, PowerState};
 use devices::PowerStyle;
 use devices::faults::FaultRow;
@@ -28,12 +29,27 @@ pub(crate) enum Trigger {
     NoAcknowledge,
     /// The target was not reached in the time it should take: where it is, where it should be, in `unit`.
     Late { at: f64, target: f64, unit: &'static str, waited: Duration },
+    /// The shaft rests away from its target, or turns at another speed; `target` was asked for, in `unit`.
+    Elsewhere { at: f64, target: f64, unit: &'static str, by: Interference },
+    /// This program was held up for longer than the drive's watch over its host allows.
+    HeldUp(Duration),
     /// Homing has not ended in the time given to it; position in counts.
     NotHome { at: f64, waited: Duration },
     /// Homing ended without a home position.
     HomingFailed(i8),
     /// It stopped answering.
     Silent(Error),
+}
+
+/// Who or what has stopped a motion, as far as the drive's objects tell.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Interference {
+    /// The halt bit of the controlword is set.
+    Halted,
+    /// The target is another one than what was sent.
+    Retargeted { object: Mux, now: i64, sent: i64 },
+    /// Nothing tells.
+    Unknown,
 }
 
 /// What follows from the facts, and what to do.
@@ -53,6 +69,14 @@ pub(super) fn conclude(trigger: &Trigger, facts: &[Fact], style: PowerStyle) -> 
         return faulted(code, rows);
     }
     match (trigger, state) {
+        (Trigger::HeldUp(time), _) => (
+            format!(
+                "This program did not run for {:.1} s (stopped, or the machine asleep), longer than the drive's watch over its \
+                 host allows: the drive has stopped by itself, and is not set going again",
+                time.as_secs_f64()
+            ),
+            "Look where it stands, then begin the motion anew".to_owned(),
+        ),
         (_, Some(PowerState::Fault | PowerState::FaultReactionActive)) => text(
             "The drive is at fault and gives no fault code",
             "Look at its display or error history, remove the cause, then reset the fault",
@@ -137,9 +161,27 @@ fn by_trigger(trigger: &Trigger, style: PowerStyle) -> (String, String) {
              and ramp times"
                 .to_owned(),
         ),
-        Trigger::Fault | Trigger::LostOperation | Trigger::Silent(_) => text(
+        Trigger::Elsewhere { at, target, unit, by } => elsewhere(*at, *target, unit, by),
+        Trigger::Fault | Trigger::LostOperation | Trigger::HeldUp(_) | Trigger::Silent(_) => text(
             "The drive is no longer where it was a moment ago",
             "Read its state again: it changes while being looked at",
+        ),
+    }
+}
+
+fn elsewhere(at: f64, target: f64, unit: &str, by: &Interference) -> (String, String) {
+    let place = format!("It is at {} {unit} where {} {unit} was asked for", Shown(at), Shown(target));
+    let find = "Find out who else commands it: another master, a PLC, a pendant, an RPDO. When it is safe, begin the motion anew";
+    match by {
+        Interference::Halted => (format!("{place}: somebody has halted it (bit 8 of 6040h)"), find.to_owned()),
+        Interference::Retargeted { object, now, sent } => {
+            (format!("{place}: {object} is {now}, and {sent} was sent: somebody gave it another target"), find.to_owned())
+        }
+        Interference::Unknown => (
+            format!("{place}, though it is enabled, is not halted and has its target"),
+            "Its load, a limit of its speed or current, or its own watch over its host may keep it: ferrodrive explain says \
+             what the drive shows"
+                .to_owned(),
         ),
     }
 }

@@ -2,11 +2,13 @@
 
 use std::time::Duration;
 
-use cia402::{PowerState, Statusword};
+use canopen::Mux;
+use cia402::{Controlword, PowerState, Statusword};
 use devices::{HomingRules, Quantity};
 
-use super::conclude::Trigger;
-use super::handle::{Drive, POLL, POSITION_ACTUAL};
+use super::conclude::{Interference, Trigger};
+use super::handle::{CONTROLWORD, Drive, POLL, POSITION_ACTUAL};
+use super::position::REACHED_TURNS;
 use super::power::STANDSTILL_RPM;
 use crate::error::Error;
 
@@ -14,13 +16,38 @@ use crate::error::Error;
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Goal {
     /// A speed, by the actual velocity.
-    Speed { quantity: Quantity, target_rpm: f64, band_rpm: f64 },
-    /// A position, by statusword bit 10. The bit is believed where the shaft is near the target, and everywhere once
-    /// it was seen clear: one left over from the move before says reached while the shaft is elsewhere.
-    Position { target: i64, band: f64, seen_clear: bool },
+    Speed(Held),
+    /// A position. Statusword bit 10 is believed where the shaft is near the target only: it is left over from the move before,
+    /// and a drive sets it when a halt has brought it to rest anywhere (CiA 402-2, 8.4.2).
+    Position { target: i64, band: f64, sent: Sent },
     /// The home position, by the model's bits of the statusword. They are believed some time after the start: until
     /// then they may be those of the run before.
     Home { rules: HomingRules, method: i8, looks: u8 },
+}
+
+/// A target as it was sent, to be compared with what the drive has later.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sent {
+    pub(super) object: Mux,
+    pub(super) raw: i64,
+}
+
+/// A speed that a drive is to have.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Held {
+    pub(super) quantity: Quantity,
+    pub(super) target_rpm: f64,
+    pub(super) band_rpm: f64,
+    pub(super) sent: Sent,
+}
+
+/// What one look has found.
+#[derive(Clone, Copy, Debug)]
+struct Look {
+    reached: bool,
+    at: f64,
+    /// Neither reached, nor nearer than at the look before.
+    rests: bool,
 }
 
 /// How long a shaft may swing about its target before that is taken for its rest.
@@ -29,6 +56,12 @@ const SETTLE_TIME: Duration = Duration::from_millis(200);
 /// How often the drive is looked at before its verdict on homing is believed: 50 ms, many cycles of any drive.
 const LOOKS_BEFORE_VERDICT: u8 = 5;
 
+/// Looks in a row at a shaft that rests, or is not as fast as it should be, after which somebody is looked for who has stopped it.
+const LOOKS_AT_REST: u32 = 20;
+
+/// What a shaft that is stopped may move by from one look to the next, in turns.
+const REST_TURNS: f64 = 1e-4;
+
 impl Goal {
     /// Whether it is reached, and where the drive is.
     async fn look(
@@ -36,7 +69,8 @@ impl Goal {
         drive: &Drive,
         intent: &'static str,
         statusword: Statusword,
-    ) -> Result<(bool, f64), Error> {
+        before: Option<f64>,
+    ) -> Result<Look, Error> {
         match self {
             Self::Home { rules, method, looks } => {
                 *looks = looks.saturating_add(1);
@@ -45,30 +79,38 @@ impl Goal {
                     return Err(drive.not_reached(intent, Trigger::HomingFailed(*method)).await);
                 }
                 let at = drive.read_number(drive.place(POSITION_ACTUAL)).await?;
-                Ok((settled && rules.attained.matches(statusword), at as f64))
+                Ok(Look { reached: settled && rules.attained.matches(statusword), at: at as f64, rests: false })
             }
-            Self::Speed { quantity, target_rpm, band_rpm } => {
-                let speed = drive.read_quantity(*quantity).await?;
-                Ok(((speed - *target_rpm).abs() <= *band_rpm, speed))
+            Self::Speed(held) => {
+                let at = drive.read_quantity(held.quantity).await?;
+                let reached = (at - held.target_rpm).abs() <= held.band_rpm;
+                Ok(Look { reached, at, rests: !reached && at.abs() < drive.gear.at_output(STANDSTILL_RPM) })
             }
-            Self::Position { target, band, seen_clear } => {
-                let at = drive.read_number(drive.place(POSITION_ACTUAL)).await?;
-                let reached = statusword.has(Statusword::TARGET_REACHED);
-                let near = at.abs_diff(*target) as f64 <= *band;
-                let believed = near || *seen_clear;
-                *seen_clear |= !reached;
-                Ok((reached && believed, at as f64))
+            Self::Position { target, band, .. } => {
+                let position = drive.read_number(drive.place(POSITION_ACTUAL)).await?;
+                let near = position.abs_diff(*target) as f64 <= *band;
+                let at = position as f64;
+                let least = (*band / REACHED_TURNS * REST_TURNS).max(1.0);
+                let rests = !near && before.is_some_and(|before| (at - before).abs() <= least);
+                Ok(Look { reached: near && statusword.has(Statusword::TARGET_REACHED), at, rests })
             }
         }
     }
 
     fn late(&self, at: f64, waited: Duration) -> Trigger {
-        let (target, unit) = match self {
-            Self::Home { .. } => return Trigger::NotHome { at, waited },
-            Self::Speed { target_rpm, .. } => (*target_rpm, "r/min"),
-            Self::Position { target, .. } => (*target as f64, "counts"),
-        };
-        Trigger::Late { at, target, unit, waited }
+        match self.target() {
+            None => Trigger::NotHome { at, waited },
+            Some((target, unit, _)) => Trigger::Late { at, target, unit, waited },
+        }
+    }
+
+    /// What was asked for, its unit, and what was sent for it.
+    const fn target(&self) -> Option<(f64, &'static str, Sent)> {
+        match self {
+            Self::Home { .. } => None,
+            Self::Speed(held) => Some((held.target_rpm, "r/min", held.sent)),
+            Self::Position { target, sent, .. } => Some((*target as f64, "counts", *sent)),
+        }
     }
 }
 
@@ -77,18 +119,65 @@ impl Drive {
     pub(super) async fn watch(&self, intent: &'static str, mut goal: Goal, limit: Duration) -> Result<Duration, Error> {
         let network = self.node.network();
         let began = network.now();
+        let (mut before, mut at_rest) = (None, 0);
         loop {
             let statusword = self.still_enabled(intent).await?;
-            let (reached, at) = self.answered(intent, goal.look(self, intent, statusword).await).await?;
+            let look = self.answered(intent, goal.look(self, intent, statusword, before).await).await?;
             let waited = network.now() - began;
-            if reached {
+            if look.reached {
                 return Ok(waited);
             }
             if waited >= limit {
-                return Err(self.not_reached(intent, goal.late(at, waited)).await);
+                return Err(self.not_reached(intent, goal.late(look.at, waited)).await);
             }
+            at_rest = if look.rests { at_rest + 1 } else { 0 };
+            if at_rest > 0 && at_rest % LOOKS_AT_REST == 0 {
+                self.find_who_stopped_it(intent, &goal, look.at).await?;
+            }
+            before = Some(look.at);
             network.sleep(POLL).await;
         }
+    }
+
+    /// An error if somebody has halted the drive or given it another target.
+    async fn find_who_stopped_it(&self, intent: &'static str, goal: &Goal, at: f64) -> Result<(), Error> {
+        let Some((target, unit, sent)) = goal.target() else { return Ok(()) };
+        let elsewhere = |by| Trigger::Elsewhere { at, target, unit, by };
+        // What a drive does not tell, nobody can be blamed for.
+        if let Ok(controlword) = self.node.read::<u16>(self.place(CONTROLWORD)).await
+            && Controlword(controlword).has(Controlword::HALT)
+        {
+            return Err(self.not_reached(intent, elsewhere(Interference::Halted)).await);
+        }
+        if let Ok(now) = self.read_number(sent.object).await
+            && now != sent.raw
+        {
+            let by = Interference::Retargeted { object: sent.object, now, sent: sent.raw };
+            return Err(self.not_reached(intent, elsewhere(by)).await);
+        }
+        Ok(())
+    }
+
+    /// Polls a drive that is to keep its speed for `duration`.
+    pub(super) async fn watch_speed(&self, intent: &'static str, held: Held, duration: Duration) -> Result<(), Error> {
+        let (mut waited, mut lost) = (Duration::ZERO, 0);
+        let mut goal = Goal::Speed(held);
+        while waited < duration {
+            let statusword = self.still_enabled(intent).await?;
+            let look = self.answered(intent, goal.look(self, intent, statusword, None).await).await?;
+            lost = if look.reached { 0 } else { lost + 1 };
+            let last = waited + POLL >= duration;
+            if lost >= LOOKS_AT_REST && (last || lost % LOOKS_AT_REST == 0) {
+                self.find_who_stopped_it(intent, &goal, look.at).await?;
+                if last || look.rests {
+                    let (at, target, unit) = (look.at, held.target_rpm, "r/min");
+                    let elsewhere = Trigger::Elsewhere { at, target, unit, by: Interference::Unknown };
+                    return Err(self.not_reached(intent, elsewhere).await);
+                }
+            }
+            self.wait_poll(&mut waited).await;
+        }
+        Ok(())
     }
 
     /// Waits until a shaft that has reached its target stands there. Bit 10 comes when the shaft is in its window, which it may
@@ -107,8 +196,11 @@ impl Drive {
         Ok(())
     }
 
-    /// The statusword, if the drive still follows set-points.
+    /// The statusword, if the drive still follows set-points, and this program has kept it content.
     pub(super) async fn still_enabled(&self, intent: &'static str) -> Result<Statusword, Error> {
+        if let Some(lapse) = self.node.network().lapse(self.node.id()) {
+            return Err(self.not_reached(intent, Trigger::HeldUp(lapse)).await);
+        }
         let statusword = self.answered(intent, self.statusword().await).await?;
         match self.power_state(statusword) {
             Some(PowerState::OperationEnabled) => Ok(statusword),

@@ -101,7 +101,7 @@ impl Drive {
         network.with_guards(|guards| guards.insert(id, guard));
         if let Err(error) = self.begin_guard(object, &guard, switches_on).await {
             // The first error is the one to tell.
-            let _ = network.release_guard(id).await;
+            let _ = network.release_guard(id, NodeSet::EMPTY).await;
             return Err(error);
         }
         network.show_presence(id, guard.loss, Some(guard.period));
@@ -124,7 +124,7 @@ impl Drive {
     /// # Errors
     /// Those of the SDO requests. The guard has ended nevertheless, and the drive may stop by itself.
     pub async fn release_guard(&self) -> Result<(), Error> {
-        self.node.network().release_guard(self.node.id()).await
+        self.node.network().release_guard(self.node.id(), NodeSet::EMPTY).await
     }
 
     /// What this value of the drive's watch stands for, when this program does its part.
@@ -180,20 +180,45 @@ impl Network {
         self.with_guards(|guards| guards.get(&node).map(|guard| guard.loss))
     }
 
-    /// Ends all guards, as [`Drive::release_guard`] does.
+    /// Ends the guards of those of these drives that this program has not set in motion, or has seen to stand since, as
+    /// [`Drive::release_guard`] does. A drive that may still be moving keeps its watch over its host, and is no longer kept
+    /// content: it stops by itself.
     ///
     /// # Errors
-    /// The first error of an SDO request; all guards have ended nevertheless.
-    pub async fn release_guards(&self) -> Result<(), Error> {
-        let nodes: NodeSet = self.with_guards(|guards| guards.keys().copied().collect());
-        let mut result = Ok(());
-        for node in nodes.iter() {
-            result = result.and(self.release_guard(node).await);
+    /// The first error of an SDO request; those guards have ended nevertheless.
+    pub async fn release_guards(&self, of: NodeSet) -> Result<(), Error> {
+        let moved = self.moved();
+        let nodes: NodeSet =
+            self.with_guards(|guards| guards.keys().copied().filter(|node| of.contains(*node)).collect());
+        for node in nodes.iter().filter(|node| moved.contains(*node)) {
+            self.forsake(node);
         }
-        result
+        let at_rest = nodes.iter().filter(|node| !moved.contains(*node));
+        let released = join_all(at_rest.map(|node| self.release_guard(node, moved)).collect::<Vec<_>>()).await;
+        released.into_iter().collect()
     }
 
-    async fn release_guard(&self, id: NodeId) -> Result<(), Error> {
+    /// Leaves a guarded drive to its watch: it gets no more signs of life.
+    fn forsake(&self, node: NodeId) {
+        match self.with_guards(|guards| guards.remove(&node)).map(|guard| guard.loss) {
+            Some(loss @ HostLoss::StopsInSilence { .. }) => self.show_presence(node, loss, None),
+            Some(HostLoss::StopsWithoutHeartbeat { host, .. }) => drop(self.send_heartbeat(host)),
+            _ => {}
+        }
+    }
+
+    /// How long this program was held up (frozen, or its machine asleep) beyond what the guarded drive at this node allows: the
+    /// drive has stopped by itself since, and is sent no sign of life that would have it go on.
+    pub(crate) fn lapse(&self, node: NodeId) -> Option<Duration> {
+        match self.guarded(node)? {
+            HostLoss::StopsWithoutHeartbeat { host, .. } => self.look(|core| core.lapse(host)),
+            HostLoss::StopsInSilence { .. } => self.look(|core| core.lapse(node)),
+            _ => None,
+        }
+    }
+
+    /// Those that are `armed` stay so.
+    async fn release_guard(&self, id: NodeId, armed: NodeSet) -> Result<(), Error> {
         let Some(guard) = self.with_guards(|guards| guards.remove(&id)) else { return Ok(()) };
         match guard.loss {
             HostLoss::StopsInSilence { object, .. } => {
@@ -205,24 +230,22 @@ impl Network {
                 self.node(id).write(object, guard.before as u16).await
             }
             HostLoss::StopsWithoutHeartbeat { object, host, .. } => {
-                let others = self.with_guards(|guards| heartbeat_period(guards.values(), host));
-                self.heartbeat(host, others);
-                if others.is_some() {
+                if self.send_heartbeat(host) {
                     // The heartbeat goes on for others, and would arm anew any watch but one that is switched off.
                     let off = guard.before == 0 && guard.armed != 0;
                     return if off { self.node(id).write(object, 0_u32).await } else { Ok(()) };
                 }
-                self.disarm_bystanders(id, object, host).await;
+                self.disarm_bystanders(armed.with(id), object, host).await;
                 disarm(&self.node(id), object, host, Some(guard.before as u32)).await
             }
             _ => Ok(()),
         }
     }
 
-    /// Has every other drive that this program's heartbeat has armed forget it: they would stop for want of it, whoever
+    /// Has every drive but the `others` that this program's heartbeat has armed forget it: they would stop for want of it, whoever
     /// moves them. Who does not answer cannot be helped.
-    async fn disarm_bystanders(&self, guarded: NodeId, object: Mux, host: NodeId) {
-        let bystanders = self.seen().iter().filter(|node| *node != guarded).collect::<Vec<_>>();
+    async fn disarm_bystanders(&self, others: NodeSet, object: Mux, host: NodeId) {
+        let bystanders = self.seen().iter().filter(|node| !others.contains(*node)).collect::<Vec<_>>();
         let disarmed = bystanders.into_iter().map(|id| async move {
             let node = self.node(id).with_timeout(BYSTANDER_TIMEOUT);
             disarm(&node, object, host, None).await
@@ -240,8 +263,11 @@ impl Network {
             guards.values().filter_map(host).collect()
         });
         for host in hosts.iter() {
-            let period = self.with_guards(|guards| heartbeat_period(guards.values(), host));
-            self.heartbeat(host, period.filter(|_| !hold));
+            if hold {
+                self.heartbeat(host, None);
+            } else {
+                self.send_heartbeat(host);
+            }
         }
     }
 
@@ -257,20 +283,24 @@ impl Network {
     /// Starts, changes or ends what keeps a drive content.
     fn show_presence(&self, node: NodeId, loss: HostLoss, period: Option<Duration>) {
         match loss {
-            HostLoss::StopsInSilence { .. } => self.node(node).keep_fed(period),
-            HostLoss::StopsWithoutHeartbeat { host, .. } => {
-                self.heartbeat(host, self.with_guards(|guards| heartbeat_period(guards.values(), host)));
-            }
+            HostLoss::StopsInSilence { time, .. } => self.node(node).keep_fed_within(period, Some(time)),
+            HostLoss::StopsWithoutHeartbeat { host, .. } => drop(self.send_heartbeat(host)),
             _ => {}
         }
     }
-}
 
-/// The shortest period that any of these drives needs of the heartbeat of `host`.
-fn heartbeat_period<'a>(guards: impl Iterator<Item = &'a Guard>, host: NodeId) -> Option<Duration> {
-    let of_host =
-        guards.filter(|guard| matches!(guard.loss, HostLoss::StopsWithoutHeartbeat { host: own, .. } if own == host));
-    of_host.map(|guard| guard.period).min()
+    /// Sends the heartbeat that guarded drives watch as often as they need it, or no longer; true if there are such drives.
+    fn send_heartbeat(&self, host: NodeId) -> bool {
+        let guards = self.with_guards(|guards| {
+            let of_host =
+                |guard: &&Guard| matches!(guard.loss, HostLoss::StopsWithoutHeartbeat { host: own, .. } if own == host);
+            guards.values().filter(of_host).copied().collect::<Vec<_>>()
+        });
+        let period = guards.iter().map(|guard| guard.period).min();
+        let allowed = guards.iter().filter_map(|guard| guard.loss.stops_after()).min();
+        self.heartbeat_within(host, period, allowed);
+        period.is_some()
+    }
 }
 
 /// Has a consumer of the heartbeat of `host` wait for a first one again, with `value` in its entry, or what was there. A

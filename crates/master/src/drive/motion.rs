@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use cia402::{Controlword, ModeOfOperation, PowerState};
 
-use super::goal::Goal;
+use super::goal::{Goal, Held, Sent};
 use super::handle::{CONTROLWORD, Drive};
 use super::scale::{Commanded, REACHED_LEAST_RPM};
 use crate::error::Error;
@@ -108,10 +108,8 @@ impl Drive {
         let (up, down) = self.ramp_times_s(change).await?;
         let reckoned = || Duration::from_secs_f64((up.max(down) * LATE_FACTOR + LATE_MARGIN_S).clamp(0.0, 3600.0));
         let limit = options.within.unwrap_or_else(reckoned);
-        let band = (target.abs() * REACHED_SHARE).max(self.gear.at_output(REACHED_LEAST_RPM));
-        let quantity = self.has(units.actual_velocity, "the actual velocity")?;
-        let goal = Goal::Speed { quantity, target_rpm: target, band_rpm: band };
-        let reached = self.watch(INTENT, goal, limit).await?;
+        let held = self.held(target, Sent { object: target_velocity.object, raw })?;
+        let reached = self.watch(INTENT, Goal::Speed(held), limit).await?;
         if target == 0.0 {
             self.note_stopped();
         }
@@ -158,18 +156,34 @@ impl Drive {
         Ok(())
     }
 
-    /// Keeps a moving drive company for `duration`: its polling keeps the drive's watch over its host content.
+    /// Polls a moving drive for `duration`, which keeps the drive's watch over its host content. In profile velocity its speed is
+    /// looked at too.
     ///
     /// # Errors
-    /// [`Error::NotReached`] as soon as the drive is no longer enabled or falls silent.
+    /// [`Error::NotReached`] as soon as the drive is no longer enabled or falls silent; when it stands still although it has a
+    /// target velocity, or is given another one; when it turns at another speed at the end.
     pub async fn supervise(&self, duration: Duration) -> Result<(), Error> {
         const INTENT: &str = "keep it moving";
+        if let Some(target) = self.axis_description().and_then(|axis| axis.units.target_velocity)
+            && self.answered(INTENT, self.mode().await).await? == ModeOfOperation::PROFILE_VELOCITY
+        {
+            let raw = self.answered(INTENT, self.read_number(target.object).await).await?;
+            let rpm = self.answered(INTENT, self.read_quantity(target).await).await?;
+            return self.watch_speed(INTENT, self.held(rpm, Sent { object: target.object, raw })?, duration).await;
+        }
         let mut waited = Duration::ZERO;
         while waited < duration {
             self.still_enabled(INTENT).await?;
             self.wait_poll(&mut waited).await;
         }
         Ok(())
+    }
+
+    /// When a speed counts as reached and kept.
+    fn held(&self, target_rpm: f64, sent: Sent) -> Result<Held, Error> {
+        let band_rpm = (target_rpm.abs() * REACHED_SHARE).max(self.gear.at_output(REACHED_LEAST_RPM));
+        let quantity = self.has(self.motion("look at its speed")?.units.actual_velocity, "the actual velocity")?;
+        Ok(Held { quantity, target_rpm, band_rpm, sent })
     }
 
     /// Takes a halt bit back that an earlier stop has left, now that the target is the new one.

@@ -6,8 +6,8 @@ use std::time::Duration;
 use cia402::{Controlword, ModeOfOperation, Statusword};
 use devices::NewSetPoint;
 
-use super::conclude::Trigger;
-use super::goal::Goal;
+use super::conclude::{Interference, Trigger};
+use super::goal::{Goal, Sent};
 use super::handle::{CONTROLWORD, Drive, POLL, POSITION_ACTUAL, STEP_TIMEOUT, TARGET_POSITION};
 use super::motion::{LATE_FACTOR, LATE_MARGIN_S, MotionOptions, MotionReport};
 use super::scale::Commanded;
@@ -16,8 +16,8 @@ use crate::units::{Angle, Rpm};
 
 const ENABLED: u16 = 0x0F;
 
-/// How near to the target bit 10 (target reached) is believed although it was never seen clear, in turns of the shaft.
-const REACHED_TURNS: f64 = 0.01;
+/// How near to the target bit 10 (target reached) is believed, in turns of the shaft.
+pub(super) const REACHED_TURNS: f64 = 0.01;
 
 /// Profile position moves with the set-point handshake. Source: CiA 402-2, clause 10.
 impl Drive {
@@ -68,8 +68,15 @@ impl Drive {
             return Ok(MotionReport { reached_after: None, commanded, notes });
         }
         let band = (turn * REACHED_TURNS).max(1.0);
-        let reached = self.watch(INTENT, Goal::Position { target, band, seen_clear: false }, limit).await?;
+        let sent = Sent { object: self.place(TARGET_POSITION), raw: counts };
+        let reached = self.watch(INTENT, Goal::Position { target, band, sent }, limit).await?;
         self.settle(INTENT).await?;
+        let at = self.answered(INTENT, self.read_number(self.place(POSITION_ACTUAL)).await).await?;
+        if at.abs_diff(target) as f64 > band {
+            let (at, target, unit) = (at as f64, target as f64, "counts");
+            let elsewhere = Trigger::Elsewhere { at, target, unit, by: Interference::Unknown };
+            return Err(self.not_reached(INTENT, elsewhere).await);
+        }
         self.note_stopped();
         Ok(MotionReport { reached_after: Some(reached), commanded, notes })
     }

@@ -5,16 +5,17 @@ use devices::{HomingStart, PowerStyle, Quantity};
 
 use super::conclude::Trigger;
 use super::handle::{CONTROLWORD, Drive, MODE, POLL, STEP_TIMEOUT};
+use super::safety::overrule;
 use crate::error::Error;
 
 /// Speed below which a shaft counts as standing still: the rounding of the coarsest velocity object.
-pub(super) const STANDSTILL_RPM: f64 = 1.0;
+pub(crate) const STANDSTILL_RPM: f64 = 1.0;
 
 /// The speed of a motor that does not tell it, r/min: more than those of its kind turn.
 const FASTEST_RPM: f64 = 10_000.0;
 
 /// How many looks in a row have to find it so: a shaft that swings about its rest passes zero.
-const STANDSTILL_LOOKS: u32 = 5;
+pub(super) const STANDSTILL_LOOKS: u32 = 5;
 
 /// The power drive state machine (CiA 402-2, 8.2), and what stands in its place on drives without one.
 impl Drive {
@@ -110,6 +111,7 @@ impl Drive {
             self.note_stopped();
             return Ok(());
         }
+        self.node.network().with_core(|core| overrule(core, &[self.as_moved()]));
         self.write_controlword(PowerCommand::QuickStop.controlword()).await?;
         self.leave_homing().await?;
         let stopping = |state| state != PowerState::OperationEnabled;

@@ -1,61 +1,252 @@
-use canopen::NodeId;
-use cia402::{Controlword, PowerCommand};
+//! Stopping what this program has set in motion, and only that: said to have stopped when it was seen to stand.
+//!
+//! A quick stop goes by SDO, and in the RPDO that carries the controlword too where one has been written to: a synchronous
+//! RPDO that waits in the drive for SYNC would enable it again (CiA 301, 7.2.2.2).
 
-use super::handle::{CONTROLWORD, Drive};
+use std::time::Duration;
+
+use canopen::{Mux, NodeId};
+use cia402::{Controlword, PowerCommand, PowerState, Statusword};
+use devices::PowerStyle;
+
+use super::conclude::Trigger;
+use super::handle::{CONTROLWORD, Drive, POLL, POSITION_ACTUAL, STATUSWORD};
+use super::power::{STANDSTILL_LOOKS, STANDSTILL_RPM};
 use crate::core::{Command, Core, NodeSet, Payload, Request, Transfer};
 use crate::error::Error;
-use crate::network::{DEFAULT_TIMEOUT, Network, join_all};
+use crate::gear::Gear;
+use crate::network::{DEFAULT_TIMEOUT, MovedAxis, Network, join_all};
 
 /// Quick stop, with the halt bit for drives that look for their reference whatever the quick stop bit says; where there is
 /// a state machine, halt means nothing in Quick stop active (CiA 402-2, 8.4.1).
 pub(crate) const STOP: Controlword = Controlword(PowerCommand::QuickStop.controlword().0 | Controlword::HALT);
 
+/// How long an answer is awaited while a drive is being stopped. Drives answer within milliseconds, and the next question may
+/// get through where this one was lost.
+const ANSWER: Duration = Duration::from_millis(250);
+
+/// How long a drive is asked for its state that may not be told to stop without.
+const GLANCE: Duration = Duration::from_millis(50);
+
+/// How long a drive may leave everything unanswered before its stop counts as not seen.
+const SILENCE: Duration = Duration::from_millis(500);
+
+/// How long a drive may go on in Operation enabled before it is told again: somebody else may have enabled it since.
+const REPEAT: Duration = Duration::from_millis(100);
+
+/// How long a drive of an unknown model is given to come to rest: its ramps are not known.
+const UNKNOWN_RAMP: Duration = Duration::from_secs(5);
+
+/// What the position of a shaft at rest may vary by within [`REST_LOOK`], in counts: an encoder of 32768 counts a turn has 11
+/// of them in this time at 1 r/min.
+const REST_COUNTS: i64 = 11;
+const REST_LOOK: Duration = Duration::from_millis(20);
+
+/// What became of an axis that was to stop.
+#[derive(Clone, Debug)]
+pub struct Stopped {
+    /// Its node.
+    pub node: NodeId,
+    /// The place of its controlword: which axis of the node it is.
+    pub controlword: Mux,
+    /// How long after the command it was seen to stand, by its statusword and its speed (or its position, where it does not
+    /// show a speed); or why that was not seen: then it may still be moving.
+    pub outcome: Result<Duration, Error>,
+}
+
 /// Stopping what this program has set in motion, and only that.
 impl Network {
-    /// Quick-stops every axis that this program has set in motion, all at the same time, and says what each answered.
-    pub async fn stop_all_moved(&self) -> Vec<(NodeId, Result<(), Error>)> {
-        self.with_core(Core::stop_cyclic);
-        let stops = self.moved_axes().into_iter().map(|(id, controlword)| {
-            let node = self.node(id);
-            async move { (id, controlword, node.write(controlword, STOP.0).await) }
-        });
-        let stopped = join_all(stops.collect::<Vec<_>>()).await;
-        for (id, controlword, _) in stopped.iter().filter(|(_, _, outcome)| outcome.is_ok()) {
-            self.note_stopped(*id, *controlword);
-        }
-        stopped.into_iter().map(|(id, _, outcome)| (id, outcome)).collect()
+    /// Quick-stops every axis that this program has set in motion, all at the same time, and says how each came to rest. What
+    /// else this program asks of these drives has to have ended: a future that goes on enabling one would undo this.
+    ///
+    /// Ends when each was seen to stand, or within the time of the drive's own ramps, or half a second after a drive has
+    /// fallen silent.
+    pub async fn stop_all_moved(&self) -> Vec<Stopped> {
+        self.stop_moved(self.moved()).await
     }
 
-    /// Queues the same without waiting; the runner has to be kept going until the frames are out.
+    /// The same for the axes of these nodes.
+    pub async fn stop_moved(&self, nodes: NodeSet) -> Vec<Stopped> {
+        let axes: Vec<_> = self.moved_axes().into_iter().filter(|axis| nodes.contains(axis.node)).collect();
+        self.with_core(|core| overrule(core, &axes));
+        let stops = axes.into_iter().map(|moved| async move {
+            let outcome = self.drive_of(&moved).come_to_rest().await;
+            Stopped { node: moved.node, controlword: moved.controlword, outcome }
+        });
+        join_all(stops.collect::<Vec<_>>()).await
+    }
+
+    /// [`stop_all_moved`](Self::stop_all_moved), and gives back the guards of the drives that stand. The watch of one that may
+    /// still be moving is not taken from it, and it is no longer kept content: it stops by itself, if it can.
+    pub async fn stop_and_release(&self) -> Vec<Stopped> {
+        let stopped = self.stop_all_moved().await;
+        // A drive that stands and does not answer keeps its watch, which then stops nothing.
+        let _ = self.release_guards(NodeSet::ALL).await;
+        stopped
+    }
+
+    /// Queues the same quick stops without waiting; the runner has to be kept going until the frames are out. Whether they stop
+    /// is not looked at: the nodes stay among [`moved`](Self::moved).
     pub fn quick_stop_moved(&self) -> NodeSet {
+        let axes = self.moved_axes();
+        self.with_core(|core| overrule(core, &axes));
         let stop = Payload::new(&STOP.0.to_le_bytes());
-        self.with_core(Core::stop_cyclic);
-        let moved = self.moved();
-        for (node, mux) in self.moved_axes() {
+        for MovedAxis { node, controlword: mux, .. } in axes {
             let transfer = Transfer::Download(stop.clone());
             let request = Request { node, mux, transfer, timeout: DEFAULT_TIMEOUT };
             let ticket = self.with_core(Core::ticket);
             self.submit(Command::Request(ticket, request));
-            self.note_stopped(node, mux);
         }
-        moved
+        self.moved()
+    }
+
+    /// Ends all that this master sends by itself, and everything else: SYNC, heartbeats, process data, requests. For a program
+    /// that leaves the bus, after [`stop_and_release`](Self::stop_and_release): drives that may still be moving and watch over
+    /// their host stop then. Requests after this fail.
+    pub fn fall_silent(&self) {
+        self.with_core(Core::fall_silent);
     }
 
     /// A guard that quick-stops what was set in motion when it goes out of scope.
     pub fn stop_guard(&self) -> StopGuard {
         StopGuard { network: self.clone() }
     }
+
+    fn drive_of(&self, moved: &MovedAxis) -> Drive {
+        let node = self.node(moved.node).with_timeout(ANSWER);
+        Drive { node, axis: moved.axis, description: moved.description, guess: None, gear: Gear::DIRECT }
+    }
+}
+
+/// No step moves on what is being stopped, and no frame that was sent before takes the stop back.
+pub(super) fn overrule(core: &mut Core, axes: &[MovedAxis]) {
+    for axis in axes {
+        core.stop_cyclic(axis.node, axis.controlword);
+        core.overrule_rpdos(axis.node, axis.controlword, STOP.0);
+    }
+}
+
+/// How a drive is seen to stand.
+struct Rest {
+    looks: u32,
+    position: Option<i64>,
 }
 
 impl Drive {
-    /// Notes that this program has set this axis in motion.
-    pub(super) fn note_moved(&self) {
-        self.node.network().note_moved(self.node.id(), self.place(CONTROLWORD));
+    /// This axis, as what this program has in motion is noted.
+    pub(crate) fn as_moved(&self) -> MovedAxis {
+        let (node, controlword) = (self.node.id(), self.place(CONTROLWORD));
+        MovedAxis { node, controlword, axis: self.axis, description: self.description }
     }
 
-    /// Notes that this axis stands still again.
+    /// Notes that this program has set this axis in motion.
+    pub(super) fn note_moved(&self) {
+        self.node.network().note_axis_moved(self.as_moved());
+    }
+
+    /// Notes that this axis was seen to stand.
     pub(super) fn note_stopped(&self) {
         self.node.network().note_stopped(self.node.id(), self.place(CONTROLWORD));
+    }
+
+    /// Stops the drive and waits until it is seen to stand; how long that took.
+    async fn come_to_rest(&self) -> Result<Duration, Error> {
+        const INTENT: &str = "bring it to rest";
+        let network = self.node.network();
+        let began = network.now();
+        let (mut told, mut heard) = (None, began);
+        let mut limit = None;
+        let mut rest = Rest { looks: 0, position: None };
+        loop {
+            match self.look_at_rest(&mut told, &mut rest).await {
+                Ok(true) => {
+                    self.note_stopped();
+                    return Ok(network.now() - began);
+                }
+                Ok(false) => heard = network.now(),
+                // Not a drive: nothing of it can move.
+                Err(Error::Aborted { code, .. }) if told.is_none() && code == canopen::AbortCode::NO_SUCH_OBJECT => {
+                    self.note_stopped();
+                    return Ok(network.now() - began);
+                }
+                Err(error) if network.now() - heard >= SILENCE => return self.answered(INTENT, Err(error)).await,
+                Err(_) => {}
+            }
+            let limit = match (limit, told) {
+                (Some(limit), _) => limit,
+                // Asked only once it has been told to stop.
+                (None, Some(_)) => *limit.insert(self.time_to_rest().await),
+                (None, None) => SILENCE,
+            };
+            if network.now() - began >= limit + SILENCE {
+                return Err(self
+                    .not_reached(INTENT, Trigger::StillTurning(self.speed_rpm().await.unwrap_or(0.0)))
+                    .await);
+            }
+            network.sleep(POLL).await;
+        }
+    }
+
+    /// Tells the drive to stop where it has not been told, or goes on nevertheless; true once it was seen to stand for a while.
+    async fn look_at_rest(&self, told: &mut Option<can::Instant>, rest: &mut Rest) -> Result<bool, Error> {
+        let network = self.node.network();
+        if told.is_none() {
+            // Such a drive would energise its motor to hold it.
+            if self.may_hold_by_stopping() && self.is_without_power().await {
+                return Ok(true);
+            }
+            self.write_controlword(STOP).await?;
+            *told = Some(network.now());
+        }
+        let statusword = self.statusword().await?;
+        if self.power_state(statusword) == Some(PowerState::OperationEnabled) {
+            rest.looks = 0;
+            if told.is_some_and(|at| network.now() - at >= REPEAT) {
+                let (node, controlword) = (self.node.id(), self.place(CONTROLWORD));
+                network.with_core(|core| core.overrule_rpdos(node, controlword, STOP.0));
+                *told = None;
+            }
+            return Ok(false);
+        }
+        let stands = match self.axis_description().and_then(|axis| axis.units.actual_velocity) {
+            Some(velocity) => self.read_quantity(velocity).await?.abs() < STANDSTILL_RPM,
+            None => {
+                let at = i64::from(self.node.read::<i32>(self.place(POSITION_ACTUAL)).await?);
+                let before = rest.position.replace(at);
+                network.sleep(REST_LOOK.saturating_sub(POLL)).await;
+                before.is_some_and(|before| (at - before).abs() <= REST_COUNTS)
+            }
+        };
+        rest.looks = if stands { rest.looks + 1 } else { 0 };
+        Ok(rest.looks >= STANDSTILL_LOOKS)
+    }
+
+    /// True of a drive that a quick stop may give power: one without the state machine, or of an unknown model.
+    fn may_hold_by_stopping(&self) -> bool {
+        self.description.is_none() || self.power_style() != PowerStyle::Cia402
+    }
+
+    /// True if the drive soon says that its motor has no power (statusword bit 4) and does not follow set-points.
+    async fn is_without_power(&self) -> bool {
+        let glance = self.node.clone().with_timeout(GLANCE).read::<u16>(self.place(STATUSWORD)).await;
+        glance.is_ok_and(|raw| {
+            let statusword = Statusword(raw);
+            let live = match self.power_style() {
+                PowerStyle::EchoesControlword { live, .. } => live,
+                _ => Statusword::VOLTAGE_ENABLED,
+            };
+            !statusword.has(live) && self.power_state(statusword) != Some(PowerState::OperationEnabled)
+        })
+    }
+
+    /// How long this drive's own stop may take.
+    async fn time_to_rest(&self) -> Duration {
+        if self.description.is_some() { self.stop_time().await } else { UNKNOWN_RAMP }
+    }
+
+    async fn speed_rpm(&self) -> Option<f64> {
+        let velocity = self.axis_description()?.units.actual_velocity?;
+        self.read_quantity(velocity).await.ok()
     }
 }
 

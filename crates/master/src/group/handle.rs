@@ -11,14 +11,18 @@ use super::limits::PathPoint;
 use super::state::{GroupState, Phase, StopCause};
 use super::stream::{Stream, StreamOptions};
 use super::trajectory::Trajectory;
+use crate::core::NodeSet;
 use crate::cyclic::CyclicState;
 use crate::drive::Drive;
 use crate::error::Error;
-use crate::network::{Exchange, Network, join_all};
+use crate::network::{Exchange, Network};
 use crate::units::Turns;
 
 /// How long drives may take to be enabled, and to be without power again.
 const POWER_LIMIT: Duration = Duration::from_secs(5);
+
+/// Cycles after which a drive that is not heard is not waited for.
+const UNHEARD: u64 = 10;
 
 /// Several axes that move as one. See the [module](super).
 pub struct Group {
@@ -228,26 +232,33 @@ impl Group {
     /// Cycles until every drive shows that it has no power, or the limit has passed.
     async fn switch_off(&mut self) -> Result<(), GroupError> {
         self.runner.course = Course::Off;
-        for _ in 0..self.cycles(POWER_LIMIT) {
+        for cycle in 0..self.cycles(POWER_LIMIT) {
             self.cycle().await?;
-            if self.runner.states.iter().all(CyclicState::is_without_power) {
+            // One that is not heard is not waited for: nothing is known of it, and nothing it does can be seen.
+            let settled =
+                |state: &CyclicState| state.stands_without_power() || cycle > UNHEARD && state.statusword.is_none();
+            if self.runner.states.iter().all(settled) {
                 break;
             }
         }
         Ok(())
     }
 
-    /// [`disable`](Self::disable), and ends what the group began: SYNC, and the guards of its drives.
+    /// [`disable`](Self::disable), and ends what the group began: SYNC, and the guards of the drives that were seen to stand
+    /// without power. One that was not stays among [`Network::moved`] and is left to its own watch.
     ///
     /// # Errors
     /// As [`disable`](Self::disable), and those of the requests.
     pub async fn close(mut self) -> Result<(), GroupError> {
         let disabled = self.disable().await;
         self.network.sync(None);
-        let released = join_all(self.drives.iter().map(Drive::release_guard)).await;
+        let nodes: NodeSet = self.drives.iter().map(|drive| drive.node().id()).collect();
+        let heard = self.runner.axes.iter().zip(&self.runner.states).filter(|(_, state)| state.statusword.is_some());
+        let coasting = self.network.stop_moved(heard.map(|(axis, _)| axis.drive.node()).collect()).await;
+        let released = self.network.release_guards(nodes).await;
         disabled?;
-        released.into_iter().collect::<Result<(), _>>()?;
-        Ok(())
+        coasting.into_iter().try_for_each(|stopped| stopped.outcome.map(drop))?;
+        Ok(released?)
     }
 
     /// Asks the drive that stopped the group what is the matter with it: its fault with its text, or what it is missing. The

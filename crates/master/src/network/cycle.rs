@@ -10,7 +10,7 @@ use can::Instant;
 use canopen::{Mux, NodeId};
 
 use super::handle::{CycleWaiter, Network};
-use super::moved::Moved;
+use super::moved::{Moved, MovedAxis};
 use crate::core::{Command, Core, Cycle, CycleLoss, Sample, SetPoint, Signal, Ticket, WatchId};
 
 /// Why there is no next cycle.
@@ -131,9 +131,9 @@ impl Exchange<'_> {
     }
 
     /// A set-point was given in this cycle: the axis with this controlword is in motion.
-    pub(crate) fn note_moving(&mut self, (node, controlword): (NodeId, Mux), watch: WatchId) {
+    pub(crate) fn note_moving(&mut self, axis: MovedAxis, watch: WatchId) {
         self.core.note_moving(watch);
-        self.moved.insert(node, controlword);
+        self.moved.insert(axis);
     }
 
     /// Nothing was given in this cycle that moves the node.
@@ -141,10 +141,14 @@ impl Exchange<'_> {
         self.core.note_resting(watch);
     }
 
-    /// The drive was told to switch off; a loss is forgotten.
-    pub(crate) fn note_off(&mut self, (node, controlword): (NodeId, Mux), watch: WatchId) {
+    /// The drive is told to switch off; a loss is forgotten.
+    pub(crate) fn forget_loss(&mut self, watch: WatchId) {
         self.core.forget_loss(watch);
-        self.moved.remove(node, controlword);
+    }
+
+    /// The axis was seen to stand without power.
+    pub(crate) fn note_stands(&mut self, axis: &MovedAxis) {
+        self.moved.remove(axis.node, axis.controlword);
     }
 
     /// Why the drive was stopped, until it was told to switch off.

@@ -6,8 +6,9 @@ use std::time::Duration;
 use can::{Frame, Instant, Station};
 use canopen::nmt::NmtTarget;
 use canopen::{Mux, NmtCommand, NodeId};
+use devices::AxisId;
 
-use super::moved::Moved;
+use super::moved::{Moved, MovedAxis};
 use crate::core::{Command, Core, Event, NodeFacts, NodeSet, Outcome, Received, Ticket};
 use crate::host_loss::Guard;
 use crate::models::Models;
@@ -89,7 +90,12 @@ impl Network {
     /// Any drive that consumes that heartbeat (1016h) and hears it watches this program from then on, not only those that
     /// it moves. [`crate::Drive::guard`] does what a drive needs; this is for masters that do the rest themselves.
     pub fn heartbeat(&self, own: NodeId, period: Option<Duration>) {
-        self.submit(Command::Heartbeat(own, period));
+        self.heartbeat_within(own, period, None);
+    }
+
+    /// The same for drives that stop when it stays away for `allowed`: one that would come later is not sent, nor any after it.
+    pub(crate) fn heartbeat_within(&self, own: NodeId, period: Option<Duration>, allowed: Option<Duration>) {
+        self.submit(Command::Heartbeat(own, period, allowed));
     }
 
     /// Sends an NMT command to every node.
@@ -177,21 +183,25 @@ impl Network {
 
     /// Notes that this program has set the axis with this controlword in motion.
     pub fn note_moved(&self, node: NodeId, controlword: Mux) {
-        self.lock().moved.insert(node, controlword);
+        self.note_axis_moved(MovedAxis { node, controlword, axis: AxisId::FIRST, description: None });
     }
 
-    /// Notes that it stands still again.
+    pub(crate) fn note_axis_moved(&self, axis: MovedAxis) {
+        self.lock().moved.insert(axis);
+    }
+
+    /// Notes that it was seen to stand.
     pub(crate) fn note_stopped(&self, node: NodeId, controlword: Mux) {
         self.lock().moved.remove(node, controlword);
     }
 
-    /// The nodes that this program has set in motion and not stopped again.
+    /// The nodes that this program has set in motion and not seen to stand since.
     pub fn moved(&self) -> NodeSet {
         self.lock().moved.nodes()
     }
 
-    /// The controlwords of the axes that this program has set in motion and not stopped again.
-    pub(crate) fn moved_axes(&self) -> Vec<(NodeId, Mux)> {
+    /// The axes that this program has set in motion and not seen to stand since.
+    pub(crate) fn moved_axes(&self) -> Vec<MovedAxis> {
         self.lock().moved.axes()
     }
 

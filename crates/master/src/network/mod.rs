@@ -18,4 +18,5 @@ pub use cycle::{Exchange, NextSync, NoCycle};
 pub use future::{Elapsed, NodeView, Sleep, Wait};
 pub use handle::Network;
 pub use join::join_all;
+pub(crate) use moved::MovedAxis;
 pub use node::{DEFAULT_TIMEOUT, Node};

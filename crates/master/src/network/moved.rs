@@ -1,11 +1,31 @@
 use canopen::{Mux, NodeId};
+use devices::{AxisId, Description};
 
 use crate::core::NodeSet;
 
-/// What this program has set in motion: axes, each by its node and the place of its controlword. Has room for one axis of each
-/// node, so that a cycle allocates nothing.
+/// An axis that this program has set in motion, and what is known of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MovedAxis {
+    pub(crate) node: NodeId,
+    /// The place of its controlword, which tells the axes of a node apart.
+    pub(crate) controlword: Mux,
+    pub(crate) axis: AxisId,
+    /// `None` where only the place of the controlword is known.
+    pub(crate) description: Option<&'static Description>,
+}
+
+impl MovedAxis {
+    const fn is(&self, node: NodeId, controlword: Mux) -> bool {
+        self.node.raw() == node.raw()
+            && self.controlword.index == controlword.index
+            && self.controlword.sub_index == controlword.sub_index
+    }
+}
+
+/// What this program has set in motion and not seen to stand since. Has room for one axis of each node, so that a cycle
+/// allocates nothing.
 #[derive(Clone, Debug)]
-pub(super) struct Moved(Vec<(NodeId, Mux)>);
+pub(super) struct Moved(Vec<MovedAxis>);
 
 impl Default for Moved {
     fn default() -> Self {
@@ -14,24 +34,27 @@ impl Default for Moved {
 }
 
 impl Moved {
-    pub(super) fn insert(&mut self, node: NodeId, controlword: Mux) {
-        if !self.0.contains(&(node, controlword)) {
-            self.0.push((node, controlword));
+    /// Notes an axis; what is known of it stays known.
+    pub(super) fn insert(&mut self, axis: MovedAxis) {
+        match self.0.iter_mut().find(|known| known.is(axis.node, axis.controlword)) {
+            Some(known) if known.description.is_none() => *known = axis,
+            Some(_) => {}
+            None => self.0.push(axis),
         }
     }
 
     pub(super) fn remove(&mut self, node: NodeId, controlword: Mux) {
-        self.0.retain(|known| *known != (node, controlword));
+        self.0.retain(|known| !known.is(node, controlword));
     }
 
     pub(super) fn nodes(&self) -> NodeSet {
-        self.0.iter().map(|(node, _)| *node).collect()
+        self.0.iter().map(|axis| axis.node).collect()
     }
 
     /// Ascending by node, then by place.
-    pub(super) fn axes(&self) -> Vec<(NodeId, Mux)> {
+    pub(super) fn axes(&self) -> Vec<MovedAxis> {
         let mut axes = self.0.clone();
-        axes.sort_unstable();
+        axes.sort_unstable_by_key(|axis| (axis.node, axis.controlword));
         axes
     }
 }

@@ -107,7 +107,12 @@ impl Node {
     /// Asks it for its statusword (6041h) whenever nothing else was sent to it for this long, so that a drive that stops when
     /// its host is silent goes on; `None` ends it. The runner has to go on running.
     pub fn keep_fed(&self, period: Option<Duration>) {
-        self.network.submit(Command::KeepFed(self.id, period));
+        self.keep_fed_within(period, None);
+    }
+
+    /// The same for a drive that stops when it was left without a frame for `allowed`: after that it is not asked any more.
+    pub(crate) fn keep_fed_within(&self, period: Option<Duration>, allowed: Option<Duration>) {
+        self.network.submit(Command::KeepFed(self.id, period, allowed));
     }
 
     /// Waits for its next boot-up message, counted from this call.

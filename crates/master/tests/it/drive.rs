@@ -270,7 +270,7 @@ fn stop_all_moved_answers_for_each_node() {
     bus.toys[1].drive.as_mut().unwrap().silent_at = Some(Instant::ZERO);
     let stopped = bus.block_on(network.stop_all_moved());
     assert_eq!(
-        stopped.iter().map(|(id, outcome)| (id.raw(), outcome.is_ok())).collect::<Vec<_>>(),
+        stopped.iter().map(|stopped| (stopped.node.raw(), stopped.outcome.is_ok())).collect::<Vec<_>>(),
         [(4, true), (5, false)]
     );
     assert!(network.moved().contains(node(5)) && !network.moved().contains(node(4)));

@@ -130,18 +130,24 @@ fn what_is_streamed_is_the_outputs() {
                 };
                 seen = Some(network.exchange(|io| cyclic.step(io, demand)));
             }
-            network.sync(None);
             Ok::<_, CyclicError>(seen.expect("it was stepped"))
         };
         let state = block_on(&mut world, run).unwrap().unwrap();
         assert!(state.follows, "{state}");
-        let speed = world.report(drive.node().id().raw()).unwrap().velocity_rpm;
+        // The mean of two cycles: a joint that interpolates is not as fast at each of their ends.
+        let mut sum = 0.0;
+        for _ in 0..80 {
+            sum += world.report(drive.node().id().raw()).unwrap().velocity_rpm;
+            world.run_for(2 * PERIOD / 80);
+        }
+        let speed = sum / 80.0;
         assert!((speed - 50.0).abs() < 3.0, "{drive:?}: {speed} r/min of the shaft");
         match mode {
             ModeOfOperation::PROFILE_VELOCITY => assert!((state.velocity.unwrap().0 - 4.0).abs() < 0.3, "{state}"),
             _ => assert!((state.position.unwrap().0 - 2.0 * 4.0 / 60.0).abs() < 0.01, "{state}"),
         }
         // Without SYNC the drives are stopped before the next one is moved.
+        network.sync(None);
         let _ = block_on(&mut world, drive.quick_stop()).unwrap();
     }
 }

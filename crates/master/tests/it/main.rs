@@ -22,6 +22,7 @@ mod plan;
 mod process_data;
 mod random;
 mod sdo;
+mod stopping;
 mod supervise;
 mod support;
 mod three_drives;

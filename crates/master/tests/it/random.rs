@@ -54,13 +54,17 @@ impl Random {
         }
     }
 
+    fn allowed(&mut self) -> Option<Duration> {
+        (self.below(2) == 0).then(|| Duration::from_micros(self.below(20_000).into()))
+    }
+
     fn command(&mut self, core: &mut Core) -> Command {
         let ticket = core.ticket();
         let node = self.node();
         match self.below(11) {
             10 => Command::FollowSync((self.below(2) == 0).then(|| Duration::from_micros(self.below(10_000).into()))),
-            8 => Command::Heartbeat(node, Some(Duration::from_micros(self.below(10_000).into()))),
-            9 => Command::KeepFed(node, Some(Duration::from_micros(self.below(10_000).into()))),
+            8 => Command::Heartbeat(node, Some(Duration::from_micros(self.below(10_000).into())), self.allowed()),
+            9 => Command::KeepFed(node, Some(Duration::from_micros(self.below(10_000).into())), self.allowed()),
             0 => Command::Timer(ticket, Duration::from_micros(self.below(5_000).into())),
             1 => Command::Nmt(NmtTarget::All, NmtCommand::Start),
             2 => Command::Sync((self.below(2) == 0).then(|| Duration::from_micros(self.below(10_000).into()))),

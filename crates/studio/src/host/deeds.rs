@@ -2,7 +2,7 @@
 
 use can::Instant;
 use canopen::NodeId;
-use master::drive::{HomingOptions, SwitchedOff};
+use master::drive::{HomingOptions, Stopped, SwitchedOff};
 use master::explain::{Finding, Overheard, Weight};
 use master::units::{Amperes, Angle, Ramp, Rpm};
 use master::{Drive, Error, MotionOptions};
@@ -240,7 +240,7 @@ impl Host {
             Done::Deed(node, generation, outcome) => self.conclude(node, generation, outcome),
             Done::Group(generation, outcome) => self.conclude_group(generation, outcome),
             Done::Told(told) => {
-                for (node, outcome) in told {
+                for Stopped { node, outcome, .. } in told {
                     if let Err(error) = outcome {
                         self.say_news(Some(node), &format!("it may still be moving: {error}"));
                     }

@@ -7,6 +7,7 @@ use canopen::NodeId;
 use futures_util::future::{AbortHandle, LocalBoxFuture, abortable};
 use futures_util::stream::FuturesUnordered;
 use master::Error;
+use master::drive::Stopped;
 use master::explain::{Explained, Overheard};
 use master::identify::Found;
 use master::plan::NodeTraffic;
@@ -35,8 +36,8 @@ pub(super) enum Done {
     Deed(NodeId, u64, Option<Result<Vec<String>, Error>>),
     /// A motion of several drives has ended; `None` if it was cut short.
     Group(u64, Option<GroupOutcome>),
-    /// What was moved has been told to stop.
-    Told(Vec<(NodeId, Result<(), Error>)>),
+    /// What was moved has stopped, or was not seen to.
+    Told(Vec<Stopped>),
     /// The PDO mappings of a node were read; `None` if it did not answer.
     Learned(NodeId, Option<Box<NodeTraffic>>),
     /// They were read for a page.

@@ -20,6 +20,7 @@ use crossterm::event::{
     PushKeyboardEnhancementFlags,
 };
 use crossterm::{execute, terminal};
+use master::drive::Stopped;
 use ratatui::DefaultTerminal;
 use serde_json::Value;
 use studio::{Host, Seat, Shown};
@@ -80,11 +81,11 @@ impl Top {
 
 /// Stops what was moved from here, before the bus is left.
 async fn stop(context: &Context) -> Result<(), Failure> {
-    for (node, stopped) in context.network.stop_all_moved().await {
-        stopped.map_err(|error| Failure::from(error).because(format!("node {node} was moving, and may still be")))?;
-    }
-    context.network.release_guards().await?;
-    Ok(())
+    let stopped = context.network.stop_and_release().await;
+    stopped.into_iter().try_for_each(|Stopped { node, outcome, .. }| match outcome {
+        Ok(_) => Ok(()),
+        Err(error) => Err(Failure::from(error).because(format!("node {node} was moving, and may still be"))),
+    })
 }
 
 /// The terminal, given back as it was when this is dropped.

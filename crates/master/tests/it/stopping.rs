@@ -1,0 +1,393 @@
+//! The law of stopping: whatever this program has set in motion, by whichever intent, stops when the program ends it, and is
+//! said to stand only when it stands. Every way to move x every model that has it x every way to end.
+//!
+//! What a stop may take is each drive's own ramp: 6085h of the ZL drives in ms from their highest speed (quick start guide
+//! V1.00, chapter 9; user manual V1.03, 5.4), 2000 (r/min)/s and more of the others.
+
+use std::time::Duration;
+
+use can::{Bitrate, Frame, Instant, Station};
+use cia402::ModeOfOperation;
+use devices::{HostWatch, model};
+use master::base::{Base, BaseLimits, Geometry, Twist, WheelSetup};
+use master::cyclic::CyclicOptions;
+use master::drive::{HomingOptions, MotionOptions, StopGuard, SwitchedOff};
+use master::group::{AxisLimits, AxisSetup, Group};
+use master::units::{Amperes, Ramp, Rpm, Turns};
+use master::{Drive, Error, Network};
+use sim::machine::{Order, order};
+
+use sim::{Place, StationId, Stimulus, World, block_on};
+
+use crate::support::node;
+
+/// A program with its master, which may be killed, or frozen for a while.
+#[derive(Clone)]
+struct Process {
+    network: Network,
+    killed: bool,
+    /// Until then nothing of it runs; what comes meanwhile waits.
+    frozen_until: Option<Instant>,
+    mailbox: Vec<Frame>,
+}
+
+impl Station for Process {
+    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
+        if self.killed {
+            return;
+        }
+        match self.frozen_until {
+            Some(until) if now < until => self.mailbox.push(*frame),
+            _ => self.network.handle_frame(frame, now),
+        }
+    }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        if self.killed || self.frozen_until.is_some_and(|until| now < until) {
+            return;
+        }
+        self.frozen_until = None;
+        for frame in self.mailbox.drain(..) {
+            self.network.handle_frame(&frame, now);
+        }
+        self.network.handle_timeout(now);
+    }
+
+    fn poll_transmit(&mut self) -> Option<Frame> {
+        if self.killed || self.frozen_until.is_some() { None } else { self.network.poll_transmit() }
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        if self.killed { None } else { self.frozen_until.or_else(|| self.network.poll_timeout()) }
+    }
+}
+
+/// The nodes of one model, two of them: a group and a base have two axes.
+const NODES: [u8; 2] = [1, 2];
+
+const PERIOD: Duration = Duration::from_millis(10);
+
+struct Bench {
+    world: World,
+    network: Network,
+    process: StationId,
+    drives: [Drive; 2],
+    moving: Vec<u8>,
+}
+
+impl Bench {
+    fn new(name: &str) -> Self {
+        let mut world = World::new(Bitrate::M1, 11);
+        let network = Network::new();
+        let process = Process { network: network.clone(), killed: false, frozen_until: None, mailbox: Vec::new() };
+        let process = world.add_station(process);
+        let description = model(name).unwrap();
+        let drives = NODES.map(|number| {
+            let id = node(number);
+            world.add_drive(number, order(description, &Order::new(description, id, Bitrate::M1)).unwrap()).unwrap();
+            Drive::new(network.node(id), description)
+        });
+        world.run_until(Instant::from_secs(2));
+        Self { world, network, process, drives, moving: Vec::new() }
+    }
+
+    fn run<T>(&mut self, what: impl Future<Output = T>) -> T {
+        block_on(&mut self.world, what).unwrap()
+    }
+
+    fn process(&mut self) -> &mut Process {
+        self.world.station_mut(self.process).unwrap()
+    }
+
+    fn speed(&mut self, number: u8) -> f64 {
+        self.world.report(number).unwrap().velocity_rpm
+    }
+
+    /// The fastest of those that were set in motion, within a cycle: a joint that interpolates may rest between two points.
+    fn fastest(&mut self) -> f64 {
+        let mut most = 0.0_f64;
+        for _ in 0..10 {
+            for number in self.moving.clone() {
+                most = most.max(self.speed(number).abs());
+            }
+            self.world.run_for(PERIOD / 10);
+        }
+        most
+    }
+
+    /// How long until all have stood for a tenth of a second, from now on; `None` if they turn on.
+    fn time_to_standstill(&mut self, limit: Duration) -> Option<Duration> {
+        let began = self.world.now();
+        let mut stood_since = None;
+        while self.world.now() - began < limit {
+            let stands = self.fastest() < 1.0;
+            stood_since = stands.then(|| stood_since.unwrap_or(self.world.now()));
+            if let Some(since) = stood_since.filter(|since| self.world.now() - *since >= Duration::from_millis(100)) {
+                return Some(since - began);
+            }
+        }
+        None
+    }
+}
+
+fn options() -> MotionOptions {
+    let ramp = Some(Ramp::Time(Duration::from_millis(300)));
+    MotionOptions {
+        speed: Some(Rpm(60.0)),
+        acceleration: ramp,
+        deceleration: ramp,
+        wait: false,
+        ..MotionOptions::default()
+    }
+}
+
+/// A way to set drives in motion. What it holds on to keeps them moving.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Motion {
+    Velocity,
+    Move,
+    Torque,
+    Home,
+    GroupMove,
+    Base,
+}
+
+const MOTIONS: [Motion; 6] =
+    [Motion::Velocity, Motion::Move, Motion::Torque, Motion::Home, Motion::GroupMove, Motion::Base];
+
+enum Moving {
+    Alone,
+    Group(Group),
+    Base(Box<Base>),
+}
+
+impl Bench {
+    /// Sets it in motion, and lets it turn for a second. `None` where the model has no such motion.
+    fn set_in_motion(&mut self, motion: Motion) -> Option<Moving> {
+        let [drive, _] = self.drives.clone();
+        self.moving = vec![NODES[0]];
+        let moved = match motion {
+            Motion::Velocity => self.run(drive.velocity(Rpm(60.0), options())).map(drop),
+            Motion::Move => self.run(drive.move_relative(Turns(100.0), options())).map(drop),
+            Motion::Torque => self.run(drive.torque(Amperes(0.5))).map(drop),
+            Motion::Home => self.start_homing(&drive),
+            Motion::GroupMove => return Some(Moving::Group(self.group())),
+            Motion::Base => return self.base().map(|base| Moving::Base(Box::new(base))),
+        };
+        match moved {
+            Err(Error::NoSuchMode { .. } | Error::NoSuchQuantity { .. }) => return None,
+            other => other.unwrap(),
+        }
+        self.world.run_for(Duration::from_secs(1));
+        Some(Moving::Alone)
+    }
+
+    fn start_homing(&mut self, drive: &Drive) -> Result<(), Error> {
+        // Looks for a switch that is not there, as long as it is let.
+        let method = drive.axis_description().and_then(|axis| axis.homing).map_or(17, |_| 17);
+        self.run(drive.home(method, HomingOptions { wait: false, speed: Some(Rpm(60.0)), ..HomingOptions::default() }))
+            .map(drop)
+    }
+
+    fn group(&mut self) -> Group {
+        self.moving = NODES.to_vec();
+        let axes = self.drives.clone().map(|drive| {
+            let mode = AxisSetup::best_mode(&drive).unwrap();
+            let limits = AxisLimits {
+                range_turns: None,
+                velocity_turns_s: 1.0,
+                acceleration_turns_s2: 4.0,
+                jerk_turns_s3: 40.0,
+                following_error_turns: 0.5,
+            };
+            AxisSetup { drive, mode, limits }
+        });
+        let mut group = self.run(Group::open(&axes, PERIOD, CyclicOptions::default())).unwrap();
+        self.run(group.enable()).unwrap();
+        let to: Vec<_> = group.points().iter().map(|point| Turns(point.position_turns + 100.0)).collect();
+        group.start_move(&to, None).unwrap();
+        for _ in 0..150 {
+            self.run(group.cycle()).unwrap();
+        }
+        assert_eq!(group.state().cause, None, "{}", self.drives[0].description().unwrap().name);
+        group
+    }
+
+    fn base(&mut self) -> Option<Base> {
+        self.moving = NODES.to_vec();
+        let wheels = self.drives.clone().map(|drive| {
+            let modes = drive.axis_description().unwrap().modes;
+            let mode = [ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY, ModeOfOperation::PROFILE_VELOCITY]
+                .into_iter()
+                .find(|mode| modes.contains(mode));
+            WheelSetup { drive, mode: mode.unwrap(), turns: 1.0 }
+        });
+        let geometry = Geometry { wheel_base_m: 0.4, wheel_radius_m: 0.1 };
+        let limits = BaseLimits {
+            linear_m_s: 0.8,
+            angular_rad_s: 2.0,
+            wheel_m_s: 0.8,
+            wheel_m_s2: 2.0,
+            watchdog: Duration::from_millis(200),
+        };
+        let [left, right] = &wheels;
+        let mut base = self.run(Base::open([left, right], geometry, limits, PERIOD, CyclicOptions::default())).ok()?;
+        self.run(base.enable()).unwrap();
+        for _ in 0..150 {
+            base.command(Twist { linear_m_s: 0.6, angular_rad_s: 0.0 }).unwrap();
+            self.run(base.cycle()).unwrap();
+        }
+        Some(base)
+    }
+}
+
+/// A way for a program to end a motion, or to be ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum End {
+    /// What a command does at a signal, and a network of a program that is closed.
+    StopAll,
+    /// The guard of the library goes out of scope, and the program lives on.
+    StopGuard,
+    /// The program ends everything, and leaves the bus.
+    Close,
+    /// The program no longer steps what moves, and lives on.
+    Forgotten,
+    Killed,
+    Frozen,
+    CableCut,
+}
+
+const ENDS: [End; 7] =
+    [End::StopAll, End::StopGuard, End::Close, End::Forgotten, End::Killed, End::Frozen, End::CableCut];
+
+/// How long a frozen program does not run.
+const FROZEN: Duration = Duration::from_secs(4);
+
+/// What software cannot stop: a model without a watch over its host, whose host no longer talks. A program that was frozen finds
+/// that it is late where it gives set-points in cycles.
+fn is_beyond_software(name: &str, motion: Motion, end: End) -> bool {
+    let in_cycles = matches!(motion, Motion::GroupMove | Motion::Base);
+    let silent = matches!(end, End::Killed | End::CableCut) || end == End::Frozen && !in_cycles;
+    silent && model(name).unwrap().host_watch == HostWatch::None
+}
+
+fn models() -> impl Iterator<Item = &'static str> {
+    ["zlac8030l", "m4230e17b50", "zlim42c", "cia402"].into_iter()
+}
+
+#[test]
+fn whatever_moves_stops_within_its_ramp_however_its_program_ends() {
+    for name in models() {
+        for motion in MOTIONS {
+            for end in ENDS {
+                let mut bench = Bench::new(name);
+                for drive in bench.drives.clone() {
+                    bench.run(drive.guard(SwitchedOff::SwitchOn)).unwrap();
+                }
+                let Some(moving) = bench.set_in_motion(motion) else { continue };
+                let speed = bench.fastest();
+                assert!(speed > 5.0, "{name} {motion:?}: {speed} r/min before its end");
+                bench.end((name, motion, end), moving, speed);
+            }
+        }
+    }
+}
+
+/// The last set-points may still be on their way, may wait in the drive for SYNC, or have been taken.
+#[test]
+fn a_stop_is_not_taken_back_by_set_points_that_were_sent_before_it() {
+    for name in models() {
+        for motion in [Motion::GroupMove, Motion::Base] {
+            for end in [End::StopAll, End::StopGuard] {
+                for after in [0, 1, 5, 9] {
+                    let mut bench = Bench::new(name);
+                    let Some(mut moving) = bench.set_in_motion(motion) else { continue };
+                    let speed = bench.fastest();
+                    for _ in 0..3 {
+                        bench.step(&mut moving);
+                    }
+                    bench.world.run_for(Duration::from_millis(after));
+                    bench.end((name, motion, end), moving, speed);
+                }
+            }
+        }
+    }
+}
+
+impl Bench {
+    /// One cycle of what is moved in cycles.
+    fn step(&mut self, moving: &mut Moving) {
+        match moving {
+            Moving::Alone => {}
+            Moving::Group(group) => drop(self.run(group.cycle()).unwrap()),
+            Moving::Base(base) => {
+                base.command(Twist { linear_m_s: 0.6, angular_rad_s: 0.0 }).unwrap();
+                let _ = self.run(base.cycle()).unwrap();
+            }
+        }
+    }
+
+    fn end(&mut self, (name, motion, end): (&str, Motion, End), moving: Moving, speed: f64) {
+        let what = format!("{name} {motion:?} {end:?}");
+        let network = self.network.clone();
+        let mut kept = None;
+        match end {
+            End::StopAll | End::Close => {
+                let began = self.world.now();
+                let stopped = self.run(network.stop_and_release());
+                assert_eq!(stopped.len(), self.moving.len(), "{what}");
+                for stopped in &stopped {
+                    assert!(stopped.outcome.is_ok(), "{what}: {stopped:?}");
+                }
+                assert!(self.fastest() < 2.0, "{what}: said to stand at {} r/min", self.fastest());
+                assert!(network.moved().is_empty(), "{what}");
+                assert!(self.world.now() - began < Duration::from_secs(2), "{what}");
+                if end == End::Close {
+                    network.fall_silent();
+                }
+                drop(moving);
+            }
+            End::StopGuard => {
+                let guard: StopGuard = network.stop_guard();
+                drop(guard);
+                self.world.refresh();
+                kept = Some(moving);
+            }
+            // A motion that goes on alone is what its program asked for.
+            End::Forgotten if matches!(moving, Moving::Alone) => return,
+            End::Forgotten => drop(moving),
+            End::Killed => self.process().killed = true,
+            End::Frozen => {
+                let until = self.world.now() + FROZEN;
+                self.process().frozen_until = Some(until);
+            }
+            End::CableCut => {
+                for number in self.moving.clone() {
+                    self.world.apply(Place::node(number), &Stimulus::CableCut(true)).unwrap();
+                }
+            }
+        }
+        if is_beyond_software(name, motion, end) {
+            assert_eq!(self.time_to_standstill(Duration::from_secs(8)), None, "{what}: stopped by nothing known");
+            return;
+        }
+        let watch = match end {
+            End::StopAll | End::StopGuard | End::Close => Duration::ZERO,
+            // The patience of the master's own supervision: two cycles, and the one that has begun.
+            End::Forgotten => 4 * PERIOD,
+            End::Frozen if model(name).unwrap().host_watch == HostWatch::None => FROZEN,
+            _ => Duration::from_secs(2),
+        };
+        if watch.is_zero() {
+            self.world.run_for(Duration::from_millis(100));
+            let after = self.fastest();
+            assert!(after < 0.95 * speed || after < 1.0, "{what}: {after} r/min 100 ms later, {speed} before");
+        }
+        let stood = self.time_to_standstill(Duration::from_secs(10));
+        assert!(stood.is_some_and(|time| time <= watch + Duration::from_secs(1)), "{what}: {stood:?}");
+        // And stays so, whatever is still sent.
+        self.world.run_for(Duration::from_secs(6));
+        assert!(self.fastest() < 1.0, "{what}: turns again at {} r/min", self.fastest());
+        drop(kept);
+    }
+}
