@@ -20,6 +20,7 @@ pub(crate) struct GuardArgs {
     /// What a drive has is its model's: it stops when no frame for it comes for a time, or when the heartbeat of this command
     /// (node 127, as a drive's 1016h has it) stays away, or it has nothing and goes on, which is said before it moves. A watch
     /// that is set to 0 on the drive stays so, unless --guard is given: then it has its factory value until this command ends.
+    /// A 1016h that is delivered as 0 is set to node 127 within 2000 ms for this command without being asked.
     #[arg(long, value_name = "on|off", num_args = 0..=1, default_missing_value = "on")]
     guard: Option<OnOff>,
     /// The same as --guard off: a heartbeat is not sent, and a drive that needs one goes on

@@ -60,8 +60,10 @@ pub(super) fn conclude(trigger: &Trigger, facts: &[Fact], style: PowerStyle) -> 
         Fact::FaultCode(code, rows) if *code != 0 => Some((*code, rows.as_slice())),
         _ => None,
     });
-    if let Trigger::Silent(error) = trigger {
-        return silent(error);
+    match trigger {
+        Trigger::Silent(error) => return silent(error),
+        Trigger::HeldUp(time) => return held_up(*time),
+        _ => {}
     }
     // A drive without the state machine has alarms that stop it and leave it enabled.
     let at_fault = matches!(state, Some(PowerState::Fault | PowerState::FaultReactionActive));
@@ -69,14 +71,6 @@ pub(super) fn conclude(trigger: &Trigger, facts: &[Fact], style: PowerStyle) -> 
         return faulted(code, rows);
     }
     match (trigger, state) {
-        (Trigger::HeldUp(time), _) => (
-            format!(
-                "This program did not run for {:.1} s (stopped, or the machine asleep), longer than the drive's watch over its \
-                 host allows: the drive has stopped by itself, and is not set going again",
-                time.as_secs_f64()
-            ),
-            "Look where it stands, then begin the motion anew".to_owned(),
-        ),
         (_, Some(PowerState::Fault | PowerState::FaultReactionActive)) => text(
             "The drive is at fault and gives no fault code",
             "Look at its display or error history, remove the cause, then reset the fault",
@@ -167,6 +161,17 @@ fn by_trigger(trigger: &Trigger, style: PowerStyle) -> (String, String) {
             "Read its state again: it changes while being looked at",
         ),
     }
+}
+
+fn held_up(time: Duration) -> (String, String) {
+    (
+        format!(
+            "This program did not run for {:.1} s (stopped, or the machine asleep), longer than the drive's watch over its host \
+             allows: the drive has stopped by itself, and is not set going again",
+            time.as_secs_f64()
+        ),
+        "Look where it stands, then begin the motion anew".to_owned(),
+    )
 }
 
 fn elsewhere(at: f64, target: f64, unit: &str, by: &Interference) -> (String, String) {

@@ -35,9 +35,11 @@ const BYSTANDER_TIMEOUT: Duration = Duration::from_millis(100);
 /// What is to be done with a watch that is set to 0 on the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SwitchedOff {
-    /// It is somebody's decision, and stays so.
+    /// It is somebody's decision, and stays so; but for a consumer of heartbeats that is delivered switched off, which nobody
+    /// has decided: that is switched on as by the other.
     Leave,
-    /// It is set to its factory value until the guard is released. A drive that stores each write stores these two.
+    /// It is set to its factory value until the guard is released, or to node 127 within 2000 ms where that is off. A drive that
+    /// stores each write stores these two.
     SwitchOn,
 }
 
@@ -86,13 +88,15 @@ impl Drive {
             None => self.read_number(object).await?,
         };
         let mut armed = held.map_or(before, |guard| guard.armed);
-        let switches_on = armed == 0 && switched_off == SwitchedOff::SwitchOn;
-        if switches_on && let DefaultValue::Value(factory) = self.row(object, "guard it")?.default {
-            armed = factory;
-            // A device that is delivered with its watch off, as most are, would be armed with nothing.
-            if factory == 0 && object.index == HEARTBEAT_CONSUMERS {
-                armed = OWN_WATCH;
-            }
+        let factory = match self.row(object, "guard it")?.default {
+            DefaultValue::Value(factory) => factory,
+            _ => 0,
+        };
+        // Nobody has decided against a watch that is delivered switched off, as 1016h mostly is.
+        let delivered_off = factory == 0 && object.index == HEARTBEAT_CONSUMERS;
+        let switches_on = armed == 0 && (delivered_off || switched_off == SwitchedOff::SwitchOn);
+        if switches_on {
+            armed = if delivered_off { OWN_WATCH } else { factory };
         }
         let loss = self.loss(armed);
         let Some(time) = loss.stops_after() else { return Ok(loss) };

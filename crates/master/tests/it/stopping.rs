@@ -19,7 +19,7 @@ use sim::machine::{Order, order};
 
 use sim::{Place, StationId, Stimulus, World, block_on};
 
-use crate::support::node;
+use crate::support::{mux, node};
 
 /// A program with its master, which may be killed, or frozen for a while.
 #[derive(Clone)]
@@ -389,5 +389,127 @@ impl Bench {
         self.world.run_for(Duration::from_secs(6));
         assert!(self.fastest() < 1.0, "{what}: turns again at {} r/min", self.fastest());
         drop(kept);
+    }
+}
+
+/// What comes of `first`, while `second` goes on beside it.
+async fn beside<T>(first: impl Future<Output = T>, second: impl Future<Output = ()>) -> T {
+    type Part<'a, T> = std::pin::Pin<Box<dyn Future<Output = Option<T>> + 'a>>;
+    let first: Part<'_, T> = Box::pin(async { Some(first.await) });
+    let second: Part<'_, T> = Box::pin(async {
+        second.await;
+        None
+    });
+    let ended = master::join_all([first, second]).await.into_iter().flatten().next();
+    ended.expect("the first one has ended")
+}
+
+/// What another master does to a drive that is moved, and the words that say so.
+type Meddling = (&'static str, fn(&Drive) -> Vec<(canopen::Mux, i64, u8)>, &'static str);
+
+/// Halt (bit 8), and another target.
+const HALT: Meddling = ("halt", |_| vec![(mux(0x6040, 0), 0x010F, 2)], "somebody has halted it");
+const TARGET: Meddling = (
+    "another target",
+    |drive| {
+        // A joint follows the target as soon as it is written and bit 4 rises; so do the others with bits 4 and 5.
+        let _ = drive;
+        vec![(mux(0x6040, 0), 0x0F, 2), (mux(0x607A, 0), 0, 4), (mux(0x6040, 0), 0x3F, 2)]
+    },
+    "somebody gave it another target",
+);
+
+#[test]
+fn a_move_that_another_master_stops_is_not_said_to_be_reached() {
+    for name in models() {
+        for (what, frames, says) in [HALT, TARGET] {
+            let mut bench = Bench::new(name);
+            let other = Network::new();
+            bench.world.add_station(other.clone());
+            let [drive, _] = bench.drives.clone();
+            let id = drive.node().id();
+            let meddle = async {
+                bench.network.sleep(Duration::from_secs(2)).await;
+                for (object, value, size) in frames(&drive) {
+                    other.node(id).download(object, &value.to_le_bytes()[..usize::from(size)]).await.unwrap();
+                }
+            };
+            let to = MotionOptions { wait: true, ..options() };
+            let moved = beside(drive.move_absolute(Turns(10.0), to), meddle);
+            let outcome = block_on(&mut bench.world, moved).unwrap();
+            let error = outcome.expect_err(&format!("{name}, {what}"));
+            assert!(error.to_string().contains(says), "{name}, {what}: {error}");
+            assert!(bench.network.moved().contains(id), "{name}, {what}: nobody has seen it stand");
+        }
+    }
+}
+
+#[test]
+fn a_speed_that_another_master_takes_away_is_not_said_to_be_kept() {
+    for name in models() {
+        let mut bench = Bench::new(name);
+        let other = Network::new();
+        bench.world.add_station(other.clone());
+        let [drive, _] = bench.drives.clone();
+        let id = drive.node().id();
+        bench.run(drive.velocity(Rpm(60.0), MotionOptions { wait: true, ..options() })).unwrap();
+        let target = drive.axis_description().unwrap().units.target_velocity.unwrap().object;
+        let began = bench.world.now();
+        let meddle = async {
+            bench.network.sleep(Duration::from_secs(1)).await;
+            other.node(id).write(target, 0_i32).await.unwrap();
+        };
+        let kept = beside(drive.supervise(Duration::from_secs(6)), meddle);
+        let error = block_on(&mut bench.world, kept).unwrap().unwrap_err();
+        assert!(error.to_string().contains("somebody gave it another target"), "{name}: {error}");
+        // Not at the end of the six seconds.
+        assert!(bench.world.now() - began < Duration::from_secs(2), "{name}");
+    }
+}
+
+#[test]
+fn a_program_that_was_frozen_says_so_and_does_not_set_a_drive_going_again() {
+    for name in models().filter(|name| model(name).unwrap().host_watch != HostWatch::None) {
+        let mut bench = Bench::new(name);
+        let [drive, _] = bench.drives.clone();
+        bench.run(drive.guard(SwitchedOff::SwitchOn)).unwrap();
+        bench.run(drive.velocity(Rpm(60.0), MotionOptions { wait: true, ..options() })).unwrap();
+        bench.moving = vec![NODES[0]];
+        let until = bench.world.now() + FROZEN;
+        bench.process().frozen_until = Some(until);
+        let error = bench.run(drive.supervise(Duration::from_secs(10))).unwrap_err();
+        assert!(error.to_string().contains("This program did not run for 4."), "{name}: {error}");
+        assert!(bench.fastest() < 1.0, "{name}");
+        let stopped = bench.run(bench.network.clone().stop_and_release());
+        assert!(stopped.iter().all(|stopped| stopped.outcome.is_ok()), "{name}: {stopped:?}");
+        bench.world.run_for(Duration::from_secs(6));
+        assert!(bench.fastest() < 1.0, "{name}");
+    }
+}
+
+#[test]
+fn a_drive_that_was_not_seen_to_stand_keeps_its_watch_and_is_said_to_move() {
+    for name in models() {
+        let mut bench = Bench::new(name);
+        let [drive, other] = bench.drives.clone();
+        for drive in [&drive, &other] {
+            bench.run(drive.guard(SwitchedOff::SwitchOn)).unwrap();
+            bench.run(drive.velocity(Rpm(60.0), MotionOptions { wait: true, ..options() })).unwrap();
+        }
+        bench.world.apply(Place::node(NODES[0]), &Stimulus::CableCut(true)).unwrap();
+        let began = bench.world.now();
+        let stopped = bench.run(bench.network.clone().stop_and_release());
+        let outcomes: Vec<_> = stopped.iter().map(|stopped| stopped.outcome.is_ok()).collect();
+        assert_eq!(outcomes, [false, true], "{name}: {stopped:?}");
+        // The dead one costs the other no time: its own ramp of 300 ms, and some looks.
+        assert!(bench.world.now() - began < Duration::from_secs(2), "{name}");
+        assert!(bench.network.moved().contains(node(NODES[0])) && !bench.network.moved().contains(node(NODES[1])));
+        // Its cable is mended. What keeps it content has ended, and it has stopped by itself where it has a watch.
+        bench.world.run_for(Duration::from_secs(3));
+        bench.world.apply(Place::node(NODES[0]), &Stimulus::CableCut(false)).unwrap();
+        bench.world.run_for(Duration::from_secs(3));
+        bench.moving = vec![NODES[0]];
+        let has_watch = model(name).unwrap().host_watch != HostWatch::None;
+        assert_eq!(bench.fastest() < 1.0, has_watch, "{name}");
     }
 }
