@@ -118,7 +118,8 @@ impl Drop for Sleep {
     }
 }
 
-/// Nanoseconds of the system's monotonic clock at which this one began.
+/// Nanoseconds since the machine started at which this one began. The time in which a machine sleeps counts (CLOCK_BOOTTIME): a
+/// drive does not sleep with it.
 #[cfg(target_os = "linux")]
 #[derive(Clone, Copy, Debug)]
 struct Face {
@@ -128,20 +129,20 @@ struct Face {
 #[cfg(target_os = "linux")]
 impl Face {
     fn new() -> Self {
-        Self { zero: Self::monotonic() }
+        Self { zero: Self::since_boot() }
     }
 
     fn now(self) -> Instant {
-        Instant::ZERO + (Self::monotonic() - self.zero)
+        Instant::ZERO + (Self::since_boot() - self.zero)
     }
 
-    /// When `at` is, by CLOCK_MONOTONIC.
+    /// When `at` is, by CLOCK_BOOTTIME.
     fn absolute(self, at: Instant) -> Duration {
         self.zero + (at - Instant::ZERO)
     }
 
-    fn monotonic() -> Duration {
-        let now = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
+    fn since_boot() -> Duration {
+        let now = rustix::time::clock_gettime(rustix::time::ClockId::Boottime);
         Duration::new(now.tv_sec.unsigned_abs(), now.tv_nsec.unsigned_abs() as u32)
     }
 }

@@ -12,6 +12,9 @@ const STEP: Duration = Duration::from_millis(1);
 /// How long a world waits between two moves while nobody is there to hear it. What happens in it has its own time all the same.
 const UNHEARD: Duration = Duration::from_millis(20);
 
+/// A world that was not moved for longer does not catch up: the machine slept, or the program was frozen.
+const ASLEEP: Duration = Duration::from_secs(10);
+
 /// Fastest and slowest that can be asked for.
 const SPEEDS: std::ops::RangeInclusive<f64> = 0.001..=100_000.0;
 
@@ -96,6 +99,8 @@ impl Pacer {
 
     /// How far a world at `now` is to come when the clock shows `clock`.
     pub(crate) fn target(&mut self, clock: Instant, now: Instant) -> Instant {
+        // The time in which the machine slept is left out.
+        self.changed |= clock - self.moved > ASLEEP;
         self.moved = clock;
         match self.way {
             Way::Manual(end) => end,
@@ -162,6 +167,16 @@ mod tests {
 
     fn at(ms: u64) -> Instant {
         Instant::from_millis(ms)
+    }
+
+    #[test]
+    fn a_machine_that_slept_does_not_hurry_after() {
+        let mut pacer = Pacer::new(Clock::Real, Speed::Times(1.0));
+        assert_eq!(pacer.target(at(5_000), at(4_900)), at(5_000));
+        // Held up for a moment it does; asleep for an hour it goes on from where it is.
+        assert_eq!(pacer.target(at(9_000), at(5_000)), at(9_000));
+        assert_eq!(pacer.target(at(3_609_000), at(9_000)), at(9_000));
+        assert_eq!(pacer.target(at(3_609_100), at(9_000)), at(9_100));
     }
 
     #[test]

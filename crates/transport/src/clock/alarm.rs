@@ -5,7 +5,7 @@ pub(super) use linux::Alarm;
 #[cfg(not(target_os = "linux"))]
 pub(super) use portable::Alarm;
 
-/// A timer of the kernel (timerfd_create(2)): it takes an absolute time of CLOCK_MONOTONIC, so that what passes between
+/// A timer of the kernel (timerfd_create(2)): it takes an absolute time of CLOCK_BOOTTIME, so that what passes between
 /// computing and setting it makes nothing later, and the kernel's slack of 50 µs for sleeping threads does not hold for it.
 #[cfg(target_os = "linux")]
 mod linux {
@@ -24,7 +24,7 @@ mod linux {
         /// If the process may open no more files.
         #[allow(clippy::expect_used, reason = "as for its thread: without a timer there is no clock")]
         pub(in crate::clock) fn new() -> Self {
-            let timer = TimerFd::new(ClockId::CLOCK_MONOTONIC, TimerFlags::TFD_CLOEXEC);
+            let timer = TimerFd::new(ClockId::CLOCK_BOOTTIME, TimerFlags::TFD_CLOEXEC);
             Self(timer.expect("the process has a file descriptor left for a timer"))
         }
 
