@@ -25,6 +25,7 @@ const LIMITS: BaseLimits = BaseLimits {
     wheel_m_s: 0.6,
     wheel_m_s2: 0.5,
     watchdog: Duration::from_millis(200),
+    lag_m: 0.15,
 };
 
 const PERIOD: Duration = Duration::from_millis(10);

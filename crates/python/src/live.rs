@@ -1,22 +1,18 @@
 //! A master on a real bus: a thread that runs it, and the jobs it is given.
 //!
-//! The thread ends with its handle. Before it does, every drive that this program has set in motion is quick-stopped, and
-//! the guards are released, as the command line does.
+//! The thread ends with its handle. Before it does, what it was asked is given up, every drive that this program has set in
+//! motion is quick-stopped, and the guards of those that stand are released.
 
+use master::Network;
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
-
-use master::Network;
 use tokio::sync::{Notify, mpsc};
-use tokio::task::LocalSet;
+use tokio::task::{JoinSet, LocalSet};
 use transport::{BusNotes, BusSpec, Note, WallClock, run_station};
 
+use crate::master::still_moving;
 use crate::world::Job;
-
-/// How long the last words may take.
-const STOP_PATIENCE: Duration = Duration::from_secs(2);
 
 /// What the bus says that may wait for a program: each kind comes once, only a connection may come and go for ever.
 const MOST_WAITING: usize = 64;
@@ -37,11 +33,13 @@ struct Words {
     waiting: VecDeque<String>,
     /// Why there is no bus any more.
     ended: Option<String>,
+    /// What was not seen to stand when the thread ended.
+    moving: Vec<String>,
 }
 
 impl Said {
     fn of(spec: &BusSpec) -> Self {
-        Self(Mutex::new(Words { notes: BusNotes::of(spec), waiting: VecDeque::new(), ended: None }))
+        Self(Mutex::new(Words { notes: BusNotes::of(spec), waiting: VecDeque::new(), ended: None, moving: Vec::new() }))
     }
 
     fn lock(&self) -> MutexGuard<'_, Words> {
@@ -104,13 +102,14 @@ impl Live {
         self.said.lock().waiting.drain(..).collect()
     }
 
-    /// Stops what moves and ends the thread.
-    pub(crate) fn close(&mut self) {
+    /// Stops what moves and ends the thread; what was not seen to stand, in words.
+    pub(crate) fn close(&mut self) -> Vec<String> {
         self.jobs = None;
         if let Some(thread) = self.thread.take() {
             // A thread that panicked has nothing left to say.
             let _ = thread.join();
         }
+        std::mem::take(&mut self.said.lock().moving)
     }
 }
 
@@ -140,24 +139,41 @@ fn run(spec: &BusSpec, network: Network, incoming: mpsc::UnboundedReceiver<Job>,
         tell(Ok(()));
         let mut station = network.clone();
         let wakeup = Arc::new(Notify::new());
-        let work = work_through(network, incoming, Arc::clone(&wakeup));
+        let work = work_through(network.clone(), incoming, Arc::clone(&wakeup));
         let ended = run_station(&mut bus, &mut station, &clock, &wakeup, work, |_, note| said.note(note));
-        if let Err(error) = ended.await {
-            said.lock().ended = Some(with_causes(&error));
+        match ended.await {
+            Ok(moving) => said.lock().moving = moving,
+            Err(error) => {
+                let lost =
+                    network.moved().iter().map(|node| format!("node {node} may still be moving: the bus is lost"));
+                let mut words = said.lock();
+                (words.moving, words.ended) = (lost.collect(), Some(with_causes(&error)));
+            }
         }
     }));
 }
 
-/// Does the jobs that come, side by side, until nobody can send more; then stops what moves.
-async fn work_through(network: Network, mut incoming: mpsc::UnboundedReceiver<Job>, wakeup: Arc<Notify>) {
+/// Does the jobs that come, side by side, until nobody can send more; then gives them up and stops what moves.
+async fn work_through(
+    network: Network,
+    mut incoming: mpsc::UnboundedReceiver<Job>,
+    wakeup: Arc<Notify>,
+) -> Vec<String> {
     let waking = std::task::Waker::from(Arc::new(Wakes(wakeup)));
     network.on_activity(waking);
-    while let Some(job) = incoming.recv().await {
-        tokio::task::spawn_local(job);
+    let mut running = JoinSet::new();
+    loop {
+        tokio::select! {
+            job = incoming.recv() => match job {
+                Some(job) => drop(running.spawn_local(job)),
+                None => break,
+            },
+            // What has ended needs no place.
+            Some(_) = running.join_next() => {}
+        }
     }
-    // What cannot be reached any more stops by its guard.
-    let _ = tokio::time::timeout(STOP_PATIENCE, network.stop_all_moved()).await;
-    let _ = tokio::time::timeout(STOP_PATIENCE, network.release_guards()).await;
+    running.shutdown().await;
+    still_moving(network.stop_and_release().await)
 }
 
 /// Has the runner look at the master again when a job has asked it for something.

@@ -7,11 +7,12 @@ mod job;
 mod runner;
 mod value;
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use canopen::{Mux, NmtCommand, NodeId};
-use master::drive::{Drive, HomingOptions, MotionOptions, SwitchedOff};
+use master::drive::{Drive, HomingOptions, MotionOptions, Stopped, SwitchedOff};
 use master::units::{Amperes, Angle, Ramp, Rpm};
 use master::{Error, Gear, Network as Core, Node};
 use pyo3::prelude::*;
@@ -32,6 +33,7 @@ use crate::world::World;
 pub(crate) struct Network {
     core: Core,
     runner: Arc<Runner>,
+    closed: AtomicBool,
 }
 
 /// What a drive is asked to do, in plain values.
@@ -98,7 +100,7 @@ impl Network {
         state.world.add_station(core.clone());
         state.jobs.note_master();
         drop(state);
-        Ok(Self { core, runner: Arc::new(Runner::World(shared)) })
+        Ok(Self { core, runner: Arc::new(Runner::World(shared)), closed: AtomicBool::new(false) })
     }
 
     /// A master on a real bus: `socketcand://HOST:PORT/can0`, `slcan:///dev/ttyACM0?bitrate=500k`.
@@ -108,30 +110,36 @@ impl Network {
         let core = Core::new();
         let live = py.detach(|| Live::open(spec, core.clone()));
         let live = live.map_err(|reason| wrong_use(format!("bus {bus}: {reason}")))?;
-        Ok(Self { core, runner: Arc::new(Runner::Live(Mutex::new(Some(live)))) })
+        Ok(Self { core, runner: Arc::new(Runner::Live(Mutex::new(Some(live)))), closed: AtomicBool::new(false) })
     }
 
-    /// Stops what this program has set in motion, and leaves the real bus. A world has to be moved for that by its owner.
-    fn close(&self, py: Python<'_>) {
-        if let Runner::Live(live) = &*self.runner {
-            let open = live.lock().unwrap_or_else(PoisonError::into_inner).take();
-            py.detach(|| drop(open));
+    /// Stops what this program has set in motion, and leaves the real bus; what was not seen to stand, in words.
+    fn close(&self, py: Python<'_>) -> Vec<String> {
+        self.closed.store(true, Ordering::Relaxed);
+        let Runner::Live(live) = &*self.runner else { return Vec::new() };
+        let open = live.lock().unwrap_or_else(PoisonError::into_inner).take();
+        py.detach(|| open.map(|mut live| live.close()).unwrap_or_default())
+    }
+
+    /// The same in a world, whose owner has to move it: everything else that was asked of this network is given up, and the
+    /// network is silent when this has ended.
+    fn close_in_world(&self, py: Python<'_>) -> PyResult<Job> {
+        let core = self.core.clone();
+        if let Runner::World(shared) = &*self.runner {
+            shared.lock(py)?.jobs.cancel_all_of(self.owner());
         }
+        let job = self.begin(py, async move {
+            let moving = still_moving(core.stop_and_release().await);
+            core.fall_silent();
+            Ok(Value::List(moving.into_iter().map(Value::Text).collect()))
+        });
+        self.closed.store(true, Ordering::Relaxed);
+        job
     }
 
     /// What a real bus has said beside frames since the last call, a line each.
     fn take_notes(&self) -> Vec<String> {
         self.runner.with_live(Live::take_notes).unwrap_or_default()
-    }
-
-    /// Quick-stops every drive that this program has set in motion; the result is a list of what did not go well.
-    fn stop_all(&self, py: Python<'_>) -> PyResult<Job> {
-        let core = self.core.clone();
-        self.begin(py, async move {
-            let stopped = core.stop_all_moved().await;
-            let failed = stopped.into_iter().filter_map(|(_, outcome)| outcome.err());
-            Ok(Value::List(failed.map(|error| Value::Text(error.to_string())).collect()))
-        })
     }
 
     /// Lets time pass, in seconds.
@@ -249,7 +257,36 @@ impl Network {
     }
 }
 
+impl Drop for Network {
+    /// A network that nobody holds any more, and that was not closed, stops what it moved all the same.
+    fn drop(&mut self) {
+        if self.closed.load(Ordering::Relaxed) {
+            return;
+        }
+        self.core.quick_stop_moved();
+        if let Runner::World(shared) = &*self.runner {
+            Python::attach(|py| {
+                // Nobody moves a world that is being given up itself.
+                if let Ok(mut state) = shared.lock(py) {
+                    state.world.refresh();
+                }
+            });
+        }
+    }
+}
+
+/// What was not seen to stand, in words.
+pub(crate) fn still_moving(stopped: Vec<Stopped>) -> Vec<String> {
+    let failed = stopped.into_iter().filter_map(|stopped| Some((stopped.node, stopped.outcome.err()?)));
+    failed.map(|(node, error)| format!("node {node} may still be moving: {error}")).collect()
+}
+
 impl Network {
+    /// Tells its jobs from those of other networks in the same world.
+    fn owner(&self) -> usize {
+        Arc::as_ptr(&self.runner) as usize
+    }
+
     fn node(&self, raw: u8) -> PyResult<Node> {
         Ok(self.core.node(node_id(raw)?))
     }
@@ -269,9 +306,12 @@ impl Network {
         py: Python<'_>,
         work: impl Future<Output = Result<Value, Trouble>> + Send + 'static,
     ) -> PyResult<Job> {
+        if self.closed.load(Ordering::Relaxed) {
+            return Err(wrong_use("the network is closed"));
+        }
         let (job, future) = Job::new(work, &self.runner);
         match &*self.runner {
-            Runner::World(shared) => job.set_number(shared.lock(py)?.jobs.begin(future)),
+            Runner::World(shared) => job.set_number(shared.lock(py)?.jobs.begin(self.owner(), future)),
             Runner::Live(live) => {
                 let live = live.lock().unwrap_or_else(PoisonError::into_inner);
                 let open = live.as_ref().ok_or_else(|| wrong_use("the network is closed"))?;

@@ -83,8 +83,8 @@ fn command(core: &mut Core, chunk: &[u8]) -> Option<Command> {
         5 => Command::Timer(ticket, Duration::from_millis(u64::from(byte(3)))),
         6 => Command::Sync((byte(2) != 0).then(|| Duration::from_millis(u64::from(byte(2))))),
         9 => Command::Nmt(NmtTarget::All, NmtCommand::Start),
-        10 => Command::Heartbeat(node, (byte(3) != 0).then_some(time)),
-        11 => Command::KeepFed(node, (byte(3) != 0).then_some(time)),
+        10 => Command::Heartbeat(node, (byte(3) != 0).then_some(time), (byte(4) != 0).then_some(3 * time)),
+        11 => Command::KeepFed(node, (byte(3) != 0).then_some(time), (byte(4) != 0).then_some(3 * time)),
         _ => return None,
     })
 }

@@ -106,6 +106,7 @@ struct Limits {
     wheel_m_s: f64,
     wheel_m_s2: f64,
     dead_man_ms: f64,
+    lag_m: f64,
 }
 
 #[derive(Debug, Serialize)]
@@ -247,7 +248,7 @@ fn lines_of_input() -> Receiver<String> {
 /// A cycle, with where the base is for a person; an error once a wheel has stopped it.
 async fn cycle(context: &Context, base: &mut Base, began: can::Instant) -> Result<BaseState, BaseError> {
     let state = base.cycle().await?;
-    if let Some(cause @ StopCause::Wheel { .. }) = state.cause {
+    if let Some(cause) = state.cause.filter(|cause| cause.wheel().is_some()) {
         // Both wheels come to rest before it is told.
         base.stop().await?;
         return Err(BaseError::Stopped(cause));
@@ -369,7 +370,7 @@ impl BaseDriven {
         wheels: [&WheelSetup; 2],
         guards: [GuardReport; 2],
     ) -> Self {
-        let BaseLimits { linear_m_s, angular_rad_s, wheel_m_s, wheel_m_s2, watchdog } = limits;
+        let BaseLimits { linear_m_s, angular_rad_s, wheel_m_s, wheel_m_s2, watchdog, lag_m } = limits;
         let dead_man_ms = watchdog.as_secs_f64() * 1e3;
         let [left, right] = guards;
         let report = |wheel: &WheelSetup, guard| WheelReport {
@@ -387,7 +388,7 @@ impl BaseDriven {
             dead_man_stops: seen.dead_man_stops,
             bad_lines: seen.bad_lines,
             unseen_cycles: state.unseen_cycles,
-            limits: Limits { linear_m_s, angular_rad_s, wheel_m_s, wheel_m_s2, dead_man_ms },
+            limits: Limits { linear_m_s, angular_rad_s, wheel_m_s, wheel_m_s2, dead_man_ms, lag_m },
             wheels: [report(wheels[0], left), report(wheels[1], right)],
         }
     }
@@ -397,13 +398,14 @@ impl Report for BaseDriven {
     fn text(&self, paint: Paint) -> String {
         let PoseReport { x_m, y_m, heading_deg } = self.pose;
         let head = format!("the base stands after {:.2} s; its drives have no power now", self.time_s);
-        let Limits { linear_m_s, angular_rad_s, wheel_m_s, wheel_m_s2, dead_man_ms } = self.limits;
+        let Limits { linear_m_s, angular_rad_s, wheel_m_s, wheel_m_s2, dead_man_ms, lag_m } = self.limits;
         let [linear, angular, wheel, ramp] = [linear_m_s, angular_rad_s, wheel_m_s, wheel_m_s2].map(Shown);
         let mut lines = vec![
             paint.good(&head),
             format!("  at      x {x_m:.3} m, y {y_m:.3} m, heading {heading_deg:.1} deg, by its wheels"),
             format!(
-                "  limits  {linear} m/s, {angular} rad/s, a wheel {wheel} m/s and {ramp} m/s^2, a twist {} ms",
+                "  limits  {linear} m/s, {angular} rad/s, a wheel {wheel} m/s and {ramp} m/s^2, {} m behind at most, a twist {} ms",
+                Shown(lag_m),
                 Shown(dead_man_ms)
             ),
         ];

@@ -19,6 +19,9 @@ use crate::units::{Rpm, Turns};
 /// How long drives may take to be enabled, and to be without power again.
 const POWER_LIMIT: Duration = Duration::from_secs(5);
 
+/// How long a wheel that is behind stays so, s: its speed is rounded to what its object counts, and that adds up.
+const LAG_MEMORY_S: f64 = 5.0;
+
 /// Cycles after which a drive that is not heard is not waited for.
 const UNHEARD: u64 = 10;
 
@@ -82,6 +85,8 @@ struct Wheel {
     turns: f64,
     /// Where the shaft was when the pose was counted last, in turns.
     counted_turns: Option<f64>,
+    /// How far it is behind the way that it was told, m. What is forgotten of it is what speeds are rounded by.
+    behind_m: f64,
     shows: Option<CyclicState>,
     _claim: Claim,
 }
@@ -147,7 +152,7 @@ impl Base {
             return Err(BaseError::BadTwist { linear_m_s, angular_rad_s });
         }
         match self.state.cause {
-            Some(cause @ StopCause::Wheel { .. }) => return Err(BaseError::Stopped(cause)),
+            Some(cause) if cause.wheel().is_some() => return Err(BaseError::Stopped(cause)),
             _ => self.state.cause = None,
         }
         self.wanted = self.geometry.saturate(twist, &self.limits);
@@ -168,6 +173,10 @@ impl Base {
                 Power::Enabling | Power::On => Demand::Velocity(Rpm(m_s * turns_per_m * wheel.turns * 60.0)),
             };
             wheel.shows = Some(wheel.drive.step(io, demand));
+        }
+        let period_s = self.period.as_secs_f64();
+        for (wheel, m_s) in self.wheels.iter_mut().zip(told) {
+            wheel.behind_m = (wheel.behind_m + m_s * period_s) * (1.0 - period_s / LAG_MEMORY_S);
         }
         self.count();
         self.state.follows = self.wheels.iter().all(|wheel| wheel.shows.is_some_and(|shown| shown.follows));
@@ -216,6 +225,7 @@ impl Base {
             let before = wheel.counted_turns.replace(now).unwrap_or(now);
             *way = (now - before) / wheel.turns * m_per_turn;
         }
+        self.wheels.iter_mut().zip(ways).for_each(|(wheel, way)| wheel.behind_m -= way);
         let [left, right] = ways;
         self.state.pose = self.state.pose.after(Wheels { left, right }, &self.geometry);
     }
@@ -235,6 +245,13 @@ impl Base {
                     return;
                 }
             }
+        }
+        // A wheel that was not seen is behind by what it may have gone meanwhile.
+        let seen = |wheel: &&Wheel| wheel.shows.is_some_and(|shown| shown.position.is_some());
+        let limit_m = self.limits.lag_m;
+        let lagging = self.wheels.iter().filter(seen).find(|wheel| wheel.behind_m.abs() > limit_m);
+        if let Some(wheel) = lagging.filter(|_| self.power == Power::On) {
+            self.state.cause = Some(StopCause::Lag { node: wheel.drive.node(), lag_m: wheel.behind_m, limit_m });
         }
     }
 
@@ -265,6 +282,7 @@ impl Base {
     /// [`cycle`](Self::cycle).
     pub async fn enable(&mut self) -> Result<(), BaseError> {
         (self.state.cause, self.wanted, self.told) = (None, Twist::default(), Wheels::default());
+        self.wheels.iter_mut().for_each(|wheel| wheel.behind_m = 0.0);
         // What an earlier stop has left behind ends without power.
         self.switch_off().await?;
         self.power = Power::Enabling;
@@ -316,7 +334,7 @@ impl Base {
     }
 
     fn lost_wheel(&self) -> Option<StopCause> {
-        self.state.cause.filter(|cause| matches!(cause, StopCause::Wheel { .. }))
+        self.state.cause.filter(|cause| cause.wheel().is_some())
     }
 
     /// Brings the base to rest, takes the wheels' power and ends what was begun: SYNC, and the guards of the drives that were seen
@@ -390,7 +408,7 @@ impl WheelSetup {
             }
             Some(_) if drive.shows_position() && drive.set_point().is_none() => {
                 self.drive.write_ramps_of_a_cycle(period, rpm_of(limits.wheel_m_s2)).await?;
-                Ok(Wheel { drive, turns: self.turns, counted_turns: None, shows: None, _claim: claim })
+                Ok(Wheel { drive, turns: self.turns, counted_turns: None, behind_m: 0.0, shows: None, _claim: claim })
             }
             _ => Err(BaseError::NoWheel { node }),
         }

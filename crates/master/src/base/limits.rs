@@ -23,7 +23,16 @@ pub struct BaseLimits {
     pub wheel_m_s2: f64,
     /// How long a twist counts. Without a new one the base stops.
     pub watchdog: Duration,
+    /// How far a wheel may stay behind the way that it was told, over the ground, before both are stopped, m: it is blocked, or
+    /// its load is too heavy. See [`lag_for`](Self::lag_for).
+    pub lag_m: f64,
 }
+
+/// What a wheel at its highest speed is behind in this time, in s, is a lag that nobody states.
+const LAG_S: f64 = 0.25;
+
+/// The least of such lags, m: at low speeds a wheel may stick before it begins to roll.
+const LEAST_LAG_M: f64 = 0.1;
 
 impl BaseLimits {
     /// That each value is one that a base can have.
@@ -36,6 +45,7 @@ impl BaseLimits {
             ("angular_rad_s", self.angular_rad_s),
             ("wheel_m_s", self.wheel_m_s),
             ("wheel_m_s2", self.wheel_m_s2),
+            ("lag_m", self.lag_m),
             ("watchdog in seconds", self.watchdog.as_secs_f64()),
         ];
         match values.into_iter().find(|(_, value)| !value.is_finite() || *value <= 0.0) {
@@ -44,10 +54,15 @@ impl BaseLimits {
         }
     }
 
+    /// A lag for wheels of this highest speed where nobody states one: several times what velocity loops and a bus take.
+    pub fn lag_for(wheel_m_s: f64) -> f64 {
+        (LAG_S * wheel_m_s).max(LEAST_LAG_M)
+    }
+
     #[cfg(test)]
     pub(super) fn of_test() -> Self {
         let watchdog = Duration::from_millis(500);
-        Self { linear_m_s: 1.0, angular_rad_s: 1.0, wheel_m_s: 1.0, wheel_m_s2: 1.0, watchdog }
+        Self { linear_m_s: 1.0, angular_rad_s: 1.0, wheel_m_s: 1.0, wheel_m_s2: 1.0, watchdog, lag_m: 0.25 }
     }
 }
 

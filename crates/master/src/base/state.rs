@@ -7,7 +7,7 @@ use canopen::NodeId;
 
 use crate::cyclic::Refusal;
 
-/// Why a base was stopped. A drive's cause stays until the base is enabled anew; a watchdog's until the next twist.
+/// Why a base was stopped. A wheel's cause stays until the base is enabled anew; a watchdog's until the next twist.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StopCause {
     /// A drive did not do what it was told: a fault, a loss.
@@ -17,6 +17,15 @@ pub enum StopCause {
         /// What its drive says.
         refusal: Refusal,
     },
+    /// A wheel stays behind the way that it was told.
+    Lag {
+        /// Its node.
+        node: NodeId,
+        /// How far, over the ground, in m; below 0 it is ahead.
+        lag_m: f64,
+        /// How far it may.
+        limit_m: f64,
+    },
     /// No new twist came.
     Watchdog {
         /// For how long the last one counted.
@@ -24,10 +33,25 @@ pub enum StopCause {
     },
 }
 
+impl StopCause {
+    /// The node whose wheel is the cause: such a cause stays until the base is enabled anew.
+    pub const fn wheel(&self) -> Option<NodeId> {
+        match self {
+            Self::Wheel { node, .. } | Self::Lag { node, .. } => Some(*node),
+            Self::Watchdog { .. } => None,
+        }
+    }
+}
+
 impl fmt::Display for StopCause {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Wheel { node, refusal } => write!(f, "the base was stopped by its wheel, node {node}: {refusal}"),
+            Self::Lag { node, lag_m, limit_m } => write!(
+                f,
+                "the base was stopped: its wheel, node {node}, is {lag_m:.2} m behind what it was told, and may be {limit_m:.2} m \
+                 (lag_m). It may be blocked, or its load too heavy"
+            ),
             Self::Watchdog { after } => {
                 write!(f, "the base was stopped: no new twist came for {} ms", after.as_millis())
             }

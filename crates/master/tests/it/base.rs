@@ -25,6 +25,7 @@ const LIMITS: BaseLimits = BaseLimits {
     wheel_m_s: 0.8,
     wheel_m_s2: 0.8,
     watchdog: Duration::from_millis(200),
+    lag_m: 0.2,
 };
 
 struct Bench {
@@ -222,6 +223,32 @@ fn a_wheel_that_is_not_heard_for_a_while_ends_the_motion_with_a_cause() {
     block_on(&mut bench.world, base.enable()).unwrap().unwrap();
     bench.drive(&mut base, 0.4, 0.0, 2.0);
     assert!(bench.truth().1 > 0.38);
+}
+
+/// At 0.4 m/s a blocked wheel is 0.2 m behind after half a second; the drive's own overload takes several (2015h).
+#[test]
+fn a_blocked_wheel_stops_both_before_the_base_has_turned_about_it() {
+    let mut bench = Bench::new();
+    let mut base = bench.open();
+    bench.drive(&mut base, 0.4, 0.0, 2.0);
+    bench.world.apply(Place::node(RIGHT), &Stimulus::RotorLock(true)).unwrap().unwrap();
+    let mut cycles = 0;
+    while base.state().cause.is_none() {
+        base.command(Twist { linear_m_s: 0.4, angular_rad_s: 0.0 }).unwrap();
+        bench.cycle(&mut base);
+        cycles += 1;
+    }
+    let cause = base.state().cause.unwrap();
+    assert!(matches!(cause, StopCause::Lag { node, limit_m: 0.2, .. } if node.raw() == RIGHT), "{cause}");
+    let waited = cycles as f64 * PERIOD.as_secs_f64();
+    assert!((0.35..0.6).contains(&waited), "{waited} s");
+    let stopped = block_on(&mut bench.world, base.stop()).unwrap();
+    assert!(matches!(stopped, Err(BaseError::Stopped(StopCause::Lag { .. }))), "{stopped:?}");
+    for _ in 0..30 {
+        bench.cycle(&mut base);
+    }
+    assert!(bench.world.report(LEFT).unwrap().velocity_rpm.abs() < 1.0);
+    assert!(matches!(base.command(Twist::default()), Err(BaseError::Stopped(_))), "until it is enabled anew");
 }
 
 #[test]

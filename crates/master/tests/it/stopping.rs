@@ -229,6 +229,7 @@ impl Bench {
             wheel_m_s: 0.8,
             wheel_m_s2: 2.0,
             watchdog: Duration::from_millis(200),
+            lag_m: 0.2,
         };
         let [left, right] = &wheels;
         let mut base = self.run(Base::open([left, right], geometry, limits, PERIOD, CyclicOptions::default())).ok()?;

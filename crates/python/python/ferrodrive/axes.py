@@ -65,8 +65,9 @@ class _Open:
         self.network._finish(self._native.stop())
 
     def close(self) -> None:
-        """Comes to rest and takes the drives' power. Does nothing the second time."""
-        self.network._finish(self._native.close())
+        """Comes to rest and takes the drives' power. Does nothing the second time, nor after its network, which has stopped it."""
+        if not self.network.closed:
+            self.network._finish(self._native.close())
 
     def state(self) -> dict[str, Any]:
         """What the last cycle showed."""

@@ -52,15 +52,31 @@ class Network:
     def __exit__(
         self, kind: Optional[type[BaseException]], error: Optional[BaseException], traceback: Optional[TracebackType]
     ) -> None:
-        self.close()
+        try:
+            self.close()
+        except MasterError as moving:
+            if error is None:
+                raise
+            # What went wrong first is what is raised; that a drive may still be moving is said beside it.
+            warnings.warn(str(moving), BusWarning, stacklevel=2)
 
     def close(self) -> None:
-        """Quick-stops what this program has set in motion, and leaves the bus."""
-        if self in _open:
-            _open.discard(self)
-            if self._world is not None:
-                self._finish(self._native.stop_all())
-            self._native.close()
+        """Gives up what is still asked of drives, quick-stops what this program has set in motion, and leaves the bus: nothing is
+        sent after that. :class:`~ferrodrive.MasterError` if a drive was not seen to stand."""
+        if self not in _open:
+            return
+        _open.discard(self)
+        if self._world is None:
+            moving: list[str] = self._native.close()
+        else:
+            moving = self._finish(self._native.close_in_world())
+        if moving:
+            raise MasterError("; ".join(moving))
+
+    @property
+    def closed(self) -> bool:
+        """True once it was closed."""
+        return self not in _open
 
     # Waiting for the master.
 
@@ -159,6 +175,7 @@ class Network:
         turns: tuple[float, float] = (1.0, -1.0),
         mode: str = "pv",
         watchdog: float = 0.3,
+        lag_m: Optional[float] = None,
         period: float = 0.01,
         tolerance: int = 2,
     ) -> Base:
@@ -168,6 +185,8 @@ class Network:
             the ground, ``wheel_m_s2`` how fast that may change
         :param turns: turns of each drive for a turn of its wheel forward; the right one of two hub motors sits the other way round
         :param watchdog: how long a twist counts, in s
+        :param lag_m: how far a wheel may stay behind the way that it was told before both are stopped, over the ground; None is what
+            it goes in 0.25 s at ``wheel_m_s``, and 0.1 m at least
         """
         order = {
             "wheels": ((*left, turns[0]), (*right, turns[1])),
@@ -179,6 +198,7 @@ class Network:
             "wheel_m_s": wheel_m_s,
             "wheel_m_s2": wheel_m_s2,
             "watchdog_s": watchdog,
+            "lag_m": lag_m,
         }
         return Base(self, order, period, tolerance)
 

@@ -4,7 +4,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use master::base::{Base as MasterBase, BaseError, BaseLimits, BaseState, Geometry, StopCause, Twist, WheelSetup};
+use master::base::{Base as MasterBase, BaseError, BaseLimits, BaseState, Geometry, Twist, WheelSetup};
 use master::cyclic::CyclicOptions;
 use master::drive::Drive;
 use master::group::{AxisLimits, AxisSetup, Group as MasterGroup, GroupError, Phase, StreamOptions};
@@ -67,6 +67,8 @@ pub(crate) struct BaseOrder {
     wheel_m_s2: f64,
     #[pyo3(item)]
     watchdog_s: f64,
+    #[pyo3(item)]
+    lag_m: Option<f64>,
 }
 
 /// What is stepped in each cycle.
@@ -156,6 +158,13 @@ impl From<BaseError> for Trouble {
             BaseError::Drive(error) => Self::Drive(error),
             error => Self::Said(error.to_string()),
         }
+    }
+}
+
+/// One that nobody holds any more is stepped no longer, and the master stops its drives.
+impl Drop for Group {
+    fn drop(&mut self) {
+        drop(self.slot.close());
     }
 }
 
@@ -333,6 +342,13 @@ pub(crate) struct Base {
     slot: Slot<MasterBase>,
 }
 
+/// One that nobody holds any more is stepped no longer, and the master stops its drives.
+impl Drop for Base {
+    fn drop(&mut self) {
+        drop(self.slot.close());
+    }
+}
+
 #[pymethods]
 impl Base {
     /// A base on two wheels in a network, still to be opened.
@@ -353,6 +369,7 @@ impl Base {
             wheel_m_s: order.wheel_m_s,
             wheel_m_s2: order.wheel_m_s2,
             watchdog: duration(order.watchdog_s)?,
+            lag_m: order.lag_m.unwrap_or_else(|| BaseLimits::lag_for(order.wheel_m_s)),
         };
         let (period, slot) = (duration(period_s)?, self.slot.clone());
         let options = CyclicOptions { tolerance, ..CyclicOptions::default() };
@@ -444,14 +461,14 @@ async fn next(core: &Core) -> Result<(), Trouble> {
 async fn stand(core: &Core, slot: &Slot<MasterBase>) -> Result<Value, Trouble> {
     loop {
         let state = slot.with(|base| {
-            if !matches!(base.state().cause, Some(StopCause::Wheel { .. })) {
+            if base.state().cause.and_then(|cause| cause.wheel()).is_none() {
                 base.command(Twist::default())?;
             }
             Ok(base.state())
         })?;
         if state.commanded == Twist::default() {
             return match state.cause {
-                Some(cause @ StopCause::Wheel { .. }) => Err(Trouble::Said(cause.to_string())),
+                Some(cause) if cause.wheel().is_some() => Err(Trouble::Said(cause.to_string())),
                 _ => Ok(Value::None),
             };
         }

@@ -23,6 +23,8 @@ pub(crate) struct Jobs {
 
 struct Running {
     number: u64,
+    /// Whose it is.
+    owner: usize,
     job: Job,
     woken: Arc<Woken>,
 }
@@ -33,16 +35,21 @@ impl Jobs {
         self.has_master = true;
     }
 
-    /// Begins a job; returns its number.
-    pub(crate) fn begin(&mut self, job: Job) -> u64 {
+    /// Begins a job of this owner; returns its number.
+    pub(crate) fn begin(&mut self, owner: usize, job: Job) -> u64 {
         self.begun += 1;
-        self.running.push(Running { number: self.begun, job, woken: Arc::new(Woken(AtomicBool::new(true))) });
+        self.running.push(Running { number: self.begun, owner, job, woken: Arc::new(Woken(AtomicBool::new(true))) });
         self.begun
     }
 
     /// Gives a job up: what it asked for is taken back.
     pub(crate) fn cancel(&mut self, number: u64) {
         self.running.retain(|running| running.number != number);
+    }
+
+    /// Gives every job of this owner up.
+    pub(crate) fn cancel_all_of(&mut self, owner: usize) {
+        self.running.retain(|running| running.owner != owner);
     }
 
     /// Polls every job that was woken, until none is; returns the first that has ended.

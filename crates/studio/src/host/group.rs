@@ -13,7 +13,7 @@ use can::Instant;
 use canopen::NodeId;
 use cia402::ModeOfOperation;
 use master::Drive;
-use master::base::{Base, BaseError, BaseLimits, Geometry, StopCause, Twist, WheelSetup};
+use master::base::{Base, BaseError, BaseLimits, Geometry, Twist, WheelSetup};
 use master::cyclic::CyclicOptions;
 use master::group::{AxisLimits, AxisSetup, Group, GroupError, Phase, StreamOptions};
 use master::units::Turns;
@@ -346,6 +346,7 @@ async fn drive_base(drives: Vec<Drive>, asked: BaseJog, wanted: Rc<Cell<Wanted>>
         wheel_m_s2: asked.m_per_s2,
         // Held by the page's dead man; this is for a host that is late.
         watchdog: JOG_SPAN,
+        lag_m: BaseLimits::lag_for(asked.most_m_s),
     };
     let options = CyclicOptions { tolerance: TOLERANCE, ..CyclicOptions::default() };
     let base = Base::open([&wheel(0), &wheel(1)], geometry, limits, PERIOD, options).await;
@@ -370,7 +371,7 @@ async fn follow_twists(base: &mut Base, wanted: &Cell<Wanted>) -> Result<(), Bas
     base.enable().await?;
     while !wanted.get().let_go {
         base.command(wanted.get().twist)?;
-        if let Some(cause @ StopCause::Wheel { .. }) = base.cycle().await?.cause {
+        if let Some(cause) = base.cycle().await?.cause.filter(|cause| cause.wheel().is_some()) {
             // Both wheels come to rest before it is told.
             base.stop().await?;
             return Err(BaseError::Stopped(cause));

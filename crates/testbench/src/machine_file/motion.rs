@@ -39,6 +39,7 @@ const BASE_KEYS: &[&str] = &[
     "wheel_m_s",
     "wheel_m_s2",
     "watchdog",
+    "lag_m",
 ];
 
 /// Axes that move as one: a `[[group]]`.
@@ -161,6 +162,10 @@ fn base(field: &Field<'_>, drives: &[NodeId]) -> Result<BasePlan, Problem> {
         wheel_m_s: number("wheel_m_s")?,
         wheel_m_s2: number("wheel_m_s2")?,
         watchdog: time(&table, "watchdog")?.unwrap_or(WATCHDOG),
+        lag_m: match table.get("lag_m") {
+            Some(field) => field.number(NUMBER)?,
+            None => BaseLimits::lag_for(number("wheel_m_s")?),
+        },
     };
     geometry.check().and_then(|()| limits.check()).map_err(|error| field.problem(error.to_string()))?;
     let wheels = table.need("wheels", WHEELS)?;

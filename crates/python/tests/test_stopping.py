@@ -1,0 +1,119 @@
+"""Whatever a program forgets, or however it ends: what it has set in motion stops, and the bus is silent after it."""
+
+import ferrodrive
+import pytest
+
+#: The tests of the master have them all; these are a servo that holds an RPDO back, and a joint that does not.
+MODELS = ["zlac8030l", "m4230e17b50"]
+
+#: How long a stop may take: 300 ms of the master's watch over its program, and the drives' own ramps.
+SECONDS = 1.5
+
+
+def velocity(network, model):
+    drive = network.drive(1, model)
+    drive.velocity(60, wait=False)
+    return drive
+
+
+def group(network, model):
+    mode = "ip" if model.startswith("m") else "pv"
+    axes = [ferrodrive.Axis(node, model, mode=mode, velocity_rpm=60, acceleration_rpm_s=300) for node in (1, 2)]
+    opened = network.group(axes, period=0.01)
+    # Nobody waits for this.
+    opened.moving = opened._native.move_to([36000, 36000], None)
+    return opened
+
+
+def base(network, model):
+    limits = {"linear_m_s": 0.8, "angular_rad_s": 2, "wheel_m_s": 0.8, "wheel_m_s2": 2}
+    opened = network.base(
+        (1, model), (2, model), wheel_base_m=0.4, wheel_radius_m=0.1, mode="pv", watchdog=5.0, **limits
+    )
+    opened.command(0.5, 0)
+    return opened
+
+
+def fastest(world):
+    """Within 10 ms: a joint that interpolates may rest between two points."""
+    most = 0.0
+    for _ in range(10):
+        most = max(most, *(abs(world[node].velocity_rpm) for node in (1, 2)))
+        world.run_for(0.001)
+    return most
+
+
+def assert_stands(world):
+    """It stands in time, and stays so."""
+    world.run_for(SECONDS)
+    for _ in range(2):
+        world.run_for(0.7)
+        assert fastest(world) < 1.0
+
+
+@pytest.fixture(params=MODELS)
+def model(request):
+    return request.param
+
+
+@pytest.fixture
+def world(model):
+    world = ferrodrive.World(bitrate=1_000_000)
+    for node in (1, 2):
+        world.add(model, node=node)
+    world.run_for(1.5)
+    return world
+
+
+def begin(motion, network, world, model):
+    try:
+        opened = motion(network, model)
+    except ferrodrive.MasterError as error:
+        # A drive that takes no speeds, or does not show where it is, is no wheel.
+        if motion is not base or "cannot be a wheel" not in str(error):
+            raise
+        pytest.skip(f"{model} is no wheel: {error}")
+    network.sleep(0.5)
+    assert fastest(world) > 20.0
+    return opened
+
+
+@pytest.mark.parametrize("motion", [velocity, group, base])
+@pytest.mark.parametrize("error", [None, KeyboardInterrupt])
+def test_a_network_that_is_left_stops_what_it_moved_and_is_silent(world, model, motion, error):
+    opened = None
+    try:
+        with ferrodrive.Network(world) as network:
+            opened = begin(motion, network, world, model)
+            if error is not None:
+                raise error("the program has a fault")
+    except KeyboardInterrupt:
+        pass
+    # It was seen to stand before it was left.
+    assert fastest(world) < 2.0
+    probe = world.add_probe()
+    assert_stands(world)
+    heard = iter(lambda: world.poll(probe), None)
+    # NMT, SYNC, RPDOs and SDO requests are a master's, and the heartbeat of node 127 is this one's.
+    identifiers = {message[0] for _, message in heard}
+    assert not {i for i in identifiers if i in (0, 0x80, 0x77F) or i & 0x780 in (0x200, 0x300, 0x400, 0x500, 0x600)}
+    if motion is not velocity:
+        opened.close()
+    with pytest.raises(RuntimeError, match="the network is closed"):
+        network.drive(1, model).enable()
+
+
+@pytest.mark.parametrize("motion", [group, base])
+def test_a_group_or_base_that_nobody_holds_any_more_stops(world, model, motion):
+    with ferrodrive.Network(world) as network:
+        opened = begin(motion, network, world, model)
+        del opened
+        assert_stands(world)
+
+
+@pytest.mark.parametrize("motion", [velocity, group, base])
+def test_a_network_that_nobody_holds_any_more_stops_what_it_moved(world, model, motion):
+    network = ferrodrive.Network(world)
+    opened = begin(motion, network, world, model)
+    del opened, network
+    assert_stands(world)
