@@ -9,6 +9,7 @@ mod limits;
 mod modes;
 mod services;
 mod stops;
+mod units;
 
 use bench::{Bench, TURN};
 
