@@ -3,14 +3,16 @@
 //! Each [`SetPoints::push`] plans from where the path is to the new set-point, which is reached one period later
 //! ([`Course::Linear`]) or two ([`Course::Cubic`]). [`SetPoints::at`] is the plan: any time after the last set-point.
 //!
-//! A set-point that does not come leaves the path going on as it last went, for as many periods as are forgiven, and then
-//! slowing down to rest. The standard leaves this to makers; going on is what keeps a single lost frame from being a jerk.
+//! A set-point that does not come leaves the path going on as it last went, for as many periods as are forgiven; then it slows
+//! down, and comes back to rest on the last set-point. The standard leaves this to makers; going on is what keeps a single lost
+//! frame from being a jerk, and only the last set-point is where the host has said to be.
 //! Only a path whose last two set-points came in time goes on so: one that is written once, or comes in a bunch, is reached
 //! and held, for what its velocity says is not the host's. A set-point that comes late starts its period when it comes, from
 //! where the path is by then.
 
 use crate::interpolate::{cubic, linear};
 use crate::profile::Point;
+use crate::trapezoid::PositionMove;
 
 /// How the path runs from set-point to set-point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -31,7 +33,7 @@ pub struct Following {
     pub period_s: f64,
     /// Periods without a set-point that the path goes on for.
     pub forgiven: f64,
-    /// How the path then slows down, units/s²; 0 stands at once.
+    /// How the path then slows down and comes back, units/s²; 0 turns round at once.
     pub deceleration: f64,
 }
 
@@ -94,7 +96,7 @@ impl SetPoints {
             return Point { position: end.position + end.velocity * over_s, velocity: end.velocity, acceleration: 0.0 };
         }
         let position = end.position + end.velocity * free_s;
-        slowing_down(Point { position, ..end }, over_s - free_s, following.deceleration)
+        self.coming_back(Point { position, ..end }, over_s - free_s, following.deceleration)
     }
 
     /// The last two set-points came in time, one a period.
@@ -124,6 +126,28 @@ impl SetPoints {
         }
     }
 
+    /// `time_s` after the path, at `from` by then, was given up: on the way to rest on the last set-point.
+    fn coming_back(&self, from: Point, time_s: f64, deceleration: f64) -> Point {
+        let at_rest = Point { position: self.after, ..Point::default() };
+        if from.velocity == 0.0 && from.position == self.after {
+            return at_rest;
+        }
+        let way = PositionMove {
+            distance: self.after - from.position,
+            velocity: from.velocity,
+            max_speed: from.velocity.abs(),
+            acceleration: deceleration,
+            deceleration,
+            ..PositionMove::default()
+        }
+        .plan();
+        if time_s >= way.duration() {
+            return at_rest;
+        }
+        let point = way.at(time_s);
+        Point { position: from.position + point.position, ..point }
+    }
+
     fn within(&self, age_s: f64, following: &Following) -> Point {
         let period_s = following.period_s;
         match following.course {
@@ -135,21 +159,6 @@ impl SetPoints {
     /// Within half a period of when it was to come: jitter of the bus is no lateness.
     fn is_in_time(&self, age_s: f64, following: &Following) -> bool {
         (age_s - following.period_s).abs() <= 0.5 * following.period_s
-    }
-}
-
-/// The point `time_s` after a deceleration from `start` began.
-fn slowing_down(start: Point, time_s: f64, deceleration: f64) -> Point {
-    let Point { position, velocity, .. } = start;
-    let stops_after_s = if deceleration > 0.0 { velocity.abs() / deceleration } else { 0.0 };
-    if time_s >= stops_after_s {
-        return Point { position: position + 0.5 * velocity * stops_after_s, ..Point::default() };
-    }
-    let acceleration = -deceleration.copysign(velocity);
-    Point {
-        position: position + time_s * (velocity + 0.5 * acceleration * time_s),
-        velocity: velocity + acceleration * time_s,
-        acceleration,
     }
 }
 
@@ -213,19 +222,45 @@ mod tests {
     }
 
     #[test]
-    fn beyond_what_is_forgiven_the_path_slows_down_to_rest() {
+    fn beyond_what_is_forgiven_the_path_slows_down_and_comes_back_to_the_last_set_point() {
         let mut path = SetPoints::resting(0.0);
         path.push(0.0, PERIOD_S, &LINEAR);
         path.push(2.0, PERIOD_S, &LINEAR);
         // On at 1000 units/s for two periods to 6, then 1000 / 50000 = 20 ms and 1000^2 / (2 * 50000) = 10 units more.
         let middle = path.at(3.0 * PERIOD_S + 0.010, &LINEAR);
         assert!(close(middle.velocity, 500.0) && close(middle.position, 6.0 + 7.5));
-        for age_s in [3.0 * PERIOD_S + 0.020, 1.0, 1e6] {
-            let end = path.at(age_s, &LINEAR);
-            assert!(close(end.position, 16.0) && end.velocity == 0.0, "{age_s}");
+        let turn = path.at(3.0 * PERIOD_S + 0.020, &LINEAR);
+        assert!(close(turn.position, 16.0) && turn.velocity.abs() < 1e-6);
+        // 14 units back, half of them up and half of them down: sqrt(14 / 50000) each.
+        let back_s = (14.0_f64 / 50_000.0).sqrt();
+        let half_way = path.at(3.0 * PERIOD_S + 0.020 + back_s, &LINEAR);
+        assert!(close(half_way.position, 9.0) && close(half_way.velocity, -50_000.0 * back_s));
+        for age_s in [3.0 * PERIOD_S + 0.020 + 2.0 * back_s + 1e-9, 1.0, 1e6] {
+            assert_eq!(path.at(age_s, &LINEAR), Point { position: 2.0, ..Point::default() }, "{age_s}");
         }
         let strict = Following { forgiven: 0.0, deceleration: 0.0, ..LINEAR };
         assert_eq!(path.at(PERIOD_S * 1.01, &strict), Point { position: 2.0, ..Point::default() });
+    }
+
+    #[test]
+    fn a_stream_that_ends_at_any_speed_comes_to_rest_on_its_last_set_point_without_a_jump() {
+        for following in [LINEAR, CUBIC] {
+            for (period_s, step) in [(1e-3, 7.0), (2e-3, -3.0), (4e-3, 0.01), (10e-3, 500.0), (10e-3, 0.0)] {
+                let following = Following { period_s, ..following };
+                let mut path = SetPoints::resting(0.0);
+                for k in 1..=10 {
+                    path.push(step * f64::from(k), period_s, &following);
+                }
+                let mut before = path.at(0.0, &following).position;
+                let most = 2.0 * (step / period_s).abs() * 1e-4 + 1e-9;
+                for tick in 1..100_000 {
+                    let now = path.at(f64::from(tick) * 1e-4, &following).position;
+                    assert!((now - before).abs() <= most, "{following:?} {step}: {before} {now}");
+                    before = now;
+                }
+                assert_eq!(path.at(10.0, &following), Point { position: 10.0 * step, ..Point::default() });
+            }
+        }
     }
 
     #[test]

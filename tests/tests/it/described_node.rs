@@ -48,7 +48,11 @@ struct Bench {
 impl Bench {
     /// Node 9, switched on and operational.
     fn new() -> Self {
-        let eds = eds::Eds::load(SHEET).expect("it is read").eds;
+        Self::of(SHEET)
+    }
+
+    fn of(sheet: &[u8]) -> Self {
+        let eds = eds::Eds::load(sheet).expect("it is read").eds;
         let model = eds::keep(&eds).expect("it makes a description");
         let mut world = World::new(Bitrate::M1, 1);
         let host = world.add_probe();
@@ -146,4 +150,50 @@ fn heartbeats_come_in_their_time() {
     bench.world.run_for(Duration::from_millis(500));
     let beats = bench.heard();
     assert!(beats.len() == 5 && beats.iter().all(|frame| frame == "709#05"), "{beats:?}");
+}
+
+/// What is refused, as the code of the abort; `None` is taken.
+fn write(bench: &mut Bench, index: u16, sub_index: u8, bytes: u8, value: u32) -> Option<u32> {
+    let command = 0x23 | (4 - bytes) << 2;
+    let (index, value) = (index.to_le_bytes(), value.to_le_bytes());
+    let data: String =
+        [command, index[0], index[1], sub_index].iter().chain(&value).map(|b| format!("{b:02X}")).collect();
+    let answer = bench.send(&format!("609#{data}"));
+    let answer = answer.iter().find(|frame| frame.starts_with("589#")).expect("it answers");
+    let code = u32::from_str_radix(&answer[12..20], 16).unwrap().swap_bytes();
+    answer.starts_with("589#80").then_some(code)
+}
+
+#[test]
+fn what_nothing_acts_on_and_what_contradicts_is_refused_with_the_standards_codes() {
+    let services = b"[1006]\nParameterName=Cycle\nDataType=7\nAccessType=rw\nDefaultValue=0\n\
+[1007]\nParameterName=Window\nDataType=7\nAccessType=rw\nDefaultValue=0\n\
+[1012]\nParameterName=TIME\nDataType=7\nAccessType=rw\nDefaultValue=0x100\n\
+[1016]\nParameterName=Consumers\nObjectType=8\nSubNumber=4\n[1016sub0]\nParameterName=n\nDataType=5\nAccessType=ro\nDefaultValue=3\n\
+[1016sub1]\nParameterName=1\nDataType=7\nAccessType=rw\n[1016sub2]\nParameterName=2\nDataType=7\nAccessType=rw\n\
+[1016sub3]\nParameterName=3\nDataType=7\nAccessType=rw\n\
+[1019]\nParameterName=Counter\nDataType=5\nAccessType=rw\nDefaultValue=0\n";
+    let mut bench = Bench::of(&[SHEET, services].concat());
+    let mut refused = |index, sub_index, bytes, value| write(&mut bench, index, sub_index, bytes, value);
+    // CiA 301, 7.5.2.19: no two times for one node; a time of 0 watches nobody.
+    assert_eq!(refused(0x1016, 1, 4, 0x0005_03E8), None);
+    assert_eq!(refused(0x1016, 2, 4, 0x0005_01F4), Some(0x0604_0043));
+    assert_eq!(refused(0x1016, 2, 4, 0x0005_0000), None);
+    assert_eq!(refused(0x1016, 1, 4, 0x0005_07D0), None, "its own entry may change");
+    assert_eq!(refused(0x1016, 3, 4, 0x0006_01F4), None);
+    assert_eq!(refused(0x1016, 1, 4, 0), None);
+    assert_eq!(refused(0x1016, 2, 4, 0x0005_01F4), None, "it is watched by nobody else any more");
+    // There is no window of synchronous PDOs and no clock.
+    assert_eq!(refused(0x1007, 0, 4, 500), Some(0x0609_0030));
+    assert_eq!(refused(0x1007, 0, 4, 0), None);
+    assert_eq!(refused(0x1012, 0, 4, 0x8000_0100), Some(0x0609_0030));
+    assert_eq!(refused(0x1012, 0, 4, 0x4000_0100), Some(0x0609_0030));
+    assert_eq!(refused(0x1012, 0, 4, 0x100), None);
+    // CiA 301, 7.5.2.22: 0 or 2 to 240, while 1006h is 0.
+    for (value, code) in [(1, Some(0x0609_0030)), (241, Some(0x0609_0030)), (2, None), (240, None)] {
+        assert_eq!(refused(0x1019, 0, 1, value), code, "{value}");
+    }
+    assert_eq!(refused(0x1006, 0, 4, 1000), None);
+    assert_eq!(refused(0x1019, 0, 1, 4), Some(0x0800_0022));
+    assert_eq!(refused(0x1019, 0, 1, 240), None, "as it is");
 }

@@ -14,6 +14,10 @@ use super::{Memory, SERIAL_NUMBER, error_behaviour};
 use crate::engine::device::{Application, Device, Reset};
 use crate::engine::storage::StoredImage;
 
+/// How often a device looks whether what its TPDOs carry has changed: without an inhibit time a TPDO comes no more often.
+/// Assumed: drives and couplers of makers do it once in 1 to 10 ms.
+const COMMUNICATION_PERIOD_NS: u64 = 1_000_000;
+
 /// Device and services over one dictionary.
 #[derive(Clone)]
 pub struct DescribedDevice<S: Storage> {
@@ -51,12 +55,11 @@ impl<S: Storage> DescribedDevice<S> {
         node_id: NodeId,
         bitrate: can::Bitrate,
         memory: Memory<S>,
-        task_period_ns: u64,
         variant: Variant,
         has_lss: bool,
     ) -> Self {
         Self {
-            device: Device::new(profile, bitrate, StoredImage::BLANK, task_period_ns, variant),
+            device: Device::new(profile, bitrate, StoredImage::BLANK, COMMUNICATION_PERIOD_NS, variant),
             services: Services::new(memory),
             lss: None,
             has_lss,

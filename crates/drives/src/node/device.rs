@@ -11,8 +11,6 @@ use super::described::{Described, DescribedDevice, described_station};
 use super::{Memory, services};
 use crate::engine::device::{Application, Device, ResetTimes};
 
-const COMMUNICATION_PERIOD_NS: u64 = 1_000_000;
-
 /// The firmware of a described device that is no drive.
 #[derive(Clone)]
 pub struct DescribedNode<S: Storage> {
@@ -34,8 +32,7 @@ impl<S: Storage> DescribedNode<S> {
     ) -> Self {
         let variant = Variant::first_of(description.variations);
         let memory = Memory::empty(description.dictionary);
-        let base =
-            DescribedDevice::new(profile, node_id, bitrate, memory, COMMUNICATION_PERIOD_NS, variant, description.lss);
+        let base = DescribedDevice::new(profile, node_id, bitrate, memory, variant, description.lss);
         Self { description, base }
     }
 

@@ -1,6 +1,6 @@
 //! The drive: axes, communication and protection joined over the dictionary.
 //!
-//! Three rhythms: frames as they come (`handle_frame`), the communication task every 0.5 ms (`handle_timeout`), and the
+//! Three rhythms: frames as they come (`handle_frame`), the communication task every 1 ms (`handle_timeout`), and the
 //! control period of 50 us ([`Firmware::tick`]), of which every tenth is a supervision period.
 
 mod connection;
@@ -24,8 +24,6 @@ use crate::engine::device::ResetTimes;
 use crate::engine::faults::FaultSet;
 use crate::node::described::DescribedDevice;
 use crate::{Firmware, Report};
-
-const COMMUNICATION_PERIOD_NS: u64 = 500_000;
 
 /// The firmware of a described servo.
 #[derive(Clone)]
@@ -56,15 +54,7 @@ impl<S: Storage> ServoDrive<S> {
         let Hardware { node_id, bitrate, motors, memory } = hardware.clone();
         let mut drive = Self {
             description,
-            base: DescribedDevice::new(
-                profile,
-                node_id,
-                bitrate,
-                memory,
-                COMMUNICATION_PERIOD_NS,
-                variant,
-                description.lss,
-            ),
+            base: DescribedDevice::new(profile, node_id, bitrate, memory, variant, description.lss),
             shafts: [const { None }; MAX_AXES],
             motors,
             faults: no_faults(),

@@ -31,6 +31,9 @@ const VELOCITY_WINDOW_SHARE: f64 = 0.005;
 const STANDSTILL_SHARE: f64 = 0.001;
 const TORQUE_WINDOW_SHARE: f32 = 0.05;
 
+/// A position that is no limit, increments: finite, so that no product of it with 0 is no number.
+const FAR: f64 = 1e18;
+
 /// Everything that an axis reads of the dictionary besides its targets.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Parameters {
@@ -126,7 +129,7 @@ impl<S: Storage> Reader<'_, S> {
             max_speed,
             rated_torque_nm,
             max_current_a: self.max_current_a(rated_torque_nm),
-            home_offset: self.scales.increments(self.read(slots.home_offset, 0)),
+            home_offset: counter(self.scales.increments(self.read(slots.home_offset, 0))),
             abort_connection: AbortConnectionOption(self.read(slots.abort_connection, 1) as i16),
             fault_reaction: self.fault_reaction(),
         }
@@ -211,15 +214,22 @@ impl<S: Storage> Reader<'_, S> {
         }
     }
 
-    /// 607Dh; the wrong way round it is off, as most makers have it.
+    /// 607Dh in increments, which may be beyond what the counter holds: then nothing reaches the limit. The wrong way round it
+    /// is off, as most makers have it, and so is an end of the type's range, which some write as -7FFFFFFFh.
     fn travel(&self) -> Option<Travel> {
         let (low, high) = (self.slots.min_position?, self.slots.max_position?);
-        let [a, b] = [low, high].map(|slot| self.read(Some(slot), 0));
-        if a >= b || (a == i64::from(i32::MIN) && b == i64::from(i32::MAX)) {
+        let [low, high] = [low, high].map(|slot| self.read(Some(slot), 0));
+        let no_limit = |limit: i64| limit.abs() >= i64::from(i32::MAX);
+        if low >= high || (no_limit(low) && no_limit(high)) {
             return None;
         }
-        let [a, b] = [a, b].map(|limit| f64::from(self.scales.increments(limit)));
-        Travel::new(a.min(b), a.max(b))
+        let turned_over = self.scales.position_direction();
+        let [a, b] = [low, high].map(|limit| match limit {
+            _ if no_limit(limit) => FAR.copysign((limit * turned_over) as f64),
+            _ => self.scales.increments(limit) as f64,
+        });
+        // Units that are finer than increments may leave both ends on one of them: limits all the same.
+        Travel::new(a.min(b), a.max(b).max(a.min(b) + 0.5))
     }
 
     fn bounds(&self, speed: f64) -> Bounds {
@@ -316,4 +326,9 @@ impl<S: Storage> Reader<'_, S> {
     fn read(&self, slot: Option<Slot>, absent: i64) -> i64 {
         read(self.values, slot, absent)
     }
+}
+
+/// A position as the counter has it, which is as wide as the encoder's own: beyond its ends it is held there.
+pub(super) fn counter(increments: i64) -> i32 {
+    increments.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
 }

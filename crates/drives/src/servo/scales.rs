@@ -36,9 +36,9 @@ impl Scales {
         Self { factors, polarity: Polarity(read(values, slots.polarity, 0) as u8) }
     }
 
-    /// A position in increments; positions wrap, as the counter does.
-    pub(super) fn increments(&self, position: i64) -> i32 {
-        self.factors.position.scale(position * self.polarity.position()) as i32
+    /// A position in increments. Units may be coarser than increments: what 32 bits of them say may need more bits.
+    pub(super) fn increments(&self, position: i64) -> i64 {
+        self.factors.position.scale(position * self.polarity.position())
     }
 
     /// A position in user units, held to 32 bits.
@@ -46,9 +46,10 @@ impl Scales {
         saturated(self.factors.position.inverse().scale(i64::from(increments)) * self.polarity.position())
     }
 
-    /// A length in increments, whatever its sign.
+    /// A length in increments, whatever its sign; held to 32 bits, and at least one increment unless it is 0.
     pub(super) fn length(&self, user: u32) -> u32 {
-        u32::try_from(self.factors.position.scale(i64::from(user))).unwrap_or(u32::MAX)
+        let least = u32::from(user != 0);
+        u32::try_from(self.factors.position.scale(i64::from(user))).unwrap_or(u32::MAX).max(least)
     }
 
     /// Increments per second.
@@ -75,6 +76,11 @@ impl Scales {
     /// Increments per second squared.
     pub(super) fn rate(&self, user: i64) -> f64 {
         user as f64 * self.factors.acceleration.as_f64()
+    }
+
+    /// -1 if positions change their sign, else 1.
+    pub(super) const fn position_direction(&self) -> i64 {
+        self.polarity.position()
     }
 
     /// -1 if velocities and torques change their sign, else 1.

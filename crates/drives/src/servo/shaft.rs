@@ -43,6 +43,16 @@ const DISAGREEMENT_TURNS: f32 = 0.2;
 const STANDING_SHARE: f32 = 0.001;
 const SUPERVISION_MS: f64 = (CONTROL_PERIOD_NS * SUPERVISION_DIVIDER as u64) as f64 / 1e6;
 
+/// What a target position of profile position was held back by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum TargetHold {
+    None,
+    /// A software limit: the motion ends there, which counts as the target.
+    Limit,
+    /// The counter cannot tell it: the motion ends short of it, and the target is not reached.
+    Counter,
+}
+
 /// One axis of the drive.
 #[derive(Clone)]
 pub(super) struct Shaft {
@@ -77,6 +87,7 @@ pub(super) struct Shaft {
     following_error: bool,
     /// A limit holds a target back.
     limited: bool,
+    target_hold: TargetHold,
     probes: TouchProbes,
 }
 
@@ -117,6 +128,7 @@ impl Shaft {
             outside: Dwell::default(),
             following_error: false,
             limited: false,
+            target_hold: TargetHold::None,
             probes: TouchProbes::default(),
         }
     }
@@ -353,6 +365,7 @@ impl Shaft {
             outside,
             following_error,
             limited,
+            target_hold,
             probes,
         } = self;
         // The windows go on counting, which changes nothing once their times have passed.
@@ -369,7 +382,7 @@ impl Shaft {
             && *set_points == earlier.set_points
             && (faults, lost, overload) == (&earlier.faults, &earlier.lost, &earlier.overload)
             && (following_error, limited) == (&earlier.following_error, &earlier.limited)
-            && *probes == earlier.probes
+            && (target_hold, probes) == (&earlier.target_hold, &earlier.probes)
     }
 
     /// Operation enabled, with no fault on its way.

@@ -1,5 +1,6 @@
 //! The axes of a file of CiA 402: as the standard has them, without what the file does not have of it.
 
+use super::rows::Row;
 use canopen::Mux;
 use canopen::od::{DefaultValue, Table};
 use cia402::{ModeOfOperation, SupportedModes};
@@ -102,25 +103,13 @@ impl Objects {
         CountsPerTurn::Fixed(INCREMENTS_PER_TURN.unsigned_abs() as u32)
     }
 
-    /// Those that 6502h says; without it, those whose target is there.
+    /// Those that 6502h says; without it, those whose objects are there.
     fn modes(&self) -> Vec<ModeOfOperation> {
-        use ModeOfOperation as Mode;
-        let of_standard = (1..=10).map(Mode).filter(|mode| mode.name().is_some());
+        let of_standard = (1..=10).map(ModeOfOperation).filter(|mode| mode.name().is_some());
         if let Some(said) = self.supported_modes() {
             return of_standard.filter(|mode| said.has(*mode)).collect();
         }
-        let by_object = [
-            (Mode::PROFILE_POSITION, 0x607A, 0),
-            (Mode::PROFILE_VELOCITY, 0x60FF, 0),
-            (Mode::PROFILE_TORQUE, 0x6071, 0),
-            (Mode::HOMING, 0x6098, 0),
-            (Mode::INTERPOLATED_POSITION, 0x60C1, 1),
-        ];
-        by_object
-            .into_iter()
-            .filter(|(_, index, sub_index)| self.has(*index, *sub_index))
-            .map(|(mode, ..)| mode)
-            .collect()
+        by_objects(|index, sub_index| self.has(index, sub_index))
     }
 
     fn supported_modes(&self) -> Option<SupportedModes> {
@@ -129,5 +118,38 @@ impl Objects {
             DefaultValue::Value(bits) => u32::try_from(bits).ok().filter(|bits| *bits != 0).map(SupportedModes),
             _ => None,
         }
+    }
+}
+
+/// The modes whose objects are there; the cyclic ones are given a set-point each period of 60C2h.
+fn by_objects(has: impl Fn(u16, u8) -> bool) -> Vec<ModeOfOperation> {
+    use ModeOfOperation as Mode;
+    let cyclic = has(0x60C2, 1);
+    let of_objects = [
+        (Mode::PROFILE_POSITION, has(0x607A, 0)),
+        (Mode::PROFILE_VELOCITY, has(0x60FF, 0)),
+        (Mode::PROFILE_TORQUE, has(0x6071, 0)),
+        (Mode::HOMING, has(0x6098, 0)),
+        (Mode::INTERPOLATED_POSITION, has(0x60C1, 1)),
+        (Mode::CYCLIC_SYNCHRONOUS_POSITION, cyclic && has(0x607A, 0)),
+        (Mode::CYCLIC_SYNCHRONOUS_VELOCITY, cyclic && has(0x60FF, 0)),
+        (Mode::CYCLIC_SYNCHRONOUS_TORQUE, cyclic && has(0x6071, 0)),
+    ];
+    of_objects.into_iter().filter(|(_, is_there)| *is_there).map(|(mode, _)| mode).collect()
+}
+
+/// A 6502h that says no mode, as many files have it, which leave the value to the device: the modes whose objects are there. It
+/// would say otherwise that the axis has none.
+pub(super) fn say_modes(rows: &mut [Row]) {
+    for number in 0..MOST_AXES {
+        let place = |index: u16, sub_index| Mux::new(index + number * BLOCK, sub_index);
+        let find = |mux: Mux| rows.binary_search_by_key(&mux.key(), |row| row.entry.mux().key()).ok();
+        let Some(at) = find(place(0x6502, 0)) else { continue };
+        if rows[at].entry.default != DefaultValue::Value(0) {
+            continue;
+        }
+        let modes = by_objects(|index, sub_index| find(place(index, sub_index)).is_some());
+        let modes = modes.into_iter().fold(SupportedModes::default(), SupportedModes::with);
+        rows[at].entry.default = DefaultValue::Value(i64::from(modes.0));
     }
 }

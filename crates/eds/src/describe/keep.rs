@@ -12,7 +12,7 @@ use cia402::ErrorCode;
 use devices::faults::Faults;
 use devices::{Description, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules, Timing, servo};
 
-use super::axis::axes;
+use super::axis::{axes, say_modes};
 use super::names;
 use super::rows::{Row, leak, rows};
 use crate::{Eds, write};
@@ -119,7 +119,10 @@ fn describe(eds: &Eds, manual: &str) -> Result<Description, Unkept> {
         rows if rows > MAX_ROWS => return Err(Unkept::TooManyRows { rows, most: MAX_ROWS }),
         _ => {}
     }
-    let table = table(rows(eds))?;
+    let mut rows = rows(eds);
+    say_modes(&mut rows);
+    say_identity(eds, &mut rows);
+    let table = table(rows)?;
     let identity = identity(eds, table);
     let axes: &'static [_] = Box::leak(axes(table, identity.device_type).into_boxed_slice());
     let has = |index, sub_index| table.find(Mux::new(index, sub_index)).is_ok();
@@ -167,7 +170,23 @@ fn table(rows: Vec<Row>) -> Result<&'static Table, Unkept> {
     Ok(Box::leak(Box::new(table)))
 }
 
-/// What 1000h and 1018h answer; what they leave open, `[DeviceInfo]` says.
+/// What `[DeviceInfo]` says of the numbers of 1018h, sub-index 1 first.
+const fn of_device_info(eds: &Eds) -> [Option<u32>; 3] {
+    [eds.device.vendor_number, eds.device.product_number, eds.device.revision_number]
+}
+
+/// What 1018h leaves open `[DeviceInfo]` says: the device answers it.
+fn say_identity(eds: &Eds, rows: &mut [Row]) {
+    for (said, sub_index) in of_device_info(eds).into_iter().zip(1..) {
+        let is_open = eds.variable(0x1018, sub_index).is_some_and(|of| of.default.is_none() && of.value.is_none());
+        let row = rows.iter_mut().find(|row| row.entry.mux() == Mux::new(0x1018, sub_index));
+        if let (true, Some(row), Some(number)) = (is_open, row, said) {
+            row.entry.default = DefaultValue::Value(i64::from(number));
+        }
+    }
+}
+
+/// What 1000h and 1018h answer; of the numbers of 1018h that are not there, what `[DeviceInfo]` says.
 fn identity(eds: &Eds, table: &'static Table) -> Identity {
     let number = |index, sub_index| {
         let row = table.find(Mux::new(index, sub_index)).ok().map(|slot| table.row(slot))?;
@@ -176,12 +195,12 @@ fn identity(eds: &Eds, table: &'static Table) -> Identity {
             _ => None,
         }
     };
-    let or = |said: Option<u32>, device: Option<u32>| said.filter(|value| *value != 0).or(device).unwrap_or(0);
+    let [vendor, product, revision] = of_device_info(eds);
     Identity {
         device_type: number(0x1000, 0).unwrap_or(0),
-        vendor_id: or(number(0x1018, 1), eds.device.vendor_number),
-        product_code: or(number(0x1018, 2), eds.device.product_number),
-        revision_number: or(number(0x1018, 3), eds.device.revision_number),
+        vendor_id: number(0x1018, 1).or(vendor).unwrap_or(0),
+        product_code: number(0x1018, 2).or(product).unwrap_or(0),
+        revision_number: number(0x1018, 3).or(revision).unwrap_or(0),
     }
 }
 

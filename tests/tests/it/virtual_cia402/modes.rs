@@ -216,6 +216,35 @@ fn set_points_that_come_in_bunches_are_caught_up_with() {
     assert!((bench.position() - target).abs() < TURN / 500 && bench.emcy().is_empty(), "{}", bench.position());
 }
 
+#[test]
+fn a_stream_of_positions_that_ends_leaves_the_shaft_on_the_last_one() {
+    for period_ms in [1, 2, 4, 10] {
+        for mode in [8, 7] {
+            let mut bench = Bench::new();
+            map_cyclic_position(&mut bench);
+            bench.set(&[(0x60C2, 1, period_ms)]);
+            bench.enable(mode);
+            bench.control(0x1F);
+            let periods = 200 / period_ms;
+            for period in 1..=periods {
+                let target = 60_000 * period / periods;
+                match mode {
+                    8 => rpdo3(&mut bench, 0x1F, target),
+                    _ => bench.set(&[(0x60C1, 1, target)]),
+                }
+                bench.sync();
+                bench.run_ms(period_ms as u64);
+            }
+            assert!(bench.rpm() > 100.0, "it turns at the end of the stream");
+            bench.run_ms(500);
+            let case = format!("mode {mode}, {period_ms} ms");
+            assert!((bench.position() - 60_000).abs() <= 1, "{case}: {}", bench.position());
+            assert_eq!(bench.read(0x6062, 0), 60_000, "{case}");
+            assert!(bench.rpm().abs() < 0.5 && bench.has(0x1000), "{case}: {:04X}", bench.status());
+        }
+    }
+}
+
 /// Into ip with a buffer of so many places and a period of 20 ms, bit 4 not set yet.
 fn buffered(places: i64, organisation: i64) -> Bench {
     let mut bench = Bench::new();

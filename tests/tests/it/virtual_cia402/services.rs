@@ -5,7 +5,7 @@ use canopen::{AbortCode, Mux};
 use devices::servo::CIA402;
 use sim::VirtualDrive;
 
-use crate::virtual_cia402::bench::Bench;
+use crate::virtual_cia402::bench::{Bench, TURN};
 
 const SAVE: i64 = 0x6576_6173;
 const LOAD: i64 = 0x6461_6F6C;
@@ -128,6 +128,35 @@ fn pdos_are_mapped_as_the_standard_has_them() {
     assert_eq!(bench.read(0x6061, 0), 3, "RPDO2 carries the mode");
     bench.frame("505#060000000200");
     assert_eq!(bench.read(0x60FF, 0), 0x0002_0000, "RPDO4 the target velocity");
+}
+
+#[test]
+fn a_position_that_always_changes_is_sent_once_a_millisecond_without_an_inhibit_time() {
+    let mut bench = Bench::new();
+    // TPDO3 carries statusword and position.
+    bench.set(&[(0x1802, 1, 0xC000_0385), (0x1802, 2, 255), (0x1802, 3, 0), (0x1802, 1, 0x385)]);
+    bench.enable(3);
+    bench.set(&[(0x60FF, 0, 5 * TURN)]);
+    bench.run_ms(200);
+    bench.sent.clear();
+    bench.run_ms(1000);
+    let count = bench.sent.iter().filter(|frame| frame.id().raw() == 0x385).count();
+    assert!((999..=1001).contains(&count), "{count}");
+}
+
+#[test]
+fn each_of_eight_nodes_is_watched_once() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.read(0x1016, 0), 8);
+    for sub in 1..=8 {
+        bench.set(&[(0x1016, sub, i64::from(sub) << 16 | 100)]);
+        let again = bench.write(0x1016, sub % 8 + 1, i64::from(sub) << 16 | 100);
+        assert_eq!(again, Err(AbortCode::PARAMETER_INCOMPATIBLE), "node {sub} in two entries");
+    }
+    // The eighth is missed as the first would be.
+    bench.frame("708#05");
+    bench.run_ms(150);
+    assert_eq!(bench.emcy(), [0x8130]);
 }
 
 #[test]

@@ -34,7 +34,7 @@ const CONTROLWORD: i64 = 0x6040_0010;
 const STATUSWORD: i64 = 0x6041_0010;
 
 #[rustfmt::skip]
-const GENERAL: [Entry; 43] = [
+const GENERAL: [Entry; 49] = [
     // Bits 0 to 15: profile 402; bits 16 to 23: servo drive.
     ro(0x1000, 0, U32, "device_type", "Device type").default(0x0002_0192),
     ro(0x1001, 0, U8, "error_register", "Error register").mappable(),
@@ -64,9 +64,15 @@ const GENERAL: [Entry; 43] = [
     rw(0x1011, 3, U32, "restore_application_default_parameters", "Restore 6000h to 9FFFh: write 'load'").default(1),
     rw(0x1014, 0, U32, "cob_id_emcy", "COB-ID of EMCY").node_id_plus(0x80).saved(),
     rw(0x1015, 0, U16, "inhibit_time_emcy", "Least time between two EMCY messages").unit("100 us").saved(),
-    ro(0x1016, 0, U8, "consumer_heartbeat_time", "Number of nodes that can be watched").default(2),
+    ro(0x1016, 0, U8, "consumer_heartbeat_time", "Number of nodes that can be watched").default(8),
     rw(0x1016, 1, U32, "consumer_heartbeat_time_1", "First node watched, and how long it may be silent").saved(),
     rw(0x1016, 2, U32, "consumer_heartbeat_time_2", "Second node watched, and how long it may be silent").saved(),
+    rw(0x1016, 3, U32, "consumer_heartbeat_time_3", "Third node watched, and how long it may be silent").saved(),
+    rw(0x1016, 4, U32, "consumer_heartbeat_time_4", "Fourth node watched, and how long it may be silent").saved(),
+    rw(0x1016, 5, U32, "consumer_heartbeat_time_5", "Fifth node watched, and how long it may be silent").saved(),
+    rw(0x1016, 6, U32, "consumer_heartbeat_time_6", "Sixth node watched, and how long it may be silent").saved(),
+    rw(0x1016, 7, U32, "consumer_heartbeat_time_7", "Seventh node watched, and how long it may be silent").saved(),
+    rw(0x1016, 8, U32, "consumer_heartbeat_time_8", "Eighth node watched, and how long it may be silent").saved(),
     rw(0x1017, 0, U16, "producer_heartbeat_time", "Time between two heartbeats; 0 is off").unit("ms").saved(),
     ro(0x1018, 0, U8, "identity_object", "Number of entries").default(4),
     // No vendor of CiA: 0 is not given to anybody.

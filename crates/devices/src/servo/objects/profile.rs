@@ -44,8 +44,9 @@ pub(super) static ROWS: [Entry; ROW_COUNT] = [
     rw(0x6068, 0, U16, "position_window_time", "How long it has to be as near").default(10).unit("ms").mappable().saved(),
     ro(0x606B, 0, I32, "velocity_demand_value", "Velocity demand").unit(INC_S).mappable(),
     ro(0x606C, 0, I32, "velocity_actual_value", "Velocity").unit(INC_S).mappable(),
-    // 16 bits cannot hold increments per second of a fine encoder: thousands of them.
-    rw(0x606D, 0, U16, "velocity_window", "How near a target velocity is reached").default(u16::MAX as i64).unit(INC_S).mappable().saved(),
+    // The standard leaves it to makers. A thousandth of the rated speed, 3 r/min: three times the increment that one supervision
+    // period of 0.5 ms may see more or less, and less than what a host that turns anything at all asks for.
+    rw(0x606D, 0, U16, "velocity_window", "How near a target velocity is reached").default(RATED_TURNS_S * TURN / 1000).unit(INC_S).mappable().saved(),
     rw(0x606E, 0, U16, "velocity_window_time", "How long it has to be as near").default(10).unit("ms").mappable().saved(),
     rw(0x606F, 0, U16, "velocity_threshold", "Velocity that counts as standstill").default(TURN / 10).unit(INC_S).mappable().saved(),
     rw(0x6070, 0, U16, "velocity_threshold_time", "How long it has to be as slow").default(10).unit("ms").mappable().saved(),

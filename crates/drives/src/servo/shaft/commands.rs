@@ -4,9 +4,10 @@ use canopen::node::Via;
 use canopen::od::{Dictionary, Slot, Storage};
 use cia402::{AbortConnectionOption, Controlword, FaultReactionOption, ModeOfOperation, PowerCommand};
 
-use super::Shaft;
 use super::cyclic::{MOST_WAITING, Organisation};
+use super::{Shaft, TargetHold};
 use crate::engine::faults::FaultSet;
+use crate::servo::parameters::counter;
 use crate::servo::read;
 use crate::servo::slots::SYNC_PERIOD;
 
@@ -182,19 +183,39 @@ impl Shaft {
     fn command(&mut self, controlword: Controlword, values: &Dictionary<impl Storage>) -> Written {
         self.refresh(values);
         let target = self.parameters.scales.increments(read(values, self.slots.target_position, 0));
-        let relative = controlword.has(Controlword::RELATIVE);
-        let target = self.held_target(target, relative);
-        if self.power.command(controlword, target, &self.parameters.power) {
+        let held = self.held_target(target, controlword);
+        if controlword.rises(self.power.controlword(), Controlword::NEW_SET_POINT) {
+            self.target_hold = held.1;
+        }
+        if self.power.command(controlword, held.0, &self.parameters.power) {
             Written::FaultReset
         } else {
             Written::Command
         }
     }
 
-    /// A target position held to the software limits.
-    fn held_target(&self, target: i32, relative: bool) -> i32 {
-        let Some(travel) = self.parameters.travel else { return target };
-        let from = if relative { f64::from(self.power.axis().target()) } else { 0.0 };
-        (travel.hold(from + f64::from(target)) - from) as i32
+    /// 607Ah as the axis is given it (bit 6: the way), held to the software limits, and to what the counter can tell: to its
+    /// two ends, and to no more than half of its round, for beyond that the short way is the other one. Relative moves turn on
+    /// past the ends.
+    fn held_target(&self, target: i64, controlword: Controlword) -> (i32, TargetHold) {
+        let axis = self.power.axis();
+        let relative = controlword.has(Controlword::RELATIVE);
+        let from = if relative { i64::from(axis.target()) } else { 0 };
+        let wanted = from.saturating_add(target);
+        let within = match self.parameters.travel.map(|travel| travel.hold(wanted as f64)) {
+            Some(held) if held != wanted as f64 => held as i64,
+            _ => wanted,
+        };
+        let at_once = controlword.has(Controlword::CHANGE_SET_IMMEDIATELY);
+        let begins = if at_once { axis.point().position } else { axis.target() };
+        let middle = if relative { begins.wrapping_sub(axis.target()) } else { begins };
+        let [middle, most] = [middle, i32::MAX].map(i64::from);
+        let told = counter(within.saturating_sub(from).clamp(middle - most, middle + most));
+        let hold = match within.saturating_sub(from) {
+            way if i64::from(told) != way => TargetHold::Counter,
+            _ if within != wanted => TargetHold::Limit,
+            _ => TargetHold::None,
+        };
+        (told, hold)
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! A path leads from one to the next within the period 60C2h. When they stay away, the path ends:
 //!
-//! - Positions (ip, csp) go on for [`FORGIVEN_PERIODS`] and slow down to rest: [`motion::set_points`].
+//! - Positions (ip, csp) go on for [`FORGIVEN_PERIODS`], slow down, and come back to the last one: [`motion::set_points`].
 //! - Velocities and torques that came once a period do not: the axis is brought to rest after the same time, and held.
 //! - Those that came by RPDO in another rhythm: after three periods of SYNC, if 1006h says how long one is, else after
 //!   [`PATIENCE_S`](crate::servo::parameters::PATIENCE_S). The standard leaves it to makers; a motor that turns on for

@@ -3,7 +3,7 @@
 use canopen::od::{Dictionary, Storage};
 use cia402::{DigitalInputs, DigitalOutputs, ModeOfOperation, PowerState};
 
-use super::{AxisSensors, Shaft};
+use super::{AxisSensors, Shaft, TargetHold};
 use crate::engine::axis::Demand;
 use crate::engine::cia402::StopCause;
 use crate::servo::statusword::{Facts, statusword};
@@ -76,10 +76,15 @@ impl Shaft {
             _ => self.parameters.velocity_window.1,
         };
         let lasts = self.reached.has_lasted(time_ms);
+        let target_hold = match self.power.mode() {
+            ModeOfOperation::PROFILE_POSITION => self.target_hold,
+            _ => TargetHold::None,
+        };
+        let out_of_reach = target_hold == TargetHold::Counter && self.power.stop_cause().is_none();
         Facts {
             voltage: !matches!(self.power.state(), PowerState::NotReadyToSwitchOn),
-            target_reached: status.target_reached && (halted || !windowed || lasts),
-            limited: self.limited || status.limit_active,
+            target_reached: status.target_reached && !out_of_reach && (halted || !windowed || lasts),
+            limited: self.limited || target_hold != TargetHold::None || status.limit_active,
             acknowledged: status.acknowledged,
             standing: self.standing.has_lasted(self.parameters.velocity_threshold.1),
             following_error: self.following_error,

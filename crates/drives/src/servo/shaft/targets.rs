@@ -5,9 +5,10 @@ use cia402::{Controlword, ModeOfOperation};
 use motion::profile::Point;
 use motion::set_points::{Course, Following};
 
-use super::{SUPERVISION_PERIOD_S, Shaft};
+use super::{SUPERVISION_PERIOD_S, Shaft, TargetHold};
 use crate::engine::axis::{Cyclic, Feedback, TrajectoryPoint};
 use crate::engine::cia402::Targets;
+use crate::servo::parameters::counter;
 use crate::servo::{read, write};
 
 const DT_S: f64 = SUPERVISION_PERIOD_S as f64;
@@ -20,6 +21,7 @@ impl Shaft {
         let mode = self.power.mode();
         let cyclic = match mode {
             _ if !self.is_enabled() => {
+                self.target_hold = TargetHold::None;
                 self.follow_nothing(mode);
                 None
             }
@@ -62,7 +64,7 @@ impl Shaft {
                 let target = self.parameters.scales.increments(read(values, self.slots.interpolation_set_point, 0));
                 if self.set_points.waiting.is_used() {
                     let place = read(values, self.slots.interpolation_buffer_position, 0);
-                    let _ = self.set_points.waiting.put(target, usize::try_from(place).unwrap_or(usize::MAX));
+                    let _ = self.set_points.waiting.put(counter(target), usize::try_from(place).unwrap_or(usize::MAX));
                 } else if self.is_enabled() {
                     self.take_position(target, by_rpdo);
                 }
@@ -74,17 +76,16 @@ impl Shaft {
         }
     }
 
-    fn take_position(&mut self, target: i32, by_rpdo: bool) {
-        let wanted = f64::from(target);
-        let target = self.parameters.travel.map_or(wanted, |travel| travel.hold(wanted));
-        let from = f64::from(self.position());
+    fn take_position(&mut self, target: i64, by_rpdo: bool) {
+        let (wanted, from) = (target as f64, f64::from(self.position()));
+        let target = self.held_position(wanted);
         self.set_points.take(target, from, target != wanted, by_rpdo, &self.parameters.following);
     }
 
     /// In ip with a buffer, once a period: the next one that waits.
     fn take_waiting_set_point(&mut self, values: &mut Dictionary<impl Storage>) {
         if let Some(target) = self.set_points.take_waiting(DT_S, &self.parameters.following) {
-            self.take_position(target, false);
+            self.take_position(i64::from(target), false);
             self.publish_waiting(values);
         }
     }
@@ -106,8 +107,8 @@ impl Shaft {
     fn cyclic_position(&mut self, values: &Dictionary<impl Storage>) -> Option<Cyclic> {
         let point = self.set_points.advance(DT_S, &self.parameters.following)?;
         let offset = self.parameters.scales.increments(read(values, self.slots.position_offset, 0));
-        let at = point.position + f64::from(offset);
-        let held = self.parameters.travel.map_or(at, |travel| travel.hold(at));
+        let at = point.position + offset as f64;
+        let held = self.held_position(at);
         self.limited = held != at || self.set_points.is_held();
         let velocity = match self.velocity_offset(values) {
             0.0 => point.velocity,
@@ -167,6 +168,13 @@ impl Shaft {
     pub(super) fn torque_offset_a(&self, values: &Dictionary<impl Storage>) -> f32 {
         let takes = [ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION, ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY];
         if self.is_enabled() && takes.contains(&self.power.mode()) { self.offset_a(values) } else { 0.0 }
+    }
+
+    /// A set-point held to the software limits, and to what the counter can tell: its ends, and half of its round from here.
+    fn held_position(&self, wanted: f64) -> f64 {
+        let (here, most) = (f64::from(self.position()), f64::from(i32::MAX));
+        let within = self.parameters.travel.map_or(wanted, |travel| travel.hold(wanted));
+        within.clamp(f64::from(i32::MIN), most).clamp(here - most, here + most)
     }
 
     /// A velocity held to the highest speed, and to what can still be stopped before a software limit.
