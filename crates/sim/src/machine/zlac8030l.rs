@@ -288,9 +288,7 @@ impl Assembly for HubWheel {
             Component::Phase => self.motor.lost_phase = broken.then_some(Phase::U),
             Component::Bridge if broken => self.motor.burn_power_stage(),
             Component::Bridge => self.motor.mend_power_stage(),
-            Component::Short => {
-                return Err(Refused::Absent { model: Self::MODEL, what: "short circuit to simulate" });
-            }
+            Component::Short => self.motor.wires_touch = broken,
         }
         Ok(())
     }
