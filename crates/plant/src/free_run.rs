@@ -121,6 +121,9 @@ impl HubMotor {
     /// What the shaft does in the end while the bridge idles and its load stays as it is; see [`FreeRun`]. `None` where that
     /// is not for friction and bridge to decide.
     pub fn free_run(&self, brake_released: bool) -> Option<FreeRun> {
+        if self.wires_touch {
+            return None;
+        }
         let model = &self.model;
         let ratio = self.rig.attachment().gear.map_or(1.0, |gear| gear.ratio);
         let resistance = Resistance {

@@ -19,6 +19,9 @@ use crate::rig::{Rig, RigModel};
 use crate::shaft::{Motion, Pending, Turned};
 use crate::thermal::reading_c;
 
+/// Assumed: two motor wires that touch have 0.05 ohm with their contact and the cable up to it.
+const SHORT_OHM: f64 = 0.05;
+
 /// What never changes about a hub motor and the power stage it is wired to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HubMotorModel {
@@ -105,9 +108,13 @@ pub struct HubMotor {
     pub rig: Rig,
     /// Torque of the motor on its rotor, mean over the last step, cogging included.
     pub torque_nm: f64,
+    /// The wires of U and V touch: the bridge feeds the contact, and no voltage stands between the two in the winding.
+    pub wires_touch: bool,
     power_stage_burnt: bool,
     seized: bool,
     axis: Axis,
+    /// Current from U to V through the contact of two wires, A.
+    short_a: f64,
 }
 
 impl HubMotor {
@@ -123,28 +130,33 @@ impl HubMotor {
             cogging: None,
             rig: Rig::new(&model.rig, model.pmsm.resistance_ohm, source_v, ambient_c),
             torque_nm: 0.0,
+            wires_touch: false,
             power_stage_burnt: false,
             seized: false,
             axis: Axis::at_turns(model.pmsm.electrical_turns(angle)),
+            short_a: 0.0,
         }
     }
 
     /// One step: winding, rotor, bus, encoder, energies, and now and then heat. Meant for 50 µs and less.
     #[inline]
     pub fn step(&mut self, dt_s: f64, actuation: &Actuation) {
-        if self.power_stage_burnt | self.rig.is_joined() || self.rig.supply.bus_v > self.model.clamp.from_v {
+        if self.power_stage_burnt | self.wires_touch | self.rig.is_joined()
+            || self.rig.supply.bus_v > self.model.clamp.from_v
+        {
             self.step_in_trouble(dt_s, actuation);
         } else if self.rests(actuation) {
             self.torque_nm = 0.0;
             self.book(dt_s, &Flows::default(), actuation);
         } else {
-            let flows = self.turn(dt_s, actuation, actuation.inverter.terminals(self.rig.supply.bus_v));
+            let terminals = actuation.inverter.terminals(self.rig.supply.bus_v);
+            let flows = self.turn(dt_s, actuation, terminals, self.lost_phase);
             self.book(dt_s, &flows, actuation);
         }
     }
 
-    /// The same while the bus is so high that its suppressors conduct, or with molten switches, which join the wires whatever
-    /// the drive wants. Apart, so that other steps pay for no more than the question.
+    /// The same while the bus is so high that its suppressors conduct, with two wires that touch, or with molten switches, which
+    /// join the wires whatever the drive wants. Apart, so that other steps pay for no more than the question.
     #[cold]
     #[inline(never)]
     fn step_in_trouble(&mut self, dt_s: f64, actuation: &Actuation) {
@@ -152,25 +164,47 @@ impl HubMotor {
             return self.step_joined(dt_s, actuation);
         }
         let bus_v = self.rig.supply.bus_v;
-        let inverter = if self.power_stage_burnt { Inverter::Shorted } else { actuation.inverter };
-        let mut flows = self.turn(dt_s, actuation, inverter.terminals(bus_v));
-        let clamp_w = self.model.clamp.power_w(bus_v);
-        flows.bus_w += clamp_w;
-        flows.arc_j += clamp_w * dt_s;
+        let (inverter, lost_phase, short_w) = self.in_trouble(actuation.inverter);
+        let mut flows = self.turn(dt_s, actuation, inverter.terminals(bus_v), lost_phase);
+        let beside_w = self.model.clamp.power_w(bus_v) + short_w;
+        flows.bus_w += beside_w;
+        flows.arc_j += beside_w * dt_s;
         self.book(dt_s, &flows, actuation);
+    }
+
+    /// What the winding sees of the power stage when that has melted, or when two wires touch; and the power that their contact
+    /// takes from the bus.
+    ///
+    /// A bridge that drives two wires that touch gives the winding the mean of both; with its switches off the two are joined and
+    /// the third is open, as if it had come off.
+    #[inline]
+    fn in_trouble(&mut self, inverter: Inverter) -> (Inverter, Option<Phase>, f64) {
+        self.short_a = 0.0;
+        match inverter {
+            _ if self.power_stage_burnt => (Inverter::Shorted, self.lost_phase, 0.0),
+            Inverter::Driven([u, v, w]) if self.wires_touch => {
+                let [u, v] = [u, v].map(|duty| if duty > 0.0 { duty.min(1.0) } else { 0.0 });
+                let short_v = (u - v) * self.rig.supply.bus_v;
+                self.short_a = short_v / (SHORT_OHM + 2.0 * self.model.rig.switch_resistance_ohm);
+                let mean = 0.5 * (u + v);
+                (Inverter::Driven([mean, mean, w]), self.lost_phase, short_v * self.short_a)
+            }
+            Inverter::Open if self.wires_touch => (Inverter::Shorted, self.lost_phase.or(Some(Phase::W)), 0.0),
+            inverter => (inverter, self.lost_phase, 0.0),
+        }
     }
 
     /// The same for a shaft that is no plain one. The winding goes by the velocity that is expected in the middle of the step, the
     /// angle by the real one.
     fn step_joined(&mut self, dt_s: f64, actuation: &Actuation) {
-        let model = &self.model;
         let bus_v = self.rig.supply.bus_v;
-        let inverter = if self.power_stage_burnt { Inverter::Shorted } else { actuation.inverter };
+        let (inverter, lost_phase, short_w) = self.in_trouble(actuation.inverter);
+        let model = &self.model;
         let velocity_rad_s = self.rotor.velocity_rad_s + 0.5 * self.rotor.velocity_change_rad_s;
         let half_turn_rad = 0.5 * dt_s * f64::from(model.pmsm.pole_pairs) * velocity_rad_s;
         let input = PmsmInput {
             terminals: inverter.terminals(bus_v),
-            lost_phase: self.lost_phase,
+            lost_phase,
             resistance_ohm: self.rig.path_ohm(&model.rig),
             axis: self.axis.turned_by(Axis::at_small_rad(half_turn_rad)),
             velocity_rad_s,
@@ -178,10 +212,10 @@ impl HubMotor {
         let motor = model.pmsm.step(&mut self.pmsm, dt_s, &input);
         let motor_nm = motor.torque_nm + self.cogging.map_or(0.0, |cogging| cogging.torque_nm(self.rotor.angle));
         let brake_nm = model.brake.torque_nm(actuation.brake_released);
-        let clamp_w = model.clamp.power_w(bus_v);
+        let beside_w = model.clamp.power_w(bus_v) + short_w;
         let mut flows = motor.flows(0.0, 0.0);
-        flows.bus_w += clamp_w;
-        flows.arc_j += clamp_w * dt_s;
+        flows.bus_w += beside_w;
+        flows.arc_j += beside_w * dt_s;
         let pending = Pending { flows, motor_nm, dt_s, bleeder_on: actuation.bleeder_on };
         if self.rig.is_coupled() {
             self.rig.push_directly((&model.rotor, &self.rotor), pending, brake_nm);
@@ -228,13 +262,13 @@ impl HubMotor {
     /// Winding, rotor and encoder.
     // Inlined by force: it has two callers, and the frequent one would not get it.
     #[inline(always)]
-    fn turn(&mut self, dt_s: f64, actuation: &Actuation, terminals: Terminals) -> Flows {
+    fn turn(&mut self, dt_s: f64, actuation: &Actuation, terminals: Terminals, lost_phase: Option<Phase>) -> Flows {
         let model = &self.model;
         let velocity_rad_s = self.rotor.turn(dt_s, &self.rig.load);
         let half_turn = Axis::at_small_rad(0.5 * dt_s * f64::from(model.pmsm.pole_pairs) * velocity_rad_s);
         let input = PmsmInput {
             terminals,
-            lost_phase: self.lost_phase,
+            lost_phase,
             resistance_ohm: self.rig.path_ohm(&model.rig),
             axis: self.axis.turned_by(half_turn),
             velocity_rad_s,
@@ -325,10 +359,15 @@ impl HubMotor {
     #[inline]
     pub fn sense(&self) -> Sensors {
         let electrical = self.model.pmsm.electrical_turns(self.rotor.angle);
+        let mut phase_current_a = self.model.pmsm.phase_current_a(&self.pmsm, self.axis);
+        if self.wires_touch {
+            phase_current_a[0] += self.short_a;
+            phase_current_a[1] -= self.short_a;
+        }
         Sensors {
             encoder_count: self.encoder.count,
             hall: self.model.hall.state(electrical, self.hall_fault),
-            phase_current_a: self.model.pmsm.phase_current_a(&self.pmsm, self.axis),
+            phase_current_a,
             bus_v: self.rig.supply.bus_v,
             winding_c: reading_c(self.rig.winding.temperature_c),
             heat_sink_c: reading_c(self.rig.heat_sink.temperature_c),

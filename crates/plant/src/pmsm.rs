@@ -141,13 +141,15 @@ pub struct PmsmOutput {
     pub bus_w: f64,
     /// Heat in the phases' resistance per ohm of it: the sum of the squares of the three currents.
     pub heat_w_per_ohm: f64,
+    /// Magnetic energy of a wire that came off under current: burnt in the arc.
+    pub arc_j: f64,
 }
 
 impl PmsmOutput {
     /// The step for the energy book, with what its shaft did.
     #[inline]
     pub(crate) fn flows(&self, friction_j: f64, load_j: f64) -> Flows {
-        Flows { bus_w: self.bus_w, heat_w_per_ohm: self.heat_w_per_ohm, arc_j: 0.0, friction_j, load_j }
+        Flows { bus_w: self.bus_w, heat_w_per_ohm: self.heat_w_per_ohm, arc_j: self.arc_j, friction_j, load_j }
     }
 }
 
@@ -260,7 +262,7 @@ impl PmsmModel {
     /// L_n di/dt = v_n - (R + dL_n/dt) i - w psi n_q     L_n = L_d n_d^2 + L_q n_q^2
     /// ```
     ///
-    /// What current the lost phase carried when it came off is gone at once (it burnt in the arc).
+    /// What current the lost phase carried when it came off is gone at once: it burnt in the arc.
     fn step_two_wires(&self, data: &mut PmsmData, dt_s: f64, input: &PmsmInput, phase: Phase) -> PmsmOutput {
         let wires = phase.axis_across();
         let Axis { sin, cos } = input.axis;
@@ -271,6 +273,8 @@ impl PmsmModel {
         let inductance_rate = 2.0 * omega * (self.inductance_d_h - self.inductance_q_h) * n.d * n.q;
         let lag_h = inductance_h + half_s * (input.resistance_ohm + inductance_rate);
         let before = self.current_across(data, n, half_s * omega);
+        let turn = half_s * omega;
+        let arc_j = self.magnetic_energy_j(data) - 0.75 * inductance_h * before * before * (1.0 + turn * turn);
         let free = (inductance_h * before - half_s * omega * self.flux_linkage_wb * n.q) / lag_h;
 
         let (mean, after, bus_w) = match input.terminals {
@@ -291,9 +295,8 @@ impl PmsmModel {
             }
         };
         // The state lives in the rotor's frame, which has turned on by half a step when the step ends.
-        let turn = half_s * omega;
         data.current_a = Dq { d: after * (n.d + turn * n.q), q: after * (n.q - turn * n.d) };
-        self.output(Dq { d: mean * n.d, q: mean * n.q }, bus_w)
+        PmsmOutput { arc_j, ..self.output(Dq { d: mean * n.d, q: mean * n.q }, bus_w) }
     }
 
     /// The current along the fixed axis at the start of a step, when the axis stood `turn` radians further on.
@@ -304,7 +307,12 @@ impl PmsmModel {
 
     #[inline]
     fn output(&self, mean: Dq, bus_w: f64) -> PmsmOutput {
-        PmsmOutput { torque_nm: self.torque_nm(mean), bus_w, heat_w_per_ohm: 1.5 * (mean.d * mean.d + mean.q * mean.q) }
+        PmsmOutput {
+            torque_nm: self.torque_nm(mean),
+            bus_w,
+            heat_w_per_ohm: 1.5 * (mean.d * mean.d + mean.q * mean.q),
+            arc_j: 0.0,
+        }
     }
 }
 

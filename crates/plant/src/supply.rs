@@ -76,6 +76,12 @@ impl SupplyData {
         SupplyData { connected: false, bus_v: 0.0, ..SupplyData::charged(source_v) }
     }
 
+    /// The bleeder's resistor burns out, or a new, cold one is put in.
+    pub fn set_bleeder_burnt(&mut self, burnt: bool) {
+        self.bleeder_burnt = burnt;
+        self.bleeder_load = 0.0;
+    }
+
     /// A supply whose capacitor has been charged.
     pub fn charged(source_v: f64) -> Self {
         SupplyData { source_v, connected: true, bus_v: source_v, bleeder_load: 0.0, bleeder_burnt: false }

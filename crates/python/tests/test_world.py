@@ -272,7 +272,7 @@ STIMULI = {
         lambda it: it.cut_cable(),
         lambda it: it.join_cable(),
         *(lambda it, part=part: it.set_fault(part) for part in ("hall", "encoder", "eeprom", "reference")),
-        *(lambda it, part=part: it.set_fault(part, False) for part in ("phase", "short", "bridge")),
+        *(lambda it, part=part: it.set_fault(part, False) for part in ("phase", "short", "bridge", "bleeder")),
         lambda it: it.set_load_friction(0.2, 0.01, static_nm=0.3, stribeck_rad_s=0.5),
         lambda it: it.set_load_friction(None),
         lambda it: it.set_load_pulley(2, 0.05),

@@ -70,3 +70,16 @@ pub fn input_status_shows_the_levels_whatever_the_polarity_and_the_functions<S: 
     bench.set_input(1, false).run_ms(15).reads(0x2003, ((1 << S::INPUTS) - 1) & !2);
     bench.set_input(0, false).run_ms(15).reads(0x2003, ((1 << S::INPUTS) - 1) & !3);
 }
+
+/// X0 stops (function 9) by a contact that opens: its polarity is reversed (2030h:01) and its level high. A drive that starts reads
+/// it as it is: one that is enabled within its debounce time keeps the speed that it is given then.
+pub fn a_stop_input_that_is_active_low_stops_a_drive_that_has_just_started_only_if_it_is_low<S: ZltechSubject>() {
+    for (level, rpm) in [(true, 100), (false, 0)] {
+        let mut bench = Bench::<S>::new();
+        bench.set((0x2030, 1), 1).set((0x2030, 2), 9).set_input(0, level).run_ms(50).let_store();
+        bench.send("000#8104").send("000#8101");
+        S::let_take_time(&mut bench);
+        bench.enable_in(3).reads(0x2003, i64::from(level)).set(0x60FF, 100);
+        bench.run_ms(2000).goes_at(rpm);
+    }
+}

@@ -78,5 +78,6 @@ ferrodrive_tests::scenarios! {
         an_output_tells_what_its_function_names_in_either_polarity: zlac8030l zlim42c;
         a_drive_without_power_has_its_outputs_off: zlac8030l zlim42c;
         input_status_shows_the_levels_whatever_the_polarity_and_the_functions: zlac8030l zlim42c;
+        a_stop_input_that_is_active_low_stops_a_drive_that_has_just_started_only_if_it_is_low: zlac8030l zlim42c;
     }
 }

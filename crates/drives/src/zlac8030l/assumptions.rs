@@ -41,11 +41,29 @@ pub const LOOSE_WIRE_CURRENT_SHARE: f32 = 0.5;
 /// Least current set-point at which a loose wire can be told, A.
 pub const LOOSE_WIRE_LEAST_A: f32 = 1.0;
 
-/// Above this speed the motor's own voltage can hold the current down, and a loose wire cannot be told, r/min.
+/// Above this speed the motor's own voltage can hold the current down, and missing current says nothing by itself, r/min.
 pub const LOOSE_WIRE_MOST_RPM: f32 = 20.0;
 
 /// How long it must be so: ten electrical time constants of a hub motor (3 ms) and more.
 pub const LOOSE_WIRE_PERIODS: u16 = 200;
+
+/// A wire of a turning motor counts as loose when it carries less than this share of what the largest of the others does. In a
+/// sound motor that is so in a seventh of an electrical turn, in two pieces.
+pub const LOOSE_WIRE_CARRIED_SHARE: f32 = 0.25;
+
+/// Least current of the others, A: a quarter of it is more than a reading of nothing is off by (a step and a half of 29 mA). A
+/// hub motor without a load takes twice as much.
+pub const LOOSE_WIRE_OTHERS_A: f32 = 0.2;
+
+/// How far the motor turns meanwhile, there and back counted, in electrical turns: seven times what a sound one does at a stretch.
+pub const LOOSE_WIRE_TURNS: f32 = 0.5;
+
+/// How far apart the ends of that way are, in electrical turns: twice a stretch in which a sound motor leaves a wire empty. A
+/// heavy load makes a motor with a loose wire swing over more.
+pub const LOOSE_WIRE_SPAN_TURNS: f32 = 0.15;
+
+/// The most that one supervision period counts, in electrical turns: a wire is watched for 10 ms at the least.
+pub const LOOSE_WIRE_MOST_TURNS: f32 = 0.025;
 
 /// 5 ms: a Hall edge that is caught half way reads 0 or 7 for one control period at most.
 pub const SENSOR_DEBOUNCE_PERIODS: u16 = 10;

@@ -1,5 +1,7 @@
 //! Figures that the manual ("ZLIM42-C user manual V1.03") does not give, each with the reason for its value.
 
+use crate::engine::actuator::stepper::AtLimit;
+
 pub use devices::zltech::zlim42c::assumptions::*;
 
 /// Rotor teeth of a motor with 200 full steps: electrical turns in a turn of the shaft.
@@ -62,8 +64,13 @@ pub const PHASE_LOSS_DEBOUNCE_PERIODS: u16 = 20;
 /// of 20 V from 580 r/min on (82 mm, `K = 0.72 N m / 2.2 A`), and where both are equal an unloaded motor takes no current.
 pub const PHASE_COMPARED_RPM: f64 = 300.0;
 
-/// A sound phase carries at least this share of the amplitude: three times what a lost one may seem to carry.
-pub const PHASE_SOUND_SHARE: f32 = 0.15;
+/// The other phase is sound if it carries at least this share of the amplitude: three hundredths of the smallest are 9 mA, and
+/// more than the offset of a current measurement.
+pub const PHASE_SOUND_SHARE: f32 = 0.03;
+
+/// A phase that carries this share of the other one's current is no lost one: the lower of two equal phases has 0.38 of the
+/// higher, at the least, in a supervision period at the speed from which they are compared (an eighth of an electrical turn).
+pub const PHASE_BESIDE_SHARE: f32 = 0.25;
 
 /// Reference of the current measurement, V: the supply of the controller.
 pub const REFERENCE_V: f32 = 3.3;
@@ -93,6 +100,18 @@ pub const CURRENT_KI_V_PER_A_S: f32 = 5.0;
 
 /// Share of the bus voltage that the bridges can give; the rest is dead time.
 pub const MODULATION_LIMIT: f32 = 0.98;
+
+/// What a voltage vector at its limit does against the rotor's swing. A guess, as such drives damp a swing in the middle of
+/// their range of speed: 1 rad/A falls back about as far as the rotor does, since the current along the vector changes by
+/// `psi / L`, 1.6 and 1.2 A for a radian of the two lengths.
+pub const AT_LIMIT: AtLimit = AtLimit {
+    turns_per_a: 1.0 / core::f32::consts::TAU,
+    // Behind 0.8 ms, between a bare rotor's swing (230 Hz at 0.3 N m) and one of ten times its inertia (70 Hz): there the way
+    // back comes a quarter of a swing late, which is what damps. Up to 30 ms: a load that stays turns nothing.
+    passed: [CONTROL_PERIOD_S / 0.8e-3, CONTROL_PERIOD_S / 30e-3],
+    // The integrals' own time is near the swing of a heavy load, which they feed.
+    integral_share: 0.3,
+};
 
 /// Current across the vector that balances the detent, A: four fifths of it arrive in the motor, since the current loop passes
 /// 0.87 and 0.80 of it at 60 r/min (`kp / (kp + R + j w L)` of the two lengths, four periods in an electrical turn), and that is

@@ -56,6 +56,7 @@ impl Parameters {
                     integral_per_s: f32::from(values.get(CURRENT_LOOP_KI)) * CURRENT_KI_V_PER_A_S,
                 },
                 modulation_limit: MODULATION_LIMIT,
+                at_limit: AT_LIMIT,
             },
             currents: currents(values),
         }

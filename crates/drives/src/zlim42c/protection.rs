@@ -32,13 +32,15 @@ impl PhaseWatch {
             return false;
         }
         let carries = |phase: usize, share| peaks.current_a[phase] >= share * amplitude_a;
+        let fast = speed_rpm.abs() > PHASE_COMPARED_RPM;
         let mut lost = false;
         for (phase, empty_for) in self.empty_for.iter_mut().enumerate() {
             // Where the motor's own voltage is near the bus voltage, a sound motor takes hardly any current: in both.
-            let held_down = speed_rpm.abs() > PHASE_COMPARED_RPM && !carries(1 - phase, PHASE_SOUND_SHARE);
+            let beside = fast && peaks.current_a[phase] >= PHASE_BESIDE_SHARE * peaks.current_a[1 - phase];
+            let held_down = fast && !carries(1 - phase, PHASE_SOUND_SHARE);
             if carries(phase, PHASE_CARRIED_SHARE) {
                 *empty_for = 0;
-            } else if peaks.reference_a[phase] > PHASE_ASKED_SHARE * amplitude_a && !held_down {
+            } else if peaks.reference_a[phase] > PHASE_ASKED_SHARE * amplitude_a && !held_down && !beside {
                 *empty_for = empty_for.saturating_add(1);
             }
             lost |= *empty_for >= PHASE_LOSS_DEBOUNCE_PERIODS;

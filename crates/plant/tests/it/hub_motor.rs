@@ -99,6 +99,27 @@ fn energy_closes_when_a_load_drives_the_shorted_motor() {
 }
 
 #[test]
+fn two_wires_that_touch_carry_the_voltage_between_them_over_their_path_and_brake_a_free_motor() {
+    let mut motor = motor();
+    motor.wires_touch = true;
+    motor.step(DT_S, &Actuation { inverter: Inverter::Driven([0.55, 0.45, 0.5]), ..Actuation::default() });
+    // A tenth of 48 V over the contact's 50 milliohm and two switches; the winding sees none of it.
+    let short_a = 4.8 / (0.05 + 2.0 * MODEL.rig.switch_resistance_ohm);
+    let [u, v, w] = motor.sense().phase_current_a;
+    assert!((u - short_a).abs() < 1e-6 && (v + short_a).abs() < 1e-6 && w.abs() < 1e-6, "{u} {v} {w}");
+
+    // Switched off, the load turns it far slower than one whose wires are sound, and charges nothing.
+    let ends = |touch: bool| {
+        let mut motor = self::motor();
+        (motor.wires_touch, motor.rig.load.torque_nm) = (touch, -3.0);
+        (0..40_000).for_each(|_| motor.step(DT_S, &Actuation { brake_released: true, ..Actuation::default() }));
+        (motor.rotor.velocity_rad_s, motor.rig.supply.bus_v)
+    };
+    let ((touching, bus_v), (sound, _)) = (ends(true), ends(false));
+    assert!(touching < 0.2 * sound && bus_v < 48.1, "{touching} and {sound} rad/s, {bus_v} V");
+}
+
+#[test]
 fn a_driven_open_motor_charges_the_bus_through_its_diodes() {
     let mut motor = motor();
     motor.rig.load.torque_nm = -3.0;
@@ -269,8 +290,9 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn whatever_the_drive_does_the_energy_book_closes(play in any_play()) {
+    fn whatever_the_drive_does_the_energy_book_closes(play in any_play(), touch in any::<bool>()) {
         let mut motor = motor();
+        motor.wires_touch = touch;
         let stored = motor.stored_j();
         for (inverter, bleeder_on, brake_released, load_nm, steps) in play {
             motor.rig.load.torque_nm = load_nm;
@@ -291,10 +313,12 @@ proptest! {
         let mut motor = motor();
         for (index, (inverter, bleeder_on, brake_released, load_nm, steps)) in play.into_iter().enumerate() {
             motor.lost_phase = if index % 2 == 1 { lost } else { None };
+            motor.wires_touch = index % 5 == 4;
             motor.rig.supply.connected = index % 3 != 2;
             motor.rig.load.torque_nm = load_nm;
             let inverter = match inverter {
                 Inverter::Driven([u, v, _]) if index % 4 == 3 => Inverter::Driven([u, v, bad]),
+                Inverter::Driven([_, v, w]) if index % 5 == 4 => Inverter::Driven([bad, v, w]),
                 other => other,
             };
             for _ in 0..steps {

@@ -281,8 +281,8 @@ class VirtualDrive:
         self.apply(f"temperature {word(sensor)} {'auto' if celsius is None else number(celsius)}")
 
     def set_fault(self, component: str, broken: bool = True) -> None:
-        """Breaks or mends a component (``fault hall on``): ``hall``, ``encoder``, ``eeprom``, ``reference``, ``phase``, ``short``
-        or ``bridge``."""
+        """Breaks or mends a component (``fault hall on``): ``hall``, ``encoder``, ``eeprom``, ``reference``, ``phase``, ``short``,
+        ``bridge`` or ``bleeder``."""
         self.apply(f"fault {word(component)} {'on' if broken else 'off'}")
 
     def set_battery(self, connected: bool) -> None:

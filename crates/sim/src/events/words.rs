@@ -17,7 +17,6 @@ impl Event {
             EventKind::BusState { to: ErrorState::BusOff, .. } => {
                 Some("look for a node at another bit rate, a broken wire or a missing terminator")
             }
-            EventKind::Damage(_) => Some("a new drive: this one stays as it is until the simulation ends"),
             EventKind::Behind(_) => Some("fewer drives or clients, or a slower pace"),
             EventKind::Missed(_) => Some("pull events more often, or subscribe to fewer"),
             _ => None,

@@ -356,6 +356,7 @@ impl Assembly for Joint {
             Component::Hall => return absent("Hall sensors: its encoder is absolute"),
             Component::Reference => return absent("reference voltage that it watches: no alarm tells of one"),
             Component::Short => return absent("short circuit to simulate"),
+            Component::Bleeder => return absent("bleeder"),
             Component::Bridge if broken => self.motor.burn_power_stage(),
             Component::Bridge => self.motor.mend_power_stage(),
             Component::Encoder => {

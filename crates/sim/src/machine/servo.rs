@@ -47,6 +47,7 @@ const OUTPUTS: &[&str] = &["brake released"];
 /// What has been destroyed, and what to do about it.
 const SEIZED: &str = "bearings seized by over-speed: 'rotor free' puts in new ones";
 const BURNT: &str = "power stage burnt: 'fault bridge off' puts in a new one, 'power cycle' starts it";
+const BLEEDER_BURNT: &str = "bleeder resistor burnt, it takes no power: 'fault bleeder off' puts in a new one";
 
 /// A described servo, as a station of a world.
 pub type ServoMachine = Machine<ServoBench>;
@@ -184,7 +185,8 @@ impl ServoBench {
 
     fn damage(&self) -> Option<&'static str> {
         let seized = self.motors.iter().any(HubMotor::is_seized).then_some(SEIZED);
-        self.motors.iter().any(HubMotor::is_power_stage_burnt).then_some(BURNT).or(seized)
+        let bleeder = self.motors.iter().any(|motor| motor.rig.supply.bleeder_burnt).then_some(BLEEDER_BURNT);
+        self.motors.iter().any(HubMotor::is_power_stage_burnt).then_some(BURNT).or(seized).or(bleeder)
     }
 
     fn sense_axis(&self, axis: usize, inputs: u64) -> AxisSensors {
@@ -445,6 +447,7 @@ impl Assembly for ServoBench {
             Component::Phase => motor.lost_phase = broken.then_some(Phase::U),
             Component::Bridge if broken => motor.burn_power_stage(),
             Component::Bridge => motor.mend_power_stage(),
+            Component::Bleeder => motor.rig.supply.set_bleeder_burnt(broken),
             Component::Short | Component::Reference => {
                 return Err(Refused::Absent { model: self.model.name, what: "such component" });
             }

@@ -46,6 +46,7 @@ const BRAKE_NM: f64 = 6.0;
 /// What has been destroyed, and what to do about it.
 const SEIZED: &str = "bearings seized by over-speed: 'rotor free' puts in new ones";
 const BURNT: &str = "power stage burnt: 'fault bridge off' puts in a new one, 'power cycle' starts it";
+const BLEEDER_BURNT: &str = "bleeder resistor burnt, it takes no power: 'fault bleeder off' puts in a new one";
 
 /// A ZLAC8030L with its wheel, as a station of a world.
 pub type Zlac8030lMachine = Machine<HubWheel>;
@@ -113,7 +114,8 @@ impl HubWheel {
 
     fn damage(&self) -> Option<&'static str> {
         let seized = self.motor.is_seized().then_some(SEIZED);
-        self.motor.is_power_stage_burnt().then_some(BURNT).or(seized)
+        let bleeder = self.motor.rig.supply.bleeder_burnt.then_some(BLEEDER_BURNT);
+        self.motor.is_power_stage_burnt().then_some(BURNT).or(seized).or(bleeder)
     }
 
     /// What the power stage and the brake make of the firmware's outputs.
@@ -288,9 +290,8 @@ impl Assembly for HubWheel {
             Component::Phase => self.motor.lost_phase = broken.then_some(Phase::U),
             Component::Bridge if broken => self.motor.burn_power_stage(),
             Component::Bridge => self.motor.mend_power_stage(),
-            Component::Short => {
-                return Err(Refused::Absent { model: Self::MODEL, what: "short circuit to simulate" });
-            }
+            Component::Short => self.motor.wires_touch = broken,
+            Component::Bleeder => self.motor.rig.supply.set_bleeder_burnt(broken),
         }
         Ok(())
     }

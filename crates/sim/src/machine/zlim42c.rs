@@ -351,6 +351,7 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
             Component::Phase => self.motor.lost_phase = broken.then_some(Phase::A),
             Component::Short => self.motor.shorted_phase = broken.then_some(Phase::A),
             Component::Bridge => self.motor.set_broken_down(broken),
+            Component::Bleeder => return Err(Refused::Absent { model: Self::MODEL, what: "bleeder" }),
         }
         Ok(())
     }

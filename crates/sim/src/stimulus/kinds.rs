@@ -119,6 +119,8 @@ pub enum Component {
     Short,
     /// The power stage: a transistor that has broken down takes current from the bus.
     Bridge,
+    /// The bleeder's resistor, open.
+    Bleeder,
 }
 
 /// What a controller sends to a drive's pulse inputs.

@@ -78,8 +78,16 @@ impl TemperatureSensor {
 }
 
 impl Component {
-    pub(super) const ALL: [Self; 7] =
-        [Self::Hall, Self::Encoder, Self::Eeprom, Self::Reference, Self::Phase, Self::Short, Self::Bridge];
+    pub(super) const ALL: [Self; 8] = [
+        Self::Hall,
+        Self::Encoder,
+        Self::Eeprom,
+        Self::Reference,
+        Self::Phase,
+        Self::Short,
+        Self::Bridge,
+        Self::Bleeder,
+    ];
 
     pub(super) const fn word(self) -> &'static str {
         match self {
@@ -90,6 +98,7 @@ impl Component {
             Self::Phase => "phase",
             Self::Short => "short",
             Self::Bridge => "bridge",
+            Self::Bleeder => "bleeder",
         }
     }
 }

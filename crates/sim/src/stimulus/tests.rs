@@ -66,7 +66,7 @@ fn any(random: &mut Prng) -> Stimulus {
             let celsius = number(random, -273.15);
             Stimulus::Temperature(TemperatureSensor::ALL[usize::from(coin)], some(random, celsius))
         }
-        8 => Stimulus::Fault(Component::ALL[random.below(7) as usize], coin),
+        8 => Stimulus::Fault(Component::ALL[random.below(8) as usize], coin),
         9 => Stimulus::Battery(coin),
         10 => Stimulus::Pulses(PulseTrain::Pulses { count: random.next_u64() as i64, hz: number(random, 0.0) }),
         11 => Stimulus::Pulses(PulseTrain::Quadrature { count: random.next_u64() as i64, hz: number(random, 0.0) }),

@@ -210,3 +210,30 @@ fn kinds_have_names_of_their_own() {
     assert_eq!(EventKind::Missed(1).name(), "missed");
     assert_eq!(EventKind::TargetReached.name(), "target_reached");
 }
+
+/// 202Eh:02 = 1000 W lets the drive load the resistor of 100 W with all of its 72²/5 W. It warms to ten times what its rated power
+/// does, with 30 s, and burns at twice that: after -30 s ln(1 - 0.2 * 5 * 100 / 72²).
+#[test]
+fn a_bleeder_that_burns_out_is_told_shown_as_damage_and_mended() {
+    let (mut world, probe) = world();
+    world.run_for(Duration::from_millis(20));
+    // 202Eh:05 = 1, :02 = 1000.
+    send(&mut world, probe, &["604#2B2E200501000000", "604#2B2E2002E8030000"]);
+    events(&mut world);
+    let damage = |world: &mut World| world.with_drive(4, |drive, _| drive.report().damage).unwrap();
+    assert_eq!(damage(&mut world), None);
+    apply(&mut world, "supply 72");
+    let expected_s = -30.0 * f64::ln(1.0 - 2.0 * 5.0 * 100.0 / (72.0 * 72.0));
+    world.run_for(Duration::from_secs_f64(0.95 * expected_s));
+    assert_eq!(damage(&mut world), None);
+    world.run_for(Duration::from_secs_f64(0.1 * expected_s));
+    let burnt = damage(&mut world).expect("the bleeder is burnt");
+    assert!(burnt.contains("bleeder") && burnt.contains("'fault bleeder off'"), "{burnt}");
+    let told: Vec<_> = events(&mut world).into_iter().filter(|event| event.kind == EventKind::Damage(burnt)).collect();
+    assert!(told.len() == 1 && told[0].place == Some(Place::node(4)), "{told:?}");
+    apply(&mut world, "supply 48");
+    apply(&mut world, "fault bleeder off");
+    assert_eq!(damage(&mut world), None);
+    apply(&mut world, "fault bleeder on");
+    assert_eq!(damage(&mut world), Some(burnt));
+}

@@ -28,3 +28,4 @@ mod torque;
 mod traps;
 mod velocity;
 mod wheel;
+mod wires;

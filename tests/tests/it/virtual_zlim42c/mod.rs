@@ -17,6 +17,7 @@ mod limits;
 mod motion;
 mod objects;
 mod power_state;
+mod pull_out;
 mod robustness;
 mod step_loss;
 mod stops;

@@ -15,6 +15,12 @@
 //! i_q* = I_detent sin(4 angle)
 //! ```
 //!
+//! Where the motor's own voltage leaves too little of the bus for these currents, the voltage vector keeps the direction that
+//! the controllers ask for, at the length that there is: the motor is then a synchronous one on a stiff source, whose pull-out
+//! torque `K (V / Z - R e / Z²)` is that of the voltage alone. Such a motor has hardly any damping, and at high speed less than
+//! none; so the vector gives way to the swings of the current along it, which are those of the power
+//! ([`AtLimit`]): it falls back while the power rises and runs ahead while it falls.
+//!
 //! Nothing here measures the rotor: it follows within a quarter of an electrical turn, or slips by whole ones, and the
 //! position knows nothing of it.
 
@@ -57,6 +63,20 @@ pub struct StepperGains {
     pub current: PiGains,
     /// Share of the bus voltage that the bridges can give, 0 to 1.
     pub modulation_limit: f32,
+    /// What the vector does at that limit.
+    pub at_limit: AtLimit,
+}
+
+/// How a voltage vector at the limit of its length damps the rotor's swing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AtLimit {
+    /// How far the vector falls back for what swings of the current along it, turns/A.
+    pub turns_per_a: f32,
+    /// What swings is what passes the first of two low-passes and not the second: the share of the way that each goes in a
+    /// control period.
+    pub passed: [f32; 2],
+    /// Share of their rate at which the integrals of the controllers follow the direction.
+    pub integral_share: f32,
 }
 
 /// What the currents did in one supervision period, for the faults: the largest values, phase A first.
@@ -85,6 +105,8 @@ pub struct Stepper {
     resting_for: u16,
     d: Pi,
     q: Pi,
+    /// Current along a voltage vector at its limit, behind the two low-passes, A.
+    along_a: Option<[f32; 2]>,
     measured_a: [f32; 2],
     peaks: Peaks,
 }
@@ -175,13 +197,26 @@ impl Stepper {
             (self.d.propose(&gains.current, error_d, 0.0), self.q.propose(&gains.current, error_q, 0.0));
 
         // The voltage acts over the period after the coming one: in its middle the frame has turned on so far.
-        let (sin_v, cos_v) = sin_cos_turns(angle + VOLTAGE_DELAY_PERIODS * self.pulses_per_period as f32 * per_pulse);
+        let angle_v = angle + VOLTAGE_DELAY_PERIODS * self.pulses_per_period as f32 * per_pulse;
         let limit = gains.modulation_limit * bus_v.max(0.0);
-        let v_a = (wanted_d * cos_v - wanted_q * sin_v).clamp(-limit, limit);
-        let v_b = (wanted_d * sin_v + wanted_q * cos_v).clamp(-limit, limit);
-        let (given_d, given_q) = (v_a * cos_v + v_b * sin_v, v_b * cos_v - v_a * sin_v);
-        self.d.settle(&gains.current, error_d, wanted_d, given_d, model.control_period_s);
-        self.q.settle(&gains.current, error_q, wanted_q, given_q, model.control_period_s);
+        let square = wanted_d * wanted_d + wanted_q * wanted_q;
+        let (v_a, v_b) = if square > limit * limit {
+            let share = limit / libm::sqrtf(square);
+            let (given_d, given_q) = (wanted_d * share, wanted_q * share);
+            let dt_s = gains.at_limit.integral_share * model.control_period_s;
+            self.d.settle(&gains.current, error_d, wanted_d, given_d, dt_s);
+            self.q.settle(&gains.current, error_q, wanted_q, given_q, dt_s);
+            let along = (given_d * (wanted_d_a - error_d) + given_q * (wanted_q_a - error_q)) / limit;
+            turned(given_d, given_q, sin_cos_turns(angle_v - self.give_way(&gains.at_limit, along)))
+        } else {
+            self.along_a = None;
+            let (sin_v, cos_v) = sin_cos_turns(angle_v);
+            let (v_a, v_b) = turned(wanted_d, wanted_q, (sin_v, cos_v));
+            let (given_d, given_q) = (v_a * cos_v + v_b * sin_v, v_b * cos_v - v_a * sin_v);
+            self.d.settle(&gains.current, error_d, wanted_d, given_d, model.control_period_s);
+            self.q.settle(&gains.current, error_q, wanted_q, given_q, model.control_period_s);
+            (v_a, v_b)
+        };
 
         let duty = if bus_v > 0.0 { [v_a / bus_v, v_b / bus_v] } else { [0.0; 2] };
         self.note_peaks(current_a, [self.amplitude_a * cos, self.amplitude_a * sin]);
@@ -201,6 +236,17 @@ impl Stepper {
         (self.amplitude_a - 0.5 * across_a * across_a / self.amplitude_a, across_a)
     }
 
+    /// How far a voltage vector at its limit falls back, turns, by the current along it, A.
+    #[inline]
+    fn give_way(&mut self, at_limit: &AtLimit, along_a: f32) -> f32 {
+        let mut passed = self.along_a.unwrap_or([along_a; 2]);
+        for (passed_a, share) in passed.iter_mut().zip(at_limit.passed) {
+            *passed_a += share * (along_a - *passed_a);
+        }
+        self.along_a = Some(passed);
+        (at_limit.turns_per_a * (passed[0] - passed[1])).clamp(-0.25, 0.25)
+    }
+
     /// The largest values since they were last taken.
     pub fn take_peaks(&mut self) -> Peaks {
         core::mem::take(&mut self.peaks)
@@ -215,6 +261,7 @@ impl Stepper {
         self.resting_for = 0;
         self.measured_a = [0.0; 2];
         (self.d, self.q) = (Pi::default(), Pi::default());
+        self.along_a = None;
         self.peaks = Peaks::default();
     }
 
@@ -245,6 +292,12 @@ impl Stepper {
     }
 }
 
+/// From the turning frame to the phases.
+#[inline]
+fn turned(d: f32, q: f32, (sin, cos): (f32, f32)) -> (f32, f32) {
+    (d * cos - q * sin, d * sin + q * cos)
+}
+
 /// From sampling the currents to the middle of the period in which the voltage acts: duty cycles go through the
 /// timer's shadow registers.
 const VOLTAGE_DELAY_PERIODS: f32 = 1.5;
@@ -270,8 +323,11 @@ mod tests {
         detent_a: 0.0,
         detent_lead_periods: 0.0,
     };
-    const GAINS: StepperGains =
-        StepperGains { current: PiGains { proportional: 15.0, integral_per_s: 1.5e3 }, modulation_limit: 0.98 };
+    const GAINS: StepperGains = StepperGains {
+        current: PiGains { proportional: 15.0, integral_per_s: 1.5e3 },
+        modulation_limit: 0.98,
+        at_limit: AtLimit { turns_per_a: 0.16, passed: [0.06, 1.7e-3], integral_share: 0.3 },
+    };
     const CURRENTS: StepperCurrents = StepperCurrents { run_a: 1.2, hold_a: 0.6, hold_after: 200 };
     const RESISTANCE_OHM: f32 = 1.85;
     const INDUCTANCE_H: f32 = 2.8e-3;
@@ -338,6 +394,38 @@ mod tests {
         let lag = (asked - bench.angle_turns() + 0.5).rem_euclid(1.0) - 0.5;
         assert!(lag.abs() < 0.03, "{lag} turns");
         assert!((bench.stepper.current_a() - 1.2).abs() < 0.1, "{}", bench.stepper.current_a());
+    }
+
+    #[test]
+    fn a_vector_that_the_bus_cannot_give_keeps_the_direction_asked_for_at_the_length_that_there_is() {
+        let mut stepper = Stepper { field: 10, ..Stepper::default() };
+        // An eighth of an electrical turn: both phases alike, each below what one of them could be given alone.
+        stepper.command(&MODEL, &Demand::Position(TrajectoryPoint::rest(0)), &CURRENTS);
+        for bus_v in [24.0, 12.0, 6.0] {
+            let mut stepper = stepper.clone();
+            let duty = stepper.modulate(&MODEL, &GAINS, [0.0; 2], bus_v);
+            let asked_v = GAINS.current.proportional * CURRENTS.run_a;
+            let length = (asked_v / bus_v).min(GAINS.modulation_limit);
+            assert!((libm::hypotf(duty[0], duty[1]) - length).abs() < 1e-4, "{bus_v} V: {duty:?}");
+            assert!((duty[0] - duty[1]).abs() < 1e-4, "{bus_v} V: {duty:?}");
+        }
+    }
+
+    #[test]
+    fn a_vector_at_its_limit_falls_back_while_the_power_rises_and_stands_where_it_was_when_that_stays() {
+        let mut stepper = Stepper::default();
+        stepper.command(&MODEL, &Demand::Position(TrajectoryPoint::rest(0)), &CURRENTS);
+        let mut turned = |current_a: f32, periods: u32| {
+            let mut duty = [0.0; 2];
+            (0..periods).for_each(|_| duty = stepper.modulate(&MODEL, &GAINS, [current_a, 0.0], 6.0));
+            libm::atan2f(duty[1], duty[0]) / core::f32::consts::TAU
+        };
+        assert!(turned(0.1, 1000).abs() < 1e-4);
+        // 0.3 A more along the vector, at 0.16 turns/A: most of it after some ms, nothing after some tenths of a second.
+        let (soon, late) = (turned(0.4, 60), turned(0.4, 6000));
+        assert!((-0.048..-0.035).contains(&soon), "{soon} turns");
+        assert!(late.abs() < 1e-4, "{late} turns");
+        assert!(turned(0.1, 60) > 0.035, "and ahead while it falls");
     }
 
     #[test]
