@@ -215,11 +215,6 @@ impl Machine {
         Some(Parameters { identity, node: Some(node), values: placed.start_up.clone() })
     }
 
-    /// What stands behind the shaft of a drive: `units`. [`Gear::DIRECT`] for a node that is not in the file.
-    pub fn gear(&self, node: NodeId) -> Gear {
-        self.drives.iter().find(|drive| drive.spec.node == node).map_or(Gear::DIRECT, |drive| drive.gear)
-    }
-
     /// The writes that set a node up so, whatever it has, in the order of CiA 301; none for a node that is not in the file, or
     /// of which it says nothing.
     pub fn configuration(&self, node: NodeId) -> Vec<(Mux, Vec<u8>)> {
