@@ -179,6 +179,7 @@ impl Course {
             rows,
             figures: self.script.figures(&self.scenario),
             digest: world.digest().value(),
+            is_random: world.is_random(),
             last_frames: Vec::new(),
         };
         if !outcome.passed() {
