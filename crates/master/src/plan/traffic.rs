@@ -277,8 +277,11 @@ impl NodeTraffic {
 }
 
 fn queued(id: CanId, length: u8, period: Duration) -> Queued {
-    Queued { id, length, period, jitter: Duration::ZERO, ahead: Vec::new(), trigger: None }
+    Queued { id, length, period, jitter: Duration::ZERO, ahead: Vec::new(), with: None, trigger: None }
 }
+
+/// The place of SYNC among the frames.
+const SYNC: usize = 0;
 
 /// SYNC and the RPDOs, in the order in which they are sent, and what comes between now and then.
 fn of_host(nodes: &[NodeTraffic], settings: &Settings) -> Vec<Draft> {
@@ -292,7 +295,7 @@ fn of_host(nodes: &[NodeTraffic], settings: &Settings) -> Vec<Draft> {
         for (config, cob_id) in node.pdos.iter().filter(|(config, cob_id)| is_sent(config, *cob_id)) {
             let is_sent = node.in_cycle.is_none_or(|number| number == config.pdo.number);
             if config.pdo.direction == Direction::Rpdo && is_sent {
-                let frame = in_cycle(cob_id.can_id(), config.map.bytes() as u8);
+                let frame = Queued { with: Some(SYNC), ..in_cycle(cob_id.can_id(), config.map.bytes() as u8) };
                 drafts.push(draft(Purpose::Pdo(config.pdo), Some(node.node), frame));
             }
         }
