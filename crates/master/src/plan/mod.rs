@@ -31,4 +31,6 @@ mod response_time;
 mod traffic;
 
 pub use response_time::{Bound, ErrorRate, Queued, Trigger, load, response_times};
-pub use traffic::{HostQueue, NodeTraffic, Plan, PlannedFrame, Purpose, Remark, Settings, most_nodes, plan};
+pub use traffic::{
+    HostQueue, NodeTraffic, Plan, PlannedFrame, Purpose, Remark, Settings, most_nodes, plan, shortest_cycle,
+};

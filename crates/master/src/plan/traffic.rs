@@ -191,6 +191,18 @@ impl Plan {
     pub fn fits(&self) -> bool {
         self.frames.iter().all(PlannedFrame::is_in_time)
     }
+
+    /// Whether a host that tolerates so many cycles in a row without a PDO runs on this bus, where `cycle_alone` is the plan of the same
+    /// [without SDO and EMCY](Settings::cycle_alone): all is in time then, and what comes beside it delays no PDO for longer.
+    pub fn is_tolerable(&self, cycle_alone: &Self, tolerance: u32) -> bool {
+        let holds = |frame: &PlannedFrame| match frame.purpose {
+            Purpose::Sync | Purpose::Pdo(_) => {
+                frame.bound.worst.is_some_and(|worst| worst <= frame.deadline * (1 + tolerance))
+            }
+            _ => frame.is_in_time(),
+        };
+        cycle_alone.fits() && self.frames.iter().all(holds)
+    }
 }
 
 /// A frame before its bound is known.
@@ -238,6 +250,14 @@ pub fn plan(nodes: &[NodeTraffic], settings: &Settings, bitrate: Bitrate) -> Pla
     let load = load(&frames, bitrate);
     planned.sort_by_key(|planned| can::Frame::new(planned.frame.id, &[]).arbitration_key());
     Plan { frames: planned, load, remarks }
+}
+
+/// The shortest cycle, in steps of 0.5 ms to 10 ms and then longer ones, in which everything is there in time that is sent beside no SDO
+/// and no EMCY; `None`: there is none up to 100 ms.
+pub fn shortest_cycle(nodes: &[NodeTraffic], settings: &Settings, bitrate: Bitrate) -> Option<Duration> {
+    let half_ms = (1..=20).chain([40, 100, 200]);
+    let mut cycles = half_ms.map(|half_ms| Duration::from_micros(500) * half_ms);
+    cycles.find(|cycle| plan(nodes, &Settings { cycle: *cycle, ..settings.cycle_alone() }, bitrate).fits())
 }
 
 /// How many nodes like these, over and over in their order, fit the bus at this cycle; at most 127. The PDOs of those that are
