@@ -6,6 +6,7 @@
 
 mod bodies;
 mod configuration;
+mod cycles;
 mod motion;
 mod surroundings;
 mod units;
@@ -28,6 +29,7 @@ use crate::words::drive::DriveSpec;
 use crate::words::node::node;
 use bodies::Joined;
 pub use configuration::{mapped, pdo_id};
+pub use cycles::{BASE_PERIOD, CyclePlan, GROUP_PERIOD, TOLERANCE, TooFull, speed_mode, too_full, too_full_at};
 pub use motion::{AxisPlan, BasePlan, GroupPlan, WATCHDOG};
 
 const EXAMPLE: &str =
