@@ -35,10 +35,10 @@ use std::process::ExitCode;
 use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue};
 use clap::parser::ValueSource;
-use clap::{ArgMatches, CommandFactory, FromArgMatches};
+use clap::{ArgMatches, FromArgMatches};
 use clap_complete::env::CompleteEnv;
 
-use crate::args::{Cli, Command};
+use crate::args::{Cli, Command, command_line};
 use crate::command::completions::ASKED_BY;
 use crate::command::departures::DepartureList;
 use crate::command::objects::{Objects, Whose};
@@ -51,7 +51,7 @@ use plot::Paint;
 
 fn main() -> ExitCode {
     // A shell asks for what a line may go on with: answered here, and nothing else is done.
-    CompleteEnv::with_factory(|| completion::with_values(Cli::command())).var(ASKED_BY).complete();
+    CompleteEnv::with_factory(|| completion::with_values(command_line())).var(ASKED_BY).complete();
     let parsed = matches().and_then(|matches| {
         let cli = Cli::from_arg_matches(&matches)?;
         Ok((cli, matches))
@@ -74,7 +74,7 @@ fn main() -> ExitCode {
 
 /// The command line as it was typed, or with its words in the order that was meant, where that does no harm.
 fn matches() -> Result<ArgMatches, clap::Error> {
-    let command = Cli::command();
+    let command = command_line();
     let mut error = match command.clone().try_get_matches() {
         Ok(matches) => return Ok(matches),
         Err(error) => error,
@@ -227,7 +227,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Studio(command) => session::run_live(global, async |context| command.run(context, format).await),
         Command::Replay(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Completions(completions) => completions.run(),
-        Command::ManPages(pages) => pages.run(Cli::command()),
+        Command::ManPages(pages) => pages.run(command_line()),
     }
 }
 

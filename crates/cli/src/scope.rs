@@ -1,5 +1,5 @@
-//! Options of every command that mean nothing to one of them: typed there they are refused, so that nobody believes that
-//! they were heeded. The environment may set them for all commands.
+//! Options of every command that mean nothing to one of them: its help does not show them, and typed there they are refused, so
+//! that nobody believes that they were heeded. The environment may set them for all commands.
 
 use std::collections::BTreeMap;
 
@@ -28,22 +28,24 @@ const VERBOSE: &str = "verbose";
 const REALTIME: &str = "realtime";
 const LOG: &str = "log";
 
-const UNHEEDED: [Unheeded; 13] = [
+const ALL: &[&str] = &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG];
+
+const UNHEEDED: [Unheeded; 15] = [
     Unheeded {
         command: "run",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG],
+        options: ALL,
         why: "a scenario has a machine and a bus of its own",
         next: "leave it away; the scenario's machine may be the path of a machine file",
     },
     Unheeded {
         command: "world",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG],
+        options: ALL,
         why: "it speaks to a running simulator, not to a bus",
         next: "leave it away; --control says where the simulator is",
     },
     Unheeded {
         command: "events",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG],
+        options: ALL,
         why: "it listens to a running simulator, not to a bus",
         next: "leave it away; --control says where the simulator is",
     },
@@ -55,43 +57,50 @@ const UNHEEDED: [Unheeded; 13] = [
     },
     Unheeded {
         command: "sim",
-        options: &[TIMEOUT, VERBOSE],
+        options: &[TIMEOUT],
         why: "it asks nobody anything, and waits for no answer",
-        next: "leave it away; --record and --log keep the frames, and dump shows them",
+        next: "leave it away",
     },
     Unheeded {
         command: "demo",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG],
+        options: ALL,
         why: "it shows virtual drives on buses of their own",
         next: "leave it away; --drive MODEL chooses the drive",
     },
     Unheeded {
         command: "dump",
-        options: &[TIMEOUT],
-        why: "it only listens, and waits for no answer",
+        options: &[TIMEOUT, VERBOSE],
+        why: "it only listens, waits for no answer, and shows every frame that it hears",
         next: "leave it away; --for TIME says how long it listens",
     },
     Unheeded {
         command: "decode",
-        options: &[BUS, TIMEOUT],
+        options: &[BUS, TIMEOUT, VERBOSE, REALTIME],
         why: "it reads a log, and asks nobody anything",
         next: "leave it away",
     },
     Unheeded {
         command: "convert",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, LOG],
+        options: ALL,
         why: "it reads a log and writes another, and looks at no frame",
         next: "leave it away; the second file is the log that is written",
     },
+    Unheeded { command: "plot", options: ALL, why: "it draws what a file has", next: "leave it away" },
+    Unheeded {
+        command: "man-pages",
+        options: ALL,
+        why: "a manual page depends on none of them",
+        next: "leave it away",
+    },
     Unheeded {
         command: "completions",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG],
+        options: ALL,
         why: "a script for a shell depends on none of them",
         next: "leave it away",
     },
     Unheeded {
         command: "eds",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG],
+        options: ALL,
         why: "it is about files, not about a node of a bus",
         next: "leave it away",
     },
@@ -103,7 +112,7 @@ const UNHEEDED: [Unheeded; 13] = [
     },
     Unheeded {
         command: "readings",
-        options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG],
+        options: ALL,
         why: "it is about a model, not about a node of a bus",
         next: "leave it away",
     },
@@ -111,7 +120,7 @@ const UNHEEDED: [Unheeded; 13] = [
 
 const OBJECTS_OF_A_MODEL: Unheeded = Unheeded {
     command: "objects",
-    options: &[BUS, MODEL, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG],
+    options: ALL,
     why: "the objects of a model are the same on every bus",
     next: "leave it away, or give a node-ID in place of the model",
 };
@@ -122,6 +131,19 @@ const CHECK_OF_A_FILE: Unheeded = Unheeded {
     why: "without a bus it reads files, and sends nothing",
     next: "leave it away, or give --bus to have the drives asked that are there",
 };
+
+/// The command line with help that shows of each command what it heeds.
+pub(crate) fn only_heeded(mut command: clap::Command) -> clap::Command {
+    for row in UNHEEDED {
+        for option in row.options {
+            // As the parser hands it down to every command, but not shown.
+            let handed_down = command.get_arguments().find(|argument| argument.get_id() == *option).cloned();
+            let hidden = handed_down.map(|argument| argument.hide(true));
+            command = command.mut_subcommand(row.command, |its| its.args(hidden));
+        }
+    }
+    command
+}
 
 /// Refuses typed options that the command does not heed, and options that contradict each other.
 pub(crate) fn refuse_unheeded(global: &Global, command: &Command, matches: &ArgMatches) -> Result<(), Failure> {
@@ -141,12 +163,15 @@ pub(crate) fn refuse_unheeded(global: &Global, command: &Command, matches: &ArgM
                 .next(row.next));
         }
     }
-    if typed(MACHINE) && own_bus && name != "sim" {
+    // A command that has no bus is not on one of its own.
+    let own_bus =
+        own_bus && name != "sim" && !UNHEEDED.iter().any(|row| row.command == name && row.options.contains(&BUS));
+    if typed(MACHINE) && own_bus {
         return Err(Failure::usage("--machine means nothing on a virtual bus of this command alone")
             .because("such a bus knows its drives")
             .next("give --bus sim:FILE.toml to have the drives of the file on it, or --bus with the bus that it describes"));
     }
-    if typed(REALTIME) && own_bus && name != "sim" {
+    if typed(REALTIME) && own_bus {
         return Err(Failure::usage("--realtime means nothing on a virtual bus of this command alone")
             .because("its time is that of the simulation, not of the clock")
             .next("give --bus with a real bus, or use it with sim"));
@@ -169,4 +194,126 @@ fn refuse_two_models(global: &Global) -> Result<(), Failure> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::{CommandFactory, FromArgMatches};
+
+    use super::*;
+    use crate::args::Cli;
+
+    const REAL_BUS: &str = "socketcand://127.0.0.1:1/can0";
+
+    /// A line of each command that the parser takes, on a bus where every option may mean something.
+    const LINES: &[&str] = &[
+        "boot m.toml",
+        "check m.toml",
+        "completions bash",
+        "convert a.log b.asc",
+        "dcf 4",
+        "decode a.log",
+        "demo",
+        "disable 4",
+        "drive-base m.toml",
+        "dump",
+        "eds zlac8030l",
+        "emcy watch",
+        "enable 4",
+        "events --control 127.0.0.1:1",
+        "explain 4",
+        "export dbc",
+        "gateway",
+        "group move 4=90deg",
+        "home 4 --method 17",
+        "latency",
+        "lss scan",
+        "man-pages pages",
+        "move 4 90deg",
+        "nmt 4 start",
+        "objects 4",
+        "params backup 4",
+        "pdo show 4",
+        "plan",
+        "plot a.csv",
+        "quick-stop 4",
+        "read 4 6064",
+        "readings zlac8030l",
+        "record 4 6064 --out a.csv",
+        "replay a.log",
+        "reset 4",
+        "restore 4",
+        "run a.toml",
+        "save 4",
+        "scan",
+        "send 000#0104",
+        "sim --drive zlac8030l@4",
+        "state 4",
+        "stop 4",
+        "studio",
+        "supervise m.toml",
+        "sync",
+        "time",
+        "top",
+        "torque 4 1A",
+        "velocity 4 60rpm",
+        "watch 4 6064",
+        "world --control 127.0.0.1:1 now",
+        "write 4 6060 3",
+    ];
+
+    /// What is typed for each option that every command has, but for `--json`, which all heed.
+    fn typed(option: &str) -> Vec<&'static str> {
+        let machine = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.toml");
+        match option {
+            BUS => vec!["--bus", REAL_BUS],
+            MODEL => vec!["--model", "4=zlac8030l"],
+            MACHINE => vec!["--machine", machine],
+            TIMEOUT => vec!["--timeout", "1s"],
+            VERBOSE => vec!["--verbose"],
+            REALTIME => vec!["--realtime"],
+            LOG => vec!["--log", "frames.log"],
+            other => panic!("what is typed for {other}?"),
+        }
+    }
+
+    /// Whether a line with an option is taken, on this bus.
+    fn is_taken(line: &[&str], bus: &[&str], option: &str) -> bool {
+        let all = [&["ferrodrive"], bus, line].concat();
+        let matches = only_heeded(Cli::command()).try_get_matches_from(&all).unwrap_or_else(|e| panic!("{all:?}: {e}"));
+        let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| panic!("{all:?}: {e}"));
+        let refused = refuse_unheeded(&cli.global, &cli.command, &matches).err();
+        let said = refused.as_ref().map(|failure| failure.what.as_str());
+        let of_option = format!("--{} means nothing to", spelled(option));
+        assert!(said.is_none_or(|said| said.starts_with(&of_option)), "{all:?}: {said:?}");
+        said.is_none()
+    }
+
+    #[test]
+    fn every_option_that_the_help_of_a_command_shows_is_taken_by_it_and_no_other() {
+        let mut built = only_heeded(Cli::command());
+        built.build();
+        let options: Vec<_> = Cli::command()
+            .get_arguments()
+            .filter(|argument| argument.is_global_set() && argument.get_id() != "json")
+            .map(|argument| argument.get_id().to_string())
+            .collect();
+        assert_eq!(options.len(), ALL.len(), "{options:?}");
+        for its in built.get_subcommands().filter(|its| its.get_name() != "help") {
+            let name = its.get_name();
+            let line = LINES.iter().find(|line| line.split(' ').next() == Some(name));
+            let line = line.unwrap_or_else(|| panic!("a line of {name} is missing here"));
+            let words: Vec<_> = line.split(' ').collect();
+            let shows = |option: &str| {
+                its.get_arguments().any(|argument| argument.get_id() == option && !argument.is_hide_set())
+            };
+            for option in &options {
+                let bus: &[&str] = if shows(BUS) && option != BUS { &["--bus", REAL_BUS] } else { &[] };
+                let typed = typed(option);
+                for line in [[&words[..], &typed[..]].concat(), [&typed[..], &words[..]].concat()] {
+                    assert_eq!(is_taken(&line, bus, option), shows(option), "{line:?}");
+                }
+            }
+        }
+    }
 }

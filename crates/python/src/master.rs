@@ -7,6 +7,7 @@ mod job;
 mod runner;
 mod value;
 
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -16,6 +17,8 @@ use master::drive::{Drive, HomingOptions, MotionOptions, Stopped, SwitchedOff};
 use master::units::{Amperes, Angle, Ramp, Rpm};
 use master::{Error, Gear, Network as Core, Node};
 use pyo3::prelude::*;
+use testbench::machine_file::{self, Machine};
+use testbench::models::Description;
 use transport::BusSpec;
 
 pub(crate) use job::Job;
@@ -23,7 +26,7 @@ use job::Trouble;
 use runner::Runner;
 use value::Value;
 
-use crate::failure::{bad_value, wrong_use};
+use crate::failure::{bad_value, named, wrong_use};
 use crate::live::Live;
 use crate::sheets::{model_of, node_id};
 use crate::world::World;
@@ -34,6 +37,8 @@ pub(crate) struct Network {
     core: Core,
     runner: Arc<Runner>,
     closed: AtomicBool,
+    /// What a machine file says of its drives.
+    machine: Option<Arc<Machine>>,
 }
 
 /// What a drive is asked to do, in plain values.
@@ -59,11 +64,6 @@ struct Order {
     limit_s: Option<f64>,
     #[pyo3(item, default)]
     gear_ratio: Option<f64>,
-}
-
-/// What stands behind a shaft.
-fn gear(ratio: Option<f64>) -> PyResult<Gear> {
-    ratio.map_or(Ok(Gear::DIRECT), |ratio| Gear::new(ratio).map_err(|error| bad_value(error.to_string())))
 }
 
 impl Order {
@@ -99,18 +99,22 @@ impl Network {
         let mut state = shared.lock(py)?;
         state.world.add_station(core.clone());
         state.jobs.note_master();
+        let machine = state.machine();
         drop(state);
-        Ok(Self { core, runner: Arc::new(Runner::World(shared)), closed: AtomicBool::new(false) })
+        Ok(Self { core, runner: Arc::new(Runner::World(shared)), closed: AtomicBool::new(false), machine })
     }
 
-    /// A master on a real bus: `socketcand://HOST:PORT/can0`, `slcan:///dev/ttyACM0?bitrate=500k`.
+    /// A master on a real bus: `socketcand://HOST:PORT/can0`, `slcan:///dev/ttyACM0?bitrate=500k`; with the machine file that says what
+    /// is there.
     #[staticmethod]
-    fn on_bus(py: Python<'_>, bus: &str) -> PyResult<Self> {
+    fn on_bus(py: Python<'_>, bus: &str, machine: Option<PathBuf>) -> PyResult<Self> {
         let spec: BusSpec = bus.parse().map_err(bad_value)?;
+        let read = |path: PathBuf| machine_file::read(&path).map_err(|reason| bad_value(named(&path, reason)));
+        let machine = machine.map(read).transpose()?.map(Arc::new);
         let core = Core::new();
         let live = py.detach(|| Live::open(spec, core.clone()));
         let live = live.map_err(|reason| wrong_use(format!("bus {bus}: {reason}")))?;
-        Ok(Self { core, runner: Arc::new(Runner::Live(Mutex::new(Some(live)))), closed: AtomicBool::new(false) })
+        Ok(Self { core, runner: Arc::new(Runner::Live(Mutex::new(Some(live)))), closed: AtomicBool::new(false), machine })
     }
 
     /// Stops what this program has set in motion, and leaves the real bus; what was not seen to stand, in words.
@@ -197,6 +201,11 @@ impl Network {
         self.begin(py, async move { node.download(Mux::new(index, sub_index), &data).await.map(|()| Value::None) })
     }
 
+    /// Which model a node is as the machine file says; `None` where it says nothing.
+    fn model_by_file(&self, node: u8) -> PyResult<Option<&'static str>> {
+        Ok(self.described(node_id(node)?).map(|model| model.name))
+    }
+
     /// Which model a node is by its identity and objects; its name, or `None` if that is not certain.
     fn identify(&self, py: Python<'_>, node: u8) -> PyResult<Job> {
         let node = self.node(node)?;
@@ -210,7 +219,7 @@ impl Network {
 
     /// Does what an order says with a drive of a model.
     fn drive(&self, py: Python<'_>, node: u8, model: &str, order: Order) -> PyResult<Job> {
-        let drive = Drive::new(self.node(node)?, model_of(model)?).behind(gear(order.gear_ratio)?);
+        let drive = Drive::new(self.node(node)?, self.model(node, model)?).behind(self.gear(node, order.gear_ratio)?);
         match order.do_.as_str() {
             "enable" => self.begin(py, async move { drive.enable().await.map(|()| Value::None) }),
             "disable" => self.begin(py, async move { drive.disable().await.map(|()| Value::None) }),
@@ -285,6 +294,27 @@ impl Network {
     /// Tells its jobs from those of other networks in the same world.
     fn owner(&self) -> usize {
         Arc::as_ptr(&self.runner) as usize
+    }
+
+    /// The model of a node as the machine file says.
+    fn described(&self, node: NodeId) -> Option<&'static Description> {
+        let mut models = self.machine.iter().flat_map(|machine| machine.models());
+        models.find(|(id, _)| *id == node).map(|(_, model)| model)
+    }
+
+    /// A model by its name; of a node that the machine file has, with the choices that it has there.
+    fn model(&self, node: u8, name: &str) -> PyResult<&'static Description> {
+        let described = self.described(node_id(node)?).filter(|model| model.name == name);
+        described.map_or_else(|| model_of(name), Ok)
+    }
+
+    /// What stands behind the shaft of a node: this ratio, or else what the machine file says.
+    fn gear(&self, node: u8, ratio: Option<f64>) -> PyResult<Gear> {
+        let Some(ratio) = ratio else {
+            let node = node_id(node)?;
+            return Ok(self.machine.as_ref().map_or(Gear::DIRECT, |machine| machine.gear(node)));
+        };
+        Gear::new(ratio).map_err(|error| bad_value(error.to_string()))
     }
 
     fn node(&self, raw: u8) -> PyResult<Node> {

@@ -10,7 +10,7 @@ use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use testbench::document::BadFile;
 use testbench::document::reader::Parameters;
-use testbench::scenario::{Runner, Scenario};
+use testbench::scenario::{Outcome, Runner, Scenario};
 use testbench::sweep;
 
 use crate::failure::{bad_value, named};
@@ -25,7 +25,8 @@ type Setting = (String, String);
 #[pyfunction]
 pub(crate) fn run_scenario(py: Python<'_>, path: PathBuf, seed: Option<u64>, set: Vec<Setting>) -> PyResult<String> {
     let scenario = read(&path, set)?;
-    run(py, || Runner::new(&scenario, seed).map_err(|bad| bad.named(path.display().to_string())))
+    let outcome = made(py, || Runner::new(&scenario, seed).map_err(|bad| bad.named(path.display().to_string())))?;
+    serde_json::to_string(&outcome.to_json()).map_err(bad_value)
 }
 
 /// A scenario with seeds and values of its parameters; `ferrodrive.Sweep` is what users have.
@@ -33,6 +34,7 @@ pub(crate) fn run_scenario(py: Python<'_>, path: PathBuf, seed: Option<u64>, set
 pub(crate) struct Sweep {
     file: PathBuf,
     sweep: sweep::Sweep,
+    alike: sweep::Alike,
 }
 
 /// What came of the runs of a sweep so far.
@@ -49,7 +51,7 @@ impl Sweep {
     fn new(path: PathBuf, first: u64, last: u64, set: Vec<Setting>) -> PyResult<Self> {
         let scenario = read(&path, set)?;
         let sweep = sweep::Sweep::new(scenario, first..=last).map_err(bad_value)?;
-        Ok(Self { file: path, sweep })
+        Ok(Self { file: path, sweep, alike: sweep::Alike::default() })
     }
 
     /// How many runs it has.
@@ -68,7 +70,12 @@ impl Sweep {
     /// Makes the run of this number; returns what `ferrodrive run --json` prints.
     fn run(&self, py: Python<'_>, number: u64) -> PyResult<String> {
         self.check(number)?;
-        run(py, || self.sweep.runner(number))
+        if let Some(known) = self.alike.of(&self.sweep, number) {
+            return serde_json::to_string(&known.to_json()).map_err(bad_value);
+        }
+        let outcome = made(py, || self.sweep.runner(number))?;
+        self.alike.keep(&self.sweep, number, &outcome);
+        serde_json::to_string(&outcome.to_json()).map_err(bad_value)
     }
 }
 
@@ -126,13 +133,12 @@ fn read(path: &Path, set: Vec<Setting>) -> PyResult<Scenario> {
     if set.is_empty() {
         return Ok(scenario);
     }
-    let mut values: Parameters = scenario.parameters.clone();
-    values.extend(set);
+    let values: Parameters = set.into_iter().collect();
     scenario.with(&values).map_err(|bad| bad_value(bad.named(path.display().to_string())))
 }
 
 /// Goes through a run while other threads of Python go on; a signal whose handler raises (Ctrl-C) ends it.
-fn run(py: Python<'_>, begin: impl Fn() -> Result<Runner, BadFile> + Send + Sync) -> PyResult<String> {
+fn made(py: Python<'_>, begin: impl Fn() -> Result<Runner, BadFile> + Send + Sync) -> PyResult<Outcome> {
     py.detach(|| {
         let mut runner = begin().map_err(bad_value)?;
         let mut steps = 0u32;
@@ -142,6 +148,6 @@ fn run(py: Python<'_>, begin: impl Fn() -> Result<Runner, BadFile> + Send + Sync
                 Python::attach(|py| py.check_signals())?;
             }
         }
-        serde_json::to_string(&runner.conclude().to_json()).map_err(bad_value)
+        Ok(runner.conclude())
     })
 }

@@ -20,7 +20,7 @@ use sim::stimulus::{FORMS, Place};
 use sim::wire::{Statistics, WireEvent};
 use sim::{StationId, VirtualDrive};
 use testbench::events;
-use testbench::machine_file;
+use testbench::machine_file::{self, Machine};
 use testbench::words::drive::DriveSpec;
 
 use crate::failure::{bad_value, named, refused, wrong_use};
@@ -62,6 +62,8 @@ pub(crate) struct State {
     /// In the order in which Python numbers them.
     probes: Vec<StationId>,
     recordings: Recordings,
+    /// What its machine file says, for a master that joins it.
+    machine: Option<Arc<Machine>>,
 }
 
 /// Why [`World::advance`] came back.
@@ -103,7 +105,12 @@ impl Shared {
 
 impl State {
     fn new(world: sim::World) -> Self {
-        Self { world, jobs: Jobs::default(), probes: Vec::new(), recordings: Recordings::default() }
+        Self { world, jobs: Jobs::default(), probes: Vec::new(), recordings: Recordings::default(), machine: None }
+    }
+
+    /// What its machine file says, if it is of one.
+    pub(crate) fn machine(&self) -> Option<Arc<Machine>> {
+        self.machine.clone()
     }
 
     fn probe(&self, number: usize) -> PyResult<StationId> {
@@ -227,7 +234,7 @@ impl World {
         let mut machine = machine_file::read(&path).map_err(|reason| bad_value(named(&path, reason)))?;
         machine.seed = seed.or(machine.seed);
         let world = machine.build().map_err(|bad| bad_value(bad.named(path.display().to_string())))?;
-        *self.shared.lock(py)? = State::new(world);
+        *self.shared.lock(py)? = State { machine: Some(Arc::new(machine)), ..State::new(world) };
         Ok(())
     }
 
@@ -410,13 +417,13 @@ impl World {
         if Arc::ptr_eq(&self.shared, &other.get().shared) {
             return Ok(());
         }
-        let (world, probes) = {
+        let (world, probes, machine) = {
             let state = other.get().shared.lock(py)?;
             state.jobs.check_copyable()?;
             let mut copy = state.world.snapshot();
             // What is kept of a world is not part of it.
             copy.stop_recording();
-            (copy, state.probes.clone())
+            (copy, state.probes.clone(), state.machine())
         };
         let state = &mut *self.shared.lock(py)?;
         state.jobs.check_copyable()?;
@@ -431,7 +438,7 @@ impl World {
                  or restore it before",
             ));
         }
-        (state.world, state.probes) = (world, probes);
+        (state.world, state.probes, state.machine) = (world, probes, machine);
         state.recordings.follow(&mut state.world);
         Ok(())
     }

@@ -94,7 +94,7 @@ def test_what_breaks_a_limit_moves_nothing(world, network):
 def test_a_blocked_shaft_stops_the_others_and_is_named(world, network):
     with network.group(servos(), period=0.001) as group:
         world[2].lock_rotor()
-        with pytest.raises(ferrodrive.MasterError, match="axis 2, node 2, is .* turns from its set-point"):
+        with pytest.raises(ferrodrive.MasterError, match="axis 2, node 2, is .* deg from its set-point"):
             group.move([360, 360])
         assert "axis 2" in group.state()["cause"]
         network.sleep(0.5)

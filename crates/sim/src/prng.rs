@@ -5,7 +5,7 @@
 /// State `s += 9E3779B97F4A7C15h`, then two xor-shift-multiply rounds over `s` (Steele, Lea, Flood:
 /// "Fast Splittable Pseudorandom Number Generators", OOPSLA 2014). The period is 2^64; good enough
 /// for faults, no good for secrets.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Prng(u64);
 
 impl Prng {

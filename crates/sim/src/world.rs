@@ -47,6 +47,8 @@ pub struct World {
     now: Instant,
     seed: u64,
     timing: TimingMode,
+    /// Some drive of it has noise or jitter.
+    has_chance: bool,
     bus: Bus,
     members: Vec<Member>,
     due: DueTimes,
@@ -96,6 +98,7 @@ impl World {
             now: Instant::ZERO,
             seed,
             timing: TimingMode::Ideal,
+            has_chance: false,
             bus: Bus::new(bitrate, seeds.next_u64()),
             members: Vec::new(),
             due: DueTimes::default(),
@@ -121,10 +124,16 @@ impl World {
         }
         if self.timing == TimingMode::Device {
             drive.set_timing(self.timing, self.seed_of(number, TIMING_SEED), self.now);
+            self.has_chance = true;
         }
         let id = self.add(Member::Drive { number, drive }, ControllerOptions::MICROCONTROLLER);
         self.set_power(number, true)?;
         Ok(id)
+    }
+
+    /// Whether its seed may have decided anything so far. If not, a world of any other seed has done the same.
+    pub fn is_random(&self) -> bool {
+        self.has_chance || self.bus.has_drawn()
     }
 
     /// The seed of what is random about the drive under `number`, one for each `purpose`.

@@ -6,14 +6,13 @@ use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 use std::time::Duration;
 
 use canopen::NodeId;
-use cia402::ModeOfOperation;
-use master::Drive;
 use master::base::{Base, BaseError, BaseLimits, BaseState, StopCause, Twist, WheelSetup};
 use master::units::{Shown, parse_duration};
 use serde::Serialize;
-use testbench::machine_file::BasePlan;
+use testbench::machine_file::{BASE_PERIOD, BasePlan, CyclePlan, speed_mode};
 
-use super::group::{CycleArgs, end_guards};
+use super::cycles::{CycleArgs, refuse_too_full};
+use super::group::end_guards;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::global::Global;
@@ -21,9 +20,6 @@ use crate::guard::{GuardArgs, GuardReport};
 use crate::output::{Format, Report};
 use crate::session;
 use plot::Paint;
-
-/// From one SYNC to the next where neither the file nor the command line says it.
-const PERIOD: Duration = Duration::from_millis(10);
 
 /// How long a line counts on the virtual bus of this command alone, where no time passes between two lines.
 const VIRTUAL_LINE: Duration = Duration::from_millis(100);
@@ -152,13 +148,15 @@ impl DriveBase {
         for (node, turns) in plan.wheels {
             wheels.push(wheel(context, &plan, node, turns).await?);
         }
+        let drives: Vec<_> = wheels.iter().map(|wheel| &wheel.drive).collect();
+        refuse_too_full(context, &CyclePlan::from(&plan), &drives).await?;
         let mut guards = Vec::new();
         for wheel in &wheels {
             guards.push(self.guard.begin(context, &wheel.drive).await?);
         }
         let [left, right] = &wheels[..] else { return Err(Failure::new("a base has two wheels")) };
         let options = self.cycles.options();
-        let period = plan.period.unwrap_or(PERIOD);
+        let period = plan.period.unwrap_or(BASE_PERIOD);
         let driven = match Base::open([left, right], plan.geometry, limits, period, options).await {
             Ok(mut base) => {
                 let driven = self.carry_out(context, &mut base).await;
@@ -178,10 +176,13 @@ impl DriveBase {
         match self.follow(context, base).await {
             Ok(seen) => Ok(seen),
             Err(error) => {
-                let stopped = matches!(error, BaseError::Stopped(_));
-                let failure = failure(error);
-                let reason = if stopped { base.explain_stop().await } else { None };
-                Err(reason.into_iter().fold(failure, Failure::because))
+                let cause = if let BaseError::Stopped(cause) = error { Some(cause) } else { None };
+                let reason = if cause.is_some() { base.explain_stop().await } else { None };
+                let failure = reason.into_iter().fold(failure(error), Failure::because);
+                Err(match cause {
+                    Some(StopCause::Wheel { refusal, .. }) => self.cycles.advised(failure, refusal),
+                    _ => failure,
+                })
             }
         }
     }
@@ -223,13 +224,6 @@ async fn wheel(context: &Context, plan: &BasePlan, node: NodeId, turns: f64) -> 
     Ok(WheelSetup { drive, mode, turns })
 }
 
-/// Cyclic synchronous velocity where the model has it.
-fn speed_mode(drive: &Drive) -> ModeOfOperation {
-    let csv = ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY;
-    let has = drive.axis_description().is_some_and(|axis| axis.modes.contains(&csv));
-    if has { csv } else { ModeOfOperation::PROFILE_VELOCITY }
-}
-
 /// The lines of standard input, read by a thread: a read cannot be waited for beside the cycles. The thread ends with the input
 /// or with the process.
 fn lines_of_input() -> Receiver<String> {
@@ -262,7 +256,7 @@ async fn cycle(context: &Context, base: &mut Base, began: can::Instant) -> Resul
 
 /// True in about one cycle of each such period.
 fn is_progress_due(elapsed: Duration) -> bool {
-    elapsed.as_millis() % PROGRESS_PERIOD.as_millis() < PERIOD.as_millis()
+    elapsed.as_millis() % PROGRESS_PERIOD.as_millis() < BASE_PERIOD.as_millis()
 }
 
 fn place(state: &BaseState) -> String {
@@ -357,6 +351,10 @@ fn failure(error: BaseError) -> Failure {
         BaseError::Drive(error) => error.into(),
         BaseError::BadLimit { .. } | BaseError::BadTwist { .. } | BaseError::BeyondDrive { .. } => {
             Failure::usage(error.to_string())
+        }
+        BaseError::NotEnabled { limit, left, right } => {
+            let what = format!("the wheels were not enabled within {} s: {left}; {right}", limit.as_secs());
+            Failure::new(what).of_kind("base").next("ferrodrive explain NODE says what keeps each of them")
         }
         error => Failure::new(error.to_string()).of_kind("base"),
     }

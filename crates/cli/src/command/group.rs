@@ -6,14 +6,14 @@ use std::time::Duration;
 use canopen::NodeId;
 use cia402::ModeOfOperation;
 use master::Drive;
-use master::cyclic::CyclicOptions;
-use master::group::{AxisLimits, AxisSetup, Group, GroupError, Phase};
+use master::group::{AxisLimits, AxisSetup, Group, GroupError, Phase, StopCause};
 use master::units::{Along, Angle, Ramp, Rpm, Shown, Turns, parse_duration};
 use serde::Serialize;
-use testbench::machine_file::GroupPlan;
+use testbench::machine_file::{CyclePlan, GROUP_PERIOD, GroupPlan};
 use testbench::words::mode::mode;
 use testbench::words::node::node;
 
+use super::cycles::{CycleArgs, ask_why, refuse_too_full};
 use super::motion::speed;
 use crate::context::Context;
 use crate::failure::Failure;
@@ -23,9 +23,6 @@ use crate::output::{Format, Report};
 use crate::session;
 use plot::Paint;
 use plot::Table;
-
-/// What counts where neither the file nor the command line says it.
-const PERIOD: Duration = Duration::from_millis(5);
 
 /// How long the shafts may take to come to their last set-points before it is looked where they are.
 const SETTLING: Duration = Duration::from_millis(500);
@@ -58,7 +55,7 @@ enum What {
 /// and 60 (r/min)/s, within 100 ms of it, and lag by 0.2 turns. A drive that takes no positions in cycles is moved by speeds.
 #[derive(Debug, clap::Args)]
 struct Move {
-    /// Machine file, and the positions of the nodes: 1=90deg 4=0.5turn 2=-3000 (counts)
+    /// Machine file, and the positions of the nodes: 1=90deg 4=0.5turn 2=-3000counts
     #[arg(value_name = "FILE.toml|NODE=POSITION", required = true, value_parser = word)]
     words: Vec<Word>,
     /// Which [[group]] of the file (default: the one that has the nodes)
@@ -80,7 +77,7 @@ struct Move {
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     rounding: Option<Duration>,
     /// How far a shaft may be from its set-point before all are stopped
-    #[arg(long, value_name = "ANGLE")]
+    #[arg(long, value_name = "ANGLE", value_parser = angle)]
     following_error: Option<Angle>,
     /// From one SYNC to the next (default: the file's, or 5ms)
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
@@ -94,21 +91,6 @@ struct Move {
     guard: GuardArgs,
 }
 
-/// How late a host may be.
-#[derive(Clone, Copy, Debug, clap::Args)]
-pub(super) struct CycleArgs {
-    /// Cycles in a row that this command may be late for, or a drive's TPDO, before all are stopped
-    #[arg(long, value_name = "CYCLES", default_value_t = 2, value_parser = clap::value_parser!(u32).range(0..=100))]
-    tolerance: u32,
-}
-
-impl CycleArgs {
-    /// Drives that are guarded already, as the command line has it.
-    pub(super) const fn options(self) -> CyclicOptions {
-        CyclicOptions { guard: None, tolerance: self.tolerance }
-    }
-}
-
 /// A machine file, or where an axis is to go.
 #[derive(Clone, Debug)]
 enum Word {
@@ -118,15 +100,23 @@ enum Word {
 
 fn word(text: &str) -> Result<Word, String> {
     match text.split_once('=') {
-        Some((number, angle)) => {
-            let angle = angle.parse().map_err(|error| format!("{error}"))?;
-            Ok(Word::Target(node(number)?, angle))
-        }
+        Some((number, position)) => Ok(Word::Target(node(number)?, angle(position)?)),
         None if Path::new(text).extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) => {
             Ok(Word::File(text.into()))
         }
         None => Err("expected a machine file, FILE.toml, or NODE=POSITION, e.g. 1=90deg".into()),
     }
+}
+
+/// An angle with its unit: a group is spoken of in degrees, and a number alone would be counts of the drive.
+fn angle(text: &str) -> Result<Angle, String> {
+    let angle = text.parse().map_err(|error| format!("{error}"))?;
+    if text.ends_with(|c: char| c.is_ascii_digit() || c == '.') {
+        return Err(format!(
+            "'{text}' has no unit: expected an angle, e.g. {text}deg, 0.5turn or 1.57rad, or counts of the drive: {text}counts"
+        ));
+    }
+    Ok(angle)
 }
 
 /// A speed of the shaft: a group plans in turns.
@@ -201,6 +191,18 @@ struct Planned {
     period: Duration,
 }
 
+impl Planned {
+    /// What the bus has to carry.
+    fn cycle(&self) -> CyclePlan {
+        CyclePlan {
+            what: "the group".to_owned(),
+            period: self.period,
+            nodes: self.axes.iter().map(|axis| (axis.drive.node().id(), Some(axis.mode))).collect(),
+            is_base: false,
+        }
+    }
+}
+
 /// What was seen on the way.
 struct Seen {
     time: Duration,
@@ -239,6 +241,8 @@ impl Move {
 
     async fn run(&self, context: &Context) -> Result<GroupMoved, Failure> {
         let planned = self.plan(context).await?;
+        let drives: Vec<_> = planned.axes.iter().map(|axis| &axis.drive).collect();
+        refuse_too_full(context, &planned.cycle(), &drives).await?;
         let mut guards = Vec::new();
         for axis in &planned.axes {
             guards.push(self.guard.begin(context, &axis.drive).await?);
@@ -272,7 +276,7 @@ impl Move {
             Some(plan) => plan.axes.iter().map(|axis| axis.node).collect(),
             None => targets.iter().map(|(node, _)| *node).collect(),
         };
-        let period = self.period.or(plan.and_then(|plan| plan.period)).unwrap_or(PERIOD);
+        let period = self.period.or(plan.and_then(|plan| plan.period)).unwrap_or(GROUP_PERIOD);
         let mut planned = Planned { axes: Vec::new(), targets: Vec::new(), period };
         for (index, node) in nodes.into_iter().enumerate() {
             let drive = context.known_drive(node).await?;
@@ -351,10 +355,13 @@ impl Move {
         match self.follow(context, group, planned).await {
             Ok(seen) => Ok(seen),
             Err(error) => {
-                let stopped = matches!(error, GroupError::Stopped(_));
-                let failure = failure(error);
-                let reason = if stopped { group.explain_stop().await } else { None };
-                Err(reason.into_iter().fold(failure, Failure::because))
+                let cause = if let GroupError::Stopped(cause) = error { Some(cause) } else { None };
+                let reason = if cause.is_some() { group.explain_stop().await } else { None };
+                let failure = reason.into_iter().fold(failure(error), Failure::because);
+                Err(match cause {
+                    Some(StopCause::Axis { refusal, .. }) => self.cycles.advised(failure, refusal),
+                    _ => failure,
+                })
             }
         }
     }
@@ -424,6 +431,9 @@ fn failure(error: GroupError) -> Failure {
     match error {
         GroupError::Drive(error) => error.into(),
         GroupError::NoMode { node } => Failure::new(error.to_string()).at_node(node),
+        GroupError::NotEnabled { node, .. } => {
+            Failure::new(error.to_string()).of_kind("group").at_node(node).next(ask_why(node))
+        }
         GroupError::Path(_) | GroupError::Period { .. } | GroupError::BeyondDrive { .. } => {
             Failure::usage(error.to_string())
         }

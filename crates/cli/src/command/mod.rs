@@ -4,6 +4,7 @@ pub(crate) mod boot;
 pub(crate) mod check;
 pub(crate) mod completions;
 pub(crate) mod convert;
+mod cycles;
 pub(crate) mod dcf;
 pub(crate) mod decode;
 pub(crate) mod demo;

@@ -172,7 +172,7 @@ impl Sim {
         for placed in &machine.drives {
             world.set_timing(machine.timing_of(placed, TimingMode::Device));
             add_drive(&mut world, placed, eeproms.as_ref(), &warnings)?;
-            let notes = notes(placed.spec.node, placed.spec.model, self.verbose);
+            let notes = notes(placed.spec.node, placed.spec.model, self.verbose || global.verbose);
             notes.iter().for_each(|note| warnings.say(&plain(note)));
         }
         machine.join(&mut world).map_err(unusable)?;

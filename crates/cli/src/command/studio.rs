@@ -142,7 +142,7 @@ impl Journals for InFolder {
 }
 
 /// The bit rate, where the bus or the machine tells it: a CAN interface of Linux does not.
-fn bitrate(context: &Context) -> Option<Bitrate> {
+pub(super) fn bitrate(context: &Context) -> Option<Bitrate> {
     match context.bus() {
         BusSpec::SlcanSerial { bitrate, .. } | BusSpec::SlcanTcp { bitrate, .. } => *bitrate,
         bus => {

@@ -2,6 +2,7 @@
 
 mod broken_pipe;
 mod completion;
+mod cycles;
 mod eds;
 mod handbook;
 mod json;

@@ -63,6 +63,37 @@ fn a_sweep_tells_how_many_failed_how_figures_are_spread_and_how_to_repeat_a_run(
 }
 
 #[test]
+fn a_sweep_tells_what_came_of_each_value_and_a_value_that_is_set_is_not_swept() {
+    let directory = scratch("run-values");
+    let file = directory.join("values.toml");
+    let text = "[parameters]\nvolts = 24\n[sweep]\nvolts = { from = 20, to = 26, step = 2 }\n[machine]\n\
+                drive = [{ model = 'zlac8030l', node = 4 }]\n[[step]]\nat = '10ms'\ndo = '4 supply {volts}'\n\
+                [[expect]]\nfrom = '1s'\nuntil = '1100ms'\nalways = '4 supply > 23'\n";
+    std::fs::write(&file, text).unwrap();
+    let path = file.to_str().unwrap();
+    let swept = ferrodrive(&["run", path, "--seeds", "1..3", "--json"]);
+    let said = swept.json();
+    let rows: Vec<_> = said["values"].as_array().expect("a list").iter().collect();
+    let counts = rows.iter().map(|row| (row["value"].as_str(), row["passed"].as_u64(), row["failed"].as_u64()));
+    let expected = [("20", 0, 3), ("22", 0, 3), ("24", 3, 0), ("26", 3, 0)];
+    assert_eq!(
+        counts.collect::<Vec<_>>(),
+        expected.map(|(value, passed, failed)| (Some(value), Some(passed), Some(failed)))
+    );
+    let text = ferrodrive(&["run", path, "--seeds", "1..3"]).out;
+    let row = text.lines().find(|line| line.starts_with("volts") && line.contains("22")).expect("a row of 22");
+    assert_eq!(row.split_whitespace().collect::<Vec<_>>(), ["volts", "22", "3", "0", "3"], "{text}");
+
+    let set = ferrodrive(&["run", path, "--seeds", "1..3", "--set", "volts=26", "--json"]);
+    let said = set.json();
+    assert_eq!(
+        (&said["runs"], &said["passed"], &said["values"]),
+        (&3.into(), &3.into(), &Value::Array(Vec::new())),
+        "{said}"
+    );
+}
+
+#[test]
 fn of_several_scenarios_each_is_a_row_and_a_suite_and_one_that_fails_is_enough() {
     let directory = scratch("run-several");
     let path = |name: &str| directory.join(name).to_str().expect("UTF-8").to_owned();

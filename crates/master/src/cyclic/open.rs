@@ -223,15 +223,42 @@ impl Drive {
     }
 
     async fn configure_cyclic_with(&self, mode: ModeOfOperation, position: bool) -> Result<(), CyclicError> {
-        let (description, axis) = (self.known(INTENT)?, self.motion(INTENT)?);
+        let description = self.known(INTENT)?;
         let node = self.node().id();
-        let target = match set_point_of(description, axis, mode) {
-            Some(SetPointKind::Position(object)) => object,
-            Some(SetPointKind::Quantity(quantity)) => quantity.object,
-            None => return Err(CyclicError::NoSetPoint { node, mode }),
-        };
+        let Some(mapped) = self.pdos_of_cycle(mode, position)? else { return Ok(()) };
+        for config in mapped {
+            self.node().configure_pdo(&config, TimerUnits::of(description)).await?;
+        }
+        for config in self.adopt_pdos(description).await?.tpdos {
+            let number = config.pdo.number;
+            let known = self.node().network().look(|core| core.image().tpdo_id(node, number).is_some());
+            if known && number.position() >= description.axes.len() && !config.map.0.is_empty() {
+                self.node().switch_pdo_off(config.pdo).await?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The object that takes the set-point of a mode.
+    pub(crate) fn set_point_object(&self, mode: ModeOfOperation) -> Result<Mux, CyclicError> {
+        match set_point_of(self.known(INTENT)?, self.motion(INTENT)?, mode) {
+            Some(SetPointKind::Position(object)) => Ok(object),
+            Some(SetPointKind::Quantity(quantity)) => Ok(quantity.object),
+            None => Err(CyclicError::NoSetPoint { node: self.node().id(), mode }),
+        }
+    }
+
+    /// The RPDO and the TPDO that a mode needs in each cycle, with the position in every mode or not; `None` for a model whose mapping is
+    /// fixed. Nothing is written.
+    pub(crate) fn pdos_of_cycle(
+        &self,
+        mode: ModeOfOperation,
+        position: bool,
+    ) -> Result<Option<[PdoConfig; 2]>, CyclicError> {
+        let (description, axis) = (self.known(INTENT)?, self.motion(INTENT)?);
+        let target = self.set_point_object(mode)?;
         if description.pdo.fixed_mapping {
-            return Ok(());
+            return Ok(None);
         }
         let record =
             |mux: Mux| description.row(mux).map(|row| MappingRecord { mux, bits: (row.data_type.size() * 8) as u8 });
@@ -258,18 +285,10 @@ impl Drive {
         let command = map(&[Some(axis.object(CONTROLWORD)), Some(target)]);
         // A PDO of its own for each axis.
         let number = PdoNumber::at(usize::from(self.axis_id().0)).unwrap_or(PdoNumber::FIRST);
-        for (direction, map) in [(Direction::Rpdo, command), (Direction::Tpdo, state)] {
-            let config = PdoConfig::new(PdoId { direction, number }, map).transmission(TransmissionType::EVERY_SYNC);
-            self.node().configure_pdo(&config, TimerUnits::of(description)).await?;
-        }
-        for config in self.adopt_pdos(description).await?.tpdos {
-            let number = config.pdo.number;
-            let known = self.node().network().look(|core| core.image().tpdo_id(node, number).is_some());
-            if known && number.position() >= description.axes.len() && !config.map.0.is_empty() {
-                self.node().switch_pdo_off(config.pdo).await?;
-            }
-        }
-        Ok(())
+        let mapped = [(Direction::Rpdo, command), (Direction::Tpdo, state)];
+        Ok(Some(mapped.map(|(direction, map)| {
+            PdoConfig::new(PdoId { direction, number }, map).transmission(TransmissionType::EVERY_SYNC)
+        })))
     }
 
     /// Reads every PDO that the model has, and has this master send and receive them as they are set up.

@@ -112,7 +112,7 @@ pub enum GroupError {
     #[error("the stream has no room for a further point: wait for the next cycle, or give it a larger capacity")]
     StreamFull,
     /// The drives were not enabled in time.
-    #[error("axis {axis}, node {node}, was not enabled within {} s: {shows}. Drive::explain_refusal asks it why", limit.as_secs())]
+    #[error("axis {axis}, node {node}, was not enabled within {} s: {shows}", limit.as_secs())]
     NotEnabled {
         /// Which axis, from 1.
         axis: usize,

@@ -59,7 +59,7 @@ pub enum PathError {
         axes: usize,
     },
     /// A set-point is infinite or no number.
-    #[error("the set-point of axis {axis} is {value}: expected a finite number of turns. Nothing was moved")]
+    #[error("the set-point of axis {axis} is {value}: expected a finite number. Nothing was moved")]
     NoNumber {
         /// Which axis.
         axis: usize,
@@ -68,7 +68,7 @@ pub enum PathError {
     },
     /// A limit that allows nothing or that bounds nothing.
     #[error(
-        "the limit of axis {axis} for {quantity} is {value} {}: state a finite number above 0", quantity.unit()
+        "the limit of axis {axis} for {quantity} is {} {}: state a finite number above 0", degrees(*value), quantity.unit()
     )]
     BadLimit {
         /// Which axis.
@@ -79,7 +79,7 @@ pub enum PathError {
         value: f64,
     },
     /// Software limits that leave no place, or that are no numbers.
-    #[error("the software limits of axis {axis} are {low} to {high} turns: state the lower one first, both finite")]
+    #[error("the software limits of axis {axis} are {} to {} deg: state the lower one first, both finite", degrees(*low), degrees(*high))]
     BadRange {
         /// Which axis.
         axis: usize,
@@ -90,8 +90,8 @@ pub enum PathError {
     },
     /// A position outside the software limits.
     #[error(
-        "axis {axis} would be at {} turns, outside its software limits of {} to {} turns. Nothing was moved: \
-         choose a position within, or change the limits", Shown(*at_turns), Shown(*low), Shown(*high)
+        "axis {axis} would be at {} deg, outside its software limits of {} to {} deg. Nothing was moved: \
+         choose a position within, or change the limits", degrees(*at_turns), degrees(*low), degrees(*high)
     )]
     OutOfRange {
         /// Which axis.
@@ -106,7 +106,7 @@ pub enum PathError {
     /// The points of a stream are too far apart, or turn too sharply.
     #[error(
         "axis {axis} would need {quantity} of {} {unit}, and its limit is {} {unit}: let the path take \
-         longer, or change the limit", Shown(*needed), Shown(*limit), unit = quantity.unit()
+         longer, or change the limit", degrees(*needed), degrees(*limit), unit = quantity.unit()
     )]
     TooFast {
         /// Which axis.
@@ -132,14 +132,19 @@ pub enum PathError {
     NoPath(String),
 }
 
+/// Turns as people are told them: in degrees, as machine files and the command line have them.
+pub(super) const fn degrees(turns: f64) -> Shown {
+    Shown(turns * 360.0)
+}
+
 impl Quantity {
-    /// The unit of its values.
+    /// The unit in which people are told its values.
     pub const fn unit(self) -> &'static str {
         match self {
-            Self::Position | Self::FollowingError => "turns",
-            Self::Velocity => "turns/s",
-            Self::Acceleration => "turns/s^2",
-            Self::Jerk => "turns/s^3",
+            Self::Position | Self::FollowingError => "deg",
+            Self::Velocity => "deg/s",
+            Self::Acceleration => "deg/s^2",
+            Self::Jerk => "deg/s^3",
         }
     }
 }

@@ -4,8 +4,8 @@ use core::fmt;
 
 use canopen::NodeId;
 
+use super::limits::degrees;
 use crate::cyclic::Refusal;
-use crate::units::Shown;
 
 /// What a group is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,10 +84,10 @@ impl fmt::Display for StopCause {
             }
             Self::FollowingError { axis, node, error_turns, limit_turns } => write!(
                 f,
-                "the group was stopped: axis {axis}, node {node}, is {} turns from its set-point, and {} are allowed: \
+                "the group was stopped: axis {axis}, node {node}, is {} deg from its set-point, and {} are allowed: \
                  look whether it is blocked or overloaded, or allow more",
-                Shown(*error_turns),
-                Shown(*limit_turns)
+                degrees(*error_turns),
+                degrees(*limit_turns)
             ),
             Self::Underrun { cycles } => write!(
                 f,

@@ -321,7 +321,7 @@ mod tests {
         let (mut stream, _) = stream(1);
         assert_eq!(
             push(&mut stream, 0.003).unwrap_err().to_string(),
-            "axis 1 would need a velocity of 3 turns/s, and its limit is 2 turns/s: let the path take longer, or change \
+            "axis 1 would need a velocity of 1080 deg/s, and its limit is 720 deg/s: let the path take longer, or change \
              the limit"
         );
         push(&mut stream, 0.001).unwrap().unwrap();

@@ -223,11 +223,11 @@ mod tests {
             Trajectory::to_rest_at(&[rest(0.0)], &[to], core::slice::from_ref(limits), None).unwrap_err().to_string()
         };
         for value in [f64::NAN, f64::INFINITY, -1e300] {
-            assert!(refused(value, &good).contains("expected a finite number of turns"), "{}", refused(value, &good));
+            assert!(refused(value, &good).contains("expected a finite number"), "{}", refused(value, &good));
         }
         assert_eq!(
             refused(100.5, &good),
-            "axis 1 would be at 100.5 turns, outside its software limits of -100 to 100 turns. Nothing was moved: choose a \
+            "axis 1 would be at 36180 deg, outside its software limits of -36000 to 36000 deg. Nothing was moved: choose a \
              position within, or change the limits"
         );
         for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {

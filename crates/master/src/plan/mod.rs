@@ -17,6 +17,7 @@
 //!     period: Duration::from_micros(us),
 //!     jitter: Duration::ZERO,
 //!     ahead: vec![],
+//!     with: None,
 //!     trigger: None,
 //! };
 //! let frames = [frame(1, 2_500), frame(2, 3_500), frame(3, 3_500)];
@@ -24,9 +25,12 @@
 //! assert_eq!(worst.collect::<Vec<_>>(), [2_000, 3_000, 3_500].map(|us| Some(Duration::from_micros(us))));
 //! ```
 
+mod in_step;
 mod read;
 mod response_time;
 mod traffic;
 
 pub use response_time::{Bound, ErrorRate, Queued, Trigger, load, response_times};
-pub use traffic::{HostQueue, NodeTraffic, Plan, PlannedFrame, Purpose, Remark, Settings, most_nodes, plan};
+pub use traffic::{
+    HostQueue, NodeTraffic, Plan, PlannedFrame, Purpose, Remark, Settings, most_nodes, plan, shortest_cycle,
+};

@@ -10,10 +10,13 @@
 //!   known by name in place of all of the queue.
 //! - Frames that answer others ([`Trigger`]): a TPDO comes after SYNC, as much later as its device takes.
 //!
+//! Where that finds a frame late, a second analysis counts what comes in step once (`in_step.rs`), and the smaller bound is told.
+//!
 //! What is given is an upper bound for a bus without errors, or with one at most in each [`ErrorRate`].
 
 use std::time::Duration;
 
+use super::in_step::InStep;
 use can::{Bitrate, CanId, Frame, INTERFRAME_SPACE_BITS, fewest_frame_bits, most_frame_bits};
 
 /// A frame that comes again and again.
@@ -29,6 +32,9 @@ pub struct Queued {
     pub jitter: Duration,
     /// What of the other frames, by number, may stand before it in the queue of its sender's controller.
     pub ahead: Vec<usize>,
+    /// The frame at the beginning of whose period it is offered, period for period, as a host sends its set-points with SYNC.
+    /// `None`: it comes when it likes.
+    pub with: Option<usize>,
     /// The frame that it answers.
     pub trigger: Option<Trigger>,
 }
@@ -96,6 +102,7 @@ pub fn response_times(frames: &[Queued], bitrate: Bitrate, errors: Option<ErrorR
         frames: frames.iter().map(|frame| Sent::new(frame, bit_ns)).collect(),
     };
     let mut known = vec![Known { response_ns: Some(0), ..Known::default() }; frames.len()];
+    let mut is_settled = false;
     for _ in 0..ROUNDS {
         let before = known.clone();
         for (number, frame) in frames.iter().enumerate() {
@@ -108,17 +115,31 @@ pub fn response_times(frames: &[Queued], bitrate: Bitrate, errors: Option<ErrorR
             };
             (known[number].response_ns, known[number].queued_ns) = (response_ns, queued_ns);
         }
-        if known == before {
+        is_settled = known == before;
+        if is_settled {
             break;
         }
+    }
+    if !is_settled {
+        // What still grows has no bound that could be told.
+        known.iter_mut().for_each(|known| known.response_ns = None);
     }
     let settled = known.iter().zip(frames).map(|(known, frame)| {
         let begins_ns = frame.trigger.map_or(0, |trigger| after(&trigger, frames, bit_ns));
         let worst = known.response_ns.filter(|_| known.jitter_ns < HORIZON_NS);
-        worst.map(|response_ns| Duration::from_nanos(begins_ns + response_ns))
+        worst.map(|response_ns| begins_ns + response_ns)
     });
+    let mut settled: Vec<Option<u64>> = settled.collect();
+    let is_late = |(worst, sent): (&Option<u64>, &Sent<'_>)| worst.is_none_or(|worst_ns| worst_ns > sent.period_ns);
+    if settled.iter().zip(&bus.frames).any(is_late) && load(frames, bitrate) <= 1.0 {
+        let in_step = InStep::new(frames, bit_ns, bus.error_ns, ERROR_BITS).longest();
+        for (worst, in_step) in settled.iter_mut().zip(in_step) {
+            *worst = [*worst, in_step].into_iter().flatten().min();
+        }
+    }
     let times = bus.frames.iter().map(|sent| Duration::from_nanos(sent.time_ns));
-    times.zip(settled).map(|(transmission, worst)| Bound { transmission, worst }).collect()
+    let worst = settled.into_iter().map(|worst| worst.map(Duration::from_nanos));
+    times.zip(worst).map(|(transmission, worst)| Bound { transmission, worst }).collect()
 }
 
 /// Share of its time that the bus is taken, with the most stuff bits: 1 is all of it.
@@ -128,7 +149,7 @@ pub fn load(frames: &[Queued], bitrate: Bitrate) -> f64 {
 }
 
 /// When a triggered frame may be offered at the earliest, from the beginning of the trigger's period.
-fn after(trigger: &Trigger, frames: &[Queued], bit_ns: u64) -> u64 {
+pub(super) fn after(trigger: &Trigger, frames: &[Queued], bit_ns: u64) -> u64 {
     let by = &frames[trigger.by];
     u64::from(fewest_frame_bits(by.id.is_extended(), by.length)) * bit_ns + nanos(trigger.least)
 }
@@ -142,16 +163,20 @@ fn offered_late(frame: &Queued, frames: &[Queued], known: &[Known], bit_ns: u64)
     own_ns + latest_ns.saturating_sub(after(&trigger, frames, bit_ns))
 }
 
-fn nanos(time: Duration) -> u64 {
+pub(super) fn nanos(time: Duration) -> u64 {
     u64::try_from(time.as_nanos()).map_or(HORIZON_NS, |ns| ns.min(HORIZON_NS))
+}
+
+/// Time on the wire with the most stuff bits, interframe space included.
+pub(super) fn wire_ns(frame: &Queued, bit_ns: u64) -> u64 {
+    u64::from(most_frame_bits(frame.id.is_extended(), frame.length) + INTERFRAME_SPACE_BITS) * bit_ns
 }
 
 impl<'a> Sent<'a> {
     fn new(frame: &'a Queued, bit_ns: u64) -> Self {
-        let bits = most_frame_bits(frame.id.is_extended(), frame.length) + INTERFRAME_SPACE_BITS;
         Self {
             key: Frame::new(frame.id, &[]).arbitration_key(),
-            time_ns: u64::from(bits) * bit_ns,
+            time_ns: wire_ns(frame, bit_ns),
             period_ns: nanos(frame.period).max(1),
             ahead: &frame.ahead,
         }
@@ -289,7 +314,15 @@ mod tests {
 
     fn frame(id: u16, length: u8, period_us: u64) -> Queued {
         let period = Duration::from_micros(period_us);
-        Queued { id: CanId::standard(id), length, period, jitter: Duration::ZERO, ahead: vec![], trigger: None }
+        Queued {
+            id: CanId::standard(id),
+            length,
+            period,
+            jitter: Duration::ZERO,
+            ahead: vec![],
+            with: None,
+            trigger: None,
+        }
     }
 
     fn worst_us(frames: &[Queued], bitrate: Bitrate) -> Vec<Option<u128>> {

@@ -191,6 +191,18 @@ impl Plan {
     pub fn fits(&self) -> bool {
         self.frames.iter().all(PlannedFrame::is_in_time)
     }
+
+    /// Whether a host that tolerates so many cycles in a row without a PDO runs on this bus, where `cycle_alone` is the plan of the same
+    /// [without SDO and EMCY](Settings::cycle_alone): all is in time then, and what comes beside it delays no PDO for longer.
+    pub fn is_tolerable(&self, cycle_alone: &Self, tolerance: u32) -> bool {
+        let holds = |frame: &PlannedFrame| match frame.purpose {
+            Purpose::Sync | Purpose::Pdo(_) => {
+                frame.bound.worst.is_some_and(|worst| worst <= frame.deadline * (1 + tolerance))
+            }
+            _ => frame.is_in_time(),
+        };
+        cycle_alone.fits() && self.frames.iter().all(holds)
+    }
 }
 
 /// A frame before its bound is known.
@@ -240,6 +252,14 @@ pub fn plan(nodes: &[NodeTraffic], settings: &Settings, bitrate: Bitrate) -> Pla
     Plan { frames: planned, load, remarks }
 }
 
+/// The shortest cycle, in steps of 0.5 ms to 10 ms and then longer ones, in which everything is there in time that is sent beside no SDO
+/// and no EMCY; `None`: there is none up to 100 ms.
+pub fn shortest_cycle(nodes: &[NodeTraffic], settings: &Settings, bitrate: Bitrate) -> Option<Duration> {
+    let half_ms = (1..=20).chain([40, 100, 200]);
+    let mut cycles = half_ms.map(|half_ms| Duration::from_micros(500) * half_ms);
+    cycles.find(|cycle| plan(nodes, &Settings { cycle: *cycle, ..settings.cycle_alone() }, bitrate).fits())
+}
+
 /// How many nodes like these, over and over in their order, fit the bus at this cycle; at most 127. The PDOs of those that are
 /// added have the identifiers of the predefined connection set for their node-IDs.
 pub fn most_nodes(nodes: &[NodeTraffic], settings: &Settings, bitrate: Bitrate) -> usize {
@@ -277,8 +297,11 @@ impl NodeTraffic {
 }
 
 fn queued(id: CanId, length: u8, period: Duration) -> Queued {
-    Queued { id, length, period, jitter: Duration::ZERO, ahead: Vec::new(), trigger: None }
+    Queued { id, length, period, jitter: Duration::ZERO, ahead: Vec::new(), with: None, trigger: None }
 }
+
+/// The place of SYNC among the frames.
+const SYNC: usize = 0;
 
 /// SYNC and the RPDOs, in the order in which they are sent, and what comes between now and then.
 fn of_host(nodes: &[NodeTraffic], settings: &Settings) -> Vec<Draft> {
@@ -292,7 +315,7 @@ fn of_host(nodes: &[NodeTraffic], settings: &Settings) -> Vec<Draft> {
         for (config, cob_id) in node.pdos.iter().filter(|(config, cob_id)| is_sent(config, *cob_id)) {
             let is_sent = node.in_cycle.is_none_or(|number| number == config.pdo.number);
             if config.pdo.direction == Direction::Rpdo && is_sent {
-                let frame = in_cycle(cob_id.can_id(), config.map.bytes() as u8);
+                let frame = Queued { with: Some(SYNC), ..in_cycle(cob_id.can_id(), config.map.bytes() as u8) };
                 drafts.push(draft(Purpose::Pdo(config.pdo), Some(node.node), frame));
             }
         }

@@ -45,8 +45,8 @@ class Axis:
     following_error_deg: float = 72.0
     #: Software limits in degrees, low and high; None for an axis that turns without end.
     range_deg: Optional[tuple[float, float]] = None
-    #: Turns of the drive's shaft for one turn of the output, which all the others are of.
-    gear_ratio: float = 1.0
+    #: Turns of the drive's shaft for one turn of the output, which all the others are of; None is what the machine file says, or 1.
+    gear_ratio: Optional[float] = None
 
 
 class _Open:

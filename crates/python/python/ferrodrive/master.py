@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import asyncio
 import atexit
+import os
 import warnings
 import weakref
 from collections.abc import Sequence
@@ -39,11 +40,18 @@ class Network:
     """The network as its master sees it.
 
     :param bus: a :class:`~ferrodrive.World`, ``socketcand://HOST:PORT/can0`` or ``slcan:///dev/ttyACM0?bitrate=500k``
+    :param machine: the machine file that describes what is on a real bus: which models are where, and what stands behind their
+        shafts (``units``). :meth:`World.machine` has one already
     """
 
-    def __init__(self, bus: Union[World, str]) -> None:
+    def __init__(self, bus: Union[World, str], *, machine: Optional[Union[str, os.PathLike[str]]] = None) -> None:
         self._world = bus if isinstance(bus, World) else None
-        self._native = NativeNetwork.in_world(bus) if isinstance(bus, World) else NativeNetwork.on_bus(bus)
+        if isinstance(bus, World):
+            if machine is not None:
+                raise ValueError("a world knows its machine file: make it by World.machine(FILE)")
+            self._native = NativeNetwork.in_world(bus)
+        else:
+            self._native = NativeNetwork.on_bus(bus, None if machine is None else os.fspath(machine))
         _open.add(self)
 
     def __enter__(self) -> Network:
@@ -137,19 +145,20 @@ class Network:
 
     # What a network does.
 
-    def drive(self, node: int, model: Optional[str] = None, *, gear_ratio: float = 1.0) -> Drive:
+    def drive(self, node: int, model: Optional[str] = None, *, gear_ratio: Optional[float] = None) -> Drive:
         """A drive, to be moved in physical units.
 
-        :param model: as :func:`~ferrodrive.models` lists them, or a file that describes it (``FILE.eds``); without it the drive is
-            asked, and one that cannot be told is an error
-        :param gear_ratio: turns of its shaft for one turn of the output behind a gear: angles and speeds are the output's, counts the drive's
+        :param model: as :func:`~ferrodrive.models` lists them, or a file that describes it (``FILE.eds``); without it the machine file's, else
+            the drive is asked, and one that cannot be told is an error
+        :param gear_ratio: turns of its shaft for one turn of the output behind a gear: angles and speeds are the output's, counts the
+            drive's; without it what ``units`` of the machine file say, or 1
         """
-        model = model or self._finish(self._native.identify(node))
+        model = model or self._native.model_by_file(node) or self._finish(self._native.identify(node))
         if model is None:
             raise MasterError(f"the model of node {node} is not certain from its identity and objects; say which: drive({node}, MODEL)")
         return Drive(self, node, model, gear_ratio)
 
-    def async_drive(self, node: int, model: str, *, gear_ratio: float = 1.0) -> AsyncDrive:
+    def async_drive(self, node: int, model: str, *, gear_ratio: Optional[float] = None) -> AsyncDrive:
         """The same with coroutines."""
         return AsyncDrive(self, node, model, gear_ratio)
 
@@ -249,14 +258,14 @@ class Network:
 class _Orders:
     """What can be asked of a drive, as jobs. Both kinds of drive wait for these."""
 
-    def __init__(self, network: Network, node: int, model: str, gear_ratio: float = 1.0) -> None:
+    def __init__(self, network: Network, node: int, model: str, gear_ratio: Optional[float] = None) -> None:
         model_name(model)
         self.network = network
         #: Its node-ID, 1 to 127.
         self.node = node
         #: Its model.
         self.model = model
-        #: Turns of its shaft for one turn of the output.
+        #: Turns of its shaft for one turn of the output; None: as the machine file says, or 1.
         self.gear_ratio = gear_ratio
 
     def __repr__(self) -> str:
@@ -264,7 +273,8 @@ class _Orders:
 
     def _begin(self, do_: str, **order: Any) -> Job:
         given = {name: value for name, value in order.items() if value is not None}
-        return self.network._native.drive(self.node, self.model, {"do_": do_, "gear_ratio": self.gear_ratio, **given})
+        behind = {} if self.gear_ratio is None else {"gear_ratio": self.gear_ratio}
+        return self.network._native.drive(self.node, self.model, {"do_": do_, **behind, **given})
 
 
 def _angle(degrees: Optional[float], counts: Optional[int]) -> dict[str, Any]:

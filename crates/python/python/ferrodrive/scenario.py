@@ -110,7 +110,7 @@ class Sweep:
 
     :param path: a scenario file
     :param seeds: one seed after the other, as ``range(1, 101)``
-    :param set: values of parameters that the sweep does not go through
+    :param set: values of parameters; one that is set here is not swept
     """
 
     def __init__(

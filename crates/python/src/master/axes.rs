@@ -15,9 +15,8 @@ use testbench::words::mode::mode;
 
 use super::job::Trouble;
 use super::value::Value;
-use super::{Job, Network, duration, gear};
+use super::{Job, Network, duration};
 use crate::failure::bad_value;
-use crate::sheets::model_of;
 
 /// Points of a path that are given at once: a tenth of a second at 1 ms.
 const AHEAD: usize = 100;
@@ -42,7 +41,7 @@ pub(crate) struct AxisOrder {
     #[pyo3(item)]
     following_error_deg: f64,
     #[pyo3(item)]
-    gear_ratio: f64,
+    gear_ratio: Option<f64>,
 }
 
 /// A base, in plain values.
@@ -292,7 +291,8 @@ impl AxisOrder {
             jerk_turns_s3: self.jerk_rpm_s2 / 60.0,
             following_error_turns: self.following_error_deg / 360.0,
         };
-        let drive = Drive::new(network.node(self.node)?, model_of(&self.model)?).behind(gear(Some(self.gear_ratio))?);
+        let drive = Drive::new(network.node(self.node)?, network.model(self.node, &self.model)?)
+            .behind(network.gear(self.node, self.gear_ratio)?);
         Ok(AxisSetup { drive, mode: mode(&self.mode).map_err(bad_value)?, limits })
     }
 }
@@ -446,7 +446,8 @@ impl BaseOrder {
     fn setups(&self, network: &Network) -> PyResult<[WheelSetup; 2]> {
         let mode = mode(&self.mode).map_err(bad_value)?;
         let wheel = |(node, model, turns): &(u8, String, f64)| {
-            let drive = Drive::new(network.node(*node)?, model_of(model)?);
+            let drive =
+                Drive::new(network.node(*node)?, network.model(*node, model)?).behind(network.gear(*node, None)?);
             Ok::<_, PyErr>(WheelSetup { drive, mode, turns: *turns })
         };
         Ok([wheel(&self.wheels[0])?, wheel(&self.wheels[1])?])

@@ -33,6 +33,8 @@ pub struct Bus {
     pub(super) any_foreign: bool,
     pub(super) corruption: Corruption,
     pub(super) prng: Prng,
+    /// As it began: something has been decided by chance if it is another one now.
+    fresh: Prng,
     pub(super) events: VecDeque<WireEvent>,
     waiting: usize,
     statistics: Statistics,
@@ -63,6 +65,11 @@ pub enum Role {
 }
 
 impl Bus {
+    /// Whether chance has decided anything on it so far.
+    pub(crate) fn has_drawn(&self) -> bool {
+        self.prng != self.fresh
+    }
+
     /// A bus at `bitrate` with nobody on it. `seed` decides all random faults.
     pub fn new(bitrate: Bitrate, seed: u64) -> Self {
         Self {
@@ -74,6 +81,7 @@ impl Bus {
             any_foreign: false,
             corruption: Corruption::none(),
             prng: Prng::new(seed),
+            fresh: Prng::new(seed),
             events: VecDeque::new(),
             waiting: 0,
             statistics: Statistics::default(),

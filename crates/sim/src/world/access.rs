@@ -89,6 +89,7 @@ impl World {
     /// Makes the drive added under `number` as it is calculated, or as one on a bench. The world's seed decides its noise.
     pub fn set_realism(&mut self, number: u8, realism: Realism) -> Result<(), WorldError> {
         let seed = self.seed_of(number, 0);
+        self.has_chance |= realism == Realism::Full;
         self.with_drive(number, |drive, now| drive.set_realism(realism, seed, now))
     }
 

@@ -13,6 +13,7 @@ use super::bus_yml::{Bus, Slave};
 use super::device::Device;
 use super::finding::Place;
 use super::generated::{Generator, Planned, assignment};
+use crate::machine_file::CyclePlan;
 
 /// A bus as its file wants it.
 #[derive(Clone, Debug)]
@@ -25,9 +26,20 @@ pub struct Intended {
     pub bitrate: Bitrate,
     /// Period of SYNC; `None`: the master sends none.
     pub cycle: Option<Duration>,
+    /// What is moved in cycles; the first of them is what the bus is planned for.
+    pub moved: Vec<MovedAt>,
     /// The master's heartbeat.
     pub host_heartbeat: Option<(NodeId, Duration)>,
     /// Where what is about the whole bus is said.
+    pub at: Place,
+}
+
+/// What is moved in cycles, and where the file says its period.
+#[derive(Clone, Debug)]
+pub struct MovedAt {
+    /// What.
+    pub cycle: CyclePlan,
+    /// Where.
     pub at: Place,
 }
 
@@ -108,6 +120,7 @@ pub(super) fn of_bus_yml(bus: &Bus, devices: &[Option<Device>]) -> Result<Intend
         plan,
         bitrate: bitrate(bus, &nodes),
         nodes,
+        moved: Vec::new(),
         cycle: cycle.filter(|us| *us > 0).map(|us| Duration::from_micros(us.into())),
         host_heartbeat: beat.map(|period| (own, period)),
         at: bus.master.sync_period_us.as_ref().map_or(bus.master.at, |period| period.at),

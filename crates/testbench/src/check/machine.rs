@@ -11,7 +11,7 @@ use master::boot::{BootPlan, Expectation};
 
 use super::finding::{Findings, Place, Reporter, Severity};
 use super::generated::Planned;
-use super::intended::{Intended, IntendedNode};
+use super::intended::{Intended, IntendedNode, MovedAt};
 use super::predict::CYCLE;
 use super::{Checked, CheckedNode};
 use crate::document::reader::{self, Field, Parameters, Table};
@@ -56,11 +56,11 @@ pub fn of_machine(text: &str, folder: &Path) -> Result<Checked, BadFile> {
     let machine = Machine::parse_in(text, folder)?;
     // What the world around the drives refuses is told too.
     machine.build()?;
-    let places = reader::read(text, &Parameters::new(), "a machine file", |file| Ok::<_, Vec<Problem>>(places(file)));
-    let places = places.unwrap_or_default();
+    let both = |file: &Table<'_>| Ok::<_, Vec<Problem>>((places(file), periods(file)));
+    let (places, periods) = reader::read(text, &Parameters::new(), "a machine file", both).unwrap_or_default();
     let mut found = Findings::default();
     let mut report = Reporter { found: &mut found, rule: "shape", node: None };
-    let intended = intended(&machine, &places);
+    let intended = intended(&machine, &places, &periods);
     for (node, place) in &intended.nodes {
         report.node = Some(*node);
         traps(*node, place, &mut report);
@@ -96,7 +96,17 @@ fn places(file: &Table<'_>) -> BTreeMap<u8, Places> {
     drives.iter().filter_map(of_drive).collect()
 }
 
-fn intended(machine: &Machine, places: &BTreeMap<u8, Places>) -> Intended {
+/// Where each group and the base say their period, in the order of [`Machine::cycles`].
+fn periods(file: &Table<'_>) -> Vec<Place> {
+    let groups = file.get("group").and_then(|field| field.list("").ok()).unwrap_or_default();
+    let of = |field: &Field<'_>| {
+        let period = field.table("", "").ok().and_then(|table| table.get("period"));
+        period.as_ref().map_or_else(|| located(field), located)
+    };
+    groups.iter().chain(&file.get("base")).map(of).collect()
+}
+
+fn intended(machine: &Machine, places: &BTreeMap<u8, Places>, periods: &[Place]) -> Intended {
     let mut nodes = BTreeMap::new();
     let mut plan = BootPlan::new([]);
     for (node, model) in machine.models() {
@@ -113,13 +123,21 @@ fn intended(machine: &Machine, places: &BTreeMap<u8, Places>) -> Intended {
         let (name, of_sheet) = (model.name.to_owned(), BTreeMap::new());
         nodes.insert(node, IntendedNode { name, at, description: model, writes, of_sheet });
     }
+    let top = Place { line: 1, column: 1 };
+    let places = periods.iter().copied().chain(std::iter::repeat(top));
+    let mut moved: Vec<_> = machine.cycles().zip(places).map(|(cycle, at)| MovedAt { cycle, at }).collect();
+    // The one that fills the bus most is what is foretold.
+    let fullest = machine.fullest_cycle();
+    moved.sort_by_key(|moved| Some(&moved.cycle) != fullest.as_ref());
+    let first = moved.first();
     Intended {
         plan,
         nodes,
         bitrate: machine.bitrate.unwrap_or(Bitrate::K500),
-        cycle: Some(CYCLE),
+        cycle: Some(first.map_or(CYCLE, |first| first.cycle.period)),
         host_heartbeat: None,
-        at: Place { line: 1, column: 1 },
+        at: first.map_or(top, |first| first.at),
+        moved,
     }
 }
 

@@ -24,7 +24,7 @@ use sim::World;
 
 pub use finding::{Finding, Findings, Place, Severity};
 pub use generated::Planned;
-pub use intended::{Intended, IntendedNode};
+pub use intended::{Intended, IntendedNode, MovedAt};
 pub use live::{LiveDeviation, LiveNode};
 pub use machine::of_machine;
 pub use predict::{PredictedFrame, PredictedNode, Prediction};
@@ -72,7 +72,7 @@ impl Checked {
         let predicted = match &self.intended {
             Ok(intended) => self
                 .world(intended)
-                .and_then(|world| predict::predict(intended, world, &mut report))
+                .and_then(|world| predict::predict(intended, self.machine.as_ref(), world, &mut report))
                 .map_err(|why| (intended.at, why)),
             Err(why) => Err((Place { line: 1, column: 1 }, why.clone())),
         };

@@ -3,6 +3,7 @@
 
 use std::time::Duration;
 
+use can::Bitrate;
 use canopen::pdo::PdoId;
 use canopen::{Mux, NmtState, NodeId};
 use master::boot::{BootReport, ErrorStatus, NodeReport, Verdict};
@@ -14,7 +15,8 @@ use sim::machine::{Order, TimingMode, order};
 use sim::{World, block_on_for};
 
 use super::finding::{Place, Reporter, Severity};
-use super::intended::{Intended, IntendedNode};
+use super::intended::{Intended, IntendedNode, MovedAt};
+use crate::machine_file::{Machine, TOLERANCE, too_full_at};
 
 /// What a bus will do.
 #[derive(Clone, Debug, Serialize)]
@@ -99,7 +101,12 @@ pub(super) fn world(intended: &Intended) -> Result<World, String> {
 ///
 /// # Errors
 /// Why nothing can be told.
-pub(super) fn predict(intended: &Intended, mut world: World, report: &mut Reporter<'_>) -> Result<Prediction, String> {
+pub(super) fn predict(
+    intended: &Intended,
+    machine: Option<&Machine>,
+    mut world: World,
+    report: &mut Reporter<'_>,
+) -> Result<Prediction, String> {
     let network = Network::new();
     world.add_station(network.clone());
     world.run_for(SWITCHED_ON);
@@ -114,17 +121,26 @@ pub(super) fn predict(intended: &Intended, mut world: World, report: &mut Report
         for (node, place) in &intended.nodes {
             let drive = Drive::new(network.node(*node), place.description);
             if let Ok(read) = NodeTraffic::of(&drive).await {
-                traffic.push(read);
+                traffic.push((drive, read));
             }
         }
         traffic
     };
-    let traffic = block_on_for(&mut world, LIMIT, reading).map_err(|error| error.to_string())?;
+    let mut read = block_on_for(&mut world, LIMIT, reading).map_err(|error| error.to_string())?;
+    // What was refused at the boot-up, or not written to a node that was operational, is meant all the same.
+    if let Some(machine) = machine {
+        read.iter_mut().for_each(|(_, traffic)| *traffic = machine.set_up(traffic.clone()));
+    }
+    of_boot(intended, &booted, report);
+    let mut traffic: Vec<_> = read.iter().map(|(_, traffic)| traffic.clone()).collect();
+    for moved in intended.moved.iter().rev() {
+        traffic = in_cycles(moved, &read, report);
+        of_cycle(moved, &traffic, intended.bitrate, report);
+    }
     let cycle = intended.cycle.unwrap_or(CYCLE);
     let settings = Settings { host_heartbeat: intended.host_heartbeat, ..Settings::new(cycle) };
     let planned = plan(&traffic, &settings, intended.bitrate);
-    of_boot(intended, &booted, report);
-    of_plan(intended, &planned, report);
+    of_plan(intended, &planned, &traffic, &settings, report);
     without_sync(intended, &traffic, report);
     let nodes = booted.nodes.iter().filter_map(|node| predicted(intended, node)).collect();
     let frames = planned.frames.iter().map(|frame| of_frame(intended, frame, &traffic)).collect();
@@ -175,8 +191,53 @@ fn of_boot(intended: &Intended, booted: &BootReport, report: &mut Reporter<'_>) 
     report.node = None;
 }
 
-fn of_plan(intended: &Intended, planned: &Plan, report: &mut Reporter<'_>) {
+/// What each node sends while something is moved in cycles; a drive that cannot be moved so is told.
+fn in_cycles(moved: &MovedAt, read: &[(Drive, NodeTraffic)], report: &mut Reporter<'_>) -> Vec<NodeTraffic> {
+    report.rule = "cycle-mode";
+    let traffic = read.iter().map(|(drive, traffic)| {
+        moved.cycle.traffic(drive, traffic.clone()).unwrap_or_else(|error| {
+            report.node = Some(traffic.node);
+            let what = format!("{} cannot be moved: {error}", moved.cycle.what);
+            report.say(Severity::Error, moved.at, what, "give the axis another `mode`");
+            traffic.clone()
+        })
+    });
+    let traffic = traffic.collect();
+    report.node = None;
+    traffic
+}
+
+/// Whether the bus carries the cycle of a group or a base, and those who move it will begin.
+fn of_cycle(moved: &MovedAt, traffic: &[NodeTraffic], bitrate: Bitrate, report: &mut Reporter<'_>) {
+    report.rule = "cycle-load";
+    if let Some(full) = too_full_at(traffic, moved.cycle.period, bitrate) {
+        report.say(Severity::Error, moved.at, format!("{}: {}", moved.cycle.what, full.what), full.next);
+    }
+}
+
+fn of_plan(
+    intended: &Intended,
+    planned: &Plan,
+    traffic: &[NodeTraffic],
+    settings: &Settings,
+    report: &mut Reporter<'_>,
+) {
     report.rule = "bus-load";
+    if !intended.moved.is_empty() {
+        let alone = plan(traffic, &settings.cycle_alone(), intended.bitrate);
+        // A cycle that does not fit has been told.
+        if alone.fits() && !planned.is_tolerable(&alone, TOLERANCE) {
+            let what = format!(
+                "SDO requests and EMCY beside the cycle may keep a PDO away for more than the {TOLERANCE} cycles that are tolerated, and so \
+                 stop the motion"
+            );
+            let next = "take a longer period, or ask nothing while it moves; `ferrodrive plan` shows each frame";
+            report.say(Severity::Warning, intended.at, what, next);
+        }
+        if alone.load > 1.0 || alone.fits() {
+            return remarks(intended, planned, report);
+        }
+    }
     let (percent, rate) = (planned.load * 100.0, intended.bitrate.bits_per_second() / 1000);
     let late: Vec<&PlannedFrame> = planned.frames.iter().filter(|frame| !frame.is_in_time()).collect();
     let cycle = intended.cycle.unwrap_or(CYCLE).as_micros();
@@ -195,6 +256,11 @@ fn of_plan(intended: &Intended, planned: &Plan, report: &mut Reporter<'_>) {
         );
         report.say(Severity::Warning, intended.at, what, next);
     }
+    remarks(intended, planned, report);
+}
+
+/// What was taken or left out.
+fn remarks(intended: &Intended, planned: &Plan, report: &mut Reporter<'_>) {
     for remark in &planned.remarks {
         let (Remark::Unbounded(node, pdo) | Remark::OnRequest(node, pdo) | Remark::Shared(node, pdo, _)) = *remark;
         let place = intended

@@ -6,6 +6,7 @@
 
 mod bodies;
 mod configuration;
+mod cycles;
 mod motion;
 mod surroundings;
 mod units;
@@ -28,6 +29,7 @@ use crate::words::drive::DriveSpec;
 use crate::words::node::node;
 use bodies::Joined;
 pub use configuration::{mapped, pdo_id};
+pub use cycles::{BASE_PERIOD, CyclePlan, GROUP_PERIOD, TOLERANCE, TooFull, speed_mode, too_full, too_full_at};
 pub use motion::{AxisPlan, BasePlan, GroupPlan, WATCHDOG};
 
 const EXAMPLE: &str =
@@ -213,11 +215,6 @@ impl Machine {
             revision_number: known(model.revision_number),
         };
         Some(Parameters { identity, node: Some(node), values: placed.start_up.clone() })
-    }
-
-    /// What stands behind the shaft of a drive: `units`. [`Gear::DIRECT`] for a node that is not in the file.
-    pub fn gear(&self, node: NodeId) -> Gear {
-        self.drives.iter().find(|drive| drive.spec.node == node).map_or(Gear::DIRECT, |drive| drive.gear)
     }
 
     /// The writes that set a node up so, whatever it has, in the order of CiA 301; none for a node that is not in the file, or

@@ -249,7 +249,7 @@ mod tests {
         assert!(with("node = 4", "node = 9").contains("line 11, column 8: the file has no [[drive]] at node 9"));
         assert!(with("velocity_deg_s = 360\n", "").contains("an axis of a group needs 'velocity_deg_s'"));
         let zero = with("jerk_deg_s3 = 3600", "jerk_deg_s3 = 0");
-        assert!(zero.contains("the limit of axis 1 for a jerk is 0 turns/s^3"), "{zero}");
+        assert!(zero.contains("the limit of axis 1 for a jerk is 0 deg/s^3"), "{zero}");
         assert!(with("[-90, 180]", "[180, -90]").contains("state the lower one first"));
         assert!(with("[-90, 180]", "[1]").contains("'range_deg' is a list of 1; expected two bounds in degrees"));
         assert!(with("'pv'", "'fast'").contains("'fast' is no mode of operation"));

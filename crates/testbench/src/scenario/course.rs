@@ -75,9 +75,10 @@ impl Course {
         network.set_models(with_told(scenario.machine.models().map(|(_, model)| model)));
         let host = world.add_station(network.clone());
         let desk = Rc::new(RefCell::new(Desk::default()));
+        let machine = Rc::new(scenario.machine.clone());
         let tasks = scenario.hosts.iter().enumerate().map(|(number, it)| {
-            let models = scenario.machine.models().collect();
-            let post = Post { number, name: it.name.clone(), network: network.clone(), models, desk: Rc::clone(&desk) };
+            let (machine, desk) = (Rc::clone(&machine), Rc::clone(&desk));
+            let post = Post { number, name: it.name.clone(), network: network.clone(), machine, desk };
             let future = run(post, it.start, it.lines.clone());
             Task { future: Some(Box::pin(future)), woken: Arc::new(Woken(AtomicBool::new(true))) }
         });
@@ -178,6 +179,7 @@ impl Course {
             rows,
             figures: self.script.figures(&self.scenario),
             digest: world.digest().value(),
+            is_random: world.is_random(),
             last_frames: Vec::new(),
         };
         if !outcome.passed() {

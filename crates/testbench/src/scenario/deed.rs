@@ -8,9 +8,10 @@ use std::time::Duration;
 use can::Frame;
 use canopen::pdo::{Direction, PdoId, PdoNumber};
 use canopen::{NmtCommand, NodeId};
+use master::Drive;
 use master::drive::{HomingOptions, MotionOptions};
 use master::pdo::TransmissionType;
-use master::units::{Amperes, Angle, Ramp, Rpm, parse_duration};
+use master::units::{Along, Amperes, Angle, Ramp, Rpm, parse_duration};
 use sim::Place;
 
 use super::condition::Condition;
@@ -47,22 +48,31 @@ pub enum Deed {
     /// An intent without a value.
     Drive(Place, Intent),
     /// Turns at a speed.
-    Velocity(Place, Rpm, MotionOptions),
+    Velocity(Place, Along<Rpm>, Manner),
     /// Turns to a position, or by an angle.
     Move {
         /// Which axis.
         place: Place,
         /// Where to.
-        to: Angle,
+        to: Along<Angle>,
         /// By so much from the last target.
         relative: bool,
         /// How.
-        options: MotionOptions,
+        manner: Manner,
     },
     /// Pushes with a current.
     Torque(Place, Amperes),
     /// Finds the reference position.
-    Home(Place, i8, HomingOptions),
+    Home {
+        /// Which axis.
+        place: Place,
+        /// The method of CiA 402.
+        method: i8,
+        /// How long it may take; the master's own limit without it.
+        within: Option<Duration>,
+        /// How.
+        manner: Manner,
+    },
     /// Uploads an object.
     Read(NodeId, ObjectArg),
     /// Downloads an object.
@@ -83,6 +93,45 @@ pub enum Deed {
     Wait(Duration),
     /// Waits until something is so.
     WaitFor(Condition, Duration),
+}
+
+/// How a motion is to be made, as it is typed: along a way too, which becomes a rotation by the [gear](Drive::gear) of a drive.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Manner {
+    /// Largest speed on the way.
+    pub speed: Option<Along<Rpm>>,
+    /// How fast the speed may rise.
+    pub acceleration: Option<Along<Ramp>>,
+    /// How fast the speed may fall.
+    pub deceleration: Option<Along<Ramp>>,
+    /// The next line does not wait for the end of it.
+    pub no_wait: bool,
+}
+
+impl Manner {
+    /// The same for this drive.
+    ///
+    /// # Errors
+    /// [`master::Error::NoFeed`] for a way, where nothing says how far a turn of the output moves something.
+    pub fn motion(&self, drive: &Drive) -> Result<MotionOptions, master::Error> {
+        let ramp = |wish: Option<Along<Ramp>>| wish.map(|wish| drive.turning(wish)).transpose();
+        Ok(MotionOptions {
+            speed: self.speed.map(|wish| drive.turning(wish)).transpose()?,
+            acceleration: ramp(self.acceleration)?,
+            deceleration: ramp(self.deceleration)?,
+            wait: !self.no_wait,
+            ..MotionOptions::default()
+        })
+    }
+
+    /// The same for a homing that may take this long.
+    ///
+    /// # Errors
+    /// As [`motion`](Self::motion).
+    pub fn homing(&self, drive: &Drive, within: Option<Duration>) -> Result<HomingOptions, master::Error> {
+        let MotionOptions { speed, wait, .. } = self.motion(drive)?;
+        Ok(HomingOptions { speed, wait, limit: within.unwrap_or(HomingOptions::default().limit) })
+    }
 }
 
 /// What is done with process data.
@@ -183,8 +232,8 @@ fn of_node(place_word: &str, words: &[&str]) -> Result<Deed, String> {
         ["pdo", ref rest @ ..] => pdo(rest).map(|deed| Ok(Deed::Pdo(id()?, deed)))?,
         ["write", name, ref value @ ..] if !value.is_empty() => Ok(Deed::Write(id()?, object(name)?, value.join(" "))),
         ["velocity", speed, ref rest @ ..] => {
-            let Options { motion, speed: None, within: None } = options(rest)? else { return Err(unknown(words)) };
-            Ok(Deed::Velocity(place, quantity(speed)?, motion))
+            let (manner @ Manner { speed: None, .. }, None) = manner(rest)? else { return Err(unknown(words)) };
+            Ok(Deed::Velocity(place, quantity(speed)?, manner))
         }
         ["move", "by", to, ref rest @ ..] => movement(place, to, true, rest),
         ["move", to, ref rest @ ..] => movement(place, to, false, rest),
@@ -193,9 +242,8 @@ fn of_node(place_word: &str, words: &[&str]) -> Result<Deed, String> {
             let method = method
                 .parse()
                 .map_err(|_| format!("'{method}' is no homing method; expected a number, as in: home 17"))?;
-            let Options { motion, speed, within } = options(rest)?;
-            let limit = within.unwrap_or(HomingOptions::default().limit);
-            Ok(Deed::Home(place, method, HomingOptions { speed, limit, wait: motion.wait }))
+            let (manner, within) = manner(rest)?;
+            Ok(Deed::Home { place, method, within, manner })
         }
         _ => Err(unknown(words)),
     }
@@ -246,23 +294,18 @@ fn unknown(words: &[&str]) -> String {
 }
 
 fn movement(place: Place, to: &str, relative: bool, rest: &[&str]) -> Result<Deed, String> {
-    let Options { motion, speed, within: None } = options(rest)? else { return Err(unknown(rest)) };
-    Ok(Deed::Move { place, to: quantity(to)?, relative, options: MotionOptions { speed, ..motion } })
+    let (manner, None) = manner(rest)? else { return Err(unknown(rest)) };
+    Ok(Deed::Move { place, to: quantity(to)?, relative, manner })
 }
 
-/// What may stand behind an intent.
-struct Options {
-    motion: MotionOptions,
-    speed: Option<Rpm>,
-    within: Option<Duration>,
-}
-
-fn options(mut words: &[&str]) -> Result<Options, String> {
-    let mut options = Options { motion: MotionOptions::default(), speed: None, within: None };
+/// What may stand behind an intent: how, and for how long at most.
+fn manner(mut words: &[&str]) -> Result<(Manner, Option<Duration>), String> {
+    let mut manner = Manner::default();
+    let mut within = None;
     while let Some((&word, rest)) = words.split_first() {
         words = rest;
         if word == "no-wait" {
-            options.motion.wait = false;
+            manner.no_wait = true;
             continue;
         }
         let Some((&value, rest)) = rest.split_first() else {
@@ -272,10 +315,10 @@ fn options(mut words: &[&str]) -> Result<Options, String> {
         };
         words = rest;
         match word {
-            "at" => options.speed = Some(quantity(value)?),
-            "acceleration" => options.motion.acceleration = Some(quantity::<Ramp>(value)?),
-            "deceleration" => options.motion.deceleration = Some(quantity::<Ramp>(value)?),
-            "within" => options.within = Some(time(value)?),
+            "at" => manner.speed = Some(quantity(value)?),
+            "acceleration" => manner.acceleration = Some(quantity(value)?),
+            "deceleration" => manner.deceleration = Some(quantity(value)?),
+            "within" => within = Some(time(value)?),
             _ => {
                 return Err(format!(
                     "'{word}' says nothing about a motion; expected at, acceleration, deceleration, within or no-wait"
@@ -283,7 +326,7 @@ fn options(mut words: &[&str]) -> Result<Options, String> {
             }
         }
     }
-    Ok(options)
+    Ok((manner, within))
 }
 
 fn quantity<T: FromStr<Err = master::units::ParseUnitError>>(text: &str) -> Result<T, String> {
@@ -315,6 +358,8 @@ mod tests {
             "4 enable",
             "4 velocity -60rpm acceleration 500ms no-wait",
             "5.2 move by 90deg at 30rpm",
+            "2 move 40mm at 20mm/s acceleration 100mm/s2",
+            "2 velocity -5mm/s deceleration 100mm/s2",
             "4 move 32000",
             "2 home 17 at 60rpm within 5s",
             "4 write 6060 profile velocity",

@@ -83,7 +83,7 @@ impl Scenario {
         Self::parse_with(text, folder, &Parameters::new())
     }
 
-    /// The same scenario with other values of its parameters.
+    /// The same scenario with other values of some of its parameters. What is given a value is not swept any more.
     ///
     /// # Errors
     /// A name that is no parameter of it, or what becomes wrong with the value.
@@ -103,7 +103,9 @@ impl Scenario {
             }
         }
         let read = |file: &Table<'_>| Self::from_table(file, text, folder, &parameters);
-        reader::read(text, &parameters, "a scenario", read).map_err(bad)
+        let mut scenario = reader::read(text, &parameters, "a scenario", read).map_err(bad)?;
+        scenario.sweep.retain(|axis| !values.contains_key(&axis.name));
+        Ok(scenario)
     }
 
     fn from_table(file: &Table<'_>, text: &str, folder: &Path, parameters: &Parameters) -> Many<Self> {

@@ -16,13 +16,14 @@ use devices::Description;
 use master::core::PdoMap;
 use master::drive::{MotionReport, SwitchedOff};
 use master::pdo::{PdoConfig, TimerUnits};
-use master::units::Shown;
+use master::units::{Along, Angle, Shown};
 use master::{Drive, Network};
 use sim::Place;
 
-use super::deed::{Deed, Intent, PdoDeed};
+use super::deed::{Deed, Intent, Manner, PdoDeed};
 use super::outcome::{Row, RowKind, Verdict};
 use super::plan::{HostLine, Wanted};
+use crate::machine_file::Machine;
 use crate::words::object::ObjectArg;
 use crate::words::value::{typed_value, value};
 
@@ -57,7 +58,7 @@ pub(super) struct Post {
     pub(super) number: usize,
     pub(super) name: String,
     pub(super) network: Network,
-    pub(super) models: Vec<(NodeId, &'static Description)>,
+    pub(super) machine: Rc<Machine>,
     pub(super) desk: Rc<RefCell<Desk>>,
 }
 
@@ -124,24 +125,22 @@ impl Wanted {
 impl Post {
     /// Waits until each drive has booted and looked about; not for ever for one that does not.
     async fn wait_until_booted(&self) {
-        let boots =
-            self.models.iter().map(|(node, _)| self.network.node(*node).wait(|node| node.facts.boot_up, BOOT_PATIENCE));
+        let boots = self
+            .machine
+            .models()
+            .map(|(node, _)| self.network.node(node).wait(|node| node.facts.boot_up, BOOT_PATIENCE));
         master::join_all(boots).await;
         self.network.sleep(SETTLING_TIME).await;
     }
 
     fn drive(&self, place: Place) -> Result<Drive, String> {
         let id = NodeId::new(place.node).ok_or("there is no such node")?;
-        let node = self.network.node(id);
-        let drive = match self.model(id) {
-            Some(model) => Drive::new(node, model),
-            None => Drive::of_unknown_model(node),
-        };
+        let drive = self.machine.drive(self.network.node(id));
         drive.axis(place.axis).map_err(|error| error.to_string())
     }
 
     fn model(&self, id: NodeId) -> Option<&'static Description> {
-        self.models.iter().find(|(node, _)| *node == id).map(|(_, model)| *model)
+        self.machine.models().find(|(node, _)| *node == id).map(|(_, model)| model)
     }
 
     async fn perform(&self, line: usize, deed: &Deed) -> Done {
@@ -149,13 +148,20 @@ impl Post {
         let network = &self.network;
         match deed {
             Deed::Drive(place, intent) => self.intend(*place, *intent).await,
-            Deed::Velocity(place, speed, options) => moved(self.drive(*place)?.velocity(*speed, *options).await),
-            Deed::Move { place, to, relative: true, options } => {
-                moved(self.drive(*place)?.move_relative(*to, *options).await)
+            Deed::Velocity(place, speed, manner) => {
+                let drive = self.drive(*place)?;
+                let turn = async { drive.velocity(drive.turning(*speed)?, manner.motion(&drive)?).await };
+                moved(turn.await)
             }
-            Deed::Move { place, to, options, .. } => moved(self.drive(*place)?.move_absolute(*to, *options).await),
+            Deed::Move { place, to, relative, manner } => {
+                moved(move_drive(&self.drive(*place)?, *to, *relative, manner).await)
+            }
             Deed::Torque(place, current) => moved(self.drive(*place)?.torque(*current).await),
-            Deed::Home(place, method, options) => moved(self.drive(*place)?.home(*method, *options).await),
+            Deed::Home { place, method, within, manner } => {
+                let drive = self.drive(*place)?;
+                let home = async { drive.home(*method, manner.homing(&drive, *within)?).await };
+                moved(home.await)
+            }
             Deed::Read(node, object) => self.read(*node, object).await,
             Deed::Write(node, object, text) => self.write(*node, object, text).await,
             Deed::Pdo(node, pdo) => self.exchange(*node, pdo).await,
@@ -330,6 +336,16 @@ fn number_of(raw: u64, length: usize, row: Option<&'static Entry>) -> (String, O
     let signed = row.is_some_and(|row| row.data_type.is_signed());
     let number = if signed { i128::from((raw << unused) as i64 >> unused) } else { i128::from(raw) };
     (format!("{number} ({raw:0width$X}h)", width = 2 * length), Some(number as f64))
+}
+
+async fn move_drive(
+    drive: &Drive,
+    to: Along<Angle>,
+    relative: bool,
+    manner: &Manner,
+) -> Result<MotionReport, master::Error> {
+    let (to, options) = (drive.turning(to)?, manner.motion(drive)?);
+    if relative { drive.move_relative(to, options).await } else { drive.move_absolute(to, options).await }
 }
 
 fn moved(report: Result<MotionReport, master::Error>) -> Done {

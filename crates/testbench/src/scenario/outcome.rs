@@ -20,6 +20,8 @@ pub struct Outcome {
     pub figures: Vec<(String, f64)>,
     /// Hash over all frames and shaft angles: equal for equal runs.
     pub digest: u64,
+    /// Whether the seed may have decided anything. If not, every other seed gives the same run.
+    pub is_random: bool,
     /// The last frames on the wire, in candump format, of a run that failed.
     pub last_frames: Vec<String>,
 }

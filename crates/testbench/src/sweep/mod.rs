@@ -3,6 +3,7 @@
 //! A [`Sweep`] numbers its runs; whoever has threads makes [`Sweep::run`] of the numbers in any order, and adds what comes of
 //! them to a [`Summary`]. The summary does not depend on that order, and its size not on the number of runs.
 
+mod alike;
 pub mod file;
 mod report;
 mod summary;
@@ -18,8 +19,9 @@ use crate::machine_file::Machine;
 use crate::scenario::{Outcome, Runner, Scenario};
 use file::Axis;
 
+pub use alike::Alike;
 pub use report::{SweepReport, Worst};
-pub use summary::{Distribution, Failed, Summary};
+pub use summary::{Distribution, Failed, OfValue, Summary};
 
 /// Runs that a sweep may have: more would take longer than anybody waits.
 pub const MOST_RUNS: u64 = 1_000_000_000;
@@ -104,15 +106,20 @@ impl Sweep {
         realism.into_iter().chain(timing).collect::<Vec<_>>().join(" and ")
     }
 
+    /// Each parameter that is swept, and which of its values the run of this number has.
+    fn places(&self, number: u64) -> impl Iterator<Item = (&Axis, usize)> {
+        let mut rest = self.setting(number);
+        self.axes.iter().map(move |axis| {
+            let count = axis.values.len() as u64;
+            let place = (rest % count) as usize;
+            rest /= count;
+            (axis, place)
+        })
+    }
+
     /// The run of this number, from 0 on: the seed changes first, then the parameters in the order of the alphabet.
     pub fn point(&self, number: u64) -> Point {
-        let mut rest = self.setting(number);
-        let values = self.axes.iter().map(|axis| {
-            let count = axis.values.len() as u64;
-            let value = axis.values[(rest % count) as usize].clone();
-            rest /= count;
-            (axis.name.clone(), value)
-        });
+        let values = self.places(number).map(|(axis, place)| (axis.name.clone(), axis.values[place].clone()));
         Point { values: values.collect(), seed: self.seeds.start() + number % self.seeds_of_a_setting() }
     }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::{Distribution, Failed, Summary, Sweep};
+use super::{Distribution, Failed, OfValue, Summary, Sweep};
 
 /// What came of a sweep.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -23,9 +23,11 @@ pub struct SweepReport {
     pub failed: u64,
     /// All runs were made.
     pub complete: bool,
+    /// What came of the runs with each value of each parameter that is swept.
+    pub values: Vec<OfValue>,
     /// How each named figure is distributed.
     pub figures: Vec<Distribution>,
-    /// The first failed runs.
+    /// The first failed runs, one of each setting of the parameters before a second of any.
     pub worst: Vec<Worst>,
     /// Whether runs that differ in their seeds alone differ; `None` if there are no two such runs.
     pub seeds_differ: Option<bool>,
@@ -56,6 +58,7 @@ impl SweepReport {
             passed,
             failed,
             complete: passed + failed == sweep.runs(),
+            values: summary.of_values(sweep),
             figures: summary.distributions(sweep),
             seeds_differ: summary.seeds_differ(),
             note: summary.note(sweep),

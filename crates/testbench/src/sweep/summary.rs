@@ -23,8 +23,11 @@ pub struct Summary {
     /// By the setting of the parameters: the digest of a run, and whether another one had another.
     compared: BTreeMap<u64, Compared>,
     passed: u64,
-    failed: BTreeMap<u64, Failed>,
+    /// By the setting of the parameters, and by number: the first of each of the first settings that failed.
+    failed: BTreeMap<u64, BTreeMap<u64, Failed>>,
     failures: u64,
+    /// By the parameter that is swept, and by its value: runs that passed, and that failed.
+    values: Vec<Vec<(u64, u64)>>,
     figures: BTreeMap<String, Figure>,
 }
 
@@ -46,6 +49,21 @@ pub struct Failed {
     pub asked: String,
     /// What was seen.
     pub seen: String,
+}
+
+/// What came of the runs with one value of a parameter that is swept.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct OfValue {
+    /// The parameter.
+    pub parameter: String,
+    /// Its value.
+    pub value: String,
+    /// Runs with it that were made.
+    pub runs: u64,
+    /// Those that passed.
+    pub passed: u64,
+    /// Those that did not.
+    pub failed: u64,
 }
 
 /// How a figure is distributed over the runs.
@@ -107,14 +125,29 @@ impl Summary {
             let figure = self.figures.entry(name.to_owned());
             figure.or_insert_with(|| Figure::new(value, number)).add(value, number);
         }
+        self.count_values(sweep, number, failure.is_some());
         let Some((asked, seen)) = failure else {
             self.passed += 1;
             return;
         };
         self.failures += 1;
-        self.failed.insert(number, Failed { point: sweep.point(number), asked, seen });
+        let of_setting = self.failed.entry(sweep.setting(number)).or_default();
+        of_setting.insert(number, Failed { point: sweep.point(number), asked, seen });
+        if of_setting.len() > MOST_TOLD {
+            of_setting.pop_last();
+        }
         if self.failed.len() > MOST_TOLD {
             self.failed.pop_last();
+        }
+    }
+
+    fn count_values(&mut self, sweep: &Sweep, number: u64, failed: bool) {
+        if self.values.is_empty() {
+            self.values = sweep.axes.iter().map(|axis| vec![(0, 0); axis.values.len()]).collect();
+        }
+        for ((_, place), counts) in sweep.places(number).zip(&mut self.values) {
+            let (passed, failures) = &mut counts[place];
+            *if failed { failures } else { passed } += 1;
         }
     }
 
@@ -136,7 +169,8 @@ impl Summary {
 
     /// That a seed makes no difference, why, and what to turn on; `None` if it makes one, or that is not known.
     pub fn note(&self, sweep: &Sweep) -> Option<String> {
-        const WHAT: &str = "all seeds give the same run: nothing in it is random";
+        const WHAT: &str =
+            "all seeds give the same run: nothing in it is random, so that it is made once and counts for each seed";
         const STEP: &str = "a step such as \"bus corrupt 0.01\" makes runs differ";
         (self.seeds_differ() == Some(false)).then(|| match sweep.ways_to_differ() {
             ways if ways.is_empty() => format!("{WHAT}; {STEP}"),
@@ -154,9 +188,28 @@ impl Summary {
         self.failures
     }
 
-    /// The first of those.
+    /// The first of those, in their order: one of each setting of the parameters before a second of any.
     pub fn failed(&self) -> impl Iterator<Item = &Failed> {
-        self.failed.values()
+        let ranked = self.failed.values().flat_map(|of_setting| (0usize..).zip(of_setting));
+        let mut first: Vec<_> = ranked.collect();
+        first.sort_by_key(|(rank, (number, _))| (*rank, **number));
+        first.truncate(MOST_TOLD);
+        first.sort_by_key(|(_, (number, _))| **number);
+        first.into_iter().map(|(_, (_, failed))| failed)
+    }
+
+    /// What came of the runs with each value of each parameter that is swept.
+    pub fn of_values(&self, sweep: &Sweep) -> Vec<OfValue> {
+        let rows = sweep.axes.iter().zip(&self.values).flat_map(|(axis, counts)| {
+            axis.values.iter().zip(counts).map(|(value, (passed, failed))| OfValue {
+                parameter: axis.name.clone(),
+                value: value.clone(),
+                runs: passed + failed,
+                passed: *passed,
+                failed: *failed,
+            })
+        });
+        rows.collect()
     }
 
     /// How each named figure is distributed.
@@ -229,6 +282,7 @@ mod tests {
             rows: Vec::new(),
             figures: vec![("figure".into(), value)],
             digest: 0,
+            is_random: true,
             last_frames: Vec::new(),
         })
     }
@@ -260,6 +314,35 @@ mod tests {
         let found = &forth.distributions(&sweep)[0];
         assert!(found.runs == 200_000 && (found.median - 100_000.0).abs() < 2_000.0, "{found:?}");
         assert!(forth.figures["figure"].kept.len() <= MOST_KEPT);
+    }
+
+    /// Of a sweep of 11 values of one parameter with 2 of another, and 3 seeds, every run above 0.6 fails.
+    #[test]
+    fn each_value_has_its_runs_counted_and_its_first_failure_told_before_a_second_of_another() {
+        let sweep = sweep(3);
+        let (mut forth, mut back) = (Summary::default(), Summary::default());
+        let add = |summary: &mut Summary, number: u64| {
+            let over = sweep.point(number).values["a"].parse::<f64>().expect("a number") > 0.65;
+            summary.add_run(&sweep, number, [], over.then(|| ("a".into(), "b".into())));
+        };
+        (0..sweep.runs()).for_each(|number| add(&mut forth, number));
+        (0..sweep.runs()).rev().for_each(|number| add(&mut back, number));
+        let rows = forth.of_values(&sweep);
+        let counts = |parameter: &str| -> Vec<_> {
+            let its = rows.iter().filter(|row| row.parameter == parameter);
+            its.map(|row| (row.value.as_str(), row.runs, row.passed, row.failed)).collect()
+        };
+        let a = counts("a");
+        assert_eq!((a.len(), a[6], a[7], a[10]), (11, ("0.6", 6, 6, 0), ("0.7", 6, 0, 6), ("1", 6, 0, 6)));
+        assert_eq!(counts("b"), [("x", 33, 21, 12), ("it is", 33, 21, 12)]);
+        assert_eq!((forth.passed(), forth.failures()), (42, 24));
+        let told = |summary: &Summary| -> Vec<_> { summary.failed().map(|failed| failed.point.options()).collect() };
+        let said = told(&forth);
+        assert_eq!(said, told(&back));
+        // All eight settings, and the second seed of the first two of them.
+        let settings: std::collections::BTreeSet<_> = said.iter().map(|options| &options["--seed 1".len()..]).collect();
+        assert_eq!((said.len(), settings.len()), (10, 8), "{said:?}");
+        assert_eq!(said[..2], ["--seed 1 --set a=0.7 --set b=x", "--seed 2 --set a=0.7 --set b=x"]);
     }
 
     #[test]

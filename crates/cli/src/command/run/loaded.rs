@@ -38,9 +38,8 @@ impl<'a> Loaded<'a> {
 
     /// The scenario with those of the values that are of its parameters.
     pub(super) fn with_its_own(self) -> Result<Scenario, Failure> {
-        let mut values: Parameters = self.scenario.parameters.clone();
         let known = self.set.iter().filter(|(name, _)| self.scenario.parameters.contains_key(name));
-        values.extend(known.cloned());
+        let values: Parameters = known.cloned().collect();
         let named = |bad: BadFile| unusable(self.file, &bad.named(self.file.display().to_string()).to_string());
         self.scenario.with(&values).map_err(named)
     }

@@ -4,8 +4,9 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 
 use master::units::Shown;
-use testbench::scenario::Scenario;
-use testbench::sweep::{Summary, Sweep, SweepReport, Worst};
+use testbench::document::BadFile;
+use testbench::scenario::{Outcome, Scenario};
+use testbench::sweep::{Alike, OfValue, Summary, Sweep, SweepReport, Worst};
 
 use super::crew::Crew;
 use crate::failure::Failure;
@@ -13,6 +14,9 @@ use crate::output::{Format, Report};
 use crate::progress::Progress;
 use plot::Paint;
 use plot::Table;
+
+/// Values of a parameter that are shown to people.
+const MOST_VALUES: usize = 40;
 
 /// Runs between two changes of the line that tells the progress.
 const RUNS_A_LOOK: u64 = 16;
@@ -42,9 +46,10 @@ pub(super) fn sweep(
 
 fn sum_up(sweep: &Sweep, crew: &Crew, progress: &Progress) -> Summary {
     let mut summary = Summary::default();
+    let alike = Alike::default();
     crew.work(
         sweep.runs(),
-        |number| sweep.run(number),
+        |number| made(sweep, &alike, number),
         |number, outcome| {
             summary.add(sweep, number, &outcome);
             let done = summary.passed() + summary.failures();
@@ -57,6 +62,16 @@ fn sum_up(sweep: &Sweep, crew: &Crew, progress: &Progress) -> Summary {
     summary
 }
 
+/// What comes of a run; it is not made again where nothing in it is random.
+fn made(sweep: &Sweep, alike: &Alike, number: u64) -> Result<Outcome, BadFile> {
+    if let Some(known) = alike.of(sweep, number) {
+        return Ok(known);
+    }
+    let outcome = sweep.run(number)?;
+    alike.keep(sweep, number, &outcome);
+    Ok(outcome)
+}
+
 /// That runs failed, and how to repeat the first of them.
 fn failure(report: &SweepReport) -> Option<Failure> {
     let first = report.worst.first()?;
@@ -65,9 +80,32 @@ fn failure(report: &SweepReport) -> Option<Failure> {
     Some(Failure::new(what).of_kind("scenario").because(because).next(&first.again))
 }
 
+/// A table of what came of each value; of a parameter with many values only those with which runs failed, and no more than fit.
+fn of_values(values: &[OfValue], paint: Paint) -> Option<String> {
+    let mut table = Table::new(&["parameter", "value", "runs", "passed", "failed"]);
+    let mut notes = Vec::new();
+    for axis in values.chunk_by(|one, other| one.parameter == other.parameter) {
+        let all = axis.len() <= MOST_VALUES;
+        let shown: Vec<_> = axis.iter().filter(|row| all || row.failed > 0).take(MOST_VALUES).collect();
+        if !all {
+            let (shown, of, name) = (shown.len(), axis.len(), &axis[0].parameter);
+            notes.push(format!(
+                "{shown} of the {of} values of {name}: the first with which runs failed; --json has all"
+            ));
+        }
+        for row in shown {
+            let counts = [row.runs, row.passed, row.failed].map(|count| count.to_string());
+            table.row([row.parameter.clone(), row.value.clone()].into_iter().chain(counts));
+        }
+    }
+    let colour = |_, column, cell: &str| (column == 4 && cell != "0").then(|| paint.bad(cell));
+    (!values.is_empty()).then(|| [table.text(paint, colour)].into_iter().chain(notes).collect::<Vec<_>>().join("\n"))
+}
+
 impl Report for SweepReport {
     fn text(&self, paint: Paint) -> String {
         let mut lines = vec![paint.strong(&self.title)];
+        lines.extend(of_values(&self.values, paint));
         if !self.figures.is_empty() {
             let mut table = Table::new(&["figure", "min", "median", "max", "lowest with", "highest with"]);
             for it in &self.figures {

@@ -1,0 +1,68 @@
+//! What commands that move drives cycle by cycle have in common: how late a host may be, whether the bus carries the cycle, and
+//! what to do where the host was late.
+
+use std::time::Duration;
+
+use canopen::NodeId;
+use master::Drive;
+use master::core::CycleLoss;
+use master::cyclic::{CyclicOptions, Refusal};
+use master::plan::NodeTraffic;
+use testbench::machine_file::{CyclePlan, TOLERANCE, too_full_at};
+
+use super::studio::bitrate;
+use crate::context::Context;
+use crate::failure::Failure;
+
+/// How late a host may be.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub(super) struct CycleArgs {
+    /// Cycles in a row that this command may be late for, or a drive's TPDO, before all are stopped
+    #[arg(long, value_name = "CYCLES", default_value_t = TOLERANCE, value_parser = clap::value_parser!(u32).range(0..=100))]
+    tolerance: u32,
+}
+
+impl CycleArgs {
+    /// Drives that are guarded already, as the command line has it.
+    pub(super) const fn options(self) -> CyclicOptions {
+        CyclicOptions { guard: None, tolerance: self.tolerance }
+    }
+
+    /// A failure by what a drive says, with what helps where this command was late.
+    pub(super) fn advised(self, failure: Failure, refusal: Refusal) -> Failure {
+        let Refusal::Stopped(CycleLoss::ProgramLate(_)) = refusal else { return failure };
+        let more = self.tolerance.max(1) * 5;
+        failure.next(format!(
+            "other programs kept this one from its cycles: give --tolerance {more} to allow more of them without a set-point, --realtime \
+             (Linux) to run before other programs, or a longer period; `ferrodrive latency` measures how late this host is"
+        ))
+    }
+}
+
+/// The most that SYNC, and a set-point of 8 bytes and its answer for each drive, take on the wire, in bits.
+const SYNC_BITS: u64 = 55;
+const DRIVE_BITS: u64 = 2 * 135;
+
+/// Refuses a cycle that does not fit the bus, before anything is written. Where nobody says the bit rate nothing is refused.
+pub(super) async fn refuse_too_full(context: &Context, cycle: &CyclePlan, drives: &[&Drive]) -> Result<(), Failure> {
+    let Some(bitrate) = bitrate(context) else { return Ok(()) };
+    let most_ns = (SYNC_BITS + DRIVE_BITS * drives.len() as u64) * bitrate.bit_nanos();
+    if Duration::from_nanos(most_ns) <= cycle.period {
+        // It fits in any case: nobody need be asked.
+        return Ok(());
+    }
+    let mut nodes = Vec::new();
+    for drive in drives {
+        let read = NodeTraffic::of(drive).await?;
+        nodes.push(cycle.traffic(drive, read).map_err(|error| Failure::new(error.to_string()).of_kind("group"))?);
+    }
+    too_full_at(&nodes, cycle.period, bitrate).map_or(Ok(()), |full| {
+        let failure = Failure::new(full.what).of_kind("bus_load").next(full.next);
+        Err(failure.next(format!("ferrodrive plan --cycle {}us shows each frame", cycle.period.as_micros())))
+    })
+}
+
+/// How a drive that did not become enabled is asked why.
+pub(super) fn ask_why(node: NodeId) -> String {
+    format!("ferrodrive explain {node} says what keeps it; `ferrodrive plan` whether the bus carries such a cycle")
+}
