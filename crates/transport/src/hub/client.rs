@@ -2,7 +2,6 @@
 
 use std::io;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use can::{Frame, Instant};
@@ -14,7 +13,7 @@ use tokio::sync::{Semaphore, mpsc};
 use super::event::{ClientId, HubEvent};
 use super::session::Session;
 use crate::link::within;
-use crate::{WallClock, tcp};
+use crate::{Vitals, WallClock, tcp};
 
 /// Read at once, in bytes.
 const READ_SIZE: usize = 2048;
@@ -34,36 +33,6 @@ const LINGER: Duration = Duration::from_secs(1);
 pub(super) struct Stamped {
     pub(super) at: Instant,
     pub(super) frame: Frame,
-}
-
-/// What the hub sees of a client without asking it.
-#[derive(Debug)]
-pub(super) struct Vitals {
-    listening: AtomicBool,
-    /// When it last said something, in ns of the hub's clock.
-    spoke_at: AtomicU64,
-}
-
-impl Vitals {
-    /// Of a client that connected at `now`.
-    pub(super) fn new(now: Instant) -> Self {
-        Self { listening: AtomicBool::new(false), spoke_at: AtomicU64::new(now.as_nanos()) }
-    }
-
-    /// Of one that hears everything and never makes room for another.
-    pub(super) fn of_a_bus() -> Self {
-        Self { listening: AtomicBool::new(true), spoke_at: AtomicU64::new(u64::MAX) }
-    }
-
-    /// It wants to hear frames.
-    pub(super) fn is_listening(&self) -> bool {
-        self.listening.load(Ordering::Relaxed)
-    }
-
-    /// Lower for a client that matters less: first those that do not listen, then by how long they have been silent.
-    pub(super) fn rank(&self) -> (bool, u64) {
-        (self.is_listening(), self.spoke_at.load(Ordering::Relaxed))
-    }
 }
 
 /// The task's end of what it shares with the hub.
@@ -136,7 +105,7 @@ impl Connection {
                     self.at_end = read? == 0;
                     tcp::acknowledge_at_once(reader.as_ref());
                     self.quiet_until = None;
-                    self.end.vitals.spoke_at.store(self.end.clock.now().as_nanos(), Ordering::Relaxed);
+                    self.end.vitals.spoke(self.end.clock.now());
                 }
                 credit = self.end.credits.acquire(), if self.waiting.is_some() => {
                     if let (Ok(credit), Some(frame)) = (credit, self.waiting.take()) {
@@ -165,7 +134,7 @@ impl Connection {
                 self.input.clear();
                 self.consumed = 0;
             }
-            self.end.vitals.listening.store(self.session.is_listening(), Ordering::Relaxed);
+            self.end.vitals.set_engaged(self.session.is_listening());
         }
     }
 

@@ -26,8 +26,8 @@ use tokio::task::AbortHandle;
 
 use crate::slcan::SlcanSession;
 use crate::socketcand::SocketcandSession;
-use crate::{AsyncBus, BusError, Note, Protocol, Received, ServeSpec, WallClock, tcp};
-use client::{Stamped, Vitals};
+use crate::{AsyncBus, BusError, Note, Protocol, Received, ServeSpec, Vitals, WallClock, tcp};
+use client::Stamped;
 pub use event::{ClientId, HubEvent, LeaveReason};
 pub(crate) use session::{MAX_WAITING_REPLIES, Session};
 
@@ -180,7 +180,7 @@ impl Hub {
                 client.credits.add_permits(1);
                 return true;
             }
-            let kept = !client.vitals.is_listening()
+            let kept = !client.vitals.is_engaged()
                 || !matches!(
                     client.outgoing.try_send(Stamped { at, frame: *frame }),
                     Err(mpsc::error::TrySendError::Full(_))
@@ -319,8 +319,7 @@ impl Shared {
     }
 
     fn displace_one(&self, clients: &mut Clients) {
-        let least = (0..clients.list.len()).min_by_key(|place| clients.list[*place].vitals.rank());
-        if let Some(place) = least {
+        if let Some(place) = Vitals::least(clients.list.iter().map(|client| &*client.vitals)) {
             let client = clients.list.remove(place);
             client.task.abort();
             self.tell(HubEvent::Left { client: client.id, reason: LeaveReason::Displaced });
