@@ -183,7 +183,7 @@ impl Plan {
             return Err(Failure::usage("--mode sets PDOs up, which a plan of a real bus does not")
                 .next("name a machine file, or leave --mode away: the PDOs are read as they are"));
         }
-        let asked = |count| context.progress.show(format!("asked {count} of 127"));
+        let asked = |count| context.progress.count(format!("asked {count} of 127"));
         let mut found: Vec<NodeId> =
             context.network.scan(context.timeout(), asked).await.iter().map(|found| found.node).collect();
         found.sort_unstable();
