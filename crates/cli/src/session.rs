@@ -240,6 +240,7 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     let ended = runner.run(&network, station, &clock, until, tell).await;
     progress.clear();
     context.remember_nodes();
+    context.tell_of_twins();
     if let (Some(missing), Some(log)) = (writing.finish(), &global.log) {
         log.lacks(missing);
     }
