@@ -28,11 +28,19 @@ const SEGMENTS_A_TURN: u32 = 16;
 /// How long a disconnected client may take to close its side.
 const LINGER: Duration = Duration::from_secs(1);
 
-/// A frame and when the bus carried it.
+/// What was on the bus, and when.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stamped {
     pub(super) at: Instant,
-    pub(super) frame: Frame,
+    pub(super) what: Carried,
+}
+
+/// What a bus carries.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Carried {
+    Frame(Frame),
+    /// An error frame, by its class in Linux's messages.
+    Error(u32),
 }
 
 /// The task's end of what it shares with the hub.
@@ -115,7 +123,7 @@ impl Connection {
                 }
                 stamped = self.end.frames.recv(), if self.segment.is_empty() && self.quiet_until.is_none() => {
                     match stamped {
-                        Some(Stamped { at, frame }) => self.session.deliver(at, &frame, &mut self.segment),
+                        Some(stamped) => deliver(&mut *self.session, &stamped, &mut self.segment),
                         None => return Ok(()),
                     }
                 }
@@ -148,8 +156,8 @@ impl Connection {
             return;
         }
         while self.quiet_until.is_none() && self.segment.len() < WRITE_SIZE {
-            let Ok(Stamped { at, frame }) = self.end.frames.try_recv() else { return };
-            self.session.deliver(at, &frame, &mut self.segment);
+            let Ok(stamped) = self.end.frames.try_recv() else { return };
+            deliver(&mut *self.session, &stamped, &mut self.segment);
         }
     }
 
@@ -164,5 +172,12 @@ impl Connection {
             Ok(())
         };
         within(&self.end.clock, LINGER, drained).await.unwrap_or(Ok(()))
+    }
+}
+
+fn deliver(session: &mut dyn Session, stamped: &Stamped, segment: &mut Vec<u8>) {
+    match stamped.what {
+        Carried::Frame(frame) => session.deliver(stamped.at, &frame, segment),
+        Carried::Error(class) => session.deliver_error(stamped.at, class, segment),
     }
 }
