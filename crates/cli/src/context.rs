@@ -269,6 +269,14 @@ impl Context {
         self.node(id).write(CONTROLWORD, PowerCommand::QuickStop.controlword().0).await
     }
 
+    /// Says of which nodes there are two.
+    pub(crate) fn tell_of_twins(&self) {
+        let seen = self.network.seen();
+        for node in seen.iter().filter(|node| self.network.node(*node).facts().is_answered_twice()) {
+            self.tell(&master::core::answered_twice(node));
+        }
+    }
+
     /// Lets frames out that nobody answers.
     pub(crate) async fn settle(&self) {
         self.network.sleep(SETTLING_TIME).await;

@@ -47,6 +47,7 @@ use crate::failure::{Failure, FailureReport};
 use crate::global::Global;
 use crate::output::{Format, Report};
 use crate::plain::plain;
+use crate::recording::LogPath;
 use plot::Paint;
 
 fn main() -> ExitCode {
@@ -63,6 +64,12 @@ fn main() -> ExitCode {
     let format = Format { json: cli.global.json, paint: Paint::for_stream(&io::stdout()) };
     let ran = scope::refuse_unheeded(&cli.global, &cli.command, &matches)
         .and_then(|()| run(&cli.global, format, &cli.command, Typed::of(&matches)));
+    let ran = match (ran, cli.global.log.as_ref().and_then(LogPath::failure)) {
+        (ran, None) => ran,
+        // What the command found out has been printed.
+        (Ok(()), Some(torn)) => Err(torn),
+        (Err(failure), Some(torn)) => Err(torn.because.into_iter().fold(failure.because(torn.what), Failure::because)),
+    };
     match ran {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {

@@ -9,23 +9,29 @@ use terminal_size::Width;
 
 use crate::plain::plain;
 
+/// How often somebody is told of a long count who reads standard error from a file or a pipe.
+const PIPED_INTERVAL: Duration = Duration::from_secs(5);
+
 /// One line on standard error that says what is being waited for; nothing if that is no terminal.
 #[derive(Clone, Debug)]
 pub(crate) struct Progress {
     bar: ProgressBar,
+    /// No terminal, and yet somebody may read it.
+    piped: bool,
 }
 
 impl Progress {
     /// A line that shows nothing yet. `quiet` keeps it so.
     pub(crate) fn new(quiet: bool) -> Self {
-        if quiet || !io::stderr().is_terminal() {
-            return Self { bar: ProgressBar::hidden() };
+        let piped = !io::stderr().is_terminal();
+        if quiet || piped {
+            return Self { bar: ProgressBar::hidden(), piped: piped && !quiet };
         }
         let bar = ProgressBar::new_spinner();
         if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}") {
             bar.set_style(style);
         }
-        Self { bar }
+        Self { bar, piped }
     }
 
     /// True if somebody sees it.
@@ -37,6 +43,16 @@ impl Progress {
     pub(crate) fn show(&self, text: impl Into<String>) {
         self.bar.set_message(text.into());
         self.bar.tick();
+    }
+
+    /// Shows how far something is that may take long: no terminal gets a line now and then.
+    pub(crate) fn count(&self, text: impl Into<String>) {
+        if !self.piped {
+            self.show(text);
+        } else if self.bar.elapsed() >= PIPED_INTERVAL {
+            self.bar.reset_elapsed();
+            self.note(&text.into());
+        }
     }
 
     /// A line on standard error that stays, terminal or not.

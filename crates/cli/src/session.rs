@@ -104,7 +104,9 @@ fn virtual_bus<R>(
     };
     let ended = sim::block_on_for(&mut world, VIRTUAL_LIMIT, whole);
     progress.clear();
-    writing.finish().inspect(|missing| context.tell(missing));
+    if let (Some(missing), Some(log)) = (writing.finish(), &global.log) {
+        log.lacks(missing);
+    }
     ended.map_err(|error| Failure::new("the virtual bus came to a halt").because(error))?
 }
 
@@ -229,7 +231,10 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     let ended = runner.run(&network, station, &clock, until, tell).await;
     progress.clear();
     context.remember_nodes();
-    writing.finish().inspect(|missing| context.tell(missing));
+    context.tell_of_twins();
+    if let (Some(missing), Some(log)) = (writing.finish(), &global.log) {
+        log.lacks(missing);
+    }
     ended.map_err(|error| {
         let failure = bus_failure(global, &error);
         let moved = network.moved();

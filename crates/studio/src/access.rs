@@ -4,7 +4,7 @@
 //! origin: every request that does something has to come from the page that this server gave out. A name of another site
 //! that leads here (DNS rebinding) is refused by its Host.
 
-use std::net::SocketAddr;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
 use axum::http::HeaderMap;
 use axum::http::header::{AUTHORIZATION, COOKIE, HOST, HeaderName, ORIGIN};
@@ -62,6 +62,8 @@ pub struct Access {
     /// In the cookie that it is exchanged for.
     pass: String,
     password: Option<Password>,
+    /// Names that this server is called by, too.
+    hosts: Vec<String>,
 }
 
 impl core::fmt::Debug for Access {
@@ -79,12 +81,23 @@ impl Access {
         if !address.ip().is_loopback() && password.is_none() {
             return Err(AccessError::NoPassword(address));
         }
-        Ok(Self { address, token: secret()?, pass: secret()?, password })
+        Ok(Self { address, token: secret()?, pass: secret()?, password, hosts: Vec::new() })
     }
 
-    /// The address to open, with the token of this launch.
+    /// Lets browsers call this server by these names, too: `drives.local`, whatever the port.
+    #[must_use]
+    pub fn with_hosts(self, hosts: Vec<String>) -> Self {
+        Self { hosts, ..self }
+    }
+
+    /// The address to open on this machine, with the token of this launch: it lets in without a password, from anywhere.
     pub fn url(&self) -> String {
-        format!("http://{}/?token={}", self.address, self.token)
+        let mut address = self.address;
+        if address.ip().is_unspecified() {
+            // Everywhere is no place to go to.
+            address.set_ip(if address.is_ipv4() { Ipv4Addr::LOCALHOST.into() } else { Ipv6Addr::LOCALHOST.into() });
+        }
+        format!("http://{address}/?token={}", self.token)
     }
 
     /// True if somebody may come in by a password.
@@ -119,8 +132,12 @@ impl Access {
     /// True if a request is meant for this server, by the name that it calls it.
     pub(crate) fn is_for_us(&self, headers: &HeaderMap) -> bool {
         let Some(host) = text(headers, HOST) else { return false };
-        // Where others are let in, so is any name for this machine: a foreign one brings no cookie of ours.
-        !self.address.ip().is_loopback() || self.own_hosts().iter().any(|own| own == host)
+        let name = host.rsplit_once(':').map_or(host, |(name, port)| if port.ends_with(']') { host } else { name });
+        let is_named = self.hosts.iter().any(|own| own.eq_ignore_ascii_case(name));
+        // A browser that was led here by another's name (DNS rebinding) says that name; an address is nobody else's.
+        let is_address = host.parse::<SocketAddr>().is_ok() || name.trim_matches(['[', ']']).parse::<IpAddr>().is_ok();
+        let elsewhere = !self.address.ip().is_loopback() && is_address;
+        is_named || elsewhere || self.own_hosts().iter().any(|own| own == host)
     }
 
     /// True if a request comes from a page of this very server.

@@ -35,6 +35,6 @@ pub use desk::Desk;
 pub use host::{Host, JOG_SPAN, Journals, PRESENCE_SPAN, Setting};
 pub use seat::{Seat, Shown};
 pub use trace::Passed;
-pub use web::app;
+pub use web::{app, serve};
 pub use wire::{Health, Wire};
 pub use world::{Around, Changed, WorldAsks, WorldDoor, world_door};

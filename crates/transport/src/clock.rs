@@ -32,8 +32,7 @@ impl WallClock {
     /// If the system has no thread left for the timer.
     pub fn start() -> Self {
         let face = Face::new();
-        let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        Self { face, timer: Timer::start(face, since_epoch, || {}) }
+        Self { face, timer: Timer::start(face, since_epoch(), || {}) }
     }
 
     /// The same, with the timer's thread in real time ([`realtime`]); or why that is not allowed.
@@ -43,8 +42,7 @@ impl WallClock {
     pub fn start_in_real_time() -> Result<Self, RealTimeError> {
         let (told, entered) = std::sync::mpsc::channel();
         let face = Face::new();
-        let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        let timer = Timer::start(face, since_epoch, move || drop(told.send(realtime::enter())));
+        let timer = Timer::start(face, since_epoch(), move || drop(told.send(realtime::enter())));
         // A thread that tells nothing has not entered anything.
         entered.recv().unwrap_or(Err(RealTimeError::NotHere))?;
         Ok(Self { face, timer })
@@ -86,6 +84,12 @@ impl WallClock {
     pub fn sleep(&self, duration: Duration) -> Sleep {
         self.sleep_until(self.now() + duration)
     }
+}
+
+/// Unix time in whole microseconds: logs have no finer ones, and two times of a bus are as far apart there as on it.
+fn since_epoch() -> Duration {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    Duration::new(now.as_secs(), now.subsec_micros() * 1000)
 }
 
 /// Future of [`WallClock::sleep_until`].

@@ -69,6 +69,7 @@ mod tcp;
 mod testing;
 mod text;
 pub mod udp_multicast;
+mod vitals;
 
 pub use any_bus::AnyBus;
 pub use bus::{AsyncBus, BusError};
@@ -89,3 +90,4 @@ pub use socketcan::SocketCanBus;
 pub use socketcan::{InterfaceProblem, can_interfaces};
 pub use socketcand::SocketcandBus;
 pub use udp_multicast::UdpMulticastBus;
+pub use vitals::Vitals;

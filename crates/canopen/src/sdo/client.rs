@@ -79,6 +79,22 @@ pub enum Failure {
         /// Bytes received.
         received: usize,
     },
+    /// A segment without a byte said that more follow: such an upload need not end.
+    EmptySegment {
+        /// The entry.
+        mux: Mux,
+        /// Bytes received before it.
+        received: usize,
+    },
+    /// Each segment was in time, and yet the upload did not end.
+    Endless {
+        /// The entry.
+        mux: Mux,
+        /// Bytes received.
+        received: usize,
+        /// Time that it was given.
+        limit: Duration,
+    },
 }
 
 impl fmt::Display for Failure {
@@ -94,6 +110,16 @@ impl fmt::Display for Failure {
             Self::BufferTooSmall { mux, needed } => write!(f, "{mux}: the value has at least {needed} bytes, too many"),
             Self::LengthMismatch { mux, declared, received } => {
                 write!(f, "{mux}: {declared} bytes declared but {received} received")
+            }
+            Self::EmptySegment { mux, received } => {
+                write!(f, "{mux}: after {received} bytes came a segment without data that announced more")
+            }
+            Self::Endless { mux, received, limit } => {
+                write!(
+                    f,
+                    "{mux}: {received} bytes came in {} s and no end of them; a longer time-out allows for more",
+                    limit.as_secs()
+                )
             }
         }
     }
@@ -112,12 +138,20 @@ pub struct Client {
     timeout: Duration,
     state: State,
     deadline: Instant,
+    /// When the transfer began, and how long it may take in all.
+    began: Instant,
+    limit: Duration,
     request: Option<[u8; LENGTH]>,
     /// What was asked for before, the newest first: a server that is slow answers to that still, and some answer twice.
     earlier: [Option<Mux>; REMEMBERED],
     /// What somebody else asked for, as a reply that came meanwhile says.
     foreign: Option<Mux>,
 }
+
+/// An upload may take as long in all as if each segment but the last were full and used up its time. Where the server does not say how
+/// long the value is, this many are allowed for. A guess: with half a second for each 128 s, and 1 MiB of data (150,000 segments and
+/// their requests of up to 130 bits) takes 78 s of a bus at 500 kbit/s.
+const UNDECLARED_SEGMENTS: u32 = 256;
 
 /// How many questions ago a late answer may belong to.
 const REMEMBERED: usize = 4;
@@ -158,6 +192,8 @@ impl Client {
             timeout,
             state: State::Idle,
             deadline: Instant::FAR_FUTURE,
+            began: Instant::ZERO,
+            limit: Duration::MAX,
             request: None,
             earlier: [None; REMEMBERED],
             foreign: None,
@@ -236,10 +272,15 @@ impl Client {
     /// Time has reached `now`.
     pub fn handle_timeout(&mut self, now: Instant) -> Option<Failure> {
         let mux = self.mux().filter(|_| now >= self.deadline)?;
+        let endless = match self.state {
+            State::UploadSegments { received, .. } if now >= self.began + self.limit => Some(received),
+            _ => None,
+        };
         self.give_up(mux, AbortCode::TIMED_OUT);
-        Some(match self.foreign {
-            Some(received) => Failure::WrongMux { expected: mux, received },
-            None => Failure::TimedOut { mux },
+        Some(match (endless, self.foreign) {
+            (Some(received), _) => Failure::Endless { mux, received, limit: self.limit },
+            (None, Some(received)) => Failure::WrongMux { expected: mux, received },
+            (None, None) => Failure::TimedOut { mux },
         })
     }
 
@@ -268,7 +309,13 @@ impl Client {
                 if segment.toggle != toggle {
                     return Err(Failure::ToggleBit { mux });
                 }
+                if segment.data().is_empty() && !segment.last {
+                    return Err(Failure::EmptySegment { mux, received });
+                }
                 let end = received + segment.data().len();
+                if let Some(declared) = declared.filter(|declared| end > *declared) {
+                    return Err(Failure::LengthMismatch { mux, declared, received: end });
+                }
                 let room = buffer.get_mut(received..end).ok_or(Failure::BufferTooSmall { mux, needed: end })?;
                 room.copy_from_slice(segment.data());
                 if !segment.last {
@@ -321,6 +368,10 @@ impl Client {
                 if let Some(needed) = declared.filter(|declared| *declared > buffer.len()) {
                     return Err(Failure::BufferTooSmall { mux, needed });
                 }
+                let segments =
+                    declared.map_or(UNDECLARED_SEGMENTS, |bytes| bytes.div_ceil(MAX_SEGMENT) as u32).saturating_add(1);
+                self.limit = self.timeout.saturating_mul(segments);
+                self.began = now;
                 self.ask_segment(mux, declared, 0, false, now);
                 Ok(None)
             }
@@ -363,6 +414,9 @@ impl Client {
         }
         self.foreign = None;
         self.deadline = now + self.timeout;
+        if let State::UploadSegments { .. } = state {
+            self.deadline = self.deadline.min(self.began + self.limit);
+        }
     }
 
     fn give_up(&mut self, mux: Mux, code: AbortCode) {
@@ -394,8 +448,8 @@ fn expect_mux(expected: Mux, received: Mux) -> Result<(), Failure> {
 const fn abort_code_for(failure: &Failure) -> Option<AbortCode> {
     match failure {
         Failure::Aborted { .. } => None,
-        Failure::TimedOut { .. } => Some(AbortCode::TIMED_OUT),
-        Failure::WrongMux { .. } => Some(AbortCode::GENERAL),
+        Failure::TimedOut { .. } | Failure::Endless { .. } => Some(AbortCode::TIMED_OUT),
+        Failure::WrongMux { .. } | Failure::EmptySegment { .. } => Some(AbortCode::GENERAL),
         Failure::UnexpectedReply { .. } => Some(AbortCode::UNKNOWN_COMMAND),
         Failure::ToggleBit { .. } => Some(AbortCode::TOGGLE_BIT),
         Failure::BufferTooSmall { .. } => Some(AbortCode::OUT_OF_MEMORY),

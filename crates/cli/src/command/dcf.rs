@@ -135,7 +135,7 @@ impl Dcf {
         let wanted = made.wanted();
         let (mut values, mut read, mut refused) = (0, 0, Vec::new());
         for (number, place) in wanted.iter().enumerate() {
-            context.progress.show(format!("{} of {}: {place}", number + 1, wanted.len()));
+            context.progress.count(format!("{} of {}: {place}", number + 1, wanted.len()));
             let name = made.eds().variable(place.index, place.sub_index).map(|variable| variable.name.clone());
             let name = name.unwrap_or_default();
             let mut refuse = |why: String, abort: Option<u32>| {

@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 use std::time::Duration;
 
 use canopen::NodeId;
-use master::base::{Base, BaseError, BaseLimits, BaseState, StopCause, Twist, WheelSetup};
+use master::base::{Base, BaseError, BaseLimits, BaseState, Geometry, StopCause, Twist, WheelSetup};
 use master::units::{Shown, parse_duration};
 use serde::Serialize;
 use testbench::machine_file::{BASE_PERIOD, BasePlan, CyclePlan, speed_mode};
@@ -124,6 +124,31 @@ struct Seen {
     time: Duration,
     dead_man_stops: u32,
     bad_lines: u32,
+    /// The last twist was beyond the limits.
+    beyond: bool,
+}
+
+/// What the base can do, for what is asked of it beyond that.
+#[derive(Clone, Copy)]
+struct Bounds {
+    geometry: Geometry,
+    limits: BaseLimits,
+}
+
+impl Bounds {
+    /// Says once of twists beyond the limits, one after the other, what is driven instead.
+    fn say(&self, context: &Context, twist: Twist, seen: &mut Seen) {
+        let driven = self.geometry.saturate(twist, &self.limits);
+        let beyond = driven != twist;
+        if beyond && !seen.beyond {
+            let [linear, angular] = [twist.linear_m_s, twist.angular_rad_s].map(Shown);
+            let [to_linear, to_angular] = [driven.linear_m_s, driven.angular_rad_s].map(Shown);
+            context.progress.note(&format!(
+                "{linear} m/s and {angular} rad/s are beyond the limits of the base: it is driven at {to_linear} m/s and {to_angular} rad/s"
+            ));
+        }
+        seen.beyond = beyond;
+    }
 }
 
 impl DriveBase {
@@ -159,7 +184,7 @@ impl DriveBase {
         let period = plan.period.unwrap_or(BASE_PERIOD);
         let driven = match Base::open([left, right], plan.geometry, limits, period, options).await {
             Ok(mut base) => {
-                let driven = self.carry_out(context, &mut base).await;
+                let driven = self.carry_out(context, &mut base, Bounds { geometry: plan.geometry, limits }).await;
                 let state = base.state();
                 let closed = base.close().await.map_err(failure);
                 driven.and_then(|seen| closed.map(|()| (seen, state)))
@@ -172,8 +197,8 @@ impl DriveBase {
         Ok(BaseDriven::new(&seen, &state, limits, [left, right], reports))
     }
 
-    async fn carry_out(&self, context: &Context, base: &mut Base) -> Result<Seen, Failure> {
-        match self.follow(context, base).await {
+    async fn carry_out(&self, context: &Context, base: &mut Base, bounds: Bounds) -> Result<Seen, Failure> {
+        match self.follow(context, base, bounds).await {
             Ok(seen) => Ok(seen),
             Err(error) => {
                 let cause = if let BaseError::Stopped(cause) = error { Some(cause) } else { None };
@@ -187,7 +212,7 @@ impl DriveBase {
         }
     }
 
-    async fn follow(&self, context: &Context, base: &mut Base) -> Result<Seen, BaseError> {
+    async fn follow(&self, context: &Context, base: &mut Base, bounds: Bounds) -> Result<Seen, BaseError> {
         context.progress.show("enabling both wheels");
         base.enable().await?;
         let mut seen = Seen::default();
@@ -195,12 +220,15 @@ impl DriveBase {
         match self.source() {
             Source::For(twist, duration) => {
                 while context.network.now() - began < duration {
+                    bounds.say(context, twist, &mut seen);
                     base.command(twist)?;
                     cycle(context, base, began).await?;
                 }
             }
-            Source::Lines(lines) if context.is_embedded() => follow_virtually(context, base, &lines, &mut seen).await?,
-            Source::Lines(lines) => follow_lines(context, base, &lines, &mut seen).await?,
+            Source::Lines(lines) if context.is_embedded() => {
+                follow_virtually(context, (base, bounds), &lines, &mut seen).await?
+            }
+            Source::Lines(lines) => follow_lines(context, (base, bounds), &lines, &mut seen).await?,
         }
         base.stop().await?;
         let settled = context.network.now() + SETTLING;
@@ -268,7 +296,7 @@ fn place(state: &BaseState) -> String {
 /// The newest line of each cycle, until the input ends. Where none comes in time, the base's watchdog stops it.
 async fn follow_lines(
     context: &Context,
-    base: &mut Base,
+    (base, bounds): (&mut Base, Bounds),
     lines: &Receiver<String>,
     seen: &mut Seen,
 ) -> Result<(), BaseError> {
@@ -284,7 +312,7 @@ async fn follow_lines(
             }
         };
         if let Some(twist) = newest {
-            take(context, base, twist, seen)?;
+            take(context, (base, bounds), twist, seen)?;
         }
         let state = cycle(context, base, began).await?;
         let is_late = matches!(state.cause, Some(StopCause::Watchdog { .. }));
@@ -302,7 +330,7 @@ async fn follow_lines(
 /// Each line for the same virtual time, so that a run is the same whenever its lines come.
 async fn follow_virtually(
     context: &Context,
-    base: &mut Base,
+    (base, bounds): (&mut Base, Bounds),
     lines: &Receiver<String>,
     seen: &mut Seen,
 ) -> Result<(), BaseError> {
@@ -311,7 +339,7 @@ async fn follow_virtually(
         let Some(twist) = twist_of(context, &line, seen) else { continue };
         let end = context.network.now() + VIRTUAL_LINE;
         while context.network.now() < end {
-            take(context, base, twist, seen)?;
+            take(context, (base, bounds), twist, seen)?;
             cycle(context, base, began).await?;
         }
     }
@@ -319,7 +347,13 @@ async fn follow_virtually(
 }
 
 /// A twist that is no number is a bad line; whatever else is wrong ends the drive.
-fn take(context: &Context, base: &mut Base, twist: Twist, seen: &mut Seen) -> Result<(), BaseError> {
+fn take(
+    context: &Context,
+    (base, bounds): (&mut Base, Bounds),
+    twist: Twist,
+    seen: &mut Seen,
+) -> Result<(), BaseError> {
+    bounds.say(context, twist, seen);
     match base.command(twist) {
         Err(error @ BaseError::BadTwist { .. }) => {
             seen.bad_lines += 1;

@@ -58,7 +58,7 @@ impl Export {
         let Form::Dbc(dbc) = &self.form;
         let mut ids = dbc.nodes.clone();
         if ids.is_empty() {
-            let asked = |count| context.progress.show(format!("asked {count} of 127"));
+            let asked = |count| context.progress.count(format!("asked {count} of 127"));
             ids = context.network.scan(context.timeout(), asked).await.iter().map(|found| found.node).collect();
         }
         if ids.is_empty() {

@@ -1,8 +1,10 @@
 //! `ferrodrive gateway`: the ASCII protocol of CiA 309-3 over TCP.
 
 mod client;
+mod places;
 mod wish;
 
+use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -15,7 +17,9 @@ use serde::Serialize;
 use tokio::net::TcpListener;
 use tokio::sync::{broadcast, mpsc};
 
-use wish::Wish;
+use client::Desk;
+use places::{MAX_CLIENTS, Places};
+use wish::{Gone, Guard};
 
 use crate::context::Context;
 use crate::failure::Failure;
@@ -36,11 +40,11 @@ pub(crate) struct Gateway {
     listen: String,
 }
 
-/// Clients at once; a further one is turned away.
-const MAX_CLIENTS: usize = 32;
-
 /// How often what the network has noticed is looked for.
 const EVENT_INTERVAL: Duration = Duration::from_millis(20);
+
+/// Pause after a failed accept (out of file descriptors): the clients that are there go on.
+const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
 /// Requests of clients that may wait.
 const REQUESTS: usize = 64;
@@ -79,56 +83,92 @@ impl Gateway {
             context.tell(&format!("everybody who reaches {address} can move the drives: there is no password"));
         }
         format.print(&Ready { listen: address }).map_err(|error| Failure::new("cannot write").because(error))?;
-        let (wishes, mut wished) = mpsc::channel(REQUESTS);
-        let (events, _) = broadcast::channel::<Event>(EVENTS);
-        let mut guards = BTreeMap::new();
-        loop {
-            tokio::select! {
-                accepted = listener.accept() => {
-                    // A client that has gone before it was taken in is no matter.
-                    let Ok((stream, _)) = accepted else { continue };
-                    if events.receiver_count() < MAX_CLIENTS {
-                        let heard = (context.traffic.of_others(), events.subscribe());
-                        tokio::spawn(client::serve(stream, context.network.clone(), heard, wishes.clone()));
-                    }
+        let (guard, guards) = mpsc::channel(REQUESTS);
+        // Unbounded in type only: each client goes once.
+        let (gone, parted) = mpsc::unbounded_channel();
+        let guarded = Guarded::default();
+        // Neither who comes nor who is to be stopped waits for a drive that does not answer.
+        tokio::select! {
+            () = let_in(context, &listener, guard, gone) => {}
+            () = see_off(context, parted, &guarded) => {}
+            () = see_guarded(context, guards, &guarded) => {}
+        }
+        Ok(())
+    }
+}
+
+/// Serves whoever comes, and tells all of them what the network has noticed.
+async fn let_in(
+    context: &Context,
+    listener: &TcpListener,
+    guards: mpsc::Sender<Guard>,
+    gone: mpsc::UnboundedSender<Gone>,
+) {
+    let (events, _) = broadcast::channel::<Event>(EVENTS);
+    let mut places = Places::default();
+    let told = Cell::new(false);
+    loop {
+        tokio::select! {
+            accepted = listener.accept() => {
+                let Ok((stream, peer)) = accepted else {
+                    context.network.sleep(ACCEPT_PAUSE).await;
+                    continue;
+                };
+                let (place, displaced) = places.take(peer, context.network.now());
+                if let Some(displaced) = displaced.filter(|_| !told.replace(true)) {
+                    context.tell(&format!(
+                        "{MAX_CLIENTS} clients are connected: {displaced}, silent for the longest, has made room for {peer}; \
+                         whoever comes further is let in in the same way"
+                    ));
                 }
-                Some(wish) = wished.recv() => grant(context, wish, &mut guards).await,
-                () = context.network.sleep(EVENT_INTERVAL) => {
-                    while let Some((_, event)) = context.network.poll_event() {
-                        // Nobody may be connected.
-                        let _ = events.send(event);
-                    }
+                let desk = Desk {
+                    frames: context.traffic.of_others(),
+                    events: events.subscribe(),
+                    guards: guards.clone(),
+                    gone: gone.clone(),
+                };
+                tokio::spawn(client::serve(stream, context.network.clone(), desk, place));
+            }
+            () = context.network.sleep(EVENT_INTERVAL) => {
+                while let Some((_, event)) = context.network.poll_event() {
+                    // Nobody may be connected.
+                    let _ = events.send(event);
                 }
             }
         }
     }
 }
 
-/// Guards what is about to be moved; stops what was moved by who has gone.
-async fn grant(context: &Context, wish: Wish, guards: &mut BTreeMap<NodeId, Drive>) {
-    match wish {
-        Wish::Guard(nodes, done) => {
-            for node in nodes.iter().filter(|node| !guards.contains_key(node)).collect::<Vec<_>>() {
-                match guard(context, node).await {
-                    Ok(drive) => drop(guards.insert(node, drive)),
-                    Err(why) => context.tell(&format!("node {node}: nothing stops it when this gateway dies: {why}")),
-                }
+/// The drives that stop when this gateway dies.
+type Guarded = RefCell<BTreeMap<NodeId, Drive>>;
+
+/// Guards what is about to be moved.
+async fn see_guarded(context: &Context, mut guards: mpsc::Receiver<Guard>, guarded: &Guarded) {
+    while let Some(Guard(nodes, done)) = guards.recv().await {
+        for node in nodes.iter().filter(|node| !guarded.borrow().contains_key(node)) {
+            match guard(context, node).await {
+                Ok(drive) => drop(guarded.borrow_mut().insert(node, drive)),
+                Err(why) => context.tell(&format!("node {node}: nothing stops it when this gateway dies: {why}")),
             }
-            // The client may have gone.
-            let _ = done.send(());
         }
-        Wish::Gone(nodes) => {
-            for Stopped { node, outcome, .. } in context.network.stop_moved(nodes).await {
-                let text = match outcome {
-                    Ok(_) => format!("node {node}: its client has gone; it has been quick-stopped and stands"),
-                    Err(error) => format!("node {node}: its client has gone, and it may still be moving: {error}"),
-                };
-                context.tell(&text);
-            }
-            nodes.iter().for_each(|node| drop(guards.remove(&node)));
-            // What has a watch and was not seen to stand is left to it.
-            let _ = context.network.release_guards(nodes).await;
+        // The client may have gone.
+        let _ = done.send(());
+    }
+}
+
+/// Stops what was moved by who has gone.
+async fn see_off(context: &Context, mut parted: mpsc::UnboundedReceiver<Gone>, guarded: &Guarded) {
+    while let Some(Gone(nodes)) = parted.recv().await {
+        for Stopped { node, outcome, .. } in context.network.stop_moved(nodes).await {
+            let text = match outcome {
+                Ok(_) => format!("node {node}: its client has gone; it has been quick-stopped and stands"),
+                Err(error) => format!("node {node}: its client has gone, and it may still be moving: {error}"),
+            };
+            context.tell(&text);
         }
+        nodes.iter().for_each(|node| drop(guarded.borrow_mut().remove(&node)));
+        // What has a watch and was not seen to stand is left to it.
+        let _ = context.network.release_guards(nodes).await;
     }
 }
 

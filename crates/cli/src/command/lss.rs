@@ -277,7 +277,7 @@ impl LssMaster<'_> {
                 let answer = self.ask(request).await;
                 scan.note(answer == Some(Reply::Identified));
                 asked += 1;
-                self.context.progress.show(format!("found {}; question {asked} of 133", devices.len()));
+                self.context.progress.count(format!("found {}; question {asked} of 133", devices.len()));
             }
             match scan.found() {
                 Some(address) => devices.push(Found::new(address, None)),
@@ -310,7 +310,7 @@ impl LssMaster<'_> {
             if matches!(request, Request::Identify(Bound::HighestSerial, _)) {
                 addresses.extend(search.note(answer == Some(Reply::Identified)));
                 asked += 1;
-                self.context.progress.show(format!("found {}; question {asked}", addresses.len()));
+                self.context.progress.count(format!("found {}; question {asked}", addresses.len()));
             }
             if addresses.len() == MOST {
                 break;

@@ -144,7 +144,7 @@ impl Show {
     async fn run(&self, context: &Context) -> Result<PdoList, Failure> {
         let mut nodes = self.nodes.clone();
         if nodes.is_empty() {
-            let asked = |count| context.progress.show(format!("asked {count} of 127"));
+            let asked = |count| context.progress.count(format!("asked {count} of 127"));
             nodes.extend(context.network.scan(context.timeout(), asked).await.iter().map(|found| found.node));
         }
         let mut list = Vec::new();

@@ -203,7 +203,7 @@ impl Plan {
     /// What each node sends: as it is set up, or on a virtual bus as the machine file has it set up, and in the cycles of what is moved or
     /// in the modes that were asked for.
     async fn nodes(&self, context: &Context, moved: Option<&CyclePlan>) -> Result<Vec<NodeTraffic>, Failure> {
-        let asked = |count| context.progress.show(format!("asked {count} of 127"));
+        let asked = |count| context.progress.count(format!("asked {count} of 127"));
         let mut found: Vec<NodeId> =
             context.network.scan(context.timeout(), asked).await.iter().map(|found| found.node).collect();
         found.sort_unstable();

@@ -141,7 +141,7 @@ impl Record {
             duration_s: 0.0,
         };
         self.sample(context, &node, &sources, &mut file, &mut report).await;
-        file.finish(DISK_PATIENCE);
+        file.finish(DISK_PATIENCE)?;
         Ok(report)
     }
 

@@ -26,6 +26,10 @@ use testbench::models::{Description, how_to_say};
 )]
 pub(crate) struct Scan {}
 
+/// What is said of a node whose requests are answered twice.
+const TWICE: &str = "two devices answer at this node-ID, and what is said here is of one or the other: switch one off, and give \
+                     the other a node-ID of its own (its switches, or ferrodrive lss scan)";
+
 /// Everybody found.
 #[derive(Debug, Serialize)]
 pub(crate) struct ScanReport {
@@ -60,7 +64,7 @@ struct Node {
 impl Scan {
     /// Asks everybody.
     pub(crate) async fn run(&self, context: &Context) -> Result<ScanReport, Failure> {
-        let asked = |count| context.progress.show(format!("asked {count} of 127"));
+        let asked = |count| context.progress.count(format!("asked {count} of 127"));
         let (mut counted, mut decoder) = (Counted::default(), context.decoder());
         let mut others = context.traffic.of_others();
         let mut scanning = std::pin::pin!(context.network.scan(context.timeout(), asked));
@@ -114,7 +118,10 @@ impl Node {
             vendor_id: identity.vendor_id,
             product_code: identity.product_code,
             revision_number: identity.revision_number,
-            remark: contradiction
+            remark: found
+                .twice
+                .then(|| TWICE.to_owned())
+                .or(contradiction)
                 .or_else(|| found.doubt().filter(|_| told.is_none()).map(|doubt| remark(found, doubt))),
         }
     }

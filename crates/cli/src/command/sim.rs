@@ -4,6 +4,7 @@ mod described;
 
 use std::collections::{BTreeSet, VecDeque};
 use std::path::PathBuf;
+use std::time::Duration;
 
 use can::{Bitrate, Instant};
 use sim::machine::{Realism, TimingMode};
@@ -128,7 +129,7 @@ pub(crate) struct Sim {
     /// What moves time: the clock, or `run 20ms` and `run until 2.5s` on standard input (manual)
     ///
     /// Moved by hand, time stands between two runs: a frame of a client is taken at the time that the bus has, and goes out
-    /// with the next run. Each run is answered, when it is over, with the time reached, how many frames the bus has carried,
+    /// with the next run. Records and logs are the same each time, then; a log counts from the start of the bus. Each run is answered, when it is over, with the time reached, how many frames the bus has carried,
     /// and the drives whose power, statusword or error code has changed. Lines that come before that wait for it; a second `quit` does not.
     #[arg(long, value_name = "real|manual", value_enum, default_value = "real")]
     clock: Clock,
@@ -227,10 +228,12 @@ impl Sim {
         let (requests, mut incoming) = mpsc::channel(REQUESTS_WAITING);
         listen_to_signals(requests.clone());
         let answers = Speaker::of_answers(warnings.clone());
-        let log = log.map(|file| FrameLog::start(file, clock.unix_zero(), self.pace(), warnings.clone()));
-        let waiting = VecDeque::new();
-        let mut service =
-            Service { answers: answers.clone(), warnings: warnings.clone(), log, record, waiting, quit_in: None };
+        // A bus whose time is moved by hand has no time of day, and its log is the same each time.
+        let unix_zero = if self.clock == Clock::Manual { Duration::ZERO } else { clock.unix_zero() };
+        let log = log.map(|file| FrameLog::start(file, unix_zero, self.pace(), warnings.clone()));
+        let (waiting, by_hand) = (VecDeque::new(), self.clock == Clock::Manual);
+        let (said, warned) = (answers.clone(), warnings.clone());
+        let mut service = Service { answers: said, warnings: warned, log, record, waiting, quit_in: None, by_hand };
         let outer = match bridge {
             Some(spec) => Some(spec.open(&clock).await.map_err(|error| bus_failure(global, &error))?),
             None => None,

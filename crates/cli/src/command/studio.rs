@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
+use std::net::{SocketAddr, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -39,6 +40,12 @@ pub(crate) struct Studio {
     /// and whoever has it can move the drives.
     #[arg(long, value_name = "FILE")]
     password_file: Option<PathBuf>,
+    /// A name that browsers may call this server by, e.g. drives.local; may be repeated
+    ///
+    /// Without it that is an address of this machine, or localhost: under a name of another site, which leads here, it could be
+    /// asked from any browser of this network.
+    #[arg(long = "host", value_name = "NAME")]
+    hosts: Vec<String>,
     /// Open the page in the browser of this machine
     #[arg(long)]
     open: bool,
@@ -68,10 +75,11 @@ impl Studio {
         };
         let listener = TcpListener::bind(&self.listen).await.map_err(cannot)?;
         let address = listener.local_addr().map_err(cannot)?;
-        let access = Arc::new(Access::new(address, password).map_err(|error| refused(&error))?);
+        let access = Access::new(address, password).map_err(|error| refused(&error))?.with_hosts(self.hosts.clone());
         if !address.ip().is_loopback() {
+            let place = elsewhere(address);
             context.tell(&format!(
-                "everybody who reaches {address} and has the password can move the drives, and nothing is encrypted on its way: \
+                "from other machines: http://{place}/ with the password. Everybody who reaches it and has the password can move the drives, and nothing is encrypted on its way: \
                  keep it to a network of the machine's own"
             ));
         }
@@ -79,9 +87,9 @@ impl Studio {
         format.print(&Ready { studio: url.clone() }).map_err(Failure::of_stdout)?;
         context.traffic.listen();
         let (host, desk) = Host::new(context.network.clone(), setting(context));
-        let app = studio::app(desk, access);
+        let app = studio::app(desk, Arc::new(access));
         tokio::select! {
-            served = axum::serve(listener, app) => served.map_err(cannot),
+            served = studio::serve(listener, app) => served.map_err(cannot),
             // Not before the router is gone, which holds the desk.
             () = host.run(|| passed(context)) => Ok(()),
             never = self.keep_open(context, &url) => match never {},
@@ -95,6 +103,19 @@ impl Studio {
         }
         std::future::pending().await
     }
+}
+
+/// The address by which other machines reach this one: where it listens everywhere, the one that it would send from.
+fn elsewhere(mut address: SocketAddr) -> SocketAddr {
+    if address.ip().is_unspecified() {
+        // An address for documentation (RFC 5737): a route is looked up, and nothing is sent.
+        let asked = UdpSocket::bind("0.0.0.0:0").and_then(|socket| {
+            socket.connect("192.0.2.1:9")?;
+            socket.local_addr()
+        });
+        asked.into_iter().for_each(|own| address.set_ip(own.ip()));
+    }
+    address
 }
 
 /// What the host of a command is told at its start.

@@ -4,6 +4,7 @@ use std::io;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, channel, sync_channel};
 use std::time::Duration;
 
+use crate::failure::Failure;
 use crate::serve::speaker::Speaker;
 
 /// Whether somebody's time passes while a batch waits.
@@ -38,11 +39,13 @@ pub(super) struct Words {
 /// See the [module](self).
 pub(super) struct Background<B> {
     batches: SyncSender<B>,
-    /// Ends when everything is written.
-    written: Receiver<()>,
+    /// Says how it ended, when everything is written.
+    written: Receiver<Result<(), String>>,
     words: Words,
     pace: Pace,
     missing: u64,
+    /// Pieces that are missing before the file was written again.
+    lost: u64,
     speaker: Speaker,
 }
 
@@ -62,13 +65,16 @@ impl<B: Send + 'static> Background<B> {
         std::thread::spawn(move || {
             let mut writer = writer;
             let all = incoming.iter().try_for_each(|batch| write(&mut writer, batch));
-            if let Err(error) = all.and_then(|()| end(writer)) {
+            let ended = all.and_then(|()| end(writer)).map_err(|error| error.to_string());
+            if let Err(error) = &ended {
                 // The drives are worth more than what is written about them.
                 told.say(&format!("warning: cannot write {}: {error}; it ends here", words.file));
             }
-            drop((incoming, done));
+            // Nobody may wait for the end any more.
+            let _ = done.send(ended);
+            drop(incoming);
         });
-        Self { batches, written, words, pace, missing: 0, speaker }
+        Self { batches, written, words, pace, missing: 0, lost: 0, speaker }
     }
 
     /// Takes a batch of so many pieces; one that the disk has no time for is left out, and that is said, or waited for: as the pace is.
@@ -82,6 +88,7 @@ impl<B: Send + 'static> Background<B> {
         match self.batches.try_send(batch) {
             Ok(()) if self.missing > 0 => {
                 let missing = std::mem::take(&mut self.missing);
+                self.lost += missing;
                 self.speaker.say(&format!("warning: {file} is written again; {missing} {what} are missing in it"));
             }
             // When the file has ended for good, that has been said.
@@ -104,12 +111,23 @@ impl<B: Send + 'static> Background<B> {
     }
 
     /// Waits until everything is written, at most for `patience`.
-    pub(super) fn finish(self, patience: Duration) {
+    ///
+    /// # Errors
+    /// The file is not whole.
+    pub(super) fn finish(self, patience: Duration) -> Result<(), Failure> {
         drop(self.batches);
-        let ended = self.written.recv_timeout(patience);
-        if ended == Err(RecvTimeoutError::Timeout) || self.missing > 0 {
-            let Words { file, pieces } = self.words;
-            self.speaker.say(&format!("warning: the end of {file} is missing, and {} {pieces} before", self.missing));
+        let Words { file, pieces } = self.words;
+        let torn = |why: String| Failure::new(format!("{file} is not whole")).of_kind("file").because(why);
+        let lost = self.lost + self.missing;
+        match self.written.recv_timeout(patience) {
+            Ok(Err(error)) => Err(torn(format!("{error}; it ends there")).next("see that the disk has room")),
+            Ok(Ok(())) if lost == 0 => Ok(()),
+            Ok(Ok(())) if self.missing == 0 => Err(torn(format!("the disk was too slow: {lost} {pieces} are missing"))),
+            Ok(Ok(())) | Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
+                self.speaker
+                    .say(&format!("warning: the end of {file} is missing, and {} {pieces} before", self.missing));
+                Err(torn(format!("the disk was too slow: its end is missing, and {lost} {pieces} before")))
+            }
         }
     }
 }

@@ -10,6 +10,7 @@ use sim::recorder::Recorder;
 use testbench::recording::{Column, Kind, Mark, Record};
 
 use super::background::{Background, Pace, Words};
+use crate::failure::Failure;
 use crate::serve::speaker::Speaker;
 
 /// What happened since the batch before, each kind in the order of its times.
@@ -44,8 +45,11 @@ impl RecordFile {
     }
 
     /// Waits until everything is written, at most for `patience`.
-    pub(crate) fn finish(self, patience: Duration) {
-        self.0.finish(patience);
+    ///
+    /// # Errors
+    /// The file is not whole.
+    pub(crate) fn finish(self, patience: Duration) -> Result<(), Failure> {
+        self.0.finish(patience)
     }
 }
 

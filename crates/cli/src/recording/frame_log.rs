@@ -7,6 +7,7 @@ use can::{Frame, Instant};
 use transport::log::{LogWriter, Record};
 
 use super::background::{Background, Pace, Words};
+use crate::failure::Failure;
 use crate::serve::speaker::Speaker;
 
 /// Frames, and when the bus carried them.
@@ -41,8 +42,11 @@ impl FrameLog {
     }
 
     /// Waits until everything is written, at most for `patience`.
-    pub(crate) fn finish(self, patience: Duration) {
-        self.0.finish(patience);
+    ///
+    /// # Errors
+    /// The file is not whole.
+    pub(crate) fn finish(self, patience: Duration) -> Result<(), Failure> {
+        self.0.finish(patience)
     }
 }
 
@@ -99,7 +103,8 @@ mod tests {
         assert!((49..=50).contains(&log.0.missing()), "{}", log.0.missing());
         let missing = log.0.missing() as usize;
         drop(allow);
-        log.finish(SOON);
+        // What is missing is said at the end, too.
+        assert!(log.finish(SOON).is_err());
         let text = String::from_utf8(disk.try_iter().flatten().collect()).unwrap();
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), ROOM + 50 - missing);
@@ -124,7 +129,7 @@ mod tests {
         (0..batches).for_each(|second| log.write(batch(second)));
         assert_eq!(log.0.missing(), 0);
         slow.join().unwrap();
-        log.finish(SOON);
+        assert_eq!(log.finish(SOON), Ok(()));
         let text = String::from_utf8(disk.try_iter().flatten().collect()).unwrap();
         assert_eq!(text.lines().count(), batches);
     }
@@ -139,6 +144,7 @@ mod tests {
         for second in 0..3 * ROOM {
             log.write(batch(second));
         }
-        log.finish(SOON);
+        let failure = log.finish(SOON).unwrap_err();
+        assert_eq!((failure.what.as_str(), failure.kind), ("the log is not whole", "file"), "{failure:?}");
     }
 }

@@ -1,6 +1,7 @@
 //! `--log FILE`: which file, and in which form.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
 
 use transport::BusSpec;
 use transport::log::{Format, Interface, LogWriter};
@@ -13,6 +14,8 @@ use crate::serve::files::create_log;
 pub(crate) struct LogPath {
     path: PathBuf,
     format: Format,
+    /// What the log of a command has not got, once that is known; the copies are of one log.
+    missing: Arc<OnceLock<String>>,
 }
 
 /// A log that has just been begun.
@@ -25,13 +28,26 @@ pub(crate) fn log_path(text: &str) -> Result<LogPath, String> {
     if text.is_empty() || !format.is_written() {
         return Err(format!("a {format} file is only read; a log is written as {}", Format::written_extensions()));
     }
-    Ok(LogPath { path, format })
+    Ok(LogPath { path, format, missing: Arc::default() })
 }
 
 impl LogPath {
     /// Where it is.
     pub(crate) fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Puts down what a command has found missing in it, in words.
+    pub(crate) fn lacks(&self, missing: String) {
+        // The first is what went wrong.
+        let _ = self.missing.set(missing);
+    }
+
+    /// Why the log is not what was asked for, if it is not.
+    pub(crate) fn failure(&self) -> Option<Failure> {
+        let missing = self.missing.get()?;
+        let failure = Failure::new(format!("the log {} is not whole", self.path.display())).of_kind("file");
+        Some(failure.because(missing).next("see that the disk has room, and is fast enough"))
     }
 
     /// Begins the file: a new one, or one that is empty or a log of the same form already.

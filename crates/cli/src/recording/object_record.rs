@@ -8,6 +8,7 @@ use can::{Frame, Instant};
 use testbench::recording::{Column, Kind, Mark, Record};
 
 use super::background::{Background, Pace, Words};
+use crate::failure::Failure;
 use crate::serve::speaker::Speaker;
 
 /// What came since the batch before, each kind in the order of its times.
@@ -42,8 +43,11 @@ impl ObjectRecord {
     }
 
     /// Waits until everything is written, at most for `patience`.
-    pub(crate) fn finish(self, patience: Duration) {
-        self.0.finish(patience);
+    ///
+    /// # Errors
+    /// The file is not whole.
+    pub(crate) fn finish(self, patience: Duration) -> Result<(), Failure> {
+        self.0.finish(patience)
     }
 }
 

@@ -100,6 +100,8 @@ pub(crate) struct Service {
     pub(crate) waiting: VecDeque<String>,
     /// Turns of keeping after which a `quit` that waits ends the run.
     pub(crate) quit_in: Option<u32>,
+    /// Time is moved by hand.
+    pub(crate) by_hand: bool,
 }
 
 impl Service {
@@ -116,7 +118,10 @@ impl Service {
             Request::Control(message) => world.serve_control(message),
             Request::Keep => {
                 world.look_for_stores();
-                self.write_records(world);
+                // Where time is moved by hand the clock is not to show in a record: pieces end with runs, and when they are full.
+                if !self.by_hand {
+                    self.write_records(world);
+                }
                 return self.count_down(world);
             }
             Request::PieceIsFull => self.write_records(world),
@@ -193,6 +198,7 @@ impl Service {
         if let Some(answer) = world.take_run() {
             self.answers.say(&answer);
         }
+        self.write_records(world);
         while !world.is_running()
             && let Some(line) = self.waiting.pop_front()
         {
@@ -209,11 +215,13 @@ impl Service {
             (Err(failure), Err(lost)) => Err(failure.because(lost.what)),
             (ended, kept) => ended.and(kept),
         };
-        if let Some(log) = self.log.take() {
-            log.finish(DISK_PATIENCE);
-        }
-        if let Some(record) = self.record.take() {
-            record.finish(DISK_PATIENCE);
+        let logged = self.log.take().map(|log| log.finish(DISK_PATIENCE));
+        let recorded = self.record.take().map(|record| record.finish(DISK_PATIENCE));
+        for torn in [logged, recorded].into_iter().flatten().filter_map(Result::err) {
+            ended = Err(match ended {
+                Ok(()) => torn,
+                Err(failure) => torn.because.into_iter().fold(failure.because(torn.what), Failure::because),
+            });
         }
         let read = self.answers.finish(PARTING_PATIENCE) & self.warnings.finish(PARTING_PATIENCE);
         if let Err(failure) = &mut ended {
@@ -298,4 +306,75 @@ pub(crate) fn listen_to_signals(requests: mpsc::Sender<Request>) {
     });
     // Whoever has read `ready` may ask for the end; the other end is dropped when that is so.
     let _: Result<(), _> = listening.recv();
+}
+
+#[cfg(test)]
+mod tests {
+    use can::{Bitrate, Instant};
+    use devices::AxisId;
+    use sim::World;
+    use sim::machine::zlac8030l;
+    use sim::recorder::{Channel, Recorder, Signal};
+    use sim::stimulus::Place;
+    use testbench::recording::{Column, Kind};
+    use transport::RealTimeWorld;
+
+    use super::super::pacer::{Clock, Pacer, Speed};
+    use super::super::scratch;
+    use super::*;
+    use crate::recording::Pace;
+
+    /// The record of some lines; before line `keep_before` the clock comes to where records are looked for.
+    fn record(kind: Kind, keep_before: usize) -> Vec<u8> {
+        let folder = scratch(&format!("by-hand-{kind:?}-{keep_before}"));
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("record");
+        let mut world = World::new(Bitrate::K500, 1);
+        world.add_drive(4, Box::new(zlac8030l(4, 1))).unwrap();
+        let channel = Channel { place: Place { node: 4, axis: AxisId(0) }, signal: Signal::Velocity };
+        world.start_recording(Recorder::new(Duration::from_millis(1), vec![channel]));
+        world.watch(true);
+        let file = std::fs::File::create(&path).unwrap();
+        let columns = [Column::of_axis(channel)];
+        let file = RecordFile::start(kind, file, &columns, Pace::Free, Speaker::silent()).unwrap();
+        let mut served = ServedWorld::new(world, Pacer::new(Clock::Manual, Speed::Times(1.0)), true, Speaker::silent());
+        let mut service = Service {
+            answers: Speaker::silent(),
+            warnings: Speaker::silent(),
+            log: None,
+            record: Some(file),
+            waiting: VecDeque::new(),
+            quit_in: None,
+            by_hand: true,
+        };
+        let lines = ["run 1500ms", "4 load torque 0.5", "run 2ms", "4 fault hall on", "run 1s", "4 fault hall off"];
+        for (place, line) in lines.into_iter().enumerate() {
+            if place == keep_before {
+                assert!(service.serve(&mut served, Request::Keep).is_continue());
+            }
+            assert!(service.serve(&mut served, Request::Line(line.to_owned())).is_continue());
+            while served.is_running() {
+                let target = served.target(Instant::ZERO);
+                let before = served.now();
+                served.advance_to(target);
+                let request = if served.now() == before { Request::RunIsOver } else { Request::PieceIsFull };
+                assert!(service.serve(&mut served, request).is_continue());
+            }
+        }
+        assert!(service.part(&mut served, Ok(())).is_ok());
+        let bytes = std::fs::read(&path).unwrap();
+        std::fs::remove_dir_all(folder).unwrap();
+        bytes
+    }
+
+    #[test]
+    fn moved_by_hand_a_record_is_the_same_whenever_the_clock_looks_for_it() {
+        for kind in [Kind::Csv, Kind::Mcap] {
+            let never = record(kind, usize::MAX);
+            assert!(String::from_utf8_lossy(&never).contains("load torque 0.5"));
+            for place in 0..6 {
+                assert!(record(kind, place) == never, "{kind:?}, looked for before line {place}");
+            }
+        }
+    }
 }

@@ -5,6 +5,9 @@
 //! one before is out, which is too late for the arbitration that follows: a station that waits has its turn then, whatever
 //! the identifiers are.
 
+#[cfg(test)]
+mod tests;
+
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
@@ -13,12 +16,12 @@ use can::{Bitrate, Frame, INTERFRAME_SPACE_BITS, Instant};
 use sim::command::{Answer, Before, Command, CommandError, Run, Service};
 use sim::events::{Event, EventKind, MAX_WAITING};
 use sim::recorder::Recorder;
-use sim::wire::WireEvent;
+use sim::wire::{ErrorCause, WireEvent};
 use sim::{StationId, World};
 use testbench::control::{ClientNumber, Control, Outcome, Pending};
 use testbench::scenario::Course;
 use testbench::scenario::happening::Happening;
-use transport::{ClientId, Heard, LeaveReason, ModbusRequest, RealTimeWorld};
+use transport::{ClientId, ErrorFrame, ErrorKind, ErrorKinds, Heard, LeaveReason, ModbusRequest, RealTimeWorld};
 
 use super::control::{ControlMessage, Letters};
 use super::eeprom::EepromError;
@@ -326,6 +329,11 @@ impl ServedWorld {
             if let Some(FollowedCourse { course, .. }) = &mut self.course {
                 course.hear(&mut self.world, Happening::Wire(&event));
             }
+            if let WireEvent::Error { at, cause, .. } = event
+                && self.hears()
+            {
+                self.heard.push_back(Heard::Error { error: error_frame(cause), at });
+            }
             let WireEvent::Frame { end, source, frame, .. } = event else { continue };
             let mut from = None;
             if source == self.adapter.index() {
@@ -455,6 +463,17 @@ impl ServedWorld {
     }
 }
 
+/// What a controller would tell of an error that all stations see: of which kind, where the cause is one kind's.
+fn error_frame(cause: ErrorCause) -> ErrorFrame {
+    let kinds = match cause {
+        ErrorCause::NotAcknowledged => ErrorKinds::NONE.with(ErrorKind::Acknowledge),
+        ErrorCause::Collision => ErrorKinds::NONE.with(ErrorKind::Bit),
+        ErrorCause::BitRate | ErrorCause::Abandoned => ErrorKinds::NONE.with(ErrorKind::Stuff),
+        ErrorCause::Disturbed => ErrorKinds::NONE.with(ErrorKind::Crc),
+    };
+    ErrorFrame { kinds, ..ErrorFrame::default() }
+}
+
 impl RealTimeWorld for ServedWorld {
     fn now(&self) -> Instant {
         self.world.now()
@@ -545,55 +564,5 @@ impl RealTimeWorld for ServedWorld {
             self.world.tell(None, kind);
             self.control.publish(&mut self.world);
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use sim::machine::zlac8030l;
-
-    use super::super::pacer::{Clock, Speed};
-    use super::*;
-
-    /// 2000h, which is stored with each write, becomes 700.
-    const WRITE_700: &str = "604#2B002000BC020000";
-
-    #[test]
-    fn moved_by_hand_time_stands_while_an_answer_waits_for_the_disk_so_that_none_shows_in_it() {
-        let mut ends = Vec::new();
-        for disk_ms in [0, 30, 200] {
-            let mut world = World::new(Bitrate::K500, 1);
-            let host = world.add_probe();
-            world.add_drive(4, Box::new(zlac8030l(4, 1))).expect("the first");
-            let pacer = Pacer::new(Clock::Manual, Speed::Times(1.0));
-            let mut served = ServedWorld::new(world, pacer, false, Speaker::silent());
-            let (keeper, kept) = Keeper::by_hand();
-            served.keep_stores(keeper);
-            let turn = |served: &mut ServedWorld, clock_ms: u64| {
-                let target = served.target(Instant::from_millis(clock_ms)).max(served.now());
-                served.advance_to(target);
-            };
-            assert!(matches!(served.command("run 500ms"), Commanded::Begun));
-            turn(&mut served, 1);
-            served.take_run().expect("it is over");
-            served.world.send(host, WRITE_700.parse().expect("a frame")).expect("a probe");
-            assert!(matches!(served.command("run 1s"), Commanded::Begun));
-            turn(&mut served, 2);
-            let stood = served.now();
-            assert!(stood < Instant::from_millis(1500), "{stood:?}: it waits for the disk");
-            assert!(served.clock_at(stood).is_none() && served.wakes_at() == Some(Instant::from_millis(252)));
-            turn(&mut served, 2 + disk_ms);
-            assert_eq!((served.now(), served.take_run()), (stood, None));
-            let (number, generation) = served.world.held_answers().next().expect("an answer waits");
-            kept(number, generation);
-            // One turn to take that in, one to go on.
-            turn(&mut served, 3 + disk_ms);
-            turn(&mut served, 3 + disk_ms);
-            assert!(served.take_run().is_some_and(|answer| answer.contains("1.5")), "the run ends where it was to");
-            let heard = std::iter::from_fn(|| served.take_heard());
-            ends.push(heard.map(|heard| format!("{heard:?}")).collect::<Vec<_>>());
-        }
-        assert!(ends.iter().all(|end| *end == ends[0]), "the same frames at the same times: {ends:#?}");
-        assert!(ends[0].iter().any(|heard| heard.contains("584")), "{:?}", ends[0]);
     }
 }

@@ -24,6 +24,8 @@ pub enum Event {
     Emcy(NodeId, Emcy),
     /// A node did not answer an SDO request in this time.
     NoAnswer(NodeId, Mux, Duration),
+    /// SDO requests to a node are answered twice: there are two of it.
+    AnsweredTwice(NodeId),
     /// A node aborted an SDO request.
     Aborted(NodeId, Mux, AbortCode),
     /// So many periods directly before this one had no SYNC.
@@ -49,6 +51,7 @@ impl fmt::Display for Event {
             Self::NoAnswer(node, mux, time) => {
                 write!(f, "node {node} did not answer about {mux} within {} ms", time.as_millis())
             }
+            Self::AnsweredTwice(node) => f.write_str(&answered_twice(*node)),
             Self::CyclesMissed(1) => f.write_str("one cycle had no SYNC"),
             Self::CyclesMissed(cycles) => write!(f, "{cycles} cycles had no SYNC"),
             Self::SyncLost(time) => write!(f, "no SYNC for {} ms", time.as_secs_f64() * 1e3),
@@ -58,6 +61,14 @@ impl fmt::Display for Event {
             Self::Aborted(node, mux, code) => write!(f, "node {node} refused {mux}: {code}"),
         }
     }
+}
+
+/// That SDO requests to a node are answered twice, and what to do.
+pub fn answered_twice(node: NodeId) -> String {
+    format!(
+        "node {node}: one SDO request has two answers: two devices have this node-ID, and both act on what either is told. Switch \
+         one off, and give the other a node-ID of its own"
+    )
 }
 
 /// How many events are kept until they are pulled; older ones are dropped first.

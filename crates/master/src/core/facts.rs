@@ -6,6 +6,8 @@ use canopen::emcy::Emcy;
 use canopen::{NmtCommand, NmtState};
 use devices::Description;
 
+use super::answers::ENOUGH;
+
 /// How many emergency messages are kept for each node.
 const EMCY_KEPT: usize = 8;
 
@@ -30,6 +32,8 @@ pub struct NodeFacts {
     pub talked_to_at: Option<Instant>,
     /// When it was last told something: an SDO download had ended, or an RPDO left. What it sent before tells nothing of that.
     pub told_at: Option<Instant>,
+    /// SDO answers that no client had asked for.
+    pub second_answers: u32,
     emcys: VecDeque<(Instant, Emcy)>,
 }
 
@@ -45,6 +49,11 @@ pub struct HeartbeatWatch {
 }
 
 impl NodeFacts {
+    /// Two devices answer under this node-ID: more requests than one have had two answers.
+    pub const fn is_answered_twice(&self) -> bool {
+        self.second_answers >= ENOUGH
+    }
+
     /// The emergency messages kept, oldest first, with the time each came.
     pub fn emcys(&self) -> impl DoubleEndedIterator<Item = &(Instant, Emcy)> {
         self.emcys.iter()

@@ -5,6 +5,7 @@
 //! [`Event`]s, all pulled. Up to 127 nodes are asked at once, one request per node on the wire, the others queued.
 //! Nothing here waits: the async face is [`crate::Network`]. Drives are unknown here: see [`crate::drive`].
 
+mod answers;
 mod channel;
 mod cycle;
 mod event;
@@ -30,7 +31,7 @@ use canopen::connection_set::Service;
 use canopen::{Mux, NodeId};
 
 pub use cycle::Cycle;
-pub use event::Event;
+pub use event::{Event, answered_twice};
 pub use facts::{HeartbeatWatch, NodeFacts};
 pub(crate) use field::bits_of;
 pub use field::{Field, NumberForm, Sample, SetPoint, Signal};
@@ -42,6 +43,7 @@ pub use request::{Command, Failure, Finished, Outcome, Request, Ticket, Transfer
 pub use supervision::CycleLoss;
 pub(crate) use supervision::{Cadence, CycleRules, WatchId};
 
+use answers::Answers;
 use channel::Channel;
 use cycle::SyncClock;
 use event::Events;
@@ -101,6 +103,7 @@ pub struct Core {
 struct Member {
     facts: NodeFacts,
     channel: Channel,
+    answers: Answers,
 }
 
 impl Default for Core {
@@ -112,7 +115,8 @@ impl Default for Core {
 impl Core {
     /// A master that knows nothing of any node.
     pub fn new() -> Self {
-        let member = |node| Member { facts: NodeFacts::default(), channel: Channel::new(node) };
+        let member =
+            |node| Member { facts: NodeFacts::default(), channel: Channel::new(node), answers: Answers::default() };
         Self {
             now: Instant::ZERO,
             members: NodeId::all().map(member).collect(),
@@ -317,7 +321,9 @@ impl Core {
                 Some(frame) => {
                     self.presence.note_sent(node, self.now);
                     let now = self.now;
-                    self.member_mut(node).facts.talked_to_at = Some(now);
+                    let member = self.member_mut(node);
+                    member.facts.talked_to_at = Some(now);
+                    member.answers.asked(&frame, now);
                     return Some(frame);
                 }
                 None => self.sending.remove(node),
@@ -361,6 +367,8 @@ impl Station for Core {
                 self.handle_emcy(node, frame);
                 node
             }
+            // Another client's: the answer to it is not ours.
+            Some(Service::SdoRequest(node)) => return self.member_mut(node).answers.asked(frame, now),
             Some(Service::Sync) => return self.handle_sync(),
             _ => return,
         };

@@ -4,6 +4,7 @@ use canopen::heartbeat::Heartbeat;
 use canopen::{Mux, NmtState, NodeId};
 
 use super::Core;
+use super::answers::ENOUGH;
 use super::event::Event;
 use super::request::{Failure, Outcome};
 
@@ -29,8 +30,15 @@ impl Core {
     }
 
     pub(super) fn handle_sdo_reply(&mut self, node: NodeId, frame: &Frame) {
+        let now = self.now;
+        let member = self.member_mut(node);
+        if let Some(second) = member.answers.answered(frame, now) {
+            member.facts.second_answers = second;
+            if second == ENOUGH {
+                self.events.push(Event::AnsweredTwice(node), now);
+            }
+        }
         if self.busy.contains(node) {
-            let now = self.now;
             self.member_mut(node).channel.handle_frame(frame, now);
             self.settle(node);
             self.find_due();

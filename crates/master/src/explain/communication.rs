@@ -15,7 +15,7 @@ const TOPIC: Topic = Topic::Communication;
 pub(super) fn look(seen: &Observed, findings: &mut Vec<Finding>) {
     findings.extend(silent(seen));
     if seen.silence.is_none() {
-        findings.extend(heartbeat(seen));
+        findings.extend(answered_twice(seen).or_else(|| heartbeat(seen)));
         findings.extend(other_master(seen));
         findings.extend(nmt_by_other(seen));
         findings.extend(host_watch(seen));
@@ -47,6 +47,26 @@ fn silent(seen: &Observed) -> Option<Finding> {
     Some(cause(TOPIC, "no_answer", [expected, error.to_string(), follows, remedy]))
 }
 
+/// A server answers each request once (CiA 301, 7.2.4.3).
+fn answered_twice(seen: &Observed) -> Option<Finding> {
+    seen.answered_twice.then(|| {
+        warning(
+            TOPIC,
+            "node_twice",
+            [
+                "One answer to each SDO request".to_owned(),
+                "Two to one request".to_owned(),
+                format!("Two devices answer as node {}: both act on what either is told", seen.node),
+                TWO_DEVICES.to_owned(),
+            ],
+        )
+    })
+}
+
+/// What to do about two devices with one node-ID.
+const TWO_DEVICES: &str =
+    "Switch one off and give the other a node-ID of its own: ferrodrive lss scan, or its switches";
+
 /// 1017h says how often one should come.
 fn heartbeat(seen: &Observed) -> Option<Finding> {
     let period_ms = seen.value(HEARTBEAT_TIME).filter(|time| *time > 0)? as u64;
@@ -76,8 +96,7 @@ fn heartbeat(seen: &Observed) -> Option<Finding> {
                 expected,
                 found,
                 format!("Two devices send as node {}: both act on what either is told", seen.node),
-                "Switch one off and give the other a node-ID of its own: ferrodrive lss scan, or its switches"
-                    .to_owned(),
+                TWO_DEVICES.to_owned(),
             ],
         )
     })

@@ -94,6 +94,8 @@ pub struct Observed {
     pub pdos: Vec<(PdoConfig, CobId)>,
     /// This master said something to it within this time before it was looked at.
     pub talked_to: Option<Duration>,
+    /// Its SDO requests have two answers.
+    pub answered_twice: bool,
     /// What others sent.
     pub heard: Overheard,
     values: BTreeMap<Mux, i64>,
@@ -121,6 +123,7 @@ impl Observed {
             rates_of_zero: Vec::new(),
             pdos: Vec::new(),
             talked_to: facts.talked_to_at.map(|at| now - at),
+            answered_twice: facts.is_answered_twice(),
             heard: heard.clone(),
             values: BTreeMap::new(),
         };

@@ -6,6 +6,7 @@ use canopen::connection_set::Service;
 use canopen::emcy::Emcy;
 use canopen::heartbeat::Heartbeat;
 use canopen::{Mux, NmtCommand, NmtState, NodeId};
+use cia402::PowerCommand;
 
 use super::data_type::GatewayType;
 use super::refusal::Refusal;
@@ -59,18 +60,24 @@ impl Session {
         }
     }
 
+    /// The network whose gateway this is.
+    pub const fn network(&self) -> &Network {
+        &self.network
+    }
+
     /// The nodes that this client has written to in a way that may set their drives in motion.
     pub const fn moved(&self) -> NodeSet {
         self.moved
     }
 
     /// The nodes whose drives a line may set in motion, if it is obeyed: for whoever sees to it that they stop without the
-    /// gateway.
+    /// gateway. A controlword that does not enable operation is not held up for that: it may be a stop.
     pub fn about_to_move(&self, line: &str) -> NodeSet {
         let mut nodes = NodeSet::EMPTY;
         match GatewayRequest::parse(line) {
-            Ok(Some(GatewayRequest { place, command: GatewayCommand::Write(mux, _), .. })) => {
-                if let (Some(_), Ok(node)) = (object_may_move(mux), self.node(&place)) {
+            Ok(Some(GatewayRequest { place, command: GatewayCommand::Write(mux, bytes), .. })) => {
+                let may_move = object_may_move(mux).is_some() && !is_stop(mux, &bytes);
+                if let (true, Ok(node)) = (may_move, self.node(&place)) {
                     nodes.insert(node.id());
                 }
             }
@@ -276,6 +283,12 @@ impl Session {
     }
 }
 
+/// A controlword of the first axis with which no drive is in operation: CiA 402-2, the commands of the power drive system.
+fn is_stop(mux: Mux, bytes: &[u8]) -> bool {
+    let enabled = PowerCommand::EnableOperation.controlword().0;
+    mux == CONTROLWORD && bytes.first().is_some_and(|low| u16::from(*low) & enabled != enabled)
+}
+
 fn node_id(node: u64) -> Result<NodeId, Refusal> {
     u8::try_from(node).ok().and_then(NodeId::new).ok_or(Refusal::NODE)
 }
@@ -311,4 +324,29 @@ fn version() -> String {
     let mut numbers = env!("CARGO_PKG_VERSION").split('.');
     let (major, minor) = (numbers.next().unwrap_or("0"), numbers.next().unwrap_or("0"));
     format!("0 0 0 0 2 1.1 {major}.{minor}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_may_be_a_stop_waits_for_no_guard() {
+        let session = Session::new(Network::new());
+        for (line, moves) in [
+            // CiA 402-2, commands: disable voltage, quick stop, shutdown, switch on; enable operation, with and without more.
+            ("[1] 4 w 0x6040 0 u16 0", false),
+            ("[1] 4 w 0x6040 0 u16 2", false),
+            ("[1] 4 w 0x6040 0 u16 6", false),
+            ("[1] 4 w 0x6040 0 u16 7", false),
+            ("[1] 4 w 0x6040 0 u16 15", true),
+            ("[1] 4 w 0x6040 0 x16 0x010F", true),
+            ("[1] 4 w 0x60FF 0 i32 0", true),
+            ("[1] 4 w 0x6083 0 u32 100", false),
+            ("[1] 4 stop", false),
+        ] {
+            let node = NodeId::new(4).unwrap();
+            assert_eq!(session.about_to_move(line).contains(node), moves, "{line}");
+        }
+    }
 }

@@ -45,6 +45,8 @@ pub struct Found {
     pub knowledge: Knowledge,
     /// The models that answer so. More than one: it cannot be told which by its identity.
     pub models: Vec<&'static Description>,
+    /// Its requests are answered twice: two devices have this node-ID, and what is said here is of one or the other.
+    pub twice: bool,
 }
 
 impl Found {
@@ -190,7 +192,9 @@ impl Network {
         });
         let _ = join_all(due.collect::<Vec<_>>()).await;
         for found in found {
-            found.nmt_state = self.facts(found.node).probable_state(found.knowledge.description());
+            let facts = self.facts(found.node);
+            found.nmt_state = facts.probable_state(found.knowledge.description());
+            found.twice = facts.is_answered_twice();
         }
     }
 
@@ -210,7 +214,7 @@ impl Network {
         };
         let heartbeat = heartbeat.map(|ms| Duration::from_millis(u64::from(ms) & 0xFFFF));
         let nmt_state = facts.probable_state(knowledge.description());
-        Some(Found { node: id, identity, nmt_state, heartbeat, knowledge, models })
+        Some(Found { node: id, identity, nmt_state, heartbeat, knowledge, models, twice: false })
     }
 }
 

@@ -7,6 +7,7 @@ use crate::support::toy::Toy;
 use crate::support::{Bus, mux, node};
 use can::Instant;
 use canopen::AbortCode;
+use master::core::Event;
 use master::{Error, join_all};
 
 const DEVICE_TYPE: canopen::Mux = mux(0x1000, 0);
@@ -110,6 +111,29 @@ fn an_abort_code_is_handed_on_with_what_to_do() {
     );
     let error = bus.block_on(node.read::<u32>(mux(0x6502, 0))).unwrap_err();
     assert!(matches!(error, Error::Aborted { code: AbortCode::NO_SUCH_OBJECT, .. }));
+}
+
+#[test]
+fn two_devices_with_one_node_id_are_noticed_by_their_answers() {
+    let one = Toy::new(4).u32(0x1000, 0, 0x0004_0192).u16(0x1017, 0, 0);
+    let other = Toy::new(4).u32(0x1000, 0, 0x0002_0192);
+    let mut bus = Bus::new(vec![one.clone(), other]);
+    let network = bus.network.clone();
+    let found = bus.block_on(network.scan(Duration::from_millis(50), |_| {}));
+    assert!(found.len() == 1 && found[0].twice, "{found:?}");
+    let events: Vec<Event> = std::iter::from_fn(|| network.poll_event()).map(|(_, event)| event).collect();
+    let twice: Vec<_> = events.iter().filter(|event| **event == Event::AnsweredTwice(node(4))).collect();
+    assert_eq!(twice.len(), 1, "told once: {events:?}");
+    // One device, asked by this master and by another.
+    let mut bus = Bus::new(vec![one]);
+    let network = bus.network.clone();
+    let asked_by_another = "604#4000100000000000".parse().unwrap();
+    for _ in 0..5 {
+        bus.noise.push((bus.now, asked_by_another));
+        assert!(bus.block_on(network.node(node(4)).read::<u32>(DEVICE_TYPE)).is_ok());
+    }
+    assert_eq!(network.node(node(4)).facts().second_answers, 0);
+    assert!(!bus.block_on(network.scan(Duration::from_millis(50), |_| {}))[0].twice);
 }
 
 #[test]

@@ -209,6 +209,31 @@ fn resets_by_nmt_take_their_time_in_which_the_drive_is_silent_and_deaf() {
     }
 }
 
+#[test]
+fn what_is_asked_of_a_drive_that_resets_is_never_answered_also_right_before_its_end() {
+    for model in models() {
+        for command in ["000#8200", "000#8100"] {
+            let mut bench = Bench::booted(model, 1);
+            // When it ends: the same world, with nobody who asks later.
+            let mut alone = Bench { world: bench.world.snapshot(), adapter: bench.adapter };
+            alone.send("605#4000100000000000");
+            alone.send(command);
+            let end = alone.wait(&boot_up(), 1000);
+            bench.send("605#4000100000000000");
+            bench.send(command);
+            // The last request is on the wire before the boot-up message is.
+            let last = Instant::from_nanos(end.as_nanos() - 600_000);
+            bench.world.run_until(last);
+            bench.send("605#4000100000000000");
+            bench.world.run_for(Duration::from_millis(100));
+            let heard = bench.heard();
+            assert!(heard.iter().any(|(_, frame)| frame.to_string() == boot_up()), "{}: {heard:?}", model.name);
+            let answers = heard.iter().filter(|(at, frame)| frame.id().raw() == 0x585 && *at > last).count();
+            assert_eq!(answers, 0, "{} after {command}: {heard:?}", model.name);
+        }
+    }
+}
+
 /// A stored parameter of each maker's, with a value that is not its default: written with this, read with that, and what is
 /// answered before and after.
 const STORED: [(&str, &str, &str, &str, &str); 2] = [

@@ -3,6 +3,8 @@
 //! Who is let in is decided before anything else, in one place ([`guard`]). No handler knows a drive.
 
 mod answer;
+mod door;
+mod guessers;
 mod openapi;
 mod page;
 mod parameters;
@@ -13,17 +15,16 @@ mod tests;
 mod trace;
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use axum::Router;
 use axum::extract::rejection::QueryRejection;
 use axum::extract::ws::WebSocketUpgrade;
-use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
+use axum::extract::{DefaultBodyLimit, FromRequest, Path, Query, Request, State};
 use axum::http::header::{
-    CACHE_CONTROL, CONTENT_SECURITY_POLICY, LOCATION, REFERRER_POLICY, SET_COOKIE, X_CONTENT_TYPE_OPTIONS,
-    X_FRAME_OPTIONS,
+    ACCEPT, CACHE_CONTROL, CONTENT_LENGTH, CONTENT_SECURITY_POLICY, CONTENT_TYPE, LOCATION, REFERRER_POLICY,
+    SET_COOKIE, X_CONTENT_TYPE_OPTIONS, X_FRAME_OPTIONS,
 };
-use axum::http::{HeaderName, HeaderValue, Method, StatusCode};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{MethodRouter, get, post};
@@ -34,13 +35,13 @@ use tokio::sync::Semaphore;
 use crate::access::Access;
 use crate::desk::Desk;
 use answer::{json_text, trouble};
+use door::Visitor;
+pub use door::serve;
+use guessers::Guessers;
 use openapi::{Operation, ROUTES};
 
 /// The largest message or body that is read.
 pub(crate) const LARGEST_MESSAGE: usize = 64 << 10;
-
-/// What a wrong password costs. One is looked at at a time.
-const PENALTY: Duration = Duration::from_secs(1);
 
 /// What every answer says to the browser: nothing but this server's own files runs in the page, nobody frames it, and it
 /// tells nobody where it was.
@@ -61,8 +62,8 @@ const HEADERS: [(HeaderName, &str); 5] = [
 struct Web {
     desk: Desk,
     access: Arc<Access>,
-    /// One password at a time.
-    door: Arc<Semaphore>,
+    /// Who has just said a wrong password.
+    guessers: Arc<Guessers>,
     doors: trace::Doors,
     /// One record or file at a time: each takes memory.
     records: Arc<Semaphore>,
@@ -71,7 +72,7 @@ struct Web {
 /// The server of a studio: everything under one router, which needs no socket to be called.
 pub fn app(desk: Desk, access: Arc<Access>) -> Router {
     let one = || Arc::new(Semaphore::new(1));
-    let web = Web { desk, access, door: one(), doors: trace::Doors::default(), records: one() };
+    let web = Web { desk, access, guessers: Arc::default(), doors: trace::Doors::default(), records: one() };
     let api = ROUTES.iter().fold(Router::new(), |router, route| router.route(route.path, handler(route.operation)));
     api.route("/", get(async || page::file("index.html")))
         .route("/page/{file}", get(async |Path(file): Path<String>| page::file(&file)))
@@ -107,9 +108,11 @@ fn handler(operation: Operation) -> MethodRouter<Web> {
 
 /// Who is let in, and with what every answer goes out.
 async fn guard(State(web): State<Web>, request: Request, next: Next) -> Response {
+    let wants_page = request.method() == Method::GET && accepts_html(request.headers());
     let mut response = match refuse(&web.access, &request) {
-        Some(refusal) => refusal,
-        None => next.run(request).await,
+        // A person looks at it: in a tab of an earlier launch, for one.
+        Some(refusal) => refusal.answer(wants_page),
+        None => in_json(next.run(request).await),
     };
     for (name, value) in HEADERS {
         response.headers_mut().insert(name, HeaderValue::from_static(value));
@@ -122,22 +125,73 @@ struct Asked {
     token: Option<String>,
 }
 
-fn refuse(access: &Access, request: &Request) -> Option<Response> {
+/// What somebody hears instead of what was asked for.
+enum Refusal {
+    /// Go there, with this cookie.
+    Elsewhere(&'static str, Option<String>),
+    /// No, and why.
+    Trouble(StatusCode, &'static str, &'static str),
+}
+
+impl Refusal {
+    /// For a person who looks at it, or for a program.
+    fn answer(self, wants_page: bool) -> Response {
+        match self {
+            Self::Elsewhere(to, None) => ([(LOCATION, to)], StatusCode::SEE_OTHER).into_response(),
+            Self::Elsewhere(to, Some(cookie)) => {
+                ([(SET_COOKIE, cookie), (LOCATION, to.into())], StatusCode::SEE_OTHER).into_response()
+            }
+            Self::Trouble(status, _, text) if wants_page => page::refused(status, text),
+            Self::Trouble(status, kind, text) => trouble(status, kind, text),
+        }
+    }
+}
+
+fn accepts_html(headers: &HeaderMap) -> bool {
+    headers.get(ACCEPT).and_then(|value| value.to_str().ok()).is_some_and(|types| types.contains("text/html"))
+}
+
+/// An error that the router has put into words of its own, as all others.
+fn in_json(response: Response) -> Response {
+    let status = response.status();
+    let told = response.headers().get(CONTENT_TYPE).is_some_and(|kind| kind == "application/json");
+    if !status.is_client_error() || told {
+        return response;
+    }
+    let (kind, text) = match status {
+        StatusCode::PAYLOAD_TOO_LARGE => ("too_large", "the body is larger than what is read here"),
+        StatusCode::METHOD_NOT_ALLOWED => ("method_not_allowed", "this path takes another method"),
+        _ => ("malformed", "the request cannot be read"),
+    };
+    let mut answer = trouble(status, kind, text);
+    // Which methods there are, what a socket has to say: the head stays.
+    for (name, value) in
+        response.headers().iter().filter(|(name, _)| **name != CONTENT_TYPE && **name != CONTENT_LENGTH)
+    {
+        answer.headers_mut().insert(name, value.clone());
+    }
+    answer
+}
+
+fn refuse(access: &Access, request: &Request) -> Option<Refusal> {
     let (headers, path) = (request.headers(), request.uri().path());
     if !access.is_for_us(headers) {
-        return Some(trouble(StatusCode::FORBIDDEN, "foreign_host", "this server is called by another name"));
+        let text = "this server is not known by that name: call it by its address, or start it with --host NAME";
+        return Some(Refusal::Trouble(StatusCode::FORBIDDEN, "foreign_host", text));
     }
     let changes = request.method() != Method::GET && request.method() != Method::HEAD;
     if (changes || path == "/ws") && !access.is_from_us(headers) {
         let text = "this is for pages of this server: the Origin has to be http:// and the Host";
-        return Some(trouble(StatusCode::FORBIDDEN, "foreign_origin", text));
+        return Some(Refusal::Trouble(StatusCode::FORBIDDEN, "foreign_origin", text));
     }
     let token = Query::<Asked>::try_from_uri(request.uri()).ok().and_then(|Query(asked)| asked.token);
     if path == "/" && token.is_some_and(|token| access.is_token(&token)) {
         // The token leaves the address bar, and with it the history.
-        return Some(([(SET_COOKIE, access.cookie()), (LOCATION, "/".into())], StatusCode::SEE_OTHER).into_response());
+        Visitor::of(request).into_iter().for_each(Visitor::admit);
+        return Some(Refusal::Elsewhere("/", Some(access.cookie())));
     }
     if access.lets_in(headers) {
+        Visitor::of(request).into_iter().for_each(Visitor::admit);
         return None;
     }
     // What is needed to ask for a password.
@@ -146,10 +200,10 @@ fn refuse(access: &Access, request: &Request) -> Option<Response> {
         return None;
     }
     if access.has_password() && path == "/" {
-        return Some(([(LOCATION, "/login")], StatusCode::SEE_OTHER).into_response());
+        return Some(Refusal::Elsewhere("/login", None));
     }
     let text = "open the address that `ferrodrive studio` printed: it has the token of this launch";
-    Some(trouble(StatusCode::UNAUTHORIZED, "no_token", text))
+    Some(Refusal::Trouble(StatusCode::UNAUTHORIZED, "no_token", text))
 }
 
 async fn state(State(web): State<Web>) -> Response {
@@ -189,17 +243,24 @@ struct Credentials {
     password: String,
 }
 
-async fn login(State(web): State<Web>, body: String) -> Response {
+async fn login(State(web): State<Web>, request: Request) -> Response {
+    let visitor = Visitor::of(&request).cloned();
+    let body = match String::from_request(request, &web).await {
+        Ok(body) => body,
+        Err(rejection) => return rejection.into_response(),
+    };
     let Ok(Credentials { password }) = serde_json::from_str(&body) else {
         return trouble(StatusCode::BAD_REQUEST, "malformed", r#"expected {"password":".."}"#);
     };
-    let Ok(_at_the_door) = web.door.try_acquire() else {
-        return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "another password is being looked at: try again");
-    };
+    let from = Visitor::origin(visitor.as_ref());
+    if web.guessers.has(from) {
+        return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "a wrong password came from your address: try again");
+    }
     if web.access.is_password(&password) {
+        visitor.iter().for_each(Visitor::admit);
         return ([(SET_COOKIE, web.access.cookie())], json_text(json!({ "ok": true }).to_string())).into_response();
     }
-    tokio::time::sleep(PENALTY).await;
+    Arc::clone(&web.guessers).pay(from).await;
     trouble(StatusCode::UNAUTHORIZED, "wrong_password", "this is not the password")
 }
 

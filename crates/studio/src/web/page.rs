@@ -59,6 +59,12 @@ pub(super) fn file(name: &str) -> Response {
     }
 }
 
+/// What somebody sees who is not let in, and what to do then.
+pub(super) fn refused(status: StatusCode, reason: &str) -> Response {
+    let text = include_str!("../../page/refused.html").replace("REASON", reason);
+    (status, [(CONTENT_TYPE, HTML)], text).into_response()
+}
+
 /// The power drive state machine as the page draws it. Transitions 0 (start) and 13 (a fault, from everywhere) are no rows of
 /// the table.
 pub(super) fn power_states() -> String {

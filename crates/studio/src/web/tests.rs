@@ -5,17 +5,20 @@ use std::time::Duration;
 
 use axum::Router;
 use axum::body::Body;
+use axum::extract::ConnectInfo;
 use axum::http::{Request, StatusCode};
 use axum::response::Response;
 use futures_util::{SinkExt, StreamExt};
 use serde_json::Value;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
 use tokio_tungstenite::tungstenite::client::IntoClientRequest;
 use tokio_tungstenite::tungstenite::{Error as SocketError, Message};
 use tokio_tungstenite::{MaybeTlsStream, WebSocketStream};
 use tower::ServiceExt;
 
-use super::{LARGEST_MESSAGE, ROUTES, app, openapi};
+use super::door::Visitor;
+use super::{LARGEST_MESSAGE, ROUTES, app, openapi, serve};
 use crate::access::{Access, Password};
 use crate::authority::Authority;
 use crate::desk::{Counter, Desk, Picture, Wish, desk};
@@ -171,7 +174,112 @@ async fn a_password_opens_and_a_wrong_one_costs_time() {
     let cookie = right.headers()["set-cookie"].to_str().expect("text").split(';').next().expect("a value").to_owned();
     assert_eq!(ask(&app, "GET", "/api/state", &[("cookie", &cookie)], "").await.status(), StatusCode::OK);
     let large = "x".repeat(LARGEST_MESSAGE + 1);
-    assert_eq!(ask(&app, "POST", "/api/login", &origin, &large).await.status(), StatusCode::PAYLOAD_TOO_LARGE);
+    let refused = ask(&app, "POST", "/api/login", &origin, &large).await;
+    assert_eq!(refused.status(), StatusCode::PAYLOAD_TOO_LARGE);
+    let refused: Value = serde_json::from_str(&text(refused).await).expect("JSON, as all other refusals");
+    assert_eq!(refused["error"]["kind"], "too_large");
+}
+
+#[tokio::test(start_paused = true)]
+async fn who_guesses_at_one_address_holds_up_nobody_at_another() {
+    let (app, _access, _counter) = server(Some("correct horse battery"));
+    let login = async |from: [u8; 4], password: &str| {
+        let body = serde_json::json!({ "password": password }).to_string();
+        let request = Request::builder().method("POST").uri("/api/login").header("host", ADDRESS);
+        let mut request = request.header("origin", "http://127.0.0.1:8402").body(Body::from(body)).expect("a request");
+        request.extensions_mut().insert(ConnectInfo(Visitor::new((from, 5000).into())));
+        app.clone().oneshot(request).await.expect("it answers").status()
+    };
+    let guesser = [10, 0, 0, 66];
+    {
+        let mut guess = std::pin::pin!(login(guesser, "incorrect horse"));
+        let at_once = tokio::time::timeout(Duration::from_millis(100), guess.as_mut()).await;
+        assert!(at_once.is_err());
+        // He hangs up, and waits all the same.
+    }
+    assert_eq!(login(guesser, "correct horse battery").await, StatusCode::TOO_MANY_REQUESTS);
+    assert_eq!(login([10, 0, 0, 1], "correct horse battery").await, StatusCode::OK, "the owner comes in");
+    tokio::time::sleep(Duration::from_secs(1)).await;
+    assert_eq!(login(guesser, "correct horse battery").await, StatusCode::OK);
+}
+
+#[tokio::test]
+async fn elsewhere_a_name_has_to_be_one_that_was_said() {
+    let password = Password::new("correct horse battery").expect("long enough");
+    let access = Access::new("0.0.0.0:8402".parse().expect("an address"), Some(password)).expect("with a password");
+    let here = access.url();
+    assert!(here.starts_with("http://127.0.0.1:8402/?token="), "an address that can be opened: {here}");
+    let access = Arc::new(access.with_hosts(vec!["drives.local".to_owned()]));
+    let (desk, _counter) = desk(Trace::new(master::Models::default(), Origin::default()));
+    let app = app(desk, access);
+    for host in
+        ["192.168.1.5:8402", "[2001:db8::1]:8402", "[::1]", "localhost:8402", "drives.local:8402", "Drives.LOCAL"]
+    {
+        let page = ask(&app, "GET", "/login", &[("host", host)], "").await;
+        assert_eq!(page.status(), StatusCode::OK, "{host}");
+    }
+    let origin = ("origin", "http://evil.example:8402");
+    for host in ["evil.example:8402", "drives.local.evil.example", "192.168.1.5.evil.example:8402", ""] {
+        let body = r#"{"password":"correct horse battery"}"#;
+        let login = ask(&app, "POST", "/api/login", &[("host", host), origin], body).await;
+        assert_eq!(login.status(), StatusCode::FORBIDDEN, "{host}");
+    }
+}
+
+#[tokio::test]
+async fn a_person_without_a_token_reads_what_to_do_and_a_program_gets_json() {
+    let (app, access, _counter) = server(None);
+    let browser = ("accept", "text/html,application/xhtml+xml,*/*;q=0.8");
+    for headers in [&[browser][..], &[browser, ("cookie", "ferrodrive_studio_8402=of an earlier launch")]] {
+        let page = ask(&app, "GET", "/", headers, "").await;
+        assert_eq!(page.status(), StatusCode::UNAUTHORIZED);
+        assert!(page.headers()["content-type"].to_str().expect("text").starts_with("text/html"));
+        let page = text(page).await;
+        assert!(page.contains("open the address that `ferrodrive studio` printed") && page.contains("emergency stop"));
+        assert!(!page.contains(&token(&access)));
+    }
+    let program = text(ask(&app, "GET", "/api/state", &[], "").await).await;
+    assert!(program.contains("no_token"), "{program}");
+    let bearer = format!("Bearer {}", token(&access));
+    let wrong =
+        ask(&app, "PUT", "/api/state", &[("authorization", &bearer), ("origin", "http://127.0.0.1:8402")], "").await;
+    assert_eq!(
+        (wrong.status(), &wrong.headers()["allow"]),
+        (StatusCode::METHOD_NOT_ALLOWED, &"GET,HEAD".parse().expect("text"))
+    );
+    assert!(text(wrong).await.contains("method_not_allowed"));
+}
+
+#[tokio::test]
+async fn whoever_has_the_token_is_served_however_many_say_nothing() {
+    let (access, _desk, _pictures) = listening().await;
+    let mut silent = Vec::new();
+    for _ in 0..200 {
+        let mut stream = TcpStream::connect(host_of(&access)).await.expect("it takes connections");
+        stream.write_all(b"GET / HTTP/1.1\r\nHost: ").await.expect("half a header");
+        silent.push(stream);
+    }
+    // The socket of a page that is open is not a stranger's.
+    let mut page = open(&access, &format!("http://{}", host_of(&access))).await.expect("it is let in");
+    let mut rest = [0; 1];
+    let ended = tokio::time::timeout(PATIENCE, silent[0].read(&mut rest)).await.expect("it is sent away");
+    assert!(matches!(ended, Ok(0) | Err(_)), "{ended:?}");
+    for _ in 0..200 {
+        silent.push(TcpStream::connect(host_of(&access)).await.expect("it takes connections"));
+    }
+    page.send(Message::text(r#"{"seq":1,"op":"stop_all"}"#)).await.expect("it is open");
+    assert!(matches!(page.next().await, Some(Ok(_))), "and answered");
+}
+
+#[tokio::test(start_paused = true)]
+async fn half_a_header_has_five_seconds() {
+    let (access, _desk, _pictures) = listening().await;
+    let began = tokio::time::Instant::now();
+    let mut stream = TcpStream::connect(host_of(&access)).await.expect("it takes connections");
+    stream.write_all(b"GET / HTTP/1.1\r\nHost: ").await.expect("half a header");
+    let mut rest = Vec::new();
+    let _ = stream.read_to_end(&mut rest).await;
+    assert_eq!((began.elapsed().as_secs(), rest.len()), (5, 0));
 }
 
 #[tokio::test]
@@ -216,7 +324,7 @@ async fn listening() -> (Arc<Access>, Desk, tokio::sync::watch::Sender<Picture>)
     let (desk, counter) = desk(Trace::new(master::Models::default(), Origin::default()));
     let Counter { mut wishes, pictures, .. } = counter;
     let served = app(desk.clone(), Arc::clone(&access));
-    tokio::spawn(async move { axum::serve(listener, served).await });
+    tokio::spawn(serve(listener, served));
     tokio::spawn(async move {
         let mut authority = Authority::default();
         while let Some(wish) = wishes.recv().await {

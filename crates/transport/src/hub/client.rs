@@ -2,7 +2,6 @@
 
 use std::io;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use can::{Frame, Instant};
@@ -14,7 +13,7 @@ use tokio::sync::{Semaphore, mpsc};
 use super::event::{ClientId, HubEvent};
 use super::session::Session;
 use crate::link::within;
-use crate::{WallClock, tcp};
+use crate::{Vitals, WallClock, tcp};
 
 /// Read at once, in bytes.
 const READ_SIZE: usize = 2048;
@@ -29,41 +28,19 @@ const SEGMENTS_A_TURN: u32 = 16;
 /// How long a disconnected client may take to close its side.
 const LINGER: Duration = Duration::from_secs(1);
 
-/// A frame and when the bus carried it.
+/// What was on the bus, and when.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stamped {
     pub(super) at: Instant,
-    pub(super) frame: Frame,
+    pub(super) what: Carried,
 }
 
-/// What the hub sees of a client without asking it.
-#[derive(Debug)]
-pub(super) struct Vitals {
-    listening: AtomicBool,
-    /// When it last said something, in ns of the hub's clock.
-    spoke_at: AtomicU64,
-}
-
-impl Vitals {
-    /// Of a client that connected at `now`.
-    pub(super) fn new(now: Instant) -> Self {
-        Self { listening: AtomicBool::new(false), spoke_at: AtomicU64::new(now.as_nanos()) }
-    }
-
-    /// Of one that hears everything and never makes room for another.
-    pub(super) fn of_a_bus() -> Self {
-        Self { listening: AtomicBool::new(true), spoke_at: AtomicU64::new(u64::MAX) }
-    }
-
-    /// It wants to hear frames.
-    pub(super) fn is_listening(&self) -> bool {
-        self.listening.load(Ordering::Relaxed)
-    }
-
-    /// Lower for a client that matters less: first those that do not listen, then by how long they have been silent.
-    pub(super) fn rank(&self) -> (bool, u64) {
-        (self.is_listening(), self.spoke_at.load(Ordering::Relaxed))
-    }
+/// What a bus carries.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Carried {
+    Frame(Frame),
+    /// An error frame, by its class in Linux's messages.
+    Error(u32),
 }
 
 /// The task's end of what it shares with the hub.
@@ -136,7 +113,7 @@ impl Connection {
                     self.at_end = read? == 0;
                     tcp::acknowledge_at_once(reader.as_ref());
                     self.quiet_until = None;
-                    self.end.vitals.spoke_at.store(self.end.clock.now().as_nanos(), Ordering::Relaxed);
+                    self.end.vitals.spoke(self.end.clock.now());
                 }
                 credit = self.end.credits.acquire(), if self.waiting.is_some() => {
                     if let (Ok(credit), Some(frame)) = (credit, self.waiting.take()) {
@@ -146,7 +123,7 @@ impl Connection {
                 }
                 stamped = self.end.frames.recv(), if self.segment.is_empty() && self.quiet_until.is_none() => {
                     match stamped {
-                        Some(Stamped { at, frame }) => self.session.deliver(at, &frame, &mut self.segment),
+                        Some(stamped) => deliver(&mut *self.session, &stamped, &mut self.segment),
                         None => return Ok(()),
                     }
                 }
@@ -165,7 +142,7 @@ impl Connection {
                 self.input.clear();
                 self.consumed = 0;
             }
-            self.end.vitals.listening.store(self.session.is_listening(), Ordering::Relaxed);
+            self.end.vitals.set_engaged(self.session.is_listening());
         }
     }
 
@@ -179,8 +156,8 @@ impl Connection {
             return;
         }
         while self.quiet_until.is_none() && self.segment.len() < WRITE_SIZE {
-            let Ok(Stamped { at, frame }) = self.end.frames.try_recv() else { return };
-            self.session.deliver(at, &frame, &mut self.segment);
+            let Ok(stamped) = self.end.frames.try_recv() else { return };
+            deliver(&mut *self.session, &stamped, &mut self.segment);
         }
     }
 
@@ -195,5 +172,12 @@ impl Connection {
             Ok(())
         };
         within(&self.end.clock, LINGER, drained).await.unwrap_or(Ok(()))
+    }
+}
+
+fn deliver(session: &mut dyn Session, stamped: &Stamped, segment: &mut Vec<u8>) {
+    match stamped.what {
+        Carried::Frame(frame) => session.deliver(stamped.at, &frame, segment),
+        Carried::Error(class) => session.deliver_error(stamped.at, class, segment),
     }
 }

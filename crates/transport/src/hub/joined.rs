@@ -2,7 +2,7 @@
 
 use can::Frame;
 
-use super::client::{End, Stamped};
+use super::client::{Carried, End, Stamped};
 use super::event::HubEvent;
 use crate::{AsyncBus, BusError, Note, Received};
 
@@ -24,7 +24,9 @@ pub(super) async fn serve(mut bus: impl AsyncBus, mut end: End, mut tell: impl F
                 Err(error) => return error,
             },
             stamped = end.frames.recv() => match stamped {
-                Some(Stamped { frame, .. }) => {
+                // The other bus has error frames of its own.
+                Some(Stamped { what: Carried::Error(_), .. }) => {}
+                Some(Stamped { what: Carried::Frame(frame), .. }) => {
                     if let Err(error) = bus.send(&frame).await {
                         return error;
                     }

@@ -25,9 +25,10 @@ use tokio::sync::{Semaphore, mpsc, oneshot};
 use tokio::task::AbortHandle;
 
 use crate::slcan::SlcanSession;
+use crate::socketcan::class_of;
 use crate::socketcand::SocketcandSession;
-use crate::{AsyncBus, BusError, Note, Protocol, Received, ServeSpec, WallClock, tcp};
-use client::{Stamped, Vitals};
+use crate::{AsyncBus, BusError, ErrorFrame, Note, Protocol, Received, ServeSpec, Vitals, WallClock, tcp};
+use client::{Carried, Stamped};
 pub use event::{ClientId, HubEvent, LeaveReason};
 pub(crate) use session::{MAX_WAITING_REPLIES, Session};
 
@@ -174,17 +175,23 @@ impl Hub {
 
     /// Tells every listening client but `from` of a frame that was on the bus at `at`, and lets `from` send another.
     pub fn broadcast(&self, frame: &Frame, at: Instant, from: Option<ClientId>) {
+        self.hand_out(Stamped { at, what: Carried::Frame(*frame) }, from);
+    }
+
+    /// Tells every listening client, as far as its protocol can, of an error frame that was on the bus at `at`.
+    pub fn broadcast_error(&self, error: &ErrorFrame, at: Instant) {
+        self.hand_out(Stamped { at, what: Carried::Error(class_of(error)) }, None);
+    }
+
+    fn hand_out(&self, stamped: Stamped, from: Option<ClientId>) {
         let mut clients = self.shared.lock();
         clients.list.retain(|client| {
             if Some(client.id) == from {
                 client.credits.add_permits(1);
                 return true;
             }
-            let kept = !client.vitals.is_listening()
-                || !matches!(
-                    client.outgoing.try_send(Stamped { at, frame: *frame }),
-                    Err(mpsc::error::TrySendError::Full(_))
-                );
+            let kept = !client.vitals.is_engaged()
+                || !matches!(client.outgoing.try_send(stamped), Err(mpsc::error::TrySendError::Full(_)));
             if !kept {
                 client.task.abort();
                 self.shared.tell(HubEvent::Left { client: client.id, reason: LeaveReason::TooSlow });
@@ -319,8 +326,7 @@ impl Shared {
     }
 
     fn displace_one(&self, clients: &mut Clients) {
-        let least = (0..clients.list.len()).min_by_key(|place| clients.list[*place].vitals.rank());
-        if let Some(place) = least {
+        if let Some(place) = Vitals::least(clients.list.iter().map(|client| &*client.vitals)) {
             let client = clients.list.remove(place);
             client.task.abort();
             self.tell(HubEvent::Left { client: client.id, reason: LeaveReason::Displaced });

@@ -20,6 +20,10 @@ pub(crate) trait Session: Send {
     /// Appends a frame that was on the bus at `at`; nothing if the client does not listen.
     fn deliver(&mut self, at: Instant, frame: &Frame, out: &mut Vec<u8>);
 
+    /// Appends what the protocol has for an error frame that was on the bus at `at`, of this class in Linux's messages
+    /// (`CAN_ERR_*`); nothing if it has nothing, or the client does not listen.
+    fn deliver_error(&mut self, at: Instant, class: u32, out: &mut Vec<u8>);
+
     /// Whether to disconnect once the replies are written.
     fn is_over(&self) -> bool;
 }

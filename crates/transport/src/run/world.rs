@@ -6,7 +6,7 @@ use std::time::Duration;
 use can::{Frame, Instant};
 use tokio::sync::mpsc;
 
-use crate::{ClientId, Hub, HubEvent, LeaveReason, WallClock};
+use crate::{ClientId, ErrorFrame, Hub, HubEvent, LeaveReason, WallClock};
 
 /// How far a world is moved past its next deadline in one go. A world that is late (the machine was busy, the process was
 /// stopped) catches up in steps of this length, between which clients and commands are served; one with nothing due is
@@ -78,6 +78,13 @@ pub enum Heard {
         at: Instant,
         /// Whose; `None` for the world's own stations.
         from: Option<ClientId>,
+    },
+    /// A frame was destroyed on the wire, and an error frame followed: all stations see that.
+    Error {
+        /// What a controller tells of it.
+        error: ErrorFrame,
+        /// When.
+        at: Instant,
     },
     /// The world gave up an injected frame.
     Lost {
@@ -161,6 +168,7 @@ fn tell(world: &mut impl RealTimeWorld, hub: &Hub) {
     while let Some(heard) = world.take_heard() {
         match heard {
             Heard::Carried { frame, at, from } => hub.broadcast(&frame, at, from),
+            Heard::Error { error, at } => hub.broadcast_error(&error, at),
             Heard::Lost { from } => hub.discard(from),
         }
     }

@@ -6,6 +6,7 @@ use std::time::Duration;
 use can::{Bitrate, Frame, Instant};
 
 use super::codec::{Answer, Command, Decoder, Line, bitrate_of_code};
+use super::status::BUS_ERROR;
 use crate::hub::{MAX_WAITING_REPLIES, Session};
 
 /// Hardware version 1.0 (there is none), software version of this crate's first release.
@@ -30,6 +31,8 @@ pub(crate) struct SlcanSession {
     bitrate: Option<Bitrate>,
     channel: Channel,
     time_stamps: bool,
+    /// Flags of the status that stand for what has been: reading it clears them.
+    happened: u8,
     decoder: Decoder<Command>,
     replies: VecDeque<Answer>,
 }
@@ -42,6 +45,7 @@ impl SlcanSession {
             bitrate: None,
             channel: Channel::Closed,
             time_stamps: false,
+            happened: 0,
             decoder: Decoder::default(),
             replies: VecDeque::new(),
         }
@@ -59,8 +63,8 @@ impl SlcanSession {
             Command::Version => Answer::Version(VERSION.to_owned()),
             Command::SerialNumber => Answer::SerialNumber(SERIAL_NUMBER.to_owned()),
             Command::Empty | Command::AutoSend(true) => Answer::Done,
-            // No flag can be set: the bus is never off, and a client that falls behind is disconnected.
-            Command::Status if !is_closed => Answer::Status(0),
+            // No other flag can be set: the bus is never off, and a client that falls behind is disconnected.
+            Command::Status if !is_closed => Answer::Status(std::mem::take(&mut self.happened)),
             Command::Close if !is_closed => self.set(Channel::Closed),
             Command::Open if is_closed && self.rate_fits() => self.set(Channel::Open),
             Command::OpenListenOnly if is_closed && self.rate_fits() => self.set(Channel::ListenOnly),
@@ -124,6 +128,13 @@ impl Session for SlcanSession {
         }
     }
 
+    /// The protocol has no message for it: the status tells.
+    fn deliver_error(&mut self, _: Instant, _: u32, _: &mut Vec<u8>) {
+        if self.is_listening() {
+            self.happened |= BUS_ERROR;
+        }
+    }
+
     fn is_over(&self) -> bool {
         false
     }
@@ -164,6 +175,16 @@ mod tests {
         let mut session = SlcanSession::new(None);
         assert_eq!(exchange(&mut session, "L\rt1000\r"), ("\r\x07".into(), 0));
         assert_eq!(heard(&mut session, Instant::ZERO), "t18420102\r");
+    }
+
+    #[test]
+    fn the_status_tells_of_a_bus_error_once() {
+        let mut session = SlcanSession::new(None);
+        session.deliver_error(Instant::ZERO, 0x88, &mut Vec::new());
+        assert_eq!(exchange(&mut session, "O\rF\r").0, "\rF00\r", "a closed channel hears nothing");
+        session.deliver_error(Instant::ZERO, 0x88, &mut Vec::new());
+        // LAWICEL's CANUSB manual, command F: bit 7 is the bus error; reading clears it.
+        assert_eq!(exchange(&mut session, "F\rF\r").0, "F80\rF00\r");
     }
 
     #[test]

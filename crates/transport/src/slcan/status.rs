@@ -11,7 +11,7 @@ const ERROR_WARNING: u8 = 0x04;
 const DATA_OVERRUN: u8 = 0x08;
 const ERROR_PASSIVE: u8 = 0x20;
 const ARBITRATION_LOST: u8 = 0x40;
-const BUS_ERROR: u8 = 0x80;
+pub(super) const BUS_ERROR: u8 = 0x80;
 
 /// The state of the controller that flags tell.
 pub(super) const fn state(flags: u8) -> ControllerState {

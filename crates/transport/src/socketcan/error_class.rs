@@ -73,6 +73,20 @@ pub(crate) fn notes_of(class: u32, data: [u8; 8]) -> impl Iterator<Item = Note> 
     [error, overrun, overflow, restarted, state.map(Note::State)].into_iter().flatten()
 }
 
+/// The class of an error frame, as [`notes_of`] reads it: on the wire a bus error in any case.
+pub(crate) fn class_of(error: &ErrorFrame) -> u32 {
+    let of_kind = |kind| match kind {
+        ErrorKind::Acknowledge => class::NO_ACKNOWLEDGE | class::BUS_ERROR,
+        ErrorKind::LostArbitration => class::LOST_ARBITRATION,
+        ErrorKind::Transceiver => class::TRANSCEIVER,
+        ErrorKind::Bit | ErrorKind::Stuff | ErrorKind::Form | ErrorKind::Crc | ErrorKind::Overload => {
+            class::PROTOCOL | class::BUS_ERROR
+        }
+    };
+    let class = error.kinds.iter().map(of_kind).fold(0, |all, one| all | one);
+    if class == 0 { class::BUS_ERROR } else { class }
+}
+
 fn error_frame(class: u32, data: [u8; 8]) -> ErrorFrame {
     let of_class = |bit: u32| class & bit != 0;
     let (kind, place) = if of_class(class::PROTOCOL) { (data[2], data[3]) } else { (0, 0) };

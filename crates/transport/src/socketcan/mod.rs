@@ -14,5 +14,5 @@ mod wire;
 
 #[cfg(target_os = "linux")]
 pub use bus::SocketCanBus;
-pub(crate) use error_class::notes_of;
+pub(crate) use error_class::{class_of, notes_of};
 pub use interface::{InterfaceProblem, can_interfaces};

@@ -146,6 +146,14 @@ impl Message for Request {
     }
 }
 
+impl Reply {
+    /// `< error CLASS SECONDS >`: an error frame of the bus, by its class in Linux's messages (`CAN_ERR_*`).
+    pub(super) fn error_frame(at: Instant, class: u32) -> Self {
+        let micros = at.as_nanos() / 1_000;
+        Self::Error(format!("{class:03X} {}.{:06}", micros / 1_000_000, micros % 1_000_000))
+    }
+}
+
 impl Message for Reply {
     fn parse(body: &str) -> Result<Self, Malformed> {
         let syntax = |expected| Malformed::Syntax { text: text::shown(body), expected };

@@ -101,6 +101,12 @@ impl Session for SocketcandSession {
         }
     }
 
+    fn deliver_error(&mut self, at: Instant, class: u32, out: &mut Vec<u8>) {
+        if self.is_listening() {
+            Reply::error_frame(at + self.zero, class).emit(out);
+        }
+    }
+
     fn is_over(&self) -> bool {
         self.mode == Mode::Over
     }
@@ -134,8 +140,13 @@ mod tests {
         out.clear();
         session.deliver(Instant::from_millis(1500), &frame, &mut out);
         assert_eq!(out, b"< frame 604 1700000001.500000 40 >");
+        // The protocol document of socketcand, "Error frame transmission": the class, then seconds and microseconds.
+        out.clear();
+        session.deliver_error(Instant::from_millis(1500), 0x88, &mut out);
+        assert_eq!(out, b"< error 088 1700000001.500000 >");
         assert_eq!(exchange(&mut session, b"< bcmmode >").0, "< ok >");
         out.clear();
+        session.deliver_error(Instant::ZERO, 0x88, &mut out);
         session.deliver(Instant::ZERO, &frame, &mut out);
         assert!(out.is_empty() && !session.is_over());
     }

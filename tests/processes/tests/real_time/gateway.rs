@@ -279,6 +279,20 @@ fn a_client_that_goes_has_what_it_moved_stopped() {
 }
 
 #[test]
+fn a_stop_gets_in_however_many_connections_are_idle() {
+    let (simulator, mut gateway, mut mover) = turning();
+    // More than there are places for, and none of them ever says a word.
+    let idle: Vec<Client> = (0..70).map(|_| gateway.client()).collect();
+    let mut stopper = gateway.client();
+    assert_eq!(stopper.ask("[1] 4 w 0x6040 0 u16 2"), "[1] OK");
+    wait_for("the drive stands", || speed_of(&simulator).abs() < 1.0);
+    // Who has moved a drive does not make room for who has not.
+    assert!(mover.ask("[50] 4 r 0x606C 0 i32").starts_with("[50] "));
+    gateway.told("has made room");
+    drop(idle);
+}
+
+#[test]
 fn a_gateway_that_is_asked_to_end_stops_what_its_clients_moved() {
     let (simulator, mut gateway, mut client) = turning();
     let ended = std::process::Command::new("kill").args(["-TERM", &gateway.child.id().to_string()]).status();

@@ -157,3 +157,48 @@ fn a_log_of_a_killed_simulator_can_be_read_in_every_form() {
         assert!(frames.iter().any(|(frame, _)| frame.starts_with("584#43181001")), "{extension}: {frames:?}");
     }
 }
+
+/// A program whose files take no more than a few kilobytes, as on a disk that is full then.
+#[cfg(unix)]
+fn on_a_full_disk(input: &str, arguments: &str) -> processes::Ended {
+    let program = processes::program();
+    let limited = format!("trap '' XFSZ; ulimit -f 2; printf '{input}' | {program} {arguments}");
+    let ended = std::process::Command::new("sh").args(["-c", &limited]).env_remove("FERRODRIVE_BUS").output().unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    processes::Ended { status: ended.status.code(), out: text(ended.stdout), err: text(ended.stderr) }
+}
+
+#[test]
+#[cfg(unix)]
+fn a_log_that_the_disk_has_no_room_for_is_a_failure_of_the_command() {
+    let folder = scratch("full-disk");
+    let log = folder.join("scan.log");
+    let ended = on_a_full_disk("", &format!("--log {} --bus sim scan", log.display()));
+    assert_eq!(ended.status, Some(1), "{}", ended.err);
+    // What was asked for was done, and is shown.
+    assert!(ended.out.contains("zlac8030l") && ended.err.contains("is not whole"), "{}{}", ended.out, ended.err);
+    for name in ["--log run.log", "--record run.csv"] {
+        let (option, name) = name.split_once(' ').unwrap();
+        let file = folder.join(name);
+        let drive = "--drive m4230e17b50@1 --clock manual --serve socketcand://127.0.0.1:0";
+        let options = format!("sim {drive} {option} {}", file.display());
+        // Its heartbeat is sent each second (M joint manual, 5.11.1).
+        let ended = on_a_full_disk("run 900s\\nquit\\n", &options);
+        assert!(ended.status == Some(1) && ended.err.contains("is not whole"), "{option}: {}", ended.err);
+    }
+}
+
+#[test]
+fn what_a_base_cannot_do_is_said_with_what_it_does_instead() {
+    let base = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/base.toml");
+    let mut base = command(&["drive-base", base]);
+    let base = base.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = base.spawn().unwrap();
+    let mut input = child.stdin.take().unwrap();
+    input.write_all(b"1e308 0\n1e308 0\n0.1 0\n").unwrap();
+    drop(input);
+    let ended = child.wait_with_output().unwrap();
+    let err = String::from_utf8_lossy(&ended.stderr);
+    assert!(ended.status.success(), "{err}");
+    assert_eq!(err.matches("are beyond the limits of the base: it is driven at").count(), 1, "{err}");
+}

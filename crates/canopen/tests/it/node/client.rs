@@ -178,6 +178,67 @@ fn another_length_than_declared_is_an_error() {
 }
 
 #[test]
+fn more_than_declared_is_refused_at_the_first_byte_too_many() {
+    // Declared: 3 bytes; the first segment has 7, and more are to follow.
+    let frames = ["584#4108100003000000", "584#0061206472697665"];
+    let (result, mut client) = replies(uploading(NAME), &mut [0; 1024], &frames);
+    assert_eq!(result, Some(Err(Failure::LengthMismatch { mux: NAME, declared: 3, received: 7 })));
+    // CiA 301, 7.2.4.3.17: 0607 0010h, the length of the service parameter does not match.
+    assert_eq!(client.poll_transmit(), Some("604#8008100010000706".parse().unwrap()));
+}
+
+#[test]
+fn a_segment_without_data_that_announces_more_ends_the_upload() {
+    for first in ["584#4008100000000000", "584#4108100014000000"] {
+        let frames = [first, "584#0061206472697665", "584#1E00000000000000"];
+        let (result, mut client) = replies(uploading(NAME), &mut [0; 1024], &frames);
+        assert_eq!(result, Some(Err(Failure::EmptySegment { mux: NAME, received: 7 })));
+        assert_eq!(client.poll_transmit(), Some("604#8008100000000008".parse().unwrap()));
+    }
+    // The last segment may be empty: how else would a server end that did not know the length?
+    let frames = ["584#4008100000000000", "584#0061206472697665", "584#1F00000000000000"];
+    let (result, _) = replies(uploading(NAME), &mut [0; 1024], &frames);
+    assert_eq!(result, Some(Ok(Outcome::Uploaded { mux: NAME, length: 7 })));
+}
+
+/// When an upload ends whose server sends a byte in each segment, each 49 ms after it was asked, and never the last.
+fn dribbled(first: &str) -> (Instant, Failure, Client) {
+    let (mut client, mut now) = (uploading(NAME), Instant::ZERO);
+    let mut buffer = [0; 4096];
+    assert_eq!(client.handle_frame(&first.parse().unwrap(), &mut buffer, now), None);
+    for segment in 0.. {
+        let toggle = if segment % 2 == 0 { "0C" } else { "1C" };
+        now = now + Duration::from_millis(49);
+        let due = client.poll_timeout().unwrap();
+        if due <= now {
+            return (due, client.handle_timeout(due).unwrap(), client);
+        }
+        let reply = format!("584#{toggle}61000000000000").parse().unwrap();
+        assert_eq!(client.handle_frame(&reply, &mut buffer, now), None);
+    }
+    unreachable!()
+}
+
+#[test]
+fn an_upload_whose_segments_are_all_in_time_ends_nevertheless() {
+    // 50 ms for each reply. 700 bytes are 100 full segments, and one more is allowed for: 5.05 s.
+    let (at, failure, mut client) = dribbled("584#41081000BC020000");
+    let limit = Duration::from_millis(5050);
+    assert_eq!(failure, Failure::Endless { mux: NAME, received: 103, limit });
+    assert_eq!(at, Instant::ZERO + limit);
+    // 0504 0000h: SDO protocol timed out.
+    assert_eq!(client.poll_transmit(), Some("604#8008100000000405".parse().unwrap()));
+    // Of a length that was not declared: 256 and one.
+    let (_, failure, _) = dribbled("584#4008100000000000");
+    assert_eq!(failure, Failure::Endless { mux: NAME, received: 262, limit: Duration::from_millis(257 * 50) });
+    // A time that has no end for each reply has none for all of them.
+    let mut client = Client::new(NodeId::new(4).unwrap(), Duration::MAX);
+    client.upload(NAME, Instant::ZERO);
+    assert_eq!(client.handle_frame(&"584#4008100000000000".parse().unwrap(), &mut [0; 8], Instant::ZERO), None);
+    assert_eq!(client.poll_timeout(), Some(Instant::FAR_FUTURE));
+}
+
+#[test]
 fn a_reply_of_another_kind_is_an_error() {
     let (result, _) = replies(uploading(NAME), &mut [0; 32], &["584#6008100000000000"]);
     assert_eq!(result, Some(Err(Failure::UnexpectedReply { mux: NAME, command: 0x60 })));

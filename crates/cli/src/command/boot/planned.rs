@@ -97,7 +97,7 @@ async fn found(context: &Context, only: &[NodeId]) -> Vec<(NodeId, Expectation)>
     if !told_nodes.is_empty() {
         return told_nodes.into_iter().map(|node| (node, told(node))).collect();
     }
-    let asked = |count| context.progress.show(format!("asked {count} of 127"));
+    let asked = |count| context.progress.count(format!("asked {count} of 127"));
     let found = context.network.scan(context.timeout(), asked).await;
     let expected = found.iter().map(|found| {
         let model = found.knowledge.description();

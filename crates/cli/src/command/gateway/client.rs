@@ -5,61 +5,70 @@ use std::time::Duration;
 
 use can::{Frame, Instant};
 use master::Network;
-use master::core::Event;
+use master::core::{Event, NodeSet};
 use master::gateway::{MAX_LINE, Session};
 use tokio::io::{AsyncBufRead, AsyncBufReadExt, AsyncWriteExt, BufReader};
 use tokio::net::TcpStream;
 use tokio::net::tcp::OwnedWriteHalf;
 use tokio::sync::broadcast::error::RecvError;
 use tokio::sync::{broadcast, mpsc, oneshot};
+use transport::Vitals;
 
-use super::wish::Wish;
+use super::places::Place;
+use super::wish::{Gone, Guard};
 
 /// How long a client may take to read what it is sent; one that never reads is let go.
 const READER_PATIENCE: Duration = Duration::from_secs(10);
 
-/// Serves a client until its connection ends, then has stopped what it moved.
-pub(super) async fn serve(
-    stream: TcpStream,
-    network: Network,
-    heard: (broadcast::Receiver<(Instant, Frame)>, broadcast::Receiver<Event>),
-    wishes: mpsc::Sender<Wish>,
-) {
+/// What a client has of the gateway.
+pub(super) struct Desk {
+    pub(super) frames: broadcast::Receiver<(Instant, Frame)>,
+    pub(super) events: broadcast::Receiver<Event>,
+    pub(super) guards: mpsc::Sender<Guard>,
+    pub(super) gone: mpsc::UnboundedSender<Gone>,
+}
+
+/// Serves a client until its connection ends or another needs its place, then has stopped what it moved.
+pub(super) async fn serve(stream: TcpStream, network: Network, mut desk: Desk, place: Place) {
     let mut session = Session::new(network);
-    // Whatever ended it, what it moved is stopped.
-    let _ = converse(stream, &mut session, heard, &wishes).await;
+    tokio::select! {
+        // Whatever ended it, what it moved is stopped.
+        _ = converse(stream, &mut session, &mut desk, &place.vitals) => {}
+        _ = place.stay => {}
+    }
     if !session.moved().is_empty() {
-        let _ = wishes.send(Wish::Gone(session.moved())).await;
+        let _ = desk.gone.send(Gone(session.moved()));
     }
 }
 
-async fn converse(
-    stream: TcpStream,
-    session: &mut Session,
-    (mut frames, mut events): (broadcast::Receiver<(Instant, Frame)>, broadcast::Receiver<Event>),
-    wishes: &mpsc::Sender<Wish>,
-) -> io::Result<()> {
+async fn converse(stream: TcpStream, session: &mut Session, desk: &mut Desk, vitals: &Vitals) -> io::Result<()> {
     // Answers are small and waited for.
     stream.set_nodelay(true)?;
     let (input, mut output) = stream.into_split();
     let mut input = BufReader::new(input);
     let mut line = Line::default();
+    let mut guarded = NodeSet::EMPTY;
     loop {
         let said = tokio::select! {
-            read = line.read(&mut input) => match read? {
-                Read::End => return Ok(()),
-                Read::Unreadable => Some(Session::unreadable()),
-                Read::Line(text) => {
-                    guard(session, &text, wishes).await;
-                    session.answer(&text).await
+            read = line.read(&mut input) => {
+                vitals.spoke(session.network().now());
+                match read? {
+                    Read::End => return Ok(()),
+                    Read::Unreadable => Some(Session::unreadable()),
+                    Read::Line(text) => {
+                        guard(session, &text, &mut guarded, &desk.guards).await;
+                        let answer = session.answer(&text).await;
+                        vitals.set_engaged(!session.moved().is_empty());
+                        answer
+                    }
                 }
-            },
-            frame = frames.recv() => match frame {
+            }
+            frame = desk.frames.recv() => match frame {
                 Ok((_, frame)) => session.told_frame(&frame),
                 Err(RecvError::Lagged(_)) => None,
                 Err(RecvError::Closed) => return Ok(()),
             },
-            event = events.recv() => match event {
+            event = desk.events.recv() => match event {
                 Ok(event) => session.told_event(&event),
                 Err(RecvError::Lagged(_)) => None,
                 Err(RecvError::Closed) => return Ok(()),
@@ -72,16 +81,16 @@ async fn converse(
 }
 
 /// Has what a line is about to move guarded first.
-async fn guard(session: &Session, line: &str, wishes: &mpsc::Sender<Wish>) {
+async fn guard(session: &Session, line: &str, guarded: &mut NodeSet, guards: &mpsc::Sender<Guard>) {
     let nodes = session.about_to_move(line);
-    let known = session.moved();
-    if nodes.iter().all(|node| known.contains(node)) {
+    if nodes.iter().all(|node| guarded.contains(node)) {
         return;
     }
-    let (done, guarded) = oneshot::channel();
-    if wishes.send(Wish::Guard(nodes, done)).await.is_ok() {
-        let _ = guarded.await;
+    let (done, answered) = oneshot::channel();
+    if guards.send(Guard(nodes, done)).await.is_ok() {
+        let _ = answered.await;
     }
+    nodes.iter().for_each(|node| guarded.insert(node));
 }
 
 async fn say(output: &mut OwnedWriteHalf, text: &str) -> io::Result<()> {

@@ -108,7 +108,7 @@ impl<'a> Measurement<'a> {
             }
             self.fetch();
             if asked % 64 == 0 {
-                self.context.progress.show(format!("{} of {} answers", self.measured.sdo.count(), self.count));
+                self.context.progress.count(format!("{} of {} answers", self.measured.sdo.count(), self.count));
             }
             if self.is_over(end) {
                 break;
@@ -129,7 +129,7 @@ impl<'a> Measurement<'a> {
 
     /// A node whose motor is switched on, if there is one on the bus.
     async fn energised(&self) -> Option<NodeId> {
-        let asked = |count| self.context.progress.show(format!("is a motor switched on? asked {count} of 127"));
+        let asked = |count| self.context.progress.count(format!("is a motor switched on? asked {count} of 127"));
         for found in self.context.network.scan(self.context.timeout(), asked).await {
             let node = self.context.node(found.node);
             for axis in 0..AXES {
@@ -187,7 +187,7 @@ impl<'a> Measurement<'a> {
             self.context.network.sleep(LOOK_PERIOD).await;
             self.fetch();
             let (count, now) = (self.measured.sync.count(), self.context.network.now());
-            self.context.progress.show(format!("{count} of {} SYNCs", self.count));
+            self.context.progress.count(format!("{count} of {} SYNCs", self.count));
             if count > last.0 {
                 last = (count, now);
             } else if now - last.1 > LISTEN_TIME + 4 * period {

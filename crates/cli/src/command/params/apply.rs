@@ -134,7 +134,7 @@ impl super::Transaction {
         let done = |kept: Option<Kept>| kept.map_or(Ok(()), Kept::remove);
         let show = |number: usize, step: &master::parameters::Step| {
             let name = name(model, step.object).unwrap_or_default();
-            context.progress.show(format!("node {id}: {number} of {}: {} {name}", plan.steps.len(), step.object));
+            context.progress.count(format!("node {id}: {number} of {}: {} {name}", plan.steps.len(), step.object));
         };
         match drive.apply_parameters(plan, show).await {
             Ok(Ok(applied)) => {

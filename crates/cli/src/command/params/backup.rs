@@ -44,7 +44,7 @@ impl super::Backup {
         }
         let drive = context.known_drive(self.node).await?;
         let model = drive.description().ok_or_else(|| Failure::new("the model is not known").at_node(self.node))?;
-        let show = |number, of, object| context.progress.show(format!("{number} of {of}: {object}"));
+        let show = |number, of, object| context.progress.count(format!("{number} of {of}: {object}"));
         let backup = drive.back_up(show).await?;
         let refused = backup.refused.iter().map(|(object, error)| Refused {
             object: object.to_string(),

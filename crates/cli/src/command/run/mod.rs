@@ -155,8 +155,9 @@ impl Run {
         }
         if let Some(mut record) = record {
             record.write(batch(&mut runner));
-            record.finish(DISK_PATIENCE);
+            let recorded = record.finish(DISK_PATIENCE);
             warnings.finish(DISK_PATIENCE);
+            recorded?;
         }
         progress.clear();
         Ok(runner.conclude())

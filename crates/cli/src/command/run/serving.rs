@@ -68,7 +68,8 @@ impl ServeOptions {
         let pacer = Pacer::new(self.clock, self.speed.unwrap_or(Speed::Times(1.0))).waiting_for_a_client();
         let world = ServedWorld::new(world, pacer, record.is_some(), warnings.clone());
         let answers = Speaker::of_answers(warnings.clone());
-        let service = Service { answers, warnings, log: None, record, waiting: VecDeque::new(), quit_in: None };
+        let (waiting, by_hand) = (VecDeque::new(), self.clock == Clock::Manual);
+        let service = Service { answers, warnings, log: None, record, waiting, quit_in: None, by_hand };
         runtime_of_clients()?.block_on(self.serve(world, course, service))
     }
 

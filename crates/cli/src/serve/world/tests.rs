@@ -1,0 +1,66 @@
+//! A served world that a test moves.
+
+use sim::machine::zlac8030l;
+
+use super::super::pacer::{Clock, Speed};
+use super::*;
+
+/// 2000h, which is stored with each write, becomes 700.
+const WRITE_700: &str = "604#2B002000BC020000";
+
+#[test]
+fn moved_by_hand_time_stands_while_an_answer_waits_for_the_disk_so_that_none_shows_in_it() {
+    let mut ends = Vec::new();
+    for disk_ms in [0, 30, 200] {
+        let mut world = World::new(Bitrate::K500, 1);
+        let host = world.add_probe();
+        world.add_drive(4, Box::new(zlac8030l(4, 1))).expect("the first");
+        let pacer = Pacer::new(Clock::Manual, Speed::Times(1.0));
+        let mut served = ServedWorld::new(world, pacer, false, Speaker::silent());
+        let (keeper, kept) = Keeper::by_hand();
+        served.keep_stores(keeper);
+        let turn = |served: &mut ServedWorld, clock_ms: u64| {
+            let target = served.target(Instant::from_millis(clock_ms)).max(served.now());
+            served.advance_to(target);
+        };
+        assert!(matches!(served.command("run 500ms"), Commanded::Begun));
+        turn(&mut served, 1);
+        served.take_run().expect("it is over");
+        served.world.send(host, WRITE_700.parse().expect("a frame")).expect("a probe");
+        assert!(matches!(served.command("run 1s"), Commanded::Begun));
+        turn(&mut served, 2);
+        let stood = served.now();
+        assert!(stood < Instant::from_millis(1500), "{stood:?}: it waits for the disk");
+        assert!(served.clock_at(stood).is_none() && served.wakes_at() == Some(Instant::from_millis(252)));
+        turn(&mut served, 2 + disk_ms);
+        assert_eq!((served.now(), served.take_run()), (stood, None));
+        let (number, generation) = served.world.held_answers().next().expect("an answer waits");
+        kept(number, generation);
+        // One turn to take that in, one to go on.
+        turn(&mut served, 3 + disk_ms);
+        turn(&mut served, 3 + disk_ms);
+        assert!(served.take_run().is_some_and(|answer| answer.contains("1.5")), "the run ends where it was to");
+        let heard = std::iter::from_fn(|| served.take_heard());
+        ends.push(heard.map(|heard| format!("{heard:?}")).collect::<Vec<_>>());
+    }
+    assert!(ends.iter().all(|end| *end == ends[0]), "the same frames at the same times: {ends:#?}");
+    assert!(ends[0].iter().any(|heard| heard.contains("584")), "{:?}", ends[0]);
+}
+
+#[test]
+fn an_error_on_the_wire_is_heard_by_clients() {
+    let mut world = World::new(Bitrate::K500, 1);
+    world.add_probe();
+    world.add_drive(4, Box::new(zlac8030l(4, 1))).expect("the first");
+    let pacer = Pacer::new(Clock::Manual, Speed::Times(1.0));
+    let mut served = ServedWorld::new(world, pacer, false, Speaker::silent());
+    assert!(matches!(served.command("bus corrupt 0.5"), Commanded::Done(_)));
+    // Its boot-up message goes out until it gets through.
+    assert!(matches!(served.command("run 3s"), Commanded::Begun));
+    let target = served.target(Instant::from_millis(1));
+    served.advance_to(target);
+    let disturbed = served.world.statistics().errors;
+    let heard: Vec<Heard> = std::iter::from_fn(|| served.take_heard()).collect();
+    let errors = heard.iter().filter(|heard| matches!(heard, Heard::Error { .. })).count();
+    assert!(errors > 0 && errors as u64 == disturbed, "{errors} of {disturbed}: {heard:?}");
+}

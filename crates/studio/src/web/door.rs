@@ -1,0 +1,199 @@
+//! The door: connections of those who have shown no pass (the cookie, the token) are few, and none of them stays.
+//!
+//! A connection counts as a stranger's until a request on it has shown a pass. Strangers that say nothing, or half a header, keep
+//! neither places nor file descriptors from those who have one: a further stranger takes the place of the one that has been there
+//! for the longest, and each has [`PATIENCE`].
+
+use std::collections::VecDeque;
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::pin::Pin;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+use axum::Router;
+use axum::extract::Request;
+use axum::extract::connect_info::{ConnectInfo, Connected};
+use axum::serve::{IncomingStream, Listener};
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::oneshot;
+use tokio::time::Sleep;
+
+/// How long a stranger's connection may last: a request with its answer.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Connections of strangers at once: a browser opens six.
+const MOST_STRANGERS: usize = 64;
+
+/// Pause after a failed accept (out of file descriptors): the connections that are there go on.
+const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
+
+/// Serves `app` at `listener` until the future is dropped.
+///
+/// # Errors
+/// What the listener says.
+pub async fn serve(listener: TcpListener, app: Router) -> io::Result<()> {
+    let door = Door { listener, strangers: Strangers::default() };
+    axum::serve(door, app.into_make_service_with_connect_info::<Visitor>()).await
+}
+
+/// Who is at the other end of a connection.
+#[derive(Clone, Debug)]
+pub(super) struct Visitor(Arc<Inner>);
+
+#[derive(Debug)]
+struct Inner {
+    address: SocketAddr,
+    known: AtomicBool,
+}
+
+impl Visitor {
+    pub(super) fn new(address: SocketAddr) -> Self {
+        Self(Arc::new(Inner { address, known: AtomicBool::new(false) }))
+    }
+
+    /// Whose request this is, where it came over a connection.
+    pub(super) fn of(request: &Request) -> Option<&Self> {
+        request.extensions().get::<ConnectInfo<Self>>().map(|ConnectInfo(visitor)| visitor)
+    }
+
+    /// Where it comes from: of IPv6 the network, since a host there has as many addresses as it likes.
+    pub(super) fn origin(visitor: Option<&Self>) -> IpAddr {
+        match visitor.map(|visitor| visitor.0.address.ip().to_canonical()) {
+            Some(IpAddr::V6(address)) => IpAddr::V6((address.to_bits() >> 64 << 64).into()),
+            Some(address) => address,
+            None => IpAddr::V4(Ipv4Addr::UNSPECIFIED),
+        }
+    }
+
+    /// It has shown a pass.
+    pub(super) fn admit(&self) {
+        self.0.known.store(true, Ordering::Relaxed);
+    }
+
+    fn is_known(&self) -> bool {
+        self.0.known.load(Ordering::Relaxed)
+    }
+}
+
+impl Connected<IncomingStream<'_, Door>> for Visitor {
+    fn connect_info(stream: IncomingStream<'_, Door>) -> Self {
+        stream.remote_addr().clone()
+    }
+}
+
+/// The strangers that are there, who came first first.
+#[derive(Debug, Default)]
+struct Strangers(VecDeque<(Visitor, oneshot::Sender<()>)>);
+
+impl Strangers {
+    /// Takes one more in; what it is given ends when another needs its place.
+    fn take(&mut self, visitor: &Visitor) -> oneshot::Receiver<()> {
+        self.0.retain(|(visitor, stay)| !visitor.is_known() && !stay.is_closed());
+        if self.0.len() >= MOST_STRANGERS {
+            self.0.pop_front();
+        }
+        let (stay, stays) = oneshot::channel();
+        self.0.push_back((visitor.clone(), stay));
+        stays
+    }
+}
+
+/// Where connections come in.
+struct Door {
+    listener: TcpListener,
+    strangers: Strangers,
+}
+
+impl Listener for Door {
+    type Io = Connection;
+    type Addr = Visitor;
+
+    async fn accept(&mut self) -> (Connection, Visitor) {
+        loop {
+            let Ok((stream, address)) = self.listener.accept().await else {
+                tokio::time::sleep(ACCEPT_PAUSE).await;
+                continue;
+            };
+            let visitor = Visitor::new(address);
+            let stay = self.strangers.take(&visitor);
+            let patience = Box::pin(tokio::time::sleep(PATIENCE));
+            return (Connection { stream, visitor: visitor.clone(), patience, stay, sent_away: false }, visitor);
+        }
+    }
+
+    fn local_addr(&self) -> io::Result<Visitor> {
+        self.listener.local_addr().map(Visitor::new)
+    }
+}
+
+/// A connection that ends unless its visitor becomes known in time.
+struct Connection {
+    stream: TcpStream,
+    visitor: Visitor,
+    patience: Pin<Box<Sleep>>,
+    stay: oneshot::Receiver<()>,
+    sent_away: bool,
+}
+
+impl Connection {
+    /// The stream, unless the visitor is not to stay.
+    fn stream(&mut self, context: &mut Context<'_>) -> io::Result<Pin<&mut TcpStream>> {
+        if !self.sent_away && !self.visitor.is_known() {
+            let displaced = Pin::new(&mut self.stay).poll(context).is_ready();
+            self.sent_away = displaced || self.patience.as_mut().poll(context).is_ready();
+        }
+        if self.sent_away { Err(io::ErrorKind::TimedOut.into()) } else { Ok(Pin::new(&mut self.stream)) }
+    }
+}
+
+impl AsyncRead for Connection {
+    fn poll_read(mut self: Pin<&mut Self>, context: &mut Context<'_>, into: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
+        self.stream(context)?.poll_read(context, into)
+    }
+}
+
+impl AsyncWrite for Connection {
+    fn poll_write(mut self: Pin<&mut Self>, context: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
+        self.stream(context)?.poll_write(context, bytes)
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(context)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(context)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_stranger_that_came_first_makes_room_and_nobody_who_has_shown_a_pass() {
+        let mut strangers = Strangers::default();
+        let visitors: Vec<Visitor> = (0..=MOST_STRANGERS).map(|_| Visitor::new(([10, 0, 0, 1], 1).into())).collect();
+        let mut stays: Vec<_> = visitors.iter().take(MOST_STRANGERS).map(|visitor| strangers.take(visitor)).collect();
+        visitors[0].admit();
+        // The place of one that is known by now is free.
+        stays.push(strangers.take(&visitors[MOST_STRANGERS]));
+        assert!(stays[1].try_recv() == Err(oneshot::error::TryRecvError::Empty));
+        stays.push(strangers.take(&Visitor::new(([10, 0, 0, 2], 1).into())));
+        assert!(stays[1].try_recv() == Err(oneshot::error::TryRecvError::Closed));
+        assert!(stays[2].try_recv() == Err(oneshot::error::TryRecvError::Empty));
+    }
+
+    #[test]
+    fn of_ipv6_a_network_is_one_origin() {
+        let origin = |text: &str| Visitor::origin(Some(&Visitor::new(text.parse().expect("an address"))));
+        assert_eq!(origin("[2001:db8::1]:5"), origin("[2001:db8::2:3]:6"));
+        assert_ne!(origin("[2001:db8::1]:5"), origin("[2001:db8:0:1::1]:5"));
+        assert_eq!(origin("[::ffff:10.0.0.1]:5"), origin("10.0.0.1:7"));
+        assert_ne!(origin("10.0.0.1:7"), origin("10.0.0.2:7"));
+    }
+}
