@@ -12,9 +12,9 @@ use master::{Drive, Error};
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use super::guarding::refusal_of;
 use super::object_rows::value_text;
 use super::state::Host;
-use super::transactions::Refusal;
 use super::work::{Asked, Done, say};
 use crate::message::Answer;
 
@@ -46,14 +46,10 @@ impl Host {
         let running = self.running.get(&node).is_some_and(|running| running.what == "homing");
         self.work.push(Box::pin(async move {
             let outcome = Seen::look(&drive, model, axis, rules).await;
-            let told = outcome.map(|seen| seen.told(node, running)).map_err(|error| refusal(&error));
+            let told = outcome.map(|seen| seen.told(node, running)).map_err(|error| refusal_of(&error));
             Done::Looked((seq, answer), told)
         }));
     }
-}
-
-fn refusal(error: &Error) -> Refusal {
-    (error.kind(), error.to_string())
 }
 
 /// What was read of a drive.

@@ -18,6 +18,7 @@ use testbench::parameters::{sheet, to_dcf};
 use testbench::words::object::object;
 use testbench::words::value::typed_for;
 
+use super::deeds::quietly;
 use super::journals::Journals;
 use super::object_rows::{bytes_text, row_json, value_text};
 use super::state::Host;
@@ -104,7 +105,7 @@ impl Host {
         if is_busy {
             return refuse(asked, busy("something else is being done with the drive"));
         }
-        self.begin(node, STORING, false, Some(asked), async move { drive.save().await.map(|()| Vec::new()) });
+        self.begin(node, STORING, false, Some(asked), async move { quietly(drive.save().await) });
     }
 
     fn begin_rolling_back(&mut self, drive: &Drive, model: &'static Description, asked: Asked) {
