@@ -2,7 +2,7 @@
 
 use can::Instant;
 use canopen::NodeId;
-use master::drive::{HomingOptions, MotionReport};
+use master::drive::{HomingOptions, MotionReport, Note};
 use master::explain::{Finding, Overheard, Weight};
 use master::units::{Amperes, Angle, Ramp, Rpm};
 use master::{Drive, Error, MotionOptions};
@@ -329,11 +329,13 @@ pub(super) fn quietly(done: Result<(), Error>) -> Outcome {
     done.map(|()| Vec::new()).map_err(|error| refusal_of(&error))
 }
 
-/// What there is to know of a motion: values that had to be rounded, and what the drive does without this program.
+/// What there is to know of a motion: values that had to be rounded, and the like. What the drive does without this program is shown
+/// all the time.
 fn told(moved: Result<MotionReport, Error>) -> Outcome {
     let report = moved.map_err(|error| refusal_of(&error))?;
     let rounded = report.commanded.iter().filter(|commanded| commanded.is_rounded()).map(ToString::to_string);
-    Ok(rounded.chain(report.notes.iter().map(ToString::to_string)).collect())
+    let notes = report.notes.iter().filter(|note| !matches!(note, Note::HostLoss(_))).map(ToString::to_string);
+    Ok(rounded.chain(notes).collect())
 }
 
 fn shown(finding: &Finding) -> serde_json::Value {

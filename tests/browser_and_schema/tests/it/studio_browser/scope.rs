@@ -9,12 +9,12 @@ use super::{Locator, PATIENCE, Stage, press};
 async fn the_scope_keeps_what_the_drive_said_and_saves_it() {
     let stage = Stage::open("scope").await;
     stage.take_the_wheel().await;
-    stage.click("form[aria-label=Move] button").await;
+    stage.click("#go-move").await;
     let angle = |wheel: &Value| wheel["drive"]["angle_degrees"].as_f64().expect("an angle");
     stage.wheel("a quarter of a turn", |wheel| (angle(wheel) - 90.0).abs() < 2.0);
     stage.rests();
     stage.client.perform_actions(press('4')).await.expect("a key");
-    stage.click("#scope-window option:first-child").await;
+    stage.choose("#scope-window", "1").await;
     // Longer than the half of what is shown, so that there is a reading under the cursor.
     tokio::time::sleep(std::time::Duration::from_secs(3)).await;
     stage.click("#scope-pause").await;
@@ -47,10 +47,7 @@ async fn the_scope_draws_any_object_that_passes() {
     let stage = Stage::open("scope_object").await;
     stage.click("#tabs [data-name=scope]").await;
     stage.click(".scope .chooser button:nth-child(3)").await;
-    let list = stage.find("#scope-object").await;
-    list.click().await.expect("it opens");
     // ZLAC8030L: 2029h is the bus voltage in 0.01 V, which the studio reads; 48 V is the supply as delivered.
-    stage.find("#scope-object option[value='4:2029:00']").await;
     stage.choose("#scope-object", "4:2029:00").await;
     stage.find("[data-object='4:2029:00']").await;
     // A picture of so long a time.
