@@ -116,6 +116,13 @@ impl Stage {
             match self.find(css).await.click().await {
                 Ok(()) => return,
                 Err(error) if is_replaced(&error) && std::time::Instant::now() < until => {}
+                // Below the header or the news, which stay where they are.
+                Err(CmdError::Standard(error))
+                    if error.error == ErrorStatus::ElementClickIntercepted && std::time::Instant::now() < until =>
+                {
+                    let scroll = "document.querySelector(arguments[0])?.scrollIntoView({ block: 'center' })";
+                    self.client.execute(scroll, vec![css.into()]).await.expect("it scrolls");
+                }
                 Err(error) => panic!("{css}: {error}"),
             }
         }

@@ -1,7 +1,7 @@
 //! What the page says when it no longer sees the drives, and that nothing on it keeps a stop from its way: in a real browser, at the
 //! widths of a telephone, a tablet and a desk.
 
-use std::io::{Read, Write};
+use std::io::{BufRead, BufReader, Write};
 use std::net::TcpStream;
 use std::time::Duration;
 
@@ -22,16 +22,16 @@ impl Stage {
         let session = self.client.session_id().await.expect("it answers").expect("it has begun");
         let metrics = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 1000 });
         let body = json!({ "cmd": "Emulation.setDeviceMetricsOverride", "params": metrics }).to_string();
-        let mut stream = TcpStream::connect(&self.driver_address).expect("the driver listens");
+        let stream = TcpStream::connect(&self.driver_address).expect("the driver listens");
         stream.set_read_timeout(Some(PATIENCE)).expect("it takes it");
         let head = format!(
-            "POST /session/{session}/goog/cdp/execute HTTP/1.1\r\nHost: {}\r\nConnection: close\r\nContent-Length: {}\r\n\r\n",
+            "POST /session/{session}/goog/cdp/execute HTTP/1.1\r\nHost: {}\r\nContent-Length: {}\r\n\r\n",
             self.driver_address,
             body.len()
         );
-        stream.write_all((head + &body).as_bytes()).expect("it is sent");
+        (&stream).write_all((head + &body).as_bytes()).expect("it is sent");
         let mut answer = String::new();
-        stream.read_to_string(&mut answer).expect("it answers");
+        BufReader::new(&stream).read_line(&mut answer).expect("it answers");
         assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
     }
 
