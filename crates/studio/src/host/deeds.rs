@@ -9,10 +9,10 @@ use master::{Drive, Error, MotionOptions};
 use serde_json::json;
 use tokio::sync::oneshot;
 
-use super::guarding::{UNGUARDED, guard, refusal_of};
+use super::guarding::{UNGUARDED, guard};
 use super::parameters::STORING;
 use super::state::{Host, JOG_SPAN, PRESENCE_SPAN};
-use super::work::{Asked, Done, LISTENING_TIME, Listening, Outcome, Running, say};
+use super::work::{Asked, Done, LISTENING_TIME, Listening, Outcome, Running, quietly, refusal_of, say};
 use super::world::conclude_looking_around;
 use crate::authority::{Refusal, SessionId};
 use crate::dead_man::DeadMan;
@@ -322,11 +322,6 @@ async fn home(drive: Drive, accepted: bool, method: i8, rpm: Option<f64>) -> Out
     guard(&drive, accepted).await?;
     let options = HomingOptions { speed: rpm.map(Rpm), ..HomingOptions::default() };
     told(drive.home(method, options).await)
-}
-
-/// What there is to know of something that shows itself: nothing, where it was done.
-pub(super) fn quietly(done: Result<(), Error>) -> Outcome {
-    done.map(|()| Vec::new()).map_err(|error| refusal_of(&error))
 }
 
 /// What there is to know of a motion: values that had to be rounded, and the like. What the drive does without this program is shown

@@ -2,12 +2,12 @@
 //! has control has to have accepted that before the first motion; until then nothing is begun.
 
 use canopen::NodeId;
+use master::Drive;
 use master::drive::SwitchedOff;
-use master::{Drive, Error};
 
 use super::state::Host;
 use super::transactions::Refusal;
-use super::work::{Asked, say};
+use super::work::{Asked, refusal_of, say};
 use crate::message::Answer;
 
 /// The kind of the refusal, for programs.
@@ -58,9 +58,4 @@ pub(super) async fn expect_guard(drive: &Drive) -> Result<(), Refusal> {
             Err((UNGUARDED, text))
         }
     }
-}
-
-/// What the master says, as it is answered.
-pub(super) fn refusal_of(error: &Error) -> Refusal {
-    (error.kind(), error.to_string())
 }

@@ -12,10 +12,9 @@ use master::{Drive, Error};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::guarding::refusal_of;
 use super::object_rows::value_text;
 use super::state::Host;
-use super::work::{Asked, Done, say};
+use super::work::{Asked, Done, refusal_of, say};
 use crate::message::Answer;
 
 /// How homing is set (CiA 402-2, 11.2): speed to the switch, speed to the edge, acceleration, and where zero is.

@@ -18,12 +18,11 @@ use testbench::parameters::{sheet, to_dcf};
 use testbench::words::object::object;
 use testbench::words::value::typed_for;
 
-use super::deeds::quietly;
 use super::journals::Journals;
 use super::object_rows::{bytes_text, row_json, value_text};
 use super::state::Host;
 use super::transactions::{Change, MOST_KEPT, Refusal, Written};
-use super::work::{Asked, Done, say};
+use super::work::{Asked, Done, quietly, say};
 use crate::message::{Answer, Deed, FileForm, NewValue};
 
 /// Objects that one request may read.

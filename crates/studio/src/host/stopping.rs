@@ -7,9 +7,8 @@ use can::Instant;
 use canopen::{Mux, NodeId};
 use cia402::PowerCommand;
 
-use super::deeds::quietly;
 use super::state::Host;
-use super::work::{Asked, Done};
+use super::work::{Asked, Done, quietly};
 
 /// Presses of stop that come within this time are told as one.
 const SAME_PRESS: Duration = Duration::from_secs(1);

@@ -137,3 +137,13 @@ impl Running {
 pub(super) fn say(answer: oneshot::Sender<Answer>, text: Answer) {
     let _ = answer.send(text);
 }
+
+/// What there is to know of something that shows itself: nothing, where it was done.
+pub(super) fn quietly(done: Result<(), Error>) -> Outcome {
+    done.map(|()| Vec::new()).map_err(|error| refusal_of(&error))
+}
+
+/// What the master says, as it is answered.
+pub(super) fn refusal_of(error: &Error) -> Refusal {
+    (error.kind(), error.to_string())
+}

@@ -408,39 +408,6 @@ async fn a_fault_is_shown_with_its_remedy_and_the_frames_around() {
     stage.close().await;
 }
 
-#[tokio::test]
-#[ignore = "needs a browser: cargo xtask test --only studio"]
-async fn the_scope_waits_for_its_trigger_and_measures_the_step() {
-    let stage = Stage::open("trigger").await;
-    stage.take_the_wheel().await;
-    stage.click("#tabs [data-name=scope]").await;
-    stage.choose("#scope-window", "10").await;
-    stage.choose("#trigger-mode", "once").await;
-    stage.says("#trigger-status", "waits").await;
-    stage.click("#tabs [data-name=motion]").await;
-    stage.click("#go-turn").await;
-    stage.turns();
-    stage.click("#tabs [data-name=scope]").await;
-    stage.says("#trigger-status", "came at").await;
-    // The part after it, 80 % of 10 s: while the wheel goes on turning.
-    stage.find("#scope-pause[aria-pressed=true]").await;
-    stage.click("#scope-step").await;
-    // A ramp of less than a second, read nine times a second: that is said, and nothing made up.
-    let told = stage.says(".readout", "Step of Speed").await;
-    assert!(told.contains("Step of Speed: too few readings: ") && told.contains("event timer of 1 ms"), "{told}");
-    assert!(!told.contains("rise time") && !told.contains("Step of Current"), "{told}");
-    stage.shoot("scope_step").await;
-    stage.click("#scope-svg").await;
-    let drawing = std::fs::read_to_string(stage.saved("node4.svg").await).expect("text");
-    assert!(
-        drawing.starts_with("<svg ") && drawing.ends_with("</svg>\n") && drawing.contains(">Speed</text>"),
-        "{drawing}"
-    );
-    stage.click("#scope-fft").await;
-    stage.shoot("scope_spectrum").await;
-    stage.close().await;
-}
-
 /// Held to closed forms: a lag of first order and two sines on a slope. (Steps at all rates: `crates/studio/page_tests`.)
 #[tokio::test]
 #[ignore = "needs a browser: cargo xtask test --only studio"]

@@ -11,6 +11,7 @@ async fn homing_is_chosen_by_its_picture_and_ends_with_a_stop() {
     stage.take_the_wheel().await;
     stage.click(".motion .chooser button:nth-child(2)").await;
     stage.click("#homing summary").await;
+    stage.find("#homing .columns:not([hidden]) #home-method li[data-value='24']").await;
     stage.choose("#home-method", "24").await;
     // ZLIM42-C user manual V1.03, 5.3.6; 2030h gives no input a meaning as delivered.
     stage.says("#home-described", "looks for the home switch in positive direction, and turns round at a limit").await;
