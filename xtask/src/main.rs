@@ -11,6 +11,7 @@ mod examples;
 mod idle;
 mod libtest;
 mod packages;
+mod page;
 mod peers;
 mod pgo;
 mod process;

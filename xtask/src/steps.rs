@@ -6,7 +6,7 @@
 use crate::say::say;
 use crate::tally::Tally;
 use crate::test_programs::{self, How, REAL_TIME, SCHEMA_AND_BROWSER};
-use crate::{browser, dist, examples, libtest, packages, peers, process, program, python, tidy, vcan, workspace};
+use crate::{browser, dist, examples, libtest, packages, page, peers, process, program, python, tidy, vcan, workspace};
 
 /// One step: its name for `--only`, what it does for the progress line, when it runs, and the function that does it.
 pub(crate) struct Step {
@@ -71,6 +71,7 @@ pub(crate) const STEPS: &[Step] = &[
         when: When::Busy,
         run: peers::run,
     },
+    Step { name: "page", does: "what the studio's page computes and says, by node", when: When::Busy, run: page::step },
     Step {
         name: "real_time",
         does: "processes in real time: servers, signals, sockets, terminals",

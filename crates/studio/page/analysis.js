@@ -8,10 +8,22 @@ function between(series, time_s) {
   return v0 + ((v1 - v0) * (time_s - t0)) / (t1 - t0);
 }
 
-function mean(series, from_s, to_s) {
-  const [from, to] = [series.at(from_s), series.at(to_s)];
-  const values = series.values.subarray(from, Math.max(to, from + 1));
-  return values.reduce((sum, value) => sum + value, 0) / values.length;
+/** The straight line by least squares through the samples of two places, the second beyond the last: `{ mean, slope, rms }` of what is left. */
+function straight({ times, values }, from, to) {
+  const count = to - from;
+  let [middle_s, mean] = [0, 0];
+  for (let at = from; at < to; at += 1) {
+    middle_s += times[at] / count;
+    mean += values[at] / count;
+  }
+  let [over, below, left] = [0, 0, 0];
+  for (let at = from; at < to; at += 1) {
+    over += (times[at] - middle_s) * (values[at] - mean);
+    below += (times[at] - middle_s) ** 2;
+  }
+  const slope = below > 0 ? over / below : 0;
+  for (let at = from; at < to; at += 1) left += (values[at] - mean - slope * (times[at] - middle_s)) ** 2;
+  return { mean, slope, rms: Math.sqrt(left / count) };
 }
 
 /** When the line first passes from one side of `level` to the other after `from_s`: "rising", "falling" or "either"; null if never. */
@@ -28,35 +40,98 @@ export function crossing(series, level, edge, from_s = -Infinity) {
   return null;
 }
 
+/** Readings that the rise of a step needs at least, and those in which an overshoot has to be seen. */
+const FEWEST_IN_RISE = 10;
+const FEWEST_IN_PEAK = 5;
+/** Readings by which is judged whether a value stands. */
+const FEWEST_AT_REST = 3;
+/** By which part of the way a value may drift while it stands, how far it may be off its mean, and how far a step is off every straight line. */
+const DRIFT = 0.02;
+const SCATTER = 0.05;
+const BEND = 0.05;
+/** An end that has not come wholly to rest is off by so much of the way, and with it whatever is measured from it. */
+const FINEST = 0.001;
+/** Within which part of the way it has settled. */
+const BAND = 0.02;
+
+/** The largest time between two samples of these places. */
+function widest({ times }, from, to) {
+  let most = 0;
+  for (let at = from + 1; at <= to; at += 1) most = Math.max(most, times[at] - times[at - 1]);
+  return most;
+}
+
+/** Whether the samples of a part stand still, beside a change by `way`. */
+function stands(series, from, to, way) {
+  const { mean, slope, rms } = straight(series, from, to);
+  const drift = Math.abs(slope * (series.times[to - 1] - series.times[from]));
+  let scatter = 0;
+  for (let at = from; at < to; at += 1) scatter = Math.max(scatter, Math.abs(series.values[at] - mean));
+  return drift <= Math.max(DRIFT * Math.abs(way), 2 * rms) && scatter <= SCATTER * Math.abs(way) ? { mean, scatter } : null;
+}
+
 /**
- * The response to a step between two times: it begins at the mean of the first 5 % of the time and ends at that of the last 10 %.
+ * How far it goes beyond its end, as a part of the way, with what a peak between two readings may be higher by (twice what a parabola through the
+ * three around it has). Null where it is over in too few readings to say.
+ */
+function beyond({ times, values }, from, to, end, way, scatter) {
+  const part = (at) => (values[at] - end) / way;
+  let peak = from;
+  for (let at = from; at < to; at += 1) if (part(at) > part(peak)) peak = at;
+  // The end may be off by as much as its readings scatter, and so may the peak.
+  const noise = Math.max(FINEST, 2 * Math.abs(scatter / way));
+  if (part(peak) <= noise) return { overshoot: 0, overshoot_grid: noise };
+  let [first, last] = [peak, peak];
+  while (first > from && part(first - 1) > 0) first -= 1;
+  while (last + 1 < to && part(last + 1) > 0) last += 1;
+  if (last - first + 1 < FEWEST_IN_PEAK || peak === from || peak + 1 >= to) return { overshoot: null, overshoot_grid: null };
+  const [left_s, right_s] = [times[peak] - times[peak - 1], times[peak + 1] - times[peak]];
+  const bend = ((part(peak + 1) - part(peak)) / right_s - (part(peak) - part(peak - 1)) / left_s) / ((left_s + right_s) / 2);
+  return { overshoot: part(peak), overshoot_grid: noise + (Math.abs(bend) * Math.max(left_s, right_s) ** 2) / 4 };
+}
+
+/**
+ * The response to a step between two times. It begins at the mean of the first 5 % of the time and ends at that of the last 10 %, and
+ * at both it has to stand: what goes on steadily is a ramp, and null, as is everything else that is not a step.
  *
  * `rise_s` is the time from 10 % to 90 % of the way, `overshoot` the greatest excess over the end as a part of the way, `settling_s` the
- * time from 10 % of the way until it stays within 2 % of the way around its end, null if it does not. Null where there is no step: at its
- * end the values scatter by more than a twentieth of the way.
+ * time from 10 % of the way until it stays within 2 % of the way around its end, each null if that is not seen. `grid_s` is what the
+ * times may be off by, `overshoot_grid` the overshoot. With fewer than ten readings in its rise it is `{ few }`, how many there are.
  */
 export function stepResponse(series, from_s, to_s) {
-  const [begin_s, end_s] = [Math.max(from_s, series.first_s()), Math.min(to_s, series.last_s())];
+  const [first, end] = [series.at(Math.max(from_s, series.first_s())), series.at(Math.min(to_s, series.last_s()) + 1e-9)];
+  if (end - first < 2 * FEWEST_AT_REST) return null;
+  const [begin_s, end_s] = [series.times[first], series.times[end - 1]];
   const span_s = end_s - begin_s;
-  if (series.length < 5 || !(span_s > 0)) return null;
-  const from = mean(series, begin_s, begin_s + 0.05 * span_s);
-  const to = mean(series, end_s - 0.1 * span_s, end_s + 1e-9);
+  const rests = Math.max(series.at(begin_s + 0.05 * span_s), first + FEWEST_AT_REST);
+  const settled = Math.min(series.at(end_s - 0.1 * span_s), end - FEWEST_AT_REST);
+  const from = straight(series, first, rests).mean;
+  const to = straight(series, settled, end).mean;
   const way = to - from;
-  let scatter = 0;
-  for (let at = series.at(end_s - 0.1 * span_s); at < series.at(end_s + 1e-9); at += 1) scatter = Math.max(scatter, Math.abs(series.values[at] - to));
-  if (Math.abs(way) <= 20 * scatter || way === 0) return null;
+  const [before, after] = [stands(series, first, rests, way), stands(series, settled, end, way)];
+  if (!before || !after || way === 0 || straight(series, first, end).rms < BEND * Math.abs(way)) return null;
   const edge = way > 0 ? "rising" : "falling";
   const at10_s = crossing(series, from + 0.1 * way, edge, begin_s);
-  const at90_s = crossing(series, from + 0.9 * way, edge, at10_s ?? begin_s);
-  if (at10_s === null || at90_s === null) return null;
-  let [overshoot, outside_s] = [0, at10_s];
-  for (let at = series.at(at10_s); at < series.at(end_s + 1e-9); at += 1) {
-    const beyond = (series.values[at] - to) / way;
-    overshoot = Math.max(overshoot, beyond);
-    if (Math.abs(beyond) > 0.02) outside_s = at + 1 < series.end ? series.times[at + 1] : Infinity;
-  }
-  const settling_s = outside_s <= end_s - 0.1 * span_s ? outside_s - at10_s : null;
-  return { from, to, rise_s: at90_s - at10_s, overshoot, settling_s };
+  const at90_s = at10_s === null ? null : crossing(series, from + 0.9 * way, edge, at10_s);
+  if (at90_s === null || at90_s > end_s) return null;
+  const [at10, at90] = [series.at(at10_s), series.at(at90_s)];
+  // The edges themselves lie between readings.
+  if (at90 - at10 < FEWEST_IN_RISE) return { few: at90 - at10 };
+  const part = (at) => (series.values[at] - to) / way;
+  let outside = at10;
+  for (let at = at10; at < end; at += 1) if (Math.abs(part(at)) > BAND) outside = at;
+  const grid_s = widest(series, at10 - 1, Math.min(outside + 1, end - 1));
+  // Where the line between the last reading beyond the band and the next one comes into it.
+  const into = () => series.times[outside] + ((series.times[outside + 1] - series.times[outside]) * (Math.sign(part(outside)) * BAND - part(outside))) / (part(outside + 1) - part(outside));
+  const settling_s = outside + 1 < settled ? into() - at10_s : null;
+  return { from, to, rise_s: at90_s - at10_s, settling_s, grid_s, ...beyond(series, at10, end, to, way, after.scatter) };
+}
+
+/** A number with what it may be off by, and no more decimals than that has: `1.2 ± 0.2`. */
+export function within(value, grid) {
+  const decimals = Math.min(6, Math.max(0, -Math.floor(Math.log10(grid))));
+  const unit = 10 ** -decimals;
+  return `${value.toFixed(decimals)} ± ${(Math.ceil(grid / unit - 1e-6) * unit).toFixed(decimals)}`;
 }
 
 /** In place: the discrete Fourier transform of a power of two of complex values. */

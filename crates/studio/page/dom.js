@@ -13,8 +13,22 @@ function fill(element, properties, children) {
   return element;
 }
 
-/** An element with attributes; `onclick` and the like add listeners. */
-export const h = (tag, properties = {}, ...children) => fill(document.createElement(tag), properties, children);
+/** An element with attributes; `onclick` and the like add listeners. The browser's own list under a field would take the keys of Stop. */
+export const h = (tag, properties = {}, ...children) => fill(document.createElement(tag), tag === "input" ? { autocomplete: "off", ...properties } : properties, children);
+
+/** Something that is on or off, as a button with `checked`: pressed by the pointer and by Enter, since Space is Stop. */
+export function toggle(id, text, on, onchange = () => {}, properties = {}) {
+  const button = h("button", { type: "button", id, class: "toggle", "aria-pressed": String(on), ...properties }, text);
+  Object.defineProperty(button, "checked", {
+    get: () => button.getAttribute("aria-pressed") === "true",
+    set: (value) => button.setAttribute("aria-pressed", String(value)),
+  });
+  button.addEventListener("click", () => {
+    button.checked = !button.checked;
+    onchange();
+  });
+  return button;
+}
 
 /** The same for SVG. */
 export const s = (tag, properties = {}, ...children) => fill(document.createElementNS(SVG, tag), properties, children);

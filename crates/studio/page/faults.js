@@ -1,7 +1,7 @@
 // The Faults view: what has happened to the drives, what to do about it, and the frames around. The studio keeps it, so that
 // what happened before this page was opened is there too.
 
-import { h, hex, number, renew, say } from "./dom.js";
+import { h, hex, number, renew, say, toggle } from "./dom.js";
 import { pointed, told } from "./help.js";
 import { headRow, lineRow } from "./trace.js";
 
@@ -15,7 +15,7 @@ const KINDS = { emcy: "EMCY", fault: "fault", silent: "silent", state: "power st
 const LASTING = ["emcy", "fault", "silent"];
 
 export function faultsView() {
-  const only = h("input", { type: "checkbox", id: "faults-only", onchange: draw });
+  const only = toggle("faults-only", "faults only", false, () => draw());
   const here = h("span", { class: "quiet", role: "status" });
   const list = h("div", { class: "timeline", tabindex: "0", role: "log", "aria-label": "What happened, newest first" });
   const detail = h("div", { class: "told" });
@@ -23,9 +23,8 @@ export function faultsView() {
   const root = h(
     "section",
     { class: "faults-view" },
-    h("div", { class: "bar" }, h("label", {}, only, " faults only"), here),
-    h("div", { class: "happening head" }, ...COLUMNS.map((title) => h("span", {}, title))),
-    list,
+    h("div", { class: "bar" }, only, here),
+    h("div", { class: "wide" }, h("div", { class: "happening head" }, ...COLUMNS.map((title) => h("span", {}, title))), list),
     detail,
     frames,
   );

@@ -2,7 +2,10 @@
 // The paths are the studio's; held motions last as long as their button is held.
 
 import { ask, inControl, link } from "./link.js";
-import { h, number, renew, say } from "./dom.js";
+import { choice } from "./choice.js";
+import { h, number, renew, say, toggle } from "./dom.js";
+import { guarding } from "./guarding.js";
+import { motionForm } from "./motion_form.js";
 
 // Three within the 200 ms after which the studio stops what is not held.
 const HOLD_MS = 60;
@@ -67,12 +70,15 @@ export function groupMotion(report) {
   const body = h("tbody");
   const heads = ["Node", "In the group", "Angle", "Speed", "Now", "Counts", "Does"];
   const table = h("table", {}, h("thead", {}, h("tr", {}, ...heads.map((head) => h("th", {}, head)))), body);
-  const relative = h("input", { id: "group-relative", type: "checkbox", checked: true });
+  const relative = toggle("group-relative", "relative, from where each is", true);
   const rpm = input("group-rpm", "", { placeholder: "30" });
   const ramp = input("group-ramp", "", { placeholder: "60" });
   const within = input("group-within", "", { placeholder: "shortest" });
   const told = h("p", { role: "status", id: "group-told", class: "quiet" });
   const held = holder((name, answer) => tell(name, answer));
+  const risk = guarding("group-guarding", report);
+  /** Which drives somebody wanted to move last. */
+  let asked = [];
 
   const tell = (name, answer) => {
     told.className = answer.ok ? "good" : "bad";
@@ -98,10 +104,9 @@ export function groupMotion(report) {
     return found;
   }
 
-  async function move(event) {
-    event.preventDefault();
+  async function move() {
     const to = axes("degrees", "angle");
-    if (!to) return;
+    if (!to || !isAccepted(chosen().map(([node]) => node))) return;
     told.className = "quiet";
     say(told, "Moving …");
     tell("Group", await ask({ do: "group_move", axes: to, relative: relative.checked, rpm: read(rpm), rpm_per_s: read(ramp), within_s: read(within) }));
@@ -109,14 +114,13 @@ export function groupMotion(report) {
 
   const turn = (sign) => () => {
     const at = axes("rpm", "speed");
-    return at && { do: "group_jog", axes: at.map(({ node, rpm }) => ({ node, rpm: sign * rpm })), rpm_per_s: read(ramp) };
+    return at && isAccepted(at.map(({ node }) => node)) && { do: "group_jog", axes: at.map(({ node, rpm }) => ({ node, rpm: sign * rpm })), rpm_per_s: read(ramp) };
   };
   const hold = () => ({ do: "group_hold" });
   const spin = (id, text, sign, title) => held.button(id, text, title, () => held.begin("Group", turn(sign), hold));
 
   // The base: which drives are its wheels, how it is built, and how fast.
-  const wheel = (id) => h("select", { id });
-  const [left, right] = [wheel("base-left"), wheel("base-right")];
+  const [left, right] = [choice("base-left", "Left wheel"), choice("base-right", "Right wheel")];
   const [turns_left, turns_right] = [input("base-turns-left", "1"), input("base-turns-right", "-1")];
   const [base_m, radius_m] = [input("base-wheel-base", "0.5"), input("base-wheel-radius", "0.08")];
   const [speed, most, ramp_m] = [input("base-speed", "0.1"), input("base-most", "0.3"), input("base-ramp", "0.5")];
@@ -127,8 +131,9 @@ export function groupMotion(report) {
   };
   let wanted = null;
   const drive = (forward, round) => () => {
-    wanted = twist(forward, round);
     const wheels = [Number(left.value), Number(right.value)];
+    if (!isAccepted(wheels)) return;
+    wanted = twist(forward, round);
     const begin = () => ({ do: "base_jog", wheels, turns: [read(turns_left) ?? 1, read(turns_right) ?? -1], wheel_base_m: read(base_m) ?? 0, wheel_radius_m: read(radius_m) ?? 0, most_m_s: read(most) ?? 0, m_per_s2: read(ramp_m) ?? 0, ...wanted });
     held.begin("Base", begin, () => ({ do: "base_twist", ...wanted }));
   };
@@ -138,17 +143,18 @@ export function groupMotion(report) {
     "div",
     {},
     table,
+    risk.root,
     h(
       "div",
       { class: "forms" },
-      h("form", { "aria-label": "Move together", onsubmit: move }, h("h3", {}, "Move together"), h("label", { for: "group-relative" }, relative, " relative, from where each is"), row("Speed", rpm, "r/min at most"), row("Ramp", ramp, "r/min/s at most"), row("Within", within, "s"), h("button", { type: "submit", id: "group-move" }, "Move together")),
+      motionForm("Move together", h("button", { type: "button", id: "group-move", onclick: move }, "Enable and move together"), relative, row("Speed", rpm, "r/min at most"), row("Ramp", ramp, "r/min/s at most"), row("Within", within, "s")),
       h("div", { class: "form" }, h("h3", {}, "Turn together (hold to run)"), h("p", { class: "quiet" }, "Each at its own speed of the table; they gather it together."), h("div", { class: "bar" }, spin("group-back", "◀", -1, "Hold to turn all backwards"), spin("group-forward", "▶", 1, "Hold to turn all forwards"))),
       h(
         "div",
         { class: "form base" },
         h("h3", {}, "Base on two wheels (hold to run)"),
-        h("label", { for: "base-left" }, "Left wheel ", left, " turns ", turns_left),
-        h("label", { for: "base-right" }, "Right wheel ", right, " turns ", turns_right),
+        h("p", {}, "Left wheel ", left, " turns ", turns_left),
+        h("p", {}, "Right wheel ", right, " turns ", turns_right),
         row("Wheel base", base_m, "m"),
         row("Wheel radius", radius_m, "m"),
         row("Speed", speed, "m/s"),
@@ -159,10 +165,10 @@ export function groupMotion(report) {
     ),
     told,
   );
-  const details = h("details", { class: "homing", id: "group" }, h("summary", {}, "Groups: several drives as one motion"), h("p", { class: "quiet" }, "All begin with one SYNC and end together. When one faults, is lost or lags, all come to rest. Afterwards they have no power. Their PDO mapping is set anew for it."), fields);
+  const details = h("details", { class: "homing", id: "group" }, h("summary", {}, "Groups: several drives as one motion"), h("p", { class: "quiet" }, "All begin with one SYNC and end together. When one faults, is lost or lags, all come to rest. They are enabled for it, also by a held button, and have no power afterwards. Their PDO mapping is set anew for it."), fields);
 
   function line(node) {
-    const fields = { in: h("input", { type: "checkbox", id: `group-in-${node}`, "aria-label": `Node ${node} is in the group` }), angle: input(`group-angle-${node}`, "90"), speed: input(`group-speed-${node}`, "30"), now: h("td"), counts: h("td"), does: h("td") };
+    const fields = { in: toggle(`group-in-${node}`, "", false, () => link.state && update(link.state), { "aria-label": `Node ${node} is in the group` }), angle: input(`group-angle-${node}`, "90"), speed: input(`group-speed-${node}`, "30"), now: h("td"), counts: h("td"), does: h("td") };
     lines.set(node, fields);
     return fields;
   }
@@ -173,9 +179,12 @@ export function groupMotion(report) {
     renew(body, drives.map(({ node, model }) => `${node}${model}`).join(), () => {
       const before = new Map(lines);
       lines.clear();
-      const options = (of) => drives.map(({ node }) => h("option", { value: String(node), selected: of === node }, `node ${node}`));
-      left.replaceChildren(...options(drives[0]?.node));
-      right.replaceChildren(...options(drives[1]?.node));
+      const options = drives.map(({ node }) => ({ value: String(node), text: `node ${node}` }));
+      for (const [at, wheel] of [left, right].entries()) {
+        const kept = wheel.value;
+        wheel.offer(options);
+        if (wheel.value !== kept) wheel.value = String(drives[at]?.node ?? "");
+      }
       return drives.map(({ node, model }) => {
         const of = before.get(node) ?? line(node);
         lines.set(node, of);
@@ -183,12 +192,21 @@ export function groupMotion(report) {
         return h("tr", { "data-node": String(node) }, ...cells.map((cell, at) => h("td", { "data-label": heads[at] }, cell)), of.now, of.counts, of.does);
       });
     });
+    const moved = new Set([...chosen().map(([node]) => node), ...asked]);
+    risk.update(drives.filter(({ node, goes_on }) => goes_on && moved.has(node)), inControl());
     for (const { node, drive, doing, trouble } of drives) {
       const of = lines.get(node);
       say(of.now, `${number(drive?.angle_degrees, 1)}° ${number(drive?.velocity_rpm, 1)} r/min`);
       say(of.counts, number(drive?.position_counts, 0));
       say(of.does, trouble ?? doing ?? drive?.state ?? "–");
     }
+  }
+
+  /** True if these may be moved; else whoever wants that is asked. */
+  function isAccepted(nodes) {
+    asked = nodes;
+    if (link.state) update(link.state);
+    return risk.isAccepted();
   }
 
   details.addEventListener("toggle", () => details.open && link.state && update(link.state));

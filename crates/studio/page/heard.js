@@ -1,6 +1,7 @@
 // Any object that passes on the bus, as a series: mapped into a PDO each frame is a sample, read or written by SDO each transfer,
 // whoever asked. Times are those of the frames.
 
+import { choice } from "./choice.js";
 import { h, say } from "./dom.js";
 import { Series } from "./series.js";
 
@@ -13,6 +14,9 @@ const MOST = 32;
 const chosen = new Map();
 let after = null;
 let timer = null;
+
+/** Torque is current by another name. */
+const isCurrent = ({ name, unit }) => /current|torque/i.test(name ?? "") || /\bm?A\b/.test(unit ?? "");
 
 /** What was chosen, as quantities of the scope. */
 export const heard = () => [...chosen.values()];
@@ -34,7 +38,8 @@ function take(told) {
 
 /** Buttons to choose objects by, and to let them go. */
 export function heardChooser() {
-  const list = h("select", { id: "scope-object", "aria-label": "Add an object that passes on the bus", onfocus: load, onpointerdown: load, onchange: () => add(list.value) }, h("option", { value: "" }, "Add an object …"));
+  const first = { value: "", text: "Add an object …" };
+  const list = choice("scope-object", "Add an object that passes on the bus", [first], { onopen: load, onchange: () => add(list.value) });
   const shown = h("span", { class: "chooser", role: "group", "aria-label": "Objects shown" });
   const status = h("span", { class: "quiet", role: "status" });
   let known = [];
@@ -47,7 +52,7 @@ export function heardChooser() {
     try {
       known = (await fetchSeries({})).series.filter(({ object }) => !chosen.has(object));
       const title = ({ object, name, unit, count }) => `${object} ${name ?? ""}${unit ? ` [${unit}]` : ""}, ${count} lately`;
-      list.replaceChildren(h("option", { value: "" }, "Add an object …"), ...known.map((one) => h("option", { value: one.object }, title(one))));
+      list.offer([first, ...known.map((one) => ({ value: one.object, text: title(one) }))]);
       say(status, "");
     } catch (error) {
       say(status, error.message);
@@ -60,7 +65,7 @@ export function heardChooser() {
     list.value = "";
     if (!one || chosen.has(object)) return;
     if (chosen.size >= MOST) return say(status, `At most ${MOST} objects`);
-    chosen.set(object, { field: object, node: one.node, label: `${object} ${one.name ?? ""}`, unit: one.unit ? `[${one.unit}]` : "", decimals: 0, series: new Series(KEPT_S) });
+    chosen.set(object, { field: object, node: one.node, label: `${object} ${one.name ?? ""}`, unit: one.unit ? `[${one.unit}]` : "", decimals: 0, steps: !isCurrent(one), series: new Series(KEPT_S) });
     const remove = h("button", { type: "button", "data-object": object, title: "Take it away" }, `× ${object}`);
     remove.addEventListener("click", () => {
       chosen.delete(object);

@@ -2,6 +2,7 @@
 // now, and how a run goes. What a method means is told by the studio, from the drive's description.
 
 import { ask } from "./link.js";
+import { choice } from "./choice.js";
 import { h, number, renew, say } from "./dom.js";
 import { helped } from "./help.js";
 import { described, homingPicture } from "./homing_picture.js";
@@ -10,8 +11,9 @@ import { described, homingPicture } from "./homing_picture.js";
 const LOOK_MS = 1000;
 const RUNNING_MS = 250;
 
-export function homingWizard(shared, report) {
-  const choose = h("select", { id: "home-method", onchange: () => drawMethod() });
+/** `isAccepted` asks, where nothing stops the drive when the studio dies, and says whether it may be moved. */
+export function homingWizard(shared, report, isAccepted) {
+  const choose = choice("home-method", "Method", [], { onchange: () => drawMethod() });
   const about = h("p", { id: "home-described" });
   const picture = h("div");
   const missing = h("p", { class: "bad", id: "home-missing" });
@@ -24,7 +26,7 @@ export function homingWizard(shared, report) {
   const body = h(
     "div",
     { class: "columns" },
-    h("div", {}, h("label", { for: "home-method" }, "Method ", choose), about, picture, missing, remark),
+    h("div", {}, h("p", {}, "Method ", choose), about, picture, missing, remark),
     h("div", {}, h("h3", {}, "Switches now"), inputs, h("h3", {}, "How it is set"), settings, told),
   );
   const none = h("p", { class: "quiet" }, "Open it to read which methods the drive has.");
@@ -79,7 +81,7 @@ export function homingWizard(shared, report) {
 
   function fill() {
     const kept = choose.value;
-    choose.replaceChildren(...seen.methods.map(({ method, title }) => h("option", { value: String(method) }, title ? `${method}: ${title}` : String(method))));
+    choose.offer(seen.methods.map(({ method, title }) => ({ value: String(method), text: title ? `${method}: ${title}` : String(method) })));
     const wanted = [kept, String(seen.method)].find((value) => seen.methods.some(({ method }) => String(method) === value));
     if (wanted !== undefined) choose.value = wanted;
     say(remark, seen.remark);
@@ -140,7 +142,7 @@ export function homingWizard(shared, report) {
 
   async function run() {
     const of = method();
-    if (!of) return;
+    if (!of || !isAccepted()) return;
     const on = node;
     outcome = "";
     asked_at = 0;
@@ -156,6 +158,7 @@ export function homingWizard(shared, report) {
     position = found?.drive?.angle_degrees ?? null;
     const running = found?.doing === "homing";
     start.disabled = !seen || running || !method();
+    say(start, found?.drive?.state === "Operation enabled" ? "Start homing" : "Enable and start homing");
     if (seen) seen.running = running;
     if (!details.open || !found?.drive) return;
     if (seen) drawProgress();

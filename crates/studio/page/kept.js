@@ -7,11 +7,11 @@ import { Series } from "./series.js";
 const KEPT_S = 60;
 const MARKERS_KEPT = 200;
 
-/** What a drive says when it is looked at: field, label, unit, decimals. */
+/** What a drive says when it is looked at: field, label, unit, decimals. A current answers no step: it is what a step takes. */
 export const QUANTITIES = [
   { field: "velocity_rpm", label: "Speed", unit: "r/min", decimals: 1 },
   { field: "angle_degrees", label: "Position", unit: "°", decimals: 1 },
-  { field: "current_a", label: "Current", unit: "A", decimals: 2 },
+  { field: "current_a", label: "Current", unit: "A", decimals: 2, steps: false },
   { field: "supply_v", label: "Supply", unit: "V", decimals: 1 },
 ];
 

@@ -1,12 +1,14 @@
 // The frame of the page: views, keys, stop, control, news.
 
 import { ask, connect, inControl, link, on, stopAll } from "./link.js";
+import { closeChoice } from "./choice.js";
 import { h, number, renew, say } from "./dom.js";
 import { busView } from "./bus.js";
 import { driveView } from "./drive.js";
 import { motionView } from "./motion.js";
 import { helpPanel } from "./help.js";
 import { scopeView } from "./scope.js";
+import { lostSight } from "./sight.js";
 import { parametersView } from "./parameters.js";
 import { pdoView } from "./pdo.js";
 import { faultsView } from "./faults.js";
@@ -16,6 +18,12 @@ import { worldView } from "./world.js";
 
 const byId = (id) => document.getElementById(id);
 const NEWS_KEPT = 200;
+/** What is told twice within this time is told once. */
+const SAME_NEWS_MS = 2000;
+/** How long it is shown that a stop was confirmed late. */
+const LATE_MS = 6000;
+/** A page that has just been opened has no picture yet. */
+const OPENING_MS = 1500;
 
 /** What the views share: which node is looked at. */
 const shared = { node: null };
@@ -47,7 +55,12 @@ function show(name) {
   shown = next;
   byId("view").replaceChildren(next.view.root);
   scrollTo(0, 0);
-  for (const tab of byId("tabs").children) tab.setAttribute("aria-current", tab.dataset.name === next.name ? "page" : "false");
+  for (const tab of byId("tabs").children) {
+    const isShown = tab.dataset.name === next.name;
+    tab.setAttribute("aria-current", isShown ? "page" : "false");
+    // In a narrow window the views are a line that moves sideways.
+    if (isShown) tab.scrollIntoView({ block: "nearest", inline: "center" });
+  }
   if (location.hash !== `#${next.name}`) location.hash = next.name;
   if (link.state) next.view.update(link.state);
 }
@@ -66,13 +79,12 @@ byId("stop").addEventListener("click", (event) => {
 });
 
 /**
- * A space is a space in a text field, as long as nothing is moved and the studio can be asked whether that is so; and in the
- * commands to a virtual world, where no real motor turns.
+ * A space is a space in a text field, as long as the studio moves nothing and that is seen; and in the commands to a virtual world,
+ * where no real motor turns.
  */
 const isText = (target) =>
   target.matches("textarea, input:not([type]), input[type=text], input[type=search]") &&
-  link.welcome !== null &&
-  link.state !== null &&
+  link.fresh &&
   (target.closest(".world") !== null || !link.state.nodes.some((node) => node.moving || node.doing));
 
 addEventListener(
@@ -83,10 +95,11 @@ addEventListener(
       event.preventDefault();
       event.stopPropagation();
       if (!event.repeat) stopAll();
+      closeChoice();
       if (event.key === "Escape") help.hide();
       return;
     }
-    const typing = event.target.matches("input, select, textarea");
+    const typing = event.target.matches("input, textarea, [aria-expanded=true]");
     if (typing || event.ctrlKey || event.altKey || event.metaKey) return;
     const view = views[Number(event.key) - 1];
     if (event.key === "?") help.key();
@@ -109,25 +122,40 @@ byId("theme").addEventListener("click", () => {
 /** Shows what became of a deed: notes, or why it was not done. */
 export function report(title, answer) {
   if (answer.ok) {
-    for (const note of answer.notes ?? []) addNews(null, `${title}: ${note}`, "note");
+    for (const note of answer.notes ?? []) addNews(null, `${title}: `, note, "note");
   } else {
-    addNews(null, `${title}: ${answer.error.message}`, "bad");
+    addNews(null, `${title}: `, answer.error.message, "bad");
   }
   return answer;
 }
 
-function addNews(time_s, text, kind) {
+/** The newest line below: who it is about, and what has happened. The answer to whoever asked and the news to all may be the same. */
+let newest = { text: "", at: -Infinity };
+function addNews(time_s, about, text, kind) {
   const list = byId("news");
   const time = time_s ?? link.state?.time_s ?? null;
-  list.prepend(h("li", { class: kind }, h("time", {}, time === null ? "" : `${number(time, 1)} s`), ` ${text}`));
+  const now = performance.now();
+  const isSame = newest.text === text && now - newest.at < SAME_NEWS_MS;
+  newest = { text, at: now };
+  if (isSame && kind === "") return;
+  if (isSame) list.firstElementChild.remove();
+  list.prepend(h("li", { class: kind }, h("time", {}, time === null ? "" : `${number(time, 1)} s`), ` ${about}${text}`));
   while (list.children.length > NEWS_KEPT) list.lastElementChild.remove();
+  document.querySelector("footer").hidden = false;
 }
+byId("news-all").addEventListener("click", ({ currentTarget }) => {
+  const all = document.querySelector("footer").classList.toggle("all");
+  currentTarget.setAttribute("aria-expanded", String(all));
+  say(currentTarget, all ? "The newest" : "All news");
+  byId("news").scrollTop = 0;
+});
 
 function updateControl(state) {
   const mine = inControl();
   const asking = mine && state.asking !== null ? state.asking : null;
-  const key = `${link.welcome?.session} ${state.controller} ${state.sessions} ${state.asking}`;
+  const key = `${link.fresh} ${link.welcome?.session} ${state.controller} ${state.sessions} ${state.asking}`;
   renew(byId("control"), key, () => {
+    if (!link.fresh) return [h("span", { class: "bad" }, "The studio shows nothing new")];
     const others = state.sessions > 1 ? ` · ${state.sessions} pages open` : "";
     if (mine) {
       return [
@@ -153,8 +181,8 @@ async function control(deed, to) {
 }
 
 on("state", (state) => {
-  const load = state.bus.load_percent === null ? "" : ` · load ${number(state.bus.load_percent, 1)} %`;
-  const bus = `${state.bus.frames_per_s} frames/s${load} · ${state.bus.name}`;
+  const load = state.bus.load_percent === null ? "" : `load ${number(state.bus.load_percent, 1)} % · `;
+  const bus = `${load}${state.bus.frames_per_s} frames/s · ${state.bus.name}`;
   say(byId("bus-line"), bus);
   byId("bus-line").title = bus;
   updateControl(state);
@@ -168,13 +196,41 @@ on("state", (state) => {
 /** A text about no node, or that begins with it. */
 const isNamed = ({ node, text }) => node === null || node === undefined || text.toLowerCase().startsWith(`node ${node}`);
 
-on("news", (news) => addNews(news.time_s, isNamed(news) ? news.text : `node ${news.node}: ${news.text}`, ""));
+on("news", (news) => addNews(news.time_s, isNamed(news) ? "" : `node ${news.node}: `, news.text, ""));
 
 on("change", (connected) => {
-  const banner = byId("banner");
-  banner.hidden = connected;
-  say(banner, connected ? "" : "No connection to the studio. What this page moved is stopped there. Trying again …");
   if (!connected) shown?.view.hide?.();
+});
+
+// What is not seen any more is grey, and what is known of it stands over the whole width.
+on("sight", ({ fresh, connected, age_ms }) => {
+  const wasFresh = !document.body.classList.contains("unseen");
+  document.body.classList.toggle("unseen", !fresh);
+  const banner = byId("banner");
+  banner.hidden = fresh || (!link.state && age_ms < OPENING_MS);
+  if (fresh) return;
+  const lines = lostSight({ state: link.state, connected, age_ms });
+  renew(banner, JSON.stringify(lines), () => lines.map(({ text, urgent }) => h("p", { class: urgent ? "urgent" : "" }, text)));
+  if (wasFresh && link.state) {
+    for (const { view } of views) view.lose?.();
+    updateControl(link.state);
+  }
+});
+
+// A stop that nobody has confirmed stays told until one is.
+let late = null;
+on("stop", ({ confirmed, after_ms }) => {
+  const notice = byId("stop-notice");
+  clearTimeout(late);
+  if (!confirmed) {
+    notice.className = "unconfirmed";
+    say(notice, "STOP WAS NOT CONFIRMED: use the emergency stop");
+    notice.hidden = false;
+  } else if (!notice.hidden) {
+    notice.className = "";
+    say(notice, `The stop was confirmed after ${number(after_ms / 1000, 1)} s.`);
+    late = setTimeout(() => (notice.hidden = true), LATE_MS);
+  }
 });
 
 show(location.hash.slice(1) || "bus");

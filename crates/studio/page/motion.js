@@ -1,20 +1,24 @@
 // The Motion view: everything that moves a drive. A jog lasts as long as it is held.
 
 import { ask, inControl, link } from "./link.js";
-import { h, say } from "./dom.js";
+import { h, say, toggle } from "./dom.js";
 import { VALUES, chooser, tiles } from "./drive.js";
 import { groupMotion } from "./group.js";
+import { guarding } from "./guarding.js";
 import { homingWizard } from "./homing.js";
+import { series } from "./kept.js";
+import { motionForm } from "./motion_form.js";
+import { isSeenMoving } from "./sight.js";
 
 // Three within the 200 ms after which the studio stops what is not held.
 const HOLD_MS = 60;
 
 /** Hold to run: turns while held, stops when it is let go by any way there is. */
-function jogger(shared, speed, report) {
+function jogger(shared, speed, report, isAccepted) {
   let held = null;
 
   async function begin(direction) {
-    if (held || !inControl()) return;
+    if (held || !inControl() || !isAccepted()) return;
     const node = shared.node;
     const jog = { node, timer: setInterval(() => hold(jog), HOLD_MS) };
     held = jog;
@@ -68,7 +72,6 @@ export function motionView(shared, report) {
   const large = tiles(VALUES.slice(0, 4));
   const title = h("h2");
   const status = h("p", { class: "status", role: "status" });
-  const without = h("p", { class: "quiet" });
 
   const field = (id, label, unit, value, optional = false) => {
     const input = h("input", { id, type: "number", step: "any", value, placeholder: optional ? "as set" : "", inputmode: "decimal" });
@@ -87,27 +90,39 @@ export function motionView(shared, report) {
   const send = async (name, deed) => {
     if (deed) report(`Node ${deed.node}: ${name}`, await ask(deed));
   };
-  const act = (name, make) => (event) => {
-    event.preventDefault();
+  /** The buttons that move, which enable the drive where it is not. */
+  const starts = [];
+  const act = (name, make) => () => {
     const deed = make();
-    if (deed) send(name, { ...deed, node: shared.node });
+    if (deed && risk.isAccepted()) send(name, { ...deed, node: shared.node });
   };
-  const form = (name, make, ...fields) =>
-    h("form", { onsubmit: act(name, make), "aria-label": name }, h("h3", {}, name), ...fields, h("button", { type: "submit" }, name));
+  const form = (name, make, ...fields) => {
+    const go = h("button", { type: "button", id: `go-${name.toLowerCase()}`, title: "Ctrl and Enter in a field", onclick: act(name, make) }, name);
+    starts.push([go, name]);
+    return motionForm(name, go, ...fields);
+  };
 
   const jogSpeed = field("jog-speed", "Speed", "r/min", "60");
-  const jog = jogger(shared, () => Math.abs(required(jogSpeed) ?? 0), report);
+  const risk = guarding("guarding", report);
+  const jog = jogger(shared, () => Math.abs(required(jogSpeed) ?? 0), report, risk.isAccepted);
   const speed = field("velocity-rpm", "Speed", "r/min", "60");
   const ramp = field("velocity-ramp", "Ramp", "r/min/s", "", true);
   const angle = field("move-degrees", "Angle", "°", "90");
   const moveSpeed = field("move-rpm", "at", "r/min", "", true);
-  const relative = h("input", { id: "move-relative", type: "checkbox", checked: true });
+  const relative = toggle("move-relative", "relative, from the last target", true);
   const amperes = field("torque-amperes", "Current", "A", "0.5");
-  const homing = homingWizard(shared, report);
+  const homing = homingWizard(shared, report, risk.isAccepted);
   const group = groupMotion(report);
 
   const power = (id, name, what, key) =>
-    h("button", { type: "button", id, title: `${name} (key ${key})`, onclick: () => send(name, { do: what, node: shared.node }) }, name);
+    h("button", { type: "button", id, title: key ? `${name} (key ${key})` : name, onclick: () => send(name, { do: what, node: shared.node }) }, name);
+
+  const enables = h("p", { class: "quiet" }, "Holding one also enables the drive.");
+  /** Where the shaft of a node was a second before it was last read. */
+  const before_degrees = (node) => {
+    const angles = series(node, "angle_degrees");
+    return angles.value(angles.last_s() - 1);
+  };
 
   const controls = h(
     "fieldset",
@@ -115,7 +130,7 @@ export function motionView(shared, report) {
     h(
       "div",
       { class: "bar" },
-      power("enable", "Enable", "enable", "e"),
+      power("enable", "Enable", "enable"),
       power("disable", "Disable", "disable", "d"),
       power("reset-fault", "Reset fault", "reset_fault", "r"),
       power("gentle-stop", "Stop by ramp", "stop", "s"),
@@ -128,6 +143,7 @@ export function motionView(shared, report) {
         { class: "form" },
         h("h3", {}, "Jog (hold to run)"),
         jogSpeed.row,
+        enables,
         h("div", { class: "bar" }, jog.button("◀", -1, "Hold to turn backwards (left arrow)"), jog.button("▶", 1, "Hold to turn forwards (right arrow)")),
       ),
       form("Turn", () => {
@@ -137,7 +153,7 @@ export function motionView(shared, report) {
       form("Move", () => {
         const degrees = required(angle);
         return degrees === null ? null : { do: "move", degrees, relative: relative.checked, rpm: read(moveSpeed) };
-      }, angle.row, moveSpeed.row, h("label", { for: "move-relative" }, relative, " relative, from the last target")),
+      }, angle.row, moveSpeed.row, relative),
       form("Push", () => {
         const value = required(amperes);
         return value === null ? null : { do: "torque", amperes: value };
@@ -146,16 +162,20 @@ export function motionView(shared, report) {
     homing.root,
     group.root,
   );
-  const root = h("section", { class: "motion" }, h("div", { class: "bar" }, title, choose.root), large.root, status, without, controls);
+  const root = h("section", { class: "motion" }, h("div", { class: "bar" }, title, choose.root), large.root, status, risk.root, controls);
 
   function update(state) {
     choose.update(state);
     const node = state.nodes.find((node) => node.node === shared.node);
     say(title, node ? `Node ${node.node}: ${node.title ?? "model not known"}` : "No drive");
     large.update(node?.drive ?? null);
-    const parts = [node?.trouble ?? node?.drive?.state ?? "–", node?.doing, node?.moving ? "in motion by this studio" : null];
+    const seen = node && isSeenMoving(node.drive, before_degrees(node.node));
+    const parts = [node?.trouble ?? node?.drive?.state ?? "–", node?.doing, seen ? (node.moving ? "in motion by this studio" : "in motion") : null];
     say(status, parts.filter(Boolean).join(" · "));
-    say(without, node?.without_us ? `If the studio dies, ${node.without_us}.` : "");
+    const enabled = node?.drive?.state === "Operation enabled";
+    for (const [go, name] of starts) say(go, enabled ? name : `Enable and ${name.toLowerCase()}`);
+    enables.hidden = enabled;
+    risk.update(node ? [node] : [], inControl());
     homing.update(state);
     group.update(state);
     controls.disabled = !inControl() || !node?.drive;
@@ -167,9 +187,16 @@ export function motionView(shared, report) {
     group.hide();
   }
 
+  /** What is not seen any more is not told, and cannot be moved. */
+  function lose() {
+    hide();
+    say(status, "Not known: the studio shows nothing new");
+    controls.disabled = true;
+  }
+
   function key(event) {
     if (event.repeat || controls.disabled) return;
-    const pressed = { e: "enable", d: "disable", r: "reset-fault", s: "gentle-stop" }[event.key];
+    const pressed = { d: "disable", r: "reset-fault", s: "gentle-stop" }[event.key];
     if (pressed) document.getElementById(pressed).click();
     else if (event.key === "ArrowLeft" || event.key === "ArrowRight") {
       event.preventDefault();
@@ -177,5 +204,5 @@ export function motionView(shared, report) {
     }
   }
 
-  return { root, update, key, hide };
+  return { root, update, key, hide, lose };
 }

@@ -2,7 +2,7 @@
 // kept and put back as a transaction of the studio.
 
 import { ask, inControl } from "./link.js";
-import { count, h, say } from "./dom.js";
+import { count, h, say, toggle } from "./dom.js";
 import { chooser } from "./drive.js";
 import { helped } from "./help.js";
 import { parameterFile } from "./parameter_file.js";
@@ -17,7 +17,7 @@ const MOST_FOUND = 100;
 export function parametersView(shared, report) {
   const choose = chooser(shared);
   const search = h("input", { type: "search", id: "parameters-search", placeholder: "Index, name or words", "aria-label": "Search objects", oninput: draw });
-  const changed = h("input", { type: "checkbox", id: "parameters-changed", onchange: draw });
+  const changed = toggle("parameters-changed", "changed only", false, () => draw());
   const all = h("button", { type: "button", id: "parameters-read", onclick: readAll }, "Read all");
   const store = h("button", { type: "button", id: "parameters-store", title: "The drive keeps its parameters after a restart", onclick: () => keep() }, "Store in the drive");
   const back = h("button", { type: "button", id: "parameters-back", onclick: rollBack }, "Roll back");
@@ -28,7 +28,7 @@ export function parametersView(shared, report) {
   const root = h(
     "section",
     { class: "parameters" },
-    h("div", { class: "bar" }, choose.root, search, h("label", {}, changed, " changed only"), all, progress, back, store),
+    h("div", { class: "bar" }, choose.root, search, changed, all, progress, back, store),
     about,
     file.root,
     list,

@@ -1,7 +1,8 @@
 // The editor of one PDO in the PDO view: what it carries, in order, within its 64 bits; when it is sent; its identifier. It
 // changes the draft that it was given and says so; what the drive does not let be changed is grey, with the reason.
 
-import { h, say } from "./dom.js";
+import { choice } from "./choice.js";
+import { h, say, toggle } from "./dom.js";
 import { helped, pointed } from "./help.js";
 
 const BITS = 64;
@@ -150,9 +151,12 @@ export function pdoEditor({ draft, objects, node, changed }) {
   function typeField() {
     const same = (type) => draft.transmission >= type.from && draft.transmission <= type.to;
     const title = (type) => `${type.from === type.to ? type.from : `${type.from} to ${type.to}`}: ${type.words}${type.why_not ? ` (${type.why_not})` : ""}`;
-    const options = takes.types.map((type, at) => h("option", { value: String(at), disabled: type.why_not !== null, selected: same(type) }, title(type)));
-    const unknown = takes.types.some(same) ? [] : [h("option", { value: "", selected: true }, `${draft.transmission}: means nothing by CiA 301`)];
-    const select = h("select", { id: "pdo-type", disabled: takes.type !== null, title: takes.type ?? "" }, ...unknown, ...options);
+    const options = takes.types.map((type, at) => ({ value: String(at), text: title(type), disabled: type.why_not !== null }));
+    const known = takes.types.findIndex(same);
+    const unknown = known >= 0 ? [] : [{ value: "", text: `${draft.transmission}: means nothing by CiA 301` }];
+    const select = choice("pdo-type", "Transmission type", [...unknown, ...options], { value: known >= 0 ? String(known) : "" });
+    select.disabled = takes.type !== null;
+    select.title = takes.type ?? "";
     const each = h("input", { id: "pdo-each", type: "number", "aria-label": "Transmission type", disabled: takes.type !== null });
     const range = () => {
       const type = takes.types[Number(select.value)];
@@ -172,7 +176,7 @@ export function pdoEditor({ draft, objects, node, changed }) {
       changed();
     });
     range();
-    return h("label", {}, "Transmission type ", select, each);
+    return h("span", {}, "Transmission type ", select, " ", each);
   }
 
   function identifier() {
@@ -186,12 +190,17 @@ export function pdoEditor({ draft, objects, node, changed }) {
   }
 
   function switched() {
-    const box = h("input", { id: "pdo-valid", type: "checkbox", checked: draft.valid, disabled: takes.id !== null, title: takes.id ?? "Bit 31 of its COB-ID" });
-    box.addEventListener("change", () => {
-      draft.valid = box.checked;
-      changed();
-    });
-    return h("label", {}, box, " on");
+    const box = toggle(
+      "pdo-valid",
+      "on",
+      draft.valid,
+      () => {
+        draft.valid = box.checked;
+        changed();
+      },
+      { disabled: takes.id !== null, title: takes.id ?? "Bit 31 of its COB-ID" },
+    );
+    return box;
   }
 
   const time = (field, label, { why_not, step_ms, most_ms }) =>

@@ -2,12 +2,13 @@
 //
 // A sample is one reading of a drive, with the time at which it was read; between two readings a line is drawn and nothing is made up.
 
+import { choice } from "./choice.js";
 import { h, number, say } from "./dom.js";
 import { chooser } from "./drive.js";
 import { heard, heardChooser } from "./heard.js";
 import { QUANTITIES, everything, markers, newest_s, series } from "./kept.js";
 import { frame, overFrequency, overTime } from "./scope_picture.js";
-import { crossing, spectrum, stepResponse } from "./analysis.js";
+import { crossing, spectrum, stepResponse, within } from "./analysis.js";
 import { edge } from "./scope_edge.js";
 import { SvgPen } from "./svg_pen.js";
 import { trigger } from "./scope_trigger.js";
@@ -23,7 +24,7 @@ export function scopeView(shared) {
   const choose = chooser(shared);
   const canvas = h("canvas", { tabindex: "0", "aria-label": "Values over time. Click sets cursor A, Shift and click cursor B; the wheel zooms while paused." });
   const readout = h("p", { class: "readout", role: "status" });
-  const seconds = h("select", { id: "scope-window", "aria-label": "Time shown" }, ...SPANS_S.map((span) => h("option", { value: String(span), selected: span === 10 }, `${span} s`)));
+  const seconds = choice("scope-window", "Time shown", SPANS_S.map((span) => ({ value: String(span), text: `${span} s` })), { value: "10" });
   const button = (id, text, onclick, title = "") => h("button", { type: "button", id, title, onclick }, text);
   const toggled = (id, text, onclick, title) => h("button", { type: "button", id, title, "aria-pressed": "false", onclick }, text);
   const pause = toggled("scope-pause", "Pause", pauseOrGoOn, "Key p");
@@ -196,16 +197,22 @@ export function scopeView(shared) {
     }
     if (isPressed(steps)) {
       const [from, to] = a && b ? [Math.min(...cursors), Math.max(...cursors)] : [from_s, to_s];
-      for (const { label, unit, decimals, series: of } of all) {
-        const step = stepResponse(of, from, to);
-        if (!step) continue;
-        const settling = step.settling_s === null ? "not settled to 2 %" : `settled to 2 % in ${number(step.settling_s, 3)} s`;
-        lines.push(`Step of ${label}: ${number(step.from, decimals)} to ${number(step.to, decimals)} ${unit}, rise time (10 to 90 %) ${number(step.rise_s, 3)} s, overshoot ${number(100 * step.overshoot, 1)} %, ${settling}`);
+      for (const { label, unit, decimals, steps: takesSteps, series: of } of all) {
+        const step = takesSteps === false ? null : stepResponse(of, from, to);
+        if (step) lines.push(`Step of ${label}: ${step.few === undefined ? shownStep(step, unit, decimals) : tooFew(step.few)}`);
       }
-      if (!lines.some((line) => line.startsWith("Step"))) lines.push("No step in what is shown: a value has to stand, change and stand again.");
+      if (!lines.some((line) => line.startsWith("Step"))) lines.push("No step in what is shown: a value other than a current has to stand, change and stand again.");
     }
     return lines.join("\n");
   }
+
+  function shownStep({ from, to, rise_s, overshoot, overshoot_grid, settling_s, grid_s }, unit, decimals) {
+    const above = overshoot === null ? "an overshoot too short for these readings" : overshoot === 0 ? "no overshoot seen" : `overshoot ${within(100 * overshoot, 100 * overshoot_grid)} %`;
+    const settling = settling_s === null ? "not settled to 2 %" : `settled to 2 % in ${within(settling_s, grid_s)} s`;
+    return `${number(from, decimals)} to ${number(to, decimals)} ${unit}, rise time (10 to 90 %) ${within(rise_s, grid_s)} s, ${above}, ${settling}`;
+  }
+
+  const tooFew = (few) => `too few readings: ${few} in the rise, 10 are needed. Have the object sent in a TPDO by an event timer of 1 ms (view PDO), start the node, and add the object here.`;
 
   const timeAt = (x) => extent.from_s + ((x - extent.left) / (extent.right - extent.left)) * extent.span_s;
   let dragged = null;

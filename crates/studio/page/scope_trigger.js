@@ -1,13 +1,14 @@
 // The trigger of the scope: which value has to cross which level, and how much is shown of what was before.
 
+import { choice } from "./choice.js";
 import { h, say } from "./dom.js";
 
 /** `release` is called when a held picture is to go. What it may look at is offered by `offer`. */
 export function trigger(release) {
-  const choice = (id, label, options) => h("select", { id, "aria-label": label }, ...options.map(([value, text]) => h("option", { value }, text)));
-  const mode = choice("trigger-mode", "Trigger", [["off", "off"], ["once", "once"], ["again", "again and again"]]);
-  const field = choice("trigger-field", "Value", []);
-  const edge = choice("trigger-edge", "Edge", [["rising", "rising through"], ["falling", "falling through"], ["either", "through"]]);
+  const of = (id, label, options) => choice(id, label, options.map(([value, text]) => ({ value, text })));
+  const mode = of("trigger-mode", "Trigger", [["off", "off"], ["once", "once"], ["again", "again and again"]]);
+  const field = of("trigger-field", "Value", []);
+  const edge = of("trigger-edge", "Edge", [["rising", "rising through"], ["falling", "falling through"], ["either", "through"]]);
   const level = h("input", { id: "trigger-level", type: "number", value: "10", step: "any", "aria-label": "Level", size: "7" });
   const before = h("input", { id: "trigger-before", type: "number", value: "20", min: "0", max: "100", "aria-label": "Per cent shown before", size: "4" });
   const status = h("span", { id: "trigger-status", class: "quiet", role: "status" });
@@ -50,9 +51,8 @@ export function trigger(release) {
     if (field.dataset.key === key) return;
     const before = field.value;
     field.dataset.key = key;
-    field.replaceChildren(...quantities.map(({ field, label, unit }) => h("option", { value: field }, unit ? `${label} (${unit.replace(/^\[(.*)\]$/, "$1")})` : label)));
-    if (quantities.some((one) => one.field === before)) field.value = before;
-    else if (before) {
+    field.offer(quantities.map(({ field, label, unit }) => ({ value: field, text: unit ? `${label} (${unit.replace(/^\[(.*)\]$/, "$1")})` : label })));
+    if (before && field.value !== before) {
       mode.value = "off";
       arm();
     }

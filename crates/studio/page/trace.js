@@ -1,7 +1,7 @@
 // The Trace view: what passes on the bus, in words. The frames are kept in the studio; this page has a part of their lines,
 // asks for what is new while it is looked at, and for what is older when somebody scrolls there.
 
-import { h, number, say } from "./dom.js";
+import { h, number, say, toggle } from "./dom.js";
 import { pointed } from "./help.js";
 
 const ASK_MS = 100;
@@ -35,9 +35,9 @@ export function traceView() {
   const nodes = h("input", { id: "trace-nodes", size: "8", placeholder: "all nodes", "aria-label": "Node-IDs, separated by commas", oninput: again });
   const words = h("input", { id: "trace-text", size: "24", placeholder: "words, separated by commas", "aria-label": "Words that a line has to have, separated by commas", oninput: again });
   const kinds = h("div", { class: "chooser", role: "group", "aria-label": "Kinds of frames; none for all" }, ...KINDS.map((kind) => h("button", { type: "button", "data-kind": kind, "aria-pressed": "false", onclick: choose }, kind)));
-  const whole = h("input", { type: "checkbox", id: "trace-transfers", checked: true, onchange: again });
-  const quiet = h("input", { type: "checkbox", id: "trace-quiet", onchange: again });
-  const pause = h("button", { type: "button", id: "trace-pause", "aria-pressed": "false", onclick: toggle }, "Pause");
+  const whole = toggle("trace-transfers", "whole SDO transfers", true, () => again());
+  const quiet = toggle("trace-quiet", "without the studio's readings", false, () => again());
+  const pause = h("button", { type: "button", id: "trace-pause", "aria-pressed": "false", onclick: pauseOrGoOn }, "Pause");
   const save = h("a", { id: "trace-save", class: "button", download: "trace.log", title: "All frames that are kept of these nodes and kinds, in the form of candump" }, "Save candump");
   const room = h("div", { class: "room" });
   const list = h("div", { class: "trace-list", tabindex: "0", role: "log", "aria-label": "Frames", onscroll: draw }, room);
@@ -45,10 +45,9 @@ export function traceView() {
   const root = h(
     "section",
     { class: "trace" },
-    h("div", { class: "bar" }, h("label", {}, "Nodes ", nodes), h("label", {}, "Text ", words), h("label", {}, whole, " whole SDO transfers"), h("label", {}, quiet, " without the studio's readings"), pause, save),
+    h("div", { class: "bar" }, h("label", {}, "Nodes ", nodes), h("label", {}, "Text ", words), whole, quiet, pause, save),
     h("div", { class: "bar" }, kinds),
-    headRow(),
-    list,
+    h("div", { class: "wide" }, headRow(), list),
     status,
   );
 
@@ -157,7 +156,7 @@ export function traceView() {
     draw();
   }
 
-  function toggle() {
+  function pauseOrGoOn() {
     paused = !paused;
     pause.setAttribute("aria-pressed", String(paused));
     say(pause, paused ? "Go on" : "Pause");
@@ -203,7 +202,7 @@ export function traceView() {
   }
 
   function key(event) {
-    if (event.key === "p") toggle();
+    if (event.key === "p") pauseOrGoOn();
   }
 
   return { root, update, key, hide };

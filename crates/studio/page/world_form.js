@@ -1,7 +1,13 @@
 // What may be done to the world, as forms: each made from the simulator's own usage text, such as
 // "NODE supply VOLTS [limit AMPERES] [resistance OHMS]". There is no table of commands here.
 
+import { choice } from "./choice.js";
 import { h } from "./dom.js";
+
+/** Each list of the forms has a name of its own. */
+let ids = 0;
+const nextId = () => `world-choice-${(ids += 1)}`;
+const named = (word) => ({ value: word, text: word });
 
 const isWord = (token) => /^[a-z]+$/.test(token);
 const isChoice = (token) => token.includes("|") && token.split("|").every((one) => /^[a-z0-9]+$/.test(one));
@@ -53,13 +59,13 @@ export function commandForm(command, { place, names, run }) {
     } else if (part.choice && at === found.length - 1) {
       last = part.choice;
     } else if (part.choice) {
-      const list = h("select", { "aria-label": part.choice.join(", ") }, ...part.choice.map((one) => h("option", {}, one)));
+      const list = choice(nextId(), part.choice.join(", "), part.choice.map(named));
       fields.push(() => [list.value]);
       shown.push(list);
     } else {
       const of = part.hint === "NAME" ? names(before) : null;
       const label = [...part.before, part.hint].join(" ");
-      const field = of ? h("select", { "aria-label": label }, ...of.map((one) => h("option", {}, one))) : h("input", { size: "9", placeholder: label, "aria-label": label, required: !part.optional, autocomplete: "off" });
+      const field = of ? choice(nextId(), label, of.map(named)) : h("input", { size: "9", placeholder: label, "aria-label": label, required: !part.optional, autocomplete: "off" });
       fields.push(() => (field.value.trim() === "" ? [] : [...part.before, field.value.trim()]));
       shown.push(field);
     }

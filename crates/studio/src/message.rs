@@ -76,6 +76,11 @@ pub(crate) enum Deed {
         #[serde(deserialize_with = "node")]
         node: NodeId,
     },
+    /// Moves of this drive may begin, although nothing stops it when this program dies. Holds until control changes hands.
+    AcceptUnguarded {
+        #[serde(deserialize_with = "node")]
+        node: NodeId,
+    },
     /// Turns as long as it is held.
     Jog {
         #[serde(deserialize_with = "node")]

@@ -76,8 +76,12 @@ pub(crate) struct NodeView<'a> {
     pub(crate) stored: u32,
     /// How often its PDOs were set up since the studio began.
     pub(crate) mapped: u32,
-    /// What it does when this program dies, once that has been seen to.
+    /// What it does when this program dies; `null` where that is not known yet.
     pub(crate) without_us: Option<String>,
+    /// Nothing stops it then: it goes on as it was told.
+    pub(crate) goes_on: bool,
+    /// Whoever has control has accepted that it goes on then.
+    pub(crate) accepted: bool,
     /// Of a drive.
     pub(crate) drive: Option<&'a DriveView>,
 }

@@ -62,6 +62,20 @@ impl Drive {
         }
     }
 
+    /// What [`guard`](Self::guard) would tell now, with [`SwitchedOff::Leave`]: what the drive does when this program dies in the
+    /// middle of a motion that is guarded. Changes nothing.
+    ///
+    /// # Errors
+    /// [`Error::UnknownModel`]; those of the SDO reads.
+    pub async fn host_loss_if_guarded(&self) -> Result<HostLoss, Error> {
+        match self.known("tell what it does without its host")?.host_watch {
+            HostWatch::Silence { time: object } | HostWatch::Heartbeat { consumer: object, .. } => {
+                Ok(self.loss(self.read_number(object).await?))
+            }
+            HostWatch::None => Ok(HostLoss::GoesOn),
+        }
+    }
+
     /// Has the drive stop by itself when this program dies, with what its model has for that, and tells what it will do:
     /// [`HostLoss::stops_after`] is `None` where nothing can be done.
     ///

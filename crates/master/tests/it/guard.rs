@@ -92,7 +92,10 @@ impl Bench {
 
     fn guard(&mut self, id: u8) -> HostLoss {
         let drive = self.drive(id);
-        self.run(drive.guard(SwitchedOff::Leave)).unwrap()
+        let foretold = self.run(drive.host_loss_if_guarded()).unwrap();
+        let loss = self.run(drive.guard(SwitchedOff::Leave)).unwrap();
+        assert_eq!(foretold, loss, "what a guard would tell is what it tells");
+        loss
     }
 
     fn turn(&mut self, id: u8) {

@@ -2,16 +2,17 @@
 
 use can::Instant;
 use canopen::NodeId;
-use master::drive::{HomingOptions, Stopped, SwitchedOff};
+use master::drive::{HomingOptions, MotionReport, Note, Stopped};
 use master::explain::{Finding, Overheard, Weight};
 use master::units::{Amperes, Angle, Ramp, Rpm};
 use master::{Drive, Error, MotionOptions};
 use serde_json::json;
 use tokio::sync::oneshot;
 
+use super::guarding::{UNGUARDED, guard};
 use super::parameters::STORING;
 use super::state::{Host, JOG_SPAN, PRESENCE_SPAN};
-use super::work::{Asked, Done, LISTENING_TIME, Listening, Running, say};
+use super::work::{Asked, Done, LISTENING_TIME, Listening, Outcome, Running, quietly, refusal_of, say};
 use super::world::conclude_looking_around;
 use crate::authority::{Refusal, SessionId};
 use crate::dead_man::DeadMan;
@@ -19,9 +20,6 @@ use crate::message::{Answer, Deed};
 
 /// Questions for an explanation that may be under way.
 const MOST_LISTENING: usize = 32;
-
-/// What a motion tells when it is done.
-type Outcome = Result<Vec<String>, Error>;
 
 impl Host {
     /// Does what a session asks for, or begins it.
@@ -73,6 +71,7 @@ impl Host {
                 }
             }
             Deed::JogEnd { node } => self.end_jog(node, asked),
+            Deed::AcceptUnguarded { node } => self.accept_unguarded(node, asked),
             Deed::Objects { .. }
             | Deed::ReadObjects { .. }
             | Deed::PlanParameters { .. }
@@ -114,42 +113,36 @@ impl Host {
             Deed::Enable { .. } | Deed::ResetFault { .. } => {}
             _ => drop(self.jogs.remove(&id)),
         }
-        let asked = Some(asked);
+        let (asked, accepted) = (Some(asked), self.accepted.contains(&id));
         match deed {
             Deed::Enable { .. } => self.begin(id, "enabling", true, asked, enable(drive)),
             Deed::Disable { .. } => {
-                self.begin(id, "disabling", true, asked, async move { drive.disable().await.map(|()| Vec::new()) });
+                self.begin(id, "disabling", true, asked, async move { quietly(drive.disable().await) });
             }
             Deed::ResetFault { .. } => {
-                self.begin(
-                    id,
-                    "resetting",
-                    false,
-                    asked,
-                    async move { drive.reset_fault().await.map(|()| Vec::new()) },
-                );
+                self.begin(id, "resetting", false, asked, async move { quietly(drive.reset_fault().await) });
             }
             Deed::Stop { .. } => self.begin(id, "stopping", true, asked, stop(drive)),
             Deed::Jog { rpm, .. } => {
                 let options = MotionOptions { wait: false, ..MotionOptions::default() };
-                self.begin(id, "jogging", true, asked, turn(drive, rpm, options));
+                self.begin(id, "jogging", true, asked, turn(drive, accepted, rpm, options));
             }
             Deed::Velocity { rpm, rpm_per_s, .. } => {
                 let ramp = rpm_per_s.map(Ramp::RpmPerSecond);
                 let options = MotionOptions { acceleration: ramp, deceleration: ramp, ..MotionOptions::default() };
-                self.begin(id, "turning", true, asked, turn(drive, rpm, options));
+                self.begin(id, "turning", true, asked, turn(drive, accepted, rpm, options));
             }
             Deed::Move { degrees, relative, rpm, .. } => {
-                self.begin(id, "moving", true, asked, position(drive, degrees, relative, rpm));
+                self.begin(id, "moving", true, asked, position(drive, accepted, degrees, relative, rpm));
             }
             Deed::Torque { amperes, .. } => {
                 self.begin(id, "pushing", true, asked, async move {
-                    drive.guard(SwitchedOff::Leave).await?;
-                    Ok(told(&drive.torque(Amperes(amperes)).await?))
+                    guard(&drive, accepted).await?;
+                    told(drive.torque(Amperes(amperes)).await)
                 });
             }
             Deed::Home { method, rpm, .. } => {
-                self.begin(id, "homing", true, asked, home(drive, method, rpm));
+                self.begin(id, "homing", true, asked, home(drive, accepted, method, rpm));
             }
             // The others concern no drive, or have been done.
             _ => {}
@@ -193,6 +186,8 @@ impl Host {
             if controller != self.held_by {
                 self.stop_moved("control changed hands");
                 self.held_by = controller;
+                // Who has it now has been told nothing yet.
+                self.accepted.clear();
             }
             self.presence = controller.map(|_| DeadMan::new(PRESENCE_SPAN, self.network.now()));
         }
@@ -265,11 +260,15 @@ impl Host {
                 running.tell(|seq| Answer::done(seq, notes));
             }
             Some(Ok(notes)) => running.tell(|seq| Answer::done(seq, notes)),
-            Some(Err(error)) => {
-                let text = error.to_string();
-                self.say_news(Some(node), &text);
+            Some(Err((kind, text))) => {
+                if kind == UNGUARDED {
+                    // A question to whoever asked is not news to the others, and nothing has begun that would have to be stopped.
+                    self.jogs.remove(&node);
+                } else {
+                    self.say_news(Some(node), &text);
+                }
                 let moves = running.moves;
-                running.tell(|seq| Answer::failed(Some(seq), error.kind(), text));
+                running.tell(|seq| Answer::failed(Some(seq), kind, text));
                 // What went wrong on the way may have left it turning.
                 if moves && (self.jogs.contains_key(&node) || self.network.moved().contains(node)) {
                     self.quick_stop_one(node, "", None);
@@ -297,40 +296,41 @@ const fn subject(deed: &Deed) -> Option<NodeId> {
 }
 
 async fn enable(drive: Drive) -> Outcome {
-    drive.enable().await.map(|()| Vec::new())
+    quietly(drive.enable().await)
 }
 
 async fn stop(drive: Drive) -> Outcome {
-    drive.stop().await.map(|()| Vec::new())
+    quietly(drive.stop().await)
 }
 
-/// Every motion is guarded first: where the drive can, it stops by itself if this program dies.
-async fn turn(drive: Drive, rpm: f64, options: MotionOptions) -> Outcome {
-    drive.guard(SwitchedOff::Leave).await?;
-    Ok(told(&drive.velocity(Rpm(rpm), options).await?))
+async fn turn(drive: Drive, accepted: bool, rpm: f64, options: MotionOptions) -> Outcome {
+    guard(&drive, accepted).await?;
+    told(drive.velocity(Rpm(rpm), options).await)
 }
 
-async fn position(drive: Drive, degrees: f64, relative: bool, rpm: Option<f64>) -> Outcome {
-    drive.guard(SwitchedOff::Leave).await?;
+async fn position(drive: Drive, accepted: bool, degrees: f64, relative: bool, rpm: Option<f64>) -> Outcome {
+    guard(&drive, accepted).await?;
     let options = MotionOptions { speed: rpm.map(Rpm), ..MotionOptions::default() };
     let angle = Angle::Turns(degrees / 360.0);
-    let report = match relative {
-        true => drive.move_relative(angle, options).await?,
-        false => drive.move_absolute(angle, options).await?,
-    };
-    Ok(told(&report))
+    told(match relative {
+        true => drive.move_relative(angle, options).await,
+        false => drive.move_absolute(angle, options).await,
+    })
 }
 
-async fn home(drive: Drive, method: i8, rpm: Option<f64>) -> Outcome {
-    drive.guard(SwitchedOff::Leave).await?;
+async fn home(drive: Drive, accepted: bool, method: i8, rpm: Option<f64>) -> Outcome {
+    guard(&drive, accepted).await?;
     let options = HomingOptions { speed: rpm.map(Rpm), ..HomingOptions::default() };
-    Ok(told(&drive.home(method, options).await?))
+    told(drive.home(method, options).await)
 }
 
-/// What there is to know of a motion: values that had to be rounded, and what the drive does without this program.
-fn told(report: &master::drive::MotionReport) -> Vec<String> {
+/// What there is to know of a motion: values that had to be rounded, and the like. What the drive does without this program is shown
+/// all the time.
+fn told(moved: Result<MotionReport, Error>) -> Outcome {
+    let report = moved.map_err(|error| refusal_of(&error))?;
     let rounded = report.commanded.iter().filter(|commanded| commanded.is_rounded()).map(ToString::to_string);
-    rounded.chain(report.notes.iter().map(ToString::to_string)).collect()
+    let notes = report.notes.iter().filter(|note| !matches!(note, Note::HostLoss(_))).map(ToString::to_string);
+    Ok(rounded.chain(notes).collect())
 }
 
 fn shown(finding: &Finding) -> serde_json::Value {

@@ -19,6 +19,7 @@ use master::group::{AxisLimits, AxisSetup, Group, GroupError, Phase, StreamOptio
 use master::units::Turns;
 
 use super::group_run::{GroupOutcome, GroupRun, Wanted};
+use super::guarding::{UNGUARDED, expect_guard};
 use super::state::{Host, JOG_SPAN};
 use super::transactions::Refusal;
 use super::work::{Asked, Running, say};
@@ -89,8 +90,15 @@ impl Host {
         };
         self.generation += 1;
         let wanted = Rc::<Cell<Wanted>>::default();
-        let (running, future) =
-            Running::of_group(nodes, self.generation, what, (seq, answer), motion(drives, Rc::clone(&wanted)));
+        let unaccepted = self.not_accepted(&drives);
+        let motion = motion(drives, Rc::clone(&wanted));
+        let motion = async move {
+            for drive in &unaccepted {
+                expect_guard(drive).await?;
+            }
+            motion.await
+        };
+        let (running, future) = Running::of_group(nodes, self.generation, what, (seq, answer), motion);
         for (node, running) in nodes.iter().zip(running) {
             self.jogs.remove(node);
             if let Some(before) = self.running.insert(*node, running) {
@@ -182,7 +190,9 @@ impl Host {
                 asked.into_iter().for_each(|running| running.tell(|seq| Answer::done(seq, notes.clone())));
             }
             Some(Err((kind, text))) => {
-                self.say_news(None, &text);
+                if kind != UNGUARDED {
+                    self.say_news(None, &text);
+                }
                 asked.into_iter().for_each(|running| running.tell(|seq| Answer::failed(Some(seq), kind, text.clone())));
                 self.network.sync(None);
                 // What went wrong on the way may have left one turning.

@@ -14,8 +14,7 @@ use serde_json::{Value, json};
 
 use super::object_rows::value_text;
 use super::state::Host;
-use super::transactions::Refusal;
-use super::work::{Asked, Done, say};
+use super::work::{Asked, Done, refusal_of, say};
 use crate::message::Answer;
 
 /// How homing is set (CiA 402-2, 11.2): speed to the switch, speed to the edge, acceleration, and where zero is.
@@ -46,14 +45,10 @@ impl Host {
         let running = self.running.get(&node).is_some_and(|running| running.what == "homing");
         self.work.push(Box::pin(async move {
             let outcome = Seen::look(&drive, model, axis, rules).await;
-            let told = outcome.map(|seen| seen.told(node, running)).map_err(|error| refusal(&error));
+            let told = outcome.map(|seen| seen.told(node, running)).map_err(|error| refusal_of(&error));
             Done::Looked((seq, answer), told)
         }));
     }
-}
-
-fn refusal(error: &Error) -> Refusal {
-    (error.kind(), error.to_string())
 }
 
 /// What was read of a drive.

@@ -1,7 +1,9 @@
 //! A node that was found, and what it last said.
 
+use can::Instant;
 use cia402::PowerState;
 use master::Drive;
+use master::drive::HostLoss;
 use master::identify::Identity;
 
 use crate::snapshot::DriveView;
@@ -17,6 +19,8 @@ pub(super) struct KnownNode {
     /// Somebody is looking at it already.
     pub(super) is_looked_at: bool,
     pub(super) view: Option<Box<DriveView>>,
+    /// What it would do if this program died in the middle of a motion, and when that was read.
+    pub(super) loss: Option<(HostLoss, Instant)>,
     /// Why nothing is known of it now.
     pub(super) trouble: Option<String>,
 }

@@ -8,6 +8,7 @@ mod deeds;
 mod faults;
 mod group;
 mod group_run;
+mod guarding;
 mod heard_ids;
 mod help;
 mod homing;

@@ -11,7 +11,7 @@ use serde_json::json;
 
 use super::known_node::KnownNode;
 use super::state::Host;
-use super::work::{Asked, Done, say};
+use super::work::{Asked, Done, Look, say};
 use crate::message::Answer;
 use crate::snapshot::{DriveView, NodeView};
 
@@ -25,6 +25,9 @@ const LOOK_INTERVAL: Duration = Duration::from_millis(100);
 
 /// By how much longer each further drive makes that: so that many drives take no more of the bus than a few.
 const LOOK_INTERVAL_OF_EACH: Duration = Duration::from_millis(25);
+
+/// How often a drive is asked for what it would do if this program died: somebody may set it.
+const LOSS_INTERVAL: Duration = Duration::from_secs(2);
 
 /// How often one is asked that does not answer.
 const SILENT_INTERVAL: Duration = Duration::from_secs(1);
@@ -51,7 +54,8 @@ impl Host {
             let before = self.nodes.remove(&id);
             let is_looked_at = before.as_ref().is_some_and(|before| before.is_looked_at);
             let is_drive = known.drive.is_some();
-            self.nodes.insert(id, KnownNode { is_looked_at, view: before.and_then(|before| before.view), ..known });
+            let (view, loss) = before.map_or((None, None), |before| (before.view, before.loss));
+            self.nodes.insert(id, KnownNode { is_looked_at, view, loss, ..known });
             self.learn_pdos(id);
             if is_drive && !is_looked_at {
                 self.look_at(id, Duration::ZERO);
@@ -87,6 +91,7 @@ impl Host {
             drive: Some(drive).filter(|_| is_drive),
             is_looked_at: false,
             view: None,
+            loss: None,
             trouble: None,
         }
     }
@@ -96,24 +101,28 @@ impl Host {
         let Some(node) = self.nodes.get_mut(&id) else { return };
         let Some(drive) = node.drive.clone() else { return };
         node.is_looked_at = true;
+        let due = self.network.now() + after;
+        let asks_loss = node.loss.is_none_or(|(_, read_at)| due - read_at >= LOSS_INTERVAL);
         self.work.push(Box::pin(async move {
             drive.node().network().sleep(after).await;
-            Done::Read(id, read(&drive).await.map(Box::new))
+            Done::Read(id, read(&drive, asks_loss).await.map(Box::new))
         }));
     }
 
     /// Takes in what a drive said, and looks at it again.
-    pub(super) fn take_in(&mut self, id: NodeId, read: Result<Box<DriveView>, Error>) {
+    pub(super) fn take_in(&mut self, id: NodeId, read: Result<Box<Look>, Error>) {
         match &read {
-            Ok(view) => self.note_look(id, view),
+            Ok(look) => self.note_look(id, &look.view),
             Err(error) => self.note_silence(id, error),
         }
         let drives = self.nodes.values().filter(|node| node.drive.is_some()).count() as u32;
         let Some(node) = self.nodes.get_mut(&id) else { return };
         node.is_looked_at = false;
         let interval = match read {
-            Ok(view) => {
-                (node.view, node.trouble) = (Some(view), None);
+            Ok(look) => {
+                let Look { view, loss } = *look;
+                node.loss = loss.map(|loss| (loss, self.network.now())).or(node.loss);
+                (node.view, node.trouble) = (Some(Box::new(view)), None);
                 LOOK_INTERVAL.max(LOOK_INTERVAL_OF_EACH * drives)
             }
             Err(error) => {
@@ -129,6 +138,7 @@ impl Host {
         let facts = self.network.facts(id);
         let description = node.drive.as_ref().and_then(Drive::description);
         let identity = node.identity.unwrap_or_default();
+        let loss = self.network.guarded(id).or(node.loss.map(|(loss, _)| loss));
         NodeView {
             node: id.raw(),
             model: description.map(|description| description.name),
@@ -146,7 +156,9 @@ impl Host {
             can_roll_back: self.parameters.can_roll_back(id),
             stored: self.parameters.stored(id),
             mapped: self.parameters.mapped(id),
-            without_us: self.network.guarded(id).map(|loss| loss.to_string()),
+            without_us: loss.map(|loss| loss.to_string()),
+            goes_on: loss.is_some_and(|loss| loss.stops_after().is_none()),
+            accepted: self.accepted.contains(&id),
             drive: node.view.as_deref(),
         }
     }
@@ -187,11 +199,13 @@ impl Host {
     }
 }
 
-async fn read(drive: &Drive) -> Result<DriveView, Error> {
+async fn read(drive: &Drive, asks_loss: bool) -> Result<Look, Error> {
     let state = drive.state().await?;
     let object = drive.axis_description().map_or(CONTROLWORD, |axis| axis.object(CONTROLWORD));
     // Some drives do not tell it.
     let controlword = drive.node().read::<u16>(object).await.ok();
     let at_s = (drive.node().network().now() - Instant::ZERO).as_secs_f64();
-    Ok(DriveView::new(&state, controlword, at_s))
+    // Of a model that is not known nobody can say.
+    let loss = if asks_loss { drive.host_loss_if_guarded().await.ok() } else { None };
+    Ok(Look { view: DriveView::new(&state, controlword, at_s), loss })
 }

@@ -22,7 +22,7 @@ use super::journals::Journals;
 use super::object_rows::{bytes_text, row_json, value_text};
 use super::state::Host;
 use super::transactions::{Change, MOST_KEPT, Refusal, Written};
-use super::work::{Asked, Done, say};
+use super::work::{Asked, Done, quietly, say};
 use crate::message::{Answer, Deed, FileForm, NewValue};
 
 /// Objects that one request may read.
@@ -104,7 +104,7 @@ impl Host {
         if is_busy {
             return refuse(asked, busy("something else is being done with the drive"));
         }
-        self.begin(node, STORING, false, Some(asked), async move { drive.save().await.map(|()| Vec::new()) });
+        self.begin(node, STORING, false, Some(asked), async move { quietly(drive.save().await) });
     }
 
     fn begin_rolling_back(&mut self, drive: &Drive, model: &'static Description, asked: Asked) {

@@ -102,6 +102,7 @@ impl Host {
     fn leave(&mut self, session: SessionId) {
         if self.authority.leave(session) {
             (self.presence, self.held_by) = (None, None);
+            self.accepted.clear();
             self.stop_moved("the page that moved it has gone");
         }
     }

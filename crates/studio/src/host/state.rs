@@ -1,6 +1,6 @@
 //! The host: what it holds, and what it is told at its start. What it does stands in the files beside this one.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -77,6 +77,10 @@ pub struct Host {
     pub(super) scans_again: bool,
     pub(super) running: BTreeMap<NodeId, Running>,
     pub(super) jogs: BTreeMap<NodeId, DeadMan>,
+    /// Drives that may be moved although nothing stops them when this program dies.
+    pub(super) accepted: BTreeSet<NodeId>,
+    /// What was last told of a stop of each node, and when.
+    pub(super) stops_told: BTreeMap<NodeId, (Instant, &'static str)>,
     /// Several drives as one motion.
     pub(super) group: Option<GroupRun>,
     pub(super) listening: Vec<Listening>,
@@ -125,6 +129,8 @@ impl Host {
             scans_again: false,
             running: BTreeMap::new(),
             jogs: BTreeMap::new(),
+            accepted: BTreeSet::new(),
+            stops_told: BTreeMap::new(),
             group: None,
             listening: Vec::new(),
             parameters: Transactions::default(),

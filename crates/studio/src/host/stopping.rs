@@ -1,13 +1,17 @@
 //! What stops drives: a press of stop, a dead man, a session that has gone.
 
 use std::collections::BTreeSet;
+use std::time::Duration;
 
 use can::Instant;
 use canopen::{Mux, NodeId};
 use cia402::PowerCommand;
 
 use super::state::Host;
-use super::work::{Asked, Done};
+use super::work::{Asked, Done, quietly};
+
+/// Presses of stop that come within this time are told as one.
+const SAME_PRESS: Duration = Duration::from_secs(1);
 
 const CONTROLWORD: Mux = Mux::new(0x6040, 0);
 
@@ -56,9 +60,18 @@ impl Host {
             self.work.push(Box::pin(async move { Done::Told(network.stop_all_moved().await) }));
         }
         for id in nodes {
+            self.tell_stop(id, why);
+            self.quick_stop_one(id, why, None);
+        }
+    }
+
+    /// Tells that a node is stopped, once for a press that comes by two ways, or by several fingers.
+    fn tell_stop(&mut self, id: NodeId, why: &'static str) {
+        let now = self.network.now();
+        let before = self.stops_told.insert(id, (now, why));
+        if before.is_none_or(|(told_at, of)| of != why || now - told_at >= SAME_PRESS) {
             self.say_news(Some(id), why);
             self.note_stop(id, why);
-            self.quick_stop_one(id, why, None);
         }
     }
 
@@ -75,10 +88,9 @@ impl Host {
         let drive = self.nodes.get(&id).and_then(|node| node.drive.clone());
         self.begin(id, "stopping", false, answer, async move {
             match drive {
-                Some(drive) => drive.quick_stop().await?,
-                None => node.write(CONTROLWORD, PowerCommand::QuickStop.controlword().0).await?,
+                Some(drive) => quietly(drive.quick_stop().await),
+                None => quietly(node.write(CONTROLWORD, PowerCommand::QuickStop.controlword().0).await),
             }
-            Ok(Vec::new())
         });
     }
 

@@ -2,6 +2,7 @@
 
 mod faults;
 mod group;
+mod guarding;
 mod homing;
 mod parameters;
 mod pdo;
@@ -58,6 +59,12 @@ impl Page {
         self.seq += 1;
         let answered = self.session.ask(self.seq, deed).expect("there is room");
         answered.await.expect("every message is answered")
+    }
+
+    /// Takes control, and accepts that nothing stops the stepper when the program dies.
+    async fn take_control_of_all(&mut self) {
+        self.must(Deed::TakeControl {}).await;
+        self.must(Deed::AcceptUnguarded { node: ARM }).await;
     }
 
     async fn must(&mut self, deed: Deed) {
@@ -327,7 +334,7 @@ fn a_jog_that_is_let_go_stops_by_its_ramp_and_stays_enabled() {
 fn a_page_that_goes_stops_all_that_it_moved_and_gives_control_up() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.take_control_of_all().await;
         page.must(Deed::Velocity { node: WHEEL, rpm: 60.0, rpm_per_s: None }).await;
         page.must(Deed::Velocity { node: ARM, rpm: 30.0, rpm_per_s: None }).await;
         stage.turns(ARM, 30.0).await;

@@ -7,7 +7,7 @@ use canopen::NodeId;
 use futures_util::future::{AbortHandle, LocalBoxFuture, abortable};
 use futures_util::stream::FuturesUnordered;
 use master::Error;
-use master::drive::Stopped;
+use master::drive::{HostLoss, Stopped};
 use master::explain::{Explained, Overheard};
 use master::identify::Found;
 use master::plan::NodeTraffic;
@@ -29,11 +29,11 @@ pub(super) type Asked = (u64, oneshot::Sender<Answer>);
 /// Something has come to its end.
 pub(super) enum Done {
     /// A drive was looked at.
-    Read(NodeId, Result<Box<DriveView>, Error>),
+    Read(NodeId, Result<Box<Look>, Error>),
     /// All node-IDs were asked.
     Scanned(Vec<Found>, Option<Asked>),
     /// A deed on a drive has ended; `None` if it was cut short.
-    Deed(NodeId, u64, Option<Result<Vec<String>, Error>>),
+    Deed(NodeId, u64, Option<Outcome>),
     /// A motion of several drives has ended; `None` if it was cut short.
     Group(u64, Option<GroupOutcome>),
     /// What was moved has stopped, or was not seen to.
@@ -54,6 +54,16 @@ pub(super) enum Done {
     WorldChanged(Asked, Result<Result<Changed, (&'static str, String)>, NoAnswer>),
     /// A drive was looked at closely.
     Explained(u64, oneshot::Sender<Answer>, Box<Explained>),
+}
+
+/// What a motion tells when it is done, or why it was not done.
+pub(super) type Outcome = Result<Vec<String>, Refusal>;
+
+/// What was seen of a drive.
+pub(super) struct Look {
+    pub(super) view: DriveView,
+    /// What it would do if this program died, where that was asked for and is known.
+    pub(super) loss: Option<HostLoss>,
 }
 
 /// A deed on a drive that is under way. There is one for each node: a further one replaces it.
@@ -87,7 +97,7 @@ impl Running {
         what: &'static str,
         moves: bool,
         answer: Option<Asked>,
-        deed: impl Future<Output = Result<Vec<String>, Error>> + 'static,
+        deed: impl Future<Output = Outcome> + 'static,
     ) -> (Self, LocalBoxFuture<'static, Done>) {
         let (deed, abort) = abortable(deed);
         let future = Box::pin(async move { Done::Deed(node, generation, deed.await.ok()) });
@@ -126,4 +136,14 @@ impl Running {
 /// Gives an answer to whoever waits for it; the page may have gone.
 pub(super) fn say(answer: oneshot::Sender<Answer>, text: Answer) {
     let _ = answer.send(text);
+}
+
+/// What there is to know of something that shows itself: nothing, where it was done.
+pub(super) fn quietly(done: Result<(), Error>) -> Outcome {
+    done.map(|()| Vec::new()).map_err(|error| refusal_of(&error))
+}
+
+/// What the master says, as it is answered.
+pub(super) fn refusal_of(error: &Error) -> Refusal {
+    (error.kind(), error.to_string())
 }

@@ -29,6 +29,8 @@ pub(super) struct Desk {
     pub(super) news: Vec<News>,
     pub(super) chosen: Option<u8>,
     pub(super) help: bool,
+    /// The node that was not moved, since nothing stops it when this program dies: whether it is to be moved nevertheless.
+    pub(super) question: Option<u8>,
     jog_step: usize,
     hold: Hold,
     /// Which key is or was held: to which side.
@@ -55,6 +57,7 @@ impl Desk {
             news: Vec::new(),
             chosen: None,
             help: false,
+            question: None,
             jog_step: FIRST_JOG,
             hold: Hold::default(),
             side: 1.0,
@@ -93,6 +96,10 @@ impl Desk {
         let before = self.news.len();
         if let Some(error) = answer["error"].as_object() {
             let kind = error.get("kind").and_then(Value::as_str).unwrap_or_default();
+            if kind == "unguarded" {
+                self.question = node;
+                return true;
+            }
             // The bus has told it already, or the key was let go.
             if !matches!(kind, "stopped" | "replaced" | "not_held") {
                 self.tell(node, error.get("message").and_then(Value::as_str).unwrap_or("it was refused"));
@@ -145,6 +152,10 @@ impl Desk {
             let act = side.filter(|side| *side == self.side).and_then(|_| self.hold.release());
             return self.jog(act);
         }
+        if let Some(node) = self.question {
+            let given_up = self.hold.give_up(now);
+            return [self.jog(given_up), self.answer(node, key)].concat();
+        }
         let mut wishes = Vec::new();
         // Any other key lets go of what was held.
         if side != Some(self.side) {
@@ -164,6 +175,20 @@ impl Desk {
         }
         wishes.extend(self.other_key(key));
         wishes
+    }
+
+    /// A key while the question is on the screen.
+    fn answer(&mut self, node: u8, key: KeyEvent) -> Vec<Wish> {
+        // The key that led to it may still be held.
+        if matches!(key.code, KeyCode::Left | KeyCode::Right | KeyCode::Char('h' | 'l')) {
+            return Vec::new();
+        }
+        self.question = None;
+        match key.code {
+            KeyCode::Char('y') => vec![Wish::Say(json!({ "do": "accept_unguarded", "node": node }))],
+            KeyCode::Esc | KeyCode::Char(' ' | 'q' | 'c') => self.other_key(key),
+            _ => Vec::new(),
+        }
     }
 
     fn other_key(&mut self, key: KeyEvent) -> Vec<Wish> {
@@ -214,7 +239,9 @@ impl Desk {
     fn jog(&mut self, act: Option<Act>) -> Vec<Wish> {
         let Some(act) = act else { return Vec::new() };
         if act == Act::Begin {
-            self.jogged = self.chosen;
+            let asks = |node: &Node| self.has_control() && node.goes_on && !node.accepted;
+            self.question = self.node().filter(|node| asks(node)).map(|node| node.node);
+            self.jogged = if self.question.is_some() { None } else { self.chosen };
         }
         let Some(node) = self.jogged else { return Vec::new() };
         let message = match act {

@@ -83,6 +83,9 @@ pub(super) fn draw(frame: &mut Frame<'_>, desk: &Desk, look: Look) {
     if desk.help {
         draw_help(frame, area);
     }
+    if let Some(node) = desk.question {
+        draw_question(frame, area, desk.state.node(node), look);
+    }
 }
 
 fn title_line<'a>(desk: &'a Desk, look: Look) -> Line<'a> {
@@ -210,7 +213,9 @@ fn chosen_lines<'a>(desk: &'a Desk, look: Look) -> Paragraph<'a> {
     let jog = if desk.is_jogging() { "jogging" } else { "jog" };
     let without =
         node.without_us.as_deref().map_or_else(String::new, |without| format!("; without this program {without}"));
-    lines.push(Line::from(format!("{jog} at {} r/min, + and - change that{without}", desk.jog_rpm())));
+    let jog = format!("{jog} at {} r/min, + and - change that", desk.jog_rpm());
+    let style = if node.goes_on { look.bad() } else { Style::new() };
+    lines.push(Line::from(vec![Span::from(jog), Span::from(without).style(style)]));
     Paragraph::new(lines).wrap(Wrap { trim: true }).block(Block::new().borders(Borders::TOP))
 }
 
@@ -222,6 +227,35 @@ fn draw_news(frame: &mut Frame<'_>, area: Rect, desk: &Desk) {
         Line::from(format!("{:8.1} s  {node}{}", news.time_s, news.text))
     });
     frame.render_widget(Paragraph::new(lines.collect::<Vec<_>>()).block(Block::new().borders(Borders::TOP)), area);
+}
+
+/// Lines of the question: what a drive does without this program is said in full.
+const QUESTION: u16 = 12;
+
+/// That nothing stops a drive, before it is moved for the first time.
+fn draw_question(frame: &mut Frame<'_>, area: Rect, node: Option<&Node>, look: Look) {
+    let Some(node) = node else { return };
+    let width = LEAST.0 - 4;
+    let within = Rect {
+        x: area.x + (area.width - width) / 2,
+        y: area.y + (area.height - QUESTION) / 2,
+        width,
+        height: QUESTION,
+    };
+    frame.render_widget(Clear, within);
+    let number = node.node;
+    let why = node.without_us.as_deref().unwrap_or("nothing stops it");
+    let text = vec![
+        Line::from(format!("NOTHING STOPS NODE {number} IF THIS PROGRAM DIES")).style(look.bad()),
+        Line::from(format!("If this program dies in the middle of a motion, {why}.")).style(look.bad()),
+        Line::from(""),
+        Line::from("It was not moved. Keep an emergency stop within reach."),
+        Line::from(""),
+        Line::from("y      move it nevertheless: let the key go, then hold it again"),
+        Line::from("SPACE  quick stop of every drive; any other key goes back"),
+    ];
+    let text = Paragraph::new(text).wrap(Wrap { trim: false });
+    frame.render_widget(text.block(Block::bordered().title(format!(" node {number} "))), within);
 }
 
 fn draw_help(frame: &mut Frame<'_>, area: Rect) {

@@ -32,6 +32,12 @@ pub(super) struct Node {
     pub(super) trouble: Option<String>,
     pub(super) doing: Option<String>,
     pub(super) without_us: Option<String>,
+    /// Nothing stops it when this program dies,
+    #[serde(default)]
+    pub(super) goes_on: bool,
+    /// which whoever has control has accepted.
+    #[serde(default)]
+    pub(super) accepted: bool,
     pub(super) drive: Option<Drive>,
 }
 

@@ -202,6 +202,50 @@ fn a_held_key_jogs_and_every_other_ends_it_first() {
     assert_eq!(desk.lose_focus(at(9140)), [end()]);
 }
 
+/// A drive that goes on without this program is moved once that was accepted, by a key of its own.
+#[test]
+fn what_nothing_stops_is_asked_about_in_full_before_it_moves() {
+    let held = |desk: &mut Desk, from: u64| {
+        [from, from + 500, from + 533].map(|ms| desk.key(key(KeyCode::Right), at(ms))).concat()
+    };
+    let mut desk = desk();
+    let mut state = state();
+    state.nodes[0].goes_on = true;
+    state.nodes[0].without_us =
+        Some("nothing stops it: this model has no watch over its host and goes on as it was told".into());
+    desk.take(state.clone());
+    assert_eq!(held(&mut desk, 0), [], "nothing is begun");
+    // The key is still held, and so is the question.
+    assert_eq!([566, 600, 633].map(|ms| desk.key(key(KeyCode::Right), at(ms))).concat(), []);
+    assert_eq!(desk.look(at(640)), []);
+    let lines = drawn(&desk, 80, 24);
+    let text = lines.join(" ").replace('│', " ");
+    let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    for part in [
+        "NOTHING STOPS NODE 1 IF THIS PROGRAM DIES",
+        "nothing stops it: this model has no watch over its host and goes on as it was told.",
+        "Keep an emergency stop within reach.",
+        "y move it nevertheless",
+    ] {
+        assert!(text.contains(part), "{part}: {lines:#?}");
+    }
+    assert_eq!(desk.key(key(KeyCode::Char(' ')), at(700)), [say(json!({ "do": "stop_all" }))]);
+    assert_eq!(desk.question, None);
+    assert_eq!(held(&mut desk, 3000), []);
+    assert_eq!(desk.key(key(KeyCode::Char('e')), at(3600)), [], "goes back and does nothing else");
+    assert_eq!(held(&mut desk, 6000), []);
+    assert_eq!(desk.key(key(KeyCode::Char('y')), at(6600)), [say(json!({ "do": "accept_unguarded", "node": 1 }))]);
+    assert_eq!(desk.key(key(KeyCode::Right), at(6640)), [], "what was held all the while begins nothing");
+    state.nodes[0].accepted = true;
+    desk.take(state);
+    assert_eq!(held(&mut desk, 9000), [say(json!({ "do": "jog", "node": 1, "rpm": 10.0 }))], "asked once");
+    desk.look(at(9900));
+    // The host knows it better than the last state.
+    let refused = json!({ "ok": false, "error": { "kind": "unguarded", "message": "node 4 was not moved" } });
+    assert!(desk.answered(Some(4), &refused));
+    assert_eq!(desk.question, Some(4));
+}
+
 #[test]
 fn answers_are_told_where_they_say_something() {
     let mut desk = desk();

@@ -9,7 +9,7 @@ use crate::message::Deed;
 
 impl Stage {
     /// Everything that has happened, oldest first.
-    fn happened(&self) -> Vec<Value> {
+    pub(super) fn happened(&self) -> Vec<Value> {
         let news = serde_json::to_value(self.desk.timeline().since(0)).expect("JSON");
         news["entries"].as_array().expect("entries").clone()
     }

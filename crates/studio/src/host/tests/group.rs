@@ -71,7 +71,7 @@ fn drives_move_together_to_their_positions_and_have_no_power_then() {
     play(async |stage| {
         let mut page = stage.page().await;
         assert_eq!(page.ask(to(90.0, -45.0)).await.error_kind(), "not_in_control");
-        page.must(Deed::TakeControl {}).await;
+        page.take_control_of_all().await;
         let mut moved = page.begin(to(180.0, -90.0));
         // 30 r/min are 180 degrees a second: the wheel takes more than a second, and the arm, with half the way, as long.
         stage.sleep(800).await;
@@ -100,7 +100,7 @@ fn drives_move_together_to_their_positions_and_have_no_power_then() {
 fn what_is_no_group_is_refused() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.take_control_of_all().await;
         let of = |nodes: &[u8]| {
             let axes = nodes.iter().map(|raw| AxisTarget { node: node(*raw), degrees: 1.0 }).collect();
             Deed::GroupMove(GroupMove { axes, relative: true, rpm: None, rpm_per_s: None, within_s: None })
@@ -128,7 +128,7 @@ fn what_is_no_group_is_refused() {
 fn speeds_that_are_held_go_on_together_and_end_by_their_ramps() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.take_control_of_all().await;
         let turned = page.begin(jog(60.0, -30.0));
         page.hold(stage, &Deed::GroupHold {}, 30).await;
         let (wheel, arm) = (stage.velocity(WHEEL), stage.velocity(ARM));
@@ -145,7 +145,7 @@ fn speeds_that_are_held_go_on_together_and_end_by_their_ramps() {
 fn a_group_that_is_not_held_stops_within_200_ms() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.take_control_of_all().await;
         for deed in [jog(60.0, 30.0), Deed::BaseJog(base())] {
             let begun = page.begin(deed);
             page.hold(stage, &Deed::GroupHold {}, 30).await;
@@ -177,7 +177,7 @@ async fn stop_of_both(stage: &Stage, from: Instant) -> Duration {
 fn a_page_that_goes_and_a_press_of_stop_end_a_group() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.take_control_of_all().await;
         let _begun = page.begin(to(3600.0, 3600.0));
         stage.sleep(1500).await;
         assert!(stage.velocity(WHEEL) > 20.0 && stage.velocity(ARM) > 20.0);
@@ -186,7 +186,7 @@ fn a_page_that_goes_and_a_press_of_stop_end_a_group() {
         assert!(told < Duration::from_millis(200), "{told:?}");
 
         let (mut page, mut other) = (stage.page().await, stage.page().await);
-        page.must(Deed::TakeControl {}).await;
+        page.take_control_of_all().await;
         let begun = page.begin(to(-3600.0, -3600.0));
         stage.sleep(1500).await;
         assert!(stage.velocity(WHEEL) < -20.0);
@@ -200,7 +200,7 @@ fn a_page_that_goes_and_a_press_of_stop_end_a_group() {
 fn who_stops_one_of_a_group_stops_all_of_it() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.take_control_of_all().await;
         for deed in [Deed::QuickStop { node: ARM }, Deed::Disable { node: ARM }] {
             let begun = page.begin(to(7200.0, 7200.0));
             stage.sleep(1500).await;
@@ -216,7 +216,7 @@ fn who_stops_one_of_a_group_stops_all_of_it() {
 fn a_drive_of_a_group_does_nothing_else_meanwhile() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.take_control_of_all().await;
         let _begun = page.begin(to(7200.0, 7200.0));
         stage.sleep(1500).await;
         for deed in [
@@ -242,7 +242,7 @@ fn a_fault_of_one_stops_the_others_and_says_which() {
     play_acts(
         async |stage| {
             let mut page = stage.page().await;
-            page.must(Deed::TakeControl {}).await;
+            page.take_control_of_all().await;
             let answered = page.begin(to(3600.0, 3600.0));
             stage.sleep(1500).await;
             *begun.borrow_mut() = Some((page, answered));
@@ -270,7 +270,7 @@ fn a_fault_of_one_stops_the_others_and_says_which() {
 fn a_base_is_driven_by_its_twist() {
     play(async |stage| {
         let mut page = stage.page().await;
-        page.must(Deed::TakeControl {}).await;
+        page.take_control_of_all().await;
         let driven = page.begin(Deed::BaseJog(base()));
         page.hold(stage, &Deed::GroupHold {}, 20).await;
         // 0.2 m/s on a wheel of 0.1 m: 0.2 / (2 pi 0.1) turns a second.

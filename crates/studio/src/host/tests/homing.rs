@@ -75,7 +75,7 @@ fn a_run_is_told_on_its_way_and_at_its_end() {
         |world| change(world, ARM, "switch X0 min -20000"),
         async |stage| {
             let mut page = stage.page().await;
-            page.must(Deed::TakeControl {}).await;
+            page.take_control_of_all().await;
             let speed = NewValue { object: "6099:01".into(), value: "60".into() };
             page.must(Deed::WriteParameters { node: ARM, values: vec![speed], file: None }).await;
             page.seq += 1;
@@ -111,7 +111,7 @@ fn a_page_that_goes_ends_a_search() {
     play_acts(
         async |stage| {
             let mut page = stage.page().await;
-            page.must(Deed::TakeControl {}).await;
+            page.take_control_of_all().await;
             page.seq += 1;
             let _homed = page.session.ask(page.seq, Deed::Home { node: ARM, method: 17, rpm: None }).expect("room");
             stage.sleep(1000).await;

@@ -27,6 +27,9 @@ async fn two_drives_move_together_turn_while_held_and_stop_together() {
     stage.says("#group-told", "Choose two drives or more").await;
     stage.click("#group-in-2").await;
     stage.click("#group-in-4").await;
+    stage.says("#group-guarding", "Node 2: if the studio dies, nothing stops it").await;
+    stage.click("#group-guarding button").await;
+    stage.find("#group-guarding:not(:has(button))").await;
     stage.click("#group-move").await;
     stage.says("#group-told", "2 drives moved together in").await;
     stage.studio.wait("a quarter of a turn of both", |state| all(state, |node| (angle(node) - 90.0).abs() < 3.0));

@@ -11,7 +11,7 @@ async fn homing_is_chosen_by_its_picture_and_ends_with_a_stop() {
     stage.take_the_wheel().await;
     stage.click(".motion .chooser button:nth-child(2)").await;
     stage.click("#homing summary").await;
-    stage.find("#home-method option[value='24']").await;
+    stage.find("#homing .columns:not([hidden]) #home-method li[data-value='24']").await;
     stage.choose("#home-method", "24").await;
     // ZLIM42-C user manual V1.03, 5.3.6; 2030h gives no input a meaning as delivered.
     stage.says("#home-described", "looks for the home switch in positive direction, and turns round at a limit").await;
@@ -25,6 +25,10 @@ async fn homing_is_chosen_by_its_picture_and_ends_with_a_stop() {
     field.send_keys("60rpm").await.expect("typed");
     stage.click("#home-write").await;
     stage.says("#home-told", "Written and read back").await;
+    // Nothing stops this model when the studio dies: whoever moves it is asked.
+    stage.click("#home-start").await;
+    stage.click("#guarding button:focus").await;
+    stage.find("#guarding:not(:has(button))").await;
     stage.click("#home-start").await;
     stage.says("#home-progress", "moving negatively").await;
     stage.click("#theme").await;

@@ -9,12 +9,12 @@ use super::{Locator, PATIENCE, Stage, press};
 async fn the_scope_keeps_what_the_drive_said_and_saves_it() {
     let stage = Stage::open("scope").await;
     stage.take_the_wheel().await;
-    stage.click("form[aria-label=Move] button").await;
+    stage.click("#go-move").await;
     let angle = |wheel: &Value| wheel["drive"]["angle_degrees"].as_f64().expect("an angle");
     stage.wheel("a quarter of a turn", |wheel| (angle(wheel) - 90.0).abs() < 2.0);
     stage.rests();
     stage.client.perform_actions(press('4')).await.expect("a key");
-    stage.click("#scope-window option:first-child").await;
+    stage.choose("#scope-window", "1").await;
     // Longer than the half of what is shown, so that there is a reading under the cursor.
     tokio::time::sleep(std::time::Duration::from_secs(3)).await;
     stage.click("#scope-pause").await;
@@ -47,10 +47,7 @@ async fn the_scope_draws_any_object_that_passes() {
     let stage = Stage::open("scope_object").await;
     stage.click("#tabs [data-name=scope]").await;
     stage.click(".scope .chooser button:nth-child(3)").await;
-    let list = stage.find("#scope-object").await;
-    list.click().await.expect("it opens");
     // ZLAC8030L: 2029h is the bus voltage in 0.01 V, which the studio reads; 48 V is the supply as delivered.
-    stage.find("#scope-object option[value='4:2029:00']").await;
     stage.choose("#scope-object", "4:2029:00").await;
     stage.find("[data-object='4:2029:00']").await;
     // A picture of so long a time.
@@ -139,4 +136,79 @@ async fn the_edge_of_the_scope_moves_evenly_and_stands_where_the_bus_does() {
     assert!((moved["stood"].as_f64().expect("a number") - 1020.4).abs() < 1e-9, "{moved}");
     assert!((moved["anew"].as_f64().expect("a number") - 0.1).abs() < 1e-9, "{moved}");
     stage.close().await;
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn the_scope_waits_for_its_trigger_and_measures_the_step() {
+    let stage = Stage::open("trigger").await;
+    stage.take_the_wheel().await;
+    stage.click("#tabs [data-name=scope]").await;
+    stage.choose("#scope-window", "10").await;
+    stage.choose("#trigger-mode", "once").await;
+    stage.says("#trigger-status", "waits").await;
+    stage.click("#tabs [data-name=motion]").await;
+    stage.click("#go-turn").await;
+    stage.turns();
+    stage.click("#tabs [data-name=scope]").await;
+    stage.says("#trigger-status", "came at").await;
+    // The part after it, 80 % of 10 s: while the wheel goes on turning.
+    stage.find("#scope-pause[aria-pressed=true]").await;
+    stage.click("#scope-step").await;
+    // A ramp of less than a second, read nine times a second: that is said, and nothing made up.
+    let told = stage.says(".readout", "Step of Speed").await;
+    assert!(told.contains("Step of Speed: too few readings: ") && told.contains("event timer of 1 ms"), "{told}");
+    assert!(!told.contains("rise time") && !told.contains("Step of Current"), "{told}");
+    measures_what_comes_each_millisecond(&stage).await;
+    stage.click("#scope-svg").await;
+    let drawing = std::fs::read_to_string(stage.saved("node4.svg").await).expect("text");
+    assert!(
+        drawing.starts_with("<svg ") && drawing.ends_with("</svg>\n") && drawing.contains(">Speed</text>"),
+        "{drawing}"
+    );
+    stage.click("#scope-fft").await;
+    stage.shoot("scope_spectrum").await;
+    stage.close().await;
+}
+
+/// The speed in a TPDO each millisecond: from rest to 60 r/min within 120 ms, by two joined parabolas (6083h of the ZLTECH drives). Of
+/// `2 x²` and `1 - 2 (1 - x)²` 10 % lie at sqrt(0.05) and 90 % at 1 - sqrt(0.05).
+async fn measures_what_comes_each_millisecond(stage: &Stage) {
+    let set = "const done = arguments[arguments.length - 1]; import('/page/link.js').then(async ({ ask }) => { \
+               await ask({ do: 'stop', node: 4 }); await ask({ do: 'disable', node: 4 }); \
+               const pdos = [{ pdo: 'TPDO1', valid: true, objects: [{ object: '606Ch:00', bits: 32 }], transmission: 255, event_ms: 1 }]; \
+               done([await ask({ do: 'write_pdos', node: 4, pdos }), await ask({ do: 'nmt', node: 4, command: 'start' })]); })";
+    let set = stage.client.execute_async(set, Vec::new()).await.expect("it is asked");
+    assert!(set[0]["ok"] == true && set[1]["ok"] == true, "{set}");
+    stage.rests();
+    stage.choose("#trigger-mode", "off").await;
+    stage.choose("#scope-object", "4:606C:00").await;
+    stage.find("[data-object='4:606C:00']").await;
+    for hidden in ["angle_degrees", "current_a"] {
+        stage.click(&format!("[data-field={hidden}]")).await;
+    }
+    stage.choose("#scope-window", "2").await;
+    stage.choose("#trigger-field", "4:606C:00").await;
+    let level = stage.find("#trigger-level").await;
+    level.clear().await.expect("cleared");
+    // 0.1 r/min is a count.
+    level.send_keys("100").await.expect("typed");
+    stage.choose("#trigger-mode", "once").await;
+    stage.says("#trigger-status", "waits").await;
+    stage.click("#tabs [data-name=motion]").await;
+    stage.find("#velocity-ramp").await.send_keys("500").await.expect("typed");
+    stage.click("#go-turn").await;
+    stage.turns();
+    stage.click("#tabs [data-name=scope]").await;
+    stage.find("#scope-pause[aria-pressed=true]").await;
+    let told = stage.says(".readout", "Step of 4:606C:00").await;
+    let told = told.lines().find(|line| line.starts_with("Step of 4:606C:00")).expect("its line").to_owned();
+    let rise = told.split("rise time (10 to 90 %) ").nth(1).unwrap_or_else(|| panic!("{told}"));
+    let mut rise =
+        rise.split(" s,").next().expect("a time").split(" ± ").map(|part| part.parse::<f64>().expect("a number"));
+    let (rise_s, grid_s) = (rise.next().expect("a time"), rise.next().expect("what it may be off by"));
+    let truth_s = (1.0 - 2.0 * 0.05_f64.sqrt()) * 60.0 / 500.0;
+    // The shaft follows its loop, which takes some milliseconds of its own.
+    assert!(grid_s < 0.01 && (rise_s - truth_s).abs() < grid_s + 0.003, "{told}, not {truth_s} s");
+    stage.shoot("scope_step").await;
 }

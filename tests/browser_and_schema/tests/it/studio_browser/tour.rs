@@ -32,7 +32,7 @@ async fn the_tour_goes_on_when_the_drive_did_what_it_asks_for() {
     stage.says("#tour", "3 of 10: Scope").await;
     stage.client.release_actions().await.expect("a release");
     stage.rests();
-    stage.click("form[aria-label=Turn] button").await;
+    stage.click("#go-turn").await;
     stage.turns();
     stage.go_on().await;
     stage.says("#tour", "4 of 10: Parameter").await;

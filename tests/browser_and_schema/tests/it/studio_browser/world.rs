@@ -25,7 +25,7 @@ async fn what_happens_to_the_world_is_drawn_and_the_drives_say_so() {
     let stage = Stage::open("world").await;
     stage.take_the_wheel().await;
     stage.click("#enable").await;
-    stage.click("form[aria-label=Turn] button").await;
+    stage.click("#go-turn").await;
     stage.turns();
     stage.click("#tabs [data-name=world]").await;
     stage.find("[data-place='4'][aria-pressed=true]").await;

@@ -1,0 +1,14 @@
+// What moves a drive, as a group of fields with its button. Enter in a field moves nothing: only the button does, or Ctrl and Enter.
+
+import { h } from "./dom.js";
+
+/** `go` is the button that does it. */
+export function motionForm(name, go, ...fields) {
+  const root = h("div", { class: "form", role: "group", "aria-label": name }, h("h3", {}, name), ...fields, go);
+  root.addEventListener("keydown", (event) => {
+    if (event.key !== "Enter" || !event.ctrlKey || event.repeat || !event.target.matches("input")) return;
+    event.preventDefault();
+    go.click();
+  });
+  return root;
+}

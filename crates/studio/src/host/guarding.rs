@@ -1,0 +1,61 @@
+//! Every motion is guarded first: where the drive can, it stops by itself if this program dies. Where nothing stops it, whoever
+//! has control has to have accepted that before the first motion; until then nothing is begun.
+
+use canopen::NodeId;
+use master::Drive;
+use master::drive::SwitchedOff;
+
+use super::state::Host;
+use super::transactions::Refusal;
+use super::work::{Asked, refusal_of, say};
+use crate::message::Answer;
+
+/// The kind of the refusal, for programs.
+pub(super) const UNGUARDED: &str = "unguarded";
+
+impl Host {
+    /// Whoever has control wants a drive to be moved although it goes on when this program dies.
+    pub(super) fn accept_unguarded(&mut self, node: NodeId, (seq, answer): Asked) {
+        let is_drive = self.nodes.get(&node).is_some_and(|node| node.drive.is_some());
+        if !is_drive {
+            let text = "no drive is known at this node: scan the bus, and see whether it has power";
+            return say(answer, Answer::failed(Some(seq), "no_such_drive", text));
+        }
+        self.accepted.insert(node);
+        say(answer, Answer::done(seq, Vec::new()));
+    }
+
+    /// Of these drives those whose loss of the host nobody has accepted.
+    pub(super) fn not_accepted(&self, drives: &[Drive]) -> Vec<Drive> {
+        drives.iter().filter(|drive| !self.accepted.contains(&drive.node().id())).cloned().collect()
+    }
+}
+
+/// Guards a drive for a motion.
+///
+/// # Errors
+/// Nothing stops it when this program dies, and that is not accepted; those of the master.
+pub(super) async fn guard(drive: &Drive, accepted: bool) -> Result<(), Refusal> {
+    if !accepted {
+        expect_guard(drive).await?;
+    }
+    drive.guard(SwitchedOff::Leave).await.map(drop).map_err(|error| refusal_of(&error))
+}
+
+/// Expects that a guard will stop a drive. Changes nothing.
+///
+/// # Errors
+/// It will not; those of the master.
+pub(super) async fn expect_guard(drive: &Drive) -> Result<(), Refusal> {
+    let loss = drive.host_loss_if_guarded().await.map_err(|error| refusal_of(&error))?;
+    match loss.stops_after() {
+        Some(_) => Ok(()),
+        None => {
+            let node = drive.node().id();
+            let text = format!(
+                "node {node} was not moved: if this program dies in the middle of it, {loss}. Accept that first"
+            );
+            Err((UNGUARDED, text))
+        }
+    }
+}

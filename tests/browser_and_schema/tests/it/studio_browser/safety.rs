@@ -1,0 +1,252 @@
+//! What the page says when it no longer sees the drives, and that nothing on it keeps a stop from its way: in a real browser, at the
+//! widths of a telephone, a tablet and a desk.
+
+use std::io::{BufRead, BufReader, Write};
+use std::net::TcpStream;
+use std::time::Duration;
+
+use fantoccini::key::Key;
+use serde_json::{Value, json};
+
+use super::{PATIENCE, Stage, press, speed};
+
+/// The stepper of the embedded bus, by its place: nothing stops it when the studio dies.
+const STEPPER: usize = 1;
+
+const VIEWS: [&str; 9] = ["bus", "drive", "motion", "scope", "parameters", "pdo", "trace", "faults", "world"];
+
+impl Stage {
+    /// A window of this size; narrow ones as those of a device that is touched, whose layout is as wide as what stands in it. By a
+    /// command of Chromium's own (Chrome DevTools Protocol), which its driver passes on.
+    async fn device(&self, width: u32, height: u32) {
+        let session = self.client.session_id().await.expect("it answers").expect("it has begun");
+        let metrics = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 1000 });
+        let body = json!({ "cmd": "Emulation.setDeviceMetricsOverride", "params": metrics }).to_string();
+        let stream = TcpStream::connect(&self.driver_address).expect("the driver listens");
+        stream.set_read_timeout(Some(PATIENCE)).expect("it takes it");
+        let head = format!(
+            "POST /session/{session}/goog/cdp/execute HTTP/1.1\r\nHost: {}\r\nContent-Length: {}\r\n\r\n",
+            self.driver_address,
+            body.len()
+        );
+        (&stream).write_all((head + &body).as_bytes()).expect("it is sent");
+        let mut answer = String::new();
+        BufReader::new(&stream).read_line(&mut answer).expect("it answers");
+        assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+    }
+
+    async fn script(&self, script: &str) -> Value {
+        self.client.execute(script, Vec::new()).await.unwrap_or_else(|error| panic!("{script}: {error}"))
+    }
+
+    async fn key(&self, key: impl Into<char>) {
+        self.client.perform_actions(press(key.into())).await.expect("a key");
+        self.client.release_actions().await.expect("a release");
+    }
+
+    async fn focus(&self, css: &str) {
+        self.find(css).await;
+        self.script(&format!("document.querySelector({css:?}).focus()")).await;
+    }
+
+    async fn take_the_stepper(&self) {
+        self.take_the_wheel().await;
+        self.click(".motion .chooser button:nth-child(2)").await;
+        self.find(".motion .chooser button:nth-child(2)[aria-pressed=true]").await;
+    }
+
+    /// Sends a signal to the studio.
+    fn signal(&self, name: &str) {
+        let sent = std::process::Command::new("kill").args([name, &self.studio.child.id().to_string()]).status();
+        assert!(sent.is_ok_and(|status| status.success()), "{name}");
+    }
+
+    fn stepper(&self, what: &str, wanted: impl Fn(&Value) -> bool) {
+        self.studio.wait(what, |state| wanted(&state["nodes"][STEPPER]));
+    }
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn a_studio_that_freezes_or_dies_is_said_to_and_so_is_a_stop_that_nobody_confirms() {
+    let stage = Stage::open("frozen").await;
+    stage.take_the_stepper().await;
+    stage.says("#guarding .bad", "Node 2: if the studio dies, nothing stops it").await;
+    stage.click("#go-turn").await;
+    stage.find("#guarding button:focus").await;
+    stage.shoot("guarding").await;
+    stage.stepper("a stepper that is not even enabled", |node| node["drive"]["state"] == "Switch on disabled");
+    stage.click("#guarding button").await;
+    stage.find("#guarding:not(:has(button))").await;
+    stage.click("#go-turn").await;
+    stage.stepper("a stepper that turns", |node| speed(node) > 50.0);
+    stage.says(".motion .status", "in motion by this studio").await;
+    // A stop is confirmed by whoever moves the drives, and nothing is said.
+    stage.key(Key::Escape).await;
+    stage.stepper("a stepper that rests", |node| speed(node) < 2.0);
+    stage.find("#stop-notice[hidden]").await;
+    stage.stepper("motion is told of what turns alone", |node| !node["moving"].as_bool().unwrap_or(true));
+    stage.click("#go-turn").await;
+    stage.stepper("a stepper that turns", |node| speed(node) > 50.0);
+    stage.signal("-STOP");
+    let told = stage.says("#banner:not([hidden])", "no longer knows what moves").await;
+    assert!(told.contains("Node 2 has nothing that stops it if the studio is dead: use the emergency stop"), "{told}");
+    assert!(!told.contains("is stopped"), "{told}");
+    stage.find("body.unseen .motion fieldset[disabled]").await;
+    assert!(!stage.says("#control", "nothing new").await.contains("You have control"));
+    assert!(!stage.says(".motion .status", "Not known").await.contains("in motion"));
+    let opacity = stage.script("return Number(getComputedStyle(document.querySelector('#view')).opacity)").await;
+    assert!(opacity.as_f64().is_some_and(|opacity| opacity < 0.6), "values are grey: {opacity}");
+    stage.key(Key::Escape).await;
+    stage.says("#stop-notice.unconfirmed", "STOP WAS NOT CONFIRMED: use the emergency stop").await;
+    let wide = stage.script("const of = document.querySelector('#stop-notice').getBoundingClientRect(); return of.width / document.documentElement.clientWidth").await;
+    assert!(wide.as_f64().is_some_and(|part| part > 0.99), "over the whole width: {wide}");
+    stage.shoot("frozen").await;
+    stage.device(375, 667).await;
+    stage.shoot("frozen_375").await;
+    stage.device(1280, 900).await;
+    // It goes on: whoever had it in hand is long gone, and the page sees again.
+    stage.signal("-CONT");
+    stage.find("body:not(.unseen)").await;
+    stage.stepper("a stepper that rests", |node| speed(node) < 2.0);
+    stage.signal("-KILL");
+    stage.says("#banner:not([hidden])", "No connection to the studio").await;
+    stage.find("body.unseen").await;
+    stage.close().await;
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn esc_and_space_stop_with_any_list_open() {
+    let stage = Stage::open("lists").await;
+    stage.take_the_wheel().await;
+    assert_eq!(stage.script("return document.querySelectorAll('select').length").await, 0);
+    let lists = [
+        ("scope", "#scope-window"),
+        ("scope", "#trigger-mode"),
+        ("scope", "#scope-object"),
+        ("motion", "#base-left"),
+        ("world", ".world-form .choice"),
+    ];
+    for (at, (view, list)) in lists.into_iter().enumerate() {
+        stage.click("#tabs [data-name=motion]").await;
+        stage.click("#go-turn").await;
+        stage.turns();
+        stage.click(&format!("#tabs [data-name={view}]")).await;
+        if view == "motion" {
+            stage.click("#group summary").await;
+        }
+        stage.click_for(&format!("{list} > button"), &format!("{list} > ul:not([hidden])")).await;
+        if at == 0 {
+            stage.shoot("choice").await;
+        }
+        stage.key(if at % 2 == 0 { char::from(Key::Escape) } else { ' ' }).await;
+        stage.rests();
+        stage.wheel("a quick stop", |wheel| wheel["drive"]["state"] != "Operation enabled");
+        stage.find(&format!("{list} > ul[hidden]")).await;
+    }
+    assert_eq!(stage.script("return document.querySelectorAll('select, input[type=checkbox]').length").await, 0);
+    stage.close().await;
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn by_the_keyboard_everything_is_chosen_and_nothing_moves_by_enter_or_a_letter() {
+    let stage = Stage::open("keyboard").await;
+    stage.take_the_wheel().await;
+    let rests = |stage: &Stage| stage.wheel("no power", |wheel| wheel["drive"]["state"] == "Switch on disabled");
+    stage.says("#go-turn", "Enable and turn").await;
+    for field in ["#velocity-rpm", "#velocity-ramp", "#move-degrees", "#torque-amperes", "#jog-speed", "#group-rpm"] {
+        if field == "#group-rpm" {
+            stage.click("#group summary").await;
+        }
+        stage.focus(field).await;
+        stage.key(Key::Enter).await;
+    }
+    stage.script("document.activeElement.blur()").await;
+    for letter in ('a'..='z').filter(|letter| *letter != 'p') {
+        stage.key(letter).await;
+    }
+    // A thing that is told meanwhile would be seen: pictures come every 50 ms.
+    tokio::time::sleep(Duration::from_millis(500)).await;
+    rests(&stage);
+    let answered = stage.studio.state();
+    assert!(answered["nodes"].as_array().expect("nodes").iter().all(|node| node["moving"] == false), "{answered}");
+    for (view, toggle) in [
+        ("motion", "#move-relative"),
+        ("parameters", "#parameters-changed"),
+        ("trace", "#trace-quiet"),
+        ("faults", "#faults-only"),
+    ] {
+        stage.click(&format!("#tabs [data-name={view}]")).await;
+        let before = stage.find(toggle).await.attr("aria-pressed").await.expect("it answers").expect("it has it");
+        stage.focus(toggle).await;
+        stage.key(Key::Enter).await;
+        stage.find(&format!("{toggle}[aria-pressed={}]", before != "true")).await;
+    }
+    stage.click("#tabs [data-name=scope]").await;
+    stage.focus("#scope-window > button").await;
+    for key in [Key::Down, Key::Down, Key::Enter] {
+        stage.key(key).await;
+    }
+    stage.says("#scope-window > button", "30 s").await;
+    rests(&stage);
+    stage.click("#tabs [data-name=motion]").await;
+    stage.focus("#velocity-rpm").await;
+    stage
+        .find("#velocity-rpm")
+        .await
+        .send_keys(&(Key::Control + &char::from(Key::Enter).to_string()))
+        .await
+        .expect("keys");
+    stage.turns();
+    stage.says("#go-turn", "Turn").await;
+    stage.key(Key::Escape).await;
+    stage.rests();
+    stage.close().await;
+}
+
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn stop_is_on_the_screen_in_every_view_at_every_width() {
+    let stage = Stage::open("widths").await;
+    stage.click("#take").await;
+    stage.find("#release").await;
+    for (width, height) in [(320, 568), (375, 667), (667, 375), (820, 1180), (1366, 768)] {
+        stage.device(width, height).await;
+        for view in VIEWS {
+            stage.script(&format!("document.querySelector('#tabs [data-name={view}]').click()")).await;
+            stage.find(&format!("#tabs [data-name={view}][aria-current=page]")).await;
+            for open in ["#group", "#homing", ".parameters details.group"] {
+                stage.script(&format!("const of = document.querySelector({open:?}); if (of) of.open = true")).await;
+            }
+            // What is fetched for it has come, and is drawn.
+            tokio::time::sleep(Duration::from_millis(400)).await;
+            let seen = stage
+                .script(
+                    "scrollTo(0, document.body.scrollHeight); \
+                     const of = document.querySelector('#stop').getBoundingClientRect(), view = visualViewport; \
+                     const top = document.elementFromPoint((of.left + of.right) / 2, (of.top + of.bottom) / 2)?.id; \
+                     const bus = document.querySelector('#bus-line'); \
+                     const bar = document.querySelector('header'); \
+                     const stays = Math.max(...[bar, document.querySelector('#tabs')].filter((one) => getComputedStyle(one).position === 'sticky').map((one) => one.getBoundingClientRect().height)); \
+                     return { left: of.left, top: of.top, right: of.right - view.width, bottom: of.bottom - view.height, \
+                              scale: view.scale, wide: document.documentElement.scrollWidth - innerWidth, id: top, \
+                              cut: bus.scrollWidth - bus.clientWidth, stays: stays / view.height, text: bus.textContent }",
+                )
+                .await;
+            let what = format!("{view} at {width}: {seen}");
+            let number = |name: &str| seen[name].as_f64().unwrap_or_else(|| panic!("{what}"));
+            assert!(number("left") >= 0.0 && number("top") >= 0.0, "{what}");
+            assert!(number("right") <= 0.0 && number("bottom") <= 0.0, "{what}");
+            assert!(number("wide") <= 0.0 && (number("scale") - 1.0).abs() < 1e-6, "{what}");
+            assert_eq!(seen["id"], "stop", "nothing lies over it: {what}");
+            assert!(number("cut") <= 0.0 && seen["text"].as_str().is_some_and(|text| text.contains("load ")), "{what}");
+            assert!(number("stays") < 0.17, "the header leaves the room to the view: {what}");
+            if width != 667 {
+                stage.shoot(&format!("{view}_{width}")).await;
+            }
+        }
+    }
+    stage.close().await;
+}

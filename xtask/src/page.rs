@@ -1,0 +1,36 @@
+//! What the studio's page computes and says, by node: the parts of it that need no browser.
+
+use std::process::Command;
+
+use crate::debian;
+use crate::process;
+use crate::say::say;
+use crate::tally::Tally;
+use crate::workspace;
+
+/// What runs JavaScript, with the package of Debian that it is in.
+const PROGRAMS: &[(&str, &str)] = &[("node", "nodejs")];
+
+pub(crate) fn step() -> Tally {
+    if let Err(reason) = debian::install(PROGRAMS) {
+        return Tally::skipped(reason);
+    }
+    let mut tally = Tally::default();
+    let mut node = Command::new("node");
+    node.current_dir(workspace::root().join("crates/studio")).args(["--test", "--test-reporter=tap", "page_tests/"]);
+    let ended = process::run(&mut node, |line| match line.split_once("ok ") {
+        Some(("", _)) => tally.passed += 1,
+        Some(("not ", name)) => {
+            tally.failed += 1;
+            say(format_args!("not ok {name}"));
+        }
+        _ if tally.failed > 0 && !line.starts_with('#') => say(line),
+        _ => {}
+    });
+    match ended {
+        Err(error) => Tally::failed(error),
+        Ok(false) if tally.failed == 0 => Tally::failed("node --test failed"),
+        Ok(_) if tally.passed + tally.failed == 0 => Tally::failed("no test was found"),
+        Ok(_) => tally,
+    }
+}
