@@ -1,5 +1,6 @@
 //! Runs the built `ferrodrive`, for a moment or for a while.
 
+mod patience;
 pub mod raw_bus;
 pub mod studio;
 
@@ -12,8 +13,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-/// Longest wait for a line of a simulator.
-const PATIENCE: Duration = Duration::from_secs(20);
+pub use patience::{PATIENCE, wait_for, wait_until};
 
 /// How a command ended, and what it printed.
 pub struct Ended {
@@ -130,8 +130,8 @@ impl Simulator {
     pub fn error(&self, part: &str) -> String {
         let errors = self.errors.as_ref().expect("standard error is kept");
         loop {
-            let line =
-                errors.recv_timeout(PATIENCE).unwrap_or_else(|_| panic!("no {part:?} on standard error in time"));
+            // The watchdog's.
+            let line = errors.recv_timeout(PATIENCE).unwrap_or_else(|_| panic!("no {part:?} on standard error"));
             if line.contains(part) {
                 return line;
             }
@@ -156,7 +156,8 @@ impl Simulator {
 
     /// The next line that it prints.
     pub fn line(&self) -> String {
-        self.lines.recv_timeout(PATIENCE).expect("a line in time")
+        // The watchdog's.
+        self.lines.recv_timeout(PATIENCE).expect("a line")
     }
 
     /// All lines left on the standard output of one that ends.

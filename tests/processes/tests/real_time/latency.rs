@@ -38,7 +38,7 @@ fn on_a_virtual_bus_an_answer_takes_what_its_frame_takes_and_sync_is_even() {
 fn answers_and_sync_are_measured_over_tcp_and_the_text_has_its_bars() {
     let simulator = Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
     let bus = simulator.bus("socketcand");
-    let on_bus = |arguments: &[&str]| done(&[&["--bus", &bus, "--timeout", "1s"], arguments].concat());
+    let on_bus = |arguments: &[&str]| done(&[&["--bus", &bus, "--timeout", "10s"], arguments].concat());
     done(&["--bus", &bus, "--timeout", "10s", "read", "4", "1000"]);
     let report = on_bus(&["--json", "latency", "4", "--count", "30"]).json();
     assert_eq!(figure(&report, "sdo", "count"), 30.0);
@@ -74,7 +74,7 @@ fn a_tpdo_that_follows_sync_is_measured_and_is_no_faster_than_its_wire() {
 fn a_bus_with_a_motor_switched_on_is_sent_no_sync() {
     let simulator = Simulator::start(&["--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
     let bus = simulator.bus("socketcand");
-    let on_bus = |arguments: &[&str]| done(&[&["--bus", &bus, "--timeout", "1s"], arguments].concat());
+    let on_bus = |arguments: &[&str]| done(&[&["--bus", &bus, "--timeout", "10s"], arguments].concat());
     done(&["--bus", &bus, "--timeout", "10s", "read", "4", "1000"]);
     on_bus(&["--model", "4=zlac8030l", "enable", "4"]);
     // Not only the node that is asked counts.
