@@ -45,9 +45,17 @@ pub fn program() -> &'static str {
     })
 }
 
-/// The program with these arguments, and nothing of this environment that it would listen to.
+/// Commands that ask nobody, or each node-ID whether somebody is there.
+const NOT_PATIENT: [&str; 3] = ["sim", "dump", "scan"];
+
+/// The program with these arguments, and nothing of this environment that it would listen to. Who asks on a served bus waits longer
+/// for an answer than a person would: on a busy machine the bus may be seconds behind.
 pub fn command(arguments: &[&str]) -> Command {
     let mut command = Command::new(program());
+    let served = arguments.windows(2).any(|pair| pair[0] == "--bus" && pair[1].contains("://"));
+    if served && !arguments.iter().any(|word| *word == "--timeout" || NOT_PATIENT.contains(word)) {
+        command.args(["--timeout", "10s"]);
+    }
     command.args(arguments).env_remove("FERRODRIVE_BUS").env_remove("FERRODRIVE_MACHINE").env("NO_COLOR", "1");
     command
 }

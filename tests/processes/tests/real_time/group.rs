@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use processes::{Ended, Simulator, done, ferrodrive, wait_until};
+use processes::{Ended, Simulator, command, done, ferrodrive, wait_until};
 use serde_json::Value;
 
 fn example(name: &str) -> String {
@@ -142,9 +142,8 @@ impl Bench {
 
     /// A busy machine may be late by some hundred milliseconds: that is not what these tests are about.
     fn start(&self, arguments: &[&str]) -> Child {
-        Command::new(processes::program())
-            .args(["--bus", &self.bus, "--model", "4=zlac8030l", "--model", "5=zlac8030l", "--json"])
-            .args(arguments)
+        let on_bus = ["--bus", &self.bus, "--model", "4=zlac8030l", "--model", "5=zlac8030l", "--json"];
+        command(&[&on_bus, arguments].concat())
             .args(["--tolerance", "100"])
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())

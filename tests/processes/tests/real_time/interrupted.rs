@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use processes::{Simulator, done, ferrodrive, is_heard, wait_until};
+use processes::{Simulator, command, done, ferrodrive, is_heard, wait_until};
 
 const DRIVES: [(&str, &str, &str); 4] = [
     ("4", "zlac8030l", "4=zlac8030l"),
@@ -22,9 +22,7 @@ fn bench() -> Simulator {
 }
 
 fn start(bus: &str, model: &str, arguments: &[&str]) -> Child {
-    Command::new(processes::program())
-        .args(["--bus", bus, "--model", model])
-        .args(arguments)
+    command(&[&["--bus", bus, "--model", model], arguments].concat())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -84,8 +82,8 @@ fn every_motion_is_stopped_by(signal: &str, status: i32) {
             let ended = moving.wait_with_output().unwrap();
             let speed = speed(&mut simulator, node);
             assert!(speed.abs() < 20.0, "{motion:?}: still at {speed} r/min");
-            assert_eq!(ended.status.code(), Some(status), "{motion:?}");
             let said = String::from_utf8(ended.stderr).unwrap();
+            assert_eq!(ended.status.code(), Some(status), "{motion:?}: {said}");
             assert!(said.contains(&format!("node {node} was moving and has been quick-stopped")), "{motion:?}: {said}");
             done(&["--bus", &bus, "--model", model, "disable", node]);
         }

@@ -8,7 +8,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use processes::{Simulator, done, wait_until};
+use processes::{Simulator, command, done, wait_until};
 use serde_json::{Value, json};
 
 const JOINT: (&str, &str) = ("1", "1=m4230e17b50");
@@ -60,10 +60,7 @@ impl Bench {
     }
 
     fn moving_by(&mut self, (node, model): (&str, &str), motion: &[&str], options: &[&str]) -> Child {
-        let child = Command::new(processes::program())
-            .args(["--bus", &self.bus, "--model", model])
-            .args(motion)
-            .args(options)
+        let child = command(&[&["--bus", &self.bus, "--model", model], motion, options].concat())
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
             .spawn()
