@@ -14,28 +14,7 @@ use std::time::{Duration, Instant};
 
 use crate::test_programs::{self, Program};
 use crate::{libtest, process, workspace};
-use list::DEFECTS;
-
-/// One line that is written wrongly.
-struct Defect {
-    /// The file, from the root of the workspace.
-    file: &'static str,
-    /// What is there, once.
-    text: &'static str,
-    /// What is written instead.
-    instead: &'static str,
-    noticed_by: Tests,
-}
-
-/// A program with tests.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Tests {
-    package: &'static str,
-    /// `--lib`, or the name of an integration test.
-    target: &'static str,
-    /// A part of the names of the tests that run; empty for all.
-    filter: &'static str,
-}
+use list::{DEFECTS, Defect, Tests};
 
 /// What became of a defect.
 #[derive(Debug, PartialEq, Eq)]
@@ -49,12 +28,6 @@ enum Verdict {
 
 /// Tests that take longer do not end.
 const LONGEST: Duration = Duration::from_mins(30);
-
-impl Tests {
-    const fn of(package: &'static str, target: &'static str) -> Self {
-        Self { package, target, filter: "" }
-    }
-}
 
 pub(crate) fn command(words: &[&str]) -> ExitCode {
     match chosen(words).and_then(|numbers| check(&numbers)) {

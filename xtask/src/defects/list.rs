@@ -3,7 +3,32 @@
 //! A line each, of the kind that a person writes by mistake: a limit by one, a sign, a word for its neighbour. Where a defect was not
 //! noticed a test was missing, and has been written.
 
-use super::{Defect, Tests};
+/// One line that is written wrongly.
+pub(super) struct Defect {
+    /// The file, from the root of the workspace.
+    pub(super) file: &'static str,
+    /// What is there, once.
+    pub(super) text: &'static str,
+    /// What is written instead.
+    pub(super) instead: &'static str,
+    pub(super) noticed_by: Tests,
+}
+
+/// A program with tests.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Tests {
+    pub(super) package: &'static str,
+    /// `--lib`, or the name of an integration test.
+    pub(super) target: &'static str,
+    /// A part of the names of the tests that run; empty for all.
+    pub(super) filter: &'static str,
+}
+
+impl Tests {
+    pub(super) const fn of(package: &'static str, target: &'static str) -> Self {
+        Self { package, target, filter: "" }
+    }
+}
 
 const CAN: Tests = Tests::of("ferrodrive-can", "--lib");
 const CANOPEN: Tests = Tests::of("ferrodrive-canopen", "--lib");
