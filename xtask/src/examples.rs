@@ -13,7 +13,7 @@ use crate::tally::Tally;
 use crate::{process, workspace};
 
 /// An example is for a person to watch. One that takes longer does not end.
-const TIME_LIMIT: Duration = Duration::from_mins(10);
+const TIME_LIMIT: Duration = Duration::from_secs(600);
 
 /// How an example ended.
 #[derive(Debug, PartialEq, Eq)]
@@ -103,7 +103,7 @@ mod tests {
     use super::*;
 
     /// A watchdog against hangs.
-    const PATIENCE: Duration = Duration::from_mins(10);
+    const PATIENCE: Duration = Duration::from_secs(600);
 
     fn shell(script: &str, limit: Duration) -> (Ending, Vec<String>) {
         let mut command = Command::new("sh");

@@ -330,7 +330,7 @@ mod tests {
         drop(clock);
         let patience = std::time::Instant::now();
         while queue.strong_count() > 0 {
-            assert!(patience.elapsed() < Duration::from_mins(10), "timer thread still runs");
+            assert!(patience.elapsed() < Duration::from_secs(600), "timer thread still runs");
             std::thread::yield_now();
         }
     }

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 /// A watchdog against hangs, which no test is about: what has not come by then does not come.
-pub const PATIENCE: Duration = Duration::from_mins(10);
+pub const PATIENCE: Duration = Duration::from_secs(600);
 
 /// Between two looks.
 const LOOK: Duration = Duration::from_millis(20);

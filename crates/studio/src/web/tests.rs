@@ -23,7 +23,7 @@ use crate::message::Answer;
 use crate::trace::{Origin, Passed, Trace};
 
 /// A watchdog against hangs.
-const PATIENCE: Duration = Duration::from_mins(10);
+const PATIENCE: Duration = Duration::from_secs(600);
 
 const ADDRESS: &str = "127.0.0.1:8402";
 
